@@ -54,6 +54,15 @@ PetscErrorCode SbScanPoint(SbScan *scan, const char *what, int64_t number,
 /* A count of things that take at least so many bytes each as text and in binary: more than the file holds is an error. */
 PetscErrorCode SbScanRoom(SbScan *scan, const char *what, int64_t n, int64_t text_bytes,
                           int64_t binary_bytes);
+/* How a number stands in binary data. */
+typedef struct {
+  char kind; /* 'i' signed, 'u' unsigned, 'f' floating point */
+  int size;  /* bytes */
+} SbNumberType;
+/* The next word, one of the names that VTK's and PLY files have for types. */
+PetscErrorCode SbScanType(SbScan *scan, SbNumberType *type);
+/* n numbers of this type from bytes. */
+void SbNumbersConvert(SbNumberType type, PetscBool big_endian, size_t n, const void *bytes, double value[]);
 /* The next word; empty at the end of the file. */
 PetscErrorCode SbScanWord(SbScan *scan, size_t size, char word[]);
 PetscErrorCode SbScanEndOfLine(SbScan *scan); /* to the first byte after it */

@@ -36,8 +36,13 @@ PetscInt SbFacesFind(const SbFaces *faces, const PetscInt vert[3], PetscInt slot
 PetscErrorCode SbImportDropUnused(SbImport *import);
 /* Drops unused vertices, turns cells, refuses what would make the physics wrong; builds the faces. */
 PetscErrorCode SbImportCheck(SbImport *import, SbFaces *faces);
-/* How many tets have a dihedral angle below this, and the smallest of all, degrees. */
-PetscErrorCode SbImportSlivers(const SbImport *import, PetscReal degrees, PetscInt *n, PetscReal *smallest);
+/* Sums and maxima over tets and vertices; neutral where there are none. */
+typedef struct {
+  PetscInt nsliver;  /* tets with a dihedral angle below that wanted */
+  PetscReal volume;  /* m^3 */
+  PetscReal most[8]; /* cosine of a dihedral angle, radius ratio, -x, -y, -z, x, y, z */
+} SbShape;
+void SbImportShape(const SbImport *import, PetscReal degrees, SbShape *shape);
 
 /*
   SbTetQuality - shape of a tet with corners x, m: 3 r / R with the radii of the spheres in it and around it, 1 for the regular one, 0 for a flat

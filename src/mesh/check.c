@@ -9,7 +9,6 @@
   A tet is flat when its height over the longest edge L is below 1e-12, or below the rounding of its coordinates:
   |det| <= (1e-12 L + 8 eps max|x|) L^2. The thinnest slivers worth simulating are nine orders above the first term.
 */
-#include <stdlib.h>
 #include "mesh_impl.h"
 
 /* ------------------------------------------------------------------ unused vertices */
@@ -174,17 +173,10 @@ PetscErrorCode SbImportCheckFaces(const SbImport *im, const SbFaces *faces)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static int compare_edges(const void *a, const void *b)
-{
-  const uint64_t p = *(const uint64_t *)a, q = *(const uint64_t *)b;
-
-  return (p > q) - (p < q);
-}
-
 PetscErrorCode SbImportCheck(SbImport *im, SbFaces *faces)
 {
   PetscInt slots[2], n = 0;
-  uint64_t *edge;
+  PetscInt64 *edge;
 
   PetscFunctionBeginUser;
   PetscCall(SbImportDropUnused(im));
@@ -202,10 +194,10 @@ PetscErrorCode SbImportCheck(SbImport *im, SbFaces *faces)
       const PetscInt *v = im->item[3].vert + 4 * (s / 4), a = v[SbFaceVertex[s % 4][i]],
                      b = v[SbFaceVertex[s % 4][(i + 1) % 3]];
 
-      edge[n++] = (uint64_t)PetscMin(a, b) << 32 | (uint64_t)PetscMax(a, b);
+      edge[n++] = (PetscInt64)PetscMin(a, b) << 32 | (PetscInt64)PetscMax(a, b);
     }
   }
-  qsort(edge, (size_t)n, sizeof(*edge), compare_edges);
+  PetscCall(PetscSortInt64(n, edge));
   for (PetscInt i = 0, m; i < n; i += m) {
     for (m = 1; i + m < n && edge[i + m] == edge[i]; m++) {
     }

@@ -31,22 +31,27 @@ static PetscErrorCode cells_destroy(Cells *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For each rank the vertices of the cells that go there, in the order of their first cell: at[n][4] is the position of a cell's vertices in the list of its rank. */
-static PetscErrorCode list_vertices(const Cells *from, const SbRoute *route, const PetscInt which[],
-                                    const PetscMPIInt dest[], PetscInt at[], PetscInt *nlist, PetscInt **list,
-                                    PetscMPIInt **to)
+/* Sends the cells which[] (NULL: all) to ranks dest[], as the route says. */
+static PetscErrorCode send_cells(const Cells *from, const SbRoute *route, const PetscInt which[],
+                                 const PetscMPIInt dest[], Cells *to)
 {
-  PetscInt *order, *position, *count, n = 0;
-  PetscMPIInt *mark;
+  PetscInt *at, *list, nlist = 0, *order, *position, *count;
+  PetscMPIInt *list_dest, *owner = NULL, *mark;
+  SbRoute vertices;
+  SbVertexData *vertex;
+  SbCellData *data = NULL;
 
   PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(to, sizeof(*to)));
+  // for each rank the vertices of the cells that go there, in the order of their first cell; at[][4]: the places of a cell's vertices in that list
+  PetscCall(PetscMalloc1(4 * (size_t)route->nsend, &at));
   PetscCall(
     PetscMalloc4(route->nsend, &order, from->nvert, &position, route->size, &count, from->nvert, &mark));
   for (PetscInt i = 0; i < route->nsend; i++) order[route->position[i]] = i;
   for (int pass = 0; pass < 2; pass++) {
     for (PetscInt v = 0; v < from->nvert; v++) mark[v] = -1;
     for (PetscMPIInt r = 0; r < route->size; r++) count[r] = 0;
-    n = 0;
+    nlist = 0;
     for (PetscInt k = 0; k < route->nsend; k++) {
       const PetscInt i = order[k], *v = from->cell + 4 * (size_t)(which ? which[i] : i);
 
@@ -55,36 +60,17 @@ static PetscErrorCode list_vertices(const Cells *from, const SbRoute *route, con
           mark[v[a]] = dest[i];
           position[v[a]] = count[dest[i]]++;
           if (pass) {
-            (*list)[n] = v[a];
-            (*to)[n] = dest[i];
+            list[nlist] = v[a];
+            list_dest[nlist] = dest[i];
           }
-          n++;
+          nlist++;
         }
         at[4 * (size_t)i + a] = position[v[a]];
       }
     }
-    if (!pass) PetscCall(PetscMalloc2(n, list, n, to));
+    if (!pass) PetscCall(PetscMalloc2(nlist, &list, nlist, &list_dest));
   }
-  *nlist = n;
   PetscCall(PetscFree4(order, position, count, mark));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Sends the cells which[] (NULL: all) to ranks dest[], as the route says. */
-static PetscErrorCode send_cells(const Cells *from, const SbRoute *route, const PetscInt which[],
-                                 const PetscMPIInt dest[], Cells *to)
-{
-  PetscInt *at, *list, nlist;
-  PetscMPIInt *list_dest, *owner = NULL;
-  SbRoute vertices;
-  SbVertexData *vertex;
-  SbCellData *data = NULL;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(to, sizeof(*to)));
-  /* cells as positions in the list of vertices of their rank */
-  PetscCall(PetscMalloc1(4 * (size_t)route->nsend, &at));
-  PetscCall(list_vertices(from, route, which, dest, at, &nlist, &list, &list_dest));
   PetscCall(SbRouteCreate(route->comm, nlist, list_dest, &vertices));
   PetscCall(SbRouteSend(route, 4 * sizeof(PetscInt), at, &to->cell));
   PetscCall(PetscFree(at));
@@ -131,39 +117,6 @@ static PetscErrorCode ascending(PetscInt n, const PetscInt number[], PetscInt or
   PetscCall(PetscArraycpy(key, number, n));
   PetscCall(PetscSortIntWithArray(n, key, order));
   PetscCall(PetscFree(key));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Owned cells and their vertices by original number; a vertex that came from several ranks becomes one. */
-static PetscErrorCode keep_owned(Cells *c, SbLocalMesh *local)
-{
-  PetscInt *number, *order, *position, n = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc3(PetscMax(c->nvert, c->ncell), &number, PetscMax(c->nvert, c->ncell), &order,
-                         c->nvert, &position));
-  for (PetscInt v = 0; v < c->nvert; v++) number[v] = c->vertex[v].orig;
-  PetscCall(ascending(c->nvert, number, order));
-  PetscCall(PetscMalloc1(c->nvert, &local->vertex));
-  for (PetscInt i = 0; i < c->nvert; i++) {
-    const SbVertexData *v = &c->vertex[order[i]];
-
-    if (!n || local->vertex[n - 1].orig != v->orig) local->vertex[n++] = *v;
-    position[order[i]] = n - 1;
-  }
-  local->nvert = local->nvert_cells = n;
-  PetscCall(PetscFree(c->vertex));
-  for (PetscInt k = 0; k < c->ncell; k++) number[k] = c->data[k].orig;
-  PetscCall(ascending(c->ncell, number, order));
-  PetscCall(PetscMalloc1(4 * (size_t)c->ncell, &local->cell));
-  PetscCall(PetscMalloc1(c->ncell, &local->data));
-  for (PetscInt k = 0; k < c->ncell; k++) {
-    local->data[k] = c->data[order[k]];
-    for (int a = 0; a < 4; a++) local->cell[4 * (size_t)k + a] = position[c->cell[4 * (size_t)order[k] + a]];
-  }
-  local->ncell = local->ncell_owned = c->ncell;
-  PetscCall(PetscFree3(number, order, position));
-  PetscCall(cells_destroy(c));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -266,37 +219,6 @@ static int compare_shared(const void *a, const void *b)
   return (p->orig > q->orig) - (p->orig < q->orig);
 }
 
-/* Vertices of the same ranks go to them in equal runs along the longest side of their box. */
-static PetscErrorCode choose_owners(const SbLocalMesh *local, Border *border, PetscMPIInt me,
-                                    PetscMPIInt owner[])
-{
-  PetscInt n;
-
-  PetscFunctionBeginUser;
-  for (PetscInt v = 0; v < local->nvert_cells; v++) owner[v] = me;
-  if (border->n) qsort(border->vert, (size_t)border->n, sizeof(Shared), compare_shared);
-  for (PetscInt i = 0; i < border->n; i += n) {
-    Shared *s = border->vert + i;
-    PetscReal low[3], high[3];
-    int axis = 0;
-
-    for (n = 1; i + n < border->n && !compare_ranks(s, s + n);) n++;
-    for (int d = 0; d < 3; d++) {
-      low[d] = high[d] = local->vertex[s[0].vert].x[d];
-      for (PetscInt k = 1; k < n; k++) {
-        low[d] = PetscMin(low[d], local->vertex[s[k].vert].x[d]);
-        high[d] = PetscMax(high[d], local->vertex[s[k].vert].x[d]);
-      }
-      if (high[d] - low[d] > high[axis] - low[axis]) axis = d;
-    }
-    for (PetscInt k = 0; k < n; k++) s[k].along = local->vertex[s[k].vert].x[axis];
-    qsort(s, (size_t)n, sizeof(Shared), compare_shared);
-    for (PetscInt k = 0; k < n; k++)
-      owner[s[k].vert] = (PetscMPIInt)s[k].rank[2 * ((PetscInt64)k * s[k].n / n)];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ ghosts */
 
 /* Which owned cells are copied to which ranks. */
@@ -344,41 +266,6 @@ static PetscErrorCode list_copies(const SbLocalMesh *local, const Border *border
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Appends the ghosts and those of their vertices that are new here. */
-static PetscErrorCode append_ghosts(const Cells *g, SbLocalMesh *local)
-{
-  PetscInt *orig, *number, *order, *position, n = local->nvert;
-
-  PetscFunctionBeginUser;
-  PetscCall(
-    PetscMalloc4(local->nvert_cells, &orig, g->nvert, &number, g->nvert, &order, g->nvert, &position));
-  for (PetscInt v = 0; v < local->nvert_cells; v++) orig[v] = local->vertex[v].orig;
-  for (PetscInt v = 0; v < g->nvert; v++) number[v] = g->vertex[v].orig;
-  PetscCall(ascending(g->nvert, number, order));
-  PetscCall(PetscRealloc((size_t)(n + g->nvert) * sizeof(SbVertexData), &local->vertex));
-  PetscCall(PetscRealloc((size_t)(n + g->nvert) * sizeof(PetscMPIInt), &local->owner));
-  for (PetscInt i = 0; i < g->nvert; i++) {
-    const PetscInt v = order[i];
-
-    PetscCall(PetscFindInt(number[v], local->nvert_cells, orig, &position[v]));
-    if (position[v] >= 0) continue;
-    if (n == local->nvert_cells || local->vertex[n - 1].orig != number[v]) {
-      local->vertex[n] = g->vertex[v];
-      local->owner[n++] = g->owner[v];
-    }
-    position[v] = n - 1;
-  }
-  local->nvert = n;
-  n = local->ncell;
-  local->ncell += g->ncell;
-  PetscCall(PetscRealloc(4 * (size_t)local->ncell * sizeof(PetscInt), &local->cell));
-  PetscCall(PetscRealloc((size_t)local->ncell * sizeof(SbCellData), &local->data));
-  PetscCall(PetscArraycpy(local->data + n, g->data, g->ncell));
-  for (PetscInt i = 0; i < 4 * g->ncell; i++) local->cell[4 * (size_t)n + i] = position[g->cell[i]];
-  PetscCall(PetscFree4(orig, number, order, position));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ all of it */
 
 PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, SbMergedMesh *w,
@@ -418,18 +305,68 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
   }
   // owners of the vertices, and a layer of ghosts
   PetscCall(SbMergedMeshDestroy(w));
-  if (size > 1) PetscCall(keep_owned(&owned, local));
+  if (size > 1) {
+    PetscInt *number, *order, *position, n = 0;
+
+    // owned cells and their vertices by original number; a vertex that came from several ranks becomes one
+    PetscCall(PetscMalloc3(PetscMax(owned.nvert, owned.ncell), &number, PetscMax(owned.nvert, owned.ncell),
+                           &order, owned.nvert, &position));
+    for (PetscInt v = 0; v < owned.nvert; v++) number[v] = owned.vertex[v].orig;
+    PetscCall(ascending(owned.nvert, number, order));
+    PetscCall(PetscMalloc1(owned.nvert, &local->vertex));
+    for (PetscInt i = 0; i < owned.nvert; i++) {
+      const SbVertexData *v = &owned.vertex[order[i]];
+
+      if (!n || local->vertex[n - 1].orig != v->orig) local->vertex[n++] = *v;
+      position[order[i]] = n - 1;
+    }
+    local->nvert = local->nvert_cells = n;
+    PetscCall(PetscFree(owned.vertex));
+    for (PetscInt k = 0; k < owned.ncell; k++) number[k] = owned.data[k].orig;
+    PetscCall(ascending(owned.ncell, number, order));
+    PetscCall(PetscMalloc1(4 * (size_t)owned.ncell, &local->cell));
+    PetscCall(PetscMalloc1(owned.ncell, &local->data));
+    for (PetscInt k = 0; k < owned.ncell; k++) {
+      local->data[k] = owned.data[order[k]];
+      for (int a = 0; a < 4; a++)
+        local->cell[4 * (size_t)k + a] = position[owned.cell[4 * (size_t)order[k] + a]];
+    }
+    local->ncell = local->ncell_owned = owned.ncell;
+    PetscCall(PetscFree3(number, order, position));
+    PetscCall(cells_destroy(&owned));
+  }
   PetscCall(PetscCalloc1(local->nvert, &local->owner));
   // ghosts: who owns the vertices at the borders, which cells are sent to whom
   if (size > 1) {
     PetscMPIInt rank, *dest;
-    PetscInt n = 0;
+    PetscInt *orig, *number, *order, *position, n = 0;
     Border border;
     Cells own, ghost;
 
     PetscCallMPI(MPI_Comm_rank(comm, &rank));
     PetscCall(border_create(comm, Nvert, local, &border));
-    PetscCall(choose_owners(local, &border, rank, local->owner));
+    // vertices of the same ranks go to them in equal runs along the longest side of their box
+    for (PetscInt v = 0; v < local->nvert_cells; v++) local->owner[v] = rank;
+    if (border.n) qsort(border.vert, (size_t)border.n, sizeof(Shared), compare_shared);
+    for (PetscInt i = 0; i < border.n; i += n) {
+      Shared *s = border.vert + i;
+      PetscReal low[3], high[3];
+      int axis = 0;
+
+      for (n = 1; i + n < border.n && !compare_ranks(s, s + n);) n++;
+      for (int d = 0; d < 3; d++) {
+        low[d] = high[d] = local->vertex[s[0].vert].x[d];
+        for (PetscInt k = 1; k < n; k++) {
+          low[d] = PetscMin(low[d], local->vertex[s[k].vert].x[d]);
+          high[d] = PetscMax(high[d], local->vertex[s[k].vert].x[d]);
+        }
+        if (high[d] - low[d] > high[axis] - low[axis]) axis = d;
+      }
+      for (PetscInt k = 0; k < n; k++) s[k].along = local->vertex[s[k].vert].x[axis];
+      qsort(s, (size_t)n, sizeof(Shared), compare_shared);
+      for (PetscInt k = 0; k < n; k++)
+        local->owner[s[k].vert] = (PetscMPIInt)s[k].rank[2 * ((PetscInt64)k * s[k].n / n)];
+    }
     PetscCall(list_copies(local, &border, all, rank, size, &n, &local->copied, &dest));
     PetscCall(PetscFree(border.vert));
     PetscCall(PetscFree(border.pair));
@@ -438,7 +375,34 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
       (Cells){PETSC_TRUE, local->ncell, local->nvert, local->cell, local->data, local->vertex, local->owner};
     PetscCall(send_cells(&own, &local->ghost, local->copied, dest, &ghost));
     PetscCall(PetscFree(dest));
-    PetscCall(append_ghosts(&ghost, local));
+    // appends the ghosts and those of their vertices that are new here
+    n = local->nvert;
+    PetscCall(PetscMalloc4(local->nvert_cells, &orig, ghost.nvert, &number, ghost.nvert, &order, ghost.nvert,
+                           &position));
+    for (PetscInt v = 0; v < local->nvert_cells; v++) orig[v] = local->vertex[v].orig;
+    for (PetscInt v = 0; v < ghost.nvert; v++) number[v] = ghost.vertex[v].orig;
+    PetscCall(ascending(ghost.nvert, number, order));
+    PetscCall(PetscRealloc((size_t)(n + ghost.nvert) * sizeof(SbVertexData), &local->vertex));
+    PetscCall(PetscRealloc((size_t)(n + ghost.nvert) * sizeof(PetscMPIInt), &local->owner));
+    for (PetscInt i = 0; i < ghost.nvert; i++) {
+      const PetscInt v = order[i];
+
+      PetscCall(PetscFindInt(number[v], local->nvert_cells, orig, &position[v]));
+      if (position[v] >= 0) continue;
+      if (n == local->nvert_cells || local->vertex[n - 1].orig != number[v]) {
+        local->vertex[n] = ghost.vertex[v];
+        local->owner[n++] = ghost.owner[v];
+      }
+      position[v] = n - 1;
+    }
+    local->nvert = n;
+    n = local->ncell;
+    local->ncell += ghost.ncell;
+    PetscCall(PetscRealloc(4 * (size_t)local->ncell * sizeof(PetscInt), &local->cell));
+    PetscCall(PetscRealloc((size_t)local->ncell * sizeof(SbCellData), &local->data));
+    PetscCall(PetscArraycpy(local->data + n, ghost.data, ghost.ncell));
+    for (PetscInt i = 0; i < 4 * ghost.ncell; i++) local->cell[4 * (size_t)n + i] = position[ghost.cell[i]];
+    PetscCall(PetscFree4(orig, number, order, position));
     PetscCall(cells_destroy(&ghost));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

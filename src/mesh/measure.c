@@ -53,14 +53,32 @@ PetscErrorCode SbMeshFileGroup(const SbImport *im, PetscInt i, SbMeshGroup *grou
 
 /* ------------------------------------------------------------------ shape */
 
-static PetscErrorCode measure_edges(const SbImport *im, SbMeshFacts *facts)
+PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshFacts *facts)
 {
+  SbFaces faces;
+  PetscErrorCode ierr;
+  PetscReal V, cosine[6], ratio, min_cosine = 1, sum = 0;
   SbImportEdges edges;
-  SbImport tets = *im;
-  PetscReal sum = 0;
+  SbImport tets;
 
   PetscFunctionBeginUser;
-  /* of the tets alone: lines and triangles of groups may lie elsewhere */
+  PetscCall(PetscMemzero(facts, sizeof(*facts)));
+  PetscCall(PetscMemzero(&faces, sizeof(faces)));
+  ierr = SbImportCheck(im, &faces);
+  if (!ierr) ierr = SbImportQuality(im, &faces, &facts->body);
+  // faces, and the area of the surface
+  facts->nface = (4 * faces.ncell - faces.nboundary) / 2 + faces.nboundary;
+  for (PetscInt s = 0; !ierr && s < 4 * faces.ncell; s++) {
+    const PetscInt *v = im->item[3].vert + 4 * (s / 4);
+    const int *f = SbFaceVertex[s % 4];
+
+    if (faces.neighbour[s] < 0)
+      facts->area += measure(im->x, 2, (const PetscInt[3]){v[f[0]], v[f[1]], v[f[2]]});
+  }
+  PetscCall(SbFacesDestroy(&faces));
+  PetscCall(ierr);
+  // edges of the tets alone: lines and triangles of groups may lie elsewhere
+  tets = *im;
   tets.item[1].n = tets.item[2].n = 0;
   PetscCall(SbImportEdgesCreate(&tets, &edges));
   facts->nedge = edges.nedge;
@@ -77,39 +95,6 @@ static PetscErrorCode measure_edges(const SbImport *im, SbMeshFacts *facts)
   }
   facts->edge[1] = edges.nedge ? sum / edges.nedge : 0;
   PetscCall(SbImportEdgesDestroy(&edges));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode measure_faces(const SbImport *im, const SbFaces *faces, SbMeshFacts *facts)
-{
-  PetscFunctionBeginUser;
-  facts->nface = (4 * faces->ncell - faces->nboundary) / 2 + faces->nboundary;
-  for (PetscInt s = 0; s < 4 * faces->ncell; s++) {
-    const PetscInt *v = im->item[3].vert + 4 * (s / 4);
-    PetscInt corner[3];
-
-    if (faces->neighbour[s] >= 0) continue;
-    for (int i = 0; i < 3; i++) corner[i] = v[SbFaceVertex[s % 4][i]];
-    facts->area += measure(im->x, 2, corner);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshFacts *facts)
-{
-  SbFaces faces;
-  PetscErrorCode ierr;
-  PetscReal V, cosine[6], ratio, min_cosine = 1;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(facts, sizeof(*facts)));
-  PetscCall(PetscMemzero(&faces, sizeof(faces)));
-  ierr = SbImportCheck(im, &faces);
-  if (!ierr) ierr = SbImportQuality(im, &faces, &facts->body);
-  if (!ierr) ierr = measure_faces(im, &faces, facts);
-  PetscCall(SbFacesDestroy(&faces));
-  PetscCall(ierr);
-  PetscCall(measure_edges(im, facts));
   // dihedral angles and radius ratios of the tets
   for (PetscInt c = 0; c < im->item[3].n; c++) {
     int bin = SB_RATIO_BINS - 1;

@@ -15,8 +15,6 @@
 static PetscErrorCode prepare(PetscInt nbody, SbBody body[], PetscInt b, PetscInt nset, SbSet set[],
                               SbImport *shared, SbImport *im, SbPart *part)
 {
-  PetscInt *count;
-
   PetscFunctionBeginUser;
   if (body[b].in_memory)
     PetscCall(SbImportMemoryMesh(&body[b], im));
@@ -28,14 +26,7 @@ static PetscErrorCode prepare(PetscInt nbody, SbBody body[], PetscInt b, PetscIn
   PetscCall(PetscCalloc1(im->item[3].n, &part->masks.cell));
   PetscCall(PetscCalloc1(4 * (size_t)im->item[3].n, &part->masks.face));
   PetscCall(SbSetsMark(im, &part->faces, nbody, body, b, nset, set, &part->masks));
-  PetscCall(PetscCalloc1(3 * nset, &count));
-  SbSetsCount(im->nvert, im->item[3].n, &part->masks, nset, (PetscInt(*)[3])count);
-  for (PetscInt k = 0; k < nset; k++) {
-    set[k].nvert += count[3 * k];
-    set[k].nfacet += count[3 * k + 1];
-    set[k].ncell += count[3 * k + 2];
-  }
-  PetscCall(PetscFree(count));
+  PetscCall(SbSetsCount(PETSC_COMM_SELF, im->nvert, im->item[3].n, &part->masks, nset, set));
   PetscCall(PetscFree(part->faces.face)); /* the neighbours are found */
   PetscCall(PetscFree(part->faces.start));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -77,12 +68,9 @@ static PetscErrorCode merge(PetscInt nbody, const SbBody body[], SbImport im[], 
     }
     PetscCall(PetscArraycpy(w->remote + at.remote, part[b].remote, part[b].nremote));
     PetscCall(SbFacesDestroy(&part[b].faces));
-    for (int d = 0; d < 4; d++) {
-      PetscCall(PetscFree(im[b].item[d].vert));
-      PetscCall(PetscFree(im[b].item[d].tags));
-      PetscCall(PetscFree(im[b].item[d].number));
-    }
-    next_body(&body[b], &im[b], im[b].item[3].n, &part[b], &at);
+    for (int d = 0; d < 4; d++) PetscCall(SbItemsFree(&im[b].item[d]));
+    im[b].item[3].n = ncell; /* still needed */
+    next_body(&body[b], &im[b], ncell, &part[b], &at);
   }
   PetscCall(PetscMalloc1(w->ncell, &w->data));
   PetscCall(PetscMalloc1(w->nvert, &w->vertex));

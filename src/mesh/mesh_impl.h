@@ -7,6 +7,16 @@
 #include <petscsf.h>
 #include "sbtet.h"
 
+/* A number for a number, without pattern (splitmix64, Steele et al. 2014). */
+static inline uint64_t SbMix(PetscInt i)
+{
+  uint64_t z = ((uint64_t)i + 1) * 0x9e3779b97f4a7c15u;
+
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+  return z ^ (z >> 31);
+}
+
 /* memory_mesh.c: the mesh that a body has in memory. */
 PetscErrorCode SbImportMemoryMesh(const SbBody *body, SbImport *import);
 
@@ -35,13 +45,6 @@ PetscErrorCode SbImportCheckFaces(const SbImport *import, const SbFaces *faces);
 /* Their errors: numbers of the tets in the file, and how many faces have more than two. */
 PetscErrorCode SbImportTwice(const SbImport *import, int64_t a, int64_t b);
 PetscErrorCode SbImportOverlap(const SbImport *import, const int64_t number[3], PetscInt nshared);
-/* Sums and maxima over tets and vertices; neutral where there are none. */
-typedef struct {
-  PetscInt nsliver;
-  PetscReal volume;  /* m^3 */
-  PetscReal most[8]; /* cosine of a dihedral angle, radius ratio, -x, -y, -z, x, y, z */
-} SbShape;
-void SbImportShape(const SbImport *import, SbShape *shape);
 /* The "found" fields that follow from them. */
 void SbShapeKeep(const SbShape *shape, SbBody *body);
 /* What was repaired or is odd: fills the note of the body, whose number of parts is known. */
@@ -53,8 +56,6 @@ PetscErrorCode SbImportQuality(const SbImport *import, const SbFaces *faces, SbB
 /* Volume, cosines of the six dihedral angles, radius ratio of a tet. */
 void SbTetShape(const PetscReal x[], const PetscInt vert[4], PetscReal *V, PetscReal cosine[6],
                 PetscReal *ratio);
-/* Parts that share no vertex. */
-PetscErrorCode SbImportParts(const SbImport *import, PetscInt *npart);
 /* A tet that check.c refuses as flat; `largest` is the largest coordinate in size. */
 PetscBool SbTetFlat(const PetscReal x[], const PetscInt vert[4], PetscReal largest, PetscReal *det);
 
@@ -70,8 +71,9 @@ PetscErrorCode SbSetsMark(const SbImport *import, const SbFaces *faces, PetscInt
 /* The bits of sets that are groups, for each tag set: bits[ntags]. */
 PetscErrorCode SbSetsBits(const SbImport *import, PetscInt nbody, const SbBody body[], PetscInt b,
                           PetscInt nset, const SbSet set[], uint64_t bits[]);
-/* Adds the vertices, boundary facets and cells that each set holds: count[nset][3]. */
-void SbSetsCount(PetscInt nvert, PetscInt ncell, const SbMasks *masks, PetscInt nset, PetscInt count[][3]);
+/* Adds the vertices, boundary facets and cells that each set holds on all ranks. Collective. */
+PetscErrorCode SbSetsCount(MPI_Comm comm, PetscInt nvert, PetscInt ncell, const SbMasks *masks, PetscInt nset,
+                           SbSet set[]);
 /* Adds the members of sets that are groups. */
 PetscErrorCode SbMemoryMeshMark(const SbBody *body, const SbFaces *faces, SbMasks *masks);
 /* A set that selects nothing is an error, which lists the groups that exist. */

@@ -102,13 +102,16 @@ static PetscInt inclusion_of(SbMesh mesh, const SbCellData *cell)
   return 0;
 }
 
-/* The cells of the local mesh in the order of their own numbers. */
-static PetscErrorCode order_cells(const Work *w, SbMesh mesh, PetscInt order[])
+static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
 {
   const SbLocalMesh *p = w->p;
-  PetscInt *key, *some, *at, *start;
+  const PetscInt nghost = p->ncell - p->ncell_owned;
+  PetscInt *order, *key, *some, *at, *start, *number, *sent, *got, *leaf;
+  PetscSFNode *remote;
 
   PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(mesh->ncell, &order));
+  // the cells of the local mesh in the order of their own numbers
   PetscCall(PetscMalloc1(p->ncell, &key));
   for (PetscInt c = 0; c < p->ncell; c++) {
     const PetscInt *v = p->cell + 4 * (size_t)c;
@@ -129,64 +132,44 @@ static PetscErrorCode order_cells(const Work *w, SbMesh mesh, PetscInt order[])
   PetscCall(PetscFree(some));
   PetscCall(PetscFree(at));
   PetscCall(PetscFree(start));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+  // from owned cells to their copies on other ranks
+  if (w->size > 1) {
+    PetscCall(PetscMalloc2(p->ncell, &number, p->ghost.nsend, &sent));
+    for (PetscInt c = 0; c < p->ncell; c++) number[order[c]] = c;
+    for (PetscInt i = 0; i < p->ghost.nsend; i++) sent[i] = number[p->copied[i]];
+    PetscCall(SbRouteSend(&p->ghost, sizeof(PetscInt), sent, &got));
+    PetscCall(PetscMalloc1(nghost, &leaf));
+    PetscCall(PetscMalloc1(nghost, &remote));
+    for (PetscInt g = 0; g < nghost; g++) {
+      const PetscInt came = order[p->ncell_owned + g] - p->ncell_owned; /* as which of the ghosts */
 
-/* From owned cells to their copies on other ranks. */
-static PetscErrorCode link_cells(const Work *w, SbMesh mesh, const PetscInt order[])
-{
-  const SbLocalMesh *p = w->p;
-  const PetscInt nghost = p->ncell - p->ncell_owned;
-  PetscInt *number, *sent, *got, *leaf;
-  PetscSFNode *remote;
-
-  PetscFunctionBeginUser;
-  if (w->size == 1) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc2(p->ncell, &number, p->ghost.nsend, &sent));
-  for (PetscInt c = 0; c < p->ncell; c++) number[order[c]] = c;
-  for (PetscInt i = 0; i < p->ghost.nsend; i++) sent[i] = number[p->copied[i]];
-  PetscCall(SbRouteSend(&p->ghost, sizeof(PetscInt), sent, &got));
-  PetscCall(PetscMalloc1(nghost, &leaf));
-  PetscCall(PetscMalloc1(nghost, &remote));
-  for (PetscInt g = 0; g < nghost; g++) {
-    const PetscInt came = order[p->ncell_owned + g] - p->ncell_owned; /* as which of the ghosts */
-
-    leaf[g] = p->ncell_owned + g;
-    remote[g].rank = SbRouteSource(&p->ghost, came);
-    remote[g].index = got[came];
+      leaf[g] = p->ncell_owned + g;
+      remote[g].rank = SbRouteSource(&p->ghost, came);
+      remote[g].index = got[came];
+    }
+    PetscCall(PetscSFCreate(mesh->comm, &mesh->cell_sf));
+    PetscCall(PetscSFSetGraph(mesh->cell_sf, p->ncell_owned, nghost, leaf, PETSC_OWN_POINTER, remote,
+                              PETSC_OWN_POINTER));
+    PetscCall(PetscFree(got));
+    PetscCall(PetscFree2(number, sent));
   }
-  PetscCall(PetscSFCreate(mesh->comm, &mesh->cell_sf));
-  PetscCall(PetscSFSetGraph(mesh->cell_sf, p->ncell_owned, nghost, leaf, PETSC_OWN_POINTER, remote,
-                            PETSC_OWN_POINTER));
-  PetscCall(PetscFree(got));
-  PetscCall(PetscFree2(number, sent));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
-{
-  PetscInt *order;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(mesh->ncell, &order));
-  PetscCall(order_cells(w, mesh, order));
-  PetscCall(link_cells(w, mesh, order));
   PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &mesh->cell));
   PetscCall(PetscMalloc1(mesh->ncell, &mesh->cell_orig));
   PetscCall(PetscMalloc2(mesh->ncell, &mesh->cell_body, mesh->ncell, &mesh->cell_material));
   PetscCall(PetscMalloc1(mesh->ncell, &mesh->cell_set));
   PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &mesh->face_set));
   for (PetscInt c = 0; c < mesh->ncell; c++) {
-    const SbCellData *p = &w->p->data[order[c]];
-    const PetscInt inclusion = inclusion_of(mesh, p);
+    const SbCellData *data = &p->data[order[c]];
+    const PetscInt inclusion = inclusion_of(mesh, data);
 
-    mesh->cell_orig[c] = p->orig;
-    mesh->cell_body[c] = p->body;
-    mesh->cell_material[c] = inclusion ? mesh->body[p->body].inclusion[inclusion - 1].material : p->body;
-    mesh->cell_set[c] = p->set;
+    mesh->cell_orig[c] = data->orig;
+    mesh->cell_body[c] = data->body;
+    mesh->cell_material[c] =
+      inclusion ? mesh->body[data->body].inclusion[inclusion - 1].material : data->body;
+    mesh->cell_set[c] = data->set;
     for (int a = 0; a < 4; a++) {
-      mesh->cell[4 * (size_t)c + a] = w->local[w->p->cell[4 * (size_t)order[c] + a]];
-      mesh->face_set[4 * (size_t)c + a] = p->face[a];
+      mesh->cell[4 * (size_t)c + a] = w->local[p->cell[4 * (size_t)order[c] + a]];
+      mesh->face_set[4 * (size_t)c + a] = data->face[a];
     }
   }
   PetscCall(PetscFree(order));

@@ -30,15 +30,6 @@ typedef struct {
   Node *node;
 } Tree;
 
-/* A hash of a number, so that samples have nothing to do with the order of a mesh. */
-static inline uint64_t mix(uint64_t z)
-{
-  z += 0x9e3779b97f4a7c15u;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  return z ^ (z >> 31);
-}
-
 static inline void centre(const SbMergedMesh *w, PetscInt c, PetscReal x[3])
 {
   const PetscInt *v = w->cell + 4 * (size_t)c;
@@ -107,37 +98,6 @@ static PetscErrorCode split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3],
 
 /* ------------------------------------------------------------------ METIS */
 
-/* The part of each cell, of a graph on one rank. */
-static PetscErrorCode call_metis(PetscInt ncell, const PetscInt orig[], const PetscInt across[],
-                                 PetscInt nparts, PetscInt part[])
-{
-  idx_t n = (idx_t)ncell, ncon = 1, np = (idx_t)nparts, cut, options[METIS_NOPTIONS], k = 0;
-  idx_t *start, *adj, *result;
-  PetscInt *position;
-  int status;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc4(ncell + 1, &start, 4 * (size_t)ncell, &adj, ncell, &result, ncell, &position));
-  for (PetscInt c = 0; c < ncell; c++) position[orig[c]] = c;
-  for (PetscInt c = 0; c < ncell; c++) {
-    const PetscInt *other = across + 4 * (size_t)position[c];
-
-    start[c] = k;
-    for (int f = 0; f < 4; f++)
-      if (other[f] >= 0) adj[k++] = (idx_t)other[f];
-  }
-  start[n] = k;
-  METIS_SetDefaultOptions(options);
-  options[METIS_OPTION_UFACTOR] = 10; /* the largest part is at most 1 % above the mean */
-  status =
-    METIS_PartGraphKway(&n, &ncon, start, adj, NULL, NULL, NULL, &np, NULL, NULL, options, &cut, result);
-  for (PetscInt c = 0; c < ncell; c++) part[c] = (PetscInt)result[orig[c]];
-  PetscCall(PetscFree4(start, adj, result, position));
-  PetscCheck(status == METIS_OK, PETSC_COMM_SELF, PETSC_ERR_LIB, "METIS_PartGraphKway() failed with %d",
-             status);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Collects the graph on rank 0, by original numbers, so that its partition has nothing to do with who had what. */
 static PetscErrorCode cut_graph(MPI_Comm comm, const SbMergedMesh *w, PetscSF sf, PetscInt part[])
 {
@@ -165,7 +125,33 @@ static PetscErrorCode cut_graph(MPI_Comm comm, const SbMergedMesh *w, PetscSF sf
   PetscCall(SbRouteSend(&route, sizeof(PetscInt), orig, &all_orig));
   PetscCall(SbRouteSend(&route, 4 * sizeof(PetscInt), across, &all_across));
   PetscCall(PetscMalloc1(route.nrecv, &all_part));
-  if (!rank) PetscCall(call_metis(w->Ncell, all_orig, all_across, size, all_part));
+  if (!rank) {
+    idx_t n = (idx_t)w->Ncell, ncon = 1, np = (idx_t)size, cut, options[METIS_NOPTIONS], k = 0;
+    idx_t *start, *adj, *result;
+    PetscInt *position;
+    int status;
+
+    // the part of each cell, of a graph on one rank
+    PetscCall(
+      PetscMalloc4(w->Ncell + 1, &start, 4 * (size_t)w->Ncell, &adj, w->Ncell, &result, w->Ncell, &position));
+    for (PetscInt c = 0; c < w->Ncell; c++) position[all_orig[c]] = c;
+    for (PetscInt c = 0; c < w->Ncell; c++) {
+      const PetscInt *other = all_across + 4 * (size_t)position[c];
+
+      start[c] = k;
+      for (int f = 0; f < 4; f++)
+        if (other[f] >= 0) adj[k++] = (idx_t)other[f];
+    }
+    start[n] = k;
+    METIS_SetDefaultOptions(options);
+    options[METIS_OPTION_UFACTOR] = 10; /* the largest part is at most 1 % above the mean */
+    status =
+      METIS_PartGraphKway(&n, &ncon, start, adj, NULL, NULL, NULL, &np, NULL, NULL, options, &cut, result);
+    for (PetscInt c = 0; c < w->Ncell; c++) all_part[c] = (PetscInt)result[all_orig[c]];
+    PetscCall(PetscFree4(start, adj, result, position));
+    PetscCheck(status == METIS_OK, PETSC_COMM_SELF, PETSC_ERR_LIB, "METIS_PartGraphKway() failed with %d",
+               status);
+  }
   PetscCall(SbRouteReply(&route, sizeof(PetscInt), all_part, part));
   PetscCall(PetscFree(all_orig));
   PetscCall(PetscFree(all_across));
@@ -176,46 +162,6 @@ static PetscErrorCode cut_graph(MPI_Comm comm, const SbMergedMesh *w, PetscSF sf
 }
 
 /* ------------------------------------------------------------------ borders */
-
-/* What the neighbour of a cell across slot s has: `across` of those on other ranks. */
-static inline PetscInt value_across(const SbMergedMesh *w, PetscInt s, const PetscInt value[],
-                                    const PetscInt across[])
-{
-  const PetscInt n = w->neighbour[s];
-
-  return n < w->ncell ? value[n] : across[n - w->ncell];
-}
-
-/* A cell moves to the part that most of its neighbours are in, when that takes faces from the border. */
-static PetscErrorCode smooth(const SbMergedMesh *w, PetscSF sf, PetscInt part[])
-{
-  PetscInt *now, *across;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(w->ncell, &now, w->nremote, &across));
-  for (int sweep = 0; sweep < SWEEPS; sweep++) {
-    PetscCall(PetscSFBcastBegin(sf, MPIU_INT, part, across, MPI_REPLACE));
-    PetscCall(PetscSFBcastEnd(sf, MPIU_INT, part, across, MPI_REPLACE));
-    PetscCall(PetscArraycpy(now, part, w->ncell));
-    for (PetscInt c = 0; c < w->ncell; c++) {
-      PetscInt other[4], n = 0, own = 0;
-
-      for (PetscInt s = 4 * c; s < 4 * c + 4; s++) {
-        if (w->neighbour[s] < 0) continue;
-        other[n] = value_across(w, s, now, across);
-        own += other[n++] == now[c];
-      }
-      for (PetscInt i = 0; i < n && own < 2; i++) {
-        PetscInt there = 0;
-
-        for (PetscInt j = 0; j < n; j++) there += other[j] == other[i];
-        if (there > own + 1) part[c] = other[i];
-      }
-    }
-  }
-  PetscCall(PetscFree2(now, across));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh *w, PetscMPIInt part[])
 {
@@ -241,16 +187,16 @@ PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh
     uint64_t bound;
     PetscReal(*mine)[3];
     PetscReal(*all)[3];
-    PetscInt n = 0, total;
+    PetscInt n = 0, total, *now, *across;
 
     // a tree with a leaf for each rank, cut through a sample of the tets
     wanted = PetscMax((PetscInt64)SAMPLE * size, SAMPLES);
     bound = wanted >= w->Ncell ? UINT64_MAX : UINT64_MAX / (uint64_t)w->Ncell * (uint64_t)wanted;
-    for (PetscInt c = 0; c < w->ncell; c++) n += mix((uint64_t)w->data[c].orig) <= bound;
+    for (PetscInt c = 0; c < w->ncell; c++) n += SbMix(w->data[c].orig) <= bound;
     PetscCall(PetscMalloc1(n, &mine));
     n = 0;
     for (PetscInt c = 0; c < w->ncell; c++)
-      if (mix((uint64_t)w->data[c].orig) <= bound) centre(w, c, mine[n++]);
+      if (SbMix(w->data[c].orig) <= bound) centre(w, c, mine[n++]);
     PetscCall(SbGatherAll(comm, MPIU_REAL, 3 * n, mine, &total, &all, NULL));
     PetscCall(PetscFree(mine));
     PetscCall(PetscMalloc1(2 * (size_t)size, &tree.node));
@@ -268,7 +214,31 @@ PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh
       to[c] = node->next;
     }
     PetscCall(PetscFree(tree.node));
-    PetscCall(smooth(w, sf, to));
+    // a cell moves to the part that most of its neighbours are in, when that takes faces from the border
+    PetscCall(PetscMalloc2(w->ncell, &now, w->nremote, &across));
+    for (int sweep = 0; sweep < SWEEPS; sweep++) {
+      PetscCall(PetscSFBcastBegin(sf, MPIU_INT, to, across, MPI_REPLACE));
+      PetscCall(PetscSFBcastEnd(sf, MPIU_INT, to, across, MPI_REPLACE));
+      PetscCall(PetscArraycpy(now, to, w->ncell));
+      for (PetscInt c = 0; c < w->ncell; c++) {
+        PetscInt other[4], nother = 0, own = 0;
+
+        for (PetscInt s = 4 * c; s < 4 * c + 4; s++) {
+          const PetscInt k = w->neighbour[s];
+
+          if (k < 0) continue;
+          other[nother] = k < w->ncell ? now[k] : across[k - w->ncell];
+          own += other[nother++] == now[c];
+        }
+        for (PetscInt i = 0; i < nother && own < 2; i++) {
+          PetscInt there = 0;
+
+          for (PetscInt j = 0; j < nother; j++) there += other[j] == other[i];
+          if (there > own + 1) to[c] = other[i];
+        }
+      }
+    }
+    PetscCall(PetscFree2(now, across));
   }
   for (PetscInt c = 0; c < w->ncell; c++) part[c] = (PetscMPIInt)to[c];
   PetscCall(PetscFree(to));

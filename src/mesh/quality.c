@@ -6,19 +6,8 @@
   R = | |a|^2 b x c + |b|^2 c x a + |c|^2 a x b | / (12 V) with the edges a, b, c from vertex 0 (Shewchuk, "What is a good
   linear finite element?", 2002).
 */
+#include "sbkernel.h"
 #include "mesh_impl.h"
-
-static inline void cross(const PetscReal a[3], const PetscReal b[3], PetscReal c[3])
-{
-  c[0] = a[1] * b[2] - a[2] * b[1];
-  c[1] = a[2] * b[0] - a[0] * b[2];
-  c[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-static inline PetscReal dot(const PetscReal a[3], const PetscReal b[3])
-{
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 void SbTetShape(const PetscReal x[], const PetscInt v[4], PetscReal *V, PetscReal cosine[6], PetscReal *ratio)
 {
@@ -31,40 +20,22 @@ void SbTetShape(const PetscReal x[], const PetscInt v[4], PetscReal *V, PetscRea
     c[i] = x[3 * v[3] + i] - x[3 * v[0] + i];
   }
   /* Twice the area vectors; they sum to zero. */
-  cross(c, b, n[1]);
-  cross(a, c, n[2]);
-  cross(b, a, n[3]);
+  SbCross(c, b, n[1]);
+  SbCross(a, c, n[2]);
+  SbCross(b, a, n[3]);
   for (int i = 0; i < 3; i++) n[0][i] = -n[1][i] - n[2][i] - n[3][i];
-  det = -dot(a, n[1]);
+  det = -SbDot3(a, n[1]);
   for (int i = 0; i < 4; i++) {
-    area[i] = PetscSqrtReal(dot(n[i], n[i]));
+    area[i] = PetscSqrtReal(SbDot3(n[i], n[i]));
     sum += area[i];
   }
   for (int i = 0; i < 4; i++) {
-    for (int j = 0; j < i; j++) cosine[edge++] = -dot(n[i], n[j]) / (area[i] * area[j]);
+    for (int j = 0; j < i; j++) cosine[edge++] = -SbDot3(n[i], n[j]) / (area[i] * area[j]);
   }
-  for (int i = 0; i < 3; i++) to_centre[i] = dot(a, a) * n[1][i] + dot(b, b) * n[2][i] + dot(c, c) * n[3][i];
+  for (int i = 0; i < 3; i++)
+    to_centre[i] = SbDot3(a, a) * n[1][i] + SbDot3(b, b) * n[2][i] + SbDot3(c, c) * n[3][i];
   *V = det / 6;
-  *ratio = PetscSqrtReal(dot(to_centre, to_centre)) / (2 * det) * sum / (3 * det);
-}
-
-PetscErrorCode SbImportSlivers(const SbImport *im, PetscReal degrees, PetscInt *n, PetscReal *smallest)
-{
-  const PetscReal bound = PetscCosReal(degrees * PETSC_PI / 180);
-  PetscReal V, cosine[6], ratio, most = -1;
-
-  PetscFunctionBeginUser;
-  *n = 0;
-  for (PetscInt c = 0; c < im->item[3].n; c++) {
-    PetscReal largest = -1;
-
-    SbTetShape(im->x, im->item[3].vert + 4 * c, &V, cosine, &ratio);
-    for (int e = 0; e < 6; e++) largest = PetscMax(largest, cosine[e]);
-    *n += largest > bound;
-    most = PetscMax(most, largest);
-  }
-  *smallest = acos(PetscMin(most, 1)) * 180 / PETSC_PI;
-  PetscFunctionReturn(PETSC_SUCCESS);
+  *ratio = PetscSqrtReal(SbDot3(to_centre, to_centre)) / (2 * det) * sum / (3 * det);
 }
 
 PetscReal SbTetQuality(const PetscReal x[4][3])
@@ -89,17 +60,6 @@ void SbImportJoin(const SbImport *im, PetscInt parent[], PetscInt *npart)
   }
   /* a parent is lower than its child */
   for (PetscInt v = 0; v < im->nvert; v++) parent[v] = parent[parent[v]];
-}
-
-PetscErrorCode SbImportParts(const SbImport *im, PetscInt *npart)
-{
-  PetscInt *parent;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(im->nvert, &parent));
-  SbImportJoin(im, parent, npart);
-  PetscCall(PetscFree(parent));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* What was repaired or is odd, in one line; empty when there is nothing. */
@@ -128,10 +88,10 @@ PetscErrorCode SbImportNote(const SbImport *im, SbBody *body)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbImportShape(const SbImport *im, SbShape *s)
+void SbImportShape(const SbImport *im, PetscReal degrees, SbShape *s)
 {
   PetscReal V, cosine[6], ratio;
-  const PetscReal sliver = PetscCosReal(SB_SLIVER * PETSC_PI / 180);
+  const PetscReal sliver = PetscCosReal(degrees * PETSC_PI / 180);
 
   *s = (SbShape){.most = {-1, 0}};
   for (PetscInt c = 0; c < im->item[3].n; c++) {
@@ -168,14 +128,17 @@ void SbShapeKeep(const SbShape *s, SbBody *body)
 PetscErrorCode SbImportQuality(const SbImport *im, const SbFaces *faces, SbBody *body)
 {
   SbShape shape;
+  PetscInt *parent;
 
   PetscFunctionBeginUser;
-  SbImportShape(im, &shape);
+  SbImportShape(im, SB_SLIVER, &shape);
   SbShapeKeep(&shape, body);
   body->nvert = im->nvert;
   body->ncell = im->item[3].n;
   body->nfacet = faces->nboundary;
-  PetscCall(SbImportParts(im, &body->npart));
+  PetscCall(PetscMalloc1(im->nvert, &parent));
+  SbImportJoin(im, parent, &body->npart);
+  PetscCall(PetscFree(parent));
   PetscCall(SbImportNote(im, body));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

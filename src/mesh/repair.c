@@ -74,16 +74,28 @@ static PetscErrorCode drop_collapsed(SbImport *im, int dim, PetscInt *ndropped)
 
 /* ------------------------------------------------------------------ flat tets, and triangles that are no face */
 
-static PetscErrorCode drop_flat(SbImport *im, SbRepair *done)
+PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *done)
 {
-  SbItems *item = &im->item[3];
-  PetscReal largest = 0, det;
-  PetscBool *drop, any = PETSC_FALSE;
   SbFaces faces;
+  PetscErrorCode ierr;
+  PetscInt turned, nitem = im->item[0].n + im->item[1].n + im->item[2].n, ndropped = 0, slots[2];
+  PetscBool *drop, any = PETSC_FALSE;
+  SbItems *item = &im->item[3];
+  const PetscReal largest = SbImportLargest(im);
+  PetscReal det;
 
   PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(done, sizeof(*done)));
+  PetscCall(PetscMemzero(&faces, sizeof(faces)));
+  PetscCall(weld(im, tolerance, done));
+  PetscCall(drop_collapsed(im, 3, &done->ncollapsed));
+  PetscCall(SbImportJoinRepeats(im, 3, PETSC_TRUE, &done->nduplicate));
+  for (int d = 0; d < 3; d++) {
+    PetscCall(drop_collapsed(im, d, &ndropped));
+    PetscCall(SbImportJoinRepeats(im, d, PETSC_TRUE, &ndropped));
+  }
+  // flat tets; those with a neighbour at every face leave a slit
   PetscCall(PetscCalloc1(item->n, &drop));
-  for (PetscInt i = 0; i < 3 * im->nvert; i++) largest = PetscMax(largest, PetscAbsReal(im->x[i]));
   for (PetscInt c = 0; c < item->n; c++) {
     drop[c] = SbTetFlat(im->x, item->vert + 4 * c, largest, &det);
     any = (PetscBool)(any || drop[c]);
@@ -99,27 +111,6 @@ static PetscErrorCode drop_flat(SbImport *im, SbRepair *done)
     PetscCall(drop_marked(item, 3, drop, &done->nflat));
   }
   PetscCall(PetscFree(drop));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *done)
-{
-  SbFaces faces;
-  PetscErrorCode ierr;
-  PetscInt turned, nitem = im->item[0].n + im->item[1].n + im->item[2].n, ndropped = 0, slots[2];
-  PetscBool *drop;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(done, sizeof(*done)));
-  PetscCall(PetscMemzero(&faces, sizeof(faces)));
-  PetscCall(weld(im, tolerance, done));
-  PetscCall(drop_collapsed(im, 3, &done->ncollapsed));
-  PetscCall(SbImportJoinRepeats(im, 3, PETSC_TRUE, &done->nduplicate));
-  for (int d = 0; d < 3; d++) {
-    PetscCall(drop_collapsed(im, d, &ndropped));
-    PetscCall(SbImportJoinRepeats(im, d, PETSC_TRUE, &ndropped));
-  }
-  PetscCall(drop_flat(im, done));
   PetscCheck(im->item[3].n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: nothing is left: every tetrahedron is flat or uses a vertex twice; check -merge_tolerance "
              "and the scale of the file",

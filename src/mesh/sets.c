@@ -163,18 +163,24 @@ PetscErrorCode SbSetsBits(const SbImport *im, PetscInt nbody, const SbBody body[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Shapes, whole bodies, the boundary. `all` holds the bits of sets that are this body, `hull` those of the boundary. */
-static PetscErrorCode mark_shapes(const SbImport *im, const SbFaces *faces, const SbBody *body, PetscInt nset,
-                                  const SbSet set[], SbMasks *m)
+static void count_bits(uint64_t mask, PetscInt nset, PetscInt *count)
 {
-  const PetscReal *box = body->bbox, size[3] = {box[3] - box[0], box[4] - box[1], box[5] - box[2]};
+  for (PetscInt k = 0; mask && k < nset; k++) count[3 * k] += (mask & SB_SET_BIT(k)) != 0;
+}
+
+PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbody, const SbBody body[],
+                          PetscInt b, PetscInt nset, const SbSet set[], SbMasks *m)
+{
+  uint64_t *bits, all = 0, hull = 0;
+  PetscInt slots[2];
+  const PetscReal *box = body[b].bbox, size[3] = {box[3] - box[0], box[4] - box[1], box[5] - box[2]};
   const PetscReal slack = 1e-6 * PetscSqrtReal(size[0] * size[0] + size[1] * size[1] + size[2] * size[2]);
-  uint64_t all = 0, hull = 0;
 
   PetscFunctionBeginUser;
+  // shapes, whole bodies, the boundary: `all` holds the bits of sets that are this body, `hull` those of the boundary
   for (PetscInt k = 0; k < nset; k++) {
-    if (set[k].shape == SB_SET_BODY &&
-        (!strcmp(set[k].group, body->name) || (body->copy_of[0] && !strcmp(set[k].group, body->copy_of))))
+    if (set[k].shape == SB_SET_BODY && (!strcmp(set[k].group, body[b].name) ||
+                                        (body[b].copy_of[0] && !strcmp(set[k].group, body[b].copy_of))))
       all |= SB_SET_BIT(k);
     else if (set[k].shape == SB_SET_BOUNDARY)
       hull |= SB_SET_BIT(k);
@@ -200,22 +206,6 @@ static PetscErrorCode mark_shapes(const SbImport *im, const SbFaces *faces, cons
     if (faces->neighbour[s] >= 0) continue;
     for (int i = 0; i < 3; i++) m->vert[im->item[3].vert[4 * (s / 4) + SbFaceVertex[s % 4][i]]] |= hull;
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static void count_bits(uint64_t mask, PetscInt nset, PetscInt *count)
-{
-  for (PetscInt k = 0; mask && k < nset; k++) count[3 * k] += (mask & SB_SET_BIT(k)) != 0;
-}
-
-PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbody, const SbBody body[],
-                          PetscInt b, PetscInt nset, const SbSet set[], SbMasks *m)
-{
-  uint64_t *bits;
-  PetscInt slots[2];
-
-  PetscFunctionBeginUser;
-  PetscCall(mark_shapes(im, faces, &body[b], nset, set, m));
   PetscCall(PetscMalloc1(im->ntags, &bits));
   PetscCall(SbSetsBits(im, nbody, body, b, nset, set, bits));
   // members of groups: vertices, faces of tets, tets with their faces on the boundary
@@ -242,14 +232,27 @@ PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbSetsCount(PetscInt nvert, PetscInt ncell, const SbMasks *m, PetscInt nset, PetscInt count[][3])
+PetscErrorCode SbSetsCount(MPI_Comm comm, PetscInt nvert, PetscInt ncell, const SbMasks *m, PetscInt nset,
+                           SbSet set[])
 {
-  if (!nset) return;
-  for (PetscInt v = 0; v < nvert; v++) count_bits(m->vert[v], nset, &count[0][0]);
-  for (PetscInt c = 0; c < ncell; c++) count_bits(m->cell[c], nset, &count[0][2]);
+  PetscInt *count;
+
+  PetscFunctionBeginUser;
+  if (!nset) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc1(3 * nset, &count));
+  for (PetscInt v = 0; v < nvert; v++) count_bits(m->vert[v], nset, count);
+  for (PetscInt c = 0; c < ncell; c++) count_bits(m->cell[c], nset, count + 2);
   for (PetscInt s = 0; s < 4 * ncell; s++) {
-    if (m->face[s] & SB_ON_BOUNDARY) count_bits(m->face[s] & ~SB_ON_BOUNDARY, nset, &count[0][1]);
+    if (m->face[s] & SB_ON_BOUNDARY) count_bits(m->face[s] & ~SB_ON_BOUNDARY, nset, count + 1);
   }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)(3 * nset), MPIU_INT, MPI_SUM, comm));
+  for (PetscInt k = 0; k < nset; k++) {
+    set[k].nvert += count[3 * k];
+    set[k].nfacet += count[3 * k + 1];
+    set[k].ncell += count[3 * k + 2];
+  }
+  PetscCall(PetscFree(count));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ sets that hold nothing */

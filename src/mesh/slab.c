@@ -45,58 +45,6 @@ static PetscErrorCode sum(const Slab *s, PetscInt n, PetscInt value[])
 
 /* ------------------------------------------------------------------ vertices */
 
-/* The vertices of the tets, ascending; tets then refer to them. */
-static PetscErrorCode find_used(Slab *s)
-{
-  SbItems *tets = &s->im->item[3];
-  PetscInt low = PETSC_MAX_INT, high = -1, n = 0, *map;
-
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < 4 * tets->n; i++) {
-    low = PetscMin(low, tets->vert[i]);
-    high = PetscMax(high, tets->vert[i]);
-  }
-  PetscCall(PetscCalloc1(PetscMax(0, high - low + 1), &map));
-  for (PetscInt i = 0; i < 4 * tets->n; i++) {
-    n += !map[tets->vert[i] - low];
-    map[tets->vert[i] - low] = 1;
-  }
-  PetscCall(PetscMalloc1(n, &s->used));
-  n = 0;
-  for (PetscInt v = low; v <= high; v++) {
-    if (!map[v - low]) continue;
-    s->used[n] = v;
-    map[v - low] = n++;
-  }
-  for (PetscInt i = 0; i < 4 * tets->n; i++) tets->vert[i] = map[tets->vert[i] - low];
-  PetscCall(PetscFree(map));
-  /* what was read is what this rank keeps */
-  s->nkept = s->im->nvert;
-  s->x = s->im->x;
-  s->im->x = NULL;
-  PetscCall(PetscFree(s->im->vert_number));
-  s->im->nvert = n;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Who uses the vertices that are kept here, and their original numbers. */
-static PetscErrorCode list_users(Slab *s)
-{
-  PetscInt n = 0, before;
-
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < s->vert.nrecv; i++) s->asked[i] -= s->rows.first;
-  PetscCall(SbGroupByKey(s->vert.nrecv, s->asked, s->nkept, &s->start, &s->user));
-  for (PetscInt i = 0; i < s->vert.nrecv; i++) s->user[i] = SbRouteSource(&s->vert, s->user[i]);
-  for (PetscInt v = 0; v < s->nkept; v++) n += s->start[v + 1] > s->start[v];
-  PetscCallMPI(MPI_Scan(&n, &before, 1, MPIU_INT, MPI_SUM, s->comm));
-  before -= n;
-  PetscCall(PetscMalloc1(s->nkept, &s->number));
-  for (PetscInt v = 0; v < s->nkept; v++) s->number[v] = s->start[v + 1] > s->start[v] ? before++ : -1;
-  s->im->nunused = s->nkept - n;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Places and original numbers of the vertices of this rank's tets. */
 static PetscErrorCode ask_keepers(Slab *s)
 {
@@ -107,6 +55,7 @@ static PetscErrorCode ask_keepers(Slab *s)
   SbImport *im = s->im;
   PetscMPIInt *dest;
   Answer *answer, *result;
+  PetscInt n = 0, before;
 
   PetscFunctionBeginUser;
   // the keepers learn who uses their vertices
@@ -115,7 +64,16 @@ static PetscErrorCode ask_keepers(Slab *s)
   PetscCall(SbRouteCreate(s->comm, im->nvert, dest, &s->vert));
   PetscCall(PetscFree(dest));
   PetscCall(SbRouteSend(&s->vert, sizeof(PetscInt), s->used, &s->asked));
-  PetscCall(list_users(s));
+  // who uses the vertices that are kept here, and their original numbers
+  for (PetscInt i = 0; i < s->vert.nrecv; i++) s->asked[i] -= s->rows.first;
+  PetscCall(SbGroupByKey(s->vert.nrecv, s->asked, s->nkept, &s->start, &s->user));
+  for (PetscInt i = 0; i < s->vert.nrecv; i++) s->user[i] = SbRouteSource(&s->vert, s->user[i]);
+  for (PetscInt v = 0; v < s->nkept; v++) n += s->start[v + 1] > s->start[v];
+  PetscCallMPI(MPI_Scan(&n, &before, 1, MPIU_INT, MPI_SUM, s->comm));
+  before -= n;
+  PetscCall(PetscMalloc1(s->nkept, &s->number));
+  for (PetscInt v = 0; v < s->nkept; v++) s->number[v] = s->start[v + 1] > s->start[v] ? before++ : -1;
+  s->im->nunused = s->nkept - n;
   // they answer with place, number and how many ranks use it
   PetscCall(PetscMalloc2(s->vert.nrecv, &answer, im->nvert, &result));
   for (PetscInt i = 0; i < s->vert.nrecv; i++) {
@@ -505,13 +463,10 @@ static PetscErrorCode mark(Slab *s, PetscInt nbody, const SbBody body[], PetscIn
 {
   SbImport *im = s->im;
   SbMasks *m = &s->part->masks, kept;
-  uint64_t *bits;
-  PetscInt *count;
-  uint64_t *got;
+  uint64_t *bits, *got;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(im->ntags, &bits, 3 * nset, &count));
-  PetscCall(PetscArrayzero(count, 3 * nset));
+  PetscCall(PetscMalloc1(im->ntags, &bits));
   PetscCall(PetscCalloc1(s->nkept, &s->mask));
   PetscCall(SbSetsBits(im, nbody, body, b, nset, set, bits));
   PetscCall(mark_items(s, bits));
@@ -529,28 +484,12 @@ static PetscErrorCode mark(Slab *s, PetscInt nbody, const SbBody body[], PetscIn
   /* vertices are counted by their keepers */
   kept = *m;
   kept.vert = s->mask;
-  SbSetsCount(s->nkept, im->item[3].n, &kept, nset, (PetscInt(*)[3])count);
-  PetscCall(sum(s, 3 * nset, count));
-  for (PetscInt k = 0; k < nset; k++) {
-    set[k].nvert += count[3 * k];
-    set[k].nfacet += count[3 * k + 1];
-    set[k].ncell += count[3 * k + 2];
-  }
-  PetscCall(PetscFree2(bits, count));
+  PetscCall(SbSetsCount(s->comm, s->nkept, im->item[3].n, &kept, nset, set));
+  PetscCall(PetscFree(bits));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ all of it */
-
-static PetscErrorCode read_slab(Slab *s, const SbBody *body)
-{
-  SbImport *im = s->im;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbImportSlab(body, s->rank, s->size, im, &s->rows));
-  s->part->first = im->item[3].n ? (PetscInt)im->item[3].number[0] - 1 : 0;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 static PetscErrorCode check_cells(Slab *s, PetscReal largest)
 {
@@ -570,11 +509,38 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   SbCaughtError caught = {0, ""};
   PetscReal largest;
   SbShape shape;
+  SbItems *tets = &im->item[3];
+  PetscInt low = PETSC_MAX_INT, high = -1, n = 0, *map;
 
   PetscFunctionBeginUser;
-  SB_CATCH(&caught, read_slab(s, &body[b]));
+  SB_CATCH(&caught, SbImportSlab(&body[b], s->rank, s->size, im, &s->rows));
   PetscCall(SbCaughtRaise(s->comm, &caught));
-  PetscCall(find_used(s));
+  s->part->first = im->item[3].n ? (PetscInt)im->item[3].number[0] - 1 : 0;
+  // the vertices of the tets, ascending; tets then refer to them
+  for (PetscInt i = 0; i < 4 * tets->n; i++) {
+    low = PetscMin(low, tets->vert[i]);
+    high = PetscMax(high, tets->vert[i]);
+  }
+  PetscCall(PetscCalloc1(PetscMax(0, high - low + 1), &map));
+  for (PetscInt i = 0; i < 4 * tets->n; i++) {
+    n += !map[tets->vert[i] - low];
+    map[tets->vert[i] - low] = 1;
+  }
+  PetscCall(PetscMalloc1(n, &s->used));
+  n = 0;
+  for (PetscInt v = low; v <= high; v++) {
+    if (!map[v - low]) continue;
+    s->used[n] = v;
+    map[v - low] = n++;
+  }
+  for (PetscInt i = 0; i < 4 * tets->n; i++) tets->vert[i] = map[tets->vert[i] - low];
+  PetscCall(PetscFree(map));
+  /* what was read is what this rank keeps */
+  s->nkept = im->nvert;
+  s->x = im->x;
+  im->x = NULL;
+  PetscCall(PetscFree(im->vert_number));
+  im->nvert = n;
   PetscCall(ask_keepers(s));
   largest = SbImportLargest(im);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPIU_REAL, MPI_MAX, s->comm));
@@ -584,7 +550,7 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   PetscCall(sum(s, 1, &im->nunused));
   PetscCall(sum(s, 1, &im->nreoriented));
   // size and shape of the body, from those of all ranks
-  SbImportShape(s->im, &shape);
+  SbImportShape(im, SB_SLIVER, &shape);
   PetscCall(sum(s, 1, &shape.nsliver));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &shape.volume, 1, MPIU_REAL, MPI_SUM, s->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, shape.most, 8, MPIU_REAL, MPI_MAX, s->comm));

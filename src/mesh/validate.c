@@ -9,78 +9,9 @@
 
 #define CHECK(cond, ...) PetscCheck(cond, PETSC_COMM_SELF, PETSC_ERR_PLIB, __VA_ARGS__)
 
-static PetscErrorCode check_vertices(SbMesh m)
-{
-  PetscFunctionBeginUser;
-  CHECK(0 <= m->nvert_owned && m->nvert_owned <= m->nvert && m->nvert <= m->Nvert, "Bad numbers of vertices");
-  for (PetscInt v = 0; v < m->nvert; v++) {
-    const PetscInt body = m->vert_body[v];
-
-    if (v < m->nvert_owned)
-      CHECK(m->gvert[v] == m->gvert_start + v,
-            "Owned vertex %" PetscInt_FMT " has global number %" PetscInt_FMT, v, m->gvert[v]);
-    else {
-      CHECK(m->gvert[v] < m->gvert_start || m->gvert[v] >= m->gvert_start + m->nvert_owned,
-            "Ghost vertex %" PetscInt_FMT " has an owned number", v);
-      CHECK(v == m->nvert_owned || m->gvert[v] > m->gvert[v - 1],
-            "Ghost vertices are not ascending at %" PetscInt_FMT, v);
-    }
-    CHECK(0 <= m->gvert[v] && m->gvert[v] < m->Nvert, "Global vertex number %" PetscInt_FMT " out of range",
-          m->gvert[v]);
-    CHECK(0 <= m->vert_orig[v] && m->vert_orig[v] < m->Nvert,
-          "Original vertex number %" PetscInt_FMT " out of range", m->vert_orig[v]);
-    CHECK(0 <= body && body < m->nbody, "Vertex %" PetscInt_FMT " in body %" PetscInt_FMT, v, body);
-    CHECK(!(m->vert_set[v] & SB_ON_BOUNDARY), "Vertex %" PetscInt_FMT " carries the bit of faces", v);
-    for (int i = 0; i < 3; i++) {
-      CHECK(m->body[body].bbox[i] <= m->x[3 * v + i] && m->x[3 * v + i] <= m->body[body].bbox[3 + i],
-            "Vertex %" PetscInt_FMT " outside its body", v);
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscInt lowest(const PetscInt v[4])
 {
   return PetscMin(PetscMin(v[0], v[1]), PetscMin(v[2], v[3]));
-}
-
-static PetscErrorCode check_cells(SbMesh m)
-{
-  PetscBool all = PETSC_FALSE;
-
-  PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < m->nbody; b++) all = (PetscBool)(all || m->body[b].other_nodes);
-  CHECK(0 <= m->ncell_owned && m->ncell_owned <= m->ncell && m->ncell <= m->Ncell, "Bad numbers of cells");
-  for (PetscInt c = 0; c < m->ncell; c++) {
-    const PetscInt *v = m->cell + 4 * c;
-
-    for (int a = 0; a < 4; a++) {
-      CHECK(0 <= v[a] && v[a] < m->nvert, "Cell %" PetscInt_FMT " has vertex %" PetscInt_FMT, c, v[a]);
-      CHECK(m->vert_body[v[a]] == m->cell_body[c],
-            "Cell %" PetscInt_FMT " and its vertex %" PetscInt_FMT " are in different bodies", c, v[a]);
-    }
-    CHECK(SbTetDeterminant(m->x, v) > 0, "Cell %" PetscInt_FMT " is not positively oriented", c);
-    CHECK(0 <= m->cell_orig[c] && m->cell_orig[c] < m->Ncell,
-          "Original cell number %" PetscInt_FMT " out of range", m->cell_orig[c]);
-    if (c >= m->ncell_owned && !all)
-      CHECK(lowest(v) < m->nvert_owned, "Ghost cell %" PetscInt_FMT " touches no owned vertex", c);
-    if (c == 0 || c == m->ncell_owned) continue;
-    CHECK(m->cell_body[c - 1] < m->cell_body[c] ||
-            (m->cell_body[c - 1] == m->cell_body[c] &&
-             (m->cell_material[c - 1] != m->cell_material[c] || lowest(v - 4) <= lowest(v))),
-          "Cells are out of order at %" PetscInt_FMT, c);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* A number for a number, without pattern (splitmix64, Steele et al. 2014). */
-static uint64_t mix(PetscInt i)
-{
-  uint64_t z = (uint64_t)i * 0x9e3779b97f4a7c15u + 0x9e3779b97f4a7c15u;
-
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  return z ^ (z >> 31);
 }
 
 /* What all ranks must agree on. */
@@ -94,11 +25,11 @@ static PetscErrorCode check_sums(SbMesh m)
   // sums over what this rank owns
   mine[VERT] = (uint64_t)m->nvert_owned;
   mine[CELL] = (uint64_t)m->ncell_owned;
-  for (PetscInt v = 0; v < m->nvert_owned; v++) mine[VERT_MIX] += mix(m->vert_orig[v]);
+  for (PetscInt v = 0; v < m->nvert_owned; v++) mine[VERT_MIX] += SbMix(m->vert_orig[v]);
   for (PetscInt c = 0; c < m->ncell; c++) {
     for (int a = 0; a < 4; a++) mine[PAIR] += m->cell[4 * c + a] < m->nvert_owned;
     if (c >= m->ncell_owned) continue;
-    mine[CELL_MIX] += mix(m->cell_orig[c]);
+    mine[CELL_MIX] += SbMix(m->cell_orig[c]);
     for (int f = 0; f < 4; f++) mine[FACET] += m->face_set[4 * c + f] & SB_ON_BOUNDARY;
     volume += SbTetDeterminant(m->x, m->cell + 4 * c) / 6;
   }
@@ -108,8 +39,8 @@ static PetscErrorCode check_sums(SbMesh m)
   expected[VERT] = (uint64_t)m->Nvert;
   expected[CELL] = (uint64_t)m->Ncell;
   expected[PAIR] = 4 * (uint64_t)m->Ncell;
-  for (PetscInt v = 0; v < m->Nvert; v++) expected[VERT_MIX] += mix(v);
-  for (PetscInt c = 0; c < m->Ncell; c++) expected[CELL_MIX] += mix(c);
+  for (PetscInt v = 0; v < m->Nvert; v++) expected[VERT_MIX] += SbMix(v);
+  for (PetscInt c = 0; c < m->Ncell; c++) expected[CELL_MIX] += SbMix(c);
   for (PetscInt b = 0; b < m->nbody; b++) {
     expected[FACET] += (uint64_t)m->body[b].nfacet;
     rest += m->body[b].volume;
@@ -132,10 +63,58 @@ PetscErrorCode SbMeshValidate(SbMesh mesh)
 {
   PetscReal *x;
   PetscInt *orig;
+  PetscBool all;
 
   PetscFunctionBeginUser;
-  PetscCall(check_vertices(mesh));
-  PetscCall(check_cells(mesh));
+  CHECK(0 <= mesh->nvert_owned && mesh->nvert_owned <= mesh->nvert && mesh->nvert <= mesh->Nvert,
+        "Bad numbers of vertices");
+  for (PetscInt v = 0; v < mesh->nvert; v++) {
+    const PetscInt body = mesh->vert_body[v];
+
+    if (v < mesh->nvert_owned)
+      CHECK(mesh->gvert[v] == mesh->gvert_start + v,
+            "Owned vertex %" PetscInt_FMT " has global number %" PetscInt_FMT, v, mesh->gvert[v]);
+    else {
+      CHECK(mesh->gvert[v] < mesh->gvert_start || mesh->gvert[v] >= mesh->gvert_start + mesh->nvert_owned,
+            "Ghost vertex %" PetscInt_FMT " has an owned number", v);
+      CHECK(v == mesh->nvert_owned || mesh->gvert[v] > mesh->gvert[v - 1],
+            "Ghost vertices are not ascending at %" PetscInt_FMT, v);
+    }
+    CHECK(0 <= mesh->gvert[v] && mesh->gvert[v] < mesh->Nvert,
+          "Global vertex number %" PetscInt_FMT " out of range", mesh->gvert[v]);
+    CHECK(0 <= mesh->vert_orig[v] && mesh->vert_orig[v] < mesh->Nvert,
+          "Original vertex number %" PetscInt_FMT " out of range", mesh->vert_orig[v]);
+    CHECK(0 <= body && body < mesh->nbody, "Vertex %" PetscInt_FMT " in body %" PetscInt_FMT, v, body);
+    CHECK(!(mesh->vert_set[v] & SB_ON_BOUNDARY), "Vertex %" PetscInt_FMT " carries the bit of faces", v);
+    for (int i = 0; i < 3; i++) {
+      CHECK(mesh->body[body].bbox[i] <= mesh->x[3 * v + i] &&
+              mesh->x[3 * v + i] <= mesh->body[body].bbox[3 + i],
+            "Vertex %" PetscInt_FMT " outside its body", v);
+    }
+  }
+  all = PETSC_FALSE;
+  for (PetscInt b = 0; b < mesh->nbody; b++) all = (PetscBool)(all || mesh->body[b].other_nodes);
+  CHECK(0 <= mesh->ncell_owned && mesh->ncell_owned <= mesh->ncell && mesh->ncell <= mesh->Ncell,
+        "Bad numbers of cells");
+  for (PetscInt c = 0; c < mesh->ncell; c++) {
+    const PetscInt *v = mesh->cell + 4 * c;
+
+    for (int a = 0; a < 4; a++) {
+      CHECK(0 <= v[a] && v[a] < mesh->nvert, "Cell %" PetscInt_FMT " has vertex %" PetscInt_FMT, c, v[a]);
+      CHECK(mesh->vert_body[v[a]] == mesh->cell_body[c],
+            "Cell %" PetscInt_FMT " and its vertex %" PetscInt_FMT " are in different bodies", c, v[a]);
+    }
+    CHECK(SbTetDeterminant(mesh->x, v) > 0, "Cell %" PetscInt_FMT " is not positively oriented", c);
+    CHECK(0 <= mesh->cell_orig[c] && mesh->cell_orig[c] < mesh->Ncell,
+          "Original cell number %" PetscInt_FMT " out of range", mesh->cell_orig[c]);
+    if (c >= mesh->ncell_owned && !all)
+      CHECK(lowest(v) < mesh->nvert_owned, "Ghost cell %" PetscInt_FMT " touches no owned vertex", c);
+    if (c == 0 || c == mesh->ncell_owned) continue;
+    CHECK(mesh->cell_body[c - 1] < mesh->cell_body[c] ||
+            (mesh->cell_body[c - 1] == mesh->cell_body[c] &&
+             (mesh->cell_material[c - 1] != mesh->cell_material[c] || lowest(v - 4) <= lowest(v))),
+          "Cells are out of order at %" PetscInt_FMT, c);
+  }
   PetscCall(check_sums(mesh));
   // ghost vertices carry what their owners have
   PetscCall(PetscMalloc2(3 * (size_t)mesh->nvert, &x, mesh->nvert, &orig));

@@ -37,41 +37,6 @@ static int read_numbers(const char **text, double value[3])
   return n;
 }
 
-static PetscErrorCode parse_box(const char *text, const char *where, Box *box)
-{
-  const char *p = text + strlen("box:");
-  double l[3], n[3], total = 6;
-  int count;
-
-  PetscFunctionBeginUser;
-  PetscCheck(read_numbers(&p, l) == 3 && *p == ':', PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s: " BOX_HELP,
-             where);
-  p++;
-  count = read_numbers(&p, n);
-  PetscCheck((count == 1 || count == 3) && !*p, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s: " BOX_HELP,
-             where);
-  for (int i = 0; i < 3; i++) {
-    PetscCheck(l[i] > 0 && isfinite(l[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "%s: length %g m; " BOX_HELP, where, l[i]);
-  }
-  if (count == 1) {
-    const double n0 = n[0], shortest = PetscMin(PetscMin(l[0], l[1]), l[2]);
-
-    for (int i = 0; i < 3; i++)
-      n[i] = l[i] == shortest ? n0 : PetscMax(1., floor(l[i] / shortest * n0 + 0.5));
-  }
-  for (int i = 0; i < 3; i++) {
-    PetscCheck(n[i] >= 1 && n[i] == floor(n[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "%s: %g cells; " BOX_HELP, where, n[i]);
-    total *= n[i];
-    PetscCheck(total <= PETSC_MAX_INT / 8, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "%s: %g tets or more are more than this build can number; take fewer cells", where, total);
-    box->l[i] = l[i];
-    box->n[i] = (PetscInt)n[i];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static inline PetscInt vertex(const Box *box, PetscInt i, PetscInt j, PetscInt k)
 {
   return (k * (box->n[1] + 1) + j) * (box->n[0] + 1) + i;
@@ -103,41 +68,41 @@ static PetscErrorCode add_cell(const Box *box, const PetscInt at[3], SbImport *i
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Two triangles on each cell side of the face `side` of the box; the diagonal is the one that the tets have. */
-static PetscErrorCode add_side(const Box *box, int side, SbImport *im)
-{
-  static const char *const names[6] = {"xmin", "xmax", "ymin", "ymax", "zmin", "zmax"};
-  const int d = side / 2, e = (d + 1) % 3, f = (d + 2) % 3;
-  PetscInt at[3], group, tags;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbImportGroup(im, 2, side + 1, names[side], &group));
-  PetscCall(SbImportTagSet(im, 1, &group, &tags));
-  at[d] = side % 2 ? box->n[d] : 0;
-  for (PetscInt i = 0; i < box->n[e]; i++) {
-    for (PetscInt j = 0; j < box->n[f]; j++) {
-      PetscInt v[4];
-
-      /* Corners by bits; the diagonals of a row of mirrored cells alternate. */
-      for (int corner = 0; corner < 4; corner++) {
-        at[e] = i + ((corner & 1) ^ (i & 1));
-        at[f] = j + ((corner >> 1) ^ (j & 1));
-        v[corner] = vertex(box, at[0], at[1], at[2]);
-      }
-      PetscCall(SbImportAddItem(im, 2, (PetscInt[3]){v[0], v[1], v[3]}, tags, im->item[2].n + 1));
-      PetscCall(SbImportAddItem(im, 2, (PetscInt[3]){v[0], v[2], v[3]}, tags, im->item[2].n + 1));
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbImportRead_Box(const char *text, SbImport *im)
 {
   Box box;
   PetscInt at[3], v = 0;
+  const char *p = text + strlen("box:");
+  double l[3], n[3], total = 6;
+  int count;
 
   PetscFunctionBeginUser;
-  PetscCall(parse_box(text, im->where, &box));
+  // the lengths and the numbers of cells
+  PetscCheck(read_numbers(&p, l) == 3 && *p == ':', PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s: " BOX_HELP,
+             im->where);
+  p++;
+  count = read_numbers(&p, n);
+  PetscCheck((count == 1 || count == 3) && !*p, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s: " BOX_HELP,
+             im->where);
+  for (int i = 0; i < 3; i++) {
+    PetscCheck(l[i] > 0 && isfinite(l[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s: length %g m; " BOX_HELP, im->where, l[i]);
+  }
+  if (count == 1) {
+    const double n0 = n[0], shortest = PetscMin(PetscMin(l[0], l[1]), l[2]);
+
+    for (int i = 0; i < 3; i++)
+      n[i] = l[i] == shortest ? n0 : PetscMax(1., floor(l[i] / shortest * n0 + 0.5));
+  }
+  for (int i = 0; i < 3; i++) {
+    PetscCheck(n[i] >= 1 && n[i] == floor(n[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s: %g cells; " BOX_HELP, im->where, n[i]);
+    total *= n[i];
+    PetscCheck(total <= PETSC_MAX_INT / 8, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s: %g tets or more are more than this build can number; take fewer cells", im->where, total);
+    box.l[i] = l[i];
+    box.n[i] = (PetscInt)n[i];
+  }
   // vertices, x fastest
   PetscCall(SbImportSetVertices(im, (box.n[0] + 1) * (box.n[1] + 1) * (box.n[2] + 1)));
   for (PetscInt k = 0; k <= box.n[2]; k++) {
@@ -155,6 +120,29 @@ PetscErrorCode SbImportRead_Box(const char *text, SbImport *im)
       for (at[0] = 0; at[0] < box.n[0]; at[0]++) PetscCall(add_cell(&box, at, im));
     }
   }
-  for (int side = 0; side < 6; side++) PetscCall(add_side(&box, side, im));
+  for (int side = 0; side < 6; side++) {
+    static const char *const names[6] = {"xmin", "xmax", "ymin", "ymax", "zmin", "zmax"};
+    const int d = side / 2, e = (d + 1) % 3, f = (d + 2) % 3;
+    PetscInt group, tags;
+
+    // two triangles on each cell side of the face `side` of the box; the diagonal is the one that the tets have
+    PetscCall(SbImportGroup(im, 2, side + 1, names[side], &group));
+    PetscCall(SbImportTagSet(im, 1, &group, &tags));
+    at[d] = side % 2 ? box.n[d] : 0;
+    for (PetscInt i = 0; i < box.n[e]; i++) {
+      for (PetscInt j = 0; j < box.n[f]; j++) {
+        PetscInt c[4];
+
+        /* Corners by bits; the diagonals of a row of mirrored cells alternate. */
+        for (int corner = 0; corner < 4; corner++) {
+          at[e] = i + ((corner & 1) ^ (i & 1));
+          at[f] = j + ((corner >> 1) ^ (j & 1));
+          c[corner] = vertex(&box, at[0], at[1], at[2]);
+        }
+        PetscCall(SbImportAddItem(im, 2, (PetscInt[3]){c[0], c[1], c[3]}, tags, im->item[2].n + 1));
+        PetscCall(SbImportAddItem(im, 2, (PetscInt[3]){c[0], c[2], c[3]}, tags, im->item[2].n + 1));
+      }
+    }
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

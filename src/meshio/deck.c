@@ -71,39 +71,6 @@ PetscErrorCode SbDeckAddSet(SbDeck *d, PetscInt set, PetscInt other)
 
 /* ------------------------------------------------------------------ put together */
 
-/* The simplices, with the groups of their properties. */
-static PetscErrorCode make_items(SbDeck *d)
-{
-  SbImport *im = d->im;
-  int64_t *label = NULL;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbImportScratch(im, (size_t)d->nelement.n * sizeof(*label), &label));
-  for (PetscInt e = 0; e < d->nelement.n; e++) {
-    SbDeckElement *element = &d->element[e];
-    const int dim = SbGmshTypes[element->type].dim;
-    PetscInt vert[4] = {0, 0, 0, 0}, tags = 0;
-
-    label[e] = element->label;
-    element->item = -1;
-    if (SbGmshTypes[element->type].nnode != dim + 1) continue;
-    im->scan.token = element->at;
-    for (int k = 0; k <= dim; k++) {
-      vert[k] = SbNumbersFind(&im->nodes, element->node[k]);
-      if (vert[k] < 0)
-        SB_SCAN_ERROR(&im->scan, "element %lld uses node %lld, which is not there", (long long)element->label,
-                      (long long)element->node[k]);
-    }
-    if (element->property >= 0) PetscCall(SbImportTagsAlone(im, dim, element->property, NULL, &tags));
-    element->item = im->item[dim].n;
-    PetscCall(SbImportAddItem(im, dim, vert, tags, element->label));
-  }
-  PetscCall(SbNumbersCreate(d->nelement.n, label, &im->elements));
-  if (im->elements.repeated && d->unique)
-    SB_SCAN_ERROR(&im->scan, "element %lld is given twice; %s", (long long)im->elements.twice, d->cure);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Adds the nodes or elements of a range to those found, by their places. */
 static PetscErrorCode find_range(SbDeck *d, const SbDeckSet *set, const SbDeckRange *r)
 {
@@ -174,6 +141,7 @@ PetscErrorCode SbDeckFind(SbDeck *d, PetscInt s)
 PetscErrorCode SbDeckBuild(SbDeck *d)
 {
   SbImport *im = d->im;
+  int64_t *label = NULL;
   PetscInt *point = NULL, group; /* [nvert] item of a node that is in a set, or -1 */
 
   PetscFunctionBeginUser;
@@ -189,7 +157,31 @@ PetscErrorCode SbDeckBuild(SbDeck *d)
     if (d->node[v].label == im->nodes.twice) im->scan.token = d->node[v].at;
   if (im->nodes.repeated)
     SB_SCAN_ERROR(&im->scan, "node %lld is given twice; %s", (long long)im->nodes.twice, d->cure);
-  PetscCall(make_items(d));
+  // the simplices, with the groups of their properties
+  PetscCall(SbImportScratch(im, (size_t)d->nelement.n * sizeof(*label), &label));
+  for (PetscInt e = 0; e < d->nelement.n; e++) {
+    SbDeckElement *element = &d->element[e];
+    const int dim = SbGmshTypes[element->type].dim;
+    PetscInt vert[4] = {0, 0, 0, 0}, tags = 0;
+
+    label[e] = element->label;
+    element->item = -1;
+    if (SbGmshTypes[element->type].nnode != dim + 1) continue;
+    im->scan.token = element->at;
+    for (int k = 0; k <= dim; k++) {
+      vert[k] = SbNumbersFind(&im->nodes, element->node[k]);
+      if (vert[k] < 0)
+        SB_SCAN_ERROR(&im->scan, "element %lld uses node %lld, which is not there", (long long)element->label,
+                      (long long)element->node[k]);
+    }
+    if (element->property >= 0) PetscCall(SbImportTagsAlone(im, dim, element->property, NULL, &tags));
+    element->item = im->item[dim].n;
+    PetscCall(SbImportAddItem(im, dim, vert, tags, element->label));
+  }
+  PetscCall(SbNumbersCreate(d->nelement.n, label, &im->elements));
+  if (im->elements.repeated && d->unique)
+    SB_SCAN_ERROR(&im->scan, "element %lld is given twice; %s", (long long)im->elements.twice, d->cure);
+  // sets become groups of their members; a node of a set becomes a point
   PetscCall(SbImportScratch(im, (size_t)im->nvert * sizeof(*point), &point));
   for (PetscInt v = 0; v < im->nvert; v++) point[v] = -1;
   for (PetscInt s = 0; s < d->nset.n; s++) {

@@ -107,64 +107,6 @@ static int compare_tags(const void *a, const void *b)
   return (p->tag > q->tag) - (p->tag < q->tag);
 }
 
-/* All nodes, ascending tags. */
-static PetscErrorCode collect_nodes(const SbGmsh *g, SbImport *im)
-{
-  size_t *tag, ntag, nx, nparameter;
-  double *x, *parameter;
-  Order *order;
-
-  PetscFunctionBeginUser;
-  SB_GMSH(g, ModelMeshGetNodes, &tag, &ntag, &x, &nx, &parameter, &nparameter, -1, -1, 0, 0);
-  PetscCheck(ntag < PETSC_MAX_INT / 8, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-             "%s: %zu nodes are more than this build can number", g->where, ntag);
-  PetscCall(PetscMalloc1(ntag + 1, &order));
-  for (size_t i = 0; i < ntag; i++) order[i] = (Order){tag[i], i};
-  qsort(order, ntag, sizeof(*order), compare_tags);
-  PetscCall(SbImportSetVertices(im, (PetscInt)ntag));
-  for (size_t i = 0; i < ntag; i++) {
-    im->vert_number[i] = (int64_t)order[i].tag;
-    for (int k = 0; k < 3; k++) {
-      im->x[3 * i + k] = x[3 * order[i].from + k];
-      PetscCheck(isfinite(im->x[3 * i + k]), PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-                 "%s: coordinate of node %zu is not a finite number; repair the file", g->where,
-                 order[i].tag);
-    }
-  }
-  PetscCall(PetscFree(order));
-  g->Free(tag);
-  g->Free(x);
-  g->Free(parameter);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Tag set of an entity: its physical groups with their names, or itself. */
-static PetscErrorCode entity_tags(const SbGmsh *g, int dim, int entity, PetscBool itself, SbImport *im,
-                                  PetscInt *tags)
-{
-  int *physical = NULL;
-  size_t n = 0;
-  PetscInt *group;
-  char *name;
-
-  PetscFunctionBeginUser;
-  if (!itself) SB_GMSH(g, ModelGetPhysicalGroupsForEntity, dim, entity, &physical, &n);
-  PetscCall(PetscMalloc1(n + 1, &group));
-  for (size_t i = 0; i < n; i++) {
-    SB_GMSH(g, ModelGetPhysicalName, dim, physical[i], &name);
-    PetscCall(SbImportGroup(im, dim, physical[i], name && name[0] ? name : NULL, &group[i]));
-    g->Free(name);
-  }
-  if (itself) {
-    PetscCall(SbImportGroup(im, dim, entity, NULL, &group[0]));
-    n = 1;
-  }
-  PetscCall(SbImportTagSet(im, (PetscInt)n, group, tags));
-  PetscCall(PetscFree(group));
-  g->Free(physical);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The elements of one entity: those of use are kept, all are counted by type. */
 static PetscErrorCode collect_entity(const SbGmsh *g, int dim, int entity, PetscBool itself, SbImport *im)
 {
@@ -174,7 +116,28 @@ static PetscErrorCode collect_entity(const SbGmsh *g, int dim, int entity, Petsc
 
   PetscFunctionBeginUser;
   SB_GMSH(g, ModelMeshGetElements, &types, &ntype, &number, &nnumber, &nn, &node, &nnode, &nnn, dim, entity);
-  if (ntype) PetscCall(entity_tags(g, dim, entity, itself, im, &tags));
+  if (ntype) {
+    int *physical = NULL;
+    size_t n = 0;
+    PetscInt *group;
+    char *name;
+
+    // tag set of an entity: its physical groups with their names, or itself
+    if (!itself) SB_GMSH(g, ModelGetPhysicalGroupsForEntity, dim, entity, &physical, &n);
+    PetscCall(PetscMalloc1(n + 1, &group));
+    for (size_t i = 0; i < n; i++) {
+      SB_GMSH(g, ModelGetPhysicalName, dim, physical[i], &name);
+      PetscCall(SbImportGroup(im, dim, physical[i], name && name[0] ? name : NULL, &group[i]));
+      g->Free(name);
+    }
+    if (itself) {
+      PetscCall(SbImportGroup(im, dim, entity, NULL, &group[0]));
+      n = 1;
+    }
+    PetscCall(SbImportTagSet(im, (PetscInt)n, group, &tags));
+    PetscCall(PetscFree(group));
+    g->Free(physical);
+  }
   for (size_t t = 0; t < ntype; t++) {
     const int type = types[t];
 
@@ -210,9 +173,32 @@ PetscErrorCode SbGmshCollect(const SbGmsh *g, SbGmshGroups groups, SbImport *im)
   int *entity, *physical;
   size_t n, nphysical;
   PetscBool itself = PETSC_FALSE;
+  size_t *tag, ntag, nx, nparameter;
+  double *x, *parameter;
+  Order *order;
 
   PetscFunctionBeginUser;
-  PetscCall(collect_nodes(g, im));
+  // all nodes, ascending tags
+  SB_GMSH(g, ModelMeshGetNodes, &tag, &ntag, &x, &nx, &parameter, &nparameter, -1, -1, 0, 0);
+  PetscCheck(ntag < PETSC_MAX_INT / 8, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s: %zu nodes are more than this build can number", g->where, ntag);
+  PetscCall(PetscMalloc1(ntag + 1, &order));
+  for (size_t i = 0; i < ntag; i++) order[i] = (Order){tag[i], i};
+  qsort(order, ntag, sizeof(*order), compare_tags);
+  PetscCall(SbImportSetVertices(im, (PetscInt)ntag));
+  for (size_t i = 0; i < ntag; i++) {
+    im->vert_number[i] = (int64_t)order[i].tag;
+    for (int k = 0; k < 3; k++) {
+      im->x[3 * i + k] = x[3 * order[i].from + k];
+      PetscCheck(isfinite(im->x[3 * i + k]), PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+                 "%s: coordinate of node %zu is not a finite number; repair the file", g->where,
+                 order[i].tag);
+    }
+  }
+  PetscCall(PetscFree(order));
+  g->Free(tag);
+  g->Free(x);
+  g->Free(parameter);
   PetscCall(SbNumbersCreate(im->nvert, im->vert_number, &im->nodes));
   if (groups == SB_GMSH_ENTITIES) {
     SB_GMSH(g, ModelGetPhysicalGroups, &physical, &nphysical, -1);
@@ -225,7 +211,6 @@ PetscErrorCode SbGmshCollect(const SbGmsh *g, SbGmshGroups groups, SbImport *im)
   // items in the order of their numbers: entities had torn that of the file
   for (int d = 0; d < 4; d++) {
     SbItems *item = &im->item[d], old = *item;
-    Order *order;
 
     PetscCall(PetscMalloc1(old.n, &order));
     for (PetscInt i = 0; i < old.n; i++) order[i] = (Order){(size_t)old.number[i], (size_t)i};

@@ -218,32 +218,6 @@ static int type_of(const char *name)
   return 0;
 }
 
-/* One element, on as many lines as its nodes need. */
-static PetscErrorCode read_element(Abaqus *a, int type, PetscInt set)
-{
-  SbDeckElement e = {.type = type, .property = -1, .at = a->scan->token};
-  const int nnode = SbGmshTypes[type].nnode;
-  char word[WORD];
-
-  PetscFunctionBeginUser;
-  (void)next_word(a, word);
-  PetscCall(number_of(a, word, "label of an element", &e.label));
-  for (int k = 0; k < nnode; k++) {
-    int64_t node;
-
-    if (!next_word(a, word)) {
-      leave_line(a);
-      if (!next_line(a) || *a->scan->at == '*' || !next_word(a, word))
-        SB_SCAN_ERROR(a->scan, "element %lld ends after %d of %d nodes", (long long)e.label, k, nnode);
-    }
-    PetscCall(number_of(a, word, "node of an element", &node));
-    if (k < 4) e.node[k] = node;
-  }
-  PetscCall(SbDeckAddElement(&a->deck, &e));
-  if (set >= 0) PetscCall(SbDeckAddRange(&a->deck, set, e.label, e.label, 1));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode read_elements(Abaqus *a, const char *line)
 {
   char name[WORD] = "", word[WORD];
@@ -260,8 +234,27 @@ static PetscErrorCode read_elements(Abaqus *a, const char *line)
                   "triangles and two-node lines for sets",
                   name);
   if (parameter(a, line, "ELSET", word)) PetscCall(find_set(a, PETSC_FALSE, word, &set));
-  for (leave_line(a); next_line(a) && *a->scan->at != '*'; leave_line(a))
-    PetscCall(read_element(a, type, set));
+  for (leave_line(a); next_line(a) && *a->scan->at != '*'; leave_line(a)) {
+    SbDeckElement e = {.type = type, .property = -1, .at = a->scan->token};
+    const int nnode = SbGmshTypes[type].nnode;
+
+    // one element, on as many lines as its nodes need
+    (void)next_word(a, word);
+    PetscCall(number_of(a, word, "label of an element", &e.label));
+    for (int k = 0; k < nnode; k++) {
+      int64_t node;
+
+      if (!next_word(a, word)) {
+        leave_line(a);
+        if (!next_line(a) || *a->scan->at == '*' || !next_word(a, word))
+          SB_SCAN_ERROR(a->scan, "element %lld ends after %d of %d nodes", (long long)e.label, k, nnode);
+      }
+      PetscCall(number_of(a, word, "node of an element", &node));
+      if (k < 4) e.node[k] = node;
+    }
+    PetscCall(SbDeckAddElement(&a->deck, &e));
+    if (set >= 0) PetscCall(SbDeckAddRange(&a->deck, set, e.label, e.label, 1));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -320,30 +313,6 @@ static PetscErrorCode use_side(Abaqus *a, const Side *side, const SbDeckElement 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode use_sides(Abaqus *a)
-{
-  SbDeck *d = &a->deck;
-
-  PetscFunctionBeginUser;
-  for (PetscInt k = 0; k < a->nside.n; k++) {
-    const Side *side = &a->side[k];
-
-    if (side->set >= 0) {
-      PetscCall(SbDeckFind(d, side->set));
-      for (PetscInt i = 0; i < d->nfound.n; i++) PetscCall(use_side(a, side, &d->element[d->found[i]]));
-    } else {
-      const PetscInt e = SbNumbersFind(&d->im->elements, side->element);
-
-      a->scan->token = side->at;
-      if (e < 0)
-        SB_SCAN_ERROR(a->scan, "surface '%s' has a side of element %lld, which is not there",
-                      a->surface[side->surface], (long long)side->element);
-      PetscCall(use_side(a, side, &d->element[e]));
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ the file */
 
 PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
@@ -355,6 +324,7 @@ PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
   char word[WORD], rotate[SB_IMPORT_OPTION_MAX], translate[SB_IMPORT_OPTION_MAX];
   PetscBool in_instance = PETSC_FALSE;
   int npart = 0;
+  SbDeck *d = &a.deck;
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
@@ -391,11 +361,27 @@ PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
       leave_line(&a);
     }
   }
-  // elements and sets find their nodes; sides of elements become triangles
+  // elements and sets find their nodes
   s->token = s->end;
   if (!a.deck.nnode.n) SB_SCAN_ERROR(s, "there is no *NODE in it; this is no input file of Abaqus");
   PetscCall(SbDeckBuild(&a.deck));
-  PetscCall(use_sides(&a));
+  // sides of elements become triangles
+  for (PetscInt k = 0; k < a.nside.n; k++) {
+    const Side *side = &a.side[k];
+
+    if (side->set >= 0) {
+      PetscCall(SbDeckFind(d, side->set));
+      for (PetscInt i = 0; i < d->nfound.n; i++) PetscCall(use_side(&a, side, &d->element[d->found[i]]));
+    } else {
+      const PetscInt e = SbNumbersFind(&im->elements, side->element);
+
+      a.scan->token = side->at;
+      if (e < 0)
+        SB_SCAN_ERROR(a.scan, "surface '%s' has a side of element %lld, which is not there",
+                      a.surface[side->surface], (long long)side->element);
+      PetscCall(use_side(&a, side, &d->element[e]));
+    }
+  }
   PetscCall(SbImportJoinGroups(im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -181,46 +181,35 @@ static PetscErrorCode read_items(const File *f, int dim, const char *name)
 
 /* ------------------------------------------------------------------ groups of an own mesh */
 
-/* The groups of the file; map[] leads to their numbers here. */
-static PetscErrorCode read_groups(const File *f, PetscInt *n, PetscInt **map)
-{
-  PetscInt ndim, nnumber, *dim;
-  int64_t *number;
-  char *names;
-  Array a = {.name = "/groups/name", .klass = H5T_STRING, .ncomp = 1};
-
-  PetscFunctionBeginUser;
-  PetscCall(read_array(f, &a, n, &names));
-  PetscCall(read_table(f, "/groups/dim", 1, 4, &ndim, &dim));
-  PetscCall(read_array(f, &(Array){.name = "/groups/number", .klass = H5T_INTEGER, .ncomp = 1, .bound = -1},
-                       &nnumber, &number));
-  if (ndim != *n || nnumber != *n)
-    H5_ERROR(f, "/groups has %lld names, %lld dimensions and %lld numbers; the file is damaged",
-             (long long)*n, (long long)ndim, (long long)nnumber);
-  *map = NULL;
-  PetscCall(SbImportScratch(f->im, (size_t)*n * sizeof(**map), map));
-  for (PetscInt i = 0; i < *n; i++) {
-    char name[SB_GROUP_MAX];
-
-    (void)snprintf(name, sizeof(name), "%.*s", (int)PetscMin(a.width, sizeof(name) - 1),
-                   names + a.width * (size_t)i);
-    PetscCall(SbImportGroup(f->im, dim[i], number[i], name[0] ? name : NULL, &(*map)[i]));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode read_own(const File *f)
 {
   static const char *const names[4] = {"point", "line", "triangle", "cell"};
-  PetscInt nset = 0, n, *map, *set, ngroup, nmember, nstart, *group, *member, *start;
+  PetscInt nset = 0, n, *map = NULL, *set, ngroup, nmember, nstart, *group = NULL, *member, *start;
+  PetscInt ndim, nnumber, *dim;
+  int64_t *number;
+  char *title;
+  Array text = {.name = "/groups/name", .klass = H5T_STRING, .ncomp = 1};
 
   PetscFunctionBeginUser;
-  // the tag sets of the file; map[] leads to their numbers here
-  PetscCall(read_groups(f, &ngroup, &group));
+  // the groups of the file, group[] leads to their numbers here; its tag sets likewise with map[]
+  PetscCall(read_array(f, &text, &ngroup, &title));
+  PetscCall(read_table(f, "/groups/dim", 1, 4, &ndim, &dim));
+  PetscCall(read_array(f, &(Array){.name = "/groups/number", .klass = H5T_INTEGER, .ncomp = 1, .bound = -1},
+                       &nnumber, &number));
+  if (ndim != ngroup || nnumber != ngroup)
+    H5_ERROR(f, "/groups has %lld names, %lld dimensions and %lld numbers; the file is damaged",
+             (long long)ngroup, (long long)ndim, (long long)nnumber);
+  PetscCall(SbImportScratch(f->im, (size_t)ngroup * sizeof(*group), &group));
+  for (PetscInt i = 0; i < ngroup; i++) {
+    char name[SB_GROUP_MAX];
+
+    (void)snprintf(name, sizeof(name), "%.*s", (int)PetscMin(text.width, sizeof(name) - 1),
+                   title + text.width * (size_t)i);
+    PetscCall(SbImportGroup(f->im, dim[i], number[i], name[0] ? name : NULL, &group[i]));
+  }
   PetscCall(read_table(f, "/tag_sets/group", 1, ngroup, &nmember, &member));
   PetscCall(read_table(f, "/tag_sets/start", 1, (int64_t)nmember + 1, &nstart, &start));
   nset = PetscMax(nstart - 1, 0);
-  map = NULL;
   PetscCall(SbImportScratch(f->im, (size_t)nset * sizeof(*map), &map));
   for (PetscInt i = 0; i < nmember; i++) member[i] = group[member[i]];
   for (PetscInt t = 0; t < nset; t++) {
@@ -283,33 +272,6 @@ static herr_t visit_hundred(hid_t where, const char *name, const H5L_info_t *inf
   return 0;
 }
 
-/* Points of each tet become the vertices that they lie at, in their mean position. */
-static PetscErrorCode join_points(const File *f)
-{
-  SbImport *im = f->im;
-  PetscInt n, *vertex, *share, nvert = 0;
-  PetscReal *x;
-
-  PetscFunctionBeginUser;
-  PetscCall(read_table(f, "/mesh/vertices", 4, PETSC_MAX_INT / 8, &n, &vertex));
-  for (PetscInt i = 0; i < 4 * n; i++) nvert = PetscMax(nvert, vertex[i] + 1);
-  if (n != im->item[3].n || nvert > im->nvert)
-    H5_ERROR(f, "/mesh/vertices does not fit /mesh/cells; the file is damaged");
-  PetscCall(PetscCalloc2(3 * (size_t)nvert, &x, nvert, &share));
-  for (PetscInt i = 0; i < 4 * n; i++) {
-    for (int k = 0; k < 3; k++) x[3 * vertex[i] + k] += im->x[3 * im->item[3].vert[i] + k];
-    share[vertex[i]]++;
-  }
-  for (PetscInt v = 0; v < nvert; v++) {
-    for (int k = 0; k < 3; k++) im->x[3 * v + k] = share[v] ? x[3 * v + k] / share[v] : 0;
-    im->vert_number[v] = v + 1;
-  }
-  PetscCall(PetscArraycpy(im->item[3].vert, vertex, 4 * n));
-  im->nvert = nvert;
-  PetscCall(PetscFree2(x, share));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Each body is a group of tets. */
 static PetscErrorCode read_bodies(const File *f)
 {
@@ -367,7 +329,29 @@ static PetscErrorCode read_output(const File *f)
       H5_ERROR(f, "%s has %lld rows for %lld points", name, (long long)n, (long long)im->nvert);
     for (PetscInt i = 0; i < 3 * n; i++) im->x[i] += u[i];
   }
-  if (is_there(f, "/mesh/vertices")) PetscCall(join_points(f));
+  if (is_there(f, "/mesh/vertices")) {
+    SbImport *im = f->im;
+    PetscInt n, *vertex, *share, nvert = 0;
+    PetscReal *x;
+
+    // points of each tet become the vertices that they lie at, in their mean position
+    PetscCall(read_table(f, "/mesh/vertices", 4, PETSC_MAX_INT / 8, &n, &vertex));
+    for (PetscInt i = 0; i < 4 * n; i++) nvert = PetscMax(nvert, vertex[i] + 1);
+    if (n != im->item[3].n || nvert > im->nvert)
+      H5_ERROR(f, "/mesh/vertices does not fit /mesh/cells; the file is damaged");
+    PetscCall(PetscCalloc2(3 * (size_t)nvert, &x, nvert, &share));
+    for (PetscInt i = 0; i < 4 * n; i++) {
+      for (int k = 0; k < 3; k++) x[3 * vertex[i] + k] += im->x[3 * im->item[3].vert[i] + k];
+      share[vertex[i]]++;
+    }
+    for (PetscInt v = 0; v < nvert; v++) {
+      for (int k = 0; k < 3; k++) im->x[3 * v + k] = share[v] ? x[3 * v + k] / share[v] : 0;
+      im->vert_number[v] = v + 1;
+    }
+    PetscCall(PetscArraycpy(im->item[3].vert, vertex, 4 * n));
+    im->nvert = nvert;
+    PetscCall(PetscFree2(x, share));
+  }
   PetscCall(read_bodies(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -102,45 +102,6 @@ static PetscErrorCode read_group(SbDeck *d, int nvalue)
 
 /* ------------------------------------------------------------------ the file */
 
-/* A data set: its number, then as many of what it holds as there are. */
-static PetscErrorCode read_set(SbDeck *d)
-{
-  SbScan *s = &d->im->scan;
-  int64_t id;
-  PetscBool end;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanText(s, "number of a data set", &id));
-  PetscCall(SbScanEndOfLine(s));
-  if (id == 2412 && !d->nnode.n) SB_SCAN_ERROR(s, "elements before the nodes");
-  for (;;) {
-    // the data set ends at a mark; with the file it is an error
-    while (s->at < s->end && (*s->at == '\n' || *s->at == '\r')) s->at++;
-    s->token = s->at;
-    if (s->at >= s->end)
-      SB_SCAN_ERROR(s,
-                    "the file ends where a line of -1 is expected; it is truncated, write or copy it again");
-    end = is_mark(s);
-    if (end) break;
-    // set 2411 has the coordinates on a line of their own, set 15 on the same one
-    if (id == 2411 || id == 781 || id == 15) {
-      int64_t label, other;
-      PetscReal *x;
-
-      PetscCall(SbScanText(s, "label of a node", &label));
-      PetscCall(SbDeckAddNode(d, label, &x));
-      for (int i = 0; i < 3; i++) PetscCall(SbScanText(s, "coordinate system or colour of a node", &other));
-      PetscCall(SbScanPoint(s, "coordinate", label, x));
-    }
-    if (id == 2412) PetscCall(read_element(d));
-    if (id == 2429 || id == 2430 || id == 2432) PetscCall(read_group(d, 2));
-    if (id == 2435 || id == 2452 || id == 2467 || id == 2477) PetscCall(read_group(d, 4));
-    PetscCall(SbScanEndOfLine(s)); /* data sets of no concern are passed over */
-  }
-  PetscCall(SbScanEndOfLine(s));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbImportRead_UNV(const char *path, SbImport *im)
 {
   SbScan *s = &im->scan;
@@ -149,12 +110,41 @@ PetscErrorCode SbImportRead_UNV(const char *path, SbImport *im)
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
   for (;;) {
+    int64_t id;
+
     SbScanNext(s, 0);
     if (s->at >= s->end) break;
     while (s->at > s->data && s->at[-1] != '\n') s->at--; /* the whole line */
     if (!is_mark(s)) SB_SCAN_ERROR(s, "expected a line of -1; this is no universal file, or it is damaged");
     PetscCall(SbScanEndOfLine(s));
-    PetscCall(read_set(&d));
+    // a data set: its number, then as many of what it holds as there are
+    PetscCall(SbScanText(s, "number of a data set", &id));
+    PetscCall(SbScanEndOfLine(s));
+    if (id == 2412 && !d.nnode.n) SB_SCAN_ERROR(s, "elements before the nodes");
+    for (;;) {
+      // the data set ends at a mark; with the file it is an error
+      while (s->at < s->end && (*s->at == '\n' || *s->at == '\r')) s->at++;
+      s->token = s->at;
+      if (s->at >= s->end)
+        SB_SCAN_ERROR(
+          s, "the file ends where a line of -1 is expected; it is truncated, write or copy it again");
+      if (is_mark(s)) break;
+      // set 2411 has the coordinates on a line of their own, set 15 on the same one
+      if (id == 2411 || id == 781 || id == 15) {
+        int64_t label, other;
+        PetscReal *x;
+
+        PetscCall(SbScanText(s, "label of a node", &label));
+        PetscCall(SbDeckAddNode(&d, label, &x));
+        for (int i = 0; i < 3; i++) PetscCall(SbScanText(s, "coordinate system or colour of a node", &other));
+        PetscCall(SbScanPoint(s, "coordinate", label, x));
+      }
+      if (id == 2412) PetscCall(read_element(&d));
+      if (id == 2429 || id == 2430 || id == 2432) PetscCall(read_group(&d, 2));
+      if (id == 2435 || id == 2452 || id == 2467 || id == 2477) PetscCall(read_group(&d, 4));
+      PetscCall(SbScanEndOfLine(s)); /* data sets of no concern are passed over */
+    }
+    PetscCall(SbScanEndOfLine(s));
   }
   if (!d.nnode.n) SB_SCAN_ERROR(s, "there are no nodes (data set 2411 or 15)");
   PetscCall(SbDeckBuild(&d));

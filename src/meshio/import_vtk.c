@@ -17,36 +17,10 @@ typedef struct {
   const char *cells_at;                      /* for messages */
 } Vtk;
 
-static const struct {
-  const char *name;
-  SbVtkType type;
-} types[] = {
-  {"char", {'i', 1}},           {"unsigned_char", {'u', 1}}, {"short", {'i', 2}},
-  {"unsigned_short", {'u', 2}}, {"int", {'i', 4}},           {"unsigned_int", {'u', 4}},
-  {"long", {'i', 8}},           {"unsigned_long", {'u', 8}}, {"float", {'f', 4}},
-  {"double", {'f', 8}},         {"vtkidtype", {'i', 4}},     {"vtktypeint64", {'i', 8}},
-  {"vtktypeuint64", {'u', 8}},
-};
-
 /* ------------------------------------------------------------------ numbers */
 
-static PetscErrorCode read_type(Vtk *v, SbVtkType *type)
-{
-  char word[32];
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanWord(v->scan, sizeof(word), word));
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(types); i++) {
-    if (strcasecmp(word, types[i].name)) continue;
-    *type = types[i].type;
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  SB_SCAN_ERROR(v->scan, "expected a type of numbers, as float or int, found '%s'", word);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* n numbers of this type; value NULL: they are passed over, else it is allocated. */
-static PetscErrorCode read_array(Vtk *v, const char *what, int64_t n, SbVtkType type, double **value)
+static PetscErrorCode read_array(Vtk *v, const char *what, int64_t n, SbNumberType type, double **value)
 {
   SbScan *s = v->scan;
   const size_t bytes = (size_t)n * (size_t)type.size;
@@ -70,7 +44,7 @@ static PetscErrorCode read_array(Vtk *v, const char *what, int64_t n, SbVtkType 
   s->token = s->at;
   if ((size_t)(s->end - s->at) < bytes)
     SB_SCAN_ERROR(s, "the file ends within the %s; it is truncated, write or copy it again", what);
-  if (value) SbVtkConvert(type, PETSC_TRUE, (size_t)n, s->at, *value);
+  if (value) SbNumbersConvert(type, PETSC_TRUE, (size_t)n, s->at, *value);
   s->at += bytes;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -97,15 +71,15 @@ static PetscErrorCode read_cells(Vtk *v)
   at = s->at;
   PetscCall(SbScanWord(s, sizeof(word), word));
   if (!strcasecmp(word, "OFFSETS")) {
-    SbVtkType type;
+    SbNumberType type;
 
     // from version 5 on: `n` offsets from 0 to the number of points, then the points
-    PetscCall(read_type(v, &type));
+    PetscCall(SbScanType(v->scan, &type));
     PetscCall(read_array(v, "offsets", n, type, &grid->end));
     for (int64_t c = 0; c + 1 < n; c++) grid->end[c] = grid->end[c + 1]; /* the first is 0 */
     PetscCall(SbScanWord(v->scan, sizeof(word), word));
     if (strcasecmp(word, "CONNECTIVITY")) SB_SCAN_ERROR(v->scan, "expected CONNECTIVITY, found '%s'", word);
-    PetscCall(read_type(v, &type));
+    PetscCall(SbScanType(v->scan, &type));
     PetscCall(read_array(v, "points of cells", size, type, &grid->connect));
     grid->ncell = (PetscInt)PetscMax(n - 1, 0);
     grid->nconnect = size;
@@ -113,7 +87,7 @@ static PetscErrorCode read_cells(Vtk *v)
   }
   s->at = at;
   grid->ncell = (PetscInt)n;
-  PetscCall(read_array(v, "list of cells", size, (SbVtkType){'i', 4}, &all));
+  PetscCall(read_array(v, "list of cells", size, (SbNumberType){'i', 4}, &all));
   // before version 5: [n, p1 ... pn] one cell after the other
   PetscCall(SbImportScratch(v->im, (size_t)size * sizeof(double), &grid->connect));
   PetscCall(SbImportScratch(v->im, (size_t)grid->ncell * sizeof(double), &grid->end));
@@ -134,7 +108,8 @@ static PetscErrorCode read_cells(Vtk *v)
 /* ------------------------------------------------------------------ data */
 
 /* An array of `ncomponent` numbers for each tuple: kept when it is one number for each cell. */
-static PetscErrorCode read_data(Vtk *v, const char *name, int64_t ncomponent, int64_t ntuple, SbVtkType type)
+static PetscErrorCode read_data(Vtk *v, const char *name, int64_t ncomponent, int64_t ntuple,
+                                SbNumberType type)
 {
   SbVtkGrid *grid = &v->grid;
 
@@ -153,58 +128,6 @@ static PetscErrorCode read_data(Vtk *v, const char *name, int64_t ncomponent, in
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* SCALARS name type [components] / LOOKUP_TABLE name / numbers */
-static PetscErrorCode read_scalars(Vtk *v)
-{
-  SbScan *s = v->scan;
-  SbVtkType type;
-  int64_t ncomponent = 1;
-  char name[SB_NAME_MAX], word[32];
-  const char *at;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanWord(s, sizeof(name), name));
-  PetscCall(read_type(v, &type));
-  if (SbScanMore(s, '\n')) PetscCall(SbScanText(s, "number of components", &ncomponent));
-  at = s->at;
-  PetscCall(SbScanWord(s, sizeof(word), word));
-  if (strcasecmp(word, "LOOKUP_TABLE"))
-    s->at = at;
-  else
-    PetscCall(SbScanWord(s, sizeof(word), word));
-  PetscCall(read_data(v, name, ncomponent, v->ntuple, type));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* FIELD name n, then n times: name components tuples type / numbers */
-static PetscErrorCode read_field(Vtk *v)
-{
-  SbScan *s = v->scan;
-  SbVtkType type;
-  char name[SB_NAME_MAX], word[32];
-  int64_t n, ncomponent, ntuple;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanWord(s, sizeof(word), word));
-  PetscCall(SbScanText(s, "number of arrays in a field", &n));
-  PetscCall(SbScanRoom(s, "arrays", n, 8, 8));
-  for (int64_t i = 0; i < n; i++) {
-    PetscCall(SbScanWord(s, sizeof(name), name));
-    if (!strcmp(name, "METADATA")) {
-      while (SbScanMore(s, '\n')) {
-        PetscCall(SbScanEndOfLine(s));
-        if (s->at < s->end && (*s->at == '\n' || *s->at == '\r')) break;
-      }
-      PetscCall(SbScanWord(s, sizeof(name), name));
-    }
-    PetscCall(SbScanText(s, "number of components", &ncomponent));
-    PetscCall(SbScanText(s, "number of tuples", &ntuple));
-    PetscCall(read_type(v, &type));
-    PetscCall(read_data(v, name, ncomponent, ntuple, type));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ the file */
 
 static PetscErrorCode read_section(Vtk *v, const char *section)
@@ -215,10 +138,10 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
   } tuples[] = {{"VECTORS", 3}, {"NORMALS", 3}, {"TENSORS", 9}, {"TENSORS6", 6}};
   SbScan *s = v->scan;
   const PetscBool on_cells = (PetscBool)!strcasecmp(section, "CELL_DATA");
-  SbVtkType type;
-  char name[SB_NAME_MAX];
+  SbNumberType type;
+  char name[SB_NAME_MAX], word[32];
   double *x = NULL;
-  int64_t n;
+  int64_t n, ncomponent = 1, ntuple;
   size_t k = 0;
 
   PetscFunctionBeginUser;
@@ -227,7 +150,7 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
     if (v->points) SB_SCAN_ERROR(s, "second section POINTS");
     v->points = PETSC_TRUE;
     PetscCall(SbScanText(s, "number of points", &n));
-    PetscCall(read_type(v, &type));
+    PetscCall(SbScanType(v->scan, &type));
     PetscCall(SbScanRoom(s, "points", n, 3, 3));
     PetscCall(read_array(v, "coordinates", 3 * n, type, &x));
     PetscCall(SbVtkSetPoints((PetscInt)n, x, v->im));
@@ -237,7 +160,7 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
     PetscCall(SbScanText(s, "number of types of cells", &n));
     if (!v->cells || n != v->grid.ncell)
       SB_SCAN_ERROR(s, "%lld types of cells for %lld cells", (long long)n, (long long)v->grid.ncell);
-    PetscCall(read_array(v, "types of cells", n, (SbVtkType){'i', 4}, &v->grid.type));
+    PetscCall(read_array(v, "types of cells", n, (SbNumberType){'i', 4}, &v->grid.type));
   } else if (on_cells || !strcasecmp(section, "POINT_DATA")) {
     // what the arrays that follow belong to
     n = on_cells ? v->grid.ncell : v->im->nvert;
@@ -248,22 +171,51 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
                     on_cells ? "cells" : "points", (long long)n);
     v->on_cells = on_cells;
   } else if (!strcasecmp(section, "SCALARS")) {
-    PetscCall(read_scalars(v));
+    // SCALARS name type [components] / LOOKUP_TABLE name / numbers
+    const char *at;
+
+    PetscCall(SbScanWord(s, sizeof(name), name));
+    PetscCall(SbScanType(v->scan, &type));
+    if (SbScanMore(s, '\n')) PetscCall(SbScanText(s, "number of components", &ncomponent));
+    at = s->at;
+    PetscCall(SbScanWord(s, sizeof(word), word));
+    if (strcasecmp(word, "LOOKUP_TABLE"))
+      s->at = at;
+    else
+      PetscCall(SbScanWord(s, sizeof(word), word));
+    PetscCall(read_data(v, name, ncomponent, v->ntuple, type));
   } else if (!strcasecmp(section, "FIELD")) {
-    PetscCall(read_field(v));
+    // FIELD name n, then n times: name components tuples type / numbers
+    PetscCall(SbScanWord(s, sizeof(word), word));
+    PetscCall(SbScanText(s, "number of arrays in a field", &n));
+    PetscCall(SbScanRoom(s, "arrays", n, 8, 8));
+    for (int64_t i = 0; i < n; i++) {
+      PetscCall(SbScanWord(s, sizeof(name), name));
+      if (!strcmp(name, "METADATA")) {
+        while (SbScanMore(s, '\n')) {
+          PetscCall(SbScanEndOfLine(s));
+          if (s->at < s->end && (*s->at == '\n' || *s->at == '\r')) break;
+        }
+        PetscCall(SbScanWord(s, sizeof(name), name));
+      }
+      PetscCall(SbScanText(s, "number of components", &ncomponent));
+      PetscCall(SbScanText(s, "number of tuples", &ntuple));
+      PetscCall(SbScanType(v->scan, &type));
+      PetscCall(read_data(v, name, ncomponent, ntuple, type));
+    }
   } else if (!strcasecmp(section, "LOOKUP_TABLE")) {
     // four bytes, or four numbers, for each entry
     PetscCall(SbScanWord(s, sizeof(name), name));
     PetscCall(SbScanText(s, "number of colours", &n));
     PetscCall(SbScanRoom(s, "colours", n, 1, 1));
-    PetscCall(read_array(v, "colours", 4 * n, (SbVtkType){'u', 1}, NULL));
+    PetscCall(read_array(v, "colours", 4 * n, (SbNumberType){'u', 1}, NULL));
   } else if (!strcasecmp(section, "METADATA")) {
     // a block of lines up to an empty one
     do PetscCall(SbScanEndOfLine(s));
     while (SbScanMore(s, '\n'));
   } else if (k < PETSC_STATIC_ARRAY_LENGTH(tuples)) {
     PetscCall(SbScanWord(s, sizeof(name), name));
-    PetscCall(read_type(v, &type));
+    PetscCall(SbScanType(v->scan, &type));
     PetscCall(read_data(v, name, tuples[k].ncomponent, v->ntuple, type));
   } else
     SB_SCAN_ERROR(s, "expected a section, as POINTS or CELLS, found '%s'", section);

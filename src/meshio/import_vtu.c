@@ -19,7 +19,7 @@ typedef struct {
   SbScan *scan;
   SbImport *im;
   SbVtkGrid grid;
-  PetscBool swap, zlib;
+  PetscBool big_endian, zlib;
   int header;              /* bytes of a length: 4 or 8 */
   const char *xml_end;     /* what is XML ends here */
   const char *appended;    /* first byte behind the mark _, or NULL */
@@ -151,7 +151,8 @@ static PetscErrorCode take_length(Vtu *v, Bytes *b, const char *name, size_t *le
   PetscFunctionBeginUser;
   if (!take_bytes(b, (size_t)v->header, raw))
     SB_SCAN_ERROR(v->scan, "the data of array '%s' is truncated, or no base64", name);
-  for (int i = 0; i < v->header; i++) value |= (uint64_t)raw[i] << 8 * (v->swap ? v->header - 1 - i : i);
+  for (int i = 0; i < v->header; i++)
+    value |= (uint64_t)raw[i] << 8 * (v->big_endian ? v->header - 1 - i : i);
   if (value > (uint64_t)1 << 40)
     SB_SCAN_ERROR(v->scan, "array '%s' announces %llu bytes or blocks; it is damaged", name,
                   (unsigned long long)value);
@@ -199,7 +200,7 @@ static PetscErrorCode take_blocks(Vtu *v, Bytes *b, const char *name, size_t wan
 /* The n numbers of the array whose element stands between open and close; *value is allocated. */
 static PetscErrorCode read_array(Vtu *v, const char *open, const char *close, int64_t n, double **value)
 {
-  SbVtkType type;
+  SbNumberType type;
   Bytes b;
   char format[16], name[64];
   size_t room, want, length;
@@ -275,7 +276,7 @@ static PetscErrorCode read_array(Vtu *v, const char *open, const char *close, in
       SB_SCAN_ERROR(v->scan, "array '%s' has %zu bytes; expected %zu, or it is truncated, or no base64", name,
                     length, want);
   }
-  SbVtkConvert(type, v->swap, (size_t)n, raw, (*value));
+  SbNumbersConvert(type, v->big_endian, (size_t)n, raw, (*value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -318,35 +319,6 @@ static PetscErrorCode read_cell_array(Vtu *v, const char *name, int64_t n, doubl
 
 /* ------------------------------------------------------------------ the file */
 
-static PetscErrorCode read_file_element(Vtu *v)
-{
-  SbScan *s = v->scan;
-  const char *open, *close;
-  char value[64];
-  const uint16_t one = 1;
-  const PetscBool little = (PetscBool)(*(const unsigned char *)&one == 1);
-
-  PetscFunctionBeginUser;
-  if (!find_element(s->data, v->xml_end, "VTKFile", &open, &close))
-    SB_SCAN_ERROR(s, "expected an element VTKFile; this is no XML file of VTK");
-  s->token = open;
-  attribute(open, close, "type", sizeof(value), value);
-  if (strcmp(value, "UnstructuredGrid"))
-    SB_SCAN_ERROR(s, "a file of type '%s'; expected UnstructuredGrid with tetrahedra", value);
-  attribute(open, close, "byte_order", sizeof(value), value);
-  v->swap = (PetscBool)((!strcmp(value, "BigEndian")) == little);
-  attribute(open, close, "header_type", sizeof(value), value);
-  v->header = !strcmp(value, "UInt64") ? 8 : 4;
-  attribute(open, close, "compressor", sizeof(value), value);
-  v->zlib = (PetscBool)(value[0] != 0);
-  if (v->zlib && strcmp(value, "vtkZLibDataCompressor") != 0)
-    SB_SCAN_ERROR(s,
-                  "compressed by %s; supple knows vtkZLibDataCompressor and uncompressed files (ParaView: "
-                  "Save Data, Compressor Type)",
-                  value);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
 {
   SbScan *s = &im->scan;
@@ -356,6 +328,7 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
   int64_t npoint, ncell, ncomponent = 3;
   double *x = NULL, last;
   SbVtkGrid *grid = &v->grid;
+  char value[64];
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
@@ -370,7 +343,24 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
     if (!v->appended) SB_SCAN_ERROR(s, "the appended data has no mark _ at its beginning");
     v->appended++;
   }
-  PetscCall(read_file_element(v));
+  // what the file is, and how its arrays are packed
+  if (!find_element(s->data, v->xml_end, "VTKFile", &open, &close))
+    SB_SCAN_ERROR(s, "expected an element VTKFile; this is no XML file of VTK");
+  s->token = open;
+  attribute(open, close, "type", sizeof(value), value);
+  if (strcmp(value, "UnstructuredGrid"))
+    SB_SCAN_ERROR(s, "a file of type '%s'; expected UnstructuredGrid with tetrahedra", value);
+  attribute(open, close, "byte_order", sizeof(value), value);
+  v->big_endian = (PetscBool)!strcmp(value, "BigEndian");
+  attribute(open, close, "header_type", sizeof(value), value);
+  v->header = !strcmp(value, "UInt64") ? 8 : 4;
+  attribute(open, close, "compressor", sizeof(value), value);
+  v->zlib = (PetscBool)(value[0] != 0);
+  if (v->zlib && strcmp(value, "vtkZLibDataCompressor") != 0)
+    SB_SCAN_ERROR(s,
+                  "compressed by %s; supple knows vtkZLibDataCompressor and uncompressed files (ParaView: "
+                  "Save Data, Compressor Type)",
+                  value);
   if (!find_element(s->data, v->xml_end, "Piece", &open, &close))
     SB_SCAN_ERROR(s, "there is no element Piece; the file is truncated or damaged");
   s->token = close;

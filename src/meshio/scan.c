@@ -8,6 +8,7 @@
 #include <ctype.h>
 #include <errno.h>
 #include <stdlib.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include "meshio_impl.h"
 
@@ -279,6 +280,67 @@ PetscErrorCode SbScanWord(SbScan *s, size_t size, char word[])
   word[n] = 0;
   s->at += n;
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbScanType(SbScan *s, SbNumberType *type)
+{
+  static const struct {
+    const char *name, *other;
+    SbNumberType type;
+  } types[] = {
+    {"char", "int8", {'i', 1}},
+    {"uchar", "uint8", {'u', 1}},
+    {"short", "int16", {'i', 2}},
+    {"ushort", "uint16", {'u', 2}},
+    {"int", "int32", {'i', 4}},
+    {"uint", "uint32", {'u', 4}},
+    {"float", "float32", {'f', 4}},
+    {"double", "float64", {'f', 8}},
+    {"long", "vtktypeint64", {'i', 8}},
+    {"unsigned_char", "", {'u', 1}},
+    {"unsigned_short", "", {'u', 2}},
+    {"unsigned_int", "", {'u', 4}},
+    {"unsigned_long", "vtktypeuint64", {'u', 8}},
+    {"vtkidtype", "", {'i', 4}},
+  };
+  char word[32];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanWord(s, sizeof(word), word));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(types) && word[0]; i++) {
+    if (strcasecmp(word, types[i].name) && strcasecmp(word, types[i].other)) continue;
+    *type = types[i].type;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  SB_SCAN_ERROR(s, "expected a type of numbers, as float or int, found '%s'", word);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbNumbersConvert(SbNumberType type, PetscBool big_endian, size_t n, const void *bytes, double value[])
+{
+  const unsigned char *from = (const unsigned char *)bytes;
+
+  for (size_t i = 0; i < n; i++) {
+    uint64_t bits = 0;
+
+    for (int b = 0; b < type.size; b++)
+      bits |= (uint64_t)from[i * (size_t)type.size + (size_t)b] << 8 * (big_endian ? type.size - 1 - b : b);
+    if (type.kind == 'f' && type.size == 4) {
+      const uint32_t half = (uint32_t)bits;
+      float x;
+
+      memcpy(&x, &half, 4);
+      value[i] = (double)x;
+    } else if (type.kind == 'f')
+      memcpy(&value[i], &bits, 8);
+    else if (type.kind == 'u')
+      value[i] = (double)bits;
+    else {
+      const int unused = 64 - 8 * type.size;
+
+      value[i] = (double)((int64_t)(bits << unused) >> unused);
+    }
+  }
 }
 
 void SbScanNext(SbScan *s, char comment)

@@ -39,33 +39,6 @@ static const char *const region_names[] = {
   "CellEntityIds", "gmsh:physical", "medit:ref", "region", "regions", "RegionId",  "RegionIds", "material",
   "MaterialId",    "MaterialIds",   "subdomain", "label",  "labels",  "cell_tags", "tag"};
 
-void SbVtkConvert(SbVtkType type, PetscBool swap, size_t n, const void *bytes, double value[])
-{
-  const unsigned char *from = (const unsigned char *)bytes;
-
-  for (size_t i = 0; i < n; i++) {
-    uint64_t bits = 0;
-
-    for (int b = 0; b < type.size; b++)
-      bits |= (uint64_t)from[i * (size_t)type.size + (size_t)b] << 8 * (swap ? type.size - 1 - b : b);
-    if (type.kind == 'f' && type.size == 4) {
-      const uint32_t half = (uint32_t)bits;
-      float x;
-
-      memcpy(&x, &half, 4);
-      value[i] = (double)x;
-    } else if (type.kind == 'f')
-      memcpy(&value[i], &bits, 8);
-    else if (type.kind == 'u')
-      value[i] = (double)bits;
-    else {
-      const int unused = 64 - 8 * type.size;
-
-      value[i] = (double)((int64_t)(bits << unused) >> unused);
-    }
-  }
-}
-
 PetscErrorCode SbVtkSetPoints(PetscInt n, const double x[], SbImport *im)
 {
   PetscFunctionBeginUser;

@@ -7,12 +7,6 @@
 #define SB_VTK_ARRAYS 16    /* cell arrays that are examined */
 #define SB_VTK_REGIONS 1000 /* an array of more different values is no number of regions */
 
-/* How a number stands in binary data. */
-typedef struct {
-  char kind; /* 'i' signed, 'u' unsigned, 'f' floating point */
-  int size;  /* bytes */
-} SbVtkType;
-
 /* All numbers as double: exact for every position of a node. Arrays are those of the reader, see SbImportScratch(). */
 typedef struct {
   PetscInt ncell;
@@ -34,7 +28,5 @@ typedef struct {
   ...; each other one NAME_volume_N, ... Errors of a cell name the position import->scan.token.
 */
 PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im);
-/* n numbers of this type from bytes, which are of the other byte order when `swap`. */
-void SbVtkConvert(SbVtkType type, PetscBool swap, size_t n, const void *bytes, double value[]);
 /* Coordinates, [nvert][3], into the body; number i of a bad one is named. */
 PetscErrorCode SbVtkSetPoints(PetscInt n, const double x[], SbImport *im);

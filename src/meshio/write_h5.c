@@ -49,31 +49,6 @@ static void write_ints(H5 *h, const char *name, int ncomp, size_t n, const Petsc
               data);
 }
 
-static PetscErrorCode write_groups(H5 *h, const SbImport *im)
-{
-  const hid_t text = H5Tcopy(H5T_C_S1);
-  char(*name)[SB_GROUP_MAX];
-  PetscInt *dim;
-  int64_t *number;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc3(im->ngroup, &name, im->ngroup, &dim, im->ngroup, &number));
-  for (PetscInt g = 0; g < im->ngroup; g++) {
-    (void)snprintf(name[g], SB_GROUP_MAX, "%s", im->group[g].name);
-    dim[g] = im->group[g].dim;
-    number[g] = im->group[g].tag;
-  }
-  (void)H5Tset_size(text, SB_GROUP_MAX);
-  write_array(h, "/groups/name", 1, (size_t)im->ngroup, text, text, name);
-  write_ints(h, "/groups/dim", 1, (size_t)im->ngroup, dim);
-  write_array(h, "/groups/number", 1, (size_t)im->ngroup, H5T_STD_I64LE, H5T_NATIVE_INT64, number);
-  write_ints(h, "/tag_sets/start", 1, (size_t)im->ntags + 1, im->tags_start);
-  write_ints(h, "/tag_sets/group", 1, (size_t)im->tags_start[im->ntags], im->tags_group);
-  (void)H5Tclose(text);
-  PetscCall(PetscFree3(name, dim, number));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static void make_group(H5 *h, const char *name)
 {
   const hid_t group = keep(h, H5Gcreate2(h->file, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
@@ -88,6 +63,10 @@ PetscErrorCode SbWrite_H5(const SbImport *im, const char *path)
   char array[64];
   const int version = 1;
   hid_t space, mark;
+  const hid_t text = H5Tcopy(H5T_C_S1);
+  char(*title)[SB_GROUP_MAX];
+  PetscInt *dim;
+  int64_t *number;
 
   PetscFunctionBeginUser;
   PetscCheck(im->nvert <= INT32_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -117,7 +96,21 @@ PetscErrorCode SbWrite_H5(const SbImport *im, const char *path)
     (void)snprintf(array, sizeof(array), "/mesh/%s_tags", name[d]);
     write_ints(&h, array, 1, (size_t)item->n, item->tags);
   }
-  PetscCall(write_groups(&h, im));
+  // groups and tag sets
+  PetscCall(PetscCalloc3(im->ngroup, &title, im->ngroup, &dim, im->ngroup, &number));
+  for (PetscInt g = 0; g < im->ngroup; g++) {
+    (void)snprintf(title[g], SB_GROUP_MAX, "%s", im->group[g].name);
+    dim[g] = im->group[g].dim;
+    number[g] = im->group[g].tag;
+  }
+  (void)H5Tset_size(text, SB_GROUP_MAX);
+  write_array(&h, "/groups/name", 1, (size_t)im->ngroup, text, text, title);
+  write_ints(&h, "/groups/dim", 1, (size_t)im->ngroup, dim);
+  write_array(&h, "/groups/number", 1, (size_t)im->ngroup, H5T_STD_I64LE, H5T_NATIVE_INT64, number);
+  write_ints(&h, "/tag_sets/start", 1, (size_t)im->ntags + 1, im->tags_start);
+  write_ints(&h, "/tag_sets/group", 1, (size_t)im->tags_start[im->ntags], im->tags_group);
+  (void)H5Tclose(text);
+  PetscCall(PetscFree3(title, dim, number));
   (void)keep(&h, H5Fclose(h.file));
   PetscCheck(!h.failed, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE,
              "%s cannot be written: %s; is there room on the disk?", path,

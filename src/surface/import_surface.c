@@ -37,9 +37,9 @@ PetscErrorCode SbTetRegister(void)
 
 PetscBool SbMeshFileIsSurface(const char *path)
 {
-  const SbTriangleReader read = strncmp(path, "box:", 4) ? SbTrianglesReader(path) : NULL;
+  const SbTriangleFormat *format = strncmp(path, "box:", 4) ? SbTrianglesFormat(path) : NULL;
 
-  return (PetscBool)(read && read != SbTrianglesRead_Gmsh);
+  return (PetscBool)(format && format->read);
 }
 
 PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOptions *o)
@@ -138,7 +138,7 @@ static PetscErrorCode make_surface(const char *path, const SbImport *im, SbTrian
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(&repairs, sizeof(repairs)));
-  PetscCall((*SbTrianglesReader(path))(path, f));
+  PetscCall(SbTrianglesReadFile(path, f));
   PetscCheck(f->t->ntri, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
              "%s: holds no triangles; give a closed surface of triangles, or a mesh of tetrahedra", f->where);
   // to metres, and nothing that is not a number

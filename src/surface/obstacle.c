@@ -7,14 +7,14 @@
 static PetscErrorCode read_file(const char *path, PetscReal scale, const PetscReal at[3], SbTriangleFile *f,
                                 size_t size, char note[])
 {
-  const SbTriangleReader read = SbTrianglesReader(path);
+  const SbTriangleFormat *format = SbTrianglesFormat(path);
   SbTriangles *t = f->t;
 
   PetscFunctionBeginUser;
-  PetscCheck(read && read != SbTrianglesRead_Poly, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+  PetscCheck(format && !format->sheets, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: is a file of no known kind; give one that ends in .stl, .obj, .off, .ply or .msh",
              f->where);
-  PetscCall((*read)(path, f));
+  PetscCall(SbTrianglesReadFile(path, f));
   PetscCheck(t->ntri, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
              "%s: holds no triangles; give a closed surface of triangles, or a mesh of tetrahedra", f->where);
   PetscCall(SbDropUnusedPoints(&t->nvert, t->x, 3 * t->ntri, t->tri));

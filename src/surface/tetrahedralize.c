@@ -205,9 +205,9 @@ static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscB
   PetscFunctionBeginUser;
   for (int backend = 0; backend < 2 && !*done; backend++) {
     SbItems *tri = &body->item[2];
-    PetscInt n = 0, nnote;
+    PetscInt n = 0;
     const char *surface;
-    PetscReal smallest;
+    SbShape shape;
     char text[512], slivers[96] = "";
 
     if (job->options.backend != SB_TET_AUTO && (int)job->options.backend != backend + 1) continue;
@@ -222,9 +222,7 @@ static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscB
     tets.x = NULL;
     tets.vert_number = NULL;
     for (int d = 0; d < 4; d++) {
-      PetscCall(PetscFree(body->item[d].vert));
-      PetscCall(PetscFree(body->item[d].tags));
-      PetscCall(PetscFree(body->item[d].number));
+      PetscCall(SbItemsFree(&body->item[d]));
       body->item[d] = tets.item[d];
       PetscCall(PetscMemzero(&tets.item[d], sizeof(tets.item[d])));
     }
@@ -247,11 +245,11 @@ static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscB
     // a word on who made the tets
     surface = job->remesh ? "remeshed" : "kept";
     if (job->remesh && backend + 1 == SB_TET_TETGEN) surface = job->size < job->edge ? "split" : "kept";
-    PetscCall(SbImportSlivers(body, SLIVER, &nnote, &smallest));
-    if (nnote)
+    SbImportShape(body, SLIVER, &shape);
+    if (shape.nsliver)
       (void)snprintf(slivers, sizeof(slivers),
-                     ", %" PetscInt_FMT " slivers (dihedral below %g degrees, smallest %.2g)", nnote,
-                     (double)SLIVER, (double)smallest);
+                     ", %" PetscInt_FMT " slivers (dihedral below %g degrees, smallest %.2g)", shape.nsliver,
+                     (double)SLIVER, acos(PetscMin((double)shape.most[0], 1)) * 180 / PETSC_PI);
     (void)snprintf(
       text, sizeof(text), "%s%" PetscInt_FMT " tets of size %.3g m by %s, surface %s%s%s%.200s%s",
       body->note[0] ? ", " : "", body->item[3].n, (double)(job->size / factor), backends[backend].name,

@@ -29,7 +29,7 @@ static PetscErrorCode add_boundary(SbImport *im, SbTriangleFile *f)
   PetscFunctionReturn(ierr);
 }
 
-PetscErrorCode SbTrianglesRead_Gmsh(const char *path, SbTriangleFile *f)
+static PetscErrorCode read_gmsh(const char *path, SbTriangleFile *f)
 {
   SbImport im;
   PetscInt none;
@@ -54,25 +54,45 @@ PetscErrorCode SbTrianglesRead_Gmsh(const char *path, SbTriangleFile *f)
   PetscFunctionReturn(ierr);
 }
 
-/* ------------------------------------------------------------------ from file to all ranks */
+/* ------------------------------------------------------------------ files */
 
-static const struct {
-  const char *extension;
-  SbTriangleReader read;
-} readers[] = {
-  {".stl", SbTrianglesRead_STL},    {".obj", SbTrianglesRead_OBJ},  {".off", SbTrianglesRead_OFF},
-  {".ply", SbTrianglesRead_PLY},    {".msh", SbTrianglesRead_Gmsh}, {".poly", SbTrianglesRead_Poly},
-  {".smesh", SbTrianglesRead_Poly},
-};
-
-SbTriangleReader SbTrianglesReader(const char *path)
+const SbTriangleFormat *SbTrianglesFormat(const char *path)
 {
+  static const SbTriangleFormat formats[] = {
+    {".stl", SbTrianglesRead_STL, PETSC_FALSE},
+    {".obj", SbTrianglesRead_OBJ, PETSC_FALSE},
+    {".off", SbTrianglesRead_OFF, PETSC_FALSE},
+    {".ply", SbTrianglesRead_PLY, PETSC_FALSE},
+    {".poly", SbTrianglesRead_Poly, PETSC_TRUE},
+    {".smesh", SbTrianglesRead_Poly, PETSC_TRUE},
+    {".msh", NULL, PETSC_FALSE},
+  };
   const char *dot = strrchr(path, '.');
 
-  for (size_t i = 0; dot && i < PETSC_STATIC_ARRAY_LENGTH(readers); i++) {
-    if (!strcasecmp(dot, readers[i].extension)) return readers[i].read;
+  for (size_t i = 0; dot && i < PETSC_STATIC_ARRAY_LENGTH(formats); i++) {
+    if (!strcasecmp(dot, formats[i].extension)) return &formats[i];
   }
   return NULL;
+}
+
+PetscErrorCode SbTrianglesReadFile(const char *path, SbTriangleFile *f)
+{
+  const SbTriangleFormat *format = SbTrianglesFormat(path);
+  SbScan scan;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  f->path = path;
+  f->sheets = format->sheets;
+  if (!format->read) {
+    PetscCall(read_gmsh(path, f));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  ierr = SbScanOpen(f->where, path, &scan);
+  if (!ierr) ierr = (*format->read)(&scan, f);
+  PetscCall(SbScanClose(&scan));
+  PetscCall(PetscFree(f->corner));
+  PetscFunctionReturn(ierr);
 }
 
 PetscErrorCode SbTrianglesDestroy(SbTriangles *t)

@@ -19,6 +19,7 @@ typedef struct {
 /* Filled by a reader, item by item. */
 typedef struct {
   const char *where; /* begins every message */
+  const char *path;  /* while it is read */
   SbTriangles *t;
   PetscInt vert_size, tri_size; /* allocated */
   int64_t *number;              /* [ntri] of the face in the file, from 1; owned by who reads */
@@ -33,13 +34,12 @@ typedef struct {
   SbSeed *hole, *region; /* owned by who reads */
 } SbTriangleFile;
 
-/* Readers. Errors name the file, and the line or byte. Not collective. */
-PetscErrorCode SbTrianglesRead_STL(const char *path, SbTriangleFile *file);
-PetscErrorCode SbTrianglesRead_OBJ(const char *path, SbTriangleFile *file);
-PetscErrorCode SbTrianglesRead_OFF(const char *path, SbTriangleFile *file);
-PetscErrorCode SbTrianglesRead_PLY(const char *path, SbTriangleFile *file);
-PetscErrorCode SbTrianglesRead_Poly(const char *path, SbTriangleFile *file); /* and .smesh */
-PetscErrorCode SbTrianglesRead_Gmsh(const char *path, SbTriangleFile *file);
+/* Readers of a file in memory. Errors name the file, and the line or byte. Not collective. */
+PetscErrorCode SbTrianglesRead_STL(SbScan *scan, SbTriangleFile *file);
+PetscErrorCode SbTrianglesRead_OBJ(SbScan *scan, SbTriangleFile *file);
+PetscErrorCode SbTrianglesRead_OFF(SbScan *scan, SbTriangleFile *file);
+PetscErrorCode SbTrianglesRead_PLY(SbScan *scan, SbTriangleFile *file);
+PetscErrorCode SbTrianglesRead_Poly(SbScan *scan, SbTriangleFile *file); /* and .smesh */
 /* Appends a vertex, or a triangle of vertices that are there. */
 PetscErrorCode SbTrianglesAddVertex(SbTriangleFile *file, const PetscReal x[3]);
 PetscErrorCode SbTrianglesAdd(SbTriangleFile *file, PetscInt a, PetscInt b, PetscInt c, int64_t number);
@@ -58,12 +58,15 @@ PetscErrorCode SbTrianglesAddLoops(SbScan *scan, PetscInt nloop, const PetscInt 
                                    int64_t number, SbTriangleFile *file);
 /* The triangles that come next belong to these groups; blanks in names become underscores. n = 0: to none. */
 PetscErrorCode SbTrianglesGroups(SbTriangleFile *file, PetscInt n, const char *const names[]);
-/* Reads with the file in memory; also after an error it is closed. */
-PetscErrorCode SbTrianglesScan(const char *path, PetscErrorCode (*read)(SbScan *, SbTriangleFile *),
-                               SbTriangleFile *file);
-/* The reader of a file by its name; NULL: of no known kind. */
-typedef PetscErrorCode (*SbTriangleReader)(const char *path, SbTriangleFile *file);
-SbTriangleReader SbTrianglesReader(const char *path);
+/* What is known of a kind of file, by its name; NULL: of no known kind. */
+typedef struct {
+  const char *extension;
+  PetscErrorCode (*read)(SbScan *, SbTriangleFile *); /* NULL: gmsh's, which the reader of meshes reads */
+  PetscBool sheets;                                   /* as of SbTriangleFile */
+} SbTriangleFormat;
+const SbTriangleFormat *SbTrianglesFormat(const char *path);
+/* Reads a file of a known kind. */
+PetscErrorCode SbTrianglesReadFile(const char *path, SbTriangleFile *file);
 
 /*
   SbSurfaceObstacle - a surface that was read and placed becomes the boundary of all its material: repaired and checked as that of a body, but that triangles

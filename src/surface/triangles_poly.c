@@ -64,7 +64,7 @@ static PetscErrorCode read_points(Poly *p, int64_t n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_node_file(Poly *p, const char *path)
+static PetscErrorCode read_node_file(Poly *p)
 {
   char name[PETSC_MAX_PATH_LEN + 8];
   SbScan *own = p->s, scan;
@@ -73,7 +73,7 @@ static PetscErrorCode read_node_file(Poly *p, const char *path)
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  (void)snprintf(name, PETSC_MAX_PATH_LEN, "%s", path);
+  (void)snprintf(name, PETSC_MAX_PATH_LEN, "%s", p->f->path);
   dot = strrchr(name, '.');
   (void)snprintf(dot, 8, ".node");
   ierr = SbScanOpen(p->f->where, name, &scan);
@@ -186,20 +186,19 @@ static PetscErrorCode read_seeds(Poly *p, const char *what, PetscBool attribute,
 
 /* ------------------------------------------------------------------ the file */
 
-static PetscErrorCode read_all(Poly *p, const char *path)
+static PetscErrorCode read_all(Poly *p)
 {
-  const PetscBool smesh = (PetscBool)!strcasecmp(strrchr(path, '.'), ".smesh");
+  const PetscBool smesh = (PetscBool)!strcasecmp(strrchr(p->f->path, '.'), ".smesh");
   int64_t count[4];
 
   PetscFunctionBeginUser;
-  PetscCall(SbScanOpen(p->f->where, path, p->s));
   PetscCall(read_counts(p->s, "number of points", 4, count));
   if (count[0] && count[1] != 3)
     SB_SCAN_ERROR(p->s, "points of %lld dimensions; expected 3", (long long)count[1]);
   if (count[0])
     PetscCall(read_points(p, count[0]));
   else
-    PetscCall(read_node_file(p, path));
+    PetscCall(read_node_file(p));
   PetscCall(read_counts(p->s, "number of facets", 2, count));
   for (int64_t i = 1; i <= count[0]; i++) {
     if (smesh) {
@@ -220,17 +219,13 @@ static PetscErrorCode read_all(Poly *p, const char *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbTrianglesRead_Poly(const char *path, SbTriangleFile *f)
+PetscErrorCode SbTrianglesRead_Poly(SbScan *s, SbTriangleFile *f)
 {
-  SbScan scan;
-  Poly p = {.s = &scan, .f = f};
+  Poly p = {.s = s, .f = f};
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&scan, sizeof(scan)));
-  f->sheets = PETSC_TRUE;
-  ierr = read_all(&p, path);
-  PetscCall(SbScanClose(&scan));
+  ierr = read_all(&p);
   PetscCall(SbNumbersDestroy(&p.index));
   PetscCall(PetscFree(p.start));
   PetscCall(PetscFree(p.vert));

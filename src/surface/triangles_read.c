@@ -23,15 +23,6 @@ static uint32_t little(const char *p)
   return (uint32_t)b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
 }
 
-static PetscErrorCode stl_triangle(SbTriangleFile *f)
-{
-  const PetscInt n = f->t->nvert;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbTrianglesAdd(f, n - 3, n - 2, n - 1, f->t->ntri + 1));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The next word; `end solid` is `endsolid`. */
 static PetscErrorCode stl_next(SbScan *s, char word[32])
 {
@@ -99,7 +90,7 @@ static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
       }
       PetscCall(stl_word(s, "endloop"));
       PetscCall(stl_word(s, "endfacet"));
-      PetscCall(stl_triangle(f));
+      PetscCall(SbTrianglesAdd(f, f->t->nvert - 3, f->t->nvert - 2, f->t->nvert - 1, f->t->ntri + 1));
     }
     PetscCall(stl_next(s, word));
     if (!strcasecmp(word, "endsolid"))
@@ -114,7 +105,7 @@ static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode stl_file(SbScan *s, SbTriangleFile *f)
+PetscErrorCode SbTrianglesRead_STL(SbScan *s, SbTriangleFile *f)
 {
   const size_t size = (size_t)(s->end - s->data);
   const uint32_t n = size >= 84 ? little(s->data + 80) : 0;
@@ -143,7 +134,7 @@ static PetscErrorCode stl_file(SbScan *s, SbTriangleFile *f)
         }
         PetscCall(SbTrianglesAddVertex(f, x));
       }
-      PetscCall(stl_triangle(f));
+      PetscCall(SbTrianglesAdd(f, f->t->nvert - 3, f->t->nvert - 2, f->t->nvert - 1, f->t->ntri + 1));
     }
   } else
     PetscCall(stl_text(s, f));
@@ -194,7 +185,7 @@ static PetscErrorCode obj_names(SbScan *s, PetscBool object, ObjNames *names, Sb
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode obj_file(SbScan *s, SbTriangleFile *f)
+PetscErrorCode SbTrianglesRead_OBJ(SbScan *s, SbTriangleFile *f)
 {
   int64_t nface = 0;
   ObjNames names;
@@ -233,43 +224,31 @@ static PetscErrorCode obj_file(SbScan *s, SbTriangleFile *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* To the next number, over lines that begin with #. */
-static PetscErrorCode off_next(SbScan *s)
-{
-  PetscFunctionBeginUser;
-  for (;;) {
-    while (s->at < s->end && strchr(" \t\r\n", *s->at)) s->at++;
-    if (s->at >= s->end || *s->at != '#') break;
-    PetscCall(SbScanEndOfLine(s));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode off_file(SbScan *s, SbTriangleFile *f)
+PetscErrorCode SbTrianglesRead_OFF(SbScan *s, SbTriangleFile *f)
 {
   int64_t count[3];
   char word[16];
 
   PetscFunctionBeginUser;
-  PetscCall(off_next(s));
+  SbScanNext(s, '#');
   PetscCall(SbScanWord(s, sizeof(word), word));
   if (strcmp(word, "OFF"))
     SB_SCAN_ERROR(s, "expected 'OFF', found '%s'; only the plain text kind of OFF file is read", word);
   for (int i = 0; i < 3; i++) {
-    PetscCall(off_next(s));
+    SbScanNext(s, '#');
     PetscCall(SbScanText(s, "number of vertices, faces and edges", &count[i]));
   }
   PetscCall(SbScanRoom(s, "vertices", count[0], 6, 6));
   PetscCall(SbScanRoom(s, "faces", count[1], 8, 8));
   for (int64_t i = 0; i < count[0]; i++) {
-    PetscCall(off_next(s));
+    SbScanNext(s, '#');
     PetscCall(add_vertex(s, f));
     PetscCall(SbScanEndOfLine(s));
   }
   for (int64_t i = 0; i < count[1]; i++) {
     int64_t n, v;
 
-    PetscCall(off_next(s));
+    SbScanNext(s, '#');
     PetscCall(SbScanText(s, "number of corners of a face", &n));
     for (int64_t k = 0; k < n; k++) {
       PetscCall(SbScanText(s, "vertex of a face", &v));
@@ -279,35 +258,4 @@ static PetscErrorCode off_file(SbScan *s, SbTriangleFile *f)
     PetscCall(SbScanEndOfLine(s)); /* colours */
   }
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* ------------------------------------------------------------------ files */
-
-PetscErrorCode SbTrianglesScan(const char *path, PetscErrorCode (*read)(SbScan *, SbTriangleFile *),
-                               SbTriangleFile *f)
-{
-  SbScan scan;
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  ierr = SbScanOpen(f->where, path, &scan);
-  if (!ierr) ierr = (*read)(&scan, f);
-  PetscCall(SbScanClose(&scan));
-  PetscCall(PetscFree(f->corner));
-  PetscFunctionReturn(ierr);
-}
-
-PetscErrorCode SbTrianglesRead_STL(const char *path, SbTriangleFile *f)
-{
-  return SbTrianglesScan(path, stl_file, f);
-}
-
-PetscErrorCode SbTrianglesRead_OBJ(const char *path, SbTriangleFile *f)
-{
-  return SbTrianglesScan(path, obj_file, f);
-}
-
-PetscErrorCode SbTrianglesRead_OFF(const char *path, SbTriangleFile *f)
-{
-  return SbTrianglesScan(path, off_file, f);
 }
