@@ -235,15 +235,16 @@ PetscReal SbFormulaEval(SbFormula formula, PetscReal t,
 PetscErrorCode SbFormulaUses(SbFormula formula, PetscBool *time, PetscBool *position);
 PetscErrorCode SbFormulaDestroy(SbFormula *formula);
 /*
-  Live formulas (src/base/live.c): places that somebody moves while a run goes on, where an option of an effect with three formulas is the word `live`.
+  Live formulas (src/base/live.c): numbers that somebody sets while a run goes on, where a formula of an effect is the word `live`.
 
-  SetUp: the file with the places, the largest speed, m/s, and how many simulated seconds may pass per second, 0: any; before the first step. Place: of
-  number i = 0 .. SbLiveCount() - 1 at time t of the present step, m, and the name of its effect; SetPlace puts it there. Advance: a step that ended at t was accepted, from now on they go to where the file says. Collective.
+  SetUp: the file with them, the largest speeds of what moves (m/s) and turns (degree/s), and how many simulated seconds may pass per second, 0: any; before the first step. Of number i = 0 .. SbLiveCount() - 1: Column, its
+  name in the history and its unit (may be NULL); Get, its value at time t of the present step; Set puts it there. Advance: a step that ended at t was accepted, from now on they go to what the file says. Collective.
 */
-PetscErrorCode SbLiveSetUp(const char *file, PetscReal speed, PetscReal pace);
+PetscErrorCode SbLiveSetUp(const char *file, PetscReal speed, PetscReal angular_speed, PetscReal pace);
 PetscInt SbLiveCount(void);
-const char *SbLivePlace(PetscInt i, PetscReal t, PetscReal place[3]);
-void SbLiveSetPlace(PetscInt i, PetscReal t, const PetscReal place[3]);
+const char *SbLiveColumn(PetscInt i, const char **unit);
+PetscReal SbLiveGet(PetscInt i, PetscReal t);
+void SbLiveSet(PetscInt i, PetscReal t, PetscReal value);
 PetscErrorCode SbLiveAdvance(MPI_Comm comm, PetscReal t);
 /* Reads an option of kind SB_OPTION_FORMULA: `count` formulas as in the row; destroy each. */
 PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula formulas[]);

@@ -68,7 +68,7 @@ def turned(profile, axes, spokes=48):
 class Obstacle:
     """A rigid obstacle: its surface at rest, x [n][3] m and triangles [m][3], and where it is at a time.
 
-    Where `displacement` is live, the history of the run says where it was. Of a plane a piece below the places `reached` [k][3] is made, of a bowl the part deeper than half its radius; `up` is a unit vector.
+    Where `displacement` or `angle` is live, the history of the run says where it was. Of a plane a piece below the places `reached` [k][3] is made, of a bowl the part deeper than half its radius; `up` is a unit vector.
     """
 
     def __init__(self, run, name, reached, up):
@@ -130,15 +130,17 @@ class Obstacle:
     def shift(self, t):
         """[3] m at time t, s."""
         text = self.option("displacement", "0;0;0")
-        if text == "live":
-            table = self.run.history
-            return [numpy.interp(t, table["time"], table[f"{self.name}_live_{k}"]) if len(table) else 0.0 for k in "xyz"]
-        return [formula(one, t) for one in text.split(";")]
+        return [self.live(f"{self.name}_live_{k}", t) for k in "xyz"] if text == "live" else [formula(one, t) for one in text.split(";")]
+
+    def live(self, column, t):
+        table = self.run.history
+        return numpy.interp(t, table["time"], table[column]) if len(table) else 0.0
 
     def pose(self, t):
         """[4][4]: turned about its axis, then shifted (m); x at time t (s) is pose @ (x, 1)."""
         centre, axis = ([float(x) for x in self.option(*given).split(",")] for given in (("axis_point", "0,0,0"), ("axis", "0,0,1")))
-        angle = math.radians(formula(self.option("angle", "0"), t))
+        text = self.option("angle", "0")
+        angle = math.radians(self.live(f"{self.name}_angle_live", t) if text == "live" else formula(text, t))
         a = numpy.asarray(axis) / (numpy.linalg.norm(axis) or 1)
         cross = numpy.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
         pose = numpy.eye(4)

@@ -1,5 +1,6 @@
 """The folder of a run, read: meshes, frames, fields, history, settings."""
 import json
+import time
 from functools import cached_property
 from pathlib import Path
 
@@ -55,7 +56,7 @@ class Mesh:
     cell has its own), body [ncell] number of the body, `arrays` the names of what else there is (sets, ranks)."""
 
     def __init__(self, group):
-        self.group = group
+        self.path = group.name
         self.x, self.cells, self.body = group["x"][()], group["cells"][()], group["body"][()]
         self.vertices = group["vertices"][()] if "vertices" in group else self.cells
         self.arrays = [name for name in group if name not in ("x", "cells", "vertices")]
@@ -79,60 +80,78 @@ class Run:
 
     def __init__(self, folder):
         self.folder = Path(folder)
-        self.file = None
+        self.file, self.inode, self.paths, self.about, self.meshes, self.rows = None, None, [], {}, {}, None
         self.refresh()
 
     def __repr__(self):
         return f"<Run {self.folder}: {len(self)} frames, {self.info.get('status', 'no run.json')}>"
 
     def __len__(self):
-        return len(self.frames)
+        return len(self.paths)
 
     def refresh(self):
-        """Reads again what there is."""
-        for name in ("history", "units", "info", "scenario"):
+        """Reads again what there is; of a run that goes on only what is new."""
+        for name in ("history", "info", "scenario"):
             self.__dict__.pop(name, None)
-        if self.file:
-            self.file.close()
-        self.file, self.frames, self.meshes = None, [], {}
+        self.close()
         path = self.folder / "fields.h5"
         if not path.exists():
             if not (self.folder / "run.json").exists():
                 raise RunError(f"{path} does not exist; is {self.folder} the folder of a run with -output_fields?")
             return  # a run without fields
-        try:
-            self.file = h5py.File(path, "r", locking=False)
-            self.frames = [group for hundred in self.file["/step"].values() for group in hundred.values()]
-            self.frames.sort(key=lambda group: group.attrs["step"])
-            self.first_mesh = self.file["/mesh"]
-        except (OSError, KeyError) as e:
-            self.close()  # HDF5 would go on reading what it had
-            raise RunError(f"{path} is not a results file of supple: {e}") from None
+        for attempts in range(5, 0, -1):
+            try:
+                self.read_index(path)
+                return
+            except (OSError, KeyError) as e:
+                self.close()  # HDF5 would go on reading what it had
+                if attempts == 1:
+                    raise RunError(f"{path} is not a results file of supple: {e}") from None
+                # a frame may have come while this was read, behind the end that the file had when it was opened
+                time.sleep(0.02)
+
+    def read_index(self, path):
+        """Frames of fields.h5, and that the newest of them is whole."""
+        self.file = h5py.File(path, "r", locking=False)
+        self.paths = sorted((f"/step/{hundred}/{step}" for hundred, steps in self.file["/step"].items() for step in steps), key=lambda one: int(one.rpartition("/")[2]))
+        self.first_mesh = self.file["/mesh"]
+        for one in self.paths[-1:]:
+            _ = [self.file[one][name] for name in self.file[one]]
+        # another run in the same folder, or one that went on from a checkpoint: nothing of before counts
+        inode, known = path.stat().st_ino, [one for one in self.paths if one in self.about]
+        if inode != self.inode or len(known) < len(self.about) or known and self.about[known[-1]] != self.read_about(known[-1]):
+            self.about, self.meshes, self.inode = {}, {}, inode
+        self.about |= {one: self.read_about(one) for one in self.paths if one not in self.about}
 
     def close(self):
         if self.file:
             self.file.close()
-        self.file, self.frames, self.meshes = None, [], {}
+        self.file, self.paths = None, []
+
+    def read_about(self, path):
+        """(time, number of the mesh) of a frame."""
+        group = self.file[path]
+        return float(group.attrs["time"]), int(group.attrs.get("mesh", 0))
 
     # ---------------------------------------------------------------- frames
 
     @property
     def times(self):
         """[nframe] s; the load factor of a static run."""
-        return numpy.array([group.attrs["time"] for group in self.frames])
+        return numpy.array([self.about[path][0] for path in self.paths])
 
     @property
     def steps(self):
-        return numpy.array([group.attrs["step"] for group in self.frames])
+        return numpy.array([int(path.rpartition("/")[2]) for path in self.paths])
 
     def frame(self, k):
-        if not -len(self.frames) <= k < len(self.frames):
-            raise RunError(f"there is no frame {k}; the run has {len(self.frames)}")
-        return self.frames[k]
+        if not -len(self) <= k < len(self):
+            raise RunError(f"there is no frame {k}; the run has {len(self)}")
+        return self.file[self.paths[k]]
 
     def mesh(self, k=0):
         """The Mesh of a frame."""
-        number = int(self.frame(k).attrs.get("mesh", 0)) if self.frames else 0
+        number = self.about[self.frame(k).name][1] if self.paths else 0
         if number not in self.meshes:
             self.meshes[number] = Mesh(self.file[f"/mesh_{number:06d}" if number else "/mesh"])
         return self.meshes[number]
@@ -158,7 +177,7 @@ class Run:
         """The dataset of a field, with its attribute `unit`."""
         if name not in self.fields(k):
             raise RunError(f"the run has no field '{name}'; it has {', '.join(self.fields(k))}")
-        return self.frame(k)[name] if name in self.frame(k) else self.mesh(k).group[name]
+        return self.frame(k)[name] if name in self.frame(k) else self.file[self.mesh(k).path][name]
 
     def field(self, name, k=-1):
         """A field as it is stored: [n] or [n][3] or [n][6] (xx xy xz yy yz zz), per point or per cell."""
@@ -190,10 +209,20 @@ class Run:
         path = self.folder / "history.csv"
         if not path.exists():
             raise RunError(f"{path} does not exist: the run was made with -output_history no, or has not begun")
-        lines = path.read_text().splitlines()
-        names, units = lines[0].split(","), lines[1].lstrip("#").split(",")
-        rows = [tuple(map(float, words)) for words in (line.split(",") for line in lines[2:]) if len(words) == len(names)]
-        return numpy.array(rows, dtype=[(name, float) for name in names]), dict(zip(names, units))
+        with open(path, "rb") as f:
+            head = f.readline() + f.readline()
+            names, units = (line.lstrip("#").split(",") for line in head.decode().splitlines())
+            # (head, last line that was read, where it ends, table): of the same file that has grown the lines behind are new
+            if self.rows and self.rows[0] == head and f.seek(self.rows[2] - len(self.rows[1])) >= 0 and f.read(len(self.rows[1])) == self.rows[1]:
+                _, last, end, table = self.rows
+            else:
+                last, end, table = head, len(head), numpy.empty(0, dtype=[(name, float) for name in names])
+            f.seek(end)
+            lines = f.read().splitlines(keepends=True)
+        lines = [line for line in lines if line.endswith(b"\n") and line.count(b",") == len(names) - 1]
+        table = numpy.concatenate([table, numpy.array([tuple(map(float, line.split(b","))) for line in lines], dtype=table.dtype)])
+        self.rows = head, lines[-1] if lines else last, end + sum(map(len, lines)), table
+        return table, dict(zip(names, units))
 
     @cached_property
     def history(self):

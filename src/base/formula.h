@@ -35,8 +35,8 @@ struct _p_SbFormula {
 
 /* Reads a two-column file on rank 0 and gives it to all. Collective. Errors name option, file and line. */
 PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *where, SbFormula formula);
-/* The three formulas of an option that is `live` (live.c); where: its name. Destroy each. */
-PetscErrorCode SbLiveCreate(const char *where, SbFormula formula[3]);
+/* The formulas, as many as the row says, of an option that is `live` (live.c); where: its name. Destroy each. */
+PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula formula[]);
 /* A live formula is destroyed. */
 void SbLiveForget(SbFormula formula);
 /* Linear in between, constant outside. */

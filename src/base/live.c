@@ -1,27 +1,32 @@
 /*
-  live.c - formulas that follow what somebody does while a run goes on: -effect_<name>_displacement live.
+  live.c - formulas that follow what somebody does while a run goes on: -effect_<name>_displacement live, and any other formula of an effect.
 
-  A file, live.txt in the run's folder, has a line `NAME x y z` (m) for each effect that is moved. Others rewrite it as often as they like, best by renaming a new one. After each accepted step rank
-  0 reads it, and the effect goes from where it is towards the new place in a straight line, at -live_speed at most: three tables of two rows. So a step that is tried again is the same one.
+  A file, live.txt in the run's folder, has a line `NAME x y z` (m) for each effect that is moved, and lines `NAME_angle a` (degrees), `NAME_vector x y z` (N), ... for other options of effects. Others rewrite it as often as they like, best by
+  renaming a new one. After each accepted step rank 0 reads it, and the effect goes from where it is towards the new place in a straight line, at -live_speed at most, or turns at -live_angular_speed; what is neither has
+  its new value from the next step on. All are tables of two rows, so a step that is tried again is the same one.
   A run that is faster than -live_pace simulated seconds per second waits; one that is slower does not hurry afterwards.
 */
 #include "formula.h"
 
-#define MOVED_MAX 16 /* effects that are moved */
+#define VALUE_MAX 48 /* numbers that are set while a run goes on */
 
 typedef struct {
-  char name[SB_NAME_MAX];
-  SbFormula formula[3];
-} Moved;
+  char name[2 * SB_NAME_MAX];   /* begins its line of the file: tool, tool_angle */
+  char column[3 * SB_NAME_MAX]; /* of the history: tool_live_x, tool_angle_live */
+  const char *unit;
+  const PetscReal *speed; /* unit/s; NULL: none, it jumps */
+  int n, k;               /* number k of the n of its option, which follow each other */
+  SbFormula formula;
+} Value;
 
 static struct {
   PetscInt n;
-  Moved moved[MOVED_MAX];
+  Value value[VALUE_MAX];
   char file[PETSC_MAX_PATH_LEN];
-  PetscReal speed, pace; /* m/s; simulated seconds per second, 0: no limit */
+  PetscReal speed, angular_speed, pace; /* m/s; degree/s; simulated seconds per second, 0: no limit */
   PetscReal clock,
     begun; /* s: the clock, and the time of the run, from which the pace counts; clock 0: not yet */
-} live = {.file = "live.txt", .speed = 0.2, .pace = 1.};
+} live = {.file = "live.txt", .speed = 0.2, .angular_speed = 90., .pace = 1.};
 
 /* From `from` at time t on to `to`. */
 static void set_rows(SbFormula f, PetscReal t, PetscReal from, PetscReal duration, PetscReal to)
@@ -32,44 +37,60 @@ static void set_rows(SbFormula f, PetscReal t, PetscReal from, PetscReal duratio
   f->value[1] = to;
 }
 
-PetscErrorCode SbLiveCreate(const char *where, SbFormula formula[3])
+PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula formula[])
 {
-  const char *name = strchr(where[0] == '-' ? where + 1 : where, '_'), *end = strrchr(where, '_');
-  Moved *moved = &live.moved[live.n];
-  PetscReal place[3] = {0., 0., 0.};
+  const char *name = strchr(where[0] == '-' ? where + 1 : where, '_');
+  const int n = (int)row->count;
+  const PetscBool moved = (PetscBool)!strcmp(row->key, "displacement");
+  const int length = name ? (int)(strlen(name + 1) - (moved ? strlen("_displacement") : 0)) : 0;
 
   PetscFunctionBeginUser;
-  PetscCheck(live.n < MOVED_MAX && name && end > name, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s live: up to %d effects can be moved while a run goes on", where, MOVED_MAX);
-  (void)snprintf(moved->name, sizeof(moved->name), "%.*s", (int)(end - name - 1), name + 1);
-  /* a scene that is made again goes on where it was */
-  for (PetscInt i = 0; i < live.n; i++)
-    for (int k = 0; k < 3 && !strcmp(live.moved[i].name, moved->name); k++)
-      place[k] = live.moved[i].formula[k]->value[0];
-  for (int k = 0; k < 3; k++) {
+  PetscCheck(live.n + n <= VALUE_MAX && name, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s live: %d numbers can be set while a run goes on, three by a vector", where, VALUE_MAX);
+  for (int k = 0; k < n; k++) {
+    Value *v = &live.value[live.n + k];
+    PetscReal old = 0.;
+
+    /* its names: those of the effect where this is moved */
+    (void)snprintf(v->name, sizeof(v->name), "%.*s", length, name + 1);
+    (void)snprintf(v->column, sizeof(v->column), n == 1 ? "%.*s_live" : "%.*s_live_%c", length, name + 1, 'x' + k);
+    v->unit = row->unit[0] ? row->unit : "1";
+    v->speed = moved ? &live.speed : !strcmp(row->key, "angle") ? &live.angular_speed : NULL;
+    v->n = n;
+    v->k = k;
+
+    /* a scene that is made again goes on where it was */
+    for (PetscInt i = 0; i < live.n; i++) {
+      if (!strcmp(live.value[i].column, v->column)) old = live.value[i].formula->value[0];
+    }
     PetscCall(PetscNew(&formula[k]));
     formula[k]->uses_time = PETSC_TRUE;
     formula[k]->nrow = 2;
     PetscCall(PetscMalloc1(2, &formula[k]->time));
     PetscCall(PetscMalloc1(2, &formula[k]->value));
-    set_rows(formula[k], 0., place[k], 1., place[k]);
-    moved->formula[k] = formula[k];
+    set_rows(formula[k], 0., old, 1., old);
+    v->formula = formula[k];
   }
-  live.n++;
+  live.n += n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 void SbLiveForget(SbFormula formula)
 {
-  for (PetscInt i = 0; i < live.n; i++)
-    if (live.moved[i].formula[0] == formula) live.moved[i--] = live.moved[--live.n];
+  for (PetscInt i = 0; i < live.n; i++) {
+    if (live.value[i].formula != formula) continue;
+    live.n--;
+    memmove(&live.value[i], &live.value[i + 1], (size_t)(live.n - i) * sizeof(Value));
+    break;
+  }
 }
 
-PetscErrorCode SbLiveSetUp(const char *file, PetscReal speed, PetscReal pace)
+PetscErrorCode SbLiveSetUp(const char *file, PetscReal speed, PetscReal angular_speed, PetscReal pace)
 {
   PetscFunctionBeginUser;
   PetscCall(PetscStrncpy(live.file, file, sizeof(live.file)));
   live.speed = speed;
+  live.angular_speed = angular_speed;
   live.pace = pace;
   live.clock = 0.;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -80,19 +101,24 @@ PetscInt SbLiveCount(void)
   return live.n;
 }
 
-const char *SbLivePlace(PetscInt i, PetscReal t, PetscReal place[3])
+const char *SbLiveColumn(PetscInt i, const char **unit)
 {
-  for (int k = 0; k < 3; k++) place[k] = SbFormulaEvalTable(live.moved[i].formula[k], t);
-  return live.moved[i].name;
+  if (unit) *unit = live.value[i].unit;
+  return live.value[i].column;
 }
 
-void SbLiveSetPlace(PetscInt i, PetscReal t, const PetscReal place[3])
+PetscReal SbLiveGet(PetscInt i, PetscReal t)
 {
-  for (int k = 0; k < 3; k++) set_rows(live.moved[i].formula[k], t, place[k], 1., place[k]);
+  return SbFormulaEvalTable(live.value[i].formula, t);
 }
 
-/* Where the file wants each effect; those that it does not name, or not with three numbers, keep their target. Rank 0. */
-static void read_targets(PetscReal target[][3])
+void SbLiveSet(PetscInt i, PetscReal t, PetscReal value)
+{
+  set_rows(live.value[i].formula, t, value, 1., value);
+}
+
+/* What the file wants; what it does not name, or not with as many numbers, keeps its target. Rank 0. */
+static void read_targets(PetscReal target[])
 {
   FILE *f = fopen(live.file, "r");
   char line[512];
@@ -100,19 +126,19 @@ static void read_targets(PetscReal target[][3])
   while (f && fgets(line, sizeof(line), f)) {
     const size_t n = strcspn(line, " \t,");
 
-    for (PetscInt i = 0; i < live.n; i++) {
+    for (PetscInt i = 0; i < live.n; i += live.value[i].n) {
       char *next = line + n, *end;
-      PetscReal x[3];
+      PetscReal x[SB_OPTION_COUNT_MAX];
       int k = 0;
 
-      if (strlen(live.moved[i].name) != n || strncmp(line, live.moved[i].name, n)) continue;
-      for (; k < 3; k++) {
+      if (strlen(live.value[i].name) != n || strncmp(line, live.value[i].name, n)) continue;
+      for (; k < live.value[i].n; k++) {
         next += strspn(next, " \t,");
         x[k] = strtod(next, &end);
         if (end == next || !isfinite(x[k])) break;
         next = end;
       }
-      if (k == 3) memcpy(target[i], x, sizeof(x));
+      if (k == live.value[i].n) memcpy(&target[i], x, (size_t)k * sizeof(*x));
     }
   }
   if (f) (void)fclose(f);
@@ -120,7 +146,7 @@ static void read_targets(PetscReal target[][3])
 
 PetscErrorCode SbLiveAdvance(MPI_Comm comm, PetscReal t)
 {
-  PetscReal target[MOVED_MAX][3], ahead;
+  PetscReal target[VALUE_MAX], ahead;
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
@@ -139,18 +165,17 @@ PetscErrorCode SbLiveAdvance(MPI_Comm comm, PetscReal t)
 
   /* from here to where they are wanted */
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  for (PetscInt i = 0; i < live.n; i++)
-    for (int k = 0; k < 3; k++) target[i][k] = live.moved[i].formula[k]->value[1];
+  for (PetscInt i = 0; i < live.n; i++) target[i] = live.value[i].formula->value[1];
   if (!rank) read_targets(target);
-  PetscCallMPI(MPI_Bcast(target, (PetscMPIInt)(3 * live.n), MPIU_REAL, 0, comm));
-  for (PetscInt i = 0; i < live.n; i++) {
-    PetscReal place[3], way = 0.;
+  PetscCallMPI(MPI_Bcast(target, (PetscMPIInt)live.n, MPIU_REAL, 0, comm));
+  for (PetscInt first = 0; first < live.n; first += live.value[first].n) {
+    const Value *v = &live.value[first];
+    PetscReal way = 0.;
 
-    (void)SbLivePlace(i, t, place);
-    for (int k = 0; k < 3; k++) way += PetscSqr(target[i][k] - place[k]);
+    for (PetscInt i = first; i < first + v->n; i++) way += PetscSqr(target[i] - SbLiveGet(i, t));
     way = PetscSqrtReal(way);
-    for (int k = 0; k < 3; k++)
-      set_rows(live.moved[i].formula[k], t, place[k], way > 0. ? way / live.speed : 1., target[i][k]);
+    for (PetscInt i = first; i < first + v->n; i++)
+      set_rows(live.value[i].formula, t, SbLiveGet(i, t), v->speed ? way / *v->speed : 0., target[i]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -274,9 +274,8 @@ PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula
   count = r->row->count;
   for (PetscInt i = 0; i < count; i++) formulas[i] = NULL;
   if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
-  if (count == 3 && !strcmp(r->text, "live") && !strcmp(scope->klass, "effect") &&
-      !strcmp(key, "displacement")) {
-    PetscCall(SbLiveCreate(r->name, formulas));
+  if (!strcmp(r->text, "live") && !strcmp(scope->klass, "effect")) {
+    PetscCall(SbLiveCreate(r->name, r->row, formulas));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   // between formulas stand semicolons or, as in other vectors, commas outside parentheses; those become semicolons

@@ -129,17 +129,9 @@ static PetscErrorCode write_numbers(SbRun run, SbOutput out, const SbStep *step,
     PetscCall(SbH5PutReal(h, h->file, run->carried[i].name, *run->carried[i].value));
   PetscCall(SbProbesWrite(run, out, h));
 
-  /* where effects are that are moved by hand */
-  for (PetscInt i = 0; i < SbLiveCount(); i++) {
-    PetscReal place[3];
-    const char *effect = SbLivePlace(i, step->t, place);
-    char name[2 * SB_NAME_MAX];
-
-    for (int k = 0; k < 3; k++) {
-      SbFormat(sizeof(name), name, "live_%s_%c", effect, 'x' + k);
-      PetscCall(SbH5PutReal(h, h->file, name, place[k]));
-    }
-  }
+  /* what is set by hand */
+  for (PetscInt i = 0; i < SbLiveCount(); i++)
+    PetscCall(SbH5PutReal(h, h->file, SbLiveColumn(i, NULL), SbLiveGet(i, step->t)));
 
   /* by what a restart knows that the file fits the run and is whole */
   PetscCall(SbH5PutInt(h, h->file, "mesh_hash", (int64_t)out->mesh_hash));
@@ -355,15 +347,10 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   }
   if (*ok) PetscCall(SbProbesRead(run, out, &h));
   for (PetscInt i = 0; *ok && i < SbLiveCount(); i++) {
-    PetscReal place[3];
-    const char *effect = SbLivePlace(i, times.t, place);
-    char name[2 * SB_NAME_MAX];
+    PetscReal value;
 
-    for (int k = 0; k < 3; k++) {
-      SbFormat(sizeof(name), name, "live_%s_%c", effect, 'x' + k);
-      PetscCall(SbH5GetReal(h.file, name, &place[k], ok));
-    }
-    if (*ok) SbLiveSetPlace(i, times.t, place);
+    PetscCall(SbH5GetReal(h.file, SbLiveColumn(i, NULL), &value, ok));
+    if (*ok) SbLiveSet(i, times.t, value);
   }
   PetscCall(SbH5Close(&h));
 

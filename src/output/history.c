@@ -129,12 +129,7 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
     for (int c = 0; c < SB_BODY_SUMS; c++)
       PetscCall(put(h, ",%s_%s", run->model->body[b].name, body_columns[c].name));
   }
-  for (PetscInt i = 0; i < SbLiveCount(); i++) {
-    PetscReal place[3];
-    const char *effect = SbLivePlace(i, 0., place);
-
-    for (int k = 0; k < 3; k++) PetscCall(put(h, ",%s_live_%c", effect, 'x' + k));
-  }
+  for (PetscInt i = 0; i < SbLiveCount(); i++) PetscCall(put(h, ",%s", SbLiveColumn(i, NULL)));
   for (PetscInt c = 0; c < run->ncolumn; c++) PetscCall(put(h, ",%s", run->column[c].name));
   PetscCall(put(h, "\n#"));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(columns); i++)
@@ -151,7 +146,10 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
   for (PetscInt b = 0; b < nbody; b++) {
     for (int c = 0; c < SB_BODY_SUMS; c++) PetscCall(put(h, ",%s", body_columns[c].unit));
   }
-  for (PetscInt i = 0; i < 3 * SbLiveCount(); i++) PetscCall(put(h, ",m"));
+  for (PetscInt i = 0; i < SbLiveCount(); i++) {
+    (void)SbLiveColumn(i, &unit);
+    PetscCall(put(h, ",%s", unit));
+  }
   for (PetscInt c = 0; c < run->ncolumn; c++) PetscCall(put(h, ",%s", run->column[c].unit));
   PetscCall(put(h, "\n"));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -206,12 +204,7 @@ static PetscErrorCode put_row(SbHistory h, const SbStep *step, SbRun run)
       PetscCall(put(h, ",%.17g", (double)(e->kinetic + e->strain - e->load_work - e->prescribed_work)));
   }
   for (PetscInt i = 0; i < h->nextra; i++) PetscCall(put(h, ",%.17g", (double)h->sum[i]));
-  for (PetscInt i = 0; i < SbLiveCount(); i++) {
-    PetscReal place[3];
-
-    (void)SbLivePlace(i, step->t, place);
-    for (int k = 0; k < 3; k++) PetscCall(put(h, ",%.17g", (double)place[k]));
-  }
+  for (PetscInt i = 0; i < SbLiveCount(); i++) PetscCall(put(h, ",%.17g", (double)SbLiveGet(i, step->t)));
   for (PetscInt i = 0; i < run->ncolumn; i++) PetscCall(put(h, ",%.17g", (double)*run->column[i].value));
   PetscCall(put(h, "\n"));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -358,7 +351,7 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
   h->nextra += h->nprobe + (out->history_bodies ? SB_BODY_SUMS * model->nbody : 0);
   PetscCall(PetscMalloc2(h->nextra + 1, &h->mine, h->nextra + 1, &h->sum));
   h->capacity =
-    2 * (PETSC_STATIC_ARRAY_LENGTH(columns) + (size_t)(h->nextra + run->ncolumn + 3 * SbLiveCount())) *
+    2 * (PETSC_STATIC_ARRAY_LENGTH(columns) + (size_t)(h->nextra + run->ncolumn + SbLiveCount())) *
       (3 * SB_NAME_MAX) +
     256;
   PetscCall(PetscMalloc1(h->capacity, &h->row));

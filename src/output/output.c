@@ -162,15 +162,16 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
 
   PetscCall(SbProbesSetFromOptions(out, &scope, model->dynamic));
 
-  /* the file in which others say where effects are to go */
+  /* the file in which others say what live formulas are to be */
   if (SbLiveCount()) {
     char path[PETSC_MAX_PATH_LEN];
-    PetscReal speed, pace;
+    PetscReal speed, angular_speed, pace;
 
     PetscCall(SbOptionReal(&scope, "live_speed", &speed));
+    PetscCall(SbOptionReal(&scope, "live_angular_speed", &angular_speed));
     PetscCall(SbOptionReal(&scope, "live_pace", &pace));
     PetscCall(SbOutputPath(out, "live.txt", sizeof(path), path));
-    PetscCall(SbLiveSetUp(path, speed, pace));
+    PetscCall(SbLiveSetUp(path, speed, angular_speed, pace));
   }
 
   /* what the screen shows */

@@ -105,8 +105,21 @@ g = history("on")
 if not (abs(g["tool_live_x"][40] - h["tool_live_x"][40]) < 1e-15 and abs(g["tool_live_z"][-1]) < 1e-12 and g["tool_live_z"][41] < -0.01):
     fail("a restart does not go on where the tool was")
 
+# An angle and a traction: the one is reached at its speed, the other at once; tables of the history do the same.
+turn = ["-effects", "hold,push", "-effect_hold_type", "prescribed_displacement", "-effect_hold_axis_point", "0.05,0.05,0", "-effect_push_type", "traction", "-effect_push_on", "zmax", "-ts_max_time", "0.1"]
+(OUT / "turn").mkdir()
+put("turn", "hold_angle 5\npush_vector 0 50 100\npush_vector 1 1\n")
+subprocess.run(command(2, "turn", *turn, "-effect_hold_angle", "live", "-effect_push_vector", "live", "-live_angular_speed", "100", "-live_pace", "0", "-output_overwrite", "yes"), check=True)
+h = history("turn")
+if not (abs(h["hold_angle_live"] - numpy.minimum(100 * h["time"], 5)).max() < 1e-12 and (h["push_vector_live_z"][1:] == 100).all() and h["push_vector_live_z"][0] == 0):
+    fail(f"angle {h['hold_angle_live']}, traction {h['push_vector_live_z']}")
+subprocess.run(command(1, "turned", *turn, "-effect_hold_angle", "clamp(100*t,0,5)", "-effect_push_vector", "0;50;100"), check=True)
+g = history("turned")
+if not (abs(h["strain"] - g["strain"]).max() < 1e-8 * g["strain"].max() and g["strain"].max() > 0):
+    fail(f"an angle that is set by hand gives {h['strain']}, as a formula {g['strain']}")
+
 # What it is not for.
 result = subprocess.run(command(1, "static", "-effect_tool_displacement", "live", "-time", "static"), capture_output=True, text=True)
-if not result.returncode or "_displacement live" not in result.stderr:
+if not result.returncode or "-time static" not in result.stderr or "live" not in result.stderr:
     fail(f"a static run: {result.stderr}")
 print("an obstacle goes where it is wanted, and the same way again")

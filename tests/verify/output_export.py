@@ -1,6 +1,7 @@
 """scripts/export: what the files hold, read back: points, triangles, colours and fields of each body and frame, and where obstacles are.
 
 """
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,9 @@ import numpy
 import trimesh
 from alembic3d import Abc, AbcGeom
 from pxr import Usd, UsdGeom
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkLogger
+from vtkmodules.vtkIOGeometry import vtkGLTFReader
 
 from output_common import OUT, run
 
@@ -35,14 +39,13 @@ def check_files(it, folder):
     """One file per frame: both surfaces with their places, in the axes of the format."""
     surface = it.mesh().surface
     x = it.positions(-1)[surface.points]
-    for form, ending in (("obj", ".obj"), ("ply", ".ply"), ("gltf", ".glb")):
+    for form, ending in (("obj", ".obj"), ("ply", ".ply")):
         export(folder, "--to", form, "-o", OUT / form)
         files = sorted(OUT.glob(f"{form}_*{ending}"))
         check(len(files) == len(it), f"{form}: {len(files)} files for {len(it)} frames")
         found = trimesh.load(files[-1], process=False)
         whole = found.to_mesh() if isinstance(found, trimesh.Scene) else found
-        expected = x if form != "gltf" else numpy.stack([x[:, 0], x[:, 2], -x[:, 1]], axis=1)  # y is up there
-        near = numpy.array([numpy.abs(whole.vertices - p).max(axis=1).min() for p in expected])
+        near = numpy.array([numpy.abs(whole.vertices - p).max(axis=1).min() for p in x])
         check(near.max() < 1e-6, f"{form}: a point of the bar is {near.max()} m off")
         check(len(whole.faces) > len(surface.triangles) and abs(whole.area - 0.045 - area_of(x, surface)) < 2e-3, f"{form}: area {whole.area}")
     ply = trimesh.load(sorted(OUT.glob("ply_*.ply"))[-1], process=False)
@@ -97,11 +100,58 @@ def check_alembic(it, folder):
     check((faces == surface.triangles[:, ::-1]).all(), "triangles")
 
 
+def check_gltf(it, folder):
+    """One file with all frames, y up: VTK plays it, the bar and the ball are where they were at each time; trimesh and who plays nothing see the last frame; colours of all frames."""
+    export(folder, "--to", "gltf", "-o", OUT / "all")
+    surface, path = it.mesh().surface, str(OUT / "all.glb")
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)  # VTK warns that it does not play colours
+    reader = vtkGLTFReader()
+    reader.SetFileName(path)
+    reader.UpdateInformation()
+    check(reader.GetNumberOfAnimations() == 1 and abs(reader.GetAnimationDuration(0) - it.times[-1]) < 1e-6, f"the film lasts {reader.GetAnimationDuration(0)} s")
+    reader.EnableAnimation(0)
+    reader.SetFrameRate(1000)  # VTK's own time steps, among which are those of the run
+    for k in (0, len(it) // 2, len(it) - 1):
+        reader.UpdateInformation()
+        reader.UpdateTimeStep(float(it.times[k]))
+        shapes, items = [], reader.GetOutput().NewIterator()
+        items.InitTraversal()
+        while not items.IsDoneWithTraversal():
+            shapes.append(vtk_to_numpy(items.GetCurrentDataObject().GetPoints().GetData()).astype(float))
+            items.GoToNextItem()
+        x = it.positions(k)[surface.points]
+        check(numpy.abs(shapes[0] - x[:, [0, 2, 1]] * [1, 1, -1]).max() < 1e-6, f"points of frame {k}")
+        check(numpy.allclose(shapes[1].mean(axis=0), [0.2, -0.3 - 2 * it.times[k], -0.05], atol=1e-3), f"the ball is at {shapes[1].mean(axis=0)} in frame {k}")
+    still = trimesh.load(path, process=False)
+    x = trimesh.transform_points(still.geometry["bar"].vertices, still.graph["bar"][0])
+    check(numpy.abs(x - it.positions(-1)[surface.points][:, [0, 2, 1]] * [1, 1, -1]).max() < 1e-6, "trimesh does not see the last frame")
+    # viridis in every frame: the largest stress is yellow, that is red and green, the least violet, that is blue
+    with open(path, "rb") as f:
+        f.seek(12)
+        size = int.from_bytes(f.read(4), "little")
+        file, blob = json.loads(f.read(4 + size)[4:]), f.read()[8:]
+
+    def array(number):
+        a = file["accessors"][number]
+        return numpy.frombuffer(blob, numpy.float32, 3 * a["count"], file["bufferViews"][a["bufferView"]]["byteOffset"]).reshape(-1, 3)
+
+    part = file["meshes"][0]["primitives"][0]
+    check(len(part["targets"]) == len(it) - 1, f"{len(part['targets'])} targets for {len(it)} frames")
+    for k, target in [(1, part["targets"][1]["COLOR_0"]), (len(it) - 1, None)]:
+        colours = array(part["attributes"]["COLOR_0"]) + (array(target) if target else 0)
+        values = surface.at_points(it.values("von_mises", k)[0])
+        check(colours.min() > -1e-6 and colours.max() < 1 + 1e-6 and colours[values.argmin()][2] > colours[values.argmin()][1], f"colours of frame {k}")
+        check(k == 1 or colours[values.argmax()][0] > 0.5, f"colours {colours[values.argmax()]}")
+    export(folder, "--to", "gltf", "--frame", 0, "-o", OUT / "still")
+    check(numpy.abs(trimesh.load(OUT / "still.glb", process=False).geometry["bar"].vertices - it.positions(0)[surface.points]).max() < 1e-6, "a still of frame 0")
+
+
 def main():
     run(1, "run", "-ts_max_time", "0.04", "-quiet", "-time", "euler_implicit", *BALL)
     it = supple.Run(OUT / "run")
     check_files(it, OUT / "run")
     check_usd(it, OUT / "run")
+    check_gltf(it, OUT / "run")
     check("there is no frame 99" in export(OUT / "run", "--to", "ply", "--frame", 99, fails=True), "unknown frame")
     check_alembic(it, OUT / "run")
 

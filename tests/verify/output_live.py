@@ -29,49 +29,71 @@ def live(*args, fails=False):
     return done.stdout + done.stderr
 
 
+def refused(*args):
+    """The message of an error; in this process, as what is loaded takes seconds."""
+    sys.argv = ["live", *map(str, args)]
+    try:
+        module.main()
+    except module.RunError as error:
+        return str(error)
+    sys.exit(f"live {args} ends without an error")
+
+
 def coloured(path):
     """The part of the picture's right that is coloured as bodies are, the scale included."""
     pixels = numpy.asarray(Image.open(path).convert("RGB")).astype(int)[:, 330:]
     return (pixels.max(axis=2) - pixels.min(axis=2) > 40).mean()
 
 
-def wait(condition, text):
-    end = time.monotonic() + 240
+def wait(process, condition, text):
+    """Until it is so; it never will be when the run, which has a last step, has ended. No clock: the machine may be busy."""
     while not condition():
-        check(time.monotonic() < end, text)
-        time.sleep(0.05)
+        if process.poll() is not None:
+            check(condition(), f"{text}, and the run has ended with {process.returncode}")
+        time.sleep(0.02)
 
 
-def load_module():
-    loader = importlib.machinery.SourceFileLoader("live", LIVE)
-    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("live", loader))
-    loader.exec_module(module)
-    return module
+def watched(process, folder, **options):
+    """A window without a screen on the run, with its first frame."""
+    wait(process, (OUT / folder / "run.json").exists, "the run does not begin")
+    window = module.Window(OUT / folder, process, argparse.Namespace(**{"field": "von_mises", "picture": None, "move": None, **options}))
+    window.window.SetOffScreenRendering(1)
+    wait(process, window.update, "no frame comes")
+    return window
+
+
+def states(process):
+    """Of all processes of the run: R, S, T (stopped), ..."""
+    found = set()
+    for pid in filter(str.isdigit, os.listdir("/proc")):
+        try:
+            if os.getsid(int(pid)) == process.pid:
+                found.add(Path("/proc", pid, "stat").read_text().rpartition(")")[2].split()[0])
+        except OSError:  # it has ended meanwhile
+            pass
+    return found
 
 
 def check_move():
     """The arrow key presses the instrument into the tissue, the mouse takes it away again: the force in the history, the obstacle in the picture, the places in both."""
-    module = load_module()
-    more = ("-effect_tool_displacement", "live", "-body_tissue_mesh", "box:0.1,0.06,0.04:3", "-ts_dt", "0.05", "-ts_max_time", "1000", "-output_every", "0", "-live_pace", "0", "-quiet")
+    more = ("-effect_tool_displacement", "live", "-body_tissue_mesh", "box:0.1,0.06,0.04:3", "-ts_dt", "0.05", "-ts_max_time", "200", "-output_every", "0", "-live_pace", "0", "-quiet")
     process = subprocess.Popen([*MPI, "2", SUPPLE, str(Path("scenarios/indent.opts").resolve()), "-output_dir", str(OUT / "moved"), *more], start_new_session=True)
     try:
-        wait((OUT / "moved" / "run.json").exists, "the run does not begin")
-        window = module.Window(OUT / "moved", process, argparse.Namespace(field="von_mises", plot="tool_force_z", picture=None, move="tool"))
-        window.window.SetOffScreenRendering(1)
+        window = watched(process, "moved", plot="tool_force_z", move="tool")
 
         def force():
             return (window.run.history["tool_force_z"].tolist() or [0.0])[-1]
 
-        wait(window.update, "no frame comes")
         window.picture(OUT / "before.png")
         window.renderer.GetActiveCamera().SetViewUp(0, 0, 1)
         for _ in range(3):
             window.key("Down")
+
         def depth():
             tool = window.obstacles[0][0]
             return (tool.x - tool.positions(window.run.times[window.shown])).mean(axis=0)[2]
 
-        wait(lambda: window.update() and force() < -0.05 and depth() > 1e-3, "nothing is pressed")
+        wait(process, lambda: window.update() and force() < -0.05 and depth() > 1e-3, "nothing is pressed")
         window.picture(OUT / "pressed.png")
         check(window.place[2] < -5e-3, f"the tool is wanted at {window.place}")
         parts = [numpy.asarray(Image.open(OUT / name).convert("RGB")).astype(int)[:, 330:] for name in ("before.png", "pressed.png")]
@@ -80,7 +102,7 @@ def check_move():
         window.drag((500, 600))
         window.drag(None)
         check(window.place[2] > 0.02, f"the mouse has moved the tool to {window.place}")
-        wait(lambda: window.update() and force() == 0, "the tool is not taken away")
+        wait(process, lambda: window.update() and force() == 0, "the tool is not taken away")
     finally:
         module.send(process, module.signal.SIGKILL)
         process.wait()
@@ -88,21 +110,20 @@ def check_move():
 
 def check_keys():
     """A long run on two ranks is paused: no more frames come; the next one can be looked at; then it goes on."""
-    module = load_module()
-    process = subprocess.Popen(command(2, "long", "-quiet", "-ts_max_time", "1000"), start_new_session=True)
+    process = subprocess.Popen(command(2, "long", "-quiet", "-ts_max_time", "100"), start_new_session=True)
     try:
-        wait((OUT / "long" / "run.json").exists, "the run does not begin")
-        window = module.Window(OUT / "long", process, argparse.Namespace(field="von_mises", plot="strain", picture=None, move=None))
-        window.window.SetOffScreenRendering(1)
-        wait(window.update, "no frame comes")
-        wait(lambda: window.update() and window.shown > 3, "frames do not follow each other")
+        window = watched(process, "long", plot="strain")
+        mesh = window.run.mesh(-1)
+        wait(process, lambda: window.update() and window.shown > 3, "frames do not follow each other")
+        check(window.run.mesh(-1) is mesh, "the mesh is read again with each frame")
         window.key("space")
-        time.sleep(1)  # what was being written
-        window.refresh()
-        count = len(window.run)
-        time.sleep(2)
-        shown = window.shown
-        check(window.refresh() and len(window.run) == count and not window.update(), "the run goes on although it is paused")
+        wait(process, lambda: states(process) == {"T"}, "the run goes on although it is paused")
+        wait(process, window.refresh, "what was written last cannot be read")
+        count, shown = len(window.run), window.shown
+        rows = [line.split(",") for line in (OUT / "long" / "history.csv").read_text().splitlines()]
+        strain = numpy.array([float(row[rows[0].index("strain")]) for row in rows[2:] if len(row) == len(rows[0])])
+        check(len(strain) > 3 and numpy.array_equal(window.run.history["strain"], strain), "the history is not that of the file")
+        check(not window.update(), "a window that is paused shows another frame")
         if shown + 1 < count:
             window.key("n")
             check(window.shown == shown + 1, f"the next frame is {window.shown}, not {shown + 1}")
@@ -111,10 +132,20 @@ def check_keys():
         window.picture(OUT / "long.png")
         check(coloured(OUT / "long.png") > 0.02, "nothing is drawn")
         window.key("space")
-        wait(lambda: window.update() and window.shown > count, "the run does not go on")
+        wait(process, lambda: window.update() and window.shown > count, "the run does not go on")
     finally:
         module.send(process, module.signal.SIGKILL)
         process.wait()
+
+
+def load_module():
+    loader = importlib.machinery.SourceFileLoader("live", LIVE)
+    found = importlib.util.module_from_spec(importlib.util.spec_from_loader("live", loader))
+    loader.exec_module(found)
+    return found
+
+
+module = load_module()
 
 
 def main():
@@ -124,9 +155,11 @@ def main():
     dark = (numpy.asarray(Image.open(OUT / "started.png").convert("L"))[330:590, 10:320] < 90).mean()
     check(0.005 < dark < 0.2, f"{dark:.1%} of the diagram is dark")
     run(2, "done", "-quiet", "-ts_max_time", "0.05")
-    check("1 of 6 frames" in live(OUT / "done", "--picture", OUT / "done.png"), "a run that has ended")
-    check("no column 'strian'" in live(OUT / "done", "--plot", "strian", "--picture", OUT / "no.png", fails=True), "unknown column")
-    check("neither a scenario" in live(OUT / "nothing.opts", fails=True), "neither scenario nor folder")
+    window = module.Window(OUT / "done", None, argparse.Namespace(field="von_mises", plot="strain", picture=None, move=None))
+    module.follow(window, OUT / "done.png")
+    check(window.shown == 5 and coloured(OUT / "done.png") > 0.05, "a run that has ended")
+    check("'strian'" in refused(OUT / "done", "--plot", "strian", "--picture", OUT / "no.png"), "unknown column")
+    check("nothing.opts" in live(OUT / "nothing.opts", fails=True), "neither scenario nor folder")
     check_keys()
     check_move()
 

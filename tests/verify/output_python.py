@@ -5,6 +5,7 @@ import json
 import math
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -60,6 +61,31 @@ def check_run():
     refused(lambda: it.field("von_mizes"), "von_mizes", "von_mises")
     refused(lambda: it.frame(99), "99", "6")
     refused(lambda: supple.Run(OUT / "nowhere"), "nowhere")
+
+
+def check_growing():
+    """A run that goes on is read again: what was read stays, and a frame that comes while the file is read, behind the end that this had, is met by reading once more."""
+    folder = OUT / "growing"
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(OUT / "run", folder)
+    table, fields = (OUT / "run" / "history.csv").read_text(), (OUT / "run" / "fields.h5").read_bytes()
+    lines = table.splitlines(keepends=True)
+    (folder / "history.csv").write_text("".join(lines[:4]) + lines[4][:20])
+    it = supple.Run(folder)
+    mesh, first = it.mesh(-1), it.history.copy()
+    (folder / "history.csv").write_text(table)
+    it.refresh()
+    check(len(first) == 2 and numpy.array_equal(it.history, supple.Run(OUT / "run").history), "rows that have come")
+    check(it.mesh(-1) is mesh, "the mesh is read again")
+
+    # the end of the file stands at byte 40: that of a file that lacks its last frame
+    cut = fields[:40] + (len(fields) // 2).to_bytes(8, "little") + fields[48:]
+    (folder / "fields.h5").write_bytes(cut)
+    refused(it.refresh, "fields.h5")
+    sleep, supple.run.time.sleep = supple.run.time.sleep, lambda _: (folder / "fields.h5").write_bytes(fields)
+    it.refresh()
+    supple.run.time.sleep = sleep
+    check(len(it) == 6 and numpy.allclose(it.positions(-1), supple.Run(OUT / "run").positions(-1)), "the frame that came meanwhile")
 
 
 def check_sweep():
@@ -130,6 +156,7 @@ def check_notebook():
 
 def main():
     check_run()
+    check_growing()
     check_sweep()
     check_plot(check_convergence())
     check_installed()
