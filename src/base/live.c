@@ -53,7 +53,8 @@ PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula fo
 
     /* its names: those of the effect where this is moved */
     (void)snprintf(v->name, sizeof(v->name), "%.*s", length, name + 1);
-    (void)snprintf(v->column, sizeof(v->column), n == 1 ? "%.*s_live" : "%.*s_live_%c", length, name + 1, 'x' + k);
+    (void)snprintf(v->column, sizeof(v->column), n == 1 ? "%.*s_live" : "%.*s_live_%c", length, name + 1,
+                   'x' + k);
     v->unit = row->unit[0] ? row->unit : "1";
     v->speed = moved ? &live.speed : !strcmp(row->key, "angle") ? &live.angular_speed : NULL;
     v->n = n;

@@ -350,10 +350,10 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
   h->nprobe = SbProbesCount(out);
   h->nextra += h->nprobe + (out->history_bodies ? SB_BODY_SUMS * model->nbody : 0);
   PetscCall(PetscMalloc2(h->nextra + 1, &h->mine, h->nextra + 1, &h->sum));
-  h->capacity =
-    2 * (PETSC_STATIC_ARRAY_LENGTH(columns) + (size_t)(h->nextra + run->ncolumn + SbLiveCount())) *
-      (3 * SB_NAME_MAX) +
-    256;
+  h->capacity = 2 *
+                  (PETSC_STATIC_ARRAY_LENGTH(columns) + (size_t)(h->nextra + run->ncolumn + SbLiveCount())) *
+                  (3 * SB_NAME_MAX) +
+                256;
   PetscCall(PetscMalloc1(h->capacity, &h->row));
   PetscCall(SbOutputPath(out, "history.csv", sizeof(h->path), h->path));
   if (!out->rank) PetscCall(open_file(run, out, sizeof(message), message));

@@ -43,7 +43,8 @@ static const SbOption rows[] = {
    "-effect_<name>_displacement live: how fast the effect goes, at most, to the place that live.txt in "
    "output_dir names (lines `NAME x y z`, m)"},
   {"live_angular_speed", SB_OPTION_REAL, 1, "degree/s", "90", "(0, inf)",
-   "-effect_<name>_angle live: how fast the effect turns, at most; other options that are live have their new value from the next step on"},
+   "-effect_<name>_angle live: how fast the effect turns, at most; other options that are live have their "
+   "new value from the next step on"},
   {"live_pace", SB_OPTION_REAL, 1, "", "1", "[0, inf)",
    "live: simulated seconds per second, at most; a run that is faster waits; 0: no limit"},
   {"wall_time", SB_OPTION_STRING, 1, "", "", "",
@@ -553,7 +554,8 @@ PetscErrorCode SbRunSetUp(SbRun run)
     if (run->preset != SB_TIME_ALPHA2) PetscCall(SbSpaceCreateVec(m->space, &run->A));
   }
   PetscCheck(m->dynamic || !SbLiveCount(), m->comm, PETSC_ERR_USER_INPUT,
-             "-effect_<name>_... live: what is set while a run goes on needs a time, and -time static has none: choose -time euler_implicit, newmark or genalpha");
+             "-effect_<name>_... live: what is set while a run goes on needs a time, and -time static has "
+             "none: choose -time euler_implicit, newmark or genalpha");
   if (!m->dynamic) m->load = run->t0; /* a static run begins without loads and prescribed displacements */
   PetscCall(SbModelInitialState(m, run->U, run->V));
   if (run->arc.on) {
