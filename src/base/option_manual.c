@@ -22,19 +22,19 @@ static PetscErrorCode help_row(PetscViewer viewer, const SbOptionBlock *block, c
 {
   char name[SB_OPTION_NAME_MAX], value[64], number[16] = "";
   static const char *const kinds[] = {
-    [SB_OPTION_BOOL] = "true or false", [SB_OPTION_INT] = "whole number",
+    [SB_OPTION_BOOL] = "true or false", [SB_OPTION_INT] = "integer",
     [SB_OPTION_REAL] = "number",        [SB_OPTION_REALS] = "number",
-    [SB_OPTION_STRING] = "text",        [SB_OPTION_NAMES] = "names with commas",
+    [SB_OPTION_STRING] = "text",        [SB_OPTION_NAMES] = "comma-separated names",
     [SB_OPTION_CHOICE] = "one of",      [SB_OPTION_FORMULA] = "formula"};
   const char *with;
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionManualName(block, row, sizeof(name), name));
   // what the value looks like: "3 numbers", "euler_implicit|newmark"
-  with = row->kind == SB_OPTION_REALS ? " with commas" : row->count > 1 ? " with semicolons" : "";
+  with = row->kind == SB_OPTION_REALS ? "comma-separated " : row->count > 1 ? "semicolon-separated " : "";
   if (row->count > 1) PetscCall(PetscSNPrintf(number, sizeof(number), "%" PetscInt_FMT " ", row->count));
-  PetscCall(PetscSNPrintf(value, sizeof(value), "%s%s%s%s", number, kinds[row->kind],
-                          row->count > 1 ? "s" : "", with));
+  PetscCall(PetscSNPrintf(value, sizeof(value), "%s%s%s%s", number, with, kinds[row->kind],
+                          row->count > 1 ? "s" : ""));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  %s: %s", name, value));
   if (row->range[0])
     PetscCall(PetscViewerASCIIPrintf(viewer, "%s %s", strchr("[(", row->range[0]) ? " in" : "", row->range));
@@ -168,21 +168,23 @@ static PetscErrorCode print_topics(PetscViewer viewer)
       if (!strstr(words, word)) PetscCall(PetscStrlcat(words, word + 1, sizeof(words)));
     }
   }
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  run:%s", words));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  of the run:%s", words));
   for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
     const SbOptionBlock *b = &SbTheOptions.block[i];
 
+    PetscInt types = 0;
+
     if (!b->klass[0] || !is_first(i, PETSC_FALSE)) continue;
-    PetscCall(PetscViewerASCIIPrintf(viewer, "\n  %s:", b->klass));
+    PetscCall(PetscViewerASCIIPrintf(viewer, "\n  %s", b->klass));
     for (PetscInt j = i; j < SbTheOptions.nblock; j++) {
       const SbOptionBlock *t = &SbTheOptions.block[j];
 
       if (!strcmp(t->klass, b->klass) && t->type[0] && is_first(j, PETSC_TRUE))
-        PetscCall(PetscViewerASCIIPrintf(viewer, " %s", t->type));
+        PetscCall(PetscViewerASCIIPrintf(viewer, "%s %s", types++ ? "" : ":", t->type));
     }
   }
   PetscCall(PetscViewerASCIIPrintf(viewer,
-                                   "\n  any other word: the options whose name or text holds it\n"
+                                   "\n  any other word: the options whose name or text contains it\n"
                                    "  all: everything; petsc: a run that lists PETSc's own options\n"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

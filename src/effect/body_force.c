@@ -13,11 +13,10 @@ typedef struct {
 } BodyForce;
 
 static const SbOption rows[] = {
-  {"on", SB_OPTION_NAMES, 1, "", "", "",
-   "sets whose tetrahedra carry the force; everything when none is named"},
+  {"on", SB_OPTION_NAMES, 1, "", "", "", "sets whose tets carry the force; default: all bodies"},
   {"density", SB_OPTION_FORMULA, 3, "N/m^3", NULL, "",
-   "force per rest volume, three formulas of t, x, y, z (rest position)"},
-  {"time", SB_OPTION_FORMULA, 1, "", "1", "", "factor on the force, a formula of the time t"},
+   "force per reference volume, three formulas of t and the reference position x, y, z"},
+  {"time", SB_OPTION_FORMULA, 1, "", "1", "", "amplitude: factor on the force, a formula of the time t"},
 };
 
 static PetscErrorCode options_body_force(SbEffect e, const SbScope *scope)

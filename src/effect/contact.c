@@ -11,63 +11,65 @@
 #include "contact.h"
 
 static const SbOption rows[] = {
-  {"on", SB_OPTION_NAMES, 1, "", "boundary", "", "sets whose surfaces may touch"},
+  {"on", SB_OPTION_NAMES, 1, "", "boundary", "", "sets whose surfaces may be in contact"},
   {"obstacle", SB_OPTION_STRING, 1, "", "", "",
-   "what they touch, a rigid obstacle (m): plane:nx,ny,nz,d (n.x <= d is solid), sphere:x,y,z,r, "
-   "box:x0,y0,z0,x1,y1,z1, capsule:x0,y0,z0,x1,y1,z1,r, cylinder:x0,y0,z0,x1,y1,z1,r, bowl:x,y,z,r (solid "
-   "outside the sphere), mesh:FILE (what a closed surface encloses: .stl, .obj, .off, .msh); without one "
-   "bodies meet each other"},
+   "rigid obstacle (m): plane:nx,ny,nz,d (half-space n.x <= d), sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1, "
+   "capsule:x0,y0,z0,x1,y1,z1,r, cylinder:x0,y0,z0,x1,y1,z1,r, bowl:x,y,z,r (everything outside the sphere), "
+   "mesh:FILE (inside of a closed surface: .stl, .obj, .off, .msh); without it: contact between bodies"},
   {"obstacle_scale", SB_OPTION_REAL, 1, "", "1", "(0, inf)",
    "mesh: factor on the coordinates of the file; 0.001 for a file in mm"},
-  {"obstacle_at", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "mesh: shift of the scaled mesh"},
+  {"obstacle_at", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "mesh: translation, after scaling"},
   {"displacement", SB_OPTION_FORMULA, 3, "m", "0;0;0", "",
-   "path of the obstacle, three formulas of the time t; live: as live.txt says while the run goes on"},
-  {"angle", SB_OPTION_FORMULA, 1, "degree", "0", "",
+   "path of the obstacle, three formulas of the time t; live: interactive, as the file live.txt says during "
+   "the run"},
+  {"angle", SB_OPTION_FORMULA, 1, "degrees", "0", "",
    "rotation of the obstacle about the axis, a formula of t"},
   {"axis", SB_OPTION_REALS, 3, "", "0,0,1", "", "direction of the axis of rotation; right-handed"},
   {"axis_point", SB_OPTION_REALS, 3, "m", "0,0,0", "", "a point on the axis; torques are about it"},
-  {"self", SB_OPTION_BOOL, 1, "", "no", "", "without an obstacle: bodies may meet themselves"},
-  {"friction", SB_OPTION_REAL, 1, "", "0", "[0, inf)", "Coulomb's coefficient for sticking"},
+  {"self", SB_OPTION_BOOL, 1, "", "false", "", "without an obstacle: self-contact as well"},
+  {"friction", SB_OPTION_REAL, 1, "", "0", "[0, inf)", "static coefficient of friction"},
   {"response", SB_OPTION_CHOICE, 1, "", "auto", "auto|projected|multiplier|augmented|penalty|barrier",
-   "auto: projected where only half-spaces and bowls are touched or options ask for it, else barrier; "
-   "between bodies always barrier; projected: exact constraints, the solve "
-   "in their null space; multiplier: with the forces as unknowns; augmented: multipliers raised on springs; "
-   "penalty: springs; barrier: an "
-   "energy that never lets surfaces touch"},
+   "how contact is enforced. auto: barrier between bodies; with an obstacle projected where it is a "
+   "half-space or bowl, or where an option is set that only projected has, else barrier. projected: active "
+   "set, constraints eliminated by solving in their null space; multiplier: Lagrange multipliers; augmented: "
+   "augmented Lagrangian, penalty with multipliers updated by Uzawa's method; penalty: springs; barrier: a "
+   "potential that grows without bound as the gap closes (incremental potential contact), so that surfaces "
+   "never pass through each other"},
   {"barrier_width", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
-   "response barrier: gap below which surfaces push each other; 0: a thousandth of the diagonal of the "
-   "smallest body, at most 0.003 of the "
-   "edge of a cube of its volume and half of its shortest edge"},
+   "response barrier: activation distance, the gap below which surfaces repel each other; 0: a thousandth of "
+   "the diagonal of the smallest body, at most 0.003 times the cube root of its volume and half of its "
+   "shortest edge"},
   {"barrier_pressure", SB_OPTION_REAL, 1, "Pa", "0", "[0, inf)",
-   "response barrier: scale of the pressure; 0: a tenth of Young's modulus of the softer side"},
-  {"verify", SB_OPTION_BOOL, 1, "", "no", "",
-   "response barrier: after each step, edges that go through triangles are searched for, and end the run"},
+   "response barrier: stiffness of the barrier as a pressure; 0: a tenth of Young's modulus of the softer "
+   "body"},
+  {"verify", SB_OPTION_BOOL, 1, "", "false", "",
+   "response barrier: after each step, search for edges that intersect triangles; an intersection ends the "
+   "run"},
   {"friction_solves", SB_OPTION_INT, 1, "", "0", "[0, inf)",
-   "response barrier: solves of a step, at most, each with the normal forces and directions that friction "
-   "had at the end of the one before; 0: one, two where friction changes by more than half, in static runs "
-   "100"},
+   "response barrier: largest number of lagged-friction iterations of a step, each with the normal forces "
+   "and slip directions at the end of the one before; 0: one, two where friction changes by more than half, "
+   "in static runs 100"},
   {"friction_tolerance", SB_OPTION_REAL, 1, "", "1e-3", "(0, inf)",
-   "response barrier: with more solves than one, change of friction in the last one, as part of Coulomb's "
-   "limit"},
+   "response barrier: tolerance of lagged friction, its change in an iteration relative to Coulomb's limit"},
   {"friction_kinetic", SB_OPTION_REAL, 1, "", "-1", "[-1, inf)",
-   "Coulomb's coefficient for slipping; negative: that for sticking; not with barrier"},
+   "kinetic coefficient of friction; negative: equal to the static one; not with barrier"},
   {"stiffness", SB_OPTION_REAL, 1, "", "20", "(0, inf)",
-   "springs of penalty, augmented and friction: factor on (lambda + 2 mu) area / height of the cell behind"},
+   "penalty, augmented and friction: factor on the stiffness (lambda + 2 mu) area / height of the tet behind "
+   "the surface"},
   {"damping", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
-   "response penalty: a damper beside each spring, its constant being stiffness times this time; it acts on "
-   "what is behind and never pulls"},
+   "response penalty: dashpot in parallel with each spring, of stiffness times this time; acts on "
+   "penetrating points, without tension"},
   {"restitution", SB_OPTION_REAL, 1, "", "0", "[0, 1]",
-   "part of their relative speed with which surfaces leave what they hit; needs -time euler_implicit, and "
-   "bodies that are stiff within a step to bounce as a whole; projected, multiplier and barrier"},
+   "coefficient of restitution, the ratio of normal relative velocities after and before impact; needs -time "
+   "euler_implicit, and steps in which elastic waves cross the body; projected, multiplier and barrier"},
   {"time_of_impact", SB_OPTION_CHOICE, 1, "", "no", "no|yes",
-   "a step in which points begin to touch is taken as it is, or repeated up to the moment of the first "
-   "touch; not with barrier"},
+   "yes: a step in which contact begins is cut at the first time of impact; not with barrier"},
   {"separation_steps", SB_OPTION_REAL, 1, "steps", "30", "[1, inf)",
-   "what overlaps before it meets is parted slowly: to 1/e of the depth in so many steps; 1, and in static "
-   "runs: at once"},
-  {"pairs", SB_OPTION_BOOL, 1, "", "no", "",
-   "between bodies: columns in history.csv for each pair of bodies: force on the second by the first, "
-   "contacts"},
+   "penetration that is there at the start is resolved gradually: number of steps in which its depth falls "
+   "to 1/e; 1, and in static runs: at once"},
+  {"pairs", SB_OPTION_BOOL, 1, "", "false", "",
+   "between bodies: columns in history.csv for each pair of bodies: force of the first on the second, number "
+   "of contacts"},
 };
 
 static const char *const names_of_responses[] = {"auto",      "projected", "multiplier",

@@ -14,9 +14,9 @@ typedef struct {
 } Damping;
 
 static const SbOption rows[] = {
-  {"on", SB_OPTION_NAMES, 1, "", "", "", "bodies that are damped; all when none is named"},
-  {"alpha", SB_OPTION_REAL, 1, "1/s", "0", "[0, inf)", "factor on the mass matrix in the damping matrix"},
-  {"beta", SB_OPTION_REAL, 1, "s", "0", "[0, inf)", "factor on the stiffness matrix in the damping matrix"},
+  {"on", SB_OPTION_NAMES, 1, "", "", "", "bodies that are damped; default: all"},
+  {"alpha", SB_OPTION_REAL, 1, "1/s", "0", "[0, inf)", "Rayleigh damping: factor on the mass matrix"},
+  {"beta", SB_OPTION_REAL, 1, "s", "0", "[0, inf)", "Rayleigh damping: factor on the stiffness matrix"},
 };
 
 static PetscErrorCode options_damping(SbEffect e, const SbScope *scope)

@@ -10,11 +10,11 @@
 PetscFunctionList SbEffectList = NULL;
 
 static const SbOption common_rows[] = {
-  {"type", SB_OPTION_STRING, 1, "", "", "", "what the effect is; by default its own name says so"},
+  {"type", SB_OPTION_STRING, 1, "", "", "", "type of the effect; default: its name"},
   {"from", SB_OPTION_REAL, 1, "s", "", "(-inf, inf)",
-   "time from which the effect acts, for loads and supports (in a static run: the load factor)"},
+   "time from which a load, support or prescribed displacement acts (static: load factor)"},
   {"until", SB_OPTION_REAL, 1, "s", "", "(-inf, inf)",
-   "time until which the effect acts; a support lets go at the end of the step that gets there"},
+   "time until which the effect acts; a support is released at the end of the step that reaches it"},
 };
 
 static PetscErrorCode forget_types(void)

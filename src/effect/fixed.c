@@ -20,8 +20,8 @@ typedef struct {
 
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", NULL, "",
-   "sets whose nodes are constrained: vertices, with cr and dg the means over triangles"},
-  {"components", SB_OPTION_CHOICE, 1, "", "xyz", SB_COMPONENT_CHOICES, "directions that are constrained"},
+   "sets whose nodes are fixed: vertices, p2 also edge midpoints, cr and dg the means over boundary faces"},
+  {"components", SB_OPTION_CHOICE, 1, "", "xyz", SB_COMPONENT_CHOICES, "directions that are fixed"},
 };
 
 static PetscErrorCode options_fixed(SbEffect e, const SbScope *scope)

@@ -13,7 +13,8 @@ typedef struct {
 
 static const SbOption rows[] = {
   {"vector", SB_OPTION_REALS, 3, "m/s^2", "0,0,-9.81", "", "acceleration"},
-  {"time", SB_OPTION_FORMULA, 1, "", "1", "", "factor on the acceleration, a formula of the time t"},
+  {"time", SB_OPTION_FORMULA, 1, "", "1", "",
+   "amplitude: factor on the acceleration, a formula of the time t"},
 };
 
 static PetscErrorCode options_gravity(SbEffect e, const SbScope *scope)

@@ -22,7 +22,7 @@ typedef struct {
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose vertices share the force equally"},
   {"vector", SB_OPTION_FORMULA, 3, "N", NULL, "", "total force, three formulas of the time t"},
-  {"time", SB_OPTION_FORMULA, 1, "", "1", "", "factor on the force, a formula of the time t"},
+  {"time", SB_OPTION_FORMULA, 1, "", "1", "", "amplitude: factor on the force, a formula of the time t"},
 };
 
 static PetscErrorCode options_point_force(SbEffect e, const SbScope *scope)

@@ -22,11 +22,12 @@ typedef struct {
 
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", NULL, "",
-   "sets whose nodes are moved: vertices, with cr and dg the means over triangles"},
+   "sets whose nodes are moved: vertices, p2 also edge midpoints, cr and dg the means over boundary faces"},
   {"components", SB_OPTION_CHOICE, 1, "", "xyz", SB_COMPONENT_CHOICES, "directions that are prescribed"},
   {"displacement", SB_OPTION_FORMULA, 3, "m", "0;0;0", "",
-   "translation, three formulas of t, x, y, z (rest position); live: as live.txt says while the run goes on"},
-  {"angle", SB_OPTION_FORMULA, 1, "degree", "0", "",
+   "translation, three formulas of t and the reference position x, y, z; live: interactive, as the file "
+   "live.txt says during the run"},
+  {"angle", SB_OPTION_FORMULA, 1, "degrees", "0", "",
    "angle of rotation about the axis, a formula of the time t"},
   {"axis", SB_OPTION_REALS, 3, "", "0,0,1", "", "direction of the axis of rotation; right-handed"},
   {"axis_point", SB_OPTION_REALS, 3, "m", "0,0,0", "", "a point on the axis of rotation"},

@@ -50,8 +50,9 @@ static const SbOption rows[] = {
   {"value", SB_OPTION_FORMULA, 1, "Pa", NULL, "",
    "pressure, a formula of the time t; positive pushes inwards"},
   {"follower", SB_OPTION_BOOL, 1, "", "true", "",
-   "act on the current area and normal; if not, on those at rest"},
-  {"time", SB_OPTION_FORMULA, 1, "", "1", "", "factor on the pressure, a formula of the time t"},
+   "follower load, on the current area and normal; if not, a dead load on those of the reference "
+   "configuration"},
+  {"time", SB_OPTION_FORMULA, 1, "", "1", "", "amplitude: factor on the pressure, a formula of the time t"},
 };
 
 static PetscErrorCode options_pressure(SbEffect e, const SbScope *scope)

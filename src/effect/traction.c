@@ -20,10 +20,10 @@ typedef struct {
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose boundary facets carry the traction"},
   {"vector", SB_OPTION_FORMULA, 3, "Pa", "0;0;0", "",
-   "force per rest area, three formulas of t, x, y, z (rest position)"},
+   "force per reference area, three formulas of t and the reference position x, y, z"},
   {"total", SB_OPTION_REALS, 3, "N", "0,0,0", "",
-   "total force, spread evenly over the rest area of the sets"},
-  {"time", SB_OPTION_FORMULA, 1, "", "1", "", "factor on the traction, a formula of the time t"},
+   "total force, spread evenly over the reference area of the sets"},
+  {"time", SB_OPTION_FORMULA, 1, "", "1", "", "amplitude: factor on the traction, a formula of the time t"},
 };
 
 static PetscErrorCode options_traction(SbEffect e, const SbScope *scope)

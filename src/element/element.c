@@ -8,14 +8,15 @@ PetscFunctionList SbElementList = NULL;
 
 static const SbOption cr_rows[] = {
   {"gamma1", SB_OPTION_REAL, 1, "", "0.6", "(0, inf)",
-   "factor on the penalty of jumps across faces; less is softer, much more locks"},
+   "penalty factor on the full jump across faces; smaller values are softer, much larger ones lock"},
 };
 static const SbOption dg_rows[] = {
-  {"gamma0", SB_OPTION_REAL, 1, "", "4", "(0, inf)", "factor on the penalty of the mean jump across a face"},
+  {"gamma0", SB_OPTION_REAL, 1, "", "4", "(0, inf)", "penalty factor on the mean of the jump over a face"},
   {"gamma1", SB_OPTION_REAL, 1, "", "0.6", "(0, inf)",
-   "factor on the penalty of jumps across faces; less is softer, much more locks"},
+   "penalty factor on the full jump across faces; smaller values are softer, much larger ones lock"},
   {"dirichlet", SB_OPTION_CHOICE, 1, "", "weak", "weak|strong",
-   "boundary faces fixed in all directions: by a penalty, or the mean displacement itself"},
+   "boundary faces that are fixed in all directions: weak, by a penalty, or strong, by their mean "
+   "displacement"},
 };
 
 static PetscErrorCode destroy_list(void)
@@ -27,7 +28,7 @@ static PetscErrorCode destroy_list(void)
 
 static const SbOption p2_rows[] = {
   {"volume", SB_OPTION_CHOICE, 1, "", "mean", "mean|pointwise",
-   "energy of a change of volume: of its mean over a tet, or at each point like the rest, which locks when "
+   "volumetric energy: of the mean dilatation of a tet (P2/P0), or fully integrated, which locks when "
    "poisson is near 0.5"},
 };
 

@@ -15,23 +15,23 @@
 
 static const SbOption rows[] = {
   {"ledger", SB_OPTION_BOOL, 1, "", "false", "",
-   "estimate the errors of the result by source, and print them beside the seconds spent on each"},
+   "estimate the error of the result by its sources (mesh, time step, iterations, contact), and print a "
+   "table of them with the seconds spent on each, the error ledger"},
   {"ledger_every", SB_OPTION_INT, 1, "", "0", "[0, inf)",
-   "steps between estimates of the error of the mesh, for the columns of history.csv; 0: at the end alone"},
+   "steps between estimates of the spatial discretisation error in history.csv; 0: at the end only"},
   {"ledger_quantity", SB_OPTION_CHOICE, 1, "", "none", "none|displacement|reaction|volume",
-   "number whose error is estimated, too: of the node nearest to ledger_at, of the prescribed nodes of "
-   "ledger_on, of all "
-   "bodies"},
+   "quantity of interest whose error is estimated as well: displacement of the node nearest to ledger_at, "
+   "reaction on the prescribed nodes of ledger_on, or volume of all bodies"},
   {"ledger_at", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)",
-   "rest position of ledger_quantity displacement"},
+   "ledger_quantity displacement: its position in the reference configuration"},
   {"ledger_direction", SB_OPTION_REALS, 3, "", "0,0,1", "(-inf, inf)",
-   "direction of ledger_quantity displacement and reaction; its length does not matter"},
-  {"ledger_on", SB_OPTION_STRING, 1, "", "", "", "set whose prescribed nodes make ledger_quantity reaction"},
+   "ledger_quantity displacement and reaction: direction; its length does not matter"},
+  {"ledger_on", SB_OPTION_STRING, 1, "", "", "", "ledger_quantity reaction: set of its prescribed nodes"},
   {"accuracy", SB_OPTION_REAL, 1, "", "0", "[0, 1)",
-   "relative error in the norm of the energy that the run aims at: sets steps, tolerances and the width of "
-   "response barrier; 0: they are yours"},
+   "target relative error in the energy norm: chooses time steps, tolerances and the width of response "
+   "barrier; 0: as given by their options"},
   {"step_time_budget", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
-   "wall time that a step may take: tolerances are as tight as it allows; 0: no limit"},
+   "wall time that a step may take: tolerances are chosen as tight as it allows; 0: no limit"},
 };
 
 PetscErrorCode SbLedgerRegister(void)

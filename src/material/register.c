@@ -7,16 +7,17 @@ static const SbOption body_rows[] = {
   {"young", SB_OPTION_REAL, 1, "Pa", NULL, "(0, inf)", "Young's modulus"},
   {"poisson", SB_OPTION_REAL, 1, "", NULL, "(-1, 0.5)",
    "Poisson's ratio; soft tissue is near 0.5, where p1 elements lock"},
-  {"density", SB_OPTION_REAL, 1, "kg/m^3", "1000", "(0, inf)", "mass per rest volume"},
+  {"density", SB_OPTION_REAL, 1, "kg/m^3", "1000", "(0, inf)",
+   "mass per volume in the reference configuration"},
 };
 static const SbOption corotated_rows[] = {
   {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|warped|exact|exact_spd",
-   "stiffness: Hooke's turned with the cell (positive definite), the exact derivative, or that without "
-   "negative eigenvalues"},
+   "tangent stiffness: warped, Hooke's tensor rotated with the cell (stiffness warping, positive definite); "
+   "exact; exact_spd, exact with each cell projected to positive semi-definite"},
 };
 static const SbOption exact_rows[] = {
   {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|exact|exact_spd",
-   "stiffness: the exact derivative of the force, or that without negative eigenvalues (for CG)"},
+   "tangent stiffness: exact; exact_spd, exact with each cell projected to positive semi-definite, for CG"},
 };
 
 PetscErrorCode SbMaterialRegisterAll(void)

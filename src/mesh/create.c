@@ -5,11 +5,12 @@
 
 static const SbOption rows[] = {
   {"mesh_partitioner", SB_OPTION_CHOICE, 1, "", "auto", "auto|metis|bisection",
-   "how the mesh is cut into one part per rank: METIS (short borders, on rank 0), bisection (in parallel), "
-   "auto: METIS up to 50,000 tets"},
+   "how the mesh is partitioned: METIS (small interfaces between ranks; computed on rank 0), recursive "
+   "bisection (in parallel), auto: METIS up to 50,000 tets"},
   {"mesh_reading", SB_OPTION_CHOICE, 1, "", "auto", "auto|rank0|slabs",
-   "who reads an .h5 mesh of supple-mesh on several ranks: rank 0 all of it, or every rank a slab, so that "
-   "its memory falls with the ranks; auto: slabs from 50,000 tets on. Other meshes are read by rank 0"},
+   "how several ranks read an .h5 mesh of supple-mesh: rank0, rank 0 reads it whole; slabs, every rank reads "
+   "a contiguous part of the arrays, so that memory per rank falls with the number of ranks; auto: slabs "
+   "from 50,000 tets on. Other meshes are read by rank 0"},
   {"mesh_report", SB_OPTION_BOOL, 1, "", "false", "",
    "print one line per body with the size, shape and groups of its mesh"},
 };

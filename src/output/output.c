@@ -10,7 +10,8 @@ static const SbOption rows[] = {
   {"output_dir", SB_OPTION_STRING, 1, "", "", "",
    "folder of the results; empty: out/<name of the scenario file>"},
   {"output_overwrite", SB_OPTION_BOOL, 1, "", "false", "",
-   "results of an earlier run in the folder are replaced; else they are moved into its folder before_DATE"},
+   "replace the results of an earlier run in the folder; if not, they are moved into its subfolder "
+   "before_DATE"},
   {"output_fields", SB_OPTION_NAMES, 1, "", "position,displacement,velocity,von_mises", "",
    "fields in fields.h5: position, displacement, velocity, acceleration, reaction, contact_force, "
    "contact_gap, stress, "
@@ -22,27 +23,28 @@ static const SbOption rows[] = {
    "steps between frames of fields.h5, while output_every is 0"},
   {"output_precision", SB_OPTION_CHOICE, 1, "", "float", "float|double", "numbers in fields.h5"},
   {"output_discontinuous", SB_OPTION_BOOL, 1, "", "false", "",
-   "each tet in fields.h5 has four points of its own: cr and dg as they are, else averaged around vertices"},
+   "each tet in fields.h5 has its own four points, so that cr and dg are discontinuous as computed; if not, "
+   "values are averaged at the vertices"},
   {"output_quadratic", SB_OPTION_BOOL, 1, "", "false", "",
-   "bodies of p2: fields.h5 has all their nodes, and viewers show quadratic tets; else the vertices"},
+   "bodies of p2: fields.h5 has all their nodes, and viewers show quadratic tets; if not, the vertices only"},
   {"output_contacts", SB_OPTION_BOOL, 1, "", "false", "",
-   "contacts.xmf: the points where contact pushes in each frame, with normals, gaps and forces"},
+   "contacts.xmf: the active contact points of each frame, with normals, gaps and forces"},
   {"output_history", SB_OPTION_BOOL, 1, "", "true", "", "write history.csv"},
   {"output_history_bodies", SB_OPTION_BOOL, 1, "", "false", "",
-   "history.csv has energies, momentum and centre of mass of each body, too"},
+   "history.csv also has energies, momentum and centre of mass of each body"},
   {"output_history_every", SB_OPTION_INT, 1, "", "1", "[1, inf)", "steps between rows of history.csv"},
   {"checkpoint_every_time", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
-   "simulated time between checkpoints; 0: none by time"},
+   "simulated time between checkpoints; 0: not by time"},
   {"checkpoint_every_steps", SB_OPTION_INT, 1, "", "0", "[0, inf)",
-   "steps between checkpoints; 0: none by steps"},
+   "steps between checkpoints; 0: not by steps"},
   {"checkpoint_keep", SB_OPTION_INT, 1, "", "2", "[1, inf)", "checkpoints kept, the newest ones"},
   {"restart", SB_OPTION_STRING, 1, "", "", "",
-   "checkpoint to go on from, or latest: the newest one in output_dir, or auto: that one if there is any; "
-   "empty: start from "
-   "the beginning"},
+   "checkpoint to resume from, or latest: the newest one in output_dir, or auto: that one if there is any; "
+   "empty: start from the beginning"},
   {"probes", SB_OPTION_NAMES, 1, "", "", "",
-   "names of points, surfaces and volumes whose displacement or other fields history.csv follows"},
-  {"progress", SB_OPTION_BOOL, 1, "", "true", "", "print a line on the progress of the run"},
+   "names of probes: points, surfaces and volumes whose displacement or other fields are columns of "
+   "history.csv"},
+  {"progress", SB_OPTION_BOOL, 1, "", "true", "", "print a progress line"},
   {"quiet", SB_OPTION_BOOL, 1, "", "false", "", "print errors and warnings only"},
 };
 

@@ -18,16 +18,17 @@
 
 static const SbOption rows[] = {
   {"at", SB_OPTION_REALS, 3, "m", NULL, "(-inf, inf)",
-   "position of the probe in the rest state, as placed; the nearest vertex is taken"},
+   "position of the probe in the reference configuration (after scale, rotate, translate); the nearest "
+   "vertex is taken"},
   {"on", SB_OPTION_STRING, 1, "", "", "",
    "instead of a position: mean over the boundary facets of this set (of -sets, a physical group, a body, "
-   "boundary), by area at rest"},
+   "boundary), weighted by reference area"},
   {"in", SB_OPTION_STRING, 1, "", "", "",
-   "instead of a position: mean over the tetrahedra of this set, by volume at rest"},
+   "instead of a position: mean over the tets of this set, weighted by reference volume"},
   {"fields", SB_OPTION_NAMES, 1, "", "displacement", "",
-   "what history.csv follows there: displacement, position, velocity, acceleration, stress, von_mises, "
-   "pressure, mean_pressure, J, "
-   "energy_density; of a tet's quantities the mean over the tets around the vertex, or behind the facets"},
+   "columns of history.csv: displacement, position, velocity, acceleration, stress, von_mises, pressure, "
+   "mean_pressure, J, energy_density; quantities of tets are averaged over the tets around the vertex, or "
+   "behind the facets"},
 };
 
 PetscErrorCode SbProbesRegister(void)

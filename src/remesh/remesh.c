@@ -42,20 +42,21 @@ struct _p_SbRemesh {
 
 static const SbOption rows[] = {
   {"remesh_quality", SB_OPTION_REAL, 1, "", "0", "[0, 1)",
-   "a body is re-meshed when the shape 3 r/R of a tet falls below this (1: regular, 0: flat, negative: "
-   "inside out); 0: never for that"},
+   "a body is re-meshed when the radius ratio 3 r/R (inscribed and circumscribed sphere) of a tet falls "
+   "below this (1: regular, 0: flat, negative: inverted); 0: not for that reason"},
   {"remesh_times", SB_OPTION_NAMES, 1, "s", "", "",
-   "times at which bodies are re-meshed, with commas between them"},
+   "times at which bodies are re-meshed, separated by commas"},
   {"remesh_failed", SB_OPTION_BOOL, 1, "", "false", "",
-   "when a step fails for good: the body with the worst tet is re-meshed and the step tried again"},
+   "when a step fails and halving does not help: re-mesh the body with the worst tet and repeat the step"},
   {"remesh_bodies", SB_OPTION_NAMES, 1, "", "", "", "bodies that may be re-meshed; empty: all"},
   {"remesh_from", SB_OPTION_CHOICE, 1, "", "deformed", "deformed|rest",
-   "the shape that is filled with new tets: the one that the body has then, or the one at rest"},
+   "configuration that is filled with new tets: the current one, or the reference configuration"},
   {"remesh_size", SB_OPTION_REAL, 1, "", "1", "[0.1, 10]",
-   "edges of new tets inside, in mean edges of the body's surface, which stays"},
+   "edge length of new tets inside a body, relative to the mean edge of its surface, whose triangles are "
+   "kept"},
 };
 static const SbOption body_rows[] = {
-  {"remesh_quality", SB_OPTION_REAL, 1, "", "", "[0, 1)", "of this body, instead of -remesh_quality"},
+  {"remesh_quality", SB_OPTION_REAL, 1, "", "", "[0, 1)", "value for this body in place of -remesh_quality"},
 };
 
 PetscErrorCode SbRemeshRegister(void)

@@ -11,20 +11,19 @@
 
 static const SbOption rows[] = {
   {"error_trace", SB_OPTION_BOOL, 1, "", "false", "",
-   "print the stack of calls with every error, also with errors of the input"},
+   "print the stack of calls with every error, also of the input"},
   {"help", SB_OPTION_BOOL, 1, "", "false", "",
-   "how to run it and the topics, or the options of a topic, and nothing else; -help all: every option; "
-   "-help petsc runs and lists PETSc's own"},
-  {"version", SB_OPTION_BOOL, 1, "", "false", "", "the versions of supple and of PETSc, and nothing else"},
+   "print usage and topics, or the options of a topic, and end; -help all: every option; -help petsc runs "
+   "and lists PETSc's own"},
+  {"version", SB_OPTION_BOOL, 1, "", "false", "", "print the versions of supple and of PETSc, and end"},
   {"options_file", SB_OPTION_STRING, 1, "", "", "",
    "the scenario, .opts or .yml; its name can also be the first word of the command line"},
   {"scenario_view", SB_OPTION_STRING, 1, "", "", "",
-   "checks the scenario, writes it with every default filled in to this file (standard output without one), "
-   "and ends"},
+   "check the scenario, write it with every default filled in to this file (without one: standard output), "
+   "and end"},
   {"options_table", SB_OPTION_STRING, 1, "", "", "",
-   "writes this list for programs to a file (standard output without one), one option per line with tabs "
-   "between "
-   "its columns, and nothing else"},
+   "write the table of options as tab-separated text, one option per line, to this file (without one: "
+   "standard output), and end"},
 };
 
 PetscErrorCode SbCommandRegister(void)

@@ -7,13 +7,13 @@
 #define LAWS "linear|corotated|stvk|neohookean"
 
 static const SbOption run_rows[] = {
-  {"bodies", SB_OPTION_NAMES, 1, "", NULL, "", "names of the bodies, with commas between them"},
+  {"bodies", SB_OPTION_NAMES, 1, "", NULL, "", "names of the bodies, separated by commas"},
   {"sets", SB_OPTION_NAMES, 1, "", "", "",
-   "names of sets given by a shape; physical groups of the meshes, bodies, `all` and `boundary` need no set"},
-  {"effects", SB_OPTION_NAMES, 1, "", "", "",
-   "names of the effects: what acts on the bodies beyond elasticity and inertia"},
+   "names of sets that are defined by a shape; physical groups of the meshes, bodies, `all` and `boundary` "
+   "need no set"},
+  {"effects", SB_OPTION_NAMES, 1, "", "", "", "names of the effects: loads, supports, damping and contact"},
   {"validate", SB_OPTION_BOOL, 1, "", "false", "",
-   "checks the invariants of mesh and space after they are set up"},
+   "check the invariants of the mesh and of the finite-element space after set-up"},
 };
 static const SbOption body_rows[] = {
   {"mesh", SB_OPTION_STRING, 1, "", NULL, "",
@@ -21,36 +21,33 @@ static const SbOption body_rows[] = {
    "docs/reference/meshes.md), a closed surface to fill (.stl .obj .off .ply .poly .smesh), or "
    "box:lx,ly,lz:n, or box:lx,ly,lz:nx,ny,nz (m, cells)"},
   {"mesh_step", SB_OPTION_INT, 1, "", "0", "[-1, inf)",
-   "when the mesh is a run's output (fields.h5): the step whose positions are taken; 0: at rest, -1: the "
-   "last"},
+   "when the mesh is the output of a run (fields.h5): number of the frame whose positions are taken; 0: "
+   "reference configuration, -1: the last"},
   {"scale", SB_OPTION_REAL, 1, "", "1", "(0, inf)",
    "factor on the coordinates of the mesh, before rotation; 0.001 for a file in mm"},
   {"rotate", SB_OPTION_REALS, 4, "", "0,0,1,0", "(-inf, inf)",
    "axis x,y,z and angle in degrees, before translation"},
-  {"translate", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "shift of the scaled and rotated mesh"},
+  {"translate", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "translation, after scaling and rotation"},
   {"copies", SB_OPTION_STRING, 1, "", "", "",
-   "bodies NAME1, NAME2, ... instead of this one, which share its options: a file with a line x y z [ax ay "
-   "az degrees [scale "
-   "[vx vy vz]]] for each, or grid:nx,ny,nz,dx,dy,dz (m); scale and rotation come first, and shifts and "
-   "velocities add up; "
-   "empty: one body"},
+   "instances NAME1, NAME2, ... of this body, which share its options: a file with a line x y z [ax ay az "
+   "degrees [scale [vx vy vz]]] for each, or grid:nx,ny,nz,dx,dy,dz (m); scales multiply, rotations "
+   "compose, translations and velocities add up; empty: one body"},
   {"element", SB_OPTION_STRING, 1, "", "p1", "p1|p2|cr|dg",
    "finite element; p2, cr and dg do not lock when poisson is near 0.5, p2 is the most accurate where the "
    "solution is smooth"},
   {"material", SB_OPTION_STRING, 1, "", "", LAWS, "material law, required"},
   {"inclusions", SB_OPTION_NAMES, 1, "", "", "",
-   "sets or volume groups whose tetrahedra have a material of their own, -inclusion_<name>_..."},
+   "sets or volume groups whose tets have another material, -inclusion_<name>_..."},
   {"displacement", SB_OPTION_FORMULA, 3, "m", "0,0,0", "",
-   "displacement at the start: numbers or formulas of the place x, y, z at rest"},
+   "initial displacement: numbers or formulas of the reference position x, y, z"},
   {"state", SB_OPTION_STRING, 1, "", "", "",
-   "RUN or RUN,STEP: displacement and velocity at the start are those of this body in the results of another "
-   "run (its folder or fields.h5; the last step "
-   "without one), which may have another mesh, element, material, integrator and other effects; or of a "
-   "checkpoint of a run with the same bodies, meshes and elements"},
+   "RUN or RUN,STEP: initial displacement and velocity are those of this body in the results of another run "
+   "(its folder or fields.h5; without STEP the last frame), which may have another mesh, element, material, "
+   "integrator and other effects; or of a checkpoint of a run with the same bodies, meshes and elements"},
   {"velocity", SB_OPTION_FORMULA, 3, "m/s", "0,0,0", "",
-   "velocity at the start: numbers or formulas of the place x, y, z at rest"},
+   "initial velocity: numbers or formulas of the reference position x, y, z"},
   {"angular_velocity", SB_OPTION_REALS, 3, "rad/s", "0,0,0", "(-inf, inf)",
-   "angular velocity about the centre of mass at the start"},
+   "initial angular velocity about the centre of mass"},
 };
 static const SbOption inclusion_rows[] = {
   {"material", SB_OPTION_STRING, 1, "", "", LAWS, "material law, required"},

@@ -9,8 +9,9 @@
 
 static const SbOption set_rows[] = {
   {"at", SB_OPTION_STRING, 1, "", NULL, "",
-   "where the set is in the placed rest frame (m): box:x0,y0,z0,x1,y1,z1, plane:nx,ny,nz,d[,tolerance], "
-   "sphere:x,y,z,r, halfspace:nx,ny,nz,d, or group:name, body:name, boundary"},
+   "shape of the set in the reference configuration, after scale, rotate, translate (m): "
+   "box:x0,y0,z0,x1,y1,z1, plane:nx,ny,nz,d[,tolerance] (n.x = d), sphere:x,y,z,r, halfspace:nx,ny,nz,d (n.x "
+   "<= d), or group:name, body:name, boundary"},
 };
 
 PetscErrorCode SbSetsRegister(void)

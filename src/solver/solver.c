@@ -106,11 +106,17 @@ static const SbOption rows[] = {
    "auto|direct|cg|cg_jacobi|cg_pbjacobi|cg_icc|cg_ssor|cg_two_level|cg_p_multigrid|cg_gamg|cg_hypre|gauss_"
    "seidel|sor|"
    "cholmod|umfpack|mumps|rotated|realtime|pressure",
-   "linear solver; auto chooses by size, ranks and material and says why, direct takes the fastest "
-   "factorisation that this PETSc has for the problem. PETSc's -ksp_ and -pc_ options refine it"},
+   "linear solver. auto: chosen by size, ranks and material, and reported; direct: the fastest factorisation "
+   "that this PETSc has; cg_...: conjugate gradients, preconditioned by Jacobi, point-block Jacobi, "
+   "incomplete Cholesky, SSOR, two levels with rigid-body modes as coarse space, p-multigrid (p2), GAMG or "
+   "BoomerAMG; gauss_seidel, sor: stationary iterations by blocks, or PETSc's; cholmod, umfpack, mumps: "
+   "factorisations; rotated: CG with a Cholesky factor in low precision, computed once and rotated with the "
+   "nodes from then on; realtime: the same without a matrix and warm-started, for linear and corotated; "
+   "pressure: GMRES with the pressures of cells as unknowns, for CR and DG near incompressibility. PETSc's "
+   "-ksp_ and -pc_ options refine it"},
   {"reproducible", SB_OPTION_BOOL, 1, "", "false", "",
-   "every run on the same number of ranks has the same bits: several ranks factor on one of them, and never "
-   "by MUMPS or SuperLU_DIST, which add in the order in which messages come"},
+   "bitwise identical results of every run on the same number of ranks: matrices are factored on one rank, "
+   "and never by MUMPS or SuperLU_DIST, whose order of summation depends on the arrival of messages"},
 };
 
 PetscErrorCode SbSolverRegister(void)

@@ -13,18 +13,17 @@ static const SbOption rows[] = {
   {"tet_size", SB_OPTION_REAL, 1, "m", "", "(0, inf)",
    "edge length of the tets made from a surface; default: the mean edge of its triangles"},
   {"tet_surface", SB_OPTION_CHOICE, 1, "", "auto", "auto|keep|remesh",
-   "whether the triangles of the surface stay: auto keeps them when their mean edge is within a factor of "
-   "1.5 of tet_size"},
+   "keep the triangles of the surface, or remesh it: auto keeps them when their mean edge is within a factor "
+   "of 1.5 of tet_size"},
   {"tet_feature_angle", SB_OPTION_REAL, 1, "degrees", "40", "(0, 180)",
-   "edges where the surface turns by more are kept when it is remeshed"},
+   "feature angle: edges where the normals of the surface differ by more are kept when it is remeshed"},
   {"tetrahedralizer", SB_OPTION_CHOICE, 1, "", "auto", "auto|gmsh|tetgen",
-   "who makes tets from a surface: auto tries gmsh, then tetgen"},
-  {"tet_seconds", SB_OPTION_REAL, 1, "s", "600", "(0, inf)",
-   "time that gmsh, and then tetgen, may take to make tets from a surface"},
+   "program that fills a surface with tets: auto tries gmsh, then tetgen"},
+  {"tet_seconds", SB_OPTION_REAL, 1, "s", "600", "(0, inf)", "time limit of gmsh, and then of tetgen"},
   {"merge_tolerance", SB_OPTION_REAL, 1, "m", "", "[0, inf)",
-   "vertices of a surface no farther apart than this are one; default: 1e-7 of the diagonal of its box"},
+   "vertices of a surface closer than this are merged; default: 1e-7 of the diagonal of its bounding box"},
   {"untangle", SB_OPTION_REAL, 1, "m", "", "[0, inf)",
-   "how far vertices may be moved to smooth out small folds where a surface cuts itself; default: half its "
+   "largest displacement of vertices that removes small self-intersections of a surface; default: half its "
    "mean edge"},
 };
 

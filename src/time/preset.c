@@ -26,57 +26,55 @@ static const SbOption rows[] = {
    "stable step unless given"},
   {"ts_max_time", SB_OPTION_REAL, 1, "s", "1", "(0, inf)", "end of the simulated time"},
   {"time_spectral_radius", SB_OPTION_REAL, 1, "", "0.5", "[0, 1]",
-   "genalpha: amplitude that is left of the highest frequencies per step; 1 keeps all, 0 removes them at "
-   "once"},
+   "genalpha: spectral radius at infinite frequency, the amplitude of the highest frequencies that is left "
+   "after a step; 1: no damping, 0: they vanish in one step"},
   {"time_newmark_beta", SB_OPTION_REAL, 1, "", "0.25", "(0, 0.5]", "newmark: beta"},
   {"time_newmark_gamma", SB_OPTION_REAL, 1, "", "0.5", "[0.5, 1]",
    "newmark: gamma; more than 1/2 damps and is first order"},
   {"time_predictor", SB_OPTION_CHOICE, 1, "", "none", "none|velocity",
-   "where Newton starts a step: at the old displacement, or moved on by the velocity; one solve per step is "
-   "far better with it, but may blow up unless tangent is exact_spd"},
+   "first guess of Newton's method in a step: the old displacement, or u + dt v. With one linear solve per "
+   "step (-snes_type ksponly) velocity is far more accurate, but may be unstable unless the tangent is "
+   "exact_spd"},
   {"time_max_halvings", SB_OPTION_INT, 1, "", "10", "[0, 60]",
-   "how often a step that fails is halved before the run stops"},
+   "how often a step that fails is halved and repeated before the run stops"},
   {"time_inverted", SB_OPTION_CHOICE, 1, "", "accept", "accept|reject",
-   "a step that inverts tets (det F <= 0): taken, and they are counted; or halved and tried again, and the "
-   "run stops when that does not help"},
+   "a step that inverts tets (det F <= 0): accept, and count them; or reject, halve it and try again, and "
+   "stop when that does not help"},
   {"live_speed", SB_OPTION_REAL, 1, "m/s", "0.2", "(0, inf)",
-   "-effect_<name>_displacement live: how fast the effect goes, at most, to the place that live.txt in "
-   "output_dir names (lines `NAME x y z`, m)"},
-  {"live_angular_speed", SB_OPTION_REAL, 1, "degree/s", "90", "(0, inf)",
-   "-effect_<name>_angle live: how fast the effect turns, at most; other options that are live have their "
-   "new value from the next step on"},
+   "-effect_<name>_displacement live (interactive): largest speed at which the effect moves to the position "
+   "that the file live.txt in output_dir names (lines `NAME x y z`, m)"},
+  {"live_angular_speed", SB_OPTION_REAL, 1, "degrees/s", "90", "(0, inf)",
+   "-effect_<name>_angle live (interactive): largest angular speed; other live options take their new value "
+   "in the next step"},
   {"live_pace", SB_OPTION_REAL, 1, "", "1", "[0, inf)",
-   "live: simulated seconds per second, at most; a run that is faster waits; 0: no limit"},
+   "interactive runs: largest ratio of simulated time to real time; a faster run waits; 0: no limit"},
   {"wall_time", SB_OPTION_STRING, 1, "", "", "",
-   "h:mm:ss (or d-hh:mm:ss) after which the program has to have ended: the run stops in time for a "
-   "checkpoint, with exit code "
-   "75, and goes on with -restart latest; empty: no limit"},
+   "wall time limit of the program, h:mm:ss or d-hh:mm:ss: the run stops in time to write a checkpoint, with "
+   "exit code 75, and -restart latest resumes it; empty: no limit"},
   {"stop_grace", SB_OPTION_REAL, 1, "s", "10", "[0, inf)",
-   "after a signal to stop (SIGTERM, SIGINT, SIGUSR1): seconds that the step has to end; then it is given "
-   "up, and the run ends "
-   "with the step before"},
+   "after a signal to stop (SIGTERM, SIGINT, SIGUSR1): time in which the current step may be finished; then "
+   "it is abandoned, and the run ends with the step before"},
   {"saddle_solver", SB_OPTION_CHOICE, 1, "", "auto", "auto|direct|iterative",
-   "how effects with response multiplier solve for displacements and multipliers: by a factorisation in "
-   "which the multipliers are eliminated, or by the solver in the null space of the constraints; auto goes "
-   "by "
-   "size"},
+   "contact with response multiplier: how the saddle-point system of displacements and Lagrange multipliers "
+   "is solved: by a factorisation with the multipliers condensed, or by projected iterations in the null "
+   "space of the constraints; auto goes by size"},
   {"contact_solver", SB_OPTION_CHOICE, 1, "", "auto", "auto|direct|iterative",
-   "how systems with response barrier are solved: by a factorisation, or by CG with a coarse space of what "
-   "touches; auto goes by size and by the share of nodes that touch"},
+   "contact with response barrier: how linear systems are solved: by a factorisation, or by CG whose coarse "
+   "space contains the unknowns in contact; auto goes by size and by the fraction of nodes in contact"},
   {"static_steps", SB_OPTION_INT, 1, "", "1", "[1, 1000000]",
    "static: equal load steps from zero to full load"},
   {"static_min_increment", SB_OPTION_REAL, 1, "", "1e-4", "(0, 1]",
-   "static: smallest load increment, as a part of a load step; where equilibrium asks for a shorter one the "
-   "run stops, and says whether a limit load is likely"},
+   "static: smallest load increment, as a fraction of a load step; below it the run stops, and says whether "
+   "a limit load is likely"},
   {"static_control", SB_OPTION_CHOICE, 1, "", "load", "load|arc_length",
-   "static: what a step prescribes, the load factor or the length of the path of equilibria, which goes past "
-   "limit loads; ends where the load factor reaches 1"},
+   "static: load control, or arc-length control along the equilibrium path, which continues past limit "
+   "points; both end where the load factor reaches 1"},
   {"static_max_steps", SB_OPTION_INT, 1, "", "1000", "[1, inf)",
-   "arc_length: steps after which the run ends"},
+   "arc_length: largest number of steps; the run ends there"},
   {"static_max_displacement", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
-   "arc_length: displacement of some node at which the run ends; 0: none"},
+   "arc_length: the run ends when the displacement of any node exceeds this; 0: no limit"},
   {"static_longest_step", SB_OPTION_REAL, 1, "", "10", "(0, inf)",
-   "arc_length: longest step along the path, as a multiple of the first one, whose load increment is "
+   "arc_length: largest increment of arc length, as a multiple of the first one, whose load increment is "
    "1/-static_steps"},
 };
 

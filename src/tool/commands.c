@@ -113,13 +113,14 @@ static PetscErrorCode repair(SbTool *tool, SbImport *mesh)
 /* ------------------------------------------------------------------ the table */
 
 const SbToolCommand SbToolCommands[] = {
-  {"info", "FILE", "what is in it: size, groups, shape of the tets, memory that a run will take", 1,
-   SbToolInfo},
+  {"info", "FILE", "contents: size, groups, quality of the tets, memory that a run will take", 1, SbToolInfo},
   {"convert", "FILE OUT", "writes it in another format, groups and order kept", 2, write_mesh},
-  {"tet", "SURFACE OUT", "fills a closed surface (.stl, .obj, .off, .ply, ...) with tets of a -size", 2, tet},
-  {"repair", "FILE OUT", "drops, turns and welds what keeps a mesh from being simulated; says what it did", 2,
+  {"tet", "SURFACE OUT",
+   "fills a closed surface (.stl, .obj, .off, .ply, ...) with tets of edge length -size", 2, tet},
+  {"repair", "FILE OUT",
+   "removes degenerate tets, corrects orientation, merges duplicate vertices; reports what it did", 2,
    repair},
-  {"refine", "FILE OUT", "cuts every tet into eight; groups are carried over", 2, refine},
+  {"refine", "FILE OUT", "divides every tet into eight; groups are kept", 2, refine},
   {NULL, NULL, NULL, 0, NULL},
 };
 

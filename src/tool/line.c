@@ -9,34 +9,32 @@
 
 static const SbOption rows[] = {
   {"size", SB_OPTION_REAL, 1, "m", "", "(0, inf)",
-   "edge length of the tets made from a surface; without it the mean edge of its triangles"},
+   "edge length of the tets; default: the mean edge of the surface's triangles"},
   {"surface", SB_OPTION_CHOICE, 1, "", "auto", "auto|keep|remesh",
-   "whether the triangles of a surface stay: auto keeps them when their mean edge is within a factor of 1.5 "
-   "of the size"},
+   "keep the triangles of the surface, or remesh it: auto keeps them when their mean edge is within a factor "
+   "of 1.5 of the size"},
   {"angle", SB_OPTION_REAL, 1, "degrees", "40", "(0, 180)",
-   "edges where a surface turns by more are kept when it is remeshed"},
+   "feature angle: edges where the normals of the surface differ by more are kept when it is remeshed"},
   {"tetrahedralizer", SB_OPTION_CHOICE, 1, "", "auto", "auto|gmsh|tetgen",
-   "who makes tets from a surface: auto tries gmsh, then tetgen"},
-  {"seconds", SB_OPTION_REAL, 1, "s", "600", "(0, inf)", "time that gmsh, and then tetgen, may take"},
+   "program that fills a surface with tets: auto tries gmsh, then tetgen"},
+  {"seconds", SB_OPTION_REAL, 1, "s", "600", "(0, inf)", "time limit of gmsh, and then of tetgen"},
   {"untangle", SB_OPTION_REAL, 1, "m", "", "[0, inf)",
-   "how far vertices may be moved to smooth out small folds where a surface cuts itself; without it half its "
+   "largest displacement of vertices that removes small self-intersections of a surface; default: half its "
    "mean edge"},
   {"merge_tolerance", SB_OPTION_REAL, 1, "m", "", "[0, inf)",
-   "vertices at most so far apart become one; 0: none do; without it 1e-9 of the diagonal of the mesh (tet: "
-   "1e-7)"},
-  {"levels", SB_OPTION_INT, 1, "", "1", "[1, 8]",
-   "how often the mesh is refined: each time 8 times as many tets"},
+   "vertices closer than this are merged; 0: none; default: 1e-9 of the diagonal of the mesh (tet: 1e-7)"},
+  {"levels", SB_OPTION_INT, 1, "", "1", "[1, 8]", "number of refinements, each into 8 times as many tets"},
   {"format", SB_OPTION_CHOICE, 1, "", "auto", "auto|msh41|msh41_binary|msh22|msh22_binary|h5",
-   "of the file that is written; auto: .msh is msh41 (text), .h5 is h5"},
+   "output format; auto: .msh is msh41 (text), .h5 is h5"},
   {"step", SB_OPTION_INT, 1, "", "0", "[-1, inf)",
-   "when FILE is a run's output (fields.h5): the step whose positions are taken; 0: at rest, -1: the last"},
-  {"scale", SB_OPTION_REAL, 1, "", "1", "(0, inf)",
-   "factor on the coordinates as they are read; 0.001 for mm"},
+   "when FILE is the output of a run (fields.h5): number of the frame whose positions are taken; 0: "
+   "reference configuration, -1: the last"},
+  {"scale", SB_OPTION_REAL, 1, "", "1", "(0, inf)", "factor on the coordinates; 0.001 for a file in mm"},
   {"rotate", SB_OPTION_REALS, 4, "", "0,0,1,0", "(-inf, inf)",
    "axis x,y,z and angle in degrees, after scaling"},
-  {"translate", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "shift, after rotation"},
-  {"view", SB_OPTION_STRING, 1, "", "", "", "draws the mesh to this .png"},
-  {"quiet", SB_OPTION_BOOL, 1, "", "false", "", "says nothing while it works"},
+  {"translate", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "translation, after rotation"},
+  {"view", SB_OPTION_STRING, 1, "", "", "", "draw the mesh to this .png"},
+  {"quiet", SB_OPTION_BOOL, 1, "", "false", "", "print nothing but errors"},
 };
 /* Which commands read each row; "" for all. */
 static const char *const readers[] = {
