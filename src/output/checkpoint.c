@@ -7,6 +7,7 @@
   the options that decide the mechanics. A checksum over the three vectors detects a file that was damaged later (mesh.c says what both sums are of).
 */
 #include <errno.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include "output_impl.h"
 #include "sblog.h"
@@ -254,7 +255,8 @@ static PetscErrorCode check_identity(SbRun run, SbOutput out, SbH5 *h, int64_t m
     "cannot restart from %s: it was made with '%s', this run has '%s'; bodies and effects must be the same",
     h->path, a, b);
   PetscCheck((uint64_t)mesh_hash == out->mesh_hash, out->comm, PETSC_ERR_USER_INPUT,
-             "cannot restart from %s: it belongs to another mesh (other vertices, cells or placement%s)",
+             "cannot restart from %s: it belongs to another mesh (other vertices, cells or placement%s); "
+             "-body_<name>_state FOLDER takes the state of a run with any mesh",
              h->path, SbOutputMeshStep(run) ? ", or a body was re-meshed: name it by -restart FILE" : "");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -370,9 +372,14 @@ PetscErrorCode SbCheckpointLoad(SbRun run, const char *file)
   SbOutput out = (SbOutput)run->output;
   PetscBool latest = (PetscBool)!strcmp(file, "latest"), ok = PETSC_FALSE;
   char path[PETSC_MAX_PATH_LEN];
+  struct stat info;
 
   PetscFunctionBeginUser;
   PetscCall(SbOutputOrder(run, out));
+  PetscCheck(stat(file, &info) || !S_ISDIR(info.st_mode), out->comm, PETSC_ERR_FILE_OPEN,
+             "-restart %s is a folder: name a checkpoint_*.h5 in it, or go on there with -output_dir %s "
+             "-restart latest",
+             file, file);
   for (int k = 0; !ok; k++) {
     PetscCall(SbCheckpointFind(out, file, k, sizeof(path), path));
     /* one that cannot be read is passed over where another one may be taken */

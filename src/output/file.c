@@ -54,8 +54,8 @@ PetscErrorCode SbFileReserve(MPI_Comm comm, const char *path, PetscInt64 bytes)
     }
     // A file system that cannot reserve is not full.
     if (error && (fd < 0 || (error != EINVAL && error != EOPNOTSUPP && error != ENOSYS))) {
-      SbFormat(sizeof(message), message, "cannot write %" PetscInt64_FMT " bytes to %s: %s", bytes, path,
-               strerror(error));
+      SbFormat(sizeof(message), message, "cannot write %" PetscInt64_FMT " bytes to %s: %s; " SB_NO_ROOM,
+               bytes, path, strerror(error));
     }
   }
   PetscCall(SbAgree(comm, PETSC_ERR_FILE_WRITE, message));
@@ -79,7 +79,8 @@ void SbFileReplace(const char *path, int nchunk, const SbChunk chunk[], size_t n
     bad = fclose(file) || written != size || rename(tmp, path);
   }
   if (!bad) return;
-  SbFormat(nmessage, message, "cannot write %zu bytes to %s: %s", size, path, strerror(errno ? errno : EIO));
+  SbFormat(nmessage, message, "cannot write %zu bytes to %s: %s; " SB_NO_ROOM, size, path,
+           strerror(errno ? errno : EIO));
   (void)unlink(tmp);
 }
 

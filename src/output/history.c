@@ -217,7 +217,7 @@ static void write_row(SbHistory h, size_t nmessage, char message[])
   const ssize_t n = write(h->fd, h->row, h->size);
 
   if (n == (ssize_t)h->size) return;
-  SbFormat(nmessage, message, "cannot write %zu bytes to %s: %s", h->size, h->path,
+  SbFormat(nmessage, message, "cannot write %zu bytes to %s: %s; " SB_NO_ROOM, h->size, h->path,
            strerror(n < 0 ? errno : ENOSPC));
   if (n > 0 && ftruncate(h->fd, before))
     SbFormat(nmessage, message, "cannot write to %s, its last row is incomplete", h->path);

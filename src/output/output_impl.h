@@ -87,6 +87,7 @@ PetscErrorCode SbH5Reserve(SbH5 *h, PetscInt64 bytes);
 /* Asks the file system for `bytes` behind the end of a file, before anything in it is touched. Collective. */
 PetscErrorCode SbFileReserve(MPI_Comm comm, const char *path, PetscInt64 bytes);
 /* Ends the run on all ranks when the message of any rank is not empty; the lowest rank's is reported. Collective. */
+#define SB_NO_ROOM "make room and go on with -restart auto, or give another -output_dir"
 PetscErrorCode SbAgree(MPI_Comm comm, PetscErrorCode code, const char *message);
 typedef struct {
   const char *text;

@@ -6,6 +6,7 @@
   reads the body's part of the file. A checkpoint has no mesh, but all digits of all unknowns: it serves scenes with the same meshes and elements, whatever else is different there.
 */
 #include <sys/stat.h>
+#include <unistd.h>
 #include "output_impl.h"
 #include "sbgeometry.h"
 
@@ -122,11 +123,17 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
     PetscCall(PetscStrlcat(o->path, "/fields.h5", sizeof(o->path)));
   o->file = stat(o->path, &info) ? -1 : H5Fopen(o->path, H5F_ACC_RDONLY, H5P_DEFAULT);
   PetscCheck(o->file >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
-             "%s %s: there is no %s; give the folder of a run that wrote fields, displacement among them",
-             option, text, o->path);
+             "%s %s: %s %s; give the folder of a run that wrote fields, displacement among them", option,
+             text, o->path, access(o->path, F_OK) ? "is not there" : "holds no results");
   o->frame = open_frame(o->file, step);
-  PetscCheck(o->frame >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s has no frame%s", option,
-             text, o->path, step < 0 ? "" : " of this step");
+  if (o->frame < 0 && step >= 0 && (o->frame = open_frame(o->file, -1)) >= 0) {
+    PetscCall(SbH5GetInt(o->frame, "step", &mesh, &ok));
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+            "%s %s: %s has no frame of step %ld; its last one is of step %ld", option, text, o->path, step,
+            (long)mesh);
+  }
+  PetscCheck(o->frame >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s has no frame", option,
+             text, o->path);
 
   /* the mesh of that frame, which may be one of a re-meshing */
   if (H5Aexists(o->frame, "mesh") > 0) PetscCall(SbH5GetInt(o->frame, "mesh", &mesh, &ok));

@@ -6,6 +6,7 @@
   file that is not there is found before.
 */
 #include <errno.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include "scene_impl.h"
 
@@ -55,9 +56,11 @@ static int file_error(const char *file)
 {
   int error = 0;
   PetscMPIInt rank;
+  struct stat info;
 
   (void)MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   if (!rank && access(file, R_OK)) error = errno;
+  if (!rank && !error && !stat(file, &info) && S_ISDIR(info.st_mode)) error = EISDIR;
   (void)MPI_Bcast(&error, 1, MPI_INT, 0, MPI_COMM_WORLD);
   return error;
 }
@@ -132,9 +135,12 @@ PetscErrorCode SbCommandLine(int *argc, char *argv[], SbCommand *command)
         (void)snprintf(command->scenario, sizeof(command->scenario), "%s", argv[1]);
     } else if (!command->problem[0]) {
       (void)snprintf(command->problem, sizeof(command->problem),
-                     "the word '%s' in the command line belongs to no option (an option begins with a dash, "
-                     "a value with blanks needs quotes)",
-                     argv[i]);
+                     strpbrk(argv[i], "./")
+                       ? "the word '%s' in the command line belongs to no option: a run has one option file, "
+                         "the first word; more come by -options_file"
+                       : "the word '%s' in the command line belongs to no option (an option begins with a "
+                         "dash, -%s; a value with blanks needs quotes)",
+                     argv[i], argv[i]);
     }
     i += words;
   }

@@ -26,6 +26,8 @@
 #include <petsc/private/tsimpl.h>
 #include "time_impl.h"
 
+#define SHORTEST 1e-9 /* of the nominal length: a step that fails below that ends the run */
+
 typedef struct {
   SbRun run;
   SbMethodSettings set;
@@ -366,9 +368,19 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     ts->reject++;
     so->run->rejected_total++;
     so->good = 0;
+    // steps that succeed in between may be halved without end, until t + h is t
     if (is_explicit(so) || so->run->stopped || ++cuts > so->set.max_halvings ||
-        SbRunTooShort(so->run, next)) {
+        next < SHORTEST * so->nominal || SbRunTooShort(so->run, next)) {
       ts->reason = TS_DIVERGED_STEP_REJECTED;
+      if (!is_explicit(so) && !so->run->stopped && so->run->stop_reason[0]) {
+        char why[sizeof(so->run->stop_reason)];
+
+        PetscCall(PetscStrncpy(why, so->run->stop_reason, sizeof(why)));
+        PetscCall(SbRunFail(so->run,
+                            "%s; try a shorter -ts_dt, or loads and motions that begin gently "
+                            "(docs/guides/when_it_fails.md, R1)",
+                            why));
+      }
       break;
     }
     ts->time_step = next;

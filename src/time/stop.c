@@ -12,7 +12,7 @@
 #include <unistd.h>
 #include "time_impl.h"
 
-#define SHORT 0.13         /* of the length asked for: three halvings */
+#define SHORT 0.13          /* of the length asked for: three halvings */
 #define WALL_TIME 1000      /* as the number of a signal */
 #define RESERVE_PART 0.05   /* of -wall_time, for the last files, */
 #define RESERVE_LONGEST 60. /* but no more than so many s; twice what files have taken so far comes on top */
@@ -171,6 +171,11 @@ PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool w
                                                : "USR1"));
     who = signal_name;
   }
+  /* a job that is put back into the queue would come here again */
+  PetscCheck(
+    reason != WALL_TIME || step > run->step0, run->model->comm, PETSC_ERR_USER_INPUT,
+    "-wall_time: the %g s are over before a step is done: give more time or ranks, or a coarser mesh",
+    (double)run->stop.wall_time);
   run->stopped = PETSC_TRUE;
   run->paused = PETSC_FALSE;
   run->stop_reason[0] = 0;

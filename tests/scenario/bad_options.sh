@@ -82,6 +82,12 @@ printf 'ts_dt: 1\n  bodies: x\n' >bad.yml
 error 3 "bad.yml" -options_file bad.yml
 error 1 "-effects" bar.opts -effects
 error 1 "'2,'" bar.opts -body_bar_translate 1, 2, 3
+error 1 "'ts_dt'|-ts_dt" bar.opts ts_dt 1
+error 1 "'bar.yml'|-options_file" bar.opts bar.yml
+mkdir -p folder
+error 1 "folder" folder
+error 1 "-effect_gravity_vector 9.81|1|3 in m/s^2" bar.opts -effect_gravity_vector 9.81
+error 1 "-static_steps 2.5|[1, 1000000]" bar.opts -time static -static_steps 2.5
 error 1 "-time static" -bodies bar -body_bar_mesh box:1,1,1:1 -body_bar_material linear \
   -body_bar_young 1 -body_bar_poisson 0 -time static
 # the path by arc length takes exact tangents, solvers for indefinite matrices, and no contact
@@ -185,5 +191,9 @@ for ranks in 0 bin/supple -2 ""; do
   check "scripts/mpi '$ranks': exit code $code" test "$code" -ne 0
   check "scripts/mpi '$ranks': $(cat err.txt)" grep -q "'$ranks' is no number of ranks" err.txt
 done
+"$top/scripts/mpi" 2 bin/nothing -version >out.txt 2>err.txt
+code=$?
+check "scripts/mpi 2 bin/nothing: exit code $code" test "$code" = 127
+check "scripts/mpi 2 bin/nothing: $(cat err.txt)" grep -q "'bin/nothing'" err.txt
 
 finish

@@ -101,6 +101,11 @@ def main():
     if "-wall_time 90" not in text:
         sys.exit(f"-wall_time 90 is not refused: {text}")
 
+    # ... before there was a step: not what a job that is put back into the queue would mend
+    text = run(1, "early", *SLOW, "-wall_time", "0:00:01", "-body_bar_mesh", "box:0.4,0.1,0.1:60,15,15", fails=True)
+    if "-wall_time" not in text or json.loads((OUT / "early" / "run.json").read_text())["status"] != "failed":
+        sys.exit(f"-wall_time that is over before the first step: {text}")
+
     # steps of dozens of iterations: one of them is given up, and the checkpoint is of the step before
     for k in range(8):
         process = start(2, f"grace{k}", *LONG_STEPS, "-stop_grace", "0", rows=2)
