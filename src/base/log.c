@@ -22,9 +22,9 @@ static PetscErrorCode stage(const char *name, PetscLogStage *s)
 PetscErrorCode SbLogInitialize(void)
 {
   static const char *const names[SB_EVENT_COUNT] = {
-    "SbMeshRead", "SbMeshDistrib", "SbSpaceSetUp", "SbMatrixSetUp", "SbResidual",
-    "SbTangent",  "SbEnergy",      "SbEffects",    "SbContact",     "SbSearch",
-    "SbProject",  "SbSolverSetUp", "SbOutput",     "SbCheckpoint",
+    "SbMeshRead", "SbMeshDistrib", "SbSpaceSetUp",   "SbMatrixSetUp", "SbResidual",
+    "SbTangent",  "SbEnergy",      "SbEffects",      "SbContact",     "SbSearch",
+    "SbProject",  "SbSolverSetUp", "SbContactSolve", "SbOutput",      "SbCheckpoint",
   };
 
   PetscFunctionBeginUser;

@@ -18,7 +18,7 @@ PetscErrorCode SbLedgerGetSeconds(SbLedger l, SbLedgerSeconds *s)
     {ASSEMBLY, SB_EVENT_RESIDUAL}, {ASSEMBLY, SB_EVENT_TANGENT},   {CONTACT, SB_EVENT_CONTACT},
     {SEARCH, SB_EVENT_SEARCH},     {SETUP, SB_EVENT_MESH_READ},    {SETUP, SB_EVENT_MESH_DISTRIBUTE},
     {SETUP, SB_EVENT_SPACE_SETUP}, {SETUP, SB_EVENT_MATRIX_SETUP}, {SETUP, SB_EVENT_SOLVER_SETUP},
-    {OUTPUT, SB_EVENT_OUTPUT},     {OUTPUT, SB_EVENT_CHECKPOINT}};
+    {OUTPUT, SB_EVENT_OUTPUT},     {OUTPUT, SB_EVENT_CHECKPOINT},  {SOLVE, SB_EVENT_CONTACT_SOLVE}};
   static const char *const solve[] = {"KSPSolve", "PCSetUp", "PCSetUpOnBlocks"};
   const SbRun run = l->run;
   PetscReal mine[COUNT] = {0.}, t[COUNT], beyond;

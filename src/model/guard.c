@@ -2,6 +2,15 @@
   Guarded contact as Newton's method sees it: all effects that have it together.
 */
 #include "model_impl.h"
+#include "sblog.h"
+
+/* SbEffectCall() that counts as contact in the table of phases, too. */
+#define CONTACT_CALL(e, op, ...)                                           \
+  do {                                                                     \
+    PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0)); \
+    SbEffectCall(e, op, __VA_ARGS__);                                      \
+    PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));   \
+  } while (0)
 
 #define ROUNDS 20   /* of motions of bodies that touch */
 #define SWEEPS 1000 /* over what touches, in each */
@@ -146,7 +155,7 @@ static PetscErrorCode move_apart(SbModel m, PetscReal t, PetscReal dt, PetscReal
     for (PetscInt e = 0; e < m->npotential; e++) {
       PetscBool first;
 
-      SbEffectCall(m->potential[e], touching, s, t, dt, u, &first, &list);
+      CONTACT_CALL(m->potential[e], touching, s, t, dt, u, &first, &list);
       go_on = (PetscBool)(go_on || first);
     }
     if (!go_on) break;
@@ -254,7 +263,7 @@ PetscErrorCode SbModelGuardBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0, V
   for (PetscInt e = 0; e < m->npotential; e++) {
     PetscBool mine;
 
-    SbEffectCall(m->potential[e], begin_guarded, m->space, t, dt, m->guard_speed, u, &mine);
+    CONTACT_CALL(m->potential[e], begin_guarded, m->space, t, dt, m->guard_speed, u, &mine);
     moved = (PetscBool)(moved || mine);
   }
   PetscCall(close_state(m, U0, moved, &local, &u));
@@ -267,7 +276,7 @@ PetscErrorCode SbModelGuardBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0, V
     PetscCall(SbSpaceGetLocalRead(m->space, U0, &u0));
     PetscCall(SbSpaceGetLocalRead(m->space, V0, &v0));
     for (PetscInt e = 0; e < m->npotential; e++) {
-      if (m->potential[e]->ops.meet) SbEffectCall(m->potential[e], meet, m->space, dt, u0, v0);
+      if (m->potential[e]->ops.meet) CONTACT_CALL(m->potential[e], meet, m->space, dt, u0, v0);
     }
     PetscCall(SbSpaceRestoreLocalRead(m->space, V0, &v0));
     PetscCall(SbSpaceRestoreLocalRead(m->space, U0, &u0));
@@ -278,7 +287,7 @@ PetscErrorCode SbModelGuardBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0, V
 PetscErrorCode SbModelGuardAdvance(SbModel m, PetscReal progress)
 {
   PetscFunctionBeginUser;
-  for (PetscInt e = 0; e < m->npotential; e++) SbEffectCall(m->potential[e], advance, progress);
+  for (PetscInt e = 0; e < m->npotential; e++) CONTACT_CALL(m->potential[e], advance, progress);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -298,7 +307,7 @@ PetscErrorCode SbModelGuardSafe(SbModel m, Vec X, Vec Y, PetscReal progress, Pet
     PetscReal mine;
     PetscInt pairs;
 
-    SbEffectCall(m->potential[e], safe, m->space, u0, u1, progress, &mine, &pairs);
+    CONTACT_CALL(m->potential[e], safe, m->space, u0, u1, progress, &mine, &pairs);
     found[0] = PetscMin(found[0], mine);
     found[1] -= (PetscReal)pairs;
   }
@@ -321,7 +330,7 @@ PetscErrorCode SbModelGuardNearest(SbModel m, size_t size, char text[])
   for (PetscInt e = 0; e < m->npotential; e++) {
     PetscReal gap;
 
-    SbEffectCall(m->potential[e], nearest, m->space, &gap, sizeof(mine), mine);
+    CONTACT_CALL(m->potential[e], nearest, m->space, &gap, sizeof(mine), mine);
     if (gap >= least) continue;
     least = gap;
     PetscCall(PetscStrncpy(text, mine, size));
@@ -339,7 +348,7 @@ PetscErrorCode SbModelGuardLag(SbModel m, Vec X, PetscBool solved, PetscBool *ag
   for (PetscInt e = 0; e < m->npotential; e++) {
     PetscBool mine;
 
-    SbEffectCall(m->potential[e], lag, m->space, u, solved, &mine);
+    CONTACT_CALL(m->potential[e], lag, m->space, u, solved, &mine);
     *again = (PetscBool)(*again || mine);
   }
   PetscCall(SbSpaceRestoreLocalRead(m->space, X, &u));
@@ -357,7 +366,7 @@ PetscErrorCode SbModelGuardHessian(SbModel m, Vec U, SbContactHessian kind, SbBl
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(3 * s->nnode, &r));
   PetscCall(SbSpaceGetLocalRead(s, U, &u));
-  for (PetscInt e = 0; e < m->npotential; e++) SbEffectCall(m->potential[e], hessian, s, u, kind, blocks, r);
+  for (PetscInt e = 0; e < m->npotential; e++) CONTACT_CALL(m->potential[e], hessian, s, u, kind, blocks, r);
   PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
   if (R) {
     PetscCall(VecGetArray(R, &out));
@@ -382,7 +391,7 @@ PetscErrorCode SbModelGuardGradient(SbModel m, Vec U, PetscReal scale, PetscBool
   for (PetscInt e = 0; e < m->npotential; e++) {
     PetscReal mine;
 
-    SbEffectCall(m->potential[e], potential, s, u, &mine, f);
+    CONTACT_CALL(m->potential[e], potential, s, u, &mine, f);
     sum += mine;
   }
   PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
@@ -410,7 +419,7 @@ PetscErrorCode SbModelGapForces(SbModel m, Vec U, Vec F, PetscReal *bound)
   for (PetscInt e = 0; e < m->npotential; e++) {
     PetscReal mine;
 
-    SbEffectCall(m->potential[e], gap_forces, s, u, f, &mine);
+    CONTACT_CALL(m->potential[e], gap_forces, s, u, f, &mine);
     *bound += mine;
   }
   PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
@@ -429,7 +438,7 @@ PetscErrorCode SbModelScaleWidths(SbModel m, PetscReal factor, PetscReal growth,
   for (PetscInt e = 0; e < m->npotential; e++) {
     PetscBool mine;
 
-    SbEffectCall(m->potential[e], scale_width, factor, growth, &mine);
+    CONTACT_CALL(m->potential[e], scale_width, factor, growth, &mine);
     *changed = (PetscBool)(*changed || mine);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -443,7 +452,7 @@ PetscErrorCode SbModelGuardWork(SbModel m, Vec U, PetscReal *work, Vec F)
   for (PetscInt e = 0; e < m->npotential; e++) {
     PetscReal mine;
 
-    SbEffectCall(m->potential[e], work, &mine);
+    CONTACT_CALL(m->potential[e], work, &mine);
     *work += mine;
   }
   PetscFunctionReturn(PETSC_SUCCESS);

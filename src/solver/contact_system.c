@@ -10,6 +10,7 @@
   both; -ksp_type and -contact_ksp_type name another method than CG.
 */
 #include "contact_coarse.h"
+#include "sblog.h"
 #include "sbsolver.h"
 
 #define KEEP 20         /* solves for which a place without values stays */
@@ -336,9 +337,14 @@ static PetscErrorCode iterate(SbContactSystem c, Vec F, Vec Y, KSPConvergedReaso
   PetscFunctionBeginUser;
   if (c->fresh[0]) PetscCall(set_up_iteration(c));
   PetscCall(KSPGetPC(c->ksp, &pc));
+  /* what PETSc's own events count is not counted twice */
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   PetscCall(KSPSetUp(c->ksp));
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   if (!c->type[0]) PetscCall(SbPCContactGuess(pc, F, Y));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   PetscCall(KSPSolve(c->ksp, F, Y));
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   PetscCall(KSPGetConvergedReason(c->ksp, reason));
   PetscCall(KSPGetIterationNumber(c->ksp, iterations));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -373,6 +379,7 @@ PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *bl
   PetscBool factored;
 
   PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   if (fresh || !c->rows.value) PetscCall(merge(c, K, blocks));
   factored = is_factored(c->space, c->choice, c->type, c->nnode);
   *iterations = 0;
@@ -382,6 +389,7 @@ PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *bl
     PetscCall(factor(c, F, Y, reason));
     ++*iterations;
   }
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

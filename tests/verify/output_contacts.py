@@ -1,6 +1,7 @@
 """contacts.xmf and contacts.vtkhdf: the places of contact as VTK reads them, frame by frame, against fields.h5 and the pairs in history.csv; a frame
 without any; going on after a restart, with the places and without; what is refused.
 """
+import json
 import os
 import subprocess
 import sys
@@ -39,6 +40,13 @@ def places(folder, group):
     with h5py.File(OUT / folder / "fields.h5", "r") as f:
         found = f[f"{group}/contacts"]
         return int(found.attrs["count"]), {name: data[()] for name, data in found.items()}
+
+
+def check_seconds(folder):
+    """Contact and its linear solves have their own seconds: more than the residuals of the same iterations."""
+    seconds = json.loads((OUT / folder / "run.json").read_text())["seconds"]
+    check(seconds["contact"] > 0, f"{folder}: no seconds of contact: {seconds}")
+    check(seconds["linear solve"] > seconds["residual"], f"{folder}: solves with contact are not counted: {seconds}")
 
 
 def check_reader(folder):
@@ -115,6 +123,7 @@ def check_restart():
 
 def main():
     run(1, "one")
+    check_seconds("one")
     check_reader("one")
     check_numbers("one")
     run(2, "two")
