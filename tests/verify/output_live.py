@@ -3,7 +3,9 @@
 import argparse
 import importlib.machinery
 import importlib.util
+import json
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -138,6 +140,27 @@ def check_keys():
         process.wait()
 
 
+def check_window():
+    """A window on a screen without a user: Ctrl-C ends it and the run that it started, which writes its checkpoint."""
+    if not shutil.which("Xvfb"):
+        print("no Xvfb, so no window was opened: apt-get install xvfb")
+        return
+    screen = subprocess.Popen(["Xvfb", "-displayfd", "1", "-screen", "0", "1000x700x24"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    try:
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("VTK_")} | {"DISPLAY": ":" + screen.stdout.readline().strip()}
+        process = subprocess.Popen([sys.executable, LIVE, str(scenario()), "-output_dir", str(OUT / "window"), "-ts_max_time", "100"], env=environment,
+                                   preexec_fn=lambda: module.signal.signal(module.signal.SIGINT, module.signal.default_int_handler))
+        history = OUT / "window" / "history.csv"
+        wait(process, lambda: history.exists() and history.read_text().count("\n") > 100, "the run does not begin")
+        process.send_signal(module.signal.SIGINT)
+        process.wait()
+        told = json.loads((OUT / "window" / "run.json").read_text())
+        check(told["status"] == "stopped", f"after Ctrl-C the run is {told['status']}")
+    finally:
+        screen.kill()
+        screen.wait()
+
+
 def load_module():
     loader = importlib.machinery.SourceFileLoader("live", LIVE)
     found = importlib.util.module_from_spec(importlib.util.spec_from_loader("live", loader))
@@ -160,6 +183,7 @@ def main():
     check(window.shown == 5 and coloured(OUT / "done.png") > 0.05, "a run that has ended")
     check("'strian'" in refused(OUT / "done", "--plot", "strian", "--picture", OUT / "no.png"), "unknown column")
     check("nothing.opts" in live(OUT / "nothing.opts", fails=True), "neither scenario nor folder")
+    check_window()
     check_keys()
     check_move()
 
