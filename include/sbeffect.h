@@ -146,10 +146,31 @@ typedef struct {
   PetscErrorCode (*destroy)(SbEffect e);
 } SbEffectOps;
 
+/* The sets named by the option -effect_<name>_on. */
+typedef struct {
+  char option[2 * SB_NAME_MAX]; /* full name of the option, for messages */
+  PetscInt n;
+  char (*name)[SB_NAME_MAX]; /* [n] owned */
+} SbEffectOn;
+
+/* A type of effects, one per file in src/effect/. */
+typedef struct {
+  const char *name;
+  size_t size; /* bytes of `data`, zero at first */
+  PetscInt nrow, ncolumn;
+  const SbOption *row; /* [nrow] its options; "on", and "time" where it is one formula, are read for it */
+  const char *const *column; /* [ncolumn] history columns that each effect of the type has */
+  SbEffectOps ops;
+} SbEffectType;
+extern const SbEffectType SbEffectGravity, SbEffectBodyForce, SbEffectTraction, SbEffectPressure,
+  SbEffectPointForce, SbEffectFixed, SbEffectPrescribedDisplacement, SbEffectDamping, SbEffectContact;
+
 struct _p_SbEffect {
   char name[SB_NAME_MAX];
   char type[SB_NAME_MAX];
   SbEffectOps ops;
+  SbEffectOn on;  /* empty for a type without the option */
+  SbFormula time; /* factor on a load; NULL for a type without the option */
   PetscLogEvent
     event;          /* SbEff_<type>, around every operation of the table from `setup` to `contact_points` */
   PetscBool linear; /* force does not depend on u: the tangent stays constant. Default PETSC_TRUE */
@@ -160,14 +181,14 @@ struct _p_SbEffect {
   PetscBool euler;       /* made for implicit Euler only. Default PETSC_FALSE */
   PetscBool
     springs; /* of contact: it pushes with springs or friction, not with constraints alone. Default PETSC_FALSE */
-  const struct SbEffectOn_ *prescribed; /* the sets whose nodes it prescribes in all directions; NULL: none */
-  PetscInt nstate;                      /* numbers in a record of save() */
-  PetscReal width;                      /* of guarded contact: the smallest gap below which it pushes, m */
-  PetscInt ncolumn;                     /* history columns, known after set-up */
+  PetscBool prescribed; /* it prescribes the nodes of its sets in all directions */
+  PetscInt nstate;      /* numbers in a record of save() */
+  PetscReal width;      /* of guarded contact: the smallest gap below which it pushes, m */
+  PetscInt ncolumn;     /* history columns, known after set-up */
   const char *const
     *column;      /* [ncolumn] "force_x", ...; written as <name>_<column>; owned by the type or by `data` */
   char note[256]; /* what set-up has to say in the run's report; "": nothing */
-  void *data;
+  void *data;     /* the type's own; freed with the effect */
 };
 
 /* Whether it acts at a time, or from that time on; ends of steps may be off by rounding. Not collective. */
@@ -182,10 +203,11 @@ PetscBool SbEffectActsAfter(SbEffect e, PetscReal t);
     PetscCall(PetscLogEventEnd(sb_e_->event, 0, 0, 0, 0));   \
   } while (0)
 
-extern PetscFunctionList SbEffectList;
-/* Adds a type and its option rows; `rows` and the names in them must live as long as the program. Not collective. */
-PetscErrorCode SbEffectRegister(const char *type, PetscErrorCode (*create)(SbEffect), PetscInt nrows,
-                                const SbOption rows[]);
+/* Adds a type, which must live as long as the program, and its option rows. Not collective. */
+PetscErrorCode SbEffectRegister(const SbEffectType *type);
+/* Names of all types. Not collective. */
+#define SB_EFFECT_TYPES 32
+PetscInt SbEffectTypes(const char *names[SB_EFFECT_TYPES]);
 /*
   SbEffectCreate - an effect of the scenario by its name, with its options read.
 
@@ -203,14 +225,3 @@ PetscErrorCode SbEffectDestroy(SbEffect *e); /* sets *e to NULL; NULL is accepte
   Not collective. Call it for every effect between SbMeshCreate() and SbSpaceCreate(). Names without a set are left to set-up.
 */
 PetscErrorCode SbEffectMarkPrescribed(SbEffect e, PetscInt nset, SbSet set[]);
-
-/* Constructors, one per file in src/effect/. */
-PetscErrorCode SbEffectRegister_Gravity(void);
-PetscErrorCode SbEffectRegister_BodyForce(void);
-PetscErrorCode SbEffectRegister_Traction(void);
-PetscErrorCode SbEffectRegister_Pressure(void);
-PetscErrorCode SbEffectRegister_PointForce(void);
-PetscErrorCode SbEffectRegister_Fixed(void);
-PetscErrorCode SbEffectRegister_PrescribedDisplacement(void);
-PetscErrorCode SbEffectRegister_Damping(void);
-PetscErrorCode SbEffectRegister_Contact(void);

@@ -34,22 +34,17 @@
 #define SB_GMSH_FUNCTIONS(X)                                                                               \
   X(void, Open, (const char *, int *))                                                                     \
   X(void, Merge, (const char *, int *))                                                                    \
-  X(void, Write, (const char *, int *))                                                                    \
   X(void, OptionSetNumber, (const char *, double, int *))                                                  \
-  X(void, OptionSetString, (const char *, const char *, int *))                                            \
   X(void, ModelAdd, (const char *, int *))                                                                 \
   X(void, ModelGetEntities, (int **, size_t *, int, int *))                                                \
   X(void, ModelGetPhysicalGroups, (int **, size_t *, int, int *))                                          \
   X(void, ModelGetPhysicalGroupsForEntity, (int, int, int **, size_t *, int *))                            \
   X(void, ModelGetPhysicalName, (int, int, char **, int *))                                                \
   X(int, ModelAddDiscreteEntity, (int, int, int *, size_t, int *))                                         \
-  X(void, ModelGetBoundary, (int *, size_t, int **, size_t *, int, int, int, int *))                       \
   X(void, ModelMeshGenerate, (int, int *))                                                                 \
   X(void, ModelMeshOptimize, (const char *, int, int, int *, size_t, int *))                               \
-  X(void, ModelMeshRefine, (int *))                                                                        \
   X(void, ModelMeshClassifySurfaces, (double, int, int, double, int, int *))                               \
   X(void, ModelMeshCreateGeometry, (int *, size_t, int *))                                                 \
-  X(void, ModelMeshCreateTopology, (int, int, int *))                                                      \
   X(void, ModelMeshAddNodes, (int, int, size_t *, size_t, double *, size_t, double *, size_t, int *))      \
   X(void, ModelMeshAddElementsByType, (int, int, size_t *, size_t, size_t *, size_t, int *))               \
   X(void, ModelMeshGetNodes,                                                                               \
@@ -58,20 +53,11 @@
     (int **, size_t *, size_t ***, size_t **, size_t *, size_t ***, size_t **, size_t *, int, int, int *)) \
   X(void, ModelMeshGetElementsByType,                                                                      \
     (int, size_t **, size_t *, size_t **, size_t *, int, size_t, size_t, int *))                           \
-  X(void, ModelMeshSetSize, (int *, size_t, double, int *))                                                \
-  X(int, ModelMeshFieldAdd, (const char *, int, int *))                                                    \
-  X(void, ModelMeshFieldSetNumber, (int, const char *, double, int *))                                     \
-  X(void, ModelMeshFieldSetNumbers, (int, const char *, double *, size_t, int *))                          \
-  X(void, ModelMeshFieldSetString, (int, const char *, const char *, int *))                               \
-  X(void, ModelMeshFieldSetAsBackgroundMesh, (int, int *))                                                 \
   X(int, ModelGeoAddSurfaceLoop, (int *, size_t, int, int *))                                              \
   X(int, ModelGeoAddVolume, (int *, size_t, int, int *))                                                   \
   X(void, ModelGeoSynchronize, (int *))                                                                    \
-  X(int, ViewAdd, (const char *, int, int *))                                                              \
-  X(void, ViewAddListData, (int, const char *, int, double *, size_t, int *))                              \
   X(void, LoggerStart, (int *))                                                                            \
-  X(void, LoggerGet, (char ***, size_t *, int *))                                                          \
-  X(void, LoggerGetLastError, (char **, int *))
+  X(void, LoggerGet, (char ***, size_t *, int *))
 
 typedef struct {
   const char *where; /* begins every message */

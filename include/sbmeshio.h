@@ -2,6 +2,7 @@
   sbmeshio.h - layer 1: a body on rank 0 as its reader delivers it, and what reading a file takes. Not collective throughout.
 */
 #pragma once
+#include <hdf5.h>
 #include <sys/types.h>
 #include "sbmeshfile.h"
 
@@ -204,3 +205,16 @@ PetscErrorCode SbImportJoinRepeats(SbImport *import, int dim, PetscBool all, Pet
 /* An array [n] or [n][ncomp] of type "Int" or "Float" as a DataItem of XDMF; file and path in it by a printf format. */
 void SbXdmfArray(FILE *file, PetscInt64 n, int ncomp, const char *type, int bytes, const char *format, ...)
   PETSC_ATTRIBUTE_FORMAT(6, 7);
+
+/* ------------------------------------------------------------------ import_h5.c: what is in the fields.h5 of a run */
+
+/* Its frames. Start with {.wanted = step}, negative: the last one. */
+typedef struct {
+  int64_t wanted, first, last; /* steps */
+  PetscInt n;
+  char found[64]; /* group of the wanted one, "": there is none */
+  const char *hundred;
+} SbH5Frames;
+void SbH5FindFrame(hid_t file, SbH5Frames *frames);
+/* Names of the bodies of a mesh, between commas, "" where it does not say. PetscFree. */
+PetscErrorCode SbH5BodyNames(hid_t file, const char *mesh, char **names);

@@ -52,10 +52,10 @@ struct _p_SbModel {
   SbSpace space;
   PetscInt neffect;
   SbEffect *effect;
-  /* one list per operation, holding only the effects that implement it */
-  PetscInt nprescribe, nforce, ntangent, nnonsymmetric, naccept, nhistory, nbegin_step,
-    nassemble_constraints, nupdate_active_set, ntime_of_impact, nrestitution, npotential;
-  SbEffect *prescribe, *begin_step, *assemble_constraints, *update_active_set, *force, *tangent,
+  /* one list per operation, holding only the effects that implement it; all of them lie in `lists` */
+  PetscInt nprescribe, nforce, ntangent, nnonsymmetric, naccept, nhistory, nbegin_step, nassemble_constraints,
+    nupdate_active_set, ntime_of_impact, nrestitution, npotential;
+  SbEffect *lists, *prescribe, *begin_step, *assemble_constraints, *update_active_set, *force, *tangent,
     *nonsymmetric, *accept, *history, *time_of_impact, *restitution, *potential;
   struct {
     Vec U0, V0;     /* state when the step began; borrowed */

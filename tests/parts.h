@@ -155,7 +155,10 @@ static inline PetscErrorCode part_names(const char *family, PetscInt *n, char na
   PetscFunctionBeginUser;
   *n = 0;
   if (!strcmp(family, "effect")) {
-    PetscCall(part_names_list(SbEffectList, n, names));
+    const char *types[SB_EFFECT_TYPES];
+
+    *n = SbEffectTypes(types);
+    for (PetscInt i = 0; i < *n; i++) PetscCall(PetscStrncpy(names[i], types[i], SB_NAME_MAX));
   } else if (!strcmp(family, "element")) {
     PetscCall(part_names_list(SbElementList, n, names));
   } else if (!strcmp(family, "material")) {

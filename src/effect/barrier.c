@@ -609,7 +609,7 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   PetscCall(PetscFree(b->spring));
   PetscCall(SbContactOverlapFree(&b->overlap));
   e->data = b->data;
-  PetscCall((*b->destroy)(e));
+  if (b->destroy) PetscCall((*b->destroy)(e));
   PetscCall(PetscFree(b));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -7,8 +7,7 @@
 #include "effect_impl.h"
 
 typedef struct {
-  SbEffectOn on;
-  SbFormula density[3], time;
+  SbFormula density[3];
   SbDeadLoad load;
 } BodyForce;
 
@@ -24,9 +23,7 @@ static PetscErrorCode options_body_force(SbEffect e, const SbScope *scope)
   BodyForce *b = (BodyForce *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectReadOn(scope, &b->on));
   PetscCall(SbEffectFormulas(scope, "density", 3, PETSC_TRUE, b->density, &e->steady));
-  PetscCall(SbEffectFormulas(scope, "time", 1, PETSC_FALSE, &b->time, &e->steady));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -36,7 +33,7 @@ static PetscErrorCode setup_body_force(SbEffect e, SbSpace space)
   PetscInt n, *cells, *corners;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectCells(space, &b->on, &n, &cells));
+  PetscCall(SbEffectCells(space, &e->on, &n, &cells));
   PetscCall(PetscMalloc1(4 * n, &corners));
   for (PetscInt i = 0; i < 4 * n; i++) corners[i] = 4 * cells[i / 4] + i % 4;
   PetscCall(SbDeadLoadCreate(space, 4, n, corners, b->density, &b->load));
@@ -51,7 +48,7 @@ static PetscErrorCode force_body_force(SbEffect e, SbSpace space, const SbStage 
 
   PetscFunctionBeginUser;
   (void)space;
-  PetscCall(SbDeadLoadAdd(b->load, stage->t, SbFormulaEval(b->time, stage->t, NULL), f));
+  PetscCall(SbDeadLoadAdd(b->load, stage->t, SbFormulaEval(e->time, stage->t, NULL), f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -60,31 +57,18 @@ static PetscErrorCode destroy_body_force(SbEffect e)
   BodyForce *b = (BodyForce *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectFreeOn(&b->on));
   for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&b->density[i]));
-  PetscCall(SbFormulaDestroy(&b->time));
   PetscCall(SbDeadLoadDestroy(&b->load));
-  PetscCall(PetscFree(e->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode create_body_force(SbEffect e)
-{
-  BodyForce *b;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscNew(&b));
-  e->data = b;
-  e->ops.setfromoptions = options_body_force;
-  e->ops.setup = setup_body_force;
-  e->ops.force = force_body_force;
-  e->ops.destroy = destroy_body_force;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbEffectRegister_BodyForce(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbEffectRegister("body_force", create_body_force, PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+const SbEffectType SbEffectBodyForce = {
+  .name = "body_force",
+  .size = sizeof(BodyForce),
+  .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
+  .row = rows,
+  .ops = {.setfromoptions = options_body_force,
+          .setup = setup_body_force,
+          .force = force_body_force,
+          .destroy = destroy_body_force},
+};

@@ -221,22 +221,9 @@ static PetscErrorCode read_common(SbEffect e, const SbScope *scope, SbContactOpt
 }
 
 /* Bodies that meet each other. */
-typedef struct {
-  SbEffectOn on;
-} Bodies;
-
-static PetscErrorCode destroy_bodies(SbEffect e)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbEffectFreeOn(&((Bodies *)e->data)->on));
-  PetscCall(PetscFree(e->data));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode create_bodies(SbEffect e, const SbScope *scope, const SbContactOptions *o)
 {
-  SbBarrierScene scene = {.friction = o->friction.mu, .restitution = o->restitution};
-  Bodies *b;
+  SbBarrierScene scene = {.on = &e->on, .friction = o->friction.mu, .restitution = o->restitution};
 
   PetscFunctionBeginUser;
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(obstacles_only); k++) {
@@ -247,11 +234,6 @@ static PetscErrorCode create_bodies(SbEffect e, const SbScope *scope, const SbCo
                "-effect_%s_%s is for responses to obstacles: bodies meet each other by barrier; leave it out",
                e->name, obstacles_only[k]);
   }
-  PetscCall(PetscNew(&b));
-  e->data = b;
-  e->ops.destroy = destroy_bodies;
-  PetscCall(SbEffectReadOn(scope, &b->on));
-  scene.on = &b->on;
   PetscCall(SbOptionBool(scope, "self", &scene.self));
   PetscCall(SbOptionBool(scope, "pairs", &scene.pairs));
   PetscCall(SbBarrierCreate(e, scope, &scene));
@@ -285,16 +267,9 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode create_contact(SbEffect e)
-{
-  PetscFunctionBeginUser;
-  e->ops.setfromoptions = options_contact;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbEffectRegister_Contact(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbEffectRegister("contact", create_contact, PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+const SbEffectType SbEffectContact = {
+  .name = "contact",
+  .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
+  .row = rows,
+  .ops = {.setfromoptions = options_contact},
+};

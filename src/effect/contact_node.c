@@ -30,24 +30,6 @@
 #define PULLING 1e-6 /* of the largest contact force: what a node must pull with to leave */
 #define SETTLED 1e-4 /* of the largest contact force: what that of a spring may be off */
 
-static PetscErrorCode read_path(SbEffect e, const SbScope *scope)
-{
-  Contact *c = (Contact *)e->data;
-  PetscBool steady = PETSC_TRUE;
-  PetscReal length;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbEffectFormulas(scope, "displacement", 3, PETSC_FALSE, c->displacement, &steady));
-  PetscCall(SbEffectFormulas(scope, "angle", 1, PETSC_FALSE, &c->angle, &steady));
-  PetscCall(SbOptionReals(scope, "axis", c->axis));
-  PetscCall(SbOptionReals(scope, "axis_point", c->point));
-  length = PetscSqrtReal(SbDot3(c->axis, c->axis));
-  PetscCheck(length > 0, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "-effect_%s_axis: 0,0,0 is no direction",
-             e->name);
-  for (int i = 0; i < 3; i++) c->axis[i] /= length;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode read_obstacle(SbEffect e, const SbScope *scope)
 {
   Contact *c = (Contact *)e->data;
@@ -86,7 +68,7 @@ static void pose_of(const void *data, PetscReal t, SbPose *pose)
 static PetscErrorCode create_barrier(SbEffect e, const SbScope *scope, PetscReal restitution)
 {
   Contact *c = (Contact *)e->data;
-  SbBarrierScene scene = {.on = &c->on,
+  SbBarrierScene scene = {.on = &e->on,
                           .obstacle = c->obstacle,
                           .pose = pose_of,
                           .friction = c->friction.mu,
@@ -102,11 +84,19 @@ static PetscErrorCode create_barrier(SbEffect e, const SbScope *scope, PetscReal
 PetscErrorCode SbContactOptions_Node(SbEffect e, const SbScope *scope, const SbContactOptions *o)
 {
   Contact *c = (Contact *)e->data;
+  PetscBool steady = PETSC_TRUE;
+  PetscReal length;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectReadOn(scope, &c->on));
   PetscCall(read_obstacle(e, scope));
-  PetscCall(read_path(e, scope));
+  PetscCall(SbEffectFormulas(scope, "displacement", 3, PETSC_FALSE, c->displacement, &steady));
+  PetscCall(SbEffectFormulas(scope, "angle", 1, PETSC_FALSE, &c->angle, &steady));
+  PetscCall(SbOptionReals(scope, "axis", c->axis));
+  PetscCall(SbOptionReals(scope, "axis_point", c->point));
+  length = PetscSqrtReal(SbDot3(c->axis, c->axis));
+  PetscCheck(length > 0, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "-effect_%s_axis: 0,0,0 is no direction",
+             e->name);
+  for (int i = 0; i < 3; i++) c->axis[i] /= length;
   c->response = o->response;
   c->friction = o->friction;
   if (c->response == BARRIER) {
@@ -161,7 +151,7 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
              "-effect_%s_damping %g s: a static run has no speed to damp; leave it out", e->name,
              (double)c->damping);
   if (!e->dynamic) c->overlap.recovery = 0;
-  PetscCall(SbEffectFacets(space, &c->on, &n, &facet));
+  PetscCall(SbEffectFacets(space, &e->on, &n, &facet));
   PetscCall(PetscMalloc1(6 * n, &c->touch));
   PetscCall(PetscMalloc1(space->nnode, &slot));
   for (PetscInt i = 0; i < space->nnode; i++) slot[i] = -1;
@@ -512,12 +502,10 @@ static PetscErrorCode destroy_contact(SbEffect e)
   Contact *c = (Contact *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectFreeOn(&c->on));
   PetscCall(SbObstacleDestroy(&c->obstacle));
   for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&c->displacement[i]));
   PetscCall(SbFormulaDestroy(&c->angle));
   PetscCall(PetscFree(c->touch));
-  PetscCall(PetscFree(e->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

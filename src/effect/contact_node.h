@@ -58,7 +58,6 @@ typedef struct {
 } Touch;
 
 typedef struct {
-  SbEffectOn on;
   SbObstacle obstacle;
   SbResponse response;
   PetscBool held;   /* touching nodes are constrained; else they are pushed by force() */

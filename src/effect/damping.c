@@ -9,7 +9,6 @@
 #include "effect_impl.h"
 
 typedef struct {
-  SbEffectOn on;         /* names of bodies */
   PetscReal alpha, beta; /* 1/s, s */
 } Damping;
 
@@ -24,80 +23,55 @@ static PetscErrorCode options_damping(SbEffect e, const SbScope *scope)
   Damping *d = (Damping *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectReadOn(scope, &d->on));
   PetscCall(SbOptionReal(scope, "alpha", &d->alpha));
   PetscCall(SbOptionReal(scope, "beta", &d->beta));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An error with the nearest names when there is no body of that name. */
-static PetscErrorCode check_body(SbMesh mesh, const SbEffectOn *on, const char *name)
-{
-  const char **names;
-  char near[512];
-
-  PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < mesh->nbody; b++) {
-    PetscBool same;
-
-    PetscCall(PetscStrcmp(mesh->body[b].name, name, &same));
-    if (same) PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(PetscMalloc1(mesh->nbody, &names));
-  for (PetscInt b = 0; b < mesh->nbody; b++) names[b] = mesh->body[b].name;
-  PetscCall(SbNearestNames(name, mesh->nbody, names, sizeof(near), near));
-  PetscCall(PetscFree(names));
-  SETERRQ(mesh->comm, PETSC_ERR_USER_INPUT,
-          "%s: there is no body %s%s%s; damping acts on bodies, see -bodies", on->option, name,
-          near[0] ? "; did you mean " : "", near);
-}
-
 static PetscErrorCode setup_damping(SbEffect e, SbSpace space)
 {
   const Damping *d = (const Damping *)e->data;
+  const SbMesh mesh = space->mesh;
+  PetscBool *damped;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < d->on.n; i++) PetscCall(check_body(space->mesh, &d->on, d->on.name[i]));
+  /* the bodies of these names; an error with the nearest ones where there is none */
+  PetscCall(PetscCalloc1(mesh->nbody, &damped));
+  for (PetscInt b = 0; b < mesh->nbody; b++) damped[b] = (PetscBool)!e->on.n;
+  for (PetscInt i = 0; i < e->on.n; i++) {
+    PetscInt b = 0;
+
+    while (b < mesh->nbody && strcmp(mesh->body[b].name, e->on.name[i])) b++;
+    if (b == mesh->nbody) {
+      const char **names;
+      char near[512];
+
+      PetscCall(PetscMalloc1(mesh->nbody, &names));
+      for (b = 0; b < mesh->nbody; b++) names[b] = mesh->body[b].name;
+      PetscCall(SbNearestNames(e->on.name[i], mesh->nbody, names, sizeof(near), near));
+      PetscCall(PetscFree(names));
+      PetscCall(PetscFree(damped));
+      SETERRQ(mesh->comm, PETSC_ERR_USER_INPUT,
+              "%s: there is no body %s%s%s; damping acts on bodies, see -bodies", e->on.option, e->on.name[i],
+              near[0] ? "; did you mean " : "", near);
+    }
+    damped[b] = PETSC_TRUE;
+  }
   for (PetscInt r = 0; r < space->nregion; r++) {
     SbRegion *region = &space->region[r];
-    PetscBool damped = d->on.n ? PETSC_FALSE : PETSC_TRUE;
 
-    for (PetscInt i = 0; i < d->on.n && !damped; i++) {
-      PetscCall(PetscStrcmp(d->on.name[i], space->mesh->body[region->body].name, &damped));
-    }
-    if (!damped) continue;
+    if (!damped[region->body]) continue;
     region->alpha += d->alpha;
     region->beta += d->beta;
   }
+  PetscCall(PetscFree(damped));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode destroy_damping(SbEffect e)
-{
-  Damping *d = (Damping *)e->data;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbEffectFreeOn(&d->on));
-  PetscCall(PetscFree(e->data));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode create_damping(SbEffect e)
-{
-  Damping *d;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscNew(&d));
-  e->data = d;
-  e->ops.setfromoptions = options_damping;
-  e->ops.setup = setup_damping;
-  e->ops.destroy = destroy_damping;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbEffectRegister_Damping(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbEffectRegister("damping", create_damping, PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+const SbEffectType SbEffectDamping = {
+  .name = "damping",
+  .size = sizeof(Damping),
+  .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
+  .row = rows,
+  .ops = {.setfromoptions = options_damping, .setup = setup_damping},
+};

@@ -85,43 +85,6 @@ static PetscReal simplex_measure(PetscInt ncorner, const PetscReal *const x[4])
   return PetscAbsReal(n[0] * e[2][0] + n[1] * e[2][1] + n[2] * e[2][2]) / 6;
 }
 
-/* l of one item: what its barycentric coordinates receive, [ncorner]; quadratic: its nodes of P2, [10], as the cell numbers them. */
-static void integrate_item(SbDeadLoad load, PetscReal t, PetscBool quadratic, PetscInt npoint,
-                           PetscReal (*const b)[4], const PetscReal w[], const PetscInt corner[],
-                           PetscReal l[SB_CELL_NODES][3])
-{
-  const PetscInt nc = load->ncorner;
-  const SbMesh mesh = load->space->mesh;
-  const PetscReal *x[4];
-  PetscReal measure;
-
-  for (int k = 0; k < 3 * SB_CELL_NODES; k++) l[k / 3][k % 3] = 0;
-  for (PetscInt c = 0; c < nc; c++) x[c] = &mesh->x[3 * mesh->cell[corner[c]]];
-  measure = simplex_measure(nc, x);
-  for (PetscInt k = 0; k < npoint; k++) {
-    PetscReal p[3] = {0, 0, 0}, q[3];
-
-    for (PetscInt c = 0; c < nc; c++) {
-      for (int i = 0; i < 3; i++) p[i] += b[k][c] * x[c][i];
-    }
-    for (int i = 0; i < 3; i++) q[i] = measure * w[k] * SbFormulaEval(load->density[i], t, p);
-    for (PetscInt c = 0; c < nc && !quadratic; c++) {
-      for (int i = 0; i < 3; i++) l[c][i] += b[k][c] * q[i];
-    }
-    if (quadratic) {
-      PetscReal L[4] = {0, 0, 0, 0};
-
-      for (PetscInt c = 0; c < nc; c++) L[corner[c] % 4] = b[k][c];
-      for (int a = 0; a < SB_CELL_NODES; a++) {
-        const PetscReal phi =
-          a < 4 ? L[a] * (2 * L[a] - 1) : 4 * L[SbTetEdge[a - 4][0]] * L[SbTetEdge[a - 4][1]];
-
-        for (int i = 0; i < 3; i++) l[a][i] += phi * q[i];
-      }
-    }
-  }
-}
-
 /* value = the load at time t. */
 static void integrate(SbDeadLoad load, PetscReal t)
 {
@@ -135,9 +98,36 @@ static void integrate(SbDeadLoad load, PetscReal t)
     const SbElement element = SbSpaceCellElement(load->space, corner[0] / 4);
     const SbElementOps *e = &element->ops;
     const PetscBool quadratic = (PetscBool)(element->nodes_per[1] > 0);
-    PetscReal l[SB_CELL_NODES][3];
+    PetscReal l[SB_CELL_NODES][3], measure;
+    const SbMesh mesh = load->space->mesh;
+    const PetscReal *x[4];
 
-    integrate_item(load, t, quadratic, npoint, b, w, corner, l);
+    /* l of one item: what its barycentric coordinates receive, [ncorner]; quadratic: its nodes of P2, [10], as the cell numbers them. */
+    for (int k = 0; k < 3 * SB_CELL_NODES; k++) l[k / 3][k % 3] = 0;
+    for (PetscInt c = 0; c < nc; c++) x[c] = &mesh->x[3 * mesh->cell[corner[c]]];
+    measure = simplex_measure(nc, x);
+    for (PetscInt k = 0; k < npoint; k++) {
+      PetscReal p[3] = {0, 0, 0}, q[3];
+
+      for (PetscInt c = 0; c < nc; c++) {
+        for (int i = 0; i < 3; i++) p[i] += b[k][c] * x[c][i];
+      }
+      for (int i = 0; i < 3; i++) q[i] = measure * w[k] * SbFormulaEval(load->density[i], t, p);
+      for (PetscInt c = 0; c < nc && !quadratic; c++) {
+        for (int i = 0; i < 3; i++) l[c][i] += b[k][c] * q[i];
+      }
+      if (quadratic) {
+        PetscReal L[4] = {0, 0, 0, 0};
+
+        for (PetscInt c = 0; c < nc; c++) L[corner[c] % 4] = b[k][c];
+        for (int a = 0; a < SB_CELL_NODES; a++) {
+          const PetscReal phi =
+            a < 4 ? L[a] * (2 * L[a] - 1) : 4 * L[SbTetEdge[a - 4][0]] * L[SbTetEdge[a - 4][1]];
+
+          for (int i = 0; i < 3; i++) l[a][i] += phi * q[i];
+        }
+      }
+    }
     for (PetscInt a = 0; a < load->nslot; a++) {
       const PetscInt slot = load->slot[load->nslot * item + a];
 

@@ -1,13 +1,14 @@
 /*
   effect.c - the registry of effects, and how one comes to be from its name in the scenario.
 
-  An effect is created by its constructor, which fills the table of operations and the private data; then it
-  reads its options. Everything that needs the mesh waits for its setup operation.
+  An effect gets the operations of its type and private data of zeros; then it reads its options. Everything that needs the
+  mesh waits for its setup operation.
 */
 #include "effect_impl.h"
 #include "sblog.h"
 
-PetscFunctionList SbEffectList = NULL;
+static const SbEffectType *types[SB_EFFECT_TYPES];
+static PetscInt ntype;
 
 static const SbOption common_rows[] = {
   {"type", SB_OPTION_STRING, 1, "", "", "", "type of the effect; default: its name"},
@@ -17,28 +18,30 @@ static const SbOption common_rows[] = {
    "time until which the effect acts; a support is released at the end of the step that reaches it"},
 };
 
-static PetscErrorCode forget_types(void)
+PetscErrorCode SbEffectRegister(const SbEffectType *type)
 {
+  PetscInt i = 0;
+
   PetscFunctionBeginUser;
-  PetscCall(PetscFunctionListDestroy(&SbEffectList));
+  // What there is may be registered again and again: the options may have been forgotten.
+  while (i < ntype && types[i] != type) i++;
+  PetscCheck(i < SB_EFFECT_TYPES, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No room for effects of type %s",
+             type->name);
+  if (i == ntype) types[ntype++] = type;
+  PetscCall(SbOptionsRegister("effect", "", PETSC_STATIC_ARRAY_LENGTH(common_rows), common_rows));
+  PetscCall(SbOptionsRegister("effect", type->name, type->nrow, type->row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEffectRegister(const char *type, PetscErrorCode (*create)(SbEffect), PetscInt nrows,
-                                const SbOption rows[])
+PetscInt SbEffectTypes(const char *names[SB_EFFECT_TYPES])
 {
-  PetscFunctionBeginUser;
-  // The first type brings the clean-up; what all types have in common may be registered again and again.
-  if (!SbEffectList) PetscCall(PetscRegisterFinalize(forget_types));
-  PetscCall(PetscFunctionListAdd(&SbEffectList, type, create));
-  PetscCall(SbOptionsRegister("effect", "", PETSC_STATIC_ARRAY_LENGTH(common_rows), common_rows));
-  PetscCall(SbOptionsRegister("effect", type, nrows, rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = 0; i < ntype; i++) names[i] = types[i]->name;
+  return ntype;
 }
 
 PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
 {
-  PetscErrorCode (*create)(SbEffect) = NULL;
+  const SbEffectType *is = NULL;
   SbEffect e;
   SbScope scope;
   char type[SB_NAME_MAX];
@@ -48,11 +51,13 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
   PetscCall(SbScopeSet(&scope, "effect", "", name));
   PetscCall(SbOptionString(&scope, "type", sizeof(type), type));
   if (!type[0]) PetscCall(PetscStrncpy(type, name, sizeof(type)));
-  PetscCall(PetscFunctionListFind(SbEffectList, type, &create));
-  if (!create) {
+  for (PetscInt i = 0; i < ntype; i++)
+    if (!strcmp(types[i]->name, type)) is = types[i];
+  if (!is) {
+    const char *names[SB_EFFECT_TYPES];
     char all[512];
 
-    PetscCall(SbListAdvise(SbEffectList, type, sizeof(all), all));
+    PetscCall(SbNamesAdvise(type, SbEffectTypes(names), names, sizeof(all), all));
     SETERRQ(PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
             "effect %s: there is no effect of type \"%s\"; set -effect_%s_type to one of %s", name, type,
             name, all);
@@ -65,8 +70,20 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
   PetscCall(SbLogNamed("Eff", type, &e->event));
   e->linear = PETSC_TRUE;
   e->steady = PETSC_TRUE;
-  PetscCall((*create)(e));
+  e->ops = is->ops;
+  e->column = is->column;
+  e->ncolumn = is->ncolumn;
+  if (is->size) PetscCall(PetscCalloc(is->size, &e->data));
   PetscCall(SbScopeSet(&scope, "effect", type, name));
+
+  /* the sets that it acts on, and the factor on a load */
+  for (PetscInt i = 0; i < is->nrow; i++) {
+    if (!strcmp(is->row[i].key, "on")) {
+      PetscCall(SbOptionName(&scope, "on", sizeof(e->on.option), e->on.option));
+      PetscCall(SbOptionNames(&scope, "on", &e->on.n, &e->on.name));
+    } else if (!strcmp(is->row[i].key, "time"))
+      PetscCall(SbEffectFormulas(&scope, "time", 1, PETSC_FALSE, &e->time, &e->steady));
+  }
   if (e->ops.setfromoptions) PetscCall((*e->ops.setfromoptions)(e, &scope));
 
   /* when it acts: what comes and goes are loads and supports */
@@ -108,6 +125,9 @@ PetscErrorCode SbEffectDestroy(SbEffect *effect)
   PetscFunctionBeginUser;
   if (!*effect) PetscFunctionReturn(PETSC_SUCCESS);
   if ((*effect)->ops.destroy) PetscCall((*(*effect)->ops.destroy)(*effect));
+  PetscCall(SbFormulaDestroy(&(*effect)->time));
+  PetscCall(PetscFree((*effect)->on.name));
+  PetscCall(PetscFree((*effect)->data));
   PetscCall(PetscFree(*effect));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -115,10 +135,7 @@ PetscErrorCode SbEffectDestroy(SbEffect *effect)
 PetscErrorCode SbContactPointsAdd(SbContactPoints *list, const SbContactPoint *point)
 {
   PetscFunctionBeginUser;
-  if (list->n == list->size) {
-    list->size = PetscMax(64, 2 * list->size);
-    PetscCall(PetscRealloc((size_t)list->size * sizeof(SbContactPoint), &list->point));
-  }
+  PetscCall(SbReserve(list->n + 1, sizeof(SbContactPoint), &list->size, &list->point));
   list->point[list->n++] = *point;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -126,13 +143,9 @@ PetscErrorCode SbContactPointsAdd(SbContactPoints *list, const SbContactPoint *p
 PetscErrorCode SbEffectMarkPrescribed(SbEffect e, PetscInt nset, SbSet set[])
 {
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; e->prescribed && i < e->prescribed->n; i++) {
-    for (PetscInt k = 0; k < nset; k++) {
-      PetscBool same;
-
-      PetscCall(PetscStrcmp(set[k].name, e->prescribed->name[i], &same));
-      if (same) set[k].prescribed = PETSC_TRUE;
-    }
+  for (PetscInt i = 0; e->prescribed && i < e->on.n; i++) {
+    for (PetscInt k = 0; k < nset; k++)
+      if (!strcmp(set[k].name, e->on.name[i])) set[k].prescribed = PETSC_TRUE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -22,15 +22,6 @@
 PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt n, PetscBool position,
                                 SbFormula formulas[], PetscBool *steady);
 
-/* The sets named by the option -effect_<name>_on, as read by SbEffectReadOn(). */
-typedef struct SbEffectOn_ {
-  char option[2 * SB_NAME_MAX]; /* full name of the option, for messages */
-  PetscInt n;
-  char (*name)[SB_NAME_MAX]; /* [n] owned */
-} SbEffectOn;
-PetscErrorCode SbEffectReadOn(const SbScope *scope, SbEffectOn *on); /* release with SbEffectFreeOn() */
-PetscErrorCode SbEffectFreeOn(SbEffectOn *on);
-
 /*
   What the named sets select on this rank, each item once even when it is in several of the sets. Collective; the caller
   releases the array with PetscFree(). Errors (PETSC_ERR_USER_INPUT, alike on all ranks): no such set; a set that selects

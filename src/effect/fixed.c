@@ -13,7 +13,6 @@
 #include "effect_impl.h"
 
 typedef struct {
-  SbEffectOn on;
   int components; /* bits 0..2 */
   SbPrescribed prescribed;
 } Fixed;
@@ -30,10 +29,9 @@ static PetscErrorCode options_fixed(SbEffect e, const SbScope *scope)
   PetscInt choice;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectReadOn(scope, &s->on));
   PetscCall(SbOptionChoice(scope, "components", &choice));
   s->components = SbPrescribedComponents(choice);
-  if (s->components == 7) e->prescribed = &s->on;
+  e->prescribed = (PetscBool)(s->components == 7);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -42,7 +40,7 @@ static PetscErrorCode setup_fixed(SbEffect e, SbSpace space)
   Fixed *s = (Fixed *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbPrescribedSetUp(&s->prescribed, space, &s->on, s->components));
+  PetscCall(SbPrescribedSetUp(&s->prescribed, space, &e->on, s->components));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -73,33 +71,22 @@ static PetscErrorCode destroy_fixed(SbEffect e)
   Fixed *s = (Fixed *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectFreeOn(&s->on));
   PetscCall(SbPrescribedFree(&s->prescribed));
-  PetscCall(PetscFree(e->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode create_fixed(SbEffect e)
-{
-  static const char *const columns[] = {"reaction_x", "reaction_y", "reaction_z"};
-  Fixed *s;
+static const char *const columns[] = {"reaction_x", "reaction_y", "reaction_z"};
 
-  PetscFunctionBeginUser;
-  PetscCall(PetscNew(&s));
-  e->data = s;
-  e->ops.setfromoptions = options_fixed;
-  e->ops.setup = setup_fixed;
-  e->ops.prescribe = prescribe_fixed;
-  e->ops.history = history_fixed;
-  e->ops.destroy = destroy_fixed;
-  e->column = columns;
-  e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbEffectRegister_Fixed(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbEffectRegister("fixed", create_fixed, PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+const SbEffectType SbEffectFixed = {
+  .name = "fixed",
+  .size = sizeof(Fixed),
+  .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
+  .row = rows,
+  .ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns),
+  .column = columns,
+  .ops = {.setfromoptions = options_fixed,
+          .setup = setup_fixed,
+          .prescribe = prescribe_fixed,
+          .history = history_fixed,
+          .destroy = destroy_fixed},
+};

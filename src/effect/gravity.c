@@ -6,11 +6,6 @@
 */
 #include "effect_impl.h"
 
-typedef struct {
-  PetscReal g[3]; /* m/s^2 */
-  SbFormula time;
-} Gravity;
-
 static const SbOption rows[] = {
   {"vector", SB_OPTION_REALS, 3, "m/s^2", "0,0,-9.81", "", "acceleration"},
   {"time", SB_OPTION_FORMULA, 1, "", "1", "",
@@ -19,20 +14,17 @@ static const SbOption rows[] = {
 
 static PetscErrorCode options_gravity(SbEffect e, const SbScope *scope)
 {
-  Gravity *gravity = (Gravity *)e->data;
-
   PetscFunctionBeginUser;
-  PetscCall(SbOptionReals(scope, "vector", gravity->g));
-  PetscCall(SbEffectFormulas(scope, "time", 1, PETSC_FALSE, &gravity->time, &e->steady));
+  PetscCall(SbOptionReals(scope, "vector", (PetscReal *)e->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode force_gravity(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
 {
-  const Gravity *gravity = (const Gravity *)e->data;
-  const PetscReal s = SbFormulaEval(gravity->time, stage->t, NULL);
+  const PetscReal *vector = (const PetscReal *)e->data;
+  const PetscReal s = SbFormulaEval(e->time, stage->t, NULL);
   const PetscReal *mass = space->consistent_mass || !e->dynamic ? space->node_share : space->node_mass;
-  const PetscReal g[3] = {s * gravity->g[0], s * gravity->g[1], s * gravity->g[2]};
+  const PetscReal g[3] = {s * vector[0], s * vector[1], s * vector[2]};
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < space->nnode_owned; i++) {
@@ -42,32 +34,10 @@ static PetscErrorCode force_gravity(SbEffect e, SbSpace space, const SbStage *st
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode destroy_gravity(SbEffect e)
-{
-  Gravity *gravity = (Gravity *)e->data;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbFormulaDestroy(&gravity->time));
-  PetscCall(PetscFree(e->data));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode create_gravity(SbEffect e)
-{
-  Gravity *gravity;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscNew(&gravity));
-  e->data = gravity;
-  e->ops.setfromoptions = options_gravity;
-  e->ops.force = force_gravity;
-  e->ops.destroy = destroy_gravity;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbEffectRegister_Gravity(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbEffectRegister("gravity", create_gravity, PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+const SbEffectType SbEffectGravity = {
+  .name = "gravity",
+  .size = sizeof(PetscReal[3]),
+  .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
+  .row = rows,
+  .ops = {.setfromoptions = options_gravity, .force = force_gravity},
+};

@@ -12,8 +12,7 @@
 #include "effect_impl.h"
 
 typedef struct {
-  SbEffectOn on;
-  SbFormula vector[3], time;
+  SbFormula vector[3];
   PetscInt n;       /* owned nodes that have a part */
   PetscInt *node;   /* [n] local */
   PetscReal *share; /* [n] of the total force */
@@ -30,38 +29,25 @@ static PetscErrorCode options_point_force(SbEffect e, const SbScope *scope)
   PointForce *p = (PointForce *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectReadOn(scope, &p->on));
   PetscCall(SbEffectFormulas(scope, "vector", 3, PETSC_FALSE, p->vector, &e->steady));
-  PetscCall(SbEffectFormulas(scope, "time", 1, PETSC_FALSE, &p->time, &e->steady));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the share of vertex k of a cell to its nodes; part: the cell's of the volume around the vertex. */
-static void spread(SbSpace space, PetscInt cell, int k, PetscReal share, PetscReal part,
-                   PetscReal node_share[])
+static PetscErrorCode setup_point_force(SbEffect e, SbSpace space)
 {
-  const SbElement element = SbSpaceCellElement(space, cell);
-
-  for (int a = 0; a < 4; a++) {
-    const PetscInt node = space->cell_node[4 * cell + a];
-
-    // A P1 node is the vertex: the parts of its cells add up to one.
-    if (element->nodes_per[0])
-      node_share[node] = a == k ? share : node_share[node];
-    else
-      node_share[node] += part * share * element->ops.vertex[k][a];
-  }
-}
-
-/* node_share[nnode] = part of the total force that each node has, right on owned ones; share: that of a vertex. */
-static PetscErrorCode spread_all(SbSpace space, PetscInt n, const PetscInt vertices[], PetscReal share,
-                                 PetscReal node_share[])
-{
+  PointForce *p = (PointForce *)e->data;
+  PetscInt n, total = 0, *vertices;
+  PetscReal *node_share;
   const SbMesh mesh = space->mesh;
   PetscReal *volume; /* of the cells around each selected vertex, m^3 */
   PetscBool *chosen;
 
   PetscFunctionBeginUser;
+  PetscCall(SbEffectVertices(space, &e->on, &n, &vertices));
+  while (total < n && vertices[total] < space->mesh->nvert_owned) total++;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_INT, MPI_SUM, space->comm));
+  PetscCall(PetscCalloc1(space->nnode, &node_share));
+  /* node_share[nnode] = part of the total force that each node has, right on owned ones; share: that of a vertex. */
   PetscCall(PetscCalloc2(mesh->nvert, &volume, mesh->nvert, &chosen));
   for (PetscInt i = 0; i < n; i++) chosen[vertices[i]] = PETSC_TRUE;
   for (int pass = 0; pass < 2; pass++) {
@@ -71,28 +57,25 @@ static PetscErrorCode spread_all(SbSpace space, PetscInt n, const PetscInt verti
       const PetscInt v = l < space->batch_n[b] ? mesh->cell[4 * cell + k] : -1;
 
       if (v < 0 || !chosen[v]) continue;
-      if (pass)
-        spread(space, cell, k, share, space->batch_V[b][l] / volume[v], node_share);
-      else
+      if (pass) {
+        const SbElement element = SbSpaceCellElement(space, cell);
+
+        /* Adds the share of vertex k of a cell to its nodes; part: the cell's of the volume around the vertex. */
+        for (int a = 0; a < 4; a++) {
+          const PetscInt node = space->cell_node[4 * cell + a];
+
+          // A P1 node is the vertex: the parts of its cells add up to one.
+          if (element->nodes_per[0])
+            node_share[node] = a == k ? (1 / (PetscReal)total) : node_share[node];
+          else
+            node_share[node] +=
+              (space->batch_V[b][l] / volume[v]) * (1 / (PetscReal)total) * element->ops.vertex[k][a];
+        }
+      } else
         volume[v] += space->batch_V[b][l];
     }
   }
   PetscCall(PetscFree2(volume, chosen));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode setup_point_force(SbEffect e, SbSpace space)
-{
-  PointForce *p = (PointForce *)e->data;
-  PetscInt n, total = 0, *vertices;
-  PetscReal *node_share;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbEffectVertices(space, &p->on, &n, &vertices));
-  while (total < n && vertices[total] < space->mesh->nvert_owned) total++;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_INT, MPI_SUM, space->comm));
-  PetscCall(PetscCalloc1(space->nnode, &node_share));
-  PetscCall(spread_all(space, n, vertices, 1 / (PetscReal)total, node_share));
   for (PetscInt i = 0; i < space->nnode_owned; i++) p->n += node_share[i] != 0;
   PetscCall(PetscMalloc2(p->n, &p->node, p->n, &p->share));
   p->n = 0;
@@ -109,7 +92,7 @@ static PetscErrorCode setup_point_force(SbEffect e, SbSpace space)
 static PetscErrorCode force_point_force(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
 {
   const PointForce *p = (const PointForce *)e->data;
-  const PetscReal s = SbFormulaEval(p->time, stage->t, NULL);
+  const PetscReal s = SbFormulaEval(e->time, stage->t, NULL);
   PetscReal F[3];
 
   PetscFunctionBeginUser;
@@ -126,31 +109,18 @@ static PetscErrorCode destroy_point_force(SbEffect e)
   PointForce *p = (PointForce *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectFreeOn(&p->on));
   for (int c = 0; c < 3; c++) PetscCall(SbFormulaDestroy(&p->vector[c]));
-  PetscCall(SbFormulaDestroy(&p->time));
   PetscCall(PetscFree2(p->node, p->share));
-  PetscCall(PetscFree(e->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode create_point_force(SbEffect e)
-{
-  PointForce *p;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscNew(&p));
-  e->data = p;
-  e->ops.setfromoptions = options_point_force;
-  e->ops.setup = setup_point_force;
-  e->ops.force = force_point_force;
-  e->ops.destroy = destroy_point_force;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbEffectRegister_PointForce(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbEffectRegister("point_force", create_point_force, PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+const SbEffectType SbEffectPointForce = {
+  .name = "point_force",
+  .size = sizeof(PointForce),
+  .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
+  .row = rows,
+  .ops = {.setfromoptions = options_point_force,
+          .setup = setup_point_force,
+          .force = force_point_force,
+          .destroy = destroy_point_force},
+};

@@ -12,7 +12,6 @@
 #include "effect_impl.h"
 
 typedef struct {
-  SbEffectOn on;
   int components; /* bits 0..2 */
   SbFormula displacement[3], angle;
   PetscReal point[3], axis[3]; /* m; unit vector */
@@ -41,10 +40,9 @@ static PetscErrorCode options_displacement(SbEffect e, const SbScope *scope)
   PetscReal length = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectReadOn(scope, &d->on));
   PetscCall(SbOptionChoice(scope, "components", &choice));
   d->components = SbPrescribedComponents(choice);
-  if (d->components == 7) e->prescribed = &d->on;
+  e->prescribed = (PetscBool)(d->components == 7);
   PetscCall(SbOptionGiven(scope, "displacement", &move));
   PetscCall(SbOptionGiven(scope, "angle", &turn));
   PetscCheck(
@@ -68,16 +66,9 @@ static PetscErrorCode setup_displacement(SbEffect e, SbSpace space)
   PrescribedDisplacement *d = (PrescribedDisplacement *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbPrescribedSetUp(&d->prescribed, space, &d->on, d->components));
+  PetscCall(SbPrescribedSetUp(&d->prescribed, space, &e->on, d->components));
   PetscCall(PetscMalloc1(3 * d->prescribed.n, &d->value));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static inline void cross(const PetscReal a[3], const PetscReal b[3], PetscReal c[3])
-{
-  c[0] = a[1] * b[2] - a[2] * b[1];
-  c[1] = a[2] * b[0] - a[0] * b[2];
-  c[2] = a[0] * b[1] - a[1] * b[0];
 }
 
 static PetscErrorCode prescribe_displacement(SbEffect e, SbSpace space, PetscReal t)
@@ -92,8 +83,8 @@ static PetscErrorCode prescribe_displacement(SbEffect e, SbSpace space, PetscRea
     const PetscReal r[3] = {X[0] - d->point[0], X[1] - d->point[1], X[2] - d->point[2]};
     PetscReal kr[3], kkr[3];
 
-    cross(d->axis, r, kr);
-    cross(d->axis, kr, kkr);
+    SbCross(d->axis, r, kr);
+    SbCross(d->axis, kr, kkr);
     for (int c = 0; c < 3; c++) {
       d->value[3 * i + c] =
         SbFormulaEval(d->displacement[c], t, X) + PetscSinReal(theta) * kr[c] + 2 * half * half * kkr[c];
@@ -119,7 +110,7 @@ static PetscErrorCode history_displacement(SbEffect e, SbSpace space, const SbSt
       arm[c] = space->node_x[3 * node + c] + stage->u[3 * node + c] - d->point[c];
       force[c] = d->prescribed.components[i] & (1 << c) ? residual[3 * node + c] : 0;
     }
-    cross(arm, force, moment);
+    SbCross(arm, force, moment);
     for (int c = 0; c < 3; c++) values[3] += d->axis[c] * moment[c];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -130,37 +121,25 @@ static PetscErrorCode destroy_displacement(SbEffect e)
   PrescribedDisplacement *d = (PrescribedDisplacement *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectFreeOn(&d->on));
   for (int c = 0; c < 3; c++) PetscCall(SbFormulaDestroy(&d->displacement[c]));
   PetscCall(SbFormulaDestroy(&d->angle));
   PetscCall(SbPrescribedFree(&d->prescribed));
   PetscCall(PetscFree(d->value));
-  PetscCall(PetscFree(e->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode create_displacement(SbEffect e)
-{
-  static const char *const columns[] = {"reaction_x", "reaction_y", "reaction_z", "torque"};
-  PrescribedDisplacement *d;
+static const char *const columns[] = {"reaction_x", "reaction_y", "reaction_z", "torque"};
 
-  PetscFunctionBeginUser;
-  PetscCall(PetscNew(&d));
-  e->data = d;
-  e->ops.setfromoptions = options_displacement;
-  e->ops.setup = setup_displacement;
-  e->ops.prescribe = prescribe_displacement;
-  e->ops.history = history_displacement;
-  e->ops.destroy = destroy_displacement;
-  e->column = columns;
-  e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbEffectRegister_PrescribedDisplacement(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(
-    SbEffectRegister("prescribed_displacement", create_displacement, PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+const SbEffectType SbEffectPrescribedDisplacement = {
+  .name = "prescribed_displacement",
+  .size = sizeof(PrescribedDisplacement),
+  .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
+  .row = rows,
+  .ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns),
+  .column = columns,
+  .ops = {.setfromoptions = options_displacement,
+          .setup = setup_displacement,
+          .prescribe = prescribe_displacement,
+          .history = history_displacement,
+          .destroy = destroy_displacement},
+};

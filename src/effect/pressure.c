@@ -37,8 +37,7 @@
 #include "effect_impl.h"
 
 typedef struct {
-  SbEffectOn on;
-  SbFormula value, time;
+  SbFormula value;
   PetscBool follower;
   PetscInt nfacet;
   SbFacet *facet;   /* [nfacet] of owned and ghost cells */
@@ -60,10 +59,8 @@ static PetscErrorCode options_pressure(SbEffect e, const SbScope *scope)
   Pressure *p = (Pressure *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectReadOn(scope, &p->on));
   PetscCall(SbEffectFormulas(scope, "value", 1, PETSC_FALSE, &p->value, &e->steady));
   PetscCall(SbOptionBool(scope, "follower", &p->follower));
-  PetscCall(SbEffectFormulas(scope, "time", 1, PETSC_FALSE, &p->time, &e->steady));
   if (p->follower)
     e->linear = PETSC_FALSE;
   else {
@@ -100,7 +97,7 @@ static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
   PetscBool some = PETSC_FALSE;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectFacets(space, &p->on, &p->nfacet, &p->facet));
+  PetscCall(SbEffectFacets(space, &e->on, &p->nfacet, &p->facet));
   PetscCall(PetscCalloc1(space->mesh->nbody, &p->whole));
   if (space->faces && p->follower) PetscCall(find_whole(p, space));
   /* the remainder of bodies with nodes at faces */
@@ -209,26 +206,6 @@ static void facet_sides(SbSpace space, const SbFacet *facet, const int node[6], 
   }
 }
 
-/* f -= p phi_a X x Y */
-static void add_quadratic(SbSpace space, const SbFacet *facet, const FacetPoint point[NPOINT],
-                          const PetscReal u[], PetscReal p, PetscReal f[])
-{
-  int node[6];
-
-  facet_nodes(facet, node);
-  for (int q = 0; q < NPOINT; q++) {
-    PetscReal side[2][3], N[3];
-
-    facet_sides(space, facet, node, &point[q], u, side);
-    SbCross(side[0], side[1], N);
-    for (int a = 0; a < 6; a++) {
-      const PetscInt n = SbSpaceCellNode(space, facet->cell, node[a]);
-
-      for (int i = 0; i < 3; i++) f[3 * n + i] -= p * point[q].weight * point[q].phi[a] * N[i];
-    }
-  }
-}
-
 /* [c]x */
 static inline void cross_block(const PetscReal c[3], PetscReal block[9])
 {
@@ -283,7 +260,7 @@ static inline PetscBool apart(SbSpace space, const SbFacet *facet)
 static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
 {
   const Pressure *load = (const Pressure *)e->data;
-  const PetscReal p = SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(load->time, stage->t, NULL);
+  const PetscReal p = SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(e->time, stage->t, NULL);
   const PetscReal *u = load->follower ? stage->u : NULL;
   FacetPoint point[NPOINT];
 
@@ -297,7 +274,21 @@ static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *s
     PetscReal x[3][3], d[3], b[3], N[3];
 
     if (quadratic(space, facet)) {
-      add_quadratic(space, facet, point, u, p, f);
+      int node[6];
+
+      /* f -= p phi_a X x Y */
+      facet_nodes(facet, node);
+      for (int q = 0; q < NPOINT; q++) {
+        PetscReal side[2][3], area[3];
+
+        facet_sides(space, facet, node, &point[q], u, side);
+        SbCross(side[0], side[1], area);
+        for (int a = 0; a < 6; a++) {
+          const PetscInt n = SbSpaceCellNode(space, facet->cell, node[a]);
+
+          for (int i = 0; i < 3; i++) f[3 * n + i] -= p * point[q].weight * point[q].phi[a] * area[i];
+        }
+      }
       continue;
     }
     corners(space, facet, u, x);
@@ -335,7 +326,7 @@ static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage 
 {
   const Pressure *load = (const Pressure *)e->data;
   const PetscReal p =
-    stage->shift_k * SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(load->time, stage->t, NULL);
+    stage->shift_k * SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(e->time, stage->t, NULL);
   FacetPoint point[NPOINT];
 
   PetscFunctionBeginUser;
@@ -374,7 +365,7 @@ static PetscErrorCode unsymmetric_pressure(SbEffect e, SbSpace space, const SbSt
 {
   const Pressure *load = (const Pressure *)e->data;
   const PetscReal p =
-    stage->shift_k * SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(load->time, stage->t, NULL);
+    stage->shift_k * SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(e->time, stage->t, NULL);
 
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < load->nfacet; k++) {
@@ -406,34 +397,21 @@ static PetscErrorCode destroy_pressure(SbEffect e)
   Pressure *p = (Pressure *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectFreeOn(&p->on));
   PetscCall(SbFormulaDestroy(&p->value));
-  PetscCall(SbFormulaDestroy(&p->time));
   PetscCall(PetscFree(p->facet));
   PetscCall(PetscFree(p->whole));
-  PetscCall(PetscFree(e->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode create_pressure(SbEffect e)
-{
-  Pressure *p;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscNew(&p));
-  e->data = p;
-  e->ops.setfromoptions = options_pressure;
-  e->ops.setup = setup_pressure;
-  e->ops.force = force_pressure;
-  e->ops.tangent = tangent_pressure;
-  e->ops.nonsymmetric = unsymmetric_pressure;
-  e->ops.destroy = destroy_pressure;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbEffectRegister_Pressure(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbEffectRegister("pressure", create_pressure, PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+const SbEffectType SbEffectPressure = {
+  .name = "pressure",
+  .size = sizeof(Pressure),
+  .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
+  .row = rows,
+  .ops = {.setfromoptions = options_pressure,
+          .setup = setup_pressure,
+          .force = force_pressure,
+          .tangent = tangent_pressure,
+          .nonsymmetric = unsymmetric_pressure,
+          .destroy = destroy_pressure},
+};

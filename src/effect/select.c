@@ -11,22 +11,6 @@
 */
 #include "effect_impl.h"
 
-PetscErrorCode SbEffectReadOn(const SbScope *scope, SbEffectOn *on)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionName(scope, "on", sizeof(on->option), on->option));
-  PetscCall(SbOptionNames(scope, "on", &on->n, &on->name));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbEffectFreeOn(SbEffectOn *on)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree(on->name));
-  on->n = 0;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 typedef enum { CELLS, FACETS, VERTICES } Kind;
 
 /* Numbers k[on->n] of the named sets; an error when one selects nothing of the kind. */

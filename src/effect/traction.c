@@ -8,9 +8,8 @@
 #include "effect_impl.h"
 
 typedef struct {
-  SbEffectOn on;
   char option[3 * SB_NAME_MAX]; /* full name of the option "total" */
-  SbFormula vector[3], time;
+  SbFormula vector[3];
   PetscReal total[3];             /* N */
   SbFormula uniform[3];           /* total per area, Pa */
   SbDeadLoad by_vector, by_total; /* NULL when not given */
@@ -31,7 +30,6 @@ static PetscErrorCode options_traction(SbEffect e, const SbScope *scope)
   Traction *q = (Traction *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectReadOn(scope, &q->on));
   PetscCall(SbOptionName(scope, "total", sizeof(q->option), q->option));
   PetscCall(SbOptionGiven(scope, "vector", &q->vector_given));
   PetscCall(SbOptionGiven(scope, "total", &q->total_given));
@@ -40,7 +38,6 @@ static PetscErrorCode options_traction(SbEffect e, const SbScope *scope)
              e->name, e->name, e->name);
   PetscCall(SbEffectFormulas(scope, "vector", 3, PETSC_TRUE, q->vector, &e->steady));
   PetscCall(SbOptionReals(scope, "total", q->total));
-  PetscCall(SbEffectFormulas(scope, "time", 1, PETSC_FALSE, &q->time, &e->steady));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -70,7 +67,7 @@ static PetscErrorCode setup_traction(SbEffect e, SbSpace space)
   PetscInt n, *corners;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectFacets(space, &q->on, &n, &facets));
+  PetscCall(SbEffectFacets(space, &e->on, &n, &facets));
   PetscCall(PetscMalloc1(3 * n, &corners));
   for (PetscInt i = 0; i < n; i++) {
     for (int a = 0; a < 3; a++) corners[3 * i + a] = 4 * facets[i].cell + facets[i].corner[a];
@@ -88,7 +85,7 @@ static PetscErrorCode setup_traction(SbEffect e, SbSpace space)
 static PetscErrorCode force_traction(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
 {
   const Traction *q = (const Traction *)e->data;
-  const PetscReal s = SbFormulaEval(q->time, stage->t, NULL);
+  const PetscReal s = SbFormulaEval(e->time, stage->t, NULL);
 
   PetscFunctionBeginUser;
   (void)space;
@@ -102,35 +99,22 @@ static PetscErrorCode destroy_traction(SbEffect e)
   Traction *q = (Traction *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectFreeOn(&q->on));
   for (int i = 0; i < 3; i++) {
     PetscCall(SbFormulaDestroy(&q->vector[i]));
     PetscCall(SbFormulaDestroy(&q->uniform[i]));
   }
-  PetscCall(SbFormulaDestroy(&q->time));
   PetscCall(SbDeadLoadDestroy(&q->by_vector));
   PetscCall(SbDeadLoadDestroy(&q->by_total));
-  PetscCall(PetscFree(e->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode create_traction(SbEffect e)
-{
-  Traction *q;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscNew(&q));
-  e->data = q;
-  e->ops.setfromoptions = options_traction;
-  e->ops.setup = setup_traction;
-  e->ops.force = force_traction;
-  e->ops.destroy = destroy_traction;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbEffectRegister_Traction(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbEffectRegister("traction", create_traction, PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+const SbEffectType SbEffectTraction = {
+  .name = "traction",
+  .size = sizeof(Traction),
+  .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
+  .row = rows,
+  .ops = {.setfromoptions = options_traction,
+          .setup = setup_traction,
+          .force = force_traction,
+          .destroy = destroy_traction},
+};

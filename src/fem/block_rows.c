@@ -26,57 +26,10 @@ static PetscInt find_column(SbSpace s, PetscInt row, PetscInt g)
   return -1;
 }
 
-static PetscErrorCode read_any(SbSpace s, Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],
-                               PetscReal block[])
-{
-  PetscFunctionBeginUser;
-  for (PetscInt k = 0; k < n; k++) {
-    for (PetscInt c = 0; c < 3; c++) {
-      const PetscInt row = 3 * (s->gnode_start + node[k]) + c, *column;
-      const PetscScalar *value;
-      PetscInt ncol, at = -1;
-
-      PetscCall(MatGetRow(A, row, &ncol, &column, &value));
-      for (PetscInt e = 0; e < ncol; e++) {
-        if (!e || column[e] / 3 != column[e - 1] / 3) at = find_column(s, node[k], column[e] / 3);
-        if (at >= 0) block[9 * (ia[k] + at) + 3 * c + column[e] % 3] = value[e];
-      }
-      PetscCall(MatRestoreRow(A, row, &ncol, &column, &value));
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* A block by columns to one by rows; `turned`: of the transposed block. */
 static inline void copy_block(const PetscScalar *from, PetscBool turned, PetscReal to[9])
 {
   for (int e = 0; e < 9; e++) to[e] = from[turned ? e : 3 * (e % 3) + e / 3];
-}
-
-static PetscErrorCode read_baij(SbSpace s, Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],
-                                PetscReal block[])
-{
-  const SbPlan p = s->plan;
-  PetscScalar *diagonal, *other = NULL;
-  Mat part[2] = {A, NULL};
-  PetscBool parallel;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
-  if (parallel) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &part[0], &part[1], NULL));
-  PetscCall(MatSeqBAIJGetArray(part[0], &diagonal));
-  if (part[1]) PetscCall(MatSeqBAIJGetArray(part[1], &other));
-  for (PetscInt k = 0; k < n; k++) {
-    PetscReal *to = block + 9 * ia[k];
-
-    for (PetscInt e = p->di[node[k]]; e < p->di[node[k] + 1]; e++, to += 9)
-      copy_block(diagonal + 9 * (size_t)e, PETSC_FALSE, to);
-    for (PetscInt e = p->oi[node[k]]; e < p->oi[node[k] + 1]; e++, to += 9)
-      copy_block(other + 9 * (size_t)e, PETSC_FALSE, to);
-  }
-  PetscCall(SbMatRestoreRead(part[0], MatSeqBAIJRestoreArray, &diagonal));
-  if (part[1]) PetscCall(SbMatRestoreRead(part[1], MatSeqBAIJRestoreArray, &other));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Blocks left of the diagonal are found, transposed, in the rows of their columns. */
@@ -128,11 +81,42 @@ PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[
   PetscCall(PetscArrayzero(block, 9 * ia[n]));
   if (R)
     PetscCall(SbMatrixFreeAddRows(A, n, node, ia, block));
-  else if (baij)
-    PetscCall(read_baij(s, A, n, node, ia, block));
-  else if (sbaij)
+  else if (baij) {
+    PetscScalar *diagonal, *other = NULL;
+    Mat part[2] = {A, NULL};
+    PetscBool parallel;
+
+    PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
+    if (parallel) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &part[0], &part[1], NULL));
+    PetscCall(MatSeqBAIJGetArray(part[0], &diagonal));
+    if (part[1]) PetscCall(MatSeqBAIJGetArray(part[1], &other));
+    for (PetscInt k = 0; k < n; k++) {
+      PetscReal *to = block + 9 * ia[k];
+
+      for (PetscInt e = p->di[node[k]]; e < p->di[node[k] + 1]; e++, to += 9)
+        copy_block(diagonal + 9 * (size_t)e, PETSC_FALSE, to);
+      for (PetscInt e = p->oi[node[k]]; e < p->oi[node[k] + 1]; e++, to += 9)
+        copy_block(other + 9 * (size_t)e, PETSC_FALSE, to);
+    }
+    PetscCall(SbMatRestoreRead(part[0], MatSeqBAIJRestoreArray, &diagonal));
+    if (part[1]) PetscCall(SbMatRestoreRead(part[1], MatSeqBAIJRestoreArray, &other));
+  } else if (sbaij)
     PetscCall(read_sbaij(s, A, n, node, ia, block));
-  else
-    PetscCall(read_any(s, A, n, node, ia, block));
+  else {
+    for (PetscInt k = 0; k < n; k++) {
+      for (PetscInt c = 0; c < 3; c++) {
+        const PetscInt row = 3 * (s->gnode_start + node[k]) + c, *column;
+        const PetscScalar *value;
+        PetscInt ncol, at = -1;
+
+        PetscCall(MatGetRow(A, row, &ncol, &column, &value));
+        for (PetscInt e = 0; e < ncol; e++) {
+          if (!e || column[e] / 3 != column[e - 1] / 3) at = find_column(s, node[k], column[e] / 3);
+          if (at >= 0) block[9 * (ia[k] + at) + 3 * c + column[e] % 3] = value[e];
+        }
+        PetscCall(MatRestoreRow(A, row, &ncol, &column, &value));
+      }
+    }
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -354,11 +354,22 @@ void SbConstraintsReactions(SbSpace s, PetscReal r[])
 
 /* ------------------------------------------------------------------ matrices */
 
-/* B <- P_i B P_j, rows rs apart, columns cs; Q NULL: not constrained. */
-static void project_block(const PetscReal *Qi, const PetscReal *Qj, size_t rs, size_t cs, PetscScalar *v)
+/* Size of a diagonal block. */
+static inline PetscReal block_size(const PetscScalar v[], size_t rs, size_t cs)
 {
-  PetscReal B[9], X[9];
+  return (PetscAbsReal(v[0]) + PetscAbsReal(v[rs + cs]) + PetscAbsReal(v[2 * (rs + cs)])) / 3.;
+}
 
+void SbConstraintsProjectBlock(SbSpace s, PetscInt i, PetscInt j, size_t rs, size_t cs, PetscScalar *v)
+{
+  const PetscReal *Qi = s->constraints->Q + 9 * i, *Qj = s->constraints->Q + 9 * j;
+  PetscReal size, B[9], X[9];
+
+  if (Qi[0] + Qi[4] + Qi[8] < 0.5) Qi = NULL;
+  if (Qj[0] + Qj[4] + Qj[8] < 0.5) Qj = NULL;
+  if (!Qi && !Qj) return;
+  size = block_size(v, rs, cs);
+  /* B <- P_i B P_j, rows rs apart, columns cs; Q NULL: not constrained. */
   for (size_t k = 0; k < 9; k++) B[k] = v[k / 3 * rs + k % 3 * cs];
   if (Qi) {
     SbMatMul(Qi, B, X);
@@ -369,24 +380,6 @@ static void project_block(const PetscReal *Qi, const PetscReal *Qj, size_t rs, s
     for (int k = 0; k < 9; k++) B[k] -= X[k];
   }
   for (size_t k = 0; k < 9; k++) v[k / 3 * rs + k % 3 * cs] = B[k];
-}
-
-/* Size of a diagonal block. */
-static inline PetscReal block_size(const PetscScalar v[], size_t rs, size_t cs)
-{
-  return (PetscAbsReal(v[0]) + PetscAbsReal(v[rs + cs]) + PetscAbsReal(v[2 * (rs + cs)])) / 3.;
-}
-
-void SbConstraintsProjectBlock(SbSpace s, PetscInt i, PetscInt j, size_t rs, size_t cs, PetscScalar *v)
-{
-  const PetscReal *Qi = s->constraints->Q + 9 * i, *Qj = s->constraints->Q + 9 * j;
-  PetscReal size;
-
-  if (Qi[0] + Qi[4] + Qi[8] < 0.5) Qi = NULL;
-  if (Qj[0] + Qj[4] + Qj[8] < 0.5) Qj = NULL;
-  if (!Qi && !Qj) return;
-  size = block_size(v, rs, cs);
-  project_block(Qi, Qj, rs, cs, v);
   for (size_t k = 0; k < 9 && i == j; k++) v[k / 3 * rs + k % 3 * cs] += size * Qi[k];
 }
 

@@ -34,21 +34,18 @@ static void begin_with_glue(SbSpace s, const SbValues *x, PetscInt i, int q)
   }
 }
 
-static void clear_row(SbSpace s, const SbValues *x, PetscInt i, int q)
-{
-  const SbPlan p = s->plan;
-  const PetscInt *ptr = q ? p->oi : x->kind == SB_MATRIX_SBAIJ ? p->ui : p->di;
-
-  memset(x->value[q] + 9 * (size_t)ptr[i], 0, 72 * (size_t)(ptr[i + 1] - ptr[i]));
-}
-
 void SbInsertClear(SbSpace s, const SbValues *x, PetscInt b)
 {
   const SbPlan p = s->plan;
 
   for (PetscInt k = p->fresh_start[b]; k < p->fresh_start[b + 1]; k++) {
     for (int q = 0; q < (x->value[1] ? 2 : 1); q++) {
-      if (!x->face_term || x->kind == SB_MATRIX_AIJ) clear_row(s, x, p->fresh[k], q);
+      if (!x->face_term || x->kind == SB_MATRIX_AIJ) {
+        const PetscInt *ptr = q ? p->oi : x->kind == SB_MATRIX_SBAIJ ? p->ui : p->di;
+
+        memset(x->value[q] + 9 * (size_t)ptr[p->fresh[k]], 0,
+               72 * (size_t)(ptr[p->fresh[k] + 1] - ptr[p->fresh[k]]));
+      }
       if (x->face_term) begin_with_glue(s, x, p->fresh[k], q);
     }
   }

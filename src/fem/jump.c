@@ -128,12 +128,29 @@ static PetscErrorCode find_faces(SbSpace s, const PetscInt region_of[], PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode fill_batches(SbSpace s, const PetscInt region_of[], const PetscReal V[], PetscInt nface,
-                                   const Face faces[], SbJump j)
+PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
 {
-  PetscInt b = -1;
+  PetscInt nface = 0, *region_of, b = -1;
+  PetscReal *V;
+  Face *faces;
+  SbJump j;
 
   PetscFunctionBeginUser;
+  PetscCall(PetscNew(&j));
+  PetscCall(PetscMalloc2(s->mesh->ncell, &region_of, s->mesh->ncell, &V));
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+
+    for (PetscInt c = region->cstart; c < region->cend; c++) {
+      const PetscInt k = c - region->cstart;
+
+      region_of[c] = r;
+      V[c] = s->batch_V[region->bstart + k / SB_BATCH][k % SB_BATCH];
+    }
+  }
+  PetscCall(find_faces(s, region_of, &nface, &faces));
+  /* a batch never mixes bodies: one more each at most */
+  j->nbatch = nface / SB_BATCH + s->mesh->nbody;
   PetscCall(PetscMalloc3(j->nbatch, &j->region, j->nbatch, &j->n, j->nbatch * 8 * SB_BATCH, &j->node));
   PetscCall(PetscCalloc3(j->nbatch, &j->c0, j->nbatch, &j->c1, j->nbatch, &j->share));
   for (PetscInt i = 0; i < nface; i++) {
@@ -157,33 +174,6 @@ static PetscErrorCode fill_batches(SbSpace s, const PetscInt region_of[], const 
       j->share[b][l] += cell < s->mesh->ncell_owned ? 0.5 : 0.;
     }
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
-{
-  PetscInt nface = 0, *region_of;
-  PetscReal *V;
-  Face *faces;
-  SbJump j;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscNew(&j));
-  PetscCall(PetscMalloc2(s->mesh->ncell, &region_of, s->mesh->ncell, &V));
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
-
-    for (PetscInt c = region->cstart; c < region->cend; c++) {
-      const PetscInt k = c - region->cstart;
-
-      region_of[c] = r;
-      V[c] = s->batch_V[region->bstart + k / SB_BATCH][k % SB_BATCH];
-    }
-  }
-  PetscCall(find_faces(s, region_of, &nface, &faces));
-  /* a batch never mixes bodies: one more each at most */
-  j->nbatch = nface / SB_BATCH + s->mesh->nbody;
-  PetscCall(fill_batches(s, region_of, V, nface, faces, j));
   j->nbatch = 0;
   for (PetscInt i = 0; i < nface; i += j->n[j->nbatch++]) {
   }

@@ -358,47 +358,6 @@ static PetscErrorCode layout_vertices(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode layout_others(SbSpace s, PetscBool quadratic)
-{
-  SbMesh mesh = s->mesh;
-  const uint64_t prescribed = prescribed_sets(s);
-  Edges edges = {0};
-
-  PetscFunctionBeginUser;
-  if (s->faces) PetscCall(SbMeshNeighbours(mesh, &s->neighbour));
-  if (quadratic) {
-    PetscCall(find_edges(s, &edges));
-    PetscCall(PetscMalloc1(6 * (size_t)mesh->ncell, &s->edge_node));
-  }
-  PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->cell_node));
-  if (prescribed) {
-    PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->dirichlet_node));
-    for (PetscInt i = 0; i < 4 * mesh->ncell; i++) s->dirichlet_node[i] = UNKNOWN;
-  }
-  PetscCall(number_owned(s, prescribed, &edges, s->cell_node));
-  PetscCallMPI(MPI_Scan(&s->nnode_owned, &s->gnode_start, 1, MPIU_INT, MPI_SUM, s->comm));
-  PetscCallMPI(MPI_Allreduce(&s->nnode_owned, &s->Nnode, 1, MPIU_INT, MPI_SUM, s->comm));
-  s->gnode_start -= s->nnode_owned;
-  for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++) {
-    if (s->cell_node[i] != UNKNOWN) s->cell_node[i] += s->gnode_start;
-    if (s->dirichlet_node && s->dirichlet_node[i] != UNKNOWN) s->dirichlet_node[i] += s->gnode_start;
-  }
-  for (PetscInt i = 0; quadratic && i < 6 * mesh->ncell_owned; i++) {
-    if (s->edge_node[i] != UNKNOWN) s->edge_node[i] += s->gnode_start;
-  }
-  for (int round = 0; round < 2; round++) {
-    if (round) PetscCall(complete_owned(s, &edges, s->cell_node));
-    PetscCall(SbMeshBroadcastCells(mesh, 4, MPIU_INT, s->cell_node));
-    if (quadratic) PetscCall(SbMeshBroadcastCells(mesh, 6, MPIU_INT, s->edge_node));
-  }
-  if (s->dirichlet_node) PetscCall(SbMeshBroadcastCells(mesh, 4, MPIU_INT, s->dirichlet_node));
-  PetscCall(localise(s));
-  PetscCall(describe_nodes(s, &edges));
-  PetscCall(PetscFree(edges.edge));
-  PetscCall(PetscFree3(edges.first, edges.own, edges.at));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbLayoutNodes(SbSpace s)
 {
   PetscBool quadratic = PETSC_FALSE;
@@ -411,8 +370,43 @@ PetscErrorCode SbLayoutNodes(SbSpace s)
   s->vertices = (PetscBool)(!s->faces && !quadratic);
   if (s->vertices)
     PetscCall(layout_vertices(s));
-  else
-    PetscCall(layout_others(s, quadratic));
+  else {
+    SbMesh mesh = s->mesh;
+    const uint64_t prescribed = prescribed_sets(s);
+    Edges edges = {0};
+
+    if (s->faces) PetscCall(SbMeshNeighbours(mesh, &s->neighbour));
+    if (quadratic) {
+      PetscCall(find_edges(s, &edges));
+      PetscCall(PetscMalloc1(6 * (size_t)mesh->ncell, &s->edge_node));
+    }
+    PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->cell_node));
+    if (prescribed) {
+      PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->dirichlet_node));
+      for (PetscInt i = 0; i < 4 * mesh->ncell; i++) s->dirichlet_node[i] = UNKNOWN;
+    }
+    PetscCall(number_owned(s, prescribed, &edges, s->cell_node));
+    PetscCallMPI(MPI_Scan(&s->nnode_owned, &s->gnode_start, 1, MPIU_INT, MPI_SUM, s->comm));
+    PetscCallMPI(MPI_Allreduce(&s->nnode_owned, &s->Nnode, 1, MPIU_INT, MPI_SUM, s->comm));
+    s->gnode_start -= s->nnode_owned;
+    for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++) {
+      if (s->cell_node[i] != UNKNOWN) s->cell_node[i] += s->gnode_start;
+      if (s->dirichlet_node && s->dirichlet_node[i] != UNKNOWN) s->dirichlet_node[i] += s->gnode_start;
+    }
+    for (PetscInt i = 0; quadratic && i < 6 * mesh->ncell_owned; i++) {
+      if (s->edge_node[i] != UNKNOWN) s->edge_node[i] += s->gnode_start;
+    }
+    for (int round = 0; round < 2; round++) {
+      if (round) PetscCall(complete_owned(s, &edges, s->cell_node));
+      PetscCall(SbMeshBroadcastCells(mesh, 4, MPIU_INT, s->cell_node));
+      if (quadratic) PetscCall(SbMeshBroadcastCells(mesh, 6, MPIU_INT, s->edge_node));
+    }
+    if (s->dirichlet_node) PetscCall(SbMeshBroadcastCells(mesh, 4, MPIU_INT, s->dirichlet_node));
+    PetscCall(localise(s));
+    PetscCall(describe_nodes(s, &edges));
+    PetscCall(PetscFree(edges.edge));
+    PetscCall(PetscFree3(edges.first, edges.own, edges.at));
+  }
   PetscCall(PetscCalloc1(s->nnode, &s->fixed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

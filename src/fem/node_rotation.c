@@ -37,9 +37,13 @@ static inline PetscInt batch_nodes(SbSpace s, PetscInt b)
   return s->edge_node && s->edge_node[6 * s->batch_cell[b]] >= 0 ? SB_CELL_NODES : 4;
 }
 
-/* sum[nnode][9] += V R of every cell at its nodes. */
-static void sum_rotations(SbSpace s, const SbLane R[], PetscReal sum[])
+PetscErrorCode SbSpaceAverageRotations(SbSpace s, const SbLane R[], PetscReal node_R[], PetscReal spread[])
 {
+  PetscReal *sum;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(9 * s->nnode, &sum));
+  /* sum[nnode][9] += V R of every cell at its nodes. */
   for (PetscInt b = 0; b < s->nbatch; b++) {
     const PetscInt n = batch_nodes(s, b), *node = s->batch_clique + s->width * SB_BATCH * b;
 
@@ -54,35 +58,6 @@ static void sum_rotations(SbSpace s, const SbLane R[], PetscReal sum[])
       }
     }
   }
-}
-
-static void find_spread(SbSpace s, const SbLane R[], const PetscReal node_R[], PetscReal spread[])
-{
-  for (PetscInt i = 0; i < s->nnode_owned; i++) spread[i] = 0.;
-  for (PetscInt b = 0; b < s->nbatch; b++) {
-    const PetscInt n = batch_nodes(s, b), *node = s->batch_clique + s->width * SB_BATCH * b;
-
-    for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-      PetscReal r[9];
-
-      for (int k = 0; k < 9; k++) r[k] = R[9 * b + k][l];
-      for (PetscInt a = 0; a < n; a++) {
-        const PetscInt i = node[a * SB_BATCH + l];
-
-        /* |R - Q|^2 = 6 - 2 R : Q for rotations */
-        if (i < s->nnode_owned) spread[i] = PetscMax(spread[i], 6. - 2. * SbDot9(r, node_R + 9 * i));
-      }
-    }
-  }
-}
-
-PetscErrorCode SbSpaceAverageRotations(SbSpace s, const SbLane R[], PetscReal node_R[], PetscReal spread[])
-{
-  PetscReal *sum;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(9 * s->nnode, &sum));
-  sum_rotations(s, R, sum);
   for (PetscInt first = 0; first < s->nnode_owned; first += SB_BATCH) {
     const PetscInt n = PetscMin(SB_BATCH, s->nnode_owned - first);
     SbLane M[9], Q[9];
@@ -97,7 +72,24 @@ PetscErrorCode SbSpaceAverageRotations(SbSpace s, const SbLane R[], PetscReal no
     SbPolar((const SbLane *)M, Q);
     for (PetscInt l = 0; l < n; l++) SbLaneGet(9, (const SbLane *)Q, (int)l, node_R + 9 * (first + l));
   }
-  if (spread) find_spread(s, R, node_R, spread);
+  if (spread) {
+    for (PetscInt i = 0; i < s->nnode_owned; i++) spread[i] = 0.;
+    for (PetscInt b = 0; b < s->nbatch; b++) {
+      const PetscInt n = batch_nodes(s, b), *node = s->batch_clique + s->width * SB_BATCH * b;
+
+      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+        PetscReal r[9];
+
+        for (int k = 0; k < 9; k++) r[k] = R[9 * b + k][l];
+        for (PetscInt a = 0; a < n; a++) {
+          const PetscInt i = node[a * SB_BATCH + l];
+
+          /* |R - Q|^2 = 6 - 2 R : Q for rotations */
+          if (i < s->nnode_owned) spread[i] = PetscMax(spread[i], 6. - 2. * SbDot9(r, node_R + 9 * i));
+        }
+      }
+    }
+  }
   PetscCall(PetscFree(sum));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -106,59 +106,13 @@ static PetscErrorCode tabulate_batches(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode lump_mass(SbSpace s)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(s->nnode, &s->node_mass));
-  s->node_share = s->node_mass;
-  if (s->edge_node) PetscCall(PetscCalloc1(s->nnode, &s->node_share));
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
-    const PetscReal share = region->material->density * region->element->ops.mass_lumped;
-
-    for (PetscInt b = region->bstart; b < region->bend; b++) {
-      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        for (PetscInt a = 0; a < 4; a++)
-          s->node_mass[s->batch_node[(4 * b + a) * SB_BATCH + l]] += share * s->batch_V[b][l];
-        for (PetscInt a = 0; s->edge_node && a < (region->quadratic ? SB_CELL_NODES : 4); a++) {
-          const PetscInt node = s->batch_clique[(s->width * b + a) * SB_BATCH + l];
-          const PetscReal mass = region->material->density * s->batch_V[b][l];
-
-          if (a >= 4) s->node_mass[node] += region->element->ops.mass_lumped_edge * mass;
-          s->node_share[node] += (!region->quadratic ? region->element->ops.mass_lumped
-                                  : a < 4            ? -0.05
-                                                     : 0.2) *
-                                 mass;
-        }
-      }
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode create_template(SbSpace s)
-{
-  PetscMPIInt size;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(s->comm, &size));
-  s->ghosted = (PetscBool)(size > 1);
-  if (size == 1) {
-    PetscCall(VecCreateSeq(s->comm, 3 * s->nnode, &s->template_vec));
-    PetscCall(VecSetBlockSize(s->template_vec, 3));
-  } else {
-    PetscCall(VecCreateGhostBlock(s->comm, 3, 3 * s->nnode_owned, PETSC_DECIDE, s->nnode - s->nnode_owned,
-                                  s->gnode + s->nnode_owned, &s->template_vec));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbElement element[],
                              SbSpace *space)
 {
   SbSpace s;
   PetscInt mass;
   SbScope scope;
+  PetscMPIInt size;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SPACE_SETUP], 0, 0, 0, 0));
@@ -176,8 +130,39 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
   PetscCall(tabulate_batches(s));
   PetscCall(SbLayoutCliques(s));
   if (s->faces) PetscCall(SbJumpCreate(s, &s->jump));
-  PetscCall(lump_mass(s));
-  PetscCall(create_template(s));
+  PetscCall(PetscCalloc1(s->nnode, &s->node_mass));
+  s->node_share = s->node_mass;
+  if (s->edge_node) PetscCall(PetscCalloc1(s->nnode, &s->node_share));
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+    const PetscReal share = region->material->density * region->element->ops.mass_lumped;
+
+    for (PetscInt b = region->bstart; b < region->bend; b++) {
+      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+        for (PetscInt a = 0; a < 4; a++)
+          s->node_mass[s->batch_node[(4 * b + a) * SB_BATCH + l]] += share * s->batch_V[b][l];
+        for (PetscInt a = 0; s->edge_node && a < (region->quadratic ? SB_CELL_NODES : 4); a++) {
+          const PetscInt node = s->batch_clique[(s->width * b + a) * SB_BATCH + l];
+          const PetscReal m = region->material->density * s->batch_V[b][l];
+
+          if (a >= 4) s->node_mass[node] += region->element->ops.mass_lumped_edge * m;
+          s->node_share[node] += (!region->quadratic ? region->element->ops.mass_lumped
+                                  : a < 4            ? -0.05
+                                                     : 0.2) *
+                                 m;
+        }
+      }
+    }
+  }
+  PetscCallMPI(MPI_Comm_size(s->comm, &size));
+  s->ghosted = (PetscBool)(size > 1);
+  if (size == 1) {
+    PetscCall(VecCreateSeq(s->comm, 3 * s->nnode, &s->template_vec));
+    PetscCall(VecSetBlockSize(s->template_vec, 3));
+  } else {
+    PetscCall(VecCreateGhostBlock(s->comm, 3, 3 * s->nnode_owned, PETSC_DECIDE, s->nnode - s->nnode_owned,
+                                  s->gnode + s->nnode_owned, &s->template_vec));
+  }
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SPACE_SETUP], 0, 0, 0, 0));
   *space = s;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -261,29 +246,6 @@ PetscErrorCode SbSpaceFindSet(SbSpace s, const char *name, const char *where, Pe
 /* Corners of face f of a positively oriented tet, counter-clockwise seen from outside. */
 static const PetscInt face_corner[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
 
-static void facet_geometry(SbMesh mesh, SbFacet *facet)
-{
-  PetscReal e1[3], e2[3], n[3], length;
-
-  for (PetscInt a = 0; a < 3; a++) {
-    facet->corner[a] = face_corner[facet->face][a];
-    facet->vertex[a] = mesh->cell[4 * facet->cell + facet->corner[a]];
-  }
-  for (PetscInt i = 0; i < 3; i++) {
-    e1[i] = mesh->x[3 * facet->vertex[1] + i] - mesh->x[3 * facet->vertex[0] + i];
-    e2[i] = mesh->x[3 * facet->vertex[2] + i] - mesh->x[3 * facet->vertex[0] + i];
-  }
-  SbCross(e1, e2, n);
-  length = PetscSqrtReal(SbDot3(n, n));
-  facet->area = 0.5 * length;
-  facet->height = 0;
-  for (PetscInt i = 0; i < 3; i++) {
-    facet->normal[i] = n[i] / length;
-    facet->height += facet->normal[i] * (mesh->x[3 * facet->vertex[0] + i] -
-                                         mesh->x[3 * mesh->cell[4 * facet->cell + facet->face] + i]);
-  }
-}
-
 PetscErrorCode SbSpaceGetSetFacets(SbSpace s, PetscInt k, PetscInt *n, SbFacet **facets)
 {
   const uint64_t want = SB_SET_BIT(k) | SB_ON_BOUNDARY;
@@ -295,12 +257,29 @@ PetscErrorCode SbSpaceGetSetFacets(SbSpace s, PetscInt k, PetscInt *n, SbFacet *
   *n = 0;
   for (PetscInt f = 0; f < 4 * s->mesh->ncell; f++) {
     SbFacet *facet;
+    PetscReal e1[3], e2[3], normal[3], length;
 
     if ((s->mesh->face_set[f] & want) != want) continue;
     facet = &(*facets)[(*n)++];
     facet->cell = f / 4;
     facet->face = f % 4;
-    facet_geometry(s->mesh, facet);
+    for (PetscInt a = 0; a < 3; a++) {
+      facet->corner[a] = face_corner[facet->face][a];
+      facet->vertex[a] = s->mesh->cell[4 * facet->cell + facet->corner[a]];
+    }
+    for (PetscInt i = 0; i < 3; i++) {
+      e1[i] = s->mesh->x[3 * facet->vertex[1] + i] - s->mesh->x[3 * facet->vertex[0] + i];
+      e2[i] = s->mesh->x[3 * facet->vertex[2] + i] - s->mesh->x[3 * facet->vertex[0] + i];
+    }
+    SbCross(e1, e2, normal);
+    length = PetscSqrtReal(SbDot3(normal, normal));
+    facet->area = 0.5 * length;
+    facet->height = 0;
+    for (PetscInt i = 0; i < 3; i++) {
+      facet->normal[i] = normal[i] / length;
+      facet->height += facet->normal[i] * (s->mesh->x[3 * facet->vertex[0] + i] -
+                                           s->mesh->x[3 * s->mesh->cell[4 * facet->cell + facet->face] + i]);
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -68,18 +68,6 @@ static void multiply_stiffness(SbSpace s, const PetscReal x[], PetscReal f[])
   if (s->jump) SbJumpAdd(s, x, SB_JUMP_STIFFNESS, f);
 }
 
-/* Zero on prescribed unknowns; returns x.M x of the owned ones. */
-static PetscReal clear_fixed_and_square(SbSpace s, PetscReal x[])
-{
-  PetscReal sum = 0.;
-
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
-    if (s->fixed[i / 3] & (1 << i % 3)) x[i] = 0.;
-    sum += s->node_mass[i / 3] * x[i] * x[i];
-  }
-  return sum;
-}
-
 /* Each node along its own radius, by an amount that has no pattern. */
 static PetscErrorCode start(SbSpace s, PetscReal x[])
 {
@@ -113,7 +101,14 @@ static PetscErrorCode highest_frequency(SbSpace s, PetscReal *w)
   PetscCall(start(s, f));
   *w = 0.;
   for (int step = 0; step <= POWER_STEPS; step++) {
-    square = clear_fixed_and_square(s, f);
+    PetscReal sum = 0.;
+
+    /* Zero on prescribed unknowns; returns x.M x of the owned ones. */
+    for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
+      if (s->fixed[i / 3] & (1 << i % 3)) f[i] = 0.;
+      sum += s->node_mass[i / 3] * f[i] * f[i];
+    }
+    square = sum;
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &square, 1, MPIU_REAL, MPI_SUM, s->comm));
     if (square <= 0.) break;
     /* x had length one: the growth of |y| is w^2 */

@@ -99,17 +99,6 @@ typedef struct {
   const SbLane *pressure; /* that a law without lambda is under, Pa, tension; NULL: its own */
 } Factors;
 
-static void add_consistent_mass(const SbElementOps *e, PetscReal inertia, const SbLane V, SbLane K[10][9])
-{
-  for (int p = 0; p < 10; p++) {
-    const PetscReal share = inertia * (SbPairA[p] == SbPairB[p] ? e->mass_diagonal : e->mass_coupling);
-
-    for (int i = 0; i < 3; i++) {
-      for (int l = 0; l < SB_BATCH; l++) K[p][4 * i][l] += share * V[l];
-    }
-  }
-}
-
 static void scaled_volumes(const SbLane V, PetscReal factor, SbLane W)
 {
   for (int l = 0; l < SB_BATCH; l++) W[l] = factor * V[l];
@@ -337,9 +326,16 @@ static void fill_batch(const Fill *fill, PetscInt r, PetscInt b, PetscReal inert
     SbInsertBroken(s, &fill->x, b, (const SbLane(*)[9])K);
     memset(K, 0, 90 * sizeof(SbLane));
   }
-  if (inertia != 0.)
-    add_consistent_mass(&region->element->ops, inertia, s->batch_V[b], K);
-  else if (region->broken)
+  if (inertia != 0.) {
+    for (int p = 0; p < 10; p++) {
+      const PetscReal share = inertia * (SbPairA[p] == SbPairB[p] ? region->element->ops.mass_diagonal
+                                                                  : region->element->ops.mass_coupling);
+
+      for (int i = 0; i < 3; i++) {
+        for (int l = 0; l < SB_BATCH; l++) K[p][4 * i][l] += share * s->batch_V[b][l];
+      }
+    }
+  } else if (region->broken)
     return;
   SbInsertBatch(s, &fill->x, b, (const SbLane(*)[9])K);
 }

@@ -13,26 +13,6 @@
 
 #define CLOSELY 1e-3 /* delta is nearly the gap, and what strains is the difference */
 
-/* D . f_int(U + length D) */
-static PetscErrorCode elastic_work(SbLedger l, Vec U, PetscReal length, Vec D, PetscReal *work)
-{
-  const SbSpace s = l->run->model->space;
-  SbStage stage = {.shift_k = 1.};
-  PetscReal *f;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecWAXPY(l->w[1], length, D, U));
-  PetscCall(VecZeroEntries(l->w[2]));
-  PetscCall(SbSpaceGetLocalRead(s, l->w[1], &stage.u));
-  PetscCall(SbSpaceGetLocalWrite(s, l->w[2], &f));
-  PetscCall(PetscArrayzero(f, 3 * s->nnode));
-  PetscCall(SbSpaceAddInternalForce(s, &stage, f));
-  PetscCall(SbSpaceRestoreLocalWrite(s, l->w[2], &f));
-  PetscCall(SbSpaceRestoreLocalRead(s, l->w[1], &stage.u));
-  PetscCall(VecDot(l->w[2], D, work));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Elastic energy of what the forces F move bodies and contact by. */
 static PetscErrorCode moved_energy(SbLedger l, Vec U, Vec F, PetscReal *energy)
 {
@@ -46,8 +26,22 @@ static PetscErrorCode moved_energy(SbLedger l, Vec U, Vec F, PetscReal *energy)
   PetscCall(SbProbeSolve(l, CLOSELY, F, D, &its));
   PetscCall(SbProbeLength(l, D, &length));
   if (length > 0.) {
-    for (int side = 0; side < 2; side++)
-      PetscCall(elastic_work(l, U, side ? length : -length, D, &work[side]));
+    for (int side = 0; side < 2; side++) {
+      const SbSpace s = l->run->model->space;
+      SbStage stage = {.shift_k = 1.};
+      PetscReal *f;
+
+      /* D . f_int(U + length D) */
+      PetscCall(VecWAXPY(l->w[1], (side ? length : -length), D, U));
+      PetscCall(VecZeroEntries(l->w[2]));
+      PetscCall(SbSpaceGetLocalRead(s, l->w[1], &stage.u));
+      PetscCall(SbSpaceGetLocalWrite(s, l->w[2], &f));
+      PetscCall(PetscArrayzero(f, 3 * s->nnode));
+      PetscCall(SbSpaceAddInternalForce(s, &stage, f));
+      PetscCall(SbSpaceRestoreLocalWrite(s, l->w[2], &f));
+      PetscCall(SbSpaceRestoreLocalRead(s, l->w[1], &stage.u));
+      PetscCall(VecDot(l->w[2], D, &work[side]));
+    }
     *energy = 0.5 * PetscAbsReal(work[1] - work[0]) / (2. * length);
   }
   l->own_work += 2. + 2. * (PetscReal)its;

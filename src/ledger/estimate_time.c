@@ -28,37 +28,6 @@ PetscErrorCode SbMassForm(SbLedger l, Vec D, PetscReal *form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the matrix of the last solve is J = shift_a M + K: then one product gives the form. */
-static PetscBool has_matrix(const SbRun run)
-{
-  return (PetscBool)(run->J && run->ts && run->shift_a > 0. && !run->damped &&
-                     !run->solver_used->matrix_free && !run->model->space->consistent_mass);
-}
-
-static PetscErrorCode form_by_matrix(SbLedger l, Vec D, PetscReal *form)
-{
-  const SbSpace s = l->run->model->space;
-  Vec free = l->w[1], product = l->w[2];
-  PetscReal mass;
-  PetscScalar *d;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecCopy(D, free));
-  PetscCall(VecGetArray(free, &d));
-  for (PetscInt k = 0; k < s->nfixed; k++) {
-    for (PetscInt i = 3 * s->fixed_node[k]; i < 3 * s->fixed_node[k] + 3; i++) {
-      if (s->fixed_node[k] < s->nnode_owned && (s->fixed[i / 3] & (1 << i % 3))) d[i] = 0.;
-    }
-  }
-  PetscCall(VecRestoreArray(free, &d));
-  PetscCall(MatMult(l->run->J, free, product));
-  PetscCall(VecDot(product, free, form));
-  PetscCall(SbMassForm(l, free, &mass));
-  *form = PetscMax(0., *form - l->run->shift_a * mass);
-  l->own_work += 1.;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal *form)
 {
   const SbModel m = l->run->model;
@@ -69,8 +38,29 @@ PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal 
   *form = 0.;
   PetscCall(SbProbeLength(l, D, &length));
   if (!(length > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
-  if (has_matrix(l->run)) {
-    PetscCall(form_by_matrix(l, D, form));
+  if ((PetscBool)(l->run->J && l->run->ts && l->run->shift_a > 0. && !l->run->damped &&
+                  !l->run->solver_used->matrix_free && !l->run->model->space->consistent_mass)) {
+    SbSpace s;
+    Vec free, product;
+    PetscReal mass;
+    PetscScalar *d;
+
+    s = l->run->model->space;
+    free = l->w[1];
+    product = l->w[2];
+    PetscCall(VecCopy(D, free));
+    PetscCall(VecGetArray(free, &d));
+    for (PetscInt k = 0; k < s->nfixed; k++) {
+      for (PetscInt i = 3 * s->fixed_node[k]; i < 3 * s->fixed_node[k] + 3; i++) {
+        if (s->fixed_node[k] < s->nnode_owned && (s->fixed[i / 3] & (1 << i % 3))) d[i] = 0.;
+      }
+    }
+    PetscCall(VecRestoreArray(free, &d));
+    PetscCall(MatMult(l->run->J, free, product));
+    PetscCall(VecDot(product, free, form));
+    PetscCall(SbMassForm(l, free, &mass));
+    *form = PetscMax(0., *form - l->run->shift_a * mass);
+    l->own_work += 1.;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   l->residuals -= MPI_Wtime();

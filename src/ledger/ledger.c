@@ -143,25 +143,6 @@ static PetscReal damped_part(const SbRun run, const SbStep *step)
   return PetscExpReal(-0.5 * PetscMin(step->dt * run->damping_power / energy, 2.));
 }
 
-static PetscErrorCode estimate_state(SbLedger l, const SbStep *step)
-{
-  const SbModel m = l->run->model;
-  PetscReal sum = 0., contact = 0.;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbSpaceEstimateCompute(l->space, step->t, step->U, step->V, step->A));
-  for (PetscInt b = 0; b < m->nbody; b++) {
-    l->space_error[b] = l->space->body2[b];
-    sum += l->space->body2[b];
-  }
-  l->error[SB_ERROR_SPACE] =
-    m->dynamic ? PetscMax(l->error[SB_ERROR_SPACE], PetscSqrtReal(sum)) : PetscSqrtReal(sum);
-  if ((m->nbegin_step || m->npotential) && step->R) PetscCall(SbEstimateContact(l, step, &contact));
-  l->error[SB_ERROR_CONTACT] = m->dynamic ? PetscMax(l->error[SB_ERROR_CONTACT], contact) : contact;
-  l->own_work += SPACE_WORK;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
   SbLedger l = (SbLedger)ctx;
@@ -192,7 +173,21 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 
   /* what is computed at this state, at the price that goes into own_work */
   PetscCall(begin(l));
-  if (!first && (step->last || (l->every && step->step % l->every == 0))) PetscCall(estimate_state(l, step));
+  if (!first && (step->last || (l->every && step->step % l->every == 0))) {
+    const SbModel m = l->run->model;
+    PetscReal sum = 0., contact = 0.;
+
+    PetscCall(SbSpaceEstimateCompute(l->space, step->t, step->U, step->V, step->A));
+    for (PetscInt b = 0; b < m->nbody; b++) {
+      l->space_error[b] = l->space->body2[b];
+      sum += l->space->body2[b];
+    }
+    l->error[SB_ERROR_SPACE] =
+      m->dynamic ? PetscMax(l->error[SB_ERROR_SPACE], PetscSqrtReal(sum)) : PetscSqrtReal(sum);
+    if ((m->nbegin_step || m->npotential) && step->R) PetscCall(SbEstimateContact(l, step, &contact));
+    l->error[SB_ERROR_CONTACT] = m->dynamic ? PetscMax(l->error[SB_ERROR_CONTACT], contact) : contact;
+    l->own_work += SPACE_WORK;
+  }
   if (l->quantity.kind) PetscCall(SbQuantityValue(l, step));
   if (step->last && !first) {
     PetscCall(SbEstimateRounding(l, step->t, step->U, &l->error[SB_ERROR_ROUNDING]));

@@ -55,10 +55,10 @@ struct _p_SbLedger {
   PetscBool
     anew; /* the run goes on with another mesh, on which the accelerations of before are in no balance */
 
-  Vec kept, before; /* accelerations at the start of this step and of the one before, m/s^2 */
-  PetscReal kept_t, kept_dt, before_dt; /* s; before_dt 0: there was none */
-  Vec w[3];                             /* work */
-  Vec delta;                            /* what the solve left, m: the quantity's share of it */
+  Vec kept, before;            /* accelerations at the start of this step and of the one before, m/s^2 */
+  PetscReal kept_t, before_dt; /* s; before_dt 0: there was none */
+  Vec w[3];                    /* work */
+  Vec delta;                   /* what the solve left, m: the quantity's share of it */
 
   PetscReal work, own_work; /* in residuals, of the run and of the estimates: the same on every run */
   PetscReal seconds, solving,

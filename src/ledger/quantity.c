@@ -35,36 +35,6 @@ PetscErrorCode SbQuantitySetFromOptions(SbLedger l, const SbScope *scope)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of all ranks; of equally near ones the one with the lowest number, whatever the partition. */
-static PetscErrorCode nearest_node(SbLedger l)
-{
-  const SbSpace s = l->run->model->space;
-  SbQuantity *q = &l->quantity;
-  PetscReal least = PETSC_MAX_REAL, all;
-  PetscInt first = PETSC_MAX_INT, winner;
-
-  PetscFunctionBeginUser;
-  for (int pass = 0; pass < 2; pass++) {
-    for (PetscInt i = 0; i < s->nnode_owned; i++) {
-      PetscReal r = 0.;
-
-      for (int k = 0; k < 3; k++) r += PetscSqr(s->node_x[3 * i + k] - q->at[k]);
-      if (!pass)
-        least = PetscMin(least, r);
-      else if (r <= all * (1. + 1e-12) && s->node_orig[i] < first) {
-        first = s->node_orig[i];
-        q->node = i;
-      }
-    }
-    if (!pass) PetscCallMPI(MPI_Allreduce(&least, &all, 1, MPIU_REAL, MPI_MIN, s->comm));
-  }
-  PetscCallMPI(MPI_Allreduce(&first, &winner, 1, MPIU_INT, MPI_MIN, s->comm));
-  if (first != winner) q->node = -1;
-  for (int k = 0; k < 3; k++) q->x[k] = q->node < 0 ? 0. : s->node_x[3 * q->node + k];
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, q->x, 3, MPIU_REAL, MPI_SUM, s->comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbQuantityAttach(SbLedger l)
 {
   const SbModel m = l->run->model;
@@ -77,7 +47,30 @@ PetscErrorCode SbQuantityAttach(SbLedger l)
   if (q->kind == SB_QUANTITY_NONE || q->kind == SB_QUANTITY_VOLUME) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(l->run->U, &q->weight));
   PetscCall(VecZeroEntries(q->weight));
-  if (q->kind == SB_QUANTITY_DISPLACEMENT) PetscCall(nearest_node(l));
+  if (q->kind == SB_QUANTITY_DISPLACEMENT) {
+    PetscReal least = PETSC_MAX_REAL, all;
+    PetscInt first = PETSC_MAX_INT, winner;
+
+    /* Of all ranks; of equally near ones the one with the lowest number, whatever the partition. */
+    for (int pass = 0; pass < 2; pass++) {
+      for (PetscInt k = 0; k < s->nnode_owned; k++) {
+        PetscReal r = 0.;
+
+        for (int j = 0; j < 3; j++) r += PetscSqr(s->node_x[3 * k + j] - q->at[j]);
+        if (!pass)
+          least = PetscMin(least, r);
+        else if (r <= all * (1. + 1e-12) && s->node_orig[k] < first) {
+          first = s->node_orig[k];
+          q->node = k;
+        }
+      }
+      if (!pass) PetscCallMPI(MPI_Allreduce(&least, &all, 1, MPIU_REAL, MPI_MIN, s->comm));
+    }
+    PetscCallMPI(MPI_Allreduce(&first, &winner, 1, MPIU_INT, MPI_MIN, s->comm));
+    if (first != winner) q->node = -1;
+    for (int j = 0; j < 3; j++) q->x[j] = q->node < 0 ? 0. : s->node_x[3 * q->node + j];
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, q->x, 3, MPIU_REAL, MPI_SUM, s->comm));
+  }
   for (PetscInt k = 0; k < m->nset; k++) {
     if (!strcmp(m->set[k].name, q->on)) q->set = SB_SET_BIT(k);
   }
@@ -170,44 +163,6 @@ static PetscErrorCode gradient(SbLedger l, const SbStep *step, Vec B)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode by_duality(SbLedger l, const SbStep *step)
-{
-  SbQuantity *q = &l->quantity;
-  const PetscReal both = PetscSqr(l->step_linear) + PetscSqr(l->step_nonlinear);
-  PetscReal left, energy;
-  Vec B, Z;
-  const SbModel m = l->run->model;
-  PetscReal s, sums[2] = {0., 0.};
-
-  PetscFunctionBeginUser;
-  PetscCall(VecDuplicate(step->U, &B));
-  PetscCall(VecDuplicate(step->U, &Z));
-  PetscCall(gradient(l, step, B));
-  PetscCall(VecDot(B, l->delta, &left));
-  left = PetscAbsReal(left) / PetscSqrtReal(PetscMax(both, PETSC_MIN_REAL));
-  q->error[SB_ERROR_LINEAR] = left * l->step_linear;
-  q->error[SB_ERROR_NONLINEAR] = left * l->step_nonlinear;
-  PetscCall(SbProbeSolve(l, ADJOINT, B, Z, NULL));
-  PetscCall(VecDot(B, Z, &energy));
-  /* of a reaction: what a motion of the support does to the body, which moves as a whole where nothing else holds it */
-  if (q->kind == SB_QUANTITY_REACTION) PetscCall(VecAYPX(Z, -1., q->weight));
-
-  /* the mesh's share: a(e_u, e_z) */
-  q->error[SB_ERROR_SPACE] = 0.;
-  if (energy > 0. && l->stored > 0.) {
-    s = MIX * PetscSqrtReal(2. * l->stored / energy);
-    for (int side = 0; side < 2; side++) {
-      PetscCall(VecWAXPY(l->w[1], side ? s : -s, Z, step->U));
-      PetscCall(SbSpaceEstimateCompute(l->space, step->t, l->w[1], NULL, NULL));
-      for (PetscInt b = 0; b < m->nbody; b++) sums[side] += l->space->body2[b];
-    }
-    q->error[SB_ERROR_SPACE] = PetscAbsReal(sums[1] - sums[0]) / (2. * s);
-  }
-  PetscCall(VecDestroy(&B));
-  PetscCall(VecDestroy(&Z));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step)
 {
   SbQuantity *q = &l->quantity;
@@ -216,7 +171,39 @@ PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step)
   PetscFunctionBeginUser;
   for (int i = 0; i < SB_ERROR_COUNT; i++)
     q->error[i] = scale * (l->error[i] + (i == SB_ERROR_TIME ? l->offset : 0.));
-  if (!l->run->model->dynamic && q->kind != SB_QUANTITY_VOLUME) PetscCall(by_duality(l, step));
+  if (!l->run->model->dynamic && q->kind != SB_QUANTITY_VOLUME) {
+    const PetscReal both = PetscSqr(l->step_linear) + PetscSqr(l->step_nonlinear);
+    PetscReal left, energy;
+    Vec B, Z;
+    const SbModel m = l->run->model;
+    PetscReal s, sums[2] = {0., 0.};
+
+    PetscCall(VecDuplicate(step->U, &B));
+    PetscCall(VecDuplicate(step->U, &Z));
+    PetscCall(gradient(l, step, B));
+    PetscCall(VecDot(B, l->delta, &left));
+    left = PetscAbsReal(left) / PetscSqrtReal(PetscMax(both, PETSC_MIN_REAL));
+    q->error[SB_ERROR_LINEAR] = left * l->step_linear;
+    q->error[SB_ERROR_NONLINEAR] = left * l->step_nonlinear;
+    PetscCall(SbProbeSolve(l, ADJOINT, B, Z, NULL));
+    PetscCall(VecDot(B, Z, &energy));
+    /* of a reaction: what a motion of the support does to the body, which moves as a whole where nothing else holds it */
+    if (q->kind == SB_QUANTITY_REACTION) PetscCall(VecAYPX(Z, -1., q->weight));
+
+    /* the mesh's share: a(e_u, e_z) */
+    q->error[SB_ERROR_SPACE] = 0.;
+    if (energy > 0. && l->stored > 0.) {
+      s = MIX * PetscSqrtReal(2. * l->stored / energy);
+      for (int side = 0; side < 2; side++) {
+        PetscCall(VecWAXPY(l->w[1], side ? s : -s, Z, step->U));
+        PetscCall(SbSpaceEstimateCompute(l->space, step->t, l->w[1], NULL, NULL));
+        for (PetscInt b = 0; b < m->nbody; b++) sums[side] += l->space->body2[b];
+      }
+      q->error[SB_ERROR_SPACE] = PetscAbsReal(sums[1] - sums[0]) / (2. * s);
+    }
+    PetscCall(VecDestroy(&B));
+    PetscCall(VecDestroy(&Z));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

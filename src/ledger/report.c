@@ -32,25 +32,6 @@ static void say(Words *w, const char *format, ...)
   w->n = PetscMin(w->n, sizeof(w->text) - 1);
 }
 
-static PetscErrorCode print_wrapped(char text[])
-{
-  int column = 0;
-
-  PetscFunctionBeginUser;
-  for (char *word = strtok(text, " "); word; word = strtok(NULL, " ")) {
-    const int n = (int)strlen(word);
-
-    if (column && column + 1 + n > WIDTH) {
-      PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n"));
-      column = 0;
-    }
-    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "%s%s", column ? " " : "", word));
-    column += n + (column > 0);
-  }
-  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n"));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscReal error_of(SbLedger l, int source)
 {
   return l->error[source] + (source == SB_ERROR_TIME ? l->offset : 0.);
@@ -279,43 +260,19 @@ static PetscErrorCode print_line(const char *name, PetscReal error, PetscReal re
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode print_table(SbLedger l, const SbLedgerSeconds *s)
-{
-  static const char *const notes[SB_ERROR_COUNT] = {
-    "residual, tangent", "steps", "iterations after the first", "linear solves", "contact, search", ""};
-  static const char *const quantities[] = {"", "of u, m", "of F, N", "of V, m^3"};
-  const SbModel m = l->run->model;
-  const PetscReal scale = l->stored > 0. ? 1. / PetscSqrtReal(l->stored) : 0.;
-  const PetscReal *q = l->quantity.kind ? l->quantity.error : NULL;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n%-11s %10s %9s %9s %9s %7s  of %.3g J stored\n",
-                         "error", "J^(1/2)", "relative", quantities[l->quantity.kind], "seconds", "",
-                         (double)l->stored));
-  for (int i = 0; i < SB_ERROR_COUNT; i++) {
-    PetscCall(print_line(names[i], error_of(l, i), scale * error_of(l, i), q ? &q[i] : NULL,
-                         i == SB_ERROR_ROUNDING ? -1. : s->source[i], s->total, notes[i]));
-    for (PetscInt b = 0; i == SB_ERROR_SPACE && m->nbody > 1 && b < m->nbody; b++) {
-      char name[16];
-
-      PetscCall(PetscSNPrintf(name, sizeof(name), "  %.8s", m->body[b].name));
-      PetscCall(print_line(name, PetscSqrtReal(l->space_error[b]), scale * PetscSqrtReal(l->space_error[b]),
-                           NULL, -1., 1., ""));
-    }
-  }
-  PetscCall(print_line("set-up", -1., 0., NULL, s->setup, s->total, ""));
-  PetscCall(print_line("output", -1., 0., NULL, s->output, s->total, ""));
-  PetscCall(print_line("estimates", -1., 0., NULL, s->estimates, s->total, "of this table"));
-  PetscCall(print_line("together", together(l), scale * together(l), NULL, s->total, s->total, ""));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbLedgerReport(SbLedger l, const char *file, PetscBool quiet)
 {
   SbLedgerSeconds s;
   PetscMPIInt rank;
   Words w = {.n = 0};
   FILE *f;
+  int column = 0;
+  static const char *const notes[SB_ERROR_COUNT] =
+    {"residual, tangent", "steps", "iterations after the first", "linear solves", "contact, search", ""},
+                           *const quantities[] = {"", "of u, m", "of F, N", "of V, m^3"};
+  SbModel m;
+  PetscReal scale;
+  const PetscReal *q;
 
   PetscFunctionBeginUser;
   if (!l) PetscFunctionReturn(PETSC_SUCCESS);
@@ -327,11 +284,41 @@ PetscErrorCode SbLedgerReport(SbLedger l, const char *file, PetscBool quiet)
   PetscCall(write_table(l, &s, f));
   PetscCheck(!fclose(f), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "cannot write %s", file);
   if (quiet) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(print_table(l, &s));
+  m = l->run->model;
+  scale = l->stored > 0. ? 1. / PetscSqrtReal(l->stored) : 0.;
+  q = l->quantity.kind ? l->quantity.error : NULL;
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n%-11s %10s %9s %9s %9s %7s  of %.3g J stored\n",
+                         "error", "J^(1/2)", "relative", quantities[l->quantity.kind], "seconds", "",
+                         (double)l->stored));
+  for (int i = 0; i < SB_ERROR_COUNT; i++) {
+    PetscCall(print_line(names[i], error_of(l, i), scale * error_of(l, i), q ? &q[i] : NULL,
+                         i == SB_ERROR_ROUNDING ? -1. : s.source[i], s.total, notes[i]));
+    for (PetscInt b = 0; i == SB_ERROR_SPACE && m->nbody > 1 && b < m->nbody; b++) {
+      char name[16];
+
+      PetscCall(PetscSNPrintf(name, sizeof(name), "  %.8s", m->body[b].name));
+      PetscCall(print_line(name, PetscSqrtReal(l->space_error[b]), scale * PetscSqrtReal(l->space_error[b]),
+                           NULL, -1., 1., ""));
+    }
+  }
+  PetscCall(print_line("set-up", -1., 0., NULL, s.setup, s.total, ""));
+  PetscCall(print_line("output", -1., 0., NULL, s.output, s.total, ""));
+  PetscCall(print_line("estimates", -1., 0., NULL, s.estimates, s.total, "of this table"));
+  PetscCall(print_line("together", together(l), scale * together(l), NULL, s.total, s.total, ""));
   say_largest(l, &s, &w);
   say_wasted(l, &s, &w);
   say_dial(l, &w);
-  PetscCall(print_wrapped(w.text));
+  for (char *word = strtok(w.text, " "); word; word = strtok(NULL, " ")) {
+    const int n = (int)strlen(word);
+
+    if (column && column + 1 + n > WIDTH) {
+      PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n"));
+      column = 0;
+    }
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "%s%s", column ? " " : "", word));
+    column += n + (column > 0);
+  }
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n"));
   (void)fflush(PETSC_STDOUT);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -238,17 +238,9 @@ static PetscErrorCode read_own(const File *f)
 
 /* ------------------------------------------------------------------ what a run wrote */
 
-/* Steps of the frames: "0, 10, 20 ... 500". */
-typedef struct {
-  int64_t wanted, first, last;
-  PetscInt n;
-  char found[64];
-  const char *hundred;
-} Frames;
-
 static herr_t visit_frame(hid_t where, const char *name, const H5L_info_t *info, void *ctx)
 {
-  Frames *s = (Frames *)ctx;
+  SbH5Frames *s = (SbH5Frames *)ctx;
   const int64_t step = strtoll(name, NULL, 10);
 
   (void)where, (void)info;
@@ -266,10 +258,34 @@ static herr_t visit_hundred(hid_t where, const char *name, const H5L_info_t *inf
 
   (void)info;
   if (group < 0) return 0;
-  ((Frames *)ctx)->hundred = name;
+  ((SbH5Frames *)ctx)->hundred = name;
   (void)H5Literate(group, H5_INDEX_NAME, H5_ITER_INC, NULL, visit_frame, ctx);
   (void)H5Gclose(group);
   return 0;
+}
+
+void SbH5FindFrame(hid_t file, SbH5Frames *frames)
+{
+  if (H5Lexists(file, "step", H5P_DEFAULT) > 0)
+    (void)H5Literate_by_name(file, "step", H5_INDEX_NAME, H5_ITER_INC, NULL, visit_hundred, frames,
+                             H5P_DEFAULT);
+}
+
+PetscErrorCode SbH5BodyNames(hid_t file, const char *mesh, char **names)
+{
+  const hid_t attribute = H5Aexists_by_name(file, mesh, "bodies", H5P_DEFAULT) > 0
+                            ? H5Aopen_by_name(file, mesh, "bodies", H5P_DEFAULT, H5P_DEFAULT)
+                            : -1,
+              type = attribute >= 0 ? H5Aget_type(attribute) : -1;
+  const PetscBool text = (PetscBool)(type >= 0 && H5Tget_class(type) == H5T_STRING &&
+                                     H5Tis_variable_str(type) <= 0 && H5Tget_size(type) < 1 << 24);
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(text ? H5Tget_size(type) + 1 : 1, names));
+  if (text) (void)H5Aread(attribute, type, *names);
+  if (type >= 0) (void)H5Tclose(type);
+  if (attribute >= 0) (void)H5Aclose(attribute);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Each body is a group of tets. */
@@ -277,8 +293,7 @@ static PetscErrorCode read_bodies(const File *f)
 {
   SbImport *im = f->im;
   PetscInt n, *body, nbody = 0, group, *tags;
-  char names[4096], *name, *rest = names;
-  hid_t attribute, kind;
+  char *names, *name, *rest;
 
   PetscFunctionBeginUser;
   if (!is_there(f, "/mesh/body")) PetscFunctionReturn(PETSC_SUCCESS);
@@ -287,16 +302,8 @@ static PetscErrorCode read_bodies(const File *f)
     H5_ERROR(f, "/mesh/body has %lld rows for %lld tets", (long long)n, (long long)im->item[3].n);
   for (PetscInt c = 0; c < n; c++) nbody = PetscMax(nbody, body[c] + 1);
   // names of the bodies; none in old files
-  attribute = H5Aexists_by_name(f->file, "/mesh", "bodies", H5P_DEFAULT) > 0
-                ? H5Aopen_by_name(f->file, "/mesh", "bodies", H5P_DEFAULT, H5P_DEFAULT)
-                : -1;
-  kind = attribute >= 0 ? H5Aget_type(attribute) : -1;
-  memset(names, 0, sizeof(names));
-  if (kind >= 0 && H5Tget_class(kind) == H5T_STRING && H5Tis_variable_str(kind) <= 0 &&
-      H5Tget_size(kind) < sizeof(names))
-    (void)H5Aread(attribute, kind, names);
-  if (kind >= 0) (void)H5Tclose(kind);
-  if (attribute >= 0) (void)H5Aclose(attribute);
+  PetscCall(SbH5BodyNames(f->file, "/mesh", &names));
+  rest = names;
   PetscCall(PetscMalloc1(nbody, &tags));
   for (PetscInt b = 0; b < nbody; b++) {
     char plain[32];
@@ -308,6 +315,7 @@ static PetscErrorCode read_bodies(const File *f)
   }
   for (PetscInt c = 0; c < n; c++) im->item[3].tags[c] = tags[body[c]];
   PetscCall(PetscFree(tags));
+  PetscCall(PetscFree(names));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -396,7 +404,7 @@ static PetscErrorCode read_mesh(File *f, SbSlabRows *rows)
   SbImport *im = f->im;
   PetscBool own;
   Array x = {.name = "/mesh/x", .klass = H5T_FLOAT, .ncomp = 3, .block = PETSC_TRUE};
-  Frames s = {.wanted = f->im->step};
+  SbH5Frames s = {.wanted = f->im->step};
 
   PetscFunctionBeginUser;
   PetscCall(check_layout(f, &own));
@@ -404,8 +412,7 @@ static PetscErrorCode read_mesh(File *f, SbSlabRows *rows)
   if (im->step) {
     if (!is_there(f, "/step"))
       H5_ERROR(f, "holds a mesh, no steps of a run; leave out the step %lld", (long long)s.wanted);
-    (void)H5Literate_by_name(f->file, "/step", H5_INDEX_NAME, H5_ITER_INC, NULL, visit_hundred, &s,
-                             H5P_DEFAULT);
+    SbH5FindFrame(f->file, &s);
     if (!s.n) H5_ERROR(f, "has no step yet");
     if (!s.found[0])
       H5_ERROR(f, "has no step %lld; it has %lld of them, from %lld to %lld (-1: the last one)",

@@ -15,18 +15,7 @@ PetscErrorCode SbModelDestroy(SbModel *model)
   if (!m) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt e = 0; e < m->neffect; e++) PetscCall(SbEffectDestroy(&m->effect[e]));
   PetscCall(PetscFree(m->effect));
-  PetscCall(PetscFree(m->prescribe));
-  PetscCall(PetscFree(m->force));
-  PetscCall(PetscFree(m->begin_step));
-  PetscCall(PetscFree(m->assemble_constraints));
-  PetscCall(PetscFree(m->update_active_set));
-  PetscCall(PetscFree(m->time_of_impact));
-  PetscCall(PetscFree(m->restitution));
-  PetscCall(PetscFree(m->potential));
-  PetscCall(PetscFree(m->tangent));
-  PetscCall(PetscFree(m->nonsymmetric));
-  PetscCall(PetscFree(m->accept));
-  PetscCall(PetscFree(m->history));
+  PetscCall(PetscFree(m->lists));
   PetscCall(SbSpaceDestroy(&m->space));
   PetscCall(SbMeshDestroy(&m->mesh));
   for (PetscInt k = 0; k < m->nmaterial; k++) PetscCall(SbMaterialDestroy(&m->material[k]));
@@ -95,17 +84,20 @@ static PetscErrorCode match_mass(SbModel m, PetscInt b)
 }
 
 /* Effects that have the operation, in scenario order. */
+#define NLIST 12
 #define SORT_INTO_LIST(m, op)                                               \
   do {                                                                      \
-    PetscCall(PetscMalloc1((m)->neffect, &(m)->op));                        \
+    (m)->op = list;                                                         \
     for (PetscInt i_ = 0; i_ < (m)->neffect; i_++) {                        \
       if ((m)->effect[i_]->ops.op) (m)->op[(m)->n##op++] = (m)->effect[i_]; \
     }                                                                       \
+    list += (m)->n##op;                                                     \
   } while (0)
 
 PetscErrorCode SbModelSetUp(SbModel m)
 {
   PetscReal mass = 0.;
+  SbEffect *list;
 
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < m->nbody; b++) {
@@ -127,7 +119,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
     if (!effect->ops.prescribe || SbEffectActsAfter(effect, m->t_begin)) continue;
     effect->ops.setup = NULL;
     effect->ops.prescribe = NULL;
-    effect->prescribed = NULL;
+    effect->prescribed = PETSC_FALSE;
   }
   for (PetscInt e = 0; e < m->neffect; e++) PetscCall(SbEffectMarkPrescribed(m->effect[e], m->nset, m->set));
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
@@ -139,6 +131,8 @@ PetscErrorCode SbModelSetUp(SbModel m)
     m->linear = (PetscBool)(m->linear && m->effect[e]->linear);
   }
   PetscCall(SbSpaceFixDone(m->space));
+  PetscCall(PetscMalloc1(NLIST * m->neffect, &m->lists));
+  list = m->lists;
   SORT_INTO_LIST(m, prescribe);
   SORT_INTO_LIST(m, begin_step);
   SORT_INTO_LIST(m, assemble_constraints);

@@ -111,78 +111,17 @@ static PetscErrorCode write_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode write_numbers(SbRun run, SbOutput out, const SbStep *step, SbH5 *h, uint64_t checksum)
-{
-  Times times = {step->t, run->dt, run->dt, run->t_end, run->paused ? run->after.dt : 0.};
-  Number number[NNUMBER];
-
-  PetscFunctionBeginUser;
-  /* where in time it is, works and losses so far */
-  if (run->ts) PetscCall(TSGetTimeStep(run->ts, &times.next));
-  numbers_of(run, &times, number);
-  for (int i = 0; i < NNUMBER; i++)
-    if (!number[i].optional || *number[i].value != 0.)
-      PetscCall(SbH5PutReal(h, h->file, number[i].name, *number[i].value));
-  PetscCall(SbH5PutInt(h, h->file, "step", step->step));
-
-  /* errors that the ledger has added up, and the material points that probes follow */
-  for (PetscInt i = 0; i < run->ncarried; i++)
-    PetscCall(SbH5PutReal(h, h->file, run->carried[i].name, *run->carried[i].value));
-  PetscCall(SbProbesWrite(run, out, h));
-
-  /* what is set by hand */
-  for (PetscInt i = 0; i < SbLiveCount(); i++)
-    PetscCall(SbH5PutReal(h, h->file, SbLiveColumn(i, NULL), SbLiveGet(i, step->t)));
-
-  /* by what a restart knows that the file fits the run and is whole */
-  PetscCall(SbH5PutInt(h, h->file, "mesh_hash", (int64_t)out->mesh_hash));
-  PetscCall(SbH5PutInt(h, h->file, "checksum", (int64_t)checksum));
-  PetscCall(SbH5PutInt(h, h->file, "format", FORMAT));
-  PetscCall(SbH5WriteText(h, h->file, "options", out->identity));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode write_checkpoint(SbRun run, SbOutput out, const SbStep *step)
-{
-  SbH5 h;
-  char name[SB_FILE_MAX], path[PETSC_MAX_PATH_LEN], tmp[PETSC_MAX_PATH_LEN], message[SB_MESSAGE_MAX] = "";
-  PetscInt64 mesh_bytes;
-  uint64_t checksum;
-
-  PetscFunctionBeginUser;
-  /* a file beside its target, with room for all of it: a full disk shows before anything is written */
-  (void)snprintf(name, sizeof(name), "checkpoint_%06" PetscInt_FMT ".h5", step->step);
-  PetscCall(SbOutputPath(out, name, sizeof(path), path));
-  PetscCall(SbOutputPath(out, "checkpoint.tmp", sizeof(tmp), tmp));
-  PetscCall(SbH5Create(out->comm, tmp, &h));
-  PetscCall(SbCheckpointMeshBytes(run, &mesh_bytes));
-  PetscCall(SbH5Reserve(&h, (PetscInt64)out->node.N * 3 * 32 + (PetscInt64)strlen(out->identity) + 65536 +
-                              mesh_bytes));
-
-  /* the state */
-  PetscCall(write_vectors(run, out, &h, &checksum));
-  PetscCall(SbCheckpointWriteEffects(run, &h, &checksum));
-  PetscCall(SbCheckpointWriteMeshes(run, &h, &checksum));
-  PetscCall(write_numbers(run, out, step, &h, checksum));
-  PetscCall(SbH5Flush(&h));
-  PetscCall(SbH5Close(&h));
-
-  /* once it is on disk, it takes its place, and the oldest ones go */
-  if (!out->rank) {
-    if (rename(tmp, path))
-      SbFormat(sizeof(message), message, "cannot rename %s to %s: %s", tmp, path, strerror(errno));
-    else
-      PetscCall(SbCheckpointPrune(out, PETSC_MAX_INT, out->checkpoint_keep));
-  }
-  PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
   SbOutput out = (SbOutput)ctx;
   const PetscBool asked = (PetscBool)(out->checkpoint_every > 0. || out->checkpoint_every_steps);
   PetscBool due = (PetscBool)(run->stopped || (step->last && asked));
+  SbH5 h;
+  char name[SB_FILE_MAX], path[PETSC_MAX_PATH_LEN], tmp[PETSC_MAX_PATH_LEN], message[SB_MESSAGE_MAX] = "";
+  PetscInt64 mesh_bytes;
+  uint64_t checksum;
+  Times times = {step->t, run->dt, run->dt, run->t_end, run->paused ? run->after.dt : 0.};
+  Number number[NNUMBER];
 
   PetscFunctionBeginUser;
   /* whether this step is to be kept: by time, by number, as the last one, or to go on from */
@@ -197,7 +136,52 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscCall(PetscLogStagePush(SbStageOutput));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CHECKPOINT], 0, 0, 0, 0));
   PetscCall(PetscLogEventBegin(out->event.checkpoint, 0, 0, 0, 0));
-  PetscCall(write_checkpoint(run, out, step));
+  /* a file beside its target, with room for all of it: a full disk shows before anything is written */
+  (void)snprintf(name, sizeof(name), "checkpoint_%06" PetscInt_FMT ".h5", step->step);
+  PetscCall(SbOutputPath(out, name, sizeof(path), path));
+  PetscCall(SbOutputPath(out, "checkpoint.tmp", sizeof(tmp), tmp));
+  PetscCall(SbH5Create(out->comm, tmp, &h));
+  PetscCall(SbCheckpointMeshBytes(run, &mesh_bytes));
+  PetscCall(SbH5Reserve(&h, (PetscInt64)out->node.N * 3 * 32 + (PetscInt64)strlen(out->identity) + 65536 +
+                              mesh_bytes));
+
+  /* the state */
+  PetscCall(write_vectors(run, out, &h, &checksum));
+  PetscCall(SbCheckpointWriteEffects(run, &h, &checksum));
+  PetscCall(SbCheckpointWriteMeshes(run, &h, &checksum));
+  /* where in time it is, works and losses so far */
+  if (run->ts) PetscCall(TSGetTimeStep(run->ts, &times.next));
+  numbers_of(run, &times, number);
+  for (int i = 0; i < NNUMBER; i++)
+    if (!number[i].optional || *number[i].value != 0.)
+      PetscCall(SbH5PutReal(&h, h.file, number[i].name, *number[i].value));
+  PetscCall(SbH5PutInt(&h, h.file, "step", step->step));
+
+  /* errors that the ledger has added up, and the material points that probes follow */
+  for (PetscInt i = 0; i < run->ncarried; i++)
+    PetscCall(SbH5PutReal(&h, h.file, run->carried[i].name, *run->carried[i].value));
+  PetscCall(SbProbesWrite(run, out, &h));
+
+  /* what is set by hand */
+  for (PetscInt i = 0; i < SbLiveCount(); i++)
+    PetscCall(SbH5PutReal(&h, h.file, SbLiveColumn(i, NULL), SbLiveGet(i, step->t)));
+
+  /* by what a restart knows that the file fits the run and is whole */
+  PetscCall(SbH5PutInt(&h, h.file, "mesh_hash", (int64_t)out->mesh_hash));
+  PetscCall(SbH5PutInt(&h, h.file, "checksum", (int64_t)checksum));
+  PetscCall(SbH5PutInt(&h, h.file, "format", FORMAT));
+  PetscCall(SbH5WriteText(&h, h.file, "options", out->identity));
+  PetscCall(SbH5Flush(&h));
+  PetscCall(SbH5Close(&h));
+
+  /* once it is on disk, it takes its place, and the oldest ones go */
+  if (!out->rank) {
+    if (rename(tmp, path))
+      SbFormat(sizeof(message), message, "cannot rename %s to %s: %s", tmp, path, strerror(errno));
+    else
+      PetscCall(SbCheckpointPrune(out, PETSC_MAX_INT, out->checkpoint_keep));
+  }
+  PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
   PetscCall(PetscLogEventEnd(out->event.checkpoint, 0, 0, 0, 0));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CHECKPOINT], 0, 0, 0, 0));
   PetscCall(PetscLogStagePop());

@@ -113,26 +113,6 @@ PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum)
 
 /* ------------------------------------------------------------------ reading; one rank */
 
-static PetscErrorCode read_array(hid_t group, const Array *a, PetscBool *ok)
-{
-  hsize_t size[2] = {0, 0};
-  hid_t set, space;
-
-  PetscFunctionBeginUser;
-  if (!*ok || !a->n) PetscFunctionReturn(PETSC_SUCCESS);
-  set = H5Lexists(group, a->name, H5P_DEFAULT) > 0 ? H5Dopen2(group, a->name, H5P_DEFAULT) : -1;
-  *ok = (PetscBool)(set >= 0);
-  if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
-  space = H5Dget_space(set);
-  *ok =
-    (PetscBool)(H5Sget_simple_extent_ndims(space) <= 2 && H5Sget_simple_extent_dims(space, size, NULL) > 0 &&
-                size[0] == (hsize_t)a->n && (a->ncomp == 1 || size[1] == (hsize_t)a->ncomp));
-  if (*ok) *ok = (PetscBool)(H5Dread(set, a->memtype, H5S_ALL, H5S_ALL, H5P_DEFAULT, a->data) >= 0);
-  (void)H5Sclose(space);
-  (void)H5Dclose(set);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Numbers of vertices lie in their range: nothing else may be read beyond its end. */
 static PetscBool in_range(const SbMemoryMesh *g)
 {
@@ -181,7 +161,8 @@ static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_
     (*in_memory)->mass = mass;
     (*in_memory)->bound = bound;
     arrays_of(*in_memory, count, a);
-    for (int k = 0; k < NARRAY; k++) PetscCall(read_array(group, &a[k], ok));
+    for (int k = 0; k < NARRAY && *ok; k++)
+      if (a[k].n) *ok = SbH5Read(group, a[k].name, a[k].memtype, a[k].n, a[k].ncomp, a[k].data);
     /* checked before the mesh is used: else a damaged file would be taken for one of another mesh */
     *ok = (PetscBool)(*ok && in_range(*in_memory) && (int64_t)sum_of(*in_memory) == sum);
     if (!*ok) PetscCall(SbMemoryMeshDestroy(in_memory));

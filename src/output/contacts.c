@@ -64,15 +64,23 @@ static int by_keys(const void *a, const void *b)
   return 0;
 }
 
-/* The contact points of this rank to the ranks that have their share of the numbers of points and edges; those that came, sorted. */
-static PetscErrorCode share_points(SbContacts c, PetscMPIInt size)
+PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt64 *bytes)
 {
+  SbContacts c = out->contacts;
   PetscInt bound = 0;
   PetscMPIInt *dest;
   PetscReal *mine;
   SbRoute route;
 
   PetscFunctionBeginUser;
+  *bytes = 0;
+  if (!out->contact_points) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+             "The residual was asked for but not given to the monitors");
+  PetscCall(PetscLogEventBegin(out->event.contacts, 0, 0, 0, 0));
+  c->list.n = 0;
+  PetscCall(SbModelContactPoints(run->model, step->t, step->U, &c->list));
+  /* The contact points of this rank to the ranks that have their share of the numbers of points and edges; those that came, sorted. */
   for (PetscInt i = 0; i < c->list.n; i++) bound = PetscMax(bound, c->list.point[i].id[1]);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &bound, 1, MPIU_INT, MPI_MAX, c->share.comm));
   PetscCall(PetscMalloc2(c->list.n, &dest, RECORD * (size_t)c->list.n, &mine));
@@ -80,7 +88,7 @@ static PetscErrorCode share_points(SbContacts c, PetscMPIInt size)
     const SbContactPoint *p = &c->list.point[i];
     PetscReal *r, push;
 
-    dest[i] = (PetscMPIInt)((PetscInt64)p->id[1] * size / ((PetscInt64)bound + 1));
+    dest[i] = (PetscMPIInt)((PetscInt64)p->id[1] * out->size / ((PetscInt64)bound + 1));
     r = mine + RECORD * (size_t)i;
     push = SbDot3(p->force, p->normal);
     r[FIRST] = (PetscReal)p->id[1];
@@ -105,22 +113,6 @@ static PetscErrorCode share_points(SbContacts c, PetscMPIInt size)
   PetscCall(SbRouteDestroy(&route));
   PetscCall(PetscFree2(dest, mine));
   if (c->share.n) qsort(c->record, (size_t)c->share.n, RECORD * sizeof(PetscReal), by_keys);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt64 *bytes)
-{
-  SbContacts c = out->contacts;
-
-  PetscFunctionBeginUser;
-  *bytes = 0;
-  if (!out->contact_points) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
-             "The residual was asked for but not given to the monitors");
-  PetscCall(PetscLogEventBegin(out->event.contacts, 0, 0, 0, 0));
-  c->list.n = 0;
-  PetscCall(SbModelContactPoints(run->model, step->t, step->U, &c->list));
-  PetscCall(share_points(c, out->size));
   PetscCall(PetscFree(c->column));
   PetscCall(PetscMalloc(3 * sizeof(double) * (size_t)c->share.n, &c->column));
   PetscCallMPI(MPI_Scan(&c->share.n, &c->share.start, 1, MPIU_INT, MPI_SUM, out->comm));

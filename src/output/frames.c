@@ -236,35 +236,6 @@ static PetscInt64 frame_bytes(const SbOutput out, PetscInt64 contact_bytes)
   return bytes;
 }
 
-/* Links the complete frame into the file, in a group of at most a hundred; a new group is complete before it is linked itself. */
-static PetscErrorCode commit(SbOutput out, hid_t group, PetscInt step, size_t size, char path[])
-{
-  SbFrames fr = out->frames;
-  char name[16], hundred[16];
-
-  PetscFunctionBeginUser;
-  (void)snprintf(name, sizeof(name), "%06" PetscInt_FMT, step);
-  if (fr->node >= 0 && fr->nlink < SB_H5_NODE_LINKS) {
-    /* all data on disk before the link */
-    PetscCall(SbH5Flush(&fr->h5));
-    PetscCall(SbH5GroupLink(&fr->h5, group, fr->node, name));
-    (void)snprintf(hundred, sizeof(hundred), "%04" PetscInt_FMT, fr->nnode - 1);
-  } else {
-    if (fr->node >= 0) (void)H5Gclose(fr->node);
-    PetscCall(SbH5GroupCreate(&fr->h5, SB_H5_NODE_LINKS, 6, &fr->node));
-    PetscCall(SbH5GroupLink(&fr->h5, group, fr->node, name));
-    PetscCall(SbH5Flush(&fr->h5));
-    (void)snprintf(hundred, sizeof(hundred), "%04" PetscInt_FMT, fr->nnode);
-    PetscCall(SbH5GroupLink(&fr->h5, fr->node, fr->top, hundred));
-    fr->nnode++;
-    fr->nlink = 0;
-  }
-  PetscCall(SbH5Flush(&fr->h5));
-  fr->nlink++;
-  (void)snprintf(path, size, "/step/%s/%s", hundred, name);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* What viewers open, with all frames so far. Rank 0. */
 static void write_indices(SbOutput out, PetscBool last, size_t nmessage, char message[])
 {
@@ -279,7 +250,7 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   const SbField *field[SB_FIELD_MAX];
   PetscInt bytes[SB_FIELD_MAX], n = 0;
   PetscInt64 contact_bytes;
-  char path[48], message[SB_MESSAGE_MAX] = "";
+  char path[48], message[SB_MESSAGE_MAX] = "", name[16], hundred[16];
   /* along an arc length the load factor may fall, while viewers expect times that rise: the step is the time */
   const PetscReal time = run->path ? (PetscReal)step->step : step->t;
   hid_t group;
@@ -309,7 +280,25 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   PetscCall(SbContactsWrite(out, &fr->h5, group));
 
   /* the frame gets its name, and then its entry in the index */
-  PetscCall(commit(out, group, step->step, sizeof(path), path));
+  (void)snprintf(name, sizeof(name), "%06" PetscInt_FMT, step->step);
+  if (fr->node >= 0 && fr->nlink < SB_H5_NODE_LINKS) {
+    /* all data on disk before the link */
+    PetscCall(SbH5Flush(&fr->h5));
+    PetscCall(SbH5GroupLink(&fr->h5, group, fr->node, name));
+    (void)snprintf(hundred, sizeof(hundred), "%04" PetscInt_FMT, fr->nnode - 1);
+  } else {
+    if (fr->node >= 0) (void)H5Gclose(fr->node);
+    PetscCall(SbH5GroupCreate(&fr->h5, SB_H5_NODE_LINKS, 6, &fr->node));
+    PetscCall(SbH5GroupLink(&fr->h5, group, fr->node, name));
+    PetscCall(SbH5Flush(&fr->h5));
+    (void)snprintf(hundred, sizeof(hundred), "%04" PetscInt_FMT, fr->nnode);
+    PetscCall(SbH5GroupLink(&fr->h5, fr->node, fr->top, hundred));
+    fr->nnode++;
+    fr->nlink = 0;
+  }
+  PetscCall(SbH5Flush(&fr->h5));
+  fr->nlink++;
+  (void)snprintf(path, sizeof(path), "/step/%s/%s", hundred, name);
   (void)H5Gclose(group);
   fr->last_step = step->step;
   fr->nframe++;

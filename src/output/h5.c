@@ -231,27 +231,52 @@ PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the dataset has the shape [N][ncomp]. */
-static PetscBool has_shape(hid_t dataset, const SbOrder *order, PetscInt ncomp)
+/* Opens a dataset and says its shape, [n][1] for a list; negative when it is not there. */
+static hid_t open_dataset(hid_t where, const char *name, hsize_t n[2])
 {
-  const hid_t space = H5Dget_space(dataset);
-  hsize_t n[2] = {0, 1};
-  PetscBool same;
+  const hid_t dataset =
+    where >= 0 && H5Lexists(where, name, H5P_DEFAULT) > 0 ? H5Dopen2(where, name, H5P_DEFAULT) : -1;
 
-  if (H5Sget_simple_extent_ndims(space) <= 2) (void)H5Sget_simple_extent_dims(space, n, NULL);
-  same = (PetscBool)(n[0] == (hsize_t)order->N && n[1] == (hsize_t)ncomp);
-  (void)H5Sclose(space);
-  return same;
+  n[0] = 0;
+  n[1] = 1;
+  if (dataset >= 0) {
+    const hid_t space = H5Dget_space(dataset);
+
+    if (H5Sget_simple_extent_ndims(space) <= 2) (void)H5Sget_simple_extent_dims(space, n, NULL);
+    (void)H5Sclose(space);
+  }
+  return dataset;
+}
+
+PetscInt64 SbH5Rows(hid_t where, const char *name)
+{
+  hsize_t n[2];
+  const hid_t dataset = open_dataset(where, name, n);
+
+  if (dataset >= 0) (void)H5Dclose(dataset);
+  return (PetscInt64)n[0];
+}
+
+PetscBool SbH5Read(hid_t where, const char *name, hid_t type, PetscInt rows, PetscInt ncomp, void *values)
+{
+  hsize_t n[2];
+  const hid_t dataset = open_dataset(where, name, n);
+  PetscBool ok = (PetscBool)(dataset >= 0 && n[0] == (hsize_t)rows && n[1] == (hsize_t)ncomp);
+
+  if (ok) ok = (PetscBool)(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0);
+  if (dataset >= 0) (void)H5Dclose(dataset);
+  return ok;
 }
 
 PetscErrorCode SbH5ReadSlice(SbH5 *h, const char *name, const SbOrder *order, PetscInt ncomp,
                              PetscReal slice[], PetscBool *ok)
 {
-  const hid_t dataset = H5Dopen2(h->file, name, H5P_DEFAULT);
+  hsize_t n[2];
+  const hid_t dataset = open_dataset(h->file, name, n);
   PetscMPIInt here, everywhere;
 
   PetscFunctionBeginUser;
-  here = dataset >= 0 && has_shape(dataset, order, ncomp);
+  here = dataset >= 0 && n[0] == (hsize_t)order->N && n[1] == (hsize_t)ncomp;
   PetscCallMPI(MPI_Allreduce(&here, &everywhere, 1, MPI_INT, MPI_MIN, h->comm));
   if (everywhere) {
     const hid_t transfer = collective_list();
@@ -283,21 +308,6 @@ static PetscErrorCode put(SbH5 *h, hid_t where, const char *name, hid_t filetype
   (void)H5Aclose(attribute);
   (void)H5Sclose(space);
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscInt64 SbH5Rows(hid_t where, const char *name)
-{
-  const hid_t set =
-    where >= 0 && H5Lexists(where, name, H5P_DEFAULT) > 0 ? H5Dopen2(where, name, H5P_DEFAULT) : -1;
-  hsize_t n[2] = {0, 0};
-  hid_t space;
-
-  if (set < 0) return 0;
-  space = H5Dget_space(set);
-  if (H5Sget_simple_extent_ndims(space) <= 2) (void)H5Sget_simple_extent_dims(space, n, NULL);
-  (void)H5Sclose(space);
-  (void)H5Dclose(set);
-  return (PetscInt64)n[0];
 }
 
 PetscErrorCode SbH5PutReal(SbH5 *h, hid_t where, const char *name, PetscReal value)

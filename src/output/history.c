@@ -187,29 +187,6 @@ static PetscErrorCode effect_columns(SbRun run, const SbStep *step, PetscReal *v
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode put_row(SbHistory h, const SbStep *step, SbRun run)
-{
-  const SbEnergies *e = &step->energies;
-
-  PetscFunctionBeginUser;
-  h->size = 0;
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(columns); i++) {
-    const char *value = (const char *)step + columns[i].from, *comma = i ? "," : "";
-
-    if (columns[i].kind == COUNT)
-      PetscCall(put(h, "%s%" PetscInt_FMT, comma, *(const PetscInt *)value));
-    else if (columns[i].kind == REAL)
-      PetscCall(put(h, "%s%.17g", comma, (double)*(const PetscReal *)value));
-    else
-      PetscCall(put(h, ",%.17g", (double)(e->kinetic + e->strain - e->load_work - e->prescribed_work)));
-  }
-  for (PetscInt i = 0; i < h->nextra; i++) PetscCall(put(h, ",%.17g", (double)h->sum[i]));
-  for (PetscInt i = 0; i < SbLiveCount(); i++) PetscCall(put(h, ",%.17g", (double)SbLiveGet(i, step->t)));
-  for (PetscInt i = 0; i < run->ncolumn; i++) PetscCall(put(h, ",%.17g", (double)*run->column[i].value));
-  PetscCall(put(h, "\n"));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Brings the row to the file in one call; a row that was cut off by a full disk is taken back. */
 static void write_row(SbHistory h, size_t nmessage, char message[])
 {
@@ -260,7 +237,24 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   /* the row, as text, for one call */
   h->last_step = step->step;
   if (h->fd >= 0) {
-    PetscCall(put_row(h, step, run));
+    const SbEnergies *e;
+
+    e = &step->energies;
+    h->size = 0;
+    for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(columns); k++) {
+      const char *value = (const char *)step + columns[k].from, *comma = k ? "," : "";
+
+      if (columns[k].kind == COUNT)
+        PetscCall(put(h, "%s%" PetscInt_FMT, comma, *(const PetscInt *)value));
+      else if (columns[k].kind == REAL)
+        PetscCall(put(h, "%s%.17g", comma, (double)*(const PetscReal *)value));
+      else
+        PetscCall(put(h, ",%.17g", (double)(e->kinetic + e->strain - e->load_work - e->prescribed_work)));
+    }
+    for (PetscInt k = 0; k < h->nextra; k++) PetscCall(put(h, ",%.17g", (double)h->sum[k]));
+    for (PetscInt k = 0; k < SbLiveCount(); k++) PetscCall(put(h, ",%.17g", (double)SbLiveGet(k, step->t)));
+    for (PetscInt k = 0; k < run->ncolumn; k++) PetscCall(put(h, ",%.17g", (double)*run->column[k].value));
+    PetscCall(put(h, "\n"));
     write_row(h, sizeof(h->message), h->message);
   }
   if (step->last) PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, h->message));

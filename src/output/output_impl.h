@@ -65,6 +65,8 @@ PetscErrorCode SbH5ReadSlice(SbH5 *h, const char *name, const SbOrder *order, Pe
                              PetscReal slice[], PetscBool *ok);
 /* Rows of a dataset [n] or [n][m]; 0 when it is not there or another one. Not collective. */
 PetscInt64 SbH5Rows(hid_t where, const char *name);
+/* A whole dataset of the shape [n][ncomp], or [n], as numbers of this type in memory; false when it is not there, has another shape or cannot be read. */
+PetscBool SbH5Read(hid_t where, const char *name, hid_t type, PetscInt n, PetscInt ncomp, void *values);
 PetscErrorCode SbH5PutReal(SbH5 *h, hid_t where, const char *name, PetscReal value);
 PetscErrorCode SbH5PutInt(SbH5 *h, hid_t where, const char *name, int64_t value);
 PetscErrorCode SbH5PutText(SbH5 *h, hid_t where, const char *name, const char *text);

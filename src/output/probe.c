@@ -275,32 +275,6 @@ static PetscErrorCode sum_set(SbRun run, SbProbe *probe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The tets around the vertex of a probe, by volume; the lowest numbers first. */
-static PetscErrorCode sum_around(const SbMesh mesh, SbProbe *probe)
-{
-  PetscInt vertex = probe->local < 0 ? -1 : mesh->gvert[probe->local], n = 0;
-  PetscReal total = 0.;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &vertex, 1, MPIU_INT, MPI_MAX, mesh->comm));
-  for (int pass = 0; pass < 2; pass++) {
-    for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++) {
-      if (mesh->gvert[mesh->cell[i]] != vertex) continue;
-      if (!pass) {
-        n++;
-        continue;
-      }
-      probe->cell[probe->ncell] = i / 4;
-      probe->cell_weight[probe->ncell] = SbTetDeterminant(mesh->x, mesh->cell + 4 * (i / 4)) / 6.;
-      total += probe->cell_weight[probe->ncell++];
-    }
-    if (!pass) PetscCall(PetscMalloc2(n, &probe->cell, n, &probe->cell_weight));
-  }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_REAL, MPI_SUM, mesh->comm));
-  for (PetscInt i = 0; i < n; i++) probe->cell_weight[i] /= total;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Another mesh: the vertex at the position that it followed, or the tet around it. */
 static PetscErrorCode find_again(const SbSpace s, SbOutput out, SbProbe *probe)
 {
@@ -377,7 +351,28 @@ PetscErrorCode SbProbesFind(SbRun run, SbOutput out)
       PetscCall(find_again(s, out, probe));
     else
       PetscCall(find_first(s->mesh, out, probe));
-    if (cells && probe->kind == SB_PROBE_POINT && probe->original >= 0) PetscCall(sum_around(s->mesh, probe));
+    if (cells && probe->kind == SB_PROBE_POINT && probe->original >= 0) {
+      PetscInt vertex = probe->local < 0 ? -1 : s->mesh->gvert[probe->local], n = 0;
+      PetscReal total = 0.;
+
+      /* The tets around the vertex of a probe, by volume; the lowest numbers first. */
+      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &vertex, 1, MPIU_INT, MPI_MAX, s->mesh->comm));
+      for (int pass = 0; pass < 2; pass++) {
+        for (PetscInt i = 0; i < 4 * s->mesh->ncell_owned; i++) {
+          if (s->mesh->gvert[s->mesh->cell[i]] != vertex) continue;
+          if (!pass) {
+            n++;
+            continue;
+          }
+          probe->cell[probe->ncell] = i / 4;
+          probe->cell_weight[probe->ncell] = SbTetDeterminant(s->mesh->x, s->mesh->cell + 4 * (i / 4)) / 6.;
+          total += probe->cell_weight[probe->ncell++];
+        }
+        if (!pass) PetscCall(PetscMalloc2(n, &probe->cell, n, &probe->cell_weight));
+      }
+      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_REAL, MPI_SUM, s->mesh->comm));
+      for (PetscInt i = 0; i < n; i++) probe->cell_weight[i] /= total;
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

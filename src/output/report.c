@@ -89,44 +89,6 @@ static PetscErrorCode print_bodies(SbModel m, SbOutput out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode print_output(SbOutput out)
-{
-  char text[1024] = "";
-  size_t n = 0;
-
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < out->nfield && n < sizeof(text); i++)
-    n += (size_t)snprintf(text + n, sizeof(text) - n, "%s%s", i ? ", " : "", out->field[i]->name);
-  if (out->nfield && n < sizeof(text)) {
-    if (out->every > 0.)
-      n += (size_t)snprintf(text + n, sizeof(text) - n, " every %g s;", (double)out->every);
-    else if (out->every_steps > 1)
-      n += (size_t)snprintf(text + n, sizeof(text) - n, " every %" PetscInt_FMT " steps;", out->every_steps);
-    else
-      n += (size_t)snprintf(text + n, sizeof(text) - n, " every step;");
-  }
-  if (out->history && n < sizeof(text)) n += (size_t)snprintf(text + n, sizeof(text) - n, " history;");
-  if (n) text[n - 1] = 0;
-  PetscCall(entry("output", "%s%s%s", out->dir, text[0] ? ": " : "", text));
-  for (PetscInt p = 0; p < out->nprobe && out->history; p++) {
-    const SbProbe *probe = &out->probe[p];
-    char where[64] = "a tet";
-
-    if (probe->kind != SB_PROBE_POINT) {
-      PetscCall(entry("probe", "%s: mean over the %s of '%s'", probe->name,
-                      probe->kind == SB_PROBE_FACETS ? "facets" : "tets", probe->set));
-      continue;
-    }
-    if (probe->original >= 0) (void)snprintf(where, sizeof(where), "vertex %lld", (long long)probe->original);
-    PetscCall(entry("probe", "%s at %s (%g, %g, %g) m, %.3g m from the position asked for", probe->name,
-                    where, (double)probe->x[0], (double)probe->x[1], (double)probe->x[2],
-                    (double)PetscSqrtReal(PetscSqr(probe->x[0] - probe->at[0]) +
-                                          PetscSqr(probe->x[1] - probe->at[1]) +
-                                          PetscSqr(probe->x[2] - probe->at[2]))));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbReportHeader(SbRun run)
 {
   SbOutput out = (SbOutput)run->output;
@@ -176,7 +138,36 @@ PetscErrorCode SbReportHeader(SbRun run)
     PetscCall(entry("solver", "%s (%s): %s", run->solver, run->solver_parts, run->solver_reason));
   else
     PetscCall(entry("solver", "%s: %s", run->solver, run->solver_reason));
-  PetscCall(print_output(out));
+  n = 0;
+  for (PetscInt k = 0; k < out->nfield && n < sizeof(text); k++)
+    n += (size_t)snprintf(text + n, sizeof(text) - n, "%s%s", k ? ", " : "", out->field[k]->name);
+  if (out->nfield && n < sizeof(text)) {
+    if (out->every > 0.)
+      n += (size_t)snprintf(text + n, sizeof(text) - n, " every %g s;", (double)out->every);
+    else if (out->every_steps > 1)
+      n += (size_t)snprintf(text + n, sizeof(text) - n, " every %" PetscInt_FMT " steps;", out->every_steps);
+    else
+      n += (size_t)snprintf(text + n, sizeof(text) - n, " every step;");
+  }
+  if (out->history && n < sizeof(text)) n += (size_t)snprintf(text + n, sizeof(text) - n, " history;");
+  if (n) text[n - 1] = 0;
+  PetscCall(entry("output", "%s%s%s", out->dir, text[0] ? ": " : "", text));
+  for (PetscInt p = 0; p < out->nprobe && out->history; p++) {
+    const SbProbe *probe = &out->probe[p];
+    char where[64] = "a tet";
+
+    if (probe->kind != SB_PROBE_POINT) {
+      PetscCall(entry("probe", "%s: mean over the %s of '%s'", probe->name,
+                      probe->kind == SB_PROBE_FACETS ? "facets" : "tets", probe->set));
+      continue;
+    }
+    if (probe->original >= 0) (void)snprintf(where, sizeof(where), "vertex %lld", (long long)probe->original);
+    PetscCall(entry("probe", "%s at %s (%g, %g, %g) m, %.3g m from the position asked for", probe->name,
+                    where, (double)probe->x[0], (double)probe->x[1], (double)probe->x[2],
+                    (double)PetscSqrtReal(PetscSqr(probe->x[0] - probe->at[0]) +
+                                          PetscSqr(probe->x[1] - probe->at[1]) +
+                                          PetscSqr(probe->x[2] - probe->at[2]))));
+  }
   (void)fflush(PETSC_STDOUT);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

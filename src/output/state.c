@@ -9,6 +9,7 @@
 #include <unistd.h>
 #include "output_impl.h"
 #include "sbgeometry.h"
+#include "sbmeshio.h"
 
 #define OUTSIDE 0.05 /* of the body's diagonal: a node farther from the other run's body is worth a warning */
 
@@ -21,93 +22,25 @@ typedef struct {
   PetscInt *cell;       /* [ncell][4] those of the body */
 } Other;
 
-static PetscInt count_links(hid_t group)
-{
-  H5G_info_t info;
-
-  return H5Gget_info(group, &info) < 0 ? 0 : (PetscInt)info.nlinks;
-}
-
-/* The frame of a step, or the last one for step < 0; negative: there is none. Frames lie in groups of hundreds, named by their steps. */
-static hid_t open_frame(hid_t file, long step)
-{
-  const hid_t top = H5Gopen2(file, "step", H5P_DEFAULT);
-  hid_t found = -1;
-  long best = -1;
-
-  for (PetscInt h = 0; top >= 0 && h < count_links(top); h++) {
-    char name[32], frame[32];
-    hid_t hundred;
-
-    if (H5Lget_name_by_idx(top, ".", H5_INDEX_NAME, H5_ITER_INC, (hsize_t)h, name, sizeof(name),
-                           H5P_DEFAULT) < 0)
-      continue;
-    hundred = H5Gopen2(top, name, H5P_DEFAULT);
-    for (PetscInt i = 0; i < count_links(hundred); i++) {
-      long number;
-
-      (void)H5Lget_name_by_idx(hundred, ".", H5_INDEX_NAME, H5_ITER_INC, (hsize_t)i, frame, sizeof(frame),
-                               H5P_DEFAULT);
-      number = strtol(frame, NULL, 10);
-      if (step < 0 ? number <= best : number != step) continue;
-      if (found >= 0) (void)H5Gclose(found);
-      found = H5Gopen2(hundred, frame, H5P_DEFAULT);
-      best = number;
-    }
-    (void)H5Gclose(hundred);
-  }
-  if (top >= 0) (void)H5Gclose(top);
-  return found;
-}
-
 /* A whole dataset as numbers of `type`, [n] or [n][ncomp]; NULL when it is not there. PetscFree. */
 static PetscErrorCode read_all(hid_t where, const char *name, hid_t type, size_t size, PetscInt ncomp,
                                PetscInt *n, void *array)
 {
-  const PetscInt64 rows = H5Lexists(where, name, H5P_DEFAULT) > 0 ? SbH5Rows(where, name) : 0;
-  hid_t dataset;
-
   PetscFunctionBeginUser;
   *(void **)array = NULL;
-  *n = (PetscInt)rows;
-  if (!rows) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc((size_t)rows * (size_t)ncomp * size, (void **)array));
-  dataset = H5Dopen2(where, name, H5P_DEFAULT);
-  if (H5Sget_simple_extent_npoints(H5Dget_space(dataset)) != rows * ncomp ||
-      H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, *(void **)array) < 0)
-    PetscCall(PetscFree(*(void **)array));
-  (void)H5Dclose(dataset);
+  *n = (PetscInt)SbH5Rows(where, name);
+  if (!*n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc((size_t)*n * (size_t)ncomp * size, (void **)array));
+  if (!SbH5Read(where, name, type, *n, ncomp, *(void **)array)) PetscCall(PetscFree(*(void **)array));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Which number a body of this name, or of what it is a copy of, has there; one body is the one. -1: none. */
-static PetscInt find_body(hid_t mesh, const SbBody *body)
-{
-  const hid_t attribute = H5Aexists(mesh, "bodies") > 0 ? H5Aopen(mesh, "bodies", H5P_DEFAULT) : -1,
-              type = attribute >= 0 ? H5Aget_type(attribute) : -1;
-  PetscInt found = -1, n = 0;
-  char *names, *rest;
-
-  if (type < 0) return 0;
-  names = (char *)calloc(H5Tget_size(type) + 1, 1);
-  rest = names;
-  (void)H5Aread(attribute, type, names);
-  for (char *name = strsep(&rest, ","); name; name = strsep(&rest, ",")) {
-    if (!strcmp(name, body->name) || (found < 0 && !strcmp(name, body->copy_of))) found = n;
-    n++;
-  }
-  free(names);
-  (void)H5Tclose(type);
-  (void)H5Aclose(attribute);
-  return found < 0 && n == 1 ? 0 : found;
 }
 
 static PetscErrorCode read_other(const char *option, const char *text, const SbBody *body, Other *o)
 {
-  char name[32] = "mesh", *comma;
+  char name[32] = "mesh", *comma, *names, *rest;
   struct stat info;
-  long step = -1;
-  PetscInt which, n, nu, *cell_body;
+  SbH5Frames frames = {.wanted = -1};
+  PetscInt which = -1, n = 0, nu, *cell_body;
   int64_t mesh = 0;
   PetscBool ok = PETSC_TRUE;
 
@@ -116,7 +49,7 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
   PetscCall(PetscStrncpy(o->path, text, sizeof(o->path)));
   comma = strrchr(o->path, ',');
   if (comma && comma[1] && !comma[1 + strspn(comma + 1, "0123456789")]) {
-    step = strtol(comma + 1, NULL, 10);
+    frames.wanted = strtoll(comma + 1, NULL, 10);
     *comma = 0;
   }
   if (!stat(o->path, &info) && S_ISDIR(info.st_mode))
@@ -125,21 +58,28 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
   PetscCheck(o->file >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
              "%s %s: %s %s; give the folder of a run that wrote fields, displacement among them", option,
              text, o->path, access(o->path, F_OK) ? "is not there" : "holds no results");
-  o->frame = open_frame(o->file, step);
-  if (o->frame < 0 && step >= 0 && (o->frame = open_frame(o->file, -1)) >= 0) {
-    PetscCall(SbH5GetInt(o->frame, "step", &mesh, &ok));
-    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-            "%s %s: %s has no frame of step %ld; its last one is of step %ld", option, text, o->path, step,
-            (long)mesh);
-  }
-  PetscCheck(o->frame >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s has no frame", option,
-             text, o->path);
+  SbH5FindFrame(o->file, &frames);
+  PetscCheck(frames.n, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s has no frame", option, text,
+             o->path);
+  if (frames.found[0]) o->frame = H5Gopen2(o->file, frames.found, H5P_DEFAULT);
+  PetscCheck(o->frame >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s %s: %s has no frame of step %lld; its last one is of step %lld", option, text, o->path,
+             (long long)frames.wanted, (long long)frames.last);
 
   /* the mesh of that frame, which may be one of a re-meshing */
   if (H5Aexists(o->frame, "mesh") > 0) PetscCall(SbH5GetInt(o->frame, "mesh", &mesh, &ok));
   if (mesh) (void)snprintf(name, sizeof(name), "mesh_%06ld", (long)mesh);
   o->mesh = H5Gopen2(o->file, name, H5P_DEFAULT);
-  which = o->mesh < 0 ? -1 : find_body(o->mesh, body);
+
+  /* its number for a body of this name, or of what it is a copy of; where there is one body, it is the one */
+  if (o->mesh >= 0) {
+    PetscCall(SbH5BodyNames(o->file, name, &names));
+    rest = names;
+    for (char *other = strsep(&rest, ","); other; other = strsep(&rest, ","), n++)
+      if (!strcmp(other, body->name) || (which < 0 && !strcmp(other, body->copy_of))) which = n;
+    if (which < 0 && n == 1) which = 0;
+    PetscCall(PetscFree(names));
+  }
   PetscCheck(which >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s has no body '%s'", option,
              text, o->path, body->name);
   PetscCall(read_all(o->mesh, "x", H5T_NATIVE_DOUBLE, sizeof(double), 3, &o->npoint, &o->x));

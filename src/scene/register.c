@@ -8,6 +8,16 @@
 
 PetscErrorCode SbRegisterAll(void)
 {
+  static const SbEffectType *const effects[] = {&SbEffectGravity,
+                                                &SbEffectBodyForce,
+                                                &SbEffectTraction,
+                                                &SbEffectPressure,
+                                                &SbEffectPointForce,
+                                                &SbEffectFixed,
+                                                &SbEffectPrescribedDisplacement,
+                                                &SbEffectDamping,
+                                                &SbEffectContact};
+
   PetscFunctionBeginUser;
   PetscCall(SbLogInitialize());
 
@@ -28,14 +38,6 @@ PetscErrorCode SbRegisterAll(void)
   PetscCall(SbMaterialRegisterAll());
   PetscCall(SbSetsRegister());
 
-  PetscCall(SbEffectRegister_Gravity());
-  PetscCall(SbEffectRegister_BodyForce());
-  PetscCall(SbEffectRegister_Traction());
-  PetscCall(SbEffectRegister_Pressure());
-  PetscCall(SbEffectRegister_PointForce());
-  PetscCall(SbEffectRegister_Fixed());
-  PetscCall(SbEffectRegister_PrescribedDisplacement());
-  PetscCall(SbEffectRegister_Damping());
-  PetscCall(SbEffectRegister_Contact());
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(effects); i++) PetscCall(SbEffectRegister(effects[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -17,31 +17,6 @@ typedef struct {
   PetscScalar *value[2];
 } Blocks;
 
-static PetscErrorCode lend_blocks(Mat A, Blocks *x)
-{
-  PetscBool parallel, sequential;
-  MatType type;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &x->symmetric));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQBAIJ, &sequential));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
-  PetscCheck(
-    x->symmetric || sequential || parallel, PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
-    "The two-level preconditioner takes BAIJ and SBAIJ matrices, this one is %s: leave -mat_type alone",
-    type);
-  x->part[0] = A;
-  x->part[1] = NULL;
-  x->value[1] = NULL;
-  if (parallel) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &x->part[0], &x->part[1], NULL));
-  if (x->symmetric)
-    PetscCall(MatSeqSBAIJGetArray(A, &x->value[0]));
-  else
-    PetscCall(MatSeqBAIJGetArray(x->part[0], &x->value[0]));
-  if (parallel) PetscCall(MatSeqBAIJGetArray(x->part[1], &x->value[1]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* W[3][6] += factor K Z_j; K by columns. */
 static inline void add_column(const PetscScalar K[9], PetscReal factor, const PetscReal d[3], PetscReal W[18])
 {
@@ -112,80 +87,82 @@ static inline PetscReal *block_of(SbCoarse c, PetscInt a, PetscInt b)
   return c->value + 36 * k;
 }
 
-/* E_ab += Z_i^T W_ib for the aggregates b around node i. With symmetric storage blocks below the diagonal are transposed. */
-static void add_row(SbCoarse c, PetscBool symmetric, PetscInt i, const RowSums *row)
+PetscErrorCode SbCoarseSetUp(SbCoarse c, Mat A)
 {
-  const PetscInt a = c->agg[i];
-
-  for (PetscInt k = 0; k < row->n; k++) {
-    const PetscInt b = row->b[k];
-    const PetscBool below = (PetscBool)(symmetric && b < a);
-    PetscReal *E = below ? block_of(c, b, a) : block_of(c, a, b);
-
-    for (int q = 0; q < 6; q++) {
-      const PetscReal f[3] = {row->W[18 * k + q], row->W[18 * k + 6 + q], row->W[18 * k + 12 + q]};
-      PetscReal m[6] = {0.};
-
-      SbCoarseAddMoments(c->d + 3 * i, f, m);
-      for (int e = 0; e < 6; e++) E[below ? 6 * q + e : 6 * e + q] += m[e];
-    }
-  }
-}
-
-/* Diagonal blocks: symmetric, with their vanishing modes filled; those below them from those above where A has only these. */
-static void complete(SbCoarse c, PetscBool symmetric)
-{
-  for (PetscInt a = 0; a < c->n; a++) {
-    PetscReal *E = c->value + 36 * c->start[a], trace = 0.;
-
-    for (int i = 0; i < 6; i++) {
-      for (int j = 0; j <= i; j++)
-        E[6 * i + j] = E[6 * j + i] = (symmetric ? 1. : 0.5) * (E[6 * i + j] + E[6 * j + i]);
-      trace += E[7 * i];
-    }
-    for (int e = 0; e < 36; e++) E[e] += trace / 6. * c->null[36 * a + e];
-    for (PetscInt k = c->start[a] + 1; symmetric && k < c->start[a + 1] && c->column[k] < a; k++) {
-      const PetscReal *above = block_of(c, c->column[k], a);
-
-      for (int e = 0; e < 36; e++) c->value[36 * k + e] = above[6 * (e % 6) + e / 6];
-    }
-  }
-}
-
-static PetscErrorCode assemble(SbCoarse c, Mat A)
-{
-  const SbPlan p = c->space->plan;
+  SbPlan p;
   PetscInt widest = 1;
   Blocks x;
   RowSums row;
+  PetscBool parallel, sequential;
+  MatType type;
 
   PetscFunctionBeginUser;
+  c->ok = PETSC_TRUE;
+  if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
+  p = c->space->plan;
   for (PetscInt i = 0; i < c->space->nnode_owned; i++)
     widest = PetscMax(widest, p->di[i + 1] - p->di[i] + p->oi[i + 1] - p->oi[i]);
   PetscCall(PetscMalloc2(widest, &row.b, 18 * widest, &row.W));
   PetscCall(PetscArrayzero(c->value, 36 * c->start[c->n]));
-  PetscCall(lend_blocks(A, &x));
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &x.symmetric));
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQBAIJ, &sequential));
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
+  PetscCheck(
+    x.symmetric || sequential || parallel, PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
+    "The two-level preconditioner takes BAIJ and SBAIJ matrices, this one is %s: leave -mat_type alone",
+    type);
+  x.part[0] = A;
+  x.part[1] = NULL;
+  x.value[1] = NULL;
+  if (parallel) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &x.part[0], &x.part[1], NULL));
+  if (x.symmetric)
+    PetscCall(MatSeqSBAIJGetArray(A, &x.value[0]));
+  else
+    PetscCall(MatSeqBAIJGetArray(x.part[0], &x.value[0]));
+  if (parallel) PetscCall(MatSeqBAIJGetArray(x.part[1], &x.value[1]));
   for (PetscInt i = 0; i < c->space->nnode_owned; i++) {
+    PetscInt a;
+
     if (c->agg[i] < 0) continue;
     sum_row(c, &x, i, &row);
-    add_row(c, x.symmetric, i, &row);
+    /* E_ab += Z_i^T W_ib for the aggregates b around node i. With symmetric storage blocks below the diagonal are transposed. */
+    a = c->agg[i];
+    for (PetscInt k = 0; k < row.n; k++) {
+      const PetscInt b = row.b[k];
+      const PetscBool below = (PetscBool)(x.symmetric && b < a);
+      PetscReal *E = below ? block_of(c, b, a) : block_of(c, a, b);
+
+      for (int q = 0; q < 6; q++) {
+        const PetscReal f[3] = {row.W[18 * k + q], row.W[18 * k + 6 + q], row.W[18 * k + 12 + q]};
+        PetscReal m[6] = {0.};
+
+        SbCoarseAddMoments(c->d + 3 * i, f, m);
+        for (int e = 0; e < 6; e++) E[below ? 6 * q + e : 6 * e + q] += m[e];
+      }
+    }
   }
   if (x.symmetric)
     PetscCall(SbMatRestoreRead(A, MatSeqSBAIJRestoreArray, &x.value[0]));
   else
     PetscCall(SbMatRestoreRead(x.part[0], MatSeqBAIJRestoreArray, &x.value[0]));
   if (x.part[1]) PetscCall(SbMatRestoreRead(x.part[1], MatSeqBAIJRestoreArray, &x.value[1]));
-  complete(c, x.symmetric);
-  PetscCall(PetscFree2(row.b, row.W));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+  /* Diagonal blocks: symmetric, with their vanishing modes filled; those below them from those above where A has only these. */
+  for (PetscInt a = 0; a < c->n; a++) {
+    PetscReal *E = c->value + 36 * c->start[a], trace = 0.;
 
-PetscErrorCode SbCoarseSetUp(SbCoarse c, Mat A)
-{
-  PetscFunctionBeginUser;
-  c->ok = PETSC_TRUE;
-  if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(assemble(c, A));
+    for (int i = 0; i < 6; i++) {
+      for (int j = 0; j <= i; j++)
+        E[6 * i + j] = E[6 * j + i] = (x.symmetric ? 1. : 0.5) * (E[6 * i + j] + E[6 * j + i]);
+      trace += E[7 * i];
+    }
+    for (int e = 0; e < 36; e++) E[e] += trace / 6. * c->null[36 * a + e];
+    for (PetscInt k = c->start[a] + 1; x.symmetric && k < c->start[a + 1] && c->column[k] < a; k++) {
+      const PetscReal *above = block_of(c, c->column[k], a);
+
+      for (int e = 0; e < 36; e++) c->value[36 * k + e] = above[6 * (e % 6) + e / 6];
+    }
+  }
+  PetscCall(PetscFree2(row.b, row.W));
   PetscCall(SbCoarseSetUpSolver(c));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

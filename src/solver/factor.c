@@ -161,28 +161,6 @@ typedef struct {
   PetscInt *child, *sibling; /* [nsuper] lists of children in the assembly tree */
 } Work;
 
-/* Adds the entries of A in the columns of supernode g to its front. Row-major block (node, neighbour) is column-major block (neighbour, node). */
-static void add_entries(SbFactor f, PetscInt g, const PetscInt ia[], const PetscInt ja[],
-                        const PetscReal block[], const Work *work, PetscInt ld)
-{
-  const SbElimination *e = &f->e;
-
-  for (PetscInt j = e->first[g]; j < e->first[g + 1]; j++) {
-    const PetscInt node = e->order[j], column = 3 * (j - e->first[g]);
-
-    for (PetscInt k = ia[node]; k < ia[node + 1]; k++) {
-      const PetscInt i = e->inverse[ja[k]];
-
-      if (i < j) continue;
-      for (PetscInt a = 0; a < 3; a++) {
-        PetscScalar *to = work->front + (size_t)(column + a) * (size_t)ld + 3 * work->position[i];
-
-        for (PetscInt b = 0; b < 3; b++) to[b] += block[9 * k + 3 * a + b];
-      }
-    }
-  }
-}
-
 /* Extend-add: the update of a supernode joins a lower triangle; at[k] is the node index there of its k-th row. */
 static void add_update(const PetscScalar *update, PetscInt nrow, const PetscInt at[], PetscScalar *to,
                        PetscInt ld)
@@ -240,7 +218,21 @@ static PetscErrorCode eliminate(SbFactor f, PetscInt g, const PetscInt ia[], con
   for (PetscInt k = 0; k < nall; k++) work->position[list[k]] = k;
   for (size_t j = 0, n = 3 * (size_t)nall; j < n; j++)
     PetscCall(PetscArrayzero(work->front + n * j + j / 3 * 3, n - j / 3 * 3));
-  add_entries(f, g, ia, ja, block, work, 3 * nall);
+  /* Adds the entries of A in the columns of supernode g to its front. Row-major block (node, neighbour) is column-major block (neighbour, node). */
+  for (PetscInt j = e->first[g]; j < e->first[g + 1]; j++) {
+    const PetscInt node = e->order[j], column = 3 * (j - e->first[g]);
+
+    for (PetscInt k = ia[node]; k < ia[node + 1]; k++) {
+      const PetscInt i = e->inverse[ja[k]];
+
+      if (i < j) continue;
+      for (PetscInt a = 0; a < 3; a++) {
+        PetscScalar *to = work->front + (size_t)(column + a) * (size_t)(3 * nall) + 3 * work->position[i];
+
+        for (PetscInt b = 0; b < 3; b++) to[b] += block[9 * k + 3 * a + b];
+      }
+    }
+  }
   // the updates of the children join it and are freed
   for (PetscInt c = work->child[g]; c >= 0; c = work->sibling[c]) {
     const PetscInt below = e->start[c] + e->first[c + 1] - e->first[c], n = e->start[c + 1] - below;

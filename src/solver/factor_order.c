@@ -222,11 +222,27 @@ static PetscErrorCode find_groups(SbElimination *e, const PetscInt ia[], const P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode store_groups(SbElimination *e, PetscInt ngroup, Group group[])
+PetscErrorCode SbEliminationCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], const PetscInt ja[],
+                                   const PetscInt order[], SbElimination *e)
 {
-  PetscInt *owner, total = 0;
+  PetscInt *parent, *ancestor, ngroup = 0, *owner, total = 0;
+  Group *group;
 
   PetscFunctionBeginUser;
+  e->n = n;
+  e->nfree = n - nkeep;
+  PetscCall(PetscMalloc2(n, &e->order, n, &e->inverse));
+  if (order)
+    PetscCall(PetscArraycpy(e->order, order, e->nfree));
+  else
+    PetscCall(dissect(e->nfree, ia, ja, e->order));
+  for (PetscInt k = e->nfree; k < n; k++) e->order[k] = k;
+  for (PetscInt k = 0; k < n; k++) e->inverse[e->order[k]] = k;
+  PetscCall(PetscMalloc2(e->nfree, &parent, e->nfree, &ancestor));
+  elimination_tree(e, ia, ja, parent, ancestor);
+  PetscCall(postorder(e, parent));
+  PetscCall(PetscMalloc1(e->nfree, &group));
+  PetscCall(find_groups(e, ia, ja, parent, &ngroup, group));
   for (PetscInt g = 0; g < ngroup; g++) total += group[g].ncol + group[g].nrow;
   e->nsuper = ngroup;
   PetscCall(PetscMalloc4(ngroup + 1, &e->first, ngroup + 1, &e->start, total, &e->list, ngroup, &e->parent));
@@ -249,31 +265,6 @@ static PetscErrorCode store_groups(SbElimination *e, PetscInt ngroup, Group grou
     PetscCall(PetscFree(group[g].row));
   }
   PetscCall(PetscFree(owner));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbEliminationCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], const PetscInt ja[],
-                                   const PetscInt order[], SbElimination *e)
-{
-  PetscInt *parent, *ancestor, ngroup = 0;
-  Group *group;
-
-  PetscFunctionBeginUser;
-  e->n = n;
-  e->nfree = n - nkeep;
-  PetscCall(PetscMalloc2(n, &e->order, n, &e->inverse));
-  if (order)
-    PetscCall(PetscArraycpy(e->order, order, e->nfree));
-  else
-    PetscCall(dissect(e->nfree, ia, ja, e->order));
-  for (PetscInt k = e->nfree; k < n; k++) e->order[k] = k;
-  for (PetscInt k = 0; k < n; k++) e->inverse[e->order[k]] = k;
-  PetscCall(PetscMalloc2(e->nfree, &parent, e->nfree, &ancestor));
-  elimination_tree(e, ia, ja, parent, ancestor);
-  PetscCall(postorder(e, parent));
-  PetscCall(PetscMalloc1(e->nfree, &group));
-  PetscCall(find_groups(e, ia, ja, parent, &ngroup, group));
-  PetscCall(store_groups(e, ngroup, group));
   PetscCall(PetscFree(group));
   PetscCall(PetscFree2(parent, ancestor));
   PetscFunctionReturn(PETSC_SUCCESS);

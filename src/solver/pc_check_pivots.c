@@ -83,26 +83,6 @@ static PetscErrorCode guarded_apply(PC pc, Vec x, Vec y)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The factorisation on the rank that has the matrix; made at the first set-up, before which PETSc has nothing inside a telescope. */
-static PetscErrorCode set_up_inner(PC pc, PC inner, PCFailedReason *reason)
-{
-  const char *package;
-  PetscBool cholmod;
-
-  PetscFunctionBeginUser;
-  PetscCall(PCGetApplicationContext(pc, &package));
-  if (package && !inner->setupcalled) {
-    PetscCall(PetscStrcmp(package, MATSOLVERCHOLMOD, &cholmod));
-    PetscCall(PCSetType(inner, cholmod ? PCCHOLESKY : PCLU));
-    PetscCall(PCFactorSetMatSolverType(inner, package));
-    PetscCall(PCSetFromOptions(inner));
-  }
-  PetscCall(SbPCCheckPivots(inner));
-  PetscCall(PCSetUp(inner));
-  PetscCall(PCGetFailedReason(inner, reason));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* PETSc would factor at the first solve; here all ranks know after the set-up whether the one that factors has failed. */
 static PetscErrorCode gathered_setup(PC pc)
 {
@@ -116,9 +96,23 @@ static PetscErrorCode gathered_setup(PC pc)
   PetscCall(PetscObjectQueryFunction((PetscObject)pc, ORIGINAL, &original));
   PetscCall((*original)(pc));
   PetscCall(PCTelescopeGetKSP(pc, &ksp));
-  if (ksp) { /* there is none on ranks that wait */
+  if (ksp) {
+    const char *package;
+    PetscBool cholmod;
+
+    /* there is none on ranks that wait */
     PetscCall(KSPGetPC(ksp, &inner));
-    PetscCall(set_up_inner(pc, inner, &reason));
+    /* The factorisation on the rank that has the matrix; made at the first set-up, before which PETSc has nothing inside a telescope. */
+    PetscCall(PCGetApplicationContext(pc, &package));
+    if (package && !inner->setupcalled) {
+      PetscCall(PetscStrcmp(package, MATSOLVERCHOLMOD, &cholmod));
+      PetscCall(PCSetType(inner, cholmod ? PCCHOLESKY : PCLU));
+      PetscCall(PCFactorSetMatSolverType(inner, package));
+      PetscCall(PCSetFromOptions(inner));
+    }
+    PetscCall(SbPCCheckPivots(inner));
+    PetscCall(PCSetUp(inner));
+    PetscCall(PCGetFailedReason(inner, &reason));
   }
   failed = (PetscMPIInt)reason;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, PetscObjectComm((PetscObject)pc)));

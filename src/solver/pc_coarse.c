@@ -79,18 +79,6 @@ static PetscErrorCode create_coarse(TwoLevel *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode choose_fine(TwoLevel *p)
-{
-  SbSpace s = p->space;
-  PetscReal nu = 0.;
-
-  PetscFunctionBeginUser;
-  for (PetscInt r = 0; r < s->nregion; r++) nu = PetscMax(nu, s->region[r].material->nu);
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nu, 1, MPIU_REAL, MPI_MAX, s->comm));
-  p->simple = (PetscBool)(nu > NU_ICC);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Incomplete Cholesky of the rows and columns of this rank, or what replaces it. */
 static PetscErrorCode create_fine(TwoLevel *p, PC pc, Mat A)
 {
@@ -157,8 +145,14 @@ static PetscErrorCode PCSetUp_Coarse(PC pc)
   PetscCall(PCGetOperators(pc, NULL, &A));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
   if (!p->coarse) {
+    SbSpace s;
+    PetscReal nu = 0.;
+
     PetscCall(create_coarse(p));
-    PetscCall(choose_fine(p));
+    s = p->space;
+    for (PetscInt r = 0; r < s->nregion; r++) nu = PetscMax(nu, s->region[r].material->nu);
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nu, 1, MPIU_REAL, MPI_MAX, s->comm));
+    p->simple = (PetscBool)(nu > NU_ICC);
     PetscCall(MatCreateVecs(A, &p->s, &p->w));
     PetscCall(VecDuplicate(p->s, &p->t));
     PetscCall(VecCreateLocalVector(p->s, &p->own_in));

@@ -114,22 +114,6 @@ static PetscErrorCode find_means(SbLevels v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode find_corners(SbLevels v)
-{
-  SbSpace s = v->at[v->n - 2];
-  SbSpace p = v->at[v->n - 1];
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(3 * s->nnode, &v->corner));
-  for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
-    const PetscInt *vertex = p->cell_node + 4 * (i / 4), a = i % 4;
-    const PetscBool face = (PetscBool)!SbSpaceCellElement(s, i / 4)->nodes_per[0];
-
-    for (PetscInt k = 0; k < 3; k++) v->corner[3 * s->cell_node[i] + k] = vertex[face ? (a + 1 + k) % 4 : a];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The owned part of a plain vector into one with ghosts, and these. */
 static PetscErrorCode load(SbSpace s, Vec from, Vec to, const PetscReal **x)
 {
@@ -172,14 +156,20 @@ static PetscErrorCode restrict_to_vertices(SbLevels v, Vec t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode add_from_vertices(SbLevels v, Vec z)
+static PetscErrorCode cycle_faces(SbLevels v, Vec r, Vec z)
 {
   const PetscInt k = v->n - 2;
-  SbSpace s = v->at[k], p = v->at[k + 1];
+  SbSpace at = v->at[k], s, p;
+  Mat A = v->A[k];
   const PetscReal *x;
   PetscScalar *out;
 
   PetscFunctionBeginUser;
+  PetscCall(SbGaussSeidelDown(at, A, v->inverse, NULL, r, z, v->t[k]));
+  PetscCall(restrict_to_vertices(v, v->t[k]));
+  PetscCall(KSPSolve(v->coarse, v->t[k + 1], v->w[k + 1]));
+  s = v->at[k];
+  p = v->at[k + 1];
   PetscCall(load(p, v->w[k + 1], v->g[k + 1], &x));
   PetscCall(VecGetArray(z, &out));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
@@ -190,20 +180,6 @@ static PetscErrorCode add_from_vertices(SbLevels v, Vec z)
   }
   PetscCall(VecRestoreArray(z, &out));
   PetscCall(SbSpaceRestoreLocalRead(p, v->g[k + 1], &x));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode cycle_faces(SbLevels v, Vec r, Vec z)
-{
-  const PetscInt k = v->n - 2;
-  SbSpace at = v->at[k];
-  Mat A = v->A[k];
-
-  PetscFunctionBeginUser;
-  PetscCall(SbGaussSeidelDown(at, A, v->inverse, NULL, r, z, v->t[k]));
-  PetscCall(restrict_to_vertices(v, v->t[k]));
-  PetscCall(KSPSolve(v->coarse, v->t[k + 1], v->w[k + 1]));
-  PetscCall(add_from_vertices(v, z));
   PetscCall(SbGaussSeidelUp(at, A, v->inverse, NULL, r, z, v->t[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -229,34 +205,12 @@ static PetscErrorCode restrict_to_means(SbLevels v, const PetscReal x[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* u = m + (1 - w) d, with the jump's own residual (1 - w) r_own - w r_across. */
-static void spread(SbLevels v, const PetscReal r[], const PetscReal mean[], const PetscScalar diagonal[],
-                   PetscScalar z[])
-{
-  SbSpace s = v->space;
-
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    const PetscInt other = v->across[i];
-    const PetscReal w = v->weight[i];
-
-    for (PetscInt c = 0; c < 3; c++) {
-      const PetscInt k = 3 * i + c;
-
-      if (s->fixed[i] & (1 << c)) {
-        z[k] = r[k] / diagonal[k];
-        continue;
-      }
-      z[k] = mean[3 * v->mean[i] + c];
-      if (other >= 0) z[k] += (1. - w) * v->jump[i] * ((1. - w) * r[k] - w * r[3 * other + c]);
-    }
-  }
-}
-
 PetscErrorCode SbLevelsApply(SbLevels v, Vec r, Vec z)
 {
   const PetscReal *x, *mean;
   const PetscScalar *diagonal;
   PetscScalar *out;
+  SbSpace s = v->space;
 
   PetscFunctionBeginUser;
   if (v->n == 2) {
@@ -269,7 +223,22 @@ PetscErrorCode SbLevelsApply(SbLevels v, Vec r, Vec z)
   PetscCall(load(v->at[1], v->z[1], v->z[1], &mean));
   PetscCall(VecGetArrayRead(v->t[0], &diagonal));
   PetscCall(VecGetArray(z, &out));
-  spread(v, x, mean, diagonal, out);
+  /* u = m + (1 - w) d, with the jump's own residual (1 - w) r_own - w r_across. */
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    const PetscInt other = v->across[i];
+    const PetscReal w = v->weight[i];
+
+    for (PetscInt c = 0; c < 3; c++) {
+      const PetscInt k = 3 * i + c;
+
+      if (s->fixed[i] & (1 << c)) {
+        out[k] = x[k] / diagonal[k];
+        continue;
+      }
+      out[k] = mean[3 * v->mean[i] + c];
+      if (other >= 0) out[k] += (1. - w) * v->jump[i] * ((1. - w) * x[k] - w * x[3 * other + c]);
+    }
+  }
   PetscCall(VecRestoreArray(z, &out));
   PetscCall(VecRestoreArrayRead(v->t[0], &diagonal));
   PetscCall(SbSpaceRestoreLocalRead(v->at[1], v->z[1], &mean));
@@ -298,36 +267,6 @@ static PetscErrorCode loose_diagonal(SbLevels v, Vec D)
     }
   }
   PetscCall(VecRestoreArray(D, &d));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Inverse stiffness of the jumps: (1-w)^2 A_ii - 2 w (1-w) A_ij + w^2 A_jj of the face terms and the mass. */
-static PetscErrorCode jump_stiffness(SbLevels v)
-{
-  SbSpace s = v->space;
-  const SbPlan p = s->plan;
-  const PetscReal *own;
-
-  PetscFunctionBeginUser;
-  PetscCall(MatGetDiagonal(v->A[0], v->t[0]));
-  PetscCall(loose_diagonal(v, v->r[0]));
-  PetscCall(load(s, v->r[0], v->r[0], &own));
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
-
-    for (PetscInt k = 4 * SB_BATCH * region->bstart; k < 4 * SB_BATCH * region->bend; k++) {
-      const PetscInt b = k / (4 * SB_BATCH), a = k / SB_BATCH % 4, i = s->batch_node[k], j = v->across[i],
-                     at = p->offset[((size_t)b * 64 + (size_t)(8 * a + 4 + a)) * SB_BATCH +
-                                    (size_t)(k % SB_BATCH)];
-      const PetscReal w = v->weight[i];
-
-      if (i >= s->nnode_owned || j < 0) continue;
-      v->jump[i] = 1. / ((1. - w) * (1. - w) * own[3 * i] + w * w * own[3 * j] -
-                         2. * w * (1. - w) * (v->shift_k + v->shift_v * region->beta) *
-                           p->face_term[at < 0][at < 0 ? ~at : at]);
-    }
-  }
-  PetscCall(SbSpaceRestoreLocalRead(s, v->r[0], &own));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -418,7 +357,32 @@ PetscErrorCode SbLevelsAssemble(SbLevels v, const SbStage *stage, const SbVolume
 PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
 {
   PetscFunctionBeginUser;
-  if (v->n == 3) PetscCall(jump_stiffness(v));
+  if (v->n == 3) {
+    SbSpace s = v->space;
+    const SbPlan p = s->plan;
+    const PetscReal *own;
+
+    /* Inverse stiffness of the jumps: (1-w)^2 A_ii - 2 w (1-w) A_ij + w^2 A_jj of the face terms and the mass. */
+    PetscCall(MatGetDiagonal(v->A[0], v->t[0]));
+    PetscCall(loose_diagonal(v, v->r[0]));
+    PetscCall(load(s, v->r[0], v->r[0], &own));
+    for (PetscInt r = 0; r < s->nregion; r++) {
+      const SbRegion *region = &s->region[r];
+
+      for (PetscInt k = 4 * SB_BATCH * region->bstart; k < 4 * SB_BATCH * region->bend; k++) {
+        const PetscInt b = k / (4 * SB_BATCH), a = k / SB_BATCH % 4, i = s->batch_node[k], j = v->across[i],
+                       at = p->offset[((size_t)b * 64 + (size_t)(8 * a + 4 + a)) * SB_BATCH +
+                                      (size_t)(k % SB_BATCH)];
+        const PetscReal w = v->weight[i];
+
+        if (i >= s->nnode_owned || j < 0) continue;
+        v->jump[i] = 1. / ((1. - w) * (1. - w) * own[3 * i] + w * w * own[3 * j] -
+                           2. * w * (1. - w) * (v->shift_k + v->shift_v * region->beta) *
+                             p->face_term[at < 0][at < 0 ? ~at : at]);
+      }
+    }
+    PetscCall(SbSpaceRestoreLocalRead(s, v->r[0], &own));
+  }
   PetscCall(SbGaussSeidelSetUp(v->at[v->n - 2], v->A[v->n - 2], v->inverse, NULL, positive));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, positive, 1, SB_MPI_BOOL, MPI_LAND, v->space->comm));
   if (!*positive) PetscFunctionReturn(PETSC_SUCCESS);
@@ -427,28 +391,12 @@ PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode create_coarse(SbLevels v)
-{
-  PetscReal weak = WEAK;
-  PC pc;
-
-  PetscFunctionBeginUser;
-  PetscCall(KSPCreate(v->space->comm, &v->coarse));
-  PetscCall(KSPSetOptionsPrefix(v->coarse, "pressure_coarse_"));
-  PetscCall(KSPSetType(v->coarse, KSPPREONLY));
-  PetscCall(KSPGetPC(v->coarse, &pc));
-  PetscCall(PCSetType(pc, PCGAMG));
-  PetscCall(PCGAMGSetReuseInterpolation(pc, PETSC_TRUE));
-  PetscCall(PCGAMGSetThreshold(pc, &weak, 1));
-  PetscCall(PCGAMGSetCoarseEqLim(pc, LAST_LEVEL));
-  PetscCall(PCGAMGSetProcEqLim(pc, PER_RANK));
-  PetscCall(KSPSetFromOptions(v->coarse));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbLevelsCreate(SbSpace s, SbLevels *levels)
 {
   SbLevels v;
+  PetscReal weak = WEAK;
+  PC pc;
+  SbSpace upper, lower;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&v));
@@ -460,7 +408,16 @@ PetscErrorCode SbLevelsCreate(SbSpace s, SbLevels *levels)
     PetscCall(find_means(v));
   }
   PetscCall(add_level(v, PETSC_TRUE));
-  PetscCall(find_corners(v));
+  upper = v->at[v->n - 2];
+  lower = v->at[v->n - 1];
+  PetscCall(PetscMalloc1(3 * upper->nnode, &v->corner));
+  for (PetscInt i = 0; i < 4 * upper->mesh->ncell; i++) {
+    const PetscInt *vertex = lower->cell_node + 4 * (i / 4), a = i % 4;
+    const PetscBool face = (PetscBool)!SbSpaceCellElement(upper, i / 4)->nodes_per[0];
+
+    for (PetscInt k = 0; k < 3; k++)
+      v->corner[3 * upper->cell_node[i] + k] = vertex[face ? (a + 1 + k) % 4 : a];
+  }
   for (PetscInt k = 0; k < v->n; k++) {
     PetscCall(SbSpaceCreateVec(v->at[k], &v->r[k]));
     PetscCall(SbSpaceCreateVec(v->at[k], &v->z[k]));
@@ -468,7 +425,16 @@ PetscErrorCode SbLevelsCreate(SbSpace s, SbLevels *levels)
     PetscCall(MatCreateVecs(v->A[k], &v->t[k], &v->w[k]));
   }
   PetscCall(PetscMalloc1(9 * (size_t)v->at[v->n - 2]->nnode_owned, &v->inverse));
-  PetscCall(create_coarse(v));
+  PetscCall(KSPCreate(v->space->comm, &v->coarse));
+  PetscCall(KSPSetOptionsPrefix(v->coarse, "pressure_coarse_"));
+  PetscCall(KSPSetType(v->coarse, KSPPREONLY));
+  PetscCall(KSPGetPC(v->coarse, &pc));
+  PetscCall(PCSetType(pc, PCGAMG));
+  PetscCall(PCGAMGSetReuseInterpolation(pc, PETSC_TRUE));
+  PetscCall(PCGAMGSetThreshold(pc, &weak, 1));
+  PetscCall(PCGAMGSetCoarseEqLim(pc, LAST_LEVEL));
+  PetscCall(PCGAMGSetProcEqLim(pc, PER_RANK));
+  PetscCall(KSPSetFromOptions(v->coarse));
   *levels = v;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -101,35 +101,6 @@ static PetscErrorCode PCApply_Mixed(PC pc, Vec R, Vec Z)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode create_inner(Pressure *s)
-{
-  const PetscInt n = 3 * s->space->nnode_owned + s->space->mesh->ncell_owned;
-  PC pc;
-
-  PetscFunctionBeginUser;
-  PetscCall(MatCreateShell(s->space->comm, n, n, PETSC_DETERMINE, PETSC_DETERMINE, s, &s->M));
-  PetscCall(MatShellSetOperation(s->M, MATOP_MULT, SB_OPERATION(MatMult_Mixed)));
-  PetscCall(MatSetUp(s->M));
-  PetscCall(MatCreateVecs(s->M, &s->x, &s->b));
-  PetscCall(MatCreateVecs(s->op->levels->A[0], &s->t, NULL));
-  PetscCall(PetscMalloc1(s->space->mesh->ncell_owned, &s->weight));
-  PetscCall(KSPCreate(s->space->comm, &s->inner));
-  PetscCall(KSPSetOptionsPrefix(s->inner, "pressure_"));
-  PetscCall(KSPSetOperators(s->inner, s->M, s->M));
-  PetscCall(KSPSetType(s->inner, KSPGMRES));
-  PetscCall(KSPGMRESSetRestart(s->inner, RESTART));
-  PetscCall(SbKSPRefineOrthogonalization(s->inner));
-  PetscCall(KSPSetPCSide(s->inner, PC_RIGHT));
-  PetscCall(KSPSetNormType(s->inner, KSP_NORM_UNPRECONDITIONED));
-  PetscCall(KSPGetPC(s->inner, &pc));
-  PetscCall(PCSetType(pc, PCSHELL));
-  PetscCall(PCShellSetContext(pc, s));
-  PetscCall(PCShellSetName(pc, "nodes and pressures"));
-  PetscCall(PCShellSetApply(pc, PCApply_Mixed));
-  PetscCall(KSPSetFromOptions(s->inner));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ set-up and application */
 
 static PetscErrorCode PCSetUp_Pressure(PC pc)
@@ -145,7 +116,31 @@ static PetscErrorCode PCSetUp_Pressure(PC pc)
   PetscCall(SbPressureOperatorGet(K, &s->op));
   PetscCheck(s->op, s->space->comm, PETSC_ERR_ARG_WRONG,
              "The operator is not one of SbPressureOperatorCreate()");
-  if (!s->inner) PetscCall(create_inner(s));
+  if (!s->inner) {
+    const PetscInt n = 3 * s->space->nnode_owned + s->space->mesh->ncell_owned;
+    PC inner;
+
+    PetscCall(MatCreateShell(s->space->comm, n, n, PETSC_DETERMINE, PETSC_DETERMINE, s, &s->M));
+    PetscCall(MatShellSetOperation(s->M, MATOP_MULT, SB_OPERATION(MatMult_Mixed)));
+    PetscCall(MatSetUp(s->M));
+    PetscCall(MatCreateVecs(s->M, &s->x, &s->b));
+    PetscCall(MatCreateVecs(s->op->levels->A[0], &s->t, NULL));
+    PetscCall(PetscMalloc1(s->space->mesh->ncell_owned, &s->weight));
+    PetscCall(KSPCreate(s->space->comm, &s->inner));
+    PetscCall(KSPSetOptionsPrefix(s->inner, "pressure_"));
+    PetscCall(KSPSetOperators(s->inner, s->M, s->M));
+    PetscCall(KSPSetType(s->inner, KSPGMRES));
+    PetscCall(KSPGMRESSetRestart(s->inner, RESTART));
+    PetscCall(SbKSPRefineOrthogonalization(s->inner));
+    PetscCall(KSPSetPCSide(s->inner, PC_RIGHT));
+    PetscCall(KSPSetNormType(s->inner, KSP_NORM_UNPRECONDITIONED));
+    PetscCall(KSPGetPC(s->inner, &inner));
+    PetscCall(PCSetType(inner, PCSHELL));
+    PetscCall(PCShellSetContext(inner, s));
+    PetscCall(PCShellSetName(inner, "nodes and pressures"));
+    PetscCall(PCShellSetApply(inner, PCApply_Mixed));
+    PetscCall(KSPSetFromOptions(s->inner));
+  }
   PetscCall(SbLevelsSetUp(s->op->levels, &positive));
   PetscCall(PCSetFailedReason(pc, positive ? PC_NOERROR : PC_FACTOR_NUMERIC_ZEROPIVOT));
   for (PetscInt c = 0; c < s->space->mesh->ncell_owned; c++) {

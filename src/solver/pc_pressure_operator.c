@@ -28,54 +28,11 @@ static void clear_fixed(SbSpace s, PetscInt nnode, PetscReal x[])
   }
 }
 
-/* d[ncell_owned] = B x of owned cells; x[nnode][3] with ghosts. */
-static void divergence(SbPressureOperator op, const PetscReal x[], PetscBool absolute, PetscReal d[])
-{
-  SbSpace s = op->space;
-
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
-
-    for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
-      const SbLane *v = (const SbLane *)op->volume.b + 12 * b;
-      SbLane u[12], sum = {0};
-
-      sb_gather_strain(s, region, b, x, u);
-      for (int k = 0; k < 12; k++) {
-        for (int l = 0; l < SB_BATCH; l++) sum[l] += (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * u[k][l];
-      }
-      for (PetscInt l = 0; l < s->batch_n[b]; l++) d[s->batch_cell[b] + l] = sum[l];
-    }
-  }
-}
-
-/* y[nnode][3] += B^T p, right on owned nodes; p[ncell] with ghosts. */
-static void gradient(SbPressureOperator op, const PetscReal p[], PetscBool absolute, PetscReal y[])
-{
-  SbSpace s = op->space;
-
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
-
-    for (PetscInt b = region->bstart; b < region->bend; b++) {
-      const SbLane *v = (const SbLane *)op->volume.b + 12 * b;
-      const PetscReal *q = p + s->batch_cell[b];
-      SbLane f[12], lane = {0};
-
-      for (PetscInt l = 0; l < s->batch_n[b]; l++) lane[l] = q[l];
-      for (int k = 0; k < 12; k++) {
-        for (int l = 0; l < SB_BATCH; l++) f[k][l] = (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * lane[l];
-      }
-      sb_scatter_strain(s, region, b, f, y);
-    }
-  }
-}
-
 /* d = B u. */
 static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar u[], PetscBool absolute,
                                        PetscScalar d[])
 {
-  SbSpace s = op->space;
+  SbSpace s = op->space, space = op->space;
   PetscScalar *x;
   const PetscReal *local;
 
@@ -85,7 +42,22 @@ static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar 
   clear_fixed(s, s->nnode_owned, x);
   PetscCall(VecRestoreArray(op->u, &x));
   PetscCall(SbSpaceGetLocalRead(s, op->u, &local));
-  divergence(op, local, absolute, d);
+  /* d[ncell_owned] = B x of owned cells; x[nnode][3] with ghosts. */
+  for (PetscInt r = 0; r < space->nregion; r++) {
+    const SbRegion *region = &space->region[r];
+
+    for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
+      const SbLane *v = (const SbLane *)op->volume.b + 12 * b;
+      SbLane cell_u[12], sum = {0};
+
+      sb_gather_strain(space, region, b, local, cell_u);
+      for (int k = 0; k < 12; k++) {
+        for (int l = 0; l < SB_BATCH; l++)
+          sum[l] += (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * cell_u[k][l];
+      }
+      for (PetscInt l = 0; l < space->batch_n[b]; l++) d[space->batch_cell[b] + l] = sum[l];
+    }
+  }
   PetscCall(SbSpaceRestoreLocalRead(s, op->u, &local));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -94,7 +66,7 @@ static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar 
 static PetscErrorCode add_gradient(SbPressureOperator op, const PetscScalar p[], PetscBool absolute,
                                    PetscReal factor, PetscScalar y[])
 {
-  SbSpace s = op->space;
+  SbSpace s = op->space, space = op->space;
   const PetscScalar *q;
   PetscScalar *x;
   PetscReal *f;
@@ -112,7 +84,23 @@ static PetscErrorCode add_gradient(SbPressureOperator op, const PetscScalar p[],
   PetscCall(VecGetArrayRead(local, &q));
   PetscCall(SbSpaceGetLocalWrite(s, op->y, &f));
   PetscCall(PetscArrayzero(f, 3 * s->nnode));
-  gradient(op, q, absolute, f);
+  /* y[nnode][3] += B^T p, right on owned nodes; p[ncell] with ghosts. */
+  for (PetscInt r = 0; r < space->nregion; r++) {
+    const SbRegion *region = &space->region[r];
+
+    for (PetscInt b = region->bstart; b < region->bend; b++) {
+      const SbLane *v = (const SbLane *)op->volume.b + 12 * b;
+      const PetscReal *value = q + space->batch_cell[b];
+      SbLane force[12], lane = {0};
+
+      for (PetscInt l = 0; l < space->batch_n[b]; l++) lane[l] = value[l];
+      for (int k = 0; k < 12; k++) {
+        for (int l = 0; l < SB_BATCH; l++)
+          force[k][l] = (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * lane[l];
+      }
+      sb_scatter_strain(space, region, b, force, f);
+    }
+  }
   clear_fixed(s, s->nnode_owned, f);
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) y[i] += factor * f[i];
   PetscCall(SbSpaceRestoreLocalWrite(s, op->y, &f));
@@ -190,11 +178,19 @@ static PetscErrorCode MatMult_Pressure(Mat K, Vec X, Vec Y)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Squares of the entries of B C^-1/2 at each node, added to y[nnode][3]; right on owned nodes. */
-static void add_squares(SbPressureOperator op, PetscReal y[])
+static PetscErrorCode MatGetDiagonal_Pressure(Mat K, Vec D)
 {
-  SbSpace s = op->space;
+  SbPressureOperator op;
+  PetscScalar *d;
+  PetscReal *y;
+  SbSpace s;
 
+  PetscFunctionBeginUser;
+  PetscCall(MatShellGetContext(K, &op));
+  PetscCall(MatGetDiagonal(op->levels->A[0], D));
+  PetscCall(PetscCalloc1(3 * op->space->nnode, &y));
+  /* Squares of the entries of B C^-1/2 at each node, added to y[nnode][3]; right on owned nodes. */
+  s = op->space;
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
 
@@ -215,19 +211,6 @@ static void add_squares(SbPressureOperator op, PetscReal y[])
       }
     }
   }
-}
-
-static PetscErrorCode MatGetDiagonal_Pressure(Mat K, Vec D)
-{
-  SbPressureOperator op;
-  PetscScalar *d;
-  PetscReal *y;
-
-  PetscFunctionBeginUser;
-  PetscCall(MatShellGetContext(K, &op));
-  PetscCall(MatGetDiagonal(op->levels->A[0], D));
-  PetscCall(PetscCalloc1(3 * op->space->nnode, &y));
-  add_squares(op, y);
   clear_fixed(op->space, op->space->nnode_owned, y);
   PetscCall(VecGetArray(D, &d));
   for (PetscInt i = 0; i < 3 * op->space->nnode_owned; i++) d[i] += y[i];
@@ -350,27 +333,11 @@ static PetscErrorCode create_cell_vector(SbMesh mesh, Vec *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode allocate(SbPressureOperator op)
-{
-  SbSpace s = op->space;
-  const PetscInt n = s->mesh->ncell_owned;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc((size_t)s->nbatch * 14 * sizeof(SbLane) + 64, &op->memory));
-  op->volume.b = (SbLane *)(((uintptr_t)op->memory + 63) & ~(uintptr_t)63);
-  op->volume.modulus = op->volume.b + 12 * (size_t)s->nbatch;
-  op->volume.shear = op->volume.modulus + s->nbatch;
-  PetscCall(PetscMalloc4(n, &op->C, n, &op->Cinv, n, &op->S, n, &op->norm));
-  PetscCall(SbSpaceCreateVec(s, &op->u));
-  PetscCall(SbSpaceCreateVec(s, &op->y));
-  PetscCall(create_cell_vector(s->mesh, &op->p));
-  PetscCall(MatCreateVecs(op->levels->A[0], &op->a, &op->b));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbPressureOperatorCreate(SbSpace s, Mat *K)
 {
   SbPressureOperator op;
+  SbSpace space;
+  PetscInt n;
 
   PetscFunctionBeginUser;
   PetscCheck(
@@ -380,7 +347,17 @@ PetscErrorCode SbPressureOperatorCreate(SbSpace s, Mat *K)
   PetscCall(PetscNew(&op));
   op->space = s;
   PetscCall(SbLevelsCreate(s, &op->levels));
-  PetscCall(allocate(op));
+  space = op->space;
+  n = space->mesh->ncell_owned;
+  PetscCall(PetscMalloc((size_t)space->nbatch * 14 * sizeof(SbLane) + 64, &op->memory));
+  op->volume.b = (SbLane *)(((uintptr_t)op->memory + 63) & ~(uintptr_t)63);
+  op->volume.modulus = op->volume.b + 12 * (size_t)space->nbatch;
+  op->volume.shear = op->volume.modulus + space->nbatch;
+  PetscCall(PetscMalloc4(n, &op->C, n, &op->Cinv, n, &op->S, n, &op->norm));
+  PetscCall(SbSpaceCreateVec(space, &op->u));
+  PetscCall(SbSpaceCreateVec(space, &op->y));
+  PetscCall(create_cell_vector(space->mesh, &op->p));
+  PetscCall(MatCreateVecs(op->levels->A[0], &op->a, &op->b));
   PetscCall(
     MatCreateShell(s->comm, 3 * s->nnode_owned, 3 * s->nnode_owned, PETSC_DETERMINE, PETSC_DETERMINE, op, K));
   PetscCall(MatSetBlockSize(*K, 3));

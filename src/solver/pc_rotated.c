@@ -90,24 +90,6 @@ static PetscErrorCode number_nodes(Rotated *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode set_up_once(Rotated *p)
-{
-  SbSpace s = p->space;
-  const PetscInt n = s->nnode_owned;
-
-  PetscFunctionBeginUser;
-  if (p->factor) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!s->plan) PetscCall(SbPlanCreate(s, &s->plan));
-  PetscCall(SbInterfaceCreate(s, &p->face));
-  PetscCall(number_nodes(p));
-  PetscCall(SbFactorCreate(p->n, p->nkeep, p->ia, p->ja, &p->factor));
-  PetscCall(SbExactNodesCreate(s, &p->exact));
-  PetscCall(PetscMalloc3(9 * n, &p->turn, 9 * n, &p->turn0, n, &p->spread));
-  PetscCall(PetscMalloc5(9 * n, &p->Q, 3 * n, &p->diagonal, 3 * n, &p->r, 3 * n, &p->r1, 3 * n, &p->z));
-  PetscCall(PetscMalloc4(3 * p->n, &p->b, 3 * p->n, &p->x, 3 * p->nkeep, &p->kept, 3 * p->face->n, &p->edge));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ set-up for a new operator */
 
 /* Rotations of cells that belong to the operator. */
@@ -231,7 +213,20 @@ static PetscErrorCode PCSetUp_Rotated(PC pc)
   PetscCall(PCShellGetContext(pc, &p));
   PetscCall(PCGetOperators(pc, NULL, &A));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
-  PetscCall(set_up_once(p));
+  if (!p->factor) {
+    SbSpace s = p->space;
+    const PetscInt n = s->nnode_owned;
+
+    if (!s->plan) PetscCall(SbPlanCreate(s, &s->plan));
+    PetscCall(SbInterfaceCreate(s, &p->face));
+    PetscCall(number_nodes(p));
+    PetscCall(SbFactorCreate(p->n, p->nkeep, p->ia, p->ja, &p->factor));
+    PetscCall(SbExactNodesCreate(s, &p->exact));
+    PetscCall(PetscMalloc3(9 * n, &p->turn, 9 * n, &p->turn0, n, &p->spread));
+    PetscCall(PetscMalloc5(9 * n, &p->Q, 3 * n, &p->diagonal, 3 * n, &p->r, 3 * n, &p->r1, 3 * n, &p->z));
+    PetscCall(
+      PetscMalloc4(3 * p->n, &p->b, 3 * p->n, &p->x, 3 * p->nkeep, &p->kept, 3 * p->face->n, &p->edge));
+  }
   PetscCall(find_cells(p, A, &cells));
   PetscCall(SbSpaceAverageRotations(p->space, cells, p->turn, p->spread));
   if (p->renew) {

@@ -56,47 +56,6 @@ static PetscErrorCode destroy_factor(SbSaddleFactor *factored)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The matrix by scalars. MatConvert() is not asked: it takes a parallel block matrix apart, whose parts others hold. */
-static PetscErrorCode create_matrix(SbSpace s, Mat *A)
-{
-  const SbConstraints c = s->constraints;
-  const PetscInt n = s->nnode_owned;
-  PetscInt *node, *ia, *ja, *near, *far;
-  PetscReal *block;
-
-  PetscFunctionBeginUser;
-  /* K by its blocks */
-  PetscCall(PetscMalloc4(n, &node, n + 1, &ia, 3 * n, &near, 3 * n, &far));
-  for (PetscInt i = 0; i < n; i++) node[i] = i;
-  PetscCall(SbSpaceGetRows(s, c->K, n, node, ia, NULL, NULL));
-  PetscCall(PetscMalloc2(ia[n], &ja, 9 * ia[n], &block));
-  PetscCall(SbSpaceGetRows(s, c->K, n, node, ia, ja, block));
-  for (PetscInt i = 0; i < 3 * n; i++) {
-    near[i] = far[i] = 0;
-    for (PetscInt e = ia[i / 3]; e < ia[i / 3 + 1]; e++) (ja[e] < n ? near : far)[i] += 3;
-  }
-  PetscCall(MatCreateAIJ(s->comm, 3 * n, 3 * n, 3 * s->Nnode, 3 * s->Nnode, 0, near, 0, far, A));
-
-  /* springs are added and blocks are projected on their way */
-  for (PetscInt i = 0; i < n; i++) {
-    const PetscInt row = 3 * s->gnode[i], rows[3] = {row, row + 1, row + 2};
-
-    for (PetscInt e = ia[i]; e < ia[i + 1]; e++) {
-      const PetscInt column = 3 * s->gnode[ja[e]], columns[3] = {column, column + 1, column + 2};
-
-      if (ja[e] == i) SbConstraintsAddSprings(s, i, block + 9 * e);
-      SbConstraintsProjectBlock(s, i, ja[e], 3, 1, block + 9 * e);
-      PetscCall(MatSetValues(*A, 3, rows, 3, columns, block + 9 * e, INSERT_VALUES));
-    }
-  }
-  PetscCall(MatAssemblyBegin(*A, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*A, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatSetOption(*A, MAT_SYMMETRIC, (PetscBool)!c->nonsymmetric));
-  PetscCall(PetscFree2(ja, block));
-  PetscCall(PetscFree4(node, ia, near, far));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbSaddleFactorSolve(SbSpace s, Vec r, Vec z, PCFailedReason *failed)
 {
   const char *package;
@@ -113,9 +72,42 @@ PetscErrorCode SbSaddleFactorSolve(SbSpace s, Vec r, Vec z, PCFailedReason *fail
 
   /* a factorisation of K as it is now with the constraints as they are */
   if (!f->pc || f->matrix != c->matrix || f->version != c->version) {
+    PetscInt n, *node, *ia, *ja, *near, *far;
+    PetscReal *block;
+
     PetscCall(PCDestroy(&f->pc));
     PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, PETSC_FALSE, &package));
-    PetscCall(create_matrix(s, &A));
+    /* The matrix by scalars. MatConvert() is not asked: it takes a parallel block matrix apart, whose parts others hold. */
+    n = s->nnode_owned;
+    /* K by its blocks */
+    PetscCall(PetscMalloc4(n, &node, n + 1, &ia, 3 * n, &near, 3 * n, &far));
+    for (PetscInt k = 0; k < n; k++) node[k] = k;
+    PetscCall(SbSpaceGetRows(s, c->K, n, node, ia, NULL, NULL));
+    PetscCall(PetscMalloc2(ia[n], &ja, 9 * ia[n], &block));
+    PetscCall(SbSpaceGetRows(s, c->K, n, node, ia, ja, block));
+    for (PetscInt k = 0; k < 3 * n; k++) {
+      near[k] = far[k] = 0;
+      for (PetscInt j = ia[k / 3]; j < ia[k / 3 + 1]; j++) (ja[j] < n ? near : far)[k] += 3;
+    }
+    PetscCall(MatCreateAIJ(s->comm, 3 * n, 3 * n, 3 * s->Nnode, 3 * s->Nnode, 0, near, 0, far, &A));
+
+    /* springs are added and blocks are projected on their way */
+    for (PetscInt k = 0; k < n; k++) {
+      const PetscInt row = 3 * s->gnode[k], rows[3] = {row, row + 1, row + 2};
+
+      for (PetscInt j = ia[k]; j < ia[k + 1]; j++) {
+        const PetscInt column = 3 * s->gnode[ja[j]], columns[3] = {column, column + 1, column + 2};
+
+        if (ja[j] == k) SbConstraintsAddSprings(s, k, block + 9 * j);
+        SbConstraintsProjectBlock(s, k, ja[j], 3, 1, block + 9 * j);
+        PetscCall(MatSetValues(A, 3, rows, 3, columns, block + 9 * j, INSERT_VALUES));
+      }
+    }
+    PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+    PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+    PetscCall(MatSetOption(A, MAT_SYMMETRIC, (PetscBool)!c->nonsymmetric));
+    PetscCall(PetscFree2(ja, block));
+    PetscCall(PetscFree4(node, ia, near, far));
     PetscCall(PCCreate(s->comm, &f->pc));
     PetscCall(PCSetOptionsPrefix(f->pc, "saddle_"));
     PetscCall(PCSetOperators(f->pc, A, A));

@@ -363,27 +363,6 @@ static const struct {
               {"cg_gamg", PETSC_MAX_INT},
               {"direct", PETSC_MAX_INT}};
 
-/* The row of a name in that list that has not failed yet and can solve for this space; NULL: there is none. */
-static PetscErrorCode find_other(SbSpace s, const char *name, PetscBool indefinite, uint32_t tried,
-                                 const SbSolverPreset **preset)
-{
-  const PetscBool direct = (PetscBool)!strcmp(name, "direct");
-
-  PetscFunctionBeginUser;
-  *preset = direct ? NULL : find_preset(name);
-  /* what is not definite by rounding or by stress is next */
-  for (int k = indefinite; direct && k < 2 && !*preset; k++) {
-    const char *package;
-
-    PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, (PetscBool)!k, &package));
-    if (package) *preset = find_preset(package);
-    if (*preset && tried & 1U << (*preset - presets)) *preset = NULL;
-  }
-  if (*preset && tried & 1U << (*preset - presets)) *preset = NULL;
-  if (*preset && (*preset)->create && (!s->faces || s->edge_node || s->constraints)) *preset = NULL;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscBool memory, uint32_t *tried,
                                     const SbSolverPreset **preset)
 {
@@ -406,7 +385,18 @@ PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscB
     if (!strcmp(others[k].name, "cg_gamg") && hard.face_nu > NU_PRESSURE) continue;
     /* what a factorisation finds singular no iteration solves */
     if (failed->direct && !memory && !direct) continue;
-    PetscCall(find_other(s, others[k].name, indefinite, *tried, preset));
+    /* The row of a name in that list that has not failed yet and can solve for this space; NULL: there is none. */
+    *preset = direct ? NULL : find_preset(others[k].name);
+    /* what is not definite by rounding or by stress is next */
+    for (int j = indefinite; direct && j < 2 && !*preset; j++) {
+      const char *package;
+
+      PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, (PetscBool)!j, &package));
+      if (package) *preset = find_preset(package);
+      if (*preset && (*tried) & 1U << (*preset - presets)) *preset = NULL;
+    }
+    if (*preset && (*tried) & 1U << (*preset - presets)) *preset = NULL;
+    if (*preset && (*preset)->create && (!s->faces || s->edge_node || s->constraints)) *preset = NULL;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -27,41 +27,6 @@ PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Work of a force field over a displacement, on all or only on prescribed unknowns; two times it, this rank's part. */
-static PetscErrorCode works(SbRun run, Vec loads, Vec reaction, PetscReal sums[2])
-{
-  SbSpace s = run->model->space;
-  const PetscBool obstacles = (PetscBool)(s->constraints != NULL);
-  const PetscScalar *u, *u0, *f, *f0, *r, *r0;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecGetArrayRead(run->U, &u));
-  PetscCall(VecGetArrayRead(run->previous, &u0));
-  PetscCall(VecGetArrayRead(loads, &f));
-  PetscCall(VecGetArrayRead(run->loads, &f0));
-  PetscCall(VecGetArrayRead(reaction, &r));
-  PetscCall(VecGetArrayRead(run->reaction, &r0));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) sums[0] += (f[i] + f0[i]) * (u[i] - u0[i]);
-  for (PetscInt k = 0; k < s->nfixed && s->fixed_node[k] < s->nnode_owned; k++) {
-    const PetscInt node = s->fixed_node[k];
-
-    for (PetscInt i = 3 * node; i < 3 * node + 3; i++) {
-      if (s->fixed[node] & (1 << (i - 3 * node))) sums[1] += (r[i] + r0[i]) * (u[i] - u0[i]);
-    }
-  }
-  /* elsewhere the remainder of it is what contact exerts, now or a step ago */
-  for (PetscInt i = 0; obstacles && i < 3 * s->nnode_owned; i++) {
-    if (!(s->fixed[i / 3] & (1 << i % 3))) sums[1] += (r[i] + r0[i]) * (u[i] - u0[i]);
-  }
-  PetscCall(VecRestoreArrayRead(run->U, &u));
-  PetscCall(VecRestoreArrayRead(run->previous, &u0));
-  PetscCall(VecRestoreArrayRead(loads, &f));
-  PetscCall(VecRestoreArrayRead(run->loads, &f0));
-  PetscCall(VecRestoreArrayRead(reaction, &r));
-  PetscCall(VecRestoreArrayRead(run->reaction, &r0));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool first)
 {
   SbModel m = run->model;
@@ -78,7 +43,36 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   PetscCall(SbRunReactions(run, t, reaction));
   if (run->damped) PetscCall(SbModelDampingPower(m, run->U, run->V, &power));
   if (!first) {
-    PetscCall(works(run, loads, reaction, sums));
+    SbSpace s = run->model->space;
+    PetscBool obstacles;
+    const PetscScalar *u, *u0, *f, *f0, *r, *r0;
+
+    /* Work of a force field over a displacement, on all or only on prescribed unknowns; two times it, this rank's part. */
+    obstacles = (PetscBool)(s->constraints != NULL);
+    PetscCall(VecGetArrayRead(run->U, &u));
+    PetscCall(VecGetArrayRead(run->previous, &u0));
+    PetscCall(VecGetArrayRead(loads, &f));
+    PetscCall(VecGetArrayRead(run->loads, &f0));
+    PetscCall(VecGetArrayRead(reaction, &r));
+    PetscCall(VecGetArrayRead(run->reaction, &r0));
+    for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) sums[0] += (f[i] + f0[i]) * (u[i] - u0[i]);
+    for (PetscInt k = 0; k < s->nfixed && s->fixed_node[k] < s->nnode_owned; k++) {
+      const PetscInt node = s->fixed_node[k];
+
+      for (PetscInt i = 3 * node; i < 3 * node + 3; i++) {
+        if (s->fixed[node] & (1 << (i - 3 * node))) sums[1] += (r[i] + r0[i]) * (u[i] - u0[i]);
+      }
+    }
+    /* elsewhere the remainder of it is what contact exerts, now or a step ago */
+    for (PetscInt i = 0; obstacles && i < 3 * s->nnode_owned; i++) {
+      if (!(s->fixed[i / 3] & (1 << i % 3))) sums[1] += (r[i] + r0[i]) * (u[i] - u0[i]);
+    }
+    PetscCall(VecRestoreArrayRead(run->U, &u));
+    PetscCall(VecRestoreArrayRead(run->previous, &u0));
+    PetscCall(VecRestoreArrayRead(loads, &f));
+    PetscCall(VecRestoreArrayRead(run->loads, &f0));
+    PetscCall(VecRestoreArrayRead(reaction, &r));
+    PetscCall(VecRestoreArrayRead(run->reaction, &r0));
     sums[0] += 2. * contact;
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPIU_REAL, MPI_SUM, m->comm));
     e->load_work += 0.5 * sums[0];

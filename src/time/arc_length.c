@@ -114,22 +114,6 @@ static PetscErrorCode create(SbRun run, Path *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode destroy(Path *p)
-{
-  PetscFunctionBeginUser;
-  PetscCall(VecDestroy(&p->weight));
-  PetscCall(VecDestroy(&p->X));
-  PetscCall(VecDestroy(&p->d));
-  PetscCall(VecDestroy(&p->r));
-  PetscCall(VecDestroy(&p->v));
-  PetscCall(VecDestroy(&p->q));
-  PetscCall(VecDestroy(&p->w));
-  PetscCall(VecDestroy(&p->du));
-  PetscCall(MatDestroy(&p->exact));
-  PetscCall(VecDestroy(&p->begin));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* r = R(X, lambda) */
 static PetscErrorCode residual(Path *p, PetscReal *norm)
 {
@@ -430,6 +414,15 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
     factor = p.factor;
   }
   if (run->stop_reason[0] && !run->stopped) PetscCall(explain(run, factor, l));
-  PetscCall(destroy(&p));
+  PetscCall(VecDestroy(&p.weight));
+  PetscCall(VecDestroy(&p.X));
+  PetscCall(VecDestroy(&p.d));
+  PetscCall(VecDestroy(&p.r));
+  PetscCall(VecDestroy(&p.v));
+  PetscCall(VecDestroy(&p.q));
+  PetscCall(VecDestroy(&p.w));
+  PetscCall(VecDestroy(&p.du));
+  PetscCall(MatDestroy(&p.exact));
+  PetscCall(VecDestroy(&p.begin));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -109,29 +109,6 @@ PetscErrorCode SbFormStaticJacobian(SNES snes, Vec U, Mat J, Mat P, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* With the consistent mass the system is solved by CG to rounding; the lumped mass is a division. */
-static PetscErrorCode solve_consistent_mass(SbRun run, Vec B, Vec A)
-{
-  Mat M;
-  KSP ksp;
-  PC pc;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbSpaceCreateMatrix(run->model->space, SB_MATRIX_BAIJ, &M));
-  PetscCall(SbModelTangent(run->model, 0., 0., 1., 0., run->U, run->V, M));
-  PetscCall(KSPCreate(run->model->comm, &ksp));
-  PetscCall(KSPSetOptionsPrefix(ksp, "mass_"));
-  PetscCall(KSPSetOperators(ksp, M, M));
-  PetscCall(KSPSetType(ksp, KSPCG));
-  PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(PCSetType(pc, PCJACOBI));
-  PetscCall(KSPSetTolerances(ksp, 1e-14, PETSC_DEFAULT, PETSC_DEFAULT, 500));
-  PetscCall(KSPSolve(ksp, B, A));
-  PetscCall(KSPDestroy(&ksp));
-  PetscCall(MatDestroy(&M));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A)
 {
   SbSpace s = run->model->space;
@@ -142,7 +119,23 @@ PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A)
   PetscCall(VecDuplicate(U, &F));
   PetscCall(SbModelResidual(run->model, t, U, V, NULL, PETSC_TRUE, F));
   if (s->consistent_mass) {
-    PetscCall(solve_consistent_mass(run, F, A));
+    Mat M;
+    KSP ksp;
+    PC pc;
+
+    /* With the consistent mass the system is solved by CG to rounding; the lumped mass is a division. */
+    PetscCall(SbSpaceCreateMatrix(run->model->space, SB_MATRIX_BAIJ, &M));
+    PetscCall(SbModelTangent(run->model, 0., 0., 1., 0., run->U, run->V, M));
+    PetscCall(KSPCreate(run->model->comm, &ksp));
+    PetscCall(KSPSetOptionsPrefix(ksp, "mass_"));
+    PetscCall(KSPSetOperators(ksp, M, M));
+    PetscCall(KSPSetType(ksp, KSPCG));
+    PetscCall(KSPGetPC(ksp, &pc));
+    PetscCall(PCSetType(pc, PCJACOBI));
+    PetscCall(KSPSetTolerances(ksp, 1e-14, PETSC_DEFAULT, PETSC_DEFAULT, 500));
+    PetscCall(KSPSolve(ksp, F, A));
+    PetscCall(KSPDestroy(&ksp));
+    PetscCall(MatDestroy(&M));
   } else {
     PetscCall(VecCopy(F, A));
     PetscCall(VecGetArray(A, &a));

@@ -137,38 +137,6 @@ static PetscErrorCode measure(SbRun run, const PetscInt label[], Part *part)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Motion k = 0..2: along an axis, 3..5: about one through the centre; z: its admissible part. */
-static PetscErrorCode create_motion(SbRun run, const PetscInt label[], const Part *part, PetscInt k, Vec *Z,
-                                    Vec *z)
-{
-  SbSpace s = run->model->space;
-  const PetscScalar *u;
-  PetscScalar *to;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbSpaceCreateVec(s, Z));
-  PetscCall(VecGetArrayRead(run->U, &u));
-  PetscCall(VecGetArray(*Z, &to));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    PetscReal r[3];
-
-    if (label[i] != part->label) continue;
-    for (PetscInt c = 0; c < 3; c++) r[c] = (coordinate(s, u, 3 * i + c) - part->centre[c]) / part->size;
-    if (k < 3)
-      to[3 * i + k] = 1.;
-    else {
-      to[3 * i + (k + 1) % 3] = -r[(k + 2) % 3];
-      to[3 * i + (k + 2) % 3] = r[(k + 1) % 3];
-    }
-  }
-  PetscCall(VecRestoreArray(*Z, &to));
-  PetscCall(VecRestoreArrayRead(run->U, &u));
-  PetscCall(VecDuplicate(*Z, z));
-  PetscCall(VecCopy(*Z, *z));
-  PetscCall(SbSpaceProjectAdmissible(s, *z));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Eigenvalues of E x = value M x, n <= 6, ascending; their vectors, M-orthonormal, into the columns of E. ok: M is definite. */
 static PetscErrorCode eigen(PetscInt n, PetscReal E[36], PetscReal M[36], PetscReal value[6], PetscBool *ok)
 {
@@ -199,46 +167,6 @@ static PetscErrorCode find_admissible(Vec Z[6], Vec z[6], PetscInt *n, PetscReal
   PetscCall(eigen(6, x, M, value, &ok));
   for (*n = 0; ok && *n < 6 && value[*n] <= ALLOWED; ++*n) {
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Free ones among the n admissible motions x (problem 2): part->nfree, and one of them. */
-static PetscErrorCode find_free(SbRun run, Vec d, Vec z[6], PetscInt n, const PetscReal x[36], Part *part)
-{
-  PetscReal E[36], M[36], value[6];
-  PetscBool ok;
-  Vec y[6], w;
-
-  PetscFunctionBeginUser;
-  /* y = P Z x */
-  PetscCall(VecDuplicate(d, &w));
-  for (PetscInt j = 0; j < n; j++) {
-    PetscCall(VecDuplicate(d, &y[j]));
-    PetscCall(VecZeroEntries(y[j]));
-    PetscCall(VecMAXPY(y[j], 6, x + 6 * j, z));
-  }
-
-  /* M = y^T D y, E = y^T A y */
-  for (PetscInt j = 0; j < n; j++) {
-    PetscCall(VecPointwiseMult(w, d, y[j]));
-    for (PetscInt i = 0; i <= j; i++) PetscCall(VecDot(y[i], w, &M[6 * j + i]));
-    PetscCall(MatMult(run->operator, y[j], w));
-    for (PetscInt i = 0; i <= j; i++) PetscCall(VecDot(y[i], w, &E[6 * j + i]));
-  }
-  PetscCall(eigen(n, E, M, value, &ok));
-  for (part->nfree = 0; ok && part->nfree < n && PetscAbsReal(value[part->nfree]) <= FREE; part->nfree++) {
-  }
-  PetscCall(PetscInfo(NULL,
-                      "part of body %s: softest of %" PetscInt_FMT " motions %g of the cells' stiffness\n",
-                      run->model->body[part->body].name, n, ok ? (double)value[0] : -1.));
-
-  /* the softest one in terms of the six */
-  for (int c = 0; c < 6 && part->nfree; c++) {
-    part->motion[c] = 0.;
-    for (PetscInt i = 0; i < n; i++) part->motion[c] += E[i] * x[6 * i + c];
-  }
-  for (PetscInt j = 0; j < n; j++) PetscCall(VecDestroy(&y[j]));
-  PetscCall(VecDestroy(&w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -276,9 +204,70 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
   PetscFunctionBeginUser;
   part->nfree = 0;
   PetscCall(measure(run, label, part));
-  for (PetscInt k = 0; k < 6; k++) PetscCall(create_motion(run, label, part, k, &Z[k], &z[k]));
+  for (PetscInt k = 0; k < 6; k++) {
+    SbSpace s = run->model->space;
+    const PetscScalar *u;
+    PetscScalar *to;
+
+    /* Motion k = 0..2: along an axis, 3..5: about one through the centre; z: its admissible part. */
+    PetscCall(SbSpaceCreateVec(s, &Z[k]));
+    PetscCall(VecGetArrayRead(run->U, &u));
+    PetscCall(VecGetArray(Z[k], &to));
+    for (PetscInt i = 0; i < s->nnode_owned; i++) {
+      PetscReal r[3];
+
+      if (label[i] != part->label) continue;
+      for (PetscInt c = 0; c < 3; c++) r[c] = (coordinate(s, u, 3 * i + c) - part->centre[c]) / part->size;
+      if (k < 3)
+        to[3 * i + k] = 1.;
+      else {
+        to[3 * i + (k + 1) % 3] = -r[(k + 2) % 3];
+        to[3 * i + (k + 2) % 3] = r[(k + 1) % 3];
+      }
+    }
+    PetscCall(VecRestoreArray(Z[k], &to));
+    PetscCall(VecRestoreArrayRead(run->U, &u));
+    PetscCall(VecDuplicate(Z[k], &z[k]));
+    PetscCall(VecCopy(Z[k], z[k]));
+    PetscCall(SbSpaceProjectAdmissible(s, z[k]));
+  }
   PetscCall(find_admissible(Z, z, &n, x));
-  if (n) PetscCall(find_free(run, d, z, n, x, part));
+  if (n) {
+    PetscReal E[36], M[36], value[6];
+    PetscBool ok;
+    Vec y[6], w;
+
+    /* Free ones among the n admissible motions x (problem 2): part->nfree, and one of them. */
+    /* y = P Z x */
+    PetscCall(VecDuplicate(d, &w));
+    for (PetscInt j = 0; j < n; j++) {
+      PetscCall(VecDuplicate(d, &y[j]));
+      PetscCall(VecZeroEntries(y[j]));
+      PetscCall(VecMAXPY(y[j], 6, x + 6 * j, z));
+    }
+
+    /* M = y^T D y, E = y^T A y */
+    for (PetscInt j = 0; j < n; j++) {
+      PetscCall(VecPointwiseMult(w, d, y[j]));
+      for (PetscInt i = 0; i <= j; i++) PetscCall(VecDot(y[i], w, &M[6 * j + i]));
+      PetscCall(MatMult(run->operator, y[j], w));
+      for (PetscInt i = 0; i <= j; i++) PetscCall(VecDot(y[i], w, &E[6 * j + i]));
+    }
+    PetscCall(eigen(n, E, M, value, &ok));
+    for (part->nfree = 0; ok && part->nfree < n && PetscAbsReal(value[part->nfree]) <= FREE; part->nfree++) {
+    }
+    PetscCall(PetscInfo(NULL,
+                        "part of body %s: softest of %" PetscInt_FMT " motions %g of the cells' stiffness\n",
+                        run->model->body[part->body].name, n, ok ? (double)value[0] : -1.));
+
+    /* the softest one in terms of the six */
+    for (int c = 0; c < 6 && part->nfree; c++) {
+      part->motion[c] = 0.;
+      for (PetscInt i = 0; i < n; i++) part->motion[c] += E[i] * x[6 * i + c];
+    }
+    for (PetscInt j = 0; j < n; j++) PetscCall(VecDestroy(&y[j]));
+    PetscCall(VecDestroy(&w));
+  }
   if (part->nfree > 1) PetscCall(choose_axis(run, d, Z, z, part));
   for (int k = 0; k < 6; k++) {
     PetscCall(VecDestroy(&Z[k]));

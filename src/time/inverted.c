@@ -7,22 +7,6 @@
 */
 #include "time_impl.h"
 
-/* Tets with det F <= 0 of all ranks, and the smallest det F. */
-static PetscErrorCode count_inverted(SbRun run, Vec U, PetscInt *n, PetscReal *least)
-{
-  const SbSpace s = run->model->space;
-  PetscReal energy, volume;
-  const PetscReal *u;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbSpaceGetLocalRead(s, U, &u));
-  PetscCall(SbSpaceStrainEnergy(s, u, NULL, &energy, least, n, &volume));
-  PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, n, 1, MPIU_INT, MPI_SUM, run->model->comm));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, least, 1, MPIU_REAL, MPI_MIN, run->model->comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const Vec U[2], PetscBool *ok)
 {
   PetscInt n[2];
@@ -31,7 +15,18 @@ PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const V
   PetscFunctionBeginUser;
   run->rejected_inverted = PETSC_FALSE;
   if (!run->reject_inverted || !*ok) PetscFunctionReturn(PETSC_SUCCESS);
-  for (int k = 0; k < 2; k++) PetscCall(count_inverted(run, U[k], &n[k], &least[k]));
+  for (int k = 0; k < 2; k++) {
+    const SbSpace s = run->model->space;
+    PetscReal energy, volume;
+    const PetscReal *u;
+
+    /* Tets with det F <= 0 of all ranks, and the smallest det F. */
+    PetscCall(SbSpaceGetLocalRead(s, U[k], &u));
+    PetscCall(SbSpaceStrainEnergy(s, u, NULL, &energy, &least[k], &n[k], &volume));
+    PetscCall(SbSpaceRestoreLocalRead(s, U[k], &u));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &n[k], 1, MPIU_INT, MPI_SUM, run->model->comm));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least[k], 1, MPIU_REAL, MPI_MIN, run->model->comm));
+  }
   if (n[1] <= n[0]) PetscFunctionReturn(PETSC_SUCCESS);
   *ok = PETSC_FALSE;
   run->rejected_inverted = PETSC_TRUE;

@@ -418,50 +418,6 @@ static PetscErrorCode set_up_ts(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode set_up_static(SbRun run)
-{
-  Vec F;
-
-  PetscFunctionBeginUser;
-  run->fixed_step = (PetscBool)!run->arc.on;
-  PetscCall(SbSpaceCreateVec(run->model->space, &F));
-  PetscCall(SNESCreate(run->model->comm, &run->snes));
-  PetscCall(SNESSetFunction(run->snes, F, SbFormStaticFunction, run));
-  PetscCall(SNESSetJacobian(run->snes, run->operator, run->J, SbFormStaticJacobian, run));
-  PetscCall(VecDestroy(&F));
-  PetscCall(set_up_snes(run));
-  PetscCall(SbSolverSetUp(run->snes, run->model->space, run->solver_used));
-  PetscCall(SNESSetFromOptions(run->snes));
-  PetscCall(SbSolverFinish(run->snes, run->model->space, run->solver_used, run->J));
-  PetscCall(SbNewtonSetRun(run->snes, run));
-  PetscCall(forcing_terms(run->snes));
-  if (run->arc.on) PetscCall(SbArcLengthCheck(run));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* What contact with Newmark rests on (newmark_contact.c): the trapezoidal rule, the lumped mass, and forces of what is constrained alone. */
-static PetscErrorCode check_newmark(SbRun run)
-{
-  const SbModel m = run->model;
-
-  PetscFunctionBeginUser;
-  PetscCheck(run->newmark[0] == 0.25 && run->newmark[1] == 0.5, m->comm, PETSC_ERR_USER_INPUT,
-             "-time newmark with the effect %s needs -time_newmark_beta 0.25 and -time_newmark_gamma 0.5, "
-             "not %g and %g: else impacts may gain energy",
-             m->begin_step[0]->name, (double)run->newmark[0], (double)run->newmark[1]);
-  PetscCheck(!m->space->consistent_mass, m->comm, PETSC_ERR_USER_INPUT,
-             "-time newmark with the effect %s needs -mass lumped: velocities of what touches are put right "
-             "node by node",
-             m->begin_step[0]->name);
-  for (PetscInt e = 0; e < m->nbegin_step; e++)
-    PetscCheck(
-      !m->begin_step[e]->springs, m->comm, PETSC_ERR_USER_INPUT,
-      "-time newmark gains energy by springs and friction of the effect %s: give -effect_%s_response "
-      "projected or multiplier and no friction, or use euler_implicit or genalpha",
-      m->begin_step[e]->name, m->begin_step[e]->name);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* What guarded contact needs: a potential, our own Newton method, and no other contact, which knows of no guard. */
 static PetscErrorCode check_guarded(SbRun run)
 {
@@ -510,7 +466,24 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
     !explicit && run->preset != SB_TIME_ALPHA2, m->comm, PETSC_ERR_USER_INPUT,
     "The effect %s needs several solves in a step: use -time euler_implicit, newmark, genalpha or static",
     name);
-  if (run->preset == SB_TIME_NEWMARK) PetscCall(check_newmark(run));
+  if (run->preset == SB_TIME_NEWMARK) {
+    /* What contact with Newmark rests on (newmark_contact.c): the trapezoidal rule, the lumped mass, and forces of what is constrained alone. */
+    PetscCheck(run->newmark[0] == 0.25 && run->newmark[1] == 0.5, m->comm, PETSC_ERR_USER_INPUT,
+               "-time newmark with the effect %s needs -time_newmark_beta 0.25 and -time_newmark_gamma 0.5, "
+               "not %g and %g: else impacts may gain energy",
+               m->begin_step[0]->name, (double)run->newmark[0], (double)run->newmark[1]);
+    PetscCheck(
+      !m->space->consistent_mass, m->comm, PETSC_ERR_USER_INPUT,
+      "-time newmark with the effect %s needs -mass lumped: velocities of what touches are put right "
+      "node by node",
+      m->begin_step[0]->name);
+    for (PetscInt e = 0; e < m->nbegin_step; e++)
+      PetscCheck(
+        !m->begin_step[e]->springs, m->comm, PETSC_ERR_USER_INPUT,
+        "-time newmark gains energy by springs and friction of the effect %s: give -effect_%s_response "
+        "projected or multiplier and no friction, or use euler_implicit or genalpha",
+        m->begin_step[e]->name, m->begin_step[e]->name);
+  }
   for (PetscInt e = 0; e < m->nbegin_step; e++)
     PetscCheck(!m->begin_step[e]->euler || run->preset == SB_TIME_EULER_IMPLICIT, m->comm,
                PETSC_ERR_USER_INPUT,
@@ -596,8 +569,23 @@ PetscErrorCode SbRunSetUp(SbRun run)
              run->solver, m->tangent[0]->name);
   if (m->dynamic)
     PetscCall(set_up_ts(run));
-  else
-    PetscCall(set_up_static(run));
+  else {
+    Vec F;
+
+    run->fixed_step = (PetscBool)!run->arc.on;
+    PetscCall(SbSpaceCreateVec(run->model->space, &F));
+    PetscCall(SNESCreate(run->model->comm, &run->snes));
+    PetscCall(SNESSetFunction(run->snes, F, SbFormStaticFunction, run));
+    PetscCall(SNESSetJacobian(run->snes, run->operator, run->J, SbFormStaticJacobian, run));
+    PetscCall(VecDestroy(&F));
+    PetscCall(set_up_snes(run));
+    PetscCall(SbSolverSetUp(run->snes, run->model->space, run->solver_used));
+    PetscCall(SNESSetFromOptions(run->snes));
+    PetscCall(SbSolverFinish(run->snes, run->model->space, run->solver_used, run->J));
+    PetscCall(SbNewtonSetRun(run->snes, run));
+    PetscCall(forcing_terms(run->snes));
+    if (run->arc.on) PetscCall(SbArcLengthCheck(run));
+  }
   PetscCall(SbSolverListCreate(run));
   /* options may have made something else of the preset */
   if (!explicit) {

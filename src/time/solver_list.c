@@ -261,16 +261,19 @@ PetscErrorCode SbSolverListDestroy(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Properties of the bodies that are known to make systems ill-conditioned: "; nu is up to 0.4999". */
-static PetscErrorCode describe_causes(SbRun run, char text[], size_t size)
+PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[])
 {
+  const SbSolverList l = run->solver_list;
+  const SbSolverPreset *next = run->solver_used;
+  uint32_t tried = 0;
+  char causes[256], one[128];
   const SbModel m = run->model;
   PetscReal nu = 0., soft = PETSC_MAX_REAL, stiff = 0.;
   PetscInt nsliver = 0, ntet = 0;
-  char one[128];
 
   PetscFunctionBeginUser;
-  text[0] = 0;
+  /* Properties of the bodies that are known to make systems ill-conditioned: "; nu is up to 0.4999". */
+  causes[0] = 0;
   for (PetscInt k = 0; k < m->nmaterial; k++) {
     nu = PetscMax(nu, m->material[k]->nu);
     soft = PetscMin(soft, m->material[k]->E);
@@ -285,30 +288,18 @@ static PetscErrorCode describe_causes(SbRun run, char text[], size_t size)
                             "; %" PetscInt_FMT " of %" PetscInt_FMT
                             " tets have an angle below %g degrees: repair the mesh",
                             nsliver, ntet, SB_SLIVER));
-    PetscCall(PetscStrlcat(text, one, size));
+    PetscCall(PetscStrlcat(causes, one, sizeof(causes)));
   }
   if (stiff > RATIO * soft) {
     PetscCall(PetscSNPrintf(one, sizeof(one),
                             "; the stiffest material has %.2g times Young's modulus of the softest",
                             (double)(stiff / soft)));
-    PetscCall(PetscStrlcat(text, one, size));
+    PetscCall(PetscStrlcat(causes, one, sizeof(causes)));
   }
   if (nu > NU_HARD) {
     PetscCall(PetscSNPrintf(one, sizeof(one), "; nu is up to %g", (double)nu));
-    PetscCall(PetscStrlcat(text, one, size));
+    PetscCall(PetscStrlcat(causes, one, sizeof(causes)));
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[])
-{
-  const SbSolverList l = run->solver_list;
-  const SbSolverPreset *next = run->solver_used;
-  uint32_t tried = 0;
-  char causes[256];
-
-  PetscFunctionBeginUser;
-  PetscCall(describe_causes(run, causes, sizeof(causes)));
   if (l->own)
     PetscCall(PetscSNPrintf(text, size, "linear solver: %s%s", l->failures, causes));
   else {

@@ -45,14 +45,14 @@ static inline PetscErrorCode fixture_register(void)
   PetscCall(SbSpaceRegister());
   PetscCall(SbMaterialRegisterAll());
   PetscCall(SbElementRegisterAll());
-  PetscCall(SbEffectRegister_Gravity());
-  PetscCall(SbEffectRegister_BodyForce());
-  PetscCall(SbEffectRegister_Traction());
-  PetscCall(SbEffectRegister_Pressure());
-  PetscCall(SbEffectRegister_PointForce());
-  PetscCall(SbEffectRegister_Fixed());
-  PetscCall(SbEffectRegister_PrescribedDisplacement());
-  PetscCall(SbEffectRegister_Damping());
+  PetscCall(SbEffectRegister(&SbEffectGravity));
+  PetscCall(SbEffectRegister(&SbEffectBodyForce));
+  PetscCall(SbEffectRegister(&SbEffectTraction));
+  PetscCall(SbEffectRegister(&SbEffectPressure));
+  PetscCall(SbEffectRegister(&SbEffectPointForce));
+  PetscCall(SbEffectRegister(&SbEffectFixed));
+  PetscCall(SbEffectRegister(&SbEffectPrescribedDisplacement));
+  PetscCall(SbEffectRegister(&SbEffectDamping));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -13,12 +13,7 @@ static PetscErrorCode no_space(SbEffect e, SbSpace space)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode create_bare(SbEffect e)
-{
-  PetscFunctionBeginUser;
-  e->ops.setup = no_space;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+static const SbEffectType bare = {.name = "bare", .ops = {.setup = no_space}};
 
 static PetscErrorCode test_types(void)
 {
@@ -89,15 +84,15 @@ static PetscErrorCode test_registration(void)
   SbEffect e;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectRegister("bare", create_bare, 0, NULL));
+  PetscCall(SbEffectRegister(&bare));
   PetscCall(SbEffectCreate("bare", &e));
-  SB_CHECK(e->ops.setup == no_space, "constructor of a new type was called");
+  SB_CHECK(e->ops.setup == no_space, "operations of a new type");
   SB_CHECK(e->linear && e->steady && !e->ncolumn, "defaults");
   PetscCall(SbEffectDestroy(&e));
 
   // A fresh option table needs the types again.
   PetscCall(SbOptionsReset());
-  PetscCall(SbEffectRegister_Gravity());
+  PetscCall(SbEffectRegister(&SbEffectGravity));
   PetscCall(SbEffectCreate("gravity", &e));
   SB_CHECK(e != NULL, "after a reset");
   PetscCall(SbEffectDestroy(&e));
@@ -107,14 +102,14 @@ static PetscErrorCode test_registration(void)
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(SbEffectRegister_Gravity());
-  PetscCall(SbEffectRegister_BodyForce());
-  PetscCall(SbEffectRegister_Traction());
-  PetscCall(SbEffectRegister_Pressure());
-  PetscCall(SbEffectRegister_PointForce());
-  PetscCall(SbEffectRegister_Fixed());
-  PetscCall(SbEffectRegister_PrescribedDisplacement());
-  PetscCall(SbEffectRegister_Damping());
+  PetscCall(SbEffectRegister(&SbEffectGravity));
+  PetscCall(SbEffectRegister(&SbEffectBodyForce));
+  PetscCall(SbEffectRegister(&SbEffectTraction));
+  PetscCall(SbEffectRegister(&SbEffectPressure));
+  PetscCall(SbEffectRegister(&SbEffectPointForce));
+  PetscCall(SbEffectRegister(&SbEffectFixed));
+  PetscCall(SbEffectRegister(&SbEffectPrescribedDisplacement));
+  PetscCall(SbEffectRegister(&SbEffectDamping));
   PetscCall(test_types());
   PetscCall(test_errors());
   PetscCall(test_registration());

@@ -336,7 +336,7 @@ int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   PetscCall(fixture_register());
-  PetscCall(SbEffectRegister_Contact());
+  PetscCall(SbEffectRegister(&SbEffectContact));
   PetscCall(check_options());
   PetscCall(check_tangent("p1", FLOOR "-effect_floor_response penalty"));
   PetscCall(check_tangent("cr", FLOOR "-effect_floor_response augmented"));

@@ -86,8 +86,7 @@ int main(int argc, char **argv)
     &e[1]));
   check_regions(&x, (const PetscReal[2]){0.5, 1.5}, (const PetscReal[2]){0.25, 0.25 + 0.01});
   for (int i = 0; i < 2; i++) {
-    SB_CHECK(!e[i]->ops.force && !e[i]->ops.tangent && !e[i]->ops.accept,
-             "nothing to do at run time");
+    SB_CHECK(!e[i]->ops.force && !e[i]->ops.tangent && !e[i]->ops.accept, "nothing to do at run time");
     PetscCall(SbEffectDestroy(&e[i]));
   }
   SB_CHECK_ERROR(effect_create(&x, "wrong", "-effect_wrong_type damping -effect_wrong_on blok", &e[2]),

@@ -107,7 +107,7 @@ static PetscErrorCode check_element(const char *element)
   PetscCall(SbPrescribedFree(&bottom));
   PetscCall(SbPrescribedFree(&west));
   PetscCall(SbPrescribedFree(&edge));
-  for (int i = 0; i < 3; i++) PetscCall(SbEffectFreeOn(&on[i]));
+  for (int i = 0; i < 3; i++) PetscCall(PetscFree(on[i].name));
   PetscCall(fixture_destroy(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -143,7 +143,7 @@ static PetscErrorCode check_supports(void)
   SB_CHECK(supports == 8 && x.space->Nnode == 4 * x.mesh->Ncell + 8, "%d supports", (int)supports);
   PetscCall(SbSpaceValidate(x.space));
   for (int i = 0; i < 2; i++) PetscCall(SbPrescribedFree(&hold[i]));
-  PetscCall(SbEffectFreeOn(&on));
+  PetscCall(PetscFree(on.name));
   PetscCall(fixture_destroy(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -42,7 +42,7 @@ static PetscErrorCode check_facets(Fixture *x, const char *a, const char *b, Pet
   SB_CHECK_NEAR(all[0], area, 1e-13, "area of the facets");
   SB_CHECK_NEAR(all[1], count, 0, "number of facets");
   PetscCall(PetscFree(facets));
-  PetscCall(SbEffectFreeOn(&on));
+  PetscCall(PetscFree(on.name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -61,7 +61,7 @@ static PetscErrorCode check_nodes(Fixture *x, const char *a, const char *b, Pets
   PetscCallMPI(MPI_Allreduce(&owned, &all, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
   SB_CHECK_NEAR(all, count, 0, "number of nodes");
   PetscCall(PetscFree(nodes));
-  PetscCall(SbEffectFreeOn(&on));
+  PetscCall(PetscFree(on.name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -88,7 +88,7 @@ static PetscErrorCode check_cells(Fixture *x, const char *a, const char *b, Pets
   PetscCallMPI(MPI_Allreduce(&sum, &all, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   SB_CHECK_NEAR(all, volume, 1e-13, "volume of the cells");
   PetscCall(PetscFree(cells));
-  PetscCall(SbEffectFreeOn(&on));
+  PetscCall(PetscFree(on.name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -104,13 +104,13 @@ static PetscErrorCode check_errors(Fixture *x)
   SB_CHECK_ERROR(SbEffectFacets(x->space, &on, &n, &facets), PETSC_ERR_USER_INPUT, "1 vertices|0");
   SB_CHECK_ERROR(SbEffectCells(x->space, &on, &n, &items), PETSC_ERR_USER_INPUT,
                  "-effect_test_on|set bottom");
-  PetscCall(SbEffectFreeOn(&on));
+  PetscCall(PetscFree(on.name));
   PetscCall(make_on("botom", NULL, &on));
   SB_CHECK_ERROR(SbEffectNodes(x->space, &on, &n, &items), PETSC_ERR_USER, "bottom");
-  PetscCall(SbEffectFreeOn(&on));
+  PetscCall(PetscFree(on.name));
   PetscCall(make_on(NULL, NULL, &on));
   SB_CHECK_ERROR(SbEffectNodes(x->space, &on, &n, &items), PETSC_ERR_USER_INPUT, "-effect_test_on");
-  PetscCall(SbEffectFreeOn(&on));
+  PetscCall(PetscFree(on.name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -134,7 +134,7 @@ static PetscErrorCode check_faces(const char *element, PetscInt all, PetscInt bo
   PetscCall(make_on("corner", NULL, &on));
   SB_CHECK_ERROR(SbEffectNodes(x.space, &on, &n, &items), PETSC_ERR_USER_INPUT,
                  "-effect_test_on|1 vertices|body block");
-  PetscCall(SbEffectFreeOn(&on));
+  PetscCall(PetscFree(on.name));
   PetscCall(fixture_destroy(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -5,7 +5,7 @@
     lists       without effects the model holds no effect, no list of operations has an entry, and the log events of effects
                 and of contact are never begun, while that of forces is
     memory      a scene allocates the same number of bytes whether the program knows an effect of another type or not, and
-                the type's constructor is not called
+                the type's options are not read
     trajectory  bit by bit the same with that type in the program; with effects that are named and do nothing too
     elements    with P1 alone there is nothing of CR and DG: no neighbours, no face terms, no second list of nodes; the nodes
                 are the mesh's own arrays. Named or not, the run is the same to the last bit and byte. Beside a body of another
@@ -16,16 +16,19 @@
 #include "verify.h"
 #include <sblog.h>
 
-/* A type that nobody names. Its constructor must not be called. */
+/* A type that nobody names. Its options must not be read. */
 static int storms;
 
-static PetscErrorCode create_storm(SbEffect e)
+static PetscErrorCode options_storm(SbEffect e, const SbScope *scope)
 {
   PetscFunctionBeginUser;
   (void)e;
+  (void)scope;
   storms++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+static const SbEffectType storm_type = {.name = "storm", .ops = {.setfromoptions = options_storm}};
 
 typedef struct {
   PetscInt n;
@@ -61,7 +64,7 @@ static PetscErrorCode run(const char *options, PetscBool storm, Trace *trace)
   PetscCall(PetscOptionsClear(NULL));
   PetscCall(SbOptionsReset());
   PetscCall(SbRegisterAll());
-  if (storm) PetscCall(SbEffectRegister("storm", create_storm, 0, NULL));
+  if (storm) PetscCall(SbEffectRegister(&storm_type));
   PetscCall(PetscOptionsInsertString(NULL, options));
   PetscCall(count_events(first));
   PetscCall(PetscMallocGetCurrentUsage(&before));
@@ -81,8 +84,7 @@ static PetscErrorCode run(const char *options, PetscBool storm, Trace *trace)
   if (!strstr(options, "-effects")) {
     const SbModel m = t.model;
 
-    SB_CHECK(!m->neffect && !m->nprescribe && !m->nforce && !m->ntangent && !m->naccept &&
-               !m->nhistory,
+    SB_CHECK(!m->neffect && !m->nprescribe && !m->nforce && !m->ntangent && !m->naccept && !m->nhistory,
              "a scene without effects has entries in its lists");
     SB_CHECK(!m->space->nfixed && !t.run->damped && !t.run->nmonitor && !t.run->output && !t.run->loads &&
                !t.run->reaction,
