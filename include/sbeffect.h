@@ -224,4 +224,4 @@ PetscErrorCode SbEffectDestroy(SbEffect *e); /* sets *e to NULL; NULL is accepte
 
   Not collective. Call it for every effect between SbMeshCreate() and SbSpaceCreate(). Names without a set are left to set-up.
 */
-PetscErrorCode SbEffectMarkPrescribed(SbEffect e, PetscInt nset, SbSet set[]);
+void SbEffectMarkPrescribed(SbEffect e, PetscInt nset, SbSet set[]);

@@ -126,7 +126,7 @@ PetscErrorCode SbSpaceUpdateGhosts(SbSpace space, PetscReal x[]);
 /* f[nnode][3] += internal force (stress divergence and beta K v), N. Right on owned nodes. Not collective. */
 PetscErrorCode SbSpaceAddInternalForce(SbSpace space, const SbStage *stage, PetscReal f[]);
 /* f += M (a + alpha v); a or v may be NULL. */
-PetscErrorCode SbSpaceAddInertia(SbSpace space, const SbStage *stage, PetscReal f[]);
+void SbSpaceAddInertia(SbSpace space, const SbStage *stage, PetscReal f[]);
 
 typedef enum { SB_MATRIX_AIJ, SB_MATRIX_BAIJ, SB_MATRIX_SBAIJ } SbMatrixKind; /* SBAIJ: one rank only */
 /* Preallocated matrix and the assembly plan. Collective. Caller destroys the matrix. */
@@ -157,18 +157,17 @@ PetscErrorCode SbSpaceFixDone(SbSpace space);
 PetscInt SbSpaceFixedIndex(SbSpace space, PetscInt node);
 
 /* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest). Outputs may be NULL. */
-PetscErrorCode SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[],
-                                PetscReal psi[]);
+void SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[], PetscReal psi[]);
 /* Per owned cell: first Piola-Kirchhoff stress P[9] (Pa), rotation R[9] in F (the identity for the linear law; may be NULL), energy
    density psi (J/m^3, rest); of P2, whose stresses are means over the points of SbRuleQuadratic, P there as well, point[ncell][4][9]
    (may be NULL). Not collective. */
-PetscErrorCode SbSpaceCellPiola(SbSpace space, const PetscReal u[], PetscReal P[], PetscReal R[],
-                                PetscReal psi[], PetscReal point[]);
+void SbSpaceCellPiola(SbSpace space, const PetscReal u[], PetscReal P[], PetscReal R[], PetscReal psi[],
+                      PetscReal point[]);
 /* Per owned cell: the law's pressure -lambda theta, Pa (SbMaterialOps.pressure). Not collective. */
-PetscErrorCode SbSpaceCellPressure(SbSpace space, const PetscReal u[], PetscReal pressure[]);
+void SbSpaceCellPressure(SbSpace space, const PetscReal u[], PetscReal pressure[]);
 /* Owned cells: strain energy (J; added to body[nbody] by bodies, too, unless that is NULL), smallest det F, number with det F <= 0, current volume (m^3). Local: reduce them. */
-PetscErrorCode SbSpaceStrainEnergy(SbSpace space, const PetscReal u[], PetscReal body[], PetscReal *energy,
-                                   PetscReal *minJ, PetscInt *ninverted, PetscReal *volume);
+void SbSpaceStrainEnergy(SbSpace space, const PetscReal u[], PetscReal body[], PetscReal *energy,
+                         PetscReal *minJ, PetscInt *ninverted, PetscReal *volume);
 /* v . C v of owned cells, W. Local: reduce it. */
 PetscErrorCode SbSpaceDampingPower(SbSpace space, const PetscReal u[], const PetscReal v[], PetscReal *power);
 /* Largest stable step of an explicit run at rest, with its damping, s; a few percent too large at most. Collective, after

@@ -188,7 +188,7 @@ struct _p_SbRun {
   Not collective. Output: order p and constant c, from the eigenvalue of the method for an undamped oscillator; `ahead`, the time in lengths of a
   step by which symplectic Euler's velocities are behind, whose error does not add up; 0 for the others.
 */
-PetscErrorCode SbRunMethodError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead);
+void SbRunMethodError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead);
 /* X = (K + H)^-1 B with the tangent K of the last direction of Newton's method and the second derivative H of guarded contact, where surfaces pushed each other there (solved). Collective. */
 PetscErrorCode SbRunSolveTangent(SbRun run, Vec B, Vec X, PetscInt *iterations, PetscBool *solved);
 PetscErrorCode SbTimeRegister(void); /* option rows and the TSType */
@@ -200,7 +200,7 @@ PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx, PetscErrorC
 /* From now on SIGTERM, SIGINT and SIGUSR1 end the run after its step: SbRun.stopped. A second SIGINT ends the process. Of one run at a time. */
 PetscErrorCode SbRunCatchSignals(SbRun run);
 /* After SbRunSetUp(). */
-PetscErrorCode SbRunSetPause(SbRun run, SbPauseFn fn, void *ctx);
+void SbRunSetPause(SbRun run, SbPauseFn fn, void *ctx);
 /*
   SbRunContinue - `to` goes on where `from` has come to, on another model of the same scene. Collective.
 

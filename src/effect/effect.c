@@ -140,14 +140,12 @@ PetscErrorCode SbContactPointsAdd(SbContactPoints *list, const SbContactPoint *p
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEffectMarkPrescribed(SbEffect e, PetscInt nset, SbSet set[])
+void SbEffectMarkPrescribed(SbEffect e, PetscInt nset, SbSet set[])
 {
-  PetscFunctionBeginUser;
   for (PetscInt i = 0; e->prescribed && i < e->on.n; i++) {
     for (PetscInt k = 0; k < nset; k++)
       if (!strcmp(set[k].name, e->on.name[i])) set[k].prescribed = PETSC_TRUE;
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt n, PetscBool position,

@@ -32,37 +32,12 @@ static inline void copy_block(const PetscScalar *from, PetscBool turned, PetscRe
   for (int e = 0; e < 9; e++) to[e] = from[turned ? e : 3 * (e % 3) + e / 3];
 }
 
-/* Blocks left of the diagonal are found, transposed, in the rows of their columns. */
-static PetscErrorCode read_sbaij(SbSpace s, Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],
-                                 PetscReal block[])
-{
-  const SbPlan p = s->plan;
-  PetscScalar *value;
-
-  PetscFunctionBeginUser;
-  PetscCall(MatSeqSBAIJGetArray(A, &value));
-  for (PetscInt k = 0; k < n; k++) {
-    const PetscInt i = node[k];
-    PetscReal *to = block + 9 * ia[k];
-
-    for (PetscInt e = p->di[i]; e < p->di[i + 1]; e++, to += 9) {
-      const PetscBool lower = (PetscBool)(p->dj[e] < i);
-      const PetscInt row = lower ? p->dj[e] : i;
-      const PetscInt at = lower ? p->di[row] + find_column(s, row, s->gnode[i]) : e;
-
-      copy_block(value + 9 * (size_t)(p->ui[row] + at - p->diagonal[row]), lower, to);
-    }
-  }
-  PetscCall(SbMatRestoreRead(A, MatSeqSBAIJRestoreArray, &value));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[], PetscInt ia[],
                               PetscInt ja[], PetscReal block[])
 {
   const SbPlan p = s->plan;
   const SbLane *R;
-  PetscBool baij, sbaij;
+  PetscBool blocks;
 
   PetscFunctionBeginUser;
   ia[0] = 0;
@@ -75,34 +50,33 @@ PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[
     PetscCall(PetscArraycpy(ja + ia[k] + nd, p->oj + p->oi[i], no));
   }
   if (!block) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &baij, MATSEQBAIJ, MATMPIBAIJ, ""));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &sbaij));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &blocks, MATSEQBAIJ, MATMPIBAIJ, MATSEQSBAIJ, ""));
   PetscCall(SbMatrixFreeGetRotations(A, &R));
   PetscCall(PetscArrayzero(block, 9 * ia[n]));
   if (R)
     PetscCall(SbMatrixFreeAddRows(A, n, node, ia, block));
-  else if (baij) {
-    PetscScalar *diagonal, *other = NULL;
-    Mat part[2] = {A, NULL};
-    PetscBool parallel;
+  else if (blocks) {
+    SbMatBlocks b;
 
-    PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
-    if (parallel) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &part[0], &part[1], NULL));
-    PetscCall(MatSeqBAIJGetArray(part[0], &diagonal));
-    if (part[1]) PetscCall(MatSeqBAIJGetArray(part[1], &other));
+    PetscCall(SbMatGetBlocks(A, &b));
     for (PetscInt k = 0; k < n; k++) {
+      const PetscInt i = node[k];
       PetscReal *to = block + 9 * ia[k];
 
-      for (PetscInt e = p->di[node[k]]; e < p->di[node[k] + 1]; e++, to += 9)
-        copy_block(diagonal + 9 * (size_t)e, PETSC_FALSE, to);
-      for (PetscInt e = p->oi[node[k]]; e < p->oi[node[k] + 1]; e++, to += 9)
-        copy_block(other + 9 * (size_t)e, PETSC_FALSE, to);
+      /* of a symmetric matrix, blocks left of the diagonal are found, transposed, in the rows of their columns */
+      for (PetscInt e = p->di[i]; e < p->di[i + 1]; e++, to += 9) {
+        const PetscBool lower = (PetscBool)(b.symmetric && p->dj[e] < i);
+        const PetscInt row = lower ? p->dj[e] : i;
+        const PetscInt at = lower ? p->di[row] + find_column(s, row, s->gnode[i]) : e;
+
+        copy_block(b.value[0] + 9 * (size_t)(b.symmetric ? p->ui[row] + at - p->diagonal[row] : at), lower,
+                   to);
+      }
+      for (PetscInt e = p->oi[i]; e < p->oi[i + 1]; e++, to += 9)
+        copy_block(b.value[1] + 9 * (size_t)e, PETSC_FALSE, to);
     }
-    PetscCall(SbMatRestoreRead(part[0], MatSeqBAIJRestoreArray, &diagonal));
-    if (part[1]) PetscCall(SbMatRestoreRead(part[1], MatSeqBAIJRestoreArray, &other));
-  } else if (sbaij)
-    PetscCall(read_sbaij(s, A, n, node, ia, block));
-  else {
+    PetscCall(SbMatRestoreBlocks(&b));
+  } else {
     for (PetscInt k = 0; k < n; k++) {
       for (PetscInt c = 0; c < 3; c++) {
         const PetscInt row = 3 * (s->gnode_start + node[k]) + c, *column;

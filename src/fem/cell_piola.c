@@ -5,10 +5,9 @@
 #include "fem_impl.h"
 #include "sbkernel.h"
 
-PetscErrorCode SbSpaceCellPiola(SbSpace s, const PetscReal x[], PetscReal P[], PetscReal R[], PetscReal psi[],
-                                PetscReal point[])
+void SbSpaceCellPiola(SbSpace s, const PetscReal x[], PetscReal P[], PetscReal R[], PetscReal psi[],
+                      PetscReal point[])
 {
-  PetscFunctionBeginUser;
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
 
@@ -44,5 +43,4 @@ PetscErrorCode SbSpaceCellPiola(SbSpace s, const PetscReal x[], PetscReal P[], P
       }
     }
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -7,9 +7,8 @@
 */
 #include "fem_impl.h"
 
-PetscErrorCode SbSpaceCellPressure(SbSpace s, const PetscReal x[], PetscReal pressure[])
+void SbSpaceCellPressure(SbSpace s, const PetscReal x[], PetscReal pressure[])
 {
-  PetscFunctionBeginUser;
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
 
@@ -23,5 +22,4 @@ PetscErrorCode SbSpaceCellPressure(SbSpace s, const PetscReal x[], PetscReal pre
       }
     }
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }

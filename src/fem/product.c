@@ -132,6 +132,37 @@ PetscErrorCode SbMatRestoreRead(Mat A, PetscErrorCode (*restore)(Mat, PetscScala
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbMatGetBlocks(Mat A, SbMatBlocks *b)
+{
+  PetscBool parallel, sequential;
+  MatType type;
+
+  PetscFunctionBeginUser;
+  *b = (SbMatBlocks){.part = {A, NULL}};
+  PetscCall(MatGetType(A, &type));
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &b->symmetric));
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQBAIJ, &sequential));
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
+  PetscCheck(b->symmetric || sequential || parallel, PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
+             "This preconditioner takes BAIJ and SBAIJ matrices, and this one is %s: leave -mat_type alone",
+             type);
+  if (parallel) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &b->part[0], &b->part[1], NULL));
+  if (b->symmetric) PetscCall(MatSeqSBAIJGetArray(A, &b->value[0]));
+  for (int q = 0; q < 2 && !b->symmetric; q++)
+    if (b->part[q]) PetscCall(MatSeqBAIJGetArray(b->part[q], &b->value[q]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMatRestoreBlocks(SbMatBlocks *b)
+{
+  PetscFunctionBeginUser;
+  for (int q = 0; q < 2; q++)
+    if (b->part[q])
+      PetscCall(SbMatRestoreRead(b->part[q], b->symmetric ? MatSeqSBAIJRestoreArray : MatSeqBAIJRestoreArray,
+                                 &b->value[q]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbProductGetSymmetric(Mat A, Mat *local)
 {
   Product *p;

@@ -127,9 +127,8 @@ static void add_lumped_damping(SbSpace s, const SbRegion *region, const PetscRea
   }
 }
 
-PetscErrorCode SbSpaceAddInertia(SbSpace s, const SbStage *stage, PetscReal f[])
+void SbSpaceAddInertia(SbSpace s, const SbStage *stage, PetscReal f[])
 {
-  PetscFunctionBeginUser;
   if (s->consistent_mass) {
     for (PetscInt r = 0; r < s->nregion; r++) {
       if (s->region[r].quadratic) {
@@ -191,7 +190,6 @@ PetscErrorCode SbSpaceAddInertia(SbSpace s, const SbStage *stage, PetscReal f[])
       if (s->region[r].alpha != 0.) add_lumped_damping(s, &s->region[r], stage->v, f);
     }
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Cauchy stress P F^T / J of one lane, in the order xx yy zz xy yz xz. */
@@ -214,10 +212,8 @@ static PetscReal lane_det(const SbLane F[9], PetscInt l)
          F[2][l] * (F[3][l] * F[7][l] - F[4][l] * F[6][l]);
 }
 
-PetscErrorCode SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscReal J[],
-                                PetscReal psi[])
+void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscReal J[], PetscReal psi[])
 {
-  PetscFunctionBeginUser;
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
 
@@ -252,7 +248,6 @@ PetscErrorCode SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[
       }
     }
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Exact volumes of the cells of a P2 batch, and the least det F at the points of the rule for them. */
@@ -274,10 +269,9 @@ static void quadratic_volume(SbSpace s, PetscInt b, const PetscReal x[], SbLane 
   }
 }
 
-PetscErrorCode SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal body[], PetscReal *energy,
-                                   PetscReal *minJ, PetscInt *ninverted, PetscReal *volume)
+void SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal body[], PetscReal *energy, PetscReal *minJ,
+                         PetscInt *ninverted, PetscReal *volume)
 {
-  PetscFunctionBeginUser;
   *energy = 0.;
   *volume = 0.;
   *minJ = PETSC_MAX_REAL;
@@ -309,7 +303,6 @@ PetscErrorCode SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal bod
     if (body) body[region->body] += *energy - before;
   }
   if (s->jump) *energy += SbJumpEnergy(s, x, SB_JUMP_STIFFNESS, body);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The power of a P2 region's damping: its force times the velocity. */

@@ -112,7 +112,6 @@ PetscErrorCode SbQuantityAttach(SbLedger l);
 PetscErrorCode SbQuantityContinue(SbLedger from, SbLedger to);
 PetscErrorCode SbQuantityValue(SbLedger l, const SbStep *step);
 PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step);
-PetscErrorCode SbQuantityDestroy(SbLedger l);
 
 /* Seconds by source and those without one, largest of all ranks. */
 typedef struct {

@@ -206,10 +206,3 @@ PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step)
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-PetscErrorCode SbQuantityDestroy(SbLedger l)
-{
-  PetscFunctionBeginUser;
-  PetscCall(VecDestroy(&l->quantity.weight));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}

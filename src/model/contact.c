@@ -38,7 +38,7 @@ PetscErrorCode SbModelContactBeginStep(SbModel m, PetscReal t, PetscReal dt, Vec
   PetscCall(SbSpaceGetLocalRead(m->space, U0, &u0));
   PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
   if (m->nrestitution) {
-    PetscCall(SbModelRestitutionBegin(m, dt, U0, V0));
+    SbModelRestitutionBegin(m, dt, U0, V0);
     PetscCall(SbSpaceGetLocalRead(m->space, V0, &v0));
   }
   for (PetscInt e = 0; e < m->nbegin_step; e++)

@@ -27,7 +27,7 @@ static PetscErrorCode nodal_momenta(SbSpace s, const PetscReal v[], PetscReal **
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(3 * s->nnode, p));
   if (s->consistent_mass)
-    PetscCall(SbSpaceAddInertia(s, &stage, *p));
+    SbSpaceAddInertia(s, &stage, *p);
   else
     for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) (*p)[i] = s->node_mass[i / 3] * v[i];
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -44,7 +44,7 @@ PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_ENERGY], 0, 0, 0, 0));
   PetscCall(SbSpaceGetLocalRead(s, U, &u));
-  PetscCall(SbSpaceStrainEnergy(s, u, NULL, &sum[STRAIN], &extreme[2], &ninverted, &sum[VOLUME]));
+  SbSpaceStrainEnergy(s, u, NULL, &sum[STRAIN], &extreme[2], &ninverted, &sum[VOLUME]);
   sum[INVERTED] = (PetscReal)ninverted;
   extreme[2] = -extreme[2];
   if (V) {
@@ -101,7 +101,7 @@ PetscErrorCode SbModelBodySums(SbModel m, Vec U, Vec V, PetscReal sum[][SB_BODY_
   PetscFunctionBeginUser;
   PetscCall(SbSpaceGetLocalRead(s, U, &u));
   PetscCall(PetscCalloc1(m->nbody, &strain));
-  PetscCall(SbSpaceStrainEnergy(s, u, strain, &unused[0], &unused[1], &n, &unused[2]));
+  SbSpaceStrainEnergy(s, u, strain, &unused[0], &unused[1], &n, &unused[2]);
   for (PetscInt b = 0; b < m->nbody; b++) sum[b][1] += strain[b];
   PetscCall(PetscFree(strain));
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
@@ -172,7 +172,7 @@ PetscErrorCode SbModelStrainEnergyAlong(SbModel m, Vec U, Vec D, PetscReal *psi,
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(3 * s->nnode, &f));
   PetscCall(SbSpaceGetLocalRead(s, U, &stage.u));
-  PetscCall(SbSpaceStrainEnergy(s, stage.u, NULL, &sum[0], &minJ, &n, &volume));
+  SbSpaceStrainEnergy(s, stage.u, NULL, &sum[0], &minJ, &n, &volume);
   PetscCall(SbSpaceAddInternalForce(s, &stage, f));
   PetscCall(SbSpaceRestoreLocalRead(s, U, &stage.u));
   PetscCall(VecGetArrayRead(D, &d));

@@ -272,7 +272,7 @@ PetscErrorCode SbModelGuardBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0, V
   if (m->nrestitution && V0) {
     const PetscReal *u0, *v0;
 
-    PetscCall(SbModelRestitutionBegin(m, dt, U0, V0));
+    SbModelRestitutionBegin(m, dt, U0, V0);
     PetscCall(SbSpaceGetLocalRead(m->space, U0, &u0));
     PetscCall(SbSpaceGetLocalRead(m->space, V0, &v0));
     for (PetscInt e = 0; e < m->npotential; e++) {

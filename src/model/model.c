@@ -121,7 +121,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
     effect->ops.prescribe = NULL;
     effect->prescribed = PETSC_FALSE;
   }
-  for (PetscInt e = 0; e < m->neffect; e++) PetscCall(SbEffectMarkPrescribed(m->effect[e], m->nset, m->set));
+  for (PetscInt e = 0; e < m->neffect; e++) SbEffectMarkPrescribed(m->effect[e], m->nset, m->set);
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
   m->load = 1.;
   m->linear = m->space->linear;
@@ -231,7 +231,7 @@ PetscErrorCode SbModelResidual(SbModel m, PetscReal t, Vec U, Vec V, Vec A, Pets
   PetscCall(SbSpaceGetLocalWrite(m->space, F, &f));
   PetscCall(SbModelExternalForces(m, &stage, (PetscBool)(constrain && m->guard_apart), -1., f));
   PetscCall(SbSpaceAddInternalForce(m->space, &stage, f));
-  if (A || V) PetscCall(SbSpaceAddInertia(m->space, &stage, f));
+  if (A || V) SbSpaceAddInertia(m->space, &stage, f);
   if (constrain) constrain_residual(m->space, f);
   if (m->space->constraints) SbConstraintsResidual(m->space, stage.u, constrain, f);
   PetscCall(SbSpaceRestoreLocalWrite(m->space, F, &f));

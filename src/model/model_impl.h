@@ -6,7 +6,7 @@
 
 /* restitution.c, for SbModelContactBeginStep() and SbModelContactUpdateActiveSet(): Begin starts an attempt at a step; Update, once the active set is right, sees to the energy: `again` when
    coefficients had to be reduced. Collective. */
-PetscErrorCode SbModelRestitutionBegin(SbModel model, PetscReal dt, Vec U0, Vec V0);
+void SbModelRestitutionBegin(SbModel model, PetscReal dt, Vec U0, Vec V0);
 PetscErrorCode SbModelRestitutionUpdate(SbModel model, Vec U, PetscBool *again);
 /* model.c: f[nnode][3] = sign * f_ext, N; apart: without guarded contact. Not collective. */
 PetscErrorCode SbModelExternalForces(SbModel model, const SbStage *stage, PetscBool apart, PetscReal sign,

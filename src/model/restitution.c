@@ -27,15 +27,13 @@
   2.1 /* the same for a small excess, as of a stiff body with e = 1, whose W / D grows with the root of e */
 #define ROUND 1e-9 /* of D: W that counts as not larger */
 
-PetscErrorCode SbModelRestitutionBegin(SbModel m, PetscReal dt, Vec U0, Vec V0)
+void SbModelRestitutionBegin(SbModel m, PetscReal dt, Vec U0, Vec V0)
 {
-  PetscFunctionBeginUser;
   m->bounce.U0 = U0;
   m->bounce.V0 = V0;
   m->bounce.dt = dt;
   m->bounce.left = 1.;
   m->bounce.reductions = 0;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* C of the step that ends at U, J. */
@@ -51,8 +49,8 @@ static PetscErrorCode convexity(SbModel m, Vec U, PetscReal *C)
   PetscCall(PetscCalloc1(3 * s->nnode, &f));
   PetscCall(SbSpaceGetLocalRead(s, m->bounce.U0, &u0));
   PetscCall(SbSpaceGetLocalRead(s, U, &stage.u));
-  PetscCall(SbSpaceStrainEnergy(s, u0, NULL, &strain[0], &unused[0], &inverted, &unused[1]));
-  PetscCall(SbSpaceStrainEnergy(s, stage.u, NULL, &strain[1], &unused[0], &inverted, &unused[1]));
+  SbSpaceStrainEnergy(s, u0, NULL, &strain[0], &unused[0], &inverted, &unused[1]);
+  SbSpaceStrainEnergy(s, stage.u, NULL, &strain[1], &unused[0], &inverted, &unused[1]);
   PetscCall(SbSpaceAddInternalForce(s, &stage, f));
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) work += f[i] * (stage.u[i] - u0[i]);
   PetscCall(SbSpaceRestoreLocalRead(s, U, &stage.u));

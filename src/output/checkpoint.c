@@ -141,7 +141,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscCall(SbOutputPath(out, name, sizeof(path), path));
   PetscCall(SbOutputPath(out, "checkpoint.tmp", sizeof(tmp), tmp));
   PetscCall(SbH5Create(out->comm, tmp, &h));
-  PetscCall(SbCheckpointMeshBytes(run, &mesh_bytes));
+  SbCheckpointMeshBytes(run, &mesh_bytes);
   PetscCall(SbH5Reserve(&h, (PetscInt64)out->node.N * 3 * 32 + (PetscInt64)strlen(out->identity) + 65536 +
                               mesh_bytes));
 
@@ -264,8 +264,8 @@ static PetscErrorCode read_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *a
     if (!*ok) break;
     PetscCall(checksum_of(&out->node, (uint64_t)k, slice, &sum));
     if (k == PATH) {
-      PetscCall(SbH5GetInt(h->file, "path_checksum", &own, ok));
-      PetscCall(SbH5GetReal(h->file, "path_first", &run->arc.first, ok));
+      SbH5GetInt(h->file, "path_checksum", &own, ok);
+      SbH5GetReal(h->file, "path_first", &run->arc.first, ok);
       if (own != (int64_t)sum) *ok = PETSC_FALSE;
     } else
       *all += sum;
@@ -291,15 +291,15 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   PetscFunctionBeginUser;
   PetscCall(SbH5Open(out->comm, path, PETSC_FALSE, &h, ok));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbH5GetInt(h.file, "format", &format, ok));
-  PetscCall(SbH5GetInt(h.file, "step", &step, ok));
-  PetscCall(SbH5GetInt(h.file, "mesh_hash", &mesh_hash, ok));
-  PetscCall(SbH5GetInt(h.file, "checksum", &checksum, ok));
+  SbH5GetInt(h.file, "format", &format, ok);
+  SbH5GetInt(h.file, "step", &step, ok);
+  SbH5GetInt(h.file, "mesh_hash", &mesh_hash, ok);
+  SbH5GetInt(h.file, "checksum", &checksum, ok);
   numbers_of(run, &times, number);
   for (int i = 0; i < NNUMBER; i++) {
     PetscBool there = PETSC_TRUE;
 
-    PetscCall(SbH5GetReal(h.file, number[i].name, &values[i], &there));
+    SbH5GetReal(h.file, number[i].name, &values[i], &there);
     if (!there && !number[i].optional) *ok = PETSC_FALSE;
   }
   if (*ok && format != FORMAT) *ok = PETSC_FALSE;
@@ -324,7 +324,7 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
 
     PetscCall(PetscMalloc1(run->ncarried, &errors));
     for (PetscInt i = 0; i < run->ncarried && all; i++)
-      PetscCall(SbH5GetReal(h.file, run->carried[i].name, &errors[i], &all));
+      SbH5GetReal(h.file, run->carried[i].name, &errors[i], &all);
     for (PetscInt i = 0; i < run->ncarried && all; i++) *run->carried[i].value = errors[i];
     PetscCall(PetscFree(errors));
     if (!all)
@@ -335,14 +335,14 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   for (PetscInt i = 0; *ok && i < SbLiveCount(); i++) {
     PetscReal value;
 
-    PetscCall(SbH5GetReal(h.file, SbLiveColumn(i, NULL), &value, ok));
+    SbH5GetReal(h.file, SbLiveColumn(i, NULL), &value, ok);
     if (*ok) SbLiveSet(i, times.t, value);
   }
   PetscCall(SbH5Close(&h));
 
   /* effects take up what they remember, and the run stands where the file was written */
   if (*ok) PetscCall(SbCheckpointLoadEffects(run, times.t, records));
-  PetscCall(SbCheckpointFreeEffects(run, records));
+  for (PetscInt k = 0; k < run->model->neffect; k++) PetscCall(PetscFree(records[k].record));
   PetscCall(PetscFree(records));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
   run->after.dt = times.paused;

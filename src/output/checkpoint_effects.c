@@ -75,7 +75,7 @@ PetscErrorCode SbCheckpointReadEffects(SbRun run, SbH5 *h, SbRecords records[], 
 
     if (!e->ops.load) continue;
     PetscCall(name_of(e, sizeof(name), name));
-    PetscCall(SbH5GetInt(h->file, name, &n, &there));
+    SbH5GetInt(h->file, name, &n, &there);
     if (!there || n <= 0) continue;
     order.n = order.N = (PetscInt)n;
     PetscCall(PetscMalloc1(e->nstate * order.n, &records[k].record));
@@ -101,12 +101,5 @@ PetscErrorCode SbCheckpointLoadEffects(SbRun run, PetscReal t, const SbRecords r
   }
   PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &u));
   PetscCall(SbModelContactResume(m));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbCheckpointFreeEffects(SbRun run, SbRecords records[])
-{
-  PetscFunctionBeginUser;
-  for (PetscInt k = 0; k < run->model->neffect; k++) PetscCall(PetscFree(records[k].record));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -43,9 +43,8 @@ static uint64_t sum_of(const SbMemoryMesh *g)
   return sum;
 }
 
-PetscErrorCode SbCheckpointMeshBytes(SbRun run, PetscInt64 *bytes)
+void SbCheckpointMeshBytes(SbRun run, PetscInt64 *bytes)
 {
-  PetscFunctionBeginUser;
   *bytes = 0;
   for (PetscInt b = 0; b < run->model->nbody; b++) {
     const SbBody *body = &run->model->body[b];
@@ -54,7 +53,6 @@ PetscErrorCode SbCheckpointMeshBytes(SbRun run, PetscInt64 *bytes)
       *bytes +=
         (PetscInt64)body->nvert * 32 + (PetscInt64)body->ncell * 40 + (PetscInt64)body->nfacet * 32 + 65536;
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode write_mesh(SbH5 *h, SbOutput out, const char *body, SbMemoryMesh *g, uint64_t *sum)
@@ -144,13 +142,13 @@ static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_
   *ok = (PetscBool)(group >= 0);
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 3; k++) {
-    PetscCall(SbH5GetInt(group, counts[k], &n[k], ok));
+    SbH5GetInt(group, counts[k], &n[k], ok);
     *ok = (PetscBool)(*ok && n[k] >= 0 && n[k] < PETSC_MAX_INT / 8);
   }
-  PetscCall(SbH5GetInt(group, "step", &step, ok));
-  PetscCall(SbH5GetReal(group, "mass", &mass, ok));
-  PetscCall(SbH5GetReal(group, "bound", &bound, ok));
-  PetscCall(SbH5GetInt(group, "sum", &sum, ok));
+  SbH5GetInt(group, "step", &step, ok);
+  SbH5GetReal(group, "mass", &mass, ok);
+  SbH5GetReal(group, "bound", &bound, ok);
+  SbH5GetInt(group, "sum", &sum, ok);
   for (int k = 0; k < 3; k++) count[k] = *ok ? (PetscInt)n[k] : 0;
   /* a count that lies shows when its dataset has another one: nothing is allocated for it */
   *ok = (PetscBool)(*ok && SbH5Rows(group, "x") == n[0] && SbH5Rows(group, "cells") == n[1] &&

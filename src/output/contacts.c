@@ -176,7 +176,7 @@ PetscErrorCode SbContactsRead(hid_t frame, PetscInt *n, PetscInt *bytes)
   PetscBool ok = (PetscBool)(group >= 0);
 
   PetscFunctionBeginUser;
-  if (ok) PetscCall(SbH5GetInt(group, "count", &count, &ok));
+  if (ok) SbH5GetInt(group, "count", &count, &ok);
   *n = ok ? (PetscInt)count : -1;
   *bytes = 8;
   if (ok && count) {
@@ -207,7 +207,7 @@ PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, P
     values[k] = (SbXdmfValues){
       .name = table[k].name, .ncomp = table[k].ncomp, .bytes = (int)bytes, .whole = table[k].whole};
   (void)snprintf(group, sizeof(group), "%s/contacts", frame);
-  PetscCall(SbXdmfAddPoints(c->xdmf, time, group, n, c->nowhere, NTABLE, values));
+  SbXdmfAddPoints(c->xdmf, time, group, n, c->nowhere, NTABLE, values);
   PetscCall(SbVtkhdfAddPoints(c->vtkhdf, time, group, n, NTABLE, values));
   c->listed = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -226,8 +226,8 @@ PetscErrorCode SbContactsRemoveIndex(SbOutput out)
 {
   PetscFunctionBeginUser;
   if (!out->contacts || !out->contacts->xdmf) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbXdmfRemove(out->contacts->xdmf));
-  PetscCall(SbVtkhdfRemove(out->contacts->vtkhdf));
+  SbXdmfRemove(out->contacts->xdmf);
+  SbVtkhdfRemove(out->contacts->vtkhdf);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

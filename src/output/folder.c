@@ -116,14 +116,12 @@ PetscErrorCode SbOutputLock(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbFolderUnlock(SbOutput out)
+void SbFolderUnlock(SbOutput out)
 {
-  PetscFunctionBeginUser;
-  if (out->lock < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (out->lock < 0) return;
   remove_lock();
   (void)close(out->lock);
   out->lock = -1;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ checkpoints in it */

@@ -303,7 +303,7 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   fr->last_step = step->step;
   fr->nframe++;
   if (fr->xdmf) {
-    PetscCall(SbXdmfAdd(fr->xdmf, time, path, n, field, bytes));
+    SbXdmfAdd(fr->xdmf, time, path, n, field, bytes);
     PetscCall(SbVtkhdfAdd(fr->vtkhdf, time, path, n, field, bytes));
     PetscCall(SbContactsList(out, time, path, SbContactsCount(out), out->precise ? 8 : 4));
     write_indices(out, step->last, sizeof(message), message);
@@ -352,9 +352,9 @@ static PetscErrorCode read_frame(hid_t hundred, const char *name, SbFrame *frame
   PetscFunctionBeginUser;
   *ok = (PetscBool)(group >= 0);
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbH5GetInt(group, "step", &step, ok));
-  PetscCall(SbH5GetReal(group, "time", &frame->time, ok));
-  PetscCall(SbH5GetInt(group, "mesh", &mesh, &other));
+  SbH5GetInt(group, "step", &step, ok);
+  SbH5GetReal(group, "time", &frame->time, ok);
+  SbH5GetInt(group, "mesh", &mesh, &other);
   frame->step = (PetscInt)step;
   frame->mesh = other ? (PetscInt)mesh : 0;
   frame->nfield = 0;
@@ -435,7 +435,7 @@ static PetscErrorCode mesh_hash(hid_t file, PetscInt step, int64_t *hash, PetscB
   mesh_name(step, sizeof(name), name);
   mesh = H5Lexists(file, name, H5P_DEFAULT) > 0 ? H5Gopen2(file, name, H5P_DEFAULT) : -1;
   *ok = (PetscBool)(mesh >= 0);
-  if (*ok) PetscCall(SbH5GetInt(mesh, "hash", hash, ok));
+  if (*ok) SbH5GetInt(mesh, "hash", hash, ok);
   if (mesh >= 0) (void)H5Gclose(mesh);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -501,8 +501,7 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
   /* the index first, so that it never lists a frame that is removed */
   for (PetscInt i = 0; fr->xdmf && i < fr->nframe; i++) {
     if (!i || frames[i].mesh != frames[i - 1].mesh) PetscCall(index_mesh(fr, frames[i].mesh));
-    PetscCall(SbXdmfAdd(fr->xdmf, frames[i].time, frames[i].group, frames[i].nfield, frames[i].field,
-                        frames[i].bytes));
+    SbXdmfAdd(fr->xdmf, frames[i].time, frames[i].group, frames[i].nfield, frames[i].field, frames[i].bytes);
     PetscCall(SbVtkhdfAdd(fr->vtkhdf, frames[i].time, frames[i].group, frames[i].nfield, frames[i].field,
                           frames[i].bytes));
     PetscCall(SbContactsList(out, frames[i].time, frames[i].group, frames[i].npoint, frames[i].point_bytes));
@@ -608,8 +607,8 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
   if (!resumed) {
     SbFrames fr = out->frames;
 
-    if (fr->xdmf) PetscCall(SbXdmfRemove(fr->xdmf));
-    if (fr->xdmf) PetscCall(SbVtkhdfRemove(fr->vtkhdf));
+    if (fr->xdmf) SbXdmfRemove(fr->xdmf);
+    if (fr->xdmf) SbVtkhdfRemove(fr->vtkhdf);
     PetscCall(SbContactsRemoveIndex(out));
     PetscCall(SbH5Create(out->comm, path, &fr->h5));
     PetscCall(SbH5PutText(&fr->h5, fr->h5.file, "program", "supple " SB_VERSION));

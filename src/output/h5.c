@@ -351,18 +351,14 @@ static PetscBool get(hid_t where, const char *name, H5T_class_t klass, hid_t mem
   return good;
 }
 
-PetscErrorCode SbH5GetReal(hid_t where, const char *name, PetscReal *value, PetscBool *ok)
+void SbH5GetReal(hid_t where, const char *name, PetscReal *value, PetscBool *ok)
 {
-  PetscFunctionBeginUser;
   if (!get(where, name, H5T_FLOAT, H5T_NATIVE_DOUBLE, value)) *ok = PETSC_FALSE;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbH5GetInt(hid_t where, const char *name, int64_t *value, PetscBool *ok)
+void SbH5GetInt(hid_t where, const char *name, int64_t *value, PetscBool *ok)
 {
-  PetscFunctionBeginUser;
   if (!get(where, name, H5T_INTEGER, H5T_NATIVE_INT64, value)) *ok = PETSC_FALSE;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ texts */

@@ -314,9 +314,10 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, size_t nmessage, char m
 }
 
 /* From now on rows are those of this run. */
-static PetscErrorCode attach(SbRun run, SbOutput out)
+PetscErrorCode SbHistoryReattach(SbRun run, SbOutput out)
 {
   PetscFunctionBeginUser;
+  if (!out->hist) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbProbesFind(run, out));
   if (out->history_bodies) {
     if (!out->hist->mass) PetscCall(PetscMalloc1(run->model->nbody, &out->hist->mass));
@@ -353,14 +354,7 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
   if (!out->rank) PetscCall(open_file(run, out, sizeof(message), message));
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
   PetscCallMPI(MPI_Bcast(&h->last_step, 1, MPIU_INT, 0, out->comm));
-  PetscCall(attach(run, out));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbHistoryReattach(SbRun run, SbOutput out)
-{
-  PetscFunctionBeginUser;
-  if (out->hist) PetscCall(attach(run, out));
+  PetscCall(SbHistoryReattach(run, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

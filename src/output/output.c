@@ -220,12 +220,12 @@ static PetscErrorCode destroy(SbRun run)
   if (!out) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbFramesDestroy(out));
   PetscCall(SbHistoryDestroy(out));
-  PetscCall(SbProgressDestroy(out));
+  PetscCall(PetscFree(out->line));
   PetscCall(SbOutputForgetMesh(out));
   PetscCall(SbProbesDestroy(out));
   PetscCall(PetscFree(out->identity));
   PetscCall(PetscFree(out->remeshed));
-  PetscCall(SbFolderUnlock(out));
+  SbFolderUnlock(out);
   PetscCall(PetscFree(run->output));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -345,7 +345,7 @@ PetscErrorCode SbOutputReattach(SbRun from, SbRun to)
   PetscCall(SbFramesReattach(to, out));
   PetscCall(SbHistoryReattach(to, out));
   PetscCall(SbCheckpointAttach(to, out));
-  PetscCall(SbProgressReattach(to, out));
+  PetscCall(SbProgressAttach(to, out));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -71,8 +71,8 @@ PetscErrorCode SbH5PutReal(SbH5 *h, hid_t where, const char *name, PetscReal val
 PetscErrorCode SbH5PutInt(SbH5 *h, hid_t where, const char *name, int64_t value);
 PetscErrorCode SbH5PutText(SbH5 *h, hid_t where, const char *name, const char *text);
 /* ok turns false when the attribute is missing or of another kind, and is left alone otherwise. Not collective. */
-PetscErrorCode SbH5GetReal(hid_t where, const char *name, PetscReal *value, PetscBool *ok);
-PetscErrorCode SbH5GetInt(hid_t where, const char *name, int64_t *value, PetscBool *ok);
+void SbH5GetReal(hid_t where, const char *name, PetscReal *value, PetscBool *ok);
+void SbH5GetInt(hid_t where, const char *name, int64_t *value, PetscBool *ok);
 /* A text of any length as a dataset, the same on all ranks. Collective. Free what was read with PetscFree. */
 PetscErrorCode SbH5WriteText(SbH5 *h, hid_t where, const char *name, const char *text);
 PetscErrorCode SbH5ReadText(SbH5 *h, const char *name, char **text, PetscBool *ok);
@@ -189,7 +189,7 @@ struct _p_SbOutput {
 /* folder.c: the folder with its parents is made, and tried by writing into it; why it cannot be is in message. Rank 0. */
 PetscErrorCode SbFolderMake(SbOutput out, size_t nmessage, char message[]);
 /* Gives up the lock of SbOutputLock(), if there is one. */
-PetscErrorCode SbFolderUnlock(SbOutput out);
+void SbFolderUnlock(SbOutput out);
 /* Moves what an earlier run left under our names into a folder of its own (overwrite: removes it), after a restart only removes checkpoints of later steps. Rank 0. */
 PetscErrorCode SbFolderClear(SbOutput out, PetscInt step0);
 /* Path of a file of the run's folder. */
@@ -273,7 +273,6 @@ PetscErrorCode SbCheckpointWriteEffects(SbRun run, SbH5 *h, uint64_t *sum);
 PetscErrorCode SbCheckpointReadEffects(SbRun run, SbH5 *h, SbRecords records[], uint64_t *sum, PetscBool *ok);
 /* Hands them to the effects, for the state of the run at time t. Collective. */
 PetscErrorCode SbCheckpointLoadEffects(SbRun run, PetscReal t, const SbRecords records[]);
-PetscErrorCode SbCheckpointFreeEffects(SbRun run, SbRecords records[]);
 /* A number at a position, as 64 mixed bits. */
 uint64_t SbMixReal(uint64_t position, PetscReal value);
 
@@ -282,7 +281,7 @@ PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum);
 /* Their checksum in an open file, 0 without any; ok turns false when they cannot be read. Collective. */
 PetscErrorCode SbCheckpointSumMeshes(SbRun run, SbH5 *h, uint64_t *sum, PetscBool *ok);
 /* Bytes that they take, for messages. Collective. */
-PetscErrorCode SbCheckpointMeshBytes(SbRun run, PetscInt64 *bytes);
+void SbCheckpointMeshBytes(SbRun run, PetscInt64 *bytes);
 /* Path of the checkpoint that -restart names; of `latest` the k-th newest one, "" when there is none. Collective. */
 PetscErrorCode SbCheckpointFind(SbOutput out, const char *file, int k, size_t size, char path[]);
 PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out);
@@ -290,9 +289,7 @@ PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out);
 PetscErrorCode SbCheckpointPrune(SbOutput out, PetscInt step, PetscInt keep);
 typedef PetscErrorCode (*SbFileFn)(const char *name, PetscInt64 bytes, void *ctx);
 PetscErrorCode SbProgressAttach(SbRun run, SbOutput out);
-PetscErrorCode SbProgressReattach(SbRun run, SbOutput out);
 PetscErrorCode SbProgressEnd(SbOutput out); /* ends a line that is being rewritten */
-PetscErrorCode SbProgressDestroy(SbOutput out);
 PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char *reason); /* collective */
 
 /* xdmf.c: an index of fields.h5, on rank 0. */
@@ -301,10 +298,10 @@ PetscErrorCode SbXdmfCreate(const char *path, SbXdmf *x);
 /* The mesh of SbXdmfAdd() from now on: its group in fields.h5, open, and by name without the first slash. */
 PetscErrorCode SbXdmfSetMesh(SbXdmf x, hid_t mesh, const char *group);
 PetscErrorCode SbXdmfDestroy(SbXdmf *x);
-PetscErrorCode SbXdmfRemove(SbXdmf x); /* the file, if there is one */
+void SbXdmfRemove(SbXdmf x); /* the file, if there is one */
 /* Adds a frame: its group in fields.h5 and its fields. */
-PetscErrorCode SbXdmfAdd(SbXdmf x, PetscReal time, const char *group, PetscInt n,
-                         const SbField *const field[], const PetscInt bytes[]);
+void SbXdmfAdd(SbXdmf x, PetscReal time, const char *group, PetscInt n, const SbField *const field[],
+               const PetscInt bytes[]);
 /* Values at points: a dataset [n] or [n][3] of whole numbers, or of floating ones with so many bytes. */
 typedef struct {
   const char *name;
@@ -313,8 +310,8 @@ typedef struct {
 } SbXdmfValues;
 /* Adds a frame of n points: values[0] are their numbers, values[1] their positions, the others attributes; `nowhere`: where to put
    a point without force when n is 0, m. */
-PetscErrorCode SbXdmfAddPoints(SbXdmf x, PetscReal time, const char *group, PetscInt n,
-                               const PetscReal nowhere[3], PetscInt nvalues, const SbXdmfValues values[]);
+void SbXdmfAddPoints(SbXdmf x, PetscReal time, const char *group, PetscInt n, const PetscReal nowhere[3],
+                     PetscInt nvalues, const SbXdmfValues values[]);
 /* Replaces the file; `message` becomes the error, if any. */
 void SbXdmfWrite(SbXdmf x, size_t nmessage, char message[]);
 
@@ -323,7 +320,7 @@ typedef struct _p_SbVtkhdf *SbVtkhdf;
 PetscErrorCode SbVtkhdfCreate(const char *path, PetscBool points, SbVtkhdf *v);
 PetscErrorCode SbVtkhdfSetMesh(SbVtkhdf v, hid_t mesh, const char *group);
 PetscErrorCode SbVtkhdfDestroy(SbVtkhdf *v);
-PetscErrorCode SbVtkhdfRemove(SbVtkhdf v);
+void SbVtkhdfRemove(SbVtkhdf v);
 PetscErrorCode SbVtkhdfAdd(SbVtkhdf v, PetscReal time, const char *group, PetscInt n,
                            const SbField *const field[], const PetscInt bytes[]);
 PetscErrorCode SbVtkhdfAddPoints(SbVtkhdf v, PetscReal time, const char *group, PetscInt n, PetscInt nvalues,
@@ -349,7 +346,7 @@ PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *phases); /* collective */
 /* Files of the run with their sizes: calls fn for each one that exists. Rank 0. */
 PetscErrorCode SbOutputFiles(SbOutput out, SbFileFn fn, void *ctx);
 /* Name of the time preset, e.g. "newmark". */
-PetscErrorCode SbPresetName(SbRun run, size_t size, char name[]);
+void SbPresetName(SbRun run, size_t size, char name[]);
 
 /*
   SbCheckpointLoad - state of a run from a file, on any number of ranks. Collective.

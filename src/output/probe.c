@@ -463,7 +463,7 @@ PetscErrorCode SbProbesRead(SbRun run, SbOutput out, SbH5 *h)
 
     for (int k = 0; k < NNUMBER; k++) {
       PetscCall(number_name(probe, k, sizeof(name), name));
-      PetscCall(SbH5GetReal(h->file, name, &number[k], &there));
+      SbH5GetReal(h->file, name, &number[k], &there);
     }
     if (!there || number[3] < 0. || number[3] >= (PetscReal)run->model->nbody) continue;
     PetscCall(PetscArraycpy(probe->x, number, 3));

@@ -155,20 +155,11 @@ PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
   PetscFunctionBeginUser;
   if (!out->progress || out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
   run->want_energies = PETSC_TRUE;
-  if (!out->rank) {
+  if (!out->rank && !out->line) {
     PetscCall(PetscNew(&out->line));
     out->line->terminal = is_terminal();
     out->line->event = out->event.progress;
   }
-  PetscCall(attach(run, out));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbProgressReattach(SbRun run, SbOutput out)
-{
-  PetscFunctionBeginUser;
-  if (!out->progress || out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
-  run->want_energies = PETSC_TRUE;
   PetscCall(attach(run, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -178,12 +169,5 @@ PetscErrorCode SbProgressEnd(SbOutput out)
   PetscFunctionBeginUser;
   if (out->line && out->line->open) PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n"));
   if (out->line) out->line->open = PETSC_FALSE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbProgressDestroy(SbOutput out)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree(out->line));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -121,7 +121,7 @@ PetscErrorCode SbReportHeader(SbRun run)
       PetscCall(entry("effect", "%s: %s", run->model->effect[e]->name, run->model->effect[e]->note));
   }
   // integrator and steps
-  PetscCall(SbPresetName(run, sizeof(name), name));
+  SbPresetName(run, sizeof(name), name);
   if (run->arc.on)
     PetscCall(entry("time", "%s, along the path of equilibria; load increment of the first step %g", name,
                     1. / (double)run->static_steps));

@@ -7,14 +7,12 @@
 #include "output_impl.h"
 #include "sbsolver.h"
 
-PetscErrorCode SbPresetName(SbRun run, size_t size, char name[])
+void SbPresetName(SbRun run, size_t size, char name[])
 {
   const char *word = SbTimePresets;
 
-  PetscFunctionBeginUser;
   for (int i = 0; i < (int)run->preset; i++) word = strchr(word, '|') + 1;
   (void)snprintf(name, size, "%.*s", (int)strcspn(word, "|"), word);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* A JSON string with its quotes. */
@@ -56,7 +54,7 @@ static PetscErrorCode put_settings(FILE *f, SbRun run)
   char *options;
 
   PetscFunctionBeginUser;
-  PetscCall(SbPresetName(run, sizeof(name), name));
+  SbPresetName(run, sizeof(name), name);
   put_text(f, "time", name);
   put_text(f, "solver", run->solver);
   put_text(f, "solver_reason", run->solver_reason);

@@ -73,11 +73,9 @@ PetscErrorCode SbVtkhdfDestroy(SbVtkhdf *v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbVtkhdfRemove(SbVtkhdf v)
+void SbVtkhdfRemove(SbVtkhdf v)
 {
-  PetscFunctionBeginUser;
   (void)unlink(v->path);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ the list of what there is */

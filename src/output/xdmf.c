@@ -43,11 +43,9 @@ PetscErrorCode SbXdmfDestroy(SbXdmf *x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbXdmfRemove(SbXdmf x)
+void SbXdmfRemove(SbXdmf x)
 {
-  PetscFunctionBeginUser;
   (void)unlink(x->path);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ the mesh */
@@ -107,10 +105,9 @@ static void begin_grid(SbXdmf x, const char *name, PetscReal time)
                 (double)time);
 }
 
-PetscErrorCode SbXdmfAdd(SbXdmf x, PetscReal time, const char *group, PetscInt n,
-                         const SbField *const field[], const PetscInt bytes[])
+void SbXdmfAdd(SbXdmf x, PetscReal time, const char *group, PetscInt n, const SbField *const field[],
+               const PetscInt bytes[])
 {
-  PetscFunctionBeginUser;
   begin_grid(x, "bodies", time);
   (void)fputs(x->mesh, x->file);
   for (PetscInt i = 0; i < n; i++) {
@@ -126,7 +123,6 @@ PetscErrorCode SbXdmfAdd(SbXdmf x, PetscReal time, const char *group, PetscInt n
     (void)fputs("</Attribute>\n", x->file);
   }
   (void)fputs("</Grid>\n", x->file);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Values at points below `group`, or without a group those of a single point, as they are. */
@@ -146,13 +142,12 @@ static void point_item(SbXdmf x, const char *group, const SbXdmfValues *v, Petsc
   }
 }
 
-PetscErrorCode SbXdmfAddPoints(SbXdmf x, PetscReal time, const char *group, PetscInt n,
-                               const PetscReal nowhere[3], PetscInt nvalues, const SbXdmfValues values[])
+void SbXdmfAddPoints(SbXdmf x, PetscReal time, const char *group, PetscInt n, const PetscReal nowhere[3],
+                     PetscInt nvalues, const SbXdmfValues values[])
 {
   static const PetscReal none[3] = {0., 0., 0.}, nobody[1] = {-1.};
   const char *where = n ? group : NULL;
 
-  PetscFunctionBeginUser;
   begin_grid(x, "contacts", time);
   (void)fprintf(x->file,
                 "<Topology TopologyType=\"Polyvertex\" NumberOfElements=\"%" PetscInt_FMT
@@ -169,7 +164,6 @@ PetscErrorCode SbXdmfAddPoints(SbXdmf x, PetscReal time, const char *group, Pets
     (void)fputs("</Attribute>\n", x->file);
   }
   (void)fputs("</Grid>\n", x->file);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 void SbXdmfWrite(SbXdmf x, size_t nmessage, char message[])

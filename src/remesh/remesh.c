@@ -264,7 +264,7 @@ PetscErrorCode SbRemeshAttach(SbRemesh r, SbRun run)
 {
   PetscFunctionBeginUser;
   if (!r) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbRunSetPause(run, check_quality, r));
+  SbRunSetPause(run, check_quality, r);
   if (!r->meshes) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(r->column));
   PetscCall(PetscMalloc1(run->ncolumn + 3, &r->column));

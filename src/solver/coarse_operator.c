@@ -10,13 +10,6 @@
 #include "coarse.h"
 #include "sbassembly.h"
 
-/* The value arrays of A: diagonal part with its first block of each row, and the part with ghost columns. */
-typedef struct {
-  PetscBool symmetric; /* only blocks on and above the diagonal are stored */
-  Mat part[2];
-  PetscScalar *value[2];
-} Blocks;
-
 /* W[3][6] += factor K Z_j; K by columns. */
 static inline void add_column(const PetscScalar K[9], PetscReal factor, const PetscReal d[3], PetscReal W[18])
 {
@@ -52,7 +45,7 @@ static inline PetscReal *sum_of(RowSums *row, PetscInt b)
 }
 
 /* Rows of prescribed components hold only their diagonal, columns likewise, which is not in the span of Z: left out by the masks. */
-static void sum_row(SbCoarse c, const Blocks *x, PetscInt i, RowSums *row)
+static void sum_row(SbCoarse c, const SbMatBlocks *x, PetscInt i, RowSums *row)
 {
   const SbPlan p = c->space->plan;
   const PetscInt first = x->symmetric ? p->diagonal[i] : p->di[i];
@@ -91,10 +84,8 @@ PetscErrorCode SbCoarseSetUp(SbCoarse c, Mat A)
 {
   SbPlan p;
   PetscInt widest = 1;
-  Blocks x;
+  SbMatBlocks x;
   RowSums row;
-  PetscBool parallel, sequential;
-  MatType type;
 
   PetscFunctionBeginUser;
   c->ok = PETSC_TRUE;
@@ -104,22 +95,7 @@ PetscErrorCode SbCoarseSetUp(SbCoarse c, Mat A)
     widest = PetscMax(widest, p->di[i + 1] - p->di[i] + p->oi[i + 1] - p->oi[i]);
   PetscCall(PetscMalloc2(widest, &row.b, 18 * widest, &row.W));
   PetscCall(PetscArrayzero(c->value, 36 * c->start[c->n]));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &x.symmetric));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQBAIJ, &sequential));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
-  PetscCheck(
-    x.symmetric || sequential || parallel, PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
-    "The two-level preconditioner takes BAIJ and SBAIJ matrices, this one is %s: leave -mat_type alone",
-    type);
-  x.part[0] = A;
-  x.part[1] = NULL;
-  x.value[1] = NULL;
-  if (parallel) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &x.part[0], &x.part[1], NULL));
-  if (x.symmetric)
-    PetscCall(MatSeqSBAIJGetArray(A, &x.value[0]));
-  else
-    PetscCall(MatSeqBAIJGetArray(x.part[0], &x.value[0]));
-  if (parallel) PetscCall(MatSeqBAIJGetArray(x.part[1], &x.value[1]));
+  PetscCall(SbMatGetBlocks(A, &x));
   for (PetscInt i = 0; i < c->space->nnode_owned; i++) {
     PetscInt a;
 
@@ -141,11 +117,7 @@ PetscErrorCode SbCoarseSetUp(SbCoarse c, Mat A)
       }
     }
   }
-  if (x.symmetric)
-    PetscCall(SbMatRestoreRead(A, MatSeqSBAIJRestoreArray, &x.value[0]));
-  else
-    PetscCall(SbMatRestoreRead(x.part[0], MatSeqBAIJRestoreArray, &x.value[0]));
-  if (x.part[1]) PetscCall(SbMatRestoreRead(x.part[1], MatSeqBAIJRestoreArray, &x.value[1]));
+  PetscCall(SbMatRestoreBlocks(&x));
   /* Diagonal blocks: symmetric, with their vanishing modes filled; those below them from those above where A has only these. */
   for (PetscInt a = 0; a < c->n; a++) {
     PetscReal *E = c->value + 36 * c->start[a], trace = 0.;

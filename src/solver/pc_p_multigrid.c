@@ -200,12 +200,12 @@ static void add_column(const Multigrid *p, const PetscScalar K[9], PetscReal wei
 }
 
 /* Row i of A; of a symmetric one from its diagonal on, with half of that. */
-static void sum_row(const Multigrid *p, const PetscScalar *const value[2], PetscBool symmetric, PetscInt i,
-                    RowSums *row)
+static void sum_row(const Multigrid *p, const SbMatBlocks *A, PetscInt i, RowSums *row)
 {
   const SbPlan plan = p->space->plan;
+  const PetscBool symmetric = A->symmetric;
   const PetscInt first = symmetric ? plan->diagonal[i] : plan->di[i];
-  const PetscScalar *K = value[0] + 9 * (size_t)(symmetric ? plan->ui[i] : first);
+  const PetscScalar *K = A->value[0] + 9 * (size_t)(symmetric ? plan->ui[i] : first);
   const PetscBool edge = (PetscBool)(p->parent[2 * i] != i);
 
   row->n = 0;
@@ -218,7 +218,7 @@ static void sum_row(const Multigrid *p, const PetscScalar *const value[2], Petsc
     add_column(p, j == i ? D : K, symmetric && j == i ? 0.5 : 1., j, row);
   }
   for (PetscInt k = plan->oi[i]; k < plan->oi[i + 1]; k++)
-    add_column(p, value[1] + 9 * (size_t)k, 1., plan->oj[k], row);
+    add_column(p, A->value[1] + 9 * (size_t)k, 1., plan->oj[k], row);
 }
 
 static inline PetscReal *block_of(const Multigrid *p, PetscInt row, PetscInt node)
@@ -275,21 +275,13 @@ static PetscErrorCode assemble(Multigrid *p, Mat A)
   const SbSpace s = p->space;
   const SbPlan plan = s->plan;
   PetscInt widest = 1, *columns;
-  PetscBool symmetric, parallel;
-  PetscScalar *value[2] = {NULL, NULL}, *text;
-  Mat part[2] = {A, NULL};
+  PetscScalar *text;
+  SbMatBlocks blocks;
   RowSums row;
 
   PetscFunctionBeginUser;
   // the arrays of A, and room for one row
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &symmetric));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
-  if (parallel) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &part[0], &part[1], NULL));
-  if (symmetric)
-    PetscCall(MatSeqSBAIJGetArray(A, &value[0]));
-  else
-    PetscCall(MatSeqBAIJGetArray(part[0], &value[0]));
-  if (parallel) PetscCall(MatSeqBAIJGetArray(part[1], &value[1]));
+  PetscCall(SbMatGetBlocks(A, &blocks));
   for (PetscInt i = 0; i < s->nnode_owned; i++)
     widest = PetscMax(widest, 2 * (plan->di[i + 1] - plan->di[i] + plan->oi[i + 1] - plan->oi[i]));
   PetscCall(PetscMalloc5(widest, &row.node, s->nnode, &row.slot, widest, &row.W, 9 * widest, &text, widest,
@@ -300,14 +292,10 @@ static PetscErrorCode assemble(Multigrid *p, Mat A)
   PetscCall(MatZeroEntries(p->E));
   PetscCall(PetscArrayzero(p->value, 9 * (size_t)p->start[p->n]));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    sum_row(p, (const PetscScalar *const *)value, symmetric, i, &row);
+    sum_row(p, &blocks, i, &row);
     PetscCall(add_row(p, i, &row, text, columns));
   }
-  if (symmetric)
-    PetscCall(SbMatRestoreRead(A, MatSeqSBAIJRestoreArray, &value[0]));
-  else
-    PetscCall(SbMatRestoreRead(part[0], MatSeqBAIJRestoreArray, &value[0]));
-  if (parallel) PetscCall(SbMatRestoreRead(part[1], MatSeqBAIJRestoreArray, &value[1]));
+  PetscCall(SbMatRestoreBlocks(&blocks));
   PetscCall(PetscFree5(row.node, row.slot, row.W, text, columns));
 
   // into E; of the half of a symmetric one, the other half is the transpose
@@ -319,7 +307,7 @@ static PetscErrorCode assemble(Multigrid *p, Mat A)
       const PetscInt j = p->column[p->start[k] + e / 9], i = e % 9 / 3, c = e % 3;
       PetscReal x = p->value[9 * (size_t)p->start[k] + (size_t)e];
 
-      if (symmetric) x += block_of(p, p->row[j], p->node[k])[3 * c + i];
+      if (blocks.symmetric) x += block_of(p, p->row[j], p->node[k])[3 * c + i];
       text[3 * n * i + 3 * (e / 9) + c] = x;
       columns[e / 9] = p->gcoarse[j];
     }

@@ -33,14 +33,19 @@
 
 typedef struct {
   SbRun run;
-  Vec weight;               /* of each displacement: its share of the mass */
-  Vec X, d, r, v, q, begin; /* end of the step and its parts as above; v where the step begins */
-  Vec w, du;                /* work; correction of X */
-  Mat exact;                /* K by differences of R where the assembled one is not exact; else NULL */
-  PetscReal factor, delta;  /* lambda at X; its step for q */
-  PetscReal load;           /* |q| where the run begins, N */
-  PetscInt negative;        /* eigenvalues of K where the last step began; -1: not known */
-  PetscReal turned;         /* sign of dlambda then */
+  union {
+    struct {
+      Vec weight;               /* of each displacement: its share of the mass */
+      Vec X, d, r, v, q, begin; /* end of the step and its parts as above; v where the step begins */
+      Vec w, du;                /* work; correction of X */
+    };
+    Vec all[9];
+  };
+  Mat exact;               /* K by differences of R where the assembled one is not exact; else NULL */
+  PetscReal factor, delta; /* lambda at X; its step for q */
+  PetscReal load;          /* |q| where the run begins, N */
+  PetscInt negative;       /* eigenvalues of K where the last step began; -1: not known */
+  PetscReal turned;        /* sign of dlambda then */
 } Path;
 
 /* (a, b), m^2. */
@@ -76,15 +81,7 @@ static PetscErrorCode create(SbRun run, Path *p)
 
   PetscFunctionBeginUser;
   *p = (Path){.run = run, .negative = -1};
-  PetscCall(VecDuplicate(run->U, &p->weight));
-  PetscCall(VecDuplicate(run->U, &p->X));
-  PetscCall(VecDuplicate(run->U, &p->d));
-  PetscCall(VecDuplicate(run->U, &p->r));
-  PetscCall(VecDuplicate(run->U, &p->v));
-  PetscCall(VecDuplicate(run->U, &p->q));
-  PetscCall(VecDuplicate(run->U, &p->w));
-  PetscCall(VecDuplicate(run->U, &p->du));
-  PetscCall(VecDuplicate(run->U, &p->begin));
+  for (int k = 0; k < 9; k++) PetscCall(VecDuplicate(run->U, &p->all[k]));
   PetscCall(VecGetArray(p->weight, &w));
   for (PetscInt i = 0; i < 3 * m->space->nnode_owned; i++) w[i] = m->space->node_mass[i / 3] / m->mass;
   PetscCall(VecRestoreArray(p->weight, &w));
@@ -414,15 +411,7 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
     factor = p.factor;
   }
   if (run->stop_reason[0] && !run->stopped) PetscCall(explain(run, factor, l));
-  PetscCall(VecDestroy(&p.weight));
-  PetscCall(VecDestroy(&p.X));
-  PetscCall(VecDestroy(&p.d));
-  PetscCall(VecDestroy(&p.r));
-  PetscCall(VecDestroy(&p.v));
-  PetscCall(VecDestroy(&p.q));
-  PetscCall(VecDestroy(&p.w));
-  PetscCall(VecDestroy(&p.du));
+  for (int k = 0; k < 9; k++) PetscCall(VecDestroy(&p.all[k]));
   PetscCall(MatDestroy(&p.exact));
-  PetscCall(VecDestroy(&p.begin));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -27,12 +27,10 @@ PetscErrorCode SbRunAfterStep(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRunSetPause(SbRun run, SbPauseFn fn, void *ctx)
+void SbRunSetPause(SbRun run, SbPauseFn fn, void *ctx)
 {
-  PetscFunctionBeginUser;
   run->after.fn = fn;
   run->after.ctx = ctx;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscBool is_explicit(const SbRun run)

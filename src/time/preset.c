@@ -225,13 +225,12 @@ static double complex alpha_eigenvalue(const SbMethodSettings *s, double w)
   return z;
 }
 
-PetscErrorCode SbRunMethodError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead)
+void SbRunMethodError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead)
 {
   const double w = 0.03;
   SbMethodSettings s;
   double complex z;
 
-  PetscFunctionBeginUser;
   method_settings(run, &s);
   *ahead = 0;
   *order = 1;
@@ -252,7 +251,6 @@ PetscErrorCode SbRunMethodError(SbRun run, PetscInt *order, PetscReal *c, PetscR
     *ahead = 0.5;
   }
   *c = (PetscReal)(cabs(z - cexp(I * w)) / pow(w, (double)*order + 1));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Newton on nonlinear models, one linear solve on linear ones; tolerances that hold in any unit system. */
@@ -414,7 +412,7 @@ static PetscErrorCode set_up_ts(SbRun run)
   run->model->guard_apart = (PetscBool)(m->npotential && run->preset != SB_TIME_EULER_IMPLICIT);
   if (run->model->guard_apart)
     run->guard_weight = settings.separate ? 0.5 / settings.beta : 1. / settings.alpha_f;
-  if (run->preset != SB_TIME_ALPHA2) PetscCall(SbSecondOrderSet(run->ts, run, &settings));
+  if (run->preset != SB_TIME_ALPHA2) SbSecondOrderSet(run->ts, run, &settings);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -423,7 +421,6 @@ static PetscErrorCode check_guarded(SbRun run)
 {
   const SbModel m = run->model;
   const char *name = m->potential[0]->name;
-  PetscBool split;
 
   PetscFunctionBeginUser;
   PetscCheck(run->preset == SB_TIME_EULER_IMPLICIT || run->preset == SB_TIME_STATIC ||
@@ -434,17 +431,11 @@ static PetscErrorCode check_guarded(SbRun run)
                !m->space->consistent_mass,
              m->comm, PETSC_ERR_USER_INPUT,
              "-effect_%s_response barrier with -time newmark or genalpha needs -mass lumped", name);
-  for (PetscInt e = 0; e < m->npotential; e++)
-    PetscCheck(!m->potential[e]->euler || run->preset == SB_TIME_EULER_IMPLICIT, m->comm,
-               PETSC_ERR_USER_INPUT,
-               "-effect_%s_restitution needs -time euler_implicit, whose velocities are those of a step",
-               m->potential[e]->name);
   PetscCheck(!m->nbegin_step, m->comm, PETSC_ERR_USER_INPUT,
              "-effect_%s_response barrier and -effect_%s_response of another kind do not go together: give "
              "both the same",
              name, m->begin_step[0]->name);
-  PetscCall(PetscStrcmp(run->solver, "pressure", &split));
-  PetscCheck(!run->solver_used->matrix_free && !split, m->comm, PETSC_ERR_USER_INPUT,
+  PetscCheck(!run->solver_used->matrix_free && strcmp(run->solver, "pressure"), m->comm, PETSC_ERR_USER_INPUT,
              "-solver %s has no matrix of everything, to which the effect %s could add: use -solver auto or "
              "cg_two_level",
              run->solver, name);
@@ -456,9 +447,12 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
 {
   const SbModel m = run->model;
   const char *name;
-  PetscBool split;
 
   PetscFunctionBeginUser;
+  for (PetscInt e = 0; e < m->neffect; e++)
+    PetscCheck(!m->effect[e]->euler || run->preset == SB_TIME_EULER_IMPLICIT, m->comm, PETSC_ERR_USER_INPUT,
+               "-effect_%s_restitution needs -time euler_implicit, whose velocities are those of a step",
+               m->effect[e]->name);
   if (m->npotential) PetscCall(check_guarded(run));
   if (!m->nbegin_step) PetscFunctionReturn(PETSC_SUCCESS);
   name = m->begin_step[0]->name;
@@ -484,11 +478,6 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
         "projected or multiplier and no friction, or use euler_implicit or genalpha",
         m->begin_step[e]->name, m->begin_step[e]->name);
   }
-  for (PetscInt e = 0; e < m->nbegin_step; e++)
-    PetscCheck(!m->begin_step[e]->euler || run->preset == SB_TIME_EULER_IMPLICIT, m->comm,
-               PETSC_ERR_USER_INPUT,
-               "-effect_%s_restitution needs -time euler_implicit, whose velocities are those of a step",
-               m->begin_step[e]->name);
   PetscCheck(m->dynamic || !m->ntime_of_impact, m->comm, PETSC_ERR_USER_INPUT,
              "-effect_%s_time_of_impact yes is about the length of time steps, and -time static has none: "
              "leave it out",
@@ -497,9 +486,8 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
              "-time genalpha gains energy with -effect_%s_time_of_impact yes: it takes the acceleration of a "
              "short step, in which nodes are stopped, into a long one; use euler_implicit",
              m->ntime_of_impact ? m->time_of_impact[0]->name : name);
-  PetscCall(PetscStrcmp(run->solver, "pressure", &split));
-  PetscCheck(!run->solver_used->matrix_free && (!split || !m->nassemble_constraints), m->comm,
-             PETSC_ERR_USER_INPUT,
+  PetscCheck(!run->solver_used->matrix_free && (strcmp(run->solver, "pressure") || !m->nassemble_constraints),
+             m->comm, PETSC_ERR_USER_INPUT,
              "-solver %s has no matrix of everything, in which the effect %s could hold nodes: use -solver "
              "rotated or cg_two_level",
              run->solver, name);
@@ -648,7 +636,7 @@ PetscErrorCode SbRunDestroy(SbRun *run)
   for (PetscInt k = 0; k < r->nmonitor; k++) {
     if (r->monitor[k].destroy) PetscCall(r->monitor[k].destroy(r->monitor[k].ctx));
   }
-  PetscCall(SbSolverListDestroy(r));
+  PetscCall(PetscFree(r->solver_list));
   if (!r->ts) PetscCall(SNESDestroy(&r->snes));
   PetscCall(TSDestroy(&r->ts));
   PetscCall(VecDestroy(&r->R));

@@ -459,19 +459,11 @@ static PetscErrorCode TSSetUp_SecondOrder(TS ts)
 static PetscErrorCode TSReset_SecondOrder(TS ts)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
+  Vec *const all[] = {&so->X0, &so->V0, &so->X1,   &so->V1,   &so->A1,  &so->Xa,
+                      &so->Va, &so->Aa, &so->work, &so->own0, &so->own1};
 
   PetscFunctionBeginUser;
-  PetscCall(VecDestroy(&so->X0));
-  PetscCall(VecDestroy(&so->V0));
-  PetscCall(VecDestroy(&so->X1));
-  PetscCall(VecDestroy(&so->V1));
-  PetscCall(VecDestroy(&so->A1));
-  PetscCall(VecDestroy(&so->Xa));
-  PetscCall(VecDestroy(&so->Va));
-  PetscCall(VecDestroy(&so->Aa));
-  PetscCall(VecDestroy(&so->work));
-  PetscCall(VecDestroy(&so->own0));
-  PetscCall(VecDestroy(&so->own1));
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(all); k++) PetscCall(VecDestroy(all[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -483,15 +475,13 @@ static PetscErrorCode TSDestroy_SecondOrder(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings)
+void SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
 
-  PetscFunctionBeginUser;
   so->run = run;
   so->set = *settings;
   ts->usessnes = (PetscBool)!is_explicit(so);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode TSCreate_SecondOrder(TS ts)

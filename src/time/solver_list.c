@@ -254,13 +254,6 @@ PetscErrorCode SbSolverListCreate(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSolverListDestroy(SbRun run)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree(run->solver_list));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[])
 {
   const SbSolverList l = run->solver_list;

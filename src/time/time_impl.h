@@ -30,7 +30,7 @@ typedef struct {
 
 PetscErrorCode SbSecondOrderRegister(void);
 /* The run gives prescribed displacements, initial acceleration and the lumped mass; it is borrowed. */
-PetscErrorCode SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings);
+void SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings);
 
 /* step.c: what happens in a step. */
 /* How a step from t to t + dt is attempted; vectors and ctx are borrowed. Static runs: t is the load factor. */
@@ -109,7 +109,6 @@ PetscErrorCode SbNewmarkOwn(SbRun run, PetscReal t, Vec U, Vec V, Vec A, Vec own
   Collective, after SbSolverFinish().
 */
 PetscErrorCode SbSolverListCreate(SbRun run);
-PetscErrorCode SbSolverListDestroy(SbRun run);
 /* After a Newton step whose linear solve failed: "linear solver: ", each solver that was tried with its reason, iterations and residual, what is known of the
    causes, and advice. Collective. */
 PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[]);
