@@ -9,13 +9,6 @@
 
 #define SB_BOX_ROUNDING 16 /* in units of eps |x|: what the corners of a box may be off */
 
-/* Whether two boxes share a point. */
-static inline PetscBool SbBoxesOverlap(const PetscReal a[6], const PetscReal b[6])
-{
-  return (PetscBool)(a[0] <= b[3] && b[0] <= a[3] && a[1] <= b[4] && b[1] <= a[4] && a[2] <= b[5] &&
-                     b[2] <= a[5]);
-}
-
 /* Boxes: lower and upper corner, m. An empty one has its lower corner above the upper. */
 static inline void SbBoxClear(PetscReal box[6])
 {
@@ -44,31 +37,10 @@ static inline void SbBoxMerge(PetscReal box[6], const PetscReal other[6])
   SbBoxJoin(box, other, other + 3);
 }
 
-/* Grows the box of what is within it now to what may come within the reach. */
-static inline void SbBoxGrow(PetscReal reach, PetscReal box[6])
-{
-  for (int k = 0; k < 3; k++) {
-    const PetscReal far = PetscMax(PetscAbsReal(box[k]), PetscAbsReal(box[3 + k]));
-    const PetscReal margin = reach + SB_BOX_ROUNDING * PETSC_MACHINE_EPSILON * (far + reach);
-
-    box[k] -= margin;
-    box[3 + k] += margin;
-  }
-}
-
 /* Length of the diagonal of a box that is not empty. */
 static inline PetscReal SbBoxDiagonal(const PetscReal box[6])
 {
   return PetscSqrtReal(PetscSqr(box[3] - box[0]) + PetscSqr(box[4] - box[1]) + PetscSqr(box[5] - box[2]));
-}
-
-/* Whether two boxes are nearer than `grown` in every coordinate. Empty ones never are. */
-static inline PetscBool SbBoxesWithin(const PetscReal a[6], const PetscReal b[6], PetscReal grown)
-{
-  for (int k = 0; k < 3; k++) {
-    if (a[k] - grown > b[3 + k] || b[k] - grown > a[3 + k]) return PETSC_FALSE;
-  }
-  return PETSC_TRUE;
 }
 
 /* Where on a triangle: its corner 0, 1 or 2, its edge from corner 0 to 1, 1 to 2, 2 to 0, or its inside. */

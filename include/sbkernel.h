@@ -57,6 +57,12 @@ SB_INLINE PetscReal SbDot9(const PetscReal A[9], const PetscReal B[9])
   return SbDot3(A, B) + SbDot3(A + 3, B + 3) + SbDot3(A + 6, B + 6);
 }
 
+/* c = a - b */
+SB_INLINE void SbSubtract(const PetscReal a[3], const PetscReal b[3], PetscReal c[3])
+{
+  for (int k = 0; k < 3; k++) c[k] = a[k] - b[k];
+}
+
 /* c = a x b */
 SB_INLINE void SbCross(const PetscReal a[3], const PetscReal b[3], PetscReal c[3])
 {

@@ -58,7 +58,6 @@ typedef struct {
      filtered tangent only where that is not negative. NULL: it vanishes, or it is in W of spin, which is proportional to lambda theta -
      2 mu. */
   void (*curvature)(const struct _p_SbMaterial *m, const SbLane F[9], const SbLane p, SbLane C[81]);
-  PetscErrorCode (*destroy)(SbMaterial m);
 } SbMaterialOps;
 
 struct _p_SbMaterial {

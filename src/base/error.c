@@ -218,8 +218,7 @@ PetscErrorCode SbCatchError(MPI_Comm comm, int line, const char *function, const
     caught->code = (int)code;
     (void)snprintf(caught->text, sizeof(caught->text), "%s", text ? text : "");
   }
-  if (caught->code != PETSC_ERR_USER_INPUT && caught->code != PETSC_ERR_FILE_OPEN &&
-      caught->code != PETSC_ERR_FILE_READ && caught->code != PETSC_ERR_FILE_UNEXPECTED)
+  if (!is_user_error(code, NULL))
     (void)PetscTraceBackErrorHandler(comm, line, function, file, code, kind, text, NULL);
   return code;
 }

@@ -96,46 +96,14 @@ static PetscErrorCode expect(Parser *p, char c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode unknown_name(const Parser *p, const char *at, const char *name)
-{
-  const char *known[PETSC_STATIC_ARRAY_LENGTH(functions) + 5];
-  char near[128], what[256];
-  PetscInt n = 0;
-
-  PetscFunctionBeginUser;
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(functions); i++) known[n++] = functions[i].name;
-  for (int i = 0; i < 4; i++) known[n++] = variables[i];
-  known[n++] = "pi";
-  if (strlen(name) > 1)
-    PetscCall(SbNearestNames(name, n, known, sizeof(near), near));
-  else
-    near[0] = 0;
-  PetscCall(PetscSNPrintf(
-    what, sizeof(what), "unknown name '%s'; %s%s%s", name, near[0] ? "did you mean " : "", near,
-    near[0] ? "?" : "a formula knows t (s), x, y, z (m), pi and functions such as sin, sqrt, ramp"));
-  PetscCall(complain(p, at, what));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* sin(expression), atan2(expression, expression), ...; the name has been read. */
-static PetscErrorCode call(Parser *p, int f)
-{
-  PetscFunctionBeginUser;
-  PetscCall(expect(p, '('));
-  for (int i = 0; i < functions[f].narg; i++) {
-    if (i) PetscCall(expect(p, ','));
-    PetscCall(expression(p));
-  }
-  PetscCall(expect(p, ')'));
-  PetscCall(emit(p, SB_OP_CALL, f, 0, 1 - functions[f].narg));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode word(Parser *p)
 {
   const char *begin = p->next;
   char name[32];
   size_t n = 0;
+  const char *known[PETSC_STATIC_ARRAY_LENGTH(functions) + 5];
+  char near[128] = "", what[256];
+  PetscInt nknown = 0;
 
   PetscFunctionBeginUser;
   for (; isalnum((unsigned char)*p->next) || *p->next == '_'; p->next++)
@@ -156,10 +124,25 @@ static PetscErrorCode word(Parser *p)
   }
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(functions); i++) {
     if (strcmp(name, functions[i].name)) continue;
-    PetscCall(call(p, (int)i));
+    // sin(expression), atan2(expression, expression), ...
+    PetscCall(expect(p, '('));
+    for (int k = 0; k < functions[i].narg; k++) {
+      if (k) PetscCall(expect(p, ','));
+      PetscCall(expression(p));
+    }
+    PetscCall(expect(p, ')'));
+    PetscCall(emit(p, SB_OP_CALL, (int)i, 0, 1 - functions[i].narg));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(unknown_name(p, begin, name));
+  // a name that is unknown, and what it may mean
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(functions); i++) known[nknown++] = functions[i].name;
+  for (int i = 0; i < 4; i++) known[nknown++] = variables[i];
+  known[nknown++] = "pi";
+  if (n > 1) PetscCall(SbNearestNames(name, nknown, known, sizeof(near), near));
+  PetscCall(PetscSNPrintf(
+    what, sizeof(what), "unknown name '%s'; %s%s%s", name, near[0] ? "did you mean " : "", near,
+    near[0] ? "?" : "a formula knows t (s), x, y, z (m), pi and functions such as sin, sqrt, ramp"));
+  PetscCall(complain(p, begin, what));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -304,8 +287,7 @@ PetscErrorCode SbFormulaDestroy(SbFormula *formula)
   if (!*formula) PetscFunctionReturn(PETSC_SUCCESS);
   SbLiveForget(*formula);
   PetscCall(PetscFree((*formula)->step));
-  PetscCall(PetscFree((*formula)->time));
-  PetscCall(PetscFree((*formula)->value));
+  PetscCall(PetscFree2((*formula)->time, (*formula)->value));
   PetscCall(PetscFree(*formula));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

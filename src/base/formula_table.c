@@ -26,39 +26,34 @@ static int read_line(char *line, PetscReal row[2])
   return *next ? -1 : 1;
 }
 
-/* Reads the whole file; `message` stays empty when all is well. Rank 0 only. */
-static PetscErrorCode read_rows(const char *file, PetscInt *n, PetscReal **rows, size_t size, char message[])
+/* Reads the whole file. Rank 0 only. */
+static PetscErrorCode read_rows(FILE *f, const char *file, const char *where, PetscInt *n, PetscReal **rows)
 {
-  FILE *f = fopen(file, "r");
   char line[512];
   PetscInt room = 0;
 
   PetscFunctionBeginUser;
-  *n = 0;
-  *rows = NULL;
-  if (!f) {
-    PetscCall(PetscSNPrintf(message, size, "cannot open %s: %s", file, strerror(errno)));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  for (int number = 1; !message[0] && fgets(line, sizeof(line), f); number++) {
+  PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: cannot open %s: %s", where, file, strerror(errno));
+  for (int number = 1; fgets(line, sizeof(line), f); number++) {
     PetscReal row[2];
     const int found = read_line(line, row);
 
-    if (found < 0)
-      PetscCall(
-        PetscSNPrintf(message, size, "%s, line %d: expected two numbers, time (s) and value", file, number));
-    if (found <= 0) continue;
-    if (*n && row[0] <= (*rows)[2 * (*n - 1)])
-      (void)snprintf(message, size, "%s, line %d: time %g s does not come after %g s; times must ascend",
-                     file, number, (double)row[0], (double)(*rows)[2 * (*n - 1)]);
+    PetscCheck(found >= 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "%s: %s, line %d: expected two numbers, time (s) and value", where, file, number);
+    if (!found) continue;
+    if (*n && row[0] <= (*rows)[2 * (*n - 1)]) {
+      char times[64]; /* PETSc would write "2." */
+
+      (void)snprintf(times, sizeof(times), "%g s does not come after %g s", (double)row[0],
+                     (double)(*rows)[2 * (*n - 1)]);
+      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s: %s, line %d: time %s; times must ascend", where, file,
+              number, times);
+    }
     PetscCall(SbReserve(*n + 1, 2 * sizeof(PetscReal), &room, rows));
-    (*rows)[2 * *n] = row[0];
-    (*rows)[2 * *n + 1] = row[1];
-    (*n)++;
+    PetscCall(PetscArraycpy(*rows + 2 * (*n)++, row, 2));
   }
-  if (!message[0] && ferror(f)) PetscCall(PetscSNPrintf(message, size, "cannot read %s", file));
-  if (!message[0] && !*n) PetscCall(PetscSNPrintf(message, size, "%s holds no numbers", file));
-  (void)fclose(f);
+  PetscCheck(!ferror(f), PETSC_COMM_SELF, PETSC_ERR_USER, "%s: cannot read %s", where, file);
+  PetscCheck(*n, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: %s holds no numbers", where, file);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -67,20 +62,23 @@ PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *w
   PetscMPIInt rank;
   PetscInt n = 0;
   PetscReal *rows = NULL;
-  char message[512] = "";
+  SbCaughtError caught = {0, ""};
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  if (!rank) PetscCall(read_rows(file, &n, &rows, sizeof(message), message));
-  PetscCallMPI(MPI_Bcast(message, sizeof(message), MPI_CHAR, 0, comm));
-  if (message[0]) PetscCall(PetscFree(rows));
-  PetscCheck(!message[0], PETSC_COMM_SELF, PETSC_ERR_USER, "%s: %s", where, message);
+  if (!rank) {
+    FILE *f = fopen(file, "r");
+
+    SB_CATCH(&caught, read_rows(f, file, where, &n, &rows));
+    if (f) (void)fclose(f);
+    if (caught.code) PetscCall(PetscFree(rows));
+  }
+  PetscCall(SbCaughtRaise(comm, &caught));
   PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, 0, comm));
   if (rank) PetscCall(PetscMalloc1(2 * n, &rows));
   PetscCallMPI(MPI_Bcast(rows, (PetscMPIInt)(2 * n), MPIU_REAL, 0, comm));
   formula->nrow = n;
-  PetscCall(PetscMalloc1(n, &formula->time));
-  PetscCall(PetscMalloc1(n, &formula->value));
+  PetscCall(PetscMalloc2(n, &formula->time, n, &formula->value));
   for (PetscInt i = 0; i < n; i++) {
     formula->time[i] = rows[2 * i];
     formula->value[i] = rows[2 * i + 1];

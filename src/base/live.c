@@ -67,8 +67,7 @@ PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula fo
     PetscCall(PetscNew(&formula[k]));
     formula[k]->uses_time = PETSC_TRUE;
     formula[k]->nrow = 2;
-    PetscCall(PetscMalloc1(2, &formula[k]->time));
-    PetscCall(PetscMalloc1(2, &formula[k]->value));
+    PetscCall(PetscMalloc2(2, &formula[k]->time, 2, &formula[k]->value));
     set_rows(formula[k], 0., old, 1., old);
     v->formula = formula[k];
   }

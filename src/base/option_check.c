@@ -49,62 +49,6 @@ static const char *class_of(const char *name)
   return NULL;
 }
 
-/* Near full names: everything read so far, every program-wide option, and the options of what a scenario file names. `text` is empty when none is near. */
-static PetscErrorCode near_options(const char *dashed, size_t size, char text[])
-{
-  PetscInt n = 0, room = SbTheOptions.nrecord;
-  const char **list;
-  char(*names)[SB_OPTION_NAME_MAX];
-
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < SbTheOptions.nblock; i++)
-    room += SbTheOptions.block[i].n * (SbTheOptions.block[i].klass[0] ? SbTheOptions.nlisted + 1 : 1);
-  PetscCall(PetscMalloc2(room, &list, room, &names));
-  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) list[n++] = SbTheOptions.record[i].name;
-  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
-    const SbOptionBlock *block = &SbTheOptions.block[i];
-    const PetscInt instances =
-      block->klass[0] ? SbTheOptions.nlisted + !strcmp(block->klass, "body") : 1; /* for all bodies, too */
-
-    for (PetscInt j = 0; j < block->n * instances; j++) {
-      const char *key = block->rows[j % block->n].key;
-
-      if (block->klass[0])
-        PetscCall(PetscSNPrintf(
-          names[n], SB_OPTION_NAME_MAX, "-%s_%s_%s", block->klass,
-          j / block->n < SbTheOptions.nlisted ? SbTheOptions.listed[j / block->n] : SB_OPTION_DEFAULT, key));
-      else
-        PetscCall(PetscSNPrintf(names[n], SB_OPTION_NAME_MAX, "-%s", key));
-      if (SbOptionIsRead(names[n] + 1)) continue;
-      list[n] = names[n];
-      n++;
-    }
-  }
-  PetscCall(SbNearestNames(dashed, n, list, size, text));
-  PetscCall(PetscFree2(list, names));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Keys that were read for the instance that a name belongs to: "body liver has mesh, young"; "" when there are none. */
-static PetscErrorCode keys_of(const char *klass, const char *name, size_t size, char text[])
-{
-  PetscFunctionBeginUser;
-  text[0] = 0;
-  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
-    const SbOptionRecord *r = &SbTheOptions.record[i];
-    const size_t n = strlen(r->scope.instance);
-    char begin[2 * SB_NAME_MAX + 8];
-
-    if (strcmp(r->scope.klass, klass) || strncasecmp(name + strlen(klass) + 1, r->scope.instance, n))
-      continue;
-    if (name[strlen(klass) + 1 + n] != '_') continue;
-    PetscCall(PetscSNPrintf(begin, sizeof(begin), "%s %s has ", klass, r->scope.instance));
-    PetscCall(PetscStrlcat(text, text[0] ? ", " : begin, size));
-    PetscCall(PetscStrlcat(text, r->row->key, size));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The length of the name's instance, "liver" in "body_liver_young": the longest one that is known; 0: none. read: it has been read, else it is only listed in a file. */
 static size_t instance_of(const char *klass, const char *name, PetscBool *read)
 {
@@ -139,15 +83,6 @@ static PetscBool has_type(const char *klass, const char *instance, size_t n, con
   return PETSC_FALSE;
 }
 
-/* Whether an option of a class, from behind its prefix on, is one for all bodies: "default_young". */
-static PetscBool is_for_all(const char *klass, const char *instance)
-{
-  const size_t n = strlen(SB_OPTION_DEFAULT);
-
-  return (PetscBool)(!strcmp(klass, "body") && !strncasecmp(instance, SB_OPTION_DEFAULT, n) &&
-                     instance[n] == '_');
-}
-
 /* What is to be said of an option that nobody read. */
 typedef enum {
   NOT_OURS,
@@ -167,8 +102,10 @@ static PetscErrorCode verdict_of_class(const char *klass, const char *name, size
 
   PetscFunctionBeginUser;
   *verdict = WRONG;
-  if (is_for_all(klass, instance)) {
-    key = instance + strlen(SB_OPTION_DEFAULT) + 1;
+  // one for all bodies: "default_young"
+  if (!strcmp(klass, "body") &&
+      !strncasecmp(instance, SB_OPTION_DEFAULT "_", strlen(SB_OPTION_DEFAULT "_"))) {
+    key = instance + strlen(SB_OPTION_DEFAULT "_");
     for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
       for (PetscInt j = 0; !strcmp(SbTheOptions.block[i].klass, klass) && j < SbTheOptions.block[i].n; j++)
         if (!strcasecmp(SbTheOptions.block[i].rows[j].key, key)) *verdict = UNUSED;
@@ -204,6 +141,9 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
   char near[3 * SB_OPTION_NAME_MAX], dashed[SB_OPTION_NAME_MAX], why[1024] = "";
   const char *klass = class_of(name);
   const SbOption *row = program_row(name);
+  PetscInt n = 0, room = SbTheOptions.nrecord;
+  const char **list;
+  char(*names)[SB_OPTION_NAME_MAX];
 
   PetscFunctionBeginUser;
   text[0] = 0;
@@ -219,7 +159,32 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
     PetscCall(verdict_of_class(klass, name, size, text, verdict));
     if (*verdict != WRONG) PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(near_options(dashed, sizeof(near), near));
+  // near full names: everything read so far, every program-wide option, and the options of what a scenario file names. `near` is empty when none is
+  for (PetscInt i = 0; i < SbTheOptions.nblock; i++)
+    room += SbTheOptions.block[i].n * (SbTheOptions.block[i].klass[0] ? SbTheOptions.nlisted + 1 : 1);
+  PetscCall(PetscMalloc2(room, &list, room, &names));
+  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) list[n++] = SbTheOptions.record[i].name;
+  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
+    const SbOptionBlock *block = &SbTheOptions.block[i];
+    const PetscInt instances =
+      block->klass[0] ? SbTheOptions.nlisted + !strcmp(block->klass, "body") : 1; /* for all bodies, too */
+
+    for (PetscInt j = 0; j < block->n * instances; j++) {
+      const char *key = block->rows[j % block->n].key;
+
+      if (block->klass[0])
+        PetscCall(PetscSNPrintf(
+          names[n], SB_OPTION_NAME_MAX, "-%s_%s_%s", block->klass,
+          j / block->n < SbTheOptions.nlisted ? SbTheOptions.listed[j / block->n] : SB_OPTION_DEFAULT, key));
+      else
+        PetscCall(PetscSNPrintf(names[n], SB_OPTION_NAME_MAX, "-%s", key));
+      if (SbOptionIsRead(names[n] + 1)) continue;
+      list[n] = names[n];
+      n++;
+    }
+  }
+  PetscCall(SbNearestNames(dashed, n, list, sizeof(near), near));
+  PetscCall(PetscFree2(list, names));
   if (!klass && !near[0]) PetscFunctionReturn(PETSC_SUCCESS);
   *verdict = WRONG;
   if (near[0])
@@ -229,8 +194,20 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
     char keys[768], instances[256];
     const SbOptionRecord *last = NULL;
 
-    PetscCall(keys_of(klass, name, sizeof(keys), keys));
+    // keys that were read for the instance that a name belongs to: "body liver has mesh, young"; "" when there are none
+    keys[0] = 0;
+    for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
+      const SbOptionRecord *r = &SbTheOptions.record[i];
+      const size_t length = strlen(r->scope.instance);
+      const char *at = name + strlen(klass) + 1;
+      char begin[2 * SB_NAME_MAX + 8];
 
+      if (strcmp(r->scope.klass, klass) || strncasecmp(at, r->scope.instance, length) || at[length] != '_')
+        continue;
+      PetscCall(PetscSNPrintf(begin, sizeof(begin), "%s %s has ", klass, r->scope.instance));
+      PetscCall(PetscStrlcat(keys, keys[0] ? ", " : begin, sizeof(keys)));
+      PetscCall(PetscStrlcat(keys, r->row->key, sizeof(keys)));
+    }
     /* instances of a class that have been read, "liver, stone"; "" when there are none */
     instances[0] = 0;
     for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {

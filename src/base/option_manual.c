@@ -151,44 +151,6 @@ static PetscErrorCode print_manual(PetscViewer viewer, const char *topic, int le
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Topics that have options of their own: classes and their types, first words that several options of the run share. */
-static PetscErrorCode print_topics(PetscViewer viewer)
-{
-  char word[SB_NAME_MAX], words[1024] = " ";
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscViewerASCIIPrintf(viewer, "\nTopics of -help\n"));
-  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
-    const SbOptionBlock *b = &SbTheOptions.block[i];
-
-    for (PetscInt k = 0; !b->klass[0] && k < b->n; k++) {
-      const size_t n = strcspn(b->rows[k].key, "_");
-
-      PetscCall(PetscSNPrintf(word, sizeof(word), " %.*s ", (int)n, b->rows[k].key));
-      if (!strstr(words, word)) PetscCall(PetscStrlcat(words, word + 1, sizeof(words)));
-    }
-  }
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  of the run:%s", words));
-  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
-    const SbOptionBlock *b = &SbTheOptions.block[i];
-
-    PetscInt types = 0;
-
-    if (!b->klass[0] || !is_first(i, PETSC_FALSE)) continue;
-    PetscCall(PetscViewerASCIIPrintf(viewer, "\n  %s", b->klass));
-    for (PetscInt j = i; j < SbTheOptions.nblock; j++) {
-      const SbOptionBlock *t = &SbTheOptions.block[j];
-
-      if (!strcmp(t->klass, b->klass) && t->type[0] && is_first(j, PETSC_TRUE))
-        PetscCall(PetscViewerASCIIPrintf(viewer, "%s %s", types++ ? "" : ":", t->type));
-    }
-  }
-  PetscCall(PetscViewerASCIIPrintf(viewer,
-                                   "\n  any other word: the options whose name or text contains it\n"
-                                   "  all: everything; petsc: a run that lists PETSc's own options\n"));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic)
 {
   const PetscBool all = (PetscBool)!strcasecmp(topic, "all");
@@ -199,6 +161,8 @@ PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic)
   PetscCall(SbViewerOpen(comm, "", &viewer));
   // how to run it, what a first scenario needs, and where the rest is
   if (!topic[0] || all) {
+    char word[SB_NAME_MAX], words[1024] = " ";
+
     PetscCall(PetscViewerASCIIPrintf(viewer, "supple %s - soft bodies by finite elements on PETSc\n\n%s",
                                      SB_VERSION, USAGE));
     PetscCall(PetscViewerASCIIPrintf(
@@ -217,7 +181,34 @@ PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic)
         if (row) PetscCall(help_row(viewer, b, row));
       }
     }
-    PetscCall(print_topics(viewer));
+    // topics that have options of their own: classes and their types, first words that several options of the run share
+    PetscCall(PetscViewerASCIIPrintf(viewer, "\nTopics of -help\n"));
+    for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
+      const SbOptionBlock *b = &SbTheOptions.block[i];
+
+      for (PetscInt k = 0; !b->klass[0] && k < b->n; k++) {
+        PetscCall(
+          PetscSNPrintf(word, sizeof(word), " %.*s ", (int)strcspn(b->rows[k].key, "_"), b->rows[k].key));
+        if (!strstr(words, word)) PetscCall(PetscStrlcat(words, word + 1, sizeof(words)));
+      }
+    }
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  of the run:%s", words));
+    for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
+      const SbOptionBlock *b = &SbTheOptions.block[i];
+      PetscInt types = 0;
+
+      if (!b->klass[0] || !is_first(i, PETSC_FALSE)) continue;
+      PetscCall(PetscViewerASCIIPrintf(viewer, "\n  %s", b->klass));
+      for (PetscInt j = i; j < SbTheOptions.nblock; j++) {
+        const SbOptionBlock *t = &SbTheOptions.block[j];
+
+        if (!strcmp(t->klass, b->klass) && t->type[0] && is_first(j, PETSC_TRUE))
+          PetscCall(PetscViewerASCIIPrintf(viewer, "%s %s", types++ ? "" : ":", t->type));
+      }
+    }
+    PetscCall(PetscViewerASCIIPrintf(viewer,
+                                     "\n  any other word: the options whose name or text contains it\n"
+                                     "  all: everything; petsc: a run that lists PETSc's own options\n"));
   }
   if (all) PetscCall(print_manual(viewer, "", 0, PETSC_FALSE, &n));
   /* the best kind of answer that there is */

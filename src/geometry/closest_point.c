@@ -12,11 +12,6 @@
 #define PARALLEL \
   1e-10 /* volume of way and edges over the squared length of one: the half-line lies in the plane */
 
-static inline void subtract(const PetscReal a[3], const PetscReal b[3], PetscReal c[3])
-{
-  for (int k = 0; k < 3; k++) c[k] = a[k] - b[k];
-}
-
 /* p minus the point with these weights. */
 static inline void away(const PetscReal p[3], const PetscReal *const x[3], const PetscReal w[3],
                         PetscReal r[3])
@@ -42,8 +37,8 @@ static SbTriangleFeature closest_edge(const PetscReal p[3], const PetscReal *con
     const int l = (k + 1) % 3;
     PetscReal e[3], r[3], length2, t, other;
 
-    subtract(x[l], x[k], e);
-    subtract(p, x[k], r);
+    SbSubtract(x[l], x[k], e);
+    SbSubtract(p, x[k], r);
     length2 = SbDot3(e, e);
     t = length2 > 0 ? PetscMax(0, PetscMin(1, SbDot3(r, e) / length2)) : 0;
     for (int i = 0; i < 3; i++) r[i] -= t * e[i];
@@ -85,10 +80,10 @@ SbTriangleFeature SbTriangleClosestPoint(const PetscReal p[3], const PetscReal *
   SbTriangleFeature place;
 
   // products of both edges at corner 0 with the vectors from each corner to p; areas of the three parts
-  subtract(x[1], x[0], ab);
-  subtract(x[2], x[0], ac);
+  SbSubtract(x[1], x[0], ab);
+  SbSubtract(x[2], x[0], ac);
   for (int k = 0; k < 3; k++) {
-    subtract(p, x[k], r);
+    SbSubtract(p, x[k], r);
     d[2 * k] = SbDot3(ab, r);
     d[2 * k + 1] = SbDot3(ac, r);
   }
@@ -126,11 +121,9 @@ PetscBool SbRayTriangle(const PetscReal p[3], const PetscReal way[3], const Pets
   PetscReal e1[3], e2[3], r[3], c[3], det;
 
   /* Moeller and Trumbore, "Fast, minimum storage ray/triangle intersection", 1997 */
-  for (int k = 0; k < 3; k++) {
-    e1[k] = x[1][k] - x[0][k];
-    e2[k] = x[2][k] - x[0][k];
-    r[k] = p[k] - x[0][k];
-  }
+  SbSubtract(x[1], x[0], e1);
+  SbSubtract(x[2], x[0], e2);
+  SbSubtract(p, x[0], r);
   SbCross(way, e2, c);
   det = SbDot3(e1, c);
   if (!(PetscAbsReal(det) > PARALLEL * SbDot3(e1, e1) * PetscSqrtReal(SbDot3(way, way)))) return PETSC_FALSE;

@@ -25,11 +25,6 @@
 #define ALONG 1e-4     /* sine between edges, below which the lines' closest points may be wrong */
 #define PARALLEL 1e-12 /* the same, below which there are none */
 
-static inline void subtract(const PetscReal a[3], const PetscReal b[3], PetscReal c[3])
-{
-  for (int k = 0; k < 3; k++) c[k] = a[k] - b[k];
-}
-
 /*
   The distance of `vertex` from the edge from a to b, when it is less than s->d, which is squared here. The vertex is on the first
   side for sign = 1, on the second for -1.
@@ -38,13 +33,13 @@ static inline void try_edge(const PetscReal x[], int vertex, int a, int b, Petsc
 {
   PetscReal e[3], r[3], ee, er, t, d2;
 
-  subtract(x + 3 * b, x + 3 * a, e);
-  subtract(x + 3 * vertex, x + 3 * a, r);
+  SbSubtract(x + 3 * b, x + 3 * a, e);
+  SbSubtract(x + 3 * vertex, x + 3 * a, r);
   ee = SbDot3(e, e);
   er = SbDot3(e, r);
   t = er <= 0 ? 0 : er >= ee ? 1 : er / ee;
   // from the nearer end, where the difference is smaller
-  if (t > 0.5) subtract(x + 3 * vertex, x + 3 * b, r);
+  if (t > 0.5) SbSubtract(x + 3 * vertex, x + 3 * b, r);
   for (int k = 0; k < 3; k++) r[k] -= (t > 0.5 ? t - 1 : t) * e[k];
   d2 = SbDot3(r, r);
   if (!(d2 < s->d)) return;
@@ -84,7 +79,7 @@ static inline void vertex_triangle(const PetscReal x[], SbDistance *s)
   s->weight[0] = 1;
   s->mask = 1;
   for (int a = 0; a < 3; a++) {
-    subtract(x, corner[a], r[a]);
+    SbSubtract(x, corner[a], r[a]);
     s->weight[1 + a] = -w[a];
     s->mask |= (w[a] != 0 || feature == SB_FEATURE_FACE) << (1 + a);
   }
@@ -96,8 +91,8 @@ static inline void vertex_triangle(const PetscReal x[], SbDistance *s)
     finish(NULL, NULL, 0, s);
     return;
   }
-  subtract(corner[1], corner[0], e[0]);
-  subtract(corner[2], corner[0], e[1]);
+  SbSubtract(corner[1], corner[0], e[0]);
+  SbSubtract(corner[2], corner[0], e[1]);
   SbCross(e[0], e[1], normal);
   finish(r[0], normal, PetscMax(SbDot3(e[0], e[0]), SbDot3(e[1], e[1])), s);
 }
@@ -107,9 +102,9 @@ static inline void edge_edge(const PetscReal x[], SbDistance *s)
   PetscReal u[3], v[3], r[3], normal[3], c[3], uu, vv, nn, a = 0, b = 0;
   PetscBool inside = PETSC_FALSE;
 
-  subtract(x + 3, x, u);
-  subtract(x + 9, x + 6, v);
-  subtract(x, x + 6, r);
+  SbSubtract(x + 3, x, u);
+  SbSubtract(x + 9, x + 6, v);
+  SbSubtract(x, x + 6, r);
   uu = SbDot3(u, u);
   vv = SbDot3(v, v);
   SbCross(u, v, normal);
@@ -157,7 +152,7 @@ void SbDistanceFind(SbPairKind kind, const PetscReal x[], SbDistance *s)
     finish(NULL, NULL, 0, s);
     break;
   case SB_PAIR_VERTEX_VERTEX:
-    subtract(x, x + 3, r);
+    SbSubtract(x, x + 3, r);
     *s = (SbDistance){.feature = kind, .mask = 3, .weight = {1, -1}, .n = {r[0], r[1], r[2]}};
     finish(NULL, NULL, 0, s);
     break;
@@ -180,7 +175,7 @@ static void point_derivatives(const PetscReal x[], const SbDistance *s, PetscRea
     for (int a = 0; a < 4; a++) {
       if (npositive == 1 ? s->weight[a] < 0 : s->weight[a] > 0) end[n++] = a;
     }
-    subtract(x + 3 * end[1], x + 3 * end[0], t[0]);
+    SbSubtract(x + 3 * end[1], x + 3 * end[0], t[0]);
     for (int k = 0; k < 3; k++) {
       c[end[1]][k] = t[0][k] / SbDot3(t[0], t[0]);
       c[end[0]][k] = -c[end[1]][k];
@@ -189,8 +184,8 @@ static void point_derivatives(const PetscReal x[], const SbDistance *s, PetscRea
     const PetscBool face = (PetscBool)(s->feature == SB_PAIR_VERTEX_TRIANGLE);
     PetscReal nn;
 
-    subtract(x + 3, x + (face ? 6 : 0), t[0]);
-    subtract(x + (face ? 3 : 6), x + 9, t[1]);
+    SbSubtract(x + 3, x + (face ? 6 : 0), t[0]);
+    SbSubtract(x + (face ? 3 : 6), x + 9, t[1]);
     SbCross(t[0], t[1], normal);
     nn = SbDot3(normal, normal);
     SbCross(t[1], normal, q[0]);
@@ -350,8 +345,8 @@ PetscReal SbEdgeMollifier(const PetscReal x[], PetscReal eps, PetscReal g[], Pet
 {
   PetscReal u[3], v[3], c[3], uu, vv, uv, d[2][3], area, value, first, second;
 
-  subtract(x + 3, x, u);
-  subtract(x + 9, x + 6, v);
+  SbSubtract(x + 3, x, u);
+  SbSubtract(x + 9, x + 6, v);
   SbCross(u, v, c);
   area = SbDot3(c, c);
   value = area < eps ? (2 - area / eps) * area / eps : 1;

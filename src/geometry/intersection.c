@@ -38,11 +38,9 @@ static int orient(const PetscReal a[3], const PetscReal b[3], const PetscReal c[
 {
   PetscReal u[3], v[3], w[3], det = 0, size = 0;
 
-  for (int k = 0; k < 3; k++) {
-    u[k] = a[k] - d[k];
-    v[k] = b[k] - d[k];
-    w[k] = c[k] - d[k];
-  }
+  SbSubtract(a, d, u);
+  SbSubtract(b, d, v);
+  SbSubtract(c, d, w);
   for (int k = 0; k < 3; k++) {
     const int i = (k + 1) % 3, j = (k + 2) % 3;
 
@@ -61,10 +59,8 @@ static void axes_of(PetscReal const *const t[3], int axis[2])
   PetscReal e[3], f[3], n[3];
   int most = 0;
 
-  for (int k = 0; k < 3; k++) {
-    e[k] = t[1][k] - t[0][k];
-    f[k] = t[2][k] - t[0][k];
-  }
+  SbSubtract(t[1], t[0], e);
+  SbSubtract(t[2], t[0], f);
   SbCross(e, f, n);
   for (int k = 1; k < 3; k++) {
     if (PetscAbsReal(n[k]) > PetscAbsReal(n[most])) most = k;

@@ -9,13 +9,11 @@
 
 PetscReal SbTetDeterminant(const PetscReal x[], const PetscInt v[4])
 {
-  const PetscReal *p = x + 3 * v[0], *q = x + 3 * v[1], *r = x + 3 * v[2], *s = x + 3 * v[3];
-  const PetscReal a[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
-  const PetscReal b[3] = {r[0] - p[0], r[1] - p[1], r[2] - p[2]};
-  const PetscReal c[3] = {s[0] - p[0], s[1] - p[1], s[2] - p[2]};
+  PetscReal e[3][3], n[3];
 
-  return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
-         a[2] * (b[0] * c[1] - b[1] * c[0]);
+  for (int k = 0; k < 3; k++) SbSubtract(x + 3 * v[k + 1], x + 3 * v[0], e[k]);
+  SbCross(e[1], e[2], n);
+  return SbDot3(e[0], n);
 }
 
 struct _p_SbLocator {
@@ -56,25 +54,17 @@ PetscErrorCode SbLocatorDestroy(SbLocator *locator)
 /* Volumes of the tets that the point makes with the faces, over that of the tet. */
 void SbTetBarycentric(const PetscReal x[], const PetscInt v[4], const PetscReal p[3], PetscReal w[4])
 {
-  PetscReal a[3], b[3], d[3], r[3], det;
+  PetscReal e[3][3], r[3], n[3], det;
 
-  for (int k = 0; k < 3; k++) {
-    a[k] = x[3 * v[1] + k] - x[3 * v[0] + k];
-    b[k] = x[3 * v[2] + k] - x[3 * v[0] + k];
-    d[k] = x[3 * v[3] + k] - x[3 * v[0] + k];
-    r[k] = p[k] - x[3 * v[0] + k];
-  }
-  det = a[0] * (b[1] * d[2] - b[2] * d[1]) + a[1] * (b[2] * d[0] - b[0] * d[2]) +
-        a[2] * (b[0] * d[1] - b[1] * d[0]);
-  w[1] = (r[0] * (b[1] * d[2] - b[2] * d[1]) + r[1] * (b[2] * d[0] - b[0] * d[2]) +
-          r[2] * (b[0] * d[1] - b[1] * d[0])) /
-         det;
-  w[2] = (a[0] * (r[1] * d[2] - r[2] * d[1]) + a[1] * (r[2] * d[0] - r[0] * d[2]) +
-          a[2] * (r[0] * d[1] - r[1] * d[0])) /
-         det;
-  w[3] = (a[0] * (b[1] * r[2] - b[2] * r[1]) + a[1] * (b[2] * r[0] - b[0] * r[2]) +
-          a[2] * (b[0] * r[1] - b[1] * r[0])) /
-         det;
+  for (int k = 0; k < 3; k++) SbSubtract(x + 3 * v[k + 1], x + 3 * v[0], e[k]);
+  SbSubtract(p, x + 3 * v[0], r);
+  SbCross(e[1], e[2], n);
+  det = SbDot3(e[0], n);
+  w[1] = SbDot3(r, n) / det;
+  SbCross(r, e[2], n);
+  w[2] = SbDot3(e[0], n) / det;
+  SbCross(e[1], r, n);
+  w[3] = SbDot3(e[0], n) / det;
   w[0] = 1 - w[1] - w[2] - w[3];
 }
 

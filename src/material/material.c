@@ -26,25 +26,19 @@ PetscErrorCode SbMaterialRegister(const char *law, PetscErrorCode (*create)(SbMa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The constructor of a law, or an error that lists the laws there are; `where` names what asked for it. */
-static PetscErrorCode find_law(const char *law, const char *where, PetscErrorCode (**create)(SbMaterial))
+/* `where` names what asked for it. */
+static PetscErrorCode create_law(const char *law, PetscReal E, PetscReal nu, PetscReal density,
+                                 const char *where, SbMaterial *material)
 {
-  char all[256];
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscFunctionListFind(SbMaterialList, law, create));
-  if (*create) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbListAdvise(SbMaterialList, law, sizeof(all), all));
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s: there is no material law \"%s\"; the laws are %s", where, law,
-          all);
-}
-
-static PetscErrorCode create_law(const char *law, PetscErrorCode (*create)(SbMaterial), PetscReal E,
-                                 PetscReal nu, PetscReal density, const char *where, SbMaterial *material)
-{
+  PetscErrorCode (*create)(SbMaterial) = NULL;
   SbMaterial m;
+  char all[256] = "";
 
   PetscFunctionBeginUser;
+  PetscCall(PetscFunctionListFind(SbMaterialList, law, &create));
+  if (!create) PetscCall(SbListAdvise(SbMaterialList, law, sizeof(all), all));
+  PetscCheck(create, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: there is no material law \"%s\"; the laws are %s",
+             where, law, all);
   PetscCheck(E > 0 && E < PETSC_INFINITY, PETSC_COMM_SELF, PETSC_ERR_USER,
              "%s: Young's modulus is %g Pa; it must lie in (0, inf)", where, (double)E);
   PetscCheck(nu > -1 && nu < 0.5, PETSC_COMM_SELF, PETSC_ERR_USER,
@@ -66,29 +60,24 @@ static PetscErrorCode create_law(const char *law, PetscErrorCode (*create)(SbMat
 PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal nu, PetscReal density,
                                        SbMaterial *material)
 {
-  PetscErrorCode (*create)(SbMaterial) = NULL;
-
   PetscFunctionBeginUser;
-  PetscCall(find_law(law, "material", &create));
-  PetscCall(create_law(law, create, E, nu, density, "material", material));
+  PetscCall(create_law(law, E, nu, density, "material", material));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial *material)
 {
-  PetscErrorCode (*create)(SbMaterial) = NULL;
   SbScope scope;
   PetscReal E, nu, density;
   char where[3 * SB_NAME_MAX];
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(where, sizeof(where), "-%s_%s_material", body->klass, body->instance));
-  PetscCall(find_law(law, where, &create));
   PetscCall(SbScopeSet(&scope, body->klass, law, body->instance));
   PetscCall(SbOptionReal(&scope, "young", &E));
   PetscCall(SbOptionReal(&scope, "poisson", &nu));
   PetscCall(SbOptionReal(&scope, "density", &density));
-  PetscCall(create_law(law, create, E, nu, density, where, material));
+  PetscCall(create_law(law, E, nu, density, where, material));
   if ((*material)->ops.setfromoptions) PetscCall(((*material)->ops.setfromoptions)(*material, &scope));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -98,7 +87,7 @@ PetscErrorCode SbMaterialDestroy(SbMaterial *m)
   PetscFunctionBeginUser;
   if (!*m) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbMaterialDestroy(&(*m)->shear));
-  if ((*m)->ops.destroy) PetscCall(((*m)->ops.destroy)(*m));
+  PetscCall(PetscFree((*m)->data));
   PetscCall(PetscFree(*m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -167,13 +156,6 @@ static PetscReal wave_speed_hooke(const struct _p_SbMaterial *m)
   return sqrt((sb_lame(m)->lambda + 2 * sb_lame(m)->mu) / m->density);
 }
 
-static PetscErrorCode destroy_hooke(SbMaterial m)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree(m->data));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbMaterialSetHooke(SbMaterial m)
 {
   SbLame *lame;
@@ -187,7 +169,6 @@ PetscErrorCode SbMaterialSetHooke(SbMaterial m)
   m->ops.bulk_modulus = bulk_modulus_hooke;
   m->ops.volumetric_modulus = volumetric_modulus_hooke;
   m->ops.wave_speed = wave_speed_hooke;
-  m->ops.destroy = destroy_hooke;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -17,7 +17,7 @@ typedef struct {
 /*
   SbMaterialSetHooke - makes m->data an SbLame from E and nu, and the law answer for its stiffness with it.
 
-  Not collective. Sets shear_modulus, bulk_modulus, volumetric_modulus, wave_speed and destroy of the table. For laws whose tangent
+  Not collective. Sets shear_modulus, bulk_modulus, volumetric_modulus and wave_speed of the table. For laws whose tangent
   at rest is Hooke's tensor; another law sets its own.
 */
 PetscErrorCode SbMaterialSetHooke(SbMaterial m);

@@ -84,16 +84,8 @@ PetscErrorCode SbMeshDestroy(SbMesh *mesh)
   if (!m) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscSFDestroy(&m->cell_sf));
   PetscCall(PetscSFDestroy(&m->vert_sf));
-  PetscCall(PetscFree(m->gvert));
-  PetscCall(PetscFree(m->vert_orig));
-  PetscCall(PetscFree(m->vert_body));
-  PetscCall(PetscFree(m->vert_set));
-  PetscCall(PetscFree(m->x));
-  PetscCall(PetscFree(m->cell));
-  PetscCall(PetscFree(m->cell_orig));
-  PetscCall(PetscFree2(m->cell_body, m->cell_material));
-  PetscCall(PetscFree(m->cell_set));
-  PetscCall(PetscFree(m->face_set));
+  PetscCall(PetscFree5(m->gvert, m->vert_orig, m->vert_body, m->vert_set, m->x));
+  PetscCall(PetscFree6(m->cell, m->cell_orig, m->cell_body, m->cell_material, m->cell_set, m->face_set));
   PetscCall(PetscFree(*mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,6 +1,7 @@
 /*
   measure.c - what there is to know about a mesh before it is simulated: groups, size, shape of its tets.
 */
+#include "sbkernel.h"
 #include "mesh_impl.h"
 
 const PetscReal SbRatioBounds[SB_RATIO_BINS] = {1, 1.25, 1.5, 2, 3, 5, 10, 100};
@@ -14,12 +15,10 @@ static PetscReal measure(const PetscReal x[], int dim, const PetscInt v[])
 
   if (dim == 3) return PetscAbsReal(SbTetDeterminant(x, v)) / 6;
   if (!dim) return 0;
-  for (int k = 0; k < dim; k++)
-    for (int i = 0; i < 3; i++) a[k][i] = x[3 * v[k + 1] + i] - x[3 * v[0] + i];
-  if (dim == 1) return PetscSqrtReal(a[0][0] * a[0][0] + a[0][1] * a[0][1] + a[0][2] * a[0][2]);
-  for (int i = 0; i < 3; i++)
-    n[i] = a[0][(i + 1) % 3] * a[1][(i + 2) % 3] - a[0][(i + 2) % 3] * a[1][(i + 1) % 3];
-  return PetscSqrtReal(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) / 2;
+  for (int k = 0; k < dim; k++) SbSubtract(x + 3 * v[k + 1], x + 3 * v[0], a[k]);
+  if (dim == 1) return PetscSqrtReal(SbDot3(a[0], a[0]));
+  SbCross(a[0], a[1], n);
+  return PetscSqrtReal(SbDot3(n, n)) / 2;
 }
 
 PetscErrorCode SbMeshFileGroup(const SbImport *im, PetscInt i, SbMeshGroup *group, PetscBool *found)

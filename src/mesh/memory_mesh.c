@@ -15,12 +15,8 @@ PetscErrorCode SbMemoryMeshCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri,
   g->nvert = nvert;
   g->ncell = ncell;
   g->ntri = ntri;
-  PetscCall(PetscCalloc1(3 * (size_t)nvert, &g->x));
-  PetscCall(PetscCalloc1(4 * (size_t)ncell, &g->cell));
-  PetscCall(PetscCalloc1(3 * (size_t)ntri, &g->tri));
-  PetscCall(PetscCalloc1(nvert, &g->vert_set));
-  PetscCall(PetscCalloc1(ntri, &g->tri_set));
-  PetscCall(PetscCalloc1(ncell, &g->cell_set));
+  PetscCall(PetscCalloc6(3 * (size_t)nvert, &g->x, 4 * (size_t)ncell, &g->cell, 3 * (size_t)ntri, &g->tri,
+                         nvert, &g->vert_set, ntri, &g->tri_set, ncell, &g->cell_set));
   *in_memory = g;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -31,12 +27,7 @@ PetscErrorCode SbMemoryMeshDestroy(SbMemoryMesh **in_memory)
 
   PetscFunctionBeginUser;
   if (!g) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree(g->x));
-  PetscCall(PetscFree(g->cell));
-  PetscCall(PetscFree(g->tri));
-  PetscCall(PetscFree(g->vert_set));
-  PetscCall(PetscFree(g->tri_set));
-  PetscCall(PetscFree(g->cell_set));
+  PetscCall(PetscFree6(g->x, g->cell, g->tri, g->vert_set, g->tri_set, g->cell_set));
   PetscCall(PetscFree(*in_memory));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

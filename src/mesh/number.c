@@ -153,11 +153,9 @@ static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
     PetscCall(PetscFree(got));
     PetscCall(PetscFree2(number, sent));
   }
-  PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &mesh->cell));
-  PetscCall(PetscMalloc1(mesh->ncell, &mesh->cell_orig));
-  PetscCall(PetscMalloc2(mesh->ncell, &mesh->cell_body, mesh->ncell, &mesh->cell_material));
-  PetscCall(PetscMalloc1(mesh->ncell, &mesh->cell_set));
-  PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &mesh->face_set));
+  PetscCall(PetscMalloc6(4 * (size_t)mesh->ncell, &mesh->cell, mesh->ncell, &mesh->cell_orig, mesh->ncell,
+                         &mesh->cell_body, mesh->ncell, &mesh->cell_material, mesh->ncell, &mesh->cell_set,
+                         4 * (size_t)mesh->ncell, &mesh->face_set));
   for (PetscInt c = 0; c < mesh->ncell; c++) {
     const SbCellData *data = &p->data[order[c]];
     const PetscInt inclusion = inclusion_of(mesh, data);
@@ -187,11 +185,8 @@ PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *local)
   PetscCall(number_owned(&w, mesh));
   PetscCall(number_ghosts(&w, mesh));
   // the arrays of the vertices, in their new order
-  PetscCall(PetscMalloc1(mesh->nvert, &mesh->gvert));
-  PetscCall(PetscMalloc1(mesh->nvert, &mesh->vert_orig));
-  PetscCall(PetscMalloc1(mesh->nvert, &mesh->vert_body));
-  PetscCall(PetscMalloc1(mesh->nvert, &mesh->vert_set));
-  PetscCall(PetscMalloc1(3 * (size_t)mesh->nvert, &mesh->x));
+  PetscCall(PetscMalloc5(mesh->nvert, &mesh->gvert, mesh->nvert, &mesh->vert_orig, mesh->nvert,
+                         &mesh->vert_body, mesh->nvert, &mesh->vert_set, 3 * (size_t)mesh->nvert, &mesh->x));
   for (PetscInt v = 0; v < mesh->nvert; v++) {
     const SbVertexData *p = &w.p->vertex[v];
     const PetscInt l = w.local[v];

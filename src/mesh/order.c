@@ -22,34 +22,10 @@ static inline PetscInt degree(const Graph *g, PetscInt v)
   return g->start[v + 1] - g->start[v];
 }
 
-/* Appends the unseen neighbours of v to the queue, those with few cells first. */
-static PetscInt append_neighbours(Graph *g, PetscInt v, PetscInt queue[], PetscInt n)
-{
-  const PetscInt begin = n;
-
-  for (PetscInt i = g->start[v]; i < g->start[v + 1]; i++) {
-    const PetscInt c = g->incident[i] / 4;
-
-    if (g->cell_mark[c] == g->search) continue;
-    g->cell_mark[c] = g->search;
-    for (int a = 0; a < 4; a++) {
-      const PetscInt w = g->cell[4 * c + a];
-      PetscInt j = n;
-
-      if (w < 0 || g->vert_mark[w] == g->search) continue;
-      g->vert_mark[w] = g->search;
-      for (; j > begin && degree(g, queue[j - 1]) > degree(g, w); j--) queue[j] = queue[j - 1];
-      queue[j] = w;
-      n++;
-    }
-  }
-  return n;
-}
-
 /* Breadth-first search from a vertex: the number of vertices reached, and where the last level of them begins. */
 static PetscInt search(Graph *g, PetscInt root, PetscInt queue[], PetscInt *last)
 {
-  PetscInt n = 1, level_end = 1;
+  PetscInt n = 1, level_end = 1, begin;
 
   g->search++;
   g->vert_mark[root] = g->search;
@@ -60,7 +36,24 @@ static PetscInt search(Graph *g, PetscInt root, PetscInt queue[], PetscInt *last
       *last = level_end;
       level_end = n;
     }
-    n = append_neighbours(g, queue[i], queue, n);
+    // appends the unseen neighbours, those with few cells first
+    begin = n;
+    for (PetscInt k = g->start[queue[i]]; k < g->start[queue[i] + 1]; k++) {
+      const PetscInt c = g->incident[k] / 4;
+
+      if (g->cell_mark[c] == g->search) continue;
+      g->cell_mark[c] = g->search;
+      for (int a = 0; a < 4; a++) {
+        const PetscInt w = g->cell[4 * c + a];
+        PetscInt j = n;
+
+        if (w < 0 || g->vert_mark[w] == g->search) continue;
+        g->vert_mark[w] = g->search;
+        for (; j > begin && degree(g, queue[j - 1]) > degree(g, w); j--) queue[j] = queue[j - 1];
+        queue[j] = w;
+        n++;
+      }
+    }
   }
   return n;
 }
@@ -71,8 +64,7 @@ PetscErrorCode SbOrderRCM(PetscInt nvert, PetscInt ncell, const PetscInt cell[],
 
   PetscFunctionBeginUser;
   PetscCall(SbGroupByKey(4 * ncell, cell, nvert, &g.start, &g.incident));
-  PetscCall(PetscCalloc1(nvert, &g.vert_mark));
-  PetscCall(PetscCalloc1(ncell, &g.cell_mark));
+  PetscCall(PetscCalloc2(nvert, &g.vert_mark, ncell, &g.cell_mark));
   for (PetscInt v = 0, done = 0; v < nvert; v++) {
     PetscInt n, last, root;
 
@@ -94,7 +86,6 @@ PetscErrorCode SbOrderRCM(PetscInt nvert, PetscInt ncell, const PetscInt cell[],
   }
   PetscCall(PetscFree(g.start));
   PetscCall(PetscFree(g.incident));
-  PetscCall(PetscFree(g.vert_mark));
-  PetscCall(PetscFree(g.cell_mark));
+  PetscCall(PetscFree2(g.vert_mark, g.cell_mark));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -38,36 +38,11 @@ static inline void centre(const SbMergedMesh *w, PetscInt c, PetscReal x[3])
     x[i] = w->vertex[v[0]].x[i] + w->vertex[v[1]].x[i] + w->vertex[v[2]].x[i] + w->vertex[v[3]].x[i];
 }
 
-/* Puts the samples below the cut first. What lies on it goes up, as tets will, and not by the order of the samples; when nothing is below it, it is raised. */
-static PetscInt split_at(PetscInt n, PetscReal (*x)[3], int axis, PetscReal middle, PetscReal *cut)
-{
-  PetscReal low = PETSC_MAX_REAL, next = PETSC_MAX_REAL;
-  PetscInt below = 0;
-
-  for (PetscInt i = 0; i < n; i++) {
-    low = PetscMin(low, x[i][axis]);
-    if (x[i][axis] > middle) next = PetscMin(next, x[i][axis]);
-  }
-  *cut = low < middle ? middle : next;
-  for (PetscInt i = 0; i < n; i++) {
-    if (x[i][axis] >= *cut) continue;
-    for (int d = 0; d < 3; d++) {
-      const PetscReal keep = x[i][d];
-
-      x[i][d] = x[below][d];
-      x[below][d] = keep;
-    }
-    below++;
-  }
-  return below;
-}
-
 /* Splits the samples x[n] into k leaves below a node. */
 static PetscErrorCode split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3], PetscInt k)
 {
-  PetscReal *along, low[3] = {0, 0, 0}, high[3] = {0, 0, 0};
-  PetscReal cut;
-  PetscInt below, half = k / 2;
+  PetscReal *along, low[3] = {0, 0, 0}, high[3] = {0, 0, 0}, cut, next = PETSC_MAX_REAL;
+  PetscInt below = 0, half = k / 2;
   int axis = 0;
 
   PetscFunctionBeginUser;
@@ -83,12 +58,26 @@ static PetscErrorCode split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3],
   }
   for (int d = 1; d < 3; d++)
     if (high[d] - low[d] > high[axis] - low[axis]) axis = d;
-  below = (PetscInt)((PetscInt64)n * half / k);
+  // the cut is the median; when nothing is below it, it is raised
   PetscCall(PetscMalloc1(n, &along));
   for (PetscInt i = 0; i < n; i++) along[i] = x[i][axis];
   PetscCall(PetscRealSortSemiOrdered(n, along));
-  below = split_at(n, x, axis, along[below], &cut);
+  cut = along[(PetscInt64)n * half / k];
+  for (PetscInt i = 0; i < n; i++)
+    if (along[i] > cut) next = PetscMin(next, along[i]);
+  if (!(along[0] < cut)) cut = next;
   PetscCall(PetscFree(along));
+  // the samples below it come first; what lies on it goes up, as tets will, and not by the order of the samples
+  for (PetscInt i = 0; i < n; i++) {
+    if (x[i][axis] >= cut) continue;
+    for (int d = 0; d < 3; d++) {
+      const PetscReal keep = x[i][d];
+
+      x[i][d] = x[below][d];
+      x[below][d] = keep;
+    }
+    below++;
+  }
   t->node[at] = (Node){axis, cut, t->nnode};
   t->nnode += 2;
   PetscCall(split(t, t->node[at].next, below, x, half));

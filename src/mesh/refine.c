@@ -8,6 +8,7 @@
 
   The surface keeps its facets: new vertices lie in their middle, not on a rounder shape.
 */
+#include "sbkernel.h"
 #include "mesh_impl.h"
 
 enum { M01, M02, M03, M12, M13, M23 }; /* middles of the edges of a tet, in the order of edges */
@@ -22,11 +23,6 @@ static const struct {
   {M03, M12, {M01, M02, M23, M13}},
 };
 
-static inline PetscReal distance2(const PetscReal *p, const PetscReal *q)
-{
-  return (p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]) + (p[2] - q[2]) * (p[2] - q[2]);
-}
-
 /* The eight children of the tet v with the middles m. */
 static void split_tet(const PetscReal x[], const PetscInt v[4], const PetscInt m[6], PetscInt child[8][4])
 {
@@ -39,7 +35,10 @@ static void split_tet(const PetscReal x[], const PetscInt v[4], const PetscInt m
 
   memcpy(child, corner, sizeof(corner));
   for (int d = 0; d < 3; d++) {
-    const PetscReal length = distance2(x + 3 * m[diagonals[d].from], x + 3 * m[diagonals[d].to]);
+    PetscReal r[3], length;
+
+    SbSubtract(x + 3 * m[diagonals[d].from], x + 3 * m[diagonals[d].to], r);
+    length = SbDot3(r, r);
 
     /* A tie must not be decided by rounding: the first one stays. */
     if (length < shortest * (1 - 1e-12)) shortest = length, best = d;

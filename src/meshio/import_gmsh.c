@@ -109,15 +109,6 @@ static PetscErrorCode read_entities(Gmsh *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Tag set of an entity; an entity that the file does not list has no groups. */
-static PetscInt entity_tags(const Gmsh *g, int64_t dim, int64_t tag)
-{
-  for (PetscInt i = 0; i < g->nentity; i++) {
-    if (g->entity[i].dim == dim && g->entity[i].tag == tag) return g->entity[i].tags;
-  }
-  return 0;
-}
-
 /* ------------------------------------------------------------------ nodes */
 
 /* Versions 1 and 2: number and place of each. 4.1: blocks of numbers, then places, with up to three parameters on the entity. */
@@ -274,6 +265,8 @@ static PetscErrorCode read_elements_41(Gmsh *g)
   PetscCall(SbScanInt8(s, "highest number of an element", &bound));
   PetscCall(SbScanRoom(s, "elements", total, 4, 16));
   for (int64_t b = 0; b < nblock; b++, nread += n) {
+    PetscInt tags = 0;
+
     PetscCall(SbScanInt4(s, "dimension of a block of elements", &dim));
     PetscCall(SbScanInt4(s, "entity of a block of elements", &tag));
     PetscCall(SbScanInt4(s, "type of a block of elements", &type));
@@ -282,13 +275,15 @@ static PetscErrorCode read_elements_41(Gmsh *g)
     if (n < 0 || n > total - nread)
       SB_SCAN_ERROR(s, "block of %lld elements; only %lld of those announced for the section are left",
                     (long long)n, (long long)(total - nread));
-    tag = entity_tags(g, dim, tag);
-    if (tag && dim != SbGmshTypes[type].dim)
+    // its tag set; an entity that the file does not list has no groups
+    for (PetscInt i = 0; i < g->nentity && !tags; i++)
+      if (g->entity[i].dim == dim && g->entity[i].tag == tag) tags = g->entity[i].tags;
+    if (tags && dim != SbGmshTypes[type].dim)
       SB_SCAN_ERROR(s, "%s in a block of dimension %lld; the file is damaged", SbGmshTypes[type].name,
                     (long long)dim);
     for (int64_t i = 0; i < n; i++) {
       PetscCall(SbScanInt8(s, "number of an element", &number));
-      PetscCall(read_element(g, (int)type, number, (PetscInt)tag));
+      PetscCall(read_element(g, (int)type, number, tags));
     }
   }
   if (nread < total)

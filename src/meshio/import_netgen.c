@@ -35,40 +35,21 @@ static PetscErrorCode read_points(SbImport *im)
 
 /* What stands before the points of an element: numbers of no use, its group, and in .vol how many points it has. */
 typedef struct {
-  int dim;
-  const char *title, *count; /* for messages */
-  int room;                  /* bytes that a line takes at least */
+  int dim, room; /* bytes that a line takes at least */
   const char *before[5];
   int mark, nnode; /* which of them; nnode -1: all words that are left on the line are points */
 } Layout;
 
-static const Layout neutral_volume = {.dim = 3,
-                                      .title = "volume elements",
-                                      .count = "number of volume elements",
-                                      .room = 10,
-                                      .nnode = -1,
-                                      .before = {"subdomain of an element"}};
-static const Layout neutral_surface = {.dim = 2,
-                                       .title = "surface elements",
-                                       .count = "number of surface elements",
-                                       .room = 8,
-                                       .nnode = -1,
-                                       .before = {"boundary condition of an element"}};
-static const Layout vol_volume = {.dim = 3,
-                                  .title = "volume elements",
-                                  .count = "number of volume elements",
-                                  .room = 12,
-                                  .nnode = 1,
-                                  .before = {"material of an element", "number of points of an element"}};
+static const Layout neutral_volume = {3, 10, {"subdomain of an element"}, 0, -1};
+static const Layout neutral_surface = {2, 8, {"boundary condition of an element"}, 0, -1};
+static const Layout vol_volume = {3, 12, {"material of an element", "number of points of an element"}, 0, 1};
 static const Layout vol_surface = {
-  .dim = 2,
-  .title = "surface elements",
-  .count = "number of surface elements",
-  .room = 16,
-  .mark = 1,
-  .nnode = 4,
-  .before = {"surface of an element", "boundary condition of an element", "domain on one side of an element",
-             "domain on the other side of an element", "number of points of an element"}};
+  2,
+  16,
+  {"surface of an element", "boundary condition of an element", "domain on one side of an element",
+   "domain on the other side of an element", "number of points of an element"},
+  1,
+  4};
 
 static PetscErrorCode read_elements(SbImport *im, const Layout *l)
 {
@@ -78,8 +59,8 @@ static PetscErrorCode read_elements(SbImport *im, const Layout *l)
 
   PetscFunctionBeginUser;
   SbScanNext(s, '#');
-  PetscCall(SbScanText(s, l->count, &n));
-  PetscCall(SbScanRoom(s, l->title, n, l->room, l->room));
+  PetscCall(SbScanText(s, l->dim == 3 ? "number of volume elements" : "number of surface elements", &n));
+  PetscCall(SbScanRoom(s, l->dim == 3 ? "volume elements" : "surface elements", n, l->room, l->room));
   for (int64_t i = 0; i < n; i++) {
     const char *at, *token;
     int type = SB_GMSH_LINE;

@@ -170,19 +170,6 @@ PetscErrorCode SbScanInt8(SbScan *s, const char *what, int64_t *value)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A number with the exponent letter of Fortran, 1.5D+00. Returns its end, or NULL. */
-static const char *fortran_real(const SbScan *s, PetscReal *value)
-{
-  char copy[64], *p;
-  size_t n = 0;
-
-  for (; n + 1 < sizeof(copy) && !ends_token(s, s->at + n); n++)
-    copy[n] = s->at[n] == 'D' || s->at[n] == 'd' ? 'E' : s->at[n];
-  copy[n] = 0;
-  *value = strtod(copy, &p);
-  return n && p == copy + n ? s->at + n : NULL;
-}
-
 PetscErrorCode SbScanReal(SbScan *s, const char *what, int64_t number, PetscReal *value)
 {
   char *p;
@@ -195,10 +182,15 @@ PetscErrorCode SbScanReal(SbScan *s, const char *what, int64_t number, PetscReal
   skip_blanks(s);
   *value = strtod(s->at, &p);
   if (s->at < s->end && p > s->at && (*p == 'D' || *p == 'd')) {
-    const char *end = fortran_real(s, value);
+    // with the exponent letter of Fortran, 1.5D+00
+    char copy[64], *end;
+    size_t n = 0;
 
-    if (end) s->at = end;
-    if (end) PetscFunctionReturn(PETSC_SUCCESS);
+    for (; n + 1 < sizeof(copy) && !ends_token(s, s->at + n); n++)
+      copy[n] = s->at[n] == 'D' || s->at[n] == 'd' ? 'E' : s->at[n];
+    copy[n] = 0;
+    *value = strtod(copy, &end);
+    if (end == copy + n) p = (char *)s->at + n;
   }
   if (p > s->at && p + 1 < s->end && *p == ',' && isdigit((unsigned char)p[1]))
     SB_SCAN_ERROR(s, "the %s, %.*s, has a decimal comma; write the file with decimal points", what,

@@ -3,7 +3,6 @@
 
   Types of cells as in VTK's vtkCellType.h; they are counted as what gmsh calls them, to say what else is there in the same words.
 */
-#include <stdlib.h>
 #include <strings.h>
 #include "vtk_grid.h"
 
@@ -55,36 +54,6 @@ PetscErrorCode SbVtkSetPoints(PetscInt n, const double x[], SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ groups */
-
-static int compare_values(const void *a, const void *b)
-{
-  const double p = *(const double *)a, q = *(const double *)b;
-
-  return (p > q) - (p < q);
-}
-
-/* Whether an array numbers regions: whole numbers, of few different values. */
-static PetscErrorCode numbers_regions(PetscInt n, const double value[], PetscBool *is)
-{
-  double *sorted;
-  PetscInt different = 1;
-
-  PetscFunctionBeginUser;
-  *is = PETSC_FALSE;
-  for (PetscInt i = 0; i < n; i++) {
-    if (!(PetscAbsReal(value[i]) < 1e12) || value[i] != PetscFloorReal(value[i]))
-      PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(PetscMalloc1(n, &sorted));
-  PetscCall(PetscArraycpy(sorted, value, n));
-  if (n) qsort(sorted, (size_t)n, sizeof(*sorted), compare_values);
-  for (PetscInt i = 1; i < n; i++) different += sorted[i] != sorted[i - 1];
-  PetscCall(PetscFree(sorted));
-  *is = (PetscBool)(different <= SB_VTK_REGIONS);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ cells */
 
 /* What gmsh calls a cell; a type that is not known is an error. */
@@ -114,15 +83,29 @@ PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
   int64_t begin = 0, end;
   PetscBool use[SB_VTK_ARRAYS];
   PetscInt vert[4] = {0, 0, 0, 0}, tags;
+  double *sorted;
   int regions, type, nuse = 0;
 
   PetscFunctionBeginUser;
   // which arrays become groups, and which of them is the one of regions
   regions = -1;
+  PetscCall(PetscMalloc1(grid->ncell, &sorted));
   for (int a = 0; a < grid->narray; a++) {
-    PetscCall(numbers_regions(grid->ncell, grid->array[a].value, &use[a]));
+    const double *value = grid->array[a].value;
+    PetscInt different = 1;
+
+    // those of whole numbers with few different values
+    use[a] = PETSC_TRUE;
+    for (PetscInt c = 0; c < grid->ncell && use[a]; c++)
+      use[a] = (PetscBool)(PetscAbsReal(value[c]) < 1e12 && value[c] == PetscFloorReal(value[c]));
+    if (!use[a]) continue;
+    PetscCall(PetscArraycpy(sorted, value, grid->ncell));
+    PetscCall(PetscRealSortSemiOrdered(grid->ncell, sorted));
+    for (PetscInt c = 1; c < grid->ncell; c++) different += sorted[c] != sorted[c - 1];
+    use[a] = (PetscBool)(different <= SB_VTK_REGIONS);
     nuse += use[a];
   }
+  PetscCall(PetscFree(sorted));
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(region_names) && regions < 0; k++) {
     for (int a = 0; a < grid->narray && regions < 0; a++) {
       if (use[a] && !strcasecmp(grid->array[a].name, region_names[k])) regions = a;

@@ -76,35 +76,6 @@ typedef struct {
   uint64_t inclusions; /* and of those that are inclusions of the body */
 } Work;
 
-static PetscErrorCode open_work(SbModel m, const SbGathered *g, PetscInt b, Work *w)
-{
-  const PetscInt nvert = g->vert0[b + 1] - g->vert0[b];
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(w, sizeof(*w)));
-  w->model = m;
-  w->g = g;
-  w->body = b;
-  w->vert0 = g->vert0[b];
-  w->cell0 = g->cell0[b];
-  w->ncell = g->cell0[b + 1] - g->cell0[b];
-  w->element = m->element[b];
-  w->each = 3 * g->nfield;
-  for (PetscInt k = 0; k < m->nset; k++) w->groups |= m->set[k].shape == SB_SET_GROUP ? SB_SET_BIT(k) : 0;
-  for (PetscInt k = 0; k < m->body[b].ninclusion; k++)
-    w->inclusions |= SB_SET_BIT(m->body[b].inclusion[k].set);
-  PetscCall(PetscMalloc1(4 * (size_t)w->ncell, &w->cell));
-  PetscCall(PetscMalloc1(nvert, &w->at));
-  for (PetscInt i = 0; i < 4 * w->ncell; i++) {
-    w->cell[i] = g->cell[4 * w->cell0 + i] - w->vert0;
-    w->at[w->cell[i]] = i;
-  }
-  if (w->element->nodes_per[1]) PetscCall(list_edges(w->ncell, w->cell, &w->nedge, &w->edge));
-  PetscCall(SbFacesCreate(nvert, w->ncell, w->cell, &w->faces));
-  PetscCall(SbLocatorCreate(w->ncell, w->cell, g->X + 3 * w->vert0, &w->rest));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The sets of the face `slot` = 4 cell + face of the old mesh. */
 static uint64_t face_set(const Work *w, PetscInt slot)
 {
@@ -128,37 +99,6 @@ static PetscInt old_slot(const Work *w, PetscInt slot)
 
 /* ------------------------------------------------------------------ the mesh */
 
-/* A set that holds what lies inside as points, curves or triangles of a file would lose it. */
-static PetscErrorCode check_sets(const Work *w)
-{
-  const SbGathered *g = w->g;
-  const PetscInt nvert = g->vert0[w->body + 1] - w->vert0;
-  uint64_t lost = 0, *volume;
-  PetscBool *surface;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(nvert, &volume));
-  PetscCall(PetscCalloc1(nvert, &surface));
-  for (PetscInt i = 0; i < 4 * w->ncell; i++) {
-    volume[w->cell[i]] |= g->cell_set[5 * (w->cell0 + i / 4)];
-    if (!(face_set(w, i) & SB_ON_BOUNDARY)) {
-      lost |= face_set(w, i) & w->groups;
-    } else {
-      for (int k = 1; k < 4; k++) surface[w->cell[4 * (i / 4) + (i % 4 + k) % 4]] = PETSC_TRUE;
-    }
-  }
-  for (PetscInt v = 0; v < nvert; v++)
-    lost |= surface[v] ? 0 : g->vert_set[w->vert0 + v] & w->groups & ~volume[v];
-  PetscCall(PetscFree(volume));
-  PetscCall(PetscFree(surface));
-  for (PetscInt k = 0; k < w->model->nset; k++)
-    PetscCheck(!(lost & SB_SET_BIT(k)), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "the group '%s' holds triangles, curves or points inside the body, which would be lost: use a "
-               "shape (-sets) or a group of the surface or of volumes",
-               w->model->set[k].group);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
 {
   const SbGathered *g = w->g;
@@ -171,10 +111,28 @@ static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
                    .x = g->x + 3 * w->vert0,
                    .cell = w->cell,
                    .faces = &w->faces};
-  uint64_t(*kind)[2];
+  uint64_t(*kind)[2], lost = 0, *volume;
+  PetscBool *surface;
 
   PetscFunctionBeginUser;
-  PetscCall(check_sets(w));
+  // a set that holds what lies inside as points, curves or triangles of a file would lose it
+  PetscCall(PetscCalloc2(old.nvert, &volume, old.nvert, &surface));
+  for (PetscInt i = 0; i < 4 * w->ncell; i++) {
+    volume[w->cell[i]] |= g->cell_set[5 * (w->cell0 + i / 4)];
+    if (!(face_set(w, i) & SB_ON_BOUNDARY)) {
+      lost |= face_set(w, i) & w->groups;
+    } else {
+      for (int k = 1; k < 4; k++) surface[w->cell[4 * (i / 4) + (i % 4 + k) % 4]] = PETSC_TRUE;
+    }
+  }
+  for (PetscInt v = 0; v < old.nvert; v++)
+    lost |= surface[v] ? 0 : g->vert_set[w->vert0 + v] & w->groups & ~volume[v];
+  PetscCall(PetscFree2(volume, surface));
+  for (PetscInt k = 0; k < w->model->nset; k++)
+    PetscCheck(!(lost & SB_SET_BIT(k)), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "the group '%s' holds triangles, curves or points inside the body, which would be lost: use a "
+               "shape (-sets) or a group of the surface or of volumes",
+               w->model->set[k].group);
   PetscCall(PetscSNPrintf(where, sizeof(where), "body '%s', re-meshed", w->model->body[w->body].name));
   PetscCall(PetscMalloc1(w->ncell, &region));
   // tets of another material, or of other groups, stay apart
@@ -442,7 +400,28 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
   for (PetscInt b = 0; b < m->nbody; b++) {
     const PetscInt nvert = g->vert0[b + 1] - g->vert0[b];
 
-    PetscCall(open_work(m, g, b, &work[b]));
+    work[b].model = m;
+    work[b].g = g;
+    work[b].body = b;
+    work[b].vert0 = g->vert0[b];
+    work[b].cell0 = g->cell0[b];
+    work[b].ncell = g->cell0[b + 1] - g->cell0[b];
+    work[b].element = m->element[b];
+    work[b].each = 3 * g->nfield;
+    for (PetscInt k = 0; k < m->nset; k++)
+      work[b].groups |= m->set[k].shape == SB_SET_GROUP ? SB_SET_BIT(k) : 0;
+    for (PetscInt k = 0; k < m->body[b].ninclusion; k++)
+      work[b].inclusions |= SB_SET_BIT(m->body[b].inclusion[k].set);
+    PetscCall(PetscMalloc1(4 * (size_t)work[b].ncell, &work[b].cell));
+    PetscCall(PetscMalloc1(nvert, &work[b].at));
+    for (PetscInt i = 0; i < 4 * work[b].ncell; i++) {
+      work[b].cell[i] = g->cell[4 * work[b].cell0 + i] - work[b].vert0;
+      work[b].at[work[b].cell[i]] = i;
+    }
+    if (work[b].element->nodes_per[1])
+      PetscCall(list_edges(work[b].ncell, work[b].cell, &work[b].nedge, &work[b].edge));
+    PetscCall(SbFacesCreate(nvert, work[b].ncell, work[b].cell, &work[b].faces));
+    PetscCall(SbLocatorCreate(work[b].ncell, work[b].cell, g->X + 3 * work[b].vert0, &work[b].rest));
     r->outcome[b] = (SbRemeshOutcome){{nvert, nvert}, {work[b].ncell, work[b].ncell}, 0, 0., ""};
     // meshes the body again; what it cannot do goes to the message
     if (due[b]) {

@@ -21,54 +21,12 @@
 
 /* ------------------------------------------------------------------ the hull */
 
-/* Parts of the body that hang together by faces between tets of one number: component[ncell], how many. */
-static PetscInt find_regions(const SbOldMesh *old, PetscInt component[])
-{
-  for (PetscInt c = 0; c < old->ncell; c++) component[c] = c;
-  for (PetscInt s = 0; s < 4 * old->ncell; s++) {
-    const PetscInt other = old->faces->neighbour[s];
-
-    if (other >= 0 && old->region[other] == old->region[s / 4]) (void)SbUnionJoin(component, other, s / 4);
-  }
-  return SbUnionNumber(old->ncell, component);
-}
-
 /* Whether the hull has face f of tet c: each triangle once. */
 static PetscBool in_hull(const SbOldMesh *old, const PetscInt component[], PetscInt c, int f)
 {
   const PetscInt other = old->faces->neighbour[4 * c + f];
 
   return (PetscBool)(other < 0 || (c < other && component[other] != component[c]));
-}
-
-/* The hull in the shape x; its vertices in the order of the old mesh: kept[hull->nvert]. */
-static PetscErrorCode create_hull(const SbOldMesh *old, const PetscReal x[], SbSurface *hull, PetscInt **kept)
-{
-  PetscInt *component, nregion, ntri = 0, n = 0, nkept;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(old->ncell, &component));
-  nregion = find_regions(old, component);
-  for (PetscInt s = 0; s < 4 * old->ncell; s++) ntri += in_hull(old, component, s / 4, s % 4);
-  PetscCall(SbSurfaceCreate(old->nvert, ntri, nregion, hull));
-  for (PetscInt s = 0; s < 4 * old->ncell; s++) {
-    const PetscInt other = old->faces->neighbour[s];
-
-    if (!in_hull(old, component, s / 4, s % 4)) continue;
-    for (int k = 0; k < 3; k++) hull->tri[3 * n + k] = old->cell[4 * (s / 4) + SbFaceVertex[s % 4][k]];
-    hull->side[2 * n] = other < 0 ? -1 : component[other];
-    hull->side[2 * n + 1] = component[s / 4];
-    hull->number[n] = n + 1;
-    n++;
-  }
-  PetscCall(PetscFree(component));
-  nkept = 3 * ntri;
-  PetscCall(PetscMalloc1(nkept, kept));
-  PetscCall(PetscArraycpy(*kept, hull->tri, nkept));
-  PetscCall(PetscSortRemoveDupsInt(&nkept, *kept));
-  PetscCall(PetscArraycpy(hull->x, x, 3 * (size_t)old->nvert));
-  PetscCall(SbDropUnusedPoints(&hull->nvert, hull->x, 3 * ntri, hull->tri));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ the material at new vertices */
@@ -189,37 +147,6 @@ static PetscBool move_vertex(const SbOldMesh *old, SbLocator rest, const Stars *
   return better;
 }
 
-/* Moves inner vertices until all tets are good enough, or nothing helps. */
-static PetscErrorCode move_vertices(const SbOldMesh *old, const SbRemeshing *how, SbLocator rest,
-                                    SbNewMesh *m)
-{
-  PetscBool *moved, better = PETSC_TRUE;
-  Stars stars;
-
-  PetscFunctionBeginUser;
-  // tets around each vertex
-  PetscCall(SbGroupByKey(4 * m->ncell, m->cell, m->nvert, &stars.start, &stars.cells));
-  for (PetscInt i = 0; i < 4 * m->ncell; i++) stars.cells[i] /= 4;
-  PetscCall(PetscCalloc1(m->nvert, &moved));
-  for (int sweep = 0; sweep < SWEEPS && better; sweep++) {
-    better = PETSC_FALSE;
-    for (PetscInt c = 0; c < m->ncell; c++) {
-      if (worse(m, c) >= how->quality) continue;
-      for (int a = 0; a < 4; a++) {
-        const PetscInt v = m->cell[4 * c + a];
-
-        if (v < m->nkept || !move_vertex(old, rest, &stars, v, m)) continue;
-        moved[v] = better = PETSC_TRUE;
-      }
-    }
-  }
-  for (PetscInt v = 0; v < m->nvert; v++) m->nmoved += moved[v];
-  PetscCall(PetscFree(moved));
-  PetscCall(PetscFree(stars.start));
-  PetscCall(PetscFree(stars.cells));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static uint64_t edge_key(PetscInt p, PetscInt q)
 {
   return (uint64_t)PetscMin(p, q) << 32 | (uint64_t)PetscMax(p, q);
@@ -306,8 +233,29 @@ static PetscErrorCode repair_tets(const SbOldMesh *old, const SbRemeshing *how, 
   qsort(edge, 3 * (size_t)hull->ntri, sizeof(*edge), by_key);
   for (int round = 0; round < ROUNDS && split; round++) {
     const PetscInt ncell = m->ncell;
+    PetscBool *moved, better = PETSC_TRUE;
+    Stars stars;
 
-    PetscCall(move_vertices(old, how, rest, m));
+    // moves inner vertices until all tets are good enough, or nothing helps
+    PetscCall(SbGroupByKey(4 * m->ncell, m->cell, m->nvert, &stars.start, &stars.cells));
+    for (PetscInt i = 0; i < 4 * m->ncell; i++) stars.cells[i] /= 4;
+    PetscCall(PetscCalloc1(m->nvert, &moved));
+    for (int sweep = 0; sweep < SWEEPS && better; sweep++) {
+      better = PETSC_FALSE;
+      for (PetscInt c = 0; c < m->ncell; c++) {
+        if (worse(m, c) >= how->quality) continue;
+        for (int a = 0; a < 4; a++) {
+          const PetscInt v = m->cell[4 * c + a];
+
+          if (v < m->nkept || !move_vertex(old, rest, &stars, v, m)) continue;
+          moved[v] = better = PETSC_TRUE;
+        }
+      }
+    }
+    for (PetscInt v = 0; v < m->nvert; v++) m->nmoved += moved[v];
+    PetscCall(PetscFree(moved));
+    PetscCall(PetscFree(stars.start));
+    PetscCall(PetscFree(stars.cells));
     split = PETSC_FALSE;
     for (PetscInt c = 0; c < ncell && round + 1 < ROUNDS; c++) {
       PetscInt ends[2] = {-1, -1};
@@ -369,10 +317,38 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
 {
   SbTets tets = {0};
   PetscBool *used, all = PETSC_TRUE;
+  PetscInt *component, nregion, ntri = 0, n = 0, nkept;
 
   PetscFunctionBeginUser;
-  // the hull: outer surface and interfaces between regions
-  PetscCall(create_hull(old, how->rest ? old->X : old->x, hull, &m->kept));
+  PetscCall(PetscMalloc1(old->ncell, &component));
+  // parts of the body that hang together by faces between tets of one number
+  for (PetscInt c = 0; c < old->ncell; c++) component[c] = c;
+  for (PetscInt s = 0; s < 4 * old->ncell; s++) {
+    const PetscInt other = old->faces->neighbour[s];
+
+    if (other >= 0 && old->region[other] == old->region[s / 4]) (void)SbUnionJoin(component, other, s / 4);
+  }
+  nregion = SbUnionNumber(old->ncell, component);
+  // the hull: outer surface and interfaces between regions, in the shape that is filled
+  for (PetscInt s = 0; s < 4 * old->ncell; s++) ntri += in_hull(old, component, s / 4, s % 4);
+  PetscCall(SbSurfaceCreate(old->nvert, ntri, nregion, hull));
+  for (PetscInt s = 0; s < 4 * old->ncell; s++) {
+    const PetscInt other = old->faces->neighbour[s];
+
+    if (!in_hull(old, component, s / 4, s % 4)) continue;
+    for (int k = 0; k < 3; k++) hull->tri[3 * n + k] = old->cell[4 * (s / 4) + SbFaceVertex[s % 4][k]];
+    hull->side[2 * n] = other < 0 ? -1 : component[other];
+    hull->side[2 * n + 1] = component[s / 4];
+    hull->number[n] = n + 1;
+    n++;
+  }
+  PetscCall(PetscFree(component));
+  nkept = 3 * ntri;
+  PetscCall(PetscMalloc1(nkept, &m->kept));
+  PetscCall(PetscArraycpy(m->kept, hull->tri, nkept));
+  PetscCall(PetscSortRemoveDupsInt(&nkept, m->kept));
+  PetscCall(PetscArraycpy(hull->x, how->rest ? old->X : old->x, 3 * (size_t)old->nvert));
+  PetscCall(SbDropUnusedPoints(&hull->nvert, hull->x, 3 * ntri, hull->tri));
   m->nkept = hull->nvert;
   PetscCall((*how->mesher)(where, hull, how->size * SbSurfaceMeasure(hull, NULL), how->ctx, &tets));
   m->nvert = tets.nvert;

@@ -36,35 +36,6 @@ static PetscErrorCode collect(PetscSF sf, PetscInt n, MPI_Datatype one, const vo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode gather_cells(SbMesh mesh, PetscBool root, PetscSF sf, SbGathered *g)
-{
-  const PetscInt n = mesh->ncell_owned;
-  PetscInt *cell;
-  uint64_t *set;
-
-  PetscFunctionBeginUser;
-  if (root) {
-    PetscCall(PetscMalloc1(4 * (size_t)g->ncell, &g->cell));
-    PetscCall(PetscMalloc1(g->ncell, &g->cell_material));
-    PetscCall(PetscMalloc1(5 * (size_t)g->ncell, &g->cell_set));
-  }
-  PetscCall(PetscMalloc1(4 * (size_t)n, &cell));
-  PetscCall(PetscMalloc1(5 * (size_t)n, &set));
-  for (PetscInt c = 0; c < n; c++) {
-    for (int a = 0; a < 4; a++) {
-      cell[4 * c + a] = mesh->vert_orig[mesh->cell[4 * c + a]];
-      set[5 * c + 1 + a] = mesh->face_set[4 * c + a];
-    }
-    set[5 * c] = mesh->cell_set[c];
-  }
-  PetscCall(collect(sf, 4, MPIU_INT, cell, g->cell));
-  PetscCall(collect(sf, 1, MPIU_INT, mesh->cell_material, g->cell_material));
-  PetscCall(collect(sf, 5, MPI_UINT64_T, set, g->cell_set));
-  PetscCall(PetscFree(cell));
-  PetscCall(PetscFree(set));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The vectors of a run. */
 static PetscInt vectors_of(SbRun run, Vec vec[3])
 {
@@ -83,33 +54,6 @@ static PetscInt node_at(SbSpace s, PetscInt cell, PetscInt k)
   return s->edge_node[6 * cell + k - SB_EDGES];
 }
 
-static PetscErrorCode gather_values(SbRun run, PetscBool root, PetscSF sf, SbGathered *g)
-{
-  const SbSpace s = run->model->space;
-  const PetscInt n = s->mesh->ncell_owned, each = g->width * g->nfield * 3;
-  const PetscReal *array;
-  PetscReal *value;
-  Vec vec[3];
-
-  PetscFunctionBeginUser;
-  (void)vectors_of(run, vec);
-  if (root) PetscCall(PetscMalloc1((size_t)each * (size_t)g->ncell, &g->value));
-  PetscCall(PetscMalloc1((size_t)each * (size_t)n, &value));
-  for (PetscInt f = 0; f < g->nfield; f++) {
-    PetscCall(SbSpaceGetLocalRead(s, vec[f], &array));
-    for (PetscInt i = 0; i < n * g->width; i++) {
-      const PetscInt node = node_at(s, i / g->width, i % g->width);
-
-      for (int k = 0; k < 3; k++)
-        value[(g->nfield * i + f) * 3 + k] = node < 0 ? PETSC_MAX_REAL : array[3 * node + k];
-    }
-    PetscCall(SbSpaceRestoreLocalRead(s, vec[f], &array));
-  }
-  PetscCall(collect(sf, each, MPIU_REAL, value, g->value));
-  PetscCall(PetscFree(value));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbGather(SbRun run, SbGathered *g)
 {
   const SbModel m = run->model;
@@ -118,6 +62,12 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   PetscReal(*centre)[4], *now;
   Vec vec[3];
   PetscSF sf;
+  const PetscInt n = mesh->ncell_owned;
+  PetscInt *cell, each;
+  uint64_t *set;
+  const SbSpace s = m->space;
+  const PetscReal *array;
+  PetscReal *value;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(g, sizeof(*g)));
@@ -141,9 +91,7 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   PetscCall(PetscFree(centre));
   // vertices and their sets to rank 0
   if (!rank) {
-    PetscCall(PetscMalloc1(3 * (size_t)g->nvert, &g->X));
-    PetscCall(PetscMalloc1(3 * (size_t)g->nvert, &g->x));
-    PetscCall(PetscMalloc1(g->nvert, &g->vert_set));
+    PetscCall(PetscMalloc3(3 * (size_t)g->nvert, &g->X, 3 * (size_t)g->nvert, &g->x, g->nvert, &g->vert_set));
   }
   PetscCall(forest(mesh->comm, mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &sf));
   PetscCall(PetscMalloc1(3 * (size_t)mesh->nvert, &now));
@@ -154,8 +102,39 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   PetscCall(collect(sf, 1, MPI_UINT64_T, mesh->vert_set, g->vert_set));
   PetscCall(PetscSFDestroy(&sf));
   PetscCall(forest(m->comm, mesh->Ncell, mesh->ncell_owned, mesh->cell_orig, &sf));
-  PetscCall(gather_cells(mesh, (PetscBool)!rank, sf, g));
-  PetscCall(gather_values(run, (PetscBool)!rank, sf, g));
+  // cells with their vertices, materials and sets
+  if (!rank) {
+    PetscCall(PetscMalloc3(4 * (size_t)g->ncell, &g->cell, g->ncell, &g->cell_material, 5 * (size_t)g->ncell,
+                           &g->cell_set));
+  }
+  PetscCall(PetscMalloc2(4 * (size_t)n, &cell, 5 * (size_t)n, &set));
+  for (PetscInt c = 0; c < n; c++) {
+    for (int a = 0; a < 4; a++) {
+      cell[4 * c + a] = mesh->vert_orig[mesh->cell[4 * c + a]];
+      set[5 * c + 1 + a] = mesh->face_set[4 * c + a];
+    }
+    set[5 * c] = mesh->cell_set[c];
+  }
+  PetscCall(collect(sf, 4, MPIU_INT, cell, g->cell));
+  PetscCall(collect(sf, 1, MPIU_INT, mesh->cell_material, g->cell_material));
+  PetscCall(collect(sf, 5, MPI_UINT64_T, set, g->cell_set));
+  PetscCall(PetscFree2(cell, set));
+  // the values of the vectors at the nodes of each cell
+  each = g->width * g->nfield * 3;
+  if (!rank) PetscCall(PetscMalloc1((size_t)each * (size_t)g->ncell, &g->value));
+  PetscCall(PetscMalloc1((size_t)each * (size_t)n, &value));
+  for (PetscInt f = 0; f < g->nfield; f++) {
+    PetscCall(SbSpaceGetLocalRead(s, vec[f], &array));
+    for (PetscInt i = 0; i < n * g->width; i++) {
+      const PetscInt node = node_at(s, i / g->width, i % g->width);
+
+      for (int k = 0; k < 3; k++)
+        value[(g->nfield * i + f) * 3 + k] = node < 0 ? PETSC_MAX_REAL : array[3 * node + k];
+    }
+    PetscCall(SbSpaceRestoreLocalRead(s, vec[f], &array));
+  }
+  PetscCall(collect(sf, each, MPIU_REAL, value, g->value));
+  PetscCall(PetscFree(value));
   PetscCall(PetscSFDestroy(&sf));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -165,12 +144,8 @@ PetscErrorCode SbGatheredDestroy(SbGathered *g)
   PetscFunctionBeginUser;
   PetscCall(PetscFree2(g->vert0, g->cell0));
   PetscCall(PetscFree(g->mass));
-  PetscCall(PetscFree(g->X));
-  PetscCall(PetscFree(g->x));
-  PetscCall(PetscFree(g->vert_set));
-  PetscCall(PetscFree(g->cell));
-  PetscCall(PetscFree(g->cell_material));
-  PetscCall(PetscFree(g->cell_set));
+  PetscCall(PetscFree3(g->X, g->x, g->vert_set));
+  PetscCall(PetscFree3(g->cell, g->cell_material, g->cell_set));
   PetscCall(PetscFree(g->value));
   PetscCall(PetscMemzero(g, sizeof(*g)));
   PetscFunctionReturn(PETSC_SUCCESS);

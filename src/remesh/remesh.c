@@ -298,39 +298,6 @@ static PetscReal distance(const PetscReal a[3], const PetscReal b[3])
 
 /* ------------------------------------------------------------------ a re-meshing from beginning to end */
 
-/* What rank 0 has outcome; all ranks know the messages, numbers and names. any: some body has a new mesh. */
-static PetscErrorCode make_meshes(SbRemesh r, SbRun run, SbRemeshResult *result, PetscBool *any)
-{
-  const SbModel m = run->model;
-  SbRenamed *renamed = &result->renamed;
-  SbGathered g;
-  PetscMPIInt rank;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(m->comm, &rank));
-  PetscCall(SbGather(run, &g));
-  if (!rank) PetscCall(SbRemeshBodies(m, &g, r->due, run->step_now, &r->how, result));
-  result->next.nbody = g.nbody;
-  result->next.nfield = g.nfield;
-  result->next.width = g.width;
-  PetscCall(SbGatheredDestroy(&g));
-  PetscCallMPI(
-    MPI_Bcast(result->outcome, (int)((size_t)m->nbody * sizeof(*result->outcome)), MPI_BYTE, 0, m->comm));
-  PetscCallMPI(MPI_Bcast(result->done, (PetscMPIInt)m->nbody, SB_MPI_BOOL, 0, m->comm));
-  PetscCallMPI(MPI_Bcast(&renamed->n, 1, MPIU_INT, 0, m->comm));
-  if (rank) PetscCall(PetscMalloc2(renamed->n, &renamed->from, renamed->n, &renamed->to));
-  PetscCallMPI(MPI_Bcast(renamed->from, (PetscMPIInt)renamed->n, MPIU_INT, 0, m->comm));
-  PetscCallMPI(MPI_Bcast(renamed->to, (PetscMPIInt)renamed->n, MPIU_INT, 0, m->comm));
-  *any = PETSC_FALSE;
-  for (PetscInt b = 0; b < m->nbody; b++) {
-    *any = (PetscBool)(*any || result->done[b]);
-    if (r->due[b] && !result->done[b])
-      PetscCall(SbWarning(m->comm, "body '%s' keeps its mesh after step %" PetscInt_FMT ": %s",
-                          m->body[b].name, run->step_now, result->outcome[b].message));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The new scene, or the message why it cannot be made: then the old one goes on. */
 static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
 {
@@ -432,12 +399,37 @@ static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
   SbRemeshResult result;
   const SbRemeshOutcome *outcome;
   const PetscBool *done;
+  const SbModel m = scene->run->model;
+  SbRenamed *renamed = &result.renamed;
+  SbGathered g;
+  PetscMPIInt rank;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogStagePush(SbStageSetup));
   PetscCall(PetscLogEventBegin(r->event, 0, 0, 0, 0));
   PetscCall(SbRemeshResultCreate(scene->model->nbody, &result));
-  PetscCall(make_meshes(r, scene->run, &result, any));
+  // new meshes on rank 0; all ranks know the messages, numbers and names
+  PetscCallMPI(MPI_Comm_rank(m->comm, &rank));
+  PetscCall(SbGather(scene->run, &g));
+  if (!rank) PetscCall(SbRemeshBodies(m, &g, r->due, scene->run->step_now, &r->how, &result));
+  result.next.nbody = g.nbody;
+  result.next.nfield = g.nfield;
+  result.next.width = g.width;
+  PetscCall(SbGatheredDestroy(&g));
+  PetscCallMPI(
+    MPI_Bcast(result.outcome, (int)((size_t)m->nbody * sizeof(*result.outcome)), MPI_BYTE, 0, m->comm));
+  PetscCallMPI(MPI_Bcast(result.done, (PetscMPIInt)m->nbody, SB_MPI_BOOL, 0, m->comm));
+  PetscCallMPI(MPI_Bcast(&renamed->n, 1, MPIU_INT, 0, m->comm));
+  if (rank) PetscCall(PetscMalloc2(renamed->n, &renamed->from, renamed->n, &renamed->to));
+  PetscCallMPI(MPI_Bcast(renamed->from, (PetscMPIInt)renamed->n, MPIU_INT, 0, m->comm));
+  PetscCallMPI(MPI_Bcast(renamed->to, (PetscMPIInt)renamed->n, MPIU_INT, 0, m->comm));
+  *any = PETSC_FALSE;
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    *any = (PetscBool)(*any || result.done[b]);
+    if (r->due[b] && !result.done[b])
+      PetscCall(SbWarning(m->comm, "body '%s' keeps its mesh after step %" PetscInt_FMT ": %s",
+                          m->body[b].name, scene->run->step_now, result.outcome[b].message));
+  }
   // quality and step from which a body may be remeshed again
   outcome = result.outcome;
   done = result.done;

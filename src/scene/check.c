@@ -39,25 +39,19 @@ static PetscErrorCode near_files(const char *path, size_t size, char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The file, or the points of a mesh of TetGen whose files are named without their endings; sets errno. */
-static PetscBool mesh_is_there(const char *mesh)
-{
-  char node[PETSC_MAX_PATH_LEN + 8];
-
-  (void)snprintf(node, sizeof(node), "%s.node", mesh);
-  return (PetscBool)(!access(node, R_OK) || !access(mesh, R_OK));
-}
-
 /* Rank 0 looks, all ranks learn the result. */
 static PetscErrorCode check_mesh_file(MPI_Comm comm, const SbBody *body)
 {
   char near[PETSC_MAX_PATH_LEN] = "", folder[PETSC_MAX_PATH_LEN], make[PETSC_MAX_PATH_LEN + 32] = "";
+  char node[PETSC_MAX_PATH_LEN + 8];
   int error = 0;
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  if (!rank && !mesh_is_there(body->mesh)) {
+  // the file, or the points of a mesh of TetGen whose files are named without their endings
+  (void)snprintf(node, sizeof(node), "%s.node", body->mesh);
+  if (!rank && access(node, R_OK) && access(body->mesh, R_OK)) {
     error = errno;
 
     /* "; make meshes/lobe.msh makes it" where its description for gmsh lies beside it, as for those of the scenarios */

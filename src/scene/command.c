@@ -51,8 +51,8 @@ static PetscBool is_one_of(const char *word, const char *a, const char *b)
   return (PetscBool)(!strcasecmp(word, a) || !strcasecmp(word, b));
 }
 
-/* What keeps rank 0 from reading the file, as an errno; 0 when nothing does. Collective. */
-static int file_error(const char *file)
+/* Whether rank 0 can read an option file: it is noted; else that is said in command->problem. Collective. */
+static PetscBool readable(const char *file, SbCommand *command)
 {
   int error = 0;
   PetscMPIInt rank;
@@ -62,22 +62,14 @@ static int file_error(const char *file)
   if (!rank && access(file, R_OK)) error = errno;
   if (!rank && !error && !stat(file, &info) && S_ISDIR(info.st_mode)) error = EISDIR;
   (void)MPI_Bcast(&error, 1, MPI_INT, 0, MPI_COMM_WORLD);
-  return error;
-}
-
-/* Whether an option file can be read: it is noted; else that is said in command->problem. */
-static PetscBool readable(const char *file, SbCommand *command)
-{
-  const int error = file_error(file);
-
   if (!error) {
     if (command->nfile < (PetscInt)PETSC_STATIC_ARRAY_LENGTH(command->file))
       command->file[command->nfile++] = file;
     return PETSC_TRUE;
   }
-  if (command->problem[0]) return PETSC_FALSE;
-  (void)snprintf(command->problem, sizeof(command->problem), "cannot read the option file %s: %s", file,
-                 strerror(error));
+  if (!command->problem[0])
+    (void)snprintf(command->problem, sizeof(command->problem), "cannot read the option file %s: %s", file,
+                   strerror(error));
   return PETSC_FALSE;
 }
 

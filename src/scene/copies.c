@@ -9,32 +9,6 @@
 
 #define NUMBERS 11 /* of a line: x y z, axis, degrees, scale, velocity */
 
-/* n placements on a grid nx,ny,nz,dx,dy,dz, x fastest. */
-static PetscErrorCode read_grid(const char *name, const char *text, PetscInt *n, SbPlacement **place)
-{
-  int count[3], end = 0;
-  double d[3];
-
-  PetscFunctionBeginUser;
-  PetscCheck(
-    sscanf(text, "%d,%d,%d,%lf,%lf,%lf%n", &count[0], &count[1], &count[2], &d[0], &d[1], &d[2], &end) == 6 &&
-      !text[end] && count[0] > 0 && count[1] > 0 && count[2] > 0 &&
-      (double)count[0] * count[1] * count[2] < 1e6,
-    PETSC_COMM_SELF, PETSC_ERR_USER,
-    "-body_%s_copies grid:%s: give grid:nx,ny,nz,dx,dy,dz, how many along each axis (a million at "
-    "most) and how far apart (m)",
-    name, text);
-  *n = (PetscInt)count[0] * count[1] * count[2];
-  PetscCall(PetscCalloc1(*n, place));
-  for (PetscInt k = 0; k < *n; k++) {
-    const PetscInt at[3] = {k % count[0], k / count[0] % count[1], k / count[0] / count[1]};
-
-    (*place)[k] = (SbPlacement){.rotate = {0., 0., 1., 0.}, .scale = 1.};
-    for (int i = 0; i < 3; i++) (*place)[k].x[i] = (PetscReal)(at[i] * d[i]);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The placement that a line gives, blanks or commas between numbers; false: it gives none, but blanks or a comment. */
 static PetscErrorCode read_line(const char *option, const char *file, int number, char *line,
                                 SbPlacement *place, PetscBool *found)
@@ -103,7 +77,26 @@ PetscErrorCode SbSceneReadCopies(MPI_Comm comm, const char *name, PetscInt *n, S
   PetscCall(SbOptionString(&scope, "copies", sizeof(text), text));
   if (!text[0]) PetscFunctionReturn(PETSC_SUCCESS);
   if (!strncmp(text, "grid:", 5)) {
-    PetscCall(read_grid(name, text + 5, n, place));
+    int count[3], end = 0;
+    double d[3];
+
+    // n placements on a grid nx,ny,nz,dx,dy,dz, x fastest
+    PetscCheck(sscanf(text + 5, "%d,%d,%d,%lf,%lf,%lf%n", &count[0], &count[1], &count[2], &d[0], &d[1],
+                      &d[2], &end) == 6 &&
+                 !text[5 + end] && count[0] > 0 && count[1] > 0 && count[2] > 0 &&
+                 (double)count[0] * count[1] * count[2] < 1e6,
+               PETSC_COMM_SELF, PETSC_ERR_USER,
+               "-body_%s_copies grid:%s: give grid:nx,ny,nz,dx,dy,dz, how many along each axis (a million at "
+               "most) and how far apart (m)",
+               name, text + 5);
+    *n = (PetscInt)count[0] * count[1] * count[2];
+    PetscCall(PetscCalloc1(*n, place));
+    for (PetscInt k = 0; k < *n; k++) {
+      const PetscInt at[3] = {k % count[0], k / count[0] % count[1], k / count[0] / count[1]};
+
+      (*place)[k] = (SbPlacement){.rotate = {0., 0., 1., 0.}, .scale = 1.};
+      for (int i = 0; i < 3; i++) (*place)[k].x[i] = (PetscReal)(at[i] * d[i]);
+    }
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 

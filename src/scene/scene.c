@@ -143,33 +143,6 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The materials of the inclusions of body i, behind those that are there. */
-static PetscErrorCode read_inclusions(SbModel model, PetscInt i)
-{
-  SbBody *body = &model->body[i];
-  char(*names)[SB_NAME_MAX], law[SB_NAME_MAX];
-  SbScope scope;
-  PetscInt n;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScopeSet(&scope, "body", "", body->name));
-  PetscCall(SbOptionNames(&scope, "inclusions", &n, &names));
-  PetscCheck(n <= SB_INCLUSION_MAX, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "-body_%s_inclusions names %" PetscInt_FMT " sets; a body may have up to %d", body->name, n,
-             SB_INCLUSION_MAX);
-  PetscCall(PetscRealloc((size_t)(model->nmaterial + n) * sizeof(*model->material), &model->material));
-  PetscCall(PetscRealloc((size_t)(model->nmaterial + n - model->nbody + 1) * SB_NAME_MAX, &model->inclusion));
-  for (PetscInt k = 0; k < n; k++) {
-    PetscCall(PetscStrncpy(model->inclusion[model->nmaterial - model->nbody], names[k], SB_NAME_MAX));
-    PetscCall(SbScopeSet(&scope, "inclusion", "", names[k]));
-    PetscCall(read_type(&scope, "material", SbMaterialList, law));
-    PetscCall(SbMaterialCreate(law, &scope, &model->material[model->nmaterial]));
-    body->inclusion[body->ninclusion++].material = model->nmaterial++;
-  }
-  PetscCall(PetscFree(names));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The n bodies of these names, each as often as there are copies of it; copy[i]: [ncopy[i]], the caller's. */
 static PetscErrorCode read_named_bodies(SbModel model, PetscInt n, const char (*names)[SB_NAME_MAX],
                                         PetscInt ncopy[], SbPlacement *copy[])
@@ -206,7 +179,31 @@ static PetscErrorCode read_named_bodies(SbModel model, PetscInt n, const char (*
       if (ncopy[i]) SbPlacementAdd(&copy[i][k], body);
     }
   }
-  for (PetscInt i = 0; i < model->nbody; i++) PetscCall(read_inclusions(model, i));
+  for (PetscInt i = 0; i < model->nbody; i++) {
+    SbBody *body = &model->body[i];
+    char(*inclusions)[SB_NAME_MAX], law[SB_NAME_MAX];
+    SbScope scope;
+    PetscInt ninclusion;
+
+    // the materials of the inclusions of body i, behind those that are there
+    PetscCall(SbScopeSet(&scope, "body", "", body->name));
+    PetscCall(SbOptionNames(&scope, "inclusions", &ninclusion, &inclusions));
+    PetscCheck(ninclusion <= SB_INCLUSION_MAX, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "-body_%s_inclusions names %" PetscInt_FMT " sets; a body may have up to %d", body->name,
+               ninclusion, SB_INCLUSION_MAX);
+    PetscCall(
+      PetscRealloc((size_t)(model->nmaterial + ninclusion) * sizeof(*model->material), &model->material));
+    PetscCall(PetscRealloc((size_t)(model->nmaterial + ninclusion - model->nbody + 1) * SB_NAME_MAX,
+                           &model->inclusion));
+    for (PetscInt k = 0; k < ninclusion; k++) {
+      PetscCall(PetscStrncpy(model->inclusion[model->nmaterial - model->nbody], inclusions[k], SB_NAME_MAX));
+      PetscCall(SbScopeSet(&scope, "inclusion", "", inclusions[k]));
+      PetscCall(read_type(&scope, "material", SbMaterialList, law));
+      PetscCall(SbMaterialCreate(law, &scope, &model->material[model->nmaterial]));
+      body->inclusion[body->ninclusion++].material = model->nmaterial++;
+    }
+    PetscCall(PetscFree(inclusions));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -82,21 +82,6 @@ static PetscErrorCode use_name(SbModel model, const char *name)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Names of the sets that an effect acts on; none when its type has no such option. */
-static PetscErrorCode names_of_effect(const SbEffect effect, PetscInt *n, char (**names)[SB_NAME_MAX])
-{
-  SbScope scope;
-  PetscBool has_on;
-
-  PetscFunctionBeginUser;
-  *n = 0;
-  *names = NULL;
-  PetscCall(SbScopeSet(&scope, "effect", effect->type, effect->name));
-  PetscCall(SbOptionExists(&scope, "on", &has_on));
-  if (has_on) PetscCall(SbOptionNames(&scope, "on", n, names));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbSceneReadSets(SbModel model)
 {
   char(*names)[SB_NAME_MAX];
@@ -115,7 +100,13 @@ PetscErrorCode SbSceneReadSets(SbModel model)
   }
   PetscCall(PetscFree(names));
   for (PetscInt e = 0; e < model->neffect; e++) {
-    PetscCall(names_of_effect(model->effect[e], &n, &names));
+    PetscBool has_on;
+
+    // the sets that an effect acts on; none when its type has no such option
+    PetscCall(SbScopeSet(&scope, "effect", model->effect[e]->type, model->effect[e]->name));
+    PetscCall(SbOptionExists(&scope, "on", &has_on));
+    if (!has_on) continue;
+    PetscCall(SbOptionNames(&scope, "on", &n, &names));
     for (PetscInt i = 0; i < n && model->nset <= SB_SET_MAX; i++) PetscCall(use_name(model, names[i]));
     PetscCall(PetscFree(names));
   }

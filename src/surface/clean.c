@@ -203,33 +203,6 @@ static PetscErrorCode cut_flat(SbTriangleFile *f, PetscBool touched[], SbTriangl
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode take_flat(SbTriangleFile *f, SbTriangleEdge edge[], SbSurfaceRepairs *m)
-{
-  SbTriangles *t = f->t;
-  PetscBool *touched;
-  PetscInt ncut = 1, nflat = 1;
-  PetscReal longest2, around;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(t->ntri, &touched));
-  for (int pass = 0; pass < PASSES && ncut; pass++) {
-    PetscCall(cut_flat(f, touched, edge, &ncut, &nflat));
-    m->nflat += ncut;
-  }
-  PetscCall(PetscFree(touched));
-  for (PetscInt i = 0; nflat && i < t->ntri; i++) {
-    const PetscReal *x = t->x + 3 * t->tri[3 * i];
-
-    PetscCheck(
-      SbTriangleMeasure(t, i, &longest2, &around) > SB_TRIANGLE_FLAT * longest2, PETSC_COMM_SELF,
-      PETSC_ERR_USER_INPUT,
-      "%s: triangle %lld at (%.6g, %.6g, %.6g) m has no area (of %" PetscInt_FMT
-      " such ones), and no neighbour that could take it in; remove it (meshlab: remove degenerate faces)",
-      f->where, (long long)f->number[i], (double)x[0], (double)x[1], (double)x[2], nflat);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ open edges */
 
 /* Corner of an edge: its beginning (0) or end (1). */
@@ -261,18 +234,25 @@ static PetscReal partner_distance(const SbTriangles *t, PetscInt n, const PetscI
   return need < 0.25 * edge ? need : 0;
 }
 
-/* Every edge has a triangle on both sides. */
-static PetscErrorCode check_open(const SbTriangleFile *f, SbTriangleEdge edge[])
+PetscErrorCode SbSurfaceRepairTriangles(SbTriangleFile *f, SbSurfaceRepairs *repairs)
 {
   const SbTriangles *t = f->t;
   const PetscInt n = 3 * t->ntri;
-  PetscInt *slot, nopen = 0, first;
-  PetscReal need;
+  SbTriangleEdge *edge;
+  PetscBool *touched;
+  PetscInt *slot, nopen = 0, first, ncut = 1, nflat = 1;
+  PetscReal need, longest2, around;
   const PetscReal *a, *b;
   char option[SB_IMPORT_OPTION_MAX], what[256] = "close the holes (meshlab: close holes; blender: fill)";
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(n, &slot));
+  // triangles without area go into their neighbours, as far as these can take them
+  PetscCall(PetscMalloc3(n, &edge, t->ntri, &touched, n, &slot));
+  for (int pass = 0; pass < PASSES && ncut; pass++) {
+    PetscCall(cut_flat(f, touched, edge, &ncut, &nflat));
+    repairs->nflat += ncut;
+  }
+  // edges with a triangle on one side only
   PetscCall(SbTrianglesEdges(t, edge));
   for (PetscInt i = 0, m; i < n; i += m) {
     m = SbTrianglesAtEdge(n, edge, i);
@@ -281,7 +261,17 @@ static PetscErrorCode check_open(const SbTriangleFile *f, SbTriangleEdge edge[])
   PetscCall(PetscSortInt(nopen, slot));
   first = nopen ? slot[0] : 0;
   need = partner_distance(t, nopen, slot);
-  PetscCall(PetscFree(slot));
+  PetscCall(PetscFree3(edge, touched, slot));
+  for (PetscInt i = 0; nflat && i < t->ntri; i++) {
+    const PetscReal *x = t->x + 3 * t->tri[3 * i];
+
+    PetscCheck(
+      SbTriangleMeasure(t, i, &longest2, &around) > SB_TRIANGLE_FLAT * longest2, PETSC_COMM_SELF,
+      PETSC_ERR_USER_INPUT,
+      "%s: triangle %lld at (%.6g, %.6g, %.6g) m has no area (of %" PetscInt_FMT
+      " such ones), and no neighbour that could take it in; remove it (meshlab: remove degenerate faces)",
+      f->where, (long long)f->number[i], (double)x[0], (double)x[1], (double)x[2], nflat);
+  }
   if (!nopen) PetscFunctionReturn(PETSC_SUCCESS);
   // what is wrong: the first open edge, and whether joining would close all of them
   a = t->x + 3 * edge_end(t, first, 0);
@@ -297,17 +287,4 @@ static PetscErrorCode check_open(const SbTriangleFile *f, SbTriangleEdge edge[])
           "%.6g) to (%.6g, %.6g, %.6g) m; %s",
           f->where, nopen, (long long)f->number[first / 3], (double)a[0], (double)a[1], (double)a[2],
           (double)b[0], (double)b[1], (double)b[2], what);
-}
-
-PetscErrorCode SbSurfaceRepairTriangles(SbTriangleFile *f, SbSurfaceRepairs *m)
-{
-  SbTriangleEdge *edge;
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(3 * (size_t)f->t->ntri, &edge));
-  ierr = take_flat(f, edge, m);
-  if (!ierr) ierr = check_open(f, edge);
-  PetscCall(PetscFree(edge));
-  PetscFunctionReturn(ierr);
 }

@@ -1,5 +1,5 @@
 /*
-  import_surface.c - a body from a closed surface: read, repaired, checked, cut into regions, filled with tets.
+  import_surface.c - a body or a rigid obstacle from a closed surface: read, repaired, checked, cut into regions; a body is filled with tets.
 
   The steps and what each refuses or repairs are in triangles_read.c and its neighbours, clean.c, self_intersection.c,
   region.c and tetrahedralize.c. Lengths are in metres from the reader on: the surface is scaled first.
@@ -221,8 +221,12 @@ static PetscErrorCode take_boundary(const SbTriangleFile *f, const SbSurface *s,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSurfaceObstacle(SbTriangleFile *f, size_t size, char note[])
+/* On rank 0: repaired and checked as the surface of a body, but that triangles may cut each other far from their edges; those with material on both sides are left out. */
+static PetscErrorCode read_obstacle(const char *path, PetscReal scale, const PetscReal at[3],
+                                    SbTriangleFile *f, size_t size, char note[])
 {
+  const SbTriangleFormat *format = SbTrianglesFormat(path);
+  SbTriangles *t = f->t;
   SbSurfaceRepairs repairs;
   SbSurface s;
   PetscReal tolerance, edge;
@@ -231,6 +235,21 @@ PetscErrorCode SbSurfaceObstacle(SbTriangleFile *f, size_t size, char note[])
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(&repairs, sizeof(repairs)));
   PetscCall(PetscMemzero(&s, sizeof(s)));
+  PetscCheck(format && !format->sheets, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: is a file of no known kind; give one that ends in .stl, .obj, .off, .ply or .msh",
+             f->where);
+  PetscCall(SbTrianglesReadFile(path, f));
+  PetscCheck(t->ntri, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s: holds no triangles; give a closed surface of triangles, or a mesh of tetrahedra", f->where);
+  // scaled and placed
+  PetscCall(SbDropUnusedPoints(&t->nvert, t->x, 3 * t->ntri, t->tri));
+  for (PetscInt i = 0; i < 3 * t->nvert; i++) {
+    t->x[i] = scale * t->x[i] + at[i % 3];
+    PetscCheck(isfinite(t->x[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s: vertex %lld has a coordinate that is not a finite number; repair the file", f->where,
+               (long long)(i / 3 + 1));
+  }
+  // repaired; the boundary of its material
   PetscCall(weld_tolerance(f, -1, &tolerance, &edge));
   PetscCall(SbSurfaceMergeVertices(f, tolerance, &repairs));
   PetscCheck(f->t->ntri, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -245,6 +264,49 @@ PetscErrorCode SbSurfaceObstacle(SbTriangleFile *f, size_t size, char note[])
   PetscCall(write_repairs(f->t, &repairs, size, note));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbTrianglesRead(MPI_Comm comm, const char *option, const char *path, PetscReal scale,
+                               const PetscReal at[3], SbTriangles *t)
+{
+  char where[PETSC_MAX_PATH_LEN + 3 * SB_NAME_MAX], note[512] = ""; /* of rank 0, as warnings are */
+  SbCaughtError caught = {0, ""};
+  SbTriangles head;
+  PetscMPIInt rank, n[2];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(t, sizeof(*t)));
+  (void)snprintf(where, sizeof(where), "%s: %s", option, path);
+  // rank 0 reads; all ranks fail together
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  if (!rank) {
+    SbTriangleFile file = {.where = where, .t = t};
+
+    SB_CATCH(&caught, read_obstacle(path, scale, at, &file, sizeof(note), note));
+    PetscCall(PetscFree(file.number));
+    if (caught.code) PetscCall(SbTrianglesDestroy(t));
+  }
+  PetscCall(SbCaughtRaise(comm, &caught));
+  // the surface goes to the others
+  head = *t;
+  PetscCallMPI(MPI_Bcast(&head, (int)sizeof(head), MPI_BYTE, 0, comm));
+  if (rank) {
+    *t = head;
+    t->x = NULL;
+    t->tri = t->across = NULL;
+    PetscCall(PetscMalloc1(3 * (size_t)t->nvert, &t->x));
+    PetscCall(PetscMalloc1(3 * (size_t)t->ntri, &t->tri));
+    PetscCall(PetscMalloc1(3 * (size_t)t->ntri, &t->across));
+  }
+  PetscCall(PetscMPIIntCast(3 * t->nvert, &n[0]));
+  PetscCall(PetscMPIIntCast(3 * t->ntri, &n[1]));
+  PetscCallMPI(MPI_Bcast(t->x, n[0], MPIU_REAL, 0, comm));
+  PetscCallMPI(MPI_Bcast(t->tri, n[1], MPIU_INT, 0, comm));
+  PetscCallMPI(MPI_Bcast(t->across, n[1], MPIU_INT, 0, comm));
+  if (note[0]) PetscCall(SbWarning(comm, "%s: %s", where, note));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ a body */
 
 PetscErrorCode SbSurfaceRead(const char *path, SbImport *im, SbSurface *s)
 {

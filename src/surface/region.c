@@ -52,42 +52,6 @@ typedef struct {
 
 /* ------------------------------------------------------------------ orientation */
 
-/* Visits what is connected to triangle `first`: sense[f] is 1 where f is oriented as the first one, else -1. */
-static PetscErrorCode visit_connected(const Space *s, PetscInt first, const PetscInt across[], int sense[],
-                                      PetscInt stack[], PetscInt *n)
-{
-  const SbTriangles *t = s->t;
-  PetscInt done = 0;
-
-  PetscFunctionBeginUser;
-  // breadth first; stack[0 .. n) is what was reached
-  *n = 0;
-  stack[(*n)++] = first;
-  sense[first] = 1;
-  while (done < *n) {
-    const PetscInt f = stack[done++];
-
-    for (PetscInt k = 3 * f; k < 3 * f + 3; k++) {
-      const PetscInt g = across[k] < 0 ? -1 : across[k] / 3;
-      int same;
-
-      if (g < 0) continue;
-      // neighbours that are oriented alike have their edge in opposite directions
-      same = t->tri[across[k]] != t->tri[k] ? 1 : -1;
-      if (!sense[g]) {
-        sense[g] = same * sense[f];
-        stack[(*n)++] = g;
-      } else if (sense[g] != same * sense[f]) {
-        SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-                "%s: the surface has one side only (a Moebius strip or Klein bottle) around triangles %lld "
-                "and %lld; it encloses nothing, cut it there",
-                s->f->where, (long long)s->f->number[f], (long long)s->f->number[g]);
-      }
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Reverses the minority of each set of triangles that are connected by edges of two. */
 static PetscErrorCode reverse_minority(Space *s, const PetscInt across[], int sense[], PetscInt stack[])
 {
@@ -95,9 +59,35 @@ static PetscErrorCode reverse_minority(Space *s, const PetscInt across[], int se
   for (PetscInt f = 0; f < s->t->ntri; f++) {
     PetscInt n, nother = 0;
     int wrong;
+    const SbTriangles *t = s->t;
+    PetscInt done = 0;
 
     if (sense[f]) continue;
-    PetscCall(visit_connected(s, f, across, sense, stack, &n));
+    // what is connected to this triangle, breadth first; stack[0 .. n) was reached, sense is 1 where it is oriented as this one, else -1
+    n = 0;
+    stack[n++] = f;
+    sense[f] = 1;
+    while (done < n) {
+      const PetscInt old = stack[done++];
+
+      for (PetscInt k = 3 * old; k < 3 * old + 3; k++) {
+        const PetscInt g = across[k] < 0 ? -1 : across[k] / 3;
+        int same;
+
+        if (g < 0) continue;
+        // neighbours that are oriented alike have their edge in opposite directions
+        same = t->tri[across[k]] != t->tri[k] ? 1 : -1;
+        if (!sense[g]) {
+          sense[g] = same * sense[old];
+          stack[n++] = g;
+        } else if (sense[g] != same * sense[old]) {
+          SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+                  "%s: the surface has one side only (a Moebius strip or Klein bottle) around triangles %lld "
+                  "and %lld; it encloses nothing, cut it there",
+                  s->f->where, (long long)s->f->number[old], (long long)s->f->number[g]);
+        }
+      }
+    }
     // what is fewer: those like the first one, or the others
     for (PetscInt i = 0; i < n; i++) nother += sense[stack[i]] < 0;
     wrong = 2 * nother > n ? 1 : -1;

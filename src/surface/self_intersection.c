@@ -47,28 +47,6 @@ static PetscErrorCode find_pairs(const SbTriangles *t, Search *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode name_pairs(const SbTriangleFile *f, const Search *s, const char *why)
-{
-  const PetscReal *x = f->t->x + 3 * f->t->tri[3 * s->pair[0][0]];
-  char text[256] = "";
-
-  PetscFunctionBeginUser;
-  for (PetscInt k = 0; k < PetscMin(s->n, NAMED); k++) {
-    char one[64];
-
-    (void)snprintf(one, sizeof(one), "%s%lld and %lld", k ? ", " : "", (long long)f->number[s->pair[k][0]],
-                   (long long)f->number[s->pair[k][1]]);
-    PetscCall(PetscStrlcat(text, one, sizeof(text)));
-  }
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-          "%s: the surface cuts or touches itself at %" PetscInt_FMT
-          " pair%s of triangles: %s%s, near (%.6g, %.6g, %.6g) m; %s; join the parts into one (meshlab, "
-          "blender: boolean union), or move them apart",
-          f->where, s->n, s->n == 1 ? "" : "s", text, s->n > NAMED ? ", ..." : "", (double)x[0], (double)x[1],
-          (double)x[2], why);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ small folds are smoothed out */
 
 /* Active vertices go half the way to the mean of their neighbours; sum[nvert][4]. */
@@ -142,7 +120,6 @@ PetscErrorCode SbSurfaceUntangle(SbTriangleFile *f, PetscReal reach, SbSurfaceRe
   Search search, left;
   PetscInt ncrossing = 0;
   char why[192] = "", option[SB_IMPORT_OPTION_MAX];
-  PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(t->ntri, &search.crossing));
@@ -163,6 +140,24 @@ PetscErrorCode SbSurfaceUntangle(SbTriangleFile *f, PetscReal reach, SbSurfaceRe
     (void)snprintf(why, sizeof(why), "%s 0 forbids to smooth it",
                    SbImportOption(f->groups, "untangle", option));
   PetscCall(PetscFree(search.crossing));
-  if (why[0]) ierr = name_pairs(f, &search, why);
-  PetscFunctionReturn(ierr);
+  if (why[0]) {
+    const PetscReal *x = t->x + 3 * t->tri[3 * search.pair[0][0]];
+    char text[256] = "";
+
+    // some of the pairs, and where the first one is
+    for (PetscInt k = 0; k < PetscMin(search.n, NAMED); k++) {
+      char one[64];
+
+      (void)snprintf(one, sizeof(one), "%s%lld and %lld", k ? ", " : "",
+                     (long long)f->number[search.pair[k][0]], (long long)f->number[search.pair[k][1]]);
+      PetscCall(PetscStrlcat(text, one, sizeof(text)));
+    }
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+            "%s: the surface cuts or touches itself at %" PetscInt_FMT
+            " pair%s of triangles: %s%s, near (%.6g, %.6g, %.6g) m; %s; join the parts into one (meshlab, "
+            "blender: boolean union), or move them apart",
+            f->where, search.n, search.n == 1 ? "" : "s", text, search.n > NAMED ? ", ..." : "", (double)x[0],
+            (double)x[1], (double)x[2], why);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }

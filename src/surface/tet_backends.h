@@ -24,6 +24,3 @@ typedef struct {
 */
 PetscErrorCode SbTetRun_Gmsh(const SbTetJob *job, SbImport *tets);
 PetscErrorCode SbTetRun_TetGen(const SbTetJob *job, SbImport *tets);
-
-/* The tags of item[2], for triangles that were rebuilt: the triangle of the surface nearest to their middle. */
-PetscErrorCode SbTetNearest(const SbSurface *surface, SbItems *tri, const PetscReal x[]);

@@ -26,20 +26,6 @@ typedef struct {
 
 /* ------------------------------------------------------------------ into the model */
 
-/* The piece between these regions, made when new. */
-static PetscErrorCode find_piece(Model *m, const PetscInt side[2], PetscInt *k)
-{
-  PetscFunctionBeginUser;
-  for (*k = 0; *k < m->npiece; (*k)++) {
-    if (m->piece[*k].side[0] == side[0] && m->piece[*k].side[1] == side[1])
-      PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(PetscRealloc((size_t)(m->npiece + 1) * sizeof(*m->piece), &m->piece));
-  m->piece[m->npiece] = (Piece){(int)m->npiece + 1, {side[0], side[1]}};
-  m->npiece++;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode add_surface(const SbGmsh *g, Model *m)
 {
   const SbSurface *s = m->job->surface;
@@ -48,7 +34,18 @@ static PetscErrorCode add_surface(const SbGmsh *g, Model *m)
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc3(s->ntri, &piece, s->ntri, &tag, 3 * (size_t)s->ntri, &node));
-  for (PetscInt f = 0; f < s->ntri; f++) PetscCall(find_piece(m, s->side + 2 * f, &piece[f]));
+  // the piece between the regions of each triangle, made when new
+  for (PetscInt f = 0; f < s->ntri; f++) {
+    const PetscInt *side = s->side + 2 * f;
+    PetscInt k = 0;
+
+    while (k < m->npiece && (m->piece[k].side[0] != side[0] || m->piece[k].side[1] != side[1])) k++;
+    if (k == m->npiece) {
+      PetscCall(PetscRealloc((size_t)(m->npiece + 1) * sizeof(*m->piece), &m->piece));
+      m->piece[m->npiece++] = (Piece){(int)k + 1, {side[0], side[1]}};
+    }
+    piece[f] = k;
+  }
   for (PetscInt k = 0; k < m->npiece; k++) SB_GMSH(g, ModelAddDiscreteEntity, 2, m->piece[k].tag, NULL, 0);
   // nodes: all on the first entity, gmsh assigns them by the triangles
   PetscCall(PetscMalloc1(s->nvert, &vertex));
@@ -102,26 +99,6 @@ static PetscErrorCode cut_surface(const SbGmsh *g, Model *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode set_sizes(const SbGmsh *g, const SbTetJob *job)
-{
-  const struct {
-    const char *name;
-    PetscReal value;
-  } options[] = {
-    {"Mesh.MeshSizeMax", job->size},
-    {"Mesh.MeshSizeMin", job->remesh ? job->size : 0},
-    {"Mesh.MeshSizeFromPoints", 0},
-    {"Mesh.MeshSizeExtendFromBoundary", job->remesh ? 0 : 1},
-    {"Mesh.Optimize", 1},
-    {"Mesh.OptimizeThreshold", 0.4},
-  };
-
-  PetscFunctionBeginUser;
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(options); i++)
-    SB_GMSH(g, OptionSetNumber, options[i].name, options[i].value);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ out of the model */
 
 /* Items of one entity; their corners are tags of nodes, from 0. */
@@ -142,25 +119,6 @@ static PetscErrorCode take_items(const SbGmsh *g, int dim, int entity, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Vertices in the order of their tags, so that those of a kept surface are the first ones; left out: the old surface's. */
-static PetscErrorCode take_nodes(const SbGmsh *g, SbImport *im)
-{
-  size_t *tag, ntag, nx, nparameter, most = 0;
-  double *x, *parameter;
-
-  PetscFunctionBeginUser;
-  SB_GMSH(g, ModelMeshGetNodes, &tag, &ntag, &x, &nx, &parameter, &nparameter, -1, -1, 0, 0);
-  for (size_t i = 0; i < ntag; i++) most = PetscMax(most, tag[i]);
-  PetscCheck(most < PETSC_MAX_INT / 8, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "too many nodes");
-  PetscCall(SbImportSetVertices(im, (PetscInt)most));
-  for (size_t i = 0; i < ntag; i++) PetscCall(PetscArraycpy(im->x + 3 * (tag[i] - 1), x + 3 * i, 3));
-  PetscCall(SbImportDropUnused(im));
-  g->Free(tag);
-  g->Free(x);
-  g->Free(parameter);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ the job */
 
 static PetscErrorCode work(const SbGmsh *g, void *ctx, SbImport *im)
@@ -168,6 +126,8 @@ static PetscErrorCode work(const SbGmsh *g, void *ctx, SbImport *im)
   Model m = {.job = (const SbTetJob *)ctx};
   const SbSurface *s;
   int missing = 0, *tag;
+  size_t *number, ntag, nx, nparameter, most = 0;
+  double *x, *parameter;
 
   PetscFunctionBeginUser;
   PetscCall(add_surface(g, &m));
@@ -186,7 +146,12 @@ static PetscErrorCode work(const SbGmsh *g, void *ctx, SbImport *im)
   }
   SB_GMSH0(g, ModelGeoSynchronize);
   PetscCall(PetscFree(tag));
-  PetscCall(set_sizes(g, m.job));
+  SB_GMSH(g, OptionSetNumber, "Mesh.MeshSizeMax", m.job->size);
+  SB_GMSH(g, OptionSetNumber, "Mesh.MeshSizeMin", m.job->remesh ? m.job->size : 0);
+  SB_GMSH(g, OptionSetNumber, "Mesh.MeshSizeFromPoints", 0);
+  SB_GMSH(g, OptionSetNumber, "Mesh.MeshSizeExtendFromBoundary", m.job->remesh ? 0 : 1);
+  SB_GMSH(g, OptionSetNumber, "Mesh.Optimize", 1);
+  SB_GMSH(g, OptionSetNumber, "Mesh.OptimizeThreshold", 0.4);
   SB_GMSH(g, ModelMeshGenerate, 3);
   // optimises beyond Generate; Netgen's optimiser is not in every build of gmsh
   for (int pass = 0; pass < 2; pass++) {
@@ -199,8 +164,52 @@ static PetscErrorCode work(const SbGmsh *g, void *ctx, SbImport *im)
   for (PetscInt r = 0; r < s->nregion; r++) PetscCall(take_items(g, 3, (int)r + 1, r, im));
   PetscCheck(im->item[3].n, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "no tets were made");
   for (PetscInt k = 0; k < m.npiece; k++) PetscCall(take_items(g, 2, m.piece[k].tag, 0, im));
-  PetscCall(take_nodes(g, im));
+  // vertices in the order of their tags, so that those of a kept surface are the first ones; left out: the old surface's
+  SB_GMSH(g, ModelMeshGetNodes, &number, &ntag, &x, &nx, &parameter, &nparameter, -1, -1, 0, 0);
+  for (size_t i = 0; i < ntag; i++) most = PetscMax(most, number[i]);
+  PetscCheck(most < PETSC_MAX_INT / 8, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "too many nodes");
+  PetscCall(SbImportSetVertices(im, (PetscInt)most));
+  for (size_t i = 0; i < ntag; i++) PetscCall(PetscArraycpy(im->x + 3 * (number[i] - 1), x + 3 * i, 3));
+  PetscCall(SbImportDropUnused(im));
+  g->Free(number);
+  g->Free(x);
+  g->Free(parameter);
   PetscCall(PetscFree(m.piece));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The tags of new triangles: the triangle of the surface nearest to their middle, so groups survive when a surface is remeshed. */
+static PetscErrorCode nearest_triangles(const SbSurface *s, SbItems *tri, const PetscReal x[])
+{
+  PetscReal(*box)[6];
+  SbBoxTree tree;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(s->ntri, &box));
+  for (PetscInt f = 0; f < s->ntri; f++) SbTriangleBox(s->x, s->tri + 3 * f, box[f]);
+  PetscCall(SbBoxTreeCreate(s->ntri, (const PetscReal(*)[6])box, &tree));
+  for (PetscInt i = 0, f; i < tri->n; i++) {
+    const PetscInt *v = tri->vert + 3 * i;
+    PetscReal middle[6];
+    SbBoxNearest nearest;
+
+    for (int k = 0; k < 6; k++)
+      middle[k] = (x[3 * v[0] + k % 3] + x[3 * v[1] + k % 3] + x[3 * v[2] + k % 3]) / 3;
+    tri->tags[i] = 0;
+    // of equally near ones the first
+    for (SbBoxNearestBegin(&tree, middle, PETSC_MAX_REAL, &nearest); SbBoxNearestNext(&nearest, &f);) {
+      const PetscInt *c = s->tri + 3 * f;
+      const PetscReal *const corner[3] = {s->x + 3 * c[0], s->x + 3 * c[1], s->x + 3 * c[2]};
+      PetscReal w[3], d2;
+
+      (void)SbTriangleClosestPoint(middle, corner, w, &d2);
+      if (d2 > nearest.limit2 || (d2 == nearest.limit2 && f > tri->tags[i])) continue;
+      nearest.limit2 = d2;
+      tri->tags[i] = f;
+    }
+  }
+  PetscCall(SbBoxTreeDestroy(&tree));
+  PetscCall(PetscFree(box));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -212,7 +221,7 @@ PetscErrorCode SbTetRun_Gmsh(const SbTetJob *job, SbImport *tets)
   PetscFunctionBeginUser;
   PetscCall(SbGmshRun(&child, tets));
   if (job->remesh)
-    PetscCall(SbTetNearest(job->surface, &tets->item[2], tets->x));
+    PetscCall(nearest_triangles(job->surface, &tets->item[2], tets->x));
   else {
     // a kept surface is not asked back: its triangles are the input's
     tets->item[2].n = 0;

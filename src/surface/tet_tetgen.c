@@ -57,14 +57,12 @@ static PetscErrorCode check_end(const char *folder, int status)
 /* Whether the point lies in front of a triangle of the surface (0) or behind it (1). */
 static int side_of(const SbSurface *s, PetscInt f, const PetscReal x[3])
 {
-  const PetscReal *a = s->x + 3 * s->tri[3 * f], *b = s->x + 3 * s->tri[3 * f + 1],
-                  *c = s->x + 3 * s->tri[3 * f + 2];
-  const PetscReal u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]},
-                  v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]},
-                  w[3] = {x[0] - a[0], x[1] - a[1], x[2] - a[2]};
-  PetscReal n[3];
+  const PetscInt *v = s->tri + 3 * f;
+  PetscReal e[2][3], w[3], n[3];
 
-  SbCross(u, v, n);
+  for (int k = 0; k < 2; k++) SbSubtract(s->x + 3 * v[k + 1], s->x + 3 * v[0], e[k]);
+  SbSubtract(x, s->x + 3 * v[0], w);
+  SbCross(e[0], e[1], n);
   return SbDot3(n, w) < 0;
 }
 

@@ -23,24 +23,15 @@ PetscErrorCode SbSurfaceCreate(PetscInt nvert, PetscInt ntri, PetscInt nregion, 
   s->nvert = nvert;
   s->ntri = ntri;
   s->nregion = nregion;
-  PetscCall(PetscCalloc1(3 * (size_t)nvert, &s->x));
-  PetscCall(PetscCalloc1(3 * (size_t)ntri, &s->tri));
-  PetscCall(PetscCalloc1(ntri, &s->tags));
-  PetscCall(PetscCalloc1(ntri, &s->number));
-  PetscCall(PetscCalloc1(2 * (size_t)ntri, &s->side));
-  PetscCall(PetscCalloc1(nregion, &s->region_tags));
+  PetscCall(PetscCalloc6(3 * (size_t)nvert, &s->x, 3 * (size_t)ntri, &s->tri, ntri, &s->tags, ntri,
+                         &s->number, 2 * (size_t)ntri, &s->side, nregion, &s->region_tags));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbSurfaceDestroy(SbSurface *s)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscFree(s->x));
-  PetscCall(PetscFree(s->tri));
-  PetscCall(PetscFree(s->tags));
-  PetscCall(PetscFree(s->number));
-  PetscCall(PetscFree(s->side));
-  PetscCall(PetscFree(s->region_tags));
+  PetscCall(PetscFree6(s->x, s->tri, s->tags, s->number, s->side, s->region_tags));
   PetscCall(PetscMemzero(s, sizeof(*s)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -150,52 +141,6 @@ PetscErrorCode SbTetDefaults(SbTetOptions *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The size, whether the triangles stay, and what follows from the shape of the surface. */
-static PetscErrorCode prepare(const char *where, const SbSurface *s, const SbTetOptions *o,
-                              const SbImport *body, SbTetJob *job)
-{
-  PetscReal *volume, edge, all = 0;
-  char option[SB_IMPORT_OPTION_MAX];
-
-  PetscFunctionBeginUser;
-  PetscCheck(s->ntri > 3 && s->nregion > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%s: %" PetscInt_FMT " triangles around %" PetscInt_FMT " regions enclose nothing", where,
-             s->ntri, s->nregion);
-  PetscCall(PetscCalloc1(s->nregion, &volume));
-  edge = SbSurfaceMeasure(s, volume);
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const PetscReal v = volume[r];
-
-    if (!(v > 0)) {
-      PetscCall(PetscFree(volume));
-      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-              "%s: region %" PetscInt_FMT " has the volume %g; its triangles are turned, or not closed",
-              where, r + 1, (double)v);
-    }
-    all += v;
-  }
-  PetscCall(PetscFree(volume));
-  *job = (SbTetJob){.where = where,
-                    .body = body,
-                    .surface = s,
-                    .size = o->size > 0 ? o->size : edge,
-                    .options = *o,
-                    .edge = edge};
-  if (!(job->options.seconds > 0)) job->options.seconds = 600;
-  if (!(job->options.angle > 0)) job->options.angle = 40;
-  job->remesh =
-    (PetscBool)(o->surface == SB_TET_REMESH ||
-                (o->surface == SB_TET_SURFACE_AUTO && (job->size > NEAR * edge || edge > NEAR * job->size)));
-  /* A tet of edge h has the volume h^3 / (6 sqrt(2)); a mesh has some ten percent more tets. */
-  job->expected = 6 * PETSC_SQRT2 * all / (job->size * job->size * job->size);
-  PetscCheck(job->expected < SB_TET_MOST, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%s: a size of %g m makes about %.2g tets out of %.4g m^3; give a size of at least %.3g m (%s)",
-             where, (double)job->size, (double)job->expected, (double)all,
-             (double)(job->size * PetscPowReal(job->expected / SB_TET_MOST, 1. / 3)),
-             SbImportOption(body, "tet_size", option));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The first backend that works; its mesh goes to the body. */
 static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscBool *done, size_t size,
                                    char reasons[], SbImport *body)
@@ -268,9 +213,46 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *s, const SbT
   char reasons[640] = "", size_option[SB_IMPORT_OPTION_MAX], surface_option[SB_IMPORT_OPTION_MAX];
   int exponent;
   PetscErrorCode ierr;
+  PetscReal *volume, edge, all = 0;
+  char option[SB_IMPORT_OPTION_MAX];
 
   PetscFunctionBeginUser;
-  PetscCall(prepare(where, s, o, body, &job));
+  // the size, whether the triangles stay, and what follows from the shape of the surface
+  PetscCheck(s->ntri > 3 && s->nregion > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: %" PetscInt_FMT " triangles around %" PetscInt_FMT " regions enclose nothing", where,
+             s->ntri, s->nregion);
+  PetscCall(PetscCalloc1(s->nregion, &volume));
+  edge = SbSurfaceMeasure(s, volume);
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const PetscReal v = volume[r];
+
+    if (!(v > 0)) {
+      PetscCall(PetscFree(volume));
+      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+              "%s: region %" PetscInt_FMT " has the volume %g; its triangles are turned, or not closed",
+              where, r + 1, (double)v);
+    }
+    all += v;
+  }
+  PetscCall(PetscFree(volume));
+  job = (SbTetJob){.where = where,
+                   .body = body,
+                   .surface = s,
+                   .size = o->size > 0 ? o->size : edge,
+                   .options = *o,
+                   .edge = edge};
+  if (!(job.options.seconds > 0)) job.options.seconds = 600;
+  if (!(job.options.angle > 0)) job.options.angle = 40;
+  job.remesh =
+    (PetscBool)(o->surface == SB_TET_REMESH ||
+                (o->surface == SB_TET_SURFACE_AUTO && (job.size > NEAR * edge || edge > NEAR * job.size)));
+  /* A tet of edge h has the volume h^3 / (6 sqrt(2)); a mesh has some ten percent more tets. */
+  job.expected = 6 * PETSC_SQRT2 * all / (job.size * job.size * job.size);
+  PetscCheck(job.expected < SB_TET_MOST, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: a size of %g m makes about %.2g tets out of %.4g m^3; give a size of at least %.3g m (%s)",
+             where, (double)job.size, (double)job.expected, (double)all,
+             (double)(job.size * PetscPowReal(job.expected / SB_TET_MOST, 1. / 3)),
+             SbImportOption(body, "tet_size", option));
   (void)frexp(job.size, &exponent);
   factor = ldexp(1, 1 - exponent);
   // lengths times a power of two, which is exact: backends with absolute bounds see a size between 1 and 2

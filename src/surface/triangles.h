@@ -68,15 +68,6 @@ const SbTriangleFormat *SbTrianglesFormat(const char *path);
 /* Reads a file of a known kind. */
 PetscErrorCode SbTrianglesReadFile(const char *path, SbTriangleFile *file);
 
-/*
-  SbSurfaceObstacle - a surface that was read and placed becomes the boundary of all its material: repaired and checked as that of a body, but that triangles
-  may cut each other far from their edges; triangles with material on both sides are left out.
-
-  Not collective. Output: file->t with neighbours, volume and mean edge; note - what was repaired, "" when nothing.
-  Errors: PETSC_ERR_USER_INPUT, one line that names the triangle and what to do.
-*/
-PetscErrorCode SbSurfaceObstacle(SbTriangleFile *file, size_t size, char note[]);
-
 /* ------------------------------------------------------------------ triangles_measure.c */
 
 typedef struct {

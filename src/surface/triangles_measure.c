@@ -11,11 +11,6 @@ static const PetscReal *corner(const SbTriangles *t, PetscInt f, int k)
   return t->x + 3 * t->tri[3 * f + k];
 }
 
-static void difference(const PetscReal a[3], const PetscReal b[3], PetscReal c[3])
-{
-  for (int i = 0; i < 3; i++) c[i] = a[i] - b[i];
-}
-
 PetscReal SbTriangleMeasure(const SbTriangles *t, PetscInt f, PetscReal *longest2, PetscReal *around)
 {
   PetscReal e[3][3], n[3];
@@ -24,7 +19,7 @@ PetscReal SbTriangleMeasure(const SbTriangles *t, PetscInt f, PetscReal *longest
   for (int k = 0; k < 3; k++) {
     PetscReal l2;
 
-    difference(corner(t, f, (k + 1) % 3), corner(t, f, k), e[k]);
+    SbSubtract(corner(t, f, (k + 1) % 3), corner(t, f, k), e[k]);
     l2 = SbDot3(e[k], e[k]);
     *longest2 = PetscMax(*longest2, l2);
     *around += PetscSqrtReal(l2);
@@ -70,7 +65,7 @@ PetscReal SbTetVolumeTo(const SbTriangles *t, PetscInt f, const PetscReal o[3])
 {
   PetscReal a[3][3], n[3];
 
-  for (int k = 0; k < 3; k++) difference(corner(t, f, k), o, a[k]);
+  for (int k = 0; k < 3; k++) SbSubtract(corner(t, f, k), o, a[k]);
   SbCross(a[0], a[1], n);
   return SbDot3(n, a[2]) / 6;
 }
@@ -80,7 +75,7 @@ PetscReal SbTriangleSolidAngle(const SbTriangles *t, PetscInt f, const PetscReal
   PetscReal a[3][3], l[3], n[3], down;
 
   for (int k = 0; k < 3; k++) {
-    difference(corner(t, f, k), o, a[k]);
+    SbSubtract(corner(t, f, k), o, a[k]);
     l[k] = PetscSqrtReal(SbDot3(a[k], a[k]));
   }
   SbCross(a[0], a[1], n);

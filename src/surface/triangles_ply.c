@@ -143,24 +143,6 @@ static PetscErrorCode read_count(Ply *p, const Property *q, int64_t *n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_face(Ply *p, const Property *q, int64_t number)
-{
-  int64_t n;
-  double value;
-
-  PetscFunctionBeginUser;
-  PetscCall(read_count(p, q, &n));
-  for (int64_t k = 0; k < n; k++) {
-    PetscCall(read_value(p, q->type, "vertex of a face", &value));
-    if (!(value >= 0 && value < (double)p->f->t->nvert))
-      SB_SCAN_ERROR(p->s, "face %lld uses a vertex that is not there (%g, from 0, of %lld)",
-                    (long long)number, value, (long long)p->f->t->nvert);
-    PetscCall(SbTrianglesAddCorner(p->s, number, (int64_t)value, p->f));
-  }
-  PetscCall(SbTrianglesAddFace(p->s, number, p->f));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode read_all(Ply *p)
 {
   PetscFunctionBeginUser;
@@ -194,7 +176,16 @@ static PetscErrorCode read_all(Ply *p)
         int64_t n = 1;
 
         if (q->axis == 3) {
-          PetscCall(read_face(p, q, i + 1));
+          // the corners of a face
+          PetscCall(read_count(p, q, &n));
+          for (int64_t c = 0; c < n; c++) {
+            PetscCall(read_value(p, q->type, "vertex of a face", &value));
+            if (!(value >= 0 && value < (double)p->f->t->nvert))
+              SB_SCAN_ERROR(p->s, "face %lld uses a vertex that is not there (%g, from 0, of %lld)",
+                            (long long)i + 1, value, (long long)p->f->t->nvert);
+            PetscCall(SbTrianglesAddCorner(p->s, i + 1, (int64_t)value, p->f));
+          }
+          PetscCall(SbTrianglesAddFace(p->s, i + 1, p->f));
           continue;
         }
         if (q->count.size) PetscCall(read_count(p, q, &n));

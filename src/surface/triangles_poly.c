@@ -130,32 +130,6 @@ static PetscErrorCode end_facet(Poly *p, int64_t marker, int64_t facet)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One facet of .poly: numbers of polygons and holes, marker; then these. */
-static PetscErrorCode read_poly_facet(Poly *p, int64_t facet)
-{
-  int64_t count[3], n, number;
-
-  PetscFunctionBeginUser;
-  PetscCall(read_counts(p->s, "number of polygons of a facet", 3, count));
-  for (int64_t i = 0; i < count[0]; i++) {
-    SbScanNext(p->s, '#');
-    PetscCall(SbScanText(p->s, "number of corners of a polygon", &n));
-    PetscCall(read_polygon(p, n, facet));
-    PetscCall(SbScanEndOfLine(p->s));
-  }
-  PetscCall(SbScanRoom(p->s, "holes of a facet", count[1], 4, 4));
-  for (int64_t i = 0; i < count[1]; i++) {
-    SbScanNext(p->s, '#');
-    PetscCall(SbScanText(p->s, "number of a hole", &number));
-    PetscCall(SbReserve(3 * (p->nhole + 1), sizeof(*p->hole), &p->hole_size, &p->hole));
-    PetscCall(SbScanPoint(p->s, "coordinate of a hole", 0, p->hole + 3 * p->nhole));
-    p->nhole++;
-    PetscCall(SbScanEndOfLine(p->s));
-  }
-  PetscCall(end_facet(p, count[2], facet));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ holes and regions */
 
 /* The part may be missing at the end of the file. */
@@ -211,8 +185,28 @@ static PetscErrorCode read_all(Poly *p)
       if (count[1] && SbScanMore(p->s, '#')) PetscCall(SbScanText(p->s, "marker of a facet", &marker));
       PetscCall(SbScanEndOfLine(p->s));
       PetscCall(end_facet(p, marker, i));
-    } else
-      PetscCall(read_poly_facet(p, i));
+    } else {
+      int64_t facet[3], n, number;
+
+      // one facet of .poly: numbers of polygons and holes, marker; then these
+      PetscCall(read_counts(p->s, "number of polygons of a facet", 3, facet));
+      for (int64_t k = 0; k < facet[0]; k++) {
+        SbScanNext(p->s, '#');
+        PetscCall(SbScanText(p->s, "number of corners of a polygon", &n));
+        PetscCall(read_polygon(p, n, i));
+        PetscCall(SbScanEndOfLine(p->s));
+      }
+      PetscCall(SbScanRoom(p->s, "holes of a facet", facet[1], 4, 4));
+      for (int64_t k = 0; k < facet[1]; k++) {
+        SbScanNext(p->s, '#');
+        PetscCall(SbScanText(p->s, "number of a hole", &number));
+        PetscCall(SbReserve(3 * (p->nhole + 1), sizeof(*p->hole), &p->hole_size, &p->hole));
+        PetscCall(SbScanPoint(p->s, "coordinate of a hole", 0, p->hole + 3 * p->nhole));
+        p->nhole++;
+        PetscCall(SbScanEndOfLine(p->s));
+      }
+      PetscCall(end_facet(p, facet[2], i));
+    }
   }
   PetscCall(read_seeds(p, "hole", PETSC_FALSE, &p->f->nhole, &p->f->hole));
   PetscCall(read_seeds(p, "region", PETSC_TRUE, &p->f->nregion, &p->f->region));

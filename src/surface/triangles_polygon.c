@@ -25,11 +25,10 @@ static void find_normal(PetscInt n, const PetscInt vert[], Polygon *p)
 
   for (int k = 0; k < 3; k++) p->normal[k] = 0;
   for (PetscInt i = 1; i + 1 < n; i++) {
-    const PetscReal *a = p->x + 3 * vert[i], *b = p->x + 3 * vert[i + 1];
-    const PetscReal u[3] = {a[0] - o[0], a[1] - o[1], a[2] - o[2]},
-                    v[3] = {b[0] - o[0], b[1] - o[1], b[2] - o[2]};
-    PetscReal c[3];
+    PetscReal u[3], v[3], c[3];
 
+    SbSubtract(p->x + 3 * vert[i], o, u);
+    SbSubtract(p->x + 3 * vert[i + 1], o, v);
     SbCross(u, v, c);
     for (int k = 0; k < 3; k++) p->normal[k] += c[k];
   }
@@ -39,11 +38,11 @@ static void find_normal(PetscInt n, const PetscInt vert[], Polygon *p)
 static PetscReal seen_area(const Polygon *p, PetscInt a, PetscInt b, PetscInt c, PetscReal *longest2)
 {
   const PetscReal *x = p->x + 3 * a, *y = p->x + 3 * b, *z = p->x + 3 * c;
-  const PetscReal u[3] = {y[0] - x[0], y[1] - x[1], y[2] - x[2]},
-                  v[3] = {z[0] - x[0], z[1] - x[1], z[2] - x[2]},
-                  w[3] = {z[0] - y[0], z[1] - y[1], z[2] - y[2]};
-  PetscReal n[3];
+  PetscReal u[3], v[3], w[3], n[3];
 
+  SbSubtract(y, x, u);
+  SbSubtract(z, x, v);
+  SbSubtract(z, y, w);
   SbCross(u, v, n);
   if (longest2) *longest2 = PetscMax(SbDot3(u, u), PetscMax(SbDot3(v, v), SbDot3(w, w)));
   return SbDot3(n, p->normal);

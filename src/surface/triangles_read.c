@@ -153,42 +153,13 @@ static PetscErrorCode add_vertex(SbScan *s, SbTriangleFile *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The words behind o and g: the names of one object and of the groups that the next faces belong to. */
-typedef struct {
-  char object[SB_NAME_MAX], group[8][SB_NAME_MAX];
-  PetscInt ngroup;
-} ObjNames;
-
-static PetscErrorCode obj_names(SbScan *s, PetscBool object, ObjNames *names, SbTriangleFile *f)
-{
-  const char *all[9];
-  PetscInt n = 0;
-
-  PetscFunctionBeginUser;
-  if (object)
-    names->object[0] = 0;
-  else
-    names->ngroup = 0;
-  for (;;) {
-    char word[SB_NAME_MAX];
-
-    while (s->at < s->end && (*s->at == ' ' || *s->at == '\t' || *s->at == '\r')) s->at++;
-    if (s->at >= s->end || *s->at == '\n') break;
-    PetscCall(SbScanWord(s, sizeof(word), word));
-    if (!object && names->ngroup < 8)
-      PetscCall(PetscStrncpy(names->group[names->ngroup++], word, SB_NAME_MAX));
-    if (object && !names->object[0]) PetscCall(PetscStrncpy(names->object, word, SB_NAME_MAX));
-  }
-  if (names->object[0]) all[n++] = names->object;
-  for (PetscInt i = 0; i < names->ngroup; i++) all[n++] = names->group[i];
-  PetscCall(SbTrianglesGroups(f, n, all));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbTrianglesRead_OBJ(SbScan *s, SbTriangleFile *f)
 {
   int64_t nface = 0;
-  ObjNames names;
+  struct { /* the words behind o and g: one object, and the groups that the next faces belong to */
+    char object[SB_NAME_MAX], group[8][SB_NAME_MAX];
+    PetscInt ngroup;
+  } names;
   char word[16];
 
   PetscFunctionBeginUser;
@@ -217,8 +188,29 @@ PetscErrorCode SbTrianglesRead_OBJ(SbScan *s, SbTriangleFile *f)
       }
       PetscCall(SbTrianglesAddFace(s, number, f));
     }
-    if (!strcmp(word, "g") || !strcmp(word, "o"))
-      PetscCall(obj_names(s, (PetscBool)(word[0] == 'o'), &names, f));
+    if (!strcmp(word, "g") || !strcmp(word, "o")) {
+      const PetscBool object = (PetscBool)(word[0] == 'o');
+      const char *all[9];
+      PetscInt n = 0;
+
+      if (object)
+        names.object[0] = 0;
+      else
+        names.ngroup = 0;
+      for (;;) {
+        char name[SB_NAME_MAX];
+
+        while (s->at < s->end && (*s->at == ' ' || *s->at == '\t' || *s->at == '\r')) s->at++;
+        if (s->at >= s->end || *s->at == '\n') break;
+        PetscCall(SbScanWord(s, sizeof(name), name));
+        if (!object && names.ngroup < 8)
+          PetscCall(PetscStrncpy(names.group[names.ngroup++], name, SB_NAME_MAX));
+        if (object && !names.object[0]) PetscCall(PetscStrncpy(names.object, name, SB_NAME_MAX));
+      }
+      if (names.object[0]) all[n++] = names.object;
+      for (PetscInt i = 0; i < names.ngroup; i++) all[n++] = names.group[i];
+      PetscCall(SbTrianglesGroups(f, n, all));
+    }
     PetscCall(SbScanEndOfLine(s));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -3,21 +3,7 @@
 */
 #include "tool.h"
 
-/* ------------------------------------------------------------------ reading and writing, with a word about it */
-
-static PetscErrorCode read_mesh(SbTool *tool, SbImport **mesh)
-{
-  char phase[PETSC_MAX_PATH_LEN + 16];
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  (void)snprintf(phase, sizeof(phase), "%s %s",
-                 SbMeshFileIsSurface(tool->in) ? "making tets from" : "reading", tool->in);
-  PetscCall(SbToolBegin(tool, phase));
-  ierr = SbMeshFileRead(&tool->body, SbToolProgress, tool, mesh);
-  PetscCall(SbToolEnd(tool));
-  PetscFunctionReturn(ierr);
-}
+/* ------------------------------------------------------------------ the commands */
 
 static PetscErrorCode write_mesh(SbTool *tool, SbImport *mesh)
 {
@@ -45,8 +31,6 @@ static PetscErrorCode write_mesh(SbTool *tool, SbImport *mesh)
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ the commands */
 
 /* Reading has filled the surface already. */
 static PetscErrorCode tet(SbTool *tool, SbImport *mesh)
@@ -128,6 +112,7 @@ PetscErrorCode SbToolRun(SbTool *tool)
 {
   const SbToolCommand *command = SbToolCommands;
   SbImport *mesh = NULL;
+  char phase[PETSC_MAX_PATH_LEN + 16];
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
@@ -136,7 +121,13 @@ PetscErrorCode SbToolRun(SbTool *tool)
              "%s: is no surface that tet can fill, by its name; give a closed surface of triangles (.stl, "
              ".obj, .off, .ply, ...); supple-mesh info says what a mesh of tets holds",
              tool->in);
-  PetscCall(read_mesh(tool, &mesh));
+  // the mesh is read, with a word about it
+  (void)snprintf(phase, sizeof(phase), "%s %s",
+                 SbMeshFileIsSurface(tool->in) ? "making tets from" : "reading", tool->in);
+  PetscCall(SbToolBegin(tool, phase));
+  ierr = SbMeshFileRead(&tool->body, SbToolProgress, tool, &mesh);
+  PetscCall(SbToolEnd(tool));
+  PetscCall(ierr);
   ierr = command->run(tool, mesh);
   if (!ierr && tool->view[0]) ierr = SbToolView(tool, mesh);
   PetscCall(SbMeshFileDestroy(&mesh));

@@ -1,7 +1,22 @@
 /*
   info.c - supple-mesh info: what is in a mesh, whether a run accepts it, and what a run will take.
+
+  What a run will take, from the counts of a mesh. Nodes are those of the element: vertices (p1), faces (cr), four in every tet (dg). A row of the matrix has a block of
+  3 x 3 numbers for itself and for every node that a term joins it with:
+
+    p1  N + 2 edges
+    cr  N + 12 for each tet (six pairs of faces, each in one tet only) + 18 for each inner face, whose jump joins the three other
+        faces of one side with those of the other
+    dg  16 for each tet + 32 for each inner face
+
+  The rest was measured: see the constants. docs/reference/meshes.md says how good it is.
 */
 #include "tool.h"
+
+#define PROCESS 43e6   /* bytes of a run without a mesh to speak of */
+#define TET 600.       /* bytes: mesh and geometry of a tet, with vertices and boundary */
+#define FACTOR 4096.   /* bytes for each unknown of a factorisation */
+#define FACTORED 60000 /* unknowns up to which -solver auto factors the matrix of a dynamic run */
 
 static PetscErrorCode print(const char *format, ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
 
@@ -59,33 +74,24 @@ static PetscErrorCode bar(const char *label, PetscInt64 n, PetscInt64 most)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode quality(const SbMeshFacts *f)
+/* Bytes that a run of one step takes on one rank, by element: p1, cr, dg. */
+static PetscReal memory(const SbMeshFacts *f, const char *element, PetscInt *unknowns, PetscReal *matrix)
 {
-  PetscInt64 most = 1;
-  char label[32];
+  const PetscReal inner = f->nface - f->body.nfacet, ncell = f->body.ncell;
+  PetscReal nodes = f->body.nvert, blocks = nodes + 2. * f->nedge,
+            times = 1.9; /* matrix, plan, preconditioner */
 
-  PetscFunctionBeginUser;
-  PetscCall(print("dihedral angles, degrees: %.3g to %.4g (70.5 in the regular tet)\n",
-                  (double)f->body.min_dihedral, (double)f->max_dihedral));
-  for (int i = 0; i < SB_ANGLE_BINS; i++) most = PetscMax(most, f->angle[i]);
-  for (int i = 0; i < SB_ANGLE_BINS; i++) {
-    (void)snprintf(label, sizeof(label), "%3d to %3d", 180 / SB_ANGLE_BINS * i,
-                   180 / SB_ANGLE_BINS * (i + 1));
-    PetscCall(bar(label, f->angle[i], most));
+  if (!strcmp(element, "cr")) {
+    nodes = f->nface;
+    blocks = nodes + 12 * ncell + 18 * inner;
+  } else if (!strcmp(element, "dg")) {
+    nodes = 4 * ncell;
+    blocks = 16 * ncell + 32 * inner;
+    times = 2.45;
   }
-  PetscCall(print("radius ratio, circumradius / (3 inradius): up to %.4g (1 in the regular tet)\n",
-                  (double)f->body.max_radius_ratio));
-  most = 1;
-  for (int i = 0; i < SB_RATIO_BINS; i++) most = PetscMax(most, f->ratio[i]);
-  for (int i = 0; i < SB_RATIO_BINS; i++) {
-    if (i + 1 < SB_RATIO_BINS)
-      (void)snprintf(label, sizeof(label), "%4.4g to %.4g", (double)SbRatioBounds[i],
-                     (double)SbRatioBounds[i + 1]);
-    else
-      (void)snprintf(label, sizeof(label), "%4.4g and more", (double)SbRatioBounds[i]);
-    PetscCall(bar(label, f->ratio[i], most));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
+  *unknowns = (PetscInt)(3 * nodes);
+  *matrix = 72 * blocks;
+  return PROCESS + TET * ncell + times * *matrix + (*unknowns <= FACTORED ? FACTOR * *unknowns : 0);
 }
 
 PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
@@ -96,6 +102,8 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
   char number[32];
   const PetscReal *b;
   static const char *const elements[] = {"p1", "cr", "dg"};
+  PetscInt64 most = 1;
+  char label[32];
 
   PetscFunctionBeginUser;
   SbMeshFileCount(mesh, &nvert, n);
@@ -125,14 +133,34 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
                   (double)facts.edge[2]));
   PetscCall(print("  %-26s %12s\n", "faces", SbToolNumber(facts.nface, number)));
   if (facts.body.note[0]) PetscCall(print("  to know: %s\n", facts.body.note));
-  PetscCall(quality(&facts));
+  // shape of the tets
+  PetscCall(print("dihedral angles, degrees: %.3g to %.4g (70.5 in the regular tet)\n",
+                  (double)facts.body.min_dihedral, (double)facts.max_dihedral));
+  for (int i = 0; i < SB_ANGLE_BINS; i++) most = PetscMax(most, facts.angle[i]);
+  for (int i = 0; i < SB_ANGLE_BINS; i++) {
+    (void)snprintf(label, sizeof(label), "%3d to %3d", 180 / SB_ANGLE_BINS * i,
+                   180 / SB_ANGLE_BINS * (i + 1));
+    PetscCall(bar(label, facts.angle[i], most));
+  }
+  PetscCall(print("radius ratio, circumradius / (3 inradius): up to %.4g (1 in the regular tet)\n",
+                  (double)facts.body.max_radius_ratio));
+  most = 1;
+  for (int i = 0; i < SB_RATIO_BINS; i++) most = PetscMax(most, facts.ratio[i]);
+  for (int i = 0; i < SB_RATIO_BINS; i++) {
+    if (i + 1 < SB_RATIO_BINS)
+      (void)snprintf(label, sizeof(label), "%4.4g to %.4g", (double)SbRatioBounds[i],
+                     (double)SbRatioBounds[i + 1]);
+    else
+      (void)snprintf(label, sizeof(label), "%4.4g and more", (double)SbRatioBounds[i]);
+    PetscCall(bar(label, facts.ratio[i], most));
+  }
   // what a run of it needs
   PetscCall(print("a dynamic run on one rank, estimated\n  %-8s %14s %14s %14s\n", "element", "unknowns",
                   "matrix MiB", "memory MiB"));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements); i++) {
     PetscInt unknowns;
     PetscReal matrix;
-    const PetscReal bytes = SbToolMemory(&facts, elements[i], &unknowns, &matrix);
+    const PetscReal bytes = memory(&facts, elements[i], &unknowns, &matrix);
 
     PetscCall(print("  %-8s %14s %14.0f %14.0f\n", elements[i], SbToolNumber(unknowns, number),
                     (double)matrix / 1048576, (double)bytes / 1048576));

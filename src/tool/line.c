@@ -92,20 +92,6 @@ static PetscBool is_truth(const char *word)
   return PETSC_FALSE;
 }
 
-/* Whether the word behind an option is its value. */
-static PetscErrorCode takes_value(const char *option, const char *next, PetscBool *takes)
-{
-  const SbOption *row = find_row(option + 1, NULL);
-  PetscBool is_option;
-
-  PetscFunctionBeginUser;
-  *takes = PETSC_FALSE;
-  if (!next) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscOptionsValidKey(next, &is_option));
-  *takes = (PetscBool)(!is_option && (!row || row->kind != SB_OPTION_BOOL || is_truth(next)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbToolCommandLine(int *argc, char *argv[], SbToolLine *line)
 {
   int kept = 1;
@@ -113,7 +99,7 @@ PetscErrorCode SbToolCommandLine(int *argc, char *argv[], SbToolLine *line)
   PetscFunctionBeginUser;
   memset(line, 0, sizeof(*line));
   for (int i = 1; i < *argc; i++) {
-    PetscBool is_option, value;
+    PetscBool is_option;
 
     PetscCall(PetscOptionsValidKey(argv[i], &is_option));
     if (!strcasecmp(argv[i], "-help") || !strcasecmp(argv[i], "--help") || !strcmp(argv[i], "-h")) {
@@ -121,9 +107,14 @@ PetscErrorCode SbToolCommandLine(int *argc, char *argv[], SbToolLine *line)
     } else if (!strcasecmp(argv[i], "-version") || !strcasecmp(argv[i], "--version")) {
       line->version = PETSC_TRUE;
     } else if (is_option) {
-      PetscCall(takes_value(argv[i], argv[i + 1], &value));
+      const SbOption *row = find_row(argv[i] + 1, NULL);
+
+      // the word behind an option is its value, but for a switch only where it says true or false
       argv[kept++] = argv[i];
-      if (value) argv[kept++] = argv[++i];
+      if (!argv[i + 1]) break;
+      PetscCall(PetscOptionsValidKey(argv[i + 1], &is_option));
+      if (!is_option && (!row || row->kind != SB_OPTION_BOOL || is_truth(argv[i + 1])))
+        argv[kept++] = argv[++i];
     } else {
       if (line->nword < 4) line->word[line->nword] = argv[i];
       line->nword++;
@@ -157,30 +148,47 @@ static PetscErrorCode check_option(const char *name, const char *command)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode find_command(const char *word, const SbToolCommand **command)
-{
-  const char *list[16];
-  char all[256];
-  PetscInt n = 0;
-
-  PetscFunctionBeginUser;
-  for (*command = SbToolCommands; (*command)->name; (*command)++) {
-    if (!strcmp((*command)->name, word)) PetscFunctionReturn(PETSC_SUCCESS);
-    list[n++] = (*command)->name;
-  }
-  PetscCall(SbNamesAdvise(word, n, list, sizeof(all), all));
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "'%s' is no command; the commands are %s", word, all);
-}
-
 /* ------------------------------------------------------------------ values */
 
-static PetscErrorCode read_options(SbTool *tool)
+PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *line, SbTool *tool)
 {
+  const SbToolCommand *command;
+  const char *list[16];
+  char all[256] = "";
+  PetscInt n = 0;
+  PetscMPIInt size;
+  int nfile;
   SbScope scope;
   PetscInt format;
   PetscInt backend, surface;
 
   PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(tool, sizeof(*tool)));
+  // one process, a command, and as many files as it takes
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  PetscCheck(size == 1, PETSC_COMM_WORLD, PETSC_ERR_USER, "runs on one process, not on %d; leave out mpirun",
+             (int)size);
+  PetscCheck(line->nword, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "no command is given; supple-mesh -help lists them, supple-mesh info FILE describes a mesh");
+  for (command = SbToolCommands; command->name && strcmp(command->name, line->word[0]); command++)
+    list[n++] = command->name;
+  if (!command->name) PetscCall(SbNamesAdvise(line->word[0], n, list, sizeof(all), all));
+  PetscCheck(command->name, PETSC_COMM_SELF, PETSC_ERR_USER, "'%s' is no command; the commands are %s",
+             line->word[0], all);
+  nfile = line->nword - 1;
+  PetscCheck(nfile == command->nfile, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s takes %d file%s, not %d: supple-mesh %s %s", command->name, command->nfile,
+             command->nfile > 1 ? "s" : "", nfile, command->name, command->files);
+  for (int i = 1; i < argc; i++) {
+    PetscBool is_option;
+
+    PetscCall(PetscOptionsValidKey(argv[i], &is_option));
+    if (is_option) PetscCall(check_option(argv[i] + 1, command->name));
+  }
+  tool->command = command->name;
+  tool->in = line->word[1];
+  tool->out = command->nfile > 1 ? line->word[2] : NULL;
+  PetscCall(PetscStrncpy(tool->body.mesh, tool->in, sizeof(tool->body.mesh)));
   PetscCall(SbScopeSet(&scope, "", "", ""));
   tool->merge_tolerance = -1;
   PetscCall(SbOptionReal(&scope, "merge_tolerance", &tool->merge_tolerance));
@@ -205,38 +213,5 @@ static PetscErrorCode read_options(SbTool *tool)
   PetscCall(SbOptionReals(&scope, "translate", tool->body.translate));
   PetscCall(SbOptionString(&scope, "view", sizeof(tool->view), tool->view));
   PetscCall(SbOptionBool(&scope, "quiet", &tool->quiet));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *line, SbTool *tool)
-{
-  const SbToolCommand *command = NULL;
-  PetscMPIInt size;
-  int nfile;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(tool, sizeof(*tool)));
-  // one process, a command, and as many files as it takes
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  PetscCheck(size == 1, PETSC_COMM_WORLD, PETSC_ERR_USER, "runs on one process, not on %d; leave out mpirun",
-             (int)size);
-  PetscCheck(line->nword, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "no command is given; supple-mesh -help lists them, supple-mesh info FILE describes a mesh");
-  PetscCall(find_command(line->word[0], &command));
-  nfile = line->nword - 1;
-  PetscCheck(nfile == command->nfile, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s takes %d file%s, not %d: supple-mesh %s %s", command->name, command->nfile,
-             command->nfile > 1 ? "s" : "", nfile, command->name, command->files);
-  for (int i = 1; i < argc; i++) {
-    PetscBool is_option;
-
-    PetscCall(PetscOptionsValidKey(argv[i], &is_option));
-    if (is_option) PetscCall(check_option(argv[i] + 1, command->name));
-  }
-  tool->command = command->name;
-  tool->in = line->word[1];
-  tool->out = command->nfile > 1 ? line->word[2] : NULL;
-  PetscCall(PetscStrncpy(tool->body.mesh, tool->in, sizeof(tool->body.mesh)));
-  PetscCall(read_options(tool));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -43,10 +43,8 @@ typedef struct {
 } SbToolCommand;
 extern const SbToolCommand SbToolCommands[];
 
-/* info.c, memory.c */
+/* info.c */
 PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh);
-/* Bytes that a run of one step takes on one rank, by element: p1, cr, dg. docs/reference/meshes.md says how good it is. */
-PetscReal SbToolMemory(const SbMeshFacts *facts, const char *element, PetscInt *unknowns, PetscReal *matrix);
 
 /* view.c: draws the mesh to tool->view. */
 PetscErrorCode SbToolView(SbTool *tool, const SbImport *mesh);
