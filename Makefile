@@ -174,7 +174,7 @@ bench: deps ## speed, kept as CSV below tests/perf/results; QUICK=1 measures les
 	$(AGAIN) bin/supple bin/supple-mesh tests
 	@scripts/bench --build $(BUILD) $(if $(QUICK),--quick)
 
-locking: deps ## how P1, CR and DG behave near nu = 1/2, measured into docs/reports/locking.md with its plots (about 10 minutes)
+locking: deps ## how P1, P2, CR and DG behave near nu = 1/2, measured into docs/reports/locking.md with its plots (about 10 minutes)
 	$(AGAIN) $(BUILD)/tests/perf/locking
 	@scripts/locking --build $(BUILD)
 

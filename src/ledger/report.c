@@ -117,6 +117,35 @@ static PetscReal price(SbLedger l, const SbLedgerSeconds *s, int source)
   }
 }
 
+/*
+  Whether P2 halves the error of the mesh for less than edges of half the length do. On the same tets its error is about half the square of that of an element of
+  order one, both relative, while that is small (the bar of docs/reports/quadratic_tets.md: 0.4 to 0.7 of the square). So edges may be longer by r^(-1/2), and
+  the run takes c r^(3/2) times as long, c being the ratio of bytes of the matrix per tet.
+*/
+static void say_quadratic(SbLedger l, PetscReal price_of_half, Words *w)
+{
+  const SbModel m = l->run->model;
+  const PetscInt body = worst_body(l), *nodes = m->element[body]->nodes_per;
+  const SbMaterial law = m->material[body];
+  const PetscReal r = l->error[SB_ERROR_SPACE] / PetscSqrtReal(l->stored);
+  const PetscReal times = (nodes[0] ? 14. : nodes[2] ? 0.9 : 0.45) * r * PetscSqrtReal(r);
+
+  /* P2 itself, and explicit steps, which the smallest distance of nodes bounds */
+  if (nodes[1] || !l->run->J) return;
+  /* nu > 0.45: errors of P1 do not fall with the mesh */
+  if (nodes[0] && law->ops.bulk_modulus(law) > 9.7 * law->ops.shear_modulus(law)) {
+    say(w, "At this Poisson's ratio P1 locks, finer meshes help little: -body_%s_element %s does not. ",
+        m->body[body].name, m->nbegin_step || m->npotential ? "cr" : "p2 (or cr)");
+    return;
+  }
+  /* contact has an edge, where solutions are not smooth */
+  if (m->nbegin_step || m->npotential || times >= price_of_half) return;
+  say(w,
+      "Where the solution is smooth and tets are well shaped, -body_%s_element p2 does it with edges of %.2g "
+      "times the length and %.2g times the time; not for shocks and sharp contact. ",
+      m->body[body].name, (double)(1. / PetscSqrtReal(r)), (double)times);
+}
+
 static void say_largest(SbLedger l, const SbLedgerSeconds *s, Words *w)
 {
   static const char *const what[SB_ERROR_COUNT] = {
@@ -144,12 +173,7 @@ static void say_largest(SbLedger l, const SbLedgerSeconds *s, Words *w)
   if (most != SB_ERROR_CONTACT && most != SB_ERROR_ROUNDING)
     say(w, ", and %.2g times the time", (double)price(l, s, most));
   say(w, ". ");
-  /* contact has an edge, where solutions are not smooth */
-  if (most == SB_ERROR_SPACE && order_of_space(l) < 2. && !run->model->nbegin_step && !run->model->npotential)
-    say(w,
-        "Where the solution is smooth and tets are well shaped, -body_%s_element p2 gives more for the same "
-        "time on a coarser mesh; not for shocks and sharp contact. ",
-        run->model->body[worst_body(l)].name);
+  if (most == SB_ERROR_SPACE) say_quadratic(l, price(l, s, most), w);
 }
 
 /* Settings that cost and gain nothing. */

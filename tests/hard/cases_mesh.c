@@ -32,7 +32,9 @@ const HardCase HardCasesMesh[] = {
   BLOCK("needle", NEEDLE, HardMeshNeedle, "2e5", "p1", "corotated", 1),
   BLOCK("needle", NEEDLE, HardMeshNeedle, "2e5", "cr", "corotated", 0),
   BLOCK("needle", NEEDLE, HardMeshNeedle, "2e5", "dg", "corotated", 0),
+  BLOCK("needle", NEEDLE, HardMeshNeedle, "2e5", "p2", "corotated", 0),
   BLOCK("graded", GRADED, HardMeshGraded, "2e6", "p1", "corotated", 0),
   BLOCK("graded", GRADED, HardMeshGraded, "2e6", "cr", "corotated", 0),
+  BLOCK("graded", GRADED, HardMeshGraded, "2e6", "p2", "corotated", 0),
   {.name = NULL},
 };

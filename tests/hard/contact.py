@@ -158,6 +158,7 @@ def plate(s, speed, element="p1"):
 for speed in (2, 5, 50):
     case(f"speed.plate.{speed}", f"a block meets a thin rigid plate at {speed} m/s", short=0 if speed == 50 else None, speed=speed)(plate)
 case("speed.plate.cr", "the same with CR at 50 m/s", short=None, speed=50, element="cr")(plate)
+case("speed.plate.p2", "the same with P2 at 50 m/s", short=None, speed=50, element="p2")(plate)
 
 
 @case("speed.bars", "two crossed bars 2 cm thick meet at 50 m/s", short=0.02)
@@ -189,6 +190,7 @@ def rigid_needle(s, element="p1"):
 
 case("speed.rigid_needle", "a thin rigid needle is driven 2.5 cm into a block at 5 m/s", short=0.006)(rigid_needle)
 case("speed.rigid_needle.cr", "the same with CR", element="cr")(rigid_needle)
+case("speed.rigid_needle.p2", "the same with P2", element="p2")(rigid_needle)
 
 
 def capsule(p, a, b, radius):

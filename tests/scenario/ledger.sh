@@ -48,14 +48,23 @@ for n in 1 2 3; do
 done
 check "the error of the mesh, $(column led1/ledger.csv space 4)" near "$(column led1/ledger.csv space 4)" 0.45 0.3
 check "columns of the history" grep -q 'error_space,error_time,error_nonlinear,error_linear,error_contact,error_rounding$' <<<"$(head -n 1 led1/history.csv)"
-check "no advice of p2" grep -q 'body_bar_element p2' out1.txt
 for n in 1 3; do
   "${mpi[@]}" $n "$supple" bar.opts -body_bar_element p2 -ledger yes -output_dir "quadratic$n" >"quadratic$n.txt" 2>&1
   check "p2, $n ranks: exit code $?" test $? = 0
   check "p2, $n ranks: space differs" near "$(column quadratic$n/ledger.csv space 4)" "$(column quadratic1/ledger.csv space 4)" 1e-6
 done
 check "p2 is more accurate" awk -v a="$(column quadratic1/ledger.csv space 4)" -v b="$(column led1/ledger.csv space 4)" 'BEGIN { exit !(a < 0.4 * b) }'
-check "p2 is advised to p2" test -z "$(grep 'body_bar_element p2 gives' quadratic1.txt)"
+# advice of p2: not to itself; where P1 locks; beside -accuracy; with a length of edges that does halve the error
+words() { tr '\n' ' ' <"$1"; }
+check "p2 is advised to p2" test -z "$(grep 'element p2' <<<"$(words quadratic1.txt)")"
+"$supple" bar.opts -body_bar_poisson 0.4999 -ledger yes -output_dir locked >locked.txt 2>&1
+check "no word of locking" grep -q 'P1 locks.*-body_bar_element p2' <<<"$(words locked.txt)"
+"$supple" bar.opts -body_bar_mesh box:0.4,0.1,0.1:6 -ledger yes -output_dir six >six.txt 2>&1
+longer=$(sed -n 's/.*body_bar_element p2 does it with edges of \([0-9.]*\) times.*/\1/p' <<<"$(words six.txt)")
+across=$(awk -v k="$longer" 'BEGIN { print (k > 1 ? int(6 / k + 0.5) : 0) }')
+check "no length of edges for p2" test "$across" -gt 0
+"$supple" bar.opts -body_bar_mesh "box:0.4,0.1,0.1:$across" -body_bar_element p2 -ledger yes -output_dir longer >longer.txt 2>&1
+check "p2 with edges $longer times as long has no half of the error" awk -v a="$(column longer/ledger.csv space 4)" -v b="$(column six/ledger.csv space 4)" 'BEGIN { exit !(a < 0.5 * b) }'
 "$supple" bar.opts -output_dir plain >plain.txt 2>&1
 check "without -ledger there is one" test ! -e plain/ledger.csv
 check "columns without -ledger" test -z "$(head -n 1 plain/history.csv | grep error_)"
@@ -87,6 +96,7 @@ check "a checkpoint without errors goes unsaid" grep -q 'was written without -le
 check "-accuracy 0.5 says nothing" grep -q -- '-accuracy 0.5 was' coarse.txt
 "$supple" swing.opts -accuracy 0.01 -output_dir fine >fine.txt 2>&1
 check "-accuracy 0.01 on two cells" grep -q 'NOT met' fine.txt
+check "no advice of p2 beside -accuracy" grep -q -- '-body_bar_element p2' <<<"$(words fine.txt)"
 check "no mesh size" grep -q 'too coarse for it: tets of about' <<<"$(tr '\n' ' ' <fine.txt)"
 "$supple" swing.opts -step_time_budget 100 -output_dir slow >slow.txt 2>&1
 check "100 s for a step" grep -q '10 of 10 steps kept it' <<<"$(tr '\n' ' ' <slow.txt)"

@@ -4,11 +4,13 @@
 #pragma once
 #include "verify.h"
 
-/* The linear function of an element in one cell. */
+/* The function of an element in one cell: linear, with P2 that and four times b_i b_j of each edge. */
 typedef struct {
   PetscReal x[4][3]; /* vertices at rest, m */
   PetscReal u[4][3]; /* values there, seen from this cell */
-  PetscReal H[9];    /* gradient, H[3*i+j] = du_i/dX_j */
+  PetscReal e[6][3]; /* P2: values at the middles of edges less the means of their vertices; else 0 */
+  PetscReal g[4][3]; /* P1, P2: gradients of the barycentric coordinates, 1/m */
+  PetscReal H[9];    /* gradient of the linear part, H[3*i+j] = du_i/dX_j */
   PetscReal V;       /* volume, m^3 */
 } VerifyCell;
 
@@ -17,7 +19,6 @@ static inline void verify_cell(SbSpace s, const PetscReal u[], PetscInt c, Verif
 {
   const SbElement e = SbSpaceCellElement(s, c);
   const PetscInt *vertex = s->mesh->cell + 4 * c, *node = s->cell_node + 4 * c;
-  PetscReal g[3][3];
 
   for (int v = 0; v < 4; v++) {
     for (int k = 0; k < 3; k++) {
@@ -26,11 +27,38 @@ static inline void verify_cell(SbSpace s, const PetscReal u[], PetscInt c, Verif
       for (int a = 0; a < 4; a++) cell->u[v][k] += e->ops.vertex[v][a] * u[3 * node[a] + k];
     }
   }
-  e->ops.tabulate((const PetscReal(*)[3])cell->x, g, &cell->V);
+  for (int q = 0; q < 18; q++) {
+    const int *v = SbTetEdge[q / 3], k = q % 3;
+
+    cell->e[q / 3][k] = e->nodes_per[1] ? u[3 * SbSpaceCellNode(s, c, 4 + q / 3) + k] -
+                                            0.5 * (cell->u[v[0]][k] + cell->u[v[1]][k])
+                                        : 0.;
+  }
+  e->ops.tabulate((const PetscReal(*)[3])cell->x, cell->g + 1, &cell->V);
   for (int k = 0; k < 9; k++) {
     cell->H[k] = 0.;
     for (int a = 0; a < 3; a++)
-      cell->H[k] += (u[3 * node[a + 1] + k / 3] - u[3 * node[0] + k / 3]) * g[a][k % 3];
+      cell->H[k] += (u[3 * node[a + 1] + k / 3] - u[3 * node[0] + k / 3]) * cell->g[a + 1][k % 3];
+  }
+  for (int k = 0; k < 3; k++) cell->g[0][k] = -(cell->g[1][k] + cell->g[2][k] + cell->g[3][k]);
+}
+
+/* Value and gradient of that function at barycentric coordinates b. */
+static inline void verify_cell_at(const VerifyCell *cell, const PetscReal b[4], PetscReal u[3],
+                                  PetscReal H[9])
+{
+  for (int k = 0; k < 3; k++) {
+    u[k] = 0.;
+    for (int v = 0; v < 4; v++) u[k] += b[v] * cell->u[v][k];
+    for (int q = 0; q < 6; q++) u[k] += 4. * b[SbTetEdge[q][0]] * b[SbTetEdge[q][1]] * cell->e[q][k];
+  }
+  for (int k = 0; k < 9; k++) {
+    H[k] = cell->H[k];
+    for (int q = 0; q < 6; q++) {
+      const int i = SbTetEdge[q][0], j = SbTetEdge[q][1];
+
+      H[k] += 4. * cell->e[q][k / 3] * (b[j] * cell->g[i][k % 3] + b[i] * cell->g[j][k % 3]);
+    }
   }
 }
 

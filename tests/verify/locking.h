@@ -138,14 +138,11 @@ static inline void locking_shell_cell(const VerifyCell *cell, const PetscReal si
                                       PetscReal sum[7])
 {
   static const int entry[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
-  PetscReal p[3] = {0., 0., 0.}, u[3] = {0., 0., 0.}, r, radial = 0., exact[2], difference[3];
+  const PetscReal centre[4] = {0.25, 0.25, 0.25, 0.25};
+  PetscReal p[3] = {0., 0., 0.}, u[3], H[9], r, radial = 0., exact[2], difference[3];
 
-  for (int k = 0; k < 3; k++) {
-    for (int v = 0; v < 4; v++) {
-      p[k] += 0.25 * cell->x[v][k];
-      u[k] += 0.25 * cell->u[v][k];
-    }
-  }
+  for (int k = 0; k < 12; k++) p[k % 3] += 0.25 * cell->x[k / 3][k % 3];
+  verify_cell_at(cell, centre, u, H);
   r = PetscSqrtReal(SbDot3(p, p));
   for (int i = 0; i < 3; i++) {
     for (int j = 0; j < 3; j++) radial += p[i] * p[j] * sigma[entry[i][j]] / (r * r);

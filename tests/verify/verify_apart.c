@@ -123,6 +123,7 @@ int main(int argc, char **argv)
   PetscCall(check_named("cr", "euler_implicit", "cg_icc", 0));
   PetscCall(check_named("cr", "euler_implicit", "cg_two_level", 1e-7));
   PetscCall(check_named("dg", "euler_implicit", "cg_jacobi", 0));
+  PetscCall(check_named("p2", "euler_implicit", "cg_jacobi", 0));
   PetscCall(check_beside("cg_icc", 1e-9));
   PetscCall(check_beside("direct", 1e-9));
   SB_TEST_END();

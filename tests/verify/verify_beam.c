@@ -52,7 +52,7 @@ static void hanging_exact(const PetscReal x[3], PetscReal u[3])
   u[2] = HANG_W * (PetscSqr(x[2]) - 1. + HANG_NU * (PetscSqr(x[0]) + PetscSqr(x[1]))) / (2. * HANG_E);
 }
 
-static PetscErrorCode hanging_error(PetscInt n, PetscReal *error)
+static PetscErrorCode hanging_error(PetscInt n, const char *more, PetscReal *error)
 {
   TestScene t;
   Vec U;
@@ -60,14 +60,15 @@ static PetscErrorCode hanging_error(PetscInt n, PetscReal *error)
   char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
-    "-bodies a -time static -body_a_mesh box:0.3,0.3,1:%d -body_a_translate -0.1,-0.2,0 "
-    "-body_a_material linear -body_a_young %g -body_a_poisson %g -body_a_density 1000 -effects gravity,top "
-    "-effect_top_type prescribed_displacement -effect_top_on zmax "
-    "-effect_top_displacement %.17g*x;%.17g*y;%.17g*(x^2+y^2)",
-    (int)n, HANG_E, HANG_NU, -HANG_NU * HANG_W / HANG_E, -HANG_NU * HANG_W / HANG_E,
-    0.5 * HANG_NU * HANG_W / HANG_E));
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text),
+                  "-bodies a -time static -body_a_mesh box:0.3,0.3,1:%d -body_a_translate -0.1,-0.2,0 "
+                  "-body_a_material linear -body_a_young %g -body_a_poisson %g -body_a_density 1000 %s "
+                  "-effects gravity,top "
+                  "-effect_top_type prescribed_displacement -effect_top_on zmax "
+                  "-effect_top_displacement %.17g*x;%.17g*y;%.17g*(x^2+y^2)",
+                  (int)n, HANG_E, HANG_NU, more, -HANG_NU * HANG_W / HANG_E, -HANG_NU * HANG_W / HANG_E,
+                  0.5 * HANG_NU * HANG_W / HANG_E));
   PetscCall(test_scene_open(text, &t));
   PetscCall(verify_solve(&t, "hanging bar"));
   PetscCall(VecDuplicate(t.run->U, &U));
@@ -86,7 +87,7 @@ static PetscErrorCode check_hanging(void)
   PetscReal error[3], order;
 
   PetscFunctionBeginUser;
-  for (int k = 0; k < 3; k++) PetscCall(hanging_error(2 << k, &error[k]));
+  for (int k = 0; k < 3; k++) PetscCall(hanging_error(2 << k, "", &error[k]));
   order = PetscLog2Real(error[1] / error[2]);
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
                         "  hanging bar: largest error at vertices n 2, 4, 8: %.2e %.2e %.2e of the largest "
@@ -95,6 +96,16 @@ static PetscErrorCode check_hanging(void)
   /* the maximum over vertices is not smooth in h: 0.3 off the order, and small in itself */
   SB_CHECK_NEAR(order, 2., 0.3, "order at the vertices of the hanging bar");
   SB_CHECK(error[2] < 1e-3, "hanging bar, n = 8: error of %g", (double)error[2]);
+  /* the displacement is quadratic: P2 has it, but for the volume, which it takes as constant in each tet */
+  PetscCall(hanging_error(2, "-body_a_element p2 -body_a_volume pointwise -solver direct", &error[0]));
+  PetscCall(hanging_error(2, "-body_a_element p2 -solver direct", &error[1]));
+  PetscCall(hanging_error(4, "-body_a_element p2 -solver direct", &error[2]));
+  PetscCall(PetscPrintf(
+    PETSC_COMM_WORLD,
+    "    P2: n 2 with the volume at points %.1e; with its mean n 2, 4: %.2e %.2e, order %.2f\n",
+    (double)error[0], (double)error[1], (double)error[2], (double)PetscLog2Real(error[1] / error[2])));
+  SB_CHECK(error[0] < 1e-10, "P2, volume at points: error of %g", (double)error[0]);
+  SB_CHECK(error[2] < 1e-3, "P2, n = 4: error of %g", (double)error[2]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -104,35 +115,41 @@ static PetscErrorCode check_hanging(void)
   " -effects clamp,plane,end -effect_clamp_type fixed -effect_clamp_on xmin -effect_plane_type fixed " \
   "-effect_plane_on all -effect_plane_components y -effect_end_type traction -effect_end_on xmax"
 
-/* End load with the parabolic shear of beam theory. */
-static PetscErrorCode check_shear(void)
+/* Deflection of the cantilever with n cells across, of Timoshenko's. */
+static PetscErrorCode shear(PetscInt n, const char *element, PetscReal *w)
 {
   const PetscReal L = 1., h = 0.2, E = 1e6, P = 1e3 /* N per m of width */, G = E / 2.;
-  const PetscReal exact = 4. * P * L * L * L / (E * h * h * h) + P * L / (5. / 6. * G * h);
-  PetscReal w[3], limit;
+  Bar bar = {.what = "end load", .end = {L, 0., h / 2.}};
   char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  for (int k = 0; k < 3; k++) {
-    const int n = 4 << k;
-    Bar bar = {.what = "end load", .end = {L, 0., h / 2.}};
+  PetscCall(PetscSNPrintf(
+    text, sizeof(text),
+    "-body_a_mesh box:1,0.05,0.2:%d,1,%d -body_a_element %s -body_a_material linear "
+    "-body_a_young %g -body_a_poisson 0 -body_a_density 1" PLANE " -effect_end_vector 0;0;%.17g*z*(%g-z)",
+    (int)(5 * n), (int)n, element, (double)E, (double)(6. * P / (h * h * h)), (double)h));
+  PetscCall(solve(text, &bar));
+  *w = bar.u[2] / (4. * P * L * L * L / (E * h * h * h) + P * L / (5. / 6. * G * h));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-    PetscCall(PetscSNPrintf(text, sizeof(text),
-                            "-body_a_mesh box:1,0.05,0.2:%d,1,%d -body_a_material linear -body_a_young %g "
-                            "-body_a_poisson 0 -body_a_density 1" PLANE
-                            " -effect_end_vector 0;0;%.17g*z*(%g-z)",
-                            5 * n, n, (double)E, (double)(6. * P / (h * h * h)), (double)h));
-    PetscCall(solve(text, &bar));
-    w[k] = bar.u[2] / exact;
-  }
+/* End load with the parabolic shear of beam theory. */
+static PetscErrorCode check_shear(void)
+{
+  PetscReal w[4], limit;
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 3; k++) PetscCall(shear(4 << k, "p1", &w[k]));
+  PetscCall(shear(2, "p2", &w[3]));
   limit = verify_extrapolate(w[1], w[2], 2.);
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  cantilever with end load, n 4, 8, 16: %.5f %.5f %.5f of Timoshenko's %.6g m, extrapolated %.5f\n",
-    (double)w[0], (double)w[1], (double)w[2], (double)exact, (double)limit));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  cantilever with end load, n 4, 8, 16: %.5f %.5f %.5f of Timoshenko, extrapolated "
+                        "%.5f; P2, n 2: %.5f\n",
+                        (double)w[0], (double)w[1], (double)w[2], (double)limit, (double)w[3]));
   SB_CHECK_NEAR(PetscLog2Real((1. - w[1]) / (1. - w[2])), 2., 0.15, "order of the end deflection");
   /* the clamp keeps the end plane, which beam theory does not: about (h/L)^3 / 10 */
   SB_CHECK_NEAR(limit, 1., 2e-3, "extrapolated deflection / Timoshenko");
+  SB_CHECK_NEAR(w[3], 1., 2e-3, "deflection with P2 / Timoshenko");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -172,37 +189,47 @@ static PetscErrorCode check_weight(void)
 }
 
 /* L = 1, h = 0.05: stretch and shear, which the elastica leaves out, are alpha/12 (h/L)^2 and 0.6 (h/L)^2. */
-static PetscErrorCode check_elastica(const char *law, PetscReal alpha, PetscReal shortening,
-                                     PetscReal deflection)
+static PetscErrorCode elastica(const char *law, const char *element, PetscInt n, PetscReal alpha,
+                               PetscReal value[2])
 {
   const PetscReal h = 0.05, E = 1e6;
-  PetscReal x[2], z[2], limit[2];
+  Bar bar = {.what = "elastica", .end = {1., 0., h / 2.}};
   char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  for (int k = 0; k < 2; k++) {
-    const int n = 8 << k;
-    Bar bar = {.what = "elastica", .end = {1., 0., h / 2.}};
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          "-body_a_mesh box:1,0.02,0.05:%d,1,%d -body_a_element %s -body_a_material %s "
+                          "-body_a_tangent exact -body_a_young %g -body_a_poisson 0 -body_a_density 1 " PLANE
+                          " -effect_end_vector 0;0;%.17g",
+                          (int)(20 * n), (int)n, element, law, (double)E, (double)(alpha * E * h * h / 12.)));
+  PetscCall(solve(text, &bar));
+  value[0] = -bar.u[0];
+  value[1] = bar.u[2];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-    PetscCall(PetscSNPrintf(text, sizeof(text),
-                            "-body_a_mesh box:1,0.02,0.05:%d,1,%d -body_a_material %s -body_a_tangent exact "
-                            "-body_a_young %g -body_a_poisson 0 -body_a_density 1 " PLANE
-                            " -effect_end_vector 0;0;%.17g",
-                            20 * n, n, law, (double)E, (double)(alpha * E * h * h / 12.)));
-    PetscCall(solve(text, &bar));
-    x[k] = -bar.u[0];
-    z[k] = bar.u[2];
+/* P1 extrapolated from two meshes, and P2 with two cells across. */
+static PetscErrorCode check_elastica(const char *law, PetscReal alpha, PetscReal shortening,
+                                     PetscReal deflection)
+{
+  const PetscReal exact[2] = {shortening, deflection};
+  PetscReal coarse[2], fine[2], quadratic[2], limit[2];
+
+  PetscFunctionBeginUser;
+  PetscCall(elastica(law, "p1", 8, alpha, coarse));
+  PetscCall(elastica(law, "p1", 16, alpha, fine));
+  PetscCall(elastica(law, "p2", 2, alpha, quadratic));
+  for (int k = 0; k < 2; k++) limit[k] = verify_extrapolate(coarse[k], fine[k], 2.);
+  for (int k = 0; k < 2; k++) {
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                          "  elastica, %s, alpha %g, %s n 8, 16: %.5f %.5f, extrapolated %.5f, P2 n 2: %.5f "
+                          "(exact %.5f)\n",
+                          law, (double)alpha, k ? "deflection" : "shortening", (double)coarse[k],
+                          (double)fine[k], (double)limit[k], (double)quadratic[k], (double)exact[k]));
+    /* 1 % of the length: what two meshes leave after extrapolation, and the slenderness */
+    SB_CHECK_NEAR(limit[k], exact[k], 0.01 * deflection, k ? "deflection" : "shortening");
+    SB_CHECK_NEAR(quadratic[k], exact[k], 0.01 * deflection, "P2");
   }
-  limit[0] = verify_extrapolate(x[0], x[1], 2.);
-  limit[1] = verify_extrapolate(z[0], z[1], 2.);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  elastica, %s, alpha %g: shortening n 8, 16: %.5f %.5f, extrapolated %.5f (exact "
-                        "%.5f), deflection %.5f %.5f, %.5f (%.5f)\n",
-                        law, (double)alpha, (double)x[0], (double)x[1], (double)limit[0], (double)shortening,
-                        (double)z[0], (double)z[1], (double)limit[1], (double)deflection));
-  /* 1 % of the length: what two meshes leave after extrapolation, and the slenderness */
-  SB_CHECK_NEAR(limit[0], shortening, 0.01 * deflection, "shortening");
-  SB_CHECK_NEAR(limit[1], deflection, 0.01 * deflection, "deflection");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

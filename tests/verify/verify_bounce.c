@@ -104,6 +104,7 @@ int main(int argc, char **argv)
   PetscCall(PetscSNPrintf(multiplier, sizeof(multiplier), "%s -effect_floor_response multiplier", falls));
   PetscCall(check_ball("p1", 0.5));
   PetscCall(check_ball("cr", 0.5));
+  PetscCall(check_ball("p2", 0.5));
   PetscCall(check_block("block", "plane:0,0,1,0", falls, 0.6));
   PetscCall(check_block("block, multiplier", "plane:0,0,1,0", multiplier, 0.6));
   PetscCall(check_block("bat", "plane:0,0,1,-0.01", "-effect_floor_displacement 0;0;0.5*t", 0.8));

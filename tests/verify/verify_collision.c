@@ -163,12 +163,15 @@ int main(int argc, char **argv)
   /* single tets: pairs at edges and corners carry shares of area that are not those of a uniform pressure; 11 to 19 % of it */
   PetscCall(check_stack("p1", 3, 0.2));
   PetscCall(check_stack("cr", 2, 0.25));
+  PetscCall(check_stack("p2", 2, 0.25));
   PetscCall(check_bars("p1"));
   PetscCall(check_momentum("dg", 0));
+  PetscCall(check_momentum("p2", 0.3));
   PetscCall(check_momentum("p1", 0.3));
   if (size > 1) SB_TEST_END(); /* many solves of a small system: on one rank only */
   PetscCall(check_stack("p1", 2, 0.2));
   PetscCall(check_bars("cr"));
+  PetscCall(check_bars("p2"));
   PetscCall(check_momentum("p1", 0));
   /* friction sticks below 1e-4 of the step's speed, some m/s with what weight and supports do */
   PetscCall(check_slope(0.51, 2e-4));

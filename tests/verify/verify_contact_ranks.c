@@ -17,7 +17,7 @@ typedef struct {
   Record r;
 } Motion;
 
-static PetscErrorCode solve(MPI_Comm comm, Motion *motion)
+static PetscErrorCode solve(MPI_Comm comm, const char *element, Motion *motion)
 {
   TestScene t;
   char text[VERIFY_TEXT];
@@ -34,8 +34,8 @@ static PetscErrorCode solve(MPI_Comm comm, Motion *motion)
     "-effect_floor_obstacle plane:0,0,1,0 -effect_ball_type contact "
     "-effect_ball_on high -effect_ball_obstacle sphere:0.17,0.05,0.07,0.04 "
     "-effect_meet_type contact -time euler_implicit "
-    "-ts_dt 0.003 -ts_max_time %g -snes_rtol 1e-11 -ksp_rtol 1e-10",
-    0.003 * STEPS));
+    "-ts_dt 0.003 -ts_max_time %g -snes_rtol 1e-11 -ksp_rtol 1e-10 -body_high_element %s",
+    0.003 * STEPS, element));
   PetscCall(test_scene_open_on(comm, NULL, text, &t));
   PetscCall(record_solve(&t, &motion->r));
   motion->n = verify_numbers(t.model);
@@ -45,7 +45,7 @@ static PetscErrorCode solve(MPI_Comm comm, Motion *motion)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check(PetscReal tolerance)
+static PetscErrorCode check(const char *element, PetscReal tolerance)
 {
   static const char *const contacts[3] = {"floor_contacts", "ball_contacts", "meet_contacts"};
   Motion m[2]; /* alone, together */
@@ -53,7 +53,7 @@ static PetscErrorCode check(PetscReal tolerance)
 
   PetscFunctionBeginUser;
   for (int k = 0; k < 2; k++) {
-    PetscCall(solve(k ? PETSC_COMM_WORLD : PETSC_COMM_SELF, &m[k]));
+    PetscCall(solve(k ? PETSC_COMM_WORLD : PETSC_COMM_SELF, element, &m[k]));
     VERIFY_NEAR(m[k].r.steps, STEPS, 0, "steps");
     for (PetscInt i = 0; i < m[k].r.n && i <= STEPS; i++)
       force[k][i] = record_at(&m[k].r, "floor_force_z", i);
@@ -80,6 +80,7 @@ static PetscErrorCode check(PetscReal tolerance)
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(check(1e-7));
+  PetscCall(check("p1", 1e-7));
+  PetscCall(check("p2", 1e-7));
   SB_TEST_END();
 }

@@ -6,7 +6,7 @@
                 penalty and by the mean displacement come to the same answer as the mesh is refined, in the order of the
                 method
     drive       both ends of a bar turned and moved by a drive: it follows without strain and without reaction
-    mixed       bodies of P1, CR and DG in one scene: each support carries its own body
+    mixed       bodies of each element in one scene: each support carries its own body
     flight      velocity and spin of a free body: momenta are those of the rigid body from the start, and stay
     motion      a clamped bar swings: energy stays with Newmark; symplectic Euler follows it, below its largest step
     pressure    a body under pressure all around does not move away
@@ -158,15 +158,17 @@ static PetscErrorCode check_drive(int kind)
 
 static PetscErrorCode check_mixed(void)
 {
-  const char *element[] = {"p1", "cr", "dg"};
+  const char *element[] = {"p1", "cr", "dg", "p2"};
   char text[VERIFY_TEXT];
   TestScene t;
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(
     text, sizeof(text),
-    "-bodies a,b,c -body_a_mesh box:0.2,0.1,0.1:2 -body_b_mesh box:0.1,0.2,0.1:2 "
-    "-body_c_mesh box:0.1,0.1,0.2:2 -body_a_material linear -body_b_material corotated "
+    "-bodies a,b,c,d -body_a_mesh box:0.2,0.1,0.1:2 -body_b_mesh box:0.1,0.2,0.1:2 "
+    "-body_c_mesh box:0.1,0.1,0.2:2 -body_d_mesh box:0.2,0.1,0.1:1 -body_d_material stvk -body_d_element p2 "
+    "-body_d_translate 0,2,0 -body_d_young 1e5 -body_d_poisson 0.4 -body_d_density 200 -body_a_material "
+    "linear -body_b_material corotated "
     "-body_c_material neohookean -body_b_element cr -body_c_element dg -body_b_translate 1,0,0 "
     "-body_c_translate 2,0,0" BODY
     "-body_b_young 2e5 -body_c_young 1e5 -body_b_poisson 0.3 -body_c_poisson 0.45 -body_b_density 500 "
@@ -175,12 +177,12 @@ static PetscErrorCode check_mixed(void)
     "-effect_poke_vector 0.01;0.02;0.03 -time static -solver direct" EXACT));
   PetscCall(PetscStrlcat(text, " -set_tip_at box:-1,-1,0.09,3,1,1", sizeof(text)));
   PetscCall(test_scene_open(text, &t));
-  PetscCall(verify_solve(&t, "three bodies"));
-  for (PetscInt b = 0; b < 3; b++) {
-    const PetscReal density[] = {1000, 500, 250};
+  PetscCall(verify_solve(&t, "four bodies"));
+  for (PetscInt b = 0; b < 4; b++) {
+    const PetscReal density[] = {1000, 500, 250, 200};
     PetscReal sum[6];
-    // 5 x 3 vertices of a and of b lie in the set, and three layers of 9 of c.
-    const PetscReal poke = (b < 2 ? 15. : 27.) / 57.;
+    // 5 x 3 vertices of a and of b lie in the set, three layers of 9 of c, and nothing of d.
+    const PetscReal poke = (b < 2 ? 15. : b == 2 ? 27. : 0.) / 57.;
 
     PetscCall(reaction(&t, b, sum));
     SB_CHECK_NEAR(sum[0], -0.01 * poke, 1e-9, element[b]);

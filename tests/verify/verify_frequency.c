@@ -148,19 +148,21 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode sudden_gravity(PetscInt n, PetscReal *u, PetscReal *at)
+static PetscErrorCode sudden_gravity(const char *element, PetscInt n, PetscReal *u, PetscReal *at)
 {
   Minimum m = {.min_u = 0.};
   TestScene t;
   char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          BAR "-effects clamp,gravity -time newmark -ts_dt 0.01 -ts_max_time 0.9", (int)n));
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text),
+                  BAR "-body_a_element %s -effects clamp,gravity -time newmark -ts_dt 0.01 -ts_max_time 0.9",
+                  (int)n, element));
   PetscCall(test_scene_open(text, &t));
   PetscCall(SbRunAddMonitor(t.run, watch, &m, NULL));
   PetscCall(verify_solve(&t, "sudden gravity"));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "    n %2d: first minimum %.5f m at %.5f s\n", (int)n,
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "    %s n %2d: first minimum %.5f m at %.5f s\n", element, (int)n,
                         (double)m.min_u, (double)m.min_t));
   *u = m.min_u;
   *at = m.min_t;
@@ -174,7 +176,7 @@ int main(int argc, char **argv)
 
   SB_TEST_BEGIN(argc, argv);
   for (int k = 0; k < 3; k++) PetscCall(check_release("p1", 3 << k, &f[k]));
-  for (int k = 0; k < 3; k++) PetscCall(sudden_gravity(3 << k, &u[k], &at[k]));
+  for (int k = 0; k < 3; k++) PetscCall(sudden_gravity("p1", 3 << k, &u[k], &at[k]));
   limit[0] = verify_aitken(f);
   limit[1] = verify_aitken(u);
   limit[2] = verify_aitken(at);
@@ -196,5 +198,8 @@ int main(int argc, char **argv)
       SB_CHECK_NEAR(f[0], 0.68846, 5e-3 * 0.68846, element);
     }
   }
+  PetscCall(sudden_gravity("p2", 4, u, at));
+  SB_CHECK_NEAR(u[0], -1.5696, 1e-2 * 1.5696, "first minimum, P2");
+  SB_CHECK_NEAR(at[0], 0.7203, 1e-2 * 0.7203, "its time, P2");
   SB_TEST_END();
 }

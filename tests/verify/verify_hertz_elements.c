@@ -1,7 +1,7 @@
 // @ranks 1
 // @long
 /*
-  Hertz's contact (hertz.h) with CR and DG, and of one body on a rigid plane.
+  Hertz's contact (hertz.h) with CR and DG (P2: verify_quadratic_contact.c), and of one body on a rigid plane.
 */
 #include "hertz.h"
 
@@ -72,5 +72,6 @@ int main(int argc, char **argv)
   PetscCall(check_plane("p1", CELLS, 0.03));
   PetscCall(check_plane("cr", 10, 0.03));
   PetscCall(check_plane("dg", 10, 0.03));
+  PetscCall(check_plane("p2", 8, 0.03));
   SB_TEST_END();
 }

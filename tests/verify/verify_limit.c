@@ -165,6 +165,7 @@ int main(int argc, char **argv)
   PetscCall(check_branch(PETSC_FALSE, ARC "-body_a_mesh box:1,1,1:1"));
   PetscCall(check_branch(PETSC_FALSE, ARC "-body_a_element cr"));
   PetscCall(check_branch(PETSC_FALSE, ARC "-body_a_element dg"));
+  PetscCall(check_branch(PETSC_FALSE, ARC "-body_a_element p2"));
   PetscCall(check_branch(PETSC_FALSE, ARC "-effect_press_vector 0;0;-0.2*t"));
   PetscCall(check_drive());
   PetscCall(check_branch(PETSC_TRUE, ARC "-static_max_displacement 0.45"));

@@ -103,12 +103,13 @@ static PetscErrorCode collide(const char *time, const char *more, Left *left)
 
 static PetscErrorCode check_bars(void)
 {
-  static const char *const more[] = {"", "-body_a_element cr -body_b_element cr"};
+  static const char *const more[] = {"", "-body_a_element cr -body_b_element cr",
+                                     "-body_a_element p2 -body_b_element p2"};
   Left euler, left;
 
   PetscFunctionBeginUser;
   PetscCall(collide("euler_implicit", "", &euler));
-  for (int k = 0; k < 2; k++) {
+  for (int k = 0; k < 3; k++) {
     PetscCall(collide("newmark", more[k], &left));
     check_better(&left, &euler, (PetscBool)!k);
   }

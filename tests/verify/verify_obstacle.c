@@ -258,6 +258,7 @@ int main(int argc, char **argv)
   PetscCall(check_at_once());
   if (size == 1) {
     PetscCall(check_overlap("cr", "projected", "plane:0,0,1,0"));
+    PetscCall(check_overlap("p2", "projected", "plane:0,0,1,0"));
     PetscCall(check_overlap("p1", "augmented", "plane:0,0,1,0"));
     PetscCall(check_overlap("p1", "penalty", "plane:0,0,1,0"));
     PetscCall(check_overlap_mesh());

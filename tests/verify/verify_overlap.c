@@ -193,5 +193,6 @@ int main(int argc, char **argv)
   PetscCall(check_obstacle("box:-0.1,-0.1,-0.05,0.2,0.2,0"));
   PetscCall(check_ring("p1"));
   PetscCall(check_ring("cr"));
+  PetscCall(check_ring("p2"));
   SB_TEST_END();
 }

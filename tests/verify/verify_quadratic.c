@@ -103,56 +103,6 @@ static PetscErrorCode check_derivatives(const char *law, const char *volume)
 
 /* ------------------------------------------------------------------ orders */
 
-/* Errors in L2 and in the H1 seminorm of the quadratic function. */
-static PetscErrorCode errors(SbModel m, Vec U, PetscReal error[2])
-{
-  SbSpace s = m->space;
-  PetscReal b[14][4], w[14], sum[4] = {0., 0., 0., 0.};
-  const PetscReal *u;
-
-  PetscFunctionBeginUser;
-  manufactured_rule(b, w);
-  PetscCall(SbSpaceGetLocalRead(s, U, &u));
-  for (PetscInt c = 0; c < s->mesh->ncell_owned; c++) {
-    PetscReal x[4][3], g[4][3], V;
-
-    for (int k = 0; k < 12; k++) x[k / 3][k % 3] = s->mesh->x[3 * s->mesh->cell[4 * c + k / 3] + k % 3];
-    SbSpaceCellElement(s, c)->ops.tabulate((const PetscReal(*)[3])x, g + 1, &V);
-    for (int k = 0; k < 3; k++) g[0][k] = -(g[1][k] + g[2][k] + g[3][k]);
-    for (int q = 0; q < 14; q++) {
-      PetscReal p[3] = {0.}, uh[3] = {0.}, H[9] = {0.}, ue[3], G[9];
-
-      for (int k = 0; k < 12; k++) p[k % 3] += b[q][k / 3] * x[k / 3][k % 3];
-      for (int a = 0; a < 10; a++) {
-        const PetscReal *ua = u + 3 * SbSpaceCellNode(s, c, a);
-        const int i = a < 4 ? a : SbTetEdge[a - 4][0], j = a < 4 ? a : SbTetEdge[a - 4][1];
-        const PetscReal phi = a < 4 ? b[q][a] * (2. * b[q][a] - 1.) : 4. * b[q][i] * b[q][j];
-
-        for (int k = 0; k < 9; k++) {
-          const PetscReal d =
-            a < 4 ? (4. * b[q][a] - 1.) * g[a][k % 3] : 4. * (b[q][j] * g[i][k % 3] + b[q][i] * g[j][k % 3]);
-
-          H[k] += ua[k / 3] * d;
-        }
-        for (int k = 0; k < 3; k++) uh[k] += phi * ua[k];
-      }
-      manufactured_exact(p, ue, G);
-      for (int k = 0; k < 3; k++) {
-        sum[0] += w[q] * V * PetscSqr(uh[k] - ue[k]);
-        sum[2] += w[q] * V * PetscSqr(ue[k]);
-      }
-      for (int k = 0; k < 9; k++) {
-        sum[1] += w[q] * V * PetscSqr(H[k] - G[k]);
-        sum[3] += w[q] * V * PetscSqr(G[k]);
-      }
-    }
-  }
-  PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 4, MPIU_REAL, MPI_SUM, m->comm));
-  for (int k = 0; k < 2; k++) error[k] = PetscSqrtReal(sum[k] / sum[2 + k]);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode solve(PetscInt n, PetscReal nu, const char *volume, PetscReal error[2])
 {
   TestScene t;
@@ -167,7 +117,7 @@ static PetscErrorCode solve(PetscInt n, PetscReal nu, const char *volume, PetscR
   PetscCall(PetscStrlcat(text, body, sizeof(text)));
   PetscCall(test_scene_open(text, &t));
   PetscCall(verify_solve(&t, "manufactured solution"));
-  PetscCall(errors(t.model, t.run->U, error));
+  PetscCall(manufactured_errors(t.model, t.run->U, error));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %-9s nu %-6g n %2d: L2 %.5f  H1 %.4f\n", volume, (double)nu,
                         (int)n, (double)error[0], (double)error[1]));
   PetscCall(test_scene_close(&t));

@@ -5,7 +5,7 @@
     touch      the same nodes touch before and after it, with the same forces, frictions and normals: a plane and another body
     runs       bodies that are re-meshed while they touch: momentum, penetration, energy, end
     inclusion  every tet's material has the mass that it had, also where the inclusion is a shape that new tets would lie across
-    held       cr and dg on a support, with adaptive steps
+    held       cr, dg and p2 on a support, with adaptive steps
     ledger     errors go on, and -accuracy finds its steps
     failed     -remesh_failed: tried once for each state, then the run stops with its reason; not where the first step fails
 */
@@ -379,6 +379,7 @@ int main(int argc, char **argv)
   PetscCall(check_touch(FLOOR "-ts_max_time 0.04"));
   PetscCall(check_touch(FLOOR "-ts_max_time 0.04 -effect_floor_friction 0.4"));
   PetscCall(check_touch(FLOOR "-ts_max_time 0.04 -effect_floor_friction 0.4 -body_a_element cr"));
+  PetscCall(check_touch(FLOOR "-ts_max_time 0.04 -effect_floor_friction 0.4 -body_a_element p2"));
   PetscCall(check_run(FLOOR "-ts_max_time 0.07 -remesh_times 0.04", PETSC_FALSE, 0.07));
   PetscCall(
     check_run(FLOOR "-ts_max_time 0.07 -remesh_times 0.04 -effect_floor_friction 0.4", PETSC_FALSE, 0.07));
@@ -390,6 +391,7 @@ int main(int argc, char **argv)
               PETSC_TRUE, 0.05));
   PetscCall(check_inclusion(""));
   PetscCall(check_held("-body_a_element cr"));
+  PetscCall(check_held("-body_a_element p2"));
   PetscCall(check_held("-body_a_element dg -ts_adapt_type basic"));
   PetscCall(check_held("-ts_adapt_type basic -time genalpha"));
   PetscCall(check_ledger("", 0.));

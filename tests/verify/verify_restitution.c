@@ -179,6 +179,7 @@ int main(int argc, char **argv)
   PetscCall(check_pair("blocks, heavy", "-body_b_mesh box:0.1,0.1,0.1:3 -body_b_density 5000", 0.6));
   PetscCall(check_pair("blocks, equal", "", 1));
   PetscCall(check_pair("blocks, CR", "-body_b_density 3000 -body_a_element cr -body_b_element cr", 0.3));
+  PetscCall(check_pair("blocks, P2", "-body_b_density 3000 -body_a_element p2 -body_b_element p2", 0.3));
   PetscCall(check_balls());
   PetscCall(check_tower());
   PetscCall(check_oblique(0, 1));

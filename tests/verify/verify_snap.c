@@ -86,7 +86,8 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_toggle(PetscInt nx, PetscInt ny, PetscReal *error, PetscReal *top)
+static PetscErrorCode check_toggle(const char *element, PetscInt nx, PetscInt ny, PetscReal *error,
+                                   PetscReal *top)
 {
   const PetscInt n[3] = {nx, ny, 1};
   char mesh[512];
@@ -97,23 +98,23 @@ static PetscErrorCode check_toggle(PetscInt nx, PetscInt ny, PetscReal *error, P
   PetscCall(verify_mesh_write(n, member, NULL, mesh));
   PetscCall(verify_open(
     &t,
-    "-bodies a -body_a_mesh %s -body_a_element cr -body_a_material stvk -body_a_young %.17g "
+    "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material stvk -body_a_young %.17g "
     "-body_a_poisson 0 -body_a_density 1 -sets far,middle -set_far_at plane:1,0,0,0 "
     "-set_middle_at plane:1,0,0,%.17g -effects clamp,symmetry,plane,load -effect_clamp_type fixed "
     "-effect_clamp_on far -effect_symmetry_type fixed -effect_symmetry_on middle "
     "-effect_symmetry_components x -effect_plane_type fixed -effect_plane_on all -effect_plane_components z "
     "-effect_load_type traction -effect_load_on middle -effect_load_total 0,%.17g,0 -time static "
     "-static_control arc_length -static_steps 5 -static_longest_step 1",
-    mesh, YOUNG, SPAN, (double)(-0.5 * g.full * SPAN / (double)nx / WIDTH)));
+    mesh, element, YOUNG, SPAN, (double)(-0.5 * g.full * SPAN / (double)nx / WIDTH)));
   PetscCall(test_file_remove(mesh));
   PetscCall(SbRunAddMonitor(t.run, watch, &g, NULL));
   PetscCall(verify_solve(&t, "toggle"));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  %d x %d cells: %d steps, %d rejected, %d Newton iterations; load %.4f lb, then "
-                        "%.4f lb, %.1f lb at %.4f in; error %.3f lb\n",
-                        (int)nx, (int)ny, (int)t.run->steps_total, (int)t.run->rejected_total,
-                        (int)t.run->newton_total, (double)g.top, (double)g.bottom, (double)g.last[1],
-                        (double)g.last[0], (double)g.error));
+  PetscCall(PetscPrintf(
+    PETSC_COMM_WORLD,
+    "  %s, %d x %d cells: %d steps, %d rejected, %d Newton iterations; load %.4f lb, then "
+    "%.4f lb, %.1f lb at %.4f in; error %.3f lb\n",
+    element, (int)nx, (int)ny, (int)t.run->steps_total, (int)t.run->rejected_total, (int)t.run->newton_total,
+    (double)g.top, (double)g.bottom, (double)g.last[1], (double)g.last[0], (double)g.error));
   SB_CHECK(g.last[1] == g.full, "the load ended at %g lb", (double)g.last[1]);
   SB_CHECK(g.bottom < g.top - 1., "the load fell from %g to %g lb", (double)g.top, (double)g.bottom);
   SB_CHECK(t.run->bifurcations == 0, "bifurcation");
@@ -128,8 +129,8 @@ int main(int argc, char **argv)
   PetscReal error[2], top[2], limit;
 
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(check_toggle(108, 2, &error[0], &top[0]));
-  PetscCall(check_toggle(216, 4, &error[1], &top[1]));
+  PetscCall(check_toggle("cr", 108, 2, &error[0], &top[0]));
+  PetscCall(check_toggle("cr", 216, 4, &error[1], &top[1]));
   limit = verify_extrapolate(top[0], top[1], 2.);
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  limit load: extrapolated %.3f lb, published %g lb\n",
                         (double)limit, LIMIT));
@@ -137,5 +138,8 @@ int main(int argc, char **argv)
   SB_CHECK(error[1] < 0.4 * error[0], "%g and %g of the load off the curve", (double)error[0],
            (double)error[1]);
   SB_CHECK_NEAR(limit, LIMIT, 0.01 * LIMIT, "limit load");
+  PetscCall(check_toggle("p2", 54, 1, &error[0], &top[0]));
+  SB_CHECK(error[0] < 0.02, "P2: %g of the load off the curve", (double)error[0]);
+  SB_CHECK_NEAR(top[0], LIMIT, 0.01 * LIMIT, "limit load, P2");
   SB_TEST_END();
 }

@@ -110,5 +110,6 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_squeeze("p1", 4, 0.3, 0.35));
   PetscCall(check_squeeze("cr", 3, 0.49, 0.012));
+  PetscCall(check_squeeze("p2", 2, 0.49, 0.02));
   SB_TEST_END();
 }

@@ -37,11 +37,12 @@ int main(int argc, char **argv)
   const PetscReal size = 0.02, turn = 0.5 * PETSC_PI, width = 0.1, length = 0.4;
   const PetscReal torsion =
     0.14058 * PetscPowReal(width, 4.) * 1e5 / (2. * (1. + NU)) * turn * turn / (2. * length);
-  PetscReal dg[4], cr[5][4], expected[4], limit[4], d[2];
+  PetscReal dg[4], p2[4], cr[5][4], expected[4], limit[4], d[2];
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(twist("dg", 2, dg));
   for (PetscInt n = 2; n <= 4; n++) PetscCall(twist("cr", n, cr[n]));
+  PetscCall(twist("p2", 2, p2));
   locking_difference(dg, cr[2], d);
   SB_CHECK(d[0] < 1e-3 * size && d[1] < 1e-3, "CR and DG differ by %g m, %g of the energy", (double)d[0],
            (double)d[1]);
@@ -56,6 +57,7 @@ int main(int argc, char **argv)
                         (double)d[0], (double)d[1], (double)limit[3], (double)torsion));
   SB_CHECK(d[0] < 0.01 * size && d[1] < 0.03, "three cells: %g m and %g of the energy away from second order",
            (double)d[0], (double)d[1]);
+  SB_CHECK_NEAR(p2[3], limit[3], 0.05 * limit[3], "energy of P2 against the limit of CR");
   SB_CHECK(limit[3] > torsion && limit[3] < 1.05 * torsion, "limit of the energy %g J, of torsion %g J",
            (double)limit[3], (double)torsion);
   SB_TEST_END();

@@ -30,10 +30,10 @@ int main(int argc, char **argv)
 {
   static const char *const laws[2] = {"-body_a_material neohookean -body_a_young 5e3",
                                       "-body_a_material corotated -body_a_young 5e4"};
-  static const char *const elements[2] = {"cr", "dg"};
+  static const char *const elements[] = {"cr", "dg", "p2"};
 
   SB_TEST_BEGIN(argc, argv);
-  for (int e = 0; e < 2; e++) {
+  for (int e = 0; e < 3; e++) {
     for (int k = 0; k < 2; k++) {
       PetscReal value[3];
       LockingCost cost;
@@ -45,7 +45,8 @@ int main(int argc, char **argv)
       PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s %s: longer by %.4f m, volume %+.2e, smallest J %.4f\n",
                             elements[e], laws[k], (double)value[0], (double)value[1], (double)value[2]));
       SB_CHECK(PetscAbsReal(value[1]) < 1e-3, "the volume changes by %g", (double)value[1]);
-      SB_CHECK(value[2] > 0.99, "smallest J %g", (double)value[2]);
+      /* P2 keeps the mean of each tet: at its points the volume is another one where the block is clamped */
+      SB_CHECK(value[2] > (e == 2 ? 0.75 : 0.99), "smallest J %g", (double)value[2]);
       /* it does hang: P1 gives about 3/4 of this */
       SB_CHECK(value[0] > (k ? 3.3e-3 : 0.04), "longer by %g m only", (double)value[0]);
     }
