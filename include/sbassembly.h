@@ -39,9 +39,9 @@ PetscErrorCode SbPlanCreate(SbSpace space, SbPlan *plan);
   SbMaterialOps.volumetric. Cells of P1 bodies and of laws with lambda <= 0 are kept whole: b and both moduli are zero.
 */
 typedef struct {
-  SbLane *b;       /* [nbatch][12] m^2; 0 in padding */
-  SbLane *modulus; /* [nbatch] lambda times the factor of stiffness and damping, Pa */
-  SbLane *shear;   /* [nbatch] mu likewise, Pa */
+  SbPack *b;       /* [nbatch][12] m^2; 0 in padding */
+  SbPack *modulus; /* [nbatch] lambda times the factor of stiffness and damping, Pa */
+  SbPack *shear;   /* [nbatch] mu likewise, Pa */
 } SbVolumetric;
 /*
   SbSpaceAssembleSplit - the tangent without its volumetric part, in up to three spaces of the mesh at once: space[0] is s.
@@ -64,7 +64,7 @@ typedef struct {
 PetscErrorCode SbMatrixSetAssembly(Mat A, const SbAssembly *assembly);
 
 /* u[3 a + i][lane] of n nodes of a batch from a local array [nnode][3]. */
-SB_INLINE void sb_gather_nodes(int n, const PetscInt node[], const PetscReal x[], SbLane u[])
+SB_INLINE void sb_gather_nodes(int n, const PetscInt node[], const PetscReal x[], SbPack u[])
 {
   for (int a = 0; a < n; a++) {
     for (int l = 0; l < SB_BATCH; l++) {
@@ -77,7 +77,7 @@ SB_INLINE void sb_gather_nodes(int n, const PetscInt node[], const PetscReal x[]
   }
 }
 
-static inline void sb_gather(const PetscInt node[4 * SB_BATCH], const PetscReal x[], SbLane u[12])
+static inline void sb_gather(const PetscInt node[4 * SB_BATCH], const PetscReal x[], SbPack u[12])
 {
   sb_gather_nodes(4, node, x, u);
 }
@@ -103,11 +103,11 @@ PetscErrorCode SbAttachModes(Mat A, PetscErrorCode (*fill)(PetscInt mode, PetscS
   across the face p.
 */
 static inline void sb_gather_strain(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[],
-                                    SbLane u[12])
+                                    SbPack u[12])
 {
   sb_gather(s->batch_node + 4 * SB_BATCH * b, x, u);
   if (region->broken) {
-    SbLane p[12];
+    SbPack p[12];
 
     sb_gather(s->batch_clique + (s->width * b + 4) * SB_BATCH, x, p);
     for (int k = 0; k < 12; k++) {
@@ -118,7 +118,7 @@ static inline void sb_gather_strain(SbSpace s, const SbRegion *region, PetscInt 
 }
 
 /* f[nnode][3] += the first n lanes of a batch's vectors at nnode nodes. */
-SB_INLINE void sb_scatter_nodes(int nnode, const PetscInt node[], PetscInt n, const SbLane fe[],
+SB_INLINE void sb_scatter_nodes(int nnode, const PetscInt node[], PetscInt n, const SbPack fe[],
                                 PetscReal f[])
 {
   for (int a = 0; a < nnode; a++) {
@@ -132,18 +132,18 @@ SB_INLINE void sb_scatter_nodes(int nnode, const PetscInt node[], PetscInt n, co
   }
 }
 
-static inline void sb_scatter_add(const PetscInt node[4 * SB_BATCH], PetscInt n, const SbLane fe[12],
+static inline void sb_scatter_add(const PetscInt node[4 * SB_BATCH], PetscInt n, const SbPack fe[12],
                                   PetscReal f[])
 {
   sb_scatter_nodes(4, node, n, fe, f);
 }
 
 /* The transpose of sb_gather_strain(): forces on the means go to the two nodes by their weights. */
-static inline void sb_scatter_strain(SbSpace s, const SbRegion *region, PetscInt b, SbLane fe[12],
+static inline void sb_scatter_strain(SbSpace s, const SbRegion *region, PetscInt b, SbPack fe[12],
                                      PetscReal f[])
 {
   if (region->broken) {
-    SbLane p[12];
+    SbPack p[12];
 
     for (int k = 0; k < 12; k++) {
       for (int l = 0; l < SB_BATCH; l++) {
@@ -153,9 +153,9 @@ static inline void sb_scatter_strain(SbSpace s, const SbRegion *region, PetscInt
         fe[k][l] = own;
       }
     }
-    sb_scatter_add(s->batch_clique + (s->width * b + 4) * SB_BATCH, s->batch_n[b], (const SbLane *)p, f);
+    sb_scatter_add(s->batch_clique + (s->width * b + 4) * SB_BATCH, s->batch_n[b], (const SbPack *)p, f);
   }
-  sb_scatter_add(s->batch_node + 4 * SB_BATCH * b, s->batch_n[b], (const SbLane *)fe, f);
+  sb_scatter_add(s->batch_node + 4 * SB_BATCH * b, s->batch_n[b], (const SbPack *)fe, f);
 }
 
 /*
@@ -163,13 +163,13 @@ static inline void sb_scatter_strain(SbSpace s, const SbRegion *region, PetscInt
 
   Not collective. Input: u[nnode][3] with ghosts, m; NULL: at rest.
 */
-void SbSpaceCellRotations(SbSpace space, const PetscReal u[], SbLane R[]);
+void SbSpaceCellRotations(SbSpace space, const PetscReal u[], SbPack R[]);
 /* As SbSpaceNodeRotations(), from rotations of cells. */
-PetscErrorCode SbSpaceAverageRotations(SbSpace space, const SbLane R[], PetscReal node_R[],
+PetscErrorCode SbSpaceAverageRotations(SbSpace space, const SbPack R[], PetscReal node_R[],
                                        PetscReal spread[]);
 
 /* Lends the rotations of cells that a matrix-free operator holds; NULL for another matrix. */
-PetscErrorCode SbMatrixFreeGetRotations(Mat A, const SbLane **R);
+PetscErrorCode SbMatrixFreeGetRotations(Mat A, const SbPack **R);
 
 /*
   SbSpaceGetRows - rows of an operator of the space for some owned nodes.
@@ -188,7 +188,7 @@ PetscErrorCode SbSpaceGetRows(SbSpace space, Mat A, PetscInt n, const PetscInt n
 */
 PetscErrorCode SbProductGetSymmetric(Mat A, Mat *local);
 /* y -= the columns of other ranks of A times x. Collective. */
-PetscErrorCode SbProductSubtractOther(Mat A, Vec x, Vec y);
+PetscErrorCode SbProductSubtractOffDiagonal(Mat A, Vec x, Vec y);
 /*
   SbMatRestoreRead - gives back the values of a matrix that were only read, by its own function, say MatSeqSBAIJRestoreArray.
 

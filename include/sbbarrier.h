@@ -34,7 +34,7 @@ struct _p_SbContactMesh {
   SbObstacleSide side;         /* what vertices alone meet, kept as vertices of the obstacle */
   PetscReal shortest;          /* edge of the bodies at rest, m */
   PetscReal size;              /* of the smallest body, diagonal, m */
-  /* of SbContactMeshMove() */
+  /* of SbContactMeshGetPositions() */
   PetscInt nlocal, *local;    /* own vertices of bodies */
   PetscMPIInt *count, *first; /* [ranks] */
   PetscInt *order;            /* [nbody_vertex] vertex of each received one */
@@ -51,7 +51,8 @@ PetscErrorCode SbContactMeshCreate(SbSpace space, PetscInt n, const SbFacet face
 PetscErrorCode SbContactMeshDestroy(SbContactMesh *mesh);
 PetscErrorCode SbContactMeshMarkDriven(SbContactMesh mesh);
 /* x[nvertex][3] of vertices from local displacements u (ghosts up to date) and the obstacle's pose (NULL without one), m. Collective. */
-PetscErrorCode SbContactMeshMove(SbContactMesh mesh, const PetscReal u[], const SbPose *pose, PetscReal x[]);
+PetscErrorCode SbContactMeshGetPositions(SbContactMesh mesh, const PetscReal u[], const SbPose *pose,
+                                         PetscReal x[]);
 
 /* Two features: vertex 0 and triangle 1 to 3; edges 0 1 and 2 3; or vertex 0 and the side of the obstacle. */
 typedef struct {
@@ -61,7 +62,7 @@ typedef struct {
   PetscReal area;  /* m^2 */
 } SbContactPair;
 
-/* Search and its results; x0 and x1 below are arrays of SbContactMeshMove(). */
+/* Search and its results; x0 and x1 below are arrays of SbContactMeshGetPositions(). */
 typedef struct _p_SbContactPairs *SbContactPairs;
 struct _p_SbContactPairs {
   SbContactMesh mesh;     /* borrowed */
@@ -82,15 +83,16 @@ PetscErrorCode SbContactPairsCreate(SbContactMesh mesh, PetscBool self, PetscBoo
                                     SbContactPairs *pairs);
 PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs);
 /* Vertices inside with triangles near there, edges of what crosses with each other are no pairs from now on, by SbContactOverlap.near (borrowed); NULL: all may be. Not collective. */
-PetscErrorCode SbContactPairsExempt(SbContactPairs pairs, const uint8_t near[]);
+PetscErrorCode SbContactPairsIgnore(SbContactPairs pairs, const uint8_t near[]);
 /* All pairs that come within the reach on the straight way from x0 to x1, and more. Not collective. */
 PetscErrorCode SbContactPairsFind(SbContactPairs pairs, const PetscReal x0[], const PetscReal x1[]);
 /* The gap, m: the distance less the radius of a rounded obstacle; nearest places and direction in `distance`. Not collective. */
 PetscReal SbContactPairGap(SbContactMesh mesh, const SbContactPair *pair, const PetscReal x[],
                            SbDistance *distance);
 /* Whether the boxes of both features on the straight way from x0 to x1 are farther apart than `distance`, m; false for the side of an obstacle. */
-static inline PetscBool SbContactPairApart(SbContactMesh mesh, const SbContactPair *pair,
-                                           const PetscReal x0[], const PetscReal x1[], PetscReal distance)
+static inline PetscBool SbContactPairSweptApart(SbContactMesh mesh, const SbContactPair *pair,
+                                                const PetscReal x0[], const PetscReal x1[],
+                                                PetscReal distance)
 {
   const int split = pair->kind == SB_PAIR_EDGE_EDGE ? 2 : 1;
   const PetscReal reach =
@@ -110,37 +112,37 @@ static inline PetscBool SbContactPairApart(SbContactMesh mesh, const SbContactPa
   }
   return PETSC_FALSE;
 }
-/* The part of the straight way from x0 to x1, 0..1, that no pair of this rank touches before; pairs at a distance keep a tenth of it. Not collective. */
-PetscErrorCode SbContactPairsSafe(SbContactPairs pairs, const PetscReal x0[], const PetscReal x1[],
-                                  PetscReal *part, PetscInt *worst);
-/* A vertex, or the middle of what is inside of an edge, that is in something: `normal` leads out of that over `depth`, to the point -sum of the weights from `first` on. */
+/* Largest collision-free fraction, 0..1, of the motion from x0 to x1, over the pairs of this rank, by continuous collision detection; each pair keeps a tenth of its gap. Not collective. */
+PetscErrorCode SbContactPairsMaxStep(SbContactPairs pairs, const PetscReal x0[], const PetscReal x1[],
+                                     PetscReal *part, PetscInt *worst);
+/* A penetrating vertex, or the midpoint of the penetrating part of an edge: `normal` is the separation direction, `depth` the penetration. */
 typedef struct {
   PetscInt n, v[5];
   PetscReal weight[5]; /* sum 0, n . sum weight x = -depth; for a round obstacle less its radius */
   PetscReal normal[3], depth, area;
-} SbContactInside;
-/* A vertex is inside; its edges or triangles go through something; it is next to these. */
-enum { SB_OVERLAP_AROUND = 1, SB_OVERLAP_CROSSED, SB_OVERLAP_INSIDE };
+} SbPenetration;
+/* Of a vertex: next to intersected ones; its edges or triangles intersect a surface; it is inside one. */
+enum { SB_OVERLAP_ADJACENT = 1, SB_OVERLAP_INTERSECTED, SB_OVERLAP_INSIDE };
 /* Start with {0}. The same on every rank. */
 typedef struct {
-  PetscInt ncrossing; /* edges that go through triangles, or features behind a round or one-sided obstacle */
+  PetscInt ncrossing; /* edges that intersect triangles, or features behind a round or one-sided obstacle */
   PetscInt part[2];   /* of the first of them: body, or nbody for the obstacle */
-  PetscReal place[3], deepest; /* where that is; deepest point inside, m */
+  PetscReal place[3], deepest; /* position of it; largest penetration, m */
   PetscInt n, size;
-  SbContactInside *point; /* [n] those that know the way out */
-  uint8_t *near;          /* [nvertex] SB_OVERLAP_INSIDE, _CROSSED, _AROUND or 0 */
+  SbPenetration *point; /* [n] with a separation direction */
+  uint8_t *near;        /* [nvertex] SB_OVERLAP_INSIDE, _CROSSED, _AROUND or 0 */
 } SbContactOverlap;
-/* What is in something else at x; `inside`: something is, also when no edge says so. Collective; release with SbContactOverlapFree(). */
+/* Penetration at x; `inside`: there is some, even if no edge intersects a triangle. Collective; release with SbContactOverlapFree(). */
 PetscErrorCode SbContactOverlapFind(SbContactMesh mesh, PetscBool self, const PetscReal x[], PetscBool inside,
                                     SbContactOverlap *overlap);
 PetscErrorCode SbContactOverlapFree(SbContactOverlap *overlap);
 /*
-  SbContactMeshContained - whether the middle of a tet of body[0] at rest is within the surface of body[1] at x: bodies of which no edge goes through the other.
+  SbContactMeshIsInside - whether one body is wholly inside another, so that no edge intersects a triangle: the centroid of a tet of body[0] is within the surface of body[1] at x.
 
   Collective. It takes every triangle for every body: for the start of a run.
 */
-PetscErrorCode SbContactMeshContained(SbContactMesh mesh, const PetscReal x[], PetscInt body[2],
-                                      PetscBool *found);
+PetscErrorCode SbContactMeshIsInside(SbContactMesh mesh, const PetscReal x[], PetscInt body[2],
+                                     PetscBool *found);
 
 /* Energy of a gap d, J, and its first two derivatives by d: barrier of the width w (m), pressure k (Pa) and area (m^2); 0 from w on, infinite at 0. */
 void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal b[3]);
@@ -166,4 +168,4 @@ PetscErrorCode SbContactBlocksFree(SbContactBlocks *blocks);
 PetscErrorCode SbContactBlocksAdd(SbContactBlocks *blocks, PetscInt v, PetscInt w, const PetscReal H[],
                                   PetscInt ld);
 /* Adds their blocks between own nodes and all nodes of the vertices, zero at prescribed components, each place once. Not collective. */
-PetscErrorCode SbContactBlocksSpread(SbContactMesh mesh, const SbContactBlocks *blocks, SbBlocks *nodes);
+PetscErrorCode SbContactBlocksToNodes(SbContactMesh mesh, const SbContactBlocks *blocks, SbBlocks *nodes);

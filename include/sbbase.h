@@ -117,17 +117,17 @@ PetscErrorCode SbOptionsTable(MPI_Comm comm, const char *file);
 PetscErrorCode SbViewerOpen(MPI_Comm comm, const char *file, PetscViewer *viewer);
 PetscErrorCode SbOptionsReset(void); /* forgets what was read and registered; at exit and in tests */
 
-/* SbNearestNames - the names of `n` candidates closest to `word` by edit distance, joined by " or "; "" when none is near. NULL
+/* SbSuggestNames - the names of `n` candidates closest to `word` by edit distance, joined by " or "; "" when none is near. NULL
    among the names is passed over: PetscFunctionListGet() counts its closing one. */
-PetscErrorCode SbNearestNames(const char *word, PetscInt n, const char *const names[], size_t size,
+PetscErrorCode SbSuggestNames(const char *word, PetscInt n, const char *const names[], size_t size,
                               char text[]);
 /* What to say of a word that is none of these names: "p1, cr, dg; did you mean cr?". */
-PetscErrorCode SbNamesAdvise(const char *word, PetscInt n, const char *const names[], size_t size,
+PetscErrorCode SbSuggestName(const char *word, PetscInt n, const char *const names[], size_t size,
                              char text[]);
 /* The same for the types in a list. */
 PetscErrorCode SbListAdvise(PetscFunctionList list, const char *word, size_t size, char text[]);
 /* Whether a word begins with one of these, "ksp_ pc_ snes_", in capitals or not. */
-PetscBool SbBeginsWith(const char *word, const char *beginnings);
+PetscBool SbHasPrefix(const char *word, const char *beginnings);
 
 /* ------------------------------------------------------------------ errors and warnings */
 
@@ -154,7 +154,7 @@ void SbErrorSetStopped(void);
 /* What one rank does when the run fails, before the error line: with PETSc as it was left, no communication. NULL: nothing. */
 void SbErrorSetFailureHandler(void (*failure_handler)(const char *message, void *ctx), void *ctx);
 /* What SbErrorFinish() calls first on this rank, with or without an error: files that must not stay. NULL: nothing. */
-void SbErrorAtEnd(void (*fn)(void));
+void SbErrorSetCleanup(void (*fn)(void));
 /*
   SbErrorFinish - last call of main() on every rank: `supple: error: ...` on stderr, once for the run; then MPI_Finalize(),
   or MPI_Abort() when other ranks do not arrive within a few seconds. Returns the exit code, non-zero on all ranks when
@@ -188,19 +188,19 @@ PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...) PETSC_ATTRIBUTE
 /* Room for at least `need` elements of `unit` bytes in *array, which has *size of them; doubles, so that appending is cheap. Not collective. */
 PetscErrorCode SbReserve(PetscInt need, size_t unit, PetscInt *size, void *array);
 /*
-  SbGroupByKey - positions 0..n-1 by their keys: those with key k are item[start[k]..start[k + 1]), ascending.
+  SbBucketByKey - positions 0..n-1 by their keys: those with key k are item[start[k]..start[k + 1]), ascending.
 
   Not collective. Positions with a key below 0 or from nkey on take no part. Output: start[nkey + 1], item[start[nkey]]; the caller frees both.
 */
-PetscErrorCode SbGroupByKey(PetscInt n, const PetscInt key[], PetscInt nkey, PetscInt **start,
-                            PetscInt **item);
+PetscErrorCode SbBucketByKey(PetscInt n, const PetscInt key[], PetscInt nkey, PetscInt **start,
+                             PetscInt **item);
 /*
-  SbGatherAll - one array on all ranks, of those of all ranks in their order.
+  SbAllgatherv - one array on all ranks, of those of all ranks in their order.
 
   Collective. Input: mine[n]. Output: total; all, address of a pointer to the array, which the caller frees; before (or NULL), entries of lower ranks.
 */
-PetscErrorCode SbGatherAll(MPI_Comm comm, MPI_Datatype type, PetscInt n, const void *mine, PetscInt *total,
-                           void *all, PetscInt *before);
+PetscErrorCode SbAllgatherv(MPI_Comm comm, MPI_Datatype type, PetscInt n, const void *mine, PetscInt *total,
+                            void *all, PetscInt *before);
 
 /* ------------------------------------------------------------------ memory */
 

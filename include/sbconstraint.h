@@ -52,7 +52,7 @@ struct _p_SbConstraints {
 };
 
 /* The constraints that solves see beside K; NULL: there are none. Not collective. */
-static inline SbConstraints SbConstraintsBeside(SbSpace space)
+static inline SbConstraints SbConstraintsSeparate(SbSpace space)
 {
   return space->constraints && space->constraints->beside ? space->constraints : NULL;
 }

@@ -10,19 +10,19 @@
 
 typedef struct _p_SbEffect *SbEffect;
 
-/* What Newton's method takes for the second derivative of the energy of contact: itself; the positive part of each pair's; that with parabolas that touch the energy
-   of friction from above in the place of it, which has a kink where a slip turns round. */
-typedef enum { SB_HESSIAN_EXACT, SB_HESSIAN_CLAMPED, SB_HESSIAN_ABOVE } SbContactHessian;
+/* Hessian of the contact energy in Newton's method: exact; each pair projected to positive semi-definite; the same with friction majorized by quadratics, as its energy
+   has a kink where slip reverses. */
+typedef enum { SB_HESSIAN_EXACT, SB_HESSIAN_PROJECTED, SB_HESSIAN_MAJORIZED } SbContactHessian;
 
-/* A point where something pushes a body. */
+/* An active contact point of a body. */
 typedef struct {
-  PetscInt id[3];      /* numbers that name it among those of its effect, the same for any partition */
+  PetscInt id[3];      /* identify it within its effect, the same for any partition */
   PetscInt effect;     /* number of the effect in the scenario; filled by the model */
-  PetscInt body[2];    /* the one that is pushed and the one that pushes; -1: a rigid obstacle */
-  PetscReal x[3];      /* where, on the body that is pushed, m */
-  PetscReal normal[3]; /* out of what pushes */
+  PetscInt body[2];    /* the body itself and its partner; -1: a rigid obstacle */
+  PetscReal x[3];      /* position on body[0], m */
+  PetscReal normal[3]; /* outward normal of the partner */
   PetscReal gap;       /* m; negative inside */
-  PetscReal force[3];  /* on the body that is pushed, with friction, N */
+  PetscReal force[3];  /* on body[0], with friction, N */
 } SbContactPoint;
 /* Start with {0}; the room is kept when n is set to zero. Release with PetscFree(list->point). */
 typedef struct {
@@ -30,24 +30,24 @@ typedef struct {
   SbContactPoint *point; /* [n] */
 } SbContactPoints;
 
-/* Two bodies that touch when a run begins, or nearly do. */
+/* Two bodies that are in contact, or nearly so, when a run begins. */
 typedef struct {
   PetscInt body[2];  /* nbody: an obstacle */
   PetscReal n[3];    /* unit, from the second to the first */
-  PetscReal gap, to; /* the distance along n, and the one that they are to have, m */
-} SbTouch;
+  PetscReal gap, to; /* the distance along n, and its target, m */
+} SbInitialContact;
 /* Start with {0}; release with PetscFree(list->touch). */
 typedef struct {
   PetscInt n, size;
-  SbTouch *touch; /* [n] */
-} SbTouches;
+  SbInitialContact *touch; /* [n] */
+} SbInitialContacts;
 
 typedef struct {
   /* reads -effect_<name>_...; scope = {"effect", <type>, <name>}; called once, by SbEffectCreate() */
   PetscErrorCode (*setfromoptions)(SbEffect e, const SbScope *scope);
-  /* finds its nodes, facets, cells; marks prescribed unknowns by SbSpaceFix(). Collective. */
+  /* finds its nodes, facets, cells; marks prescribed unknowns by SbSpacePrescribe(). Collective. */
   PetscErrorCode (*setup)(SbEffect e, SbSpace space);
-  /* writes prescribed displacements at time t into space->fixed_value (rows from SbSpaceFixedIndex()). Not collective. */
+  /* writes prescribed displacements at time t into space->fixed_value (rows from SbSpacePrescribedIndex()). Not collective. */
   PetscErrorCode (*prescribe)(SbEffect e, SbSpace space, PetscReal t);
   /* contact, before the first solve of an attempt at a step from t to t + dt: local displacements u0 at t and u as predicted at
      t + dt, m; v0 are the velocities at t, m/s, NULL unless an effect has `restitution`. Collective. */
@@ -86,7 +86,7 @@ typedef struct {
 
     touching      - a run begins at t, its first step has the length dt: adds what has a gap at the local displacements u that is too small, or not much larger, of this
                     rank. first: it was that step, alike on all ranks; else nothing was done.
-    begin_guarded - a step from t to t + dt begins with the local displacements u0, and the speed of guard.c, m/s; when the run begins they may be changed (moved), ghosts too, where surfaces
+    begin_guarded - a step from t to t + dt begins with the local displacements u0, and the speed of potential.c, m/s; when the run begins they may be changed (moved), ghosts too, where surfaces
                     touch. What moves by order is where it is at t: `progress` 0.
     meet          - after begin_guarded, for effects with restitution: what bounces in the step, by the local displacements u0 and velocities v0 at its start.
     advance       - it is where its way from t to t + dt has the part `progress` behind it, 0..1. Not collective.
@@ -104,7 +104,7 @@ typedef struct {
                     all ranks. Larger: when the next step begins, if the energy of gaps does not grow by more than `growth` with it, J, and not beyond the default. Not collective.
   */
   PetscErrorCode (*touching)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, const PetscReal u[],
-                             PetscBool *first, SbTouches *list);
+                             PetscBool *first, SbInitialContacts *list);
   PetscErrorCode (*begin_guarded)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, PetscReal speed,
                                   PetscReal u0[], PetscBool *moved);
   PetscErrorCode (*meet)(SbEffect e, SbSpace space, PetscReal dt, const PetscReal u0[], const PetscReal v0[]);

@@ -63,26 +63,26 @@ PetscErrorCode SbElementCreate(const char *name, const SbScope *body, SbElement 
 PetscErrorCode SbElementDestroy(SbElement *e);
 
 /* F = I + sum_a u_a (x) grad phi_a. g[3*(a-1)+j] = d phi_a / dX_j for a = 1..3, 1/m; u[3*a+i], a = 0..3, m. */
-void SbCellGradient(const SbLane g[9], const SbLane u[12], SbLane F[9]);
+void SbCellGradient(const SbPack g[9], const SbPack u[12], SbPack F[9]);
 /* Velocity-like gradient without the identity: H = sum_a v_a (x) grad phi_a. */
-void SbCellGradientRate(const SbLane g[9], const SbLane v[12], SbLane H[9]);
+void SbCellGradientRate(const SbPack g[9], const SbPack v[12], SbPack H[9]);
 /* f[3*a+i] = V P_ij grad phi_a,j: internal force of the cell on its nodes, N. The four forces sum to zero. */
-void SbCellForce(const SbLane g[9], const SbLane V, const SbLane P[9], SbLane f[12]);
+void SbCellForce(const SbPack g[9], const SbPack V, const SbPack P[9], SbPack f[12]);
 /*
   Ten upper blocks of the cell matrix for Hooke's tensor turned by R (R NULL: not turned):
   K[p][3*i+k] for p = 0..9 as SbPairA/B, K_ab = V (lambda h_a h_b^T + mu h_b h_a^T + mu (h_a . h_b) I), h = R grad phi. N/m.
   Diagonal blocks are symmetric to the last bit; the blocks (a, 0..3) sum to zero, (b, a) being the transpose of (a, b).
 */
-void SbCellBlocksIsotropic(const SbLane g[9], const SbLane V, PetscReal lambda, PetscReal mu,
-                           const SbLane R[9], SbLane K[10][9]);
+void SbCellBlocksIsotropic(const SbPack g[9], const SbPack V, PetscReal lambda, PetscReal mu,
+                           const SbPack R[9], SbPack K[10][9]);
 /*
   The same for the tangent that SbMaterialOps.spin describes, R and symmetric W (Pa) from there:
   K_ab = V (2 mu (h_a . h_b) I + lambda h_a h_b^T + [h_a]x R W R^T [h_b]x^T).
 */
-void SbCellBlocksSpin(const SbLane g[9], const SbLane V, PetscReal lambda, PetscReal mu, const SbLane R[9],
-                      const SbLane W[9], SbLane K[10][9]);
+void SbCellBlocksCorotated(const SbPack g[9], const SbPack V, PetscReal lambda, PetscReal mu,
+                           const SbPack R[9], const SbPack W[9], SbPack K[10][9]);
 /* The same for a full tangent C, symmetric in the pairs: K_ab,ik = V C_(ij)(kl) grad phi_a,j grad phi_b,l. */
-void SbCellBlocksGeneral(const SbLane g[9], const SbLane V, const SbLane C[81], SbLane K[10][9]);
+void SbCellBlocksGeneral(const SbPack g[9], const SbPack V, const SbPack C[81], SbPack K[10][9]);
 
 /* ------------------------------------------------------------------ P2, src/element/p2.c */
 
@@ -94,13 +94,13 @@ typedef struct {
 extern const SbPointRule SbRuleQuadratic; /* degree 2: where stresses are taken */
 extern const SbPointRule SbRuleCubic;     /* degree 3 */
 /* u[12] at the vertices of the P1 cell that has the gradient of U[30] at L. And the transpose: F[30] += what f[12] on that cell is. */
-void SbQuadraticAt(const PetscReal L[4], const SbLane U[30], SbLane u[12]);
-void SbQuadraticAdd(const PetscReal L[4], const SbLane f[12], SbLane F[30]);
+void SbQuadraticAt(const PetscReal L[4], const SbPack U[30], SbPack u[12]);
+void SbQuadraticAdd(const PetscReal L[4], const SbPack f[12], SbPack F[30]);
 /* K[p] for p = 0..54 from the ten blocks of P1 at the four points of SbRuleQuadratic, and factor b_a b_b^T. */
-void SbQuadraticBlocks(const SbLane B[4][10][9], const SbLane factor, const SbLane b[30],
-                       SbLane K[SB_PAIRS][9]);
+void SbQuadraticBlocks(const SbPack B[4][10][9], const SbPack factor, const SbPack b[30],
+                       SbPack K[SB_PAIRS][9]);
 /* K += weight d^2(det F)/du^2 at L; g as for P1, F there. */
-void SbQuadraticAddJacobian(const PetscReal L[4], const SbLane g[9], const SbLane F[9], const SbLane weight,
-                            SbLane K[SB_PAIRS][9]);
+void SbQuadraticAddJacobian(const PetscReal L[4], const SbPack g[9], const SbPack F[9], const SbPack weight,
+                            SbPack K[SB_PAIRS][9]);
 /* Consistent mass M_ab of a cell / (density V), a, b = 0..9. */
 PetscReal SbQuadraticMass(int a, int b);

@@ -77,13 +77,13 @@ struct _p_SbSpace {
   PetscInt *
     batch_clique; /* [nbatch][width][SB_BATCH] these nodes: the four of batch_node, then those across the faces, or those of P2
                                 at the edges (again its own where there is no other); batch_node itself when width is 4 */
-  SbLane *
+  SbPack *
     batch_weight; /* [nbatch][4] weight of a cell's own node in the mean of the two; NULL without a DG body */
   SbJump jump;    /* NULL without face nodes */
   SbConstraints constraints; /* NULL unless an effect may constrain nodes along directions of their own */
   PetscBool coupled;         /* an effect may couple nodes that share no cell, in an assembled tangent */
-  SbLane *batch_g;           /* [nbatch][9] basis gradients of nodes 1..3, 1/m; 64-byte aligned */
-  SbLane *batch_V;           /* [nbatch] volumes, m^3; 0 in padding; 64-byte aligned */
+  SbPack *batch_g;           /* [nbatch][9] basis gradients of nodes 1..3, 1/m; 64-byte aligned */
+  SbPack *batch_V;           /* [nbatch] volumes, m^3; 0 in padding; 64-byte aligned */
   void *batch_memory;        /* what batch_g and batch_V live in */
   PetscReal *node_mass;      /* [nnode] lumped mass, kg, complete on owned nodes */
   PetscReal *
@@ -150,11 +150,11 @@ PetscErrorCode SbSpaceAddVolumeTangent(SbSpace space, PetscInt body, const Petsc
                                        Mat A);
 
 /* Marks components (bits 0..2) of a local node as prescribed; set-up only. All ranks that know the node must do it. */
-PetscErrorCode SbSpaceFix(SbSpace space, PetscInt node, int components);
+PetscErrorCode SbSpacePrescribe(SbSpace space, PetscInt node, int components);
 /* After all effects were set up: builds fixed_node. */
-PetscErrorCode SbSpaceFixDone(SbSpace space);
+PetscErrorCode SbSpacePrescribeDone(SbSpace space);
 /* Index into fixed_node of a node, or -1. */
-PetscInt SbSpaceFixedIndex(SbSpace space, PetscInt node);
+PetscInt SbSpacePrescribedIndex(SbSpace space, PetscInt node);
 
 /* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest). Outputs may be NULL. */
 void SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[], PetscReal psi[]);
@@ -171,7 +171,7 @@ void SbSpaceStrainEnergy(SbSpace space, const PetscReal u[], PetscReal body[], P
 /* v . C v of owned cells, W. Local: reduce it. */
 PetscErrorCode SbSpaceDampingPower(SbSpace space, const PetscReal u[], const PetscReal v[], PetscReal *power);
 /* Largest stable step of an explicit run at rest, with its damping, s; a few percent too large at most. Collective, after
-   SbSpaceFixDone(). */
+   SbSpacePrescribeDone(). */
 PetscErrorCode SbSpaceStableStep(SbSpace space, PetscReal *dt);
 
 /*

@@ -128,7 +128,7 @@ PetscReal SbEdgeMollifier(const PetscReal x[], PetscReal eps, PetscReal g[], Pet
 
 /* Replaces a symmetric matrix A[n][n] by its positive semi-definite part. Not collective; n <= SB_CLAMP_MAX. */
 #define SB_CLAMP_MAX 12
-void SbSymmetricClamp(int n, PetscReal A[]);
+void SbSymmetricProjectPSD(int n, PetscReal A[]);
 
 /*
   SbTimeOfImpact - how much of a step a pair may go before the gap between its sides is used up; never later than the true time.
@@ -276,7 +276,7 @@ static inline PetscBool SbUnionJoin(PetscInt up[], PetscInt a, PetscInt b)
 */
 PetscErrorCode SbWeld(PetscInt n, const PetscReal x[], PetscReal tolerance, PetscBool chains, PetscInt map[]);
 /* Numbers the trees in the order of their roots, in place: up[n] is the tree of each; returns how many there are. */
-PetscInt SbUnionNumber(PetscInt n, PetscInt up[]);
+PetscInt SbUnionLabel(PetscInt n, PetscInt up[]);
 /* Leaves out points that none of used[nused] names, and renumbers these. The order stays. */
 PetscErrorCode SbDropUnusedPoints(PetscInt *n, PetscReal x[], PetscInt nused, PetscInt used[]);
 

@@ -13,7 +13,7 @@
 #include <math.h>
 
 #define SB_BATCH 8
-typedef PetscReal SbLane[SB_BATCH]; /* 64-byte aligned where the program allocates it */
+typedef PetscReal SbPack[SB_BATCH]; /* 64-byte aligned where the program allocates it */
 
 /*
   SB_KERNEL in front of a function compiles it for AVX-512, for AVX2 and for the baseline; the loader picks one when the
@@ -36,12 +36,12 @@ typedef PetscReal SbLane[SB_BATCH]; /* 64-byte aligned where the program allocat
 #endif
 
 /* Copies n numbers of lane l out of and into a batch. */
-SB_INLINE void SbLaneGet(int n, const SbLane a[], int l, PetscReal x[])
+SB_INLINE void SbPackGet(int n, const SbPack a[], int l, PetscReal x[])
 {
   for (int k = 0; k < n; k++) x[k] = a[k][l];
 }
 
-SB_INLINE void SbLanePut(int n, const PetscReal x[], int l, SbLane a[])
+SB_INLINE void SbPackPut(int n, const PetscReal x[], int l, SbPack a[])
 {
   for (int k = 0; k < n; k++) a[k][l] = x[k];
 }
@@ -120,7 +120,7 @@ SB_INLINE PetscReal SbMatDet(const PetscReal A[9])
   finite gives NaN. Error of R about 5 eps |F| / (s2 + s3), s2 + s3 being the sum of the two smaller signed stretches:
   that is rounding of F seen through the condition number of the problem. A lane's result does not depend on the others.
 */
-void SbPolar(const SbLane F[9], SbLane R[9]);
+void SbPolar(const SbPack F[9], SbPack R[9]);
 
 /*
   SbSymEig - eigenvalues s[3] and eigenvectors V (columns, det V = +1) of symmetric matrices S[6] = 00 01 02 11 12 22.
@@ -128,4 +128,4 @@ void SbPolar(const SbLane F[9], SbLane R[9]);
   Not collective. Right to rounding of the largest entry; no order among the eigenvalues. With R from SbPolar() and S = R^T F this
   is the singular value decomposition F = (R V) diag(s) V^T with two rotations, the sign of det F being in s.
 */
-void SbSymEig(const SbLane S[6], SbLane s[3], SbLane V[9]);
+void SbSymEig(const SbPack S[6], SbPack s[3], SbPack V[9]);

@@ -24,7 +24,7 @@ typedef enum {
   SB_EVENT_COUNT
 } SbEvent;
 extern PetscLogEvent SbEvents[SB_EVENT_COUNT];
-extern PetscLogStage SbStageSetup, SbStageSolve, SbStageOutput;
+extern PetscLogStage SbLogStageSetup, SbLogStageSolve, SbLogStageOutput;
 PetscErrorCode SbLogInitialize(void);
 /*
   SbLogNamed - the log event of something that a scene names: "SbEff_gravity", made when it is first asked for. What no scene of the

@@ -35,29 +35,29 @@ typedef struct {
   PetscReal (*wave_speed)(
     const struct _p_SbMaterial *m); /* of the fastest wave, sqrt((lambda + 2 mu) / rho), m/s */
   /* psi = energy per rest volume, J/m^3; zero at rest */
-  void (*energy)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane psi);
+  void (*energy)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack psi);
   /* Every law is psi = psi_mu(F) + lambda/2 theta(F)^2 with theta the law's measure of the change of volume: tr(eps) (linear),
      tr(S - I) (corotated), tr(E) (stvk), J - 1 (neohookean). p = -lambda theta, Pa, positive in compression: what resists the
      change of volume, and what oscillates from cell to cell where an element locks. */
-  void (*pressure)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane p);
+  void (*pressure)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack p);
   /* P = dPsi/dF, Pa */
-  void (*stress)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane P[9]);
+  void (*stress)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack P[9]);
   /* The tangent is the isotropic Hooke tensor of volumetric_modulus and shear_modulus, turned by R: fills R. NULL when the law needs the full tangent.
      Co-rotated has it with the warped tangent, linear always (R = I). */
-  void (*frame)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane R[9]);
+  void (*frame)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack R[9]);
   /* The tangent is dP = 2 mu dF + lambda (R : dF) R + R [W y]x with y = axial(R^T dF - dF^T R), what a law of R^T F has:
-     fills R and the symmetric W (Pa), for SbCellBlocksSpin(), which is cheaper than the full tangent. W = -mu I is Hooke's
+     fills R and the symmetric W (Pa), for SbCellBlocksCorotated(), which is cheaper than the full tangent. W = -mu I is Hooke's
      tensor turned by R. NULL when the law is not of this kind. Co-rotated has it with its exact tangents. */
-  void (*spin)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane R[9], SbLane W[9]);
+  void (*spin)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack R[9], SbPack W[9]);
   /* C[9*(3*i+j) + 3*k+l] = dP_ij/dF_kl, Pa; symmetric in the pairs to the last bit */
-  void (*tangent)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane C[81]);
+  void (*tangent)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack C[81]);
   /* D = d theta/dF (pressure, above): the tangent holds lambda D D^T, and nothing else of it grows with lambda but the stress.
      At rest D = I. With a frame or a spin D is their R. */
-  void (*volumetric)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane D[9]);
+  void (*volumetric)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack D[9]);
   /* C += p d^2 theta/dF^2 (C as in tangent), for the derivative of a pressure p (Pa, tension) that does not come from F alone; with the
      filtered tangent only where that is not negative. NULL: it vanishes, or it is in W of spin, which is proportional to lambda theta -
      2 mu. */
-  void (*curvature)(const struct _p_SbMaterial *m, const SbLane F[9], const SbLane p, SbLane C[81]);
+  void (*curvature)(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack p, SbPack C[81]);
 } SbMaterialOps;
 
 struct _p_SbMaterial {
@@ -117,5 +117,5 @@ SB_INLINE PetscReal SbMaterialWaveModulus(const struct _p_SbMaterial *m)
 
   Not collective. Input: F; H, gradient of the velocity, 1/s. Output: dP, Pa/s.
 */
-void SbMaterialDampingStress(const struct _p_SbMaterial *m, const SbLane F[9], const SbLane H[9],
-                             SbLane dP[9]);
+void SbMaterialDampingStress(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack H[9],
+                             SbPack dP[9]);

@@ -47,7 +47,7 @@ PetscErrorCode SbMeshFileGroup(const SbImport *import, PetscInt i, SbMeshGroup *
 
 #define SB_ANGLE_BINS 18 /* of ten degrees */
 #define SB_RATIO_BINS 8
-extern const PetscReal SbRatioBounds[SB_RATIO_BINS]; /* lower ends of the bins of radius ratios */
+extern const PetscReal SbRatioBinEdges[SB_RATIO_BINS]; /* lower ends of the bins of radius ratios */
 
 typedef struct {
   SbBody body;                     /* the fields that SbMeshCreate() finds */
@@ -57,13 +57,13 @@ typedef struct {
   PetscReal max_dihedral;          /* degrees */
   PetscInt64 angle[SB_ANGLE_BINS]; /* dihedral angles, six for each tet */
   PetscInt64 ratio[SB_RATIO_BINS]; /* radius ratios of the tets, 1 for the regular tet */
-} SbMeshFacts;
+} SbMeshStatistics;
 /*
   SbMeshFileMeasure - checks the mesh as a run would, and measures it. What a run would leave out or turn is left out and turned.
 
   Errors: what SbMeshCreate() refuses.
 */
-PetscErrorCode SbMeshFileMeasure(SbImport *import, SbMeshFacts *facts);
+PetscErrorCode SbMeshFileMeasure(SbImport *import, SbMeshStatistics *facts);
 
 /* ------------------------------------------------------------------ repair */
 

@@ -65,7 +65,7 @@ struct _p_SbModel {
   } bounce;              /* src/model/restitution.c; only with effects that bounce */
   PetscBool linear;      /* laws and effects: the tangent depends on the shifts only */
   PetscBool may_filter;  /* some law has the tangent auto */
-  PetscBool guard_apart; /* residuals that are solved leave guarded contact out: SbModelGuardGradient() */
+  PetscBool guard_apart; /* residuals that are solved leave guarded contact out: SbModelPotentialGradient() */
   PetscReal
     guard_speed; /* of the step that began, by which tolerances of guarded contact are judged, m/s; 0 in a static run */
   PetscReal mass; /* kg */
@@ -102,44 +102,45 @@ PetscErrorCode SbModelContactUpdateActiveSet(SbModel model, PetscReal t, Vec U, 
 /* After effects have loaded their state from a checkpoint: assembles the constraints of then, so that forces and reactions of that time are known.
    Collective. */
 PetscErrorCode SbModelContactResume(SbModel model);
-/* After the first Settle of a step: the part of it after which the first point arrives at what it did not touch before, 1: none
+/* After the first solve of a step: the fraction of the step at which the first point comes into contact, 1: none
    does; effects that do not ask for it are not examined. Collective. */
 PetscErrorCode SbModelContactTimeOfImpact(SbModel model, PetscReal *part);
-/* V <- the nearest velocity with which what touches stays so, after a step of the length dt that ended at t with the displacement U. Collective. */
+/* V <- the nearest velocity that keeps active contacts closed, after a step of the length dt that ended at t with the displacement U. Collective. */
 PetscErrorCode SbModelContactVelocity(SbModel model, PetscReal t, PetscReal dt, Vec U, Vec V);
-/* G = gap of each node along the normal of the nearest thing that it may touch, m, after the step that ended at t with the displacement U;
+/* G = gap of each node along the normal of the closest candidate surface, m, after the step that ended at t with the displacement U;
    0 where nothing is near. Collective. */
 PetscErrorCode SbModelContactGap(SbModel model, PetscReal t, Vec U, Vec G);
-/* F = what contact pushes the nodes with, N, after the step that ended at t with the displacement U, for which SbRunReactions() has been called.
+/* F = contact forces on the nodes, N, after the step that ended at t with the displacement U, for which SbRunReactions() has been called.
    Collective. */
 PetscErrorCode SbModelContactForce(SbModel model, PetscReal t, Vec U, Vec F);
 /* Appends the points of this rank where contact pushes bodies, after the same step. Collective. */
 PetscErrorCode SbModelContactPoints(SbModel model, PetscReal t, Vec U, SbContactPoints *list);
 /*
-  Guarded contact, where model->npotential > 0; operations of the same names in sbeffect.h. Collective.
+  Contact with a potential, response barrier, as Newton's method sees it: all effects that have it together, where model->npotential > 0; operations of the same names in sbeffect.h. Collective.
 
   Start: a run begins with U, dt being the length of its first step; bodies that touch are moved apart whole. Begin: a step begins with U0, which is changed when the run begins
-  with surfaces that still touch. Safe: part of the way from X to X - Y that can be gone, of all ranks, and
-  pairs that push each other now. Lag: X is an iterate of the step, or (solved) its solution, with the friction of before and what bounces; again: it wants more of them. V0: velocities when the step begins, NULL without.
+  with surfaces that still touch. MaxStep: largest collision-free fraction of the way from X to X - Y over all ranks, by continuous
+  collision detection, and the number of active pairs. UpdateFriction: lagged friction and restitution from X, an iterate of the step or (solved) its solution; again: another solve is wanted. V0: velocities when the step begins, NULL without.
 */
-PetscErrorCode SbModelGuardStart(SbModel model, PetscReal t, PetscReal dt, Vec U);
-PetscErrorCode SbModelGuardBegin(SbModel model, PetscReal t, PetscReal dt, Vec U0, Vec V0);
-PetscErrorCode SbModelGuardAdvance(SbModel model, PetscReal progress);
-PetscErrorCode SbModelGuardSafe(SbModel model, Vec X, Vec Y, PetscReal progress, PetscReal *part,
-                                PetscInt *nactive);
-/* What was nearest to each other in the last attempt at a step, in words, for who says why it failed. */
-PetscErrorCode SbModelGuardNearest(SbModel model, size_t size, char text[]);
-PetscErrorCode SbModelGuardLag(SbModel model, Vec X, PetscBool solved, PetscBool *again);
+PetscErrorCode SbModelPotentialStart(SbModel model, PetscReal t, PetscReal dt, Vec U);
+PetscErrorCode SbModelPotentialBegin(SbModel model, PetscReal t, PetscReal dt, Vec U0, Vec V0);
+PetscErrorCode SbModelPotentialAdvance(SbModel model, PetscReal progress);
+PetscErrorCode SbModelPotentialMaxStep(SbModel model, Vec X, Vec Y, PetscReal progress, PetscReal *part,
+                                       PetscInt *nactive);
+/* The closest pair in the last attempt at a step, in words, for the message of its failure. */
+PetscErrorCode SbModelPotentialNearest(SbModel model, size_t size, char text[]);
+PetscErrorCode SbModelPotentialUpdateFriction(SbModel model, Vec X, PetscBool solved, PetscBool *again);
 /* Of the last accepted step: what contact did to the bodies, J, and its forces taken out of those of SbModelLoads() at U, F, N. */
-PetscErrorCode SbModelGuardWork(SbModel model, Vec U, PetscReal *work, Vec F);
+PetscErrorCode SbModelPotentialWork(SbModel model, Vec U, PetscReal *work, Vec F);
 /* F += scale times the gradient of the energy at U, N; free_only: not at prescribed unknowns. energy of all ranks, J (NULL: not wanted). */
-PetscErrorCode SbModelGuardGradient(SbModel model, Vec U, PetscReal scale, PetscBool free_only,
-                                    PetscReal *energy, Vec F);
-PetscErrorCode SbModelGuardHessian(SbModel model, Vec U, SbContactHessian kind, SbBlocks *blocks, Vec R);
-/* F = what closes the gaps at U, N, zero at prescribed unknowns; bound of all ranks, J. changed: some width did. Collective. */
+PetscErrorCode SbModelPotentialGradient(SbModel model, Vec U, PetscReal scale, PetscBool free_only,
+                                        PetscReal *energy, Vec F);
+PetscErrorCode SbModelPotentialHessian(SbModel model, Vec U, SbContactHessian kind, SbBlocks *blocks, Vec R);
+/* For the estimate of contact's error. GapForces: F = nodal forces of the barrier that the gaps at U leave beyond exact contact, N, zero at prescribed unknowns; bound on their energy over all ranks, J. ScaleBarrierWidths: widths times `factor`, growing by `growth` at most; changed: some width did. Collective. */
 PetscErrorCode SbModelGapForces(SbModel model, Vec U, Vec F, PetscReal *bound);
-PetscErrorCode SbModelScaleWidths(SbModel model, PetscReal factor, PetscReal growth, PetscBool *changed);
-/* Initial displacements and velocities of bodies, with spin. Collective. */
+PetscErrorCode SbModelScaleBarrierWidths(SbModel model, PetscReal factor, PetscReal growth,
+                                         PetscBool *changed);
+/* Initial displacements and velocities of bodies, with their angular velocity. Collective. */
 PetscErrorCode SbModelInitialState(SbModel model, Vec U, Vec V);
 /* Centre of mass, m, and mass, kg, of each body, centre[nbody][4]: at rest with U NULL, else now. Collective. */
 PetscErrorCode SbModelCentres(SbModel model, Vec U, PetscReal centre[][4]);
@@ -155,7 +156,7 @@ PetscErrorCode SbModelEnergies(SbModel model, Vec U, Vec V, SbEnergies *e);
 */
 PetscErrorCode SbModelStrainEnergyAlong(SbModel model, Vec U, Vec D, PetscReal *psi, PetscReal *slope,
                                         PetscInt *ninverted);
-/* For laws with -body_NAME_tangent auto: tangents from now on without negative eigenvalues of cells, or the exact ones. Not collective. */
-PetscErrorCode SbModelFilterTangent(SbModel model, PetscBool filter);
+/* For laws with -body_NAME_tangent auto: from now on tangents with each cell projected to positive semi-definite, or the exact ones. Not collective. */
+PetscErrorCode SbModelProjectTangent(SbModel model, PetscBool filter);
 /* Power taken by Rayleigh damping, v . C v, W. Collective. */
 PetscErrorCode SbModelDampingPower(SbModel model, Vec U, Vec V, PetscReal *power);

@@ -74,10 +74,10 @@ PetscErrorCode SbOutputAttach(SbRun run);
 PetscErrorCode SbOutputLock(SbRun run);
 
 /*
-  SbOutputTakeState - displacement and velocity of bodies with -body_<name>_state, from frames of other runs. Collective; after SbRunSetUp(), before SbOutputAttach().
+  SbOutputLoadState - displacement and velocity of bodies with -body_<name>_state, from frames of other runs. Collective; after SbRunSetUp(), before SbOutputAttach().
   Errors: PETSC_ERR_FILE_OPEN, PETSC_ERR_FILE_UNEXPECTED for a run, step or body that is not there.
 */
-PetscErrorCode SbOutputTakeState(SbRun run);
+PetscErrorCode SbOutputLoadState(SbRun run);
 
 /*
   SbOutputRestoreMeshes - with -restart from a checkpoint of a run that was re-meshed: the bodies' meshes (SbBody.given). Collective; between

@@ -123,7 +123,7 @@ PetscErrorCode SbPCPMultigridCreate(SbSpace space, PC pc);
   SbPressureOperatorCreate - the tangent of a space with CR or DG bodies, its volumetric part apart, so that a large lambda
   does no harm.
 
-  Collective, after SbSpaceFixDone(). K is a MATSHELL owned by the caller; the space is borrowed. It is filled by
+  Collective, after SbSpacePrescribeDone(). K is a MATSHELL owned by the caller; the space is borrowed. It is filled by
   SbSpaceAssembleTangent() and SbSpaceFinishTangent() as a matrix is, and effects may add to it. Errors: PETSC_ERR_USER for a space
   without face nodes.
 */

@@ -12,8 +12,8 @@ typedef enum {
   SB_TIME_EULER_EXPLICIT,
   SB_TIME_ALPHA2,
   SB_TIME_STATIC
-} SbTimePreset;
-extern const char *const SbTimePresets; /* "euler_implicit|newmark|..." in the order of the enum */
+} SbIntegrator;
+extern const char *const SbIntegrators; /* "euler_implicit|newmark|..." in the order of the enum */
 
 /* What a monitor sees after each accepted step (and once before the first). */
 typedef struct {
@@ -67,7 +67,7 @@ typedef PetscErrorCode (*SbPauseFn)(SbRun run, PetscInt step, PetscReal t, Petsc
 /* One simulation: model, solver, integrator, monitors. */
 struct _p_SbRun {
   SbModel model; /* borrowed */
-  SbTimePreset preset;
+  SbIntegrator preset;
   TS ts;           /* NULL in a static run */
   SNES snes;       /* of the TS, or own in a static run; borrowed from ts when there is one */
   Mat J, operator; /* tangent; what solves see of it: J itself, its projection (sbfem.h, SbConstraints), or
@@ -160,7 +160,7 @@ struct _p_SbRun {
   /* values[ncell_owned] = energy of the error of space discretisation per rest volume, J/m^3; NULL: nobody estimates it. Collective. */
   PetscErrorCode (*cell_error)(SbRun run, const SbStep *step, PetscReal values[]);
   PetscBool want_energies, want_residual;
-  SbEnergies energies;    /* running totals of works and losses */
+  SbEnergies energies;    /* running totals of work and dissipation */
   PetscReal energy_start; /* kinetic + strain at the start of the run (kept over restarts), J */
   PetscInt step0;         /* first step and time when restarted */
   PetscReal t0;
@@ -182,13 +182,13 @@ struct _p_SbRun {
 };
 
 /*
-  SbRunMethodError - what one step of the integrator of a dynamic run loses, for small steps: in the norm of the energy c h^(p+1)
+  SbRunLocalError - what one step of the integrator of a dynamic run loses, for small steps: in the norm of the energy c h^(p+1)
   |d^(p+1) (u, v) / dt^(p+1)|.
 
   Not collective. Output: order p and constant c, from the eigenvalue of the method for an undamped oscillator; `ahead`, the time in lengths of a
   step by which symplectic Euler's velocities are behind, whose error does not add up; 0 for the others.
 */
-void SbRunMethodError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead);
+void SbRunLocalError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead);
 /* X = (K + H)^-1 B with the tangent K of the last direction of Newton's method and the second derivative H of guarded contact, where surfaces pushed each other there (solved). Collective. */
 PetscErrorCode SbRunSolveTangent(SbRun run, Vec B, Vec X, PetscInt *iterations, PetscBool *solved);
 PetscErrorCode SbTimeRegister(void); /* option rows and the TSType */
@@ -202,12 +202,12 @@ PetscErrorCode SbRunCatchSignals(SbRun run);
 /* After SbRunSetUp(). */
 void SbRunSetPause(SbRun run, SbPauseFn fn, void *ctx);
 /*
-  SbRunContinue - `to` goes on where `from` has come to, on another model of the same scene. Collective.
+  SbRunTransferState - `to` goes on where `from` has come to, on another model of the same scene. Collective.
 
-  After SbRunSetUp(to), before monitors are added. Takes over totals, works and losses, the step and its time, and lengths of steps; with explicit
+  After SbRunSetUp(to), before monitors are added. Takes over totals, work and dissipation, the step and its time, and lengths of steps; with explicit
   integrators that is the stable one of the new model, unless it was given. U, V and A are the caller's to fill.
 */
-PetscErrorCode SbRunContinue(SbRun from, SbRun to);
+PetscErrorCode SbRunTransferState(SbRun from, SbRun to);
 /* A <- the acceleration with which the integrator goes on at t_now from U and V: where it takes the one of the residual, that one; but A stays
    as it is where displacements are prescribed, and with integrators that keep their own. Collective. */
 PetscErrorCode SbRunRestartAcceleration(SbRun run);

@@ -33,14 +33,14 @@ static PetscErrorCode simulate(Scene *s)
   PetscFunctionBeginUser;
   SbErrorSetFailureHandler(report_failure, s);
   /* set-up: meshes of a restart, space, integrator, who looks on */
-  PetscCall(PetscLogStagePush(SbStageSetup));
+  PetscCall(PetscLogStagePush(SbLogStageSetup));
   PetscCall(SbOutputLock(s->run));
   PetscCall(SbOutputRestoreMeshes(s->run));
   PetscCall(SbModelSetUp(s->model));
   PetscCall(SbSceneCheckSizes(s->model));
   PetscCall(SbSceneValidate(s->model));
   PetscCall(SbRunSetUp(s->run));
-  PetscCall(SbOutputTakeState(s->run));
+  PetscCall(SbOutputLoadState(s->run));
   PetscCall(SbLedgerAttach(s->ledger));
   PetscCall(SbRemeshAttach(s->remesh, s->run));
   PetscCall(SbRunCatchSignals(s->run));

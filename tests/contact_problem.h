@@ -43,8 +43,8 @@ static inline PetscErrorCode contact_problem_open(PetscInt cells, const char *el
   /* tangent and blocks at rest; the barrier is not soft where nothing has moved yet */
   PetscCall(SbSpaceCreateMatrix(s, size == 1 ? SB_MATRIX_SBAIJ : SB_MATRIX_BAIJ, &p->K));
   PetscCall(SbSpaceCreateVec(s, &zero));
-  PetscCall(SbModelGuardBegin(p->scene.model, 0., h, zero, NULL));
-  PetscCall(SbModelGuardHessian(p->scene.model, zero, SB_HESSIAN_CLAMPED, &p->blocks, NULL));
+  PetscCall(SbModelPotentialBegin(p->scene.model, 0., h, zero, NULL));
+  PetscCall(SbModelPotentialHessian(p->scene.model, zero, SB_HESSIAN_PROJECTED, &p->blocks, NULL));
   PetscCall(SbSpaceGetLocalRead(s, zero, &u));
   stage.u = u;
   PetscCall(SbSpaceAssembleTangent(s, &stage, p->K));

@@ -167,7 +167,7 @@ static inline PetscErrorCode part_names(const char *family, PetscInt *n, char na
     char **words;
     int count;
 
-    PetscCall(PetscStrToArray(SbTimePresets, '|', &count, &words));
+    PetscCall(PetscStrToArray(SbIntegrators, '|', &count, &words));
     for (int i = 0; i < count; i++) PetscCall(PetscStrncpy(names[(*n)++], words[i], SB_NAME_MAX));
     PetscCall(PetscStrToArrayDestroy(count, words));
   } else if (!strcmp(family, "field")) {
@@ -231,7 +231,7 @@ static inline PetscErrorCode part_text(const char *mesh, const char *scene, cons
 /* How often an event has been begun in all stages, and the seconds in it; 0 for one that does not exist. Not collective. */
 static inline PetscErrorCode part_event(const char *name, PetscInt *count, PetscLogDouble *seconds)
 {
-  const PetscLogStage stages[] = {0, SbStageSetup, SbStageSolve, SbStageOutput};
+  const PetscLogStage stages[] = {0, SbLogStageSetup, SbLogStageSolve, SbLogStageOutput};
   PetscLogEvent event;
 
   PetscFunctionBeginUser;

@@ -12,8 +12,8 @@ PetscErrorCode SbReserve(PetscInt need, size_t unit, PetscInt *size, void *array
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbGroupByKey(PetscInt n, const PetscInt key[], PetscInt nkey, PetscInt **start,
-                            PetscInt **item)
+PetscErrorCode SbBucketByKey(PetscInt n, const PetscInt key[], PetscInt nkey, PetscInt **start,
+                             PetscInt **item)
 {
   PetscInt *first;
 
@@ -32,8 +32,8 @@ PetscErrorCode SbGroupByKey(PetscInt n, const PetscInt key[], PetscInt nkey, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbGatherAll(MPI_Comm comm, MPI_Datatype type, PetscInt n, const void *mine, PetscInt *total,
-                           void *all, PetscInt *before)
+PetscErrorCode SbAllgatherv(MPI_Comm comm, MPI_Datatype type, PetscInt n, const void *mine, PetscInt *total,
+                            void *all, PetscInt *before)
 {
   PetscMPIInt nrank, rank, size, count, *counts, *offsets;
 

@@ -161,7 +161,7 @@ void SbErrorSetFailureHandler(void (*failure_handler)(const char *message, void 
   state.farewell_ctx = ctx;
 }
 
-void SbErrorAtEnd(void (*fn)(void))
+void SbErrorSetCleanup(void (*fn)(void))
 {
   state.at_end = fn;
 }

@@ -9,7 +9,7 @@
 #include "sblog.h"
 
 PetscLogEvent SbEvents[SB_EVENT_COUNT];
-PetscLogStage SbStageSetup, SbStageSolve, SbStageOutput;
+PetscLogStage SbLogStageSetup, SbLogStageSolve, SbLogStageOutput;
 
 static PetscErrorCode stage(const char *name, PetscLogStage *s)
 {
@@ -30,9 +30,9 @@ PetscErrorCode SbLogInitialize(void)
   PetscFunctionBeginUser;
   for (int i = 0; i < SB_EVENT_COUNT; i++)
     PetscCall(PetscLogEventRegister(names[i], PETSC_OBJECT_CLASSID, &SbEvents[i]));
-  PetscCall(stage("Setup", &SbStageSetup));
-  PetscCall(stage("Solve", &SbStageSolve));
-  PetscCall(stage("Output", &SbStageOutput));
+  PetscCall(stage("Setup", &SbLogStageSetup));
+  PetscCall(stage("Solve", &SbLogStageSolve));
+  PetscCall(stage("Output", &SbLogStageOutput));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -49,7 +49,7 @@ PetscErrorCode SbLogNamed(const char *kind, const char *name, PetscLogEvent *eve
 
 PetscErrorCode SbLogSeconds(PetscLogEvent event, PetscReal *seconds)
 {
-  const PetscLogStage stages[] = {0, SbStageSetup, SbStageSolve, SbStageOutput};
+  const PetscLogStage stages[] = {0, SbLogStageSetup, SbLogStageSolve, SbLogStageOutput};
 
   PetscFunctionBeginUser;
   for (size_t s = 0; s < PETSC_STATIC_ARRAY_LENGTH(stages); s++) {

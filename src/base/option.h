@@ -30,7 +30,7 @@ typedef struct {
 } SbOptionUser;
 
 typedef struct {
-  PetscBool at_end; /* PETSc frees it at the end */
+  PetscBool at_end; /* freed in PetscFinalize() */
   PetscInt nblock, nrecord, nuser;
   SbOptionBlock *block;   /* [nblock] in the order of registration */
   SbOptionRecord *record; /* [nrecord] in the order of the first reading */

@@ -28,7 +28,7 @@ static const SbOption *program_row(const char *name)
 /* Beginnings of PETSc's own options, as far as a run of ours can meet them. */
 static PetscBool looks_like_petsc(const char *name)
 {
-  return SbBeginsWith(
+  return SbHasPrefix(
     name,
     "ksp_ pc_ snes_ ts_ mat_ vec_ dm_ is_ sub_ mg_ fieldsplit_ asm_ log_ malloc options_ petsc on_error_ "
     "memory_ fp_trap start_in_debugger stop_for_debugger debugger_ citations no_signal_handler info viewer_ "
@@ -183,7 +183,7 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
       n++;
     }
   }
-  PetscCall(SbNearestNames(dashed, n, list, sizeof(near), near));
+  PetscCall(SbSuggestNames(dashed, n, list, sizeof(near), near));
   PetscCall(PetscFree2(list, names));
   if (!klass && !near[0]) PetscFunctionReturn(PETSC_SUCCESS);
   *verdict = WRONG;
@@ -251,7 +251,7 @@ PetscErrorCode SbOptionMissing(const SbOptionRecord *r)
       continue;
     list[n++] = names[i];
   }
-  PetscCall(SbNearestNames(r->name + 1, n, list, sizeof(near), near));
+  PetscCall(SbSuggestNames(r->name + 1, n, list, sizeof(near), near));
   PetscCall(PetscFree(list));
   PetscCall(PetscOptionsLeftRestore(NULL, &nleft, &names, NULL));
   PetscCheck(!near[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-%s is not an option of supple; did you mean %s?",
@@ -312,8 +312,8 @@ PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n)
     for (PetscInt j = 0; j < SbTheOptions.nuser && !users; j++)
       users = (PetscBool)!strcasecmp(SbTheOptions.user[j].name, names[i]);
     if (!users ||
-        SbBeginsWith(names[i], "citations get_total_flops log_ malloc_ memory_view mpidump no_signal_handler "
-                               "nox objects_dump options_left options_view saw_options x_virtual") ||
+        SbHasPrefix(names[i], "citations get_total_flops log_ malloc_ memory_view mpidump no_signal_handler "
+                              "nox objects_dump options_left options_view saw_options x_virtual") ||
         class_of(names[i]) || program_row(names[i]))
       continue;
     PetscCall(SbWarning(comm, "nobody read the option -%s%s%s", names[i], values[i] ? " " : "",

@@ -78,7 +78,7 @@ void SbBarrierPair(SbContactMesh m, const SbContactPair *pair, PetscReal gap, co
         for (int j = 0; j < 12; j++)
           H[12 * i + j] += b[0] * C[12 * i + j] + b[1] * (grad[i] * gradient[j] + gradient[i] * grad[j]);
       }
-      if (clamp) SbSymmetricClamp(12, H);
+      if (clamp) SbSymmetricProjectPSD(12, H);
     }
   }
   for (int k = 0; k < 12; k++) gradient[k] = e * b[1] * gradient[k] + (e < 1. ? b[0] * grad[k] : 0.);

@@ -80,7 +80,7 @@ static inline void add_weighted(PetscReal weight, const PetscReal block[9], Pets
   }
 }
 
-PetscErrorCode SbContactBlocksSpread(SbContactMesh m, const SbContactBlocks *b, SbBlocks *to)
+PetscErrorCode SbContactBlocksToNodes(SbContactMesh m, const SbContactBlocks *b, SbBlocks *to)
 {
   const SbSpace s = m->space;
   const PetscInt nv = m->nbody_vertex;

@@ -156,8 +156,8 @@ static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet f
   PetscCallMPI(MPI_Comm_size(s->comm, &ranks));
   PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
   PetscCall(list_own(m, n, facet, &nnumber, &number, &nreal, &real));
-  PetscCall(SbGatherAll(s->comm, MPIU_INT, nnumber, number, &Nnumber, &all, NULL));
-  PetscCall(SbGatherAll(s->comm, MPIU_REAL, nreal, real, &Nreal, &values, NULL));
+  PetscCall(SbAllgatherv(s->comm, MPIU_INT, nnumber, number, &Nnumber, &all, NULL));
+  PetscCall(SbAllgatherv(s->comm, MPIU_REAL, nreal, real, &Nreal, &values, NULL));
   PetscCall(PetscFree(number));
   PetscCall(PetscFree(real));
 
@@ -248,7 +248,7 @@ static PetscErrorCode make_triangles(SbContactMesh m, PetscInt n, const SbFacet 
       }
     }
   }
-  PetscCall(SbGatherAll(s->comm, MPIU_INT, 4 * nmine, mine, &total, &all, NULL));
+  PetscCall(SbAllgatherv(s->comm, MPIU_INT, 4 * nmine, mine, &total, &all, NULL));
   PetscCall(PetscFree(mine));
   if (total) qsort(all, (size_t)(total / 4), 4 * sizeof(PetscInt), compare_triangles);
 
@@ -348,7 +348,7 @@ PetscErrorCode SbContactMeshCreate(SbSpace s, PetscInt n, const SbFacet facet[],
   m->space = s;
   PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
 
-  /* vertices and triangles of the bodies, then of the obstacle, for which rank 0 speaks */
+  /* vertices and triangles of the bodies, then of the obstacle, which belong to rank 0 */
   if (obstacle) PetscCall(SbObstacleGetSurface(obstacle, &o));
   m->side = o.side;
   m->radius = o.radius;
@@ -396,7 +396,8 @@ PetscErrorCode SbContactMeshMarkDriven(SbContactMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactMeshMove(SbContactMesh m, const PetscReal u[], const SbPose *pose, PetscReal x[])
+PetscErrorCode SbContactMeshGetPositions(SbContactMesh m, const PetscReal u[], const SbPose *pose,
+                                         PetscReal x[])
 {
   PetscReal *mine = m->buffer, *all = m->buffer + 3 * m->nlocal;
   PetscMPIInt ranks;

@@ -12,7 +12,7 @@
 #include "sbgeometry.h"
 #include "sblog.h"
 
-#define LEFT 0.1 /* of its gap that a pair keeps at least */
+#define LEFT 0.1 /* fraction of its gap that a pair keeps at least */
 #define LEFT_MOST \
   0.5 /* of the reach: no more need be left, so that what comes from far away comes within it at once */
 
@@ -101,7 +101,7 @@ static inline PetscBool overlaps(SbContactPairs p, const PetscInt v[4], int spli
   for (int k = 0; k < 4; k++) near[k >= split] = PetscMax(near[k >= split], p->near[v[k]]);
   if (!near[0] || !near[1]) return PETSC_FALSE;
   return (PetscBool)(split == 1 ? near[0] == SB_OVERLAP_INSIDE
-                                : PetscMax(near[0], near[1]) >= SB_OVERLAP_CROSSED);
+                                : PetscMax(near[0], near[1]) >= SB_OVERLAP_INTERSECTED);
 }
 
 static PetscErrorCode add_vertex_triangle(SbContactPairs p, PetscInt v, PetscInt t)
@@ -188,7 +188,7 @@ PetscErrorCode SbContactPairsCreate(SbContactMesh m, PetscBool self, PetscBool o
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactPairsExempt(SbContactPairs p, const uint8_t near[])
+PetscErrorCode SbContactPairsIgnore(SbContactPairs p, const uint8_t near[])
 {
   PetscFunctionBeginUser;
   if (p->near || near) p->known = PETSC_FALSE;
@@ -378,8 +378,8 @@ static PetscReal safe_part(SbContactMesh m, const SbContactPair *pair, PetscReal
   return PetscMin(1., part);
 }
 
-PetscErrorCode SbContactPairsSafe(SbContactPairs p, const PetscReal x0[], const PetscReal x1[],
-                                  PetscReal *part, PetscInt *worst)
+PetscErrorCode SbContactPairsMaxStep(SbContactPairs p, const PetscReal x0[], const PetscReal x1[],
+                                     PetscReal *part, PetscInt *worst)
 {
   const SbContactMesh m = p->mesh;
   const PetscInt most = PetscMin(CROWD * (PetscInt64)(m->nvertex + CROWD_LEAST), PETSC_MAX_INT / 2);
@@ -403,7 +403,7 @@ PetscErrorCode SbContactPairsSafe(SbContactPairs p, const PetscReal x0[], const 
     PetscReal t;
 
     if (!m->own[pair->v[0]] && !(pair->v[0] >= m->nbody_vertex && m->own[pair->v[1]])) continue;
-    if (SbContactPairApart(m, pair, x0, x1, p->reach)) continue;
+    if (SbContactPairSweptApart(m, pair, x0, x1, p->reach)) continue;
     t = safe_part(m, pair, LEFT_MOST * p->reach, x0, x1);
     if (t < *part) {
       *part = t;

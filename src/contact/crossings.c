@@ -1,8 +1,8 @@
 /*
-  crossings.c - whether surfaces are in each other: edges that go through triangles. It shares nothing with the search for pairs but the tree of boxes.
+  crossings.c - intersections of surfaces: edges that intersect triangles. It shares nothing with the search for pairs but the tree of boxes.
 
   An edge goes through a triangle where its ends are on different sides of the plane and the line passes the three sides the same way round; signs of volumes of tets tell. Volumes
-  below rounding, that of the coordinates too, count as neither: bodies that touch are not in each other.
+  below rounding, that of the coordinates too, count as neither: bodies in contact do not intersect.
 */
 #include "contact_mesh.h"
 
@@ -103,7 +103,7 @@ PetscErrorCode SbContactMeshCrossings(SbContactMesh m, PetscBool self, const Pet
   PetscCall(PetscFree(box));
 
   /* those of all ranks */
-  PetscCall(SbGatherAll(m->space->comm, MPIU_INT, 2 * s.n, s.hit, n, hits, NULL));
+  PetscCall(SbAllgatherv(m->space->comm, MPIU_INT, 2 * s.n, s.hit, n, hits, NULL));
   PetscCall(PetscFree(s.hit));
   *n /= 2;
   if (*n) qsort(*hits, (size_t)*n, 2 * sizeof(PetscInt), compare_hits);
@@ -127,8 +127,7 @@ static PetscReal solid_angle(const PetscReal p[3], const PetscReal *a, const Pet
          (2. * PETSC_PI);
 }
 
-PetscErrorCode SbContactMeshContained(SbContactMesh m, const PetscReal x[], PetscInt body[2],
-                                      PetscBool *found)
+PetscErrorCode SbContactMeshIsInside(SbContactMesh m, const PetscReal x[], PetscInt body[2], PetscBool *found)
 {
   const SbMesh mesh = m->space->mesh;
   const PetscInt nbody = mesh->nbody;

@@ -1,7 +1,7 @@
 /*
   obstacle.c - rigid obstacles by their signed distance.
 
-  Each shape is a core with a radius: distance = |x - nearest point of the core| - r, the core being a point (sphere), a segment
+  Each shape is a rounded primitive, a core with a radius: distance = |x - nearest point of the core| - r, the core being a point (sphere), a segment
   (capsule), a solid box or a solid cylinder (r = 0; inside them the nearest side counts). A bowl is a sphere inverted.
   What a closed mesh encloses is in src/geometry/signed_distance.c.
 */

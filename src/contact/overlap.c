@@ -1,11 +1,11 @@
 /*
-  overlap.c - what is in something else when it should not be: where, how deep, and which way out.
+  overlap.c - penetrations: where, how deep, and the separation direction.
 
-  Between surfaces of triangles, edges that go through a triangle (crossings.c) say which of their ends is inside and the normal there. From these vertices the way out and the depth along it spread over the
-  edges that go through nothing, so that neighbours leave to the same side (Heidelberger, Teschner, Keiser, Mueller and Gross, "Consistent penetration depth estimation for deformable
-  collision response", VMV 2004). An edge that goes in and out again is inside with its middle alone. The way out ends at the triangle that it goes through from the back.
+  Between surfaces of triangles, edges that go through a triangle (crossings.c) say which of their ends is inside and the normal there. From these vertices the separation direction and the depth along it spread over the
+  edges that intersect nothing, so that neighbours leave to the same side (Heidelberger, Teschner, Keiser, Mueller and Gross, "Consistent penetration depth estimation for deformable
+  collision response", VMV 2004). Of an edge that enters and leaves a body only the midpoint of the inner part is inside. The depth ends at the triangle that the direction meets from the back.
 
-  Of a half-space and a bowl a vertex is behind; of a ball and a capsule features are nearer to the middle than the radius: these know their way out.
+  Of a half-space and a bowl a vertex is behind; of a ball and a capsule features are nearer to the centre or axis than the radius: their separation direction is known.
 
   Everything is done alike by every rank.
 */
@@ -33,7 +33,7 @@ typedef struct {
   uint8_t *through;       /* [nedge] goes through a triangle */
 } Ways;
 
-static PetscErrorCode add_point(SbContactOverlap *o, const SbContactInside *point)
+static PetscErrorCode add_point(SbContactOverlap *o, const SbPenetration *point)
 {
   PetscFunctionBeginUser;
   if (o->n == o->size) {
@@ -90,7 +90,7 @@ static PetscReal pierce(SbContactMesh m, const PetscReal x[], PetscInt e, PetscI
 
 /* The point inside leaves along its way through a triangle of the part that it is in: that becomes the other side. */
 static PetscErrorCode find_way_out(SbContactMesh m, const PetscReal x[], const SbBoxTree *tree, PetscInt part,
-                                   PetscReal depth, const PetscReal p[3], SbContactInside *point,
+                                   PetscReal depth, const PetscReal p[3], SbPenetration *point,
                                    PetscBool *found)
 {
   PetscReal box[6], goal[3], nearest = PETSC_MAX_REAL, best[3] = {0};
@@ -191,7 +191,7 @@ static void add_normals(SbContactMesh m, const PetscReal x[], PetscReal normal[]
 }
 
 /* Whether a point's own surface looks against its way out; along others neighbours leave, or nothing is in the way. */
-static PetscBool leads(const PetscReal normal[], const SbContactInside *p)
+static PetscBool leads(const PetscReal normal[], const SbPenetration *p)
 {
   PetscReal n[3] = {0.};
 
@@ -289,11 +289,11 @@ static PetscErrorCode look_inside(SbContactMesh m, const PetscReal x[], PetscInt
     PetscInt j = i + 1;
 
     w.through[e] = 1;
-    for (int k = 0; k < 2; k++) o->near[ends[k]] = PetscMax(o->near[ends[k]], SB_OVERLAP_CROSSED);
+    for (int k = 0; k < 2; k++) o->near[ends[k]] = PetscMax(o->near[ends[k]], SB_OVERLAP_INTERSECTED);
     for (int k = 0; k < 3; k++) {
       const PetscInt v = m->triangle[3 * hit[2 * i + 1] + k];
 
-      o->near[v] = PetscMax(o->near[v], SB_OVERLAP_CROSSED);
+      o->near[v] = PetscMax(o->near[v], SB_OVERLAP_INTERSECTED);
     }
     if (paired[i]) continue;
 
@@ -302,7 +302,7 @@ static PetscErrorCode look_inside(SbContactMesh m, const PetscReal x[], PetscInt
     if (j < n && hit[2 * j] == e) {
       PetscReal unused, length, chord = 0.;
       const PetscReal s2 = pierce(m, x, e, hit[2 * j + 1], other, &unused), at = 0.5 * (s + s2);
-      SbContactInside point = {
+      SbPenetration point = {
         .n = 2, .v = {ends[0], ends[1]}, .weight = {1. - at, at}, .area = m->edge_area[e]};
       PetscBool found;
 
@@ -338,7 +338,7 @@ static PetscErrorCode look_inside(SbContactMesh m, const PetscReal x[], PetscInt
   PetscCall(spread_ways(m, &w, nlist, list));
 
   for (PetscInt v = 0; v < m->nvertex; v++) {
-    SbContactInside point = {.n = 1, .v = {v}, .weight = {1.}, .area = m->area[v]};
+    SbPenetration point = {.n = 1, .v = {v}, .weight = {1.}, .area = m->area[v]};
     PetscBool found;
 
     if (!w.layer[v]) continue;
@@ -368,7 +368,7 @@ static PetscErrorCode look_inside(SbContactMesh m, const PetscReal x[], PetscInt
 static PetscErrorCode add_behind(SbContactMesh m, const PetscReal x[], const SbContactPair *pair,
                                  SbContactOverlap *o)
 {
-  SbContactInside point = {.n = 0, .area = pair->area};
+  SbPenetration point = {.n = 0, .area = pair->area};
   PetscBool driven = PETSC_TRUE;
   SbDistance d;
   const PetscReal gap = SbContactPairGap(m, pair, x, &d);
@@ -492,7 +492,7 @@ PetscErrorCode SbContactOverlapFind(SbContactMesh m, PetscBool self, const Petsc
     const PetscInt *v = m->edge + 2 * e;
 
     for (int k = 0; k < 2; k++) {
-      if (o->near[v[k]] && !o->near[v[1 - k]]) around[v[1 - k]] = SB_OVERLAP_AROUND;
+      if (o->near[v[k]] && !o->near[v[1 - k]]) around[v[1 - k]] = SB_OVERLAP_ADJACENT;
     }
   }
   PetscCall(PetscFree(o->near));

@@ -1,12 +1,12 @@
 /*
   barrier.c - contact by a barrier, with friction: surfaces never touch, and no step lets them through each other.
 
-  Below the width w pairs of features push each other by the barrier of src/contact/barrier.c, an energy that is infinite where they touch. It joins the
-  potential that Newton's method lowers (src/time/newton.c), and no iteration goes farther than the pairs allow (src/contact/contact_pairs.c). So a state that is accepted can be reached
+  Below the width w pairs of features repel each other by the barrier of src/contact/barrier.c, an energy that is infinite at contact. It is part of the
+  potential that Newton's method minimises (src/time/newton.c), and no iteration goes farther than the pairs allow (src/contact/contact_pairs.c). So a state that is accepted can be reached
   from the one before it without surfaces passing through each other.
 
-  What moves by order, an obstacle on its path, goes on straight ways from where it is at the start of a step to where it is at its end, and as far on these as
-  `progress` says: Newton's method raises it to one as fast as the surfaces let it.
+  Prescribed motions, such as an obstacle on its path, are linear within a step; `progress` is the fraction that is completed. Newton's method raises
+  it to one as fast as the surfaces allow.
 
   Friction: Coulomb's law with the normal forces N and nearest places that the pairs have when the step begins (Li et al., "Incremental potential contact",
   ACM TOG 39(4), 2020, section 4): the energy mu N f0(|u_t|) of the slip u_t since then, whose slope rises from 0 to 1 within the slip e = dt times a small speed:
@@ -16,14 +16,14 @@
   In a static run, or when asked for, a solution gives its normal forces and places to the next solve of the same step, until friction changes by less than a tolerance
   (barrier_friction.c). By how much it still would is reported.
 
-  Starts. Bodies that touch when a run begins are moved apart as they are (src/model/guard.c), by the width or, in a static run, half of it; what cannot be parted so, by its vertices. Those that are in each other are parted by springs (barrier_springs.c).
+  Initial contact. Bodies that touch when a run begins are moved apart rigidly (src/model/potential.c), by the width or, in a static run, half of it; where that fails, by their vertices. Bodies that intersect are separated by penalty springs (barrier_springs.c).
 */
 #include "barrier_impl.h"
 
 #define WIDTH 1e-3       /* of the size of the smallest body: default of w */
 #define WIDTH_CUBE 3e-3  /* at most so much of the edge of a cube of its volume, as thin bodies are long */
 #define PRESSURE 0.1     /* of Young's modulus of the softer side */
-#define SLIP 1e-4        /* of the speed of a step (src/model/guard.c): below it friction sticks */
+#define SLIP 1e-4        /* of the speed of a step (src/model/potential.c): below it friction sticks */
 #define SLIP_LEAST 1e-7  /* of the size of the smallest body: the slip of a time step is not smaller */
 #define SLIP_STATIC 1e-5 /* of the size: the same in a static run, as a length */
 #define LAGS 100         /* solves of a load step with the friction of the one before */
@@ -169,7 +169,7 @@ static PetscBool facing(const Barrier *b, const SbContactPair *pair, const Petsc
 }
 
 static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, PetscReal dt, const PetscReal u[],
-                                       PetscBool *first, SbTouches *list)
+                                       PetscBool *first, SbInitialContacts *list)
 {
   Barrier *b = (Barrier *)e->data;
   const SbContactMesh m = b->mesh;
@@ -181,7 +181,7 @@ static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, Petsc
   if (!*first) PetscFunctionReturn(PETSC_SUCCESS);
   find_path(b, t, dt);
   PetscCall(SbContactMeshMarkDriven(m));
-  PetscCall(SbContactMeshMove(m, u, NULL, b->x));
+  PetscCall(SbContactMeshGetPositions(m, u, NULL, b->x));
   SbBarrierPlaceObstacle(b, 0., b->x);
   PetscCall(SbBarrierPart(e, s, dt, (PetscBool)!b->looked));
   b->looked = PETSC_TRUE;
@@ -191,11 +191,11 @@ static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, Petsc
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
     const PetscInt one = m->part[pair->v[0]], two = m->part[pair->v[pair->kind == SB_PAIR_EDGE_EDGE ? 2 : 1]];
-    SbTouch touch = {.body = {one, two}, .to = (e->dynamic ? 1. : APART) * width_of(b, pair)};
+    SbInitialContact touch = {.body = {one, two}, .to = (e->dynamic ? 1. : APART) * width_of(b, pair)};
     SbDistance d;
 
     if (one == two || !counts(b, pair)) continue;
-    if (SbContactPairApart(m, pair, b->x, b->x, NEARBY * touch.to)) continue;
+    if (SbContactPairSweptApart(m, pair, b->x, b->x, NEARBY * touch.to)) continue;
     touch.gap = SbContactPairGap(m, pair, b->x, &d);
     if (touch.gap > NEARBY * touch.to) continue;
     for (int k = 0; k < 3; k++) touch.n[k] = d.n[k];
@@ -229,7 +229,7 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
   for (int pass = 0; pass < PASSES; pass++) {
     PetscInt n = 0;
 
-    PetscCall(SbContactMeshMove(m, u, NULL, b->x));
+    PetscCall(SbContactMeshGetPositions(m, u, NULL, b->x));
     SbBarrierPlaceObstacle(b, 0., b->x);
     PetscCall(vertex_normals(b, b->x, normal));
     PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
@@ -399,7 +399,7 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
   b->nrub = b->nspring = b->nbounce = 0;
   if (!b->begun) PetscCall(SbContactMeshMarkDriven(m));
   if (!b->begun || b->overlapping || b->parted) {
-    PetscCall(SbContactMeshMove(m, u0, NULL, b->x));
+    PetscCall(SbContactMeshGetPositions(m, u0, NULL, b->x));
     SbBarrierPlaceObstacle(b, 0., b->x);
     PetscCall(SbBarrierPart(e, s, dt, (PetscBool)(!b->begun && !b->looked && t == 0.)));
   }
@@ -462,9 +462,9 @@ static PetscErrorCode safe_barrier(SbEffect e, SbSpace s, const PetscReal u0[], 
   PetscCall(SbBarrierLook(b, u0));
   nsearch = b->pairs->nsearch;
   *nactive = b->nactive;
-  PetscCall(SbContactMeshMove(b->mesh, u1, NULL, b->other));
+  PetscCall(SbContactMeshGetPositions(b->mesh, u1, NULL, b->other));
   SbBarrierPlaceObstacle(b, progress, b->other);
-  PetscCall(SbContactPairsSafe(b->pairs, b->x, b->other, part, &worst));
+  PetscCall(SbContactPairsMaxStep(b->pairs, b->x, b->other, part, &worst));
   /* pairs that were found for the way are others than those of its start */
   if (b->pairs->nsearch != nsearch) b->known = PETSC_FALSE;
   b->shortest = PetscMin(b->shortest, *part);

@@ -42,14 +42,14 @@ PetscErrorCode SbBarrierLook(Barrier *b, const PetscReal u[])
   PetscCall(PetscArraycpy(b->u, u, n));
   b->now = b->progress;
   b->known = PETSC_TRUE;
-  PetscCall(SbContactMeshMove(b->mesh, u, NULL, b->x));
+  PetscCall(SbContactMeshGetPositions(b->mesh, u, NULL, b->x));
   SbBarrierPlaceObstacle(b, b->progress, b->x);
   PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
   b->nactive = 0;
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     Active a = {.pair = i};
 
-    if (SbContactPairApart(b->mesh, &b->pairs->pair[i], b->x, b->x, b->w[0])) continue;
+    if (SbContactPairSweptApart(b->mesh, &b->pairs->pair[i], b->x, b->x, b->w[0])) continue;
     a.gap = SbContactPairGap(b->mesh, &b->pairs->pair[i], b->x, &a.at);
     if (a.gap >= width_of(b, &b->pairs->pair[i])) continue;
     if (b->nactive == b->size) {
@@ -262,7 +262,7 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
     const PetscReal y = SbBarrierSlip(b, rub, rub->slip), w = b->slip;
     PetscReal slope = SbBarrierSlope(b, y), curve = y < w ? 2. / w - 2. * y / (w * w) : 0.;
 
-    rub->sticks = (PetscBool)(y > w && kind != SB_HESSIAN_ABOVE &&
+    rub->sticks = (PetscBool)(y > w && kind != SB_HESSIAN_MAJORIZED &&
                               (rub->turns || (rub->sticks && kind != SB_HESSIAN_EXACT)));
     rub->turns = PETSC_FALSE;
     if (rub->sticks) {
@@ -272,7 +272,7 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
         force[k] = rub->force * (1. / w - slope) * rub->weight[k / 3] * rub->slip[k % 3];
       spread(b, rub->pair.side ? 1 : 4, rub->pair.v, 1., force, r);
       slope = curve = 1. / w;
-    } else if (kind == SB_HESSIAN_ABOVE)
+    } else if (kind == SB_HESSIAN_MAJORIZED)
       curve = slope;
     for (int k = 0; k < 9; k++) {
       T[k] = slope * ((k % 4 ? 0. : 1.) - rub->n[k / 3] * rub->n[k % 3]);
@@ -300,6 +300,6 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
       PetscCall(SbContactBlocksAdd(&b->blocks, v, w, B, 3));
     }
   }
-  PetscCall(SbContactBlocksSpread(b->mesh, &b->blocks, blocks));
+  PetscCall(SbContactBlocksToNodes(b->mesh, &b->blocks, blocks));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -4,7 +4,7 @@
 #pragma once
 #include "barrier.h"
 #include "overlap.h"
-#include "rebound.h"
+#include "restitution.h"
 
 /* A pair below its width, at the places that the effect knows. */
 typedef struct {

@@ -40,7 +40,7 @@ static PetscErrorCode exempt_nearest(Barrier *b)
   }
   PetscCallMPI(
     MPI_Allreduce(MPI_IN_PLACE, near, (PetscMPIInt)m->nvertex, MPI_UINT8_T, MPI_MAX, m->space->comm));
-  PetscCall(SbContactPairsExempt(b->pairs, near));
+  PetscCall(SbContactPairsIgnore(b->pairs, near));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -116,7 +116,7 @@ PetscErrorCode SbBarrierPart(SbEffect e, SbSpace s, PetscReal dt, PetscBool firs
 
   PetscFunctionBeginUser;
   b->nspring = 0;
-  if (first && !b->scene.obstacle) PetscCall(SbContactMeshContained(b->mesh, b->x, body, &inside));
+  if (first && !b->scene.obstacle) PetscCall(SbContactMeshIsInside(b->mesh, b->x, body, &inside));
   PetscCall(SbContactOverlapFind(b->mesh, b->scene.self, b->x, inside, o));
   PetscCheck(
     !inside || (o->n && !same_place(b, body)), s->comm, PETSC_ERR_USER_INPUT,
@@ -126,7 +126,7 @@ PetscErrorCode SbBarrierPart(SbEffect e, SbSpace s, PetscReal dt, PetscBool firs
   b->overlapping =
     (PetscBool)(o->ncrossing > 0 && (!first || !o->n || o->deepest > ROUNDING * b->mesh->size));
   if (first && b->scene.obstacle && !b->overlapping) PetscCall(check_obstacle(e, s, 0.));
-  PetscCall(SbContactPairsExempt(b->pairs, b->overlapping ? o->near : NULL));
+  PetscCall(SbContactPairsIgnore(b->pairs, b->overlapping ? o->near : NULL));
   b->known = PETSC_FALSE;
   if (!b->overlapping) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(exempt_nearest(b));
@@ -135,7 +135,7 @@ PetscErrorCode SbBarrierPart(SbEffect e, SbSpace s, PetscReal dt, PetscBool firs
 
   if (e->dynamic) SbOverlapBegin(&b->parting, dt);
   for (PetscInt i = 0; i < o->n; i++) {
-    const SbContactInside *p = &o->point[i];
+    const SbPenetration *p = &o->point[i];
     const PetscInt one = b->mesh->part[p->v[0]], two = b->mesh->part[p->v[p->n - 1]];
     const PetscReal w = PetscMin(b->w[one], b->w[two]), k = PetscMin(b->k[one], b->k[two]),
                     all = p->depth + 0.5 * w;

@@ -4,7 +4,7 @@
 #pragma once
 #include "barrier.h"
 #include "overlap.h"
-#include "rebound.h"
+#include "restitution.h"
 
 typedef enum { AUTO, PROJECTED, MULTIPLIER, AUGMENTED, PENALTY, BARRIER } SbResponse;
 

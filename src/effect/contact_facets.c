@@ -1,7 +1,7 @@
 /*
   contact_facets.c - constrained nodes where facets of an obstacle's mesh meet.
 
-  There a node may slide from one facet to the other and back with every look. In a valley both push: constrained on one of them it goes through the
+  There a node may alternate between facets with every update of the active set. At a concave edge both act: constrained on one of them it penetrates the
   other one. So it is constrained on both for a solve, which tells what each has to exert. If neither pulls, the resultant is the
   normal with which forces balance in the valley, and it is constrained along that till the step ends; else the one that pulls is left. On
   two facets it slides along the valley, and maybe behind a third one, which then takes the place of that which pushes less.

@@ -6,22 +6,22 @@
   pressure is carried by the edges of P2 alone, which exact responses find by themselves; springs have the areas of the four triangles over the six nodes of a facet.
 
   Response `projected`: touching nodes are constrained on the obstacle (src/fem/constraint.c): n . u is prescribed, and the force that this
-  takes is the multiplier lambda. After each solve a pulling one leaves, a penetrated node enters, the normal is taken again on a
-  curved obstacle, and the solve is repeated until nothing changes (Kikuchi and Oden 1988; Hueeber and Wohlmuth 2005). A node that
+  takes is the multiplier lambda. Primal-dual active set: after each solve nodes in tension are released, penetrating nodes are added, the normal is updated on a
+  curved obstacle, and the solve is repeated until the set does not change (Kikuchi and Oden 1988; Hueeber and Wohlmuth 2005). A node that
   has left and come back several times within a step stays: the loop ends. `multiplier`: the same with the forces as
   unknowns of the solves.
 
-  Response `penalty`: springs, N = k <-g>, with k from the stiffness of the cell behind. `augmented`: the penalty with a multiplier,
-  N = <lambda - k g>, which is raised after each solve until the penetration is within the tolerance (Simo and Laursen 1992).
+  Response `penalty`: springs, N = k <-g>, <x> = max(x, 0), with k from the stiffness of the cell behind. `augmented`: the penalty with a multiplier,
+  N = <lambda - k g>, which is updated after each solve until the penetration is within the tolerance (Simo and Laursen 1992).
 
   Friction (friction.c) is solved for with N. It needs constraints: with it all responses write their nodes as such, `projected` exact ones in whose
-  null space the solves run, `penalty` and `augmented` springs, linear while normals and who touches stay, which is examined after each
+  null space the solves run, `penalty` and `augmented` springs, linear while normals and the active set stay fixed, which is examined after each
   solve. A node sticks to the place of the obstacle where it was when the step began, and moves with it.
 
-  Overlap that is there when a step begins is not thrown out at once: a node may stay behind the obstacle by that depth, which falls to
-  1/e in `recovery` steps. With springs that is the depth beyond what they give. A static run closes it at once.
+  Penetration that is there when a step begins is resolved gradually: a node may stay behind the obstacle by that depth, which falls to
+  1/e in `separation_steps` steps. With springs that is the depth beyond what they give. A static run closes it at once.
 
-  What bounces is described in contact_rebound.c, what happens where facets of a mesh meet in
+  Restitution is described in contact_restitution.c, what happens where facets of a mesh meet in
   contact_facets.c, forces and what is reported of them are in contact_force.c.
 */
 #include "contact_node.h"

@@ -1,5 +1,5 @@
 /*
-  contact_node.h - nodes of the surface against a rigid obstacle: what contact_node.c, contact_facets.c, contact_force.c, contact_rebound.c and friction.c share.
+  contact_node.h - nodes of the surface against a rigid obstacle: what contact_node.c, contact_facets.c, contact_force.c, contact_restitution.c and friction.c share.
 */
 #pragma once
 #include "contact.h"
@@ -147,7 +147,7 @@ void SbFrictionSave(const SbFrictionState *grip, PetscReal state[]);
 void SbFrictionLoad(const PetscReal state[], SbFrictionState *grip);
 
 /*
-  Restitution (contact_rebound.c), of a node at x0 with the velocity v0 (m/s; NULL: not known) when the step begins. Comes: it will be
+  Restitution (contact_restitution.c), of a node at x0 with the velocity v0 (m/s; NULL: not known) when the step begins. Comes: it will be
   behind the obstacle at that speed. Hit: it is to be constrained.
 */
 PetscBool SbContactComes(const Contact *c, const SbPose *from, const PetscReal x0[3], const PetscReal v0[3],

@@ -57,7 +57,7 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
     const char *names[SB_EFFECT_TYPES];
     char all[512];
 
-    PetscCall(SbNamesAdvise(type, SbEffectTypes(names), names, sizeof(all), all));
+    PetscCall(SbSuggestName(type, SbEffectTypes(names), names, sizeof(all), all));
     SETERRQ(PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
             "effect %s: there is no effect of type \"%s\"; set -effect_%s_type to one of %s", name, type,
             name, all);

@@ -82,7 +82,7 @@ typedef struct {
   Errors: PETSC_ERR_USER_INPUT when earlier effects have all of them already.
 */
 PetscErrorCode SbPrescribedSetUp(SbPrescribed *p, SbSpace space, const SbEffectOn *on, int components);
-/* Writes value[n][3] (NULL: zero), m, into space->fixed_value. Not collective; after SbSpaceFixDone(). */
+/* Writes value[n][3] (NULL: zero), m, into space->fixed_value. Not collective; after SbSpacePrescribeDone(). */
 PetscErrorCode SbPrescribedSetValues(SbPrescribed *p, SbSpace space, const PetscReal value[]);
 /* force[3] = sum over the owned prescribed unknowns of the residual: the reaction, acting on the body, N. Not collective. */
 void SbPrescribedReaction(const SbPrescribed *p, const PetscReal residual[], PetscReal force[3]);

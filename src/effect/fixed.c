@@ -1,9 +1,8 @@
 /*
   fixed.c - nodes constrained where they are at rest, in all directions or in some.
 
-  Prescribes u_c = 0 for the chosen components c. The history gets the force of the support on the body
-  (prescribed.c has the sign). Between effects that want the same unknown, the one named first in the scenario has
-  it.
+  Prescribes u_c = 0 for the chosen components c. history.csv has the reaction, the force of the support on the body
+  (prescribed.c has the sign). Of several effects that prescribe one unknown, the first in the scenario counts.
 
   CR and DG are constrained at the triangles of their surface, in the mean: one triangle alone, or two, leave rotations
   free. A DG face that is fixed in all directions has a node of its own that is prescribed, to which its cell is tied

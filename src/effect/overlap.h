@@ -1,16 +1,15 @@
 /*
-  overlap.h - overlap that is there when a step begins: how much of it is left when the step ends.
+  overlap.h - penetration that is there when a step begins: how much of it is left when the step ends.
 
-  It is not thrown out but taken back to 1/e in `recovery` whole steps. A step that was cut takes back less, so that what moves out moves no
-  faster.
+  It decays to 1/e in `separation_steps` whole steps. A shorter step resolves less of it, at the same speed.
 */
 #pragma once
 #include "sbbase.h"
 
 typedef struct {
-  PetscReal recovery; /* part of a depth that is left after a whole step; 0: all overlap closes at once */
+  PetscReal recovery; /* factor on the depth in a whole step, exp(-1/separation_steps); 0: resolved at once */
   PetscReal longest;  /* step so far, s */
-  PetscReal left;     /* part of a depth that is left after this step */
+  PetscReal left;     /* factor on the depth in this step */
 } SbOverlap;
 
 /* steps: as the option says. */

@@ -28,7 +28,7 @@ PetscErrorCode SbPrescribedSetUp(SbPrescribed *prescribed, SbSpace space, const 
     const int free = components & ~(int)space->fixed[node];
 
     if (!free) continue;
-    PetscCall(SbSpaceFix(space, node, free));
+    PetscCall(SbSpacePrescribe(space, node, free));
     prescribed->node[n] = node;
     prescribed->components[n] = (uint8_t)free;
     n++;
@@ -49,7 +49,7 @@ PetscErrorCode SbPrescribedSetValues(SbPrescribed *prescribed, SbSpace space, co
   // Rows exist only after every effect was set up, so they are looked up on first use.
   if (!prescribed->have_rows) {
     for (PetscInt i = 0; i < prescribed->n; i++) {
-      prescribed->row[i] = SbSpaceFixedIndex(space, prescribed->node[i]);
+      prescribed->row[i] = SbSpacePrescribedIndex(space, prescribed->node[i]);
       PetscCheck(prescribed->row[i] >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB,
                  "Node %" PetscInt_FMT " is not marked as prescribed", prescribed->node[i]);
     }

@@ -254,7 +254,7 @@ static PetscErrorCode add_quadratic_tangent(SbSpace space, const SbFacet *facet,
 /* Whether it meets no other facet at its edges, and its tangent is applied beside the matrix. */
 static inline PetscBool apart(SbSpace space, const SbFacet *facet)
 {
-  return (PetscBool)(!SbSpaceCellElement(space, facet->cell)->nodes_per[0] && !SbConstraintsBeside(space));
+  return (PetscBool)(!SbSpaceCellElement(space, facet->cell)->nodes_per[0] && !SbConstraintsSeparate(space));
 }
 
 static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])

@@ -7,7 +7,7 @@
   sets.
 
   Nodes of P1 bodies are vertices; those of CR and DG lie at faces. A set that holds a corner or an edge of such a body
-  holds none of its nodes. To take no notice would let go what a P1 body is constrained by, so that is an error.
+  holds none of its nodes. Ignoring it would silently drop a constraint, so it is an error.
 */
 #include "effect_impl.h"
 

@@ -15,7 +15,7 @@
 #include <sbelement.h>
 
 /* H = (u_1 - u_0) g_1^T + (u_2 - u_0) g_2^T + (u_3 - u_0) g_3^T of lane l */
-SB_INLINE void gradient(const SbLane g[9], const SbLane u[12], int l, PetscReal H[9])
+SB_INLINE void gradient(const SbPack g[9], const SbPack u[12], int l, PetscReal H[9])
 {
   for (int i = 0; i < 3; i++) {
     const PetscReal d1 = u[3 + i][l] - u[i][l], d2 = u[6 + i][l] - u[i][l], d3 = u[9 + i][l] - u[i][l];
@@ -24,7 +24,7 @@ SB_INLINE void gradient(const SbLane g[9], const SbLane u[12], int l, PetscReal 
   }
 }
 
-SB_KERNEL void SbCellGradient(const SbLane g[restrict 9], const SbLane u[restrict 12], SbLane F[restrict 9])
+SB_KERNEL void SbCellGradient(const SbPack g[restrict 9], const SbPack u[restrict 12], SbPack F[restrict 9])
 {
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal H[9];
@@ -34,19 +34,19 @@ SB_KERNEL void SbCellGradient(const SbLane g[restrict 9], const SbLane u[restric
   }
 }
 
-SB_KERNEL void SbCellGradientRate(const SbLane g[restrict 9], const SbLane v[restrict 12],
-                                  SbLane H[restrict 9])
+SB_KERNEL void SbCellGradientRate(const SbPack g[restrict 9], const SbPack v[restrict 12],
+                                  SbPack H[restrict 9])
 {
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal h[9];
 
     gradient(g, v, l, h);
-    SbLanePut(9, h, l, H);
+    SbPackPut(9, h, l, H);
   }
 }
 
-SB_KERNEL void SbCellForce(const SbLane g[restrict 9], const PetscReal V[restrict SB_BATCH],
-                           const SbLane P[restrict 9], SbLane f[restrict 12])
+SB_KERNEL void SbCellForce(const SbPack g[restrict 9], const PetscReal V[restrict SB_BATCH],
+                           const SbPack P[restrict 9], SbPack f[restrict 12])
 {
   for (int l = 0; l < SB_BATCH; l++) {
     for (int i = 0; i < 3; i++) {
@@ -89,7 +89,7 @@ SB_INLINE void coupling_block(PetscReal lv, PetscReal mv, const PetscReal ha[3],
 /* Blocks of node 0 of lane l from those of nodes 1..3. */
 SB_INLINE void node0_blocks(const PetscReal K11[9], const PetscReal K12[9], const PetscReal K13[9],
                             const PetscReal K22[9], const PetscReal K23[9], const PetscReal K33[9], int l,
-                            SbLane K[10][9])
+                            SbPack K[10][9])
 {
   PetscReal K01[9], K02[9], K03[9];
 
@@ -102,9 +102,9 @@ SB_INLINE void node0_blocks(const PetscReal K11[9], const PetscReal K12[9], cons
       K03[ik] = -(K13[ik] + K23[ik] + K33[ik]);
     }
   }
-  SbLanePut(9, K01, l, K[1]);
-  SbLanePut(9, K02, l, K[2]);
-  SbLanePut(9, K03, l, K[3]);
+  SbPackPut(9, K01, l, K[1]);
+  SbPackPut(9, K02, l, K[2]);
+  SbPackPut(9, K03, l, K[3]);
   for (int i = 0; i < 3; i++) {
     for (int k = 0; k < 3; k++) {
       const int upper = i < k ? 3 * i + k : 3 * k + i;
@@ -114,25 +114,25 @@ SB_INLINE void node0_blocks(const PetscReal K11[9], const PetscReal K12[9], cons
   }
 }
 
-SB_KERNEL void SbCellBlocksIsotropic(const SbLane g[restrict 9], const PetscReal V[restrict SB_BATCH],
-                                     PetscReal lambda, PetscReal mu, const SbLane R[restrict 9],
-                                     SbLane K[restrict 10][9])
+SB_KERNEL void SbCellBlocksIsotropic(const SbPack g[restrict 9], const PetscReal V[restrict SB_BATCH],
+                                     PetscReal lambda, PetscReal mu, const SbPack R[restrict 9],
+                                     SbPack K[restrict 10][9])
 {
-  SbLane identity[9];
-  const SbLane *Q = R;
+  SbPack identity[9];
+  const SbPack *Q = R;
 
   if (!R) {
     for (int k = 0; k < 9; k++) {
       for (int l = 0; l < SB_BATCH; l++) identity[k][l] = k % 4 == 0;
     }
-    Q = (const SbLane *)identity;
+    Q = (const SbPack *)identity;
   }
   for (int l = 0; l < SB_BATCH; l++) {
     const PetscReal lv = lambda * V[l], mv = mu * V[l];
     PetscReal r[9], e[9], h[9], K11[9], K12[9], K13[9], K22[9], K23[9], K33[9];
 
-    SbLaneGet(9, Q, l, r);
-    SbLaneGet(9, g, l, e);
+    SbPackGet(9, Q, l, r);
+    SbPackGet(9, g, l, e);
     SbMatMulTranspose(e, r, h); /* row a = R g_a */
     diagonal_block(lv, mv, h, K11);
     coupling_block(lv, mv, h, h + 3, K12);
@@ -140,12 +140,12 @@ SB_KERNEL void SbCellBlocksIsotropic(const SbLane g[restrict 9], const PetscReal
     diagonal_block(lv, mv, h + 3, K22);
     coupling_block(lv, mv, h + 3, h + 6, K23);
     diagonal_block(lv, mv, h + 6, K33);
-    SbLanePut(9, K11, l, K[4]);
-    SbLanePut(9, K12, l, K[5]);
-    SbLanePut(9, K13, l, K[6]);
-    SbLanePut(9, K22, l, K[7]);
-    SbLanePut(9, K23, l, K[8]);
-    SbLanePut(9, K33, l, K[9]);
+    SbPackPut(9, K11, l, K[4]);
+    SbPackPut(9, K12, l, K[5]);
+    SbPackPut(9, K13, l, K[6]);
+    SbPackPut(9, K22, l, K[7]);
+    SbPackPut(9, K23, l, K[8]);
+    SbPackPut(9, K33, l, K[9]);
     node0_blocks(K11, K12, K13, K22, K23, K33, l, K);
   }
 }
@@ -183,18 +183,18 @@ SB_INLINE void copy_upper(PetscReal K[9])
   K[7] = K[5];
 }
 
-SB_KERNEL void SbCellBlocksSpin(const SbLane g[restrict 9], const PetscReal V[restrict SB_BATCH],
-                                PetscReal lambda, PetscReal mu, const SbLane R[restrict 9],
-                                const SbLane W[restrict 9], SbLane K[restrict 10][9])
+SB_KERNEL void SbCellBlocksCorotated(const SbPack g[restrict 9], const PetscReal V[restrict SB_BATCH],
+                                     PetscReal lambda, PetscReal mu, const SbPack R[restrict 9],
+                                     const SbPack W[restrict 9], SbPack K[restrict 10][9])
 {
   for (int l = 0; l < SB_BATCH; l++) {
     const PetscReal lv = lambda * V[l], mv = mu * V[l];
     PetscReal r[9], e[9], h[9], w[9], x[9], T1[9], T2[9], T3[9], K11[9], K12[9], K13[9], K22[9], K23[9],
       K33[9];
 
-    SbLaneGet(9, R, l, r);
-    SbLaneGet(9, g, l, e);
-    SbLaneGet(9, W, l, w);
+    SbPackGet(9, R, l, r);
+    SbPackGet(9, g, l, e);
+    SbPackGet(9, W, l, w);
     for (int k = 0; k < 9; k++) w[k] *= V[l];
     SbMatMulTranspose(e, r, h); /* row a = R g_a */
     SbMatMul(r, w, x);
@@ -211,12 +211,12 @@ SB_KERNEL void SbCellBlocksSpin(const SbLane g[restrict 9], const PetscReal V[re
     copy_upper(K11);
     copy_upper(K22);
     copy_upper(K33);
-    SbLanePut(9, K11, l, K[4]);
-    SbLanePut(9, K12, l, K[5]);
-    SbLanePut(9, K13, l, K[6]);
-    SbLanePut(9, K22, l, K[7]);
-    SbLanePut(9, K23, l, K[8]);
-    SbLanePut(9, K33, l, K[9]);
+    SbPackPut(9, K11, l, K[4]);
+    SbPackPut(9, K12, l, K[5]);
+    SbPackPut(9, K13, l, K[6]);
+    SbPackPut(9, K22, l, K[7]);
+    SbPackPut(9, K23, l, K[8]);
+    SbPackPut(9, K33, l, K[9]);
     node0_blocks(K11, K12, K13, K22, K23, K33, l, K);
   }
 }
@@ -225,14 +225,14 @@ SB_KERNEL void SbCellBlocksSpin(const SbLane g[restrict 9], const PetscReal V[re
   For each pair (i, k) of components the slice M_jl = C_(ij)(kl) gives G M G^T, G holding the gradients as rows: its entry
   (a, b) is K_ab,ik, and since C_(kj)(il) = M_lj it is K_ba,ki too. Six slices do.
 */
-SB_KERNEL void SbCellBlocksGeneral(const SbLane g[restrict 9], const PetscReal V[restrict SB_BATCH],
-                                   const SbLane C[restrict 81], SbLane K[restrict 10][9])
+SB_KERNEL void SbCellBlocksGeneral(const SbPack g[restrict 9], const PetscReal V[restrict SB_BATCH],
+                                   const SbPack C[restrict 81], SbPack K[restrict 10][9])
 {
   static const int pair[3][3] = {{4, 5, 6}, {5, 7, 8}, {6, 8, 9}};
 
   for (int i = 0; i < 3; i++) {
     for (int k = i; k < 3; k++) {
-      SbLane B[9];
+      SbPack B[9];
 
       for (int l = 0; l < SB_BATCH; l++) {
         PetscReal G[9], M[9], T[9], b[9];
@@ -240,7 +240,7 @@ SB_KERNEL void SbCellBlocksGeneral(const SbLane g[restrict 9], const PetscReal V
         for (int j = 0; j < 3; j++) {
           for (int n = 0; n < 3; n++) M[3 * j + n] = C[9 * (3 * i + j) + 3 * k + n][l];
         }
-        SbLaneGet(9, g, l, G);
+        SbPackGet(9, g, l, G);
         SbMatMulTranspose(M, G, T);
         SbMatMul(G, T, b);
         for (int m = 0; m < 9; m++) B[m][l] = V[l] * b[m];
@@ -258,12 +258,12 @@ SB_KERNEL void SbCellBlocksGeneral(const SbLane g[restrict 9], const PetscReal V
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal K11[9], K12[9], K13[9], K22[9], K23[9], K33[9];
 
-    SbLaneGet(9, (const SbLane *)K[4], l, K11);
-    SbLaneGet(9, (const SbLane *)K[5], l, K12);
-    SbLaneGet(9, (const SbLane *)K[6], l, K13);
-    SbLaneGet(9, (const SbLane *)K[7], l, K22);
-    SbLaneGet(9, (const SbLane *)K[8], l, K23);
-    SbLaneGet(9, (const SbLane *)K[9], l, K33);
+    SbPackGet(9, (const SbPack *)K[4], l, K11);
+    SbPackGet(9, (const SbPack *)K[5], l, K12);
+    SbPackGet(9, (const SbPack *)K[6], l, K13);
+    SbPackGet(9, (const SbPack *)K[7], l, K22);
+    SbPackGet(9, (const SbPack *)K[8], l, K23);
+    SbPackGet(9, (const SbPack *)K[9], l, K33);
     node0_blocks(K11, K12, K13, K22, K23, K33, l, K);
   }
 }

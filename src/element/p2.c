@@ -30,7 +30,7 @@ const SbPointRule SbRuleCubic = {5,
                                   {1. / 6, 1. / 6, 1. / 6, 1. / 2}},
                                  {-0.8, 0.45, 0.45, 0.45, 0.45}};
 
-SB_KERNEL void SbQuadraticAt(const PetscReal L[4], const SbLane U[restrict 30], SbLane u[restrict 12])
+SB_KERNEL void SbQuadraticAt(const PetscReal L[4], const SbPack U[restrict 30], SbPack u[restrict 12])
 {
   for (int k = 0; k < 12; k++) {
     for (int l = 0; l < SB_BATCH; l++) u[k][l] = (4 * L[k / 3] - 1) * U[k][l];
@@ -49,7 +49,7 @@ SB_KERNEL void SbQuadraticAt(const PetscReal L[4], const SbLane U[restrict 30], 
   }
 }
 
-SB_KERNEL void SbQuadraticAdd(const PetscReal L[4], const SbLane f[restrict 12], SbLane F[restrict 30])
+SB_KERNEL void SbQuadraticAdd(const PetscReal L[4], const SbPack f[restrict 12], SbPack F[restrict 30])
 {
   for (int k = 0; k < 12; k++) {
     for (int l = 0; l < SB_BATCH; l++) F[k][l] += (4 * L[k / 3] - 1) * f[k][l];
@@ -79,11 +79,11 @@ SB_INLINE int gradient_of(int a, const PetscReal L[4], int vertex[2], PetscReal 
   return 2;
 }
 
-SB_KERNEL void SbQuadraticBlocks(const SbLane B[restrict 4][10][9], const SbLane factor,
-                                 const SbLane b[restrict 30], SbLane K[restrict SB_PAIRS][9])
+SB_KERNEL void SbQuadraticBlocks(const SbPack B[restrict 4][10][9], const SbPack factor,
+                                 const SbPack b[restrict 30], SbPack K[restrict SB_PAIRS][9])
 {
   static const int pair[4][4] = {{0, 1, 2, 3}, {1, 4, 5, 6}, {2, 5, 7, 8}, {3, 6, 8, 9}};
-  SbLane scaled[30];
+  SbPack scaled[30];
 
   for (int k = 0; k < 30; k++) {
     for (int l = 0; l < SB_BATCH; l++) scaled[k][l] = factor[l] * b[k][l];
@@ -91,7 +91,7 @@ SB_KERNEL void SbQuadraticBlocks(const SbLane B[restrict 4][10][9], const SbLane
 
   for (int p = 0; p < SB_PAIRS; p++) {
     PetscReal weight[16];
-    const SbLane *block[16];
+    const SbPack *block[16];
     int turned[16], n = 0;
 
     // the blocks between vertices at the four points that this one is a sum of
@@ -112,7 +112,7 @@ SB_KERNEL void SbQuadraticBlocks(const SbLane B[restrict 4][10][9], const SbLane
     for (int e = 0; e < 9; e++) {
       const int other = 3 * (e % 3) + e / 3;
       const PetscReal *x = scaled[3 * SbPairA[p] + e / 3], *y = b[3 * SbPairB[p] + e % 3];
-      SbLane sum;
+      SbPack sum;
 
       for (int l = 0; l < SB_BATCH; l++) sum[l] = x[l] * y[l];
       for (int k = 0; k < n; k++) {
@@ -126,16 +126,16 @@ SB_KERNEL void SbQuadraticBlocks(const SbLane B[restrict 4][10][9], const SbLane
 }
 
 /* With x_i x_j = F g_i x g_j of the barycentric coordinates the second derivative of det F along u at a and v at b is (u x v) . F (g_a x g_b). */
-SB_KERNEL void SbQuadraticAddJacobian(const PetscReal L[4], const SbLane g[restrict 9],
-                                      const SbLane F[restrict 9], const PetscReal weight[restrict SB_BATCH],
-                                      SbLane K[restrict SB_PAIRS][9])
+SB_KERNEL void SbQuadraticAddJacobian(const PetscReal L[4], const SbPack g[restrict 9],
+                                      const SbPack F[restrict 9], const PetscReal weight[restrict SB_BATCH],
+                                      SbPack K[restrict SB_PAIRS][9])
 {
-  SbLane x[4][4][3];
+  SbPack x[4][4][3];
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal h[4][3], f[9], c[3];
 
-    SbLaneGet(9, F, l, f);
+    SbPackGet(9, F, l, f);
     for (int k = 0; k < 3; k++) {
       for (int a = 1; a < 4; a++) h[a][k] = g[3 * (a - 1) + k][l];
       h[0][k] = -(h[1][k] + h[2][k] + h[3][k]);
@@ -155,7 +155,7 @@ SB_KERNEL void SbQuadraticAddJacobian(const PetscReal L[4], const SbLane g[restr
     if (SbPairA[p] == SbPairB[p]) continue;
     for (int k = 0; k < na * nb; k++) {
       const PetscReal w = fa[k / nb] * fb[k % nb];
-      const SbLane *c = x[va[k / nb]][vb[k % nb]];
+      const SbPack *c = x[va[k / nb]][vb[k % nb]];
 
       for (int l = 0; l < SB_BATCH; l++) {
         K[p][1][l] += w * c[2][l];

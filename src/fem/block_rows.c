@@ -36,7 +36,7 @@ PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[
                               PetscInt ja[], PetscReal block[])
 {
   const SbPlan p = s->plan;
-  const SbLane *R;
+  const SbPack *R;
   PetscBool blocks;
 
   PetscFunctionBeginUser;

@@ -12,12 +12,12 @@
 #include "sbkernel.h"
 
 /* F of each lane of batch b. */
-static void batch_gradient(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[], SbLane F[9])
+static void batch_gradient(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[], SbPack F[9])
 {
-  SbLane u[12];
+  SbPack u[12];
 
   sb_gather_strain(s, region, b, x, u);
-  SbCellGradient(s->batch_g + 9 * b, (const SbLane *)u, F);
+  SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, F);
 }
 
 void SbSpaceAddVolumeForce(SbSpace s, PetscInt body, const PetscReal x[], PetscReal factor, PetscReal f[])
@@ -26,24 +26,24 @@ void SbSpaceAddVolumeForce(SbSpace s, PetscInt body, const PetscReal x[], PetscR
     const SbRegion *region = &s->region[r];
 
     for (PetscInt b = region->bstart; region->body == body && b < region->bend; b++) {
-      SbLane F[9], P[9], fe[12];
+      SbPack F[9], P[9], fe[12];
 
       batch_gradient(s, region, b, x, F);
       for (int l = 0; l < SB_BATCH; l++) {
         PetscReal one[9], cofactor[9];
 
-        SbLaneGet(9, (const SbLane *)F, l, one);
+        SbPackGet(9, (const SbPack *)F, l, one);
         SbMatCofactor(one, cofactor);
         for (int k = 0; k < 9; k++) P[k][l] = factor * cofactor[k];
       }
-      SbCellForce(s->batch_g + 9 * b, s->batch_V[b], (const SbLane *)P, fe);
+      SbCellForce(s->batch_g + 9 * b, s->batch_V[b], (const SbPack *)P, fe);
       sb_scatter_strain(s, region, b, fe, f);
     }
   }
 }
 
 /* C = factor d cof F / dF. The two indices that i and k leave free make one term each way. */
-static void cofactor_tangent(const SbLane F[9], PetscReal factor, SbLane C[81])
+static void cofactor_tangent(const SbPack F[9], PetscReal factor, SbPack C[81])
 {
   for (int c = 0; c < 81; c++) {
     const int i = c / 27, j = c / 9 % 3, k = c / 3 % 3, n = c % 3;
@@ -64,15 +64,15 @@ PetscErrorCode SbSpaceAddVolumeTangent(SbSpace s, PetscInt body, const PetscReal
     const SbRegion *region = &s->region[r];
 
     for (PetscInt b = region->bstart; region->body == body && b < region->bend; b++) {
-      SbLane F[9], C[81], K[10][9] __attribute__((aligned(64)));
+      SbPack F[9], C[81], K[10][9] __attribute__((aligned(64)));
 
       batch_gradient(s, region, b, x, F);
-      cofactor_tangent((const SbLane *)F, s->block_scale * factor, C);
-      SbCellBlocksGeneral(s->batch_g + 9 * b, s->batch_V[b], (const SbLane *)C, K);
+      cofactor_tangent((const SbPack *)F, s->block_scale * factor, C);
+      SbCellBlocksGeneral(s->batch_g + 9 * b, s->batch_V[b], (const SbPack *)C, K);
       if (region->broken)
-        SbInsertBroken(s, &values, b, (const SbLane(*)[9])K);
+        SbInsertBroken(s, &values, b, (const SbPack(*)[9])K);
       else
-        SbInsertBatch(s, &values, b, (const SbLane(*)[9])K);
+        SbInsertBatch(s, &values, b, (const SbPack(*)[9])K);
     }
   }
   PetscCall(SbValuesEnd(&values));

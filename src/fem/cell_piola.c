@@ -12,11 +12,11 @@ void SbSpaceCellPiola(SbSpace s, const PetscReal x[], PetscReal P[], PetscReal R
     const SbRegion *region = &s->region[r];
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
-      SbLane F[4][9], stress[4][9], energy[4], rotation[9];
+      SbPack F[4][9], stress[4][9], energy[4], rotation[9];
       const PetscInt n = SbBatchState(s, region, b, x, F, stress, energy, NULL);
 
       for (PetscInt i = 0; point && region->quadratic && i < n * s->batch_n[b]; i++)
-        SbLaneGet(9, (const SbLane *)stress[i % n], (int)(i / n), point + 9 * (n * s->batch_cell[b] + i));
+        SbPackGet(9, (const SbPack *)stress[i % n], (int)(i / n), point + 9 * (n * s->batch_cell[b] + i));
 
       /* means over the points */
       for (PetscInt q = 1; q < n; q++) {
@@ -33,12 +33,12 @@ void SbSpaceCellPiola(SbSpace s, const PetscReal x[], PetscReal P[], PetscReal R
           for (int l = 0; l < SB_BATCH; l++) rotation[k][l] = k % 4 == 0;
         }
       } else if (R)
-        SbPolar((const SbLane *)F[0], rotation);
+        SbPolar((const SbPack *)F[0], rotation);
       for (int l = 0; l < s->batch_n[b]; l++) {
         const PetscInt c = s->batch_cell[b] + l;
 
-        SbLaneGet(9, (const SbLane *)stress[0], l, P + 9 * c);
-        if (R) SbLaneGet(9, (const SbLane *)rotation, l, R + 9 * c);
+        SbPackGet(9, (const SbPack *)stress[0], l, P + 9 * c);
+        if (R) SbPackGet(9, (const SbPack *)rotation, l, R + 9 * c);
         psi[c] = energy[0][l];
       }
     }

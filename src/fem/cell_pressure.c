@@ -13,7 +13,7 @@ void SbSpaceCellPressure(SbSpace s, const PetscReal x[], PetscReal pressure[])
     const SbRegion *region = &s->region[r];
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
-      SbLane F[4][9], p[4];
+      SbPack F[4][9], p[4];
       const PetscInt n = SbBatchState(s, region, b, x, F, NULL, NULL, p);
 
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {

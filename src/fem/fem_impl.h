@@ -68,23 +68,23 @@ static inline const PetscInt *sb_quadratic_nodes(SbSpace s, PetscInt b)
   return s->batch_clique + (size_t)(b * s->width) * SB_BATCH;
 }
 /* F (rate: without the identity) at the points of SbRuleQuadratic. */
-void SbQuadraticGradients(const SbLane g[9], const SbLane U[30], PetscBool rate, SbLane F[4][9]);
+void SbQuadraticGradients(const SbPack g[9], const SbPack U[30], PetscBool rate, SbPack F[4][9]);
 /*
   The volumetric part of the energy, V lambda/2 (mean of theta)^2: pressure = lambda times the mean (Pa, tension), b[30] = V d mean/du (m^2; NULL: not
   wanted). F at the points of SbRuleQuadratic.
 */
-void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbLane g[9], const SbLane V, const SbLane U[30],
-                       const SbLane F[4][9], SbLane pressure, SbLane b[30]);
+void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPack g[9], const SbPack V, const SbPack U[30],
+                       const SbPack F[4][9], SbPack pressure, SbPack b[30]);
 /* What a law says at the points of a cell: one, for P2 four. Returns their number. P (Pa), psi (J/m^3), pressure (Pa, compression) may be NULL. */
-PetscInt SbBatchState(SbSpace space, const SbRegion *region, PetscInt b, const PetscReal x[], SbLane F[4][9],
-                      SbLane P[4][9], SbLane psi[4], SbLane pressure[4]);
+PetscInt SbBatchState(SbSpace space, const SbRegion *region, PetscInt b, const PetscReal x[], SbPack F[4][9],
+                      SbPack P[4][9], SbPack psi[4], SbPack pressure[4]);
 
 /* Adds the ten blocks of each cell of batch b; K is 32-byte aligned. */
-void SbInsertBatch(SbSpace space, const SbValues *x, PetscInt b, const SbLane K[10][9]);
+void SbInsertBatch(SbSpace space, const SbValues *x, PetscInt b, const SbPack K[10][9]);
 /* The 55 blocks of P2 cells. */
-void SbInsertQuadratic(SbSpace space, const SbValues *x, PetscInt b, const SbLane K[SB_PAIRS][9]);
+void SbInsertQuadratic(SbSpace space, const SbValues *x, PetscInt b, const SbPack K[SB_PAIRS][9]);
 /* The same for DG cells, whose blocks stand between the means of their faces. */
-void SbInsertBroken(SbSpace space, const SbValues *x, PetscInt b, const SbLane K[10][9]);
+void SbInsertBroken(SbSpace space, const SbValues *x, PetscInt b, const SbPack K[10][9]);
 
 /* constraint.c: projects an assembled matrix, or makes it regular. Not collective. */
 void SbConstraintsFinishTangent(SbSpace space, const SbValues *x);

@@ -14,8 +14,8 @@
 #include "fem_impl.h"
 #include "sbfour.h"
 
-/* Part q of row i begins with the face terms, glue times the identity in each block; one pass where blocks lie together. */
-static void begin_with_glue(SbSpace s, const SbValues *x, PetscInt i, int q)
+/* Part q of row i begins with the face terms, one number times the identity in each block; one pass where blocks lie together. */
+static void begin_with_face_terms(SbSpace s, const SbValues *x, PetscInt i, int q)
 {
   const SbPlan p = s->plan;
   const PetscInt *ptr = q ? p->oi : p->di, first = x->kind == SB_MATRIX_SBAIJ ? p->diagonal[i] : ptr[i];
@@ -46,7 +46,7 @@ void SbInsertClear(SbSpace s, const SbValues *x, PetscInt b)
         memset(x->value[q] + 9 * (size_t)ptr[p->fresh[k]], 0,
                72 * (size_t)(ptr[p->fresh[k] + 1] - ptr[p->fresh[k]]));
       }
-      if (x->face_term) begin_with_glue(s, x, p->fresh[k], q);
+      if (x->face_term) begin_with_face_terms(s, x, p->fresh[k], q);
     }
   }
 }
@@ -66,7 +66,7 @@ static inline void add_block(SbSpace s, const SbValues *x, PetscInt row, PetscIn
 }
 
 /* Any storage, any rank: the cell in lane l of batch b, block by block. */
-static void insert_cell(SbSpace s, const SbValues *x, PetscInt b, PetscInt l, int npair, const SbLane K[][9])
+static void insert_cell(SbSpace s, const SbValues *x, PetscInt b, PetscInt l, int npair, const SbPack K[][9])
 {
   const PetscInt w = s->width, *node = s->batch_clique + (size_t)(b * w) * SB_BATCH + l;
   const PetscInt *offset = s->plan->offset + (size_t)(b * w * w) * SB_BATCH + l;
@@ -74,7 +74,7 @@ static void insert_cell(SbSpace s, const SbValues *x, PetscInt b, PetscInt l, in
   for (int p = 0; p < npair; p++) {
     PetscReal k[9];
 
-    SbLaneGet(9, K[p], (int)l, k);
+    SbPackGet(9, K[p], (int)l, k);
     for (int turn = 0; turn < (SbPairA[p] == SbPairB[p] ? 1 : 2); turn++) {
       const int row = turn ? SbPairB[p] : SbPairA[p], column = turn ? SbPairA[p] : SbPairB[p];
 
@@ -85,7 +85,7 @@ static void insert_cell(SbSpace s, const SbValues *x, PetscInt b, PetscInt l, in
 }
 
 /* Each block between means is spread over the own nodes and those across the faces. */
-static void insert_broken_cell(SbSpace s, const SbValues *x, PetscInt b, PetscInt l, const SbLane K[10][9])
+static void insert_broken_cell(SbSpace s, const SbValues *x, PetscInt b, PetscInt l, const SbPack K[10][9])
 {
   const PetscInt w = s->width, *node = s->batch_clique + (size_t)(b * w) * SB_BATCH + l;
   const PetscInt *offset = s->plan->offset + (size_t)(b * w * w) * SB_BATCH + l;
@@ -99,7 +99,7 @@ static void insert_broken_cell(SbSpace s, const SbValues *x, PetscInt b, PetscIn
     const int twice = SbPairA[p] == SbPairB[p] ? 1 : 2;
     PetscReal k[9];
 
-    SbLaneGet(9, K[p], (int)l, k);
+    SbPackGet(9, K[p], (int)l, k);
     for (int n = 0; n < 4 * twice; n++) {
       const int turn = n / 4, row = (turn ? SbPairB[p] : SbPairA[p]) + 4 * (n & 1),
                 column = (turn ? SbPairA[p] : SbPairB[p]) + 2 * (n & 2);
@@ -154,7 +154,7 @@ SB_INLINE void add_blocks(const Four k[9], const PetscInt position[4], PetscBool
 }
 
 /* Padding lanes have volume zero and add nothing to the blocks of the first. */
-SB_INLINE void insert_both(int npair, const SbLane K[][9], const PetscInt offset[], PetscInt width,
+SB_INLINE void insert_both(int npair, const SbPack K[][9], const PetscInt offset[], PetscInt width,
                            PetscBool edge, PetscScalar *const value[2])
 {
   for (int p = 0; p < npair; p++) {
@@ -172,27 +172,27 @@ SB_INLINE void insert_both(int npair, const SbLane K[][9], const PetscInt offset
   }
 }
 
-SB_KERNEL static void insert_baij(const SbLane K[restrict 10][9], const PetscInt offset[restrict],
+SB_KERNEL static void insert_baij(const SbPack K[restrict 10][9], const PetscInt offset[restrict],
                                   PetscInt width, PetscScalar *const value[2])
 {
   insert_both(10, K, offset, width, PETSC_FALSE, value);
 }
 
 /* Batches that touch nodes of another rank. */
-SB_KERNEL static void insert_baij_edge(const SbLane K[restrict 10][9], const PetscInt offset[restrict],
+SB_KERNEL static void insert_baij_edge(const SbPack K[restrict 10][9], const PetscInt offset[restrict],
                                        PetscInt width, PetscScalar *const value[2])
 {
   insert_both(10, K, offset, width, PETSC_TRUE, value);
 }
 
-SB_KERNEL static void insert_baij_quadratic(const SbLane K[restrict SB_PAIRS][9],
+SB_KERNEL static void insert_baij_quadratic(const SbPack K[restrict SB_PAIRS][9],
                                             const PetscInt offset[restrict], PetscScalar *const value[2])
 {
   insert_both(SB_PAIRS, K, offset, SB_CELL_NODES, PETSC_TRUE, value);
 }
 
 /* The stored block is K_ab, or K_ba = K_ab^T when that lies in the row of the lower node. */
-SB_INLINE void insert_upper(int npair, const SbLane K[restrict][9], const PetscInt upper[restrict],
+SB_INLINE void insert_upper(int npair, const SbPack K[restrict][9], const PetscInt upper[restrict],
                             PetscScalar *const value[2])
 {
   for (int p = 0; p < npair; p++) {
@@ -217,13 +217,13 @@ SB_INLINE void insert_upper(int npair, const SbLane K[restrict][9], const PetscI
   }
 }
 
-SB_KERNEL static void insert_sbaij(const SbLane K[restrict 10][9], const PetscInt upper[restrict],
+SB_KERNEL static void insert_sbaij(const SbPack K[restrict 10][9], const PetscInt upper[restrict],
                                    PetscScalar *const value[2])
 {
   insert_upper(10, K, upper, value);
 }
 
-SB_KERNEL static void insert_sbaij_quadratic(const SbLane K[restrict SB_PAIRS][9],
+SB_KERNEL static void insert_sbaij_quadratic(const SbPack K[restrict SB_PAIRS][9],
                                              const PetscInt upper[restrict], PetscScalar *const value[2])
 {
   insert_upper(SB_PAIRS, K, upper, value);
@@ -237,7 +237,7 @@ static PetscBool all_owned(SbSpace s, const PetscInt node[4 * SB_BATCH])
   return (PetscBool)(last < s->nnode_owned);
 }
 
-static PetscBool insert_fast(SbSpace s, const SbValues *x, PetscInt b, const SbLane K[10][9])
+static PetscBool insert_fast(SbSpace s, const SbValues *x, PetscInt b, const SbPack K[10][9])
 {
   const PetscInt *offset = s->plan->offset + (size_t)(b * s->width * s->width) * SB_BATCH;
 
@@ -251,7 +251,7 @@ static PetscBool insert_fast(SbSpace s, const SbValues *x, PetscInt b, const SbL
   return PETSC_TRUE;
 }
 
-static PetscBool insert_fast_quadratic(SbSpace s, const SbValues *x, PetscInt b, const SbLane K[SB_PAIRS][9])
+static PetscBool insert_fast_quadratic(SbSpace s, const SbValues *x, PetscInt b, const SbPack K[SB_PAIRS][9])
 {
   const PetscInt w = s->width;
 
@@ -263,31 +263,31 @@ static PetscBool insert_fast_quadratic(SbSpace s, const SbValues *x, PetscInt b,
   return PETSC_TRUE;
 }
 #else
-static PetscBool insert_fast_quadratic(SbSpace s, const SbValues *x, PetscInt b, const SbLane K[SB_PAIRS][9])
+static PetscBool insert_fast_quadratic(SbSpace s, const SbValues *x, PetscInt b, const SbPack K[SB_PAIRS][9])
 {
   (void)s, (void)x, (void)b, (void)K;
   return PETSC_FALSE;
 }
-static PetscBool insert_fast(SbSpace s, const SbValues *x, PetscInt b, const SbLane K[10][9])
+static PetscBool insert_fast(SbSpace s, const SbValues *x, PetscInt b, const SbPack K[10][9])
 {
   (void)s, (void)x, (void)b, (void)K;
   return PETSC_FALSE;
 }
 #endif
 
-void SbInsertBatch(SbSpace s, const SbValues *x, PetscInt b, const SbLane K[10][9])
+void SbInsertBatch(SbSpace s, const SbValues *x, PetscInt b, const SbPack K[10][9])
 {
   if (insert_fast(s, x, b, K)) return;
   for (PetscInt l = 0; l < s->batch_n[b]; l++) insert_cell(s, x, b, l, 10, K);
 }
 
-void SbInsertQuadratic(SbSpace s, const SbValues *x, PetscInt b, const SbLane K[SB_PAIRS][9])
+void SbInsertQuadratic(SbSpace s, const SbValues *x, PetscInt b, const SbPack K[SB_PAIRS][9])
 {
   if (insert_fast_quadratic(s, x, b, K)) return;
   for (PetscInt l = 0; l < s->batch_n[b]; l++) insert_cell(s, x, b, l, SB_PAIRS, K);
 }
 
-void SbInsertBroken(SbSpace s, const SbValues *x, PetscInt b, const SbLane K[10][9])
+void SbInsertBroken(SbSpace s, const SbValues *x, PetscInt b, const SbPack K[10][9])
 {
   for (PetscInt l = 0; l < s->batch_n[b]; l++) insert_broken_cell(s, x, b, l, K);
 }

@@ -28,8 +28,8 @@ struct _p_SbJump {
   PetscInt *region; /* [nbatch] region of the first side: damping is that of its body */
   PetscInt *n;      /* [nbatch] faces in it */
   PetscInt *node;   /* [nbatch][8][SB_BATCH]; padding lanes repeat the first face */
-  SbLane *c0, *c1;  /* [nbatch] N/m; zero in padding */
-  SbLane *share;    /* [nbatch] how much of a face's energy this rank counts: 1, or 1/2 between ranks */
+  SbPack *c0, *c1;  /* [nbatch] N/m; zero in padding */
+  SbPack *share;    /* [nbatch] how much of a face's energy this rank counts: 1, or 1/2 between ranks */
 };
 
 /* A face between two local cells; cell[1] = SUPPORT: between a cell and a support. */
@@ -213,7 +213,7 @@ SB_INLINE void gather_jumps(const PetscInt node[8 * SB_BATCH], const PetscReal x
 SB_KERNEL static void jump_forces(const PetscInt node[restrict 8 * SB_BATCH],
                                   const PetscReal c0[restrict SB_BATCH],
                                   const PetscReal c1[restrict SB_BATCH], const PetscReal x[restrict],
-                                  SbLane t[restrict 12])
+                                  SbPack t[restrict 12])
 {
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal J[9], sum[3];
@@ -239,7 +239,7 @@ void SbJumpAdd(SbSpace s, const PetscReal x[], SbJumpFactor factor, PetscReal f[
   for (PetscInt b = 0; b < j->nbatch; b++) {
     const PetscInt *node = j->node + 8 * SB_BATCH * b;
     const PetscReal scale = factor == SB_JUMP_STIFFNESS ? 1. : s->region[j->region[b]].beta;
-    SbLane t[12];
+    SbPack t[12];
 
     if (scale == 0.) continue;
     jump_forces(node, j->c0[b], j->c1[b], x, t);

@@ -20,7 +20,7 @@
 typedef struct {
   SbSpace space;
   void *memory;                  /* what R and h live in */
-  SbLane *R, *h;                 /* [nbatch][9] rotations; rotated gradients of nodes 1..3, 1/m */
+  SbPack *R, *h;                 /* [nbatch][9] rotations; rotated gradients of nodes 1..3, 1/m */
   PetscReal *lambda, *mu;        /* [nregion] times the factor of the stiffness, Pa */
   PetscReal *inertia;            /* [nnode_owned] diagonal from mass and its damping, kg/s^2 */
   PetscReal prescribed_diagonal; /* diagonal of prescribed unknowns, kg/s^2 or N/m */
@@ -70,8 +70,8 @@ SB_INLINE void scatter_add(const Eight lanes[3], const PetscInt node[SB_BATCH], 
 }
 
 /* q += A p of the batches of one region. Padding lanes have volume zero. */
-SB_KERNEL static void apply_region(PetscInt nbatch, const PetscInt *node, const SbLane *gradient,
-                                   const SbLane *volume, PetscReal lambda, PetscReal mu, const PetscReal *p,
+SB_KERNEL static void apply_region(PetscInt nbatch, const PetscInt *node, const SbPack *gradient,
+                                   const SbPack *volume, PetscReal lambda, PetscReal mu, const PetscReal *p,
                                    PetscReal *q)
 {
   for (PetscInt b = 0; b < nbatch; b++, node += 4 * SB_BATCH) {
@@ -144,8 +144,8 @@ static PetscErrorCode MatMult_Frames(Mat A, Vec X, Vec Y)
   for (PetscInt r = 0; r < s->nregion; r++) {
     const PetscInt b = s->region[r].bstart;
 
-    apply_region(s->region[r].bend - b, s->batch_node + 4 * SB_BATCH * b, (const SbLane *)o->h + 9 * b,
-                 (const SbLane *)s->batch_V + b, o->lambda[r], o->mu[r], o->p, o->q);
+    apply_region(s->region[r].bend - b, s->batch_node + 4 * SB_BATCH * b, (const SbPack *)o->h + 9 * b,
+                 (const SbPack *)s->batch_V + b, o->lambda[r], o->mu[r], o->p, o->q);
   }
   PetscCall(VecGetArrayRead(X, &x));
   PetscCall(VecGetArray(Y, &y));
@@ -179,16 +179,16 @@ static PetscErrorCode MatDestroy_Frames(Mat A)
 }
 
 /* h = R grad phi of one batch. */
-SB_KERNEL static void rotate_gradients(const SbLane R[restrict 9], const SbLane g[restrict 9],
-                                       SbLane h[restrict 9])
+SB_KERNEL static void rotate_gradients(const SbPack R[restrict 9], const SbPack g[restrict 9],
+                                       SbPack h[restrict 9])
 {
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal r[9], e[9], t[9];
 
-    SbLaneGet(9, R, l, r);
-    SbLaneGet(9, g, l, e);
+    SbPackGet(9, R, l, r);
+    SbPackGet(9, g, l, e);
     SbMatMulTranspose(e, r, t);
-    SbLanePut(9, t, l, h);
+    SbPackPut(9, t, l, h);
   }
 }
 
@@ -204,7 +204,7 @@ static PetscErrorCode assemble(Mat A, const SbStage *stage)
   s = o->space;
   SbSpaceCellRotations(s, stage->u, o->R);
   for (PetscInt b = 0; b < s->nbatch; b++)
-    rotate_gradients((const SbLane *)o->R + 9 * b, (const SbLane *)s->batch_g + 9 * b, o->h + 9 * b);
+    rotate_gradients((const SbPack *)o->R + 9 * b, (const SbPack *)s->batch_g + 9 * b, o->h + 9 * b);
   for (PetscInt i = 0; i < s->nnode_owned; i++) o->inertia[i] = stage->shift_a * s->node_mass[i];
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
@@ -244,7 +244,7 @@ PetscErrorCode SbSpaceAllowsMatrixFree(SbSpace s, PetscBool *has)
 PetscErrorCode SbSpaceCreateMatrixFree(SbSpace s, Mat *A)
 {
   static const SbAssembly assembly = {.assemble = assemble};
-  const size_t batches = 18 * (size_t)s->nbatch * sizeof(SbLane),
+  const size_t batches = 18 * (size_t)s->nbatch * sizeof(SbPack),
                nodes = 8 * (size_t)s->nnode * sizeof(PetscReal);
   PetscMPIInt size;
   PetscBool has;
@@ -258,7 +258,7 @@ PetscErrorCode SbSpaceCreateMatrixFree(SbSpace s, Mat *A)
   PetscCall(PetscNew(&o));
   o->space = s;
   PetscCall(PetscMalloc(batches + nodes + 64, &o->memory));
-  o->R = (SbLane *)(((uintptr_t)o->memory + 63) & ~(uintptr_t)63);
+  o->R = (SbPack *)(((uintptr_t)o->memory + 63) & ~(uintptr_t)63);
   o->h = o->R + 9 * s->nbatch;
   o->p = (PetscReal *)(o->h + 9 * s->nbatch);
   o->q = o->p + 4 * s->nnode;
@@ -290,13 +290,13 @@ static PetscErrorCode get_operator(Mat A, Operator **o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMatrixFreeGetRotations(Mat A, const SbLane **R)
+PetscErrorCode SbMatrixFreeGetRotations(Mat A, const SbPack **R)
 {
   Operator *o;
 
   PetscFunctionBeginUser;
   PetscCall(get_operator(A, &o));
-  *R = o ? (const SbLane *)o->R : NULL;
+  *R = o ? (const SbPack *)o->R : NULL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -340,12 +340,12 @@ PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], con
     for (PetscInt b = s->region[r].bstart; b < s->region[r].bend; b++) {
       const PetscInt *corner = s->batch_node + 4 * SB_BATCH * b;
       PetscBool any = PETSC_FALSE;
-      SbLane K[10][9];
+      SbPack K[10][9];
 
       for (PetscInt l = 0; l < 4 * SB_BATCH; l++) any = (PetscBool)(any || wanted[corner[l]] >= 0);
       if (!any) continue;
       SbCellBlocksIsotropic(s->batch_g + 9 * b, s->batch_V[b], o->lambda[r], o->mu[r],
-                            (const SbLane *)o->R + 9 * b, K);
+                            (const SbPack *)o->R + 9 * b, K);
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
         for (int q = 0; q < 16; q++) {
           const int a = q / 4, c = q % 4, lo = PetscMin(a, c), hi = PetscMax(a, c);

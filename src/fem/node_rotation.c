@@ -7,13 +7,13 @@
 */
 #include "fem_impl.h"
 
-void SbSpaceCellRotations(SbSpace s, const PetscReal x[], SbLane R[])
+void SbSpaceCellRotations(SbSpace s, const PetscReal x[], SbPack R[])
 {
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbMaterial m = s->region[r].material;
 
     for (PetscInt b = s->region[r].bstart; b < s->region[r].bend; b++) {
-      SbLane u[12], F[9];
+      SbPack u[12], F[9];
 
       if (!x || m->linear) {
         for (int k = 0; k < 9; k++) {
@@ -22,11 +22,11 @@ void SbSpaceCellRotations(SbSpace s, const PetscReal x[], SbLane R[])
         continue;
       }
       sb_gather(s->batch_node + 4 * SB_BATCH * b, x, u);
-      SbCellGradient(s->batch_g + 9 * b, (const SbLane *)u, F);
+      SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, F);
       if (m->ops.frame)
-        m->ops.frame(m, (const SbLane *)F, R + 9 * b);
+        m->ops.frame(m, (const SbPack *)F, R + 9 * b);
       else
-        SbPolar((const SbLane *)F, R + 9 * b);
+        SbPolar((const SbPack *)F, R + 9 * b);
     }
   }
 }
@@ -37,7 +37,7 @@ static inline PetscInt batch_nodes(SbSpace s, PetscInt b)
   return s->edge_node && s->edge_node[6 * s->batch_cell[b]] >= 0 ? SB_CELL_NODES : 4;
 }
 
-PetscErrorCode SbSpaceAverageRotations(SbSpace s, const SbLane R[], PetscReal node_R[], PetscReal spread[])
+PetscErrorCode SbSpaceAverageRotations(SbSpace s, const SbPack R[], PetscReal node_R[], PetscReal spread[])
 {
   PetscReal *sum;
 
@@ -60,7 +60,7 @@ PetscErrorCode SbSpaceAverageRotations(SbSpace s, const SbLane R[], PetscReal no
   }
   for (PetscInt first = 0; first < s->nnode_owned; first += SB_BATCH) {
     const PetscInt n = PetscMin(SB_BATCH, s->nnode_owned - first);
-    SbLane M[9], Q[9];
+    SbPack M[9], Q[9];
 
     /* the volume around the node is the scale: SbPolar() wants numbers near one */
     for (PetscInt l = 0; l < SB_BATCH; l++) {
@@ -69,8 +69,8 @@ PetscErrorCode SbSpaceAverageRotations(SbSpace s, const SbLane R[], PetscReal no
 
       for (int k = 0; k < 9; k++) M[k][l] = size > 0. ? from[k] / size : 0.;
     }
-    SbPolar((const SbLane *)M, Q);
-    for (PetscInt l = 0; l < n; l++) SbLaneGet(9, (const SbLane *)Q, (int)l, node_R + 9 * (first + l));
+    SbPolar((const SbPack *)M, Q);
+    for (PetscInt l = 0; l < n; l++) SbPackGet(9, (const SbPack *)Q, (int)l, node_R + 9 * (first + l));
   }
   if (spread) {
     for (PetscInt i = 0; i < s->nnode_owned; i++) spread[i] = 0.;
@@ -96,12 +96,12 @@ PetscErrorCode SbSpaceAverageRotations(SbSpace s, const SbLane R[], PetscReal no
 
 PetscErrorCode SbSpaceNodeRotations(SbSpace s, const PetscReal u[], PetscReal R[], PetscReal spread[])
 {
-  SbLane *cells;
+  SbPack *cells;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(9 * s->nbatch, &cells));
   SbSpaceCellRotations(s, u, cells);
-  PetscCall(SbSpaceAverageRotations(s, (const SbLane *)cells, R, spread));
+  PetscCall(SbSpaceAverageRotations(s, (const SbPack *)cells, R, spread));
   PetscCall(PetscFree(cells));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -73,7 +73,7 @@ static PetscErrorCode plan_fresh(SbSpace s, SbPlan p)
 }
 
 /* The face terms, which do not change: their factor of the identity in each block. */
-static PetscErrorCode plan_glue(SbSpace s, const Groups *faces, SbPlan p)
+static PetscErrorCode plan_face_terms(SbSpace s, const Groups *faces, SbPlan p)
 {
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc2(p->di[s->nnode_owned], &p->face_term[0], p->oi[s->nnode_owned], &p->face_term[1]));
@@ -103,7 +103,7 @@ static PetscErrorCode create_groups(SbSpace s, const PetscInt node[], PetscInt n
   g->nodes = nodes;
   g->nbatch = nbatch;
   /* padding lanes count as the group that they repeat: its columns are marked once more, and they get its positions */
-  PetscCall(SbGroupByKey(nodes * SB_BATCH * nbatch, node, s->nnode_owned, &g->start, &g->slot));
+  PetscCall(SbBucketByKey(nodes * SB_BATCH * nbatch, node, s->nnode_owned, &g->start, &g->slot));
   PetscCall(PetscMalloc1(npoint, &g->offset));
   for (size_t k = 0; k < npoint; k++) g->offset[k] = SB_NOT_OWNED;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -192,7 +192,7 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
   // the positions of the cells are kept, those of the faces only until their constant terms are summed
   p->offset = group[0].offset;
   if (s->jump) {
-    PetscCall(plan_glue(s, &group[1], p));
+    PetscCall(plan_face_terms(s, &group[1], p));
     PetscCall(PetscFree(group[1].offset));
   }
   for (PetscInt k = 0; k < ngroup; k++) {

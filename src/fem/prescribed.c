@@ -5,7 +5,7 @@
 */
 #include "fem_impl.h"
 
-PetscErrorCode SbSpaceFix(SbSpace s, PetscInt node, int components)
+PetscErrorCode SbSpacePrescribe(SbSpace s, PetscInt node, int components)
 {
   PetscFunctionBeginUser;
   PetscCheck(!s->fixed_node, PETSC_COMM_SELF, PETSC_ERR_ORDER,
@@ -14,7 +14,7 @@ PetscErrorCode SbSpaceFix(SbSpace s, PetscInt node, int components)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSpaceFixDone(SbSpace s)
+PetscErrorCode SbSpacePrescribeDone(SbSpace s)
 {
   PetscFunctionBeginUser;
   s->nfixed = 0;
@@ -28,7 +28,7 @@ PetscErrorCode SbSpaceFixDone(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscInt SbSpaceFixedIndex(SbSpace s, PetscInt node)
+PetscInt SbSpacePrescribedIndex(SbSpace s, PetscInt node)
 {
   PetscInt lo = 0, hi = s->nfixed;
 

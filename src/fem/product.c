@@ -173,7 +173,7 @@ PetscErrorCode SbProductGetSymmetric(Mat A, Mat *local)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbProductSubtractOther(Mat A, Vec x, Vec y)
+PetscErrorCode SbProductSubtractOffDiagonal(Mat A, Vec x, Vec y)
 {
   Product *p;
 

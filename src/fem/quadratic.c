@@ -16,35 +16,35 @@
 */
 #include "fem_impl.h"
 
-void SbQuadraticGradients(const SbLane g[9], const SbLane U[30], PetscBool rate, SbLane F[4][9])
+void SbQuadraticGradients(const SbPack g[9], const SbPack U[30], PetscBool rate, SbPack F[4][9])
 {
   for (int q = 0; q < 4; q++) {
-    SbLane u[12];
+    SbPack u[12];
 
     SbQuadraticAt(SbRuleQuadratic.L[q], U, u);
     if (rate)
-      SbCellGradientRate(g, (const SbLane *)u, F[q]);
+      SbCellGradientRate(g, (const SbPack *)u, F[q]);
     else
-      SbCellGradient(g, (const SbLane *)u, F[q]);
+      SbCellGradient(g, (const SbPack *)u, F[q]);
   }
 }
 
-void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbLane g[9], const SbLane V, const SbLane U[30],
-                       const SbLane F[4][9], SbLane pressure, SbLane b[30])
+void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPack g[9], const SbPack V, const SbPack U[30],
+                       const SbPack F[4][9], SbPack pressure, SbPack b[30])
 {
   const SbPointRule *rule = m->jacobian ? &SbRuleCubic : &SbRuleQuadratic;
   const PetscReal lambda = m->ops.volumetric_modulus(m);
 
   for (int l = 0; l < SB_BATCH; l++) pressure[l] = 0.;
-  if (b) memset(b, 0, 30 * sizeof(SbLane));
+  if (b) memset(b, 0, 30 * sizeof(SbPack));
   for (int q = 0; q < rule->n; q++) {
-    SbLane u[12], here[9], D[9], p, W, f[12];
-    const SbLane *at = F ? F[q] : NULL;
+    SbPack u[12], here[9], D[9], p, W, f[12];
+    const SbPack *at = F ? F[q] : NULL;
 
     if (m->jacobian) {
       SbQuadraticAt(rule->L[q], U, u);
-      SbCellGradient(g, (const SbLane *)u, here);
-      at = (const SbLane *)here;
+      SbCellGradient(g, (const SbPack *)u, here);
+      at = (const SbPack *)here;
     }
     if (m->linear || m->ops.frame || m->ops.spin) {
       // theta = R : F - 3, with its derivative at once
@@ -60,41 +60,41 @@ void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbLane g[9], const S
     for (int l = 0; l < SB_BATCH; l++) pressure[l] -= rule->weight[q] * p[l];
     if (!b) continue;
     for (int l = 0; l < SB_BATCH; l++) W[l] = rule->weight[q] * V[l];
-    SbCellForce(g, W, (const SbLane *)D, f);
-    SbQuadraticAdd(rule->L[q], (const SbLane *)f, b);
+    SbCellForce(g, W, (const SbPack *)D, f);
+    SbQuadraticAdd(rule->L[q], (const SbPack *)f, b);
   }
 }
 
-PetscInt SbBatchState(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[], SbLane F[4][9],
-                      SbLane P[4][9], SbLane psi[4], SbLane pressure[4])
+PetscInt SbBatchState(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[], SbPack F[4][9],
+                      SbPack P[4][9], SbPack psi[4], SbPack pressure[4])
 {
   const SbMaterial m = region->pointwise;
-  const SbLane *g = s->batch_g + 9 * b;
+  const SbPack *g = s->batch_g + 9 * b;
   const PetscInt n = region->quadratic ? 4 : 1;
-  SbLane U[30], p;
+  SbPack U[30], p;
 
   if (region->quadratic) {
     sb_gather_nodes(10, sb_quadratic_nodes(s, b), x, U);
-    SbQuadraticGradients(g, (const SbLane *)U, PETSC_FALSE, F);
+    SbQuadraticGradients(g, (const SbPack *)U, PETSC_FALSE, F);
   } else {
     sb_gather_strain(s, region, b, x, U);
-    SbCellGradient(g, (const SbLane *)U, F[0]);
+    SbCellGradient(g, (const SbPack *)U, F[0]);
   }
   for (PetscInt q = 0; q < n; q++) {
-    if (P) m->ops.stress(m, (const SbLane *)F[q], P[q]);
-    if (psi) m->ops.energy(m, (const SbLane *)F[q], psi[q]);
-    if (pressure) m->ops.pressure(m, (const SbLane *)F[q], pressure[q]);
+    if (P) m->ops.stress(m, (const SbPack *)F[q], P[q]);
+    if (psi) m->ops.energy(m, (const SbPack *)F[q], psi[q]);
+    if (pressure) m->ops.pressure(m, (const SbPack *)F[q], pressure[q]);
   }
   if (m == region->material) return n;
 
   /* what the mean adds */
   const PetscReal lambda = region->material->ops.volumetric_modulus(region->material);
 
-  SbQuadraticVolume(region->material, g, s->batch_V[b], (const SbLane *)U, (const SbLane(*)[9])F, p, NULL);
+  SbQuadraticVolume(region->material, g, s->batch_V[b], (const SbPack *)U, (const SbPack(*)[9])F, p, NULL);
   for (PetscInt q = 0; q < n; q++) {
-    SbLane D[9];
+    SbPack D[9];
 
-    if (P) region->material->ops.volumetric(region->material, (const SbLane *)F[q], D);
+    if (P) region->material->ops.volumetric(region->material, (const SbPack *)F[q], D);
     for (int k = 0; P && k < 9; k++) {
       for (int l = 0; l < SB_BATCH; l++) P[q][k][l] += p[l] * D[k][l];
     }

@@ -20,26 +20,26 @@ static void add_quadratic_force(SbSpace s, const SbRegion *region, const SbStage
   const PetscBool mean = (PetscBool)(m != region->material);
 
   for (PetscInt b = region->bstart; b < region->bend; b++) {
-    const SbLane *g = s->batch_g + 9 * b;
-    SbLane U[30], F[4][9], H[4][9], P[9], dP[9], R[9], W, fe[12], f10[30] = {{0}}, b10[30], p;
+    const SbPack *g = s->batch_g + 9 * b;
+    SbPack U[30], F[4][9], H[4][9], P[9], dP[9], R[9], W, fe[12], f10[30] = {{0}}, b10[30], p;
 
     sb_gather_nodes(10, sb_quadratic_nodes(s, b), stage->u, U);
-    SbQuadraticGradients(g, (const SbLane *)U, PETSC_FALSE, F);
+    SbQuadraticGradients(g, (const SbPack *)U, PETSC_FALSE, F);
     if (mean) {
-      SbQuadraticVolume(region->material, g, s->batch_V[b], (const SbLane *)U, (const SbLane(*)[9])F, p, b10);
+      SbQuadraticVolume(region->material, g, s->batch_V[b], (const SbPack *)U, (const SbPack(*)[9])F, p, b10);
       for (int k = 0; k < 30; k++) {
         for (int l = 0; l < SB_BATCH; l++) f10[k][l] = p[l] * b10[k][l];
       }
     }
     if (beta != 0.) {
       sb_gather_nodes(10, sb_quadratic_nodes(s, b), stage->v, U);
-      SbQuadraticGradients(g, (const SbLane *)U, PETSC_TRUE, H);
+      SbQuadraticGradients(g, (const SbPack *)U, PETSC_TRUE, H);
       for (int l = 0; l < SB_BATCH; l++) p[l] = 0.;
       for (int q = 0; q < 4 && mean; q++) {
         if (m->linear)
-          m->ops.frame(m, (const SbLane *)F[q], R);
+          m->ops.frame(m, (const SbPack *)F[q], R);
         else
-          SbPolar((const SbLane *)F[q], R);
+          SbPolar((const SbPack *)F[q], R);
         for (int k = 0; k < 9; k++) {
           for (int l = 0; l < SB_BATCH; l++) p[l] += 0.25 * beta * lambda * R[k][l] * H[q][k][l];
         }
@@ -47,21 +47,21 @@ static void add_quadratic_force(SbSpace s, const SbRegion *region, const SbStage
     }
     for (int l = 0; l < SB_BATCH; l++) W[l] = 0.25 * s->batch_V[b][l];
     for (int q = 0; q < 4; q++) {
-      m->ops.stress(m, (const SbLane *)F[q], P);
+      m->ops.stress(m, (const SbPack *)F[q], P);
       if (beta != 0.) {
-        SbMaterialDampingStress(m, (const SbLane *)F[q], (const SbLane *)H[q], dP);
+        SbMaterialDampingStress(m, (const SbPack *)F[q], (const SbPack *)H[q], dP);
         if (mean && m->linear)
-          m->ops.frame(m, (const SbLane *)F[q], R);
+          m->ops.frame(m, (const SbPack *)F[q], R);
         else if (mean)
-          SbPolar((const SbLane *)F[q], R);
+          SbPolar((const SbPack *)F[q], R);
         for (int k = 0; k < 9; k++) {
           for (int l = 0; l < SB_BATCH; l++) P[k][l] += beta * dP[k][l] + (mean ? p[l] * R[k][l] : 0.);
         }
       }
-      SbCellForce(g, W, (const SbLane *)P, fe);
-      SbQuadraticAdd(SbRuleQuadratic.L[q], (const SbLane *)fe, f10);
+      SbCellForce(g, W, (const SbPack *)P, fe);
+      SbQuadraticAdd(SbRuleQuadratic.L[q], (const SbPack *)fe, f10);
     }
-    sb_scatter_nodes(10, sb_quadratic_nodes(s, b), s->batch_n[b], (const SbLane *)f10, f);
+    sb_scatter_nodes(10, sb_quadratic_nodes(s, b), s->batch_n[b], (const SbPack *)f10, f);
   }
 }
 
@@ -78,23 +78,23 @@ PetscErrorCode SbSpaceAddInternalForce(SbSpace s, const SbStage *stage, PetscRea
       const PetscReal beta = stage->v ? s->region[r].beta : 0.;
 
       for (PetscInt b = s->region[r].bstart; b < s->region[r].bend; b++) {
-        const SbLane *g = s->batch_g + 9 * b;
-        SbLane u[12], F[9], P[9], fe[12];
+        const SbPack *g = s->batch_g + 9 * b;
+        SbPack u[12], F[9], P[9], fe[12];
 
         sb_gather_strain(s, &s->region[r], b, stage->u, u);
-        SbCellGradient(g, (const SbLane *)u, F);
-        m->ops.stress(m, (const SbLane *)F, P);
+        SbCellGradient(g, (const SbPack *)u, F);
+        m->ops.stress(m, (const SbPack *)F, P);
         if (beta != 0.) {
-          SbLane H[9], dP[9];
+          SbPack H[9], dP[9];
 
           sb_gather_strain(s, &s->region[r], b, stage->v, u);
-          SbCellGradientRate(g, (const SbLane *)u, H);
-          SbMaterialDampingStress(m, (const SbLane *)F, (const SbLane *)H, dP);
+          SbCellGradientRate(g, (const SbPack *)u, H);
+          SbMaterialDampingStress(m, (const SbPack *)F, (const SbPack *)H, dP);
           for (int k = 0; k < 9; k++) {
             for (int l = 0; l < SB_BATCH; l++) P[k][l] += beta * dP[k][l];
           }
         }
-        SbCellForce(g, s->batch_V[b], (const SbLane *)P, fe);
+        SbCellForce(g, s->batch_V[b], (const SbPack *)P, fe);
         sb_scatter_strain(s, &s->region[r], b, fe, f);
       }
     }
@@ -138,7 +138,7 @@ void SbSpaceAddInertia(SbSpace s, const SbStage *stage, PetscReal f[])
         for (int k = 0; k < 100; k++)
           mass[k / 10][k % 10] = s->region[r].material->density * SbQuadraticMass(k / 10, k % 10);
         for (PetscInt b = s->region[r].bstart; b < s->region[r].bend; b++) {
-          SbLane w[30] = {{0}}, v[30], fe[30] = {{0}};
+          SbPack w[30] = {{0}}, v[30], fe[30] = {{0}};
 
           if (stage->a) sb_gather_nodes(10, sb_quadratic_nodes(s, b), stage->a, w);
           if (damping != 0.) sb_gather_nodes(10, sb_quadratic_nodes(s, b), stage->v, v);
@@ -149,7 +149,7 @@ void SbSpaceAddInertia(SbSpace s, const SbStage *stage, PetscReal f[])
             for (int l = 0; l < SB_BATCH; l++)
               fe[k / 30 * 3 + k % 3][l] += mass[k / 30][k / 3 % 10] * s->batch_V[b][l] * w[k % 30][l];
           }
-          sb_scatter_nodes(10, sb_quadratic_nodes(s, b), s->batch_n[b], (const SbLane *)fe, f);
+          sb_scatter_nodes(10, sb_quadratic_nodes(s, b), s->batch_n[b], (const SbPack *)fe, f);
         }
       } else {
         const SbElementOps *e = &s->region[r].element->ops;
@@ -158,14 +158,14 @@ void SbSpaceAddInertia(SbSpace s, const SbStage *stage, PetscReal f[])
         /* Consistent mass of a region times w = a + alpha v. */
         for (PetscInt b = s->region[r].bstart; b < s->region[r].bend; b++) {
           const PetscInt *node = s->batch_node + 4 * SB_BATCH * b;
-          SbLane w[12], fe[12];
+          SbPack w[12], fe[12];
 
           if (stage->a)
             sb_gather(node, stage->a, w);
           else
             memset(w, 0, sizeof(w));
           if (alpha != 0.) {
-            SbLane v[12];
+            SbPack v[12];
 
             sb_gather(node, stage->v, v);
             for (int k = 0; k < 12; k++) {
@@ -180,7 +180,7 @@ void SbSpaceAddInertia(SbSpace s, const SbStage *stage, PetscReal f[])
                          ((e->mass_diagonal - e->mass_coupling) * w[k][l] + e->mass_coupling * sum);
             }
           }
-          sb_scatter_add(node, s->batch_n[b], (const SbLane *)fe, f);
+          sb_scatter_add(node, s->batch_n[b], (const SbPack *)fe, f);
         }
       }
     }
@@ -193,7 +193,7 @@ void SbSpaceAddInertia(SbSpace s, const SbStage *stage, PetscReal f[])
 }
 
 /* Cauchy stress P F^T / J of one lane, in the order xx yy zz xy yz xz. */
-static void cauchy(const SbLane P[9], const SbLane F[9], PetscInt l, PetscReal J, PetscReal sigma[6])
+static void cauchy(const SbPack P[9], const SbPack F[9], PetscInt l, PetscReal J, PetscReal sigma[6])
 {
   static const int row[6] = {0, 1, 2, 0, 1, 0}, column[6] = {0, 1, 2, 1, 2, 2};
 
@@ -205,7 +205,7 @@ static void cauchy(const SbLane P[9], const SbLane F[9], PetscInt l, PetscReal J
   }
 }
 
-static PetscReal lane_det(const SbLane F[9], PetscInt l)
+static PetscReal lane_det(const SbPack F[9], PetscInt l)
 {
   return F[0][l] * (F[4][l] * F[8][l] - F[5][l] * F[7][l]) -
          F[1][l] * (F[3][l] * F[8][l] - F[5][l] * F[6][l]) +
@@ -218,7 +218,7 @@ void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscRe
     const SbRegion *region = &s->region[r];
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
-      SbLane F[4][9], P[4][9], energy[4];
+      SbPack F[4][9], P[4][9], energy[4];
       const PetscInt n = SbBatchState(s, region, b, x, F, sigma ? P : NULL, psi ? energy : NULL, NULL);
 
       /* means over the points */
@@ -230,7 +230,7 @@ void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscRe
         if (psi) psi[c] = 0.;
         for (int k = 0; sigma && k < 6; k++) sigma[6 * c + k] = 0.;
         for (PetscInt q = 0; q < n; q++) {
-          const PetscReal det = lane_det((const SbLane *)F[q], l);
+          const PetscReal det = lane_det((const SbPack *)F[q], l);
           PetscReal stress[6];
 
           if (J) J[c] += part * det;
@@ -242,7 +242,7 @@ void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscRe
 
             for (int k = 0; k < 6; k++) stress[k] = P[q][entry[k]][l];
           } else
-            cauchy((const SbLane *)P[q], (const SbLane *)F[q], l, det, stress);
+            cauchy((const SbPack *)P[q], (const SbPack *)F[q], l, det, stress);
           for (int k = 0; k < 6; k++) sigma[6 * c + k] += part * stress[k];
         }
       }
@@ -251,16 +251,16 @@ void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscRe
 }
 
 /* Exact volumes of the cells of a P2 batch, and the least det F at the points of the rule for them. */
-static void quadratic_volume(SbSpace s, PetscInt b, const PetscReal x[], SbLane volume, SbLane least)
+static void quadratic_volume(SbSpace s, PetscInt b, const PetscReal x[], SbPack volume, SbPack least)
 {
-  SbLane U[30], u[12], F[9];
+  SbPack U[30], u[12], F[9];
 
   sb_gather_nodes(10, sb_quadratic_nodes(s, b), x, U);
   for (int q = 0; q < SbRuleCubic.n; q++) {
-    SbQuadraticAt(SbRuleCubic.L[q], (const SbLane *)U, u);
-    SbCellGradient(s->batch_g + 9 * b, (const SbLane *)u, F);
+    SbQuadraticAt(SbRuleCubic.L[q], (const SbPack *)U, u);
+    SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, F);
     for (int l = 0; l < SB_BATCH; l++) {
-      const PetscReal det = lane_det((const SbLane *)F, l),
+      const PetscReal det = lane_det((const SbPack *)F, l),
                       part = SbRuleCubic.weight[q] * s->batch_V[b][l] * det;
 
       volume[l] = q ? volume[l] + part : part;
@@ -281,7 +281,7 @@ void SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal body[], Petsc
     const PetscReal before = *energy;
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
-      SbLane F[4][9], psi[4], exact = {0}, lowest;
+      SbPack F[4][9], psi[4], exact = {0}, lowest;
       const PetscInt n = SbBatchState(s, region, b, x, F, NULL, psi, NULL);
 
       if (region->quadratic) quadratic_volume(s, b, x, exact, lowest);
@@ -289,7 +289,7 @@ void SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal body[], Petsc
         PetscReal least = region->quadratic ? lowest[l] : PETSC_MAX_REAL;
 
         for (PetscInt q = 0; q < n; q++) {
-          const PetscReal det = lane_det((const SbLane *)F[q], l), part = s->batch_V[b][l] / (PetscReal)n;
+          const PetscReal det = lane_det((const SbPack *)F[q], l), part = s->batch_V[b][l] / (PetscReal)n;
 
           *energy += part * psi[q][l];
           *volume += region->quadratic ? 0. : part * det;
@@ -336,13 +336,13 @@ PetscErrorCode SbSpaceDampingPower(SbSpace s, const PetscReal x[], const PetscRe
       continue;
     }
     for (PetscInt b = region->bstart; b < region->bend; b++) {
-      SbLane u[12], F[9], H[9], dP[9];
+      SbPack u[12], F[9], H[9], dP[9];
 
       sb_gather_strain(s, region, b, x, u);
-      SbCellGradient(s->batch_g + 9 * b, (const SbLane *)u, F);
+      SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, F);
       sb_gather_strain(s, region, b, v, u);
-      SbCellGradientRate(s->batch_g + 9 * b, (const SbLane *)u, H);
-      SbMaterialDampingStress(m, (const SbLane *)F, (const SbLane *)H, dP);
+      SbCellGradientRate(s->batch_g + 9 * b, (const SbPack *)u, H);
+      SbMaterialDampingStress(m, (const SbPack *)F, (const SbPack *)H, dP);
       sb_gather(s->batch_node + 4 * SB_BATCH * b, v, u);
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
         PetscReal hooke = 0., inertia = 0.;

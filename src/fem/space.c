@@ -70,14 +70,14 @@ static PetscErrorCode find_regions(SbSpace s, const SbMaterial material[], const
 /* Gradients, volumes and nodes of each batch; padding lanes repeat the first cell with volume zero. */
 static PetscErrorCode tabulate_batches(SbSpace s)
 {
-  const size_t bytes = (size_t)s->nbatch * 10 * sizeof(SbLane);
+  const size_t bytes = (size_t)s->nbatch * 10 * sizeof(SbPack);
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(s->nbatch, &s->batch_cell));
   PetscCall(PetscMalloc1(s->nbatch, &s->batch_n));
   PetscCall(PetscMalloc1(s->nbatch * 4 * SB_BATCH, &s->batch_node));
   PetscCall(PetscMalloc(bytes + 64, &s->batch_memory));
-  s->batch_g = (SbLane *)(((uintptr_t)s->batch_memory + 63) & ~(uintptr_t)63);
+  s->batch_g = (SbPack *)(((uintptr_t)s->batch_memory + 63) & ~(uintptr_t)63);
   s->batch_V = s->batch_g + (size_t)s->nbatch * 9;
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
@@ -238,7 +238,7 @@ PetscErrorCode SbSpaceFindSet(SbSpace s, const char *name, const char *where, Pe
     if (same) PetscFunctionReturn(PETSC_SUCCESS);
     names[*k] = s->mesh->set[*k].name;
   }
-  PetscCall(SbNearestNames(name, s->mesh->nset, names, sizeof(near), near));
+  PetscCall(SbSuggestNames(name, s->mesh->nset, names, sizeof(near), near));
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s names the set '%s', which does not exist%s%s", where, name,
           near[0] ? "; nearest: " : "", near);
 }

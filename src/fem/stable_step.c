@@ -29,10 +29,10 @@ static void multiply_stiffness(SbSpace s, const PetscReal x[], PetscReal f[])
     const PetscReal mu = m->ops.shear_modulus(m), lambda = m->ops.volumetric_modulus(m);
 
     for (PetscInt b = region->bstart; region->quadratic && b < region->bend; b++) {
-      SbLane U[30], H[4][9], P[9], W, mean = {0}, fe[12], f10[30] = {{0}};
+      SbPack U[30], H[4][9], P[9], W, mean = {0}, fe[12], f10[30] = {{0}};
 
       sb_gather_nodes(10, sb_quadratic_nodes(s, b), x, U);
-      SbQuadraticGradients(s->batch_g + 9 * b, (const SbLane *)U, PETSC_TRUE, H);
+      SbQuadraticGradients(s->batch_g + 9 * b, (const SbPack *)U, PETSC_TRUE, H);
       for (int l = 0; l < SB_BATCH; l++) {
         for (int q = 0; q < 4; q++) mean[l] += 0.25 * lambda * (H[q][0][l] + H[q][4][l] + H[q][8][l]);
         W[l] = 0.25 * s->batch_V[b][l];
@@ -45,23 +45,23 @@ static void multiply_stiffness(SbSpace s, const PetscReal x[], PetscReal f[])
           for (int k = 0; k < 9; k++)
             P[k][l] = mu * (H[q][k][l] + H[q][3 * (k % 3) + k / 3][l]) + (k % 4 == 0 ? pressure : 0.);
         }
-        SbCellForce(s->batch_g + 9 * b, W, (const SbLane *)P, fe);
-        SbQuadraticAdd(SbRuleQuadratic.L[q], (const SbLane *)fe, f10);
+        SbCellForce(s->batch_g + 9 * b, W, (const SbPack *)P, fe);
+        SbQuadraticAdd(SbRuleQuadratic.L[q], (const SbPack *)fe, f10);
       }
-      sb_scatter_nodes(10, sb_quadratic_nodes(s, b), s->batch_n[b], (const SbLane *)f10, f);
+      sb_scatter_nodes(10, sb_quadratic_nodes(s, b), s->batch_n[b], (const SbPack *)f10, f);
     }
     for (PetscInt b = region->bstart; !region->quadratic && b < region->bend; b++) {
-      SbLane u[12], H[9], P[9], fe[12];
+      SbPack u[12], H[9], P[9], fe[12];
 
       sb_gather_strain(s, region, b, x, u);
-      SbCellGradientRate(s->batch_g + 9 * b, (const SbLane *)u, H);
+      SbCellGradientRate(s->batch_g + 9 * b, (const SbPack *)u, H);
       for (int l = 0; l < SB_BATCH; l++) {
         const PetscReal pressure = lambda * (H[0][l] + H[4][l] + H[8][l]);
 
         for (int k = 0; k < 9; k++)
           P[k][l] = mu * (H[k][l] + H[3 * (k % 3) + k / 3][l]) + (k % 4 == 0 ? pressure : 0.);
       }
-      SbCellForce(s->batch_g + 9 * b, s->batch_V[b], (const SbLane *)P, fe);
+      SbCellForce(s->batch_g + 9 * b, s->batch_V[b], (const SbPack *)P, fe);
       sb_scatter_strain(s, region, b, fe, f);
     }
   }

@@ -96,22 +96,22 @@ typedef struct {
   PetscReal inertia;      /* on the consistent mass */
   PetscReal lambda;       /* volumetric modulus of the law, Pa */
   PetscReal mu;           /* shear modulus of the law, Pa */
-  const SbLane *pressure; /* that a law without lambda is under, Pa, tension; NULL: its own */
+  const SbPack *pressure; /* that a law without lambda is under, Pa, tension; NULL: its own */
 } Factors;
 
-static void scaled_volumes(const SbLane V, PetscReal factor, SbLane W)
+static void scaled_volumes(const SbPack V, PetscReal factor, SbPack W)
 {
   for (int l = 0; l < SB_BATCH; l++) W[l] = factor * V[l];
 }
 
 /* What a cell's blocks leave out: D (SbMaterialOps.volumetric) and the factor on lambda and mu. */
 typedef struct {
-  SbLane D[9];
+  SbPack D[9];
   PetscReal factor;
 } Split;
 
 /* C -= lambda D D^T */
-SB_KERNEL static void remove_volumetric(PetscReal lambda, const SbLane D[restrict 9], SbLane C[restrict 81])
+SB_KERNEL static void remove_volumetric(PetscReal lambda, const SbPack D[restrict 9], SbPack C[restrict 81])
 {
   for (int i = 0; i < 9; i++) {
     for (int k = 0; k < 9; k++) {
@@ -121,26 +121,26 @@ SB_KERNEL static void remove_volumetric(PetscReal lambda, const SbLane D[restric
 }
 
 /* A law with the full tangent; its damping comes on top and stays whole. */
-static void general_blocks(const SbMaterial m, const SbLane *g, const SbLane V, const Factors *x,
-                           const SbLane F[9], Split *split, SbLane K[10][9])
+static void general_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
+                           const SbPack F[9], Split *split, SbPack K[10][9])
 {
-  SbLane C[81], W;
+  SbPack C[81], W;
 
   m->ops.tangent(m, F, C);
   if (split) {
     m->ops.volumetric(m, F, split->D);
     split->factor = x->stiffness;
-    remove_volumetric(x->lambda, (const SbLane *)split->D, C);
+    remove_volumetric(x->lambda, (const SbPack *)split->D, C);
   }
   if (x->pressure && m->ops.curvature) m->ops.curvature(m, F, *x->pressure, C);
   scaled_volumes(V, x->stiffness, W);
-  SbCellBlocksGeneral(g, W, (const SbLane *)C, K);
+  SbCellBlocksGeneral(g, W, (const SbPack *)C, K);
   if (x->damping != 0.) {
-    SbLane R[9], D[10][9];
+    SbPack R[9], D[10][9];
 
     SbPolar(F, R);
     scaled_volumes(V, x->damping, W);
-    SbCellBlocksIsotropic(g, W, x->lambda, x->mu, (const SbLane *)R, D);
+    SbCellBlocksIsotropic(g, W, x->lambda, x->mu, (const SbPack *)R, D);
     for (int k = 0; k < 90; k++) {
       for (int l = 0; l < SB_BATCH; l++) K[k / 9][k % 9][l] += D[k / 9][k % 9][l];
     }
@@ -148,11 +148,11 @@ static void general_blocks(const SbMaterial m, const SbLane *g, const SbLane V, 
 }
 
 /* A law whose tangent is Hooke's tensor turned by R and a part T of the spins (sbelement.h); damping is the same form with T = -mu I. */
-static void spin_blocks(const SbMaterial m, const SbLane *g, const SbLane V, const Factors *x,
-                        const SbLane F[9], Split *split, SbLane K[10][9])
+static void spin_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
+                        const SbPack F[9], Split *split, SbPack K[10][9])
 {
   const PetscReal both = x->stiffness + x->damping, lambda = split ? 0. : x->lambda;
-  SbLane R[9], T[9], W;
+  SbPack R[9], T[9], W;
 
   m->ops.spin(m, F, R, T);
   /* T is proportional to pressure - 2 mu; a filtered one keeps to what is not negative */
@@ -168,7 +168,7 @@ static void spin_blocks(const SbMaterial m, const SbLane *g, const SbLane V, con
     for (int l = 0; l < SB_BATCH; l++) T[k][l] = (x->stiffness * T[k][l] - rest) / both;
   }
   scaled_volumes(V, both, W);
-  SbCellBlocksSpin(g, W, lambda, x->mu, (const SbLane *)R, (const SbLane *)T, K);
+  SbCellBlocksCorotated(g, W, lambda, x->mu, (const SbPack *)R, (const SbPack *)T, K);
   if (split) {
     memcpy(split->D, R, sizeof(R));
     split->factor = both;
@@ -176,11 +176,11 @@ static void spin_blocks(const SbMaterial m, const SbLane *g, const SbLane V, con
 }
 
 /* Hooke's tensor turned by R, with its damping. */
-static void isotropic_blocks(const SbMaterial m, const SbLane *g, const SbLane V, const Factors *x,
-                             const SbLane R[9], Split *split, SbLane K[10][9])
+static void isotropic_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
+                             const SbPack R[9], Split *split, SbPack K[10][9])
 {
   const PetscReal both = x->stiffness + x->damping;
-  SbLane W;
+  SbPack W;
 
   scaled_volumes(V, both, W);
   SbCellBlocksIsotropic(g, W, split ? 0. : x->lambda, x->mu, m->linear ? NULL : R, K);
@@ -191,14 +191,14 @@ static void isotropic_blocks(const SbMaterial m, const SbLane *g, const SbLane V
 }
 
 /* Blocks of a law at F, without mass; `split` NULL: whole. */
-static void law_blocks(const SbMaterial m, const SbLane *g, const SbLane V, const Factors *x,
-                       const SbLane F[9], Split *split, SbLane K[10][9])
+static void law_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
+                       const SbPack F[9], Split *split, SbPack K[10][9])
 {
-  SbLane R[9];
+  SbPack R[9];
 
   if (m->linear || m->ops.frame) {
     m->ops.frame(m, F, R);
-    isotropic_blocks(m, g, V, x, (const SbLane *)R, split, K);
+    isotropic_blocks(m, g, V, x, (const SbPack *)R, split, K);
   } else if (m->ops.spin && x->stiffness != 0.)
     spin_blocks(m, g, V, x, F, split, K);
   else
@@ -207,22 +207,22 @@ static void law_blocks(const SbMaterial m, const SbLane *g, const SbLane V, cons
 
 /* The same of one batch. */
 static void batch_blocks(SbSpace s, const SbRegion *region, const PetscReal displacement[], const Factors *x,
-                         PetscInt b, Split *split, SbLane K[10][9])
+                         PetscInt b, Split *split, SbPack K[10][9])
 {
   const SbMaterial m = region->material;
-  const SbLane *g = s->batch_g + 9 * b, *V = s->batch_V + b;
-  SbLane u[12], F[9];
+  const SbPack *g = s->batch_g + 9 * b, *V = s->batch_V + b;
+  SbPack u[12], F[9];
 
   if (!m->linear) {
     sb_gather_strain(s, region, b, displacement, u);
-    SbCellGradient(g, (const SbLane *)u, F);
+    SbCellGradient(g, (const SbPack *)u, F);
   }
-  law_blocks(m, g, *V, x, (const SbLane *)F, split, K);
+  law_blocks(m, g, *V, x, (const SbPack *)F, split, K);
 }
 
 /* K_ab += factor b_a b_b^T */
-SB_KERNEL static void add_dyad(const SbLane factor, const SbLane b[restrict 30],
-                               SbLane K[restrict SB_PAIRS][9])
+SB_KERNEL static void add_dyad(const SbPack factor, const SbPack b[restrict 30],
+                               SbPack K[restrict SB_PAIRS][9])
 {
   for (int p = 0; p < SB_PAIRS; p++) {
     for (int e = 0; e < 9; e++) {
@@ -238,59 +238,59 @@ SB_KERNEL static void add_dyad(const SbLane factor, const SbLane b[restrict 30],
   where theta is J - 1, V lambda m d^2 m/du^2, which a filtered tangent goes without. Damping has R in the place of D in b.
 */
 static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal displacement[],
-                             const Factors *x, PetscInt batch, SbLane K[SB_PAIRS][9])
+                             const Factors *x, PetscInt batch, SbPack K[SB_PAIRS][9])
 {
   const SbMaterial m = region->material, law = region->pointwise;
-  const SbLane *g = s->batch_g + 9 * batch, *V = s->batch_V + batch;
+  const SbPack *g = s->batch_g + 9 * batch, *V = s->batch_V + batch;
   const PetscBool mean = (PetscBool)(law != m), one_D = (PetscBool)(m->linear || m->ops.frame || m->ops.spin);
-  SbLane U[30], F[4][9], B[4][10][9] __attribute__((aligned(64))), quarter, p, factor, b[30] = {{0}};
+  SbPack U[30], F[4][9], B[4][10][9] __attribute__((aligned(64))), quarter, p, factor, b[30] = {{0}};
   Factors at = *x;
 
   if (m->linear)
     memset(U, 0, sizeof(U));
   else
     sb_gather_nodes(10, sb_quadratic_nodes(s, batch), displacement, U);
-  SbQuadraticGradients(g, (const SbLane *)U, PETSC_FALSE, F);
+  SbQuadraticGradients(g, (const SbPack *)U, PETSC_FALSE, F);
   if (mean) {
-    SbQuadraticVolume(m, g, *V, (const SbLane *)U, (const SbLane(*)[9])F, p, b);
+    SbQuadraticVolume(m, g, *V, (const SbPack *)U, (const SbPack(*)[9])F, p, b);
     at.lambda = 0.;
     at.pressure = &p;
   }
   scaled_volumes(*V, 0.25, quarter);
-  for (int q = 0; q < 4; q++) law_blocks(law, g, quarter, &at, (const SbLane *)F[q], NULL, B[q]);
+  for (int q = 0; q < 4; q++) law_blocks(law, g, quarter, &at, (const SbPack *)F[q], NULL, B[q]);
   for (int l = 0; l < SB_BATCH; l++)
     factor[l] = (*V)[l] > 0. ? x->lambda * (x->stiffness + (one_D ? x->damping : 0.)) / (*V)[l] : 0.;
-  SbQuadraticBlocks((const SbLane(*)[10][9])B, factor, (const SbLane *)b, K);
+  SbQuadraticBlocks((const SbPack(*)[10][9])B, factor, (const SbPack *)b, K);
   if (!mean) return;
   if (m->jacobian && law->tangent != SB_TANGENT_EXACT_SPD) {
     for (int q = 0; q < SbRuleCubic.n; q++) {
-      SbLane u[12], here[9];
+      SbPack u[12], here[9];
 
-      SbQuadraticAt(SbRuleCubic.L[q], (const SbLane *)U, u);
-      SbCellGradient(g, (const SbLane *)u, here);
+      SbQuadraticAt(SbRuleCubic.L[q], (const SbPack *)U, u);
+      SbCellGradient(g, (const SbPack *)u, here);
       for (int l = 0; l < SB_BATCH; l++) factor[l] = x->stiffness * SbRuleCubic.weight[q] * (*V)[l] * p[l];
-      SbQuadraticAddJacobian(SbRuleCubic.L[q], g, (const SbLane *)here, factor, K);
+      SbQuadraticAddJacobian(SbRuleCubic.L[q], g, (const SbPack *)here, factor, K);
     }
   }
   if (one_D || x->damping == 0.) return;
   memset(b, 0, sizeof(b));
   for (int q = 0; q < 4; q++) {
-    SbLane R[9], f[12];
+    SbPack R[9], f[12];
 
-    SbPolar((const SbLane *)F[q], R);
-    SbCellForce(g, quarter, (const SbLane *)R, f);
-    SbQuadraticAdd(SbRuleQuadratic.L[q], (const SbLane *)f, b);
+    SbPolar((const SbPack *)F[q], R);
+    SbCellForce(g, quarter, (const SbPack *)R, f);
+    SbQuadraticAdd(SbRuleQuadratic.L[q], (const SbPack *)f, b);
   }
   for (int l = 0; l < SB_BATCH; l++) factor[l] = (*V)[l] > 0. ? x->lambda * x->damping / (*V)[l] : 0.;
-  add_dyad(factor, (const SbLane *)b, K);
+  add_dyad(factor, (const SbPack *)b, K);
 }
 
 /* b_a = V D grad psi_a and the moduli of a batch. */
 static void keep_volumetric(SbSpace s, const Factors *x, PetscInt batch, const Split *split,
                             const SbVolumetric *out)
 {
-  const SbLane *g = s->batch_g + 9 * batch;
-  SbLane *b = out->b + 12 * batch;
+  const SbPack *g = s->batch_g + 9 * batch;
+  SbPack *b = out->b + 12 * batch;
 
   for (int l = 0; l < SB_BATCH; l++) {
     out->modulus[batch][l] = split ? split->factor * x->lambda : 0.;
@@ -316,15 +316,15 @@ typedef struct {
 } Fill;
 
 /* Adds the blocks of a batch and its consistent mass; K is overwritten. */
-static void fill_batch(const Fill *fill, PetscInt r, PetscInt b, PetscReal inertia, SbLane K[10][9])
+static void fill_batch(const Fill *fill, PetscInt r, PetscInt b, PetscReal inertia, SbPack K[10][9])
 {
   const SbSpace s = fill->space;
   const SbRegion *region = &s->region[r];
 
   SbInsertClear(s, &fill->x, b);
   if (region->broken) {
-    SbInsertBroken(s, &fill->x, b, (const SbLane(*)[9])K);
-    memset(K, 0, 90 * sizeof(SbLane));
+    SbInsertBroken(s, &fill->x, b, (const SbPack(*)[9])K);
+    memset(K, 0, 90 * sizeof(SbPack));
   }
   if (inertia != 0.) {
     for (int p = 0; p < 10; p++) {
@@ -337,7 +337,7 @@ static void fill_batch(const Fill *fill, PetscInt r, PetscInt b, PetscReal inert
     }
   } else if (region->broken)
     return;
-  SbInsertBatch(s, &fill->x, b, (const SbLane(*)[9])K);
+  SbInsertBatch(s, &fill->x, b, (const SbPack(*)[9])K);
 }
 
 /*
@@ -345,10 +345,10 @@ static void fill_batch(const Fill *fill, PetscInt r, PetscInt b, PetscReal inert
   opposite sign: the blocks a ninth.
 */
 static void fill_other(const Fill *fill, PetscInt r, PetscInt b, PetscBool faces, PetscReal inertia,
-                       const SbLane K[10][9])
+                       const SbPack K[10][9])
 {
   const PetscReal scale = faces && fill->space->region[r].element->nodes_per[0] ? 1. / 9. : 1.;
-  SbLane copy[10][9] __attribute__((aligned(64)));
+  SbPack copy[10][9] __attribute__((aligned(64)));
 
   for (int k = 0; k < 90; k++) {
     for (int l = 0; l < SB_BATCH; l++) copy[k / 9][k % 9][l] = scale * K[k / 9][k % 9][l];
@@ -372,7 +372,7 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
   Split kept, *split = out && faces && factors.lambda > 0. ? &kept : NULL;
 
   for (PetscInt b = region->bstart; region->quadratic && b < region->bend; b++) {
-    SbLane K[SB_PAIRS][9] __attribute__((aligned(64)));
+    SbPack K[SB_PAIRS][9] __attribute__((aligned(64)));
 
     quadratic_blocks(s, region, stage->u, &factors, b, K);
     for (int p = 0; factors.inertia != 0. && p < SB_PAIRS; p++) {
@@ -382,23 +382,23 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
         K[p][4 * (k / SB_BATCH)][k % SB_BATCH] += share * s->batch_V[b][k % SB_BATCH];
     }
     SbInsertClear(s, &fill[0].x, b);
-    SbInsertQuadratic(s, &fill[0].x, b, (const SbLane(*)[9])K);
+    SbInsertQuadratic(s, &fill[0].x, b, (const SbPack(*)[9])K);
   }
   if (region->quadratic) return;
 
   for (PetscInt b = region->bstart; b < region->bend; b++) {
-    SbLane K[10][9] __attribute__((aligned(64)));
+    SbPack K[10][9] __attribute__((aligned(64)));
 
     batch_blocks(s, region, stage->u, &factors, b, split, K);
     if (out) keep_volumetric(s, &factors, b, split, out);
     for (PetscInt n = nfill - 1; n > 0; n--)
-      fill_other(&fill[n], r, b, faces, factors.inertia, (const SbLane(*)[9])K);
+      fill_other(&fill[n], r, b, faces, factors.inertia, (const SbPack(*)[9])K);
     fill_batch(&fill[0], r, b, factors.inertia, K);
   }
 }
 
 /* What the rows of each body begin with: its face terms, as stiffness and damping. */
-static PetscErrorCode glue_factors(SbSpace s, const SbStage *stage, PetscReal **face_term)
+static PetscErrorCode face_term_factors(SbSpace s, const SbStage *stage, PetscReal **face_term)
 {
   PetscFunctionBeginUser;
   *face_term = NULL;
@@ -448,7 +448,7 @@ PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n,
   for (PetscInt k = 0; k < n; k++) {
     fill[k].space = space[k];
     PetscCall(SbValuesBegin(A[k], &fill[k].x));
-    PetscCall(glue_factors(space[k], stage, &fill[k].face_term));
+    PetscCall(face_term_factors(space[k], stage, &fill[k].face_term));
     fill[k].x.face_term = fill[k].face_term;
   }
   for (PetscInt r = 0; r < s->nregion; r++) {

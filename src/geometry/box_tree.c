@@ -12,7 +12,7 @@
 #include "sbgeometry.h"
 
 #define WORSE \
-  1.5 /* size of all hulls against that of the boxes, over the same in a new tree: beyond this the tree is rebuilt */
+  1.5 /* size of all hulls against that of the boxes, over that of a newly built tree: beyond this the tree is rebuilt */
 
 /* ------------------------------------------------------------------ making a tree */
 

@@ -258,7 +258,7 @@ static inline void clamp_eigenvalues(const int n, PetscReal A[])
   }
 }
 
-void SbSymmetricClamp(int n, PetscReal A[])
+void SbSymmetricProjectPSD(int n, PetscReal A[])
 {
   clamp_eigenvalues(n, A);
 }

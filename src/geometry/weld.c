@@ -38,7 +38,7 @@ PetscErrorCode SbWeld(PetscInt n, const PetscReal x[], PetscReal tolerance, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscInt SbUnionNumber(PetscInt n, PetscInt up[])
+PetscInt SbUnionLabel(PetscInt n, PetscInt up[])
 {
   PetscInt count = 0;
 

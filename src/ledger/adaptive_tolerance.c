@@ -122,8 +122,8 @@ static PetscErrorCode update_widths(SbLedger l, const SbSolvedStep *step, PetscB
   PetscCall(SbEstimateGaps(l, step->U, ROOM * allowed, &error));
   if (!(error > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
   if (error < ROOM * allowed) {
-    PetscCall(SbModelScaleWidths(l->run->model, PetscMin(3., AIM * allowed / error),
-                                 step->V ? GROWTH * PetscSqr(allowed) : PETSC_MAX_REAL, &changed));
+    PetscCall(SbModelScaleBarrierWidths(l->run->model, PetscMin(3., AIM * allowed / error),
+                                        step->V ? GROWTH * PetscSqr(allowed) : PETSC_MAX_REAL, &changed));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (error <= allowed) PetscFunctionReturn(PETSC_SUCCESS);
@@ -137,7 +137,7 @@ static PetscErrorCode update_widths(SbLedger l, const SbSolvedStep *step, PetscB
     l->mesh_bounds = PETSC_TRUE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(SbModelScaleWidths(l->run->model, AIM * allowed / error, 0., &changed));
+  PetscCall(SbModelScaleBarrierWidths(l->run->model, AIM * allowed / error, 0., &changed));
   l->narrowed += changed;
   l->width_bounds = (PetscBool)(l->width_bounds || !changed);
   *again = (PetscBool)(*again || changed);

@@ -24,7 +24,7 @@ static PetscErrorCode moved_energy(SbLedger l, Vec U, Vec F, PetscReal *energy)
   *energy = 0.;
   PetscCall(VecDuplicate(U, &D));
   PetscCall(SbProbeSolve(l, CLOSELY, F, D, &its));
-  PetscCall(SbProbeLength(l, D, &length));
+  PetscCall(SbDifferenceLength(l, D, &length));
   if (length > 0.) {
     for (int side = 0; side < 2; side++) {
       const SbSpace s = l->run->model->space;

@@ -36,7 +36,7 @@ PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal 
 
   PetscFunctionBeginUser;
   *form = 0.;
-  PetscCall(SbProbeLength(l, D, &length));
+  PetscCall(SbDifferenceLength(l, D, &length));
   if (!(length > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
   if ((PetscBool)(l->run->J && l->run->ts && l->run->shift_a > 0. && !l->run->damped &&
                   !l->run->solver_used->matrix_free && !l->run->model->space->consistent_mass)) {

@@ -280,7 +280,7 @@ PetscErrorCode SbLedgerAttach(SbLedger l)
   PetscCall(PetscCalloc1(run->model->nbody, &l->space_error));
   for (int i = 0; i < 3; i++) PetscCall(VecDuplicate(run->U, &l->w[i]));
   PetscCall(VecDuplicate(run->U, &l->delta));
-  if (run->model->dynamic) SbRunMethodError(run, &l->order, &l->c, &l->ahead);
+  if (run->model->dynamic) SbRunLocalError(run, &l->order, &l->c, &l->ahead);
   PetscCall(SbQuantityAttach(l));
 
   /* columns of history.csv */

@@ -35,7 +35,7 @@ struct _p_SbLedger {
   PetscReal *space_error; /* [nbody] of the last estimate, J */
   SbQuantity quantity;
 
-  PetscInt order; /* of the integrator; its constant, and how far velocities are behind (SbRunMethodError) */
+  PetscInt order; /* of the integrator; its constant, and how far velocities are behind (SbRunLocalError) */
   PetscReal c, ahead;
   PetscReal derivative[4],
     mean[4]; /* energies of derivatives of the last state, J/s^2j; their integrals over the run */
@@ -75,8 +75,8 @@ struct _p_SbLedger {
   PetscReal wall, longest, total; /* at the last step; s */
 };
 
-/* probe.c: factor on D that moves the bodies by a millionth of their size at most, 0 when D is zero. Collective. */
-PetscErrorCode SbProbeLength(SbLedger l, Vec D, PetscReal *length);
+/* difference.c: factor on D that moves the bodies by a millionth of their size at most, 0 when D is zero. Collective. */
+PetscErrorCode SbDifferenceLength(SbLedger l, Vec D, PetscReal *length);
 /* X = J^-1 B with the solver and tangent of the last solve, to the relative residual rtol, from zero; its may be NULL. Collective. */
 PetscErrorCode SbProbeSolve(SbLedger l, PetscReal rtol, Vec B, Vec X, PetscInt *its);
 

@@ -51,7 +51,7 @@ PetscErrorCode SbQuantityAttach(SbLedger l)
     PetscReal least = PETSC_MAX_REAL, all;
     PetscInt first = PETSC_MAX_INT, winner;
 
-    /* Of all ranks; of equally near ones the one with the lowest number, whatever the partition. */
+    /* The node nearest to the position, over all ranks; of several the one with the lowest number, whatever the partition. */
     for (int pass = 0; pass < 2; pass++) {
       for (PetscInt k = 0; k < s->nnode_owned; k++) {
         PetscReal r = 0.;
@@ -132,7 +132,7 @@ static PetscErrorCode stiffness_times(SbLedger l, PetscReal t, Vec U, Vec D, Vec
 
   PetscFunctionBeginUser;
   PetscCall(VecZeroEntries(R));
-  PetscCall(SbProbeLength(l, D, &length));
+  PetscCall(SbDifferenceLength(l, D, &length));
   if (!(length > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecWAXPY(moved, length, D, U));
   PetscCall(SbModelResidual(m, t, moved, NULL, NULL, PETSC_FALSE, R));

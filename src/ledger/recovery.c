@@ -61,7 +61,7 @@ static PetscErrorCode create_slots(SbRecovery r)
 
   PetscFunctionBeginUser;
   /* cells around each vertex: corners 4 c + a, at[start[v]..start[v + 1]) */
-  PetscCall(SbGroupByKey(4 * mesh->ncell, mesh->cell, mesh->nvert, &start, &at));
+  PetscCall(SbBucketByKey(4 * mesh->ncell, mesh->cell, mesh->nvert, &start, &at));
   for (PetscInt v = 0; v < mesh->nvert_owned; v++) longest = PetscMax(longest, start[v + 1] - start[v]);
   PetscCall(PetscMalloc1(longest, &found));
   for (PetscInt v = 0; v < mesh->nvert_owned; v++) {

@@ -19,71 +19,71 @@
 #define SMALLEST_DET 1e-9 /* of q I - S, which is 8 at rest */
 #define SMALLEST_SUM 1e-2 /* of two stretches, 2 at rest */
 
-SB_KERNEL static void energy_corotated(const struct _p_SbMaterial *m, const SbLane F[restrict 9], SbLane psi)
+SB_KERNEL static void energy_corotated(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack psi)
 {
   const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
-  SbLane R[9];
+  SbPack R[9];
 
   SbPolar(F, R);
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], r[9];
 
-    SbLaneGet(9, F, l, f);
-    SbLaneGet(9, R, l, r);
+    SbPackGet(9, F, l, f);
+    SbPackGet(9, R, l, r);
     const PetscReal tr = SbDot9(r, f) - 3;
     for (int k = 0; k < 9; k++) f[k] -= r[k];
     psi[l] = mu * SbDot9(f, f) + lambda / 2 * tr * tr;
   }
 }
 
-SB_KERNEL static void stress_corotated(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
-                                       SbLane P[restrict 9])
+SB_KERNEL static void stress_corotated(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                       SbPack P[restrict 9])
 {
   const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
-  SbLane R[9];
+  SbPack R[9];
 
   SbPolar(F, R);
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], r[9];
 
-    SbLaneGet(9, F, l, f);
-    SbLaneGet(9, R, l, r);
+    SbPackGet(9, F, l, f);
+    SbPackGet(9, R, l, r);
     const PetscReal p = lambda * (SbDot9(r, f) - 3);
     for (int k = 0; k < 9; k++) P[k][l] = 2 * mu * (f[k] - r[k]) + p * r[k];
   }
 }
 
-SB_KERNEL static void pressure_corotated(const struct _p_SbMaterial *m, const SbLane F[restrict 9], SbLane p)
+SB_KERNEL static void pressure_corotated(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack p)
 {
-  SbLane R[9];
+  SbPack R[9];
 
   SbPolar(F, R);
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], r[9];
 
-    SbLaneGet(9, F, l, f);
-    SbLaneGet(9, R, l, r);
+    SbPackGet(9, F, l, f);
+    SbPackGet(9, R, l, r);
     p[l] = -sb_lame(m)->lambda * (SbDot9(r, f) - 3);
   }
 }
 
-static void frame_corotated(const struct _p_SbMaterial *m, const SbLane F[9], SbLane R[9])
+static void frame_corotated(const struct _p_SbMaterial *m, const SbPack F[9], SbPack R[9])
 {
   (void)m;
   SbPolar(F, R);
 }
 
 /* S = sym(R^T F) as 00 01 02 11 12 22, kappa. */
-SB_KERNEL static void stretch(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
-                              const SbLane R[restrict 9], SbLane S[restrict 6], SbLane kappa)
+SB_KERNEL static void stretch(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                              const SbPack R[restrict 9], SbPack S[restrict 6], SbPack kappa)
 {
   const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], r[9], s[9];
 
-    SbLaneGet(9, F, l, f);
-    SbLaneGet(9, R, l, r);
+    SbPackGet(9, F, l, f);
+    SbPackGet(9, R, l, r);
     SbMatTransposeMul(r, f, s);
     S[0][l] = s[0];
     S[1][l] = (s[1] + s[3]) / 2;
@@ -96,7 +96,7 @@ SB_KERNEL static void stretch(const struct _p_SbMaterial *m, const SbLane F[rest
 }
 
 /* W = kappa (q I - S)^-1 */
-SB_KERNEL static void twist_exact(const SbLane S[restrict 6], const SbLane kappa, SbLane W[restrict 9])
+SB_KERNEL static void twist_exact(const SbPack S[restrict 6], const SbPack kappa, SbPack W[restrict 9])
 {
   for (int l = 0; l < SB_BATCH; l++) {
     const PetscReal a = S[3][l] + S[5][l], b = S[0][l] + S[5][l], c = S[0][l] + S[3][l];
@@ -115,17 +115,17 @@ SB_KERNEL static void twist_exact(const SbLane S[restrict 6], const SbLane kappa
 }
 
 /* The same with kappa / (s_i + s_j) limited to -mu, by the eigenvectors of S. */
-SB_KERNEL static void twist_spd(PetscReal mu, const SbLane S[restrict 6], const SbLane kappa,
-                                SbLane W[restrict 9])
+SB_KERNEL static void twist_spd(PetscReal mu, const SbPack S[restrict 6], const SbPack kappa,
+                                SbPack W[restrict 9])
 {
-  SbLane s[3], V[9];
+  SbPack s[3], V[9];
 
   SbSymEig(S, s, V);
   for (int l = 0; l < SB_BATCH; l++) {
     const PetscReal q = s[0][l] + s[1][l] + s[2][l];
     PetscReal v[9], w[3];
 
-    SbLaneGet(9, (const SbLane *)V, l, v);
+    SbPackGet(9, (const SbPack *)V, l, v);
     for (int k = 0; k < 3; k++) {
       const PetscReal sum = q - s[k][l] > SMALLEST_SUM ? q - s[k][l] : SMALLEST_SUM, limit = -mu * sum;
 
@@ -144,17 +144,17 @@ SB_KERNEL static void twist_spd(PetscReal mu, const SbLane S[restrict 6], const 
   C = 2 mu identity + lambda R R + Z W Z^T, the columns of Z being R [e_n]x: of row (i, j) only columns j+1 and j+2 (cyclic)
   are not zero, -R_i,j+2 and R_i,j+1.
 */
-SB_KERNEL static void add_modes(const struct _p_SbMaterial *m, const SbLane R[restrict 9],
-                                const SbLane W[restrict 9], SbLane C[restrict 81])
+SB_KERNEL static void add_modes(const struct _p_SbMaterial *m, const SbPack R[restrict 9],
+                                const SbPack W[restrict 9], SbPack C[restrict 81])
 {
   const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
-  SbLane ZW[27];
+  SbPack ZW[27];
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal r[9], w[9];
 
-    SbLaneGet(9, R, l, r);
-    SbLaneGet(9, W, l, w);
+    SbPackGet(9, R, l, r);
+    SbPackGet(9, W, l, w);
     for (int ij = 0; ij < 9; ij++) {
       const int i = ij / 3, j1 = (ij + 1) % 3, j2 = (ij + 2) % 3;
 
@@ -166,7 +166,7 @@ SB_KERNEL static void add_modes(const struct _p_SbMaterial *m, const SbLane R[re
     for (int kl = ij; kl < 9; kl++) {
       const int l1 = (kl + 1) % 3, l2 = (kl + 2) % 3, k = 3 * (kl / 3);
       const PetscReal identity = ij == kl ? 2 * mu : 0;
-      SbLane c;
+      SbPack c;
 
       for (int l = 0; l < SB_BATCH; l++) {
         c[l] = identity + lambda * R[ij][l] * R[kl][l] + ZW[3 * ij + l2][l] * R[k + l1][l] -
@@ -177,24 +177,24 @@ SB_KERNEL static void add_modes(const struct _p_SbMaterial *m, const SbLane R[re
   }
 }
 
-static void spin_corotated(const struct _p_SbMaterial *m, const SbLane F[9], SbLane R[9], SbLane W[9])
+static void spin_corotated(const struct _p_SbMaterial *m, const SbPack F[9], SbPack R[9], SbPack W[9])
 {
-  SbLane S[6], kappa;
+  SbPack S[6], kappa;
 
   SbPolar(F, R);
-  stretch(m, F, (const SbLane *)R, S, kappa);
+  stretch(m, F, (const SbPack *)R, S, kappa);
   if (m->tangent == SB_TANGENT_EXACT_SPD)
-    twist_spd(sb_lame(m)->mu, (const SbLane *)S, kappa, W);
+    twist_spd(sb_lame(m)->mu, (const SbPack *)S, kappa, W);
   else
-    twist_exact((const SbLane *)S, kappa, W);
+    twist_exact((const SbPack *)S, kappa, W);
 }
 
-static void tangent_corotated(const struct _p_SbMaterial *m, const SbLane F[9], SbLane C[81])
+static void tangent_corotated(const struct _p_SbMaterial *m, const SbPack F[9], SbPack C[81])
 {
-  SbLane R[9], W[9];
+  SbPack R[9], W[9];
 
   spin_corotated(m, F, R, W);
-  add_modes(m, (const SbLane *)R, (const SbLane *)W, C);
+  add_modes(m, (const SbPack *)R, (const SbPack *)W, C);
 }
 
 static PetscErrorCode settangent_corotated(SbMaterial m, SbTangentKind kind)

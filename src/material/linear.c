@@ -5,9 +5,9 @@
 */
 #include "material_impl.h"
 
-SB_INLINE void strain(const SbLane F[9], int l, PetscReal e[9])
+SB_INLINE void strain(const SbPack F[9], int l, PetscReal e[9])
 {
-  SbLaneGet(9, F, l, e);
+  SbPackGet(9, F, l, e);
   e[1] = e[3] = (e[1] + e[3]) / 2;
   e[2] = e[6] = (e[2] + e[6]) / 2;
   e[5] = e[7] = (e[5] + e[7]) / 2;
@@ -16,7 +16,7 @@ SB_INLINE void strain(const SbLane F[9], int l, PetscReal e[9])
   e[8] -= 1;
 }
 
-SB_KERNEL static void energy_linear(const struct _p_SbMaterial *m, const SbLane F[restrict 9], SbLane psi)
+SB_KERNEL static void energy_linear(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack psi)
 {
   const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
 
@@ -29,8 +29,8 @@ SB_KERNEL static void energy_linear(const struct _p_SbMaterial *m, const SbLane 
   }
 }
 
-SB_KERNEL static void stress_linear(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
-                                    SbLane P[restrict 9])
+SB_KERNEL static void stress_linear(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                    SbPack P[restrict 9])
 {
   const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
 
@@ -43,13 +43,13 @@ SB_KERNEL static void stress_linear(const struct _p_SbMaterial *m, const SbLane 
   }
 }
 
-SB_KERNEL static void pressure_linear(const struct _p_SbMaterial *m, const SbLane F[restrict 9], SbLane p)
+SB_KERNEL static void pressure_linear(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack p)
 {
   for (int l = 0; l < SB_BATCH; l++)
     p[l] = -sb_lame(m)->lambda * ((F[0][l] - 1) + (F[4][l] - 1) + (F[8][l] - 1));
 }
 
-static void frame_linear(const struct _p_SbMaterial *m, const SbLane F[9], SbLane R[9])
+static void frame_linear(const struct _p_SbMaterial *m, const SbPack F[9], SbPack R[9])
 {
   (void)m;
   (void)F;
@@ -58,7 +58,7 @@ static void frame_linear(const struct _p_SbMaterial *m, const SbLane F[9], SbLan
   }
 }
 
-static void tangent_linear(const struct _p_SbMaterial *m, const SbLane F[9], SbLane C[81])
+static void tangent_linear(const struct _p_SbMaterial *m, const SbPack F[9], SbPack C[81])
 {
   (void)F;
   for (int i = 0; i < 9; i++) {

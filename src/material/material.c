@@ -173,14 +173,14 @@ PetscErrorCode SbMaterialSetHooke(SbMaterial m)
 }
 
 /* dP = mu (H + R H^T R) + lambda (R : H) R */
-SB_KERNEL static void turned_hooke(PetscReal lambda, PetscReal mu, const SbLane R[restrict 9],
-                                   const SbLane H[restrict 9], SbLane dP[restrict 9])
+SB_KERNEL static void turned_hooke(PetscReal lambda, PetscReal mu, const SbPack R[restrict 9],
+                                   const SbPack H[restrict 9], SbPack dP[restrict 9])
 {
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal r[9], h[9], b[9], t[9];
 
-    SbLaneGet(9, R, l, r);
-    SbLaneGet(9, H, l, h);
+    SbPackGet(9, R, l, r);
+    SbPackGet(9, H, l, h);
     SbMatTransposeMul(h, r, b);
     SbMatMul(r, b, t);
     const PetscReal p = lambda * (b[0] + b[4] + b[8]);
@@ -188,14 +188,14 @@ SB_KERNEL static void turned_hooke(PetscReal lambda, PetscReal mu, const SbLane 
   }
 }
 
-void SbMaterialDampingStress(const struct _p_SbMaterial *m, const SbLane F[9], const SbLane H[9],
-                             SbLane dP[9])
+void SbMaterialDampingStress(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack H[9],
+                             SbPack dP[9])
 {
-  SbLane R[9];
+  SbPack R[9];
 
   if (m->linear)
     m->ops.frame(m, F, R);
   else
     SbPolar(F, R);
-  turned_hooke(m->ops.volumetric_modulus(m), m->ops.shear_modulus(m), (const SbLane *)R, H, dP);
+  turned_hooke(m->ops.volumetric_modulus(m), m->ops.shear_modulus(m), (const SbPack *)R, H, dP);
 }

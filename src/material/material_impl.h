@@ -34,7 +34,7 @@ PetscErrorCode SbMaterialSetTangent_Exact(SbMaterial m, SbTangentKind kind);
 /*
   SbStretches - F = U diag(s) V^T with rotations U and V; s[k] in no order, det F = s0 s1 s2 with its sign.
 */
-void SbStretches(const SbLane F[9], SbLane U[9], SbLane s[3], SbLane V[9]);
+void SbStretches(const SbPack F[9], SbPack U[9], SbPack s[3], SbPack V[9]);
 /*
   SbSpectralTangent - C[81] of an isotropic energy psi(s0, s1, s2), its negative eigenvalues raised to zero.
 
@@ -42,11 +42,11 @@ void SbStretches(const SbLane F[9], SbLane U[9], SbLane s[3], SbLane V[9]);
     flip[k]  = (psi_i - psi_j) / (s_i - s_j), eigenvalue of the symmetric shear of the axes i and j;
     twist[k] = (psi_i + psi_j) / (s_i + s_j), eigenvalue of the rotation about axis k; psi_i = d psi / d s_i.
 */
-void SbSpectralTangent(const SbLane U[9], const SbLane V[9], const SbLane hessian[6], const SbLane flip[3],
-                       const SbLane twist[3], SbLane C[81]);
+void SbSpectralTangent(const SbPack U[9], const SbPack V[9], const SbPack hessian[6], const SbPack flip[3],
+                       const SbPack twist[3], SbPack C[81]);
 
 /* C_(ij)(kl) = C_(kl)(ij) = c */
-SB_INLINE void SbTangentPut(const SbLane c, int ij, int kl, SbLane C[81])
+SB_INLINE void SbTangentPut(const SbPack c, int ij, int kl, SbPack C[81])
 {
   for (int l = 0; l < SB_BATCH; l++) C[9 * ij + kl][l] = c[l];
   for (int l = 0; l < SB_BATCH; l++) C[9 * kl + ij][l] = c[l];

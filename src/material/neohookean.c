@@ -23,15 +23,15 @@
   Energy from H = F - I, whose first-order terms cancel: with x = (I1 - 3)/4, I1 - 3 = 2 tr H + |H|^2 and
   J - 1 = tr H + h2 + det H (h2: sum of the principal 2x2 minors) taken by hand, small strains keep their digits.
 */
-SB_KERNEL static void energy_neohookean(const struct _p_SbMaterial *m, const SbLane F[restrict 9], SbLane psi)
+SB_KERNEL static void energy_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack psi)
 {
   const PetscReal a = 4 * sb_lame(m)->mu / 3, b = sb_lame(m)->lambda + 5 * sb_lame(m)->mu / 6;
-  SbLane x;
+  SbPack x;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal h[9], c[9];
 
-    SbLaneGet(9, F, l, h);
+    SbPackGet(9, F, l, h);
     h[0] -= 1;
     h[4] -= 1;
     h[8] -= 1;
@@ -44,15 +44,15 @@ SB_KERNEL static void energy_neohookean(const struct _p_SbMaterial *m, const SbL
   for (int l = 0; l < SB_BATCH; l++) psi[l] += a / 2 * (x[l] - log1p(x[l]));
 }
 
-SB_KERNEL static void stress_neohookean(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
-                                        SbLane P[restrict 9])
+SB_KERNEL static void stress_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                        SbPack P[restrict 9])
 {
   const PetscReal a = 4 * sb_lame(m)->mu / 3, b = sb_lame(m)->lambda + 5 * sb_lame(m)->mu / 6;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], c[9];
 
-    SbLaneGet(9, F, l, f);
+    SbPackGet(9, F, l, f);
     SbMatCofactor(f, c);
     const PetscReal I1 = SbDot9(f, f), shear = a * I1 / (I1 + 1), p = b * (SbDot3(f, c) - 1) - 3 * a / 4;
     for (int k = 0; k < 9; k++) P[k][l] = shear * f[k] + p * c[k];
@@ -60,12 +60,12 @@ SB_KERNEL static void stress_neohookean(const struct _p_SbMaterial *m, const SbL
 }
 
 /* J - 1 from H = F - I as in the energy. */
-SB_KERNEL static void pressure_neohookean(const struct _p_SbMaterial *m, const SbLane F[restrict 9], SbLane p)
+SB_KERNEL static void pressure_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack p)
 {
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal h[9], c[9];
 
-    SbLaneGet(9, F, l, h);
+    SbPackGet(9, F, l, h);
     h[0] -= 1;
     h[4] -= 1;
     h[8] -= 1;
@@ -74,21 +74,21 @@ SB_KERNEL static void pressure_neohookean(const struct _p_SbMaterial *m, const S
   }
 }
 
-SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
-                                    SbLane C[restrict 81])
+SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                    SbPack C[restrict 81])
 {
   const PetscReal a = 4 * sb_lame(m)->mu / 3, b = sb_lame(m)->lambda + 5 * sb_lame(m)->mu / 6;
-  SbLane cof[9], pF[9], shear, stretch;
+  SbPack cof[9], pF[9], shear, stretch;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], c[9];
 
-    SbLaneGet(9, F, l, f);
+    SbPackGet(9, F, l, f);
     SbMatCofactor(f, c);
     const PetscReal g = 1 / (SbDot9(f, f) + 1), p = b * (SbDot3(f, c) - 1) - 3 * a / 4;
     shear[l] = a * (1 - g);
     stretch[l] = 2 * a * g * g;
-    SbLanePut(9, c, l, cof);
+    SbPackPut(9, c, l, cof);
     for (int k = 0; k < 9; k++) pF[k][l] = p * f[k];
   }
   for (int ij = 0; ij < 9; ij++) {
@@ -97,7 +97,7 @@ SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbLane 
                 column = (kl % 3 - ij % 3 + 3) % 3; /* 0 the same, 1 the next, 2 the one before */
       const int third = 3 * ((6 - ij / 3 - kl / 3) % 3) + (6 - ij % 3 - kl % 3) % 3;
       const PetscReal same = ij == kl, sign = row && column ? (row == column ? 1 : -1) : 0;
-      SbLane c;
+      SbPack c;
 
       for (int l = 0; l < SB_BATCH; l++) {
         c[l] = b * cof[ij][l] * cof[kl][l] + stretch[l] * F[ij][l] * F[kl][l] + sign * pF[third][l] +
@@ -108,11 +108,11 @@ SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbLane 
   }
 }
 
-SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
-                                  SbLane C[restrict 81])
+SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                  SbPack C[restrict 81])
 {
   const PetscReal a = 4 * sb_lame(m)->mu / 3, b = sb_lame(m)->lambda + 5 * sb_lame(m)->mu / 6;
-  SbLane U[9], V[9], s[3], hessian[6], flip[3], twist[3];
+  SbPack U[9], V[9], s[3], hessian[6], flip[3], twist[3];
 
   SbStretches(F, U, s, V);
   for (int l = 0; l < SB_BATCH; l++) {
@@ -130,11 +130,11 @@ SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbLane F[
       twist[k][l] = shear + p * s[k][l];
     }
   }
-  SbSpectralTangent((const SbLane *)U, (const SbLane *)V, (const SbLane *)hessian, (const SbLane *)flip,
-                    (const SbLane *)twist, C);
+  SbSpectralTangent((const SbPack *)U, (const SbPack *)V, (const SbPack *)hessian, (const SbPack *)flip,
+                    (const SbPack *)twist, C);
 }
 
-static void tangent_neohookean(const struct _p_SbMaterial *m, const SbLane F[9], SbLane C[81])
+static void tangent_neohookean(const struct _p_SbMaterial *m, const SbPack F[9], SbPack C[81])
 {
   if (m->tangent == SB_TANGENT_EXACT_SPD)
     tangent_spd(m, F, C);
@@ -142,16 +142,16 @@ static void tangent_neohookean(const struct _p_SbMaterial *m, const SbLane F[9],
     tangent_exact(m, F, C);
 }
 
-SB_KERNEL static void volumetric_neohookean(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
-                                            SbLane D[restrict 9])
+SB_KERNEL static void volumetric_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                            SbPack D[restrict 9])
 {
   (void)m;
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], c[9];
 
-    SbLaneGet(9, F, l, f);
+    SbPackGet(9, F, l, f);
     SbMatCofactor(f, c);
-    SbLanePut(9, c, l, D);
+    SbPackPut(9, c, l, D);
   }
 }
 

@@ -192,17 +192,17 @@ static void polar_robust(const PetscReal F[9], PetscReal R[9])
   quaternion_rotation(q, R);
 }
 
-SB_KERNEL void SbPolar(const SbLane F[restrict 9], SbLane R[restrict 9])
+SB_KERNEL void SbPolar(const SbPack F[restrict 9], SbPack R[restrict 9])
 {
-  SbLane trust;
+  SbPack trust;
   PetscReal worst = 1;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], r[9];
 
-    SbLaneGet(9, F, l, f);
+    SbPackGet(9, F, l, f);
     trust[l] = polar_fast(f, r);
-    SbLanePut(9, r, l, R);
+    SbPackPut(9, r, l, R);
   }
   for (int l = 0; l < SB_BATCH; l++) worst = trust[l] > 0 ? worst : 0;
   if (worst > 0) return;
@@ -210,8 +210,8 @@ SB_KERNEL void SbPolar(const SbLane F[restrict 9], SbLane R[restrict 9])
     PetscReal f[9], r[9];
 
     if (trust[l] > 0) continue;
-    SbLaneGet(9, F, l, f);
+    SbPackGet(9, F, l, f);
     polar_robust(f, r);
-    SbLanePut(9, r, l, R);
+    SbPackPut(9, r, l, R);
   }
 }

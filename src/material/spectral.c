@@ -91,29 +91,29 @@ SB_INLINE void sym_eig(const PetscReal S[6], PetscReal s[3], PetscReal V[9])
   s[2] = mean + p * y;
 }
 
-SB_KERNEL void SbSymEig(const SbLane S[restrict 6], SbLane s[restrict 3], SbLane V[restrict 9])
+SB_KERNEL void SbSymEig(const SbPack S[restrict 6], SbPack s[restrict 3], SbPack V[restrict 9])
 {
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal a[6], e[3], v[9];
 
-    SbLaneGet(6, S, l, a);
+    SbPackGet(6, S, l, a);
     sym_eig(a, e, v);
-    SbLanePut(3, e, l, s);
-    SbLanePut(9, v, l, V);
+    SbPackPut(3, e, l, s);
+    SbPackPut(9, v, l, V);
   }
 }
 
-SB_KERNEL void SbStretches(const SbLane F[restrict 9], SbLane U[restrict 9], SbLane s[restrict 3],
-                           SbLane V[restrict 9])
+SB_KERNEL void SbStretches(const SbPack F[restrict 9], SbPack U[restrict 9], SbPack s[restrict 3],
+                           SbPack V[restrict 9])
 {
-  SbLane R[9], S[6];
+  SbPack R[9], S[6];
 
   SbPolar(F, R);
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], r[9], a[9];
 
-    SbLaneGet(9, F, l, f);
-    SbLaneGet(9, R, l, r);
+    SbPackGet(9, F, l, f);
+    SbPackGet(9, R, l, r);
     SbMatTransposeMul(r, f, a);
     S[0][l] = a[0];
     S[1][l] = (a[1] + a[3]) / 2;
@@ -122,21 +122,21 @@ SB_KERNEL void SbStretches(const SbLane F[restrict 9], SbLane U[restrict 9], SbL
     S[4][l] = (a[5] + a[7]) / 2;
     S[5][l] = a[8];
   }
-  SbSymEig((const SbLane *)S, s, V);
+  SbSymEig((const SbPack *)S, s, V);
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal r[9], v[9], u[9];
 
-    SbLaneGet(9, R, l, r);
-    SbLaneGet(9, V, l, v);
+    SbPackGet(9, R, l, r);
+    SbPackGet(9, V, l, v);
     SbMatMul(r, v, u);
-    SbLanePut(9, u, l, U);
+    SbPackPut(9, u, l, U);
   }
 }
 
 /* E[m] = root of eigenvalue m times its matrix, for the twist and the flip of the axes i and j. */
-SB_KERNEL static void shear_modes(const SbLane U[restrict 9], const SbLane V[restrict 9], int i, int j,
-                                  const SbLane flip, const SbLane twist, SbLane Eflip[restrict 9],
-                                  SbLane Etwist[restrict 9])
+SB_KERNEL static void shear_modes(const SbPack U[restrict 9], const SbPack V[restrict 9], int i, int j,
+                                  const SbPack flip, const SbPack twist, SbPack Eflip[restrict 9],
+                                  SbPack Etwist[restrict 9])
 {
   for (int l = 0; l < SB_BATCH; l++) {
     const PetscReal f = sqrt(flip[l] > 0 ? flip[l] / 2 : 0), t = sqrt(twist[l] > 0 ? twist[l] / 2 : 0);
@@ -153,8 +153,8 @@ SB_KERNEL static void shear_modes(const SbLane U[restrict 9], const SbLane V[res
 }
 
 /* The same for the stretch with eigenvalue m and eigenvector Q[.][k] of the Hessian. */
-SB_KERNEL static void stretch_mode(const SbLane U[restrict 9], const SbLane V[restrict 9], const SbLane m,
-                                   const SbLane Q[restrict 9], int k, SbLane E[restrict 9])
+SB_KERNEL static void stretch_mode(const SbPack U[restrict 9], const SbPack V[restrict 9], const SbPack m,
+                                   const SbPack Q[restrict 9], int k, SbPack E[restrict 9])
 {
   for (int l = 0; l < SB_BATCH; l++) {
     const PetscReal root = sqrt(m[l] > 0 ? m[l] : 0), q0 = root * Q[k][l], q1 = root * Q[3 + k][l],
@@ -169,18 +169,18 @@ SB_KERNEL static void stretch_mode(const SbLane U[restrict 9], const SbLane V[re
   }
 }
 
-SB_KERNEL void SbSpectralTangent(const SbLane U[restrict 9], const SbLane V[restrict 9],
-                                 const SbLane hessian[restrict 6], const SbLane flip[restrict 3],
-                                 const SbLane twist[restrict 3], SbLane C[restrict 81])
+SB_KERNEL void SbSpectralTangent(const SbPack U[restrict 9], const SbPack V[restrict 9],
+                                 const SbPack hessian[restrict 6], const SbPack flip[restrict 3],
+                                 const SbPack twist[restrict 3], SbPack C[restrict 81])
 {
-  SbLane m[3], Q[9], E[9][9];
+  SbPack m[3], Q[9], E[9][9];
 
   for (int k = 0; k < 3; k++) shear_modes(U, V, (k + 1) % 3, (k + 2) % 3, flip[k], twist[k], E[k], E[3 + k]);
   SbSymEig(hessian, m, Q);
-  for (int k = 0; k < 3; k++) stretch_mode(U, V, m[k], (const SbLane *)Q, k, E[6 + k]);
+  for (int k = 0; k < 3; k++) stretch_mode(U, V, m[k], (const SbPack *)Q, k, E[6 + k]);
   for (int ij = 0; ij < 9; ij++) {
     for (int kl = ij; kl < 9; kl++) {
-      SbLane c;
+      SbPack c;
 
       for (int l = 0; l < SB_BATCH; l++) {
         PetscReal sum = E[0][ij][l] * E[0][kl][l];

@@ -10,14 +10,14 @@
 #include "material_impl.h"
 
 /* f = F of lane l, e = Green's strain. */
-SB_INLINE void green_strain(const SbLane F[9], int l, PetscReal f[9], PetscReal e[9])
+SB_INLINE void green_strain(const SbPack F[9], int l, PetscReal f[9], PetscReal e[9])
 {
-  SbLaneGet(9, F, l, f);
+  SbPackGet(9, F, l, f);
   SbMatTransposeMul(f, f, e);
   for (int k = 0; k < 9; k++) e[k] = (e[k] - (k % 4 == 0)) / 2;
 }
 
-SB_KERNEL static void energy_stvk(const struct _p_SbMaterial *m, const SbLane F[restrict 9], SbLane psi)
+SB_KERNEL static void energy_stvk(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack psi)
 {
   const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
 
@@ -30,8 +30,8 @@ SB_KERNEL static void energy_stvk(const struct _p_SbMaterial *m, const SbLane F[
   }
 }
 
-SB_KERNEL static void stress_stvk(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
-                                  SbLane P[restrict 9])
+SB_KERNEL static void stress_stvk(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                  SbPack P[restrict 9])
 {
   const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
 
@@ -42,11 +42,11 @@ SB_KERNEL static void stress_stvk(const struct _p_SbMaterial *m, const SbLane F[
     const PetscReal pressure = lambda * (e[0] + e[4] + e[8]);
     for (int k = 0; k < 9; k++) e[k] = 2 * mu * e[k] + (k % 4 == 0 ? pressure : 0);
     SbMatMul(f, e, p);
-    SbLanePut(9, p, l, P);
+    SbPackPut(9, p, l, P);
   }
 }
 
-SB_KERNEL static void pressure_stvk(const struct _p_SbMaterial *m, const SbLane F[restrict 9], SbLane p)
+SB_KERNEL static void pressure_stvk(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack p)
 {
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], e[9];
@@ -56,11 +56,11 @@ SB_KERNEL static void pressure_stvk(const struct _p_SbMaterial *m, const SbLane 
   }
 }
 
-SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
-                                    SbLane C[restrict 81])
+SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                    SbPack C[restrict 81])
 {
   const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
-  SbLane S[9], B[9]; /* B = mu F F^T */
+  SbPack S[9], B[9]; /* B = mu F F^T */
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], e[9], b[9];
@@ -77,7 +77,7 @@ SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbLane 
     for (int kl = ij; kl < 9; kl++) {
       const int i = ij / 3, j = ij % 3, k = kl / 3, n = kl % 3;
       const PetscReal same_row = i == k, same_column = j == n;
-      SbLane c;
+      SbPack c;
 
       for (int l = 0; l < SB_BATCH; l++) {
         c[l] = lambda * F[ij][l] * F[kl][l] + mu * F[3 * i + n][l] * F[3 * k + j][l] +
@@ -88,11 +88,11 @@ SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbLane 
   }
 }
 
-SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
-                                  SbLane C[restrict 81])
+SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                  SbPack C[restrict 81])
 {
   const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
-  SbLane U[9], V[9], s[3], hessian[6], flip[3], twist[3];
+  SbPack U[9], V[9], s[3], hessian[6], flip[3], twist[3];
 
   SbStretches(F, U, s, V);
   for (int l = 0; l < SB_BATCH; l++) {
@@ -111,11 +111,11 @@ SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbLane F[
     twist[1][l] = p + mu * (c * c - c * a + a * a);
     twist[2][l] = p + mu * (a * a - a * b + b * b);
   }
-  SbSpectralTangent((const SbLane *)U, (const SbLane *)V, (const SbLane *)hessian, (const SbLane *)flip,
-                    (const SbLane *)twist, C);
+  SbSpectralTangent((const SbPack *)U, (const SbPack *)V, (const SbPack *)hessian, (const SbPack *)flip,
+                    (const SbPack *)twist, C);
 }
 
-static void tangent_stvk(const struct _p_SbMaterial *m, const SbLane F[9], SbLane C[81])
+static void tangent_stvk(const struct _p_SbMaterial *m, const SbPack F[9], SbPack C[81])
 {
   if (m->tangent == SB_TANGENT_EXACT_SPD)
     tangent_spd(m, F, C);
@@ -124,14 +124,14 @@ static void tangent_stvk(const struct _p_SbMaterial *m, const SbLane F[9], SbLan
 }
 
 /* theta = tr(F^T F - I) / 2 */
-static void volumetric_stvk(const struct _p_SbMaterial *m, const SbLane F[9], SbLane D[9])
+static void volumetric_stvk(const struct _p_SbMaterial *m, const SbPack F[9], SbPack D[9])
 {
   (void)m;
-  memcpy(D, F, 9 * sizeof(SbLane));
+  memcpy(D, F, 9 * sizeof(SbPack));
 }
 
 /* d^2 theta/dF^2 is the identity. */
-static void curvature_stvk(const struct _p_SbMaterial *m, const SbLane F[9], const SbLane p, SbLane C[81])
+static void curvature_stvk(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack p, SbPack C[81])
 {
   const PetscBool filter = (PetscBool)(m->tangent == SB_TANGENT_EXACT_SPD);
 

@@ -32,7 +32,7 @@ PetscErrorCode SbMeshEdges(SbMesh mesh, PetscInt *nedge, PetscInt **edge)
     low[i] = PetscMin(a, b);
     high[i] = PetscMax(a, b);
   }
-  PetscCall(SbGroupByKey(n, low, mesh->nvert, &start, &item));
+  PetscCall(SbBucketByKey(n, low, mesh->nvert, &start, &item));
   *nedge = 0;
   for (PetscInt v = 0; v < mesh->nvert; v++) {
     for (PetscInt i = start[v]; i < start[v + 1]; i++) {

@@ -156,7 +156,7 @@ static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbLocal
   PetscCall(PetscFree2(orig, dest));
   /* ranks of each vertex of the block, ascending */
   for (PetscInt i = 0; i < there.nrecv; i++) got[i] -= first;
-  PetscCall(SbGroupByKey(there.nrecv, got, block, &start, &holder));
+  PetscCall(SbBucketByKey(there.nrecv, got, block, &start, &holder));
   for (PetscInt i = 0; i < there.nrecv; i++) holder[i] = SbRouteSource(&there, holder[i]);
   PetscCall(SbRouteDestroy(&there));
   PetscCall(PetscFree(got));

@@ -4,7 +4,7 @@
 #include "sbkernel.h"
 #include "mesh_impl.h"
 
-const PetscReal SbRatioBounds[SB_RATIO_BINS] = {1, 1.25, 1.5, 2, 3, 5, 10, 100};
+const PetscReal SbRatioBinEdges[SB_RATIO_BINS] = {1, 1.25, 1.5, 2, 3, 5, 10, 100};
 
 /* ------------------------------------------------------------------ groups */
 
@@ -52,7 +52,7 @@ PetscErrorCode SbMeshFileGroup(const SbImport *im, PetscInt i, SbMeshGroup *grou
 
 /* ------------------------------------------------------------------ shape */
 
-PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshFacts *facts)
+PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshStatistics *facts)
 {
   SbFaces faces;
   PetscErrorCode ierr;
@@ -105,7 +105,7 @@ PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshFacts *facts)
       facts->angle[PetscMin((int)(degrees * SB_ANGLE_BINS / 180), SB_ANGLE_BINS - 1)]++;
       min_cosine = PetscMin(min_cosine, cosine[e]);
     }
-    while (bin && ratio < SbRatioBounds[bin]) bin--;
+    while (bin && ratio < SbRatioBinEdges[bin]) bin--;
     facts->ratio[bin]++;
   }
   facts->max_dihedral = acos(PetscMax(-1, min_cosine)) * 180 / PETSC_PI;

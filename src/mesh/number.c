@@ -118,7 +118,7 @@ static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
 
     key[c] = PetscMin(PetscMin(w->local[v[0]], w->local[v[1]]), PetscMin(w->local[v[2]], w->local[v[3]]));
   }
-  PetscCall(SbGroupByKey(p->ncell, key, mesh->nvert, &start, &some));
+  PetscCall(SbBucketByKey(p->ncell, key, mesh->nvert, &start, &some));
   PetscCall(PetscFree(start));
   for (PetscInt i = 0; i < p->ncell; i++) {
     const PetscInt c = some[i];
@@ -126,7 +126,7 @@ static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
     key[i] = (SB_INCLUSION_MAX + 1) * (p->data[c].body + (c < p->ncell_owned ? 0 : mesh->nbody)) +
              inclusion_of(mesh, &p->data[c]);
   }
-  PetscCall(SbGroupByKey(p->ncell, key, 2 * (SB_INCLUSION_MAX + 1) * mesh->nbody, &start, &at));
+  PetscCall(SbBucketByKey(p->ncell, key, 2 * (SB_INCLUSION_MAX + 1) * mesh->nbody, &start, &at));
   for (PetscInt i = 0; i < p->ncell; i++) order[i] = some[at[i]];
   PetscCall(PetscFree(key));
   PetscCall(PetscFree(some));

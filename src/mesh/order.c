@@ -63,7 +63,7 @@ PetscErrorCode SbOrderRCM(PetscInt nvert, PetscInt ncell, const PetscInt cell[],
   Graph g = {.cell = cell};
 
   PetscFunctionBeginUser;
-  PetscCall(SbGroupByKey(4 * ncell, cell, nvert, &g.start, &g.incident));
+  PetscCall(SbBucketByKey(4 * ncell, cell, nvert, &g.start, &g.incident));
   PetscCall(PetscCalloc2(nvert, &g.vert_mark, ncell, &g.cell_mark));
   for (PetscInt v = 0, done = 0; v < nvert; v++) {
     PetscInt n, last, root;

@@ -186,7 +186,7 @@ PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh
     n = 0;
     for (PetscInt c = 0; c < w->ncell; c++)
       if (SbMix(w->data[c].orig) <= bound) centre(w, c, mine[n++]);
-    PetscCall(SbGatherAll(comm, MPIU_REAL, 3 * n, mine, &total, &all, NULL));
+    PetscCall(SbAllgatherv(comm, MPIU_REAL, 3 * n, mine, &total, &all, NULL));
     PetscCall(PetscFree(mine));
     PetscCall(PetscMalloc1(2 * (size_t)size, &tree.node));
     tree.nnode = 1;

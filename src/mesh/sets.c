@@ -1,8 +1,8 @@
 /*
-  sets.c - named sets: their text, and which vertices, facets and cells they hold, as bits.
+  sets.c - named sets: their specification, and which vertices, facets and cells they contain, as bits.
 
   A shape holds the vertices inside it, the boundary facets with all three vertices inside, and the tets with all four.
-  Inside is meant with a slack of 1e-6 times the diagonal of the body, so that a plane through the nodes of a curved or
+  Inside is meant with a tolerance of 1e-6 times the diagonal of the body, so that a plane through the nodes of a curved or
   rotated side finds them. A group of points or curves holds vertices; a group of surfaces holds its triangles (also
   inner ones, seen from both tets) with their vertices; a group of volumes holds its tets, their vertices and their
   boundary facets. Groups of one name and several dimensions are joined.
@@ -60,7 +60,7 @@ PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set)
 
     for (int k = 0; k < NSHAPE; k++) names[k] = shapes[k].name;
     (void)snprintf(word, sizeof(word), "%.*s", (int)strcspn(text, ":"), text);
-    PetscCall(SbNamesAdvise(word, NSHAPE, names, sizeof(all), all));
+    PetscCall(SbSuggestName(word, NSHAPE, names, sizeof(all), all));
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': a set begins with one of %s", option, text, all);
   }
   set->shape = shapes[i].shape;
@@ -277,7 +277,7 @@ static PetscErrorCode empty_group(PetscInt nbody, const SbBody body[], const SbI
       exists += name && is_named(&import[b].group[g], name);
     }
   }
-  PetscCall(SbNearestNames(wanted, n, names, sizeof(near), near));
+  PetscCall(SbSuggestNames(wanted, n, names, sizeof(near), near));
   PetscCall(PetscFree(names));
   // "liver: wall, ligament; stone: none"
   size = sizeof(groups);
@@ -324,7 +324,7 @@ PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport i
 
       PetscCall(PetscMalloc1(nbody, &names));
       for (PetscInt b = 0; b < nbody; b++) names[b] = body[b].name;
-      PetscCall(SbNearestNames(set[k].group, nbody, names, sizeof(near), near));
+      PetscCall(SbSuggestNames(set[k].group, nbody, names, sizeof(near), near));
       PetscCall(PetscFree(names));
       SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "set '%s': there is no body '%s'%s%s%s", set[k].name,
               set[k].group, near[0] ? "; did you mean " : "", near, near[0] ? "?" : "");

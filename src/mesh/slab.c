@@ -1,9 +1,9 @@
 /*
   slab.c - one body read by all ranks: each has a block of the file's tets and keeps a block of its vertices.
 
-  The keeper of a vertex is asked for its position, and knows which ranks' tets use it; there vertices that no tet uses are found, and
-  what belongs to a vertex on several ranks is joined. A face between tets of two ranks is matched by the keeper of its lowest
-  vertex, and so are the edges of the surface. A triangle of a group goes to the keeper of its lowest vertex, and from there to all ranks that use it: one of them has
+  The home rank of a vertex (vertices are dealt to ranks by their numbers, a rendezvous) is asked for its position, and knows which ranks' tets use it; there vertices that no tet uses are found, and
+  what belongs to a vertex on several ranks is joined. A face between tets of two ranks is matched by the home rank of its lowest
+  vertex, and so are the edges of the surface. A triangle of a group goes to the home rank of its lowest vertex, and from there to all ranks that use it: one of them has
   the tet. The parts that tets hang together in on each rank are joined on rank 0, along vertices that several ranks use.
 
   A rank has about as much of the mesh as any other: everything here is of the size of its block, but for the pairs of parts that rank 0 joins (few,
@@ -23,7 +23,7 @@ typedef struct {
   PetscReal *x;      /* [nkept][3] */
   PetscInt *number;  /* [nkept] original number, -1: no tet uses it */
   uint64_t *mask;    /* [nkept] sets */
-  SbRoute vert;      /* vertices of this rank's tets, to their keepers */
+  SbRoute vert;      /* vertices of this rank's tets, to their home ranks */
   PetscInt *used;    /* [im->nvert] their numbers in the file, ascending */
   PetscInt *asked;   /* [vert.nrecv] position of each among those that are kept */
   PetscInt *start;   /* [nkept + 1] */
@@ -31,7 +31,7 @@ typedef struct {
   PetscBool *shared; /* [im->nvert] other ranks use it, too */
 } Slab;
 
-static inline PetscMPIInt keeper(const Slab *s, PetscInt vert)
+static inline PetscMPIInt home(const Slab *s, PetscInt vert)
 {
   return (PetscMPIInt)(vert / s->rows.block);
 }
@@ -46,7 +46,7 @@ static PetscErrorCode sum(const Slab *s, PetscInt n, PetscInt value[])
 /* ------------------------------------------------------------------ vertices */
 
 /* Places and original numbers of the vertices of this rank's tets. */
-static PetscErrorCode ask_keepers(Slab *s)
+static PetscErrorCode ask_home_ranks(Slab *s)
 {
   typedef struct {
     PetscReal x[3];
@@ -58,15 +58,15 @@ static PetscErrorCode ask_keepers(Slab *s)
   PetscInt n = 0, before;
 
   PetscFunctionBeginUser;
-  // the keepers learn who uses their vertices
+  // the home ranks learn who uses their vertices
   PetscCall(PetscMalloc1(im->nvert, &dest));
-  for (PetscInt v = 0; v < im->nvert; v++) dest[v] = keeper(s, s->used[v]);
+  for (PetscInt v = 0; v < im->nvert; v++) dest[v] = home(s, s->used[v]);
   PetscCall(SbRouteCreate(s->comm, im->nvert, dest, &s->vert));
   PetscCall(PetscFree(dest));
   PetscCall(SbRouteSend(&s->vert, sizeof(PetscInt), s->used, &s->asked));
   // who uses the vertices that are kept here, and their original numbers
   for (PetscInt i = 0; i < s->vert.nrecv; i++) s->asked[i] -= s->rows.first;
-  PetscCall(SbGroupByKey(s->vert.nrecv, s->asked, s->nkept, &s->start, &s->user));
+  PetscCall(SbBucketByKey(s->vert.nrecv, s->asked, s->nkept, &s->start, &s->user));
   for (PetscInt i = 0; i < s->vert.nrecv; i++) s->user[i] = SbRouteSource(&s->vert, s->user[i]);
   for (PetscInt v = 0; v < s->nkept; v++) n += s->start[v + 1] > s->start[v];
   PetscCallMPI(MPI_Scan(&n, &before, 1, MPIU_INT, MPI_SUM, s->comm));
@@ -186,7 +186,7 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
   Across *across, *result;
 
   PetscFunctionBeginUser;
-  // counted, then listed: faces with three shared vertices, at the keeper of their lowest one
+  // counted, then listed: faces with three shared vertices, at the home rank of their lowest one
   for (int pass = 0; pass < 2; pass++) {
     if (pass) PetscCall(PetscMalloc3(n, &face, n, &slot, n, &dest));
     n = 0;
@@ -206,12 +206,12 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
         face[n].cell = before + i / 4;
         face[n].number = tets->number[i / 4];
         slot[n] = i;
-        dest[n] = keeper(s, face[n].vert[0]);
+        dest[n] = home(s, face[n].vert[0]);
       }
       n++;
     }
   }
-  // the keepers match them, and say what lies across
+  // the home ranks match them, and say what lies across
   PetscCall(SbRouteCreate(s->comm, n, dest, &route));
   PetscCall(SbRouteSend(&route, sizeof(Face), face, &got));
   PetscCall(PetscMalloc2(route.nrecv, &across, n, &result));
@@ -251,7 +251,7 @@ static PetscErrorCode count_pinched(Slab *s)
 
       edge[2 * at] = s->used[PetscMin(a, b)];
       edge[2 * at + 1] = s->used[PetscMax(a, b)];
-      dest[at] = keeper(s, edge[2 * at]);
+      dest[at] = home(s, edge[2 * at]);
       at++;
     }
   }
@@ -326,7 +326,7 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
 
 /* ------------------------------------------------------------------ points, lines and triangles of groups */
 
-/* Drops items with a vertex that no tet uses; the keepers of the others get the bits of their tag sets. */
+/* Drops items with a vertex that no tet uses; the home ranks of the others get the bits of their tag sets. */
 static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
 {
   SbImport *im = s->im;
@@ -344,11 +344,11 @@ static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
   for (int d = 0; d < 3; d++) {
     for (PetscInt i = 0; i < (d + 1) * im->item[d].n; i++) {
       vert[n] = im->item[d].vert[i];
-      dest[n] = keeper(s, vert[n]);
+      dest[n] = home(s, vert[n]);
       n++;
     }
   }
-  // the keepers say which of them a tet uses
+  // the home ranks say which of them a tet uses
   PetscCall(SbRouteCreate(s->comm, n, dest, &route));
   PetscCall(SbRouteSend(&route, sizeof(PetscInt), vert, &got));
   PetscCall(PetscMalloc1(route.nrecv, &is));
@@ -373,7 +373,7 @@ static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
     if (d == 2) im->nlost += item->n - kept;
     item->n = d == 2 ? kept : 0;
   }
-  // the marks of all ranks come together at the keepers
+  // the marks of all ranks come together at the home ranks
   PetscCall(SbRouteSend(&route, sizeof(uint64_t), mark, &got_mark));
   for (PetscInt i = 0; i < route.nrecv; i++) s->mask[got[i] - s->rows.first] |= got_mark[i];
   PetscCall(PetscFree(got));
@@ -387,7 +387,7 @@ typedef struct {
   PetscInt vert[3], tags;
 } Triangle;
 
-/* Each triangle goes to all ranks that use its lowest vertex, by way of that vertex's keeper. */
+/* Each triangle goes to all ranks that use its lowest vertex, by way of that vertex's home. */
 static PetscErrorCode find_triangles(Slab *s)
 {
   const SbItems *item = &s->im->item[2];
@@ -404,7 +404,7 @@ static PetscErrorCode find_triangles(Slab *s)
     const PetscInt *v = item->vert + 3 * (size_t)i;
 
     mine[i] = (Triangle){{v[0], v[1], v[2]}, item->tags[i]};
-    dest[i] = keeper(s, PetscMin(v[0], PetscMin(v[1], v[2])));
+    dest[i] = home(s, PetscMin(v[0], PetscMin(v[1], v[2])));
   }
   PetscCall(SbRouteCreate(s->comm, item->n, dest, &there));
   PetscCall(SbRouteSend(&there, sizeof(Triangle), mine, &got));
@@ -481,7 +481,7 @@ static PetscErrorCode mark(Slab *s, PetscInt nbody, const SbBody body[], PetscIn
   for (PetscInt i = 0; i < s->vert.nrecv; i++) got[i] = s->mask[s->asked[i]];
   PetscCall(SbRouteReply(&s->vert, sizeof(uint64_t), got, s->part->masks.vert));
   PetscCall(PetscFree(got));
-  /* vertices are counted by their keepers */
+  /* vertices are counted by their home ranks */
   kept = *m;
   kept.vert = s->mask;
   PetscCall(SbSetsCount(s->comm, s->nkept, im->item[3].n, &kept, nset, set));
@@ -541,7 +541,7 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   im->x = NULL;
   PetscCall(PetscFree(im->vert_number));
   im->nvert = n;
-  PetscCall(ask_keepers(s));
+  PetscCall(ask_home_ranks(s));
   largest = SbImportLargest(im);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPIU_REAL, MPI_MAX, s->comm));
   SB_CATCH(&caught, check_cells(s, largest));

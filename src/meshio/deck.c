@@ -56,7 +56,7 @@ PetscErrorCode SbDeckAddRange(SbDeck *d, PetscInt set, int64_t first, int64_t la
   SbDeckRange *before = s->nrange.n ? &s->range[s->nrange.n - 1] : NULL;
 
   PetscFunctionBeginUser;
-  /* labels one by one, as an element gives its set: a range grows. Where one may be missing its place is wanted */
+  /* consecutive labels, as an element gives its set, are merged into one range, except where messages need the line of each */
   if (before && !d->strict && before->set < 0 && before->step == 1 && step == 1 && first == before->last + 1)
     before->last = last;
   else

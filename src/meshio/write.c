@@ -1,5 +1,5 @@
 /*
-  write.c - meshes as files: read and written by their names. A file is written beside its target and renamed when it is whole.
+  write.c - meshes as files: formats by the extension of the name. A file is written under a temporary name and renamed when it is complete.
 */
 #include <errno.h>
 #include <strings.h>

@@ -130,7 +130,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
     if (m->effect[e]->ops.setup) SbEffectCall(m->effect[e], setup, m->space);
     m->linear = (PetscBool)(m->linear && m->effect[e]->linear);
   }
-  PetscCall(SbSpaceFixDone(m->space));
+  PetscCall(SbSpacePrescribeDone(m->space));
   PetscCall(PetscMalloc1(NLIST * m->neffect, &m->lists));
   list = m->lists;
   SORT_INTO_LIST(m, prescribe);
@@ -298,7 +298,7 @@ PetscErrorCode SbModelNonsymmetric(SbModel m, PetscReal t, Vec U, Vec X, Vec Y)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelFilterTangent(SbModel m, PetscBool filter)
+PetscErrorCode SbModelProjectTangent(SbModel m, PetscBool filter)
 {
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < m->nmaterial; k++) {

@@ -11,7 +11,7 @@
   or let go when that takes a pull and it moves beyond; in the next step it is free. Force and elasticity are solved for together, so what
   bounces is all that moves with the point within a step: a body that is stiff against its inertia, sqrt(k/m) h >> 1, bounces as a
   whole. In a soft one the point's share is small, whatever e is; it bounces by its elasticity (Doyen, Ern, Piperno, SIAM J. Sci.
-  Comput. 33, 2011). The effects see to this (src/effect/rebound.h, barrier_bounce.c).
+  Comput. 33, 2011). The effects see to this (src/effect/restitution.h, barrier_bounce.c).
 
   Energy. With W = sum h N v+ over these pairs, D = 1/2 |v1 - v0|^2 in the norm of the mass and S the strain energy, a step of implicit
   Euler gains W - D + C plus the work of the loads, C = S(u1) - S(u0) - f_int(u1) . (u1 - u0); friction and pairs that stay only take. C is

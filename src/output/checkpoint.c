@@ -2,7 +2,7 @@
   Checkpoints: the state of a run in one HDF5 file, from which it goes on as if it had not stopped.
 
   Displacement, velocity and acceleration (the integrator's own) of all nodes in original order and double precision, the step, its time,
-  the next step's length, works and losses so far, and what effects remember (checkpoint_effects.c). A file is written beside its target, flushed and renamed; the newest ones
+  the next step's length, work and dissipation so far, and what effects remember (checkpoint_effects.c). A file is written beside its target, flushed and renamed; the newest ones
   are kept. What makes it fit a run: a hash of the mesh (every coordinate and cell by its original number), and the text of
   the options that decide the mechanics. A checksum over the three vectors detects a file that was damaged later (mesh.c says what both sums are of).
 */
@@ -133,7 +133,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 
   PetscCall(SbOutputOrder(run, out));
   PetscCall(SbLogNamed("Out", "checkpoint", &out->event.checkpoint));
-  PetscCall(PetscLogStagePush(SbStageOutput));
+  PetscCall(PetscLogStagePush(SbLogStageOutput));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CHECKPOINT], 0, 0, 0, 0));
   PetscCall(PetscLogEventBegin(out->event.checkpoint, 0, 0, 0, 0));
   /* a file beside its target, with room for all of it: a full disk shows before anything is written */
@@ -149,7 +149,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscCall(write_vectors(run, out, &h, &checksum));
   PetscCall(SbCheckpointWriteEffects(run, &h, &checksum));
   PetscCall(SbCheckpointWriteMeshes(run, &h, &checksum));
-  /* where in time it is, works and losses so far */
+  /* where in time it is, work and dissipation so far */
   if (run->ts) PetscCall(TSGetTimeStep(run->ts, &times.next));
   numbers_of(run, &times, number);
   for (int i = 0; i < NNUMBER; i++)
@@ -193,7 +193,7 @@ PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out)
   const PetscBool asked = (PetscBool)(out->checkpoint_every > 0. || out->checkpoint_every_steps);
 
   PetscFunctionBeginUser;
-  // A run that is asked to stop writes one, too, with what it knows of works and losses, which are part of the state.
+  // A run that is asked to stop writes one, too, with what it knows of work and dissipation, which are part of the state.
   if (!asked && !run->stop.listens) PetscFunctionReturn(PETSC_SUCCESS);
   if (asked) {
     PetscCall(SbOutputOrder(run, out));

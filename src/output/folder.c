@@ -100,7 +100,7 @@ static PetscErrorCode lock_folder(SbOutput out, size_t nmessage, char message[])
   SbFormat(sizeof(text), text, "process %ld on %s since %s", (long)getpid(), host, out->started);
   if (!ftruncate(out->lock, 0)) (void)!write(out->lock, text, strlen(text));
 
-  SbErrorAtEnd(remove_lock); /* an error leaves the output as it is */
+  SbErrorSetCleanup(remove_lock); /* an error leaves the output as it is */
   PetscCall(PetscStrncpy(locked, path, sizeof(locked)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

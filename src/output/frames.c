@@ -260,7 +260,7 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   PetscCall(SbContactsFind(run, out, step, &contact_bytes));
   PetscCall(SbH5Reserve(&fr->h5, frame_bytes(out, contact_bytes)));
 
-  /* a group that has no name yet, with its time */
+  /* an anonymous group, linked under its name when it is complete, with its time */
   PetscCall(SbH5GroupCreate(&fr->h5, (unsigned)out->nfield + 1, 14, &group));
   PetscCall(SbH5PutReal(&fr->h5, group, "time", time));
   if (run->path) PetscCall(SbH5PutReal(&fr->h5, group, "load_factor", step->t));
@@ -327,7 +327,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   if (!first && !due && !step->last) PetscFunctionReturn(PETSC_SUCCESS);
   /* after a restart the first frame may be in the file */
   if (out->frames->last_step >= step->step) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscLogStagePush(SbStageOutput));
+  PetscCall(PetscLogStagePush(SbLogStageOutput));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
   PetscCall(PetscLogEventBegin(out->event.fields, 0, 0, 0, 0));
   PetscCall(write_frame(run, out, step));

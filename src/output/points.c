@@ -31,8 +31,8 @@ PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out)
   PetscCall(PetscNew(&out->points));
   if (s->vertices) PetscFunctionReturn(PETSC_SUCCESS);
   // the cells around each owned vertex: all of them are local
-  PetscCall(SbGroupByKey(4 * s->mesh->ncell, s->mesh->cell, s->mesh->nvert_owned, &out->points->start,
-                         &out->points->corner));
+  PetscCall(SbBucketByKey(4 * s->mesh->ncell, s->mesh->cell, s->mesh->nvert_owned, &out->points->start,
+                          &out->points->corner));
   PetscCall(PetscMalloc1(out->points->start[s->mesh->nvert_owned], &key));
   for (PetscInt i = 0; i < out->points->start[s->mesh->nvert_owned]; i++)
     key[i] = s->mesh->cell_orig[out->points->corner[i] / 4];

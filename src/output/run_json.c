@@ -9,7 +9,7 @@
 
 void SbPresetName(SbRun run, size_t size, char name[])
 {
-  const char *word = SbTimePresets;
+  const char *word = SbIntegrators;
 
   for (int i = 0; i < (int)run->preset; i++) word = strchr(word, '|') + 1;
   (void)snprintf(name, size, "%.*s", (int)strcspn(word, "|"), word);

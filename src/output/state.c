@@ -217,7 +217,7 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbOutputTakeState(SbRun run)
+PetscErrorCode SbOutputLoadState(SbRun run)
 {
   const SbModel m = run->model;
   const SbOutput out = (SbOutput)run->output;

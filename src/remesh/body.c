@@ -237,7 +237,7 @@ static PetscErrorCode repair_tets(const SbOldMesh *old, const SbRemeshing *how, 
     Stars stars;
 
     // moves inner vertices until all tets are good enough, or nothing helps
-    PetscCall(SbGroupByKey(4 * m->ncell, m->cell, m->nvert, &stars.start, &stars.cells));
+    PetscCall(SbBucketByKey(4 * m->ncell, m->cell, m->nvert, &stars.start, &stars.cells));
     for (PetscInt i = 0; i < 4 * m->ncell; i++) stars.cells[i] /= 4;
     PetscCall(PetscCalloc1(m->nvert, &moved));
     for (int sweep = 0; sweep < SWEEPS && better; sweep++) {
@@ -328,7 +328,7 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
 
     if (other >= 0 && old->region[other] == old->region[s / 4]) (void)SbUnionJoin(component, other, s / 4);
   }
-  nregion = SbUnionNumber(old->ncell, component);
+  nregion = SbUnionLabel(old->ncell, component);
   // the hull: outer surface and interfaces between regions, in the shape that is filled
   for (PetscInt s = 0; s < 4 * old->ncell; s++) ntri += in_hull(old, component, s / 4, s % 4);
   PetscCall(SbSurfaceCreate(old->nvert, ntri, nregion, hull));

@@ -20,7 +20,7 @@ PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed)
     if (!e->ops.save || !e->ops.rename) continue;
     // the records of all ranks, on all of them
     SbEffectCall(e, save, a->space, &nown, &own);
-    PetscCall(SbGatherAll(a->space->comm, MPIU_REAL, nown * e->nstate, own, &total, &records, NULL));
+    PetscCall(SbAllgatherv(a->space->comm, MPIU_REAL, nown * e->nstate, own, &total, &records, NULL));
     n = e->nstate ? total / e->nstate : 0;
     PetscCall(PetscFree(own));
     PetscCall((*e->ops.rename)(e, renamed->n, renamed->from, renamed->to, &n, records));

@@ -339,7 +339,7 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   PetscCall(PetscStrncpy(s.run->solver_reason, old->run->solver_reason, sizeof(s.run->solver_reason)));
   // the state goes from the old scene to the new one
   run = s.run;
-  PetscCall(SbRunContinue(old->run, run));
+  PetscCall(SbRunTransferState(old->run, run));
   PetscCall(SbScatter(&result->next, run));
   PetscCall(SbModelPrescribe(s.model, run->t_now, run->U));
   // keeps the bodies' momenta, and their rates where the integrator carries accelerations
@@ -405,7 +405,7 @@ static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscLogStagePush(SbStageSetup));
+  PetscCall(PetscLogStagePush(SbLogStageSetup));
   PetscCall(PetscLogEventBegin(r->event, 0, 0, 0, 0));
   PetscCall(SbRemeshResultCreate(scene->model->nbody, &result));
   // new meshes on rank 0; all ranks know the messages, numbers and names

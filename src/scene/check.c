@@ -32,7 +32,7 @@ static PetscErrorCode near_files(const char *path, size_t size, char text[])
   while (n < NAMES_MAX && (entry = readdir(dir)))
     PetscCall(PetscStrallocpy(entry->d_name, (char **)&list[n++]));
   (void)closedir(dir);
-  PetscCall(SbNearestNames(name, n, list, sizeof(found), found));
+  PetscCall(SbSuggestNames(name, n, list, sizeof(found), found));
   if (found[0]) PetscCall(PetscSNPrintf(text, size, "%s%s", slash ? folder : "", found));
   for (PetscInt i = 0; i < n; i++) PetscCall(PetscFree(list[i]));
   PetscCall(PetscFree(list));

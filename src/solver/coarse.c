@@ -143,7 +143,7 @@ PetscErrorCode SbCoarseCreate(SbSpace s, PetscInt wanted, PetscBool spread, SbCo
   PetscCallMPI(MPI_Scan(&c->n, &c->first, 1, MPIU_INT, MPI_SUM, s->comm));
   c->first -= c->n;
   /* own nodes by aggregate: agg still counts from 0 on this rank */
-  PetscCall(SbGroupByKey(s->nnode_owned, c->agg, c->n, &c->member_start, &c->member));
+  PetscCall(SbBucketByKey(s->nnode_owned, c->agg, c->n, &c->member_start, &c->member));
   PetscCall(PetscMalloc1(4 * c->n, &c->centre));
   find_positions(c);
   PetscCall(PetscMalloc1(36 * c->n, &c->null));

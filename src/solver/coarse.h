@@ -44,7 +44,7 @@ PetscErrorCode SbCoarseDestroy(SbCoarse *coarse);
 PetscErrorCode SbCoarseSetUp(SbCoarse coarse, Mat A);
 /* c = Z^T r; share: |c|, weighted so that it is about |r| when r is in the span of Z, over |r|; 1 when spread. Collective. */
 PetscErrorCode SbCoarseRestrict(SbCoarse coarse, Vec r, PetscReal *share);
-/* z += Z E^-1 c with the c of the last SbCoarseRestrict(). Collective. */
+/* z += Z E^-1 c, E = Z^T A Z, with the c of the last SbCoarseRestrict(). Collective. */
 PetscErrorCode SbCoarseAdd(SbCoarse coarse, Vec z);
 /* E without values, and what solves with it, once (coarse_solver.c). Collective. */
 PetscErrorCode SbCoarseCreateSolver(SbCoarse coarse);

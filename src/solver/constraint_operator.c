@@ -148,7 +148,7 @@ PetscErrorCode SbPCConstrainedCreate(SbSpace s, PC pc, PC *inner)
 
   PetscFunctionBeginUser;
   *inner = pc;
-  if (!SbConstraintsBeside(s)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!SbConstraintsSeparate(s)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&w));
   w->space = s;
   PetscCall(PCCreate(s->comm, &w->inner));

@@ -3,7 +3,7 @@
   sparse matrix solution", 1992), and solves that read as few bytes as possible.
 
   Each supernode, a group of columns with one pattern (factor_order.c), has a dense front: its entries of A and the updates of its children. LAPACK factors
-  the leading block, BLAS forms the update for the parent. Updates of the roots reach kept nodes only, and go to the Schur complement of these.
+  the leading block, BLAS forms the update for the parent. Nodes may be kept, that is, not eliminated: the updates (contribution blocks) of the roots add up to the Schur complement on them. In exact mode L is stored in double precision.
 
   A solve touches every entry of L twice and does little with it: it is as fast as the memory. Entries are therefore
   kept as 16-bit integers times a scale per column: the rounding, 1.5e-5 of the largest entry of a column, does not change
@@ -16,7 +16,7 @@
   Not handled: indefinite matrices (reported), refinement.
 */
 #include "factor.h"
-#include "packed.h"
+#include "quantized.h"
 #include <petscblaslapack.h>
 
 typedef struct {

@@ -114,7 +114,7 @@ SB_KERNEL static void up(PetscInt nrow, const PetscInt first[restrict], const Pe
   }
 }
 
-/* E: half the sums of the magnitudes in the off-diagonal part of a parallel matrix. */
+/* The diagonal that makes block Jacobi between ranks convergent (l1-Gauss-Seidel, Baker et al. 2011): half the sums of the magnitudes in the off-diagonal part of a parallel matrix. */
 static PetscErrorCode sum_magnitudes(SbSpace s, Mat A, PetscReal extra[])
 {
   const SbPlan p = s->plan;
@@ -183,7 +183,7 @@ PetscErrorCode SbGaussSeidelDown(SbSpace s, Mat A, const PetscReal inverse[], co
   PetscCall(VecRestoreArray(z, &out));
   PetscCall(VecRestoreArrayRead(r, &in));
   PetscCall(SbMatRestoreRead(local, MatSeqSBAIJRestoreArray, &a));
-  PetscCall(SbProductSubtractOther(A, z, t));
+  PetscCall(SbProductSubtractOffDiagonal(A, z, t));
   PetscCall(PetscLogFlops(18. * (double)(p->di[n] + n)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -198,7 +198,7 @@ PetscErrorCode SbGaussSeidelUp(SbSpace s, Mat A, const PetscReal inverse[], cons
   PetscFunctionBeginUser;
   PetscCall(SbProductGetSymmetric(A, &local));
   PetscCall(VecCopy(r, t));
-  PetscCall(SbProductSubtractOther(A, z, t));
+  PetscCall(SbProductSubtractOffDiagonal(A, z, t));
   PetscCall(MatSeqSBAIJGetArray(local, &a));
   PetscCall(VecGetArray(z, &out));
   PetscCall(VecGetArray(t, &b));

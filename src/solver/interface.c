@@ -2,10 +2,10 @@
   The interface between the parts of several ranks, for substructuring.
 
   Without its nodes (interface_nodes.c) those of different ranks are never neighbours, so each rank eliminates its interior, and what is left is a
-  dense matrix S on the interface: the sum of what the ranks leave. Its factorisation S = L L^T is made by block columns that
-  are dealt out to the ranks, and it is applied as S^-1 = W^T W with W = L^-1. Each rank has some rows W_r of the triangle W and adds
+  dense matrix S on the interface: the sum of the ranks' Schur complements. Its factorisation S = L L^T is made by block columns that
+  are distributed cyclically, and it is applied as S^-1 = W^T W with W = L^-1. Each rank has some rows W_r of the triangle W and adds
   W_r^T (W_r b): symmetric and positive definite however W is rounded, which an inverse would not be. Hence W can be of 16-bit integers
-  (packed.h), and as a block of rows is used twice while it is in the cache, the memory is read once: a quarter of the bytes of
+  (quantized.h), and as a block of rows is used twice while it is in the cache, the memory is read once: a quarter of the bytes of
   the inverse in single precision. An application sums two short vectors over the ranks. Ranks with less to do in their interior have
   more rows.
 
@@ -13,7 +13,7 @@
 */
 #include "sbsolver.h"
 #include "rotated.h"
-#include "packed.h"
+#include "quantized.h"
 #include <petscblaslapack.h>
 
 #define BLOCK 48        /* unknowns in a block of rows of W and of columns of L */

@@ -43,7 +43,7 @@ static PetscErrorCode gather_edges(SbSpace s, Cut *cut)
       mine[count++] = s->gnode[i];
     }
   }
-  PetscCall(SbGatherAll(s->comm, MPIU_INT, count, mine, &cut->nedge, &cut->edge, NULL));
+  PetscCall(SbAllgatherv(s->comm, MPIU_INT, count, mine, &cut->nedge, &cut->edge, NULL));
   cut->nedge /= 2;
   PetscCall(PetscFree(mine));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -70,7 +70,7 @@ static PetscErrorCode make_graph(Cut *cut, const PetscInt start[])
   }
   for (PetscInt e = 0; e < 2 * cut->nedge; e++)
     PetscCall(PetscFindInt(cut->edge[e], cut->nnode, cut->node, &cut->edge[e]));
-  PetscCall(SbGroupByKey(2 * cut->nedge, cut->edge, cut->nnode, &cut->ia, &cut->ja));
+  PetscCall(SbBucketByKey(2 * cut->nedge, cut->edge, cut->nnode, &cut->ia, &cut->ja));
   for (PetscInt e = 0; e < 2 * cut->nedge; e++) cut->ja[e] = cut->edge[cut->ja[e] ^ 1];
   PetscFunctionReturn(PETSC_SUCCESS);
 }

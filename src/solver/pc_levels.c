@@ -66,9 +66,9 @@ static PetscErrorCode fix_like(SbSpace from, SbSpace to)
   for (PetscInt i = 0; i < to->nnode_owned; i++) shared[3 * i] = mark[i];
   PetscCall(SbSpaceUpdateGhosts(to, shared));
   for (PetscInt i = 0; i < to->nnode; i++) {
-    if (shared[3 * i] > 0.) PetscCall(SbSpaceFix(to, i, (int)shared[3 * i]));
+    if (shared[3 * i] > 0.) PetscCall(SbSpacePrescribe(to, i, (int)shared[3 * i]));
   }
-  PetscCall(SbSpaceFixDone(to));
+  PetscCall(SbSpacePrescribeDone(to));
   PetscCall(PetscFree2(mark, shared));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

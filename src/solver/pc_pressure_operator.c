@@ -47,8 +47,8 @@ static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar 
     const SbRegion *region = &space->region[r];
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
-      const SbLane *v = (const SbLane *)op->volume.b + 12 * b;
-      SbLane cell_u[12], sum = {0};
+      const SbPack *v = (const SbPack *)op->volume.b + 12 * b;
+      SbPack cell_u[12], sum = {0};
 
       sb_gather_strain(space, region, b, local, cell_u);
       for (int k = 0; k < 12; k++) {
@@ -89,9 +89,9 @@ static PetscErrorCode add_gradient(SbPressureOperator op, const PetscScalar p[],
     const SbRegion *region = &space->region[r];
 
     for (PetscInt b = region->bstart; b < region->bend; b++) {
-      const SbLane *v = (const SbLane *)op->volume.b + 12 * b;
+      const SbPack *v = (const SbPack *)op->volume.b + 12 * b;
       const PetscReal *value = q + space->batch_cell[b];
-      SbLane force[12], lane = {0};
+      SbPack force[12], lane = {0};
 
       for (PetscInt l = 0; l < space->batch_n[b]; l++) lane[l] = value[l];
       for (int k = 0; k < 12; k++) {
@@ -195,7 +195,7 @@ static PetscErrorCode MatGetDiagonal_Pressure(Mat K, Vec D)
     const SbRegion *region = &s->region[r];
 
     for (PetscInt b = region->bstart; b < region->bend; b++) {
-      const SbLane *v = (const SbLane *)op->volume.b + 12 * b;
+      const SbPack *v = (const SbPack *)op->volume.b + 12 * b;
 
       for (PetscInt k = 0; k < 12; k++) {
         for (PetscInt l = 0; l < s->batch_n[b]; l++) {
@@ -349,8 +349,8 @@ PetscErrorCode SbPressureOperatorCreate(SbSpace s, Mat *K)
   PetscCall(SbLevelsCreate(s, &op->levels));
   space = op->space;
   n = space->mesh->ncell_owned;
-  PetscCall(PetscMalloc((size_t)space->nbatch * 14 * sizeof(SbLane) + 64, &op->memory));
-  op->volume.b = (SbLane *)(((uintptr_t)op->memory + 63) & ~(uintptr_t)63);
+  PetscCall(PetscMalloc((size_t)space->nbatch * 14 * sizeof(SbPack) + 64, &op->memory));
+  op->volume.b = (SbPack *)(((uintptr_t)op->memory + 63) & ~(uintptr_t)63);
   op->volume.modulus = op->volume.b + 12 * (size_t)space->nbatch;
   op->volume.shear = op->volume.modulus + space->nbatch;
   PetscCall(PetscMalloc4(n, &op->C, n, &op->Cinv, n, &op->S, n, &op->norm));

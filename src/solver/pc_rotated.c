@@ -27,7 +27,7 @@ typedef struct {
   PetscInt *local;   /* [nnode] inverse, -1 for nodes without part */
   PetscInt *ia, *ja; /* graph of the interior rows */
   SbFactor factor;
-  SbLane *cells;     /* [nbatch][9] rotations, when the operator does not hold them */
+  SbPack *cells;     /* [nbatch][9] rotations, when the operator does not hold them */
   PetscReal *turn;   /* [nnode_owned][9] rotations of the nodes now */
   PetscReal *turn0;  /* and at the factorisation */
   PetscReal *spread; /* [nnode_owned] */
@@ -93,7 +93,7 @@ static PetscErrorCode number_nodes(Rotated *p)
 /* ------------------------------------------------------------------ set-up for a new operator */
 
 /* Rotations of cells that belong to the operator. */
-static PetscErrorCode find_cells(Rotated *p, Mat A, const SbLane **cells)
+static PetscErrorCode find_cells(Rotated *p, Mat A, const SbPack **cells)
 {
   SbSpace s = p->space;
   const PetscReal *u;
@@ -113,7 +113,7 @@ static PetscErrorCode find_cells(Rotated *p, Mat A, const SbLane **cells)
     SbSpaceCellRotations(s, u, p->cells);
     PetscCall(SbSpaceRestoreLocalRead(s, state, &u));
   }
-  *cells = (const SbLane *)p->cells;
+  *cells = (const SbPack *)p->cells;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -204,7 +204,7 @@ static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
 
 static PetscErrorCode PCSetUp_Rotated(PC pc)
 {
-  const SbLane *cells;
+  const SbPack *cells;
   Rotated *p;
   PetscBool ok = PETSC_TRUE;
   Mat A;

@@ -1,6 +1,6 @@
 /*
-  pressure.h - what the parts of the solver for nearly incompressible bodies share: the operator with the pressures of the cells
-  apart, and the preconditioner of what is left (pc_pressure.c says why).
+  pressure.h - what the parts of the solver for nearly incompressible bodies share: the mixed operator, with the pressures of the cells as unknowns,
+  and the preconditioner of its displacement block (pc_pressure.c says why).
 */
 #pragma once
 #include "sbassembly.h"
@@ -12,7 +12,7 @@
 typedef struct _p_SbLevels *SbLevels;
 struct _p_SbLevels {
   SbSpace space; /* borrowed */
-  PetscInt n;    /* 2, or 3 with a DG body */
+  PetscInt n;    /* number of levels: 2, or 3 with a DG body */
   SbSpace at[3]; /* at[0] = space; the others are owned */
   Mat A[3];      /* BAIJ; the last one AIJ */
   SbElement *element[3];
@@ -25,8 +25,9 @@ struct _p_SbLevels {
   Vec r[3], z[3], g[3]; /* work vectors of each level, with ghosts */
   Vec t[3], w[3];       /* and without; t[0] is the diagonal of A[0] with a DG body */
   PetscBool sprung;     /* this rank has springs since the last assembly */
-  PetscReal *spring;    /* [nnode_owned][9] their sum at each node, N/m; NULL before the first one */
-  PetscReal *shared;    /* [nodes of at[n-2]][9] the same there; NULL before the first one of any rank */
+  PetscReal
+    *spring; /* [nnode_owned][9] sum of the springs of effects at each node, N/m; NULL before the first one */
+  PetscReal *shared; /* [nodes of at[n-2]][9] the same there; NULL before the first one of any rank */
   KSP coarse;
   PetscReal *inverse; /* [nodes of at[n-2]][9] inverses of the diagonal blocks there, m/N */
 };

@@ -515,7 +515,7 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(KSPSetTolerances(ksp, 1e-8, PETSC_DEFAULT, PETSC_DEFAULT, 5000));
   /* in a null space the residual of CG may grow a long way before it falls */
-  if (SbConstraintsBeside(s))
+  if (SbConstraintsSeparate(s))
     PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, PETSC_DEFAULT, 1e10, PETSC_DEFAULT));
   PetscCall(SbPCConstrainedCreate(s, pc, &pc));
   /* the row, and over it the types of the user's */
@@ -627,7 +627,7 @@ static PetscErrorCode check_method(SbSpace s, KSP ksp, PC pc, const SbSolverPres
              "-ksp_type preonly takes the preconditioner for the inverse, which %s %s is not: choose "
              "-pc_type cholesky or lu, or a -ksp_type that iterates (cg, minres, gmres)",
              strcmp(type, PCSHELL) ? "-pc_type" : "-solver", strcmp(type, PCSHELL) ? type : preset->name);
-  PetscCheck(!SbConstraintsBeside(s) || s->constraints->saddle == SB_SADDLE_DIRECT, s->comm, PETSC_ERR_USER,
+  PetscCheck(!SbConstraintsSeparate(s) || s->constraints->saddle == SB_SADDLE_DIRECT, s->comm, PETSC_ERR_USER,
              "-ksp_type preonly does not hold the contact constraints, which stand beside the matrix: "
              "choose -ksp_type cg or fgmres");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -646,7 +646,7 @@ PetscErrorCode SbSolverFinish(SNES snes, SbSpace s, const SbSolverPreset *preset
   PetscCall(SNESGetKSP(snes, &ksp));
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(SbPCConstrainedGetInner(pc, &pc));
-  if (SbConstraintsBeside(s)) {
+  if (SbConstraintsSeparate(s)) {
     PetscCall(PCSetOperators(pc, P, P));
     PetscCall(PCSetFromOptions(pc));
   }
@@ -658,7 +658,7 @@ PetscErrorCode SbSolverFinish(SNES snes, SbSpace s, const SbSolverPreset *preset
   PetscCall(SNESGetJacobian(snes, &A, NULL, NULL, NULL));
   PetscCall(is_symmetric(ksp, &symmetric));
   PetscCall(PetscObjectTypeCompareAny((PetscObject)ksp, &single, KSPRICHARDSON, KSPPREONLY, ""));
-  if (A && A != P && !SbConstraintsBeside(s) && (symmetric || single)) {
+  if (A && A != P && !SbConstraintsSeparate(s) && (symmetric || single)) {
     PetscCall(KSPSetType(ksp, KSPFGMRES));
     PetscCall(PetscOptionsGetInt(NULL, NULL, "-ksp_gmres_restart", &restart, NULL));
     PetscCall(KSPGMRESSetRestart(ksp, restart));

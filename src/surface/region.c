@@ -48,12 +48,12 @@ typedef struct {
   PetscInt nshell, nsurface;
   Shell *shells;
   Surface *surfaces;
-} Space;
+} Arrangement;
 
 /* ------------------------------------------------------------------ orientation */
 
 /* Reverses the minority of each set of triangles that are connected by edges of two. */
-static PetscErrorCode reverse_minority(Space *s, const PetscInt across[], int sense[], PetscInt stack[])
+static PetscErrorCode reverse_minority(Arrangement *s, const PetscInt across[], int sense[], PetscInt stack[])
 {
   PetscFunctionBeginUser;
   for (PetscInt f = 0; f < s->t->ntri; f++) {
@@ -105,7 +105,7 @@ static PetscErrorCode reverse_minority(Space *s, const PetscInt across[], int se
 }
 
 /* Orients the triangles of each surface alike, for formats with orientation. */
-static PetscErrorCode orient_alike(Space *s)
+static PetscErrorCode orient_alike(Arrangement *s)
 {
   PetscInt *across, *stack;
   int *sense;
@@ -194,7 +194,7 @@ static PetscErrorCode join_at_edge(const SbTriangles *t, PetscInt n, const SbTri
 }
 
 /* Shells from sides that face each other, surfaces from triangles that share an edge. */
-static PetscErrorCode find_shells(Space *s)
+static PetscErrorCode find_shells(Arrangement *s)
 {
   const PetscInt n = 3 * s->t->ntri;
 
@@ -209,8 +209,8 @@ static PetscErrorCode find_shells(Space *s)
       (void)SbUnionJoin(s->surface, s->edge[i].slot / 3, s->edge[i + k].slot / 3);
   }
   // numbers from 0 on
-  s->nshell = SbUnionNumber(2 * s->t->ntri, s->shell);
-  s->nsurface = SbUnionNumber(s->t->ntri, s->surface);
+  s->nshell = SbUnionLabel(2 * s->t->ntri, s->shell);
+  s->nsurface = SbUnionLabel(s->t->ntri, s->surface);
   PetscCheck(s->nsurface <= PARTS_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: the surface consists of %" PetscInt_FMT
              " parts; supple takes up to %d: remove the specks around it (meshlab: remove isolated pieces)",
@@ -219,7 +219,7 @@ static PetscErrorCode find_shells(Space *s)
 }
 
 /* Volume, area and box of every shell; every surface has one shell with a negative volume. */
-static PetscErrorCode measure_shells(Space *s)
+static PetscErrorCode measure_shells(Arrangement *s)
 {
   const SbTriangles *t = s->t;
   PetscReal longest2, around;
@@ -259,7 +259,7 @@ static PetscErrorCode measure_shells(Space *s)
 /* ------------------------------------------------------------------ nesting */
 
 /* The smallest positive shell around a point, not of the surface `except`; OUTSIDE when there is none. */
-static PetscInt shell_around(const Space *s, const PetscReal o[3], PetscInt except)
+static PetscInt shell_around(const Arrangement *s, const PetscReal o[3], PetscInt except)
 {
   PetscInt best = OUTSIDE;
 
@@ -280,13 +280,13 @@ static PetscInt shell_around(const Space *s, const PetscReal o[3], PetscInt exce
 }
 
 /* Whether the outer side of a surface is the front of its triangles. */
-static PetscBool turned_outwards(const Space *s, PetscInt k)
+static PetscBool turned_outwards(const Arrangement *s, PetscInt k)
 {
   return (PetscBool)(s->shell[2 * s->surfaces[k].first] == s->surfaces[k].outer);
 }
 
 /* How many surfaces are around a surface. */
-static PetscInt depth_of(const Space *s, PetscInt k)
+static PetscInt depth_of(const Arrangement *s, PetscInt k)
 {
   PetscInt depth = 0;
 
@@ -295,7 +295,7 @@ static PetscInt depth_of(const Space *s, PetscInt k)
 }
 
 /* Cavities, for formats with orientation. Surfaces within an outermost one with inward normals are taken as reversed with it. */
-static PetscErrorCode empty_cavities(Space *s)
+static PetscErrorCode empty_cavities(Arrangement *s)
 {
   PetscInt deepest = 0;
 
@@ -327,7 +327,7 @@ static PetscErrorCode empty_cavities(Space *s)
 /* ------------------------------------------------------------------ the result */
 
 /* The groups that all triangles of a shell belong to: group[n], n at most 16. */
-static PetscErrorCode groups_of_shell(const Space *s, PetscInt shell, PetscInt *n, PetscInt group[16])
+static PetscErrorCode groups_of_shell(const Arrangement *s, PetscInt shell, PetscInt *n, PetscInt group[16])
 {
   const SbImport *im = s->f->groups;
   PetscInt last = -1; /* the tag set of the triangle before, which has been examined */
@@ -357,7 +357,7 @@ static PetscErrorCode groups_of_shell(const Space *s, PetscInt shell, PetscInt *
 }
 
 /* Every region is region_1, ...; also NAME_region when its outer limit lies in the group NAME; and what the file says. */
-static PetscErrorCode name_regions(const Space *s, SbSurface *out)
+static PetscErrorCode name_regions(const Arrangement *s, SbSurface *out)
 {
   SbImport *im = s->f->groups;
   char name[SB_GROUP_MAX];
@@ -387,7 +387,7 @@ static PetscErrorCode name_regions(const Space *s, SbSurface *out)
 }
 
 /* All of it, in the order of the head of this file. */
-static PetscErrorCode find_regions(Space *s, SbSurface *out)
+static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
 {
   PetscInt n, kept = 0;
   const SbTriangles *t = s->t;
@@ -487,7 +487,7 @@ static PetscErrorCode find_regions(Space *s, SbSurface *out)
 
 PetscErrorCode SbSurfaceFindRegions(SbTriangleFile *f, SbSurfaceRepairs *m, SbSurface *out)
 {
-  Space s = {.f = f, .t = f->t, .m = m};
+  Arrangement s = {.f = f, .t = f->t, .m = m};
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;

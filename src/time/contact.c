@@ -43,7 +43,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
   const SNES snes = run->snes;
   const PetscReal t = step->t, dt = step->dt;
   const Vec U0 = step->U0, U = step->U;
-  const PetscBool projected = (PetscBool)(m->space->constraints && !SbConstraintsBeside(m->space));
+  const PetscBool projected = (PetscBool)(m->space->constraints && !SbConstraintsSeparate(m->space));
   PetscBool again = PETSC_TRUE, given_up, rough, constrained;
   PetscReal size, least = 0;
   Aim aim;

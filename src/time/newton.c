@@ -33,15 +33,15 @@
 #include "sbsolver.h"
 #include "time_impl.h"
 
-#define DECREASE 1e-4   /* c above */
-#define SHORTEST 1e-7   /* of a step, before the search gives up */
-#define ROUNDING 1e-11  /* of the terms that E's change is the difference of */
-#define NOTHING 1e-6    /* of E's rounding: what a step promises to lower E by at its solution */
-#define ACCURATE 1e-6   /* relative tolerance of a linear solve whose step has to come back */
-#define APPROACHES 50   /* steps in which what moves by order has to arrive */
-#define DIFFERENCE 1e-7 /* of that motion, for its derivative */
+#define DECREASE 1e-4   /* Armijo's constant, c above */
+#define SHORTEST 1e-7   /* shortest fraction of a step that the line search tries */
+#define ROUNDING 1e-11  /* relative rounding of the terms of E */
+#define NOTHING 1e-6    /* relative to E's rounding: predicted decrease that counts as none */
+#define ACCURATE 1e-6   /* relative tolerance of linear solves whose direction is used again */
+#define APPROACHES 50   /* iterations in which prescribed motions have to be completed */
+#define DIFFERENCE 1e-7 /* fraction of a prescribed motion, for finite differences by it */
 #define SETTLED \
-  1e-4 /* of the speed of the time step (src/model/guard.c): a step that is short enough, where surfaces push each other */
+  1e-4 /* of the speed of the time step (src/model/potential.c): a step that is short enough, where surfaces push each other */
 #define STICKING 1e-2 /* of that, with friction, whose forces follow from as small speeds */
 #define SETTLED_STATIC \
   1e-7 /* of the smallest body's size: the same in a static run, whose forces are all that is asked for */
@@ -49,16 +49,17 @@
   1e-8 /* of that size: no step of a whole time step need be shorter, however short these are */
 #define SETTLED_GAP \
   1e-2 /* of the width below which surfaces push each other: how much the last step may change gaps */
-#define EARLY 10         /* iterations in which friction follows normal forces at once */
+#define EARLY 10         /* iterations in which friction is not lagged: normal forces are updated in each */
 #define SHIFT 0.1        /* of the shift by inertia: the least one of a tangent that is not definite */
-#define SHIFT_STIFF 1e-4 /* the same, of the mean stiffness by mass */
-#define SHIFTS 8         /* so often by SHIFT_MORE before cells are filtered */
+#define SHIFT_STIFF 1e-4 /* the same, relative to the mean ratio of stiffness and mass */
+#define SHIFTS 8         /* tries, each with a shift SHIFT_MORE times as large, before cells are projected */
 #define SHIFT_MORE 4.
-#define WALL 0.5      /* of the slope of E at first: where more of it is left, a longer step is tried */
-#define FARTHER 4.    /* so many times, behind a whole one */
-#define TRIES 5       /* of these */
-#define STEEP 0.01    /* of the slope of the quadratic model: the least of E along a direction */
-#define PROVISIONAL 1 /* steps that may follow each other while E is above where they began */
+#define WOLFE \
+  0.5 /* curvature condition: where the slope of E stays above this fraction of the first one, a longer step is tried */
+#define FARTHER 4.    /* factor on a whole step, the first longer one */
+#define TRIES 5       /* longer steps, at most */
+#define STEEP 0.01    /* of the slope of the quadratic model: least slope of E along a direction */
+#define PROVISIONAL 1 /* non-monotone steps that may follow each other while E is above where they began */
 
 /* What a solve keeps from iteration to iteration. */
 typedef struct {
@@ -113,7 +114,7 @@ static PetscErrorCode evaluate_at(Newton *n, Vec X, Vec F, Vec Y, Iterate *at)
     PetscReal energy, along;
 
     PetscCall(VecZeroEntries(n->contact));
-    PetscCall(SbModelGuardGradient(run->model, X, run->guard_weight, PETSC_TRUE, &energy, n->contact));
+    PetscCall(SbModelPotentialGradient(run->model, X, run->guard_weight, PETSC_TRUE, &energy, n->contact));
     PetscCall(VecDot(n->contact, Y, &along));
     at->gaps = run->guard_weight * energy;
     at->psi += at->gaps;
@@ -132,7 +133,7 @@ static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
   PetscFunctionBeginUser;
   n->blocks.n = n->nblock = 0;
   if (m->npotential) {
-    PetscCall(SbModelGuardHessian(m, snes->vec_sol, n->kind, &n->blocks, n->contact));
+    PetscCall(SbModelPotentialHessian(m, snes->vec_sol, n->kind, &n->blocks, n->contact));
     PetscCall(VecAYPX(n->contact, n->run->guard_weight, snes->vec_func));
     for (PetscInt k = 0; k < n->blocks.n; k++) {
       for (int i = 0; i < 9; i++) n->blocks.block[k][i] *= n->run->guard_weight;
@@ -199,7 +200,7 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
   PetscFunctionBeginUser;
   n->shift = 0.;
   for (;;) {
-    PetscCall(SbModelFilterTangent(m, *filtered));
+    PetscCall(SbModelProjectTangent(m, *filtered));
     PetscCall(SNESComputeJacobian(snes, X, snes->jacobian, snes->jacobian_pre));
     if (shift > 0.) {
       if (least == 0.) PetscCall(least_shift(snes, &least));
@@ -211,9 +212,9 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
     *slope = -*slope;
     /* friction that is taken for one that sticks has a right-hand side of its own: the direction has to go down E as well */
     if (n->nblock) PetscCall(VecDot(n->contact, Y, &modelled));
-    if (n->nblock && n->kind != SB_HESSIAN_ABOVE &&
+    if (n->nblock && n->kind != SB_HESSIAN_MAJORIZED &&
         (reason < 0 || *slope >= -STEEP * PetscMax(modelled, 0.))) {
-      n->kind = n->kind == SB_HESSIAN_EXACT ? SB_HESSIAN_CLAMPED : SB_HESSIAN_ABOVE;
+      n->kind = n->kind == SB_HESSIAN_EXACT ? SB_HESSIAN_PROJECTED : SB_HESSIAN_MAJORIZED;
       continue;
     }
     if (n->nblock && m->may_filter && !*filtered && (reason < 0 || *slope >= 0.) && shifts++ < SHIFTS) {
@@ -322,7 +323,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
     else if (guarded && slope < 0. && (to.gaps > from.gaps || best.s > 0.))
       high = *s;
     if (guarded && enough) {
-      flat = (PetscBool)(to.slope >= WALL * slope);
+      flat = (PetscBool)(to.slope >= WOLFE * slope);
       if (best.s == 0. || change < best.change) {
         PetscCall(VecSwap(n->W, n->kept[0]));
         PetscCall(VecSwap(n->G, n->kept[1]));
@@ -339,7 +340,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
           far = 0.5 * (low + high);
         else if (*s >= 1.) {
           PetscCall(VecScale(Y, FARTHER * *s));
-          PetscCall(SbModelGuardSafe(m, X, Y, 1., &far, &nactive));
+          PetscCall(SbModelPotentialMaxStep(m, X, Y, 1., &far, &nactive));
           PetscCall(VecScale(Y, 1. / (FARTHER * *s)));
           if (far < 1.) tries = TRIES;
           far = far > 1.5 / FARTHER ? FARTHER * far * *s : 0.;
@@ -363,7 +364,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
       PetscCall(solve_accurately(snes, &slope, &better));
       if (better) {
         if (m->npotential)
-          PetscCall(SbModelGuardSafe(m, X, Y, 1., s, &nactive)); /* another way than before */
+          PetscCall(SbModelPotentialMaxStep(m, X, Y, 1., s, &nactive)); /* another way than before */
         PetscCall(evaluate_at(n, X, F, Y, &from));
         continue;
       }
@@ -436,15 +437,15 @@ static PetscErrorCode approach(SNES snes)
   PetscInt nactive, inverted, before;
 
   PetscFunctionBeginUser;
-  PetscCall(SbModelGuardAdvance(m, 0.));
+  PetscCall(SbModelPotentialAdvance(m, 0.));
   PetscCall(VecWAXPY(Y, -1., X, start));
-  PetscCall(SbModelGuardSafe(m, start, Y, 1., &part, &nactive));
+  PetscCall(SbModelPotentialMaxStep(m, start, Y, 1., &part, &nactive));
   if (part == 1. && !nactive) {
-    PetscCall(SbModelGuardAdvance(m, 1.));
+    PetscCall(SbModelPotentialAdvance(m, 1.));
     PetscCall(VecZeroEntries(Y));
-    PetscCall(SbModelGuardSafe(m, X, Y, 1., &part, &nactive));
+    PetscCall(SbModelPotentialMaxStep(m, X, Y, 1., &part, &nactive));
     if (!nactive) PetscFunctionReturn(PETSC_SUCCESS);
-    PetscCall(SbModelGuardAdvance(m, 0.));
+    PetscCall(SbModelPotentialAdvance(m, 0.));
   }
   PetscCall(prescribed_way(m->space, X, start, D));
   PetscCall(VecCopy(start, X));
@@ -455,29 +456,29 @@ static PetscErrorCode approach(SNES snes)
     /* all the rest at once */
     PetscCall(VecCopy(D, Y));
     PetscCall(VecScale(Y, progress - 1.));
-    PetscCall(SbModelGuardSafe(m, X, Y, 1., &part, &nactive));
+    PetscCall(SbModelPotentialMaxStep(m, X, Y, 1., &part, &nactive));
     if (part == 1.) {
       PetscCall(VecAXPY(X, -1., Y));
-      PetscCall(SbModelGuardAdvance(m, 1.));
+      PetscCall(SbModelPotentialAdvance(m, 1.));
       PetscFunctionReturn(PETSC_SUCCESS);
     }
 
     /* as far as it goes when bodies give way */
     PetscCall(SNESComputeFunction(snes, X, F));
     PetscCall(VecWAXPY(n->W, DIFFERENCE, D, X));
-    PetscCall(SbModelGuardAdvance(m, progress + DIFFERENCE));
+    PetscCall(SbModelPotentialAdvance(m, progress + DIFFERENCE));
     PetscCall(SNESComputeFunction(snes, n->W, n->G));
-    PetscCall(SbModelGuardAdvance(m, progress));
+    PetscCall(SbModelPotentialAdvance(m, progress));
     PetscCall(VecAXPY(n->G, -1., F));
     PetscCall(VecAXPY(F, (1. - progress) / DIFFERENCE, n->G));
     PetscCall(find_direction(snes, &filtered, &slope));
     if (snes->reason) PetscFunctionReturn(PETSC_SUCCESS);
     PetscCall(VecAXPY(Y, progress - 1., D));
-    PetscCall(SbModelGuardSafe(m, X, Y, 1., &s, &nactive));
+    PetscCall(SbModelPotentialMaxStep(m, X, Y, 1., &s, &nactive));
     PetscCall(SbModelStrainEnergyAlong(m, X, Y, &unused[0], &unused[1], &before));
     for (;; s *= 0.5) {
       PetscCall(VecWAXPY(n->W, -s, Y, X));
-      PetscCall(SbModelGuardAdvance(m, progress + s * (1. - progress)));
+      PetscCall(SbModelPotentialAdvance(m, progress + s * (1. - progress)));
       PetscCall(SbModelStrainEnergyAlong(m, n->W, Y, &unused[0], &unused[1], &inverted));
       if (s < SHORTEST || (inverted <= before && !PetscIsInfOrNanReal(unused[0]))) break;
     }
@@ -540,7 +541,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   snes->iter = 0;
   n->provisional = 0;
   n->nblock = 0;
-  n->kind = SB_HESSIAN_CLAMPED;
+  n->kind = SB_HESSIAN_PROJECTED;
   n->shift = 0.;
   if (guarded) PetscCall(approach(snes));
   if (snes->reason) PetscFunctionReturn(PETSC_SUCCESS);
@@ -563,11 +564,11 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     /* where to, and how far */
     PetscCall(find_direction(snes, &filtered, &slope));
     s = 1.;
-    if (guarded && !snes->reason) PetscCall(SbModelGuardSafe(n->run->model, X, Y, 1., &s, &nactive));
+    if (guarded && !snes->reason) PetscCall(SbModelPotentialMaxStep(n->run->model, X, Y, 1., &s, &nactive));
     if (!snes->reason) PetscCall(search(snes, slope, &s));
     if (snes->reason) break;
     if (s >= 1.) filtered = PETSC_FALSE;
-    n->kind = s < 1. ? SB_HESSIAN_CLAMPED : SB_HESSIAN_EXACT;
+    n->kind = s < 1. ? SB_HESSIAN_PROJECTED : SB_HESSIAN_EXACT;
 
     /* whether that is near enough */
     snes->iter++;
@@ -583,7 +584,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     if (guarded && (snes->reason > 0 || (!snes->reason && snes->iter <= EARLY))) {
       PetscBool again;
 
-      PetscCall(SbModelGuardLag(n->run->model, X, (PetscBool)(snes->reason > 0), &again));
+      PetscCall(SbModelPotentialUpdateFriction(n->run->model, X, (PetscBool)(snes->reason > 0), &again));
       if (!again) continue;
       snes->reason = SNES_CONVERGED_ITERATING;
       first = snes->iter;
@@ -692,6 +693,6 @@ PetscErrorCode SbNewtonSetRun(SNES snes, SbRun run)
   PetscCheck(ours || !m->npotential, m->comm, PETSC_ERR_USER_INPUT,
              "-snes_type %s does not keep surfaces apart: with contact of response barrier leave it out",
              ((PetscObject)snes)->type_name);
-  PetscCall(SbModelFilterTangent(m, (PetscBool)!ours));
+  PetscCall(SbModelProjectTangent(m, (PetscBool)!ours));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -112,7 +112,7 @@ static PetscErrorCode SNESTSFormFunction_SecondOrder(SNES snes, Vec X, Vec F, TS
   PetscCall(TSComputeI2Function(ts, t, U, V, A, F));
   if (so->set.alpha_f != 1.) PetscCall(VecScale(F, 1. / so->set.alpha_f));
   if (so->run->model->guard_apart)
-    PetscCall(SbModelGuardGradient(so->run->model, X, so->run->guard_weight, PETSC_TRUE, NULL, F));
+    PetscCall(SbModelPotentialGradient(so->run->model, X, so->run->guard_weight, PETSC_TRUE, NULL, F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -216,7 +216,7 @@ static PetscErrorCode separate_contact(TS ts)
 
   PetscFunctionBeginUser;
   PetscCall(VecZeroEntries(so->work));
-  PetscCall(SbModelGuardGradient(so->run->model, so->X1, -1., PETSC_TRUE, NULL, so->work));
+  PetscCall(SbModelPotentialGradient(so->run->model, so->X1, -1., PETSC_TRUE, NULL, so->work));
   PetscCall(VecGetArray(so->work, &push));
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
     push[i] = s->node_mass[i / 3] > 0. ? push[i] / s->node_mass[i / 3] : 0.;
@@ -255,7 +255,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
     if (reason == SNES_DIVERGED_LINEAR_SOLVE)
       PetscCall(SbSolverListExplain(so->run, sizeof(why), why));
     else
-      PetscCall(SbModelGuardNearest(so->run->model, sizeof(why), why));
+      PetscCall(SbModelPotentialNearest(so->run->model, sizeof(why), why));
     PetscCall(SbRunFail(so->run, "step %" PetscInt_FMT " at t = %g s with a length of %g s: %s%s%s",
                         ts->steps + 1, (double)ts->ptime, (double)ts->time_step,
                         reason > 0 ? "the solution is not finite" : SNESConvergedReasons[reason],

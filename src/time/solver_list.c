@@ -6,7 +6,7 @@
   the next solver needs another kind of matrix, another operator, assembled at Newton's iterate.
 
   Not replaced: solvers that the user chose by -ksp_type or -pc_type; factorisations of the saddle-point system of contact; solves along
-  an arc length; static systems with a free rigid motion (free_body.c), which are singular; exact tangents that Newton's method will filter
+  an arc length; static systems with a free rigid motion (rigid_modes.c), which are singular; exact tangents that Newton's method will filter
   (newton.c).
 
   petsc/private/kspimpl.h: the reason and the iterations of a solve and the callback that was set before have no public access.
@@ -138,7 +138,7 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
 
     PetscCall(MatDestroy(&run->J));
     PetscCall(SbSolverCreateOperator(s, next, &run->J));
-    if (SbConstraintsBeside(s))
+    if (SbConstraintsSeparate(s))
       s->constraints->K = run->J;
     else if (!run->nonsymmetric.U) { /* the nonsymmetric operator multiplies by run->J in any case */
       PetscCall(MatDestroy(&run->operator));

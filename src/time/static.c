@@ -92,7 +92,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
       char near[256];
 
       if (reason == SNES_DIVERGED_LINEAR_SOLVE) PetscCall(SbSolverListExplain(l->run, sizeof(why), why));
-      PetscCall(SbModelGuardNearest(l->run->model, sizeof(near), near));
+      PetscCall(SbModelPotentialNearest(l->run->model, sizeof(near), near));
       PetscCall(SbRunFail(l->run, "load factor %g: %s; %s%s%s", (double)l->factor,
                           SNESConvergedReasons[reason], why, near[0] ? "; " : "", near));
     }

@@ -2,7 +2,7 @@
   One step, dynamic or static, from its start to its acceptance. second_order.c and static.c say what a step's unknowns are and how long it is.
 
     attempt: a first guess, Newton's method with the loop of contact around it, who examines solutions, what is refused
-    accepted: effects keep their history, the account of energies is closed (account.c), monitors look
+    accepted: effects keep their history, the account of energies is closed (energy_balance.c), monitors look
 */
 #include "time_impl.h"
 
@@ -17,7 +17,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 
     /* guarded contact begins where the step does */
     if (run->model->npotential) {
-      PetscCall(SbModelGuardBegin(run->model, a->t, a->dt, a->U0, run->V));
+      PetscCall(SbModelPotentialBegin(run->model, a->t, a->dt, a->U0, run->V));
       run->guard_start = a->U0;
       run->guard_dt = a->dt;
     }
@@ -42,7 +42,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   PetscCall(SbRunRejectInverted(run, a->t, a->dt, (Vec[2]){a->U0, a->U}, ok));
 
   /* what moves by order is where it was when the step began, if the run ends there */
-  if (!*ok && run->model->npotential) PetscCall(SbModelGuardAdvance(run->model, 0.));
+  if (!*ok && run->model->npotential) PetscCall(SbModelPotentialAdvance(run->model, 0.));
 
   if (!*ok) PetscCall(SbRunWarnShorter(run, a->dt));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -49,7 +49,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *attempt, PetscBool *ok);
 PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt,
                                  PetscBool last); /* after it was accepted; also once at the start */
 #define SB_NEWTON_ITERATIONS 100
-/* continue.c: the post-step function of the TS. */
+/* transfer.c: the post-step function of the TS. */
 PetscErrorCode SbRunAfterStep(TS ts);
 /* newton.c: Newton's method as a minimisation, a SNESType. Run: the one whose steps snes solves, borrowed; after the type is set. */
 #define SB_SNES_NEWTON "newton"
@@ -76,7 +76,7 @@ PetscBool SbRunTooShort(SbRun run, PetscReal dt);
 */
 PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const Vec U[2], PetscBool *ok);
 
-/* form.c: the model as PETSc sees it. */
+/* callbacks.c: the model as PETSc sees it. */
 PetscErrorCode SbFormI2Function(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *run);
 PetscErrorCode SbFormI2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal shift_v, PetscReal shift_a,
                                 Mat J, Mat P, void *run);
@@ -118,12 +118,12 @@ PetscErrorCode SbStaticSolve(SbRun run); /* static.c: the load path */
    contact, and for solvers that take definite matrices only. */
 PetscErrorCode SbArcLengthCheck(SbRun run);
 PetscErrorCode SbArcLengthSolve(SbRun run);
-/* free_body.c, after a static solve: a body that can move rigidly without a force, -1: none is found; how, in words. Collective. */
+/* rigid_modes.c, after a static solve: a body that can move rigidly without a force, -1: none is found; how, in words. Collective. */
 PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion[]);
 /* Whether displacements are so many times the bodies' size that the matrix must have been singular. Collective. */
 PetscErrorCode SbRunTooFar(SbRun run, Vec X, PetscBool *far);
 
-/* account.c: energies of the state at t and the account of the step of the length dt that ended there; `first` opens the account. Collective. */
+/* energy_balance.c: energies of the state at t and the account of the step of the length dt that ended there; `first` opens the account. Collective. */
 PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool first);
 /* R <- the residual at t with the acceleration of the integrator, without constraints: reactions on prescribed unknowns; where it keeps none
    (TSALPHA2), inertia is left out. Forces between bodies are taken out. Collective. */

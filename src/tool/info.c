@@ -75,7 +75,7 @@ static PetscErrorCode bar(const char *label, PetscInt64 n, PetscInt64 most)
 }
 
 /* Bytes that a run of one step takes on one rank, by element: p1, cr, dg. */
-static PetscReal memory(const SbMeshFacts *f, const char *element, PetscInt *unknowns, PetscReal *matrix)
+static PetscReal memory(const SbMeshStatistics *f, const char *element, PetscInt *unknowns, PetscReal *matrix)
 {
   const PetscReal inner = f->nface - f->body.nfacet, ncell = f->body.ncell;
   PetscReal nodes = f->body.nvert, blocks = nodes + 2. * f->nedge,
@@ -96,7 +96,7 @@ static PetscReal memory(const SbMeshFacts *f, const char *element, PetscInt *unk
 
 PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
 {
-  SbMeshFacts facts;
+  SbMeshStatistics facts;
   PetscErrorCode ierr;
   PetscInt nvert, n[4];
   char number[32];
@@ -148,10 +148,10 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
   for (int i = 0; i < SB_RATIO_BINS; i++) most = PetscMax(most, facts.ratio[i]);
   for (int i = 0; i < SB_RATIO_BINS; i++) {
     if (i + 1 < SB_RATIO_BINS)
-      (void)snprintf(label, sizeof(label), "%4.4g to %.4g", (double)SbRatioBounds[i],
-                     (double)SbRatioBounds[i + 1]);
+      (void)snprintf(label, sizeof(label), "%4.4g to %.4g", (double)SbRatioBinEdges[i],
+                     (double)SbRatioBinEdges[i + 1]);
     else
-      (void)snprintf(label, sizeof(label), "%4.4g and more", (double)SbRatioBounds[i]);
+      (void)snprintf(label, sizeof(label), "%4.4g and more", (double)SbRatioBinEdges[i]);
     PetscCall(bar(label, facts.ratio[i], most));
   }
   // what a run of it needs

@@ -39,26 +39,26 @@ static void bend(const PetscReal x[3], PetscReal v[3])
 /* ------------------------------------------------------------------ alternatives */
 
 /* Ten blocks of batch b, as the tangent makes them. */
-static void blocks(Bench *w, const SbRegion *region, PetscInt b, SbLane K[10][9])
+static void blocks(Bench *w, const SbRegion *region, PetscInt b, SbPack K[10][9])
 {
   const SbMaterial m = region->material;
   const PetscInt *node = w->s->batch_node + 4 * SB_BATCH * b;
-  SbLane u[12], F[9], R[9];
+  SbPack u[12], F[9], R[9];
 
   for (int a = 0; a < 4; a++) {
     for (int l = 0; l < SB_BATCH; l++) {
       for (int i = 0; i < 3; i++) u[3 * a + i][l] = w->u[3 * node[a * SB_BATCH + l] + i];
     }
   }
-  SbCellGradient(w->s->batch_g + 9 * b, (const SbLane *)u, F);
-  m->ops.frame(m, (const SbLane *)F, R);
+  SbCellGradient(w->s->batch_g + 9 * b, (const SbPack *)u, F);
+  m->ops.frame(m, (const SbPack *)F, R);
   SbCellBlocksIsotropic(w->s->batch_g + 9 * b, w->s->batch_V[b], m->ops.volumetric_modulus(m),
-                        m->ops.shear_modulus(m), (const SbLane *)R, K);
+                        m->ops.shear_modulus(m), (const SbPack *)R, K);
 }
 
 static PetscErrorCode bare_kernel(Bench *w)
 {
-  static SbLane K[10][9] __attribute__((aligned(64)));
+  static SbPack K[10][9] __attribute__((aligned(64)));
 
   PetscFunctionBeginUser;
   for (PetscInt r = 0; r < w->s->nregion; r++) {
@@ -70,7 +70,7 @@ static PetscErrorCode bare_kernel(Bench *w)
 }
 
 /* The whole 12x12 matrix of lane l, row-major. */
-static void whole_matrix(SbLane K[10][9], int l, PetscReal Ke[144])
+static void whole_matrix(SbPack K[10][9], int l, PetscReal Ke[144])
 {
   for (int p = 0; p < 10; p++) {
     const int a = SbPairA[p], b = SbPairB[p];
@@ -93,7 +93,7 @@ static PetscErrorCode insert(Bench *w, DM dm, Mat A)
     const SbRegion *region = &w->s->region[r];
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
-      SbLane K[10][9] __attribute__((aligned(64)));
+      SbPack K[10][9] __attribute__((aligned(64)));
 
       blocks(w, region, b, K);
       for (int l = 0; l < w->s->batch_n[b]; l++) {

@@ -40,29 +40,29 @@ static PetscErrorCode residual(Case *c)
 
 static void bare_kernel(Case *c, const PetscReal u[])
 {
-  static SbLane K[SB_PAIRS][9] __attribute__((aligned(64)));
+  static SbPack K[SB_PAIRS][9] __attribute__((aligned(64)));
   const SbSpace s = c->s;
 
   for (PetscInt b = 0; b < s->nbatch; b++) {
     const SbMaterial m = s->region[0].pointwise;
     const PetscInt *node = s->batch_clique + s->width * SB_BATCH * b;
-    const SbLane *g = s->batch_g + 9 * b;
-    SbLane B[4][10][9] __attribute__((aligned(64))), U[30], W, none[30] = {{0}};
+    const SbPack *g = s->batch_g + 9 * b;
+    SbPack B[4][10][9] __attribute__((aligned(64))), U[30], W, none[30] = {{0}};
 
     for (int k = 0; k < 30 * SB_BATCH; k++)
       U[k / SB_BATCH][k % SB_BATCH] =
         u[3 * node[k / (3 * SB_BATCH) * SB_BATCH + k % SB_BATCH] + k / SB_BATCH % 3];
     for (int l = 0; l < SB_BATCH; l++) W[l] = 0.25 * s->batch_V[b][l];
     for (int q = 0; q < 4; q++) {
-      SbLane at[12], F[9], R[9];
+      SbPack at[12], F[9], R[9];
 
-      SbQuadraticAt(SbRuleQuadratic.L[q], (const SbLane *)U, at);
-      SbCellGradient(g, (const SbLane *)at, F);
-      m->ops.frame(m, (const SbLane *)F, R);
-      SbCellBlocksIsotropic(g, W, m->ops.volumetric_modulus(m), m->ops.shear_modulus(m), (const SbLane *)R,
+      SbQuadraticAt(SbRuleQuadratic.L[q], (const SbPack *)U, at);
+      SbCellGradient(g, (const SbPack *)at, F);
+      m->ops.frame(m, (const SbPack *)F, R);
+      SbCellBlocksIsotropic(g, W, m->ops.volumetric_modulus(m), m->ops.shear_modulus(m), (const SbPack *)R,
                             B[q]);
     }
-    SbQuadraticBlocks((const SbLane(*)[10][9])B, W, (const SbLane *)none, K);
+    SbQuadraticBlocks((const SbPack(*)[10][9])B, W, (const SbPack *)none, K);
   }
 }
 

@@ -20,7 +20,7 @@ typedef struct {
 /* Seconds of an event in all stages, on this rank. */
 static PetscErrorCode seconds(SbEvent event, double *sum)
 {
-  const PetscLogStage stages[] = {0, SbStageSetup, SbStageSolve, SbStageOutput};
+  const PetscLogStage stages[] = {0, SbLogStageSetup, SbLogStageSolve, SbLogStageOutput};
 
   PetscFunctionBeginUser;
   *sum = 0;

@@ -74,49 +74,49 @@ static inline void with_stretches(PetscReal s0, PetscReal s1, PetscReal s2, Pets
 }
 
 /* A batch with F in lane 2 and unrelated numbers around it. */
-static inline void batch(const PetscReal F[9], SbLane f[9])
+static inline void batch(const PetscReal F[9], SbPack f[9])
 {
   for (int l = 0; l < SB_BATCH; l++) {
     for (int k = 0; k < 9; k++) f[k][l] = (k % 4 == 0) + 0.1 * l - 0.03 * k;
   }
-  SbLanePut(9, F, 2, f);
+  SbPackPut(9, F, 2, f);
 }
 
 static inline PetscReal energy_of(SbMaterial m, const PetscReal F[9])
 {
-  SbLane f[9], psi;
+  SbPack f[9], psi;
 
   batch(F, f);
-  m->ops.energy(m, (const SbLane *)f, psi);
+  m->ops.energy(m, (const SbPack *)f, psi);
   return psi[2];
 }
 
 static inline void stress_of(SbMaterial m, const PetscReal F[9], PetscReal P[9])
 {
-  SbLane f[9], p[9];
+  SbPack f[9], p[9];
 
   batch(F, f);
-  m->ops.stress(m, (const SbLane *)f, p);
-  SbLaneGet(9, (const SbLane *)p, 2, P);
+  m->ops.stress(m, (const SbPack *)f, p);
+  SbPackGet(9, (const SbPack *)p, 2, P);
 }
 
 static inline void tangent_of(SbMaterial m, const PetscReal F[9], PetscReal C[81])
 {
-  SbLane f[9], c[81];
+  SbPack f[9], c[81];
 
   batch(F, f);
-  m->ops.tangent(m, (const SbLane *)f, c);
-  SbLaneGet(81, (const SbLane *)c, 2, C);
+  m->ops.tangent(m, (const SbPack *)f, c);
+  SbPackGet(81, (const SbPack *)c, 2, C);
 }
 
 static inline void damping_of(SbMaterial m, const PetscReal F[9], const PetscReal H[9], PetscReal dP[9])
 {
-  SbLane f[9], h[9], p[9];
+  SbPack f[9], h[9], p[9];
 
   batch(F, f);
   batch(H, h);
-  SbMaterialDampingStress(m, (const SbLane *)f, (const SbLane *)h, p);
-  SbLaneGet(9, (const SbLane *)p, 2, dP);
+  SbMaterialDampingStress(m, (const SbPack *)f, (const SbPack *)h, p);
+  SbPackGet(9, (const SbPack *)p, 2, dP);
 }
 
 /* B = C : H */
@@ -361,7 +361,7 @@ static inline PetscErrorCode check_spd(SbMaterial m)
 /* The same F in any lane among any neighbours, NaN included: the same bits from every operation. */
 static inline void check_lanes(SbMaterial m)
 {
-  SbLane f[9], psi, P[9], C[81];
+  SbPack f[9], psi, P[9], C[81];
   PetscReal F[9], p[9], q[9], c[81], d[81];
   PetscInt different = 0;
 
@@ -374,11 +374,11 @@ static inline void check_lanes(SbMaterial m)
       for (int l = 0; l < SB_BATCH; l++) {
         for (int k = 0; k < 9; k++) f[k][l] = l == place ? F[k] : l % 3 ? uniform() : NAN;
       }
-      m->ops.energy(m, (const SbLane *)f, psi);
-      m->ops.stress(m, (const SbLane *)f, P);
-      m->ops.tangent(m, (const SbLane *)f, C);
-      SbLaneGet(9, (const SbLane *)P, place, q);
-      SbLaneGet(81, (const SbLane *)C, place, d);
+      m->ops.energy(m, (const SbPack *)f, psi);
+      m->ops.stress(m, (const SbPack *)f, P);
+      m->ops.tangent(m, (const SbPack *)f, C);
+      SbPackGet(9, (const SbPack *)P, place, q);
+      SbPackGet(81, (const SbPack *)C, place, d);
       different += psi[place] != e || memcmp(p, q, sizeof(p)) != 0 || memcmp(c, d, sizeof(c)) != 0;
     }
   }

@@ -32,7 +32,7 @@ static inline PetscErrorCode test_set(const char *name, const char *text, SbSet 
 /* A mesh as a run reads and checks it. */
 typedef struct {
   SbImport im;
-  SbMeshFacts facts;
+  SbMeshStatistics facts;
 } TestMesh;
 
 static inline PetscErrorCode test_mesh_read(SbBody body, TestMesh *m)

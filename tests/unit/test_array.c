@@ -14,7 +14,7 @@ int main(int argc, char **argv)
 
   /* keys from -1 to NKEY: the lowest and the highest take no part, key 3 is nobody's */
   for (PetscInt i = 0; i < N; i++) key[i] = i * i % 9 == 4 ? 4 : i * i % 9 - 1;
-  PetscCall(SbGroupByKey(N, key, NKEY, &start, &item));
+  PetscCall(SbBucketByKey(N, key, NKEY, &start, &item));
   for (PetscInt k = 0; k < NKEY; k++) {
     SB_CHECK(start[k] == at, "key %d starts at %d", (int)k, (int)start[k]);
     for (PetscInt i = 0; i < N; i++) {
@@ -26,14 +26,14 @@ int main(int argc, char **argv)
   SB_CHECK(start[NKEY] == at && at < N, "%d positions", (int)start[NKEY]);
   PetscCall(PetscFree(start));
   PetscCall(PetscFree(item));
-  PetscCall(SbGroupByKey(0, NULL, 0, &start, &item));
+  PetscCall(SbBucketByKey(0, NULL, 0, &start, &item));
   SB_CHECK(start[0] == 0, "nothing");
   PetscCall(PetscFree(start));
   PetscCall(PetscFree(item));
 
   /* rank r has r % 3 numbers */
   for (PetscInt i = 0; i < rank % 3; i++) mine[i] = 10 * rank + i;
-  PetscCall(SbGatherAll(PETSC_COMM_WORLD, MPIU_INT, rank % 3, mine, &total, &all, &before));
+  PetscCall(SbAllgatherv(PETSC_COMM_WORLD, MPIU_INT, rank % 3, mine, &total, &all, &before));
   at = 0;
   for (PetscMPIInt r = 0; r < size; r++) {
     if (r == rank) SB_CHECK(before == at, "%d entries before", (int)before);

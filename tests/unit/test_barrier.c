@@ -73,7 +73,7 @@ static void check_pair(SbContactMesh m, const SbContactPair *pair, PetscReal x[1
   }
   if (worst > 1e-4 * largest) return;
   for (int clamp = 0; clamp < 2; clamp++) {
-    if (clamp) SbSymmetricClamp(12, reference);
+    if (clamp) SbSymmetricProjectPSD(12, reference);
     for (int k = 0; k < 3 * nv; k++) {
       for (int l = 0; l < 3 * nv; l++)
         SB_CHECK_NEAR(H[clamp][12 * k + l], reference[12 * k + l], 2e-3 * largest + 1e-6,

@@ -5,7 +5,7 @@
 static const char *const laws[] = {"linear", "corotated", "stvk", "neohookean"};
 
 /* F = I + size times numbers in [-1, 1], the same in every run. */
-static PetscErrorCode deform(PetscRandom random, PetscReal size, SbLane F[9])
+static PetscErrorCode deform(PetscRandom random, PetscReal size, SbPack F[9])
 {
   PetscFunctionBeginUser;
   for (int k = 0; k < 9; k++) {
@@ -22,7 +22,7 @@ static PetscErrorCode deform(PetscRandom random, PetscReal size, SbLane F[9])
 static PetscErrorCode test_energy(const char *law, PetscRandom random)
 {
   SbMaterial m, shear;
-  SbLane F[9], psi, without, p;
+  SbPack F[9], psi, without, p;
 
   PetscFunctionBeginUser;
   PetscCall(SbMaterialCreateElastic(law, 1000., 0.45, 1., &m));
@@ -30,9 +30,9 @@ static PetscErrorCode test_energy(const char *law, PetscRandom random)
   PetscCall(SbMaterialCreateElastic(law, 2. * m->ops.shear_modulus(m), 0., 1., &shear));
   for (int i = 0; i < 20; i++) {
     PetscCall(deform(random, 0.3, F));
-    m->ops.energy(m, (const SbLane *)F, psi);
-    shear->ops.energy(shear, (const SbLane *)F, without);
-    m->ops.pressure(m, (const SbLane *)F, p);
+    m->ops.energy(m, (const SbPack *)F, psi);
+    shear->ops.energy(shear, (const SbPack *)F, without);
+    m->ops.pressure(m, (const SbPack *)F, p);
     for (int l = 0; l < SB_BATCH; l++) // energies are of the size of 1000 Pa
       SB_CHECK_NEAR(p[l] * p[l] / (2. * m->ops.volumetric_modulus(m)), psi[l] - without[l], 1e-11, law);
   }
@@ -45,12 +45,12 @@ static PetscErrorCode test_small(const char *law, PetscRandom random)
 {
   const PetscReal size = 1e-6;
   SbMaterial m;
-  SbLane F[9], p;
+  SbPack F[9], p;
 
   PetscFunctionBeginUser;
   PetscCall(SbMaterialCreateElastic(law, 1000., 0.4999, 1., &m));
   PetscCall(deform(random, size, F));
-  m->ops.pressure(m, (const SbLane *)F, p);
+  m->ops.pressure(m, (const SbPack *)F, p);
   for (int l = 0; l < SB_BATCH; l++) {
     const PetscReal expected =
       -m->ops.volumetric_modulus(m) * ((F[0][l] - 1.) + (F[4][l] - 1.) + (F[8][l] - 1.));
@@ -59,13 +59,13 @@ static PetscErrorCode test_small(const char *law, PetscRandom random)
     SB_CHECK_NEAR(p[l], expected, m->ops.volumetric_modulus(m) * (20. * size * size + 1e-14), law);
   }
   PetscCall(deform(random, 0., F));
-  m->ops.pressure(m, (const SbLane *)F, p);
+  m->ops.pressure(m, (const SbPack *)F, p);
   for (int l = 0; l < SB_BATCH; l++)
     SB_CHECK_NEAR(p[l], 0., 1e-14 * m->ops.volumetric_modulus(m), "pressure at rest");
   for (int k = 0; k < 9; k += 4) {
     for (int l = 0; l < SB_BATCH; l++) F[k][l] = 0.9;
   }
-  m->ops.pressure(m, (const SbLane *)F, p);
+  m->ops.pressure(m, (const SbPack *)F, p);
   for (int l = 0; l < SB_BATCH; l++) SB_CHECK(p[l] > 0., "%s: pressure %g in compression", law, (double)p[l]);
   PetscCall(SbMaterialDestroy(&m));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -56,7 +56,7 @@ int main(int argc, char **argv)
     }
     SB_CHECK(blocks.n <= NV * (NV + 1) / 2, "%d pairs of %d vertices", (int)blocks.n, NV);
     spread.n = 0;
-    PetscCall(SbContactBlocksSpread(&m, &blocks, &spread));
+    PetscCall(SbContactBlocksToNodes(&m, &blocks, &spread));
   }
 
   /* against dense matrices */

@@ -238,7 +238,7 @@ static void check_clamp(void)
     check_part(A, P, "clamped derivative of a distance");
     for (int k = 0; k < 144; k++) A[k] = P[k] = k % 12 <= k / 12 ? pair_random() : A[12 * (k % 12) + k / 12];
     for (int k = 0; k < 144; k++) A[k] = P[k] = A[12 * PetscMax(k / 12, k % 12) + PetscMin(k / 12, k % 12)];
-    SbSymmetricClamp(12, P);
+    SbSymmetricProjectPSD(12, P);
     check_part(A, P, "clamped matrix");
   }
 }

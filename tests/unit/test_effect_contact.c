@@ -50,7 +50,7 @@ static PetscErrorCode check_options(void)
   }
   PetscCall(effect_create(&x, "floor", FLOOR, &e));
   SB_CHECK(e->linear && !e->steady && !e->ops.tangent && e->ops.assemble_constraints &&
-             e->ops.update_active_set && x.space->constraints && !SbConstraintsBeside(x.space),
+             e->ops.update_active_set && x.space->constraints && !SbConstraintsSeparate(x.space),
            "projected, without friction");
   SB_CHECK(e->ncolumn == 8, "columns");
   PetscCall(SbEffectDestroy(&e));
@@ -60,7 +60,7 @@ static PetscErrorCode check_options(void)
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, hull, &x));
   PetscCall(effect_create(&x, "floor", FLOOR "-effect_floor_response multiplier", &e));
   SB_CHECK(e->linear && e->saddle && !e->ops.tangent && e->ops.assemble_constraints &&
-             SbConstraintsBeside(x.space),
+             SbConstraintsSeparate(x.space),
            "multiplier, without friction");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(PetscOptionsClear(NULL));
@@ -74,7 +74,7 @@ static PetscErrorCode check_options(void)
   PetscCall(SbEffectDestroy(&e));
   PetscCall(PetscOptionsClear(NULL));
   PetscCall(effect_create(&x, "floor", FLOOR "-effect_floor_friction 0.2", &e));
-  SB_CHECK(e->linear && !e->ops.tangent && e->ops.assemble_constraints && SbConstraintsBeside(x.space) &&
+  SB_CHECK(e->linear && !e->ops.tangent && e->ops.assemble_constraints && SbConstraintsSeparate(x.space) &&
              x.space->constraints->nonsymmetric,
            "friction has constraints");
   PetscCall(SbEffectDestroy(&e));
@@ -155,7 +155,7 @@ static PetscErrorCode check_tangent(const char *element, const char *options)
   fixture_use(element, element, PETSC_FALSE);
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, hull, &x));
   PetscCall(effect_create(&x, "floor", options, &e));
-  PetscCall(SbSpaceFixDone(x.space));
+  PetscCall(SbSpacePrescribeDone(x.space));
   PetscCall(SbSpaceCreateMatrix(x.space, SB_MATRIX_AIJ, &A));
   PetscCall(press(&x, e));
   PetscCall(PetscMemzero(&stage, sizeof(stage)));
@@ -206,7 +206,7 @@ static PetscErrorCode rub(Fixture *x, const char *options)
 
   PetscFunctionBeginUser;
   PetscCall(effect_create(x, "floor", options, &e));
-  PetscCall(SbSpaceFixDone(x->space));
+  PetscCall(SbSpacePrescribeDone(x->space));
   PetscCall(PetscCalloc1(3 * x->space->nnode, &u0));
   push(x, 0.15);
   PetscCall((*e->ops.begin_step)(e, x->space, 0, 0.1, u0, NULL, x->u));

@@ -33,7 +33,7 @@ static PetscErrorCode check_element(const char *element, PetscReal low)
   PetscCall(effect_create(&x, "roll",
                           "-effect_roll_type fixed -effect_roll_on bottom -effect_roll_components z", &roll));
   PetscCall(effect_create(&x, "rest", "-effect_rest_type fixed -effect_rest_on all", &rest));
-  PetscCall(SbSpaceFixDone(x.space));
+  PetscCall(SbSpacePrescribeDone(x.space));
   SB_CHECK(roll->linear && roll->steady && !roll->ops.force && !roll->ops.tangent, "a support is no force");
   SB_CHECK(roll->ncolumn == 3, "columns");
   PetscCall(PetscStrcmp(roll->column[2], "reaction_z", &same));

@@ -101,7 +101,7 @@ static PetscErrorCode check_element(const char *element)
   check_bits(&x);
   SB_CHECK_ERROR(SbPrescribedSetUp(&edge, x.space, &on[2], 5), PETSC_ERR_USER_INPUT,
                  p1 ? "-effect_test_on" : "body block");
-  PetscCall(SbSpaceFixDone(x.space));
+  PetscCall(SbSpacePrescribeDone(x.space));
   PetscCall(check_values(&x, &bottom, &west));
 
   PetscCall(SbPrescribedFree(&bottom));

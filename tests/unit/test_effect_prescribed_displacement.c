@@ -114,7 +114,7 @@ static PetscErrorCode check_element(const char *element, PetscBool held)
                           "-effect_pull_components xz -effect_pull_displacement table:%s;0;t*x*y",
                           table));
   PetscCall(effect_create(&x, "pull", options, &pull));
-  PetscCall(SbSpaceFixDone(x.space));
+  PetscCall(SbSpacePrescribeDone(x.space));
   SB_CHECK(!twist->steady && twist->linear && !twist->ops.force && twist->ncolumn == 4,
            "a drive moves with time");
   for (int k = 0; k < 4; k++) {

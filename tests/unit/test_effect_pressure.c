@@ -229,7 +229,7 @@ static PetscErrorCode check_tangent(Fixture *x)
   PetscCall((*closed->ops.setup)(closed, x->space));
   PetscCall(SbEffectCreate("hat", &open));
   PetscCall((*open->ops.setup)(open, x->space));
-  PetscCall(SbSpaceFixDone(x->space));
+  PetscCall(SbSpacePrescribeDone(x->space));
   PetscCall(SbSpaceCreateMatrix(x->space, SB_MATRIX_BAIJ, &A));
   PetscCall(check_taylor(x, closed, A, PETSC_FALSE));
   // The facets of CR and DG do not meet at their edges: all of the tangent of an open surface is applied facet by facet, and exact at a free rim.

@@ -7,7 +7,7 @@
 #include <sbelement.h>
 
 typedef struct {
-  SbLane X[12], g[9], V; /* corners, gradients, volumes */
+  SbPack X[12], g[9], V; /* corners, gradients, volumes */
 } Cells;
 
 static void make_cells(SbElement e, PetscReal size, Cells *c)
@@ -19,14 +19,14 @@ static void make_cells(SbElement e, PetscReal size, Cells *c)
       for (int i = 0; i < 3; i++) x[a][i] = size * (0.15 * uniform() + (a == i + 1));
     }
     e->ops.tabulate((const PetscReal(*)[3])x, g, &V);
-    SbLanePut(12, &x[0][0], l, c->X);
-    SbLanePut(9, &g[0][0], l, c->g);
+    SbPackPut(12, &x[0][0], l, c->X);
+    SbPackPut(9, &g[0][0], l, c->g);
     c->V[l] = V;
   }
 }
 
 /* u = (A - I) X + b, another A and b in each lane. */
-static void affine(const Cells *c, const SbLane A[9], const SbLane b[3], SbLane u[12])
+static void affine(const Cells *c, const SbPack A[9], const SbPack b[3], SbPack u[12])
 {
   for (int l = 0; l < SB_BATCH; l++) {
     for (int k = 0; k < 12; k++) {
@@ -38,30 +38,30 @@ static void affine(const Cells *c, const SbLane A[9], const SbLane b[3], SbLane 
   }
 }
 
-static void force_of(SbMaterial m, const Cells *c, const SbLane u[12], SbLane f[12])
+static void force_of(SbMaterial m, const Cells *c, const SbPack u[12], SbPack f[12])
 {
-  SbLane F[9], P[9];
+  SbPack F[9], P[9];
 
   SbCellGradient(c->g, u, F);
-  m->ops.stress(m, (const SbLane *)F, P);
-  SbCellForce(c->g, c->V, (const SbLane *)P, f);
+  m->ops.stress(m, (const SbPack *)F, P);
+  SbCellForce(c->g, c->V, (const SbPack *)P, f);
 }
 
-static void random_state(const Cells *c, PetscReal size, SbLane A[9], SbLane u[12])
+static void random_state(const Cells *c, PetscReal size, SbPack A[9], SbPack u[12])
 {
-  SbLane b[3];
+  SbPack b[3];
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal F[9];
 
     random_deformation(size, F);
-    SbLanePut(9, F, l, A);
+    SbPackPut(9, F, l, A);
     for (int i = 0; i < 3; i++) b[i][l] = c->X[1][l] * uniform();
   }
-  affine(c, (const SbLane *)A, (const SbLane *)b, u);
+  affine(c, (const SbPack *)A, (const SbPack *)b, u);
 }
 
-static PetscReal lane_difference(int n, const SbLane a[], const SbLane b[])
+static PetscReal lane_difference(int n, const SbPack a[], const SbPack b[])
 {
   PetscReal worst = 0;
 
@@ -73,23 +73,23 @@ static void test_gradient(SbElement e)
 {
   for (int t = 0; t < 100; t++) {
     Cells c;
-    SbLane A[9], u[12], F[9], H[9];
+    SbPack A[9], u[12], F[9], H[9];
 
     make_cells(e, pow(10, t % 7 - 3), &c);
     random_state(&c, 0.5, A, u);
-    SbCellGradient((const SbLane *)c.g, (const SbLane *)u, F);
-    SB_CHECK(lane_difference(9, (const SbLane *)A, (const SbLane *)F) < 1e-13,
-             "F of an affine map is off by %g", lane_difference(9, (const SbLane *)A, (const SbLane *)F));
-    SbCellGradientRate((const SbLane *)c.g, (const SbLane *)u, H);
+    SbCellGradient((const SbPack *)c.g, (const SbPack *)u, F);
+    SB_CHECK(lane_difference(9, (const SbPack *)A, (const SbPack *)F) < 1e-13,
+             "F of an affine map is off by %g", lane_difference(9, (const SbPack *)A, (const SbPack *)F));
+    SbCellGradientRate((const SbPack *)c.g, (const SbPack *)u, H);
     for (int k = 0; k < 9; k += 4) {
       for (int l = 0; l < SB_BATCH; l++) H[k][l] += 1;
     }
-    SB_CHECK(lane_difference(9, (const SbLane *)A, (const SbLane *)H) < 1e-13,
+    SB_CHECK(lane_difference(9, (const SbPack *)A, (const SbPack *)H) < 1e-13,
              "the rate of an affine map is wrong");
     for (int k = 0; k < 12; k++) {
       for (int l = 0; l < SB_BATCH; l++) u[k][l] = 1e3 * (1 + k % 3);
     }
-    SbCellGradient((const SbLane *)c.g, (const SbLane *)u, F);
+    SbCellGradient((const SbPack *)c.g, (const SbPack *)u, F);
     for (int k = 0; k < 9; k++) {
       for (int l = 0; l < SB_BATCH; l++) SB_CHECK(F[k][l] == (k % 4 == 0), "F of a translation is not I");
     }
@@ -103,18 +103,18 @@ static void test_force(SbElement e, SbMaterial m)
 
   for (int t = 0; t < 10; t++) {
     Cells c;
-    SbLane A[9], u[12], f[12], F[9], plus, minus;
+    SbPack A[9], u[12], f[12], F[9], plus, minus;
 
     make_cells(e, size, &c);
     random_state(&c, 0.25, A, u);
-    force_of(m, &c, (const SbLane *)u, f);
+    force_of(m, &c, (const SbPack *)u, f);
     for (int k = 0; k < 12; k++) {
       for (int l = 0; l < SB_BATCH; l++) u[k][l] += h;
-      SbCellGradient((const SbLane *)c.g, (const SbLane *)u, F);
-      m->ops.energy(m, (const SbLane *)F, plus);
+      SbCellGradient((const SbPack *)c.g, (const SbPack *)u, F);
+      m->ops.energy(m, (const SbPack *)F, plus);
       for (int l = 0; l < SB_BATCH; l++) u[k][l] -= 2 * h;
-      SbCellGradient((const SbLane *)c.g, (const SbLane *)u, F);
-      m->ops.energy(m, (const SbLane *)F, minus);
+      SbCellGradient((const SbPack *)c.g, (const SbPack *)u, F);
+      m->ops.energy(m, (const SbPack *)F, minus);
       for (int l = 0; l < SB_BATCH; l++) {
         u[k][l] += h;
         SB_CHECK_NEAR(f[k][l], c.V[l] * (plus[l] - minus[l]) / (2 * h), 1e-8 * m->E * size * size,
@@ -131,7 +131,7 @@ static void test_force(SbElement e, SbMaterial m)
 }
 
 /* Entry (3 a + i, 3 b + k) of the cell matrix from the ten blocks. */
-static PetscReal entry(const SbLane K[10][9], int row, int column, int l)
+static PetscReal entry(const SbPack K[10][9], int row, int column, int l)
 {
   const int a = row / 3, i = row % 3, b = column / 3, k = column % 3;
 
@@ -143,7 +143,7 @@ static PetscReal entry(const SbLane K[10][9], int row, int column, int l)
 }
 
 /* Blocks of a row sum to zero; diagonal blocks are symmetric to the last bit. */
-static void check_block_sums(const SbLane K[10][9], PetscReal scale)
+static void check_block_sums(const SbPack K[10][9], PetscReal scale)
 {
   static const int diagonal[4] = {0, 4, 7, 9};
 
@@ -174,47 +174,47 @@ static PetscErrorCode test_blocks(SbElement e, SbMaterial m, SbTangentKind kind)
   if (!m->linear) PetscCall(SbMaterialSetTangent(m, kind));
   for (int t = 0; t < 10; t++) {
     Cells c;
-    SbLane A[9], u[12], F[9], C[81], K[10][9], J[10][9], plus[12], minus[12];
+    SbPack A[9], u[12], F[9], C[81], K[10][9], J[10][9], plus[12], minus[12];
 
     make_cells(e, size, &c);
     random_state(&c, 0.25, A, u);
-    SbCellGradient((const SbLane *)c.g, (const SbLane *)u, F);
-    m->ops.tangent(m, (const SbLane *)F, C);
-    SbCellBlocksGeneral((const SbLane *)c.g, c.V, (const SbLane *)C, K);
-    check_block_sums((const SbLane(*)[9])K, (m->E + m->ops.volumetric_modulus(m)) * size);
+    SbCellGradient((const SbPack *)c.g, (const SbPack *)u, F);
+    m->ops.tangent(m, (const SbPack *)F, C);
+    SbCellBlocksGeneral((const SbPack *)c.g, c.V, (const SbPack *)C, K);
+    check_block_sums((const SbPack(*)[9])K, (m->E + m->ops.volumetric_modulus(m)) * size);
     for (int column = 0; kind == SB_TANGENT_EXACT && column < 12; column++) {
       for (int l = 0; l < SB_BATCH; l++) u[column][l] += h;
-      force_of(m, &c, (const SbLane *)u, plus);
+      force_of(m, &c, (const SbPack *)u, plus);
       for (int l = 0; l < SB_BATCH; l++) u[column][l] -= 2 * h;
-      force_of(m, &c, (const SbLane *)u, minus);
+      force_of(m, &c, (const SbPack *)u, minus);
       for (int l = 0; l < SB_BATCH; l++) {
         u[column][l] += h;
         for (int row = 0; row < 12; row++) {
-          SB_CHECK_NEAR(entry((const SbLane(*)[9])K, row, column, l),
+          SB_CHECK_NEAR(entry((const SbPack(*)[9])K, row, column, l),
                         (plus[row][l] - minus[row][l]) / (2 * h), 1e-7 * m->E * size, "block against force");
         }
       }
     }
     if (m->ops.spin) {
-      SbLane R[9], W[9];
+      SbPack R[9], W[9];
 
-      m->ops.spin(m, (const SbLane *)F, R, W);
-      SbCellBlocksSpin((const SbLane *)c.g, c.V, m->ops.volumetric_modulus(m), m->ops.shear_modulus(m),
-                       (const SbLane *)R, (const SbLane *)W, J);
-      check_block_sums((const SbLane(*)[9])J, (m->E + m->ops.volumetric_modulus(m)) * size);
+      m->ops.spin(m, (const SbPack *)F, R, W);
+      SbCellBlocksCorotated((const SbPack *)c.g, c.V, m->ops.volumetric_modulus(m), m->ops.shear_modulus(m),
+                            (const SbPack *)R, (const SbPack *)W, J);
+      check_block_sums((const SbPack(*)[9])J, (m->E + m->ops.volumetric_modulus(m)) * size);
       for (int p = 0; p < 10; p++) {
-        SB_CHECK(lane_difference(9, (const SbLane *)J[p], (const SbLane *)K[p]) <
+        SB_CHECK(lane_difference(9, (const SbPack *)J[p], (const SbPack *)K[p]) <
                    1e-13 * (m->E + m->ops.volumetric_modulus(m)) * size,
                  "block %d from the spin is %g from the general one", p,
-                 lane_difference(9, (const SbLane *)J[p], (const SbLane *)K[p]));
+                 lane_difference(9, (const SbPack *)J[p], (const SbPack *)K[p]));
       }
     }
     if (m->linear) {
-      SbCellBlocksIsotropic((const SbLane *)c.g, c.V, m->ops.volumetric_modulus(m), m->ops.shear_modulus(m),
+      SbCellBlocksIsotropic((const SbPack *)c.g, c.V, m->ops.volumetric_modulus(m), m->ops.shear_modulus(m),
                             NULL, J);
-      check_block_sums((const SbLane(*)[9])J, (m->E + m->ops.volumetric_modulus(m)) * size);
+      check_block_sums((const SbPack(*)[9])J, (m->E + m->ops.volumetric_modulus(m)) * size);
       for (int p = 0; p < 10; p++) {
-        SB_CHECK(lane_difference(9, (const SbLane *)J[p], (const SbLane *)K[p]) <
+        SB_CHECK(lane_difference(9, (const SbPack *)J[p], (const SbPack *)K[p]) <
                    1e-14 * (m->E + m->ops.volumetric_modulus(m)) * size,
                  "isotropic block %d is not the general one", p);
       }
@@ -232,31 +232,31 @@ static PetscErrorCode test_warped(SbElement e, SbMaterial m)
   PetscCall(SbMaterialSetTangent(m, SB_TANGENT_WARPED));
   for (int t = 0; t < 50; t++) {
     Cells c;
-    SbLane A[9], u[12], v[12], F[9], R[9], H[9], W[9], dP[9], f[12], K[10][9], J[10][9];
+    SbPack A[9], u[12], v[12], F[9], R[9], H[9], W[9], dP[9], f[12], K[10][9], J[10][9];
 
     make_cells(e, size, &c);
     random_state(&c, 0.6, A, u);
     for (int k = 0; k < 12; k++) {
       for (int l = 0; l < SB_BATCH; l++) v[k][l] = uniform();
     }
-    SbCellGradient((const SbLane *)c.g, (const SbLane *)u, F);
-    m->ops.frame(m, (const SbLane *)F, R);
-    SbCellBlocksIsotropic((const SbLane *)c.g, c.V, m->ops.volumetric_modulus(m), m->ops.shear_modulus(m),
-                          (const SbLane *)R, K);
+    SbCellGradient((const SbPack *)c.g, (const SbPack *)u, F);
+    m->ops.frame(m, (const SbPack *)F, R);
+    SbCellBlocksIsotropic((const SbPack *)c.g, c.V, m->ops.volumetric_modulus(m), m->ops.shear_modulus(m),
+                          (const SbPack *)R, K);
     for (int k = 0; k < 9; k++) {
       for (int l = 0; l < SB_BATCH; l++) W[k][l] = k % 4 == 0 ? -m->ops.shear_modulus(m) : 0;
     }
-    SbCellBlocksSpin((const SbLane *)c.g, c.V, m->ops.volumetric_modulus(m), m->ops.shear_modulus(m),
-                     (const SbLane *)R, (const SbLane *)W, J);
+    SbCellBlocksCorotated((const SbPack *)c.g, c.V, m->ops.volumetric_modulus(m), m->ops.shear_modulus(m),
+                          (const SbPack *)R, (const SbPack *)W, J);
     for (int p = 0; p < 10; p++) {
-      SB_CHECK(lane_difference(9, (const SbLane *)J[p], (const SbLane *)K[p]) <
+      SB_CHECK(lane_difference(9, (const SbPack *)J[p], (const SbPack *)K[p]) <
                  1e-14 * (m->E + m->ops.volumetric_modulus(m)) * size,
                "block %d with W = -mu I is not Hooke's", p);
     }
-    check_block_sums((const SbLane(*)[9])K, (m->E + m->ops.volumetric_modulus(m)) * size);
-    SbCellGradientRate((const SbLane *)c.g, (const SbLane *)v, H);
-    SbMaterialDampingStress(m, (const SbLane *)F, (const SbLane *)H, dP);
-    SbCellForce((const SbLane *)c.g, c.V, (const SbLane *)dP, f);
+    check_block_sums((const SbPack(*)[9])K, (m->E + m->ops.volumetric_modulus(m)) * size);
+    SbCellGradientRate((const SbPack *)c.g, (const SbPack *)v, H);
+    SbMaterialDampingStress(m, (const SbPack *)F, (const SbPack *)H, dP);
+    SbCellForce((const SbPack *)c.g, c.V, (const SbPack *)dP, f);
     for (int l = 0; l < SB_BATCH; l++) {
       PetscReal power = 0;
 
@@ -264,7 +264,7 @@ static PetscErrorCode test_warped(SbElement e, SbMaterial m)
         PetscReal sum = 0;
 
         for (int column = 0; column < 12; column++)
-          sum += entry((const SbLane(*)[9])K, row, column, l) * v[column][l];
+          sum += entry((const SbPack(*)[9])K, row, column, l) * v[column][l];
         SB_CHECK_NEAR(sum, f[row][l], 1e-13 * (m->E + m->ops.volumetric_modulus(m)) * size,
                       "warped K v against the damping stress");
         power += sum * v[row][l];
@@ -283,16 +283,16 @@ static void test_rotation(SbElement e, SbMaterial m)
 
   make_cells(e, 1, &c);
   for (int degree = 0; degree <= 360; degree += 15) {
-    SbLane A[9], b[3], u[12], f[12];
+    SbPack A[9], b[3], u[12], f[12];
     PetscReal Q[9];
 
     axis_rotation(axis, degree * PETSC_PI / 180, Q);
     for (int l = 0; l < SB_BATCH; l++) {
-      SbLanePut(9, Q, l, A);
+      SbPackPut(9, Q, l, A);
       for (int i = 0; i < 3; i++) b[i][l] = 3 - i;
     }
-    affine(&c, (const SbLane *)A, (const SbLane *)b, u);
-    force_of(m, &c, (const SbLane *)u, f);
+    affine(&c, (const SbPack *)A, (const SbPack *)b, u);
+    force_of(m, &c, (const SbPack *)u, f);
     for (int k = 0; k < 12; k++) {
       for (int l = 0; l < SB_BATCH; l++) SB_CHECK_NEAR(f[k][l], 0, 1e-12 * m->E, "force of a rotated cell");
     }
@@ -318,7 +318,7 @@ static void test_patch(SbElement e, SbMaterial m)
   random_deformation(0.3, F);
   for (int start = 0; start < 12; start += 4) {
     Cells c;
-    SbLane A[9], b[3] = {{0}}, u[12], fe[12];
+    SbPack A[9], b[3] = {{0}}, u[12], fe[12];
 
     for (int l = 0; l < SB_BATCH; l++) {
       const int *corner = face[start + l % 4], node[4] = {8, corner[0], corner[1], corner[2]};
@@ -326,13 +326,13 @@ static void test_patch(SbElement e, SbMaterial m)
 
       for (int a = 0; a < 4; a++) memcpy(x[a], X[node[a]], sizeof(x[a]));
       e->ops.tabulate((const PetscReal(*)[3])x, g, &V);
-      SbLanePut(12, &x[0][0], l, c.X);
-      SbLanePut(9, &g[0][0], l, c.g);
-      SbLanePut(9, F, l, A);
+      SbPackPut(12, &x[0][0], l, c.X);
+      SbPackPut(9, &g[0][0], l, c.g);
+      SbPackPut(9, F, l, A);
       c.V[l] = V;
     }
-    affine(&c, (const SbLane *)A, (const SbLane *)b, u);
-    force_of(m, &c, (const SbLane *)u, fe);
+    affine(&c, (const SbPack *)A, (const SbPack *)b, u);
+    force_of(m, &c, (const SbPack *)u, fe);
     for (int l = 0; l < 4; l++) {
       const int *corner = face[start + l], node[4] = {8, corner[0], corner[1], corner[2]};
 
@@ -358,7 +358,7 @@ static void test_patch(SbElement e, SbMaterial m)
 static void test_lanes(SbElement e)
 {
   Cells c;
-  SbLane u[12], R[9], C[81], F[9], f[12], K[10][9], J[10][9], S[10][9];
+  SbPack u[12], R[9], C[81], F[9], f[12], K[10][9], J[10][9], S[10][9];
   PetscInt different = 0;
 
   make_cells(e, 1, &c);
@@ -370,11 +370,11 @@ static void test_lanes(SbElement e)
     for (int k = 0; k < 9; k++) c.g[k][l] = l % 2 ? c.g[k][l] : c.g[k][0];
     c.V[l] = l % 2 ? c.V[l] : c.V[0];
   }
-  SbCellGradient((const SbLane *)c.g, (const SbLane *)u, F);
-  SbCellForce((const SbLane *)c.g, c.V, (const SbLane *)F, f);
-  SbCellBlocksIsotropic((const SbLane *)c.g, c.V, 3, 2, (const SbLane *)R, K);
-  SbCellBlocksGeneral((const SbLane *)c.g, c.V, (const SbLane *)C, J);
-  SbCellBlocksSpin((const SbLane *)c.g, c.V, 3, 2, (const SbLane *)R, (const SbLane *)C, S);
+  SbCellGradient((const SbPack *)c.g, (const SbPack *)u, F);
+  SbCellForce((const SbPack *)c.g, c.V, (const SbPack *)F, f);
+  SbCellBlocksIsotropic((const SbPack *)c.g, c.V, 3, 2, (const SbPack *)R, K);
+  SbCellBlocksGeneral((const SbPack *)c.g, c.V, (const SbPack *)C, J);
+  SbCellBlocksCorotated((const SbPack *)c.g, c.V, 3, 2, (const SbPack *)R, (const SbPack *)C, S);
   for (int l = 2; l < SB_BATCH; l += 2) {
     for (int k = 0; k < 9; k++) different += F[k][l] != F[k][0];
     for (int k = 0; k < 12; k++) different += f[k][l] != f[k][0];

@@ -36,13 +36,13 @@ static PetscErrorCode test_warped(SbMaterial m)
   SB_CHECK(m->ops.frame && !m->ops.spin, "the warped tangent has no frame, or a spin");
   for (int t = 0; t < 100; t++) {
     PetscReal F[9], H[9], R[9], B[9], S[9], P[9], dP[9];
-    SbLane f[9], r[9];
+    SbPack f[9], r[9];
 
     random_deformation(0.4, F);
     for (int k = 0; k < 9; k++) H[k] = uniform();
     batch(F, f);
-    m->ops.frame(m, (const SbLane *)f, r);
-    SbLaneGet(9, (const SbLane *)r, 2, R);
+    m->ops.frame(m, (const SbPack *)f, r);
+    SbPackGet(9, (const SbPack *)r, 2, R);
     SbMatTransposeMul(R, H, B);
     for (int i = 0; i < 3; i++) {
       for (int j = 0; j < 3; j++) {

@@ -26,7 +26,7 @@ int main(int argc, char **argv)
 {
   SbMaterial m;
   PetscReal F[9], H[9], R[9], dP[9], P[9], C[81], CH[9];
-  SbLane f[9], r[9];
+  SbPack f[9], r[9];
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(random_begin());
@@ -54,8 +54,8 @@ int main(int argc, char **argv)
                "damping is %g from the stress", difference(9, P, dP));
     }
     batch(F, f);
-    m->ops.frame(m, (const SbLane *)f, r);
-    SbLaneGet(9, (const SbLane *)r, 2, R);
+    m->ops.frame(m, (const SbPack *)f, r);
+    SbPackGet(9, (const SbPack *)r, 2, R);
     for (int i = 0; i < 9; i++) SB_CHECK(R[i] == (i % 4 == 0), "the frame of the linear law is not I");
     SB_CHECK_ERROR(SbMaterialSetTangent(m, SB_TANGENT_WARPED), PETSC_ERR_USER, "linear");
     PetscCall(SbMaterialDestroy(&m));

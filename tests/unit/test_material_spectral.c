@@ -11,7 +11,7 @@ static void test_eig(void)
   for (int t = 0; t < 20000; t++) {
     const PetscReal size = pow(10, 3 * uniform()), small = pow(10, -16 * fabs(uniform()));
     PetscReal w[3] = {uniform(), uniform(), uniform()}, Q[9], A[9], D[9], v[9], s[3];
-    SbLane S[6], e[3], V[9];
+    SbPack S[6], e[3], V[9];
 
     if (t % 4 == 1) w[1] = w[0] + small;
     if (t % 4 == 2) w[1] = w[2] = small * uniform();
@@ -22,14 +22,14 @@ static void test_eig(void)
     for (int l = 0; l < SB_BATCH; l++) {
       const PetscReal upper[6] = {A[0], A[1], A[2], A[4], A[5], A[8]};
 
-      SbLanePut(6, upper, l, S);
+      SbPackPut(6, upper, l, S);
     }
     A[3] = A[1];
     A[6] = A[2];
     A[7] = A[5];
-    SbSymEig((const SbLane *)S, e, V);
-    SbLaneGet(9, (const SbLane *)V, 5, v);
-    SbLaneGet(3, (const SbLane *)e, 5, s);
+    SbSymEig((const SbPack *)S, e, V);
+    SbPackGet(9, (const SbPack *)V, 5, v);
+    SbPackGet(3, (const SbPack *)e, 5, s);
     for (int k = 0; k < 9; k++) D[k] = s[k % 3] * v[k];
     SbMatMulTranspose(D, v, Q);
     SB_CHECK(difference(9, A, Q) < 20 * eps * size, "V diag(s) V^T is %g from S of size %g",
@@ -45,13 +45,13 @@ static void test_stretches(void)
 {
   for (int t = 0; t < 5000; t++) {
     PetscReal F[9], u[9], v[9], d[9], G[9];
-    SbLane f[9], U[9], V[9], s[3];
+    SbPack f[9], U[9], V[9], s[3];
 
     with_stretches(1 + 0.5 * uniform(), 1 + 0.5 * uniform(), t % 3 ? 0.5 * uniform() : 0, F);
     batch(F, f);
-    SbStretches((const SbLane *)f, U, s, V);
-    SbLaneGet(9, (const SbLane *)U, 2, u);
-    SbLaneGet(9, (const SbLane *)V, 2, v);
+    SbStretches((const SbPack *)f, U, s, V);
+    SbPackGet(9, (const SbPack *)U, 2, u);
+    SbPackGet(9, (const SbPack *)V, 2, v);
     for (int k = 0; k < 9; k++) d[k] = u[k] * s[k % 3][2];
     SbMatMulTranspose(d, v, G);
     /* gap of the polar rotation at least 0.05 here */
@@ -66,7 +66,7 @@ static void test_modes(void)
 {
   for (int t = 0; t < 500; t++) {
     PetscReal u[9], v[9], f[3], w[3], h[9], q[9], C[81], upper[6];
-    SbLane U[9], V[9], flip[3], twist[3], hessian[6], c[81];
+    SbPack U[9], V[9], flip[3], twist[3], hessian[6], c[81];
 
     random_rotation(u);
     random_rotation(v);
@@ -79,15 +79,15 @@ static void test_modes(void)
       w[k] = uniform();
     }
     for (int l = 0; l < SB_BATCH; l++) {
-      SbLanePut(9, u, l, U);
-      SbLanePut(9, v, l, V);
-      SbLanePut(3, f, l, flip);
-      SbLanePut(3, w, l, twist);
-      SbLanePut(6, upper, l, hessian);
+      SbPackPut(9, u, l, U);
+      SbPackPut(9, v, l, V);
+      SbPackPut(3, f, l, flip);
+      SbPackPut(3, w, l, twist);
+      SbPackPut(6, upper, l, hessian);
     }
-    SbSpectralTangent((const SbLane *)U, (const SbLane *)V, (const SbLane *)hessian, (const SbLane *)flip,
-                      (const SbLane *)twist, c);
-    SbLaneGet(81, (const SbLane *)c, 3, C);
+    SbSpectralTangent((const SbPack *)U, (const SbPack *)V, (const SbPack *)hessian, (const SbPack *)flip,
+                      (const SbPack *)twist, c);
+    SbPackGet(81, (const SbPack *)c, 3, C);
     for (int mode = 0; mode < 9; mode++) {
       const int k = mode % 3, i = (k + 1) % 3, j = (k + 2) % 3;
       PetscReal E[9], CE[9], expected[9];

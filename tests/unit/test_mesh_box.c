@@ -10,7 +10,7 @@ typedef struct {
 
 static PetscErrorCode make_box(const char *text, Box *box)
 {
-  SbMeshFacts facts;
+  SbMeshStatistics facts;
 
   PetscFunctionBeginUser;
   memset(box, 0, sizeof(*box));

@@ -59,7 +59,7 @@ static PetscErrorCode mesh_cube(const SbGmsh *gmsh, void *ctx, SbImport *result)
 static PetscErrorCode test_cube(void)
 {
   SbImport im;
-  SbMeshFacts facts;
+  SbMeshStatistics facts;
   double size = 0.5;
 
   PetscFunctionBeginUser;

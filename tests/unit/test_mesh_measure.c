@@ -5,7 +5,7 @@
 static PetscErrorCode test_box(void)
 {
   SbImport *im;
-  SbMeshFacts f;
+  SbMeshStatistics f;
   PetscInt64 angles = 0, tets = 0;
 
   PetscFunctionBeginUser;
@@ -66,7 +66,7 @@ static PetscErrorCode test_groups(void)
 static PetscErrorCode test_refused(void)
 {
   SbImport *im;
-  SbMeshFacts f;
+  SbMeshStatistics f;
 
   PetscFunctionBeginUser;
   PetscCall(test_read("tests/data/bad_twice.msh", 0, &im));

@@ -84,7 +84,7 @@ static PetscErrorCode test_children(const char *path)
 static PetscErrorCode test_sound(void)
 {
   SbImport *im;
-  SbMeshFacts coarse, fine;
+  SbMeshStatistics coarse, fine;
 
   PetscFunctionBeginUser;
   PetscCall(test_read("tests/data/two_cubes_41.msh", 0, &im));
@@ -104,7 +104,7 @@ static PetscErrorCode test_sound(void)
 static PetscErrorCode test_shapes(void)
 {
   SbImport *im;
-  SbMeshFacts facts;
+  SbMeshStatistics facts;
   PetscReal first = 0;
 
   PetscFunctionBeginUser;

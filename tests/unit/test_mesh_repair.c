@@ -2,7 +2,7 @@
 // @ranks 1
 #include "mesh_same.h"
 
-static PetscErrorCode repaired(SbImport *im, PetscReal merge_tolerance, SbRepair *r, SbMeshFacts *facts)
+static PetscErrorCode repaired(SbImport *im, PetscReal merge_tolerance, SbRepair *r, SbMeshStatistics *facts)
 {
   PetscFunctionBeginUser;
   PetscCall(SbMeshFileRepair(im, merge_tolerance, r));
@@ -48,7 +48,7 @@ static PetscErrorCode test_weld(void)
 {
   SbImport *im;
   SbRepair r;
-  SbMeshFacts facts;
+  SbMeshStatistics facts;
 
   PetscFunctionBeginUser;
   PetscCall(test_read("box:1,1,1:4", 0, &im));
@@ -84,7 +84,7 @@ static PetscErrorCode test_all_at_once(void)
 {
   SbImport *im;
   SbRepair r;
-  SbMeshFacts facts;
+  SbMeshStatistics facts;
   PetscInt group, tags, v[4], *first;
   char text[256];
 
@@ -120,7 +120,7 @@ static PetscErrorCode test_flat(void)
   static const PetscInt ring[5] = {0, 1, 2, 3, 0};
   SbImport im;
   SbRepair r;
-  SbMeshFacts facts;
+  SbMeshStatistics facts;
   PetscInt v[4];
 
   PetscFunctionBeginUser;

@@ -11,7 +11,7 @@ static PetscErrorCode import(const char *extension, PetscBool binary, const Test
                              const SbTetOptions *options, SbImport *im, SbBody *body, PetscBool *here)
 {
   char path[512];
-  SbMeshFacts facts;
+  SbMeshStatistics facts;
 
   PetscFunctionBeginUser;
   PetscCall(test_file_write(extension, binary, s, text, path));

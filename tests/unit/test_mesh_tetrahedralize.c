@@ -93,7 +93,7 @@ static PetscErrorCode check_sizes(void)
   PetscCall(make_skin(&t, t.ntri, &s));
   for (int k = 0; k < 3; k++) {
     SbImport im;
-    SbMeshFacts facts;
+    SbMeshStatistics facts;
     const SbBody *body = &facts.body;
     PetscReal volume;
     PetscInt none;

@@ -463,15 +463,15 @@ static PetscErrorCode test_nearest(void)
   char text[64];
 
   PetscFunctionBeginUser;
-  PetscCall(SbNearestNames("gravty", 5, names, sizeof(text), text));
+  PetscCall(SbSuggestNames("gravty", 5, names, sizeof(text), text));
   SB_CHECK(!strcmp(text, "gravity"), "'%s'", text);
-  PetscCall(SbNearestNames("GRAVITY", 5, names, sizeof(text), text));
+  PetscCall(SbSuggestNames("GRAVITY", 5, names, sizeof(text), text));
   SB_CHECK(!strcmp(text, "gravity"), "'%s'", text);
-  PetscCall(SbNearestNames("c1", 5, names, sizeof(text), text));
+  PetscCall(SbSuggestNames("c1", 5, names, sizeof(text), text));
   SB_CHECK(!strcmp(text, "p1 or cr"), "'%s'", text);
-  PetscCall(SbNearestNames("rc", 5, names, sizeof(text), text));
+  PetscCall(SbSuggestNames("rc", 5, names, sizeof(text), text));
   SB_CHECK(!strcmp(text, "cr"), "'%s'", text);
-  PetscCall(SbNearestNames("contact", 5, names, sizeof(text), text));
+  PetscCall(SbSuggestNames("contact", 5, names, sizeof(text), text));
   SB_CHECK(!text[0], "'%s'", text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -17,14 +17,14 @@
 /* ------------------------------------------------------------------ laws */
 
 /* theta (sbmaterial.h) of s F, the same in each lane. */
-static PetscReal volume_measure(SbMaterial m, const PetscReal f[9], PetscReal scale, SbLane F[9])
+static PetscReal volume_measure(SbMaterial m, const PetscReal f[9], PetscReal scale, SbPack F[9])
 {
-  SbLane p;
+  SbPack p;
 
   for (int k = 0; k < 9; k++) {
     for (int l = 0; l < SB_BATCH; l++) F[k][l] = scale * f[k];
   }
-  m->ops.pressure(m, (const SbLane *)F, p);
+  m->ops.pressure(m, (const SbPack *)F, p);
   return -p[0] / m->ops.volumetric_modulus(m);
 }
 
@@ -33,7 +33,7 @@ static PetscErrorCode rest_of_tangent(const char *law, PetscReal nu, const Petsc
 {
   const PetscReal mu = 1e4;
   PetscReal low = 0.5, high = 2.;
-  SbLane F[9], D[9], C[81];
+  SbPack F[9], D[9], C[81];
   SbMaterial m;
 
   PetscFunctionBeginUser;
@@ -47,8 +47,8 @@ static PetscErrorCode rest_of_tangent(const char *law, PetscReal nu, const Petsc
     else
       low = middle;
   }
-  m->ops.tangent(m, (const SbLane *)F, C);
-  m->ops.volumetric(m, (const SbLane *)F, D);
+  m->ops.tangent(m, (const SbPack *)F, C);
+  m->ops.volumetric(m, (const SbPack *)F, D);
   for (int k = 0; k < 81; k++)
     rest[k] = (C[k][1] - m->ops.volumetric_modulus(m) * D[k / 9][1] * D[k % 9][1]) / mu;
   PetscCall(SbMaterialDestroy(&m));

@@ -63,7 +63,7 @@ static PetscErrorCode open_case(const char *law, const char *extra, PetscBool fr
   PetscCall(SbSpaceCreateVec(c->t.model->space, &c->U));
   PetscCall(SbSpaceCreateVec(c->t.model->space, &c->b));
   PetscCall(SbSpaceCreateVec(c->t.model->space, &c->x));
-  PetscCall(SbModelFilterTangent(c->t.model, PETSC_TRUE)); /* definite at any state */
+  PetscCall(SbModelProjectTangent(c->t.model, PETSC_TRUE)); /* definite at any state */
   c->frames = frames;
   if (frames)
     PetscCall(SbSpaceCreateMatrixFree(c->t.model->space, &c->A));

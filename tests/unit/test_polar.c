@@ -57,11 +57,11 @@ static void with_stretches(PetscReal s0, PetscReal s1, PetscReal s2, PetscReal F
 
 static void polar_one(const PetscReal F[9], PetscReal R[9])
 {
-  SbLane f[9], r[9];
+  SbPack f[9], r[9];
 
-  for (int l = 0; l < SB_BATCH; l++) SbLanePut(9, F, l, f);
-  SbPolar((const SbLane *)f, r);
-  SbLaneGet(9, (const SbLane *)r, SB_BATCH / 2, R);
+  for (int l = 0; l < SB_BATCH; l++) SbPackPut(9, F, l, f);
+  SbPolar((const SbPack *)f, r);
+  SbPackGet(9, (const SbPack *)r, SB_BATCH / 2, R);
 }
 
 static void cross(const Long a[3], const Long b[3], Long c[3])
@@ -311,7 +311,7 @@ static void test_lanes(void)
 
   for (int t = 0; t < 500; t++) {
     PetscReal F[9], G[9], R[9], Q[9];
-    SbLane f[9], r[9];
+    SbPack f[9], r[9];
 
     for (int k = 0; k < 9; k++) F[k] = (k % 4 == 0) + (t % 5) * 0.3 * uniform();
     polar_one(F, R);
@@ -319,10 +319,10 @@ static void test_lanes(void)
       for (int l = 0; l < SB_BATCH; l++) {
         with_stretches(1, uniform(), l % 3 ? uniform() : 0, G);
         if (l == (place + 3) % SB_BATCH) G[0] = NAN;
-        SbLanePut(9, l == place ? F : G, l, f);
+        SbPackPut(9, l == place ? F : G, l, f);
       }
-      SbPolar((const SbLane *)f, r);
-      SbLaneGet(9, (const SbLane *)r, place, Q);
+      SbPolar((const SbPack *)f, r);
+      SbPackGet(9, (const SbPack *)r, place, Q);
       different += memcmp(R, Q, sizeof(R)) != 0;
     }
   }

@@ -101,7 +101,7 @@ static PetscErrorCode hand_over(TestScene *a, TestScene *b, SbRemeshResult *resu
   }
   PetscCall(SbModelSetUp(b->model));
   PetscCall(SbRunSetUp(b->run));
-  PetscCall(SbRunContinue(a->run, b->run));
+  PetscCall(SbRunTransferState(a->run, b->run));
   PetscCall(SbScatter(&result->next, b->run));
   PetscCall(SbEffectsHandOver(a->run, b->run, renamed));
   PetscCall(SbGatheredDestroy(&g));

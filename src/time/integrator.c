@@ -14,7 +14,7 @@
 #include "time_impl.h"
 #include "sbsolver.h"
 
-const char *const SbTimePresets =
+const char *const SbIntegrators =
   "euler_implicit|newmark|genalpha|euler_symplectic|euler_explicit|alpha2|static";
 
 static const SbOption rows[] = {
@@ -126,7 +126,7 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
   r->model = model;
   PetscCall(SbScopeSet(&scope, "", "", ""));
   PetscCall(SbOptionChoice(&scope, "time", &preset));
-  r->preset = (SbTimePreset)preset;
+  r->preset = (SbIntegrator)preset;
   model->dynamic = (PetscBool)(r->preset != SB_TIME_STATIC);
   if (model->dynamic) {
     char text[64];
@@ -225,7 +225,7 @@ static double complex alpha_eigenvalue(const SbMethodSettings *s, double w)
   return z;
 }
 
-void SbRunMethodError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead)
+void SbRunLocalError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead)
 {
   const double w = 0.03;
   SbMethodSettings s;
@@ -542,7 +542,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
   /* the matrix, and what solves see of it when constraints stand beside it */
   if (!explicit) {
     PetscCall(SbSolverCreateOperator(m->space, run->solver_used, &run->J));
-    if (SbConstraintsBeside(m->space))
+    if (SbConstraintsSeparate(m->space))
       PetscCall(SbConstraintsCreateOperator(m->space, run->J, (PetscBool)!m->dynamic, run->saddle_used,
                                             &run->operator));
     else if (m->nnonsymmetric)
@@ -613,7 +613,7 @@ PetscErrorCode SbRunSolve(SbRun run)
   if (run->wall_start == 0.) run->wall_start = MPI_Wtime();
   run->paused = PETSC_FALSE;
   run->seen.U = NULL;
-  if (run->model->npotential) PetscCall(SbModelGuardStart(run->model, run->t0, run->dt, run->U));
+  if (run->model->npotential) PetscCall(SbModelPotentialStart(run->model, run->t0, run->dt, run->U));
   if (run->ts) {
     PetscCall(TSSetStepNumber(run->ts, run->step0));
     PetscCall(TSSetTime(run->ts, run->t0));

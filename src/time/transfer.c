@@ -38,7 +38,7 @@ static PetscBool is_explicit(const SbRun run)
   return (PetscBool)(run->preset == SB_TIME_EULER_EXPLICIT || run->preset == SB_TIME_EULER_SYMPLECTIC);
 }
 
-PetscErrorCode SbRunContinue(SbRun from, SbRun to)
+PetscErrorCode SbRunTransferState(SbRun from, SbRun to)
 {
   PetscReal dt;
 

@@ -1,5 +1,5 @@
 /*
-  near_name.c - which of some names a misspelt one may mean.
+  suggest_name.c - which of some names a misspelt one may mean.
 
   Distance between words: optimal string alignment (Levenshtein's distance, an exchange of neighbours counts as one edit;
   Damerau, Communications of the ACM 7, 1964). Case does not count, as in PETSc.
@@ -31,7 +31,7 @@ static PetscInt edit_distance(const char *a, const char *b)
   return row[na % 3][nb];
 }
 
-PetscErrorCode SbNearestNames(const char *word, PetscInt n, const char *const names[], size_t size,
+PetscErrorCode SbSuggestNames(const char *word, PetscInt n, const char *const names[], size_t size,
                               char text[])
 {
   const PetscInt farthest = strlen(word) < 6 ? 1 : 2; /* edits that still look like a slip */
@@ -54,7 +54,7 @@ PetscErrorCode SbNearestNames(const char *word, PetscInt n, const char *const na
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbNamesAdvise(const char *word, PetscInt n, const char *const names[], size_t size,
+PetscErrorCode SbSuggestName(const char *word, PetscInt n, const char *const names[], size_t size,
                              char text[])
 {
   char near[256];
@@ -65,7 +65,7 @@ PetscErrorCode SbNamesAdvise(const char *word, PetscInt n, const char *const nam
     PetscCall(PetscStrlcat(text, i ? ", " : "", size));
     PetscCall(PetscStrlcat(text, names[i], size));
   }
-  PetscCall(SbNearestNames(word, n, names, sizeof(near), near));
+  PetscCall(SbSuggestNames(word, n, names, sizeof(near), near));
   if (!near[0]) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscStrlcat(text, "; did you mean ", size));
   PetscCall(PetscStrlcat(text, near, size));
@@ -88,12 +88,12 @@ PetscErrorCode SbListAdvise(PetscFunctionList list, const char *word, size_t siz
   while (n && !names[n - 1])
     n--; /* PETSc 3.18 counts the closing NULL; newer releases have no order of their own */
   qsort(names, (size_t)n, sizeof(*names), compare_texts);
-  PetscCall(SbNamesAdvise(word, n, names, size, text));
+  PetscCall(SbSuggestName(word, n, names, size, text));
   PetscCall(PetscFree(names));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscBool SbBeginsWith(const char *word, const char *beginnings)
+PetscBool SbHasPrefix(const char *word, const char *beginnings)
 {
   size_t n;
 

@@ -1,5 +1,5 @@
 /*
-  contact_rebound.c - velocities at a rigid obstacle: restitution of nodes that meet it, whose law and what it does to the energy are described in
+  contact_restitution.c - velocities at a rigid obstacle: restitution of nodes that meet it, whose law and what it does to the energy are described in
   src/model/restitution.c, and how fast it moves where it holds nodes.
 */
 #include "contact_node.h"

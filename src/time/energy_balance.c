@@ -39,7 +39,7 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   PetscCall(VecDuplicate(run->U, &loads));
   PetscCall(VecDuplicate(run->U, &reaction));
   PetscCall(SbModelLoads(m, t, run->U, run->V, loads));
-  if (m->npotential) PetscCall(SbModelGuardWork(m, run->U, &contact, loads));
+  if (m->npotential) PetscCall(SbModelPotentialWork(m, run->U, &contact, loads));
   PetscCall(SbRunReactions(run, t, reaction));
   if (run->damped) PetscCall(SbModelDampingPower(m, run->U, run->V, &power));
   if (!first) {

@@ -1,5 +1,5 @@
 /*
-  rebound.h - Newton's law of restitution for one point that meets something within a step; told in src/model/restitution.c.
+  restitution.h - Newton's law of restitution for one point that meets something within a step; told in src/model/restitution.c.
 */
 #pragma once
 #include "sbbase.h"

@@ -1,5 +1,5 @@
 /*
-  Guarded contact as Newton's method sees it: all effects that have it together.
+  The potential of contact, response barrier, as Newton's method sees it: all effects that have it together.
 */
 #include "model_impl.h"
 #include "sblog.h"
@@ -12,11 +12,11 @@
     PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));   \
   } while (0)
 
-#define ROUNDS 20   /* of motions of bodies that touch */
-#define SWEEPS 1000 /* over what touches, in each */
-#define FAR 2.      /* of the gap they are to have: how far a round moves bodies at most */
-#define CLOSE 0.9   /* of that gap: nearer is touching */
-#define MISSED 1e-3 /* of it: by which a sweep may leave it smaller */
+#define ROUNDS 20   /* rounds of moving bodies in initial contact apart, at most */
+#define SWEEPS 1000 /* Gauss-Seidel sweeps over the contacts in each round */
+#define FAR 2.      /* of the target gap: how far a round moves bodies at most */
+#define CLOSE 0.9   /* of the target gap: nearer counts as contact */
+#define MISSED 1e-3 /* of the target gap: by which a sweep may miss it */
 
 static int by_value(const void *a, const void *b)
 {
@@ -29,21 +29,22 @@ static int by_value(const void *a, const void *b)
 }
 
 /* What touches on any rank, the same on all and in an order that no partition changes: bodies, direction, gap and the one to have. */
-static PetscErrorCode gather_touches(MPI_Comm comm, const SbTouches *mine, PetscInt *n, PetscReal (**all)[7])
+static PetscErrorCode gather_touches(MPI_Comm comm, const SbInitialContacts *mine, PetscInt *n,
+                                     PetscReal (**all)[7])
 {
   PetscReal(*own)[7];
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(mine->n + 1, &own));
   for (PetscInt i = 0; i < mine->n; i++) {
-    const SbTouch *t = &mine->touch[i];
+    const SbInitialContact *t = &mine->touch[i];
 
     for (int k = 0; k < 2; k++) own[i][k] = (PetscReal)t->body[k];
     for (int k = 0; k < 3; k++) own[i][2 + k] = t->n[k];
     own[i][5] = t->gap;
     own[i][6] = t->to;
   }
-  PetscCall(SbGatherAll(comm, MPIU_REAL, 7 * mine->n, own, n, all, NULL));
+  PetscCall(SbAllgatherv(comm, MPIU_REAL, 7 * mine->n, own, n, all, NULL));
   *n /= 7;
   if (*n) qsort(*all, (size_t)*n, sizeof(**all), by_value);
   PetscCall(PetscFree(own));
@@ -147,7 +148,7 @@ static PetscErrorCode move_apart(SbModel m, PetscReal t, PetscReal dt, PetscReal
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc2(nbody + 1, &fixed, 3 * (nbody + 1), &way));
   for (int round = 0; go_on && round < ROUNDS; round++) {
-    SbTouches list = {0};
+    SbInitialContacts list = {0};
     PetscReal(*touch)[7];
     PetscInt n = 0;
 
@@ -201,7 +202,7 @@ static PetscErrorCode close_state(SbModel m, Vec U, PetscBool moved, Vec *local,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelGuardStart(SbModel m, PetscReal t, PetscReal dt, Vec U)
+PetscErrorCode SbModelPotentialStart(SbModel m, PetscReal t, PetscReal dt, Vec U)
 {
   PetscBool moved = PETSC_FALSE;
   PetscReal *u;
@@ -250,7 +251,7 @@ static PetscErrorCode step_speed(SbModel m, PetscReal t, PetscReal dt, Vec U, Ve
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelGuardBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0, Vec V0)
+PetscErrorCode SbModelPotentialBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0, Vec V0)
 {
   PetscBool moved = PETSC_FALSE;
   PetscReal *u;
@@ -284,15 +285,15 @@ PetscErrorCode SbModelGuardBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0, V
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelGuardAdvance(SbModel m, PetscReal progress)
+PetscErrorCode SbModelPotentialAdvance(SbModel m, PetscReal progress)
 {
   PetscFunctionBeginUser;
   for (PetscInt e = 0; e < m->npotential; e++) CONTACT_CALL(m->potential[e], advance, progress);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelGuardSafe(SbModel m, Vec X, Vec Y, PetscReal progress, PetscReal *part,
-                                PetscInt *nactive)
+PetscErrorCode SbModelPotentialMaxStep(SbModel m, Vec X, Vec Y, PetscReal progress, PetscReal *part,
+                                       PetscInt *nactive)
 {
   const PetscReal *u0, *u1;
   PetscReal found[2] = {1., 0.};
@@ -320,7 +321,7 @@ PetscErrorCode SbModelGuardSafe(SbModel m, Vec X, Vec Y, PetscReal progress, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelGuardNearest(SbModel m, size_t size, char text[])
+PetscErrorCode SbModelPotentialNearest(SbModel m, size_t size, char text[])
 {
   PetscReal least = PETSC_MAX_REAL;
   char mine[256];
@@ -338,7 +339,7 @@ PetscErrorCode SbModelGuardNearest(SbModel m, size_t size, char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelGuardLag(SbModel m, Vec X, PetscBool solved, PetscBool *again)
+PetscErrorCode SbModelPotentialUpdateFriction(SbModel m, Vec X, PetscBool solved, PetscBool *again)
 {
   const PetscReal *u;
 
@@ -356,7 +357,7 @@ PetscErrorCode SbModelGuardLag(SbModel m, Vec X, PetscBool solved, PetscBool *ag
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelGuardHessian(SbModel m, Vec U, SbContactHessian kind, SbBlocks *blocks, Vec R)
+PetscErrorCode SbModelPotentialHessian(SbModel m, Vec U, SbContactHessian kind, SbBlocks *blocks, Vec R)
 {
   const SbSpace s = m->space;
   const PetscReal *u;
@@ -377,8 +378,8 @@ PetscErrorCode SbModelGuardHessian(SbModel m, Vec U, SbContactHessian kind, SbBl
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelGuardGradient(SbModel m, Vec U, PetscReal scale, PetscBool free_only, PetscReal *energy,
-                                    Vec F)
+PetscErrorCode SbModelPotentialGradient(SbModel m, Vec U, PetscReal scale, PetscBool free_only,
+                                        PetscReal *energy, Vec F)
 {
   const SbSpace s = m->space;
   const PetscReal *u;
@@ -431,7 +432,7 @@ PetscErrorCode SbModelGapForces(SbModel m, Vec U, Vec F, PetscReal *bound)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelScaleWidths(SbModel m, PetscReal factor, PetscReal growth, PetscBool *changed)
+PetscErrorCode SbModelScaleBarrierWidths(SbModel m, PetscReal factor, PetscReal growth, PetscBool *changed)
 {
   PetscFunctionBeginUser;
   *changed = PETSC_FALSE;
@@ -444,11 +445,11 @@ PetscErrorCode SbModelScaleWidths(SbModel m, PetscReal factor, PetscReal growth,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelGuardWork(SbModel m, Vec U, PetscReal *work, Vec F)
+PetscErrorCode SbModelPotentialWork(SbModel m, Vec U, PetscReal *work, Vec F)
 {
   PetscFunctionBeginUser;
   *work = 0.;
-  PetscCall(SbModelGuardGradient(m, U, 1., PETSC_FALSE, NULL, F));
+  PetscCall(SbModelPotentialGradient(m, U, 1., PETSC_FALSE, NULL, F));
   for (PetscInt e = 0; e < m->npotential; e++) {
     PetscReal mine;
 

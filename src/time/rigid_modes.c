@@ -87,7 +87,7 @@ static PetscErrorCode list_parts(SbSpace s, const PetscInt label[], PetscInt *np
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     if (label[i] == s->gnode[i]) own[mine++] = label[i];
   }
-  PetscCall(SbGatherAll(s->comm, MPIU_INT, mine, own, npart, part, NULL));
+  PetscCall(SbAllgatherv(s->comm, MPIU_INT, mine, own, npart, part, NULL));
   PetscCall(PetscSortInt(*npart, *part));
   PetscCall(PetscFree(own));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -6,7 +6,7 @@
 
 #define PROBE 1e-6 /* of the bodies' size: far enough for digits, near enough to be linear */
 
-PetscErrorCode SbProbeLength(SbLedger l, Vec D, PetscReal *length)
+PetscErrorCode SbDifferenceLength(SbLedger l, Vec D, PetscReal *length)
 {
   const SbModel m = l->run->model;
   PetscReal size, volume = 0.;

@@ -1,5 +1,5 @@
 /*
-  packed.h - dense panels in 16-bit integers, for solves that read as few bytes as possible: factor.c, interface.c.
+  quantized.h - dense panels in 16-bit integers, for solves that read as few bytes as possible: factor.c, interface.c.
 
   Entries are 16-bit integers times a scale per column. Two of them share a 32-bit word, so that reading them takes little more than
   a conversion: shifted up, the word is the lower one; as it is, it is the upper one, the lower one being a fraction that was

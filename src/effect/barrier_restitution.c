@@ -1,5 +1,5 @@
 /*
-  barrier_bounce.c - restitution with the response `barrier`: what meets within a step leaves with a part of its speed (the law and its energy: src/model/restitution.c).
+  barrier_restitution.c - restitution with the response `barrier`: what meets within a step leaves with a part of its speed (the law and its energy: src/model/restitution.c).
 
   When a step begins, all that is not within the width of a barrier flies on with its velocity. A pair that comes to the width on this way, or nearly, has
   the direction n and the weights of its nearest places there, and the speed of approach v = -n . sum weight v. In this step it is pushed, not pulled, to
@@ -86,7 +86,7 @@ PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const P
   PetscCall(PetscMalloc2(3 * s->nnode, &u1, 3 * m->nvertex, &x));
   for (PetscInt i = 0; i < 3 * s->nnode; i++) u1[i] = u0[i] + dt * v0[i];
   PetscCall(SbBarrierLook(b, u0));
-  PetscCall(SbContactMeshMove(m, u1, NULL, b->other));
+  PetscCall(SbContactMeshGetPositions(m, u1, NULL, b->other));
   SbBarrierPlaceObstacle(b, 1., b->other);
   PetscCall(SbContactPairsFind(b->pairs, b->x, b->other));
   b->known = PETSC_FALSE;
@@ -99,7 +99,7 @@ PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const P
     PetscReal at, mass = PETSC_MAX_REAL;
     Spring spring;
 
-    if (SbContactPairApart(m, pair, b->x, b->other, w)) continue;
+    if (SbContactPairSweptApart(m, pair, b->x, b->other, w)) continue;
     at = meets(b, pair, b->x, b->other, w);
     if (at > 1.) continue;
     for (int k = 0; k < (pair->side ? 3 : 4); k++) {
