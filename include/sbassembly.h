@@ -36,10 +36,11 @@ PetscErrorCode SbPlanCreate(SbSpace space, SbPlan *plan);
 
 /*
   The volumetric part of a tangent, kept out of the matrix: sum over cells of modulus / V b b^T, b_a = V D grad psi_a with D from
-  SbMaterialOps.volumetric. Cells of P1 bodies and of laws with lambda <= 0 are kept whole: b and both moduli are zero.
+  SbMaterialOps.volumetric; of P2 V times the derivative of the mean of theta. Cells of P1 bodies and of laws with lambda <= 0 are kept whole: b and both moduli are zero.
 */
 typedef struct {
-  SbPack *b;       /* [nbatch][12] m^2; 0 in padding */
+  PetscInt stride; /* lanes of a batch in b: 12, or 30 with a P2 body */
+  SbPack *b;       /* [nbatch][stride] m^2; 0 in padding */
   SbPack *modulus; /* [nbatch] lambda times the factor of stiffness and damping, Pa */
   SbPack *shear;   /* [nbatch] mu likewise, Pa */
 } SbVolumetric;

@@ -12,11 +12,12 @@
   A DG cell that touches this rank's cells with a vertex only may have neighbours that are not here; its strain is that of its own
   nodes there, so that in a strained body the P1 matrix is slightly nonsymmetric at the border of ranks. GMRES does not mind.
   Springs of effects are in P1's matrix as the Galerkin product has them: they may be all that supports a body.
-  P1 by algebraic multigrid. Hiptmair and Xu (2007), Nodal auxiliary space preconditioning; Brenner (2003), Poincare-Friedrichs
+  P1 by algebraic multigrid. With a P2 body: pc_p_multigrid.c. Hiptmair and Xu (2007), Nodal auxiliary space preconditioning; Brenner (2003), Poincare-Friedrichs
   inequalities for piecewise H1 functions.
 */
 #include "pressure.h"
 #include "gauss_seidel.h"
+#include "sbsolver.h"
 
 /*
   Couplings of P1 that are zero do not count when multigrid coarsens: boxes have many. Bar of CR, nu 0.49, 53,000 tets: 59 iterations on 1, 2, 3 and
@@ -213,6 +214,10 @@ PetscErrorCode SbLevelsApply(SbLevels v, Vec r, Vec z)
   SbSpace s = v->space;
 
   PetscFunctionBeginUser;
+  if (v->multigrid) {
+    PetscCall(PCApply(v->multigrid, r, z));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (v->n == 2) {
     PetscCall(cycle_faces(v, r, z));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -275,7 +280,7 @@ static PetscErrorCode loose_diagonal(SbLevels v, Vec D)
 PetscErrorCode SbLevelsAddSpring(SbLevels v, PetscInt node, PetscReal factor, const PetscReal block[9])
 {
   PetscFunctionBeginUser;
-  if (node >= v->space->nnode_owned) PetscFunctionReturn(PETSC_SUCCESS);
+  if (v->multigrid || node >= v->space->nnode_owned) PetscFunctionReturn(PETSC_SUCCESS);
   if (!v->spring) PetscCall(PetscCalloc1(9 * (size_t)v->space->nnode_owned, &v->spring));
   v->sprung = PETSC_TRUE;
   for (int k = 0; k < 9; k++) v->spring[9 * node + k] += factor * block[k];
@@ -309,10 +314,11 @@ static PetscErrorCode gather_springs(SbLevels v)
 
 PetscErrorCode SbLevelsShareSprings(SbLevels v)
 {
-  const SbSpace s = v->at[v->n - 2], p = v->at[v->n - 1];
+  const SbSpace s = v->at[PetscMax(0, v->n - 2)], p = v->at[v->n - 1];
   PetscBool any = v->sprung;
 
   PetscFunctionBeginUser;
+  if (v->multigrid) PetscFunctionReturn(PETSC_SUCCESS); /* made from the matrix */
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, SB_MPI_BOOL, MPI_LOR, v->space->comm));
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(gather_springs(v));
@@ -357,6 +363,15 @@ PetscErrorCode SbLevelsAssemble(SbLevels v, const SbStage *stage, const SbVolume
 PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
 {
   PetscFunctionBeginUser;
+  if (v->multigrid) {
+    PCFailedReason reason;
+
+    PetscCall(PCSetOperators(v->multigrid, v->A[0], v->A[0]));
+    PetscCall(PCSetUp(v->multigrid));
+    PetscCall(PCGetFailedReason(v->multigrid, &reason));
+    *positive = (PetscBool)!reason;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (v->n == 3) {
     SbSpace s = v->space;
     const SbPlan p = s->plan;
@@ -403,6 +418,12 @@ PetscErrorCode SbLevelsCreate(SbSpace s, SbLevels *levels)
   v->space = v->at[0] = s;
   v->n = 1;
   PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_BAIJ, &v->A[0]));
+  *levels = v;
+  if (s->edge_node) {
+    PetscCall(PCCreate(s->comm, &v->multigrid));
+    PetscCall(SbPCPMultigridCreate(s, v->multigrid));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (s->width > 4) {
     PetscCall(add_level(v, PETSC_FALSE));
     PetscCall(find_means(v));
@@ -435,7 +456,6 @@ PetscErrorCode SbLevelsCreate(SbSpace s, SbLevels *levels)
   PetscCall(PCGAMGSetCoarseEqLim(pc, LAST_LEVEL));
   PetscCall(PCGAMGSetProcEqLim(pc, PER_RANK));
   PetscCall(KSPSetFromOptions(v->coarse));
-  *levels = v;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -462,6 +482,7 @@ PetscErrorCode SbLevelsDestroy(SbLevels *levels)
   PetscCall(PetscFree4(v->mean, v->across, v->weight, v->jump));
   PetscCall(PetscFree(v->corner));
   PetscCall(KSPDestroy(&v->coarse));
+  PetscCall(PCDestroy(&v->multigrid));
   PetscCall(PetscFree(*levels));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

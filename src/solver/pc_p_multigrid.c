@@ -143,6 +143,7 @@ static PetscErrorCode create_solver(Multigrid *p)
 {
   const PetscReal weak = WEAK;
   const char *package;
+  char type[SB_NAME_MAX] = "";
   PetscInt N;
 
   PetscFunctionBeginUser;
@@ -150,7 +151,8 @@ static PetscErrorCode create_solver(Multigrid *p)
   PetscCall(PCSetOptionsPrefix(p->solver, "pc_coarse_"));
   PetscCall(MatGetSize(p->E, &N, NULL));
   PetscCall(SbDirectPackage(p->space->comm, N, PETSC_TRUE, &package));
-  if (package && N <= FACTORED)
+  PetscCall(PetscOptionsGetString(NULL, "pc_coarse_", "-pc_type", type, sizeof(type), NULL));
+  if (package && N <= FACTORED && strcmp(type, PCGAMG))
     PetscCall(SbPCDirectSet(p->solver, package, PETSC_TRUE));
   else {
     PetscCall(SbAttachModes(p->E, fill_mode, p));

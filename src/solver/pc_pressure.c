@@ -278,7 +278,10 @@ static PetscErrorCode PCView_Pressure(PC pc, PetscViewer viewer)
   PetscCall(PCShellGetContext(pc, &s));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  nodes, and pressures of the cells as unknowns\n"));
   if (s->inner) PetscCall(KSPView(s->inner, viewer));
-  if (s->op) PetscCall(KSPView(s->op->levels->coarse, viewer));
+  if (s->op && s->op->levels->multigrid)
+    PetscCall(PCView(s->op->levels->multigrid, viewer));
+  else if (s->op)
+    PetscCall(KSPView(s->op->levels->coarse, viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -28,6 +28,18 @@ static void clear_fixed(SbSpace s, PetscInt nnode, PetscReal x[])
   }
 }
 
+/* What the cells of a batch strain with, at the 4 or 10 nodes of each: u[3 n], and n. */
+static inline int gather_strain(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[],
+                                SbPack u[30])
+{
+  if (!region->quadratic) {
+    sb_gather_strain(s, region, b, x, u);
+    return 4;
+  }
+  sb_gather_nodes(10, s->batch_clique + s->width * SB_BATCH * b, x, u);
+  return 10;
+}
+
 /* d = B u. */
 static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar u[], PetscBool absolute,
                                        PetscScalar d[])
@@ -47,11 +59,11 @@ static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar 
     const SbRegion *region = &space->region[r];
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
-      const SbPack *v = (const SbPack *)op->volume.b + 12 * b;
-      SbPack cell_u[12], sum = {0};
+      const SbPack *v = (const SbPack *)op->volume.b + op->volume.stride * b;
+      SbPack cell_u[30], sum = {0};
+      const int n = gather_strain(space, region, b, local, cell_u);
 
-      sb_gather_strain(space, region, b, local, cell_u);
-      for (int k = 0; k < 12; k++) {
+      for (int k = 0; k < 3 * n; k++) {
         for (int l = 0; l < SB_BATCH; l++)
           sum[l] += (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * cell_u[k][l];
       }
@@ -89,16 +101,20 @@ static PetscErrorCode add_gradient(SbPressureOperator op, const PetscScalar p[],
     const SbRegion *region = &space->region[r];
 
     for (PetscInt b = region->bstart; b < region->bend; b++) {
-      const SbPack *v = (const SbPack *)op->volume.b + 12 * b;
+      const SbPack *v = (const SbPack *)op->volume.b + op->volume.stride * b;
       const PetscReal *value = q + space->batch_cell[b];
-      SbPack force[12], lane = {0};
+      SbPack force[30], lane = {0};
 
       for (PetscInt l = 0; l < space->batch_n[b]; l++) lane[l] = value[l];
-      for (int k = 0; k < 12; k++) {
+      for (int k = 0; k < (region->quadratic ? 30 : 12); k++) {
         for (int l = 0; l < SB_BATCH; l++)
           force[k][l] = (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * lane[l];
       }
-      sb_scatter_strain(space, region, b, force, f);
+      if (region->quadratic)
+        sb_scatter_nodes(10, space->batch_clique + space->width * SB_BATCH * b, space->batch_n[b],
+                         (const SbPack *)force, f);
+      else
+        sb_scatter_strain(space, region, b, force, f);
     }
   }
   clear_fixed(s, s->nnode_owned, f);
@@ -195,13 +211,13 @@ static PetscErrorCode MatGetDiagonal_Pressure(Mat K, Vec D)
     const SbRegion *region = &s->region[r];
 
     for (PetscInt b = region->bstart; b < region->bend; b++) {
-      const SbPack *v = (const SbPack *)op->volume.b + 12 * b;
+      const SbPack *v = (const SbPack *)op->volume.b + op->volume.stride * b;
 
-      for (PetscInt k = 0; k < 12; k++) {
+      for (PetscInt k = 0; k < (region->quadratic ? 30 : 12); k++) {
         for (PetscInt l = 0; l < s->batch_n[b]; l++) {
           const PetscReal weight = region->broken ? s->batch_weight[4 * b + k / 3][l] : 1.,
                           square = op->volume.modulus[b][l] / s->batch_V[b][l] * PetscSqr(v[k][l]);
-          const PetscInt node = s->batch_node[(4 * b + k / 3) * SB_BATCH + l];
+          const PetscInt node = s->batch_clique[(s->width * b + k / 3) * SB_BATCH + l];
 
           y[3 * node + k % 3] += square * PetscSqr(weight);
           if (region->broken)
@@ -264,7 +280,8 @@ static void cell_numbers(SbPressureOperator op)
         const PetscReal V = s->batch_V[b][l], modulus = op->volume.modulus[b][l];
         PetscReal square = 0.;
 
-        for (int k = 0; k < 12; k++) square += PetscSqr(op->volume.b[12 * b + k][l]);
+        for (int k = 0; k < (region->quadratic ? 30 : 12); k++)
+          square += PetscSqr(op->volume.b[op->volume.stride * b + k][l]);
         op->norm[c] = PetscSqrtReal(square);
         op->Cinv[c] = modulus / V;
         op->C[c] = modulus > 0. ? V / modulus : 1.;
@@ -340,18 +357,20 @@ PetscErrorCode SbPressureOperatorCreate(SbSpace s, Mat *K)
   PetscInt n;
 
   PetscFunctionBeginUser;
-  PetscCheck(
-    s->faces && !s->edge_node, s->comm, PETSC_ERR_USER,
-    "-solver pressure is for bodies with -body_<name>_element cr or dg, %s: choose auto, or cg_two_level",
-    s->faces ? "and some have p2" : "and there are none");
+  PetscCheck(!s->faces != !s->edge_node, s->comm, PETSC_ERR_USER,
+             "-solver pressure is for bodies with -body_<name>_element p2, or with cr or dg, %s: choose "
+             "auto, or cg_two_level",
+             s->faces ? "not for both in one run" : "and there are none");
   PetscCall(PetscNew(&op));
   op->space = s;
   PetscCall(SbLevelsCreate(s, &op->levels));
   space = op->space;
   n = space->mesh->ncell_owned;
-  PetscCall(PetscMalloc((size_t)space->nbatch * 14 * sizeof(SbPack) + 64, &op->memory));
+  op->volume.stride = s->edge_node ? 30 : 12;
+  PetscCall(
+    PetscMalloc((size_t)(space->nbatch * (op->volume.stride + 2)) * sizeof(SbPack) + 64, &op->memory));
   op->volume.b = (SbPack *)(((uintptr_t)op->memory + 63) & ~(uintptr_t)63);
-  op->volume.modulus = op->volume.b + 12 * (size_t)space->nbatch;
+  op->volume.modulus = op->volume.b + op->volume.stride * space->nbatch;
   op->volume.shear = op->volume.modulus + space->nbatch;
   PetscCall(PetscMalloc4(n, &op->C, n, &op->Cinv, n, &op->S, n, &op->norm));
   PetscCall(SbSpaceCreateVec(space, &op->u));

@@ -7,12 +7,12 @@
 
 /*
   Up to three spaces of one mesh: the space itself; the same with CR instead of DG, when some body is DG; and P1 for every body.
-  The tangent without its volumetric part is assembled in each.
+  The tangent without its volumetric part is assembled in each. With a P2 body there is the space itself only, and pc_p_multigrid.c.
 */
 typedef struct _p_SbLevels *SbLevels;
 struct _p_SbLevels {
   SbSpace space; /* borrowed */
-  PetscInt n;    /* number of levels: 2, or 3 with a DG body */
+  PetscInt n;    /* number of levels: 2, or 3 with a DG body, 1 with a P2 body */
   SbSpace at[3]; /* at[0] = space; the others are owned */
   Mat A[3];      /* BAIJ; the last one AIJ */
   SbElement *element[3];
@@ -27,8 +27,9 @@ struct _p_SbLevels {
   PetscBool sprung;     /* this rank has springs since the last assembly */
   PetscReal
     *spring; /* [nnode_owned][9] sum of the springs of effects at each node, N/m; NULL before the first one */
-  PetscReal *shared; /* [nodes of at[n-2]][9] the same there; NULL before the first one of any rank */
-  KSP coarse;
+  PetscReal *shared;  /* [nodes of at[n-2]][9] the same there; NULL before the first one of any rank */
+  KSP coarse;         /* NULL with a P2 body */
+  PC multigrid;       /* of a space with a P2 body, else NULL */
   PetscReal *inverse; /* [nodes of at[n-2]][9] inverses of the diagonal blocks there, m/N */
 };
 /* Collective. The space's prescribed unknowns are known. Options read: -pressure_coarse_. */

@@ -83,8 +83,9 @@ static const SbSolverPreset presets[] = {
            "fastest with -snes_type ksponly and -ksp_rtol 1e-4"},
   {"pressure", SB_MATRIX_BAIJ, "-ksp_type richardson -ksp_max_it 300", .create = SbPressureOperatorCreate,
    .precondition = SbPCPressureCreate,
-   .help = "GMRES with the pressures of the cells as unknowns and multigrid on P1: CR and DG bodies at any "
-           "Poisson's ratio"},
+   .help =
+     "GMRES with the pressures of the cells as unknowns and multigrid on P1: P2, CR and DG bodies at any "
+     "Poisson's ratio"},
 };
 
 /* Preconditioners that the user names by -pc_type: what they work on, and what goes with them. The last row: all others. */
@@ -112,7 +113,7 @@ static const SbOption rows[] = {
    "BoomerAMG; gauss_seidel, sor: stationary iterations by blocks, or PETSc's; cholmod, umfpack, mumps: "
    "factorisations; rotated: CG with a Cholesky factor in low precision, computed once and rotated with the "
    "nodes from then on; realtime: the same without a matrix and warm-started, for linear and corotated; "
-   "pressure: GMRES with the pressures of cells as unknowns, for CR and DG near incompressibility. PETSc's "
+   "pressure: GMRES with the pressures of cells as unknowns, for P2, CR and DG near incompressibility. PETSc's "
    "-ksp_ and -pc_ options refine it"},
   {"reproducible", SB_OPTION_BOOL, 1, "", "false", "",
    "bitwise identical results of every run on the same number of ranks: matrices are factored on one rank, "
@@ -318,15 +319,18 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
                             " unknowns, nu up to %g, %.2g %% of the tets slivers (angles below %g degrees): "
                             "a factorisation, iterations hardly get there",
                             unknowns, (double)hard.nu, 100. * (double)hard.sliver_part, SB_SLIVER));
-  } else if (s->faces && !s->edge_node && !s->constraints && !s->coupled &&
-             (hard.face_nu > NU_PRESSURE || (!hard.slivers && (!dynamic || hard.dg)))) {
+  } else if (!s->constraints && !s->coupled &&
+             (s->edge_node
+                ? !s->faces && hard.nu > NU_SLIVERS
+                : s->faces && (hard.face_nu > NU_PRESSURE || (!hard.slivers && (!dynamic || hard.dg))))) {
     /* docs/reports/solver_choice.md; 24k tets of CR, dynamic, CPU s of this and cg_two_level at nu 0.3 12 and 7, at 0.45 15 and 11, at 0.49 17 and 17 */
     name = "pressure";
     PetscCall(PetscSNPrintf(
       reason, size,
       "%s, %" PetscInt_FMT
-      " unknowns of cr or dg, nu up to %g: iterations that grow neither towards 1/2 nor with the mesh",
-      dynamic ? "dynamic" : "static", unknowns, (double)hard.face_nu));
+      " unknowns of %s, nu up to %g: with the pressures as unknowns iterations hardly grow towards 1/2",
+      dynamic ? "dynamic" : "static", unknowns, s->edge_node ? "p2" : "cr or dg",
+      (double)(s->edge_node ? hard.nu : hard.face_nu)));
   } else {
     /* 192k tets, CPU s of one rank. Static: 0.36 (cg_gamg 1.7, cg_icc 1.4), at nu 0.45 0.7 (2.3), at 0.499 4.2 (18); dynamic, h = 0.01 s: 0.22 (1.7, 0.40) */
     name = s->edge_node && !s->faces ? "cg_p_multigrid" : "cg_two_level";
@@ -396,7 +400,7 @@ PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscB
       if (*preset && (*tried) & 1U << (*preset - presets)) *preset = NULL;
     }
     if (*preset && (*tried) & 1U << (*preset - presets)) *preset = NULL;
-    if (*preset && (*preset)->create && (!s->faces || s->edge_node || s->constraints)) *preset = NULL;
+    if (*preset && (*preset)->create && (!s->faces == !s->edge_node || s->constraints)) *preset = NULL;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

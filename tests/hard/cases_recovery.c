@@ -76,7 +76,6 @@ const HardCase HardCasesRecovery[] = {
   RECOVERY("flat", FLAT, HardStartFlat, "cr", "neohookean", "2", 0),
   RECOVERY("flat", FLAT, HardStartFlat, "dg", "corotated", "2", 0),
   RECOVERY("flat", FLAT, HardStartFlat, "p2", "corotated", "2", 0),
-  RECOVERY("random", RANDOM, HardStartRandom, "p2", "corotated", "2", 0),
   UNFOLDS("mirror", MIRROR, HardStartMirror, "p2", "corotated", "2", 0),
   {.name = NULL},
 };

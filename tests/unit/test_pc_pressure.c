@@ -186,6 +186,13 @@ static PetscErrorCode test_operators(void)
   PetscCall(test_operator(ONE("stvk", "dg"), 1e-4, &moving));
   PetscCall(test_operator(ONE("neohookean", "cr") "-body_one_tangent exact_spd", 1e-4, &still));
   PetscCall(test_operator(ONE("neohookean", "dg") "-mass consistent", 1e-4, &moving));
+  PetscCall(test_operator(ONE("linear", "p2"), 0., &still));
+  PetscCall(test_operator(ONE("corotated", "p2"), 1e-3, &moving));
+  PetscCall(test_operator(ONE("neohookean", "p2") "-body_one_tangent exact_spd", 1e-4, &moving));
+  PetscCall(
+    test_operator("-bodies a,b " BODY("a", "box:0.2,0.1,0.1:2", "linear", "p1", "-body_a_poisson 0.3 ")
+                    BODY("b", "box:0.2,0.1,0.1:3", "corotated", "p2", "-body_b_poisson 0.49 ") CLAMPED STATIC,
+                  1e-4, &still));
   PetscCall(test_operator(
     "-bodies a,b,c " BODY("a", "box:0.2,0.1,0.1:2", "linear", "p1", "-body_a_poisson 0.3 ")
       BODY("b", "box:0.2,0.1,0.1:3", "corotated", "cr", "-body_b_poisson 0.49 ")
@@ -252,11 +259,12 @@ static PetscErrorCode test_solution(const char *options, PetscInt bound, PetscRe
 /* Linear bars; measured: 39, 63 and 68 iterations at most. */
 static PetscErrorCode test_bounds(void)
 {
-  static const char *element[] = {"cr", "dg"}, *nu[] = {"0.3", "0.4999", "0.499999"}, *cells[] = {"2", "4"};
+  static const char *element[] = {"cr", "dg", "p2"}, *nu[] = {"0.3", "0.4999", "0.499999"},
+                    *cells[] = {"2", "4"};
   static const PetscInt bound[] = {45, 75, 80};
 
   PetscFunctionBeginUser;
-  for (int k = 0; k < 12; k++) {
+  for (int k = 0; k < 18; k++) {
     char options[1024];
 
     PetscCall(
@@ -264,7 +272,7 @@ static PetscErrorCode test_bounds(void)
                     "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:%s -body_bar_material linear "
                     "-body_bar_young 1e6 -body_bar_density 1000 -body_bar_element %s -body_bar_poisson %s "
                     "-effects gravity,clamp -effect_clamp_type fixed -effect_clamp_on xmin " STATIC,
-                    cells[k / 6], element[k / 3 % 2], nu[k % 3]));
+                    cells[k / 9], element[k / 3 % 3], nu[k % 3]));
     /* relative residuals of 1e-8 times the condition of the bar, above all in bending; at 0.499999 factorisations of the same
        matrix differ by 1e-5 among themselves */
     PetscCall(test_solution(options, bound[k % 3], k % 3 == 2 ? 1e-4 : 1e-6));
@@ -330,10 +338,10 @@ static PetscErrorCode test_scenes(void)
    iterations at most. */
 static PetscErrorCode test_springs(void)
 {
-  static const char *element[] = {"cr", "dg"}, *floor[] = {"plane:0,0,1,0.001", "plane:0.02,0,1,0.001"};
+  static const char *element[] = {"cr", "dg", "p2"}, *floor[] = {"plane:0,0,1,0.001", "plane:0.02,0,1,0.001"};
 
   PetscFunctionBeginUser;
-  for (int k = 0; k < 4; k++) {
+  for (int k = 0; k < 6; k++) {
     char options[1024];
 
     PetscCall(PetscSNPrintf(
@@ -345,7 +353,7 @@ static PetscErrorCode test_springs(void)
       "-effect_y_type fixed -effect_y_on ymin -effect_y_components y -effect_floor_type contact "
       "-effect_floor_response projected -effect_floor_on zmin -effect_floor_obstacle %s "
       "-effect_floor_response penalty " STATIC,
-      element[k % 2], floor[k / 2]));
+      element[k % 3], floor[k / 3]));
     PetscCall(test_solution(options, 65, 1e-5)); /* nonlinear: Newton ends at 1e-8 of the force */
   }
   PetscFunctionReturn(PETSC_SUCCESS);

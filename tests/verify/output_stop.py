@@ -102,7 +102,7 @@ def main():
         sys.exit(f"-wall_time 90 is not refused: {text}")
 
     # ... before there was a step: not what a job that is put back into the queue would mend
-    text = run(1, "early", *SLOW, "-wall_time", "0:00:01", "-body_bar_mesh", "box:0.4,0.1,0.1:60,15,15", fails=True)
+    text = run(1, "early", *SLOW, *LONG_STEPS, "-wall_time", "0:00:01", "-body_bar_mesh", "box:0.4,0.1,0.1:100,25,25", fails=True)
     if "-wall_time" not in text or json.loads((OUT / "early" / "run.json").read_text())["status"] != "failed":
         sys.exit(f"-wall_time that is over before the first step: {text}")
 

@@ -153,8 +153,7 @@ static PetscErrorCode check_orders(void)
 static PetscErrorCode check_refused(void)
 {
   static const char *const more[][2] = {
-    {"-time euler_implicit -ts_dt 0.1 -solver realtime", "-solver realtime"},
-    {"-time euler_implicit -ts_dt 0.1 -solver pressure", "-solver pressure"}};
+    {"-time euler_implicit -ts_dt 0.1 -solver realtime", "-solver realtime"}};
 
   PetscFunctionBeginUser;
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(more); k++) {
