@@ -109,7 +109,7 @@ deps:
 	@scripts/install-deps run
 
 demo: deps ## install what is missing, build, run scenarios/demo.opts on 2 ranks, draw it: out/demo
-	$(AGAIN) bin/supple meshes/organ.msh
+	$(AGAIN) bin/supple meshes/organ_coarse.msh
 	@scripts/venv
 	@scripts/mpi 2 bin/supple scenarios/demo.opts
 	@scripts/render out/demo
