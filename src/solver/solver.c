@@ -113,7 +113,8 @@ static const SbOption rows[] = {
    "BoomerAMG; gauss_seidel, sor: stationary iterations by blocks, or PETSc's; cholmod, umfpack, mumps: "
    "factorisations; rotated: CG with a Cholesky factor in low precision, computed once and rotated with the "
    "nodes from then on; realtime: the same without a matrix and warm-started, for linear and corotated; "
-   "pressure: GMRES with the pressures of cells as unknowns, for P2, CR and DG near incompressibility. PETSc's "
+   "pressure: GMRES with the pressures of cells as unknowns, for P2, CR and DG near incompressibility. "
+   "PETSc's "
    "-ksp_ and -pc_ options refine it"},
   {"reproducible", SB_OPTION_BOOL, 1, "", "false", "",
    "bitwise identical results of every run on the same number of ranks: matrices are factored on one rank, "
