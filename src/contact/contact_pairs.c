@@ -82,6 +82,29 @@ static PetscErrorCode add_pair(SbContactPairs p, const SbContactPair *pair)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether the features of a pair stay farther apart than the reach, wherever its vertices are in their boxes: the distance in the middle of the boxes
+   less what vertices may move from there, as the points between them move no farther. Boxes of neighbours in a surface overlap, but they seldom meet. */
+static PetscBool stays_apart(SbContactPairs p, const SbContactPair *pair)
+{
+  const int split = pair->kind == SB_PAIR_EDGE_EDGE ? 2 : 1;
+  PetscReal at[12], far[2] = {0., 0.};
+  SbDistance g;
+
+  for (int k = 0; k < 4; k++) {
+    const PetscReal *box = p->box + 6 * pair->v[k];
+    PetscReal square = 0.;
+
+    for (int i = 0; i < 3; i++) {
+      at[3 * k + i] = 0.5 * (box[i] + box[3 + i]);
+      square += 0.25 * PetscSqr(box[3 + i] - box[i]);
+    }
+    far[k >= split] = PetscMax(far[k >= split], square);
+  }
+  SbDistanceFind(pair->kind, at, &g);
+  return (PetscBool)(g.d - radius_of(p->mesh, pair) >
+                     p->reach + PetscSqrtReal(far[0]) + PetscSqrtReal(far[1]));
+}
+
 /* Whether features of a and b may meet at all: of different parts or self-contact, not both driven or the obstacle's. */
 static inline PetscBool wanted(SbContactPairs p, PetscInt a, PetscInt b)
 {
@@ -118,7 +141,7 @@ static PetscErrorCode add_vertex_triangle(SbContactPairs p, PetscInt v, PetscInt
     pair.area = m->area[v];
   else
     pair.area = (m->area[tri[0]] + m->area[tri[1]] + m->area[tri[2]]) / 3.;
-  if (!overlaps(p, pair.v, 1)) PetscCall(add_pair(p, &pair));
+  if (!overlaps(p, pair.v, 1) && !stays_apart(p, &pair)) PetscCall(add_pair(p, &pair));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -137,7 +160,7 @@ static PetscErrorCode add_edge_edge(SbContactPairs p, PetscInt e, PetscInt f)
     pair.area = m->edge_area[low];
   else
     pair.area = 0.5 * (m->edge_area[low] + m->edge_area[high]);
-  if (!overlaps(p, pair.v, 2)) PetscCall(add_pair(p, &pair));
+  if (!overlaps(p, pair.v, 2) && !stays_apart(p, &pair)) PetscCall(add_pair(p, &pair));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
