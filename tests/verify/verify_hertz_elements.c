@@ -72,6 +72,6 @@ int main(int argc, char **argv)
   PetscCall(check_plane("p1", CELLS, 0.03));
   PetscCall(check_plane("cr", 10, 0.03));
   PetscCall(check_plane("dg", 10, 0.03));
-  PetscCall(check_plane("p2", 8, 0.03));
+  PetscCall(check_plane("p2", 10, 0.03));
   SB_TEST_END();
 }
