@@ -7,7 +7,7 @@
   not used: the order of the corners gives the side. It is binary when its size is what its count of triangles says (80 bytes, the count,
   50 bytes per triangle), whatever its first word is, or when it is larger and there is a byte 0 near its beginning, which text has not:
   what follows the triangles is left out with a warning. Words of the text may be in capitals, and `end solid` be two of them. OBJ: the lines v, f, o and g; OFF: the plain kind. Faces with more
-  than three corners are cut into triangles, see triangles_polygon.c.
+  than three corners are cut into triangles, see triangles_add.c.
 */
 #include <ctype.h>
 #include <stdlib.h>

@@ -1,17 +1,77 @@
 /*
-  triangles_polygon.c - a polygon as triangles between its corners: a fan where that works, else ear by ear.
+  triangles_add.c - vertices, triangles and polygons, added as a file gives them; a polygon becomes triangles between its corners: a fan
+  where that works, else ear by ear.
 
   Signs are those of areas seen along the polygon's normal (Newell's sum over its edges, which a slightly warped one has, too). An
   ear is a corner that turns left and whose triangle holds no other corner; cut off is the one whose triangle has the largest smallest
   angle, so that corners on a straight line do not end as triangles without area (Meisters, "Polygons have ears", 1975). Polygons
   within a polygon become one with it by bridges: pairs of edges there and back.
 */
+#include <ctype.h>
 #include "sbkernel.h"
 #include "triangles.h"
 
 #define CORNERS_MAX 1000 /* of a polygon that is no fan: the search for ears takes their number cubed */
 #define LOOPS_MAX 100    /* polygons of one facet */
 #define THIN 1e-9        /* area over longest edge squared, below which a fan's triangle is not taken */
+
+/* ------------------------------------------------------------------ one by one, with the groups of triangles */
+
+PetscErrorCode SbTrianglesAddVertex(SbTriangleFile *f, const PetscReal x[3])
+{
+  SbTriangles *t = f->t;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbReserve(t->nvert + 1, 3 * sizeof(PetscReal), &f->vert_size, &t->x));
+  for (int i = 0; i < 3; i++) t->x[3 * t->nvert + i] = x[i];
+  t->nvert++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbTrianglesAdd(SbTriangleFile *f, PetscInt a, PetscInt b, PetscInt c, int64_t number)
+{
+  SbTriangles *t = f->t;
+  PetscInt *v;
+
+  PetscFunctionBeginUser;
+  if (t->ntri == f->tri_size) {
+    f->tri_size = PetscMax(256, 2 * f->tri_size);
+    PetscCall(PetscRealloc(3 * (size_t)f->tri_size * sizeof(PetscInt), &t->tri));
+    PetscCall(PetscRealloc((size_t)f->tri_size * sizeof(int64_t), &f->number));
+    if (f->groups) PetscCall(PetscRealloc((size_t)f->tri_size * sizeof(PetscInt), &f->tags));
+  }
+  if (f->groups) f->tags[t->ntri] = f->now;
+  v = t->tri + 3 * t->ntri;
+  v[0] = a;
+  v[1] = b;
+  v[2] = c;
+  f->number[t->ntri++] = number;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbTrianglesGroups(SbTriangleFile *f, PetscInt n, const char *const names[])
+{
+  PetscInt group[16];
+
+  PetscFunctionBeginUser;
+  if (!f->groups) PetscFunctionReturn(PETSC_SUCCESS);
+  n = PetscMin(n, 16);
+  for (PetscInt i = 0; i < n; i++) {
+    char name[SB_GROUP_MAX];
+    uint64_t hash = 0xcbf29ce484222325u; /* stands for the name where groups have numbers (FNV-1a) */
+
+    PetscCall(PetscStrncpy(name, names[i], sizeof(name)));
+    for (char *c = name; *c; c++) {
+      if (isspace((unsigned char)*c)) *c = '_';
+      hash = (hash ^ (unsigned char)*c) * 0x100000001b3u;
+    }
+    PetscCall(SbImportGroup(f->groups, 2, (int64_t)(hash >> 2), name, &group[i]));
+  }
+  PetscCall(SbImportTagSet(f->groups, n, group, &f->now));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ a polygon as triangles */
 
 typedef struct {
   const PetscReal *x;
