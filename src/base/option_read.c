@@ -163,7 +163,7 @@ PetscErrorCode SbOptionInt(const SbScope *scope, const char *key, PetscInt *valu
   PetscCall(text_of(scope, key, SB_OPTION_INT, &r));
   if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
   n = strtoll(r->text, &end, 10);
-  PetscCheck(end != r->text && !*end, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not a whole number%s: %s",
+  PetscCheck(end != r->text && !*end, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not an integer%s: %s",
              r->name, r->text, wanted(r->row, sizeof(want), want), r->row->help);
   PetscCall(check_range(r, (PetscReal)n));
   PetscCheck(n >= PETSC_MIN_INT && n <= PETSC_MAX_INT, PETSC_COMM_SELF, PETSC_ERR_USER,

@@ -37,17 +37,19 @@ static PetscErrorCode setup_point_force(SbEffect e, SbSpace space)
 {
   PointForce *p = (PointForce *)e->data;
   PetscInt n, total = 0, *vertices;
-  PetscReal *node_share;
   const SbMesh mesh = space->mesh;
-  PetscReal *volume; /* of the cells around each selected vertex, m^3 */
+  PetscReal *node_share; /* [nnode] part of the total force, right on owned nodes */
+  PetscReal *volume;     /* of the cells around each selected vertex, m^3 */
+  PetscReal share;       /* of the total force that a vertex has */
   PetscBool *chosen;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectVertices(space, &e->on, &n, &vertices));
-  while (total < n && vertices[total] < space->mesh->nvert_owned) total++;
+  while (total < n && vertices[total] < mesh->nvert_owned) total++;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_INT, MPI_SUM, space->comm));
+  share = 1. / (PetscReal)total;
+  /* the volume around each vertex first, then what its cells pass on to their nodes */
   PetscCall(PetscCalloc1(space->nnode, &node_share));
-  /* node_share[nnode] = part of the total force that each node has, right on owned ones; share: that of a vertex. */
   PetscCall(PetscCalloc2(mesh->nvert, &volume, mesh->nvert, &chosen));
   for (PetscInt i = 0; i < n; i++) chosen[vertices[i]] = PETSC_TRUE;
   for (int pass = 0; pass < 2; pass++) {
@@ -60,17 +62,11 @@ static PetscErrorCode setup_point_force(SbEffect e, SbSpace space)
       if (pass) {
         const SbElement element = SbSpaceCellElement(space, cell);
 
-        /* Adds the share of vertex k of a cell to its nodes; part: the cell's of the volume around the vertex. */
-        for (int a = 0; a < 4; a++) {
-          const PetscInt node = space->cell_node[4 * cell + a];
-
-          // A P1 node is the vertex: the parts of its cells add up to one.
-          if (element->nodes_per[0])
-            node_share[node] = a == k ? (1 / (PetscReal)total) : node_share[node];
-          else
-            node_share[node] +=
-              (space->batch_V[b][l] / volume[v]) * (1 / (PetscReal)total) * element->ops.vertex[k][a];
-        }
+        /* a P1 or P2 node at the vertex is the vertex: the parts of its cells add up to one */
+        if (element->nodes_per[0]) node_share[space->cell_node[4 * cell + k]] = share;
+        for (int a = 0; a < 4 && !element->nodes_per[0]; a++)
+          node_share[space->cell_node[4 * cell + a]] +=
+            share * space->batch_V[b][l] / volume[v] * element->ops.vertex[k][a];
       } else
         volume[v] += space->batch_V[b][l];
     }

@@ -65,40 +65,47 @@ static void add_quadratic_force(SbSpace s, const SbRegion *region, const SbStage
   }
 }
 
+/* P1, CR and DG: one point in a cell. */
+static void add_linear_force(SbSpace s, const SbRegion *region, const SbStage *stage, PetscReal f[])
+{
+  const SbMaterial m = region->material;
+  const PetscReal beta = stage->v ? region->beta : 0.;
+
+  for (PetscInt b = region->bstart; b < region->bend; b++) {
+    const SbPack *g = s->batch_g + 9 * b;
+    SbPack u[12], F[9], P[9], fe[12];
+
+    sb_gather_strain(s, region, b, stage->u, u);
+    SbCellGradient(g, (const SbPack *)u, F);
+    m->ops.stress(m, (const SbPack *)F, P);
+    if (beta != 0.) {
+      SbPack H[9], dP[9];
+
+      sb_gather_strain(s, region, b, stage->v, u);
+      SbCellGradientRate(g, (const SbPack *)u, H);
+      SbMaterialDampingStress(m, (const SbPack *)F, (const SbPack *)H, dP);
+      for (int k = 0; k < 9; k++) {
+        for (int l = 0; l < SB_BATCH; l++) P[k][l] += beta * dP[k][l];
+      }
+    }
+    SbCellForce(g, s->batch_V[b], (const SbPack *)P, fe);
+    sb_scatter_strain(s, region, b, fe, f);
+  }
+}
+
 PetscErrorCode SbSpaceAddInternalForce(SbSpace s, const SbStage *stage, PetscReal f[])
 {
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_RESIDUAL], 0, 0, 0, 0));
   for (PetscInt r = 0; r < s->nregion; r++) {
-    PetscCall(PetscLogEventBegin(s->region[r].material->event, 0, 0, 0, 0));
-    if (s->region[r].quadratic)
-      add_quadratic_force(s, &s->region[r], stage, f);
-    else {
-      const SbMaterial m = s->region[r].material;
-      const PetscReal beta = stage->v ? s->region[r].beta : 0.;
+    const SbRegion *region = &s->region[r];
 
-      for (PetscInt b = s->region[r].bstart; b < s->region[r].bend; b++) {
-        const SbPack *g = s->batch_g + 9 * b;
-        SbPack u[12], F[9], P[9], fe[12];
-
-        sb_gather_strain(s, &s->region[r], b, stage->u, u);
-        SbCellGradient(g, (const SbPack *)u, F);
-        m->ops.stress(m, (const SbPack *)F, P);
-        if (beta != 0.) {
-          SbPack H[9], dP[9];
-
-          sb_gather_strain(s, &s->region[r], b, stage->v, u);
-          SbCellGradientRate(g, (const SbPack *)u, H);
-          SbMaterialDampingStress(m, (const SbPack *)F, (const SbPack *)H, dP);
-          for (int k = 0; k < 9; k++) {
-            for (int l = 0; l < SB_BATCH; l++) P[k][l] += beta * dP[k][l];
-          }
-        }
-        SbCellForce(g, s->batch_V[b], (const SbPack *)P, fe);
-        sb_scatter_strain(s, &s->region[r], b, fe, f);
-      }
-    }
-    PetscCall(PetscLogEventEnd(s->region[r].material->event, 0, 0, 0, 0));
+    PetscCall(PetscLogEventBegin(region->material->event, 0, 0, 0, 0));
+    if (region->quadratic)
+      add_quadratic_force(s, region, stage, f);
+    else
+      add_linear_force(s, region, stage, f);
+    PetscCall(PetscLogEventEnd(region->material->event, 0, 0, 0, 0));
   }
   if (s->jump) {
     SbJumpAdd(s, stage->u, SB_JUMP_STIFFNESS, f);
@@ -127,68 +134,72 @@ static void add_lumped_damping(SbSpace s, const SbRegion *region, const PetscRea
   }
 }
 
+/* Consistent mass of a P2 region times w = a + alpha v. */
+static void add_quadratic_inertia(SbSpace s, const SbRegion *region, const SbStage *stage, PetscReal f[])
+{
+  const PetscReal alpha = stage->v ? region->alpha : 0.;
+  PetscReal mass[SB_CELL_NODES][SB_CELL_NODES];
+
+  for (int k = 0; k < 100; k++)
+    mass[k / 10][k % 10] = region->material->density * SbQuadraticMass(k / 10, k % 10);
+  for (PetscInt b = region->bstart; b < region->bend; b++) {
+    const PetscInt *node = sb_quadratic_nodes(s, b);
+    SbPack w[30] = {{0}}, v[30], fe[30] = {{0}};
+
+    if (stage->a) sb_gather_nodes(10, node, stage->a, w);
+    if (alpha != 0.) sb_gather_nodes(10, node, stage->v, v);
+    for (int k = 0; alpha != 0. && k < 30; k++) {
+      for (int l = 0; l < SB_BATCH; l++) w[k][l] += alpha * v[k][l];
+    }
+    for (int k = 0; k < 300; k++) {
+      for (int l = 0; l < SB_BATCH; l++)
+        fe[k / 30 * 3 + k % 3][l] += mass[k / 30][k / 3 % 10] * s->batch_V[b][l] * w[k % 30][l];
+    }
+    sb_scatter_nodes(10, node, s->batch_n[b], (const SbPack *)fe, f);
+  }
+}
+
+/* The same of a P1, CR or DG region. */
+static void add_linear_inertia(SbSpace s, const SbRegion *region, const SbStage *stage, PetscReal f[])
+{
+  const SbElementOps *e = &region->element->ops;
+  const PetscReal alpha = stage->v ? region->alpha : 0.;
+
+  for (PetscInt b = region->bstart; b < region->bend; b++) {
+    const PetscInt *node = s->batch_node + 4 * SB_BATCH * b;
+    SbPack w[12] = {{0}}, v[12], fe[12];
+
+    if (stage->a) sb_gather(node, stage->a, w);
+    if (alpha != 0.) sb_gather(node, stage->v, v);
+    for (int k = 0; alpha != 0. && k < 12; k++) {
+      for (int l = 0; l < SB_BATCH; l++) w[k][l] += alpha * v[k][l];
+    }
+    for (int k = 0; k < 12; k++) {
+      for (int l = 0; l < SB_BATCH; l++) {
+        const PetscReal sum = w[k % 3][l] + w[3 + k % 3][l] + w[6 + k % 3][l] + w[9 + k % 3][l];
+
+        fe[k][l] = region->material->density * s->batch_V[b][l] *
+                   ((e->mass_diagonal - e->mass_coupling) * w[k][l] + e->mass_coupling * sum);
+      }
+    }
+    sb_scatter_add(node, s->batch_n[b], (const SbPack *)fe, f);
+  }
+}
+
 void SbSpaceAddInertia(SbSpace s, const SbStage *stage, PetscReal f[])
 {
   if (s->consistent_mass) {
     for (PetscInt r = 0; r < s->nregion; r++) {
-      if (s->region[r].quadratic) {
-        const PetscReal damping = stage->v ? s->region[r].alpha : 0.;
-        PetscReal mass[SB_CELL_NODES][SB_CELL_NODES];
-
-        for (int k = 0; k < 100; k++)
-          mass[k / 10][k % 10] = s->region[r].material->density * SbQuadraticMass(k / 10, k % 10);
-        for (PetscInt b = s->region[r].bstart; b < s->region[r].bend; b++) {
-          SbPack w[30] = {{0}}, v[30], fe[30] = {{0}};
-
-          if (stage->a) sb_gather_nodes(10, sb_quadratic_nodes(s, b), stage->a, w);
-          if (damping != 0.) sb_gather_nodes(10, sb_quadratic_nodes(s, b), stage->v, v);
-          for (int k = 0; damping != 0. && k < 30; k++) {
-            for (int l = 0; l < SB_BATCH; l++) w[k][l] += damping * v[k][l];
-          }
-          for (int k = 0; k < 300; k++) {
-            for (int l = 0; l < SB_BATCH; l++)
-              fe[k / 30 * 3 + k % 3][l] += mass[k / 30][k / 3 % 10] * s->batch_V[b][l] * w[k % 30][l];
-          }
-          sb_scatter_nodes(10, sb_quadratic_nodes(s, b), s->batch_n[b], (const SbPack *)fe, f);
-        }
-      } else {
-        const SbElementOps *e = &s->region[r].element->ops;
-        const PetscReal alpha = stage->v ? s->region[r].alpha : 0.;
-
-        /* Consistent mass of a region times w = a + alpha v. */
-        for (PetscInt b = s->region[r].bstart; b < s->region[r].bend; b++) {
-          const PetscInt *node = s->batch_node + 4 * SB_BATCH * b;
-          SbPack w[12], fe[12];
-
-          if (stage->a)
-            sb_gather(node, stage->a, w);
-          else
-            memset(w, 0, sizeof(w));
-          if (alpha != 0.) {
-            SbPack v[12];
-
-            sb_gather(node, stage->v, v);
-            for (int k = 0; k < 12; k++) {
-              for (int l = 0; l < SB_BATCH; l++) w[k][l] += alpha * v[k][l];
-            }
-          }
-          for (int k = 0; k < 12; k++) {
-            for (int l = 0; l < SB_BATCH; l++) {
-              const PetscReal sum = w[k % 3][l] + w[3 + k % 3][l] + w[6 + k % 3][l] + w[9 + k % 3][l];
-
-              fe[k][l] = s->region[r].material->density * s->batch_V[b][l] *
-                         ((e->mass_diagonal - e->mass_coupling) * w[k][l] + e->mass_coupling * sum);
-            }
-          }
-          sb_scatter_add(node, s->batch_n[b], (const SbPack *)fe, f);
-        }
-      }
+      if (s->region[r].quadratic)
+        add_quadratic_inertia(s, &s->region[r], stage, f);
+      else
+        add_linear_inertia(s, &s->region[r], stage, f);
     }
-  } else {
-    for (PetscInt i = 0; stage->a && i < 3 * s->nnode_owned; i++) f[i] += s->node_mass[i / 3] * stage->a[i];
-    for (PetscInt r = 0; stage->v && r < s->nregion; r++) {
-      if (s->region[r].alpha != 0.) add_lumped_damping(s, &s->region[r], stage->v, f);
-    }
+    return;
+  }
+  for (PetscInt i = 0; stage->a && i < 3 * s->nnode_owned; i++) f[i] += s->node_mass[i / 3] * stage->a[i];
+  for (PetscInt r = 0; stage->v && r < s->nregion; r++) {
+    if (s->region[r].alpha != 0.) add_lumped_damping(s, &s->region[r], stage->v, f);
   }
 }
 

@@ -101,14 +101,12 @@ static PetscErrorCode highest_frequency(SbSpace s, PetscReal *w)
   PetscCall(start(s, f));
   *w = 0.;
   for (int step = 0; step <= POWER_STEPS; step++) {
-    PetscReal sum = 0.;
-
-    /* Zero on prescribed unknowns; returns x.M x of the owned ones. */
-    for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
+    /* y.M y, with zeros at prescribed unknowns */
+    square = 0.;
+    for (PetscInt i = 0; i < n; i++) {
       if (s->fixed[i / 3] & (1 << i % 3)) f[i] = 0.;
-      sum += s->node_mass[i / 3] * f[i] * f[i];
+      square += s->node_mass[i / 3] * f[i] * f[i];
     }
-    square = sum;
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &square, 1, MPIU_REAL, MPI_SUM, s->comm));
     if (square <= 0.) break;
     /* x had length one: the growth of |y| is w^2 */

@@ -28,9 +28,39 @@ PetscErrorCode SbMassForm(SbLedger l, Vec D, PetscReal *form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether the last tangent of a step is K + shift M with the lumped mass, as a matrix. */
+static PetscBool has_matrix(const SbRun run)
+{
+  return (PetscBool)(run->J && run->ts && run->shift_a > 0. && !run->damped &&
+                     !run->solver_used->matrix_free && !run->model->space->consistent_mass);
+}
+
+/* D.K D of the free unknowns, from the last tangent of the step. Collective. */
+static PetscErrorCode form_by_matrix(SbLedger l, Vec D, PetscReal *form)
+{
+  const SbSpace s = l->run->model->space;
+  Vec free = l->w[1], product = l->w[2];
+  PetscReal mass;
+  PetscScalar *d;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecCopy(D, free));
+  PetscCall(VecGetArray(free, &d));
+  for (PetscInt k = 0; k < s->nfixed; k++) {
+    for (PetscInt i = 3 * s->fixed_node[k]; i < 3 * s->fixed_node[k] + 3; i++) {
+      if (s->fixed_node[k] < s->nnode_owned && (s->fixed[i / 3] & (1 << i % 3))) d[i] = 0.;
+    }
+  }
+  PetscCall(VecRestoreArray(free, &d));
+  PetscCall(MatMult(l->run->J, free, product));
+  PetscCall(VecDot(product, free, form));
+  PetscCall(SbMassForm(l, free, &mass));
+  *form = PetscMax(0., *form - l->run->shift_a * mass);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal *form)
 {
-  const SbModel m = l->run->model;
   PetscReal length, at[2];
   Vec moved = l->w[1], R = l->w[2];
 
@@ -38,35 +68,16 @@ PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal 
   *form = 0.;
   PetscCall(SbDifferenceLength(l, D, &length));
   if (!(length > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
-  if ((PetscBool)(l->run->J && l->run->ts && l->run->shift_a > 0. && !l->run->damped &&
-                  !l->run->solver_used->matrix_free && !l->run->model->space->consistent_mass)) {
-    SbSpace s;
-    Vec free, product;
-    PetscReal mass;
-    PetscScalar *d;
-
-    s = l->run->model->space;
-    free = l->w[1];
-    product = l->w[2];
-    PetscCall(VecCopy(D, free));
-    PetscCall(VecGetArray(free, &d));
-    for (PetscInt k = 0; k < s->nfixed; k++) {
-      for (PetscInt i = 3 * s->fixed_node[k]; i < 3 * s->fixed_node[k] + 3; i++) {
-        if (s->fixed_node[k] < s->nnode_owned && (s->fixed[i / 3] & (1 << i % 3))) d[i] = 0.;
-      }
-    }
-    PetscCall(VecRestoreArray(free, &d));
-    PetscCall(MatMult(l->run->J, free, product));
-    PetscCall(VecDot(product, free, form));
-    PetscCall(SbMassForm(l, free, &mass));
-    *form = PetscMax(0., *form - l->run->shift_a * mass);
+  if (has_matrix(l->run)) {
+    PetscCall(form_by_matrix(l, D, form));
     l->own_work += 1.;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  /* a difference of forces */
   l->residuals -= MPI_Wtime();
   for (int side = 0; side < 2; side++) {
     PetscCall(VecWAXPY(moved, side ? length : -length, D, U));
-    PetscCall(SbModelResidual(m, t, moved, NULL, NULL, PETSC_FALSE, R));
+    PetscCall(SbModelResidual(l->run->model, t, moved, NULL, NULL, PETSC_FALSE, R));
     PetscCall(VecDot(R, D, &at[side]));
   }
   l->residuals += MPI_Wtime();

@@ -286,14 +286,14 @@ static PetscErrorCode print_line(const char *name, PetscReal error, PetscReal re
 
 PetscErrorCode SbLedgerReport(SbLedger l, const char *file, PetscBool quiet)
 {
+  static const char *const notes[SB_ERROR_COUNT] = {
+    "residual, tangent", "steps", "iterations after the first", "linear solves", "contact, search", ""};
+  static const char *const quantities[] = {"", "of u, m", "of F, N", "of V, m^3"};
   SbLedgerSeconds s;
   PetscMPIInt rank;
   Words w = {.n = 0};
   FILE *f;
   int column = 0;
-  static const char *const notes[SB_ERROR_COUNT] =
-    {"residual, tangent", "steps", "iterations after the first", "linear solves", "contact, search", ""},
-                           *const quantities[] = {"", "of u, m", "of F, N", "of V, m^3"};
   SbModel m;
   PetscReal scale;
   const PetscReal *q;

@@ -40,16 +40,22 @@ typedef struct {
   int mark, nnode; /* which of them; nnode -1: all words that are left on the line are points */
 } Layout;
 
-static const Layout neutral_volume = {3, 10, {"subdomain of an element"}, 0, -1};
-static const Layout neutral_surface = {2, 8, {"boundary condition of an element"}, 0, -1};
-static const Layout vol_volume = {3, 12, {"material of an element", "number of points of an element"}, 0, 1};
+static const Layout neutral_volume = {
+  .dim = 3, .room = 10, .before = {"subdomain of an element"}, .mark = 0, .nnode = -1};
+static const Layout neutral_surface = {
+  .dim = 2, .room = 8, .before = {"boundary condition of an element"}, .mark = 0, .nnode = -1};
+static const Layout vol_volume = {.dim = 3,
+                                  .room = 12,
+                                  .before = {"material of an element", "number of points of an element"},
+                                  .mark = 0,
+                                  .nnode = 1};
 static const Layout vol_surface = {
-  2,
-  16,
-  {"surface of an element", "boundary condition of an element", "domain on one side of an element",
-   "domain on the other side of an element", "number of points of an element"},
-  1,
-  4};
+  .dim = 2,
+  .room = 16,
+  .before = {"surface of an element", "boundary condition of an element", "domain on one side of an element",
+             "domain on the other side of an element", "number of points of an element"},
+  .mark = 1,
+  .nnode = 4};
 
 static PetscErrorCode read_elements(SbImport *im, const Layout *l)
 {

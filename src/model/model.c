@@ -83,10 +83,11 @@ static PetscErrorCode match_mass(SbModel m, PetscInt b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Effects that have the operation, in scenario order. */
+/* Effects that have the operation, in scenario order; the lists lie one behind the other in m->lists, which has room for NLIST. */
 #define NLIST 12
 #define SORT_INTO_LIST(m, op)                                               \
   do {                                                                      \
+    PetscCheck(nlist++ < NLIST, (m)->comm, PETSC_ERR_PLIB, "NLIST");        \
     (m)->op = list;                                                         \
     for (PetscInt i_ = 0; i_ < (m)->neffect; i_++) {                        \
       if ((m)->effect[i_]->ops.op) (m)->op[(m)->n##op++] = (m)->effect[i_]; \
@@ -97,6 +98,7 @@ static PetscErrorCode match_mass(SbModel m, PetscInt b)
 PetscErrorCode SbModelSetUp(SbModel m)
 {
   PetscReal mass = 0.;
+  PetscInt nlist = 0;
   SbEffect *list;
 
   PetscFunctionBeginUser;

@@ -237,9 +237,8 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   /* the row, as text, for one call */
   h->last_step = step->step;
   if (h->fd >= 0) {
-    const SbEnergies *e;
+    const SbEnergies *e = &step->energies;
 
-    e = &step->energies;
     h->size = 0;
     for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(columns); k++) {
       const char *value = (const char *)step + columns[k].from, *comma = k ? "," : "";
@@ -278,7 +277,6 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, size_t nmessage, char m
     SbChunk chunk;
 
     // rows up to step0 of a file with the same columns are kept; one without its end was cut off by a kill
-    kept = PETSC_FALSE;
     PetscCall(SbFileRead(h->path, &text, &size));
     if (text && size >= h->size && !strncmp(text, h->row, h->size)) {
       for (line = text + h->size; (end = strchr(line, '\n')); line = end + 1) {

@@ -335,16 +335,18 @@ static PetscErrorCode iterate(SbContactSystem c, Vec F, Vec Y, KSPConvergedReaso
   PC pc;
 
   PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   if (c->fresh[0]) PetscCall(set_up_iteration(c));
-  PetscCall(KSPGetPC(c->ksp, &pc));
-  /* what PETSc's own events count is not counted twice */
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
+  /* PETSc's own events count these */
   PetscCall(KSPSetUp(c->ksp));
-  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
-  if (!c->type[0]) PetscCall(SbPCContactGuess(pc, F, Y));
-  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
+  if (!c->type[0]) {
+    PetscCall(KSPGetPC(c->ksp, &pc));
+    PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
+    PetscCall(SbPCContactGuess(pc, F, Y));
+    PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
+  }
   PetscCall(KSPSolve(c->ksp, F, Y));
-  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   PetscCall(KSPGetConvergedReason(c->ksp, reason));
   PetscCall(KSPGetIterationNumber(c->ksp, iterations));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -381,15 +383,17 @@ PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *bl
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   if (fresh || !c->rows.value) PetscCall(merge(c, K, blocks));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   factored = is_factored(c->space, c->choice, c->type, c->nnode);
   *iterations = 0;
   *reason = KSP_DIVERGED_ITS;
   if (!factored) PetscCall(iterate(c, F, Y, reason, iterations));
   if (factored || (*reason == KSP_DIVERGED_ITS && !c->type[0])) {
+    PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
     PetscCall(factor(c, F, Y, reason));
+    PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
     ++*iterations;
   }
-  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -160,17 +160,15 @@ static PetscErrorCode restrict_to_vertices(SbLevels v, Vec t)
 static PetscErrorCode cycle_faces(SbLevels v, Vec r, Vec z)
 {
   const PetscInt k = v->n - 2;
-  SbSpace at = v->at[k], s, p;
+  SbSpace s = v->at[k], p = v->at[k + 1];
   Mat A = v->A[k];
   const PetscReal *x;
   PetscScalar *out;
 
   PetscFunctionBeginUser;
-  PetscCall(SbGaussSeidelDown(at, A, v->inverse, NULL, r, z, v->t[k]));
+  PetscCall(SbGaussSeidelDown(s, A, v->inverse, NULL, r, z, v->t[k]));
   PetscCall(restrict_to_vertices(v, v->t[k]));
   PetscCall(KSPSolve(v->coarse, v->t[k + 1], v->w[k + 1]));
-  s = v->at[k];
-  p = v->at[k + 1];
   PetscCall(load(p, v->w[k + 1], v->g[k + 1], &x));
   PetscCall(VecGetArray(z, &out));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
@@ -181,7 +179,7 @@ static PetscErrorCode cycle_faces(SbLevels v, Vec r, Vec z)
   }
   PetscCall(VecRestoreArray(z, &out));
   PetscCall(SbSpaceRestoreLocalRead(p, v->g[k + 1], &x));
-  PetscCall(SbGaussSeidelUp(at, A, v->inverse, NULL, r, z, v->t[k]));
+  PetscCall(SbGaussSeidelUp(s, A, v->inverse, NULL, r, z, v->t[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -314,14 +312,16 @@ static PetscErrorCode gather_springs(SbLevels v)
 
 PetscErrorCode SbLevelsShareSprings(SbLevels v)
 {
-  const SbSpace s = v->at[PetscMax(0, v->n - 2)], p = v->at[v->n - 1];
   PetscBool any = v->sprung;
+  SbSpace s, p;
 
   PetscFunctionBeginUser;
   if (v->multigrid) PetscFunctionReturn(PETSC_SUCCESS); /* made from the matrix */
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, SB_MPI_BOOL, MPI_LOR, v->space->comm));
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(gather_springs(v));
+  s = v->at[v->n - 2];
+  p = v->at[v->n - 1];
   for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
     const PetscInt c = i / 4, a = i % 4;
     const PetscBool face = (PetscBool)!SbSpaceCellElement(s, c)->nodes_per[0];

@@ -44,7 +44,7 @@ static inline int gather_strain(SbSpace s, const SbRegion *region, PetscInt b, c
 static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar u[], PetscBool absolute,
                                        PetscScalar d[])
 {
-  SbSpace s = op->space, space = op->space;
+  SbSpace s = op->space;
   PetscScalar *x;
   const PetscReal *local;
 
@@ -55,19 +55,19 @@ static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar 
   PetscCall(VecRestoreArray(op->u, &x));
   PetscCall(SbSpaceGetLocalRead(s, op->u, &local));
   /* d[ncell_owned] = B x of owned cells; x[nnode][3] with ghosts. */
-  for (PetscInt r = 0; r < space->nregion; r++) {
-    const SbRegion *region = &space->region[r];
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
       const SbPack *v = (const SbPack *)op->volume.b + op->volume.stride * b;
       SbPack cell_u[30], sum = {0};
-      const int n = gather_strain(space, region, b, local, cell_u);
+      const int n = gather_strain(s, region, b, local, cell_u);
 
       for (int k = 0; k < 3 * n; k++) {
         for (int l = 0; l < SB_BATCH; l++)
           sum[l] += (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * cell_u[k][l];
       }
-      for (PetscInt l = 0; l < space->batch_n[b]; l++) d[space->batch_cell[b] + l] = sum[l];
+      for (PetscInt l = 0; l < s->batch_n[b]; l++) d[s->batch_cell[b] + l] = sum[l];
     }
   }
   PetscCall(SbSpaceRestoreLocalRead(s, op->u, &local));
@@ -78,7 +78,7 @@ static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar 
 static PetscErrorCode add_gradient(SbPressureOperator op, const PetscScalar p[], PetscBool absolute,
                                    PetscReal factor, PetscScalar y[])
 {
-  SbSpace s = op->space, space = op->space;
+  SbSpace s = op->space;
   const PetscScalar *q;
   PetscScalar *x;
   PetscReal *f;
@@ -97,24 +97,24 @@ static PetscErrorCode add_gradient(SbPressureOperator op, const PetscScalar p[],
   PetscCall(SbSpaceGetLocalWrite(s, op->y, &f));
   PetscCall(PetscArrayzero(f, 3 * s->nnode));
   /* y[nnode][3] += B^T p, right on owned nodes; p[ncell] with ghosts. */
-  for (PetscInt r = 0; r < space->nregion; r++) {
-    const SbRegion *region = &space->region[r];
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
 
     for (PetscInt b = region->bstart; b < region->bend; b++) {
       const SbPack *v = (const SbPack *)op->volume.b + op->volume.stride * b;
-      const PetscReal *value = q + space->batch_cell[b];
+      const PetscReal *value = q + s->batch_cell[b];
       SbPack force[30], lane = {0};
 
-      for (PetscInt l = 0; l < space->batch_n[b]; l++) lane[l] = value[l];
+      for (PetscInt l = 0; l < s->batch_n[b]; l++) lane[l] = value[l];
       for (int k = 0; k < (region->quadratic ? 30 : 12); k++) {
         for (int l = 0; l < SB_BATCH; l++)
           force[k][l] = (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * lane[l];
       }
       if (region->quadratic)
-        sb_scatter_nodes(10, space->batch_clique + space->width * SB_BATCH * b, space->batch_n[b],
-                         (const SbPack *)force, f);
+        sb_scatter_nodes(10, s->batch_clique + s->width * SB_BATCH * b, s->batch_n[b], (const SbPack *)force,
+                         f);
       else
-        sb_scatter_strain(space, region, b, force, f);
+        sb_scatter_strain(s, region, b, force, f);
     }
   }
   clear_fixed(s, s->nnode_owned, f);
@@ -353,7 +353,6 @@ static PetscErrorCode create_cell_vector(SbMesh mesh, Vec *p)
 PetscErrorCode SbPressureOperatorCreate(SbSpace s, Mat *K)
 {
   SbPressureOperator op;
-  SbSpace space;
   PetscInt n;
 
   PetscFunctionBeginUser;
@@ -364,18 +363,16 @@ PetscErrorCode SbPressureOperatorCreate(SbSpace s, Mat *K)
   PetscCall(PetscNew(&op));
   op->space = s;
   PetscCall(SbLevelsCreate(s, &op->levels));
-  space = op->space;
-  n = space->mesh->ncell_owned;
+  n = s->mesh->ncell_owned;
   op->volume.stride = s->edge_node ? 30 : 12;
-  PetscCall(
-    PetscMalloc((size_t)(space->nbatch * (op->volume.stride + 2)) * sizeof(SbPack) + 64, &op->memory));
+  PetscCall(PetscMalloc((size_t)(s->nbatch * (op->volume.stride + 2)) * sizeof(SbPack) + 64, &op->memory));
   op->volume.b = (SbPack *)(((uintptr_t)op->memory + 63) & ~(uintptr_t)63);
-  op->volume.modulus = op->volume.b + op->volume.stride * space->nbatch;
-  op->volume.shear = op->volume.modulus + space->nbatch;
+  op->volume.modulus = op->volume.b + op->volume.stride * s->nbatch;
+  op->volume.shear = op->volume.modulus + s->nbatch;
   PetscCall(PetscMalloc4(n, &op->C, n, &op->Cinv, n, &op->S, n, &op->norm));
-  PetscCall(SbSpaceCreateVec(space, &op->u));
-  PetscCall(SbSpaceCreateVec(space, &op->y));
-  PetscCall(create_cell_vector(space->mesh, &op->p));
+  PetscCall(SbSpaceCreateVec(s, &op->u));
+  PetscCall(SbSpaceCreateVec(s, &op->y));
+  PetscCall(create_cell_vector(s->mesh, &op->p));
   PetscCall(MatCreateVecs(op->levels->A[0], &op->a, &op->b));
   PetscCall(
     MatCreateShell(s->comm, 3 * s->nnode_owned, 3 * s->nnode_owned, PETSC_DETERMINE, PETSC_DETERMINE, op, K));

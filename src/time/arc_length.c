@@ -39,7 +39,7 @@ typedef struct {
       Vec X, d, r, v, q, begin; /* end of the step and its parts as above; v where the step begins */
       Vec w, du;                /* work; correction of X */
     };
-    Vec all[9];
+    Vec all[9]; /* the same vectors */
   };
   Mat exact;               /* K by differences of R where the assembled one is not exact; else NULL */
   PetscReal factor, delta; /* lambda at X; its step for q */

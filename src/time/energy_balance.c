@@ -43,12 +43,11 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   PetscCall(SbRunReactions(run, t, reaction));
   if (run->damped) PetscCall(SbModelDampingPower(m, run->U, run->V, &power));
   if (!first) {
-    SbSpace s = run->model->space;
-    PetscBool obstacles;
+    const SbSpace s = run->model->space;
+    const PetscBool obstacles = (PetscBool)(s->constraints != NULL);
     const PetscScalar *u, *u0, *f, *f0, *r, *r0;
 
     /* Work of a force field over a displacement, on all or only on prescribed unknowns; two times it, this rank's part. */
-    obstacles = (PetscBool)(s->constraints != NULL);
     PetscCall(VecGetArrayRead(run->U, &u));
     PetscCall(VecGetArrayRead(run->previous, &u0));
     PetscCall(VecGetArrayRead(loads, &f));

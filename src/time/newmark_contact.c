@@ -27,6 +27,7 @@
 
 PetscErrorCode SbNewmarkOwn(SbRun run, PetscReal t, Vec U, Vec V, Vec A, Vec own)
 {
+  const SbSpace s = run->model->space;
   const PetscScalar *a;
   PetscScalar *x;
 
@@ -35,11 +36,11 @@ PetscErrorCode SbNewmarkOwn(SbRun run, PetscReal t, Vec U, Vec V, Vec A, Vec own
   /* own = -M^-1 r at free unknowns, A's at prescribed ones; r: the residual of all but inertia and contact. */
   PetscCall(VecGetArrayRead(A, &a));
   PetscCall(VecGetArray(own, &x));
-  for (PetscInt i = 0; i < 3 * run->model->space->nnode_owned; i++) {
-    if (run->model->space->fixed[i / 3] & (1 << (i % 3)))
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
+    if (s->fixed[i / 3] & (1 << (i % 3)))
       x[i] = a[i];
     else
-      x[i] = run->model->space->node_mass[i / 3] > 0. ? -x[i] / run->model->space->node_mass[i / 3] : 0.;
+      x[i] = s->node_mass[i / 3] > 0. ? -x[i] / s->node_mass[i / 3] : 0.;
   }
   PetscCall(VecRestoreArray(own, &x));
   PetscCall(VecRestoreArrayRead(A, &a));

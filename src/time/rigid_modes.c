@@ -237,8 +237,7 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
     PetscBool ok;
     Vec y[6], w;
 
-    /* Free ones among the n admissible motions x (problem 2): part->nfree, and one of them. */
-    /* y = P Z x */
+    /* free ones among the n admissible motions x (problem 2): y = P Z x */
     PetscCall(VecDuplicate(d, &w));
     for (PetscInt j = 0; j < n; j++) {
       PetscCall(VecDuplicate(d, &y[j]));

@@ -1,13 +1,15 @@
 /*
   info.c - supple-mesh info: what is in a mesh, whether a run accepts it, and what a run will take.
 
-  What a run will take, from the counts of a mesh. Nodes are those of the element: vertices (p1), faces (cr), four in every tet (dg). A row of the matrix has a block of
+  What a run will take, from the counts of a mesh. Nodes are those of the element: vertices (p1), faces (cr), four in every tet (dg), vertices and edges (p2). A row of the matrix has a block of
   3 x 3 numbers for itself and for every node that a term joins it with:
 
     p1  N + 2 edges
     cr  N + 12 for each tet (six pairs of faces, each in one tet only) + 18 for each inner face, whose jump joins the three other
         faces of one side with those of the other
     dg  16 for each tet + 32 for each inner face
+    p2  N + 6 for each edge + 12 for each face + 6 for each tet (three edges of a triangle meet in pairs, its corners each the edge across;
+        a tet has three pairs of edges apart)
 
   The rest was measured: see the constants. docs/reference/meshes.md says how good it is.
 */
@@ -74,7 +76,7 @@ static PetscErrorCode bar(const char *label, PetscInt64 n, PetscInt64 most)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bytes that a run of one step takes on one rank, by element: p1, cr, dg. */
+/* Bytes that a run of one step takes on one rank, by element. */
 static PetscReal memory(const SbMeshStatistics *f, const char *element, PetscInt *unknowns, PetscReal *matrix)
 {
   const PetscReal inner = f->nface - f->body.nfacet, ncell = f->body.ncell;
@@ -88,6 +90,10 @@ static PetscReal memory(const SbMeshStatistics *f, const char *element, PetscInt
     nodes = 4 * ncell;
     blocks = 16 * ncell + 32 * inner;
     times = 2.45;
+  } else if (!strcmp(element, "p2")) {
+    nodes = f->body.nvert + f->nedge;
+    blocks = nodes + 6. * f->nedge + 12. * f->nface + 6 * ncell;
+    times = 2.3;
   }
   *unknowns = (PetscInt)(3 * nodes);
   *matrix = 72 * blocks;
@@ -101,7 +107,7 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
   PetscInt nvert, n[4];
   char number[32];
   const PetscReal *b;
-  static const char *const elements[] = {"p1", "cr", "dg"};
+  static const char *const elements[] = {"p1", "cr", "dg", "p2"};
   PetscInt64 most = 1;
   char label[32];
 

@@ -96,6 +96,21 @@ static PetscErrorCode measure_push(HardRun *r, const SbStep *step)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+#define OVERLAP(title, element, always)                                              \
+  {                                                                                  \
+    .name = "overlap." element, .seconds = 600,                                      \
+    .what = "two blocks begin half in each other, their sides in one plane, " title, \
+    .options = HALF(element), .look = measure_push, .quick = always, .limits = {     \
+      {HARD_MOMENTUM, '<', 1e-6},                                                    \
+      {HARD_MIN_J, '>', 0.99},                                                       \
+      {HARD_MIN_J_EVER, '>', 0.5},                                                   \
+      {HARD_SHAPE, '<', 1e-2},                                                       \
+      {HARD_OWN, '<', 2, "energy / M v^2 of the recovery", ""},                      \
+      {HARD_NEWTON, '<', 100},                                                       \
+      {HARD_REJECTED, '<', 1}                                                        \
+    }                                                                                \
+  }
+
 const HardCase HardCasesContact[] = {
   IMPACT("plate", "a thin plate", PLATE, "p1", 1),
   IMPACT("plate", "a thin plate", PLATE, "cr", 0),
@@ -103,43 +118,9 @@ const HardCase HardCasesContact[] = {
   IMPACT("corner", "the floor with a corner", CORNER, "dg", 0),
   IMPACT("plate", "a thin plate", PLATE, "p2", 0),
   IMPACT("corner", "the floor with a corner", CORNER, "p2", 0),
-  {.name = "overlap.p1",
-   .seconds = 600,
-   .what = "two blocks begin half in each other, their sides in one plane, P1",
-   .options = HALF("p1"),
-   .look = measure_push,
-   .quick = 1,
-   .limits = {{HARD_MOMENTUM, '<', 1e-6},
-              {HARD_MIN_J, '>', 0.99},
-              {HARD_MIN_J_EVER, '>', 0.5},
-              {HARD_SHAPE, '<', 1e-2},
-              {HARD_OWN, '<', 2, "energy / M v^2 of the recovery", ""},
-              {HARD_NEWTON, '<', 100},
-              {HARD_REJECTED, '<', 1}}},
-  {.name = "overlap.cr",
-   .seconds = 600,
-   .what = "two blocks begin half in each other, their sides in one plane, CR",
-   .options = HALF("cr"),
-   .look = measure_push,
-   .limits = {{HARD_MOMENTUM, '<', 1e-6},
-              {HARD_MIN_J, '>', 0.99},
-              {HARD_MIN_J_EVER, '>', 0.5},
-              {HARD_SHAPE, '<', 1e-2},
-              {HARD_OWN, '<', 2, "energy / M v^2 of the recovery", ""},
-              {HARD_NEWTON, '<', 100},
-              {HARD_REJECTED, '<', 1}}},
-  {.name = "overlap.p2",
-   .seconds = 600,
-   .what = "two blocks begin half in each other, their sides in one plane, P2",
-   .options = HALF("p2"),
-   .look = measure_push,
-   .limits = {{HARD_MOMENTUM, '<', 1e-6},
-              {HARD_MIN_J, '>', 0.99},
-              {HARD_MIN_J_EVER, '>', 0.5},
-              {HARD_SHAPE, '<', 1e-2},
-              {HARD_OWN, '<', 2, "energy / M v^2 of the recovery", ""},
-              {HARD_NEWTON, '<', 100},
-              {HARD_REJECTED, '<', 1}}},
+  OVERLAP("P1", "p1", 1),
+  OVERLAP("CR", "cr", 0),
+  OVERLAP("P2", "p2", 0),
   {.name = "overlap.askew",
    .seconds = 600,
    .what = "a block begins with half of its width in another one, P1",

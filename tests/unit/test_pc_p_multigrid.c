@@ -146,6 +146,11 @@ int main(int argc, char **argv)
         "-body_c_poisson 0.3 -body_c_translate 0,2,0 -body_c_element cr ") "-effects gravity,clamp "
                                                                            "-effect_clamp_type fixed "
                                                                            "-effect_clamp_on xmin " STATIC));
+  /* the lower level by algebraic multigrid, as where it is too large for a factorisation */
+  PetscCall(check_answer("-pc_coarse_pc_type gamg -bodies a " BODY(
+    "a", "box:0.3,0.1,0.1:3",
+    "-body_a_element p2 -body_a_poisson 0.3 ") "-effects gravity,clamp -effect_clamp_type fixed "
+                                               "-effect_clamp_on xmin " STATIC));
   SB_CHECK_ERROR(
     test_scene_open(
       "-bodies a " BODY(
