@@ -40,7 +40,7 @@ same() {
 # info: numbers of a known mesh
 ok info "$data/two_cubes_41.msh"
 for text in " vertices 23" " tets 48" " left 24 tets, 1 m^3 (number 1)" " both ends 8 triangles, 2 m^2 (number 4)" " volume 2 m^3" \
-  " surface 10 m^2, 40 facets" " edges 90: " " faces 116" " parts 1" " p1 69 " " cr 348 " " dg 576 " " p2 159 " \
+  " surface 10 m^2, 40 facets" " edges 90: " " faces 116" " parts 1" " p1 69 " " cr 348 " " dg 576 " " p2 339 " \
   "dihedral angles, degrees: 54.7 to 109.5" " 50 to 60 128 #" " 1 to 1.25 48 #"; do
   says "$text"
 done
