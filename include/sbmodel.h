@@ -150,12 +150,11 @@ PetscErrorCode SbModelBodySums(SbModel model, Vec U, Vec V, PetscReal sum[][SB_B
 /* Instantaneous part of the energies (kinetic, strain, momenta, ...). V may be NULL. Collective. */
 PetscErrorCode SbModelEnergies(SbModel model, Vec U, Vec V, SbEnergies *e);
 /*
-  SbModelStrainEnergyAlong - strain energy at U, J, its slope against D, d psi(U - s D)/ds at s = 0, J, and how many tets are inverted there.
+  SbModelStrainEnergy - strain energy at U, J, its gradient, the internal forces without damping, F[nnode][3] N, and how many tets are inverted there.
 
-  Collective. D: [nnode][3] m, of any length.
+  Collective. F: NULL where nobody asks for it.
 */
-PetscErrorCode SbModelStrainEnergyAlong(SbModel model, Vec U, Vec D, PetscReal *psi, PetscReal *slope,
-                                        PetscInt *ninverted);
+PetscErrorCode SbModelStrainEnergy(SbModel model, Vec U, Vec F, PetscReal *psi, PetscInt *ninverted);
 /* For laws with -body_NAME_tangent auto: from now on tangents with each cell projected to positive semi-definite, or the exact ones. Not collective. */
 PetscErrorCode SbModelProjectTangent(SbModel model, PetscBool filter);
 /* Power taken by Rayleigh damping, v . C v, W. Collective. */

@@ -160,30 +160,26 @@ PetscErrorCode SbModelDampingPower(SbModel m, Vec U, Vec V, PetscReal *power)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelStrainEnergyAlong(SbModel m, Vec U, Vec D, PetscReal *psi, PetscReal *slope,
-                                        PetscInt *ninverted)
+PetscErrorCode SbModelStrainEnergy(SbModel m, Vec U, Vec F, PetscReal *psi, PetscInt *ninverted)
 {
   SbSpace s = m->space;
   SbStage stage = {.shift_k = 1.};
-  PetscReal sum[3], minJ, volume, *f;
-  const PetscScalar *d;
+  PetscReal sum[2], minJ, volume, *f;
   PetscInt n;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(3 * s->nnode, &f));
   PetscCall(SbSpaceGetLocalRead(s, U, &stage.u));
   SbSpaceStrainEnergy(s, stage.u, NULL, &sum[0], &minJ, &n, &volume);
-  PetscCall(SbSpaceAddInternalForce(s, &stage, f));
+  if (F) {
+    PetscCall(SbSpaceGetLocalWrite(s, F, &f));
+    PetscCall(PetscArrayzero(f, 3 * s->nnode));
+    PetscCall(SbSpaceAddInternalForce(s, &stage, f));
+    PetscCall(SbSpaceRestoreLocalWrite(s, F, &f));
+  }
   PetscCall(SbSpaceRestoreLocalRead(s, U, &stage.u));
-  PetscCall(VecGetArrayRead(D, &d));
-  sum[1] = 0.;
-  sum[2] = (PetscReal)n;
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) sum[1] -= f[i] * d[i];
-  PetscCall(VecRestoreArrayRead(D, &d));
-  PetscCall(PetscFree(f));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 3, MPIU_REAL, MPI_SUM, m->comm));
+  sum[1] = (PetscReal)n;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, m->comm));
   *psi = sum[0];
-  *slope = sum[1];
-  *ninverted = (PetscInt)sum[2];
+  *ninverted = (PetscInt)sum[1];
   PetscFunctionReturn(PETSC_SUCCESS);
 }

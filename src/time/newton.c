@@ -61,12 +61,28 @@
 #define STEEP 0.01    /* of the slope of the quadratic model: least slope of E along a direction */
 #define PROVISIONAL 1 /* non-monotone steps that may follow each other while E is above where they began */
 
+/* The potential at an iterate, as far as lengths of steps ask. */
+typedef struct {
+  Vec x, r;            /* the iterate and its residual; of the last one these are the solver's own */
+  Vec elastic;         /* gradient of the strain energy, N */
+  Vec contact;         /* guarded contact: the same of its energy */
+  PetscReal norm;      /* of the residual, N */
+  PetscReal psi;       /* strain energy, J */
+  PetscReal gaps;      /* energy of guarded contact, J: part of psi */
+  PetscReal rest;      /* slope of all but strain and guarded contact along the step, J */
+  PetscReal slope;     /* of E along the step, J */
+  PetscReal s, change; /* part of the step, and of E over it, J */
+  PetscInt ninverted;
+} Iterate;
+
 /* What a solve keeps from iteration to iteration. */
 typedef struct {
   SbRun run;
-  Vec W, G;        /* trial iterate and its residual */
-  Vec kept[2];     /* guarded contact: the same of the longest trial that is good enough */
-  Vec contact;     /* guarded contact: its forces */
+  Iterate from;    /* the last iterate */
+  PetscBool known; /* and all about it but slopes */
+  Iterate to;      /* a trial */
+  Iterate best;    /* guarded contact: the longest trial that is good enough */
+  Vec rhs;         /* guarded contact: residual of its model */
   Vec start, step; /* where provisional steps began; the first of them led to start - step */
   PetscReal least; /* rounding of the strain energy of a body that has turned: E V to the last digit, J */
   PetscInt provisional;   /* how many there were since */
@@ -79,47 +95,45 @@ typedef struct {
   PetscReal shift; /* of the last direction: times the mass added to the tangent, 1/s^2 */
 } Newton;
 
-/* The potential at an iterate, as far as lengths of steps ask. */
-typedef struct {
-  PetscReal norm;      /* of the residual, N */
-  PetscReal psi;       /* strain energy, J */
-  PetscReal rest;      /* slope of all but strain along the step, J */
-  PetscReal gaps;      /* energy of guarded contact, J: part of psi */
-  PetscReal slope;     /* of E along the step, J */
-  PetscReal s, change; /* part of the step, and of E over it, J */
-  PetscInt ninverted;
-} Iterate;
-
-/* Everything about the iterate X, whose residual is F, for a step along -Y. */
-static PetscErrorCode evaluate_at(Newton *n, Vec X, Vec F, Vec Y, Iterate *at)
+/* Energies and forces of an iterate with its residual, or the residual's norm alone where that is no number. */
+static PetscErrorCode evaluate(Newton *n, Iterate *at)
 {
   const SbRun run = n->run;
   const PetscReal part = run->stage ? run->stage_part : 1.;
-  PetscReal slope, elastic;
+  PetscReal energy;
 
   PetscFunctionBeginUser;
-  *at = (Iterate){0};
-  PetscCall(VecNorm(F, NORM_2, &at->norm));
+  at->psi = at->gaps = at->slope = at->rest = 0.;
+  at->ninverted = 0;
+  PetscCall(VecNorm(at->r, NORM_2, &at->norm));
   if (PetscIsInfOrNanReal(at->norm)) PetscFunctionReturn(PETSC_SUCCESS);
-  /* forces are those of a stage between the start of the step and X, divided by its part of the step */
-  if (run->stage) PetscCall(VecAXPBYPCZ(run->stage, 1. - part, part, 0., run->stage_start, X));
+  /* forces are those of a stage between the start of the step and x, divided by its part of the step */
+  if (run->stage) PetscCall(VecAXPBYPCZ(run->stage, 1. - part, part, 0., run->stage_start, at->x));
   PetscCall(
-    SbModelStrainEnergyAlong(run->model, run->stage ? run->stage : X, Y, &at->psi, &elastic, &at->ninverted));
-  PetscCall(VecDot(F, Y, &slope));
+    SbModelStrainEnergy(run->model, run->stage ? run->stage : at->x, at->elastic, &at->psi, &at->ninverted));
   at->psi /= PetscSqr(part);
-  at->slope = -slope;
-  at->rest = -slope - elastic / part;
-  /* that of contact is at X */
+  /* that of contact is at x */
   if (run->model->npotential) {
-    PetscReal energy, along;
-
-    PetscCall(VecZeroEntries(n->contact));
-    PetscCall(SbModelPotentialGradient(run->model, X, run->guard_weight, PETSC_TRUE, &energy, n->contact));
-    PetscCall(VecDot(n->contact, Y, &along));
+    PetscCall(VecZeroEntries(at->contact));
+    PetscCall(
+      SbModelPotentialGradient(run->model, at->x, run->guard_weight, PETSC_TRUE, &energy, at->contact));
     at->gaps = run->guard_weight * energy;
     at->psi += at->gaps;
-    at->rest += along;
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Slopes at an iterate along -Y. */
+static PetscErrorCode find_slopes(Newton *n, Vec Y, Iterate *at)
+{
+  const PetscReal part = n->run->stage ? n->run->stage_part : 1.;
+  const Vec forces[3] = {at->r, at->elastic, at->contact};
+  PetscScalar along[3] = {0., 0., 0.};
+
+  PetscFunctionBeginUser;
+  PetscCall(VecMDot(Y, at->contact ? 3 : 2, forces, along));
+  at->slope = -along[0];
+  at->rest = -along[0] + along[1] / part + along[2];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -133,8 +147,8 @@ static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
   PetscFunctionBeginUser;
   n->blocks.n = n->nblock = 0;
   if (m->npotential) {
-    PetscCall(SbModelPotentialHessian(m, snes->vec_sol, n->kind, &n->blocks, n->contact));
-    PetscCall(VecAYPX(n->contact, n->run->guard_weight, snes->vec_func));
+    PetscCall(SbModelPotentialHessian(m, snes->vec_sol, n->kind, &n->blocks, n->rhs));
+    PetscCall(VecAYPX(n->rhs, n->run->guard_weight, snes->vec_func));
     for (PetscInt k = 0; k < n->blocks.n; k++) {
       for (int i = 0; i < 9; i++) n->blocks.block[k][i] *= n->run->guard_weight;
     }
@@ -142,7 +156,7 @@ static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
   }
   if (n->nblock) {
     if (!n->system) PetscCall(SbContactSystemCreate(m->space, n->run->contact_choice, &n->system));
-    PetscCall(SbContactSystemSolve(n->system, snes->jacobian_pre, &n->blocks, PETSC_TRUE, n->contact,
+    PetscCall(SbContactSystemSolve(n->system, snes->jacobian_pre, &n->blocks, PETSC_TRUE, n->rhs,
                                    snes->vec_sol_update, reason, &iterations));
   } else {
     PetscCall(KSPSetOperators(snes->ksp, snes->jacobian, snes->jacobian_pre));
@@ -163,8 +177,8 @@ static PetscErrorCode least_shift(SNES snes, PetscReal *shift)
   PetscReal mass = 0.;
 
   PetscFunctionBeginUser;
-  PetscCall(MatGetDiagonal(snes->jacobian_pre, n->G));
-  PetscCall(VecSum(n->G, &stiff));
+  PetscCall(MatGetDiagonal(snes->jacobian_pre, n->to.r));
+  PetscCall(VecSum(n->to.r, &stiff));
   for (PetscInt i = 0; i < s->nnode_owned; i++) mass += 3. * s->node_mass[i];
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &mass, 1, MPIU_REAL, MPI_SUM, s->comm));
   *shift = SHIFT_STIFF * PetscRealPart(stiff) / mass;
@@ -180,10 +194,10 @@ static PetscErrorCode add_shift(SNES snes, PetscReal shift)
   PetscScalar *d;
 
   PetscFunctionBeginUser;
-  PetscCall(VecGetArray(n->G, &d));
+  PetscCall(VecGetArray(n->to.r, &d));
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) d[i] = shift * s->node_mass[i / 3];
-  PetscCall(VecRestoreArray(n->G, &d));
-  PetscCall(MatDiagonalSet(snes->jacobian_pre, n->G, ADD_VALUES));
+  PetscCall(VecRestoreArray(n->to.r, &d));
+  PetscCall(MatDiagonalSet(snes->jacobian_pre, n->to.r, ADD_VALUES));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -211,7 +225,7 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
     PetscCall(VecDot(F, Y, slope));
     *slope = -*slope;
     /* friction that is taken for one that sticks has a right-hand side of its own: the direction has to go down E as well */
-    if (n->nblock) PetscCall(VecDot(n->contact, Y, &modelled));
+    if (n->nblock) PetscCall(VecDot(n->rhs, Y, &modelled));
     if (n->nblock && n->kind != SB_HESSIAN_MAJORIZED &&
         (reason < 0 || *slope >= -STEEP * PetscMax(modelled, 0.))) {
       n->kind = n->kind == SB_HESSIAN_EXACT ? SB_HESSIAN_PROJECTED : SB_HESSIAN_MAJORIZED;
@@ -256,18 +270,26 @@ static PetscErrorCode solve_accurately(SNES snes, PetscReal *slope, PetscBool *b
   if (!*better) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESKSPSetUseEW(snes, PETSC_FALSE));
   PetscCall(KSPSetTolerances(snes->ksp, ACCURATE, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
-  PetscCall(VecZeroEntries(n->G));
-  PetscCall(KSPSolve(snes->ksp, F, n->G));
+  PetscCall(VecZeroEntries(n->to.r));
+  PetscCall(KSPSolve(snes->ksp, F, n->to.r));
   PetscCall(SNESKSPSetUseEW(snes, PETSC_TRUE));
   PetscCall(KSPGetIterationNumber(snes->ksp, &iterations));
   PetscCall(KSPGetConvergedReason(snes->ksp, &reason));
   snes->linear_its += iterations;
   *better = (PetscBool)(reason > 0);
   if (!*better) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecCopy(n->G, Y));
+  PetscCall(VecCopy(n->to.r, Y));
   PetscCall(VecDot(F, Y, slope));
   *slope = -*slope;
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void swap(Iterate *a, Iterate *b)
+{
+  const Iterate c = *a;
+
+  *a = *b;
+  *b = c;
 }
 
 /* Goes from X along -Y, E having the slope `slope` there, to the next X and F; s: how far, as part of Y, in: at most. */
@@ -276,63 +298,67 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
   Newton *n = (Newton *)snes->data;
   const SbModel m = n->run->model;
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
+  Iterate *from = &n->from, *to = &n->to, *best = &n->best;
   PetscBool enough, provisional, better,
     flat = PETSC_FALSE, guarded,
     plain = (PetscBool)(n->nblock > 0 || *s < 1.); /* a barrier is nothing to come back from */
   PetscReal change, noise, total, goal;
   PetscReal low = 0., high = 0.; /* parts of the step between which E is lowest; 0: not known yet */
   PetscInt nactive, tries = 0;
-  Iterate from, to, best = {0};
 
   PetscFunctionBeginUser;
-  PetscCall(evaluate_at(n, X, F, Y, &from));
+  from->x = X;
+  from->r = F;
+  if (!n->known) PetscCall(evaluate(n, from));
+  PetscCall(find_slopes(n, Y, from));
+  n->known = PETSC_TRUE;
+  best->s = 0.;
   for (;;) {
     /* how E changes */
     change = PETSC_INFINITY;
     noise = 0.;
-    PetscCall(VecWAXPY(n->W, -*s, Y, X));
-    PetscCall(SNESComputeFunction(snes, n->W, n->G));
-    PetscCall(evaluate_at(n, n->W, n->G, Y, &to));
-    if (!PetscIsInfOrNanReal(to.norm)) {
-      change = to.psi - from.psi + 0.5 * *s * (from.rest + to.rest);
-      noise = n->least + ROUNDING * (PetscAbsReal(to.psi) + PetscAbsReal(from.psi) +
-                                     *s * (PetscAbsReal(from.rest) + PetscAbsReal(to.rest)));
+    PetscCall(VecWAXPY(to->x, -*s, Y, X));
+    PetscCall(SNESComputeFunction(snes, to->x, to->r));
+    PetscCall(evaluate(n, to));
+    if (!PetscIsInfOrNanReal(to->norm)) {
+      PetscCall(find_slopes(n, Y, to));
+      change = to->psi - from->psi + 0.5 * *s * (from->rest + to->rest);
+      noise = n->least + ROUNDING * (PetscAbsReal(to->psi) + PetscAbsReal(from->psi) +
+                                     *s * (PetscAbsReal(from->rest) + PetscAbsReal(to->rest)));
       if (PetscIsInfOrNanReal(change)) change = PETSC_INFINITY;
     }
     PetscCall(PetscInfo(
       snes,
       "iteration %" PetscInt_FMT ": %g of the step changes E by %g J (slope %g J), residual %g -> %g N\n",
-      snes->iter, (double)*s, (double)change, (double)slope, (double)from.norm, (double)to.norm));
+      snes->iter, (double)*s, (double)change, (double)slope, (double)from->norm, (double)to->norm));
 
     /* enough; where it is too little to decide, or the step goes up at once, as forces without a potential may make it, the residual has to */
     total = n->provisional ? n->rise + change : change;
     goal = DECREASE * (n->provisional ? n->slope : *s * slope);
     enough = (PetscBool)(slope < 0. && total <= goal);
     if (slope >= 0. || total <= noise)
-      enough = (PetscBool)(enough || to.norm <= (1. - DECREASE * *s) * from.norm);
+      enough = (PetscBool)(enough || to->norm <= (1. - DECREASE * *s) * from->norm);
     /* at the solution, where residuals are rounding as well, the step is as good as none */
     if (slope < 0. && total <= noise) enough = (PetscBool)(enough || -slope <= NOTHING * noise);
     provisional =
       (PetscBool)(!enough && !plain && slope < 0. && n->provisional < PROVISIONAL &&
-                  change < PETSC_INFINITY && to.ninverted <= from.ninverted && to.gaps <= from.gaps);
+                  change < PETSC_INFINITY && to->ninverted <= from->ninverted && to->gaps <= from->gaps);
 
     /* with a barrier on the way E is lowest in front of it, and where it hardly curves far behind a whole step: between what is known by slopes */
     guarded = (PetscBool)(m->npotential && plain);
-    if (guarded && enough && to.slope < 0.)
+    if (guarded && enough && to->slope < 0.)
       low = *s;
-    else if (guarded && slope < 0. && (to.gaps > from.gaps || best.s > 0.))
+    else if (guarded && slope < 0. && (to->gaps > from->gaps || best->s > 0.))
       high = *s;
     if (guarded && enough) {
-      flat = (PetscBool)(to.slope >= WOLFE * slope);
-      if (best.s == 0. || change < best.change) {
-        PetscCall(VecSwap(n->W, n->kept[0]));
-        PetscCall(VecSwap(n->G, n->kept[1]));
-        best = to;
-        best.s = *s;
-        best.change = change;
+      flat = (PetscBool)(to->slope >= WOLFE * slope);
+      if (best->s == 0. || change < best->change) {
+        to->s = *s;
+        to->change = change;
+        swap(to, best);
       }
     }
-    if (best.s > 0.) {
+    if (best->s > 0.) {
       PetscReal far = 0.;
 
       if (!flat && tries++ < TRIES) {
@@ -350,11 +376,9 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
         *s = far;
         continue;
       }
-      PetscCall(VecSwap(n->W, n->kept[0]));
-      PetscCall(VecSwap(n->G, n->kept[1]));
-      to = best;
-      *s = best.s;
-      change = best.change;
+      swap(to, best);
+      *s = to->s;
+      change = to->change;
       enough = PETSC_TRUE;
     }
     if (enough || provisional) break;
@@ -365,7 +389,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
       if (better) {
         if (m->npotential)
           PetscCall(SbModelPotentialMaxStep(m, X, Y, 1., s, &nactive)); /* another way than before */
-        PetscCall(evaluate_at(n, X, F, Y, &from));
+        PetscCall(find_slopes(n, Y, from));
         continue;
       }
     }
@@ -375,7 +399,8 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
       PetscCall(VecCopy(n->start, X));
       PetscCall(VecCopy(n->step, Y));
       PetscCall(SNESComputeFunction(snes, X, F));
-      PetscCall(evaluate_at(n, X, F, Y, &from));
+      PetscCall(evaluate(n, from));
+      PetscCall(find_slopes(n, Y, from));
       slope = n->slope;
       change = n->first;
       n->provisional = 0;
@@ -400,9 +425,12 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
     n->rise = 0.;
   }
   n->rise += change;
-  PetscCall(VecCopy(n->W, X));
-  PetscCall(VecCopy(n->G, F));
-  snes->norm = to.norm;
+  PetscCall(VecCopy(to->x, X));
+  PetscCall(VecCopy(to->r, F));
+  snes->norm = to->norm;
+  from->x = to->x;
+  from->r = to->r;
+  swap(from, to);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -433,7 +461,7 @@ static PetscErrorCode approach(SNES snes)
   const SbModel m = n->run->model;
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update, start = n->run->guard_start,
             D = n->step;
-  PetscReal part, progress = 0., slope, unused[2];
+  PetscReal part, progress = 0., slope, energy;
   PetscInt nactive, inverted, before;
 
   PetscFunctionBeginUser;
@@ -465,28 +493,28 @@ static PetscErrorCode approach(SNES snes)
 
     /* as far as it goes when bodies give way */
     PetscCall(SNESComputeFunction(snes, X, F));
-    PetscCall(VecWAXPY(n->W, DIFFERENCE, D, X));
+    PetscCall(VecWAXPY(n->to.x, DIFFERENCE, D, X));
     PetscCall(SbModelPotentialAdvance(m, progress + DIFFERENCE));
-    PetscCall(SNESComputeFunction(snes, n->W, n->G));
+    PetscCall(SNESComputeFunction(snes, n->to.x, n->to.r));
     PetscCall(SbModelPotentialAdvance(m, progress));
-    PetscCall(VecAXPY(n->G, -1., F));
-    PetscCall(VecAXPY(F, (1. - progress) / DIFFERENCE, n->G));
+    PetscCall(VecAXPY(n->to.r, -1., F));
+    PetscCall(VecAXPY(F, (1. - progress) / DIFFERENCE, n->to.r));
     PetscCall(find_direction(snes, &filtered, &slope));
     if (snes->reason) PetscFunctionReturn(PETSC_SUCCESS);
     PetscCall(VecAXPY(Y, progress - 1., D));
     PetscCall(SbModelPotentialMaxStep(m, X, Y, 1., &s, &nactive));
-    PetscCall(SbModelStrainEnergyAlong(m, X, Y, &unused[0], &unused[1], &before));
+    PetscCall(SbModelStrainEnergy(m, X, NULL, &energy, &before));
     for (;; s *= 0.5) {
-      PetscCall(VecWAXPY(n->W, -s, Y, X));
+      PetscCall(VecWAXPY(n->to.x, -s, Y, X));
       PetscCall(SbModelPotentialAdvance(m, progress + s * (1. - progress)));
-      PetscCall(SbModelStrainEnergyAlong(m, n->W, Y, &unused[0], &unused[1], &inverted));
-      if (s < SHORTEST || (inverted <= before && !PetscIsInfOrNanReal(unused[0]))) break;
+      PetscCall(SbModelStrainEnergy(m, n->to.x, NULL, &energy, &inverted));
+      if (s < SHORTEST || (inverted <= before && !PetscIsInfOrNanReal(energy))) break;
     }
     PetscCall(PetscInfo(snes, "approach %d: %g of the rest of the way, of which %g was done\n", round,
                         (double)s, (double)progress));
     snes->iter++;
     if (s < SHORTEST) break;
-    PetscCall(VecCopy(n->W, X));
+    PetscCall(VecCopy(n->to.x, X));
     progress = s == 1. ? 1. : progress + s * (1. - progress);
     if (progress == 1.) PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -541,6 +569,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   snes->iter = 0;
   n->provisional = 0;
   n->nblock = 0;
+  n->known = PETSC_FALSE;
   n->kind = SB_HESSIAN_PROJECTED;
   n->shift = 0.;
   if (guarded) PetscCall(approach(snes));
@@ -588,6 +617,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
       if (!again) continue;
       snes->reason = SNES_CONVERGED_ITERATING;
       first = snes->iter;
+      n->known = PETSC_FALSE;
       PetscCall(SNESComputeFunction(snes, X, F));
       PetscCall(VecNorm(F, NORM_2, &snes->norm));
     }
@@ -615,16 +645,19 @@ PetscErrorCode SbRunSolveTangent(SbRun run, Vec B, Vec X, PetscInt *iterations, 
 static PetscErrorCode SNESSetUp_Newton(SNES snes)
 {
   Newton *n = (Newton *)snes->data;
+  const PetscBool guarded = (PetscBool)(n->run->model->npotential > 0);
+  Iterate *const of[3] = {&n->from, &n->to, &n->best};
 
   PetscFunctionBeginUser;
   PetscCall(SNESSetUpMatrices(snes));
-  PetscCall(VecDuplicate(snes->vec_sol, &n->W));
-  PetscCall(VecDuplicate(snes->vec_sol, &n->G));
   PetscCall(VecDuplicate(snes->vec_sol, &n->start));
   PetscCall(VecDuplicate(snes->vec_sol, &n->step));
-  if (n->run->model->npotential) {
-    PetscCall(VecDuplicate(snes->vec_sol, &n->contact));
-    for (int k = 0; k < 2; k++) PetscCall(VecDuplicate(snes->vec_sol, &n->kept[k]));
+  if (guarded) PetscCall(VecDuplicate(snes->vec_sol, &n->rhs));
+  for (int k = 0; k < (guarded ? 3 : 2); k++) {
+    if (k) PetscCall(VecDuplicate(snes->vec_sol, &of[k]->x));
+    if (k) PetscCall(VecDuplicate(snes->vec_sol, &of[k]->r));
+    PetscCall(VecDuplicate(snes->vec_sol, &of[k]->elastic));
+    if (guarded) PetscCall(VecDuplicate(snes->vec_sol, &of[k]->contact));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -632,14 +665,18 @@ static PetscErrorCode SNESSetUp_Newton(SNES snes)
 static PetscErrorCode SNESReset_Newton(SNES snes)
 {
   Newton *n = (Newton *)snes->data;
+  Iterate *const of[3] = {&n->from, &n->to, &n->best};
 
   PetscFunctionBeginUser;
-  PetscCall(VecDestroy(&n->W));
-  PetscCall(VecDestroy(&n->G));
+  for (int k = 0; k < 3; k++) {
+    if (k) PetscCall(VecDestroy(&of[k]->x));
+    if (k) PetscCall(VecDestroy(&of[k]->r));
+    PetscCall(VecDestroy(&of[k]->elastic));
+    PetscCall(VecDestroy(&of[k]->contact));
+  }
   PetscCall(VecDestroy(&n->start));
   PetscCall(VecDestroy(&n->step));
-  PetscCall(VecDestroy(&n->contact));
-  for (int k = 0; k < 2; k++) PetscCall(VecDestroy(&n->kept[k]));
+  PetscCall(VecDestroy(&n->rhs));
   PetscCall(SbContactSystemDestroy(&n->system));
   PetscCall(SbBlocksFree(&n->blocks));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -15,17 +15,23 @@
 /* The norm of the energy of the difference of two states of the model, whose law is linear or nearly so between them. */
 static PetscErrorCode distance(SbModel m, Vec U, Vec V, Vec U1, Vec V1, PetscReal *error)
 {
-  PetscReal form, slope[2], unused, mass = 0., all;
+  PetscReal unused, mass = 0., all;
+  PetscScalar form;
   PetscInt inverted;
   const PetscScalar *v;
-  Vec D;
+  Vec D, F[2];
 
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(U, &D));
+  PetscCall(VecDuplicate(U, &F[0]));
+  PetscCall(VecDuplicate(U, &F[1]));
   PetscCall(VecWAXPY(D, -1., U, U1));
-  PetscCall(SbModelStrainEnergyAlong(m, U, D, &unused, &slope[0], &inverted));
-  PetscCall(SbModelStrainEnergyAlong(m, U1, D, &unused, &slope[1], &inverted));
-  form = slope[0] - slope[1]; /* of -D */
+  PetscCall(SbModelStrainEnergy(m, U, F[0], &unused, &inverted));
+  PetscCall(SbModelStrainEnergy(m, U1, F[1], &unused, &inverted));
+  PetscCall(VecAXPY(F[1], -1., F[0]));
+  PetscCall(VecDot(F[1], D, &form));
+  PetscCall(VecDestroy(&F[0]));
+  PetscCall(VecDestroy(&F[1]));
   if (V) {
     PetscCall(VecWAXPY(D, -1., V, V1));
     PetscCall(VecGetArrayRead(D, &v));
