@@ -159,8 +159,13 @@ static inline void sb_scatter_strain(SbSpace s, const SbRegion *region, PetscInt
   sb_scatter_add(s->batch_node + 4 * SB_BATCH * b, s->batch_n[b], (const SbPack *)fe, f);
 }
 
+/* Rotations that are stored for a cell: those of P2 have one at each point of SbRuleQuadratic, others use the first. */
+static inline PetscInt sb_rotation_points(SbSpace s)
+{
+  return s->edge_node ? 4 : 1;
+}
 /*
-  SbSpaceCellRotations - R[nbatch][9]: the frames of the laws, or the polar rotations of F where a law has none.
+  SbSpaceCellRotations - R[nbatch][sb_rotation_points()][9]: the frames of the laws, or the polar rotations of F where a law has none.
 
   Not collective. Input: u[nnode][3] with ghosts, m; NULL: at rest.
 */

@@ -207,12 +207,12 @@ PetscErrorCode SbSpaceFindSet(SbSpace space, const char *name, const char *where
   SbSpaceCreateMatrixFree - the tangent without a matrix: A = shift_a M + shift_v C + shift_k sum_T R_T K_T R_T^T, applied cell
   by cell from the cells' rotated gradients.
 
-  Collective. For laws whose tangent is Hooke's tensor turned by a rotation (linear; co-rotated with the warped tangent) and
-  lumped mass. A is a MATSHELL owned by the caller; the space is borrowed. Its state is set by SbSpaceAssembleTangent(), as for
-  any matrix. Prescribed unknowns have a scaled identity. Errors: PETSC_ERR_SUP for other laws and the consistent mass.
+  Collective. For laws whose tangent is Hooke's tensor turned by a rotation (linear; co-rotated with the warped tangent), lumped
+  mass, and elements without face terms (P1, P2). A is a MATSHELL owned by the caller; the space is borrowed. Its state is set by SbSpaceAssembleTangent(), as for
+  any matrix. Prescribed unknowns have a scaled identity. Errors: PETSC_ERR_SUP for what it is not for.
 */
 PetscErrorCode SbSpaceCreateMatrixFree(SbSpace space, Mat *A);
-/* PETSC_TRUE when the space's laws and mass allow a matrix-free operator. Not collective, same on all ranks. */
+/* PETSC_TRUE when the space's laws, elements and mass allow a matrix-free operator. Not collective, same on all ranks. */
 PetscErrorCode SbSpaceAllowsMatrixFree(SbSpace space, PetscBool *has);
 
 /*

@@ -7,6 +7,11 @@
   an application about as much as one with a stored matrix, and no blocks are formed at all: for a handful of iterations per
   step this is several times cheaper than assembling.
 
+  A cell of P2 has the rotated gradients of its four points, and lambda acts on the mean of tr(H) over them (quadratic.c). With
+  far and near the two barycentric coordinates of the points, point q sees a linear cell whose vertices i move by
+    (4 far - 1) p_i + 4 far sum_j p_ij + 4 (near - far) p_iq,   p_ii = p_i:
+  all but the last term is the same at the four points.
+
   Vectors are copied to four doubles per node, so that a node is one load and one store of the processor. Eight cells side by
   side: a 4x4 transpose turns eight loads of a node into lanes.
 
@@ -20,7 +25,8 @@
 typedef struct {
   SbSpace space;
   void *memory;                  /* what R and h live in */
-  SbPack *R, *h;                 /* [nbatch][9] rotations; rotated gradients of nodes 1..3, 1/m */
+  SbPack *R;                     /* [nbatch][sb_rotation_points()][9] rotations */
+  SbPack *h;                     /* likewise: rotated gradients of nodes 1..3, 1/m */
   PetscReal *lambda, *mu;        /* [nregion] times the factor of the stiffness, Pa */
   PetscReal *inertia;            /* [nnode_owned] diagonal from mass and its damping, kg/s^2 */
   PetscReal prescribed_diagonal; /* diagonal of prescribed unknowns, kg/s^2 or N/m */
@@ -69,13 +75,13 @@ SB_INLINE void scatter_add(const Eight lanes[3], const PetscInt node[SB_BATCH], 
   }
 }
 
-/* q += A p of the batches of one region. Padding lanes have volume zero. */
-SB_KERNEL static void apply_region(PetscInt nbatch, const PetscInt *node, const SbPack *gradient,
-                                   const SbPack *volume, PetscReal lambda, PetscReal mu, const PetscReal *p,
-                                   PetscReal *q)
+/* q += A p of the batches of one region, whose gradients are `stride` apart. Padding lanes have volume zero. */
+SB_KERNEL static void apply_region(PetscInt nbatch, const PetscInt *node, PetscInt stride,
+                                   const SbPack *gradient, const SbPack *volume, PetscReal lambda,
+                                   PetscReal mu, const PetscReal *p, PetscReal *q)
 {
   for (PetscInt b = 0; b < nbatch; b++, node += 4 * SB_BATCH) {
-    const Eight *h = (const Eight *)(gradient + 9 * b), V = *(const Eight *)(volume + b);
+    const Eight *h = (const Eight *)(gradient + stride * b), V = *(const Eight *)(volume + b);
     Eight u[4][3], H[9], f[4][3];
 
     for (int a = 0; a < 4; a++) gather(p, node + a * SB_BATCH, u[a]);
@@ -96,6 +102,70 @@ SB_KERNEL static void apply_region(PetscInt nbatch, const PetscInt *node, const 
     }
     for (int i = 0; i < 3; i++) f[0][i] = -(f[1][i] + f[2][i] + f[3][i]);
     for (int a = 0; a < 4; a++) scatter_add(f[a], node + a * SB_BATCH, q);
+  }
+}
+
+/* The same of P2. lambda[2]: at the points, and of the mean over them. */
+SB_KERNEL static void apply_quadratic(PetscInt nbatch, PetscInt width, const PetscInt *node,
+                                      const SbPack *gradient, const SbPack *volume, const PetscReal lambda[2],
+                                      PetscReal mu, const PetscReal *p, PetscReal *q)
+{
+  static const int between[4][4] = {{0, 4, 5, 6}, {4, 1, 7, 8}, {5, 7, 2, 9}, {6, 8, 9, 3}};
+  const PetscReal far4 = 4. * SbRuleQuadratic.L[0][1], step = 4. * SbRuleQuadratic.L[0][0] - far4;
+
+  for (PetscInt b = 0; b < nbatch; b++, node += width * SB_BATCH) {
+    const Eight *h = (const Eight *)(gradient + 36 * b), V = 0.25 * *(const Eight *)(volume + b);
+    const Eight mv = mu * V, m2 = mv + mv;
+    Eight u[10][3], same[4][3], H[4][9], f[4][4][3], mean = {0};
+
+    for (int a = 0; a < 10; a++) gather(p, node + a * SB_BATCH, u[a]);
+    // what vertices move by at all points; then the gradients there
+    for (int i = 0; i < 3; i++) {
+      for (int a = 0; a < 4; a++) {
+        same[a][i] = (far4 - 1.) * u[a][i];
+        for (int c = 0; c < 4; c++) {
+          if (c != a) same[a][i] += far4 * u[between[a][c]][i];
+        }
+      }
+    }
+    for (int k = 0; k < 4; k++) {
+      for (int i = 0; i < 3; i++) {
+        const Eight u0 = same[0][i] + step * u[between[0][k]][i];
+        const Eight d1 = same[1][i] + step * u[between[1][k]][i] - u0;
+        const Eight d2 = same[2][i] + step * u[between[2][k]][i] - u0;
+        const Eight d3 = same[3][i] + step * u[between[3][k]][i] - u0;
+
+        for (int j = 0; j < 3; j++)
+          H[k][3 * i + j] = d1 * h[9 * k + j] + d2 * h[9 * k + 3 + j] + d3 * h[9 * k + 6 + j];
+      }
+      mean += H[k][0] + H[k][4] + H[k][8];
+    }
+    mean *= 0.25 * lambda[1] * V;
+    // forces of the points on the vertices
+    for (int k = 0; k < 4; k++) {
+      const Eight *G = H[k], pressure = lambda[0] * V * (G[0] + G[4] + G[8]) + mean;
+      const Eight xx = m2 * G[0] + pressure, yy = m2 * G[4] + pressure, zz = m2 * G[8] + pressure;
+      const Eight xy = mv * (G[1] + G[3]), xz = mv * (G[2] + G[6]), yz = mv * (G[5] + G[7]);
+
+      for (int a = 0; a < 3; a++) {
+        const Eight *g = h + 9 * k + 3 * a;
+
+        f[k][a + 1][0] = xx * g[0] + xy * g[1] + xz * g[2];
+        f[k][a + 1][1] = xy * g[0] + yy * g[1] + yz * g[2];
+        f[k][a + 1][2] = xz * g[0] + yz * g[1] + zz * g[2];
+      }
+      for (int i = 0; i < 3; i++) f[k][0][i] = -(f[k][1][i] + f[k][2][i] + f[k][3][i]);
+    }
+    // and back as they came
+    for (int i = 0; i < 3; i++) {
+      for (int a = 0; a < 4; a++) same[a][i] = f[0][a][i] + f[1][a][i] + f[2][a][i] + f[3][a][i];
+      for (int a = 0; a < 4; a++) {
+        u[a][i] = (far4 - 1.) * same[a][i] + step * f[a][a][i];
+        for (int c = a + 1; c < 4; c++)
+          u[between[a][c]][i] = far4 * (same[a][i] + same[c][i]) + step * (f[c][a][i] + f[a][c][i]);
+      }
+    }
+    for (int a = 0; a < 10; a++) scatter_add(u[a], node + a * SB_BATCH, q);
   }
 }
 
@@ -142,10 +212,18 @@ static PetscErrorCode MatMult_Frames(Mat A, Vec X, Vec Y)
   }
   PetscCall(PetscArrayzero(o->q + 4 * s->nnode_owned, 4 * (s->nnode - s->nnode_owned)));
   for (PetscInt r = 0; r < s->nregion; r++) {
-    const PetscInt b = s->region[r].bstart;
+    const SbRegion *region = &s->region[r];
+    const PetscInt b = region->bstart, n = region->bend - b;
+    const PetscReal lambda[2] = {region->pointwise == region->material ? o->lambda[r] : 0.,
+                                 region->pointwise == region->material ? 0. : o->lambda[r]};
+    const SbPack *h = (const SbPack *)o->h + 9 * sb_rotation_points(s) * b,
+                 *V = (const SbPack *)s->batch_V + b;
 
-    apply_region(s->region[r].bend - b, s->batch_node + 4 * SB_BATCH * b, (const SbPack *)o->h + 9 * b,
-                 (const SbPack *)s->batch_V + b, o->lambda[r], o->mu[r], o->p, o->q);
+    if (region->quadratic)
+      apply_quadratic(n, s->width, sb_quadratic_nodes(s, b), h, V, lambda, o->mu[r], o->p, o->q);
+    else
+      apply_region(n, s->batch_node + 4 * SB_BATCH * b, 9 * sb_rotation_points(s), h, V, o->lambda[r],
+                   o->mu[r], o->p, o->q);
   }
   PetscCall(VecGetArrayRead(X, &x));
   PetscCall(VecGetArray(Y, &y));
@@ -178,7 +256,7 @@ static PetscErrorCode MatDestroy_Frames(Mat A)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* h = R grad phi of one batch. */
+/* h = R grad phi of one batch, or of one point of it. */
 SB_KERNEL static void rotate_gradients(const SbPack R[restrict 9], const SbPack g[restrict 9],
                                        SbPack h[restrict 9])
 {
@@ -203,23 +281,31 @@ static PetscErrorCode assemble(Mat A, const SbStage *stage)
   PetscCall(MatShellGetContext(A, &o));
   s = o->space;
   SbSpaceCellRotations(s, stage->u, o->R);
-  for (PetscInt b = 0; b < s->nbatch; b++)
-    rotate_gradients((const SbPack *)o->R + 9 * b, (const SbPack *)s->batch_g + 9 * b, o->h + 9 * b);
   for (PetscInt i = 0; i < s->nnode_owned; i++) o->inertia[i] = stage->shift_a * s->node_mass[i];
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
     const SbMaterial m = region->material;
     const PetscReal factor = stage->shift_k + stage->shift_v * region->beta;
-    const PetscReal damping = stage->shift_v * region->alpha * m->density * region->element->ops.mass_lumped;
+    const PetscReal drag = stage->shift_v * region->alpha * m->density,
+                    damping = drag * region->element->ops.mass_lumped,
+                    damping_edge = drag * region->element->ops.mass_lumped_edge;
 
     o->lambda[r] = factor * m->ops.volumetric_modulus(m);
     o->mu[r] = factor * m->ops.shear_modulus(m);
     stiffest = PetscMax(stiffest, factor * m->E);
-    for (PetscInt b = region->bstart; damping != 0. && b < region->bend; b++) {
-      for (PetscInt l = 0; l < 4 * SB_BATCH; l++) {
-        const PetscInt node = s->batch_node[4 * SB_BATCH * b + l];
+    for (PetscInt b = region->bstart; b < region->bend; b++) {
+      for (int q = 0; q < (region->quadratic ? 4 : 1); q++) {
+        const PetscInt at = 9 * (sb_rotation_points(s) * b + q);
 
-        if (node < s->nnode_owned) o->inertia[node] += damping * s->batch_V[b][l % SB_BATCH];
+        rotate_gradients((const SbPack *)o->R + at, (const SbPack *)s->batch_g + 9 * b, o->h + at);
+      }
+    }
+    for (PetscInt b = region->bstart; damping != 0. && b < region->bend; b++) {
+      for (PetscInt l = 0; l < (region->quadratic ? 10 : 4) * SB_BATCH; l++) {
+        const PetscInt node = s->batch_clique[s->width * SB_BATCH * b + l];
+        const PetscReal share = l < 4 * SB_BATCH ? damping : damping_edge;
+
+        if (node < s->nnode_owned) o->inertia[node] += share * s->batch_V[b][l % SB_BATCH];
       }
     }
   }
@@ -234,7 +320,7 @@ static PetscErrorCode assemble(Mat A, const SbStage *stage)
 PetscErrorCode SbSpaceAllowsMatrixFree(SbSpace s, PetscBool *has)
 {
   PetscFunctionBeginUser;
-  *has = (PetscBool)(!s->consistent_mass && !s->edge_node);
+  *has = (PetscBool)(!s->consistent_mass && !s->faces);
   for (PetscInt r = 0; r < s->nregion; r++)
     *has = (PetscBool)(*has && (s->region[r].material->linear || s->region[r].material->ops.frame));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, has, 1, SB_MPI_BOOL, MPI_LAND, s->comm));
@@ -244,8 +330,7 @@ PetscErrorCode SbSpaceAllowsMatrixFree(SbSpace s, PetscBool *has)
 PetscErrorCode SbSpaceCreateMatrixFree(SbSpace s, Mat *A)
 {
   static const SbAssembly assembly = {.assemble = assemble};
-  const size_t batches = 18 * (size_t)s->nbatch * sizeof(SbPack),
-               nodes = 8 * (size_t)s->nnode * sizeof(PetscReal);
+  const size_t packs = 9 * (size_t)(sb_rotation_points(s) * s->nbatch), nodes = 8 * (size_t)s->nnode;
   PetscMPIInt size;
   PetscBool has;
   Operator *o;
@@ -253,14 +338,14 @@ PetscErrorCode SbSpaceCreateMatrixFree(SbSpace s, Mat *A)
   PetscFunctionBeginUser;
   PetscCall(SbSpaceAllowsMatrixFree(s, &has));
   PetscCheck(has, s->comm, PETSC_ERR_SUP,
-             "The tangent of this law, element p2, or the consistent mass, needs an assembled matrix");
+             "The tangent of this law, element cr or dg, or the consistent mass, needs an assembled matrix");
   if (!s->plan) PetscCall(SbPlanCreate(s, &s->plan));
   PetscCall(PetscNew(&o));
   o->space = s;
-  PetscCall(PetscMalloc(batches + nodes + 64, &o->memory));
+  PetscCall(PetscMalloc(2 * packs * sizeof(SbPack) + nodes * sizeof(PetscReal) + 64, &o->memory));
   o->R = (SbPack *)(((uintptr_t)o->memory + 63) & ~(uintptr_t)63);
-  o->h = o->R + 9 * s->nbatch;
-  o->p = (PetscReal *)(o->h + 9 * s->nbatch);
+  o->h = o->R + packs;
+  o->p = (PetscReal *)(o->h + packs);
   o->q = o->p + 4 * s->nnode;
   PetscCall(PetscArrayzero(o->p, 8 * s->nnode));
   PetscCall(PetscMalloc3(s->nregion, &o->lambda, s->nregion, &o->mu, s->nnode_owned, &o->inertia));
@@ -337,27 +422,50 @@ PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], con
       block[9 * (ia[k] + p->diagonal[node[k]] - p->di[node[k]]) + 4 * c] += o->inertia[node[k]];
   }
   for (PetscInt r = 0; r < s->nregion; r++) {
-    for (PetscInt b = s->region[r].bstart; b < s->region[r].bend; b++) {
-      const PetscInt *corner = s->batch_node + 4 * SB_BATCH * b;
-      PetscBool any = PETSC_FALSE;
-      SbPack K[10][9];
+    const SbRegion *region = &s->region[r];
+    const PetscBool mean = (PetscBool)(region->quadratic && region->pointwise != region->material);
+    const PetscInt na = region->quadratic ? SB_CELL_NODES : 4, npair = region->quadratic ? SB_PAIRS : 10;
 
-      for (PetscInt l = 0; l < 4 * SB_BATCH; l++) any = (PetscBool)(any || wanted[corner[l]] >= 0);
+    for (PetscInt b = region->bstart; b < region->bend; b++) {
+      const PetscInt *corner = s->batch_clique + s->width * SB_BATCH * b;
+      PetscBool any = PETSC_FALSE;
+      SbPack K[SB_PAIRS][9] __attribute__((aligned(64)));
+
+      for (PetscInt l = 0; l < na * SB_BATCH; l++) any = (PetscBool)(any || wanted[corner[l]] >= 0);
       if (!any) continue;
-      SbCellBlocksIsotropic(s->batch_g + 9 * b, s->batch_V[b], o->lambda[r], o->mu[r],
-                            (const SbPack *)o->R + 9 * b, K);
+      if (region->quadratic) {
+        const SbPack *h = (const SbPack *)o->h + 9 * sb_rotation_points(s) * b;
+        SbPack B[4][10][9] __attribute__((aligned(64))), V, one[9], factor, force[12], volume[30] = {{0}};
+
+        // the points in the turned frame, and lambda/V b b^T with b = sum_q V_q h_q (quadratic.c)
+        for (PetscInt l = 0; l < SB_BATCH; l++) {
+          V[l] = 0.25 * s->batch_V[b][l];
+          factor[l] = mean && V[l] > 0. ? o->lambda[r] / (4. * V[l]) : 0.;
+          for (int e = 0; e < 9; e++) one[e][l] = e % 4 == 0;
+        }
+        for (int q = 0; q < 4; q++) {
+          SbCellBlocksIsotropic(h + 9 * q, V, mean ? 0. : o->lambda[r], o->mu[r], NULL, B[q]);
+          SbCellForce(h + 9 * q, V, (const SbPack *)one, force);
+          SbQuadraticAdd(SbRuleQuadratic.L[q], (const SbPack *)force, volume);
+        }
+        SbQuadraticBlocks((const SbPack(*)[10][9])B, factor, (const SbPack *)volume, K);
+      } else
+        SbCellBlocksIsotropic(s->batch_g + 9 * b, s->batch_V[b], o->lambda[r], o->mu[r],
+                              (const SbPack *)o->R + 9 * sb_rotation_points(s) * b, K);
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        for (int q = 0; q < 16; q++) {
-          const int a = q / 4, c = q % 4, lo = PetscMin(a, c), hi = PetscMax(a, c);
-          const int pair = lo * (7 - lo) / 2 + hi;
+        const size_t start = SbPlanCellOffset(s, s->batch_cell[b] + l);
+
+        for (PetscInt turn = 0; turn < 2 * npair; turn++) {
+          const PetscInt pair = turn / 2, a = turn % 2 ? SbPairB[pair] : SbPairA[pair],
+                         c = turn % 2 ? SbPairA[pair] : SbPairB[pair];
           const PetscInt i = corner[a * SB_BATCH + l], k = wanted[i];
 
-          if (k < 0) continue;
-          const PetscInt position = p->offset[(16 * (size_t)b + (size_t)q) * SB_BATCH + (size_t)l];
+          if (k < 0 || (a == c && turn % 2)) continue;
+          const PetscInt position = p->offset[start + (size_t)(SB_BATCH * (s->width * a + c))];
           const PetscInt at =
             ia[k] + (position >= 0 ? position - p->di[i] : p->di[i + 1] - p->di[i] + ~position - p->oi[i]);
 
-          for (int e = 0; e < 9; e++) block[9 * at + e] += K[pair][a <= c ? e : 3 * (e % 3) + e / 3][l];
+          for (int e = 0; e < 9; e++) block[9 * at + e] += K[pair][turn % 2 ? 3 * (e % 3) + e / 3 : e][l];
         }
       }
     }

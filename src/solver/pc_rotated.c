@@ -27,7 +27,7 @@ typedef struct {
   PetscInt *local;   /* [nnode] inverse, -1 for nodes without part */
   PetscInt *ia, *ja; /* graph of the interior rows */
   SbFactor factor;
-  SbPack *cells;     /* [nbatch][9] rotations, when the operator does not hold them */
+  SbPack *cells;     /* rotations of the cells, when the operator does not hold them */
   PetscReal *turn;   /* [nnode_owned][9] rotations of the nodes now */
   PetscReal *turn0;  /* and at the factorisation */
   PetscReal *spread; /* [nnode_owned] */
@@ -105,7 +105,7 @@ static PetscErrorCode find_cells(Rotated *p, Mat A, const SbPack **cells)
   PetscCall(PetscObjectQuery((PetscObject)A, "sb_state", (PetscObject *)&state));
   PetscCheck(state || s->linear, s->comm, PETSC_ERR_ARG_WRONGSTATE,
              "The operator does not carry its displacement: compose it as sb_state");
-  if (!p->cells) PetscCall(PetscMalloc1(9 * s->nbatch, &p->cells));
+  if (!p->cells) PetscCall(PetscMalloc1(9 * sb_rotation_points(s) * s->nbatch, &p->cells));
   if (s->linear)
     SbSpaceCellRotations(s, NULL, p->cells);
   else {

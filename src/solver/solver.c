@@ -36,8 +36,8 @@ static PetscErrorCode create_frames(SbSpace s, Mat *A)
   PetscFunctionBeginUser;
   PetscCall(SbSpaceAllowsMatrixFree(s, &frames));
   PetscCheck(frames, s->comm, PETSC_ERR_USER,
-             "-solver realtime is for -mass lumped, the elements p1, cr and dg, and the materials linear, "
-             "and corotated with "
+             "-solver realtime is for -mass lumped, the elements p1 and p2, and the materials linear, and "
+             "corotated with "
              "-body_<name>_tangent warped: choose these, or -solver rotated");
   PetscCall(SbSpaceCreateMatrixFree(s, A));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -79,7 +79,8 @@ static const SbSolverPreset presets[] = {
            "about 100k tets"},
   {"realtime", SB_MATRIX_BAIJ, "-ksp_type cg -ksp_initial_guess_nonzero", .matrix_free = PETSC_TRUE,
    .create = create_frames, .precondition = SbPCRotatedCreate,
-   .help = "the same without a matrix, warm-started: linear, or corotated with -body_<name>_tangent warped; "
+   .help = "the same without a matrix, warm-started: p1 and p2, linear, or corotated with "
+           "-body_<name>_tangent warped; "
            "fastest with -snes_type ksponly and -ksp_rtol 1e-4"},
   {"pressure", SB_MATRIX_BAIJ, "-ksp_type richardson -ksp_max_it 300", .create = SbPressureOperatorCreate,
    .precondition = SbPCPressureCreate,
@@ -112,7 +113,8 @@ static const SbOption rows[] = {
    "incomplete Cholesky, SSOR, two levels with rigid-body modes as coarse space, p-multigrid (p2), GAMG or "
    "BoomerAMG; gauss_seidel, sor: stationary iterations by blocks, or PETSc's; cholmod, umfpack, mumps: "
    "factorisations; rotated: CG with a Cholesky factor in low precision, computed once and rotated with the "
-   "nodes from then on; realtime: the same without a matrix and warm-started, for linear and corotated; "
+   "nodes from then on; realtime: the same without a matrix and warm-started, for p1 and p2, linear and "
+   "corotated; "
    "pressure: GMRES with the pressures of cells as unknowns, for P2, CR and DG near incompressibility. "
    "PETSc's "
    "-ksp_ and -pc_ options refine it"},

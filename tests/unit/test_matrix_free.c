@@ -127,8 +127,12 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   PetscCall(compare("corotated -body_b_tangent warped"));
   PetscCall(compare("linear"));
+  PetscCall(compare("corotated -body_b_tangent warped -body_b_element p2"));
+  PetscCall(compare("linear -body_a_element p2 -body_a_volume pointwise -body_b_element p2"));
   PetscCall(refuse("stvk", ""));
   PetscCall(refuse("linear", "-mass consistent"));
+  PetscCall(refuse("linear", "-body_a_element cr"));
+  PetscCall(refuse("linear", "-body_b_element dg"));
   PetscCall(refuse("linear", "-body_a_tangent exact"));
   SB_TEST_END();
 }

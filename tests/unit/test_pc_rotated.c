@@ -14,6 +14,7 @@ static const char *const guided =
   "-effects clamp -effect_clamp_type fixed -effect_clamp_on left -effect_clamp_components x";
 
 #define WARPED "corotated -body_bar_tangent warped"
+#define WARPED_P2 WARPED " -body_bar_element p2 -body_bar_mesh box:0.4,0.1,0.1:8,2,2"
 
 static PetscReal turn_angle, bend_angle; /* of the states below, rad */
 
@@ -257,6 +258,11 @@ int main(int argc, char **argv)
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(check_turn(WARPED, PETSC_TRUE));
   PetscCall(check_turn(WARPED, PETSC_FALSE));
+  PetscCall(check_turn(WARPED_P2, PETSC_TRUE));
+  PetscCall(check_bent(WARPED_P2, held, PETSC_TRUE, 2., 13, &its[0]));
+  PetscCall(check_bent(WARPED_P2, held, PETSC_FALSE, 2., 13, &its[1]));
+  SB_CHECK(PetscAbsInt(its[0] - its[1]) <= 1,
+           "%" PetscInt_FMT " iterations without, %" PetscInt_FMT " with a matrix", its[0], its[1]);
   PetscCall(check_bent(WARPED, held, PETSC_TRUE, 2., 13, &its[0]));
   PetscCall(check_bent(WARPED, held, PETSC_FALSE, 2., 13, &its[1]));
   SB_CHECK(PetscAbsInt(its[0] - its[1]) <= 1,

@@ -6,7 +6,6 @@
                   mean and at the points: the remainder of a step of length e is of third, of second order
     orders        manufactured solution (manufactured.h): 3 in L2 and 2 in H1 at nu 0.3; at 0.49 and 0.4999 errors within a factor of 2.5
                   of those, where the volumetric part at the points locks
-    refused       what is not there yet says so
 */
 #include "manufactured.h"
 
@@ -148,27 +147,6 @@ static PetscErrorCode check_orders(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ refused */
-
-static PetscErrorCode check_refused(void)
-{
-  static const char *const more[][2] = {
-    {"-time euler_implicit -ts_dt 0.1 -solver realtime", "-solver realtime"}};
-
-  PetscFunctionBeginUser;
-  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(more); k++) {
-    char text[VERIFY_TEXT];
-    TestScene t;
-
-    PetscCall(PetscSNPrintf(text, sizeof(text),
-                            "-bodies a -body_a_mesh box:1,1,1:1" BODY "-body_a_element p2 %s", "corotated",
-                            more[k][0]));
-    SB_CHECK_ERROR(test_scene_open(text, &t), PETSC_ERR_USER, more[k][1]);
-    PetscCall(test_scene_close(&t));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 int main(int argc, char **argv)
 {
   static const char *const laws[] = {"linear", "corotated", "stvk", "neohookean"};
@@ -179,6 +157,5 @@ int main(int argc, char **argv)
     PetscCall(check_derivatives(laws[law], "pointwise"));
   }
   PetscCall(check_orders());
-  PetscCall(check_refused());
   SB_TEST_END();
 }
