@@ -11,7 +11,7 @@
 */
 #include <stdarg.h>
 #include <unistd.h>
-#include "sbbase.h"
+#include "option.h"
 
 #define GRACE 3.0 /* s that a failed rank waits for the others */
 
@@ -50,6 +50,31 @@ static PetscBool is_user_error(PetscErrorCode n, const char *function)
                                    !strcmp(function, "PetscParseLayerYAML"))));
 }
 
+/* What PETSc's own objects cannot do because of types or tolerances that the user gave them: `given`, "-ksp_type cg -pc_type bddc". */
+static PetscBool is_wrong_choice(PetscErrorCode n, const char *function, const char *file, size_t size,
+                                 char given[])
+{
+  const char *rooms[] = {"src/ksp/", "src/snes/", "src/ts/", "src/mat/", "src/vec/", "src/dm/"};
+  PetscBool petsc = PETSC_FALSE;
+
+  given[0] = 0;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rooms); i++)
+    petsc = (PetscBool)(petsc || (file && strstr(file, rooms[i])));
+  if (!petsc || (n != PETSC_ERR_SUP && n != PETSC_ERR_ARG_WRONG && n != PETSC_ERR_ARG_WRONGSTATE &&
+                 n != PETSC_ERR_ARG_OUTOFRANGE && n != PETSC_ERR_ARG_INCOMP && n != PETSC_ERR_ARG_NULL &&
+                 n != PETSC_ERR_USER && n != PETSC_ERR_ARG_UNKNOWN_TYPE && n != PETSC_ERR_MISSING_FACTOR))
+    return PETSC_FALSE;
+  for (PetscInt i = 0; i < SbTheOptions.nuser; i++) {
+    const char *name = SbTheOptions.user[i].name, *value = SbTheOptions.user[i].value;
+    const size_t length = strlen(name), have = strlen(given);
+
+    if (length > 5 && !strcmp(name + length - 5, "_type") &&
+        (strstr(name, "ksp_") || strstr(name, "pc_") || strstr(name, "snes_") || strstr(name, "mat_")))
+      (void)snprintf(given + have, size - have, "%s-%s %s", have ? " " : "", name, value ? value : "");
+  }
+  return (PetscBool)(given[0] || (function && strstr(function, "SetTolerances")));
+}
+
 static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, const char *file,
                               PetscErrorCode n, PetscErrorType p, const char *mess, void *ctx)
 {
@@ -57,14 +82,23 @@ static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, con
   (void)ctx;
   if (p == PETSC_ERROR_INITIAL) {
     const PetscBool yaml = (PetscBool)(function && strstr(function, "YAML"));
+    char given[256];
+    const PetscBool choice = is_wrong_choice(n, function, file, sizeof(given), given);
 
     state.code = 1;
-    state.pending = is_user_error(n, function);
+    state.pending = (PetscBool)(choice || is_user_error(n, function));
     (void)snprintf(state.message, sizeof(state.message), "%s%s%s%s", yaml ? state.file : "",
                    yaml && state.file[0] ? ": " : "", mess ? mess : "unknown error",
                    mess && !strncmp(mess, "Unknown first token", 19)
                      ? ": an option begins with a dash, and a comment with #"
                      : "");
+    if (choice) {
+      const size_t length = strlen(state.message);
+
+      for (char *c = strchr(state.message, '\n'); c; c = strchr(c, '\n')) *c = ' ';
+      (void)snprintf(state.message + length, sizeof(state.message) - length, "%s%s%s",
+                     given[0] ? ", with " : "", given, state.trace ? "" : " (-error_trace shows where)");
+    }
   }
   if (state.pending && !state.trace) return n;
   /* PETSC_COMM_SELF: PETSc's handler puts the other ranks of a larger communicator to sleep and ends them with code 0 */

@@ -153,7 +153,7 @@ PetscErrorCode SbMaterialCreate_StVK(SbMaterial m)
   m->ops.tangent = tangent_stvk;
   m->ops.volumetric = volumetric_stvk;
   m->ops.curvature = curvature_stvk;
-  m->symmetric = PETSC_TRUE;
+  m->symmetric = m->softens = PETSC_TRUE;
   m->tangent = SB_TANGENT_EXACT;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

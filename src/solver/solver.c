@@ -215,8 +215,9 @@ static PetscErrorCode find_hardness(SbSpace s, Hardness *h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The row for a -pc_type of the user's: that of -solver when it has the same one; NULL: the user gave none. */
-static PetscErrorCode find_type(const char *choice, const SbSolverPreset **preset)
+/* The row for what the user chose by an option of PETSc, *option. -pc_type: that of -solver when it has the same one. -pc_factor_mat_solver_type, where
+   nothing else than a factorisation is chosen: that of the package. NULL: the user gave none. */
+static PetscErrorCode find_type(const char *choice, const SbSolverPreset **preset, const char **option)
 {
   const SbSolverPreset *base = find_preset(choice);
   char type[SB_NAME_MAX], own[SB_NAME_MAX];
@@ -224,7 +225,15 @@ static PetscErrorCode find_type(const char *choice, const SbSolverPreset **prese
 
   PetscFunctionBeginUser;
   *preset = NULL;
-  PetscCall(PetscOptionsGetString(NULL, NULL, "-pc_type", type, sizeof(type), &given));
+  *option = "-pc_type";
+  PetscCall(PetscOptionsGetString(NULL, NULL, *option, type, sizeof(type), &given));
+  if (!given && (!base || base->direct)) {
+    *option = "-pc_factor_mat_solver_type";
+    PetscCall(PetscOptionsGetString(NULL, NULL, *option, type, sizeof(type), &given));
+    if (given) *preset = find_preset(type);
+    if (*preset && !(*preset)->direct) *preset = NULL;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (!given) PetscFunctionReturn(PETSC_SUCCESS);
   if (base) {
     PetscCall(preset_value(base, "-pc_type", sizeof(own), own));
@@ -240,7 +249,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
                               const char *choice, const SbSolverPreset **preset, char reason[], size_t size)
 {
   const PetscInt unknowns = 3 * s->Nnode;
-  const char *name = choice, *package;
+  const char *name = choice, *package, *option = NULL;
   char method[SB_NAME_MAX] = "";
   PetscInt nface = 0, most = 0;
   PetscBool indefinite, has = PETSC_TRUE, turns;
@@ -254,7 +263,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   PetscCall(SbDirectPackage(s->comm, unknowns, (PetscBool)!indefinite, &package));
   PetscCall(PetscOptionsGetString(NULL, NULL, "-ksp_type", method, sizeof(method), NULL));
   *preset = NULL;
-  if (!explicit_run) PetscCall(find_type(choice, preset));
+  if (!explicit_run) PetscCall(find_type(choice, preset, &option));
   /* a factorisation that turns with the nodes, unless ranks meet at too many of them */
   turns = (PetscBool)(!strcmp(choice, "rotated") || !strcmp(choice, "realtime"));
   if (!strcmp(choice, "auto"))
@@ -276,7 +285,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
     name = "cg";
     PetscCall(PetscSNPrintf(reason, size, "explicit integrator: no linear system"));
   } else if (*preset) {
-    PetscCall(PetscSNPrintf(reason, size, "chosen by -pc_type"));
+    PetscCall(PetscSNPrintf(reason, size, "chosen by %s", option));
   } else if (!strcmp(choice, "direct")) {
     PetscCheck(package, s->comm, PETSC_ERR_USER,
                "-solver direct needs SuiteSparse or MUMPS, and this PETSc was built without both: choose "
@@ -357,7 +366,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   if ((*preset)->package) PetscCall(SbHasPackage((*preset)->package, &has));
   PetscCheck(has, s->comm, PETSC_ERR_USER,
              "%s %s needs %s, which this PETSc was built without: choose another one, or -solver auto",
-             find_preset((*preset)->name) ? "-solver" : "-pc_type", (*preset)->name, (*preset)->package);
+             option && *preset ? option : "-solver", (*preset)->name, (*preset)->package);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -532,8 +541,13 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   PetscCall(PetscOptionsGetString(NULL, NULL, "-ksp_type", users, sizeof(users), &given));
   PetscCall(KSPSetType(ksp, given ? users : method));
   PetscCall(is_symmetric(ksp, &symmetric));
-  if (symmetric) PetscCall(insert_options("-pc_asm_type basic -sub_0_pc_sor_local_symmetric"));
   if (type[0]) PetscCall(PCSetType(pc, type));
+  /* what keeps the preconditioner symmetric */
+  if (symmetric && !strcmp(type, PCASM)) PetscCall(insert_options("-pc_asm_type basic"));
+  if (symmetric && !strcmp(type, PCCOMPOSITE)) PetscCall(insert_options("-sub_0_pc_sor_local_symmetric"));
+  /* eigenvalues of the first matrix, which PETSc keeps with the interpolation, are too small once springs of contact stand in it */
+  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &given));
+  if (!given && !strcmp(type, PCGAMG)) PetscCall(insert_options("-pc_gamg_use_sa_esteig no"));
   PetscCall(insert_options(preset->options));
   if (!strcmp(type, PCLU) || !strcmp(type, PCCHOLESKY)) PetscCall(choose_package(s, pc, type));
   if (preset->direct) PetscCall(SbPCDirectSet(pc, preset->package, PETSC_TRUE));

@@ -37,9 +37,10 @@ static const SbOption rows[] = {
    "exact_spd"},
   {"time_max_halvings", SB_OPTION_INT, 1, "", "10", "[0, 60]",
    "how often a step that fails is halved and repeated before the run stops"},
-  {"time_inverted", SB_OPTION_CHOICE, 1, "", "accept", "accept|reject",
+  {"time_inverted", SB_OPTION_CHOICE, 1, "", "auto", "auto|accept|reject",
    "a step that inverts tets (det F <= 0): accept, and count them; or reject, halve it and try again, and "
-   "stop when that does not help"},
+   "stop when that does not help; auto: reject in load steps of a static run with stvk, whose stress has a "
+   "maximum in compression, else accept"},
   {"live_speed", SB_OPTION_REAL, 1, "m/s", "0.2", "(0, inf)",
    "-effect_<name>_displacement live (interactive): largest speed at which the effect moves to the position "
    "that the file live.txt in output_dir names (lines `NAME x y z`, m)"},
@@ -158,7 +159,9 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
   PetscCall(SbRunReadStop(r, &scope));
   PetscCall(SbOptionInt(&scope, "time_max_halvings", &r->max_halvings));
   PetscCall(SbOptionChoice(&scope, "time_inverted", &inverted));
-  r->reject_inverted = (PetscBool)(inverted == 1);
+  r->reject_inverted = (PetscBool)(inverted == 2);
+  for (PetscInt k = 0; k < model->nmaterial && !inverted && !model->dynamic && !r->arc.on; k++)
+    r->reject_inverted = (PetscBool)(r->reject_inverted || model->material[k]->softens);
   PetscCheck(
     !r->reject_inverted || r->preset != SB_TIME_ALPHA2, PETSC_COMM_SELF, PETSC_ERR_USER,
     "-time_inverted reject: -time alpha2 cannot reject steps; take genalpha, which is the same method");
@@ -578,7 +581,9 @@ PetscErrorCode SbRunSetUp(SbRun run)
   /* options may have made something else of the preset */
   if (!explicit) {
     PetscCall(SbSolverDescribe(run->snes, m->space, sizeof(run->solver_parts), run->solver_parts));
-    if (!run->solver_used->help) PetscCall(PetscStrncpy(run->solver, run->solver_parts, sizeof(run->solver)));
+    if (!run->solver_used->help ||
+        (run->solver_used->direct && !strstr(run->solver_parts, run->solver_used->package)))
+      PetscCall(PetscStrncpy(run->solver, run->solver_parts, sizeof(run->solver)));
   }
 
   /* one solve per step, begun where the body flies to, with a tangent that may be softer than the forces: no bound on the energy (docs/reference/theory.md) */

@@ -146,6 +146,8 @@ PetscErrorCode SbStaticSolve(SbRun run)
       run->tangent_known = PETSC_FALSE;
       if (run->stopped) PetscCall(SbRunStepAccepted(run, step, factor, 0., PETSC_TRUE));
       if (run->free_body || run->stopped) break;
+      /* half of a linear problem is as hard, unless contact comes with the load */
+      if (run->model->linear && !run->model->nbegin_step && !run->model->npotential) cuts = run->max_halvings;
       if (++cuts <= run->max_halvings && length >= least && !SbRunTooShort(run, length)) continue;
 
       /* steps have become too short: how far the load has got, and what is likely in the way */

@@ -102,7 +102,7 @@ cat >stiff.opts <<'END'
 -set_part_at plane:1,0,0,0
 END
 for ranks in 1 2; do
-  error $ranks "0.000976562|DIVERGED_LINEAR_SOLVE|DIVERGED_ITS" -options_file bar.opts \
+  error $ranks "load factor 1.|DIVERGED_LINEAR_SOLVE|DIVERGED_ITS" -options_file bar.opts \
     -options_file stiff.opts -solver cg_jacobi -ksp_type cg -ksp_max_it 20
   check "the ratio of stiffness is not named: $(cat err.txt)" grep -q "1e+08 times" err.txt
 done

@@ -217,6 +217,53 @@ static PetscErrorCode check_norms(const Case *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* GAMG follows the springs of contact, which stiffen the matrix from one iteration of Newton's method to the next. */
+static PetscErrorCode check_springs(void)
+{
+  static const Case springs = {
+    "springs",
+    "-bodies a -body_a_mesh box:0.4,0.1,0.1:2 -body_a_material linear -body_a_young 1e6 "
+    "-body_a_poisson 0.3 -effects gravity,clamp,floor " HELD
+    "-effect_floor_type contact -effect_floor_on zmin -effect_floor_response penalty "
+    "-effect_floor_obstacle plane:0,0,1,-0.008 -time static ",
+    PETSC_FALSE};
+  PetscErrorCode code;
+  PetscReal exact;
+  char stop[512];
+
+  PetscFunctionBeginUser;
+  PetscCall(run(&springs, "", &code, &exact, stop));
+  SB_CHECK(!code && !stop[0], "springs: code %d, %s%s", (int)code, sb_test_text, stop);
+  PetscCall(check(&springs, "-ksp_type cg -pc_type gamg", exact, NULL));
+  PetscCall(check(&springs, "-ksp_type minres -pc_type gamg", exact, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A package that is chosen by PETSc's option is the solver's name; options that only another preconditioner reads are not set; a linear load step whose
+   solve fails is not halved. */
+static PetscErrorCode check_said(void)
+{
+  PetscBool has, set;
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbHasPackage("umfpack", &has));
+  if (has) {
+    PetscCall(test_scene_open(STATIC "-pc_factor_mat_solver_type umfpack ", &t));
+    SB_CHECK(!strcmp(t.run->solver, "umfpack") && strstr(t.run->solver_parts, "lu of umfpack"), "%s, %s",
+             t.run->solver, t.run->solver_parts);
+    PetscCall(test_scene_close(&t));
+  }
+  PetscCall(test_scene_open(STATIC "-body_a_material linear -ksp_type cg -pc_type none -ksp_max_it 2 ", &t));
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-pc_asm_type", &set));
+  SB_CHECK(!set, "-pc_asm_type is set without -pc_type asm");
+  PetscCall(SbRunSolve(t.run));
+  SB_CHECK(t.run->stop_reason[0] && t.run->rejected_total == 1, "%d steps are rejected, '%s'",
+           (int)t.run->rejected_total, t.run->stop_reason);
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   PetscMPIInt size;
@@ -228,5 +275,7 @@ int main(int argc, char **argv)
       check_case(&cases[i], size, (PetscBool)(cases[i].whole || (argc > 1 && !strcmp(argv[1], "all")))));
   }
   PetscCall(check_norms(&cases[0]));
+  PetscCall(check_springs());
+  PetscCall(check_said());
   SB_TEST_END();
 }
