@@ -517,11 +517,14 @@ static PetscErrorCode is_symmetric(KSP ksp, PetscBool *is)
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
 {
   char method[SB_NAME_MAX], type[SB_NAME_MAX], users[SB_NAME_MAX];
-  PetscBool given, symmetric;
+  PetscBool given, symmetric, reproducible;
   KSP ksp;
   PC pc;
 
   PetscFunctionBeginUser;
+  /* multigrid sums its coarse matrices up in the order in which messages arrive */
+  PetscCall(SbSolverReproducible(&reproducible));
+  if (reproducible) PetscCall(insert_options("-matptap_via allatonce -matstash_reproduce yes"));
   PetscCall(SNESGetKSP(snes, &ksp));
   if (s->constraints && s->constraints->general) { /* another solver begins as the first one did */
     PetscCall(KSPSetNormType(ksp, s->constraints->norm));

@@ -36,6 +36,21 @@ END
 sed -e '/friction/d' -e 's/^-ts_.*//' -e 's/^-effect_push_disp.*/-effect_push_displacement 0.0005*t;0.0001*t;-0.002*t/' bodies.opts >pressed.opts
 echo '-time static' >>pressed.opts
 
+# algebraic multigrid, whose coarse matrices are summed up from parts of the ranks
+cat >bar.opts <<'END'
+-bodies a
+-body_a_mesh box:0.4,0.1,0.1:3
+-body_a_material neohookean
+-body_a_young 1e6
+-body_a_poisson 0.45
+-effects gravity,clamp
+-effect_clamp_type fixed
+-effect_clamp_on xmin
+-time static
+-output_precision double
+-quiet
+END
+
 # repeats RANKS ARGUMENT...: three runs, the same bytes
 repeats() {
   local k
@@ -54,6 +69,8 @@ for n in 2 3; do
   repeats $n bodies.opts -reproducible yes -solver direct
   repeats $n bodies.opts -reproducible yes -solver direct -body_a_tangent exact -body_b_tangent exact
   repeats $n bodies.opts -reproducible yes -solver cg_two_level
+  repeats $n bar.opts -reproducible yes -solver cg_gamg
+  repeats $n bar.opts -reproducible yes -solver pressure -body_a_element cr
   repeats $n pressed.opts -reproducible yes
 done
 case " $SB_PACKAGES " in *" mumps "*) error 2 "-reproducible" bodies.opts -reproducible yes -solver mumps ;; esac
