@@ -6,8 +6,8 @@
 */
 #pragma once
 #include "sbmaterial.h"
+#include "sbquadratic.h"
 
-#define SB_CELL_NODES 10 /* of a cell at most: P2 has them at its vertices, then at its edges */
 #define SB_PAIRS 55
 /* Pairs (a, b) with a <= b in the order of the blocks of a symmetric cell matrix: ten with four nodes, P2 has all. */
 static const int SbPairA[SB_PAIRS] = {0, 0, 0, 0, 1, 1, 1, 2, 2, 3, 0, 1, 2, 3, 4, 0, 1, 2, 3,
@@ -16,9 +16,6 @@ static const int SbPairA[SB_PAIRS] = {0, 0, 0, 0, 1, 1, 1, 2, 2, 3, 0, 1, 2, 3, 
 static const int SbPairB[SB_PAIRS] = {0, 1, 2, 3, 1, 2, 3, 2, 3, 3, 4, 4, 4, 4, 4, 5, 5, 5, 5,
                                       5, 5, 6, 6, 6, 6, 6, 6, 6, 7, 7, 7, 7, 7, 7, 7, 7, 8, 8,
                                       8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9};
-/* Vertices of the edges of a cell: P2's node 4 + e is at the middle of edge e. */
-static const int SbTetEdge[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
-
 /*
   SbElement - what distinguishes one element from another. P1, CR and DG are linear in a cell and have four nodes there: P1 at the
   vertices, CR and DG at the centroids of the faces, node a opposite vertex a. CR shares a node between the two cells of a face; in DG
@@ -86,11 +83,6 @@ void SbCellBlocksGeneral(const SbPack g[9], const SbPack V, const SbPack C[81], 
 
 /* ------------------------------------------------------------------ P2, src/element/p2.c */
 
-/* Points by their barycentric coordinates, with their parts of the volume. */
-typedef struct {
-  int n;
-  PetscReal L[5][4], weight[5];
-} SbPointRule;
 extern const SbPointRule SbRuleQuadratic; /* degree 2: where stresses are taken */
 extern const SbPointRule SbRuleCubic;     /* degree 3 */
 /* u[12] at the vertices of the P1 cell that has the gradient of U[30] at L. And the transpose: F[30] += what f[12] on that cell is. */
@@ -99,6 +91,9 @@ void SbQuadraticAdd(const PetscReal L[4], const SbPack f[12], SbPack F[30]);
 /* K[p] for p = 0..54 from the ten blocks of P1 at the four points of SbRuleQuadratic, and factor b_a b_b^T. */
 void SbQuadraticBlocks(const SbPack B[4][10][9], const SbPack factor, const SbPack b[30],
                        SbPack K[SB_PAIRS][9]);
+/* The same at the points of SbRuleQuintic. */
+void SbCurvedBlocks(const SbPack B[SB_POINTS][10][9], const SbPack factor, const SbPack b[30],
+                    SbPack K[SB_PAIRS][9]);
 /* K += weight d^2(det F)/du^2 at L; g as for P1, F there. */
 void SbQuadraticAddJacobian(const PetscReal L[4], const SbPack g[9], const SbPack F[9], const SbPack weight,
                             SbPack K[SB_PAIRS][9]);

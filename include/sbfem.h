@@ -26,8 +26,12 @@ typedef struct {
   PetscInt cstart, cend; /* local cells */
   PetscInt bstart, bend; /* batches; the last one may be partly filled */
   PetscBool owned;
-  PetscBool broken;    /* DG: strains come from the means of the two sides of each face */
-  PetscBool quadratic; /* P2: each point of SbRuleQuadratic has a strain of its own */
+  PetscBool broken; /* DG: strains come from the means of the two sides of each face */
+  PetscBool
+    quadratic; /* P2: each point of SbRuleQuadratic has a strain of its own; of SbRuleQuintic where cells are curved */
+  /* P2 cells that are curved at rest; NULL: straight. Gradients, parts of the volume at the points [batch][SB_POINTS]([9]), lumped mass / (density V)
+     [batch][10]; their memory is the space's */
+  SbPack *curve_g, *curve_weight, *curve_mass;
   SbMaterial
     pointwise; /* P2: the law at the points, which has no volumetric part where that is of the mean of the cell; borrowed */
   PetscReal alpha,
@@ -82,10 +86,10 @@ struct _p_SbSpace {
   SbJump jump;    /* NULL without face nodes */
   SbConstraints constraints; /* NULL unless an effect may constrain nodes along directions of their own */
   PetscBool coupled;         /* an effect may couple nodes that share no cell, in an assembled tangent */
-  SbPack *batch_g;           /* [nbatch][9] basis gradients of nodes 1..3, 1/m; 64-byte aligned */
-  SbPack *batch_V;           /* [nbatch] volumes, m^3; 0 in padding; 64-byte aligned */
-  void *batch_memory;        /* what batch_g and batch_V live in */
-  PetscReal *node_mass;      /* [nnode] lumped mass, kg, complete on owned nodes */
+  SbPack *batch_g;    /* [nbatch][9] basis gradients of nodes 1..3, 1/m, of straight cells; 64-byte aligned */
+  SbPack *batch_V;    /* [nbatch] volumes, m^3; 0 in padding; 64-byte aligned */
+  void *batch_memory; /* what batch_g, batch_V and those of curved cells live in */
+  PetscReal *node_mass; /* [nnode] lumped mass, kg, complete on owned nodes */
   PetscReal *
     node_share; /* [nnode] integral of density times phi_a, kg, likewise; node_mass itself without a P2 body */
   PetscBool consistent_mass; /* -mass consistent */
@@ -160,7 +164,7 @@ PetscInt SbSpacePrescribedIndex(SbSpace space, PetscInt node);
 void SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[], PetscReal psi[]);
 /* Per owned cell: first Piola-Kirchhoff stress P[9] (Pa), rotation R[9] in F (the identity for the linear law; may be NULL), energy
    density psi (J/m^3, rest); of P2, whose stresses are means over the points of SbRuleQuadratic, P there as well, point[ncell][4][9]
-   (may be NULL). Not collective. */
+   (may be NULL); of a curved cell the linear function nearest to P is taken there. Not collective. */
 void SbSpaceCellPiola(SbSpace space, const PetscReal u[], PetscReal P[], PetscReal R[], PetscReal psi[],
                       PetscReal point[]);
 /* Per owned cell: the law's pressure -lambda theta, Pa (SbMaterialOps.pressure). Not collective. */
@@ -180,12 +184,18 @@ PetscErrorCode SbSpaceStableStep(SbSpace space, PetscReal *dt);
 */
 typedef struct {
   PetscInt cell, face;
-  PetscInt corner[3];  /* 0..3, which vertices of the cell, counter-clockwise seen from outside */
-  PetscInt vertex[3];  /* the same as local vertices of the mesh */
-  PetscReal area;      /* rest area, m^2 */
+  PetscInt corner[3]; /* 0..3, which vertices of the cell, counter-clockwise seen from outside */
+  PetscInt vertex[3]; /* the same as local vertices of the mesh */
+  PetscReal
+    area; /* rest area, m^2, of a curved facet too; height and normal are those of the plane through its corners */
   PetscReal height;    /* rest height of the cell over it, m */
   PetscReal normal[3]; /* rest outward unit normal */
 } SbFacet;
+/* Positions of the ten nodes of a P2 cell at rest. */
+void SbSpaceCellPositions(SbSpace space, PetscInt cell, PetscReal x[SB_CELL_NODES][3]);
+/* Integrals of the basis functions over a curved P2 cell, or over a facet of it unless that is NULL. Returns their sum, its volume (m^3) or area (m^2). */
+PetscReal SbSpaceCurvedIntegrals(SbSpace space, PetscInt cell, const SbFacet *facet,
+                                 PetscReal integral[SB_CELL_NODES]);
 /* The element of a local cell. */
 static inline SbElement SbSpaceCellElement(SbSpace space, PetscInt cell)
 {

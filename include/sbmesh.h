@@ -7,6 +7,7 @@
 
 #define SB_SET_MAX 63                /* named sets that one scenario may use: one bit each, bit 0 is taken */
 #define SB_ON_BOUNDARY ((uint64_t)1) /* bit 0 of SbMesh.face_set: the face has no cell on the other side */
+#define SB_CURVED ((uint64_t)1)      /* bit 0 of SbMesh.cell_set: an edge is curved at rest */
 #define SB_SET_BIT(k) ((uint64_t)1 << ((k) + 1))
 #define SB_SLIVER 0.5       /* degrees: tets with a smaller dihedral angle are slivers, which solvers feel */
 #define SB_INCLUSION_MAX 16 /* inclusions of a body: tets with a material of their own */
@@ -70,6 +71,8 @@ typedef struct {
   char element[SB_NAME_MAX]; /* p1, p2, cr, dg */
   PetscBool
     other_nodes; /* the element has nodes elsewhere than at vertices: every cell of the overlap is needed */
+  PetscBool
+    edge_nodes; /* it has nodes at edges: they lie where a mesh of second order has them; else tets are straight */
   char material[SB_NAME_MAX];    /* linear | corotated | stvk | neohookean */
   PetscReal density;             /* kg/m^3 */
   PetscReal velocity[3];         /* initial velocity of the centre of mass, m/s */
@@ -147,11 +150,13 @@ struct _p_SbMesh {
   PetscInt ncell_owned, ncell;
   PetscInt *cell;      /* [ncell][4] local vertices, positively oriented: det(x1-x0, x2-x0, x3-x0) > 0 */
   PetscInt *cell_orig; /* [ncell] original number, as for vertices */
-  PetscInt
-    *cell_body; /* [ncell]; owned and ghost cells are each sorted by body, inclusion, lowest local vertex */
+  PetscInt *
+    cell_body; /* [ncell]; owned and ghost cells are each sorted by body, inclusion, straight or curved, lowest local vertex */
   PetscInt *
     cell_material; /* [ncell] number of the body, or the material of its first inclusion that holds the cell */
-  uint64_t *cell_set; /* [ncell] */
+  uint64_t *cell_set; /* [ncell] SB_SET_BIT(k), SB_CURVED */
+  PetscReal *
+    edge_off; /* [ncell][6][3] of the nodes at edges 01 02 03 12 13 23 from their middles, m; NULL without curved cells */
   uint64_t
     *face_set; /* [ncell][4] face f lies opposite vertex f: SB_ON_BOUNDARY, and SB_SET_BIT(k) when in set k */
 };

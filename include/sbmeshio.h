@@ -89,7 +89,16 @@ typedef struct {
 } SbGroup;
 
 /* Types of elements as gmsh numbers them: what readers of all formats count. */
-enum { SB_GMSH_LINE = 1, SB_GMSH_TRIANGLE = 2, SB_GMSH_TET = 4, SB_GMSH_POINT = 15, SB_GMSH_NTYPES = 32 };
+enum {
+  SB_GMSH_LINE = 1,
+  SB_GMSH_TRIANGLE = 2,
+  SB_GMSH_TET = 4,
+  SB_GMSH_LINE3 = 8,
+  SB_GMSH_TRIANGLE6 = 9,
+  SB_GMSH_TET10 = 11,
+  SB_GMSH_POINT = 15,
+  SB_GMSH_NTYPES = 32
+};
 
 /* Simplices of one dimension. */
 typedef struct {
@@ -109,6 +118,12 @@ typedef struct {
   PetscInt n, capacity;
 } SbCount;
 
+/* The node of an edge of 10-node tets. */
+typedef struct {
+  PetscInt end[2], node; /* vertices, end[0] < end[1] */
+  PetscReal off[3];      /* from the middle of the edge, m once placed */
+} SbMiddle;
+
 /* A body as its reader delivers it. Zeroed before the reader is called; freed by SbImportDestroy(), also after an error. */
 struct _p_SbImport {
   char where[PETSC_MAX_PATH_LEN + 2 * SB_NAME_MAX]; /* "body 'liver': liver.msh", begins every message */
@@ -125,10 +140,15 @@ struct _p_SbImport {
   PetscInt capacity[3]; /* of group, tags_start, tags_group */
   PetscInt nslot;       /* a power of two */
   PetscInt *slot;       /* [nslot] groups by a hash of (dim, tag), or -1; made when needed */
-  PetscBool surface;    /* given: all triangles are wanted, and tets need not be there */
-  SbTetOptions tet;     /* given: how a surface becomes tets */
-  PetscReal scale;      /* given: factor that placing will use; a reader that has scaled sets it to 1 */
-  char note[512];       /* what the reader repaired, for SbBody.note */
+  SbCount nmiddle;
+  SbMiddle *
+    middle; /* [nmiddle] edges of 10-node tets, for each tet; once read those that are off the middle, each once, ascending */
+  PetscInt nedge_node;    /* vertices that are the node of an edge and no corner of a tet */
+  PetscBool second_order; /* the reader gives the nodes at edges of 10-node tets: these are read */
+  PetscBool surface;      /* given: all triangles are wanted, and tets need not be there */
+  SbTetOptions tet;       /* given: how a surface becomes tets */
+  PetscReal scale;        /* given: factor that placing will use; a reader that has scaled sets it to 1 */
+  char note[512];         /* what the reader repaired, for SbBody.note */
   PetscInt step; /* given: step of a run's output whose positions are wanted; 0 at rest, -1 the last one */
   SbMeshProgress progress; /* given: called with how far a long read is; may be NULL */
   void *progress_ctx;

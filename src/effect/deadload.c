@@ -7,11 +7,11 @@
     l_c += |T| sum_k w_k b_kc q(sum_d b_kd X_d, t),   f_a = sum_c psi_a(X_c) l_c,
 
   psi_a the basis of the element, of which b_c are the combinations (for P1 they are the same). P2's own basis b_c (2 b_c - 1), 4 b_c b_d is
-  integrated as it is, with one function for each corner and each edge between corners.
+  integrated as it is, with one function for each corner and each edge between corners. Of a curved cell |T| is that of the tet (or
+  triangle) with the derivatives of its map at the point, and X that of the map.
 
-  Rules, both with positive weights, inner points and degree 5, hence exact for q of degree 4: 14 points on
-  the tetrahedron (Walkington, "Quadrature on simplices of arbitrary dimension", 2000), 7 points on the
-  triangle (Radon 1948; Stroud, "Approximate calculation of multiple integrals", 1971, T2:5-1). Second-order
+  Rules, both with positive weights, inner points and degree 5, hence exact for q of degree 4: SbRuleQuintic (Walkington, "Quadrature on simplices
+  of arbitrary dimension", 2000), SbRuleFacet (Radon 1948; Stroud, "Approximate calculation of multiple integrals", 1971, T2:5-1). Second-order
   convergence of linear elements needs degree 2; the rest lowers the constant at no cost, because a load that
   does not change is integrated once.
 
@@ -32,44 +32,6 @@ struct _p_SbDeadLoad {
   SbFormula density[3]; /* borrowed */
 };
 
-#define NPOINT_MAX 14
-
-/* Barycentric points [npoint][4] and weights (sum 1) of the rule for tetrahedra or triangles. */
-static PetscInt tabulate_rule(PetscInt ncorner, PetscReal b[NPOINT_MAX][4], PetscReal w[NPOINT_MAX])
-{
-  const PetscReal s15 = PetscSqrtReal(15.0);
-  const PetscReal a4[] = {0.31088591926330060980, 0.092735250310891226402},
-                  w4[] = {0.11268792571801585080, 0.073493043116361949544};
-  const PetscReal a3[] = {(6 - s15) / 21, (6 + s15) / 21}, w3[] = {(155 - s15) / 1200, (155 + s15) / 1200};
-  const PetscReal *a = ncorner == 4 ? a4 : a3, *wa = ncorner == 4 ? w4 : w3;
-  PetscInt n = 0;
-
-  // Two orbits with one corner apart.
-  for (int orbit = 0; orbit < 2; orbit++) {
-    for (PetscInt c = 0; c < ncorner; c++, n++) {
-      for (PetscInt d = 0; d < ncorner; d++) b[n][d] = a[orbit];
-      b[n][c] = 1 - (PetscReal)(ncorner - 1) * a[orbit];
-      w[n] = wa[orbit];
-    }
-  }
-  if (ncorner == 4) {
-    // One orbit near the six edges.
-    const PetscReal e = 0.045503704125649649492;
-
-    for (int c = 0; c < 4; c++) {
-      for (int d = c + 1; d < 4; d++, n++) {
-        for (int i = 0; i < 4; i++) b[n][i] = e;
-        b[n][c] = b[n][d] = 0.5 - e;
-        w[n] = 0.042546020777081466438;
-      }
-    }
-  } else {
-    for (int i = 0; i < 3; i++) b[n][i] = 1.0 / 3.0;
-    w[n++] = 9.0 / 40.0;
-  }
-  return n;
-}
-
 /* Volume of a tetrahedron or area of a triangle from its corners, m^3 or m^2. */
 static PetscReal simplex_measure(PetscInt ncorner, const PetscReal *const x[4])
 {
@@ -89,44 +51,44 @@ static PetscReal simplex_measure(PetscInt ncorner, const PetscReal *const x[4])
 static void integrate(SbDeadLoad load, PetscReal t)
 {
   const PetscInt nc = load->ncorner;
-  PetscReal b[NPOINT_MAX][4], w[NPOINT_MAX];
-  const PetscInt npoint = tabulate_rule(nc, b, w);
+  const SbPointRule *rule = nc == 4 ? &SbRuleQuintic : &SbRuleFacet;
 
   for (PetscInt i = 0; i < 3 * load->n; i++) load->value[i] = 0;
   for (PetscInt item = 0; item < load->nitem; item++) {
     const PetscInt *corner = &load->corner[nc * item];
     const SbElement element = SbSpaceCellElement(load->space, corner[0] / 4);
     const SbElementOps *e = &element->ops;
-    const PetscBool quadratic = (PetscBool)(element->nodes_per[1] > 0);
-    PetscReal l[SB_CELL_NODES][3], measure;
     const SbMesh mesh = load->space->mesh;
+    const PetscBool quadratic = (PetscBool)(element->nodes_per[1] > 0),
+                    curved = (PetscBool)(mesh->cell_set[corner[0] / 4] & SB_CURVED);
+    PetscReal l[SB_CELL_NODES][3], nodes[SB_CELL_NODES][3], corners[4][3], measure;
     const PetscReal *x[4];
 
     /* l of one item: what its barycentric coordinates receive, [ncorner]; quadratic: its nodes of P2, [10], as the cell numbers them. */
     for (int k = 0; k < 3 * SB_CELL_NODES; k++) l[k / 3][k % 3] = 0;
     for (PetscInt c = 0; c < nc; c++) x[c] = &mesh->x[3 * mesh->cell[corner[c]]];
     measure = simplex_measure(nc, x);
-    for (PetscInt k = 0; k < npoint; k++) {
-      PetscReal p[3] = {0, 0, 0}, q[3];
+    if (curved) SbSpaceCellPositions(load->space, corner[0] / 4, nodes);
+    for (int k = 0; k < rule->n; k++) {
+      const PetscReal *b = rule->L[k];
+      PetscReal p[3] = {0, 0, 0}, q[3], L[4] = {0, 0, 0, 0}, phi[SB_CELL_NODES];
 
-      for (PetscInt c = 0; c < nc; c++) {
-        for (int i = 0; i < 3; i++) p[i] += b[k][c] * x[c][i];
+      for (PetscInt c = 0; c < nc; c++) L[corner[c] % 4] = b[c];
+      SbQuadraticBasis(L, phi);
+      if (curved) {
+        SbQuadraticCorners(L, (const PetscReal(*)[3])nodes, corners);
+        for (PetscInt c = 0; c < nc; c++) x[c] = corners[corner[c] % 4];
+        measure = simplex_measure(nc, x);
+        for (int n = 0; n < 3 * SB_CELL_NODES; n++) p[n % 3] += phi[n / 3] * nodes[n / 3][n % 3];
       }
-      for (int i = 0; i < 3; i++) q[i] = measure * w[k] * SbFormulaEval(load->density[i], t, p);
+      for (PetscInt c = 0; c < nc && !curved; c++) {
+        for (int i = 0; i < 3; i++) p[i] += b[c] * x[c][i];
+      }
+      for (int i = 0; i < 3; i++) q[i] = measure * rule->weight[k] * SbFormulaEval(load->density[i], t, p);
       for (PetscInt c = 0; c < nc && !quadratic; c++) {
-        for (int i = 0; i < 3; i++) l[c][i] += b[k][c] * q[i];
+        for (int i = 0; i < 3; i++) l[c][i] += b[c] * q[i];
       }
-      if (quadratic) {
-        PetscReal L[4] = {0, 0, 0, 0};
-
-        for (PetscInt c = 0; c < nc; c++) L[corner[c] % 4] = b[k][c];
-        for (int a = 0; a < SB_CELL_NODES; a++) {
-          const PetscReal phi =
-            a < 4 ? L[a] * (2 * L[a] - 1) : 4 * L[SbTetEdge[a - 4][0]] * L[SbTetEdge[a - 4][1]];
-
-          for (int i = 0; i < 3; i++) l[a][i] += phi * q[i];
-        }
-      }
+      for (int n = 0; n < 3 * SB_CELL_NODES && quadratic; n++) l[n / 3][n % 3] += phi[n / 3] * q[n % 3];
     }
     for (PetscInt a = 0; a < load->nslot; a++) {
       const PetscInt slot = load->slot[load->nslot * item + a];

@@ -142,7 +142,7 @@ static inline PetscBool quadratic(SbSpace space, const SbFacet *facet)
   return (PetscBool)(SbSpaceCellElement(space, facet->cell)->nodes_per[1] > 0);
 }
 
-/* Radon's rule: where a facet of P2 is integrated, with values and derivatives of its basis. */
+/* SbRuleFacet: where a facet of P2 is integrated, with values and derivatives of its basis. */
 #define NPOINT 7
 typedef struct {
   PetscReal weight;              /* times half, the area of the triangle of the coordinates */
@@ -151,15 +151,11 @@ typedef struct {
 
 static void facet_points(FacetPoint point[NPOINT])
 {
-  const PetscReal s = PetscSqrtReal(15.0), a[2] = {(6 - s) / 21, (6 + s) / 21},
-                  w[2] = {(155 - s) / 2400, (155 + s) / 2400};
-
   for (int n = 0; n < NPOINT; n++) {
-    PetscReal L[3] = {1. / 3, 1. / 3, 1. / 3};
+    const PetscReal *L = SbRuleFacet.L[n];
     FacetPoint *p = &point[n];
 
-    p->weight = n < 6 ? w[n / 3] : 9. / 80;
-    for (int c = 0; n < 6 && c < 3; c++) L[c] = c == n % 3 ? 1 - 2 * a[n / 3] : a[n / 3];
+    p->weight = 0.5 * SbRuleFacet.weight[n];
     for (int c = 0; c < 3; c++) {
       const int d = (c + 1) % 3;
 

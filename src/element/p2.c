@@ -10,6 +10,8 @@
   Stresses are taken at the four points of the rule of degree 2 (Keast 1986), each with a quarter of the volume. Cubic functions, as the
   determinant of a deformation gradient that is linear in the tet, have the rule of degree 3 with five points.
 
+  Tets with curved edges are P1 tets with other corners at each of the points of SbRuleQuintic (src/base/quadratic_map.c).
+
   Mass / (density V): the consistent one is the integral of phi_a phi_b; lumped (Hinton, Rock and Zienkiewicz 1976) is its diagonal, scaled
   to the mass of the tet: row sums at vertices would be negative, -1/20.
 */
@@ -79,8 +81,8 @@ SB_INLINE int gradient_of(int a, const PetscReal L[4], int vertex[2], PetscReal 
   return 2;
 }
 
-SB_KERNEL void SbQuadraticBlocks(const SbPack B[restrict 4][10][9], const SbPack factor,
-                                 const SbPack b[restrict 30], SbPack K[restrict SB_PAIRS][9])
+SB_INLINE void blocks(const SbPointRule *rule, const int npoint, const SbPack (*B)[10][9],
+                      const PetscReal *factor, const SbPack *b, SbPack (*K)[9])
 {
   static const int pair[4][4] = {{0, 1, 2, 3}, {1, 4, 5, 6}, {2, 5, 7, 8}, {3, 6, 8, 9}};
   SbPack scaled[30];
@@ -90,16 +92,16 @@ SB_KERNEL void SbQuadraticBlocks(const SbPack B[restrict 4][10][9], const SbPack
   }
 
   for (int p = 0; p < SB_PAIRS; p++) {
-    PetscReal weight[16];
-    const SbPack *block[16];
-    int turned[16], n = 0;
+    PetscReal weight[4 * SB_POINTS];
+    const SbPack *block[4 * SB_POINTS];
+    int turned[4 * SB_POINTS], n = 0;
 
-    // the blocks between vertices at the four points that this one is a sum of
-    for (int q = 0; q < 4; q++) {
+    // the blocks between vertices at the points that this one is a sum of
+    for (int q = 0; q < npoint; q++) {
       PetscReal fa[2], fb[2];
       int va[2], vb[2];
-      const int na = gradient_of(SbPairA[p], SbRuleQuadratic.L[q], va, fa),
-                nb = gradient_of(SbPairB[p], SbRuleQuadratic.L[q], vb, fb);
+      const int na = gradient_of(SbPairA[p], rule->L[q], va, fa),
+                nb = gradient_of(SbPairB[p], rule->L[q], vb, fb);
 
       for (int k = 0; k < na * nb; k++, n++) {
         const int i = va[k / nb], j = vb[k % nb];
@@ -123,6 +125,18 @@ SB_KERNEL void SbQuadraticBlocks(const SbPack B[restrict 4][10][9], const SbPack
       for (int l = 0; l < SB_BATCH; l++) K[p][e][l] = sum[l];
     }
   }
+}
+
+SB_KERNEL void SbQuadraticBlocks(const SbPack B[restrict 4][10][9], const SbPack factor,
+                                 const SbPack b[restrict 30], SbPack K[restrict SB_PAIRS][9])
+{
+  blocks(&SbRuleQuadratic, 4, B, factor, b, K);
+}
+
+SB_KERNEL void SbCurvedBlocks(const SbPack B[restrict SB_POINTS][10][9], const SbPack factor,
+                              const SbPack b[restrict 30], SbPack K[restrict SB_PAIRS][9])
+{
+  blocks(&SbRuleQuintic, SB_POINTS, B, factor, b, K);
 }
 
 /* With x_i x_j = F g_i x g_j of the barycentric coordinates the second derivative of det F along u at a and v at b is (u x v) . F (g_a x g_b). */

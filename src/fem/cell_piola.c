@@ -5,6 +5,25 @@
 #include "fem_impl.h"
 #include "sbkernel.h"
 
+/*
+  Of a curved cell: the linear function of l nearest to P in the straight tet, at the points of SbRuleQuadratic. With b_i = sum_q w_q l_i P_q it has 20 b_i -
+  4 sum_j b_j at corner i.
+*/
+static void linear_at_points(const SbPoints *at, const SbPack P[SB_POINTS][9], PetscInt n, PetscReal point[])
+{
+  for (PetscInt i = 0; i < 36 * n; i++) {
+    const PetscInt l = i / 36, to = i / 9 % 4, k = i % 9;
+
+    point[i] = 0.;
+    for (int q = 0; q < at->n; q++) {
+      PetscReal value = -4.;
+
+      for (int c = 0; c < 4; c++) value += 20. * SbRuleQuadratic.L[to][c] * at->rule->L[q][c];
+      point[i] += at->rule->weight[q] * value * P[q][k][l];
+    }
+  }
+}
+
 void SbSpaceCellPiola(SbSpace s, const PetscReal x[], PetscReal P[], PetscReal R[], PetscReal psi[],
                       PetscReal point[])
 {
@@ -12,20 +31,27 @@ void SbSpaceCellPiola(SbSpace s, const PetscReal x[], PetscReal P[], PetscReal R
     const SbRegion *region = &s->region[r];
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
-      SbPack F[4][9], stress[4][9], energy[4], rotation[9];
-      const PetscInt n = SbBatchState(s, region, b, x, F, stress, energy, NULL);
+      const SbPoints at = SbBatchPoints(s, region, b);
+      SbPack F[SB_POINTS][9], stress[SB_POINTS][9], energy[SB_POINTS], rotation[9], all;
 
-      for (PetscInt i = 0; point && region->quadratic && i < n * s->batch_n[b]; i++)
-        SbPackGet(9, (const SbPack *)stress[i % n], (int)(i / n), point + 9 * (n * s->batch_cell[b] + i));
+      SbBatchState(s, region, b, x, F, stress, energy, NULL);
+      for (PetscInt i = 0; point && region->quadratic && !at.step && i < 4 * s->batch_n[b]; i++)
+        SbPackGet(9, (const SbPack *)stress[i % 4], (int)(i / 4), point + 9 * (4 * s->batch_cell[b] + i));
+      if (point && at.step)
+        linear_at_points(&at, (const SbPack(*)[9])stress, s->batch_n[b], point + 36 * s->batch_cell[b]);
 
       /* means over the points */
-      for (PetscInt q = 1; q < n; q++) {
+      for (int l = 0; l < SB_BATCH; l++) all[l] = at.weight[0][l];
+      for (int q = 1; q < at.n; q++) {
         for (int l = 0; l < SB_BATCH; l++) {
+          const PetscReal part = at.weight[q][l];
+
+          all[l] += part;
           for (int k = 0; k < 9; k++) {
-            F[0][k][l] += (F[q][k][l] - F[0][k][l]) / (PetscReal)(q + 1);
-            stress[0][k][l] += (stress[q][k][l] - stress[0][k][l]) / (PetscReal)(q + 1);
+            F[0][k][l] += (F[q][k][l] - F[0][k][l]) * part / all[l];
+            stress[0][k][l] += (stress[q][k][l] - stress[0][k][l]) * part / all[l];
           }
-          energy[0][l] += (energy[q][l] - energy[0][l]) / (PetscReal)(q + 1);
+          energy[0][l] += (energy[q][l] - energy[0][l]) * part / all[l];
         }
       }
       if (R && region->material->linear) {

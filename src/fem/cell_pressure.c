@@ -13,12 +13,13 @@ void SbSpaceCellPressure(SbSpace s, const PetscReal x[], PetscReal pressure[])
     const SbRegion *region = &s->region[r];
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
-      SbPack F[4][9], p[4];
-      const PetscInt n = SbBatchState(s, region, b, x, F, NULL, NULL, p);
+      const SbPoints at = SbBatchPoints(s, region, b);
+      SbPack F[SB_POINTS][9], p[SB_POINTS];
 
+      SbBatchState(s, region, b, x, F, NULL, NULL, p);
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
         pressure[s->batch_cell[b] + l] = 0.;
-        for (PetscInt q = 0; q < n; q++) pressure[s->batch_cell[b] + l] += p[q][l] / (PetscReal)n;
+        for (int q = 0; q < at.n; q++) pressure[s->batch_cell[b] + l] += p[q][l] * at.weight[q][l];
       }
     }
   }

@@ -67,17 +67,42 @@ static inline const PetscInt *sb_quadratic_nodes(SbSpace s, PetscInt b)
 {
   return s->batch_clique + (size_t)(b * s->width) * SB_BATCH;
 }
-/* F (rate: without the identity) at the points of SbRuleQuadratic. */
-void SbQuadraticGradients(const SbPack g[9], const SbPack U[30], PetscBool rate, SbPack F[4][9]);
+/* The points of a batch: one of P1, CR and DG; four of a P2 cell; those of SbRuleQuintic of a curved one. */
+typedef struct {
+  int n, step;             /* gradients of point q: g + step q */
+  const SbPointRule *rule; /* of P2 */
+  const SbPack *g, *V;     /* V[0]: volume of the cell */
+  const SbPack *weight;    /* [n] parts of it */
+} SbPoints;
+SbPoints SbBatchPoints(SbSpace space, const SbRegion *region, PetscInt b);
+/* W = the part of the volume of a point. */
+SB_INLINE void SbPointVolume(const SbPoints *at, int q, SbPack W)
+{
+  for (int l = 0; l < SB_BATCH; l++) W[l] = at->weight[q][l] * (*at->V)[l];
+}
+/* F (rate: without the identity) at the points. */
+void SbQuadraticGradients(const SbPoints *at, const SbPack U[30], PetscBool rate, SbPack F[SB_POINTS][9]);
 /*
   The volumetric part of the energy, V lambda/2 (mean of theta)^2: pressure = lambda times the mean (Pa, tension), b[30] = V d mean/du (m^2; NULL: not
-  wanted). F at the points of SbRuleQuadratic.
+  wanted). F at the points.
 */
-void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPack g[9], const SbPack V, const SbPack U[30],
-                       const SbPack F[4][9], SbPack pressure, SbPack b[30]);
-/* What a law says at the points of a cell: one, for P2 four. Returns their number. P (Pa), psi (J/m^3), pressure (Pa, compression) may be NULL. */
-PetscInt SbBatchState(SbSpace space, const SbRegion *region, PetscInt b, const PetscReal x[], SbPack F[4][9],
-                      SbPack P[4][9], SbPack psi[4], SbPack pressure[4]);
+void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const SbPack U[30],
+                       const SbPack F[SB_POINTS][9], SbPack pressure, SbPack b[30]);
+/* The rule that is exact for det F: of a curved cell that of its points. */
+SB_INLINE const SbPointRule *SbVolumeRule(const SbPoints *at)
+{
+  return at->step ? at->rule : &SbRuleCubic;
+}
+/* What a law says at the points of a cell. P (Pa), psi (J/m^3), pressure (Pa, compression) may be NULL. */
+void SbBatchState(SbSpace space, const SbRegion *region, PetscInt b, const PetscReal x[],
+                  SbPack F[SB_POINTS][9], SbPack P[SB_POINTS][9], SbPack psi[SB_POINTS],
+                  SbPack pressure[SB_POINTS]);
+/* Lumped mass / (density V) of node a of a P2 cell in lane l. */
+SB_INLINE PetscReal SbQuadraticLumped(const SbRegion *region, PetscInt b, PetscInt a, PetscInt l)
+{
+  if (region->curve_mass) return region->curve_mass[SB_CELL_NODES * (b - region->bstart) + a][l];
+  return a < 4 ? region->element->ops.mass_lumped : region->element->ops.mass_lumped_edge;
+}
 
 /* Adds the ten blocks of each cell of batch b; K is 32-byte aligned. */
 void SbInsertBatch(SbSpace space, const SbValues *x, PetscInt b, const SbPack K[10][9]);

@@ -298,7 +298,8 @@ static PetscErrorCode describe_edges(SbSpace s, const Edges *edges)
       PetscMin(s->node_orig[node], mesh->Nvert + 8 * mesh->Ncell + 6 * mesh->cell_orig[i / 6] + i % 6);
     for (int k = 0; k < 3; k++)
       s->node_x[3 * node + k] =
-        0.5 * (mesh->x[3 * v[SbTetEdge[i % 6][0]] + k] + mesh->x[3 * v[SbTetEdge[i % 6][1]] + k]);
+        0.5 * (mesh->x[3 * v[SbTetEdge[i % 6][0]] + k] + mesh->x[3 * v[SbTetEdge[i % 6][1]] + k]) +
+        (mesh->edge_off ? mesh->edge_off[3 * i + k] : 0.);
   }
   PetscCall(PetscFree(set));
   PetscCall(PetscFree(cell_set));

@@ -320,7 +320,7 @@ static PetscErrorCode assemble(Mat A, const SbStage *stage)
 PetscErrorCode SbSpaceAllowsMatrixFree(SbSpace s, PetscBool *has)
 {
   PetscFunctionBeginUser;
-  *has = (PetscBool)(!s->consistent_mass && !s->faces);
+  *has = (PetscBool)(!s->consistent_mass && !s->faces && !s->mesh->edge_off);
   for (PetscInt r = 0; r < s->nregion; r++)
     *has = (PetscBool)(*has && (s->region[r].material->linear || s->region[r].material->ops.frame));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, has, 1, SB_MPI_BOOL, MPI_LAND, s->comm));
@@ -338,7 +338,8 @@ PetscErrorCode SbSpaceCreateMatrixFree(SbSpace s, Mat *A)
   PetscFunctionBeginUser;
   PetscCall(SbSpaceAllowsMatrixFree(s, &has));
   PetscCheck(has, s->comm, PETSC_ERR_SUP,
-             "The tangent of this law, element cr or dg, or the consistent mass, needs an assembled matrix");
+             "The tangent of this law, element cr or dg, curved tets, or the consistent mass, need an "
+             "assembled matrix");
   if (!s->plan) PetscCall(SbPlanCreate(s, &s->plan));
   PetscCall(PetscNew(&o));
   o->space = s;

@@ -18,7 +18,8 @@ void SbSpaceCellRotations(SbSpace s, const PetscReal x[], SbPack R[])
     const SbMaterial m = region->material;
 
     for (PetscInt b = region->bstart; b < region->bend; b++) {
-      SbPack U[30], F[4][9];
+      SbPoints at = SbBatchPoints(s, region, b);
+      SbPack U[30], F[SB_POINTS][9];
 
       if (!x || m->linear) {
         for (PetscInt k = 0; k < (region->quadratic ? 36 : 9); k++) {
@@ -28,7 +29,8 @@ void SbSpaceCellRotations(SbSpace s, const PetscReal x[], SbPack R[])
       }
       if (region->quadratic) {
         sb_gather_nodes(10, sb_quadratic_nodes(s, b), x, U);
-        SbQuadraticGradients(s->batch_g + 9 * b, (const SbPack *)U, PETSC_FALSE, F);
+        at.n = 4; /* of a curved cell the first four of its points */
+        SbQuadraticGradients(&at, (const SbPack *)U, PETSC_FALSE, F);
       } else {
         sb_gather(s->batch_node + 4 * SB_BATCH * b, x, U);
         SbCellGradient(s->batch_g + 9 * b, (const SbPack *)U, F[0]);

@@ -12,16 +12,38 @@
 
   Pressures of single cells may oscillate where the mesh is coarse and held all around; means over the cells around a vertex do not.
 
-  Not handled: curved cells. Edges are straight at rest.
+  Cells that are curved at rest are regions of their own: they have gradients and a part of the volume at each of the points of SbRuleQuintic,
+  which is exact for all that is needed: a constant stress and a constant pressure are in equilibrium.
 */
 #include "fem_impl.h"
 
-void SbQuadraticGradients(const SbPack g[9], const SbPack U[30], PetscBool rate, SbPack F[4][9])
+SbPoints SbBatchPoints(SbSpace s, const SbRegion *region, PetscInt b)
 {
-  for (int q = 0; q < 4; q++) {
+#define SAME(x)            \
+  {                        \
+    x, x, x, x, x, x, x, x \
+  }
+  static const SbPack one[1] = {SAME(1.)}, quarter[4] = {SAME(0.25), SAME(0.25), SAME(0.25), SAME(0.25)};
+#undef SAME
+  const PetscInt k = SB_POINTS * (b - region->bstart);
+  SbPoints at = {1, 0, NULL, (const SbPack *)s->batch_g + 9 * b, (const SbPack *)s->batch_V + b, one};
+
+  if (region->curve_g)
+    at = (SbPoints){SB_POINTS,      9,
+                    &SbRuleQuintic, (const SbPack *)region->curve_g + 9 * k,
+                    at.V,           (const SbPack *)region->curve_weight + k};
+  else if (region->quadratic)
+    at = (SbPoints){4, 0, &SbRuleQuadratic, at.g, at.V, quarter};
+  return at;
+}
+
+void SbQuadraticGradients(const SbPoints *at, const SbPack U[30], PetscBool rate, SbPack F[SB_POINTS][9])
+{
+  for (int q = 0; q < at->n; q++) {
+    const SbPack *g = at->g + at->step * q;
     SbPack u[12];
 
-    SbQuadraticAt(SbRuleQuadratic.L[q], U, u);
+    SbQuadraticAt(at->rule->L[q], U, u);
     if (rate)
       SbCellGradientRate(g, (const SbPack *)u, F[q]);
     else
@@ -29,69 +51,73 @@ void SbQuadraticGradients(const SbPack g[9], const SbPack U[30], PetscBool rate,
   }
 }
 
-void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPack g[9], const SbPack V, const SbPack U[30],
-                       const SbPack F[4][9], SbPack pressure, SbPack b[30])
+void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const SbPack U[30],
+                       const SbPack F[SB_POINTS][9], SbPack pressure, SbPack b[30])
 {
-  const SbPointRule *rule = m->jacobian ? &SbRuleCubic : &SbRuleQuadratic;
+  const PetscBool cubic = (PetscBool)(m->jacobian && !at->step); /* at more points than the law */
+  const SbPointRule *rule = cubic ? &SbRuleCubic : at->rule;
   const PetscReal lambda = m->ops.volumetric_modulus(m);
 
   for (int l = 0; l < SB_BATCH; l++) pressure[l] = 0.;
   if (b) memset(b, 0, 30 * sizeof(SbPack));
   for (int q = 0; q < rule->n; q++) {
-    SbPack u[12], here[9], D[9], p, W, f[12];
-    const SbPack *at = F ? F[q] : NULL;
+    const SbPack *g = at->g + at->step * q, *here = cubic ? NULL : F[q];
+    SbPack u[12], own[9], D[9], p, W, f[12];
 
-    if (m->jacobian) {
+    if (cubic) {
       SbQuadraticAt(rule->L[q], U, u);
-      SbCellGradient(g, (const SbPack *)u, here);
-      at = (const SbPack *)here;
+      SbCellGradient(g, (const SbPack *)u, own);
+      here = (const SbPack *)own;
     }
     if (m->linear || m->ops.frame || m->ops.spin) {
       // theta = R : F - 3, with its derivative at once
-      m->ops.volumetric(m, at, D);
+      m->ops.volumetric(m, here, D);
       for (int l = 0; l < SB_BATCH; l++) p[l] = 3. * lambda;
       for (int k = 0; k < 9; k++) {
-        for (int l = 0; l < SB_BATCH; l++) p[l] -= lambda * D[k][l] * at[k][l];
+        for (int l = 0; l < SB_BATCH; l++) p[l] -= lambda * D[k][l] * here[k][l];
       }
     } else {
-      m->ops.pressure(m, at, p);
-      if (b) m->ops.volumetric(m, at, D);
+      m->ops.pressure(m, here, p);
+      if (b) m->ops.volumetric(m, here, D);
     }
-    for (int l = 0; l < SB_BATCH; l++) pressure[l] -= rule->weight[q] * p[l];
+    for (int l = 0; l < SB_BATCH; l++) {
+      const PetscReal weight = cubic ? rule->weight[q] : at->weight[q][l];
+
+      pressure[l] -= weight * p[l];
+      W[l] = weight * (*at->V)[l];
+    }
     if (!b) continue;
-    for (int l = 0; l < SB_BATCH; l++) W[l] = rule->weight[q] * V[l];
     SbCellForce(g, W, (const SbPack *)D, f);
     SbQuadraticAdd(rule->L[q], (const SbPack *)f, b);
   }
 }
 
-PetscInt SbBatchState(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[], SbPack F[4][9],
-                      SbPack P[4][9], SbPack psi[4], SbPack pressure[4])
+void SbBatchState(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS][9],
+                  SbPack P[SB_POINTS][9], SbPack psi[SB_POINTS], SbPack pressure[SB_POINTS])
 {
   const SbMaterial m = region->pointwise;
-  const SbPack *g = s->batch_g + 9 * b;
-  const PetscInt n = region->quadratic ? 4 : 1;
+  const SbPoints at = SbBatchPoints(s, region, b);
   SbPack U[30], p;
 
   if (region->quadratic) {
     sb_gather_nodes(10, sb_quadratic_nodes(s, b), x, U);
-    SbQuadraticGradients(g, (const SbPack *)U, PETSC_FALSE, F);
+    SbQuadraticGradients(&at, (const SbPack *)U, PETSC_FALSE, F);
   } else {
     sb_gather_strain(s, region, b, x, U);
-    SbCellGradient(g, (const SbPack *)U, F[0]);
+    SbCellGradient(at.g, (const SbPack *)U, F[0]);
   }
-  for (PetscInt q = 0; q < n; q++) {
+  for (int q = 0; q < at.n; q++) {
     if (P) m->ops.stress(m, (const SbPack *)F[q], P[q]);
     if (psi) m->ops.energy(m, (const SbPack *)F[q], psi[q]);
     if (pressure) m->ops.pressure(m, (const SbPack *)F[q], pressure[q]);
   }
-  if (m == region->material) return n;
+  if (m == region->material) return;
 
   /* what the mean adds */
   const PetscReal lambda = region->material->ops.volumetric_modulus(region->material);
 
-  SbQuadraticVolume(region->material, g, s->batch_V[b], (const SbPack *)U, (const SbPack(*)[9])F, p, NULL);
-  for (PetscInt q = 0; q < n; q++) {
+  SbQuadraticVolume(region->material, &at, (const SbPack *)U, (const SbPack(*)[9])F, p, NULL);
+  for (int q = 0; q < at.n; q++) {
     SbPack D[9];
 
     if (P) region->material->ops.volumetric(region->material, (const SbPack *)F[q], D);
@@ -103,5 +129,4 @@ PetscInt SbBatchState(SbSpace s, const SbRegion *region, PetscInt b, const Petsc
       if (pressure) pressure[q][l] = -p[l];
     }
   }
-  return n;
 }

@@ -9,7 +9,7 @@
 #include "sblog.h"
 
 /*
-  P2. Each point has a quarter of the volume; the volumetric part is that of the mean of the cell. Damping alike: mu (H + R H^T R) at the points, lambda times the
+  P2. Each point has its part of the volume; the volumetric part is that of the mean of the cell. Damping alike: mu (H + R H^T R) at the points, lambda times the
   mean of R : H.
 */
 static void add_quadratic_force(SbSpace s, const SbRegion *region, const SbStage *stage, PetscReal f[])
@@ -20,33 +20,32 @@ static void add_quadratic_force(SbSpace s, const SbRegion *region, const SbStage
   const PetscBool mean = (PetscBool)(m != region->material);
 
   for (PetscInt b = region->bstart; b < region->bend; b++) {
-    const SbPack *g = s->batch_g + 9 * b;
-    SbPack U[30], F[4][9], H[4][9], P[9], dP[9], R[9], W, fe[12], f10[30] = {{0}}, b10[30], p;
+    const SbPoints at = SbBatchPoints(s, region, b);
+    SbPack U[30], F[SB_POINTS][9], H[SB_POINTS][9], P[9], dP[9], R[9], W, fe[12], f10[30] = {{0}}, b10[30], p;
 
     sb_gather_nodes(10, sb_quadratic_nodes(s, b), stage->u, U);
-    SbQuadraticGradients(g, (const SbPack *)U, PETSC_FALSE, F);
+    SbQuadraticGradients(&at, (const SbPack *)U, PETSC_FALSE, F);
     if (mean) {
-      SbQuadraticVolume(region->material, g, s->batch_V[b], (const SbPack *)U, (const SbPack(*)[9])F, p, b10);
+      SbQuadraticVolume(region->material, &at, (const SbPack *)U, (const SbPack(*)[9])F, p, b10);
       for (int k = 0; k < 30; k++) {
         for (int l = 0; l < SB_BATCH; l++) f10[k][l] = p[l] * b10[k][l];
       }
     }
     if (beta != 0.) {
       sb_gather_nodes(10, sb_quadratic_nodes(s, b), stage->v, U);
-      SbQuadraticGradients(g, (const SbPack *)U, PETSC_TRUE, H);
+      SbQuadraticGradients(&at, (const SbPack *)U, PETSC_TRUE, H);
       for (int l = 0; l < SB_BATCH; l++) p[l] = 0.;
-      for (int q = 0; q < 4 && mean; q++) {
+      for (int q = 0; q < at.n && mean; q++) {
         if (m->linear)
           m->ops.frame(m, (const SbPack *)F[q], R);
         else
           SbPolar((const SbPack *)F[q], R);
         for (int k = 0; k < 9; k++) {
-          for (int l = 0; l < SB_BATCH; l++) p[l] += 0.25 * beta * lambda * R[k][l] * H[q][k][l];
+          for (int l = 0; l < SB_BATCH; l++) p[l] += at.weight[q][l] * beta * lambda * R[k][l] * H[q][k][l];
         }
       }
     }
-    for (int l = 0; l < SB_BATCH; l++) W[l] = 0.25 * s->batch_V[b][l];
-    for (int q = 0; q < 4; q++) {
+    for (int q = 0; q < at.n; q++) {
       m->ops.stress(m, (const SbPack *)F[q], P);
       if (beta != 0.) {
         SbMaterialDampingStress(m, (const SbPack *)F[q], (const SbPack *)H[q], dP);
@@ -58,8 +57,9 @@ static void add_quadratic_force(SbSpace s, const SbRegion *region, const SbStage
           for (int l = 0; l < SB_BATCH; l++) P[k][l] += beta * dP[k][l] + (mean ? p[l] * R[k][l] : 0.);
         }
       }
-      SbCellForce(g, W, (const SbPack *)P, fe);
-      SbQuadraticAdd(SbRuleQuadratic.L[q], (const SbPack *)fe, f10);
+      SbPointVolume(&at, q, W);
+      SbCellForce(at.g + at.step * q, W, (const SbPack *)P, fe);
+      SbQuadraticAdd(at.rule->L[q], (const SbPack *)fe, f10);
     }
     sb_scatter_nodes(10, sb_quadratic_nodes(s, b), s->batch_n[b], (const SbPack *)f10, f);
   }
@@ -118,17 +118,16 @@ PetscErrorCode SbSpaceAddInternalForce(SbSpace s, const SbStage *stage, PetscRea
 /* Mass-proportional damping of a region with the lumped mass. */
 static void add_lumped_damping(SbSpace s, const SbRegion *region, const PetscReal v[], PetscReal f[])
 {
-  const PetscReal damping = region->alpha * region->material->density,
-                  share = damping * region->element->ops.mass_lumped,
-                  edge = damping * region->element->ops.mass_lumped_edge;
+  const PetscReal damping = region->alpha * region->material->density;
 
   for (PetscInt b = region->bstart; b < region->bend; b++) {
     for (PetscInt l = 0; l < s->batch_n[b]; l++) {
       for (PetscInt a = 0; a < (region->quadratic ? 10 : 4); a++) {
         const PetscInt node = s->batch_clique[(s->width * b + a) * SB_BATCH + l];
 
-        for (PetscInt i = 0; i < 3; i++)
-          f[3 * node + i] += (a < 4 ? share : edge) * s->batch_V[b][l] * v[3 * node + i];
+        const PetscReal share = damping * SbQuadraticLumped(region, b, a, l);
+
+        for (PetscInt i = 0; i < 3; i++) f[3 * node + i] += share * s->batch_V[b][l] * v[3 * node + i];
       }
     }
   }
@@ -151,7 +150,22 @@ static void add_quadratic_inertia(SbSpace s, const SbRegion *region, const SbSta
     for (int k = 0; alpha != 0. && k < 30; k++) {
       for (int l = 0; l < SB_BATCH; l++) w[k][l] += alpha * v[k][l];
     }
-    for (int k = 0; k < 300; k++) {
+    for (int q = 0; region->curve_g && q < SB_POINTS; q++) {
+      const SbPoints at = SbBatchPoints(s, region, b);
+      PetscReal phi[SB_CELL_NODES];
+      SbPack here[3] = {{0}}, W;
+
+      SbQuadraticBasis(at.rule->L[q], phi);
+      SbPointVolume(&at, q, W);
+      for (int k = 0; k < 30; k++) {
+        for (int l = 0; l < SB_BATCH; l++) here[k % 3][l] += phi[k / 3] * w[k][l];
+      }
+      for (int k = 0; k < 30; k++) {
+        for (int l = 0; l < SB_BATCH; l++)
+          fe[k][l] += region->material->density * W[l] * phi[k / 3] * here[k % 3][l];
+      }
+    }
+    for (int k = 0; !region->curve_g && k < 300; k++) {
       for (int l = 0; l < SB_BATCH; l++)
         fe[k / 30 * 3 + k % 3][l] += mass[k / 30][k / 3 % 10] * s->batch_V[b][l] * w[k % 30][l];
     }
@@ -229,19 +243,19 @@ void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscRe
     const SbRegion *region = &s->region[r];
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
-      SbPack F[4][9], P[4][9], energy[4];
-      const PetscInt n = SbBatchState(s, region, b, x, F, sigma ? P : NULL, psi ? energy : NULL, NULL);
+      const SbPoints at = SbBatchPoints(s, region, b);
+      SbPack F[SB_POINTS][9], P[SB_POINTS][9], energy[SB_POINTS];
 
       /* means over the points */
+      SbBatchState(s, region, b, x, F, sigma ? P : NULL, psi ? energy : NULL, NULL);
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
         const PetscInt c = s->batch_cell[b] + l;
-        const PetscReal part = 1. / (PetscReal)n;
 
         if (J) J[c] = 0.;
         if (psi) psi[c] = 0.;
         for (int k = 0; sigma && k < 6; k++) sigma[6 * c + k] = 0.;
-        for (PetscInt q = 0; q < n; q++) {
-          const PetscReal det = lane_det((const SbPack *)F[q], l);
+        for (int q = 0; q < at.n; q++) {
+          const PetscReal det = lane_det((const SbPack *)F[q], l), part = at.weight[q][l];
           PetscReal stress[6];
 
           if (J) J[c] += part * det;
@@ -262,17 +276,19 @@ void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscRe
 }
 
 /* Exact volumes of the cells of a P2 batch, and the least det F at the points of the rule for them. */
-static void quadratic_volume(SbSpace s, PetscInt b, const PetscReal x[], SbPack volume, SbPack least)
+static void quadratic_volume(SbSpace s, PetscInt b, const SbPoints *at, const PetscReal x[], SbPack volume,
+                             SbPack least)
 {
+  const SbPointRule *rule = SbVolumeRule(at);
   SbPack U[30], u[12], F[9];
 
   sb_gather_nodes(10, sb_quadratic_nodes(s, b), x, U);
-  for (int q = 0; q < SbRuleCubic.n; q++) {
-    SbQuadraticAt(SbRuleCubic.L[q], (const SbPack *)U, u);
-    SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, F);
+  for (int q = 0; q < rule->n; q++) {
+    SbQuadraticAt(rule->L[q], (const SbPack *)U, u);
+    SbCellGradient(at->g + at->step * q, (const SbPack *)u, F);
     for (int l = 0; l < SB_BATCH; l++) {
       const PetscReal det = lane_det((const SbPack *)F, l),
-                      part = SbRuleCubic.weight[q] * s->batch_V[b][l] * det;
+                      part = (at->step ? at->weight[q][l] : rule->weight[q]) * s->batch_V[b][l] * det;
 
       volume[l] = q ? volume[l] + part : part;
       least[l] = q ? PetscMin(least[l], det) : det;
@@ -292,15 +308,16 @@ void SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal body[], Petsc
     const PetscReal before = *energy;
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
-      SbPack F[4][9], psi[4], exact = {0}, lowest;
-      const PetscInt n = SbBatchState(s, region, b, x, F, NULL, psi, NULL);
+      const SbPoints at = SbBatchPoints(s, region, b);
+      SbPack F[SB_POINTS][9], psi[SB_POINTS], exact = {0}, lowest;
 
-      if (region->quadratic) quadratic_volume(s, b, x, exact, lowest);
+      SbBatchState(s, region, b, x, F, NULL, psi, NULL);
+      if (region->quadratic) quadratic_volume(s, b, &at, x, exact, lowest);
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
         PetscReal least = region->quadratic ? lowest[l] : PETSC_MAX_REAL;
 
-        for (PetscInt q = 0; q < n; q++) {
-          const PetscReal det = lane_det((const SbPack *)F[q], l), part = s->batch_V[b][l] / (PetscReal)n;
+        for (int q = 0; q < at.n; q++) {
+          const PetscReal det = lane_det((const SbPack *)F[q], l), part = s->batch_V[b][l] * at.weight[q][l];
 
           *energy += part * psi[q][l];
           *volume += region->quadratic ? 0. : part * det;

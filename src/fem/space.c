@@ -25,7 +25,13 @@ PetscErrorCode SbSpaceRegister(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Owned and ghost cells are each sorted by body and inclusion: a region is a run of cells. */
+/* Whether a cell is a P2 cell with curved edges. */
+static PetscBool is_curved(SbSpace s, PetscInt cell)
+{
+  return (PetscBool)(s->edge_node && s->mesh->edge_off && (s->mesh->cell_set[cell] & SB_CURVED));
+}
+
+/* Owned and ghost cells are each sorted by body, inclusion, and whether they are curved: a region is a run of cells. */
 static PetscErrorCode find_regions(SbSpace s, const SbMaterial material[], const SbElement element[])
 {
   SbMesh mesh = s->mesh;
@@ -37,14 +43,14 @@ static PetscErrorCode find_regions(SbSpace s, const SbMaterial material[], const
     s->linear = (PetscBool)(s->linear && material[b]->linear);
     for (PetscInt k = 0; k < mesh->body[b].ninclusion; k++)
       s->linear = (PetscBool)(s->linear && material[mesh->body[b].inclusion[k].material]->linear);
-    most += 2 * (1 + mesh->body[b].ninclusion);
+    most += 4 * (1 + mesh->body[b].ninclusion);
   }
   PetscCall(PetscCalloc1(most, &s->region));
   for (PetscInt c = 0; c < mesh->ncell; c++) {
     const PetscInt body = mesh->cell_body[c], m = mesh->cell_material[c];
 
     if (c == 0 || c == mesh->ncell_owned || body != mesh->cell_body[c - 1] ||
-        m != mesh->cell_material[c - 1]) {
+        m != mesh->cell_material[c - 1] || is_curved(s, c) != is_curved(s, c - 1)) {
       SbRegion *r = &s->region[s->nregion++];
 
       r->body = body;
@@ -67,20 +73,62 @@ static PetscErrorCode find_regions(SbSpace s, const SbMaterial material[], const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A curved P2 cell, which is a P1 cell with corners of its own at each point: fills lane l of batch b. */
+static void tabulate_curved(SbSpace s, SbRegion *region, PetscInt b, PetscInt cell, PetscInt l)
+{
+  const PetscInt k = b - region->bstart;
+  SbPack *g = region->curve_g + 9 * SB_POINTS * k, *weight = region->curve_weight + SB_POINTS * k,
+         *mass = region->curve_mass + SB_CELL_NODES * k;
+  PetscReal x[SB_CELL_NODES][3], V = 0., sum = 0.;
+
+  SbSpaceCellPositions(s, cell, x);
+  for (int a = 0; a < SB_CELL_NODES; a++) mass[a][l] = 0.;
+  for (int q = 0; q < SB_POINTS; q++) {
+    PetscReal corner[4][3], grad[3][3], phi[SB_CELL_NODES];
+
+    SbQuadraticCorners(SbRuleQuintic.L[q], (const PetscReal(*)[3])x, corner);
+    region->element->ops.tabulate((const PetscReal(*)[3])corner, grad, &weight[q][l]);
+    weight[q][l] *= SbRuleQuintic.weight[q];
+    V += weight[q][l];
+    for (int i = 0; i < 9; i++) g[9 * q + i][l] = grad[i / 3][i % 3];
+    SbQuadraticBasis(SbRuleQuintic.L[q], phi);
+    for (int a = 0; a < SB_CELL_NODES; a++) mass[a][l] += weight[q][l] * phi[a] * phi[a];
+  }
+  for (int q = 0; q < SB_POINTS; q++) weight[q][l] /= V;
+  for (int a = 0; a < SB_CELL_NODES; a++) sum += mass[a][l];
+  for (int a = 0; a < SB_CELL_NODES; a++) mass[a][l] /= sum;
+  if (l < s->batch_n[b]) s->batch_V[b][l] = V;
+}
+
 /* Gradients, volumes and nodes of each batch; padding lanes repeat the first cell with volume zero. */
 static PetscErrorCode tabulate_batches(SbSpace s)
 {
-  const size_t bytes = (size_t)s->nbatch * 10 * sizeof(SbPack);
+  const size_t each = SB_POINTS * 10 + SB_CELL_NODES;
+  size_t bytes = (size_t)s->nbatch * 10 * sizeof(SbPack);
+  SbPack *curve;
 
   PetscFunctionBeginUser;
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    if (is_curved(s, s->region[r].cstart))
+      bytes += each * (size_t)(s->region[r].bend - s->region[r].bstart) * sizeof(SbPack);
+  }
   PetscCall(PetscMalloc1(s->nbatch, &s->batch_cell));
   PetscCall(PetscMalloc1(s->nbatch, &s->batch_n));
   PetscCall(PetscMalloc1(s->nbatch * 4 * SB_BATCH, &s->batch_node));
   PetscCall(PetscMalloc(bytes + 64, &s->batch_memory));
   s->batch_g = (SbPack *)(((uintptr_t)s->batch_memory + 63) & ~(uintptr_t)63);
   s->batch_V = s->batch_g + (size_t)s->nbatch * 9;
+  curve = s->batch_V + s->nbatch;
   for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
+    SbRegion *region = &s->region[r];
+    const PetscInt n = region->bend - region->bstart;
+
+    if (is_curved(s, region->cstart)) {
+      region->curve_g = curve;
+      region->curve_weight = region->curve_g + 9 * SB_POINTS * n;
+      region->curve_mass = region->curve_weight + SB_POINTS * n;
+      curve = region->curve_mass + SB_CELL_NODES * n;
+    }
 
     PetscCall(PetscLogEventBegin(region->element->event, 0, 0, 0, 0));
     for (PetscInt b = region->bstart; b < region->bend; b++) {
@@ -99,6 +147,7 @@ static PetscErrorCode tabulate_batches(SbSpace s)
         region->element->ops.tabulate((const PetscReal(*)[3])x, g, &V);
         for (PetscInt k = 0; k < 9; k++) s->batch_g[9 * b + k][l] = g[k / 3][k % 3];
         s->batch_V[b][l] = l < s->batch_n[b] ? V : 0.;
+        if (region->curve_g) tabulate_curved(s, region, b, cell, l);
       }
     }
     PetscCall(PetscLogEventEnd(region->element->event, 0, 0, 0, 0));
@@ -135,21 +184,26 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
   if (s->edge_node) PetscCall(PetscCalloc1(s->nnode, &s->node_share));
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
-    const PetscReal share = region->material->density * region->element->ops.mass_lumped;
 
     for (PetscInt b = region->bstart; b < region->bend; b++) {
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        for (PetscInt a = 0; a < 4; a++)
-          s->node_mass[s->batch_node[(4 * b + a) * SB_BATCH + l]] += share * s->batch_V[b][l];
-        for (PetscInt a = 0; s->edge_node && a < (region->quadratic ? SB_CELL_NODES : 4); a++) {
-          const PetscInt node = s->batch_clique[(s->width * b + a) * SB_BATCH + l];
-          const PetscReal m = region->material->density * s->batch_V[b][l];
+        const PetscReal m = region->material->density * s->batch_V[b][l];
+        PetscReal share[SB_CELL_NODES];
 
-          if (a >= 4) s->node_mass[node] += region->element->ops.mass_lumped_edge * m;
-          s->node_share[node] += (!region->quadratic ? region->element->ops.mass_lumped
-                                  : a < 4            ? -0.05
-                                                     : 0.2) *
-                                 m;
+        /* the integrals of the basis functions of P2 */
+        for (int a = 0; a < SB_CELL_NODES; a++)
+          share[a] = !region->quadratic ? region->element->ops.mass_lumped : a < 4 ? -0.05 : 0.2;
+        if (region->curve_g) {
+          (void)SbSpaceCurvedIntegrals(s, s->batch_cell[b] + l, NULL, share);
+          for (int a = 0; a < SB_CELL_NODES; a++) share[a] /= s->batch_V[b][l];
+        }
+        for (PetscInt a = 0; a < (region->quadratic ? SB_CELL_NODES : 4); a++) {
+          const PetscInt node = s->batch_clique[(s->width * b + a) * SB_BATCH + l];
+
+          s->node_mass[node] +=
+            a < 4 ? region->material->density * SbQuadraticLumped(region, b, a, l) * s->batch_V[b][l]
+                  : SbQuadraticLumped(region, b, a, l) * m;
+          if (s->edge_node) s->node_share[node] += share[a] * m;
         }
       }
     }
@@ -223,6 +277,38 @@ PetscErrorCode SbSpaceValidate(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void SbSpaceCellPositions(SbSpace s, PetscInt cell, PetscReal x[SB_CELL_NODES][3])
+{
+  for (PetscInt a = 0; a < SB_CELL_NODES; a++) {
+    for (int k = 0; k < 3; k++) x[a][k] = s->node_x[3 * SbSpaceCellNode(s, cell, a) + k];
+  }
+}
+
+PetscReal SbSpaceCurvedIntegrals(SbSpace s, PetscInt cell, const SbFacet *facet,
+                                 PetscReal integral[SB_CELL_NODES])
+{
+  const SbPointRule *rule = facet ? &SbRuleFacet : &SbRuleQuintic;
+  PetscReal x[SB_CELL_NODES][3], sum = 0.;
+
+  SbSpaceCellPositions(s, cell, x);
+  for (int a = 0; a < SB_CELL_NODES; a++) integral[a] = 0.;
+  for (int q = 0; q < rule->n; q++) {
+    PetscReal L[4] = {0., 0., 0., 0.}, corner[4][3], e[3][3], normal[3], phi[SB_CELL_NODES], measure;
+
+    /* the P1 tet, or triangle, with the derivatives of the map there */
+    for (int c = 0; c < (facet ? 3 : 4); c++) L[facet ? facet->corner[c] : c] = rule->L[q][c];
+    SbQuadraticCorners(L, (const PetscReal(*)[3])x, corner);
+    for (int c = 0; c < (facet ? 2 : 3); c++)
+      SbSubtract(corner[facet ? facet->corner[c + 1] : c + 1], corner[facet ? facet->corner[0] : 0], e[c]);
+    SbCross(e[0], e[1], normal);
+    measure = facet ? PetscSqrtReal(SbDot3(normal, normal)) / 2. : SbDot3(normal, e[2]) / 6.;
+    SbQuadraticBasis(L, phi);
+    for (int a = 0; a < SB_CELL_NODES; a++) integral[a] += rule->weight[q] * measure * phi[a];
+    sum += rule->weight[q] * measure;
+  }
+  return sum;
+}
+
 /* ------------------------------------------------------------------ sets */
 
 PetscErrorCode SbSpaceFindSet(SbSpace s, const char *name, const char *where, PetscInt *k)
@@ -257,7 +343,7 @@ PetscErrorCode SbSpaceGetSetFacets(SbSpace s, PetscInt k, PetscInt *n, SbFacet *
   *n = 0;
   for (PetscInt f = 0; f < 4 * s->mesh->ncell; f++) {
     SbFacet *facet;
-    PetscReal e1[3], e2[3], normal[3], length;
+    PetscReal e1[3], e2[3], normal[3], length, integral[SB_CELL_NODES];
 
     if ((s->mesh->face_set[f] & want) != want) continue;
     facet = &(*facets)[(*n)++];
@@ -274,6 +360,7 @@ PetscErrorCode SbSpaceGetSetFacets(SbSpace s, PetscInt k, PetscInt *n, SbFacet *
     SbCross(e1, e2, normal);
     length = PetscSqrtReal(SbDot3(normal, normal));
     facet->area = 0.5 * length;
+    if (is_curved(s, facet->cell)) facet->area = SbSpaceCurvedIntegrals(s, facet->cell, facet, integral);
     facet->height = 0;
     for (PetscInt i = 0; i < 3; i++) {
       facet->normal[i] = normal[i] / length;

@@ -29,15 +29,16 @@ static void multiply_stiffness(SbSpace s, const PetscReal x[], PetscReal f[])
     const PetscReal mu = m->ops.shear_modulus(m), lambda = m->ops.volumetric_modulus(m);
 
     for (PetscInt b = region->bstart; region->quadratic && b < region->bend; b++) {
-      SbPack U[30], H[4][9], P[9], W, mean = {0}, fe[12], f10[30] = {{0}};
+      const SbPoints at = SbBatchPoints(s, region, b);
+      SbPack U[30], H[SB_POINTS][9], P[9], W, mean = {0}, fe[12], f10[30] = {{0}};
 
       sb_gather_nodes(10, sb_quadratic_nodes(s, b), x, U);
-      SbQuadraticGradients(s->batch_g + 9 * b, (const SbPack *)U, PETSC_TRUE, H);
+      SbQuadraticGradients(&at, (const SbPack *)U, PETSC_TRUE, H);
       for (int l = 0; l < SB_BATCH; l++) {
-        for (int q = 0; q < 4; q++) mean[l] += 0.25 * lambda * (H[q][0][l] + H[q][4][l] + H[q][8][l]);
-        W[l] = 0.25 * s->batch_V[b][l];
+        for (int q = 0; q < at.n; q++)
+          mean[l] += at.weight[q][l] * lambda * (H[q][0][l] + H[q][4][l] + H[q][8][l]);
       }
-      for (int q = 0; q < 4; q++) {
+      for (int q = 0; q < at.n; q++) {
         for (int l = 0; l < SB_BATCH; l++) {
           const PetscReal trace = H[q][0][l] + H[q][4][l] + H[q][8][l],
                           pressure = region->pointwise == m ? lambda * trace : mean[l];
@@ -45,8 +46,9 @@ static void multiply_stiffness(SbSpace s, const PetscReal x[], PetscReal f[])
           for (int k = 0; k < 9; k++)
             P[k][l] = mu * (H[q][k][l] + H[q][3 * (k % 3) + k / 3][l]) + (k % 4 == 0 ? pressure : 0.);
         }
-        SbCellForce(s->batch_g + 9 * b, W, (const SbPack *)P, fe);
-        SbQuadraticAdd(SbRuleQuadratic.L[q], (const SbPack *)fe, f10);
+        SbPointVolume(&at, q, W);
+        SbCellForce(at.g + at.step * q, W, (const SbPack *)P, fe);
+        SbQuadraticAdd(at.rule->L[q], (const SbPack *)fe, f10);
       }
       sb_scatter_nodes(10, sb_quadratic_nodes(s, b), s->batch_n[b], (const SbPack *)f10, f);
     }

@@ -249,24 +249,28 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
                              const Factors *x, PetscInt batch, const SbVolumetric *out, SbPack K[SB_PAIRS][9])
 {
   const SbMaterial m = region->material, law = region->pointwise;
-  const SbPack *g = s->batch_g + 9 * batch, *V = s->batch_V + batch;
+  const SbPoints points = SbBatchPoints(s, region, batch);
+  const SbPack *V = points.V;
   const PetscBool mean = (PetscBool)(law != m), one_D = (PetscBool)(m->linear || m->ops.frame || m->ops.spin),
                   split = (PetscBool)(out && mean && x->lambda > 0.);
-  SbPack U[30], F[4][9], B[4][10][9] __attribute__((aligned(64))), quarter, p, factor, b[30] = {{0}};
+  SbPack U[30], F[SB_POINTS][9], B[SB_POINTS][10][9] __attribute__((aligned(64))), W, p, factor,
+    b[30] = {{0}};
   Factors at = *x;
 
   if (m->linear)
     memset(U, 0, sizeof(U));
   else
     sb_gather_nodes(10, sb_quadratic_nodes(s, batch), displacement, U);
-  SbQuadraticGradients(g, (const SbPack *)U, PETSC_FALSE, F);
+  SbQuadraticGradients(&points, (const SbPack *)U, PETSC_FALSE, F);
   if (mean) {
-    SbQuadraticVolume(m, g, *V, (const SbPack *)U, (const SbPack(*)[9])F, p, b);
+    SbQuadraticVolume(m, &points, (const SbPack *)U, (const SbPack(*)[9])F, p, b);
     at.lambda = 0.;
     at.pressure = &p;
   }
-  scaled_volumes(*V, 0.25, quarter);
-  for (int q = 0; q < 4; q++) law_blocks(law, g, quarter, &at, (const SbPack *)F[q], NULL, B[q]);
+  for (int q = 0; q < points.n; q++) {
+    SbPointVolume(&points, q, W);
+    law_blocks(law, points.g + points.step * q, W, &at, (const SbPack *)F[q], NULL, B[q]);
+  }
   for (int l = 0; l < SB_BATCH; l++) {
     const PetscReal both = x->stiffness + (one_D ? x->damping : 0.);
     const PetscReal kept = split ? PetscMin(KEPT_MOST * x->lambda, KEPT * x->mu) : x->lambda;
@@ -277,26 +281,34 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
   }
   if (out) memset(out->b + out->stride * batch, 0, sizeof(b));
   if (split) memcpy(out->b + out->stride * batch, b, sizeof(b));
-  SbQuadraticBlocks((const SbPack(*)[10][9])B, factor, (const SbPack *)b, K);
+  if (points.step)
+    SbCurvedBlocks((const SbPack(*)[10][9])B, factor, (const SbPack *)b, K);
+  else
+    SbQuadraticBlocks((const SbPack(*)[10][9])B, factor, (const SbPack *)b, K);
   if (!mean) return;
   if (m->jacobian && law->tangent != SB_TANGENT_EXACT_SPD) {
-    for (int q = 0; q < SbRuleCubic.n; q++) {
+    const SbPointRule *rule = SbVolumeRule(&points);
+
+    for (int q = 0; q < rule->n; q++) {
+      const SbPack *g = points.g + points.step * q;
       SbPack u[12], here[9];
 
-      SbQuadraticAt(SbRuleCubic.L[q], (const SbPack *)U, u);
+      SbQuadraticAt(rule->L[q], (const SbPack *)U, u);
       SbCellGradient(g, (const SbPack *)u, here);
-      for (int l = 0; l < SB_BATCH; l++) factor[l] = x->stiffness * SbRuleCubic.weight[q] * (*V)[l] * p[l];
-      SbQuadraticAddJacobian(SbRuleCubic.L[q], g, (const SbPack *)here, factor, K);
+      for (int l = 0; l < SB_BATCH; l++)
+        factor[l] = x->stiffness * (points.step ? points.weight[q][l] : rule->weight[q]) * (*V)[l] * p[l];
+      SbQuadraticAddJacobian(rule->L[q], g, (const SbPack *)here, factor, K);
     }
   }
   if (one_D || x->damping == 0.) return;
   memset(b, 0, sizeof(b));
-  for (int q = 0; q < 4; q++) {
+  for (int q = 0; q < points.n; q++) {
     SbPack R[9], f[12];
 
     SbPolar((const SbPack *)F[q], R);
-    SbCellForce(g, quarter, (const SbPack *)R, f);
-    SbQuadraticAdd(SbRuleQuadratic.L[q], (const SbPack *)f, b);
+    SbPointVolume(&points, q, W);
+    SbCellForce(points.g + points.step * q, W, (const SbPack *)R, f);
+    SbQuadraticAdd(points.rule->L[q], (const SbPack *)f, b);
   }
   for (int l = 0; l < SB_BATCH; l++) factor[l] = (*V)[l] > 0. ? x->lambda * x->damping / (*V)[l] : 0.;
   add_dyad(factor, (const SbPack *)b, K);
@@ -373,6 +385,26 @@ static void fill_other(const Fill *fill, PetscInt r, PetscInt b, PetscBool faces
   fill_batch(fill, r, b, inertia, copy);
 }
 
+/* K_ab += inertia int phi_a phi_b of curved cells. */
+static void add_curved_mass(SbSpace s, const SbRegion *region, PetscInt b, PetscReal inertia,
+                            SbPack K[SB_PAIRS][9])
+{
+  const SbPoints at = SbBatchPoints(s, region, b);
+
+  for (int q = 0; q < at.n; q++) {
+    PetscReal phi[SB_CELL_NODES];
+    SbPack W;
+
+    SbQuadraticBasis(at.rule->L[q], phi);
+    SbPointVolume(&at, q, W);
+    for (int k = 0; k < 3 * SB_PAIRS; k++) {
+      const PetscReal share = inertia * phi[SbPairA[k / 3]] * phi[SbPairB[k / 3]];
+
+      for (int l = 0; l < SB_BATCH; l++) K[k / 3][4 * (k % 3)][l] += share * W[l];
+    }
+  }
+}
+
 /* fill[0] is the matrix of the space itself. */
 static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nfill, const Fill fill[],
                         const SbVolumetric *out)
@@ -392,7 +424,8 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
     SbPack K[SB_PAIRS][9] __attribute__((aligned(64)));
 
     quadratic_blocks(s, region, stage->u, &factors, b, out, K);
-    for (int p = 0; factors.inertia != 0. && p < SB_PAIRS; p++) {
+    if (factors.inertia != 0. && region->curve_g) add_curved_mass(s, region, b, factors.inertia, K);
+    for (int p = 0; factors.inertia != 0. && !region->curve_g && p < SB_PAIRS; p++) {
       const PetscReal share = factors.inertia * SbQuadraticMass(SbPairA[p], SbPairB[p]);
 
       for (int k = 0; k < 3 * SB_BATCH; k++)
@@ -440,14 +473,13 @@ static void add_lumped_mass(SbSpace s, const SbStage *stage, const SbValues *x)
   for (PetscInt i = 0; i < s->nnode_owned; i++) add_to_diagonal(s, x, i, stage->shift_a * s->node_mass[i]);
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
-    const SbElementOps *e = &region->element->ops;
     const PetscReal factor = stage->shift_v * region->alpha * region->material->density;
 
     for (PetscInt b = region->bstart; factor != 0. && b < region->bend; b++) {
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
         for (PetscInt a = 0; a < (region->quadratic ? 10 : 4); a++) {
           const PetscInt node = s->batch_clique[(s->width * b + a) * SB_BATCH + l];
-          const PetscReal share = factor * (a < 4 ? e->mass_lumped : e->mass_lumped_edge);
+          const PetscReal share = factor * SbQuadraticLumped(region, b, a, l);
 
           if (node < s->nnode_owned) add_to_diagonal(s, x, node, share * s->batch_V[b][l]);
         }

@@ -21,13 +21,23 @@ PetscErrorCode SbImportDropUnused(SbImport *im)
   PetscCall(PetscCalloc1(im->nvert, &map));
   for (PetscInt i = 0; i < 4 * im->item[3].n; i++) map[im->item[3].vert[i]] = 1;
   for (PetscInt v = 0; v < im->nvert; v++) map[v] = map[v] ? nused++ : -1;
-  im->nunused = im->nvert - nused;
-  if (im->nunused) {
+  im->nunused = im->nvert - nused - im->nedge_node;
+  im->nedge_node = 0;
+  if (im->nvert > nused) {
+    PetscInt n = 0;
+
     for (PetscInt v = 0; v < im->nvert; v++) {
       if (map[v] < 0) continue;
       PetscCall(PetscArraymove(im->x + 3 * map[v], im->x + 3 * v, 3));
       im->vert_number[map[v]] = im->vert_number[v];
     }
+    for (PetscInt i = 0; i < im->nmiddle.n; i++) {
+      SbMiddle m = im->middle[i];
+
+      for (int k = 0; k < 2; k++) m.end[k] = map[m.end[k]];
+      if (m.end[0] >= 0 && m.end[1] >= 0) im->middle[n++] = m;
+    }
+    im->nmiddle.n = n;
     for (int d = 0; d < 4; d++) {
       PetscInt kept = 0;
 

@@ -34,6 +34,7 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   SbLocalMesh local;
   PetscInt partitioner, reading;
   PetscBool full, all = PETSC_FALSE;
+  PetscReal *edge_off;
 
   PetscFunctionBeginUser;
   PetscCheck(nset <= SB_SET_MAX, comm, PETSC_ERR_USER_INPUT,
@@ -69,8 +70,12 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   m->set = set;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));
   for (PetscInt b = 0; b < nbody; b++) all = (PetscBool)(all || body[b].other_nodes);
+  edge_off = merged.edge_off;
+  merged.edge_off = NULL;
   PetscCall(SbDistribute(comm, (SbPartitioner)partitioner, all, &merged, &local));
   PetscCall(SbMeshNumber(m, &local));
+  PetscCall(SbMeshCurve(m, edge_off));
+  PetscCall(PetscFree(edge_off));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));
   *mesh = m;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -86,6 +91,7 @@ PetscErrorCode SbMeshDestroy(SbMesh *mesh)
   PetscCall(PetscSFDestroy(&m->vert_sf));
   PetscCall(PetscFree5(m->gvert, m->vert_orig, m->vert_body, m->vert_set, m->x));
   PetscCall(PetscFree6(m->cell, m->cell_orig, m->cell_body, m->cell_material, m->cell_set, m->face_set));
+  PetscCall(PetscFree(m->edge_off));
   PetscCall(PetscFree(*mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -26,6 +26,7 @@ static PetscErrorCode prepare(PetscInt nbody, SbBody body[], PetscInt b, PetscIn
   PetscCall(PetscCalloc1(im->item[3].n, &part->masks.cell));
   PetscCall(PetscCalloc1(4 * (size_t)im->item[3].n, &part->masks.face));
   PetscCall(SbSetsMark(im, &part->faces, nbody, body, b, nset, set, &part->masks));
+  PetscCall(SbImportCurve(im, &body[b], part->masks.cell, &part->edge_off));
   PetscCall(SbSetsCount(PETSC_COMM_SELF, im->nvert, im->item[3].n, &part->masks, nset, set));
   PetscCall(PetscFree(part->faces.face)); /* the neighbours are found */
   PetscCall(PetscFree(part->faces.start));
@@ -84,6 +85,11 @@ static PetscErrorCode merge(PetscInt nbody, const SbBody body[], SbImport im[], 
       p->body = b;
       p->set = part[b].masks.cell[c];
       for (int f = 0; f < 4; f++) p->face[f] = part[b].masks.face[4 * c + f];
+    }
+    if (part[b].edge_off) {
+      if (!w->edge_off) PetscCall(PetscCalloc1(18 * (size_t)w->Ncell, &w->edge_off));
+      PetscCall(PetscArraycpy(w->edge_off + 18 * (size_t)at.orig_cell, part[b].edge_off, 18 * body[b].ncell));
+      PetscCall(PetscFree(part[b].edge_off));
     }
     for (PetscInt v = 0; v < im[b].nvert; v++) {
       SbVertexData *p = &w->vertex[at.vert + v];
@@ -187,6 +193,7 @@ PetscErrorCode SbMergedMeshCreate(MPI_Comm comm, SbReading reading, PetscInt nbo
     PetscCall(PetscFree(part[b].masks.cell));
     PetscCall(PetscFree(part[b].masks.face));
     PetscCall(PetscFree(part[b].orig));
+    PetscCall(PetscFree(part[b].edge_off));
     PetscCall(PetscFree(part[b].remote));
   }
   PetscCall(PetscFree3(im, part, slabs));
@@ -203,5 +210,6 @@ PetscErrorCode SbMergedMeshDestroy(SbMergedMesh *w)
   PetscCall(PetscFree(w->remote));
   PetscCall(PetscFree(w->data));
   PetscCall(PetscFree(w->vertex));
+  PetscCall(PetscFree(w->edge_off));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -74,6 +74,16 @@ PetscErrorCode SbSetsBits(const SbImport *import, PetscInt nbody, const SbBody b
 /* Adds the vertices, boundary facets and cells that each set holds on all ranks. Collective. */
 PetscErrorCode SbSetsCount(MPI_Comm comm, PetscInt nvert, PetscInt ncell, const SbMasks *masks, PetscInt nset,
                            SbSet set[]);
+/*
+  curve.c: cells with curved edges of a body whose element has nodes there are marked; the volume of the body becomes that of them; a note for other elements.
+
+  Output: edge_off[ncell][6][3], NULL where there are none. Error: a cell whose map has no positive Jacobian at a point.
+*/
+PetscErrorCode SbImportCurve(const SbImport *import, SbBody *body, uint64_t cell[], PetscReal **edge_off);
+/* Of a tet with its edges off their middles by off[6][3]. */
+PetscReal SbTetCurvedVolume(const PetscReal x[], const PetscInt vert[4], const PetscReal off[18]);
+/* Brings them from rank 0, by original number, to where the cells are. Collective. */
+PetscErrorCode SbMeshCurve(SbMesh mesh, const PetscReal *edge_off);
 /* Adds the members of sets that are groups. */
 PetscErrorCode SbMemoryMeshMark(const SbBody *body, const SbFaces *faces, SbMasks *masks);
 /* A set that selects nothing is an error, which lists the groups that exist. */
@@ -114,6 +124,8 @@ typedef struct {
     neighbour; /* [ncell][4] cell across the face, -1 on the boundary, ncell + k: the cell remote[k] of another rank */
   PetscInt nremote;
   PetscSFNode *remote; /* [nremote] */
+  PetscReal
+    *edge_off; /* [Ncell][6][3] by original numbers, on rank 0: SbMesh.edge_off; NULL without curved cells */
 } SbMergedMesh;
 
 typedef enum {
@@ -129,8 +141,9 @@ PetscErrorCode SbMergedMeshCreate(MPI_Comm comm, SbReading reading, PetscInt nbo
 typedef struct {
   SbFaces faces; /* neighbours: ncell + k is remote[k] */
   SbMasks masks;
-  PetscInt first; /* original number of the first cell */
-  PetscInt *orig; /* [nvert] original numbers, ascending; NULL: 0, 1, ... */
+  PetscInt first;      /* original number of the first cell */
+  PetscInt *orig;      /* [nvert] original numbers, ascending; NULL: 0, 1, ... */
+  PetscReal *edge_off; /* [ncell][6][3] */
   PetscInt nremote;
   PetscSFNode *remote; /* [nremote] cells of other ranks, numbered there from its first body on */
 } SbPart;

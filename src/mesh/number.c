@@ -2,7 +2,7 @@
   number.c - own local numbering of what has come to this rank.
 
   Vertices: owned ones first, in reverse Cuthill-McKee order, then ghosts by global number. The owned ones of all ranks,
-  one rank after the other, are the global numbers. Cells: owned ones first, then ghosts; both sorted by body and inclusion, then by
+  one rank after the other, are the global numbers. Cells: owned ones first, then ghosts; both sorted by body, inclusion and whether they are curved, then by
   lowest local vertex, so that a loop over cells walks through the vertices.
 */
 #include "mesh_impl.h"
@@ -123,10 +123,11 @@ static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
   for (PetscInt i = 0; i < p->ncell; i++) {
     const PetscInt c = some[i];
 
-    key[i] = (SB_INCLUSION_MAX + 1) * (p->data[c].body + (c < p->ncell_owned ? 0 : mesh->nbody)) +
-             inclusion_of(mesh, &p->data[c]);
+    key[i] = 2 * ((SB_INCLUSION_MAX + 1) * (p->data[c].body + (c < p->ncell_owned ? 0 : mesh->nbody)) +
+                  inclusion_of(mesh, &p->data[c])) +
+             (p->data[c].set & SB_CURVED ? 1 : 0);
   }
-  PetscCall(SbBucketByKey(p->ncell, key, 2 * (SB_INCLUSION_MAX + 1) * mesh->nbody, &start, &at));
+  PetscCall(SbBucketByKey(p->ncell, key, 4 * (SB_INCLUSION_MAX + 1) * mesh->nbody, &start, &at));
   for (PetscInt i = 0; i < p->ncell; i++) order[i] = some[at[i]];
   PetscCall(PetscFree(key));
   PetscCall(PetscFree(some));

@@ -31,7 +31,8 @@ static PetscErrorCode check_sums(SbMesh m)
     if (c >= m->ncell_owned) continue;
     mine[CELL_MIX] += SbMix(m->cell_orig[c]);
     for (int f = 0; f < 4; f++) mine[FACET] += m->face_set[4 * c + f] & SB_ON_BOUNDARY;
-    volume += SbTetDeterminant(m->x, m->cell + 4 * c) / 6;
+    volume += m->cell_set[c] & SB_CURVED ? SbTetCurvedVolume(m->x, m->cell + 4 * c, m->edge_off + 18 * c)
+                                         : SbTetDeterminant(m->x, m->cell + 4 * c) / 6;
   }
   PetscCallMPI(MPI_Allreduce(mine, all, NSUM, MPI_UINT64_T, MPI_SUM, m->comm));
   PetscCallMPI(MPI_Allreduce(&volume, &volumes, 1, MPIU_REAL, MPI_SUM, m->comm));
@@ -112,7 +113,9 @@ PetscErrorCode SbMeshValidate(SbMesh mesh)
     if (c == 0 || c == mesh->ncell_owned) continue;
     CHECK(mesh->cell_body[c - 1] < mesh->cell_body[c] ||
             (mesh->cell_body[c - 1] == mesh->cell_body[c] &&
-             (mesh->cell_material[c - 1] != mesh->cell_material[c] || lowest(v - 4) <= lowest(v))),
+             (mesh->cell_material[c - 1] != mesh->cell_material[c] ||
+              (mesh->cell_set[c - 1] & SB_CURVED) < (mesh->cell_set[c] & SB_CURVED) ||
+              lowest(v - 4) <= lowest(v))),
           "Cells are out of order at %" PetscInt_FMT, c);
   }
   PetscCall(check_sums(mesh));

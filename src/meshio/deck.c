@@ -162,21 +162,26 @@ PetscErrorCode SbDeckBuild(SbDeck *d)
   for (PetscInt e = 0; e < d->nelement.n; e++) {
     SbDeckElement *element = &d->element[e];
     const int dim = SbGmshTypes[element->type].dim;
-    PetscInt vert[4] = {0, 0, 0, 0}, tags = 0;
+    const PetscBool ten = (PetscBool)(element->type == SB_GMSH_TET10);
+    PetscInt vert[10] = {0}, tags = 0;
 
     label[e] = element->label;
     element->item = -1;
-    if (SbGmshTypes[element->type].nnode != dim + 1) continue;
+    if (SbGmshTypes[element->type].nnode != dim + 1 &&
+        (!im->second_order || (!ten && element->type != SB_GMSH_LINE3 && element->type != SB_GMSH_TRIANGLE6)))
+      continue;
     im->scan.token = element->at;
-    for (int k = 0; k <= dim; k++) {
+    for (int k = 0; k < (ten ? 10 : dim + 1); k++) {
       vert[k] = SbNumbersFind(&im->nodes, element->node[k]);
-      if (vert[k] < 0)
+      if (vert[k] < 0 &&
+          (k < 4 || element->node[k])) // Nastran may leave out nodes of edges that are straight
         SB_SCAN_ERROR(&im->scan, "element %lld uses node %lld, which is not there", (long long)element->label,
                       (long long)element->node[k]);
     }
     if (element->property >= 0) PetscCall(SbImportTagsAlone(im, dim, element->property, NULL, &tags));
     element->item = im->item[dim].n;
     PetscCall(SbImportAddItem(im, dim, vert, tags, element->label));
+    if (ten) PetscCall(SbImportAddMiddles(im, vert, SbDeckMiddle));
   }
   PetscCall(SbNumbersCreate(d->nelement.n, label, &im->elements));
   if (im->elements.repeated && d->unique)

@@ -36,6 +36,12 @@ static PetscErrorCode transform_body(const SbBody *body, SbImport *im)
       R[i][(i + 2) % 3] += s * a[(i + 1) % 3];
     }
   }
+  for (PetscInt m = 0; m < im->nmiddle.n; m++) {
+    PetscReal *off = im->middle[m].off, y[3];
+
+    for (int i = 0; i < 3; i++) y[i] = im->scale * off[i];
+    for (int i = 0; i < 3; i++) off[i] = R[i][0] * y[0] + R[i][1] * y[1] + R[i][2] * y[2];
+  }
   for (PetscInt v = 0; v < im->nvert; v++) {
     PetscReal *x = im->x + 3 * v, y[3];
 
@@ -147,6 +153,8 @@ static PetscErrorCode copy_import(const SbImport *from, SbImport *to)
   memcpy(to->body, body, sizeof(body));
   COPY(x, 3 * from->nvert);
   COPY(vert_number, from->nvert);
+  COPY(middle, from->nmiddle.n);
+  to->nmiddle.capacity = from->nmiddle.n;
   for (int d = 0; d < 4; d++) {
     COPY(item[d].vert, (d + 1) * from->item[d].n);
     COPY(item[d].tags, from->item[d].n);
@@ -186,6 +194,7 @@ PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImpo
     PetscCall(find_reader(body, &read));
     PetscCall(begin(body, shared));
     PetscCall(read(body->mesh, shared));
+    PetscCall(SbImportMiddles(shared));
     PetscCall(SbImportForget(shared));
   }
   PetscCall(begin(body, im));
@@ -202,6 +211,7 @@ PetscErrorCode SbImportRead(const SbBody *body, SbImport *im)
   PetscCall(find_reader(body, &read));
   PetscCall(begin(body, im));
   PetscCall(read(body->mesh, im));
+  PetscCall(SbImportMiddles(im));
   PetscCall(SbImportForget(im));
   PetscCall(transform_body(body, im));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -250,7 +250,7 @@ static PetscErrorCode read_elements(Abaqus *a, const char *line)
           SB_SCAN_ERROR(a->scan, "element %lld ends after %d of %d nodes", (long long)e.label, k, nnode);
       }
       PetscCall(number_of(a, word, "node of an element", &node));
-      if (k < 4) e.node[k] = node;
+      if (k < 10) e.node[k] = node;
     }
     PetscCall(SbDeckAddElement(&a->deck, &e));
     if (set >= 0) PetscCall(SbDeckAddRange(&a->deck, set, e.label, e.label, 1));
@@ -301,10 +301,10 @@ static PetscErrorCode use_side(Abaqus *a, const Side *side, const SbDeckElement 
   a->scan->token = side->at;
   PetscCall(SbImportGroup(im, 2, tag, a->surface[side->surface], &group));
   if (side->side < 0) {
-    if (e->type == SB_GMSH_TRIANGLE) PetscCall(SbImportAddMember(im, 2, e->item, group));
+    if (SbGmshTypes[e->type].dim == 2 && e->item >= 0) PetscCall(SbImportAddMember(im, 2, e->item, group));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (e->type != SB_GMSH_TET)
+  if (e->type != SB_GMSH_TET && e->type != SB_GMSH_TET10)
     SB_SCAN_ERROR(a->scan, "surface '%s' has side S%d of element %lld, which is no tetrahedron",
                   a->surface[side->surface], side->side + 1, (long long)e->label);
   for (int k = 0; k < 3; k++) vert[k] = im->item[3].vert[4 * e->item + corners[side->side][k]];
@@ -327,6 +327,7 @@ PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
   SbDeck *d = &a.deck;
 
   PetscFunctionBeginUser;
+  im->second_order = PETSC_TRUE;
   PetscCall(SbScanOpen(im->where, path, s));
   while (next_line(&a)) {
     const char *line = s->at;

@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include "meshio_impl.h"
 
+#define STRAIGHT 1e-6 /* of the length of an edge: nearer to the middle its node is there */
+
 /* ------------------------------------------------------------------ arrays of readers */
 
 /* Stands before each array. */
@@ -119,9 +121,95 @@ PetscErrorCode SbImportAddElement(SbImport *im, int type, const PetscInt vert[],
 {
   PetscFunctionBeginUser;
   im->count[type]++;
+  if (type == SB_GMSH_TET10 && im->second_order) {
+    PetscCall(SbImportAddMiddles(im, vert, SbGmshMiddle));
+    PetscCall(SbImportAddItem(im, 3, vert, tags, number));
+  }
+  if (im->second_order && type == SB_GMSH_LINE3) type = SB_GMSH_LINE;
+  if (im->second_order && type == SB_GMSH_TRIANGLE6 && !im->surface) type = SB_GMSH_TRIANGLE;
   if (type == SB_GMSH_TET || (type == SB_GMSH_TRIANGLE && im->surface) ||
       (tags && (type == SB_GMSH_POINT || type == SB_GMSH_LINE || type == SB_GMSH_TRIANGLE)))
     PetscCall(SbImportAddItem(im, SbGmshTypes[type].dim, vert, tags, number));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ nodes at edges */
+
+const int SbGmshMiddle[6] = {4, 6, 7, 5, 9, 8}, SbDeckMiddle[6] = {4, 6, 7, 5, 8, 9};
+
+PetscErrorCode SbImportAddMiddles(SbImport *im, const PetscInt vert[], const int place[6])
+{
+  PetscFunctionBeginUser;
+  for (int a = 0, e = 0; a < 4; a++) {
+    for (int b = a + 1; b < 4; b++, e++) {
+      if (vert[place[e]] < 0) continue;
+      PetscCall(SbReserve(++im->nmiddle.n, sizeof(*im->middle), &im->nmiddle.capacity, &im->middle));
+      im->middle[im->nmiddle.n - 1] =
+        (SbMiddle){.end = {PetscMin(vert[a], vert[b]), PetscMax(vert[a], vert[b])}, .node = vert[place[e]]};
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static int compare_middles(const void *a, const void *b)
+{
+  const SbMiddle *p = (const SbMiddle *)a, *q = (const SbMiddle *)b;
+
+  if (p->end[0] != q->end[0]) return p->end[0] < q->end[0] ? -1 : 1;
+  if (p->end[1] != q->end[1]) return p->end[1] < q->end[1] ? -1 : 1;
+  return (p->node > q->node) - (p->node < q->node);
+}
+
+PetscErrorCode SbImportMiddles(SbImport *im)
+{
+  SbMiddle *last = NULL;
+  PetscReal largest = 0;
+  PetscBool *taken;
+  PetscInt n = 0;
+
+  PetscFunctionBeginUser;
+  if (!im->nmiddle.n) PetscFunctionReturn(PETSC_SUCCESS);
+  qsort(im->middle, (size_t)im->nmiddle.n, sizeof(*im->middle), compare_middles);
+  PetscCall(PetscCalloc1(im->nvert, &taken));
+  for (PetscInt i = 0; i < 4 * im->item[3].n; i++) taken[im->item[3].vert[i]] = PETSC_TRUE;
+  for (PetscInt i = 0; i < im->nmiddle.n; i++) {
+    SbMiddle m = im->middle[i];
+    const PetscReal *a = im->x + 3 * m.end[0], *b = im->x + 3 * m.end[1], *x = im->x + 3 * m.node;
+    PetscReal length = 0, off = 0;
+
+    // nodes that only lie at edges are no unused vertices
+    im->nedge_node += !taken[m.node];
+    taken[m.node] = PETSC_TRUE;
+    // each edge once; two nodes at the same place are one
+    if (last && last->end[0] == m.end[0] && last->end[1] == m.end[1] && last->node == m.node) continue;
+    for (int k = 0; k < 3; k++) {
+      m.off[k] = x[k] - 0.5 * (a[k] + b[k]);
+      length += PetscSqr(b[k] - a[k]);
+      off += PetscSqr(m.off[k]);
+    }
+    if (last && last->end[0] == m.end[0] && last->end[1] == m.end[1]) {
+      PetscReal apart = 0;
+
+      for (int k = 0; k < 3; k++) apart += PetscSqr(x[k] - im->x[3 * last->node + k]);
+      PetscCheck(
+        apart <= PetscSqr(STRAIGHT) * length, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+        "%s: the edge between nodes %lld and %lld has two nodes, %lld and %lld, at different places; "
+        "make it one (gmsh: Coherence Mesh)",
+        im->where, (long long)im->vert_number[m.end[0]], (long long)im->vert_number[m.end[1]],
+        (long long)im->vert_number[last->node], (long long)im->vert_number[m.node]);
+      continue;
+    }
+    im->middle[n] = m;
+    last = &im->middle[n];
+    if (off > PetscSqr(STRAIGHT) * length) n++;
+    if (length > 0) largest = PetscMax(largest, off / length);
+  }
+  PetscCall(PetscFree(taken));
+  im->nmiddle.n = n;
+  if (n)
+    (void)snprintf(im->note, sizeof(im->note),
+                   "edges with their node off the middle: %lld, by %.2g of their length at most%s",
+                   (long long)n, (double)PetscSqrtReal(largest), im->body[0] ? "" : ", taken as straight");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -351,6 +439,7 @@ PetscErrorCode SbImportDestroy(SbImport *im)
   PetscCall(SbImportForget(im));
   PetscCall(PetscFree(im->x));
   PetscCall(PetscFree(im->vert_number));
+  PetscCall(PetscFree(im->middle));
   for (int d = 0; d < 4; d++) PetscCall(SbItemsFree(&im->item[d]));
   PetscCall(PetscFree(im->group));
   PetscCall(PetscFree(im->tags_start));

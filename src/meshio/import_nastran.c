@@ -300,10 +300,15 @@ static PetscErrorCode read_element(Nastran *b, int kind)
     if (k < 4) e.node[k] = node;
   }
   /* nodes at the middle of edges; the last fields of shells and lines are something else */
-  while (kinds[kind].linear != kinds[kind].higher && !more) {
+  for (int k = 4;
+       kinds[kind].linear != kinds[kind].higher && (!more || (kinds[kind].higher == SB_GMSH_TET10 && k < 10));
+       k++) {
     PetscCall(next_field(b, word, &there));
     if (!there) break;
-    more = (PetscBool)(word[0] != 0 && word[0] != '+' && !strchr(word, '.'));
+    if (!word[0] || word[0] == '+' || strchr(word, '.')) continue;
+    more = PETSC_TRUE;
+    if (kinds[kind].higher == SB_GMSH_TET10)
+      PetscCall(to_number(b, word, "node of an element", 0, &e.node[PetscMin(k, 9)]));
   }
   e.type = more ? kinds[kind].higher : kinds[kind].linear;
   PetscCall(SbDeckAddElement(&b->deck, &e));
@@ -405,6 +410,7 @@ PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *im)
   PetscBool there;
 
   PetscFunctionBeginUser;
+  im->second_order = PETSC_TRUE;
   PetscCall(SbScanOpen(im->where, path, b.scan));
   // behind the line BEGIN BULK, or at the start of a file that has none
   for (const char *p = b.scan->data, *end; p; p = end ? end + 1 : NULL) {

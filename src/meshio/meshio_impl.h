@@ -45,15 +45,23 @@ typedef struct {
 } SbGmshType;
 extern const SbGmshType SbGmshTypes[SB_GMSH_NTYPES];
 
-/* Counts an element, and keeps it when it is of use: a tet, a simplex of groups, a triangle where a surface is wanted. */
+/* Nodes 4..9 of gmsh's 10-node tet by the edges 01 02 03 12 13 23, and those of Abaqus, Nastran and VTK. */
+extern const int SbGmshMiddle[6], SbDeckMiddle[6];
+/* Counts an element, and keeps it when it is of use: a tet, a simplex of groups, a triangle where a surface is wanted. Of second order the corners count;
+   vert[10] of a tet, then with its nodes at edges where im->second_order is set, in the order of gmsh. */
 PetscErrorCode SbImportAddElement(SbImport *import, int type, const PetscInt vert[], PetscInt tags,
                                   int64_t number);
 /*
-  SbImportCheckTypes - what was read must be a mesh of 4-node tets and of nothing else in the volume (or triangles, for a surface).
+  SbImportCheckTypes - what was read must be a mesh of 4-node tets (or of 10 nodes, im->second_order) and of nothing else in the volume (or triangles, for a surface).
 
   Not collective. Errors: PETSC_ERR_FILE_UNEXPECTED, which says what is there.
 */
 PetscErrorCode SbImportCheckTypes(const SbImport *import);
+
+/* Adds the nodes of the edges of a 10-node tet: vert[10], in it those of the edges at place[6]. */
+PetscErrorCode SbImportAddMiddles(SbImport *import, const PetscInt vert[], const int place[6]);
+/* Once all is read: which edges are off their middle. Error: an edge with two nodes. */
+PetscErrorCode SbImportMiddles(SbImport *import);
 
 /* ------------------------------------------------------------------ deck.c: a file that names nodes and elements by labels */
 
@@ -63,8 +71,8 @@ typedef struct {
   const char *at; /* in the file, for messages */
 } SbDeckNode;
 typedef struct {
-  int64_t label, property, node[4]; /* property: number of its group; -1: none */
-  int type;                         /* as gmsh numbers it */
+  int64_t label, property, node[10]; /* property: number of its group; -1: none */
+  int type;                          /* as gmsh numbers it */
   const char *at;
   PetscInt item; /* when put together: of the import; -1: it is no simplex */
 } SbDeckElement;

@@ -82,11 +82,12 @@ PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
   SbScan *s = &im->scan;
   int64_t begin = 0, end;
   PetscBool use[SB_VTK_ARRAYS];
-  PetscInt vert[4] = {0, 0, 0, 0}, tags;
+  PetscInt vert[10] = {0}, tags;
   double *sorted;
   int regions, type, nuse = 0;
 
   PetscFunctionBeginUser;
+  im->second_order = PETSC_TRUE;
   // which arrays become groups, and which of them is the one of regions
   regions = -1;
   PetscCall(PetscMalloc1(grid->ncell, &sorted));
@@ -130,11 +131,18 @@ PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
       if (!(point >= 0 && point < (double)im->nvert) || point != PetscFloorReal(point))
         SB_SCAN_ERROR(s, "cell %lld uses point %g; the points are 0 to %lld", (long long)c, point,
                       (long long)im->nvert - 1);
-      if (k < 4) vert[k] = (PetscInt)point;
+      if (k < 10) vert[k] = (PetscInt)point;
+    }
+    if (type == SB_GMSH_TET10) {
+      const PetscInt last = vert[9];
+
+      vert[9] = vert[8];
+      vert[8] = last;
     }
     // a simplex, but not a line of many pieces, has a group from each array in use
     tags = 0;
-    if (end - begin == SbGmshTypes[type].dim + 1) {
+    if (end - begin == SbGmshTypes[type].dim + 1 || type == SB_GMSH_LINE3 || type == SB_GMSH_TRIANGLE6 ||
+        type == SB_GMSH_TET10) {
       int dim = SbGmshTypes[type].dim;
       static const char *const kind[4] = {"point", "curve", "surface", "volume"};
       PetscInt group[SB_VTK_ARRAYS], n = 0;

@@ -106,6 +106,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
     const PetscInt *per = m->element[b]->nodes_per;
 
     m->body[b].other_nodes = (PetscBool)(!per[0] || per[1]);
+    m->body[b].edge_nodes = (PetscBool)(per[1] > 0);
   }
   PetscCall(SbMeshCreate(m->comm, m->nbody, m->body, m->nset, m->set, &m->mesh));
   if (m->nmaterial > m->nbody) PetscCall(check_inclusions(m));

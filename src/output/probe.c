@@ -260,6 +260,8 @@ static PetscErrorCode sum_set(SbRun run, SbProbe *probe)
       for (int c = 0; c < 4; c++) L[c] = measure / 4.;
       for (int a = 0; a < SB_CELL_NODES; a++) Q[a] = measure * (a < 4 ? -0.05 : 0.2);
     }
+    if (mesh->cell_set[cell] & SB_CURVED)
+      measure = SbSpaceCurvedIntegrals(s, cell, facet ? &facet[i] : NULL, Q);
     add_nodes(s, probe, cell, L, Q);
     probe->cell[probe->ncell] = cell;
     probe->cell_weight[probe->ncell++] = measure;

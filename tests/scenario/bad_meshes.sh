@@ -91,7 +91,6 @@ kept 2 "body 'it'|flat.msh|tetrahedron 1" flat.msh
 
 # sound meshes that are not of tetrahedra
 mesh 2 "$data/bad_hexes.msh" "1 hexahedra"
-mesh 2 "$data/bad_second_order.msh" "1 10-node tetrahedra"
 edit $'1 4 0 1 2 3 4\n2 4 0 2 3 4 5' $'1 2 0 1 2 3\n2 2 0 2 3 4' >surface.msh
 mesh 1 surface.msh "2 3-node triangles|gmsh -3"
 mesh 2 surface.msh "2 3-node triangles|gmsh -3"

@@ -511,6 +511,58 @@ static PetscErrorCode test_netgen(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One tet of second order: the nodes of its edges, those of edges 02, 13 and 23 off the middle by parts of 0.1, however a format numbers them. */
+static PetscErrorCode test_second_order(const char *folder)
+{
+  static const struct {
+    const char *name, *text;
+  } file[] = {
+    {"q.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n10\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 0.5 0 "
+              "0\n6 0.5 0.5 0\n7 -0.1 0.5 0\n"
+              "8 0 0 0.5\n9 0 0.5 0.7\n10 0.5 0.3 0.5\n$EndNodes\n$Elements\n1\n1 11 0 1 2 3 4 5 6 7 8 9 "
+              "10\n$EndElements\n"},
+    {"q.vtk",
+     "# vtk DataFile Version 3.0\nq\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 10 double\n0 0 0\n1 0 0\n0 1 "
+     "0\n0 0 1\n0.5 0 0\n0.5 0.5 0\n"
+     "-0.1 0.5 0\n0 0 0.5\n0.5 0.3 0.5\n0 0.5 0.7\nCELLS 1 11\n10 0 1 2 3 4 5 6 7 8 9\nCELL_TYPES 1\n24\n"},
+    {"q.inp", "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n5,0.5,0,0\n6,0.5,0.5,0\n7,-0.1,0.5,0\n8,0,0,0.5\n9,"
+              "0.5,0.3,0.5\n10,0,0.5,0.7\n"
+              "*ELEMENT, TYPE=C3D10\n1,1,2,3,4,5,6,7,8,9,10\n"},
+    {"q.bdf", "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nGRID,4,,0.,0.,1.\nGRID,7,,-.1,.5,0."
+              "\nGRID,9,,.5,.3,.5\nGRID,10,,0.,.5,.7\n"
+              "CTETRA,1,1,1,2,3,4,,,+\n+,7,,9,10\nENDDATA\n"}};
+  static const struct {
+    PetscInt end[2];
+    PetscReal off[3];
+  } expected[3] = {{{0, 2}, {-0.1, 0, 0}}, {{1, 3}, {0, 0.3, 0}}, {{2, 3}, {0, 0, 0.2}}};
+
+  PetscFunctionBeginUser;
+  for (size_t f = 0; f < PETSC_STATIC_ARRAY_LENGTH(file); f++) {
+    char path[128];
+    TestMesh m;
+    FILE *out;
+
+    (void)snprintf(path, sizeof(path), "%s/%s", folder, file[f].name);
+    out = fopen(path, "w");
+    if (out) (void)fputs(file[f].text, out);
+    if (out) (void)fclose(out);
+    PetscCall(test_mesh_read(test_body("b", path), &m));
+    SB_CHECK(m.im.nvert == 4 && m.im.item[3].n == 1 && m.im.nunused == 0 && m.im.nmiddle.n == 3,
+             "%s: %d vertices, %d tets, %d unused, %d edges off the middle", file[f].name, (int)m.im.nvert,
+             (int)m.im.item[3].n, (int)m.im.nunused, (int)m.im.nmiddle.n);
+    for (int i = 0; i < 3 && m.im.nmiddle.n == 3; i++) {
+      const SbMiddle *e = &m.im.middle[i];
+      PetscReal off = 0;
+
+      for (int k = 0; k < 3; k++) off = PetscMax(off, PetscAbsReal(e->off[k] - expected[i].off[k]));
+      SB_CHECK(e->end[0] == expected[i].end[0] && e->end[1] == expected[i].end[1] && off < 1e-14,
+               "%s: edge %d-%d off by %g", file[f].name, (int)e->end[0], (int)e->end[1], (double)off);
+    }
+    PetscCall(SbImportDestroy(&m.im));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   char folder[] = "/tmp/sbformats_XXXXXX", command[64];
@@ -522,6 +574,7 @@ int main(int argc, char **argv)
   PetscCall(test_foreign(&reference));
   PetscCall(test_written(&reference, folder));
   PetscCall(test_nastran(&reference, folder));
+  PetscCall(test_second_order(folder));
   PetscCall(test_numbers());
   PetscCall(SbImportDestroy(&reference));
   PetscCall(test_tetgen());

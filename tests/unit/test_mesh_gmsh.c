@@ -123,7 +123,6 @@ static PetscErrorCode test_damage(void)
     {"bad_no_tets.msh", "body 'b'|tests/data/bad_no_tets.msh"},
     {"bad_surface.msh", "2 3-node"},
     {"bad_hexes.msh", "1 hexahedra"},
-    {"bad_second_order.msh", "1 10-node|4-node"},
     {"bad_type.msh", "line 15|type 140|4-node tetrahedra"},
     {"bad_partitioned.msh", "line 4"},
   };

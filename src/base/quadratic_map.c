@@ -1,0 +1,73 @@
+/*
+  quadratic_map.c - a tet with ten nodes: its basis, its map, and rules with positive weights to integrate over it and over its facets.
+
+  A tet with curved edges is x = sum_a phi_a(l) x_a. With the same map, of positions, it is at a point the P1 tet with the corners
+  x_i' = (4 l_i - 1) x_i + sum_j 4 l_j x_ij, whose gradients and volume (times the weight) it has there. A constant stress is in equilibrium when
+  the rule integrates grad phi_a det dx/dl, a polynomial of degree 3, exactly; the mean of grad phi_a det F det dx/dl and the mass of linear fields
+  want degree 5: 14 points with positive weights (Walkington 2000), which leave no motion without energy or mass.
+*/
+#include "sbquadratic.h"
+
+#define A 0.31088591926330060980
+#define B 0.092735250310891226402
+#define C 0.045503704125649649492
+#define WA 0.11268792571801585080
+#define WB 0.073493043116361949544
+#define WC 0.042546020777081466438
+const SbPointRule SbRuleQuintic = {SB_POINTS,
+                                   {{1 - 3 * A, A, A, A},
+                                    {A, 1 - 3 * A, A, A},
+                                    {A, A, 1 - 3 * A, A},
+                                    {A, A, A, 1 - 3 * A},
+                                    {1 - 3 * B, B, B, B},
+                                    {B, 1 - 3 * B, B, B},
+                                    {B, B, 1 - 3 * B, B},
+                                    {B, B, B, 1 - 3 * B},
+                                    {0.5 - C, 0.5 - C, C, C},
+                                    {0.5 - C, C, 0.5 - C, C},
+                                    {0.5 - C, C, C, 0.5 - C},
+                                    {C, 0.5 - C, 0.5 - C, C},
+                                    {C, 0.5 - C, C, 0.5 - C},
+                                    {C, C, 0.5 - C, 0.5 - C}},
+                                   {WA, WA, WA, WA, WB, WB, WB, WB, WC, WC, WC, WC, WC, WC}};
+#undef A
+#undef B
+#undef C
+#undef WA
+#undef WB
+#undef WC
+
+#define A 0.10128650732345633  /* (6 - sqrt 15) / 21 */
+#define B 0.47014206410511505  /* (6 + sqrt 15) / 21 */
+#define WA 0.12593918054482717 /* (155 - sqrt 15) / 1200 */
+#define WB 0.13239415278850616 /* (155 + sqrt 15) / 1200 */
+const SbPointRule SbRuleFacet = {7,
+                                 {{1 - 2 * A, A, A},
+                                  {A, 1 - 2 * A, A},
+                                  {A, A, 1 - 2 * A},
+                                  {1 - 2 * B, B, B},
+                                  {B, 1 - 2 * B, B},
+                                  {B, B, 1 - 2 * B},
+                                  {1. / 3, 1. / 3, 1. / 3}},
+                                 {WA, WA, WA, WB, WB, WB, 9. / 40}};
+#undef A
+#undef B
+#undef WA
+#undef WB
+
+void SbQuadraticBasis(const PetscReal L[4], PetscReal phi[SB_CELL_NODES])
+{
+  for (int a = 0; a < 4; a++) phi[a] = L[a] * (2 * L[a] - 1);
+  for (int e = 0; e < 6; e++) phi[4 + e] = 4 * L[SbTetEdge[e][0]] * L[SbTetEdge[e][1]];
+}
+
+void SbQuadraticCorners(const PetscReal L[4], const PetscReal x[SB_CELL_NODES][3], PetscReal corner[4][3])
+{
+  for (int k = 0; k < 12; k++) corner[k / 3][k % 3] = (4 * L[k / 3] - 1) * x[k / 3][k % 3];
+  for (int k = 0; k < 18; k++) {
+    const int i = SbTetEdge[k / 3][0], j = SbTetEdge[k / 3][1];
+
+    corner[i][k % 3] += 4 * L[j] * x[4 + k / 3][k % 3];
+    corner[j][k % 3] += 4 * L[i] * x[4 + k / 3][k % 3];
+  }
+}

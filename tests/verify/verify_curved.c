@@ -1,0 +1,354 @@
+// @ranks 1 2 3
+/*
+  P2 on meshes of second order with curved tets, all edges inside too:
+
+    patch       an affine displacement of the boundary is that of all nodes, for every law; a uniform pressure on the curved surface is in
+                equilibrium with the uniform stress; both to rounding, as the rule is exact for the polynomials that decide
+    rigid       a turn leaves neither force nor energy
+    sums        volume of the body, mass of the nodes, lumped and consistent, force of a load on a curved facet: exact ones
+    sphere      Lame's thick sphere, nu 0.3 and 0.4999: order of the displacement at the inner wall, curved and straight tets
+    ranks       the same displacement as on one rank
+    refused     a tet that folds over itself, by its number
+*/
+#include "curved.h"
+
+static const char *const laws[] = {"linear", "corotated", "stvk", "neohookean"};
+
+/* ------------------------------------------------------------------ patch, rigid motion, sums */
+
+/* The largest error of a displacement (A - 1) X, relative to the largest one. */
+static PetscErrorCode affine_error(TestScene *t, const PetscReal A[9], PetscReal *error)
+{
+  const SbSpace s = t->model->space;
+  const PetscScalar *u;
+  PetscReal most[2] = {0., 0.};
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArrayRead(t->run->U, &u));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    const PetscReal *x = s->node_x + 3 * i;
+    PetscReal y[3];
+
+    verify_apply(A, x, y);
+    for (int k = 0; k < 3; k++) {
+      most[0] = PetscMax(most[0], PetscAbsReal(u[3 * i + k] - (y[k] - x[k])));
+      most[1] = PetscMax(most[1], PetscAbsReal(y[k] - x[k]));
+    }
+  }
+  PetscCall(VecRestoreArrayRead(t->run->U, &u));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most, 2, MPIU_REAL, MPI_MAX, t->model->comm));
+  *error = most[0] / most[1];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_patch(const char *mesh, const char *law, const char *volume)
+{
+  static const PetscReal A[9] = {1.02, 0.03, -0.01, 0.015, 0.98, 0.02, -0.02, 0.01, 1.01};
+  TestScene t;
+  PetscReal error;
+
+  PetscFunctionBeginUser;
+  PetscCall(verify_open(
+    &t,
+    "-bodies a" VERIFY_BODY(
+      "a", "%s", "%s", "1e3",
+      "0.45") "-body_a_element p2 -body_a_volume %s %s -sets skin -set_skin_at boundary -effects d "
+              "-effect_d_type prescribed_displacement -effect_d_on skin -effect_d_displacement "
+              "0.02*x+0.03*y-0.01*z;0.015*x-0.02*y+0.02*z;-0.02*x+0.01*y+0.01*z -time static -solver direct "
+              "-snes_rtol 1e-13 "
+              "-snes_atol 0 -snes_stol 1e-13",
+    mesh, law, volume, strcmp(law, "linear") ? "-body_a_tangent exact" : ""));
+  PetscCall(verify_solve(&t, "patch test"));
+  PetscCall(affine_error(&t, A, &error));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  patch test, %s, %s: %.1e\n", law, volume, (double)error));
+  SB_CHECK(error < 1e-10, "patch test, %s, %s: %g", law, volume, (double)error);
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void turn(const PetscReal x[3], PetscReal v[3])
+{
+  static const PetscReal axis[3] = {1., -2., 0.5};
+  PetscReal R[9];
+
+  verify_rotation(axis, 1., R);
+  verify_apply(R, x, v);
+  for (int k = 0; k < 3; k++) v[k] -= x[k];
+}
+
+static void shrink(const PetscReal x[3], PetscReal v[3])
+{
+  for (int k = 0; k < 3; k++) v[k] = -1e-3 * x[k];
+}
+
+static void one(const PetscReal x[3], PetscReal v[3])
+{
+  (void)x;
+  v[0] = 1.;
+  v[1] = v[2] = 0.;
+}
+
+/* Largest component of the residual. */
+static PetscErrorCode residual(TestScene *t, Vec U, PetscReal *most)
+{
+  Vec F;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(U, &F));
+  PetscCall(SbModelResidual(t->model, 0., U, NULL, NULL, PETSC_FALSE, F));
+  PetscCall(VecNorm(F, NORM_INFINITY, most));
+  PetscCall(VecDestroy(&F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_equilibrium(const char *mesh)
+{
+  TestScene t;
+  SbEnergies energies;
+  PetscReal still, most, size;
+  Vec U;
+
+  PetscFunctionBeginUser;
+  /* K = E / (3 (1 - 2 nu)); a uniform strain of -1e-3 has the pressure 3 K 1e-3 */
+  PetscCall(
+    verify_open(&t,
+                "-bodies a" VERIFY_BODY(
+                  "a", "%s", "linear", "1e3",
+                  "0.45") "-body_a_element p2 -sets skin -set_skin_at boundary -effects p -effect_p_type "
+                          "pressure -effect_p_on skin -effect_p_value 10 -effect_p_follower no -time "
+                          "euler_implicit -ts_dt 0.1",
+                mesh));
+  PetscCall(VecDuplicate(t.run->U, &U));
+  PetscCall(residual(&t, U, &size));
+  PetscCall(test_fill(t.model, shrink, U));
+  PetscCall(residual(&t, U, &most));
+  PetscCall(
+    PetscPrintf(PETSC_COMM_WORLD, "  pressure and stress: %.1e of %.1e N\n", (double)most, (double)size));
+  SB_CHECK(most < 1e-12 * size, "pressure and stress leave %g of %g N", (double)most, (double)size);
+  PetscCall(VecDestroy(&U));
+  PetscCall(test_scene_close(&t));
+  for (int law = 1; law < 4; law++) {
+    PetscCall(verify_open(
+      &t, "-bodies a" VERIFY_BODY("a", "%s", "%s", "1e3", "0.45") "-body_a_element p2 -time static", mesh,
+      laws[law]));
+    PetscCall(VecDuplicate(t.run->U, &U));
+    PetscCall(residual(&t, U, &still));
+    PetscCall(test_fill(t.model, turn, U));
+    PetscCall(residual(&t, U, &most));
+    PetscCall(SbModelEnergies(t.model, U, NULL, &energies));
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  turned, %s: %.1e N, %.1e J\n", laws[law], (double)most,
+                          (double)energies.strain));
+    SB_CHECK(still < 1e-10 && most < 1e-10 && PetscAbsReal(energies.strain) < 1e-10,
+             "%s: at rest %g, turned %g N, %g J", laws[law], (double)still, (double)most,
+             (double)energies.strain);
+    PetscCall(VecDestroy(&U));
+    PetscCall(test_scene_close(&t));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_sums(const char *mesh, const char *mass)
+{
+  TestScene t;
+  PetscReal body = 0., energy, least, now, total, force, volume;
+  PetscInt inverted;
+  const PetscReal *u;
+  Vec U, V, F;
+
+  PetscFunctionBeginUser;
+  PetscCall(verify_open(
+    &t,
+    "-bodies a" VERIFY_BODY(
+      "a", "%s", "linear", "1e3",
+      "0.3") "-body_a_element p2 -mass %s -sets skin -set_skin_at boundary -effects q -effect_q_type "
+             "traction -effect_q_on skin -effect_q_total 3,0,0 -time euler_implicit -ts_dt 0.1",
+    mesh, mass));
+  PetscCall(VecDuplicate(t.run->U, &U));
+  PetscCall(VecDuplicate(U, &V));
+  PetscCall(VecDuplicate(U, &F));
+  PetscCall(VecZeroEntries(U));
+  PetscCall(test_fill(t.model, one, V));
+  volume = t.model->body[0].volume;
+  PetscCall(SbSpaceGetLocalRead(t.model->space, U, &u));
+  SbSpaceStrainEnergy(t.model->space, u, &body, &energy, &least, &inverted, &now);
+  PetscCall(SbSpaceRestoreLocalRead(t.model->space, U, &u));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &now, 1, MPIU_REAL, MPI_SUM, t.model->comm));
+  SB_CHECK_NEAR(now, volume, 1e-13, "volume of the tets and of the body");
+  /* M a - f with a = (1, 0, 0), along (1, 0, 0): the mass less the total force */
+  PetscCall(SbModelResidual(t.model, 0., U, NULL, NULL, PETSC_FALSE, F));
+  PetscCall(VecDot(F, V, &force));
+  PetscCall(SbModelResidual(t.model, 0., U, U, V, PETSC_FALSE, F));
+  PetscCall(VecDot(F, V, &total));
+  SB_CHECK_NEAR(PetscAbsReal(force), 3., 1e-12, "total force");
+  SB_CHECK_NEAR(PetscAbsReal(total - force) / (1000. * volume), 1., 1e-12, "mass");
+  PetscCall(VecDestroy(&U));
+  PetscCall(VecDestroy(&V));
+  PetscCall(VecDestroy(&F));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ Lame's sphere */
+
+#define SHELL                                                                                              \
+  "-bodies a" VERIFY_BODY("a", "%s", "linear", "1",                                                        \
+                          "%.17g") "-body_a_element %s -sets x,y,z,in -set_x_at plane:1,0,0,0 -set_y_at "  \
+                                   "plane:0,1,0,0 -set_z_at plane:0,0,1,0 "                                \
+                                   "-set_in_at sphere:0,0,0,1.0001 -effects x,y,z,p -effect_x_type fixed " \
+                                   "-effect_x_on x -effect_x_components x "                                \
+                                   "-effect_y_type fixed -effect_y_on y -effect_y_components y "           \
+                                   "-effect_z_type fixed -effect_z_on z "                                  \
+                                   "-effect_z_components z -effect_p_type pressure -effect_p_on in "       \
+                                   "-effect_p_value 1 -effect_p_follower no "                              \
+                                   "-time static -solver direct"
+
+static PetscErrorCode sphere_error(PetscInt n, PetscBool second, PetscReal nu, const char *element,
+                                   PetscReal *error)
+{
+  TestScene t;
+  char mesh[512];
+  const PetscScalar *u;
+  PetscReal sum[2] = {0., 0.};
+
+  PetscFunctionBeginUser;
+  PetscCall(curved_mesh_write(n, n, curved_shell, second, mesh));
+  PetscCall(verify_open(&t, SHELL, mesh, (double)nu, element));
+  PetscCall(verify_solve(&t, "sphere"));
+  /* at the vertices, weighted by 1: those of both meshes are the same */
+  PetscCall(VecGetArrayRead(t.run->U, &u));
+  for (PetscInt i = 0; i < t.model->space->nnode_owned; i++) {
+    const PetscReal *x = t.model->space->node_x + 3 * i,
+                    r = PetscSqrtReal(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
+    const PetscReal exact = ((1. - 2. * nu) * r + 4. * (1. + nu) / (r * r)) / 7.;
+
+    if (t.model->space->node_orig[i] >= t.model->mesh->Nvert) continue;
+    for (int k = 0; k < 3; k++) sum[0] += PetscSqr(u[3 * i + k] - exact * x[k] / r);
+    sum[1] += PetscSqr(exact);
+  }
+  PetscCall(VecRestoreArrayRead(t.run->U, &u));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, t.model->comm));
+  *error = PetscSqrtReal(sum[0] / sum[1]);
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  sphere, nu %g, %s, %5d %s tets: error %.3e\n", (double)nu,
+                        element, (int)t.model->mesh->Ncell, second ? "curved" : "straight", (double)*error));
+  PetscCall(test_scene_close(&t));
+  PetscCall(test_file_remove(mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_sphere(PetscReal nu)
+{
+  PetscReal curved[2], straight[2];
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 2; k++) {
+    PetscCall(sphere_error(k ? 6 : 3, PETSC_TRUE, nu, "p2", &curved[k]));
+    PetscCall(sphere_error(k ? 6 : 3, PETSC_FALSE, nu, "p2", &straight[k]));
+  }
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  orders: curved %.2f, straight %.2f\n",
+                        log(curved[0] / curved[1]) / log(2.), log(straight[0] / straight[1]) / log(2.)));
+  /* in theory 3 in the mean square, and 2 with the geometry of straight tets, here on coarse meshes */
+  SB_CHECK(curved[0] > 7. * curved[1] && straight[0] < 5. * straight[1], "orders: curved %g, straight %g",
+           log(curved[0] / curved[1]) / log(2.), log(straight[0] / straight[1]) / log(2.));
+  SB_CHECK(curved[0] < 0.2 * straight[0] && curved[1] < 0.1 * straight[1], "curved %g, %g, straight %g, %g",
+           (double)curved[0], (double)curved[1], (double)straight[0], (double)straight[1]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ ranks, what is refused */
+
+/* Straight and curved regions: the inner layer stays as it is. */
+static void half(PetscReal x[3])
+{
+  x[0] *= 0.9 + 0.2 * PetscMax(0., x[2] - 0.5) * x[1];
+}
+
+static PetscErrorCode check_ranks(void)
+{
+  static const char *const solver[] = {"direct", "cg_p_multigrid", "pressure"};
+  char mesh[512];
+
+  PetscFunctionBeginUser;
+  PetscCall(curved_mesh_write(3, 4, half, PETSC_TRUE, mesh));
+  for (int k = 0; k < 3; k++) {
+    PetscReal *value[2];
+    PetscInt n = 0;
+
+    for (int r = 0; r < 2; r++) {
+      TestScene t;
+      char text[VERIFY_TEXT];
+
+      PetscCall(
+        PetscSNPrintf(text, sizeof(text),
+                      "-bodies a" VERIFY_BODY(
+                        "a", "%s", "neohookean", "1e6",
+                        "0.45") "-body_a_element p2 -sets foot -set_foot_at plane:0,0,1,0 -effects f,g "
+                                "-effect_f_type fixed "
+                                "-effect_f_on foot -effect_g_type gravity -effect_g_vector 3,-5,-9.81 -time "
+                                "newmark -mass %s "
+                                "-ts_dt 0.02 -ts_max_time 0.06 -solver %s -ksp_rtol 1e-12 -snes_rtol 1e-12",
+                      mesh, k ? "consistent" : "lumped", solver[k]));
+      PetscCall(test_scene_open_on(r ? PETSC_COMM_SELF : PETSC_COMM_WORLD, NULL, text, &t));
+      PetscCall(verify_solve(&t, "ranks"));
+      n = verify_numbers(t.model);
+      PetscCall(verify_gather(t.model, t.run->U, &value[r]));
+      PetscCall(test_scene_close(&t));
+    }
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s: one rank and all differ by %.1e\n", solver[k],
+                          (double)verify_difference(3 * n, value[0], value[1])));
+    SB_CHECK(verify_difference(3 * n, value[0], value[1]) < 1e-8, "%s: one rank and all differ by %g",
+             solver[k], (double)verify_difference(3 * n, value[0], value[1]));
+    for (int r = 0; r < 2; r++) PetscCall(PetscFree(value[r]));
+  }
+  PetscCall(test_file_remove(mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The node at half of the edge from (0, 0, 0) to (0, 0, 1) beyond its end. */
+static void fold(PetscReal x[3])
+{
+  if (x[0] == 0. && x[1] == 0. && x[2] == 0.5) x[2] = 1.2;
+}
+
+static PetscErrorCode check_refused(void)
+{
+  TestScene t;
+  char mesh[512], words[600];
+
+  PetscFunctionBeginUser;
+  PetscCall(curved_mesh_write(1, 1, fold, PETSC_TRUE, mesh));
+  PetscCall(PetscSNPrintf(words, sizeof(words), "body 'a'|%s|tetrahedron 3|Jacobian", mesh));
+  SB_CHECK_ERROR(
+    verify_open(
+      &t, "-bodies a" VERIFY_BODY("a", "%s", "linear", "1", "0.3") "-body_a_element p2 -time static", mesh),
+    PETSC_ERR_USER_INPUT, words);
+  PetscCall(test_scene_close(&t));
+  /* others take the straight tet */
+  PetscCall(verify_open(
+    &t, "-bodies a" VERIFY_BODY("a", "%s", "linear", "1", "0.3") "-body_a_element p1 -time static", mesh));
+  SB_CHECK_NEAR(t.model->body[0].volume, 0.5, 1e-14, "volume of the straight tets");
+  SB_CHECK(strstr(t.model->body[0].note, "straight: 1") != NULL, "note '%s'", t.model->body[0].note);
+  PetscCall(test_scene_close(&t));
+  PetscCall(test_file_remove(mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  char mesh[512];
+
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(curved_mesh_write(3, 2, curved_wobble, PETSC_TRUE, mesh));
+  for (int law = 0; law < 4; law++) {
+    PetscCall(check_patch(mesh, laws[law], "mean"));
+    PetscCall(check_patch(mesh, laws[law], "pointwise"));
+  }
+  PetscCall(check_equilibrium(mesh));
+  PetscCall(check_sums(mesh, "lumped"));
+  PetscCall(check_sums(mesh, "consistent"));
+  PetscCall(test_file_remove(mesh));
+  PetscCall(check_sphere(0.3));
+  PetscCall(check_sphere(0.4999));
+  PetscCall(check_ranks());
+  PetscCall(check_refused());
+  SB_TEST_END();
+}
