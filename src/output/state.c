@@ -2,7 +2,7 @@
   A body begins where another run has brought it: -body_<name>_state RUN[,STEP] or CHECKPOINT.
 
   Displacement and velocity are those of a frame of that run's fields.h5, evaluated at the nodes of this run: u(X) = sum_a w_a u_a with the weights of the tet that holds the place X at
-  rest there, or of the nearest one. So element, mesh, material, effects and integrator may be others; where nodes are the vertices of that run, values are those of the file. Every rank
+  rest there, or of the nearest one; of a run with -output_quadratic they are the ten of P2. So element, mesh, material, effects and integrator may be others; where nodes are the vertices of that run, values are those of the file. Every rank
   reads the body's part of the file. A checkpoint has no mesh, but all digits of all unknowns: it serves scenes with the same meshes and elements, whatever else is different there.
 */
 #include <sys/stat.h>
@@ -20,6 +20,8 @@ typedef struct {
   PetscInt npoint, ncell;
   PetscReal *x, *u, *v; /* [npoint][3] at rest, m; displacement, m; velocity, m/s, NULL: the frame has none */
   PetscInt *cell;       /* [ncell][4] those of the body */
+  PetscInt *
+    cell10; /* [ncell][10] with the middles of the edges 01 12 02 03 13 23, NULL: the run did not write them */
 } Other;
 
 /* A whole dataset as numbers of `type`, [n] or [n][ncomp]; NULL when it is not there. PetscFree. */
@@ -85,6 +87,9 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
   PetscCall(read_all(o->mesh, "x", H5T_NATIVE_DOUBLE, sizeof(double), 3, &o->npoint, &o->x));
   PetscCall(read_all(o->mesh, "cells", sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32,
                      sizeof(PetscInt), 4, &o->ncell, &o->cell));
+  if (H5Lexists(o->mesh, "cells10", H5P_DEFAULT) > 0)
+    PetscCall(read_all(o->mesh, "cells10", sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32,
+                       sizeof(PetscInt), 10, &n, &o->cell10));
   PetscCall(read_all(o->mesh, "body", sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32,
                      sizeof(PetscInt), 1, &n, &cell_body));
   PetscCall(read_all(o->frame, "displacement", H5T_NATIVE_DOUBLE, sizeof(double), 3, &nu, &o->u));
@@ -98,6 +103,7 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
   for (PetscInt c = 0; c < o->ncell; c++) {
     if (cell_body && cell_body[c] != which) continue;
     PetscCall(PetscArraymove(o->cell + 4 * n, o->cell + 4 * c, 4));
+    if (o->cell10) PetscCall(PetscArraymove(o->cell10 + 10 * n, o->cell10 + 10 * c, 10));
     n++;
   }
   o->ncell = n;
@@ -120,16 +126,21 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
   PetscCall(VecGetArray(run->U, &u));
   PetscCall(VecGetArray(run->V, &v));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    PetscReal weight[4];
+    static const int edge[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
+    const PetscInt n = o->cell10 ? 10 : 4, *point;
+    PetscReal weight[10];
     PetscInt cell;
 
     if (s->node_body[i] != b) continue;
     far = PetscMax(far, SbLocatorFind(locator, s->node_x + 3 * i, &cell, weight));
+    point = o->cell10 ? o->cell10 + 10 * cell : o->cell + 4 * cell;
+    for (int e = 0; e < n - 4; e++) weight[4 + e] = 4. * weight[edge[e][0]] * weight[edge[e][1]];
+    for (int a = 0; a < 4 && n == 10; a++) weight[a] *= 2. * weight[a] - 1.;
     for (int k = 0; k < 3; k++) {
       u[3 * i + k] = v[3 * i + k] = 0.;
-      for (int a = 0; a < 4; a++) {
-        u[3 * i + k] += weight[a] * o->u[3 * o->cell[4 * cell + a] + k];
-        if (o->v) v[3 * i + k] += weight[a] * o->v[3 * o->cell[4 * cell + a] + k];
+      for (PetscInt a = 0; a < n; a++) {
+        u[3 * i + k] += weight[a] * o->u[3 * point[a] + k];
+        if (o->v) v[3 * i + k] += weight[a] * o->v[3 * point[a] + k];
       }
       if (s->fixed[i] & (1 << k)) v[3 * i + k] = 0.;
     }
@@ -241,6 +252,7 @@ PetscErrorCode SbOutputLoadState(SbRun run)
     PetscCall(PetscFree(o.u));
     PetscCall(PetscFree(o.v));
     PetscCall(PetscFree(o.cell));
+    PetscCall(PetscFree(o.cell10));
     if (o.mesh >= 0) (void)H5Gclose(o.mesh);
     if (o.frame >= 0) (void)H5Gclose(o.frame);
     if (o.file >= 0) (void)H5Fclose(o.file);
