@@ -54,7 +54,8 @@ static const SbOption rows[] = {
   {"friction_kinetic", SB_OPTION_REAL, 1, "", "-1", "[-1, inf)",
    "kinetic coefficient of friction; negative: equal to the static one; not with barrier"},
   {"stiffness", SB_OPTION_REAL, 1, "", "20", "(0, inf)",
-   "penalty, augmented and friction: factor on the stiffness (lambda + 2 mu) area / height of the tet behind "
+   "penalty, augmented and friction: factor on the stiffness min(lambda + 2 mu, 11 mu) area / height of the "
+   "tet behind "
    "the surface"},
   {"damping", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "response penalty: dashpot in parallel with each spring, of stiffness times this time; acts on "

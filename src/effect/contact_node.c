@@ -11,7 +11,8 @@
   has left and come back several times within a step stays: the loop ends. `multiplier`: the same with the forces as
   unknowns of the solves.
 
-  Response `penalty`: springs, N = k <-g>, <x> = max(x, 0), with k from the stiffness of the cell behind. `augmented`: the penalty with a multiplier,
+  Response `penalty`: springs, N = k <-g>, <x> = max(x, 0), with k from the stiffness of the cell behind, where that hardly changes its volume as if poisson were 0.45: a surface gives by shear, and
+  springs that are stiffer by orders make E so narrow a valley that the line search crawls in it. `augmented`: the penalty with a multiplier,
   N = <lambda - k g>, which is updated after each solve until the penetration is within the tolerance (Simo and Laursen 1992).
 
   Friction (friction.c) is solved for with N. It needs constraints: with it all responses write their nodes as such, `projected` exact ones in whose
@@ -26,6 +27,7 @@
 */
 #include "contact_node.h"
 
+#define STIFFEST 11. /* of the shear modulus: lambda + 2 mu at nu = 0.45 */
 #define TOGGLES 3    /* how often a node may come within a step before it stays */
 #define PULLING 1e-6 /* of the largest contact force: what a node must pull with to leave */
 #define SETTLED 1e-4 /* of the largest contact force: what that of a spring may be off */
@@ -134,7 +136,8 @@ static void add_share(SbSpace space, const SbFacet *facet, PetscInt a, PetscReal
     c->touch[slot[node]] = (Touch){.node = node, .cell = facet->cell, .a = a, .along = -1};
   }
   touch = &c->touch[slot[node]];
-  touch->k += c->stiffness * SbMaterialWaveModulus(m) * share / facet->height;
+  touch->k += c->stiffness * PetscMin(SbMaterialWaveModulus(m), STIFFEST * m->ops.shear_modulus(m)) * share /
+              facet->height;
   touch->stiff = touch->k;
 }
 
