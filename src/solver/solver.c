@@ -35,10 +35,11 @@ static PetscErrorCode create_frames(SbSpace s, Mat *A)
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceAllowsMatrixFree(s, &frames));
-  PetscCheck(frames, s->comm, PETSC_ERR_USER,
-             "-solver realtime is for -mass lumped, the elements p1 and p2, and the materials linear, and "
-             "corotated with "
-             "-body_<name>_tangent warped: choose these, or -solver rotated");
+  PetscCheck(
+    frames, s->comm, PETSC_ERR_USER,
+    "-solver realtime is for -mass lumped, the elements p1 and p2 with straight edges, and the materials "
+    "linear, and corotated with "
+    "-body_<name>_tangent warped: choose these, or -solver rotated");
   PetscCall(SbSpaceCreateMatrixFree(s, A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
