@@ -74,7 +74,7 @@ static void integrate(SbDeadLoad load, PetscReal t)
       PetscReal p[3] = {0, 0, 0}, q[3], L[4] = {0, 0, 0, 0}, phi[SB_CELL_NODES];
 
       for (PetscInt c = 0; c < nc; c++) L[corner[c] % 4] = b[c];
-      SbQuadraticBasis(L, phi);
+      if (quadratic) SbQuadraticBasis(L, phi);
       if (curved) {
         SbQuadraticCorners(L, (const PetscReal(*)[3])nodes, corners);
         for (PetscInt c = 0; c < nc; c++) x[c] = corners[corner[c] % 4];
