@@ -95,7 +95,7 @@ struct _p_SbRun {
   PetscInt max_halvings, static_steps;
   PetscReal min_increment; /* static: smallest load increment as a part of 1 / static_steps */
   PetscReal
-    softening; /* static: |du|/dlambda of the last step over that of the first one; 0: there was none */
+    softening; /* static: |du|/dlambda of the last step over that of the slowest one; 0: there was none */
   struct {
     PetscBool on;   /* static: steps along the path of equilibria, with the load factor as an unknown */
     PetscInt steps; /* at most so many */

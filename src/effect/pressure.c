@@ -13,8 +13,12 @@
   df_a/dx_b = p/6 [c_b]x, where [c]x w = c x w. It is not symmetric facet by facet; what the facets add to the
   matrix here is the symmetric part, the blocks p/12 [c_b - c_a]x. On a closed surface, or one whose rim is
   constrained, the other part cancels and the tangent is the exact derivative (Bufler, "Pressure loaded structures
-  under large deformations", 1984); at a free rim it is not, and Newton converges a little more slowly to the
-  same answer.
+  under large deformations", 1984). What is left of it is an integral along the rim R, counter-clockwise,
+
+    -df_a = -p/2 int_R phi_a dx x w.
+
+  Where the rim is free the operator of the linear solver applies it, and the matrix preconditions. Newton's method without it converges
+  linearly, and not at all under a load that turns a body far round. Constraints beside the matrix have no method for both, and go without.
 
   The facets of CR and DG bodies do not meet at their edges, so that forces facet by facet do not quite add up to
   zero. Where the pressure acts on the whole surface of such a body, it is taken as -p dV/du of the volume inside
@@ -36,11 +40,20 @@
 */
 #include "effect_impl.h"
 
+#define STRAIGHT 1e-9 /* relative: components of an edge below which it has none, as in a plane of symmetry */
+
+/* Where the surface under pressure ends, and its nodes are free to move. */
+typedef struct {
+  PetscInt node
+    [3]; /* from, to, between them (-1: none, it is straight); the surface lies to the left, seen from outside */
+} RimEdge;
+
 typedef struct {
   SbFormula value;
   PetscBool follower;
-  PetscInt nfacet;
+  PetscInt nfacet, nedge;
   SbFacet *facet;   /* [nfacet] of owned and ghost cells */
+  RimEdge *rim;     /* [nedge] of P1 and P2, with an owned node */
   PetscBool *whole; /* [nbody] taken by its volume: its facets are not in the list */
 } Pressure;
 
@@ -91,6 +104,110 @@ static PetscErrorCode find_whole(Pressure *p, SbSpace space)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static inline PetscBool quadratic(SbSpace space, const SbFacet *facet)
+{
+  return (PetscBool)(SbSpaceCellElement(space, facet->cell)->nodes_per[1] > 0);
+}
+
+/* The nodes of a P2 facet in their cell. */
+static void facet_nodes(const SbFacet *facet, int node[6])
+{
+  for (int c = 0; c < 3; c++) {
+    const int a = (int)facet->corner[c], b = (int)facet->corner[(c + 1) % 3];
+
+    node[c] = a;
+    node[3 + c] = 4;
+    for (int e = 0; e < 6; e++) {
+      if (SbTetEdge[e][0] == PetscMin(a, b) && SbTetEdge[e][1] == PetscMax(a, b)) node[3 + c] = 4 + e;
+    }
+  }
+}
+
+/* Whether the tangent has a part along the edge that supports leave. */
+static PetscBool is_free(SbSpace space, const RimEdge *edge)
+{
+  const PetscInt n = edge->node[2] < 0 ? 2 : 3;
+  PetscReal e[3], longest = 0;
+
+  for (int i = 0; i < 3; i++) {
+    e[i] = space->node_x[3 * edge->node[1] + i] - space->node_x[3 * edge->node[0] + i];
+    longest = PetscMax(longest, PetscAbsReal(e[i]));
+  }
+  for (PetscInt a = 0; a < n; a++) {
+    for (PetscInt b = 0; b < n; b++) {
+      for (int k = 0; k < 3; k++) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        const uint8_t row = space->fixed[edge->node[a]], column = space->fixed[edge->node[b]];
+
+        /* e_k couples components i and j */
+        if (PetscAbsReal(e[k]) > STRAIGHT * longest && !(row >> i & 1) && !(column >> j & 1))
+          return PETSC_TRUE;
+      }
+    }
+  }
+  return PETSC_FALSE;
+}
+
+static int compare_edges(const void *one, const void *other)
+{
+  const PetscInt *a = (const PetscInt *)one, *b = (const PetscInt *)other;
+
+  for (int k = 0; k < 2; k++) {
+    if (a[k] != b[k]) return a[k] < b[k] ? -1 : 1;
+  }
+  return 0;
+}
+
+/* The free rim of the facets of P1 and P2: edges that facets go along one way more often than the other. */
+static PetscErrorCode find_rim(Pressure *p, SbSpace space)
+{
+  PetscInt(*edge)[5]; /* lower node, higher node, 1 or -1: from lower to higher or back; facet, side */
+  PetscInt n = 0, ways;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(3 * p->nfacet, &edge));
+  for (PetscInt k = 0; k < p->nfacet; k++) {
+    const SbFacet *facet = &p->facet[k];
+
+    if (!SbSpaceCellElement(space, facet->cell)->nodes_per[0]) continue;
+    for (PetscInt c = 0; c < 3; c++) {
+      const PetscInt a = SbSpaceCellNode(space, facet->cell, facet->corner[c]),
+                     b = SbSpaceCellNode(space, facet->cell, facet->corner[(c + 1) % 3]);
+      const PetscInt record[5] = {PetscMin(a, b), PetscMax(a, b), a < b ? 1 : -1, k, c};
+
+      PetscCall(PetscArraycpy(edge[n++], record, 5));
+    }
+  }
+  qsort(edge, (size_t)n, sizeof(*edge), compare_edges);
+  PetscCall(PetscMalloc1(n, &p->rim));
+  for (PetscInt first = 0, last; first < n; first = last) {
+    const SbFacet *facet = &p->facet[edge[first][3]];
+    RimEdge rim = {{edge[first][0], edge[first][1], -1}};
+    PetscBool owned;
+
+    for (ways = 0, last = first; last < n && !compare_edges(edge[first], edge[last]); last++)
+      ways += edge[last][2];
+    if (!ways) continue;
+    if (ways < 0) {
+      rim.node[0] = edge[first][1];
+      rim.node[1] = edge[first][0];
+    }
+    if (quadratic(space, facet)) {
+      int node[6];
+
+      facet_nodes(facet, node);
+      rim.node[2] = SbSpaceCellNode(space, facet->cell, node[3 + edge[first][4]]);
+    }
+    /* all facets of an edge with an owned node are here */
+    owned = PETSC_FALSE;
+    for (int a = 0; a < 3; a++)
+      owned = (PetscBool)(owned || (rim.node[a] >= 0 && rim.node[a] < space->nnode_owned));
+    if (owned && is_free(space, &rim)) p->rim[p->nedge++] = rim;
+  }
+  PetscCall(PetscFree(edge));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
 {
   Pressure *p = (Pressure *)e->data;
@@ -100,7 +217,9 @@ static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
   PetscCall(SbEffectFacets(space, &e->on, &p->nfacet, &p->facet));
   PetscCall(PetscCalloc1(space->mesh->nbody, &p->whole));
   if (space->faces && p->follower) PetscCall(find_whole(p, space));
-  /* the remainder of bodies with nodes at faces */
+  if (p->follower) PetscCall(find_rim(p, space));
+  /* the remainder of bodies with nodes at faces, and free rims */
+  some = (PetscBool)(p->nedge > 0);
   for (PetscInt k = 0; k < p->nfacet && !some; k++)
     some = (PetscBool)!SbSpaceCellElement(space, p->facet[k].cell)->nodes_per[0];
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &some, 1, SB_MPI_BOOL, MPI_LOR, space->comm));
@@ -137,11 +256,6 @@ static inline void add_to_corners(SbSpace space, const SbFacet *facet, PetscReal
   }
 }
 
-static inline PetscBool quadratic(SbSpace space, const SbFacet *facet)
-{
-  return (PetscBool)(SbSpaceCellElement(space, facet->cell)->nodes_per[1] > 0);
-}
-
 /* SbRuleFacet: where a facet of P2 is integrated, with values and derivatives of its basis. */
 #define NPOINT 7
 typedef struct {
@@ -172,20 +286,7 @@ static void facet_points(FacetPoint point[NPOINT])
   }
 }
 
-/* The nodes of a P2 facet in their cell, and the derivatives X, Y at a point. */
-static void facet_nodes(const SbFacet *facet, int node[6])
-{
-  for (int c = 0; c < 3; c++) {
-    const int a = (int)facet->corner[c], b = (int)facet->corner[(c + 1) % 3];
-
-    node[c] = a;
-    node[3 + c] = 4;
-    for (int e = 0; e < 6; e++) {
-      if (SbTetEdge[e][0] == PetscMin(a, b) && SbTetEdge[e][1] == PetscMax(a, b)) node[3 + c] = 4 + e;
-    }
-  }
-}
-
+/* The derivatives X, Y of a P2 facet at a point. */
 static void facet_sides(SbSpace space, const SbFacet *facet, const int node[6], const FacetPoint *point,
                         const PetscReal u[], PetscReal side[2][3])
 {
@@ -356,6 +457,35 @@ static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* y_a -= factor int phi_a dx x w along an edge of the rim, by Gauss' rule of three points: exact for curved ones. */
+static void add_rim(SbSpace space, const RimEdge *edge, PetscReal factor, const PetscReal u[],
+                    const PetscReal w[], PetscReal y[])
+{
+  const PetscInt n = edge->node[2] < 0 ? 2 : 3;
+
+  for (int q = -1; q < 2; q++) {
+    const PetscReal s = 0.5 + q * 0.5 * PetscSqrtReal(0.6), weight = factor * (q ? 5. : 8.) / 18.;
+    const PetscReal straight[2] = {1 - s, s},
+                    curved[3] = {(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)},
+                    straight_along[2] = {-1, 1}, curved_along[3] = {4 * s - 3, 4 * s - 1, 4 - 8 * s};
+    const PetscReal *phi = n == 2 ? straight : curved, *along = n == 2 ? straight_along : curved_along;
+    PetscReal dx[3] = {0, 0, 0}, W[3] = {0, 0, 0}, turn[3];
+
+    for (PetscInt a = 0; a < n; a++) {
+      for (int i = 0; i < 3; i++) {
+        const PetscInt k = 3 * edge->node[a] + i;
+
+        dx[i] += along[a] * (space->node_x[k] + u[k]);
+        W[i] += phi[a] * w[k];
+      }
+    }
+    SbCross(dx, W, turn);
+    for (PetscInt a = 0; a < n; a++) {
+      for (int i = 0; i < 3; i++) y[3 * edge->node[a] + i] -= weight * phi[a] * turn[i];
+    }
+  }
+}
+
 static PetscErrorCode unsymmetric_pressure(SbEffect e, SbSpace space, const SbStage *stage,
                                            const PetscReal x[], PetscReal y[])
 {
@@ -385,6 +515,7 @@ static PetscErrorCode unsymmetric_pressure(SbEffect e, SbSpace space, const SbSt
     }
     add_to_corners(space, facet, p / 6, dN, y);
   }
+  for (PetscInt k = 0; k < load->nedge; k++) add_rim(space, &load->rim[k], 0.5 * p, stage->u, x, y);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -395,6 +526,7 @@ static PetscErrorCode destroy_pressure(SbEffect e)
   PetscFunctionBeginUser;
   PetscCall(SbFormulaDestroy(&p->value));
   PetscCall(PetscFree(p->facet));
+  PetscCall(PetscFree(p->rim));
   PetscCall(PetscFree(p->whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -128,10 +128,15 @@ PetscErrorCode SbModelSetUp(SbModel m)
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
   m->load = 1.;
   m->linear = m->space->linear;
-  for (PetscInt e = 0; e < m->neffect; e++) {
-    m->effect[e]->dynamic = m->dynamic;
-    if (m->effect[e]->ops.setup) SbEffectCall(m->effect[e], setup, m->space);
-    m->linear = (PetscBool)(m->linear && m->effect[e]->linear);
+  /* supports first: others ask which unknowns are prescribed */
+  for (PetscInt k = 0; k < 2 * m->neffect; k++) {
+    const PetscBool supports = (PetscBool)(k < m->neffect);
+    SbEffect effect = m->effect[k % m->neffect];
+
+    if (supports != (effect->ops.prescribe != NULL)) continue;
+    effect->dynamic = m->dynamic;
+    if (effect->ops.setup) SbEffectCall(effect, setup, m->space);
+    m->linear = (PetscBool)(m->linear && effect->linear);
   }
   PetscCall(SbSpacePrescribeDone(m->space));
   PetscCall(PetscMalloc1(NLIST * m->neffect, &m->lists));

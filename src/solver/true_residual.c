@@ -10,7 +10,8 @@
   right-hand side. Such a solve ends as failed. What rounding leaves is far below the bound: near nu = 1/2, where lambda / mu is a
   million, 1e-5 of the right-hand side.
 
-  Likewise that of a method with a norm of its own where no Newton step examines it again.
+  Likewise that of a method with a norm of its own where no Newton step examines it again, and of one that ends early, as CG does when a
+  preconditioner makes nothing of its residual.
 
   petsc/private/kspimpl.h: the reason of a solve has no public setter, the norms that a method supports no public getter.
 */
@@ -48,6 +49,13 @@ static PetscErrorCode check_residual(KSP ksp, Vec b, Vec x, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode check_early_end(KSP ksp, Vec b, Vec x, void *ctx)
+{
+  PetscFunctionBeginUser;
+  if (ksp->reason == KSP_CONVERGED_ATOL) PetscCall(check_residual(ksp, b, x, ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbKSPCheckTrueResidual(KSP ksp, PetscBool direct, PetscBool alone)
 {
   PetscBool single;
@@ -60,6 +68,8 @@ PetscErrorCode SbKSPCheckTrueResidual(KSP ksp, PetscBool direct, PetscBool alone
   if (single || (direct && norm == KSP_NORM_UNPRECONDITIONED) ||
       (alone && (norm == KSP_NORM_PRECONDITIONED || norm == KSP_NORM_NATURAL)))
     PetscCall(KSPSetPostSolve(ksp, check_residual, NULL));
+  else if (alone)
+    PetscCall(KSPSetPostSolve(ksp, check_early_end, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -15,8 +15,7 @@
   and behind bifurcations. The first step has the load increment 1 / static_steps, later ones are longer while iterations are few. A step that does
   not converge, or ends far from the direction in which it began (on another branch), is halved.
 
-  K is that of the matrix, but for pressure that follows a free rim: there it is applied by differences of R, and the matrix preconditions. q is a
-  difference of residuals, too. It is exact for loads that are proportional to lambda; with moving supports and formulas of t, which is
+  q is a difference of residuals. It is exact for loads that are proportional to lambda; with moving supports and formulas of t, which is
   lambda, the step of the difference is small. The last step is solved at lambda = 1.
 
   K has negative eigenvalues behind limit loads. Where its factorisation counts them, one that changes while the load does not turn is a
@@ -28,7 +27,6 @@
 #define DESIRED 4.  /* iterations below which steps become longer */
 #define MOST 25     /* iterations after which a step is halved */
 #define STRAIGHT .7 /* smallest cosine of the angle between the directions in which a step begins and ends */
-#define ROUGH 1e-5  /* relative residual of linear solves with K by differences, which is as exact as that */
 #define FINE 1e-6   /* step of lambda for q where R is not linear in it */
 
 typedef struct {
@@ -41,7 +39,6 @@ typedef struct {
     };
     Vec all[9]; /* the same vectors */
   };
-  Mat exact;               /* K by differences of R where the assembled one is not exact; else NULL */
   PetscReal factor, delta; /* lambda at X; its step for q */
   PetscReal load;          /* |q| where the run begins, N */
   PetscInt negative;       /* eigenvalues of K where the last step began; -1: not known */
@@ -66,13 +63,6 @@ static PetscErrorCode put_at(Path *p, PetscReal factor)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode evaluate(void *snes, Vec X, Vec R)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SNESComputeFunction((SNES)snes, X, R));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode create(SbRun run, Path *p)
 {
   const SbModel m = run->model;
@@ -94,20 +84,6 @@ static PetscErrorCode create(SbRun run, Path *p)
   for (PetscInt e = 0; e < m->nprescribe; e++) p->delta = m->prescribe[e]->steady ? p->delta : FINE;
   PetscCall(VecCopy(run->U, p->X));
   PetscCall(put_at(p, run->t0));
-
-  /* pressure that follows a free rim has a tangent that is not symmetric, and the matrix has its symmetric part: a preconditioner here */
-  if (m->ntangent) {
-    PetscInt n, N;
-    KSP ksp;
-
-    PetscCall(VecGetLocalSize(p->X, &n));
-    PetscCall(VecGetSize(p->X, &N));
-    PetscCall(MatCreateMFFD(p->run->model->comm, n, n, N, N, &p->exact));
-    PetscCall(MatMFFDSetFunction(p->exact, evaluate, p->run->snes));
-    PetscCall(MatSetUp(p->exact));
-    PetscCall(SNESGetKSP(p->run->snes, &ksp));
-    PetscCall(KSPSetTolerances(ksp, ROUGH, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -129,7 +105,7 @@ static PetscErrorCode solve(Path *p, Vec b, Vec x, PetscBool *ok)
 
   PetscFunctionBeginUser;
   PetscCall(SNESGetKSP(p->run->snes, &ksp));
-  PetscCall(KSPSetOperators(ksp, p->exact ? p->exact : p->run->operator, p->run->J));
+  PetscCall(KSPSetOperators(ksp, p->run->operator, p->run->J));
   PetscCall(VecZeroEntries(x));
   PetscCall(KSPSolve(ksp, b, x));
   PetscCall(KSPGetConvergedReason(ksp, &reason));
@@ -158,11 +134,6 @@ static PetscErrorCode tangent(Path *p, PetscBool *ok)
   PetscCall(VecAXPBY(p->q, 1. / p->delta, -1. / p->delta, p->r));
   PetscCall(VecAYPX(p->w, -1., p->X));
   PetscCall(put_at(p, factor));
-  if (p->exact) {
-    PetscCall(MatMFFDSetBase(p->exact, p->X, p->r));
-    PetscCall(MatAssemblyBegin(p->exact, MAT_FINAL_ASSEMBLY));
-    PetscCall(MatAssemblyEnd(p->exact, MAT_FINAL_ASSEMBLY));
-  }
   PetscCall(solve(p, p->q, p->v, ok));
   PetscCall(VecAXPY(p->v, 1. / p->delta, p->w));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -412,6 +383,5 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
   }
   if (run->stop_reason[0] && !run->stopped) PetscCall(explain(run, factor, l));
   for (int k = 0; k < 9; k++) PetscCall(VecDestroy(&p.all[k]));
-  PetscCall(MatDestroy(&p.exact));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

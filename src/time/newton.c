@@ -19,6 +19,8 @@
 
   Tangent. With -body_NAME_tangent auto it is the exact one. When the linear solver meets a direction of negative curvature or counts negative pivots, or p goes up, the eigenvalues of
   the cells are raised to zero and the system is solved once more (Longva et al. 2023, "Pitfalls of projection"); after a full step the exact one is tried again.
+  Forces without a potential (the free rim of a follower pressure) have equilibria at which its symmetric part is not definite: after a full step
+  it is kept whatever that is, and the residual decides about a direction that goes up.
 
   Where surfaces push each other, the second derivative of contact is the positive part of each pair's, and the exact one after a whole step, as near the end only that converges
   faster than linearly. Friction that slipped the other way than expected is taken for one that sticks (src/effect/barrier_forces.c), and where p goes up, bounded from above. A tangent that is not
@@ -93,6 +95,7 @@ typedef struct {
   PetscInt nblock;        /* of all ranks */
   SbContactHessian kind;
   PetscReal shift; /* of the last direction: times the mass added to the tangent, 1/s^2 */
+  PetscBool whole; /* the last step was */
 } Newton;
 
 /* Energies and forces of an iterate with its residual, or the residual's norm alone where that is no number. */
@@ -208,6 +211,7 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
   const SbModel m = n->run->model;
   KSPConvergedReason reason;
+  const PetscBool keep = (PetscBool)(n->run->nonsymmetric.U && n->whole && !m->npotential);
   PetscReal shift = n->shift / SHIFT_MORE, least = 0., modelled = 0.;
   PetscInt negative, shifts = 0;
 
@@ -215,6 +219,7 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
   n->shift = 0.;
   for (;;) {
     PetscCall(SbModelProjectTangent(m, *filtered));
+    if (keep) m->space->tentative = PETSC_FALSE;
     PetscCall(SNESComputeJacobian(snes, X, snes->jacobian, snes->jacobian_pre));
     if (shift > 0.) {
       if (least == 0.) PetscCall(least_shift(snes, &least));
@@ -237,6 +242,7 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
     }
     n->shift = shift;
     if (*filtered || !m->may_filter) break;
+    if (keep && reason > 0) break;
     /* L D L^T factors what is not definite without a word, and p may go down on the way to a saddle point */
     negative = -1;
     if (reason > 0 && *slope < 0. && !n->nblock)
@@ -572,6 +578,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   n->known = PETSC_FALSE;
   n->kind = SB_HESSIAN_PROJECTED;
   n->shift = 0.;
+  n->whole = PETSC_TRUE;
   if (guarded) PetscCall(approach(snes));
   if (snes->reason) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESComputeFunction(snes, X, F));
@@ -596,7 +603,8 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     if (guarded && !snes->reason) PetscCall(SbModelPotentialMaxStep(n->run->model, X, Y, 1., &s, &nactive));
     if (!snes->reason) PetscCall(search(snes, slope, &s));
     if (snes->reason) break;
-    if (s >= 1.) filtered = PETSC_FALSE;
+    n->whole = (PetscBool)(s >= 1.);
+    if (n->whole) filtered = PETSC_FALSE;
     n->kind = s < 1. ? SB_HESSIAN_PROJECTED : SB_HESSIAN_EXACT;
 
     /* whether that is near enough */

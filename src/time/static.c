@@ -4,7 +4,7 @@
   last equilibrium; each step that succeeds doubles it again.
 
   Towards a limit load lambda* displacements go like sqrt(lambda* - lambda), and steps become shorter without end. Below
-  -static_min_increment the run stops; how much faster displacements grow with the load than in the first step distinguishes a limit load from
+  -static_min_increment the run stops; how much faster displacements grow with the load than where they grew slowest distinguishes a limit load from
   other failures. A shortened step without an iteration (a change of load below rounding) is no sign that steps may be longer.
 */
 #include "time_impl.h"
@@ -110,7 +110,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
 PetscErrorCode SbStaticSolve(SbRun run)
 {
   const PetscReal nominal = 1. / (PetscReal)run->static_steps, least = run->min_increment * nominal;
-  PetscReal factor = run->t0, length = nominal, rate, first = 0.;
+  PetscReal factor = run->t0, length = nominal, rate, slowest = 0.;
   PetscInt step = run->step0, cuts = 0;
   LoadStep load;
   SbAttempt attempt = {.U0 = run->U,
@@ -156,7 +156,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
         PetscCall(SbRunFail(run,
                             "the load factor reached %.7g of 1, and no equilibrium was found %.1e further "
                             "on: a limit load is likely, as displacements grow %.0f times as fast with the "
-                            "load as at first; -static_control arc_length goes past it",
+                            "load as before; -static_control arc_length goes past it",
                             (double)factor, (double)(2. * length), (double)run->softening));
       else if (factor > 0.)
         PetscCall(SbRunFail(run, "the load factor reached %.7g of 1; %s", (double)factor, why));
@@ -164,12 +164,12 @@ PetscErrorCode SbStaticSolve(SbRun run)
     }
     run->stop_reason[0] = 0;
 
-    /* the new equilibrium, and how many times as fast as in the first step displacements grow with the load */
+    /* the new equilibrium, and how many times as fast as in the slowest step displacements grow with the load */
     PetscCall(VecAXPY(run->U, -1., X));
     PetscCall(VecNorm(run->U, NORM_2, &rate));
     rate /= next - factor;
-    if (first == 0.) first = rate;
-    if (first > 0. && run->newton_step) run->softening = rate / first;
+    if (slowest == 0. || (rate < slowest && run->newton_step)) slowest = rate;
+    if (slowest > 0. && run->newton_step) run->softening = rate / slowest;
     PetscCall(VecCopy(X, run->U));
 
     /* who wants to go on with another mesh, effects and monitors */

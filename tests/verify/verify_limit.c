@@ -7,6 +7,9 @@
   below gets to its end. By arc length each equilibrium of the path is one of the formula, past the maximum, through s = 0, where the cube has no height, to the
   branch on which it is inverted and carries 0.2 E; with dead and follower loads, and with all elements. A restart goes on along the same path, also from the
   end of a load path.
+
+  Follower pressure on part of a surface has no potential. Its load path ends at the limit as well, and a cantilever that it curls up takes the
+  iterations of Newton's method, where it meets indefinite symmetric parts of the tangent on the way.
 */
 #include "verify.h"
 
@@ -40,6 +43,53 @@ static PetscErrorCode check_end(PetscReal load, int steps, const char *more)
   SB_CHECK(t.run->steps_total <= steps + 60, "%d steps", (int)t.run->steps_total);
   SB_CHECK((t.run->stop_reason[0] == 0) == (reached == 1.), "%s", t.run->stop_reason);
   SB_CHECK(reached == 1. || t.run->softening > 30., "softening %g", (double)t.run->softening);
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The end under a follower pressure, in few iterations. */
+static PetscErrorCode check_follower_end(const char *element)
+{
+  const PetscReal load = 0.25, reached = limit / load;
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(verify_open(&t,
+                        CUBE "-static_steps 5 -effect_press_type pressure -effect_press_value %g "
+                             "-body_a_element %s",
+                        (double)load, element));
+  PetscCall(SbRunSolve(t.run));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  follower %g E, %s: %.9g in %d steps, %d iterations\n    %s\n",
+                        (double)load, element, (double)t.run->t_now, (int)t.run->steps_total,
+                        (int)t.run->newton_total, t.run->stop_reason));
+  SB_CHECK(t.run->t_now > reached * (1. - 1e-2) && t.run->t_now < reached * (1. + 2e-2), "%s: load factor %g",
+           element, (double)t.run->t_now);
+  SB_CHECK(strstr(t.run->stop_reason, "a limit load is likely"), "%s: %s", element, t.run->stop_reason);
+  SB_CHECK(t.run->newton_total < 2500, "%s: %d iterations", element, (int)t.run->newton_total);
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A cantilever that a pressure on its upper face curls up. */
+static PetscErrorCode check_curl(const char *element, PetscReal pressure, PetscReal iterations)
+{
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    verify_open(&t,
+                "-bodies a -body_a_mesh box:1,0.1,0.1:10,2,2 -body_a_material neohookean -body_a_young "
+                "1e6 -body_a_poisson 0.3 -body_a_density 1000 -effects hold,press -effect_hold_type "
+                "fixed -effect_hold_on xmin -effect_press_type pressure -effect_press_on zmax "
+                "-effect_press_value %g -time static -static_steps 10 -body_a_element %s",
+                (double)pressure, element));
+  PetscCall(verify_solve(&t, "curl"));
+  PetscCall(PetscPrintf(
+    PETSC_COMM_WORLD, "  curl, %s, %g Pa: %d Newton and %d linear iterations, %d rejected\n", element,
+    (double)pressure, (int)t.run->newton_total, (int)t.run->linear_total, (int)t.run->rejected_total));
+  SB_CHECK(t.run->t_now == 1. && !t.run->rejected_total, "%s: load factor %g, %d rejected", element,
+           (double)t.run->t_now, (int)t.run->rejected_total);
+  SB_CHECK(t.run->newton_total <= iterations, "%s: %d Newton iterations", element, (int)t.run->newton_total);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -161,6 +211,11 @@ int main(int argc, char **argv)
   PetscCall(check_end(0.2, 10, "-body_a_tangent exact_spd"));
   /* increments of rounding: the number of attempts ends it */
   PetscCall(check_end(0.2, 10, "-body_a_tangent exact_spd -static_min_increment 1e-15"));
+  PetscCall(check_follower_end("p1"));
+  PetscCall(check_follower_end("p2"));
+  PetscCall(check_follower_end("cr"));
+  PetscCall(check_curl("p1", 2e4, 150));
+  PetscCall(check_curl("p2", 8e3, 150));
   PetscCall(check_branch(PETSC_FALSE, ARC));
   PetscCall(check_branch(PETSC_FALSE, ARC "-body_a_mesh box:1,1,1:1"));
   PetscCall(check_branch(PETSC_FALSE, ARC "-body_a_element cr"));
