@@ -19,8 +19,8 @@
 
   Tangent. With -body_NAME_tangent auto it is the exact one. When the linear solver meets a direction of negative curvature or counts negative pivots, or p goes up, the eigenvalues of
   the cells are raised to zero and the system is solved once more (Longva et al. 2023, "Pitfalls of projection"); after a full step the exact one is tried again.
-  Forces without a potential (the free rim of a follower pressure) have equilibria at which its symmetric part is not definite: after a full step
-  it is kept whatever that is, and the residual decides about a direction that goes up.
+  Forces without a potential (the free rim of a follower pressure) have equilibria at which its symmetric part is not definite: after a full step to a residual
+  smaller than the first it is kept whatever that is, and the residual decides about a direction that goes up.
 
   Where surfaces push each other, the second derivative of contact is the positive part of each pair's, and the exact one after a whole step, as near the end only that converges
   faster than linearly. Friction that slipped the other way than expected is taken for one that sticks (src/effect/barrier_forces.c), and where p goes up, bounded from above. A tangent that is not
@@ -94,8 +94,9 @@ typedef struct {
   SbBlocks blocks;        /* its second derivative, when the last direction was solved for */
   PetscInt nblock;        /* of all ranks */
   SbContactHessian kind;
-  PetscReal shift; /* of the last direction: times the mass added to the tangent, 1/s^2 */
-  PetscBool whole; /* the last step was */
+  PetscReal shift;   /* of the last direction: times the mass added to the tangent, 1/s^2 */
+  PetscBool whole;   /* the last step was */
+  PetscReal initial; /* norm of the first residual, N */
 } Newton;
 
 /* Energies and forces of an iterate with its residual, or the residual's norm alone where that is no number. */
@@ -211,7 +212,8 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
   const SbModel m = n->run->model;
   KSPConvergedReason reason;
-  const PetscBool keep = (PetscBool)(n->run->nonsymmetric.U && n->whole && !m->npotential);
+  const PetscBool keep =
+    (PetscBool)(n->run->nonsymmetric.U && n->whole && snes->norm < n->initial && !m->npotential);
   PetscReal shift = n->shift / SHIFT_MORE, least = 0., modelled = 0.;
   PetscInt negative, shifts = 0;
 
@@ -578,11 +580,12 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   n->known = PETSC_FALSE;
   n->kind = SB_HESSIAN_PROJECTED;
   n->shift = 0.;
-  n->whole = PETSC_TRUE;
+  n->whole = PETSC_FALSE;
   if (guarded) PetscCall(approach(snes));
   if (snes->reason) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESComputeFunction(snes, X, F));
   PetscCall(VecNorm(F, NORM_2, &snes->norm));
+  n->initial = snes->norm;
   PetscCall(SNESLogConvergenceHistory(snes, snes->norm, 0));
   PetscCall(SbSNESConverged(snes, 0, 0., 0., snes->norm));
   PetscCall(SNESMonitor(snes, 0, snes->norm));

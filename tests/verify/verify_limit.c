@@ -215,7 +215,7 @@ int main(int argc, char **argv)
   PetscCall(check_follower_end("p2"));
   PetscCall(check_follower_end("cr"));
   PetscCall(check_curl("p1", 2e4, 150));
-  PetscCall(check_curl("p2", 8e3, 150));
+  PetscCall(check_curl("p2", 8e3, 250));
   PetscCall(check_branch(PETSC_FALSE, ARC));
   PetscCall(check_branch(PETSC_FALSE, ARC "-body_a_mesh box:1,1,1:1"));
   PetscCall(check_branch(PETSC_FALSE, ARC "-body_a_element cr"));
