@@ -217,7 +217,7 @@ static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
   PetscCall(SbEffectFacets(space, &e->on, &p->nfacet, &p->facet));
   PetscCall(PetscCalloc1(space->mesh->nbody, &p->whole));
   if (space->faces && p->follower) PetscCall(find_whole(p, space));
-  if (p->follower) PetscCall(find_rim(p, space));
+  if (p->follower && !(e->steady && SbFormulaEval(p->value, 0, NULL) == 0)) PetscCall(find_rim(p, space));
   /* the remainder of bodies with nodes at faces, and free rims */
   some = (PetscBool)(p->nedge > 0);
   for (PetscInt k = 0; k < p->nfacet && !some; k++)
