@@ -1,8 +1,8 @@
 /*
-  sbgmsh.h - layer 1: the gmsh library at work in a process of its own: reads foreign files, makes tetrahedra. Rank 0 only.
+  sbgmsh.h - layer 1: the gmsh library at work in a process of its own: it makes tetrahedra. Rank 0 only.
 
   How to use it: write a function of type SbGmshWork and hand it to SbGmshRun(). That forks; the child loads libgmsh, calls
-  the function with a fresh, empty model, and what the function puts into its SbImport (most often by SbGmshCollect())
+  the function with a fresh, empty model, and what the function puts into its SbImport
   comes back to the caller by a pipe. The function sees all memory of the caller as it was (its ctx may point anywhere), but what
   it changes there stays in the child. A PETSc error in the function is raised in the caller with the same code and
   text. A crash of gmsh, or one that does not end in time, is an error of the caller too; the memory of gmsh goes with the child. A
@@ -16,7 +16,8 @@
       SB_GMSH(gmsh, ModelMeshAddElementsByType, 1, 2, NULL, 0, nodes, 3 * ntri);
       ...
       SB_GMSH(gmsh, ModelMeshGenerate, 3);
-      PetscCall(SbGmshCollect(gmsh, SB_GMSH_ENTITIES, result));
+      SB_GMSH(gmsh, ModelMeshGetElementsByType, 4, &tag, &ntag, &node, &nnode, -1, 0, 1);
+      ...
       PetscFunctionReturn(PETSC_SUCCESS);
     }
 
@@ -32,14 +33,9 @@
 
 /* type, name, arguments: as in gmshc.h, with the same ones from gmsh 4.8 on to 4.15 (gmshModelAddPhysicalGroup() has not). */
 #define SB_GMSH_FUNCTIONS(X)                                                                               \
-  X(void, Open, (const char *, int *))                                                                     \
-  X(void, Merge, (const char *, int *))                                                                    \
   X(void, OptionSetNumber, (const char *, double, int *))                                                  \
   X(void, ModelAdd, (const char *, int *))                                                                 \
   X(void, ModelGetEntities, (int **, size_t *, int, int *))                                                \
-  X(void, ModelGetPhysicalGroups, (int **, size_t *, int, int *))                                          \
-  X(void, ModelGetPhysicalGroupsForEntity, (int, int, int **, size_t *, int *))                            \
-  X(void, ModelGetPhysicalName, (int, int, char **, int *))                                                \
   X(int, ModelAddDiscreteEntity, (int, int, int *, size_t, int *))                                         \
   X(void, ModelMeshGenerate, (int, int *))                                                                 \
   X(void, ModelMeshOptimize, (const char *, int, int, int *, size_t, int *))                               \
@@ -49,8 +45,6 @@
   X(void, ModelMeshAddElementsByType, (int, int, size_t *, size_t, size_t *, size_t, int *))               \
   X(void, ModelMeshGetNodes,                                                                               \
     (size_t **, size_t *, double **, size_t *, double **, size_t *, int, int, int, int, int *))            \
-  X(void, ModelMeshGetElements,                                                                            \
-    (int **, size_t *, size_t ***, size_t **, size_t *, size_t ***, size_t **, size_t *, int, int, int *)) \
   X(void, ModelMeshGetElementsByType,                                                                      \
     (int, size_t **, size_t *, size_t **, size_t *, int, size_t, size_t, int *))                           \
   X(int, ModelGeoAddSurfaceLoop, (int *, size_t, int, int *))                                              \
@@ -94,27 +88,12 @@ typedef struct {
 /*
   SbGmshRun - runs job->work in a child process with the gmsh library, and brings back what it filled in.
 
-  Not collective; for rank 0. Replaces vertices, items, groups and tag sets of `result`, keeps its `where` and `surface`
-  (the work function finds `surface` set as here).
+  Not collective; for rank 0. Replaces vertices, items, groups and tag sets of `result`, keeps its `where`.
 
   Errors: what the work function raises; PETSC_ERR_USER_INPUT when the library cannot be loaded; PETSC_ERR_FILE_UNEXPECTED when
   gmsh crashes or takes longer than job->seconds; PETSC_ERR_SYS when there can be no child process.
 */
 PetscErrorCode SbGmshRun(const SbGmshJob *job, SbImport *result);
-
-/* Which groups SbGmshCollect() gives to an element. */
-typedef enum {
-  SB_GMSH_PHYSICAL, /* physical groups with their names */
-  SB_GMSH_ENTITIES  /* these or, when the model has none, its entities: "volume_3" */
-} SbGmshGroups;
-
-/*
-  SbGmshCollect - the mesh of the current model: all nodes, all tets, and triangles, lines and points of groups (all triangles
-  when result->surface). In the order of their numbers. Not collective; in a work function.
-
-  Errors: PETSC_ERR_FILE_UNEXPECTED when there are no tets (and, for a surface, no triangles) or other volume elements.
-*/
-PetscErrorCode SbGmshCollect(const SbGmsh *gmsh, SbGmshGroups groups, SbImport *result);
 
 /* The error of a function of gmsh that failed. */
 PetscErrorCode SbGmshError(const SbGmsh *gmsh, const char *function);

@@ -191,8 +191,8 @@ PetscErrorCode SbImportSlab(const SbBody *body, PetscInt k, PetscInt n, SbImport
 /* How the user writes an option of this body, for messages: "-body_liver_tet_size"; in supple-mesh "-size". */
 #define SB_IMPORT_OPTION_MAX (SB_NAME_MAX + 32)
 const char *SbImportOption(const SbImport *import, const char *key, char name[SB_IMPORT_OPTION_MAX]);
-/* A .msh of any version, by the program's own reader or by the gmsh library. */
-PetscErrorCode SbImportRead_Msh(const char *path, SbImport *body);
+/* A .msh of any version. */
+PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *body);
 /* TetGen's files; path: one of them, or what they have in common. */
 PetscErrorCode SbImportRead_TetGen(const char *path, SbImport *body);
 

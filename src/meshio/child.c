@@ -81,7 +81,6 @@ static void child(FILE *file, SbChildWork work, void *ctx, const SbImport *like)
   memset(&h, 0, sizeof(h));
   memset(&im, 0, sizeof(im));
   memcpy(im.where, like->where, sizeof(im.where));
-  im.surface = like->surface;
   (void)PetscPushErrorHandler(SbCatchError, &h.caught);
   h.caught.code = (int)SbImportTagSet(&im, 0, NULL, &none);
   if (!h.caught.code) h.caught.code = (int)(*work)(ctx, &im);

@@ -1,12 +1,11 @@
 /*
-  gmsh_library.c - the gmsh library, loaded in a child process when it is needed, and a mesh taken out of it.
+  gmsh_library.c - the gmsh library, loaded in a child process when it is needed.
 
   It is found by its name, with the version in it: gmshInitialize() has another list of arguments from 4.9 on. Its output is off; its
   messages are kept by its logger, whose last error (or warning) becomes our message.
 */
 #include <dlfcn.h>
 #include <stddef.h>
-#include <stdlib.h>
 #include "meshio_impl.h"
 #include "sbgmsh.h"
 
@@ -90,143 +89,6 @@ PetscErrorCode SbGmshError(const SbGmsh *g, const char *function)
   if (!text[0]) last_line(g, "Warning", sizeof(text), text);
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s: gmsh failed: %s (%s)", g->where,
           text[0] ? text : "no reason given", function);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* ------------------------------------------------------------------ the mesh of the model */
-
-typedef struct {
-  size_t tag;
-  size_t from;
-} Order;
-
-static int compare_tags(const void *a, const void *b)
-{
-  const Order *p = (const Order *)a, *q = (const Order *)b;
-
-  return (p->tag > q->tag) - (p->tag < q->tag);
-}
-
-/* The elements of one entity: those of use are kept, all are counted by type. */
-static PetscErrorCode collect_entity(const SbGmsh *g, int dim, int entity, PetscBool itself, SbImport *im)
-{
-  int *types;
-  size_t ntype, **number, *nnumber, nn, **node, *nnode, nnn;
-  PetscInt tags;
-
-  PetscFunctionBeginUser;
-  SB_GMSH(g, ModelMeshGetElements, &types, &ntype, &number, &nnumber, &nn, &node, &nnode, &nnn, dim, entity);
-  if (ntype) {
-    int *physical = NULL;
-    size_t n = 0;
-    PetscInt *group;
-    char *name;
-
-    // tag set of an entity: its physical groups with their names, or itself
-    if (!itself) SB_GMSH(g, ModelGetPhysicalGroupsForEntity, dim, entity, &physical, &n);
-    PetscCall(PetscMalloc1(n + 1, &group));
-    for (size_t i = 0; i < n; i++) {
-      SB_GMSH(g, ModelGetPhysicalName, dim, physical[i], &name);
-      PetscCall(SbImportGroup(im, dim, physical[i], name && name[0] ? name : NULL, &group[i]));
-      g->Free(name);
-    }
-    if (itself) {
-      PetscCall(SbImportGroup(im, dim, entity, NULL, &group[0]));
-      n = 1;
-    }
-    PetscCall(SbImportTagSet(im, (PetscInt)n, group, &tags));
-    PetscCall(PetscFree(group));
-    g->Free(physical);
-  }
-  for (size_t t = 0; t < ntype; t++) {
-    const int type = types[t];
-
-    PetscCheck(type > 0 && type < SB_GMSH_NTYPES, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-               "%s: holds elements of gmsh's type %d; supple simulates 4-node tetrahedra only", g->where,
-               type);
-    for (size_t i = 0; i < nnumber[t]; i++) {
-      const int n = SbGmshTypes[type].nnode;
-      PetscInt vert[4] = {0, 0, 0, 0};
-
-      for (int k = 0; k < PetscMin(n, 4); k++) {
-        const size_t tag = node[t][i * (size_t)n + (size_t)k];
-
-        vert[k] = SbNumbersFind(&im->nodes, (int64_t)tag);
-        PetscCheck(vert[k] >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-                   "%s: element %zu uses node %zu, which is not there", g->where, number[t][i], tag);
-      }
-      PetscCall(SbImportAddElement(im, type, vert, tags, (int64_t)number[t][i]));
-    }
-    g->Free(number[t]);
-    g->Free(node[t]);
-  }
-  g->Free(types);
-  g->Free(number);
-  g->Free(nnumber);
-  g->Free(node);
-  g->Free(nnode);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbGmshCollect(const SbGmsh *g, SbGmshGroups groups, SbImport *im)
-{
-  int *entity, *physical;
-  size_t n, nphysical;
-  PetscBool itself = PETSC_FALSE;
-  size_t *tag, ntag, nx, nparameter;
-  double *x, *parameter;
-  Order *order;
-
-  PetscFunctionBeginUser;
-  // all nodes, ascending tags
-  SB_GMSH(g, ModelMeshGetNodes, &tag, &ntag, &x, &nx, &parameter, &nparameter, -1, -1, 0, 0);
-  PetscCheck(ntag < PETSC_MAX_INT / 8, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-             "%s: %zu nodes are more than this build can number", g->where, ntag);
-  PetscCall(PetscMalloc1(ntag + 1, &order));
-  for (size_t i = 0; i < ntag; i++) order[i] = (Order){tag[i], i};
-  qsort(order, ntag, sizeof(*order), compare_tags);
-  PetscCall(SbImportSetVertices(im, (PetscInt)ntag));
-  for (size_t i = 0; i < ntag; i++) {
-    im->vert_number[i] = (int64_t)order[i].tag;
-    for (int k = 0; k < 3; k++) {
-      im->x[3 * i + k] = x[3 * order[i].from + k];
-      PetscCheck(isfinite(im->x[3 * i + k]), PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-                 "%s: coordinate of node %zu is not a finite number; repair the file", g->where,
-                 order[i].tag);
-    }
-  }
-  PetscCall(PetscFree(order));
-  g->Free(tag);
-  g->Free(x);
-  g->Free(parameter);
-  PetscCall(SbNumbersCreate(im->nvert, im->vert_number, &im->nodes));
-  if (groups == SB_GMSH_ENTITIES) {
-    SB_GMSH(g, ModelGetPhysicalGroups, &physical, &nphysical, -1);
-    itself = (PetscBool)(nphysical == 0);
-    g->Free(physical);
-  }
-  SB_GMSH(g, ModelGetEntities, &entity, &n, -1);
-  for (size_t i = 0; i + 1 < n; i += 2) PetscCall(collect_entity(g, entity[i], entity[i + 1], itself, im));
-  g->Free(entity);
-  // items in the order of their numbers: entities had torn that of the file
-  for (int d = 0; d < 4; d++) {
-    SbItems *item = &im->item[d], old = *item;
-
-    PetscCall(PetscMalloc1(old.n, &order));
-    for (PetscInt i = 0; i < old.n; i++) order[i] = (Order){(size_t)old.number[i], (size_t)i};
-    if (old.n) qsort(order, (size_t)old.n, sizeof(*order), compare_tags);
-    PetscCall(SbImportSetItems(im, d, old.n));
-    for (PetscInt i = 0; i < old.n; i++) {
-      const PetscInt from = (PetscInt)order[i].from;
-
-      for (int k = 0; k <= d; k++) item->vert[(d + 1) * i + k] = old.vert[(d + 1) * from + k];
-      item->tags[i] = old.tags[from];
-      item->number[i] = old.number[from];
-    }
-    PetscCall(SbItemsFree(&old));
-    PetscCall(PetscFree(order));
-  }
-  PetscCall(SbImportCheckTypes(im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

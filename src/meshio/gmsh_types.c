@@ -44,9 +44,8 @@ PetscErrorCode SbImportCheckTypes(const SbImport *im)
   for (int t = 1; t < SB_GMSH_NTYPES; t++) {
     const char *advice =
       strstr(SbGmshTypes[t].name, "tetra")
-        ? "supple needs 4-node ones (gmsh: Mesh.ElementOrder = 1); of 10 nodes it reads those of gmsh, but "
-          "for "
-          "4.0, VTK, Abaqus and Nastran"
+        ? "supple needs 4-node ones (gmsh: Mesh.ElementOrder = 1); of 10 nodes it reads those of gmsh, VTK, "
+          "Abaqus and Nastran"
         : "supple simulates tetrahedra only: split them (gmsh: Mesh.SubdivisionAlgorithm = 0, Recombine off)";
 
     if (t == SB_GMSH_TET10 && im->second_order) continue;

@@ -1,8 +1,8 @@
 /*
-  import_gmsh.c - reader of gmsh's .msh files: versions 1, 2 (2.0 to 2.2) and 4.1, text and binary (gmsh reference manual, "File
+  import_gmsh.c - reader of gmsh's .msh files: versions 1, 2 (2.0 to 2.2), 4.0 and 4.1, text and binary (gmsh reference manual, "File
   formats" and "Legacy formats"). Own reader, because a body needs every physical group of every entity, also where groups overlap.
 
-  Version 4.1 gives groups per entity of the geometry; an entity may have several. Versions 1 and 2 give one group per
+  Version 4 gives groups per entity of the geometry; an entity may have several. Versions 1 and 2 give one group per
   element and write an element again for each further group: such repeats are merged, groups joined.
 
   Kept: points, lines, triangles that belong to a group, and all tets; all triangles where a surface is wanted, which needs no tets.
@@ -10,7 +10,7 @@
 */
 #include "meshio_impl.h"
 
-/* An entity of the geometry in a 4.1 file. */
+/* An entity of the geometry in a file of version 4. */
 typedef struct {
   PetscInt dim, tags;
   int64_t tag;
@@ -18,7 +18,7 @@ typedef struct {
 
 typedef struct {
   SbImport *im;
-  int version; /* 1, 2 or 41 */
+  int version; /* 1, 2, 40 or 41 */
   PetscBool binary;
   PetscInt nentity;
   Entity *entity; /* [nentity] */
@@ -36,7 +36,7 @@ static PetscErrorCode read_format(Gmsh *g)
   static const struct {
     const char *name;
     int version;
-  } versions[] = {{"2", 2}, {"2.0", 2}, {"2.1", 2}, {"2.2", 2}, {"4.1", 41}};
+  } versions[] = {{"2", 2}, {"2.0", 2}, {"2.1", 2}, {"2.2", 2}, {"4", 40}, {"4.0", 40}, {"4.1", 41}};
   SbScan *s = &g->im->scan;
   char version[16];
   int64_t kind, size, one;
@@ -90,7 +90,8 @@ static PetscErrorCode read_entities(Gmsh *g)
 
       e->dim = d;
       PetscCall(SbScanInt4(s, "number of an entity", &e->tag));
-      for (int k = 0; k < (d ? 6 : 3); k++) PetscCall(SbScanReal(s, "extent of an entity", 0, &box));
+      for (int k = 0; k < (d || g->version == 40 ? 6 : 3); k++)
+        PetscCall(SbScanReal(s, "extent of an entity", 0, &box));
       // its groups; a minus sign is gmsh's sign of the orientation, it means nothing here
       PetscCall(SbScanInt8(s, "number of physical groups of an entity", &n));
       PetscCall(SbScanRoom(s, "physical groups", n, 2, 4));
@@ -109,14 +110,55 @@ static PetscErrorCode read_entities(Gmsh *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* ------------------------------------------------------------------ blocks of nodes and elements, in version 4 */
+
+/* Before them: how many blocks and things there are; in 4.1 also their lowest and highest number. */
+static PetscErrorCode read_totals(Gmsh *g, int64_t *nblock, int64_t *n)
+{
+  SbScan *s = &g->im->scan;
+  int64_t bound;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanInt8(s, "number of blocks", nblock));
+  PetscCall(SbScanInt8(s, "number of nodes or elements", n));
+  for (int k = 0; k < 2 && g->version == 41; k++)
+    PetscCall(SbScanInt8(s, "lowest or highest number", &bound));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Begins a block: its entity, whether nodes have parameters or which type elements have, how many follow. */
+static PetscErrorCode read_block(Gmsh *g, int64_t *dim, int64_t *tag, int64_t *kind, int64_t *n)
+{
+  SbScan *s = &g->im->scan;
+
+  PetscFunctionBeginUser;
+  if (g->version == 40) PetscCall(SbScanInt4(s, "entity of a block", tag));
+  PetscCall(SbScanInt4(s, "dimension of a block", dim));
+  if (g->version == 41) PetscCall(SbScanInt4(s, "entity of a block", tag));
+  PetscCall(SbScanInt4(s, "mark of parametric nodes, or type of elements", kind));
+  PetscCall(SbScanInt8(s, "number of nodes or elements in a block", n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The number of a node or element: 8 bytes of binary data in 4.1. */
+static PetscErrorCode read_number(Gmsh *g, const char *what, int64_t *number)
+{
+  PetscFunctionBeginUser;
+  if (g->version == 41)
+    PetscCall(SbScanInt8(&g->im->scan, what, number));
+  else
+    PetscCall(SbScanInt4(&g->im->scan, what, number));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* ------------------------------------------------------------------ nodes */
 
-/* Versions 1 and 2: number and place of each. 4.1: blocks of numbers, then places, with up to three parameters on the entity. */
+/* Number and place of each, in version 4 by blocks and with up to three parameters on the entity; in 4.1 all numbers of a block come first. */
 static PetscErrorCode read_nodes(Gmsh *g)
 {
   SbImport *im = g->im;
   SbScan *s = &im->scan;
-  int64_t nblock, n, bound, dim, tag, parametric;
+  int64_t nblock, n, dim, tag, parametric;
   PetscInt v = 0;
   PetscReal parameter;
 
@@ -131,33 +173,31 @@ static PetscErrorCode read_nodes(Gmsh *g)
     PetscCall(SbScanRoom(s, "nodes", n, 8, 28));
     PetscCall(SbImportSetVertices(im, (PetscInt)n));
     for (; v < n; v++) {
-      PetscCall(SbScanInt4(s, "number of a node", &im->vert_number[v]));
+      PetscCall(read_number(g, "number of a node", &im->vert_number[v]));
       PetscCall(SbScanPoint(s, "coordinate", im->vert_number[v], im->x + 3 * v));
     }
   } else {
-    PetscCall(SbScanInt8(s, "number of blocks of nodes", &nblock));
-    PetscCall(SbScanInt8(s, "number of nodes", &n));
-    PetscCall(SbScanInt8(s, "lowest number of a node", &bound));
-    PetscCall(SbScanInt8(s, "highest number of a node", &bound));
-    PetscCall(SbScanRoom(s, "nodes", n, 8, 32));
+    PetscCall(read_totals(g, &nblock, &n));
+    PetscCall(SbScanRoom(s, "nodes", n, 8, 28));
     PetscCall(SbImportSetVertices(im, (PetscInt)n));
     for (int64_t b = 0; b < nblock; b++) {
-      PetscCall(SbScanInt4(s, "dimension of a block of nodes", &dim));
-      PetscCall(SbScanInt4(s, "entity of a block of nodes", &tag));
-      PetscCall(SbScanInt4(s, "mark of parametric nodes", &parametric));
-      PetscCall(SbScanInt8(s, "number of nodes in a block", &n));
+      PetscCall(read_block(g, &dim, &tag, &parametric, &n));
       if (dim < 0 || dim > 3)
         SB_SCAN_ERROR(s, "dimension %lld of a block of nodes; expected 0 to 3", (long long)dim);
       if (n < 0 || n > im->nvert - v)
         SB_SCAN_ERROR(s, "block of %lld nodes; only %lld of those announced for the section are left",
                       (long long)n, (long long)(im->nvert - v));
-      for (PetscInt i = v; i < v + n; i++) PetscCall(SbScanInt8(s, "number of a node", &im->vert_number[i]));
+      for (PetscInt i = v; i < v + n && g->version == 41; i++)
+        PetscCall(read_number(g, "number of a node", &im->vert_number[i]));
       for (; n > 0; v++, n--) {
+        if (g->version == 40) PetscCall(read_number(g, "number of a node", &im->vert_number[v]));
         PetscCall(SbScanPoint(s, "coordinate", im->vert_number[v], im->x + 3 * v));
         for (int k = 0; parametric && k < dim; k++)
           PetscCall(SbScanReal(s, "parameter", im->vert_number[v], &parameter));
       }
     }
+    // gmsh may announce too many in 4.0, where it saves some of the entities alone
+    if (g->version == 40) im->nvert = v;
     if (v < im->nvert)
       SB_SCAN_ERROR(s, "%lld nodes are announced, the blocks hold %lld", (long long)im->nvert, (long long)v);
   }
@@ -190,10 +230,7 @@ static PetscErrorCode read_element(Gmsh *g, int type, int64_t number, PetscInt t
 
   PetscFunctionBeginUser;
   for (int i = 0; i < n; i++) {
-    if (g->version <= 2)
-      PetscCall(SbScanInt4(s, "node of an element", &node));
-    else
-      PetscCall(SbScanInt8(s, "node of an element", &node));
+    PetscCall(read_number(g, "node of an element", &node));
     vert[i] = SbNumbersFind(&g->im->nodes, node);
     if (vert[i] < 0)
       SB_SCAN_ERROR(s, "element %lld uses node %lld, which $Nodes does not list", (long long)number,
@@ -253,24 +290,18 @@ static PetscErrorCode read_elements_22_run(Gmsh *g, int64_t left, int64_t *nread
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_elements_41(Gmsh *g)
+static PetscErrorCode read_elements_4(Gmsh *g)
 {
   SbScan *s = &g->im->scan;
-  int64_t nblock, total, bound, dim, tag, type, n, number, nread = 0;
+  int64_t nblock, total, dim, tag, type, n, number, nread = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(SbScanInt8(s, "number of blocks of elements", &nblock));
-  PetscCall(SbScanInt8(s, "number of elements", &total));
-  PetscCall(SbScanInt8(s, "lowest number of an element", &bound));
-  PetscCall(SbScanInt8(s, "highest number of an element", &bound));
-  PetscCall(SbScanRoom(s, "elements", total, 4, 16));
+  PetscCall(read_totals(g, &nblock, &total));
+  PetscCall(SbScanRoom(s, "elements", total, 4, 8));
   for (int64_t b = 0; b < nblock; b++, nread += n) {
     PetscInt tags = 0;
 
-    PetscCall(SbScanInt4(s, "dimension of a block of elements", &dim));
-    PetscCall(SbScanInt4(s, "entity of a block of elements", &tag));
-    PetscCall(SbScanInt4(s, "type of a block of elements", &type));
-    PetscCall(SbScanInt8(s, "number of elements in a block", &n));
+    PetscCall(read_block(g, &dim, &tag, &type, &n));
     PetscCall(check_type(g, type));
     if (n < 0 || n > total - nread)
       SB_SCAN_ERROR(s, "block of %lld elements; only %lld of those announced for the section are left",
@@ -282,7 +313,7 @@ static PetscErrorCode read_elements_41(Gmsh *g)
       SB_SCAN_ERROR(s, "%s in a block of dimension %lld; the file is damaged", SbGmshTypes[type].name,
                     (long long)dim);
     for (int64_t i = 0; i < n; i++) {
-      PetscCall(SbScanInt8(s, "number of an element", &number));
+      PetscCall(read_number(g, "number of an element", &number));
       PetscCall(read_element(g, (int)type, number, tags));
     }
   }
@@ -335,7 +366,7 @@ static PetscErrorCode read_section(Gmsh *g, const char *name, PetscBool *known)
         PetscCall(SbScanRoom(s, "elements", n, 8, 8));
         for (int64_t i = 0; i < n; i += nrun) PetscCall(read_elements_22_run(g, n - i, &nrun));
       } else
-        PetscCall(read_elements_41(g));
+        PetscCall(read_elements_4(g));
     } else
       PetscCall(read_entities(g));
     s->binary = PETSC_FALSE;

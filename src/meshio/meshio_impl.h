@@ -19,7 +19,6 @@ PetscErrorCode SbScanInt8(SbScan *scan, const char *what, int64_t *value);
 
 /* A reader fills x, vert_number, items and groups from the file or description `text`. */
 typedef PetscErrorCode (*SbReader)(const char *text, SbImport *body);
-PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Netgen(const char *path, SbImport *body); /* .vol */
 PetscErrorCode SbImportRead_NetgenNeutral(const char *path, SbImport *body);

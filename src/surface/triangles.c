@@ -40,7 +40,7 @@ static PetscErrorCode read_gmsh(const char *path, SbTriangleFile *f)
   (void)snprintf(im.where, sizeof(im.where), "%s", f->where);
   im.surface = PETSC_TRUE;
   PetscCall(SbImportTagSet(&im, 0, NULL, &none));
-  ierr = SbImportRead_Msh(path, &im);
+  ierr = SbImportRead_Gmsh(path, &im);
   if (!ierr && im.item[3].n)
     ierr = add_boundary(&im, f);
   else if (!ierr) {

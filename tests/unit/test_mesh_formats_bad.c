@@ -273,13 +273,20 @@ static PetscErrorCode test_unv(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nothing gets to the gmsh library that it would take for a script. */
-static PetscErrorCode test_library(void)
+/* gmsh 4.0: also behind a blank line or the mark of UTF-8. */
+static PetscErrorCode test_gmsh_40(void)
 {
+#define FORMAT40 "$MeshFormat\n4.0 0 8\n$EndMeshFormat\n"
+#define ENTITY40 "$Entities\n0 0 0 1\n1 0 0 0 1 1 1 1 7 0\n$EndEntities\n"
+#define NODES40 "$Nodes\n1 4\n1 3 0 4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n"
   static const Case cases[] = {
-    {"\n$MeshFormat\n4.0 0 8\n$EndMeshFormat\n", "g.msh|line 1|version 4.0|$MeshFormat"},
-    {"\xef\xbb\xbf$MeshFormat\n4.0 0 8\n$EndMeshFormat\n", "g.msh|line 1|version 4.0|$MeshFormat"},
-    {"$MeshFormat\n4.0 0 8\n$EndMeshFormat\n", "g.msh"},
+    {FORMAT40 ENTITY40 NODES40 "$Elements\n1 1\n1 3 4 1\n1 1 2 3 4\n$EndElements\n", NULL},
+    {"\n" FORMAT40 NODES40 "$Elements\n1 1\n1 3 4 1\n1 1 2 3 4\n$EndElements\n", NULL},
+    {"\xef\xbb\xbf" FORMAT40 NODES40 "$Elements\n1 1\n1 3 4 1\n1 1 2 3 4\n$EndElements\n", NULL},
+    {FORMAT40 NODES40 "$Elements\n1 1\n1 3 4 1\n1 1 2 3 9\n$EndElements\n", "g.msh|line 15|element 1|node 9"},
+    {FORMAT40 NODES40 "$Elements\n1 2\n1 3 4 1\n1 1 2 3 4\n$EndElements\n", "line 15|2 elements|1"},
+    {FORMAT40 "$Nodes\n1 1\n1 7 0 1\n1 0 0 0\n", "line 6|dimension 7"},
+    {FORMAT40, "g.msh"},
     {NULL, NULL}};
 
   PetscFunctionBeginUser;
@@ -332,7 +339,7 @@ int main(int argc, char **argv)
   PetscCall(test_vtu());
   PetscCall(test_abaqus());
   PetscCall(test_unv());
-  PetscCall(test_library());
+  PetscCall(test_gmsh_40());
   PetscCall(test_nastran());
   (void)snprintf(command, sizeof(command), "rm -rf %s", folder);
   SB_CHECK(!system(command), "%s stays", folder);
