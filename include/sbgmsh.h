@@ -3,7 +3,7 @@
 
   How to use it: write a function of type SbGmshWork and hand it to SbGmshRun(). That forks; the child loads libgmsh, calls
   the function with a fresh, empty model, and what the function puts into its SbImport
-  comes back to the caller by a pipe. The function sees all memory of the caller as it was (its ctx may point anywhere), but what
+  comes back to the caller. The function sees all memory of the caller as it was (its ctx may point anywhere), but what
   it changes there stays in the child. A PETSc error in the function is raised in the caller with the same code and
   text. A crash of gmsh, or one that does not end in time, is an error of the caller too; the memory of gmsh goes with the child. A
   scene that does not call SbGmshRun() never loads the library.
@@ -32,25 +32,25 @@
 #include "sbmeshio.h"
 
 /* type, name, arguments: as in gmshc.h, with the same ones from gmsh 4.8 on to 4.15 (gmshModelAddPhysicalGroup() has not). */
-#define SB_GMSH_FUNCTIONS(X)                                                                               \
-  X(void, OptionSetNumber, (const char *, double, int *))                                                  \
-  X(void, ModelAdd, (const char *, int *))                                                                 \
-  X(void, ModelGetEntities, (int **, size_t *, int, int *))                                                \
-  X(int, ModelAddDiscreteEntity, (int, int, int *, size_t, int *))                                         \
-  X(void, ModelMeshGenerate, (int, int *))                                                                 \
-  X(void, ModelMeshOptimize, (const char *, int, int, int *, size_t, int *))                               \
-  X(void, ModelMeshClassifySurfaces, (double, int, int, double, int, int *))                               \
-  X(void, ModelMeshCreateGeometry, (int *, size_t, int *))                                                 \
-  X(void, ModelMeshAddNodes, (int, int, size_t *, size_t, double *, size_t, double *, size_t, int *))      \
-  X(void, ModelMeshAddElementsByType, (int, int, size_t *, size_t, size_t *, size_t, int *))               \
-  X(void, ModelMeshGetNodes,                                                                               \
-    (size_t **, size_t *, double **, size_t *, double **, size_t *, int, int, int, int, int *))            \
-  X(void, ModelMeshGetElementsByType,                                                                      \
-    (int, size_t **, size_t *, size_t **, size_t *, int, size_t, size_t, int *))                           \
-  X(int, ModelGeoAddSurfaceLoop, (int *, size_t, int, int *))                                              \
-  X(int, ModelGeoAddVolume, (int *, size_t, int, int *))                                                   \
-  X(void, ModelGeoSynchronize, (int *))                                                                    \
-  X(void, LoggerStart, (int *))                                                                            \
+#define SB_GMSH_FUNCTIONS(X)                                                                          \
+  X(void, OptionSetNumber, (const char *, double, int *))                                             \
+  X(void, ModelAdd, (const char *, int *))                                                            \
+  X(void, ModelGetEntities, (int **, size_t *, int, int *))                                           \
+  X(int, ModelAddDiscreteEntity, (int, int, int *, size_t, int *))                                    \
+  X(void, ModelMeshGenerate, (int, int *))                                                            \
+  X(void, ModelMeshOptimize, (const char *, int, int, int *, size_t, int *))                          \
+  X(void, ModelMeshClassifySurfaces, (double, int, int, double, int, int *))                          \
+  X(void, ModelMeshCreateGeometry, (int *, size_t, int *))                                            \
+  X(void, ModelMeshAddNodes, (int, int, size_t *, size_t, double *, size_t, double *, size_t, int *)) \
+  X(void, ModelMeshAddElementsByType, (int, int, size_t *, size_t, size_t *, size_t, int *))          \
+  X(void, ModelMeshGetNodes,                                                                          \
+    (size_t **, size_t *, double **, size_t *, double **, size_t *, int, int, int, int, int *))       \
+  X(void, ModelMeshGetElementsByType,                                                                 \
+    (int, size_t **, size_t *, size_t **, size_t *, int, size_t, size_t, int *))                      \
+  X(int, ModelGeoAddSurfaceLoop, (int *, size_t, int, int *))                                         \
+  X(int, ModelGeoAddVolume, (int *, size_t, int, int *))                                              \
+  X(void, ModelGeoSynchronize, (int *))                                                               \
+  X(void, LoggerStart, (int *))                                                                       \
   X(void, LoggerGet, (char ***, size_t *, int *))
 
 typedef struct {
@@ -88,12 +88,14 @@ typedef struct {
 /*
   SbGmshRun - runs job->work in a child process with the gmsh library, and brings back what it filled in.
 
-  Not collective; for rank 0. Replaces vertices, items, groups and tag sets of `result`, keeps its `where`.
+  Not collective; for rank 0. Replaces vertices and items of `result`; groups do not come back.
 
   Errors: what the work function raises; PETSC_ERR_USER_INPUT when the library cannot be loaded; PETSC_ERR_FILE_UNEXPECTED when
   gmsh crashes or takes longer than job->seconds; PETSC_ERR_SYS when there can be no child process.
 */
 PetscErrorCode SbGmshRun(const SbGmshJob *job, SbImport *result);
 
+/* The part of it in the child. */
+PetscErrorCode SbGmshCall(const SbGmshJob *job, SbImport *result);
 /* The error of a function of gmsh that failed. */
 PetscErrorCode SbGmshError(const SbGmsh *gmsh, const char *function);

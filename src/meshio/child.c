@@ -1,5 +1,5 @@
 /*
-  child.c - a function that fills a body, run in a forked child: when it crashes or hangs the program goes on, with a message.
+  child.c - gmsh at work in a forked child: when it crashes or hangs the program goes on, with a message.
 
   The child must not disturb what it inherits: it never returns but ends by _exit() (no MPI, no buffers, no
   PetscFinalize()), takes back every signal handler (of PETSc and MPI), prints nothing, leaves no core file, dies with its parent, and by a
@@ -16,10 +16,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 #include "meshio_impl.h"
+#include "sbgmsh.h"
 
 typedef struct {
   SbCaughtError caught;
-  PetscInt nvert, n[4], ngroup, ntags, nmember; /* nmember: entries of tags_group */
+  PetscInt nvert, n[4]; /* vertices, items by dimension */
 } Header;
 
 /* The arrays of a body by their position and size in bytes: alike for who sends and who receives. */
@@ -27,7 +28,7 @@ typedef struct {
   void **array;
   size_t bytes;
 } Part;
-enum { NPART = 2 + 3 * 4 + 3 };
+enum { NPART = 2 + 3 * 4 };
 
 static void list_parts(SbImport *im, const Header *h, Part part[NPART])
 {
@@ -42,9 +43,6 @@ static void list_parts(SbImport *im, const Header *h, Part part[NPART])
     part[n++] = (Part){(void **)&im->item[d].tags, m * sizeof(PetscInt)};
     part[n++] = (Part){(void **)&im->item[d].number, m * sizeof(int64_t)};
   }
-  part[n++] = (Part){(void **)&im->group, (size_t)h->ngroup * sizeof(SbGroup)};
-  part[n++] = (Part){(void **)&im->tags_start, (size_t)(h->ntags ? h->ntags + 1 : 0) * sizeof(PetscInt)};
-  part[n++] = (Part){(void **)&im->tags_group, (size_t)h->nmember * sizeof(PetscInt)};
 }
 
 /* ------------------------------------------------------------------ the child */
@@ -71,25 +69,20 @@ void SbChildIsolate(pid_t parent, PetscReal seconds)
 }
 
 /* Never returns. */
-static void child(FILE *file, SbChildWork work, void *ctx, const SbImport *like)
+static void child(FILE *file, const SbGmshJob *job)
 {
   Header h;
   SbImport im;
   Part part[NPART];
-  PetscInt none;
 
   memset(&h, 0, sizeof(h));
   memset(&im, 0, sizeof(im));
-  memcpy(im.where, like->where, sizeof(im.where));
+  (void)snprintf(im.where, sizeof(im.where), "%s", job->where);
   (void)PetscPushErrorHandler(SbCatchError, &h.caught);
-  h.caught.code = (int)SbImportTagSet(&im, 0, NULL, &none);
-  if (!h.caught.code) h.caught.code = (int)(*work)(ctx, &im);
+  h.caught.code = (int)SbGmshCall(job, &im);
   if (!h.caught.code) {
     h.nvert = im.nvert;
     for (int d = 0; d < 4; d++) h.n[d] = im.item[d].n;
-    h.ngroup = im.ngroup;
-    h.ntags = im.ntags;
-    h.nmember = im.ntags ? im.tags_start[im.ntags] : 0;
   }
   (void)fwrite(&h, sizeof(h), 1, file);
   list_parts(&im, &h, part);
@@ -115,17 +108,10 @@ static PetscErrorCode take_body(FILE *file, const Header *h, SbImport *im, Petsc
   if (!*complete) PetscFunctionReturn(PETSC_SUCCESS);
   im->nvert = h->nvert;
   for (int d = 0; d < 4; d++) im->item[d].n = im->item[d].capacity = h->n[d];
-  im->ngroup = im->capacity[0] = h->ngroup;
-  PetscCall(PetscFree(im->slot));
-  im->nslot = 0;
-  im->ntags = h->ntags;
-  im->capacity[1] = h->ntags ? h->ntags + 1 : 0;
-  im->capacity[2] = h->nmember;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbChildRun(const char *who, const char *doing, PetscReal seconds, SbChildWork work, void *ctx,
-                          SbImport *im)
+PetscErrorCode SbGmshRun(const SbGmshJob *job, SbImport *im)
 {
   const pid_t self = getpid();
   const int memory = memfd_create("supple", MFD_CLOEXEC);
@@ -141,8 +127,8 @@ PetscErrorCode SbChildRun(const char *who, const char *doing, PetscReal seconds,
              im->where, strerror(errno));
   pid = fork();
   if (!pid) {
-    SbChildIsolate(self, seconds);
-    child(file, work, ctx, im);
+    SbChildIsolate(self, job->seconds);
+    child(file, job);
   }
   while (pid > 0 && waitpid(pid, &status, 0) < 0 && errno == EINTR) {
   }
@@ -152,24 +138,25 @@ PetscErrorCode SbChildRun(const char *who, const char *doing, PetscReal seconds,
   if (complete && !h.caught.code) ierr = take_body(file, &h, im, &complete);
   (void)fclose(file);
   PetscCall(ierr);
-  PetscCheck(pid > 0, PETSC_COMM_SELF, PETSC_ERR_SYS, "%s: no child process for %s (%s)", im->where, who,
+  PetscCheck(pid > 0, PETSC_COMM_SELF, PETSC_ERR_SYS, "%s: no child process for gmsh (%s)", im->where,
              strerror(errno));
 
   /* what is said of a child that left nothing complete */
   PetscCheck(complete || !WIFSIGNALED(status) || WTERMSIG(status) != SIGALRM, PETSC_COMM_SELF,
              PETSC_ERR_FILE_UNEXPECTED,
-             "%s: %s was stopped: after %g s it had not %s; give a smaller or repaired input", im->where, who,
-             (double)seconds, doing);
-  PetscCheck(complete || !WIFSIGNALED(status) || WTERMSIG(status) != SIGKILL, PETSC_COMM_SELF,
-             PETSC_ERR_FILE_UNEXPECTED,
-             "%s: %s was killed from outside while it %s; most often memory ran out: give a smaller mesh or "
-             "more memory",
-             im->where, who, doing);
+             "%s: gmsh was stopped: after %g s it had not %s; give a smaller or repaired input", im->where,
+             (double)job->seconds, job->doing);
+  PetscCheck(
+    complete || !WIFSIGNALED(status) || WTERMSIG(status) != SIGKILL, PETSC_COMM_SELF,
+    PETSC_ERR_FILE_UNEXPECTED,
+    "%s: gmsh was killed from outside while it %s; most often memory ran out: give a smaller mesh or "
+    "more memory",
+    im->where, job->doing);
   PetscCheck(complete || !WIFSIGNALED(status), PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-             "%s: %s crashed (%s) while it %s; the input is damaged, or of a kind it cannot take", im->where,
-             who, strsignal(WTERMSIG(status)), doing);
-  PetscCheck(complete, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s: %s ended (exit code %d) while it %s",
-             im->where, who, WEXITSTATUS(status), doing);
+             "%s: gmsh crashed (%s) while it %s; the input is damaged, or of a kind it cannot take",
+             im->where, strsignal(WTERMSIG(status)), job->doing);
+  PetscCheck(complete, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s: gmsh ended (exit code %d) while it %s", im->where, WEXITSTATUS(status), job->doing);
   PetscCheck(!h.caught.code, PETSC_COMM_SELF, (PetscErrorCode)h.caught.code, "%s", h.caught.text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -94,9 +94,8 @@ PetscErrorCode SbGmshError(const SbGmsh *g, const char *function)
 
 /* ------------------------------------------------------------------ the job */
 
-static PetscErrorCode in_child(void *ctx, SbImport *im)
+PetscErrorCode SbGmshCall(const SbGmshJob *job, SbImport *im)
 {
-  const SbGmshJob *job = (const SbGmshJob *)ctx;
   SbGmsh g;
   void *library, (*before_9)(int, char **, int, int *);
   int minor, error = 1;
@@ -133,14 +132,5 @@ static PetscErrorCode in_child(void *ctx, SbImport *im)
   SB_GMSH0(&g, LoggerStart);
   SB_GMSH(&g, ModelAdd, "supple");
   PetscCall((*job->work)(&g, job->ctx, im));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbGmshRun(const SbGmshJob *job, SbImport *im)
-{
-  SbGmshJob mine = *job;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbChildRun("gmsh", job->doing, job->seconds, in_child, &mine, im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -64,7 +64,7 @@ static const struct {
   const char *extension;
   SbReader read;
 } readers[] = {
-  {".msh", SbImportRead_Gmsh},      {".vtk", SbImportRead_VTK},
+  {".msh", SbImportRead_Gmsh},     {".vtk", SbImportRead_VTK},
   {".vtu", SbImportRead_VTU},      {".mesh", SbImportRead_Mesh},
   {".node", SbImportRead_TetGen},  {".ele", SbImportRead_TetGen},
   {".face", SbImportRead_TetGen},  {".edge", SbImportRead_TetGen},

@@ -126,16 +126,6 @@ PetscErrorCode SbWrite_H5(const SbImport *import, const char *path);
 /* The index for ParaView of a mesh that was written to `h5`. */
 PetscErrorCode SbWrite_Xdmf(const SbImport *import, const char *path, const char *h5);
 
-/* ------------------------------------------------------------------ child.c */
-
-typedef PetscErrorCode (*SbChildWork)(void *ctx, SbImport *result);
-
-/*
-  SbChildRun - calls work(ctx, .) in a forked child, which sends what it filled in by a pipe. As SbGmshRun(); `who` did `doing`, for messages.
-*/
-PetscErrorCode SbChildRun(const char *who, const char *doing, PetscReal seconds, SbChildWork work, void *ctx,
-                          SbImport *result);
-
 /* Opens a regular file and tells its size; else says what is wrong with the name. */
 PetscErrorCode SbScanOpenFile(const char *where, const char *path, FILE **file, size_t *size);
 /* Moves to the beginning of a text; false when it does not come. */

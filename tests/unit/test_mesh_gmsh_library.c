@@ -63,11 +63,10 @@ static PetscErrorCode mesh_cube(const SbGmsh *gmsh, void *ctx, SbImport *result)
   }
   SB_GMSH(gmsh, ModelMeshGetElementsByType, 4, &number, &ntet, &node, &nnode, volume, 0, 1);
   for (size_t c = 0; c < ntet; c++) {
-    PetscInt vert[4], tags;
+    PetscInt vert[4];
 
     for (int a = 0; a < 4; a++) vert[a] = (PetscInt)node[4 * c + (size_t)a] - 1;
-    PetscCall(SbImportTagsAlone(result, 3, volume, "inside", &tags));
-    PetscCall(SbImportAddItem(result, 3, vert, tags, (int64_t)number[c]));
+    PetscCall(SbImportAddItem(result, 3, vert, 0, (int64_t)number[c]));
   }
   gmsh->Free(vertex);
   gmsh->Free(place);
@@ -88,7 +87,6 @@ static PetscErrorCode test_cube(void)
   (void)snprintf(im.where, sizeof(im.where), "body 'b': cube");
   PetscCall(run("made tetrahedra", 60, mesh_cube, &size, &im));
   SB_CHECK(im.item[3].n >= 6 && im.nvert >= 8, "%d tets, %d vertices", (int)im.item[3].n, (int)im.nvert);
-  SB_CHECK(im.ngroup == 1 && test_count(&im, 3, "inside") == im.item[3].n, "%d groups", (int)im.ngroup);
   PetscCall(SbMeshFileMeasure(&im, &facts));
   SB_CHECK_NEAR(facts.body.volume, 1, 1e-12, "volume");
   /* the body can go on growing */
