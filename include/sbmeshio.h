@@ -199,6 +199,10 @@ PetscErrorCode SbImportRead_TetGen(const char *path, SbImport *body);
 /* In a forked child of `parent`: nothing of the parent's is left in the way, handlers, masks, terminal; it dies with it, and after so many seconds by SIGALRM,
    which holds for a program that it becomes. */
 void SbChildIsolate(pid_t parent, PetscReal seconds);
+/* Room of so many bytes for an array of a reader: *array is NULL, or grows and keeps what is in it. SbImportDestroy() gives it back, at the latest. */
+PetscErrorCode SbImportScratch(SbImport *import, size_t bytes, void *array);
+/* The same for one more of `unit` bytes each. */
+PetscErrorCode SbImportGrow(SbImport *import, SbCount *count, size_t unit, void *array);
 /* Room for n vertices. */
 PetscErrorCode SbImportSetVertices(SbImport *import, PetscInt n);
 /* Appends a simplex; vert[dim + 1]. */

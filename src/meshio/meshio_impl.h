@@ -8,10 +8,6 @@
 PetscErrorCode SbImportForget(SbImport *import);
 /* Gives a name to the group (dim, tag), if there is one. */
 PetscErrorCode SbImportNameGroup(SbImport *import, PetscInt dim, int64_t tag, const char *name);
-/* Room of so many bytes for an array of a reader: *array is NULL, or grows and keeps what is in it. SbImportForget() gives it back. */
-PetscErrorCode SbImportScratch(SbImport *import, size_t bytes, void *array);
-/* The same for one more of `unit` bytes each. */
-PetscErrorCode SbImportGrow(SbImport *import, SbCount *count, size_t unit, void *array);
 
 /* scan.c: an integer as text or in binary of 4 or 8 bytes; `what` names what is expected there. */
 PetscErrorCode SbScanInt4(SbScan *scan, const char *what, int64_t *value);

@@ -32,7 +32,7 @@ static PetscErrorCode keep_triangles(SbTriangleFile *f, const PetscBool keep[])
   for (PetscInt i = 0; i < t->ntri; i++) {
     if (!keep[i]) continue;
     PetscCall(PetscArraymove(t->tri + 3 * n, t->tri + 3 * i, 3));
-    if (f->tags) f->tags[n] = f->tags[i];
+    f->tags[n] = f->tags[i];
     f->number[n++] = f->number[i];
   }
   t->ntri = n;
@@ -80,8 +80,8 @@ static PetscErrorCode drop_doubled(SbTriangleFile *f, PetscBool keep[], SbSurfac
       keep[triple[i + n].triangle] = PETSC_FALSE;
       wall = (PetscBool)(wall || triple[i + n].odd != triple[i].odd);
       // the groups of both
-      if (f->tags && f->tags[triple[i].triangle] != f->tags[triple[i + n].triangle]) {
-        const SbImport *im = f->groups;
+      if (f->tags[triple[i].triangle] != f->tags[triple[i + n].triangle]) {
+        const SbImport *im = f->im;
         PetscInt group[64], ngroup = 0;
 
         for (PetscInt j = i; j <= i + n; j += n) {
@@ -90,7 +90,7 @@ static PetscErrorCode drop_doubled(SbTriangleFile *f, PetscBool keep[], SbSurfac
           for (PetscInt k = im->tags_start[set]; k < im->tags_start[set + 1] && ngroup < 64; k++)
             group[ngroup++] = im->tags_group[k];
         }
-        PetscCall(SbImportTagSet(f->groups, ngroup, group, &f->tags[triple[i].triangle]));
+        PetscCall(SbImportTagSet(f->im, ngroup, group, &f->tags[triple[i].triangle]));
       }
     }
     m->nwall += wall;
@@ -194,7 +194,7 @@ static PetscErrorCode cut_flat(SbTriangleFile *f, PetscBool touched[], SbTriangl
       w[1] = b;
       w[2] = c;
       f->number[mine] = f->number[other];
-      if (f->tags) f->tags[mine] = f->tags[other];
+      f->tags[mine] = f->tags[other];
       touched[mine] = touched[other] = PETSC_TRUE;
       (*ncut)++;
     }
@@ -276,11 +276,11 @@ PetscErrorCode SbSurfaceRepairTriangles(SbTriangleFile *f, SbSurfaceRepairs *rep
   // what is wrong: the first open edge, and whether joining would close all of them
   a = t->x + 3 * edge_end(t, first, 0);
   b = t->x + 3 * edge_end(t, first, 1);
-  if (need > 0 && f->groups)
+  if (need > 0 && f->body)
     (void)snprintf(
       what, sizeof(what),
       "every open edge has a partner within %.3g m: %s %.2g joins them, if that is rounding and not shape",
-      (double)need, SbImportOption(f->groups, "merge_tolerance", option), (double)(1.1 * need));
+      (double)need, SbImportOption(f->im, "merge_tolerance", option), (double)(1.1 * need));
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
           "%s: the surface is open: %" PetscInt_FMT
           " edges have a triangle on one side only, the first is that of triangle %lld from (%.6g, %.6g, "

@@ -124,46 +124,44 @@ static PetscErrorCode weld_tolerance(const SbTriangleFile *f, PetscReal given, P
   PetscCheck(
     given < 0.5 * sum, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
     "%s: %s %g m would join corners of one triangle: the mean edge is %.3g m; give less than half of it",
-    f->where, SbImportOption(f->groups, "merge_tolerance", option), (double)given, (double)sum);
+    f->where, SbImportOption(f->im, "merge_tolerance", option), (double)given, (double)sum);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode make_surface(const char *path, const SbImport *im, SbTriangleFile *f, SbSurface *s,
-                                   size_t size, char note[])
+/* The surface of a body, or of an obstacle at a place, with its regions: what was repaired goes to the note. */
+static PetscErrorCode make_surface(const char *path, const PetscReal at[3], SbTriangleFile *f, SbSurface *s,
+                                   SbSurfaceRepairs *repairs)
 {
-  SbSurfaceRepairs repairs;
+  const SbImport *im = f->im;
+  SbTriangles *t = f->t;
   PetscReal tolerance, edge;
   char option[SB_IMPORT_OPTION_MAX];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&repairs, sizeof(repairs)));
+  PetscCall(PetscMemzero(repairs, sizeof(*repairs)));
   PetscCall(SbTrianglesReadFile(path, f));
-  PetscCheck(f->t->ntri, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-             "%s: holds no triangles; give a closed surface of triangles, or a mesh of tetrahedra", f->where);
-  // to metres, and nothing that is not a number
-  for (PetscInt i = 0; i < 3 * f->t->nvert; i++) {
-    f->t->x[i] *= im->scale;
-    PetscCheck(isfinite(f->t->x[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+  // scaled and placed, and nothing that is not a number
+  for (PetscInt i = 0; i < 3 * t->nvert; i++) {
+    t->x[i] = im->scale * t->x[i] + at[i % 3];
+    PetscCheck(isfinite(t->x[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
                "%s: vertex %" PetscInt_FMT " leaves the range of numbers when scaled by %g; check %s",
-               f->where, i / 3 + 1, (double)im->scale, SbImportOption(f->groups, "scale", option));
+               f->where, i / 3 + 1, (double)im->scale,
+               f->body ? SbImportOption(im, "scale", option) : "the scale");
   }
-  for (PetscInt i = 0; i < f->nhole; i++) {
-    for (int k = 0; k < 3; k++) f->hole[i].x[k] *= im->scale;
-  }
-  for (PetscInt i = 0; i < f->nregion; i++) {
-    for (int k = 0; k < 3; k++) f->region[i].x[k] *= im->scale;
-  }
-  PetscCall(SbDropUnusedPoints(&f->t->nvert, f->t->x, 3 * f->t->ntri, f->t->tri));
+  for (PetscInt i = 0; i < 3 * f->nhole; i++) f->hole[i / 3].x[i % 3] *= im->scale;
+  for (PetscInt i = 0; i < 3 * f->nregion; i++) f->region[i / 3].x[i % 3] *= im->scale;
+  PetscCall(SbDropUnusedPoints(&t->nvert, t->x, 3 * t->ntri, t->tri));
+  // repaired; triangles of an obstacle may cut each other far from their edges
   PetscCall(weld_tolerance(f, im->tet.merge_tolerance, &tolerance, &edge));
-  PetscCall(SbSurfaceMergeVertices(f, tolerance, &repairs));
-  PetscCheck(
-    f->t->ntri, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-    "%s: no triangle is left when vertices within %g m are one; give a smaller %s, or check the scale",
-    f->where, (double)tolerance, SbImportOption(im, "merge_tolerance", option));
-  PetscCall(SbSurfaceRepairTriangles(f, &repairs));
-  PetscCall(SbSurfaceUntangle(f, im->tet.untangle >= 0 ? im->tet.untangle : 0.5 * edge, &repairs));
-  PetscCall(SbSurfaceFindRegions(f, &repairs, s));
-  PetscCall(write_repairs(f->t, &repairs, size, note));
+  PetscCall(SbSurfaceMergeVertices(f, tolerance, repairs));
+  PetscCheck(t->ntri, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: no triangle is left when vertices within %g m are one; %s%s, or check the scale", f->where,
+             (double)tolerance, f->body ? "give a smaller " : "repair the file",
+             f->body ? SbImportOption(im, "merge_tolerance", option) : "");
+  PetscCall(SbSurfaceRepairTriangles(f, repairs));
+  if (f->body)
+    PetscCall(SbSurfaceUntangle(f, im->tet.untangle >= 0 ? im->tet.untangle : 0.5 * edge, repairs));
+  PetscCall(SbSurfaceFindRegions(f, repairs, s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -221,70 +219,51 @@ static PetscErrorCode take_boundary(const SbTriangleFile *f, const SbSurface *s,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On rank 0: repaired and checked as the surface of a body, but that triangles may cut each other far from their edges; those with material on both sides are left out. */
-static PetscErrorCode read_obstacle(const char *path, PetscReal scale, const PetscReal at[3],
-                                    SbTriangleFile *f, size_t size, char note[])
+/* On rank 0: repaired and checked as the surface of a body; triangles with material on both sides are left out. */
+static PetscErrorCode read_obstacle(const char *path, const PetscReal at[3], SbTriangleFile *f)
 {
   const SbTriangleFormat *format = SbTrianglesFormat(path);
-  SbTriangles *t = f->t;
   SbSurfaceRepairs repairs;
-  SbSurface s;
-  PetscReal tolerance, edge;
+  SbSurface s = {0};
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&repairs, sizeof(repairs)));
-  PetscCall(PetscMemzero(&s, sizeof(s)));
   PetscCheck(format && !format->sheets, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: is a file of no known kind; give one that ends in .stl, .obj, .off, .ply or .msh",
              f->where);
-  PetscCall(SbTrianglesReadFile(path, f));
-  PetscCheck(t->ntri, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-             "%s: holds no triangles; give a closed surface of triangles, or a mesh of tetrahedra", f->where);
-  // scaled and placed
-  PetscCall(SbDropUnusedPoints(&t->nvert, t->x, 3 * t->ntri, t->tri));
-  for (PetscInt i = 0; i < 3 * t->nvert; i++) {
-    t->x[i] = scale * t->x[i] + at[i % 3];
-    PetscCheck(isfinite(t->x[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "%s: vertex %lld has a coordinate that is not a finite number; repair the file", f->where,
-               (long long)(i / 3 + 1));
-  }
-  // repaired; the boundary of its material
-  PetscCall(weld_tolerance(f, -1, &tolerance, &edge));
-  PetscCall(SbSurfaceMergeVertices(f, tolerance, &repairs));
-  PetscCheck(f->t->ntri, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%s: no triangle is left when vertices within %g m are one; check the file", f->where,
-             (double)tolerance);
-  PetscCall(SbSurfaceRepairTriangles(f, &repairs));
-  ierr = SbSurfaceFindRegions(f, &repairs, &s);
+  ierr = make_surface(path, at, f, &s, &repairs);
   if (!ierr) ierr = take_boundary(f, &s, &repairs.ninner);
   PetscCall(SbSurfaceDestroy(&s));
   PetscCall(ierr);
   repairs.ncavity = 0; /* nothing was changed for them */
-  PetscCall(write_repairs(f->t, &repairs, size, note));
+  PetscCall(write_repairs(f->t, &repairs, sizeof(f->im->note), f->im->note));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbTrianglesRead(MPI_Comm comm, const char *option, const char *path, PetscReal scale,
                                const PetscReal at[3], SbTriangles *t)
 {
-  char where[PETSC_MAX_PATH_LEN + 3 * SB_NAME_MAX], note[512] = ""; /* of rank 0, as warnings are */
+  SbImport im = {.scale = scale, .tet.merge_tolerance = -1};
   SbCaughtError caught = {0, ""};
   SbTriangles head;
   PetscMPIInt rank, n[2];
+  PetscInt none;
+  char note[sizeof(im.note)]; /* of rank 0, as warnings are */
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(t, sizeof(*t)));
-  (void)snprintf(where, sizeof(where), "%s: %s", option, path);
+  (void)snprintf(im.where, sizeof(im.where), "%s: %s", option, path);
+  PetscCall(SbImportTagSet(&im, 0, NULL, &none));
   // rank 0 reads; all ranks fail together
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   if (!rank) {
-    SbTriangleFile file = {.where = where, .t = t};
+    SbTriangleFile file = {.im = &im, .where = im.where, .t = t};
 
-    SB_CATCH(&caught, read_obstacle(path, scale, at, &file, sizeof(note), note));
-    PetscCall(PetscFree(file.number));
+    SB_CATCH(&caught, read_obstacle(path, at, &file));
     if (caught.code) PetscCall(SbTrianglesDestroy(t));
   }
+  (void)snprintf(note, sizeof(note), "%s", im.note);
+  PetscCall(SbImportDestroy(&im));
   PetscCall(SbCaughtRaise(comm, &caught));
   // the surface goes to the others
   head = *t;
@@ -302,7 +281,7 @@ PetscErrorCode SbTrianglesRead(MPI_Comm comm, const char *option, const char *pa
   PetscCallMPI(MPI_Bcast(t->x, n[0], MPIU_REAL, 0, comm));
   PetscCallMPI(MPI_Bcast(t->tri, n[1], MPIU_INT, 0, comm));
   PetscCallMPI(MPI_Bcast(t->across, n[1], MPIU_INT, 0, comm));
-  if (note[0]) PetscCall(SbWarning(comm, "%s: %s", where, note));
+  if (note[0]) PetscCall(SbWarning(comm, "%s: %s: %s", option, path, note));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -310,18 +289,15 @@ PetscErrorCode SbTrianglesRead(MPI_Comm comm, const char *option, const char *pa
 
 PetscErrorCode SbSurfaceRead(const char *path, SbImport *im, SbSurface *s)
 {
-  SbTriangles t;
-  SbTriangleFile file = {.where = im->where, .t = &t, .groups = im};
+  SbTriangles t = {0};
+  SbTriangleFile file = {.im = im, .where = im->where, .body = PETSC_TRUE, .t = &t};
+  SbSurfaceRepairs repairs;
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&t, sizeof(t)));
   PetscCall(PetscMemzero(s, sizeof(*s)));
-  ierr = make_surface(path, im, &file, s, sizeof(im->note), im->note);
-  PetscCall(PetscFree(file.number));
-  PetscCall(PetscFree(file.tags));
-  PetscCall(PetscFree(file.hole));
-  PetscCall(PetscFree(file.region));
+  ierr = make_surface(path, (const PetscReal[3]){0, 0, 0}, &file, s, &repairs);
+  if (!ierr) ierr = write_repairs(&t, &repairs, sizeof(im->note), im->note);
   PetscCall(SbTrianglesDestroy(&t));
   if (ierr) PetscCall(SbSurfaceDestroy(s));
   PetscCall(ierr);

@@ -329,7 +329,7 @@ static PetscErrorCode empty_cavities(Arrangement *s)
 /* The groups that all triangles of a shell belong to: group[n], n at most 16. */
 static PetscErrorCode groups_of_shell(const Arrangement *s, PetscInt shell, PetscInt *n, PetscInt group[16])
 {
-  const SbImport *im = s->f->groups;
+  const SbImport *im = s->f->im;
   PetscInt last = -1; /* the tag set of the triangle before, which has been examined */
 
   PetscFunctionBeginUser;
@@ -359,7 +359,7 @@ static PetscErrorCode groups_of_shell(const Arrangement *s, PetscInt shell, Pets
 /* Every region is region_1, ...; also NAME_region when its outer limit lies in the group NAME; and what the file says. */
 static PetscErrorCode name_regions(const Arrangement *s, SbSurface *out)
 {
-  SbImport *im = s->f->groups;
+  SbImport *im = s->f->im;
   char name[SB_GROUP_MAX];
 
   PetscFunctionBeginUser;
@@ -476,12 +476,12 @@ static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
     PetscCall(PetscArraycpy(out->tri + 3 * kept, t->tri + 3 * f, 3));
     out->side[2 * kept] = front;
     out->side[2 * kept + 1] = back;
-    out->tags[kept] = s->f->tags ? s->f->tags[f] : 0;
+    out->tags[kept] = s->f->tags[f];
     out->number[kept++] = s->f->number[f];
   }
   out->ntri = kept;
   PetscCall(SbDropUnusedPoints(&out->nvert, out->x, 3 * kept, out->tri));
-  if (s->f->groups) PetscCall(name_regions(s, out));
+  if (s->f->body) PetscCall(name_regions(s, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -135,10 +135,9 @@ PetscErrorCode SbSurfaceUntangle(SbTriangleFile *f, PetscReal reach, SbSurfaceRe
     PetscCall(untangle(t, reach, &left, m));
     if (left.n || m->untangled > reach)
       (void)snprintf(why, sizeof(why), "smoothing did not part them within %.3g m (%s)", (double)reach,
-                     SbImportOption(f->groups, "untangle", option));
+                     SbImportOption(f->im, "untangle", option));
   } else if (search.n)
-    (void)snprintf(why, sizeof(why), "%s 0 forbids to smooth it",
-                   SbImportOption(f->groups, "untangle", option));
+    (void)snprintf(why, sizeof(why), "%s 0 forbids to smooth it", SbImportOption(f->im, "untangle", option));
   PetscCall(PetscFree(search.crossing));
   if (why[0]) {
     const PetscReal *x = t->x + 3 * t->tri[3 * search.pair[0][0]];

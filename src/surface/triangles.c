@@ -31,27 +31,18 @@ static PetscErrorCode add_boundary(SbImport *im, SbTriangleFile *f)
 
 static PetscErrorCode read_gmsh(const char *path, SbTriangleFile *f)
 {
-  SbImport im;
-  PetscInt none;
-  PetscErrorCode ierr;
+  SbImport *im = f->im;
+  const SbItems *tri = &im->item[2];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&im, sizeof(im)));
-  (void)snprintf(im.where, sizeof(im.where), "%s", f->where);
-  im.surface = PETSC_TRUE;
-  PetscCall(SbImportTagSet(&im, 0, NULL, &none));
-  ierr = SbImportRead_Gmsh(path, &im);
-  if (!ierr && im.item[3].n)
-    ierr = add_boundary(&im, f);
-  else if (!ierr) {
-    const SbItems *tri = &im.item[2];
-
-    for (PetscInt i = 0; !ierr && i < tri->n; i++)
-      ierr = SbTrianglesAdd(f, tri->vert[3 * i], tri->vert[3 * i + 1], tri->vert[3 * i + 2], tri->number[i]);
-  }
-  for (PetscInt v = 0; !ierr && v < im.nvert; v++) ierr = SbTrianglesAddVertex(f, im.x + 3 * v);
-  PetscCall(SbImportDestroy(&im));
-  PetscFunctionReturn(ierr);
+  im->surface = PETSC_TRUE;
+  PetscCall(SbImportRead_Gmsh(path, im));
+  if (im->item[3].n) PetscCall(add_boundary(im, f));
+  for (PetscInt i = 0; !im->item[3].n && i < tri->n; i++)
+    PetscCall(
+      SbTrianglesAdd(f, tri->vert[3 * i], tri->vert[3 * i + 1], tri->vert[3 * i + 2], tri->number[i]));
+  for (PetscInt v = 0; v < im->nvert; v++) PetscCall(SbTrianglesAddVertex(f, im->x + 3 * v));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ files */
@@ -78,21 +69,20 @@ const SbTriangleFormat *SbTrianglesFormat(const char *path)
 PetscErrorCode SbTrianglesReadFile(const char *path, SbTriangleFile *f)
 {
   const SbTriangleFormat *format = SbTrianglesFormat(path);
-  SbScan scan;
-  PetscErrorCode ierr;
+  SbScan *scan = &f->im->scan;
 
   PetscFunctionBeginUser;
   f->path = path;
   f->sheets = format->sheets;
-  if (!format->read) {
+  if (format->read) {
+    PetscCall(SbScanOpen(f->where, path, scan));
+    PetscCall((*format->read)(scan, f));
+  } else
     PetscCall(read_gmsh(path, f));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  ierr = SbScanOpen(f->where, path, &scan);
-  if (!ierr) ierr = (*format->read)(&scan, f);
-  PetscCall(SbScanClose(&scan));
-  PetscCall(PetscFree(f->corner));
-  PetscFunctionReturn(ierr);
+  PetscCall(SbScanClose(scan));
+  PetscCheck(f->t->ntri, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s: holds no triangles; give a closed surface of triangles, or a mesh of tetrahedra", f->where);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbTrianglesDestroy(SbTriangles *t)

@@ -18,20 +18,20 @@ typedef struct {
 
 /* Filled by a reader, item by item. */
 typedef struct {
-  const char *where; /* begins every message */
+  SbImport *im;      /* gets the groups of the triangles; arrays here are its own, see SbImportScratch() */
+  const char *where; /* im->where: begins every message */
   const char *path;  /* while it is read */
+  PetscBool body;    /* it becomes one, by the options of im; else an obstacle */
   SbTriangles *t;
   PetscInt vert_size, tri_size; /* allocated */
-  int64_t *number;              /* [ntri] of the face in the file, from 1; owned by who reads */
-  PetscInt ncorner, corner_size;
+  int64_t *number;              /* [ntri] of the face in the file, from 1 */
+  PetscInt now;                 /* tag set of the triangles that come next */
+  PetscInt *tags;               /* [ntri] tag set */
+  SbCount ncorner;
   PetscInt *corner; /* [ncorner] of the face that is being read */
-  /* for bodies alone */
-  SbImport *groups; /* gets the groups of the triangles; NULL: nobody wants them, tags stays NULL */
-  PetscInt now;     /* tag set of the triangles that come next */
-  PetscInt *tags;   /* [ntri] tag set; owned by who reads */
   PetscBool sheets; /* the order of corners says nothing about the side: .poly, .smesh */
   PetscInt nhole, nregion;
-  SbSeed *hole, *region; /* owned by who reads */
+  SbSeed *hole, *region;
 } SbTriangleFile;
 
 /* Readers of a file in memory. Errors name the file, and the line or byte. Not collective. */

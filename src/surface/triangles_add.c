@@ -37,10 +37,10 @@ PetscErrorCode SbTrianglesAdd(SbTriangleFile *f, PetscInt a, PetscInt b, PetscIn
   if (t->ntri == f->tri_size) {
     f->tri_size = PetscMax(256, 2 * f->tri_size);
     PetscCall(PetscRealloc(3 * (size_t)f->tri_size * sizeof(PetscInt), &t->tri));
-    PetscCall(PetscRealloc((size_t)f->tri_size * sizeof(int64_t), &f->number));
-    if (f->groups) PetscCall(PetscRealloc((size_t)f->tri_size * sizeof(PetscInt), &f->tags));
+    PetscCall(SbImportScratch(f->im, (size_t)f->tri_size * sizeof(int64_t), &f->number));
+    PetscCall(SbImportScratch(f->im, (size_t)f->tri_size * sizeof(PetscInt), &f->tags));
   }
-  if (f->groups) f->tags[t->ntri] = f->now;
+  f->tags[t->ntri] = f->now;
   v = t->tri + 3 * t->ntri;
   v[0] = a;
   v[1] = b;
@@ -54,7 +54,6 @@ PetscErrorCode SbTrianglesGroups(SbTriangleFile *f, PetscInt n, const char *cons
   PetscInt group[16];
 
   PetscFunctionBeginUser;
-  if (!f->groups) PetscFunctionReturn(PETSC_SUCCESS);
   n = PetscMin(n, 16);
   for (PetscInt i = 0; i < n; i++) {
     char name[SB_GROUP_MAX];
@@ -65,9 +64,9 @@ PetscErrorCode SbTrianglesGroups(SbTriangleFile *f, PetscInt n, const char *cons
       if (isspace((unsigned char)*c)) *c = '_';
       hash = (hash ^ (unsigned char)*c) * 0x100000001b3u;
     }
-    PetscCall(SbImportGroup(f->groups, 2, (int64_t)(hash >> 2), name, &group[i]));
+    PetscCall(SbImportGroup(f->im, 2, (int64_t)(hash >> 2), name, &group[i]));
   }
-  PetscCall(SbImportTagSet(f->groups, n, group, &f->now));
+  PetscCall(SbImportTagSet(f->im, n, group, &f->now));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -198,10 +197,7 @@ PetscErrorCode SbTrianglesAddPolygon(SbScan *s, PetscInt n, const PetscInt vert[
     fan = is_fan(&p, n, vert, o, PetscSqrtReal(SbDot3(p.normal, p.normal)));
   }
   if (!fan) {
-    if (n > CORNERS_MAX)
-      SB_SCAN_ERROR(s,
-                    "face %lld has %lld corners and is not convex; supple takes up to %d, cut it into parts",
-                    (long long)number, (long long)n, CORNERS_MAX);
+    if (n > CORNERS_MAX) PetscCall(too_many(s, n, number));
     PetscCall(PetscArraycpy(left, vert, n));
     PetscCall(cut_ears(&p, n, left, number, f));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -217,17 +213,17 @@ PetscErrorCode SbTrianglesAddCorner(SbScan *s, int64_t number, int64_t v, SbTria
   if (v < 0 || v >= f->t->nvert)
     SB_SCAN_ERROR(s, "face %lld uses a vertex that is not there (%lld of %lld)", (long long)number,
                   (long long)v + 1, (long long)f->t->nvert);
-  PetscCall(SbReserve(f->ncorner + 1, sizeof(*f->corner), &f->corner_size, &f->corner));
-  f->corner[f->ncorner++] = (PetscInt)v;
+  PetscCall(SbImportGrow(f->im, &f->ncorner, sizeof(*f->corner), &f->corner));
+  f->corner[f->ncorner.n - 1] = (PetscInt)v;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbTrianglesAddFace(SbScan *s, int64_t number, SbTriangleFile *f)
 {
-  const PetscInt n = f->ncorner;
+  const PetscInt n = f->ncorner.n;
 
   PetscFunctionBeginUser;
-  f->ncorner = 0;
+  f->ncorner.n = 0;
   if (n < 3) SB_SCAN_ERROR(s, "face %lld has %lld corners; it needs three", (long long)number, (long long)n);
   PetscCall(SbTrianglesAddPolygon(s, n, f->corner, number, f));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -4,7 +4,6 @@
   The header lists which properties an element has, in which order and of which types. Of `vertex` x, y and z are taken, of `face` the
   list vertex_indices (or vertex_index); everything else is walked over. Triangle strips are refused.
 */
-#include <stdlib.h>
 #include "triangles.h"
 
 enum { ELEMENTS_MAX = 16, PROPERTIES_MAX = 64 };
@@ -143,9 +142,15 @@ static PetscErrorCode read_count(Ply *p, const Property *q, int64_t *n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_all(Ply *p)
+PetscErrorCode SbTrianglesRead_PLY(SbScan *s, SbTriangleFile *f)
 {
+  Ply *p = NULL;
+
   PetscFunctionBeginUser;
+  PetscCall(SbImportScratch(f->im, sizeof(*p), &p));
+  PetscCall(PetscMemzero(p, sizeof(*p)));
+  p->s = s;
+  p->f = f;
   PetscCall(read_header(p));
   for (int k = 0; k < p->nelement; k++) {
     int64_t bytes = 0;
@@ -198,18 +203,4 @@ static PetscErrorCode read_all(Ply *p)
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbTrianglesRead_PLY(SbScan *s, SbTriangleFile *f)
-{
-  Ply *p;
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscNew(&p));
-  p->s = s;
-  p->f = f;
-  ierr = read_all(p);
-  PetscCall(PetscFree(p));
-  PetscFunctionReturn(ierr);
 }

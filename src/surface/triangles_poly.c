@@ -15,12 +15,10 @@
 typedef struct {
   SbScan *s;
   SbTriangleFile *f;
-  SbNumbers index; /* of points */
   /* polygons of one facet */
-  PetscInt nloop, loop_size, nvert, vert_size;
+  PetscInt nloop, nvert, nhole;
   PetscInt *start; /* [nloop + 1] */
   PetscInt *vert;
-  PetscInt nhole, hole_size;
   PetscReal *hole; /* [nhole][3] points of holes in the facet */
 } Poly;
 
@@ -42,25 +40,23 @@ static PetscErrorCode read_counts(SbScan *s, const char *what, int n, int64_t co
 /* From this file, or all of NAME.node. */
 static PetscErrorCode read_points(Poly *p, int64_t n)
 {
-  int64_t *number;
-  PetscErrorCode ierr = PETSC_SUCCESS;
+  SbNumbers *index = &p->f->im->nodes;
+  int64_t *number = NULL;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(n, &number));
-  for (int64_t i = 0; !ierr && i < n; i++) {
+  PetscCall(SbImportScratch(p->f->im, (size_t)n * sizeof(*number), &number));
+  for (int64_t i = 0; i < n; i++) {
     PetscReal x[3];
 
     SbScanNext(p->s, '#');
-    ierr = SbScanText(p->s, "number of a point", &number[i]);
-    if (!ierr) ierr = SbScanPoint(p->s, "coordinate of a point", 0, x);
-    if (!ierr) ierr = SbScanEndOfLine(p->s);
-    if (!ierr) ierr = SbTrianglesAddVertex(p->f, x);
+    PetscCall(SbScanText(p->s, "number of a point", &number[i]));
+    PetscCall(SbScanPoint(p->s, "coordinate of a point", 0, x));
+    PetscCall(SbScanEndOfLine(p->s));
+    PetscCall(SbTrianglesAddVertex(p->f, x));
   }
-  if (!ierr) ierr = SbNumbersCreate((PetscInt)n, number, &p->index);
-  PetscCall(PetscFree(number));
-  PetscCall(ierr);
-  PetscCheck(!p->index.repeated, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s: point %lld is there twice",
-             p->f->where, (long long)p->index.twice);
+  PetscCall(SbNumbersCreate((PetscInt)n, number, index));
+  PetscCheck(!index->repeated, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s: point %lld is there twice",
+             p->f->where, (long long)index->twice);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -99,13 +95,13 @@ static PetscErrorCode read_polygon(Poly *p, int64_t n, int64_t facet)
                   "within facets, cut the facet there",
                   (long long)facet, (long long)n);
   PetscCall(SbScanRoom(p->s, "corners", n, 2, 2));
-  PetscCall(SbReserve(p->nloop + 2, sizeof(*p->start), &p->loop_size, &p->start));
-  PetscCall(SbReserve(p->nvert + (PetscInt)n, sizeof(*p->vert), &p->vert_size, &p->vert));
+  PetscCall(SbImportScratch(p->f->im, (size_t)(p->nloop + 2) * sizeof(*p->start), &p->start));
+  PetscCall(SbImportScratch(p->f->im, (size_t)(p->nvert + n) * sizeof(*p->vert), &p->vert));
   p->start[p->nloop] = p->nvert;
   for (int64_t i = 0; i < n; i++) {
     SbScanNext(p->s, '#');
     PetscCall(SbScanText(p->s, "corner of a polygon", &number));
-    p->vert[p->nvert] = SbNumbersFind(&p->index, number);
+    p->vert[p->nvert] = SbNumbersFind(&p->f->im->nodes, number);
     if (p->vert[p->nvert] < 0)
       SB_SCAN_ERROR(p->s, "facet %lld uses the point %lld, which is not there", (long long)facet,
                     (long long)number);
@@ -121,10 +117,8 @@ static PetscErrorCode end_facet(Poly *p, int64_t marker, int64_t facet)
   PetscInt group;
 
   PetscFunctionBeginUser;
-  if (p->f->groups) {
-    if (marker) PetscCall(SbImportGroup(p->f->groups, 2, marker, NULL, &group));
-    PetscCall(SbImportTagSet(p->f->groups, marker != 0, &group, &p->f->now));
-  }
+  if (marker) PetscCall(SbImportGroup(p->f->im, 2, marker, NULL, &group));
+  PetscCall(SbImportTagSet(p->f->im, marker != 0, &group, &p->f->now));
   PetscCall(SbTrianglesAddLoops(p->s, p->nloop, p->start, p->vert, p->nhole, p->hole, facet, p->f));
   p->nloop = p->nvert = p->nhole = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -140,7 +134,7 @@ static PetscErrorCode read_seeds(Poly *p, const char *what, PetscBool attribute,
   PetscFunctionBeginUser;
   SbScanNext(p->s, '#');
   if (p->s->at < p->s->end) PetscCall(read_counts(p->s, what, 1, count));
-  PetscCall(PetscCalloc1((size_t)count[0], seed));
+  PetscCall(SbImportScratch(p->f->im, (size_t)count[0] * sizeof(**seed), seed));
   for (*n = 0; *n < count[0]; (*n)++) {
     SbSeed *one = &(*seed)[*n];
     PetscReal value = 0;
@@ -160,9 +154,10 @@ static PetscErrorCode read_seeds(Poly *p, const char *what, PetscBool attribute,
 
 /* ------------------------------------------------------------------ the file */
 
-static PetscErrorCode read_all(Poly *p)
+PetscErrorCode SbTrianglesRead_Poly(SbScan *s, SbTriangleFile *f)
 {
-  const PetscBool smesh = (PetscBool)!strcasecmp(strrchr(p->f->path, '.'), ".smesh");
+  const PetscBool smesh = (PetscBool)!strcasecmp(strrchr(f->path, '.'), ".smesh");
+  Poly poly = {.s = s, .f = f}, *p = &poly;
   int64_t count[4];
 
   PetscFunctionBeginUser;
@@ -200,7 +195,7 @@ static PetscErrorCode read_all(Poly *p)
       for (int64_t k = 0; k < facet[1]; k++) {
         SbScanNext(p->s, '#');
         PetscCall(SbScanText(p->s, "number of a hole", &number));
-        PetscCall(SbReserve(3 * (p->nhole + 1), sizeof(*p->hole), &p->hole_size, &p->hole));
+        PetscCall(SbImportScratch(p->f->im, 3 * (size_t)(p->nhole + 1) * sizeof(*p->hole), &p->hole));
         PetscCall(SbScanPoint(p->s, "coordinate of a hole", 0, p->hole + 3 * p->nhole));
         p->nhole++;
         PetscCall(SbScanEndOfLine(p->s));
@@ -211,18 +206,4 @@ static PetscErrorCode read_all(Poly *p)
   PetscCall(read_seeds(p, "hole", PETSC_FALSE, &p->f->nhole, &p->f->hole));
   PetscCall(read_seeds(p, "region", PETSC_TRUE, &p->f->nregion, &p->f->region));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbTrianglesRead_Poly(SbScan *s, SbTriangleFile *f)
-{
-  Poly p = {.s = s, .f = f};
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  ierr = read_all(&p);
-  PetscCall(SbNumbersDestroy(&p.index));
-  PetscCall(PetscFree(p.start));
-  PetscCall(PetscFree(p.vert));
-  PetscCall(PetscFree(p.hole));
-  PetscFunctionReturn(ierr);
 }

@@ -496,7 +496,9 @@ static PetscErrorCode check_refused(void)
   TestSurface s;
   SbTriangles t;
   int64_t number[1000];
-  SbTriangleFile file = {.where = "test", .t = &t, .number = number};
+  PetscInt tags[1000] = {0};
+  SbImport im = {.where = "test"};
+  SbTriangleFile file = {.im = &im, .where = im.where, .t = &t, .number = number, .tags = tags};
   SbSurfaceRepairs mended;
   SbSurface body_surface;
 
