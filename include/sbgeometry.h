@@ -280,6 +280,23 @@ PetscInt SbUnionLabel(PetscInt n, PetscInt up[]);
 /* Leaves out points that none of used[nused] names, and renumbers these. The order stays. */
 PetscErrorCode SbDropUnusedPoints(PetscInt *n, PetscReal x[], PetscInt nused, PetscInt used[]);
 
+/* ------------------------------------------------------------------ keys.c: which of many things are the same edge, or the same face */
+
+typedef struct {
+  uint64_t key;
+  PetscInt slot; /* which thing has it */
+} SbKey;
+/* Of an edge, or whatever two numbers below 2^32 name, in either order. */
+static inline uint64_t SbKeyOfPair(PetscInt a, PetscInt b)
+{
+  return (uint64_t)PetscMin(a, b) << 32 | (uint64_t)PetscMax(a, b);
+}
+/* Sorts by key, then by slot. */
+void SbKeysSort(PetscInt n, SbKey item[]);
+/* Of sorted items: how many from position i on have the key of that one; the first position whose key is not below this one, n when all are. */
+PetscInt SbKeysAlike(PetscInt n, const SbKey item[], PetscInt i);
+PetscInt SbKeysFind(PetscInt n, const SbKey item[], uint64_t key);
+
 /* Six times the signed volume of a tet, m^3. */
 PetscReal SbTetDeterminant(const PetscReal x[], const PetscInt vert[4]);
 

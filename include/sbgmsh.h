@@ -95,7 +95,5 @@ typedef struct {
 */
 PetscErrorCode SbGmshRun(const SbGmshJob *job, SbImport *result);
 
-/* The part of it in the child. */
-PetscErrorCode SbGmshCall(const SbGmshJob *job, SbImport *result);
 /* The error of a function of gmsh that failed. */
 PetscErrorCode SbGmshError(const SbGmsh *gmsh, const char *function);

@@ -8,14 +8,10 @@
 /* ------------------------------------------------------------------ faces.c: which cells share a face */
 
 typedef struct {
-  uint64_t key;  /* middle and highest vertex */
-  PetscInt slot; /* 4 * cell + face */
-} SbFaceKey;
-
-typedef struct {
   PetscInt nvert, ncell;
-  PetscInt *start;     /* [nvert + 1] into `face`: faces by lowest vertex */
-  SbFaceKey *face;     /* [4 * ncell] ascending keys below each lowest vertex */
+  PetscInt *start; /* [nvert + 1] into `face`: faces by lowest vertex */
+  SbKey *
+    face; /* [4 * ncell] keys of the two other vertices, ascending for each lowest one; slots 4 cell + face */
   PetscInt *neighbour; /* [ncell][4] cell across face f (opposite vertex f), -1 on the boundary */
   PetscInt nboundary;
   PetscInt nshared;   /* faces of more than two cells */

@@ -5,7 +5,6 @@
   faces long, is sorted by the other two vertices: equal neighbours in it are one face. No hash table, no comparison of
   triples; linear in the number of cells for meshes whose vertices have bounded degree, n log n for all others.
 */
-#include <stdlib.h>
 #include "mesh_impl.h"
 
 const int SbFaceVertex[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
@@ -16,16 +15,8 @@ static inline PetscInt face_key(PetscInt a, PetscInt b, PetscInt c, uint64_t *ke
   const PetscInt lo = PetscMin(PetscMin(a, b), c), hi = PetscMax(PetscMax(a, b), c);
   const PetscInt mid = PetscMax(PetscMin(a, b), PetscMin(PetscMax(a, b), c));
 
-  *key = (uint64_t)mid << 32 | (uint64_t)hi;
+  *key = SbKeyOfPair(mid, hi);
   return lo;
-}
-
-static int compare_keys(const void *a, const void *b)
-{
-  const SbFaceKey *p = (const SbFaceKey *)a, *q = (const SbFaceKey *)b;
-
-  if (p->key != q->key) return p->key < q->key ? -1 : 1;
-  return (p->slot > q->slot) - (p->slot < q->slot);
 }
 
 PetscErrorCode SbFacesCreate(PetscInt nvert, PetscInt ncell, const PetscInt cell[], SbFaces *faces)
@@ -64,13 +55,13 @@ PetscErrorCode SbFacesCreate(PetscInt nvert, PetscInt ncell, const PetscInt cell
   PetscCall(PetscMalloc1(4 * (size_t)ncell, &faces->neighbour));
   for (PetscInt s = 0; s < 4 * ncell; s++) faces->neighbour[s] = -1;
   for (PetscInt v = 0; v < nvert; v++) {
-    SbFaceKey *face = faces->face;
+    SbKey *face = faces->face;
     const PetscInt begin = faces->start[v], end = faces->start[v + 1];
 
     // short buckets by insertion: the order of their faces is that of the cells
-    if (end - begin > 64) qsort(face + begin, (size_t)(end - begin), sizeof(*face), compare_keys);
+    if (end - begin > 64) SbKeysSort(end - begin, face + begin);
     for (PetscInt i = begin + 1; i < end && end - begin <= 64; i++) {
-      const SbFaceKey f = face[i];
+      const SbKey f = face[i];
       PetscInt j = i;
 
       for (; j > begin && face[j - 1].key > f.key; j--) face[j] = face[j - 1];
@@ -78,8 +69,7 @@ PetscErrorCode SbFacesCreate(PetscInt nvert, PetscInt ncell, const PetscInt cell
     }
     // equal keys: one is a boundary face, two are neighbours, more is an error
     for (PetscInt i = begin, n; i < end; i += n) {
-      for (n = 1; i + n < end && face[i + n].key == face[i].key; n++) {
-      }
+      n = SbKeysAlike(end, face, i);
       if (n == 1)
         faces->nboundary++;
       else if (n == 2) {
@@ -106,20 +96,11 @@ PetscInt SbFacesFind(const SbFaces *faces, const PetscInt vert[3], PetscInt slot
 {
   uint64_t key;
   const PetscInt lo = face_key(vert[0], vert[1], vert[2], &key);
-  PetscInt begin = faces->start[lo], n = 0;
-  const PetscInt end = faces->start[lo + 1];
+  const PetscInt end = faces->start[lo + 1] - faces->start[lo];
+  const SbKey *face = faces->face + faces->start[lo];
+  PetscInt n = 0;
 
-  /* The first face with this key or a higher one. */
-  for (PetscInt length = end - begin; length > 0;) {
-    const PetscInt half = length / 2;
-
-    if (faces->face[begin + half].key < key) {
-      begin += half + 1;
-      length -= half + 1;
-    } else
-      length = half;
-  }
-  for (; n < 2 && begin + n < end && faces->face[begin + n].key == key; n++)
-    slots[n] = faces->face[begin + n].slot;
+  for (PetscInt i = SbKeysFind(end, face, key); n < 2 && i < end && face[i].key == key; i++)
+    slots[n++] = face[i].slot;
   return n;
 }

@@ -16,7 +16,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 #include "meshio_impl.h"
-#include "sbgmsh.h"
 
 typedef struct {
   SbCaughtError caught;

@@ -7,7 +7,6 @@
 #include <dlfcn.h>
 #include <stddef.h>
 #include "meshio_impl.h"
-#include "sbgmsh.h"
 
 enum { OLDEST = 8, NEWEST = 30 }; /* 4.8 to 4.30 */
 

@@ -2,7 +2,7 @@
   meshio_impl.h - what the files of src/meshio/ share: the readers, the writers, sets that a file lists apart, a child process.
 */
 #pragma once
-#include "sbmeshio.h"
+#include "sbgmsh.h"
 
 /* Gives back what only reading needs: the text of the file, arrays of the reader. */
 PetscErrorCode SbImportForget(SbImport *import);
@@ -121,6 +121,9 @@ PetscErrorCode SbWrite_Gmsh(const SbImport *import, const char *path, SbMeshForm
 PetscErrorCode SbWrite_H5(const SbImport *import, const char *path);
 /* The index for ParaView of a mesh that was written to `h5`. */
 PetscErrorCode SbWrite_Xdmf(const SbImport *import, const char *path, const char *h5);
+
+/* gmsh_library.c: what SbGmshRun() does in the child. */
+PetscErrorCode SbGmshCall(const SbGmshJob *job, SbImport *result);
 
 /* Opens a regular file and tells its size; else says what is wrong with the name. */
 PetscErrorCode SbScanOpenFile(const char *where, const char *path, FILE **file, size_t *size);

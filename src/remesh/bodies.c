@@ -13,46 +13,24 @@
 #define INWARDS \
   1e-6 /* part of the way from a face to the middle of its DG cell, to decide on which side that is */
 
-/* Edges of tets by their vertices, each once, with the first place 6 cell + e that it has. */
-typedef struct {
-  PetscInt vert[2], at;
-} Edge;
-
-static int by_vertices(const void *a, const void *b)
+/* The edge e of a cell at the place at = 6 cell + e. */
+static SbKey edge_of(const PetscInt v[], PetscInt at)
 {
-  const Edge *p = (const Edge *)a, *q = (const Edge *)b;
-
-  for (int k = 0; k < 2; k++) {
-    if (p->vert[k] != q->vert[k]) return p->vert[k] < q->vert[k] ? -1 : 1;
-  }
-  return 0;
+  return (SbKey){SbKeyOfPair(v[SbTetEdge[at % 6][0]], v[SbTetEdge[at % 6][1]]), at};
 }
 
-static int by_place(const void *a, const void *b)
+/* Edges of tets, each once, with the first place that it has. */
+static PetscErrorCode list_edges(PetscInt ncell, const PetscInt cell[], PetscInt *n, SbKey **edge)
 {
-  const int order = by_vertices(a, b);
-
-  return order ? order : (((const Edge *)a)->at > ((const Edge *)b)->at) * 2 - 1;
-}
-
-static Edge edge_of(const PetscInt v[], PetscInt at)
-{
-  const PetscInt i = v[SbTetEdge[at % 6][0]], j = v[SbTetEdge[at % 6][1]];
-
-  return (Edge){{PetscMin(i, j), PetscMax(i, j)}, at};
-}
-
-static PetscErrorCode list_edges(PetscInt ncell, const PetscInt cell[], PetscInt *n, Edge **edge)
-{
-  PetscInt all = 6 * ncell;
+  const PetscInt all = 6 * ncell;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(all, edge));
   for (PetscInt i = 0; i < all; i++) (*edge)[i] = edge_of(cell + 4 * (i / 6), i);
-  qsort(*edge, (size_t)all, sizeof(**edge), by_place);
+  SbKeysSort(all, *edge);
   *n = 0;
   for (PetscInt i = 0; i < all; i++) {
-    if (!i || by_vertices(&(*edge)[i], &(*edge)[*n - 1])) (*edge)[(*n)++] = (*edge)[i];
+    if (!i || (*edge)[i].key != (*edge)[*n - 1].key) (*edge)[(*n)++] = (*edge)[i];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -67,7 +45,7 @@ typedef struct {
   PetscInt *cell; /* [ncell][4] old tets */
   PetscInt *at;   /* [nvert] a corner 4 cell + a of each old vertex */
   SbFaces faces;  /* of the old tets */
-  Edge *edge;     /* [nedge] of the old tets of P2, ascending */
+  SbKey *edge;    /* [nedge] of the old tets of P2, ascending */
   PetscInt nedge;
   SbLocator rest;
   PetscBool done; /* there is a new mesh */
@@ -184,20 +162,15 @@ static const PetscReal *old_value(const Work *w, PetscInt cell, PetscInt k)
 }
 
 /* The first place of the old edge that an edge of the next mesh is, -1: it is another one. */
-static PetscInt old_edge(const Work *w, const PetscInt vert[2])
+static PetscInt old_edge(const Work *w, uint64_t key)
 {
-  Edge key = {{vert[0], vert[1]}, 0}, *found;
+  const PetscInt low = (PetscInt)(key >> 32), high = (PetscInt)(key & 0xffffffff);
+  PetscInt at;
 
-  if (w->done) {
-    if (vert[1] >= w->mesh.nkept) return -1;
-    for (int k = 0; k < 2; k++) key.vert[k] = w->mesh.kept[vert[k]];
-    if (key.vert[0] > key.vert[1]) {
-      key.vert[0] = w->mesh.kept[vert[1]];
-      key.vert[1] = w->mesh.kept[vert[0]];
-    }
-  }
-  found = (Edge *)bsearch(&key, w->edge, (size_t)w->nedge, sizeof(key), by_vertices);
-  return found ? found->at : -1;
+  if (w->done && high >= w->mesh.nkept) return -1;
+  if (w->done) key = SbKeyOfPair(w->mesh.kept[low], w->mesh.kept[high]);
+  at = SbKeysFind(w->nedge, w->edge, key);
+  return at < w->nedge && w->edge[at].key == key ? w->edge[at].slot : -1;
 }
 
 /* The old fields at a position at rest, as the tet has them that holds `near`. */
@@ -254,12 +227,12 @@ static void new_values(const Work *w, PetscInt c, PetscReal value[])
       support[k] = slot < 0 ? PETSC_MAX_REAL : old_value(w, slot / 4, 4 + slot % 4)[k];
   }
   for (PetscInt e = 0; e < w->g->width - SB_EDGES; e++) {
-    const Edge edge = edge_of(w->mesh.cell + 4 * c, 6 * c + e);
-    const PetscInt at = w->edge ? old_edge(w, edge.vert) : -1;
+    const PetscInt *v = w->mesh.cell + 4 * c;
+    const PetscInt at = w->edge ? old_edge(w, edge_of(v, e).key) : -1;
     PetscReal *to = value + (SB_EDGES + e) * w->each, X[3];
 
     for (int k = 0; k < 3; k++)
-      X[k] = 0.5 * (w->mesh.X[3 * edge.vert[0] + k] + w->mesh.X[3 * edge.vert[1] + k]);
+      X[k] = 0.5 * (w->mesh.X[3 * v[SbTetEdge[e][0]] + k] + w->mesh.X[3 * v[SbTetEdge[e][1]] + k]);
     for (PetscInt k = 0; k < w->each; k++)
       to[k] = at < 0 ? PETSC_MAX_REAL : old_value(w, at / 6, SB_EDGES + at % 6)[k];
     if (w->edge && at < 0) interpolate_old(w, X, X, to);
@@ -282,14 +255,14 @@ static PetscErrorCode rename_surface(const Work *w, PetscInt vert1, PetscInt cel
   const PetscInt N = w->g->nvert, C = w->g->ncell, N1 = next->nvert, C1 = next->ncell;
   const PetscInt ncell = w->done ? w->mesh.ncell : w->ncell;
   PetscInt nedge = 0;
-  Edge *edge = NULL;
+  SbKey *edge = NULL;
 
   PetscFunctionBeginUser;
   if (w->edge) PetscCall(list_edges(ncell, w->done ? w->mesh.cell : w->cell, &nedge, &edge));
   for (PetscInt i = 0; i < nedge; i++) {
-    const PetscInt at = old_edge(w, edge[i].vert);
+    const PetscInt at = old_edge(w, edge[i].key);
 
-    if (at >= 0) rename_node(r, N + 8 * C + 6 * w->cell0 + at, N1 + 8 * C1 + 6 * cell1 + edge[i].at);
+    if (at >= 0) rename_node(r, N + 8 * C + 6 * w->cell0 + at, N1 + 8 * C1 + 6 * cell1 + edge[i].slot);
   }
   PetscCall(PetscFree(edge));
   if (w->element->nodes_per[0]) {
@@ -309,19 +282,6 @@ static PetscErrorCode rename_surface(const Work *w, PetscInt vert1, PetscInt cel
 }
 
 /* ------------------------------------------------------------------ all bodies */
-
-/* Keeps what an error says; one that is not the user's is printed with its trace, too. */
-static PetscErrorCode keep_message(MPI_Comm comm, int line, const char *function, const char *file,
-                                   PetscErrorCode code, PetscErrorType kind, const char *text, void *ctx)
-{
-  SbRemeshOutcome *outcome = (SbRemeshOutcome *)ctx;
-
-  if (kind == PETSC_ERROR_INITIAL)
-    (void)snprintf(outcome->message, sizeof(outcome->message), "%s", text ? text : "no reason was given");
-  if (code != PETSC_ERR_USER && code != PETSC_ERR_USER_INPUT && code != PETSC_ERR_FILE_UNEXPECTED)
-    (void)PetscTraceBackErrorHandler(comm, line, function, file, code, kind, text, NULL);
-  return code;
-}
 
 /* Mesh, values and names of one body. */
 static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *result)
@@ -425,17 +385,16 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
     r->outcome[b] = (SbRemeshOutcome){{nvert, nvert}, {work[b].ncell, work[b].ncell}, 0, 0., ""};
     // meshes the body again; what it cannot do goes to the message
     if (due[b]) {
-      PetscErrorCode ierr;
+      SbCaughtError caught = {0, ""};
 
-      PetscCall(PetscPushErrorHandler(keep_message, &r->outcome[b]));
-      ierr = make_mesh(&work[b], how);
-      PetscCall(PetscPopErrorHandler());
-      work[b].done = (PetscBool)!ierr;
-      if (ierr) PetscCall(SbNewMeshDestroy(&work[b].mesh));
-      r->outcome[b].nvert[0] = work[b].g->vert0[work[b].body + 1] - work[b].vert0;
-      r->outcome[b].ncell[0] = work[b].ncell;
-      r->outcome[b].nvert[1] = work[b].done ? work[b].mesh.nvert : r->outcome[b].nvert[0];
-      r->outcome[b].ncell[1] = work[b].done ? work[b].mesh.ncell : work[b].ncell;
+      SB_CATCH(&caught, make_mesh(&work[b], how));
+      (void)snprintf(r->outcome[b].message, sizeof(r->outcome[b].message), "%.511s", caught.text);
+      work[b].done = (PetscBool)!caught.code;
+      if (caught.code) PetscCall(SbNewMeshDestroy(&work[b].mesh));
+      if (work[b].done) {
+        r->outcome[b].nvert[1] = work[b].mesh.nvert;
+        r->outcome[b].ncell[1] = work[b].mesh.ncell;
+      }
       r->outcome[b].nmoved = work[b].mesh.nmoved;
       r->outcome[b].quality = work[b].mesh.quality;
     }

@@ -12,7 +12,6 @@
   now has no volume at rest, and no inner vertex: an inner edge of it gets one in its middle, with all tets around, which then moves
   inwards.
 */
-#include <stdlib.h>
 #include "remesh_impl.h"
 
 #define SWEEPS 30
@@ -147,20 +146,8 @@ static PetscBool move_vertex(const SbOldMesh *old, SbLocator rest, const Stars *
   return better;
 }
 
-static uint64_t edge_key(PetscInt p, PetscInt q)
-{
-  return (uint64_t)PetscMin(p, q) << 32 | (uint64_t)PetscMax(p, q);
-}
-
-static int by_key(const void *a, const void *b)
-{
-  const uint64_t p = *(const uint64_t *)a, q = *(const uint64_t *)b;
-
-  return (p > q) - (p < q);
-}
-
 /* The longest edge of a tet, now, that is not of the hull; false when there is none. */
-static PetscBool inner_edge(const SbSurface *hull, const uint64_t edge[], const SbNewMesh *m, PetscInt c,
+static PetscBool inner_edge(const SbSurface *hull, const SbKey edge[], const SbNewMesh *m, PetscInt c,
                             PetscInt ends[2])
 {
   PetscReal longest = -1;
@@ -168,10 +155,11 @@ static PetscBool inner_edge(const SbSurface *hull, const uint64_t edge[], const 
   for (int i = 0; i < 4; i++) {
     for (int j = 0; j < i; j++) {
       const PetscInt p = m->cell[4 * c + i], q = m->cell[4 * c + j];
-      const uint64_t key = edge_key(p, q);
+      const uint64_t key = SbKeyOfPair(p, q);
+      const PetscInt at = SbKeysFind(3 * hull->ntri, edge, key);
       PetscReal length = 0;
 
-      if (bsearch(&key, edge, 3 * (size_t)hull->ntri, sizeof(key), by_key)) continue;
+      if (at < 3 * hull->ntri && edge[at].key == key) continue;
       for (int k = 0; k < 3; k++) length += PetscSqr(m->x[3 * p + k] - m->x[3 * q + k]);
       if (length <= longest) continue;
       longest = length;
@@ -223,14 +211,14 @@ static PetscErrorCode repair_tets(const SbOldMesh *old, const SbRemeshing *how, 
                                   SbLocator rest, SbNewMesh *m)
 {
   PetscBool split = PETSC_TRUE;
-  uint64_t *edge;
+  SbKey *edge;
 
   PetscFunctionBeginUser;
   // edges of the hull, sorted: they are never split
   PetscCall(PetscMalloc1(3 * (size_t)hull->ntri, &edge));
   for (PetscInt i = 0; i < 3 * hull->ntri; i++)
-    edge[i] = edge_key(hull->tri[i], hull->tri[i % 3 == 2 ? i - 2 : i + 1]);
-  qsort(edge, 3 * (size_t)hull->ntri, sizeof(*edge), by_key);
+    edge[i] = (SbKey){SbKeyOfPair(hull->tri[i], hull->tri[i % 3 == 2 ? i - 2 : i + 1]), i};
+  SbKeysSort(3 * hull->ntri, edge);
   for (int round = 0; round < ROUNDS && split; round++) {
     const PetscInt ncell = m->ncell;
     PetscBool *moved, better = PETSC_TRUE;

@@ -154,7 +154,7 @@ static int longest_edge(const SbTriangles *t, PetscInt f)
 }
 
 /* One pass over the edges; a triangle takes part in one change at most. */
-static PetscErrorCode cut_flat(SbTriangleFile *f, PetscBool touched[], SbTriangleEdge edge[], PetscInt *ncut,
+static PetscErrorCode cut_flat(SbTriangleFile *f, PetscBool touched[], SbKey edge[], PetscInt *ncut,
                                PetscInt *nflat)
 {
   SbTriangles *t = f->t;
@@ -170,9 +170,9 @@ static PetscErrorCode cut_flat(SbTriangleFile *f, PetscBool touched[], SbTriangl
     *nflat += flat[i];
     touched[i] = PETSC_FALSE;
   }
-  if (*nflat) PetscCall(SbTrianglesEdges(t, edge));
+  if (*nflat) SbTrianglesEdges(t, edge);
   for (PetscInt i = 0, m; *nflat && i < n; i += m) {
-    m = SbTrianglesAtEdge(n, edge, i);
+    m = SbKeysAlike(n, edge, i);
     for (PetscInt k = 0; m == 2 && k < 2; k++) {
       const PetscInt mine = edge[i + k].slot / 3, other = edge[i + 1 - k].slot / 3;
       const int e = (int)(edge[i + k].slot % 3), j = (int)(edge[i + 1 - k].slot % 3);
@@ -238,7 +238,7 @@ PetscErrorCode SbSurfaceRepairTriangles(SbTriangleFile *f, SbSurfaceRepairs *rep
 {
   const SbTriangles *t = f->t;
   const PetscInt n = 3 * t->ntri;
-  SbTriangleEdge *edge;
+  SbKey *edge;
   PetscBool *touched;
   PetscInt *slot, nopen = 0, first, ncut = 1, nflat = 1;
   PetscReal need, longest2, around;
@@ -253,9 +253,9 @@ PetscErrorCode SbSurfaceRepairTriangles(SbTriangleFile *f, SbSurfaceRepairs *rep
     repairs->nflat += ncut;
   }
   // edges with a triangle on one side only
-  PetscCall(SbTrianglesEdges(t, edge));
+  SbTrianglesEdges(t, edge);
   for (PetscInt i = 0, m; i < n; i += m) {
-    m = SbTrianglesAtEdge(n, edge, i);
+    m = SbKeysAlike(n, edge, i);
     if (m == 1) slot[nopen++] = edge[i].slot;
   }
   PetscCall(PetscSortInt(nopen, slot));

@@ -169,7 +169,7 @@ static PetscErrorCode make_surface(const char *path, const PetscReal at[3], SbTr
 static PetscErrorCode take_boundary(const SbTriangleFile *f, const SbSurface *s, PetscInt *nwall)
 {
   SbTriangles *t = f->t;
-  SbTriangleEdge *edge;
+  SbKey *edge;
   PetscReal longest2, around;
 
   PetscFunctionBeginUser;
@@ -199,9 +199,9 @@ static PetscErrorCode take_boundary(const SbTriangleFile *f, const SbSurface *s,
   // neighbours across each edge; one of more than two triangles is refused
   PetscCall(PetscMalloc1(3 * (size_t)t->ntri, &t->across));
   PetscCall(PetscMalloc1(3 * (size_t)t->ntri, &edge));
-  PetscCall(SbTrianglesEdges(t, edge));
+  SbTrianglesEdges(t, edge);
   for (PetscInt i = 0; i < 3 * t->ntri; i += 2) {
-    const PetscInt n = SbTrianglesAtEdge(3 * t->ntri, edge, i), a = edge[i].slot;
+    const PetscInt n = SbKeysAlike(3 * t->ntri, edge, i), a = edge[i].slot;
     const PetscReal *p = t->x + 3 * t->tri[a], *q = t->x + 3 * t->tri[a % 3 == 2 ? a - 2 : a + 1];
 
     if (n != 2) {

@@ -42,9 +42,9 @@ typedef struct {
   SbTriangleFile *f;
   SbTriangles *t;
   SbSurfaceRepairs *m;
-  SbTriangleEdge *edge; /* [3 ntri] */
-  PetscInt *shell;      /* [2 ntri] of each side */
-  PetscInt *surface;    /* [ntri] */
+  SbKey *edge;       /* [3 ntri] */
+  PetscInt *shell;   /* [2 ntri] of each side */
+  PetscInt *surface; /* [ntri] */
   PetscInt nshell, nsurface;
   Shell *shells;
   Surface *surfaces;
@@ -118,13 +118,13 @@ static PetscErrorCode orient_alike(Arrangement *s)
   PetscCall(PetscArrayzero(sense, s->t->ntri));
   // the slot on the other side of each edge of two triangles; -1 where more meet
   for (PetscInt i = 0, m; i < n; i += m) {
-    m = SbTrianglesAtEdge(n, s->edge, i);
+    m = SbKeysAlike(n, s->edge, i);
     for (PetscInt k = 0; k < m; k++) across[s->edge[i + k].slot] = m == 2 ? s->edge[i + 1 - k].slot : -1;
   }
   ierr = reverse_minority(s, across, sense, stack);
   PetscCall(PetscFree3(across, stack, sense));
   PetscCall(ierr);
-  PetscCall(SbTrianglesEdges(s->t, s->edge)); /* corners have changed their order */
+  SbTrianglesEdges(s->t, s->edge); /* corners have changed their order */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -153,8 +153,7 @@ static PetscInt facing(const SbTriangles *t, PetscInt slot, PetscInt p, PetscBoo
 }
 
 /* Joins the sides that face each other around one edge. */
-static PetscErrorCode join_at_edge(const SbTriangles *t, PetscInt n, const SbTriangleEdge edge[],
-                                   PetscInt up[])
+static PetscErrorCode join_at_edge(const SbTriangles *t, PetscInt n, const SbKey edge[], PetscInt up[])
 {
   const PetscInt p = (PetscInt)(edge[0].key >> 32), q = (PetscInt)(edge[0].key & 0xffffffff);
   Spoke few[8], *spoke = few;
@@ -203,7 +202,7 @@ static PetscErrorCode find_shells(Arrangement *s)
   for (PetscInt i = 0; i < 2 * s->t->ntri; i++) s->shell[i] = i;
   for (PetscInt f = 0; f < s->t->ntri; f++) s->surface[f] = f;
   for (PetscInt i = 0, m; i < n; i += m) {
-    m = SbTrianglesAtEdge(n, s->edge, i);
+    m = SbKeysAlike(n, s->edge, i);
     PetscCall(join_at_edge(s->t, m, s->edge + i, s->shell));
     for (PetscInt k = 1; k < m; k++)
       (void)SbUnionJoin(s->surface, s->edge[i].slot / 3, s->edge[i + k].slot / 3);
@@ -250,7 +249,7 @@ static PetscErrorCode measure_shells(Arrangement *s)
   }
   // surfaces with an edge of more than two triangles
   for (PetscInt i = 0, m; i < 3 * t->ntri; i += m) {
-    m = SbTrianglesAtEdge(3 * t->ntri, s->edge, i);
+    m = SbKeysAlike(3 * t->ntri, s->edge, i);
     if (m > 2) s->surfaces[s->surface[s->edge[i].slot / 3]].branched = PETSC_TRUE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -394,7 +393,7 @@ static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
 
   PetscFunctionBeginUser;
   /* orientation, shells and their volumes */
-  PetscCall(SbTrianglesEdges(s->t, s->edge));
+  SbTrianglesEdges(s->t, s->edge);
   PetscCall(orient_alike(s));
   PetscCall(find_shells(s));
   PetscCall(measure_shells(s));

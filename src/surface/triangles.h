@@ -2,6 +2,7 @@
   triangles.h - a surface of triangles on its way from a file to a rigid obstacle: what the files triangles*.c share. Rank 0 only.
 */
 #pragma once
+#include "sbgeometry.h"
 #include "sbmeshio.h"
 #include "sbtriangles.h"
 
@@ -70,14 +71,8 @@ PetscErrorCode SbTrianglesReadFile(const char *path, SbTriangleFile *file);
 
 /* ------------------------------------------------------------------ triangles_measure.c */
 
-typedef struct {
-  uint64_t key;  /* lower and higher vertex */
-  PetscInt slot; /* 3 triangle + edge; edge k runs from corner k to the next */
-} SbTriangleEdge;
-/* edge[3 ntri], sorted: those with one key are one edge. */
-PetscErrorCode SbTrianglesEdges(const SbTriangles *triangles, SbTriangleEdge edge[]);
-/* How many triangles there are at the edge that begins at position i of n. */
-PetscInt SbTrianglesAtEdge(PetscInt n, const SbTriangleEdge edge[], PetscInt i);
+/* edge[3 ntri], sorted: those with one key are one edge. Slots 3 triangle + edge; edge k runs from corner k to the next. */
+void SbTrianglesEdges(const SbTriangles *triangles, SbKey edge[]);
 /* Twice the area of a triangle, m^2, its longest edge squared and the sum of its edges. */
 PetscReal SbTriangleMeasure(const SbTriangles *triangles, PetscInt f, PetscReal *longest2, PetscReal *around);
 /* Volume of the tet between a triangle and the point o, m^3, positive when o is behind. */

@@ -2,7 +2,6 @@
   triangles_measure.c - triangles and edges of a surface: areas, volumes, solid angles (van Oosterom and Strackee 1983), which triangles meet at an
   edge.
 */
-#include <stdlib.h>
 #include "sbkernel.h"
 #include "triangles.h"
 
@@ -30,35 +29,11 @@ PetscReal SbTriangleMeasure(const SbTriangles *t, PetscInt f, PetscReal *longest
 
 /* ------------------------------------------------------------------ edges */
 
-static int compare_edges(const void *a, const void *b)
+void SbTrianglesEdges(const SbTriangles *t, SbKey edge[])
 {
-  const SbTriangleEdge *p = (const SbTriangleEdge *)a, *q = (const SbTriangleEdge *)b;
-
-  if (p->key != q->key) return p->key < q->key ? -1 : 1;
-  return (p->slot > q->slot) - (p->slot < q->slot);
-}
-
-PetscErrorCode SbTrianglesEdges(const SbTriangles *t, SbTriangleEdge edge[])
-{
-  const PetscInt n = 3 * t->ntri;
-
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < n; i++) {
-    const PetscInt a = t->tri[i], b = t->tri[i % 3 == 2 ? i - 2 : i + 1];
-
-    edge[i].key = (uint64_t)PetscMin(a, b) << 32 | (uint64_t)PetscMax(a, b);
-    edge[i].slot = i;
-  }
-  if (n) qsort(edge, (size_t)n, sizeof(*edge), compare_edges);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscInt SbTrianglesAtEdge(PetscInt n, const SbTriangleEdge edge[], PetscInt i)
-{
-  PetscInt m = 1;
-
-  for (; i + m < n && edge[i + m].key == edge[i].key;) m++;
-  return m;
+  for (PetscInt i = 0; i < 3 * t->ntri; i++)
+    edge[i] = (SbKey){SbKeyOfPair(t->tri[i], t->tri[i % 3 == 2 ? i - 2 : i + 1]), i};
+  SbKeysSort(3 * t->ntri, edge);
 }
 
 PetscReal SbTetVolumeTo(const SbTriangles *t, PetscInt f, const PetscReal o[3])
