@@ -24,6 +24,8 @@ void SbJumpMatrix(SbSpace space, PetscInt b, PetscInt l, PetscReal K[8][8]);
 
 /* plan.c. Where a cell begins in SbPlan.offset: block (a, b) follows at SB_BATCH (width a + b). */
 size_t SbPlanCellOffset(SbSpace space, PetscInt cell);
+/* The face terms as they are now, summed for the matrix. */
+void SbPlanFaceTerms(SbSpace space, SbPlan plan);
 PetscErrorCode SbPlanDestroy(SbPlan *plan);
 
 /* The value arrays of a matrix and how blocks lie in them. */

@@ -7,7 +7,7 @@
     kappa1 = gamma1 H(2 mu |F| / V),   kappa0 = gamma0 H((2 mu + lambda) |F| / V)  (DG only),
 
   H(k) = 2 k+ k- / (k+ + k-) the harmonic mean of the two sides; for one material H(mu |F| / V) = mu / h with
-  h = (V+ + V-) / (2 |F|) (Hansbo and Larson 2002). The terms take world vectors, are isotropic and constant: no rotation
+  h = (V+ + V-) / (2 |F|) (Hansbo and Larson 2002). The terms take world vectors, are isotropic and constant within a step: no rotation
   changes them, and rigid motions have no jumps.
 
   A cell's function at vertex v is S - 3 u_v, S the sum of its four nodes and u_v the one opposite v. So the jump at the three
@@ -18,12 +18,35 @@
   dW/dJ_i = c1 J_i + (c1 + c0) sum J,  c1 = kappa1 |F| / 12,  c0 = kappa0 |F| / 9, is spread over the eight nodes as J was
   gathered. For CR the two sides have the node of the face in common, and its parts cancel.
 
+  Under compression mu is not enough. A law whose energy has a part that depends on det F, or on another function of F that is not convex, has twists
+  with a negative stiffness (P_i + P_j) / (s_i + s_j), P_i and s_i principal values of the first Piola stress and of F: under an even pressure p that is mu - p. For
+  continuous displacements the sum of these over the cells vanishes but for the boundary; for broken ones it is jumps that have to balance it. So
+
+    kappa1 = gamma1 H(2 m |F| / V),   m = max(mu, FOLLOW max_ij -(P_i + P_j) / (s_i + s_j)),
+
+  with the state before the step, so that within a step the terms are constant, and their energy a quadratic one. A dependence on the state of the
+  step itself would have to be differentiated: the energy of jumps would become a pressure of its own, lambda times as large as it should be.
+
   A boundary face with a support (layout.c): the other side is constant, the displacement of the support, and infinitely
   stiff. H(k) is 2 k then; there is no kappa1, because supports prescribe means.
 */
 #include "fem_impl.h"
+#include "sbkernel.h"
+
+#define FOLLOW 4. /* factor on the negative stiffness that the penalty follows; docs/reference/theory.md */
+#define RENEWED 0.01 /* relative change of a penalty that counts as one */
+
+/* A face between two local cells; cell[1] = SUPPORT: between a cell and a support. */
+typedef struct {
+  PetscInt cell[2], face[2], region;
+} Face;
+#define SUPPORT (-1)
 
 struct _p_SbJump {
+  Face *face;          /* in the order of batches and lanes */
+  PetscInt *region_of; /* [ncell] */
+  PetscReal *V;        /* [ncell] m^3 */
+  PetscReal *modulus;  /* [ncell] m above, Pa */
   PetscInt nbatch;
   PetscInt *region; /* [nbatch] region of the first side: damping is that of its body */
   PetscInt *n;      /* [nbatch] faces in it */
@@ -32,11 +55,6 @@ struct _p_SbJump {
   SbPack *share;    /* [nbatch] how much of a face's energy this rank counts: 1, or 1/2 between ranks */
 };
 
-/* A face between two local cells; cell[1] = SUPPORT: between a cell and a support. */
-typedef struct {
-  PetscInt cell[2], face[2], region;
-} Face;
-#define SUPPORT (-1)
 
 /* Nodes of a face: for each side the one on the face, then those opposite the three vertices, in one order for both. */
 static void face_nodes(SbSpace s, const Face *face, PetscInt node[8])
@@ -79,18 +97,17 @@ static inline PetscReal harmonic(PetscReal a, PetscReal b)
 }
 
 /* c0 and c1 of a face. */
-static void face_factors(SbSpace s, const Face *face, const PetscInt region_of[], const PetscReal V[],
-                         PetscReal *c0, PetscReal *c1)
+static void face_factors(SbSpace s, SbJump j, const Face *face, PetscReal *c0, PetscReal *c1)
 {
   const PetscReal area = face_area(s->mesh, face->cell[0], (PetscInt)face->face[0]);
   const SbElement e = s->region[face->region].element;
   PetscReal k0[2], k1[2];
 
   for (int side = 0; side < (face->cell[1] == SUPPORT ? 1 : 2); side++) {
-    const SbMaterial m = s->region[region_of[face->cell[side]]].material;
+    const PetscInt cell = face->cell[side];
 
-    k1[side] = 2. * m->ops.shear_modulus(m) * area / V[face->cell[side]];
-    k0[side] = SbMaterialWaveModulus(m) * area / V[face->cell[side]];
+    k1[side] = 2. * j->modulus[cell] * area / j->V[cell];
+    k0[side] = SbMaterialWaveModulus(s->region[j->region_of[cell]].material) * area / j->V[cell];
   }
   if (face->cell[1] == SUPPORT) {
     *c1 = 0.;
@@ -130,31 +147,30 @@ static PetscErrorCode find_faces(SbSpace s, const PetscInt region_of[], PetscInt
 
 PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
 {
-  PetscInt nface = 0, *region_of, b = -1;
-  PetscReal *V;
-  Face *faces;
+  PetscInt nface = 0, b = -1;
   SbJump j;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&j));
-  PetscCall(PetscMalloc2(s->mesh->ncell, &region_of, s->mesh->ncell, &V));
+  PetscCall(PetscMalloc3(s->mesh->ncell, &j->region_of, s->mesh->ncell, &j->V, s->mesh->ncell, &j->modulus));
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
 
     for (PetscInt c = region->cstart; c < region->cend; c++) {
       const PetscInt k = c - region->cstart;
 
-      region_of[c] = r;
-      V[c] = s->batch_V[region->bstart + k / SB_BATCH][k % SB_BATCH];
+      j->region_of[c] = r;
+      j->V[c] = s->batch_V[region->bstart + k / SB_BATCH][k % SB_BATCH];
+      j->modulus[c] = region->material->ops.shear_modulus(region->material);
     }
   }
-  PetscCall(find_faces(s, region_of, &nface, &faces));
+  PetscCall(find_faces(s, j->region_of, &nface, &j->face));
   /* a batch never mixes bodies: one more each at most */
   j->nbatch = nface / SB_BATCH + s->mesh->nbody;
   PetscCall(PetscMalloc3(j->nbatch, &j->region, j->nbatch, &j->n, j->nbatch * 8 * SB_BATCH, &j->node));
   PetscCall(PetscCalloc3(j->nbatch, &j->c0, j->nbatch, &j->c1, j->nbatch, &j->share));
   for (PetscInt i = 0; i < nface; i++) {
-    const Face *face = &faces[i];
+    const Face *face = &j->face[i];
     PetscInt node[8], l;
 
     if (i == 0 || j->n[b] == SB_BATCH || s->region[face->region].body != s->region[j->region[b]].body) {
@@ -167,7 +183,7 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
       for (PetscInt lane = l; lane < (l ? l + 1 : SB_BATCH); lane++)
         j->node[(8 * b + k) * SB_BATCH + lane] = node[k];
     }
-    face_factors(s, face, region_of, V, &j->c0[b][l], &j->c1[b][l]);
+    face_factors(s, j, face, &j->c0[b][l], &j->c1[b][l]);
     for (int side = 0; side < 2; side++) {
       const PetscInt cell = face->cell[face->cell[1] == SUPPORT ? 0 : side];
 
@@ -177,9 +193,90 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
   j->nbatch = 0;
   for (PetscInt i = 0; i < nface; i += j->n[j->nbatch++]) {
   }
-  PetscCall(PetscFree2(region_of, V));
-  PetscCall(PetscFree(faces));
   *jump = j;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The modulus m of each cell of a batch, from its state. */
+static void follow_batch(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[])
+{
+  const SbMaterial m = region->material;
+  const PetscReal mu = m->ops.shear_modulus(m);
+  PetscReal *modulus = s->jump->modulus + s->batch_cell[b], largest = 0.;
+  SbPack u[12], F[9], P[9], R[9], S[6], stretch[3], V[9];
+
+  for (PetscInt l = 0; l < s->batch_n[b]; l++) modulus[l] = mu;
+  sb_gather_strain(s, region, b, x, u);
+  SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, F);
+  m->ops.stress(m, (const SbPack *)F, P);
+
+  /* principal values are below sqrt(2) |P| in pairs: mostly that is all there is to know */
+  for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+    PetscReal square = 0.;
+
+    for (int k = 0; k < 9; k++) square += P[k][l] * P[k][l];
+    largest = PetscMax(largest, square);
+  }
+  if (largest < 0.5 * PetscSqr(mu / FOLLOW)) return;
+
+  /* F = R V diag(stretch) V^T, and the twists' stiffnesses */
+  SbPolar((const SbPack *)F, R);
+  for (int k = 0; k < 6; k++) {
+    static const int row[6] = {0, 0, 0, 1, 1, 2}, column[6] = {0, 1, 2, 1, 2, 2};
+
+    for (int l = 0; l < SB_BATCH; l++) {
+      S[k][l] = 0.;
+      for (int i = 0; i < 3; i++) S[k][l] += R[3 * i + row[k]][l] * F[3 * i + column[k]][l];
+    }
+  }
+  SbSymEig((const SbPack *)S, stretch, V);
+  for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+    PetscReal principal[3] = {0.};
+
+    for (int k = 0; k < 27; k++) {
+      const int i = k / 9, j = k / 3 % 3, a = k % 3;
+      PetscReal left = 0.;
+
+      for (int c = 0; c < 3; c++) left += R[3 * i + c][l] * V[3 * c + a][l];
+      principal[a] += left * P[3 * i + j][l] * V[3 * j + a][l];
+    }
+    for (int k = 0; k < 3; k++) {
+      const PetscReal sum = stretch[k][l] + stretch[(k + 1) % 3][l],
+                      twist = sum > 0. ? (principal[k] + principal[(k + 1) % 3]) / sum : 0.;
+
+      modulus[l] = PetscMax(modulus[l], -FOLLOW * twist);
+    }
+  }
+}
+
+PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, PetscBool *changed)
+{
+  const SbJump j = s->jump;
+  PetscBool any = PETSC_FALSE;
+  const PetscReal *x;
+
+  PetscFunctionBeginUser;
+  *changed = PETSC_FALSE;
+  if (!j || s->linear) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbSpaceGetLocalRead(s, U, &x));
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+
+    for (PetscInt b = region->bstart; !region->material->linear && !region->quadratic && b < region->bend; b++)
+      follow_batch(s, region, b, x);
+  }
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
+  for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
+    for (PetscInt l = 0; l < j->n[b]; l++, i++) {
+      const PetscReal before = j->c1[b][l];
+
+      face_factors(s, j, &j->face[i], &j->c0[b][l], &j->c1[b][l]);
+      any = (PetscBool)(any || j->c1[b][l] != before);
+      if (PetscAbsReal(j->c1[b][l] - before) > RENEWED * before) *changed = PETSC_TRUE;
+    }
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, changed, 1, MPIU_BOOL, MPI_LOR, s->comm));
+  if (s->plan && any) SbPlanFaceTerms(s, s->plan);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -189,6 +286,8 @@ PetscErrorCode SbJumpDestroy(SbJump *jump)
 
   PetscFunctionBeginUser;
   if (!j) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree3(j->region_of, j->V, j->modulus));
+  PetscCall(PetscFree(j->face));
   PetscCall(PetscFree3(j->region, j->n, j->node));
   PetscCall(PetscFree3(j->c0, j->c1, j->share));
   PetscCall(PetscFree(*jump));

@@ -9,7 +9,7 @@
 PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 {
   SNESConvergedReason reason;
-  PetscBool again = PETSC_TRUE;
+  PetscBool again = PETSC_TRUE, stiffer = PETSC_FALSE, changed;
 
   PetscFunctionBeginUser;
   for (int solves = 0; again; solves++) {
@@ -23,7 +23,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
     }
 
     /* a first guess, and the solution from there; with contact, as often as finding out what touches takes */
-    PetscCall((*a->predict)(a->ctx));
+    if (!stiffer) PetscCall((*a->predict)(a->ctx));
     if (run->model->nbegin_step)
       PetscCall(SbRunSolveContact(run, a, &reason));
     else
@@ -31,6 +31,15 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 
     /* the state at the end, or why there is none */
     PetscCall((*a->complete)(a->ctx, reason, &step, ok));
+
+    /* jumps of CR and DG are penalised as the state at the start asks for: of a load step, which may be long, once more as its end does */
+    if (stiffer)
+      stiffer = PETSC_FALSE;
+    else if (*ok && !run->model->dynamic) {
+      PetscCall(SbSpaceFollowJumps(run->model->space, a->U, &stiffer));
+      again = stiffer;
+      if (stiffer) continue;
+    }
 
     /* who examines solutions may ask for a better one, after the solver knows what is wanted */
     again = PETSC_FALSE;
@@ -44,19 +53,25 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   /* what moves by order is where it was when the step began, if the run ends there */
   if (!*ok && run->model->npotential) PetscCall(SbModelPotentialAdvance(run->model, 0.));
 
-  if (!*ok) PetscCall(SbRunWarnShorter(run, a->dt));
+  if (!*ok) {
+    PetscCall(SbSpaceFollowJumps(run->model->space, a->U0, &changed));
+    PetscCall(SbRunWarnShorter(run, a->dt));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt, PetscBool last)
 {
   const PetscBool first = (PetscBool)(step == run->step0);
+  PetscBool changed;
   const PetscReal begun = MPI_Wtime();
   const SbModel m = run->model;
   SbStage stage = {.t = t, .dt = dt, .step = step, .shift_k = 1.};
   SbStep now = {.step = step, .t = t, .dt = dt, .t_end = run->t_end, .U = run->U, .V = run->V, .A = run->A};
 
   PetscFunctionBeginUser;
+  if (first && run->snes) PetscCall(SbSpaceFollowJumps(m->space, run->U, &changed));
+
   /* a step that was seen already: there was no other after it */
   if (run->seen.U && run->seen.step == step) {
     if (!run->stopped || first) PetscFunctionReturn(PETSC_SUCCESS);
@@ -105,6 +120,7 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
   for (PetscInt k = 0; k < run->nmonitor; k++) PetscCall(run->monitor[k].fn(run, &now, run->monitor[k].ctx));
   run->seen = now;
   if (SbLiveCount()) PetscCall(SbLiveAdvance(m->comm, t));
+  if (!first && run->snes) PetscCall(SbSpaceFollowJumps(m->space, run->U, &changed));
   run->stop.step_begun = MPI_Wtime();
   run->stop.longest_output = PetscMax(run->stop.longest_output, run->stop.step_begun - begun);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -3,7 +3,8 @@
   A cushion between two plates that both move, until it is half as high; quarter of it, planes of symmetry x = 0 and y = 0, no friction.
 
   Both plates push alike, the force rises in every step, no cell is inverted, and nothing moves up or down in the middle. The work of
-  the plates is the energy that the cushion has taken. With Poisson's ratio 0.49 the volume hardly changes.
+  the plates is the energy that the cushion has taken. With Poisson's ratio 0.49 the volume hardly changes, and CR and P2 give the same force
+  (with a penalty of jumps that does not follow the state CR gives less than half of it).
   With P1, x itself is an
   admissible test function: the integral of the trace of the stress is the sum of x . f, which is minus the height times the force.
 */
@@ -51,7 +52,8 @@ static PetscErrorCode stress_trace(TestScene *t, PetscReal *integral)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscReal poisson, PetscReal swell)
+static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscReal poisson, PetscReal swell,
+                                    PetscReal newtons)
 {
   const PetscInt n[3] = {cells, cells, 2 * cells};
   const PetscReal young = 1e4;
@@ -87,7 +89,7 @@ static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscRe
   drift = PetscMax(record_max(&r, "centre_z"), -record_min(&r, "centre_z"));
   VERIFY_LESS(apart, 1e-6, "difference of the plates' forces, of the force");
   VERIFY_LESS(fall, 2e-3 * force, "the force fell by, N");
-  VERIFY_MORE(record_last(&r, "top_contacts"), 10, "nodes at a plate");
+  VERIFY_MORE(record_last(&r, "top_contacts"), 7, "nodes at a plate");
   VERIFY_NEAR(record_last(&r, "bottom_contacts"), record_last(&r, "top_contacts"), 0,
               "nodes at the other one");
   VERIFY_LESS(drift, 1e-7 * RADIUS, "motion of the centre, m");
@@ -97,6 +99,8 @@ static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscRe
                 "behind a plate, m");
   VERIFY_NEAR(record_last(&r, "volume") / record_at(&r, "volume", 0), 1, swell, "volume, of that at rest");
   VERIFY_NEAR(work / record_last(&r, "strain"), 1, 0.02, "work of the plates against the energy");
+  /* P2 on two cells across is 4 % below that on three */
+  if (newtons > 0) VERIFY_NEAR(force / newtons, 1, 0.05, "force, of that of P2 with three cells across");
   /* it is RADIUS high now */
   if (!strcmp(element, "p1"))
     VERIFY_NEAR(-force * RADIUS / trace, 1, 1e-6, "height times force against the trace of the stress");
@@ -105,6 +109,7 @@ static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+<<<<<<< HEAD
 /* Springs as stiff as a body is against compression, at nu = 0.4999 a thousand times as stiff as against shear, take 1,800 iterations here. */
 static PetscErrorCode check_springs(const char *element)
 {
@@ -129,16 +134,58 @@ static PetscErrorCode check_springs(const char *element)
   if (!strcmp(element, "p2"))
     VERIFY_NEAR(record_last(&r, "floor_force_z") / 3.430, 1, 0.01, "force, of that without springs");
   PetscCall(record_free(&r));
+=======
+static void block(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+{
+  (void)n;
+  (void)at;
+  (void)ctx;
+  for (int k = 0; k < 3; k++) x[k] *= (k == 2 ? 2 : 1) * RADIUS;
+}
+
+/* The penalty of jumps changes from step to step: a block that is thrown onto a floor, to two thirds of its height, gains no energy by it. */
+static PetscErrorCode check_thrown(const char *element)
+{
+  const PetscInt n[3] = {2, 2, 4};
+  Record r = {0};
+  char path[512];
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  verify_case("thrown, %s", element);
+  PetscCall(verify_mesh_write(n, block, NULL, path));
+  PetscCall(verify_open(
+    &t,
+    "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material neohookean -body_a_young 1e4 "
+    "-body_a_poisson 0.49 -body_a_density 1000 -body_a_velocity 0,0,-2.5 -effects floor -effect_floor_type contact "
+    "-effect_floor_obstacle plane:0,0,1,-1e-4 -time euler_implicit -ts_dt 1e-3 -ts_max_time 0.05",
+    path, element));
+  PetscCall(record_solve(&t, &r));
+  PetscCall(test_scene_close(&t));
+  VERIFY_LESS(record_gain(&r, "energy"), 1e-6 * record_at(&r, "energy", 0), "energy gained in a step, J");
+  /* P2 on the same mesh: 0.0551 m; with a penalty that does not follow some 0.03 m less */
+  VERIFY_NEAR(record_last(&r, "centre_z"), 0.0551, 0.003, "height of the centre, m");
+  PetscCall(record_free(&r));
+  PetscCall(test_file_remove(path));
+>>>>>>> 06b7d23 (CR and DG: the penalty of jumps follows the stress, so that strong compression no longer makes them soft)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
+<<<<<<< HEAD
   PetscCall(check_squeeze("p1", 4, 0.3, 0.35));
   PetscCall(check_squeeze("cr", 3, 0.49, 0.012));
   PetscCall(check_squeeze("p2", 2, 0.49, 0.02));
   PetscCall(check_springs("p2"));
   PetscCall(check_springs("cr"));
+=======
+  PetscCall(check_squeeze("p1", 4, 0.3, 0.35, 0));
+  PetscCall(check_squeeze("cr", 2, 0.49, 0.02, 22.5));
+  PetscCall(check_squeeze("cr", 3, 0.49, 0.02, 22.5));
+  PetscCall(check_squeeze("p2", 2, 0.49, 0.02, 22.5));
+  PetscCall(check_thrown("cr"));
+>>>>>>> 06b7d23 (CR and DG: the penalty of jumps follows the stress, so that strong compression no longer makes them soft)
   SB_TEST_END();
 }
