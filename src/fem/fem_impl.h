@@ -19,13 +19,13 @@ void SbJumpAdd(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscRea
 PetscReal SbJumpEnergy(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal body[]);
 /* node[nbatch][8][SB_BATCH] of the faces, borrowed; returns nbatch. */
 PetscInt SbJumpCliques(SbSpace space, const PetscInt **node);
+/* The penalty of jumps as the state asks for; any: something changed, changed: by a percent or more, on this rank. */
+void SbJumpFollow(SbSpace space, const PetscReal x[], PetscBool *any, PetscBool *changed);
 /* The matrix of the face in lane l of batch b, times the 3x3 identity; zero in padding. */
 void SbJumpMatrix(SbSpace space, PetscInt b, PetscInt l, PetscReal K[8][8]);
 
 /* plan.c. Where a cell begins in SbPlan.offset: block (a, b) follows at SB_BATCH (width a + b). */
 size_t SbPlanCellOffset(SbSpace space, PetscInt cell);
-/* The face terms as they are now, summed for the matrix. */
-void SbPlanFaceTerms(SbSpace space, SbPlan plan);
 PetscErrorCode SbPlanDestroy(SbPlan *plan);
 
 /* The value arrays of a matrix and how blocks lie in them. */

@@ -249,35 +249,26 @@ static void follow_batch(SbSpace s, const SbRegion *region, PetscInt b, const Pe
   }
 }
 
-PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, PetscBool *changed)
+void SbJumpFollow(SbSpace s, const PetscReal x[], PetscBool *any, PetscBool *changed)
 {
   const SbJump j = s->jump;
-  PetscBool any = PETSC_FALSE;
-  const PetscReal *x;
 
-  PetscFunctionBeginUser;
-  *changed = PETSC_FALSE;
-  if (!j || s->linear) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbSpaceGetLocalRead(s, U, &x));
+  *any = *changed = PETSC_FALSE;
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
 
     for (PetscInt b = region->bstart; !region->material->linear && !region->quadratic && b < region->bend; b++)
       follow_batch(s, region, b, x);
   }
-  PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
       const PetscReal before = j->c1[b][l];
 
       face_factors(s, j, &j->face[i], &j->c0[b][l], &j->c1[b][l]);
-      any = (PetscBool)(any || j->c1[b][l] != before);
+      *any = (PetscBool)(*any || j->c1[b][l] != before);
       if (PetscAbsReal(j->c1[b][l] - before) > RENEWED * before) *changed = PETSC_TRUE;
     }
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, changed, 1, MPIU_BOOL, MPI_LOR, s->comm));
-  if (s->plan && any) SbPlanFaceTerms(s, s->plan);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbJumpDestroy(SbJump *jump)

@@ -72,7 +72,8 @@ static PetscErrorCode plan_fresh(SbSpace s, SbPlan p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbPlanFaceTerms(SbSpace s, SbPlan p)
+/* The face terms as they are now, summed for the matrix. */
+static void sum_face_terms(SbSpace s, SbPlan p)
 {
   const PetscInt *nodes, nbatch = SbJumpCliques(s, &nodes);
 
@@ -198,7 +199,7 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
   p->offset = group[0].offset;
   if (s->jump) {
     PetscCall(PetscMalloc2(p->di[nrow], &p->face_term[0], p->oi[nrow], &p->face_term[1]));
-    SbPlanFaceTerms(s, p);
+    sum_face_terms(s, p);
   }
   for (PetscInt k = 0; k < ngroup; k++) {
     PetscCall(PetscFree(group[k].start));
@@ -208,6 +209,22 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
   // where assembly first touches each row, so that it is cleared while in the cache
   PetscCall(plan_fresh(s, p));
   *plan = p;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, PetscBool *changed)
+{
+  const PetscReal *x;
+  PetscBool any;
+
+  PetscFunctionBeginUser;
+  *changed = PETSC_FALSE;
+  if (!s->jump || s->linear) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbSpaceGetLocalRead(s, U, &x));
+  SbJumpFollow(s, x, &any, changed);
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, changed, 1, MPIU_BOOL, MPI_LOR, s->comm));
+  if (s->plan && any) sum_face_terms(s, s->plan);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
