@@ -93,6 +93,7 @@ struct _p_SbRun {
   PetscReal time_of_impact;                     /* the part of the step at which it did, 1: it did not */
   PetscReal spectral_radius, newmark[2];        /* newmark: beta, gamma */
   PetscInt max_halvings, static_steps;
+  PetscBool goes_on;       /* a solve from another one's solution, to that one's tolerance */
   PetscReal min_increment; /* static: smallest load increment as a part of 1 / static_steps */
   PetscReal
     softening; /* static: |du|/dlambda of the last step over that of the slowest one; 0: there was none */

@@ -33,7 +33,7 @@
 #include "fem_impl.h"
 #include "sbkernel.h"
 
-#define FOLLOW 4. /* factor on the negative stiffness that the penalty follows; docs/reference/theory.md */
+#define FOLLOW 4.    /* factor on the negative stiffness that the penalty follows; docs/reference/theory.md */
 #define RENEWED 0.01 /* relative change of a penalty that counts as one */
 
 /* A face between two local cells; cell[1] = SUPPORT: between a cell and a support. */
@@ -54,7 +54,6 @@ struct _p_SbJump {
   SbPack *c0, *c1;  /* [nbatch] N/m; zero in padding */
   SbPack *share;    /* [nbatch] how much of a face's energy this rank counts: 1, or 1/2 between ranks */
 };
-
 
 /* Nodes of a face: for each side the one on the face, then those opposite the three vertices, in one order for both. */
 static void face_nodes(SbSpace s, const Face *face, PetscInt node[8])
@@ -257,7 +256,8 @@ void SbJumpFollow(SbSpace s, const PetscReal x[], PetscBool *any, PetscBool *cha
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
 
-    for (PetscInt b = region->bstart; !region->material->linear && !region->quadratic && b < region->bend; b++)
+    for (PetscInt b = region->bstart; !region->material->linear && !region->quadratic && b < region->bend;
+         b++)
       follow_batch(s, region, b, x);
   }
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {

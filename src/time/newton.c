@@ -94,9 +94,10 @@ typedef struct {
   SbBlocks blocks;        /* its second derivative, when the last direction was solved for */
   PetscInt nblock;        /* of all ranks */
   SbContactHessian kind;
-  PetscReal shift;   /* of the last direction: times the mass added to the tangent, 1/s^2 */
-  PetscBool whole;   /* the last step was */
-  PetscReal initial; /* norm of the first residual, N */
+  PetscReal shift;     /* of the last direction: times the mass added to the tangent, 1/s^2 */
+  PetscBool whole;     /* the last step was */
+  PetscReal tolerance; /* of the last solve, N */
+  PetscReal initial;   /* norm of the first residual, N */
 } Newton;
 
 /* Energies and forces of an iterate with its residual, or the residual's norm alone where that is no number. */
@@ -588,6 +589,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   n->initial = snes->norm;
   PetscCall(SNESLogConvergenceHistory(snes, snes->norm, 0));
   PetscCall(SbSNESConverged(snes, 0, 0., 0., snes->norm));
+  n->tolerance = snes->ttol = PetscMax(snes->ttol, n->run->goes_on ? n->tolerance : 0.);
   PetscCall(SNESMonitor(snes, 0, snes->norm));
 
   while (!snes->reason) {

@@ -9,9 +9,11 @@
 PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 {
   SNESConvergedReason reason;
-  PetscBool again = PETSC_TRUE, stiffer = PETSC_FALSE, changed;
+  PetscBool again = PETSC_TRUE, changed;
 
   PetscFunctionBeginUser;
+  PetscCall(SbSpaceFollowJumps(run->model->space, a->U0, &changed));
+  run->goes_on = PETSC_FALSE;
   for (int solves = 0; again; solves++) {
     SbSolvedStep step;
 
@@ -23,7 +25,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
     }
 
     /* a first guess, and the solution from there; with contact, as often as finding out what touches takes */
-    if (!stiffer) PetscCall((*a->predict)(a->ctx));
+    if (!run->goes_on) PetscCall((*a->predict)(a->ctx));
     if (run->model->nbegin_step)
       PetscCall(SbRunSolveContact(run, a, &reason));
     else
@@ -33,13 +35,11 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
     PetscCall((*a->complete)(a->ctx, reason, &step, ok));
 
     /* jumps of CR and DG are penalised as the state at the start asks for: of a load step, which may be long, once more as its end does */
-    if (stiffer)
-      stiffer = PETSC_FALSE;
-    else if (*ok && !run->model->dynamic) {
-      PetscCall(SbSpaceFollowJumps(run->model->space, a->U, &stiffer));
-      again = stiffer;
-      if (stiffer) continue;
+    if (*ok && !run->model->dynamic && !run->goes_on) {
+      PetscCall(SbSpaceFollowJumps(run->model->space, a->U, &run->goes_on));
+      if (run->goes_on) continue;
     }
+    run->goes_on = PETSC_FALSE;
 
     /* who examines solutions may ask for a better one, after the solver knows what is wanted */
     again = PETSC_FALSE;
@@ -53,10 +53,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   /* what moves by order is where it was when the step began, if the run ends there */
   if (!*ok && run->model->npotential) PetscCall(SbModelPotentialAdvance(run->model, 0.));
 
-  if (!*ok) {
-    PetscCall(SbSpaceFollowJumps(run->model->space, a->U0, &changed));
-    PetscCall(SbRunWarnShorter(run, a->dt));
-  }
+  if (!*ok) PetscCall(SbRunWarnShorter(run, a->dt));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -120,7 +117,6 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
   for (PetscInt k = 0; k < run->nmonitor; k++) PetscCall(run->monitor[k].fn(run, &now, run->monitor[k].ctx));
   run->seen = now;
   if (SbLiveCount()) PetscCall(SbLiveAdvance(m->comm, t));
-  if (!first && run->snes) PetscCall(SbSpaceFollowJumps(m->space, run->U, &changed));
   run->stop.step_begun = MPI_Wtime();
   run->stop.longest_output = PetscMax(run->stop.longest_output, run->stop.step_begun - begun);
   PetscFunctionReturn(PETSC_SUCCESS);
