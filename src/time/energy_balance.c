@@ -3,9 +3,12 @@
   does the work (f0 + f1)/2 . (u1 - u0) by the loads (exact for constant loads: minus the change of their potential),
   (R0 + R1)/2 . (u1 - u0) by moving supports, and loses (p0 + p1)/2 h with p = v . C v to damping. What contact by barrier does it
   knows itself (src/effect/barrier.c): the energy of its gaps may change by much within a step. What is missing then
-  between start and now was taken (or, negative, given) by the integrator.
+  between start and now was taken (or, negative, given) by the integrator. None of the implicit ones gives much while it is stable; one
+  that gives most of what there is will go on, and what the run shows from there on is no motion of a body.
 */
 #include "time_impl.h"
+
+#define GIVEN 0.5 /* of the largest energy so far: what an integrator has given when it is unstable */
 
 PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R)
 {
@@ -81,6 +84,15 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
     run->energy_start = e->kinetic + e->strain;
   e->integrator_loss = run->energy_start + e->load_work + e->prescribed_work - e->damping_loss -
                        e->remesh_loss - e->kinetic - e->strain;
+  run->energy_most = PetscMax(run->energy_most, e->kinetic + e->strain);
+  if (m->dynamic && !run->gain_said && -e->integrator_loss > GIVEN * run->energy_most) {
+    run->gain_said = PETSC_TRUE;
+    PetscCall(
+      SbWarning(m->comm,
+                "t = %g s: of the %.3g J that bodies have, the integrator gave %.3g J: it is unstable with "
+                "steps of %g s; try a shorter -ts_dt, or -time genalpha or euler_implicit, which damp",
+                (double)t, (double)(e->kinetic + e->strain), (double)-e->integrator_loss, (double)dt));
+  }
   run->damping_power = power;
   PetscCall(VecDestroy(&run->loads));
   PetscCall(VecDestroy(&run->reaction));

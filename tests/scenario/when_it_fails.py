@@ -131,6 +131,8 @@ CASES = [
     ("R9", "warning", f"{SNAP} -static_max_steps 2", ["-static_max_steps", "2"]),
     ("R10", "warning", "RANKS 2 bar.opts -solver rotated -pc_rotated_interface 1", ["-solver rotated", "-pc_rotated_interface", "1"]),
     ("R11", "warning", "bar.opts -effect_pull_vector 0;0;1e9 -snes_max_it 2 -time_max_halvings 2 -remesh_failed yes", ["-remesh_failed"]),
+    ("R12", "warning", "cube.opts -body_a_mesh box:0.4,0.1,0.1:1 -body_a_material stvk -body_a_young 1e6 -body_a_density 1000 -body_a_velocity 30*y,-30*x,20*x "
+     "-time newmark -ts_dt 0.02 -ts_max_time 0.5", ["-ts_dt", "genalpha"]),
     ("P1", "error", "bar.opts -pc_type lu -pc_factor_mat_solver_type mkl_pardiso", ["-pc_type lu", "mkl_pardiso", "-solver"]),
 ]
 FAILS_TOO = {"R11"}  # a warning before an error
