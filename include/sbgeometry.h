@@ -43,6 +43,17 @@ static inline PetscReal SbBoxDiagonal(const PetscReal box[6])
   return PetscSqrtReal(PetscSqr(box[3] - box[0]) + PetscSqr(box[4] - box[1]) + PetscSqr(box[5] - box[2]));
 }
 
+/* The axis along which a box is longest, the first of equal ones. */
+static inline int SbBoxLongest(const PetscReal box[6])
+{
+  int axis = 0;
+
+  for (int k = 1; k < 3; k++) {
+    if (box[3 + k] - box[k] > box[3 + axis] - box[axis]) axis = k;
+  }
+  return axis;
+}
+
 /* Where on a triangle: its corner 0, 1 or 2, its edge from corner 0 to 1, 1 to 2, 2 to 0, or its inside. */
 typedef enum {
   SB_FEATURE_CORNER_0,

@@ -211,6 +211,8 @@ PetscErrorCode SbImportAddItem(SbImport *import, int dim, const PetscInt vert[],
 /* Room for exactly n simplices of a dimension that has none yet, numbered from 1 on, for the caller to fill. */
 PetscErrorCode SbImportSetItems(SbImport *import, int dim, PetscInt n);
 PetscErrorCode SbItemsFree(SbItems *items);
+/* Item `from` takes the place of item `to`. */
+void SbItemsMove(SbItems *items, int dim, PetscInt to, PetscInt from);
 /* The group (dim, tag), made when new; a NULL name means "surface_12" until somebody gives one. */
 PetscErrorCode SbImportGroup(SbImport *import, PetscInt dim, int64_t tag, const char *name, PetscInt *group);
 /* The tag set that holds this group alone. */

@@ -70,7 +70,7 @@ static void order_items(Item item[], PetscInt n, PetscInt below)
 {
   PetscReal box[6];
   PetscInt nchild, left;
-  int axis = 0;
+  int axis;
 
   // the left half takes whole children
   while (below >= n) below /= 4;
@@ -80,9 +80,7 @@ static void order_items(Item item[], PetscInt n, PetscInt below)
   // the longest axis of the box of all middles
   SbBoxClear(box);
   for (PetscInt i = 0; i < n; i++) SbBoxAdd(box, item[i].middle);
-  for (int k = 1; k < 3; k++) {
-    if (box[3 + k] - box[k] > box[3 + axis] - box[axis]) axis = k;
-  }
+  axis = SbBoxLongest(box);
   // split there, and go on with the halves
   select_first(item, n, left, axis);
   order_items(item, left, below);

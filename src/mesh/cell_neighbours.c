@@ -19,7 +19,6 @@ PetscErrorCode SbMeshNeighbours(SbMesh mesh, PetscInt **neighbour)
 /* The edges go into the bucket of their lower vertex (a counting sort); in it those with the same higher vertex are one. */
 PetscErrorCode SbMeshEdges(SbMesh mesh, PetscInt *nedge, PetscInt **edge)
 {
-  static const int vertex[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
   const PetscInt n = 6 * mesh->ncell;
   PetscInt *low, *high, *start, *item;
 
@@ -27,7 +26,7 @@ PetscErrorCode SbMeshEdges(SbMesh mesh, PetscInt *nedge, PetscInt **edge)
   PetscCall(PetscMalloc2(n, &low, n, &high));
   PetscCall(PetscMalloc1(n, edge));
   for (PetscInt i = 0; i < n; i++) {
-    const PetscInt *v = mesh->cell + 4 * (i / 6), a = v[vertex[i % 6][0]], b = v[vertex[i % 6][1]];
+    const PetscInt *v = mesh->cell + 4 * (i / 6), a = v[SbTetEdge[i % 6][0]], b = v[SbTetEdge[i % 6][1]];
 
     low[i] = PetscMin(a, b);
     high[i] = PetscMax(a, b);

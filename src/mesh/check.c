@@ -43,15 +43,14 @@ PetscErrorCode SbImportDropUnused(SbImport *im)
 
       // items have the new numbers; those that use a vertex which is gone are dropped
       for (PetscInt i = 0; i < im->item[d].n; i++) {
-        const PetscInt *from = im->item[d].vert + (d + 1) * i;
-        PetscInt *to = im->item[d].vert + (d + 1) * kept;
+        PetscInt *v = im->item[d].vert + (d + 1) * i;
         PetscBool gone = PETSC_FALSE;
 
-        for (int k = 0; k <= d; k++) gone = (PetscBool)(gone || map[from[k]] < 0);
-        if (gone) continue;
-        for (int k = 0; k <= d; k++) to[k] = map[from[k]];
-        im->item[d].tags[kept] = im->item[d].tags[i];
-        im->item[d].number[kept++] = im->item[d].number[i];
+        for (int k = 0; k <= d; k++) {
+          v[k] = map[v[k]];
+          gone = (PetscBool)(gone || v[k] < 0);
+        }
+        if (!gone) SbItemsMove(&im->item[d], d, kept++, i);
       }
       ndropped = im->item[d].n - kept;
       im->item[d].n = kept;
@@ -183,9 +182,33 @@ PetscErrorCode SbImportCheckFaces(const SbImport *im, const SbFaces *faces)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void SbBoundaryEdges(const SbImport *im, const SbFaces *faces, const PetscInt number[], PetscInt64 edge[])
+{
+  for (PetscInt s = 0; s < 4 * faces->ncell; s++) {
+    const PetscInt *v = im->item[3].vert + 4 * (s / 4);
+
+    for (int i = 0; faces->neighbour[s] < 0 && i < 3; i++) {
+      const PetscInt a = v[SbFaceVertex[s % 4][i]], b = v[SbFaceVertex[s % 4][(i + 1) % 3]];
+
+      *edge++ = (PetscInt64)SbKeyOfPair(number ? number[a] : a, number ? number[b] : b);
+    }
+  }
+}
+
+PetscErrorCode SbCountPinched(PetscInt n, PetscInt64 edge[], PetscInt *npinched)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscSortInt64(n, edge));
+  for (PetscInt i = 0, m; i < n; i += m) {
+    for (m = 1; i + m < n && edge[i + m] == edge[i];) m++;
+    *npinched += m > 2;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbImportCheck(SbImport *im, SbFaces *faces)
 {
-  PetscInt slots[2], n = 0;
+  PetscInt slots[2];
   PetscInt64 *edge;
 
   PetscFunctionBeginUser;
@@ -198,21 +221,8 @@ PetscErrorCode SbImportCheck(SbImport *im, SbFaces *faces)
     im->nlost += !SbFacesFind(faces, im->item[2].vert + 3 * t, slots);
   // on a closed surface two facets meet at every edge
   PetscCall(PetscMalloc1(3 * faces->nboundary, &edge));
-  for (PetscInt s = 0; s < 4 * faces->ncell; s++) {
-    if (faces->neighbour[s] >= 0) continue;
-    for (int i = 0; i < 3; i++) {
-      const PetscInt *v = im->item[3].vert + 4 * (s / 4), a = v[SbFaceVertex[s % 4][i]],
-                     b = v[SbFaceVertex[s % 4][(i + 1) % 3]];
-
-      edge[n++] = (PetscInt64)PetscMin(a, b) << 32 | (PetscInt64)PetscMax(a, b);
-    }
-  }
-  PetscCall(PetscSortInt64(n, edge));
-  for (PetscInt i = 0, m; i < n; i += m) {
-    for (m = 1; i + m < n && edge[i + m] == edge[i]; m++) {
-    }
-    im->npinched += m > 2;
-  }
+  SbBoundaryEdges(im, faces, NULL, edge);
+  PetscCall(SbCountPinched(3 * faces->nboundary, edge, &im->npinched));
   PetscCall(PetscFree(edge));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

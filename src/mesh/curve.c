@@ -5,7 +5,6 @@
   points of the rule, and at the ten nodes. The volume is the integral of the Jacobian, a cubic polynomial.
 */
 #include "mesh_impl.h"
-#include "sbquadratic.h"
 #include "sbkernel.h"
 
 static int compare(const void *a, const void *b)

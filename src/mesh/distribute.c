@@ -106,17 +106,9 @@ static PetscErrorCode send_cells(const Cells *from, const SbRoute *route, const 
 /* Places of numbers in ascending order: order[n]. */
 static PetscErrorCode ascending(PetscInt n, const PetscInt number[], PetscInt order[])
 {
-  PetscInt *key;
-  PetscBool sorted = PETSC_TRUE;
-
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < n; i++) order[i] = i;
-  for (PetscInt i = 1; i < n && sorted; i++) sorted = (PetscBool)(number[i] >= number[i - 1]);
-  if (sorted) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(n, &key));
-  PetscCall(PetscArraycpy(key, number, n));
-  PetscCall(PetscSortIntWithArray(n, key, order));
-  PetscCall(PetscFree(key));
+  PetscCall(PetscSortIntWithPermutation(n, number, order));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -350,18 +342,13 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
     if (border.n) qsort(border.vert, (size_t)border.n, sizeof(Shared), compare_shared);
     for (PetscInt i = 0; i < border.n; i += n) {
       Shared *s = border.vert + i;
-      PetscReal low[3], high[3];
-      int axis = 0;
+      PetscReal box[6];
+      int axis;
 
       for (n = 1; i + n < border.n && !compare_ranks(s, s + n);) n++;
-      for (int d = 0; d < 3; d++) {
-        low[d] = high[d] = local->vertex[s[0].vert].x[d];
-        for (PetscInt k = 1; k < n; k++) {
-          low[d] = PetscMin(low[d], local->vertex[s[k].vert].x[d]);
-          high[d] = PetscMax(high[d], local->vertex[s[k].vert].x[d]);
-        }
-        if (high[d] - low[d] > high[axis] - low[axis]) axis = d;
-      }
+      SbBoxClear(box);
+      for (PetscInt k = 0; k < n; k++) SbBoxAdd(box, local->vertex[s[k].vert].x);
+      axis = SbBoxLongest(box);
       for (PetscInt k = 0; k < n; k++) s[k].along = local->vertex[s[k].vert].x[axis];
       qsort(s, (size_t)n, sizeof(Shared), compare_shared);
       for (PetscInt k = 0; k < n; k++)

@@ -4,10 +4,8 @@
   The edges of every item go into the bucket of their lower vertex (a counting sort); each bucket is sorted, equal neighbours
   in it are one edge. The number of an edge is its position in the list.
 */
-#include <stdlib.h>
 #include "mesh_impl.h"
 
-static const int tet_edge[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 static const int edge_count[4] = {0, 1, 3,
                                   6}; /* of an item, by dimension; triangles use the pairs 0, 1 and 3 */
 static const int edge_row[4][6] = {{0}, {0}, {0, 1, 3}, {0, 1, 2, 3, 4, 5}};
@@ -15,7 +13,7 @@ static const int edge_row[4][6] = {{0}, {0}, {0, 1, 3}, {0, 1, 2, 3, 4, 5}};
 static inline void edge_of(const SbItems *item, int dim, PetscInt i, int e, PetscInt *low, PetscInt *high)
 {
   const PetscInt *v = item->vert + (size_t)(dim + 1) * (size_t)i;
-  const PetscInt a = v[tet_edge[edge_row[dim][e]][0]], b = v[tet_edge[edge_row[dim][e]][1]];
+  const PetscInt a = v[SbTetEdge[edge_row[dim][e]][0]], b = v[SbTetEdge[edge_row[dim][e]][1]];
 
   *low = PetscMin(a, b);
   *high = PetscMax(a, b);

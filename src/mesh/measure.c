@@ -117,9 +117,9 @@ PetscReal SbBodySmallest(PetscInt nbody, const SbBody body[])
   PetscReal size = PETSC_MAX_REAL;
 
   for (PetscInt b = 0; b < nbody; b++) {
-    const PetscReal *box = body[b].bbox, r[3] = {box[3] - box[0], box[4] - box[1], box[5] - box[2]};
+    const PetscReal diagonal = SbBoxDiagonal(body[b].bbox);
 
-    size = PetscMin(size, PetscSqrtReal(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]));
+    size = PetscMin(size, diagonal);
   }
   return size;
 }

@@ -5,6 +5,7 @@
 */
 #pragma once
 #include <petscsf.h>
+#include "sbquadratic.h"
 #include "sbtet.h"
 
 /* A number for a number, without pattern (splitmix64, Steele et al. 2014). */
@@ -45,6 +46,10 @@ PetscErrorCode SbImportCheckFaces(const SbImport *import, const SbFaces *faces);
 /* Their errors: numbers of the tets in the file, and how many faces have more than two. */
 PetscErrorCode SbImportTwice(const SbImport *import, int64_t a, int64_t b);
 PetscErrorCode SbImportOverlap(const SbImport *import, const int64_t number[3], PetscInt nshared);
+/* The edges of the boundary facets, edge[3 nboundary], each a pair of vertices or of their numbers (SbKeyOfPair); those with more than two facets are counted. */
+void SbBoundaryEdges(const SbImport *import, const SbFaces *faces, const PetscInt number[],
+                     PetscInt64 edge[]);
+PetscErrorCode SbCountPinched(PetscInt n, PetscInt64 edge[], PetscInt *npinched);
 /* The "found" fields that follow from them. */
 void SbShapeKeep(const SbShape *shape, SbBody *body);
 /* What was repaired or is odd: fills the note of the body, whose number of parts is known. */

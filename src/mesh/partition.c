@@ -41,23 +41,18 @@ static inline void centre(const SbMergedMesh *w, PetscInt c, PetscReal x[3])
 /* Splits the samples x[n] into k leaves below a node. */
 static PetscErrorCode split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3], PetscInt k)
 {
-  PetscReal *along, low[3] = {0, 0, 0}, high[3] = {0, 0, 0}, cut, next = PETSC_MAX_REAL;
+  PetscReal *along, box[6], cut, next = PETSC_MAX_REAL;
   PetscInt below = 0, half = k / 2;
-  int axis = 0;
+  int axis;
 
   PetscFunctionBeginUser;
   if (k == 1 || n < 2) {
     t->node[at] = (Node){-1, 0, t->nleaf++};
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  for (PetscInt i = 0; i < n; i++) {
-    for (int d = 0; d < 3; d++) {
-      low[d] = i ? PetscMin(low[d], x[i][d]) : x[i][d];
-      high[d] = i ? PetscMax(high[d], x[i][d]) : x[i][d];
-    }
-  }
-  for (int d = 1; d < 3; d++)
-    if (high[d] - low[d] > high[axis] - low[axis]) axis = d;
+  SbBoxClear(box);
+  for (PetscInt i = 0; i < n; i++) SbBoxAdd(box, x[i]);
+  axis = SbBoxLongest(box);
   // the cut is the median; when nothing is below it, it is raised
   PetscCall(PetscMalloc1(n, &along));
   for (PetscInt i = 0; i < n; i++) along[i] = x[i][axis];

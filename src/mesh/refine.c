@@ -12,7 +12,6 @@
 #include "mesh_impl.h"
 
 enum { M01, M02, M03, M12, M13, M23 }; /* middles of the edges of a tet, in the order of edges */
-static const int edge_vert[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
 /* The three diagonals of the octahedron, and the four middles around each so that (from, to, ring[i], ring[i + 1]) is positive. */
 static const struct {
@@ -58,7 +57,7 @@ static void split(const SbImport *im, int dim, const PetscInt v[], const SbImpor
   PetscInt m[6];
 
   for (int e = 0; e < 6; e++) {
-    const int *p = edge_vert[e];
+    const int *p = SbTetEdge[e];
 
     if (p[1] <= dim) m[e] = edges->nvert + SbImportEdgesFind(edges, v[p[0]], v[p[1]]);
   }

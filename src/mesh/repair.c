@@ -37,21 +37,16 @@ static PetscErrorCode weld(SbImport *im, PetscReal tolerance, SbRepair *done)
 /* ------------------------------------------------------------------ single items */
 
 /* Keeps the items that are not marked. */
-static PetscErrorCode drop_marked(SbItems *item, int dim, const PetscBool drop[], PetscInt *ndropped)
+static void drop_marked(SbItems *item, int dim, const PetscBool drop[], PetscInt *ndropped)
 {
   PetscInt kept = 0;
 
-  PetscFunctionBeginUser;
   for (PetscInt i = 0; i < item->n; i++) {
     if (drop[i]) continue;
-    PetscCall(
-      PetscArraymove(item->vert + (dim + 1) * (size_t)kept, item->vert + (dim + 1) * (size_t)i, dim + 1));
-    item->tags[kept] = item->tags[i];
-    item->number[kept++] = item->number[i];
+    SbItemsMove(item, dim, kept++, i);
   }
   *ndropped += item->n - kept;
   item->n = kept;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode drop_collapsed(SbImport *im, int dim, PetscInt *ndropped)
@@ -67,7 +62,7 @@ static PetscErrorCode drop_collapsed(SbImport *im, int dim, PetscInt *ndropped)
     for (int a = 1; a <= dim; a++)
       for (int b = 0; b < a; b++) drop[i] = (PetscBool)(drop[i] || v[a] == v[b]);
   }
-  PetscCall(drop_marked(item, dim, drop, ndropped));
+  drop_marked(item, dim, drop, ndropped);
   PetscCall(PetscFree(drop));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -108,7 +103,7 @@ PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *don
       done->nslit += drop[c] && n[0] >= 0 && n[1] >= 0 && n[2] >= 0 && n[3] >= 0;
     }
     PetscCall(SbFacesDestroy(&faces));
-    PetscCall(drop_marked(item, 3, drop, &done->nflat));
+    drop_marked(item, 3, drop, &done->nflat);
   }
   PetscCall(PetscFree(drop));
   PetscCheck(im->item[3].n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -123,7 +118,7 @@ PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *don
   PetscCall(PetscCalloc1(im->item[2].n, &drop));
   for (PetscInt i = 0; i < im->item[2].n && !ierr; i++)
     drop[i] = (PetscBool)!SbFacesFind(&faces, im->item[2].vert + 3 * i, slots);
-  if (!ierr) ierr = drop_marked(&im->item[2], 2, drop, &ndropped);
+  if (!ierr) drop_marked(&im->item[2], 2, drop, &ndropped);
   PetscCall(PetscFree(drop));
   PetscCall(SbFacesDestroy(&faces));
   PetscCall(ierr);

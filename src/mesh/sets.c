@@ -173,8 +173,7 @@ PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbo
 {
   uint64_t *bits, all = 0, hull = 0;
   PetscInt slots[2];
-  const PetscReal *box = body[b].bbox, size[3] = {box[3] - box[0], box[4] - box[1], box[5] - box[2]};
-  const PetscReal slack = 1e-6 * PetscSqrtReal(size[0] * size[0] + size[1] * size[1] + size[2] * size[2]);
+  const PetscReal slack = 1e-6 * SbBoxDiagonal(body[b].bbox);
 
   PetscFunctionBeginUser;
   // shapes, whole bodies, the boundary: `all` holds the bits of sets that are this body, `hull` those of the boundary
@@ -333,13 +332,8 @@ PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport i
     for (int i = 0; i < NSHAPE; i++) {
       if (shapes[i].shape == set[k].shape) name = shapes[i].name;
     }
-    PetscCall(PetscArraycpy(box, body[0].bbox, 6));
-    for (PetscInt b = 1; b < nbody; b++) {
-      for (int i = 0; i < 3; i++) {
-        box[i] = PetscMin(box[i], body[b].bbox[i]);
-        box[3 + i] = PetscMax(box[3 + i], body[b].bbox[3 + i]);
-      }
-    }
+    SbBoxClear(box);
+    for (PetscInt b = 0; b < nbody; b++) SbBoxMerge(box, body[b].bbox);
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
             "set '%s': no vertex lies in the %s; the placed bodies reach from (%.6g, %.6g, %.6g) to (%.6g, "
             "%.6g, %.6g) m",

@@ -227,42 +227,22 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static int compare_pairs(const void *a, const void *b)
-{
-  return memcmp(a, b, 2 * sizeof(PetscInt));
-}
-
-/* Edges of the surface with more than two facets. */
+/* Edges of the surface with more than two facets: the home rank of the lower vertex has all facets of an edge. */
 static PetscErrorCode count_pinched(Slab *s)
 {
-  const SbItems *tets = &s->im->item[3];
   const PetscInt n = 3 * s->part->faces.nboundary;
-  PetscInt *edge, *got, at = 0, m;
+  PetscInt64 *edge, *got;
   PetscMPIInt *dest;
   SbRoute route;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(2 * (size_t)n, &edge, n, &dest));
-  for (PetscInt i = 0; i < 4 * tets->n; i++) {
-    if (s->part->faces.neighbour[i] >= 0) continue;
-    for (int k = 0; k < 3; k++) {
-      const PetscInt *v = tets->vert + 4 * (i / 4), a = v[SbFaceVertex[i % 4][k]],
-                     b = v[SbFaceVertex[i % 4][(k + 1) % 3]];
-
-      edge[2 * at] = s->used[PetscMin(a, b)];
-      edge[2 * at + 1] = s->used[PetscMax(a, b)];
-      dest[at] = home(s, edge[2 * at]);
-      at++;
-    }
-  }
+  PetscCall(PetscMalloc2(n, &edge, n, &dest));
+  SbBoundaryEdges(s->im, &s->part->faces, s->used, edge);
+  for (PetscInt i = 0; i < n; i++) dest[i] = home(s, (PetscInt)(edge[i] >> 32));
   PetscCall(SbRouteCreate(s->comm, n, dest, &route));
-  PetscCall(SbRouteSend(&route, 2 * sizeof(PetscInt), edge, &got));
+  PetscCall(SbRouteSend(&route, sizeof(*edge), edge, &got));
   PetscCall(PetscFree2(edge, dest));
-  if (route.nrecv) qsort(got, (size_t)route.nrecv, 2 * sizeof(PetscInt), compare_pairs);
-  for (PetscInt i = 0; i < route.nrecv; i += m) {
-    for (m = 1; i + m < route.nrecv && !compare_pairs(got + 2 * i, got + 2 * (i + m));) m++;
-    s->im->npinched += m > 2;
-  }
+  PetscCall(SbCountPinched(route.nrecv, got, &s->im->npinched));
   PetscCall(PetscFree(got));
   PetscCall(SbRouteDestroy(&route));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -273,7 +253,8 @@ static PetscErrorCode count_pinched(Slab *s)
 static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
 {
   const SbImport *im = s->im;
-  PetscInt *part, *got, *pair, *user, n, first, total, npair = 0, kept = 0, *parent;
+  PetscInt *part, *got, *user, n, first, total, npair = 0, kept = 0, *parent;
+  PetscInt64 *pair, *all;
   PetscMPIInt *dest;
   SbRoute route;
 
@@ -289,35 +270,30 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
   /* those that meet at a vertex, each pair once */
   PetscCall(SbRouteSend(&s->vert, sizeof(PetscInt), part, &got));
   PetscCall(PetscFree(part));
-  PetscCall(PetscMalloc2(s->vert.nrecv, &user, 2 * (size_t)s->vert.nrecv, &pair));
+  PetscCall(PetscMalloc2(s->vert.nrecv, &user, s->vert.nrecv, &pair));
   for (PetscInt v = 0; v < s->nkept; v++) user[s->start[v]] = -1;
   for (PetscInt i = 0; i < s->vert.nrecv; i++) {
     PetscInt *other = &user[s->start[s->asked[i]]];
 
-    if (*other >= 0) {
-      pair[2 * npair] = *other;
-      pair[2 * npair++ + 1] = got[i];
-    }
+    if (*other >= 0) pair[npair++] = (PetscInt64)SbKeyOfPair(*other, got[i]);
     *other = got[i];
   }
   PetscCall(PetscFree(got));
-  if (npair) qsort(pair, (size_t)npair, 2 * sizeof(PetscInt), compare_pairs);
-  for (PetscInt i = 0; i < npair; i++) {
-    if (kept && !compare_pairs(pair + 2 * i, pair + 2 * (kept - 1))) continue;
-    PetscCall(PetscArraymove(pair + 2 * kept, pair + 2 * i, 2));
-    kept++;
-  }
+  PetscCall(PetscSortInt64(npair, pair));
+  for (PetscInt i = 0; i < npair; i++)
+    if (!kept || pair[i] != pair[kept - 1]) pair[kept++] = pair[i];
   // rank 0 joins the parts of all ranks along these pairs
   PetscCall(PetscCalloc1(kept, &dest));
   PetscCall(SbRouteCreate(s->comm, kept, dest, &route));
-  PetscCall(SbRouteSend(&route, 2 * sizeof(PetscInt), pair, &got));
+  PetscCall(SbRouteSend(&route, sizeof(*pair), pair, &all));
   PetscCall(PetscFree(dest));
   *npart = total;
   PetscCall(PetscMalloc1(s->rank ? 0 : total, &parent));
   for (PetscInt p = 0; p < total && !s->rank; p++) parent[p] = p;
-  for (PetscInt i = 0; i < route.nrecv; i++) *npart -= SbUnionJoin(parent, got[2 * i], got[2 * i + 1]);
+  for (PetscInt i = 0; i < route.nrecv; i++)
+    *npart -= SbUnionJoin(parent, (PetscInt)(all[i] >> 32), (PetscInt)(all[i] & 0xffffffff));
   PetscCall(PetscFree(parent));
-  PetscCall(PetscFree(got));
+  PetscCall(PetscFree(all));
   PetscCall(SbRouteDestroy(&route));
   PetscCallMPI(MPI_Bcast(npart, 1, MPIU_INT, 0, s->comm));
   PetscCall(PetscFree2(user, pair));
@@ -326,7 +302,7 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
 
 /* ------------------------------------------------------------------ points, lines and triangles of groups */
 
-/* Drops items with a vertex that no tet uses; the home ranks of the others get the bits of their tag sets. */
+/* The home ranks of the vertices of items get the bits of their tag sets, but not of items with a vertex that no tet uses. */
 static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
 {
   SbImport *im = s->im;
@@ -355,23 +331,16 @@ static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
   for (PetscInt i = 0; i < route.nrecv; i++) is[i] = (PetscBool)(s->number[got[i] - s->rows.first] >= 0);
   PetscCall(SbRouteReply(&route, sizeof(PetscBool), is, there));
   PetscCall(PetscFree(is));
-  // items with all their vertices mark these by their tag sets; triangles stay, points and lines go
+  // items with all their vertices mark these by their tag sets; then points and lines go
   n = 0;
   for (int d = 0; d < 3; d++) {
-    SbItems *item = &im->item[d];
-    PetscInt kept = 0;
-
-    for (PetscInt i = 0; i < item->n; i++) {
+    for (PetscInt i = 0; i < im->item[d].n; i++) {
       PetscBool all = PETSC_TRUE;
 
       for (int k = 0; k <= d; k++) all = (PetscBool)(all && there[n + k]);
-      for (int k = 0; k <= d; k++) mark[n++] = all ? bits[item->tags[i]] : 0;
-      if (!all) continue;
-      PetscCall(PetscArraymove(item->vert + (d + 1) * (size_t)kept, item->vert + (d + 1) * (size_t)i, d + 1));
-      item->tags[kept++] = item->tags[i];
+      for (int k = 0; k <= d; k++) mark[n++] = all ? bits[im->item[d].tags[i]] : 0;
     }
-    if (d == 2) im->nlost += item->n - kept;
-    item->n = d == 2 ? kept : 0;
+    if (d < 2) im->item[d].n = 0;
   }
   // the marks of all ranks come together at the home ranks
   PetscCall(SbRouteSend(&route, sizeof(uint64_t), mark, &got_mark));

@@ -132,6 +132,20 @@ static PetscErrorCode begin(const SbBody *body, SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The mesh of a body's file, before it is placed. */
+static PetscErrorCode read_body(const SbBody *body, SbImport *im)
+{
+  SbReader read;
+
+  PetscFunctionBeginUser;
+  PetscCall(find_reader(body, &read));
+  PetscCall(begin(body, im));
+  PetscCall(read(body->mesh, im));
+  PetscCall(SbImportMiddles(im));
+  PetscCall(SbImportForget(im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Arrays of their own for what is read of a file; before it is placed. */
 static PetscErrorCode copy_import(const SbImport *from, SbImport *to)
 {
@@ -175,11 +189,8 @@ static PetscErrorCode copy_import(const SbImport *from, SbImport *to)
 
 PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImport *shared, SbImport *im)
 {
-  const PetscBool copy = (PetscBool)(body->copy_of[0] && strncmp(body->mesh, "box:", 4));
-  SbReader read;
-
   PetscFunctionBeginUser;
-  if (!copy) {
+  if (!body->copy_of[0] || !strncmp(body->mesh, "box:", 4)) {
     PetscCall(SbImportRead(body, im));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -191,11 +202,7 @@ PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImpo
       before->scale != body->scale) {
     // NOLINTEND(bugprone-suspicious-memory-comparison)
     PetscCall(SbImportDestroy(shared));
-    PetscCall(find_reader(body, &read));
-    PetscCall(begin(body, shared));
-    PetscCall(read(body->mesh, shared));
-    PetscCall(SbImportMiddles(shared));
-    PetscCall(SbImportForget(shared));
+    PetscCall(read_body(body, shared));
   }
   PetscCall(begin(body, im));
   PetscCall(copy_import(shared, im));
@@ -205,14 +212,8 @@ PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImpo
 
 PetscErrorCode SbImportRead(const SbBody *body, SbImport *im)
 {
-  SbReader read;
-
   PetscFunctionBeginUser;
-  PetscCall(find_reader(body, &read));
-  PetscCall(begin(body, im));
-  PetscCall(read(body->mesh, im));
-  PetscCall(SbImportMiddles(im));
-  PetscCall(SbImportForget(im));
+  PetscCall(read_body(body, im));
   PetscCall(transform_body(body, im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -106,6 +106,14 @@ PetscErrorCode SbImportSetItems(SbImport *im, int dim, PetscInt n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void SbItemsMove(SbItems *item, int dim, PetscInt to, PetscInt from)
+{
+  memmove(item->vert + (dim + 1) * (size_t)to, item->vert + (dim + 1) * (size_t)from,
+          (size_t)(dim + 1) * sizeof(*item->vert));
+  item->tags[to] = item->tags[from];
+  item->number[to] = item->number[from];
+}
+
 PetscErrorCode SbItemsFree(SbItems *item)
 {
   PetscFunctionBeginUser;
@@ -296,8 +304,7 @@ PetscErrorCode SbImportTagsAlone(SbImport *im, PetscInt dim, int64_t tag, const 
 
   PetscFunctionBeginUser;
   PetscCall(SbImportGroup(im, dim, tag, name, &group));
-  if (im->group[group].alone < 0) PetscCall(add_tag_set(im, 1, &group, &im->group[group].alone));
-  *tags = im->group[group].alone;
+  PetscCall(SbImportTagSet(im, 1, &group, tags));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -412,9 +419,7 @@ PetscErrorCode SbImportJoinRepeats(SbImport *im, int dim, PetscBool all, PetscIn
       if (join) PetscCall(SbImportTagSet(im, n, group, &item->tags[same]));
     }
     if (join) continue;
-    PetscCall(PetscArraymove(item->vert + (dim + 1) * (size_t)kept, v, dim + 1));
-    item->tags[kept] = item->tags[i];
-    item->number[kept] = item->number[i];
+    SbItemsMove(item, dim, kept, i);
     next[kept] = head[low];
     head[low] = kept++;
   }

@@ -236,12 +236,9 @@ static PetscErrorCode measure_shells(Arrangement *s)
     SbTriangleBox(t->x, t->tri + 3 * (i / 2), box);
     if (p->first < 0) {
       p->first = i / 2;
-      PetscCall(PetscArraycpy(p->box, box, 6));
+      SbBoxClear(p->box);
     }
-    for (int k = 0; k < 3; k++) {
-      p->box[k] = PetscMin(p->box[k], box[k]);
-      p->box[3 + k] = PetscMax(p->box[3 + k], box[3 + k]);
-    }
+    SbBoxMerge(p->box, box);
     p->surface = s->surface[i / 2];
     p->volume += (i % 2 ? 1 : -1) * SbTetVolumeTo(t, i / 2, t->x + 3 * t->tri[3 * p->first]);
     p->area += 0.5 * SbTriangleMeasure(t, i / 2, &longest2, &around);
