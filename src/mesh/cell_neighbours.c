@@ -1,6 +1,6 @@
 /*
   cell_neighbours.c - what elements with nodes at faces or edges need of the mesh: who is across a face, which cells share an edge, and
-  numbers of ghost cells.
+  numbers of ghost cells; forests of PETSc that bring them there.
 */
 #include "mesh_impl.h"
 
@@ -47,15 +47,32 @@ PetscErrorCode SbMeshEdges(SbMesh mesh, PetscInt *nedge, PetscInt **edge)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode broadcast(PetscSF sf, PetscInt n, MPI_Datatype one, void *value)
+PetscErrorCode SbForestOnRank0(MPI_Comm comm, PetscInt N, PetscInt n, const PetscInt leaf[],
+                               const PetscInt root[], PetscSF *sf)
+{
+  PetscSFNode *remote;
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCall(PetscMalloc1(n, &remote));
+  for (PetscInt i = 0; i < n; i++) remote[i] = (PetscSFNode){.rank = 0, .index = root[i]};
+  PetscCall(PetscSFCreate(comm, sf));
+  PetscCall(
+    PetscSFSetGraph(*sf, rank ? 0 : N, n, (PetscInt *)leaf, PETSC_COPY_VALUES, remote, PETSC_OWN_POINTER));
+  PetscCall(PetscSFSetUp(*sf));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbForestBroadcast(PetscSF sf, PetscInt n, MPI_Datatype one, const void *root, void *leaf)
 {
   MPI_Datatype type;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Type_contiguous((PetscMPIInt)n, one, &type));
   PetscCallMPI(MPI_Type_commit(&type));
-  PetscCall(PetscSFBcastBegin(sf, type, value, value, MPI_REPLACE));
-  PetscCall(PetscSFBcastEnd(sf, type, value, value, MPI_REPLACE));
+  PetscCall(PetscSFBcastBegin(sf, type, root, leaf, MPI_REPLACE));
+  PetscCall(PetscSFBcastEnd(sf, type, root, leaf, MPI_REPLACE));
   PetscCallMPI(MPI_Type_free(&type));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -63,7 +80,7 @@ static PetscErrorCode broadcast(PetscSF sf, PetscInt n, MPI_Datatype one, void *
 PetscErrorCode SbMeshBroadcastCells(SbMesh mesh, PetscInt n, MPI_Datatype type, void *value)
 {
   PetscFunctionBeginUser;
-  if (mesh->cell_sf) PetscCall(broadcast(mesh->cell_sf, n, type, value));
+  if (mesh->cell_sf) PetscCall(SbForestBroadcast(mesh->cell_sf, n, type, value, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -85,6 +102,6 @@ PetscErrorCode SbMeshBroadcastVertices(SbMesh mesh, PetscInt n, MPI_Datatype typ
     PetscCall(PetscLayoutDestroy(&layout));
     PetscCall(PetscFree(leaf));
   }
-  PetscCall(broadcast(mesh->vert_sf, n, type, value));
+  PetscCall(SbForestBroadcast(mesh->vert_sf, n, type, value, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

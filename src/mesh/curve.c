@@ -99,32 +99,23 @@ PetscErrorCode SbImportCurve(const SbImport *im, SbBody *body, uint64_t cell[], 
 
 PetscErrorCode SbMeshCurve(SbMesh mesh, const PetscReal *edge_off)
 {
-  PetscInt *leaf, n = 0;
-  PetscMPIInt rank, any = edge_off != NULL;
-  PetscSFNode *remote;
+  PetscInt *leaf, *root, n = 0;
+  PetscMPIInt any = edge_off != NULL;
   PetscSF sf;
-  MPI_Datatype record;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Bcast(&any, 1, MPI_INT, 0, mesh->comm));
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscCalloc1(18 * (size_t)mesh->ncell, &mesh->edge_off));
-  PetscCall(PetscMalloc1(mesh->ncell, &leaf));
-  PetscCall(PetscMalloc1(mesh->ncell, &remote));
+  PetscCall(PetscMalloc2(mesh->ncell, &leaf, mesh->ncell, &root));
   for (PetscInt c = 0; c < mesh->ncell; c++) {
     if (!(mesh->cell_set[c] & SB_CURVED)) continue;
     leaf[n] = c;
-    remote[n++] = (PetscSFNode){.rank = 0, .index = mesh->cell_orig[c]};
+    root[n++] = mesh->cell_orig[c];
   }
-  PetscCallMPI(MPI_Comm_rank(mesh->comm, &rank));
-  PetscCallMPI(MPI_Type_contiguous(18, MPIU_REAL, &record));
-  PetscCallMPI(MPI_Type_commit(&record));
-  PetscCall(PetscSFCreate(mesh->comm, &sf));
-  PetscCall(
-    PetscSFSetGraph(sf, rank ? 0 : mesh->Ncell, n, leaf, PETSC_OWN_POINTER, remote, PETSC_OWN_POINTER));
-  PetscCall(PetscSFBcastBegin(sf, record, edge_off, mesh->edge_off, MPI_REPLACE));
-  PetscCall(PetscSFBcastEnd(sf, record, edge_off, mesh->edge_off, MPI_REPLACE));
+  PetscCall(SbForestOnRank0(mesh->comm, mesh->Ncell, n, leaf, root, &sf));
+  PetscCall(SbForestBroadcast(sf, 18, MPIU_REAL, edge_off, mesh->edge_off));
   PetscCall(PetscSFDestroy(&sf));
-  PetscCallMPI(MPI_Type_free(&record));
+  PetscCall(PetscFree2(leaf, root));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -172,16 +172,17 @@ PetscErrorCode SbDeckBuild(SbDeck *d)
       continue;
     im->scan.token = element->at;
     for (int k = 0; k < (ten ? 10 : dim + 1); k++) {
-      vert[k] = SbNumbersFind(&im->nodes, element->node[k]);
-      if (vert[k] < 0 &&
-          (k < 4 || element->node[k])) // Nastran may leave out nodes of edges that are straight
+      const PetscInt v = SbNumbersFind(&im->nodes, element->node[k]);
+
+      vert[SbGmshNode(k)] = v;
+      if (v < 0 && (k < 4 || element->node[k])) // Nastran may leave out nodes of edges that are straight
         SB_SCAN_ERROR(&im->scan, "element %lld uses node %lld, which is not there", (long long)element->label,
                       (long long)element->node[k]);
     }
     if (element->property >= 0) PetscCall(SbImportTagsAlone(im, dim, element->property, NULL, &tags));
     element->item = im->item[dim].n;
     PetscCall(SbImportAddItem(im, dim, vert, tags, element->label));
-    if (ten) PetscCall(SbImportAddMiddles(im, vert, SbDeckMiddle));
+    if (ten) PetscCall(SbImportAddMiddles(im, vert));
   }
   PetscCall(SbNumbersCreate(d->nelement.n, label, &im->elements));
   if (im->elements.repeated && d->unique)

@@ -130,7 +130,7 @@ PetscErrorCode SbImportAddElement(SbImport *im, int type, const PetscInt vert[],
   PetscFunctionBeginUser;
   im->count[type]++;
   if (type == SB_GMSH_TET10 && im->second_order) {
-    PetscCall(SbImportAddMiddles(im, vert, SbGmshMiddle));
+    PetscCall(SbImportAddMiddles(im, vert));
     PetscCall(SbImportAddItem(im, 3, vert, tags, number));
   }
   if (im->second_order && type == SB_GMSH_LINE3) type = SB_GMSH_LINE;
@@ -143,10 +143,10 @@ PetscErrorCode SbImportAddElement(SbImport *im, int type, const PetscInt vert[],
 
 /* ------------------------------------------------------------------ nodes at edges */
 
-const int SbGmshMiddle[6] = {4, 6, 7, 5, 9, 8}, SbDeckMiddle[6] = {4, 6, 7, 5, 8, 9};
-
-PetscErrorCode SbImportAddMiddles(SbImport *im, const PetscInt vert[], const int place[6])
+PetscErrorCode SbImportAddMiddles(SbImport *im, const PetscInt vert[])
 {
+  static const int place[6] = {4, 6, 7, 5, 9, 8}; /* of the nodes at the edges 01 02 03 12 13 23 */
+
   PetscFunctionBeginUser;
   for (int a = 0, e = 0; a < 4; a++) {
     for (int b = a + 1; b < 4; b++, e++) {

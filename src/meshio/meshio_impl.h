@@ -40,8 +40,6 @@ typedef struct {
 } SbGmshType;
 extern const SbGmshType SbGmshTypes[SB_GMSH_NTYPES];
 
-/* Nodes 4..9 of gmsh's 10-node tet by the edges 01 02 03 12 13 23, and those of Abaqus, Nastran and VTK. */
-extern const int SbGmshMiddle[6], SbDeckMiddle[6];
 /* Counts an element, and keeps it when it is of use: a tet, a simplex of groups, a triangle where a surface is wanted. Of second order the corners count;
    vert[10] of a tet, then with its nodes at edges where im->second_order is set, in the order of gmsh. */
 PetscErrorCode SbImportAddElement(SbImport *import, int type, const PetscInt vert[], PetscInt tags,
@@ -53,8 +51,13 @@ PetscErrorCode SbImportAddElement(SbImport *import, int type, const PetscInt ver
 */
 PetscErrorCode SbImportCheckTypes(const SbImport *import);
 
-/* Adds the nodes of the edges of a 10-node tet: vert[10], in it those of the edges at place[6]. */
-PetscErrorCode SbImportAddMiddles(SbImport *import, const PetscInt vert[], const int place[6]);
+/* Where gmsh has node k of a 10-node tet of Abaqus, Nastran and VTK: the last two are the other way round. */
+static inline int SbGmshNode(int k)
+{
+  return k < 8 ? k : 17 - k;
+}
+/* Adds the nodes of the edges of a 10-node tet, vert[10] in the order of gmsh; -1: the edge has none. */
+PetscErrorCode SbImportAddMiddles(SbImport *import, const PetscInt vert[]);
 /* Once all is read: which edges are off their middle. Error: an edge with two nodes. */
 PetscErrorCode SbImportMiddles(SbImport *import);
 

@@ -131,13 +131,7 @@ PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
       if (!(point >= 0 && point < (double)im->nvert) || point != PetscFloorReal(point))
         SB_SCAN_ERROR(s, "cell %lld uses point %g; the points are 0 to %lld", (long long)c, point,
                       (long long)im->nvert - 1);
-      if (k < 10) vert[k] = (PetscInt)point;
-    }
-    if (type == SB_GMSH_TET10) {
-      const PetscInt last = vert[9];
-
-      vert[9] = vert[8];
-      vert[8] = last;
+      if (k < 10) vert[SbGmshNode((int)k)] = (PetscInt)point;
     }
     // a simplex, but not a line of many pieces, has a group from each array in use
     tags = 0;

@@ -7,21 +7,6 @@
 */
 #include "remesh_impl.h"
 
-static PetscErrorCode forest(MPI_Comm comm, PetscInt N, PetscInt n, const PetscInt original[], PetscSF *sf)
-{
-  PetscSFNode *root;
-  PetscMPIInt rank;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCall(PetscMalloc1(n, &root));
-  for (PetscInt i = 0; i < n; i++) root[i] = (PetscSFNode){.rank = 0, .index = original[i]};
-  PetscCall(PetscSFCreate(comm, sf));
-  PetscCall(PetscSFSetGraph(*sf, rank ? 0 : N, n, NULL, PETSC_USE_POINTER, root, PETSC_OWN_POINTER));
-  PetscCall(PetscSFSetUp(*sf));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Brings n numbers of each leaf to its root. */
 static PetscErrorCode collect(PetscSF sf, PetscInt n, MPI_Datatype one, const void *leaf, void *root)
 {
@@ -93,7 +78,7 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   if (!rank) {
     PetscCall(PetscMalloc3(3 * (size_t)g->nvert, &g->X, 3 * (size_t)g->nvert, &g->x, g->nvert, &g->vert_set));
   }
-  PetscCall(forest(mesh->comm, mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &sf));
+  PetscCall(SbForestOnRank0(mesh->comm, mesh->Nvert, mesh->nvert_owned, NULL, mesh->vert_orig, &sf));
   PetscCall(PetscMalloc1(3 * (size_t)mesh->nvert, &now));
   PetscCall(SbCornerPositions(m->space, run->U, now));
   PetscCall(collect(sf, 3, MPIU_REAL, mesh->x, g->X));
@@ -101,7 +86,7 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   PetscCall(PetscFree(now));
   PetscCall(collect(sf, 1, MPI_UINT64_T, mesh->vert_set, g->vert_set));
   PetscCall(PetscSFDestroy(&sf));
-  PetscCall(forest(m->comm, mesh->Ncell, mesh->ncell_owned, mesh->cell_orig, &sf));
+  PetscCall(SbForestOnRank0(m->comm, mesh->Ncell, mesh->ncell_owned, NULL, mesh->cell_orig, &sf));
   // cells with their vertices, materials and sets
   if (!rank) {
     PetscCall(PetscMalloc3(4 * (size_t)g->ncell, &g->cell, g->ncell, &g->cell_material, 5 * (size_t)g->ncell,
@@ -157,18 +142,13 @@ PetscErrorCode SbScatter(const SbGathered *g, SbRun run)
   const SbMesh mesh = s->mesh;
   const PetscInt each = g->width * g->nfield * 3;
   PetscReal *value, *array;
-  MPI_Datatype type;
   Vec vec[3];
   PetscSF sf;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1((size_t)each * (size_t)mesh->ncell, &value));
-  PetscCall(forest(mesh->comm, mesh->Ncell, mesh->ncell, mesh->cell_orig, &sf));
-  PetscCallMPI(MPI_Type_contiguous((PetscMPIInt)each, MPIU_REAL, &type));
-  PetscCallMPI(MPI_Type_commit(&type));
-  PetscCall(PetscSFBcastBegin(sf, type, g->value, value, MPI_REPLACE));
-  PetscCall(PetscSFBcastEnd(sf, type, g->value, value, MPI_REPLACE));
-  PetscCallMPI(MPI_Type_free(&type));
+  PetscCall(SbForestOnRank0(mesh->comm, mesh->Ncell, mesh->ncell, NULL, mesh->cell_orig, &sf));
+  PetscCall(SbForestBroadcast(sf, each, MPIU_REAL, g->value, value));
   PetscCall(PetscSFDestroy(&sf));
   (void)vectors_of(run, vec);
   for (PetscInt f = 0; f < g->nfield; f++) {
