@@ -15,9 +15,9 @@ static PetscErrorCode write_mesh(SbTool *tool, SbImport *mesh)
 
   PetscFunctionBeginUser;
   (void)snprintf(phase, sizeof(phase), "writing %s", tool->out);
-  PetscCall(SbToolBegin(tool, phase));
+  SbToolBegin(tool, phase);
   ierr = SbMeshFileWrite(mesh, tool->out, tool->format);
-  PetscCall(SbToolEnd(tool));
+  SbToolEnd(tool);
   PetscCall(ierr);
 
   /* "out.h5: 1,234 vertices, 5,678 tets, 910 triangles" */
@@ -48,9 +48,9 @@ static PetscErrorCode refine(SbTool *tool, SbImport *mesh)
   for (PetscInt k = 0; k < tool->levels; k++) {
     PetscErrorCode ierr;
 
-    PetscCall(SbToolBegin(tool, "refining"));
+    SbToolBegin(tool, "refining");
     ierr = SbMeshFileRefine(mesh);
-    PetscCall(SbToolEnd(tool));
+    SbToolEnd(tool);
     PetscCall(ierr);
   }
   PetscCall(write_mesh(tool, mesh));
@@ -73,9 +73,9 @@ static PetscErrorCode repair(SbTool *tool, SbImport *mesh)
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  PetscCall(SbToolBegin(tool, "repairing"));
+  SbToolBegin(tool, "repairing");
   ierr = SbMeshFileRepair(mesh, tool->merge_tolerance, &r);
-  PetscCall(SbToolEnd(tool));
+  SbToolEnd(tool);
   PetscCall(ierr);
   (void)snprintf(welded, sizeof(welded), "vertices welded to others at most %.3g m away",
                  (double)r.merge_tolerance);
@@ -124,9 +124,9 @@ PetscErrorCode SbToolRun(SbTool *tool)
   // the mesh is read, with a word about it
   (void)snprintf(phase, sizeof(phase), "%s %s",
                  SbMeshFileIsSurface(tool->in) ? "making tets from" : "reading", tool->in);
-  PetscCall(SbToolBegin(tool, phase));
+  SbToolBegin(tool, phase);
   ierr = SbMeshFileRead(&tool->body, SbToolProgress, tool, &mesh);
-  PetscCall(SbToolEnd(tool));
+  SbToolEnd(tool);
   PetscCall(ierr);
   ierr = command->run(tool, mesh);
   if (!ierr && tool->view[0]) ierr = SbToolView(tool, mesh);

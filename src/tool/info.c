@@ -20,19 +20,6 @@
 #define FACTOR 4096.   /* bytes for each unknown of a factorisation */
 #define FACTORED 60000 /* unknowns up to which -solver auto factors the matrix of a dynamic run */
 
-static PetscErrorCode print(const char *format, ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
-
-static PetscErrorCode print(const char *format, ...)
-{
-  va_list args;
-
-  PetscFunctionBeginUser;
-  va_start(args, format);
-  (void)vfprintf(stdout, format, args);
-  va_end(args);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ parts of the report */
 
 static PetscErrorCode groups(const SbImport *mesh)
@@ -51,29 +38,27 @@ static PetscErrorCode groups(const SbImport *mesh)
 
       PetscCall(SbMeshFileGroup(mesh, g, &group, &found));
       if (!found || group.dim != d) continue;
-      if (!titled) PetscCall(print("%s\n", title[d]));
+      if (!titled) (void)printf("%s\n", title[d]);
       titled = PETSC_TRUE;
-      PetscCall(print("  %-26s %12s %s", group.name, SbToolNumber(group.n, number), item[d]));
-      if (d) PetscCall(print(", %.6g %s", (double)group.size, unit[d]));
+      (void)printf("  %-26s %12s %s", group.name, SbToolNumber(group.n, number), item[d]);
+      if (d) (void)printf(", %.6g %s", (double)group.size, unit[d]);
       /* readers of formats that have names only make up numbers */
-      if (group.tag > 0 && group.tag <= INT32_MAX) PetscCall(print(" (number %lld)", (long long)group.tag));
-      PetscCall(print("\n"));
+      if (group.tag > 0 && group.tag <= INT32_MAX) (void)printf(" (number %lld)", (long long)group.tag);
+      (void)printf("\n");
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* A line of a histogram: at most 40 signs; what is there has at least one. */
-static PetscErrorCode bar(const char *label, PetscInt64 n, PetscInt64 most)
+static void bar(const char *label, PetscInt64 n, PetscInt64 most)
 {
   char signs[41], number[32];
   const int length = n ? (int)PetscMax(1, 40 * n / most) : 0;
 
-  PetscFunctionBeginUser;
   memset(signs, '#', sizeof(signs));
   signs[length] = 0;
-  PetscCall(print("  %-14s %14s %s\n", label, SbToolNumber(n, number), signs));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  (void)printf("  %-14s %14s %s\n", label, SbToolNumber(n, number), signs);
 }
 
 /* Bytes that a run of one step takes on one rank, by element. */
@@ -113,43 +98,43 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
 
   PetscFunctionBeginUser;
   SbMeshFileCount(mesh, &nvert, n);
-  PetscCall(print("%s\n", tool->in));
-  PetscCall(print("  %-26s %12s\n", "vertices", SbToolNumber(nvert, number)));
-  PetscCall(print("  %-26s %12s\n", "tets", SbToolNumber(n[3], number)));
-  if (n[2]) PetscCall(print("  %-26s %12s\n", "triangles of groups", SbToolNumber(n[2], number)));
-  if (n[1]) PetscCall(print("  %-26s %12s\n", "lines of groups", SbToolNumber(n[1], number)));
-  if (n[0]) PetscCall(print("  %-26s %12s\n", "points of groups", SbToolNumber(n[0], number)));
+  (void)printf("%s\n", tool->in);
+  (void)printf("  %-26s %12s\n", "vertices", SbToolNumber(nvert, number));
+  (void)printf("  %-26s %12s\n", "tets", SbToolNumber(n[3], number));
+  if (n[2]) (void)printf("  %-26s %12s\n", "triangles of groups", SbToolNumber(n[2], number));
+  if (n[1]) (void)printf("  %-26s %12s\n", "lines of groups", SbToolNumber(n[1], number));
+  if (n[0]) (void)printf("  %-26s %12s\n", "points of groups", SbToolNumber(n[0], number));
   PetscCall(groups(mesh));
   (void)fflush(stdout);
-  PetscCall(SbToolBegin(tool, "measuring"));
+  SbToolBegin(tool, "measuring");
   ierr = SbMeshFileMeasure(mesh, &facts);
-  PetscCall(SbToolEnd(tool));
+  SbToolEnd(tool);
   PetscCall(ierr);
   // size and counts
   b = facts.body.bbox;
-  PetscCall(print("size (coordinates in m)\n"));
-  PetscCall(print("  from (%.6g, %.6g, %.6g) to (%.6g, %.6g, %.6g)\n", (double)b[0], (double)b[1],
-                  (double)b[2], (double)b[3], (double)b[4], (double)b[5]));
-  PetscCall(print("  %-26s %12.6g m^3\n", "volume", (double)facts.body.volume));
-  PetscCall(print("  %-26s %12.6g m^2, %s facets\n", "surface", (double)facts.area,
-                  SbToolNumber(facts.body.nfacet, number)));
-  PetscCall(print("  %-26s %12s\n", "parts", SbToolNumber(facts.body.npart, number)));
-  PetscCall(print("  %-26s %12s: shortest %.4g m, mean %.4g m, longest %.4g m\n", "edges",
-                  SbToolNumber(facts.nedge, number), (double)facts.edge[0], (double)facts.edge[1],
-                  (double)facts.edge[2]));
-  PetscCall(print("  %-26s %12s\n", "faces", SbToolNumber(facts.nface, number)));
-  if (facts.body.note[0]) PetscCall(print("  to know: %s\n", facts.body.note));
+  (void)printf("size (coordinates in m)\n");
+  (void)printf("  from (%.6g, %.6g, %.6g) to (%.6g, %.6g, %.6g)\n", (double)b[0], (double)b[1], (double)b[2],
+               (double)b[3], (double)b[4], (double)b[5]);
+  (void)printf("  %-26s %12.6g m^3\n", "volume", (double)facts.body.volume);
+  (void)printf("  %-26s %12.6g m^2, %s facets\n", "surface", (double)facts.area,
+               SbToolNumber(facts.body.nfacet, number));
+  (void)printf("  %-26s %12s\n", "parts", SbToolNumber(facts.body.npart, number));
+  (void)printf("  %-26s %12s: shortest %.4g m, mean %.4g m, longest %.4g m\n", "edges",
+               SbToolNumber(facts.nedge, number), (double)facts.edge[0], (double)facts.edge[1],
+               (double)facts.edge[2]);
+  (void)printf("  %-26s %12s\n", "faces", SbToolNumber(facts.nface, number));
+  if (facts.body.note[0]) (void)printf("  to know: %s\n", facts.body.note);
   // shape of the tets
-  PetscCall(print("dihedral angles, degrees: %.3g to %.4g (70.5 in the regular tet)\n",
-                  (double)facts.body.min_dihedral, (double)facts.max_dihedral));
+  (void)printf("dihedral angles, degrees: %.3g to %.4g (70.5 in the regular tet)\n",
+               (double)facts.body.min_dihedral, (double)facts.max_dihedral);
   for (int i = 0; i < SB_ANGLE_BINS; i++) most = PetscMax(most, facts.angle[i]);
   for (int i = 0; i < SB_ANGLE_BINS; i++) {
     (void)snprintf(label, sizeof(label), "%3d to %3d", 180 / SB_ANGLE_BINS * i,
                    180 / SB_ANGLE_BINS * (i + 1));
-    PetscCall(bar(label, facts.angle[i], most));
+    bar(label, facts.angle[i], most);
   }
-  PetscCall(print("radius ratio, circumradius / (3 inradius): up to %.4g (1 in the regular tet)\n",
-                  (double)facts.body.max_radius_ratio));
+  (void)printf("radius ratio, circumradius / (3 inradius): up to %.4g (1 in the regular tet)\n",
+               (double)facts.body.max_radius_ratio);
   most = 1;
   for (int i = 0; i < SB_RATIO_BINS; i++) most = PetscMax(most, facts.ratio[i]);
   for (int i = 0; i < SB_RATIO_BINS; i++) {
@@ -158,18 +143,18 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
                      (double)SbRatioBinEdges[i + 1]);
     else
       (void)snprintf(label, sizeof(label), "%4.4g and more", (double)SbRatioBinEdges[i]);
-    PetscCall(bar(label, facts.ratio[i], most));
+    bar(label, facts.ratio[i], most);
   }
   // what a run of it needs
-  PetscCall(print("a dynamic run on one rank, estimated\n  %-8s %14s %14s %14s\n", "element", "unknowns",
-                  "matrix MiB", "memory MiB"));
+  (void)printf("a dynamic run on one rank, estimated\n  %-8s %14s %14s %14s\n", "element", "unknowns",
+               "matrix MiB", "memory MiB");
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements); i++) {
     PetscInt unknowns;
     PetscReal matrix;
     const PetscReal bytes = memory(&facts, elements[i], &unknowns, &matrix);
 
-    PetscCall(print("  %-8s %14s %14.0f %14.0f\n", elements[i], SbToolNumber(unknowns, number),
-                    (double)matrix / 1048576, (double)bytes / 1048576));
+    (void)printf("  %-8s %14s %14.0f %14.0f\n", elements[i], SbToolNumber(unknowns, number),
+                 (double)matrix / 1048576, (double)bytes / 1048576);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

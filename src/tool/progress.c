@@ -7,11 +7,6 @@
 
 #define PATIENCE 1.0 /* s before the first line */
 
-static PetscLogDouble now(void)
-{
-  return MPI_Wtime();
-}
-
 const char *SbToolNumber(PetscInt64 n, char text[32])
 {
   char digits[24];
@@ -26,22 +21,20 @@ const char *SbToolNumber(PetscInt64 n, char text[32])
   return text;
 }
 
-PetscErrorCode SbToolBegin(SbTool *tool, const char *phase)
+void SbToolBegin(SbTool *tool, const char *phase)
 {
-  PetscFunctionBeginUser;
   tool->phase = phase;
-  tool->start = now();
+  tool->start = MPI_Wtime();
   tool->last = tool->start + PATIENCE;
   tool->terminal = (PetscBool)isatty(STDERR_FILENO);
   tool->open = (PetscBool)(tool->terminal && !tool->quiet);
   if (tool->open) (void)fprintf(stderr, "\r%-79.79s", phase);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbToolProgress(const char *what, PetscInt64 done, PetscInt64 total, void *ctx)
 {
   SbTool *tool = (SbTool *)ctx;
-  const PetscLogDouble t = now();
+  const PetscLogDouble t = MPI_Wtime();
   char line[PETSC_MAX_PATH_LEN], number[32];
 
   PetscFunctionBeginUser;
@@ -59,10 +52,8 @@ PetscErrorCode SbToolProgress(const char *what, PetscInt64 done, PetscInt64 tota
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbToolEnd(SbTool *tool)
+void SbToolEnd(SbTool *tool)
 {
-  PetscFunctionBeginUser;
   if (tool->open) (void)fprintf(stderr, "\r%79s\r", "");
   tool->open = PETSC_FALSE;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -50,8 +50,8 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh);
 PetscErrorCode SbToolView(SbTool *tool, const SbImport *mesh);
 
 /* progress.c: a line on standard error while something takes long. */
-PetscErrorCode SbToolBegin(SbTool *tool, const char *phase);
+void SbToolBegin(SbTool *tool, const char *phase);
 PetscErrorCode SbToolProgress(const char *what, PetscInt64 done, PetscInt64 total, void *ctx);
-PetscErrorCode SbToolEnd(SbTool *tool);
+void SbToolEnd(SbTool *tool);
 /* 1234567 as "1,234,567". */
 const char *SbToolNumber(PetscInt64 n, char text[32]);
