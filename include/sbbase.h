@@ -183,6 +183,12 @@ PetscErrorCode SbCaughtRaise(MPI_Comm comm, const SbCaughtError *caught);
 /* One line `supple: warning: ...` on stderr by rank 0 of comm; a printf format without newline. Collective. */
 PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
 
+/* ------------------------------------------------------------------ texts */
+
+/* Prints into text, or behind what is in it; what does not fit is cut off. */
+void SbFormat(size_t size, char text[], const char *format, ...) PETSC_ATTRIBUTE_FORMAT(3, 4);
+void SbAppend(size_t size, char text[], const char *format, ...) PETSC_ATTRIBUTE_FORMAT(3, 4);
+
 /* ------------------------------------------------------------------ arrays */
 
 /* Room for at least `need` elements of `unit` bytes in *array, which has *size of them; doubles, so that appending is cheap. Not collective. */

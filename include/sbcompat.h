@@ -16,6 +16,11 @@
   #error "supple needs a PETSc with real double-precision scalars"
 #endif
 
+/* "3.18.5" */
+#define SB_PETSC_VERSION                                                                          \
+  PetscStringize(PETSC_VERSION_MAJOR) "." PetscStringize(PETSC_VERSION_MINOR) "." PetscStringize( \
+    PETSC_VERSION_SUBMINOR)
+
 #ifndef PETSC_SUCCESS
   #define PETSC_SUCCESS ((PetscErrorCode)0)
 #endif

@@ -164,6 +164,8 @@ PetscErrorCode SbSpaceAddVolumeTangent(SbSpace space, PetscInt body, const Petsc
 PetscErrorCode SbSpacePrescribe(SbSpace space, PetscInt node, int components);
 /* After all effects were set up: builds fixed_node. */
 PetscErrorCode SbSpacePrescribeDone(SbSpace space);
+/* Zeroes the prescribed components of a vector, or all others. Not collective. */
+PetscErrorCode SbSpaceZeroPrescribed(SbSpace space, PetscBool prescribed, Vec X);
 /* Index into fixed_node of a node, or -1. */
 PetscInt SbSpacePrescribedIndex(SbSpace space, PetscInt node);
 

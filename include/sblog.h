@@ -39,6 +39,19 @@ PetscErrorCode SbLogInitialize(void);
     event      - of all that have this name
 */
 PetscErrorCode SbLogNamed(const char *kind, const char *name, PetscLogEvent *event);
-/* Adds the seconds of an event of ours, or of the one with a name (0: there is none), in all stages, on this rank. Not collective. */
-PetscErrorCode SbLogSeconds(PetscLogEvent event, PetscReal *seconds);
-PetscErrorCode SbLogSecondsNamed(const char *name, PetscReal *seconds);
+/* What a run spends its time on. Events of a phase do not contain each other; the linear solve is what PETSc's KSP and PC events cover. */
+typedef enum {
+  SB_PHASE_MESH,
+  SB_PHASE_SETUP,
+  SB_PHASE_RESIDUAL,
+  SB_PHASE_TANGENT,
+  SB_PHASE_SOLVE,
+  SB_PHASE_CONTACT, /* without the search */
+  SB_PHASE_SEARCH,
+  SB_PHASE_ENERGY,
+  SB_PHASE_OUTPUT,
+  SB_PHASE_OTHER, /* for what no event covers: 0 */
+  SB_PHASE_COUNT
+} SbPhase;
+/* Seconds of each phase so far on this rank. Not collective. */
+PetscErrorCode SbLogSeconds(PetscReal seconds[SB_PHASE_COUNT]);

@@ -128,7 +128,6 @@ struct _p_SbRun {
   struct {
     SbMonitorFn fn;
     void *ctx;
-    PetscErrorCode (*destroy)(void *ctx);
   } monitor[8];
   struct {
     SbStepSolvedFn fn; /* examines each step that was solved; NULL: nobody does */
@@ -180,8 +179,7 @@ struct _p_SbRun {
   PetscReal damping_power; /* at the last step, W */
   char stop_reason[1024];  /* why the run ended early; empty when it reached its end */
   void *output;            /* what src/output keeps for this run; NULL when no output was asked for */
-  PetscErrorCode (*output_destroy)(
-    SbRun run); /* frees it; called by SbRunDestroy() when not NULL, before the monitors */
+  PetscErrorCode (*output_destroy)(SbRun run); /* frees it; called by SbRunDestroy() when not NULL */
 };
 
 /*
@@ -199,7 +197,7 @@ PetscErrorCode SbRunCreate(SbModel model,
                            SbRun *run); /* reads the options -time, -solver, ...; nothing is computed yet */
 PetscErrorCode
 SbRunSetUp(SbRun run); /* after SbModelSetUp(): vectors, matrix, solver, integrator. Collective */
-PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx, PetscErrorCode (*destroy)(void *));
+PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx);
 /* From now on SIGTERM, SIGINT and SIGUSR1 end the run after its step: SbRun.stopped. A second SIGINT ends the process. Of one run at a time. */
 PetscErrorCode SbRunCatchSignals(SbRun run);
 /* After SbRunSetUp(). */

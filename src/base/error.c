@@ -66,11 +66,11 @@ static PetscBool is_wrong_choice(PetscErrorCode n, const char *function, const c
     return PETSC_FALSE;
   for (PetscInt i = 0; i < SbTheOptions.nuser; i++) {
     const char *name = SbTheOptions.user[i].name, *value = SbTheOptions.user[i].value;
-    const size_t length = strlen(name), have = strlen(given);
+    const size_t length = strlen(name);
 
     if (length > 5 && !strcmp(name + length - 5, "_type") &&
         (strstr(name, "ksp_") || strstr(name, "pc_") || strstr(name, "snes_") || strstr(name, "mat_")))
-      (void)snprintf(given + have, size - have, "%s-%s %s", have ? " " : "", name, value ? value : "");
+      SbAppend(size, given, "%s-%s %s", given[0] ? " " : "", name, value ? value : "");
   }
   return (PetscBool)(given[0] || (function && strstr(function, "SetTolerances")));
 }
@@ -93,11 +93,9 @@ static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, con
                      ? ": an option begins with a dash, and a comment with #"
                      : "");
     if (choice) {
-      const size_t length = strlen(state.message);
-
       for (char *c = strchr(state.message, '\n'); c; c = strchr(c, '\n')) *c = ' ';
-      (void)snprintf(state.message + length, sizeof(state.message) - length, "%s%s%s",
-                     given[0] ? ", with " : "", given, state.trace ? "" : " (-error_trace shows where)");
+      SbAppend(sizeof(state.message), state.message, "%s%s%s", given[0] ? ", with " : "", given,
+               state.trace ? "" : " (-error_trace shows where)");
     }
   }
   if (state.pending && !state.trace) return n;
@@ -125,9 +123,7 @@ void SbErrorSetProgram(const char *name)
 
 void SbErrorSetFile(const char *file)
 {
-  const size_t n = strlen(state.file);
-
-  (void)snprintf(state.file + n, sizeof(state.file) - n, "%s%s", n ? ", " : "", file);
+  SbAppend(sizeof(state.file), state.file, "%s%s", state.file[0] ? ", " : "", file);
 }
 
 /* Whether PETSc reads the first n lines of a text; *end: where they end. */

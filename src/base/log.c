@@ -47,7 +47,8 @@ PetscErrorCode SbLogNamed(const char *kind, const char *name, PetscLogEvent *eve
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbLogSeconds(PetscLogEvent event, PetscReal *seconds)
+/* Adds the seconds of an event in all stages. */
+static PetscErrorCode add_seconds(PetscLogEvent event, PetscReal *seconds)
 {
   const PetscLogStage stages[] = {0, SbLogStageSetup, SbLogStageSolve, SbLogStageOutput};
 
@@ -62,12 +63,30 @@ PetscErrorCode SbLogSeconds(PetscLogEvent event, PetscReal *seconds)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbLogSecondsNamed(const char *name, PetscReal *seconds)
+PetscErrorCode SbLogSeconds(PetscReal seconds[SB_PHASE_COUNT])
 {
-  PetscLogEvent event;
+  static const char *const solve[] = {"KSPSolve", "PCSetUp", "PCSetUpOnBlocks"};
+  static const struct {
+    SbPhase phase;
+    SbEvent event;
+  } ours[] = {{SB_PHASE_MESH, SB_EVENT_MESH_READ},     {SB_PHASE_MESH, SB_EVENT_MESH_DISTRIBUTE},
+              {SB_PHASE_SETUP, SB_EVENT_SPACE_SETUP},  {SB_PHASE_SETUP, SB_EVENT_MATRIX_SETUP},
+              {SB_PHASE_SETUP, SB_EVENT_SOLVER_SETUP}, {SB_PHASE_RESIDUAL, SB_EVENT_RESIDUAL},
+              {SB_PHASE_TANGENT, SB_EVENT_TANGENT},    {SB_PHASE_SOLVE, SB_EVENT_CONTACT_SOLVE},
+              {SB_PHASE_CONTACT, SB_EVENT_CONTACT},    {SB_PHASE_SEARCH, SB_EVENT_SEARCH},
+              {SB_PHASE_ENERGY, SB_EVENT_ENERGY},      {SB_PHASE_OUTPUT, SB_EVENT_OUTPUT},
+              {SB_PHASE_OUTPUT, SB_EVENT_CHECKPOINT}};
 
   PetscFunctionBeginUser;
-  PetscCall(PetscLogEventGetId(name, &event));
-  if (event >= 0) PetscCall(SbLogSeconds(event, seconds));
+  PetscCall(PetscArrayzero(seconds, SB_PHASE_COUNT));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++)
+    PetscCall(add_seconds(SbEvents[ours[i].event], &seconds[ours[i].phase]));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(solve); i++) {
+    PetscLogEvent event;
+
+    PetscCall(PetscLogEventGetId(solve[i], &event));
+    if (event >= 0) PetscCall(add_seconds(event, &seconds[SB_PHASE_SOLVE]));
+  }
+  seconds[SB_PHASE_CONTACT] = PetscMax(0, seconds[SB_PHASE_CONTACT] - seconds[SB_PHASE_SEARCH]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

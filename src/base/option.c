@@ -245,8 +245,7 @@ PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users)
       for (PetscInt i = 0; i < nleft && !left; i++)
         left = (PetscBool)(token[0] == '-' && !strcmp(token + 1, names[i]));
       if (next || left) break;
-      if (value[0]) PetscCall(PetscStrlcat(value, " ", sizeof(value)));
-      PetscCall(PetscStrlcat(value, token, sizeof(value)));
+      SbAppend(sizeof(value), value, "%s%s", value[0] ? " " : "", token);
       token = strtok_r(NULL, " ", &rest);
     }
     PetscCall(add_user(n, users, name + 1, value[0] ? value : NULL));

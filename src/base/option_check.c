@@ -191,32 +191,27 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
     PetscCall(PetscSNPrintf(why, sizeof(why), "; did you mean %s?", near));
   else {
     /* why an option with the prefix of a class was not read, when no name is near */
-    char keys[768], instances[256];
+    char keys[768] = "", instances[256] = "";
     const SbOptionRecord *last = NULL;
 
     // keys that were read for the instance that a name belongs to: "body liver has mesh, young"; "" when there are none
-    keys[0] = 0;
     for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
       const SbOptionRecord *r = &SbTheOptions.record[i];
       const size_t length = strlen(r->scope.instance);
       const char *at = name + strlen(klass) + 1;
-      char begin[2 * SB_NAME_MAX + 8];
 
       if (strcmp(r->scope.klass, klass) || strncasecmp(at, r->scope.instance, length) || at[length] != '_')
         continue;
-      PetscCall(PetscSNPrintf(begin, sizeof(begin), "%s %s has ", klass, r->scope.instance));
-      PetscCall(PetscStrlcat(keys, keys[0] ? ", " : begin, sizeof(keys)));
-      PetscCall(PetscStrlcat(keys, r->row->key, sizeof(keys)));
+      if (!keys[0]) SbFormat(sizeof(keys), keys, "%s %s has ", klass, r->scope.instance);
+      SbAppend(sizeof(keys), keys, "%s%s", keys[strlen(keys) - 1] == ' ' ? "" : ", ", r->row->key);
     }
     /* instances of a class that have been read, "liver, stone"; "" when there are none */
-    instances[0] = 0;
     for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
       const SbOptionRecord *r = &SbTheOptions.record[i];
 
       if (strcmp(r->scope.klass, klass)) continue;
       if (last && !strcmp(last->scope.instance, r->scope.instance)) continue;
-      if (last) PetscCall(PetscStrlcat(instances, ", ", sizeof(instances)));
-      PetscCall(PetscStrlcat(instances, r->scope.instance, sizeof(instances)));
+      SbAppend(sizeof(instances), instances, "%s%s", last ? ", " : "", r->scope.instance);
       last = r;
     }
     if (keys[0])

@@ -48,8 +48,7 @@ PetscErrorCode SbSuggestNames(const char *word, PetscInt n, const char *const na
     if (!names[i] || edit_distance(word, names[i]) != best) continue;
     for (PetscInt j = 0; j < i && !again; j++) again = (PetscBool)(names[j] && !strcmp(names[i], names[j]));
     if (again) continue;
-    if (nbest++) PetscCall(PetscStrlcat(text, " or ", size));
-    PetscCall(PetscStrlcat(text, names[i], size));
+    SbAppend(size, text, "%s%s", nbest++ ? " or " : "", names[i]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -61,15 +60,9 @@ PetscErrorCode SbSuggestName(const char *word, PetscInt n, const char *const nam
 
   PetscFunctionBeginUser;
   text[0] = 0;
-  for (PetscInt i = 0; i < n; i++) {
-    PetscCall(PetscStrlcat(text, i ? ", " : "", size));
-    PetscCall(PetscStrlcat(text, names[i], size));
-  }
+  for (PetscInt i = 0; i < n; i++) SbAppend(size, text, "%s%s", i ? ", " : "", names[i]);
   PetscCall(SbSuggestNames(word, n, names, sizeof(near), near));
-  if (!near[0]) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscStrlcat(text, "; did you mean ", size));
-  PetscCall(PetscStrlcat(text, near, size));
-  PetscCall(PetscStrlcat(text, "?", size));
+  if (near[0]) SbAppend(size, text, "; did you mean %s?", near);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

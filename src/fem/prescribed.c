@@ -28,6 +28,18 @@ PetscErrorCode SbSpacePrescribeDone(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbSpaceZeroPrescribed(SbSpace s, PetscBool prescribed, Vec X)
+{
+  PetscScalar *x;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArray(X, &x));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
+    if (prescribed == ((s->fixed[i / 3] >> i % 3) & 1)) x[i] = 0.;
+  PetscCall(VecRestoreArray(X, &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscInt SbSpacePrescribedIndex(SbSpace s, PetscInt node)
 {
   PetscInt lo = 0, hi = s->nfixed;

@@ -38,20 +38,12 @@ static PetscBool has_matrix(const SbRun run)
 /* D.K D of the free unknowns, from the last tangent of the step. Collective. */
 static PetscErrorCode form_by_matrix(SbLedger l, Vec D, PetscReal *form)
 {
-  const SbSpace s = l->run->model->space;
   Vec free = l->w[1], product = l->w[2];
   PetscReal mass;
-  PetscScalar *d;
 
   PetscFunctionBeginUser;
   PetscCall(VecCopy(D, free));
-  PetscCall(VecGetArray(free, &d));
-  for (PetscInt k = 0; k < s->nfixed; k++) {
-    for (PetscInt i = 3 * s->fixed_node[k]; i < 3 * s->fixed_node[k] + 3; i++) {
-      if (s->fixed_node[k] < s->nnode_owned && (s->fixed[i / 3] & (1 << i % 3))) d[i] = 0.;
-    }
-  }
-  PetscCall(VecRestoreArray(free, &d));
+  PetscCall(SbSpaceZeroPrescribed(l->run->model->space, PETSC_TRUE, free));
   PetscCall(MatMult(l->run->J, free, product));
   PetscCall(VecDot(product, free, form));
   PetscCall(SbMassForm(l, free, &mass));

@@ -72,20 +72,16 @@ PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger)
 
 /* ------------------------------------------------------------------ a step that was solved */
 
-static PetscErrorCode begin(SbLedger l)
+static void begin(SbLedger l)
 {
-  PetscFunctionBeginUser;
-  PetscCall(PetscLogEventBegin(l->event, 0, 0, 0, 0));
+  (void)PetscLogEventBegin(l->event, 0, 0, 0, 0);
   l->seconds -= MPI_Wtime();
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode end(SbLedger l)
+static void end(SbLedger l)
 {
-  PetscFunctionBeginUser;
   l->seconds += MPI_Wtime();
-  PetscCall(PetscLogEventEnd(l->event, 0, 0, 0, 0));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  (void)PetscLogEventEnd(l->event, 0, 0, 0, 0);
 }
 
 static PetscErrorCode examine_step(SbRun run, const SbSolvedStep *step, void *ctx, PetscBool *again)
@@ -121,13 +117,13 @@ static PetscErrorCode examine_step(SbRun run, const SbSolvedStep *step, void *ct
       PetscCall(SNESGetFunctionNorm(l->run->snes, &l->residual));
   }
   if (!l->seen && l->accuracy == 0.) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(begin(l));
+  begin(l);
   if (step->V) PetscCall(SbEstimateTime(l, step, l->seen));
   if (l->seen && step->solved) {
     PetscCall(SbEstimateSolver(l, step));
     l->seen_residual = l->residual;
   }
-  PetscCall(end(l));
+  end(l);
   if (l->accuracy > 0.) PetscCall(SbAdaptiveToleranceUpdate(l, step, again));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -172,7 +168,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   }
 
   /* what is computed at this state, at the price that goes into own_work */
-  PetscCall(begin(l));
+  begin(l);
   if (!first && (step->last || (l->every && step->step % l->every == 0))) {
     const SbModel m = l->run->model;
     PetscReal sum = 0., contact = 0.;
@@ -198,7 +194,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   scale = l->stored > 0. ? 1. / PetscSqrtReal(l->stored) : 0.;
   for (int i = 0; i < SB_ERROR_COUNT; i++) l->relative[i] = scale * l->error[i];
   l->relative[SB_ERROR_TIME] += scale * l->offset;
-  PetscCall(end(l));
+  end(l);
   PetscCall(SbAdaptiveToleranceAccept(l, step));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -210,7 +206,7 @@ static PetscErrorCode cell_error(SbRun run, const SbStep *step, PetscReal values
   SbLedger l = (SbLedger)run->post_solve.ctx;
 
   PetscFunctionBeginUser;
-  PetscCall(begin(l));
+  begin(l);
   PetscCall(SbSpaceEstimateCompute(l->space, step->t, step->U, step->V, step->A));
   for (PetscInt b = 0; b < space->nbatch; b++) {
     for (PetscInt i = 0; i < space->batch_n[b]; i++) {
@@ -220,7 +216,7 @@ static PetscErrorCode cell_error(SbRun run, const SbStep *step, PetscReal values
     }
   }
   l->own_work += SPACE_WORK;
-  PetscCall(end(l));
+  end(l);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -275,7 +271,7 @@ PetscErrorCode SbLedgerAttach(SbLedger l)
   PetscFunctionBeginUser;
   if (!l) PetscFunctionReturn(PETSC_SUCCESS);
   run = l->run;
-  PetscCall(begin(l));
+  begin(l);
   PetscCall(SbSpaceEstimateCreate(run->model, &l->space));
   PetscCall(PetscCalloc1(run->model->nbody, &l->space_error));
   for (int i = 0; i < 3; i++) PetscCall(VecDuplicate(run->U, &l->w[i]));
@@ -294,14 +290,14 @@ PetscErrorCode SbLedgerAttach(SbLedger l)
   run->column = l->column;
   run->ncolumn = SB_ERROR_COUNT;
   PetscCall(carry(l));
-  PetscCall(end(l));
+  end(l);
   run->want_energies = PETSC_TRUE;
   if (run->model->nbegin_step || run->model->npotential || l->quantity.kind == SB_QUANTITY_REACTION)
     run->want_residual = PETSC_TRUE;
   run->post_solve.fn = examine_step;
   run->post_solve.ctx = l;
   run->cell_error = cell_error;
-  PetscCall(SbRunAddMonitor(run, monitor, l, NULL));
+  PetscCall(SbRunAddMonitor(run, monitor, l));
   PetscCall(SbAdaptiveToleranceAttach(l));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -146,20 +146,14 @@ static PetscErrorCode stiffness_times(SbLedger l, PetscReal t, Vec U, Vec D, Vec
 /* dQ/du on what is not prescribed. */
 static PetscErrorCode gradient(SbLedger l, const SbStep *step, Vec B)
 {
-  const SbSpace s = l->run->model->space;
   SbQuantity *q = &l->quantity;
-  PetscScalar *b;
 
   PetscFunctionBeginUser;
   if (q->kind == SB_QUANTITY_REACTION)
     PetscCall(stiffness_times(l, step->t, step->U, q->weight, B));
   else
     PetscCall(VecCopy(q->weight, B));
-  PetscCall(VecGetArray(B, &b));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
-    if (s->fixed[i / 3] & (1 << i % 3)) b[i] = 0.;
-  }
-  PetscCall(VecRestoreArray(B, &b));
+  PetscCall(SbSpaceZeroPrescribed(l->run->model->space, PETSC_TRUE, B));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -5,7 +5,6 @@
   by 2^(1/2)), as many more tets as that makes, and more iterations where the preconditioner's count grows with the mesh; of the integrator of order p, steps shorter by 2^(1/p); of the
   solves, the iterations that take half a residual at the rate that was measured.
 */
-#include <stdarg.h>
 #include "ledger_impl.h"
 
 #define WASTE 1e3 /* a source so many times below the largest one is worked on for nothing */
@@ -16,21 +15,7 @@ static const char *const names[SB_ERROR_COUNT] = {"space",  "time",    "nonlinea
 
 /* ------------------------------------------------------------------ words */
 
-typedef struct {
-  char text[2048];
-  size_t n;
-} Words;
-
-static void say(Words *w, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
-static void say(Words *w, const char *format, ...)
-{
-  va_list args;
-
-  va_start(args, format);
-  w->n += (size_t)vsnprintf(w->text + w->n, sizeof(w->text) - w->n, format, args);
-  va_end(args);
-  w->n = PetscMin(w->n, sizeof(w->text) - 1);
-}
+#define ROOM 2048 /* for them */
 
 static PetscReal error_of(SbLedger l, int source)
 {
@@ -122,7 +107,7 @@ static PetscReal price(SbLedger l, const SbLedgerSeconds *s, int source)
   order one, both relative, while that is small (the bar of docs/reports/quadratic_tets.md: 0.4 to 0.7 of the square). So edges may be longer by r^(-1/2), and
   the run takes c r^(3/2) times as long, c being the ratio of bytes of the matrix per tet.
 */
-static void say_quadratic(SbLedger l, PetscReal price_of_half, Words *w)
+static void say_quadratic(SbLedger l, PetscReal price_of_half, char w[ROOM])
 {
   const SbModel m = l->run->model;
   const PetscInt body = worst_body(l), *nodes = m->element[body]->nodes_per;
@@ -134,19 +119,21 @@ static void say_quadratic(SbLedger l, PetscReal price_of_half, Words *w)
   if (nodes[1] || !l->run->J) return;
   /* nu > 0.45: errors of P1 do not fall with the mesh */
   if (nodes[0] && law->ops.bulk_modulus(law) > 9.7 * law->ops.shear_modulus(law)) {
-    say(w, "At this Poisson's ratio P1 locks, finer meshes help little: -body_%s_element %s does not. ",
-        m->body[body].name, m->nbegin_step || m->npotential ? "cr" : "p2 (or cr)");
+    SbAppend(ROOM, w,
+             "At this Poisson's ratio P1 locks, finer meshes help little: -body_%s_element %s does not. ",
+             m->body[body].name, m->nbegin_step || m->npotential ? "cr" : "p2 (or cr)");
     return;
   }
   /* contact has an edge, where solutions are not smooth */
   if (m->nbegin_step || m->npotential || times >= price_of_half) return;
-  say(w,
-      "Where the solution is smooth and tets are well shaped, -body_%s_element p2 does it with edges of %.2g "
-      "times the length and %.2g times the time; not for shocks and sharp contact. ",
-      m->body[body].name, (double)(1. / PetscSqrtReal(r)), (double)times);
+  SbAppend(
+    ROOM, w,
+    "Where the solution is smooth and tets are well shaped, -body_%s_element p2 does it with edges of %.2g "
+    "times the length and %.2g times the time; not for shocks and sharp contact. ",
+    m->body[body].name, (double)(1. / PetscSqrtReal(r)), (double)times);
 }
 
-static void say_largest(SbLedger l, const SbLedgerSeconds *s, Words *w)
+static void say_largest(SbLedger l, const SbLedgerSeconds *s, char w[ROOM])
 {
   static const char *const what[SB_ERROR_COUNT] = {
     "the mesh is the largest source of error: half of it takes edges of %.3g times the length",
@@ -159,25 +146,26 @@ static void say_largest(SbLedger l, const SbLedgerSeconds *s, Words *w)
   const SbRun run = l->run;
 
   if (!(error_of(l, most) > 0.)) {
-    say(w, "No error was found that could be distinguished from zero. ");
+    SbAppend(ROOM, w, "No error was found that could be distinguished from zero. ");
     return;
   }
-  say(w, "Of an error of %.2g %%, ", (double)(100. * together(l) / PetscSqrtReal(l->stored)));
+  SbAppend(ROOM, w, "Of an error of %.2g %%, ", (double)(100. * together(l) / PetscSqrtReal(l->stored)));
   if (most == SB_ERROR_TIME)
-    say(w, "the time step is the largest source: half of it takes steps of %.3g s",
-        (double)(run->t_end / PetscMax(1, run->steps_total) / PetscPowReal(2., 1. / (PetscReal)l->order)));
+    SbAppend(
+      ROOM, w, "the time step is the largest source: half of it takes steps of %.3g s",
+      (double)(run->t_end / PetscMax(1, run->steps_total) / PetscPowReal(2., 1. / (PetscReal)l->order)));
   else if (most == SB_ERROR_SPACE)
-    say(w, what[most], (double)PetscPowReal(0.5, 1. / order_of_space(l)));
+    SbAppend(ROOM, w, what[most], (double)PetscPowReal(0.5, 1. / order_of_space(l)));
   else
-    say(w, "%s", what[most]);
+    SbAppend(ROOM, w, "%s", what[most]);
   if (most != SB_ERROR_CONTACT && most != SB_ERROR_ROUNDING)
-    say(w, ", and %.2g times the time", (double)price(l, s, most));
-  say(w, ". ");
+    SbAppend(ROOM, w, ", and %.2g times the time", (double)price(l, s, most));
+  SbAppend(ROOM, w, ". ");
   if (most == SB_ERROR_SPACE) say_quadratic(l, price(l, s, most), w);
 }
 
 /* Settings that cost and gain nothing. */
-static void say_wasted(SbLedger l, const SbLedgerSeconds *s, Words *w)
+static void say_wasted(SbLedger l, const SbLedgerSeconds *s, char w[ROOM])
 {
   static const struct {
     int source;
@@ -196,43 +184,49 @@ static void say_wasted(SbLedger l, const SbLedgerSeconds *s, Words *w)
     if (of[i].source == SB_ERROR_TIME && !l->run->model->dynamic) continue;
     if (of[i].source != SB_ERROR_TIME && l->run->linear_total <= l->run->newton_total)
       continue; /* factorisations */
-    say(w,
-        "%s is wasted: its error is %.1g times the largest one, and could be %.1g times as large unnoticed. ",
-        of[i].what, (double)(e / most), (double)(0.1 * most / e));
+    SbAppend(
+      ROOM, w,
+      "%s is wasted: its error is %.1g times the largest one, and could be %.1g times as large unnoticed. ",
+      of[i].what, (double)(e / most), (double)(0.1 * most / e));
   }
 }
 
 /* Whether -accuracy was met, and what is in the way. */
-static void say_dial(SbLedger l, Words *w)
+static void say_dial(SbLedger l, char w[ROOM])
 {
   const PetscReal all = together(l) / PetscSqrtReal(PetscMax(l->stored, PETSC_MIN_REAL));
   const PetscReal mesh = l->error[SB_ERROR_SPACE] / PetscSqrtReal(PetscMax(l->stored, PETSC_MIN_REAL));
   const PetscReal h = mesh_size(l->run->model);
 
   if (l->accuracy > 0.) {
-    say(w, "-accuracy %.3g was %s. ", (double)l->accuracy, all <= l->accuracy ? "met" : "NOT met");
+    SbAppend(ROOM, w, "-accuracy %.3g was %s. ", (double)l->accuracy, all <= l->accuracy ? "met" : "NOT met");
     if (mesh > 0.7 * l->accuracy)
-      say(w,
-          "The mesh is too coarse for it: tets of about %.2g m (now %.2g m) would do, where errors fall with "
-          "%stheir size. ",
-          (double)(h * PetscPowReal(0.7 * l->accuracy / mesh, 1. / order_of_space(l))), (double)h,
-          order_of_space(l) > 1. ? "the square of " : "");
+      SbAppend(
+        ROOM, w,
+        "The mesh is too coarse for it: tets of about %.2g m (now %.2g m) would do, where errors fall with "
+        "%stheir size. ",
+        (double)(h * PetscPowReal(0.7 * l->accuracy / mesh, 1. / order_of_space(l))), (double)h,
+        order_of_space(l) > 1. ? "the square of " : "");
     if (l->narrowed)
-      say(w, "Widths of contact's barrier were made smaller for it %" PetscInt_FMT " times. ", l->narrowed);
-    if (l->mesh_bounds) say(w, "Contact was left at a tenth of the mesh's error, which hides less. ");
+      SbAppend(ROOM, w, "Widths of contact's barrier were made smaller for it %" PetscInt_FMT " times. ",
+               l->narrowed);
+    if (l->mesh_bounds)
+      SbAppend(ROOM, w, "Contact was left at a tenth of the mesh's error, which hides less. ");
     if (l->width_bounds)
-      say(w, "Contact was left worse than its share: -effect_..._barrier_width is given, or rounding allows "
-             "no smaller one. ");
+      SbAppend(
+        ROOM, w,
+        "Contact was left worse than its share: -effect_..._barrier_width is given, or rounding allows "
+        "no smaller one. ");
   }
   if (l->budget > 0. && l->nstep) {
-    say(w,
-        "-step_time_budget %.3g s: %" PetscInt_FMT " of %" PetscInt_FMT
-        " steps kept it, mean %.3g s, longest %.3g s; solves to %.1e. ",
-        (double)l->budget, l->nkept, l->nstep, (double)(l->total / (PetscReal)l->nstep), (double)l->longest,
-        (double)l->rtol);
+    SbAppend(ROOM, w,
+             "-step_time_budget %.3g s: %" PetscInt_FMT " of %" PetscInt_FMT
+             " steps kept it, mean %.3g s, longest %.3g s; solves to %.1e. ",
+             (double)l->budget, l->nkept, l->nstep, (double)(l->total / (PetscReal)l->nstep),
+             (double)l->longest, (double)l->rtol);
     if (l->total > l->budget * (PetscReal)l->nstep)
-      say(w, "It is too small for this mesh: tets of about %.2g m (now %.2g m) would fit. ",
-          (double)(h * PetscPowReal(l->total / ((PetscReal)l->nstep * l->budget), 1. / 3.)), (double)h);
+      SbAppend(ROOM, w, "It is too small for this mesh: tets of about %.2g m (now %.2g m) would fit. ",
+               (double)(h * PetscPowReal(l->total / ((PetscReal)l->nstep * l->budget), 1. / 3.)), (double)h);
   }
 }
 
@@ -266,21 +260,21 @@ static PetscErrorCode print_line(const char *name, PetscReal error, PetscReal re
                                  const char *note)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "%-11s", name));
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "%-11s", name));
   if (error >= 0.)
-    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, " %10.2e %9.2e", (double)error, (double)relative));
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, " %10.2e %9.2e", (double)error, (double)relative));
   else
-    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, " %10s %9s", "", ""));
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, " %10s %9s", "", ""));
   if (quantity && error >= 0.)
-    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, " %9.2e", (double)*quantity));
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, " %9.2e", (double)*quantity));
   else
-    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, " %9s", ""));
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, " %9s", ""));
   if (seconds >= 0.)
-    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, " %9.3f %5.1f %%", (double)seconds,
-                           (double)(100. * seconds / PetscMax(total, 1e-9))));
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, " %9.3f %5.1f %%", (double)seconds,
+                          (double)(100. * seconds / PetscMax(total, 1e-9))));
   else
-    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, " %9s %7s", "", ""));
-  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "  %s\n", note));
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, " %9s %7s", "", ""));
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "  %s\n", note));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -291,7 +285,7 @@ PetscErrorCode SbLedgerReport(SbLedger l, const char *file, PetscBool quiet)
   static const char *const quantities[] = {"", "of u, m", "of F, N", "of V, m^3"};
   SbLedgerSeconds s;
   PetscMPIInt rank;
-  Words w = {.n = 0};
+  char words[ROOM] = "";
   FILE *f;
   int column = 0;
   SbModel m;
@@ -311,9 +305,9 @@ PetscErrorCode SbLedgerReport(SbLedger l, const char *file, PetscBool quiet)
   m = l->run->model;
   scale = l->stored > 0. ? 1. / PetscSqrtReal(l->stored) : 0.;
   q = l->quantity.kind ? l->quantity.error : NULL;
-  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n%-11s %10s %9s %9s %9s %7s  of %.3g J stored\n",
-                         "error", "J^(1/2)", "relative", quantities[l->quantity.kind], "seconds", "",
-                         (double)l->stored));
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n%-11s %10s %9s %9s %9s %7s  of %.3g J stored\n", "error",
+                        "J^(1/2)", "relative", quantities[l->quantity.kind], "seconds", "",
+                        (double)l->stored));
   for (int i = 0; i < SB_ERROR_COUNT; i++) {
     PetscCall(print_line(names[i], error_of(l, i), scale * error_of(l, i), q ? &q[i] : NULL,
                          i == SB_ERROR_ROUNDING ? -1. : s.source[i], s.total, notes[i]));
@@ -329,20 +323,20 @@ PetscErrorCode SbLedgerReport(SbLedger l, const char *file, PetscBool quiet)
   PetscCall(print_line("output", -1., 0., NULL, s.output, s.total, ""));
   PetscCall(print_line("estimates", -1., 0., NULL, s.estimates, s.total, "of this table"));
   PetscCall(print_line("together", together(l), scale * together(l), NULL, s.total, s.total, ""));
-  say_largest(l, &s, &w);
-  say_wasted(l, &s, &w);
-  say_dial(l, &w);
-  for (char *word = strtok(w.text, " "); word; word = strtok(NULL, " ")) {
+  say_largest(l, &s, words);
+  say_wasted(l, &s, words);
+  say_dial(l, words);
+  for (char *word = strtok(words, " "); word; word = strtok(NULL, " ")) {
     const int n = (int)strlen(word);
 
     if (column && column + 1 + n > WIDTH) {
-      PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n"));
+      PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n"));
       column = 0;
     }
-    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "%s%s", column ? " " : "", word));
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s%s", column ? " " : "", word));
     column += n + (column > 0);
   }
-  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n"));
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n"));
   (void)fflush(PETSC_STDOUT);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

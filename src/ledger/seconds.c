@@ -11,26 +11,17 @@
 PetscErrorCode SbLedgerGetSeconds(SbLedger l, SbLedgerSeconds *s)
 {
   enum { ASSEMBLY, SOLVE, CONTACT, SEARCH, SETUP, OUTPUT, ESTIMATES, TOTAL, COUNT };
-  static const struct {
-    int to;
-    SbEvent event;
-  } ours[] = {
-    {ASSEMBLY, SB_EVENT_RESIDUAL}, {ASSEMBLY, SB_EVENT_TANGENT},   {CONTACT, SB_EVENT_CONTACT},
-    {SEARCH, SB_EVENT_SEARCH},     {SETUP, SB_EVENT_MESH_READ},    {SETUP, SB_EVENT_MESH_DISTRIBUTE},
-    {SETUP, SB_EVENT_SPACE_SETUP}, {SETUP, SB_EVENT_MATRIX_SETUP}, {SETUP, SB_EVENT_SOLVER_SETUP},
-    {OUTPUT, SB_EVENT_OUTPUT},     {OUTPUT, SB_EVENT_CHECKPOINT},  {SOLVE, SB_EVENT_CONTACT_SOLVE}};
-  static const char *const solve[] = {"KSPSolve", "PCSetUp", "PCSetUpOnBlocks"};
   const SbRun run = l->run;
-  PetscReal mine[COUNT] = {0.}, t[COUNT], beyond;
+  PetscReal phase[SB_PHASE_COUNT], mine[COUNT], t[COUNT], beyond;
 
   PetscFunctionBeginUser;
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++)
-    PetscCall(SbLogSeconds(SbEvents[ours[i].event], &mine[ours[i].to]));
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(solve); i++)
-    PetscCall(SbLogSecondsNamed(solve[i], &mine[SOLVE]));
-  mine[ASSEMBLY] -= l->residuals;
-  mine[SOLVE] -= l->solving;
-  mine[CONTACT] -= mine[SEARCH];
+  PetscCall(SbLogSeconds(phase));
+  mine[ASSEMBLY] = phase[SB_PHASE_RESIDUAL] + phase[SB_PHASE_TANGENT] - l->residuals;
+  mine[SOLVE] = phase[SB_PHASE_SOLVE] - l->solving;
+  mine[CONTACT] = phase[SB_PHASE_CONTACT];
+  mine[SEARCH] = phase[SB_PHASE_SEARCH];
+  mine[SETUP] = phase[SB_PHASE_MESH] + phase[SB_PHASE_SETUP];
+  mine[OUTPUT] = phase[SB_PHASE_OUTPUT];
   mine[ESTIMATES] = l->seconds;
   mine[TOTAL] = run->seconds_solve;
   for (int i = 0; i < COUNT; i++) mine[i] = PetscMax(mine[i], 0.);

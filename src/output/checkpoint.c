@@ -10,7 +10,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include "output_impl.h"
-#include "sblog.h"
 
 #define FORMAT 1
 
@@ -199,7 +198,7 @@ PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out)
     PetscCall(SbOutputOrder(run, out));
     run->want_energies = PETSC_TRUE;
   }
-  PetscCall(SbRunAddMonitor(run, monitor, out, NULL));
+  PetscCall(SbRunAddMonitor(run, monitor, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -168,26 +168,19 @@ PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactsRead(hid_t frame, PetscInt *n, PetscInt *bytes)
+void SbContactsRead(hid_t frame, PetscInt *n, PetscInt *bytes)
 {
-  const hid_t group =
-    H5Lexists(frame, "contacts", H5P_DEFAULT) > 0 ? H5Gopen2(frame, "contacts", H5P_DEFAULT) : -1;
+  const hid_t group = SbH5OpenGroup(frame, "contacts");
   int64_t count = 0;
-  PetscBool ok = (PetscBool)(group >= 0);
+  PetscBool ok = PETSC_TRUE;
 
-  PetscFunctionBeginUser;
-  if (ok) SbH5GetInt(group, "count", &count, &ok);
-  *n = ok ? (PetscInt)count : -1;
+  *n = -1;
   *bytes = 8;
-  if (ok && count) {
-    const hid_t dataset = H5Dopen2(group, "gap", H5P_DEFAULT), type = H5Dget_type(dataset);
-
-    *bytes = (PetscInt)H5Tget_size(type);
-    (void)H5Tclose(type);
-    (void)H5Dclose(dataset);
-  }
-  if (group >= 0) (void)H5Gclose(group);
-  PetscFunctionReturn(PETSC_SUCCESS);
+  if (group < 0) return;
+  SbH5GetInt(group, "count", &count, &ok);
+  if (ok) *n = (PetscInt)count;
+  if (ok && count) *bytes = SbH5NumberBytes(group, "gap");
+  (void)H5Gclose(group);
 }
 
 PetscInt SbContactsCount(SbOutput out)
@@ -213,22 +206,20 @@ PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbContactsIndex(SbOutput out, PetscBool last, size_t nmessage, char message[])
+void SbContactsIndex(SbOutput out, PetscBool last, char message[SB_MESSAGE_MAX])
 {
   const SbContacts c = out->contacts;
 
   if (!c || !c->xdmf || !c->listed) return;
-  SbXdmfWrite(c->xdmf, nmessage, message);
-  if (!message[0]) SbVtkhdfWrite(c->vtkhdf, last, nmessage, message);
+  SbXdmfWrite(c->xdmf, message);
+  if (!message[0]) SbVtkhdfWrite(c->vtkhdf, last, message);
 }
 
-PetscErrorCode SbContactsRemoveIndex(SbOutput out)
+void SbContactsRemoveIndex(SbOutput out)
 {
-  PetscFunctionBeginUser;
-  if (!out->contacts || !out->contacts->xdmf) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!out->contacts || !out->contacts->xdmf) return;
   SbXdmfRemove(out->contacts->xdmf);
   SbVtkhdfRemove(out->contacts->vtkhdf);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ life */

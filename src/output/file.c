@@ -4,34 +4,18 @@
 */
 #include <errno.h>
 #include <fcntl.h>
-#include <stdarg.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include "output_impl.h"
 
-void SbFormat(size_t size, char text[], const char *format, ...)
-{
-  va_list args;
-
-  va_start(args, format);
-  (void)vsnprintf(text, size, format, args);
-  va_end(args);
-}
-
 PetscErrorCode SbAgree(MPI_Comm comm, PetscErrorCode code, const char *message)
 {
-  PetscMPIInt rank, size, first, mine;
-  char text[SB_MESSAGE_MAX] = "";
+  SbCaughtError caught = {message[0] ? (int)code : 0, ""};
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  mine = message[0] ? rank : size;
-  PetscCallMPI(MPI_Allreduce(&mine, &first, 1, MPI_INT, MPI_MIN, comm));
-  if (first == size) PetscFunctionReturn(PETSC_SUCCESS);
-  if (first == rank) PetscCall(PetscStrncpy(text, message, sizeof(text)));
-  PetscCallMPI(MPI_Bcast(text, (PetscMPIInt)sizeof(text), MPI_CHAR, first, comm));
-  SETERRQ(comm, code, "%s", text);
+  SbFormat(sizeof(caught.text), caught.text, "%s", message);
+  PetscCall(SbCaughtRaise(comm, &caught));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbFileReserve(MPI_Comm comm, const char *path, PetscInt64 bytes)
@@ -62,7 +46,7 @@ PetscErrorCode SbFileReserve(MPI_Comm comm, const char *path, PetscInt64 bytes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbFileReplace(const char *path, int nchunk, const SbChunk chunk[], size_t nmessage, char message[])
+void SbFileReplace(const char *path, int nchunk, const SbChunk chunk[], char message[SB_MESSAGE_MAX])
 {
   char tmp[PETSC_MAX_PATH_LEN + 8];
   FILE *file;
@@ -79,7 +63,7 @@ void SbFileReplace(const char *path, int nchunk, const SbChunk chunk[], size_t n
     bad = fclose(file) || written != size || rename(tmp, path);
   }
   if (!bad) return;
-  SbFormat(nmessage, message, "cannot write %zu bytes to %s: %s; " SB_NO_ROOM, size, path,
+  SbFormat(SB_MESSAGE_MAX, message, "cannot write %zu bytes to %s: %s; " SB_NO_ROOM, size, path,
            strerror(errno ? errno : EIO));
   (void)unlink(tmp);
 }

@@ -34,7 +34,7 @@ PetscBool SbOutputDue(PetscReal every, PetscReal t, PetscReal dt)
   return (PetscBool)(PetscFloorReal((t + ahead) / every) != PetscFloorReal((t - dt + ahead) / every));
 }
 
-PetscErrorCode SbFolderMake(SbOutput out, size_t nmessage, char message[])
+PetscErrorCode SbFolderMake(SbOutput out, char message[SB_MESSAGE_MAX])
 {
   char part[PETSC_MAX_PATH_LEN], probe[PETSC_MAX_PATH_LEN];
   int fd, error = 0;
@@ -53,7 +53,7 @@ PetscErrorCode SbFolderMake(SbOutput out, size_t nmessage, char message[])
     (void)unlink(probe);
   }
   if (error) {
-    SbFormat(nmessage, message, "-output_dir %s cannot be written: %s; give another folder", out->dir,
+    SbFormat(SB_MESSAGE_MAX, message, "-output_dir %s cannot be written: %s; give another folder", out->dir,
              strerror(error));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -71,7 +71,7 @@ static void remove_lock(void)
 }
 
 /* The lock file open and locked, or why not; rank 0. A file that its owner removed meanwhile is no lock. */
-static PetscErrorCode lock_folder(SbOutput out, size_t nmessage, char message[])
+static PetscErrorCode lock_folder(SbOutput out, char message[SB_MESSAGE_MAX])
 {
   struct flock all = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
   char path[PETSC_MAX_PATH_LEN], text[512] = "", host[256] = "";
@@ -88,7 +88,7 @@ static PetscErrorCode lock_folder(SbOutput out, size_t nmessage, char message[])
       (void)close(out->lock);
       out->lock = -1;
       if (n >= 0)
-        SbFormat(nmessage, message,
+        SbFormat(SB_MESSAGE_MAX, message,
                  "-output_dir %s is in use by another run%s%s: wait for its end, or give another folder",
                  out->dir, n ? ", " : "", text);
       PetscFunctionReturn(PETSC_SUCCESS);
@@ -111,7 +111,7 @@ PetscErrorCode SbOutputLock(SbRun run)
   char message[SB_MESSAGE_MAX] = "";
 
   PetscFunctionBeginUser;
-  if (!out->rank) PetscCall(lock_folder(out, sizeof(message), message));
+  if (!out->rank) PetscCall(lock_folder(out, message));
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_OPEN, message));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

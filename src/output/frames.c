@@ -8,7 +8,6 @@
 */
 #include <ctype.h>
 #include "output_impl.h"
-#include "sblog.h"
 
 typedef struct {
   PetscReal time;
@@ -168,10 +167,8 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
 
   /* the bodies that the numbers of /mesh/body stand for: "liver,stone" */
   PetscCall(PetscCalloc1(size, &names));
-  for (PetscInt b = 0; b < run->model->nbody; b++) {
-    PetscCall(PetscStrlcat(names, b ? "," : "", size));
-    PetscCall(PetscStrlcat(names, run->model->body[b].name, size));
-  }
+  for (PetscInt b = 0; b < run->model->nbody; b++)
+    SbAppend(size, names, "%s%s", b ? "," : "", run->model->body[b].name);
   PetscCall(SbH5PutText(&fr->h5, group, "bodies", names));
   PetscCall(PetscFree(names));
   PetscCall(write_points(run, out, group));
@@ -237,11 +234,11 @@ static PetscInt64 frame_bytes(const SbOutput out, PetscInt64 contact_bytes)
 }
 
 /* What viewers open, with all frames so far. Rank 0. */
-static void write_indices(SbOutput out, PetscBool last, size_t nmessage, char message[])
+static void write_indices(SbOutput out, PetscBool last, char message[SB_MESSAGE_MAX])
 {
-  SbXdmfWrite(out->frames->xdmf, nmessage, message);
-  if (!message[0]) SbVtkhdfWrite(out->frames->vtkhdf, last, nmessage, message);
-  if (!message[0]) SbContactsIndex(out, last, nmessage, message);
+  SbXdmfWrite(out->frames->xdmf, message);
+  if (!message[0]) SbVtkhdfWrite(out->frames->vtkhdf, last, message);
+  if (!message[0]) SbContactsIndex(out, last, message);
 }
 
 static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
@@ -306,7 +303,7 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
     SbXdmfAdd(fr->xdmf, time, path, n, field, bytes);
     PetscCall(SbVtkhdfAdd(fr->vtkhdf, time, path, n, field, bytes));
     PetscCall(SbContactsList(out, time, path, SbContactsCount(out), out->precise ? 8 : 4));
-    write_indices(out, step->last, sizeof(message), message);
+    write_indices(out, step->last, message);
   }
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -343,7 +340,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 /* Step, time and fields of the frame `name` in an open hundred; ok is false when it is not one of ours. */
 static PetscErrorCode read_frame(hid_t hundred, const char *name, SbFrame *frame, PetscBool *ok)
 {
-  const hid_t group = H5Gopen2(hundred, name, H5P_DEFAULT);
+  const hid_t group = SbH5OpenGroup(hundred, name);
   int64_t step = 0, mesh = 0;
   PetscBool other = PETSC_TRUE;
   PetscInt n;
@@ -360,16 +357,13 @@ static PetscErrorCode read_frame(hid_t hundred, const char *name, SbFrame *frame
   frame->nfield = 0;
   PetscCall(SbFieldGetAll(&n, &fields));
   for (PetscInt i = 0; i < n; i++) {
-    if (H5Lexists(group, fields[i].name, H5P_DEFAULT) > 0) {
-      const hid_t dataset = H5Dopen2(group, fields[i].name, H5P_DEFAULT), type = H5Dget_type(dataset);
+    const PetscInt bytes = SbH5NumberBytes(group, fields[i].name);
 
-      frame->field[frame->nfield] = &fields[i];
-      frame->bytes[frame->nfield++] = (PetscInt)H5Tget_size(type);
-      (void)H5Tclose(type);
-      (void)H5Dclose(dataset);
-    }
+    if (!bytes) continue;
+    frame->field[frame->nfield] = &fields[i];
+    frame->bytes[frame->nfield++] = bytes;
   }
-  PetscCall(SbContactsRead(group, &frame->npoint, &frame->point_bytes));
+  SbContactsRead(group, &frame->npoint, &frame->point_bytes);
   (void)H5Gclose(group);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -425,35 +419,31 @@ static int by_step(const void *a, const void *b)
   return (p > q) - (p < q);
 }
 
-/* Hash of a mesh in an open file of frames; ok is false when there is none. */
-static PetscErrorCode mesh_hash(hid_t file, PetscInt step, int64_t *hash, PetscBool *ok)
+/* Whether an open file of frames has this run's mesh as that of a step. */
+static PetscBool has_mesh(SbOutput out, hid_t file, PetscInt step)
 {
+  PetscBool ok = PETSC_TRUE;
+  int64_t hash = 0;
   char name[32];
   hid_t mesh;
 
-  PetscFunctionBeginUser;
   mesh_name(step, sizeof(name), name);
-  mesh = H5Lexists(file, name, H5P_DEFAULT) > 0 ? H5Gopen2(file, name, H5P_DEFAULT) : -1;
-  *ok = (PetscBool)(mesh >= 0);
-  if (*ok) SbH5GetInt(mesh, "hash", hash, ok);
-  if (mesh >= 0) (void)H5Gclose(mesh);
-  PetscFunctionReturn(PETSC_SUCCESS);
+  mesh = SbH5OpenGroup(file, name);
+  if (mesh < 0) return PETSC_FALSE;
+  SbH5GetInt(mesh, "hash", &hash, &ok);
+  (void)H5Gclose(mesh);
+  return (PetscBool)(ok && (uint64_t)hash == out->mesh_hash);
 }
 
-/* The mesh of this run in an open file: that of its last re-meshing, or the first one. ok: the file has this mesh. */
-static PetscErrorCode find_mesh(SbRun run, SbOutput out, hid_t file, PetscInt *step, PetscBool *ok)
+/* The step of this run's mesh in an open file: that of its last re-meshing, or 0; ok: the file has it. */
+static PetscInt find_mesh(SbRun run, SbOutput out, hid_t file, PetscBool *ok)
 {
-  int64_t hash = 0;
+  const PetscInt step = SbOutputMeshStep(run);
 
-  PetscFunctionBeginUser;
-  *step = SbOutputMeshStep(run);
-  PetscCall(mesh_hash(file, *step, &hash, ok));
-  if (*step && (!*ok || (uint64_t)hash != out->mesh_hash)) {
-    *step = 0;
-    PetscCall(mesh_hash(file, 0, &hash, ok));
-  }
-  *ok = (PetscBool)(*ok && (uint64_t)hash == out->mesh_hash);
-  PetscFunctionReturn(PETSC_SUCCESS);
+  *ok = has_mesh(out, file, step);
+  if (*ok || !step) return step;
+  *ok = has_mesh(out, file, 0);
+  return 0;
 }
 
 /* Entries of the index that follow refer to this mesh of the file. Rank 0. */
@@ -464,7 +454,7 @@ static PetscErrorCode index_mesh(SbFrames fr, PetscInt step)
 
   PetscFunctionBeginUser;
   mesh_name(step, sizeof(name), name);
-  mesh = H5Gopen2(fr->h5.file, name, H5P_DEFAULT);
+  mesh = SbH5OpenGroup(fr->h5.file, name);
   PetscCall(SbXdmfSetMesh(fr->xdmf, mesh, name));
   PetscCall(SbVtkhdfSetMesh(fr->vtkhdf, mesh, name));
   if (mesh >= 0) (void)H5Gclose(mesh);
@@ -482,8 +472,8 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
   /* the file must have this mesh and frames */
   PetscCall(SbH5Open(out->comm, path, PETSC_TRUE, &fr->h5, ok));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(find_mesh(run, out, fr->h5.file, &fr->mesh, ok));
-  fr->top = H5Gopen2(fr->h5.file, "step", H5P_DEFAULT);
+  fr->mesh = find_mesh(run, out, fr->h5.file, ok);
+  fr->top = SbH5OpenGroup(fr->h5.file, "step");
   if (!*ok || fr->top < 0) {
     *ok = PETSC_FALSE;
     if (fr->top >= 0) (void)H5Gclose(fr->top);
@@ -508,7 +498,7 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
   }
   if (fr->xdmf && (!fr->nframe || frames[fr->nframe - 1].mesh != fr->mesh))
     PetscCall(index_mesh(fr, fr->mesh));
-  if (fr->xdmf) write_indices(out, PETSC_TRUE, sizeof(message), message);
+  if (fr->xdmf) write_indices(out, PETSC_TRUE, message);
   PetscCall(PetscFree(frames));
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
 
@@ -522,7 +512,6 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
 {
   SbH5 h;
   char path[PETSC_MAX_PATH_LEN];
-  PetscInt step;
   PetscBool ok, corners, edges;
 
   PetscFunctionBeginUser;
@@ -531,11 +520,9 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
   PetscCall(SbOutputPath(out, "fields.h5", sizeof(path), path));
   PetscCall(SbH5Open(out->comm, path, PETSC_FALSE, &h, &ok));
   if (!ok) PetscFunctionReturn(PETSC_SUCCESS);
-  corners = (PetscBool)(H5Lexists(h.file, "mesh", H5P_DEFAULT) > 0 &&
-                        H5Lexists(h.file, "mesh/vertices", H5P_DEFAULT) > 0);
-  edges = (PetscBool)(H5Lexists(h.file, "mesh", H5P_DEFAULT) > 0 &&
-                      H5Lexists(h.file, "mesh/cells10", H5P_DEFAULT) > 0);
-  PetscCall(find_mesh(run, out, h.file, &step, &ok));
+  (void)find_mesh(run, out, h.file, &ok);
+  corners = (PetscBool)(ok && H5Lexists(h.file, "mesh/vertices", H5P_DEFAULT) > 0);
+  edges = (PetscBool)(ok && H5Lexists(h.file, "mesh/cells10", H5P_DEFAULT) > 0);
   PetscCall(SbH5Close(&h));
   /* a file of another mesh is replaced, one of this mesh continued */
   PetscCheck(!ok || corners == out->discontinuous, out->comm, PETSC_ERR_USER_INPUT,
@@ -609,7 +596,7 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
 
     if (fr->xdmf) SbXdmfRemove(fr->xdmf);
     if (fr->xdmf) SbVtkhdfRemove(fr->vtkhdf);
-    PetscCall(SbContactsRemoveIndex(out));
+    SbContactsRemoveIndex(out);
     PetscCall(SbH5Create(out->comm, path, &fr->h5));
     PetscCall(SbH5PutText(&fr->h5, fr->h5.file, "program", "supple " SB_VERSION));
     PetscCall(write_mesh(run, out));
@@ -618,29 +605,25 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
     PetscCall(SbH5Flush(&fr->h5));
     if (fr->xdmf) PetscCall(index_mesh(fr, fr->mesh));
   }
-  PetscCall(SbRunAddMonitor(run, monitor, out, NULL));
+  PetscCall(SbRunAddMonitor(run, monitor, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbFramesReattach(SbRun run, SbOutput out)
 {
-  int64_t hash;
-  PetscBool same;
-
   PetscFunctionBeginUser;
   if (!out->frames) PetscFunctionReturn(PETSC_SUCCESS);
   /* work arrays and monitor for the new mesh, which is written beside the earlier ones */
   PetscCall(free_work(out->frames));
   PetscCall(allocate(run, out));
   if (out->contact_points) run->want_residual = PETSC_TRUE;
-  PetscCall(mesh_hash(out->frames->h5.file, out->frames->mesh, &hash, &same));
-  if (!same || (uint64_t)hash != out->mesh_hash) {
+  if (!has_mesh(out, out->frames->h5.file, out->frames->mesh)) {
     out->frames->mesh = run->step0;
     PetscCall(write_mesh(run, out));
     PetscCall(SbH5Flush(&out->frames->h5));
     if (out->frames->xdmf) PetscCall(index_mesh(out->frames, out->frames->mesh));
   }
-  PetscCall(SbRunAddMonitor(run, monitor, out, NULL));
+  PetscCall(SbRunAddMonitor(run, monitor, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

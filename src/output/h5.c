@@ -157,6 +157,11 @@ PetscErrorCode SbH5Reserve(SbH5 *h, PetscInt64 bytes)
 
 /* ------------------------------------------------------------------ groups */
 
+hid_t SbH5OpenGroup(hid_t where, const char *name)
+{
+  return H5Lexists(where, name, H5P_DEFAULT) > 0 ? H5Gopen2(where, name, H5P_DEFAULT) : -1;
+}
+
 PetscErrorCode SbH5GroupCreate(SbH5 *h, unsigned links, unsigned letters, hid_t *group)
 {
   const hid_t list = H5Pcreate(H5P_GROUP_CREATE);
@@ -246,6 +251,17 @@ static hid_t open_dataset(hid_t where, const char *name, hsize_t n[2])
     (void)H5Sclose(space);
   }
   return dataset;
+}
+
+PetscInt SbH5NumberBytes(hid_t where, const char *name)
+{
+  hsize_t n[2];
+  const hid_t dataset = open_dataset(where, name, n), type = dataset < 0 ? -1 : H5Dget_type(dataset);
+  const size_t bytes = dataset < 0 ? 0 : H5Tget_size(type);
+
+  if (dataset >= 0) (void)H5Tclose(type);
+  if (dataset >= 0) (void)H5Dclose(dataset);
+  return (PetscInt)bytes;
 }
 
 PetscInt64 SbH5Rows(hid_t where, const char *name)

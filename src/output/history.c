@@ -12,16 +12,17 @@
 #include <fcntl.h>
 #include <stdarg.h>
 #include <stddef.h>
+#include <stdlib.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include "output_impl.h"
-#include "sblog.h"
 
 struct _p_SbHistory {
   int fd; /* rank 0; -1 elsewhere */
   char path[PETSC_MAX_PATH_LEN];
-  char *row; /* text of a row or of the header */
-  size_t size, capacity;
+  FILE *text; /* rank 0: in memory, a row or the header, row[size] */
+  char *row;
+  size_t size;
   PetscInt last_step; /* of the last row in the file, or -1 */
   PetscInt nprobe;    /* columns of probes */
   PetscInt nextra;    /* columns of effects, probes and bodies */
@@ -77,20 +78,6 @@ static const struct {
 
 /* ------------------------------------------------------------------ text */
 
-/* The buffer holds any row: it is allocated for the number of columns. */
-static PetscErrorCode put(SbHistory h, const char *format, ...)
-{
-  va_list args;
-
-  PetscFunctionBeginUser;
-  va_start(args, format);
-  h->size += (size_t)vsnprintf(h->row + h->size, h->capacity - h->size, format, args);
-  va_end(args);
-  PetscCheck(h->size < h->capacity, PETSC_COMM_SELF, PETSC_ERR_PLIB,
-             "A row of %s needs more than %zu letters", h->path, h->capacity);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The unit of a column of an effect, by its name. */
 static const char *unit_of(const char *column)
 {
@@ -104,54 +91,55 @@ static const char *unit_of(const char *column)
   return "1";
 }
 
-/* The two lines at the top. */
+/* One column in both lines at the top. */
+static void put_column(FILE *line[2], const char *unit, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(3, 4);
+static void put_column(FILE *line[2], const char *unit, const char *format, ...)
+{
+  va_list args;
+
+  va_start(args, format);
+  (void)vfprintf(line[0], format, args);
+  va_end(args);
+  (void)fprintf(line[1], ",%s", unit);
+}
+
+/* The two lines at the top, as the row. */
 static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
 {
   const PetscInt nbody = out->history_bodies ? run->model->nbody : 0;
-  char name[3 * SB_NAME_MAX];
+  char name[3 * SB_NAME_MAX], *units;
   const char *unit;
+  size_t size;
+  FILE *line[2] = {h->text, open_memstream(&units, &size)};
 
   PetscFunctionBeginUser;
-  h->size = 0;
+  PetscCheck(line[1], PETSC_COMM_SELF, PETSC_ERR_MEM, "No memory for %s", h->path);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(columns); i++)
-    PetscCall(put(h, "%s%s", i ? "," : "", columns[i].name));
+    put_column(line, columns[i].unit, "%s%s", i ? "," : "", columns[i].name);
   for (PetscInt e = 0; e < run->model->nhistory; e++) {
     const SbEffect effect = run->model->history[e];
 
     for (PetscInt c = 0; c < effect->ncolumn; c++)
-      PetscCall(put(h, ",%s_%s", effect->name, effect->column[c]));
+      put_column(line, unit_of(effect->column[c]), ",%s_%s", effect->name, effect->column[c]);
   }
   for (PetscInt i = 0; i < h->nprobe; i++) {
     PetscCall(SbProbesColumn(out, i, sizeof(name), name, &unit));
-    PetscCall(put(h, ",%s", name));
+    put_column(line, unit, ",%s", name);
   }
-  for (PetscInt b = 0; b < nbody; b++) {
-    for (int c = 0; c < SB_BODY_SUMS; c++)
-      PetscCall(put(h, ",%s_%s", run->model->body[b].name, body_columns[c].name));
-  }
-  for (PetscInt i = 0; i < SbLiveCount(); i++) PetscCall(put(h, ",%s", SbLiveColumn(i, NULL)));
-  for (PetscInt c = 0; c < run->ncolumn; c++) PetscCall(put(h, ",%s", run->column[c].name));
-  PetscCall(put(h, "\n#"));
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(columns); i++)
-    PetscCall(put(h, "%s%s", i ? "," : "", columns[i].unit));
-  for (PetscInt e = 0; e < run->model->nhistory; e++) {
-    const SbEffect effect = run->model->history[e];
-
-    for (PetscInt c = 0; c < effect->ncolumn; c++) PetscCall(put(h, ",%s", unit_of(effect->column[c])));
-  }
-  for (PetscInt i = 0; i < h->nprobe; i++) {
-    PetscCall(SbProbesColumn(out, i, sizeof(name), name, &unit));
-    PetscCall(put(h, ",%s", unit));
-  }
-  for (PetscInt b = 0; b < nbody; b++) {
-    for (int c = 0; c < SB_BODY_SUMS; c++) PetscCall(put(h, ",%s", body_columns[c].unit));
-  }
+  for (PetscInt i = 0; i < nbody * SB_BODY_SUMS; i++)
+    put_column(line, body_columns[i % SB_BODY_SUMS].unit, ",%s_%s", run->model->body[i / SB_BODY_SUMS].name,
+               body_columns[i % SB_BODY_SUMS].name);
   for (PetscInt i = 0; i < SbLiveCount(); i++) {
-    (void)SbLiveColumn(i, &unit);
-    PetscCall(put(h, ",%s", unit));
+    const char *column = SbLiveColumn(i, &unit);
+
+    put_column(line, unit, ",%s", column);
   }
-  for (PetscInt c = 0; c < run->ncolumn; c++) PetscCall(put(h, ",%s", run->column[c].unit));
-  PetscCall(put(h, "\n"));
+  for (PetscInt c = 0; c < run->ncolumn; c++)
+    put_column(line, run->column[c].unit, ",%s", run->column[c].name);
+  (void)fclose(line[1]);
+  (void)fprintf(h->text, "\n#%s\n", units + 1);
+  free(units);
+  (void)fflush(h->text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -188,16 +176,16 @@ static PetscErrorCode effect_columns(SbRun run, const SbStep *step, PetscReal *v
 }
 
 /* Brings the row to the file in one call; a row that was cut off by a full disk is taken back. */
-static void write_row(SbHistory h, size_t nmessage, char message[])
+static void write_row(SbHistory h, char message[SB_MESSAGE_MAX])
 {
   const off_t before = lseek(h->fd, 0, SEEK_END);
   const ssize_t n = write(h->fd, h->row, h->size);
 
   if (n == (ssize_t)h->size) return;
-  SbFormat(nmessage, message, "cannot write %zu bytes to %s: %s; " SB_NO_ROOM, h->size, h->path,
+  SbFormat(SB_MESSAGE_MAX, message, "cannot write %zu bytes to %s: %s; " SB_NO_ROOM, h->size, h->path,
            strerror(n < 0 ? errno : ENOSPC));
   if (n > 0 && ftruncate(h->fd, before))
-    SbFormat(nmessage, message, "cannot write to %s, its last row is incomplete", h->path);
+    SbFormat(SB_MESSAGE_MAX, message, "cannot write to %s, its last row is incomplete", h->path);
 }
 
 static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
@@ -239,22 +227,26 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   if (h->fd >= 0) {
     const SbEnergies *e = &step->energies;
 
-    h->size = 0;
+    rewind(h->text);
     for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(columns); k++) {
       const char *value = (const char *)step + columns[k].from, *comma = k ? "," : "";
 
       if (columns[k].kind == COUNT)
-        PetscCall(put(h, "%s%" PetscInt_FMT, comma, *(const PetscInt *)value));
+        (void)fprintf(h->text, "%s%" PetscInt_FMT, comma, *(const PetscInt *)value);
       else if (columns[k].kind == REAL)
-        PetscCall(put(h, "%s%.17g", comma, (double)*(const PetscReal *)value));
+        (void)fprintf(h->text, "%s%.17g", comma, (double)*(const PetscReal *)value);
       else
-        PetscCall(put(h, ",%.17g", (double)(e->kinetic + e->strain - e->load_work - e->prescribed_work)));
+        (void)fprintf(h->text, ",%.17g",
+                      (double)(e->kinetic + e->strain - e->load_work - e->prescribed_work));
     }
-    for (PetscInt k = 0; k < h->nextra; k++) PetscCall(put(h, ",%.17g", (double)h->sum[k]));
-    for (PetscInt k = 0; k < SbLiveCount(); k++) PetscCall(put(h, ",%.17g", (double)SbLiveGet(k, step->t)));
-    for (PetscInt k = 0; k < run->ncolumn; k++) PetscCall(put(h, ",%.17g", (double)*run->column[k].value));
-    PetscCall(put(h, "\n"));
-    write_row(h, sizeof(h->message), h->message);
+    for (PetscInt k = 0; k < h->nextra; k++) (void)fprintf(h->text, ",%.17g", (double)h->sum[k]);
+    for (PetscInt k = 0; k < SbLiveCount(); k++)
+      (void)fprintf(h->text, ",%.17g", (double)SbLiveGet(k, step->t));
+    for (PetscInt k = 0; k < run->ncolumn; k++)
+      (void)fprintf(h->text, ",%.17g", (double)*run->column[k].value);
+    (void)fputc('\n', h->text);
+    (void)fflush(h->text);
+    write_row(h, h->message);
   }
   if (step->last) PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, h->message));
   PetscCall(PetscLogEventEnd(out->event.history, 0, 0, 0, 0));
@@ -264,12 +256,14 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 
 /* ------------------------------------------------------------------ beginning, and going on after a restart */
 
-static PetscErrorCode open_file(SbRun run, SbOutput out, size_t nmessage, char message[])
+static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE_MAX])
 {
   SbHistory h = out->hist;
   PetscBool kept = PETSC_FALSE;
 
   PetscFunctionBeginUser;
+  h->text = open_memstream(&h->row, &h->size);
+  PetscCheck(h->text, PETSC_COMM_SELF, PETSC_ERR_MEM, "No memory for %s", h->path);
   PetscCall(put_header(run, out, h));
   if (out->restarted) {
     char *text, *line, *end;
@@ -287,7 +281,7 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, size_t nmessage, char m
       }
       chunk.text = text;
       chunk.size = (size_t)(line - text);
-      SbFileReplace(h->path, 1, &chunk, nmessage, message);
+      SbFileReplace(h->path, 1, &chunk, message);
       kept = PETSC_TRUE;
     }
     PetscCall(PetscFree(text));
@@ -305,9 +299,9 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, size_t nmessage, char m
   if (message[0]) PetscFunctionReturn(PETSC_SUCCESS);
   h->fd = open(h->path, O_WRONLY | O_CREAT | (kept ? O_APPEND : O_TRUNC), 0666);
   if (h->fd < 0)
-    SbFormat(nmessage, message, "cannot open %s for writing: %s", h->path, strerror(errno));
+    SbFormat(SB_MESSAGE_MAX, message, "cannot open %s for writing: %s", h->path, strerror(errno));
   else if (!kept)
-    write_row(h, nmessage, message);
+    write_row(h, message);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -323,7 +317,7 @@ PetscErrorCode SbHistoryReattach(SbRun run, SbOutput out)
   }
   run->want_energies = PETSC_TRUE;
   if (run->model->nhistory) run->want_residual = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(run, monitor, out, NULL));
+  PetscCall(SbRunAddMonitor(run, monitor, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -343,13 +337,8 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
   h->nprobe = SbProbesCount(out);
   h->nextra += h->nprobe + (out->history_bodies ? SB_BODY_SUMS * model->nbody : 0);
   PetscCall(PetscMalloc2(h->nextra + 1, &h->mine, h->nextra + 1, &h->sum));
-  h->capacity = 2 *
-                  (PETSC_STATIC_ARRAY_LENGTH(columns) + (size_t)(h->nextra + run->ncolumn + SbLiveCount())) *
-                  (3 * SB_NAME_MAX) +
-                256;
-  PetscCall(PetscMalloc1(h->capacity, &h->row));
   PetscCall(SbOutputPath(out, "history.csv", sizeof(h->path), h->path));
-  if (!out->rank) PetscCall(open_file(run, out, sizeof(message), message));
+  if (!out->rank) PetscCall(open_file(run, out, message));
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
   PetscCallMPI(MPI_Bcast(&h->last_step, 1, MPIU_INT, 0, out->comm));
   PetscCall(SbHistoryReattach(run, out));
@@ -363,9 +352,10 @@ PetscErrorCode SbHistoryDestroy(SbOutput out)
   PetscFunctionBeginUser;
   if (!h) PetscFunctionReturn(PETSC_SUCCESS);
   if (h->fd >= 0) (void)close(h->fd);
+  if (h->text) (void)fclose(h->text);
+  free(h->row);
   PetscCall(PetscFree2(h->mine, h->sum));
   PetscCall(PetscFree(h->mass));
-  PetscCall(PetscFree(h->row));
   PetscCall(PetscFree(out->hist));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

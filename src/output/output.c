@@ -4,7 +4,6 @@
 #include <signal.h>
 #include <time.h>
 #include "output_impl.h"
-#include "sblog.h"
 
 static const SbOption rows[] = {
   {"output_dir", SB_OPTION_STRING, 1, "", "", "",
@@ -251,7 +250,7 @@ PetscErrorCode SbOutputSetFromOptions(SbRun run)
   PetscCall(read_options(out, run->model));
   // A limit on the size of files is met as a failed write, with its message, not as a signal.
   (void)signal(SIGXFSZ, SIG_IGN);
-  if (!out->rank) PetscCall(SbFolderMake(out, sizeof(message), message));
+  if (!out->rank) PetscCall(SbFolderMake(out, message));
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_OPEN, message));
   if (!strcmp(out->restart, "auto")) {
     char path[PETSC_MAX_PATH_LEN];
@@ -312,7 +311,7 @@ PetscErrorCode SbOutputAttach(SbRun run)
   chunk.text = scenario;
   chunk.size = size;
   PetscCall(SbOutputPath(out, "scenario.opts", sizeof(path), path));
-  if (!out->rank) SbFileReplace(path, 1, &chunk, sizeof(message), message);
+  if (!out->rank) SbFileReplace(path, 1, &chunk, message);
   free(scenario);
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
 

@@ -4,6 +4,7 @@
 #pragma once
 #include <hdf5.h>
 #include <stdio.h>
+#include "sblog.h"
 #include "sboutput.h"
 
 #define SB_FIELD_MAX 32
@@ -63,8 +64,11 @@ PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char
 /* The slice of such a dataset as doubles; ok is false when it is missing, has another shape or cannot be read. Collective. */
 PetscErrorCode SbH5ReadSlice(SbH5 *h, const char *name, const SbOrder *order, PetscInt ncomp,
                              PetscReal slice[], PetscBool *ok);
-/* Rows of a dataset [n] or [n][m]; 0 when it is not there or another one. Not collective. */
+/* A group that may be missing: negative then. Not collective. */
+hid_t SbH5OpenGroup(hid_t where, const char *name);
+/* Rows of a dataset [n] or [n][m], and bytes of each of its numbers; 0 when it is not there or another one. Not collective. */
 PetscInt64 SbH5Rows(hid_t where, const char *name);
+PetscInt SbH5NumberBytes(hid_t where, const char *name);
 /* A whole dataset of the shape [n][ncomp], or [n], as numbers of this type in memory; false when it is not there, has another shape or cannot be read. */
 PetscBool SbH5Read(hid_t where, const char *name, hid_t type, PetscInt n, PetscInt ncomp, void *values);
 PetscErrorCode SbH5PutReal(SbH5 *h, hid_t where, const char *name, PetscReal value);
@@ -82,8 +86,6 @@ PetscErrorCode SbH5GroupCreate(SbH5 *h, unsigned links, unsigned letters, hid_t 
 PetscErrorCode SbH5GroupLink(SbH5 *h, hid_t group, hid_t parent, const char *name);
 #define SB_H5_NODE_LINKS 100 /* with 6 letters: a block of 4080 bytes */
 
-/* Prints into text; what does not fit is cut off. */
-void SbFormat(size_t size, char text[], const char *format, ...) __attribute__((format(printf, 3, 4)));
 /* The same for an open HDF5 file, whose messages name these bytes from then on. Collective. */
 PetscErrorCode SbH5Reserve(SbH5 *h, PetscInt64 bytes);
 /* Asks the file system for `bytes` behind the end of a file, before anything in it is touched. Collective. */
@@ -96,7 +98,7 @@ typedef struct {
   size_t size;
 } SbChunk;
 /* path.tmp is written and takes the place of path in one step. Rank 0 calls; `message` becomes the error, if any. */
-void SbFileReplace(const char *path, int nchunk, const SbChunk chunk[], size_t nmessage, char message[]);
+void SbFileReplace(const char *path, int nchunk, const SbChunk chunk[], char message[SB_MESSAGE_MAX]);
 /* The whole file; NULL when it cannot be read. One rank. PetscFree. */
 PetscErrorCode SbFileRead(const char *path, char **text, size_t *size);
 
@@ -187,7 +189,7 @@ struct _p_SbOutput {
 };
 
 /* folder.c: the folder with its parents is made, and tried by writing into it; why it cannot be is in message. Rank 0. */
-PetscErrorCode SbFolderMake(SbOutput out, size_t nmessage, char message[]);
+PetscErrorCode SbFolderMake(SbOutput out, char message[SB_MESSAGE_MAX]);
 /* Gives up the lock of SbOutputLock(), if there is one. */
 void SbFolderUnlock(SbOutput out);
 /* Moves what an earlier run left under our names into a folder of its own (overwrite: removes it), after a restart only removes checkpoints of later steps. Rank 0. */
@@ -240,13 +242,13 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
 /* Those as a group of the frame. Collective. */
 PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame);
 /* How many points a frame has, -1: it was written without; bytes of their numbers. Not collective. */
-PetscErrorCode SbContactsRead(hid_t frame, PetscInt *n, PetscInt *bytes);
+void SbContactsRead(hid_t frame, PetscInt *n, PetscInt *bytes);
 /* How many the last SbContactsFind() found on all ranks, -1 without the option. */
 PetscInt SbContactsCount(SbOutput out);
 /* Adds a frame of n points to the index, at the path of its group; rank 0. The next brings it to disk, or removes it. */
 PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, PetscInt n, PetscInt bytes);
-void SbContactsIndex(SbOutput out, PetscBool last, size_t nmessage, char message[]);
-PetscErrorCode SbContactsRemoveIndex(SbOutput out);
+void SbContactsIndex(SbOutput out, PetscBool last, char message[SB_MESSAGE_MAX]);
+void SbContactsRemoveIndex(SbOutput out);
 PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryReattach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryDestroy(SbOutput out);
@@ -313,7 +315,7 @@ typedef struct {
 void SbXdmfAddPoints(SbXdmf x, PetscReal time, const char *group, PetscInt n, const PetscReal nowhere[3],
                      PetscInt nvalues, const SbXdmfValues values[]);
 /* Replaces the file; `message` becomes the error, if any. */
-void SbXdmfWrite(SbXdmf x, size_t nmessage, char message[]);
+void SbXdmfWrite(SbXdmf x, char message[SB_MESSAGE_MAX]);
 
 /* vtkhdf.c: the same in VTK's own format, of tets or of contact points; functions as above. Rank 0. */
 typedef struct _p_SbVtkhdf *SbVtkhdf;
@@ -326,18 +328,16 @@ PetscErrorCode SbVtkhdfAdd(SbVtkhdf v, PetscReal time, const char *group, PetscI
 PetscErrorCode SbVtkhdfAddPoints(SbVtkhdf v, PetscReal time, const char *group, PetscInt n, PetscInt nvalues,
                                  const SbXdmfValues values[]);
 /* Replaces the file when enough frames have come since, or these are the last ones. */
-void SbVtkhdfWrite(SbVtkhdf v, PetscBool last, size_t nmessage, char message[]);
+void SbVtkhdfWrite(SbVtkhdf v, PetscBool last, char message[SB_MESSAGE_MAX]);
 
 /* phases.c: where the time went, from the log events. */
-#define SB_PHASE_COUNT 10
 typedef struct {
-  const char *name;
-  PetscReal seconds; /* largest of all ranks */
-} SbPhase;
-typedef struct {
-  SbPhase phase[SB_PHASE_COUNT]; /* the last one is what no event covers */
-  PetscReal total;               /* s */
-  PetscReal cpu; /* CPU time of the slowest rank, s; less than `total` where others use the cores */
+  struct {
+    const char *name;
+    PetscReal seconds; /* largest of all ranks */
+  } phase[SB_PHASE_COUNT];
+  PetscReal total; /* s */
+  PetscReal cpu;   /* CPU time of the slowest rank, s; less than `total` where others use the cores */
   PetscReal memory_max, memory_sum; /* peak resident memory of a rank, of all, bytes */
 } SbPhases;
 /* CPU time of this process since it began, s. */

@@ -61,9 +61,9 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   if (!p->titled) {
     p->titled = PETSC_TRUE;
     p->t_start = step->t;
-    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n%13s %10s %6s %7s %10s %10s %8s %8s\n", "step",
-                           run->model->dynamic ? "t (s)" : "load", "newton", "linear", "kinetic J",
-                           "strain J", "speed", "left"));
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n%13s %10s %6s %7s %10s %10s %8s %8s\n", "step",
+                          run->model->dynamic ? "t (s)" : "load", "newton", "linear", "kinetic J", "strain J",
+                          "speed", "left"));
   } else {
     p->newton += step->newton;
     p->linear += step->linear;
@@ -86,7 +86,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
                  p->steps ? (double)p->newton / (double)p->steps : 0.,
                  p->steps ? (double)p->linear / (double)p->steps : 0., (double)step->energies.kinetic,
                  (double)step->energies.strain, times, left);
-  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, p->terminal ? "\r%-*s" : "%.*s\n", WIDTH, line));
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, p->terminal ? "\r%-*s" : "%.*s\n", WIDTH, line));
   (void)fflush(PETSC_STDOUT);
   p->open = p->terminal;
   p->last = step->wall;
@@ -111,11 +111,11 @@ static PetscErrorCode say_within(SbRun run, const char *what, PetscInt iteration
   if (run->model->nbegin_step)
     (void)snprintf(contact, sizeof(contact), ", contact round %" PetscInt_FMT, run->contact_round);
   PetscCall(SbProgressEnd(out));
-  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT,
-                         "  step %" PetscInt_FMT " has taken %.0f s: %s iteration %" PetscInt_FMT
-                         ", residual %.2e N%s, length %.3g%s\n",
-                         run->step_now + 1, (double)(now - begun), what, iteration, (double)residual, contact,
-                         (double)dt, run->model->dynamic ? " s" : ""));
+  PetscCall(PetscPrintf(PETSC_COMM_SELF,
+                        "  step %" PetscInt_FMT " has taken %.0f s: %s iteration %" PetscInt_FMT
+                        ", residual %.2e N%s, length %.3g%s\n",
+                        run->step_now + 1, (double)(now - begun), what, iteration, (double)residual, contact,
+                        (double)dt, run->model->dynamic ? " s" : ""));
   (void)fflush(PETSC_STDOUT);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -142,7 +142,7 @@ static PetscErrorCode attach(SbRun run, SbOutput out)
   KSP ksp;
 
   PetscFunctionBeginUser;
-  if (out->line) PetscCall(SbRunAddMonitor(run, monitor, out->line, NULL));
+  if (out->line) PetscCall(SbRunAddMonitor(run, monitor, out->line));
   if (!run->snes) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESGetKSP(run->snes, &ksp));
   PetscCall(SNESMonitorSet(run->snes, within_newton, run, NULL));
@@ -167,7 +167,7 @@ PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
 PetscErrorCode SbProgressEnd(SbOutput out)
 {
   PetscFunctionBeginUser;
-  if (out->line && out->line->open) PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n"));
+  if (out->line && out->line->open) PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n"));
   if (out->line) out->line->open = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

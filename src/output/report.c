@@ -19,18 +19,18 @@ static PetscErrorCode entry(const char *title, const char *format, ...)
   va_start(args, format);
   (void)vsnprintf(text, sizeof(text), format, args);
   va_end(args);
-  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "%-*s", INDENT - 1, title));
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "%-*s", INDENT - 1, title));
   for (word = strtok(text, " "); word; word = strtok(NULL, " ")) {
     const int n = (int)strlen(word);
 
     if (column + 1 + n > WIDTH && column > INDENT) {
-      PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n%*s", INDENT - 1, ""));
+      PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n%*s", INDENT - 1, ""));
       column = INDENT;
     }
-    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, " %s", word));
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, " %s", word));
     column += n + 1;
   }
-  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n"));
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -56,8 +56,8 @@ static PetscErrorCode print_bodies(SbModel m, SbOutput out)
   PetscInt tets = 0, nodes = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n%-15s %-7s %8s %9s %9s %13s %12s\n", "body",
-                         "element", "tets", "nodes", "unknowns", "min angle deg", "radius ratio"));
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n%-15s %-7s %8s %9s %9s %13s %12s\n", "body", "element", "tets",
+                        "nodes", "unknowns", "min angle deg", "radius ratio"));
   for (PetscInt b = 0; b < m->nbody; b++) {
     const SbBody *body = &m->body[b];
     const PetscInt n = out->body_nodes[b];
@@ -65,55 +65,51 @@ static PetscErrorCode print_bodies(SbModel m, SbOutput out)
     tets += body->ncell;
     nodes += n;
     if (!line_of_body(m, b, sizeof(name), name)) continue;
-    PetscCall(PetscFPrintf(
-      PETSC_COMM_SELF, PETSC_STDOUT,
+    PetscCall(PetscPrintf(
+      PETSC_COMM_SELF,
       "%-15.15s %-7.7s %8" PetscInt_FMT " %9" PetscInt_FMT " %9" PetscInt_FMT " %13.1f %12.2f\n", name,
       body->element, body->ncell, n, 3 * n, (double)body->min_dihedral, (double)body->max_radius_ratio));
   }
   if (m->nbody > 1)
-    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT,
-                           "%-15s %-7s %8" PetscInt_FMT " %9" PetscInt_FMT " %9" PetscInt_FMT "\n",
-                           "together", "", tets, nodes, 3 * nodes));
-  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n%-15s %-12s %11s %9s %14s %12s\n", "body",
-                         "material", "E (Pa)", "nu", "rho (kg/m^3)", "mass (kg)"));
+    PetscCall(PetscPrintf(PETSC_COMM_SELF,
+                          "%-15s %-7s %8" PetscInt_FMT " %9" PetscInt_FMT " %9" PetscInt_FMT "\n", "together",
+                          "", tets, nodes, 3 * nodes));
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n%-15s %-12s %11s %9s %14s %12s\n", "body", "material", "E (Pa)",
+                        "nu", "rho (kg/m^3)", "mass (kg)"));
   for (PetscInt b = 0; b < m->nbody; b++) {
     const SbBody *body = &m->body[b];
     const SbMaterial material = m->material[b];
 
     if (!line_of_body(m, b, sizeof(name), name)) continue;
-    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "%-15.15s %-12.12s %11.4g %9.6g %14.6g %12.5g\n",
-                           name, material->law, (double)material->E, (double)material->nu,
-                           (double)material->density, (double)(material->density * body->volume)));
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%-15.15s %-12.12s %11.4g %9.6g %14.6g %12.5g\n", name,
+                          material->law, (double)material->E, (double)material->nu, (double)material->density,
+                          (double)(material->density * body->volume)));
   }
-  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n"));
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbReportHeader(SbRun run)
 {
   SbOutput out = (SbOutput)run->output;
-  char petsc[256], threads[64] = "one thread", text[1024] = "", name[SB_NAME_MAX];
+  char threads[64] = "one thread", text[1024] = "", name[SB_NAME_MAX];
   int most;
-  size_t n = 0;
 
   PetscFunctionBeginUser;
   if (out->quiet || out->rank) PetscFunctionReturn(PETSC_SUCCESS);
   /* a library that does not obey is named by what it may use */
   most = SbThreadsSetOne();
   if (most > 1) (void)snprintf(threads, sizeof(threads), "up to %d threads", most);
-  (void)snprintf(petsc, sizeof(petsc), "%d.%d.%d", PETSC_VERSION_MAJOR, PETSC_VERSION_MINOR,
-                 PETSC_VERSION_SUBMINOR);
-  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "supple %s with PETSc %s on %d rank%s, %s each\n",
-                         SB_VERSION, petsc, (int)out->size, out->size == 1 ? "" : "s", threads));
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "supple %s with PETSc %s on %d rank%s, %s each\n", SB_VERSION,
+                        SB_PETSC_VERSION, (int)out->size, out->size == 1 ? "" : "s", threads));
   PetscCall(print_bodies(run->model, out));
   if (out->scenario[0]) PetscCall(entry("scenario", "%s", out->scenario));
   // effects, and what they have to say
-  for (PetscInt e = 0; e < run->model->neffect && n < sizeof(text); e++) {
+  for (PetscInt e = 0; e < run->model->neffect; e++) {
     const SbEffect effect = run->model->effect[e];
 
-    n += (size_t)snprintf(text + n, sizeof(text) - n, "%s%s", e ? ", " : "", effect->name);
-    if (strcmp(effect->name, effect->type) && n < sizeof(text))
-      n += (size_t)snprintf(text + n, sizeof(text) - n, " (%s)", effect->type);
+    SbAppend(sizeof(text), text, "%s%s", e ? ", " : "", effect->name);
+    if (strcmp(effect->name, effect->type)) SbAppend(sizeof(text), text, " (%s)", effect->type);
   }
   PetscCall(entry("effects", "%s", text[0] ? text : "none"));
   for (PetscInt e = 0; e < run->model->neffect; e++) {
@@ -138,20 +134,17 @@ PetscErrorCode SbReportHeader(SbRun run)
     PetscCall(entry("solver", "%s (%s): %s", run->solver, run->solver_parts, run->solver_reason));
   else
     PetscCall(entry("solver", "%s: %s", run->solver, run->solver_reason));
-  n = 0;
-  for (PetscInt k = 0; k < out->nfield && n < sizeof(text); k++)
-    n += (size_t)snprintf(text + n, sizeof(text) - n, "%s%s", k ? ", " : "", out->field[k]->name);
-  if (out->nfield && n < sizeof(text)) {
-    if (out->every > 0.)
-      n += (size_t)snprintf(text + n, sizeof(text) - n, " every %g s;", (double)out->every);
-    else if (out->every_steps > 1)
-      n += (size_t)snprintf(text + n, sizeof(text) - n, " every %" PetscInt_FMT " steps;", out->every_steps);
-    else
-      n += (size_t)snprintf(text + n, sizeof(text) - n, " every step;");
-  }
-  if (out->history && n < sizeof(text)) n += (size_t)snprintf(text + n, sizeof(text) - n, " history;");
-  if (n) text[n - 1] = 0;
-  PetscCall(entry("output", "%s%s%s", out->dir, text[0] ? ": " : "", text));
+  text[0] = 0;
+  for (PetscInt k = 0; k < out->nfield; k++)
+    SbAppend(sizeof(text), text, "%s%s", k ? ", " : ": ", out->field[k]->name);
+  if (out->nfield && out->every > 0.)
+    SbAppend(sizeof(text), text, " every %g s", (double)out->every);
+  else if (out->nfield && out->every_steps > 1)
+    SbAppend(sizeof(text), text, " every %" PetscInt_FMT " steps", out->every_steps);
+  else if (out->nfield)
+    SbAppend(sizeof(text), text, " every step");
+  if (out->history) SbAppend(sizeof(text), text, "%s history", out->nfield ? ";" : ":");
+  PetscCall(entry("output", "%s%s", out->dir, text));
   for (PetscInt p = 0; p < out->nprobe && out->history; p++) {
     const SbProbe *probe = &out->probe[p];
     char where[64] = "a tet";
@@ -211,11 +204,10 @@ static void size_text(PetscReal bytes, size_t size, char text[])
 static PetscErrorCode add_file(const char *name, PetscInt64 bytes, void *ctx)
 {
   char *text = (char *)ctx, length[32];
-  size_t n = strlen(text);
 
   PetscFunctionBeginUser;
   size_text((PetscReal)bytes, sizeof(length), length);
-  (void)snprintf(text + n, 1024 - n, "%s%s %s", n ? ", " : "", name, length);
+  SbAppend(1024, text, "%s%s %s", text[0] ? ", " : "", name, length);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -243,24 +235,21 @@ PetscErrorCode SbReportSummary(SbRun run)
   // seconds of the phases
   if (!out->rank) {
     const PetscReal steps = (PetscReal)run->steps_total, tets = (PetscReal)run->model->mesh->Ncell;
-    const int per_run[] = {0, 1};
 
-    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n%-15s %10s %8s %14s %18s\n", "phase", "seconds",
-                           "share", "ms per step", "us per step, tet"));
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n%-15s %10s %8s %14s %18s\n", "phase", "seconds", "share",
+                          "ms per step", "us per step, tet"));
     for (int i = 0; i < SB_PHASE_COUNT; i++) {
-      const SbPhase *phase = &phases.phase[i];
+      const PetscReal seconds = phases.phase[i].seconds;
 
-      if (!strncmp(phase->name, "contact", 7) && !(phase->seconds > 0)) continue; /* none in the scene */
-      PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "%-15s %10.3f %7.1f%%", phase->name,
-                             (double)phase->seconds,
-                             (double)(phases.total > 0. ? 100. * phase->seconds / phases.total : 0.)));
-      if (steps > 0. && i != per_run[0] && i != per_run[1])
-        PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, " %14.3f %18.4f",
-                               (double)(1e3 * phase->seconds / steps),
-                               (double)(1e6 * phase->seconds / steps / tets)));
-      PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n"));
+      if ((i == SB_PHASE_CONTACT || i == SB_PHASE_SEARCH) && !(seconds > 0)) continue; /* none in the scene */
+      PetscCall(PetscPrintf(PETSC_COMM_SELF, "%-15s %10.3f %7.1f%%", phases.phase[i].name, (double)seconds,
+                            (double)(phases.total > 0. ? 100. * seconds / phases.total : 0.)));
+      if (steps > 0. && i > SB_PHASE_SETUP)
+        PetscCall(PetscPrintf(PETSC_COMM_SELF, " %14.3f %18.4f", (double)(1e3 * seconds / steps),
+                              (double)(1e6 * seconds / steps / tets)));
+      PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n"));
     }
-    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "%-15s %10.3f\n\n", "total", (double)phases.total));
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%-15s %10.3f\n\n", "total", (double)phases.total));
   }
 
   /* what effects have to say of their work */

@@ -99,9 +99,9 @@ static PetscErrorCode put_file(const char *name, PetscInt64 bytes, void *ctx)
 
 /* The whole text, on one rank; phases is NULL when nothing was timed. */
 static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, const char *reason,
-                                 const SbPhases *phases, size_t nmessage, char message[])
+                                 const SbPhases *phases, char message[SB_MESSAGE_MAX])
 {
-  char host[256] = "", path[PETSC_MAX_PATH_LEN], *text = NULL, petsc[32], mpi[MPI_MAX_LIBRARY_VERSION_STRING];
+  char host[256] = "", path[PETSC_MAX_PATH_LEN], *text = NULL, mpi[MPI_MAX_LIBRARY_VERSION_STRING];
   size_t size = 0;
   FILE *f = open_memstream(&text, &size);
   SbChunk chunk;
@@ -112,9 +112,7 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
   (void)fprintf(f, "{\n  \"program\": \"supple\",\n");
   // versions of the program and its libraries
   put_text(f, "version", SB_VERSION);
-  (void)snprintf(petsc, sizeof(petsc), "%d.%d.%d", PETSC_VERSION_MAJOR, PETSC_VERSION_MINOR,
-                 PETSC_VERSION_SUBMINOR);
-  put_text(f, "petsc", petsc);
+  put_text(f, "petsc", SB_PETSC_VERSION);
   (void)MPI_Get_library_version(mpi, &n);
   mpi[strcspn(mpi, ",\n")] = 0;
   put_text(f, "mpi", mpi);
@@ -204,7 +202,7 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
   (void)fclose(f);
   PetscCall(SbOutputPath(out, "run.json", sizeof(path), path));
   chunk = (SbChunk){text, size};
-  SbFileReplace(path, 1, &chunk, nmessage, message);
+  SbFileReplace(path, 1, &chunk, message);
   free(text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -216,7 +214,7 @@ PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char
 
   PetscFunctionBeginUser;
   PetscCall(SbPhasesGet(out, &phases));
-  if (!out->rank) PetscCall(write_json(run, out, status, reason, &phases, sizeof(message), message));
+  if (!out->rank) PetscCall(write_json(run, out, status, reason, &phases, message));
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -229,6 +227,6 @@ PetscErrorCode SbReportFailure(SbRun run, const char *reason)
   PetscFunctionBeginUser;
   if (!out || !out->attached) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbProgressEnd(out));
-  PetscCall(write_json(run, out, "failed", reason, NULL, sizeof(message), message));
+  PetscCall(write_json(run, out, "failed", reason, NULL, message));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -416,7 +416,7 @@ static void write_file(SbVtkhdf v, hid_t file, int64_t *work, PetscBool *ok)
   (void)H5Gclose(root);
 }
 
-void SbVtkhdfWrite(SbVtkhdf v, PetscBool last, size_t nmessage, char message[])
+void SbVtkhdfWrite(SbVtkhdf v, PetscBool last, char message[SB_MESSAGE_MAX])
 {
   const hid_t list = H5Pcreate(H5P_FILE_ACCESS);
   size_t nwork = 4 * (size_t)v->nframe + (size_t)v->npart + 1;
@@ -447,9 +447,9 @@ void SbVtkhdfWrite(SbVtkhdf v, PetscBool last, size_t nmessage, char message[])
     (void)H5Fclose(file);
   }
   if (file < 0 || !ok)
-    SbFormat(nmessage, message, "cannot write %s: HDF5 fails to make it in memory", v->path);
+    SbFormat(SB_MESSAGE_MAX, message, "cannot write %s: HDF5 fails to make it in memory", v->path);
   else
-    SbFileReplace(v->path, 1, &image, nmessage, message);
+    SbFileReplace(v->path, 1, &image, message);
   v->nwritten = v->nframe;
   v->next = MPI_Wtime() + BETWEEN * (MPI_Wtime() - begun);
   free(text);

@@ -166,7 +166,7 @@ void SbXdmfAddPoints(SbXdmf x, PetscReal time, const char *group, PetscInt n, co
   (void)fputs("</Grid>\n", x->file);
 }
 
-void SbXdmfWrite(SbXdmf x, size_t nmessage, char message[])
+void SbXdmfWrite(SbXdmf x, char message[SB_MESSAGE_MAX])
 {
   static const char head[] = "<?xml version=\"1.0\" ?>\n<Xdmf Version=\"3.0\">\n<Domain>\n"
                              "<Grid Name=\"frames\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
@@ -175,5 +175,5 @@ void SbXdmfWrite(SbXdmf x, size_t nmessage, char message[])
 
   (void)fflush(x->file);
   chunks[1] = (SbChunk){x->text, x->size};
-  SbFileReplace(x->path, 3, chunks, nmessage, message);
+  SbFileReplace(x->path, 3, chunks, message);
 }

@@ -34,7 +34,7 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
 {
   SbModel m = run->model;
   SbEnergies *e = &run->energies;
-  PetscReal sums[2] = {0., 0.}, power = 0., contact = 0.;
+  PetscReal work[4], power = 0., contact = 0.;
   Vec loads, reaction;
 
   PetscFunctionBeginUser;
@@ -46,39 +46,20 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   PetscCall(SbRunReactions(run, t, reaction));
   if (run->damped) PetscCall(SbModelDampingPower(m, run->U, run->V, &power));
   if (!first) {
-    const SbSpace s = run->model->space;
-    const PetscBool obstacles = (PetscBool)(s->constraints != NULL);
-    const PetscScalar *u, *u0, *f, *f0, *r, *r0;
+    Vec moved;
 
-    /* Work of a force field over a displacement, on all or only on prescribed unknowns; two times it, this rank's part. */
-    PetscCall(VecGetArrayRead(run->U, &u));
-    PetscCall(VecGetArrayRead(run->previous, &u0));
-    PetscCall(VecGetArrayRead(loads, &f));
-    PetscCall(VecGetArrayRead(run->loads, &f0));
-    PetscCall(VecGetArrayRead(reaction, &r));
-    PetscCall(VecGetArrayRead(run->reaction, &r0));
-    for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) sums[0] += (f[i] + f0[i]) * (u[i] - u0[i]);
-    for (PetscInt k = 0; k < s->nfixed && s->fixed_node[k] < s->nnode_owned; k++) {
-      const PetscInt node = s->fixed_node[k];
-
-      for (PetscInt i = 3 * node; i < 3 * node + 3; i++) {
-        if (s->fixed[node] & (1 << (i - 3 * node))) sums[1] += (r[i] + r0[i]) * (u[i] - u0[i]);
-      }
-    }
-    /* elsewhere the remainder of it is what contact exerts, now or a step ago */
-    for (PetscInt i = 0; obstacles && i < 3 * s->nnode_owned; i++) {
-      if (!(s->fixed[i / 3] & (1 << i % 3))) sums[1] += (r[i] + r0[i]) * (u[i] - u0[i]);
-    }
-    PetscCall(VecRestoreArrayRead(run->U, &u));
-    PetscCall(VecRestoreArrayRead(run->previous, &u0));
-    PetscCall(VecRestoreArrayRead(loads, &f));
-    PetscCall(VecRestoreArrayRead(run->loads, &f0));
-    PetscCall(VecRestoreArrayRead(reaction, &r));
-    PetscCall(VecRestoreArrayRead(run->reaction, &r0));
-    sums[0] += 2. * contact;
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPIU_REAL, MPI_SUM, m->comm));
-    e->load_work += 0.5 * sums[0];
-    e->prescribed_work += 0.5 * sums[1];
+    /* twice the work of the loads; reactions work on prescribed unknowns, elsewhere with contact only, now or a step ago */
+    PetscCall(VecDuplicate(run->U, &moved));
+    PetscCall(VecWAXPY(moved, -1., run->previous, run->U));
+    PetscCall(VecDot(loads, moved, &work[0]));
+    PetscCall(VecDot(run->loads, moved, &work[1]));
+    if (!m->space->constraints) PetscCall(SbSpaceZeroPrescribed(m->space, PETSC_FALSE, moved));
+    PetscCall(VecDot(reaction, moved, &work[2]));
+    PetscCall(VecDot(run->reaction, moved, &work[3]));
+    PetscCall(VecDestroy(&moved));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &contact, 1, MPIU_REAL, MPI_SUM, m->comm));
+    e->load_work += 0.5 * (work[0] + work[1]) + contact;
+    e->prescribed_work += 0.5 * (work[2] + work[3]);
     e->damping_loss += 0.5 * dt * (power + run->damping_power);
   } else if (run->step0 == 0)
     run->energy_start = e->kinetic + e->strain;

@@ -186,10 +186,8 @@ static void method_settings(SbRun run, SbMethodSettings *set)
                        .alpha_f = 1.,
                        .beta = 0.25,
                        .gamma = 0.5,
-                       .velocity_predictor = run->velocity_predictor,
                        .impulses = (PetscBool)(run->preset == SB_TIME_NEWMARK && run->model->nbegin_step),
-                       .separate = (PetscBool)(run->preset == SB_TIME_NEWMARK && run->model->npotential),
-                       .max_halvings = run->max_halvings};
+                       .separate = (PetscBool)(run->preset == SB_TIME_NEWMARK && run->model->npotential)};
   if (run->preset == SB_TIME_NEWMARK) {
     set->method = SB_METHOD_GENERALIZED_ALPHA;
     set->beta = run->newmark[0];
@@ -355,7 +353,7 @@ static PetscErrorCode set_up_ts(SbRun run)
   Vec F;
 
   PetscFunctionBeginUser;
-  if (run->preset == SB_TIME_EULER_EXPLICIT || run->preset == SB_TIME_EULER_SYMPLECTIC) {
+  if (SbRunIsExplicit(run)) {
     /* explicit integrators know the step that they can take */
     PetscReal stable;
 
@@ -500,8 +498,7 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
 PetscErrorCode SbRunSetUp(SbRun run)
 {
   SbModel m = run->model;
-  PetscBool explicit =
-    (PetscBool)(run->preset == SB_TIME_EULER_EXPLICIT || run->preset == SB_TIME_EULER_SYMPLECTIC);
+  const PetscBool explicit = SbRunIsExplicit(run);
   const SbSpace s = m->space;
   PetscBool single, warped = PETSC_FALSE;
   char reason[128];
@@ -532,14 +529,12 @@ PetscErrorCode SbRunSetUp(SbRun run)
   /* how systems of contact are solved, and what is said of it */
   if (m->npotential) {
     PetscCall(SbContactSystemDescribe(s, run->contact_choice, reason, sizeof(reason)));
-    PetscCall(PetscStrlcat(run->solver_reason, "; ", sizeof(run->solver_reason)));
-    PetscCall(PetscStrlcat(run->solver_reason, reason, sizeof(run->solver_reason)));
+    SbAppend(sizeof(run->solver_reason), run->solver_reason, "; %s", reason);
   }
   if (run->saddle) {
     PetscCall(
       SbSaddleChoose(s, run->model->dynamic, run->saddle_choice, &run->saddle_used, reason, sizeof(reason)));
-    PetscCall(PetscStrlcat(run->solver_reason, "; ", sizeof(run->solver_reason)));
-    PetscCall(PetscStrlcat(run->solver_reason, reason, sizeof(run->solver_reason)));
+    SbAppend(sizeof(run->solver_reason), run->solver_reason, "; %s", reason);
   }
 
   /* the matrix, and what solves see of it when constraints stand beside it */
@@ -600,14 +595,13 @@ PetscErrorCode SbRunSetUp(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx, PetscErrorCode (*destroy)(void *))
+PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx)
 {
   PetscFunctionBeginUser;
   PetscCheck(run->nmonitor < (PetscInt)PETSC_STATIC_ARRAY_LENGTH(run->monitor), PETSC_COMM_SELF,
              PETSC_ERR_PLIB, "More than %d monitors", (int)PETSC_STATIC_ARRAY_LENGTH(run->monitor));
   run->monitor[run->nmonitor].fn = fn;
   run->monitor[run->nmonitor].ctx = ctx;
-  run->monitor[run->nmonitor].destroy = destroy;
   run->nmonitor++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -634,29 +628,18 @@ PetscErrorCode SbRunSolve(SbRun run)
 PetscErrorCode SbRunDestroy(SbRun *run)
 {
   SbRun r = *run;
+  Vec *const vectors[] = {&r->R, &r->nonsymmetric.U, &r->nonsymmetric.x, &r->nonsymmetric.y, &r->U,   &r->V,
+                          &r->A, &r->loads,          &r->reaction,       &r->previous,       &r->path};
 
   PetscFunctionBeginUser;
   if (!r) PetscFunctionReturn(PETSC_SUCCESS);
   if (r->output_destroy) PetscCall(r->output_destroy(r));
-  for (PetscInt k = 0; k < r->nmonitor; k++) {
-    if (r->monitor[k].destroy) PetscCall(r->monitor[k].destroy(r->monitor[k].ctx));
-  }
   PetscCall(PetscFree(r->solver_list));
   if (!r->ts) PetscCall(SNESDestroy(&r->snes));
   PetscCall(TSDestroy(&r->ts));
-  PetscCall(VecDestroy(&r->R));
   PetscCall(MatDestroy(&r->operator));
   PetscCall(MatDestroy(&r->J));
-  PetscCall(VecDestroy(&r->nonsymmetric.U));
-  PetscCall(VecDestroy(&r->nonsymmetric.x));
-  PetscCall(VecDestroy(&r->nonsymmetric.y));
-  PetscCall(VecDestroy(&r->U));
-  PetscCall(VecDestroy(&r->V));
-  PetscCall(VecDestroy(&r->A));
-  PetscCall(VecDestroy(&r->loads));
-  PetscCall(VecDestroy(&r->reaction));
-  PetscCall(VecDestroy(&r->previous));
-  PetscCall(VecDestroy(&r->path));
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(vectors); k++) PetscCall(VecDestroy(vectors[k]));
   PetscCall(PetscFree(*run));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

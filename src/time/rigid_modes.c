@@ -324,19 +324,14 @@ static PetscErrorCode describe_part(SbRun run, const PetscInt label[], const Par
 {
   SbSpace s = run->model->space;
   PetscInt nfixed[2] = {0, 0};
-  char more[128];
 
   PetscFunctionBeginUser;
   if (part->nfree > 1) {
-    PetscCall(PetscSNPrintf(more, sizeof(more), " and %" PetscInt_FMT " more motion%s", part->nfree - 1,
-                            part->nfree > 2 ? "s" : ""));
-    PetscCall(PetscStrlcat(text, more, size));
+    SbAppend(size, text, " and %" PetscInt_FMT " more motion%s", part->nfree - 1, part->nfree > 2 ? "s" : "");
   }
   if (nbrother > 1) {
-    PetscCall(PetscSNPrintf(more, sizeof(more),
-                            " (one of its %" PetscInt_FMT " parts, around (%.4g, %.4g, %.4g) m)", nbrother,
-                            (double)part->centre[0], (double)part->centre[1], (double)part->centre[2]));
-    PetscCall(PetscStrlcat(text, more, size));
+    SbAppend(size, text, " (one of its %" PetscInt_FMT " parts, around (%.4g, %.4g, %.4g) m)", nbrother,
+             (double)part->centre[0], (double)part->centre[1], (double)part->centre[2]);
   }
   /* one or two constrained facets of cr or dg leave rotations free */
   for (PetscInt k = 0; k < s->nfixed; k++) {
@@ -344,11 +339,10 @@ static PetscErrorCode describe_part(SbRun run, const PetscInt label[], const Par
   }
   PetscCallMPI(MPI_Allreduce(&nfixed[0], &nfixed[1], 1, MPIU_INT, MPI_SUM, s->comm));
   if (nfixed[1] && nfixed[1] <= 2 && !s->element[part->body]->nodes_per[0]) {
-    PetscCall(PetscSNPrintf(more, sizeof(more),
-                            "; %s is constrained at the centres of facets, here of %" PetscInt_FMT
-                            ": three that are not in line hold it",
-                            s->element[part->body]->name, nfixed[1]));
-    PetscCall(PetscStrlcat(text, more, size));
+    SbAppend(size, text,
+             "; %s is constrained at the centres of facets, here of %" PetscInt_FMT
+             ": three that are not in line hold it",
+             s->element[part->body]->name, nfixed[1]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

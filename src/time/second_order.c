@@ -43,12 +43,6 @@ typedef struct {
   PetscBool started; /* run->A holds the acceleration of the current state */
 } SecondOrder;
 
-static PetscBool is_explicit(const SecondOrder *so)
-{
-  return (PetscBool)(so->set.method == SB_METHOD_EULER_EXPLICIT ||
-                     so->set.method == SB_METHOD_EULER_SYMPLECTIC);
-}
-
 /* v1 and a1 that belong to the end displacement X. */
 static PetscErrorCode end_state(TS ts, Vec X)
 {
@@ -144,7 +138,7 @@ static PetscErrorCode predict(void *ctx)
 
   PetscFunctionBeginUser;
   PetscCall(VecCopy(so->X0, so->X1));
-  if (so->set.velocity_predictor) PetscCall(VecAXPY(so->X1, ts->time_step, so->V0));
+  if (so->run->velocity_predictor) PetscCall(VecAXPY(so->X1, ts->time_step, so->V0));
   PetscCall(SbModelPrescribe(so->run->model, ts->ptime + ts->time_step, so->X1));
   /* one linear solve per step, warm-started: the update (X <- X - Y) begins as that of free flight */
   PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, SNESKSPONLY, &single));
@@ -154,7 +148,7 @@ static PetscErrorCode predict(void *ctx)
     Vec Y;
 
     PetscCall(SNESGetSolutionUpdate(ts->snes, &Y));
-    if (Y && so->set.velocity_predictor)
+    if (Y && so->run->velocity_predictor)
       PetscCall(VecZeroEntries(Y));
     else if (Y) {
       PetscCall(VecCopy(so->V0, Y));
@@ -203,7 +197,7 @@ static SbSolvedStep solved_step(TS ts)
 
   return (SbSolvedStep){ts->ptime, ts->time_step, so->X0,
                         so->V0,    so->run->A,    so->X1,
-                        so->V1,    so->A1,        (PetscBool)!is_explicit(so)};
+                        so->V1,    so->A1,        (PetscBool)!SbRunIsExplicit(so->run)};
 }
 
 /* Guarded contact: the velocity has its impulse, the acceleration is without it. */
@@ -236,15 +230,15 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
   PetscReal size;
 
   PetscFunctionBeginUser;
-  if (!is_explicit(so)) PetscCall(end_state(ts, so->X1));
-  PetscCall(VecNorm(is_explicit(so) ? so->A1 : so->V1, NORM_INFINITY, &size));
+  if (!SbRunIsExplicit(so->run)) PetscCall(end_state(ts, so->X1));
+  PetscCall(VecNorm(SbRunIsExplicit(so->run) ? so->A1 : so->V1, NORM_INFINITY, &size));
   *ok = (PetscBool)(reason > 0 && !PetscIsInfOrNanReal(size));
   if (*ok && so->set.separate) PetscCall(separate_contact(ts));
   if (*ok && so->set.impulses)
     PetscCall(
       SbNewmarkContact(so->run, ts->ptime + ts->time_step, ts->time_step, so->X1, so->V1, so->A1, so->own1));
   *step = solved_step(ts);
-  if (!*ok && is_explicit(so))
+  if (!*ok && SbRunIsExplicit(so->run))
     PetscCall(SbRunFail(so->run,
                         "step %" PetscInt_FMT " at t = %g s: the explicit solution is not finite; its step "
                         "of %g s is beyond the stable one (see the header)",
@@ -264,14 +258,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The explicit rules need no guess and no solver. */
-static PetscErrorCode no_guess(void *ctx)
-{
-  PetscFunctionBeginUser;
-  (void)ctx;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
+/* The explicit rules need no solver. */
 static PetscErrorCode step_explicitly(void *ctx, Vec X, SNESConvergedReason *reason)
 {
   const TS ts = (TS)ctx;
@@ -290,10 +277,10 @@ static PetscErrorCode step_explicitly(void *ctx, Vec X, SNESConvergedReason *rea
 static PetscErrorCode TSStep_SecondOrder(TS ts)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
-  const PetscBool explicit = is_explicit(so);
+  const PetscBool explicit = SbRunIsExplicit(so->run);
   SbAttempt attempt = {.U0 = so->X0,
                        .U = so->X1,
-                       .predict = explicit ? no_guess : predict,
+                       .predict = explicit ? NULL : predict,
                        .solve = explicit ? step_explicitly : solve,
                        .residual = contact_residual,
                        .complete = complete,
@@ -369,10 +356,10 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     so->run->rejected_total++;
     so->good = 0;
     // steps that succeed in between may be halved without end, until t + h is t
-    if (is_explicit(so) || so->run->stopped || ++cuts > so->set.max_halvings ||
+    if (SbRunIsExplicit(so->run) || so->run->stopped || ++cuts > so->run->max_halvings ||
         next < SHORTEST * so->nominal || SbRunTooShort(so->run, next)) {
       ts->reason = TS_DIVERGED_STEP_REJECTED;
-      if (!is_explicit(so) && !so->run->stopped && so->run->stop_reason[0]) {
+      if (!SbRunIsExplicit(so->run) && !so->run->stopped && so->run->stop_reason[0]) {
         char why[sizeof(so->run->stop_reason)];
 
         PetscCall(PetscStrncpy(why, so->run->stop_reason, sizeof(why)));
@@ -432,22 +419,17 @@ static PetscErrorCode TSInterpolate_SecondOrder(TS ts, PetscReal t, Vec X)
 static PetscErrorCode TSSetUp_SecondOrder(TS ts)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
+  Vec *const ends[] = {&so->X0, &so->V0, &so->X1, &so->V1, &so->A1}, *const stage[] = {&so->Xa, &so->Va,
+                                                                                       &so->Aa};
   SNES snes;
 
   PetscFunctionBeginUser;
-  PetscCall(VecDuplicate(ts->vec_sol, &so->X0));
-  PetscCall(VecDuplicate(ts->vec_sol, &so->V0));
-  PetscCall(VecDuplicate(ts->vec_sol, &so->X1));
-  PetscCall(VecDuplicate(ts->vec_sol, &so->V1));
-  PetscCall(VecDuplicate(ts->vec_sol, &so->A1));
-  if (so->set.alpha_f != 1. || so->set.alpha_m != 1.) {
-    PetscCall(VecDuplicate(ts->vec_sol, &so->Xa));
-    PetscCall(VecDuplicate(ts->vec_sol, &so->Va));
-    PetscCall(VecDuplicate(ts->vec_sol, &so->Aa));
-  }
+  for (int k = 0; k < 5; k++) PetscCall(VecDuplicate(ts->vec_sol, ends[k]));
+  for (int k = 0; k < 3 && (so->set.alpha_f != 1. || so->set.alpha_m != 1.); k++)
+    PetscCall(VecDuplicate(ts->vec_sol, stage[k]));
   PetscCall(TSGetAdapt(ts, &ts->adapt));
   PetscCall(TSAdaptCandidatesClear(ts->adapt));
-  if (!is_explicit(so)) PetscCall(VecDuplicate(ts->vec_sol, &so->work));
+  if (!SbRunIsExplicit(so->run)) PetscCall(VecDuplicate(ts->vec_sol, &so->work));
   if (so->set.impulses) {
     PetscCall(VecDuplicate(ts->vec_sol, &so->own0));
     PetscCall(VecDuplicate(ts->vec_sol, &so->own1));
@@ -481,7 +463,7 @@ void SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings)
 
   so->run = run;
   so->set = *settings;
-  ts->usessnes = (PetscBool)!is_explicit(so);
+  ts->usessnes = (PetscBool)!SbRunIsExplicit(so->run);
 }
 
 static PetscErrorCode TSCreate_SecondOrder(TS ts)

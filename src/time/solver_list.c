@@ -48,7 +48,6 @@ static PetscErrorCode describe_failure(SbSolverList l, KSP ksp, Vec b, Vec x, ch
   const char *reason = KSPConvergedReasons[ksp->reason];
   PetscReal load, residual;
   PCFailedReason failed;
-  size_t length;
   Mat A;
   Vec r;
 
@@ -73,9 +72,7 @@ static PetscErrorCode describe_failure(SbSolverList l, KSP ksp, Vec b, Vec x, ch
                             l->run->solver, ksp->its, (double)(residual / load)));
   }
   if (!l->again) l->failures[0] = 0;
-  PetscCall(PetscStrlen(l->failures, &length));
-  PetscCall(
-    PetscSNPrintf(l->failures + length, sizeof(l->failures) - length, "%s%s", length ? ", then " : "", text));
+  SbAppend(sizeof(l->failures), l->failures, "%s%s", l->failures[0] ? ", then " : "", text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -259,14 +256,13 @@ PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[])
   const SbSolverList l = run->solver_list;
   const SbSolverPreset *next = run->solver_used;
   uint32_t tried = 0;
-  char causes[256], one[128];
+  char causes[256] = "";
   const SbModel m = run->model;
   PetscReal nu = 0., soft = PETSC_MAX_REAL, stiff = 0.;
   PetscInt nsliver = 0, ntet = 0;
 
   PetscFunctionBeginUser;
   /* Properties of the bodies that are known to make systems ill-conditioned: "; nu is up to 0.4999". */
-  causes[0] = 0;
   for (PetscInt k = 0; k < m->nmaterial; k++) {
     nu = PetscMax(nu, m->material[k]->nu);
     soft = PetscMin(soft, m->material[k]->E);
@@ -277,21 +273,16 @@ PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[])
     ntet += m->body[b].ncell;
   }
   if (nsliver) {
-    PetscCall(PetscSNPrintf(one, sizeof(one),
-                            "; %" PetscInt_FMT " of %" PetscInt_FMT
-                            " tets have an angle below %g degrees: repair the mesh",
-                            nsliver, ntet, SB_SLIVER));
-    PetscCall(PetscStrlcat(causes, one, sizeof(causes)));
+    SbAppend(sizeof(causes), causes,
+             "; %" PetscInt_FMT " of %" PetscInt_FMT " tets have an angle below %g degrees: repair the mesh",
+             nsliver, ntet, SB_SLIVER);
   }
   if (stiff > RATIO * soft) {
-    PetscCall(PetscSNPrintf(one, sizeof(one),
-                            "; the stiffest material has %.2g times Young's modulus of the softest",
-                            (double)(stiff / soft)));
-    PetscCall(PetscStrlcat(causes, one, sizeof(causes)));
+    SbAppend(sizeof(causes), causes, "; the stiffest material has %.2g times Young's modulus of the softest",
+             (double)(stiff / soft));
   }
   if (nu > NU_HARD) {
-    PetscCall(PetscSNPrintf(one, sizeof(one), "; nu is up to %g", (double)nu));
-    PetscCall(PetscStrlcat(causes, one, sizeof(causes)));
+    SbAppend(sizeof(causes), causes, "; nu is up to %g", (double)nu);
   }
   if (l->own)
     PetscCall(PetscSNPrintf(text, size, "linear solver: %s%s", l->failures, causes));

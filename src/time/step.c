@@ -25,7 +25,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
     }
 
     /* a first guess, and the solution from there; with contact, as often as finding out what touches takes */
-    if (!run->goes_on) PetscCall((*a->predict)(a->ctx));
+    if (a->predict && !run->goes_on) PetscCall((*a->predict)(a->ctx));
     if (run->model->nbegin_step)
       PetscCall(SbRunSolveContact(run, a, &reason));
     else

@@ -22,11 +22,14 @@ typedef enum {
 typedef struct {
   SbMethod method;
   PetscReal alpha_m, alpha_f, beta, gamma; /* generalized-alpha; fraction of the new state, as in TSALPHA2 */
-  PetscBool velocity_predictor;            /* Newton starts from u + h v instead of u */
   PetscBool impulses;                      /* Newmark with contact: newmark_contact.c */
   PetscBool separate;                      /* Newmark with guarded contact: the acceleration is without it */
-  PetscInt max_halvings;                   /* how often a step is halved before the run stops */
 } SbMethodSettings;
+
+static inline PetscBool SbRunIsExplicit(SbRun run)
+{
+  return (PetscBool)(run->preset == SB_TIME_EULER_EXPLICIT || run->preset == SB_TIME_EULER_SYMPLECTIC);
+}
 
 PetscErrorCode SbSecondOrderRegister(void);
 /* The run gives prescribed displacements, initial acceleration and the lumped mass; it is borrowed. */
@@ -35,9 +38,10 @@ void SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings);
 /* step.c: what happens in a step. */
 /* How a step from t to t + dt is attempted; vectors and ctx are borrowed. Static runs: t is the load factor. */
 typedef struct {
-  PetscReal t, dt;                      /* s */
-  Vec U0, U;                            /* displacements at its start, and at its end once it is solved, m */
-  PetscErrorCode (*predict)(void *ctx); /* U: a first guess with the prescribed values */
+  PetscReal t, dt; /* s */
+  Vec U0, U;       /* displacements at its start, and at its end once it is solved, m */
+  PetscErrorCode (*predict)(
+    void *ctx); /* U: a first guess with the prescribed values; NULL: none is needed */
   PetscErrorCode (*solve)(void *ctx, Vec U, SNESConvergedReason *reason); /* from the displacement in U */
   PetscErrorCode (*residual)(void *ctx, Vec U, Vec R); /* without constraints, N; for contact */
   /* the end state from U in `step`, if ok; else run->stop_reason says why */

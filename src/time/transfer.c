@@ -33,11 +33,6 @@ void SbRunSetPause(SbRun run, SbPauseFn fn, void *ctx)
   run->after.ctx = ctx;
 }
 
-static PetscBool is_explicit(const SbRun run)
-{
-  return (PetscBool)(run->preset == SB_TIME_EULER_EXPLICIT || run->preset == SB_TIME_EULER_SYMPLECTIC);
-}
-
 PetscErrorCode SbRunTransferState(SbRun from, SbRun to)
 {
   PetscReal dt;
@@ -56,7 +51,7 @@ PetscErrorCode SbRunTransferState(SbRun from, SbRun to)
   to->stop = from->stop;
 
   /* fixed steps have their nominal length again, also where the last one was cut */
-  if (!is_explicit(to) || from->dt_given) to->dt = from->dt;
+  if (!SbRunIsExplicit(to) || from->dt_given) to->dt = from->dt;
   to->dt_given = from->dt_given;
   if (to->ts) {
     PetscCall(TSGetTimeStep(from->ts, &dt));
@@ -74,7 +69,7 @@ PetscErrorCode SbRunRestartAcceleration(SbRun run)
   Vec own;
 
   PetscFunctionBeginUser;
-  if (!run->A || !(is_explicit(run) || (run->preset == SB_TIME_NEWMARK && !run->model->nbegin_step)))
+  if (!run->A || !(SbRunIsExplicit(run) || (run->preset == SB_TIME_NEWMARK && !run->model->nbegin_step)))
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(run->A, &own));
   PetscCall(SbFormAcceleration(run, run->t_now, run->U, run->V, own));

@@ -66,7 +66,7 @@ PetscErrorCode HardMeasureBegin(HardRun *r)
   for (int k = 0; k < 3; k++) r->size = PetscMax(r->size, high[k] - low[k]);
   r->value[HARD_MIN_J_EVER] = PETSC_MAX_REAL;
   r->run->want_energies = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(r->run, HardMeasureStep, r, NULL));
+  PetscCall(SbRunAddMonitor(r->run, HardMeasureStep, r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

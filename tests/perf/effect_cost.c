@@ -88,7 +88,7 @@ static PetscErrorCode run(const char *mesh, const Part *part, PetscBool named, C
   PetscCall(PetscMallocGetCurrentUsage(&before));
   PetscCall(test_scene_open_in(folder, text, &t));
   if (!tets) tets = t.model->mesh->Ncell;
-  PetscCall(SbRunAddMonitor(t.run, watch, cost, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch, cost));
   PetscCall(PetscMallocGetCurrentUsage(&after));
   cost->setup = after - before;
   PetscCall(SbRunSolve(t.run));

@@ -145,7 +145,7 @@ int main(int argc, char **argv)
   PetscCall(perf_open(text, &t));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(perf_fact("tets", (double)t.model->mesh->Ncell));
-  PetscCall(SbRunAddMonitor(t.run, watch, &w, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch, &w));
   PetscCall(SbRunSolve(t.run));
   if (t.run->stop_reason[0])
     PetscCall(PetscPrintf(PETSC_COMM_WORLD, "fact failed 1\nnote %s\n", t.run->stop_reason));

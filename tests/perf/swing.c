@@ -86,7 +86,7 @@ int main(int argc, char **argv)
   PetscCall(perf_open(text, &t));
   w.limit = (double)seconds;
   PetscCall(perf_fact("tets", (double)t.model->mesh->Ncell));
-  PetscCall(SbRunAddMonitor(t.run, watch, &w, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch, &w));
   start = perf_start();
   PetscCall(SbRunSolve(t.run));
   PetscCall(

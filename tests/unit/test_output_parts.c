@@ -136,7 +136,7 @@ static PetscErrorCode test_open_failure(void)
     char message[SB_MESSAGE_MAX] = "";
     const SbChunk chunk = {"no HDF5", 7};
 
-    SbFileReplace(path, 1, &chunk, sizeof(message), message);
+    SbFileReplace(path, 1, &chunk, message);
     SB_CHECK(!message[0], "%s", message);
   }
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
@@ -156,14 +156,14 @@ static PetscErrorCode test_files(void)
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   if (!rank) {
     SbFormat(sizeof(path), path, "%s/chunks.txt", dir);
-    SbFileReplace(path, 3, chunks, sizeof(message), message);
+    SbFileReplace(path, 3, chunks, message);
     PetscCall(SbFileRead(path, &text, &size));
     SB_CHECK(!message[0] && size == 7 && text && !strcmp(text, "one two"), "read '%s', %s", text ? text : "",
              message);
     PetscCall(PetscFree(text));
     SB_CHECK(!fixture_exists(dir, "chunks.txt.tmp"), "the temporary file is left");
     SbFormat(sizeof(path), path, "%s/no/folder", dir);
-    SbFileReplace(path, 3, chunks, sizeof(message), message);
+    SbFileReplace(path, 3, chunks, message);
     SB_CHECK(strstr(message, "cannot write 7 bytes to ") && strstr(message, "No such file or directory"),
              "message '%s'", message);
     PetscCall(SbFileRead(path, &text, &size));

@@ -294,7 +294,7 @@ static inline PetscErrorCode record_add(TestScene *t, Record *r)
 {
   PetscFunctionBeginUser;
   t->run->want_energies = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(t->run, record_step, r, NULL));
+  PetscCall(SbRunAddMonitor(t->run, record_step, r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -167,7 +167,7 @@ static inline PetscErrorCode pour(PetscInt n, PetscReal end, PetscReal radius, P
   PetscCall(test_scene_open(text, &t));
   PetscCall(PetscFree(text));
   verify_case("%d bodies", (int)n);
-  PetscCall(SbRunAddMonitor(t.run, pour_watch, &inside, NULL));
+  PetscCall(SbRunAddMonitor(t.run, pour_watch, &inside));
   PetscCall(record_solve(&t, &r));
   PetscCall(pour_furthest(&t, bowl, &furthest));
   PetscCall(test_scene_close(&t));

@@ -118,7 +118,7 @@ static PetscErrorCode check(const char *element, PetscReal dt, PetscReal toleran
     "1e-12",
     element, element, (double)dt));
   t.run->want_energies = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(t.run, watch, &w, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch, &w));
   PetscCall(verify_solve(&t, "angular"));
   PetscCall(
     PetscPrintf(PETSC_COMM_WORLD,

@@ -73,7 +73,7 @@ static PetscErrorCode swing(const char *element, PetscInt across, PetscReal h, P
   PetscCall(test_scene_open(text, &t));
   PetscCall(test_file_remove(mesh));
   t.run->want_energies = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(t.run, watch, &s, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch, &s));
   PetscCall(verify_solve(&t, "CSM3"));
   result[0] = s.low[1];
   result[1] = s.low[0];

@@ -63,7 +63,7 @@ static PetscErrorCode check_drape(PetscBool rigid, PetscInt cells, PetscInt thic
                         "-time euler_implicit -ts_dt 0.004 -ts_max_time 0.4 -snes_rtol 1e-9 -ksp_rtol 1e-8",
                         how, SIDE, SIDE, THICK, (int)cells, (int)cells, (int)thick, -0.5 * SIDE, -0.5 * SIDE,
                         DROP));
-  if (!rigid) PetscCall(SbRunAddMonitor(t.run, pour_watch, &inside, NULL));
+  if (!rigid) PetscCall(SbRunAddMonitor(t.run, pour_watch, &inside));
   PetscCall(record_solve(&t, &r));
   PetscCall(lowered(&t, depth));
   PetscCall(test_scene_close(&t));

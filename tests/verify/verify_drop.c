@@ -105,7 +105,7 @@ static PetscErrorCode check_bounce(const char *time, PetscReal bound, PetscInt l
                        "plane:0,0,1,0 -time %s -ts_dt "
                        "0.002 -ts_max_time 0.8 -snes_rtol 1e-10 -ksp_rtol 1e-9",
     path, RADIUS + HEIGHT, time));
-  PetscCall(SbRunAddMonitor(t.run, watch, &b, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch, &b));
   PetscCall(record_solve(&t, &r));
   PetscCall(test_scene_close(&t));
   PetscCall(VecDestroy(&b.U));

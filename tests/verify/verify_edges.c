@@ -244,7 +244,7 @@ static PetscErrorCode lay_bars(MPI_Comm comm, const char *more, Seen *seen, Pets
   PetscFunctionBeginUser;
   *seen = (Seen){.above = PETSC_MAX_REAL, .at = {0.09, 0, 0.0424264}};
   PetscCall(open_on(comm, &t, BARS "%s", more));
-  PetscCall(SbRunAddMonitor(t.run, watch, seen, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch, seen));
   PetscCall(verify_solve(&t, "bars"));
   PetscCall(contact_values(t.run, values));
   PetscCall(test_value_at(t.model, t.run->U, middle, u));
@@ -295,7 +295,7 @@ static PetscErrorCode check_fast(void)
                     "-body_b_mesh box:0.006,0.21,0.006:1,7,1 -body_b_rotate 0,1,0,-45 -body_b_translate "
                     "0.105,-0.105,0.0105 -body_b_velocity 0,0,-5 -effects a0,a1,b0,b1,meet -time "
                     "euler_implicit -ts_dt 0.004 -ts_max_time 0.04 " LAWS("1e7") ENDS));
-  PetscCall(SbRunAddMonitor(t.run, watch, &seen, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch, &seen));
   PetscCall(verify_solve(&t, "fast bars"));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
                         "  fast bars: in touch in %d of %d steps, force up to %.3g N, depth %.1e m (history "
@@ -329,7 +329,7 @@ static PetscErrorCode check_box(const char *what, const char *turn, PetscReal mo
     "-effect_y1_on y1 -effect_meet_type contact -time euler_implicit "
     "-ts_dt 0.001 -ts_max_time 0.03",
     turn));
-  PetscCall(SbRunAddMonitor(t.run, watch, &seen, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch, &seen));
   PetscCall(verify_solve(&t, what));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
                         "  box, %s: in touch in %d of %d steps, force up to %.3g N, depth %.1e m (history "
@@ -468,7 +468,7 @@ static PetscErrorCode check_rings(PetscReal most)
             "0.08*ramp(t/0.4);0;0 -effect_meet_type contact -time "
             "euler_implicit -ts_dt 0.01 -ts_max_time 0.5" LAWS("1e5"),
             path, path, (double)away, (double)(-away - 0.09)));
-  PetscCall(SbRunAddMonitor(t.run, watch_rings, &seen, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch_rings, &seen));
   PetscCall(verify_solve(&t, "rings"));
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD,

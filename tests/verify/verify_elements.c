@@ -230,7 +230,7 @@ static PetscErrorCode check_flight(int kind, const char *mass)
                           "-body_a_angular_velocity 3,0,0 -mass %s -time euler_symplectic -ts_max_time 0.01",
                           kinds[kind][1], mass));
   PetscCall(test_scene_open(text, &t));
-  PetscCall(SbRunAddMonitor(t.run, watch_flight, &f, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch_flight, &f));
   PetscCall(verify_solve(&t, kinds[kind][0]));
   SB_CHECK(t.run->steps_total > 5, "%d steps", (int)t.run->steps_total);
   for (int k = 0; k < 3; k++) SB_CHECK_NEAR(f.start[k], 2 * (k + 1), 1e-12, "momentum at the start");

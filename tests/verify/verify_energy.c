@@ -49,7 +49,7 @@ static PetscErrorCode check_drift(const char *element, PetscInt steps)
     "-effect_clamp_type fixed -effect_clamp_on xmin -time newmark -ts_dt 0.003 -ts_max_time %.17g" TIGHT,
     element, 0.003 * (double)steps));
   PetscCall(test_scene_open(text, &t));
-  PetscCall(SbRunAddMonitor(t.run, watch_drift, &d, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch_drift, &d));
   PetscCall(verify_solve(&t, "drift"));
   SB_CHECK(PetscAbsInt(t.run->steps_total - steps) <= 1, "%d steps", (int)t.run->steps_total);
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
@@ -111,7 +111,7 @@ static PetscErrorCode check_decay(const char *element, PetscReal h)
                   element, (double)h, (double)(100. * h)));
   PetscCall(test_scene_open(text, &t));
   t.run->want_energies = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(t.run, watch_decay, &d, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch_decay, &d));
   PetscCall(verify_solve(&t, "decay"));
   e = &t.run->energies;
   PetscCall(

@@ -160,7 +160,7 @@ static PetscErrorCode sudden_gravity(const char *element, PetscInt n, PetscReal 
                   BAR "-body_a_element %s -effects clamp,gravity -time newmark -ts_dt 0.01 -ts_max_time 0.9",
                   (int)n, element));
   PetscCall(test_scene_open(text, &t));
-  PetscCall(SbRunAddMonitor(t.run, watch, &m, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch, &m));
   PetscCall(verify_solve(&t, "sudden gravity"));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "    %s n %2d: first minimum %.5f m at %.5f s\n", element, (int)n,
                         (double)m.min_u, (double)m.min_t));

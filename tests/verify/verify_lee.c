@@ -120,7 +120,7 @@ static PetscErrorCode solve(const char *element, PetscInt nx, PetscInt ny, Frame
     (double)(LENGTH + sign[1] * off), (double)high, (double)(0.8 * width),
     (double)(-f->full * width / WIDTH)));
   PetscCall(test_file_remove(mesh));
-  PetscCall(SbRunAddMonitor(t.run, watch, f, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch, f));
   PetscCall(verify_solve(&t, "frame"));
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD, "  %s, %d cells through the depth: %d steps, %d rejected, %d Newton iterations\n",

@@ -127,7 +127,7 @@ static PetscErrorCode open_branch(const char *dir, PetscBool follower, const cha
   PetscCall(test_scene_open_in(dir, text, t));
   t->run->want_energies = PETSC_TRUE;
   *b = (Branch){.load = 0.2};
-  PetscCall(SbRunAddMonitor(t->run, watch, b, NULL));
+  PetscCall(SbRunAddMonitor(t->run, watch, b));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -163,7 +163,7 @@ static PetscErrorCode check_drive(void)
     &t, CUBE ARC
     "-static_steps 10 -effect_press_type prescribed_displacement -effect_press_displacement 0;0;-0.5"));
   t.run->want_energies = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(t.run, watch, &b, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch, &b));
   PetscCall(verify_solve(&t, "prescribed_displacement"));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  drive: %d steps, %d Newton iterations, s %.12f\n",
                         (int)t.run->steps_total, (int)t.run->newton_total, (double)b.s));

@@ -137,7 +137,7 @@ static PetscErrorCode follow(const char *element, const char *law, int steps, Pe
     strcmp(element, "p1") ? "-body_a_young 1e6" : ""));
   PetscCall(test_scene_open(text, &t));
   t.run->want_energies = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(t.run, watch_path, path, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch_path, path));
   PetscCall(verify_solve(&t, law));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -199,7 +199,7 @@ static PetscErrorCode swing(const char *options, Result *r)
   *r = (Result){.shortest = PETSC_MAX_REAL};
   PetscCall(PetscSNPrintf(text, sizeof(text), BAR CLAMP "-effects gravity,clamp %s", options));
   PetscCall(test_scene_open(text, &t));
-  PetscCall(SbRunAddMonitor(t.run, watch_step, r, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch_step, r));
   PetscCall(SbRunSolve(t.run));
   PetscCall(test_value_at(t.model, t.run->U, end, r->u));
   r->steps = t.run->steps_total;

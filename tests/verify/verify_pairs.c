@@ -114,7 +114,7 @@ static PetscErrorCode check_heap(const char *more)
   PetscFunctionBeginUser;
   PetscCall(verify_open(&t, HEAP "%s", more));
   t.run->want_energies = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(t.run, watch_heap, &w, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch_heap, &w));
   PetscCall(verify_solve(&t, more));
   counts[0] = w.places;
   counts[1] = w.edges;
@@ -190,7 +190,7 @@ static PetscErrorCode check_fold(void)
            "0.085",
     path));
   t.run->want_energies = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(t.run, watch_fold, most, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch_fold, most));
   PetscCall(verify_solve(&t, "fold"));
   PetscCall(
     PetscPrintf(PETSC_COMM_WORLD, "  fold: up to %d contacts with %g N\n", (int)most[0], (double)most[1]));

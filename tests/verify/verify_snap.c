@@ -107,7 +107,7 @@ static PetscErrorCode check_toggle(const char *element, PetscInt nx, PetscInt ny
     "-static_control arc_length -static_steps 5 -static_longest_step 1",
     mesh, element, YOUNG, SPAN, (double)(-0.5 * g.full * SPAN / (double)nx / WIDTH)));
   PetscCall(test_file_remove(mesh));
-  PetscCall(SbRunAddMonitor(t.run, watch, &g, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch, &g));
   PetscCall(verify_solve(&t, "toggle"));
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD,

@@ -165,7 +165,7 @@ static PetscErrorCode check_spin(const char *element, const char *law, PetscReal
   PetscCall(test_scene_open(text, &t));
   PetscCall(nearest_node(t.model, left, s.left));
   PetscCall(nearest_node(t.model, right, s.right));
-  PetscCall(SbRunAddMonitor(t.run, watch_spin, &s, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch_spin, &s));
   PetscCall(verify_solve(&t, "spin"));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
                         "  spin, implicit Euler, %s %s, E %g, w0 h %g: turns of %d steps within %.1e of the "

@@ -122,7 +122,7 @@ static PetscErrorCode check_stack(PetscReal friction, PetscReal slow)
                 "-time euler_implicit -ts_dt 0.01 -ts_max_time %g -snes_rtol 1e-10 -ksp_rtol 1e-9",
                 bodies, friction > 0 ? "-effects gravity,floor,meet" : GUIDED, (double)friction,
                 (double)friction, (double)end));
-  PetscCall(SbRunAddMonitor(t.run, keep, &at, NULL));
+  PetscCall(SbRunAddMonitor(t.run, keep, &at));
   PetscCall(record_solve(&t, &r));
   PetscCall(VecAXPY(at.U, -1, t.run->U));
   PetscCall(VecNorm(at.U, NORM_INFINITY, &drift));

@@ -62,7 +62,7 @@ static PetscErrorCode run_wave(const char *element, int cells, Wave *w)
     cells, element, (double)E, (double)rho, (double)N, (double)(0.5 * L / (cells * w->c)),
     (double)(4. * L / w->c)));
   PetscCall(test_scene_open(text, &t));
-  PetscCall(SbRunAddMonitor(t.run, watch, w, NULL));
+  PetscCall(SbRunAddMonitor(t.run, watch, w));
   PetscCall(verify_solve(&t, "wave"));
   w->mean /= (PetscReal)w->n;
   PetscCall(PetscPrintf(
