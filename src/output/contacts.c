@@ -32,7 +32,7 @@ static const struct {
   int ncomp, from;
   PetscBool whole;
 } table[] = {
-  // SbXdmfAddPoints() wants numbers and coordinates first
+  // SbIndexAddPoints() wants numbers and coordinates first
   {"point", "1", 1, ROW, PETSC_TRUE},          {"x", "m", 3, X, PETSC_FALSE},
   {"effect", "1", 1, EFFECT, PETSC_TRUE},      {"body", "1", 1, BODY, PETSC_TRUE},
   {"other", "1", 1, OTHER, PETSC_TRUE},        {"normal", "1", 3, NORMAL, PETSC_FALSE},
@@ -46,10 +46,7 @@ struct _p_SbContacts {
   PetscReal *record;    /* [share.n][RECORD] of this rank's share, sorted */
   SbOrder share;        /* which rows are this rank's; it has no star forest */
   void *column;         /* [share.n][3] of one quantity, as in the file */
-  SbXdmf xdmf;          /* rank 0 only, as the next one */
-  SbVtkhdf vtkhdf;
-  PetscBool listed;     /* it has a frame */
-  PetscReal nowhere[3]; /* a vertex of the mesh, m */
+  SbIndex index;        /* rank 0 only */
 };
 
 /* ------------------------------------------------------------------ to the ranks that write them */
@@ -191,18 +188,16 @@ PetscInt SbContactsCount(SbOutput out)
 PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, PetscInt n, PetscInt bytes)
 {
   SbContacts c = out->contacts;
-  SbXdmfValues values[NTABLE];
+  SbIndexValues values[NTABLE];
   char group[64];
 
   PetscFunctionBeginUser;
-  if (!c || !c->xdmf || n < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!c || !c->index || n < 0) PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < NTABLE; k++)
-    values[k] = (SbXdmfValues){
-      .name = table[k].name, .ncomp = table[k].ncomp, .bytes = (int)bytes, .whole = table[k].whole};
+    values[k] =
+      (SbIndexValues){table[k].name, table[k].ncomp, table[k].whole ? 4 : (int)bytes, table[k].whole};
   (void)snprintf(group, sizeof(group), "%s/contacts", frame);
-  SbXdmfAddPoints(c->xdmf, time, group, n, c->nowhere, NTABLE, values);
-  PetscCall(SbVtkhdfAddPoints(c->vtkhdf, time, group, n, NTABLE, values));
-  c->listed = PETSC_TRUE;
+  PetscCall(SbIndexAddPoints(c->index, time, group, n, NTABLE, values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -210,16 +205,12 @@ void SbContactsIndex(SbOutput out, PetscBool last, char message[SB_MESSAGE_MAX])
 {
   const SbContacts c = out->contacts;
 
-  if (!c || !c->xdmf || !c->listed) return;
-  SbXdmfWrite(c->xdmf, message);
-  if (!message[0]) SbVtkhdfWrite(c->vtkhdf, last, message);
+  if (c && c->index) SbIndexWrite(c->index, last, message);
 }
 
 void SbContactsRemoveIndex(SbOutput out)
 {
-  if (!out->contacts || !out->contacts->xdmf) return;
-  SbXdmfRemove(out->contacts->xdmf);
-  SbVtkhdfRemove(out->contacts->vtkhdf);
+  if (out->contacts && out->contacts->index) SbIndexRemove(out->contacts->index);
 }
 
 /* ------------------------------------------------------------------ life */
@@ -227,8 +218,8 @@ void SbContactsRemoveIndex(SbOutput out)
 PetscErrorCode SbContactsCreate(SbRun run, SbOutput out)
 {
   const SbMesh mesh = run->model->mesh;
+  PetscReal nowhere[3] = {0., 0., 0.}; /* a vertex, where a frame without points shows one */
   SbContacts c;
-  char path[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
   // After a restart frames that are kept may have contact points, which stay in the index.
@@ -239,11 +230,8 @@ PetscErrorCode SbContactsCreate(SbRun run, SbOutput out)
   c->share.comm = out->comm;
   c->share.each = 1;
   if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
-  for (int k = 0; k < 3 && mesh->nvert; k++) c->nowhere[k] = mesh->x[k];
-  PetscCall(SbOutputPath(out, "contacts.xmf", sizeof(path), path));
-  PetscCall(SbXdmfCreate(path, &c->xdmf));
-  PetscCall(SbOutputPath(out, "contacts.vtkhdf", sizeof(path), path));
-  PetscCall(SbVtkhdfCreate(path, PETSC_TRUE, &c->vtkhdf));
+  for (int k = 0; k < 3 && mesh->nvert; k++) nowhere[k] = mesh->x[k];
+  PetscCall(SbIndexCreate(out, "contacts", nowhere, &c->index));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -253,8 +241,7 @@ PetscErrorCode SbContactsDestroy(SbOutput out)
 
   PetscFunctionBeginUser;
   if (!c) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbXdmfDestroy(&c->xdmf));
-  PetscCall(SbVtkhdfDestroy(&c->vtkhdf));
+  PetscCall(SbIndexDestroy(&c->index));
   PetscCall(PetscFree(c->list.point));
   PetscCall(PetscFree(c->record));
   PetscCall(PetscFree(c->column));

@@ -27,9 +27,8 @@ struct _p_SbFrames {
   PetscInt nnode, nlink; /* hundreds so far; links in the current one */
   PetscInt last_step;    /* of the last frame in the file, or -1 */
   PetscInt nframe;
-  PetscInt mesh; /* of frames that are written, as in SbFrame */
-  SbXdmf xdmf;   /* rank 0 only, as the next one */
-  SbVtkhdf vtkhdf;
+  PetscInt mesh;            /* of frames that are written, as in SbFrame */
+  SbIndex index;            /* rank 0 only */
   PetscReal *owned, *slice; /* work: six numbers per cell or three per point */
   void *packed;             /* slice in the type of the file; NULL when that is double */
 };
@@ -236,8 +235,7 @@ static PetscInt64 frame_bytes(const SbOutput out, PetscInt64 contact_bytes)
 /* What viewers open, with all frames so far. Rank 0. */
 static void write_indices(SbOutput out, PetscBool last, char message[SB_MESSAGE_MAX])
 {
-  SbXdmfWrite(out->frames->xdmf, message);
-  if (!message[0]) SbVtkhdfWrite(out->frames->vtkhdf, last, message);
+  SbIndexWrite(out->frames->index, last, message);
   if (!message[0]) SbContactsIndex(out, last, message);
 }
 
@@ -299,9 +297,8 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   (void)H5Gclose(group);
   fr->last_step = step->step;
   fr->nframe++;
-  if (fr->xdmf) {
-    SbXdmfAdd(fr->xdmf, time, path, n, field, bytes);
-    PetscCall(SbVtkhdfAdd(fr->vtkhdf, time, path, n, field, bytes));
+  if (fr->index) {
+    PetscCall(SbIndexAdd(fr->index, time, path, n, field, bytes));
     PetscCall(SbContactsList(out, time, path, SbContactsCount(out), out->precise ? 8 : 4));
     write_indices(out, step->last, message);
   }
@@ -450,14 +447,10 @@ static PetscInt find_mesh(SbRun run, SbOutput out, hid_t file, PetscBool *ok)
 static PetscErrorCode index_mesh(SbFrames fr, PetscInt step)
 {
   char name[32];
-  hid_t mesh;
 
   PetscFunctionBeginUser;
   mesh_name(step, sizeof(name), name);
-  mesh = SbH5OpenGroup(fr->h5.file, name);
-  PetscCall(SbXdmfSetMesh(fr->xdmf, mesh, name));
-  PetscCall(SbVtkhdfSetMesh(fr->vtkhdf, mesh, name));
-  if (mesh >= 0) (void)H5Gclose(mesh);
+  PetscCall(SbIndexSetMesh(fr->index, fr->h5.file, name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -489,16 +482,15 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
   if (fr->nframe) fr->last_step = frames[fr->nframe - 1].step;
 
   /* the index first, so that it never lists a frame that is removed */
-  for (PetscInt i = 0; fr->xdmf && i < fr->nframe; i++) {
+  for (PetscInt i = 0; fr->index && i < fr->nframe; i++) {
     if (!i || frames[i].mesh != frames[i - 1].mesh) PetscCall(index_mesh(fr, frames[i].mesh));
-    SbXdmfAdd(fr->xdmf, frames[i].time, frames[i].group, frames[i].nfield, frames[i].field, frames[i].bytes);
-    PetscCall(SbVtkhdfAdd(fr->vtkhdf, frames[i].time, frames[i].group, frames[i].nfield, frames[i].field,
-                          frames[i].bytes));
+    PetscCall(SbIndexAdd(fr->index, frames[i].time, frames[i].group, frames[i].nfield, frames[i].field,
+                         frames[i].bytes));
     PetscCall(SbContactsList(out, frames[i].time, frames[i].group, frames[i].npoint, frames[i].point_bytes));
   }
-  if (fr->xdmf && (!fr->nframe || frames[fr->nframe - 1].mesh != fr->mesh))
+  if (fr->index && (!fr->nframe || frames[fr->nframe - 1].mesh != fr->mesh))
     PetscCall(index_mesh(fr, fr->mesh));
-  if (fr->xdmf) write_indices(out, PETSC_TRUE, message);
+  if (fr->index) write_indices(out, PETSC_TRUE, message);
   PetscCall(PetscFree(frames));
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
 
@@ -580,12 +572,7 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
   PetscCall(allocate(run, out));
 
   /* the index for viewers, on rank 0 */
-  if (!out->rank) {
-    PetscCall(SbOutputPath(out, "fields.xmf", sizeof(path), path));
-    PetscCall(SbXdmfCreate(path, &out->frames->xdmf));
-    PetscCall(SbOutputPath(out, "fields.vtkhdf", sizeof(path), path));
-    PetscCall(SbVtkhdfCreate(path, PETSC_FALSE, &out->frames->vtkhdf));
-  }
+  if (!out->rank) PetscCall(SbIndexCreate(out, "fields", NULL, &out->frames->index));
   PetscCall(SbContactsCreate(run, out));
   PetscCall(SbOutputPath(out, "fields.h5", sizeof(path), path));
   if (out->restarted) PetscCall(resume(run, out, path, &resumed));
@@ -594,8 +581,7 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
   if (!resumed) {
     SbFrames fr = out->frames;
 
-    if (fr->xdmf) SbXdmfRemove(fr->xdmf);
-    if (fr->xdmf) SbVtkhdfRemove(fr->vtkhdf);
+    if (fr->index) SbIndexRemove(fr->index);
     SbContactsRemoveIndex(out);
     PetscCall(SbH5Create(out->comm, path, &fr->h5));
     PetscCall(SbH5PutText(&fr->h5, fr->h5.file, "program", "supple " SB_VERSION));
@@ -603,7 +589,7 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
     PetscCall(SbH5GroupCreate(&fr->h5, SB_H5_NODE_LINKS, 4, &fr->top));
     PetscCall(SbH5GroupLink(&fr->h5, fr->top, fr->h5.file, "step"));
     PetscCall(SbH5Flush(&fr->h5));
-    if (fr->xdmf) PetscCall(index_mesh(fr, fr->mesh));
+    if (fr->index) PetscCall(index_mesh(fr, fr->mesh));
   }
   PetscCall(SbRunAddMonitor(run, monitor, out));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -621,7 +607,7 @@ PetscErrorCode SbFramesReattach(SbRun run, SbOutput out)
     out->frames->mesh = run->step0;
     PetscCall(write_mesh(run, out));
     PetscCall(SbH5Flush(&out->frames->h5));
-    if (out->frames->xdmf) PetscCall(index_mesh(out->frames, out->frames->mesh));
+    if (out->frames->index) PetscCall(index_mesh(out->frames, out->frames->mesh));
   }
   PetscCall(SbRunAddMonitor(run, monitor, out));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -645,8 +631,7 @@ PetscErrorCode SbFramesDestroy(SbOutput out)
   if (!out->frames) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbFramesClose(out));
   PetscCall(SbContactsDestroy(out));
-  PetscCall(SbXdmfDestroy(&out->frames->xdmf));
-  PetscCall(SbVtkhdfDestroy(&out->frames->vtkhdf));
+  PetscCall(SbIndexDestroy(&out->frames->index));
   PetscCall(free_work(out->frames));
   PetscCall(PetscFree(out->frames));
   PetscFunctionReturn(PETSC_SUCCESS);

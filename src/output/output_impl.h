@@ -294,41 +294,28 @@ PetscErrorCode SbProgressAttach(SbRun run, SbOutput out);
 PetscErrorCode SbProgressEnd(SbOutput out); /* ends a line that is being rewritten */
 PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char *reason); /* collective */
 
-/* xdmf.c: an index of fields.h5, on rank 0. */
-typedef struct _p_SbXdmf *SbXdmf;
-PetscErrorCode SbXdmfCreate(const char *path, SbXdmf *x);
-/* The mesh of SbXdmfAdd() from now on: its group in fields.h5, open, and by name without the first slash. */
-PetscErrorCode SbXdmfSetMesh(SbXdmf x, hid_t mesh, const char *group);
-PetscErrorCode SbXdmfDestroy(SbXdmf *x);
-void SbXdmfRemove(SbXdmf x); /* the file, if there is one */
+/* index.c: what viewers open to find the frames of fields.h5, NAME.xmf and NAME.vtkhdf. Rank 0. */
+typedef struct _p_SbIndex *SbIndex;
+/* nowhere[3]: of contact points, of which a frame may have none; NULL: of tets. */
+PetscErrorCode SbIndexCreate(SbOutput out, const char *name, const PetscReal *nowhere, SbIndex *index);
+PetscErrorCode SbIndexDestroy(SbIndex *index);
+void SbIndexRemove(SbIndex index); /* the files, if they are there */
+/* The mesh of SbIndexAdd() from now on: a group in fields.h5, open. */
+PetscErrorCode SbIndexSetMesh(SbIndex index, hid_t file, const char *name);
 /* Adds a frame: its group in fields.h5 and its fields. */
-void SbXdmfAdd(SbXdmf x, PetscReal time, const char *group, PetscInt n, const SbField *const field[],
-               const PetscInt bytes[]);
+PetscErrorCode SbIndexAdd(SbIndex index, PetscReal time, const char *group, PetscInt n,
+                          const SbField *const field[], const PetscInt bytes[]);
 /* Values at points: a dataset [n] or [n][3] of whole numbers, or of floating ones with so many bytes. */
 typedef struct {
   const char *name;
   int ncomp, bytes;
   PetscBool whole;
-} SbXdmfValues;
-/* Adds a frame of n points: values[0] are their numbers, values[1] their positions, the others attributes; `nowhere`: where to put
-   a point without force when n is 0, m. */
-void SbXdmfAddPoints(SbXdmf x, PetscReal time, const char *group, PetscInt n, const PetscReal nowhere[3],
-                     PetscInt nvalues, const SbXdmfValues values[]);
-/* Replaces the file; `message` becomes the error, if any. */
-void SbXdmfWrite(SbXdmf x, char message[SB_MESSAGE_MAX]);
-
-/* vtkhdf.c: the same in VTK's own format, of tets or of contact points; functions as above. Rank 0. */
-typedef struct _p_SbVtkhdf *SbVtkhdf;
-PetscErrorCode SbVtkhdfCreate(const char *path, PetscBool points, SbVtkhdf *v);
-PetscErrorCode SbVtkhdfSetMesh(SbVtkhdf v, hid_t mesh, const char *group);
-PetscErrorCode SbVtkhdfDestroy(SbVtkhdf *v);
-void SbVtkhdfRemove(SbVtkhdf v);
-PetscErrorCode SbVtkhdfAdd(SbVtkhdf v, PetscReal time, const char *group, PetscInt n,
-                           const SbField *const field[], const PetscInt bytes[]);
-PetscErrorCode SbVtkhdfAddPoints(SbVtkhdf v, PetscReal time, const char *group, PetscInt n, PetscInt nvalues,
-                                 const SbXdmfValues values[]);
-/* Replaces the file when enough frames have come since, or these are the last ones. */
-void SbVtkhdfWrite(SbVtkhdf v, PetscBool last, char message[SB_MESSAGE_MAX]);
+} SbIndexValues;
+/* Adds a frame of n points: values[0] are their numbers, values[1] their positions, the others attributes. */
+PetscErrorCode SbIndexAddPoints(SbIndex index, PetscReal time, const char *group, PetscInt n,
+                                PetscInt nvalues, const SbIndexValues values[]);
+/* Replaces the files; `message` becomes the error, if any. The last ones of a run are written in any case. */
+void SbIndexWrite(SbIndex index, PetscBool last, char message[SB_MESSAGE_MAX]);
 
 /* phases.c: where the time went, from the log events. */
 typedef struct {

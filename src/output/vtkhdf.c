@@ -11,199 +11,20 @@
   Reference: VTKHDF file format, version 2.0 (docs.vtk.org, "VTK File Formats"): Steps of UnstructuredGrid and PolyData. Symmetric tensors
   have the order xx yy zz xy yz xz there.
 */
-#include <unistd.h>
-#include "output_impl.h"
+#include "index.h"
 
 #define BETWEEN 20
 
-/* A run of values in fields.h5: rows of one dataset, in one frame or one mesh. */
-typedef struct {
-  PetscInt block; /* number of the frame; of the part for what does not change with time */
-  char path[96];  /* of the dataset */
-} Piece;
-
-typedef struct {
-  char name[SB_NAME_MAX + 8];
-  int ncomp, bytes;
-  PetscBool whole, cell, constant; /* whole numbers; per cell; one piece per part, else per frame */
-  PetscInt npiece, size;
-  Piece *piece; /* [npiece], the blocks rise */
-} Array;
-
-typedef struct {
-  PetscInt npoint, ncell;
-  char group[64];
-} Part;
-
-typedef struct {
-  PetscReal time; /* s */
-  PetscInt part;
-} Frame;
-
-struct _p_SbVtkhdf {
-  char path[PETSC_MAX_PATH_LEN];
-  PetscBool points; /* PolyData of contact points, else an UnstructuredGrid of tets */
-  PetscInt corners; /* of a tet: 4, or 10 nodes of a quadratic one */
-  PetscInt npart, part_size, nframe, frame_size, narray, array_size;
-  Part *part;
-  Frame *frame;
-  Array *array;
-  PetscInt nwritten; /* frames that the file on disk has */
-  double next;       /* when it is made again, in s of MPI_Wtime() */
-};
-
-PetscErrorCode SbVtkhdfCreate(const char *path, PetscBool points, SbVtkhdf *v)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscNew(v));
-  PetscCall(PetscStrncpy((*v)->path, path, sizeof((*v)->path)));
-  (*v)->points = points;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbVtkhdfDestroy(SbVtkhdf *v)
-{
-  PetscFunctionBeginUser;
-  if (!*v) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt i = 0; i < (*v)->narray; i++) PetscCall(PetscFree((*v)->array[i].piece));
-  PetscCall(PetscFree((*v)->array));
-  PetscCall(PetscFree((*v)->part));
-  PetscCall(PetscFree((*v)->frame));
-  PetscCall(PetscFree(*v));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-void SbVtkhdfRemove(SbVtkhdf v)
-{
-  (void)unlink(v->path);
-}
-
-/* ------------------------------------------------------------------ the list of what there is */
-
-/* One more piece of the array of this name, which is made when it is new: group/dataset of fields.h5. */
-static PetscErrorCode add_piece(SbVtkhdf v, const Array *like, PetscInt block, const char *group,
-                                const char *dataset)
-{
-  Array *a = NULL;
-
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < v->narray && !a; i++)
-    if (!strcmp(v->array[i].name, like->name)) a = &v->array[i];
-  if (!a) {
-    PetscCall(SbReserve(v->narray + 1, sizeof(Array), &v->array_size, &v->array));
-    a = &v->array[v->narray++];
-    *a = *like;
-  }
-  a->bytes = PetscMax(a->bytes, like->bytes); // after a restart with another precision
-  PetscCall(SbReserve(a->npiece + 1, sizeof(Piece), &a->size, &a->piece));
-  a->piece[a->npiece].block = block;
-  SbFormat(sizeof(a->piece->path), a->piece[a->npiece++].path, "%s/%s", group, dataset);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-typedef struct {
-  SbVtkhdf v;
-  const char *group;
-  PetscErrorCode ierr;
-} List;
-
-/* An array that belongs to the mesh; `vertices` is ours alone. */
-static herr_t list_array(hid_t where, const char *name, const H5L_info_t *info, void *ctx)
-{
-  List *l = (List *)ctx;
-  Array a = {.ncomp = 1, .bytes = 4, .whole = PETSC_TRUE, .cell = PETSC_TRUE, .constant = PETSC_TRUE};
-
-  (void)where, (void)info;
-  if (!strcmp(name, "vertices") || !strcmp(name, "x") || (!strcmp(name, "cells") && l->v->corners > 4))
-    return 0;
-  SbFormat(sizeof(a.name), a.name, "%s", !strcmp(name, "cells10") ? "cells" : name);
-  a.cell = (PetscBool)(strncmp(name, "set_", 4) != 0);
-  if (!strcmp(a.name, "cells")) a.ncomp = (int)l->v->corners;
-  l->ierr = add_piece(l->v, &a, l->v->npart, l->group, name);
-  return l->ierr ? -1 : 0;
-}
-
-static PetscErrorCode add_part(SbVtkhdf v, PetscInt npoint, PetscInt ncell, const char *group)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbReserve(v->npart + 1, sizeof(Part), &v->part_size, &v->part));
-  v->part[v->npart] = (Part){.npoint = npoint, .ncell = ncell};
-  SbFormat(sizeof(v->part->group), v->part[v->npart++].group, "%s", group);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbVtkhdfSetMesh(SbVtkhdf v, hid_t mesh, const char *group)
-{
-  List list = {.v = v, .group = group, .ierr = PETSC_SUCCESS};
-
-  PetscFunctionBeginUser;
-  v->corners = mesh >= 0 && H5Lexists(mesh, "cells10", H5P_DEFAULT) > 0 ? 10 : 4;
-  if (mesh >= 0) (void)H5Literate(mesh, H5_INDEX_NAME, H5_ITER_INC, NULL, list_array, &list);
-  PetscCall(list.ierr);
-  PetscCall(add_part(v, (PetscInt)SbH5Rows(mesh, "x"), (PetscInt)SbH5Rows(mesh, "cells"), group));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode add_frame(SbVtkhdf v, PetscReal time)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbReserve(v->nframe + 1, sizeof(Frame), &v->frame_size, &v->frame));
-  v->frame[v->nframe++] = (Frame){.time = time, .part = v->npart - 1};
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbVtkhdfAdd(SbVtkhdf v, PetscReal time, const char *group, PetscInt n,
-                           const SbField *const field[], const PetscInt bytes[])
-{
-  Array points = {.name = "Points", .ncomp = 3, .bytes = 8};
-  PetscBool moved = PETSC_FALSE;
-
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < n; i++) {
-    Array a = {.ncomp = (int)field[i]->ncomp, .bytes = (int)bytes[i], .cell = field[i]->cell};
-
-    SbFormat(sizeof(a.name), a.name, "%s", field[i]->name);
-    if (!strcmp(a.name, "position")) {
-      points.bytes = (int)bytes[i];
-      moved = PETSC_TRUE;
-    } else {
-      PetscCall(add_piece(v, &a, v->nframe, group, a.name));
-    }
-  }
-  PetscCall(
-    add_piece(v, &points, v->nframe, moved ? group : v->part[v->npart - 1].group, moved ? "position" : "x"));
-  PetscCall(add_frame(v, time));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbVtkhdfAddPoints(SbVtkhdf v, PetscReal time, const char *group, PetscInt n, PetscInt nvalues,
-                                 const SbXdmfValues values[])
-{
-  PetscFunctionBeginUser;
-  for (PetscInt k = 1; k < nvalues; k++) {
-    Array a = {
-      .ncomp = values[k].ncomp, .bytes = values[k].whole ? 4 : values[k].bytes, .whole = values[k].whole};
-
-    SbFormat(sizeof(a.name), a.name, "%s", k == 1 ? "Points" : values[k].name);
-    PetscCall(add_piece(v, &a, v->nframe, group, values[k].name));
-  }
-  PetscCall(add_part(v, n, n, group));
-  PetscCall(add_frame(v, time));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* ------------------------------------------------------------------ the file */
-
 /* Rows of an array in a frame, or in a part for what does not change with time. */
-static PetscInt rows_of(SbVtkhdf v, const Array *a, PetscInt block)
+static PetscInt rows_of(SbIndex v, const SbArray *a, PetscInt block)
 {
-  const Part *p = &v->part[a->constant ? block : v->frame[block].part];
+  const SbPart *p = &v->part[a->constant ? block : v->frame[block].part];
 
   return a->cell ? p->ncell : p->npoint;
 }
 
 /* The virtual dataset of an array as `name`: all frames or parts one behind the other; of the corners of cells as one list. */
-static void write_array(SbVtkhdf v, hid_t where, const char *name, const Array *a, PetscBool *ok)
+static void write_array(SbIndex v, hid_t where, const char *name, const SbArray *a, PetscBool *ok)
 {
   static const hsize_t to_vtk[6] = {0, 3, 5, 1, 4, 2}; // column in fields.h5 of each of xx yy zz xy yz xz
   const hid_t type = a->whole ? H5T_STD_I32LE : a->bytes == 8 ? H5T_IEEE_F64LE : H5T_IEEE_F32LE;
@@ -276,7 +97,7 @@ static void write_numbers(hid_t where, const char *name, PetscInt n, PetscInt m,
 }
 
 /* Cells: their numbers in each part, where their corners begin, and the corners. */
-static void write_cells(SbVtkhdf v, hid_t root, int64_t *work, PetscBool *ok)
+static void write_cells(SbIndex v, hid_t root, int64_t *work, PetscBool *ok)
 {
   static const char *const kind[4] = {"Vertices", "Lines", "Polygons", "Strips"};
   const uint8_t linear = 10, quadratic = 24; /* VTK's numbers of tets */
@@ -313,7 +134,7 @@ static void write_cells(SbVtkhdf v, hid_t root, int64_t *work, PetscBool *ok)
 }
 
 /* Times of the frames, the part that each of them shows, and where its points, cells and arrays begin. */
-static void write_steps(SbVtkhdf v, hid_t root, int64_t *work, PetscBool *ok)
+static void write_steps(SbIndex v, hid_t root, int64_t *work, PetscBool *ok)
 {
   const hid_t group = H5Gcreate2(root, "Steps", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
   const hid_t space = H5Screate(H5S_SCALAR);
@@ -348,7 +169,7 @@ static void write_steps(SbVtkhdf v, hid_t root, int64_t *work, PetscBool *ok)
   where[0] = H5Gcreate2(group, "PointDataOffsets", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
   where[1] = H5Gcreate2(group, "CellDataOffsets", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
   for (PetscInt i = 0; i < v->narray; i++) {
-    const Array *a = &v->array[i];
+    const SbArray *a = &v->array[i];
     int64_t at = 0;
 
     if (!strcmp(a->name, "cells")) continue;
@@ -371,7 +192,7 @@ static void write_steps(SbVtkhdf v, hid_t root, int64_t *work, PetscBool *ok)
 }
 
 /* The whole file, open in memory. */
-static void write_file(SbVtkhdf v, hid_t file, int64_t *work, PetscBool *ok)
+static void write_file(SbIndex v, hid_t file, int64_t *work, PetscBool *ok)
 {
   const hid_t root = H5Gcreate2(file, "VTKHDF", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
   const hid_t type = H5Tcopy(H5T_C_S1), scalar = H5Screate(H5S_SCALAR);
@@ -401,7 +222,7 @@ static void write_file(SbVtkhdf v, hid_t file, int64_t *work, PetscBool *ok)
   data[0] = H5Gcreate2(root, "PointData", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
   data[1] = H5Gcreate2(root, "CellData", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
   for (PetscInt i = 0; i < v->narray; i++) {
-    const Array *a = &v->array[i];
+    const SbArray *a = &v->array[i];
 
     if (!strcmp(a->name, "Points"))
       write_array(v, root, "Points", a, ok);
@@ -416,7 +237,7 @@ static void write_file(SbVtkhdf v, hid_t file, int64_t *work, PetscBool *ok)
   (void)H5Gclose(root);
 }
 
-void SbVtkhdfWrite(SbVtkhdf v, PetscBool last, char message[SB_MESSAGE_MAX])
+void SbVtkhdfWrite(SbIndex v, PetscBool last, char message[SB_MESSAGE_MAX])
 {
   const hid_t list = H5Pcreate(H5P_FILE_ACCESS);
   size_t nwork = 4 * (size_t)v->nframe + (size_t)v->npart + 1;
@@ -436,7 +257,7 @@ void SbVtkhdfWrite(SbVtkhdf v, PetscBool last, char message[SB_MESSAGE_MAX])
 
   /* made in memory, then replaced in one step */
   (void)H5Pset_fapl_core(list, 1 << 16, 0);
-  file = work ? H5Fcreate(v->path, H5F_ACC_TRUNC, H5P_DEFAULT, list) : -1;
+  file = work ? H5Fcreate(v->vtkhdf, H5F_ACC_TRUNC, H5P_DEFAULT, list) : -1;
   if (file >= 0) {
     write_file(v, file, work, &ok);
     (void)H5Fflush(file, H5F_SCOPE_GLOBAL);
@@ -447,9 +268,9 @@ void SbVtkhdfWrite(SbVtkhdf v, PetscBool last, char message[SB_MESSAGE_MAX])
     (void)H5Fclose(file);
   }
   if (file < 0 || !ok)
-    SbFormat(SB_MESSAGE_MAX, message, "cannot write %s: HDF5 fails to make it in memory", v->path);
+    SbFormat(SB_MESSAGE_MAX, message, "cannot write %s: HDF5 fails to make it in memory", v->vtkhdf);
   else
-    SbFileReplace(v->path, 1, &image, message);
+    SbFileReplace(v->vtkhdf, 1, &image, message);
   v->nwritten = v->nframe;
   v->next = MPI_Wtime() + BETWEEN * (MPI_Wtime() - begun);
   free(text);

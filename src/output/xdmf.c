@@ -8,165 +8,71 @@
   Points are a mesh of one vertex per cell, said explicitly: without that vtkXdmf3Reader finds no cells. Neither reader takes a
   grid without points (vtkXdmf3Reader ends with a signal); a frame without any has a single one, which belongs to nobody.
 */
-#include <stdlib.h>
-#include <unistd.h>
-#include "output_impl.h"
+#include "index.h"
 #include "sbmeshio.h"
 
-struct _p_SbXdmf {
-  char path[PETSC_MAX_PATH_LEN];
-  PetscInt npoint, ncell;
-  char *mesh; /* topology, geometry and constant arrays of the frames that come next; free() */
-  FILE *file; /* frames so far, in memory: text[size] once it is flushed */
-  char *text;
-  size_t size;
-};
-
-PetscErrorCode SbXdmfCreate(const char *path, SbXdmf *x)
+/* n rows of an array, or for none of them a single one, as it is. */
+static void put_item(SbIndex x, const SbArray *a, const SbPiece *piece, PetscInt n, const PetscReal single[])
 {
-  PetscFunctionBeginUser;
-  PetscCall(PetscNew(x));
-  PetscCall(PetscStrncpy((*x)->path, path, sizeof((*x)->path)));
-  (*x)->file = open_memstream(&(*x)->text, &(*x)->size);
-  PetscCheck((*x)->file, PETSC_COMM_SELF, PETSC_ERR_MEM, "No memory for %s", path);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+  const char *type = a->whole ? "Int" : "Float";
 
-PetscErrorCode SbXdmfDestroy(SbXdmf *x)
-{
-  PetscFunctionBeginUser;
-  if (!*x) PetscFunctionReturn(PETSC_SUCCESS);
-  (void)fclose((*x)->file);
-  free((*x)->text);
-  free((*x)->mesh);
-  PetscCall(PetscFree(*x));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-void SbXdmfRemove(SbXdmf x)
-{
-  (void)unlink(x->path);
-}
-
-/* ------------------------------------------------------------------ the mesh */
-
-typedef struct {
-  SbXdmf xdmf;
-  const char *group;
-  FILE *file;
-} List;
-
-/* Whole numbers of points (set_NAME) and cells (tets_NAME, body, rank); the others are the mesh itself. */
-static herr_t list_array(hid_t where, const char *name, const H5L_info_t *info, void *ctx)
-{
-  const List *l = (const List *)ctx;
-  const PetscBool points = (PetscBool)!strncmp(name, "set_", 4);
-
-  (void)where, (void)info;
-  if (!points && strncmp(name, "tets_", 5) != 0 && strcmp(name, "body") != 0 && strcmp(name, "rank") != 0)
-    return 0;
-  (void)fprintf(l->file, "<Attribute Name=\"%s\" AttributeType=\"Scalar\" Center=\"%s\">", name,
-                points ? "Node" : "Cell");
-  SbXdmfArray(l->file, points ? l->xdmf->npoint : l->xdmf->ncell, 1, "Int", 4, "fields.h5:/%s/%s", l->group,
-              name);
-  (void)fputs("</Attribute>\n", l->file);
-  return 0;
-}
-
-PetscErrorCode SbXdmfSetMesh(SbXdmf xdmf, hid_t mesh, const char *group)
-{
-  size_t size;
-  List list = {.xdmf = xdmf, .group = group};
-  const PetscBool quadratic = (PetscBool)(mesh >= 0 && H5Lexists(mesh, "cells10", H5P_DEFAULT) > 0);
-
-  PetscFunctionBeginUser;
-  xdmf->npoint = (PetscInt)SbH5Rows(mesh, "x");
-  xdmf->ncell = (PetscInt)SbH5Rows(mesh, "cells");
-  free(xdmf->mesh);
-  list.file = open_memstream(&xdmf->mesh, &size);
-  PetscCheck(list.file, PETSC_COMM_SELF, PETSC_ERR_MEM, "No memory for %s", xdmf->path);
-  (void)fprintf(list.file, "<Topology TopologyType=\"%s\" NumberOfElements=\"%" PetscInt_FMT "\">",
-                quadratic ? "Tetrahedron_10" : "Tetrahedron", xdmf->ncell);
-  SbXdmfArray(list.file, xdmf->ncell, quadratic ? 10 : 4, "Int", 4, "fields.h5:/%s/cells%s", group,
-              quadratic ? "10" : "");
-  (void)fputs("</Topology>\n<Geometry GeometryType=\"XYZ\">", list.file);
-  SbXdmfArray(list.file, xdmf->npoint, 3, "Float", 8, "fields.h5:/%s/x", group);
-  (void)fputs("</Geometry>\n", list.file);
-  if (mesh >= 0) (void)H5Literate(mesh, H5_INDEX_NAME, H5_ITER_INC, NULL, list_array, &list);
-  (void)fclose(list.file);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* ------------------------------------------------------------------ frames */
-
-static void begin_grid(SbXdmf x, const char *name, PetscReal time)
-{
-  (void)fprintf(x->file, "<Grid Name=\"%s\" GridType=\"Uniform\">\n<Time Value=\"%.17g\"/>\n", name,
-                (double)time);
-}
-
-void SbXdmfAdd(SbXdmf x, PetscReal time, const char *group, PetscInt n, const SbField *const field[],
-               const PetscInt bytes[])
-{
-  begin_grid(x, "bodies", time);
-  (void)fputs(x->mesh, x->file);
-  for (PetscInt i = 0; i < n; i++) {
-    const SbField *f = field[i];
-
-    (void)fprintf(x->file, "<Attribute Name=\"%s\" AttributeType=\"%s\" Center=\"%s\">", f->name,
-                  f->ncomp == 1   ? "Scalar"
-                  : f->ncomp == 3 ? "Vector"
-                                  : "Tensor6",
-                  f->cell ? "Cell" : "Node");
-    SbXdmfArray(x->file, f->cell ? x->ncell : x->npoint, (int)f->ncomp, "Float", (int)bytes[i],
-                "fields.h5:%s/%s", group, f->name);
-    (void)fputs("</Attribute>\n", x->file);
+  if (n) {
+    SbXdmfArray(x->file, n, a->ncomp, type, piece->bytes, "fields.h5:%s", piece->path);
+    return;
   }
-  (void)fputs("</Grid>\n", x->file);
+  (void)fprintf(x->file, "<DataItem Dimensions=\"1%s\" NumberType=\"%s\" Precision=\"%d\" Format=\"XML\">",
+                a->ncomp > 1 ? " 3" : "", type, piece->bytes);
+  for (int k = 0; k < a->ncomp; k++) (void)fprintf(x->file, "%s%.17g", k ? " " : "", (double)single[k]);
+  (void)fputs("</DataItem>", x->file);
 }
 
-/* Values at points below `group`, or without a group those of a single point, as they are. */
-static void point_item(SbXdmf x, const char *group, const SbXdmfValues *v, PetscInt n,
-                       const PetscReal single[])
-{
-  const char *type = v->whole ? "Int" : "Float";
-  const int bytes = v->whole ? 4 : v->bytes;
-
-  if (group) {
-    SbXdmfArray(x->file, n, v->ncomp, type, bytes, "fields.h5:%s/%s", group, v->name);
-  } else {
-    (void)fprintf(x->file, "<DataItem Dimensions=\"1%s\" NumberType=\"%s\" Precision=\"%d\" Format=\"XML\">",
-                  v->ncomp > 1 ? " 3" : "", type, bytes);
-    for (int k = 0; k < v->ncomp; k++) (void)fprintf(x->file, "%s%.17g", k ? " " : "", (double)single[k]);
-    (void)fputs("</DataItem>", x->file);
-  }
-}
-
-void SbXdmfAddPoints(SbXdmf x, PetscReal time, const char *group, PetscInt n, const PetscReal nowhere[3],
-                     PetscInt nvalues, const SbXdmfValues values[])
+void SbXdmfAdd(SbIndex x)
 {
   static const PetscReal none[3] = {0., 0., 0.}, nobody[1] = {-1.};
-  const char *where = n ? group : NULL;
+  const PetscInt f = x->nframe - 1, p = x->frame[f].part, n = x->part[p].npoint, ncell = x->part[p].ncell;
+  const SbArray whole = {.ncomp = x->points ? 1 : (int)x->corners, .whole = PETSC_TRUE},
+                vector = {.ncomp = 3};
+  SbPiece cells = {.bytes = 4}, places = {.bytes = 8};
 
-  begin_grid(x, "contacts", time);
-  (void)fprintf(x->file,
-                "<Topology TopologyType=\"Polyvertex\" NumberOfElements=\"%" PetscInt_FMT
-                "\" NodesPerElement=\"1\">",
-                PetscMax(n, 1));
-  point_item(x, where, &values[0], n, none);
+  /* points: vertices at rest, or those of contact */
+  SbFormat(sizeof(cells.path), cells.path, "%s/%s", x->part[p].group,
+           x->points        ? "point"
+           : x->corners > 4 ? "cells10"
+                            : "cells");
+  SbFormat(sizeof(places.path), places.path, "%s/x", x->part[p].group);
+  for (PetscInt i = 0; i < x->narray && x->points; i++)
+    if (!strcmp(x->array[i].name, "Points")) places.bytes = x->array[i].piece[f].bytes;
+  (void)fprintf(x->file, "<Grid Name=\"%s\" GridType=\"Uniform\">\n<Time Value=\"%.17g\"/>\n",
+                x->points ? "contacts" : "bodies", (double)x->frame[f].time);
+  (void)fprintf(x->file, "<Topology TopologyType=\"%s\" NumberOfElements=\"%" PetscInt_FMT "\"%s>",
+                x->points        ? "Polyvertex"
+                : x->corners > 4 ? "Tetrahedron_10"
+                                 : "Tetrahedron",
+                PetscMax(ncell, 1), x->points ? " NodesPerElement=\"1\"" : "");
+  put_item(x, &whole, &cells, ncell, none);
   (void)fputs("</Topology>\n<Geometry GeometryType=\"XYZ\">", x->file);
-  point_item(x, where, &values[1], n, nowhere);
+  put_item(x, &vector, &places, n, x->nowhere);
   (void)fputs("</Geometry>\n", x->file);
-  for (PetscInt k = 2; k < nvalues; k++) {
-    (void)fprintf(x->file, "<Attribute Name=\"%s\" AttributeType=\"%s\" Center=\"Node\">", values[k].name,
-                  values[k].ncomp > 1 ? "Vector" : "Scalar");
-    point_item(x, where, &values[k], n, values[k].whole ? nobody : none);
+
+  /* values of the mesh and of the frame */
+  for (PetscInt i = 0; i < x->narray; i++) {
+    const SbArray *a = &x->array[i];
+    const SbPiece *piece = &a->piece[a->npiece - 1];
+    const char *name = strrchr(piece->path, '/') + 1; // "position" of what are points in VTK's own format
+
+    if (piece->block != (a->constant ? p : f) || !strcmp(a->name, "cells") || !strcmp(name, "x")) continue;
+    (void)fprintf(x->file, "<Attribute Name=\"%s\" AttributeType=\"%s\" Center=\"%s\">", name,
+                  a->ncomp == 1   ? "Scalar"
+                  : a->ncomp == 3 ? "Vector"
+                                  : "Tensor6",
+                  a->cell ? "Cell" : "Node");
+    put_item(x, a, piece, a->cell ? ncell : n, a->whole ? nobody : none);
     (void)fputs("</Attribute>\n", x->file);
   }
   (void)fputs("</Grid>\n", x->file);
 }
 
-void SbXdmfWrite(SbXdmf x, char message[SB_MESSAGE_MAX])
+void SbXdmfWrite(SbIndex x, char message[SB_MESSAGE_MAX])
 {
   static const char head[] = "<?xml version=\"1.0\" ?>\n<Xdmf Version=\"3.0\">\n<Domain>\n"
                              "<Grid Name=\"frames\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
@@ -175,5 +81,5 @@ void SbXdmfWrite(SbXdmf x, char message[SB_MESSAGE_MAX])
 
   (void)fflush(x->file);
   chunks[1] = (SbChunk){x->text, x->size};
-  SbFileReplace(x->path, 3, chunks, message);
+  SbFileReplace(x->xmf, 3, chunks, message);
 }
