@@ -19,6 +19,7 @@
 #include "recovery.h"
 #include "sbelement.h"
 #include "sbkernel.h"
+#include <petscblaslapack.h>
 
 #define RIDGE 0.05        /* r above, as a part of the sum of squares of distances */
 #define RIDGE_SLOPE 0.01  /* of slopes of the pressure, as a part of the number of cells */
@@ -37,7 +38,7 @@ struct _p_SbRecovery {
   PetscReal (
     *factor)[2][NFIT * NFIT]; /* [nvert_owned nlayer] Cholesky factors of the sums for P and pressure */
   struct Fit {
-    PetscReal c[NFIT][NVALUE]; /* coefficients of the monomials of (X - X_v) / size */
+    PetscReal c[NVALUE][NFIT]; /* coefficients of the monomials of (X - X_v) / size */
     PetscReal size;            /* m */
   } * fit;                     /* [nvert nlayer] */
 };
@@ -186,41 +187,12 @@ static void point_monomials(SbMesh mesh, PetscInt cell, int a, PetscReal size, P
   }
 }
 
-/* A <- L of A = L L^T, lower triangle. */
-static void factorise(PetscReal A[NFIT * NFIT])
-{
-  for (int i = 0; i < NFIT; i++) {
-    for (int j = 0; j <= i; j++) {
-      PetscReal sum = A[NFIT * i + j];
-
-      for (int k = 0; k < j; k++) sum -= A[NFIT * i + k] * A[NFIT * j + k];
-      A[NFIT * i + j] = i == j ? PetscSqrtReal(sum) : sum / A[NFIT * j + j];
-    }
-  }
-}
-
-/* Columns first..last-1 of b <- A^-1 b. */
-static void solve_columns(const PetscReal L[NFIT * NFIT], int first, int last, PetscReal b[NFIT][NVALUE])
-{
-  for (int i = 0; i < NFIT; i++) {
-    for (int k = 0; k < i; k++) {
-      for (int v = first; v < last; v++) b[i][v] -= L[NFIT * i + k] * b[k][v];
-    }
-    for (int v = first; v < last; v++) b[i][v] /= L[NFIT * i + i];
-  }
-  for (int i = NFIT - 1; i >= 0; i--) {
-    for (int k = i + 1; k < NFIT; k++) {
-      for (int v = first; v < last; v++) b[i][v] -= L[NFIT * k + i] * b[k][v];
-    }
-    for (int v = first; v < last; v++) b[i][v] /= L[NFIT * i + i];
-  }
-}
-
 static PetscErrorCode create_quadratic(SbRecovery r, const PetscBool quadratic[])
 {
   SbMesh mesh = r->mesh;
   const PetscInt n = r->nlayer * mesh->nvert_owned;
   PetscBool any = PETSC_FALSE;
+  PetscBLASInt order = NFIT, info;
   PetscInt *ncell;
 
   PetscFunctionBeginUser;
@@ -263,7 +235,9 @@ static PetscErrorCode create_quadratic(SbRecovery r, const PetscBool quadratic[]
 
       for (int k = 1; k < NFIT; k++)
         A[(NFIT + 1) * k] += (k >= 4 ? RIDGE_SECOND : which ? RIDGE_SLOPE : 1e-12) * A[0];
-      factorise(A);
+      LAPACKpotrf_("L", &order, A, &order, &info);
+      PetscCheck(!info, PETSC_COMM_SELF, PETSC_ERR_LIB, "The sums at a vertex are not definite: %d",
+                 (int)info);
     }
   }
   PetscCall(PetscFree(ncell));
@@ -274,6 +248,7 @@ PetscErrorCode SbRecoveryApplyQuadratic(SbRecovery r, SbPointStress stress[])
 {
   SbMesh mesh = r->mesh;
   const PetscInt n = r->nlayer * mesh->nvert_owned;
+  PetscBLASInt order = NFIT, nine = 9, one = 1, info;
 
   PetscFunctionBeginUser;
   PetscCall(SbMeshBroadcastCells(mesh, sizeof(*stress) / sizeof(PetscReal), MPIU_REAL, stress));
@@ -286,15 +261,15 @@ PetscErrorCode SbRecoveryApplyQuadratic(SbRecovery r, SbPointStress stress[])
     point_monomials(mesh, i / 4, (int)(i % 4), fit->size, p);
     for (int m = 0; m < NFIT; m++) {
       for (int q = 0; q < 4; q++) {
-        for (int k = 0; k < 9; k++) fit->c[m][k] += p[q][m] * stress[i / 4].P[q][k];
+        for (int k = 0; k < 9; k++) fit->c[k][m] += p[q][m] * stress[i / 4].P[q][k];
       }
-      fit->c[m][9] += p[4][m] * stress[i / 4].pressure;
+      fit->c[9][m] += p[4][m] * stress[i / 4].pressure;
     }
   }
   for (PetscInt s = 0; s < n; s++) {
     if (!(r->fit[s].size > 0.)) continue;
-    solve_columns(r->factor[s][0], 0, 9, r->fit[s].c);
-    solve_columns(r->factor[s][1], 9, NVALUE, r->fit[s].c);
+    LAPACKpotrs_("L", &order, &nine, r->factor[s][0], &order, r->fit[s].c[0], &order, &info);
+    LAPACKpotrs_("L", &order, &one, r->factor[s][1], &order, r->fit[s].c[9], &order, &info);
   }
   PetscCall(
     SbMeshBroadcastVertices(mesh, r->nlayer * (sizeof(*r->fit) / sizeof(PetscReal)), MPIU_REAL, r->fit));
@@ -307,8 +282,8 @@ PetscReal SbRecoveryNode(SbRecovery r, PetscInt cell, int a, PetscReal P[9])
   PetscReal value[NVALUE] = {0.};
 
   if (a < 4) {
-    memcpy(P, r->fit[slot[a]].c[0], 9 * sizeof(*P));
-    return r->fit[slot[a]].c[0][9];
+    for (int k = 0; k < 9; k++) P[k] = r->fit[slot[a]].c[k][0];
+    return r->fit[slot[a]].c[9][0];
   }
   for (int end = 0; end < 2; end++) {
     const int from = SbTetEdge[a - 4][end], to = SbTetEdge[a - 4][1 - end];
@@ -318,7 +293,7 @@ PetscReal SbRecoveryNode(SbRecovery r, PetscInt cell, int a, PetscReal P[9])
     for (int k = 0; k < 3; k++) d[k] = 0.5 * (r->mesh->x[3 * v[to] + k] - r->mesh->x[3 * v[from] + k]);
     monomials_of(d, fit->size, p);
     for (int m = 0; m < NFIT; m++) {
-      for (int k = 0; k < NVALUE; k++) value[k] += 0.5 * p[m] * fit->c[m][k];
+      for (int k = 0; k < NVALUE; k++) value[k] += 0.5 * p[m] * fit->c[k][m];
     }
   }
   memcpy(P, value, 9 * sizeof(*P));

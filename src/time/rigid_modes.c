@@ -157,13 +157,9 @@ static PetscErrorCode find_admissible(Vec Z[6], Vec z[6], PetscInt *n, PetscReal
   PetscBool ok;
 
   PetscFunctionBeginUser;
-  for (int j = 0; j < 6; j++) {
-    for (int i = 0; i <= j; i++) PetscCall(VecDot(Z[i], Z[j], &M[6 * j + i]));
-  }
+  for (int j = 0; j < 6; j++) PetscCall(VecMDot(Z[j], j + 1, Z, M + 6 * j));
   for (int k = 0; k < 6; k++) PetscCall(VecAXPY(Z[k], -1., z[k]));
-  for (int j = 0; j < 6; j++) {
-    for (int i = 0; i <= j; i++) PetscCall(VecDot(Z[i], Z[j], &x[6 * j + i]));
-  }
+  for (int j = 0; j < 6; j++) PetscCall(VecMDot(Z[j], j + 1, Z, x + 6 * j));
   PetscCall(eigen(6, x, M, value, &ok));
   for (*n = 0; ok && *n < 6 && value[*n] <= ALLOWED; ++*n) {
   }
@@ -199,18 +195,20 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
 {
   PetscReal x[36];
   PetscInt n = 0;
-  Vec Z[6], z[6];
+  Vec *Z, *z;
 
   PetscFunctionBeginUser;
   part->nfree = 0;
   PetscCall(measure(run, label, part));
+  PetscCall(VecDuplicateVecs(d, 6, &Z));
+  PetscCall(VecDuplicateVecs(d, 6, &z));
   for (PetscInt k = 0; k < 6; k++) {
     SbSpace s = run->model->space;
     const PetscScalar *u;
     PetscScalar *to;
 
     /* Motion k = 0..2: along an axis, 3..5: about one through the centre; z: its admissible part. */
-    PetscCall(SbSpaceCreateVec(s, &Z[k]));
+    PetscCall(VecZeroEntries(Z[k]));
     PetscCall(VecGetArrayRead(run->U, &u));
     PetscCall(VecGetArray(Z[k], &to));
     for (PetscInt i = 0; i < s->nnode_owned; i++) {
@@ -227,7 +225,6 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
     }
     PetscCall(VecRestoreArray(Z[k], &to));
     PetscCall(VecRestoreArrayRead(run->U, &u));
-    PetscCall(VecDuplicate(Z[k], &z[k]));
     PetscCall(VecCopy(Z[k], z[k]));
     PetscCall(SbSpaceProjectAdmissible(s, z[k]));
   }
@@ -235,12 +232,12 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
   if (n) {
     PetscReal E[36], M[36], value[6];
     PetscBool ok;
-    Vec y[6], w;
+    Vec *y, w;
 
     /* free ones among the n admissible motions x (problem 2): y = P Z x */
     PetscCall(VecDuplicate(d, &w));
+    PetscCall(VecDuplicateVecs(d, n, &y));
     for (PetscInt j = 0; j < n; j++) {
-      PetscCall(VecDuplicate(d, &y[j]));
       PetscCall(VecZeroEntries(y[j]));
       PetscCall(VecMAXPY(y[j], 6, x + 6 * j, z));
     }
@@ -248,9 +245,9 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
     /* M = y^T D y, E = y^T A y */
     for (PetscInt j = 0; j < n; j++) {
       PetscCall(VecPointwiseMult(w, d, y[j]));
-      for (PetscInt i = 0; i <= j; i++) PetscCall(VecDot(y[i], w, &M[6 * j + i]));
+      PetscCall(VecMDot(w, j + 1, y, M + 6 * j));
       PetscCall(MatMult(run->operator, y[j], w));
-      for (PetscInt i = 0; i <= j; i++) PetscCall(VecDot(y[i], w, &E[6 * j + i]));
+      PetscCall(VecMDot(w, j + 1, y, E + 6 * j));
     }
     PetscCall(eigen(n, E, M, value, &ok));
     for (part->nfree = 0; ok && part->nfree < n && PetscAbsReal(value[part->nfree]) <= FREE; part->nfree++) {
@@ -264,14 +261,12 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
       part->motion[c] = 0.;
       for (PetscInt i = 0; i < n; i++) part->motion[c] += E[i] * x[6 * i + c];
     }
-    for (PetscInt j = 0; j < n; j++) PetscCall(VecDestroy(&y[j]));
+    PetscCall(VecDestroyVecs(n, &y));
     PetscCall(VecDestroy(&w));
   }
   if (part->nfree > 1) PetscCall(choose_axis(run, d, Z, z, part));
-  for (int k = 0; k < 6; k++) {
-    PetscCall(VecDestroy(&Z[k]));
-    PetscCall(VecDestroy(&z[k]));
-  }
+  PetscCall(VecDestroyVecs(6, &Z));
+  PetscCall(VecDestroyVecs(6, &z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
