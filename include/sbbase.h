@@ -78,7 +78,7 @@ PetscErrorCode SbOptionGiven(const SbScope *scope, const char *key, PetscBool *g
 /* Reads and checks a value that is asked for only later, when much has been computed already. */
 PetscErrorCode SbOptionCheckEarly(const SbScope *scope, const char *key);
 /* Whether the scope has a row with this key. */
-PetscErrorCode SbOptionExists(const SbScope *scope, const char *key, PetscBool *exists);
+PetscBool SbOptionExists(const SbScope *scope, const char *key);
 /* SbOptionGiven() alone does not count as reading for SbOptionsView(): read the value too. */
 
 /* Full name, e.g. "-body_liver_young", for messages. */
@@ -238,7 +238,8 @@ PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *wher
                                SbFormula *formula); /* where: option name, for messages */
 PetscReal SbFormulaEval(SbFormula formula, PetscReal t,
                         const PetscReal x[3]); /* x may be NULL when the formula does not use it */
-PetscErrorCode SbFormulaUses(SbFormula formula, PetscBool *time, PetscBool *position);
+PetscBool SbFormulaUsesTime(SbFormula formula);
+PetscBool SbFormulaUsesPosition(SbFormula formula);
 PetscErrorCode SbFormulaDestroy(SbFormula *formula);
 /*
   Live formulas (src/base/live.c): numbers that somebody sets while a run goes on, where a formula of an effect is the word `live`.

@@ -31,20 +31,14 @@ static struct {
 
 static PetscBool is_user_error(PetscErrorCode n, const char *function)
 {
-  switch ((int)n) {
-  case PETSC_ERR_USER:
-  case PETSC_ERR_USER_INPUT:
-  case PETSC_ERR_FILE_OPEN:
-  case PETSC_ERR_FILE_READ:
-  case PETSC_ERR_FILE_WRITE:
-  case PETSC_ERR_FILE_UNEXPECTED:
-    return PETSC_TRUE;
-  default:
-    break;
-  }
+  static const int ours[] = {
+    PETSC_ERR_USER,       PETSC_ERR_USER_INPUT,      PETSC_ERR_FILE_OPEN,        PETSC_ERR_FILE_READ,
+    PETSC_ERR_FILE_WRITE, PETSC_ERR_FILE_UNEXPECTED, PETSC_ERR_ARG_UNKNOWN_TYPE, PETSC_ERR_MISSING_FACTOR};
+
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++)
+    if ((int)n == ours[i]) return PETSC_TRUE;
   /* PETSc reads its options and option files itself, under other codes */
-  return (PetscBool)(n == PETSC_ERR_ARG_UNKNOWN_TYPE || n == PETSC_ERR_MISSING_FACTOR ||
-                     (function && (!strncmp(function, "PetscOptionsInsert", 18) ||
+  return (PetscBool)((function && (!strncmp(function, "PetscOptionsInsert", 18) ||
                                    !strncmp(function, "PetscOptionsStringTo", 20) ||
                                    !strncmp(function, "PetscOptionsSetValue", 20) ||
                                    !strcmp(function, "PetscParseLayerYAML"))));

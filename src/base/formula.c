@@ -273,12 +273,14 @@ PetscReal SbFormulaEval(SbFormula f, PetscReal t, const PetscReal x[3])
   return stack[0];
 }
 
-PetscErrorCode SbFormulaUses(SbFormula formula, PetscBool *time, PetscBool *position)
+PetscBool SbFormulaUsesTime(SbFormula f)
 {
-  PetscFunctionBeginUser;
-  *time = formula->uses_time;
-  *position = formula->uses_position;
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return f->uses_time;
+}
+
+PetscBool SbFormulaUsesPosition(SbFormula f)
+{
+  return f->uses_position;
 }
 
 PetscErrorCode SbFormulaDestroy(SbFormula *formula)

@@ -127,11 +127,9 @@ PetscErrorCode SbOptionFindRecord(const SbScope *scope, const SbOption *row, SbO
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbOptionExists(const SbScope *scope, const char *key, PetscBool *exists)
+PetscBool SbOptionExists(const SbScope *scope, const char *key)
 {
-  PetscFunctionBeginUser;
-  *exists = (PetscBool)(SbOptionFind(scope, key) != NULL);
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return (PetscBool)(SbOptionFind(scope, key) != NULL);
 }
 
 PetscErrorCode SbOptionsInherit(const char *klass, const char *instance, const char *from)

@@ -47,12 +47,6 @@ static PetscErrorCode help_row(PetscViewer viewer, const SbOptionBlock *block, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a text contains the word, in capitals or not. */
-static PetscBool contains(const char *text, const char *word)
-{
-  return (PetscBool)(strcasestr(text, word) != NULL);
-}
-
 /* How well an option answers a topic: 3: its class or type, 2: its first word, 1: a word in its name or text, 0: not. */
 static PetscErrorCode answers(const SbOptionBlock *block, const SbOption *row, const char *topic, int *how)
 {
@@ -66,7 +60,7 @@ static PetscErrorCode answers(const SbOptionBlock *block, const SbOption *row, c
     *how = 3;
   else if (!block->klass[0] && !strncasecmp(row->key, topic, n) && (!row->key[n] || row->key[n] == '_'))
     *how = 2;
-  else if (contains(name, topic) || contains(row->help, topic) || contains(row->range, topic))
+  else if (strcasestr(name, topic) || strcasestr(row->help, topic) || strcasestr(row->range, topic))
     *how = 1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -127,7 +127,7 @@ static PetscErrorCode is_contact(const char *name, PetscBool *is)
 /* The response of an effect; why: the effect leaves the choice, NULL: it does not. */
 static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
 {
-  PetscBool exists, guarded = PETSC_TRUE;
+  PetscBool guarded = PETSC_TRUE;
   PetscInt n = 0, method;
   char(*names)[SB_NAME_MAX] = NULL;
   SbResponse other = AUTO;
@@ -146,15 +146,13 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
 
   /* the integrator, where the program has one */
   PetscCall(SbScopeSet(&scope, "", "", ""));
-  PetscCall(SbOptionExists(&scope, "time", &exists));
-  if (exists) {
+  if (SbOptionExists(&scope, "time")) {
     PetscCall(SbOptionChoice(&scope, "time", &method));
     guarded = (PetscBool)(method == 0 || method == 6); /* euler_implicit, static */
   }
 
   /* the other effects */
-  PetscCall(SbOptionExists(&scope, "effects", &exists));
-  if (exists) PetscCall(SbOptionNames(&scope, "effects", &n, &names));
+  if (SbOptionExists(&scope, "effects")) PetscCall(SbOptionNames(&scope, "effects", &n, &names));
   for (PetscInt i = 0; i < n; i++) {
     PetscBool contact = PETSC_FALSE;
     Needs more;

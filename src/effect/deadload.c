@@ -155,11 +155,8 @@ PetscErrorCode SbDeadLoadCreate(SbSpace space, PetscInt ncorner, PetscInt nitem,
   load->nitem = nitem;
   load->space = space;
   for (int i = 0; i < 3; i++) {
-    PetscBool time, position;
-
     load->density[i] = density[i];
-    PetscCall(SbFormulaUses(density[i], &time, &position));
-    if (time) steady = PETSC_FALSE;
+    if (SbFormulaUsesTime(density[i])) steady = PETSC_FALSE;
   }
   PetscCall(PetscMalloc1(ncorner * nitem, &load->corner));
   PetscCall(PetscArraycpy(load->corner, corner, ncorner * nitem));

@@ -154,11 +154,8 @@ PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt 
   PetscFunctionBeginUser;
   PetscCall(SbOptionFormulas(scope, key, formulas));
   for (PetscInt i = 0; i < n; i++) {
-    PetscBool uses_time, uses_position;
-
-    PetscCall(SbFormulaUses(formulas[i], &uses_time, &uses_position));
-    if (uses_time) *steady = PETSC_FALSE;
-    if (uses_position && !position) {
+    if (SbFormulaUsesTime(formulas[i])) *steady = PETSC_FALSE;
+    if (SbFormulaUsesPosition(formulas[i]) && !position) {
       char option[3 * SB_NAME_MAX];
 
       PetscCall(SbOptionName(scope, key, sizeof(option), option));

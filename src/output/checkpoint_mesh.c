@@ -18,11 +18,9 @@ typedef struct {
 #define NARRAY 6
 static void arrays_of(SbMemoryMesh *g, const PetscInt count[3], Array a[NARRAY])
 {
-  const hid_t whole = sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32;
-
   a[0] = (Array){"x", count[0], 3, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, g->x};
-  a[1] = (Array){"cells", count[1], 4, H5T_STD_I64LE, whole, g->cell};
-  a[2] = (Array){"triangles", count[2], 3, H5T_STD_I64LE, whole, g->tri};
+  a[1] = (Array){"cells", count[1], 4, H5T_STD_I64LE, SB_H5_INT, g->cell};
+  a[2] = (Array){"triangles", count[2], 3, H5T_STD_I64LE, SB_H5_INT, g->tri};
   a[3] = (Array){"vertex_sets", count[0], 1, H5T_STD_U64LE, H5T_NATIVE_UINT64, g->vert_set};
   a[4] = (Array){"cell_sets", count[1], 1, H5T_STD_U64LE, H5T_NATIVE_UINT64, g->cell_set};
   a[5] = (Array){"triangle_sets", count[2], 1, H5T_STD_U64LE, H5T_NATIVE_UINT64, g->tri_set};

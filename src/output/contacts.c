@@ -7,57 +7,53 @@
   A point is sent to the rank that has its share of the numbers of points and edges, and sorted there: by the number that it begins
   with, then by effect, kind, and the number of the other side.
 */
+#include <stddef.h>
 #include "output_impl.h"
 
-/* A point as it travels: what it is sorted by, then the quantities. Whole numbers are exact in a double. */
-enum {
-  FIRST,
-  EFFECT,
-  KIND,
-  SECOND,
-  BODY,
-  OTHER,
-  X,
-  NORMAL = X + 3,
-  GAP = NORMAL + 3,
-  FORCE,
-  PUSH = FORCE + 3,
-  DRAG,
-  RECORD = DRAG + 3
-};
-#define ROW (-1) /* the number of the row itself: VTK needs a cell for each point */
+/* What is written of a point: where it is in SbContactPoint, or what is made of that. */
+#define ROW ((size_t)-1)    /* the number of the row itself: VTK needs a cell for each point */
+#define NORMAL ((size_t)-2) /* the force along the normal */
+#define FRICTION ((size_t)-3)
+#define AT(member) offsetof(SbContactPoint, member)
 
 static const struct {
   const char *name, *unit;
-  int ncomp, from;
+  int ncomp;
+  size_t from;
   PetscBool whole;
 } table[] = {
   // SbIndexAddPoints() wants numbers and coordinates first
-  {"point", "1", 1, ROW, PETSC_TRUE},          {"x", "m", 3, X, PETSC_FALSE},
-  {"effect", "1", 1, EFFECT, PETSC_TRUE},      {"body", "1", 1, BODY, PETSC_TRUE},
-  {"other", "1", 1, OTHER, PETSC_TRUE},        {"normal", "1", 3, NORMAL, PETSC_FALSE},
-  {"gap", "m", 1, GAP, PETSC_FALSE},           {"force", "N", 3, FORCE, PETSC_FALSE},
-  {"normal_force", "N", 1, PUSH, PETSC_FALSE}, {"friction_force", "N", 3, DRAG, PETSC_FALSE},
+  {"point", "1", 1, ROW, PETSC_TRUE},
+  {"x", "m", 3, AT(x), PETSC_FALSE},
+  {"effect", "1", 1, AT(effect), PETSC_TRUE},
+  {"body", "1", 1, AT(body[0]), PETSC_TRUE},
+  {"other", "1", 1, AT(body[1]), PETSC_TRUE},
+  {"normal", "1", 3, AT(normal), PETSC_FALSE},
+  {"gap", "m", 1, AT(gap), PETSC_FALSE},
+  {"force", "N", 3, AT(force), PETSC_FALSE},
+  {"normal_force", "N", 1, NORMAL, PETSC_FALSE},
+  {"friction_force", "N", 3, FRICTION, PETSC_FALSE},
 };
 #define NTABLE ((int)PETSC_STATIC_ARRAY_LENGTH(table))
 
 struct _p_SbContacts {
-  SbContactPoints list; /* of this rank */
-  PetscReal *record;    /* [share.n][RECORD] of this rank's share, sorted */
-  SbOrder share;        /* which rows are this rank's; it has no star forest */
-  void *column;         /* [share.n][3] of one quantity, as in the file */
-  SbIndex index;        /* rank 0 only */
+  SbContactPoints list;  /* of this rank */
+  SbContactPoint *point; /* [share.n] of this rank's share, sorted */
+  SbOrder share;         /* which rows are this rank's; it has no star forest */
+  void *column;          /* [share.n][3] of one quantity, as in the file */
+  SbIndex index;         /* rank 0 only */
 };
 
 /* ------------------------------------------------------------------ to the ranks that write them */
 
 static int by_keys(const void *a, const void *b)
 {
-  const PetscReal *p = (const PetscReal *)a, *q = (const PetscReal *)b;
+  const SbContactPoint *p = (const SbContactPoint *)a, *q = (const SbContactPoint *)b;
+  const PetscInt of_p[4] = {p->id[1], p->effect, p->id[0], p->id[2]};
+  const PetscInt of_q[4] = {q->id[1], q->effect, q->id[0], q->id[2]};
 
-  for (int k = FIRST; k <= SECOND; k++) {
-    if (p[k] != q[k]) return p[k] < q[k] ? -1 : 1;
-  }
+  for (int k = 0; k < 4; k++)
+    if (of_p[k] != of_q[k]) return of_p[k] < of_q[k] ? -1 : 1;
   return 0;
 }
 
@@ -66,7 +62,6 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
   SbContacts c = out->contacts;
   PetscInt bound = 0;
   PetscMPIInt *dest;
-  PetscReal *mine;
   SbRoute route;
 
   PetscFunctionBeginUser;
@@ -80,42 +75,22 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
   /* The contact points of this rank to the ranks that have their share of the numbers of points and edges; those that came, sorted. */
   for (PetscInt i = 0; i < c->list.n; i++) bound = PetscMax(bound, c->list.point[i].id[1]);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &bound, 1, MPIU_INT, MPI_MAX, c->share.comm));
-  PetscCall(PetscMalloc2(c->list.n, &dest, RECORD * (size_t)c->list.n, &mine));
-  for (PetscInt i = 0; i < c->list.n; i++) {
-    const SbContactPoint *p = &c->list.point[i];
-    PetscReal *r, push;
-
-    dest[i] = (PetscMPIInt)((PetscInt64)p->id[1] * out->size / ((PetscInt64)bound + 1));
-    r = mine + RECORD * (size_t)i;
-    push = SbDot3(p->force, p->normal);
-    r[FIRST] = (PetscReal)p->id[1];
-    r[EFFECT] = (PetscReal)p->effect;
-    r[KIND] = (PetscReal)p->id[0];
-    r[SECOND] = (PetscReal)p->id[2];
-    r[BODY] = (PetscReal)p->body[0];
-    r[OTHER] = (PetscReal)p->body[1];
-    r[GAP] = p->gap;
-    r[PUSH] = push;
-    for (int k = 0; k < 3; k++) {
-      r[X + k] = p->x[k];
-      r[NORMAL + k] = p->normal[k];
-      r[FORCE + k] = p->force[k];
-      r[DRAG + k] = p->force[k] - push * p->normal[k];
-    }
-  }
-  PetscCall(PetscFree(c->record));
+  PetscCall(PetscMalloc1(c->list.n, &dest));
+  for (PetscInt i = 0; i < c->list.n; i++)
+    dest[i] = (PetscMPIInt)((PetscInt64)c->list.point[i].id[1] * out->size / ((PetscInt64)bound + 1));
+  PetscCall(PetscFree(c->point));
   PetscCall(SbRouteCreate(c->share.comm, c->list.n, dest, &route));
-  PetscCall(SbRouteSend(&route, RECORD * sizeof(PetscReal), mine, &c->record));
+  PetscCall(SbRouteSend(&route, sizeof(SbContactPoint), c->list.point, &c->point));
   c->share.n = route.nrecv;
   PetscCall(SbRouteDestroy(&route));
-  PetscCall(PetscFree2(dest, mine));
-  if (c->share.n) qsort(c->record, (size_t)c->share.n, RECORD * sizeof(PetscReal), by_keys);
+  PetscCall(PetscFree(dest));
+  if (c->share.n) qsort(c->point, (size_t)c->share.n, sizeof(SbContactPoint), by_keys);
   PetscCall(PetscFree(c->column));
   PetscCall(PetscMalloc(3 * sizeof(double) * (size_t)c->share.n, &c->column));
   PetscCallMPI(MPI_Scan(&c->share.n, &c->share.start, 1, MPIU_INT, MPI_SUM, out->comm));
   c->share.start -= c->share.n;
   PetscCallMPI(MPI_Allreduce(&c->share.n, &c->share.N, 1, MPIU_INT, MPI_SUM, out->comm));
-  *bytes = (PetscInt64)c->share.N * RECORD * (PetscInt64)sizeof(double) + NTABLE * 8192;
+  for (int k = 0; k < NTABLE; k++) *bytes += 8 * (PetscInt64)c->share.N * table[k].ncomp + 8192;
   PetscCall(PetscLogEventEnd(out->event.contacts, 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -126,17 +101,27 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
 static hid_t fill_column(SbContacts c, int k, PetscBool precise, hid_t *filetype)
 {
   for (PetscInt i = 0; i < c->share.n * table[k].ncomp; i++) {
-    const PetscInt row = i / table[k].ncomp;
-    const PetscReal *r = c->record + RECORD * (size_t)row + i % table[k].ncomp;
+    const PetscInt row = i / table[k].ncomp, component = i % table[k].ncomp;
+    const SbContactPoint *p = c->point + row;
+    const PetscReal push = SbDot3(p->force, p->normal);
+    PetscReal value;
 
-    if (table[k].from == ROW)
-      ((int32_t *)c->column)[i] = (int32_t)(c->share.start + row);
-    else if (table[k].whole)
-      ((int32_t *)c->column)[i] = (int32_t)r[table[k].from];
-    else if (precise)
-      ((double *)c->column)[i] = r[table[k].from];
+    if (table[k].whole) {
+      ((int32_t *)c->column)[i] =
+        (int32_t)(table[k].from == ROW ? c->share.start + row
+                                       : *(const PetscInt *)((const char *)p + table[k].from));
+      continue;
+    }
+    if (table[k].from == NORMAL)
+      value = push;
+    else if (table[k].from == FRICTION)
+      value = p->force[component] - push * p->normal[component];
     else
-      ((float *)c->column)[i] = (float)r[table[k].from];
+      value = ((const PetscReal *)((const char *)p + table[k].from))[component];
+    if (precise)
+      ((double *)c->column)[i] = value;
+    else
+      ((float *)c->column)[i] = (float)value;
   }
   *filetype = table[k].whole ? H5T_STD_I32LE : precise ? H5T_IEEE_F64LE : H5T_IEEE_F32LE;
   return table[k].whole ? H5T_NATIVE_INT32 : precise ? H5T_NATIVE_DOUBLE : H5T_NATIVE_FLOAT;
@@ -243,7 +228,7 @@ PetscErrorCode SbContactsDestroy(SbOutput out)
   if (!c) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbIndexDestroy(&c->index));
   PetscCall(PetscFree(c->list.point));
-  PetscCall(PetscFree(c->record));
+  PetscCall(PetscFree(c->point));
   PetscCall(PetscFree(c->column));
   PetscCall(PetscFree(out->contacts));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -378,11 +378,13 @@ static PetscBool link_name(hid_t group, PetscInt i, size_t size, char name[])
                                         H5P_DEFAULT) > 0);
 }
 
-/* Visits every frame of the file: those up to step0 are appended to `frames`, later ones are removed when `drop`. */
-static PetscErrorCode scan(SbFrames fr, PetscInt step0, PetscBool drop, PetscInt *nframe, SbFrame frames[])
+/* Visits every frame of the file: those up to step0 are counted and put into `frames`; without it later ones are removed. */
+static PetscErrorCode scan(SbFrames fr, PetscInt step0, SbFrame **frames)
 {
+  PetscInt size = 0;
+
   PetscFunctionBeginUser;
-  *nframe = 0;
+  fr->nframe = 0;
   fr->nnode = count_links(fr->top);
   for (PetscInt h = 0; h < fr->nnode; h++) {
     char name[16], frame[16];
@@ -398,9 +400,10 @@ static PetscErrorCode scan(SbFrames fr, PetscInt step0, PetscBool drop, PetscInt
       PetscCall(read_frame(hundred, frame, &found, &ok));
       if (ok && found.step <= step0) {
         (void)snprintf(found.group, sizeof(found.group), "/step/%s/%s", name, frame);
-        if (frames) frames[*nframe] = found;
-        (*nframe)++;
-      } else if (ok && drop) {
+        if (frames) PetscCall(SbReserve(fr->nframe + 1, sizeof(found), &size, frames));
+        if (frames) (*frames)[fr->nframe] = found;
+        fr->nframe++;
+      } else if (ok && !frames) {
         (void)H5Ldelete(hundred, frame, H5P_DEFAULT);
       }
     }
@@ -458,7 +461,7 @@ static PetscErrorCode index_mesh(SbFrames fr, PetscInt step)
 static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBool *ok)
 {
   SbFrames fr = out->frames;
-  SbFrame *frames;
+  SbFrame *frames = NULL;
   char message[SB_MESSAGE_MAX] = "";
 
   PetscFunctionBeginUser;
@@ -475,10 +478,8 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
   }
 
   /* its frames up to the restart, by step */
-  PetscCall(scan(fr, run->step0, PETSC_FALSE, &fr->nframe, NULL));
-  PetscCall(PetscMalloc1(fr->nframe, &frames));
-  PetscCall(scan(fr, run->step0, PETSC_FALSE, &fr->nframe, frames));
-  qsort(frames, (size_t)fr->nframe, sizeof(*frames), by_step);
+  PetscCall(scan(fr, run->step0, &frames));
+  if (fr->nframe) qsort(frames, (size_t)fr->nframe, sizeof(*frames), by_step);
   if (fr->nframe) fr->last_step = frames[fr->nframe - 1].step;
 
   /* the index first, so that it never lists a frame that is removed */
@@ -495,7 +496,7 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
 
   /* then later frames are removed */
-  PetscCall(scan(fr, run->step0, PETSC_TRUE, &fr->nframe, NULL));
+  PetscCall(scan(fr, run->step0, NULL));
   PetscCall(SbH5Flush(&fr->h5));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

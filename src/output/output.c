@@ -67,32 +67,30 @@ PetscErrorCode SbOutputFile(SbRun run, const char *name, size_t size, char path[
 
 /* ------------------------------------------------------------------ options */
 
+static void add_field(SbOutput out, const SbField *f)
+{
+  for (PetscInt k = 0; k < out->nfield; k++)
+    if (out->field[k] == f) return;
+  out->field[out->nfield++] = f;
+}
+
 /* Fields asked for, those of a static run only where it is one; body always. */
 static PetscErrorCode read_fields(SbOutput out, const SbScope *scope, PetscBool dynamic)
 {
   char(*names)[SB_NAME_MAX];
+  const SbField *f;
   PetscInt n;
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionNames(scope, "output_fields", &n, &names));
   for (PetscInt i = 0; i < n; i++) {
-    const SbField *f;
-    PetscBool twice = PETSC_FALSE;
-
     if (n == 1 && !strcmp(names[i], "none")) break;
     PetscCall(SbFieldFind("-output_fields", names[i], &f));
-    for (PetscInt k = 0; k < out->nfield; k++) twice = (PetscBool)(twice || out->field[k] == f);
-    if (!twice && (dynamic || !f->dynamic)) out->field[out->nfield++] = f;
+    if (dynamic || !f->dynamic) add_field(out, f);
   }
   PetscCall(PetscFree(names));
-  if (out->nfield) {
-    const SbField *body;
-    PetscBool there = PETSC_FALSE;
-
-    PetscCall(SbFieldFind("-output_fields", "body", &body));
-    for (PetscInt k = 0; k < out->nfield; k++) there = (PetscBool)(there || out->field[k] == body);
-    if (!there) out->field[out->nfield++] = body;
-  }
+  PetscCall(SbFieldFind("-output_fields", "body", &f));
+  if (out->nfield) add_field(out, f);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -245,7 +243,7 @@ PetscErrorCode SbOutputSetFromOptions(SbRun run)
   PetscCallMPI(MPI_Comm_rank(out->comm, &out->rank));
   PetscCallMPI(MPI_Comm_size(out->comm, &out->size));
   PetscCall(PetscTime(&out->wall_start));
-  out->cpu_start = SbCpuSeconds();
+  out->cpu_start = SB_CPU_SECONDS;
   (void)strftime(out->started, sizeof(out->started), "%Y-%m-%dT%H:%M:%S%z", localtime_r(&now, &local));
   PetscCall(read_options(out, run->model));
   // A limit on the size of files is met as a failed write, with its message, not as a signal.

@@ -50,6 +50,8 @@ typedef struct {
   char path[PETSC_MAX_PATH_LEN];
 } SbH5;
 
+/* A PetscInt in memory. */
+#define SB_H5_INT (sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32)
 /* Files are opened collectively for MPI-IO; names that exist are truncated by SbH5Create(). */
 PetscErrorCode SbH5Create(MPI_Comm comm, const char *path, SbH5 *h);
 PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH5 *h,
@@ -328,7 +330,7 @@ typedef struct {
   PetscReal memory_max, memory_sum; /* peak resident memory of a rank, of all, bytes */
 } SbPhases;
 /* CPU time of this process since it began, s. */
-PetscReal SbCpuSeconds(void);
+#define SB_CPU_SECONDS ((PetscReal)clock() / CLOCKS_PER_SEC)
 PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *phases); /* collective */
 /* Files of the run with their sizes: calls fn for each one that exists. Rank 0. */
 PetscErrorCode SbOutputFiles(SbOutput out, SbFileFn fn, void *ctx);

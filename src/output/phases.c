@@ -6,14 +6,6 @@
 #include <time.h>
 #include "output_impl.h"
 
-PetscReal SbCpuSeconds(void)
-{
-  struct timespec t;
-
-  (void)clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return (PetscReal)t.tv_sec + 1e-9 * (PetscReal)t.tv_nsec;
-}
-
 PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *p)
 {
   static const char *const names[SB_PHASE_COUNT] = {"mesh",         "set-up",  "residual",       "tangent",
@@ -34,7 +26,7 @@ PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *p)
     p->phase[i].name = names[i];
     p->phase[i].seconds = PetscMax(most[i], 0.);
   }
-  cpu = SbCpuSeconds() - out->cpu_start;
+  cpu = SB_CPU_SECONDS - out->cpu_start;
   PetscCallMPI(MPI_Allreduce(&cpu, &p->cpu, 1, MPIU_REAL, MPI_MAX, out->comm));
   (void)getrusage(RUSAGE_SELF, &usage);
   memory = 1024. * (PetscReal)usage.ru_maxrss;

@@ -136,22 +136,10 @@ static PetscErrorCode within_linear(KSP ksp, PetscInt iteration, PetscReal resid
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Monitors of the run on rank 0, and of its solvers on all: a solver with one computes norms that it does not without. */
-static PetscErrorCode attach(SbRun run, SbOutput out)
+PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
 {
   KSP ksp;
 
-  PetscFunctionBeginUser;
-  if (out->line) PetscCall(SbRunAddMonitor(run, monitor, out->line));
-  if (!run->snes) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SNESGetKSP(run->snes, &ksp));
-  PetscCall(SNESMonitorSet(run->snes, within_newton, run, NULL));
-  PetscCall(KSPMonitorSet(ksp, within_linear, run, NULL));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
-{
   PetscFunctionBeginUser;
   if (!out->progress || out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
   run->want_energies = PETSC_TRUE;
@@ -160,7 +148,13 @@ PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
     out->line->terminal = is_terminal();
     out->line->event = out->event.progress;
   }
-  PetscCall(attach(run, out));
+
+  /* monitors of the run on rank 0, and of its solvers on all: a solver with one computes norms that it does not without */
+  if (out->line) PetscCall(SbRunAddMonitor(run, monitor, out->line));
+  if (!run->snes) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SNESGetKSP(run->snes, &ksp));
+  PetscCall(SNESMonitorSet(run->snes, within_newton, run, NULL));
+  PetscCall(KSPMonitorSet(ksp, within_linear, run, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

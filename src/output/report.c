@@ -191,14 +191,11 @@ PetscErrorCode SbReportRemeshed(SbRun run, const SbRemeshed *event)
 
 static void size_text(PetscReal bytes, size_t size, char text[])
 {
-  if (bytes < 1e3)
-    (void)snprintf(text, size, "%.0f B", (double)bytes);
-  else if (bytes < 1e6)
-    (void)snprintf(text, size, "%.3g kB", (double)bytes / 1e3);
-  else if (bytes < 1e9)
-    (void)snprintf(text, size, "%.3g MB", (double)bytes / 1e6);
-  else
-    (void)snprintf(text, size, "%.3g GB", (double)bytes / 1e9);
+  static const char *const unit[] = {"B", "kB", "MB", "GB"};
+  int k = 0;
+
+  for (; bytes >= 1e3 && k < 3; k++) bytes /= 1e3;
+  SbFormat(size, text, k ? "%.3g %s" : "%.0f %s", (double)bytes, unit[k]);
 }
 
 static PetscErrorCode add_file(const char *name, PetscInt64 bytes, void *ctx)

@@ -85,13 +85,10 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
   PetscCheck(which >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s has no body '%s'", option,
              text, o->path, body->name);
   PetscCall(read_all(o->mesh, "x", H5T_NATIVE_DOUBLE, sizeof(double), 3, &o->npoint, &o->x));
-  PetscCall(read_all(o->mesh, "cells", sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32,
-                     sizeof(PetscInt), 4, &o->ncell, &o->cell));
+  PetscCall(read_all(o->mesh, "cells", SB_H5_INT, sizeof(PetscInt), 4, &o->ncell, &o->cell));
   if (H5Lexists(o->mesh, "cells10", H5P_DEFAULT) > 0)
-    PetscCall(read_all(o->mesh, "cells10", sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32,
-                       sizeof(PetscInt), 10, &n, &o->cell10));
-  PetscCall(read_all(o->mesh, "body", sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32,
-                     sizeof(PetscInt), 1, &n, &cell_body));
+    PetscCall(read_all(o->mesh, "cells10", SB_H5_INT, sizeof(PetscInt), 10, &n, &o->cell10));
+  PetscCall(read_all(o->mesh, "body", SB_H5_INT, sizeof(PetscInt), 1, &n, &cell_body));
   PetscCall(read_all(o->frame, "displacement", H5T_NATIVE_DOUBLE, sizeof(double), 3, &nu, &o->u));
   PetscCall(read_all(o->frame, "velocity", H5T_NATIVE_DOUBLE, sizeof(double), 3, &n, &o->v));
   PetscCheck(o->x && o->cell && o->u && nu == o->npoint, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,

@@ -85,16 +85,13 @@ static PetscErrorCode read_type(const SbScope *scope, const char *key, PetscFunc
 static PetscErrorCode read_start(const SbScope *scope, const char *key, SbFormula formula[3])
 {
   char option[3 * SB_NAME_MAX];
-  PetscBool time, place;
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionFormulas(scope, key, formula));
   PetscCall(SbOptionName(scope, key, sizeof(option), option));
-  for (int k = 0; k < 3; k++) {
-    PetscCall(SbFormulaUses(formula[k], &time, &place));
-    PetscCheck(!time, PETSC_COMM_SELF, PETSC_ERR_USER,
+  for (int k = 0; k < 3; k++)
+    PetscCheck(!SbFormulaUsesTime(formula[k]), PETSC_COMM_SELF, PETSC_ERR_USER,
                "%s: what a body begins with may use the place x, y, z only, not t", option);
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -126,11 +123,8 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
   PetscCall(read_start(&scope, "displacement", model->start[i].displacement));
   PetscCall(read_start(&scope, "velocity", model->start[i].velocity));
   for (int k = 0; k < 3; k++) {
-    PetscBool time, place;
-
     /* numbers are the body's own */
-    PetscCall(SbFormulaUses(model->start[i].velocity[k], &time, &place));
-    if (place) continue;
+    if (SbFormulaUsesPosition(model->start[i].velocity[k])) continue;
     body->velocity[k] = SbFormulaEval(model->start[i].velocity[k], 0., NULL);
     PetscCall(SbFormulaDestroy(&model->start[i].velocity[k]));
   }

@@ -100,12 +100,9 @@ PetscErrorCode SbSceneReadSets(SbModel model)
   }
   PetscCall(PetscFree(names));
   for (PetscInt e = 0; e < model->neffect; e++) {
-    PetscBool has_on;
-
     // the sets that an effect acts on; none when its type has no such option
     PetscCall(SbScopeSet(&scope, "effect", model->effect[e]->type, model->effect[e]->name));
-    PetscCall(SbOptionExists(&scope, "on", &has_on));
-    if (!has_on) continue;
+    if (!SbOptionExists(&scope, "on")) continue;
     PetscCall(SbOptionNames(&scope, "on", &n, &names));
     for (PetscInt i = 0; i < n && model->nset <= SB_SET_MAX; i++) PetscCall(use_name(model, names[i]));
     PetscCall(PetscFree(names));

@@ -73,13 +73,10 @@ PetscErrorCode SbToolHelp(void)
 
 /* ------------------------------------------------------------------ words */
 
-static const SbOption *find_row(const char *key, size_t *index)
+static const SbOption *find_row(const char *key)
 {
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows); i++) {
-    if (strcasecmp(rows[i].key, key)) continue;
-    if (index) *index = i;
-    return &rows[i];
-  }
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows); i++)
+    if (!strcasecmp(rows[i].key, key)) return &rows[i];
   return NULL;
 }
 
@@ -107,7 +104,7 @@ PetscErrorCode SbToolCommandLine(int *argc, char *argv[], SbToolLine *line)
     } else if (!strcasecmp(argv[i], "-version") || !strcasecmp(argv[i], "--version")) {
       line->version = PETSC_TRUE;
     } else if (is_option) {
-      const SbOption *row = find_row(argv[i] + 1, NULL);
+      const SbOption *row = find_row(argv[i] + 1);
 
       // the word behind an option is its value, but for a switch only where it says true or false
       argv[kept++] = argv[i];
@@ -130,12 +127,13 @@ PetscErrorCode SbToolCommandLine(int *argc, char *argv[], SbToolLine *line)
 static PetscErrorCode check_option(const char *name, const char *command)
 {
   const char *list[PETSC_STATIC_ARRAY_LENGTH(rows)];
+  const SbOption *row = find_row(name);
+  const char *reader = row ? readers[row - rows] : "";
   char near[256];
-  size_t index = 0;
 
   PetscFunctionBeginUser;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows); i++) list[i] = rows[i].key;
-  if (!find_row(name, &index)) {
+  if (!row) {
     if (SbHasPrefix(name, "log_ malloc options_ info on_error_ error_ memory fp_trap no_signal_handler "
                           "start_in_debugger skip_petscrc citations"))
       PetscFunctionReturn(PETSC_SUCCESS);
@@ -143,8 +141,8 @@ static PetscErrorCode check_option(const char *name, const char *command)
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "-%s is not an option of supple-mesh%s%s%s", name,
             near[0] ? "; did you mean -" : "; supple-mesh -help lists them", near, near[0] ? "?" : "");
   }
-  PetscCheck(!readers[index][0] || strstr(readers[index], command), PETSC_COMM_SELF, PETSC_ERR_USER,
-             "-%s does nothing in supple-mesh %s; it is for %s", name, command, readers[index]);
+  PetscCheck(!reader[0] || strstr(reader, command), PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-%s does nothing in supple-mesh %s; it is for %s", name, command, reader);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

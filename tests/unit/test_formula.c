@@ -73,7 +73,8 @@ static PetscErrorCode test_uses(void)
   PetscFunctionBeginUser;
   for (int i = 0; i < 4; i++) {
     PetscCall(SbFormulaCreate(PETSC_COMM_WORLD, cases[i].text, "-test", &f));
-    PetscCall(SbFormulaUses(f, &time, &place));
+    time = SbFormulaUsesTime(f);
+    place = SbFormulaUsesPosition(f);
     SB_CHECK(time == cases[i].time && place == cases[i].place, "%s: time %d, place %d", cases[i].text, time,
              place);
     PetscCall(SbFormulaDestroy(&f));
@@ -164,7 +165,8 @@ static PetscErrorCode test_tables(void)
   PetscCall(test_file_close(empty));
 
   PetscCall(table(file, "# t value\n0 1\n\n 1, 3 # here\r\n2\t5\n4;-5", NULL, &f));
-  PetscCall(SbFormulaUses(f, &time, &place));
+  time = SbFormulaUsesTime(f);
+  place = SbFormulaUsesPosition(f);
   SB_CHECK(time && !place, "a table is a function of time");
   SB_CHECK(SbFormulaEval(f, -1, NULL) == 1 && SbFormulaEval(f, 9, NULL) == -5, "constant outside");
   SB_CHECK(SbFormulaEval(f, 1, NULL) == 3 && SbFormulaEval(f, 2, NULL) == 5, "at the rows");

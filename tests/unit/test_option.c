@@ -413,7 +413,6 @@ static PetscErrorCode test_ahead(void)
 {
   static const char *const keys[] = {"scale", "translate", "tags", "pull", "mesh"};
   PetscOptions database;
-  PetscBool exists;
   SbScope linear;
 
   PetscFunctionBeginUser;
@@ -422,13 +421,10 @@ static PetscErrorCode test_ahead(void)
   for (int i = 0; i < 5; i++) PetscCall(SbOptionCheckEarly(&body_scope, keys[i]));
   for (int i = 1; i < 4; i++) PetscCall(SbOptionCheckEarly(&run_scope, run_rows[i].key));
   PetscCall(SbOptionsCheck());
-  PetscCall(SbOptionExists(&body_scope, "young", &exists));
-  SB_CHECK(exists, "young exists");
-  PetscCall(SbOptionExists(&run_scope, "young", &exists));
-  SB_CHECK(!exists, "a run has no young");
+  SB_CHECK(SbOptionExists(&body_scope, "young"), "young exists");
+  SB_CHECK(!SbOptionExists(&run_scope, "young"), "a run has no young");
   PetscCall(SbScopeSet(&linear, "body", "linear", "liver"));
-  PetscCall(SbOptionExists(&linear, "young", &exists));
-  SB_CHECK(!exists, "young belongs to another type");
+  SB_CHECK(!SbOptionExists(&linear, "young"), "young belongs to another type");
   PetscCall(end(&database));
   PetscCall(begin("-body_liver_scale -1", &database));
   SB_CHECK_ERROR(SbOptionCheckEarly(&body_scope, "scale"), PETSC_ERR_USER, "-body_liver_scale -1|(0, inf)");
