@@ -41,6 +41,7 @@ struct _p_SbConstraints {
   /* src/solver: the solves beside K */
   SbSaddle saddle;
   Mat K;                    /* borrowed; NULL before SbConstraintsCreateOperator() */
+  Mat whole;                /* borrowed: K with the part of the tangent that it lacks, or K */
   PetscReal *added;         /* [nnode_owned][3] what K holds beside the tangent, N/m; NULL: nothing */
   PetscInt version, matrix; /* raised when the constraints change, and when K does */
   SbSaddleFactor factored;  /* NULL before the first solve with SB_SADDLE_DIRECT */

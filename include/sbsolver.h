@@ -156,9 +156,10 @@ PetscErrorCode SbPCRotatedGetStats(PC pc, PetscInt *nfactor, PetscInt *nexact, P
    factorisation. nface: nodes of the interface. Outputs may be NULL. Not collective. */
 PetscErrorCode SbPCRotatedGetWork(PC pc, PetscInt64 *interior, PetscInt64 *interface, PetscInt *nface);
 
-/* The operator of solves: K, its springs, projected. singular: K may be so, because only constraints support some body: it is made regular for
-   preconditioners, but for the operator; SB_SADDLE_DIRECT needs none of that. Collective; the caller destroys it; K is borrowed until then. */
-PetscErrorCode SbConstraintsCreateOperator(SbSpace space, Mat K, PetscBool singular, SbSaddle saddle, Mat *A);
+/* The operator of solves: `whole`, which is K or K with what it lacks, its springs, projected. singular: K may be so, because only constraints support some body: it is made regular for
+   preconditioners, but for the operator; SB_SADDLE_DIRECT needs none of that. Collective; the caller destroys it; K and `whole` are borrowed until then. */
+PetscErrorCode SbConstraintsCreateOperator(SbSpace space, Mat K, Mat whole, PetscBool singular,
+                                           SbSaddle saddle, Mat *A);
 
 /* ------------------------------------------------------------------ contact_system.c: a tangent with blocks between any nodes */
 

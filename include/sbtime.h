@@ -72,6 +72,7 @@ struct _p_SbRun {
   SNES snes;       /* of the TS, or own in a static run; borrowed from ts when there is one */
   Mat J, operator; /* tangent; what solves see of it: J itself, its projection (sbfem.h, SbConstraints), or
                      with what it lacks (SbModelNonsymmetric()) */
+  Mat whole;       /* what constraints project beside the matrix: J with what it lacks; NULL without such */
   struct {
     Vec U, x,
       y; /* displacement that J belongs to; what is multiplied, and the result; NULL where J lacks nothing */

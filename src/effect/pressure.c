@@ -18,7 +18,7 @@
     -df_a = -p/2 int_R phi_a dx x w.
 
   Where the rim is free the operator of the linear solver applies it, and the matrix preconditions. Newton's method without it converges
-  linearly, and not at all under a load that turns a body far round. Constraints beside the matrix have no method for both, and go without.
+  linearly, and not at all under a load that turns a body far round.
 
   The facets of CR and DG bodies do not meet at their edges, so that forces facet by facet do not quite add up to
   zero. Where the pressure acts on the whole surface of such a body, it is taken as -p dV/du of the volume inside
@@ -26,8 +26,7 @@
   surface the gaps stay; they close with the mesh. There nothing cancels between facets: with CR the force stands at the facet's own
   node, and N depends on the other three of the cell, so that the derivative has nothing opposite, and its symmetric part is wrong by as much as it is large.
   Newton's method with it stalls near p = mu. The matrix gets none of it; the operator of the linear solver applies it
-  exactly, facet by facet, dN = sum_b w_b x c_b, and the matrix preconditions. With contact the symmetric part stays in the matrix, for want
-  of a method for both.
+  exactly, facet by facet, dN = sum_b w_b x c_b, and the matrix preconditions.
 
   A facet of P2 has six nodes and is curved once it moves. With X, Y its derivatives along two of its barycentric coordinates, and phi_a its basis,
 
@@ -351,7 +350,7 @@ static PetscErrorCode add_quadratic_tangent(SbSpace space, const SbFacet *facet,
 /* Whether it meets no other facet at its edges, and its tangent is applied beside the matrix. */
 static inline PetscBool apart(SbSpace space, const SbFacet *facet)
 {
-  return (PetscBool)(!SbSpaceCellElement(space, facet->cell)->nodes_per[0] && !SbConstraintsSeparate(space));
+  return (PetscBool)!SbSpaceCellElement(space, facet->cell)->nodes_per[0];
 }
 
 static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])

@@ -1,6 +1,6 @@
 /*
   What solves see of constraints that stand beside the matrix K (src/fem/constraint.c): the operator A = P (K + F^T k G) P, and M_A^-1 = P M^-1 P around
-  any preconditioner M.
+  any preconditioner M. Where K lacks a part of the tangent, A has the whole one, and K preconditions.
 
   With SB_SADDLE_DIRECT the part of M is taken by a factorisation of the projected matrix, which is A's inverse in the null space: one
   iteration and what rounding asks for. Where nothing touches, M itself is used.
@@ -32,7 +32,7 @@ static PetscErrorCode multiply(Mat A, Vec x, Vec y)
 
   PetscFunctionBeginUser;
   PetscCall(MatShellGetContext(A, &s));
-  PetscCall(MatMult(s->constraints->K, x, y));
+  PetscCall(MatMult(s->constraints->whole, x, y));
   PetscCall(VecGetArrayRead(x, &from));
   PetscCall(VecGetArray(y, &to));
   SbConstraintsAddTangent(s, from, to);
@@ -42,7 +42,8 @@ static PetscErrorCode multiply(Mat A, Vec x, Vec y)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbConstraintsCreateOperator(SbSpace s, Mat K, PetscBool singular, SbSaddle saddle, Mat *A)
+PetscErrorCode SbConstraintsCreateOperator(SbSpace s, Mat K, Mat whole, PetscBool singular, SbSaddle saddle,
+                                           Mat *A)
 {
   PetscInt m, n, M, N;
 
@@ -51,8 +52,9 @@ PetscErrorCode SbConstraintsCreateOperator(SbSpace s, Mat K, PetscBool singular,
   PetscCall(MatGetSize(K, &M, &N));
   PetscCall(MatCreateShell(s->comm, m, n, M, N, s, A));
   PetscCall(MatShellSetOperation(*A, MATOP_MULT, SB_OPERATION(multiply)));
-  PetscCall(MatSetOption(*A, MAT_SYMMETRIC, (PetscBool)!s->constraints->nonsymmetric));
+  PetscCall(MatSetOption(*A, MAT_SYMMETRIC, (PetscBool)(!s->constraints->nonsymmetric && whole == K)));
   s->constraints->K = K;
+  s->constraints->whole = whole;
   s->constraints->saddle = saddle;
   if (singular && saddle != SB_SADDLE_DIRECT)
     PetscCall(PetscCalloc1(3 * s->nnode_owned, &s->constraints->added));

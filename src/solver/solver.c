@@ -683,7 +683,7 @@ PetscErrorCode SbSolverFinish(SNES snes, SbSpace s, const SbSolverPreset *preset
   PetscCall(SNESGetJacobian(snes, &A, NULL, NULL, NULL));
   PetscCall(is_symmetric(ksp, &symmetric));
   PetscCall(PetscObjectTypeCompareAny((PetscObject)ksp, &single, KSPRICHARDSON, KSPPREONLY, ""));
-  if (A && A != P && !SbConstraintsSeparate(s) && (symmetric || single)) {
+  if (A && A != P && (!SbConstraintsSeparate(s) || s->constraints->whole != P) && (symmetric || single)) {
     PetscCall(KSPSetType(ksp, KSPFGMRES));
     PetscCall(PetscOptionsGetInt(NULL, NULL, "-ksp_gmres_restart", &restart, NULL));
     PetscCall(KSPGMRESSetRestart(ksp, restart));

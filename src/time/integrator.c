@@ -540,14 +540,16 @@ PetscErrorCode SbRunSetUp(SbRun run)
   /* the matrix, and what solves see of it when constraints stand beside it */
   if (!explicit) {
     PetscCall(SbSolverCreateOperator(m->space, run->solver_used, &run->J));
-    if (SbConstraintsSeparate(m->space))
-      PetscCall(SbConstraintsCreateOperator(m->space, run->J, (PetscBool)!m->dynamic, run->saddle_used,
-                                            &run->operator));
-    else if (m->nnonsymmetric)
+    if (m->nnonsymmetric)
       PetscCall(SbFormCreateOperator(run));
     else {
       PetscCall(PetscObjectReference((PetscObject)run->J));
       run->operator= run->J;
+    }
+    if (SbConstraintsSeparate(m->space)) {
+      run->whole = run->operator;
+      PetscCall(SbConstraintsCreateOperator(m->space, run->J, run->whole, (PetscBool)!m->dynamic,
+                                            run->saddle_used, &run->operator));
     }
   }
   PetscCheck(!run->solver_used->matrix_free || !m->ntangent, m->comm, PETSC_ERR_USER,
@@ -638,6 +640,7 @@ PetscErrorCode SbRunDestroy(SbRun *run)
   if (!r->ts) PetscCall(SNESDestroy(&r->snes));
   PetscCall(TSDestroy(&r->ts));
   PetscCall(MatDestroy(&r->operator));
+  PetscCall(MatDestroy(&r->whole));
   PetscCall(MatDestroy(&r->J));
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(vectors); k++) PetscCall(VecDestroy(vectors[k]));
   PetscCall(PetscFree(*run));

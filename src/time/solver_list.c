@@ -135,9 +135,10 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
 
     PetscCall(MatDestroy(&run->J));
     PetscCall(SbSolverCreateOperator(s, next, &run->J));
-    if (SbConstraintsSeparate(s))
+    if (SbConstraintsSeparate(s)) {
       s->constraints->K = run->J;
-    else if (!run->nonsymmetric.U) { /* the nonsymmetric operator multiplies by run->J in any case */
+      if (!run->nonsymmetric.U) s->constraints->whole = run->J;
+    } else if (!run->nonsymmetric.U) { /* the nonsymmetric operator multiplies by run->J in any case */
       PetscCall(MatDestroy(&run->operator));
       PetscCall(PetscObjectReference((PetscObject)run->J));
       run->operator= run->J;

@@ -10,6 +10,8 @@
 #include "time_impl.h"
 
 #define LIMIT 10. /* softening from which on a limit load is likely */
+#define EXCESS \
+  0.5 /* of the strain energy: what it may grow by beyond the work of the forces at the end of the step */
 
 /* What one load step works with. */
 typedef struct {
@@ -55,6 +57,37 @@ static PetscErrorCode predict(void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/*
+  Whether a solution with contact is one that loads do not lead to. Who touches is guessed, and what went far through an obstacle before the guess was
+  right comes back violently crumpled, to another equilibrium. Along a path on which forces grow, strain energy grows by no more than (f_0 + f_1) . du, f_0 and f_1 the
+  internal forces at the ends of the step; linear forces make it half of that.
+*/
+static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
+{
+  const SbModel m = l->run->model;
+  PetscReal psi[2];
+  PetscScalar work[2];
+  Vec forces, way;
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  *is = PETSC_FALSE;
+  if (!m->nbegin_step || m->linear) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicate(l->X, &forces));
+  PetscCall(VecDuplicate(l->X, &way));
+  PetscCall(VecWAXPY(way, -1., l->run->U, l->X));
+  for (int k = 0; k < 2; k++) {
+    PetscCall(SbModelStrainEnergy(m, k ? l->X : l->run->U, forces, &psi[k], &n));
+    PetscCall(VecDot(forces, way, &work[k]));
+  }
+  PetscCall(PetscInfo(l->run->snes, "strain energy %g -> %g J, work of the forces at both ends %g J\n",
+                      (double)psi[0], (double)psi[1], (double)PetscRealPart(work[0] + work[1])));
+  *is = (PetscBool)((1. - EXCESS) * psi[1] > psi[0] + PetscMax(0., PetscRealPart(work[0] + work[1])));
+  PetscCall(VecDestroy(&way));
+  PetscCall(VecDestroy(&forces));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Finds a body that nothing holds; *found, and the run's reason to stop says so. */
 static PetscErrorCode find_free_body(SbRun run, PetscReal factor, PetscBool *found)
 {
@@ -76,15 +109,22 @@ static PetscErrorCode find_free_body(SbRun run, PetscReal factor, PetscBool *fou
 static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedStep *step, PetscBool *ok)
 {
   const LoadStep *l = (LoadStep *)ctx;
-  PetscBool far, found = PETSC_FALSE;
+  PetscBool far, other = PETSC_FALSE, found = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   *step = (SbSolvedStep){.t = l->factor - l->length, .dt = l->length, .U = l->X, .solved = PETSC_TRUE};
   PetscCall(SbRunTooFar(l->run, l->X, &far));
-  *ok = (PetscBool)(reason > 0 && !far);
+  if (reason > 0 && !far) PetscCall(jumped(l, &other));
+  *ok = (PetscBool)(reason > 0 && !far && !other);
+  if (other)
+    PetscCall(SbRunFail(
+      l->run,
+      "load factor %g: contact was found at another equilibrium, with more strain energy than the loads "
+      "have done work; use more -static_steps",
+      (double)l->factor));
 
   /* why the solve failed */
-  if (!*ok && !l->run->stopped) {
+  if (!*ok && !other && !l->run->stopped) {
     char why[512] = "use more -static_steps";
 
     PetscCall(find_free_body(l->run, l->factor, &found));
