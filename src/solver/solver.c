@@ -519,13 +519,15 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
 {
   char method[SB_NAME_MAX], type[SB_NAME_MAX], users[SB_NAME_MAX];
   PetscBool given, symmetric, reproducible;
+  PetscMPIInt size;
   KSP ksp;
   PC pc;
 
   PetscFunctionBeginUser;
   /* multigrid sums its coarse matrices up in the order in which messages arrive */
   PetscCall(SbSolverReproducible(&reproducible));
-  if (reproducible) PetscCall(insert_options("-matptap_via allatonce -matstash_reproduce yes"));
+  PetscCallMPI(MPI_Comm_size(s->comm, &size));
+  if (reproducible && size > 1) PetscCall(insert_options("-matptap_via allatonce -matstash_reproduce yes"));
   PetscCall(SNESGetKSP(snes, &ksp));
   if (s->constraints && s->constraints->general) { /* another solver begins as the first one did */
     PetscCall(KSPSetNormType(ksp, s->constraints->norm));

@@ -64,6 +64,8 @@ repeats() {
 
 repeats 1 bodies.opts
 repeats 1 pressed.opts
+repeats 1 bar.opts -reproducible yes -solver cg_gamg
+repeats 1 bar.opts -reproducible yes -solver pressure -body_a_element cr
 for n in 2 3; do
   repeats $n bodies.opts -reproducible yes
   repeats $n bodies.opts -reproducible yes -solver direct
