@@ -135,9 +135,9 @@ void SbSpaceAddInertia(SbSpace space, const SbStage *stage, PetscReal f[]);
 /*
   SbSpaceFollowJumps - makes the penalty of jumps of CR and DG as stiff as the state asks for (src/fem/jump.c).
 
-  Collective. Input: U, m. Output: changed: by a percent or more, somewhere. Until the next call the face terms are constant; at first they are those of the rest state.
+  Collective. Input: U, m; keep: nowhere less stiff than it was. Output: changed: by a percent or more, somewhere. Until the next call the face terms are constant; at first they are those of the rest state.
 */
-PetscErrorCode SbSpaceFollowJumps(SbSpace space, Vec U, PetscBool *changed);
+PetscErrorCode SbSpaceFollowJumps(SbSpace space, Vec U, PetscBool keep, PetscBool *changed);
 
 typedef enum { SB_MATRIX_AIJ, SB_MATRIX_BAIJ, SB_MATRIX_SBAIJ } SbMatrixKind; /* SBAIJ: one rank only */
 /* Preallocated matrix and the assembly plan. Collective. Caller destroys the matrix. */

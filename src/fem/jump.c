@@ -24,7 +24,8 @@
 
     kappa1 = gamma1 H(2 m |F| / V),   m = max(mu, FOLLOW max_ij -(P_i + P_j) / (s_i + s_j)),
 
-  with the state before the step, so that within a step the terms are constant, and their energy a quadratic one. A dependence on the state of the
+  with the state before the step, so that within a step the terms are constant, and their energy a quadratic one. In dynamic runs m never falls: a penalty that goes up and
+  down with the waves of pressure is a pump, which blew up what Newmark computes of a cube pressed to a fifth of its height. A dependence on the state of the
   step itself would have to be differentiated: the energy of jumps would become a pressure of its own, lambda times as large as it should be.
 
   A boundary face with a support (layout.c): the other side is constant, the displacement of the support, and infinitely
@@ -196,15 +197,15 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The modulus m of each cell of a batch, from its state. */
-static void follow_batch(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[])
+/* The modulus m of each cell of a batch, from its state; keep: not less than it was. */
+static void follow_batch(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[], PetscBool keep)
 {
   const SbMaterial m = region->material;
   const PetscReal mu = m->ops.shear_modulus(m);
   PetscReal *modulus = s->jump->modulus + s->batch_cell[b], largest = 0.;
   SbPack u[12], F[9], P[9], R[9], S[6], stretch[3], V[9];
 
-  for (PetscInt l = 0; l < s->batch_n[b]; l++) modulus[l] = mu;
+  for (PetscInt l = 0; l < s->batch_n[b]; l++) modulus[l] = keep ? PetscMax(mu, modulus[l]) : mu;
   sb_gather_strain(s, region, b, x, u);
   SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, F);
   m->ops.stress(m, (const SbPack *)F, P);
@@ -248,7 +249,7 @@ static void follow_batch(SbSpace s, const SbRegion *region, PetscInt b, const Pe
   }
 }
 
-void SbJumpFollow(SbSpace s, const PetscReal x[], PetscBool *any, PetscBool *changed)
+void SbJumpFollow(SbSpace s, const PetscReal x[], PetscBool keep, PetscBool *any, PetscBool *changed)
 {
   const SbJump j = s->jump;
 
@@ -258,7 +259,7 @@ void SbJumpFollow(SbSpace s, const PetscReal x[], PetscBool *any, PetscBool *cha
 
     for (PetscInt b = region->bstart; !region->material->linear && !region->quadratic && b < region->bend;
          b++)
-      follow_batch(s, region, b, x);
+      follow_batch(s, region, b, x, keep);
   }
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {

@@ -212,7 +212,7 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, PetscBool *changed)
+PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, PetscBool keep, PetscBool *changed)
 {
   const PetscReal *x;
   PetscBool any;
@@ -221,7 +221,7 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, PetscBool *changed)
   *changed = PETSC_FALSE;
   if (!s->jump || s->linear) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbSpaceGetLocalRead(s, U, &x));
-  SbJumpFollow(s, x, &any, changed);
+  SbJumpFollow(s, x, keep, &any, changed);
   PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, changed, 1, MPIU_BOOL, MPI_LOR, s->comm));
   if (s->plan && any) sum_face_terms(s, s->plan);

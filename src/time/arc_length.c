@@ -226,7 +226,7 @@ static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
   PetscBool changed;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceFollowJumps(run->model->space, run->U, &changed));
+  PetscCall(SbSpaceFollowJumps(run->model->space, run->U, PETSC_FALSE, &changed));
   PetscCall(residual(p, &norm));
   PetscCall(tangent(p, ok));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);

@@ -12,7 +12,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   PetscBool again = PETSC_TRUE, changed;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceFollowJumps(run->model->space, a->U0, &changed));
+  PetscCall(SbSpaceFollowJumps(run->model->space, a->U0, run->model->dynamic, &changed));
   run->goes_on = PETSC_FALSE;
   for (int solves = 0; again; solves++) {
     SbSolvedStep step;
@@ -36,7 +36,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 
     /* jumps of CR and DG are penalised as the state at the start asks for: of a load step, which may be long, once more as its end does */
     if (*ok && !run->model->dynamic && !run->goes_on) {
-      PetscCall(SbSpaceFollowJumps(run->model->space, a->U, &run->goes_on));
+      PetscCall(SbSpaceFollowJumps(run->model->space, a->U, PETSC_FALSE, &run->goes_on));
       if (run->goes_on) continue;
     }
     run->goes_on = PETSC_FALSE;
@@ -67,7 +67,7 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
   SbStep now = {.step = step, .t = t, .dt = dt, .t_end = run->t_end, .U = run->U, .V = run->V, .A = run->A};
 
   PetscFunctionBeginUser;
-  if (first && run->snes) PetscCall(SbSpaceFollowJumps(m->space, run->U, &changed));
+  if (first && run->snes) PetscCall(SbSpaceFollowJumps(m->space, run->U, m->dynamic, &changed));
 
   /* a step that was seen already: there was no other after it */
   if (run->seen.U && run->seen.step == step) {
