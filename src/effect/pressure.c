@@ -174,7 +174,8 @@ static PetscErrorCode find_rim(Pressure *p, SbSpace space)
                      b = SbSpaceCellNode(space, facet->cell, facet->corner[(c + 1) % 3]);
       const PetscInt record[5] = {PetscMin(a, b), PetscMax(a, b), a < b ? 1 : -1, k, c};
 
-      PetscCall(PetscArraycpy(edge[n++], record, 5));
+      PetscCall(PetscArraycpy(edge[n], record, 5));
+      n++;
     }
   }
   qsort(edge, (size_t)n, sizeof(*edge), compare_edges);

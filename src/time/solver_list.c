@@ -135,13 +135,17 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
 
     PetscCall(MatDestroy(&run->J));
     PetscCall(SbSolverCreateOperator(s, next, &run->J));
+    /* the nonsymmetric operator multiplies by run->J in any case */
+    if (!run->nonsymmetric.U) {
+      Mat *whole = SbConstraintsSeparate(s) ? &run->whole : &run->operator;
+
+      PetscCall(MatDestroy(whole));
+      PetscCall(PetscObjectReference((PetscObject)run->J));
+      *whole = run->J;
+    }
     if (SbConstraintsSeparate(s)) {
       s->constraints->K = run->J;
-      if (!run->nonsymmetric.U) s->constraints->whole = run->J;
-    } else if (!run->nonsymmetric.U) { /* the nonsymmetric operator multiplies by run->J in any case */
-      PetscCall(MatDestroy(&run->operator));
-      PetscCall(PetscObjectReference((PetscObject)run->J));
-      run->operator= run->J;
+      s->constraints->whole = run->whole;
     }
     PetscCall(SNESSetJacobian(run->snes, run->operator, run->J, NULL, NULL));
   }
