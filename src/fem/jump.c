@@ -24,8 +24,8 @@
 
     kappa1 = gamma1 H(2 m |F| / V),   m = max(mu, FOLLOW max_ij -(P_i + P_j) / (s_i + s_j)),
 
-  with the state before the step, so that within a step the terms are constant, and their energy a quadratic one. In dynamic runs m never falls: a penalty that goes up and
-  down with the waves of pressure is a pump, which blew up what Newmark computes of a cube pressed to a fifth of its height. A dependence on the state of the
+  with the state before the step, so that within a step the terms are constant, and their energy a quadratic one. With Newmark, which damps
+  nothing, m never falls: a penalty that goes up and down with the waves of pressure is a pump, which blew up a cube pressed to a fifth of its height. A dependence on the state of the
   step itself would have to be differentiated: the energy of jumps would become a pressure of its own, lambda times as large as it should be.
 
   A boundary face with a support (layout.c): the other side is constant, the displacement of the support, and infinitely

@@ -9,11 +9,12 @@
 PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 {
   SNESConvergedReason reason;
+  const PetscBool keep = (PetscBool)(run->preset == SB_TIME_NEWMARK);
   PetscBool again = PETSC_TRUE, changed;
 
   PetscFunctionBeginUser;
-  /* explicit integrators have no matrix, and a step that is stable for the penalty of the rest state */
-  if (run->J) PetscCall(SbSpaceFollowJumps(run->model->space, a->U0, run->model->dynamic, &changed));
+  /* explicit integrators have no matrix, and a step that is stable for the penalty of the rest state; without damping it never falls (src/fem/jump.c) */
+  if (run->J) PetscCall(SbSpaceFollowJumps(run->model->space, a->U0, keep, &changed));
   run->goes_on = PETSC_FALSE;
   for (int solves = 0; again; solves++) {
     SbSolvedStep step;
@@ -68,7 +69,7 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
   SbStep now = {.step = step, .t = t, .dt = dt, .t_end = run->t_end, .U = run->U, .V = run->V, .A = run->A};
 
   PetscFunctionBeginUser;
-  if (first && run->J) PetscCall(SbSpaceFollowJumps(m->space, run->U, m->dynamic, &changed));
+  if (first && run->J) PetscCall(SbSpaceFollowJumps(m->space, run->U, PETSC_FALSE, &changed));
 
   /* a step that was seen already: there was no other after it */
   if (run->seen.U && run->seen.step == step) {
