@@ -135,7 +135,7 @@ void SbSpaceAddInertia(SbSpace space, const SbStage *stage, PetscReal f[]);
 /*
   SbSpaceFollowJumps - makes the penalty of jumps of CR and DG as stiff as the state asks for (src/fem/jump.c).
 
-  Collective. Input: U, m; keep: nowhere less stiff than it was. Output: changed: by a percent or more, somewhere. Until the next call the face terms are constant; at first they are those of the rest state.
+  Collective. Input: U, m; keep: nowhere less stiff than it was. Output: changed (or NULL): by a percent or more, somewhere. Until the next call the face terms are constant; at first they are those of the rest state.
 */
 PetscErrorCode SbSpaceFollowJumps(SbSpace space, Vec U, PetscBool keep, PetscBool *changed);
 

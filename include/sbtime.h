@@ -162,7 +162,7 @@ struct _p_SbRun {
   PetscErrorCode (*cell_error)(SbRun run, const SbStep *step, PetscReal values[]);
   PetscBool want_energies, want_residual;
   SbEnergies energies;    /* running totals of work and dissipation */
-  PetscReal energy_most;  /* the largest kinetic + strain so far, J */
+  PetscReal energy_most;  /* the largest kinetic + strain so far (kept over restarts), J */
   PetscBool gain_said;    /* that the integrator is unstable */
   PetscReal energy_start; /* kinetic + strain at the start of the run (kept over restarts), J */
   PetscInt step0;         /* first step and time when restarted */

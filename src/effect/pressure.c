@@ -38,13 +38,14 @@
   is no tangent.
 */
 #include "effect_impl.h"
+#include "sbgeometry.h"
 
 #define STRAIGHT 1e-9 /* relative: components of an edge below which it has none, as in a plane of symmetry */
 
-/* Where the surface under pressure ends, and its nodes are free to move. */
+/* Where the surface under pressure ends, and its nodes are free to move: from, to, and between them (-1: none, it is straight). The
+   surface lies to the left, seen from outside. */
 typedef struct {
-  PetscInt node
-    [3]; /* from, to, between them (-1: none, it is straight); the surface lies to the left, seen from outside */
+  PetscInt node[3];
 } RimEdge;
 
 typedef struct {
@@ -122,6 +123,20 @@ static void facet_nodes(const SbFacet *facet, int node[6])
   }
 }
 
+/* Side c of a facet of P1 or P2. */
+static RimEdge side_of(SbSpace space, const SbFacet *facet, PetscInt c)
+{
+  RimEdge e = {{SbSpaceCellNode(space, facet->cell, facet->corner[c]),
+                SbSpaceCellNode(space, facet->cell, facet->corner[(c + 1) % 3]), -1}};
+  int node[6];
+
+  if (quadratic(space, facet)) {
+    facet_nodes(facet, node);
+    e.node[2] = SbSpaceCellNode(space, facet->cell, node[3 + c]);
+  }
+  return e;
+}
+
 /* Whether the tangent has a part along the edge that supports leave. */
 static PetscBool is_free(SbSpace space, const RimEdge *edge)
 {
@@ -147,62 +162,42 @@ static PetscBool is_free(SbSpace space, const RimEdge *edge)
   return PETSC_FALSE;
 }
 
-static int compare_edges(const void *one, const void *other)
-{
-  const PetscInt *a = (const PetscInt *)one, *b = (const PetscInt *)other;
-
-  for (int k = 0; k < 2; k++) {
-    if (a[k] != b[k]) return a[k] < b[k] ? -1 : 1;
-  }
-  return 0;
-}
-
 /* The free rim of the facets of P1 and P2: edges that facets go along one way more often than the other. */
 static PetscErrorCode find_rim(Pressure *p, SbSpace space)
 {
-  PetscInt(*edge)[5]; /* lower node, higher node, 1 or -1: from lower to higher or back; facet, side */
-  PetscInt n = 0, ways;
+  PetscInt n = 0;
+  SbKey *edge; /* slot 3 facet + side */
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(3 * p->nfacet, &edge));
-  for (PetscInt k = 0; k < p->nfacet; k++) {
-    const SbFacet *facet = &p->facet[k];
+  for (PetscInt i = 0; i < 3 * p->nfacet; i++) {
+    RimEdge e;
 
-    if (!SbSpaceCellElement(space, facet->cell)->nodes_per[0]) continue;
-    for (PetscInt c = 0; c < 3; c++) {
-      const PetscInt a = SbSpaceCellNode(space, facet->cell, facet->corner[c]),
-                     b = SbSpaceCellNode(space, facet->cell, facet->corner[(c + 1) % 3]);
-      const PetscInt record[5] = {PetscMin(a, b), PetscMax(a, b), a < b ? 1 : -1, k, c};
-
-      PetscCall(PetscArraycpy(edge[n], record, 5));
-      n++;
-    }
+    if (!SbSpaceCellElement(space, p->facet[i / 3].cell)->nodes_per[0]) continue;
+    e = side_of(space, &p->facet[i / 3], i % 3);
+    edge[n++] = (SbKey){SbKeyOfPair(e.node[0], e.node[1]), i};
   }
-  qsort(edge, (size_t)n, sizeof(*edge), compare_edges);
+  SbKeysSort(n, edge);
   PetscCall(PetscMalloc1(n, &p->rim));
-  for (PetscInt first = 0, last; first < n; first = last) {
-    const SbFacet *facet = &p->facet[edge[first][3]];
-    RimEdge rim = {{edge[first][0], edge[first][1], -1}};
-    PetscBool owned;
+  for (PetscInt i = 0, m; i < n; i += m) {
+    PetscInt ways[2] = {0, 0}; /* from the lower node to the higher one, and back */
+    RimEdge e[2] = {{{0}}};
+    PetscBool owned = PETSC_FALSE;
 
-    for (ways = 0, last = first; last < n && !compare_edges(edge[first], edge[last]); last++)
-      ways += edge[last][2];
-    if (!ways) continue;
-    if (ways < 0) {
-      rim.node[0] = edge[first][1];
-      rim.node[1] = edge[first][0];
-    }
-    if (quadratic(space, facet)) {
-      int node[6];
+    m = SbKeysAlike(n, edge, i);
+    for (PetscInt k = i; k < i + m; k++) {
+      const RimEdge side = side_of(space, &p->facet[edge[k].slot / 3], edge[k].slot % 3);
+      const int back = side.node[0] > side.node[1];
 
-      facet_nodes(facet, node);
-      rim.node[2] = SbSpaceCellNode(space, facet->cell, node[3 + edge[first][4]]);
+      e[back] = side;
+      ways[back]++;
     }
+    if (ways[0] == ways[1]) continue;
     /* all facets of an edge with an owned node are here */
-    owned = PETSC_FALSE;
+    e[0] = e[ways[1] > ways[0]];
     for (int a = 0; a < 3; a++)
-      owned = (PetscBool)(owned || (rim.node[a] >= 0 && rim.node[a] < space->nnode_owned));
-    if (owned && is_free(space, &rim)) p->rim[p->nedge++] = rim;
+      owned = (PetscBool)(owned || (e[0].node[a] >= 0 && e[0].node[a] < space->nnode_owned));
+    if (owned && is_free(space, &e[0])) p->rim[p->nedge++] = e[0];
   }
   PetscCall(PetscFree(edge));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -19,7 +19,7 @@ void SbJumpAdd(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscRea
 PetscReal SbJumpEnergy(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal body[]);
 /* node[nbatch][8][SB_BATCH] of the faces, borrowed; returns nbatch. */
 PetscInt SbJumpCliques(SbSpace space, const PetscInt **node);
-/* The penalty of jumps as the state asks for, or, keep, as any before; any: something changed, changed: by a percent or more, on this rank. */
+/* The penalty of jumps as the state asks for, or, keep, as any before; any: a cell asks for another one than before, changed: that of a face is another by a percent or more, on this rank. */
 void SbJumpFollow(SbSpace space, const PetscReal x[], PetscBool keep, PetscBool *any, PetscBool *changed);
 /* The matrix of the face in lane l of batch b, times the 3x3 identity; zero in padding. */
 void SbJumpMatrix(SbSpace space, PetscInt b, PetscInt l, PetscReal K[8][8]);

@@ -197,30 +197,13 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The modulus m of each cell of a batch, from its state; keep: not less than it was. */
-static void follow_batch(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[], PetscBool keep)
+/* Raises the moduli of n cells to what twists ask for at F, under the first Piola stress P. */
+static void follow_twists(PetscInt n, const SbPack F[9], const SbPack P[9], PetscReal modulus[])
 {
-  const SbMaterial m = region->material;
-  const PetscReal mu = m->ops.shear_modulus(m);
-  PetscReal *modulus = s->jump->modulus + s->batch_cell[b], largest = 0.;
-  SbPack u[12], F[9], P[9], R[9], S[6], stretch[3], V[9];
+  SbPack R[9], S[6], stretch[3], V[9];
 
-  for (PetscInt l = 0; l < s->batch_n[b]; l++) modulus[l] = keep ? PetscMax(mu, modulus[l]) : mu;
-  sb_gather_strain(s, region, b, x, u);
-  SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, F);
-  m->ops.stress(m, (const SbPack *)F, P);
-
-  /* principal values are below sqrt(2) |P| in pairs: mostly that is all there is to know */
-  for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-    PetscReal square = 0.;
-
-    for (int k = 0; k < 9; k++) square += P[k][l] * P[k][l];
-    largest = PetscMax(largest, square);
-  }
-  if (largest < 0.5 * PetscSqr(mu / FOLLOW)) return;
-
-  /* F = R V diag(stretch) V^T, and the twists' stiffnesses */
-  SbPolar((const SbPack *)F, R);
+  /* F = R V diag(stretch) V^T */
+  SbPolar(F, R);
   for (int k = 0; k < 6; k++) {
     static const int row[6] = {0, 0, 0, 1, 1, 2}, column[6] = {0, 1, 2, 1, 2, 2};
 
@@ -230,7 +213,9 @@ static void follow_batch(SbSpace s, const SbRegion *region, PetscInt b, const Pe
     }
   }
   SbSymEig((const SbPack *)S, stretch, V);
-  for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+
+  /* principal values of the stress in these axes, and the stiffness against twists */
+  for (PetscInt l = 0; l < n; l++) {
     PetscReal principal[3] = {0.};
 
     for (int k = 0; k < 27; k++) {
@@ -249,6 +234,37 @@ static void follow_batch(SbSpace s, const SbRegion *region, PetscInt b, const Pe
   }
 }
 
+/* The modulus m of each cell of a batch, from its state; keep: not less than it was. Whether one is another than before. */
+static PetscBool follow_batch(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[],
+                              PetscBool keep)
+{
+  const SbMaterial m = region->material;
+  const PetscReal mu = m->ops.shear_modulus(m);
+  const PetscInt n = s->batch_n[b];
+  PetscReal *modulus = s->jump->modulus + s->batch_cell[b], before[SB_BATCH], largest = 0.;
+  PetscBool changed = PETSC_FALSE;
+  SbPack u[12], F[9], P[9];
+
+  for (PetscInt l = 0; l < n; l++) {
+    before[l] = modulus[l];
+    if (!keep) modulus[l] = mu;
+  }
+  sb_gather_strain(s, region, b, x, u);
+  SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, F);
+  m->ops.stress(m, (const SbPack *)F, P);
+
+  /* principal values are below sqrt(2) |P| in pairs: mostly that is all there is to know */
+  for (PetscInt l = 0; l < n; l++) {
+    PetscReal square = 0.;
+
+    for (int k = 0; k < 9; k++) square += P[k][l] * P[k][l];
+    largest = PetscMax(largest, square);
+  }
+  if (largest >= 0.5 * PetscSqr(mu / FOLLOW)) follow_twists(n, (const SbPack *)F, (const SbPack *)P, modulus);
+  for (PetscInt l = 0; l < n; l++) changed = (PetscBool)(changed || modulus[l] != before[l]);
+  return changed;
+}
+
 void SbJumpFollow(SbSpace s, const PetscReal x[], PetscBool keep, PetscBool *any, PetscBool *changed)
 {
   const SbJump j = s->jump;
@@ -256,17 +272,17 @@ void SbJumpFollow(SbSpace s, const PetscReal x[], PetscBool keep, PetscBool *any
   *any = *changed = PETSC_FALSE;
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
+    const PetscBool jumps = (PetscBool)(!region->element->nodes_per[0] && !region->material->linear);
 
-    for (PetscInt b = region->bstart; !region->material->linear && !region->quadratic && b < region->bend;
-         b++)
-      follow_batch(s, region, b, x, keep);
+    for (PetscInt b = region->bstart; jumps && b < region->bend; b++) {
+      if (follow_batch(s, region, b, x, keep)) *any = PETSC_TRUE;
+    }
   }
-  for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
+  for (PetscInt b = 0, i = 0; *any && b < j->nbatch; b++) {
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
       const PetscReal before = j->c1[b][l];
 
       face_factors(s, j, &j->face[i], &j->c0[b][l], &j->c1[b][l]);
-      *any = (PetscBool)(*any || j->c1[b][l] != before);
       if (PetscAbsReal(j->c1[b][l] - before) > RENEWED * before) *changed = PETSC_TRUE;
     }
   }

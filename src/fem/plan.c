@@ -215,15 +215,15 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
 PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, PetscBool keep, PetscBool *changed)
 {
   const PetscReal *x;
-  PetscBool any;
+  PetscBool any, mine;
 
   PetscFunctionBeginUser;
-  *changed = PETSC_FALSE;
+  if (changed) *changed = PETSC_FALSE;
   if (!s->jump || s->linear) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbSpaceGetLocalRead(s, U, &x));
-  SbJumpFollow(s, x, keep, &any, changed);
+  SbJumpFollow(s, x, keep, &any, &mine);
   PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, changed, 1, MPIU_BOOL, MPI_LOR, s->comm));
+  if (changed) PetscCallMPI(MPI_Allreduce(&mine, changed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
   if (s->plan && any) sum_face_terms(s, s->plan);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

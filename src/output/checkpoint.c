@@ -43,7 +43,7 @@ typedef struct {
   PetscBool optional;
 } Number;
 
-#define NNUMBER 14
+#define NNUMBER 15
 static void numbers_of(SbRun run, Times *times, Number number[NNUMBER])
 {
   SbEnergies *e = &run->energies;
@@ -61,6 +61,7 @@ static void numbers_of(SbRun run, Times *times, Number number[NNUMBER])
     {"remesh_loss", &e->remesh_loss, PETSC_TRUE},
     {"remesh_mass", &e->remesh_mass, PETSC_TRUE},
     {"remesh_momentum", &e->remesh_momentum, PETSC_TRUE},
+    {"energy_most", &run->energy_most, PETSC_TRUE},
     {"paused_after", &times->paused, PETSC_TRUE},
   };
 

@@ -223,10 +223,9 @@ static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
   const SbRun run = p->run;
   PetscInt negative;
   PetscReal norm, along;
-  PetscBool changed;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceFollowJumps(run->model->space, run->U, PETSC_FALSE, &changed));
+  PetscCall(SbSpaceFollowJumps(run->model->space, run->U, PETSC_FALSE, NULL));
   PetscCall(residual(p, &norm));
   PetscCall(tangent(p, ok));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);

@@ -443,21 +443,6 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The prescribed part of X - start, 0 elsewhere. */
-static PetscErrorCode prescribed_way(SbSpace s, Vec X, Vec start, Vec D)
-{
-  PetscScalar *d;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecWAXPY(D, -1., start, X));
-  PetscCall(VecGetArray(D, &d));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
-    if (!(s->fixed[i / 3] & (1 << (i % 3)))) d[i] = 0.;
-  }
-  PetscCall(VecRestoreArray(D, &d));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /*
   Guarded contact: from the start of the step to a first X at which all that moves by order, prescribed unknowns and obstacles, is where it belongs.
 
@@ -484,7 +469,9 @@ static PetscErrorCode approach(SNES snes)
     if (!nactive) PetscFunctionReturn(PETSC_SUCCESS);
     PetscCall(SbModelPotentialAdvance(m, 0.));
   }
-  PetscCall(prescribed_way(m->space, X, start, D));
+  /* D is the way of what is prescribed */
+  PetscCall(VecWAXPY(D, -1., start, X));
+  PetscCall(SbSpaceZeroPrescribed(m->space, PETSC_FALSE, D));
   PetscCall(VecCopy(start, X));
   for (int round = 0; round < APPROACHES; round++) {
     PetscBool filtered = PETSC_FALSE;

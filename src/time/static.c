@@ -11,7 +11,7 @@
 
 #define LIMIT 10. /* softening from which on a limit load is likely */
 #define EXCESS \
-  0.5 /* of the strain energy: what it may grow by beyond the work of the forces at the end of the step */
+  0.5 /* of the strain energy at the end of a step: what may be there beyond the work of the forces */
 
 /* What one load step works with. */
 typedef struct {

@@ -10,11 +10,11 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 {
   SNESConvergedReason reason;
   const PetscBool keep = (PetscBool)(run->preset == SB_TIME_NEWMARK);
-  PetscBool again = PETSC_TRUE, changed;
+  PetscBool again = PETSC_TRUE;
 
   PetscFunctionBeginUser;
   /* explicit integrators have no matrix, and a step that is stable for the penalty of the rest state; without damping it never falls (src/fem/jump.c) */
-  if (run->J) PetscCall(SbSpaceFollowJumps(run->model->space, a->U0, keep, &changed));
+  if (run->J) PetscCall(SbSpaceFollowJumps(run->model->space, a->U0, keep, NULL));
   run->goes_on = PETSC_FALSE;
   for (int solves = 0; again; solves++) {
     SbSolvedStep step;
@@ -62,14 +62,13 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt, PetscBool last)
 {
   const PetscBool first = (PetscBool)(step == run->step0);
-  PetscBool changed;
   const PetscReal begun = MPI_Wtime();
   const SbModel m = run->model;
   SbStage stage = {.t = t, .dt = dt, .step = step, .shift_k = 1.};
   SbStep now = {.step = step, .t = t, .dt = dt, .t_end = run->t_end, .U = run->U, .V = run->V, .A = run->A};
 
   PetscFunctionBeginUser;
-  if (first && run->J) PetscCall(SbSpaceFollowJumps(m->space, run->U, PETSC_FALSE, &changed));
+  if (first && run->J) PetscCall(SbSpaceFollowJumps(m->space, run->U, PETSC_FALSE, NULL));
 
   /* a step that was seen already: there was no other after it */
   if (run->seen.U && run->seen.step == step) {

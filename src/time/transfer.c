@@ -43,6 +43,8 @@ PetscErrorCode SbRunTransferState(SbRun from, SbRun to)
   to->model->load = to->model->dynamic ? 1. : from->t_now; /* an attempt that failed has left its own */
   to->energies = from->energies;
   to->energy_start = from->energy_start;
+  to->energy_most = from->energy_most;
+  to->gain_said = from->gain_said;
   to->newton_total = to->newton_before = from->newton_total;
   to->linear_total = to->linear_before = from->linear_total;
   to->rejected_total = from->rejected_total;

@@ -62,10 +62,10 @@ static PetscErrorCode check_follower_end(const char *element)
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  follower %g E, %s: %.9g in %d steps, %d iterations\n    %s\n",
                         (double)load, element, (double)t.run->t_now, (int)t.run->steps_total,
                         (int)t.run->newton_total, t.run->stop_reason));
-  SB_CHECK(t.run->t_now > reached * (1. - 1e-2) && t.run->t_now < reached * (1. + 2e-2), "%s: load factor %g",
-           element, (double)t.run->t_now);
-  SB_CHECK(strstr(t.run->stop_reason, "a limit load is likely"), "%s: %s", element, t.run->stop_reason);
-  SB_CHECK(t.run->newton_total < 2500, "%s: %d iterations", element, (int)t.run->newton_total);
+  /* P1 and CR end below the limit by the least increment, P2 0.3 % beyond it, where the cube is no longer strained evenly; twice the iterations of the slowest */
+  SB_CHECK_NEAR(t.run->t_now, reached, 5e-3, "load factor");
+  SB_CHECK(t.run->softening > 10., "%s: softening %g", element, (double)t.run->softening);
+  SB_CHECK(t.run->newton_total < 550, "%s: %d iterations", element, (int)t.run->newton_total);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
