@@ -143,12 +143,11 @@ struct _p_SbImport {
   SbCount nmiddle;
   SbMiddle *
     middle; /* [nmiddle] edges of 10-node tets, for each tet; once read those that are off the middle, each once, ascending */
-  PetscInt nedge_node;    /* vertices that are the node of an edge and no corner of a tet */
-  PetscBool second_order; /* the reader gives the nodes at edges of 10-node tets: these are read */
-  PetscBool surface;      /* given: all triangles are wanted, and tets need not be there */
-  SbTetOptions tet;       /* given: how a surface becomes tets */
-  PetscReal scale;        /* given: factor that placing will use; a reader that has scaled sets it to 1 */
-  char note[512];         /* what the reader repaired, for SbBody.note */
+  PetscInt nedge_node; /* vertices that are the node of an edge and no corner of a tet */
+  PetscBool surface;   /* given: all triangles are wanted, and tets need not be there */
+  SbTetOptions tet;    /* given: how a surface becomes tets */
+  PetscReal scale;     /* given: factor that placing will use; a reader that has scaled sets it to 1 */
+  char note[512];      /* what the reader repaired, for SbBody.note */
   PetscInt step; /* given: step of a run's output whose positions are wanted; 0 at rest, -1 the last one */
   SbMeshProgress progress; /* given: called with how far a long read is; may be NULL */
   void *progress_ctx;

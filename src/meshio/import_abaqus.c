@@ -327,7 +327,6 @@ PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
   SbDeck *d = &a.deck;
 
   PetscFunctionBeginUser;
-  im->second_order = PETSC_TRUE;
   PetscCall(SbScanOpen(im->where, path, s));
   while (next_line(&a)) {
     const char *line = s->at;

@@ -384,7 +384,6 @@ PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
   char name[64];
 
   PetscFunctionBeginUser;
-  im->second_order = PETSC_TRUE;
   PetscCall(SbScanOpen(im->where, path, &im->scan));
   // version 1 begins with its nodes
   PetscCall(SbScanWord(s, sizeof(name), name));

@@ -129,12 +129,12 @@ PetscErrorCode SbImportAddElement(SbImport *im, int type, const PetscInt vert[],
 {
   PetscFunctionBeginUser;
   im->count[type]++;
-  if (type == SB_GMSH_TET10 && im->second_order) {
+  if (type == SB_GMSH_TET10) {
     PetscCall(SbImportAddMiddles(im, vert));
     PetscCall(SbImportAddItem(im, 3, vert, tags, number));
   }
-  if (im->second_order && type == SB_GMSH_LINE3) type = SB_GMSH_LINE;
-  if (im->second_order && type == SB_GMSH_TRIANGLE6 && !im->surface) type = SB_GMSH_TRIANGLE;
+  if (type == SB_GMSH_LINE3) type = SB_GMSH_LINE;
+  if (type == SB_GMSH_TRIANGLE6 && !im->surface) type = SB_GMSH_TRIANGLE;
   if (type == SB_GMSH_TET || (type == SB_GMSH_TRIANGLE && im->surface) ||
       (tags && (type == SB_GMSH_POINT || type == SB_GMSH_LINE || type == SB_GMSH_TRIANGLE)))
     PetscCall(SbImportAddItem(im, SbGmshTypes[type].dim, vert, tags, number));

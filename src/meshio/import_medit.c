@@ -4,7 +4,7 @@
 
   Keywords, each with a count and that many lines of numbers, the last of which is a reference: N gives volume_N, surface_N or
   curve_N, and 0 none but for tets. A # begins a comment. Keywords of no concern (Corners, Ridges, Normals, Required...) are passed over, with
-  their numbers. Refused: binary files (.meshb), elements other than 4-node tets in the volume.
+  their numbers. Refused: binary files (.meshb), elements other than tets of 4 or 10 nodes in the volume.
 */
 #include <ctype.h>
 #include "meshio_impl.h"
@@ -22,17 +22,19 @@ static const struct {
   {"Hexaedra", 5},
   {"Prisms", 6},
   {"Pyramids", 7},
-  {"TetrahedraP2", 11},
-  {"TrianglesP2", 9},
-  {"EdgesP2", 8},
+  {"TetrahedraP2", SB_GMSH_TET10},
+  {"TrianglesP2", SB_GMSH_TRIANGLE6},
+  {"EdgesP2", SB_GMSH_LINE3},
 };
 
 static PetscErrorCode read_elements(SbImport *im, int type)
 {
   SbScan *s = &im->scan;
   const int dim = SbGmshTypes[type].dim, nnode = SbGmshTypes[type].nnode;
+  const PetscBool two =
+    (PetscBool)(type == SB_GMSH_TET10 || type == SB_GMSH_TRIANGLE6 || type == SB_GMSH_LINE3);
   int64_t n, point, reference;
-  PetscInt vert[4], tags;
+  PetscInt vert[10], tags;
 
   PetscFunctionBeginUser;
   if (!im->x) SB_SCAN_ERROR(s, "elements before the section Vertices");
@@ -46,11 +48,11 @@ static PetscErrorCode read_elements(SbImport *im, int type)
       if (point < 1 || point > im->nvert)
         SB_SCAN_ERROR(s, "element %lld uses vertex %lld of %lld", (long long)i + 1, (long long)point,
                       (long long)im->nvert);
-      if (k < 4) vert[k] = (PetscInt)(point - 1);
+      if (k < 10) vert[SbGmshNode(k)] = (PetscInt)(point - 1);
     }
     PetscCall(SbScanText(s, "reference of an element", &reference));
     tags = 0;
-    if (nnode == dim + 1 && (reference || dim == 3))
+    if ((nnode == dim + 1 || two) && (reference || dim == 3))
       PetscCall(SbImportTagsAlone(im, dim, reference, NULL, &tags));
     PetscCall(SbImportAddElement(im, type, vert, tags, i + 1));
   }

@@ -410,7 +410,6 @@ PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *im)
   PetscBool there;
 
   PetscFunctionBeginUser;
-  im->second_order = PETSC_TRUE;
   PetscCall(SbScanOpen(im->where, path, b.scan));
   // behind the line BEGIN BULK, or at the start of a file that has none
   for (const char *p = b.scan->data, *end; p; p = end ? end + 1 : NULL) {

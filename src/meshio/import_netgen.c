@@ -9,7 +9,8 @@
   element, "matnr np p1 p2 p3 p4" for a volume element. Sections come in any order, hence each is searched for.
 
   Kept: subdomain or material N is volume_N, boundary condition N is surface_N; the sections materials and bcnames of .vol give
-  them names. Curves (edgesegments) are left out. Refused: elements of more nodes.
+  them names. Curves (edgesegments) are left out. Of second order, tets have 10 points and triangles 6, in both formats.
+  Refused: other elements.
 */
 #include <ctype.h>
 #include "meshio_impl.h"
@@ -60,8 +61,10 @@ static const Layout vol_surface = {
 static PetscErrorCode read_elements(SbImport *im, const Layout *l)
 {
   SbScan *s = &im->scan;
+  /* the nodes at the edges 01 02 03 12 13 23 of a tet, as gmsh numbers them */
+  static const int place[10] = {0, 1, 2, 3, 4, 6, 7, 5, 9, 8};
   int64_t n, value[5], nnode, point;
-  PetscInt vert[4], tags;
+  PetscInt vert[10], tags;
 
   PetscFunctionBeginUser;
   SbScanNext(s, '#');
@@ -82,17 +85,18 @@ static PetscErrorCode read_elements(SbImport *im, const Layout *l)
     while (type < SB_GMSH_NTYPES && (SbGmshTypes[type].dim != l->dim || SbGmshTypes[type].nnode != nnode))
       type++;
     if (type == SB_GMSH_NTYPES)
-      SB_SCAN_ERROR(s, "a %s element of %lld points; expected %d", l->dim == 3 ? "volume" : "surface",
-                    (long long)nnode, l->dim + 1);
+      SB_SCAN_ERROR(s, "a %s element of %lld points; expected %d or %d", l->dim == 3 ? "volume" : "surface",
+                    (long long)nnode, l->dim + 1, l->dim == 3 ? 10 : 6);
     for (int k = 0; k < nnode; k++) {
       PetscCall(SbScanText(s, "point of an element", &point));
       if (point < 1 || point > im->nvert)
         SB_SCAN_ERROR(s, "element %lld uses point %lld of %lld", (long long)i + 1, (long long)point,
                       (long long)im->nvert);
-      if (k < 4) vert[k] = (PetscInt)(point - 1);
+      if (k < 10) vert[place[k]] = (PetscInt)(point - 1);
     }
     tags = 0;
-    if (nnode == l->dim + 1) PetscCall(SbImportTagsAlone(im, l->dim, value[l->mark], NULL, &tags));
+    if (nnode == l->dim + 1 || type == SB_GMSH_TET10 || type == SB_GMSH_TRIANGLE6)
+      PetscCall(SbImportTagsAlone(im, l->dim, value[l->mark], NULL, &tags));
     PetscCall(SbImportAddElement(im, type, vert, tags, i + 1));
     PetscCall(SbScanEndOfLine(s));
   }

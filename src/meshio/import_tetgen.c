@@ -7,7 +7,7 @@
   writes neighbours there) is not read.
 
   Kept: the first attribute of a tet is its region, volume_N; the marker of a face, an edge or a point other than 0 is surface_N,
-  curve_N or point_N. Refused: tets of 10 nodes, attributes that are no whole numbers.
+  curve_N or point_N. Of second order (tetgen -o2) faces have 6 points and edges 3. Refused: attributes that are no whole numbers.
 */
 #include "meshio_impl.h"
 
@@ -33,9 +33,13 @@ static PetscErrorCode on_line(SbScan *s, const char *what)
 /* One file: the line of counts, then a line for each item: number, what it is, attributes, mark. A mark of 0 is one only for tets. */
 static PetscErrorCode read_file(SbImport *im, int f)
 {
-  static const int types[] = {SB_GMSH_POINT, SB_GMSH_LINE, SB_GMSH_TRIANGLE, SB_GMSH_TET};
+  static const int types[2][4] = {{SB_GMSH_POINT, SB_GMSH_LINE, SB_GMSH_TRIANGLE, SB_GMSH_TET},
+                                  {SB_GMSH_POINT, SB_GMSH_LINE3, SB_GMSH_TRIANGLE6, SB_GMSH_TET10}};
+  /* the nodes at the edges 23 03 01 12 13 02 of a tet, as gmsh numbers them */
+  static const int place[10] = {0, 1, 2, 3, 8, 7, 4, 5, 9, 6};
   SbScan *s = &im->scan;
   const int dim = files[f].dim;
+  int type = types[0][dim], npoint = dim + 1;
   int64_t count[4] = {0, 0, 0, 0}, number, first, mark = 0;
   PetscReal attribute;
 
@@ -58,14 +62,16 @@ static PetscErrorCode read_file(SbImport *im, int f)
   }
   if (dim == 3) {
     if (count[1] != 0 && count[1] != 4 && count[1] != 10)
-      SB_SCAN_ERROR(s, "elements of %lld points; expected 4", (long long)count[1]);
-    im->count[count[1] == 10 ? 11 : SB_GMSH_TET] = count[0]; /* 11: of 10 nodes */
-    PetscCall(SbImportCheckTypes(im));
+      SB_SCAN_ERROR(s, "elements of %lld points; expected 4 or 10", (long long)count[1]);
+    if (count[1] == 10) type = SB_GMSH_TET10;
   }
+  /* only the file of the tets says what order they have */
+  if (dim && im->count[SB_GMSH_TET10]) type = types[1][dim];
+  if (dim) npoint = SbGmshTypes[type].nnode;
 
   for (PetscInt i = 0; i < count[0]; i++) {
     PetscBool marked = (PetscBool)(count[dim == 0 ? 3 : files[f].ncount - 1] > 0);
-    PetscInt vert[4] = {i}, tags = 0;
+    PetscInt vert[10] = {i}, tags = 0;
 
     SbScanNext(s, '#');
     PetscCall(SbScanText(s, dim ? "number of an item" : "number of a point", &number));
@@ -77,7 +83,7 @@ static PetscErrorCode read_file(SbImport *im, int f)
     if (dim == 0 && number != first + i)
       SB_SCAN_ERROR(s, "point %lld follows point %lld; TetGen numbers them without gaps", (long long)number,
                     (long long)(first + i - 1));
-    for (int k = 0; k < (dim ? dim + 1 : 3); k++) {
+    for (int k = 0; k < (dim ? npoint : 3); k++) {
       int64_t point;
 
       PetscCall(on_line(s, dim ? "number of a point" : "coordinate"));
@@ -92,7 +98,7 @@ static PetscErrorCode read_file(SbImport *im, int f)
       if (point < first || point - first >= im->nvert)
         SB_SCAN_ERROR(s, "point %lld is not in the .node file, which holds %lld to %lld", (long long)point,
                       (long long)first, (long long)(first + im->nvert - 1));
-      vert[k] = (PetscInt)(point - first);
+      vert[place[k]] = (PetscInt)(point - first);
     }
     for (int64_t k = 0; dim == 0 && k < count[2]; k++) {
       PetscCall(on_line(s, "attribute of a point"));
@@ -113,9 +119,10 @@ static PetscErrorCode read_file(SbImport *im, int f)
       mark = (int64_t)value;
       if (mark || dim == 3) PetscCall(SbImportTagsAlone(im, dim, mark, NULL, &tags));
     }
-    PetscCall(SbImportAddElement(im, types[dim], vert, tags, number));
+    PetscCall(SbImportAddElement(im, type, vert, tags, number));
     PetscCall(SbScanEndOfLine(s));
   }
+  if (dim == 3) PetscCall(SbImportCheckTypes(im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

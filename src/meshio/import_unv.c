@@ -3,7 +3,7 @@
 
   A data set stands between two lines of -1 and begins with its number. Read: nodes with their coordinates, as they are (units and
   coordinate systems are not applied); tets, triangles, lines. An element belongs to volume_N, surface_N or curve_N by the number N of its
-  physical property, and to the groups that list it, by name. Groups of nodes are kept too. Refused: volume elements other than 4-node tets.
+  physical property, and to the groups that list it, by name. Groups of nodes are kept too. Refused: volume elements other than tets of 4 or 10 nodes.
 */
 #include <ctype.h>
 #include "meshio_impl.h"
@@ -43,6 +43,7 @@ static PetscErrorCode read_element(SbDeck *d)
     "material of an element", "colour of an element", "number of nodes of an element"};
   SbScan *s = &d->im->scan;
   int64_t head[6], n, other, node;
+  static const int around[10] = {0, 4, 1, 5, 2, 6, 7, 9, 8, 3}; /* as gmsh numbers the nodes */
   SbDeckElement e = {.type = 0};
 
   PetscFunctionBeginUser;
@@ -61,9 +62,17 @@ static PetscErrorCode read_element(SbDeck *d)
     for (int i = 0; i < 3; i++) PetscCall(SbScanText(s, "section of a beam", &other));
   }
   for (int64_t k = 0; k < n; k++) {
+    const int dim = SbGmshTypes[e.type].dim;
+
     PetscCall(SbScanText(s, "node of an element", &node));
     if (!k) e.at = s->token;
-    if (k < 4) e.node[k] = node;
+    // around the face of a quadratic tet, corner and edge in turn, then up; of other quadratic simplices the corners count
+    if (e.type == SB_GMSH_TET10)
+      e.node[SbGmshNode(around[k])] = node;
+    else if (e.type == SB_GMSH_LINE3 || e.type == SB_GMSH_TRIANGLE6) {
+      if (k % 2 == 0 && k / 2 <= dim) e.node[k / 2] = node;
+    } else if (k < 4)
+      e.node[k] = node;
   }
   if (e.type) PetscCall(SbDeckAddElement(d, &e));
   PetscFunctionReturn(PETSC_SUCCESS);

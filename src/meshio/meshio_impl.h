@@ -41,11 +41,11 @@ typedef struct {
 extern const SbGmshType SbGmshTypes[SB_GMSH_NTYPES];
 
 /* Counts an element, and keeps it when it is of use: a tet, a simplex of groups, a triangle where a surface is wanted. Of second order the corners count;
-   vert[10] of a tet, then with its nodes at edges where im->second_order is set, in the order of gmsh. */
+   vert[10] of a 10-node tet, in the order of gmsh. */
 PetscErrorCode SbImportAddElement(SbImport *import, int type, const PetscInt vert[], PetscInt tags,
                                   int64_t number);
 /*
-  SbImportCheckTypes - what was read must be a mesh of 4-node tets (or of 10 nodes, im->second_order) and of nothing else in the volume (or triangles, for a surface).
+  SbImportCheckTypes - what was read must be a mesh of tets of 4 or 10 nodes and of nothing else in the volume (or triangles, for a surface).
 
   Not collective. Errors: PETSC_ERR_FILE_UNEXPECTED, which says what is there.
 */

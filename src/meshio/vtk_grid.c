@@ -87,7 +87,6 @@ PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
   int regions, type, nuse = 0;
 
   PetscFunctionBeginUser;
-  im->second_order = PETSC_TRUE;
   // which arrays become groups, and which of them is the one of regions
   regions = -1;
   PetscCall(PetscMalloc1(grid->ncell, &sorted));

@@ -511,6 +511,8 @@ static PetscErrorCode test_netgen(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+#define UNV(label, x) label " 0 0 11\n" x "\n"
+
 /* One tet of second order: the nodes of its edges, those of edges 02, 13 and 23 off the middle by parts of 0.1, however a format numbers them. */
 static PetscErrorCode test_second_order(const char *folder)
 {
@@ -530,7 +532,26 @@ static PetscErrorCode test_second_order(const char *folder)
               "*ELEMENT, TYPE=C3D10\n1,1,2,3,4,5,6,7,8,9,10\n"},
     {"q.bdf", "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nGRID,4,,0.,0.,1.\nGRID,7,,-.1,.5,0."
               "\nGRID,9,,.5,.3,.5\nGRID,10,,0.,.5,.7\n"
-              "CTETRA,1,1,1,2,3,4,,,+\n+,7,,9,10\nENDDATA\n"}};
+              "CTETRA,1,1,1,2,3,4,,,+\n+,7,,9,10\nENDDATA\n"},
+    /* nodes as gmsh numbers them, each where its format has it; with a triangle and where there is one a line, to be sure of the corners */
+    {"q.unv", "    -1\n  2411\n" UNV("1", "0 0 0") UNV("2", "1 0 0") UNV("3", "0 1 0") UNV("4", "0 0 1") UNV(
+                "5", ".5 0 0") UNV("6", ".5 .5 0") UNV("7", "-.1 .5 0") UNV("8", "0 0 .5") UNV("9", "0 .5 .7")
+                UNV("10", ".5 .3 .5") "    -1\n    -1\n  2412\n1 118 1 1 7 10\n1 5 2 6 3 7 8 10\n9 4\n"
+                                      "2 92 9 1 7 6\n1 5 2 6 3 7\n3 24 8 1 7 3\n0 0 0\n1 5 2\n    -1\n"},
+    {"q.mesh", "MeshVersionFormatted 2\nDimension 3\nVertices\n10\n0 0 0 0\n1 0 0 0\n0 1 0 0\n0 0 1 0\n"
+               ".5 0 0 0\n.5 .5 0 0\n-.1 .5 0 0\n0 0 .5 0\n0 .5 .7 0\n.5 .3 .5 0\n"
+               "TetrahedraP2\n1\n1 2 3 4 5 6 7 8 10 9 1\nTrianglesP2\n1\n1 2 3 5 6 7 9\n"
+               "EdgesP2\n1\n1 2 5 8\nEnd\n"},
+    {"q.vol", "mesh3d\nvolumeelements\n1\n1 10 1 2 3 4 5 7 8 6 10 9\nsurfaceelements\n1\n"
+              "1 9 1 0 6 1 2 3 6 7 5\npoints\n10\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n.5 0 0\n.5 .5 0\n-.1 .5 0\n"
+              "0 0 .5\n0 .5 .7\n.5 .3 .5\n"},
+    {"q.neu", "10\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n.5 0 0\n.5 .5 0\n-.1 .5 0\n0 0 .5\n0 .5 .7\n.5 .3 .5\n"
+              "1\n1 1 2 3 4 5 7 8 6 10 9\n1\n9 1 2 3 6 7 5\n"},
+    {"q.node", "10 3 0 0\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 .5 0 0\n6 .5 .5 0\n7 -.1 .5 0\n8 0 0 .5\n"
+               "9 0 .5 .7\n10 .5 .3 .5\n"},
+    {"q.face", "1 1\n1 1 2 3 6 7 5 9\n"},
+    {"q.edge", "1 1\n1 1 2 5 8\n"},
+    {"q.ele", "1 10 0\n1 1 2 3 4 9 8 5 6 10 7\n"}};
   static const struct {
     PetscInt end[2];
     PetscReal off[3];
@@ -546,7 +567,19 @@ static PetscErrorCode test_second_order(const char *folder)
     out = fopen(path, "w");
     if (out) (void)fputs(file[f].text, out);
     if (out) (void)fclose(out);
+    /* of TetGen the last of its files */
+    if (strstr(file[f].name, ".node") || strstr(file[f].name, ".face") || strstr(file[f].name, ".edge"))
+      continue;
     PetscCall(test_mesh_read(test_body("b", path), &m));
+    for (int dim = 1; dim <= 2; dim++) {
+      static const char *const with_lines = ".unv .mesh .ele", *const with_triangles =
+                                                                 ".unv .mesh .vol .neu .ele";
+      const PetscBool there =
+        (PetscBool)(strstr(dim == 1 ? with_lines : with_triangles, file[f].name + 1) != NULL);
+
+      SB_CHECK(count_items(&m.im, dim, dim == 1 ? "curve_8" : "surface_9") == (PetscInt)there,
+               "%s: %d of dimension %d", file[f].name, (int)m.im.item[dim].n, dim);
+    }
     SB_CHECK(m.im.nvert == 4 && m.im.item[3].n == 1 && m.im.nunused == 0 && m.im.nmiddle.n == 3,
              "%s: %d vertices, %d tets, %d unused, %d edges off the middle", file[f].name, (int)m.im.nvert,
              (int)m.im.item[3].n, (int)m.im.nunused, (int)m.im.nmiddle.n);

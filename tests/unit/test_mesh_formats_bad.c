@@ -63,7 +63,7 @@ static PetscErrorCode test_tetgen(void)
                              {"# all\n1 4\n1 1 2 3 4\n", NULL},
                              {"1 4 0\n1 1 2 3 5\n", "t.ele|line 2|point 5|1|4"},
                              {"1 4 0\n1 0 1 2 3\n", "t.ele|line 2|point 0|1|4"},
-                             {"1 10 0\n1 1 2 3 4 5 6 7 8 9 10\n", "t.ele|1 10-node|4-node"},
+                             {"1 10 0\n1 1 2 3 4 5 6 7 8 9 10\n", "t.ele|line 2|point 5"},
                              {"1 3 0\n1 1 2 3\n", "t.ele|line 1|3 points|4"},
                              {"1 4 1\n1 1 2 3 4 1.5\n", "t.ele|line 2|1.5"},
                              {"1 4 1\n1 1 2 3 4\n", "t.ele|line 2"},
@@ -92,8 +92,8 @@ static PetscErrorCode test_netgen(void)
     {POINTS "1\n1 1 2 3 4\n", NULL},
     {POINTS "1\n1 1 2 3 4 5 6 7 8 9 10\n", "line 7|element 1|point 5|4"},
     {"12" /* points */ "\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n2 2 2\n3 3 3\n4 4 4\n5 5 5\n6 6 6\n7 7 7\n8 8 "
-     "8\n1\n1 1 2 3 4 5 6 7 8 9 10\n",
-     "1 10-node|4-node"},
+     "8\n1\n1 1 2 3 4 5 6 7 8\n",
+     "1 hexahedra"},
     {POINTS "1\n1 1 2 3\n", "line 7|3 points|4"},
     {POINTS "0\n1\n1 1 2 3\n", "1 3-node"},
     {"70000000\n0 0 0\n", "line 1|70000000 points"},
@@ -130,7 +130,7 @@ static PetscErrorCode test_medit(void)
     {HEAD VERTICES "Tetrahedra\n1\n1 2 3 5 7\nEnd\n", "line 11|element 1|vertex 5|4"},
     {HEAD VERTICES "Tetrahedra\n1\n1 2 3 4 7\n", "'End'"},
     {HEAD VERTICES "Hexahedra\n1\n1 2 3 4 1 2 3 4 0\nEnd\n", "1 hexahedra"},
-    {HEAD VERTICES "TetrahedraP2\n1\n1 2 3 4 1 2 3 4 1 2 0\nEnd\n", "1 10-node|4-node"},
+    {HEAD VERTICES "TetrahedraP2\n1\n1 2 3 4 1 2 3 4 1 5 0\nEnd\n", "element 1|vertex 5 of 4"},
     {HEAD VERTICES "Triangles\n1\n1 2 3 0\nEnd\n", "1 3-node"},
     {HEAD "Vertices\n999999999\n", "999999999 vertices"},
     {NULL, NULL}};

@@ -6,11 +6,13 @@
                 equilibrium with the uniform stress; both to rounding, as the rule is exact for the polynomials that decide
     rigid       a turn leaves neither force nor energy
     sums        volume of the body, mass of the nodes, lumped and consistent, force of a load on a curved facet: exact ones
-    sphere      Lame's thick sphere, nu 0.3 and 0.4999: order of the displacement at the inner wall, curved and straight tets
+    sphere      Lame's thick sphere, nu 0.3 and 0.4999: order of the displacement at the inner wall, curved and straight tets; the error that
+                the ledger estimates beside the true one
     ranks       the same displacement as on one rank
     refused     a tet that folds over itself, by its number
 */
 #include "curved.h"
+#include "sbestimate.h"
 
 static const char *const laws[] = {"linear", "corotated", "stvk", "neohookean"};
 
@@ -208,7 +210,9 @@ static PetscErrorCode sphere_error(PetscInt n, PetscBool second, PetscReal nu, c
   TestScene t;
   char mesh[512];
   const PetscScalar *u;
-  PetscReal sum[2] = {0., 0.};
+  PetscReal sum[2] = {0., 0.}, missing, guess;
+  SbSpaceEstimate est;
+  SbEnergies energies;
 
   PetscFunctionBeginUser;
   PetscCall(curved_mesh_write(n, n, curved_shell, second, mesh));
@@ -230,6 +234,19 @@ static PetscErrorCode sphere_error(PetscInt n, PetscBool second, PetscReal nu, c
   *error = PetscSqrtReal(sum[0] / sum[1]);
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  sphere, nu %g, %s, %5d %s tets: error %.3e\n", (double)nu,
                         element, (int)t.model->mesh->Ncell, second ? "curved" : "straight", (double)*error));
+  /* the energy of the error is what the body stores less than it should: half of the work of the pressure on the displacement of the wall */
+  PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &energies));
+  missing = 0.25 * PETSC_PI * (1. - 2. * nu + 4. * (1. + nu)) / 7. - energies.strain;
+  PetscCall(SbSpaceEstimateCreate(t.model, &est));
+  PetscCall(SbSpaceEstimateCompute(est, 1., t.run->U, t.run->V, t.run->A));
+  guess = PetscSqrtReal(est->body2[0]);
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "    in energy %.3e J^(1/2), estimated %.2f times that\n",
+                        (double)PetscSqrtReal(PetscAbsReal(missing)),
+                        (double)(guess / PetscSqrtReal(PetscAbsReal(missing)))));
+  if (second)
+    SB_CHECK(guess > 0.7 * PetscSqrtReal(missing) && guess < 1.4 * PetscSqrtReal(missing),
+             "estimated %g, true %g J^(1/2)", (double)guess, (double)PetscSqrtReal(missing));
+  PetscCall(SbSpaceEstimateDestroy(&est));
   PetscCall(test_scene_close(&t));
   PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
