@@ -78,9 +78,10 @@ SB_INLINE void sb_gather_nodes(int n, const PetscInt node[], const PetscReal x[]
   }
 }
 
-static inline void sb_gather(const PetscInt node[4 * SB_BATCH], const PetscReal x[], SbPack u[12])
+/* The nodes of a batch, those of P2 at edges behind those at vertices: [region.nnode][SB_BATCH]. */
+static inline const PetscInt *sb_batch_nodes(SbSpace s, PetscInt b)
 {
-  sb_gather_nodes(4, node, x, u);
+  return s->batch_clique + (size_t)(b * s->width) * SB_BATCH;
 }
 
 /* Longest side of a box: what a rotation of unit size is relative to. */
@@ -100,17 +101,17 @@ PetscErrorCode SbAttachModes(Mat A, PetscErrorCode (*fill)(PetscInt mode, PetscS
                              const void *ctx);
 
 /*
-  What strains are computed from: the nodes of the cells; for DG the means m = p + w (u - p) of the own node u and the one
+  What strains are computed from, u[3 nnode]: the nodes of the cells; for DG the means m = p + w (u - p) of the own node u and the one
   across the face p.
 */
 static inline void sb_gather_strain(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[],
-                                    SbPack u[12])
+                                    SbPack u[30])
 {
-  sb_gather(s->batch_node + 4 * SB_BATCH * b, x, u);
+  sb_gather_nodes((int)region->nnode, sb_batch_nodes(s, b), x, u);
   if (region->broken) {
     SbPack p[12];
 
-    sb_gather(s->batch_clique + (s->width * b + 4) * SB_BATCH, x, p);
+    sb_gather_nodes(4, sb_batch_nodes(s, b) + 4 * SB_BATCH, x, p);
     for (int k = 0; k < 12; k++) {
       for (int l = 0; l < SB_BATCH; l++)
         u[k][l] = p[k][l] + s->batch_weight[4 * b + k / 3][l] * (u[k][l] - p[k][l]);
@@ -133,14 +134,8 @@ SB_INLINE void sb_scatter_nodes(int nnode, const PetscInt node[], PetscInt n, co
   }
 }
 
-static inline void sb_scatter_add(const PetscInt node[4 * SB_BATCH], PetscInt n, const SbPack fe[12],
-                                  PetscReal f[])
-{
-  sb_scatter_nodes(4, node, n, fe, f);
-}
-
 /* The transpose of sb_gather_strain(): forces on the means go to the two nodes by their weights. */
-static inline void sb_scatter_strain(SbSpace s, const SbRegion *region, PetscInt b, SbPack fe[12],
+static inline void sb_scatter_strain(SbSpace s, const SbRegion *region, PetscInt b, SbPack fe[30],
                                      PetscReal f[])
 {
   if (region->broken) {
@@ -154,9 +149,9 @@ static inline void sb_scatter_strain(SbSpace s, const SbRegion *region, PetscInt
         fe[k][l] = own;
       }
     }
-    sb_scatter_add(s->batch_clique + (s->width * b + 4) * SB_BATCH, s->batch_n[b], (const SbPack *)p, f);
+    sb_scatter_nodes(4, sb_batch_nodes(s, b) + 4 * SB_BATCH, s->batch_n[b], (const SbPack *)p, f);
   }
-  sb_scatter_add(s->batch_node + 4 * SB_BATCH * b, s->batch_n[b], (const SbPack *)fe, f);
+  sb_scatter_nodes((int)region->nnode, sb_batch_nodes(s, b), s->batch_n[b], (const SbPack *)fe, f);
 }
 
 /* Rotations that are stored for a cell: those of P2 have one at each point of SbRuleQuadratic, others use the first. */

@@ -34,8 +34,7 @@ typedef struct {
   SbPack *curve_g, *curve_weight, *curve_mass;
   SbMaterial
     pointwise; /* P2: the law at the points, which has no volumetric part where that is of the mean of the cell; borrowed */
-  PetscReal alpha,
-    beta; /* Rayleigh damping C = alpha M + beta K, 1/s and s; 0 unless an effect set them at set-up */
+  PetscInt nnode; /* of a cell: 4, of P2 SB_CELL_NODES */
 } SbRegion;
 
 /*
@@ -92,6 +91,8 @@ struct _p_SbSpace {
   PetscReal *node_mass; /* [nnode] lumped mass, kg, complete on owned nodes */
   PetscReal *
     node_share; /* [nnode] integral of density times phi_a, kg, likewise; node_mass itself without a P2 body */
+  PetscReal *alpha,
+    *beta; /* [nbody] Rayleigh damping C = alpha M + beta K, 1/s and s; 0 unless an effect sets it */
   PetscBool consistent_mass; /* -mass consistent */
   PetscBool
     tentative; /* the tangent in use may be indefinite, and a solve that fails is repeated with a definite one: no reason to change the solver */
@@ -169,15 +170,15 @@ PetscErrorCode SbSpaceZeroPrescribed(SbSpace space, PetscBool prescribed, Vec X)
 /* Index into fixed_node of a node, or -1. */
 PetscInt SbSpacePrescribedIndex(SbSpace space, PetscInt node);
 
-/* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest). Outputs may be NULL. */
-void SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[], PetscReal psi[]);
+/* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest), the law's pressure -lambda theta, Pa
+   (SbMaterialOps.pressure). Outputs may be NULL. Not collective. */
+void SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[], PetscReal psi[],
+                      PetscReal pressure[]);
 /* Per owned cell: first Piola-Kirchhoff stress P[9] (Pa), rotation R[9] in F (the identity for the linear law; may be NULL), energy
    density psi (J/m^3, rest); of P2, whose stresses are means over the points of SbRuleQuadratic, P there as well, point[ncell][4][9]
    (may be NULL); of a curved cell the linear function nearest to P is taken there. Not collective. */
 void SbSpaceCellPiola(SbSpace space, const PetscReal u[], PetscReal P[], PetscReal R[], PetscReal psi[],
                       PetscReal point[]);
-/* Per owned cell: the law's pressure -lambda theta, Pa (SbMaterialOps.pressure). Not collective. */
-void SbSpaceCellPressure(SbSpace space, const PetscReal u[], PetscReal pressure[]);
 /* Owned cells: strain energy (J; added to body[nbody] by bodies, too, unless that is NULL), smallest det F, number with det F <= 0, current volume (m^3). Local: reduce them. */
 void SbSpaceStrainEnergy(SbSpace space, const PetscReal u[], PetscReal body[], PetscReal *energy,
                          PetscReal *minJ, PetscInt *ninverted, PetscReal *volume);

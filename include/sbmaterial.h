@@ -110,6 +110,14 @@ SB_INLINE PetscReal SbMaterialWaveModulus(const struct _p_SbMaterial *m)
 
   return m->density * c * c;
 }
+/* The rotation in F; I for the linear law. Not collective. */
+SB_INLINE void SbMaterialRotation(const struct _p_SbMaterial *m, const SbPack F[9], SbPack R[9])
+{
+  if (m->linear)
+    m->ops.frame(m, F, R);
+  else
+    SbPolar(F, R);
+}
 /*
   SbMaterialDampingStress - dP = R hooke(sym(R^T H)) = mu (H + R H^T R) + lambda (R : H) R, R the rotation in F: the stress
   of stiffness-proportional damping, per second of beta; R = I for the linear law. One rule for every other law and every

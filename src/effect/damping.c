@@ -3,7 +3,7 @@
 
   A mode of angular frequency w is damped with the ratio zeta = (alpha / w + beta w) / 2: alpha slows the
   whole motion as in a viscous medium (rigid motion too), beta takes out fast vibration. This effect writes
-  the two numbers into the regions of the space at set-up; the forces come with inertia and with the internal
+  the two numbers into the space at set-up; the forces come with inertia and with the internal
   force. Two dampings of one body add up.
 */
 #include "effect_impl.h"
@@ -57,12 +57,9 @@ static PetscErrorCode setup_damping(SbEffect e, SbSpace space)
     }
     damped[b] = PETSC_TRUE;
   }
-  for (PetscInt r = 0; r < space->nregion; r++) {
-    SbRegion *region = &space->region[r];
-
-    if (!damped[region->body]) continue;
-    region->alpha += d->alpha;
-    region->beta += d->beta;
+  for (PetscInt b = 0; b < mesh->nbody; b++) {
+    space->alpha[b] += damped[b] ? d->alpha : 0.;
+    space->beta[b] += damped[b] ? d->beta : 0.;
   }
   PetscCall(PetscFree(damped));
   PetscFunctionReturn(PETSC_SUCCESS);

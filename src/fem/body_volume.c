@@ -11,46 +11,25 @@
 #include "fem_impl.h"
 #include "sbkernel.h"
 
-/* F of each lane of batch b. */
-static void batch_gradient(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[], SbPack F[9])
-{
-  SbPack u[12];
-
-  sb_gather_strain(s, region, b, x, u);
-  SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, F);
-}
-
 void SbSpaceAddVolumeForce(SbSpace s, PetscInt body, const PetscReal x[], PetscReal factor, PetscReal f[])
 {
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
 
     for (PetscInt b = region->bstart; region->body == body && b < region->bend; b++) {
-      SbPack F[9], P[9], fe[12];
+      SbPack U[30], F[SB_POINTS][9], P[9], fe[30];
 
-      batch_gradient(s, region, b, x, F);
+      SbBatchGradients(s, region, b, x, PETSC_FALSE, U, F);
       for (int l = 0; l < SB_BATCH; l++) {
         PetscReal one[9], cofactor[9];
 
-        SbPackGet(9, (const SbPack *)F, l, one);
+        SbPackGet(9, (const SbPack *)F[0], l, one);
         SbMatCofactor(one, cofactor);
         for (int k = 0; k < 9; k++) P[k][l] = factor * cofactor[k];
       }
       SbCellForce(s->batch_g + 9 * b, s->batch_V[b], (const SbPack *)P, fe);
       sb_scatter_strain(s, region, b, fe, f);
     }
-  }
-}
-
-/* C = factor d cof F / dF. The two indices that i and k leave free make one term each way. */
-static void cofactor_tangent(const SbPack F[9], PetscReal factor, SbPack C[81])
-{
-  for (int c = 0; c < 81; c++) {
-    const int i = c / 27, j = c / 9 % 3, k = c / 3 % 3, n = c % 3;
-    const PetscReal sign = ((k + 3 - i) % 3 == 1 ? 1. : -1.) * ((n + 3 - j) % 3 == 1 ? 1. : -1.);
-    const PetscReal scale = i == k || j == n ? 0. : sign * factor;
-
-    for (int l = 0; l < SB_BATCH; l++) C[c][l] = scale == 0. ? 0. : scale * F[3 * (3 - i - k) + 3 - j - n][l];
   }
 }
 
@@ -64,15 +43,23 @@ PetscErrorCode SbSpaceAddVolumeTangent(SbSpace s, PetscInt body, const PetscReal
     const SbRegion *region = &s->region[r];
 
     for (PetscInt b = region->bstart; region->body == body && b < region->bend; b++) {
-      SbPack F[9], C[81], K[10][9] __attribute__((aligned(64)));
+      SbPack U[30], F[SB_POINTS][9], C[81], K[10][9] __attribute__((aligned(64)));
 
-      batch_gradient(s, region, b, x, F);
-      cofactor_tangent((const SbPack *)F, s->block_scale * factor, C);
+      SbBatchGradients(s, region, b, x, PETSC_FALSE, U, F);
+      /* C = factor d cof F / dF. The two indices that i and k leave free make one term each way. */
+      for (int c = 0; c < 81; c++) {
+        const int i = c / 27, j = c / 9 % 3, k = c / 3 % 3, n = c % 3;
+        const PetscReal sign = ((k + 3 - i) % 3 == 1 ? 1. : -1.) * ((n + 3 - j) % 3 == 1 ? 1. : -1.);
+        const PetscReal scale = i == k || j == n ? 0. : sign * s->block_scale * factor;
+
+        for (int l = 0; l < SB_BATCH; l++)
+          C[c][l] = scale == 0. ? 0. : scale * F[0][3 * (3 - i - k) + 3 - j - n][l];
+      }
       SbCellBlocksGeneral(s->batch_g + 9 * b, s->batch_V[b], (const SbPack *)C, K);
       if (region->broken)
         SbInsertBroken(s, &values, b, (const SbPack(*)[9])K);
       else
-        SbInsertBatch(s, &values, b, (const SbPack(*)[9])K);
+        SbInsertBatch(s, &values, b, 10, (const SbPack(*)[9])K);
     }
   }
   PetscCall(SbValuesEnd(&values));

@@ -54,12 +54,7 @@ void SbSpaceCellPiola(SbSpace s, const PetscReal x[], PetscReal P[], PetscReal R
           energy[0][l] += (energy[q][l] - energy[0][l]) * part / all[l];
         }
       }
-      if (R && region->material->linear) {
-        for (int k = 0; k < 9; k++) {
-          for (int l = 0; l < SB_BATCH; l++) rotation[k][l] = k % 4 == 0;
-        }
-      } else if (R)
-        SbPolar((const SbPack *)F[0], rotation);
+      if (R) SbMaterialRotation(region->material, (const SbPack *)F[0], rotation);
       for (int l = 0; l < s->batch_n[b]; l++) {
         const PetscInt c = s->batch_cell[b] + l;
 

@@ -62,14 +62,7 @@ static inline PetscScalar *sb_block(const SbValues *x, SbPlan p, PetscInt row, P
 
 /* Clears the rows that batch b reaches first, or fills them with the face terms; call it for every batch in turn, each before SbInsertBatch(). */
 void SbInsertClear(SbSpace space, const SbValues *x, PetscInt b);
-/*
-  quadratic.c: P2 cells. Not collective. The nodes of a batch [10][SB_BATCH].
-*/
-static inline const PetscInt *sb_quadratic_nodes(SbSpace s, PetscInt b)
-{
-  return s->batch_clique + (size_t)(b * s->width) * SB_BATCH;
-}
-/* The points of a batch: one of P1, CR and DG; four of a P2 cell; those of SbRuleQuintic of a curved one. */
+/* quadratic.c: cells at their points. Not collective. The points of a batch: one of P1, CR and DG; four of a P2 cell; those of SbRuleQuintic of a curved one. */
 typedef struct {
   int n, step;             /* gradients of point q: g + step q */
   const SbPointRule *rule; /* of P2 */
@@ -82,8 +75,11 @@ SB_INLINE void SbPointVolume(const SbPoints *at, int q, SbPack W)
 {
   for (int l = 0; l < SB_BATCH; l++) W[l] = at->weight[q][l] * (*at->V)[l];
 }
-/* F (rate: without the identity) at the points. */
-void SbQuadraticGradients(const SbPoints *at, const SbPack U[30], PetscBool rate, SbPack F[SB_POINTS][9]);
+/* U[3 nnode] of sb_gather_strain() for x, zero where that is NULL, and F (rate: without the identity) at the points. */
+void SbBatchGradients(SbSpace space, const SbRegion *region, PetscInt b, const PetscReal x[], PetscBool rate,
+                      SbPack U[30], SbPack F[SB_POINTS][9]);
+/* Adds the forces of a stress P at point q, on what sb_gather_strain() gathers. */
+void SbPointForce(const SbPoints *at, int q, const SbPack P[9], SbPack f[30]);
 /*
   The volumetric part of the energy, V lambda/2 (mean of theta)^2: pressure = lambda times the mean (Pa, tension), b[30] = V d mean/du (m^2; NULL: not
   wanted). F at the points.
@@ -99,17 +95,15 @@ SB_INLINE const SbPointRule *SbVolumeRule(const SbPoints *at)
 void SbBatchState(SbSpace space, const SbRegion *region, PetscInt b, const PetscReal x[],
                   SbPack F[SB_POINTS][9], SbPack P[SB_POINTS][9], SbPack psi[SB_POINTS],
                   SbPack pressure[SB_POINTS]);
-/* Lumped mass / (density V) of node a of a P2 cell in lane l. */
-SB_INLINE PetscReal SbQuadraticLumped(const SbRegion *region, PetscInt b, PetscInt a, PetscInt l)
+/* Consistent mass of a straight cell / (density V). */
+SB_INLINE PetscReal SbCellMass(const SbRegion *region, int a, int b)
 {
-  if (region->curve_mass) return region->curve_mass[SB_CELL_NODES * (b - region->bstart) + a][l];
-  return a < 4 ? region->element->ops.mass_lumped : region->element->ops.mass_lumped_edge;
+  if (region->quadratic) return SbQuadraticMass(a, b);
+  return a == b ? region->element->ops.mass_diagonal : region->element->ops.mass_coupling;
 }
 
-/* Adds the ten blocks of each cell of batch b; K is 32-byte aligned. */
-void SbInsertBatch(SbSpace space, const SbValues *x, PetscInt b, const SbPack K[10][9]);
-/* The 55 blocks of P2 cells. */
-void SbInsertQuadratic(SbSpace space, const SbValues *x, PetscInt b, const SbPack K[SB_PAIRS][9]);
+/* Adds the blocks of each cell of batch b, ten or, of P2, SB_PAIRS; K is 32-byte aligned. */
+void SbInsertBatch(SbSpace space, const SbValues *x, PetscInt b, int npair, const SbPack K[][9]);
 /* The same for DG cells, whose blocks stand between the means of their faces. */
 void SbInsertBroken(SbSpace space, const SbValues *x, PetscInt b, const SbPack K[10][9]);
 

@@ -84,37 +84,8 @@ static void insert_cell(SbSpace s, const SbValues *x, PetscInt b, PetscInt l, in
   }
 }
 
-/* Each block between means is spread over the own nodes and those across the faces. */
-static void insert_broken_cell(SbSpace s, const SbValues *x, PetscInt b, PetscInt l, const SbPack K[10][9])
-{
-  const PetscInt w = s->width, *node = s->batch_clique + (size_t)(b * w) * SB_BATCH + l;
-  const PetscInt *offset = s->plan->offset + (size_t)(b * w * w) * SB_BATCH + l;
-  PetscReal weight[8];
-
-  for (int a = 0; a < 4; a++) {
-    weight[a] = s->batch_weight[4 * b + a][l];
-    weight[4 + a] = 1. - weight[a];
-  }
-  for (int p = 0; p < 10; p++) {
-    const int twice = SbPairA[p] == SbPairB[p] ? 1 : 2;
-    PetscReal k[9];
-
-    SbPackGet(9, K[p], (int)l, k);
-    for (int n = 0; n < 4 * twice; n++) {
-      const int turn = n / 4, row = (turn ? SbPairB[p] : SbPairA[p]) + 4 * (n & 1),
-                column = (turn ? SbPairA[p] : SbPairB[p]) + 2 * (n & 2);
-      const PetscReal factor = weight[row] * weight[column];
-
-      if (factor != 0.)
-        add_block(s, x, node[SB_BATCH * row], node[SB_BATCH * column], offset[SB_BATCH * (w * row + column)],
-                  factor, (PetscBool)turn, k);
-    }
-  }
-}
-
 /* ------------------------------------------------------------------ four lanes at a time */
 
-#if defined(SB_HAS_FOUR)
 /* Entry e of the transposed block. */
 static const int swapped[9] = {0, 3, 6, 1, 4, 7, 2, 5, 8};
 
@@ -229,65 +200,56 @@ SB_KERNEL static void insert_sbaij_quadratic(const SbPack K[restrict SB_PAIRS][9
   insert_upper(SB_PAIRS, K, upper, value);
 }
 
-static PetscBool all_owned(SbSpace s, const PetscInt node[4 * SB_BATCH])
+void SbInsertBatch(SbSpace s, const SbValues *x, PetscInt b, int npair, const SbPack K[][9])
 {
+  const PetscInt *offset = s->plan->offset + (size_t)(b * s->width * s->width) * SB_BATCH,
+                 *node = s->batch_node + 4 * SB_BATCH * b;
   PetscInt last = 0;
 
-  for (int k = 0; k < 4 * SB_BATCH; k++) last = node[k] > last ? node[k] : last;
-  return (PetscBool)(last < s->nnode_owned);
-}
+  for (int k = 0; k < 4 * SB_BATCH; k++) last = PetscMax(last, node[k]);
+  if (x->kind == SB_MATRIX_AIJ)
+    for (PetscInt l = 0; l < s->batch_n[b]; l++) insert_cell(s, x, b, l, npair, K);
+  else if (x->kind == SB_MATRIX_SBAIJ) {
+    const PetscInt *upper = s->plan->upper + (size_t)(b * s->plan->npair) * SB_BATCH;
 
-static PetscBool insert_fast(SbSpace s, const SbValues *x, PetscInt b, const SbPack K[10][9])
-{
-  const PetscInt *offset = s->plan->offset + (size_t)(b * s->width * s->width) * SB_BATCH;
-
-  if (x->kind == SB_MATRIX_AIJ) return PETSC_FALSE;
-  if (x->kind == SB_MATRIX_SBAIJ)
-    insert_sbaij(K, s->plan->upper + (size_t)(b * s->plan->npair) * SB_BATCH, x->value);
-  else if (all_owned(s, s->batch_node + 4 * SB_BATCH * b))
+    if (npair == SB_PAIRS)
+      insert_sbaij_quadratic(K, upper, x->value);
+    else
+      insert_sbaij(K, upper, x->value);
+  } else if (npair == SB_PAIRS)
+    insert_baij_quadratic(K, offset, x->value);
+  else if (last < s->nnode_owned)
     insert_baij(K, offset, s->width, x->value);
   else
     insert_baij_edge(K, offset, s->width, x->value);
-  return PETSC_TRUE;
 }
 
-static PetscBool insert_fast_quadratic(SbSpace s, const SbValues *x, PetscInt b, const SbPack K[SB_PAIRS][9])
-{
-  const PetscInt w = s->width;
-
-  if (x->kind == SB_MATRIX_AIJ) return PETSC_FALSE;
-  if (x->kind == SB_MATRIX_SBAIJ)
-    insert_sbaij_quadratic(K, s->plan->upper + (size_t)(b * SB_PAIRS) * SB_BATCH, x->value);
-  else
-    insert_baij_quadratic(K, s->plan->offset + (size_t)(b * w * w) * SB_BATCH, x->value);
-  return PETSC_TRUE;
-}
-#else
-static PetscBool insert_fast_quadratic(SbSpace s, const SbValues *x, PetscInt b, const SbPack K[SB_PAIRS][9])
-{
-  (void)s, (void)x, (void)b, (void)K;
-  return PETSC_FALSE;
-}
-static PetscBool insert_fast(SbSpace s, const SbValues *x, PetscInt b, const SbPack K[10][9])
-{
-  (void)s, (void)x, (void)b, (void)K;
-  return PETSC_FALSE;
-}
-#endif
-
-void SbInsertBatch(SbSpace s, const SbValues *x, PetscInt b, const SbPack K[10][9])
-{
-  if (insert_fast(s, x, b, K)) return;
-  for (PetscInt l = 0; l < s->batch_n[b]; l++) insert_cell(s, x, b, l, 10, K);
-}
-
-void SbInsertQuadratic(SbSpace s, const SbValues *x, PetscInt b, const SbPack K[SB_PAIRS][9])
-{
-  if (insert_fast_quadratic(s, x, b, K)) return;
-  for (PetscInt l = 0; l < s->batch_n[b]; l++) insert_cell(s, x, b, l, SB_PAIRS, K);
-}
-
+/* Each block between means is spread over the own nodes and those across the faces. */
 void SbInsertBroken(SbSpace s, const SbValues *x, PetscInt b, const SbPack K[10][9])
 {
-  for (PetscInt l = 0; l < s->batch_n[b]; l++) insert_broken_cell(s, x, b, l, K);
+  for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+    const PetscInt w = s->width, *node = s->batch_clique + (size_t)(b * w) * SB_BATCH + l;
+    const PetscInt *offset = s->plan->offset + (size_t)(b * w * w) * SB_BATCH + l;
+    PetscReal weight[8];
+
+    for (int a = 0; a < 4; a++) {
+      weight[a] = s->batch_weight[4 * b + a][l];
+      weight[4 + a] = 1. - weight[a];
+    }
+    for (int p = 0; p < 10; p++) {
+      const int twice = SbPairA[p] == SbPairB[p] ? 1 : 2;
+      PetscReal k[9];
+
+      SbPackGet(9, K[p], (int)l, k);
+      for (int n = 0; n < 4 * twice; n++) {
+        const int turn = n / 4, row = (turn ? SbPairB[p] : SbPairA[p]) + 4 * (n & 1),
+                  column = (turn ? SbPairA[p] : SbPairB[p]) + 2 * (n & 2);
+        const PetscReal factor = weight[row] * weight[column];
+
+        if (factor != 0.)
+          add_block(s, x, node[SB_BATCH * row], node[SB_BATCH * column],
+                    offset[SB_BATCH * (w * row + column)], factor, (PetscBool)turn, k);
+      }
+    }
+  }
 }

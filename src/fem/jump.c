@@ -243,7 +243,7 @@ static PetscBool follow_batch(SbSpace s, const SbRegion *region, PetscInt b, con
   const PetscInt n = s->batch_n[b];
   PetscReal *modulus = s->jump->modulus + s->batch_cell[b], before[SB_BATCH], largest = 0.;
   PetscBool changed = PETSC_FALSE;
-  SbPack u[12], F[9], P[9];
+  SbPack u[30], F[9], P[9];
 
   for (PetscInt l = 0; l < n; l++) {
     before[l] = modulus[l];
@@ -345,7 +345,7 @@ void SbJumpAdd(SbSpace s, const PetscReal x[], SbJumpFactor factor, PetscReal f[
 
   for (PetscInt b = 0; b < j->nbatch; b++) {
     const PetscInt *node = j->node + 8 * SB_BATCH * b;
-    const PetscReal scale = factor == SB_JUMP_STIFFNESS ? 1. : s->region[j->region[b]].beta;
+    const PetscReal scale = factor == SB_JUMP_STIFFNESS ? 1. : s->beta[s->region[j->region[b]].body];
     SbPack t[12];
 
     if (scale == 0.) continue;
@@ -369,7 +369,8 @@ PetscReal SbJumpEnergy(SbSpace s, const PetscReal x[], SbJumpFactor factor, Pets
   PetscReal energy = 0.;
 
   for (PetscInt b = 0; b < j->nbatch; b++) {
-    const PetscReal scale = factor == SB_JUMP_STIFFNESS ? 1. : s->region[j->region[b]].beta, before = energy;
+    const PetscReal scale = factor == SB_JUMP_STIFFNESS ? 1. : s->beta[s->region[j->region[b]].body],
+                    before = energy;
 
     for (int l = 0; l < j->n[b] && scale != 0.; l++) {
       PetscReal J[9], sum[3], squares = 0.;

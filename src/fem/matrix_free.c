@@ -172,22 +172,19 @@ SB_KERNEL static void apply_quadratic(PetscInt nbatch, PetscInt width, const Pet
 static PetscErrorCode load_vector(Operator *o, Vec X)
 {
   SbSpace s = o->space;
-  const PetscScalar *x;
-  Vec local = X;
+  const PetscReal *x;
+  Vec from = X;
 
   PetscFunctionBeginUser;
   if (o->ghosted) {
     PetscCall(VecCopy(X, o->ghosted));
-    PetscCall(VecGhostUpdateBegin(o->ghosted, INSERT_VALUES, SCATTER_FORWARD));
-    PetscCall(VecGhostUpdateEnd(o->ghosted, INSERT_VALUES, SCATTER_FORWARD));
-    PetscCall(VecGhostGetLocalForm(o->ghosted, &local));
+    from = o->ghosted;
   }
-  PetscCall(VecGetArrayRead(local, &x));
+  PetscCall(SbSpaceGetLocalRead(s, from, &x));
   for (PetscInt i = 0; i < s->nnode; i++) {
     for (PetscInt c = 0; c < 3; c++) o->p[4 * i + c] = x[3 * i + c];
   }
-  PetscCall(VecRestoreArrayRead(local, &x));
-  if (o->ghosted) PetscCall(VecGhostRestoreLocalForm(o->ghosted, &local));
+  PetscCall(SbSpaceRestoreLocalRead(s, from, &x));
   for (PetscInt k = 0; k < s->nfixed; k++) {
     for (PetscInt c = 0; c < 3; c++) {
       if (s->fixed[s->fixed_node[k]] & (1 << c)) o->p[4 * s->fixed_node[k] + c] = 0.;
@@ -220,7 +217,7 @@ static PetscErrorCode MatMult_Frames(Mat A, Vec X, Vec Y)
                  *V = (const SbPack *)s->batch_V + b;
 
     if (region->quadratic)
-      apply_quadratic(n, s->width, sb_quadratic_nodes(s, b), h, V, lambda, o->mu[r], o->p, o->q);
+      apply_quadratic(n, s->width, sb_batch_nodes(s, b), h, V, lambda, o->mu[r], o->p, o->q);
     else
       apply_region(n, s->batch_node + 4 * SB_BATCH * b, 9 * sb_rotation_points(s), h, V, o->lambda[r],
                    o->mu[r], o->p, o->q);
@@ -281,14 +278,12 @@ static PetscErrorCode assemble(Mat A, const SbStage *stage)
   PetscCall(MatShellGetContext(A, &o));
   s = o->space;
   SbSpaceCellRotations(s, stage->u, o->R);
-  for (PetscInt i = 0; i < s->nnode_owned; i++) o->inertia[i] = stage->shift_a * s->node_mass[i];
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
+    o->inertia[i] = (stage->shift_a + stage->shift_v * s->alpha[s->node_body[i]]) * s->node_mass[i];
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
     const SbMaterial m = region->material;
-    const PetscReal factor = stage->shift_k + stage->shift_v * region->beta;
-    const PetscReal drag = stage->shift_v * region->alpha * m->density,
-                    damping = drag * region->element->ops.mass_lumped,
-                    damping_edge = drag * region->element->ops.mass_lumped_edge;
+    const PetscReal factor = stage->shift_k + stage->shift_v * s->beta[region->body];
 
     o->lambda[r] = factor * m->ops.volumetric_modulus(m);
     o->mu[r] = factor * m->ops.shear_modulus(m);
@@ -298,14 +293,6 @@ static PetscErrorCode assemble(Mat A, const SbStage *stage)
         const PetscInt at = 9 * (sb_rotation_points(s) * b + q);
 
         rotate_gradients((const SbPack *)o->R + at, (const SbPack *)s->batch_g + 9 * b, o->h + at);
-      }
-    }
-    for (PetscInt b = region->bstart; damping != 0. && b < region->bend; b++) {
-      for (PetscInt l = 0; l < (region->quadratic ? 10 : 4) * SB_BATCH; l++) {
-        const PetscInt node = s->batch_clique[s->width * SB_BATCH * b + l];
-        const PetscReal share = l < 4 * SB_BATCH ? damping : damping_edge;
-
-        if (node < s->nnode_owned) o->inertia[node] += share * s->batch_V[b][l % SB_BATCH];
       }
     }
   }
@@ -331,7 +318,6 @@ PetscErrorCode SbSpaceCreateMatrixFree(SbSpace s, Mat *A)
 {
   static const SbAssembly assembly = {.assemble = assemble};
   const size_t packs = 9 * (size_t)(sb_rotation_points(s) * s->nbatch), nodes = 8 * (size_t)s->nnode;
-  PetscMPIInt size;
   PetscBool has;
   Operator *o;
 
@@ -350,8 +336,7 @@ PetscErrorCode SbSpaceCreateMatrixFree(SbSpace s, Mat *A)
   o->q = o->p + 4 * s->nnode;
   PetscCall(PetscArrayzero(o->p, 8 * s->nnode));
   PetscCall(PetscMalloc3(s->nregion, &o->lambda, s->nregion, &o->mu, s->nnode_owned, &o->inertia));
-  PetscCallMPI(MPI_Comm_size(s->comm, &size));
-  if (size > 1) PetscCall(SbSpaceCreateVec(s, &o->ghosted));
+  if (s->ghosted) PetscCall(SbSpaceCreateVec(s, &o->ghosted));
   PetscCall(
     MatCreateShell(s->comm, 3 * s->nnode_owned, 3 * s->nnode_owned, PETSC_DETERMINE, PETSC_DETERMINE, o, A));
   PetscCall(MatSetBlockSize(*A, 3));
@@ -386,23 +371,6 @@ PetscErrorCode SbMatrixFreeGetRotations(Mat A, const SbPack **R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Clears what belongs to prescribed unknowns in row i of the operator. */
-static void constrain_row(const Operator *o, PetscInt i, PetscReal block[])
-{
-  SbSpace s = o->space;
-  SbPlan p = s->plan;
-  const PetscInt nd = p->di[i + 1] - p->di[i], no = p->oi[i + 1] - p->oi[i];
-
-  for (PetscInt k = 0; k < nd + no; k++) {
-    const PetscInt j = k < nd ? p->dj[p->di[i] + k] : p->oj[p->oi[i] + k - nd];
-
-    for (PetscInt e = 0; e < 9; e++) {
-      if (s->fixed[i] & (1 << e / 3) || s->fixed[j] & (1 << e % 3))
-        block[9 * k + e] = i == j && e % 4 == 0 ? o->prescribed_diagonal : 0.;
-    }
-  }
-}
-
 PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],
                                    PetscReal block[])
 {
@@ -425,14 +393,15 @@ PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], con
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
     const PetscBool mean = (PetscBool)(region->quadratic && region->pointwise != region->material);
-    const PetscInt na = region->quadratic ? SB_CELL_NODES : 4, npair = region->quadratic ? SB_PAIRS : 10;
+    const PetscInt npair = region->quadratic ? SB_PAIRS : 10;
 
     for (PetscInt b = region->bstart; b < region->bend; b++) {
       const PetscInt *corner = s->batch_clique + s->width * SB_BATCH * b;
       PetscBool any = PETSC_FALSE;
       SbPack K[SB_PAIRS][9] __attribute__((aligned(64)));
 
-      for (PetscInt l = 0; l < na * SB_BATCH; l++) any = (PetscBool)(any || wanted[corner[l]] >= 0);
+      for (PetscInt l = 0; l < region->nnode * SB_BATCH; l++)
+        any = (PetscBool)(any || wanted[corner[l]] >= 0);
       if (!any) continue;
       if (region->quadratic) {
         const SbPack *h = (const SbPack *)o->h + 9 * sb_rotation_points(s) * b;
@@ -471,7 +440,19 @@ PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], con
       }
     }
   }
-  for (PetscInt k = 0; k < n; k++) constrain_row(o, node[k], block + 9 * ia[k]);
+  /* what belongs to prescribed unknowns is cleared */
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscInt i = node[k], nd = p->di[i + 1] - p->di[i];
+
+    for (PetscInt at = 0; at < ia[k + 1] - ia[k]; at++) {
+      const PetscInt j = at < nd ? p->dj[p->di[i] + at] : p->oj[p->oi[i] + at - nd];
+
+      for (PetscInt e = 0; e < 9; e++) {
+        if (s->fixed[i] & (1 << e / 3) || s->fixed[j] & (1 << e % 3))
+          block[9 * (ia[k] + at) + e] = i == j && e % 4 == 0 ? o->prescribed_diagonal : 0.;
+      }
+    }
+  }
   PetscCall(PetscFree(wanted));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -15,34 +15,14 @@ void SbSpaceCellRotations(SbSpace s, const PetscReal x[], SbPack R[])
 
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
-    const SbMaterial m = region->material;
 
     for (PetscInt b = region->bstart; b < region->bend; b++) {
-      SbPoints at = SbBatchPoints(s, region, b);
       SbPack U[30], F[SB_POINTS][9];
 
-      if (!x || m->linear) {
-        for (PetscInt k = 0; k < (region->quadratic ? 36 : 9); k++) {
-          for (int l = 0; l < SB_BATCH; l++) R[stride * b + k][l] = k % 9 % 4 == 0;
-        }
-        continue;
-      }
-      if (region->quadratic) {
-        sb_gather_nodes(10, sb_quadratic_nodes(s, b), x, U);
-        at.n = 4; /* of a curved cell the first four of its points */
-        SbQuadraticGradients(&at, (const SbPack *)U, PETSC_FALSE, F);
-      } else {
-        sb_gather(s->batch_node + 4 * SB_BATCH * b, x, U);
-        SbCellGradient(s->batch_g + 9 * b, (const SbPack *)U, F[0]);
-      }
-      for (int q = 0; q < (region->quadratic ? 4 : 1); q++) {
-        SbPack *to = R + stride * b + 9 * q;
-
-        if (m->ops.frame)
-          m->ops.frame(m, (const SbPack *)F[q], to);
-        else
-          SbPolar((const SbPack *)F[q], to);
-      }
+      SbBatchGradients(s, region, b, x, PETSC_FALSE, U, F);
+      /* of a curved cell at the first four of its points */
+      for (int q = 0; q < (region->quadratic ? 4 : 1); q++)
+        SbMaterialRotation(region->material, (const SbPack *)F[q], R + stride * b + 9 * q);
     }
   }
 }

@@ -34,7 +34,6 @@ typedef struct {
   Row i: y_i += A_ii x_i, and for each block behind the diagonal y_i += A_ij x_j and y_j += A_ij^T x_i. a: the row's blocks by
   columns; column: their n columns, i first.
 */
-#if defined(SB_HAS_FOUR)
 SB_INLINE void row_product(const PetscScalar *a, PetscInt n, const PetscInt column[], const PetscScalar x[],
                            PetscScalar y[])
 {
@@ -58,22 +57,6 @@ SB_INLINE void row_product(const PetscScalar *a, PetscInt n, const PetscInt colu
   }
   for (int k = 0; k < 3; k++) w[k] += sum[k];
 }
-#else
-SB_INLINE void row_product(const PetscScalar *a, PetscInt n, const PetscInt column[], const PetscScalar x[],
-                           PetscScalar y[])
-{
-  const PetscScalar *xi = x + 3 * (size_t)column[0];
-  PetscScalar *yi = y + 3 * (size_t)column[0];
-
-  for (PetscInt k = 0; k < n; k++) {
-    const PetscScalar *b = a + 9 * k, *xj = x + 3 * (size_t)column[k];
-    PetscScalar *yj = y + 3 * (size_t)column[k];
-
-    for (int c = 0; c < 3; c++) yi[c] += b[c] * xj[0] + b[3 + c] * xj[1] + b[6 + c] * xj[2];
-    for (int c = 0; k > 0 && c < 3; c++) yj[c] += SbDot3(b + 3 * c, xi);
-  }
-}
-#endif
 
 /* y += A x; row i has the columns column[first[i]..end[i]), the first of them i. */
 SB_KERNEL static void multiply(PetscInt nrow, const PetscInt first[restrict], const PetscInt end[restrict],

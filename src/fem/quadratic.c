@@ -37,17 +37,39 @@ SbPoints SbBatchPoints(SbSpace s, const SbRegion *region, PetscInt b)
   return at;
 }
 
-void SbQuadraticGradients(const SbPoints *at, const SbPack U[30], PetscBool rate, SbPack F[SB_POINTS][9])
+void SbBatchGradients(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[], PetscBool rate,
+                      SbPack U[30], SbPack F[SB_POINTS][9])
 {
-  for (int q = 0; q < at->n; q++) {
-    const SbPack *g = at->g + at->step * q;
-    SbPack u[12];
+  const SbPoints at = SbBatchPoints(s, region, b);
 
-    SbQuadraticAt(at->rule->L[q], U, u);
+  if (x)
+    sb_gather_strain(s, region, b, x, U);
+  else
+    memset(U, 0, 30 * sizeof(SbPack));
+  for (int q = 0; q < at.n; q++) {
+    const SbPack *g = at.g + at.step * q;
+    SbPack here[12], *u = region->quadratic ? here : U;
+
+    if (region->quadratic) SbQuadraticAt(at.rule->L[q], (const SbPack *)U, here);
     if (rate)
       SbCellGradientRate(g, (const SbPack *)u, F[q]);
     else
       SbCellGradient(g, (const SbPack *)u, F[q]);
+  }
+}
+
+void SbPointForce(const SbPoints *at, int q, const SbPack P[9], SbPack f[30])
+{
+  SbPack W, corner[12];
+
+  for (int l = 0; l < SB_BATCH; l++) W[l] = at->weight[q][l] * (*at->V)[l];
+  SbCellForce(at->g + at->step * q, W, P, corner);
+  if (at->rule) {
+    SbQuadraticAdd(at->rule->L[q], (const SbPack *)corner, f);
+    return;
+  }
+  for (int k = 0; k < 12; k++) {
+    for (int l = 0; l < SB_BATCH; l++) f[k][l] += corner[k][l];
   }
 }
 
@@ -99,13 +121,7 @@ void SbBatchState(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal
   const SbPoints at = SbBatchPoints(s, region, b);
   SbPack U[30], p;
 
-  if (region->quadratic) {
-    sb_gather_nodes(10, sb_quadratic_nodes(s, b), x, U);
-    SbQuadraticGradients(&at, (const SbPack *)U, PETSC_FALSE, F);
-  } else {
-    sb_gather_strain(s, region, b, x, U);
-    SbCellGradient(at.g, (const SbPack *)U, F[0]);
-  }
+  SbBatchGradients(s, region, b, x, PETSC_FALSE, U, F);
   for (int q = 0; q < at.n; q++) {
     if (P) m->ops.stress(m, (const SbPack *)F[q], P[q]);
     if (psi) m->ops.energy(m, (const SbPack *)F[q], psi[q]);

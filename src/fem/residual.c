@@ -3,92 +3,62 @@
 
   f_a = V P grad phi_a with P from the law, and beta (dP/dF : H) for stiffness-proportional damping, H = grad v. Ghost cells are
   evaluated too: every owned node then has all its contributions. Energies sum over owned cells only.
+
+  The pressure that goes with lambda, p = -lambda theta(F), theta the change of volume as the law measures it: where poisson is near 0.5
+  lambda is large and theta small. P1 has fewer displacements than such cells have conditions on their volume: it locks, and p alternates
+  between neighbours. CR and DG satisfy the conditions in the mean of each cell and p converges (Crouzeix and Raviart 1973; Hansbo and
+  Larson 2002).
 */
 #include "fem_impl.h"
 #include "sbkernel.h"
 #include "sblog.h"
 
 /*
-  P2. Each point has its part of the volume; the volumetric part is that of the mean of the cell. Damping alike: mu (H + R H^T R) at the points, lambda times the
-  mean of R : H.
+  Elastic forces of a region (elastic), and those of its damping. P2: each point has its part of the volume; the volumetric part is that of the mean of the cell. Damping
+  alike: mu (H + R H^T R) at the points, lambda times the mean of R : H.
 */
-static void add_quadratic_force(SbSpace s, const SbRegion *region, const SbStage *stage, PetscReal f[])
+static void add_forces(SbSpace s, const SbRegion *region, PetscBool elastic, const SbStage *stage,
+                       PetscReal f[])
 {
   const SbMaterial m = region->pointwise;
-  const PetscReal beta = stage->v ? region->beta : 0.,
+  const PetscReal beta = stage->v ? s->beta[region->body] : 0.,
                   lambda = region->material->ops.volumetric_modulus(region->material);
   const PetscBool mean = (PetscBool)(m != region->material);
 
   for (PetscInt b = region->bstart; b < region->bend; b++) {
     const SbPoints at = SbBatchPoints(s, region, b);
-    SbPack U[30], F[SB_POINTS][9], H[SB_POINTS][9], P[9], dP[9], R[9], W, fe[12], f10[30] = {{0}}, b10[30], p;
+    SbPack U[30], F[SB_POINTS][9], H[SB_POINTS][9], P[9] = {{0}}, dP[9], R[9], fe[30], b10[30], p = {0};
 
-    sb_gather_nodes(10, sb_quadratic_nodes(s, b), stage->u, U);
-    SbQuadraticGradients(&at, (const SbPack *)U, PETSC_FALSE, F);
-    if (mean) {
+    memset(fe, 0, (size_t)(3 * region->nnode) * sizeof(SbPack));
+    SbBatchGradients(s, region, b, stage->u, PETSC_FALSE, U, F);
+    if (mean && elastic) {
       SbQuadraticVolume(region->material, &at, (const SbPack *)U, (const SbPack(*)[9])F, p, b10);
       for (int k = 0; k < 30; k++) {
-        for (int l = 0; l < SB_BATCH; l++) f10[k][l] = p[l] * b10[k][l];
+        for (int l = 0; l < SB_BATCH; l++) fe[k][l] = p[l] * b10[k][l];
       }
     }
     if (beta != 0.) {
-      sb_gather_nodes(10, sb_quadratic_nodes(s, b), stage->v, U);
-      SbQuadraticGradients(&at, (const SbPack *)U, PETSC_TRUE, H);
+      SbBatchGradients(s, region, b, stage->v, PETSC_TRUE, U, H);
       for (int l = 0; l < SB_BATCH; l++) p[l] = 0.;
       for (int q = 0; q < at.n && mean; q++) {
-        if (m->linear)
-          m->ops.frame(m, (const SbPack *)F[q], R);
-        else
-          SbPolar((const SbPack *)F[q], R);
+        SbMaterialRotation(m, (const SbPack *)F[q], R);
         for (int k = 0; k < 9; k++) {
           for (int l = 0; l < SB_BATCH; l++) p[l] += at.weight[q][l] * beta * lambda * R[k][l] * H[q][k][l];
         }
       }
     }
     for (int q = 0; q < at.n; q++) {
-      m->ops.stress(m, (const SbPack *)F[q], P);
+      if (elastic) m->ops.stress(m, (const SbPack *)F[q], P);
       if (beta != 0.) {
         SbMaterialDampingStress(m, (const SbPack *)F[q], (const SbPack *)H[q], dP);
-        if (mean && m->linear)
-          m->ops.frame(m, (const SbPack *)F[q], R);
-        else if (mean)
-          SbPolar((const SbPack *)F[q], R);
+        if (mean) SbMaterialRotation(m, (const SbPack *)F[q], R);
         for (int k = 0; k < 9; k++) {
-          for (int l = 0; l < SB_BATCH; l++) P[k][l] += beta * dP[k][l] + (mean ? p[l] * R[k][l] : 0.);
+          for (int l = 0; l < SB_BATCH; l++)
+            P[k][l] = (elastic ? P[k][l] : 0.) + beta * dP[k][l] + (mean ? p[l] * R[k][l] : 0.);
         }
       }
-      SbPointVolume(&at, q, W);
-      SbCellForce(at.g + at.step * q, W, (const SbPack *)P, fe);
-      SbQuadraticAdd(at.rule->L[q], (const SbPack *)fe, f10);
+      SbPointForce(&at, q, (const SbPack *)P, fe);
     }
-    sb_scatter_nodes(10, sb_quadratic_nodes(s, b), s->batch_n[b], (const SbPack *)f10, f);
-  }
-}
-
-/* P1, CR and DG: one point in a cell. */
-static void add_linear_force(SbSpace s, const SbRegion *region, const SbStage *stage, PetscReal f[])
-{
-  const SbMaterial m = region->material;
-  const PetscReal beta = stage->v ? region->beta : 0.;
-
-  for (PetscInt b = region->bstart; b < region->bend; b++) {
-    const SbPack *g = s->batch_g + 9 * b;
-    SbPack u[12], F[9], P[9], fe[12];
-
-    sb_gather_strain(s, region, b, stage->u, u);
-    SbCellGradient(g, (const SbPack *)u, F);
-    m->ops.stress(m, (const SbPack *)F, P);
-    if (beta != 0.) {
-      SbPack H[9], dP[9];
-
-      sb_gather_strain(s, region, b, stage->v, u);
-      SbCellGradientRate(g, (const SbPack *)u, H);
-      SbMaterialDampingStress(m, (const SbPack *)F, (const SbPack *)H, dP);
-      for (int k = 0; k < 9; k++) {
-        for (int l = 0; l < SB_BATCH; l++) P[k][l] += beta * dP[k][l];
-      }
-    }
-    SbCellForce(g, s->batch_V[b], (const SbPack *)P, fe);
     sb_scatter_strain(s, region, b, fe, f);
   }
 }
@@ -101,10 +71,7 @@ PetscErrorCode SbSpaceAddInternalForce(SbSpace s, const SbStage *stage, PetscRea
     const SbRegion *region = &s->region[r];
 
     PetscCall(PetscLogEventBegin(region->material->event, 0, 0, 0, 0));
-    if (region->quadratic)
-      add_quadratic_force(s, region, stage, f);
-    else
-      add_linear_force(s, region, stage, f);
+    add_forces(s, region, PETSC_TRUE, stage, f);
     PetscCall(PetscLogEventEnd(region->material->event, 0, 0, 0, 0));
   }
   if (s->jump) {
@@ -115,39 +82,21 @@ PetscErrorCode SbSpaceAddInternalForce(SbSpace s, const SbStage *stage, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Mass-proportional damping of a region with the lumped mass. */
-static void add_lumped_damping(SbSpace s, const SbRegion *region, const PetscReal v[], PetscReal f[])
+/* Consistent mass of a region times w = a + alpha v. */
+static void add_consistent_inertia(SbSpace s, const SbRegion *region, const SbStage *stage, PetscReal f[])
 {
-  const PetscReal damping = region->alpha * region->material->density;
+  const PetscReal alpha = stage->v ? s->alpha[region->body] : 0., density = region->material->density;
+  const int n = (int)region->nnode;
+  PetscReal mass[SB_CELL_NODES * SB_CELL_NODES];
 
+  for (int k = 0; k < n * n; k++) mass[k] = density * SbCellMass(region, k / n, k % n);
   for (PetscInt b = region->bstart; b < region->bend; b++) {
-    for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-      for (PetscInt a = 0; a < (region->quadratic ? 10 : 4); a++) {
-        const PetscInt node = s->batch_clique[(s->width * b + a) * SB_BATCH + l];
-
-        const PetscReal share = damping * SbQuadraticLumped(region, b, a, l);
-
-        for (PetscInt i = 0; i < 3; i++) f[3 * node + i] += share * s->batch_V[b][l] * v[3 * node + i];
-      }
-    }
-  }
-}
-
-/* Consistent mass of a P2 region times w = a + alpha v. */
-static void add_quadratic_inertia(SbSpace s, const SbRegion *region, const SbStage *stage, PetscReal f[])
-{
-  const PetscReal alpha = stage->v ? region->alpha : 0.;
-  PetscReal mass[SB_CELL_NODES][SB_CELL_NODES];
-
-  for (int k = 0; k < 100; k++)
-    mass[k / 10][k % 10] = region->material->density * SbQuadraticMass(k / 10, k % 10);
-  for (PetscInt b = region->bstart; b < region->bend; b++) {
-    const PetscInt *node = sb_quadratic_nodes(s, b);
+    const PetscInt *node = sb_batch_nodes(s, b);
     SbPack w[30] = {{0}}, v[30], fe[30] = {{0}};
 
-    if (stage->a) sb_gather_nodes(10, node, stage->a, w);
-    if (alpha != 0.) sb_gather_nodes(10, node, stage->v, v);
-    for (int k = 0; alpha != 0. && k < 30; k++) {
+    if (stage->a) sb_gather_nodes(n, node, stage->a, w);
+    if (alpha != 0.) sb_gather_nodes(n, node, stage->v, v);
+    for (int k = 0; alpha != 0. && k < 3 * n; k++) {
       for (int l = 0; l < SB_BATCH; l++) w[k][l] += alpha * v[k][l];
     }
     for (int q = 0; region->curve_g && q < SB_POINTS; q++) {
@@ -161,59 +110,26 @@ static void add_quadratic_inertia(SbSpace s, const SbRegion *region, const SbSta
         for (int l = 0; l < SB_BATCH; l++) here[k % 3][l] += phi[k / 3] * w[k][l];
       }
       for (int k = 0; k < 30; k++) {
-        for (int l = 0; l < SB_BATCH; l++)
-          fe[k][l] += region->material->density * W[l] * phi[k / 3] * here[k % 3][l];
+        for (int l = 0; l < SB_BATCH; l++) fe[k][l] += density * W[l] * phi[k / 3] * here[k % 3][l];
       }
     }
-    for (int k = 0; !region->curve_g && k < 300; k++) {
+    for (int k = 0; !region->curve_g && k < 3 * n * n; k++) {
       for (int l = 0; l < SB_BATCH; l++)
-        fe[k / 30 * 3 + k % 3][l] += mass[k / 30][k / 3 % 10] * s->batch_V[b][l] * w[k % 30][l];
+        fe[k / (3 * n) * 3 + k % 3][l] += mass[k / 3] * s->batch_V[b][l] * w[k % (3 * n)][l];
     }
-    sb_scatter_nodes(10, node, s->batch_n[b], (const SbPack *)fe, f);
-  }
-}
-
-/* The same of a P1, CR or DG region. */
-static void add_linear_inertia(SbSpace s, const SbRegion *region, const SbStage *stage, PetscReal f[])
-{
-  const SbElementOps *e = &region->element->ops;
-  const PetscReal alpha = stage->v ? region->alpha : 0.;
-
-  for (PetscInt b = region->bstart; b < region->bend; b++) {
-    const PetscInt *node = s->batch_node + 4 * SB_BATCH * b;
-    SbPack w[12] = {{0}}, v[12], fe[12];
-
-    if (stage->a) sb_gather(node, stage->a, w);
-    if (alpha != 0.) sb_gather(node, stage->v, v);
-    for (int k = 0; alpha != 0. && k < 12; k++) {
-      for (int l = 0; l < SB_BATCH; l++) w[k][l] += alpha * v[k][l];
-    }
-    for (int k = 0; k < 12; k++) {
-      for (int l = 0; l < SB_BATCH; l++) {
-        const PetscReal sum = w[k % 3][l] + w[3 + k % 3][l] + w[6 + k % 3][l] + w[9 + k % 3][l];
-
-        fe[k][l] = region->material->density * s->batch_V[b][l] *
-                   ((e->mass_diagonal - e->mass_coupling) * w[k][l] + e->mass_coupling * sum);
-      }
-    }
-    sb_scatter_add(node, s->batch_n[b], (const SbPack *)fe, f);
+    sb_scatter_nodes(n, node, s->batch_n[b], (const SbPack *)fe, f);
   }
 }
 
 void SbSpaceAddInertia(SbSpace s, const SbStage *stage, PetscReal f[])
 {
   if (s->consistent_mass) {
-    for (PetscInt r = 0; r < s->nregion; r++) {
-      if (s->region[r].quadratic)
-        add_quadratic_inertia(s, &s->region[r], stage, f);
-      else
-        add_linear_inertia(s, &s->region[r], stage, f);
-    }
+    for (PetscInt r = 0; r < s->nregion; r++) add_consistent_inertia(s, &s->region[r], stage, f);
     return;
   }
-  for (PetscInt i = 0; stage->a && i < 3 * s->nnode_owned; i++) f[i] += s->node_mass[i / 3] * stage->a[i];
-  for (PetscInt r = 0; stage->v && r < s->nregion; r++) {
-    if (s->region[r].alpha != 0.) add_lumped_damping(s, &s->region[r], stage->v, f);
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
+    if (stage->a) f[i] += s->node_mass[i / 3] * stage->a[i];
+    if (stage->v) f[i] += s->alpha[s->node_body[i / 3]] * s->node_mass[i / 3] * stage->v[i];
   }
 }
 
@@ -237,22 +153,24 @@ static PetscReal lane_det(const SbPack F[9], PetscInt l)
          F[2][l] * (F[3][l] * F[7][l] - F[4][l] * F[6][l]);
 }
 
-void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscReal J[], PetscReal psi[])
+void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscReal J[], PetscReal psi[],
+                      PetscReal pressure[])
 {
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
       const SbPoints at = SbBatchPoints(s, region, b);
-      SbPack F[SB_POINTS][9], P[SB_POINTS][9], energy[SB_POINTS];
+      SbPack F[SB_POINTS][9], P[SB_POINTS][9], energy[SB_POINTS], p[SB_POINTS];
 
       /* means over the points */
-      SbBatchState(s, region, b, x, F, sigma ? P : NULL, psi ? energy : NULL, NULL);
+      SbBatchState(s, region, b, x, F, sigma ? P : NULL, psi ? energy : NULL, pressure ? p : NULL);
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
         const PetscInt c = s->batch_cell[b] + l;
 
         if (J) J[c] = 0.;
         if (psi) psi[c] = 0.;
+        if (pressure) pressure[c] = 0.;
         for (int k = 0; sigma && k < 6; k++) sigma[6 * c + k] = 0.;
         for (int q = 0; q < at.n; q++) {
           const PetscReal det = lane_det((const SbPack *)F[q], l), part = at.weight[q][l];
@@ -260,6 +178,7 @@ void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscRe
 
           if (J) J[c] += part * det;
           if (psi) psi[c] += part * energy[q][l];
+          if (pressure) pressure[c] += part * p[q][l];
           if (!sigma) continue;
           /* small strain has one stress: P itself */
           if (region->material->linear) {
@@ -282,7 +201,7 @@ static void quadratic_volume(SbSpace s, PetscInt b, const SbPoints *at, const Pe
   const SbPointRule *rule = SbVolumeRule(at);
   SbPack U[30], u[12], F[9];
 
-  sb_gather_nodes(10, sb_quadratic_nodes(s, b), x, U);
+  sb_gather_nodes(10, sb_batch_nodes(s, b), x, U);
   for (int q = 0; q < rule->n; q++) {
     SbQuadraticAt(rule->L[q], (const SbPack *)U, u);
     SbCellGradient(at->g + at->step * q, (const SbPack *)u, F);
@@ -333,55 +252,21 @@ void SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal body[], Petsc
   if (s->jump) *energy += SbJumpEnergy(s, x, SB_JUMP_STIFFNESS, body);
 }
 
-/* The power of a P2 region's damping: its force times the velocity. */
-static PetscErrorCode quadratic_power(SbSpace s, const SbRegion *region, const PetscReal x[],
-                                      const PetscReal v[], PetscReal *power)
+PetscErrorCode SbSpaceDampingPower(SbSpace s, const PetscReal x[], const PetscReal v[], PetscReal *power)
 {
-  const SbStage damped = {.u = x, .v = v}, still = {.u = x};
+  const SbStage stage = {.u = x, .v = v};
   PetscReal *f;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(6 * s->nnode, &f));
-  add_quadratic_force(s, region, &damped, f);
-  add_quadratic_force(s, region, &still, f + 3 * s->nnode);
-  add_lumped_damping(s, region, v, f);
-  for (PetscInt i = 0; i < 3 * s->nnode; i++) *power += v[i] * (f[i] - f[3 * s->nnode + i]);
-  PetscCall(PetscFree(f));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbSpaceDampingPower(SbSpace s, const PetscReal x[], const PetscReal v[], PetscReal *power)
-{
-  PetscFunctionBeginUser;
-  *power = 0.;
+  PetscCall(PetscCalloc1(3 * s->nnode, &f));
   for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
-    const SbMaterial m = region->material;
-
-    if (!region->owned || (region->alpha == 0. && region->beta == 0.)) continue;
-    if (region->quadratic) {
-      PetscCall(quadratic_power(s, region, x, v, power));
-      continue;
-    }
-    for (PetscInt b = region->bstart; b < region->bend; b++) {
-      SbPack u[12], F[9], H[9], dP[9];
-
-      sb_gather_strain(s, region, b, x, u);
-      SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, F);
-      sb_gather_strain(s, region, b, v, u);
-      SbCellGradientRate(s->batch_g + 9 * b, (const SbPack *)u, H);
-      SbMaterialDampingStress(m, (const SbPack *)F, (const SbPack *)H, dP);
-      sb_gather(s->batch_node + 4 * SB_BATCH * b, v, u);
-      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        PetscReal hooke = 0., inertia = 0.;
-
-        for (int k = 0; k < 9; k++) hooke += H[k][l] * dP[k][l];
-        for (int k = 0; k < 12; k++) inertia += u[k][l] * u[k][l];
-        *power += s->batch_V[b][l] * (region->beta * hooke + region->alpha * m->density *
-                                                               region->element->ops.mass_lumped * inertia);
-      }
-    }
+    if (s->region[r].owned && s->beta[s->region[r].body] != 0.)
+      add_forces(s, &s->region[r], PETSC_FALSE, &stage, f);
   }
-  if (s->jump) *power += 2. * SbJumpEnergy(s, v, SB_JUMP_DAMPING, NULL);
+  *power = s->jump ? 2. * SbJumpEnergy(s, v, SB_JUMP_DAMPING, NULL) : 0.;
+  for (PetscInt i = 0; i < 3 * s->nnode; i++) *power += v[i] * f[i];
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
+    *power += s->alpha[s->node_body[i / 3]] * s->node_mass[i / 3] * v[i] * v[i];
+  PetscCall(PetscFree(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -60,6 +60,7 @@ static PetscErrorCode find_regions(SbSpace s, const SbMaterial material[], const
       r->owned = (PetscBool)(c < mesh->ncell_owned);
       r->broken = (PetscBool)(element[body]->nodes_per[3] > 0);
       r->quadratic = (PetscBool)(element[body]->nodes_per[1] > 0);
+      r->nnode = r->quadratic ? SB_CELL_NODES : 4;
       r->pointwise = material[m];
       if (r->quadratic && element[body]->mean_volume &&
           material[m]->ops.volumetric_modulus(material[m]) != 0.)
@@ -179,7 +180,7 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
   PetscCall(tabulate_batches(s));
   PetscCall(SbLayoutCliques(s));
   if (s->faces) PetscCall(SbJumpCreate(s, &s->jump));
-  PetscCall(PetscCalloc1(s->nnode, &s->node_mass));
+  PetscCall(PetscCalloc3(s->nnode, &s->node_mass, mesh->nbody, &s->alpha, mesh->nbody, &s->beta));
   s->node_share = s->node_mass;
   if (s->edge_node) PetscCall(PetscCalloc1(s->nnode, &s->node_share));
   for (PetscInt r = 0; r < s->nregion; r++) {
@@ -188,6 +189,9 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
     for (PetscInt b = region->bstart; b < region->bend; b++) {
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
         const PetscReal m = region->material->density * s->batch_V[b][l];
+        const SbPack *curved = region->curve_mass
+                                 ? (const SbPack *)region->curve_mass + SB_CELL_NODES * (b - region->bstart)
+                                 : NULL;
         PetscReal share[SB_CELL_NODES];
 
         /* the integrals of the basis functions of P2 */
@@ -197,12 +201,11 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
           (void)SbSpaceCurvedIntegrals(s, s->batch_cell[b] + l, NULL, share);
           for (int a = 0; a < SB_CELL_NODES; a++) share[a] /= s->batch_V[b][l];
         }
-        for (PetscInt a = 0; a < (region->quadratic ? SB_CELL_NODES : 4); a++) {
-          const PetscInt node = s->batch_clique[(s->width * b + a) * SB_BATCH + l];
+        for (PetscInt a = 0; a < region->nnode; a++) {
+          const PetscInt node = sb_batch_nodes(s, b)[a * SB_BATCH + l];
+          const SbElementOps *e = &region->element->ops;
 
-          s->node_mass[node] +=
-            a < 4 ? region->material->density * SbQuadraticLumped(region, b, a, l) * s->batch_V[b][l]
-                  : SbQuadraticLumped(region, b, a, l) * m;
+          s->node_mass[node] += m * (curved ? curved[a][l] : a < 4 ? e->mass_lumped : e->mass_lumped_edge);
           if (s->edge_node) s->node_share[node] += share[a] * m;
         }
       }
@@ -241,7 +244,7 @@ PetscErrorCode SbSpaceDestroy(SbSpace *space)
   PetscCall(PetscFree(s->batch_node));
   PetscCall(PetscFree(s->batch_memory));
   if (s->node_share != s->node_mass) PetscCall(PetscFree(s->node_share));
-  PetscCall(PetscFree(s->node_mass));
+  PetscCall(PetscFree3(s->node_mass, s->alpha, s->beta));
   PetscCall(PetscFree(s->fixed_node));
   PetscCall(PetscFree(s->fixed_value));
   PetscCall(PetscFree(*space));

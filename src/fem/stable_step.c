@@ -28,12 +28,11 @@ static void multiply_stiffness(SbSpace s, const PetscReal x[], PetscReal f[])
     const SbMaterial m = region->material;
     const PetscReal mu = m->ops.shear_modulus(m), lambda = m->ops.volumetric_modulus(m);
 
-    for (PetscInt b = region->bstart; region->quadratic && b < region->bend; b++) {
+    for (PetscInt b = region->bstart; b < region->bend; b++) {
       const SbPoints at = SbBatchPoints(s, region, b);
-      SbPack U[30], H[SB_POINTS][9], P[9], W, mean = {0}, fe[12], f10[30] = {{0}};
+      SbPack U[30], H[SB_POINTS][9], P[9], mean = {0}, fe[30] = {{0}};
 
-      sb_gather_nodes(10, sb_quadratic_nodes(s, b), x, U);
-      SbQuadraticGradients(&at, (const SbPack *)U, PETSC_TRUE, H);
+      SbBatchGradients(s, region, b, x, PETSC_TRUE, U, H);
       for (int l = 0; l < SB_BATCH; l++) {
         for (int q = 0; q < at.n; q++)
           mean[l] += at.weight[q][l] * lambda * (H[q][0][l] + H[q][4][l] + H[q][8][l]);
@@ -46,24 +45,8 @@ static void multiply_stiffness(SbSpace s, const PetscReal x[], PetscReal f[])
           for (int k = 0; k < 9; k++)
             P[k][l] = mu * (H[q][k][l] + H[q][3 * (k % 3) + k / 3][l]) + (k % 4 == 0 ? pressure : 0.);
         }
-        SbPointVolume(&at, q, W);
-        SbCellForce(at.g + at.step * q, W, (const SbPack *)P, fe);
-        SbQuadraticAdd(at.rule->L[q], (const SbPack *)fe, f10);
+        SbPointForce(&at, q, (const SbPack *)P, fe);
       }
-      sb_scatter_nodes(10, sb_quadratic_nodes(s, b), s->batch_n[b], (const SbPack *)f10, f);
-    }
-    for (PetscInt b = region->bstart; !region->quadratic && b < region->bend; b++) {
-      SbPack u[12], H[9], P[9], fe[12];
-
-      sb_gather_strain(s, region, b, x, u);
-      SbCellGradientRate(s->batch_g + 9 * b, (const SbPack *)u, H);
-      for (int l = 0; l < SB_BATCH; l++) {
-        const PetscReal pressure = lambda * (H[0][l] + H[4][l] + H[8][l]);
-
-        for (int k = 0; k < 9; k++)
-          P[k][l] = mu * (H[k][l] + H[3 * (k % 3) + k / 3][l]) + (k % 4 == 0 ? pressure : 0.);
-      }
-      SbCellForce(s->batch_g + 9 * b, s->batch_V[b], (const SbPack *)P, fe);
       sb_scatter_strain(s, region, b, fe, f);
     }
   }
@@ -128,27 +111,24 @@ static PetscErrorCode highest_frequency(SbSpace s, PetscReal *w)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Smallest eigenvalue of a cell's consistent mass relative to the lumped one; the constant function has one. */
-static PetscReal least_mass(SbElement e)
-{
-  if (e->nodes_per[1]) return 9. / 70.;
-  return PetscMin(1., (e->ops.mass_diagonal - e->ops.mass_coupling) / e->ops.mass_lumped);
-}
-
 PetscErrorCode SbSpaceStableStep(SbSpace s, PetscReal *dt)
 {
   PetscReal damping[2] = {0., 0.}, w = 0., least = 1., zeta;
 
   PetscFunctionBeginUser;
   PetscCall(highest_frequency(s, &w));
-  for (PetscInt b = 0; s->consistent_mass && b < s->mesh->nbody; b++)
-    least = PetscMin(least, least_mass(s->element[b]));
-  w /= PetscSqrtReal(least);
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    damping[0] = PetscMax(damping[0], s->region[r].alpha);
-    damping[1] = PetscMax(damping[1], s->region[r].beta);
+  for (PetscInt b = 0; b < s->mesh->nbody; b++) {
+    const SbElementOps *e = &s->element[b]->ops;
+
+    damping[0] = PetscMax(damping[0], s->alpha[b]);
+    damping[1] = PetscMax(damping[1], s->beta[b]);
+    /* the smallest eigenvalue of a cell's consistent mass relative to the lumped one; the constant function has one */
+    if (s->consistent_mass)
+      least =
+        PetscMin(least, s->element[b]->nodes_per[1] ? 9. / 70.
+                                                    : (e->mass_diagonal - e->mass_coupling) / e->mass_lumped);
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, damping, 2, MPIU_REAL, MPI_MAX, s->comm));
+  w /= PetscSqrtReal(least);
   *dt = PETSC_MAX_REAL;
   if (w <= 0.) PetscFunctionReturn(PETSC_SUCCESS);
   zeta = 0.5 * (damping[0] / w + damping[1] * w);

@@ -175,49 +175,25 @@ static void spin_blocks(const SbMaterial m, const SbPack *g, const SbPack V, con
   }
 }
 
-/* Hooke's tensor turned by R, with its damping. */
-static void isotropic_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
-                             const SbPack R[9], Split *split, SbPack K[10][9])
-{
-  const PetscReal both = x->stiffness + x->damping;
-  SbPack W;
-
-  scaled_volumes(V, both, W);
-  SbCellBlocksIsotropic(g, W, split ? 0. : x->lambda, x->mu, m->linear ? NULL : R, K);
-  if (split) {
-    memcpy(split->D, R, sizeof(split->D));
-    split->factor = both;
-  }
-}
-
 /* Blocks of a law at F, without mass; `split` NULL: whole. */
 static void law_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
                        const SbPack F[9], Split *split, SbPack K[10][9])
 {
-  SbPack R[9];
+  const PetscReal both = x->stiffness + x->damping;
+  SbPack R[9], W;
 
   if (m->linear || m->ops.frame) {
+    /* Hooke's tensor turned by R, with its damping */
     m->ops.frame(m, F, R);
-    isotropic_blocks(m, g, V, x, (const SbPack *)R, split, K);
+    scaled_volumes(V, both, W);
+    SbCellBlocksIsotropic(g, W, split ? 0. : x->lambda, x->mu, m->linear ? NULL : (const SbPack *)R, K);
+    if (!split) return;
+    memcpy(split->D, R, sizeof(split->D));
+    split->factor = both;
   } else if (m->ops.spin && x->stiffness != 0.)
     spin_blocks(m, g, V, x, F, split, K);
   else
     general_blocks(m, g, V, x, F, split, K);
-}
-
-/* The same of one batch. */
-static void batch_blocks(SbSpace s, const SbRegion *region, const PetscReal displacement[], const Factors *x,
-                         PetscInt b, Split *split, SbPack K[10][9])
-{
-  const SbMaterial m = region->material;
-  const SbPack *g = s->batch_g + 9 * b, *V = s->batch_V + b;
-  SbPack u[12], F[9];
-
-  if (!m->linear) {
-    sb_gather_strain(s, region, b, displacement, u);
-    SbCellGradient(g, (const SbPack *)u, F);
-  }
-  law_blocks(m, g, *V, x, (const SbPack *)F, split, K);
 }
 
 /* K_ab += factor b_a b_b^T */
@@ -257,11 +233,7 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
     b[30] = {{0}};
   Factors at = *x;
 
-  if (m->linear)
-    memset(U, 0, sizeof(U));
-  else
-    sb_gather_nodes(10, sb_quadratic_nodes(s, batch), displacement, U);
-  SbQuadraticGradients(&points, (const SbPack *)U, PETSC_FALSE, F);
+  SbBatchGradients(s, region, batch, m->linear ? NULL : displacement, PETSC_FALSE, U, F);
   if (mean) {
     SbQuadraticVolume(m, &points, (const SbPack *)U, (const SbPack(*)[9])F, p, b);
     at.lambda = 0.;
@@ -303,12 +275,10 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
   if (one_D || x->damping == 0.) return;
   memset(b, 0, sizeof(b));
   for (int q = 0; q < points.n; q++) {
-    SbPack R[9], f[12];
+    SbPack R[9];
 
     SbPolar((const SbPack *)F[q], R);
-    SbPointVolume(&points, q, W);
-    SbCellForce(points.g + points.step * q, W, (const SbPack *)R, f);
-    SbQuadraticAdd(points.rule->L[q], (const SbPack *)f, b);
+    SbPointForce(&points, q, (const SbPack *)R, b);
   }
   for (int l = 0; l < SB_BATCH; l++) factor[l] = (*V)[l] > 0. ? x->lambda * x->damping / (*V)[l] : 0.;
   add_dyad(factor, (const SbPack *)b, K);
@@ -344,65 +314,43 @@ typedef struct {
   PetscReal *face_term;
 } Fill;
 
-/* Adds the blocks of a batch and its consistent mass; K is overwritten. */
-static void fill_batch(const Fill *fill, PetscInt r, PetscInt b, PetscReal inertia, SbPack K[10][9])
+/* Adds the blocks of a batch, ten or SB_PAIRS, and its consistent mass; K is overwritten. */
+static void fill_batch(const Fill *fill, PetscInt r, PetscInt b, PetscReal inertia, SbPack K[][9])
 {
   const SbSpace s = fill->space;
   const SbRegion *region = &s->region[r];
+  const int npair = region->quadratic ? SB_PAIRS : 10;
 
   SbInsertClear(s, &fill->x, b);
   if (region->broken) {
     SbInsertBroken(s, &fill->x, b, (const SbPack(*)[9])K);
+    if (inertia == 0.) return;
     memset(K, 0, 90 * sizeof(SbPack));
   }
-  if (inertia != 0.) {
-    for (int p = 0; p < 10; p++) {
-      const PetscReal share = inertia * (SbPairA[p] == SbPairB[p] ? region->element->ops.mass_diagonal
-                                                                  : region->element->ops.mass_coupling);
+  if (inertia != 0. && region->curve_g) {
+    const SbPoints at = SbBatchPoints(s, region, b);
 
-      for (int i = 0; i < 3; i++) {
-        for (int l = 0; l < SB_BATCH; l++) K[p][4 * i][l] += share * s->batch_V[b][l];
+    /* K_ab += inertia int phi_a phi_b */
+    for (int q = 0; q < at.n; q++) {
+      PetscReal phi[SB_CELL_NODES];
+      SbPack W;
+
+      SbQuadraticBasis(at.rule->L[q], phi);
+      SbPointVolume(&at, q, W);
+      for (int k = 0; k < 3 * npair; k++) {
+        const PetscReal share = inertia * phi[SbPairA[k / 3]] * phi[SbPairB[k / 3]];
+
+        for (int l = 0; l < SB_BATCH; l++) K[k / 3][4 * (k % 3)][l] += share * W[l];
       }
     }
-  } else if (region->broken)
-    return;
-  SbInsertBatch(s, &fill->x, b, (const SbPack(*)[9])K);
-}
+  } else if (inertia != 0.) {
+    for (int k = 0; k < 3 * npair; k++) {
+      const PetscReal share = inertia * SbCellMass(region, SbPairA[k / 3], SbPairB[k / 3]);
 
-/*
-  The same cells in another space of the mesh. Between vertices the gradients are a third of those between faces, with the
-  opposite sign: the blocks a ninth.
-*/
-static void fill_other(const Fill *fill, PetscInt r, PetscInt b, PetscBool faces, PetscReal inertia,
-                       const SbPack K[10][9])
-{
-  const PetscReal scale = faces && fill->space->region[r].element->nodes_per[0] ? 1. / 9. : 1.;
-  SbPack copy[10][9] __attribute__((aligned(64)));
-
-  for (int k = 0; k < 90; k++) {
-    for (int l = 0; l < SB_BATCH; l++) copy[k / 9][k % 9][l] = scale * K[k / 9][k % 9][l];
-  }
-  fill_batch(fill, r, b, inertia, copy);
-}
-
-/* K_ab += inertia int phi_a phi_b of curved cells. */
-static void add_curved_mass(SbSpace s, const SbRegion *region, PetscInt b, PetscReal inertia,
-                            SbPack K[SB_PAIRS][9])
-{
-  const SbPoints at = SbBatchPoints(s, region, b);
-
-  for (int q = 0; q < at.n; q++) {
-    PetscReal phi[SB_CELL_NODES];
-    SbPack W;
-
-    SbQuadraticBasis(at.rule->L[q], phi);
-    SbPointVolume(&at, q, W);
-    for (int k = 0; k < 3 * SB_PAIRS; k++) {
-      const PetscReal share = inertia * phi[SbPairA[k / 3]] * phi[SbPairB[k / 3]];
-
-      for (int l = 0; l < SB_BATCH; l++) K[k / 3][4 * (k % 3)][l] += share * W[l];
+      for (int l = 0; l < SB_BATCH; l++) K[k / 3][4 * (k % 3)][l] += share * s->batch_V[b][l];
     }
   }
+  SbInsertBatch(s, &fill->x, b, npair, (const SbPack(*)[9])K);
 }
 
 /* fill[0] is the matrix of the space itself. */
@@ -411,52 +359,37 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
 {
   const SbRegion *region = &s->region[r];
   const SbMaterial m = region->material;
-  const PetscReal inertia = m->density * (stage->shift_a + stage->shift_v * region->alpha);
+  const PetscReal inertia = m->density * (stage->shift_a + stage->shift_v * s->alpha[region->body]);
   const Factors factors = {.stiffness = stage->shift_k,
-                           .damping = stage->shift_v * region->beta,
+                           .damping = stage->shift_v * s->beta[region->body],
                            .inertia = s->consistent_mass ? inertia : 0.,
                            .lambda = m->ops.volumetric_modulus(m),
                            .mu = m->ops.shear_modulus(m)};
   const PetscBool faces = (PetscBool)!region->element->nodes_per[0];
   Split kept, *split = out && faces && factors.lambda > 0. ? &kept : NULL;
 
-  for (PetscInt b = region->bstart; region->quadratic && b < region->bend; b++) {
-    SbPack K[SB_PAIRS][9] __attribute__((aligned(64)));
-
-    quadratic_blocks(s, region, stage->u, &factors, b, out, K);
-    if (factors.inertia != 0. && region->curve_g) add_curved_mass(s, region, b, factors.inertia, K);
-    for (int p = 0; factors.inertia != 0. && !region->curve_g && p < SB_PAIRS; p++) {
-      const PetscReal share = factors.inertia * SbQuadraticMass(SbPairA[p], SbPairB[p]);
-
-      for (int k = 0; k < 3 * SB_BATCH; k++)
-        K[p][4 * (k / SB_BATCH)][k % SB_BATCH] += share * s->batch_V[b][k % SB_BATCH];
-    }
-    SbInsertClear(s, &fill[0].x, b);
-    SbInsertQuadratic(s, &fill[0].x, b, (const SbPack(*)[9])K);
-  }
-  if (region->quadratic) return;
-
   for (PetscInt b = region->bstart; b < region->bend; b++) {
-    SbPack K[10][9] __attribute__((aligned(64)));
+    SbPack K[SB_PAIRS][9] __attribute__((aligned(64))), copy[10][9] __attribute__((aligned(64))), U[30],
+      F[SB_POINTS][9];
 
-    batch_blocks(s, region, stage->u, &factors, b, split, K);
-    if (out) keep_volumetric(s, &factors, b, split, out);
-    for (PetscInt n = nfill - 1; n > 0; n--)
-      fill_other(&fill[n], r, b, faces, factors.inertia, (const SbPack(*)[9])K);
+    if (region->quadratic)
+      quadratic_blocks(s, region, stage->u, &factors, b, out, K);
+    else {
+      if (!m->linear) SbBatchGradients(s, region, b, stage->u, PETSC_FALSE, U, F);
+      law_blocks(m, s->batch_g + 9 * b, s->batch_V[b], &factors, (const SbPack *)F[0], split, K);
+      if (out) keep_volumetric(s, &factors, b, split, out);
+    }
+    /* the same cells in another space: between vertices the gradients are a third of those between faces, with the opposite sign */
+    for (PetscInt n = nfill - 1; n > 0 && !region->quadratic; n--) {
+      const PetscReal scale = faces && fill[n].space->region[r].element->nodes_per[0] ? 1. / 9. : 1.;
+
+      for (int k = 0; k < 90; k++) {
+        for (int l = 0; l < SB_BATCH; l++) copy[k / 9][k % 9][l] = scale * K[k / 9][k % 9][l];
+      }
+      fill_batch(&fill[n], r, b, factors.inertia, copy);
+    }
     fill_batch(&fill[0], r, b, factors.inertia, K);
   }
-}
-
-/* What the rows of each body begin with: its face terms, as stiffness and damping. */
-static PetscErrorCode face_term_factors(SbSpace s, const SbStage *stage, PetscReal **face_term)
-{
-  PetscFunctionBeginUser;
-  *face_term = NULL;
-  if (!s->jump) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscCalloc1(s->mesh->nbody, face_term));
-  for (PetscInt r = 0; r < s->nregion; r++)
-    (*face_term)[s->region[r].body] = stage->shift_k + stage->shift_v * s->region[r].beta;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static inline void add_to_diagonal(SbSpace s, const SbValues *x, PetscInt node, PetscReal value)
@@ -465,27 +398,6 @@ static inline void add_to_diagonal(SbSpace s, const SbValues *x, PetscInt node, 
   PetscScalar *v = sb_block(x, s->plan, node, s->plan->diagonal[node], &rs, &cs);
 
   for (size_t i = 0; i < 3; i++) v[i * (rs + cs)] += value;
-}
-
-/* The lumped mass, and what mass-proportional damping of single bodies adds to it. */
-static void add_lumped_mass(SbSpace s, const SbStage *stage, const SbValues *x)
-{
-  for (PetscInt i = 0; i < s->nnode_owned; i++) add_to_diagonal(s, x, i, stage->shift_a * s->node_mass[i]);
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
-    const PetscReal factor = stage->shift_v * region->alpha * region->material->density;
-
-    for (PetscInt b = region->bstart; factor != 0. && b < region->bend; b++) {
-      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        for (PetscInt a = 0; a < (region->quadratic ? 10 : 4); a++) {
-          const PetscInt node = s->batch_clique[(s->width * b + a) * SB_BATCH + l];
-          const PetscReal share = factor * SbQuadraticLumped(region, b, a, l);
-
-          if (node < s->nnode_owned) add_to_diagonal(s, x, node, share * s->batch_V[b][l]);
-        }
-      }
-    }
-  }
 }
 
 PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n, const SbSpace space[],
@@ -497,7 +409,11 @@ PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n,
   for (PetscInt k = 0; k < n; k++) {
     fill[k].space = space[k];
     PetscCall(SbValuesBegin(A[k], &fill[k].x));
-    PetscCall(face_term_factors(space[k], stage, &fill[k].face_term));
+    fill[k].face_term = NULL;
+    /* what the rows of each body begin with: its face terms, as stiffness and damping */
+    if (space[k]->jump) PetscCall(PetscMalloc1(s->mesh->nbody, &fill[k].face_term));
+    for (PetscInt b = 0; space[k]->jump && b < s->mesh->nbody; b++)
+      fill[k].face_term[b] = stage->shift_k + stage->shift_v * s->beta[b];
     fill[k].x.face_term = fill[k].face_term;
   }
   for (PetscInt r = 0; r < s->nregion; r++) {
@@ -506,8 +422,11 @@ PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n,
     PetscCall(PetscLogEventEnd(s->region[r].material->event, 0, 0, 0, 0));
   }
   for (PetscInt k = 0; k < n; k++) {
-    if (!s->consistent_mass && (stage->shift_a != 0. || stage->shift_v != 0.))
-      add_lumped_mass(space[k], stage, &fill[k].x);
+    /* the lumped mass, and its damping */
+    for (PetscInt i = 0; !s->consistent_mass && i < space[k]->nnode_owned; i++)
+      add_to_diagonal(space[k], &fill[k].x, i,
+                      (stage->shift_a + stage->shift_v * s->alpha[space[k]->node_body[i]]) *
+                        space[k]->node_mass[i]);
     PetscCall(SbValuesEnd(&fill[k].x));
     PetscCall(PetscFree(fill[k].face_term));
   }

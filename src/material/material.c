@@ -193,9 +193,6 @@ void SbMaterialDampingStress(const struct _p_SbMaterial *m, const SbPack F[9], c
 {
   SbPack R[9];
 
-  if (m->linear)
-    m->ops.frame(m, F, R);
-  else
-    SbPolar(F, R);
+  SbMaterialRotation(m, F, R);
   turned_hooke(m->ops.volumetric_modulus(m), m->ops.shear_modulus(m), (const SbPack *)R, H, dP);
 }

@@ -88,8 +88,7 @@ static PetscErrorCode cell_state(const SbField *f, SbRun run, const SbStep *step
   PetscFunctionBeginUser;
   if (!o->state_valid) {
     PetscCall(SbSpaceGetLocalRead(run->model->space, step->U, &u));
-    if (o->sigma || o->J || o->psi) SbSpaceCellState(run->model->space, u, o->sigma, o->J, o->psi);
-    if (o->pressure) SbSpaceCellPressure(run->model->space, u, o->pressure);
+    SbSpaceCellState(run->model->space, u, o->sigma, o->J, o->psi, o->pressure);
     PetscCall(SbSpaceRestoreLocalRead(run->model->space, step->U, &u));
     o->state_valid = PETSC_TRUE;
   }

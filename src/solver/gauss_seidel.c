@@ -17,7 +17,6 @@
 #include "sbassembly.h"
 #include "gauss_seidel.h"
 
-#if defined(SB_HAS_FOUR)
 /* z_j -= A_ij^T x for the n blocks behind the diagonal; what is in the fourth lane meets a zero of x. */
 SB_INLINE void push(const PetscScalar *a, PetscInt n, const PetscInt column[], const PetscReal x[3],
                     PetscScalar z[])
@@ -37,7 +36,7 @@ SB_INLINE void push(const PetscScalar *a, PetscInt n, const PetscInt column[], c
   }
 }
 
-  #define AHEAD (9 * 32) /* numbers: rows from the last one on are not foreseen by the processor */
+#define AHEAD (9 * 32) /* numbers: rows from the last one on are not foreseen by the processor */
 
 /* sum_j A_ij z_j over the n blocks behind the diagonal. */
 SB_INLINE void pull(const PetscScalar *a, PetscInt n, const PetscInt column[], const PetscScalar z[],
@@ -54,23 +53,6 @@ SB_INLINE void pull(const PetscScalar *a, PetscInt n, const PetscInt column[], c
   }
   for (int c = 0; c < 3; c++) sum[c] = s[c];
 }
-#else
-SB_INLINE void push(const PetscScalar *a, PetscInt n, const PetscInt column[], const PetscReal x[3],
-                    PetscScalar z[])
-{
-  for (PetscInt k = 0; k < n; k++) {
-    for (int c = 0; c < 3; c++) z[3 * (size_t)column[k] + (size_t)c] -= SbDot3(a + 9 * k + 3 * c, x);
-  }
-}
-
-SB_INLINE void pull(const PetscScalar *a, PetscInt n, const PetscInt column[], const PetscScalar z[],
-                    PetscReal sum[3])
-{
-  sum[0] = sum[1] = sum[2] = 0.;
-  for (PetscInt k = 0; k < 9 * n; k++)
-    sum[k % 3] += a[k] * z[3 * (size_t)column[k / 9] + (size_t)(k / 3 % 3)];
-}
-#endif
 
 /* y = D^-1 x, D^-1 by rows. */
 SB_INLINE void divide(const PetscReal inverse[9], const PetscReal x[3], PetscScalar y[3])

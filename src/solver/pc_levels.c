@@ -259,8 +259,8 @@ static PetscErrorCode loose_diagonal(SbLevels v, Vec D)
   PetscCall(VecGetArray(D, &d));
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
-    const PetscReal stiffness = v->shift_k + v->shift_v * region->beta,
-                    inertia = v->shift_a + v->shift_v * region->alpha;
+    const PetscReal stiffness = v->shift_k + v->shift_v * s->beta[region->body],
+                    inertia = v->shift_a + v->shift_v * s->alpha[region->body];
 
     for (PetscInt k = 4 * SB_BATCH * region->bstart; k < 4 * SB_BATCH * region->bend; k++) {
       const PetscInt i = s->batch_node[k];
@@ -350,12 +350,6 @@ PetscErrorCode SbLevelsAssemble(SbLevels v, const SbStage *stage, const SbVolume
   v->shift_k = stage->shift_k;
   if (v->sprung) PetscCall(PetscArrayzero(v->spring, 9 * (size_t)v->space->nnode_owned));
   v->sprung = PETSC_FALSE;
-  for (PetscInt k = 1; k < v->n; k++) {
-    for (PetscInt r = 0; r < v->space->nregion; r++) {
-      v->at[k]->region[r].alpha = v->space->region[r].alpha;
-      v->at[k]->region[r].beta = v->space->region[r].beta;
-    }
-  }
   PetscCall(SbSpaceAssembleSplit(v->space, stage, v->n, v->at, v->A, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -392,7 +386,7 @@ PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
 
         if (i >= s->nnode_owned || j < 0) continue;
         v->jump[i] = 1. / ((1. - w) * (1. - w) * own[3 * i] + w * w * own[3 * j] -
-                           2. * w * (1. - w) * (v->shift_k + v->shift_v * region->beta) *
+                           2. * w * (1. - w) * (v->shift_k + v->shift_v * s->beta[region->body]) *
                              p->face_term[at < 0][at < 0 ? ~at : at]);
       }
     }

@@ -28,18 +28,6 @@ static void clear_fixed(SbSpace s, PetscInt nnode, PetscReal x[])
   }
 }
 
-/* What the cells of a batch strain with, at the 4 or 10 nodes of each: u[3 n], and n. */
-static inline int gather_strain(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[],
-                                SbPack u[30])
-{
-  if (!region->quadratic) {
-    sb_gather_strain(s, region, b, x, u);
-    return 4;
-  }
-  sb_gather_nodes(10, s->batch_clique + s->width * SB_BATCH * b, x, u);
-  return 10;
-}
-
 /* d = B u. */
 static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar u[], PetscBool absolute,
                                        PetscScalar d[])
@@ -61,9 +49,9 @@ static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
       const SbPack *v = (const SbPack *)op->volume.b + op->volume.stride * b;
       SbPack cell_u[30], sum = {0};
-      const int n = gather_strain(s, region, b, local, cell_u);
 
-      for (int k = 0; k < 3 * n; k++) {
+      sb_gather_strain(s, region, b, local, cell_u);
+      for (int k = 0; k < 3 * region->nnode; k++) {
         for (int l = 0; l < SB_BATCH; l++)
           sum[l] += (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * cell_u[k][l];
       }
@@ -106,15 +94,11 @@ static PetscErrorCode add_gradient(SbPressureOperator op, const PetscScalar p[],
       SbPack force[30], lane = {0};
 
       for (PetscInt l = 0; l < s->batch_n[b]; l++) lane[l] = value[l];
-      for (int k = 0; k < (region->quadratic ? 30 : 12); k++) {
+      for (int k = 0; k < 3 * region->nnode; k++) {
         for (int l = 0; l < SB_BATCH; l++)
           force[k][l] = (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * lane[l];
       }
-      if (region->quadratic)
-        sb_scatter_nodes(10, s->batch_clique + s->width * SB_BATCH * b, s->batch_n[b], (const SbPack *)force,
-                         f);
-      else
-        sb_scatter_strain(s, region, b, force, f);
+      sb_scatter_strain(s, region, b, force, f);
     }
   }
   clear_fixed(s, s->nnode_owned, f);
@@ -213,7 +197,7 @@ static PetscErrorCode MatGetDiagonal_Pressure(Mat K, Vec D)
     for (PetscInt b = region->bstart; b < region->bend; b++) {
       const SbPack *v = (const SbPack *)op->volume.b + op->volume.stride * b;
 
-      for (PetscInt k = 0; k < (region->quadratic ? 30 : 12); k++) {
+      for (PetscInt k = 0; k < 3 * region->nnode; k++) {
         for (PetscInt l = 0; l < s->batch_n[b]; l++) {
           const PetscReal weight = region->broken ? s->batch_weight[4 * b + k / 3][l] : 1.,
                           square = op->volume.modulus[b][l] / s->batch_V[b][l] * PetscSqr(v[k][l]);
@@ -280,7 +264,7 @@ static void cell_numbers(SbPressureOperator op)
         const PetscReal V = s->batch_V[b][l], modulus = op->volume.modulus[b][l];
         PetscReal square = 0.;
 
-        for (int k = 0; k < (region->quadratic ? 30 : 12); k++)
+        for (int k = 0; k < 3 * region->nnode; k++)
           square += PetscSqr(op->volume.b[op->volume.stride * b + k][l]);
         op->norm[c] = PetscSqrtReal(square);
         op->Cinv[c] = modulus / V;

@@ -503,10 +503,9 @@ PetscErrorCode SbRunSetUp(SbRun run)
   PetscBool single, warped = PETSC_FALSE;
   char reason[128];
   PetscFunctionBeginUser;
-  for (PetscInt r = 0; r < m->space->nregion; r++) {
-    if (m->space->region[r].alpha != 0. || m->space->region[r].beta != 0.) run->damped = m->dynamic;
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    if (m->space->alpha[b] != 0. || m->space->beta[b] != 0.) run->damped = m->dynamic;
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &run->damped, 1, SB_MPI_BOOL, MPI_LOR, m->comm));
   PetscCall(SbSpaceCreateVec(m->space, &run->U));
   if (m->dynamic) {
     PetscCall(SbSpaceCreateVec(m->space, &run->V));

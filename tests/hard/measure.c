@@ -191,7 +191,7 @@ static PetscErrorCode measure_max_J(HardRun *r)
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(s->mesh->ncell_owned, &J));
   PetscCall(SbSpaceGetLocalRead(s, r->run->U, &u));
-  SbSpaceCellState(s, u, NULL, J, NULL);
+  SbSpaceCellState(s, u, NULL, J, NULL, NULL);
   PetscCall(SbSpaceRestoreLocalRead(s, r->run->U, &u));
   for (PetscInt c = 0; c < s->mesh->ncell_owned; c++) most = PetscMax(most, J[c]);
   PetscCall(PetscFree(J));

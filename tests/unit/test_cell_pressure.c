@@ -99,7 +99,7 @@ static PetscErrorCode test_scene(void)
   PetscCall(test_fill(scene.model, squeeze, scene.run->U));
   PetscCall(PetscMalloc1(scene.model->mesh->ncell_owned, &p));
   PetscCall(SbSpaceGetLocalRead(scene.model->space, scene.run->U, &u));
-  SbSpaceCellPressure(scene.model->space, u, p);
+  SbSpaceCellState(scene.model->space, u, NULL, NULL, NULL, p);
   PetscCall(SbSpaceRestoreLocalRead(scene.model->space, scene.run->U, &u));
   for (PetscInt c = 0; c < scene.model->mesh->ncell_owned; c++) {
     const PetscInt b = scene.model->mesh->cell_body[c];

@@ -1,18 +1,16 @@
 /*
-  Damping: its numbers in the regions of the bodies that it names, of all when it names none, added where two meet; body
+  Damping: its numbers for the bodies that it names, of all when it names none, added where two meet; body
   names that do not exist; the power that it takes, with every element.
 */
 // @ranks 1 3
 #include "effect_fixture.h"
 
-/* Every region of body b, owned or ghost, has alpha[b] and beta[b]. */
-static void check_regions(const Fixture *x, const PetscReal alpha[2], const PetscReal beta[2])
+/* Body b has alpha[b] and beta[b]. */
+static void check_bodies(const Fixture *x, const PetscReal alpha[2], const PetscReal beta[2])
 {
-  for (PetscInt r = 0; r < x->space->nregion; r++) {
-    const SbRegion *region = &x->space->region[r];
-
-    SB_CHECK_NEAR(region->alpha, alpha[region->body], 0, "alpha");
-    SB_CHECK_NEAR(region->beta, beta[region->body], 0, "beta");
+  for (PetscInt b = 0; b < 2; b++) {
+    SB_CHECK_NEAR(x->space->alpha[b], alpha[b], 0, "alpha");
+    SB_CHECK_NEAR(x->space->beta[b], beta[b], 0, "beta");
   }
 }
 
@@ -77,14 +75,14 @@ int main(int argc, char **argv)
   PetscCall(check_power("p2", "cr", PETSC_TRUE));
   fixture_use("p1", "p1", PETSC_FALSE);
   PetscCall(fixture_create(PETSC_COMM_WORLD, 2, "box:1,1,1:2", 0, NULL, &x));
-  check_regions(&x, (const PetscReal[2]){0, 0}, (const PetscReal[2]){0, 0});
+  check_bodies(&x, (const PetscReal[2]){0, 0}, (const PetscReal[2]){0, 0});
   PetscCall(effect_create(&x, "damping", "-effect_damping_alpha 0.5 -effect_damping_beta 0.25", &e[0]));
-  check_regions(&x, (const PetscReal[2]){0.5, 0.5}, (const PetscReal[2]){0.25, 0.25});
+  check_bodies(&x, (const PetscReal[2]){0.5, 0.5}, (const PetscReal[2]){0.25, 0.25});
   PetscCall(effect_create(
     &x, "thick",
     "-effect_thick_type damping -effect_thick_on other,other -effect_thick_alpha 1 -effect_thick_beta 0.01",
     &e[1]));
-  check_regions(&x, (const PetscReal[2]){0.5, 1.5}, (const PetscReal[2]){0.25, 0.25 + 0.01});
+  check_bodies(&x, (const PetscReal[2]){0.5, 1.5}, (const PetscReal[2]){0.25, 0.25 + 0.01});
   for (int i = 0; i < 2; i++) {
     SB_CHECK(!e[i]->ops.force && !e[i]->ops.tangent && !e[i]->ops.accept, "nothing to do at run time");
     PetscCall(SbEffectDestroy(&e[i]));
@@ -92,7 +90,7 @@ int main(int argc, char **argv)
   SB_CHECK_ERROR(effect_create(&x, "wrong", "-effect_wrong_type damping -effect_wrong_on blok", &e[2]),
                  PETSC_ERR_USER_INPUT, "block");
   PetscCall(SbEffectDestroy(&e[2]));
-  check_regions(&x, (const PetscReal[2]){0.5, 1.5}, (const PetscReal[2]){0.25, 0.25 + 0.01});
+  check_bodies(&x, (const PetscReal[2]){0.5, 1.5}, (const PetscReal[2]){0.25, 0.25 + 0.01});
   PetscCall(fixture_destroy(&x));
   SB_TEST_END();
 }

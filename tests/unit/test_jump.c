@@ -228,7 +228,7 @@ static PetscErrorCode check_state(SbModel m, const char *what, const PetscReal u
   SB_CHECK(worst < 1e-14, "%s: matrices and forces differ by %g", what, (double)worst);
   PetscCall(PetscArrayzero(fw, 3 * s->nnode));
   SbJumpAdd(s, u, SB_JUMP_DAMPING, fw);
-  beta = s->region[0].beta;
+  beta = s->beta[s->region[0].body];
   SB_CHECK(beta == 0.02, "beta is %g", (double)beta);
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) largest = PetscMax(largest, PetscAbsReal(f[i]));
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)

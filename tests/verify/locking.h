@@ -179,7 +179,7 @@ static inline PetscErrorCode locking_shell_errors(SbModel m, Vec U, PetscReal nu
   PetscCall(SbSpaceFindSet(s, "inside", "locking_shell", &inside));
   PetscCall(PetscMalloc1(6 * s->mesh->ncell, &sigma));
   PetscCall(SbSpaceGetLocalRead(s, U, &u));
-  SbSpaceCellState(s, u, sigma, NULL, NULL);
+  SbSpaceCellState(s, u, sigma, NULL, NULL, NULL);
   for (PetscInt c = 0; c < s->mesh->ncell_owned; c++) {
     VerifyCell cell;
     PetscBool wall = PETSC_FALSE;

@@ -45,7 +45,7 @@ static PetscErrorCode check_press(const char *element, const char *response, Pet
   s = t.model->space;
   PetscCall(PetscMalloc1(6 * s->mesh->ncell_owned, &sigma));
   PetscCall(SbSpaceGetLocalRead(s, t.run->U, &u));
-  SbSpaceCellState(s, u, sigma, NULL, NULL);
+  SbSpaceCellState(s, u, sigma, NULL, NULL, NULL);
   PetscCall(SbSpaceRestoreLocalRead(s, t.run->U, &u));
   for (PetscInt c = 0; c < 6 * s->mesh->ncell_owned; c++)
     worst = PetscMax(worst, PetscAbsReal(sigma[c] + (c % 6 == 2 ? LOAD : 0)) / LOAD);

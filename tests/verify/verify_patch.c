@@ -146,7 +146,7 @@ static PetscErrorCode errors(TestScene *t, const PetscReal F[9], const PetscReal
   error[0] = error[1] = 0.;
   PetscCall(PetscMalloc1(6 * s->mesh->ncell_owned, &cell));
   PetscCall(SbSpaceGetLocalRead(s, t->run->U, &u));
-  SbSpaceCellState(s, u, cell, NULL, NULL);
+  SbSpaceCellState(s, u, cell, NULL, NULL, NULL);
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     PetscReal x[3];
 

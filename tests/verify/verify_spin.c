@@ -53,7 +53,7 @@ static PetscErrorCode linear_stress(TestScene *t, PetscReal angle, PetscReal *er
   *error = 0.;
   PetscCall(PetscMalloc1(6 * s->mesh->ncell_owned, &sigma));
   PetscCall(SbSpaceGetLocalRead(s, t->run->U, &u));
-  SbSpaceCellState(s, u, sigma, NULL, NULL);
+  SbSpaceCellState(s, u, sigma, NULL, NULL, NULL);
   PetscCall(SbSpaceRestoreLocalRead(s, t->run->U, &u));
   for (PetscInt c = 0; c < s->mesh->ncell_owned; c++)
     *error = PetscMax(*error, PetscAbsReal(sigma[6 * c] / modulus - (PetscCosReal(angle) - 1.)));

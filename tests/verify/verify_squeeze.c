@@ -34,7 +34,7 @@ static PetscErrorCode stress_trace(TestScene *t, PetscReal *integral)
   *integral = 0;
   PetscCall(PetscMalloc2(6 * s->mesh->ncell_owned, &sigma, s->mesh->ncell_owned, &J));
   PetscCall(SbSpaceGetLocalRead(s, t->run->U, &u));
-  SbSpaceCellState(s, u, sigma, J, NULL);
+  SbSpaceCellState(s, u, sigma, J, NULL, NULL);
   PetscCall(SbSpaceRestoreLocalRead(s, t->run->U, &u));
   for (PetscInt c = 0; c < s->mesh->ncell_owned; c++) {
     const PetscReal *x[4];
