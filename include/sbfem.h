@@ -139,6 +139,9 @@ void SbSpaceAddInertia(SbSpace space, const SbStage *stage, PetscReal f[]);
   Collective. Input: U, m; keep: nowhere less stiff than it was. Output: changed (or NULL): by a percent or more, somewhere. Until the next call the face terms are constant; at first they are those of the rest state.
 */
 PetscErrorCode SbSpaceFollowJumps(SbSpace space, Vec U, PetscBool keep, PetscBool *changed);
+/* How stiff it is, [ncell_owned] Pa, borrowed; NULL: it follows nothing. Not collective. And back, for a run that goes on; collective. */
+PetscErrorCode SbSpaceGetJumps(SbSpace space, const PetscReal **modulus);
+PetscErrorCode SbSpaceSetJumps(SbSpace space, const PetscReal modulus[]);
 
 typedef enum { SB_MATRIX_AIJ, SB_MATRIX_BAIJ, SB_MATRIX_SBAIJ } SbMatrixKind; /* SBAIJ: one rank only */
 /* Preallocated matrix and the assembly plan. Collective. Caller destroys the matrix. */

@@ -19,8 +19,12 @@ void SbJumpAdd(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscRea
 PetscReal SbJumpEnergy(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal body[]);
 /* node[nbatch][8][SB_BATCH] of the faces, borrowed; returns nbatch. */
 PetscInt SbJumpCliques(SbSpace space, const PetscInt **node);
-/* The penalty of jumps as the state asks for, or, keep, as any before; any: a cell asks for another one than before, changed: that of a face is another by a percent or more, on this rank. */
-void SbJumpFollow(SbSpace space, const PetscReal x[], PetscBool keep, PetscBool *any, PetscBool *changed);
+/* [ncell] Pa, what the penalty of jumps follows; borrowed. */
+PetscReal *SbJumpModulus(SbSpace space);
+/* Makes it what the state asks for, or, keep, what any before did: whether a cell on this rank asks for another than before. */
+PetscBool SbJumpFollow(SbSpace space, const PetscReal x[], PetscBool keep);
+/* Then the penalties: whether that of a face on this rank is another by a percent or more. */
+PetscBool SbJumpRenew(SbSpace space);
 /* The matrix of the face in lane l of batch b, times the 3x3 identity; zero in padding. */
 void SbJumpMatrix(SbSpace space, PetscInt b, PetscInt l, PetscReal K[8][8]);
 

@@ -265,27 +265,40 @@ static PetscBool follow_batch(SbSpace s, const SbRegion *region, PetscInt b, con
   return changed;
 }
 
-void SbJumpFollow(SbSpace s, const PetscReal x[], PetscBool keep, PetscBool *any, PetscBool *changed)
+PetscReal *SbJumpModulus(SbSpace s)
+{
+  return s->jump->modulus;
+}
+
+PetscBool SbJumpRenew(SbSpace s)
 {
   const SbJump j = s->jump;
+  PetscBool changed = PETSC_FALSE;
 
-  *any = *changed = PETSC_FALSE;
+  for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
+    for (PetscInt l = 0; l < j->n[b]; l++, i++) {
+      const PetscReal before = j->c1[b][l];
+
+      face_factors(s, j, &j->face[i], &j->c0[b][l], &j->c1[b][l]);
+      if (PetscAbsReal(j->c1[b][l] - before) > RENEWED * before) changed = PETSC_TRUE;
+    }
+  }
+  return changed;
+}
+
+PetscBool SbJumpFollow(SbSpace s, const PetscReal x[], PetscBool keep)
+{
+  PetscBool any = PETSC_FALSE;
+
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
     const PetscBool jumps = (PetscBool)(!region->element->nodes_per[0] && !region->material->linear);
 
     for (PetscInt b = region->bstart; jumps && b < region->bend; b++) {
-      if (follow_batch(s, region, b, x, keep)) *any = PETSC_TRUE;
+      if (follow_batch(s, region, b, x, keep)) any = PETSC_TRUE;
     }
   }
-  for (PetscInt b = 0, i = 0; *any && b < j->nbatch; b++) {
-    for (PetscInt l = 0; l < j->n[b]; l++, i++) {
-      const PetscReal before = j->c1[b][l];
-
-      face_factors(s, j, &j->face[i], &j->c0[b][l], &j->c1[b][l]);
-      if (PetscAbsReal(j->c1[b][l] - before) > RENEWED * before) *changed = PETSC_TRUE;
-    }
-  }
+  return any;
 }
 
 PetscErrorCode SbJumpDestroy(SbJump *jump)

@@ -215,16 +215,36 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
 PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, PetscBool keep, PetscBool *changed)
 {
   const PetscReal *x;
-  PetscBool any, mine;
+  PetscBool any, mine = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   if (changed) *changed = PETSC_FALSE;
   if (!s->jump || s->linear) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbSpaceGetLocalRead(s, U, &x));
-  SbJumpFollow(s, x, keep, &any, &mine);
+  any = SbJumpFollow(s, x, keep);
+  if (any) mine = SbJumpRenew(s);
   PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
   if (changed) PetscCallMPI(MPI_Allreduce(&mine, changed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
   if (s->plan && any) sum_face_terms(s, s->plan);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceGetJumps(SbSpace s, const PetscReal **modulus)
+{
+  PetscFunctionBeginUser;
+  *modulus = s->jump && !s->linear ? SbJumpModulus(s) : NULL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceSetJumps(SbSpace s, const PetscReal modulus[])
+{
+  PetscReal *own = SbJumpModulus(s);
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscArraycpy(own, modulus, s->mesh->ncell_owned));
+  PetscCall(SbMeshBroadcastCells(s->mesh, 1, MPIU_REAL, own));
+  (void)SbJumpRenew(s);
+  if (s->plan) sum_face_terms(s, s->plan);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -68,13 +68,14 @@ static void numbers_of(SbRun run, Times *times, Number number[NNUMBER])
   memcpy(number, all, sizeof(all));
 }
 
-static PetscErrorCode checksum_of(const SbOrder *order, uint64_t salt, const PetscReal slice[], uint64_t *sum)
+static PetscErrorCode checksum_of(const SbOrder *order, PetscInt ncomp, uint64_t salt,
+                                  const PetscReal slice[], uint64_t *sum)
 {
   uint64_t mine = 0;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < 3 * order->n; i++)
-    mine += SbMixReal(3 * (uint64_t)order->start + (uint64_t)i + (salt << 48), slice[i]);
+  for (PetscInt i = 0; i < ncomp * order->n; i++)
+    mine += SbMixReal((uint64_t)(ncomp * order->start + i) + (salt << 48), slice[i]);
   PetscCallMPI(MPI_Allreduce(&mine, sum, 1, MPI_UINT64_T, MPI_SUM, order->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -100,13 +101,33 @@ static PetscErrorCode write_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *
     PetscCall(VecRestoreArrayRead(part[k].vec, &array));
     PetscCall(SbH5WriteSlice(h, h->file, part[k].name, "SI", &out->node, 3, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE,
                              slice));
-    PetscCall(checksum_of(&out->node, (uint64_t)k, slice, &sum));
+    PetscCall(checksum_of(&out->node, 3, (uint64_t)k, slice, &sum));
     if (k == PATH) {
       PetscCall(SbH5PutInt(h, h->file, "path_checksum", (int64_t)sum));
       PetscCall(SbH5PutReal(h, h->file, "path_first", run->arc.first));
     } else
       *checksum += sum;
   }
+  PetscCall(PetscFree(slice));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* With Newmark the penalty of jumps never falls, so that what it was is part of the state; written like the path, with a checksum of its own. */
+static PetscErrorCode write_jumps(SbRun run, SbOutput out, SbH5 *h)
+{
+  const PetscReal *modulus;
+  PetscReal *slice;
+  uint64_t sum;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetJumps(run->model->space, &modulus));
+  if (!modulus || run->preset != SB_TIME_NEWMARK) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(out->cell.n, &slice));
+  PetscCall(SbOrderGather(&out->cell, 1, modulus, slice));
+  PetscCall(
+    SbH5WriteSlice(h, h->file, "jumps", "Pa", &out->cell, 1, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, slice));
+  PetscCall(checksum_of(&out->cell, 1, 0, slice, &sum));
+  PetscCall(SbH5PutInt(h, h->file, "jumps_checksum", (int64_t)sum));
   PetscCall(PetscFree(slice));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -147,6 +168,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 
   /* the state */
   PetscCall(write_vectors(run, out, &h, &checksum));
+  PetscCall(write_jumps(run, out, &h));
   PetscCall(SbCheckpointWriteEffects(run, &h, &checksum));
   PetscCall(SbCheckpointWriteMeshes(run, &h, &checksum));
   /* where in time it is, work and dissipation so far */
@@ -262,7 +284,7 @@ static PetscErrorCode read_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *a
     if (!part[k].vec || (k == PATH && H5Lexists(h->file, part[k].name, H5P_DEFAULT) <= 0)) continue;
     PetscCall(SbH5ReadSlice(h, part[k].name, &out->node, 3, slice, ok));
     if (!*ok) break;
-    PetscCall(checksum_of(&out->node, (uint64_t)k, slice, &sum));
+    PetscCall(checksum_of(&out->node, 3, (uint64_t)k, slice, &sum));
     if (k == PATH) {
       SbH5GetInt(h->file, "path_checksum", &own, ok);
       SbH5GetReal(h->file, "path_first", &run->arc.first, ok);
@@ -274,6 +296,31 @@ static PetscErrorCode read_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *a
     PetscCall(VecRestoreArray(part[k].vec, &array));
   }
   PetscCall(PetscFree(slice));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Files of other integrators have none. */
+static PetscErrorCode read_jumps(SbRun run, SbOutput out, SbH5 *h, PetscBool *ok)
+{
+  const PetscReal *modulus;
+  PetscReal *slice, *owned;
+  uint64_t sum;
+  int64_t own = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetJumps(run->model->space, &modulus));
+  if (!modulus || run->preset != SB_TIME_NEWMARK || H5Lexists(h->file, "jumps", H5P_DEFAULT) <= 0)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc2(out->cell.n, &slice, run->model->mesh->ncell_owned, &owned));
+  PetscCall(SbH5ReadSlice(h, "jumps", &out->cell, 1, slice, ok));
+  SbH5GetInt(h->file, "jumps_checksum", &own, ok);
+  if (*ok) {
+    PetscCall(checksum_of(&out->cell, 1, 0, slice, &sum));
+    if (own != (int64_t)sum) *ok = PETSC_FALSE;
+  }
+  if (*ok) PetscCall(SbOrderScatter(&out->cell, 1, slice, owned));
+  if (*ok) PetscCall(SbSpaceSetJumps(run->model->space, owned));
+  PetscCall(PetscFree2(slice, owned));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -308,6 +355,7 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   if (*ok) PetscCall(check_identity(run, out, &h, mesh_hash));
   PetscCall(PetscCalloc1(run->model->neffect, &records));
   if (*ok) PetscCall(read_vectors(run, out, &h, &sum, ok));
+  if (*ok) PetscCall(read_jumps(run, out, &h, ok));
   if (*ok) PetscCall(SbCheckpointReadEffects(run, &h, records, &sum, ok));
   if (*ok) PetscCall(SbCheckpointSumMeshes(run, &h, &sum, ok));
   if (sum != (uint64_t)checksum) *ok = PETSC_FALSE;

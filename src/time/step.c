@@ -68,7 +68,8 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
   SbStep now = {.step = step, .t = t, .dt = dt, .t_end = run->t_end, .U = run->U, .V = run->V, .A = run->A};
 
   PetscFunctionBeginUser;
-  if (first && run->J) PetscCall(SbSpaceFollowJumps(m->space, run->U, PETSC_FALSE, NULL));
+  if (first && run->J)
+    PetscCall(SbSpaceFollowJumps(m->space, run->U, (PetscBool)(run->preset == SB_TIME_NEWMARK), NULL));
 
   /* a step that was seen already: there was no other after it */
   if (run->seen.U && run->seen.step == step) {
