@@ -181,10 +181,14 @@ PetscErrorCode SbMatrixFreeGetRotations(Mat A, const SbPack **R);
 PetscErrorCode SbSpaceGetRows(SbSpace space, Mat A, PetscInt n, const PetscInt node[], PetscInt ia[],
                               PetscInt ja[], PetscReal block[]);
 
+/* Gives a symmetric matrix of 3x3 blocks, SBAIJ on one rank or BAIJ with its final pattern, the fast product of product.c. Collective. */
+PetscErrorCode SbProductAttach(Mat A);
+/* Lends the rows of blocks of a sequential BAIJ or SBAIJ matrix: start[n+1], column[start[n]]. Not collective. */
+PetscErrorCode SbMatGetPattern(Mat A, PetscInt *n, const PetscInt *start[], const PetscInt *column[]);
 /*
   SbProductGetSymmetric - the rows and columns of this rank of a matrix with the fast product, as SBAIJ.
 
-  Not collective. Input: A, BAIJ or SBAIJ of SbSpaceCreateMatrix(). Output: local, borrowed from A, up to date until values of A
+  Not collective. Input: A, BAIJ or SBAIJ with the fast product. Output: local, borrowed from A, up to date until values of A
   change; A itself when that is SBAIJ on one rank. Ask again after each assembly: the same matrix, with a new state.
 */
 PetscErrorCode SbProductGetSymmetric(Mat A, Mat *local);

@@ -115,9 +115,6 @@ void SbInsertBroken(SbSpace space, const SbValues *x, PetscInt b, const SbPack K
 void SbConstraintsFinishTangent(SbSpace space, const SbValues *x);
 PetscErrorCode SbConstraintsDestroy(SbConstraints *constraints);
 
-/* Gives a BAIJ or SBAIJ matrix of the space the fast product of product.c. Collective. */
-PetscErrorCode SbProductAttach(SbSpace space, SbMatrixKind kind, Mat A);
-
 /* The part of it that a matrix-free operator does. */
 PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],
                                    PetscReal block[]);

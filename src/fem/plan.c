@@ -512,7 +512,7 @@ PetscErrorCode SbSpaceCreateMatrix(SbSpace s, SbMatrixKind kind, Mat *A)
   if (kind == SB_MATRIX_AIJ)
     PetscCall(SbAttachModes(*A, fill_rigid_mode, s));
   else
-    PetscCall(SbProductAttach(s, kind, *A));
+    PetscCall(SbProductAttach(*A));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MATRIX_SETUP], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

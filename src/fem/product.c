@@ -17,9 +17,6 @@
 #include <petsc/private/petscimpl.h>
 
 typedef struct {
-  SbPlan plan; /* borrowed: the space outlives its matrices */
-  PetscInt nrow;
-  size_t nupper;       /* blocks on and above the diagonal of the diagonal part, whose graph is symmetric */
   Mat diagonal, other; /* parts of the matrix, borrowed; other NULL on one rank */
   PetscScalar *full;   /* values of BAIJ's diagonal part; NULL for SBAIJ */
   Mat
@@ -58,32 +55,43 @@ SB_INLINE void row_product(const PetscScalar *a, PetscInt n, const PetscInt colu
   for (int k = 0; k < 3; k++) w[k] += sum[k];
 }
 
-/* y += A x; row i has the columns column[first[i]..end[i]), the first of them i. */
-SB_KERNEL static void multiply(PetscInt nrow, const PetscInt first[restrict], const PetscInt end[restrict],
-                               const PetscInt column[restrict], const PetscScalar a[restrict],
-                               const PetscScalar x[restrict], PetscScalar y[restrict])
+/* y += A x; row i has the columns column[start[i]..start[i+1]), the first of them i. */
+SB_KERNEL static void multiply(PetscInt nrow, const PetscInt start[restrict], const PetscInt column[restrict],
+                               const PetscScalar a[restrict], const PetscScalar x[restrict],
+                               PetscScalar y[restrict])
 {
-  for (PetscInt i = 0; i < nrow; i++) {
-    row_product(a, end[i] - first[i], column + first[i], x, y);
-    a += 9 * (size_t)(end[i] - first[i]);
-  }
+  for (PetscInt i = 0; i < nrow; i++)
+    row_product(a + 9 * (size_t)start[i], start[i + 1] - start[i], column + start[i], x, y);
+}
+
+/* Lends the rows of blocks of a sequential BAIJ or SBAIJ matrix. */
+PetscErrorCode SbMatGetPattern(Mat A, PetscInt *n, const PetscInt *start[], const PetscInt *column[])
+{
+  PetscBool done;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatGetRowIJ(A, 0, PETSC_FALSE, PETSC_TRUE, n, start, column, &done));
+  PetscCheck(done, PETSC_COMM_SELF, PETSC_ERR_PLIB, "PETSc does not show the rows of a block matrix");
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Brings the copy of BAIJ's upper blocks up to date. */
 static PetscErrorCode copy_upper(Product *p)
 {
-  const SbPlan plan = p->plan;
-  PetscScalar *to = p->upper;
+  const PetscInt *all, *start, *column;
   PetscObjectState state;
+  PetscInt n;
 
   PetscFunctionBeginUser;
   PetscCall(PetscObjectStateGet((PetscObject)p->diagonal, &state));
   if (!p->full || state == p->copied) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt i = 0; i < p->nrow; i++) {
-    const size_t n = 9 * (size_t)(plan->di[i + 1] - plan->diagonal[i]);
+  PetscCall(SbMatGetPattern(p->diagonal, &n, &all, &column));
+  PetscCall(SbMatGetPattern(p->symmetric, &n, &start, &column));
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt length = start[i + 1] - start[i];
 
-    PetscCall(PetscArraycpy(to, p->full + 9 * (size_t)plan->diagonal[i], n));
-    to += n;
+    PetscCall(PetscArraycpy(p->upper + 9 * (size_t)start[i], p->full + 9 * (size_t)(all[i + 1] - length),
+                            9 * (size_t)length));
   }
   p->copied = state;
   PetscCall(PetscObjectStateIncrease((PetscObject)p->symmetric));
@@ -172,24 +180,27 @@ PetscErrorCode SbProductSubtractOffDiagonal(Mat A, Vec x, Vec y)
 
 static PetscErrorCode MatMult_Product(Mat A, Vec x, Vec y)
 {
+  const PetscInt *start, *column;
   const PetscScalar *in;
   PetscScalar *out;
+  PetscInt n;
   Product *p;
 
   PetscFunctionBeginUser;
   PetscCall(product_of(A, &p));
+  PetscCall(SbMatGetPattern(p->symmetric, &n, &start, &column));
   if (p->other) PetscCall(VecScatterBegin(p->scatter, x, p->ghosts, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecGetArrayRead(x, &in));
   PetscCall(VecGetArrayWrite(y, &out));
-  PetscCall(PetscArrayzero(out, 3 * p->nrow));
-  multiply(p->nrow, p->plan->diagonal, p->plan->di + 1, p->plan->dj, p->upper, in, out);
+  PetscCall(PetscArrayzero(out, 3 * n));
+  multiply(n, start, column, p->upper, in, out);
   PetscCall(VecRestoreArrayWrite(y, &out));
   PetscCall(VecRestoreArrayRead(x, &in));
   if (p->other) {
     PetscCall(VecScatterEnd(p->scatter, x, p->ghosts, INSERT_VALUES, SCATTER_FORWARD));
     PetscCall(MatMultAdd(p->other, p->ghosts, y, y));
   }
-  PetscCall(PetscLogFlops(36. * (double)p->nupper));
+  PetscCall(PetscLogFlops(36. * (double)start[n]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -223,23 +234,24 @@ static PetscErrorCode create_scatter(Mat A, const PetscInt columns[], Product *p
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An empty SBAIJ matrix with the graph of the diagonal part. */
+/* An empty SBAIJ matrix with the graph of the diagonal part, which is symmetric. */
 static PetscErrorCode create_symmetric(Product *p)
 {
-  const SbPlan plan = p->plan;
-  PetscInt *start, *column;
+  const PetscInt *all, *columns;
+  PetscInt n, *start, *column;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(p->nrow + 1, &start, p->nupper, &column));
+  PetscCall(SbMatGetPattern(p->diagonal, &n, &all, &columns));
+  PetscCall(PetscMalloc2(n + 1, &start, (all[n] + n) / 2, &column));
   start[0] = 0;
-  for (PetscInt i = 0; i < p->nrow; i++) {
-    const PetscInt n = plan->di[i + 1] - plan->diagonal[i];
-
-    PetscCall(PetscArraycpy(column + start[i], plan->dj + plan->diagonal[i], n));
-    start[i + 1] = start[i] + n;
+  for (PetscInt i = 0; i < n; i++) {
+    start[i + 1] = start[i];
+    for (PetscInt k = all[i]; k < all[i + 1]; k++) {
+      if (columns[k] >= i) column[start[i + 1]++] = columns[k];
+    }
   }
   PetscCall(MatCreate(PETSC_COMM_SELF, &p->symmetric));
-  PetscCall(MatSetSizes(p->symmetric, 3 * p->nrow, 3 * p->nrow, 3 * p->nrow, 3 * p->nrow));
+  PetscCall(MatSetSizes(p->symmetric, 3 * n, 3 * n, 3 * n, 3 * n));
   PetscCall(MatSetType(p->symmetric, MATSEQSBAIJ));
   PetscCall(MatSeqSBAIJSetPreallocationCSR(p->symmetric, 3, start, column, NULL));
   PetscCall(MatSetOption(p->symmetric, MAT_SYMMETRIC, PETSC_TRUE));
@@ -249,14 +261,15 @@ static PetscErrorCode create_symmetric(Product *p)
 }
 
 /* The arrays of values stay where they are for the life of the matrix: its pattern is fixed. */
-static PetscErrorCode find_parts(Mat A, SbMatrixKind kind, Product *p)
+static PetscErrorCode find_parts(Mat A, Product *p)
 {
   const PetscInt *columns;
-  PetscBool parallel;
+  PetscBool parallel, symmetric;
 
   PetscFunctionBeginUser;
   p->diagonal = A;
-  if (kind == SB_MATRIX_SBAIJ) {
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &symmetric));
+  if (symmetric) {
     p->symmetric = A;
     PetscCall(MatSeqSBAIJGetArray(A, &p->upper));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -272,18 +285,15 @@ static PetscErrorCode find_parts(Mat A, SbMatrixKind kind, Product *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbProductAttach(SbSpace s, SbMatrixKind kind, Mat A)
+PetscErrorCode SbProductAttach(Mat A)
 {
   PetscContainer container;
   Product *p;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&p));
-  p->plan = s->plan;
-  p->nrow = s->nnode_owned;
-  p->nupper = (size_t)(s->plan->di[p->nrow] + p->nrow) / 2;
   p->copied = -1;
-  PetscCall(find_parts(A, kind, p));
+  PetscCall(find_parts(A, p));
   PetscCall(PetscContainerCreate(PetscObjectComm((PetscObject)A), &container));
   PetscCall(PetscContainerSetPointer(container, p));
   PetscCall(SbContainerSetDestroy(container, destroy_product));

@@ -256,26 +256,28 @@ static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Values of the rows in the parts of the matrix, whose blocks are stored by columns. */
+/* Values of the rows in the parts of the matrix, whose blocks are stored by columns; SBAIJ has those on and above the diagonal. */
 static PetscErrorCode fill_matrix(SbContactSystem c)
 {
   const SbContactRows *rows = &c->rows;
   const PetscInt first = c->space->gnode_start;
-  Mat part[2] = {c->A, NULL};
-  PetscScalar *to[2] = {NULL, NULL};
-  PetscBool parallel;
+  PetscScalar *to[2];
+  SbMatBlocks b;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscObjectTypeCompare((PetscObject)c->A, MATMPIBAIJ, &parallel));
-  if (parallel) PetscCall(MatMPIBAIJGetSeqBAIJ(c->A, &part[0], &part[1], NULL));
-  for (int k = 0; k < 2 && part[k]; k++) PetscCall(MatSeqBAIJGetArray(part[k], &to[k]));
-  for (PetscInt k = 0; k < rows->ia[rows->n]; k++) {
-    const int q = rows->ja[k] < first || rows->ja[k] >= first + rows->n;
+  PetscCall(SbMatGetBlocks(c->A, &b));
+  for (int q = 0; q < 2; q++) to[q] = b.value[q];
+  for (PetscInt i = 0; i < rows->n; i++) {
+    for (PetscInt k = rows->ia[i]; k < rows->ia[i + 1]; k++) {
+      const int q = rows->ja[k] < first || rows->ja[k] >= first + rows->n;
 
-    for (int e = 0; e < 9; e++) to[q][3 * (e % 3) + e / 3] = rows->value[9 * (size_t)k + (size_t)e];
-    to[q] += 9;
+      if (b.symmetric && rows->ja[k] < i) continue;
+      for (int e = 0; e < 9; e++) to[q][3 * (e % 3) + e / 3] = rows->value[9 * (size_t)k + (size_t)e];
+      to[q] += 9;
+    }
   }
-  for (int k = 0; k < 2 && part[k]; k++) PetscCall(MatSeqBAIJRestoreArray(part[k], &to[k]));
+  PetscCall(SbMatRestoreBlocks(&b));
+  /* its assembly is that of its parts, too: they count as changed */
   PetscCall(MatAssemblyBegin(c->A, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(c->A, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -289,18 +291,23 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
   const SbSpace s = c->space;
   const SbContactRows *rows = &c->rows;
   PetscBool own = (PetscBool)!c->type[0];
+  PetscMPIInt size;
   Mat P;
   PC pc;
 
   PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(s->comm, &size));
   if (c->foreign[0]) {
     PetscCall(MatDestroy(&c->A));
     PetscCall(MatCreate(s->comm, &c->A));
     PetscCall(MatSetSizes(c->A, 3 * rows->n, 3 * rows->n, 3 * s->Nnode, 3 * s->Nnode));
     PetscCall(MatSetBlockSize(c->A, 3));
-    PetscCall(MatSetType(c->A, MATBAIJ));
+    PetscCall(MatSetType(c->A, own && size == 1 ? MATSBAIJ : MATBAIJ));
+    PetscCall(MatSetOption(c->A, MAT_IGNORE_LOWER_TRIANGULAR, PETSC_TRUE));
+    PetscCall(MatSeqSBAIJSetPreallocationCSR(c->A, 3, rows->ia, rows->ja, NULL));
     PetscCall(MatSeqBAIJSetPreallocationCSR(c->A, 3, rows->ia, rows->ja, NULL));
     PetscCall(MatMPIBAIJSetPreallocationCSR(c->A, 3, rows->ia, rows->ja, NULL));
+    if (own) PetscCall(SbProductAttach(c->A));
   }
   PetscCall(fill_matrix(c));
   if (!c->ksp) {

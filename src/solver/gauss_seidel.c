@@ -60,77 +60,78 @@ SB_INLINE void divide(const PetscReal inverse[9], const PetscReal x[3], PetscSca
   for (int i = 0; i < 3; i++) y[i] = SbDot3(inverse + 3 * i, x);
 }
 
-SB_KERNEL static void down(PetscInt nrow, const PetscInt first[restrict], const PetscInt end[restrict],
-                           const PetscInt column[restrict], const PetscScalar *a,
-                           const PetscReal inverse[restrict], const PetscReal *extra,
+SB_KERNEL static void down(PetscInt nrow, const PetscInt start[restrict], const PetscInt column[restrict],
+                           const PetscScalar *a, const PetscReal inverse[restrict], const PetscReal *extra,
                            const PetscScalar r[restrict], PetscScalar z[restrict], PetscScalar t[restrict])
 {
+  a += 9 * (size_t)start[nrow];
   for (PetscInt i = nrow - 1; i >= 0; i--) {
-    const PetscInt n = end[i] - first[i];
+    const PetscInt n = start[i + 1] - start[i];
     PetscReal sum[3];
 
     a -= 9 * (size_t)n;
-    pull(a + 9, n - 1, column + first[i] + 1, z, sum);
+    pull(a + 9, n - 1, column + start[i] + 1, z, sum);
     for (int c = 0; c < 3; c++) sum[c] = r[3 * i + c] - sum[c];
     divide(inverse + 9 * (size_t)i, sum, z + 3 * i);
-    push(a + 9, n - 1, column + first[i] + 1, z + 3 * i, t);
+    push(a + 9, n - 1, column + start[i] + 1, z + 3 * i, t);
     for (int c = 0; extra && c < 3; c++) t[3 * i + c] += extra[3 * i + c] * z[3 * i + c];
   }
 }
 
-SB_KERNEL static void up(PetscInt nrow, const PetscInt first[restrict], const PetscInt end[restrict],
-                         const PetscInt column[restrict], const PetscScalar *a,
-                         const PetscReal inverse[restrict], const PetscReal *extra, PetscScalar b[restrict],
-                         PetscScalar z[restrict])
+SB_KERNEL static void up(PetscInt nrow, const PetscInt start[restrict], const PetscInt column[restrict],
+                         const PetscScalar *a, const PetscReal inverse[restrict], const PetscReal *extra,
+                         PetscScalar b[restrict], PetscScalar z[restrict])
 {
   for (PetscInt i = 0; i < nrow; i++) {
-    const PetscInt n = end[i] - first[i];
+    const PetscInt n = start[i + 1] - start[i];
     PetscReal sum[3];
 
-    pull(a + 9, n - 1, column + first[i] + 1, z, sum);
+    pull(a + 9, n - 1, column + start[i] + 1, z, sum);
     for (int c = 0; c < 3; c++) sum[c] = b[3 * i + c] - sum[c];
     for (int c = 0; extra && c < 3; c++) sum[c] += extra[3 * i + c] * z[3 * i + c];
     divide(inverse + 9 * (size_t)i, sum, z + 3 * i);
-    push(a + 9, n - 1, column + first[i] + 1, z + 3 * i, b);
+    push(a + 9, n - 1, column + start[i] + 1, z + 3 * i, b);
     a += 9 * (size_t)n;
   }
 }
 
 /* The diagonal that makes block Jacobi between ranks convergent (l1-Gauss-Seidel, Baker et al. 2011): half the sums of the magnitudes in the off-diagonal part of a parallel matrix. */
-static PetscErrorCode sum_magnitudes(SbSpace s, Mat A, PetscReal extra[])
+static PetscErrorCode sum_magnitudes(Mat A, PetscInt n, PetscReal extra[])
 {
-  const SbPlan p = s->plan;
+  const PetscInt *start, *column;
   PetscBool parallel;
   PetscScalar *a;
   Mat other;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscArrayzero(extra, 3 * s->nnode_owned));
+  PetscCall(PetscArrayzero(extra, 3 * n));
   PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
   if (!parallel) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatMPIBAIJGetSeqBAIJ(A, NULL, &other, NULL));
+  PetscCall(SbMatGetPattern(other, &n, &start, &column));
   PetscCall(MatSeqBAIJGetArray(other, &a));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    for (PetscInt k = 9 * p->oi[i]; k < 9 * p->oi[i + 1]; k++)
+  for (PetscInt i = 0; i < n; i++) {
+    for (PetscInt k = 9 * start[i]; k < 9 * start[i + 1]; k++)
       extra[3 * i + k % 3] += 0.5 * PetscAbsReal(a[k]);
   }
   PetscCall(SbMatRestoreRead(other, MatSeqBAIJRestoreArray, &a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbGaussSeidelSetUp(SbSpace s, Mat A, PetscReal inverse[], PetscReal extra[],
-                                  PetscBool *positive)
+PetscErrorCode SbGaussSeidelSetUp(Mat A, PetscReal inverse[], PetscReal extra[], PetscBool *positive)
 {
-  const SbPlan p = s->plan;
+  const PetscInt *start, *column;
   PetscScalar *a;
+  PetscInt n;
   Mat local;
 
   PetscFunctionBeginUser;
-  if (extra) PetscCall(sum_magnitudes(s, A, extra));
   PetscCall(SbProductGetSymmetric(A, &local));
+  PetscCall(SbMatGetPattern(local, &n, &start, &column));
+  if (extra) PetscCall(sum_magnitudes(A, n, extra));
   PetscCall(MatSeqSBAIJGetArray(local, &a));
   *positive = PETSC_TRUE;
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+  for (PetscInt i = 0; i < n; i++) {
     PetscReal D[9], C[9], det;
 
     for (int k = 0; k < 9; k++) D[k] = a[k] + (extra && k % 4 == 0 ? extra[3 * i + k / 4] : 0.);
@@ -138,56 +139,58 @@ PetscErrorCode SbGaussSeidelSetUp(SbSpace s, Mat A, PetscReal inverse[], PetscRe
     det = SbDot3(D, C);
     if (!(det > 0.)) *positive = PETSC_FALSE;
     for (int k = 0; k < 9; k++) inverse[9 * (size_t)i + (size_t)k] = det > 0. ? C[k] / det : 0.;
-    a += 9 * (size_t)(p->di[i + 1] - p->diagonal[i]);
+    a += 9 * (size_t)(start[i + 1] - start[i]);
   }
   PetscCall(SbMatRestoreRead(local, MatSeqSBAIJRestoreArray, &a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbGaussSeidelDown(SbSpace s, Mat A, const PetscReal inverse[], const PetscReal extra[], Vec r,
-                                 Vec z, Vec t)
+PetscErrorCode SbGaussSeidelDown(Mat A, const PetscReal inverse[], const PetscReal extra[], Vec r, Vec z,
+                                 Vec t)
 {
-  const SbPlan p = s->plan;
-  const PetscInt n = s->nnode_owned;
+  const PetscInt *start, *column;
   const PetscScalar *in;
   PetscScalar *a, *out, *left;
+  PetscInt n;
   Mat local;
 
   PetscFunctionBeginUser;
   PetscCall(SbProductGetSymmetric(A, &local));
+  PetscCall(SbMatGetPattern(local, &n, &start, &column));
   PetscCall(MatSeqSBAIJGetArray(local, &a));
   PetscCall(VecZeroEntries(t));
   PetscCall(VecGetArrayRead(r, &in));
   PetscCall(VecGetArray(z, &out));
   PetscCall(VecGetArray(t, &left));
-  down(n, p->diagonal, p->di + 1, p->dj, a + 9 * (size_t)(p->di[n] + n) / 2, inverse, extra, in, out, left);
+  down(n, start, column, a, inverse, extra, in, out, left);
   PetscCall(VecRestoreArray(t, &left));
   PetscCall(VecRestoreArray(z, &out));
   PetscCall(VecRestoreArrayRead(r, &in));
   PetscCall(SbMatRestoreRead(local, MatSeqSBAIJRestoreArray, &a));
   PetscCall(SbProductSubtractOffDiagonal(A, z, t));
-  PetscCall(PetscLogFlops(18. * (double)(p->di[n] + n)));
+  PetscCall(PetscLogFlops(36. * (double)start[n]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbGaussSeidelUp(SbSpace s, Mat A, const PetscReal inverse[], const PetscReal extra[], Vec r,
-                               Vec z, Vec t)
+PetscErrorCode SbGaussSeidelUp(Mat A, const PetscReal inverse[], const PetscReal extra[], Vec r, Vec z, Vec t)
 {
-  const SbPlan p = s->plan;
+  const PetscInt *start, *column;
   PetscScalar *a, *out, *b;
+  PetscInt n;
   Mat local;
 
   PetscFunctionBeginUser;
   PetscCall(SbProductGetSymmetric(A, &local));
+  PetscCall(SbMatGetPattern(local, &n, &start, &column));
   PetscCall(VecCopy(r, t));
   PetscCall(SbProductSubtractOffDiagonal(A, z, t));
   PetscCall(MatSeqSBAIJGetArray(local, &a));
   PetscCall(VecGetArray(z, &out));
   PetscCall(VecGetArray(t, &b));
-  up(s->nnode_owned, p->diagonal, p->di + 1, p->dj, a, inverse, extra, b, out);
+  up(n, start, column, a, inverse, extra, b, out);
   PetscCall(VecRestoreArray(t, &b));
   PetscCall(VecRestoreArray(z, &out));
   PetscCall(SbMatRestoreRead(local, MatSeqSBAIJRestoreArray, &a));
-  PetscCall(PetscLogFlops(18. * (double)(p->di[s->nnode_owned] + s->nnode_owned)));
+  PetscCall(PetscLogFlops(36. * (double)start[n]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -5,13 +5,12 @@
 #include "sbassembly.h"
 #include "sbkernel.h"
 
-/* inverse[nnode_owned][9] of the diagonal blocks of a BAIJ or SBAIJ matrix of the space; with extra[nnode_owned][3], which is computed (NULL: without), on their diagonals: what
+/* inverse[n][9] of the diagonal blocks of a matrix with the fast product, n own nodes; with extra[n][3], which is computed (NULL: without), on their diagonals: what
    keeps sweeps convergent between ranks. Zero and *positive = false where a determinant is not positive on this rank. Not collective. */
-PetscErrorCode SbGaussSeidelSetUp(SbSpace space, Mat A, PetscReal inverse[], PetscReal extra[],
-                                  PetscBool *positive);
+PetscErrorCode SbGaussSeidelSetUp(Mat A, PetscReal inverse[], PetscReal extra[], PetscBool *positive);
 /* z = (D + L^T)^-1 r, D and L of this rank's part, and t = r - A z. r, z and t are others. Collective. */
-PetscErrorCode SbGaussSeidelDown(SbSpace space, Mat A, const PetscReal inverse[], const PetscReal extra[],
-                                 Vec r, Vec z, Vec t);
+PetscErrorCode SbGaussSeidelDown(Mat A, const PetscReal inverse[], const PetscReal extra[], Vec r, Vec z,
+                                 Vec t);
 /* z += (D + L)^-1 (r - A z); t is for work. Collective. */
-PetscErrorCode SbGaussSeidelUp(SbSpace space, Mat A, const PetscReal inverse[], const PetscReal extra[],
-                               Vec r, Vec z, Vec t);
+PetscErrorCode SbGaussSeidelUp(Mat A, const PetscReal inverse[], const PetscReal extra[], Vec r, Vec z,
+                               Vec t);

@@ -166,7 +166,7 @@ static PetscErrorCode cycle_faces(SbLevels v, Vec r, Vec z)
   PetscScalar *out;
 
   PetscFunctionBeginUser;
-  PetscCall(SbGaussSeidelDown(s, A, v->inverse, NULL, r, z, v->t[k]));
+  PetscCall(SbGaussSeidelDown(A, v->inverse, NULL, r, z, v->t[k]));
   PetscCall(restrict_to_vertices(v, v->t[k]));
   PetscCall(KSPSolve(v->coarse, v->t[k + 1], v->w[k + 1]));
   PetscCall(load(p, v->w[k + 1], v->g[k + 1], &x));
@@ -179,7 +179,7 @@ static PetscErrorCode cycle_faces(SbLevels v, Vec r, Vec z)
   }
   PetscCall(VecRestoreArray(z, &out));
   PetscCall(SbSpaceRestoreLocalRead(p, v->g[k + 1], &x));
-  PetscCall(SbGaussSeidelUp(s, A, v->inverse, NULL, r, z, v->t[k]));
+  PetscCall(SbGaussSeidelUp(A, v->inverse, NULL, r, z, v->t[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -392,7 +392,7 @@ PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
     }
     PetscCall(SbSpaceRestoreLocalRead(s, v->r[0], &own));
   }
-  PetscCall(SbGaussSeidelSetUp(v->at[v->n - 2], v->A[v->n - 2], v->inverse, NULL, positive));
+  PetscCall(SbGaussSeidelSetUp(v->A[v->n - 2], v->inverse, NULL, positive));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, positive, 1, SB_MPI_BOOL, MPI_LAND, v->space->comm));
   if (!*positive) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(KSPSetOperators(v->coarse, v->A[v->n - 1], v->A[v->n - 1]));

@@ -341,7 +341,7 @@ static PetscErrorCode PCSetUp_Multigrid(PC pc)
     PetscCall(
       PetscMalloc2(9 * (size_t)p->space->nnode_owned, &p->inverse, 3 * p->space->nnode_owned, &p->extra));
   }
-  PetscCall(SbGaussSeidelSetUp(p->space, A, p->inverse, p->extra, &ok));
+  PetscCall(SbGaussSeidelSetUp(A, p->inverse, p->extra, &ok));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &ok, 1, SB_MPI_BOOL, MPI_LAND, p->space->comm));
   if (ok) {
     PetscCall(assemble(p, A));
@@ -425,11 +425,11 @@ static PetscErrorCode PCApply_Multigrid(PC pc, Vec r, Vec z)
   PetscFunctionBeginUser;
   PetscCall(PCShellGetContext(pc, &p));
   PetscCall(PCGetOperators(pc, NULL, &A));
-  PetscCall(SbGaussSeidelDown(p->space, A, p->inverse, p->extra, r, z, p->t));
+  PetscCall(SbGaussSeidelDown(A, p->inverse, p->extra, r, z, p->t));
   PetscCall(restrict_residual(p));
   PetscCall(PCApply(p->solver, p->r, p->w));
   PetscCall(add_correction(p, z));
-  PetscCall(SbGaussSeidelUp(p->space, A, p->inverse, p->extra, r, z, p->t));
+  PetscCall(SbGaussSeidelUp(A, p->inverse, p->extra, r, z, p->t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
