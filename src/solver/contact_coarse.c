@@ -9,11 +9,16 @@
   bounds for the Galerkin mass matrix", 1987, whose argument holds for sums of any semi-definite matrices; those of terms at faces, c [P, -P; -P, P] with P = 1 - 1/3 (1, 1, 1) (1, 1, 1)^T
   for jumps and c [1, -1; -1, 1] for their mean, have three and two), so nothing is estimated, and nothing depends on the number of ranks or on what contact makes stiff. After a guess that makes Z^T r zero it stays so, and the right factor is 1, as in pc_coarse.c.
 
-  E consists of 3x3 blocks: one row for a node of contact, two for an aggregate, translation and rotation. One rank factors it (block_solver.c). Modes that vanish
+  With P2 bodies aggregates are too coarse below what their edges hide, and D^-1 A has eigenvalues above four near nu = 1/2. Up to VERTICES vertices of such bodies Z has, in the place of
+  aggregates, these: an edge node that is none of contact moves by the mean of its two vertices, if they are of its rank, and by itself if not. Around the correction stand
+  sweeps of Gauss-Seidel over all rows, as in pc_p_multigrid.c, each of half a product, and nothing is asked of the guess.
+
+  E consists of 3x3 blocks: one row for a node of contact or a vertex, two for an aggregate, translation and rotation. One rank factors it (block_solver.c). Modes that vanish
   on what is left of an aggregate get the mean diagonal, as in coarse_operator.c.
 */
 #include "coarse.h"
 #include "contact_coarse.h"
+#include "gauss_seidel.h"
 #include "solver_impl.h"
 #include <petscblaslapack.h>
 
@@ -24,11 +29,16 @@
 #define RANGE 8.        /* eigenvalues that the smoother reduces, largest over smallest */
 #define DEGREE 2        /* of the smoother */
 #define IN_SPAN 1e-5    /* share of the residual in the span of Z that rounding may leave */
+#define VERTICES 12000  /* of P2 bodies, up to which they are in Z: one rank factors E */
 #define VANISHING 1e-8  /* squared size of a mode over that of the largest one of its aggregate */
+
+typedef enum { MEMBER, ITSELF, MEAN } Way; /* how a node moves with Z: in an aggregate; by itself; by the mean of two vertices */
 
 typedef struct {
   SbSpace space;
   const SbContactRows *rows;
+  PetscInt *parent; /* [nnode][2] local nodes: vertices of an edge node, else the node itself twice; NULL: P2 has no part in Z */
+  uint8_t *vertex;  /* [nnode] the node is a vertex of a P2 body; likewise */
   PetscInt nagg, *body; /* aggregates; [n] that of each own node, -1: fully prescribed */
   PetscBool stale[2];   /* values, pattern */
   PetscBool ok;
@@ -37,18 +47,21 @@ typedef struct {
     *column; /* own nodes; other nodes of the rows, global, ascending; [ia[n]] columns as own nodes or n + ghost */
   VecScatter scatter;
   Vec local;            /* [nghost][3] */
-  PetscInt *unit;       /* [n+nghost] first block row of the node in E, global; -1: none */
-  uint8_t *single;      /* [n+nghost] it has one, else two */
+  PetscInt *unit;       /* [n+nghost][2] block rows of the node in E, global; -1: none; the second one only of a MEAN */
+  uint8_t *way;         /* [n+nghost] */
+  uint8_t *moved;       /* [n+nghost] of a MEAN: three bits for the components that the first vertex moves, three for the second one */
   PetscReal *d;         /* [n+nghost][3] position in its aggregate, in units of the radius */
   PetscInt nrow, first; /* own block rows of E, number of the first one */
   PetscInt *ia, *ja;    /* E */
   PetscReal *value;     /* [ia[nrow]][9] */
-  PetscInt *slot;       /* [rows->ia[n]] place of the block's column in the row of E */
+  int stride;           /* 4 with parents, else 1 */
+  PetscInt *slot;       /* [rows->ia[n]][stride] place of the block's column in the row of E, by vertex of the row and of the column */
   PetscReal *null;      /* [nagg][36] projector onto the modes that vanish */
   PetscInt *row_of;     /* [nagg] first own row in E, -1: no node is left */
   PetscReal *weight;    /* [nrow] one over the nodes of the row's unit */
   SbBlockSolver solver;
-  PetscReal *inverse; /* [n][9] of the blocks on the diagonal; zero at nodes of contact */
+  PetscReal *inverse; /* [n][9] of the blocks on the diagonal; without parents zero at nodes of contact */
+  PetscReal *extra;   /* [n][3] of the sweeps */
   PetscReal *c;       /* [nrow][3] */
   Vec p, s, t, w;
 } Contact;
@@ -61,11 +74,11 @@ static PetscErrorCode free_pattern(Contact *p)
   PetscCall(PetscFree2(p->ghost, p->column));
   PetscCall(VecScatterDestroy(&p->scatter));
   PetscCall(VecDestroy(&p->local));
-  PetscCall(PetscFree3(p->unit, p->single, p->d));
+  PetscCall(PetscFree4(p->unit, p->way, p->moved, p->d));
   PetscCall(PetscFree2(p->ia, p->slot));
   PetscCall(PetscFree2(p->ja, p->value));
   PetscCall(PetscFree2(p->null, p->row_of));
-  PetscCall(PetscFree3(p->inverse, p->c, p->weight));
+  PetscCall(PetscFree4(p->inverse, p->extra, p->c, p->weight));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -121,23 +134,33 @@ static PetscErrorCode update_ghosts(Contact *p, PetscReal x[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rows of E for nodes of contact and for aggregates; where nodes are in these, and which modes vanish. */
+/* How the own node moves with Z; one that is fully prescribed has no unit then. */
+static Way way_of(const Contact *p, PetscInt i)
+{
+  const PetscInt *v = p->parent ? p->parent + 2 * i : NULL;
+
+  if (p->rows->contact[i] || p->body[i] < 0) return ITSELF;
+  if (v && v[0] != v[1]) return v[0] < p->n && v[1] < p->n ? MEAN : ITSELF;
+  return v && p->vertex[i] ? ITSELF : MEMBER;
+}
+
+/* Rows of E for nodes of contact, vertices and aggregates; where nodes are in these, and which modes vanish. */
 static PetscErrorCode find_units(Contact *p)
 {
   const SbSpace s = p->space;
-  const SbContactRows *r = p->rows;
-  const PetscInt n = p->n;
+  const PetscInt n = p->n, nall = n + p->nghost;
   PetscReal *centre, *share;
   PetscInt *count, total;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc3(n + p->nghost, &p->unit, n + p->nghost, &p->single, 3 * (n + p->nghost), &p->d));
+  PetscCall(PetscMalloc4(2 * nall, &p->unit, nall, &p->way, nall, &p->moved, 3 * nall, &p->d));
   PetscCall(PetscCalloc2(36 * p->nagg, &p->null, p->nagg, &p->row_of));
   PetscCall(PetscCalloc2(4 * p->nagg, &centre, p->nagg, &count));
 
   /* centre and radius of what is left of each aggregate */
   for (PetscInt i = 0; i < n; i++) {
-    if (p->body[i] < 0 || r->contact[i]) continue;
+    p->way[i] = (uint8_t)way_of(p, i);
+    if (p->way[i] != MEMBER) continue;
     for (int k = 0; k < 3; k++) centre[4 * p->body[i] + k] += s->node_x[3 * i + k];
     count[p->body[i]]++;
   }
@@ -146,8 +169,8 @@ static PetscErrorCode find_units(Contact *p)
   }
   for (PetscInt i = 0; i < n; i++) {
     for (int k = 0; k < 3; k++) {
-      p->d[3 * i + k] = p->body[i] < 0 ? 0. : s->node_x[3 * i + k] - centre[4 * p->body[i] + k];
-      if (p->body[i] >= 0 && !r->contact[i])
+      p->d[3 * i + k] = p->way[i] == MEMBER ? s->node_x[3 * i + k] - centre[4 * p->body[i] + k] : 0.;
+      if (p->way[i] == MEMBER)
         centre[4 * p->body[i] + 3] += PetscSqr(p->d[3 * i + k]) / (PetscReal)count[p->body[i]];
     }
   }
@@ -155,9 +178,8 @@ static PetscErrorCode find_units(Contact *p)
   /* rows */
   p->nrow = 0;
   for (PetscInt i = 0; i < n; i++) {
-    p->single[i] = r->contact[i];
-    p->unit[i] = -1;
-    if (r->contact[i]) p->unit[i] = p->nrow++;
+    p->unit[2 * i] = p->unit[2 * i + 1] = -1;
+    if (p->way[i] == ITSELF && (p->rows->contact[i] || p->body[i] >= 0)) p->unit[2 * i] = p->nrow++;
   }
   for (PetscInt a = 0; a < p->nagg; a++) {
     p->row_of[a] = count[a] ? p->nrow : -1;
@@ -165,24 +187,34 @@ static PetscErrorCode find_units(Contact *p)
   }
   PetscCallMPI(MPI_Scan(&p->nrow, &p->first, 1, MPIU_INT, MPI_SUM, s->comm));
   p->first -= p->nrow;
-  PetscCall(PetscMalloc3(9 * n, &p->inverse, 3 * p->nrow, &p->c, p->nrow, &p->weight));
+  PetscCall(PetscMalloc4(9 * n, &p->inverse, p->parent ? 3 * n : 0, &p->extra, 3 * p->nrow, &p->c, p->nrow,
+                         &p->weight));
   for (PetscInt k = 0; k < p->nrow; k++) p->weight[k] = 1.;
   for (PetscInt i = 0; i < n; i++) {
     const PetscInt a = p->body[i];
 
-    if (a >= 0 && !r->contact[i]) {
+    if (p->way[i] == MEMBER) {
       const PetscReal radius = PetscSqrtReal(centre[4 * a + 3]);
 
-      p->unit[i] = p->row_of[a];
-      p->weight[p->unit[i]] = p->weight[p->unit[i] + 1] = 1. / (PetscReal)count[a];
+      p->unit[2 * i] = p->row_of[a];
+      p->weight[p->row_of[a]] = p->weight[p->row_of[a] + 1] = 1. / (PetscReal)count[a];
       for (int k = 0; k < 3; k++) p->d[3 * i + k] = count[a] > 1 ? p->d[3 * i + k] / radius : 0.;
     }
-    if (p->unit[i] >= 0) p->unit[i] += p->first;
+    p->moved[i] = 0;
+    for (int q = 0; q < 2 && p->way[i] == MEAN; q++) {
+      const PetscInt v = p->parent[2 * i + q];
+
+      p->unit[2 * i + q] = p->unit[2 * v];
+      p->moved[i] |= (uint8_t)((7 & ~(s->fixed[i] | s->fixed[v])) << (3 * q));
+    }
+  }
+  for (PetscInt k = 0; k < 2 * n; k++) {
+    if (p->unit[k] >= 0) p->unit[k] += p->first;
   }
 
   /* modes that vanish: eigenvectors of the Gram matrix */
   for (PetscInt i = 0; i < n; i++) {
-    if (p->unit[i] < 0 || p->single[i]) continue;
+    if (p->way[i] != MEMBER) continue;
     for (int m = 0; m < 6; m++) {
       PetscReal unit[6] = {0.}, u[3];
 
@@ -208,17 +240,18 @@ static PetscErrorCode find_units(Contact *p)
   PetscCall(PetscFree2(centre, count));
 
   /* the same of ghosts */
-  PetscCall(PetscMalloc1(3 * (n + p->nghost), &share));
+  PetscCall(PetscMalloc1(3 * nall, &share));
   for (PetscInt i = 0; i < n; i++) {
-    share[3 * i] = (PetscReal)p->unit[i];
-    share[3 * i + 1] = (PetscReal)p->single[i];
-    share[3 * i + 2] = 0.;
+    share[3 * i] = (PetscReal)p->unit[2 * i];
+    share[3 * i + 1] = (PetscReal)p->unit[2 * i + 1];
+    share[3 * i + 2] = (PetscReal)(64 * p->way[i] + p->moved[i]);
   }
   PetscCall(update_ghosts(p, share));
   PetscCall(update_ghosts(p, p->d));
-  for (PetscInt i = n; i < n + p->nghost; i++) {
-    p->unit[i] = (PetscInt)share[3 * i];
-    p->single[i] = share[3 * i + 1] != 0.;
+  for (PetscInt i = n; i < nall; i++) {
+    for (int q = 0; q < 2; q++) p->unit[2 * i + q] = (PetscInt)share[3 * i + q];
+    p->way[i] = (uint8_t)((PetscInt)share[3 * i + 2] / 64);
+    p->moved[i] = (uint8_t)((PetscInt)share[3 * i + 2] % 64);
   }
   PetscCall(PetscFree(share));
   PetscCallMPI(MPI_Allreduce(&p->nrow, &total, 1, MPIU_INT, MPI_SUM, s->comm));
@@ -231,26 +264,27 @@ static PetscErrorCode find_pattern(Contact *p)
 {
   const SbContactRows *r = p->rows;
   PetscInt *start, *member, *mark, *place, lowest = PETSC_MAX_INT, highest = 0, nz = 0;
+  const int stride = p->stride;
 
   PetscFunctionBeginUser;
-  /* own nodes by their unit */
+  /* places of own nodes in unit by the unit */
   PetscCall(PetscCalloc1(p->nrow + 2, &start));
-  PetscCall(PetscMalloc1(p->n, &member));
-  for (PetscInt i = 0; i < p->n; i++) {
-    if (p->unit[i] >= 0) start[p->unit[i] - p->first + 2]++;
+  PetscCall(PetscMalloc1(2 * p->n, &member));
+  for (PetscInt m = 0; m < 2 * p->n; m++) {
+    if (p->unit[m] >= 0) start[p->unit[m] - p->first + 2]++;
   }
   for (PetscInt u = 0; u < p->nrow; u++) start[u + 2] += start[u + 1];
-  for (PetscInt i = 0; i < p->n; i++) {
-    if (p->unit[i] >= 0) member[start[p->unit[i] - p->first + 1]++] = i;
+  for (PetscInt m = 0; m < 2 * p->n; m++) {
+    if (p->unit[m] >= 0) member[start[p->unit[m] - p->first + 1]++] = m;
   }
-  for (PetscInt i = 0; i < p->n + p->nghost; i++) {
-    if (p->unit[i] < 0) continue;
-    lowest = PetscMin(lowest, p->unit[i]);
-    highest = PetscMax(highest, p->unit[i] + 1);
+  for (PetscInt m = 0; m < 2 * (p->n + p->nghost); m++) {
+    if (p->unit[m] < 0) continue;
+    lowest = PetscMin(lowest, p->unit[m]);
+    highest = PetscMax(highest, p->unit[m] + 1);
   }
   if (lowest > highest) lowest = highest;
   PetscCall(PetscMalloc2(highest - lowest, &mark, highest - lowest, &place));
-  PetscCall(PetscMalloc2(p->nrow + 1, &p->ia, r->ia[p->n], &p->slot));
+  PetscCall(PetscMalloc2(p->nrow + 1, &p->ia, stride * (size_t)r->ia[p->n], &p->slot));
 
   /* once to count, once to fill */
   for (int pass = 0; pass < 2; pass++) {
@@ -261,24 +295,29 @@ static PetscErrorCode find_pattern(Contact *p)
 
       p->ia[u] = nz;
       for (PetscInt m = start[u]; m < start[u + 1]; m++) {
-        for (PetscInt k = r->ia[member[m]]; k < r->ia[member[m] + 1]; k++) {
-          const PetscInt j = p->column[k], b = p->unit[j] - lowest;
+        for (PetscInt k = r->ia[member[m] / 2]; k < r->ia[member[m] / 2 + 1]; k++) {
+          const PetscInt j = p->column[k];
+          PetscInt *slot = p->slot + stride * (size_t)k + 2 * (member[m] % 2);
 
-          p->slot[k] = -1;
-          if (p->unit[j] < 0) continue;
-          if (mark[b] != u) {
-            mark[b] = u;
-            place[b] = length;
-            for (int q = 0; q < (p->single[j] ? 1 : 2); q++, length++) {
-              if (pass) p->ja[nz + length] = p->unit[j] + q;
+          for (int v = 0; v < (p->way[j] == MEAN ? 2 : 1); v++) {
+            const PetscInt b = p->unit[2 * j + v] - lowest;
+
+            slot[v] = -1;
+            if (p->unit[2 * j + v] < 0) continue;
+            if (mark[b] != u) {
+              mark[b] = u;
+              place[b] = length;
+              for (int q = 0; q < (p->way[j] == MEMBER ? 2 : 1); q++, length++) {
+                if (pass) p->ja[nz + length] = p->unit[2 * j + v] + q;
+              }
             }
+            slot[v] = place[b];
           }
-          p->slot[k] = place[b];
         }
       }
       nz += length;
       /* the second row of an aggregate, which has no members of its own in the list */
-      if (start[u + 1] > start[u] && !p->single[member[start[u]]]) {
+      if (start[u + 1] > start[u] && p->way[member[start[u]] / 2] == MEMBER) {
         p->ia[u + 1] = nz;
         for (PetscInt q = 0; q < length && pass; q++) p->ja[nz + q] = p->ja[nz - length + q];
         nz += length;
@@ -319,6 +358,10 @@ static inline void add_block(const Contact *p, PetscInt i, PetscInt j, const Pet
   const PetscReal *d = p->d + 3 * j, *x = p->d + 3 * i;
   PetscReal T[18];
 
+  if (p->way[i] != MEMBER && p->way[j] != MEMBER) {
+    for (int e = 0; e < 9; e++) to[0][e] += A[e];
+    return;
+  }
   /* columns: as they are, and their moments */
   for (int q = 0; q < 3; q++) {
     const PetscReal *a = A + 3 * q;
@@ -328,11 +371,11 @@ static inline void add_block(const Contact *p, PetscInt i, PetscInt j, const Pet
     T[9 + 3 * q + 1] = a[0] * d[2] - a[2] * d[0];
     T[9 + 3 * q + 2] = a[1] * d[0] - a[0] * d[1];
   }
-  for (int half = 0; half < (p->single[j] ? 1 : 2); half++) {
+  for (int half = 0; half < (p->way[j] == MEMBER ? 2 : 1); half++) {
     const PetscReal *B = T + 9 * half;
 
     for (int e = 0; e < 9; e++) to[0][9 * half + e] += B[e];
-    if (p->single[i]) continue;
+    if (p->way[i] != MEMBER) continue;
     for (int c = 0; c < 3; c++) {
       to[1][9 * half + c] += x[1] * B[6 + c] - x[2] * B[3 + c];
       to[1][9 * half + 3 + c] += x[2] * B[c] - x[0] * B[6 + c];
@@ -353,21 +396,36 @@ static PetscErrorCode set_values(Contact *p, PetscBool *ok)
     for (PetscInt k = r->ia[i]; k < r->ia[i + 1]; k++) {
       const PetscInt j = p->column[k];
       const PetscReal *A = r->value + 9 * k;
+      const int ways[2] = {p->way[i] == MEAN ? 2 : 1, p->way[j] == MEAN ? 2 : 1};
       PetscReal D[9], *to[2];
 
       if (j == i) {
-        if (p->single[i])
+        if (p->way[i] == ITSELF)
           PetscCall(PetscArrayzero(p->inverse + 9 * i, 9));
-        else if (!invert(A, p->inverse + 9 * i))
+        else if (!p->parent && !invert(A, p->inverse + 9 * i))
           *ok = PETSC_FALSE;
-        /* prescribed unknowns of an aggregate have only their diagonal, which is not in the span of Z */
-        for (int e = 0; e < 9 && !p->single[i]; e++) D[e] = s->fixed[i] & (1 << (e / 3)) ? 0. : A[e];
-        if (!p->single[i]) A = D;
+        /* prescribed unknowns of others have only their diagonal, which is not in the span of Z */
+        for (int e = 0; e < 9 && p->way[i] != ITSELF; e++) D[e] = s->fixed[i] & (1 << (e / 3)) ? 0. : A[e];
+        if (p->way[i] != ITSELF) A = D;
       }
-      if (p->unit[i] < 0 || p->slot[k] < 0) continue;
-      for (int q = 0; q < (p->single[i] ? 1 : 2); q++)
-        to[q] = p->value + 9 * (size_t)(p->ia[p->unit[i] - p->first + q] + p->slot[k]);
-      add_block(p, i, j, A, to);
+      for (int w = 0; w < ways[0] * ways[1]; w++) {
+        const int v = w / ways[1], u = w % ways[1];
+        const PetscInt row = p->unit[2 * i + v] - p->first,
+                       slot = p->slot[p->stride * (size_t)k + (size_t)(2 * v + u)];
+        const PetscReal factor = (ways[0] > 1 ? 0.5 : 1.) * (ways[1] > 1 ? 0.5 : 1.);
+        PetscReal B[9];
+
+        if (p->unit[2 * i + v] < 0 || slot < 0) continue;
+        for (int q = 0; q < (p->way[i] == MEMBER ? 2 : 1); q++)
+          to[q] = p->value + 9 * (size_t)(p->ia[row + q] + slot);
+        for (int e = 0; e < 9 && factor < 1.; e++) {
+          const PetscBool moved = (PetscBool)((ways[0] == 1 || p->moved[i] & (1 << (3 * v + e / 3))) &&
+                                              (ways[1] == 1 || p->moved[j] & (1 << (3 * u + e % 3))));
+
+          B[e] = moved ? factor * A[e] : 0.;
+        }
+        add_block(p, i, j, factor < 1. ? B : A, to);
+      }
     }
   }
 
@@ -411,6 +469,10 @@ static PetscErrorCode PCSetUp_Contact(PC pc)
     PetscCall(find_pattern(p));
   }
   PetscCall(set_values(p, &ok));
+  if (p->parent) {
+    PetscCall(PCGetOperators(pc, NULL, &A));
+    PetscCall(SbGaussSeidelSetUp(A, p->inverse, p->extra, &ok));
+  }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &ok, 1, SB_MPI_BOOL, MPI_LAND, p->space->comm));
   PetscCall(SbBlockSolverSetUp(p->solver, p->nrow, p->ia, p->ja, p->value, p->stale[1], &positive));
   p->stale[0] = p->stale[1] = PETSC_FALSE;
@@ -431,16 +493,20 @@ static PetscErrorCode restrict_to(Contact *p, Vec R, PetscReal *share)
   PetscCall(PetscArrayzero(p->c, 3 * p->nrow));
   PetscCall(VecGetArrayRead(R, &r));
   for (PetscInt i = 0; i < p->n; i++) {
-    const PetscInt row = p->unit[i] - p->first;
+    const PetscInt *unit = p->unit + 2 * i;
     PetscReal f[3], m[6] = {0.};
 
-    if (p->unit[i] < 0) continue;
+    for (int v = 0; v < 2 && p->way[i] == MEAN; v++) {
+      for (int q = 0; q < 3 && unit[v] >= 0; q++)
+        p->c[3 * (unit[v] - p->first) + q] += p->moved[i] & (1 << (3 * v + q)) ? 0.5 * r[3 * i + q] : 0.;
+    }
+    if (unit[0] < 0 || p->way[i] == MEAN) continue;
     for (int q = 0; q < 3; q++) {
-      f[q] = !p->single[i] && p->space->fixed[i] & (1 << q) ? 0. : r[3 * i + q];
+      f[q] = p->way[i] == MEMBER && p->space->fixed[i] & (1 << q) ? 0. : r[3 * i + q];
       norm2[1] += f[q] * f[q];
     }
     SbCoarseAddMoments(p->d + 3 * i, f, m);
-    for (int q = 0; q < (p->single[i] ? 3 : 6); q++) p->c[3 * row + q] += m[q];
+    for (int q = 0; q < (p->way[i] == MEMBER ? 6 : 3); q++) p->c[3 * (unit[0] - p->first) + q] += m[q];
   }
   for (PetscInt k = 0; k < 3 * p->nrow; k++) norm2[0] += PetscSqr(p->c[k]) * p->weight[k / 3];
   PetscCall(VecRestoreArrayRead(R, &r));
@@ -459,14 +525,16 @@ static PetscErrorCode add_coarse(Contact *p, Vec Z)
   PetscCall(SbBlockSolverSolve(p->solver, p->c, p->c));
   PetscCall(VecGetArray(Z, &z));
   for (PetscInt i = 0; i < p->n; i++) {
-    const PetscReal *y = p->c + 3 * (p->unit[i] - p->first);
+    const PetscInt *unit = p->unit + 2 * i;
+    const PetscReal *y = p->c + 3 * (unit[0] - p->first);
     PetscReal u[3];
 
-    if (p->unit[i] < 0) continue;
-    if (p->single[i]) {
-      for (int q = 0; q < 3; q++) z[3 * i + q] += y[q];
-      continue;
+    for (int v = 0; v < 2 && p->way[i] == MEAN; v++) {
+      for (int q = 0; q < 3 && unit[v] >= 0; q++)
+        z[3 * i + q] += p->moved[i] & (1 << (3 * v + q)) ? 0.5 * p->c[3 * (unit[v] - p->first) + q] : 0.;
     }
+    for (int q = 0; q < 3 && unit[0] >= 0 && p->way[i] == ITSELF; q++) z[3 * i + q] += y[q];
+    if (p->way[i] != MEMBER) continue;
     SbCoarseMotion(p->d + 3 * i, y, u);
     for (int q = 0; q < 3; q++) z[3 * i + q] += p->space->fixed[i] & (1 << q) ? 0. : u[q];
   }
@@ -533,6 +601,13 @@ static PetscErrorCode PCApply_Contact(PC pc, Vec r, Vec z)
   PetscFunctionBeginUser;
   PetscCall(PCShellGetContext(pc, &p));
   PetscCall(PCGetOperators(pc, NULL, &A));
+  if (p->parent) {
+    PetscCall(SbGaussSeidelDown(A, p->inverse, p->extra, r, z, p->t));
+    PetscCall(restrict_to(p, p->t, NULL));
+    PetscCall(add_coarse(p, z));
+    PetscCall(SbGaussSeidelUp(A, p->inverse, p->extra, r, z, p->t));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(restrict_to(p, r, &share));
   whole = (PetscBool)(share > IN_SPAN);
   if (whole) { /* z = Q r, s = r - A z */
@@ -578,6 +653,8 @@ static PetscErrorCode PCDestroy_Contact(PC pc)
   PetscCall(PCShellGetContext(pc, &p));
   PetscCall(free_pattern(p));
   PetscCall(PetscFree(p->body));
+  PetscCall(PetscFree(p->parent));
+  PetscCall(PetscFree(p->vertex));
   PetscCall(SbBlockSolverDestroy(&p->solver));
   PetscCall(VecDestroy(&p->p));
   PetscCall(VecDestroy(&p->s));
@@ -590,8 +667,13 @@ static PetscErrorCode PCDestroy_Contact(PC pc)
 static PetscErrorCode PCView_Contact(PC pc, PetscViewer viewer)
 {
   PetscInt naggregate, ncontact;
+  Contact *p;
 
   PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  if (p->parent)
+    PetscCall(PetscViewerASCIIPrintf(
+      viewer, "  Gauss-Seidel, and the vertices of P2 bodies in the place of their aggregates\n"));
   PetscCall(SbPCContactGetSize(pc, &naggregate, &ncontact));
   PetscCall(PetscViewerASCIIPrintf(
     viewer,
@@ -602,7 +684,7 @@ static PetscErrorCode PCView_Contact(PC pc, PetscViewer viewer)
 
 PetscErrorCode SbPCContactCreate(SbSpace s, const SbContactRows *rows, PC pc)
 {
-  PetscInt nodes;
+  PetscInt nodes, nvertex = 0;
   Contact *p;
 
   PetscFunctionBeginUser;
@@ -613,6 +695,19 @@ PetscErrorCode SbPCContactCreate(SbSpace s, const SbContactRows *rows, PC pc)
   PetscCall(PetscMalloc1(s->nnode_owned, &p->body));
   nodes = s->plan->face_term[0] ? PetscClipInterval(s->Nnode / AGGREGATES, NODES_FACES, NODES) : NODES;
   PetscCall(SbAggregate(s, (s->nnode_owned + nodes - 1) / nodes, &p->nagg, p->body));
+
+  /* the level of vertices below P2, while it is small */
+  if (s->edge_node) {
+    PetscCall(SbSpaceEdgeParents(s, &p->parent));
+    PetscCall(PetscCalloc1(s->nnode, &p->vertex));
+    for (PetscInt k = 0; k < 2 * s->nnode; k++) {
+      if (p->parent[k] != k / 2) p->vertex[p->parent[k]] = 1;
+    }
+    for (PetscInt i = 0; i < s->nnode_owned; i++) nvertex += p->vertex[i];
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nvertex, 1, MPIU_INT, MPI_SUM, s->comm));
+    if (nvertex > VERTICES) PetscCall(PetscFree(p->parent));
+  }
+  p->stride = p->parent ? 4 : 1;
   PetscCall(SbBlockSolverCreate(s->comm, &p->solver));
   PetscCall(PCSetType(pc, PCSHELL));
   PetscCall(PCShellSetContext(pc, p));

@@ -241,7 +241,10 @@ static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
     c->foreign[0] = c->foreign[1] = PETSC_TRUE;
   }
   PetscCall(SbSpaceGetRows(c->space, K, rows->n, c->all, c->ka, NULL, c->tangent));
-  PetscCall(PetscArrayzero(rows->value, 9 * (size_t)rows->ia[rows->n]));
+  /* blocks of the tangent are set, those of contact alone begin at zero */
+  for (PetscInt k = 0; k < rows->ia[rows->n]; k++) {
+    if (c->used[k] >= 0) PetscCall(PetscArrayzero(rows->value + 9 * (size_t)k, 9));
+  }
   for (PetscInt k = 0; k < c->ka[rows->n]; k++) {
     for (int e = 0; e < 9; e++) rows->value[9 * (size_t)c->place[k] + e] = c->tangent[9 * (size_t)k + e];
   }

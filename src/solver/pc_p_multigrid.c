@@ -47,6 +47,20 @@ typedef struct {
 
 /* ------------------------------------------------------------------ set-up, once */
 
+PetscErrorCode SbSpaceEdgeParents(SbSpace s, PetscInt **parent)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(2 * s->nnode, parent));
+  for (PetscInt k = 0; k < 2 * s->nnode; k++) (*parent)[k] = k / 2;
+  for (PetscInt k = 0; s->edge_node && k < 6 * s->mesh->ncell; k++) {
+    const PetscInt i = s->edge_node[k];
+
+    for (int v = 0; i >= 0 && v < 2; v++)
+      (*parent)[2 * i + v] = s->cell_node[4 * (k / 6) + SbTetEdge[k % 6][v]];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode number_nodes(Multigrid *p)
 {
   SbSpace s = p->space;
@@ -54,15 +68,8 @@ static PetscErrorCode number_nodes(Multigrid *p)
   PetscReal *number;
 
   PetscFunctionBeginUser;
-  // every node is its own parent, but for those at edges
-  PetscCall(PetscMalloc2(2 * s->nnode, &p->parent, s->nnode, &p->gcoarse));
-  for (PetscInt k = 0; k < 2 * s->nnode; k++) p->parent[k] = k / 2;
-  for (PetscInt k = 0; s->edge_node && k < 6 * s->mesh->ncell; k++) {
-    const PetscInt i = s->edge_node[k];
-
-    for (int v = 0; i >= 0 && v < 2; v++)
-      p->parent[2 * i + v] = s->cell_node[4 * (k / 6) + SbTetEdge[k % 6][v]];
-  }
+  PetscCall(SbSpaceEdgeParents(s, &p->parent));
+  PetscCall(PetscMalloc1(s->nnode, &p->gcoarse));
   // own nodes of the lower level, and what their numbers are on all ranks
   PetscCall(PetscMalloc2(s->nnode_owned, &p->node, s->nnode_owned, &p->row));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
@@ -458,7 +465,8 @@ static PetscErrorCode PCDestroy_Multigrid(PC pc)
   PetscCall(VecDestroy(&p->g));
   PetscCall(VecDestroy(&p->r));
   PetscCall(VecDestroy(&p->w));
-  PetscCall(PetscFree2(p->parent, p->gcoarse));
+  PetscCall(PetscFree(p->parent));
+  PetscCall(PetscFree(p->gcoarse));
   PetscCall(PetscFree2(p->node, p->row));
   PetscCall(PetscFree2(p->column, p->value));
   PetscCall(PetscFree(p->start));

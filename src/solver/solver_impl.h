@@ -37,6 +37,9 @@ PetscErrorCode SbPCConstrainedCreate(SbSpace space, PC pc, PC *inner);
 /* negative: pivots below zero of a factorisation that is done, -1 where it is unknown: L D L^T of MUMPS counts them. Collective. */
 PetscErrorCode SbPCDirectCountNegative(PC pc, PetscInt *negative);
 
+/* parent[nnode][2], to be freed by the caller: local nodes, the vertices of a node at an edge of P2, else the node itself twice. Not collective. */
+PetscErrorCode SbSpaceEdgeParents(SbSpace space, PetscInt **parent);
+
 /* The package of such a factorisation that is gathered on one rank, NULL for any other pc. Not collective. */
 PetscErrorCode SbPCDirectGathered(PC pc, const char **package);
 
