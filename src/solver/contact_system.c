@@ -306,7 +306,7 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
     PetscCall(MatSetSizes(c->A, 3 * rows->n, 3 * rows->n, 3 * s->Nnode, 3 * s->Nnode));
     PetscCall(MatSetBlockSize(c->A, 3));
     PetscCall(MatSetType(c->A, own && size == 1 ? MATSBAIJ : MATBAIJ));
-    PetscCall(MatSetOption(c->A, MAT_IGNORE_LOWER_TRIANGULAR, PETSC_TRUE));
+    if (own && size == 1) PetscCall(MatSetOption(c->A, MAT_IGNORE_LOWER_TRIANGULAR, PETSC_TRUE));
     PetscCall(MatSeqSBAIJSetPreallocationCSR(c->A, 3, rows->ia, rows->ja, NULL));
     PetscCall(MatSeqBAIJSetPreallocationCSR(c->A, 3, rows->ia, rows->ja, NULL));
     PetscCall(MatMPIBAIJSetPreallocationCSR(c->A, 3, rows->ia, rows->ja, NULL));

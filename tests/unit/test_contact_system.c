@@ -145,8 +145,8 @@ int main(int argc, char **argv)
   PetscCall(check_stiffness(4, "p1", 0.01, 44));
   PetscCall(check_stiffness(8, "p1", 0.01, 44));
   PetscCall(check_stiffness(6, "p1", 1., 50));
-  PetscCall(check_stiffness(4, "p2", 0.01, 30));
-  PetscCall(check_stiffness(6, "p2", 1., 30));
+  PetscCall(check_stiffness(4, "p2", 0.01, 20));
+  PetscCall(check_stiffness(6, "p2", 1., 20));
   PetscCall(check_changes(1));
   PetscCall(check_changes(2));
   PetscCall(check_choice());

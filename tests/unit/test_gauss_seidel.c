@@ -41,7 +41,7 @@ static PetscErrorCode compare(const char *element)
   PetscCall(VecDuplicate(z, &reference));
   PetscCall(test_fill(scene.model, pattern, r));
   PetscCall(PetscMalloc1(9 * s->nnode_owned, &inverse));
-  PetscCall(SbGaussSeidelSetUp(s, A, inverse, NULL, &positive));
+  PetscCall(SbGaussSeidelSetUp(A, inverse, NULL, &positive));
   for (int k = 0; k < 2; k++) {
     // r - A z by a product, and D + L or D + L^T on it by PETSc
     if (!k)
@@ -60,9 +60,9 @@ static PetscErrorCode compare(const char *element)
              0., 1, 1, reference));
     if (k) {
       PetscCall(VecAXPY(reference, 1., z));
-      PetscCall(SbGaussSeidelUp(s, A, inverse, NULL, r, z, t));
+      PetscCall(SbGaussSeidelUp(A, inverse, NULL, r, z, t));
     } else
-      PetscCall(SbGaussSeidelDown(s, A, inverse, NULL, r, z, t));
+      PetscCall(SbGaussSeidelDown(A, inverse, NULL, r, z, t));
     PetscCall(VecNorm(reference, NORM_2, &size));
     PetscCall(VecAXPY(reference, -1., z));
     PetscCall(VecNorm(reference, NORM_2, &error));
@@ -71,7 +71,7 @@ static PetscErrorCode compare(const char *element)
   }
   SB_CHECK(positive, "%s: a block is not positive", element);
   PetscCall(MatScale(A, -1.));
-  PetscCall(SbGaussSeidelSetUp(s, A, inverse, NULL, &positive));
+  PetscCall(SbGaussSeidelSetUp(A, inverse, NULL, &positive));
   SB_CHECK(!positive, "%s: negative blocks pass", element);
   PetscCall(PetscFree(inverse));
   PetscCall(VecDestroy(&r));
