@@ -32,13 +32,14 @@
 #define VERTICES 12000  /* of P2 bodies, up to which they are in Z: one rank factors E */
 #define VANISHING 1e-8  /* squared size of a mode over that of the largest one of its aggregate */
 
-typedef enum { MEMBER, ITSELF, MEAN } Way; /* how a node moves with Z: in an aggregate; by itself; by the mean of two vertices */
+/* How a node moves with Z: in an aggregate; by itself; by the mean of two vertices. */
+typedef enum { MEMBER, ITSELF, MEAN } Way;
 
 typedef struct {
   SbSpace space;
   const SbContactRows *rows;
-  PetscInt *parent; /* [nnode][2] local nodes: vertices of an edge node, else the node itself twice; NULL: P2 has no part in Z */
-  uint8_t *vertex;  /* [nnode] the node is a vertex of a P2 body; likewise */
+  PetscInt *parent;     /* [nnode][2] of SbSpaceEdgeParents(); NULL: P2 is aggregated as the others */
+  uint8_t *vertex;      /* [nnode] the node is a vertex of a P2 body; likewise */
   PetscInt nagg, *body; /* aggregates; [n] that of each own node, -1: fully prescribed */
   PetscBool stale[2];   /* values, pattern */
   PetscBool ok;
@@ -47,15 +48,15 @@ typedef struct {
     *column; /* own nodes; other nodes of the rows, global, ascending; [ia[n]] columns as own nodes or n + ghost */
   VecScatter scatter;
   Vec local;            /* [nghost][3] */
-  PetscInt *unit;       /* [n+nghost][2] block rows of the node in E, global; -1: none; the second one only of a MEAN */
+  PetscInt *unit;       /* [n+nghost][2] block rows of the node in E, global; -1: none. Two of a MEAN */
   uint8_t *way;         /* [n+nghost] */
-  uint8_t *moved;       /* [n+nghost] of a MEAN: three bits for the components that the first vertex moves, three for the second one */
+  uint8_t *moved;       /* [n+nghost] of a MEAN: bits of the components moved by its two vertices */
   PetscReal *d;         /* [n+nghost][3] position in its aggregate, in units of the radius */
   PetscInt nrow, first; /* own block rows of E, number of the first one */
   PetscInt *ia, *ja;    /* E */
   PetscReal *value;     /* [ia[nrow]][9] */
   int stride;           /* 4 with parents, else 1 */
-  PetscInt *slot;       /* [rows->ia[n]][stride] place of the block's column in the row of E, by vertex of the row and of the column */
+  PetscInt *slot;       /* [rows->ia[n]][stride] of a block, by vertices: place of its column in E's row */
   PetscReal *null;      /* [nagg][36] projector onto the modes that vanish */
   PetscInt *row_of;     /* [nagg] first own row in E, -1: no node is left */
   PetscReal *weight;    /* [nrow] one over the nodes of the row's unit */

@@ -15,10 +15,10 @@ typedef struct {
 } SbContactRows;
 
 /*
-  SbPCContactCreate - makes pc a preconditioner for CG: Chebyshev's iteration with the blocks on the diagonal, and a coarse space of the
-  unknowns of contact nodes and rigid-body modes of aggregates of the others, which is solved exactly.
+  SbPCContactCreate - makes pc a preconditioner for CG: Chebyshev's iteration with the blocks on the diagonal, or Gauss-Seidel where there are P2 bodies that are not too large,
+  and a coarse space of the unknowns of contact nodes and of rigid-body modes of aggregates of the others, or of P2's vertices, which is solved exactly.
 
-  Collective; space and rows are borrowed. The operator of pc is a matrix with these rows. Right for a first guess from SbPCContactGuess().
+  Collective; space and rows are borrowed. The operator of pc is a matrix with these rows and the fast product. Right for a first guess from SbPCContactGuess().
 */
 PetscErrorCode SbPCContactCreate(SbSpace space, const SbContactRows *rows, PC pc);
 /* Before a solve: the values of the rows are others; changed, on some rank their pattern or contact nodes, too. Collective. */
