@@ -107,7 +107,11 @@ PetscErrorCode SbAttachModes(Mat A, PetscErrorCode (*fill)(PetscInt mode, PetscS
 static inline void sb_gather_strain(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[],
                                     SbPack u[30])
 {
-  sb_gather_nodes((int)region->nnode, sb_batch_nodes(s, b), x, u);
+  /* loops of constant length */
+  if (region->nnode == 4)
+    sb_gather_nodes(4, sb_batch_nodes(s, b), x, u);
+  else
+    sb_gather_nodes(10, sb_batch_nodes(s, b), x, u);
   if (region->broken) {
     SbPack p[12];
 
@@ -151,7 +155,10 @@ static inline void sb_scatter_strain(SbSpace s, const SbRegion *region, PetscInt
     }
     sb_scatter_nodes(4, sb_batch_nodes(s, b) + 4 * SB_BATCH, s->batch_n[b], (const SbPack *)p, f);
   }
-  sb_scatter_nodes((int)region->nnode, sb_batch_nodes(s, b), s->batch_n[b], (const SbPack *)fe, f);
+  if (region->nnode == 4)
+    sb_scatter_nodes(4, sb_batch_nodes(s, b), s->batch_n[b], (const SbPack *)fe, f);
+  else
+    sb_scatter_nodes(10, sb_batch_nodes(s, b), s->batch_n[b], (const SbPack *)fe, f);
 }
 
 /* Rotations that are stored for a cell: those of P2 have one at each point of SbRuleQuadratic, others use the first. */

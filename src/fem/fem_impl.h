@@ -82,7 +82,7 @@ SB_INLINE void SbPointVolume(const SbPoints *at, int q, SbPack W)
 /* U[3 nnode] of sb_gather_strain() for x, zero where that is NULL, and F (rate: without the identity) at the points. */
 void SbBatchGradients(SbSpace space, const SbRegion *region, PetscInt b, const PetscReal x[], PetscBool rate,
                       SbPack U[30], SbPack F[SB_POINTS][9]);
-/* Adds the forces of a stress P at point q, on what sb_gather_strain() gathers. */
+/* The forces of a stress P at point q, on what sb_gather_strain() gathers: added for P2, all that there is for others, which have one point. */
 void SbPointForce(const SbPoints *at, int q, const SbPack P[9], SbPack f[30]);
 /*
   The volumetric part of the energy, V lambda/2 (mean of theta)^2: pressure = lambda times the mean (Pa, tension), b[30] = V d mean/du (m^2; NULL: not

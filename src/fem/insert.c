@@ -204,9 +204,7 @@ void SbInsertBatch(SbSpace s, const SbValues *x, PetscInt b, int npair, const Sb
 {
   const PetscInt *offset = s->plan->offset + (size_t)(b * s->width * s->width) * SB_BATCH,
                  *node = s->batch_node + 4 * SB_BATCH * b;
-  PetscInt last = 0;
 
-  for (int k = 0; k < 4 * SB_BATCH; k++) last = PetscMax(last, node[k]);
   if (x->kind == SB_MATRIX_AIJ)
     for (PetscInt l = 0; l < s->batch_n[b]; l++) insert_cell(s, x, b, l, npair, K);
   else if (x->kind == SB_MATRIX_SBAIJ) {
@@ -218,10 +216,15 @@ void SbInsertBatch(SbSpace s, const SbValues *x, PetscInt b, int npair, const Sb
       insert_sbaij(K, upper, x->value);
   } else if (npair == SB_PAIRS)
     insert_baij_quadratic(K, offset, x->value);
-  else if (last < s->nnode_owned)
-    insert_baij(K, offset, s->width, x->value);
-  else
-    insert_baij_edge(K, offset, s->width, x->value);
+  else {
+    PetscInt last = 0;
+
+    for (int k = 0; k < 4 * SB_BATCH; k++) last = PetscMax(last, node[k]);
+    if (last < s->nnode_owned)
+      insert_baij(K, offset, s->width, x->value);
+    else
+      insert_baij_edge(K, offset, s->width, x->value);
+  }
 }
 
 /* Each block between means is spread over the own nodes and those across the faces. */

@@ -62,15 +62,13 @@ void SbPointForce(const SbPoints *at, int q, const SbPack P[9], SbPack f[30])
 {
   SbPack W, corner[12];
 
-  for (int l = 0; l < SB_BATCH; l++) W[l] = at->weight[q][l] * (*at->V)[l];
-  SbCellForce(at->g + at->step * q, W, P, corner);
-  if (at->rule) {
-    SbQuadraticAdd(at->rule->L[q], (const SbPack *)corner, f);
+  if (!at->rule) {
+    SbCellForce(at->g, *at->V, P, f);
     return;
   }
-  for (int k = 0; k < 12; k++) {
-    for (int l = 0; l < SB_BATCH; l++) f[k][l] += corner[k][l];
-  }
+  SbPointVolume(at, q, W);
+  SbCellForce(at->g + at->step * q, W, P, corner);
+  SbQuadraticAdd(at->rule->L[q], (const SbPack *)corner, f);
 }
 
 void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const SbPack U[30],

@@ -27,9 +27,9 @@ static void add_forces(SbSpace s, const SbRegion *region, PetscBool elastic, con
 
   for (PetscInt b = region->bstart; b < region->bend; b++) {
     const SbPoints at = SbBatchPoints(s, region, b);
-    SbPack U[30], F[SB_POINTS][9], H[SB_POINTS][9], P[9] = {{0}}, dP[9], R[9], fe[30], b10[30], p = {0};
+    SbPack U[30], F[SB_POINTS][9], H[SB_POINTS][9], P[9], dP[9], R[9], fe[30], b10[30], p = {0};
 
-    memset(fe, 0, (size_t)(3 * region->nnode) * sizeof(SbPack));
+    if (at.rule) memset(fe, 0, sizeof(fe));
     SbBatchGradients(s, region, b, stage->u, PETSC_FALSE, U, F);
     if (mean && elastic) {
       SbQuadraticVolume(region->material, &at, (const SbPack *)U, (const SbPack(*)[9])F, p, b10);
@@ -113,9 +113,14 @@ static void add_consistent_inertia(SbSpace s, const SbRegion *region, const SbSt
         for (int l = 0; l < SB_BATCH; l++) fe[k][l] += density * W[l] * phi[k / 3] * here[k % 3][l];
       }
     }
-    for (int k = 0; !region->curve_g && k < 3 * n * n; k++) {
-      for (int l = 0; l < SB_BATCH; l++)
-        fe[k / (3 * n) * 3 + k % 3][l] += mass[k / 3] * s->batch_V[b][l] * w[k % (3 * n)][l];
+    for (int a = 0; !region->curve_g && a < n; a++) {
+      for (int k = 0; k < 3 * n; k += 3) {
+        const PetscReal share = mass[n * a + k / 3];
+
+        for (int i = 0; i < 3; i++) {
+          for (int l = 0; l < SB_BATCH; l++) fe[3 * a + i][l] += share * s->batch_V[b][l] * w[k + i][l];
+        }
+      }
     }
     sb_scatter_nodes(n, node, s->batch_n[b], (const SbPack *)fe, f);
   }
@@ -123,14 +128,16 @@ static void add_consistent_inertia(SbSpace s, const SbRegion *region, const SbSt
 
 void SbSpaceAddInertia(SbSpace s, const SbStage *stage, PetscReal f[])
 {
+  PetscBool damped = PETSC_FALSE;
+
   if (s->consistent_mass) {
     for (PetscInt r = 0; r < s->nregion; r++) add_consistent_inertia(s, &s->region[r], stage, f);
     return;
   }
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
-    if (stage->a) f[i] += s->node_mass[i / 3] * stage->a[i];
-    if (stage->v) f[i] += s->alpha[s->node_body[i / 3]] * s->node_mass[i / 3] * stage->v[i];
-  }
+  for (PetscInt b = 0; stage->v && b < s->mesh->nbody; b++) damped = (PetscBool)(damped || s->alpha[b] != 0.);
+  for (PetscInt i = 0; stage->a && i < 3 * s->nnode_owned; i++) f[i] += s->node_mass[i / 3] * stage->a[i];
+  for (PetscInt i = 0; damped && i < 3 * s->nnode_owned; i++)
+    f[i] += s->alpha[s->node_body[i / 3]] * s->node_mass[i / 3] * stage->v[i];
 }
 
 /* Cauchy stress P F^T / J of one lane, in the order xx yy zz xy yz xz. */

@@ -423,7 +423,9 @@ PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n,
   }
   for (PetscInt k = 0; k < n; k++) {
     /* the lumped mass, and its damping */
-    for (PetscInt i = 0; !s->consistent_mass && i < space[k]->nnode_owned; i++)
+    for (PetscInt i = 0;
+         !s->consistent_mass && (stage->shift_a != 0. || stage->shift_v != 0.) && i < space[k]->nnode_owned;
+         i++)
       add_to_diagonal(space[k], &fill[k].x, i,
                       (stage->shift_a + stage->shift_v * s->alpha[space[k]->node_body[i]]) *
                         space[k]->node_mass[i]);
