@@ -7,7 +7,7 @@
   Small systems, and those where contact has a large share of the nodes, are factored on one rank (block_solver.c). Others are solved by CG with the coarse space of
   contact_coarse.c, to a tolerance of FORCING in the norm of the preconditioner; where CG takes too long, they are factored, too. A matrix that is not
   positive definite fails: in the factor, or by a direction of CG with negative curvature. With -pc_type or -contact_pc_type, PETSc's preconditioner of that name takes the place of
-  both; -ksp_type and -contact_ksp_type name another method than CG.
+  both; -ksp_type and -contact_ksp_type name another method than CG. What goes with -pc_type (-ksp_max_it, -sub_pc_type) counts here, too.
 */
 #include "contact_coarse.h"
 #include "sblog.h"
@@ -18,6 +18,9 @@
 #define SHARE (1. / 3.) /* of nodes of contact, above which all are */
 #define FORCING 1e-2    /* of the preconditioned residual */
 #define MOST 300        /* iterations */
+/* The same of the user's, which nothing replaces, and whose last errors are those of soft motions: a step looks short with them. */
+#define FORCING_USER 1e-4
+#define MOST_USER 5000
 
 struct _p_SbContactSystem {
   SbSpace space;
@@ -293,7 +296,7 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
 {
   const SbSpace s = c->space;
   const SbContactRows *rows = &c->rows;
-  PetscBool own = (PetscBool)!c->type[0];
+  PetscBool own = (PetscBool)!c->type[0], apart;
   PetscMPIInt size;
   Mat P;
   PC pc;
@@ -315,9 +318,11 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
   PetscCall(fill_matrix(c));
   if (!c->ksp) {
     PetscCall(KSPCreate(s->comm, &c->ksp));
-    PetscCall(KSPSetOptionsPrefix(c->ksp, "contact_"));
-    PetscCall(KSPSetType(c->ksp, c->method[0] ? c->method : KSPCG));
-    PetscCall(KSPSetTolerances(c->ksp, FORCING, PETSC_DEFAULT, 1e10, MOST));
+    /* what goes with -pc_type, its row in solver.c and the user's options, stands in the database without a prefix */
+    PetscCall(PetscOptionsHasName(NULL, "contact_", "-pc_type", &apart));
+    if (own || apart) PetscCall(KSPSetOptionsPrefix(c->ksp, "contact_"));
+    PetscCall(
+      KSPSetTolerances(c->ksp, own ? FORCING : FORCING_USER, PETSC_DEFAULT, 1e10, own ? MOST : MOST_USER));
     PetscCall(KSPGetPC(c->ksp, &pc));
     if (own) {
       PetscCall(SbPCContactCreate(s, rows, pc));
@@ -325,6 +330,7 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
     } else
       PetscCall(PCSetType(pc, c->type));
     PetscCall(KSPSetFromOptions(c->ksp));
+    PetscCall(KSPSetType(c->ksp, c->method[0] ? c->method : KSPCG));
   }
   P = c->A;
   if (!own) { /* what most of PETSc's preconditioners take */

@@ -93,9 +93,11 @@ typedef struct {
   SbContactSystem system; /* guarded contact: NULL before surfaces have pushed each other */
   SbBlocks blocks;        /* its second derivative, when the last direction was solved for */
   PetscInt nblock;        /* of all ranks */
+  PetscInt iterations;    /* of the last linear solve */
   SbContactHessian kind;
   PetscReal shift;     /* of the last direction: times the mass added to the tangent, 1/s^2 */
   PetscBool whole;     /* the last step was */
+  PetscBool rounding;  /* and as good as none, with a residual that has not fallen */
   PetscReal tolerance; /* of the last solve, N */
   PetscReal initial;   /* norm of the first residual, N */
 } Newton;
@@ -169,7 +171,7 @@ static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
     PetscCall(KSPGetIterationNumber(snes->ksp, &iterations));
     PetscCall(KSPGetConvergedReason(snes->ksp, reason));
   }
-  snes->linear_its += iterations;
+  snes->linear_its += n->iterations = iterations;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -234,6 +236,7 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
     *slope = -*slope;
     /* friction that is taken for one that sticks has a right-hand side of its own: the direction has to go down E as well */
     if (n->nblock) PetscCall(VecDot(n->rhs, Y, &modelled));
+    if (n->nblock && reason == KSP_DIVERGED_ITS) break; /* of -pc_type: says nothing of the tangent */
     if (n->nblock && n->kind != SB_HESSIAN_MAJORIZED &&
         (reason < 0 || *slope >= -STEEP * PetscMax(modelled, 0.))) {
       n->kind = n->kind == SB_HESSIAN_EXACT ? SB_HESSIAN_PROJECTED : SB_HESSIAN_MAJORIZED;
@@ -258,7 +261,10 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
                         snes->iter, KSPConvergedReasons[reason], (double)*slope, negative));
     *filtered = PETSC_TRUE;
   }
-  if (reason < 0) snes->reason = SNES_DIVERGED_LINEAR_SOLVE;
+  if (reason < 0) {
+    snes->reason = SNES_DIVERGED_LINEAR_SOLVE;
+    if (n->nblock) PetscCall(SbSolverListContactFailed(n->run, reason, n->iterations));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -348,6 +354,8 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
     if (slope >= 0. || total <= noise)
       enough = (PetscBool)(enough || to->norm <= (1. - DECREASE * *s) * from->norm);
     /* at the solution, where residuals are rounding as well, the step is as good as none */
+    n->rounding =
+      (PetscBool)(*s == 1. && !enough && slope < 0. && total <= noise && -slope <= NOTHING * noise);
     if (slope < 0. && total <= noise) enough = (PetscBool)(enough || -slope <= NOTHING * noise);
     provisional =
       (PetscBool)(!enough && !plain && slope < 0. && n->provisional < PROVISIONAL &&
@@ -530,6 +538,8 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
   PetscFunctionBeginUser;
   if (!n->nblock) {
     PetscCall(SbSNESConverged(snes, snes->iter, snes->xnorm, snes->ynorm, snes->norm));
+    /* what rounding leaves of the residual may be more than the tolerance */
+    if (!snes->reason && n->rounding) snes->reason = SNES_CONVERGED_SNORM_RELATIVE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   enough = m->dynamic ? SETTLED * m->guard_speed * run->guard_dt : SETTLED_STATIC * size;

@@ -256,6 +256,23 @@ PetscErrorCode SbSolverListCreate(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbSolverListContactFailed(SbRun run, KSPConvergedReason reason, PetscInt iterations)
+{
+  SbSolverList l = run->solver_list;
+  PetscBool apart;
+  char system[128];
+
+  PetscFunctionBeginUser;
+  if (!l) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-contact_pc_type", &apart));
+  PetscCall(SbContactSystemDescribe(run->model->space, run->contact_choice, system, sizeof(system)));
+  PetscCall(
+    PetscSNPrintf(l->failures, sizeof(l->failures), "%s of %s after %" PetscInt_FMT " iterations%s",
+                  KSPConvergedReasons[reason], system, iterations,
+                  apart ? "; it is the one of -contact_pc_type, which is not replaced: leave it out" : ""));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[])
 {
   const SbSolverList l = run->solver_list;

@@ -116,6 +116,8 @@ PetscErrorCode SbSolverListCreate(SbRun run);
 /* After a Newton step whose linear solve failed: "linear solver: ", each solver that was tried with its reason, iterations and residual, what is known of the
    causes, and advice. Collective. */
 PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[]);
+/* For that text: the last solve of guarded contact's system failed so. Not collective. */
+PetscErrorCode SbSolverListContactFailed(SbRun run, KSPConvergedReason reason, PetscInt iterations);
 
 PetscErrorCode SbStaticSolve(SbRun run); /* static.c: the load path */
 /* arc_length.c: the path of equilibria with the load factor as an unknown. Collective. Check: after the solver is set up; PETSC_ERR_USER_INPUT for

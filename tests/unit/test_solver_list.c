@@ -84,6 +84,28 @@ static PetscErrorCode check_slivers(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Where rounding leaves more of the residual than the tolerance, 6e-8 of the first one here, Newton's method ends. */
+static PetscErrorCode check_rounding(void)
+{
+  const Slivers s = {.n = {8, 4, 4}, .size = {0.3, 0.1, 0.1}, .part = 0.01, .degrees = 0.1};
+  char path[512], text[1024];
+  PetscInt made = 0;
+  Outcome o;
+
+  PetscFunctionBeginUser;
+  PetscCall(slivers_write(&s, path, &made));
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          BAR "-body_a_mesh %s -effect_clamp_on held -sets held -set_held_at plane:1,0,0,0 "
+                              "-time static -body_a_material neohookean -body_a_young 5e5 -body_a_poisson "
+                              "0.4999 -body_a_element cr",
+                          path));
+  PetscCall(run(text, "-time_max_halvings 0", &o));
+  SB_CHECK(!o.stop[0] && !o.rejected && o.newton < 40,
+           "%s, %" PetscInt_FMT " steps cut, %" PetscInt_FMT " iterations", o.stop, o.rejected, o.newton);
+  PetscCall(test_file_remove(path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The solver of a clamped bar with so many slivers, without solving. */
 static PetscErrorCode choose(const char *path, const char *solver, const char *body, char name[SB_NAME_MAX])
 {
@@ -174,6 +196,7 @@ int main(int argc, char **argv)
         "-effect_meet_type contact -ksp_rtol 1e-10",
     "cg", "-ksp_max_it 20", 1e-4));
   PetscCall(check_slivers());
+  PetscCall(check_rounding());
   PetscCall(check_choice());
   PetscCall(check_tangent("auto", PETSC_TRUE));
   PetscCall(check_tangent("exact", PETSC_FALSE));

@@ -239,6 +239,40 @@ static PetscErrorCode check_springs(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The system of surfaces that push each other is solved by what is asked for, with what goes with it: incomplete factors of blocks of CR are indefinite without a
+   shift. A solve at its limit says nothing of the tangent, and names the option. */
+static PetscErrorCode check_barrier(void)
+{
+  static const Case barrier = {
+    "barrier",
+    "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_element cr -body_a_material neohookean -body_a_young "
+    "1e6 -body_a_poisson 0.3 -effects gravity,clamp,floor " HELD
+    "-effect_floor_type contact -effect_floor_response barrier "
+    "-effect_floor_obstacle box:0.2,-1,-1,1,1,-0.003 -time static ",
+    PETSC_FALSE};
+  static const char *const more[] = {"-ksp_type cg -pc_type bjacobi", "-ksp_type cg -pc_type asm",
+                                     "-ksp_type minres -pc_type bjacobi", "-ksp_type gmres -pc_type asm",
+                                     "-ksp_type cg -pc_type bjacobi -sub_pc_type icc"};
+  PetscErrorCode code;
+  PetscReal exact;
+  char stop[512];
+
+  PetscFunctionBeginUser;
+  PetscCall(run(&barrier, "", &code, &exact, stop));
+  SB_CHECK(!code && !stop[0], "barrier: code %d, %s%s", (int)code, sb_test_text, stop);
+  /* 7 Newton iterations by a factorisation; without the shift 60 and more, so load steps are halved */
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(more); k++) {
+    char text[256];
+
+    PetscCall(PetscSNPrintf(text, sizeof(text), "%s -snes_max_it 20 -time_max_halvings 0", more[k]));
+    PetscCall(check(&barrier, text, exact, NULL));
+  }
+  PetscCall(run(&barrier, "-contact_pc_type none -contact_ksp_max_it 5 -static_min_increment 0.5", &code,
+                &exact, stop));
+  SB_CHECK(!code && sb_test_names(stop, "-contact_pc_type"), "code %d, %s", (int)code, stop);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A package that is chosen by PETSc's option is the solver's name; options that only another preconditioner reads are not set; a linear load step whose
    solve fails is not halved. */
 static PetscErrorCode check_said(void)
@@ -281,6 +315,7 @@ int main(int argc, char **argv)
   }
   PetscCall(check_norms(&cases[0]));
   PetscCall(check_springs());
+  PetscCall(check_barrier());
   PetscCall(check_said());
   SB_TEST_END();
 }
