@@ -16,10 +16,9 @@ typedef struct _p_SbPlan {
   PetscInt *
     offset; /* [nbatch][width^2][SB_BATCH] block (a, b) at width a + b: k in the diagonal part, ~k in the off-diagonal
                              part, SB_NOT_OWNED when row a is another rank's; padding lanes have those of the first */
-  PetscInt *ui;   /* [nnode_owned+1] first upper block of each row, for SBAIJ; NULL otherwise */
-  PetscInt npair; /* of blocks of a cell in upper: 10, or SB_PAIRS with a P2 body */
-  PetscInt *
-    upper; /* [nbatch][npair][SB_BATCH] block index in the upper triangle of pair p, ~k when it is to be transposed */
+  PetscInt *ui;    /* [nnode_owned+1] first upper block of each row, for SBAIJ; NULL otherwise */
+  PetscInt npair;  /* of blocks of a cell in upper: 10, or SB_PAIRS with a P2 body */
+  PetscInt *upper; /* [nbatch][npair][SB_BATCH] block of pair p in the upper triangle, ~k: to be transposed */
   PetscInt *fresh_start; /* [nbatch+1] into fresh */
   PetscInt *fresh;       /* [nnode_owned] rows in the order in which the batches reach them first */
   PetscReal *face_term
@@ -27,8 +26,7 @@ typedef struct _p_SbPlan {
   PetscInt nfix;       /* blocks that a prescribed unknown touches */
   PetscInt *fix_block; /* [nfix] block index as in offset */
   PetscInt *fix_row;   /* [nfix] local row node */
-  uint8_t
-    *fix_mask; /* [nfix] bits 0..2: rows, bits 3..5: columns of the block to clear; bit 6: diagonal block */
+  uint8_t *fix_mask;   /* [nfix] bits 0..2: rows, 3..5: columns of the block to clear; 6: diagonal block */
 } * SbPlan;
 #define SB_NOT_OWNED PETSC_MIN_INT
 

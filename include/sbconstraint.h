@@ -27,8 +27,7 @@ typedef struct {
 typedef struct _p_SbSaddleFactor *SbSaddleFactor; /* src/solver/saddle_factor.c */
 
 struct _p_SbConstraints {
-  PetscBool
-    beside; /* solves see the constraints beside K, by SbConstraintsCreateOperator(); else they are projected into it */
+  PetscBool beside;       /* solves see them beside K (SbConstraintsCreateOperator()), else in it */
   PetscBool nonsymmetric; /* some may push along another direction than n */
   PetscInt n, size;
   SbConstraint *constraint; /* [n] */

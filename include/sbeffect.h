@@ -47,7 +47,7 @@ typedef struct {
   PetscErrorCode (*setfromoptions)(SbEffect e, const SbScope *scope);
   /* finds its nodes, facets, cells; marks prescribed unknowns by SbSpacePrescribe(). Collective. */
   PetscErrorCode (*setup)(SbEffect e, SbSpace space);
-  /* writes prescribed displacements at time t into space->fixed_value (rows from SbSpacePrescribedIndex()). Not collective. */
+  /* writes prescribed displacements at time t into space->fixed_value (rows are positions in space->fixed_node). Not collective. */
   PetscErrorCode (*prescribe)(SbEffect e, SbSpace space, PetscReal t);
   /* contact, before the first solve of an attempt at a step from t to t + dt: local displacements u0 at t and u as predicted at
      t + dt, m; v0 are the velocities at t, m/s, NULL unless an effect has `restitution`. Collective. */
@@ -169,22 +169,20 @@ struct _p_SbEffect {
   char name[SB_NAME_MAX];
   char type[SB_NAME_MAX];
   SbEffectOps ops;
-  SbEffectOn on;  /* empty for a type without the option */
-  SbFormula time; /* factor on a load; NULL for a type without the option */
-  PetscLogEvent
-    event;          /* SbEff_<type>, around every operation of the table from `setup` to `contact_points` */
-  PetscBool linear; /* force does not depend on u: the tangent stays constant. Default PETSC_TRUE */
-  PetscBool steady; /* no formula uses t: a static run multiplies the effect by the load factor */
+  SbEffectOn on;         /* empty for a type without the option */
+  SbFormula time;        /* factor on a load; NULL for a type without the option */
+  PetscLogEvent event;   /* SbEff_<type>, around every operation from `setup` to `contact_points` */
+  PetscBool linear;      /* force does not depend on u: the tangent stays constant. Default PETSC_TRUE */
+  PetscBool steady;      /* no formula uses t: a static run multiplies the effect by the load factor */
   PetscReal from, until; /* s (or load factor): it acts at times t with from < t <= until; all by default */
   PetscBool dynamic;     /* the run has inertia; known from set-up on */
   PetscBool saddle;      /* its constraints are to be solved with their multipliers as unknowns */
   PetscBool euler;       /* made for implicit Euler only. Default PETSC_FALSE */
-  PetscBool
-    springs; /* of contact: it pushes with springs or friction, not with constraints alone. Default PETSC_FALSE */
-  PetscBool prescribed; /* it prescribes the nodes of its sets in all directions */
-  PetscInt nstate;      /* numbers in a record of save() */
-  PetscReal width;      /* of guarded contact: the smallest gap below which it pushes, m */
-  PetscInt ncolumn;     /* history columns, known after set-up */
+  PetscBool springs;     /* of contact: springs or friction, not constraints alone. Default PETSC_FALSE */
+  PetscBool prescribed;  /* it prescribes the nodes of its sets in all directions */
+  PetscInt nstate;       /* numbers in a record of save() */
+  PetscReal width;       /* of guarded contact: the smallest gap below which it pushes, m */
+  PetscInt ncolumn;      /* history columns, known after set-up */
   const char *const
     *column;      /* [ncolumn] "force_x", ...; written as <name>_<column>; owned by the type or by `data` */
   char note[256]; /* what set-up has to say in the run's report; "": nothing */

@@ -20,8 +20,7 @@ struct _p_SbSpaceEstimate {
   PetscReal *cell2;  /* [ncell_owned] square of the error of each owned cell, J */
   PetscReal *body2;  /* [nbody] sums over the cells of each body and all ranks, J */
   PetscReal *strain; /* [nbody] the laws' strain energy of the cells of each body and all ranks, J */
-  PetscReal *
-    factor; /* [nbody] cell2 and body2 over the square of what recovery alone gives, 1 but for bodies of P1 */
+  PetscReal *factor; /* [nbody] cell2, body2 over the square of recovery alone, 1 but for P1 */
   struct _p_SbRecovery *recovery;
   PetscReal *P;                 /* [ncell][9] stresses, Pa */
   struct SbPointStress *stress; /* [ncell] those of P2, NULL without a body of it */

@@ -26,14 +26,13 @@ typedef struct {
   PetscInt cstart, cend; /* local cells */
   PetscInt bstart, bend; /* batches; the last one may be partly filled */
   PetscBool owned;
-  PetscBool broken; /* DG: strains come from the means of the two sides of each face */
-  PetscBool
-    quadratic; /* P2: each point of SbRuleQuadratic has a strain of its own; of SbRuleQuintic where cells are curved */
+  PetscBool broken;    /* DG: strains come from the means of the two sides of each face */
+  PetscBool quadratic; /* P2: strains at the points of SbRuleQuadratic, or SbRuleQuintic where curved */
   /* P2 cells that are curved at rest; NULL: straight. Gradients, parts of the volume at the points [batch][SB_POINTS]([9]), lumped mass / (density V)
      [batch][10]; their memory is the space's */
   SbPack *curve_g, *curve_weight, *curve_mass;
   SbMaterial
-    pointwise; /* P2: the law at the points, which has no volumetric part where that is of the mean of the cell; borrowed */
+    pointwise;    /* the law at the points, without volumetric part where that is of the mean; borrowed */
   PetscInt nnode; /* of a cell: 4, of P2 SB_CELL_NODES */
 } SbRegion;
 
@@ -52,21 +51,19 @@ struct _p_SbSpace {
   PetscInt gnode_start;
   PetscInt *gnode;     /* [nnode] global node numbers; owned first, ghosts ascending */
   PetscInt *cell_node; /* [ncell][4] local nodes; of P2 those at the vertices */
-  PetscInt
-    *edge_node;      /* [ncell][6] local nodes of P2 cells at their edges, -1: none; NULL without a P2 body */
-  PetscReal *node_x; /* [nnode][3] rest position of each node, m */
+  PetscInt *edge_node; /* [ncell][6] local nodes at edges of P2 cells, -1: none; NULL without a P2 body */
+  PetscReal *node_x;   /* [nnode][3] rest position of each node, m */
   PetscInt *
     node_orig; /* [nnode] number that no partition changes, right on owned nodes: vert_orig of a vertex, Nvert +
                           4 cell_orig + a of node a of a cell, the lower of the two that share it; 4 Ncell more for its support; Nvert + 8 Ncell + 6 cell_orig
                           + e of edge e, the lowest of those that share it */
   PetscInt *node_body; /* [nnode] */
-  uint64_t *
-    node_set; /* [nnode] SB_SET_BIT(k) when constrained with set k: a face with a support is constrained there */
+  uint64_t *node_set;  /* [nnode] SB_SET_BIT(k) when constrained with set k; of a face its support */
   PetscBool faces;     /* some body has its nodes at faces */
   PetscBool vertices;  /* all have them at vertices only: nodes are the mesh's vertices */
   PetscInt *neighbour; /* [ncell][4] local cell across each face, -1: none; NULL without face nodes */
-  PetscInt *
-    dirichlet_node; /* [ncell][4] node without mass that a prescribed boundary face of a DG cell is tied to, -1: none; NULL without any */
+  PetscInt
+    *dirichlet_node; /* [ncell][4] massless node that a prescribed DG face is tied to, -1: none; or NULL */
   const SbElement *element;   /* [nbody] borrowed */
   const SbMaterial *material; /* by SbMesh.cell_material; borrowed */
   PetscInt nregion;
@@ -75,38 +72,32 @@ struct _p_SbSpace {
   PetscInt *batch_cell; /* [nbatch] first local cell */
   PetscInt *batch_n;    /* [nbatch] cells in it, 1..SB_BATCH */
   PetscInt *batch_node; /* [nbatch][4][SB_BATCH] local nodes (padding repeats the first cell) */
-  PetscInt
-    width; /* nodes that the stress of a cell acts on, at most: 4, 8 with a DG body, 10 with a P2 body */
+  PetscInt width;       /* nodes that the stress of a cell acts on at most: 4, 8 with DG, 10 with P2 */
   PetscInt *
     batch_clique; /* [nbatch][width][SB_BATCH] these nodes: the four of batch_node, then those across the faces, or those of P2
                                 at the edges (again its own where there is no other); batch_node itself when width is 4 */
-  SbPack *
-    batch_weight; /* [nbatch][4] weight of a cell's own node in the mean of the two; NULL without a DG body */
-  SbJump jump;    /* NULL without face nodes */
+  SbPack *batch_weight;      /* [nbatch][4] of a cell's own node in the mean of the two; NULL without DG */
+  SbJump jump;               /* NULL without face nodes */
   SbConstraints constraints; /* NULL unless an effect may constrain nodes along directions of their own */
   PetscBool coupled;         /* an effect may couple nodes that share no cell, in an assembled tangent */
   SbPack *batch_g;    /* [nbatch][9] basis gradients of nodes 1..3, 1/m, of straight cells; 64-byte aligned */
   SbPack *batch_V;    /* [nbatch] volumes, m^3; 0 in padding; 64-byte aligned */
   void *batch_memory; /* what batch_g, batch_V and those of curved cells live in */
-  PetscReal *node_mass; /* [nnode] lumped mass, kg, complete on owned nodes */
-  PetscReal *
-    node_share; /* [nnode] integral of density times phi_a, kg, likewise; node_mass itself without a P2 body */
-  PetscReal *alpha,
-    *beta; /* [nbody] Rayleigh damping C = alpha M + beta K, 1/s and s; 0 unless an effect sets it */
+  PetscReal *node_mass;      /* [nnode] lumped mass, kg, complete on owned nodes */
+  PetscReal *node_share;     /* [nnode] integral of density phi_a, kg; node_mass itself without P2 */
+  PetscReal *alpha, *beta;   /* [nbody] Rayleigh damping C = alpha M + beta K, 1/s and s */
   PetscBool consistent_mass; /* -mass consistent */
-  PetscBool
-    tentative; /* the tangent in use may be indefinite, and a solve that fails is repeated with a definite one: no reason to change the solver */
+  PetscBool tentative;    /* the tangent may be indefinite: a failed solve is repeated with a definite one */
   uint8_t *fixed;         /* [nnode] bit c set: component c of the node is prescribed */
   PetscInt nfixed;        /* local nodes with any bit */
-  PetscInt *fixed_node;   /* [nfixed] */
+  PetscInt *fixed_node;   /* [nfixed] ascending */
   PetscReal *fixed_value; /* [nfixed][3] prescribed displacement at the time last asked for, m */
   PetscBool ghosted; /* more than one rank: vectors carry ghosts, also where a rank happens to have none */
   Vec template_vec;  /* ghosted (more than one rank) or sequential; block size 3 */
   struct _p_SbPlan *plan; /* cell blocks -> matrix values; NULL before SbSpaceCreateMatrix() */
-  PetscReal
-    block_scale;    /* factor on blocks of SbSpaceAddCellBlock(): the load factor of a static run, else 1 */
-  PetscBool rough;  /* the solve that contact examines was a rough one: forces are not to be trusted */
-  PetscBool linear; /* every region's law is linear */
+  PetscReal block_scale;  /* on blocks of SbSpaceAddCellBlock(): the load factor of a static run, or 1 */
+  PetscBool rough;        /* the solve that contact examines was a rough one: forces are not to be trusted */
+  PetscBool linear;       /* every region's law is linear */
 };
 
 /* Collective. Borrowed: materials by the numbers in the mesh (one per body, then those of inclusions), elements one per body. Options
@@ -170,8 +161,6 @@ PetscErrorCode SbSpacePrescribe(SbSpace space, PetscInt node, int components);
 PetscErrorCode SbSpacePrescribeDone(SbSpace space);
 /* Zeroes the prescribed components of a vector, or all others. Not collective. */
 PetscErrorCode SbSpaceZeroPrescribed(SbSpace space, PetscBool prescribed, Vec X);
-/* Index into fixed_node of a node, or -1. */
-PetscInt SbSpacePrescribedIndex(SbSpace space, PetscInt node);
 
 /* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest), the law's pressure -lambda theta, Pa
    (SbMaterialOps.pressure). Outputs may be NULL. Not collective. */
@@ -197,10 +186,9 @@ PetscErrorCode SbSpaceStableStep(SbSpace space, PetscReal *dt);
 */
 typedef struct {
   PetscInt cell, face;
-  PetscInt corner[3]; /* 0..3, which vertices of the cell, counter-clockwise seen from outside */
-  PetscInt vertex[3]; /* the same as local vertices of the mesh */
-  PetscReal
-    area; /* rest area, m^2, of a curved facet too; height and normal are those of the plane through its corners */
+  PetscInt corner[3];  /* 0..3, which vertices of the cell, counter-clockwise seen from outside */
+  PetscInt vertex[3];  /* the same as local vertices of the mesh */
+  PetscReal area;      /* rest area, m^2, if curved too; height and normal: of the plane of its corners */
   PetscReal height;    /* rest height of the cell over it, m */
   PetscReal normal[3]; /* rest outward unit normal */
 } SbFacet;

@@ -106,9 +106,8 @@ typedef struct {
   int mask;           /* bit a: vertex a belongs to the closest feature */
   PetscReal weight
     [4]; /* sum 0; sum_a weight[a] x_a leads from the closest point of the second side to that of the first; 0 off the mask */
-  PetscReal d; /* the distance, m */
-  PetscReal
-    n[3]; /* unit vector from the second side to the first; 0 where d = 0 and the feature has no plane */
+  PetscReal d;    /* the distance, m */
+  PetscReal n[3]; /* unit vector from the second side to the first; 0 where it has none */
 } SbDistance;
 
 /*

@@ -129,3 +129,8 @@ void SbPolar(const SbPack F[9], SbPack R[9]);
   is the singular value decomposition F = (R V) diag(s) V^T with two rotations, the sign of det F being in s.
 */
 void SbSymEig(const SbPack S[6], SbPack s[3], SbPack V[9]);
+
+/*
+  SbStretches - F = U diag(s) V^T with rotations U and V; s[k] in no order, det F = s0 s1 s2 with its sign.
+*/
+void SbStretches(const SbPack F[9], SbPack U[9], SbPack s[3], SbPack V[9]);

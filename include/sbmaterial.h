@@ -70,8 +70,7 @@ struct _p_SbMaterial {
   PetscBool symmetric; /* always true for hyperelastic laws */
   PetscBool adaptive;  /* -body_NAME_tangent auto: the solver of a step chooses between the two exact ones */
   PetscBool softens;   /* stress has a maximum in compression: what carries more is turned inside out */
-  PetscBool
-    jacobian; /* theta is J - 1, cubic in the displacement; of the other laws it is at most quadratic */
+  PetscBool jacobian;  /* theta is J - 1, cubic in the displacement; of other laws at most quadratic */
   SbTangentKind tangent; /* what ops.frame or ops.tangent hands out */
   SbMaterial shear;      /* SbMaterialGetShear(); NULL until it is asked for; owned */
   void *data;

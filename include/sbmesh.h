@@ -26,11 +26,10 @@ typedef enum {
 } SbTetSurface;
 /* How a surface becomes tets; lengths as those of the surface. */
 typedef struct {
-  PetscReal size; /* wanted edge; 0: the mean edge of the surface */
+  PetscReal size;            /* wanted edge; 0: the mean edge of the surface */
+  PetscReal merge_tolerance; /* vertices no farther apart are one; negative: 1e-7 of the diagonal */
   PetscReal
-    merge_tolerance; /* vertices no farther apart are one; negative: 1e-7 of the diagonal of its box */
-  PetscReal
-    untangle; /* vertices may be moved so far to part triangles that cut each other; negative: half the mean edge */
+    untangle; /* by which vertices may part triangles that cut each other; negative: half the mean edge */
   PetscReal angle;   /* degrees; edges with sharper turns are kept when the surface is remeshed */
   PetscReal seconds; /* that gmsh or tetgen may take, s */
   SbTetBackend backend;
@@ -41,9 +40,8 @@ typedef struct {
   Groups of the file are there as the bits of the sets that they mean.
 */
 typedef struct {
-  PetscInt step; /* after which it was made; 0: it is the mesh of the file */
-  PetscReal
-    mass; /* kg, which the body has on this mesh, too: its densities are scaled; 0: as its materials say */
+  PetscInt step;   /* after which it was made; 0: it is the mesh of the file */
+  PetscReal mass;  /* kg, of the body on this mesh: densities are scaled; 0: as its materials say */
   PetscReal bound; /* the body is re-meshed when its quality falls below it; 0: as the options say */
   PetscInt nvert, ncell, ntri;
   PetscReal *x;       /* [nvert][3] rest position, placed, m */
@@ -57,22 +55,18 @@ typedef struct {
 /* A body as the scenario gives it. Data, no methods. */
 typedef struct {
   char name[SB_NAME_MAX];
-  char copy_of
-    [SB_NAME_MAX]; /* the body of the scenario that this is one of the copies of (-body_<name>_copies); else "" */
+  char copy_of[SB_NAME_MAX]; /* body of the scenario that it is a copy of (-body_<name>_copies); else "" */
   char mesh
     [PETSC_MAX_PATH_LEN]; /* file, or box:lx,ly,lz:n or box:lx,ly,lz:nx,ny,nz, from the origin to (lx, ly, lz);
                                          n cells along the shortest side; groups xmin xmax ymin ymax zmin zmax */
-  PetscInt
-    mesh_step; /* of a file that a run wrote: the step whose positions are the mesh; 0 at rest, -1 the last */
-  PetscReal scale;           /* factor on the file's coordinates, first */
-  PetscReal rotate[4];       /* axis (need not be normed) and angle in degrees, second */
+  PetscInt mesh_step;     /* of the file of a run: the step whose positions it has; 0 at rest, -1 the last */
+  PetscReal scale;        /* factor on the file's coordinates, first */
+  PetscReal rotate[4];    /* axis (need not be normed) and angle in degrees, second */
   PetscReal translate[3];    /* m, third */
   SbTetOptions tet;          /* for a mesh that is a surface; m */
   char element[SB_NAME_MAX]; /* p1, p2, cr, dg */
-  PetscBool
-    other_nodes; /* the element has nodes elsewhere than at vertices: every cell of the overlap is needed */
-  PetscBool
-    edge_nodes; /* it has nodes at edges: they lie where a mesh of second order has them; else tets are straight */
+  PetscBool other_nodes;     /* nodes elsewhere than at vertices: every cell of the overlap is needed */
+  PetscBool edge_nodes; /* nodes at edges, where a mesh of second order has them; else tets are straight */
   char material[SB_NAME_MAX];    /* linear | corotated | stvk | neohookean */
   PetscReal density;             /* kg/m^3 */
   PetscReal velocity[3];         /* initial velocity of the centre of mass, m/s */
@@ -118,7 +112,7 @@ typedef struct {
   PetscReal p[8]; /* box: xmin ymin zmin xmax ymax zmax; plane: nx ny nz d tol (|n.x - d| <= tol);
                                         sphere: cx cy cz r; halfspace: nx ny nz d (n.x <= d); n has length 1 here, d is scaled likewise */
   PetscInt nvert, nfacet,
-    ncell; /* global counts, found by SbMeshCreate(); nfacet counts boundary facets; all zero is an error there */
+    ncell; /* global counts, by SbMeshCreate(); nfacet: boundary facets; all zero is an error there */
   PetscBool prescribed; /* an effect prescribes every displacement there */
 } SbSet;
 
@@ -141,8 +135,8 @@ struct _p_SbMesh {
   PetscInt nvert_owned, nvert;
   PetscInt gvert_start; /* global number of this rank's first owned vertex; owned ones follow each other */
   PetscInt *gvert;      /* [nvert] global vertex number (depends on the partition); ghosts ascending */
-  PetscInt *
-    vert_orig; /* [nvert] original number: bodies in scenario order, vertices in file order, unused ones left out */
+  PetscInt
+    *vert_orig; /* [nvert] original number: bodies as the scenario, used vertices as the file has them */
   PetscInt *vert_body; /* [nvert] */
   PetscReal *x;        /* [nvert][3] rest position, placed, m */
   uint64_t *vert_set;  /* [nvert] SB_SET_BIT(k) when in set k */
@@ -150,15 +144,12 @@ struct _p_SbMesh {
   PetscInt ncell_owned, ncell;
   PetscInt *cell;      /* [ncell][4] local vertices, positively oriented: det(x1-x0, x2-x0, x3-x0) > 0 */
   PetscInt *cell_orig; /* [ncell] original number, as for vertices */
-  PetscInt *
-    cell_body; /* [ncell]; owned and ghost cells are each sorted by body, inclusion, straight or curved, lowest local vertex */
-  PetscInt *
-    cell_material; /* [ncell] number of the body, or the material of its first inclusion that holds the cell */
-  uint64_t *cell_set; /* [ncell] SB_SET_BIT(k), SB_CURVED */
-  PetscReal *
-    edge_off; /* [ncell][6][3] of the nodes at edges 01 02 03 12 13 23 from their middles, m; NULL without curved cells */
-  uint64_t
-    *face_set; /* [ncell][4] face f lies opposite vertex f: SB_ON_BOUNDARY, and SB_SET_BIT(k) when in set k */
+  PetscInt
+    *cell_body; /* [ncell]; owned and ghost cells each by body, inclusion, curved or not, lowest vertex */
+  PetscInt *cell_material; /* [ncell] number of the body, or material of its first inclusion with the cell */
+  uint64_t *cell_set;      /* [ncell] SB_SET_BIT(k), SB_CURVED */
+  PetscReal *edge_off; /* [ncell][6][3] of nodes at edges from their middles, m; NULL without curved cells */
+  uint64_t *face_set;  /* [ncell][4] face f is opposite vertex f: SB_ON_BOUNDARY, SB_SET_BIT(k) in set k */
 };
 
 /*
@@ -219,8 +210,7 @@ typedef struct {
   MPI_Comm comm;
   PetscInt nsend, nrecv;
   PetscInt *position; /* [nsend] of a record among those that leave, by rank */
-  PetscMPIInt size, *scount, *sfirst, *rcount,
-    *rfirst; /* [size] records to and from each rank, and the first of them */
+  PetscMPIInt size, *scount, *sfirst, *rcount, *rfirst; /* [size] to and from each rank, the first of them */
 } SbRoute;
 
 /* Prepares n records to go to ranks dest[n]; their order among those for one rank stays. Collective. */

@@ -6,10 +6,9 @@
 
 /* Scalars of one instant, summed over all ranks. SI. */
 typedef struct {
-  PetscReal kinetic; /* 1/2 v.M v, J */
-  PetscReal strain;  /* J */
-  PetscReal
-    load_work; /* work done by the loads since the start (minus their potential when they have one), J */
+  PetscReal kinetic;          /* 1/2 v.M v, J */
+  PetscReal strain;           /* J */
+  PetscReal load_work;        /* by the loads since the start (less their potential when they have one), J */
   PetscReal prescribed_work;  /* work done by moving supports since the start, J */
   PetscReal damping_loss;     /* dissipated by Rayleigh damping since the start, J */
   PetscReal remesh_loss;      /* taken by re-meshing since the start, J */
@@ -29,9 +28,8 @@ typedef struct {
 /* How a body begins. */
 typedef struct {
   SbFormula displacement[3],
-    velocity
-      [3]; /* m, m/s, of the place at rest; owned. Velocities that are numbers are those of the body, and NULL here */
-  PetscBool moved;                /* displacements are given */
+    velocity[3];   /* m, m/s, of the place at rest; owned. Numbers are the body's, and NULL here */
+  PetscBool moved; /* displacements are given */
   char state[PETSC_MAX_PATH_LEN]; /* run whose state it takes; "": none */
 } SbStart;
 
@@ -66,12 +64,10 @@ struct _p_SbModel {
   PetscBool linear;      /* laws and effects: the tangent depends on the shifts only */
   PetscBool may_filter;  /* some law has the tangent auto */
   PetscBool guard_apart; /* residuals that are solved leave guarded contact out: SbModelPotentialGradient() */
-  PetscReal
-    guard_speed; /* of the step that began, by which tolerances of guarded contact are judged, m/s; 0 in a static run */
-  PetscReal mass; /* kg */
+  PetscReal guard_speed; /* by which tolerances of guarded contact are judged in the step, m/s; 0: static */
+  PetscReal mass;        /* kg */
   PetscBool dynamic;
-  PetscReal
-    load; /* load factor: 1, in a static run 0..1; multiplies loads and prescribed displacements without t in their formulas */
+  PetscReal load; /* load factor, 0..1 in static runs: on loads and displacements whose formulas have no t */
 };
 
 PetscErrorCode SbModelDestroy(SbModel *model);

@@ -33,8 +33,7 @@ struct SbField {
   const char *name; /* "von_mises" */
   const char *unit;
   PetscInt ncomp; /* 1 scalar, 3 vector, 6 symmetric tensor: xx xy xz yy yz zz, the Tensor6 order of XDMF */
-  PetscBool
-    cell; /* per cell, else per point: the vertices, or each cell's four corners with -output_discontinuous */
+  PetscBool cell; /* per cell, else per vertex, or corner of a cell with -output_discontinuous */
   PetscBool constant; /* whole numbers, written once with the mesh */
   PetscBool dynamic;  /* does not exist in a static run */
   const char *help;

@@ -14,9 +14,8 @@ typedef struct {
   int n;
   PetscReal L[SB_POINTS][4], weight[SB_POINTS];
 } SbPointRule;
-extern const SbPointRule
-  SbRuleQuintic; /* degree 5, positive weights: where stresses of curved tets are taken */
-extern const SbPointRule SbRuleFacet; /* degree 5 on a triangle, L[3] (Radon 1948) */
+extern const SbPointRule SbRuleQuintic; /* degree 5, positive weights: stresses of curved tets */
+extern const SbPointRule SbRuleFacet;   /* degree 5 on a triangle, L[3] (Radon 1948) */
 /* The ten basis functions at L. */
 void SbQuadraticBasis(const PetscReal L[4], PetscReal phi[SB_CELL_NODES]);
 /* Corners of the P1 tet with the derivatives of the map x of ten nodes at L, but for a translation. */

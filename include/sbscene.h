@@ -12,8 +12,7 @@ typedef struct {
   PetscBool view;                     /* -scenario_view */
   char view_file[PETSC_MAX_PATH_LEN]; /* "" for standard output */
   char table[PETSC_MAX_PATH_LEN];     /* -options_table FILE; "" when not asked for */
-  char scenario
-    [PETSC_MAX_PATH_LEN]; /* first word of the command line when it is no option; for PetscInitialize() */
+  char scenario[PETSC_MAX_PATH_LEN];  /* first word of the command line when it is no option */
   PetscInt nfile;
   const char *file[16]; /* [nfile] scenario and other option files that can be read; of argv, borrowed */
   char problem[PETSC_MAX_PATH_LEN + 256]; /* what is wrong with the command line; "" when nothing is */

@@ -61,7 +61,7 @@ PetscErrorCode SbPCConstrainedIsFactored(PC pc, PetscBool *is);
 PetscErrorCode SbSaddleChoose(SbSpace space, PetscBool dynamic, PetscInt choice, SbSaddle *saddle,
                               char reason[], size_t size);
 #define SB_DIRECT_SMALL \
-  30000 /* unknowns up to which one rank may factor for all of them; auto takes no factorisation beyond */
+  30000 /* unknowns up to which one rank may factor for all, and beyond which auto does not */
 /*
   SbDirectPackage - the package of this PETSc that factors a symmetric matrix of so many unknowns soonest on the ranks of comm: one of PETSc's
   MATSOLVER names, NULL without any; with -reproducible one that works on one rank. Indefinite ones need other packages than those that are positive definite. Not collective.

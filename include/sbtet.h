@@ -10,8 +10,7 @@
 typedef struct {
   PetscInt nvert, ncell;
   PetscInt *start; /* [nvert + 1] into `face`: faces by lowest vertex */
-  SbKey *
-    face; /* [4 * ncell] keys of the two other vertices, ascending for each lowest one; slots 4 cell + face */
+  SbKey *face;     /* [4 ncell] of the two other vertices, ascending for each lowest; slots 4 cell + face */
   PetscInt *neighbour; /* [ncell][4] cell across face f (opposite vertex f), -1 on the boundary */
   PetscInt nboundary;
   PetscInt nshared;   /* faces of more than two cells */

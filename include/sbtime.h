@@ -74,8 +74,7 @@ struct _p_SbRun {
                      with what it lacks (SbModelNonsymmetric()) */
   Mat whole;       /* what constraints project beside the matrix: J with what it lacks; NULL without such */
   struct {
-    Vec U, x,
-      y; /* displacement that J belongs to; what is multiplied, and the result; NULL where J lacks nothing */
+    Vec U, x, y; /* displacement of J; factor and product; NULL where J lacks nothing */
     PetscReal t; /* J's time or load factor */
   } nonsymmetric;
   Vec U, V, A;            /* A: acceleration of the last step, state of the integrator */
@@ -96,20 +95,16 @@ struct _p_SbRun {
   PetscInt max_halvings, static_steps;
   PetscBool goes_on;       /* a solve from another one's solution, to that one's tolerance */
   PetscReal min_increment; /* static: smallest load increment as a part of 1 / static_steps */
-  PetscReal
-    softening; /* static: |du|/dlambda of the last step over that of the slowest one; 0: there was none */
+  PetscReal softening;     /* static: |du|/dlambda of the last step over that of the slowest; 0: none */
   struct {
     PetscBool on;   /* static: steps along the path of equilibria, with the load factor as an unknown */
     PetscInt steps; /* at most so many */
-    PetscReal longest,
-      first; /* longest step as a multiple of the first one, and that one, m; 0: not known yet */
-    PetscReal displacement; /* at which the path ends, m; 0: at none */
+    PetscReal longest, first; /* longest step as a multiple of the first, and that one, m; 0: not known */
+    PetscReal displacement;   /* at which the path ends, m; 0: at none */
   } arc;
-  Vec
-    path; /* with arc.on the last step's displacement, as long as the next step is to be; zero at the start */
-  PetscInt bifurcations; /* that a factorisation has shown */
-  PetscBool
-    free_body; /* static, without contact: nothing holds some body, and shorter load steps do not help */
+  Vec path; /* with arc.on the last step's displacement, as long as the next step; zero at the start */
+  PetscInt bifurcations;   /* that a factorisation has shown */
+  PetscBool free_body;     /* static, without contact: nothing holds some body; no shorter load steps */
   PetscBool tangent_known; /* J holds the tangent for shift_v, shift_a */
   PetscReal shift_v, shift_a;
   PetscBool saddle;        /* some effect asks for multipliers as unknowns */
@@ -118,13 +113,10 @@ struct _p_SbRun {
   SbSaddle saddle_used;
   char solver_choice[SB_NAME_MAX]; /* as the scenario says: "auto" or a name */
   const struct _SbSolverPreset *solver_used;
-  char
-    solver[SB_NAME_MAX]; /* preset chosen, "cg_gamg"; with a -pc_type of the user's what solves, "cg, gamg" */
-  char
-    solver_parts[SB_NAME_MAX]; /* what solves at first, "cg, cholesky of mumps"; "" without linear systems */
+  char solver[SB_NAME_MAX];       /* preset chosen, "cg_gamg"; with -pc_type what solves, "cg, gamg" */
+  char solver_parts[SB_NAME_MAX]; /* what solves at first, "cg, cholesky of mumps"; "" without systems */
   char solver_reason[256];
-  struct _p_SbSolverList
-    *solver_list; /* what happens when it fails (solver_list.c); NULL without linear systems */
+  struct _p_SbSolverList *solver_list; /* what happens when it fails (solver_list.c); NULL without systems */
   PetscInt nmonitor;
   struct {
     SbMonitorFn fn;
@@ -140,8 +132,7 @@ struct _p_SbRun {
   } post_solve;
   struct {
     SbPauseFn fn; /* asked after each step; NULL: nobody asks */
-    PetscReal
-      dt; /* length of the step that was asked about last; of a restart, when the run had paused there; else 0 */
+    PetscReal dt; /* of the step asked about last; of a restart from a pause; else 0 */
     void *ctx;
   } after;
   struct {

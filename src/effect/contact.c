@@ -85,7 +85,7 @@ static const char *const exact_only[] = {"restitution", "time_of_impact", "dampi
 typedef struct {
   SbResponse response;
   PetscBool bodies, vertices,
-    others; /* bodies meet each other; half-spaces and bowls are touched; it has options that `barrier` has not */
+    others; /* bodies meet each other; half-spaces, bowls; options `barrier` has not */
 } Needs;
 
 static PetscErrorCode examine(const char *name, Needs *needs)
@@ -108,19 +108,6 @@ static PetscErrorCode examine(const char *name, Needs *needs)
     PetscCall(SbOptionGiven(&scope, exact_only[k], &given));
     needs->others = (PetscBool)(needs->others || given);
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Whether the effect of this name is one of contact. */
-static PetscErrorCode is_contact(const char *name, PetscBool *is)
-{
-  SbScope scope;
-  char type[SB_NAME_MAX];
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScopeSet(&scope, "effect", "", name));
-  PetscCall(SbOptionString(&scope, "type", sizeof(type), type));
-  PetscCall(PetscStrcmp(type[0] ? type : name, "contact", is));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -154,11 +141,12 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
   /* the other effects */
   if (SbOptionExists(&scope, "effects")) PetscCall(SbOptionNames(&scope, "effects", &n, &names));
   for (PetscInt i = 0; i < n; i++) {
-    PetscBool contact = PETSC_FALSE;
+    char type[SB_NAME_MAX];
     Needs more;
 
-    PetscCall(is_contact(names[i], &contact));
-    if (!contact) continue;
+    PetscCall(SbScopeSet(&scope, "effect", "", names[i]));
+    PetscCall(SbOptionString(&scope, "type", sizeof(type), type));
+    if (strcmp(type[0] ? type : names[i], "contact")) continue;
     PetscCall(examine(names[i], &more));
     if (more.response != AUTO) other = more.response;
     needs.bodies = (PetscBool)(needs.bodies || more.bodies);
@@ -219,26 +207,6 @@ static PetscErrorCode read_common(SbEffect e, const SbScope *scope, SbContactOpt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bodies that meet each other. */
-static PetscErrorCode create_bodies(SbEffect e, const SbScope *scope, const SbContactOptions *o)
-{
-  SbBarrierScene scene = {.on = &e->on, .friction = o->friction.mu, .restitution = o->restitution};
-
-  PetscFunctionBeginUser;
-  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(obstacles_only); k++) {
-    PetscBool given;
-
-    PetscCall(SbOptionGiven(scope, obstacles_only[k], &given));
-    PetscCheck(!given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-               "-effect_%s_%s is for responses to obstacles: bodies meet each other by barrier; leave it out",
-               e->name, obstacles_only[k]);
-  }
-  PetscCall(SbOptionBool(scope, "self", &scene.self));
-  PetscCall(SbOptionBool(scope, "pairs", &scene.pairs));
-  PetscCall(SbBarrierCreate(e, scope, &scene));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
 {
   SbContactOptions o = {0};
@@ -253,8 +221,21 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   e->linear = PETSC_TRUE;
   e->steady = PETSC_FALSE; /* a load factor does not make an obstacle softer */
   e->euler = (PetscBool)(o.restitution > 0);
-  if (!text[0]) {
-    PetscCall(create_bodies(e, scope, &o));
+  if (!text[0]) { /* bodies meet each other */
+    SbBarrierScene scene = {.on = &e->on, .friction = o.friction.mu, .restitution = o.restitution};
+
+    for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(obstacles_only); k++) {
+      PetscBool given;
+
+      PetscCall(SbOptionGiven(scope, obstacles_only[k], &given));
+      PetscCheck(
+        !given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+        "-effect_%s_%s is for responses to obstacles: bodies meet each other by barrier; leave it out",
+        e->name, obstacles_only[k]);
+    }
+    PetscCall(SbOptionBool(scope, "self", &scene.self));
+    PetscCall(SbOptionBool(scope, "pairs", &scene.pairs));
+    PetscCall(SbBarrierCreate(e, scope, &scene));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(SbContactCreate_Node(e));

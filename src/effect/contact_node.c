@@ -32,22 +32,6 @@
 #define PULLING 1e-6 /* of the largest contact force: what a node must pull with to leave */
 #define SETTLED 1e-4 /* of the largest contact force: what that of a spring may be off */
 
-static PetscErrorCode read_obstacle(SbEffect e, const SbScope *scope)
-{
-  Contact *c = (Contact *)e->data;
-  char option[3 * SB_NAME_MAX], text[PETSC_MAX_PATH_LEN];
-
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionName(scope, "obstacle", sizeof(option), option));
-  PetscCall(SbOptionString(scope, "obstacle", sizeof(text), text));
-  PetscCall(SbObstacleCreate(option, text, &c->obstacle));
-  c->facets = SbObstacleIsMesh(c->obstacle);
-  if (!c->facets) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbOptionReal(scope, "obstacle_scale", &c->scale));
-  PetscCall(SbOptionReals(scope, "obstacle_at", c->at));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode setup_obstacle(SbEffect e, SbSpace space, void *data)
 {
   Contact *c = (Contact *)data;
@@ -66,31 +50,22 @@ static void pose_of(const void *data, PetscReal t, SbPose *pose)
   SbContactPose((const Contact *)data, t, pose);
 }
 
-/* With the response `barrier` another file does the work. */
-static PetscErrorCode create_barrier(SbEffect e, const SbScope *scope, PetscReal restitution)
-{
-  Contact *c = (Contact *)e->data;
-  SbBarrierScene scene = {.on = &e->on,
-                          .obstacle = c->obstacle,
-                          .pose = pose_of,
-                          .friction = c->friction.mu,
-                          .restitution = restitution,
-                          .setup_obstacle = setup_obstacle};
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscArraycpy(scene.centre, c->point, 3));
-  PetscCall(SbBarrierCreate(e, scope, &scene));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbContactOptions_Node(SbEffect e, const SbScope *scope, const SbContactOptions *o)
 {
   Contact *c = (Contact *)e->data;
   PetscBool steady = PETSC_TRUE;
   PetscReal length;
+  char option[3 * SB_NAME_MAX], text[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
-  PetscCall(read_obstacle(e, scope));
+  PetscCall(SbOptionName(scope, "obstacle", sizeof(option), option));
+  PetscCall(SbOptionString(scope, "obstacle", sizeof(text), text));
+  PetscCall(SbObstacleCreate(option, text, &c->obstacle));
+  c->facets = SbObstacleIsMesh(c->obstacle);
+  if (c->facets) {
+    PetscCall(SbOptionReal(scope, "obstacle_scale", &c->scale));
+    PetscCall(SbOptionReals(scope, "obstacle_at", c->at));
+  }
   PetscCall(SbEffectFormulas(scope, "displacement", 3, PETSC_FALSE, c->displacement, &steady));
   PetscCall(SbEffectFormulas(scope, "angle", 1, PETSC_FALSE, &c->angle, &steady));
   PetscCall(SbOptionReals(scope, "axis", c->axis));
@@ -101,8 +76,16 @@ PetscErrorCode SbContactOptions_Node(SbEffect e, const SbScope *scope, const SbC
   for (int i = 0; i < 3; i++) c->axis[i] /= length;
   c->response = o->response;
   c->friction = o->friction;
-  if (c->response == BARRIER) {
-    PetscCall(create_barrier(e, scope, o->restitution));
+  if (c->response == BARRIER) { /* another file does the work */
+    SbBarrierScene scene = {.on = &e->on,
+                            .obstacle = c->obstacle,
+                            .pose = pose_of,
+                            .friction = c->friction.mu,
+                            .restitution = o->restitution,
+                            .setup_obstacle = setup_obstacle};
+
+    PetscCall(PetscArraycpy(scene.centre, c->point, 3));
+    PetscCall(SbBarrierCreate(e, scope, &scene));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   c->cut = o->cut;
@@ -429,64 +412,22 @@ static PetscBool settle_spring(const Contact *c, PetscReal largest, Touch *touch
   return PETSC_FALSE;
 }
 
-/* Springs that have stayed as constraints and pull when all else is settled: they go, a few times. */
-static PetscErrorCode let_go(const Contact *c, SbSpace space, PetscReal largest, PetscBool *changed)
-{
-  PetscBool wait = *changed;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &wait, 1, SB_MPI_BOOL, MPI_LOR, space->comm));
-  for (PetscInt i = 0; !wait && i < c->n; i++) {
-    Touch *touch = &c->touch[i];
-
-    if (!touch->on || touch->toggles >= 2 * TOGGLES || pull(touch, touch->gap) >= -PULLING * largest)
-      continue;
-    touch->on = PETSC_FALSE;
-    *changed = PETSC_TRUE;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Which nodes stick and which slide from now on. */
-static void settle_friction(Contact *c, PetscReal largest, PetscBool *changed)
-{
-  PetscReal worst = 0;
-
-  for (PetscInt i = 0; i < c->n; i++) {
-    Touch *touch = &c->touch[i];
-    PetscReal error;
-
-    if (!touch->on || touch->along < 0) continue;
-    error = SbFrictionSettle(&c->friction, touch, SbContactForce(c, touch));
-    worst = PetscMax(worst, error); /* a macro: its arguments are evaluated twice */
-  }
-  SbFrictionJudge(&c->friction, worst, largest, changed);
-}
-
-/* After the first solve of a step: who arrives in it; springs of all nodes from now on. Whether one of these pushes. */
-static PetscBool wake(Contact *c)
-{
-  PetscBool pushes = PETSC_FALSE;
-
-  for (PetscInt i = 0; i < c->n; i++) {
-    Touch *touch = &c->touch[i];
-
-    if (!touch->on || !exact(c)) watch_arrival(c, touch);
-    if (touch->idle && touch->gap < 0) pushes = PETSC_TRUE;
-    touch->idle = PETSC_FALSE;
-  }
-  return pushes;
-}
-
 static PetscErrorCode settle_contact(SbEffect e, SbSpace space, const PetscReal u[], PetscBool *changed)
 {
   Contact *c = (Contact *)e->data;
-  PetscReal largest;
-  PetscBool mine = PETSC_FALSE;
+  PetscReal largest, worst = 0;
+  PetscBool mine = PETSC_FALSE, wait;
 
   PetscFunctionBeginUser;
   PetscCall(measure(c, space, u, &largest));
-  if (c->first && c->cut && wake(c)) mine = PETSC_TRUE;
+  /* after the first solve of a step: who arrives in it; springs of all nodes from now on */
+  for (PetscInt i = 0; c->first && c->cut && i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+
+    if (!touch->on || !exact(c)) watch_arrival(c, touch);
+    if (touch->idle && touch->gap < 0) mine = PETSC_TRUE;
+    touch->idle = PETSC_FALSE;
+  }
   c->first = PETSC_FALSE;
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
@@ -494,8 +435,28 @@ static PetscErrorCode settle_contact(SbEffect e, SbSpace space, const PetscReal 
 
     if (!right) mine = PETSC_TRUE;
   }
-  if (c->friction.mu > 0) settle_friction(c, largest, &mine);
-  if (c->held && !exact(c)) PetscCall(let_go(c, space, largest, &mine));
+  /* which nodes stick and which slide from now on */
+  for (PetscInt i = 0; c->friction.mu > 0 && i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+    PetscReal error;
+
+    if (!touch->on || touch->along < 0) continue;
+    error = SbFrictionSettle(&c->friction, touch, SbContactForce(c, touch));
+    worst = PetscMax(worst, error); /* a macro: its arguments are evaluated twice */
+  }
+  if (c->friction.mu > 0) SbFrictionJudge(&c->friction, worst, largest, &mine);
+  /* springs that have stayed as constraints and pull when all else is settled: they go, a few times */
+  wait = mine;
+  if (c->held && !exact(c))
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &wait, 1, SB_MPI_BOOL, MPI_LOR, space->comm));
+  for (PetscInt i = 0; c->held && !exact(c) && !wait && i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+
+    if (!touch->on || touch->toggles >= 2 * TOGGLES || pull(touch, touch->gap) >= -PULLING * largest)
+      continue;
+    touch->on = PETSC_FALSE;
+    mine = PETSC_TRUE;
+  }
   if (mine) *changed = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

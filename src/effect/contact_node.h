@@ -40,21 +40,18 @@ typedef struct {
   PetscReal other_lambda;          /* N */
   PetscReal n[3];                  /* normal that it is constrained along, outwards from the obstacle */
   PetscReal value;                 /* n . u that puts it on the obstacle, m */
-  PetscReal
-    rest; /* gap that it is constrained at: 0, minus the remainder of an overlap, or where it bounces to, m */
-  PetscReal kept; /* springs: the same at the end of the last step, m */
-  PetscReal gap;  /* after the last solve, beyond `rest`, m */
-  PetscReal
-    arrives; /* restitution: speed towards the obstacle when the step began, m/s; 0: it does not bounce */
-  PetscReal stiff;  /* of the spring in this step with its damper, N/m */
-  PetscReal before; /* damper: force for where the node was when the step began, N */
-  PetscReal lambda; /* multiplier of the last solve, N */
+  PetscReal rest;    /* gap that it is constrained at: 0, minus what overlaps, or where it bounces to, m */
+  PetscReal kept;    /* springs: the same at the end of the last step, m */
+  PetscReal gap;     /* after the last solve, beyond `rest`, m */
+  PetscReal arrives; /* restitution: speed towards the obstacle at first, m/s; 0: it does not bounce */
+  PetscReal stiff;   /* of the spring in this step with its damper, N/m */
+  PetscReal before;  /* damper: force for where the node was when the step began, N */
+  PetscReal lambda;  /* multiplier of the last solve, N */
   PetscReal wrong; /* constraints as springs: force that its place asks for, less that of the last solve, N */
   SbFrictionState grip; /* friction */
   PetscReal start[3];   /* displacement with which it would stick, m */
   PetscReal now[3];     /* that of the last solve, m */
-  PetscReal
-    stretch[3]; /* of springs that stick, in the obstacle's rest frame, at the end of the last step, m */
+  PetscReal stretch[3]; /* of springs that stick, in the obstacle's rest frame, after the last step, m */
 } Touch;
 
 typedef struct {

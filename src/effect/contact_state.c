@@ -6,36 +6,6 @@
 */
 #include "contact_node.h"
 
-/* Record and node, in the order of SB_CONTACT_STATE. */
-static void write_record(const Touch *touch, PetscInt number, PetscReal r[])
-{
-  const PetscReal head[8] = {(PetscReal)number, touch->on,     touch->was,   touch->rest,
-                             touch->kept,       touch->lambda, touch->value, touch->gap};
-
-  for (int k = 0; k < 8; k++) r[k] = head[k];
-  for (int k = 0; k < 3; k++) {
-    r[8 + k] = touch->n[k];
-    r[11 + k] = touch->surface[k];
-  }
-  SbFrictionSave(&touch->grip, r + 14);
-}
-
-static void read_record(const PetscReal r[], Touch *touch)
-{
-  touch->on = (PetscBool)(r[1] != 0);
-  touch->was = (PetscBool)(r[2] != 0);
-  touch->rest = r[3];
-  touch->kept = r[4];
-  touch->lambda = r[5];
-  touch->value = r[6];
-  touch->gap = r[7];
-  for (int k = 0; k < 3; k++) {
-    touch->n[k] = r[8 + k];
-    touch->surface[k] = r[11 + k];
-  }
-  SbFrictionLoad(r + 14, &touch->grip);
-}
-
 PetscErrorCode SbEffectSave_Contact(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records)
 {
   const Contact *c = (const Contact *)e->data;
@@ -45,28 +15,24 @@ PetscErrorCode SbEffectSave_Contact(SbEffect e, SbSpace space, PetscInt *n, Pets
   PetscCall(PetscMalloc1(SB_CONTACT_STATE * c->n, records));
   for (PetscInt i = 0; i < c->n; i++) {
     const Touch *touch = &c->touch[i];
+    const PetscReal head[8] = {(PetscReal)space->node_orig[touch->node],
+                               touch->on,
+                               touch->was,
+                               touch->rest,
+                               touch->kept,
+                               touch->lambda,
+                               touch->value,
+                               touch->gap};
+    PetscReal *r = *records + SB_CONTACT_STATE * *n;
 
     if (!touch->on && !touch->was && touch->lambda == 0) continue;
-    write_record(touch, space->node_orig[touch->node], *records + SB_CONTACT_STATE * (*n)++);
+    PetscCall(PetscArraycpy(r, head, 8));
+    PetscCall(PetscArraycpy(r + 8, touch->n, 3));
+    PetscCall(PetscArraycpy(r + 11, touch->surface, 3));
+    SbFrictionSave(&touch->grip, r + 14);
+    (*n)++;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Nothing touches. */
-static void forget(Contact *c, const PetscReal u[])
-{
-  for (PetscInt i = 0; i < c->n; i++) {
-    Touch *touch = &c->touch[i];
-
-    touch->on = touch->was = touch->idle = PETSC_FALSE;
-    touch->along = -1;
-    touch->rest = touch->kept = touch->lambda = touch->gap = touch->arrives = 0;
-    touch->grip = (SbFrictionState){.slide = {-1, -1}};
-    for (int k = 0; k < 3; k++) {
-      touch->start[k] = touch->now[k] = u[3 * touch->node + k];
-      touch->stretch[k] = 0;
-    }
-  }
 }
 
 PetscErrorCode SbEffectLoad_Contact(SbEffect e, SbSpace space, PetscReal t, const PetscReal u[], PetscInt n,
@@ -77,21 +43,42 @@ PetscErrorCode SbEffectLoad_Contact(SbEffect e, SbSpace space, PetscReal t, cons
 
   PetscFunctionBeginUser;
   SbContactPose(c, t, &c->to);
-  forget(c, u);
   PetscCall(PetscMalloc2(c->n, &number, c->n, &at));
   for (PetscInt i = 0; i < c->n; i++) {
-    number[i] = space->node_orig[c->touch[i].node];
+    Touch *touch = &c->touch[i];
+
+    /* nothing touches but what has a record */
+    touch->on = touch->was = touch->idle = PETSC_FALSE;
+    touch->along = -1;
+    touch->rest = touch->kept = touch->lambda = touch->gap = touch->arrives = 0;
+    touch->grip = (SbFrictionState){.slide = {-1, -1}};
+    for (int k = 0; k < 3; k++) {
+      touch->start[k] = touch->now[k] = u[3 * touch->node + k];
+      touch->stretch[k] = 0;
+    }
+    number[i] = space->node_orig[touch->node];
     at[i] = i;
   }
   PetscCall(PetscSortIntWithArray(c->n, number, at));
   for (PetscInt i = 0; i < n; i++) {
     const PetscReal *r = records + SB_CONTACT_STATE * i;
     PetscInt place;
+    Touch *touch;
 
     PetscCall(PetscFindInt((PetscInt)r[0], c->n, number, &place));
     if (place < 0) continue; /* another rank's */
-    read_record(r, &c->touch[at[place]]);
-    SbContactStretch(&c->to, &c->touch[at[place]]);
+    touch = &c->touch[at[place]];
+    touch->on = (PetscBool)(r[1] != 0);
+    touch->was = (PetscBool)(r[2] != 0);
+    touch->rest = r[3];
+    touch->kept = r[4];
+    touch->lambda = r[5];
+    touch->value = r[6];
+    touch->gap = r[7];
+    PetscCall(PetscArraycpy(touch->n, r + 8, 3));
+    PetscCall(PetscArraycpy(touch->surface, r + 11, 3));
+    SbFrictionLoad(r + 14, &touch->grip);
+    SbContactStretch(&c->to, touch);
   }
   PetscCall(PetscFree2(number, at));
   PetscFunctionReturn(PETSC_SUCCESS);

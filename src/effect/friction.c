@@ -19,7 +19,7 @@
 #define UPDATES 30   /* solves of a step with friction */
 #define FLIPS 10     /* of a pair within a step, after which it has springs */
 #define STIFF \
-  1e-3 /* smallest difference of trial force and limit that the stiffness across the slip sees, relative */
+  1e-3 /* smallest relative difference of trial force and limit for the stiffness across the slip */
 
 void SbFrictionBegin(SbFrictionState *g, PetscBool touches)
 {

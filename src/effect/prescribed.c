@@ -49,7 +49,7 @@ PetscErrorCode SbPrescribedSetValues(SbPrescribed *prescribed, SbSpace space, co
   // Rows exist only after every effect was set up, so they are looked up on first use.
   if (!prescribed->have_rows) {
     for (PetscInt i = 0; i < prescribed->n; i++) {
-      prescribed->row[i] = SbSpacePrescribedIndex(space, prescribed->node[i]);
+      PetscCall(PetscFindInt(prescribed->node[i], space->nfixed, space->fixed_node, &prescribed->row[i]));
       PetscCheck(prescribed->row[i] >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB,
                  "Node %" PetscInt_FMT " is not marked as prescribed", prescribed->node[i]);
     }

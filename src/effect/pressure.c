@@ -83,27 +83,6 @@ static PetscErrorCode options_pressure(SbEffect e, const SbScope *scope)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bodies with nodes at faces whose every boundary facet is in the list: their facets leave it. Collective. */
-static PetscErrorCode find_whole(Pressure *p, SbSpace space)
-{
-  const SbMesh mesh = space->mesh;
-  PetscInt *count, n = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(mesh->nbody, &count));
-  for (PetscInt k = 0; k < p->nfacet; k++)
-    count[mesh->cell_body[p->facet[k].cell]] += p->facet[k].cell < mesh->ncell_owned;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)mesh->nbody, MPIU_INT, MPI_SUM, space->comm));
-  for (PetscInt b = 0; b < mesh->nbody; b++)
-    p->whole[b] = (PetscBool)(!space->element[b]->nodes_per[0] && count[b] == mesh->body[b].nfacet);
-  for (PetscInt k = 0; k < p->nfacet; k++) {
-    if (!p->whole[mesh->cell_body[p->facet[k].cell]]) p->facet[n++] = p->facet[k];
-  }
-  p->nfacet = n;
-  PetscCall(PetscFree(count));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static inline PetscBool quadratic(SbSpace space, const SbFacet *facet)
 {
   return (PetscBool)(SbSpaceCellElement(space, facet->cell)->nodes_per[1] > 0);
@@ -207,11 +186,25 @@ static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
 {
   Pressure *p = (Pressure *)e->data;
   PetscBool some = PETSC_FALSE;
+  const SbMesh mesh = space->mesh;
+  PetscInt *count, n = 0;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectFacets(space, &e->on, &p->nfacet, &p->facet));
-  PetscCall(PetscCalloc1(space->mesh->nbody, &p->whole));
-  if (space->faces && p->follower) PetscCall(find_whole(p, space));
+  PetscCall(PetscCalloc1(mesh->nbody, &p->whole));
+  PetscCall(PetscCalloc1(mesh->nbody, &count));
+  /* bodies with nodes at faces whose every boundary facet is in the list: their facets leave it */
+  for (PetscInt k = 0; k < p->nfacet; k++)
+    count[mesh->cell_body[p->facet[k].cell]] += p->facet[k].cell < mesh->ncell_owned;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)mesh->nbody, MPIU_INT, MPI_SUM, space->comm));
+  for (PetscInt b = 0; b < mesh->nbody; b++)
+    p->whole[b] =
+      (PetscBool)(p->follower && !space->element[b]->nodes_per[0] && count[b] == mesh->body[b].nfacet);
+  for (PetscInt k = 0; k < p->nfacet; k++) {
+    if (!p->whole[mesh->cell_body[p->facet[k].cell]]) p->facet[n++] = p->facet[k];
+  }
+  p->nfacet = n;
+  PetscCall(PetscFree(count));
   if (p->follower && !(e->steady && SbFormulaEval(p->value, 0, NULL) == 0)) PetscCall(find_rim(p, space));
   /* the remainder of bodies with nodes at faces, and free rims */
   some = (PetscBool)(p->nedge > 0);

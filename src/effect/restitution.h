@@ -5,7 +5,7 @@
 #include "sbbase.h"
 
 #define SB_RESTITUTION_EARLY \
-  1e-6 /* of the way of a step: who would only just not arrive arrives, so that a flat base does so at once */
+  1e-6 /* of the way: who would only just not arrive arrives, a flat base at once */
 
 /* What the points of an effect have left of their speed. */
 typedef struct {

@@ -41,40 +41,29 @@ static PetscErrorCode options_traction(SbEffect e, const SbScope *scope)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The total force as a uniform traction. Collective. */
-static PetscErrorCode spread_total(Traction *q, SbSpace space, PetscInt n, const SbFacet facets[])
-{
-  PetscReal area[2] = {0, 0};
-
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < n; i++) {
-    if (facets[i].cell < space->mesh->ncell_owned) area[0] += facets[i].area;
-  }
-  PetscCallMPI(MPI_Allreduce(&area[0], &area[1], 1, MPIU_REAL, MPI_SUM, space->comm));
-  for (int i = 0; i < 3; i++) {
-    char text[64];
-
-    PetscCall(PetscSNPrintf(text, sizeof(text), "%.17g", (double)(q->total[i] / area[1])));
-    PetscCall(SbFormulaCreate(PETSC_COMM_SELF, text, q->option, &q->uniform[i]));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode setup_traction(SbEffect e, SbSpace space)
 {
   Traction *q = (Traction *)e->data;
   SbFacet *facets;
   PetscInt n, *corners;
+  PetscReal area = 0;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectFacets(space, &e->on, &n, &facets));
   PetscCall(PetscMalloc1(3 * n, &corners));
   for (PetscInt i = 0; i < n; i++) {
     for (int a = 0; a < 3; a++) corners[3 * i + a] = 4 * facets[i].cell + facets[i].corner[a];
+    if (facets[i].cell < space->mesh->ncell_owned) area += facets[i].area;
   }
   if (q->vector_given) PetscCall(SbDeadLoadCreate(space, 3, n, corners, q->vector, &q->by_vector));
-  if (q->total_given) {
-    PetscCall(spread_total(q, space, n, facets));
+  if (q->total_given) { /* as a uniform traction */
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &area, 1, MPIU_REAL, MPI_SUM, space->comm));
+    for (int i = 0; i < 3; i++) {
+      char text[64];
+
+      PetscCall(PetscSNPrintf(text, sizeof(text), "%.17g", (double)(q->total[i] / area)));
+      PetscCall(SbFormulaCreate(PETSC_COMM_SELF, text, q->option, &q->uniform[i]));
+    }
     PetscCall(SbDeadLoadCreate(space, 3, n, corners, q->uniform, &q->by_total));
   }
   PetscCall(PetscFree(corners));

@@ -6,26 +6,6 @@
 */
 #include "fem_impl.h"
 
-/* Place in the row (as ia counts) of the block with global node column g; -1: not in the graph. */
-static PetscInt find_column(SbSpace s, PetscInt row, PetscInt g)
-{
-  const SbPlan p = s->plan;
-  const PetscInt nd = p->di[row + 1] - p->di[row];
-  const PetscBool owned = (PetscBool)(g >= s->gnode_start && g < s->gnode_start + s->nnode_owned);
-  PetscInt lo = owned ? p->di[row] : p->oi[row], hi = owned ? p->di[row + 1] : p->oi[row + 1];
-
-  while (lo < hi) {
-    const PetscInt mid = lo + (hi - lo) / 2, node = owned ? p->dj[mid] : p->oj[mid];
-
-    if (s->gnode[node] == g) return owned ? mid - p->di[row] : nd + mid - p->oi[row];
-    if (s->gnode[node] < g)
-      lo = mid + 1;
-    else
-      hi = mid;
-  }
-  return -1;
-}
-
 /* A block by columns to one by rows; `turned`: of the transposed block. */
 static inline void copy_block(const PetscScalar *from, PetscBool turned, PetscReal to[9])
 {
@@ -67,8 +47,12 @@ PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[
       for (PetscInt e = p->di[i]; e < p->di[i + 1]; e++, to += 9) {
         const PetscBool lower = (PetscBool)(b.symmetric && p->dj[e] < i);
         const PetscInt row = lower ? p->dj[e] : i;
-        const PetscInt at = lower ? p->di[row] + find_column(s, row, s->gnode[i]) : e;
+        PetscInt at = e;
 
+        if (lower) {
+          PetscCall(PetscFindInt(i, p->di[row + 1] - p->di[row], p->dj + p->di[row], &at));
+          at += p->di[row];
+        }
         copy_block(b.value[0] + 9 * (size_t)(b.symmetric ? p->ui[row] + at - p->diagonal[row] : at), lower,
                    to);
       }
@@ -78,14 +62,27 @@ PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[
     PetscCall(SbMatRestoreBlocks(&b));
   } else {
     for (PetscInt k = 0; k < n; k++) {
+      const PetscInt i = node[k], nd = p->di[i + 1] - p->di[i], no = p->oi[i + 1] - p->oi[i];
+
       for (PetscInt c = 0; c < 3; c++) {
-        const PetscInt row = 3 * (s->gnode_start + node[k]) + c, *column;
+        const PetscInt row = 3 * (s->gnode_start + i) + c, *column;
         const PetscScalar *value;
         PetscInt ncol, at = -1;
 
         PetscCall(MatGetRow(A, row, &ncol, &column, &value));
         for (PetscInt e = 0; e < ncol; e++) {
-          if (!e || column[e] / 3 != column[e - 1] / 3) at = find_column(s, node[k], column[e] / 3);
+          const PetscInt own = column[e] / 3 - s->gnode_start;
+          PetscInt ghost;
+
+          /* the place of its block, own columns first; not all of them are in the graph */
+          if (own >= 0 && own < s->nnode_owned)
+            PetscCall(PetscFindInt(own, nd, p->dj + p->di[i], &at));
+          else {
+            PetscCall(
+              PetscFindInt(column[e] / 3, s->nnode - s->nnode_owned, s->gnode + s->nnode_owned, &ghost));
+            PetscCall(PetscFindInt(s->nnode_owned + ghost, no, p->oj + p->oi[i], &at));
+            if (at >= 0) at += nd;
+          }
           if (at >= 0) block[9 * (ia[k] + at) + 3 * c + column[e] % 3] = value[e];
         }
         PetscCall(MatRestoreRow(A, row, &ncol, &column, &value));

@@ -24,8 +24,7 @@
 #include "sbconstraint.h"
 #include "sbkernel.h"
 
-#define SAID \
-  1e-6 /* squared part of a constraint outside the span of the node's others; below it they say it already */
+#define SAID 1e-6    /* squared part outside the span of the node's others; below it these say it already */
 #define NO_SAY 1e-12 /* squared length of what supports leave of a direction; below it nothing is left */
 
 PetscErrorCode SbSpaceCreateConstraints(SbSpace s, PetscBool beside, PetscBool nonsymmetric)

@@ -76,21 +76,6 @@ static void face_nodes(SbSpace s, const Face *face, PetscInt node[8])
   }
 }
 
-static PetscReal face_area(SbMesh mesh, PetscInt cell, PetscInt face)
-{
-  const PetscInt *v = mesh->cell + 4 * cell;
-  const PetscReal *a = mesh->x + 3 * v[(face + 1) % 4], *b = mesh->x + 3 * v[(face + 2) % 4],
-                  *c = mesh->x + 3 * v[(face + 3) % 4];
-  PetscReal p[3], q[3], n[3];
-
-  for (int i = 0; i < 3; i++) {
-    p[i] = b[i] - a[i];
-    q[i] = c[i] - a[i];
-  }
-  SbCross(p, q, n);
-  return 0.5 * PetscSqrtReal(SbDot3(n, n));
-}
-
 static inline PetscReal harmonic(PetscReal a, PetscReal b)
 {
   return a + b > 0. ? 2. * a * b / (a + b) : 0.;
@@ -99,10 +84,15 @@ static inline PetscReal harmonic(PetscReal a, PetscReal b)
 /* c0 and c1 of a face. */
 static void face_factors(SbSpace s, SbJump j, const Face *face, PetscReal *c0, PetscReal *c1)
 {
-  const PetscReal area = face_area(s->mesh, face->cell[0], (PetscInt)face->face[0]);
+  const PetscInt *v = s->mesh->cell + 4 * face->cell[0], f = face->face[0];
+  const PetscReal *x = s->mesh->x, *corner = x + 3 * v[(f + 1) % 4];
   const SbElement e = s->region[face->region].element;
-  PetscReal k0[2], k1[2];
+  PetscReal k0[2], k1[2], p[3], q[3], n[3], area;
 
+  SbSubtract(x + 3 * v[(f + 2) % 4], corner, p);
+  SbSubtract(x + 3 * v[(f + 3) % 4], corner, q);
+  SbCross(p, q, n);
+  area = 0.5 * PetscSqrtReal(SbDot3(n, n));
   for (int side = 0; side < (face->cell[1] == SUPPORT ? 1 : 2); side++) {
     const PetscInt cell = face->cell[side];
 
@@ -200,31 +190,14 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
 /* Raises the moduli of n cells to what twists ask for at F, under the first Piola stress P. */
 static void follow_twists(PetscInt n, const SbPack F[9], const SbPack P[9], PetscReal modulus[])
 {
-  SbPack R[9], S[6], stretch[3], V[9];
+  SbPack U[9], stretch[3], V[9];
 
-  /* F = R V diag(stretch) V^T */
-  SbPolar(F, R);
-  for (int k = 0; k < 6; k++) {
-    static const int row[6] = {0, 0, 0, 1, 1, 2}, column[6] = {0, 1, 2, 1, 2, 2};
-
-    for (int l = 0; l < SB_BATCH; l++) {
-      S[k][l] = 0.;
-      for (int i = 0; i < 3; i++) S[k][l] += R[3 * i + row[k]][l] * F[3 * i + column[k]][l];
-    }
-  }
-  SbSymEig((const SbPack *)S, stretch, V);
-
-  /* principal values of the stress in these axes, and the stiffness against twists */
+  SbStretches(F, U, stretch, V);
   for (PetscInt l = 0; l < n; l++) {
-    PetscReal principal[3] = {0.};
+    PetscReal principal[3] = {0.}; /* values of the stress in these axes */
 
-    for (int k = 0; k < 27; k++) {
-      const int i = k / 9, j = k / 3 % 3, a = k % 3;
-      PetscReal left = 0.;
-
-      for (int c = 0; c < 3; c++) left += R[3 * i + c][l] * V[3 * c + a][l];
-      principal[a] += left * P[3 * i + j][l] * V[3 * j + a][l];
-    }
+    for (int k = 0; k < 27; k++)
+      principal[k % 3] += U[3 * (k / 9) + k % 3][l] * P[k / 3][l] * V[3 * (k / 3 % 3) + k % 3][l];
     for (int k = 0; k < 3; k++) {
       const PetscReal sum = stretch[k][l] + stretch[(k + 1) % 3][l],
                       twist = sum > 0. ? (principal[k] + principal[(k + 1) % 3]) / sum : 0.;

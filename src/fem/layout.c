@@ -45,18 +45,6 @@ static PetscInt number_face(SbSpace s, const PetscInt node[], PetscInt cell, Pet
   return (*n)++;
 }
 
-/* Sets that an effect prescribes; none when no body ties its faces to supports. */
-static uint64_t prescribed_sets(SbSpace s)
-{
-  uint64_t prescribed = 0;
-  PetscBool weak = PETSC_FALSE;
-
-  for (PetscInt b = 0; b < s->mesh->nbody; b++) weak = (PetscBool)(weak || s->element[b]->weak);
-  for (PetscInt k = 0; weak && k < s->mesh->nset; k++)
-    prescribed |= s->mesh->set[k].prescribed ? SB_SET_BIT(k) : 0;
-  return prescribed;
-}
-
 /* The edges of the local cells: which they are, who numbers them. */
 typedef struct {
   PetscInt n, *edge; /* [ncell][6] numbers of edges */
@@ -243,21 +231,6 @@ static uint64_t face_sets(SbMesh mesh, PetscInt cell, PetscInt face)
   return own | common;
 }
 
-/* A support lies where the node of its face lies, and takes over its sets: what prescribes the face prescribes the support. */
-static void describe_supports(SbSpace s)
-{
-  for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
-    const PetscInt own = s->cell_node[i], node = s->dirichlet_node[i];
-
-    if (node == UNKNOWN) continue;
-    s->node_body[node] = s->node_body[own];
-    s->node_set[node] = s->node_set[own];
-    s->node_set[own] = 0;
-    s->node_orig[node] = s->mesh->Nvert + 4 * (s->mesh->Ncell + s->mesh->cell_orig[i / 4]) + i % 4;
-    for (int k = 0; k < 3; k++) s->node_x[3 * node + k] = s->node_x[3 * own + k];
-  }
-}
-
 /*
   Place, body and sets of the nodes at edges. A set that is a shape holds an edge with both its vertices, as does a group without triangles
   and tets; other groups hold the edges of what they hold, so that no edge through a thin body is in the group of its surface. Owned cells
@@ -333,7 +306,17 @@ static PetscErrorCode describe_nodes(SbSpace s, const Edges *edges)
     }
   }
   if (s->edge_node) PetscCall(describe_edges(s, edges));
-  if (s->dirichlet_node) describe_supports(s);
+  /* a support lies where the node of its face lies, and takes over its sets: what prescribes the face prescribes the support */
+  for (PetscInt i = 0; s->dirichlet_node && i < 4 * mesh->ncell; i++) {
+    const PetscInt own = s->cell_node[i], node = s->dirichlet_node[i];
+
+    if (node == UNKNOWN) continue;
+    s->node_body[node] = s->node_body[own];
+    s->node_set[node] = s->node_set[own];
+    s->node_set[own] = 0;
+    s->node_orig[node] = mesh->Nvert + 4 * (mesh->Ncell + mesh->cell_orig[i / 4]) + i % 4;
+    for (int k = 0; k < 3; k++) s->node_x[3 * node + k] = s->node_x[3 * own + k];
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -373,9 +356,14 @@ PetscErrorCode SbLayoutNodes(SbSpace s)
     PetscCall(layout_vertices(s));
   else {
     SbMesh mesh = s->mesh;
-    const uint64_t prescribed = prescribed_sets(s);
+    uint64_t prescribed =
+      0; /* sets that an effect prescribes; none when no body ties its faces to supports */
     Edges edges = {0};
 
+    for (PetscInt k = 0; k < mesh->nset * mesh->nbody; k++) {
+      if (s->element[k % mesh->nbody]->weak && mesh->set[k / mesh->nbody].prescribed)
+        prescribed |= SB_SET_BIT(k / mesh->nbody);
+    }
     if (s->faces) PetscCall(SbMeshNeighbours(mesh, &s->neighbour));
     if (quadratic) {
       PetscCall(find_edges(s, &edges));
@@ -426,23 +414,6 @@ PetscErrorCode SbLayoutDestroy(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The node across face a of a cell with its own nodes, and the weight of the cell's own one in the mean of the two. */
-static void across(SbSpace s, const PetscReal stiffness[], PetscInt cell, PetscInt a, PetscInt *node,
-                   PetscReal *weight)
-{
-  const PetscInt other = s->neighbour[4 * cell + a];
-
-  *node = s->cell_node[4 * cell + a];
-  *weight = 1.;
-  if (s->dirichlet_node && s->dirichlet_node[4 * cell + a] != UNKNOWN) {
-    *node = s->dirichlet_node[4 * cell + a];
-    *weight = 0.;
-  }
-  if (other < 0) return;
-  *node = s->cell_node[4 * other + face_towards(s, other, cell)];
-  *weight = stiffness[cell] / (stiffness[cell] + stiffness[other]);
-}
-
 /*
   Nodes across the faces of DG cells. The mean of the two sides of a face is weighted by (2 mu + lambda) / |T|: then the
   constant in the bound of the lifting does not depend on the volumes and moduli on the two sides (docs/reference/theory.md).
@@ -486,10 +457,22 @@ PetscErrorCode SbLayoutCliques(SbSpace s)
     const PetscInt b = k / (4 * SB_BATCH), a = k / SB_BATCH % 4, l = k % SB_BATCH,
                    cell = s->batch_cell[b] + (l < s->batch_n[b] ? l : 0);
 
-    s->batch_weight[4 * b + a][l] = 1.;
-    if (SbSpaceCellElement(s, cell)->nodes_per[3])
-      across(s, stiffness, cell, a, &s->batch_clique[(s->width * b + 4 + a) * SB_BATCH + l],
-             &s->batch_weight[4 * b + a][l]);
+    PetscInt *node = &s->batch_clique[(s->width * b + 4 + a) * SB_BATCH + l];
+    PetscReal *weight = &s->batch_weight[4 * b + a][l];
+
+    /* the node across face a, and the weight of the cell's own one in the mean of the two */
+    *weight = 1.;
+    if (!SbSpaceCellElement(s, cell)->nodes_per[3]) continue;
+    *node = s->cell_node[4 * cell + a];
+    if (s->neighbour[4 * cell + a] >= 0) {
+      const PetscInt other = s->neighbour[4 * cell + a];
+
+      *node = s->cell_node[4 * other + face_towards(s, other, cell)];
+      *weight = stiffness[cell] / (stiffness[cell] + stiffness[other]);
+    } else if (s->dirichlet_node && s->dirichlet_node[4 * cell + a] != UNKNOWN) {
+      *node = s->dirichlet_node[4 * cell + a];
+      *weight = 0.;
+    }
   }
   PetscCall(PetscFree(stiffness));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -166,14 +166,8 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
         }
       }
     }
-    // fifteen to thirty columns in local order: ghosts are sorted globally, so global order within each part
-    for (PetscInt k = 1; k < n; k++) {
-      const PetscInt c = column[k];
-      PetscInt j = k;
-
-      for (; j > 0 && column[j - 1] > c; j--) column[j] = column[j - 1];
-      column[j] = c;
-    }
+    // in local order: ghosts are sorted globally, so global order within each part
+    PetscCall(PetscSortInt(n, column));
     // the row of the graph: owned columns in the diagonal part, ghosts in the other one
     for (PetscInt k = 0; k < n; k++) {
       if (column[k] < nrow) {

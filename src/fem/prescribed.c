@@ -39,18 +39,3 @@ PetscErrorCode SbSpaceZeroPrescribed(SbSpace s, PetscBool prescribed, Vec X)
   PetscCall(VecRestoreArray(X, &x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-PetscInt SbSpacePrescribedIndex(SbSpace s, PetscInt node)
-{
-  PetscInt lo = 0, hi = s->nfixed;
-
-  while (lo < hi) {
-    const PetscInt mid = lo + (hi - lo) / 2;
-
-    if (s->fixed_node[mid] < node)
-      lo = mid + 1;
-    else
-      hi = mid;
-  }
-  return lo < s->nfixed && s->fixed_node[lo] == node ? lo : -1;
-}

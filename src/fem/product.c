@@ -17,10 +17,9 @@
 #include <petsc/private/petscimpl.h>
 
 typedef struct {
-  Mat diagonal, other; /* parts of the matrix, borrowed; other NULL on one rank */
-  PetscScalar *full;   /* values of BAIJ's diagonal part; NULL for SBAIJ */
-  Mat
-    symmetric; /* holds the upper blocks: the matrix itself when it is SBAIJ (borrowed), a copy of BAIJ's (owned) */
+  Mat diagonal, other;     /* parts of the matrix, borrowed; other NULL on one rank */
+  PetscScalar *full;       /* values of BAIJ's diagonal part; NULL for SBAIJ */
+  Mat symmetric;           /* the upper blocks: SBAIJ itself (borrowed), or a copy of BAIJ's (owned) */
   PetscScalar *upper;      /* its values, by rows */
   PetscObjectState copied; /* state of `diagonal` that the copy belongs to */
   VecScatter scatter;      /* x -> ghosts */
@@ -216,24 +215,6 @@ static PetscErrorCode destroy_product(void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Ghosts in the order in which the off-diagonal part numbers its columns. */
-static PetscErrorCode create_scatter(Mat A, const PetscInt columns[], Product *p)
-{
-  PetscInt n;
-  Vec x;
-  IS from;
-
-  PetscFunctionBeginUser;
-  PetscCall(MatCreateVecs(p->other, &p->ghosts, NULL));
-  PetscCall(MatCreateVecs(A, &x, NULL));
-  PetscCall(VecGetLocalSize(p->ghosts, &n));
-  PetscCall(ISCreateBlock(PETSC_COMM_SELF, 3, n / 3, columns, PETSC_COPY_VALUES, &from));
-  PetscCall(VecScatterCreate(x, from, p->ghosts, NULL, &p->scatter));
-  PetscCall(ISDestroy(&from));
-  PetscCall(VecDestroy(&x));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* An empty SBAIJ matrix with the graph of the diagonal part, which is symmetric. */
 static PetscErrorCode create_symmetric(Product *p)
 {
@@ -265,6 +246,9 @@ static PetscErrorCode find_parts(Mat A, Product *p)
 {
   const PetscInt *columns;
   PetscBool parallel, symmetric;
+  PetscInt n;
+  Vec x;
+  IS from;
 
   PetscFunctionBeginUser;
   p->diagonal = A;
@@ -277,7 +261,14 @@ static PetscErrorCode find_parts(Mat A, Product *p)
   PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
   if (parallel) {
     PetscCall(MatMPIBAIJGetSeqBAIJ(A, &p->diagonal, &p->other, &columns));
-    PetscCall(create_scatter(A, columns, p));
+    /* ghosts in the order in which the off-diagonal part numbers its columns */
+    PetscCall(MatCreateVecs(p->other, &p->ghosts, NULL));
+    PetscCall(MatCreateVecs(A, &x, NULL));
+    PetscCall(VecGetLocalSize(p->ghosts, &n));
+    PetscCall(ISCreateBlock(PETSC_COMM_SELF, 3, n / 3, columns, PETSC_COPY_VALUES, &from));
+    PetscCall(VecScatterCreate(x, from, p->ghosts, NULL, &p->scatter));
+    PetscCall(ISDestroy(&from));
+    PetscCall(VecDestroy(&x));
   }
   PetscCall(MatSeqBAIJGetArray(p->diagonal, &p->full));
   PetscCall(create_symmetric(p));

@@ -140,19 +140,6 @@ void SbSpaceAddInertia(SbSpace s, const SbStage *stage, PetscReal f[])
     f[i] += s->alpha[s->node_body[i / 3]] * s->node_mass[i / 3] * stage->v[i];
 }
 
-/* Cauchy stress P F^T / J of one lane, in the order xx yy zz xy yz xz. */
-static void cauchy(const SbPack P[9], const SbPack F[9], PetscInt l, PetscReal J, PetscReal sigma[6])
-{
-  static const int row[6] = {0, 1, 2, 0, 1, 0}, column[6] = {0, 1, 2, 1, 2, 2};
-
-  for (int k = 0; k < 6; k++) {
-    PetscReal sum = 0.;
-
-    for (int j = 0; j < 3; j++) sum += P[3 * row[k] + j][l] * F[3 * column[k] + j][l];
-    sigma[k] = sum / J;
-  }
-}
-
 static PetscReal lane_det(const SbPack F[9], PetscInt l)
 {
   return F[0][l] * (F[4][l] * F[8][l] - F[5][l] * F[7][l]) -
@@ -163,15 +150,17 @@ static PetscReal lane_det(const SbPack F[9], PetscInt l)
 void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscReal J[], PetscReal psi[],
                       PetscReal pressure[])
 {
+  static const int row[6] = {0, 1, 2, 0, 1, 0}, column[6] = {0, 1, 2, 1, 2, 2};
+
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
       const SbPoints at = SbBatchPoints(s, region, b);
-      SbPack F[SB_POINTS][9], P[SB_POINTS][9], energy[SB_POINTS], p[SB_POINTS];
+      SbPack F[SB_POINTS][9], P[SB_POINTS][9], energy[SB_POINTS], pressures[SB_POINTS];
 
       /* means over the points */
-      SbBatchState(s, region, b, x, F, sigma ? P : NULL, psi ? energy : NULL, pressure ? p : NULL);
+      SbBatchState(s, region, b, x, F, sigma ? P : NULL, psi ? energy : NULL, pressure ? pressures : NULL);
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
         const PetscInt c = s->batch_cell[b] + l;
 
@@ -181,20 +170,20 @@ void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscRe
         for (int k = 0; sigma && k < 6; k++) sigma[6 * c + k] = 0.;
         for (int q = 0; q < at.n; q++) {
           const PetscReal det = lane_det((const SbPack *)F[q], l), part = at.weight[q][l];
-          PetscReal stress[6];
 
           if (J) J[c] += part * det;
           if (psi) psi[c] += part * energy[q][l];
-          if (pressure) pressure[c] += part * p[q][l];
-          if (!sigma) continue;
-          /* small strain has one stress: P itself */
-          if (region->material->linear) {
-            const int entry[6] = {0, 4, 8, 1, 5, 2};
+          if (pressure) pressure[c] += part * pressures[q][l];
+          /* Cauchy stress P F^T / J; small strain has one stress, P itself */
+          for (int k = 0; sigma && k < 6; k++) {
+            const int i = row[k], j = column[k];
+            const SbPack *p = (const SbPack *)P[q] + 3 * i, *f = (const SbPack *)F[q] + 3 * j;
 
-            for (int k = 0; k < 6; k++) stress[k] = P[q][entry[k]][l];
-          } else
-            cauchy((const SbPack *)P[q], (const SbPack *)F[q], l, det, stress);
-          for (int k = 0; k < 6; k++) sigma[6 * c + k] += part * stress[k];
+            sigma[6 * c + k] +=
+              part * (region->material->linear
+                        ? p[j][l]
+                        : (p[0][l] * f[0][l] + p[1][l] * f[1][l] + p[2][l] * f[2][l]) / det);
+          }
         }
       }
     }

@@ -53,37 +53,26 @@ static void multiply_stiffness(SbSpace s, const PetscReal x[], PetscReal f[])
   if (s->jump) SbJumpAdd(s, x, SB_JUMP_STIFFNESS, f);
 }
 
-/* Each node along its own radius, by an amount that has no pattern. */
-static PetscErrorCode start(SbSpace s, PetscReal x[])
-{
-  PetscReal centre[4] = {0., 0., 0., 0.};
-
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    for (PetscInt k = 0; k < 3; k++) centre[k] += s->node_mass[i] * s->node_x[3 * i + k];
-    centre[3] += s->node_mass[i];
-  }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, centre, 4, MPIU_REAL, MPI_SUM, s->comm));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    const PetscReal amount = PetscSinReal(12.9898 * (PetscReal)(s->node_orig[i] % 10007) + 1.);
-
-    for (PetscInt k = 0; k < 3; k++) x[3 * i + k] = amount * (s->node_x[3 * i + k] - centre[k] / centre[3]);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Highest angular frequency of K x = w^2 M x with the lumped mass, from below; 0 when nothing can move. */
 static PetscErrorCode highest_frequency(SbSpace s, PetscReal *w)
 {
   const PetscInt n = 3 * s->nnode_owned;
   Vec X;
-  PetscReal *x, *f, square;
+  PetscReal *x, *f, square, centre[4] = {0., 0., 0., 0.};
   const PetscReal *local;
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceCreateVec(s, &X));
   PetscCall(PetscCalloc1(3 * s->nnode, &f));
-  PetscCall(start(s, f));
+
+  /* the start: each node along its own radius, by an amount that has no pattern */
+  for (PetscInt i = 0; i < 4 * s->nnode_owned; i++)
+    centre[i % 4] += s->node_mass[i / 4] * (i % 4 == 3 ? 1. : s->node_x[3 * (i / 4) + i % 4]);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, centre, 4, MPIU_REAL, MPI_SUM, s->comm));
+  for (PetscInt i = 0; i < n; i++)
+    f[i] = PetscSinReal(12.9898 * (PetscReal)(s->node_orig[i / 3] % 10007) + 1.) *
+           (s->node_x[i] - centre[i % 3] / centre[3]);
+
   *w = 0.;
   for (int step = 0; step <= POWER_STEPS; step++) {
     /* y.M y, with zeros at prescribed unknowns */

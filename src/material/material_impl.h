@@ -32,10 +32,6 @@ PetscErrorCode SbMaterialSetFromOptions_Exact(SbMaterial m, const SbScope *scope
 PetscErrorCode SbMaterialSetTangent_Exact(SbMaterial m, SbTangentKind kind);
 
 /*
-  SbStretches - F = U diag(s) V^T with rotations U and V; s[k] in no order, det F = s0 s1 s2 with its sign.
-*/
-void SbStretches(const SbPack F[9], SbPack U[9], SbPack s[3], SbPack V[9]);
-/*
   SbSpectralTangent - C[81] of an isotropic energy psi(s0, s1, s2), its negative eigenvalues raised to zero.
 
   Input, Pa, with (i, j, k) cyclic: hessian[6] = d^2 psi / ds_i ds_j as 00 01 02 11 12 22;

@@ -411,11 +411,11 @@ PetscErrorCode SbModelGapForces(SbModel m, Vec U, Vec F, PetscReal *bound)
   const SbSpace s = m->space;
   PetscReal *f;
   const PetscReal *u;
-  PetscScalar *out;
 
   PetscFunctionBeginUser;
   *bound = 0.;
-  PetscCall(PetscCalloc1(3 * s->nnode, &f));
+  PetscCall(SbSpaceGetLocalWrite(s, F, &f));
+  PetscCall(PetscArrayzero(f, 3 * s->nnode));
   PetscCall(SbSpaceGetLocalRead(s, U, &u));
   for (PetscInt e = 0; e < m->npotential; e++) {
     PetscReal mine;
@@ -424,10 +424,8 @@ PetscErrorCode SbModelGapForces(SbModel m, Vec U, Vec F, PetscReal *bound)
     *bound += mine;
   }
   PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
-  PetscCall(VecGetArray(F, &out));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) out[i] = s->fixed[i / 3] & (1 << (i % 3)) ? 0. : f[i];
-  PetscCall(VecRestoreArray(F, &out));
-  PetscCall(PetscFree(f));
+  PetscCall(SbSpaceRestoreLocalWrite(s, F, &f));
+  PetscCall(SbSpaceZeroPrescribed(s, PETSC_TRUE, F));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, bound, 1, MPIU_REAL, MPI_SUM, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -107,26 +107,10 @@ static PetscErrorCode find_pattern(SbCoarse c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The numbers and positions of the nodes on every rank that knows them. */
-static PetscErrorCode share_aggregates(SbCoarse c)
-{
-  SbSpace s = c->space;
-  PetscReal *number;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(3 * s->nnode, &number));
-  for (PetscInt i = 0; i < s->nnode_owned; i++)
-    number[3 * i] = c->agg[i] < 0 ? -1. : (PetscReal)(c->first + c->agg[i]);
-  PetscCall(SbSpaceUpdateGhosts(s, number));
-  PetscCall(SbSpaceUpdateGhosts(s, c->d));
-  for (PetscInt i = 0; i < s->nnode; i++) c->agg[i] = (PetscInt)number[3 * i];
-  PetscCall(PetscFree(number));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbCoarseCreate(SbSpace s, PetscInt wanted, PetscBool spread, SbCoarse *coarse)
 {
   PetscInt nfree = 0, total;
+  PetscReal *number;
   SbCoarse c;
 
   PetscFunctionBeginUser;
@@ -148,7 +132,15 @@ PetscErrorCode SbCoarseCreate(SbSpace s, PetscInt wanted, PetscBool spread, SbCo
   find_positions(c);
   PetscCall(PetscMalloc1(36 * c->n, &c->null));
   for (PetscInt a = 0; a < c->n; a++) PetscCall(find_vanishing(c, a, c->null + 36 * a));
-  PetscCall(share_aggregates(c));
+
+  /* numbers and positions of the nodes on every rank that knows them */
+  PetscCall(PetscCalloc1(3 * s->nnode, &number));
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
+    number[3 * i] = c->agg[i] < 0 ? -1. : (PetscReal)(c->first + c->agg[i]);
+  PetscCall(SbSpaceUpdateGhosts(s, number));
+  PetscCall(SbSpaceUpdateGhosts(s, c->d));
+  for (PetscInt i = 0; i < s->nnode; i++) c->agg[i] = (PetscInt)number[3 * i];
+  PetscCall(PetscFree(number));
   PetscCall(find_pattern(c));
   if (c->N) PetscCall(SbCoarseCreateSolver(c));
   *coarse = c;

@@ -39,17 +39,6 @@ static PetscErrorCode fill_mode(PetscInt m, PetscScalar v[], const void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An option that the user did not give. */
-static PetscErrorCode set_default(const char *name, const char *value)
-{
-  PetscBool given;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscOptionsHasName(NULL, NULL, name, &given));
-  if (!given) PetscCall(PetscOptionsSetValue(NULL, name, value));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbCoarseCreateSolver(SbCoarse c)
 {
   PetscInt *own, *foreign;
@@ -88,8 +77,8 @@ PetscErrorCode SbCoarseCreateSolver(SbCoarse c)
     PetscCall(PCGAMGSetReuseInterpolation(c->solver, PETSC_TRUE));
     PetscCall(PCGAMGSetCoarseEqLim(c->solver, LAST_LEVEL));
     PetscCall(PCGAMGSetProcEqLim(c->solver, PER_RANK));
-    PetscCall(set_default("-pc_coarse_pc_gamg_aggressive_coarsening", "0"));
-    PetscCall(set_default("-pc_coarse_mg_levels_pc_type", "pbjacobi"));
+    PetscCall(SbSolverSetDefault("pc_coarse_", "pc_gamg_aggressive_coarsening", "0"));
+    PetscCall(SbSolverSetDefault("pc_coarse_", "mg_levels_pc_type", "pbjacobi"));
   }
   PetscCall(PCSetFromOptions(c->solver));
   PetscCall(SbPCCheckPivots(c->solver));

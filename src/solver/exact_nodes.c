@@ -50,25 +50,6 @@ static void choose(SbExactNodes *e, SbSpace s, const PetscReal spread[], PetscRe
   }
 }
 
-/* The blocks between the nodes themselves. */
-static void restrict_rows(SbExactNodes *e)
-{
-  PetscInt count = 0;
-
-  e->ka[0] = 0;
-  for (PetscInt k = 0; k < e->n; k++) {
-    for (PetscInt at = e->ia[k]; at < e->ia[k + 1]; at++) {
-      const PetscInt j = e->index[e->ja[at]];
-
-      if (j < 0) continue;
-      e->kja[count] = j;
-      for (PetscInt c = 0; c < 9; c++) e->kblock[9 * count + c] = e->block[9 * at + c];
-      count++;
-    }
-    e->ka[k + 1] = count;
-  }
-}
-
 PetscErrorCode SbExactNodesSetUp(SbExactNodes *e, SbSpace s, Mat A, const PetscReal spread[], PetscReal limit)
 {
   PetscInt nz = 0;
@@ -89,7 +70,18 @@ PetscErrorCode SbExactNodesSetUp(SbExactNodes *e, SbSpace s, Mat A, const PetscR
   PetscCall(PetscMalloc5(nz, &e->ja, nz, &e->kja, 9 * nz, &e->block, 9 * nz, &e->kblock, 9 * nz, &e->value));
   PetscCall(SbSpaceGetRows(s, A, e->n, e->node, e->ia, e->ja, e->block));
   for (PetscInt k = 0; k < 9 * nz; k++) e->value[k] = (float)e->block[k];
-  restrict_rows(e);
+  /* the blocks between the nodes themselves */
+  e->ka[0] = nz = 0;
+  for (PetscInt k = 0; k < e->n; k++) {
+    for (PetscInt at = e->ia[k]; at < e->ia[k + 1]; at++) {
+      const PetscInt j = e->index[e->ja[at]];
+
+      if (j < 0) continue;
+      e->kja[nz] = j;
+      PetscCall(PetscArraycpy(e->kblock + 9 * nz++, e->block + 9 * at, 9));
+    }
+    e->ka[k + 1] = nz;
+  }
   PetscCall(SbFactorCreate(e->n, 0, e->ka, e->kja, &e->factor));
   PetscCall(SbFactorNumeric(e->factor, e->ka, e->kja, e->kblock, NULL, &ok));
   /* an indefinite block: the nodes are left to the preconditioner */

@@ -28,12 +28,11 @@ typedef struct {
 struct _p_SbInterfaceFactor {
   PetscInt nblock; /* of all ranks */
   PetscInt nrows;
-  Rows *rows;    /* [nrows] */
-  size_t nword;  /* words in use */
-  int32_t *word; /* reading may run ahead of the last panel */
-  float *scale;  /* [3 n][2] of the rows; the second ones are not used */
-  float *sum,
-    *y; /* [3 n] right-hand side of all ranks, part of the solution; with room for a block of rows */
+  Rows *rows;     /* [nrows] */
+  size_t nword;   /* words in use */
+  int32_t *word;  /* reading may run ahead of the last panel */
+  float *scale;   /* [3 n][2] of the rows; the second ones are not used */
+  float *sum, *y; /* [3 n] right-hand side of all ranks, part of the solution; room for a block more */
 };
 
 PetscErrorCode SbSpaceInterfaceSize(SbSpace s, PetscInt *n, PetscInt *most)

@@ -35,9 +35,8 @@
 #include "sblog.h"
 
 #define NAME "two-level"
-#define NU_ICC 0.4 /* up to this Poisson's ratio the incomplete factorisation is tried */
-#define IN_SPAN \
-  1e-5 /* share of the residual in the span of Z that rounding may leave; below it the right factor is 1 */
+#define NU_ICC 0.4   /* up to this Poisson's ratio the incomplete factorisation is tried */
+#define IN_SPAN 1e-5 /* share of the residual in the span of Z below which the right factor is 1 */
 
 /* Aggregates that one rank factors: one for so many nodes of a rank, within these bounds. */
 #define NODES_PER_FACTORED 10
@@ -59,25 +58,6 @@ typedef struct {
 } TwoLevel;
 
 /* ------------------------------------------------------------------ set-up */
-
-static PetscErrorCode create_coarse(TwoLevel *p)
-{
-  SbSpace s = p->space;
-  PetscInt wanted = p->wanted, limit = p->limit;
-  PetscBool spread;
-  PetscMPIInt size;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(s->comm, &size));
-  /* 300 at 36,000 nodes (192,000 tets) was best; the work of a factor grows faster than the number of aggregates */
-  if (!wanted) wanted = PetscMax(1, (PetscInt)(300. * PetscPowReal((PetscReal)s->Nnode / 36000., 0.7) + 0.5));
-  if (limit < 0)
-    limit = PetscMax(LEAST_FACTORED, PetscMin(MOST_FACTORED, s->Nnode / (size * NODES_PER_FACTORED)));
-  spread = (PetscBool)(size > 1 && wanted > limit);
-  if (spread && !p->wanted) wanted = s->Nnode / NODES_PER_SPREAD;
-  PetscCall(SbCoarseCreate(s, wanted, spread, &p->coarse));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* Incomplete Cholesky of the rows and columns of this rank, or what replaces it. */
 static PetscErrorCode create_fine(TwoLevel *p, PC pc, Mat A)
@@ -145,11 +125,21 @@ static PetscErrorCode PCSetUp_Coarse(PC pc)
   PetscCall(PCGetOperators(pc, NULL, &A));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
   if (!p->coarse) {
-    SbSpace s;
+    const SbSpace s = p->space;
+    PetscInt wanted = p->wanted, limit = p->limit;
     PetscReal nu = 0.;
+    PetscBool spread;
+    PetscMPIInt size;
 
-    PetscCall(create_coarse(p));
-    s = p->space;
+    PetscCallMPI(MPI_Comm_size(s->comm, &size));
+    /* 300 at 36,000 nodes (192,000 tets) was best; the work of a factor grows faster than the number of aggregates */
+    if (!wanted)
+      wanted = PetscMax(1, (PetscInt)(300. * PetscPowReal((PetscReal)s->Nnode / 36000., 0.7) + 0.5));
+    if (limit < 0)
+      limit = PetscMax(LEAST_FACTORED, PetscMin(MOST_FACTORED, s->Nnode / (size * NODES_PER_FACTORED)));
+    spread = (PetscBool)(size > 1 && wanted > limit);
+    if (spread && !p->wanted) wanted = s->Nnode / NODES_PER_SPREAD;
+    PetscCall(SbCoarseCreate(s, wanted, spread, &p->coarse));
     for (PetscInt r = 0; r < s->nregion; r++) nu = PetscMax(nu, s->region[r].material->nu);
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nu, 1, MPIU_REAL, MPI_MAX, s->comm));
     p->simple = (PetscBool)(nu > NU_ICC);
@@ -175,21 +165,6 @@ static PetscErrorCode PCSetUp_Coarse(PC pc)
 
 /* ------------------------------------------------------------------ application */
 
-static PetscErrorCode apply_fine(TwoLevel *p, Vec r, Vec z)
-{
-  PetscFunctionBeginUser;
-  if (p->simple)
-    PetscCall(PCApply(p->fine, r, z));
-  else {
-    PetscCall(VecGetLocalVectorRead(r, p->own_in));
-    PetscCall(VecGetLocalVector(z, p->own_out));
-    PetscCall(PCApply(p->fine, p->own_in, p->own_out));
-    PetscCall(VecRestoreLocalVector(z, p->own_out));
-    PetscCall(VecRestoreLocalVectorRead(r, p->own_in));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode PCApply_Coarse(PC pc, Vec r, Vec z)
 {
   PetscReal share;
@@ -211,7 +186,15 @@ static PetscErrorCode PCApply_Coarse(PC pc, Vec r, Vec z)
     PetscCall(VecAYPX(s, -1., r));
   }
   /* w = M s + Q (s - A M s) */
-  PetscCall(apply_fine(p, s, p->w));
+  if (p->simple)
+    PetscCall(PCApply(p->fine, s, p->w));
+  else {
+    PetscCall(VecGetLocalVectorRead(s, p->own_in));
+    PetscCall(VecGetLocalVector(p->w, p->own_out));
+    PetscCall(PCApply(p->fine, p->own_in, p->own_out));
+    PetscCall(VecRestoreLocalVector(p->w, p->own_out));
+    PetscCall(VecRestoreLocalVectorRead(s, p->own_in));
+  }
   PetscCall(MatMult(A, p->w, p->t));
   PetscCall(VecAYPX(p->t, -1., s));
   PetscCall(SbCoarseRestrict(p->coarse, p->t, &share));

@@ -42,8 +42,7 @@ PetscErrorCode SbDirectPackage(MPI_Comm comm, PetscInt unknowns, PetscBool defin
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Puts an option into PETSc's database where the user is silent. */
-static PetscErrorCode set_if_silent(const char *prefix, const char *key, const char *value)
+PetscErrorCode SbSolverSetDefault(const char *prefix, const char *key, const char *value)
 {
   char name[128];
   PetscBool given;
@@ -78,13 +77,13 @@ PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric)
       PCSetApplicationContext(pc, (void *)(uintptr_t)package)); /* what is made of it at its first set-up */
   }
   /* all negative pivots are counted when the last front is not spread over the ranks */
-  if (mumps) PetscCall(set_if_silent(prefix, "mat_mumps_icntl_13", "1"));
-  if (mumps) PetscCall(set_if_silent(prefix, "mat_mumps_icntl_14", "100"));
-  if (umfpack) PetscCall(set_if_silent(prefix, "mat_umfpack_ordering", "METIS"));
+  if (mumps) PetscCall(SbSolverSetDefault(prefix, "mat_mumps_icntl_13", "1"));
+  if (mumps) PetscCall(SbSolverSetDefault(prefix, "mat_mumps_icntl_14", "100"));
+  if (umfpack) PetscCall(SbSolverSetDefault(prefix, "mat_umfpack_ordering", "METIS"));
   /* for small matrices CHOLMOD's own choice is L D L^T, which takes indefinite ones without a word; a failure shows in the solver's reason */
   if (!mumps && !umfpack) {
-    PetscCall(set_if_silent(prefix, "mat_cholmod_factor", "supernodal"));
-    PetscCall(set_if_silent(prefix, "mat_cholmod_print", "0"));
+    PetscCall(SbSolverSetDefault(prefix, "mat_cholmod_factor", "supernodal"));
+    PetscCall(SbSolverSetDefault(prefix, "mat_cholmod_print", "0"));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -32,8 +32,7 @@ typedef struct {
   PetscReal *turn0;  /* and at the factorisation */
   PetscReal *spread; /* [nnode_owned] */
   float *Q;          /* [nnode_owned][9] the turn since the factorisation */
-  float
-    *diagonal; /* [nnode_owned][3] inverse diagonal of fully prescribed nodes; allocated when there are any */
+  float *diagonal;   /* [nnode_owned][3] inverse diagonal of fully prescribed nodes */
   float *b, *x;      /* [n][3] */
   float *kept;       /* [nkeep][3] */
   float *edge;       /* [3 face->n] */
@@ -152,26 +151,11 @@ static PetscErrorCode add_other_rows(Rotated *p, Mat A, PetscReal schur[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the Schur complement of the own interior, which is numbered locally, to the one of the interface. */
-static void add_own_schur(const Rotated *p, const PetscReal own[], PetscReal schur[])
-{
-  const size_t m = 3 * (size_t)p->face->n, k = 3 * (size_t)p->nkeep;
-  const PetscInt *node = p->node + p->n - p->nkeep;
-
-  for (size_t j = 0; j < k; j++) {
-    for (size_t i = j; i < k; i++) {
-      const size_t row = 3 * (size_t)p->face->index[node[i / 3]] + i % 3;
-      const size_t column = 3 * (size_t)p->face->index[node[j / 3]] + j % 3;
-
-      schur[PetscMin(row, column) * m + PetscMax(row, column)] += own[j * k + i];
-    }
-  }
-}
-
 static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
 {
   SbSpace s = p->space;
-  const PetscInt ninterior = p->n - p->nkeep;
+  const PetscInt ninterior = p->n - p->nkeep, *kept = p->node + ninterior;
+  const size_t m = 3 * (size_t)p->face->n, k = 3 * (size_t)p->nkeep;
   PetscInt *ia, *ja, nz = 0;
   PetscInt64 entries, bytes;
   PetscReal *block, *own, *schur;
@@ -191,7 +175,15 @@ static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
                          9 * (size_t)p->face->n * (size_t)p->face->n, &schur));
   PetscCall(SbFactorNumeric(p->factor, p->ia, p->ja, block, own, ok));
   PetscCall(add_other_rows(p, A, schur));
-  add_own_schur(p, own, schur);
+  /* the Schur complement of the own interior, which is numbered locally, joins the one of the interface */
+  for (size_t j = 0; j < k; j++) {
+    for (size_t i = j; i < k; i++) {
+      const size_t row = 3 * (size_t)p->face->index[kept[i / 3]] + i % 3;
+      const size_t column = 3 * (size_t)p->face->index[kept[j / 3]] + j % 3;
+
+      schur[PetscMin(row, column) * m + PetscMax(row, column)] += own[j * k + i];
+    }
+  }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, s->comm));
   SbFactorSize(p->factor, &entries, &bytes);
   if (*ok) PetscCall(SbInterfaceFactorise(p->face, 2 * bytes, schur, ok));

@@ -25,12 +25,11 @@ struct _p_SbLevels {
   Vec r[3], z[3], g[3]; /* work vectors of each level, with ghosts */
   Vec t[3], w[3];       /* and without; t[0] is the diagonal of A[0] with a DG body */
   PetscBool sprung;     /* this rank has springs since the last assembly */
-  PetscReal
-    *spring; /* [nnode_owned][9] sum of the springs of effects at each node, N/m; NULL before the first one */
-  PetscReal *shared;  /* [nodes of at[n-2]][9] the same there; NULL before the first one of any rank */
-  KSP coarse;         /* NULL with a P2 body */
-  PC multigrid;       /* of a space with a P2 body, else NULL */
-  PetscReal *inverse; /* [nodes of at[n-2]][9] inverses of the diagonal blocks there, m/N */
+  PetscReal *spring;    /* [nnode_owned][9] sum of the springs of effects, N/m; NULL: none */
+  PetscReal *shared;    /* [nodes of at[n-2]][9] the same there; NULL before the first one of any rank */
+  KSP coarse;           /* NULL with a P2 body */
+  PC multigrid;         /* of a space with a P2 body, else NULL */
+  PetscReal *inverse;   /* [nodes of at[n-2]][9] inverses of the diagonal blocks there, m/N */
 };
 /* Collective. The space's prescribed unknowns are known. Options read: -pressure_coarse_. */
 PetscErrorCode SbLevelsCreate(SbSpace space, SbLevels *levels);

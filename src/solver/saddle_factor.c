@@ -16,8 +16,7 @@
 #include "rotated.h"
 #include "sbsolver.h"
 
-#define DIRECT_STATIC \
-  30000 /* unknowns up to which a factorisation per solve is chosen; see docs/reports/contact.md */
+#define DIRECT_STATIC 30000 /* unknowns up to which it is factored; docs/reports/contact.md */
 #define DIRECT_DYNAMIC 1000
 
 struct _p_SbSaddleFactor {

@@ -20,8 +20,7 @@
 #define ROTATED_SLIVERS 120000 /* also with slivers, up to NU_SLIVERS */
 #define DIRECT_P1 80000        /* is faster for P1 than iterations, from NU_LOCKED on */
 #define P_MULTIGRID 5000       /* is as fast as P2's multigrid, up to nu NU_SLIVERS */
-#define DIRECT_NEXT \
-  200000 /* is faster with slivers, from NU_PRESSURE on, and the first to be tried after another solver */
+#define DIRECT_NEXT 200000     /* is faster with slivers from NU_PRESSURE on, and the first fallback */
 /* Poisson's ratio */
 #define NU_PRESSURE 0.45 /* from which on CR does better with the pressures apart in dynamic runs, too */
 #define NU_SLIVERS 0.49
@@ -421,8 +420,11 @@ PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Options that the user did not give. */
-static PetscErrorCode insert_options(const char *text)
+/*
+  Puts the options of a row into PETSc's database where the user is silent, or takes them out again (clear), but for those with another value. The types are set by calls,
+  so that what stands there is the user's.
+*/
+static PetscErrorCode set_options(const char *text, PetscBool clear)
 {
   char **word;
   int n;
@@ -430,14 +432,15 @@ static PetscErrorCode insert_options(const char *text)
   PetscFunctionBeginUser;
   PetscCall(PetscStrToArray(text, ' ', &n, &word));
   for (int k = 0; k < n; k++) {
-    const char *name = word[k], *value = NULL;
+    const char *name = word[k], *value = "";
+    char there[128] = "";
     PetscBool given;
 
     if (k + 1 < n && word[k + 1][0] != '-') value = word[++k];
-    /* the types are set by calls, so that what stands in the database is the user's */
     if (!strcmp(name, "-ksp_type") || !strcmp(name, "-pc_type")) continue;
-    PetscCall(PetscOptionsHasName(NULL, NULL, name, &given));
-    if (!given) PetscCall(PetscOptionsSetValue(NULL, name, value));
+    PetscCall(PetscOptionsGetString(NULL, NULL, name, there, sizeof(there), &given));
+    if (!clear && !given) PetscCall(PetscOptionsSetValue(NULL, name, value[0] ? value : NULL));
+    if (clear && given && !strcmp(there, value)) PetscCall(PetscOptionsClearValue(NULL, name));
   }
   PetscCall(PetscStrToArrayDestroy(n, word));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -445,22 +448,8 @@ static PetscErrorCode insert_options(const char *text)
 
 PetscErrorCode SbSolverClear(const SbSolverPreset *preset)
 {
-  char **word;
-  int n;
-
   PetscFunctionBeginUser;
-  PetscCall(PetscStrToArray(preset->options, ' ', &n, &word));
-  for (int k = 0; k < n; k++) {
-    const char *name = word[k], *value = "";
-    char there[128] = "";
-    PetscBool given;
-
-    if (k + 1 < n && word[k + 1][0] != '-') value = word[++k];
-    PetscCall(PetscOptionsGetString(NULL, NULL, name, there, sizeof(there), &given));
-    if (strcmp(name, "-ksp_type") && strcmp(name, "-pc_type") && given && !strcmp(there, value))
-      PetscCall(PetscOptionsClearValue(NULL, name));
-  }
-  PetscCall(PetscStrToArrayDestroy(n, word));
+  PetscCall(set_options(preset->options, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -505,7 +494,7 @@ static PetscErrorCode choose_package(SbSpace s, PC pc, const char *type)
     package = NULL;
   if (package) PetscCall(PCFactorSetMatSolverType(pc, package));
   if (package && !strcmp(package, MATSOLVERMUMPS))
-    PetscCall(insert_options("-mat_mumps_icntl_13 1 -mat_mumps_icntl_14 100"));
+    PetscCall(set_options("-mat_mumps_icntl_13 1 -mat_mumps_icntl_14 100", PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -530,7 +519,8 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   /* multigrid sums its coarse matrices up in the order in which messages arrive */
   PetscCall(SbSolverReproducible(&reproducible));
   PetscCallMPI(MPI_Comm_size(s->comm, &size));
-  if (reproducible && size > 1) PetscCall(insert_options("-matptap_via allatonce -matstash_reproduce yes"));
+  if (reproducible && size > 1)
+    PetscCall(set_options("-matptap_via allatonce -matstash_reproduce yes", PETSC_FALSE));
   PetscCall(SNESGetKSP(snes, &ksp));
   if (s->constraints && s->constraints->general) { /* another solver begins as the first one did */
     PetscCall(KSPSetNormType(ksp, s->constraints->norm));
@@ -552,12 +542,13 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   PetscCall(is_symmetric(ksp, &symmetric));
   if (type[0]) PetscCall(PCSetType(pc, type));
   /* what keeps the preconditioner symmetric */
-  if (symmetric && !strcmp(type, PCASM)) PetscCall(insert_options("-pc_asm_type basic"));
-  if (symmetric && !strcmp(type, PCCOMPOSITE)) PetscCall(insert_options("-sub_0_pc_sor_local_symmetric"));
+  if (symmetric && !strcmp(type, PCASM)) PetscCall(set_options("-pc_asm_type basic", PETSC_FALSE));
+  if (symmetric && !strcmp(type, PCCOMPOSITE))
+    PetscCall(set_options("-sub_0_pc_sor_local_symmetric", PETSC_FALSE));
   /* eigenvalues of the first matrix, which PETSc keeps with the interpolation, are too small once springs of contact stand in it */
   PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &given));
-  if (!given && !strcmp(type, PCGAMG)) PetscCall(insert_options("-pc_gamg_use_sa_esteig no"));
-  PetscCall(insert_options(preset->options));
+  if (!given && !strcmp(type, PCGAMG)) PetscCall(set_options("-pc_gamg_use_sa_esteig no", PETSC_FALSE));
+  PetscCall(set_options(preset->options, PETSC_FALSE));
   if (!strcmp(type, PCLU) || !strcmp(type, PCCHOLESKY)) PetscCall(choose_package(s, pc, type));
   if (preset->direct) PetscCall(SbPCDirectSet(pc, preset->package, PETSC_TRUE));
   if (preset->precondition) PetscCall(preset->precondition(s, pc));
@@ -734,22 +725,15 @@ PetscErrorCode SbSolverDescribe(SNES snes, SbSpace s, size_t size, char text[])
 
 PetscErrorCode SbSolverChooseIndefinite(MPI_Comm comm, size_t size, char choice[])
 {
-  PetscBool own, direct, mumps, umfpack, reproducible;
-  PetscMPIInt nrank;
+  const char *package;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscStrcmp(choice, "auto", &own));
-  PetscCall(PetscStrcmp(choice, "direct", &direct));
-  if (!own && !direct) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbHasPackage("mumps", &mumps));
-  PetscCall(SbHasPackage("umfpack", &umfpack));
-  PetscCheck(mumps || umfpack, comm, PETSC_ERR_USER,
+  if (strcmp(choice, "auto") && strcmp(choice, "direct")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbDirectPackage(comm, PETSC_MAX_INT, PETSC_FALSE, &package));
+  PetscCheck(package, comm, PETSC_ERR_USER,
              "-static_control arc_length factors indefinite matrices, which takes MUMPS or UMFPACK, and this "
              "PETSc has neither: choose another -solver");
-  PetscCallMPI(MPI_Comm_size(comm, &nrank));
-  PetscCall(SbSolverReproducible(&reproducible));
-  if (reproducible && nrank > 1 && umfpack) mumps = PETSC_FALSE;
-  PetscCall(PetscStrncpy(choice, mumps ? "mumps" : "umfpack", size));
+  PetscCall(PetscStrncpy(choice, package, size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

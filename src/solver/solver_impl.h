@@ -62,5 +62,8 @@ PetscErrorCode SbSaddleFactorSolve(SbSpace space, Vec r, Vec z, PCFailedReason *
 /* Negative eigenvalues of K + F^T k G in the null space of the constraints, from that factorisation; -1: it is unknown. Collective. */
 PetscErrorCode SbSaddleFactorCountNegative(SbSpace space, PetscInt *negative);
 
+/* Puts -<prefix><key> into PETSc's database where the user is silent. Not collective. */
+PetscErrorCode SbSolverSetDefault(const char *prefix, const char *key, const char *value);
+
 /* -reproducible: runs on the same number of ranks have the same bits. Not collective. */
 PetscErrorCode SbSolverReproducible(PetscBool *reproducible);
