@@ -188,6 +188,8 @@ PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...) PETSC_ATTRIBUTE
 /* Prints into text, or behind what is in it; what does not fit is cut off. */
 void SbFormat(size_t size, char text[], const char *format, ...) PETSC_ATTRIBUTE_FORMAT(3, 4);
 void SbAppend(size_t size, char text[], const char *format, ...) PETSC_ATTRIBUTE_FORMAT(3, 4);
+/* Numbers with commas, into p[most]; how many there are, -1 when the text is something else or holds more. */
+int SbParseNumbers(const char *text, int most, PetscReal p[]);
 
 /* ------------------------------------------------------------------ arrays */
 
@@ -200,6 +202,8 @@ PetscErrorCode SbReserve(PetscInt need, size_t unit, PetscInt *size, void *array
 */
 PetscErrorCode SbBucketByKey(PetscInt n, const PetscInt key[], PetscInt nkey, PetscInt **start,
                              PetscInt **item);
+/* Sorts n items of `size` bytes by the PetscInts that they begin with, the first, then the second, up to nkey. Not collective. */
+PetscErrorCode SbSortByKeys(PetscInt n, size_t size, int nkey, void *item);
 /*
   SbAllgatherv - one array on all ranks, of those of all ranks in their order.
 

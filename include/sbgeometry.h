@@ -243,8 +243,11 @@ typedef struct {
 void SbBoxPairsBegin(const SbBoxTree *a, const SbBoxTree *b, PetscReal grown, SbBoxPairs *pairs);
 PetscInt SbBoxPairsNext(SbBoxPairs *pairs, PetscInt room, PetscInt pair[]);
 
-/* Box of a triangle, vert[3]. */
+/* Box of a triangle, vert[3]; the tree over those of n triangles. */
 void SbTriangleBox(const PetscReal x[], const PetscInt vert[], PetscReal box[6]);
+PetscErrorCode SbBoxTreeCreateTriangles(PetscInt n, const PetscInt vert[], const PetscReal x[],
+                                        SbBoxTree *tree);
+
 /* ------------------------------------------------------------------ signed_distance.c */
 
 /*

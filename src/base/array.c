@@ -32,6 +32,22 @@ PetscErrorCode SbBucketByKey(PetscInt n, const PetscInt key[], PetscInt nkey, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static int compare_keys(const void *a, const void *b, void *nkey)
+{
+  const PetscInt *p = (const PetscInt *)a, *q = (const PetscInt *)b;
+
+  for (int k = 0; k < *(int *)nkey; k++)
+    if (p[k] != q[k]) return p[k] < q[k] ? -1 : 1;
+  return 0;
+}
+
+PetscErrorCode SbSortByKeys(PetscInt n, size_t size, int nkey, void *item)
+{
+  PetscFunctionBeginUser;
+  if (n > 1) PetscCall(PetscTimSort(n, item, size, compare_keys, &nkey));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbAllgatherv(MPI_Comm comm, MPI_Datatype type, PetscInt n, const void *mine, PetscInt *total,
                             void *all, PetscInt *before)
 {

@@ -24,8 +24,7 @@ static struct {
   Value value[VALUE_MAX];
   char file[PETSC_MAX_PATH_LEN];
   PetscReal speed, angular_speed, pace; /* m/s; degree/s; simulated seconds per second, 0: no limit */
-  PetscReal clock,
-    begun; /* s: the clock, and the time of the run, from which the pace counts; clock 0: not yet */
+  PetscReal clock, begun;               /* s, from which the pace counts; clock 0: not yet */
 } live = {.file = "live.txt", .speed = 0.2, .angular_speed = 90., .pace = 1.};
 
 /* From `from` at time t on to `to`. */

@@ -1,7 +1,9 @@
 /*
-  text.c - texts of a fixed size, printed into; what does not fit is cut off.
+  text.c - texts of a fixed size, printed into, where what does not fit is cut off; numbers from a text.
 */
+#include <math.h>
 #include <stdarg.h>
+#include <stdlib.h>
 #include "sbbase.h"
 
 void SbFormat(size_t size, char text[], const char *format, ...)
@@ -21,4 +23,20 @@ void SbAppend(size_t size, char text[], const char *format, ...)
   va_start(args, format);
   (void)vsnprintf(text + n, size - n, format, args);
   va_end(args);
+}
+
+int SbParseNumbers(const char *text, int most, PetscReal p[])
+{
+  int n = 0;
+
+  for (;;) {
+    char *end;
+    const double value = strtod(text, &end);
+
+    if (end == text || n == most || !isfinite(value)) return -1;
+    p[n++] = (PetscReal)value;
+    if (!*end) return n;
+    if (*end != ',') return -1;
+    text = end + 1;
+  }
 }

@@ -84,26 +84,21 @@ PetscErrorCode SbContactBlocksToNodes(SbContactMesh m, const SbContactBlocks *b,
 {
   const SbSpace s = m->space;
   const PetscInt nv = m->nbody_vertex;
-  PetscInt *first, *entry, *begin, *holder, *at, *start, *column, n = 0, size = 0;
+  PetscInt *row_of, *first, *entry, *begin, *holder, *at, *start, *column, n = 0, size = 0;
   PetscReal(*T)[9] = NULL;
 
   PetscFunctionBeginUser;
   if (!b->n) PetscFunctionReturn(PETSC_SUCCESS);
 
   /* blocks by their rows, those of vertices that have nodes here: twice the number, odd where it is the transpose */
-  PetscCall(PetscCalloc3(nv + 2, &first, s->nnode_owned + 2, &begin, s->Nnode, &at));
-  for (int k = 0; k < 2 * b->n; k++) {
+  PetscCall(PetscCalloc2(s->nnode_owned + 2, &begin, s->Nnode, &at));
+  PetscCall(PetscMalloc2(2 * b->n, &row_of, nv + 1, &start));
+  for (PetscInt k = 0; k < 2 * b->n; k++) {
     const PetscInt *v = b->v[k / 2];
 
-    if (m->mine[v[k % 2]] && (k % 2 == 0 || v[0] != v[1])) first[v[k % 2] + 2]++;
+    row_of[k] = m->mine[v[k % 2]] && (k % 2 == 0 || v[0] != v[1]) ? v[k % 2] : -1;
   }
-  for (PetscInt v = 0; v < nv; v++) first[v + 2] += first[v + 1];
-  PetscCall(PetscMalloc2(first[nv + 1], &entry, nv + 1, &start));
-  for (int k = 0; k < 2 * b->n; k++) {
-    const PetscInt *v = b->v[k / 2];
-
-    if (m->mine[v[k % 2]] && (k % 2 == 0 || v[0] != v[1])) entry[first[v[k % 2] + 1]++] = k;
-  }
+  PetscCall(SbBucketByKey(2 * b->n, row_of, nv, &first, &entry));
 
   /* T: for each of these vertices a row over nodes */
   column = NULL;
@@ -182,7 +177,9 @@ PetscErrorCode SbContactBlocksToNodes(SbContactMesh m, const SbContactBlocks *b,
   PetscCall(PetscFree(holder));
   PetscCall(PetscFree(column));
   PetscCall(PetscFree(T));
-  PetscCall(PetscFree2(entry, start));
-  PetscCall(PetscFree3(first, begin, at));
+  PetscCall(PetscFree2(row_of, start));
+  PetscCall(PetscFree2(begin, at));
+  PetscCall(PetscFree(first));
+  PetscCall(PetscFree(entry));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -47,48 +47,30 @@ static PetscErrorCode list_own(SbContactMesh m, PetscInt n, const SbFacet facet[
   const SbSpace s = m->space;
   const SbMesh mesh = s->mesh;
   const PetscInt npoint = mesh->nvert_owned + (s->edge_node ? s->nnode_owned : 0);
-  PetscInt *slot, *start, *ring, nown = 0, *id, *at;
-  PetscInt size = 0;
+  PetscInt *key, *start, *ring, nown = 0, *id, *at, size = 0;
 
   PetscFunctionBeginUser;
   /* facets around each own point: number 6 facet + point */
-  PetscCall(PetscMalloc1(npoint, &slot));
-  for (PetscInt p = 0; p < npoint; p++) slot[p] = -1;
-  for (PetscInt i = 0; i < 6 * n; i++) {
-    const PetscInt p = own_point(s, &facet[i / 6], i % 6);
-
-    if (p >= 0 && slot[p] < 0) slot[p] = nown++;
-  }
-  PetscCall(PetscCalloc1(nown + 2, &start));
-  PetscCall(PetscMalloc1(6 * n, &ring));
-  for (PetscInt i = 0; i < 6 * n; i++) {
-    const PetscInt p = own_point(s, &facet[i / 6], i % 6);
-
-    if (p >= 0) start[slot[p] + 2]++;
-  }
-  for (PetscInt k = 0; k < nown; k++) start[k + 2] += start[k + 1];
-  for (PetscInt i = 0; i < 6 * n; i++) {
-    const PetscInt p = own_point(s, &facet[i / 6], i % 6);
-
-    if (p >= 0) ring[start[slot[p] + 1]++] = i;
-  }
+  PetscCall(PetscMalloc1(6 * n, &key));
+  for (PetscInt i = 0; i < 6 * n; i++) key[i] = own_point(s, &facet[i / 6], i % 6);
+  PetscCall(SbBucketByKey(6 * n, key, npoint, &start, &ring));
+  PetscCall(PetscFree(key));
 
   /* in the order of their numbers */
-  PetscCall(PetscMalloc2(nown, &id, nown, &at));
+  PetscCall(PetscMalloc2(npoint, &id, npoint, &at));
   for (PetscInt p = 0; p < npoint; p++) {
-    if (slot[p] < 0) continue;
-    id[slot[p]] = p < mesh->nvert_owned ? mesh->vert_orig[p] : s->node_orig[p - mesh->nvert_owned];
-    at[slot[p]] = p;
+    if (start[p] == start[p + 1]) continue;
+    id[nown] = p < mesh->nvert_owned ? mesh->vert_orig[p] : s->node_orig[p - mesh->nvert_owned];
+    at[nown++] = p;
+    size += 4 + 4 * (start[p + 1] - start[p]);
   }
   PetscCall(PetscSortIntWithArray(nown, id, at));
-  for (PetscInt k = 0; k < nown; k++) size += 4 + 4 * (start[slot[at[k]] + 1] - start[slot[at[k]]]);
   m->nlocal = nown;
   PetscCall(PetscMalloc1(size, number));
   PetscCall(PetscMalloc1(size, real));
   *nnumber = *nreal = 0;
   for (PetscInt k = 0; k < nown; k++) {
-    const PetscInt p = at[k], middle = p - mesh->nvert_owned, first = start[slot[p]],
-                   last = start[slot[p] + 1];
+    const PetscInt p = at[k], middle = p - mesh->nvert_owned, first = start[p], last = start[p + 1];
     const PetscReal *X = middle < 0 ? mesh->x + 3 * p : s->node_x + 3 * middle;
     PetscInt *record = *number + *nnumber, *node = record + 3, nnode = 0;
     PetscReal *weight = *real + *nreal, area = 0.;
@@ -130,18 +112,7 @@ static PetscErrorCode list_own(SbContactMesh m, PetscInt n, const SbFacet facet[
   PetscCall(PetscFree2(id, at));
   PetscCall(PetscFree(ring));
   PetscCall(PetscFree(start));
-  PetscCall(PetscFree(slot));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The local node of a global number, -1: this rank does not know it. */
-static PetscInt local_node(SbSpace s, PetscInt g)
-{
-  PetscInt at;
-
-  if (g >= s->gnode_start && g < s->gnode_start + s->nnode_owned) return g - s->gnode_start;
-  if (PetscFindInt(g, s->nnode - s->nnode_owned, s->gnode + s->nnode_owned, &at)) return -1;
-  return at < 0 ? -1 : s->nnode_owned + at;
 }
 
 /* Puts the vertices of all ranks in the order of their numbers; behind them there is room for `nobstacle` of the obstacle. */
@@ -201,8 +172,15 @@ static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet f
     PetscCall(PetscArraycpy(m->weight + m->start[v], values + j + 4, count));
     j += 4 + count;
     for (PetscInt e = m->start[v]; e < m->start[v + 1]; e++) {
-      m->node[e] = local_node(s, m->gnode[e]);
-      if (m->node[e] >= 0 && m->node[e] < s->nnode_owned) m->mine[v] = 1;
+      const PetscInt own = m->gnode[e] - s->gnode_start;
+
+      if (own >= 0 && own < s->nnode_owned) {
+        m->node[e] = own;
+        m->mine[v] = 1;
+        continue;
+      }
+      PetscCall(PetscFindInt(m->gnode[e], s->nnode - s->nnode_owned, s->gnode + s->nnode_owned, &m->node[e]));
+      m->node[e] = m->node[e] < 0 ? -1 : s->nnode_owned + m->node[e];
     }
   }
   PetscCall(PetscFree(all));
@@ -213,13 +191,6 @@ static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet f
     m->own[m->local[k]] = m->mine[m->local[k]] = 1;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static int compare_triangles(const void *a, const void *b)
-{
-  const PetscInt i = ((const PetscInt *)a)[0], j = ((const PetscInt *)b)[0];
-
-  return (i > j) - (i < j);
 }
 
 /*
@@ -250,7 +221,7 @@ static PetscErrorCode make_triangles(SbContactMesh m, PetscInt n, const SbFacet 
   }
   PetscCall(SbAllgatherv(s->comm, MPIU_INT, 4 * nmine, mine, &total, &all, NULL));
   PetscCall(PetscFree(mine));
-  if (total) qsort(all, (size_t)(total / 4), 4 * sizeof(PetscInt), compare_triangles);
+  PetscCall(SbSortByKeys(total / 4, 4 * sizeof(*all), 1, all));
 
   /* vertices by their nodes, where they are in the middle of sides */
   PetscCall(PetscMalloc2(m->nbody_vertex, &gnode, m->nbody_vertex, &vertex));
@@ -278,27 +249,6 @@ static PetscErrorCode make_triangles(SbContactMesh m, PetscInt n, const SbFacet 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscReal triangle_area(const PetscReal X[], const PetscInt v[3])
-{
-  PetscReal a[3], b[3], c[3];
-
-  for (int i = 0; i < 3; i++) {
-    a[i] = X[3 * v[1] + i] - X[3 * v[0] + i];
-    b[i] = X[3 * v[2] + i] - X[3 * v[0] + i];
-  }
-  SbCross(a, b, c);
-  return 0.5 * PetscSqrtReal(SbDot3(c, c));
-}
-
-static int compare_edges(const void *a, const void *b)
-{
-  const PetscInt *i = (const PetscInt *)a, *j = (const PetscInt *)b;
-
-  if (i[0] != j[0]) return (i[0] > j[0]) - (i[0] < j[0]);
-  if (i[1] != j[1]) return (i[1] > j[1]) - (i[1] < j[1]);
-  return (i[2] > j[2]) - (i[2] < j[2]);
-}
-
 /* The edges of all triangles, each once, its area a third of that of the triangles around; `lone`: the obstacle is an edge of its own. */
 static PetscErrorCode make_edges(SbContactMesh m, PetscBool lone)
 {
@@ -313,10 +263,11 @@ static PetscErrorCode make_edges(SbContactMesh m, PetscBool lone)
     side[i][1] = PetscMax(a, b);
     side[i][2] = i / 3;
   }
-  qsort(side, 3 * (size_t)m->ntriangle, sizeof(*side), compare_edges);
+  PetscCall(SbSortByKeys(3 * m->ntriangle, sizeof(*side), 3, side));
   PetscCall(PetscMalloc2(6 * m->ntriangle + 2, &m->edge, 3 * m->ntriangle + 1, &m->edge_area));
   for (PetscInt i = 0; i < 3 * m->ntriangle; i++) {
-    const PetscReal area = triangle_area(m->X, m->triangle + 3 * side[i][2]) / 3.;
+    PetscReal n[3];
+    const PetscReal area = SbContactTriangleArea(m->X, m->triangle + 3 * side[i][2], n) / 3.;
 
     if (i && side[i][0] == side[i - 1][0] && side[i][1] == side[i - 1][1])
       m->edge_area[m->nedge - 1] += area;

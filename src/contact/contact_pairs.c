@@ -12,9 +12,8 @@
 #include "sbgeometry.h"
 #include "sblog.h"
 
-#define LEFT 0.1 /* fraction of its gap that a pair keeps at least */
-#define LEFT_MOST \
-  0.5 /* of the reach: no more need be left, so that what comes from far away comes within it at once */
+#define LEFT 0.1      /* fraction of its gap that a pair keeps at least */
+#define LEFT_MOST 0.5 /* of the reach: no more need be left; what comes from afar is within it at once */
 
 static inline void places(const SbContactPair *pair, const PetscReal x[], PetscReal at[12])
 {
@@ -74,10 +73,7 @@ static inline const PetscInt *vertices_of(SbContactMesh m, int kind, PetscInt i,
 static PetscErrorCode add_pair(SbContactPairs p, const SbContactPair *pair)
 {
   PetscFunctionBeginUser;
-  if (p->n == p->size) {
-    p->size = PetscMax(256, 2 * p->size);
-    PetscCall(PetscRealloc((size_t)p->size * sizeof(*p->pair), &p->pair));
-  }
+  PetscCall(SbReserve(p->n + 1, sizeof(*p->pair), &p->size, &p->pair));
   p->pair[p->n++] = *pair;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -6,8 +6,7 @@
 */
 #include "contact_mesh.h"
 
-#define ROUNDING \
-  64 /* in units of eps of the products that a volume is made of, with the coordinates for its height */
+#define ROUNDING 64 /* eps of the products that make a volume, with the coordinates for its height */
 
 typedef struct {
   SbContactMesh mesh;
@@ -59,19 +58,10 @@ static PetscBool goes_through(const Search *s, PetscInt t)
   return (PetscBool)(around && side_of(a, b, q, r) == around && side_of(a, b, r, p) == around);
 }
 
-static int compare_hits(const void *a, const void *b)
-{
-  const PetscInt *i = (const PetscInt *)a, *j = (const PetscInt *)b;
-
-  if (i[0] != j[0]) return (i[0] > j[0]) - (i[0] < j[0]);
-  return (i[1] > j[1]) - (i[1] < j[1]);
-}
-
 PetscErrorCode SbContactMeshCrossings(SbContactMesh m, PetscBool self, const PetscReal x[], PetscInt *n,
                                       PetscInt **hits)
 {
   Search s = {.mesh = m, .x = x, .self = self};
-  PetscReal(*box)[6];
   PetscMPIInt rank, ranks;
   SbBoxQuery query;
   SbBoxTree tree;
@@ -80,9 +70,7 @@ PetscErrorCode SbContactMeshCrossings(SbContactMesh m, PetscBool self, const Pet
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(m->space->comm, &rank));
   PetscCallMPI(MPI_Comm_size(m->space->comm, &ranks));
-  PetscCall(PetscMalloc1(m->ntriangle, &box));
-  for (PetscInt t = 0; t < m->ntriangle; t++) SbTriangleBox(x, m->triangle + 3 * t, box[t]);
-  PetscCall(SbBoxTreeCreate(m->ntriangle, (const PetscReal(*)[6])box, &tree));
+  PetscCall(SbBoxTreeCreateTriangles(m->ntriangle, m->triangle, x, &tree));
   for (PetscInt e = rank; e < m->nedge; e += ranks) {
     PetscReal around[6];
 
@@ -91,22 +79,18 @@ PetscErrorCode SbContactMeshCrossings(SbContactMesh m, PetscBool self, const Pet
     for (int k = 0; k < 2; k++) SbBoxAdd(around, x + 3 * m->edge[2 * e + k]);
     for (SbBoxQueryBegin(&tree, around, &query); SbBoxQueryNext(&query, &hit);) {
       if (!goes_through(&s, hit)) continue;
-      if (s.n == s.size) {
-        s.size = PetscMax(64, 2 * s.size);
-        PetscCall(PetscRealloc(2 * (size_t)s.size * sizeof(*s.hit), &s.hit));
-      }
+      PetscCall(SbReserve(s.n + 1, 2 * sizeof(*s.hit), &s.size, &s.hit));
       s.hit[2 * s.n] = e;
       s.hit[2 * s.n++ + 1] = hit;
     }
   }
   PetscCall(SbBoxTreeDestroy(&tree));
-  PetscCall(PetscFree(box));
 
   /* those of all ranks */
   PetscCall(SbAllgatherv(m->space->comm, MPIU_INT, 2 * s.n, s.hit, n, hits, NULL));
   PetscCall(PetscFree(s.hit));
   *n /= 2;
-  if (*n) qsort(*hits, (size_t)*n, 2 * sizeof(PetscInt), compare_hits);
+  PetscCall(SbSortByKeys(*n, 2 * sizeof(**hits), 2, *hits));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

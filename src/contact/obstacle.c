@@ -34,23 +34,6 @@ static const struct {
   {"mesh", "mesh:FILE", 0},
 };
 
-/* Numbers with commas; how many there are, -1 when the text is something else or holds more than `most`. */
-static int read_numbers(const char *text, int most, PetscReal p[])
-{
-  int n = 0;
-
-  for (;;) {
-    char *end;
-    const double value = strtod(text, &end);
-
-    if (end == text || n == most || PetscIsInfOrNanReal((PetscReal)value)) return -1;
-    p[n++] = (PetscReal)value;
-    if (!*end) return n;
-    if (*end != ',') return -1;
-    text = end + 1;
-  }
-}
-
 /* What is wrong with the numbers of a shape; NULL when nothing is. Makes the normal of a plane a unit vector. */
 static const char *normalise(SbObstacle o)
 {
@@ -102,7 +85,7 @@ PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle
     PetscCall(PetscStrallocpy(colon + 1, &o->file));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCheck(read_numbers(colon + 1, 7, o->p) == shapes[k].numbers, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+  PetscCheck(SbParseNumbers(colon + 1, 7, o->p) == shapes[k].numbers, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s %s: write %s, lengths in m", option, text, shapes[k].form);
   problem = normalise(o);
   PetscCheck(!problem, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s %s: %s", option, text, problem);

@@ -15,10 +15,8 @@
 #define CANCEL 1e-3 /* of their sum: what is left of ways that oppose each other is none */
 #define TINY 1e-12  /* of the bodies' size: a vertex that is nearer to a surface is not told from it */
 #define AGAINST 0.1 /* cosine to the normal of its own surface, beyond which a way out is one */
-#define JITTER \
-  1e-7 /* of that size: by which vertices are moved, so that none lies in a triangle or on an edge */
-#define FAR \
-  4. /* times its depth: farther than this a way out is not followed, but the nearest place is taken */
+#define JITTER 1e-7 /* of that size: vertices move by it, so that none lies in a triangle or on an edge */
+#define FAR 4.      /* times its depth: a way out is followed so far, then the nearest place is taken */
 
 /* What is known of vertices while ways spread. */
 typedef struct {
@@ -36,10 +34,7 @@ typedef struct {
 static PetscErrorCode add_point(SbContactOverlap *o, const SbPenetration *point)
 {
   PetscFunctionBeginUser;
-  if (o->n == o->size) {
-    o->size = PetscMax(64, 2 * o->size);
-    PetscCall(PetscRealloc((size_t)o->size * sizeof(*o->point), &o->point));
-  }
+  PetscCall(SbReserve(o->n + 1, sizeof(*o->point), &o->size, &o->point));
   o->point[o->n++] = *point;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -56,29 +51,14 @@ static PetscBool suggest(Ways *w, PetscInt v, PetscInt part, PetscReal weight, c
   return PETSC_TRUE;
 }
 
-/* Makes ways and depths of what was added up; a vertex whose ways cancel has none. */
-static void settle(Ways *w, PetscInt v)
-{
-  const PetscReal length = PetscSqrtReal(SbDot3(w->way + 3 * v, w->way + 3 * v));
-
-  for (int i = 0; i < 3; i++)
-    w->way[3 * v + i] = length > CANCEL * w->sum[v] ? w->way[3 * v + i] / length : 0.;
-  w->depth[v] /= w->sum[v];
-}
-
 /* Place on edge e where it goes through triangle t, as part of the edge; unit normal of the triangle; side of the edge's first end, m. */
 static PetscReal pierce(SbContactMesh m, const PetscReal x[], PetscInt e, PetscInt t, PetscReal n[3],
                         PetscReal *first)
 {
   const PetscInt *v = m->triangle + 3 * t, *ends = m->edge + 2 * e;
-  PetscReal p[3], q[3], length, side[2];
+  const PetscReal length = 2. * SbContactTriangleArea(x, v, n);
+  PetscReal p[3], side[2];
 
-  for (int i = 0; i < 3; i++) {
-    p[i] = x[3 * v[1] + i] - x[3 * v[0] + i];
-    q[i] = x[3 * v[2] + i] - x[3 * v[0] + i];
-  }
-  SbCross(p, q, n);
-  length = PetscSqrtReal(SbDot3(n, n));
   for (int i = 0; i < 3; i++) n[i] /= length;
   for (int k = 0; k < 2; k++) {
     for (int i = 0; i < 3; i++) p[i] = x[3 * ends[k] + i] - x[3 * v[0] + i];
@@ -174,13 +154,9 @@ static void add_normals(SbContactMesh m, const PetscReal x[], PetscReal normal[]
 {
   for (PetscInt t = 0; t < m->ntriangle; t++) {
     const PetscInt *v = m->triangle + 3 * t;
-    PetscReal p[3], q[3], n[3];
+    PetscReal n[3];
 
-    for (int i = 0; i < 3; i++) {
-      p[i] = x[3 * v[1] + i] - x[3 * v[0] + i];
-      q[i] = x[3 * v[2] + i] - x[3 * v[0] + i];
-    }
-    SbCross(p, q, n);
+    (void)SbContactTriangleArea(x, v, n);
     for (int k = 0; k < 9; k++) normal[3 * v[k / 3] + k % 3] += n[k % 3];
   }
   for (PetscInt v = 0; v < m->nvertex; v++) {
@@ -201,24 +177,19 @@ static PetscBool leads(const PetscReal normal[], const SbPenetration *p)
   return (PetscBool)(SbDot3(n, p->normal) < -AGAINST * PetscSqrtReal(SbDot3(n, n)));
 }
 
-/* Edges of each vertex. */
-static PetscErrorCode list_edges(SbContactMesh m, Ways *w)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(m->nvertex + 2, &w->start));
-  PetscCall(PetscMalloc1(2 * m->nedge, &w->edge));
-  for (PetscInt k = 0; k < 2 * m->nedge; k++) w->start[m->edge[k] + 2]++;
-  for (PetscInt v = 0; v < m->nvertex; v++) w->start[v + 2] += w->start[v + 1];
-  for (PetscInt k = 0; k < 2 * m->nedge; k++) w->edge[w->start[m->edge[k] + 1]++] = k / 2;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Ways go on from the first layer, the n vertices of list[], layer by layer over edges that go through nothing. */
 static PetscErrorCode spread_ways(SbContactMesh m, Ways *w, PetscInt n, PetscInt list[])
 {
   PetscFunctionBeginUser;
   for (PetscInt first = 0, last = n, layer = 1; first < last; first = last, last = n, layer++) {
-    for (PetscInt k = first; k < last; k++) settle(w, list[k]);
+    /* ways and depths of what was added up; a vertex whose ways cancel has none */
+    for (PetscInt k = first; k < last; k++) {
+      PetscReal *way = w->way + 3 * list[k];
+      const PetscReal length = PetscSqrtReal(SbDot3(way, way));
+
+      for (int i = 0; i < 3; i++) way[i] = length > CANCEL * w->sum[list[k]] ? way[i] / length : 0.;
+      w->depth[list[k]] /= w->sum[list[k]];
+    }
     for (PetscInt k = first; k < last; k++) {
       const PetscInt v = list[k];
 
@@ -265,7 +236,6 @@ static PetscErrorCode look_inside(SbContactMesh m, const PetscReal x[], PetscInt
 {
   Ways w = {.x = x};
   PetscInt *list, nlist = 0, nleading = 0;
-  PetscReal(*box)[6];
   uint8_t *paired;
   SbBoxTree tree;
 
@@ -276,11 +246,9 @@ static PetscErrorCode look_inside(SbContactMesh m, const PetscReal x[], PetscInt
   PetscCall(PetscCalloc2(n, &paired, 3 * m->nvertex, &w.normal));
   add_normals(m, x, w.normal);
   for (PetscInt v = 0; v < m->nvertex; v++) w.in[v] = -1;
-  PetscCall(list_edges(m, &w));
-  PetscCall(PetscMalloc1(m->ntriangle, &box));
-  for (PetscInt t = 0; t < m->ntriangle; t++) SbTriangleBox(x, m->triangle + 3 * t, box[t]);
-  PetscCall(SbBoxTreeCreate(m->ntriangle, (const PetscReal(*)[6])box, &tree));
-  PetscCall(PetscFree(box));
+  PetscCall(SbBucketByKey(2 * m->nedge, m->edge, m->nvertex, &w.start, &w.edge));
+  for (PetscInt k = 0; k < 2 * m->nedge; k++) w.edge[k] /= 2;
+  PetscCall(SbBoxTreeCreateTriangles(m->ntriangle, m->triangle, x, &tree));
 
   for (PetscInt i = 0; i < n; i++) {
     const PetscInt e = hit[2 * i], part = m->part[m->triangle[3 * hit[2 * i + 1]]], *ends = m->edge + 2 * e;
@@ -423,21 +391,6 @@ static PetscErrorCode look_behind(SbContactMesh m, const PetscReal x[], SbContac
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Places where no vertex lies in a triangle, no edge on another: moved by JITTER, each alike in every run. */
-static PetscErrorCode jitter(SbContactMesh m, const PetscReal x[], PetscReal **moved)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(3 * m->nvertex, moved));
-  for (PetscInt k = 0; k < 3 * m->nvertex; k++) {
-    uint32_t h = (uint32_t)(k + 1) * 2654435761u;
-
-    h = (h ^ (h >> 15)) * 2246822519u;
-    h = (h ^ (h >> 13)) * 3266489917u;
-    (*moved)[k] = x[k] + JITTER * m->size * (2. * ((PetscReal)(h ^ (h >> 16)) / 4294967296.) - 1.);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbContactOverlapFind(SbContactMesh m, PetscBool self, const PetscReal x[], PetscBool inside,
                                     SbContactOverlap *o)
 {
@@ -450,24 +403,28 @@ PetscErrorCode SbContactOverlapFind(SbContactMesh m, PetscBool self, const Petsc
   PetscCall(PetscArrayzero(o->near, m->nvertex));
   PetscCall(SbContactMeshCrossings(m, self, x, &n, &hit));
 
-  /* what lies on something exactly is on neither side of it: ways would spread past it */
+  /* what lies on something exactly is on neither side of it, and ways would spread past it: moved by JITTER, each alike in every run, it does not */
   if (n || inside) {
     PetscInt nmoved, *other;
     PetscReal *moved;
 
-    PetscCall(jitter(m, x, &moved));
+    PetscCall(PetscMalloc1(3 * m->nvertex, &moved));
+    for (PetscInt k = 0; k < 3 * m->nvertex; k++) {
+      uint32_t h = (uint32_t)(k + 1) * 2654435761u;
+
+      h = (h ^ (h >> 15)) * 2246822519u;
+      h = (h ^ (h >> 13)) * 3266489917u;
+      moved[k] = x[k] + JITTER * m->size * (2. * ((PetscReal)(h ^ (h >> 16)) / 4294967296.) - 1.);
+    }
     PetscCall(SbContactMeshCrossings(m, self, moved, &nmoved, &other));
-    if (nmoved)
-      PetscCall(look_inside(m, moved, nmoved, other, o));
-    else if (n)
-      PetscCall(look_inside(m, x, n, hit, o));
-    PetscCall(PetscFree(moved));
     if (nmoved) {
       PetscCall(PetscFree(hit));
       n = nmoved;
       hit = other;
     } else
       PetscCall(PetscFree(other));
+    if (n) PetscCall(look_inside(m, nmoved ? moved : x, n, hit, o));
+    PetscCall(PetscFree(moved));
   }
   o->ncrossing = n;
   PetscCall(look_behind(m, x, o));

@@ -84,8 +84,7 @@ static const char *const exact_only[] = {"restitution", "time_of_impact", "dampi
 /* What decides on the response of an effect, its own one among it. */
 typedef struct {
   SbResponse response;
-  PetscBool bodies, vertices,
-    others; /* bodies meet each other; half-spaces, bowls; options `barrier` has not */
+  PetscBool bodies, vertices, others; /* bodies meet; half-spaces, bowls; options `barrier` has not */
 } Needs;
 
 static PetscErrorCode examine(const char *name, Needs *needs)

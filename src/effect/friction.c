@@ -18,8 +18,7 @@
 #define LATE 1e-2    /* the same after UPDATES solves, with a warning; what does not get there is cut */
 #define UPDATES 30   /* solves of a step with friction */
 #define FLIPS 10     /* of a pair within a step, after which it has springs */
-#define STIFF \
-  1e-3 /* smallest relative difference of trial force and limit for the stiffness across the slip */
+#define STIFF 1e-3   /* smallest relative difference of trial force and limit, for the stiffness across */
 
 void SbFrictionBegin(SbFrictionState *g, PetscBool touches)
 {

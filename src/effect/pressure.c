@@ -388,25 +388,6 @@ static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  What the facet adds to the matrix for nodes a and b of its cell: minus the derivative of the force between corners k and l,
-  -p/12 [c_l - c_k]x, which the element spreads over its nodes. The diagonal blocks of the corners vanish.
-*/
-static void facet_block(const SbElementOps *e, const SbFacet *facet, PetscReal p, PetscReal (*const c)[3],
-                        int a, int b, PetscReal block[9])
-{
-  PetscReal d[3] = {0, 0, 0};
-
-  for (int k = 0; k < 3; k++) {
-    for (int l = 0; l < 3; l++) {
-      const PetscReal weight = e->vertex[facet->corner[k]][a] * e->vertex[facet->corner[l]][b];
-
-      for (int i = 0; k != l && i < 3; i++) d[i] -= weight * p / 12 * (c[l][i] - c[k][i]);
-    }
-  }
-  cross_block(d, block);
-}
-
 static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage *stage, Mat A)
 {
   const Pressure *load = (const Pressure *)e->data;
@@ -434,9 +415,18 @@ static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage 
     for (int b = 0; b < 3; b++) {
       for (int i = 0; i < 3; i++) c[b][i] = x[(b + 1) % 3][i] - x[(b + 2) % 3][i];
     }
+    /* minus the derivatives between corners, -p/12 [c_l - c_k]x, which the element spreads over its nodes */
     for (int a = 0; a < 4; a++) {
       for (int b = 0; b < 4; b++) {
-        facet_block(element, facet, p, c, a, b, block);
+        PetscReal d[3] = {0, 0, 0};
+
+        for (int q = 0; q < 9; q++) {
+          const PetscReal weight =
+            element->vertex[facet->corner[q / 3]][a] * element->vertex[facet->corner[q % 3]][b];
+
+          for (int i = 0; i < 3; i++) d[i] -= weight * p / 12 * (c[q % 3][i] - c[q / 3][i]);
+        }
+        cross_block(d, block);
         if (block[1] == 0 && block[2] == 0 && block[5] == 0) continue;
         PetscCall(SbSpaceAddCellBlock(space, A, facet->cell, a, b, block));
       }

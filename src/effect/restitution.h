@@ -4,8 +4,7 @@
 #pragma once
 #include "sbbase.h"
 
-#define SB_RESTITUTION_EARLY \
-  1e-6 /* of the way: who would only just not arrive arrives, a flat base at once */
+#define SB_RESTITUTION_EARLY 1e-6 /* of the way: who just does not arrive arrives, a flat base at once */
 
 /* What the points of an effect have left of their speed. */
 typedef struct {

@@ -37,8 +37,7 @@ typedef struct {
   SbMatrixKind kind;
   Mat part[2]; /* diagonal and off-diagonal part; the second is NULL on one rank */
   PetscScalar *value[2];
-  const PetscReal
-    *face_term; /* [nbody] factor on the face terms that rows of a body begin with; NULL: zero */
+  const PetscReal *face_term; /* [nbody] factor on the face terms that its rows begin with, or NULL */
 } SbValues;
 
 /* tangent.c: the values of a matrix of the space; what was changed shows after SbSpaceFinishTangent(). Not collective. */

@@ -13,38 +13,23 @@ PetscErrorCode SbSpaceCreateVec(SbSpace s, Vec *v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The storage of a ghosted vector goes on behind its owned entries. */
 PetscErrorCode SbSpaceGetLocalRead(SbSpace s, Vec v, const PetscReal **array)
 {
-  Vec local = NULL;
-
   PetscFunctionBeginUser;
-  if (!s->ghosted) {
-    PetscCall(VecGetArrayRead(v, array));
-    PetscFunctionReturn(PETSC_SUCCESS);
+  if (s->ghosted) {
+    PetscCall(VecGhostUpdateBegin(v, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(VecGhostUpdateEnd(v, INSERT_VALUES, SCATTER_FORWARD));
   }
-  PetscCall(VecGhostUpdateBegin(v, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecGhostUpdateEnd(v, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecGhostGetLocalForm(v, &local));
-  PetscCheck(local, s->comm, PETSC_ERR_ARG_WRONG,
-             "The vector has no ghost entries: make it by SbSpaceCreateVec()");
-  PetscCall(VecGetArrayRead(local, array));
-  PetscCall(VecGhostRestoreLocalForm(v, &local));
+  PetscCall(VecGetArrayRead(v, array));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The local form has one reference, held by v itself: it outlives the restore of the form above. */
 PetscErrorCode SbSpaceRestoreLocalRead(SbSpace s, Vec v, const PetscReal **array)
 {
-  Vec local = NULL;
-
   PetscFunctionBeginUser;
-  if (!s->ghosted) {
-    PetscCall(VecRestoreArrayRead(v, array));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(VecGhostGetLocalForm(v, &local));
-  PetscCall(VecRestoreArrayRead(local, array));
-  PetscCall(VecGhostRestoreLocalForm(v, &local));
+  (void)s;
+  PetscCall(VecRestoreArrayRead(v, array));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -59,7 +44,6 @@ PetscErrorCode SbSpaceGetLocalWrite(SbSpace s, Vec v, PetscReal **array)
                "The vector has no ghost entries: make it by SbSpaceCreateVec()");
     PetscCall(VecGhostRestoreLocalForm(v, &local));
   }
-  /* the storage of a ghosted vector goes on behind its owned entries */
   PetscCall(VecGetArray(v, array));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

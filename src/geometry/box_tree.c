@@ -11,8 +11,7 @@
 */
 #include "sbgeometry.h"
 
-#define WORSE \
-  1.5 /* size of all hulls against that of the boxes, over that of a newly built tree: beyond this the tree is rebuilt */
+#define WORSE 1.5 /* size of the hulls against the boxes, over that of a new tree: then it is built anew */
 
 /* ------------------------------------------------------------------ making a tree */
 
@@ -384,4 +383,17 @@ void SbTriangleBox(const PetscReal x[], const PetscInt v[], PetscReal box[6])
 {
   SbBoxClear(box);
   for (int k = 0; k < 3; k++) SbBoxAdd(box, x + 3 * v[k]);
+}
+
+PetscErrorCode SbBoxTreeCreateTriangles(PetscInt n, const PetscInt vert[], const PetscReal x[],
+                                        SbBoxTree *tree)
+{
+  PetscReal(*box)[6];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(n, &box));
+  for (PetscInt t = 0; t < n; t++) SbTriangleBox(x, vert + 3 * t, box[t]);
+  PetscCall(SbBoxTreeCreate(n, (const PetscReal(*)[6])box, tree));
+  PetscCall(PetscFree(box));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -5,12 +5,10 @@
 */
 #include "sbgeometry.h"
 
-#define FLAT 1e-12 /* area over squared length, below which a triangle has none */
-#define SLIM 1e-4  /* the same, below which the region of the nearest point may be the wrong one */
-#define RIM \
-  1e-6 /* of barycentric coordinates: a half-line that just misses all triangles at an edge meets one */
-#define PARALLEL \
-  1e-10 /* volume of way and edges over the squared length of one: the half-line lies in the plane */
+#define FLAT 1e-12     /* area over squared length, below which a triangle has none */
+#define SLIM 1e-4      /* the same, below which the region of the nearest point may be the wrong one */
+#define RIM 1e-6       /* of barycentric coordinates: what just misses all triangles at an edge meets one */
+#define PARALLEL 1e-10 /* volume of way and edges over the squared length of one: it lies in the plane */
 
 /* p minus the point with these weights. */
 static inline void away(const PetscReal p[3], const PetscReal *const x[3], const PetscReal w[3],
@@ -53,26 +51,6 @@ static SbTriangleFeature closest_edge(const PetscReal p[3], const PetscReal *con
   return place;
 }
 
-/* Over the inside: by areas, and with slim triangles by a second examine the edges. */
-static SbTriangleFeature closest_inside(const PetscReal p[3], const PetscReal *const x[3],
-                                        const PetscReal area[3], PetscReal scale, PetscReal w[3],
-                                        PetscReal *d2)
-{
-  const PetscReal total = area[0] + area[1] + area[2];
-  PetscReal r[3];
-
-  *d2 = PETSC_MAX_REAL;
-  if (total > FLAT * FLAT * scale * scale) {
-    w[1] = area[1] / total;
-    w[2] = area[2] / total;
-    w[0] = PetscMax(0, 1 - w[1] - w[2]);
-    away(p, x, w, r);
-    *d2 = SbDot3(r, r);
-    if (total > SLIM * SLIM * scale * scale) return SB_FEATURE_FACE;
-  }
-  return closest_edge(p, x, SB_FEATURE_FACE, w, d2);
-}
-
 SbTriangleFeature SbTriangleClosestPoint(const PetscReal p[3], const PetscReal *const x[3], PetscReal w[3],
                                          PetscReal *d2)
 {
@@ -108,7 +86,19 @@ SbTriangleFeature SbTriangleClosestPoint(const PetscReal p[3], const PetscReal *
     place = put(SB_FEATURE_EDGE_1, 0, 1 - t, t, w);
   } else {
     const PetscReal scale = PetscMax(d[0] - d[2], d[1] - d[5]); /* squared lengths of ab, ac */
-    return closest_inside(p, x, area, scale, w, d2);
+    const PetscReal total = area[0] + area[1] + area[2];
+
+    // by areas, and with slim triangles by a second look at the edges
+    *d2 = PETSC_MAX_REAL;
+    if (total > FLAT * FLAT * scale * scale) {
+      w[1] = area[1] / total;
+      w[2] = area[2] / total;
+      w[0] = PetscMax(0, 1 - w[1] - w[2]);
+      away(p, x, w, r);
+      *d2 = SbDot3(r, r);
+      if (total > SLIM * SLIM * scale * scale) return SB_FEATURE_FACE;
+    }
+    return closest_edge(p, x, SB_FEATURE_FACE, w, d2);
   }
   away(p, x, w, r);
   *d2 = SbDot3(r, r);

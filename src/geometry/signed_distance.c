@@ -23,7 +23,6 @@ PetscErrorCode SbSignedDistanceCreate(PetscInt nvert, const PetscReal x[], Petsc
                                       SbSignedDistance *distance)
 {
   SbSignedDistance s;
-  PetscReal(*box)[6];
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&s));
@@ -31,10 +30,7 @@ PetscErrorCode SbSignedDistanceCreate(PetscInt nvert, const PetscReal x[], Petsc
   s->x = x;
   s->tri = tri;
   s->across = across;
-  PetscCall(PetscMalloc1(ntri, &box));
-  for (PetscInt f = 0; f < ntri; f++) SbTriangleBox(x, tri + 3 * f, box[f]);
-  PetscCall(SbBoxTreeCreate(ntri, (const PetscReal(*)[6])box, &s->tree));
-  PetscCall(PetscFree(box));
+  PetscCall(SbBoxTreeCreateTriangles(ntri, tri, x, &s->tree));
   for (int k = 0; k < 3 && ntri; k++)
     s->touch = PetscMax(s->touch, TOUCH * (s->tree.hull[3 + k] - s->tree.hull[k]));
 

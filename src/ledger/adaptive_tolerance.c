@@ -19,8 +19,7 @@
 #define MESH 0.1    /* of the mesh's error, that contact may have */
 #define AIM 0.5     /* of what is allowed, that a new width goes for */
 #define ROOM 0.1    /* of what is allowed: below, a width may grow */
-#define GROWTH \
-  0.01 /* of the energy of the error that is allowed: by how much the energy of gaps may grow with a width */
+#define GROWTH 0.01 /* of the energy of the allowed error: by how much that of gaps may grow with a width */
 #define LOOSEST 0.3 /* relative residual */
 #define TIGHTEST 1e-12
 #define NOISE 4.      /* times what a solve leaves */

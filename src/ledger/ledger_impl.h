@@ -37,23 +37,19 @@ struct _p_SbLedger {
 
   PetscInt order; /* of the integrator; its constant, and how far velocities are behind (SbRunLocalError) */
   PetscReal c, ahead;
-  PetscReal derivative[4],
-    mean[4]; /* energies of derivatives of the last state, J/s^2j; their integrals over the run */
-  PetscReal lost, tau,
-    span;           /* of time: sum of the losses of steps, J^(1/2); sum of c h^(p+1); length of the run, s */
-  PetscReal stored; /* largest energy so far, J */
+  PetscReal derivative[4], mean[4]; /* energies of derivatives now, J/s^2j; their integrals */
+  PetscReal lost, tau, span; /* of time: losses of steps, J^(1/2); sum of c h^(p+1); length of the run, s */
+  PetscReal stored;          /* largest energy so far, J */
   PetscReal error[SB_ERROR_COUNT];        /* J^(1/2) */
   PetscReal relative[SB_ERROR_COUNT + 1]; /* as columns of the history; the last one: of the quantity */
   SbColumn column[SB_ERROR_COUNT + 1];
   SbCheckpointValue carried[SB_LEDGER_CARRIED];
   /* of the last step that was examined, J^(1/2) */
   PetscReal step_time, step_linear, step_nonlinear, offset;
-  PetscReal residual,
-    seen_residual;     /* that the last solve left, and that of the last step that was examined, N */
-  PetscReal kept_part; /* of what solves left before: the integrator damps it */
-  PetscBool seen;      /* the step that is about to be accepted was */
-  PetscBool
-    anew; /* the run goes on with another mesh, on which the accelerations of before are in no balance */
+  PetscReal residual, seen_residual; /* after the last solve, and at the last step examined, N */
+  PetscReal kept_part;               /* of what solves left before: the integrator damps it */
+  PetscBool seen;                    /* the step that is about to be accepted was */
+  PetscBool anew;                    /* another mesh, on which the old accelerations are in no balance */
 
   Vec kept, before;            /* accelerations at the start of this step and of the one before, m/s^2 */
   PetscReal kept_t, before_dt; /* s; before_dt 0: there was none */
@@ -61,8 +57,7 @@ struct _p_SbLedger {
   Vec delta;                   /* what the solve left, m: the quantity's share of it */
 
   PetscReal work, own_work; /* in residuals, of the run and of the estimates: the same on every run */
-  PetscReal seconds, solving,
-    residuals; /* of the estimates on this rank: all, in linear solves, in residuals */
+  PetscReal seconds, solving, residuals; /* of estimates on this rank: all, linear solves, residuals */
 
   /* adaptive_tolerance.c */
   PetscBool may_tune; /* tolerances are the program's */

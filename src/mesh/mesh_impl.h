@@ -125,12 +125,10 @@ typedef struct {
   SbVertexData *vertex; /* [nvert] ascending original numbers */
   PetscInt *cell;       /* [ncell][4] positions in vertex[] */
   SbCellData *data;     /* [ncell] */
-  PetscInt *
-    neighbour; /* [ncell][4] cell across the face, -1 on the boundary, ncell + k: the cell remote[k] of another rank */
+  PetscInt *neighbour;  /* [ncell][4] cell across the face, -1: boundary, ncell + k: remote[k] */
   PetscInt nremote;
   PetscSFNode *remote; /* [nremote] */
-  PetscReal
-    *edge_off; /* [Ncell][6][3] by original numbers, on rank 0: SbMesh.edge_off; NULL without curved cells */
+  PetscReal *edge_off; /* [Ncell][6][3] by original numbers, on rank 0: as in SbMesh */
 } SbMergedMesh;
 
 typedef enum {

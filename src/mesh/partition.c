@@ -12,9 +12,8 @@
 #include <metis.h>
 #include "mesh_impl.h"
 
-#define MOST 50000 /* tets that METIS is given by itself: it takes 0.05 s for them */
-#define SAMPLE \
-  1024 /* tets of the sample for each part, at least; a part then holds within 3 % of its share */
+#define MOST 50000    /* tets that METIS is given by itself: it takes 0.05 s for them */
+#define SAMPLE 1024   /* tets of the sample for each part, at least: a part is within 3 % of its share */
 #define SAMPLES 65536 /* and of all parts together */
 #define SWEEPS 4      /* over the borders of parts */
 

@@ -27,23 +27,6 @@ static const struct {
 };
 enum { NSHAPE = (int)PETSC_STATIC_ARRAY_LENGTH(shapes) };
 
-/* Numbers separated by commas; -1 when there is anything else. */
-static int parse_numbers(const char *text, int most, PetscReal p[])
-{
-  int n = 0;
-  char *end;
-
-  for (;;) {
-    const double value = strtod(text, &end);
-
-    if (end == text || n == most || !isfinite(value)) return -1;
-    p[n++] = value;
-    if (!*end) return n;
-    if (*end != ',') return -1;
-    text = end + 1;
-  }
-}
-
 PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set)
 {
   const char *colon = strchr(text, ':');
@@ -76,7 +59,7 @@ PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set)
   } else {
     PetscReal *p;
 
-    PetscCheck(colon && parse_numbers(colon + 1, shapes[i].most, set->p) >= shapes[i].least, PETSC_COMM_SELF,
+    PetscCheck(colon && SbParseNumbers(colon + 1, shapes[i].most, set->p) >= shapes[i].least, PETSC_COMM_SELF,
                PETSC_ERR_USER_INPUT, "%s '%s': write %s", option, text, shapes[i].form);
     // norms the direction of planes (with their distance), refuses empty shapes
     p = set->p;

@@ -102,23 +102,14 @@ static PetscErrorCode ask_home_ranks(Slab *s)
 /* ------------------------------------------------------------------ faces between tets of two ranks */
 
 typedef struct {
-  PetscInt vert[3], cell; /* ascending; `cell` as SbPart.remote numbers it */
-  int64_t number;         /* of the tet in the file */
-  PetscInt at;            /* position among those received */
+  PetscInt vert[3], at; /* ascending; position among those received */
+  PetscInt cell;        /* as SbPart.remote numbers it */
+  int64_t number;       /* of the tet in the file */
 } Face;
 typedef struct {
   PetscInt rank, cell;
   int64_t number;
 } Across;
-
-static int compare_faces(const void *a, const void *b)
-{
-  const Face *p = (const Face *)a, *q = (const Face *)b;
-
-  for (int k = 0; k < 3; k++)
-    if (p->vert[k] != q->vert[k]) return p->vert[k] < q->vert[k] ? -1 : 1;
-  return (p->at > q->at) - (p->at < q->at);
-}
 
 /* What lies across each of the faces that came here. */
 static PetscErrorCode match_faces(const Slab *s, const SbRoute *route, Face face[], Across across[])
@@ -130,7 +121,7 @@ static PetscErrorCode match_faces(const Slab *s, const SbRoute *route, Face face
     face[i].at = i;
     across[i] = (Across){-1, -1, 0};
   }
-  if (route->nrecv) qsort(face, (size_t)route->nrecv, sizeof(*face), compare_faces);
+  PetscCall(SbSortByKeys(route->nrecv, sizeof(*face), 4, face));
   for (PetscInt i = 0; i < route->nrecv; i += m) {
     const Face *f = face + i;
 

@@ -159,15 +159,6 @@ PetscErrorCode SbImportAddMiddles(SbImport *im, const PetscInt vert[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static int compare_middles(const void *a, const void *b)
-{
-  const SbMiddle *p = (const SbMiddle *)a, *q = (const SbMiddle *)b;
-
-  if (p->end[0] != q->end[0]) return p->end[0] < q->end[0] ? -1 : 1;
-  if (p->end[1] != q->end[1]) return p->end[1] < q->end[1] ? -1 : 1;
-  return (p->node > q->node) - (p->node < q->node);
-}
-
 PetscErrorCode SbImportMiddles(SbImport *im)
 {
   SbMiddle *last = NULL;
@@ -177,7 +168,7 @@ PetscErrorCode SbImportMiddles(SbImport *im)
 
   PetscFunctionBeginUser;
   if (!im->nmiddle.n) PetscFunctionReturn(PETSC_SUCCESS);
-  qsort(im->middle, (size_t)im->nmiddle.n, sizeof(*im->middle), compare_middles);
+  PetscCall(SbSortByKeys(im->nmiddle.n, sizeof(*im->middle), 3, im->middle));
   PetscCall(PetscCalloc1(im->nvert, &taken));
   for (PetscInt i = 0; i < 4 * im->item[3].n; i++) taken[im->item[3].vert[i]] = PETSC_TRUE;
   for (PetscInt i = 0; i < im->nmiddle.n; i++) {
@@ -345,15 +336,6 @@ PetscErrorCode SbImportAddMember(SbImport *im, PetscInt dim, PetscInt item, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static int compare_members(const void *a, const void *b)
-{
-  const SbGroupMember *p = (const SbGroupMember *)a, *q = (const SbGroupMember *)b;
-
-  if (p->dim != q->dim) return p->dim < q->dim ? -1 : 1;
-  if (p->item != q->item) return p->item < q->item ? -1 : 1;
-  return (p->group > q->group) - (p->group < q->group);
-}
-
 PetscErrorCode SbImportJoinGroups(SbImport *im)
 {
   const SbGroupMember *m, *end;
@@ -361,7 +343,7 @@ PetscErrorCode SbImportJoinGroups(SbImport *im)
 
   PetscFunctionBeginUser;
   if (!im->nmember.n) PetscFunctionReturn(PETSC_SUCCESS);
-  if (im->nmember.n) qsort(im->member, (size_t)im->nmember.n, sizeof(*m), compare_members);
+  PetscCall(SbSortByKeys(im->nmember.n, sizeof(*m), 3, im->member));
   PetscCall(SbImportScratch(im, (size_t)(im->nmember.n + im->ngroup) * sizeof(*group), &group));
   end = im->member + im->nmember.n;
   for (m = im->member; m < end;) {

@@ -102,8 +102,7 @@ typedef struct {
   PetscBool *seen;        /* [nset] */
   int64_t nlooked;        /* labels looked for */
 } SbDeck;
-#define SB_DECK_TAG \
-  ((int64_t)1 << 40) /* number of the group of set 0: apart from the numbers of properties */
+#define SB_DECK_TAG ((int64_t)1 << 40) /* number of the group of set 0: no property has it */
 
 /* A node at the last token; its coordinates, 0, are for the caller to fill. */
 PetscErrorCode SbDeckAddNode(SbDeck *deck, int64_t label, PetscReal **x);

@@ -23,9 +23,8 @@
 
 #define REDUCTIONS 8 /* of e within a step; then it is 0 */
 #define SAFE 0.9     /* of the reduction that would do if W grew with e */
-#define STEEP \
-  2.1 /* the same for a small excess, as of a stiff body with e = 1, whose W / D grows with the root of e */
-#define ROUND 1e-9 /* of D: W that counts as not larger */
+#define STEEP 2.1    /* the same for a small excess, as of a stiff body: its W / D grows with the root of e */
+#define ROUND 1e-9   /* of D: W that counts as not larger */
 
 void SbModelRestitutionBegin(SbModel m, PetscReal dt, Vec U0, Vec V0)
 {

@@ -21,8 +21,7 @@ typedef struct {
 } Part;
 
 #define NPART 4
-#define PATH \
-  3 /* there with arc length only, with a checksum of its own: runs without go on from such a file, and the other way round */
+#define PATH 3 /* with arc length only, with a checksum of its own: runs without it go on from such a file */
 static void parts_of(SbRun run, Part part[NPART])
 {
   part[0] = (Part){"u", run->U};

@@ -219,19 +219,6 @@ static PetscErrorCode write_field(SbRun run, SbOutput out, const SbStep *step, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bytes that a frame can take, with its metadata and those of contact points. */
-static PetscInt64 frame_bytes(const SbOutput out, PetscInt64 contact_bytes)
-{
-  PetscInt64 bytes = 65536 + contact_bytes;
-
-  for (PetscInt i = 0; i < out->nfield; i++) {
-    const SbField *f = out->field[i];
-
-    bytes += (PetscInt64)(f->cell ? out->cell.N : out->point.N) * f->ncomp * (out->precise ? 8 : 4) + 8192;
-  }
-  return bytes;
-}
-
 /* What viewers open, with all frames so far. Rank 0. */
 static void write_indices(SbOutput out, PetscBool last, char message[SB_MESSAGE_MAX])
 {
@@ -244,16 +231,20 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   SbFrames fr = out->frames;
   const SbField *field[SB_FIELD_MAX];
   PetscInt bytes[SB_FIELD_MAX], n = 0;
-  PetscInt64 contact_bytes;
+  PetscInt64 room;
   char path[48], message[SB_MESSAGE_MAX] = "", name[16], hundred[16];
   /* along an arc length the load factor may fall, while viewers expect times that rise: the step is the time */
   const PetscReal time = run->path ? (PetscReal)step->step : step->t;
   hid_t group;
 
   PetscFunctionBeginUser;
-  /* room on disk for the whole frame, so that a full disk shows before anything is written */
-  PetscCall(SbContactsFind(run, out, step, &contact_bytes));
-  PetscCall(SbH5Reserve(&fr->h5, frame_bytes(out, contact_bytes)));
+  /* room on disk for the whole frame with its metadata, so that a full disk shows before anything is written */
+  PetscCall(SbContactsFind(run, out, step, &room));
+  room += 65536 + 8192 * out->nfield;
+  for (PetscInt i = 0; i < out->nfield; i++)
+    room += (PetscInt64)(out->field[i]->cell ? out->cell.N : out->point.N) * out->field[i]->ncomp *
+            (out->precise ? 8 : 4);
+  PetscCall(SbH5Reserve(&fr->h5, room));
 
   /* an anonymous group, linked under its name when it is complete, with its time */
   PetscCall(SbH5GroupCreate(&fr->h5, (unsigned)out->nfield + 1, 14, &group));

@@ -28,8 +28,7 @@ struct _p_SbHistory {
   PetscInt nextra;    /* columns of effects, probes and bodies */
   PetscReal (
     *mass)[4]; /* [nbody] centre at rest, m, and mass, kg, of each body; NULL without columns of bodies */
-  PetscReal *mine,
-    *sum; /* [nextra + 1] this rank's part, all ranks' sum; the last one: the row before failed */
+  PetscReal *mine, *sum;        /* [nextra + 1] of this rank, of all; the last: the row before failed */
   char message[SB_MESSAGE_MAX]; /* why it failed; empty when it did not */
 };
 

@@ -164,9 +164,8 @@ struct _p_SbOutput {
     PetscLogEvent fields, contacts, history, probes, checkpoint, progress;
   } event; /* SbOut_<name>, of those that the scenario asks for */
   SbOrder vertex, cell;
-  SbOrder node; /* the unknowns: that of the vertices when no body has its nodes at faces */
-  SbOrder
-    point; /* of vertex fields: vertices, 4 cell + a of the corners of cells when discontinuous, or nodes when quadratic */
+  SbOrder node;         /* the unknowns: that of the vertices when no body has its nodes at faces */
+  SbOrder point;        /* of vertex fields: vertices, corners 4 cell + a, or nodes of P2 */
   PetscBool ordered;    /* the four exist */
   PetscBool attached;   /* run.json exists */
   PetscInt *body_nodes; /* [nbody] nodes of each body, supports of faces among them */
@@ -175,9 +174,8 @@ struct _p_SbOutput {
   PetscBool restarted;
   /* cell quantities of the instant being written, computed once for all fields that need them */
   PetscBool state_valid;
-  PetscReal *sigma, *J,
-    *psi; /* [ncell_owned][6] Pa, [ncell_owned], [ncell_owned] J/m^3; NULL when no field needs it */
-  PetscReal *pressure; /* [ncell_owned] Pa; NULL likewise */
+  PetscReal *sigma, *J, *psi; /* [ncell_owned][6] Pa, [ncell_owned], the same in J/m^3; or NULL */
+  PetscReal *pressure;        /* [ncell_owned] Pa; NULL likewise */
 
   SbPoints points; /* NULL when nothing needs values at vertices */
 

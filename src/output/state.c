@@ -20,8 +20,7 @@ typedef struct {
   PetscInt npoint, ncell;
   PetscReal *x, *u, *v; /* [npoint][3] at rest, m; displacement, m; velocity, m/s, NULL: the frame has none */
   PetscInt *cell;       /* [ncell][4] those of the body */
-  PetscInt *
-    cell10; /* [ncell][10] with the middles of the edges 01 12 02 03 13 23, NULL: the run did not write them */
+  PetscInt *cell10;     /* [ncell][10] with the middles of the edges 01 12 02 03 13 23; or NULL */
 } Other;
 
 /* A whole dataset as numbers of `type`, [n] or [n][ncomp]; NULL when it is not there. PetscFree. */

@@ -10,8 +10,7 @@
 */
 #include "remesh_impl.h"
 
-#define INWARDS \
-  1e-6 /* part of the way from a face to the middle of its DG cell, to decide on which side that is */
+#define INWARDS 1e-6 /* of the way from a face to the middle of its DG cell: tells the side */
 
 /* The edge e of a cell at the place at = 6 cell + e. */
 static SbKey edge_of(const PetscInt v[], PetscInt at)

@@ -30,8 +30,7 @@ struct _p_SbRemesh {
   PetscInt ntime;
   PetscReal *time; /* [ntime] s */
   PetscInt nchange;
-  PetscReal
-    *change; /* [nchange] s, when supports come or go: then the scene is made again on the same meshes */
+  PetscReal *change; /* [nchange] s, when supports come or go: the scene is made again */
   PetscBool meshes;  /* bodies may be re-meshed; else it is here for supports alone */
   PetscBool changes; /* supports come or go now */
   PetscBool failed;  /* also when a step fails */

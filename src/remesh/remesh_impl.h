@@ -8,9 +8,8 @@
 /* All bodies in original order, and up to three vectors of the run. Arrays are on rank 0 alone, NULL elsewhere. */
 typedef struct {
   PetscInt nbody, nvert, ncell;
-  PetscInt nfield; /* vectors: U, V, A, as far as the run has them */
-  PetscInt
-    width; /* 4: the nodes of a cell; 8: and the supports of its faces; 14: and, of P2, its nodes at edges */
+  PetscInt nfield;         /* vectors: U, V, A, as far as the run has them */
+  PetscInt width;          /* 4: nodes of a cell; 8: and supports of its faces; 14: and P2's at edges */
   PetscInt *vert0, *cell0; /* [nbody + 1] first vertex and cell of each body; on all ranks */
   PetscReal *mass;         /* [nbody] kg; on all ranks */
   PetscReal *X, *x;        /* [nvert][3] at rest; now, of CR and DG the means around vertices; m */
@@ -76,8 +75,7 @@ typedef struct {
 } SbRemeshOutcome;
 typedef struct {
   PetscInt nbody;
-  SbMemoryMesh **
-    in_memory; /* [nbody] meshes of all bodies, also of those that stay as they are; rank 0, NULL elsewhere and when somebody has taken it */
+  SbMemoryMesh **in_memory; /* [nbody] meshes of all bodies, on rank 0; NULL: elsewhere, or taken */
   SbRemeshOutcome *outcome; /* [nbody] */
   PetscBool *done;          /* [nbody] has a new mesh */
   SbGathered next;   /* the same scene with the state looked up there; X, vert_set and so on are left out */

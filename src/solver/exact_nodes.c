@@ -77,8 +77,8 @@ PetscErrorCode SbExactNodesSetUp(SbExactNodes *e, SbSpace s, Mat A, const PetscR
       const PetscInt j = e->index[e->ja[at]];
 
       if (j < 0) continue;
-      e->kja[nz] = j;
-      PetscCall(PetscArraycpy(e->kblock + 9 * nz++, e->block + 9 * at, 9));
+      PetscCall(PetscArraycpy(e->kblock + 9 * nz, e->block + 9 * at, 9));
+      e->kja[nz++] = j;
     }
     e->ka[k + 1] = nz;
   }

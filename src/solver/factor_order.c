@@ -140,24 +140,19 @@ static PetscErrorCode merge_groups(PetscInt *ngroup, Group group[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static int compare_int(const void *a, const void *b)
-{
-  const PetscInt x = *(const PetscInt *)a, y = *(const PetscInt *)b;
-
-  return (x > y) - (x < y);
-}
-
 /*
   Structure of column j without j itself, sorted: own entries and the rows of the groups whose first row is j. Those are
-  linked in child[] (first group of column j) and sibling[]. Returns the count.
+  linked in child[] (first group of column j) and sibling[]. Its count is nrows[j].
 */
-static PetscInt column_structure(const SbElimination *e, PetscInt j, const PetscInt ia[], const PetscInt ja[],
-                                 const PetscInt child[], const PetscInt sibling[], PetscInt *const rows[],
-                                 const PetscInt nrows[], PetscInt mark[], PetscInt out[])
+static PetscErrorCode column_structure(const SbElimination *e, PetscInt j, const PetscInt ia[],
+                                       const PetscInt ja[], const PetscInt child[], const PetscInt sibling[],
+                                       PetscInt *const rows[], PetscInt nrows[], PetscInt mark[],
+                                       PetscInt out[])
 {
   const PetscInt node = e->order[j];
   PetscInt count = 0;
 
+  PetscFunctionBeginUser;
   mark[j] = j;
   for (PetscInt k = ia[node]; k < ia[node + 1]; k++) {
     const PetscInt i = e->inverse[ja[k]];
@@ -177,8 +172,9 @@ static PetscInt column_structure(const SbElimination *e, PetscInt j, const Petsc
       }
     }
   }
-  qsort(out, (size_t)count, sizeof(*out), compare_int);
-  return count;
+  PetscCall(PetscSortInt(count, out));
+  nrows[j] = count;
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Finds the groups of columns and their rows. rows[j], nrows[j]: structure of column j while its parent still needs it. */
@@ -194,7 +190,7 @@ static PetscErrorCode find_groups(SbElimination *e, const PetscInt ia[], const P
   for (PetscInt i = 0; i < e->n; i++) mark[i] = -1;
   *ngroup = 0;
   for (PetscInt j = 0; j < n; j++) {
-    nrows[j] = column_structure(e, j, ia, ja, child, sibling, rows, nrows, mark, out);
+    PetscCall(column_structure(e, j, ia, ja, child, sibling, rows, nrows, mark, out));
     PetscCall(PetscMalloc1(nrows[j], &rows[j]));
     PetscCall(PetscArraycpy(rows[j], out, nrows[j]));
     const PetscBool goes_on = (PetscBool)(j > 0 && parent[j - 1] == j && nrows[j - 1] == nrows[j] + 1);

@@ -6,7 +6,6 @@
   back are one wall. A triangle whose corners lie on a line is taken into its neighbour at the longest edge, which is cut in two at
   the corner between: the shape stays what it was. Refused: open edges.
 */
-#include <stdlib.h>
 #include "sbkernel.h"
 #include "surface_impl.h"
 
@@ -45,16 +44,6 @@ typedef struct {
   PetscBool odd; /* the order of the corners is turned */
 } Triple;
 
-static int compare_triples(const void *a, const void *b)
-{
-  const Triple *p = (const Triple *)a, *q = (const Triple *)b;
-
-  for (int k = 0; k < 3; k++) {
-    if (p->vert[k] != q->vert[k]) return p->vert[k] < q->vert[k] ? -1 : 1;
-  }
-  return (p->triangle > q->triangle) - (p->triangle < q->triangle);
-}
-
 /* Of triangles with the same corners the first one stays; the others give it their groups. */
 static PetscErrorCode drop_doubled(SbTriangleFile *f, PetscBool keep[], SbSurfaceRepairs *m)
 {
@@ -72,7 +61,7 @@ static PetscErrorCode drop_doubled(SbTriangleFile *f, PetscBool keep[], SbSurfac
     triple[i] = (Triple){{v[low], PetscMin(p, q), PetscMax(p, q)}, i, (PetscBool)(p > q)};
     keep[i] = PETSC_TRUE;
   }
-  qsort(triple, (size_t)t->ntri, sizeof(*triple), compare_triples);
+  PetscCall(SbSortByKeys(t->ntri, sizeof(*triple), 4, triple));
   for (PetscInt i = 0, n; i < t->ntri; i += n) {
     PetscBool wall = PETSC_FALSE;
 

@@ -6,8 +6,7 @@
 */
 #include "surface_impl.h"
 
-#define WELD \
-  1e-7 /* default tolerance over the diagonal of the surface: what is lost when coordinates are written as text */
+#define WELD 1e-7 /* default tolerance over the diagonal of the surface: what text loses of coordinates */
 
 static const SbOption rows[] = {
   {"tet_size", SB_OPTION_REAL, 1, "m", "", "(0, inf)",

@@ -20,19 +20,18 @@ typedef struct {
 /* All pairs, into *s, which has room for the marks. */
 static PetscErrorCode find_pairs(const SbTriangles *t, Search *s)
 {
-  PetscReal(*box)[6];
   SbBoxTree tree;
 
   PetscFunctionBeginUser;
   s->n = 0;
   PetscCall(PetscArrayzero(s->crossing, t->ntri));
-  PetscCall(PetscMalloc1(t->ntri, &box));
-  for (PetscInt i = 0; i < t->ntri; i++) SbTriangleBox(t->x, t->tri + 3 * i, box[i]);
-  PetscCall(SbBoxTreeCreate(t->ntri, (const PetscReal(*)[6])box, &tree));
+  PetscCall(SbBoxTreeCreateTriangles(t->ntri, t->tri, t->x, &tree));
   for (PetscInt i = 0, other; i < t->ntri; i++) {
     SbBoxQuery query;
+    PetscReal box[6];
 
-    for (SbBoxQueryBegin(&tree, box[i], &query); SbBoxQueryNext(&query, &other);) {
+    SbTriangleBox(t->x, t->tri + 3 * i, box);
+    for (SbBoxQueryBegin(&tree, box, &query); SbBoxQueryNext(&query, &other);) {
       if (other <= i || !SbTrianglesCross(t->x, t->tri + 3 * i, t->tri + 3 * other)) continue;
       if (s->n < NAMED) {
         s->pair[s->n][0] = i;
@@ -43,7 +42,6 @@ static PetscErrorCode find_pairs(const SbTriangles *t, Search *s)
     }
   }
   PetscCall(SbBoxTreeDestroy(&tree));
-  PetscCall(PetscFree(box));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -13,8 +13,7 @@ typedef struct {
   SbTetOptions options;
   PetscReal size, edge; /* wanted edge, mean edge of the surface */
   PetscReal expected;   /* about so many tets */
-  PetscBool
-    remesh; /* the surface gets triangles of the wanted size; else they stay, with the first vertices */
+  PetscBool remesh;     /* the surface gets triangles of the wanted size; else they stay */
 } SbTetJob;
 
 /*

@@ -181,13 +181,10 @@ static PetscErrorCode work(const SbGmsh *g, void *ctx, SbImport *im)
 /* The tags of new triangles: the triangle of the surface nearest to their middle, so groups survive when a surface is remeshed. */
 static PetscErrorCode nearest_triangles(const SbSurface *s, SbItems *tri, const PetscReal x[])
 {
-  PetscReal(*box)[6];
   SbBoxTree tree;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(s->ntri, &box));
-  for (PetscInt f = 0; f < s->ntri; f++) SbTriangleBox(s->x, s->tri + 3 * f, box[f]);
-  PetscCall(SbBoxTreeCreate(s->ntri, (const PetscReal(*)[6])box, &tree));
+  PetscCall(SbBoxTreeCreateTriangles(s->ntri, s->tri, s->x, &tree));
   for (PetscInt i = 0, f; i < tri->n; i++) {
     const PetscInt *v = tri->vert + 3 * i;
     PetscReal middle[6];
@@ -209,7 +206,6 @@ static PetscErrorCode nearest_triangles(const SbSurface *s, SbItems *tri, const 
     }
   }
   PetscCall(SbBoxTreeDestroy(&tree));
-  PetscCall(PetscFree(box));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -6,8 +6,7 @@
 #include "sbmeshio.h"
 #include "sbtriangles.h"
 
-#define SB_TRIANGLE_FLAT \
-  1e-10 /* twice the area over the longest edge squared, below which a triangle has no side */
+#define SB_TRIANGLE_FLAT 1e-10 /* twice the area over the longest edge squared, below which it has no side */
 #define SB_TRIANGLE_EMPTY 1e-9 /* volume over (area / 6)^1.5, below which a part encloses nothing */
 
 /* A point that a file gives for the region around it. */

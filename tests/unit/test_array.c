@@ -1,11 +1,11 @@
 // @ranks 1 3 4
-/* Positions grouped by key, against a search for each key; arrays of all ranks put together. */
+/* Positions grouped by key, against a search for each key; items sorted by several keys; arrays of all ranks put together. */
 #include "test.h"
 
 int main(int argc, char **argv)
 {
   enum { N = 50, NKEY = 7 };
-  PetscInt key[N], *start, *item, mine[3], total, *all, before, at = 0;
+  PetscInt key[N], triple[N][3], *start, *item, mine[3], total, *all, before, at = 0;
   PetscMPIInt rank, size;
 
   SB_TEST_BEGIN(argc, argv);
@@ -30,6 +30,21 @@ int main(int argc, char **argv)
   SB_CHECK(start[0] == 0, "nothing");
   PetscCall(PetscFree(start));
   PetscCall(PetscFree(item));
+
+  /* by two keys, of which many are alike; the third number goes along */
+  for (PetscInt i = 0; i < N; i++) {
+    triple[i][0] = i * i % 5;
+    triple[i][1] = -(i * 7 % N);
+    triple[i][2] = i;
+  }
+  PetscCall(SbSortByKeys(N, sizeof(*triple), 2, triple));
+  for (PetscInt i = 0; i < N; i++) {
+    const PetscInt *a = triple[i], *b = triple[PetscMin(i + 1, N - 1)];
+
+    SB_CHECK(a[0] < b[0] || (a[0] == b[0] && a[1] <= b[1]), "item %d", (int)i);
+    SB_CHECK(a[0] == a[2] * a[2] % 5 && a[1] == -(a[2] * 7 % N), "the rest of item %d", (int)i);
+  }
+  PetscCall(SbSortByKeys(0, sizeof(*triple), 2, NULL));
 
   /* rank r has r % 3 numbers */
   for (PetscInt i = 0; i < rank % 3; i++) mine[i] = 10 * rank + i;
