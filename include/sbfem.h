@@ -98,6 +98,9 @@ struct _p_SbSpace {
   PetscReal block_scale;  /* on blocks of SbSpaceAddCellBlock(): the load factor of a static run, or 1 */
   PetscBool rough;        /* the solve that contact examines was a rough one: forces are not to be trusted */
   PetscBool linear;       /* every region's law is linear */
+  SbPack
+    *linear_pressure; /* [nbatch] SbSpaceLinearisePressure(); NULL: tangents have the pressures of states */
+  void *pressure_memory; /* what it lives in */
 };
 
 /* Collective. Borrowed: materials by the numbers in the mesh (one per body, then those of inclusions), elements one per body. Options
@@ -123,6 +126,14 @@ PetscErrorCode SbSpaceUpdateGhosts(SbSpace space, PetscReal x[]);
 PetscErrorCode SbSpaceAddInternalForce(SbSpace space, const SbStage *stage, PetscReal f[]);
 /* f += M (a + alpha v); a or v may be NULL. */
 void SbSpaceAddInertia(SbSpace space, const SbStage *stage, PetscReal f[]);
+
+/*
+  SbSpaceLinearisePressure - lets the pressures of cells in tangents be those of a linearisation (src/fem/quadratic.c).
+
+  Collective. Input: U, m; step, m; along: factor on it; part: of the way to p(U) + dp/dU . along step that the pressures go. step NULL: p(U). U
+  NULL: tangents have the pressures of their states again.
+*/
+PetscErrorCode SbSpaceLinearisePressure(SbSpace space, Vec U, Vec step, PetscReal along, PetscReal part);
 
 /*
   SbSpaceFollowJumps - makes the penalty of jumps of CR and DG as stiff as the state asks for (src/fem/jump.c).

@@ -144,3 +144,59 @@ void SbBatchState(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal
     }
   }
 }
+
+/*
+  Pressures of a linearisation. A step du of Newton's method keeps theta + D : dF where it should be, D = dtheta/dF, but theta itself is off by terms of
+  second order: in bending and rotation p(u + du) is lambda times them, orders of magnitude more than any stress, and the term of the tangent with p is of no use
+  there. The pressure as an unknown of its own, p = -lambda theta a second equation, has p(u) + dp/dF : dF after the step, and that in the tangent; eliminated, the right-hand side
+  remains the residual of u (Magisano, Leonetti and Garcea, Int. J. Numer. Methods Eng. 109, 2017: all stresses). Both agree at the solution.
+*/
+PetscErrorCode SbSpaceLinearisePressure(SbSpace s, Vec U, Vec step, PetscReal along, PetscReal part)
+{
+  const PetscReal *u, *du = NULL;
+
+  PetscFunctionBeginUser;
+  if (!U) s->linear_pressure = NULL;
+  if (!U || s->linear) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!s->pressure_memory)
+    PetscCall(PetscCalloc((size_t)s->nbatch * sizeof(SbPack) + 64, &s->pressure_memory));
+  s->linear_pressure = (SbPack *)(((uintptr_t)s->pressure_memory + 63) & ~(uintptr_t)63);
+  PetscCall(SbSpaceGetLocalRead(s, U, &u));
+  if (step) PetscCall(SbSpaceGetLocalRead(s, step, &du));
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+    const SbMaterial m = region->material;
+    const PetscReal lambda = m->ops.volumetric_modulus(m);
+
+    /* those whose tangents take it */
+    if (region->quadratic ? region->pointwise == m : !m->ops.curvature) continue;
+    for (PetscInt b = region->bstart; b < region->bend; b++) {
+      const SbPoints at = SbBatchPoints(s, region, b);
+      SbPack x[30], dx[30], D[30], F[SB_POINTS][9], H[SB_POINTS][9], p, change = {0.};
+
+      SbBatchGradients(s, region, b, u, PETSC_FALSE, x, F);
+      if (step) SbBatchGradients(s, region, b, du, PETSC_TRUE, dx, H);
+      if (region->quadratic)
+        SbQuadraticVolume(m, &at, (const SbPack *)x, (const SbPack(*)[9])F, p, step ? D : NULL);
+      else {
+        m->ops.pressure(m, (const SbPack *)F[0], p);
+        m->ops.volumetric(m, (const SbPack *)F[0], D);
+        for (int l = 0; l < SB_BATCH; l++) p[l] = -p[l];
+      }
+      for (int k = 0; step && k < (region->quadratic ? 30 : 9); k++) {
+        const PetscReal *way = region->quadratic ? dx[k] : H[0][k];
+
+        for (int l = 0; l < SB_BATCH; l++) change[l] += D[k][l] * way[l];
+      }
+      for (int l = 0; l < SB_BATCH; l++) {
+        const PetscReal V = region->quadratic ? (*at.V)[l] : 1., old = step ? s->linear_pressure[b][l] : 0.;
+        const PetscReal goal = p[l] + (V > 0. ? along * lambda / V * change[l] : 0.);
+
+        s->linear_pressure[b][l] = step ? old + part * (goal - old) : goal;
+      }
+    }
+  }
+  if (step) PetscCall(SbSpaceRestoreLocalRead(s, step, &du));
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -243,6 +243,7 @@ PetscErrorCode SbSpaceDestroy(SbSpace *space)
   PetscCall(PetscFree(s->batch_n));
   PetscCall(PetscFree(s->batch_node));
   PetscCall(PetscFree(s->batch_memory));
+  PetscCall(PetscFree(s->pressure_memory));
   if (s->node_share != s->node_mass) PetscCall(PetscFree(s->node_share));
   PetscCall(PetscFree3(s->node_mass, s->alpha, s->beta));
   PetscCall(PetscFree(s->fixed_node));

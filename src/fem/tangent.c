@@ -96,7 +96,7 @@ typedef struct {
   PetscReal inertia;      /* on the consistent mass */
   PetscReal lambda;       /* volumetric modulus of the law, Pa */
   PetscReal mu;           /* shear modulus of the law, Pa */
-  const SbPack *pressure; /* that a law without lambda is under, Pa, tension; NULL: its own */
+  const SbPack *pressure; /* that the law is under beside its own, Pa, tension; NULL: none */
 } Factors;
 
 static void scaled_volumes(const SbPack V, PetscReal factor, SbPack W)
@@ -236,8 +236,9 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
   SbBatchGradients(s, region, batch, m->linear ? NULL : displacement, PETSC_FALSE, U, F);
   if (mean) {
     SbQuadraticVolume(m, &points, (const SbPack *)U, (const SbPack(*)[9])F, p, b);
+    if (s->linear_pressure) memcpy(p, s->linear_pressure[batch], sizeof(p));
     at.lambda = 0.;
-    at.pressure = &p;
+    at.pressure = m->jacobian ? NULL : &p; /* the exact mean of theta has a derivative of its own, below */
   }
   for (int q = 0; q < points.n; q++) {
     SbPointVolume(&points, q, W);
@@ -375,8 +376,16 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
     if (region->quadratic)
       quadratic_blocks(s, region, stage->u, &factors, b, out, K);
     else {
+      Factors at = factors;
+      SbPack p;
+
       if (!m->linear) SbBatchGradients(s, region, b, stage->u, PETSC_FALSE, U, F);
-      law_blocks(m, s->batch_g + 9 * b, s->batch_V[b], &factors, (const SbPack *)F[0], split, K);
+      if (s->linear_pressure && m->ops.curvature && m->tangent == SB_TANGENT_EXACT) {
+        m->ops.pressure(m, (const SbPack *)F[0], p);
+        for (int l = 0; l < SB_BATCH; l++) p[l] += s->linear_pressure[b][l];
+        at.pressure = &p;
+      }
+      law_blocks(m, s->batch_g + 9 * b, s->batch_V[b], &at, (const SbPack *)F[0], split, K);
       if (out) keep_volumetric(s, &factors, b, split, out);
     }
     /* the same cells in another space: between vertices the gradients are a third of those between faces, with the opposite sign */

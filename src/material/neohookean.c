@@ -155,6 +155,21 @@ SB_KERNEL static void volumetric_neohookean(const struct _p_SbMaterial *m, const
   }
 }
 
+SB_KERNEL static void curvature_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                           const SbPack p, SbPack C[restrict 81])
+{
+  (void)m;
+  for (int ij = 0; ij < 9; ij++) {
+    for (int kl = 0; kl < 9; kl++) {
+      const int row = (kl / 3 - ij / 3 + 3) % 3, column = (kl % 3 - ij % 3 + 3) % 3;
+      const int third = 3 * ((6 - ij / 3 - kl / 3) % 3) + (6 - ij % 3 - kl % 3) % 3;
+      const PetscReal sign = row && column ? (row == column ? 1 : -1) : 0;
+
+      for (int l = 0; l < SB_BATCH && sign != 0.; l++) C[9 * ij + kl][l] += sign * p[l] * F[third][l];
+    }
+  }
+}
+
 PetscErrorCode SbMaterialCreate_NeoHookean(SbMaterial m)
 {
   PetscFunctionBeginUser;
@@ -166,6 +181,7 @@ PetscErrorCode SbMaterialCreate_NeoHookean(SbMaterial m)
   m->ops.pressure = pressure_neohookean;
   m->ops.tangent = tangent_neohookean;
   m->ops.volumetric = volumetric_neohookean;
+  m->ops.curvature = curvature_neohookean;
   m->jacobian = PETSC_TRUE;
   m->symmetric = PETSC_TRUE;
   m->tangent = SB_TANGENT_EXACT;

@@ -17,6 +17,9 @@
   and the next one has to bring it below where it was, with an accurate linear solve where a loose one is not enough, or the search starts again from there (watchdog technique: Chamberlain et al. 1982; Nocedal
   and Wright, section 15.6).
 
+  Pressure. In static runs the term of the tangent with the pressure of a cell has that of the linearisation behind the step, as if the pressure were an unknown of its own (src/fem/quadratic.c):
+  what a full step in bending leaves of changes of volume says nothing about stress, and with it steps were a hundredth long. The first of such steps raises E far, and the next two bring it back. Steps in time are short enough without.
+
   Tangent. With -body_NAME_tangent auto it is the exact one. When the linear solver meets a direction of negative curvature or counts negative pivots, or p goes up, the eigenvalues of
   the cells are raised to zero and the system is solved once more (Longva et al. 2023, "Pitfalls of projection"); after a full step the exact one is tried again.
   Forces without a potential (the free rim of a follower pressure) have equilibria at which its symmetric part is not definite: after a full step to a residual
@@ -62,6 +65,7 @@
 #define TRIES 5       /* longer steps, at most */
 #define STEEP 0.01    /* of the slope of the quadratic model: least slope of E along a direction */
 #define PROVISIONAL 1 /* non-monotone steps that may follow each other while E is above where they began */
+#define PROVISIONAL_STATIC 2 /* the same in a static run, whose pressures are linearised */
 
 /* The potential at an iterate, as far as lengths of steps ask. */
 typedef struct {
@@ -127,6 +131,14 @@ static PetscErrorCode evaluate(Newton *n, Iterate *at)
     at->gaps = run->guard_weight * energy;
     at->psi += at->gaps;
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Static runs: the pressures in the next tangent, those of the linearisation at X after the part s of -Y; Y NULL: of X (src/fem/quadratic.c). */
+static PetscErrorCode linearise_pressure(const SbRun run, Vec X, Vec Y, PetscReal s)
+{
+  PetscFunctionBeginUser;
+  if (!run->model->dynamic) PetscCall(SbSpaceLinearisePressure(run->model->space, X, Y, -1., s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -358,7 +370,8 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
       (PetscBool)(*s == 1. && !enough && slope < 0. && total <= noise && -slope <= NOTHING * noise);
     if (slope < 0. && total <= noise) enough = (PetscBool)(enough || -slope <= NOTHING * noise);
     provisional =
-      (PetscBool)(!enough && !plain && slope < 0. && n->provisional < PROVISIONAL &&
+      (PetscBool)(!enough && !plain && slope < 0. &&
+                  n->provisional < (m->dynamic ? PROVISIONAL : PROVISIONAL_STATIC) &&
                   change < PETSC_INFINITY && to->ninverted <= from->ninverted && to->gaps <= from->gaps);
 
     /* with a barrier on the way E is lowest in front of it, and where it hardly curves far behind a whole step: between what is known by slopes */
@@ -415,6 +428,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
     if (n->provisional) {
       PetscCall(VecCopy(n->start, X));
       PetscCall(VecCopy(n->step, Y));
+      PetscCall(linearise_pressure(n->run, X, NULL, 1.));
       PetscCall(SNESComputeFunction(snes, X, F));
       PetscCall(evaluate(n, from));
       PetscCall(find_slopes(n, Y, from));
@@ -442,6 +456,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
     n->rise = 0.;
   }
   n->rise += change;
+  PetscCall(linearise_pressure(n->run, X, Y, *s));
   PetscCall(VecCopy(to->x, X));
   PetscCall(VecCopy(to->r, F));
   snes->norm = to->norm;
@@ -581,6 +596,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   n->whole = PETSC_FALSE;
   if (guarded) PetscCall(approach(snes));
   if (snes->reason) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(linearise_pressure(n->run, X, NULL, 1.));
   PetscCall(SNESComputeFunction(snes, X, F));
   PetscCall(VecNorm(F, NORM_2, &snes->norm));
   n->initial = snes->norm;
@@ -632,6 +648,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
       PetscCall(VecNorm(F, NORM_2, &snes->norm));
     }
   }
+  PetscCall(SbSpaceLinearisePressure(n->run->model->space, NULL, NULL, 0., 0.));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

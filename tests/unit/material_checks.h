@@ -180,6 +180,31 @@ static inline void check_derivatives(SbMaterial m, const PetscReal F[9], const c
   }
 }
 
+/* The curvature of theta is the derivative of its derivative: D(F + t H) - D(F) - t C : H is at most quadratic in t. */
+static inline void check_curvature(SbMaterial m, const PetscReal F[9])
+{
+  const PetscReal t = 1e-4;
+  PetscReal H[9], G[9], CH[9], C[81];
+  SbPack f[9], g[9], D[9], E[9], p, c[81] = {{0}};
+
+  if (!m->ops.curvature) return;
+  for (int k = 0; k < 9; k++) {
+    H[k] = uniform();
+    G[k] = F[k] + t * H[k];
+  }
+  for (int l = 0; l < SB_BATCH; l++) p[l] = 1 + l;
+  batch(F, f);
+  batch(G, g);
+  m->ops.volumetric(m, (const SbPack *)f, D);
+  m->ops.volumetric(m, (const SbPack *)g, E);
+  m->ops.curvature(m, (const SbPack *)f, p, c);
+  SbPackGet(81, (const SbPack *)c, 2, C);
+  contract(C, H, CH);
+  for (int k = 0; k < 9; k++)
+    SB_CHECK(fabs(E[k][2] - D[k][2] - t * CH[k] / 3) < 4 * t * t, "%s: curvature of theta off by %g of %g",
+             m->law, E[k][2] - D[k][2] - t * CH[k] / 3, t);
+}
+
 /* At rest: no energy, no stress, Hooke's tensor, and the moduli and wave speed that follow from it. */
 static inline void check_rest(SbMaterial m)
 {
@@ -422,6 +447,7 @@ static inline PetscErrorCode check_law(SbMaterial m, PetscBool recovers)
   for (int t = 0; t < 100; t++) {
     random_deformation(0.25, F);
     check_derivatives(m, F, "order of the Taylor remainder");
+    check_curvature(m, F);
     check_invariance(m, F);
     check_damping(m, F);
   }
