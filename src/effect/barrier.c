@@ -27,6 +27,9 @@
 #define SLIP_LEAST 1e-7  /* of the size of the smallest body: the slip of a time step is not smaller */
 #define SLIP_STATIC 1e-5 /* of the size: the same in a static run, as a length */
 #define LAGS 100         /* solves of a load step with the friction of the one before */
+#define STUCK \
+  5 /* solutions one after the other, none of which lags behind by less than FALLS of the least: friction goes in a circle */
+#define FALLS 0.9
 #define MUCH \
   0.5 /* of mu N: friction that lags behind by more is solved for once more in a time step, as where contact begins */
 #define PARTINGS 20 /* solves of a load step in which things are parted */
@@ -419,8 +422,9 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
 
   /* friction with the forces of the start */
   b->slip = e->dynamic ? PetscMax(SLIP * speed * dt, SLIP_LEAST * m->size) : SLIP_STATIC * m->size;
-  b->nlag = 0;
+  b->nlag = b->nstuck = 0;
   b->lag = 0.;
+  b->least_lag = PETSC_INFINITY;
   PetscCall(SbBarrierFindFriction(b, PETSC_FALSE));
   SbBarrierSwapFriction(b);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -446,7 +450,20 @@ static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], Pe
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(SbBarrierLag(b));
-  *again = (PetscBool)(b->lag > (e->dynamic && !b->lags ? MUCH : b->lag_tolerance));
+  if (b->lag < FALLS * b->least_lag) {
+    b->least_lag = b->lag;
+    b->nstuck = 0;
+  } else
+    b->nstuck += solved;
+  *again = (PetscBool)(b->nstuck < STUCK && b->lag > (e->dynamic && !b->lags ? MUCH : b->lag_tolerance));
+  if (!e->dynamic && !*again && b->lag > b->lag_tolerance && !b->stuck_said) {
+    b->stuck_said = PETSC_TRUE;
+    PetscCall(
+      SbWarning(s->comm,
+                "effect %s: friction does not settle, from solve to solve its forces change by %.2g of "
+                "Coulomb's limit; try more -static_steps, or motion (-time euler_implicit)",
+                e->name, (double)b->lag));
+  }
   if (*again) SbBarrierSwapFriction(b);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

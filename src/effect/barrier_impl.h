@@ -62,7 +62,10 @@ typedef struct {
   SbPose pose[2]; /* of the obstacle at the start and the end of the step */
   PetscInt lags,
     nlag; /* solves of a step, at most, each with the friction of the one before; those of this step */
-  PetscReal lag_tolerance, lag;     /* of what is left then; what it is, a part of mu N of all pairs */
+  PetscReal lag_tolerance, lag; /* of what is left then; what it is, a part of mu N of all pairs */
+  PetscReal least_lag; /* of the solutions of this step; how many came since without one that is less */
+  PetscInt nstuck;
+  PetscBool stuck_said;
   PetscReal most_lag;               /* of the run */
   PetscReal slip;                   /* e of friction, m */
   PetscBool overlapping, announced; /* things are in each other; that was said */

@@ -175,7 +175,8 @@ PetscErrorCode SbDeckBuild(SbDeck *d)
       const PetscInt v = SbNumbersFind(&im->nodes, element->node[k]);
 
       vert[SbGmshNode(k)] = v;
-      if (v < 0 && (k < 4 || element->node[k])) // Nastran may leave out nodes of edges that are straight
+      if (v < 0 &&
+          (k < 4 || element->node[k] || d->strict)) // Nastran may leave out nodes of edges that are straight
         SB_SCAN_ERROR(&im->scan, "element %lld uses node %lld, which is not there", (long long)element->label,
                       (long long)element->node[k]);
     }

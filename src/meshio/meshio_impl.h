@@ -92,7 +92,7 @@ typedef struct {
   int (*compare)(const char *, const char *); /* of names of sets: strcmp() or strcasecmp() */
   const char *cure;                           /* what to do about a label that is given twice */
   PetscBool unique;                           /* labels of elements, too, may be given once only */
-  PetscBool strict;                           /* nodes of sets must be there */
+  PetscBool strict;                           /* nodes of sets, and all those of tets, must be there */
   SbCount nnode, nelement, nset, nfound;
   SbDeckNode *node;       /* [nnode] */
   SbDeckElement *element; /* [nelement] */

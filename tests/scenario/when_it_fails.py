@@ -133,6 +133,11 @@ CASES = [
     ("R11", "warning", "bar.opts -effect_pull_vector 0;0;1e9 -snes_max_it 2 -time_max_halvings 2 -remesh_failed yes", ["-remesh_failed"]),
     ("R12", "warning", "cube.opts -body_a_mesh box:0.4,0.1,0.1:1 -body_a_material stvk -body_a_young 1e6 -body_a_density 1000 -body_a_velocity 30*y,-30*x,20*x "
      "-time newmark -ts_dt 0.02 -ts_max_time 0.5", ["-ts_dt", "genalpha"]),
+    # friction that goes in a circle where contact begins took 900 iterations of Newton's method for nothing
+    ("R13", "warning", "cube.opts -bodies a,b -body_a_mesh box:0.1,0.1,0.05:3 -body_b_mesh box:0.06,0.06,0.05:2 -body_a_material neohookean -body_b_material neohookean "
+     "-body_b_young 1e5 -body_b_poisson 0.3 -body_b_translate 0.02,0.013,0.052 -effects hold,push,meet -effect_hold_type fixed -effect_hold_on a.zmin "
+     "-effect_push_type prescribed_displacement -effect_push_on b.zmax -effect_push_displacement 0;0;-0.012*t -effect_meet_type contact -effect_meet_friction 0.3 "
+     "-static_steps 4", ["meet", "-static_steps"]),
     ("P1", "error", "bar.opts -pc_type lu -pc_factor_mat_solver_type mkl_pardiso", ["-pc_type lu", "mkl_pardiso", "-solver"]),
 ]
 FAILS_TOO = {"R11"}  # a warning before an error

@@ -262,6 +262,7 @@ static PetscErrorCode test_unv(void)
     {UTET, "body 'b'|line 2"},
     {UNODE "    -1\n  2412\n 1 111 2 1 7 4\n 1 2 3 9\n    -1\n", "u.unv|line 15|element 1|node 9"},
     {UNODE "    -1\n  2412\n 1 118 2 1 7 4\n 1 2 3 4\n    -1\n", "line 14|element 1|kind 118|4 nodes|10"},
+    {UNODE "    -1\n  2412\n 1 118 2 1 7 10\n 1 0 2 0 3 0 0 0\n 0 4\n    -1\n", "line 15|element 1|node 0"},
     {UNODE "    -1\n  2412\n 1 115 2 1 7 8\n 1 2 3 4 1 2 3 4\n    -1\n", "1 hexahedra"},
     {UNODE "    -1\n  2412\n 1 111 2 1 7 4\n 1 2 3 4\n", "-1"},
     {UNODE UTET "    -1\n  2467\n 1 0 0 0 0 0 0 1\nname\n 7 8 0 0\n    -1\n", "group 'name'|node 8"},
