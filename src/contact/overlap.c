@@ -14,9 +14,9 @@
 
 #define CANCEL 1e-3 /* of their sum: what is left of ways that oppose each other is none */
 #define TINY 1e-12  /* of the bodies' size: a vertex that is nearer to a surface is not told from it */
-#define AGAINST 0.1 /* cosine to the normal of its own surface, beyond which a way out is one */
+#define AGAINST 0.1 /* cosine to the normal of its own surface, beyond which it separates */
 #define JITTER 1e-7 /* of that size: vertices move by it, so that none lies in a triangle or on an edge */
-#define FAR 4.      /* times its depth: a way out is followed so far, then the nearest place is taken */
+#define FAR 4.      /* times its depth: a direction is followed so far, then the nearest place is taken */
 
 /* What is known of vertices while ways spread. */
 typedef struct {
@@ -403,7 +403,7 @@ PetscErrorCode SbContactOverlapFind(SbContactMesh m, PetscBool self, const Petsc
   PetscCall(PetscArrayzero(o->near, m->nvertex));
   PetscCall(SbContactMeshCrossings(m, self, x, &n, &hit));
 
-  /* what lies on something exactly is on neither side of it, and ways would spread past it: moved by JITTER, each alike in every run, it does not */
+  /* a point exactly on a surface is on neither side of it, and ways would spread past it: moved by JITTER, each alike in every run, it does not */
   if (n || inside) {
     PetscInt nmoved, *other;
     PetscReal *moved;

@@ -27,8 +27,7 @@
 #define SLIP_LEAST 1e-7  /* of the size of the smallest body: the slip of a time step is not smaller */
 #define SLIP_STATIC 1e-5 /* of the size: the same in a static run, as a length */
 #define LAGS 100         /* solves of a load step with the friction of the one before */
-#define STUCK \
-  5 /* solutions one after the other, none of which lags behind by less than FALLS of the least: friction goes in a circle */
+#define STUCK 5          /* solutions in turn that lag by FALLS of the least and more: it goes in a circle */
 #define FALLS 0.9
 #define MUCH \
   0.5 /* of mu N: friction that lags behind by more is solved for once more in a time step, as where contact begins */
@@ -435,12 +434,14 @@ static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], Pe
                                   PetscBool *again)
 {
   Barrier *b = (Barrier *)e->data;
+  PetscBool last;
 
   PetscFunctionBeginUser;
   *again = PETSC_FALSE;
   if (b->scene.friction <= 0. && (e->dynamic || !b->overlapping)) PetscFunctionReturn(PETSC_SUCCESS);
   if (e->dynamic && !b->lags && !solved) PetscFunctionReturn(PETSC_SUCCESS);
-  if (++b->nlag >= (b->lags ? b->lags : e->dynamic ? 2 : LAGS)) PetscFunctionReturn(PETSC_SUCCESS);
+  last = (PetscBool)(++b->nlag >= (b->lags ? b->lags : e->dynamic ? 2 : LAGS));
+  if (last && (b->lags || e->dynamic)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBarrierLook(b, u));
 
   /* in a static run what overlaps is parted within the step */
@@ -455,7 +456,8 @@ static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], Pe
     b->nstuck = 0;
   } else
     b->nstuck += solved;
-  *again = (PetscBool)(b->nstuck < STUCK && b->lag > (e->dynamic && !b->lags ? MUCH : b->lag_tolerance));
+  *again =
+    (PetscBool)(!last && b->nstuck < STUCK && b->lag > (e->dynamic && !b->lags ? MUCH : b->lag_tolerance));
   if (!e->dynamic && !*again && b->lag > b->lag_tolerance && !b->stuck_said) {
     b->stuck_said = PETSC_TRUE;
     PetscCall(

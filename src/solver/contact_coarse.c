@@ -9,7 +9,7 @@
   bounds for the Galerkin mass matrix", 1987, whose argument holds for sums of any semi-definite matrices; those of terms at faces, c [P, -P; -P, P] with P = 1 - 1/3 (1, 1, 1) (1, 1, 1)^T
   for jumps and c [1, -1; -1, 1] for their mean, have three and two), so nothing is estimated, and nothing depends on the number of ranks or on what contact makes stiff. After a guess that makes Z^T r zero it stays so, and the right factor is 1, as in pc_coarse.c.
 
-  With P2 bodies aggregates are too coarse below what their edges hide, and D^-1 A has eigenvalues above four near nu = 1/2. Up to VERTICES vertices of such bodies Z has, in the place of
+  For P2 bodies aggregates are too coarse a space, and D^-1 A has eigenvalues above four near nu = 1/2. Up to VERTICES vertices of such bodies Z has, in the place of
   aggregates, these: an edge node that is none of contact moves by the mean of its two vertices, if they are of its rank, and by itself if not. Around the correction stand
   sweeps of Gauss-Seidel over all rows, as in pc_p_multigrid.c, each of half a product, and nothing is asked of the guess.
 

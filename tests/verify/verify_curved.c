@@ -243,8 +243,9 @@ static PetscErrorCode sphere_error(PetscInt n, PetscBool second, PetscReal nu, c
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "    in energy %.3e J^(1/2), estimated %.2f times that\n",
                         (double)PetscSqrtReal(PetscAbsReal(missing)),
                         (double)(guess / PetscSqrtReal(PetscAbsReal(missing)))));
+  /* 1.20 to 1.24 times the true one on these meshes; the band is that of verify_estimate */
   if (second)
-    SB_CHECK(guess > 0.7 * PetscSqrtReal(missing) && guess < 1.4 * PetscSqrtReal(missing),
+    SB_CHECK(guess > 0.6 * PetscSqrtReal(missing) && guess < 1.3 * PetscSqrtReal(missing),
              "estimated %g, true %g J^(1/2)", (double)guess, (double)PetscSqrtReal(missing));
   PetscCall(SbSpaceEstimateDestroy(&est));
   PetscCall(test_scene_close(&t));
