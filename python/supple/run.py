@@ -103,7 +103,7 @@ class Run:
             try:
                 self.read_index(path)
                 return
-            except (OSError, KeyError) as e:
+            except (OSError, KeyError, RuntimeError) as e:
                 self.close()  # HDF5 would go on reading what it had
                 if attempts == 1:
                     raise RunError(f"{path} is not a results file of supple: {e}") from None
@@ -113,7 +113,8 @@ class Run:
     def read_index(self, path):
         """Frames of fields.h5, and that the newest of them is whole."""
         self.file = h5py.File(path, "r", locking=False)
-        self.paths = sorted((f"/step/{hundred}/{step}" for hundred, steps in self.file["/step"].items() for step in steps), key=lambda one: int(one.rpartition("/")[2]))
+        hundreds = self.file["/step"]  # not by items(), where a group that has not come to the disk yet is None
+        self.paths = sorted((f"/step/{hundred}/{step}" for hundred in hundreds for step in hundreds[hundred]), key=lambda one: int(one.rpartition("/")[2]))
         self.first_mesh = self.file["/mesh"]
         for one in self.paths[-1:]:
             _ = [self.file[one][name] for name in self.file[one]]

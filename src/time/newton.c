@@ -22,8 +22,8 @@
 
   Tangent. With -body_NAME_tangent auto it is the exact one. When the linear solver meets a direction of negative curvature or counts negative pivots, or p goes up, the eigenvalues of
   the cells are raised to zero and the system is solved once more (Longva et al. 2023, "Pitfalls of projection"); after a full step the exact one is tried again.
-  Forces without a potential (the free rim of a follower pressure) have equilibria at which its symmetric part is not definite: after a full step to a residual
-  smaller than the first it is kept whatever that is, and the residual decides about a direction that goes up.
+  Forces without a potential (the free rim of a follower pressure) have equilibria at which its symmetric part is not definite: it is kept with as many negative eigenvalues
+  as where the load step began, and after a full step to a residual smaller than the first whatever it is; the residual decides about a direction that goes up.
 
   Where surfaces push each other, the second derivative of contact is the positive part of each pair's, and the exact one after a whole step, as near the end only that converges
   faster than linearly. Friction that slipped the other way than expected is taken for one that sticks (src/effect/barrier_forces.c), and where p goes up, bounded from above. A tangent that is not
@@ -41,6 +41,8 @@
 #define DECREASE 1e-4   /* Armijo's constant, c above */
 #define SHORTEST 1e-7   /* shortest fraction of a step that the line search tries */
 #define ROUNDING 1e-11  /* relative rounding of the terms of E */
+#define CREEP 0.05      /* fraction of a step that is next to nothing */
+#define CREEPS 5        /* such steps in a row that end a load step, which a shorter one replaces */
 #define NOTHING 1e-6    /* relative to E's rounding: predicted decrease that counts as none */
 #define ACCURATE 1e-6   /* relative tolerance of linear solves whose direction is used again */
 #define APPROACHES 50   /* iterations in which prescribed motions have to be completed */
@@ -102,6 +104,7 @@ typedef struct {
   PetscReal shift;     /* of the last direction: times the mass added to the tangent, 1/s^2 */
   PetscBool whole;     /* the last step was */
   PetscBool rounding;  /* and as good as none, with a residual that has not fallen */
+  PetscInt branch;     /* static, such forces: negative eigenvalues of the symmetric part where it begins */
   PetscReal tolerance; /* of the last solve, N */
   PetscReal initial;   /* norm of the first residual, N */
 } Newton;
@@ -265,7 +268,8 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
     negative = -1;
     if (reason > 0 && *slope < 0. && !n->nblock)
       PetscCall(SbSolverCountNegativeEigenvalues(snes, m->space, &negative));
-    if (reason > 0 && *slope < 0. && negative <= 0) break;
+    if (n->run->nonsymmetric.U && !m->dynamic && !snes->iter) n->branch = PetscMax(negative, 0);
+    if (reason > 0 && *slope < 0. && negative <= n->branch) break;
     PetscCall(PetscInfo(snes,
                         "iteration %" PetscInt_FMT
                         ": the exact tangent is not definite (%s, slope %g J, %" PetscInt_FMT
@@ -582,7 +586,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   const PetscBool guarded = (PetscBool)(n->run->model->npotential > 0);
   PetscBool filtered = PETSC_FALSE;
   PetscReal slope = 0., s = 1.;
-  PetscInt nactive, first = 0;
+  PetscInt nactive, first = 0, creeps = 0;
 
   PetscFunctionBeginUser;
   /* where it begins */
@@ -593,6 +597,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   n->known = PETSC_FALSE;
   n->kind = SB_HESSIAN_PROJECTED;
   n->shift = 0.;
+  n->branch = 0;
   n->whole = PETSC_FALSE;
   if (guarded) PetscCall(approach(snes));
   if (snes->reason) PetscFunctionReturn(PETSC_SUCCESS);
@@ -634,6 +639,8 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     PetscCall(converged(snes, s));
     PetscCall(SNESMonitor(snes, snes->iter, snes->norm));
     if (!snes->reason && snes->iter >= first + snes->max_its) snes->reason = SNES_DIVERGED_MAX_IT;
+    if (!guarded && !n->run->model->dynamic && !n->provisional) creeps = s < CREEP ? creeps + 1 : 0;
+    if (!snes->reason && creeps == CREEPS) snes->reason = SNES_DIVERGED_LINE_SEARCH;
 
     /* friction with the normal forces of this iterate, where its lag is iterated: at once while loads arrive, then when it has settled */
     if (guarded && (snes->reason > 0 || (!snes->reason && snes->iter <= EARLY))) {

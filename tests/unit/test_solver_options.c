@@ -278,6 +278,7 @@ static PetscErrorCode check_barrier(void)
 static PetscErrorCode check_said(void)
 {
   PetscBool has, set;
+  PetscReal largest;
   TestScene t;
 
   PetscFunctionBeginUser;
@@ -295,10 +296,11 @@ static PetscErrorCode check_said(void)
   SB_CHECK(t.run->stop_reason[0] && t.run->rejected_total == 1, "%d steps are rejected, '%s'",
            (int)t.run->rejected_total, t.run->stop_reason);
   PetscCall(test_scene_close(&t));
-  // CG ends as converged where the preconditioner makes nothing of its residual, as that of a matrix of updates before the first of them.
+  // PETSc 3.18: CG ends as converged where the preconditioner makes nothing of its residual, as that of a matrix of updates before the first of them.
   PetscCall(test_scene_open(STATIC "-body_a_material linear -ksp_type cg -pc_type lmvm ", &t));
   PetscCall(SbRunSolve(t.run));
-  SB_CHECK(t.run->stop_reason[0], "the zero displacement is an answer");
+  PetscCall(VecNorm(t.run->U, NORM_INFINITY, &largest));
+  SB_CHECK(t.run->stop_reason[0] || largest > 0., "the zero displacement is an answer");
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import h5py
 import numpy
 
 from output_common import OUT, history, run, scenario
@@ -81,6 +82,12 @@ def check_growing():
     # the end of the file stands at byte 40: that of a file that lacks its last frame
     cut = fields[:40] + (len(fields) // 2).to_bytes(8, "little") + fields[48:]
     (folder / "fields.h5").write_bytes(cut)
+    refused(it.refresh, "fields.h5")
+
+    # a hundred of frames whose group has not come to the disk
+    (folder / "fields.h5").write_bytes(fields)
+    with h5py.File(folder / "fields.h5", "r+") as file:
+        file["/step/1"] = h5py.SoftLink("/nowhere")
     refused(it.refresh, "fields.h5")
     sleep, supple.run.time.sleep = supple.run.time.sleep, lambda _: (folder / "fields.h5").write_bytes(fields)
     it.refresh()

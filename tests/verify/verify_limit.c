@@ -62,16 +62,16 @@ static PetscErrorCode check_follower_end(const char *element)
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  follower %g E, %s: %.9g in %d steps, %d iterations\n    %s\n",
                         (double)load, element, (double)t.run->t_now, (int)t.run->steps_total,
                         (int)t.run->newton_total, t.run->stop_reason));
-  /* P1 and CR end below the limit by the least increment, P2 0.3 % beyond it, where the cube is no longer strained evenly; twice the iterations of the slowest */
-  SB_CHECK_NEAR(t.run->t_now, reached, 5e-3, "load factor");
+  /* below the limit by the least increment; twice the iterations of the slowest */
+  SB_CHECK_NEAR(t.run->t_now, reached, 1e-3, "load factor");
   SB_CHECK(t.run->softening > 10., "%s: softening %g", element, (double)t.run->softening);
-  SB_CHECK(t.run->newton_total < 550, "%s: %d iterations", element, (int)t.run->newton_total);
+  SB_CHECK(t.run->newton_total < 280, "%s: %d iterations", element, (int)t.run->newton_total);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* A cantilever that a pressure on its upper face curls up. */
-static PetscErrorCode check_curl(const char *element, PetscReal pressure, PetscReal iterations)
+static PetscErrorCode check_curl(const char *element, PetscReal nu, PetscReal pressure, PetscReal iterations)
 {
   TestScene t;
 
@@ -79,14 +79,15 @@ static PetscErrorCode check_curl(const char *element, PetscReal pressure, PetscR
   PetscCall(
     verify_open(&t,
                 "-bodies a -body_a_mesh box:1,0.1,0.1:10,2,2 -body_a_material neohookean -body_a_young "
-                "1e6 -body_a_poisson 0.3 -body_a_density 1000 -effects hold,press -effect_hold_type "
+                "1e6 -body_a_poisson %g -body_a_density 1000 -effects hold,press -effect_hold_type "
                 "fixed -effect_hold_on xmin -effect_press_type pressure -effect_press_on zmax "
                 "-effect_press_value %g -time static -static_steps 10 -body_a_element %s",
-                (double)pressure, element));
+                (double)nu, (double)pressure, element));
   PetscCall(verify_solve(&t, "curl"));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD, "  curl, %s, %g Pa: %d Newton and %d linear iterations, %d rejected\n", element,
-    (double)pressure, (int)t.run->newton_total, (int)t.run->linear_total, (int)t.run->rejected_total));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  curl, %s, nu %g, %g Pa: %d Newton and %d linear iterations, %d rejected\n",
+                        element, (double)nu, (double)pressure, (int)t.run->newton_total,
+                        (int)t.run->linear_total, (int)t.run->rejected_total));
   SB_CHECK(t.run->t_now == 1. && !t.run->rejected_total, "%s: load factor %g, %d rejected", element,
            (double)t.run->t_now, (int)t.run->rejected_total);
   SB_CHECK(t.run->newton_total <= iterations, "%s: %d Newton iterations", element, (int)t.run->newton_total);
@@ -214,8 +215,10 @@ int main(int argc, char **argv)
   PetscCall(check_follower_end("p1"));
   PetscCall(check_follower_end("p2"));
   PetscCall(check_follower_end("cr"));
-  PetscCall(check_curl("p1", 2e4, 150));
-  PetscCall(check_curl("p2", 8e3, 250));
+  PetscCall(check_curl("p1", 0.3, 2e4, 90));
+  PetscCall(check_curl("p2", 0.3, 8e3, 110));
+  /* the symmetric part of the tangent is not definite from load factors of 0.75 on */
+  PetscCall(check_curl("p2", 0.4999, 1.2e3, 250));
   PetscCall(check_branch(PETSC_FALSE, ARC));
   PetscCall(check_branch(PETSC_FALSE, ARC "-body_a_mesh box:1,1,1:1"));
   PetscCall(check_branch(PETSC_FALSE, ARC "-body_a_element cr"));
