@@ -70,14 +70,16 @@ static void write_array(SbIndex v, hid_t where, const char *name, const SbArray 
   (void)H5Pclose(list);
 }
 
-/* A dataset [n], or [n][m] when m > 0, of numbers in memory; packed when they are many. Of bytes there is one, which all of them are. */
-static void write_numbers(hid_t where, const char *name, PetscInt n, PetscInt m, hid_t memtype,
+/* A dataset [n], or [n][m] when m > 0, of that type, from numbers in memory, integers of 64 bits; packed when they are many. Of bytes there is one, which all of them are. */
+static void write_numbers(hid_t where, const char *name, PetscInt n, PetscInt m, hid_t type,
                           const void *values, PetscBool *ok)
 {
   const hsize_t size[2] = {(hsize_t)n, (hsize_t)m}, chunk[1] = {(hsize_t)PetscMin(n, 1 << 16)};
   const hid_t space = H5Screate_simple(m ? 2 : 1, size, NULL), list = H5Pcreate(H5P_DATASET_CREATE);
-  const PetscBool same = (PetscBool)(memtype == H5T_NATIVE_UINT8);
-  const hid_t type = same ? H5T_STD_U8LE : memtype == H5T_NATIVE_DOUBLE ? H5T_IEEE_F64LE : H5T_STD_I64LE;
+  const PetscBool same = (PetscBool)(type == H5T_STD_U8LE);
+  const hid_t memtype = same                     ? H5T_NATIVE_UINT8
+                        : type == H5T_IEEE_F64LE ? H5T_NATIVE_DOUBLE
+                                                 : H5T_NATIVE_INT64;
   hid_t dataset;
 
   (void)H5Pset_obj_track_times(list, 0);
@@ -109,13 +111,14 @@ static void write_cells(SbIndex v, hid_t root, int64_t *work, PetscBool *ok)
   }
   if (!v->points) {
     for (PetscInt p = 0; p < v->npart; p++) work[p] = v->part[p].ncell;
-    write_numbers(root, "NumberOfCells", v->npart, 0, H5T_NATIVE_INT64, work, ok);
+    write_numbers(root, "NumberOfCells", v->npart, 0, H5T_STD_I64LE, work, ok);
     for (PetscInt p = 0; p < v->npart; p++) work[p] *= v->corners;
-    write_numbers(root, "NumberOfConnectivityIds", v->npart, 0, H5T_NATIVE_INT64, work, ok);
-    write_numbers(root, "Types", ncell, 0, H5T_NATIVE_UINT8, v->corners > 4 ? &quadratic : &linear, ok);
+    write_numbers(root, "NumberOfConnectivityIds", v->npart, 0, H5T_STD_I64LE, work, ok);
+    write_numbers(root, "Types", ncell, 0, H5T_STD_U8LE, v->corners > 4 ? &quadratic : &linear, ok);
     for (PetscInt p = 0; p < v->npart; p++)
       for (PetscInt c = 0; c <= v->part[p].ncell; c++) work[n++] = v->corners * (int64_t)c;
-    write_numbers(root, "Offsets", n, 0, H5T_NATIVE_INT64, work, ok);
+    /* of the type of the corners: ParaView 5.13 takes no other */
+    write_numbers(root, "Offsets", n, 0, H5T_STD_I32LE, work, ok);
     return;
   }
 
@@ -124,11 +127,11 @@ static void write_cells(SbIndex v, hid_t root, int64_t *work, PetscBool *ok)
     const hid_t group = H5Gcreate2(root, kind[k], H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
 
     for (PetscInt p = 0; p < v->npart; p++) work[p] = k ? 0 : v->part[p].ncell;
-    write_numbers(group, "NumberOfCells", v->npart, 0, H5T_NATIVE_INT64, work, ok);
-    write_numbers(group, "NumberOfConnectivityIds", v->npart, 0, H5T_NATIVE_INT64, work, ok);
+    write_numbers(group, "NumberOfCells", v->npart, 0, H5T_STD_I64LE, work, ok);
+    write_numbers(group, "NumberOfConnectivityIds", v->npart, 0, H5T_STD_I64LE, work, ok);
     for (PetscInt c = 0; c <= most; c++) work[c] = c;
-    write_numbers(group, "Connectivity", k ? 0 : most, 0, H5T_NATIVE_INT64, work, ok);
-    write_numbers(group, "Offsets", k ? 1 : most + 1, 0, H5T_NATIVE_INT64, work, ok);
+    write_numbers(group, "Connectivity", k ? 0 : most, 0, H5T_STD_I64LE, work, ok);
+    write_numbers(group, "Offsets", k ? 1 : most + 1, 0, H5T_STD_I64LE, work, ok);
     (void)H5Gclose(group);
   }
 }
@@ -148,11 +151,11 @@ static void write_steps(SbIndex v, hid_t root, int64_t *work, PetscBool *ok)
   (void)H5Aclose(count);
   (void)H5Sclose(space);
   for (PetscInt f = 0; f < v->nframe; f++) times[f] = v->frame[f].time;
-  write_numbers(group, "Values", v->nframe, 0, H5T_NATIVE_DOUBLE, times, ok);
+  write_numbers(group, "Values", v->nframe, 0, H5T_IEEE_F64LE, times, ok);
   for (PetscInt f = 0; f < v->nframe; f++) work[f] = 1;
-  write_numbers(group, "NumberOfParts", v->nframe, 0, H5T_NATIVE_INT64, work, ok);
+  write_numbers(group, "NumberOfParts", v->nframe, 0, H5T_STD_I64LE, work, ok);
   for (PetscInt f = 0; f < v->nframe; f++) work[f] = v->frame[f].part;
-  write_numbers(group, "PartOffsets", v->nframe, 0, H5T_NATIVE_INT64, work, ok);
+  write_numbers(group, "PartOffsets", v->nframe, 0, H5T_STD_I64LE, work, ok);
 
   /* cells are those of the part; contact points share theirs */
   for (int corners = 0; corners < 2; corners++) {
@@ -161,8 +164,8 @@ static void write_steps(SbIndex v, hid_t root, int64_t *work, PetscBool *ok)
       for (PetscInt p = 0; !v->points && p < v->frame[i].part; p++)
         work[i] += (corners ? v->corners : 1) * (int64_t)v->part[p].ncell;
     }
-    write_numbers(group, corners ? "ConnectivityIdOffsets" : "CellOffsets", v->nframe, kinds,
-                  H5T_NATIVE_INT64, work, ok);
+    write_numbers(group, corners ? "ConnectivityIdOffsets" : "CellOffsets", v->nframe, kinds, H5T_STD_I64LE,
+                  work, ok);
   }
 
   /* arrays, one frame or one part behind the other */
@@ -182,9 +185,9 @@ static void write_steps(SbIndex v, hid_t root, int64_t *work, PetscBool *ok)
       if (!a->constant) at += rows_of(v, a, f);
     }
     if (!strcmp(a->name, "Points"))
-      write_numbers(group, "PointOffsets", v->nframe, 0, H5T_NATIVE_INT64, work, ok);
+      write_numbers(group, "PointOffsets", v->nframe, 0, H5T_STD_I64LE, work, ok);
     else
-      write_numbers(where[a->cell], a->name, v->nframe, 0, H5T_NATIVE_INT64, work, ok);
+      write_numbers(where[a->cell], a->name, v->nframe, 0, H5T_STD_I64LE, work, ok);
   }
   (void)H5Gclose(where[0]);
   (void)H5Gclose(where[1]);
@@ -217,7 +220,7 @@ static void write_file(SbIndex v, hid_t file, int64_t *work, PetscBool *ok)
 
   /* parts, cells, arrays, steps */
   for (PetscInt p = 0; p < v->npart; p++) work[p] = v->part[p].npoint;
-  write_numbers(root, "NumberOfPoints", v->npart, 0, H5T_NATIVE_INT64, work, ok);
+  write_numbers(root, "NumberOfPoints", v->npart, 0, H5T_STD_I64LE, work, ok);
   write_cells(v, root, work, ok);
   data[0] = H5Gcreate2(root, "PointData", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
   data[1] = H5Gcreate2(root, "CellData", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
