@@ -6,6 +6,7 @@
 #pragma once
 #include "sbbase.h"
 #include "sbkernel.h"
+#include "sbquadratic.h"
 
 #define SB_BOX_ROUNDING 16 /* in units of eps |x|: what the corners of a box may be off */
 
@@ -316,16 +317,23 @@ PetscReal SbTetDeterminant(const PetscReal x[], const PetscInt vert[4]);
 /* ------------------------------------------------------------------ locate.c */
 
 /*
-  SbLocator - which tet holds a point. Not collective; the arrays are borrowed. Tets without volume, or inverted, hold nothing.
+  SbLocator - which tet holds a point. Not collective; the arrays are borrowed. Tets without volume, or inverted, hold nothing. Tets are curved by
+  edge_off[ncell][6][3], nodes at edges 01 02 03 12 13 23 from their middles; NULL: straight. The weights of a curved one are l of its map x(l) (sbquadratic.h).
 
   SbLocatorFind: the tet and the weights of its corners, none negative, sum 1. Of several that hold the point the one in which it lies
   deepest, or the first of equal ones; of a point in none the nearest place. Returns the distance from there, m.
 */
 typedef struct _p_SbLocator *SbLocator;
 PetscErrorCode SbLocatorCreate(PetscInt ncell, const PetscInt cell[], const PetscReal x[],
-                               SbLocator *locator);
+                               const PetscReal edge_off[], SbLocator *locator);
 PetscErrorCode SbLocatorDestroy(SbLocator *locator);
 PetscReal SbLocatorFind(SbLocator locator, const PetscReal point[3], PetscInt *cell, PetscReal weight[4]);
+/* The l of the map of a tet with curved edges: x(l) = point, sum 1; false: Newton's method has not found any. */
+PetscBool SbTetCurvedBarycentric(const PetscReal x[], const PetscInt v[4], const PetscReal off[18],
+                                 const PetscReal point[3], PetscReal l[4]);
+/* The ten nodes of a tet with its edges off their middles by off[6][3]. */
+void SbTetNodes(const PetscReal x[], const PetscInt v[4], const PetscReal off[18],
+                PetscReal node[SB_CELL_NODES][3]);
 /* The weights of the corners v of a tet of x[][3] at a point, in it or not: sum w_a x_a = point, sum 1; negative where it lies outside. */
 void SbTetBarycentric(const PetscReal x[], const PetscInt v[4], const PetscReal point[3],
                       PetscReal weight[4]);

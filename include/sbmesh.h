@@ -43,13 +43,15 @@ typedef struct {
   PetscInt step;   /* after which it was made; 0: it is the mesh of the file */
   PetscReal mass;  /* kg, of the body on this mesh: densities are scaled; 0: as its materials say */
   PetscReal bound; /* the body is re-meshed when its quality falls below it; 0: as the options say */
-  PetscInt nvert, ncell, ntri;
+  PetscInt nvert, ncell, ntri, nedge;
   PetscReal *x;       /* [nvert][3] rest position, placed, m */
   PetscInt *cell;     /* [ncell][4] positively oriented; every vertex is used */
   PetscInt *tri;      /* [ntri][3] triangles that sets of groups hold */
   uint64_t *vert_set; /* [nvert] SB_SET_BIT() of sets that are groups */
   uint64_t *tri_set;  /* [ntri] */
   uint64_t *cell_set; /* [ncell] */
+  PetscInt *edge;     /* [nedge][2] edges that are curved at rest: vertices, the lower one first; ascending */
+  PetscReal *edge_off; /* [nedge][3] their nodes from their middles, m */
 } SbMemoryMesh;
 
 /* A body as the scenario gives it. Data, no methods. */
@@ -193,6 +195,8 @@ PetscErrorCode SbTetDefaults(SbTetOptions *options);
 PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOptions *options);
 /* Room for a mesh in memory; zeroed. Not collective. */
 PetscErrorCode SbMemoryMeshCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri, SbMemoryMesh **in_memory);
+/* Room for curved edges. */
+PetscErrorCode SbMemoryMeshCurve(SbMemoryMesh *in_memory, PetscInt nedge);
 PetscErrorCode SbMemoryMeshDestroy(SbMemoryMesh **in_memory);
 /*
   SbSetParse - reads the description of a set. Not collective.

@@ -120,7 +120,7 @@ typedef struct {
 
 /* The node of an edge of 10-node tets. */
 typedef struct {
-  PetscInt end[2], node; /* vertices, end[0] < end[1] */
+  PetscInt end[2], node; /* vertices, end[0] < end[1]; -1: off is known */
   PetscReal off[3];      /* from the middle of the edge, m once placed */
 } SbMiddle;
 
@@ -143,11 +143,10 @@ struct _p_SbImport {
   SbCount nmiddle;
   SbMiddle *
     middle; /* [nmiddle] edges of 10-node tets, for each tet; once read those that are off the middle, each once, ascending */
-  PetscInt nedge_node; /* vertices that are the node of an edge and no corner of a tet */
-  PetscBool surface;   /* given: all triangles are wanted, and tets need not be there */
-  SbTetOptions tet;    /* given: how a surface becomes tets */
-  PetscReal scale;     /* given: factor that placing will use; a reader that has scaled sets it to 1 */
-  char note[512];      /* what the reader repaired, for SbBody.note */
+  PetscBool surface; /* given: all triangles are wanted, and tets need not be there */
+  SbTetOptions tet;  /* given: how a surface becomes tets */
+  PetscReal scale;   /* given: factor that placing will use; a reader that has scaled sets it to 1 */
+  char note[512];    /* what the reader repaired, for SbBody.note */
   PetscInt step; /* given: step of a run's output whose positions are wanted; 0 at rest, -1 the last one */
   SbMeshProgress progress; /* given: called with how far a long read is; may be NULL */
   void *progress_ctx;
@@ -168,6 +167,13 @@ struct _p_SbImport {
 /* Chooses the reader by the name of the mesh, reads, transforms. Not collective. */
 PetscErrorCode SbImportRead(const SbBody *body, SbImport *import);
 PetscErrorCode SbImportDestroy(SbImport *import);
+/* Leaves out the vertices with keep[] 0, and items with such a one; keep[nvert] becomes the new number of each, or -1. Not collective. */
+PetscErrorCode SbImportDropVertices(SbImport *import, PetscInt keep[]);
+/* Once tets and nodes of edges are read: edges off their middle, each once, ascending; nodes that are no corner of a tet are no vertices any more.
+   Output: largest, off the middle over the length. Error: an edge with two nodes at different places. Not collective. */
+PetscErrorCode SbImportMiddles(SbImport *import, PetscReal *largest);
+/* The note of the reader about n edges off their middle. */
+void SbImportNoteMiddles(SbImport *import, PetscInt n, PetscReal largest);
 /* The same of a body that may be one of many copies: `before`, the body before it or NULL, and `shared`, zeroed at first, in which the mesh of its file is kept for
    the next one; destroy it. */
 PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImport *shared, SbImport *import);

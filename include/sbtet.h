@@ -44,3 +44,6 @@ void SbImportShape(const SbImport *import, PetscReal degrees, SbShape *shape);
   one, negative when it is inverted. Not collective.
 */
 PetscReal SbTetQuality(const PetscReal x[4][3]);
+/* curve.c: of a tet with its edges off their middles by off[6][3], its volume, and the least Jacobian, where P2 uses it and at its nodes, over that of the straight tet. */
+PetscReal SbTetCurvedVolume(const PetscReal x[], const PetscInt vert[4], const PetscReal off[18]);
+PetscReal SbTetCurvedLeast(const PetscReal x[], const PetscInt vert[4], const PetscReal off[18]);

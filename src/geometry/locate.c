@@ -4,6 +4,10 @@
   With the weights w of the corners of a tet (barycentric coordinates) the point lies in it when none is negative. Outside, negative ones are set to
   zero and the others scaled to the sum 1; the distance is that from the point so found. It is not less than the distance of the tet, so the tree of
   boxes need not be searched farther than that.
+
+  In a curved tet, x(l) = sum_a phi_a(l) x_a, l is found by Newton's method from the weights of the straight one on: with the corners c_i of the P1 tet that has the
+  derivatives of the map at l (src/base/quadratic_map.c) the next l is the barycentric coordinates there of p - x(l) + sum l_i c_i. The tet lies in the hull of its
+  corners and of the middles of its edges moved by twice their offsets (Bernstein form), which gives its box.
 */
 #include "sbgeometry.h"
 
@@ -18,11 +22,86 @@ PetscReal SbTetDeterminant(const PetscReal x[], const PetscInt v[4])
 
 struct _p_SbLocator {
   const PetscInt *cell;
-  const PetscReal *x;
+  const PetscReal *x, *edge_off;
   SbBoxTree tree; /* tets without volume, or inverted, have empty boxes */
 };
 
-PetscErrorCode SbLocatorCreate(PetscInt ncell, const PetscInt cell[], const PetscReal x[], SbLocator *locator)
+#define STEPS 20    /* of Newton's method; it takes 3 to 6 */
+#define CLOSE 1e-14 /* of the diagonal of the tet: where it ends */
+
+void SbTetNodes(const PetscReal x[], const PetscInt v[4], const PetscReal off[18],
+                PetscReal node[SB_CELL_NODES][3])
+{
+  for (int k = 0; k < 12; k++) node[k / 3][k % 3] = x[3 * v[k / 3] + k % 3];
+  for (int k = 0; k < 18; k++)
+    node[4 + k / 3][k % 3] =
+      0.5 * (x[3 * v[SbTetEdge[k / 3][0]] + k % 3] + x[3 * v[SbTetEdge[k / 3][1]] + k % 3]) + off[k];
+}
+
+/* The edges of a cell are off their middles; NULL: it is straight. */
+static const PetscReal *off_of(SbLocator l, PetscInt cell)
+{
+  const PetscReal *off = l->edge_off ? l->edge_off + 18 * (size_t)cell : NULL;
+
+  for (int k = 0; off && k < 18; k++)
+    if (off[k] != 0) return off;
+  return NULL;
+}
+
+/* r = p - x(w), from the first corner: small tets may lie far from the origin. */
+static void remainder_at(const PetscReal node[SB_CELL_NODES][3], const PetscReal p[3], const PetscReal w[4],
+                         PetscReal r[3])
+{
+  PetscReal phi[SB_CELL_NODES];
+
+  SbQuadraticBasis(w, phi);
+  for (int k = 0; k < 3; k++) {
+    r[k] = p[k] - node[0][k];
+    for (int a = 1; a < SB_CELL_NODES; a++) r[k] -= phi[a] * (node[a][k] - node[0][k]);
+  }
+}
+
+PetscBool SbTetCurvedBarycentric(const PetscReal x[], const PetscInt v[4], const PetscReal off[18],
+                                 const PetscReal p[3], PetscReal w[4])
+{
+  static const PetscInt own[4] = {0, 1, 2, 3};
+  PetscReal node[SB_CELL_NODES][3], box[6];
+
+  SbTetNodes(x, v, off, node);
+  SbBoxClear(box);
+  for (int a = 0; a < SB_CELL_NODES; a++) SbBoxAdd(box, node[a]);
+  SbTetBarycentric(x, v, p, w);
+  for (int i = 0; i < STEPS; i++) {
+    PetscReal corner[4][3], r[3];
+
+    remainder_at((const PetscReal(*)[3])node, p, w, r);
+    if (SbDot3(r, r) <= PetscSqr(CLOSE * SbBoxDiagonal(box))) return PETSC_TRUE;
+    SbQuadraticCorners(w, (const PetscReal(*)[3])node, corner);
+    for (int k = 0; k < 3; k++)
+      for (int a = 0; a < 4; a++) r[k] += w[a] * corner[a][k];
+    SbTetBarycentric(&corner[0][0], own, r, w);
+  }
+  return PETSC_FALSE;
+}
+
+/* The weights of the place in a curved tet nearest to p, or one close to it; returns the square of the distance. */
+static PetscReal find_curved(SbLocator l, PetscInt cell, const PetscReal off[18], const PetscReal p[3],
+                             PetscReal w[4], PetscReal *depth)
+{
+  const PetscBool found = SbTetCurvedBarycentric(l->x, l->cell + 4 * cell, off, p, w);
+  PetscReal node[SB_CELL_NODES][3], r[3], sum = 0;
+
+  *depth = PetscMin(PetscMin(w[0], w[1]), PetscMin(w[2], w[3]));
+  if (found && *depth >= 0) return 0;
+  for (int a = 0; a < 4; a++) sum += w[a] = PetscIsInfOrNanReal(w[a]) ? 1 : PetscMax(w[a], 0);
+  for (int a = 0; a < 4; a++) w[a] /= sum;
+  SbTetNodes(l->x, l->cell + 4 * cell, off, node);
+  remainder_at((const PetscReal(*)[3])node, p, w, r);
+  return SbDot3(r, r);
+}
+
+PetscErrorCode SbLocatorCreate(PetscInt ncell, const PetscInt cell[], const PetscReal x[],
+                               const PetscReal edge_off[], SbLocator *locator)
 {
   SbLocator l;
   PetscReal(*box)[6];
@@ -32,11 +111,19 @@ PetscErrorCode SbLocatorCreate(PetscInt ncell, const PetscInt cell[], const Pets
   *locator = l;
   l->cell = cell;
   l->x = x;
+  l->edge_off = edge_off;
   PetscCall(PetscMalloc1(ncell, &box));
   for (PetscInt c = 0; c < ncell; c++) {
     SbBoxClear(box[c]);
     if (!(SbTetDeterminant(x, cell + 4 * c) > 0)) continue;
     for (int a = 0; a < 4; a++) SbBoxAdd(box[c], x + 3 * cell[4 * c + a]);
+    if (off_of(l, c)) {
+      PetscReal node[SB_CELL_NODES][3], twice[18];
+
+      for (int k = 0; k < 18; k++) twice[k] = 2 * edge_off[18 * (size_t)c + k];
+      SbTetNodes(x, cell + 4 * c, twice, node);
+      for (int a = 4; a < SB_CELL_NODES; a++) SbBoxAdd(box[c], node[a]);
+    }
   }
   PetscCall(SbBoxTreeCreate(ncell, (const PetscReal(*)[6])box, &l->tree));
   PetscCall(PetscFree(box));
@@ -78,12 +165,15 @@ PetscReal SbLocatorFind(SbLocator l, const PetscReal p[3], PetscInt *cell, Petsc
   *cell = -1;
   for (int a = 0; a < 4; a++) weight[a] = 0;
   for (SbBoxNearestBegin(&l->tree, box, PETSC_MAX_REAL, &nearest); SbBoxNearestNext(&nearest, &c);) {
+    const PetscReal *off = off_of(l, c);
     PetscReal w[4], depth, sum = 0, d2 = 0;
 
     // moves the weights into the tet
     SbTetBarycentric(l->x, l->cell + 4 * c, p, w);
     depth = PetscMin(PetscMin(w[0], w[1]), PetscMin(w[2], w[3]));
-    if (depth < 0) {
+    if (off)
+      d2 = find_curved(l, c, off, p, w, &depth);
+    else if (depth < 0) {
       for (int a = 0; a < 4; a++) sum += w[a] = PetscMax(w[a], 0);
       for (int a = 0; a < 4; a++) w[a] /= sum;
       for (int k = 0; k < 3; k++) {

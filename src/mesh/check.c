@@ -15,50 +15,15 @@
 
 PetscErrorCode SbImportDropUnused(SbImport *im)
 {
-  PetscInt *map, nused = 0, ndropped;
+  const PetscInt before = im->nvert;
+  PetscInt *keep;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(im->nvert, &map));
-  for (PetscInt i = 0; i < 4 * im->item[3].n; i++) map[im->item[3].vert[i]] = 1;
-  for (PetscInt v = 0; v < im->nvert; v++) map[v] = map[v] ? nused++ : -1;
-  im->nunused = im->nvert - nused - im->nedge_node;
-  im->nedge_node = 0;
-  if (im->nvert > nused) {
-    PetscInt n = 0;
-
-    for (PetscInt v = 0; v < im->nvert; v++) {
-      if (map[v] < 0) continue;
-      PetscCall(PetscArraymove(im->x + 3 * map[v], im->x + 3 * v, 3));
-      im->vert_number[map[v]] = im->vert_number[v];
-    }
-    for (PetscInt i = 0; i < im->nmiddle.n; i++) {
-      SbMiddle m = im->middle[i];
-
-      for (int k = 0; k < 2; k++) m.end[k] = map[m.end[k]];
-      if (m.end[0] >= 0 && m.end[1] >= 0) im->middle[n++] = m;
-    }
-    im->nmiddle.n = n;
-    for (int d = 0; d < 4; d++) {
-      PetscInt kept = 0;
-
-      // items have the new numbers; those that use a vertex which is gone are dropped
-      for (PetscInt i = 0; i < im->item[d].n; i++) {
-        PetscInt *v = im->item[d].vert + (d + 1) * i;
-        PetscBool gone = PETSC_FALSE;
-
-        for (int k = 0; k <= d; k++) {
-          v[k] = map[v[k]];
-          gone = (PetscBool)(gone || v[k] < 0);
-        }
-        if (!gone) SbItemsMove(&im->item[d], d, kept++, i);
-      }
-      ndropped = im->item[d].n - kept;
-      im->item[d].n = kept;
-      if (d == 2) im->nlost += ndropped;
-    }
-    im->nvert = nused;
-  }
-  PetscCall(PetscFree(map));
+  PetscCall(PetscCalloc1(im->nvert, &keep));
+  for (PetscInt i = 0; i < 4 * im->item[3].n; i++) keep[im->item[3].vert[i]] = 1;
+  PetscCall(SbImportDropVertices(im, keep));
+  im->nunused = before - im->nvert;
+  PetscCall(PetscFree(keep));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

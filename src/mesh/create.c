@@ -30,11 +30,10 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
 {
   SbMesh m;
   SbScope scope;
-  SbMergedMesh merged;
+  SbMergedMesh merged, curved;
   SbLocalMesh local;
   PetscInt partitioner, reading;
   PetscBool full, all = PETSC_FALSE;
-  PetscReal *edge_off;
 
   PetscFunctionBeginUser;
   PetscCheck(nset <= SB_SET_MAX, comm, PETSC_ERR_USER_INPUT,
@@ -70,12 +69,14 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   m->set = set;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));
   for (PetscInt b = 0; b < nbody; b++) all = (PetscBool)(all || body[b].other_nodes);
-  edge_off = merged.edge_off;
+  curved = merged;
+  merged.curved = NULL;
   merged.edge_off = NULL;
   PetscCall(SbDistribute(comm, (SbPartitioner)partitioner, all, &merged, &local));
   PetscCall(SbMeshNumber(m, &local));
-  PetscCall(SbMeshCurve(m, edge_off));
-  PetscCall(PetscFree(edge_off));
+  PetscCall(SbMeshCurve(m, curved.ncurved, curved.curved, curved.edge_off));
+  PetscCall(PetscFree(curved.curved));
+  PetscCall(PetscFree(curved.edge_off));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));
   *mesh = m;
   PetscFunctionReturn(PETSC_SUCCESS);

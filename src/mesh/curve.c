@@ -25,37 +25,43 @@ static PetscReal jacobian(const PetscReal x[SB_CELL_NODES][3], const PetscReal L
   return SbTetDeterminant(&corner[0][0], own);
 }
 
-/* The ten nodes of a tet. */
-static void positions(const PetscReal x[], const PetscInt v[4], const PetscReal off[18],
-                      PetscReal node[SB_CELL_NODES][3])
-{
-  for (int k = 0; k < 12; k++) node[k / 3][k % 3] = x[3 * v[k / 3] + k % 3];
-  for (int k = 0; k < 18; k++)
-    node[4 + k / 3][k % 3] =
-      0.5 * (x[3 * v[SbTetEdge[k / 3][0]] + k % 3] + x[3 * v[SbTetEdge[k / 3][1]] + k % 3]) + off[k];
-}
-
 PetscReal SbTetCurvedVolume(const PetscReal x[], const PetscInt v[4], const PetscReal off[18])
 {
   PetscReal node[SB_CELL_NODES][3], volume = 0;
 
-  positions(x, v, off, node);
+  SbTetNodes(x, v, off, node);
   for (int q = 0; q < SbRuleQuintic.n; q++)
     volume += SbRuleQuintic.weight[q] * jacobian((const PetscReal(*)[3])node, SbRuleQuintic.L[q]) / 6;
   return volume;
 }
 
-PetscErrorCode SbImportCurve(const SbImport *im, SbBody *body, uint64_t cell[], PetscReal **edge_off)
+PetscReal SbTetCurvedLeast(const PetscReal x[], const PetscInt v[4], const PetscReal off[18])
 {
-  PetscInt ncurved = 0;
-  char text[128];
+  PetscReal node[SB_CELL_NODES][3], least = PETSC_MAX_REAL;
+
+  SbTetNodes(x, v, off, node);
+  for (int q = 0; q < SbRuleQuintic.n + SB_CELL_NODES; q++) {
+    const int n = q - SbRuleQuintic.n;
+    PetscReal L[4] = {0, 0, 0, 0}, at;
+
+    if (n >= 0 && n < 4) L[n] = 1;
+    if (n >= 4) L[SbTetEdge[n - 4][0]] = L[SbTetEdge[n - 4][1]] = 0.5;
+    at = jacobian((const PetscReal(*)[3])node, n < 0 ? SbRuleQuintic.L[q] : L);
+    least = PetscMin(least, at);
+  }
+  return least / SbTetDeterminant(x, v);
+}
+
+/* The curved ones of this rank's cells, and what they add to the volume. */
+static PetscErrorCode find_curved(const SbImport *im, PetscBool keep, uint64_t cell[], PetscReal **edge_off,
+                                  PetscInt *ncurved, PetscReal *volume)
+{
+  PetscInt room = 0;
 
   PetscFunctionBeginUser;
-  if (!im->nmiddle.n) PetscFunctionReturn(PETSC_SUCCESS);
-  if (body->edge_nodes) PetscCall(PetscCalloc1(18 * (size_t)im->item[3].n, edge_off));
-  for (PetscInt c = 0; c < im->item[3].n; c++) {
+  for (PetscInt c = 0; im->nmiddle.n && c < im->item[3].n; c++) {
     const PetscInt *v = im->item[3].vert + 4 * c;
-    PetscReal x[SB_CELL_NODES][3], off[18] = {0}, least = PETSC_MAX_REAL;
+    PetscReal off[18] = {0}, least;
     PetscBool curved = PETSC_FALSE;
 
     for (int e = 0; e < 6; e++) {
@@ -67,55 +73,85 @@ PetscErrorCode SbImportCurve(const SbImport *im, SbBody *body, uint64_t cell[], 
       for (int k = 0; m && k < 3; k++) off[3 * e + k] = m->off[k];
       curved = (PetscBool)(curved || m);
     }
-    ncurved += curved;
-    if (!curved || !*edge_off) continue;
+    if (!curved) continue;
+    ++*ncurved;
+    if (!keep) continue;
 
     // its Jacobian where it is used and at its nodes, and its volume instead of that of the straight tet
     cell[c] |= SB_CURVED;
-    PetscCall(PetscArraycpy(*edge_off + 18 * (size_t)c, off, 18));
-    positions(im->x, v, off, x);
-    for (int q = 0; q < SbRuleQuintic.n + SB_CELL_NODES; q++) {
-      const int n = q - SbRuleQuintic.n;
-      PetscReal L[4] = {0, 0, 0, 0};
-
-      if (n >= 0 && n < 4) L[n] = 1;
-      if (n >= 4) L[SbTetEdge[n - 4][0]] = L[SbTetEdge[n - 4][1]] = 0.5;
-      least = PetscMin(least, jacobian((const PetscReal(*)[3])x, n < 0 ? SbRuleQuintic.L[q] : L));
-    }
+    PetscCall(SbReserve(*ncurved, 18 * sizeof(PetscReal), &room, edge_off));
+    PetscCall(PetscArraycpy(*edge_off + 18 * (size_t)(*ncurved - 1), off, 18));
+    least = SbTetCurvedLeast(im->x, v, off);
     PetscCheck(
       least > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
       "%s: tetrahedron %lld of second order folds over itself: its least Jacobian is %.3g times that of the "
       "straight tet, and must be above 0; mesh finer there or let gmsh untangle it (Mesh.HighOrderOptimize = "
       "2), or save straight tets (Mesh.ElementOrder = 1)",
-      im->where, (long long)im->item[3].number[c], (double)(least / SbTetDeterminant(im->x, v)));
-    body->volume += SbTetCurvedVolume(im->x, v, off) - SbTetDeterminant(im->x, v) / 6;
+      im->where, (long long)im->item[3].number[c], (double)least);
+    *volume += SbTetCurvedVolume(im->x, v, off) - SbTetDeterminant(im->x, v) / 6;
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportCurve(MPI_Comm comm, const SbImport *im, SbBody *body, uint64_t cell[],
+                             PetscReal **edge_off)
+{
+  SbCaughtError caught = {0, ""};
+  PetscInt ncurved = 0;
+  PetscReal volume = 0;
+  char text[128];
+
+  PetscFunctionBeginUser;
+  SB_CATCH(&caught, find_curved(im, body->edge_nodes, cell, edge_off, &ncurved, &volume));
+  PetscCall(SbCaughtRaise(comm, &caught));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &ncurved, 1, MPIU_INT, MPI_SUM, comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &volume, 1, MPIU_REAL, MPI_SUM, comm));
   if (!ncurved) PetscFunctionReturn(PETSC_SUCCESS);
+  body->volume += volume;
   (void)snprintf(text, sizeof(text), "%s%s: %" PetscInt_FMT, body->note[0] ? ", " : "",
-                 *edge_off ? "curved tets" : "curved tets, which only p2 keeps, taken as straight", ncurved);
+                 body->edge_nodes ? "curved tets" : "curved tets, which only p2 keeps, taken as straight",
+                 ncurved);
   PetscCall(PetscStrlcat(body->note, text, sizeof(body->note)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMeshCurve(SbMesh mesh, const PetscReal *edge_off)
+PetscErrorCode SbMeshCurve(SbMesh mesh, PetscInt n, const PetscInt orig[], const PetscReal off[])
 {
-  PetscInt *leaf, *root, n = 0;
-  PetscMPIInt any = edge_off != NULL;
+  PetscInt *leaf, *root, ncurved = 0, total = n, ndealt;
+  PetscReal *dealt;
+  PetscLayout rows;
+  MPI_Datatype eighteen;
   PetscSF sf;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Bcast(&any, 1, MPI_INT, 0, mesh->comm));
-  if (!any) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_INT, MPI_SUM, mesh->comm));
+  if (!total) PetscFunctionReturn(PETSC_SUCCESS);
+  // from who has read them to the ranks that numbers are dealt to
+  PetscCall(PetscLayoutCreateFromSizes(mesh->comm, PETSC_DECIDE, mesh->Ncell, 1, &rows));
+  PetscCall(PetscLayoutGetLocalSize(rows, &ndealt));
+  PetscCall(PetscMalloc1(18 * (size_t)ndealt, &dealt));
+  PetscCallMPI(MPI_Type_contiguous(18, MPIU_REAL, &eighteen));
+  PetscCallMPI(MPI_Type_commit(&eighteen));
+  PetscCall(PetscSFCreate(mesh->comm, &sf));
+  PetscCall(PetscSFSetGraphLayout(sf, rows, n, NULL, PETSC_COPY_VALUES, orig));
+  PetscCall(PetscSFReduceBegin(sf, eighteen, off, dealt, MPI_REPLACE));
+  PetscCall(PetscSFReduceEnd(sf, eighteen, off, dealt, MPI_REPLACE));
+  PetscCall(PetscSFDestroy(&sf));
+  PetscCallMPI(MPI_Type_free(&eighteen));
+  // and from there to where the cells are
   PetscCall(PetscCalloc1(18 * (size_t)mesh->ncell, &mesh->edge_off));
   PetscCall(PetscMalloc2(mesh->ncell, &leaf, mesh->ncell, &root));
   for (PetscInt c = 0; c < mesh->ncell; c++) {
     if (!(mesh->cell_set[c] & SB_CURVED)) continue;
-    leaf[n] = c;
-    root[n++] = mesh->cell_orig[c];
+    leaf[ncurved] = c;
+    root[ncurved++] = mesh->cell_orig[c];
   }
-  PetscCall(SbForestOnRank0(mesh->comm, mesh->Ncell, n, leaf, root, &sf));
-  PetscCall(SbForestBroadcast(sf, 18, MPIU_REAL, edge_off, mesh->edge_off));
+  PetscCall(PetscSFCreate(mesh->comm, &sf));
+  PetscCall(PetscSFSetGraphLayout(sf, rows, ncurved, leaf, PETSC_COPY_VALUES, root));
+  PetscCall(SbForestBroadcast(sf, 18, MPIU_REAL, dealt, mesh->edge_off));
   PetscCall(PetscSFDestroy(&sf));
+  PetscCall(PetscLayoutDestroy(&rows));
   PetscCall(PetscFree2(leaf, root));
+  PetscCall(PetscFree(dealt));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -52,6 +52,27 @@ PetscErrorCode SbMeshFileGroup(const SbImport *im, PetscInt i, SbMeshGroup *grou
 
 /* ------------------------------------------------------------------ shape */
 
+/* The volume with curved tets; what p2 would refuse is no error here. */
+static PetscErrorCode measure_curved(const SbImport *im, SbBody *body)
+{
+  SbCaughtError caught = {0, ""};
+  PetscReal *edge_off = NULL;
+  uint64_t *cell;
+
+  PetscFunctionBeginUser;
+  if (!im->nmiddle.n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc1(im->item[3].n, &cell));
+  body->edge_nodes = PETSC_TRUE;
+  SB_CATCH(&caught, SbImportCurve(PETSC_COMM_SELF, im, body, cell, &edge_off));
+  if (caught.code) {
+    PetscCall(PetscStrlcat(body->note, ", refused with p2: ", sizeof(body->note)));
+    PetscCall(PetscStrlcat(body->note, caught.text, sizeof(body->note)));
+  }
+  PetscCall(PetscFree(edge_off));
+  PetscCall(PetscFree(cell));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshStatistics *facts)
 {
   SbFaces faces;
@@ -65,6 +86,7 @@ PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshStatistics *facts)
   PetscCall(PetscMemzero(&faces, sizeof(faces)));
   ierr = SbImportCheck(im, &faces);
   if (!ierr) ierr = SbImportQuality(im, &faces, &facts->body);
+  if (!ierr) ierr = measure_curved(im, &facts->body);
   // faces, and the area of the surface
   facts->nface = (4 * faces.ncell - faces.nboundary) / 2 + faces.nboundary;
   for (PetscInt s = 0; !ierr && s < 4 * faces.ncell; s++) {

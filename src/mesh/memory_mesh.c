@@ -21,6 +21,14 @@ PetscErrorCode SbMemoryMeshCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbMemoryMeshCurve(SbMemoryMesh *g, PetscInt nedge)
+{
+  PetscFunctionBeginUser;
+  g->nedge = nedge;
+  PetscCall(PetscCalloc2(2 * (size_t)nedge, &g->edge, 3 * (size_t)nedge, &g->edge_off));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbMemoryMeshDestroy(SbMemoryMesh **in_memory)
 {
   SbMemoryMesh *g = *in_memory;
@@ -28,6 +36,7 @@ PetscErrorCode SbMemoryMeshDestroy(SbMemoryMesh **in_memory)
   PetscFunctionBeginUser;
   if (!g) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree6(g->x, g->cell, g->tri, g->vert_set, g->tri_set, g->cell_set));
+  PetscCall(PetscFree2(g->edge, g->edge_off));
   PetscCall(PetscFree(*in_memory));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -49,6 +58,12 @@ PetscErrorCode SbImportMemoryMesh(const SbBody *body, SbImport *im)
   for (PetscInt v = 0; v < g->nvert; v++) im->vert_number[v] = v + 1;
   for (PetscInt c = 0; c < g->ncell; c++)
     PetscCall(SbImportAddItem(im, 3, g->cell + 4 * (size_t)c, none, c + 1));
+  PetscCall(PetscMalloc1(g->nedge, &im->middle));
+  im->nmiddle = (SbCount){g->nedge, g->nedge};
+  for (PetscInt i = 0; i < g->nedge; i++) {
+    im->middle[i] = (SbMiddle){.end = {g->edge[2 * i], g->edge[2 * i + 1]}, .node = -1};
+    PetscCall(PetscArraycpy(im->middle[i].off, g->edge_off + 3 * i, 3));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -26,7 +26,7 @@ static PetscErrorCode prepare(PetscInt nbody, SbBody body[], PetscInt b, PetscIn
   PetscCall(PetscCalloc1(im->item[3].n, &part->masks.cell));
   PetscCall(PetscCalloc1(4 * (size_t)im->item[3].n, &part->masks.face));
   PetscCall(SbSetsMark(im, &part->faces, nbody, body, b, nset, set, &part->masks));
-  PetscCall(SbImportCurve(im, &body[b], part->masks.cell, &part->edge_off));
+  PetscCall(SbImportCurve(PETSC_COMM_SELF, im, &body[b], part->masks.cell, &part->edge_off));
   PetscCall(SbSetsCount(PETSC_COMM_SELF, im->nvert, im->item[3].n, &part->masks, nset, set));
   PetscCall(PetscFree(part->faces.face)); /* the neighbours are found */
   PetscCall(PetscFree(part->faces.start));
@@ -75,8 +75,15 @@ static PetscErrorCode merge(PetscInt nbody, const SbBody body[], SbImport im[], 
   }
   PetscCall(PetscMalloc1(w->ncell, &w->data));
   PetscCall(PetscMalloc1(w->nvert, &w->vertex));
+  for (PetscInt b = 0; b < nbody; b++)
+    for (PetscInt c = 0; c < im[b].item[3].n; c++) w->ncurved += part[b].masks.cell[c] & SB_CURVED ? 1 : 0;
+  PetscCall(PetscMalloc1(w->ncurved, &w->curved));
+  PetscCall(PetscMalloc1(18 * (size_t)w->ncurved, &w->edge_off));
+  w->ncurved = 0;
   at = (Begin){0};
   for (PetscInt b = 0; b < nbody; b++) {
+    PetscInt ncurved = 0;
+
     // what travels with the points of body b
     for (PetscInt c = 0; c < im[b].item[3].n; c++) {
       SbCellData *p = &w->data[at.cell + c];
@@ -85,12 +92,11 @@ static PetscErrorCode merge(PetscInt nbody, const SbBody body[], SbImport im[], 
       p->body = b;
       p->set = part[b].masks.cell[c];
       for (int f = 0; f < 4; f++) p->face[f] = part[b].masks.face[4 * c + f];
+      if (p->set & SB_CURVED) w->curved[w->ncurved + ncurved++] = p->orig;
     }
-    if (part[b].edge_off) {
-      if (!w->edge_off) PetscCall(PetscCalloc1(18 * (size_t)w->Ncell, &w->edge_off));
-      PetscCall(PetscArraycpy(w->edge_off + 18 * (size_t)at.orig_cell, part[b].edge_off, 18 * body[b].ncell));
-      PetscCall(PetscFree(part[b].edge_off));
-    }
+    PetscCall(PetscArraycpy(w->edge_off + 18 * (size_t)w->ncurved, part[b].edge_off, 18 * (size_t)ncurved));
+    PetscCall(PetscFree(part[b].edge_off));
+    w->ncurved += ncurved;
     for (PetscInt v = 0; v < im[b].nvert; v++) {
       SbVertexData *p = &w->vertex[at.vert + v];
 
@@ -210,6 +216,7 @@ PetscErrorCode SbMergedMeshDestroy(SbMergedMesh *w)
   PetscCall(PetscFree(w->remote));
   PetscCall(PetscFree(w->data));
   PetscCall(PetscFree(w->vertex));
+  PetscCall(PetscFree(w->curved));
   PetscCall(PetscFree(w->edge_off));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -81,14 +81,14 @@ PetscErrorCode SbSetsCount(MPI_Comm comm, PetscInt nvert, PetscInt ncell, const 
                            SbSet set[]);
 /*
   curve.c: cells with curved edges of a body whose element has nodes there are marked; the volume of the body becomes that of them; a note for other elements.
+  The cells are those of all ranks of comm. Collective.
 
-  Output: edge_off[ncell][6][3], NULL where there are none. Error: a cell whose map has no positive Jacobian at a point.
+  Output: edge_off[][6][3] of the marked cells, NULL where there are none. Error: a cell whose map has no positive Jacobian at a point.
 */
-PetscErrorCode SbImportCurve(const SbImport *import, SbBody *body, uint64_t cell[], PetscReal **edge_off);
-/* Of a tet with its edges off their middles by off[6][3]. */
-PetscReal SbTetCurvedVolume(const PetscReal x[], const PetscInt vert[4], const PetscReal off[18]);
-/* Brings them from rank 0, by original number, to where the cells are. Collective. */
-PetscErrorCode SbMeshCurve(SbMesh mesh, const PetscReal *edge_off);
+PetscErrorCode SbImportCurve(MPI_Comm comm, const SbImport *import, SbBody *body, uint64_t cell[],
+                             PetscReal **edge_off);
+/* Brings off[n][6][3] of cells orig[n], by original number, to where the cells are. Collective. */
+PetscErrorCode SbMeshCurve(SbMesh mesh, PetscInt n, const PetscInt orig[], const PetscReal off[]);
 /* Adds the members of sets that are groups. */
 PetscErrorCode SbMemoryMeshMark(const SbBody *body, const SbFaces *faces, SbMasks *masks);
 /* A set that selects nothing is an error, which lists the groups that exist. */
@@ -128,7 +128,9 @@ typedef struct {
   PetscInt *neighbour;  /* [ncell][4] cell across the face, -1: boundary, ncell + k: remote[k] */
   PetscInt nremote;
   PetscSFNode *remote; /* [nremote] */
-  PetscReal *edge_off; /* [Ncell][6][3] by original numbers, on rank 0: as in SbMesh */
+  PetscInt ncurved;
+  PetscInt *curved;    /* [ncurved] original numbers of curved cells, some on each rank */
+  PetscReal *edge_off; /* [ncurved][6][3] as in SbMesh */
 } SbMergedMesh;
 
 typedef enum {
@@ -146,7 +148,7 @@ typedef struct {
   SbMasks masks;
   PetscInt first;      /* original number of the first cell */
   PetscInt *orig;      /* [nvert] original numbers, ascending; NULL: 0, 1, ... */
-  PetscReal *edge_off; /* [ncell][6][3] */
+  PetscReal *edge_off; /* [][6][3] of cells with SB_CURVED */
   PetscInt nremote;
   PetscSFNode *remote; /* [nremote] cells of other ranks, numbered there from its first body on */
 } SbPart;

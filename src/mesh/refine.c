@@ -6,7 +6,9 @@
   "Successive subdivisions of tetrahedra and multigrid methods on tetrahedral meshes", 1995). Diagonals lie inside a tet,
   so that neighbours fit whatever they choose. Children have the orientation of their parent.
 
-  The surface keeps its facets: new vertices lie in their middle, not on a rounder shape.
+  The surface keeps its facets: new vertices lie in their middle, not on a rounder shape. A curved tet keeps its shape: the map of ten nodes, restricted to a child, has its
+  nodes at edges off their middles by o/4 on the halves of an edge that is off by o, by o/4 of the opposite edge of the triangle between two middles, and on the diagonal by
+  a quarter of what the four edges that it does not join are off together, less that of the two that it joins.
 */
 #include "sbkernel.h"
 #include "mesh_impl.h"
@@ -50,6 +52,48 @@ static void split_tet(const PetscReal x[], const PetscInt v[4], const PetscInt m
   }
 }
 
+/* Adds the edge between two vertices when it is off its middle. */
+static PetscErrorCode add_middle(SbImport *im, PetscInt a, PetscInt b, const PetscReal off[3])
+{
+  PetscFunctionBeginUser;
+  if (off[0] == 0 && off[1] == 0 && off[2] == 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbReserve(++im->nmiddle.n, sizeof(*im->middle), &im->nmiddle.capacity, &im->middle));
+  im->middle[im->nmiddle.n - 1] =
+    (SbMiddle){.end = {PetscMin(a, b), PetscMax(a, b)}, .node = -1, .off = {off[0], off[1], off[2]}};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The curved edges of the children of a tet; off[][3] of edges by their middles, which are numbered from nvert on. */
+static PetscErrorCode curve_children(SbImport *im, const PetscInt v[4], PetscInt nvert, const PetscReal off[],
+                                     const PetscInt child[8][4])
+{
+  const PetscInt m[6] = {child[0][1], child[0][2], child[0][3], child[1][2], child[1][3], child[2][3]},
+                 from = child[4][0], to = child[4][1];
+  PetscReal quarter[6][3], inner[3] = {0, 0, 0};
+  PetscInt edge_at[4][4];
+
+  PetscFunctionBeginUser;
+  for (int e = 0; e < 6; e++) {
+    const int *p = SbTetEdge[e];
+    const PetscReal sign = m[e] == from || m[e] == to ? -1 : 1;
+
+    edge_at[p[0]][p[1]] = edge_at[p[1]][p[0]] = e;
+    for (int k = 0; k < 3; k++) {
+      quarter[e][k] = 0.25 * off[3 * (m[e] - nvert) + k];
+      inner[k] += sign * quarter[e][k];
+    }
+    for (int i = 0; i < 2; i++) PetscCall(add_middle(im, v[p[i]], m[e], quarter[e]));
+  }
+  // between the middles of two edges from corner i to j and k
+  for (int i = 0; i < 4; i++)
+    for (int j = 0; j < 4; j++)
+      for (int k = 0; k < j; k++)
+        if (i != j && i != k)
+          PetscCall(add_middle(im, m[edge_at[i][j]], m[edge_at[i][k]], quarter[edge_at[j][k]]));
+  PetscCall(add_middle(im, from, to, inner));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Children of one item, [2^dim][dim + 1]. */
 static void split(const SbImport *im, int dim, const PetscInt v[], const SbImportEdges *edges,
                   PetscInt child[])
@@ -78,7 +122,9 @@ static void split(const SbImport *im, int dim, const PetscInt v[], const SbImpor
 PetscErrorCode SbMeshFileRefine(SbImport *im)
 {
   SbImportEdges edges;
+  const PetscInt nvert = im->nvert, curved = im->nmiddle.n;
   PetscInt n;
+  PetscReal *off, largest;
 
   PetscFunctionBeginUser;
   PetscCheck(im->item[3].n <= PETSC_MAX_INT / 64, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -95,6 +141,15 @@ PetscErrorCode SbMeshFileRefine(SbImport *im)
         im->x[3 * (im->nvert + e) + i] = (im->x[3 * a + i] + im->x[3 * edges.high[e] + i]) / 2;
     }
   }
+  // on curved edges where their nodes are
+  PetscCall(PetscCalloc1(curved ? 3 * (size_t)edges.nedge : 0, &off));
+  for (PetscInt i = 0; i < curved; i++) {
+    const SbMiddle *middle = &im->middle[i];
+    const PetscInt e = SbImportEdgesFind(&edges, middle->end[0], middle->end[1]);
+
+    for (int k = 0; e >= 0 && k < 3; k++) im->x[3 * (nvert + e) + k] += off[3 * e + k] = middle->off[k];
+  }
+  im->nmiddle.n = 0;
   for (PetscInt v = 0; v < n; v++) im->vert_number[v] = v + 1;
   im->nvert = n;
   // children of the items, with the tags of their parents
@@ -106,8 +161,12 @@ PetscErrorCode SbMeshFileRefine(SbImport *im)
     PetscCall(PetscMemzero(item, sizeof(*item)));
     PetscCall(SbImportSetItems(im, d, nchild * parent.n));
     for (PetscInt i = 0; i < parent.n; i++) {
-      split(im, d, parent.vert + (size_t)(d + 1) * (size_t)i, &edges,
-            item->vert + (size_t)(d + 1) * (size_t)nchild * (size_t)i);
+      const PetscInt *v = parent.vert + (size_t)(d + 1) * (size_t)i;
+      PetscInt *child = item->vert + (size_t)(d + 1) * (size_t)nchild * (size_t)i;
+
+      split(im, d, v, &edges, child);
+      if (d == 3 && curved)
+        PetscCall(curve_children(im, v, nvert, off, (const PetscInt(*)[4])(const void *)child));
       for (PetscInt k = 0; k < nchild; k++) item->tags[nchild * i + k] = parent.tags[i];
       if (im->progress && !(i & 0xffff))
         PetscCall(
@@ -116,5 +175,7 @@ PetscErrorCode SbMeshFileRefine(SbImport *im)
     PetscCall(SbItemsFree(&parent));
   }
   PetscCall(SbImportEdgesDestroy(&edges));
+  PetscCall(PetscFree(off));
+  PetscCall(SbImportMiddles(im, &largest));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

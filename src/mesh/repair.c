@@ -15,7 +15,7 @@
 /* Lets items use the first of the vertices that lie together. Those left over are unused from then on. */
 static PetscErrorCode weld(SbImport *im, PetscReal tolerance, SbRepair *done)
 {
-  PetscReal box[6], diagonal;
+  PetscReal box[6], diagonal, largest;
   PetscInt *map;
 
   PetscFunctionBeginUser;
@@ -30,6 +30,13 @@ static PetscErrorCode weld(SbImport *im, PetscReal tolerance, SbRepair *done)
   for (PetscInt v = 0; v < im->nvert; v++) done->nwelded += map[v] != v;
   for (int d = 0; d < 4; d++)
     for (PetscInt i = 0; i < (d + 1) * im->item[d].n; i++) im->item[d].vert[i] = map[im->item[d].vert[i]];
+  for (PetscInt i = 0; i < im->nmiddle.n; i++) {
+    const PetscInt a = map[im->middle[i].end[0]], b = map[im->middle[i].end[1]];
+
+    im->middle[i].end[0] = PetscMin(a, b);
+    im->middle[i].end[1] = PetscMax(a, b);
+  }
+  PetscCall(SbImportMiddles(im, &largest));
   PetscCall(PetscFree(map));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -3,8 +3,8 @@
 
   The home rank of a vertex (vertices are dealt to ranks by their numbers, a rendezvous) is asked for its position, and knows which ranks' tets use it; there vertices that no tet uses are found, and
   what belongs to a vertex on several ranks is joined. A face between tets of two ranks is matched by the home rank of its lowest
-  vertex, and so are the edges of the surface. A triangle of a group goes to the home rank of its lowest vertex, and from there to all ranks that use it: one of them has
-  the tet. The parts that tets hang together in on each rank are joined on rank 0, along vertices that several ranks use.
+  vertex, and so are the edges of the surface. A triangle of a group, and the node of a curved edge, goes to the home rank of its lowest vertex, and from there to all
+  ranks that use it: one of them has the tet. The parts that tets hang together in on each rank are joined on rank 0, along vertices that several ranks use.
 
   A rank has about as much of the mesh as any other: everything here is of the size of its block, but for the pairs of parts that rank 0 joins (few,
   unless the tets of the file are in random order) and 4 bytes for each vertex between the lowest and the highest one of its tets.
@@ -343,51 +343,77 @@ static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-typedef struct {
-  PetscInt vert[3], tags;
-} Triangle;
+/*
+  Records of `unit` bytes go to all ranks that use the vertex that they begin with, by way of its home.
 
-/* Each triangle goes to all ranks that use its lowest vertex, by way of that vertex's home. */
-static PetscErrorCode find_triangles(Slab *s)
+  Output: there, the route to the homes; on, the route from there, of records from[on.nsend] that came there; in[on.nrecv], which PetscFree() frees, as from.
+*/
+static PetscErrorCode send_to_users(Slab *s, PetscInt n, size_t unit, const void *record, SbRoute *there,
+                                    SbRoute *on, PetscInt **from, void *in)
 {
-  const SbItems *item = &s->im->item[2];
-  Triangle *mine, *got, *out, *in;
-  PetscInt n = 0, *from, slots[2];
+  const char *at = (const char *)record;
+  char *got, *out;
   PetscMPIInt *dest;
-  PetscBool *found, *answered;
-  SbRoute there, on;
-  SbImport *im = s->im;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(item->n, &mine, item->n, &dest));
-  for (PetscInt i = 0; i < item->n; i++) {
-    const PetscInt *v = item->vert + 3 * (size_t)i;
-
-    mine[i] = (Triangle){{v[0], v[1], v[2]}, item->tags[i]};
-    dest[i] = home(s, PetscMin(v[0], PetscMin(v[1], v[2])));
-  }
-  PetscCall(SbRouteCreate(s->comm, item->n, dest, &there));
-  PetscCall(SbRouteSend(&there, sizeof(Triangle), mine, &got));
-  PetscCall(PetscFree2(mine, dest));
+  PetscCall(PetscMalloc1(n, &dest));
+  for (PetscInt i = 0; i < n; i++)
+    dest[i] = home(s, *(const PetscInt *)(const void *)(at + unit * (size_t)i));
+  PetscCall(SbRouteCreate(s->comm, n, dest, there));
+  PetscCall(SbRouteSend(there, unit, record, &got));
+  PetscCall(PetscFree(dest));
   for (int pass = 0; pass < 2; pass++) {
-    if (pass) PetscCall(PetscMalloc4(n, &out, n, &from, n, &dest, n, &answered));
+    if (pass) {
+      PetscCall(PetscMalloc2(unit * (size_t)n, &out, n, &dest));
+      PetscCall(PetscMalloc1(n, from));
+    }
     n = 0;
-    for (PetscInt i = 0; i < there.nrecv; i++) {
-      const PetscInt *t = got[i].vert, v = PetscMin(t[0], PetscMin(t[1], t[2])) - s->rows.first;
+    for (PetscInt i = 0; i < there->nrecv; i++) {
+      const char *p = got + unit * (size_t)i;
+      const PetscInt v = *(const PetscInt *)(const void *)p - s->rows.first;
 
       for (PetscInt k = s->start[v]; k < s->start[v + 1]; k++) {
         if (pass) {
-          out[n] = got[i];
-          from[n] = i;
+          memcpy(out + unit * (size_t)n, p, unit);
+          (*from)[n] = i;
           dest[n] = (PetscMPIInt)s->user[k];
         }
         n++;
       }
     }
   }
-  PetscCall(SbRouteCreate(s->comm, n, dest, &on));
-  PetscCall(SbRouteSend(&on, sizeof(Triangle), out, &in));
-  PetscCall(PetscMalloc1(on.nrecv, &found));
+  PetscCall(SbRouteCreate(s->comm, n, dest, on));
+  PetscCall(SbRouteSend(on, unit, out, in));
+  PetscCall(PetscFree2(out, dest));
+  PetscCall(PetscFree(got));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+typedef struct {
+  PetscInt vert[3], tags; /* the lowest vertex first */
+} Triangle;
+
+/* Each triangle goes to all ranks that use its lowest vertex. */
+static PetscErrorCode find_triangles(Slab *s)
+{
+  const SbItems *item = &s->im->item[2];
+  Triangle *mine, *in;
+  PetscInt *from, slots[2];
+  PetscBool *found, *answered;
+  SbRoute there, on;
+  SbImport *im = s->im;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(item->n, &mine));
+  for (PetscInt i = 0; i < item->n; i++) {
+    const PetscInt *v = item->vert + 3 * (size_t)i;
+
+    mine[i] = (Triangle){{v[0], v[1], v[2]}, item->tags[i]};
+    PetscCall(PetscSortInt(3, mine[i].vert));
+  }
+  PetscCall(send_to_users(s, item->n, sizeof(*mine), mine, &there, &on, &from, &in));
+  PetscCall(PetscFree(mine));
+  PetscCall(PetscMalloc2(on.nrecv, &found, on.nsend, &answered));
   // the triangles that are faces of this rank's tets become the triangles of its import
   im->item[2].n = 0;
   for (PetscInt i = 0; i < on.nrecv; i++) {
@@ -402,17 +428,56 @@ static PetscErrorCode find_triangles(Slab *s)
     if (found[i]) PetscCall(SbImportAddItem(im, 2, v, in[i].tags, 0));
   }
   PetscCall(SbRouteReply(&on, sizeof(PetscBool), found, answered));
-  PetscCall(PetscFree(found));
   /* lost: found by none of them */
-  PetscCall(PetscCalloc1(there.nrecv, &found));
-  for (PetscInt i = 0; i < n; i++) found[from[i]] = (PetscBool)(found[from[i]] || answered[i]);
-  for (PetscInt i = 0; i < there.nrecv; i++) s->im->nlost += !found[i];
-  PetscCall(PetscFree(found));
+  im->nlost += there.nrecv;
+  for (PetscInt i = 0, last = -1; i < on.nsend; i++) {
+    if (!answered[i] || from[i] == last) continue;
+    last = from[i];
+    im->nlost--;
+  }
+  PetscCall(PetscFree2(found, answered));
   PetscCall(PetscFree(in));
-  PetscCall(PetscFree(got));
-  PetscCall(PetscFree4(out, from, dest, answered));
+  PetscCall(PetscFree(from));
   PetscCall(SbRouteDestroy(&on));
   PetscCall(SbRouteDestroy(&there));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ curved edges */
+
+/* Each goes to all ranks that use its lower vertex, and stays where the other one is used, too. */
+static PetscErrorCode find_edges(Slab *s)
+{
+  SbImport *im = s->im;
+  SbCaughtError caught = {0, ""};
+  SbMiddle *in;
+  PetscReal largest = 0;
+  PetscInt *from, total = im->nmiddle.n, n = 0;
+  SbRoute there, on;
+
+  PetscFunctionBeginUser;
+  PetscCall(sum(s, 1, &total));
+  if (!total) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(send_to_users(s, im->nmiddle.n, sizeof(*in), im->middle, &there, &on, &from, &in));
+  for (PetscInt i = 0; i < on.nrecv; i++) {
+    PetscInt v[2];
+
+    for (int k = 0; k < 2; k++) PetscCall(PetscFindInt(in[i].end[k], im->nvert, s->used, &v[k]));
+    if (v[0] < 0 || v[1] < 0) continue;
+    in[n] = in[i];
+    for (int k = 0; k < 2; k++) in[n].end[k] = v[k];
+    n++;
+  }
+  PetscCall(PetscFree(from));
+  PetscCall(SbRouteDestroy(&on));
+  PetscCall(SbRouteDestroy(&there));
+  PetscCall(PetscFree(im->middle));
+  im->middle = in;
+  im->nmiddle = (SbCount){n, n};
+  SB_CATCH(&caught, SbImportMiddles(im, &largest));
+  PetscCall(SbCaughtRaise(s->comm, &caught));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPIU_REAL, MPI_MAX, s->comm));
+  SbImportNoteMiddles(im, total, largest);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -502,6 +567,7 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   PetscCall(PetscFree(im->vert_number));
   im->nvert = n;
   PetscCall(ask_home_ranks(s));
+  PetscCall(find_edges(s));
   largest = SbImportLargest(im);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPIU_REAL, MPI_MAX, s->comm));
   SB_CATCH(&caught, check_cells(s, largest));
@@ -526,6 +592,7 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   PetscCall(sum(s, 1, &im->npinched));
   PetscCall(sum(s, 1, &im->nlost));
   PetscCall(SbImportNote(im, &body[b]));
+  PetscCall(SbImportCurve(s->comm, im, &body[b], s->part->masks.cell, &s->part->edge_off));
   PetscCall(PetscFree(s->part->faces.face)); /* the neighbours are found */
   PetscCall(PetscFree(s->part->faces.start));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -136,12 +136,19 @@ static PetscErrorCode begin(const SbBody *body, SbImport *im)
 static PetscErrorCode read_body(const SbBody *body, SbImport *im)
 {
   SbReader read;
+  PetscReal largest;
+  PetscInt given;
 
   PetscFunctionBeginUser;
   PetscCall(find_reader(body, &read));
   PetscCall(begin(body, im));
   PetscCall(read(body->mesh, im));
-  PetscCall(SbImportMiddles(im));
+  given = im->nmiddle.n;
+  PetscCall(SbImportMiddles(im, &largest));
+  SbImportNoteMiddles(im, im->nmiddle.n, largest);
+  if (given && !im->nmiddle.n && !body->name[0])
+    PetscCall(PetscStrncpy(im->note, "straight tets of second order, taken as those of first order",
+                           sizeof(im->note)));
   PetscCall(SbImportForget(im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -179,6 +179,33 @@ static PetscErrorCode read_items(const File *f, int dim, const char *name)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Edges with their node off the middle. */
+static PetscErrorCode read_curved(const File *f)
+{
+  SbImport *im = f->im;
+  Array edges = {
+    .name = "/mesh/curved_edges", .klass = H5T_INTEGER, .ncomp = 2, .bound = f->nvert, .block = PETSC_TRUE};
+  Array off = {.name = "/mesh/edge_offsets", .klass = H5T_FLOAT, .ncomp = 3, .block = PETSC_TRUE};
+  PetscInt n, noff, *end;
+  PetscReal *x;
+
+  PetscFunctionBeginUser;
+  if (!is_there(f, edges.name)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(read_array(f, &edges, &n, &end));
+  PetscCall(read_array(f, &off, &noff, &x));
+  if (n != noff || edges.rows.N != off.rows.N)
+    H5_ERROR(f, "%s has %lld rows for %lld edges; the file is damaged", off.name, (long long)off.rows.N,
+             (long long)edges.rows.N);
+  PetscCall(PetscMalloc1(n, &im->middle));
+  im->nmiddle = (SbCount){n, n};
+  for (PetscInt i = 0; i < n; i++)
+    im->middle[i] =
+      (SbMiddle){.end = {PetscMin(end[2 * i], end[2 * i + 1]), PetscMax(end[2 * i], end[2 * i + 1])},
+                 .node = -1,
+                 .off = {x[3 * i], x[3 * i + 1], x[3 * i + 2]}};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* ------------------------------------------------------------------ groups of an own mesh */
 
 static PetscErrorCode read_own(const File *f)
@@ -337,6 +364,18 @@ static PetscErrorCode read_output(const File *f)
       H5_ERROR(f, "%s has %lld rows for %lld points", name, (long long)n, (long long)im->nvert);
     for (PetscInt i = 0; i < 3 * n; i++) im->x[i] += u[i];
   }
+  // nodes at the edges of P2
+  if (is_there(f, "/mesh/cells10") && !is_there(f, "/mesh/vertices")) {
+    PetscInt n, *node;
+
+    PetscCall(read_table(f, "/mesh/cells10", 10, f->nvert, &n, &node));
+    for (PetscInt c = 0; c < n; c++) {
+      PetscInt vert[10];
+
+      for (int k = 0; k < 10; k++) vert[k] = node[10 * c + SbGmshNode(k)];
+      PetscCall(SbImportAddMiddles(f->im, vert));
+    }
+  }
   if (is_there(f, "/mesh/vertices")) {
     SbImport *im = f->im;
     PetscInt n, *vertex, *share, nvert = 0;
@@ -389,7 +428,8 @@ static PetscErrorCode check_layout(const File *f, PetscBool *own)
 
     if (H5Aread(a, H5T_NATIVE_INT, &version) < 0) version = 0;
     (void)H5Aclose(a);
-    if (version != 1) H5_ERROR(f, "is a mesh of layout %d; this supple reads layout 1", version);
+    if (version != 1 && version != 2)
+      H5_ERROR(f, "is a mesh of layout %d; this supple reads layouts 1 and 2", version);
   }
   if (is_there(f, "/mesh/x") && is_there(f, "/mesh/cells")) PetscFunctionReturn(PETSC_SUCCESS);
   (void)H5Literate(f->file, H5_INDEX_NAME, H5_ITER_INC, NULL, list_name, content);
@@ -427,6 +467,7 @@ static PetscErrorCode read_mesh(File *f, SbSlabRows *rows)
   for (PetscInt v = 0; v < im->nvert; v++) im->vert_number[v] = rows->first + v + 1;
   PetscCall(read_items(f, 3, "/mesh/cells"));
   PetscCall(own ? read_own(f) : read_output(f));
+  if (own) PetscCall(read_curved(f));
   if (!im->item[3].n && !f->nparts && !(im->surface && im->item[2].n))
     H5_ERROR(f, "holds no tetrahedra; mesh the volume (supple-mesh tet)");
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -141,6 +141,46 @@ PetscErrorCode SbImportAddElement(SbImport *im, int type, const PetscInt vert[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbImportDropVertices(SbImport *im, PetscInt keep[])
+{
+  PetscInt n = 0, nmiddle = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt v = 0; v < im->nvert; v++) keep[v] = keep[v] ? n++ : -1;
+  if (n == im->nvert) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt v = 0; v < im->nvert; v++) {
+    if (keep[v] < 0) continue;
+    PetscCall(PetscArraymove(im->x + 3 * keep[v], im->x + 3 * v, 3));
+    im->vert_number[keep[v]] = im->vert_number[v];
+  }
+  im->nvert = n;
+  for (PetscInt i = 0; i < im->nmiddle.n; i++) {
+    SbMiddle m = im->middle[i];
+
+    for (int k = 0; k < 2; k++) m.end[k] = keep[m.end[k]];
+    if (m.end[0] >= 0 && m.end[1] >= 0) im->middle[nmiddle++] = m;
+  }
+  im->nmiddle.n = nmiddle;
+  for (int d = 0; d < 4; d++) {
+    PetscInt kept = 0;
+
+    // items have the new numbers; those that use a vertex which is gone are dropped
+    for (PetscInt i = 0; i < im->item[d].n; i++) {
+      PetscInt *v = im->item[d].vert + (d + 1) * i;
+      PetscBool gone = PETSC_FALSE;
+
+      for (int k = 0; k <= d; k++) {
+        v[k] = keep[v[k]];
+        gone = (PetscBool)(gone || v[k] < 0);
+      }
+      if (!gone) SbItemsMove(&im->item[d], d, kept++, i);
+    }
+    if (d == 2) im->nlost += im->item[d].n - kept;
+    im->item[d].n = kept;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* ------------------------------------------------------------------ nodes at edges */
 
 PetscErrorCode SbImportAddMiddles(SbImport *im, const PetscInt vert[])
@@ -159,57 +199,59 @@ PetscErrorCode SbImportAddMiddles(SbImport *im, const PetscInt vert[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbImportMiddles(SbImport *im)
+PetscErrorCode SbImportMiddles(SbImport *im, PetscReal *largest)
 {
   SbMiddle *last = NULL;
-  PetscReal largest = 0;
-  PetscBool *taken;
-  PetscInt n = 0;
+  PetscReal most = 0;
+  PetscInt n = 0, *keep;
 
   PetscFunctionBeginUser;
+  *largest = 0;
   if (!im->nmiddle.n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbSortByKeys(im->nmiddle.n, sizeof(*im->middle), 3, im->middle));
-  PetscCall(PetscCalloc1(im->nvert, &taken));
-  for (PetscInt i = 0; i < 4 * im->item[3].n; i++) taken[im->item[3].vert[i]] = PETSC_TRUE;
+  PetscCall(PetscMalloc1(im->nvert, &keep));
+  for (PetscInt v = 0; v < im->nvert; v++) keep[v] = 1;
   for (PetscInt i = 0; i < im->nmiddle.n; i++) {
     SbMiddle m = im->middle[i];
-    const PetscReal *a = im->x + 3 * m.end[0], *b = im->x + 3 * m.end[1], *x = im->x + 3 * m.node;
-    PetscReal length = 0, off = 0;
+    const PetscReal *a = im->x + 3 * m.end[0], *b = im->x + 3 * m.end[1];
+    PetscReal length = 0, off = 0, apart = 0;
 
-    // nodes that only lie at edges are no unused vertices
-    im->nedge_node += !taken[m.node];
-    taken[m.node] = PETSC_TRUE;
-    // each edge once; two nodes at the same place are one
-    if (last && last->end[0] == m.end[0] && last->end[1] == m.end[1] && last->node == m.node) continue;
+    if (m.node >= 0) keep[m.node] = 0;
     for (int k = 0; k < 3; k++) {
-      m.off[k] = x[k] - 0.5 * (a[k] + b[k]);
+      if (m.node >= 0) m.off[k] = im->x[3 * m.node + k] - 0.5 * (a[k] + b[k]);
       length += PetscSqr(b[k] - a[k]);
       off += PetscSqr(m.off[k]);
     }
+    // each edge once; two nodes at the same place are one
     if (last && last->end[0] == m.end[0] && last->end[1] == m.end[1]) {
-      PetscReal apart = 0;
-
-      for (int k = 0; k < 3; k++) apart += PetscSqr(x[k] - im->x[3 * last->node + k]);
-      PetscCheck(
-        apart <= PetscSqr(STRAIGHT) * length, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-        "%s: the edge between nodes %lld and %lld has two nodes, %lld and %lld, at different places; "
-        "make it one (gmsh: Coherence Mesh)",
-        im->where, (long long)im->vert_number[m.end[0]], (long long)im->vert_number[m.end[1]],
-        (long long)im->vert_number[last->node], (long long)im->vert_number[m.node]);
+      for (int k = 0; k < 3; k++) apart += PetscSqr(m.off[k] - last->off[k]);
+      PetscCheck(apart <= PetscSqr(STRAIGHT) * length, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+                 "%s: the edge between nodes %lld and %lld has two nodes, at different places; make it one "
+                 "(gmsh: Coherence Mesh)",
+                 im->where, (long long)im->vert_number[m.end[0]], (long long)im->vert_number[m.end[1]]);
       continue;
     }
+    m.node = -1;
     im->middle[n] = m;
     last = &im->middle[n];
-    if (off > PetscSqr(STRAIGHT) * length) n++;
-    if (length > 0) largest = PetscMax(largest, off / length);
+    if (off > PetscSqr(STRAIGHT) * length && m.end[0] < m.end[1]) n++;
+    if (length > 0) most = PetscMax(most, off / length);
   }
-  PetscCall(PetscFree(taken));
   im->nmiddle.n = n;
+  *largest = PetscSqrtReal(most);
+  // nodes that only lie at edges are no vertices
+  for (PetscInt i = 0; i < 4 * im->item[3].n; i++) keep[im->item[3].vert[i]] = 1;
+  PetscCall(SbImportDropVertices(im, keep));
+  PetscCall(PetscFree(keep));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbImportNoteMiddles(SbImport *im, PetscInt n, PetscReal largest)
+{
   if (n)
     (void)snprintf(im->note, sizeof(im->note),
-                   "edges with their node off the middle: %lld, by %.2g of their length at most%s",
-                   (long long)n, (double)PetscSqrtReal(largest), im->body[0] ? "" : ", taken as straight");
-  PetscFunctionReturn(PETSC_SUCCESS);
+                   "edges with their node off the middle: %lld, by %.2g of their length at most",
+                   (long long)n, (double)largest);
 }
 
 /* ------------------------------------------------------------------ groups */

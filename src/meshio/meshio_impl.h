@@ -58,8 +58,6 @@ static inline int SbGmshNode(int k)
 }
 /* Adds the nodes of the edges of a 10-node tet, vert[10] in the order of gmsh; -1: the edge has none. */
 PetscErrorCode SbImportAddMiddles(SbImport *import, const PetscInt vert[]);
-/* Once all is read: which edges are off their middle. Error: an edge with two nodes. */
-PetscErrorCode SbImportMiddles(SbImport *import);
 
 /* ------------------------------------------------------------------ deck.c: a file that names nodes and elements by labels */
 

@@ -6,11 +6,14 @@
   changes: what is read again has the same order. Version 2.2 has one group per element: an element of several groups is
   written once for each, which supple joins again.
 
+  A mesh with curved edges is written as one of second order: every edge of an item has a node, behind the vertices.
+
   Numbers are from 1 on. A double is written with 17 digits as text: what is read is what was written.
 */
 #include <errno.h>
 #include <stdlib.h>
 #include "meshio_impl.h"
+#include "sbgeometry.h"
 
 typedef struct {
   const SbImport *im;
@@ -21,9 +24,16 @@ typedef struct {
   PetscInt home;          /* its tag set */
   int64_t *number;        /* [ngroup] of the groups in the file */
   PetscInt64 total, done; /* items, for the progress */
+  PetscInt nnode, nedge;
+  SbKey *edge;  /* [nedge] of items, ascending, of a mesh with curved edges */
+  PetscReal *x; /* [nnode][3] vertices, then the nodes of edges */
 } Out;
 
-static const int gmsh_type[4] = {15, 1, 2, 4}; /* of items by dimension */
+/* Of items by dimension; of second order. */
+static const int gmsh_type[2][4] = {{SB_GMSH_POINT, SB_GMSH_LINE, SB_GMSH_TRIANGLE, SB_GMSH_TET},
+                                    {SB_GMSH_POINT, SB_GMSH_LINE3, SB_GMSH_TRIANGLE6, SB_GMSH_TET10}};
+/* Edges of an item, in the order of gmsh. */
+static const int nedge_of[4] = {0, 1, 3, 6}, edge_of[6][2] = {{0, 1}, {1, 2}, {2, 0}, {3, 0}, {2, 3}, {1, 3}};
 
 /* ------------------------------------------------------------------ numbers */
 
@@ -74,6 +84,59 @@ static PetscErrorCode report_progress(Out *out)
   if (out->im->progress && !(out->done++ & 0xffff))
     PetscCall(out->im->progress("elements", out->done, out->total, out->im->progress_ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ nodes */
+
+/* Those of edges, where some are curved. */
+static PetscErrorCode list_nodes(Out *out)
+{
+  const SbImport *im = out->im;
+  PetscInt n = 0, at = 0;
+
+  PetscFunctionBeginUser;
+  for (int d = 0; d < 4 && im->nmiddle.n; d++) n += nedge_of[d] * im->item[d].n;
+  PetscCall(PetscMalloc1(n, &out->edge));
+  n = 0;
+  for (int d = 0; d < 4 && im->nmiddle.n; d++) {
+    for (PetscInt i = 0; i < nedge_of[d] * im->item[d].n; i++) {
+      const PetscInt *v = im->item[d].vert + (d + 1) * (size_t)(i / nedge_of[d]);
+      const int *e = edge_of[i % nedge_of[d]];
+
+      out->edge[n++] = (SbKey){SbKeyOfPair(v[e[0]], v[e[1]]), 0};
+    }
+  }
+  SbKeysSort(n, out->edge);
+  for (PetscInt i = 0; i < n; i++)
+    if (!i || out->edge[i].key != out->edge[out->nedge - 1].key) out->edge[out->nedge++] = out->edge[i];
+  // vertices, then the nodes of edges
+  out->nnode = im->nvert + out->nedge;
+  PetscCall(PetscMalloc1(3 * (size_t)out->nnode, &out->x));
+  PetscCall(PetscArraycpy(out->x, im->x, 3 * (size_t)im->nvert));
+  for (PetscInt i = 0; i < out->nedge; i++) {
+    const uint64_t key = out->edge[i].key;
+    const PetscReal *a = im->x + 3 * (key >> 32), *b = im->x + 3 * (key & 0xffffffff);
+    PetscReal *x = out->x + 3 * (im->nvert + i);
+
+    while (at < im->nmiddle.n && SbKeyOfPair(im->middle[at].end[0], im->middle[at].end[1]) < key) at++;
+    for (int k = 0; k < 3; k++) x[k] = 0.5 * (a[k] + b[k]);
+    if (at == im->nmiddle.n || SbKeyOfPair(im->middle[at].end[0], im->middle[at].end[1]) != key) continue;
+    for (int k = 0; k < 3; k++) x[k] += im->middle[at].off[k];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The nodes of an item of a dimension. */
+static void put_nodes(Out *out, int d, const PetscInt v[], void (*put)(Out *, int64_t, char))
+{
+  const int nedge = out->nedge ? nedge_of[d] : 0;
+
+  for (int a = 0; a <= d; a++) (*put)(out, v[a] + 1, a < d || nedge ? ' ' : '\n');
+  for (int e = 0; e < nedge; e++) {
+    const uint64_t key = SbKeyOfPair(v[edge_of[e][0]], v[edge_of[e][1]]);
+
+    (*put)(out, out->im->nvert + SbKeysFind(out->nedge, out->edge, key) + 1, e + 1 < nedge ? ' ' : '\n');
+  }
 }
 
 /* ------------------------------------------------------------------ groups */
@@ -171,13 +234,13 @@ static PetscErrorCode write_elements_41(Out *out)
       // a block of items of one tag set
       put_int(out, d, ' ');
       put_int(out, item->tags[i] + 1, ' ');
-      put_int(out, gmsh_type[d], ' ');
+      put_int(out, gmsh_type[out->nedge > 0][d], ' ');
       put_size(out, n, '\n');
       for (PetscInt k = i; k < i + n; k++) {
         const PetscInt *v = item->vert + (size_t)(d + 1) * (size_t)k;
 
         put_size(out, number++, ' ');
-        for (int a = 0; a <= d; a++) put_size(out, v[a] + 1, a < d ? ' ' : '\n');
+        put_nodes(out, d, v, put_size);
         PetscCall(report_progress(out));
       }
     }
@@ -213,13 +276,13 @@ static PetscErrorCode write_elements_22(Out *out)
       g = next_group(out->im, item->tags[i], d, &k);
       do {
         if (!out->binary) put_int(out, number, ' ');
-        put_int(out, gmsh_type[d], ' ');
+        put_int(out, gmsh_type[out->nedge > 0][d], ' ');
         if (out->binary) put_int(out, 1, ' ');
         put_int(out, 2, ' ');
         if (out->binary) put_int(out, number, ' ');
         put_int(out, g < 0 ? 0 : out->number[g], ' ');
         put_int(out, item->tags[i] + 1, ' ');
-        for (int a = 0; a <= d; a++) put_int(out, v[a] + 1, a < d ? ' ' : '\n');
+        put_nodes(out, d, v, put_int);
         number++;
         g = g < 0 ? -1 : next_group(out->im, item->tags[i], d, &k);
       } while (g >= 0);
@@ -255,10 +318,10 @@ static PetscErrorCode write_all(Out *out, PetscBool version22)
   }
   if (nname) (void)fprintf(out->file, "$EndPhysicalNames\n");
   if (version22) {
-    (void)fprintf(out->file, "$Nodes\n%lld\n", (long long)im->nvert);
-    for (PetscInt v = 0; v < im->nvert; v++) {
+    (void)fprintf(out->file, "$Nodes\n%lld\n", (long long)out->nnode);
+    for (PetscInt v = 0; v < out->nnode; v++) {
       put_int(out, v + 1, ' ');
-      for (int i = 0; i < 3; i++) put_real(out, im->x[3 * v + i], i < 2 ? ' ' : '\n');
+      for (int i = 0; i < 3; i++) put_real(out, out->x[3 * v + i], i < 2 ? ' ' : '\n');
     }
     (void)fprintf(out->file, "%s$EndNodes\n", out->binary ? "\n" : "");
     PetscCall(write_elements_22(out));
@@ -277,16 +340,16 @@ static PetscErrorCode write_all(Out *out, PetscBool version22)
     // one block of nodes: all numbers, then all coordinates
     (void)fprintf(out->file, "$Nodes\n");
     put_size(out, 1, ' ');
-    put_size(out, im->nvert, ' ');
+    put_size(out, out->nnode, ' ');
     put_size(out, 1, ' ');
-    put_size(out, im->nvert, '\n');
+    put_size(out, out->nnode, '\n');
     put_int(out, out->home_dim, ' ');
     put_int(out, out->home + 1, ' ');
     put_int(out, 0, ' ');
-    put_size(out, im->nvert, '\n');
-    for (PetscInt v = 0; v < im->nvert; v++) put_size(out, v + 1, '\n');
-    for (PetscInt v = 0; v < im->nvert; v++)
-      for (int i = 0; i < 3; i++) put_real(out, im->x[3 * v + i], i < 2 ? ' ' : '\n');
+    put_size(out, out->nnode, '\n');
+    for (PetscInt v = 0; v < out->nnode; v++) put_size(out, v + 1, '\n');
+    for (PetscInt v = 0; v < out->nnode; v++)
+      for (int i = 0; i < 3; i++) put_real(out, out->x[3 * v + i], i < 2 ? ' ' : '\n');
     (void)fprintf(out->file, "%s$EndNodes\n", out->binary ? "\n" : "");
     PetscCall(write_elements_41(out));
   }
@@ -334,12 +397,15 @@ PetscErrorCode SbWrite_Gmsh(const SbImport *im, const char *path, SbMeshFormat f
         out.number[g] = ++highest[p->dim];
     }
   }
+  PetscCall(list_nodes(&out));
   errno = 0;
   ierr = write_all(&out, version22);
   error = ferror(out.file) ? errno : 0;
   if (fclose(out.file) && !error) error = errno;
   for (int d = 0; d < 4; d++) PetscCall(PetscFree(out.used[d]));
   PetscCall(PetscFree(out.number));
+  PetscCall(PetscFree(out.edge));
+  PetscCall(PetscFree(out.x));
   PetscCall(ierr);
   PetscCheck(!error, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path,
              strerror(error));

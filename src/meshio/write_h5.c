@@ -1,11 +1,12 @@
 /*
   write_h5.c - supple's own mesh file, HDF5, and its index for ParaView. The layout is described in docs/reference/meshes.md.
 
-    /                attribute supple_mesh: version of the layout, 1
+    /                attribute supple_mesh: version of the layout, 1; 2 with curved edges
     /mesh/x          [nvert][3]   double   coordinates
     /mesh/cells      [ntet][4]    int32    vertices from 0 on
     /mesh/cell_tags  [ntet]       int32    tag set of each tet
     /mesh/triangles  [n][3], /mesh/triangle_tags [n]; lines [n][2], line_tags; points [n][1], point_tags
+    /mesh/curved_edges [n][2] int32, vertices of edges whose node is off their middle, /mesh/edge_offsets [n][3] double, by this
     /groups/name     [ngroup] text, /groups/dim [ngroup] int32, /groups/number [ngroup] int64
     /tag_sets/start  [nset + 1] int32, /tag_sets/group: groups of set k are group[start[k]] .. group[start[k + 1] - 1]
 
@@ -61,12 +62,13 @@ PetscErrorCode SbWrite_H5(const SbImport *im, const char *path)
   H5 h = {-1, PETSC_FALSE};
   static const char *const name[4] = {"point", "line", "triangle", "cell"};
   char array[64];
-  const int version = 1;
+  const int version = im->nmiddle.n ? 2 : 1;
   hid_t space, mark;
   const hid_t text = H5Tcopy(H5T_C_S1);
   char(*title)[SB_GROUP_MAX];
-  PetscInt *dim;
+  PetscInt *dim, *end;
   int64_t *number;
+  PetscReal *off;
 
   PetscFunctionBeginUser;
   PetscCheck(im->nvert <= INT32_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -95,6 +97,17 @@ PetscErrorCode SbWrite_H5(const SbImport *im, const char *path)
     write_ints(&h, array, d + 1, (size_t)item->n, item->vert);
     (void)snprintf(array, sizeof(array), "/mesh/%s_tags", name[d]);
     write_ints(&h, array, 1, (size_t)item->n, item->tags);
+  }
+  // nodes of curved edges
+  if (im->nmiddle.n) {
+    PetscCall(PetscMalloc2(2 * (size_t)im->nmiddle.n, &end, 3 * (size_t)im->nmiddle.n, &off));
+    for (PetscInt i = 0; i < im->nmiddle.n; i++) {
+      PetscCall(PetscArraycpy(end + 2 * i, im->middle[i].end, 2));
+      PetscCall(PetscArraycpy(off + 3 * i, im->middle[i].off, 3));
+    }
+    write_ints(&h, "/mesh/curved_edges", 2, (size_t)im->nmiddle.n, end);
+    write_array(&h, "/mesh/edge_offsets", 3, (size_t)im->nmiddle.n, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, off);
+    PetscCall(PetscFree2(end, off));
   }
   // groups and tag sets
   PetscCall(PetscCalloc3(im->ngroup, &title, im->ngroup, &dim, im->ngroup, &number));

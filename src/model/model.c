@@ -6,6 +6,7 @@
 */
 #include "model_impl.h"
 #include "sblog.h"
+#include "sbtet.h"
 
 PetscErrorCode SbModelDestroy(SbModel *model)
 {
@@ -73,6 +74,8 @@ static PetscErrorCode match_mass(SbModel m, PetscInt b)
     if (mesh->cell_body[c] != b) continue;
     for (PetscInt i = 0; i < 12; i++) x[i / 3][i % 3] = mesh->x[3 * mesh->cell[4 * c + i / 3] + i % 3];
     m->element[b]->ops.tabulate((const PetscReal(*)[3])x, g, &V);
+    if (mesh->cell_set[c] & SB_CURVED)
+      V = SbTetCurvedVolume(mesh->x, mesh->cell + 4 * c, mesh->edge_off + 18 * c);
     mass += m->material[mesh->cell_material[c]]->density * V;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &mass, 1, MPIU_REAL, MPI_SUM, m->comm));

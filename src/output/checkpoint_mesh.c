@@ -15,8 +15,9 @@ typedef struct {
   void *data;
 } Array;
 
-#define NARRAY 6
-static void arrays_of(SbMemoryMesh *g, const PetscInt count[3], Array a[NARRAY])
+#define NARRAY 8
+#define NCOUNT 4
+static void arrays_of(SbMemoryMesh *g, const PetscInt count[NCOUNT], Array a[NARRAY])
 {
   a[0] = (Array){"x", count[0], 3, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, g->x};
   a[1] = (Array){"cells", count[1], 4, H5T_STD_I64LE, SB_H5_INT, g->cell};
@@ -24,6 +25,8 @@ static void arrays_of(SbMemoryMesh *g, const PetscInt count[3], Array a[NARRAY])
   a[3] = (Array){"vertex_sets", count[0], 1, H5T_STD_U64LE, H5T_NATIVE_UINT64, g->vert_set};
   a[4] = (Array){"cell_sets", count[1], 1, H5T_STD_U64LE, H5T_NATIVE_UINT64, g->cell_set};
   a[5] = (Array){"triangle_sets", count[2], 1, H5T_STD_U64LE, H5T_NATIVE_UINT64, g->tri_set};
+  a[6] = (Array){"curved_edges", count[3], 2, H5T_STD_I64LE, SB_H5_INT, g->edge};
+  a[7] = (Array){"edge_offsets", count[3], 3, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, g->edge_off};
 }
 
 /* Sum of positions and values, so that damage is seen. */
@@ -38,6 +41,10 @@ static uint64_t sum_of(const SbMemoryMesh *g)
   for (PetscInt i = 0; i < g->nvert; i++) sum += g->vert_set[i] * (uint64_t)(2 * i + 1);
   for (PetscInt i = 0; i < g->ncell; i++) sum += g->cell_set[i] * (uint64_t)(2 * i + 1);
   for (PetscInt i = 0; i < g->ntri; i++) sum += g->tri_set[i] * (uint64_t)(2 * i + 1);
+  for (PetscInt i = 0; i < 2 * g->nedge; i++)
+    sum += SbMixReal((uint64_t)i + 3 * (uint64_t)SALT, (PetscReal)g->edge[i]);
+  for (PetscInt i = 0; i < 3 * g->nedge; i++)
+    sum += SbMixReal((uint64_t)i + 4 * (uint64_t)SALT, g->edge_off[i]);
   return sum;
 }
 
@@ -48,21 +55,23 @@ void SbCheckpointMeshBytes(SbRun run, PetscInt64 *bytes)
     const SbBody *body = &run->model->body[b];
 
     if (body->in_memory && body->in_memory->step)
-      *bytes +=
-        (PetscInt64)body->nvert * 32 + (PetscInt64)body->ncell * 40 + (PetscInt64)body->nfacet * 32 + 65536;
+      *bytes += (PetscInt64)body->nvert * 32 + (PetscInt64)body->ncell * 40 + (PetscInt64)body->nfacet * 32 +
+                65536 + (run->model->mesh->edge_off ? (PetscInt64)body->ncell * 2 * 40 : 0);
   }
 }
 
+static const char *const counts[NCOUNT] = {"vertices", "tets", "faces", "curved"};
+
 static PetscErrorCode write_mesh(SbH5 *h, SbOutput out, const char *body, SbMemoryMesh *g, uint64_t *sum)
 {
-  PetscInt count[3] = {g->nvert, g->ncell, g->ntri};
+  PetscInt count[NCOUNT] = {g->nvert, g->ncell, g->ntri, g->nedge};
   uint64_t own = out->rank ? 0 : sum_of(g);
   char name[2 * SB_NAME_MAX];
   Array a[NARRAY];
   hid_t group;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Bcast(count, 3, MPIU_INT, 0, out->comm));
+  PetscCallMPI(MPI_Bcast(count, NCOUNT, MPIU_INT, 0, out->comm));
   PetscCallMPI(MPI_Bcast(&own, 1, MPI_UINT64_T, 0, out->comm));
   arrays_of(g, count, a);
   PetscCall(PetscSNPrintf(name, sizeof(name), "mesh_%s", body));
@@ -71,8 +80,7 @@ static PetscErrorCode write_mesh(SbH5 *h, SbOutput out, const char *body, SbMemo
   PetscCall(SbH5PutReal(h, group, "mass", g->mass));
   PetscCall(SbH5PutReal(h, group, "bound", g->bound));
   PetscCall(SbH5PutInt(h, group, "sum", (int64_t)own));
-  for (int k = 0; k < 3; k++)
-    PetscCall(SbH5PutInt(h, group, k == 0 ? "vertices" : k == 1 ? "tets" : "faces", count[k]));
+  for (int k = 0; k < NCOUNT; k++) PetscCall(SbH5PutInt(h, group, counts[k], count[k]));
   for (int k = 0; k < NARRAY; k++) {
     const SbOrder order = {.comm = out->comm,
                            .each = 1,
@@ -118,16 +126,18 @@ static PetscBool in_range(const SbMemoryMesh *g)
   for (PetscInt i = 0; i < 3 * g->ntri; i++) {
     if (g->tri[i] < 0 || g->tri[i] >= g->nvert) return PETSC_FALSE;
   }
+  for (PetscInt i = 0; i < 2 * g->nedge; i++) {
+    if (g->edge[i] < 0 || g->edge[i] >= g->nvert) return PETSC_FALSE;
+  }
   return PETSC_TRUE;
 }
 
 /* The mesh of a body in an open file; NULL when it has none. */
 static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_memory, PetscBool *ok)
 {
-  static const char *const counts[3] = {"vertices", "tets", "faces"};
   char name[2 * SB_NAME_MAX];
-  int64_t n[3] = {0, 0, 0}, step = 0, sum = 0;
-  PetscInt count[3];
+  int64_t n[NCOUNT] = {0}, step = 0, sum = 0;
+  PetscInt count[NCOUNT];
   PetscReal mass = 0., bound = 0.;
   Array a[NARRAY];
   hid_t group;
@@ -139,20 +149,23 @@ static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_
   group = H5Gopen2(file, name, H5P_DEFAULT);
   *ok = (PetscBool)(group >= 0);
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
-  for (int k = 0; k < 3; k++) {
-    SbH5GetInt(group, counts[k], &n[k], ok);
+  /* files of before know no curved edges */
+  for (int k = 0; k < NCOUNT; k++) {
+    if (k < 3 || H5Aexists(group, counts[k]) > 0) SbH5GetInt(group, counts[k], &n[k], ok);
     *ok = (PetscBool)(*ok && n[k] >= 0 && n[k] < PETSC_MAX_INT / 8);
   }
   SbH5GetInt(group, "step", &step, ok);
   SbH5GetReal(group, "mass", &mass, ok);
   SbH5GetReal(group, "bound", &bound, ok);
   SbH5GetInt(group, "sum", &sum, ok);
-  for (int k = 0; k < 3; k++) count[k] = *ok ? (PetscInt)n[k] : 0;
+  for (int k = 0; k < NCOUNT; k++) count[k] = *ok ? (PetscInt)n[k] : 0;
   /* a count that lies shows when its dataset has another one: nothing is allocated for it */
   *ok = (PetscBool)(*ok && SbH5Rows(group, "x") == n[0] && SbH5Rows(group, "cells") == n[1] &&
-                    (!n[2] || SbH5Rows(group, "triangles") == n[2]));
+                    (!n[2] || SbH5Rows(group, "triangles") == n[2]) &&
+                    (!n[3] || SbH5Rows(group, "curved_edges") == n[3]));
   if (*ok) {
     PetscCall(SbMemoryMeshCreate(count[0], count[1], count[2], in_memory));
+    PetscCall(SbMemoryMeshCurve(*in_memory, count[3]));
     (*in_memory)->step = (PetscInt)step;
     (*in_memory)->mass = mass;
     (*in_memory)->bound = bound;

@@ -56,6 +56,8 @@ PetscErrorCode SbOutputOrder(SbRun run, SbOutput out)
   for (PetscInt k = 0; k < mesh->ncell_owned; k++) {
     for (PetscInt a = 0; a < 4; a++)
       sum += mix(mix((uint64_t)mesh->cell_orig[k]) ^ (uint64_t)mesh->vert_orig[mesh->cell[4 * k + a]]);
+    for (PetscInt i = 0; mesh->cell_set[k] & SB_CURVED && i < 18; i++)
+      sum += SbMixReal(mix((uint64_t)mesh->cell_orig[k]) + (uint64_t)i, mesh->edge_off[18 * k + i]);
   }
   PetscCallMPI(MPI_Allreduce(&sum, &out->mesh_hash, 1, MPI_UINT64_T, MPI_SUM, mesh->comm));
   out->ordered = PETSC_TRUE;

@@ -199,6 +199,9 @@ static PetscReal deepest_owned(const SbMesh mesh, const SbProbe *probe, PetscInt
 
     if (mesh->cell_body[c] != probe->body) continue;
     SbTetBarycentric(mesh->x, mesh->cell + 4 * c, probe->x, w);
+    if (mesh->cell_set[c] & SB_CURVED &&
+        !SbTetCurvedBarycentric(mesh->x, mesh->cell + 4 * c, mesh->edge_off + 18 * c, probe->x, w))
+      continue;
     outside = -PetscMin(PetscMin(w[0], w[1]), PetscMin(w[2], w[3]));
     if (outside > best || (outside == best && mesh->cell_orig[c] > mesh->cell_orig[*cell])) continue;
     best = outside;

@@ -114,15 +114,27 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
   const PetscReal *box = run->model->body[b].bbox;
   const PetscReal size[3] = {box[3] - box[0], box[4] - box[1], box[5] - box[2]};
   PetscReal far = 0., diagonal = PetscSqrtReal(PetscSqr(size[0]) + PetscSqr(size[1]) + PetscSqr(size[2]));
+  static const int edge[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
+  static const int place[6] = {0, 2, 3, 1, 4, 5}; /* in that order, of the edges 01 02 03 12 13 23 */
   SbLocator locator;
   PetscScalar *u, *v;
+  PetscReal *off = NULL;
 
   PetscFunctionBeginUser;
-  PetscCall(SbLocatorCreate(o->ncell, o->cell, o->x, &locator));
+  // where the nodes at edges of that run are off their middles, at rest
+  if (o->cell10) PetscCall(PetscMalloc1(18 * (size_t)o->ncell, &off));
+  for (PetscInt i = 0; o->cell10 && i < 6 * o->ncell; i++) {
+    const PetscInt *point = o->cell10 + 10 * (i / 6);
+    const int *e = SbTetEdge[i % 6];
+
+    for (int k = 0; k < 3; k++)
+      off[3 * i + k] =
+        o->x[3 * point[4 + place[i % 6]] + k] - 0.5 * (o->x[3 * point[e[0]] + k] + o->x[3 * point[e[1]] + k]);
+  }
+  PetscCall(SbLocatorCreate(o->ncell, o->cell, o->x, off, &locator));
   PetscCall(VecGetArray(run->U, &u));
   PetscCall(VecGetArray(run->V, &v));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    static const int edge[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
     const PetscInt n = o->cell10 ? 10 : 4, *point;
     PetscReal weight[10];
     PetscInt cell;
@@ -144,6 +156,7 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
   PetscCall(VecRestoreArray(run->U, &u));
   PetscCall(VecRestoreArray(run->V, &v));
   PetscCall(SbLocatorDestroy(&locator));
+  PetscCall(PetscFree(off));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &far, 1, MPIU_REAL, MPI_MAX, run->model->comm));
   if (far > OUTSIDE * diagonal)
     PetscCall(SbWarning(run->model->comm,

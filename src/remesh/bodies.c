@@ -53,6 +53,12 @@ typedef struct {
   uint64_t inclusions; /* and of those that are inclusions of the body */
 } Work;
 
+/* Nodes of the edges of an old cell from their middles, at rest; NULL: no cell is curved. */
+static const PetscReal *off_of(const Work *w, PetscInt cell)
+{
+  return w->edge && w->g->edge_off ? w->g->edge_off + 18 * (size_t)(w->cell0 + cell) : NULL;
+}
+
 /* The sets of the face `slot` = 4 cell + face of the old mesh. */
 static uint64_t face_set(const Work *w, PetscInt slot)
 {
@@ -87,7 +93,8 @@ static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
                    .X = g->X + 3 * w->vert0,
                    .x = g->x + 3 * w->vert0,
                    .cell = w->cell,
-                   .faces = &w->faces};
+                   .faces = &w->faces,
+                   .edge_off = off_of(w, 0)};
   uint64_t(*kind)[2], lost = 0, *volume;
   PetscBool *surface;
 
@@ -231,7 +238,8 @@ static void new_values(const Work *w, PetscInt c, PetscReal value[])
     PetscReal *to = value + (SB_EDGES + e) * w->each, X[3];
 
     for (int k = 0; k < 3; k++)
-      X[k] = 0.5 * (w->mesh.X[3 * v[SbTetEdge[e][0]] + k] + w->mesh.X[3 * v[SbTetEdge[e][1]] + k]);
+      X[k] = 0.5 * (w->mesh.X[3 * v[SbTetEdge[e][0]] + k] + w->mesh.X[3 * v[SbTetEdge[e][1]] + k]) +
+             (w->mesh.edge_off ? w->mesh.edge_off[18 * (size_t)c + 3 * e + k] : 0.);
     for (PetscInt k = 0; k < w->each; k++)
       to[k] = at < 0 ? PETSC_MAX_REAL : old_value(w, at / 6, SB_EDGES + at % 6)[k];
     if (w->edge && at < 0) interpolate_old(w, X, X, to);
@@ -282,6 +290,34 @@ static PetscErrorCode rename_surface(const Work *w, PetscInt vert1, PetscInt cel
 
 /* ------------------------------------------------------------------ all bodies */
 
+/* Edges of the next mesh that are curved. */
+static PetscErrorCode list_curved(const Work *w, PetscInt ncell, const PetscInt cell[], SbMemoryMesh *p)
+{
+  PetscInt nedge, n = 0;
+  SbKey *edge;
+
+  PetscFunctionBeginUser;
+  if (!off_of(w, 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(list_edges(ncell, cell, &nedge, &edge));
+  for (int pass = 0; pass < 2; pass++) {
+    if (pass) PetscCall(SbMemoryMeshCurve(p, n));
+    n = 0;
+    for (PetscInt i = 0; i < nedge; i++) {
+      const PetscReal *off = (w->done ? w->mesh.edge_off : off_of(w, 0)) + 3 * (size_t)edge[i].slot;
+
+      if (off[0] == 0. && off[1] == 0. && off[2] == 0.) continue;
+      if (pass) {
+        p->edge[2 * n] = (PetscInt)(edge[i].key >> 32);
+        p->edge[2 * n + 1] = (PetscInt)(edge[i].key & 0xffffffff);
+        PetscCall(PetscArraycpy(p->edge_off + 3 * n, off, 3));
+      }
+      n++;
+    }
+  }
+  PetscCall(PetscFree(edge));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Mesh, values and names of one body. */
 static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *result)
 {
@@ -306,6 +342,7 @@ static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *
   PetscCall(PetscArraycpy(p->x, w->done ? m->X : g->X + 3 * w->vert0, 3 * (size_t)nvert));
   PetscCall(PetscArraycpy(p->cell, cell, 4 * (size_t)ncell));
   (void)list_triangles(w, ncell, cell, p);
+  PetscCall(list_curved(w, ncell, cell, p));
   for (PetscInt v = 0; v < (w->done ? m->nkept : nold); v++)
     p->vert_set[v] = g->vert_set[w->vert0 + (w->done ? m->kept[v] : v)] & w->groups;
   for (PetscInt c = 0; c < ncell; c++) {
@@ -380,7 +417,8 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
     if (work[b].element->nodes_per[1])
       PetscCall(list_edges(work[b].ncell, work[b].cell, &work[b].nedge, &work[b].edge));
     PetscCall(SbFacesCreate(nvert, work[b].ncell, work[b].cell, &work[b].faces));
-    PetscCall(SbLocatorCreate(work[b].ncell, work[b].cell, g->X + 3 * work[b].vert0, &work[b].rest));
+    PetscCall(SbLocatorCreate(work[b].ncell, work[b].cell, g->X + 3 * work[b].vert0, off_of(&work[b], 0),
+                              &work[b].rest));
     r->outcome[b] = (SbRemeshOutcome){{nvert, nvert}, {work[b].ncell, work[b].ncell}, 0, 0., ""};
     // meshes the body again; what it cannot do goes to the message
     if (due[b]) {

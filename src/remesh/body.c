@@ -11,12 +11,27 @@
   way where the worst tet around is best, until all are good or nothing helps. A tet between four vertices of a side that was flat at rest and bulges
   now has no volume at rest, and no inner vertex: an inner edge of it gets one in its middle, with all tets around, which then moves
   inwards.
+
+  Of a body with curved tets the triangles of the hull keep their curved edges, so its shape is the same. Filled is what the flat triangles enclose. Old tets make a map of that,
+  as it is at rest, to the body: from the place with the weights w in a tet with straight edges to that with l = w in the curved tet. New vertices, and nodes at
+  the middles of new edges, go along with it, so that edges inside bend as much as the surface near them. A new tet may still fold over itself, and is repaired like one that
+  is flat.
 */
 #include "remesh_impl.h"
 
 #define SWEEPS 30
-#define ROUNDS 6 /* of moving vertices and splitting edges */
-#define PLACES 6 /* on the way to the middle of the neighbours, each half as far as the one before */
+#define ROUNDS 6      /* of moving vertices and splitting edges */
+#define PLACES 6      /* on the way to the middle of the neighbours, each half as far as the one before */
+#define STRAIGHT 1e-6 /* of the length of an edge: nearer to the middle its node is there */
+
+/* What finds the old material. */
+typedef struct {
+  const SbOldMesh *old;
+  SbLocator rest, flat; /* tets at rest; straight ones of a body with curved ones, else NULL */
+  PetscInt ncurved;
+  SbKey *
+    curved; /* [ncurved] curved edges between vertices that stay, by SbKeyOfPair() of new ones; places 6 cell + edge in the old mesh */
+} Material;
 
 /* ------------------------------------------------------------------ the hull */
 
@@ -39,10 +54,56 @@ static void mix(const SbOldMesh *old, const PetscReal at[], PetscInt cell, const
   }
 }
 
-/* Rest positions of vertices that were placed now, and where the old mesh has them now. */
-static PetscErrorCode find_material(const SbOldMesh *old, const SbRemeshing *how, SbLocator rest,
-                                    SbNewMesh *m)
+/* The position at rest of weights in a tet. */
+static void mix_rest(const SbOldMesh *old, PetscInt cell, const PetscReal w[4], PetscReal X[3])
 {
+  mix(old, old->X, cell, w, X);
+  for (int i = 0; old->edge_off && i < 18; i++)
+    X[i % 3] += 4 * w[SbTetEdge[i / 3][0]] * w[SbTetEdge[i / 3][1]] * old->edge_off[18 * (size_t)cell + i];
+}
+
+/* From the rest position of a vertex to where the old mesh has it now. */
+static void follow(const Material *at, SbNewMesh *m, PetscInt v)
+{
+  PetscInt cell;
+  PetscReal w[4];
+
+  (void)SbLocatorFind(at->rest, m->X + 3 * v, &cell, w);
+  mix(at->old, at->old->x, cell, w, m->x + 3 * v);
+  if (m->flat) mix(at->old, at->old->X, cell, w, m->flat + 3 * v);
+}
+
+/* The nodes at the edges of a new tet, or at those of one of its vertices, unless that is -1. */
+static void bend(const Material *at, SbNewMesh *m, PetscInt c, PetscInt vertex)
+{
+  for (int e = 0; m->edge_off && e < 6; e++) {
+    const PetscInt a = m->cell[4 * c + SbTetEdge[e][0]], b = m->cell[4 * c + SbTetEdge[e][1]];
+    const PetscInt i = SbKeysFind(at->ncurved, at->curved, SbKeyOfPair(a, b));
+    PetscReal *off = m->edge_off + 18 * (size_t)c + 3 * e, middle[3], X[3], w[4], length2 = 0, off2 = 0;
+    PetscInt cell;
+
+    if (vertex >= 0 && a != vertex && b != vertex) continue;
+    // an old one, or the middle goes along
+    if (i < at->ncurved && at->curved[i].key == SbKeyOfPair(a, b)) {
+      for (int k = 0; k < 3; k++) off[k] = at->old->edge_off[3 * (size_t)at->curved[i].slot + k];
+      continue;
+    }
+    for (int k = 0; k < 3; k++) middle[k] = 0.5 * (m->flat[3 * a + k] + m->flat[3 * b + k]);
+    (void)SbLocatorFind(at->flat, middle, &cell, w);
+    mix_rest(at->old, cell, w, X);
+    for (int k = 0; k < 3; k++) {
+      off[k] = X[k] - 0.5 * (m->X[3 * a + k] + m->X[3 * b + k]);
+      off2 += PetscSqr(off[k]);
+      length2 += PetscSqr(m->X[3 * a + k] - m->X[3 * b + k]);
+    }
+    for (int k = 0; k < 3 && off2 <= PetscSqr(STRAIGHT) * length2; k++) off[k] = 0;
+  }
+}
+
+/* Rest positions of vertices that were placed now, and where the old mesh has them now. */
+static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, SbNewMesh *m)
+{
+  const SbOldMesh *old = at->old;
   SbLocator now = NULL;
   PetscReal *y = m->x;
 
@@ -52,20 +113,22 @@ static PetscErrorCode find_material(const SbOldMesh *old, const SbRemeshing *how
     PetscCall(PetscArraycpy(m->X + 3 * v, old->X + 3 * m->kept[v], 3));
     PetscCall(PetscArraycpy(m->x + 3 * v, old->x + 3 * m->kept[v], 3));
   }
-  if (!how->rest) PetscCall(SbLocatorCreate(old->ncell, old->cell, old->x, &now));
+  if (old->edge_off) PetscCall(PetscMalloc1(3 * (size_t)m->nvert, &m->flat));
+  for (PetscInt v = 0; old->edge_off && v < m->nkept; v++)
+    PetscCall(PetscArraycpy(m->flat + 3 * v, m->X + 3 * v, 3));
+  if (!how->rest) PetscCall(SbLocatorCreate(old->ncell, old->cell, old->x, NULL, &now));
   for (PetscInt v = m->nkept; v < m->nvert; v++) {
     PetscInt cell;
     PetscReal w[4];
 
-    if (how->rest) {
+    (void)SbLocatorFind(now ? now : at->flat ? at->flat : at->rest, y + 3 * v, &cell, w);
+    PetscCheck(cell >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "no tetrahedron has a volume %s",
+               how->rest ? "at rest" : "now");
+    if (now || at->flat)
+      mix_rest(old, cell, w, m->X + 3 * v);
+    else
       PetscCall(PetscArraycpy(m->X + 3 * v, y + 3 * v, 3));
-      (void)SbLocatorFind(rest, m->X + 3 * v, &cell, w);
-    } else {
-      (void)SbLocatorFind(now, y + 3 * v, &cell, w);
-      PetscCheck(cell >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "no tetrahedron has a volume now");
-      mix(old, old->X, cell, w, m->X + 3 * v);
-    }
-    PetscCheck(cell >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "no tetrahedron has a volume at rest");
+    if (m->flat) mix(old, old->X, cell, w, m->flat + 3 * v);
     mix(old, old->x, cell, w, m->x + 3 * v);
   }
   PetscCall(SbLocatorDestroy(&now));
@@ -84,10 +147,24 @@ static PetscReal shape_at(const SbNewMesh *m, const PetscReal at[], PetscInt cel
   return SbTetQuality((const PetscReal(*)[3])x);
 }
 
+/* Its shape at rest; of a curved one as much worse as its least Jacobian says. */
+static PetscReal shape_at_rest(const SbNewMesh *m, PetscInt cell)
+{
+  const PetscReal shape = shape_at(m, m->X, cell),
+                  *off = m->edge_off ? m->edge_off + 18 * (size_t)cell : NULL;
+  PetscBool curved = PETSC_FALSE;
+  PetscReal least;
+
+  for (int i = 0; off && i < 18; i++) curved = (PetscBool)(curved || off[i] != 0);
+  if (!curved || !(shape > 0)) return shape;
+  least = SbTetCurvedLeast(m->X, m->cell + 4 * cell, off);
+  return shape * PetscMin(1, least);
+}
+
 /* The worse of its shapes at rest and now. */
 static PetscReal worse(const SbNewMesh *m, PetscInt cell)
 {
-  const PetscReal rest = shape_at(m, m->X, cell), now = shape_at(m, m->x, cell);
+  const PetscReal rest = shape_at_rest(m, cell), now = shape_at(m, m->x, cell);
 
   return PetscMin(rest, now);
 }
@@ -110,26 +187,27 @@ static PetscReal worst_around(const SbNewMesh *m, const Stars *s, PetscInt v)
 }
 
 /* Tries positions on the way to the middle of the neighbours at rest; says whether one was better. */
-static PetscBool move_vertex(const SbOldMesh *old, SbLocator rest, const Stars *s, PetscInt v, SbNewMesh *m)
+static PetscBool move_vertex(const Material *at, const Stars *s, PetscInt v, SbNewMesh *m)
 {
-  PetscReal middle[3] = {0, 0, 0}, X[3], best_X[3], best_x[3], best = worst_around(m, s, v), part = 1;
+  PetscReal middle[3] = {0, 0, 0}, X[3], best_X[3], best_x[3], best_flat[3], best = worst_around(m, s, v),
+            part = 1;
   const PetscReal n = 4 * (PetscReal)(s->start[v + 1] - s->start[v]);
   PetscBool better = PETSC_FALSE;
 
   for (int k = 0; k < 3; k++) {
     X[k] = best_X[k] = m->X[3 * v + k];
     best_x[k] = m->x[3 * v + k];
+    if (m->flat) best_flat[k] = m->flat[3 * v + k];
     for (PetscInt i = s->start[v]; i < s->start[v + 1]; i++) {
       for (int a = 0; a < 4; a++) middle[k] += m->X[3 * m->cell[4 * s->cells[i] + a] + k] / n;
     }
   }
   for (int i = 0; i < PLACES; i++, part /= 2) {
-    PetscReal w[4], now;
-    PetscInt cell;
+    PetscReal now;
 
     for (int k = 0; k < 3; k++) m->X[3 * v + k] = X[k] + part * (middle[k] - X[k]) * 4 / 3;
-    (void)SbLocatorFind(rest, m->X + 3 * v, &cell, w);
-    mix(old, old->x, cell, w, m->x + 3 * v);
+    follow(at, m, v);
+    for (PetscInt j = s->start[v]; j < s->start[v + 1]; j++) bend(at, m, s->cells[j], v);
     now = worst_around(m, s, v);
     if (!(now > best)) continue;
     best = now;
@@ -137,12 +215,15 @@ static PetscBool move_vertex(const SbOldMesh *old, SbLocator rest, const Stars *
     for (int k = 0; k < 3; k++) {
       best_X[k] = m->X[3 * v + k];
       best_x[k] = m->x[3 * v + k];
+      if (m->flat) best_flat[k] = m->flat[3 * v + k];
     }
   }
   for (int k = 0; k < 3; k++) {
     m->X[3 * v + k] = best_X[k];
     m->x[3 * v + k] = best_x[k];
+    if (m->flat) m->flat[3 * v + k] = best_flat[k];
   }
+  for (PetscInt j = s->start[v]; j < s->start[v + 1]; j++) bend(at, m, s->cells[j], v);
   return better;
 }
 
@@ -171,11 +252,10 @@ static PetscBool inner_edge(const SbSurface *hull, const SbKey edge[], const SbN
 }
 
 /* A vertex in the middle of an edge at rest; each tet around it becomes two. */
-static PetscErrorCode split_edge(const SbOldMesh *old, SbLocator rest, const PetscInt ends[2], SbNewMesh *m)
+static PetscErrorCode split_edge(const Material *at_old, const PetscInt ends[2], SbNewMesh *m)
 {
   const PetscInt middle = m->nvert, ncell = m->ncell;
-  PetscReal w[4];
-  PetscInt n = 0, cell;
+  PetscInt n = 0;
 
   PetscFunctionBeginUser;
   for (PetscInt c = 0; c < ncell; c++) {
@@ -187,9 +267,10 @@ static PetscErrorCode split_edge(const SbOldMesh *old, SbLocator rest, const Pet
   PetscCall(PetscRealloc(3 * (size_t)(m->nvert + 1) * sizeof(*m->X), &m->X));
   PetscCall(PetscRealloc(3 * (size_t)(m->nvert + 1) * sizeof(*m->x), &m->x));
   PetscCall(PetscRealloc(4 * (size_t)(ncell + n) * sizeof(*m->cell), &m->cell));
+  if (m->flat) PetscCall(PetscRealloc(3 * (size_t)(m->nvert + 1) * sizeof(*m->flat), &m->flat));
+  if (m->edge_off) PetscCall(PetscRealloc(18 * (size_t)(ncell + n) * sizeof(*m->edge_off), &m->edge_off));
   for (int k = 0; k < 3; k++) m->X[3 * middle + k] = 0.5 * (m->X[3 * ends[0] + k] + m->X[3 * ends[1] + k]);
-  (void)SbLocatorFind(rest, m->X + 3 * middle, &cell, w);
-  mix(old, old->x, cell, w, m->x + 3 * middle);
+  follow(at_old, m, middle);
   m->nvert++;
   for (PetscInt c = 0; c < ncell; c++) {
     PetscInt *v = m->cell + 4 * c, at[2] = {-1, -1};
@@ -202,13 +283,15 @@ static PetscErrorCode split_edge(const SbOldMesh *old, SbLocator rest, const Pet
     PetscCall(PetscArraycpy(m->cell + 4 * m->ncell, v, 4));
     v[at[1]] = middle;
     m->cell[4 * m->ncell++ + at[0]] = middle;
+    bend(at_old, m, c, middle);
+    bend(at_old, m, m->ncell - 1, -1);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Vertices are moved, and edges of tets that have none to move are split, until all tets are good enough or nothing helps. */
-static PetscErrorCode repair_tets(const SbOldMesh *old, const SbRemeshing *how, const SbSurface *hull,
-                                  SbLocator rest, SbNewMesh *m)
+static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, const SbSurface *hull,
+                                  SbNewMesh *m)
 {
   PetscBool split = PETSC_TRUE;
   SbKey *edge;
@@ -235,7 +318,7 @@ static PetscErrorCode repair_tets(const SbOldMesh *old, const SbRemeshing *how, 
         for (int a = 0; a < 4; a++) {
           const PetscInt v = m->cell[4 * c + a];
 
-          if (v < m->nkept || !move_vertex(old, rest, &stars, v, m)) continue;
+          if (v < m->nkept || !move_vertex(at, &stars, v, m)) continue;
           moved[v] = better = PETSC_TRUE;
         }
       }
@@ -249,7 +332,7 @@ static PetscErrorCode repair_tets(const SbOldMesh *old, const SbRemeshing *how, 
       PetscInt ends[2] = {-1, -1};
 
       if (worse(m, c) >= how->quality || !inner_edge(hull, edge, m, c, ends)) continue;
-      PetscCall(split_edge(old, rest, ends, m));
+      PetscCall(split_edge(at, ends, m));
       split = PETSC_TRUE;
     }
   }
@@ -269,7 +352,7 @@ static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how
   for (PetscInt c = 0; c < m->ncell; c++) {
     const PetscReal quality = shape_at(m, m->x, c);
 
-    at_rest += !(shape_at(m, m->X, c) > 1e-6);
+    at_rest += !(shape_at_rest(m, c) > 1e-6);
     now += !(quality > 0);
     m->quality = PetscMin(m->quality, quality);
   }
@@ -286,8 +369,9 @@ static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how
   PetscCheck(!at_rest, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%" PetscInt_FMT " of %" PetscInt_FMT
              " new tetrahedra would be inverted or flat at rest: the deformation differs too much from one "
-             "old tetrahedron to the next",
-             at_rest, m->ncell);
+             "old tetrahedron to the next%s",
+             at_rest, m->ncell,
+             m->edge_off ? ", or the surface bends too much from one triangle to the next" : "");
   PetscCheck(now <= before, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%" PetscInt_FMT " of %" PetscInt_FMT " new tetrahedra would be inverted, %" PetscInt_FMT
              " old ones are",
@@ -300,8 +384,31 @@ static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how
 
 /* ------------------------------------------------------------------ from beginning to end */
 
+static PetscErrorCode prepare(const SbOldMesh *old, const SbNewMesh *m, Material *at)
+{
+  PetscInt n = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbLocatorCreate(old->ncell, old->cell, old->X, old->edge_off, &at->rest));
+  if (!old->edge_off) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbLocatorCreate(old->ncell, old->cell, old->X, NULL, &at->flat));
+  PetscCall(PetscMalloc1(6 * (size_t)old->ncell, &at->curved));
+  for (PetscInt i = 0; i < 6 * old->ncell; i++) {
+    const PetscReal *off = old->edge_off + 3 * (size_t)i;
+    PetscInt v[2];
+
+    if (off[0] == 0 && off[1] == 0 && off[2] == 0) continue;
+    for (int k = 0; k < 2; k++)
+      PetscCall(PetscFindInt(old->cell[4 * (i / 6) + SbTetEdge[i % 6][k]], m->nkept, m->kept, &v[k]));
+    if (v[0] >= 0 && v[1] >= 0) at->curved[n++] = (SbKey){SbKeyOfPair(v[0], v[1]), i};
+  }
+  SbKeysSort(n, at->curved);
+  at->ncurved = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRemeshing *how, SbSurface *hull,
-                             SbLocator *rest, SbNewMesh *m)
+                             Material *at, SbNewMesh *m)
 {
   SbTets tets = {0};
   PetscBool *used, all = PETSC_TRUE;
@@ -352,9 +459,11 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
   PetscCall(PetscFree(used));
   PetscCheck(all, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "the mesher left out vertices of the surface, or made some of no tetrahedron");
-  PetscCall(SbLocatorCreate(old->ncell, old->cell, old->X, rest));
-  PetscCall(find_material(old, how, *rest, m));
-  PetscCall(repair_tets(old, how, hull, *rest, m));
+  PetscCall(prepare(old, m, at));
+  PetscCall(find_material(at, how, m));
+  if (m->flat) PetscCall(PetscMalloc1(18 * (size_t)m->ncell, &m->edge_off));
+  for (PetscInt c = 0; c < m->ncell; c++) bend(at, m, c, -1);
+  PetscCall(repair_tets(at, how, hull, m));
   PetscCall(check_quality(old, how, m));
   // the old tet around the middle of each new one
   PetscCall(PetscMalloc1(m->ncell, &m->within));
@@ -365,7 +474,7 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
       middle[k] = 0;
       for (int a = 0; a < 4; a++) middle[k] += m->X[3 * m->cell[4 * c + a] + k] / 4;
     }
-    (void)SbLocatorFind(*rest, middle, &m->within[c], w);
+    (void)SbLocatorFind(at->rest, middle, &m->within[c], w);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -373,14 +482,16 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
 PetscErrorCode SbRemeshBody(const char *where, const SbOldMesh *old, const SbRemeshing *how, SbNewMesh *m)
 {
   SbSurface hull = {0};
-  SbLocator rest = NULL;
+  Material at = {.old = old};
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(m, sizeof(*m)));
-  ierr = remesh(where, old, how, &hull, &rest, m);
+  ierr = remesh(where, old, how, &hull, &at, m);
   PetscCall(SbSurfaceDestroy(&hull));
-  PetscCall(SbLocatorDestroy(&rest));
+  PetscCall(SbLocatorDestroy(&at.rest));
+  PetscCall(SbLocatorDestroy(&at.flat));
+  PetscCall(PetscFree(at.curved));
   if (ierr) PetscCall(SbNewMeshDestroy(m));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -394,6 +505,8 @@ PetscErrorCode SbNewMeshDestroy(SbNewMesh *m)
   PetscCall(PetscFree(m->cell));
   PetscCall(PetscFree(m->kept));
   PetscCall(PetscFree(m->within));
+  PetscCall(PetscFree(m->edge_off));
+  PetscCall(PetscFree(m->flat));
   PetscCall(PetscMemzero(m, sizeof(*m)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -104,6 +104,11 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   PetscCall(collect(sf, 1, MPIU_INT, mesh->cell_material, g->cell_material));
   PetscCall(collect(sf, 5, MPI_UINT64_T, set, g->cell_set));
   PetscCall(PetscFree2(cell, set));
+  // nodes of curved edges
+  if (mesh->edge_off) {
+    if (!rank) PetscCall(PetscMalloc1(18 * (size_t)g->ncell, &g->edge_off));
+    PetscCall(collect(sf, 18, MPIU_REAL, mesh->edge_off, g->edge_off));
+  }
   // the values of the vectors at the nodes of each cell
   each = g->width * g->nfield * 3;
   if (!rank) PetscCall(PetscMalloc1((size_t)each * (size_t)g->ncell, &g->value));
@@ -131,6 +136,7 @@ PetscErrorCode SbGatheredDestroy(SbGathered *g)
   PetscCall(PetscFree(g->mass));
   PetscCall(PetscFree3(g->X, g->x, g->vert_set));
   PetscCall(PetscFree3(g->cell, g->cell_material, g->cell_set));
+  PetscCall(PetscFree(g->edge_off));
   PetscCall(PetscFree(g->value));
   PetscCall(PetscMemzero(g, sizeof(*g)));
   PetscFunctionReturn(PETSC_SUCCESS);

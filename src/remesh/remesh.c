@@ -263,9 +263,6 @@ PetscErrorCode SbRemeshAttach(SbRemesh r, SbRun run)
 {
   PetscFunctionBeginUser;
   if (!r) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(
-    !run->model->mesh->edge_off, run->model->comm, PETSC_ERR_USER_INPUT,
-    "re-meshing keeps no curved tets: read straight ones (a mesh of first order), or run without it");
   SbRunSetPause(run, check_quality, r);
   if (!r->meshes) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(r->column));

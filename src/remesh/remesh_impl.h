@@ -17,6 +17,7 @@ typedef struct {
   PetscInt *cell;          /* [ncell][4] vertices */
   PetscInt *cell_material; /* [ncell] */
   uint64_t *cell_set;      /* [ncell][5] of the cell, of its faces */
+  PetscReal *edge_off;     /* [ncell][6][3] as in SbMesh; NULL: no cell is curved at rest */
   PetscReal *value; /* [ncell][width][nfield][3]; SI; PETSC_MAX_REAL where there is no support, no node */
 #define SB_EDGES 8  /* where the nodes at edges begin */
 } SbGathered;
@@ -43,19 +44,23 @@ typedef struct {
 /* The mesh that there is; all borrowed. */
 typedef struct {
   PetscInt nvert, ncell;
-  const PetscReal *X, *x; /* [nvert][3] at rest, now; m */
-  const PetscInt *cell;   /* [ncell][4] */
-  const PetscInt *region; /* [ncell] tets of different numbers stay apart */
-  const SbFaces *faces;   /* of cell */
+  const PetscReal *X, *x;    /* [nvert][3] at rest, now; m */
+  const PetscInt *cell;      /* [ncell][4] */
+  const PetscInt *region;    /* [ncell] tets of different numbers stay apart */
+  const SbFaces *faces;      /* of cell */
+  const PetscReal *edge_off; /* [ncell][6][3] at rest; NULL: straight */
 } SbOldMesh;
 /* Another one of the same body; arrays owned, SbNewMeshDestroy(). */
 typedef struct {
   PetscInt nvert, ncell, nkept;
-  PetscReal *X, *x;  /* [nvert][3] at rest, and now as the old mesh has it there; m */
-  PetscInt *cell;    /* [ncell][4] */
-  PetscInt *kept;    /* [nkept] old vertex of each of the first new ones, which are where they were */
-  PetscInt *within;  /* [ncell] old tet that holds the middle of the new one */
-  PetscInt nmoved;   /* vertices that were moved, for tets that would have been inverted or too flat */
+  PetscReal *X, *x; /* [nvert][3] at rest, and now as the old mesh has it there; m */
+  PetscInt *cell;   /* [ncell][4] */
+  PetscInt *kept;   /* [nkept] old vertex of each of the first new ones, which are where they were */
+  PetscInt *within; /* [ncell] old tet that holds the middle of the new one */
+  PetscReal *
+    edge_off; /* [ncell][6][3] of nodes at edges from their middles, at rest, m; NULL: no old tet is curved */
+  PetscReal *flat; /* [nvert][3] where the vertices would be at rest if old tets were straight, m; or NULL */
+  PetscInt nmoved; /* vertices that were moved, for tets that would have been inverted or too flat */
   PetscReal quality; /* of the worst tet, now */
 } SbNewMesh;
 /* Errors (PETSC_ERR_USER_INPUT): what the mesher says; tets that stay inverted at rest or now. */

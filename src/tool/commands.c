@@ -32,16 +32,6 @@ static PetscErrorCode write_mesh(SbTool *tool, SbImport *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reading has filled the surface already. */
-static PetscErrorCode tet(SbTool *tool, SbImport *mesh)
-{
-  PetscFunctionBeginUser;
-  if (!tool->quiet && SbMeshFileNote(mesh)[0])
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s\n", tool->in, SbMeshFileNote(mesh)));
-  PetscCall(write_mesh(tool, mesh));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode refine(SbTool *tool, SbImport *mesh)
 {
   PetscFunctionBeginUser;
@@ -100,7 +90,7 @@ const SbToolCommand SbToolCommands[] = {
   {"info", "FILE", "contents: size, groups, quality of the tets, memory that a run will take", 1, SbToolInfo},
   {"convert", "FILE OUT", "writes it in another format, groups and order kept", 2, write_mesh},
   {"tet", "SURFACE OUT",
-   "fills a closed surface (.stl, .obj, .off, .ply, ...) with tets of edge length -size", 2, tet},
+   "fills a closed surface (.stl, .obj, .off, .ply, ...) with tets of edge length -size", 2, write_mesh},
   {"repair", "FILE OUT",
    "removes degenerate tets, corrects orientation, merges duplicate vertices; reports what it did", 2,
    repair},
@@ -117,7 +107,7 @@ PetscErrorCode SbToolRun(SbTool *tool)
 
   PetscFunctionBeginUser;
   while (strcmp(command->name, tool->command)) command++;
-  PetscCheck(command->run != tet || SbMeshFileIsSurface(tool->in), PETSC_COMM_SELF, PETSC_ERR_USER,
+  PetscCheck(strcmp(command->name, "tet") || SbMeshFileIsSurface(tool->in), PETSC_COMM_SELF, PETSC_ERR_USER,
              "%s: is no surface that tet can fill, by its name; give a closed surface of triangles (.stl, "
              ".obj, .off, .ply, ...); supple-mesh info says what a mesh of tets holds",
              tool->in);
@@ -128,6 +118,8 @@ PetscErrorCode SbToolRun(SbTool *tool)
   ierr = SbMeshFileRead(&tool->body, SbToolProgress, tool, &mesh);
   SbToolEnd(tool);
   PetscCall(ierr);
+  if (command->run != SbToolInfo && !tool->quiet && SbMeshFileNote(mesh)[0])
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s\n", tool->in, SbMeshFileNote(mesh)));
   ierr = command->run(tool, mesh);
   if (!ierr && tool->view[0]) ierr = SbToolView(tool, mesh);
   PetscCall(SbMeshFileDestroy(&mesh));

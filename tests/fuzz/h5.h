@@ -53,6 +53,9 @@ static const char *const fuzz_h5_names[] = {
   "/step/0001",
   "/step/000003",
   "/mesh",
+  "/mesh/curved_edges",
+  "/mesh/edge_offsets",
+  "/mesh/cells10",
 };
 enum { FUZZ_H5_NAMES = (int)(sizeof(fuzz_h5_names) / sizeof(fuzz_h5_names[0])) };
 enum { FUZZ_H5_VALUES = 4096 }; /* arrays of more are left without */

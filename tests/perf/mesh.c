@@ -85,7 +85,7 @@ static PetscErrorCode read_only(const SbBody *body)
 static PetscErrorCode measure(SbBody *body, SbReading reading)
 {
   Phase p;
-  SbMergedMesh whole;
+  SbMergedMesh whole, curved;
   SbMesh mesh;
   SbLocalMesh local;
 
@@ -104,12 +104,20 @@ static PetscErrorCode measure(SbBody *body, SbReading reading)
   mesh->comm = PETSC_COMM_WORLD;
   mesh->nbody = 1;
   mesh->body = body;
+  curved = whole;
+  whole.curved = NULL;
+  whole.edge_off = NULL;
   phase_begin(&p);
   PetscCall(SbDistribute(PETSC_COMM_WORLD, SB_PARTITION_AUTO, PETSC_FALSE, &whole, &local));
   PetscCall(phase_end(&p, "distribute"));
   phase_begin(&p);
   PetscCall(SbMeshNumber(mesh, &local));
   PetscCall(phase_end(&p, "number"));
+  phase_begin(&p);
+  PetscCall(SbMeshCurve(mesh, curved.ncurved, curved.curved, curved.edge_off));
+  PetscCall(PetscFree(curved.curved));
+  PetscCall(PetscFree(curved.edge_off));
+  PetscCall(phase_end(&p, "curve"));
   PetscCall(perf_sample("peak_rank0", "MiB", p.most[0]));
   PetscCall(perf_sample("peak_others", "MiB", p.most[1]));
   PetscCall(perf_sample("kept", "MiB", status("VmRSS:") - p.base));
@@ -129,6 +137,7 @@ int main(int argc, char **argv)
   PetscCall(SbMeshRegister());
   PetscCall(PetscMemzero(&body, sizeof(body)));
   body.scale = 1;
+  body.edge_nodes = PETSC_TRUE;
   PetscCall(PetscStrncpy(body.mesh, "box:0.4,0.1,0.1:8", sizeof(body.mesh)));
   PetscCall(perf_argument("-mesh", sizeof(body.mesh), body.mesh));
   PetscCall(PetscOptionsGetBool(NULL, NULL, "-slabs", &slabs, NULL));

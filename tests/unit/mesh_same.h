@@ -91,4 +91,16 @@ static inline void test_same(const SbImport *a, const SbImport *b, const char *w
   SB_CHECK(a->nvert == b->nvert && !memcmp(a->x, b->x, 3 * (size_t)a->nvert * sizeof(PetscReal)),
            "%s: other coordinates", what);
   for (int d = 0; d < 4; d++) test_same_items(a, b, d, what);
+  SB_CHECK(a->nmiddle.n == b->nmiddle.n, "%s: %d and %d curved edges", what, (int)a->nmiddle.n,
+           (int)b->nmiddle.n);
+  for (PetscInt i = 0; i < PetscMin(a->nmiddle.n, b->nmiddle.n); i++) {
+    const SbMiddle *p = &a->middle[i], *q = &b->middle[i];
+    PetscBool same = (PetscBool)(p->end[0] == q->end[0] && p->end[1] == q->end[1]);
+
+    for (int k = 0; k < 3; k++) same = (PetscBool)(same && PetscAbsReal(p->off[k] - q->off[k]) < 1e-15);
+    if (!same) {
+      SB_CHECK(0, "%s: another curved edge %d", what, (int)i);
+      return;
+    }
+  }
 }

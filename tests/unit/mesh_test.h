@@ -55,6 +55,32 @@ static inline PetscErrorCode test_import(const char *path, SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Bends the edges of the tets whose middle is beyond x = 0.5, as a smooth motion would. */
+static inline PetscErrorCode test_curve(SbImport *im)
+{
+  PetscReal largest;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < 6 * im->item[3].n; i++) {
+    const PetscInt a = im->item[3].vert[4 * (i / 6) + SbTetEdge[i % 6][0]],
+                   b = im->item[3].vert[4 * (i / 6) + SbTetEdge[i % 6][1]];
+    const PetscReal *x = im->x + 3 * a, *y = im->x + 3 * b;
+    SbMiddle m = {.end = {PetscMin(a, b), PetscMax(a, b)}, .node = -1};
+
+    for (int k = 0; k < 3; k++) {
+      const int p = (k + 1) % 3, q = (k + 2) % 3;
+
+      m.off[k] = 0.05 * (PetscSinReal(x[p] + y[p] + 1.5 * (x[q] + y[q])) -
+                         0.5 * (PetscSinReal(2 * x[p] + 3 * x[q]) + PetscSinReal(2 * y[p] + 3 * y[q])));
+    }
+    if (x[0] + y[0] < 1) continue;
+    PetscCall(SbReserve(++im->nmiddle.n, sizeof(m), &im->nmiddle.capacity, &im->middle));
+    im->middle[im->nmiddle.n - 1] = m;
+  }
+  PetscCall(SbImportMiddles(im, &largest));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Whether a tag set has the group; items of one dimension that belong to it. */
 static inline PetscBool test_in_group(const SbImport *im, PetscInt tags, const char *name)
 {

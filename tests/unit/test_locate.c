@@ -1,6 +1,6 @@
 // @ranks 1
 /*
-  Which tet holds a point: against all tets one by one, at corners, outside, beside tets that are inverted. Shapes of tets.
+  Which tet holds a point: against all tets one by one, at corners, outside, beside tets that are inverted, in curved ones. Shapes of tets.
 */
 #include "../../src/meshio/meshio_impl.h"
 #include "../test.h"
@@ -51,7 +51,7 @@ static PetscErrorCode check_inside(PetscRandom random)
 
   PetscFunctionBeginUser;
   PetscCall(make_box(random, &im));
-  PetscCall(SbLocatorCreate(im.item[3].n, im.item[3].vert, im.x, &l));
+  PetscCall(SbLocatorCreate(im.item[3].n, im.item[3].vert, im.x, NULL, &l));
   for (int i = 0; i < 300; i++) {
     PetscReal p[3], w[4], best = -1, at[3] = {0, 0, 0}, distance, sum = 0;
     PetscInt cell;
@@ -84,6 +84,54 @@ static PetscErrorCode check_inside(PetscRandom random)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* In curved tets, far from the origin too: a point at l is found there, or on the side of a neighbour. */
+static PetscErrorCode check_curved(PetscRandom random, PetscReal far)
+{
+  PetscReal *off;
+  SbLocator l;
+  SbImport im;
+
+  PetscFunctionBeginUser;
+  PetscCall(make_box(random, &im));
+  for (PetscInt i = 0; i < 3 * im.nvert; i++) im.x[i] += far;
+  PetscCall(PetscCalloc1(18 * im.item[3].n, &off));
+  for (PetscInt i = 0; i < 6 * im.item[3].n; i++) {
+    const PetscReal *x = im.x + 3 * im.item[3].vert[4 * (i / 6) + SbTetEdge[i % 6][0]],
+                    *y = im.x + 3 * im.item[3].vert[4 * (i / 6) + SbTetEdge[i % 6][1]];
+
+    // the edges of a quarter of the box stay straight
+    for (int k = 0; k < 3; k++) {
+      const PetscReal d = x[(k + 1) % 3] - y[(k + 1) % 3], e = x[(k + 2) % 3] - y[(k + 2) % 3];
+
+      off[3 * i + k] = x[0] + y[0] < 2 * far + 0.5 ? 0 : 0.4 * (d * d - d * e);
+    }
+  }
+  PetscCall(SbLocatorCreate(im.item[3].n, im.item[3].vert, im.x, off, &l));
+  for (PetscInt c = 0; c < im.item[3].n; c += 3) {
+    PetscReal L[4], w[4], sum = 0, phi[SB_CELL_NODES], node[SB_CELL_NODES][3], p[3] = {0}, at[3] = {0};
+    PetscInt cell;
+
+    for (int a = 0; a < 4; a++) {
+      PetscCall(PetscRandomGetValueReal(random, &L[a]));
+      sum += L[a];
+    }
+    for (int a = 0; a < 4; a++) L[a] /= sum;
+    SbTetNodes(im.x, im.item[3].vert + 4 * c, off + 18 * c, node);
+    SbQuadraticBasis(L, phi);
+    for (int i = 0; i < 3 * SB_CELL_NODES; i++) p[i % 3] += phi[i / 3] * node[i / 3][i % 3];
+    SB_CHECK(SbLocatorFind(l, p, &cell, w) < 1e-13 * (1 + far), "tet %d: a point of it is outside", (int)c);
+    SB_CHECK(cell == c, "tet %d: found in %d", (int)c, (int)cell);
+    for (int a = 0; a < 4; a++) SB_CHECK_NEAR(w[a], L[a], 1e-11 * (1 + far), "l");
+    SbQuadraticBasis(w, phi);
+    for (int i = 0; i < 3 * SB_CELL_NODES; i++) at[i % 3] += phi[i / 3] * node[i / 3][i % 3];
+    for (int k = 0; k < 3; k++) SB_CHECK_NEAR(at[k], p[k], 1e-14 * (1 + far), "place by l");
+  }
+  PetscCall(SbLocatorDestroy(&l));
+  PetscCall(PetscFree(off));
+  PetscCall(SbImportDestroy(&im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Outside a box the nearest place is known. */
 static PetscErrorCode check_outside(void)
 {
@@ -95,7 +143,7 @@ static PetscErrorCode check_outside(void)
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(&im, sizeof(im)));
   PetscCall(SbImportRead_Box("box:1,2,0.5:6,6,6", &im));
-  PetscCall(SbLocatorCreate(im.item[3].n, im.item[3].vert, im.x, &l));
+  PetscCall(SbLocatorCreate(im.item[3].n, im.item[3].vert, im.x, NULL, &l));
   for (int i = 0; i < 3; i++) {
     PetscReal w[4];
     PetscInt cell;
@@ -113,10 +161,10 @@ static PetscErrorCode check_outside(void)
     PetscReal w[4];
     PetscInt cell;
 
-    PetscCall(SbLocatorCreate(2, cells, x, &l));
+    PetscCall(SbLocatorCreate(2, cells, x, NULL, &l));
     SB_CHECK(SbLocatorFind(l, q, &cell, w) == 0 && cell == 1, "found in the tet %d", (int)cell);
     PetscCall(SbLocatorDestroy(&l));
-    PetscCall(SbLocatorCreate(1, cells, x, &l));
+    PetscCall(SbLocatorCreate(1, cells, x, NULL, &l));
     SB_CHECK(SbLocatorFind(l, q, &cell, w) == PETSC_MAX_REAL && cell == -1, "found among no tets: %d",
              (int)cell);
     PetscCall(SbLocatorDestroy(&l));
@@ -148,6 +196,8 @@ int main(int argc, char **argv)
   PetscCall(PetscRandomSetSeed(random, 7));
   PetscCall(PetscRandomSeed(random));
   PetscCall(check_inside(random));
+  PetscCall(check_curved(random, 0));
+  PetscCall(check_curved(random, 1000));
   PetscCall(check_outside());
   check_quality();
   PetscCall(PetscRandomDestroy(&random));

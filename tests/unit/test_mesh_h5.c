@@ -206,6 +206,7 @@ static PetscErrorCode with_array(const char *path, const char *name, int ndim, c
 
   PetscFunctionBeginUser;
   PetscCall(test_read(DATA "two_cubes_41.msh", 0, &im));
+  if (strstr(name, "edge")) PetscCall(test_curve(im));
   PetscCall(SbMeshFileWrite(im, path, SB_MESH_AUTO));
   PetscCall(SbMeshFileDestroy(&im));
   file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT);
@@ -218,7 +219,8 @@ static PetscErrorCode with_array(const char *path, const char *name, int ndim, c
 
 static PetscErrorCode test_damage(void)
 {
-  const hsize_t lie[2] = {100000000, 4}, few[1] = {3}, pair[2] = {2, 2}, groups[1] = {8}, two[1] = {2};
+  const hsize_t lie[2] = {100000000, 4}, few[1] = {3}, one_by_three[2] = {1, 3}, pair[2] = {2, 2},
+                groups[1] = {8}, two[1] = {2};
   const double bad[12] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, NAN};
   const int wild[4] = {0, 1, 2, 4711}, below[4] = {0, -1, 2, 3}, high[8] = {0, 1, 2, 3, 4, 3, 3, 3},
             falling[2] = {1, 0};
@@ -241,6 +243,12 @@ static PetscErrorCode test_damage(void)
   PetscCall(with_array(path, "/groups/dim", 1, two, H5T_NATIVE_INT, high, "2 dimensions"));
   PetscCall(with_array(path, "/tag_sets/start", 1, two, H5T_NATIVE_INT, falling, "/tag_sets/start|1|0"));
   PetscCall(with_array(path, "/groups/name", 0, NULL, 0, NULL, "/groups/name"));
+  PetscCall(with_array(path, "/mesh/edge_offsets", 0, NULL, 0, NULL, "/mesh/edge_offsets"));
+  PetscCall(with_array(path, "/mesh/edge_offsets", 2, four_by_three, H5T_NATIVE_DOUBLE, bad,
+                       "/mesh/edge_offsets|row 4"));
+  PetscCall(with_array(path, "/mesh/edge_offsets", 2, one_by_three, H5T_NATIVE_DOUBLE, bad,
+                       "/mesh/edge_offsets|1 rows"));
+  PetscCall(with_array(path, "/mesh/curved_edges", 2, pair, H5T_NATIVE_INT, wild, "4711|row 2|0|22"));
   (void)unlink(path);
   (void)snprintf(index, sizeof(index), "%.*s.xmf", (int)(strlen(path) - 3), path);
   (void)unlink(index);
@@ -285,7 +293,7 @@ static PetscErrorCode test_truncated(void)
 
 static PetscErrorCode test_foreign(void)
 {
-  const int two = 2;
+  const int three = 3;
   char path[256];
   SbImport *im;
   hid_t file, space, a;
@@ -300,11 +308,11 @@ static PetscErrorCode test_foreign(void)
   file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
   space = H5Screate(H5S_SCALAR);
   a = H5Acreate2(file, "supple_mesh", H5T_NATIVE_INT, space, H5P_DEFAULT, H5P_DEFAULT);
-  (void)H5Awrite(a, H5T_NATIVE_INT, &two);
+  (void)H5Awrite(a, H5T_NATIVE_INT, &three);
   (void)H5Aclose(a);
   (void)H5Sclose(space);
   (void)H5Fclose(file);
-  SB_CHECK_ERROR(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED, "layout 2|layout 1");
+  SB_CHECK_ERROR(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED, "layout 3|layouts 1 and 2");
   (void)unlink(path);
   test_path("none.xmf", sizeof(path), path);
   {

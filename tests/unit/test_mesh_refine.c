@@ -121,6 +121,34 @@ static PetscErrorCode test_shapes(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The children of curved tets are curved as the map of their parents is: volumes to rounding, nothing folds, also of children of children. */
+static PetscErrorCode test_curved(const char *path)
+{
+  SbImport *im;
+  SbMeshStatistics facts;
+  PetscReal volume = 0, straight = 0;
+  PetscInt nedge = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_read(path, 0, &im));
+  PetscCall(SbMeshFileMeasure(im, &facts));
+  straight = facts.body.volume;
+  PetscCall(test_curve(im));
+  for (int k = 0; k < 3; k++) {
+    if (k) PetscCall(SbMeshFileRefine(im));
+    PetscCall(SbMeshFileMeasure(im, &facts));
+    if (!k) volume = facts.body.volume;
+    SB_CHECK(!strstr(facts.body.note, "refused"), "%s: %s", path, facts.body.note);
+    SB_CHECK(im->nmiddle.n > 3 * nedge, "%s: %d curved edges after %d", path, (int)im->nmiddle.n, (int)nedge);
+    SB_CHECK_NEAR(facts.body.volume, volume, 1e-13 * volume, "volume of curved tets");
+    nedge = im->nmiddle.n;
+  }
+  SB_CHECK(PetscAbsReal(volume - straight) > 1e-4 * straight, "%s: volume %g with edges as with none", path,
+           (double)volume);
+  PetscCall(SbMeshFileDestroy(&im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
@@ -129,5 +157,7 @@ int main(int argc, char **argv)
   PetscCall(test_children("box:1,2,3:2"));
   PetscCall(test_sound());
   PetscCall(test_shapes());
+  PetscCall(test_curved("tests/data/two_cubes_41.msh"));
+  PetscCall(test_curved("box:1,2,3:2"));
   SB_TEST_END();
 }

@@ -1,4 +1,4 @@
-// A mesh read in slabs by all ranks is, number by number, the one that rank 0 reads: vertices, tets, sets, parts, notes, errors.
+// A mesh read in slabs by all ranks is, number by number, the one that rank 0 reads: vertices, tets, curved edges, sets, parts, notes, errors.
 // @ranks 1 2 3 4
 #include "../../src/mesh/mesh_impl.h"
 #include "mesh_same.h"
@@ -46,7 +46,7 @@ static PetscErrorCode add_group(SbImport *im, int dim, const char *name, PetscIn
 }
 
 /*
-  Two boxes apart, of which the second has its first tets inverted; vertices in between that no tet uses; an inner triangle and one that is no face; a line, a point;
+  Two boxes apart, some of their edges curved, of which the second has its first tets inverted; vertices in between that no tet uses; an inner triangle and one that is no face; a line, a point;
   lines and triangles at unused vertices.
 */
 static PetscErrorCode make_mesh(const char *path, PetscBool random)
@@ -81,6 +81,7 @@ static PetscErrorCode make_mesh(const char *path, PetscBool random)
   PetscCall(add_group(im, 1, "edge", 1, (const PetscInt[]){3, nvert + 2}));
   PetscCall(add_group(im, 0, "corner", 1, (const PetscInt[]){nvert + 6}));
   PetscCall(add_group(im, 0, "corner", 1, (const PetscInt[]){nvert}));
+  PetscCall(test_curve(im));
   PetscCall(SbMeshFileWrite(im, path, SB_MESH_H5));
   PetscCall(SbMeshFileDestroy(&im));
   PetscCall(SbMeshFileDestroy(&other));
@@ -96,6 +97,7 @@ static PetscErrorCode make_scene(const char *path, SbBody body[3], SbSet set[NSE
   body[0] = test_body("first", "box:1,1,1:1");
   body[1] = test_body("a", path);
   body[2] = test_body("b", path);
+  body[2].edge_nodes = PETSC_TRUE;
   body[2].translate[1] = 3.;
   body[2].rotate[0] = 1.;
   body[2].rotate[3] = 30.;
@@ -152,6 +154,7 @@ static PetscErrorCode test_same_mesh(PetscBool random, const char *partitioner)
     SAME(cell_orig, a->ncell);
     SAME(cell_set, a->ncell);
     SAME(face_set, 4 * a->ncell);
+    SAME(edge_off, 18 * a->ncell);
   }
   for (int k = 0; k < NSET; k++)
     SB_CHECK(set[0][k].nvert == set[1][k].nvert && set[0][k].nfacet == set[1][k].nfacet &&
@@ -169,6 +172,8 @@ static PetscErrorCode test_same_mesh(PetscBool random, const char *partitioner)
     SB_CHECK(!strcmp(p->note, q->note), "%s: '%s' and '%s'", what, p->note, q->note);
     SB_CHECK_NEAR(q->volume, p->volume, 1e-14 * p->volume, "volume");
   }
+  SB_CHECK(strstr(body[1][1].note, "taken as straight: ") && strstr(body[1][2].note, ", curved tets: "),
+           "'%s', '%s'", body[1][1].note, body[1][2].note);
   SB_CHECK(body[1][1].npart == 2 && strstr(body[1][1].note, "inverted") && strstr(body[1][1].note, "unused"),
            "%d parts, '%s'", (int)body[1][1].npart, body[1][1].note);
   PetscCall(SbMeshDestroy(&a));

@@ -13,17 +13,19 @@ static const struct {
   {"d.msh", SB_MESH_MSH22_BINARY}, {"e.h5", SB_MESH_AUTO},
 };
 
-static PetscErrorCode test_formats(const char *path)
+static PetscErrorCode test_formats(const char *path, PetscBool curved)
 {
   SbImport *im, *again;
   SbRepair done;
 
   PetscFunctionBeginUser;
   PetscCall(test_read(path, 0, &im));
+  if (curved) PetscCall(test_curve(im));
+  SB_CHECK(im->nmiddle.n > 0 || !curved, "no curved edges");
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(formats); i++) {
     char what[128];
 
-    (void)snprintf(what, sizeof(what), "%s as %s", path, formats[i].name);
+    (void)snprintf(what, sizeof(what), "%s%s as %s", path, curved ? ", curved," : "", formats[i].name);
     PetscCall(test_round(im, formats[i].name, formats[i].format, &again));
     /* version 2.2 repeats what has several groups; the reader joins tets, repairing the others */
     if (formats[i].format == SB_MESH_MSH22 || formats[i].format == SB_MESH_MSH22_BINARY)
@@ -98,8 +100,10 @@ static PetscErrorCode test_errors(void)
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(test_formats(DATA "two_cubes_41.msh"));
-  PetscCall(test_formats("box:1,2,1.5:3"));
+  for (int curved = 0; curved < 2; curved++) {
+    PetscCall(test_formats(DATA "two_cubes_41.msh", (PetscBool)curved));
+    PetscCall(test_formats("box:1,2,1.5:3", (PetscBool)curved));
+  }
   PetscCall(test_as_it_is());
   PetscCall(test_numbers());
   PetscCall(test_errors());

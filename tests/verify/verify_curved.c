@@ -8,11 +8,12 @@
     sums        volume of the body, mass of the nodes, lumped and consistent, force of a load on a curved facet: exact ones
     sphere      Lame's thick sphere, nu 0.3 and 0.4999: order of the displacement at the inner wall, curved and straight tets; the error that
                 the ledger estimates beside the true one
-    ranks       the same displacement as on one rank
+    ranks       the same displacement as on one rank, also from an .h5 that all ranks read in slabs
     refused     a tet that folds over itself, by its number
 */
 #include "curved.h"
 #include "sbestimate.h"
+#include "sbmeshfile.h"
 
 static const char *const laws[] = {"linear", "corotated", "stvk", "neohookean"};
 
@@ -280,18 +281,45 @@ static void half(PetscReal x[3])
   x[0] *= 0.9 + 0.2 * PetscMax(0., x[2] - 0.5) * x[1];
 }
 
+/* As supple-mesh converts it, on rank 0. */
+static PetscErrorCode convert(const char *msh, char h5[512])
+{
+  SbBody body = {.scale = 1.};
+  PetscMPIInt rank;
+  SbImport *im;
+  FILE *f;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_file_open(".h5", h5, &f));
+  PetscCall(test_file_close(f));
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (!rank) {
+    PetscCall(PetscStrncpy(body.mesh, msh, sizeof(body.mesh)));
+    PetscCall(SbMeshFileRead(&body, NULL, NULL, &im));
+    PetscCall(SbMeshFileWrite(im, h5, SB_MESH_AUTO));
+    PetscCall(SbMeshFileDestroy(&im));
+  }
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode check_ranks(void)
 {
   static const char *const solver[] = {"direct", "cg_p_multigrid", "pressure"};
-  char mesh[512];
+  char mesh[512], h5[512], index[512];
+  PetscMPIInt rank, size;
 
   PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(curved_mesh_write(3, 4, half, PETSC_TRUE, mesh));
+  PetscCall(convert(mesh, h5));
   for (int k = 0; k < 3; k++) {
-    PetscReal *value[2];
+    PetscReal *value[3], volume[3];
     PetscInt n = 0;
 
-    for (int r = 0; r < 2; r++) {
+    /* all ranks, one, all in slabs */
+    for (int r = 0; r < 3; r++) {
       TestScene t;
       char text[VERIFY_TEXT];
 
@@ -303,9 +331,11 @@ static PetscErrorCode check_ranks(void)
                                 "-effect_f_type fixed "
                                 "-effect_f_on foot -effect_g_type gravity -effect_g_vector 3,-5,-9.81 -time "
                                 "newmark -mass %s "
-                                "-ts_dt 0.02 -ts_max_time 0.06 -solver %s -ksp_rtol 1e-12 -snes_rtol 1e-12",
-                      mesh, k ? "consistent" : "lumped", solver[k]));
-      PetscCall(test_scene_open_on(r ? PETSC_COMM_SELF : PETSC_COMM_WORLD, NULL, text, &t));
+                                "-ts_dt 0.02 -ts_max_time 0.06 -solver %s -ksp_rtol 1e-12 -snes_rtol 1e-12%s",
+                      r == 2 ? h5 : mesh, k ? "consistent" : "lumped", solver[k],
+                      r == 2 && size > 1 ? " -mesh_reading slabs" : ""));
+      PetscCall(test_scene_open_on(r == 1 ? PETSC_COMM_SELF : PETSC_COMM_WORLD, NULL, text, &t));
+      volume[r] = t.model->body[0].volume;
       PetscCall(verify_solve(&t, "ranks"));
       n = verify_numbers(t.model);
       PetscCall(verify_gather(t.model, t.run->U, &value[r]));
@@ -315,9 +345,15 @@ static PetscErrorCode check_ranks(void)
                           (double)verify_difference(3 * n, value[0], value[1])));
     SB_CHECK(verify_difference(3 * n, value[0], value[1]) < 1e-8, "%s: one rank and all differ by %g",
              solver[k], (double)verify_difference(3 * n, value[0], value[1]));
-    for (int r = 0; r < 2; r++) PetscCall(PetscFree(value[r]));
+    SB_CHECK(verify_difference(3 * n, value[0], value[2]) < 1e-12, "%s: the .h5 differs by %g", solver[k],
+             (double)verify_difference(3 * n, value[0], value[2]));
+    SB_CHECK_NEAR(volume[2], volume[0], 1e-14, "volume of the .h5");
+    for (int r = 0; r < 3; r++) PetscCall(PetscFree(value[r]));
   }
   PetscCall(test_file_remove(mesh));
+  PetscCall(test_file_remove(h5));
+  (void)snprintf(index, sizeof(index), "%.*s.xmf", (int)strlen(h5) - 3, h5);
+  PetscCall(test_file_remove(index));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

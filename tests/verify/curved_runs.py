@@ -1,0 +1,99 @@
+"""Runs on curved tets: an .h5 mesh made by the description of its layout, and as supple-mesh converts it, on any number of ranks; checkpoints of before and after a re-meshing
+are taken up on other numbers of ranks as if the run had not been interrupted; a body of another run begins with what it had; straight tets between the same vertices are another mesh.
+"""
+import itertools
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy
+
+from output_common import MPI, OUT, SUPPLE
+
+TOOL = str(Path(SUPPLE).with_name("supple-mesh"))
+SCENE = ["-bodies", "a", "-body_a_element", "p2", "-body_a_material", "neohookean", "-body_a_young", "1e5", "-body_a_poisson", "0.45", "-body_a_density", "1000",
+         "-body_a_angular_velocity", "0.5,1,2", "-sets", "foot", "-set_foot_at", "plane:1,0,0,0,0.1", "-effects", "hold,weight", "-effect_hold_type", "fixed", "-effect_hold_on", "foot",
+         "-effect_weight_type", "gravity", "-time", "newmark", "-ts_dt", "0.005", "-ts_max_time", "0.04", "-solver", "direct", "-snes_rtol", "1e-13", "-remesh_times", "0.02",
+         "-checkpoint_every_steps", "1", "-checkpoint_keep", "20", "-output_quadratic", "yes", "-output_precision", "double", "-output_fields", "displacement,velocity", "-quiet"]
+
+
+def check(condition, text):
+    if not condition:
+        sys.exit(text)
+
+
+def run(ranks, folder, mesh, *more, fails=""):
+    done = subprocess.run([*MPI, str(ranks), SUPPLE, *SCENE, "-body_a_mesh", str(OUT / mesh), "-output_dir", str(OUT / folder), *more], capture_output=True, text=True)
+    check(bool(done.returncode) == bool(fails) and fails in done.stderr, f"{folder}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
+
+
+def tool(*words):
+    done = subprocess.run([TOOL, *map(str, words)], capture_output=True, text=True)
+    check(done.returncode == 0, f"{words}: {done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def same(name, first, second, most=1e-10):
+    """Displacement and velocity of two checkpoints."""
+    with h5py.File(OUT / first) as a, h5py.File(OUT / second) as b:
+        for field in "uv":
+            check(a[field].shape == b[field].shape, f"{name}: {a[field].shape} and {b[field].shape}")
+            worst = numpy.abs(a[field][()] - b[field][()]).max() / numpy.abs(a[field][()]).max()
+            check(worst < most, f"{name}: {field} differs by {worst:.3g}")
+
+
+def bend(path):
+    """Moves the nodes of edges as x -> x + f(x) would, beyond x = 0.3: the rest stays straight."""
+    with h5py.File(path, "r+") as f:
+        x, cells = f["mesh/x"][()], f["mesh/cells"][()]
+        edges = numpy.unique(numpy.sort(numpy.concatenate([cells[:, pair] for pair in itertools.combinations(range(4), 2)]), axis=1), axis=0)
+
+        def motion(y):
+            return 0.06 * numpy.sin(y[:, [1, 2, 0]] * 4 + 3 * y[:, [2, 0, 1]])
+
+        a, b = x[edges[:, 0]], x[edges[:, 1]]
+        off = motion((a + b) / 2) - (motion(a) + motion(b)) / 2
+        kept = numpy.maximum(a[:, 0], b[:, 0]) > 0.3
+        f["mesh/curved_edges"] = edges[kept].astype("i4")[::-1]  # in any order
+        f["mesh/edge_offsets"] = off[kept][::-1]
+        f.attrs["supple_mesh"] = 2
+
+
+OUT.mkdir(parents=True, exist_ok=True)
+tool("convert", "box:1,0.5,0.5:2", OUT / "straight.h5")
+tool("convert", "box:1,0.5,0.5:2", OUT / "curved.h5")
+bend(OUT / "curved.h5")
+for end in ("msh", "h5"):
+    said = tool("convert", OUT / "curved.h5", OUT / f"again.{end}")
+    check("off the middle" in said, said)
+report = tool("info", OUT / "again.msh")
+check("curved tets" in report, report)
+
+# the mesh, by any way and on any number of ranks
+run(1, "whole", "curved.h5")
+last = "checkpoint_000008.h5"
+run(1, "msh", "again.msh")
+same("the .msh", f"whole/{last}", f"msh/{last}")
+run(3, "slabs", "again.h5", "-mesh_reading", "slabs")
+same("in slabs", f"whole/{last}", f"slabs/{last}")
+with open(OUT / "whole/history.csv", encoding="ascii") as f:
+    names, _, *rows = f.read().splitlines()
+row = dict(zip(names.split(","), map(float, rows[-1].split(","))))
+check(row["remesh_loss"] != 0 and row["remesh_mass"] < 1e-12 and row["min_J"] > 0, f"{row}")
+
+# interrupted before, at and after the re-meshing
+for step, ranks in ((2, 3), (4, 3), (6, 3), (6, 1)):
+    run(ranks, f"from{step}on{ranks}", "curved.h5", "-restart", str(OUT / f"whole/checkpoint_00000{step}.h5"))
+    same(f"step {step} on {ranks}", f"whole/{last}", f"from{step}on{ranks}/{last}")
+run(2, "other", "straight.h5", "-restart", str(OUT / "whole/checkpoint_000002.h5"), fails="another mesh")
+
+# a body that begins as another run ended, or went
+with h5py.File(OUT / "whole/fields.h5") as f:
+    want = f["step/0000/000003/displacement"][()]
+for name, state in (("frame", f"{OUT / 'whole'},3"), ("checkpoint", str(OUT / "whole/checkpoint_000003.h5"))):
+    run(3, name, "curved.h5", "-body_a_state", state, "-ts_max_time", "0.005")
+    with h5py.File(OUT / name / "fields.h5") as f:
+        off = numpy.abs(f["step/0000/000000/displacement"][()] - want).max() / numpy.abs(want).max()
+    check(off < 1e-12, f"-body_a_state, {name}: displacements differ by {off:.3g}")
+print("curved tets in .h5 and .msh, in slabs, across restarts, re-meshing and states of other runs")
