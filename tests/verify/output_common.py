@@ -130,7 +130,6 @@ def check_vtkhdf(folder):
         types = [f[f"/VTKHDF/{name}"].dtype for name in ("Offsets", "Connectivity")]
         if types[0] != types[1]:
             sys.exit(f"{path}: offsets and corners are {types}, and ParaView 5.13 takes them of one type only")
-    with h5py.File(path, "r") as f:
         arrays = [f["VTKHDF/Points"], f["VTKHDF/Connectivity"], *f["VTKHDF/PointData"].values(), *f["VTKHDF/CellData"].values()]
         copied = [data.name for data in arrays if not data.is_virtual]
     if copied:
