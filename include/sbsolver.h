@@ -173,10 +173,10 @@ typedef struct {
 PetscErrorCode SbBlocksReserve(SbBlocks *blocks, PetscInt more);
 PetscErrorCode SbBlocksFree(SbBlocks *blocks);
 typedef struct _p_SbContactSystem *SbContactSystem;
-/* choice: 0 by size, 1 factored, 2 by iterations. Not collective. Options read: -ksp_type, -pc_type, -contact_ksp_, -contact_pc_. */
+/* choice: 0 by cost, 1 factored, 2 by iterations. Not collective. Options read: -ksp_type, -pc_type, -contact_ksp_, -contact_pc_. */
 PetscErrorCode SbContactSystemCreate(SbSpace space, PetscInt choice, SbContactSystem *system);
 /* In words, how such systems are solved. Not collective. */
-PetscErrorCode SbContactSystemDescribe(SbSpace space, PetscInt choice, char text[], size_t size);
+PetscErrorCode SbContactSystemDescribe(PetscInt choice, char text[], size_t size);
 PetscErrorCode SbContactSystemDestroy(SbContactSystem *system);
 /*
   SbContactSystemSolve - Y = (K + blocks)^-1 F. The places of the blocks may be others each time.

@@ -68,7 +68,7 @@ static PetscInt sum_counts(PetscMPIInt size, const PetscMPIInt count[], PetscMPI
 }
 
 /* The pattern of all rows on rank 0, and its elimination. */
-static PetscErrorCode set_up_pattern(SbBlockSolver b, PetscInt n, const PetscInt ia[], const PetscInt ja[])
+PetscErrorCode SbBlockSolverAnalyze(SbBlockSolver b, PetscInt n, const PetscInt ia[], const PetscInt ja[])
 {
   const PetscBool root = (PetscBool)!b->rank;
   PetscMPIInt rows, entries;
@@ -122,13 +122,30 @@ PetscErrorCode SbBlockSolverSetUp(SbBlockSolver b, PetscInt n, const PetscInt ia
                                   const PetscReal block[], PetscBool changed, PetscBool *ok)
 {
   PetscFunctionBeginUser;
-  if (changed) PetscCall(set_up_pattern(b, n, ia, ja));
+  if (changed) PetscCall(SbBlockSolverAnalyze(b, n, ia, ja));
   if (b->size > 1)
     PetscCallMPI(MPI_Gatherv(block, (PetscMPIInt)ia[n], b->block, b->value, b->entry_count, b->entry_first,
                              b->block, 0, b->comm));
   *ok = PETSC_TRUE;
   if (!b->rank) PetscCall(SbFactorNumeric(b->factor, b->ia, b->ja, b->size > 1 ? b->value : block, NULL, ok));
   PetscCallMPI(MPI_Bcast(ok, 1, SB_MPI_BOOL, 0, b->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbBlockSolverCost(SbBlockSolver b, PetscReal *flops, PetscReal *entries)
+{
+  PetscReal cost[2] = {0., 0.};
+  PetscInt64 size, bytes;
+
+  PetscFunctionBeginUser;
+  if (!b->rank) {
+    SbFactorSize(b->factor, &size, &bytes);
+    cost[0] = SbFactorFlops(b->factor);
+    cost[1] = (PetscReal)size;
+  }
+  PetscCallMPI(MPI_Bcast(cost, 2, MPIU_REAL, 0, b->comm));
+  *flops = cost[0];
+  *entries = cost[1];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

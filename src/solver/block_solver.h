@@ -7,6 +7,9 @@
 typedef struct _p_SbBlockSolver *SbBlockSolver;
 PetscErrorCode SbBlockSolverCreate(MPI_Comm comm, SbBlockSolver *solver);
 PetscErrorCode SbBlockSolverDestroy(SbBlockSolver *solver);
+/* Order of elimination and pattern of the factor, as SbBlockSolverSetUp() finds them with `changed`. Collective. */
+PetscErrorCode SbBlockSolverAnalyze(SbBlockSolver solver, PetscInt n, const PetscInt ia[],
+                                    const PetscInt ja[]);
 /*
   SbBlockSolverSetUp - factors the matrix.
 
@@ -15,5 +18,7 @@ PetscErrorCode SbBlockSolverDestroy(SbBlockSolver *solver);
 */
 PetscErrorCode SbBlockSolverSetUp(SbBlockSolver solver, PetscInt n, const PetscInt ia[], const PetscInt ja[],
                                   const PetscReal block[], PetscBool changed, PetscBool *ok);
+/* Floating-point operations of a factorisation, and entries of the factor. Collective; after SbBlockSolverAnalyze(). */
+PetscErrorCode SbBlockSolverCost(SbBlockSolver solver, PetscReal *flops, PetscReal *entries);
 /* x = A^-1 b of own rows, [n][3]; they may be the same. Collective. */
 PetscErrorCode SbBlockSolverSolve(SbBlockSolver solver, const PetscReal b[], PetscReal x[]);

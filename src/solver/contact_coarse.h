@@ -25,5 +25,5 @@ PetscErrorCode SbPCContactCreate(SbSpace space, const SbContactRows *rows, PC pc
 PetscErrorCode SbPCContactUpdate(PC pc, PetscBool changed);
 /* X = Z E^-1 Z^T F, zero where the preconditioner could not be made. Collective; after PCSetUp(). */
 PetscErrorCode SbPCContactGuess(PC pc, Vec F, Vec X);
-/* Aggregates and contact nodes of all ranks. Collective. */
-PetscErrorCode SbPCContactGetSize(PC pc, PetscInt *naggregate, PetscInt *ncontact);
+/* SbBlockSolverCost() of the coarse space. Collective; after PCSetUp(). */
+PetscErrorCode SbPCContactCost(PC pc, PetscReal *flops, PetscReal *entries);

@@ -4,8 +4,10 @@
   Both are one matrix of 3x3 blocks, whose pattern grows where contact needs it; what contact has not used for KEEP solves is dropped when it grows
   the next time. So most iterations bring values only: the factor's elimination and the coarse space stay.
 
-  Small systems, and those where contact has a large share of the nodes, are factored on one rank (block_solver.c). Others are solved by CG with the coarse space of
-  contact_coarse.c, to a tolerance of FORCING in the norm of the preconditioner; where CG takes too long, they are factored, too. A matrix that is not
+  Systems are solved by CG with the coarse space of contact_coarse.c, to a tolerance of FORCING in the norm of the preconditioner, or factored on one rank (block_solver.c). CG may take as many
+  iterations as cost what factorisations would: the operations of both eliminations are known before, the work of an iteration is that for the blocks of the matrix and of the coarse factor. What a solve
+  leaves of them, a later one may take. A system that needs more is factored, and so are those of the next PAUSE solves, twice as many each time that CG fails at once. So thin bodies are factored, those with much in contact,
+  and some near nu = 1/2. A matrix that is not
   positive definite fails: in the factor, or by a direction of CG with negative curvature. With -pc_type or -contact_pc_type, PETSc's preconditioner of that name takes the place of
   both; -ksp_type and -contact_ksp_type name another method than CG. What goes with -pc_type (-ksp_max_it, -sub_pc_type) counts here, too.
 */
@@ -13,26 +15,33 @@
 #include "sblog.h"
 #include "sbsolver.h"
 
-#define KEEP 20         /* solves for which a place without values stays */
-#define SMALL 5000      /* unknowns that are factored */
-#define SHARE (1. / 3.) /* of nodes of contact, above which all are */
-#define FORCING 1e-2    /* of the preconditioned residual */
-#define MOST 300        /* iterations */
+#define KEEP 20      /* solves for which a place without values stays */
+#define SMALL 2000   /* unknowns that are factored, so that numbers are the same on any number of ranks */
+#define FORCING 1e-2 /* of the preconditioned residual */
+#define WORK 130     /* operations of a factorisation in the time of an iteration for a 3x3 block */
+#define SET_UP 4     /* iterations in the time that the coarse space takes besides its factor */
+#define SAVED 10     /* times the iterations of a factorisation that CG may have left */
+#define PAUSE 20     /* solves that are factored where CG was the slower one */
+#define LARGE 100000 /* unknowns, above which nobody asks what a factorisation would cost */
+#define MOST 300     /* iterations in any case */
 /* The same of the user's, which nothing replaces, and whose last errors are those of soft motions: a step looks short with them. */
 #define FORCING_USER 1e-4
 #define MOST_USER 5000
 
 struct _p_SbContactSystem {
   SbSpace space;
-  PetscInt choice; /* 0 by size, 1 factored, 2 by iterations */
+  PetscInt choice; /* 0 by cost, 1 factored, 2 by iterations */
   SbContactRows rows;
-  PetscInt *all;             /* [nnode_owned] their numbers */
-  PetscInt *ka, *kj;         /* of the tangent: [n+1], [ka[n]] global nodes */
-  PetscInt *place;           /* [ka[n]] of its blocks in the rows */
-  PetscInt *used;            /* [rows.ia[n]] solve in which contact used the place last; -1: the tangent's */
-  PetscInt *last;            /* [n] solve in which contact used the row last, -1: never */
-  PetscInt *where;           /* [Nnode] place of a column in the row that was marked last */
-  PetscInt nsolve, nnode;    /* nodes of contact, of all ranks */
+  PetscInt *all;     /* [nnode_owned] their numbers */
+  PetscInt *ka, *kj; /* of the tangent: [n+1], [ka[n]] global nodes */
+  PetscInt *place;   /* [ka[n]] of its blocks in the rows */
+  PetscInt *used;    /* [rows.ia[n]] solve in which contact used the place last; -1: the tangent's */
+  PetscInt *last;    /* [n] solve in which contact used the row last, -1: never */
+  PetscInt *where;   /* [Nnode] place of a column in the row that was marked last */
+  PetscInt nsolve;
+  PetscInt limit, most;      /* iterations by options, and in the time of a factorisation */
+  PetscInt budget;           /* iterations that solves have not taken, and may */
+  PetscInt resume, pause;    /* solve from which CG is tried again; solves between */
   PetscReal *tangent;        /* [ka[n]][9] */
   PetscBool fresh[2];        /* matrix and factor do not have the values yet */
   PetscBool foreign[2];      /* pattern is other than theirs */
@@ -98,27 +107,25 @@ PetscErrorCode SbContactSystemCreate(SbSpace s, PetscInt choice, SbContactSystem
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether it is factored when so many nodes touch. */
-static PetscBool is_factored(SbSpace s, PetscInt choice, const char type[], PetscInt nnode)
+/* Whether the user wants it factored. */
+static PetscBool is_factored(PetscInt choice, const char type[])
 {
-  if (type[0]) return (PetscBool)(!strcmp(type, PCCHOLESKY) || !strcmp(type, PCLU));
-  if (choice) return (PetscBool)(choice == 1);
-  return (PetscBool)(3 * s->Nnode <= SMALL || (PetscReal)nnode > SHARE * (PetscReal)s->Nnode);
+  return (PetscBool)(type[0] ? !strcmp(type, PCCHOLESKY) || !strcmp(type, PCLU) : choice == 1);
 }
 
-PetscErrorCode SbContactSystemDescribe(SbSpace s, PetscInt choice, char text[], size_t size)
+PetscErrorCode SbContactSystemDescribe(PetscInt choice, char text[], size_t size)
 {
   char type[32] = "";
 
   PetscFunctionBeginUser;
   PetscCall(user_types(NULL, type));
-  if (is_factored(s, choice, type, 0))
+  if (is_factored(choice, type))
     PetscCall(PetscSNPrintf(text, size, "contact by a factorisation"));
   else if (type[0])
     PetscCall(PetscSNPrintf(text, size, "contact with %s", type));
   else
     PetscCall(PetscSNPrintf(text, size, "contact by CG in two levels%s",
-                            choice ? "" : ", factored where a third of the nodes touches"));
+                            choice ? "" : ", or factored where that is less work"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -223,7 +230,7 @@ static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
 {
   SbContactRows *rows = &c->rows;
   PetscBool missing = (PetscBool)!rows->value;
-  PetscInt nnode = 0, *place;
+  PetscInt *place;
 
   PetscFunctionBeginUser;
   c->nsolve++;
@@ -239,8 +246,6 @@ static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
   if (missing) {
     PetscCall(make_pattern(c, b));
     (void)find_places(c, b, place);
-    for (PetscInt i = 0; i < rows->n; i++) nnode += rows->contact[i];
-    PetscCallMPI(MPI_Allreduce(&nnode, &c->nnode, 1, MPIU_INT, MPI_SUM, c->space->comm));
     c->foreign[0] = c->foreign[1] = PETSC_TRUE;
   }
   PetscCall(SbSpaceGetRows(c->space, K, rows->n, c->all, c->ka, NULL, c->tangent));
@@ -331,6 +336,7 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
       PetscCall(PCSetType(pc, c->type));
     PetscCall(KSPSetFromOptions(c->ksp));
     PetscCall(KSPSetType(c->ksp, c->method[0] ? c->method : KSPCG));
+    PetscCall(KSPGetTolerances(c->ksp, NULL, NULL, NULL, &c->limit));
   }
   P = c->A;
   if (!own) { /* what most of PETSc's preconditioners take */
@@ -345,9 +351,34 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Iterations that cost as much as the factorisation. */
+static PetscErrorCode find_most(SbContactSystem c, PC pc)
+{
+  const SbContactRows *rows = &c->rows;
+  PetscReal nblock = (PetscReal)rows->ia[rows->n], flops[2], entries[2];
+
+  PetscFunctionBeginUser;
+  c->most = c->limit;
+  if (c->choice || 3 * c->space->Nnode > LARGE) PetscFunctionReturn(PETSC_SUCCESS);
+  /* a pattern with a little more contact costs as much as the one that was examined last */
+  if (!c->factor) {
+    PetscCall(SbBlockSolverCreate(c->space->comm, &c->factor));
+    PetscCall(SbBlockSolverAnalyze(c->factor, rows->n, rows->ia, rows->ja));
+    c->foreign[1] = PETSC_FALSE;
+  }
+  PetscCall(SbBlockSolverCost(c->factor, &flops[0], &entries[0]));
+  PetscCall(SbPCContactCost(pc, &flops[1], &entries[1]));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nblock, 1, MPIU_REAL, MPI_SUM, c->space->comm));
+  nblock += entries[1] / 9.;
+  c->most =
+    (PetscInt)PetscClipInterval((flops[0] - flops[1]) / (WORK * nblock) - SET_UP, 0., (PetscReal)c->limit);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode iterate(SbContactSystem c, Vec F, Vec Y, KSPConvergedReason *reason,
                               PetscInt *iterations)
 {
+  const PetscBool changed = c->foreign[0];
   PC pc;
 
   PetscFunctionBeginUser;
@@ -359,12 +390,18 @@ static PetscErrorCode iterate(SbContactSystem c, Vec F, Vec Y, KSPConvergedReaso
   if (!c->type[0]) {
     PetscCall(KSPGetPC(c->ksp, &pc));
     PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
+    if (changed) PetscCall(find_most(c, pc));
+    c->budget = PetscMin(c->budget + c->most, SAVED * c->most);
+    PetscCall(
+      KSPSetTolerances(c->ksp, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT, PetscMin(c->limit, c->budget)));
     PetscCall(SbPCContactGuess(pc, F, Y));
     PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   }
+  if (!c->type[0] && !c->budget) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(KSPSolve(c->ksp, F, Y));
   PetscCall(KSPGetConvergedReason(c->ksp, reason));
   PetscCall(KSPGetIterationNumber(c->ksp, iterations));
+  c->budget -= *iterations;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -394,17 +431,26 @@ static PetscErrorCode factor(SbContactSystem c, Vec F, Vec Y, KSPConvergedReason
 PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *blocks, PetscBool fresh, Vec F,
                                     Vec Y, KSPConvergedReason *reason, PetscInt *iterations)
 {
-  PetscBool factored;
+  PetscBool factored, slow;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   if (fresh || !c->rows.value) PetscCall(merge(c, K, blocks));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
-  factored = is_factored(c->space, c->choice, c->type, c->nnode);
+  /* what has a factor already is solved with it */
+  factored = (PetscBool)(is_factored(c->choice, c->type) ||
+                         (!c->type[0] && !c->choice &&
+                          (3 * c->space->Nnode <= SMALL || c->nsolve < c->resume || !c->fresh[1])));
   *iterations = 0;
   *reason = KSP_DIVERGED_ITS;
   if (!factored) PetscCall(iterate(c, F, Y, reason, iterations));
-  if (factored || (*reason == KSP_DIVERGED_ITS && !c->type[0])) {
+  slow = (PetscBool)(!factored && *reason == KSP_DIVERGED_ITS && !c->type[0]);
+  if (!factored) c->pause = slow ? PetscMax(PAUSE, 2 * c->pause) : 0;
+  if (slow) {
+    c->resume = c->nsolve + c->pause;
+    c->budget = 0;
+  }
+  if (factored || slow) {
     PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
     PetscCall(factor(c, F, Y, reason));
     PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));

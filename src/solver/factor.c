@@ -151,6 +151,21 @@ void SbFactorSize(SbFactor f, PetscInt64 *entries, PetscInt64 *bytes)
   }
 }
 
+PetscReal SbFactorFlops(SbFactor f)
+{
+  const SbElimination *e = &f->e;
+  PetscReal sum = 0.;
+
+  // n columns with m rows below: the leading block, those rows, the update
+  for (PetscInt g = 0; g < e->nsuper; g++) {
+    const PetscReal n = 3. * (PetscReal)(e->first[g + 1] - e->first[g]);
+    const PetscReal m = 3. * (PetscReal)(e->start[g + 1] - e->start[g]) - n;
+
+    sum += n * (n * n / 3. + n * m + m * m);
+  }
+  return sum;
+}
+
 /* ------------------------------------------------------------------ numeric factorisation */
 
 /* Work space of a factorisation. */

@@ -63,4 +63,6 @@ void SbFactorBackward(SbFactor f, const float kept[], float x[]);
 PetscErrorCode SbFactorSolve(SbFactor f, const PetscReal b[], PetscReal x[]);
 /* Entries of the factor, and bytes that one pass reads. */
 void SbFactorSize(SbFactor f, PetscInt64 *entries, PetscInt64 *bytes);
+/* Multiplications and additions of a factorisation that is kept as it is. */
+PetscReal SbFactorFlops(SbFactor f);
 PetscErrorCode SbFactorDestroy(SbFactor *f);

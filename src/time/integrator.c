@@ -64,7 +64,7 @@ static const SbOption rows[] = {
    "space of the constraints; auto goes by size"},
   {"contact_solver", SB_OPTION_CHOICE, 1, "", "auto", "auto|direct|iterative",
    "contact with response barrier: how linear systems are solved: by a factorisation, or by CG whose coarse "
-   "space contains the unknowns in contact; auto goes by size and by the fraction of nodes in contact"},
+   "space contains the unknowns in contact; auto takes iterations while they are less work"},
   {"static_steps", SB_OPTION_INT, 1, "", "1", "[1, 1000000]",
    "static: equal load steps from zero to full load"},
   {"static_min_increment", SB_OPTION_REAL, 1, "", "1e-4", "(0, 1]",
@@ -536,7 +536,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
 
   /* how systems of contact are solved, and what is said of it */
   if (m->npotential) {
-    PetscCall(SbContactSystemDescribe(s, run->contact_choice, reason, sizeof(reason)));
+    PetscCall(SbContactSystemDescribe(run->contact_choice, reason, sizeof(reason)));
     SbAppend(sizeof(run->solver_reason), run->solver_reason, "; %s", reason);
   }
   if (run->saddle) {

@@ -265,7 +265,7 @@ PetscErrorCode SbSolverListContactFailed(SbRun run, KSPConvergedReason reason, P
   PetscFunctionBeginUser;
   if (!l) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscOptionsHasName(NULL, NULL, "-contact_pc_type", &apart));
-  PetscCall(SbContactSystemDescribe(run->model->space, run->contact_choice, system, sizeof(system)));
+  PetscCall(SbContactSystemDescribe(run->contact_choice, system, sizeof(system)));
   PetscCall(
     PetscSNPrintf(l->failures, sizeof(l->failures), "%s of %s after %" PetscInt_FMT " iterations%s",
                   KSPConvergedReasons[reason], system, iterations,

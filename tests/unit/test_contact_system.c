@@ -97,7 +97,7 @@ static PetscErrorCode check_changes(PetscInt way)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Small systems are factored, as are those of a body that touches everywhere; others are not; the user's types are taken. */
+/* Small systems are factored, as are those for which CG takes too long, and the next ones; others are not; the user's types are taken. */
 static PetscErrorCode check_choice(void)
 {
   static const struct {
@@ -106,6 +106,7 @@ static PetscErrorCode check_choice(void)
     PetscInt least, most; /* iterations */
   } c[] = {{4, 0, "", 1, 1},
            {10, 0, "", 2, 60},
+           {10, 0, "-contact_ksp_max_it 3 ", 4, 4},
            {10, 1, "", 1, 1},
            {4, 0, "-pc_type cholesky ", 1, 1},
            {4, 0, "-contact_pc_type bjacobi -contact_ksp_max_it 5000 ", 20, 5000},
@@ -133,6 +134,10 @@ static PetscErrorCode check_choice(void)
     PetscCall(solve(&p, system, c[k].more, &its));
     SB_CHECK(its >= c[k].least && its <= c[k].most, "%d cells, choice %d %s: %d iterations", (int)c[k].cells,
              (int)c[k].choice, c[k].more, (int)its);
+    if (strstr(c[k].more, "max_it 3 ")) {
+      PetscCall(solve(&p, system, "after CG took too long", &its));
+      SB_CHECK(its == 1, "%d iterations after CG took too long", (int)its);
+    }
     PetscCall(SbContactSystemDestroy(&system));
     PetscCall(contact_problem_close(&p));
   }

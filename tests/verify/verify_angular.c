@@ -114,7 +114,8 @@ static PetscErrorCode check(const char *element, PetscReal dt, PetscReal toleran
     "-body_b_translate 0.13,0.03,0.02 -body_b_rotate 1,2,3,20 -body_a_material corotated -body_a_young 2e4 "
     "-body_a_poisson 0.3 -body_a_element %s -body_b_material corotated -body_b_young 2e4 -body_b_poisson 0.3 "
     "-body_b_element %s -body_a_velocity 0.8,0,0 -body_b_velocity -1,0,0 -effects meet "
-    "-effect_meet_type contact -time euler_implicit -ts_dt %g -ts_max_time 0.1 -ksp_rtol 1e-11 -snes_rtol "
+    "-effect_meet_type contact -time euler_implicit -ts_dt %g -ts_max_time 0.1 -ksp_rtol 1e-11 "
+    "-contact_ksp_rtol 1e-11 -snes_rtol "
     "1e-12",
     element, element, (double)dt));
   t.run->want_energies = PETSC_TRUE;
