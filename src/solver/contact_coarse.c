@@ -645,6 +645,22 @@ PetscErrorCode SbPCContactGuess(PC pc, Vec F, Vec X)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbPCContactCorrect(PC pc, Vec F, Vec X)
+{
+  Contact *p;
+  Mat A;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  PetscCall(PCGetOperators(pc, NULL, &A));
+  if (!p->ok) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatMult(A, X, p->t));
+  PetscCall(VecAYPX(p->t, -1., F));
+  PetscCall(restrict_to(p, p->t, NULL));
+  PetscCall(add_coarse(p, X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* ------------------------------------------------------------------ life */
 
 static PetscErrorCode PCDestroy_Contact(PC pc)

@@ -25,5 +25,7 @@ PetscErrorCode SbPCContactCreate(SbSpace space, const SbContactRows *rows, PC pc
 PetscErrorCode SbPCContactUpdate(PC pc, PetscBool changed);
 /* X = Z E^-1 Z^T F, zero where the preconditioner could not be made. Collective; after PCSetUp(). */
 PetscErrorCode SbPCContactGuess(PC pc, Vec F, Vec X);
+/* X += Z E^-1 Z^T (F - A X): leaves the residual no net force on a body, so that momentum is as exact as with a factor. Collective. */
+PetscErrorCode SbPCContactCorrect(PC pc, Vec F, Vec X);
 /* SbBlockSolverCost() of the coarse space. Collective; after PCSetUp(). */
 PetscErrorCode SbPCContactCost(PC pc, PetscReal *flops, PetscReal *entries);

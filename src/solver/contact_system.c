@@ -402,6 +402,7 @@ static PetscErrorCode iterate(SbContactSystem c, Vec F, Vec Y, KSPConvergedReaso
   PetscCall(KSPGetConvergedReason(c->ksp, reason));
   PetscCall(KSPGetIterationNumber(c->ksp, iterations));
   c->budget -= *iterations;
+  if (!c->type[0] && *reason > 0) PetscCall(SbPCContactCorrect(pc, F, Y));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -102,8 +102,10 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check(const char *element, PetscReal dt, PetscReal tolerance)
+/* rest: what linear solves may leave, relative; for CR those of contact are iterated to a hundredth, and net forces, not moments, are solved for exactly. */
+static PetscErrorCode check(const char *element, PetscReal dt, PetscReal rest)
 {
+  const PetscReal tolerance = 1e-12;
   Turn w = {.most = 0};
   TestScene t;
 
@@ -114,8 +116,7 @@ static PetscErrorCode check(const char *element, PetscReal dt, PetscReal toleran
     "-body_b_translate 0.13,0.03,0.02 -body_b_rotate 1,2,3,20 -body_a_material corotated -body_a_young 2e4 "
     "-body_a_poisson 0.3 -body_a_element %s -body_b_material corotated -body_b_young 2e4 -body_b_poisson 0.3 "
     "-body_b_element %s -body_a_velocity 0.8,0,0 -body_b_velocity -1,0,0 -effects meet "
-    "-effect_meet_type contact -time euler_implicit -ts_dt %g -ts_max_time 0.1 -ksp_rtol 1e-11 "
-    "-contact_ksp_rtol 1e-11 -snes_rtol "
+    "-effect_meet_type contact -time euler_implicit -ts_dt %g -ts_max_time 0.1 -ksp_rtol 1e-11 -snes_rtol "
     "1e-12",
     element, element, (double)dt));
   t.run->want_energies = PETSC_TRUE;
@@ -128,11 +129,11 @@ static PetscErrorCode check(const char *element, PetscReal dt, PetscReal toleran
                 element, (double)(1000 * dt), (double)w.most, (double)w.missing, (double)w.torque,
                 (double)w.rest, (double)w.contacts, (double)w.momentum));
   SB_CHECK(w.contacts > 3 && w.most > 1e-4, "%s: the blocks do not meet", element);
-  SB_CHECK(w.rest < 1e-10 * w.most, "%s: angular momentum changed by %g kg m^2/s that no contact explains",
+  SB_CHECK(w.rest < rest * w.most, "%s: angular momentum changed by %g kg m^2/s that no contact explains",
            element, (double)w.rest);
   SB_CHECK(w.torque < tolerance * w.most, "%s: contact changed the angular momentum by %g of %g kg m^2/s",
            element, (double)w.torque, (double)w.most);
-  SB_CHECK(w.momentum < 1e-9, "momentum %g kg m/s", (double)w.momentum);
+  SB_CHECK(w.momentum < 1e-11, "momentum %g kg m/s", (double)w.momentum);
   PetscCall(VecDestroy(&w.V));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -144,10 +145,10 @@ int main(int argc, char **argv)
 
   SB_TEST_BEGIN(argc, argv);
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  PetscCall(check("p1", 0.001, 1e-12));
-  PetscCall(check("cr", 0.001, 1e-12));
-  PetscCall(check("p2", 0.001, 1e-12));
+  PetscCall(check("p1", 0.001, 1e-10));
+  PetscCall(check("cr", 0.001, 1e-9));
+  PetscCall(check("p2", 0.001, 1e-10));
   if (size > 1) SB_TEST_END(); /* many solves of a small system: on one rank only */
-  PetscCall(check("p1", 0.0005, 1e-12));
+  PetscCall(check("p1", 0.0005, 1e-10));
   SB_TEST_END();
 }
