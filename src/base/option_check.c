@@ -1,8 +1,8 @@
 /*
   option_check.c - options that nobody read: which are ours and misspelt, which are right but of no use in this run, which are PETSc's and did nothing.
 
-  PETSc cannot distinguish a misspelt option from one that an object created later would read, so it stays silent. Ours are all
-  read before anything is computed. A name is ours when it begins with the prefix of one of our classes, when it is a
+  PETSc cannot distinguish a misspelt option from one that an object created later would read, so it stays silent; here a slip in one of its most common
+  ones is an error. Ours are all read before anything is computed. A name is ours when it begins with the prefix of one of our classes, when it is a
   program-wide key, or when it is within two edits of one and does not begin like an option of PETSc.
 
   A misspelt one ends the run; one that is right and unused is warned of, with the reason: its integrator, type or effect is not the one of this run. What belongs to
@@ -36,6 +36,25 @@ static PetscBool looks_like_petsc(const char *name)
     "not_shared_tmp tmp partition sf_ history python blas_ omp_ use_gpu device cuda hip event_ help version "
     "redundant_ est esteig gamg_ hypre ml_ superlu sbaij inner_ coarse_ saddle_ telescope_ levels_ prefix_");
 }
+
+/* PETSc's options of solvers that are asked for most, and some that differ from them by two letters. */
+static const char *const common[] = {
+  "-ksp_type",         "-ksp_rtol",          "-ksp_atol",
+  "-ksp_divtol",       "-ksp_max_it",        "-ksp_min_it",
+  "-ksp_norm_type",    "-ksp_pc_side",       "-ksp_monitor",
+  "-ksp_view",         "-ksp_gmres_restart", "-ksp_converged_reason",
+  "-pc_type",          "-pc_side",           "-pc_view",
+  "-pc_asm_overlap",   "-pc_asm_type",       "-pc_gasm_overlap",
+  "-pc_gasm_type",     "-pc_bjacobi_blocks", "-pc_factor_mat_solver_type",
+  "-pc_factor_levels", "-pc_gamg_type",      "-pc_factor_mat_ordering_type",
+  "-pc_hypre_type",    "-pc_jacobi_type",    "-pc_gamg_threshold",
+  "-pc_mg_levels",     "-pc_mg_type",        "-pc_gamg_agg_nsmooths",
+  "-pc_sor_its",       "-pc_sor_lits",       "-pc_factor_shift_type",
+  "-snes_type",        "-snes_rtol",         "-snes_atol",
+  "-snes_stol",        "-snes_max_it",       "-snes_max_funcs",
+  "-snes_monitor",     "-snes_view",         "-snes_converged_reason",
+  "-snes_ksp_ew",      "-snes_lag_jacobian", "-snes_linesearch_type",
+};
 
 /* The class whose prefix a name begins with; NULL when there is none. */
 static const char *class_of(const char *name)
@@ -138,7 +157,7 @@ static PetscErrorCode verdict_of_class(const char *klass, const char *name, size
 
 static PetscErrorCode find_verdict(const char *name, size_t size, char text[], Verdict *verdict)
 {
-  char near[3 * SB_OPTION_NAME_MAX], dashed[SB_OPTION_NAME_MAX], why[1024] = "";
+  char near[3 * SB_OPTION_NAME_MAX] = "", dashed[SB_OPTION_NAME_MAX], why[1024] = "";
   const char *klass = class_of(name);
   const SbOption *row = program_row(name);
   PetscInt n = 0, room = SbTheOptions.nrecord;
@@ -154,7 +173,14 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
     PetscCall(PetscStrncpy(text, row->help, size));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (!klass && looks_like_petsc(name)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!klass && looks_like_petsc(name)) {
+    if (SbHasPrefix(name, "ksp_ pc_ snes_"))
+      PetscCall(SbSuggestNames(dashed, PETSC_STATIC_ARRAY_LENGTH(common), common, sizeof(near), near));
+    if (!near[0] || !strcasecmp(near, dashed)) PetscFunctionReturn(PETSC_SUCCESS);
+    *verdict = WRONG;
+    PetscCall(PetscSNPrintf(text, size, "%s is not an option of PETSc; did you mean %s?", dashed, near));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (klass) {
     PetscCall(verdict_of_class(klass, name, size, text, verdict));
     if (*verdict != WRONG) PetscFunctionReturn(PETSC_SUCCESS);
