@@ -224,7 +224,7 @@ PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model)
 {
   char(*names)[SB_NAME_MAX];
   PetscInt n;
-  static const char *const keys[] = {"mass", "mesh_partitioner", "mesh_report", "validate"};
+  static const char *const keys[] = {"mass", "mesh_partitioner", "mesh_reading", "mesh_report", "validate"};
   SbScope scope;
 
   PetscFunctionBeginUser;

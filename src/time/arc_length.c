@@ -150,7 +150,11 @@ static PetscErrorCode correct(Path *p, PetscReal l, PetscInt *its, PetscBool *ok
     PetscCall(residual(p, &norm));
     *ok = (PetscBool)(norm <= PetscMax(atol, rtol * p->load));
     if (*ok) break;
-    if (*its == MOST || PetscIsInfOrNanReal(norm)) {
+    if (PetscIsInfOrNanReal(norm) || PetscIsInfOrNanReal(p->factor)) {
+      PetscCall(SbRunFail(p->run, "forces that are no numbers after %" PetscInt_FMT " iterations", *its));
+      break;
+    }
+    if (*its == MOST) {
       PetscCall(SbRunFail(p->run,
                           "load factor %g: the residual is still %g N after %" PetscInt_FMT " iterations",
                           (double)p->factor, (double)norm, *its));
