@@ -20,8 +20,10 @@
 typedef struct {
   SbImport *im;
   hid_t file;
-  size_t bytes;          /* length of the file */
-  char frame[64];        /* group of the wanted step; "" at rest */
+  size_t bytes;   /* length of the file */
+  char frame[64]; /* group of the wanted step; "" at rest */
+  char mesh
+    [32]; /* group of its mesh: "/mesh", behind a re-meshing "/mesh_000123"; stands for "/mesh" in names */
   PetscInt part, nparts; /* which block of rows of how many; nparts 0: all rows */
   PetscInt nvert;        /* of the file */
 } File;
@@ -35,10 +37,20 @@ typedef struct {
 
 /* ------------------------------------------------------------------ the file */
 
-/* Whether every group on the way to a path exists. */
-static PetscBool is_there(const File *f, const char *path)
+/* The path of what is named, in the mesh of the step. */
+static void path_of(const File *f, const char *name, char path[256])
 {
-  char part[256];
+  const PetscBool mesh = (PetscBool)!strncmp(name, "/mesh/", strlen("/mesh/"));
+
+  (void)snprintf(path, 256, "%s%s", mesh ? f->mesh : "", mesh ? name + strlen("/mesh") : name);
+}
+
+/* Whether every group on the way to what is named exists. */
+static PetscBool is_there(const File *f, const char *name)
+{
+  char path[256], part[256];
+
+  path_of(f, name, path);
 
   for (const char *p = strchr(path + 1, '/'); p; p = strchr(p + 1, '/')) {
     (void)snprintf(part, sizeof(part), "%.*s", (int)(p - path), path);
@@ -70,9 +82,11 @@ static PetscErrorCode open_array(const File *f, Array *a)
   int ndim;
   PetscBool packed;
   double want;
+  char path[256];
 
   PetscFunctionBeginUser;
-  a->set = is_there(f, a->name) ? H5Dopen2(f->file, a->name, H5P_DEFAULT) : -1;
+  path_of(f, a->name, path);
+  a->set = is_there(f, a->name) ? H5Dopen2(f->file, path, H5P_DEFAULT) : -1;
   if (a->set < 0) H5_ERROR(f, "has no array %s; it is no mesh of supple, or damaged", a->name);
   a->type = H5Dget_type(a->set);
   a->width = H5Tget_size(a->type);
@@ -329,7 +343,7 @@ static PetscErrorCode read_bodies(const File *f)
     H5_ERROR(f, "/mesh/body has %lld rows for %lld tets", (long long)n, (long long)im->item[3].n);
   for (PetscInt c = 0; c < n; c++) nbody = PetscMax(nbody, body[c] + 1);
   // names of the bodies; none in old files
-  PetscCall(SbH5BodyNames(f->file, "/mesh", &names));
+  PetscCall(SbH5BodyNames(f->file, f->mesh, &names));
   rest = names;
   PetscCall(PetscMalloc1(nbody, &tags));
   for (PetscInt b = 0; b < nbody; b++) {
@@ -445,6 +459,8 @@ static PetscErrorCode read_mesh(File *f, SbSlabRows *rows)
   PetscBool own;
   Array x = {.name = "/mesh/x", .klass = H5T_FLOAT, .ncomp = 3, .block = PETSC_TRUE};
   SbH5Frames s = {.wanted = f->im->step};
+  int64_t number = 0;
+  hid_t frame;
 
   PetscFunctionBeginUser;
   PetscCall(check_layout(f, &own));
@@ -458,6 +474,15 @@ static PetscErrorCode read_mesh(File *f, SbSlabRows *rows)
       H5_ERROR(f, "has no step %lld; it has %lld of them, from %lld to %lld (-1: the last one)",
                (long long)s.wanted, (long long)s.n, (long long)s.first, (long long)s.last);
     (void)snprintf(f->frame, sizeof(f->frame), "%s", s.found);
+    frame = H5Gopen2(f->file, f->frame, H5P_DEFAULT);
+    if (H5Aexists(frame, "mesh") > 0) {
+      const hid_t a = H5Aopen(frame, "mesh", H5P_DEFAULT);
+
+      if (H5Aread(a, H5T_NATIVE_INT64, &number) < 0) number = 0;
+      (void)H5Aclose(a);
+    }
+    (void)H5Gclose(frame);
+    if (number) (void)snprintf(f->mesh, sizeof(f->mesh), "/mesh_%06lld", (long long)number);
   }
   PetscCall(open_array(f, &x));
   PetscCall(SbImportSetVertices(im, (PetscInt)x.n));
@@ -475,7 +500,7 @@ static PetscErrorCode read_mesh(File *f, SbSlabRows *rows)
 
 PetscErrorCode SbImportSlab_H5(const char *path, PetscInt k, PetscInt n, SbImport *im, SbSlabRows *rows)
 {
-  File f = {.im = im, .file = -1, .part = k, .nparts = n};
+  File f = {.im = im, .file = -1, .mesh = "/mesh", .part = k, .nparts = n};
   PetscErrorCode ierr;
   hid_t access;
   htri_t is_hdf5;

@@ -2,6 +2,7 @@
 are taken up on other numbers of ranks as if the run had not been interrupted; a body of another run begins with what it had; straight tets between the same vertices are another mesh.
 """
 import itertools
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -81,6 +82,11 @@ with open(OUT / "whole/history.csv", encoding="ascii") as f:
     names, _, *rows = f.read().splitlines()
 row = dict(zip(names.split(","), map(float, rows[-1].split(","))))
 check(row["remesh_loss"] != 0 and row["remesh_mass"] < 1e-12 and row["min_J"] > 0, f"{row}")
+
+# a frame behind the re-meshing is a mesh, too, which is another one than that of /mesh
+report = tool("info", OUT / "whole/fields.h5", "-step", -1)
+volume = float(re.search(r"volume +(\S+) m", report).group(1))
+check(abs(volume / row["volume"] - 1) < 1e-5, f"volume {volume} of the last frame, {row['volume']} in history.csv")
 
 # interrupted before, at and after the re-meshing
 for step, ranks in ((2, 3), (4, 3), (6, 3), (6, 1)):
