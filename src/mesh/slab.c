@@ -262,7 +262,8 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
   PetscCall(SbRouteSend(&s->vert, sizeof(PetscInt), part, &got));
   PetscCall(PetscFree(part));
   PetscCall(PetscMalloc2(s->vert.nrecv, &user, s->vert.nrecv, &pair));
-  for (PetscInt v = 0; v < s->nkept; v++) user[s->start[v]] = -1;
+  for (PetscInt v = 0; v < s->nkept; v++)
+    if (s->number[v] >= 0) user[s->start[v]] = -1; /* some tet uses it */
   for (PetscInt i = 0; i < s->vert.nrecv; i++) {
     PetscInt *other = &user[s->start[s->asked[i]]];
 
