@@ -4,7 +4,7 @@
 
   Every file begins with a line of counts; each line after that is one item: its number, then its values. Numbers of points begin at 0 or
   1, as the first line of NAME.node says. A # begins a comment. What stands at the end of a line beyond the announced values (TetGen's -nn
-  writes neighbours there) is not read.
+  writes neighbours there, of faces) is not read, but for tets an error.
 
   Kept: the first attribute of a tet is its region, volume_N; the marker of a face, an edge or a point other than 0 is surface_N,
   curve_N or point_N. Of second order (tetgen -o2) faces have 6 points and edges 3. Refused: attributes that are no whole numbers.
@@ -119,6 +119,14 @@ static PetscErrorCode read_file(SbImport *im, int f)
       mark = (int64_t)value;
       if (mark || dim == 3) PetscCall(SbImportTagsAlone(im, dim, mark, NULL, &tags));
     }
+    // a tet with more points than its file says would be another one
+    for (int64_t k = 1; dim == 3 && k < count[2] && SbScanMore(s, '#'); k++)
+      PetscCall(SbScanReal(s, files[f].mark, 0, &attribute));
+    if (dim == 3 && SbScanMore(s, '#'))
+      SB_SCAN_ERROR(s,
+                    "tetrahedron %lld goes on behind its %d points and %lld attributes, which the first line "
+                    "announces; correct that line",
+                    (long long)number, npoint, (long long)count[2]);
     PetscCall(SbImportAddElement(im, type, vert, tags, number));
     PetscCall(SbScanEndOfLine(s));
   }

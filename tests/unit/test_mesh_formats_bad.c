@@ -68,6 +68,11 @@ static PetscErrorCode test_tetgen(void)
                              {"1 4 1\n1 1 2 3 4 1.5\n", "t.ele|line 2|1.5"},
                              {"1 4 1\n1 1 2 3 4\n", "t.ele|line 2"},
                              {"2 4 0\n1 1 2 3 4\n", "t.ele|line 3"},
+                             {"1 4 0\n1 1 2 3 4 # one\n", NULL},
+                             {"1 4 3\n1 1 2 3 4 1 2.5 0\n", NULL},
+                             {"1 4 0\n1 1 2 3 4 1\n", "t.ele|line 2|tetrahedron 1|4 points|0 attributes"},
+                             {"1 4 1\n1 1 2 3 4 4 3 2 1 1 2\n", "t.ele|line 2|4 points|1 attributes"},
+                             {"1 0\n1 1 2 3 4 4 3 2 1 1 2\n", "t.ele|line 2|4 points"},
                              {"0 4 0\n", "t.ele"},
                              {NULL, NULL}};
 
