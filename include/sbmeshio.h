@@ -120,8 +120,9 @@ typedef struct {
 
 /* The node of an edge of 10-node tets. */
 typedef struct {
-  PetscInt end[2], node; /* vertices, end[0] < end[1]; -1: off is known */
-  PetscReal off[3];      /* from the middle of the edge, m once placed */
+  PetscInt end[2],
+    node;           /* vertices, end[0] < end[1]; -1: off is known, -1 - r: from row r of a file's list */
+  PetscReal off[3]; /* from the middle of the edge, m once placed */
 } SbMiddle;
 
 /* A body as its reader delivers it. Zeroed before the reader is called; freed by SbImportDestroy(), also after an error. */
@@ -169,9 +170,12 @@ PetscErrorCode SbImportRead(const SbBody *body, SbImport *import);
 PetscErrorCode SbImportDestroy(SbImport *import);
 /* Leaves out the vertices with keep[] 0, and items with such a one; keep[nvert] becomes the new number of each, or -1. Not collective. */
 PetscErrorCode SbImportDropVertices(SbImport *import, PetscInt keep[]);
-/* Once tets and nodes of edges are read: edges off their middle, each once, ascending; nodes that are no corner of a tet are no vertices any more.
-   Output: largest, off the middle over the length. Error: an edge with two nodes at different places. Not collective. */
-PetscErrorCode SbImportMiddles(SbImport *import, PetscReal *largest);
+/* Once tets and nodes of edges are read: edges of tets off their middle, each once, ascending; nodes that are no corner of a tet are no vertices any more.
+   Output: found[nmiddle], which of those in a list are edges of tets, or NULL: it is an error if one is not; largest, off the middle over the length. Errors: an edge
+   with two nodes at different places, or twice in a list. Not collective. */
+PetscErrorCode SbImportMiddles(SbImport *import, PetscBool found[], PetscReal *largest);
+/* The error of one that is listed and of no tet. */
+PetscErrorCode SbImportLostMiddle(const SbImport *import, const SbMiddle *lost);
 /* The note of the reader about n edges off their middle. */
 void SbImportNoteMiddles(SbImport *import, PetscInt n, PetscReal largest);
 /* The same of a body that may be one of many copies: `before`, the body before it or NULL, and `shared`, zeroed at first, in which the mesh of its file is kept for

@@ -47,71 +47,101 @@ PetscReal SbTetCurvedLeast(const PetscReal x[], const PetscInt v[4], const Petsc
     if (n >= 0 && n < 4) L[n] = 1;
     if (n >= 4) L[SbTetEdge[n - 4][0]] = L[SbTetEdge[n - 4][1]] = 0.5;
     at = jacobian((const PetscReal(*)[3])node, n < 0 ? SbRuleQuintic.L[q] : L);
-    least = PetscMin(least, at);
+    if (at < least || isnan(at)) least = at; /* offsets may overflow */
   }
   return least / SbTetDeterminant(x, v);
 }
 
-/* The curved ones of this rank's cells, and what they add to the volume. */
+PetscBool SbImportOffsets(const SbImport *im, int dim, const PetscInt v[], PetscReal off[18])
+{
+  PetscBool curved = PETSC_FALSE;
+
+  for (int k = 0; k < 18; k++) off[k] = 0;
+  for (int e = 0; im->nmiddle.n && e < 6; e++) {
+    const int *p = SbTetEdge[e];
+    PetscInt end[2];
+    const SbMiddle *m;
+
+    if (p[1] > dim) continue;
+    end[0] = PetscMin(v[p[0]], v[p[1]]);
+    end[1] = PetscMax(v[p[0]], v[p[1]]);
+    m = (const SbMiddle *)bsearch(end, im->middle, (size_t)im->nmiddle.n, sizeof(*m), compare);
+    for (int k = 0; m && k < 3; k++) off[3 * e + k] = m->off[k];
+    curved = (PetscBool)(curved || m);
+  }
+  return curved;
+}
+
+/* Curved cells. */
+typedef struct {
+  PetscInt n[2];    /* of them, and how many fold over themselves */
+  int64_t number;   /* the first that does, in the file */
+  PetscReal least;  /* its least Jacobian over that of the straight tet */
+  PetscReal volume; /* what all add to that of straight tets, m^3 */
+} Curved;
+
+/* This rank's, with their edges unless they are only measured, without cell[]. */
 static PetscErrorCode find_curved(const SbImport *im, PetscBool keep, uint64_t cell[], PetscReal **edge_off,
-                                  PetscInt *ncurved, PetscReal *volume)
+                                  Curved *found)
 {
   PetscInt room = 0;
 
   PetscFunctionBeginUser;
   for (PetscInt c = 0; im->nmiddle.n && c < im->item[3].n; c++) {
     const PetscInt *v = im->item[3].vert + 4 * c;
-    PetscReal off[18] = {0}, least;
-    PetscBool curved = PETSC_FALSE;
+    PetscReal off[18], least;
 
-    for (int e = 0; e < 6; e++) {
-      const PetscInt a = v[SbTetEdge[e][0]], b = v[SbTetEdge[e][1]],
-                     end[2] = {PetscMin(a, b), PetscMax(a, b)};
-      const SbMiddle *m =
-        (const SbMiddle *)bsearch(end, im->middle, (size_t)im->nmiddle.n, sizeof(*m), compare);
-
-      for (int k = 0; m && k < 3; k++) off[3 * e + k] = m->off[k];
-      curved = (PetscBool)(curved || m);
-    }
-    if (!curved) continue;
-    ++*ncurved;
+    if (!SbImportOffsets(im, 3, v, off)) continue;
+    found->n[0]++;
     if (!keep) continue;
 
     // its Jacobian where it is used and at its nodes, and its volume instead of that of the straight tet
-    cell[c] |= SB_CURVED;
-    PetscCall(SbReserve(*ncurved, 18 * sizeof(PetscReal), &room, edge_off));
-    PetscCall(PetscArraycpy(*edge_off + 18 * (size_t)(*ncurved - 1), off, 18));
     least = SbTetCurvedLeast(im->x, v, off);
-    PetscCheck(
-      least > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-      "%s: tetrahedron %lld of second order folds over itself: its least Jacobian is %.3g times that of the "
-      "straight tet, and must be above 0; mesh finer there or let gmsh untangle it (Mesh.HighOrderOptimize = "
-      "2), or save straight tets (Mesh.ElementOrder = 1)",
-      im->where, (long long)im->item[3].number[c], (double)least);
-    *volume += SbTetCurvedVolume(im->x, v, off) - SbTetDeterminant(im->x, v) / 6;
+    if (!(least > 0) && !found->n[1]++) {
+      found->number = im->item[3].number[c];
+      found->least = least;
+    }
+    found->volume += SbTetCurvedVolume(im->x, v, off) - SbTetDeterminant(im->x, v) / 6;
+    if (!cell) continue;
+    cell[c] |= SB_CURVED;
+    PetscCall(SbReserve(found->n[0], 18 * sizeof(PetscReal), &room, edge_off));
+    PetscCall(PetscArraycpy(*edge_off + 18 * (size_t)(found->n[0] - 1), off, 18));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode refuse(const SbImport *im, const Curved *found, PetscInt nfolded)
+{
+  PetscFunctionBeginUser;
+  SETERRQ(
+    PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+    "%s: tetrahedron %lld of second order folds over itself (tets that do: %lld): its least Jacobian is %.3g "
+    "times that of the straight tet, and must be above 0; mesh finer there or let gmsh untangle it "
+    "(Mesh.HighOrderOptimize = 2), or save straight tets (Mesh.ElementOrder = 1)",
+    im->where, (long long)found->number, (long long)nfolded, (double)found->least);
 }
 
 PetscErrorCode SbImportCurve(MPI_Comm comm, const SbImport *im, SbBody *body, uint64_t cell[],
                              PetscReal **edge_off)
 {
   SbCaughtError caught = {0, ""};
-  PetscInt ncurved = 0;
-  PetscReal volume = 0;
-  char text[128];
+  Curved found = {{0, 0}, 0, 0, 0};
+  PetscInt n[2];
 
   PetscFunctionBeginUser;
-  SB_CATCH(&caught, find_curved(im, body->edge_nodes, cell, edge_off, &ncurved, &volume));
+  PetscCall(find_curved(im, body->edge_nodes, cell, edge_off, &found));
+  PetscCallMPI(MPI_Allreduce(found.n, n, 2, MPIU_INT, MPI_SUM, comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &found.volume, 1, MPIU_REAL, MPI_SUM, comm));
+  if (!n[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  if (cell && found.n[1]) SB_CATCH(&caught, refuse(im, &found, n[1]));
   PetscCall(SbCaughtRaise(comm, &caught));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &ncurved, 1, MPIU_INT, MPI_SUM, comm));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &volume, 1, MPIU_REAL, MPI_SUM, comm));
-  if (!ncurved) PetscFunctionReturn(PETSC_SUCCESS);
-  body->volume += volume;
-  (void)snprintf(text, sizeof(text), "%s%s: %" PetscInt_FMT, body->note[0] ? ", " : "",
-                 body->edge_nodes ? "curved tets" : "curved tets, which only p2 keeps, taken as straight",
-                 ncurved);
-  PetscCall(PetscStrlcat(body->note, text, sizeof(body->note)));
+  body->volume += found.volume;
+  SbAppend(sizeof(body->note), body->note, "%s%s: %" PetscInt_FMT, body->note[0] ? ", " : "",
+           body->edge_nodes ? "curved tets" : "curved tets, which only p2 keeps, taken as straight", n[0]);
+  if (n[1])
+    SbAppend(sizeof(body->note), body->note,
+             ", folded over themselves, which p2 refuses: %" PetscInt_FMT " (the first: tetrahedron %lld)",
+             n[1], (long long)found.number);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -8,17 +8,37 @@ const PetscReal SbRatioBinEdges[SB_RATIO_BINS] = {1, 1.25, 1.5, 2, 3, 5, 10, 100
 
 /* ------------------------------------------------------------------ groups */
 
-/* Length, area or volume of a simplex. */
-static PetscReal measure(const PetscReal x[], int dim, const PetscInt v[])
+/* Length, area or volume of a simplex with straight edges; that of an inverted tet is negative. */
+static PetscReal straight(const PetscReal x[], int dim, const PetscInt v[])
 {
   PetscReal a[2][3], n[3];
 
-  if (dim == 3) return PetscAbsReal(SbTetDeterminant(x, v)) / 6;
+  if (dim == 3) return SbTetDeterminant(x, v) / 6;
   if (!dim) return 0;
   for (int k = 0; k < dim; k++) SbSubtract(x + 3 * v[k + 1], x + 3 * v[0], a[k]);
   if (dim == 1) return PetscSqrtReal(SbDot3(a[0], a[0]));
   SbCross(a[0], a[1], n);
   return PetscSqrtReal(SbDot3(n, n)) / 2;
+}
+
+/* With edges as they are: the integral of what simplices with the derivatives of the map have. */
+static PetscReal measure(const SbImport *im, int dim, const PetscInt v[])
+{
+  static const SbPointRule line = {
+    3, /* Gauss, degree 5 */
+    {{0.88729833462074169, 0.11270166537925831}, {0.5, 0.5}, {0.11270166537925831, 0.88729833462074169}},
+    {5. / 18, 8. / 18, 5. / 18}};
+  static const SbPointRule *const rules[4] = {NULL, &line, &SbRuleFacet, &SbRuleQuintic};
+  const PetscInt own[4] = {0, 1, 2, 3}, all[4] = {v[0], v[PetscMin(dim, 1)], v[PetscMin(dim, 2)], v[dim]};
+  PetscReal off[18], node[SB_CELL_NODES][3], corner[4][3], sum = 0;
+
+  if (!SbImportOffsets(im, dim, v, off)) return PetscAbsReal(straight(im->x, dim, v));
+  SbTetNodes(im->x, all, off, node);
+  for (int q = 0; q < rules[dim]->n; q++) {
+    SbQuadraticCorners(rules[dim]->L[q], (const PetscReal(*)[3])node, corner);
+    sum += rules[dim]->weight[q] * straight(&corner[0][0], dim, own);
+  }
+  return PetscAbsReal(sum);
 }
 
 PetscErrorCode SbMeshFileGroup(const SbImport *im, PetscInt i, SbMeshGroup *group, PetscBool *found)
@@ -44,34 +64,13 @@ PetscErrorCode SbMeshFileGroup(const SbImport *im, PetscInt i, SbMeshGroup *grou
   for (PetscInt k = 0; k < item->n; k++) {
     if (!in[item->tags[k]]) continue;
     group->n++;
-    group->size += measure(im->x, dim, item->vert + (dim + 1) * (size_t)k);
+    group->size += measure(im, dim, item->vert + (dim + 1) * (size_t)k);
   }
   PetscCall(PetscFree(in));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ shape */
-
-/* The volume with curved tets; what p2 would refuse is no error here. */
-static PetscErrorCode measure_curved(const SbImport *im, SbBody *body)
-{
-  SbCaughtError caught = {0, ""};
-  PetscReal *edge_off = NULL;
-  uint64_t *cell;
-
-  PetscFunctionBeginUser;
-  if (!im->nmiddle.n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscCalloc1(im->item[3].n, &cell));
-  body->edge_nodes = PETSC_TRUE;
-  SB_CATCH(&caught, SbImportCurve(PETSC_COMM_SELF, im, body, cell, &edge_off));
-  if (caught.code) {
-    PetscCall(PetscStrlcat(body->note, ", refused with p2: ", sizeof(body->note)));
-    PetscCall(PetscStrlcat(body->note, caught.text, sizeof(body->note)));
-  }
-  PetscCall(PetscFree(edge_off));
-  PetscCall(PetscFree(cell));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshStatistics *facts)
 {
@@ -86,15 +85,15 @@ PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshStatistics *facts)
   PetscCall(PetscMemzero(&faces, sizeof(faces)));
   ierr = SbImportCheck(im, &faces);
   if (!ierr) ierr = SbImportQuality(im, &faces, &facts->body);
-  if (!ierr) ierr = measure_curved(im, &facts->body);
+  facts->body.edge_nodes = PETSC_TRUE;
+  if (!ierr) ierr = SbImportCurve(PETSC_COMM_SELF, im, &facts->body, NULL, NULL);
   // faces, and the area of the surface
   facts->nface = (4 * faces.ncell - faces.nboundary) / 2 + faces.nboundary;
   for (PetscInt s = 0; !ierr && s < 4 * faces.ncell; s++) {
     const PetscInt *v = im->item[3].vert + 4 * (s / 4);
     const int *f = SbFaceVertex[s % 4];
 
-    if (faces.neighbour[s] < 0)
-      facts->area += measure(im->x, 2, (const PetscInt[3]){v[f[0]], v[f[1]], v[f[2]]});
+    if (faces.neighbour[s] < 0) facts->area += measure(im, 2, (const PetscInt[3]){v[f[0]], v[f[1]], v[f[2]]});
   }
   PetscCall(SbFacesDestroy(&faces));
   PetscCall(ierr);
@@ -107,7 +106,7 @@ PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshStatistics *facts)
   facts->edge[2] = 0;
   for (PetscInt a = 0; a < edges.nvert; a++) {
     for (PetscInt e = edges.start[a]; e < edges.start[a + 1]; e++) {
-      const PetscReal length = measure(im->x, 1, (const PetscInt[2]){a, edges.high[e]});
+      const PetscReal length = measure(im, 1, (const PetscInt[2]){a, edges.high[e]});
 
       facts->edge[0] = PetscMin(facts->edge[0], length);
       facts->edge[2] = PetscMax(facts->edge[2], length);

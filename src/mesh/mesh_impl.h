@@ -83,10 +83,13 @@ PetscErrorCode SbSetsCount(MPI_Comm comm, PetscInt nvert, PetscInt ncell, const 
   curve.c: cells with curved edges of a body whose element has nodes there are marked; the volume of the body becomes that of them; a note for other elements.
   The cells are those of all ranks of comm. Collective.
 
-  Output: edge_off[][6][3] of the marked cells, NULL where there are none. Error: a cell whose map has no positive Jacobian at a point.
+  Output: edge_off[][6][3] of the marked cells, NULL where there are none. Error: a cell whose map has no positive Jacobian at a point; with cell NULL they are counted
+  in the note of the body.
 */
 PetscErrorCode SbImportCurve(MPI_Comm comm, const SbImport *import, SbBody *body, uint64_t cell[],
                              PetscReal **edge_off);
+/* Offsets of the edges 01 02 03 12 13 23 of a simplex of dim + 1 vertices, zero where it has none or straight ones; whether one is curved. Not collective. */
+PetscBool SbImportOffsets(const SbImport *import, int dim, const PetscInt vert[], PetscReal off[18]);
 /* Brings off[n][6][3] of cells orig[n], by original number, to where the cells are. Collective. */
 PetscErrorCode SbMeshCurve(SbMesh mesh, PetscInt n, const PetscInt orig[], const PetscReal off[]);
 /* Adds the members of sets that are groups. */

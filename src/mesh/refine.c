@@ -176,6 +176,6 @@ PetscErrorCode SbMeshFileRefine(SbImport *im)
   }
   PetscCall(SbImportEdgesDestroy(&edges));
   PetscCall(PetscFree(off));
-  PetscCall(SbImportMiddles(im, &largest));
+  PetscCall(SbImportMiddles(im, NULL, &largest));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -15,7 +15,7 @@
 /* Lets items use the first of the vertices that lie together. Those left over are unused from then on. */
 static PetscErrorCode weld(SbImport *im, PetscReal tolerance, SbRepair *done)
 {
-  PetscReal box[6], diagonal, largest;
+  PetscReal box[6], diagonal;
   PetscInt *map;
 
   PetscFunctionBeginUser;
@@ -36,7 +36,6 @@ static PetscErrorCode weld(SbImport *im, PetscReal tolerance, SbRepair *done)
     im->middle[i].end[0] = PetscMin(a, b);
     im->middle[i].end[1] = PetscMax(a, b);
   }
-  PetscCall(SbImportMiddles(im, &largest));
   PetscCall(PetscFree(map));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -84,7 +83,7 @@ PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *don
   PetscBool *drop, any = PETSC_FALSE;
   SbItems *item = &im->item[3];
   const PetscReal largest = SbImportLargest(im);
-  PetscReal det;
+  PetscReal det, off;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(done, sizeof(*done)));
@@ -129,6 +128,7 @@ PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *don
   PetscCall(PetscFree(drop));
   PetscCall(SbFacesDestroy(&faces));
   PetscCall(ierr);
+  PetscCall(SbImportMiddles(im, NULL, &off)); /* of the tets that are left */
   for (PetscInt v = 0; v < im->nvert; v++) im->vert_number[v] = v + 1;
   done->nitem = nitem - im->item[0].n - im->item[1].n - im->item[2].n;
   im->nunused = im->nreoriented = im->nlost = 0;

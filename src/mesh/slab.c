@@ -390,6 +390,26 @@ static PetscErrorCode send_to_users(Slab *s, PetscInt n, size_t unit, const void
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Ends an exchange of send_to_users(): whether any rank has found each of the records, anywhere[there->nsend], from what this one has, found[on->nrecv]. */
+static PetscErrorCode end_search(SbRoute *there, SbRoute *on, PetscInt *from, const PetscBool found[],
+                                 PetscBool anywhere[])
+{
+  PetscBool *answered, *any;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(on->nsend, &answered));
+  PetscCall(PetscCalloc1(there->nrecv, &any));
+  PetscCall(SbRouteReply(on, sizeof(PetscBool), found, answered));
+  for (PetscInt i = 0; i < on->nsend; i++) any[from[i]] = (PetscBool)(any[from[i]] || answered[i]);
+  PetscCall(SbRouteReply(there, sizeof(PetscBool), any, anywhere));
+  PetscCall(PetscFree(answered));
+  PetscCall(PetscFree(any));
+  PetscCall(PetscFree(from));
+  PetscCall(SbRouteDestroy(on));
+  PetscCall(SbRouteDestroy(there));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 typedef struct {
   PetscInt vert[3], tags; /* the lowest vertex first */
 } Triangle;
@@ -398,23 +418,24 @@ typedef struct {
 static PetscErrorCode find_triangles(Slab *s)
 {
   const SbItems *item = &s->im->item[2];
+  const PetscInt n = item->n;
   Triangle *mine, *in;
   PetscInt *from, slots[2];
-  PetscBool *found, *answered;
+  PetscBool *found, *anywhere;
   SbRoute there, on;
   SbImport *im = s->im;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(item->n, &mine));
-  for (PetscInt i = 0; i < item->n; i++) {
+  PetscCall(PetscMalloc1(n, &mine));
+  for (PetscInt i = 0; i < n; i++) {
     const PetscInt *v = item->vert + 3 * (size_t)i;
 
     mine[i] = (Triangle){{v[0], v[1], v[2]}, item->tags[i]};
     PetscCall(PetscSortInt(3, mine[i].vert));
   }
-  PetscCall(send_to_users(s, item->n, sizeof(*mine), mine, &there, &on, &from, &in));
+  PetscCall(send_to_users(s, n, sizeof(*mine), mine, &there, &on, &from, &in));
   PetscCall(PetscFree(mine));
-  PetscCall(PetscMalloc2(on.nrecv, &found, on.nsend, &answered));
+  PetscCall(PetscMalloc2(on.nrecv, &found, n, &anywhere));
   // the triangles that are faces of this rank's tets become the triangles of its import
   im->item[2].n = 0;
   for (PetscInt i = 0; i < on.nrecv; i++) {
@@ -428,54 +449,44 @@ static PetscErrorCode find_triangles(Slab *s)
     found[i] = (PetscBool)(here && SbFacesFind(&s->part->faces, v, slots));
     if (found[i]) PetscCall(SbImportAddItem(im, 2, v, in[i].tags, 0));
   }
-  PetscCall(SbRouteReply(&on, sizeof(PetscBool), found, answered));
-  /* lost: found by none of them */
-  im->nlost += there.nrecv;
-  for (PetscInt i = 0, last = -1; i < on.nsend; i++) {
-    if (!answered[i] || from[i] == last) continue;
-    last = from[i];
-    im->nlost--;
-  }
-  PetscCall(PetscFree2(found, answered));
+  PetscCall(end_search(&there, &on, from, found, anywhere));
+  for (PetscInt i = 0; i < n; i++) im->nlost += !anywhere[i];
+  PetscCall(PetscFree2(found, anywhere));
   PetscCall(PetscFree(in));
-  PetscCall(PetscFree(from));
-  PetscCall(SbRouteDestroy(&on));
-  PetscCall(SbRouteDestroy(&there));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ curved edges */
 
-/* Each goes to all ranks that use its lower vertex, and stays where the other one is used, too. */
+/* Each goes to all ranks that use its lower vertex, and stays where it is one of a tet. */
 static PetscErrorCode find_edges(Slab *s)
 {
   SbImport *im = s->im;
   SbCaughtError caught = {0, ""};
-  SbMiddle *in;
+  SbMiddle *mine = im->middle, *in;
   PetscReal largest = 0;
-  PetscInt *from, total = im->nmiddle.n, n = 0;
+  const PetscInt nmine = im->nmiddle.n;
+  PetscInt *from, total = nmine;
+  PetscBool *found, *anywhere;
   SbRoute there, on;
 
   PetscFunctionBeginUser;
   PetscCall(sum(s, 1, &total));
   if (!total) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(send_to_users(s, im->nmiddle.n, sizeof(*in), im->middle, &there, &on, &from, &in));
-  for (PetscInt i = 0; i < on.nrecv; i++) {
-    PetscInt v[2];
-
-    for (int k = 0; k < 2; k++) PetscCall(PetscFindInt(in[i].end[k], im->nvert, s->used, &v[k]));
-    if (v[0] < 0 || v[1] < 0) continue;
-    in[n] = in[i];
-    for (int k = 0; k < 2; k++) in[n].end[k] = v[k];
-    n++;
-  }
-  PetscCall(PetscFree(from));
-  PetscCall(SbRouteDestroy(&on));
-  PetscCall(SbRouteDestroy(&there));
-  PetscCall(PetscFree(im->middle));
+  PetscCall(send_to_users(s, nmine, sizeof(*in), mine, &there, &on, &from, &in));
+  for (PetscInt i = 0; i < on.nrecv; i++)
+    for (int k = 0; k < 2; k++)
+      PetscCall(PetscFindInt(in[i].end[k], im->nvert, s->used, &in[i].end[k])); /* negative: not here */
   im->middle = in;
-  im->nmiddle = (SbCount){n, n};
-  SB_CATCH(&caught, SbImportMiddles(im, &largest));
+  im->nmiddle = (SbCount){on.nrecv, on.nrecv};
+  PetscCall(PetscMalloc2(on.nrecv, &found, nmine, &anywhere));
+  SB_CATCH(&caught, SbImportMiddles(im, found, &largest));
+  PetscCall(end_search(&there, &on, from, found, anywhere));
+  // a tet of some rank has each of those in the file
+  for (PetscInt i = 0; i < nmine && !caught.code; i++)
+    if (!anywhere[i]) SB_CATCH(&caught, SbImportLostMiddle(im, &mine[i]));
+  PetscCall(PetscFree2(found, anywhere));
+  PetscCall(PetscFree(mine));
   PetscCall(SbCaughtRaise(s->comm, &caught));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPIU_REAL, MPI_MAX, s->comm));
   SbImportNoteMiddles(im, total, largest);

@@ -144,7 +144,7 @@ static PetscErrorCode read_body(const SbBody *body, SbImport *im)
   PetscCall(begin(body, im));
   PetscCall(read(body->mesh, im));
   given = im->nmiddle.n;
-  PetscCall(SbImportMiddles(im, &largest));
+  PetscCall(SbImportMiddles(im, NULL, &largest));
   SbImportNoteMiddles(im, im->nmiddle.n, largest);
   if (given && !im->nmiddle.n && !body->name[0])
     PetscCall(PetscStrncpy(im->note, "straight tets of second order, taken as those of first order",

@@ -193,8 +193,8 @@ static PetscErrorCode read_items(const File *f, int dim, const char *name)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Edges with their node off the middle. */
-static PetscErrorCode read_curved(const File *f)
+/* Edges with their node off the middle, in layout 2. */
+static PetscErrorCode read_curved(const File *f, int layout)
 {
   SbImport *im = f->im;
   Array edges = {
@@ -204,7 +204,14 @@ static PetscErrorCode read_curved(const File *f)
   PetscReal *x;
 
   PetscFunctionBeginUser;
-  if (!is_there(f, edges.name)) PetscFunctionReturn(PETSC_SUCCESS);
+  for (int k = 0; k < 2; k++) {
+    const char *name = k ? off.name : edges.name;
+
+    if (is_there(f, name) != (layout == 2))
+      H5_ERROR(f, "is a mesh of layout %d and has %s %s; layout 2 has it, layout 1 has not; write it again",
+               layout, layout == 2 ? "no array" : "the array", name);
+  }
+  if (layout == 1) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(read_array(f, &edges, &n, &end));
   PetscCall(read_array(f, &off, &noff, &x));
   if (n != noff || edges.rows.N != off.rows.N)
@@ -212,11 +219,16 @@ static PetscErrorCode read_curved(const File *f)
              (long long)edges.rows.N);
   PetscCall(PetscMalloc1(n, &im->middle));
   im->nmiddle = (SbCount){n, n};
-  for (PetscInt i = 0; i < n; i++)
-    im->middle[i] =
-      (SbMiddle){.end = {PetscMin(end[2 * i], end[2 * i + 1]), PetscMax(end[2 * i], end[2 * i + 1])},
-                 .node = -1,
-                 .off = {x[3 * i], x[3 * i + 1], x[3 * i + 2]}};
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt a = end[2 * i], b = end[2 * i + 1], row = edges.rows.first + i + 1;
+
+    if (a == b)
+      H5_ERROR(f, "%s holds %lld twice in row %lld; an edge has two vertices", edges.name, (long long)a,
+               (long long)row);
+    im->middle[i] = (SbMiddle){.end = {PetscMin(a, b), PetscMax(a, b)},
+                               .node = -1 - row,
+                               .off = {x[3 * i], x[3 * i + 1], x[3 * i + 2]}};
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -430,20 +442,20 @@ static herr_t list_name(hid_t where, const char *name, const H5L_info_t *info, v
   return 0;
 }
 
-static PetscErrorCode check_layout(const File *f, PetscBool *own)
+/* The layout of an own mesh, 0 of a run's output. */
+static PetscErrorCode check_layout(const File *f, int *layout)
 {
   char content[256] = "";
-  int version = 0;
 
   PetscFunctionBeginUser;
-  *own = (PetscBool)(H5Aexists(f->file, "supple_mesh") > 0);
-  if (*own) {
+  *layout = 0;
+  if (H5Aexists(f->file, "supple_mesh") > 0) {
     const hid_t a = H5Aopen(f->file, "supple_mesh", H5P_DEFAULT);
 
-    if (H5Aread(a, H5T_NATIVE_INT, &version) < 0) version = 0;
+    if (H5Aread(a, H5T_NATIVE_INT, layout) < 0) *layout = 0;
     (void)H5Aclose(a);
-    if (version != 1 && version != 2)
-      H5_ERROR(f, "is a mesh of layout %d; this supple reads layouts 1 and 2", version);
+    if (*layout != 1 && *layout != 2)
+      H5_ERROR(f, "is a mesh of layout %d; this supple reads layouts 1 and 2", *layout);
   }
   if (is_there(f, "/mesh/x") && is_there(f, "/mesh/cells")) PetscFunctionReturn(PETSC_SUCCESS);
   (void)H5Literate(f->file, H5_INDEX_NAME, H5_ITER_INC, NULL, list_name, content);
@@ -456,14 +468,14 @@ static PetscErrorCode check_layout(const File *f, PetscBool *own)
 static PetscErrorCode read_mesh(File *f, SbSlabRows *rows)
 {
   SbImport *im = f->im;
-  PetscBool own;
+  int layout;
   Array x = {.name = "/mesh/x", .klass = H5T_FLOAT, .ncomp = 3, .block = PETSC_TRUE};
   SbH5Frames s = {.wanted = f->im->step};
   int64_t number = 0;
   hid_t frame;
 
   PetscFunctionBeginUser;
-  PetscCall(check_layout(f, &own));
+  PetscCall(check_layout(f, &layout));
   // the group of the wanted step
   if (im->step) {
     if (!is_there(f, "/step"))
@@ -491,8 +503,8 @@ static PetscErrorCode read_mesh(File *f, SbSlabRows *rows)
   f->nvert = rows->N;
   for (PetscInt v = 0; v < im->nvert; v++) im->vert_number[v] = rows->first + v + 1;
   PetscCall(read_items(f, 3, "/mesh/cells"));
-  PetscCall(own ? read_own(f) : read_output(f));
-  if (own) PetscCall(read_curved(f));
+  PetscCall(layout ? read_own(f) : read_output(f));
+  if (layout) PetscCall(read_curved(f, layout));
   if (!im->item[3].n && !f->nparts && !(im->surface && im->item[2].n))
     H5_ERROR(f, "holds no tetrahedra; mesh the volume (supple-mesh tet)");
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -6,6 +6,7 @@
 */
 #include <stdlib.h>
 #include "meshio_impl.h"
+#include "sbquadratic.h"
 
 #define STRAIGHT 1e-6 /* of the length of an edge: nearer to the middle its node is there */
 
@@ -199,24 +200,76 @@ PetscErrorCode SbImportAddMiddles(SbImport *im, const PetscInt vert[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbImportMiddles(SbImport *im, PetscReal *largest)
+PetscErrorCode SbImportLostMiddle(const SbImport *im, const SbMiddle *m)
+{
+  PetscFunctionBeginUser;
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+          "%s: /mesh/curved_edges holds %lld and %lld in row %lld, which is no edge of a tetrahedron; remove "
+          "the row, also of /mesh/edge_offsets",
+          im->where, (long long)m->end[0], (long long)m->end[1], (long long)(-1 - m->node));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Leaves out those that no tet has: of tets that went. In a list this is an error, unless found[] is there to tell. */
+static PetscErrorCode drop_lost(SbImport *im, PetscBool found[])
+{
+  SbMiddle lost = {.node = -1};
+  PetscInt n = 0, *low, *start, *at;
+  PetscBool *of_tet;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(im->nmiddle.n, &low));
+  PetscCall(PetscCalloc1(im->nmiddle.n, &of_tet));
+  for (PetscInt i = 0; i < im->nmiddle.n; i++) low[i] = im->middle[i].end[0];
+  PetscCall(SbBucketByKey(im->nmiddle.n, low, im->nvert, &start, &at));
+  // those with the lower vertex of an edge of a tet are a few
+  for (PetscInt i = 0; i < 6 * im->item[3].n; i++) {
+    const PetscInt *v = im->item[3].vert + 4 * (i / 6), a = v[SbTetEdge[i % 6][0]],
+                   b = v[SbTetEdge[i % 6][1]];
+
+    for (PetscInt k = start[PetscMin(a, b)]; k < start[PetscMin(a, b) + 1]; k++)
+      if (im->middle[at[k]].end[1] == PetscMax(a, b)) of_tet[at[k]] = PETSC_TRUE;
+  }
+  if (found) PetscCall(PetscArraycpy(found, of_tet, im->nmiddle.n));
+  for (PetscInt i = 0; i < im->nmiddle.n; i++) {
+    if (of_tet[i])
+      im->middle[n++] = im->middle[i];
+    else if (lost.node == -1)
+      lost = im->middle[i];
+  }
+  im->nmiddle.n = n;
+  PetscCall(PetscFree(low));
+  PetscCall(PetscFree(of_tet));
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree(at));
+  if (!found && lost.node < -1) PetscCall(SbImportLostMiddle(im, &lost));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportMiddles(SbImport *im, PetscBool found[], PetscReal *largest)
 {
   SbMiddle *last = NULL;
   PetscReal most = 0;
-  PetscInt n = 0, *keep;
+  PetscInt n = 0, row = 0, *keep = NULL;
 
   PetscFunctionBeginUser;
   *largest = 0;
   if (!im->nmiddle.n) PetscFunctionReturn(PETSC_SUCCESS);
+  if (im->middle[0].node >= 0) {
+    PetscCall(SbImportScratch(im, (size_t)im->nvert * sizeof(*keep), &keep));
+    for (PetscInt v = 0; v < im->nvert; v++) keep[v] = 1;
+  } else {
+    PetscCall(drop_lost(im, found));
+  }
   PetscCall(SbSortByKeys(im->nmiddle.n, sizeof(*im->middle), 3, im->middle));
-  PetscCall(PetscMalloc1(im->nvert, &keep));
-  for (PetscInt v = 0; v < im->nvert; v++) keep[v] = 1;
   for (PetscInt i = 0; i < im->nmiddle.n; i++) {
     SbMiddle m = im->middle[i];
     const PetscReal *a = im->x + 3 * m.end[0], *b = im->x + 3 * m.end[1];
+    const PetscInt before = row;
     PetscReal length = 0, off = 0, apart = 0;
 
-    if (m.node >= 0) keep[m.node] = 0;
+    row = -1 - m.node;
+    if (keep) keep[m.node] = 0;
     for (int k = 0; k < 3; k++) {
       if (m.node >= 0) m.off[k] = im->x[3 * m.node + k] - 0.5 * (a[k] + b[k]);
       length += PetscSqr(b[k] - a[k]);
@@ -224,6 +277,11 @@ PetscErrorCode SbImportMiddles(SbImport *im, PetscReal *largest)
     }
     // each edge once; two nodes at the same place are one
     if (last && last->end[0] == m.end[0] && last->end[1] == m.end[1]) {
+      PetscCheck(
+        row <= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+        "%s: /mesh/curved_edges holds the same edge in rows %lld and %lld; remove one of them, also of "
+        "/mesh/edge_offsets",
+        im->where, (long long)row, (long long)before);
       for (int k = 0; k < 3; k++) apart += PetscSqr(m.off[k] - last->off[k]);
       PetscCheck(apart <= PetscSqr(STRAIGHT) * length, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
                  "%s: the edge between nodes %lld and %lld has two nodes, at different places; make it one "
@@ -240,9 +298,8 @@ PetscErrorCode SbImportMiddles(SbImport *im, PetscReal *largest)
   im->nmiddle.n = n;
   *largest = PetscSqrtReal(most);
   // nodes that only lie at edges are no vertices
-  for (PetscInt i = 0; i < 4 * im->item[3].n; i++) keep[im->item[3].vert[i]] = 1;
-  PetscCall(SbImportDropVertices(im, keep));
-  PetscCall(PetscFree(keep));
+  for (PetscInt i = 0; keep && i < 4 * im->item[3].n; i++) keep[im->item[3].vert[i]] = 1;
+  if (keep) PetscCall(SbImportDropVertices(im, keep));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -12,6 +12,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import h5py
+
 TOP = Path(__file__).resolve().parents[2]
 OUT = Path(os.environ["SB_OUT"]).resolve()
 SUPPLE = str((TOP / os.environ["SB_SUPPLE"]).resolve())
@@ -88,6 +90,7 @@ CASES = [
     ("F1", "error", "bar.opts -body_bar_mesh nix.msh", ["-body_bar_mesh", "nix.msh"]),
     ("F2", "error", f"cube.opts -body_a_mesh {DATA}/bad_number.msh {HELD}", ["bad_number.msh", "line 9", "1,5"]),
     ("F2", "error", f"cube.opts -body_a_mesh {DATA}/bad_truncated_bin.msh {HELD}", ["bad_truncated_bin.msh", "byte 1996"]),
+    ("F2", "error", f"cube.opts -body_a_mesh lost.h5 -body_a_element p2 {HELD}", ["lost.h5", "/mesh/curved_edges", "1 and 6", "row 1"]),
     ("F3", "error", f"cube.opts -body_a_mesh {DATA}/bad_hexes.msh {HELD}", ["bad_hexes.msh", " 1 "]),
     ("F3", "error", f"cube.opts -body_a_mesh {DATA}/bad_surface.msh {HELD}", ["bad_surface.msh", " 2 "]),
     ("F4", "error", "bar.opts -output_dir table.txt/out", ["-output_dir", "table.txt/out"]),
@@ -99,6 +102,7 @@ CASES = [
     ("F6", "warning", "bar.opts -output_dir cut -restart latest", ["cut/checkpoint_000002.h5"]),
     ("M1", "error", f"cube.opts -body_a_mesh {DATA}/bad_flat.msh {HELD}", ["bad_flat.msh", " 1 ", "1.67e-15 m^3"]),
     ("M1", "error", f"cube.opts -body_a_mesh {DATA}/bad_twins.msh {HELD}", ["bad_twins.msh", " 1 ", " 2 "]),
+    ("M1", "error", f"cube.opts -body_a_mesh folded.h5 -body_a_element p2 {HELD}", ["folded.h5", "tetrahedron ", "that do: 2)", "above 0"]),
     ("M2", "error", f"cube.opts -body_a_mesh lid.stl {HELD}", ["lid.stl", " 3 ", " 1 ", "(1, 0, 0)"]),
     ("M3", "error", f"cube.opts -body_a_mesh {DATA}/bead.obj -body_a_tet_size 1e-7 {HELD}", ["bead.obj", "1e-07 m", "tet_size"]),
     ("M4", "warning", "bar.opts -effects gravity,stop -effect_stop_type contact -effect_stop_response projected -effect_stop_obstacle mesh:inwards.off", ["inwards.off"]),
@@ -164,6 +168,12 @@ def run(arguments):
 def main():
     for name, text in FILES.items():
         (OUT / name).write_text(text)
+    # a cube with one curved edge: no tet has it, or it is so curved that tets fold
+    for name, edge in (("lost.h5", [1, 6]), ("folded.h5", [0, 7])):
+        subprocess.run([Path(SUPPLE).with_name("supple-mesh"), "convert", "box:1,1,1:1", name, "-quiet"], cwd=OUT, check=True)
+        with h5py.File(OUT / name, "r+") as f:
+            f["mesh/curved_edges"], f["mesh/edge_offsets"] = [edge], [[0.9, 0, 0]]
+            f.attrs["supple_mesh"] = 2
     # checkpoints: of two steps, and with the newer one cut off
     for folder in ("saved", "cut"):
         code, text = run(f"bar.opts -output_dir {folder} -checkpoint_every_steps 1 -output_fields displacement")

@@ -77,7 +77,7 @@ static inline PetscErrorCode test_curve(SbImport *im)
     PetscCall(SbReserve(++im->nmiddle.n, sizeof(m), &im->nmiddle.capacity, &im->middle));
     im->middle[im->nmiddle.n - 1] = m;
   }
-  PetscCall(SbImportMiddles(im, &largest));
+  PetscCall(SbImportMiddles(im, NULL, &largest));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

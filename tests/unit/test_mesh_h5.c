@@ -1,4 +1,5 @@
 // Meshes in HDF5: what supple-mesh writes and what a run writes, distributed as from any other file; damage has its message.
+// @ranks 1 2 3
 #include <hdf5.h>
 #include "mesh_same.h"
 
@@ -197,61 +198,171 @@ static PetscErrorCode test_discontinuous(void)
 
 /* ------------------------------------------------------------------ damage */
 
-/* An own mesh with one array replaced, or none. */
-static PetscErrorCode with_array(const char *path, const char *name, int ndim, const hsize_t size[],
-                                 hid_t type, const void *data, const char *words)
+/* Read on all ranks by rank 0, in slabs, and by supple-mesh, it must fail with these words (NULL: it is sound); with a note only for p2, and supple-mesh has the note. */
+static PetscErrorCode refuse(const char *path, PetscErrorCode code, const char *words, const char *note)
 {
+  static const char *const reading[] = {"rank0", "slabs"};
+  SbMeshStatistics facts;
   SbImport *im;
-  hid_t file;
+  SbMesh mesh;
 
   PetscFunctionBeginUser;
-  PetscCall(test_read(DATA "two_cubes_41.msh", 0, &im));
-  if (strstr(name, "edge")) PetscCall(test_curve(im));
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  for (int k = 0; k < 2; k++) {
+    SbBody body = test_body("b", path);
+
+    body.edge_nodes = PETSC_TRUE;
+    PetscCall(PetscOptionsSetValue(NULL, "-mesh_reading", reading[k]));
+    if (words) {
+      SB_CHECK_ERROR(SbMeshCreate(PETSC_COMM_WORLD, 1, &body, 0, NULL, &mesh), code, words);
+    } else {
+      PetscCall(SbMeshCreate(PETSC_COMM_WORLD, 1, &body, 0, NULL, &mesh));
+      PetscCall(SbMeshDestroy(&mesh));
+    }
+  }
+  PetscCall(PetscOptionsClearValue(NULL, "-mesh_reading"));
+  if (note) {
+    PetscCall(test_read(path, 0, &im));
+    PetscCall(SbMeshFileMeasure(im, &facts));
+    SB_CHECK(strstr(facts.body.note, note) != NULL, "'%s' in '%s'", note, facts.body.note);
+    PetscCall(SbMeshFileDestroy(&im));
+  } else {
+    SB_CHECK_ERROR(test_read(path, 0, &im), code, words);
+  }
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rank 0: an own mesh. */
+static PetscErrorCode write_mesh(const char *mesh, const char *path)
+{
+  SbImport *im;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_read(mesh, 0, &im));
   PetscCall(SbMeshFileWrite(im, path, SB_MESH_AUTO));
   PetscCall(SbMeshFileDestroy(&im));
-  file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One array of a file replaced; without dimensions it is gone. */
+static void replace(const char *path, const char *name, int ndim, const hsize_t size[], hid_t type,
+                    const void *data)
+{
+  const hid_t file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT);
+
   (void)H5Ldelete(file, name, H5P_DEFAULT);
   if (ndim) put_array(file, name, ndim, size, type, data);
   (void)H5Fclose(file);
-  SB_CHECK_ERROR(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED, words);
+}
+
+static PetscErrorCode with_array(const char *path, const char *name, int ndim, const hsize_t size[],
+                                 hid_t type, const void *data, const char *words)
+{
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (!rank) {
+    PetscCall(write_mesh(DATA "two_cubes_41.msh", path));
+    replace(path, name, ndim, size, type, data);
+  }
+  PetscCall(refuse(path, PETSC_ERR_FILE_UNEXPECTED, words, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode test_damage(void)
 {
-  const hsize_t lie[2] = {100000000, 4}, few[1] = {3}, one_by_three[2] = {1, 3}, pair[2] = {2, 2},
-                groups[1] = {8}, two[1] = {2};
-  const double bad[12] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, NAN};
+  const hsize_t lie[2] = {100000000, 4}, few[1] = {3}, pair[2] = {2, 2}, groups[1] = {8}, two[1] = {2},
+                vertices[2] = {23, 3}, tets[1] = {48};
+  const double bad[4] = {0}, reals[69] = {[68] = NAN};
   const int wild[4] = {0, 1, 2, 4711}, below[4] = {0, -1, 2, 3}, high[8] = {0, 1, 2, 3, 4, 3, 3, 3},
-            falling[2] = {1, 0};
-  char path[256], index[256];
+            falling[2] = {1, 0}, tags[48] = {[47] = 4711};
+  char path[256];
 
   PetscFunctionBeginUser;
-  test_path("bad.h5", sizeof(path), path);
+  PetscCall(shared_path("bad.h5", sizeof(path), path));
   PetscCall(with_array(path, "/mesh/x", 0, NULL, 0, NULL, "/mesh/x|/mesh/cells"));
-  PetscCall(with_array(path, "/mesh/x", 2, four_by_three, H5T_NATIVE_DOUBLE, bad, "/mesh/x|row 4"));
+  PetscCall(with_array(path, "/mesh/x", 2, vertices, H5T_NATIVE_DOUBLE, reals, "/mesh/x|row 23"));
   PetscCall(with_array(path, "/mesh/x", 2, pair, H5T_NATIVE_DOUBLE, bad, "/mesh/x|2 dimensions|2 columns|3"));
   PetscCall(with_array(path, "/mesh/cells", 2, one_by_four, H5T_NATIVE_DOUBLE, bad, "/mesh/cells"));
   PetscCall(
     with_array(path, "/mesh/cells", 2, one_by_four, H5T_NATIVE_INT, wild, "/mesh/cells|4711|row 1|0|22"));
   PetscCall(with_array(path, "/mesh/cells", 2, one_by_four, H5T_NATIVE_INT, below, "/mesh/cells|-1|row 1"));
   PetscCall(with_array(path, "/mesh/cells", 2, lie, H5T_NATIVE_INT, NULL, "/mesh/cells|100000000|4 numbers"));
-  PetscCall(with_array(path, "/mesh/cell_tags", 1, few, H5T_NATIVE_INT, tet, "/mesh/cell_tags|3 rows|48"));
+  PetscCall(with_array(path, "/mesh/cell_tags", 1, few, H5T_NATIVE_INT, tet, "/mesh/cell_tags|rows"));
   PetscCall(
-    with_array(path, "/mesh/cell_tags", 1, few, H5T_NATIVE_INT, wild + 1, "/mesh/cell_tags|4711|row 3"));
+    with_array(path, "/mesh/cell_tags", 1, tets, H5T_NATIVE_INT, tags, "/mesh/cell_tags|4711|row 48"));
   PetscCall(with_array(path, "/groups/dim", 1, groups, H5T_NATIVE_INT, high, "/groups/dim|4|row 5|0|3"));
   PetscCall(with_array(path, "/groups/dim", 1, two, H5T_NATIVE_INT, high, "2 dimensions"));
   PetscCall(with_array(path, "/tag_sets/start", 1, two, H5T_NATIVE_INT, falling, "/tag_sets/start|1|0"));
   PetscCall(with_array(path, "/groups/name", 0, NULL, 0, NULL, "/groups/name"));
-  PetscCall(with_array(path, "/mesh/edge_offsets", 0, NULL, 0, NULL, "/mesh/edge_offsets"));
-  PetscCall(with_array(path, "/mesh/edge_offsets", 2, four_by_three, H5T_NATIVE_DOUBLE, bad,
-                       "/mesh/edge_offsets|row 4"));
-  PetscCall(with_array(path, "/mesh/edge_offsets", 2, one_by_three, H5T_NATIVE_DOUBLE, bad,
-                       "/mesh/edge_offsets|1 rows"));
-  PetscCall(with_array(path, "/mesh/curved_edges", 2, pair, H5T_NATIVE_INT, wild, "4711|row 2|0|22"));
-  (void)unlink(path);
-  (void)snprintf(index, sizeof(index), "%.*s.xmf", (int)(strlen(path) - 3), path);
-  (void)unlink(index);
+  PetscCall(remove_all(path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Layout 2 of a cube of six tets around its diagonal from vertex 0 to 7, with two vertices that no tet uses: the rows of both arrays (-1: there is none), and what is wrong with them. */
+static PetscErrorCode test_curved_damage(void)
+{
+  static const struct {
+    int layout, nedge, noff, edge[3][2];
+    double off[3][3];
+    const char *words, *note;
+  } cases[] = {
+    {2, 2, 2, {{7, 0}, {0, 1}}, {{0.1}, {0, -0.1}}, NULL, ", curved tets: 6"},
+    {2, 0, 0, {{0}}, {{0}}, NULL, ""},
+    {1, 2, 2, {{0, 7}, {0, 1}}, {{0.1}, {0.1}}, "layout 1|/mesh/curved_edges", NULL},
+    {1, -1, 1, {{0}}, {{0.1}}, "layout 1|/mesh/edge_offsets", NULL},
+    {2, -1, -1, {{0}}, {{0}}, "layout 2|/mesh/curved_edges", NULL},
+    {2, 1, -1, {{0, 7}}, {{0}}, "layout 2|/mesh/edge_offsets", NULL},
+    {2, -1, 1, {{0}}, {{0.1}}, "layout 2|/mesh/curved_edges", NULL},
+    {2, 2, 3, {{0, 7}, {0, 1}}, {{0.1}, {0.1}, {0.1}}, "/mesh/edge_offsets|3 rows|2 edges", NULL},
+    {2, 2, 2, {{0, 7}, {0, 10}}, {{0.1}, {0.1}}, "/mesh/curved_edges|holds 10|row 2|from 0 to 9", NULL},
+    {2, 2, 2, {{-1, 7}, {0, 1}}, {{0.1}, {0.1}}, "/mesh/curved_edges|holds -1|row 1|from 0 to 9", NULL},
+    {2, 3, 3, {{0, 7}, {0, 1}, {4, 4}}, {{0.1}, {0.1}, {0}}, "/mesh/curved_edges|holds 4 twice|row 3", NULL},
+    {2, 3, 3, {{0, 7}, {6, 1}, {0, 1}}, {{0.1}, {0.1}, {0}}, "/mesh/curved_edges|1 and 6|row 2", NULL},
+    {2, 3, 3, {{0, 7}, {0, 1}, {1, 6}}, {{0.1}, {0.1}, {0}}, "/mesh/curved_edges|1 and 6|row 3", NULL},
+    {2, 3, 3, {{0, 7}, {0, 1}, {8, 9}}, {{0.1}, {0.1}, {0.1}}, "/mesh/curved_edges|8 and 9|row 3", NULL},
+    {2, 3, 3, {{0, 7}, {8, 0}, {0, 1}}, {{0.1}, {0.1}, {0.1}}, "/mesh/curved_edges|0 and 8|row 2", NULL},
+    {2, 3, 3, {{0, 7}, {0, 1}, {7, 0}}, {{0.1}, {0.1}, {0.1}}, "/mesh/curved_edges|rows 1 and 3", NULL},
+    {2, 3, 3, {{0, 7}, {1, 7}, {1, 7}}, {{0.1}, {0.1}, {0.2}}, "/mesh/curved_edges|rows 2 and 3", NULL},
+    {2, 3, 3, {{1, 0}, {0, 1}, {0, 7}}, {{0}, {0}, {0.1}}, "/mesh/curved_edges|rows 1 and 2", NULL},
+    {2, 2, 2, {{0, 7}, {0, 1}}, {{0.1}, {0, INFINITY}}, "/mesh/edge_offsets|row 2", NULL},
+    {2, 2, 2, {{0, 7}, {0, 1}}, {{0.1}, {0, 0, NAN}}, "/mesh/edge_offsets|row 2", NULL},
+    {2, 1, 1, {{0, 7}}, {{0.9}}, "tetrahedron |that do: 2)|Jacobian|above 0", "p2 refuses: 2"},
+    {2, 1, 1, {{0, 7}}, {{1e300}}, "tetrahedron |that do: 6)|Jacobian|above 0", "p2 refuses: 6"},
+    {2, 1, 1, {{0, 1}}, {{0.9}}, "tetrahedron |that do: 2)|Jacobian|above 0", "p2 refuses: 2"},
+  };
+  static const double x[30] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 0, 1,
+                               1, 0, 1, 0, 1, 1, 1, 1, 1, 3, 0, 0, 4, 0, 0};
+  const hsize_t vertices[2] = {10, 3};
+  PetscMPIInt rank;
+  char path[256];
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCall(shared_path("curved.h5", sizeof(path), path));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
+    const hsize_t edges[2] = {(hsize_t)PetscMax(cases[i].nedge, 0), 2},
+                  offs[2] = {(hsize_t)PetscMax(cases[i].noff, 0), 3};
+
+    if (!rank) {
+      hid_t file, a;
+
+      PetscCall(write_mesh("box:1,1,1:1", path));
+      replace(path, "/mesh/x", 2, vertices, H5T_NATIVE_DOUBLE, x);
+      replace(path, "/mesh/curved_edges", cases[i].nedge < 0 ? 0 : 2, edges, H5T_NATIVE_INT, cases[i].edge);
+      replace(path, "/mesh/edge_offsets", cases[i].noff < 0 ? 0 : 2, offs, H5T_NATIVE_DOUBLE, cases[i].off);
+      file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT);
+      a = H5Aopen(file, "supple_mesh", H5P_DEFAULT);
+      (void)H5Awrite(a, H5T_NATIVE_INT, &cases[i].layout);
+      (void)H5Aclose(a);
+      (void)H5Fclose(file);
+    }
+    PetscCall(refuse(path, cases[i].note ? PETSC_ERR_USER_INPUT : PETSC_ERR_FILE_UNEXPECTED, cases[i].words,
+                     cases[i].note));
+  }
+  PetscCall(remove_all(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -335,6 +446,7 @@ int main(int argc, char **argv)
   PetscCall(test_output());
   PetscCall(test_discontinuous());
   PetscCall(test_damage());
+  PetscCall(test_curved_damage());
   PetscCall(test_truncated());
   PetscCall(test_foreign());
   PetscCall(SbOptionsReset());

@@ -62,6 +62,99 @@ static PetscErrorCode test_groups(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A quarter of the hollow cylinder of radii 1 and 2 and of height 1. */
+static void cylinder(PetscReal x[3])
+{
+  const PetscReal r = 1 + x[0], angle = 0.5 * PETSC_PI * x[1];
+
+  x[0] = r * PetscCosReal(angle);
+  x[1] = r * PetscSinReal(angle);
+}
+
+/*
+  As a mesh of n x n x n cells, vertices and nodes of edges in their places, with the region of radii below 1.5 and the curve of radius 1 at the bottom.
+  What is measured over the exact value, less 1: volume, region, whole surface, outside, inside, bottom, curve.
+*/
+static PetscErrorCode measure_cylinder(PetscInt n, PetscBool curved, PetscReal error[7])
+{
+  static const char *const names[7] = {"volume", "core", "surface", "xmax", "xmin", "zmin", "arc"};
+  const PetscReal exact[7] = {3 * PETSC_PI / 4, 1.25 * PETSC_PI / 4, 2 + 3 * PETSC_PI, PETSC_PI,
+                              PETSC_PI / 2,     3 * PETSC_PI / 4,    PETSC_PI / 2};
+  PetscReal largest, value[7] = {0};
+  PetscBool found = PETSC_TRUE;
+  PetscInt tags[2];
+  SbMeshStatistics f;
+  char path[64];
+  SbImport *im;
+
+  PetscFunctionBeginUser;
+  (void)snprintf(path, sizeof(path), "box:1,1,1:%d", (int)n);
+  PetscCall(test_read(path, 0, &im));
+  PetscCall(SbImportTagsAlone(im, 3, 1, "core", &tags[0]));
+  PetscCall(SbImportTagsAlone(im, 1, 1, "arc", &tags[1]));
+  for (PetscInt c = 0; c < im->item[3].n; c++) {
+    const PetscInt *v = im->item[3].vert + 4 * c;
+    PetscReal mean = 0;
+
+    for (int a = 0; a < 4; a++) mean += im->x[3 * v[a]] / 4;
+    if (mean < 0.5) im->item[3].tags[c] = tags[0];
+  }
+  for (PetscInt j = 0; j < n; j++)
+    PetscCall(SbImportAddItem(im, 1, (const PetscInt[]){(n + 1) * j, (n + 1) * (j + 1)}, tags[1], j + 1));
+  for (PetscInt i = 0; i < 6 * im->item[3].n && curved; i++) {
+    const PetscInt *v = im->item[3].vert + 4 * (i / 6), a = v[SbTetEdge[i % 6][0]],
+                   b = v[SbTetEdge[i % 6][1]];
+    PetscReal p[3][3];
+    SbMiddle m = {.end = {PetscMin(a, b), PetscMax(a, b)}, .node = -1};
+
+    for (int k = 0; k < 3; k++) {
+      p[0][k] = im->x[3 * a + k];
+      p[1][k] = im->x[3 * b + k];
+      p[2][k] = 0.5 * (p[0][k] + p[1][k]);
+    }
+    for (int q = 0; q < 3; q++) cylinder(p[q]);
+    for (int k = 0; k < 3; k++) m.off[k] = p[2][k] - 0.5 * (p[0][k] + p[1][k]);
+    PetscCall(SbReserve(++im->nmiddle.n, sizeof(m), &im->nmiddle.capacity, &im->middle));
+    im->middle[im->nmiddle.n - 1] = m;
+  }
+  for (PetscInt v = 0; v < im->nvert; v++) cylinder(im->x + 3 * v);
+  PetscCall(SbImportMiddles(im, NULL, &largest));
+  for (PetscInt g = 0; found; g++) {
+    SbMeshGroup group;
+
+    PetscCall(SbMeshFileGroup(im, g, &group, &found));
+    for (int k = 0; k < 7 && found; k++)
+      if (!strcmp(group.name, names[k])) value[k] = group.size;
+  }
+  PetscCall(SbMeshFileMeasure(im, &f));
+  value[0] = f.body.volume;
+  value[2] = f.area;
+  for (int k = 0; k < 7; k++) {
+    error[k] = PetscAbsReal(value[k] / exact[k] - 1);
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "  %d cells, %s, %s: %.6g, error %.2e\n", (int)n,
+                          curved ? "curved" : "straight", names[k], (double)value[k], (double)error[k]));
+  }
+  PetscCall(SbMeshFileDestroy(&im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sizes of curved bodies, their regions, surfaces and curves converge with order 4, straight ones with order 2. */
+static PetscErrorCode test_curved(void)
+{
+  PetscReal error[2][2][7];
+
+  PetscFunctionBeginUser;
+  for (int curved = 0; curved < 2; curved++)
+    for (int k = 0; k < 2; k++) PetscCall(measure_cylinder(k ? 8 : 4, (PetscBool)curved, error[curved][k]));
+  for (int k = 0; k < 7; k++) {
+    SB_CHECK(error[1][0][k] < 0.02 * error[0][0][k], "%d: error %g, %g straight", k, (double)error[1][0][k],
+             (double)error[0][0][k]);
+    SB_CHECK(error[1][0][k] > 14 * error[1][1][k], "%d: errors %g, %g", k, (double)error[1][0][k],
+             (double)error[1][1][k]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* What a run refuses is refused. */
 static PetscErrorCode test_refused(void)
 {
@@ -80,6 +173,7 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   PetscCall(test_box());
   PetscCall(test_groups());
+  PetscCall(test_curved());
   PetscCall(test_refused());
   SB_TEST_END();
 }

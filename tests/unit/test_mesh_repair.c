@@ -148,6 +148,30 @@ static PetscErrorCode test_flat(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A curved edge goes with the flat tet that alone had it: the repaired mesh can be read again. */
+static PetscErrorCode test_curved_edges(void)
+{
+  static const PetscInt flat[4] = {0, 1, 2, 3}, end[2][2] = {{1, 2}, {0, 7}};
+  SbImport *im, *again;
+  SbRepair r;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_read("box:1,1,1:1", 0, &im));
+  PetscCall(SbImportAddItem(im, 3, flat, 0, 7));
+  PetscCall(PetscMalloc1(2, &im->middle));
+  im->nmiddle = (SbCount){2, 2};
+  for (int i = 0; i < 2; i++)
+    im->middle[i] = (SbMiddle){.end = {end[i][0], end[i][1]}, .node = -1, .off = {0, 0, 0.1}};
+  PetscCall(SbMeshFileRepair(im, -1, &r));
+  SB_CHECK(r.nflat == 1 && im->item[3].n == 6, "%d flat, %d tets", (int)r.nflat, (int)im->item[3].n);
+  SB_CHECK(im->nmiddle.n == 1 && im->middle[0].end[1] == 7, "%d curved edges", (int)im->nmiddle.n);
+  PetscCall(test_round(im, "repaired.h5", SB_MESH_H5, &again));
+  test_same(im, again, "repaired");
+  PetscCall(SbMeshFileDestroy(&again));
+  PetscCall(SbMeshFileDestroy(&im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode test_hopeless(void)
 {
   SbImport *im;
@@ -169,6 +193,7 @@ int main(int argc, char **argv)
   PetscCall(test_weld());
   PetscCall(test_all_at_once());
   PetscCall(test_flat());
+  PetscCall(test_curved_edges());
   PetscCall(test_hopeless());
   SB_TEST_END();
 }

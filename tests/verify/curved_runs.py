@@ -71,6 +71,21 @@ for end in ("msh", "h5"):
 report = tool("info", OUT / "again.msh")
 check("curved tets" in report, report)
 
+# a damaged one is refused by all commands; one that folds is told by info
+for name, edge in (("lost.h5", [1, 6]), ("folded.h5", [0, 1])):
+    tool("convert", "box:1,0.5,0.5:1", OUT / name)
+    with h5py.File(OUT / name, "r+") as f:
+        f["mesh/curved_edges"], f["mesh/edge_offsets"] = [edge], [[2.0, 0, 0]]
+        f.attrs["supple_mesh"] = 2
+for command in ("info", "convert", "repair", "refine"):
+    done = subprocess.run([TOOL, command, str(OUT / "lost.h5"), *([str(OUT / "not.h5")] if command != "info" else [])], capture_output=True, text=True)
+    check(done.returncode and "/mesh/curved_edges" in done.stderr and "row 1" in done.stderr and not (OUT / "not.h5").exists(), f"{command}: {done.stdout}{done.stderr}")
+run(3, "lost", "lost.h5", "-mesh_reading", "slabs", fails="row 1")
+report = tool("info", OUT / "folded.h5")
+check("p2 refuses: 2" in report, report)
+for reading in ("rank0", "slabs"):
+    run(3, "folded", "folded.h5", "-mesh_reading", reading, fails="that do: 2)")
+
 # the mesh, by any way and on any number of ranks
 run(1, "whole", "curved.h5")
 last = "checkpoint_000008.h5"
