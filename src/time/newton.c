@@ -23,7 +23,8 @@
   Tangent. With -body_NAME_tangent auto it is the exact one. When the linear solver meets a direction of negative curvature or counts negative pivots, or p goes up, the eigenvalues of
   the cells are raised to zero and the system is solved once more (Longva et al. 2023, "Pitfalls of projection"); after a full step the exact one is tried again.
   Forces without a potential (the free rim of a follower pressure) have equilibria at which its symmetric part is not definite: it is kept with as many negative eigenvalues
-  as where the load step began, and after a full step to a residual smaller than the first whatever it is; the residual decides about a direction that goes up.
+  as where the load step began, and after a full step to a residual smaller than the first whatever it is; the residual decides about a direction that goes up. In a slender body it rises
+  as much as E does where a full step turns what is soft, so that such a step may be provisional, too: those that follow have to bring the residual below where it was.
 
   Where surfaces push each other, the second derivative of contact is the positive part of each pair's, and the exact one after a whole step, as near the end only that converges
   faster than linearly. Friction that slipped the other way than expected is taken for one that sticks (src/effect/barrier_forces.c), and where p goes up, bounded from above. A tangent that is not
@@ -95,6 +96,7 @@ typedef struct {
   PetscReal least; /* rounding of the strain energy of a body that has turned: E V to the last digit, J */
   PetscInt provisional;   /* how many there were since */
   PetscReal slope;        /* of E at `start` along that step, J */
+  PetscReal norm;         /* of the residual there, N */
   PetscReal first, rise;  /* change of E over it, and over all since, J */
   SbContactSystem system; /* guarded contact: NULL before surfaces have pushed each other */
   SbBlocks blocks;        /* its second derivative, when the last direction was solved for */
@@ -330,7 +332,9 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
   const SbModel m = n->run->model;
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
   Iterate *from = &n->from, *to = &n->to, *best = &n->best;
-  PetscBool enough, provisional, better,
+  /* forces without a potential: steps that go up may be provisional, too */
+  const PetscBool circular = (PetscBool)(n->run->nonsymmetric.U && !m->dynamic && !m->npotential);
+  PetscBool enough, back, provisional, better,
     flat = PETSC_FALSE, guarded,
     plain = (PetscBool)(n->nblock > 0 || *s < 1.); /* a barrier is nothing to come back from */
   PetscReal change, noise, total, goal;
@@ -366,15 +370,16 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
     /* enough; where it is too little to decide, or the step goes up at once, as forces without a potential may make it, the residual has to */
     total = n->provisional ? n->rise + change : change;
     goal = DECREASE * (n->provisional ? n->slope : *s * slope);
-    enough = (PetscBool)(slope < 0. && total <= goal);
-    if (slope >= 0. || total <= noise)
-      enough = (PetscBool)(enough || to->norm <= (1. - DECREASE * *s) * from->norm);
+    back = (PetscBool)(circular && n->provisional);
+    enough = (PetscBool)(slope < 0. && goal < 0. && total <= goal);
+    if (slope >= 0. || back || total <= noise)
+      enough = (PetscBool)(enough || to->norm <= (1. - DECREASE * *s) * (back ? n->norm : from->norm));
     /* at the solution, where residuals are rounding as well, the step is as good as none */
     n->rounding =
       (PetscBool)(*s == 1. && !enough && slope < 0. && total <= noise && -slope <= NOTHING * noise);
     if (slope < 0. && total <= noise) enough = (PetscBool)(enough || -slope <= NOTHING * noise);
     provisional =
-      (PetscBool)(!enough && !plain && slope < 0. &&
+      (PetscBool)(!enough && !plain && (slope < 0. || circular) &&
                   n->provisional < (m->dynamic ? PROVISIONAL : PROVISIONAL_STATIC) &&
                   change < PETSC_INFINITY && to->ninverted <= from->ninverted && to->gaps <= from->gaps);
 
@@ -456,6 +461,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
     PetscCall(VecCopy(X, n->start));
     PetscCall(VecCopy(Y, n->step));
     n->slope = slope;
+    n->norm = from->norm;
     n->first = change;
     n->rise = 0.;
   }
