@@ -333,7 +333,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
   Iterate *from = &n->from, *to = &n->to, *best = &n->best;
   /* forces without a potential: steps that go up may be provisional, too */
-  const PetscBool circular = (PetscBool)(n->run->nonsymmetric.U && !m->dynamic && !m->npotential);
+  const PetscBool circulatory = (PetscBool)(n->run->nonsymmetric.U && !m->dynamic && !m->npotential);
   PetscBool enough, back, provisional, better,
     flat = PETSC_FALSE, guarded,
     plain = (PetscBool)(n->nblock > 0 || *s < 1.); /* a barrier is nothing to come back from */
@@ -370,7 +370,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
     /* enough; where it is too little to decide, or the step goes up at once, as forces without a potential may make it, the residual has to */
     total = n->provisional ? n->rise + change : change;
     goal = DECREASE * (n->provisional ? n->slope : *s * slope);
-    back = (PetscBool)(circular && n->provisional);
+    back = (PetscBool)(circulatory && n->provisional);
     enough = (PetscBool)(slope < 0. && goal < 0. && total <= goal);
     if (slope >= 0. || back || total <= noise)
       enough = (PetscBool)(enough || to->norm <= (1. - DECREASE * *s) * (back ? n->norm : from->norm));
@@ -379,7 +379,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
       (PetscBool)(*s == 1. && !enough && slope < 0. && total <= noise && -slope <= NOTHING * noise);
     if (slope < 0. && total <= noise) enough = (PetscBool)(enough || -slope <= NOTHING * noise);
     provisional =
-      (PetscBool)(!enough && !plain && (slope < 0. || circular) &&
+      (PetscBool)(!enough && !plain && (slope < 0. || circulatory) &&
                   n->provisional < (m->dynamic ? PROVISIONAL : PROVISIONAL_STATIC) &&
                   change < PETSC_INFINITY && to->ninverted <= from->ninverted && to->gaps <= from->gaps);
 

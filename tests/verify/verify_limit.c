@@ -9,7 +9,7 @@
   end of a load path.
 
   Follower pressure on part of a surface has no potential. Its load path ends at the limit as well, and a cantilever that it curls up takes the
-  iterations of Newton's method, where it meets indefinite symmetric parts of the tangent on the way.
+  iterations of Newton's method, where it meets indefinite symmetric parts of the tangent on the way. So does a strip that it pulls by its end.
 */
 #include "verify.h"
 
@@ -91,6 +91,38 @@ static PetscErrorCode check_curl(const char *element, PetscReal nu, PetscReal pr
   SB_CHECK(t.run->t_now == 1. && !t.run->rejected_total, "%s: load factor %g, %d rejected", element,
            (double)t.run->t_now, (int)t.run->rejected_total);
   SB_CHECK(t.run->newton_total <= iterations, "%s: %d Newton iterations", element, (int)t.run->newton_total);
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  A clamped strip that a follower pressure pulls by its end. It stays nearly straight, and the less stiff against bending the harder it is pulled: the lowest eigenvalue of the
+  tangent falls like exp(-k length), k^2 = load / (EI), that of its symmetric part is negative from the first load step on. Full steps go up, and the next one comes back.
+*/
+static PetscErrorCode check_pull(const char *element, PetscReal nu)
+{
+  const PetscReal energy = 1.3652e-2; /* J; 20 x 4 x 1 cells of P2, nu = 0.49 */
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(verify_open(&t,
+                        "-bodies a -body_a_mesh box:0.2,0.04,0.01:10,2,1 -body_a_material neohookean "
+                        "-body_a_young 1e4 -body_a_poisson %g -body_a_density 1000 -effects hold,pull "
+                        "-effect_hold_type fixed -effect_hold_on xmin -effect_pull_type pressure "
+                        "-effect_pull_on xmax -effect_pull_value -2000*t -time static -static_steps 20 "
+                        "-body_a_element %s",
+                        (double)nu, element));
+  t.run->want_energies = PETSC_TRUE;
+  PetscCall(verify_solve(&t, "pull"));
+  PetscCall(PetscPrintf(
+    PETSC_COMM_WORLD, "  pull, %s, nu %g: %d Newton iterations, %d rejected, strain energy %.5e J\n", element,
+    (double)nu, (int)t.run->newton_total, (int)t.run->rejected_total, (double)t.run->energies.strain));
+  SB_CHECK(t.run->t_now == 1. && !t.run->rejected_total, "%s: load factor %g, %d rejected", element,
+           (double)t.run->t_now, (int)t.run->rejected_total);
+  /* half as many again as there were */
+  SB_CHECK(t.run->newton_total < 250, "%s: %d Newton iterations", element, (int)t.run->newton_total);
+  /* P1 is too stiff by 6 % */
+  SB_CHECK_NEAR(t.run->energies.strain, energy, 0.08 * energy, "strain energy");
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -219,6 +251,9 @@ int main(int argc, char **argv)
   PetscCall(check_curl("p2", 0.3, 8e3, 110));
   /* the symmetric part of the tangent is not definite from load factors of 0.75 on */
   PetscCall(check_curl("p2", 0.4999, 1.2e3, 250));
+  PetscCall(check_pull("p1", 0.4999));
+  PetscCall(check_pull("cr", 0.49));
+  PetscCall(check_pull("p2", 0.49));
   PetscCall(check_branch(PETSC_FALSE, ARC));
   PetscCall(check_branch(PETSC_FALSE, ARC "-body_a_mesh box:1,1,1:1"));
   PetscCall(check_branch(PETSC_FALSE, ARC "-body_a_element cr"));
