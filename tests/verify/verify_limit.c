@@ -213,11 +213,13 @@ static PetscErrorCode check_restart(const char *first, const char *checkpoint, P
 {
   const char *folder = getenv("TMPDIR");
   char dir[256], more[VERIFY_TEXT];
+  int id = (int)getpid();
   TestScene t;
   Branch b, whole;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(dir, sizeof(dir), "%s/limit", folder ? folder : "/tmp"));
+  PetscCallMPI(MPI_Bcast(&id, 1, MPI_INT, 0, PETSC_COMM_WORLD));
+  PetscCall(PetscSNPrintf(dir, sizeof(dir), "%s/limit_%d", folder ? folder : "/tmp", id));
   PetscCall(PetscSNPrintf(more, sizeof(more), "%s " OUTPUT, first));
   PetscCall(open_branch(dir, PETSC_FALSE, more, &whole, &t));
   PetscCall(SbRunSolve(t.run));
