@@ -528,10 +528,16 @@ def table(folder):
     lines = ["| scene | what | tets | ranks | steps | end | crossed frames | iterations, median and most | rejected | smallest gap, m | energy made | CPU s | ms |",
              "|---|---|---|---|---|---|---|---|---|---|---|---|---|"]
     for name, c in CASES.items():
-        for ranks, (tets, steps, end, crossed, median, most, *rest) in sorted(rows.get(name, {}).items()):
-            first = ranks == min(rows[name])
-            lines.append(f"| {'`' + name + '`' if first else ''} | {c['what'] if first else ''} | {tets if first else ''} | {ranks} | {steps} | {end} | {crossed} | {median}, {most} | " +
-                         " | ".join(rest) + " |")
+        if name not in rows:
+            continue
+        # the worst of the numbers of ranks, but for the seconds of each
+        ranks, found = zip(*sorted(rows[name].items()))
+        tets, steps, end, crossed, median, most, rejected, gap, made, cpu, each = zip(*found)
+        largest = lambda values: max(values, key=float)
+        ends = "yes" if set(end) == {"yes"} else ", ".join(end)
+        gaps = [g for g in gap if g != "-"]
+        lines.append(f"| `{name}` | {c['what']} | {tets[0]} | {', '.join(map(str, ranks))} | {largest(steps)} | {ends} | {sum(map(int, crossed))} | {largest(median)}, {largest(most)} | "
+                     f"{largest(rejected)} | {min(gaps, key=float) if gaps else '-'} | {largest(made)} | {', '.join(cpu)} | {each[0]} |")
     return lines
 
 
