@@ -138,12 +138,12 @@ PetscErrorCode SbSpaceLinearisePressure(SbSpace space, Vec U, Vec step, PetscRea
 /*
   SbSpaceFollowJumps - makes the penalty of jumps of CR and DG as stiff as the state asks for (src/fem/jump.c).
 
-  Collective. Input: U, m; keep: nowhere less stiff than it was. Output: changed (or NULL): by a percent or more, somewhere. Until the next call the face terms are constant; at first they are those of the rest state.
+  Collective. Input: U, m; in_time: the energies of faces at U stay as they are, else they are those of whole jumps. Output: changed (or NULL): somewhere, without in_time by a percent or more. Until the next call the face terms are constant; at first they are those of the rest state.
 */
-PetscErrorCode SbSpaceFollowJumps(SbSpace space, Vec U, PetscBool keep, PetscBool *changed);
-/* How stiff it is, [ncell_owned] Pa, borrowed; NULL: it follows nothing. Not collective. And back, for a run that goes on; collective. */
-PetscErrorCode SbSpaceGetJumps(SbSpace space, const PetscReal **modulus);
-PetscErrorCode SbSpaceSetJumps(SbSpace space, const PetscReal modulus[]);
+PetscErrorCode SbSpaceFollowJumps(SbSpace space, Vec U, PetscBool in_time, PetscBool *changed);
+/* The stiffness that whole jumps at U would need for the energy of each face of a cell, k[4 ncell_owned], N/m; 0: no such face. And back, before SbSpaceFollowJumps(), for a run that goes on. Collective. */
+PetscErrorCode SbSpaceGetJumps(SbSpace space, Vec U, PetscReal k[]);
+PetscErrorCode SbSpaceSetJumps(SbSpace space, const PetscReal k[]);
 
 typedef enum { SB_MATRIX_AIJ, SB_MATRIX_BAIJ, SB_MATRIX_SBAIJ } SbMatrixKind; /* SBAIJ: one rank only */
 /* Preallocated matrix and the assembly plan. Collective. Caller destroys the matrix. */

@@ -13,18 +13,19 @@ PetscErrorCode SbLayoutDestroy(SbSpace space);
 typedef enum { SB_JUMP_STIFFNESS, SB_JUMP_DAMPING } SbJumpFactor;
 PetscErrorCode SbJumpCreate(SbSpace space, SbJump *jump);
 PetscErrorCode SbJumpDestroy(SbJump *jump);
-/* f[nnode][3] += (factor) K_F x; right on owned nodes. x[nnode][3] with ghosts. */
+/* f[nnode][3] += (factor) K_F x, as displacements less what the step leaves out of jumps; right on owned nodes. x[nnode][3] with ghosts. */
 void SbJumpAdd(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal f[]);
-/* 1/2 x . (factor) K_F x, this rank's part. */
+/* Its energy, 1/2 x . (factor) K_F x, this rank's part. */
 PetscReal SbJumpEnergy(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal body[]);
 /* node[nbatch][8][SB_BATCH] of the faces, borrowed; returns nbatch. */
 PetscInt SbJumpCliques(SbSpace space, const PetscInt **node);
-/* [ncell] Pa, what the penalty of jumps follows; borrowed. */
-PetscReal *SbJumpModulus(SbSpace space);
-/* Makes it what the state asks for, or, keep, what any before did: whether a cell on this rank asks for another than before. */
-PetscBool SbJumpFollow(SbSpace space, const PetscReal x[], PetscBool keep);
-/* Then the penalties: whether that of a face on this rank is another by a percent or more. */
-PetscBool SbJumpRenew(SbSpace space);
+/* What the penalty of jumps follows is made that of the state: whether a cell on this rank asks for another than before. */
+PetscBool SbJumpFollow(SbSpace space, const PetscReal x[], PetscBool in_time);
+/* Then the penalties; with x the energies of faces there stay as they were, else they are those of whole jumps. changed: set where one on this rank is another by a percent or more. */
+PetscErrorCode SbJumpRenew(SbSpace space, const PetscReal x[], PetscBool *changed);
+/* k[4 ncell_owned], N/m: the stiffness that whole jumps at x would need for the energy of each face of a cell; and back, k[4 ncell] with ghosts, before SbJumpRenew(). */
+void SbJumpStiffness(SbSpace space, const PetscReal x[], PetscReal k[]);
+void SbJumpSetStiffness(SbSpace space, const PetscReal k[]);
 /* The matrix of the face in lane l of batch b, times the 3x3 identity; zero in padding. */
 void SbJumpMatrix(SbSpace space, PetscInt b, PetscInt l, PetscReal K[8][8]);
 

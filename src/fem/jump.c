@@ -24,9 +24,13 @@
 
     kappa1 = gamma1 H(2 m |F| / V),   m = max(mu, FOLLOW max_ij -(P_i + P_j) / (s_i + s_j)),
 
-  with the state before the step, so that within a step the terms are constant, and their energy a quadratic one. With Newmark, which damps
-  nothing, m never falls: a penalty that goes up and down with the waves of pressure is a pump, which blew up a cube pressed to a fifth of its height. A dependence on the state of the
+  with the state before the step, so that within a step the terms are constant, and their energy a quadratic one. A dependence on the state of the
   step itself would have to be differentiated: the energy of jumps would become a pressure of its own, lambda times as large as it should be.
+
+  In time that is the rate of a force, and twice as large: from step to step the energy of a face stays as it was, that of [u] - r, r the part of the jump
+  at the start of the step that leaves it. A kappa1 for whole jumps would put in 1/2 (kappa1' - kappa1) int |[u]|^2 with every step, and pump where it goes
+  up and down with waves of pressure. So that a body at rest has no force, that of a jump is along it, and between that of m = mu and that of
+  kappa1: what the bounds cut is lost. Load steps, which may be long, have r = 0: their end shall depend on the loads alone.
 
   A boundary face with a support (layout.c): the other side is constant, the displacement of the support, and infinitely
   stiff. H(k) is 2 k then; there is no kappa1, because supports prescribe means.
@@ -34,7 +38,11 @@
 #include "fem_impl.h"
 #include "sbkernel.h"
 
-#define FOLLOW 4.    /* factor on the negative stiffness that the penalty follows; docs/reference/theory.md */
+#define FOLLOW \
+  4. /* factor on the negative stiffness that the penalty of load steps follows; docs/reference/theory.md */
+#define RATE \
+  2. /* and on that, of steps in time: a force that grows with the jump has the mean of its rates */
+#define LEAST 1e-3   /* sum of two stretches below which a cell is inverted or a line, and has no stiffness against twists */
 #define RENEWED 0.01 /* relative change of a penalty that counts as one */
 
 /* A face between two local cells; cell[1] = SUPPORT: between a cell and a support. */
@@ -53,6 +61,7 @@ struct _p_SbJump {
   PetscInt *n;      /* [nbatch] faces in it */
   PetscInt *node;   /* [nbatch][8][SB_BATCH]; padding lanes repeat the first face */
   SbPack *c0, *c1;  /* [nbatch] N/m; zero in padding */
+  SbPack *r;        /* [nbatch][9] m; NULL before a kappa1 follows in a dynamic run */
   SbPack *share;    /* [nbatch] how much of a face's energy this rank counts: 1, or 1/2 between ranks */
 };
 
@@ -81,8 +90,8 @@ static inline PetscReal harmonic(PetscReal a, PetscReal b)
   return a + b > 0. ? 2. * a * b / (a + b) : 0.;
 }
 
-/* c0 and c1 of a face. */
-static void face_factors(SbSpace s, SbJump j, const Face *face, PetscReal *c0, PetscReal *c1)
+/* c0 and c1 of a face; at rest: with m = mu. */
+static void face_factors(SbSpace s, SbJump j, const Face *face, PetscBool rest, PetscReal *c0, PetscReal *c1)
 {
   const PetscInt *v = s->mesh->cell + 4 * face->cell[0], f = face->face[0];
   const PetscReal *x = s->mesh->x, *corner = x + 3 * v[(f + 1) % 4];
@@ -95,9 +104,10 @@ static void face_factors(SbSpace s, SbJump j, const Face *face, PetscReal *c0, P
   area = 0.5 * PetscSqrtReal(SbDot3(n, n));
   for (int side = 0; side < (face->cell[1] == SUPPORT ? 1 : 2); side++) {
     const PetscInt cell = face->cell[side];
+    const SbMaterial law = s->region[j->region_of[cell]].material;
 
-    k1[side] = 2. * j->modulus[cell] * area / j->V[cell];
-    k0[side] = SbMaterialWaveModulus(s->region[j->region_of[cell]].material) * area / j->V[cell];
+    k1[side] = 2. * (rest ? law->ops.shear_modulus(law) : j->modulus[cell]) * area / j->V[cell];
+    k0[side] = SbMaterialWaveModulus(law) * area / j->V[cell];
   }
   if (face->cell[1] == SUPPORT) {
     *c1 = 0.;
@@ -173,7 +183,7 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
       for (PetscInt lane = l; lane < (l ? l + 1 : SB_BATCH); lane++)
         j->node[(8 * b + k) * SB_BATCH + lane] = node[k];
     }
-    face_factors(s, j, face, &j->c0[b][l], &j->c1[b][l]);
+    face_factors(s, j, face, PETSC_TRUE, &j->c0[b][l], &j->c1[b][l]);
     for (int side = 0; side < 2; side++) {
       const PetscInt cell = face->cell[face->cell[1] == SUPPORT ? 0 : side];
 
@@ -187,8 +197,9 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Raises the moduli of n cells to what twists ask for at F, under the first Piola stress P. */
-static void follow_twists(PetscInt n, const SbPack F[9], const SbPack P[9], PetscReal modulus[])
+/* Raises the moduli of n cells to what twists ask for, times a factor, at F, under the first Piola stress P. */
+static void follow_twists(PetscInt n, const SbPack F[9], const SbPack P[9], PetscReal factor,
+                          PetscReal modulus[])
 {
   SbPack U[9], stretch[3], V[9];
 
@@ -200,16 +211,16 @@ static void follow_twists(PetscInt n, const SbPack F[9], const SbPack P[9], Pets
       principal[k % 3] += U[3 * (k / 9) + k % 3][l] * P[k / 3][l] * V[3 * (k / 3 % 3) + k % 3][l];
     for (int k = 0; k < 3; k++) {
       const PetscReal sum = stretch[k][l] + stretch[(k + 1) % 3][l],
-                      twist = sum > 0. ? (principal[k] + principal[(k + 1) % 3]) / sum : 0.;
+                      twist = sum > LEAST ? (principal[k] + principal[(k + 1) % 3]) / sum : 0.;
 
-      modulus[l] = PetscMax(modulus[l], -FOLLOW * twist);
+      modulus[l] = PetscMax(modulus[l], -factor * twist);
     }
   }
 }
 
-/* The modulus m of each cell of a batch, from its state; keep: not less than it was. Whether one is another than before. */
+/* The modulus m of each cell of a batch, from its state. Whether one is another than before. */
 static PetscBool follow_batch(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[],
-                              PetscBool keep)
+                              PetscReal factor)
 {
   const SbMaterial m = region->material;
   const PetscReal mu = m->ops.shear_modulus(m);
@@ -220,7 +231,7 @@ static PetscBool follow_batch(SbSpace s, const SbRegion *region, PetscInt b, con
 
   for (PetscInt l = 0; l < n; l++) {
     before[l] = modulus[l];
-    if (!keep) modulus[l] = mu;
+    modulus[l] = mu;
   }
   sb_gather_strain(s, region, b, x, u);
   SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, F);
@@ -233,59 +244,10 @@ static PetscBool follow_batch(SbSpace s, const SbRegion *region, PetscInt b, con
     for (int k = 0; k < 9; k++) square += P[k][l] * P[k][l];
     largest = PetscMax(largest, square);
   }
-  if (largest >= 0.5 * PetscSqr(mu / FOLLOW)) follow_twists(n, (const SbPack *)F, (const SbPack *)P, modulus);
+  if (largest >= 0.5 * PetscSqr(mu / factor))
+    follow_twists(n, (const SbPack *)F, (const SbPack *)P, factor, modulus);
   for (PetscInt l = 0; l < n; l++) changed = (PetscBool)(changed || modulus[l] != before[l]);
   return changed;
-}
-
-PetscReal *SbJumpModulus(SbSpace s)
-{
-  return s->jump->modulus;
-}
-
-PetscBool SbJumpRenew(SbSpace s)
-{
-  const SbJump j = s->jump;
-  PetscBool changed = PETSC_FALSE;
-
-  for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
-    for (PetscInt l = 0; l < j->n[b]; l++, i++) {
-      const PetscReal before = j->c1[b][l];
-
-      face_factors(s, j, &j->face[i], &j->c0[b][l], &j->c1[b][l]);
-      if (PetscAbsReal(j->c1[b][l] - before) > RENEWED * before) changed = PETSC_TRUE;
-    }
-  }
-  return changed;
-}
-
-PetscBool SbJumpFollow(SbSpace s, const PetscReal x[], PetscBool keep)
-{
-  PetscBool any = PETSC_FALSE;
-
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
-    const PetscBool jumps = (PetscBool)(!region->element->nodes_per[0] && !region->material->linear);
-
-    for (PetscInt b = region->bstart; jumps && b < region->bend; b++) {
-      if (follow_batch(s, region, b, x, keep)) any = PETSC_TRUE;
-    }
-  }
-  return any;
-}
-
-PetscErrorCode SbJumpDestroy(SbJump *jump)
-{
-  SbJump j = *jump;
-
-  PetscFunctionBeginUser;
-  if (!j) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree3(j->region_of, j->V, j->modulus));
-  PetscCall(PetscFree(j->face));
-  PetscCall(PetscFree3(j->region, j->n, j->node));
-  PetscCall(PetscFree3(j->c0, j->c1, j->share));
-  PetscCall(PetscFree(*jump));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Jumps at the three vertices, J[3 i + c], and their sum. */
@@ -302,18 +264,120 @@ SB_INLINE void gather_jumps(const PetscInt node[8 * SB_BATCH], const PetscReal x
   }
 }
 
-/* t[8][3] of each lane: forces on the nodes. */
+/* How much of the jumps J of a face at x its force belongs to, along them. */
+static PetscReal held_part(SbJump j, PetscInt b, PetscInt l, const PetscReal x[], PetscReal J[9])
+{
+  PetscReal sum[3], square = 0., along = 0.;
+
+  gather_jumps(j->node + 8 * SB_BATCH * b, x, l, J, sum);
+  for (int k = 0; k < 9; k++) {
+    square += J[k] * J[k];
+    along += (J[k] - (j->r ? j->r[9 * b + k][l] : 0.)) * J[k];
+  }
+  return square > 0. ? PetscMax(along / square, 0.) : 1.;
+}
+
+PetscErrorCode SbJumpRenew(SbSpace s, const PetscReal x[], PetscBool *changed)
+{
+  const SbJump j = s->jump;
+  PetscReal J[9];
+
+  PetscFunctionBeginUser;
+  if (x && !j->r) PetscCall(PetscCalloc1(9 * j->nbatch, &j->r));
+  for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
+    for (PetscInt l = 0; l < j->n[b]; l++, i++) {
+      const PetscReal before = j->c1[b][l], part = x ? held_part(j, b, l, x, J) : 1.;
+      PetscReal c0, least, held;
+
+      face_factors(s, j, &j->face[i], PETSC_FALSE, &j->c0[b][l], &j->c1[b][l]);
+      if (PetscAbsReal(j->c1[b][l] - before) > RENEWED * before) *changed = PETSC_TRUE;
+      if (!x || j->c1[b][l] == 0.) continue;
+
+      /* the part of the jumps that has the energy of before */
+      face_factors(s, j, &j->face[i], PETSC_TRUE, &c0, &least);
+      held = PetscClipInterval(part * PetscSqrtReal(before / j->c1[b][l]), least / j->c1[b][l], 1.);
+      for (int k = 0; k < 9; k++) j->r[9 * b + k][l] = (1. - held) * J[k];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbJumpStiffness(SbSpace s, const PetscReal x[], PetscReal k[])
+{
+  const SbJump j = s->jump;
+  PetscReal J[9];
+
+  for (PetscInt i = 0; i < 4 * s->mesh->ncell_owned; i++) k[i] = 0.;
+  for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
+    for (PetscInt l = 0; l < j->n[b]; l++, i++) {
+      for (int side = 0; side < (j->face[i].cell[1] == SUPPORT ? 1 : 2); side++) {
+        const PetscInt cell = j->face[i].cell[side];
+
+        if (cell < s->mesh->ncell_owned)
+          k[4 * cell + j->face[i].face[side]] = j->c1[b][l] * PetscSqr(held_part(j, b, l, x, J));
+      }
+    }
+  }
+}
+
+void SbJumpSetStiffness(SbSpace s, const PetscReal k[])
+{
+  const SbJump j = s->jump;
+
+  for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
+    for (PetscInt l = 0; l < j->n[b]; l++, i++) {
+      const Face *face = &j->face[i];
+
+      if (face->cell[1] == SUPPORT) continue;
+      /* the owner of a cell need not know each of its faces */
+      j->c1[b][l] = PetscMax(k[4 * face->cell[0] + face->face[0]], k[4 * face->cell[1] + face->face[1]]);
+    }
+  }
+}
+
+PetscBool SbJumpFollow(SbSpace s, const PetscReal x[], PetscBool in_time)
+{
+  PetscBool any = PETSC_FALSE;
+
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+    const PetscBool jumps = (PetscBool)(!region->element->nodes_per[0] && !region->material->linear);
+
+    for (PetscInt b = region->bstart; jumps && b < region->bend; b++) {
+      if (follow_batch(s, region, b, x, in_time ? RATE * FOLLOW : FOLLOW)) any = PETSC_TRUE;
+    }
+  }
+  return any;
+}
+
+PetscErrorCode SbJumpDestroy(SbJump *jump)
+{
+  SbJump j = *jump;
+
+  PetscFunctionBeginUser;
+  if (!j) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree3(j->region_of, j->V, j->modulus));
+  PetscCall(PetscFree(j->face));
+  PetscCall(PetscFree3(j->region, j->n, j->node));
+  PetscCall(PetscFree3(j->c0, j->c1, j->share));
+  PetscCall(PetscFree(j->r));
+  PetscCall(PetscFree(*jump));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* t[8][3] of each lane: forces on the nodes, of jumps less r. */
 SB_KERNEL static void jump_forces(const PetscInt node[restrict 8 * SB_BATCH],
                                   const PetscReal c0[restrict SB_BATCH],
-                                  const PetscReal c1[restrict SB_BATCH], const PetscReal x[restrict],
-                                  SbPack t[restrict 12])
+                                  const PetscReal c1[restrict SB_BATCH], const SbPack r[restrict 9],
+                                  const PetscReal x[restrict], SbPack t[restrict 12])
 {
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal J[9], sum[3];
 
     gather_jumps(node, x, l, J, sum);
+    for (int k = 0; k < 9; k++) J[k] -= r[k][l];
     for (int c = 0; c < 3; c++) {
-      const PetscReal common = (c1[l] + c0[l]) * sum[c];
+      const PetscReal common = c1[l] * (J[c] + J[3 + c] + J[6 + c]) + c0[l] * sum[c];
       const PetscReal t0 = c1[l] * J[c] + common, t1 = c1[l] * J[3 + c] + common,
                       t2 = c1[l] * J[6 + c] + common, all = t0 + t1 + t2;
 
@@ -323,6 +387,14 @@ SB_KERNEL static void jump_forces(const PetscInt node[restrict 8 * SB_BATCH],
       t[9 + c][l] = all - 3. * t2;
     }
   }
+}
+
+/* What is left out of the jumps of a batch; of velocities nothing. */
+static const SbPack *left_out(SbJump j, PetscInt b, SbJumpFactor factor)
+{
+  static const SbPack nothing[9];
+
+  return factor == SB_JUMP_STIFFNESS && j->r ? (const SbPack *)(j->r + 9 * b) : nothing;
 }
 
 void SbJumpAdd(SbSpace s, const PetscReal x[], SbJumpFactor factor, PetscReal f[])
@@ -335,7 +407,7 @@ void SbJumpAdd(SbSpace s, const PetscReal x[], SbJumpFactor factor, PetscReal f[
     SbPack t[12];
 
     if (scale == 0.) continue;
-    jump_forces(node, j->c0[b], j->c1[b], x, t);
+    jump_forces(node, j->c0[b], j->c1[b], left_out(j, b, factor), x, t);
     for (PetscInt l = 0; l < j->n[b]; l++) {
       for (int k = 0; k < 4; k++) {
         PetscReal *plus = f + 3 * node[k * SB_BATCH + l], *minus = f + 3 * node[(4 + k) * SB_BATCH + l];
@@ -357,14 +429,16 @@ PetscReal SbJumpEnergy(SbSpace s, const PetscReal x[], SbJumpFactor factor, Pets
   for (PetscInt b = 0; b < j->nbatch; b++) {
     const PetscReal scale = factor == SB_JUMP_STIFFNESS ? 1. : s->beta[s->region[j->region[b]].body],
                     before = energy;
+    const SbPack *r = left_out(j, b, factor);
 
     for (int l = 0; l < j->n[b] && scale != 0.; l++) {
       PetscReal J[9], sum[3], squares = 0.;
 
       gather_jumps(j->node + 8 * SB_BATCH * b, x, l, J, sum);
+      for (int k = 0; k < 9; k++) J[k] -= r[k][l];
       for (int k = 0; k < 9; k++) squares += J[k] * J[k];
-      energy += 0.5 * scale * j->share[b][l] *
-                (j->c1[b][l] * squares + (j->c1[b][l] + j->c0[b][l]) * SbDot3(sum, sum));
+      for (int k = 0; k < 3; k++) squares += PetscSqr(J[k] + J[3 + k] + J[6 + k]);
+      energy += 0.5 * scale * j->share[b][l] * (j->c1[b][l] * squares + j->c0[b][l] * SbDot3(sum, sum));
     }
     if (body) body[s->region[j->region[b]].body] += energy - before;
   }

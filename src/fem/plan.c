@@ -206,7 +206,7 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, PetscBool keep, PetscBool *changed)
+PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, PetscBool in_time, PetscBool *changed)
 {
   const PetscReal *x;
   PetscBool any, mine = PETSC_FALSE;
@@ -215,30 +215,36 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, PetscBool keep, PetscBool *c
   if (changed) *changed = PETSC_FALSE;
   if (!s->jump || s->linear) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbSpaceGetLocalRead(s, U, &x));
-  any = SbJumpFollow(s, x, keep);
-  if (any) mine = SbJumpRenew(s);
+  any = SbJumpFollow(s, x, in_time);
+  if (any) PetscCall(SbJumpRenew(s, in_time ? x : NULL, &mine));
   PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
+  if (in_time) mine = any;
   if (changed) PetscCallMPI(MPI_Allreduce(&mine, changed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
   if (s->plan && any) sum_face_terms(s, s->plan);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSpaceGetJumps(SbSpace s, const PetscReal **modulus)
+PetscErrorCode SbSpaceGetJumps(SbSpace s, Vec U, PetscReal k[])
 {
+  const PetscReal *x;
+
   PetscFunctionBeginUser;
-  *modulus = s->jump && !s->linear ? SbJumpModulus(s) : NULL;
+  PetscCall(SbSpaceGetLocalRead(s, U, &x));
+  SbJumpStiffness(s, x, k);
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSpaceSetJumps(SbSpace s, const PetscReal modulus[])
+PetscErrorCode SbSpaceSetJumps(SbSpace s, const PetscReal k[])
 {
-  PetscReal *own = SbJumpModulus(s);
+  PetscReal *all;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscArraycpy(own, modulus, s->mesh->ncell_owned));
-  PetscCall(SbMeshBroadcastCells(s->mesh, 1, MPIU_REAL, own));
-  (void)SbJumpRenew(s);
-  if (s->plan) sum_face_terms(s, s->plan);
+  PetscCall(PetscMalloc1(4 * s->mesh->ncell, &all));
+  PetscCall(PetscArraycpy(all, k, 4 * s->mesh->ncell_owned));
+  PetscCall(SbMeshBroadcastCells(s->mesh, 4, MPIU_REAL, all));
+  SbJumpSetStiffness(s, all);
+  PetscCall(PetscFree(all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

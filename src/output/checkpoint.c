@@ -111,23 +111,30 @@ static PetscErrorCode write_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* With Newmark the penalty of jumps never falls, so that what it was is part of the state; written like the path, with a checksum of its own. */
+/* Whether what faces hold goes on from step to step, so that it is part of the state. */
+static PetscBool faces_remember(SbRun run)
+{
+  const SbModel m = run->model;
+
+  return (PetscBool)(m->dynamic && run->J && m->space->jump && !m->space->linear);
+}
+
+/* It is written like the path, with a checksum of its own. */
 static PetscErrorCode write_jumps(SbRun run, SbOutput out, SbH5 *h)
 {
-  const PetscReal *modulus;
-  PetscReal *slice;
+  PetscReal *slice, *own;
   uint64_t sum;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceGetJumps(run->model->space, &modulus));
-  if (!modulus || run->preset != SB_TIME_NEWMARK) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(out->cell.n, &slice));
-  PetscCall(SbOrderGather(&out->cell, 1, modulus, slice));
+  if (!faces_remember(run)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc2(4 * out->cell.n, &slice, 4 * run->model->mesh->ncell_owned, &own));
+  PetscCall(SbSpaceGetJumps(run->model->space, run->U, own));
+  PetscCall(SbOrderGather(&out->cell, 4, own, slice));
   PetscCall(
-    SbH5WriteSlice(h, h->file, "jumps", "Pa", &out->cell, 1, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, slice));
-  PetscCall(checksum_of(&out->cell, 1, 0, slice, &sum));
+    SbH5WriteSlice(h, h->file, "jumps", "N/m", &out->cell, 4, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, slice));
+  PetscCall(checksum_of(&out->cell, 4, 0, slice, &sum));
   PetscCall(SbH5PutInt(h, h->file, "jumps_checksum", (int64_t)sum));
-  PetscCall(PetscFree(slice));
+  PetscCall(PetscFree2(slice, own));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -301,23 +308,21 @@ static PetscErrorCode read_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *a
 /* Files of other integrators have none. */
 static PetscErrorCode read_jumps(SbRun run, SbOutput out, SbH5 *h, PetscBool *ok)
 {
-  const PetscReal *modulus;
   PetscReal *slice, *owned;
   uint64_t sum;
   int64_t own = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceGetJumps(run->model->space, &modulus));
-  if (!modulus || run->preset != SB_TIME_NEWMARK || H5Lexists(h->file, "jumps", H5P_DEFAULT) <= 0)
+  if (!faces_remember(run) || H5Lexists(h->file, "jumps", H5P_DEFAULT) <= 0)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc2(out->cell.n, &slice, run->model->mesh->ncell_owned, &owned));
-  PetscCall(SbH5ReadSlice(h, "jumps", &out->cell, 1, slice, ok));
+  PetscCall(PetscMalloc2(4 * out->cell.n, &slice, 4 * run->model->mesh->ncell_owned, &owned));
+  PetscCall(SbH5ReadSlice(h, "jumps", &out->cell, 4, slice, ok));
   SbH5GetInt(h->file, "jumps_checksum", &own, ok);
   if (*ok) {
-    PetscCall(checksum_of(&out->cell, 1, 0, slice, &sum));
+    PetscCall(checksum_of(&out->cell, 4, 0, slice, &sum));
     if (own != (int64_t)sum) *ok = PETSC_FALSE;
   }
-  if (*ok) PetscCall(SbOrderScatter(&out->cell, 1, slice, owned));
+  if (*ok) PetscCall(SbOrderScatter(&out->cell, 4, slice, owned));
   if (*ok) PetscCall(SbSpaceSetJumps(run->model->space, owned));
   PetscCall(PetscFree2(slice, owned));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -286,6 +286,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
                        .complete = complete,
                        .ctx = ts};
   PetscInt cuts = 0;
+  PetscBool jumps;
 
   PetscFunctionBeginUser;
   if (so->nominal == 0.) so->nominal = ts->time_step;
@@ -293,7 +294,10 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
   /* a restarted run brings its acceleration along: that of generalized-alpha does not follow from the state */
   if (!so->started && so->run->step0 == 0 && so->set.method != SB_METHOD_EULER_IMPLICIT)
     PetscCall(SbFormAcceleration(so->run, ts->ptime, ts->vec_sol, ts->vec_dot, so->run->A));
-  if (!so->started && so->own0)
+
+  /* from here on the faces of CR and DG have other forces */
+  PetscCall(SbRunFollowJumps(so->run, &jumps));
+  if (so->own0 && (!so->started || jumps))
     PetscCall(SbNewmarkOwn(so->run, ts->ptime, ts->vec_sol, ts->vec_dot, so->run->A, so->own0));
   so->started = PETSC_TRUE;
 

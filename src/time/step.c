@@ -6,15 +6,29 @@
 */
 #include "time_impl.h"
 
+PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed)
+{
+  const SbModel m = run->model;
+
+  PetscFunctionBeginUser;
+  *changed = PETSC_FALSE;
+  if (!run->J) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbSpaceFollowJumps(m->space, run->U, m->dynamic, changed));
+  if (!m->dynamic || !*changed) PetscFunctionReturn(PETSC_SUCCESS);
+
+  /* what was taken from the forces before */
+  PetscCall(SbRunRestartAcceleration(run));
+  if (run->reaction) PetscCall(SbRunReactions(run, run->t_now, run->reaction));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 {
   SNESConvergedReason reason;
-  const PetscBool keep = (PetscBool)(run->preset == SB_TIME_NEWMARK);
   PetscBool again = PETSC_TRUE;
 
   PetscFunctionBeginUser;
-  /* explicit integrators have no matrix, and a step that is stable for the penalty of the rest state; without damping it never falls (src/fem/jump.c) */
-  if (run->J) PetscCall(SbSpaceFollowJumps(run->model->space, a->U0, keep, NULL));
+  if (!run->model->dynamic) PetscCall(SbSpaceFollowJumps(run->model->space, a->U0, PETSC_FALSE, NULL));
   run->goes_on = PETSC_FALSE;
   for (int solves = 0; again; solves++) {
     SbSolvedStep step;
@@ -65,11 +79,12 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
   const PetscReal begun = MPI_Wtime();
   const SbModel m = run->model;
   SbStage stage = {.t = t, .dt = dt, .step = step, .shift_k = 1.};
+  PetscBool jumps;
   SbStep now = {.step = step, .t = t, .dt = dt, .t_end = run->t_end, .U = run->U, .V = run->V, .A = run->A};
 
   PetscFunctionBeginUser;
-  if (first && run->J)
-    PetscCall(SbSpaceFollowJumps(m->space, run->U, (PetscBool)(run->preset == SB_TIME_NEWMARK), NULL));
+  run->t_now = t;
+  if (first) PetscCall(SbRunFollowJumps(run, &jumps));
 
   /* a step that was seen already: there was no other after it */
   if (run->seen.U && run->seen.step == step) {
@@ -88,7 +103,6 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
 
   /* effects keep their history */
   run->step_now = step;
-  run->t_now = t;
   if (!first && m->naccept) {
     PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
     if (run->V) PetscCall(SbSpaceGetLocalRead(m->space, run->V, &stage.v));

@@ -48,6 +48,9 @@ typedef struct {
   PetscErrorCode (*complete)(void *ctx, SNESConvergedReason reason, SbSolvedStep *step, PetscBool *ok);
   void *ctx;
 } SbAttempt;
+/* The penalty of jumps of CR and DG is made what the state asks for (src/fem/jump.c); where that changes forces, accelerations and reactions that were taken from them too. Explicit integrators have no
+   matrix, and a step that is stable for the penalty of the rest state. Collective. */
+PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed);
 /* ok: the step can be accepted. Collective. */
 PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *attempt, PetscBool *ok);
 PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt,

@@ -67,7 +67,7 @@ const HardCase HardCasesRecovery[] = {
   RECOVERY("mirror", MIRROR, HardStartMirror, "p1", "corotated", "3", 0),
   RECOVERY("mirror", MIRROR, HardStartMirror, "p1", "neohookean", "3", 1),
   UNFOLDS("mirror", MIRROR, HardStartMirror, "cr", "corotated", "2", 0),
-  UNFOLDS("mirror", MIRROR, HardStartMirror, "dg", "corotated", "2", 0),
+  UNFOLDS("mirror", MIRROR, HardStartMirror, "dg", "corotated", "2", 1),
   STAYS("mirror", MIRROR, HardStartMirror, "stvk"),
   STAYS("point", "all vertices at exactly one point", HardStartExactPoint, "stvk"),
   RECOVERY("flat", FLAT, HardStartFlat, "p1", "corotated", "3", 1),

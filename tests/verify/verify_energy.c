@@ -6,6 +6,7 @@
     decay      implicit Euler on a linear body: energy falls in every step, and what the account calls the integrator's
                loss is exactly 1/2 dv.M dv + 1/2 du.K du of the steps
     account    a nonlinear body, loaded, driven and damped: what is missing in the account falls with h^2 for Newmark
+    swing      a soft bar of CR or DG lets go under its weight: the penalty of jumps follows the pressure of bending, and gives no energy
     momentum   free flight with spin: linear momentum to rounding with every integrator; angular momentum to rounding with
                symplectic Euler, whose step cannot change it, else to the order of the method
 */
@@ -161,6 +162,7 @@ static PetscErrorCode missing(const char *preset, const char *element, const cha
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* order 0: none, as faces of CR and DG lose a little where their force leaves its bounds. */
 static PetscErrorCode check_account(const char *preset, const char *element, const char *law, int order,
                                     PetscReal bound)
 {
@@ -171,7 +173,51 @@ static PetscErrorCode check_account(const char *preset, const char *element, con
   PetscCall(missing(preset, element, law, 0.00125, &loss[1]));
   SB_CHECK(PetscAbsReal(loss[1]) < bound, "%s, %s, %s: %g of the work is missing", preset, element, law,
            (double)loss[1]);
-  SB_CHECK_NEAR(PetscLog2Real(PetscAbsReal(loss[0] / loss[1])), order, 0.3, preset);
+  if (order) SB_CHECK_NEAR(PetscLog2Real(PetscAbsReal(loss[0] / loss[1])), order, 0.3, preset);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ swing */
+
+typedef struct {
+  PetscReal least, largest; /* J; of the integrator's loss, and of the strain energy */
+} Swing;
+
+static PetscErrorCode watch_swing(SbRun run, const SbStep *step, void *ctx)
+{
+  Swing *w = (Swing *)ctx;
+
+  PetscFunctionBeginUser;
+  (void)run;
+  w->least = PetscMin(w->least, step->energies.integrator_loss);
+  w->largest = PetscMax(w->largest, step->energies.strain);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_swing(const char *element)
+{
+  Swing w = {0};
+  TestScene t;
+  char text[VERIFY_TEXT];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(
+    text, sizeof(text),
+    "-bodies a -body_a_mesh box:0.4,0.1,0.1:2 -body_a_element %s -body_a_material neohookean -body_a_young "
+    "3e4 -body_a_poisson 0.45 -body_a_density 1000 -effects gravity,clamp -effect_gravity_vector 0,0,-9.81 "
+    "-effect_clamp_type fixed -effect_clamp_on xmin -time newmark -ts_dt 0.005 -ts_max_time 1",
+    element));
+  PetscCall(test_scene_open(text, &t));
+  t.run->want_energies = PETSC_TRUE;
+  PetscCall(SbRunAddMonitor(t.run, watch_swing, &w));
+  PetscCall(verify_solve(&t, "swing"));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  swing, %s: strain energy up to %.2f J, given %.1e J, lost %.1e J\n", element,
+                        (double)w.largest, (double)-w.least, (double)t.run->energies.integrator_loss));
+  SB_CHECK(-w.least < 5e-3 * w.largest, "%s: %g J were given", element, (double)-w.least);
+  SB_CHECK(t.run->energies.integrator_loss < 0.02 * w.largest, "%s: %g J were lost", element,
+           (double)t.run->energies.integrator_loss);
+  PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -247,9 +293,11 @@ int main(int argc, char **argv)
   PetscCall(check_decay("p2", 0.002));
   PetscCall(check_account("newmark", "p1", "corotated", 2, 1e-3));
   PetscCall(check_account("euler_implicit", "p1", "corotated", 1, 0.1));
-  PetscCall(check_account("newmark", "cr", "corotated", 2, 1e-3));
-  PetscCall(check_account("newmark", "dg", "corotated", 2, 1e-3));
+  PetscCall(check_account("newmark", "cr", "corotated", 0, 2e-4));
+  PetscCall(check_account("newmark", "dg", "corotated", 0, 2e-4));
   PetscCall(check_account("newmark", "p2", "corotated", 2, 1e-3));
+  PetscCall(check_swing("cr"));
+  PetscCall(check_swing("dg"));
   PetscCall(check_flight("euler_implicit", "p1", "corotated", 2e-3, 1));
   PetscCall(check_flight("newmark", "p1", "corotated", 2e-3, 2));
   PetscCall(check_flight("genalpha", "p1", "stvk", 2e-3, 2));
