@@ -138,7 +138,7 @@ PetscErrorCode SbSpaceLinearisePressure(SbSpace space, Vec U, Vec step, PetscRea
 /*
   SbSpaceFollowJumps - makes the penalty of jumps of CR and DG as stiff as the state asks for (src/fem/jump.c).
 
-  Collective. Input: U, m; in_time: the energies of faces at U stay as they are, else they are those of whole jumps. Output: changed (or NULL): somewhere, without in_time by a percent or more. Until the next call the face terms are constant; at first they are those of the rest state.
+  Collective. Input: U, m; in_time: the energies of faces at U stay as they are within bounds, else they are those of whole jumps. Output: changed (or NULL): somewhere, without in_time by a percent or more. Until the next call the face terms are constant; at first they are those of the rest state.
 */
 PetscErrorCode SbSpaceFollowJumps(SbSpace space, Vec U, PetscBool in_time, PetscBool *changed);
 /* The stiffness that whole jumps at U would need for the energy of each face of a cell, k[4 ncell_owned], N/m; 0: no such face. And back, before SbSpaceFollowJumps(), for a run that goes on. Collective. */

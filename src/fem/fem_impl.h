@@ -21,8 +21,10 @@ PetscReal SbJumpEnergy(SbSpace space, const PetscReal x[], SbJumpFactor factor, 
 PetscInt SbJumpCliques(SbSpace space, const PetscInt **node);
 /* What the penalty of jumps follows is made that of the state: whether a cell on this rank asks for another than before. */
 PetscBool SbJumpFollow(SbSpace space, const PetscReal x[], PetscBool in_time);
-/* Then the penalties; with x the energies of faces there stay as they were, else they are those of whole jumps. changed: set where one on this rank is another by a percent or more. */
-PetscErrorCode SbJumpRenew(SbSpace space, const PetscReal x[], PetscBool *changed);
+/* Whether this is the first call, and SbJumpSetStiffness() has not been called. */
+PetscBool SbJumpBegin(SbSpace space);
+/* Then the penalties; with x the energies of faces there stay as they were, or, first, their forces; else they are those of whole jumps. changed: set where one on this rank is another by a percent or more. */
+PetscErrorCode SbJumpRenew(SbSpace space, const PetscReal x[], PetscBool first, PetscBool *changed);
 /* k[4 ncell_owned], N/m: the stiffness that whole jumps at x would need for the energy of each face of a cell; and back, k[4 ncell] with ghosts, before SbJumpRenew(). */
 void SbJumpStiffness(SbSpace space, const PetscReal x[], PetscReal k[]);
 void SbJumpSetStiffness(SbSpace space, const PetscReal k[]);

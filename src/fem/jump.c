@@ -30,7 +30,8 @@
   In time that is the rate of a force, and twice as large: from step to step the energy of a face stays as it was, that of [u] - r, r the part of the jump
   at the start of the step that leaves it. A kappa1 for whole jumps would put in 1/2 (kappa1' - kappa1) int |[u]|^2 with every step, and pump where it goes
   up and down with waves of pressure. So that a body at rest has no force, that of a jump is along it, and between that of m = mu and that of
-  kappa1: what the bounds cut is lost. Load steps, which may be long, have r = 0: their end shall depend on the loads alone.
+  kappa1. What the upper bound cuts is lost; the lower one gives, at most the energy that the jump has with m = mu. Load steps, which may be long, have
+  r = 0: their end shall depend on the loads alone. A dynamic run that begins in a state which no step has led to has the forces of a load step there.
 
   A boundary face with a support (layout.c): the other side is constant, the displacement of the support, and infinitely
   stiff. H(k) is 2 k then; there is no kappa1, because supports prescribe means.
@@ -42,8 +43,10 @@
   4. /* factor on the negative stiffness that the penalty of load steps follows; docs/reference/theory.md */
 #define RATE \
   2. /* and on that, of steps in time: a force that grows with the jump has the mean of its rates */
-#define LEAST 1e-3   /* sum of two stretches below which a cell is inverted or a line, and has no stiffness against twists */
+#define LEAST \
+  1e-3 /* sum of two stretches below which a cell is inverted or a line, and has no stiffness against twists */
 #define RENEWED 0.01 /* relative change of a penalty that counts as one */
+#define SAME 1e-12   /* and of one that is rounding */
 
 /* A face between two local cells; cell[1] = SUPPORT: between a cell and a support. */
 typedef struct {
@@ -62,6 +65,8 @@ struct _p_SbJump {
   PetscInt *node;   /* [nbatch][8][SB_BATCH]; padding lanes repeat the first face */
   SbPack *c0, *c1;  /* [nbatch] N/m; zero in padding */
   SbPack *r;        /* [nbatch][9] m; NULL before a kappa1 follows in a dynamic run */
+  PetscBool began;  /* steps in time, or what a checkpoint says of them, have led here */
+  PetscBool renew;  /* a checkpoint says that faces are not those of the rest state */
   SbPack *share;    /* [nbatch] how much of a face's energy this rank counts: 1, or 1/2 between ranks */
 };
 
@@ -264,20 +269,38 @@ SB_INLINE void gather_jumps(const PetscInt node[8 * SB_BATCH], const PetscReal x
   }
 }
 
-/* How much of the jumps J of a face at x its force belongs to, along them. */
+/* How much of the jumps J of a face at x its force belongs to: the part along them in the product of the energy, which is never more. */
 static PetscReal held_part(SbJump j, PetscInt b, PetscInt l, const PetscReal x[], PetscReal J[9])
 {
   PetscReal sum[3], square = 0., along = 0.;
 
   gather_jumps(j->node + 8 * SB_BATCH * b, x, l, J, sum);
-  for (int k = 0; k < 9; k++) {
-    square += J[k] * J[k];
-    along += (J[k] - (j->r ? j->r[9 * b + k][l] : 0.)) * J[k];
+  for (int c = 0; c < 3; c++) {
+    PetscReal held = 0.;
+
+    sum[c] = J[c] + J[3 + c] + J[6 + c];
+    for (int k = c; k < 9; k += 3) {
+      const PetscReal here = J[k] - (j->r ? j->r[9 * b + k][l] : 0.);
+
+      square += J[k] * J[k];
+      along += here * J[k];
+      held += here;
+    }
+    square += sum[c] * sum[c];
+    along += held * sum[c];
   }
   return square > 0. ? PetscMax(along / square, 0.) : 1.;
 }
 
-PetscErrorCode SbJumpRenew(SbSpace s, const PetscReal x[], PetscBool *changed)
+PetscBool SbJumpBegin(SbSpace s)
+{
+  const PetscBool first = (PetscBool)!s->jump->began;
+
+  s->jump->began = PETSC_TRUE;
+  return first;
+}
+
+PetscErrorCode SbJumpRenew(SbSpace s, const PetscReal x[], PetscBool first, PetscBool *changed)
 {
   const SbJump j = s->jump;
   PetscReal J[9];
@@ -287,15 +310,16 @@ PetscErrorCode SbJumpRenew(SbSpace s, const PetscReal x[], PetscBool *changed)
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
       const PetscReal before = j->c1[b][l], part = x ? held_part(j, b, l, x, J) : 1.;
-      PetscReal c0, least, held;
+      PetscReal c0, least, held, kept;
 
       face_factors(s, j, &j->face[i], PETSC_FALSE, &j->c0[b][l], &j->c1[b][l]);
       if (PetscAbsReal(j->c1[b][l] - before) > RENEWED * before) *changed = PETSC_TRUE;
       if (!x || j->c1[b][l] == 0.) continue;
 
-      /* the part of the jumps that has the energy of before */
+      /* the part of the jumps that has the energy of before; or, first, the force */
       face_factors(s, j, &j->face[i], PETSC_TRUE, &c0, &least);
-      held = PetscClipInterval(part * PetscSqrtReal(before / j->c1[b][l]), least / j->c1[b][l], 1.);
+      kept = before / j->c1[b][l];
+      held = PetscClipInterval(part * (first ? kept : PetscSqrtReal(kept)), least / j->c1[b][l], 1.);
       for (int k = 0; k < 9; k++) j->r[9 * b + k][l] = (1. - held) * J[k];
     }
   }
@@ -327,18 +351,22 @@ void SbJumpSetStiffness(SbSpace s, const PetscReal k[])
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
       const Face *face = &j->face[i];
+      const PetscReal before = j->c1[b][l];
 
       if (face->cell[1] == SUPPORT) continue;
       /* the owner of a cell need not know each of its faces */
       j->c1[b][l] = PetscMax(k[4 * face->cell[0] + face->face[0]], k[4 * face->cell[1] + face->face[1]]);
+      if (PetscAbsReal(j->c1[b][l] - before) > SAME * before) j->renew = PETSC_TRUE;
     }
   }
+  j->began = PETSC_TRUE;
 }
 
 PetscBool SbJumpFollow(SbSpace s, const PetscReal x[], PetscBool in_time)
 {
-  PetscBool any = PETSC_FALSE;
+  PetscBool any = s->jump->renew;
 
+  s->jump->renew = PETSC_FALSE;
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
     const PetscBool jumps = (PetscBool)(!region->element->nodes_per[0] && !region->material->linear);

@@ -209,14 +209,17 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
 PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, PetscBool in_time, PetscBool *changed)
 {
   const PetscReal *x;
-  PetscBool any, mine = PETSC_FALSE;
+  PetscBool any, first, mine = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   if (changed) *changed = PETSC_FALSE;
   if (!s->jump || s->linear) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbSpaceGetLocalRead(s, U, &x));
+  /* a state that no step has led to has the forces of a load step */
+  first = (PetscBool)(in_time && SbJumpBegin(s));
+  if (first && SbJumpFollow(s, x, PETSC_FALSE)) PetscCall(SbJumpRenew(s, NULL, PETSC_FALSE, &mine));
   any = SbJumpFollow(s, x, in_time);
-  if (any) PetscCall(SbJumpRenew(s, in_time ? x : NULL, &mine));
+  if (any) PetscCall(SbJumpRenew(s, in_time ? x : NULL, first, &mine));
   PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
   if (in_time) mine = any;
   if (changed) PetscCallMPI(MPI_Allreduce(&mine, changed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));

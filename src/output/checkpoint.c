@@ -116,7 +116,8 @@ static PetscBool faces_remember(SbRun run)
 {
   const SbModel m = run->model;
 
-  return (PetscBool)(m->dynamic && run->J && m->space->jump && !m->space->linear);
+  return (PetscBool)(m->dynamic && run->J && run->preset != SB_TIME_ALPHA2 && m->space->jump &&
+                     !m->space->linear);
 }
 
 /* It is written like the path, with a checksum of its own. */
@@ -305,7 +306,7 @@ static PetscErrorCode read_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *a
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Files of other integrators have none. */
+/* Files of explicit runs have none. */
 static PetscErrorCode read_jumps(SbRun run, SbOutput out, SbH5 *h, PetscBool *ok)
 {
   PetscReal *slice, *owned;

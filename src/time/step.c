@@ -12,7 +12,7 @@ PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed)
 
   PetscFunctionBeginUser;
   *changed = PETSC_FALSE;
-  if (!run->J) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!run->J || run->preset == SB_TIME_ALPHA2) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbSpaceFollowJumps(m->space, run->U, m->dynamic, changed));
   if (!m->dynamic || !*changed) PetscFunctionReturn(PETSC_SUCCESS);
 

@@ -49,7 +49,7 @@ typedef struct {
   void *ctx;
 } SbAttempt;
 /* The penalty of jumps of CR and DG is made what the state asks for (src/fem/jump.c); where that changes forces, accelerations and reactions that were taken from them too. Explicit integrators have no
-   matrix, and a step that is stable for the penalty of the rest state. Collective. */
+   matrix, and a step that is stable for the penalty of the rest state; PETSc's own steps (alpha2) do not say when they begin, and have that penalty, too. Collective. */
 PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed);
 /* ok: the step can be accepted. Collective. */
 PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *attempt, PetscBool *ok);
