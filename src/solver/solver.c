@@ -317,7 +317,8 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
       "%s, %" PetscInt_FMT " unknowns of p2, nu up to %g: with P1 on the vertices below it iterations do not "
       "grow with the mesh",
       dynamic ? "dynamic" : "static", unknowns, (double)hard.nu));
-  } else if (unknowns <= SB_DIRECT_SMALL && package) {
+  } else if (unknowns <= SB_DIRECT_SMALL && package && !(nface > most && hard.nu <= NU_PRESSURE)) {
+    /* 28k unknowns of P1 on 16 ranks, dynamic, ms per step of mumps and cg_two_level: 300 to 450 and 50 (docs/reports/realtime_ranks.md) */
     name = package;
     PetscCall(PetscSNPrintf(
       reason, size, "%" PetscInt_FMT " unknowns: a factorisation is fast and holds at any Poisson's ratio%s",

@@ -24,7 +24,7 @@
   the cells are raised to zero and the system is solved once more (Longva et al. 2023, "Pitfalls of projection"); after a full step the exact one is tried again.
   Forces without a potential (the free rim of a follower pressure) have equilibria at which its symmetric part is not definite: it is kept with as many negative eigenvalues
   as where the load step began, and after a full step to a residual smaller than the first whatever it is; the residual decides about a direction that goes up. In a slender body it rises
-  as much as E does where a full step turns what is soft, so that such a step may be provisional, too: those that follow have to bring the residual below where it was.
+  as much as E does where a full step turns what is soft, so that such a step may be provisional, too: those that follow have to bring the residual, or E, below where it was.
 
   Where surfaces push each other, the second derivative of contact is the positive part of each pair's, and the exact one after a whole step, as near the end only that converges
   faster than linearly. Friction that slipped the other way than expected is taken for one that sticks (src/effect/barrier_forces.c), and where p goes up, bounded from above. A tangent that is not

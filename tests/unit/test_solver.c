@@ -132,6 +132,7 @@ static PetscErrorCode check_meeting(const char *solver, const char *most, PetscB
   PetscCall(test_scene_open(text, &t));
   SB_CHECK((PetscBool)!strcmp(t.run->solver, strcmp(solver, "auto") ? solver : "rotated") == turns,
            "%s, at most %s nodes: %s was taken, %s", solver, most, t.run->solver, t.run->solver_reason);
+  SB_CHECK(turns || !strcmp(t.run->solver, "cg_two_level"), "with many ranks %s was taken", t.run->solver);
   PetscCall(SbRunSolve(t.run));
   SB_CHECK(!t.run->stop_reason[0] && t.run->steps_total == 1, "%s: %s", t.run->solver, t.run->stop_reason);
   PetscCall(test_scene_close(&t));
