@@ -138,10 +138,13 @@ PetscErrorCode SbSpaceLinearisePressure(SbSpace space, Vec U, Vec step, PetscRea
 /*
   SbSpaceFollowJumps - makes the penalty of jumps of CR and DG as stiff as the state asks for (src/fem/jump.c).
 
-  Collective. Input: U, m; in_time: the energies of faces at U stay as they are within bounds, else they are those of whole jumps. Output: changed (or NULL): somewhere, without in_time by a percent or more. Until the next call the face terms are constant; at first they are those of the rest state.
+  Collective. Input: U, m; steps: of loads, with energies of whole jumps; in time, where those of faces at U stay as they are within bounds; in time without damping, where no penalty falls. Output: changed (or NULL):
+  somewhere, for load steps by a percent or more. Until the next call the face terms are constant; at first they are those of the rest state.
 */
-PetscErrorCode SbSpaceFollowJumps(SbSpace space, Vec U, PetscBool in_time, PetscBool *changed);
-/* The stiffness that whole jumps at U would need for the energy of each face of a cell, k[4 ncell_owned], N/m; 0: no such face. And back, before SbSpaceFollowJumps(), for a run that goes on. Collective. */
+typedef enum { SB_STEPS_OF_LOAD, SB_STEPS_IN_TIME, SB_STEPS_UNDAMPED } SbStepsOf;
+PetscErrorCode SbSpaceFollowJumps(SbSpace space, Vec U, SbStepsOf steps, PetscBool *changed);
+/* For a run that goes on: the stiffness that whole jumps at U would need for the energy of each of the four faces of a cell, N/m, 0: no such face, and what its penalty follows, Pa: k[5 ncell_owned].
+   And back, before SbSpaceFollowJumps(). Collective. */
 PetscErrorCode SbSpaceGetJumps(SbSpace space, Vec U, PetscReal k[]);
 PetscErrorCode SbSpaceSetJumps(SbSpace space, const PetscReal k[]);
 

@@ -19,13 +19,13 @@ void SbJumpAdd(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscRea
 PetscReal SbJumpEnergy(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal body[]);
 /* node[nbatch][8][SB_BATCH] of the faces, borrowed; returns nbatch. */
 PetscInt SbJumpCliques(SbSpace space, const PetscInt **node);
-/* What the penalty of jumps follows is made that of the state: whether a cell on this rank asks for another than before. */
-PetscBool SbJumpFollow(SbSpace space, const PetscReal x[], PetscBool in_time);
+/* What the penalty of jumps follows is made that of the state: whether a cell on this rank asks for another than before, or faces leave out parts of jumps, which turn. */
+PetscBool SbJumpFollow(SbSpace space, const PetscReal x[], SbStepsOf steps);
 /* Whether this is the first call, and SbJumpSetStiffness() has not been called. */
 PetscBool SbJumpBegin(SbSpace space);
 /* Then the penalties; with x the energies of faces there stay as they were, or, first, their forces; else they are those of whole jumps. changed: set where one on this rank is another by a percent or more. */
 PetscErrorCode SbJumpRenew(SbSpace space, const PetscReal x[], PetscBool first, PetscBool *changed);
-/* k[4 ncell_owned], N/m: the stiffness that whole jumps at x would need for the energy of each face of a cell; and back, k[4 ncell] with ghosts, before SbJumpRenew(). */
+/* As SbSpaceGetJumps() says; and back, k[5 ncell] with ghosts, before SbJumpRenew(). */
 void SbJumpStiffness(SbSpace space, const PetscReal x[], PetscReal k[]);
 void SbJumpSetStiffness(SbSpace space, const PetscReal k[]);
 /* The matrix of the face in lane l of batch b, times the 3x3 identity; zero in padding. */

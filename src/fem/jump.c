@@ -29,9 +29,10 @@
 
   In time that is the rate of a force, and twice as large: from step to step the energy of a face stays as it was, that of [u] - r, r the part of the jump
   at the start of the step that leaves it. A kappa1 for whole jumps would put in 1/2 (kappa1' - kappa1) int |[u]|^2 with every step, and pump where it goes
-  up and down with waves of pressure. So that a body at rest has no force, that of a jump is along it, and between that of m = mu and that of
-  kappa1. What the upper bound cuts is lost; the lower one gives, at most the energy that the jump has with m = mu. Load steps, which may be long, have
-  r = 0: their end shall depend on the loads alone. A dynamic run that begins in a state which no step has led to has the forces of a load step there.
+  up and down with waves of pressure. So that a body at rest has no force, that of a jump is along it and belongs to a part between (kappa1 with m = mu / kappa1)^2
+  and all of it. What the upper bound cuts is lost; the lower one gives little. Load steps, which may be long, have r = 0: their end shall depend on the loads alone. A dynamic run
+  that begins in a state which no step has led to has the forces of a load step there. With Newmark, which damps nothing, m never falls: near nu = 1/2 it
+  would go up and down a hundredfold with each wave.
 
   A boundary face with a support (layout.c): the other side is constant, the displacement of the support, and infinitely
   stiff. H(k) is 2 k then; there is no kappa1, because supports prescribe means.
@@ -223,9 +224,9 @@ static void follow_twists(PetscInt n, const SbPack F[9], const SbPack P[9], Pets
   }
 }
 
-/* The modulus m of each cell of a batch, from its state. Whether one is another than before. */
+/* The modulus m of each cell of a batch, from its state; keep: not less than it was. Whether one is another than before. */
 static PetscBool follow_batch(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[],
-                              PetscReal factor)
+                              PetscReal factor, PetscBool keep)
 {
   const SbMaterial m = region->material;
   const PetscReal mu = m->ops.shear_modulus(m);
@@ -236,7 +237,7 @@ static PetscBool follow_batch(SbSpace s, const SbRegion *region, PetscInt b, con
 
   for (PetscInt l = 0; l < n; l++) {
     before[l] = modulus[l];
-    modulus[l] = mu;
+    if (!keep) modulus[l] = mu;
   }
   sb_gather_strain(s, region, b, x, u);
   SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, F);
@@ -319,7 +320,8 @@ PetscErrorCode SbJumpRenew(SbSpace s, const PetscReal x[], PetscBool first, Pets
       /* the part of the jumps that has the energy of before; or, first, the force */
       face_factors(s, j, &j->face[i], PETSC_TRUE, &c0, &least);
       kept = before / j->c1[b][l];
-      held = PetscClipInterval(part * (first ? kept : PetscSqrtReal(kept)), least / j->c1[b][l], 1.);
+      held =
+        PetscClipInterval(part * (first ? kept : PetscSqrtReal(kept)), PetscSqr(least / j->c1[b][l]), 1.);
       for (int k = 0; k < 9; k++) j->r[9 * b + k][l] = (1. - held) * J[k];
     }
   }
@@ -331,14 +333,14 @@ void SbJumpStiffness(SbSpace s, const PetscReal x[], PetscReal k[])
   const SbJump j = s->jump;
   PetscReal J[9];
 
-  for (PetscInt i = 0; i < 4 * s->mesh->ncell_owned; i++) k[i] = 0.;
+  for (PetscInt i = 0; i < 5 * s->mesh->ncell_owned; i++) k[i] = i % 5 == 4 ? j->modulus[i / 5] : 0.;
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
       for (int side = 0; side < (j->face[i].cell[1] == SUPPORT ? 1 : 2); side++) {
         const PetscInt cell = j->face[i].cell[side];
 
         if (cell < s->mesh->ncell_owned)
-          k[4 * cell + j->face[i].face[side]] = j->c1[b][l] * PetscSqr(held_part(j, b, l, x, J));
+          k[5 * cell + j->face[i].face[side]] = j->c1[b][l] * PetscSqr(held_part(j, b, l, x, J));
       }
     }
   }
@@ -355,16 +357,18 @@ void SbJumpSetStiffness(SbSpace s, const PetscReal k[])
 
       if (face->cell[1] == SUPPORT) continue;
       /* the owner of a cell need not know each of its faces */
-      j->c1[b][l] = PetscMax(k[4 * face->cell[0] + face->face[0]], k[4 * face->cell[1] + face->face[1]]);
+      j->c1[b][l] = PetscMax(k[5 * face->cell[0] + face->face[0]], k[5 * face->cell[1] + face->face[1]]);
       if (PetscAbsReal(j->c1[b][l] - before) > SAME * before) j->renew = PETSC_TRUE;
     }
   }
+  for (PetscInt c = 0; c < s->mesh->ncell; c++) j->modulus[c] = k[5 * c + 4];
   j->began = PETSC_TRUE;
 }
 
-PetscBool SbJumpFollow(SbSpace s, const PetscReal x[], PetscBool in_time)
+PetscBool SbJumpFollow(SbSpace s, const PetscReal x[], SbStepsOf steps)
 {
-  PetscBool any = s->jump->renew;
+  const PetscReal factor = steps == SB_STEPS_OF_LOAD ? FOLLOW : RATE * FOLLOW;
+  PetscBool any = (PetscBool)(s->jump->renew || (steps != SB_STEPS_OF_LOAD && s->jump->r));
 
   s->jump->renew = PETSC_FALSE;
   for (PetscInt r = 0; r < s->nregion; r++) {
@@ -372,7 +376,7 @@ PetscBool SbJumpFollow(SbSpace s, const PetscReal x[], PetscBool in_time)
     const PetscBool jumps = (PetscBool)(!region->element->nodes_per[0] && !region->material->linear);
 
     for (PetscInt b = region->bstart; jumps && b < region->bend; b++) {
-      if (follow_batch(s, region, b, x, in_time ? RATE * FOLLOW : FOLLOW)) any = PETSC_TRUE;
+      if (follow_batch(s, region, b, x, factor, (PetscBool)(steps == SB_STEPS_UNDAMPED))) any = PETSC_TRUE;
     }
   }
   return any;

@@ -206,8 +206,9 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, PetscBool in_time, PetscBool *changed)
+PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, SbStepsOf steps, PetscBool *changed)
 {
+  const PetscBool in_time = (PetscBool)(steps != SB_STEPS_OF_LOAD);
   const PetscReal *x;
   PetscBool any, first, mine = PETSC_FALSE;
 
@@ -217,8 +218,8 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, PetscBool in_time, PetscBool
   PetscCall(SbSpaceGetLocalRead(s, U, &x));
   /* a state that no step has led to has the forces of a load step */
   first = (PetscBool)(in_time && SbJumpBegin(s));
-  if (first && SbJumpFollow(s, x, PETSC_FALSE)) PetscCall(SbJumpRenew(s, NULL, PETSC_FALSE, &mine));
-  any = SbJumpFollow(s, x, in_time);
+  if (first && SbJumpFollow(s, x, SB_STEPS_OF_LOAD)) PetscCall(SbJumpRenew(s, NULL, PETSC_FALSE, &mine));
+  any = SbJumpFollow(s, x, steps);
   if (any) PetscCall(SbJumpRenew(s, in_time ? x : NULL, first, &mine));
   PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
   if (in_time) mine = any;
@@ -243,9 +244,9 @@ PetscErrorCode SbSpaceSetJumps(SbSpace s, const PetscReal k[])
   PetscReal *all;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(4 * s->mesh->ncell, &all));
-  PetscCall(PetscArraycpy(all, k, 4 * s->mesh->ncell_owned));
-  PetscCall(SbMeshBroadcastCells(s->mesh, 4, MPIU_REAL, all));
+  PetscCall(PetscMalloc1(5 * s->mesh->ncell, &all));
+  PetscCall(PetscArraycpy(all, k, 5 * s->mesh->ncell_owned));
+  PetscCall(SbMeshBroadcastCells(s->mesh, 5, MPIU_REAL, all));
   SbJumpSetStiffness(s, all);
   PetscCall(PetscFree(all));
   PetscFunctionReturn(PETSC_SUCCESS);

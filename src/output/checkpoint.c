@@ -128,12 +128,12 @@ static PetscErrorCode write_jumps(SbRun run, SbOutput out, SbH5 *h)
 
   PetscFunctionBeginUser;
   if (!faces_remember(run)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc2(4 * out->cell.n, &slice, 4 * run->model->mesh->ncell_owned, &own));
+  PetscCall(PetscMalloc2(5 * out->cell.n, &slice, 5 * run->model->mesh->ncell_owned, &own));
   PetscCall(SbSpaceGetJumps(run->model->space, run->U, own));
-  PetscCall(SbOrderGather(&out->cell, 4, own, slice));
+  PetscCall(SbOrderGather(&out->cell, 5, own, slice));
   PetscCall(
-    SbH5WriteSlice(h, h->file, "jumps", "N/m", &out->cell, 4, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, slice));
-  PetscCall(checksum_of(&out->cell, 4, 0, slice, &sum));
+    SbH5WriteSlice(h, h->file, "jumps", "N/m, Pa", &out->cell, 5, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, slice));
+  PetscCall(checksum_of(&out->cell, 5, 0, slice, &sum));
   PetscCall(SbH5PutInt(h, h->file, "jumps_checksum", (int64_t)sum));
   PetscCall(PetscFree2(slice, own));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -316,14 +316,14 @@ static PetscErrorCode read_jumps(SbRun run, SbOutput out, SbH5 *h, PetscBool *ok
   PetscFunctionBeginUser;
   if (!faces_remember(run) || H5Lexists(h->file, "jumps", H5P_DEFAULT) <= 0)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc2(4 * out->cell.n, &slice, 4 * run->model->mesh->ncell_owned, &owned));
-  PetscCall(SbH5ReadSlice(h, "jumps", &out->cell, 4, slice, ok));
+  PetscCall(PetscMalloc2(5 * out->cell.n, &slice, 5 * run->model->mesh->ncell_owned, &owned));
+  PetscCall(SbH5ReadSlice(h, "jumps", &out->cell, 5, slice, ok));
   SbH5GetInt(h->file, "jumps_checksum", &own, ok);
   if (*ok) {
-    PetscCall(checksum_of(&out->cell, 4, 0, slice, &sum));
+    PetscCall(checksum_of(&out->cell, 5, 0, slice, &sum));
     if (own != (int64_t)sum) *ok = PETSC_FALSE;
   }
-  if (*ok) PetscCall(SbOrderScatter(&out->cell, 4, slice, owned));
+  if (*ok) PetscCall(SbOrderScatter(&out->cell, 5, slice, owned));
   if (*ok) PetscCall(SbSpaceSetJumps(run->model->space, owned));
   PetscCall(PetscFree2(slice, owned));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -357,7 +357,9 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   PetscCall(SbEffectsHandOver(old->run, run, &result->renamed));
   // faces of CR and DG have what the run goes on with, before accelerations and energies are those of it
   if (run->J && run->model->dynamic && run->preset != SB_TIME_ALPHA2)
-    PetscCall(SbSpaceFollowJumps(run->model->space, run->U, PETSC_TRUE, NULL));
+    PetscCall(SbSpaceFollowJumps(run->model->space, run->U,
+                                 run->preset == SB_TIME_NEWMARK ? SB_STEPS_UNDAMPED : SB_STEPS_IN_TIME,
+                                 NULL));
   PetscCall(SbRunRestartAcceleration(run));
   // energy, mass and momentum of both states: the difference is the loss by remeshing
   PetscCall(PetscMemzero(e, 2 * sizeof(*e)));

@@ -229,7 +229,7 @@ static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
   PetscReal norm, along;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceFollowJumps(run->model->space, run->U, PETSC_FALSE, NULL));
+  PetscCall(SbSpaceFollowJumps(run->model->space, run->U, SB_STEPS_OF_LOAD, NULL));
   PetscCall(residual(p, &norm));
   PetscCall(tangent(p, ok));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);

@@ -616,6 +616,28 @@ PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* PETSc's own integrators give up without a word. */
+static PetscErrorCode explain_failure(SbRun run)
+{
+  TSConvergedReason reason;
+  PetscInt step;
+  PetscReal t, dt;
+
+  PetscFunctionBeginUser;
+  PetscCall(TSGetConvergedReason(run->ts, &reason));
+  if (reason >= 0 || run->stop_reason[0] || run->stopped) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(TSGetStepNumber(run->ts, &step));
+  PetscCall(TSGetTime(run->ts, &t));
+  PetscCall(TSGetTimeStep(run->ts, &dt));
+  PetscCall(
+    SbRunFail(run,
+              "step %" PetscInt_FMT
+              " at t = %g s with a length of %g s: %s; try a shorter -ts_dt, or -time genalpha, which "
+              "tries shorter ones by itself (docs/guides/when_it_fails.md, R1)",
+              step + 1, (double)t, (double)dt, TSConvergedReasons[reason]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRunSolve(SbRun run)
 {
   PetscFunctionBeginUser;
@@ -627,6 +649,7 @@ PetscErrorCode SbRunSolve(SbRun run)
     PetscCall(TSSetStepNumber(run->ts, run->step0));
     PetscCall(TSSetTime(run->ts, run->t0));
     PetscCall(TSSolve(run->ts, run->U));
+    PetscCall(explain_failure(run));
   } else if (run->arc.on)
     PetscCall(SbArcLengthSolve(run));
   else

@@ -13,7 +13,11 @@ PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed)
   PetscFunctionBeginUser;
   *changed = PETSC_FALSE;
   if (!run->J || run->preset == SB_TIME_ALPHA2) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbSpaceFollowJumps(m->space, run->U, m->dynamic, changed));
+  PetscCall(SbSpaceFollowJumps(m->space, run->U,
+                               !m->dynamic                      ? SB_STEPS_OF_LOAD
+                               : run->preset == SB_TIME_NEWMARK ? SB_STEPS_UNDAMPED
+                                                                : SB_STEPS_IN_TIME,
+                               changed));
   if (!m->dynamic || !*changed) PetscFunctionReturn(PETSC_SUCCESS);
 
   /* what was taken from the forces before */
@@ -28,7 +32,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   PetscBool again = PETSC_TRUE;
 
   PetscFunctionBeginUser;
-  if (!run->model->dynamic) PetscCall(SbSpaceFollowJumps(run->model->space, a->U0, PETSC_FALSE, NULL));
+  if (!run->model->dynamic) PetscCall(SbSpaceFollowJumps(run->model->space, a->U0, SB_STEPS_OF_LOAD, NULL));
   run->goes_on = PETSC_FALSE;
   for (int solves = 0; again; solves++) {
     SbSolvedStep step;
@@ -52,7 +56,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 
     /* jumps of CR and DG are penalised as the state at the start asks for: of a load step, which may be long, once more as its end does */
     if (*ok && !run->model->dynamic && !run->goes_on) {
-      PetscCall(SbSpaceFollowJumps(run->model->space, a->U, PETSC_FALSE, &run->goes_on));
+      PetscCall(SbSpaceFollowJumps(run->model->space, a->U, SB_STEPS_OF_LOAD, &run->goes_on));
       if (run->goes_on) continue;
     }
     run->goes_on = PETSC_FALSE;

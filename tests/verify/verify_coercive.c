@@ -184,7 +184,7 @@ static PetscErrorCode pressed(const char *element, const char *law, PetscReal ra
   PetscCall(VecGetArray(t.run->U, &u));
   for (PetscInt i = 0; i < 3 * t.model->space->nnode_owned; i++) u[i] = -eps * t.model->space->node_x[i];
   PetscCall(VecRestoreArray(t.run->U, &u));
-  PetscCall(SbSpaceFollowJumps(t.model->space, t.run->U, PETSC_FALSE, NULL));
+  PetscCall(SbSpaceFollowJumps(t.model->space, t.run->U, SB_STEPS_OF_LOAD, NULL));
   PetscCall(spectrum(&t, &n, &w));
   *smallest = w[0] / w[n - 1];
   PetscCall(PetscFree(w));
