@@ -194,6 +194,7 @@ static PetscErrorCode watch_swing(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What is given: hardly more than the account of the method, 4e-4; penalties of whole jumps gave an eighth. What bounds of forces take in a second is 1 %. */
 static PetscErrorCode check_swing(const char *element)
 {
   Swing w = {0};

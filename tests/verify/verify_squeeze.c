@@ -199,7 +199,7 @@ static PetscErrorCode check_released(const char *element)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Pressed by a quarter and let go in long steps near nu = 1/2, where the pressure of a cell goes up and down with waves: the penalty that follows it must not make what Newmark's method gains
+/* Pressed to half its height and let go in long steps near nu = 1/2, where the pressure of a cell goes up and down with waves: the penalty that follows it must not make what Newmark's method gains
    there without bound. P1 and P2 gain 6 and 9 % of the energy in half the motion. */
 static PetscErrorCode check_waves(const char *element)
 {
