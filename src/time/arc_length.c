@@ -255,7 +255,7 @@ static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
 /* Why no step succeeded. */
 static PetscErrorCode explain(SbRun run, PetscReal factor, PetscReal l)
 {
-  char why[sizeof(run->stop_reason)], motion[128];
+  char why[sizeof(run->stop_reason)], motion[256];
   PetscInt body;
 
   PetscFunctionBeginUser;

@@ -83,7 +83,7 @@ static PetscErrorCode may_replace(SbSolverList l, KSP ksp, Vec b, PetscBool *is)
   PetscBool newton, factored;
   PetscReal size;
   PetscInt body = -1;
-  char motion[128];
+  char motion[256];
   Vec X;
 
   PetscFunctionBeginUser;

@@ -89,18 +89,25 @@ static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
 }
 
 /* Finds a body that nothing holds; *found, and the run's reason to stop says so. */
-static PetscErrorCode find_free_body(SbRun run, PetscReal factor, PetscBool *found)
+static PetscErrorCode find_free_body(const LoadStep *l, PetscBool failed, PetscBool *found)
 {
+  const SbRun run = l->run;
   PetscInt body;
   char motion[256];
 
   PetscFunctionBeginUser;
+  /* stress and follower loads far from equilibrium resist rotations that nothing holds: where the step began they do not */
+  if (failed && !run->model->linear) {
+    run->model->load = l->factor - l->length;
+    PetscCall(SNESComputeJacobian(run->snes, run->U, run->operator, run->J));
+  }
   PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion));
+  run->model->load = l->factor;
   *found = (PetscBool)(body >= 0);
   run->free_body = (PetscBool)(*found && !run->model->nbegin_step && !run->model->npotential);
   if (*found)
     PetscCall(SbRunFail(
-      run, "load factor %g: nothing holds the body %s against %s; hold it by a support%s", (double)factor,
+      run, "load factor %g: nothing holds the body %s against %s; hold it by a support%s", (double)l->factor,
       run->model->body[body].name, motion,
       run->model->nbegin_step || run->model->npotential ? ", or let it come to rest in a dynamic run" : ""));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -127,7 +134,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
   if (!*ok && !other && !l->run->stopped) {
     char why[512] = "use more -static_steps";
 
-    PetscCall(find_free_body(l->run, l->factor, &found));
+    PetscCall(find_free_body(l, PETSC_TRUE, &found));
     if (!found) {
       char near[256];
 
@@ -141,7 +148,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
   /* loads in balance leave a singular system with a solution, and a solver may find it with any rigid motion on top */
   if (*ok && !l->run->steps_total && !l->run->model->nbegin_step && !l->run->model->npotential &&
       l->run->newton_step) {
-    PetscCall(find_free_body(l->run, l->factor, &found));
+    PetscCall(find_free_body(l, PETSC_FALSE, &found));
     if (found) *ok = PETSC_FALSE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);

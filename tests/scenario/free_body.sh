@@ -88,6 +88,20 @@ for more in "-body_a_element cr" "-body_a_element dg" "-body_a_element cr -solve
 done
 # shellcheck disable=SC2086
 error 2 "load factor 1.|$hinge" -options_file bar.opts $two -body_a_element cr
+# a follower load makes the tangent of a hinge regular wherever Newton's method may be, but not where the step began
+cat >follower.opts <<'END'
+-body_a_material neohookean
+-effects push,clamp
+-sets part,top
+-set_top_at plane:0,0,1,0.1
+-effect_push_type pressure
+-effect_push_on top
+-effect_push_value 100
+END
+for more in "cr -static_steps 3" "dg"; do
+  # shellcheck disable=SC2086
+  error 2 "nothing holds|$hinge" -options_file bar.opts -options_file follower.opts $two -body_a_element $more
+done
 # shellcheck disable=SC2086
 error 1 "load factor 1.|body a|(0.00, 0.00, 1.00)" -options_file bar.opts $two \
   -body_a_element p1 -effect_clamp_components xy
