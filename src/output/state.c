@@ -169,6 +169,38 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/*
+  row[nnode_owned]: the row of each owned node in a checkpoint with n nodes of the same meshes and elements. Its supports of dg may be others: each of this run's begins where the node of its
+  face is. ok: the file can be of these. Collective.
+*/
+static PetscErrorCode find_rows(SbRun run, PetscInt n, PetscInt row[], PetscBool *ok)
+{
+  const SbOutput out = (SbOutput)run->output;
+  const SbSpace s = run->model->space;
+  const PetscInt support = s->mesh->Nvert + 4 * s->mesh->Ncell, edge = support + 4 * s->mesh->Ncell;
+  PetscInt nsupport = 0;
+  PetscBool weak = PETSC_FALSE;
+  PetscReal *number;
+
+  PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < run->model->nbody; b++) weak = (PetscBool)(weak || s->element[b]->weak);
+  PetscCall(PetscMalloc1(s->nnode_owned + out->node.n, &number));
+  for (PetscInt i = 0; i < out->node.n; i++) number[s->nnode_owned + i] = out->node.start + i;
+  PetscCall(SbOrderScatter(&out->node, 1, number + s->nnode_owned, number));
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
+    nsupport += s->node_orig[i] >= support && s->node_orig[i] < edge;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nsupport, 1, MPIU_INT, MPI_SUM, out->comm));
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
+    row[i] = (PetscInt)number[i] + (s->node_orig[i] >= edge ? n - out->node.N : 0);
+  for (PetscInt i = 0; n != out->node.N && s->dirichlet_node && i < 4 * s->mesh->ncell; i++) {
+    if (s->dirichlet_node[i] >= 0 && s->dirichlet_node[i] < s->nnode_owned)
+      row[s->dirichlet_node[i]] = row[s->cell_node[i]];
+  }
+  *ok = (PetscBool)(*ok && (n == out->node.N || (weak && n >= out->node.N - nsupport)));
+  PetscCall(PetscFree(number));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The unknowns of body b from a checkpoint of the same bodies; is: the file is one. Collective. */
 static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b, const char *path,
                                       PetscBool *is)
@@ -180,7 +212,7 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
   SbH5 h;
   int64_t hash = 0;
   PetscBool ok = PETSC_TRUE;
-  PetscReal *slice, *owned;
+  PetscInt *row;
   char *options = NULL;
 
   PetscFunctionBeginUser;
@@ -209,25 +241,30 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
     ok = (PetscBool)(strstr(options, line) != NULL);
   }
   PetscCall(PetscFree(options));
+  PetscCall(PetscMalloc1(s->nnode_owned, &row));
 
-  /* displacement and velocity of its nodes */
-  PetscCall(PetscMalloc2(3 * out->node.n, &slice, 3 * s->nnode_owned, &owned));
+  /* displacement and velocity of its nodes; supports, which follow the faces' nodes in the file, may be other ones */
+  PetscCall(find_rows(run, (PetscInt)SbH5Rows(h.file, "u"), row, &ok));
   for (int k = 0; k < 2 && ok; k++) {
     PetscScalar *x;
+    PetscReal *all = NULL;
+    PetscInt n;
 
     if (H5Lexists(h.file, k ? "v" : "u", H5P_DEFAULT) <= 0) {
       PetscCall(SbWarning(out->comm, "%s: %s has no velocity, the body begins at rest", option, path));
       continue;
     }
-    PetscCall(SbH5ReadSlice(&h, k ? "v" : "u", &out->node, 3, slice, &ok));
-    if (!ok) break;
-    PetscCall(SbOrderScatter(&out->node, 3, slice, owned));
+    PetscCall(read_all(h.file, k ? "v" : "u", H5T_NATIVE_DOUBLE, sizeof(double), 3, &n, &all));
+    ok = (PetscBool)(all != NULL);
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &ok, 1, SB_MPI_BOOL, MPI_LAND, out->comm));
     PetscCall(VecGetArray(target[k], &x));
-    for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
-      if (s->node_body[i / 3] == b) x[i] = k && s->fixed[i / 3] & (1 << i % 3) ? 0. : owned[i];
+    for (PetscInt i = 0; i < 3 * s->nnode_owned && ok; i++)
+      if (s->node_body[i / 3] == b)
+        x[i] = k && s->fixed[i / 3] & (1 << i % 3) ? 0. : all[3 * row[i / 3] + i % 3];
     PetscCall(VecRestoreArray(target[k], &x));
+    PetscCall(PetscFree(all));
   }
-  PetscCall(PetscFree2(slice, owned));
+  PetscCall(PetscFree(row));
   PetscCall(SbH5Close(&h));
   PetscCheck(ok, out->comm, PETSC_ERR_USER_INPUT,
              "%s %s: this checkpoint is damaged, or of other bodies, meshes or elements; give the folder of "

@@ -119,6 +119,24 @@ error 1 "-body_bar_state|swung/checkpoint_000003.h5" defaults.opts $bar -body_ba
 # shellcheck disable=SC2086
 error 1 "-body_bar_state|swung/checkpoint_000003.h5" defaults.opts $bar -body_bar_state swung/checkpoint_000003.h5 -body_bar_mesh box:0.4,0.1,0.1:4,1,2
 
+# dg, whose supports are nodes of their own, with other supports than the checkpoint, beside p2, whose rows in the file follow them
+two="-bodies bar,beam -body_bar_mesh box:0.4,0.1,0.1:4,1,1 -body_bar_element dg -body_bar_poisson 0 -body_beam_mesh box:0.4,0.1,0.1:2,1,1 -body_beam_translate 0,1,0 -body_beam_element p2"
+spin="-body_bar_velocity 0,3*(x-0.2),0 -body_beam_velocity 0,0,2*y"
+hold="-effects hold -effect_hold_type fixed -effect_hold_on"
+# shellcheck disable=SC2086
+for way in "|$hold bar.xmax" "$hold bar.xmin|" "$hold bar.xmin|$hold bar.ymin"; do
+  "${mpi[@]}" 2 "$supple" defaults.opts $two $spin ${way%|*} -checkpoint_every_steps 3 -ts_max_time 0.03 -output_dir swung -output_overwrite yes >state.txt 2>&1 ||
+    fail "dg, ${way%|*}: $(cat state.txt)"
+  for n in 1 3; do
+    "${mpi[@]}" $n "$supple" defaults.opts $two ${way#*|} -body_bar_state swung/checkpoint_000003.h5 -body_beam_state swung/checkpoint_000003.h5 \
+      -ts_max_time 1e-6 -ts_dt 1e-6 -output_dir start -output_overwrite yes >state.txt 2>&1 || fail "dg, ${way%|*}, then ${way#*|}: $(cat state.txt)"
+    for column in kinetic momentum_x momentum_y momentum_z angular_z centre_y centre_z; do
+      # shellcheck disable=SC2016
+      check "dg with other supports, $column: $(row0 $column)" awk -v value="$(row0 $column)" -v then="$(value swung $column)" 'BEGIN { d = value - then; exit d > 1e-12 || d < -1e-12 }'
+    done
+  done
+done
+
 # sizes that look like mm: a warning, but not where the scale is given, or densities are not those of SI
 for size in "100 1000 1" "100 1000 0 -body_a_scale 1" "100 1e-9 0" "0.1 1000 0"; do
   # shellcheck disable=SC2086
