@@ -3,7 +3,7 @@
 
   Displacement and velocity are those of a frame of that run's fields.h5, evaluated at the nodes of this run: u(X) = sum_a w_a u_a with the weights of the tet that holds the place X at
   rest there, or of the nearest one; of a run with -output_quadratic they are the ten of P2. So element, mesh, material, effects and integrator may be others; where nodes are the vertices of that run, values are those of the file. Every rank
-  reads the body's part of the file. A checkpoint has no mesh, but all digits of all unknowns: it serves scenes with the same meshes and elements, whatever else is different there.
+  reads the body's part of the file. A checkpoint has no mesh, but all digits of all unknowns: for scenes with the same meshes and elements, whatever else is different there; others take the frame of its step.
 */
 #include <sys/stat.h>
 #include <unistd.h>
@@ -201,17 +201,20 @@ static PetscErrorCode find_rows(SbRun run, PetscInt n, PetscInt row[], PetscBool
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The unknowns of body b from a checkpoint of the same bodies; is: the file is one. Collective. */
+/*
+  The unknowns of body b from a checkpoint of the same bodies; is: the file is one. Where it is one of other bodies, meshes or elements, it is not, and frame[] names the frame of its step in its
+  run's folder. Collective.
+*/
 static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b, const char *path,
-                                      PetscBool *is)
+                                      size_t size, char frame[], PetscBool *is)
 {
   const SbOutput out = (SbOutput)run->output;
   const SbSpace s = run->model->space;
   const Vec target[2] = {run->U, run->V};
   struct stat info;
   SbH5 h;
-  int64_t hash = 0;
-  PetscBool ok = PETSC_TRUE;
+  int64_t hash = 0, step = 0;
+  PetscBool ok = PETSC_TRUE, same;
   PetscInt *row;
   char *options = NULL;
 
@@ -230,17 +233,29 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
   /* its bodies have the meshes and elements of these */
   PetscCall(SbOutputOrder(run, out));
   SbH5GetInt(h.file, "mesh_hash", &hash, &ok);
-  ok = (PetscBool)(ok && (uint64_t)hash == out->mesh_hash);
-  if (ok) PetscCall(SbH5ReadText(&h, "options", &options, &ok));
-  for (PetscInt i = 0; ok && i < run->model->nbody; i++) {
+  SbH5GetInt(h.file, "step", &step, &ok);
+  PetscCall(SbH5ReadText(&h, "options", &options, &ok));
+  same = (PetscBool)(!ok || (uint64_t)hash == out->mesh_hash);
+  for (PetscInt i = 0; ok && same && i < run->model->nbody; i++) {
     char line[3 * SB_NAME_MAX];
     const SbBody *body = &run->model->body[i];
 
     SbFormat(sizeof(line), line, "-body_%s_element %s\n", body->copy_of[0] ? body->copy_of : body->name,
              body->element);
-    ok = (PetscBool)(strstr(options, line) != NULL);
+    same = (PetscBool)(strstr(options, line) != NULL);
   }
   PetscCall(PetscFree(options));
+  if (!same) {
+    const char *name = strrchr(path, '/');
+
+    SbFormat(size, frame, "%.*s,%lld", name ? (int)(name - path) : 1, name ? path : ".", (long long)step);
+    PetscCall(SbWarning(
+      out->comm, "%s: %s is of other bodies, meshes or elements: the frame %s is taken in its place", option,
+      path, frame));
+    PetscCall(SbH5Close(&h));
+    *is = PETSC_FALSE;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(PetscMalloc1(s->nnode_owned, &row));
 
   /* displacement and velocity of its nodes; supports, which follow the faces' nodes in the file, may be other ones */
@@ -267,10 +282,8 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
   PetscCall(PetscFree(row));
   PetscCall(SbH5Close(&h));
   PetscCheck(ok, out->comm, PETSC_ERR_USER_INPUT,
-             "%s %s: this checkpoint is damaged, or of other bodies, meshes or elements; give the folder of "
-             "its run, whose frames serve any "
-             "mesh and element",
-             option, path);
+             "%s %s: this checkpoint is damaged; give the folder of its run, whose frames serve as well", option,
+             path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -285,14 +298,15 @@ PetscErrorCode SbOutputLoadState(SbRun run)
   for (PetscInt b = 0; b < m->nbody; b++) {
     Other o = {.file = -1, .frame = -1, .mesh = -1};
     SbCaughtError caught = {0, ""};
-    char option[2 * SB_NAME_MAX];
+    char option[2 * SB_NAME_MAX], frame[PETSC_MAX_PATH_LEN + 24];
 
     if (!m->start[b].state[0]) continue;
     any = PETSC_TRUE;
     PetscCall(PetscSNPrintf(option, sizeof(option), "-body_%s_state", m->body[b].name));
-    PetscCall(take_checkpoint(run, option, b, m->start[b].state, &checkpoint));
+    PetscCall(PetscStrncpy(frame, m->start[b].state, sizeof(frame)));
+    PetscCall(take_checkpoint(run, option, b, m->start[b].state, sizeof(frame), frame, &checkpoint));
     if (checkpoint) continue;
-    SB_CATCH(&caught, read_other(option, m->start[b].state, &m->body[b], &o));
+    SB_CATCH(&caught, read_other(option, frame, &m->body[b], &o));
     if (!caught.code) PetscCall(take_over(run, option, b, &o));
     PetscCall(PetscFree(o.x));
     PetscCall(PetscFree(o.u));

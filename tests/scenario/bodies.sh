@@ -101,9 +101,9 @@ for n in 1 3; do
   done
 done
 
-# from a checkpoint, to its last digit on another number of ranks, with another law, integrator and effects; not with other elements or meshes
+# from a checkpoint, to its last digit on another number of ranks, with another law, integrator and effects; with other elements or meshes from the frame of its step
 # shellcheck disable=SC2086
-"${mpi[@]}" 2 "$supple" defaults.opts $bar -body_bar_velocity "0,3*(x-0.2),0" -checkpoint_every_steps 3 -output_dir swung || fail "a run with checkpoints"
+"${mpi[@]}" 2 "$supple" defaults.opts $bar -body_bar_velocity "0,3*(x-0.2),0" -checkpoint_every_steps 3 -output_fields displacement,velocity -output_precision double -output_dir swung || fail "a run with checkpoints"
 for n in 1 3; do
   # shellcheck disable=SC2086
   "${mpi[@]}" $n "$supple" defaults.opts $bar -body_bar_state swung/checkpoint_000003.h5 -time newmark -effects g -effect_g_type gravity -body_bar_poisson 0.2 \
@@ -115,9 +115,19 @@ for n in 1 3; do
   done
 done
 # shellcheck disable=SC2086
-error 1 "-body_bar_state|swung/checkpoint_000003.h5" defaults.opts $bar -body_bar_state swung/checkpoint_000003.h5 -body_bar_element p2
+for other in "-body_bar_element p2" "-body_bar_mesh box:0.4,0.1,0.1:8,2,2"; do
+  "${mpi[@]}" 2 "$supple" defaults.opts $bar -body_bar_state swung/checkpoint_000003.h5 $other -ts_max_time 1e-6 -ts_dt 1e-6 -output_dir start -output_overwrite yes >state.txt 2>&1 ||
+    fail "a state of a checkpoint, $other: $(cat state.txt)"
+  for column in momentum_y centre_y max_displacement; do
+    # shellcheck disable=SC2016
+    check "a state of a checkpoint, $other, $column: $(row0 $column)" awk -F, -v value="$(row0 $column)" -v column=$column '
+      NR == 1 { for (i = 1; i <= NF; i++) if ($i == column) c = i } $1 == 3 { d = value - $c; exit d > 1e-9 || d < -1e-9 }' swung/history.csv
+  done
+done
+mkdir bare
+cp swung/checkpoint_000003.h5 bare/
 # shellcheck disable=SC2086
-error 1 "-body_bar_state|swung/checkpoint_000003.h5" defaults.opts $bar -body_bar_state swung/checkpoint_000003.h5 -body_bar_mesh box:0.4,0.1,0.1:4,1,2
+error 1 "-body_bar_state bare,3|bare/fields.h5" defaults.opts $bar -body_bar_state bare/checkpoint_000003.h5 -body_bar_element p2
 
 # dg, whose supports are nodes of their own, with other supports than the checkpoint, beside p2, whose rows in the file follow them
 two="-bodies bar,beam -body_bar_mesh box:0.4,0.1,0.1:4,1,1 -body_bar_element dg -body_bar_poisson 0 -body_beam_mesh box:0.4,0.1,0.1:2,1,1 -body_beam_translate 0,1,0 -body_beam_element p2"

@@ -100,6 +100,7 @@ CASES = [
     ("F5", "error", "bar.opts -output_dir restarted -body_bar_state saved,7777", ["-body_bar_state saved,7777", "7777", " 2"]),
     ("F5", "error", "bar.opts -output_dir restarted -body_bar_state table.txt", ["-body_bar_state table.txt", "folder"]),
     ("F6", "warning", "bar.opts -output_dir cut -restart latest", ["cut/checkpoint_000002.h5"]),
+    ("F7", "warning", "bar.opts -output_dir restarted -output_overwrite yes -body_bar_state saved/checkpoint_000002.h5 -body_bar_element p2", ["-body_bar_state", "saved/checkpoint_000002.h5", "saved,2"]),
     ("M1", "error", f"cube.opts -body_a_mesh {DATA}/bad_flat.msh {HELD}", ["bad_flat.msh", " 1 ", "1.67e-15 m^3"]),
     ("M1", "error", f"cube.opts -body_a_mesh {DATA}/bad_twins.msh {HELD}", ["bad_twins.msh", " 1 ", " 2 "]),
     ("M1", "error", f"cube.opts -body_a_mesh folded.h5 -body_a_element p2 {HELD}", ["folded.h5", "tetrahedron ", "that do: 2)", "above 0"]),
