@@ -249,9 +249,9 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
     const char *name = strrchr(path, '/');
 
     SbFormat(size, frame, "%.*s,%lld", name ? (int)(name - path) : 1, name ? path : ".", (long long)step);
-    PetscCall(SbWarning(
-      out->comm, "%s: %s is of other bodies, meshes or elements: the frame %s is taken in its place", option,
-      path, frame));
+    PetscCall(SbWarning(out->comm,
+                        "%s: %s is of other bodies, meshes or elements: the frame %s is taken in its place",
+                        option, path, frame));
     PetscCall(SbH5Close(&h));
     *is = PETSC_FALSE;
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -282,8 +282,8 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
   PetscCall(PetscFree(row));
   PetscCall(SbH5Close(&h));
   PetscCheck(ok, out->comm, PETSC_ERR_USER_INPUT,
-             "%s %s: this checkpoint is damaged; give the folder of its run, whose frames serve as well", option,
-             path);
+             "%s %s: this checkpoint is damaged; give the folder of its run, whose frames serve as well",
+             option, path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
