@@ -161,6 +161,7 @@ struct _p_SbRun {
   PetscInt step_now; /* of the last accepted step */
   PetscReal t_now;
   PetscInt newton_total, linear_total, rejected_total, steps_total;
+  PetscReal good_steps; /* dynamic: steps accepted since one was shortened, or they became longer again */
   PetscInt newton_before, linear_before; /* of the runs that this one goes on from */
   PetscReal wall_start, seconds_solve;
   PetscReal dt, t_end; /* length of a step (the first one when adaptive) and end, s */

@@ -42,7 +42,7 @@ typedef struct {
   PetscBool optional;
 } Number;
 
-#define NNUMBER 15
+#define NNUMBER 16
 static void numbers_of(SbRun run, Times *times, Number number[NNUMBER])
 {
   SbEnergies *e = &run->energies;
@@ -62,6 +62,7 @@ static void numbers_of(SbRun run, Times *times, Number number[NNUMBER])
     {"remesh_momentum", &e->remesh_momentum, PETSC_TRUE},
     {"energy_most", &run->energy_most, PETSC_TRUE},
     {"paused_after", &times->paused, PETSC_TRUE},
+    {"good_steps", &run->good_steps, PETSC_TRUE},
   };
 
   memcpy(number, all, sizeof(all));

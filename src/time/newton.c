@@ -47,6 +47,7 @@
 #define NOTHING 1e-6    /* relative to E's rounding: predicted decrease that counts as none */
 #define ACCURATE 1e-6   /* relative tolerance of linear solves whose direction is used again */
 #define APPROACHES 50   /* iterations in which prescribed motions have to be completed */
+#define UNAVOIDABLE 0.2 /* of a step there: one so short may turn tets over */
 #define DIFFERENCE 1e-7 /* fraction of a prescribed motion, for finite differences by it */
 #define SETTLED \
   1e-4 /* of the speed of the time step (src/model/potential.c): a step that is short enough, where surfaces push each other */
@@ -57,8 +58,11 @@
   1e-8 /* of that size: no step of a whole time step need be shorter, however short these are */
 #define SETTLED_GAP \
   1e-2 /* of the width below which surfaces push each other: how much the last step may change gaps */
-#define EARLY 10         /* iterations in which friction is not lagged: normal forces are updated in each */
-#define SHIFT 0.1        /* of the shift by inertia: the least one of a tangent that is not definite */
+#define PATIENCE \
+  50 /* iterations, where surfaces push each other, after which it is asked whether they were worth it */
+#define WORTH 0.01 /* of the fall of E until then: what so many have to add beyond SB_NEWTON_ITERATIONS */
+#define EARLY 10   /* iterations in which friction is not lagged: normal forces are updated in each */
+#define SHIFT 0.1  /* of the shift by inertia: the least one of a tangent that is not definite */
 #define SHIFT_STIFF 1e-4 /* the same, relative to the mean ratio of stiffness and mass */
 #define SHIFTS 8         /* tries, each with a shift SHIFT_MORE times as large, before cells are projected */
 #define SHIFT_MORE 4.
@@ -98,6 +102,7 @@ typedef struct {
   PetscReal slope;        /* of E at `start` along that step, J */
   PetscReal norm;         /* of the residual there, N */
   PetscReal first, rise;  /* change of E over it, and over all since, J */
+  PetscReal change;       /* of E over the last step, J */
   SbContactSystem system; /* guarded contact: NULL before surfaces have pushed each other */
   SbBlocks blocks;        /* its second derivative, when the last direction was solved for */
   PetscInt nblock;        /* of all ranks */
@@ -466,6 +471,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
     n->rise = 0.;
   }
   n->rise += change;
+  n->change = change;
   PetscCall(linearise_pressure(n->run, X, Y, *s));
   PetscCall(VecCopy(to->x, X));
   PetscCall(VecCopy(to->r, F));
@@ -508,7 +514,7 @@ static PetscErrorCode approach(SNES snes)
   PetscCall(VecCopy(start, X));
   for (int round = 0; round < APPROACHES; round++) {
     PetscBool filtered = PETSC_FALSE;
-    PetscReal s;
+    PetscReal s, whole;
 
     /* all the rest at once */
     PetscCall(VecCopy(D, Y));
@@ -533,11 +539,13 @@ static PetscErrorCode approach(SNES snes)
     PetscCall(VecAXPY(Y, progress - 1., D));
     PetscCall(SbModelPotentialMaxStep(m, X, Y, 1., &s, &nactive));
     PetscCall(SbModelStrainEnergy(m, X, NULL, &energy, &before));
-    for (;; s *= 0.5) {
+    for (whole = s;; s *= 0.5) {
       PetscCall(VecWAXPY(n->to.x, -s, Y, X));
       PetscCall(SbModelPotentialAdvance(m, progress + s * (1. - progress)));
       PetscCall(SbModelStrainEnergy(m, n->to.x, NULL, &energy, &inverted));
-      if (s < SHORTEST || (inverted <= before && !PetscIsInfOrNanReal(energy))) break;
+      /* what moves by order may turn a tet over that nothing can keep from it */
+      if (s < SHORTEST || ((inverted <= before || s < UNAVOIDABLE * whole) && !PetscIsInfOrNanReal(energy)))
+        break;
     }
     PetscCall(PetscInfo(snes, "approach %d: %g of the rest of the way, of which %g was done\n", round,
                         (double)s, (double)progress));
@@ -591,7 +599,8 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
   const PetscBool guarded = (PetscBool)(n->run->model->npotential > 0);
   PetscBool filtered = PETSC_FALSE;
-  PetscReal slope = 0., s = 1.;
+  PetscReal slope = 0., s = 1., fall = 0.,
+            fall_before = 0.; /* of E in this solve, and until it was asked last, J */
   PetscInt nactive, first = 0, creeps = 0;
 
   PetscFunctionBeginUser;
@@ -644,7 +653,13 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     PetscCall(SNESLogConvergenceHistory(snes, snes->norm, snes->linear_its - linear));
     PetscCall(converged(snes, s));
     PetscCall(SNESMonitor(snes, snes->iter, snes->norm));
-    if (!snes->reason && snes->iter >= first + snes->max_its) snes->reason = SNES_DIVERGED_MAX_IT;
+    /* a collapse takes hundreds of steps down, and as many from halfway: on while they are worth it */
+    fall -= n->change;
+    if (!snes->reason && snes->iter >= first + snes->max_its &&
+        (!guarded || snes->max_its != SB_NEWTON_ITERATIONS ||
+         ((snes->iter - first) % PATIENCE == 0 && fall - fall_before < WORTH * fall)))
+      snes->reason = SNES_DIVERGED_MAX_IT;
+    if ((snes->iter - first) % PATIENCE == 0) fall_before = fall;
     if (!guarded && !n->run->model->dynamic && !n->provisional) creeps = s < CREEP ? creeps + 1 : 0;
     if (!snes->reason && creeps == CREEPS) snes->reason = SNES_DIVERGED_LINE_SEARCH;
 

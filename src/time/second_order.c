@@ -35,8 +35,6 @@ typedef struct {
   Vec own0, own1; /* Newmark with contact: accelerations without it, at the start and at the end; else NULL */
   Vec Xa, Va, Aa; /* stage of generalized-alpha; NULL when the stage is the end */
   Vec work;
-  PetscReal nominal; /* step length asked for, s; 0 before the first step */
-  PetscInt good;     /* steps accepted since the last cut */
   PetscReal
     rest; /* of a step that was cut where points come into contact: what follows it, s; 0: no such step */
   PetscReal whole;   /* its length before, s: the rest takes the time back to where it would have been */
@@ -289,7 +287,6 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
   PetscBool jumps;
 
   PetscFunctionBeginUser;
-  if (so->nominal == 0.) so->nominal = ts->time_step;
 
   /* a restarted run brings its acceleration along: that of generalized-alpha does not follow from the state */
   if (!so->started && so->run->step0 == 0 && so->set.method != SB_METHOD_EULER_IMPLICIT)
@@ -324,14 +321,14 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
 
       /* back towards the nominal length when four steps after a cut went well */
       PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &fixed));
-      h = fixed && so->good >= 3 ? PetscMin(2. * ts->time_step, so->nominal) : ts->time_step;
+      h = fixed && so->run->good_steps >= 3 ? PetscMin(2. * ts->time_step, so->run->dt) : ts->time_step;
       if (fixed && so->whole > 0.) h = so->rest > 0. ? so->rest : so->whole;
       PetscCall(TSAdaptChoose(ts->adapt, ts, h, NULL, &next, &accept));
       if (accept) {
         PetscCall(VecCopy(so->A1, so->run->A));
         if (so->own0) PetscCall(VecCopy(so->own1, so->own0));
         ts->ptime += ts->time_step;
-        so->good = next > ts->time_step ? 0 : so->good + 1;
+        so->run->good_steps = next > ts->time_step ? 0 : so->run->good_steps + 1;
         ts->time_step = next;
         so->run->stop_reason[0] = 0;
 
@@ -358,10 +355,10 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     PetscCall(VecCopy(so->V0, ts->vec_dot));
     ts->reject++;
     so->run->rejected_total++;
-    so->good = 0;
+    so->run->good_steps = 0;
     // steps that succeed in between may be halved without end, until t + h is t
     if (SbRunIsExplicit(so->run) || so->run->stopped || ++cuts > so->run->max_halvings ||
-        next < SHORTEST * so->nominal || SbRunTooShort(so->run, next)) {
+        next < SHORTEST * so->run->dt || SbRunTooShort(so->run, next)) {
       ts->reason = TS_DIVERGED_STEP_REJECTED;
       if (!SbRunIsExplicit(so->run) && !so->run->stopped && so->run->stop_reason[0]) {
         char why[sizeof(so->run->stop_reason)];

@@ -111,6 +111,29 @@ def check_fit():
     print("checkpoints of other runs are refused")
 
 
+def check_shortened():
+    """Steps that were halved become longer again as in the run that was not interrupted."""
+    options = ["-snes_max_it", "3", "-ts_max_time", "0.05", "-effects", "gravity,hold,hit", "-effect_hit_type", "gravity",
+               "-effect_hit_vector", "0,0,-1500", "-effect_hit_time", "exp(-(t/0.02)^2)"]
+    run(2, "whole-short", *WHOLE, *options, "-checkpoint_every_steps", "1", "-checkpoint_keep", "1000")
+    names, rows = history("whole-short")
+    dt = rows[:, names.index("dt")]
+    # one that was halved, where the next one is longer, and one before that
+    longer = [k for k in range(2, len(dt) - 1) if dt[k] < 0.0099 and dt[k + 1] > 1.5 * dt[k]]
+    if not longer:
+        sys.exit(f"no step becomes longer again: {dt}")
+    for step in (longer[0], longer[0] - 2):
+        folder = f"parts-short-{step}"
+        shutil.rmtree(OUT / folder, ignore_errors=True)
+        shutil.copytree(OUT / "whole-short", OUT / folder)
+        for path in (OUT / folder).glob("checkpoint_*"):
+            if int(path.stem[-6:]) > step:
+                path.unlink()
+        run(1, folder, *WHOLE, *options, "-restart", "latest")
+        compare("whole-short", folder, 1e-10, 1e-9)
+    print(f"steps of {dt[longer[0]]:g} s are followed by {dt[longer[0] + 1]:g} s after a restart, too")
+
+
 def main():
     check_reproduction("newmark", (1, 2, 3), "-time", "newmark")
     for time in ("genalpha", "euler_implicit"):
@@ -118,6 +141,7 @@ def main():
     for element in ("cr", "dg", "mixed"):
         # dg with points of its own, so that frames of this kind go on, too
         check_reproduction(element, (3,), *ELEMENTS[element], *(["-output_discontinuous"] if element == "dg" else []))
+    check_shortened()
     check_damage()
     check_fit()
 
