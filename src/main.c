@@ -133,6 +133,8 @@ static PetscErrorCode supple(int argc, char *argv[])
 
 int main(int argc, char *argv[])
 {
+  // Open MPI tries a lock file beside each file that HDF5 opens, for file pointers that nobody shares, and aborts where its path has more than 255 letters
+  (void)setenv("OMPI_MCA_sharedfp", "^lockedfile", 0);
   if (MPI_Init(&argc, &argv)) return 1;
   return SbErrorFinish(supple(argc, argv));
 }

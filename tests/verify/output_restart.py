@@ -1,8 +1,8 @@
 """A run that is taken up from a checkpoint, on another number of ranks, is the run that was not interrupted.
 
 Displacement, velocity and acceleration of the last frame and every row of history.csv are compared, for every element and
-for all of them in one scene. Also: damaged checkpoints, the newest one that is whole, checkpoints that do not fit the run.
-
+for all of them in one scene. Also: damaged checkpoints, the newest one that is whole, checkpoints that do not fit the run,
+a folder with a long path.
 """
 import re
 import shutil
@@ -134,6 +134,15 @@ def check_shortened():
     print(f"steps of {dt[longer[0]]:g} s are followed by {dt[longer[0] + 1]:g} s after a restart, too")
 
 
+def check_long_path():
+    """A folder whose path has more letters than Open MPI's lock files may have."""
+    folder = "/".join(["long", *["x" * 100] * 3])
+    for more in (["-ts_max_time", "0.1"], ["-restart", "latest"]):
+        run(2, folder, *WHOLE, *more)
+    if len(history(folder)[1]) != 21:
+        sys.exit(f"{folder}: {len(history(folder)[1])} rows, not 21")
+
+
 def main():
     check_reproduction("newmark", (1, 2, 3), "-time", "newmark")
     for time in ("genalpha", "euler_implicit"):
@@ -144,6 +153,7 @@ def main():
     check_shortened()
     check_damage()
     check_fit()
+    check_long_path()
 
 
 if __name__ == "__main__":
