@@ -107,6 +107,26 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Which velocity a body begins with: that of the state, or, of one without, that of its options. */
+static PetscErrorCode tell_velocity(SbModel m, const char *option, PetscInt b, const char *path,
+                                    PetscBool has)
+{
+  const SbBody *body = &m->body[b];
+  PetscBool given = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 3; k++)
+    given = (PetscBool)(given || m->start[b].velocity[k] || body->velocity[k] != 0. ||
+                        body->angular_velocity[k] != 0.);
+  if (has && given)
+    PetscCall(SbWarning(m->comm,
+                        "%s: the velocity that options give the body is unused in this run: %s has one",
+                        option, path));
+  else if (!has && !given)
+    PetscCall(SbWarning(m->comm, "%s: %s has no velocity, the body begins at rest", option, path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Values at the nodes of body b. */
 static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other *o)
 {
@@ -145,7 +165,8 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
     for (int e = 0; e < n - 4; e++) weight[4 + e] = 4. * weight[edge[e][0]] * weight[edge[e][1]];
     for (int a = 0; a < 4 && n == 10; a++) weight[a] *= 2. * weight[a] - 1.;
     for (int k = 0; k < 3; k++) {
-      u[3 * i + k] = v[3 * i + k] = 0.;
+      u[3 * i + k] = 0.;
+      if (o->v) v[3 * i + k] = 0.;
       for (PetscInt a = 0; a < n; a++) {
         u[3 * i + k] += weight[a] * o->u[3 * point[a] + k];
         if (o->v) v[3 * i + k] += weight[a] * o->v[3 * point[a] + k];
@@ -163,9 +184,7 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
                         "%s: nodes are up to %g m outside of the body in %s, and take the values of the "
                         "nearest place: is it the same body, at the same place?",
                         option, (double)far, o->path));
-  if (!o->v)
-    PetscCall(
-      SbWarning(run->model->comm, "%s: %s has no velocity, the body begins at rest", option, o->path));
+  PetscCall(tell_velocity(run->model, option, b, o->path, (PetscBool)(o->v != NULL)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -264,11 +283,10 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
     PetscScalar *x;
     PetscReal *all = NULL;
     PetscInt n;
+    const PetscBool has = (PetscBool)(H5Lexists(h.file, k ? "v" : "u", H5P_DEFAULT) > 0);
 
-    if (H5Lexists(h.file, k ? "v" : "u", H5P_DEFAULT) <= 0) {
-      PetscCall(SbWarning(out->comm, "%s: %s has no velocity, the body begins at rest", option, path));
-      continue;
-    }
+    if (k) PetscCall(tell_velocity(run->model, option, b, path, has));
+    if (!has) continue;
     PetscCall(read_all(h.file, k ? "v" : "u", H5T_NATIVE_DOUBLE, sizeof(double), 3, &n, &all));
     ok = (PetscBool)(all != NULL);
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &ok, 1, SB_MPI_BOOL, MPI_LAND, out->comm));

@@ -79,6 +79,9 @@ for n in 1 2; do
     check "strain energy $(row0 strain) J of a state of $e J, $more" awk -v e="$(row0 strain)" -v f="$e" 'BEGIN { d = e / f - 1; exit d > 1e-6 || d < -1e-6 }'
     check "no warning that the run has no velocity" grep -q "no velocity" state.txt
   done
+  # it is thrown as it is loaded: kinetic energy of 4 kg that options give a state without velocity
+  "${mpi[@]}" $n "$supple" defaults.opts $bar -body_bar_state loaded -body_bar_velocity 0,0,0.5 -ts_max_time 1e-6 -ts_dt 1e-6 -output_dir start -output_overwrite yes || fail "a state that is thrown"
+  check "kinetic energy $(row0 kinetic) J of a state that is thrown" awk -v e="$(row0 kinetic)" 'BEGIN { d = e / 0.5 - 1; exit d > 1e-9 || d < -1e-9 }'
 done
 
 # between p1 and p2: values at the nodes are those of the other run, whose edges count when they were written
