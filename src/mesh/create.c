@@ -45,9 +45,11 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
   PetscCall(SbMergedMeshCreate(comm, (SbReading)reading, nbody, body, nset, set, &merged));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
-  // repairs and oddities always, the rest on request
+  // repairs and oddities always, once for copies of one mesh, the rest on request
   for (PetscInt b = 0; b < nbody; b++) {
     const SbBody *p = &body[b];
+    const PetscBool again = (PetscBool)(b && p->copy_of[0] && !strcmp(p[-1].copy_of, p->copy_of) &&
+                                        !strcmp(p[-1].mesh, p->mesh) && !strcmp(p[-1].note, p->note));
 
     if (full)
       PetscCall(PetscPrintf(comm,
@@ -58,7 +60,7 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
                             (double)p->bbox[1], (double)p->bbox[2], (double)p->bbox[3], (double)p->bbox[4],
                             (double)p->bbox[5], (double)p->min_dihedral, (double)p->max_radius_ratio,
                             p->note[0] ? "; " : "", p->note));
-    else if (p->note[0] && !p->in_memory)
+    else if (p->note[0] && !p->in_memory && !again)
       PetscCall(PetscPrintf(comm, "body '%s': %s: %s\n", p->name, p->mesh, p->note));
   }
   PetscCall(PetscNew(&m));

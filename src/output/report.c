@@ -36,24 +36,39 @@ static PetscErrorCode entry(const char *title, const char *format, ...)
 
 /* ------------------------------------------------------------------ before the run */
 
-/* "liver", or for the first of its copies "50 x ball"; false for the others. */
-static PetscBool line_of_body(SbModel m, PetscInt b, size_t size, char name[])
+/*
+  "liver", or for the first of alike copies "50 x ball"; false for the others. mass[2]: the least and the largest of them, kg. Copies are alike in all that the tables say but the mass, as they may
+  differ in scale.
+*/
+static PetscBool line_of_body(SbModel m, SbOutput out, PetscInt b, size_t size, char name[],
+                              PetscReal mass[2])
 {
   const SbBody *body = &m->body[b];
-  PetscInt n = 1;
+  PetscInt n = 0;
 
+  mass[0] = mass[1] = m->material[b]->density * body->volume;
   (void)snprintf(name, size, "%s", body->name);
-  if (!body->copy_of[0]) return PETSC_TRUE;
-  if (b && !strcmp(body[-1].copy_of, body->copy_of)) return PETSC_FALSE;
-  while (b + n < m->nbody && !strcmp(body[n].copy_of, body->copy_of)) n++;
-  (void)snprintf(name, size, "%" PetscInt_FMT " x %s", n, body->copy_of);
+  for (PetscInt k = 0; k < m->nbody && body->copy_of[0]; k++) {
+    const SbBody *other = &m->body[k];
+
+    if (strcmp(other->copy_of, body->copy_of) || strcmp(other->element, body->element) ||
+        other->ncell != body->ncell || out->body_nodes[k] != out->body_nodes[b] ||
+        strcmp(m->material[k]->law, m->material[b]->law) || m->material[k]->E != m->material[b]->E ||
+        m->material[k]->nu != m->material[b]->nu || m->material[k]->density != m->material[b]->density)
+      continue;
+    if (k < b) return PETSC_FALSE;
+    mass[0] = PetscMin(mass[0], m->material[k]->density * other->volume);
+    mass[1] = PetscMax(mass[1], m->material[k]->density * other->volume);
+    if (++n > 1) (void)snprintf(name, size, "%" PetscInt_FMT " x %s", n, body->copy_of);
+  }
   return PETSC_TRUE;
 }
 
 static PetscErrorCode print_bodies(SbModel m, SbOutput out)
 {
-  char name[2 * SB_NAME_MAX];
+  char name[2 * SB_NAME_MAX], kg[32];
   PetscInt tets = 0, nodes = 0;
+  PetscReal mass[2];
 
   PetscFunctionBeginUser;
   PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n%-15s %-7s %8s %9s %9s %13s %12s\n", "body", "element", "tets",
@@ -64,7 +79,7 @@ static PetscErrorCode print_bodies(SbModel m, SbOutput out)
 
     tets += body->ncell;
     nodes += n;
-    if (!line_of_body(m, b, sizeof(name), name)) continue;
+    if (!line_of_body(m, out, b, sizeof(name), name, mass)) continue;
     PetscCall(PetscPrintf(
       PETSC_COMM_SELF,
       "%-15.15s %-7.7s %8" PetscInt_FMT " %9" PetscInt_FMT " %9" PetscInt_FMT " %13.1f %12.2f\n", name,
@@ -77,13 +92,16 @@ static PetscErrorCode print_bodies(SbModel m, SbOutput out)
   PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n%-15s %-12s %11s %9s %14s %12s\n", "body", "material", "E (Pa)",
                         "nu", "rho (kg/m^3)", "mass (kg)"));
   for (PetscInt b = 0; b < m->nbody; b++) {
-    const SbBody *body = &m->body[b];
     const SbMaterial material = m->material[b];
 
-    if (!line_of_body(m, b, sizeof(name), name)) continue;
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%-15.15s %-12.12s %11.4g %9.6g %14.6g %12.5g\n", name,
+    if (!line_of_body(m, out, b, sizeof(name), name, mass)) continue;
+    if (mass[1] - mass[0] > 1e-5 * mass[1])
+      SbFormat(sizeof(kg), kg, "%.2g-%.2g", (double)mass[0], (double)mass[1]);
+    else
+      SbFormat(sizeof(kg), kg, "%.5g", (double)mass[0]);
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%-15.15s %-12.12s %11.4g %9.6g %14.6g %12s\n", name,
                           material->law, (double)material->E, (double)material->nu, (double)material->density,
-                          (double)(material->density * body->volume)));
+                          kg));
   }
   PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n"));
   PetscFunctionReturn(PETSC_SUCCESS);

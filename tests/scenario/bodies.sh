@@ -49,6 +49,14 @@ grep -q '"name": "brick2"' copies/run.json || fail "no body brick2 in run.json"
 "$supple" copies/scenario.opts -output_dir again || fail "the scenario that was written does not run"
 cmp -s <(cut -d, -f1-12 copies/history.csv) <(cut -d, -f1-12 again/history.csv) || fail "the scenario that was written gives other numbers"
 
+# one line for copies that are alike: the third has another modulus, and one twice as large has eight times the mass
+printf '0 0 0\n1 0 0 0 0 1 0 2\n2 0 0\n3 0 0\n' >sizes.txt
+"$supple" defaults.opts -bodies brick -body_brick_copies sizes.txt -body_brick3_young 2e4 -output_dir alike -quiet no >alike.txt || fail "copies of other sizes do not run"
+check "no line for the three that are alike: $(cat alike.txt)" grep -Eq '^3 x brick +linear +1e\+04 .* 2-16$' alike.txt
+check "no line for the one that is not: $(cat alike.txt)" grep -Eq '^brick3 +linear +2e\+04 .* 2$' alike.txt
+"$supple" defaults.opts -bodies bead -body_bead_mesh "$top/tests/data/bead.obj" -body_bead_tet_size 0.01 -body_bead_copies grid:3,1,1,1,1,1 -output_dir alike -quiet no >alike.txt || fail "copies of a surface do not run"
+check "the mesh of copies is told of more than once: $(cat alike.txt)" [ "$(grep -c ' tets of size ' alike.txt)" = 1 ]
+
 # mistakes
 printf '0 0 0\n1 2 3 4\n' >bad.txt
 error 1 "-body_default_yuong|-body_default_young" defaults.opts -bodies a -body_default_yuong 3
