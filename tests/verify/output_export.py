@@ -146,6 +146,23 @@ def check_gltf(it, folder):
     check(numpy.abs(trimesh.load(OUT / "still.glb", process=False).geometry["bar"].vertices - it.positions(0)[surface.points]).max() < 1e-6, "a still of frame 0")
 
 
+def check_remeshed():
+    """A file per frame has the mesh of its frame; one with all frames has those since the last re-meshing, and the last line says how many are left out."""
+    run(1, "again", "-ts_max_time", "0.03", "-quiet", "-body_bar_mesh", "box:0.4,0.1,0.1:2", "-remesh_times", "0.015", "-remesh_size", "0.5")
+    it = supple.Run(OUT / "again")
+    old = sum(it.mesh(k) is not it.mesh(-1) for k in range(len(it)))
+    check(0 < old < len(it), f"{old} of {len(it)} frames before the re-meshing")
+    check("without" not in export(OUT / "again", "--to", "ply", "-o", OUT / "again/bar"), "ply: frames left out")
+    files = sorted((OUT / "again").glob("bar_*.ply"))
+    check(len(files) == len(it), f"ply: {len(files)} files for {len(it)} frames")
+    for k, path in enumerate(files):
+        x = trimesh.load(path, process=False).vertices
+        y = it.positions(k)[it.mesh(k).surface.points]
+        check(x.shape == y.shape and numpy.abs(x - y).max() < 1e-6, f"ply: frame {k} is not the run's")
+    for form in ("usd", "gltf", "alembic"):
+        check(f"without the {old} " in export(OUT / "again", "--to", form, "-o", OUT / "again/bar"), f"{form}: nothing says that frames are left out")
+
+
 def main():
     run(1, "run", "-ts_max_time", "0.04", "-quiet", "-time", "euler_implicit", *BALL)
     it = supple.Run(OUT / "run")
@@ -154,6 +171,7 @@ def main():
     check_gltf(it, OUT / "run")
     check("there is no frame 99" in export(OUT / "run", "--to", "ply", "--frame", 99, fails=True), "unknown frame")
     check_alembic(it, OUT / "run")
+    check_remeshed()
 
 
 if __name__ == "__main__":
