@@ -2,8 +2,8 @@
   option_check.c - options that nobody read: which are ours and misspelt, which are right but of no use in this run, which are PETSc's and did nothing.
 
   PETSc cannot distinguish a misspelt option from one that an object created later would read, so it stays silent; here a slip in one of its most common
-  ones is an error. Ours are all read before anything is computed. A name is ours when it begins with the prefix of one of our classes, when it is a
-  program-wide key, or when it is within two edits of one and does not begin like an option of PETSc.
+  ones is an error. Ours are all read before anything is computed. A name is ours when it begins with the prefix of one of our classes or the first word of a
+  program-wide key, or when it is a key or within two edits of one, and does not begin like an option of PETSc.
 
   A misspelt one ends the run; one that is right and unused is warned of, with the reason: its integrator, type or effect is not the one of this run. What belongs to
   an instance that nobody has read is right when some list of the scenario file names that instance and the class has the key:
@@ -55,6 +55,31 @@ static const char *const common[] = {
   "-snes_monitor",     "-snes_view",         "-snes_converged_reason",
   "-snes_ksp_ew",      "-snes_lag_jacobian", "-snes_linesearch_type",
 };
+
+/*
+  What a name that is near none may have meant: an option of a class without its prefix, as -young, or one that begins with the same word as a program-wide option, as -time_budget with
+  that of -time_predictor (-contact_ksp_type is PETSc's). "" when it is nothing of ours.
+*/
+static void guess(const char *name, size_t size, char text[])
+{
+  const size_t n = strcspn(name, "_") + 1;
+  const PetscBool more =
+    (PetscBool)(strlen(name) > n && !looks_like_petsc(name) && !looks_like_petsc(name + n));
+
+  text[0] = 0;
+  for (PetscInt i = 0; i < SbTheOptions.nblock && !text[0]; i++) {
+    const SbOptionBlock *block = &SbTheOptions.block[i];
+
+    for (PetscInt j = 0; j < block->n && !text[0]; j++) {
+      const char *key = block->rows[j].key;
+
+      if (block->klass[0] && !strcasecmp(key, name))
+        SbFormat(size, text, "; did you mean -%s_NAME_%s?", block->klass, key);
+      else if (!block->klass[0] && more && !strncasecmp(key, name, n))
+        SbFormat(size, text, "; -help all lists them");
+    }
+  }
+}
 
 /* The class whose prefix a name begins with; NULL when there is none. */
 static const char *class_of(const char *name)
@@ -173,7 +198,7 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
     PetscCall(PetscStrncpy(text, row->help, size));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (!klass && looks_like_petsc(name)) {
+  if (!klass && looks_like_petsc(name) && !SbHasPrefix(name, "ts_")) { /* -ts_dt is ours, too */
     if (SbHasPrefix(name, "ksp_ pc_ snes_"))
       PetscCall(SbSuggestNames(dashed, PETSC_STATIC_ARRAY_LENGTH(common), common, sizeof(near), near));
     if (!near[0] || !strcasecmp(near, dashed)) PetscFunctionReturn(PETSC_SUCCESS);
@@ -211,11 +236,12 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
   }
   PetscCall(SbSuggestNames(dashed, n, list, sizeof(near), near));
   PetscCall(PetscFree2(list, names));
-  if (!klass && !near[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!klass && !near[0]) guess(name, sizeof(why), why);
+  if (!klass && !near[0] && !why[0]) PetscFunctionReturn(PETSC_SUCCESS);
   *verdict = WRONG;
   if (near[0])
     PetscCall(PetscSNPrintf(why, sizeof(why), "; did you mean %s?", near));
-  else {
+  else if (klass) {
     /* why an option with the prefix of a class was not read, when no name is near */
     char keys[768] = "", instances[256] = "";
     const SbOptionRecord *last = NULL;

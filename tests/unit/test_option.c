@@ -28,6 +28,7 @@ static const SbOption run_rows[] = {
   {"integrator", SB_OPTION_CHOICE, 1, "", "newmark", "newmark|genalpha|static", "integrator"},
   {"limit", SB_OPTION_REAL, 1, "s", "", "(0, inf)", "nothing by default"},
   {"ts_dt", SB_OPTION_REAL, 1, "s", "0.01", "(0, inf)", "step"},
+  {"write_every", SB_OPTION_REAL, 1, "s", "0.01", "(0, inf)", "how often"},
   {"other", SB_OPTION_REAL, 1, "s", "1", "(0, inf)", "only one integrator reads it"},
 };
 
@@ -350,8 +351,12 @@ static PetscErrorCode test_check(void)
   PetscCall(unread("-other 2", NULL));
   PetscCall(unread("-body_liver_yuong 3 -body_liver_yung 4", "-body_liver_yung|-body_liver_young|1"));
   PetscCall(unread("-ksp_rtoll 1e-3", "-ksp_rtoll|-ksp_rtol"));
+  PetscCall(unread("-ts_dtt 3", "-ts_dtt|-ts_dt"));
+  /* one of a class without its prefix, or with the first word of a program-wide one */
+  PetscCall(unread("-young 3", "-young|-body_NAME_young"));
+  PetscCall(unread("-write_nothing 3", "-write_nothing"));
   /* not ours: PETSc's, or near nothing */
-  PetscCall(unread("-ksp_nothing 1e-3 -frobnicate 2 -ts_st 3", NULL));
+  PetscCall(unread("-ksp_nothing 1e-3 -frobnicate 2 -ts_view 3 -write_ksp_type cg", NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -495,7 +500,7 @@ static PetscErrorCode test_manual(const char *folder)
       if (strstr(line, "\t-body_<name>_young\treal\t1\tPa\tyes\t\t(0, inf)\t")) required++;
     }
     if (f) (void)fclose(f);
-    SB_CHECK(rows == 1 + 16, "%d lines in the table", rows);
+    SB_CHECK(rows == 1 + 17, "%d lines in the table", rows);
     SB_CHECK(tabs == 9 * rows, "%d tabs in the table", tabs);
     SB_CHECK(required == 1, "young is not marked as required");
   }
