@@ -38,8 +38,9 @@ _supple_all() {
     case $option:$1 in
       *'<name>'*:"${option%%<name>*}"*)
         [ "$list" = "$last" ] || names=$(_supple_names "$list")
+        [ "$list" = "$last" ] || [ "$list" != bodies ] || names+=$'\ndefault'
         last=$list
-        printf '%s\n' "$names" | while read -r name; do printf '%s\n' "${option%%<name>*}$name${option#*<name>}"; done
+        printf '%s\n' "$names" | while read -r name; do [ -z "$name" ] || printf '%s\n' "${option%%<name>*}$name${option#*<name>}"; done
         ;;
       *'<name>'*) printf '%s\n' "${option%%<name>*}" ;;
       *) printf '%s\n' "$option" ;;
@@ -53,7 +54,7 @@ _supple_files() {
   shift
   compgen -d -- "$cur" | sed 's,$,/,'
   compgen -f -- "$cur" | while IFS= read -r file; do
-    [ $# -gt 0 ] || printf '%s\n' "$file"
+    [ $# -gt 0 ] || [ -d "$file" ] || printf '%s\n' "$file"
     for ending in "$@"; do case $file in *."$ending") printf '%s\n' "$file" ;; esac done
   done
 }
@@ -64,7 +65,7 @@ _supple_value() {
   case $1:$3:$4 in
     *:bool:*) compgen -W 'true false' -- "$cur" ;;
     *:*:?*) compgen -W "$(printf '%s' "$4" | tr ',' ' ')" -- "$cur" ;;
-    *_mesh:text: | *_obstacle:* | *file:* | -restart:* | -view:*) _supple_files "$cur" | sort -u ;;
+    *_mesh:text: | *_state:text: | *_copies:text: | *_obstacle:* | *file:* | -restart:* | -view:*) _supple_files "$cur" | sort -u ;;
     *_dir:*) compgen -d -- "$cur" | sed 's,$,/,' ;;
   esac
 }

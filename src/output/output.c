@@ -27,7 +27,7 @@ static const SbOption rows[] = {
   {"output_quadratic", SB_OPTION_BOOL, 1, "", "false", "",
    "bodies of p2: fields.h5 has all their nodes, and viewers show quadratic tets; if not, the vertices only"},
   {"output_contacts", SB_OPTION_BOOL, 1, "", "false", "",
-   "contacts.xmf: the active contact points of each frame, with normals, gaps and forces"},
+   "contacts.vtkhdf, contacts.xmf: the active contact points of each frame, with normals, gaps and forces"},
   {"output_history", SB_OPTION_BOOL, 1, "", "true", "", "write history.csv"},
   {"output_history_bodies", SB_OPTION_BOOL, 1, "", "false", "",
    "history.csv also has energies, momentum and centre of mass of each body"},
