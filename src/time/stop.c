@@ -174,7 +174,7 @@ PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool w
   /* a job that is put back into the queue would come here again */
   PetscCheck(
     reason != WALL_TIME || step > run->step0, run->model->comm, PETSC_ERR_USER_INPUT,
-    "-wall_time: the %g s are over before a step is done: give more time or ranks, or a coarser mesh",
+    "-wall_time: the %.6g s are over before a step is done: give more time or ranks, or a coarser mesh",
     (double)run->stop.wall_time);
   run->stopped = PETSC_TRUE;
   run->paused = PETSC_FALSE;
