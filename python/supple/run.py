@@ -53,13 +53,14 @@ class Surface:
 
 class Mesh:
     """The bodies' mesh at rest: x [npoint][3] m, cells [ncell][4] points, vertices [ncell][4] (which tell what points coincide where each
-    cell has its own), body [ncell] number of the body, `arrays` the names of what else there is (sets, ranks)."""
+    cell has its own), cells10 [ncell][10] points of quadratic tets, or None, body [ncell] number of the body, `arrays` the names of what else there is (sets, ranks)."""
 
     def __init__(self, group):
         self.path = group.name
         self.x, self.cells, self.body = group["x"][()], group["cells"][()], group["body"][()]
         self.vertices = group["vertices"][()] if "vertices" in group else self.cells
-        self.arrays = [name for name in group if name not in ("x", "cells", "vertices")]
+        self.cells10 = group["cells10"][()] if "cells10" in group else None
+        self.arrays = [name for name in group if name not in ("x", "cells", "cells10", "vertices")]
 
     @cached_property
     def surface(self):
@@ -278,7 +279,8 @@ class Run:
         mesh, names = self.mesh(k), self.fields(k)
         fields = {name: self.field(name, k) for name in names}
         on_cells = {name: [values] for name, values in fields.items() if len(values) == len(mesh.cells)}
-        return meshio.Mesh(self.positions(k), [("tetra", mesh.cells)], cell_data=on_cells,
+        cells = ("tetra", mesh.cells) if mesh.cells10 is None else ("tetra10", mesh.cells10)
+        return meshio.Mesh(self.positions(k), [cells], cell_data=on_cells,
                            point_data={name: values for name, values in fields.items() if name not in on_cells})
 
     def to_pyvista(self, k=-1):

@@ -63,6 +63,7 @@ for ranks in (1, 3):
 
 it = supple.Run(OUT / "on3")
 check(numpy.abs(it.data("displacement", -1) - bent(it.mesh().x, 0.3)).max() < 1e-15 and len(it.mesh().surface.points) < len(it.mesh().x), "python/supple")
+check((it.mesh().cells10 == data["cells10"]).all() and "cells10" not in it.fields(), f"cells10 are among the fields {it.fields()}")
 run(2, "on1", "-restart", "latest", "-ts_max_time", "0.4")
 check(len(supple.Run(OUT / "on1")) == 5, "a restart does not go on with the frames")
 run(1, "on1", "-restart", "latest", "-ts_max_time", "0.5", "-output_quadratic", "no", fails="-output_quadratic")
