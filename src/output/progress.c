@@ -95,13 +95,13 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A line within a step that takes long, by rank 0. Not collective. */
-static PetscErrorCode say_within(SbRun run, const char *what, PetscInt iteration, PetscReal residual)
+/* A line within a step that takes long, by rank 0; linear: iteration of the solve within that of Newton's method, -1: none. Not collective. */
+static PetscErrorCode say_within(SbRun run, PetscInt newton, PetscInt linear, PetscReal residual)
 {
   const SbOutput out = (SbOutput)run->output;
   const PetscReal now = MPI_Wtime(), begun = run->stop.step_begun;
   PetscReal dt = run->dt;
-  char contact[32] = "";
+  char contact[32] = "", solve[40] = "";
 
   PetscFunctionBeginUser;
   if (!out->line || begun == 0. || now - begun < LONG || now - out->line->within < LONG)
@@ -110,11 +110,12 @@ static PetscErrorCode say_within(SbRun run, const char *what, PetscInt iteration
   if (run->ts) PetscCall(TSGetTimeStep(run->ts, &dt));
   if (run->model->nbegin_step)
     (void)snprintf(contact, sizeof(contact), ", contact round %" PetscInt_FMT, run->contact_round);
+  if (linear >= 0) (void)snprintf(solve, sizeof(solve), ", linear iteration %" PetscInt_FMT, linear);
   PetscCall(SbProgressEnd(out));
   PetscCall(PetscPrintf(PETSC_COMM_SELF,
-                        "  step %" PetscInt_FMT " has taken %.0f s: %s iteration %" PetscInt_FMT
-                        ", residual %.2e N%s, length %.3g%s\n",
-                        run->step_now + 1, (double)(now - begun), what, iteration, (double)residual, contact,
+                        "  step %" PetscInt_FMT " has taken %.0f s: Newton iteration %" PetscInt_FMT
+                        "%s, residual %.2e N%s, length %.3g%s\n",
+                        run->step_now + 1, (double)(now - begun), newton, solve, (double)residual, contact,
                         (double)dt, run->model->dynamic ? " s" : ""));
   (void)fflush(PETSC_STDOUT);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -124,15 +125,18 @@ static PetscErrorCode within_newton(SNES snes, PetscInt iteration, PetscReal res
 {
   PetscFunctionBeginUser;
   (void)snes;
-  PetscCall(say_within((SbRun)run, "Newton", iteration, residual));
+  PetscCall(say_within((SbRun)run, iteration, -1, residual));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode within_linear(KSP ksp, PetscInt iteration, PetscReal residual, void *run)
 {
+  PetscInt newton;
+
   PetscFunctionBeginUser;
   (void)ksp;
-  if (iteration % 10 == 0) PetscCall(say_within((SbRun)run, "linear", iteration, residual));
+  PetscCall(SNESGetIterationNumber(((SbRun)run)->snes, &newton));
+  if (iteration % 10 == 0) PetscCall(say_within((SbRun)run, newton, iteration, residual));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
