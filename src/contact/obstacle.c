@@ -9,7 +9,8 @@
 #include "sbgeometry.h"
 #include "sbtriangles.h"
 
-#define SIDES 96 /* of a cylinder as triangles */
+#define SIDES 96  /* of a cylinder as triangles */
+#define LARGE 20. /* m; files of larger obstacles are in mm */
 
 typedef enum { PLANE, SPHERE, BOX, CAPSULE, CYLINDER, BOWL, MESH } Shape;
 
@@ -101,6 +102,7 @@ PetscErrorCode SbObstacleSetUp(SbObstacle o, MPI_Comm comm, const char *option, 
                                const PetscReal at[3], size_t size, char note[])
 {
   SbTriangles *t = &o->surface;
+  PetscReal length = 0.;
 
   PetscFunctionBeginUser;
   if (o->shape != MESH) PetscFunctionReturn(PETSC_SUCCESS);
@@ -108,6 +110,10 @@ PetscErrorCode SbObstacleSetUp(SbObstacle o, MPI_Comm comm, const char *option, 
   PetscCall(SbSignedDistanceCreate(t->nvert, t->x, t->ntri, t->tri, t->across, &o->distance));
   (void)snprintf(note, size, "%s: %" PetscInt_FMT " triangles around %.4g m^3%s", o->file, t->ntri,
                  (double)t->volume, t->turned ? " (turned: they were inverted)" : "");
+  for (PetscInt i = 0; i < 3 * t->nvert; i++) length = PetscMax(length, t->x[i] - t->x[i % 3]);
+  if (length > LARGE && scale == 1.)
+    PetscCall(SbWarning(comm, "%s: %s is more than %.3g m long: if the file is in mm, give %s_scale 0.001",
+                        option, o->file, (double)length, option));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -51,7 +51,9 @@ CUBE = """-bodies a
 OPEN = "solid lid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid lid\n"
 # A tet of unit edges whose triangles are turned inwards, as an obstacle below the bar.
 INWARDS = "OFF\n4 4 6\n0 0 -1\n1 0 -1\n0 1 -1\n0 0 -0.5\n3 0 1 2\n3 0 3 1\n3 1 3 2\n3 0 2 3\n"
-FILES = {"bar.opts": BAR, "cube.opts": CUBE, "lid.stl": OPEN, "inwards.off": INWARDS, "table.txt": "0 0\n1 2\n1 3\n", "empty.msh": ""}
+# The same in mm, turned outwards.
+FAR = "OFF\n4 4 6\n0 0 -1000\n1000 0 -1000\n0 1000 -1000\n0 0 -500\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n"
+FILES = {"bar.opts": BAR, "cube.opts": CUBE, "lid.stl": OPEN, "inwards.off": INWARDS, "far.off": FAR, "table.txt": "0 0\n1 2\n1 3\n", "empty.msh": ""}
 
 HELD = "-effects hold -effect_hold_type fixed -effect_hold_on xmin"
 DRIVEN = HELD.replace("hold ", "hold,end ", 1) + " -effect_end_type prescribed_displacement -effect_end_on xmax -effect_end_displacement"
@@ -112,6 +114,7 @@ CASES = [
     ("M3", "error", f"cube.opts -body_a_mesh {DATA}/bead.obj -body_a_tet_size 1e-7 {HELD}", ["bead.obj", "1e-07 m", "tet_size"]),
     ("M4", "warning", "bar.opts -effects gravity,stop -effect_stop_type contact -effect_stop_response projected -effect_stop_obstacle mesh:inwards.off", ["inwards.off"]),
     ("M5", "error", f"cube.opts -body_a_mesh {DATA}/two_cubes_41.msh -body_a_scale 1.7e308 {HELD}", ["two_cubes_41.msh", "-body_a_scale", "1.7e+308"]),
+    ("M5", "warning", "bar.opts -effects gravity,stop -effect_stop_type contact -effect_stop_obstacle mesh:far.off", ["-effect_stop_obstacle_scale", "far.off"]),
     ("M6", "warning", f"cube.opts -body_a_mesh box:0.1,0.1,0.1:3 -remesh_quality 0.99 -static_steps 2 {HELD}", ["'a'", " 1:"]),
     ("S1", "error", "bar.opts -set_left_at plane:1,0,0,9", ["'left'", "0.4"]),
     ("S1", "error", "bar.opts -sets left,tip -set_tip_at box:0.39,0.04,0.04,0.41,0.06,0.06 -effect_pull_on tip", ["-effect_pull_on", "tip"]),
