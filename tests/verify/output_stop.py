@@ -132,13 +132,14 @@ def main():
     else:
         sys.exit(f"no line within a long step in six runs: {text}")
 
-    # a second Ctrl-C
-    process = start(1, "twice", *LONG_STEPS, "-stop_grace", "1000", "-body_bar_mesh", "box:0.4,0.1,0.1:80,20,20", rows=1)
-    process.send_signal(signal.SIGINT)
-    time.sleep(1)
-    process.send_signal(signal.SIGINT)
-    if process.wait() != 128 + signal.SIGINT:
-        sys.exit(f"a second SIGINT: exit code {process.returncode}")
+    # a second Ctrl-C, of the program and of scripts/mpi
+    for ranks in (1, 2):
+        process = start(ranks, f"twice{ranks}", *LONG_STEPS, "-stop_grace", "1000", "-body_bar_mesh", "box:0.4,0.1,0.1:80,20,20", rows=1)
+        process.send_signal(signal.SIGINT)
+        time.sleep(1)
+        process.send_signal(signal.SIGINT)
+        if process.wait() != 128 + signal.SIGINT:
+            sys.exit(f"a second SIGINT on {ranks} ranks: exit code {process.returncode}")
     print(f"stopped after steps {steps}, gone on from there")
 
 
