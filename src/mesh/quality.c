@@ -75,16 +75,13 @@ PetscErrorCode SbImportNote(const SbImport *im, SbBody *body)
     {im->npinched, "surface edges with more than two facets"},
     {im->nlost, "triangles of groups that are no face of a tet"},
   };
-  char one[128];
 
   PetscFunctionBeginUser;
   PetscCall(PetscStrncpy(body->note, im->note, sizeof(body->note)));
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(notes); i++) {
-    if (!notes[i].n) continue;
-    (void)snprintf(one, sizeof(one), "%s%s: %" PetscInt_FMT, body->note[0] ? ", " : "", notes[i].text,
-                   notes[i].n);
-    PetscCall(PetscStrlcat(body->note, one, sizeof(body->note)));
-  }
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(notes); i++)
+    if (notes[i].n)
+      SbAppend(sizeof(body->note), body->note, "%s%s: %" PetscInt_FMT, body->note[0] ? ", " : "",
+               notes[i].text, notes[i].n);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -243,9 +243,8 @@ static PetscErrorCode empty_group(PetscInt nbody, const SbBody body[], const SbI
                                   const SbSet *set)
 {
   const char **names, *wanted = strchr(set->group, '.') ? strchr(set->group, '.') + 1 : set->group;
-  char groups[1024], near[256];
+  char groups[1024] = "", near[256];
   PetscInt n = 0, exists = 0;
-  size_t size;
 
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < nbody; b++) n += import[b].ngroup;
@@ -262,22 +261,16 @@ static PetscErrorCode empty_group(PetscInt nbody, const SbBody body[], const SbI
   PetscCall(SbSuggestNames(wanted, n, names, sizeof(near), near));
   PetscCall(PetscFree(names));
   // "liver: wall, ligament; stone: none"
-  size = sizeof(groups);
-  groups[0] = 0;
   for (PetscInt b = 0; b < nbody; b++) {
     const SbImport *im = &import[b];
 
-    PetscCall(PetscStrlcat(groups, b ? "; " : "", size));
-    PetscCall(PetscStrlcat(groups, body[b].name, size));
-    PetscCall(PetscStrlcat(groups, im->ngroup ? ": " : ": none", size));
+    SbAppend(sizeof(groups), groups, "%s%s: %s", b ? "; " : "", body[b].name, im->ngroup ? "" : "none");
     for (PetscInt g = 0; g < im->ngroup; g++) {
       PetscBool known = PETSC_FALSE;
 
       for (PetscInt h = 0; h < g; h++)
         known = (PetscBool)(known || !strcmp(im->group[h].name, im->group[g].name));
-      if (known) continue;
-      PetscCall(PetscStrlcat(groups, g ? ", " : "", size));
-      PetscCall(PetscStrlcat(groups, im->group[g].name, size));
+      if (!known) SbAppend(sizeof(groups), groups, "%s%s", g ? ", " : "", im->group[g].name);
     }
   }
   PetscCheck(!exists, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,

@@ -81,12 +81,10 @@ static const struct {
 static SbReader reader_of(const char *mesh, size_t size, char known[])
 {
   const char *dot = strrchr(mesh, '.');
-  size_t used = 0;
 
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(readers); i++) {
     if (dot && !strcasecmp(dot, readers[i].extension)) return readers[i].read;
-    (void)snprintf(known + used, size - used, "%s%s", i ? " " : "", readers[i].extension);
-    used = strlen(known);
+    SbAppend(size, known, "%s%s", i ? " " : "", readers[i].extension);
   }
   return NULL;
 }
@@ -227,7 +225,7 @@ PetscErrorCode SbImportRead(const SbBody *body, SbImport *im)
 
 PetscErrorCode SbImportSlabs(const SbBody *body, PetscInt *ncell)
 {
-  char known[256];
+  char known[256] = "";
 
   PetscFunctionBeginUser;
   *ncell = 0;

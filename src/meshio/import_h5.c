@@ -435,10 +435,9 @@ static PetscErrorCode read_output(const File *f)
 static herr_t list_name(hid_t where, const char *name, const H5L_info_t *info, void *ctx)
 {
   char *text = (char *)ctx;
-  const size_t n = strlen(text);
 
   (void)where, (void)info;
-  if (n < 160) (void)snprintf(text + n, 256 - n, "%s%.60s", n ? ", " : "", name);
+  if (strlen(text) < 160) SbAppend(256, text, "%s%.60s", text[0] ? ", " : "", name);
   return 0;
 }
 

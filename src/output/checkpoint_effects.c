@@ -23,13 +23,6 @@ static uint64_t sum_of(PetscInt n, PetscInt width, const PetscReal record[])
   return sum;
 }
 
-static PetscErrorCode name_of(SbEffect e, size_t size, char name[])
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(name, size, "state_%s", e->name));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbCheckpointWriteEffects(SbRun run, SbH5 *h, uint64_t *sum)
 {
   const SbModel m = run->model;
@@ -49,7 +42,7 @@ PetscErrorCode SbCheckpointWriteEffects(SbRun run, SbH5 *h, uint64_t *sum)
     order.start -= order.n;
     mine = sum_of(order.n, e->nstate, record);
     PetscCallMPI(MPI_Allreduce(&mine, &all, 1, MPI_UINT64_T, MPI_SUM, m->comm));
-    PetscCall(name_of(e, sizeof(name), name));
+    SbFormat(sizeof(name), name, "state_%s", e->name);
     if (order.N) {
       PetscCall(SbH5PutInt(h, h->file, name, order.N));
       PetscCall(
@@ -74,7 +67,7 @@ PetscErrorCode SbCheckpointReadEffects(SbRun run, SbH5 *h, SbRecords records[], 
     int64_t n = 0;
 
     if (!e->ops.load) continue;
-    PetscCall(name_of(e, sizeof(name), name));
+    SbFormat(sizeof(name), name, "state_%s", e->name);
     SbH5GetInt(h->file, name, &n, &there);
     if (!there || n <= 0) continue;
     order.n = order.N = (PetscInt)n;

@@ -61,7 +61,7 @@ PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOpt
 
 /* ------------------------------------------------------------------ what was repaired */
 
-static PetscErrorCode write_repairs(const SbTriangles *t, const SbSurfaceRepairs *m, size_t size, char text[])
+static void write_repairs(const SbTriangles *t, const SbSurfaceRepairs *m, size_t size, char text[])
 {
   const struct {
     PetscInt n;
@@ -76,29 +76,19 @@ static PetscErrorCode write_repairs(const SbTriangles *t, const SbSurfaceRepairs
     {m->nidle, "triangles without material on a side left out"},
     {m->ninner, "triangles within the obstacle left out"},
   };
-  char one[160];
 
-  PetscFunctionBeginUser;
-  if (t->turned) PetscCall(PetscStrlcat(text, "surface inverted: taken turned", size));
-  if (m->nwelded) {
-    (void)snprintf(one, sizeof(one), "%svertices joined within %.2g m: %" PetscInt_FMT " (by up to %.2g m)",
-                   text[0] ? ", " : "", (double)m->tolerance, m->nwelded, (double)m->moved);
-    PetscCall(PetscStrlcat(text, one, size));
-  }
-  if (m->npairs) {
-    (void)snprintf(one, sizeof(one),
-                   "%spairs of triangles that cut each other smoothed apart: %" PetscInt_FMT
-                   " (%" PetscInt_FMT " vertices moved by up to %.2g m)",
-                   text[0] ? ", " : "", m->npairs, m->nuntangled, (double)m->untangled);
-    PetscCall(PetscStrlcat(text, one, size));
-  }
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows_of); i++) {
-    if (!rows_of[i].n) continue;
-    (void)snprintf(one, sizeof(one), "%s%s: %" PetscInt_FMT, text[0] ? ", " : "", rows_of[i].what,
-                   rows_of[i].n);
-    PetscCall(PetscStrlcat(text, one, size));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
+  if (t->turned) SbAppend(size, text, "surface inverted: taken turned");
+  if (m->nwelded)
+    SbAppend(size, text, "%svertices joined within %.2g m: %" PetscInt_FMT " (by up to %.2g m)",
+             text[0] ? ", " : "", (double)m->tolerance, m->nwelded, (double)m->moved);
+  if (m->npairs)
+    SbAppend(size, text,
+             "%spairs of triangles that cut each other smoothed apart: %" PetscInt_FMT " (%" PetscInt_FMT
+             " vertices moved by up to %.2g m)",
+             text[0] ? ", " : "", m->npairs, m->nuntangled, (double)m->untangled);
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows_of); i++)
+    if (rows_of[i].n)
+      SbAppend(size, text, "%s%s: %" PetscInt_FMT, text[0] ? ", " : "", rows_of[i].what, rows_of[i].n);
 }
 
 /* ------------------------------------------------------------------ from file to tets */
@@ -235,7 +225,7 @@ static PetscErrorCode read_obstacle(const char *path, const PetscReal at[3], SbT
   PetscCall(SbSurfaceDestroy(&s));
   PetscCall(ierr);
   repairs.ncavity = 0; /* nothing was changed for them */
-  PetscCall(write_repairs(f->t, &repairs, sizeof(f->im->note), f->im->note));
+  write_repairs(f->t, &repairs, sizeof(f->im->note), f->im->note);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -296,9 +286,11 @@ PetscErrorCode SbSurfaceRead(const char *path, SbImport *im, SbSurface *s)
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(s, sizeof(*s)));
   ierr = make_surface(path, (const PetscReal[3]){0, 0, 0}, &file, s, &repairs);
-  if (!ierr) ierr = write_repairs(&t, &repairs, sizeof(im->note), im->note);
+  if (ierr)
+    PetscCall(SbSurfaceDestroy(s));
+  else
+    write_repairs(&t, &repairs, sizeof(im->note), im->note);
   PetscCall(SbTrianglesDestroy(&t));
-  if (ierr) PetscCall(SbSurfaceDestroy(s));
   PetscCall(ierr);
   im->scale = 1; /* it is in metres now */
   PetscFunctionReturn(PETSC_SUCCESS);

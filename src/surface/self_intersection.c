@@ -142,13 +142,9 @@ PetscErrorCode SbSurfaceUntangle(SbTriangleFile *f, PetscReal reach, SbSurfaceRe
     char text[256] = "";
 
     // some of the pairs, and where the first one is
-    for (PetscInt k = 0; k < PetscMin(search.n, NAMED); k++) {
-      char one[64];
-
-      (void)snprintf(one, sizeof(one), "%s%lld and %lld", k ? ", " : "",
-                     (long long)f->number[search.pair[k][0]], (long long)f->number[search.pair[k][1]]);
-      PetscCall(PetscStrlcat(text, one, sizeof(text)));
-    }
+    for (PetscInt k = 0; k < PetscMin(search.n, NAMED); k++)
+      SbAppend(sizeof(text), text, "%s%lld and %lld", k ? ", " : "", (long long)f->number[search.pair[k][0]],
+               (long long)f->number[search.pair[k][1]]);
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
             "%s: the surface cuts or touches itself at %" PetscInt_FMT
             " pair%s of triangles: %s%s, near (%.6g, %.6g, %.6g) m; %s; join the parts into one (meshlab, "

@@ -26,8 +26,7 @@
 
 static PetscErrorCode check_end(const char *folder, int status)
 {
-  char said[256];
-  char path[PATH_LENGTH], line[256];
+  char said[256] = "", path[PATH_LENGTH], line[256];
   FILE *f;
 
   PetscFunctionBeginUser;
@@ -35,15 +34,12 @@ static PetscErrorCode check_end(const char *folder, int status)
              "there is no program tetgen; install the package tetgen (Debian, Ubuntu)");
   if (WIFEXITED(status) && !WEXITSTATUS(status)) PetscFunctionReturn(PETSC_SUCCESS);
   // the last lines of the log as one line
-  said[0] = 0;
   (void)snprintf(path, sizeof(path), "%s/log", folder);
   f = fopen(path, "r");
   while (f && fgets(line, (int)sizeof(line), f)) {
-    const size_t n = strlen(said);
-
     line[strcspn(line, "\r\n")] = 0;
     if (!line[0] || strstr(line, "@") || strstr(line, "report this bug")) continue;
-    (void)snprintf(said + n, sizeof(said) - n, "%s%s", n ? " / " : "", line + strspn(line, " "));
+    SbAppend(sizeof(said), said, "%s%s", said[0] ? " / " : "", line + strspn(line, " "));
   }
   if (f) (void)fclose(f);
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "it %s %d%s%s",

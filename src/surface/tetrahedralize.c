@@ -93,20 +93,13 @@ static PetscErrorCode run_checked(int backend, const SbTetJob *job, SbImport *te
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Without the beginning that our own message has, too. */
-static const char *without(const char *where, const char *text)
-{
-  const size_t n = strlen(where);
-
-  if (strncmp(text, where, n)) return text;
-  return text + n + strspn(text + n, ": ");
-}
-
 /* One backend; its error becomes a reason. Errors that are not the input's are raised. */
 static PetscErrorCode try_backend(int backend, const SbTetJob *job, SbImport *tets, PetscBool *done,
                                   size_t size, char reasons[])
 {
+  const size_t n = strlen(job->where);
   SbCaughtError caught = {0, ""};
+  const char *why = caught.text;
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
@@ -121,10 +114,9 @@ static PetscErrorCode try_backend(int backend, const SbTetJob *job, SbImport *te
   PetscCheck(ierr == PETSC_ERR_USER_INPUT || ierr == PETSC_ERR_FILE_OPEN || ierr == PETSC_ERR_FILE_READ ||
                ierr == PETSC_ERR_FILE_UNEXPECTED,
              PETSC_COMM_SELF, ierr, "%s: %s", job->where, caught.text);
-  PetscCall(PetscStrlcat(reasons, reasons[0] ? "; " : "", size));
-  PetscCall(PetscStrlcat(reasons, backends[backend].name, size));
-  PetscCall(PetscStrlcat(reasons, ": ", size));
-  PetscCall(PetscStrlcat(reasons, without(job->where, caught.text), size));
+  // without the beginning that our own message has, too
+  if (!strncmp(why, job->where, n)) why += n + strspn(why + n, ": ");
+  SbAppend(size, reasons, "%s%s: %s", reasons[0] ? "; " : "", backends[backend].name, why);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -153,7 +145,7 @@ static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscB
     PetscInt n = 0;
     const char *surface;
     SbShape shape;
-    char text[512], slivers[96] = "";
+    char slivers[96] = "";
 
     if (job->options.backend != SB_TET_AUTO && (int)job->options.backend != backend + 1) continue;
     PetscCall(try_backend(backend, job, &tets, done, size, reasons));
@@ -195,11 +187,10 @@ static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscB
       (void)snprintf(slivers, sizeof(slivers),
                      ", %" PetscInt_FMT " slivers (dihedral below %g degrees, smallest %.2g)", shape.nsliver,
                      (double)SLIVER, acos(PetscMin((double)shape.most[0], 1)) * 180 / PETSC_PI);
-    (void)snprintf(
-      text, sizeof(text), "%s%" PetscInt_FMT " tets of size %.3g m by %s, surface %s%s%s%.200s%s",
-      body->note[0] ? ", " : "", body->item[3].n, (double)(job->size / factor), backends[backend].name,
-      surface, slivers, reasons[0] ? " (before that " : "", reasons, reasons[0] ? ")" : "");
-    PetscCall(PetscStrlcat(body->note, text, sizeof(body->note)));
+    SbAppend(sizeof(body->note), body->note,
+             "%s%" PetscInt_FMT " tets of size %.3g m by %s, surface %s%s%s%.200s%s",
+             body->note[0] ? ", " : "", body->item[3].n, (double)(job->size / factor), backends[backend].name,
+             surface, slivers, reasons[0] ? " (before that " : "", reasons, reasons[0] ? ")" : "");
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
