@@ -8,17 +8,13 @@
 static PetscErrorCode write_mesh(SbTool *tool, SbImport *mesh)
 {
   char phase[PETSC_MAX_PATH_LEN + 16];
-  PetscErrorCode ierr;
   static const char *const what[4] = {"points", "lines", "triangles", "tets"};
   PetscInt nvert, n[4];
   char number[32];
 
   PetscFunctionBeginUser;
   (void)snprintf(phase, sizeof(phase), "writing %s", tool->out);
-  SbToolBegin(tool, phase);
-  ierr = SbMeshFileWrite(mesh, tool->out, tool->format);
-  SbToolEnd(tool);
-  PetscCall(ierr);
+  SB_TOOL_PHASE(tool, phase, SbMeshFileWrite(mesh, tool->out, tool->format));
 
   /* "out.h5: 1,234 vertices, 5,678 tets, 910 triangles" */
   if (!tool->quiet) {
@@ -35,14 +31,7 @@ static PetscErrorCode write_mesh(SbTool *tool, SbImport *mesh)
 static PetscErrorCode refine(SbTool *tool, SbImport *mesh)
 {
   PetscFunctionBeginUser;
-  for (PetscInt k = 0; k < tool->levels; k++) {
-    PetscErrorCode ierr;
-
-    SbToolBegin(tool, "refining");
-    ierr = SbMeshFileRefine(mesh);
-    SbToolEnd(tool);
-    PetscCall(ierr);
-  }
+  for (PetscInt k = 0; k < tool->levels; k++) SB_TOOL_PHASE(tool, "refining", SbMeshFileRefine(mesh));
   PetscCall(write_mesh(tool, mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -60,13 +49,9 @@ static PetscErrorCode repair(SbTool *tool, SbImport *mesh)
 {
   SbRepair r;
   char welded[96];
-  PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  SbToolBegin(tool, "repairing");
-  ierr = SbMeshFileRepair(mesh, tool->merge_tolerance, &r);
-  SbToolEnd(tool);
-  PetscCall(ierr);
+  SB_TOOL_PHASE(tool, "repairing", SbMeshFileRepair(mesh, tool->merge_tolerance, &r));
   (void)snprintf(welded, sizeof(welded), "vertices welded to others at most %.3g m away",
                  (double)r.merge_tolerance);
   PetscCall(say(tool, r.nwelded, welded));
@@ -114,10 +99,7 @@ PetscErrorCode SbToolRun(SbTool *tool)
   // the mesh is read, with a word about it
   (void)snprintf(phase, sizeof(phase), "%s %s",
                  SbMeshFileIsSurface(tool->in) ? "making tets from" : "reading", tool->in);
-  SbToolBegin(tool, phase);
-  ierr = SbMeshFileRead(&tool->body, SbToolProgress, tool, &mesh);
-  SbToolEnd(tool);
-  PetscCall(ierr);
+  SB_TOOL_PHASE(tool, phase, SbMeshFileRead(&tool->body, SbToolProgress, tool, &mesh));
   if (command->run != SbToolInfo && !tool->quiet && SbMeshFileNote(mesh)[0])
     PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s\n", tool->in, SbMeshFileNote(mesh)));
   ierr = command->run(tool, mesh);

@@ -88,7 +88,6 @@ static PetscReal memory(const SbMeshStatistics *f, const char *element, PetscInt
 PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
 {
   SbMeshStatistics facts;
-  PetscErrorCode ierr;
   PetscInt nvert, n[4];
   char number[32];
   const PetscReal *b;
@@ -106,10 +105,7 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
   if (n[0]) (void)printf("  %-26s %12s\n", "points of groups", SbToolNumber(n[0], number));
   PetscCall(groups(mesh));
   (void)fflush(stdout);
-  SbToolBegin(tool, "measuring");
-  ierr = SbMeshFileMeasure(mesh, &facts);
-  SbToolEnd(tool);
-  PetscCall(ierr);
+  SB_TOOL_PHASE(tool, "measuring", SbMeshFileMeasure(mesh, &facts));
   // size and counts
   b = facts.body.bbox;
   (void)printf("size (coordinates in m)\n");

@@ -53,5 +53,14 @@ PetscErrorCode SbToolView(SbTool *tool, const SbImport *mesh);
 void SbToolBegin(SbTool *tool, const char *phase);
 PetscErrorCode SbToolProgress(const char *what, PetscInt64 done, PetscInt64 total, void *ctx);
 void SbToolEnd(SbTool *tool);
+/* A call that may take long, with that line while it goes on. */
+#define SB_TOOL_PHASE(tool, phase, call) \
+  do {                                   \
+    PetscErrorCode sb_ierr;              \
+    SbToolBegin(tool, phase);            \
+    sb_ierr = (call);                    \
+    SbToolEnd(tool);                     \
+    PetscCall(sb_ierr);                  \
+  } while (0)
 /* 1234567 as "1,234,567". */
 const char *SbToolNumber(PetscInt64 n, char text[32]);
