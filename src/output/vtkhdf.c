@@ -15,6 +15,16 @@
 
 #define BETWEEN 20
 
+static void write_attribute(hid_t where, const char *name, hid_t filetype, hid_t memtype, hid_t space,
+                            const void *value, PetscBool *ok)
+{
+  const hid_t attribute = H5Acreate2(where, name, filetype, space, H5P_DEFAULT, H5P_DEFAULT);
+
+  if (H5Awrite(attribute, memtype, value) < 0) *ok = PETSC_FALSE;
+  (void)H5Aclose(attribute);
+  (void)H5Sclose(space);
+}
+
 /* Rows of an array in a frame, or in a part for what does not change with time. */
 static PetscInt rows_of(SbIndex v, const SbArray *a, PetscInt block)
 {
@@ -140,16 +150,12 @@ static void write_cells(SbIndex v, hid_t root, int64_t *work, PetscBool *ok)
 static void write_steps(SbIndex v, hid_t root, int64_t *work, PetscBool *ok)
 {
   const hid_t group = H5Gcreate2(root, "Steps", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-  const hid_t space = H5Screate(H5S_SCALAR);
-  const hid_t count = H5Acreate2(group, "NSteps", H5T_STD_I64LE, space, H5P_DEFAULT, H5P_DEFAULT);
   const PetscInt kinds = v->points ? 4 : 1;
   const int64_t n = v->nframe;
   double *times = (double *)work;
   hid_t where[2]; /* of arrays at points, of cells */
 
-  if (H5Awrite(count, H5T_NATIVE_INT64, &n) < 0) *ok = PETSC_FALSE;
-  (void)H5Aclose(count);
-  (void)H5Sclose(space);
+  write_attribute(group, "NSteps", H5T_STD_I64LE, H5T_NATIVE_INT64, H5Screate(H5S_SCALAR), &n, ok);
   for (PetscInt f = 0; f < v->nframe; f++) times[f] = v->frame[f].time;
   write_numbers(group, "Values", v->nframe, 0, H5T_IEEE_F64LE, times, ok);
   for (PetscInt f = 0; f < v->nframe; f++) work[f] = 1;
@@ -198,25 +204,19 @@ static void write_steps(SbIndex v, hid_t root, int64_t *work, PetscBool *ok)
 static void write_file(SbIndex v, hid_t file, int64_t *work, PetscBool *ok)
 {
   const hid_t root = H5Gcreate2(file, "VTKHDF", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-  const hid_t type = H5Tcopy(H5T_C_S1), scalar = H5Screate(H5S_SCALAR);
+  const hid_t type = H5Tcopy(H5T_C_S1);
   const char *kind = v->points ? "PolyData" : "UnstructuredGrid";
   const hsize_t two = 2;
   const int64_t version[2] = {2, 0};
-  const hid_t pair = H5Screate_simple(1, &two, NULL);
-  hid_t attribute, data[2];
+  hid_t data[2];
 
   /* what it is */
   (void)H5Tset_size(type, strlen(kind));
   (void)H5Tset_strpad(type, H5T_STR_NULLPAD);
-  attribute = H5Acreate2(root, "Version", H5T_STD_I64LE, pair, H5P_DEFAULT, H5P_DEFAULT);
-  if (H5Awrite(attribute, H5T_NATIVE_INT64, version) < 0) *ok = PETSC_FALSE;
-  (void)H5Aclose(attribute);
-  attribute = H5Acreate2(root, "Type", type, scalar, H5P_DEFAULT, H5P_DEFAULT);
-  if (H5Awrite(attribute, type, kind) < 0) *ok = PETSC_FALSE;
-  (void)H5Aclose(attribute);
+  write_attribute(root, "Version", H5T_STD_I64LE, H5T_NATIVE_INT64, H5Screate_simple(1, &two, NULL), version,
+                  ok);
+  write_attribute(root, "Type", type, type, H5Screate(H5S_SCALAR), kind, ok);
   (void)H5Tclose(type);
-  (void)H5Sclose(scalar);
-  (void)H5Sclose(pair);
 
   /* parts, cells, arrays, steps */
   for (PetscInt p = 0; p < v->npart; p++) work[p] = v->part[p].npoint;
