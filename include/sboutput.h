@@ -47,7 +47,7 @@ struct SbField {
 PetscErrorCode SbOutputRegister(void); /* option rows */
 
 /* Every field that there is. Not collective. */
-PetscErrorCode SbFieldGetAll(PetscInt *n, const SbField **fields);
+const SbField *SbFieldGetAll(PetscInt *n);
 
 /*
   SbOutputSetFromOptions - reads every option of the output and makes the folder of the run. Collective.

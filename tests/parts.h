@@ -171,10 +171,9 @@ static inline PetscErrorCode part_names(const char *family, PetscInt *n, char na
     for (int i = 0; i < count; i++) PetscCall(PetscStrncpy(names[(*n)++], words[i], SB_NAME_MAX));
     PetscCall(PetscStrToArrayDestroy(count, words));
   } else if (!strcmp(family, "field")) {
-    const SbField *field;
     PetscInt count;
+    const SbField *field = SbFieldGetAll(&count);
 
-    PetscCall(SbFieldGetAll(&count, &field));
     for (PetscInt i = 0; i < count; i++) PetscCall(PetscStrncpy(names[(*n)++], field[i].name, SB_NAME_MAX));
   } else {
     for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(parts); i++) {

@@ -145,21 +145,15 @@ static PetscErrorCode space_error(const SbField *f, SbRun run, const SbStep *ste
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode body_number(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
+/* Of the body that the cell is in, or of the rank that owns it. */
+static PetscErrorCode number(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
 {
-  PetscFunctionBeginUser;
-  (void)f, (void)step;
-  for (PetscInt c = 0; c < run->model->mesh->ncell_owned; c++)
-    values[c] = (PetscReal)run->model->mesh->cell_body[c];
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+  const PetscBool body = (PetscBool)!strcmp(f->name, "body");
 
-static PetscErrorCode rank_number(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
-{
   PetscFunctionBeginUser;
-  (void)f, (void)step;
+  (void)step;
   for (PetscInt c = 0; c < run->model->mesh->ncell_owned; c++)
-    values[c] = (PetscReal)((SbOutput)run->output)->rank;
+    values[c] = (PetscReal)(body ? run->model->mesh->cell_body[c] : ((SbOutput)run->output)->rank);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -196,19 +190,17 @@ static const SbField table[] = {
   {"energy_density", "J/m^3", 1, CELL, VARIES, ALWAYS, "strain energy per rest volume", scalar, STATE(psi)},
   {"space_error", "J/m^3", 1, CELL, VARIES, ALWAYS,
    "energy of the estimated error of the mesh per rest volume; needs -ledger", .compute = space_error},
-  {"body", "1", 1, CELL, CONSTANT, ALWAYS, "number of the body, always written", .compute = body_number},
-  {"rank", "1", 1, CELL, CONSTANT, ALWAYS, "MPI rank that owns the cell", .compute = rank_number},
+  {"body", "1", 1, CELL, CONSTANT, ALWAYS, "number of the body, always written", .compute = number},
+  {"rank", "1", 1, CELL, CONSTANT, ALWAYS, "MPI rank that owns the cell", .compute = number},
   {"sets", "1", 1, CELL, CONSTANT, ALWAYS,
    "sets and groups that the scenario names: arrays set_NAME of points, tets_NAME of cells, 1 inside",
    .compute = NULL},
 };
 
-PetscErrorCode SbFieldGetAll(PetscInt *n, const SbField **fields)
+const SbField *SbFieldGetAll(PetscInt *n)
 {
-  PetscFunctionBeginUser;
   *n = (PetscInt)PETSC_STATIC_ARRAY_LENGTH(table);
-  *fields = table;
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return table;
 }
 
 PetscErrorCode SbFieldFind(const char *option, const char *name, const SbField **field)

@@ -332,7 +332,7 @@ static PetscErrorCode read_frame(hid_t hundred, const char *name, SbFrame *frame
   int64_t step = 0, mesh = 0;
   PetscBool other = PETSC_TRUE;
   PetscInt n;
-  const SbField *fields;
+  const SbField *fields = SbFieldGetAll(&n);
 
   PetscFunctionBeginUser;
   *ok = (PetscBool)(group >= 0);
@@ -343,7 +343,6 @@ static PetscErrorCode read_frame(hid_t hundred, const char *name, SbFrame *frame
   frame->step = (PetscInt)step;
   frame->mesh = other ? (PetscInt)mesh : 0;
   frame->nfield = 0;
-  PetscCall(SbFieldGetAll(&n, &fields));
   for (PetscInt i = 0; i < n; i++) {
     const PetscInt bytes = SbH5NumberBytes(group, fields[i].name);
 

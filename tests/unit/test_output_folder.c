@@ -68,13 +68,12 @@ static PetscErrorCode test_scenario(void)
 
 static PetscErrorCode test_fields(void)
 {
-  const SbField *fields, *found;
   PetscInt n;
+  const SbField *const fields = SbFieldGetAll(&n), *found;
   TestScene scene;
   SbOutput out;
 
   PetscFunctionBeginUser;
-  PetscCall(SbFieldGetAll(&n, &fields));
   for (PetscInt i = 0; i < n; i++) {
     PetscCall(SbFieldFind("-output_fields", fields[i].name, &found));
     SB_CHECK(found == &fields[i], "field %s is not found by its name", fields[i].name);
