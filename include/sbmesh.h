@@ -179,11 +179,11 @@ PetscErrorCode SbMeshNeighbours(SbMesh mesh, PetscInt **neighbour);
   Not collective. Output: nedge; edge[ncell][6] number of each edge of a cell, between vertices 01 02 03 12 13 23; PetscFree().
 */
 PetscErrorCode SbMeshEdges(SbMesh mesh, PetscInt *nedge, PetscInt **edge);
-/* The n leaves, leaf[n] (NULL: 0, 1, ...), of as many of N roots on rank 0, of which root[n] are theirs. Collective; the caller destroys it. */
-PetscErrorCode SbForestOnRank0(MPI_Comm comm, PetscInt N, PetscInt n, const PetscInt leaf[],
-                               const PetscInt root[], PetscSF *forest);
-/* Brings n numbers of each root to its leaves. Collective. */
+/* The leaves 0, 1, ... n - 1 of as many of N roots on rank 0, of which root[n] are theirs. Collective; the caller destroys it. */
+PetscErrorCode SbForestOnRank0(MPI_Comm comm, PetscInt N, PetscInt n, const PetscInt root[], PetscSF *forest);
+/* Brings n numbers of each root to its leaves, or those of each leaf to its root. Collective. */
 PetscErrorCode SbForestBroadcast(PetscSF forest, PetscInt n, MPI_Datatype type, const void *root, void *leaf);
+PetscErrorCode SbForestReduce(PetscSF forest, PetscInt n, MPI_Datatype type, const void *leaf, void *root);
 /* Brings the n numbers of each owned cell to its ghost copies: value[ncell][n]. Collective. */
 PetscErrorCode SbMeshBroadcastCells(SbMesh mesh, PetscInt n, MPI_Datatype type, void *value);
 /* The same for vertices, value[nvert][n]. */

@@ -47,8 +47,7 @@ PetscErrorCode SbMeshEdges(SbMesh mesh, PetscInt *nedge, PetscInt **edge)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbForestOnRank0(MPI_Comm comm, PetscInt N, PetscInt n, const PetscInt leaf[],
-                               const PetscInt root[], PetscSF *sf)
+PetscErrorCode SbForestOnRank0(MPI_Comm comm, PetscInt N, PetscInt n, const PetscInt root[], PetscSF *sf)
 {
   PetscSFNode *remote;
   PetscMPIInt rank;
@@ -58,9 +57,32 @@ PetscErrorCode SbForestOnRank0(MPI_Comm comm, PetscInt N, PetscInt n, const Pets
   PetscCall(PetscMalloc1(n, &remote));
   for (PetscInt i = 0; i < n; i++) remote[i] = (PetscSFNode){.rank = 0, .index = root[i]};
   PetscCall(PetscSFCreate(comm, sf));
-  PetscCall(
-    PetscSFSetGraph(*sf, rank ? 0 : N, n, (PetscInt *)leaf, PETSC_COPY_VALUES, remote, PETSC_OWN_POINTER));
+  PetscCall(PetscSFSetGraph(*sf, rank ? 0 : N, n, NULL, PETSC_COPY_VALUES, remote, PETSC_OWN_POINTER));
   PetscCall(PetscSFSetUp(*sf));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* n numbers as one. */
+static PetscErrorCode create_type(PetscInt n, MPI_Datatype one, MPI_Datatype *type)
+{
+  PetscMPIInt count;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMPIIntCast(n, &count));
+  PetscCallMPI(MPI_Type_contiguous(count, one, type));
+  PetscCallMPI(MPI_Type_commit(type));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbForestReduce(PetscSF sf, PetscInt n, MPI_Datatype one, const void *leaf, void *root)
+{
+  MPI_Datatype type;
+
+  PetscFunctionBeginUser;
+  PetscCall(create_type(n, one, &type));
+  PetscCall(PetscSFReduceBegin(sf, type, leaf, root, MPI_REPLACE));
+  PetscCall(PetscSFReduceEnd(sf, type, leaf, root, MPI_REPLACE));
+  PetscCallMPI(MPI_Type_free(&type));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -69,8 +91,7 @@ PetscErrorCode SbForestBroadcast(PetscSF sf, PetscInt n, MPI_Datatype one, const
   MPI_Datatype type;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Type_contiguous((PetscMPIInt)n, one, &type));
-  PetscCallMPI(MPI_Type_commit(&type));
+  PetscCall(create_type(n, one, &type));
   PetscCall(PetscSFBcastBegin(sf, type, root, leaf, MPI_REPLACE));
   PetscCall(PetscSFBcastEnd(sf, type, root, leaf, MPI_REPLACE));
   PetscCallMPI(MPI_Type_free(&type));

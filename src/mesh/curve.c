@@ -150,7 +150,6 @@ PetscErrorCode SbMeshCurve(SbMesh mesh, PetscInt n, const PetscInt orig[], const
   PetscInt *leaf, *root, ncurved = 0, total = n, ndealt;
   PetscReal *dealt;
   PetscLayout rows;
-  MPI_Datatype eighteen;
   PetscSF sf;
 
   PetscFunctionBeginUser;
@@ -160,14 +159,10 @@ PetscErrorCode SbMeshCurve(SbMesh mesh, PetscInt n, const PetscInt orig[], const
   PetscCall(PetscLayoutCreateFromSizes(mesh->comm, PETSC_DECIDE, mesh->Ncell, 1, &rows));
   PetscCall(PetscLayoutGetLocalSize(rows, &ndealt));
   PetscCall(PetscMalloc1(18 * (size_t)ndealt, &dealt));
-  PetscCallMPI(MPI_Type_contiguous(18, MPIU_REAL, &eighteen));
-  PetscCallMPI(MPI_Type_commit(&eighteen));
   PetscCall(PetscSFCreate(mesh->comm, &sf));
   PetscCall(PetscSFSetGraphLayout(sf, rows, n, NULL, PETSC_COPY_VALUES, orig));
-  PetscCall(PetscSFReduceBegin(sf, eighteen, off, dealt, MPI_REPLACE));
-  PetscCall(PetscSFReduceEnd(sf, eighteen, off, dealt, MPI_REPLACE));
+  PetscCall(SbForestReduce(sf, 18, MPIU_REAL, off, dealt));
   PetscCall(PetscSFDestroy(&sf));
-  PetscCallMPI(MPI_Type_free(&eighteen));
   // and from there to where the cells are
   PetscCall(PetscCalloc1(18 * (size_t)mesh->ncell, &mesh->edge_off));
   PetscCall(PetscMalloc2(mesh->ncell, &leaf, mesh->ncell, &root));

@@ -78,38 +78,17 @@ PetscErrorCode SbOrderDestroy(SbOrder *order)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode unit_create(PetscInt ncomp, MPI_Datatype *unit)
-{
-  PetscMPIInt n;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMPIIntCast(ncomp, &n));
-  PetscCallMPI(MPI_Type_contiguous(n, MPIU_REAL, unit));
-  PetscCallMPI(MPI_Type_commit(unit));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbOrderGather(const SbOrder *order, PetscInt ncomp, const PetscReal owned[], PetscReal slice[])
 {
-  MPI_Datatype unit;
-
   PetscFunctionBeginUser;
-  PetscCall(unit_create(order->each * ncomp, &unit));
-  PetscCall(PetscSFReduceBegin(order->sf, unit, owned, slice, MPI_REPLACE));
-  PetscCall(PetscSFReduceEnd(order->sf, unit, owned, slice, MPI_REPLACE));
-  PetscCallMPI(MPI_Type_free(&unit));
+  PetscCall(SbForestReduce(order->sf, order->each * ncomp, MPIU_REAL, owned, slice));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbOrderScatter(const SbOrder *order, PetscInt ncomp, const PetscReal slice[],
                               PetscReal owned[])
 {
-  MPI_Datatype unit;
-
   PetscFunctionBeginUser;
-  PetscCall(unit_create(order->each * ncomp, &unit));
-  PetscCall(PetscSFBcastBegin(order->sf, unit, slice, owned, MPI_REPLACE));
-  PetscCall(PetscSFBcastEnd(order->sf, unit, slice, owned, MPI_REPLACE));
-  PetscCallMPI(MPI_Type_free(&unit));
+  PetscCall(SbForestBroadcast(order->sf, order->each * ncomp, MPIU_REAL, slice, owned));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -7,20 +7,6 @@
 */
 #include "remesh_impl.h"
 
-/* Brings n numbers of each leaf to its root. */
-static PetscErrorCode collect(PetscSF sf, PetscInt n, MPI_Datatype one, const void *leaf, void *root)
-{
-  MPI_Datatype type;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Type_contiguous((PetscMPIInt)n, one, &type));
-  PetscCallMPI(MPI_Type_commit(&type));
-  PetscCall(PetscSFReduceBegin(sf, type, leaf, root, MPI_REPLACE));
-  PetscCall(PetscSFReduceEnd(sf, type, leaf, root, MPI_REPLACE));
-  PetscCallMPI(MPI_Type_free(&type));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The vectors of a run. */
 static PetscInt vectors_of(SbRun run, Vec vec[3])
 {
@@ -78,15 +64,15 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   if (!rank) {
     PetscCall(PetscMalloc3(3 * (size_t)g->nvert, &g->X, 3 * (size_t)g->nvert, &g->x, g->nvert, &g->vert_set));
   }
-  PetscCall(SbForestOnRank0(mesh->comm, mesh->Nvert, mesh->nvert_owned, NULL, mesh->vert_orig, &sf));
+  PetscCall(SbForestOnRank0(mesh->comm, mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &sf));
   PetscCall(PetscMalloc1(3 * (size_t)mesh->nvert, &now));
   PetscCall(SbCornerPositions(m->space, run->U, now));
-  PetscCall(collect(sf, 3, MPIU_REAL, mesh->x, g->X));
-  PetscCall(collect(sf, 3, MPIU_REAL, now, g->x));
+  PetscCall(SbForestReduce(sf, 3, MPIU_REAL, mesh->x, g->X));
+  PetscCall(SbForestReduce(sf, 3, MPIU_REAL, now, g->x));
   PetscCall(PetscFree(now));
-  PetscCall(collect(sf, 1, MPI_UINT64_T, mesh->vert_set, g->vert_set));
+  PetscCall(SbForestReduce(sf, 1, MPI_UINT64_T, mesh->vert_set, g->vert_set));
   PetscCall(PetscSFDestroy(&sf));
-  PetscCall(SbForestOnRank0(m->comm, mesh->Ncell, mesh->ncell_owned, NULL, mesh->cell_orig, &sf));
+  PetscCall(SbForestOnRank0(m->comm, mesh->Ncell, mesh->ncell_owned, mesh->cell_orig, &sf));
   // cells with their vertices, materials and sets
   if (!rank) {
     PetscCall(PetscMalloc3(4 * (size_t)g->ncell, &g->cell, g->ncell, &g->cell_material, 5 * (size_t)g->ncell,
@@ -100,14 +86,14 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
     }
     set[5 * c] = mesh->cell_set[c];
   }
-  PetscCall(collect(sf, 4, MPIU_INT, cell, g->cell));
-  PetscCall(collect(sf, 1, MPIU_INT, mesh->cell_material, g->cell_material));
-  PetscCall(collect(sf, 5, MPI_UINT64_T, set, g->cell_set));
+  PetscCall(SbForestReduce(sf, 4, MPIU_INT, cell, g->cell));
+  PetscCall(SbForestReduce(sf, 1, MPIU_INT, mesh->cell_material, g->cell_material));
+  PetscCall(SbForestReduce(sf, 5, MPI_UINT64_T, set, g->cell_set));
   PetscCall(PetscFree2(cell, set));
   // nodes of curved edges
   if (mesh->edge_off) {
     if (!rank) PetscCall(PetscMalloc1(18 * (size_t)g->ncell, &g->edge_off));
-    PetscCall(collect(sf, 18, MPIU_REAL, mesh->edge_off, g->edge_off));
+    PetscCall(SbForestReduce(sf, 18, MPIU_REAL, mesh->edge_off, g->edge_off));
   }
   // the values of the vectors at the nodes of each cell
   each = g->width * g->nfield * 3;
@@ -123,7 +109,7 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
     }
     PetscCall(SbSpaceRestoreLocalRead(s, vec[f], &array));
   }
-  PetscCall(collect(sf, each, MPIU_REAL, value, g->value));
+  PetscCall(SbForestReduce(sf, each, MPIU_REAL, value, g->value));
   PetscCall(PetscFree(value));
   PetscCall(PetscSFDestroy(&sf));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -153,7 +139,7 @@ PetscErrorCode SbScatter(const SbGathered *g, SbRun run)
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1((size_t)each * (size_t)mesh->ncell, &value));
-  PetscCall(SbForestOnRank0(mesh->comm, mesh->Ncell, mesh->ncell, NULL, mesh->cell_orig, &sf));
+  PetscCall(SbForestOnRank0(mesh->comm, mesh->Ncell, mesh->ncell, mesh->cell_orig, &sf));
   PetscCall(SbForestBroadcast(sf, each, MPIU_REAL, g->value, value));
   PetscCall(PetscSFDestroy(&sf));
   (void)vectors_of(run, vec);
