@@ -198,6 +198,8 @@ PetscErrorCode SbMemoryMeshCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri,
 /* Room for curved edges. */
 PetscErrorCode SbMemoryMeshCurve(SbMemoryMesh *in_memory, PetscInt nedge);
 PetscErrorCode SbMemoryMeshDestroy(SbMemoryMesh **in_memory);
+/* From rank 0, whose mesh it is, its step, mass and bound to all ranks, which get an empty one; NULL there: NULL on all. Collective. */
+PetscErrorCode SbMemoryMeshShare(MPI_Comm comm, SbMemoryMesh **in_memory);
 /*
   SbSetParse - reads the description of a set. Not collective.
 

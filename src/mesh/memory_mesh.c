@@ -41,6 +41,23 @@ PetscErrorCode SbMemoryMeshDestroy(SbMemoryMesh **in_memory)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbMemoryMeshShare(MPI_Comm comm, SbMemoryMesh **in_memory)
+{
+  SbMemoryMesh *g = *in_memory;
+  PetscReal numbers[2] = {g ? g->mass : 0, g ? g->bound : 0};
+  PetscInt whole[2] = {g != NULL, g ? g->step : 0};
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Bcast(numbers, 2, MPIU_REAL, 0, comm));
+  PetscCallMPI(MPI_Bcast(whole, 2, MPIU_INT, 0, comm));
+  if (!whole[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!g) PetscCall(SbMemoryMeshCreate(0, 0, 0, in_memory));
+  (*in_memory)->mass = numbers[0];
+  (*in_memory)->bound = numbers[1];
+  (*in_memory)->step = whole[1];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbImportMemoryMesh(const SbBody *body, SbImport *im)
 {
   const SbMemoryMesh *g = body->in_memory;

@@ -235,17 +235,8 @@ PetscErrorCode SbOutputRestoreMeshes(SbRun run)
   }
   // all ranks know which bodies have a mesh of their own, and its numbers
   for (PetscInt b = 0; b < m->nbody; b++) {
-    PetscReal numbers[2] = {in_memory[b] ? in_memory[b]->mass : 0., in_memory[b] ? in_memory[b]->bound : 0.};
-    PetscInt whole[2] = {in_memory[b] ? 1 : 0, in_memory[b] ? in_memory[b]->step : 0};
-
-    PetscCallMPI(MPI_Bcast(numbers, 2, MPIU_REAL, 0, out->comm));
-    PetscCallMPI(MPI_Bcast(whole, 2, MPIU_INT, 0, out->comm));
-    if (!whole[0]) continue;
-    if (out->rank) PetscCall(SbMemoryMeshCreate(0, 0, 0, &in_memory[b]));
-    in_memory[b]->mass = numbers[0];
-    in_memory[b]->bound = numbers[1];
-    in_memory[b]->step = whole[1];
-    m->body[b].in_memory = in_memory[b];
+    PetscCall(SbMemoryMeshShare(out->comm, &in_memory[b]));
+    if (in_memory[b]) m->body[b].in_memory = in_memory[b];
   }
   PetscCall(PetscFree(in_memory));
   PetscFunctionReturn(PETSC_SUCCESS);

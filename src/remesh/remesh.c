@@ -306,7 +306,6 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   SbRun run;
   const SbRun before = old->run;
   PetscReal(*momenta)[6], rate;
-  PetscMPIInt rank;
   const SbRemeshOutcome *outcome = result->outcome;
 
   PetscFunctionBeginUser;
@@ -316,19 +315,9 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   PetscCall(PetscStrncpy(s.run->solver_choice, old->run->solver, sizeof(s.run->solver_choice)));
   PetscCall(SbLedgerSetFromOptions(s.run, &s.ledger));
   // the bodies' meshes, which are on rank 0; the model owns them from now on
-  PetscCallMPI(MPI_Comm_rank(s.model->comm, &rank));
   for (PetscInt b = 0; b < s.model->nbody; b++) {
-    SbMemoryMesh *p = result->in_memory[b];
-    PetscReal numbers[2] = {p ? p->mass : 0., p ? p->bound : 0.};
-    PetscInt step = p ? p->step : 0;
-
-    if (rank) PetscCall(SbMemoryMeshCreate(0, 0, 0, &p));
-    PetscCallMPI(MPI_Bcast(numbers, 2, MPIU_REAL, 0, s.model->comm));
-    PetscCallMPI(MPI_Bcast(&step, 1, MPIU_INT, 0, s.model->comm));
-    p->mass = numbers[0];
-    p->bound = numbers[1];
-    p->step = step;
-    s.model->body[b].in_memory = p;
+    PetscCall(SbMemoryMeshShare(s.model->comm, &result->in_memory[b]));
+    s.model->body[b].in_memory = result->in_memory[b];
     result->in_memory[b] = NULL;
   }
   s.model->t_begin = old->run->t_now;
