@@ -22,9 +22,6 @@ static PetscErrorCode prepare(PetscInt nbody, SbBody body[], PetscInt b, PetscIn
     PetscCall(SbImportReadCopy(&body[b], b ? &body[b - 1] : NULL, shared, im));
   PetscCall(SbImportCheck(im, &part->faces));
   PetscCall(SbImportQuality(im, &part->faces, &body[b]));
-  PetscCall(PetscCalloc1(im->nvert, &part->masks.vert));
-  PetscCall(PetscCalloc1(im->item[3].n, &part->masks.cell));
-  PetscCall(PetscCalloc1(4 * (size_t)im->item[3].n, &part->masks.face));
   PetscCall(SbSetsMark(im, &part->faces, nbody, body, b, nset, set, &part->masks));
   PetscCall(SbImportCurve(PETSC_COMM_SELF, im, &body[b], part->masks.cell, &part->edge_off));
   PetscCall(SbSetsCount(PETSC_COMM_SELF, im->nvert, im->item[3].n, &part->masks, nset, set));

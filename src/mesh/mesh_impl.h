@@ -64,13 +64,13 @@ void SbTetShape(const PetscReal x[], const PetscInt vert[4], PetscReal *V, Petsc
 /* A tet that check.c refuses as flat; `largest` is the largest coordinate in size. */
 PetscBool SbTetFlat(const PetscReal x[], const PetscInt vert[4], PetscReal largest, PetscReal *det);
 
-/* Masks of one body, zero on entry. */
+/* Masks of one body. */
 typedef struct {
   uint64_t *vert; /* [nvert] */
   uint64_t *cell; /* [ncell] */
   uint64_t *face; /* [ncell][4] */
 } SbMasks;
-/* Marks boundary faces and the members of all sets in body b. */
+/* Marks boundary faces and the members of all sets in body b; the arrays are made here. */
 PetscErrorCode SbSetsMark(const SbImport *import, const SbFaces *faces, PetscInt nbody, const SbBody body[],
                           PetscInt b, PetscInt nset, const SbSet set[], SbMasks *masks);
 /* The bits of sets that are groups, for each tag set: bits[ntags]. */

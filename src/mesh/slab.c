@@ -508,9 +508,6 @@ static PetscErrorCode mark(Slab *s, PetscInt nbody, const SbBody body[], PetscIn
   PetscCall(SbSetsBits(im, nbody, body, b, nset, set, bits));
   PetscCall(mark_items(s, bits));
   PetscCall(find_triangles(s));
-  PetscCall(PetscCalloc1(im->nvert, &m->vert));
-  PetscCall(PetscCalloc1(im->item[3].n, &m->cell));
-  PetscCall(PetscCalloc1(4 * (size_t)im->item[3].n, &m->face));
   PetscCall(SbSetsMark(im, &s->part->faces, nbody, body, b, nset, set, m));
   // a vertex belongs to the sets that it has on any rank
   PetscCall(SbRouteSend(&s->vert, sizeof(uint64_t), s->part->masks.vert, &got));
