@@ -235,6 +235,22 @@ PetscErrorCode SbImportJoinGroups(SbImport *import);
 /* Of simplices with the same vertices the first stays, with the groups of all; but for `all` only of those that have groups and share none. Adds how many went. */
 PetscErrorCode SbImportJoinRepeats(SbImport *import, int dim, PetscBool all, PetscInt *ndropped);
 
+/* ------------------------------------------------------------------ edges.c: pairs of vertices that an item joins */
+
+typedef struct {
+  PetscInt nvert, nedge;
+  PetscInt *start; /* [nvert + 1] into `high`: edges by lower vertex */
+  PetscInt *high;  /* [nedge] the other vertex, ascending for each lower one */
+} SbImportEdges;
+
+/* Edges of tets, triangles and lines. */
+PetscErrorCode SbImportEdgesCreate(const SbImport *import, SbImportEdges *edges);
+PetscErrorCode SbImportEdgesDestroy(SbImportEdges *edges);
+/* Number of the edge between two vertices, -1 when there is none. */
+PetscInt SbImportEdgesFind(const SbImportEdges *edges, PetscInt a, PetscInt b);
+/* x[nedge][3]: the middle of each edge, or where its node is off it. */
+void SbImportEdgeNodes(const SbImport *import, const SbImportEdges *edges, PetscReal x[]);
+
 /* ------------------------------------------------------------------ write_h5.c: indices of HDF5 files for ParaView */
 
 /* An array [n] or [n][ncomp] of type "Int" or "Float" as a DataItem of XDMF; file and path in it by a printf format. */

@@ -21,20 +21,6 @@ static inline uint64_t SbMix(PetscInt i)
 /* memory_mesh.c: the mesh that a body has in memory. */
 PetscErrorCode SbImportMemoryMesh(const SbBody *body, SbImport *import);
 
-/* ------------------------------------------------------------------ edges.c: pairs of vertices that an item joins */
-
-typedef struct {
-  PetscInt nvert, nedge;
-  PetscInt *start; /* [nvert + 1] into `high`: edges by lower vertex */
-  PetscInt *high;  /* [nedge] the other vertex, ascending for each lower one */
-} SbImportEdges;
-
-/* Edges of tets, triangles and lines. */
-PetscErrorCode SbImportEdgesCreate(const SbImport *import, SbImportEdges *edges);
-PetscErrorCode SbImportEdgesDestroy(SbImportEdges *edges);
-/* Number of the edge between two vertices, -1 when there is none. */
-PetscInt SbImportEdgesFind(const SbImportEdges *edges, PetscInt a, PetscInt b);
-
 /* ------------------------------------------------------------------ check.c, quality.c, sets.c */
 
 /* Largest coordinate in size, m. */

@@ -131,23 +131,17 @@ PetscErrorCode SbMeshFileRefine(SbImport *im)
              "%s: %" PetscInt_FMT " tets, refined, are more than this build can number", im->where,
              im->item[3].n);
   PetscCall(SbImportEdgesCreate(im, &edges));
-  // vertices in the middle of the edges, behind the old ones
+  // vertices at the nodes of the edges, behind the old ones
   n = im->nvert + edges.nedge;
   PetscCall(PetscRealloc(3 * (size_t)n * sizeof(PetscReal), &im->x));
   PetscCall(PetscRealloc((size_t)n * sizeof(int64_t), &im->vert_number));
-  for (PetscInt a = 0; a < edges.nvert; a++) {
-    for (PetscInt e = edges.start[a]; e < edges.start[a + 1]; e++) {
-      for (int i = 0; i < 3; i++)
-        im->x[3 * (im->nvert + e) + i] = (im->x[3 * a + i] + im->x[3 * edges.high[e] + i]) / 2;
-    }
-  }
-  // on curved edges where their nodes are
+  SbImportEdgeNodes(im, &edges, im->x + 3 * nvert);
   PetscCall(PetscCalloc1(curved ? 3 * (size_t)edges.nedge : 0, &off));
   for (PetscInt i = 0; i < curved; i++) {
     const SbMiddle *middle = &im->middle[i];
     const PetscInt e = SbImportEdgesFind(&edges, middle->end[0], middle->end[1]);
 
-    for (int k = 0; e >= 0 && k < 3; k++) im->x[3 * (nvert + e) + k] += off[3 * e + k] = middle->off[k];
+    for (int k = 0; e >= 0 && k < 3; k++) off[3 * e + k] = middle->off[k];
   }
   im->nmiddle.n = 0;
   for (PetscInt v = 0; v < n; v++) im->vert_number[v] = v + 1;

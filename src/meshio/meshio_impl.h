@@ -125,6 +125,8 @@ PetscErrorCode SbWrite_Xdmf(const SbImport *import, const char *path, const char
 /* gmsh_library.c: what SbGmshRun() does in the child. */
 PetscErrorCode SbGmshCall(const SbGmshJob *job, SbImport *result);
 
+/* Closes a file; a write that failed since errno was 0 is an error. */
+PetscErrorCode SbWriteEnd(FILE *file, const char *path);
 /* Opens a regular file and tells its size; else says what is wrong with the name. */
 PetscErrorCode SbScanOpenFile(const char *where, const char *path, FILE **file, size_t *size);
 /* Moves to the beginning of a text; false when it does not come. */

@@ -13,7 +13,6 @@
 #include <errno.h>
 #include <stdlib.h>
 #include "meshio_impl.h"
-#include "sbgeometry.h"
 
 typedef struct {
   const SbImport *im;
@@ -24,9 +23,9 @@ typedef struct {
   PetscInt home;          /* its tag set */
   int64_t *number;        /* [ngroup] of the groups in the file */
   PetscInt64 total, done; /* items, for the progress */
-  PetscInt nnode, nedge;
-  SbKey *edge;  /* [nedge] of items, ascending, of a mesh with curved edges */
-  PetscReal *x; /* [nnode][3] vertices, then the nodes of edges */
+  PetscInt nnode;
+  SbImportEdges edges; /* of a mesh with curved edges, else empty */
+  PetscReal *x;        /* [nnode][3] vertices, then the nodes of edges */
 } Out;
 
 /* Of items by dimension; of second order. */
@@ -88,54 +87,16 @@ static PetscErrorCode report_progress(Out *out)
 
 /* ------------------------------------------------------------------ nodes */
 
-/* Those of edges, where some are curved. */
-static PetscErrorCode list_nodes(Out *out)
-{
-  const SbImport *im = out->im;
-  PetscInt n = 0, at = 0;
-
-  PetscFunctionBeginUser;
-  for (int d = 0; d < 4 && im->nmiddle.n; d++) n += nedge_of[d] * im->item[d].n;
-  PetscCall(PetscMalloc1(n, &out->edge));
-  n = 0;
-  for (int d = 0; d < 4 && im->nmiddle.n; d++) {
-    for (PetscInt i = 0; i < nedge_of[d] * im->item[d].n; i++) {
-      const PetscInt *v = im->item[d].vert + (d + 1) * (size_t)(i / nedge_of[d]);
-      const int *e = edge_of[i % nedge_of[d]];
-
-      out->edge[n++] = (SbKey){SbKeyOfPair(v[e[0]], v[e[1]]), 0};
-    }
-  }
-  SbKeysSort(n, out->edge);
-  for (PetscInt i = 0; i < n; i++)
-    if (!i || out->edge[i].key != out->edge[out->nedge - 1].key) out->edge[out->nedge++] = out->edge[i];
-  // vertices, then the nodes of edges
-  out->nnode = im->nvert + out->nedge;
-  PetscCall(PetscMalloc1(3 * (size_t)out->nnode, &out->x));
-  PetscCall(PetscArraycpy(out->x, im->x, 3 * (size_t)im->nvert));
-  for (PetscInt i = 0; i < out->nedge; i++) {
-    const uint64_t key = out->edge[i].key;
-    const PetscReal *a = im->x + 3 * (key >> 32), *b = im->x + 3 * (key & 0xffffffff);
-    PetscReal *x = out->x + 3 * (im->nvert + i);
-
-    while (at < im->nmiddle.n && SbKeyOfPair(im->middle[at].end[0], im->middle[at].end[1]) < key) at++;
-    for (int k = 0; k < 3; k++) x[k] = 0.5 * (a[k] + b[k]);
-    if (at == im->nmiddle.n || SbKeyOfPair(im->middle[at].end[0], im->middle[at].end[1]) != key) continue;
-    for (int k = 0; k < 3; k++) x[k] += im->middle[at].off[k];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The nodes of an item of a dimension. */
 static void put_nodes(Out *out, int d, const PetscInt v[], void (*put)(Out *, int64_t, char))
 {
-  const int nedge = out->nedge ? nedge_of[d] : 0;
+  const int nedge = out->edges.nedge ? nedge_of[d] : 0;
 
   for (int a = 0; a <= d; a++) (*put)(out, v[a] + 1, a < d || nedge ? ' ' : '\n');
   for (int e = 0; e < nedge; e++) {
-    const uint64_t key = SbKeyOfPair(v[edge_of[e][0]], v[edge_of[e][1]]);
+    const PetscInt at = SbImportEdgesFind(&out->edges, v[edge_of[e][0]], v[edge_of[e][1]]);
 
-    (*put)(out, out->im->nvert + SbKeysFind(out->nedge, out->edge, key) + 1, e + 1 < nedge ? ' ' : '\n');
+    (*put)(out, out->im->nvert + at + 1, e + 1 < nedge ? ' ' : '\n');
   }
 }
 
@@ -234,7 +195,7 @@ static PetscErrorCode write_elements_41(Out *out)
       // a block of items of one tag set
       put_int(out, d, ' ');
       put_int(out, item->tags[i] + 1, ' ');
-      put_int(out, gmsh_type[out->nedge > 0][d], ' ');
+      put_int(out, gmsh_type[out->edges.nedge > 0][d], ' ');
       put_size(out, n, '\n');
       for (PetscInt k = i; k < i + n; k++) {
         const PetscInt *v = item->vert + (size_t)(d + 1) * (size_t)k;
@@ -276,7 +237,7 @@ static PetscErrorCode write_elements_22(Out *out)
       g = next_group(out->im, item->tags[i], d, &k);
       do {
         if (!out->binary) put_int(out, number, ' ');
-        put_int(out, gmsh_type[out->nedge > 0][d], ' ');
+        put_int(out, gmsh_type[out->edges.nedge > 0][d], ' ');
         if (out->binary) put_int(out, 1, ' ');
         put_int(out, 2, ' ');
         if (out->binary) put_int(out, number, ' ');
@@ -356,13 +317,23 @@ static PetscErrorCode write_all(Out *out, PetscBool version22)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbWriteEnd(FILE *file, const char *path)
+{
+  int error = ferror(file) ? errno : 0;
+
+  PetscFunctionBeginUser;
+  if (fclose(file) && !error) error = errno;
+  PetscCheck(!error, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path,
+             strerror(error));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbWrite_Gmsh(const SbImport *im, const char *path, SbMeshFormat format)
 {
   const PetscBool version22 = (PetscBool)(format == SB_MESH_MSH22 || format == SB_MESH_MSH22_BINARY);
   int64_t highest[4] = {0, 0, 0, 0};
   Out out;
   PetscErrorCode ierr;
-  int error;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(&out, sizeof(out)));
@@ -397,17 +368,21 @@ PetscErrorCode SbWrite_Gmsh(const SbImport *im, const char *path, SbMeshFormat f
         out.number[g] = ++highest[p->dim];
     }
   }
-  PetscCall(list_nodes(&out));
+  // nodes: the vertices and, where edges are curved, those of all edges
+  if (im->nmiddle.n) PetscCall(SbImportEdgesCreate(im, &out.edges));
+  out.nnode = im->nvert + out.edges.nedge;
+  PetscCall(PetscMalloc1(3 * (size_t)out.nnode, &out.x));
+  PetscCall(PetscArraycpy(out.x, im->x, 3 * (size_t)im->nvert));
+  if (im->nmiddle.n) SbImportEdgeNodes(im, &out.edges, out.x + 3 * im->nvert);
   errno = 0;
   ierr = write_all(&out, version22);
-  error = ferror(out.file) ? errno : 0;
-  if (fclose(out.file) && !error) error = errno;
+  if (ierr)
+    (void)fclose(out.file);
+  else
+    ierr = SbWriteEnd(out.file, path);
   for (int d = 0; d < 4; d++) PetscCall(PetscFree(out.used[d]));
   PetscCall(PetscFree(out.number));
-  PetscCall(PetscFree(out.edge));
+  PetscCall(SbImportEdgesDestroy(&out.edges));
   PetscCall(PetscFree(out.x));
-  PetscCall(ierr);
-  PetscCheck(!error, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path,
-             strerror(error));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  PetscFunctionReturn(ierr);
 }

@@ -174,7 +174,6 @@ PetscErrorCode SbWrite_Xdmf(const SbImport *im, const char *path, const char *h5
 {
   const char *slash = strrchr(h5, '/'), *name = slash ? slash + 1 : h5;
   FILE *file;
-  int error;
 
   PetscFunctionBeginUser;
   file = fopen(path, "w");
@@ -200,9 +199,6 @@ PetscErrorCode SbWrite_Xdmf(const SbImport *im, const char *path, const char *h5
   if (im->item[3].n) write_grid(file, im, 3, name);
   if (im->item[2].n) write_grid(file, im, 2, name);
   (void)fprintf(file, "</Domain>\n</Xdmf>\n");
-  error = ferror(file) ? errno : 0;
-  if (fclose(file) && !error) error = errno;
-  PetscCheck(!error, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path,
-             strerror(error));
+  PetscCall(SbWriteEnd(file, path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -4,26 +4,17 @@
   The edges of every item go into the bucket of their lower vertex (a counting sort); each bucket is sorted, equal neighbours
   in it are one edge. The number of an edge is its position in the list.
 */
-#include "mesh_impl.h"
+#include "meshio_impl.h"
+#include "sbquadratic.h"
 
 static const int edge_count[4] = {0, 1, 3,
                                   6}; /* of an item, by dimension; triangles use the pairs 0, 1 and 3 */
 static const int edge_row[4][6] = {{0}, {0}, {0, 1, 3}, {0, 1, 2, 3, 4, 5}};
 
-static inline void edge_of(const SbItems *item, int dim, PetscInt i, int e, PetscInt *low, PetscInt *high)
-{
-  const PetscInt *v = item->vert + (size_t)(dim + 1) * (size_t)i;
-  const PetscInt a = v[SbTetEdge[edge_row[dim][e]][0]], b = v[SbTetEdge[edge_row[dim][e]][1]];
-
-  *low = PetscMin(a, b);
-  *high = PetscMax(a, b);
-}
-
 PetscErrorCode SbImportEdgesCreate(const SbImport *im, SbImportEdges *edges)
 {
-  PetscInt *next, low, high;
+  PetscInt *low, *high, *item, n = 0, begin = 0, kept = 0;
   PetscInt64 total = 0;
-  PetscInt begin = 0, kept = 0;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(edges, sizeof(*edges)));
@@ -31,32 +22,24 @@ PetscErrorCode SbImportEdgesCreate(const SbImport *im, SbImportEdges *edges)
   for (int d = 1; d < 4; d++) total += (PetscInt64)edge_count[d] * im->item[d].n;
   PetscCheck(total <= PETSC_MAX_INT, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: has more edges than this build can number", im->where);
-  PetscCall(PetscCalloc1((size_t)im->nvert + 1, &edges->start));
-  PetscCall(PetscMalloc1((size_t)total, &edges->high));
+  // those of all items, by their lower vertices
+  PetscCall(PetscMalloc2((size_t)total, &low, (size_t)total, &high));
   for (int d = 1; d < 4; d++) {
-    for (PetscInt i = 0; i < im->item[d].n; i++) {
-      for (int e = 0; e < edge_count[d]; e++) {
-        edge_of(&im->item[d], d, i, e, &low, &high);
-        edges->start[low + 1]++;
-      }
+    for (PetscInt i = 0; i < edge_count[d] * im->item[d].n; i++) {
+      const PetscInt *v = im->item[d].vert + (size_t)(d + 1) * (size_t)(i / edge_count[d]);
+      const int *pair = SbTetEdge[edge_row[d][i % edge_count[d]]];
+
+      low[n] = PetscMin(v[pair[0]], v[pair[1]]);
+      high[n++] = PetscMax(v[pair[0]], v[pair[1]]);
     }
   }
-  for (PetscInt v = 0; v < im->nvert; v++) edges->start[v + 1] += edges->start[v];
-  PetscCall(PetscMalloc1(im->nvert, &next));
-  PetscCall(PetscArraycpy(next, edges->start, im->nvert));
-  for (int d = 1; d < 4; d++) {
-    for (PetscInt i = 0; i < im->item[d].n; i++) {
-      for (int e = 0; e < edge_count[d]; e++) {
-        edge_of(&im->item[d], d, i, e, &low, &high);
-        edges->high[next[low]++] = high;
-      }
-    }
-  }
-  PetscCall(PetscFree(next));
-  // sorts each bucket and closes the gaps of repeated edges
+  PetscCall(SbBucketByKey(n, low, im->nvert, &edges->start, &item));
+  PetscCall(PetscMalloc1(n, &edges->high));
+  // each bucket is sorted, and the gaps of repeated edges are closed
   for (PetscInt v = 0; v < edges->nvert; v++) {
     const PetscInt end = edges->start[v + 1];
 
+    for (PetscInt i = begin; i < end; i++) edges->high[i] = high[item[i]];
     PetscCall(PetscSortInt(end - begin, edges->high + begin));
     for (PetscInt i = begin; i < end; i++) {
       if (i > begin && edges->high[i] == edges->high[i - 1]) continue;
@@ -66,6 +49,8 @@ PetscErrorCode SbImportEdgesCreate(const SbImport *im, SbImportEdges *edges)
     begin = end;
   }
   edges->nedge = kept;
+  PetscCall(PetscFree2(low, high));
+  PetscCall(PetscFree(item));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -84,4 +69,17 @@ PetscInt SbImportEdgesFind(const SbImportEdges *edges, PetscInt a, PetscInt b)
 
   (void)PetscFindInt(PetscMax(a, b), edges->start[low + 1] - begin, edges->high + begin, &at);
   return at < 0 ? -1 : begin + at;
+}
+
+void SbImportEdgeNodes(const SbImport *im, const SbImportEdges *edges, PetscReal x[])
+{
+  for (PetscInt a = 0; a < edges->nvert; a++)
+    for (PetscInt e = edges->start[a]; e < edges->start[a + 1]; e++)
+      for (int i = 0; i < 3; i++) x[3 * e + i] = (im->x[3 * a + i] + im->x[3 * edges->high[e] + i]) / 2;
+  for (PetscInt m = 0; m < im->nmiddle.n; m++) {
+    const SbMiddle *middle = &im->middle[m];
+    const PetscInt e = SbImportEdgesFind(edges, middle->end[0], middle->end[1]);
+
+    for (int i = 0; e >= 0 && i < 3; i++) x[3 * e + i] += middle->off[i];
+  }
 }
