@@ -191,7 +191,7 @@ PetscErrorCode SbMeshBroadcastVertices(SbMesh mesh, PetscInt n, MPI_Datatype typ
 PetscErrorCode SbMeshValidate(SbMesh mesh); /* ordering, ranges, ownership, sums; for -validate and tests */
 PetscErrorCode SbMeshRegister(void);        /* rows of the option table, the METIS partitioner */
 /* Defaults of SbTetOptions; what -body_<name>_tet_... says when the mesh is a surface. Not collective. */
-PetscErrorCode SbTetDefaults(SbTetOptions *options);
+void SbTetDefaults(SbTetOptions *options);
 PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOptions *options);
 /* Room for a mesh in memory; zeroed. Not collective. */
 PetscErrorCode SbMemoryMeshCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri, SbMemoryMesh **in_memory);

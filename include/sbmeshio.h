@@ -66,7 +66,7 @@ PetscErrorCode SbScanType(SbScan *scan, SbNumberType *type);
 void SbNumbersConvert(SbNumberType type, PetscBool big_endian, size_t n, const void *bytes, double value[]);
 /* The next word; empty at the end of the file. */
 PetscErrorCode SbScanWord(SbScan *scan, size_t size, char word[]);
-PetscErrorCode SbScanEndOfLine(SbScan *scan); /* to the first byte after it */
+void SbScanEndOfLine(SbScan *scan); /* to the first byte after it */
 void SbScanNext(SbScan *scan,
                 char comment); /* to the next word, over blank lines and comments to the end of a line */
 PetscBool SbScanMore(SbScan *scan, char comment);

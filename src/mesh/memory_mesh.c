@@ -84,13 +84,12 @@ PetscErrorCode SbImportMemoryMesh(const SbBody *body, SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMemoryMeshMark(const SbBody *body, const SbFaces *faces, SbMasks *m)
+void SbMemoryMeshMark(const SbBody *body, const SbFaces *faces, SbMasks *m)
 {
   const SbMemoryMesh *g = body->in_memory;
   uint64_t inclusions = 0;
   PetscInt slots[2];
 
-  PetscFunctionBeginUser;
   for (PetscInt k = 0; k < body->ninclusion; k++) inclusions |= SB_SET_BIT(body->inclusion[k].set);
   for (PetscInt v = 0; v < g->nvert; v++) m->vert[v] |= g->vert_set[v];
   for (PetscInt c = 0; c < g->ncell; c++) m->cell[c] = (m->cell[c] & ~inclusions) | g->cell_set[c];
@@ -99,5 +98,4 @@ PetscErrorCode SbMemoryMeshMark(const SbBody *body, const SbFaces *faces, SbMask
 
     for (PetscInt k = 0; k < n; k++) m->face[slots[k]] |= g->tri_set[t];
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }

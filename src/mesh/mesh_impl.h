@@ -79,7 +79,7 @@ PetscBool SbImportOffsets(const SbImport *import, int dim, const PetscInt vert[]
 /* Brings off[n][6][3] of cells orig[n], by original number, to where the cells are. Collective. */
 PetscErrorCode SbMeshCurve(SbMesh mesh, PetscInt n, const PetscInt orig[], const PetscReal off[]);
 /* Adds the members of sets that are groups. */
-PetscErrorCode SbMemoryMeshMark(const SbBody *body, const SbFaces *faces, SbMasks *masks);
+void SbMemoryMeshMark(const SbBody *body, const SbFaces *faces, SbMasks *masks);
 /* A set that selects nothing is an error, which lists the groups that exist. */
 PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport import[], PetscInt nset,
                            const SbSet set[]);

@@ -213,7 +213,7 @@ PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbo
     }
   }
   PetscCall(PetscFree(bits));
-  if (body[b].in_memory) PetscCall(SbMemoryMeshMark(&body[b], faces, m));
+  if (body[b].in_memory) SbMemoryMeshMark(&body[b], faces, m);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

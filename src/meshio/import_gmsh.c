@@ -57,7 +57,7 @@ static PetscErrorCode read_format(Gmsh *g)
   if (size != 8) SB_SCAN_ERROR(s, "data size %lld; expected 8", (long long)size);
   g->binary = (PetscBool)(kind == 1);
   if (!g->binary) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbScanEndOfLine(s));
+  SbScanEndOfLine(s);
   s->binary = s->bytes = PETSC_TRUE;
   PetscCall(SbScanInt4(s, "number one in binary", &one));
   if (one == 0x01000000)
@@ -168,7 +168,7 @@ static PetscErrorCode read_nodes(Gmsh *g)
     // the number of nodes is text also in binary files
     s->binary = PETSC_FALSE;
     PetscCall(SbScanText(s, "number of nodes", &n));
-    if (g->binary) PetscCall(SbScanEndOfLine(s));
+    if (g->binary) SbScanEndOfLine(s);
     s->binary = g->binary;
     PetscCall(SbScanRoom(s, "nodes", n, 8, 28));
     PetscCall(SbImportSetVertices(im, (PetscInt)n));
@@ -349,7 +349,7 @@ static PetscErrorCode read_section(Gmsh *g, const char *name, PetscBool *known)
       PetscCall(SbImportGroup(g->im, (PetscInt)dim, tag, text, &group));
     }
   } else if (!strcmp(name, "$Entities") || !strcmp(name, nodes) || !strcmp(name, elements)) {
-    PetscCall(SbScanEndOfLine(s));
+    SbScanEndOfLine(s);
     s->binary = g->binary;
     if (!strcmp(name, nodes)) {
       PetscCall(read_nodes(g));
@@ -361,7 +361,7 @@ static PetscErrorCode read_section(Gmsh *g, const char *name, PetscBool *known)
 
         s->binary = PETSC_FALSE;
         PetscCall(SbScanText(s, "number of elements", &n));
-        if (g->binary) PetscCall(SbScanEndOfLine(s));
+        if (g->binary) SbScanEndOfLine(s);
         s->binary = g->binary;
         PetscCall(SbScanRoom(s, "elements", n, 8, 8));
         for (int64_t i = 0; i < n; i += nrun) PetscCall(read_elements_22_run(g, n - i, &nrun));

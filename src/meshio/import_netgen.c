@@ -29,7 +29,7 @@ static PetscErrorCode read_points(SbImport *im)
     im->vert_number[v] = v + 1;
     SbScanNext(s, '#');
     PetscCall(SbScanPoint(s, "coordinate", v + 1, im->x + 3 * v));
-    PetscCall(SbScanEndOfLine(s));
+    SbScanEndOfLine(s);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -98,7 +98,7 @@ static PetscErrorCode read_elements(SbImport *im, const Layout *l)
     if (nnode == l->dim + 1 || type == SB_GMSH_TET10 || type == SB_GMSH_TRIANGLE6)
       PetscCall(SbImportTagsAlone(im, l->dim, value[l->mark], NULL, &tags));
     PetscCall(SbImportAddElement(im, type, vert, tags, i + 1));
-    PetscCall(SbScanEndOfLine(s));
+    SbScanEndOfLine(s);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

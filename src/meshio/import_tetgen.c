@@ -49,7 +49,7 @@ static PetscErrorCode read_file(SbImport *im, int f)
   PetscCall(SbScanText(s, files[f].count, &count[0]));
   for (int i = 1; i < files[f].ncount && SbScanMore(s, '#'); i++)
     PetscCall(SbScanText(s, "count or mark of the first line", &count[i]));
-  PetscCall(SbScanEndOfLine(s));
+  SbScanEndOfLine(s);
   if (dim == 0 && count[1] != 3 && count[1] != 0)
     SB_SCAN_ERROR(s, "the points have dimension %lld; expected 3", (long long)count[1]);
   PetscCall(SbScanRoom(s, files[f].title, count[0], files[f].room, files[f].room));
@@ -128,7 +128,7 @@ static PetscErrorCode read_file(SbImport *im, int f)
                     "announces; correct that line",
                     (long long)number, npoint, (long long)count[2]);
     PetscCall(SbImportAddElement(im, type, vert, tags, number));
-    PetscCall(SbScanEndOfLine(s));
+    SbScanEndOfLine(s);
   }
   if (dim == 3) PetscCall(SbImportCheckTypes(im));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -92,7 +92,7 @@ static PetscErrorCode read_group(SbDeck *d, int nvalue)
   PetscCall(SbScanText(s, "number of a group", &number));
   while (SbScanMore(s, '\n')) PetscCall(SbScanText(s, "number of members of a group", &n));
   PetscCall(SbScanRoom(s, "members of a group", n, 4, 4));
-  PetscCall(SbScanEndOfLine(s));
+  SbScanEndOfLine(s);
   PetscCall(SbScanRestOfLine(s, sizeof(name), name));
   if (!name[0]) (void)snprintf(name, sizeof(name), "group_%lld", (long long)number);
   for (int64_t i = 0; i < n; i++) {
@@ -125,10 +125,10 @@ PetscErrorCode SbImportRead_UNV(const char *path, SbImport *im)
     if (s->at >= s->end) break;
     while (s->at > s->data && s->at[-1] != '\n') s->at--; /* the whole line */
     if (!is_mark(s)) SB_SCAN_ERROR(s, "expected a line of -1; this is no universal file, or it is damaged");
-    PetscCall(SbScanEndOfLine(s));
+    SbScanEndOfLine(s);
     // a data set: its number, then as many of what it holds as there are
     PetscCall(SbScanText(s, "number of a data set", &id));
-    PetscCall(SbScanEndOfLine(s));
+    SbScanEndOfLine(s);
     if (id == 2412 && !d.nnode.n) SB_SCAN_ERROR(s, "elements before the nodes");
     for (;;) {
       // the data set ends at a mark; with the file it is an error
@@ -151,9 +151,9 @@ PetscErrorCode SbImportRead_UNV(const char *path, SbImport *im)
       if (id == 2412) PetscCall(read_element(&d));
       if (id == 2429 || id == 2430 || id == 2432) PetscCall(read_group(&d, 2));
       if (id == 2435 || id == 2452 || id == 2467 || id == 2477) PetscCall(read_group(&d, 4));
-      PetscCall(SbScanEndOfLine(s)); /* data sets of no concern are passed over */
+      SbScanEndOfLine(s); /* data sets of no concern are passed over */
     }
-    PetscCall(SbScanEndOfLine(s));
+    SbScanEndOfLine(s);
   }
   if (!d.nnode.n) SB_SCAN_ERROR(s, "there are no nodes (data set 2411 or 15)");
   PetscCall(SbDeckBuild(&d));

@@ -27,7 +27,7 @@ static PetscErrorCode read_array(Vtk *v, const char *what, int64_t n, SbNumberTy
 
   PetscFunctionBeginUser;
   // binary data begins behind the end of the line
-  if (v->binary) PetscCall(SbScanEndOfLine(s));
+  if (v->binary) SbScanEndOfLine(s);
   s->binary = v->binary;
   PetscCall(SbScanRoom(s, what, n, 2, type.size));
   s->binary = PETSC_FALSE;
@@ -193,7 +193,7 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
       PetscCall(SbScanWord(s, sizeof(name), name));
       if (!strcmp(name, "METADATA")) {
         while (SbScanMore(s, '\n')) {
-          PetscCall(SbScanEndOfLine(s));
+          SbScanEndOfLine(s);
           if (s->at < s->end && (*s->at == '\n' || *s->at == '\r')) break;
         }
         PetscCall(SbScanWord(s, sizeof(name), name));
@@ -211,7 +211,7 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
     PetscCall(read_array(v, "colours", 4 * n, (SbNumberType){'u', 1}, NULL));
   } else if (!strcasecmp(section, "METADATA")) {
     // a block of lines up to an empty one
-    do PetscCall(SbScanEndOfLine(s));
+    do SbScanEndOfLine(s);
     while (SbScanMore(s, '\n'));
   } else if (k < PETSC_STATIC_ARRAY_LENGTH(tuples)) {
     PetscCall(SbScanWord(s, sizeof(name), name));
@@ -233,8 +233,8 @@ PetscErrorCode SbImportRead_VTK(const char *path, SbImport *im)
   // the header: text or binary, an unstructured grid
   if ((size_t)(s->end - s->at) < 5 || strncasecmp(s->at, "# vtk", 5))
     SB_SCAN_ERROR(s, "expected '# vtk DataFile Version'; this is no legacy file of VTK");
-  PetscCall(SbScanEndOfLine(s));
-  PetscCall(SbScanEndOfLine(s)); /* the title */
+  SbScanEndOfLine(s);
+  SbScanEndOfLine(s); /* the title */
   PetscCall(SbScanWord(s, sizeof(kind), kind));
   if (strcasecmp(kind, "ASCII") && strcasecmp(kind, "BINARY"))
     SB_SCAN_ERROR(s, "expected ASCII or BINARY, found '%s'", kind);

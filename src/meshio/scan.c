@@ -339,7 +339,7 @@ void SbScanNext(SbScan *s, char comment)
 {
   skip_blanks(s);
   while (s->at < s->end && *s->at == comment) {
-    (void)SbScanEndOfLine(s);
+    SbScanEndOfLine(s);
     skip_blanks(s);
   }
 }
@@ -351,13 +351,11 @@ PetscBool SbScanMore(SbScan *s, char comment)
   return (PetscBool)(s->at < s->end && *s->at != '\n' && *s->at != comment);
 }
 
-PetscErrorCode SbScanEndOfLine(SbScan *s)
+void SbScanEndOfLine(SbScan *s)
 {
   const char *line = (const char *)memchr(s->at, '\n', (size_t)(s->end - s->at));
 
-  PetscFunctionBeginUser;
   s->at = line ? line + 1 : s->end;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscBool SbScanFind(SbScan *s, const char *text)

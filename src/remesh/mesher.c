@@ -25,7 +25,7 @@ static PetscErrorCode fill(const char *where, const SbSurface *hull, PetscReal s
   PetscCall(PetscMemzero(im, sizeof(*im)));
   (void)snprintf(im->where, sizeof(im->where), "%s", where);
   PetscCall(SbImportTagSet(im, 0, NULL, &none));
-  PetscCall(SbTetDefaults(&options));
+  SbTetDefaults(&options);
   options.size = step > 0 ? step * PetscMax(1, PetscFloorReal(size / step)) : size;
   options.surface = SB_TET_KEEP;
   PetscCall(PetscMalloc1(3 * (size_t)hull->nvert, &rounded.x));

@@ -45,7 +45,7 @@ PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOpt
   PetscInt backend = 0, surface = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(SbTetDefaults(o));
+  SbTetDefaults(o);
   if (!SbMeshFileIsSurface(mesh)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbOptionReal(scope, "tet_size", &o->size));
   PetscCall(SbOptionChoice(scope, "tet_surface", &surface));

@@ -120,9 +120,8 @@ static PetscErrorCode try_backend(int backend, const SbTetJob *job, SbImport *te
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbTetDefaults(SbTetOptions *o)
+void SbTetDefaults(SbTetOptions *o)
 {
-  PetscFunctionBeginUser;
   *o = (SbTetOptions){.size = 0,
                       .merge_tolerance = -1,
                       .untangle = -1,
@@ -130,7 +129,6 @@ PetscErrorCode SbTetDefaults(SbTetOptions *o)
                       .seconds = 600,
                       .backend = SB_TET_AUTO,
                       .surface = SB_TET_SURFACE_AUTO};
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The first backend that works; its mesh goes to the body. */

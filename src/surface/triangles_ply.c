@@ -72,7 +72,7 @@ static PetscErrorCode read_header(Ply *p)
   PetscCall(SbScanWord(p->s, sizeof(word), word));
   if (strcmp(word, "ply")) SB_SCAN_ERROR(p->s, "expected 'ply', found '%s'; it is no PLY file", word);
   for (;;) {
-    PetscCall(SbScanEndOfLine(p->s));
+    SbScanEndOfLine(p->s);
     PetscCall(SbScanWord(p->s, sizeof(word), word));
     if (!word[0])
       SB_SCAN_ERROR(p->s,
@@ -104,7 +104,7 @@ static PetscErrorCode read_header(Ply *p)
       SB_SCAN_ERROR(p->s, "'%s' is no line of a PLY header", word);
   }
   if (!format) SB_SCAN_ERROR(p->s, "the header has no line 'format'");
-  PetscCall(SbScanEndOfLine(p->s));
+  SbScanEndOfLine(p->s);
   p->s->binary = p->s->bytes = binary;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -30,7 +30,7 @@ static PetscErrorCode read_counts(SbScan *s, const char *what, int n, int64_t co
   SbScanNext(s, '#');
   PetscCall(SbScanText(s, what, &count[0]));
   for (int i = 1; i < n && SbScanMore(s, '#'); i++) PetscCall(SbScanText(s, what, &count[i]));
-  PetscCall(SbScanEndOfLine(s));
+  SbScanEndOfLine(s);
   PetscCall(SbScanRoom(s, what, count[0], 4, 4));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -51,7 +51,7 @@ static PetscErrorCode read_points(Poly *p, int64_t n)
     SbScanNext(p->s, '#');
     PetscCall(SbScanText(p->s, "number of a point", &number[i]));
     PetscCall(SbScanPoint(p->s, "coordinate of a point", 0, x));
-    PetscCall(SbScanEndOfLine(p->s));
+    SbScanEndOfLine(p->s);
     PetscCall(SbTrianglesAddVertex(p->f, x));
   }
   PetscCall(SbNumbersCreate((PetscInt)n, number, index));
@@ -147,7 +147,7 @@ static PetscErrorCode read_seeds(Poly *p, const char *what, PetscBool attribute,
       SB_SCAN_ERROR(p->s, "the attribute %g of a region is no whole number; it becomes the name volume_N",
                     (double)value);
     one->attribute = (int64_t)value;
-    PetscCall(SbScanEndOfLine(p->s));
+    SbScanEndOfLine(p->s);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -178,7 +178,7 @@ PetscErrorCode SbTrianglesRead_Poly(SbScan *s, SbTriangleFile *f)
       PetscCall(SbScanText(p->s, "number of corners of a facet", &n));
       PetscCall(read_polygon(p, n, i));
       if (count[1] && SbScanMore(p->s, '#')) PetscCall(SbScanText(p->s, "marker of a facet", &marker));
-      PetscCall(SbScanEndOfLine(p->s));
+      SbScanEndOfLine(p->s);
       PetscCall(end_facet(p, marker, i));
     } else {
       int64_t facet[3], n, number;
@@ -189,7 +189,7 @@ PetscErrorCode SbTrianglesRead_Poly(SbScan *s, SbTriangleFile *f)
         SbScanNext(p->s, '#');
         PetscCall(SbScanText(p->s, "number of corners of a polygon", &n));
         PetscCall(read_polygon(p, n, i));
-        PetscCall(SbScanEndOfLine(p->s));
+        SbScanEndOfLine(p->s);
       }
       PetscCall(SbScanRoom(p->s, "holes of a facet", facet[1], 4, 4));
       for (int64_t k = 0; k < facet[1]; k++) {
@@ -198,7 +198,7 @@ PetscErrorCode SbTrianglesRead_Poly(SbScan *s, SbTriangleFile *f)
         PetscCall(SbImportScratch(p->f->im, 3 * (size_t)(p->nhole + 1) * sizeof(*p->hole), &p->hole));
         PetscCall(SbScanPoint(p->s, "coordinate of a hole", 0, p->hole + 3 * p->nhole));
         p->nhole++;
-        PetscCall(SbScanEndOfLine(p->s));
+        SbScanEndOfLine(p->s);
       }
       PetscCall(end_facet(p, facet[2], i));
     }

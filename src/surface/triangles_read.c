@@ -73,12 +73,12 @@ static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
       for (last = name + strlen(name); last > name && isspace((unsigned char)last[-1]);) *--last = 0;
       if (!name[0]) (void)snprintf(name, sizeof(name), "solid_%" PetscInt_FMT, nsolid);
       PetscCall(SbTrianglesGroups(f, 1, names));
-      PetscCall(SbScanEndOfLine(s));
+      SbScanEndOfLine(s);
     }
-    if (!strcasecmp(word, "endsolid")) PetscCall(SbScanEndOfLine(s)); /* its name again */
+    if (!strcasecmp(word, "endsolid")) SbScanEndOfLine(s); /* its name again */
     // a facet: its normal, which is not read, and three vertices
     if (open && !strcasecmp(word, "facet")) {
-      PetscCall(SbScanEndOfLine(s)); /* the normal */
+      SbScanEndOfLine(s); /* the normal */
       PetscCall(stl_word(s, "outer"));
       PetscCall(stl_word(s, "loop"));
       for (int k = 0; k < 3; k++) {
@@ -211,7 +211,7 @@ PetscErrorCode SbTrianglesRead_OBJ(SbScan *s, SbTriangleFile *f)
       for (PetscInt i = 0; i < names.ngroup; i++) all[n++] = names.group[i];
       PetscCall(SbTrianglesGroups(f, n, all));
     }
-    PetscCall(SbScanEndOfLine(s));
+    SbScanEndOfLine(s);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -235,7 +235,7 @@ PetscErrorCode SbTrianglesRead_OFF(SbScan *s, SbTriangleFile *f)
   for (int64_t i = 0; i < count[0]; i++) {
     SbScanNext(s, '#');
     PetscCall(add_vertex(s, f));
-    PetscCall(SbScanEndOfLine(s));
+    SbScanEndOfLine(s);
   }
   for (int64_t i = 0; i < count[1]; i++) {
     int64_t n, v;
@@ -247,7 +247,7 @@ PetscErrorCode SbTrianglesRead_OFF(SbScan *s, SbTriangleFile *f)
       PetscCall(SbTrianglesAddCorner(s, i + 1, v, f));
     }
     PetscCall(SbTrianglesAddFace(s, i + 1, f));
-    PetscCall(SbScanEndOfLine(s)); /* colours */
+    SbScanEndOfLine(s); /* colours */
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -192,7 +192,7 @@ PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *li
   PetscCall(SbOptionReal(&scope, "merge_tolerance", &tool->merge_tolerance));
 
   /* how a surface becomes tets */
-  PetscCall(SbTetDefaults(&tool->body.tet));
+  SbTetDefaults(&tool->body.tet);
   PetscCall(SbOptionReal(&scope, "size", &tool->body.tet.size));
   PetscCall(SbOptionChoice(&scope, "surface", &surface));
   PetscCall(SbOptionReal(&scope, "angle", &tool->body.tet.angle));

@@ -19,7 +19,7 @@ static inline PetscErrorCode fuzz_surface(const char *path, SbImport *im)
 
   PetscFunctionBeginUser;
   im->scale = 1;
-  PetscCall(SbTetDefaults(&im->tet));
+  SbTetDefaults(&im->tet);
   PetscCall(SbSurfaceRead(path, im, &body_surface));
   PetscCall(SbSurfaceDestroy(&body_surface));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -22,7 +22,7 @@ static PetscErrorCode import(const char *extension, PetscBool binary, const Test
     if (options)
       body->tet = *options;
     else
-      PetscCall(SbTetDefaults(&body->tet));
+      SbTetDefaults(&body->tet);
     PetscCall(SbImportRead(body, im));
     PetscCall(SbMeshFileMeasure(im, &facts));
     *body = facts.body;
@@ -49,7 +49,7 @@ static PetscErrorCode refuse(const char *extension, const TestSurface *s, const 
     if (options)
       body.tet = *options;
     else
-      PetscCall(SbTetDefaults(&body.tet));
+      SbTetDefaults(&body.tet);
     SB_CHECK_ERROR(SbImportRead(&body, &im), code, words);
     PetscCall(SbImportDestroy(&im));
   }
@@ -186,7 +186,7 @@ static PetscErrorCode check_wall(void)
   PetscBool here;
 
   PetscFunctionBeginUser;
-  PetscCall(SbTetDefaults(&options));
+  SbTetDefaults(&options);
   options.surface = SB_TET_KEEP;
   PetscCall(import(".obj", PETSC_FALSE, NULL, text, &options, &im, &body, &here));
   if (!here) PetscFunctionReturn(PETSC_SUCCESS);
@@ -423,7 +423,7 @@ static PetscErrorCode check_mended(void)
 
   PetscFunctionBeginUser;
   memset(&s, 0, sizeof(s));
-  PetscCall(SbTetDefaults(&options));
+  SbTetDefaults(&options);
   cube_at(0, 1, PETSC_FALSE, &s); /* a corner twice, a little apart */
   test_surface_grow(&s, 1, 0);
   for (int k = 0; k < 3; k++) s.x[8][k] = s.x[7][k] + 1e-6;
@@ -518,7 +518,7 @@ static PetscErrorCode check_refused(void)
   clear(&s);
   cube_at(0, 1, PETSC_FALSE, &s); /* two sheets on each other */
   for (int v = 0; v < 8; v++) s.x[v][2] *= 1.5e-10;
-  PetscCall(SbTetDefaults(&options));
+  SbTetDefaults(&options);
   options.merge_tolerance = 0;
   PetscCall(refuse(".off", &s, NULL, &options, "body 'b'"));
   clear(&s);
@@ -551,7 +551,7 @@ static PetscErrorCode check_fold(void)
 
   PetscFunctionBeginUser;
   memset(&s, 0, sizeof(s));
-  PetscCall(SbTetDefaults(&options));
+  SbTetDefaults(&options);
   test_surface_sphere(4, &s);
   volume = volume_of(&s);
   v = s.tri[777][0];

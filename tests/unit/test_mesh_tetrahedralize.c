@@ -54,7 +54,7 @@ static PetscErrorCode check_kept(SbTetBackend backend)
   }
   for (PetscInt f = nin; f < t.ntri; f++) s.tags[f] = s.region_tags[0];
   (void)SbSurfaceMeasure(&s, want);
-  PetscCall(SbTetDefaults(&options));
+  SbTetDefaults(&options);
   options.backend = backend;
   options.surface = SB_TET_KEEP;
   PetscCall(SbTetrahedralize("test", &s, &options, &im));
@@ -100,7 +100,7 @@ static PetscErrorCode check_sizes(void)
 
     memset(&im, 0, sizeof(im));
     PetscCall(SbImportTagSet(&im, 0, NULL, &none));
-    PetscCall(SbTetDefaults(&options));
+    SbTetDefaults(&options);
     options.size = sizes[k];
     options.surface = SB_TET_REMESH;
     PetscCall(SbTetrahedralize("test", &s, &options, &im));
@@ -139,7 +139,7 @@ static PetscErrorCode check_second_road(void)
   test_surface_torus(1, 0.1, n, &t);
   PetscCall(make_skin(&t, t.ntri, &s));
   (void)SbSurfaceMeasure(&s, &want);
-  PetscCall(SbTetDefaults(&options));
+  SbTetDefaults(&options);
   options.size = 0.4;
   options.surface = SB_TET_REMESH;
   PetscCall(SbTetrahedralize("test", &s, &options, &im));
@@ -173,7 +173,7 @@ static PetscErrorCode check_failure(void)
   test_surface_box(lo, hi, PETSC_FALSE, &t);
   test_surface_box(lo2, hi2, PETSC_FALSE, &t);
   PetscCall(make_skin(&t, t.ntri, &s));
-  PetscCall(SbTetDefaults(&options));
+  SbTetDefaults(&options);
   SB_CHECK_ERROR(SbTetrahedralize("test", &s, &options, &im), PETSC_ERR_USER_INPUT, "gmsh|tetgen");
   SB_CHECK_ERROR(SbTetrahedralize("test", &s, &options, &im), PETSC_ERR_USER_INPUT, "test|gmsh");
   SB_CHECK(!im.x && !im.item[3].n, "something is left");
