@@ -167,9 +167,7 @@ PetscErrorCode SbDeckBuild(SbDeck *d)
 
     label[e] = element->label;
     element->item = -1;
-    if (SbGmshTypes[element->type].nnode != dim + 1 && !ten && element->type != SB_GMSH_LINE3 &&
-        element->type != SB_GMSH_TRIANGLE6)
-      continue;
+    if (!SbGmshIsSimplex(element->type)) continue;
     im->scan.token = element->at;
     for (int k = 0; k < (ten ? 10 : dim + 1); k++) {
       const PetscInt v = SbNumbersFind(&im->nodes, element->node[k]);

@@ -31,8 +31,6 @@ static PetscErrorCode read_elements(SbImport *im, int type)
 {
   SbScan *s = &im->scan;
   const int dim = SbGmshTypes[type].dim, nnode = SbGmshTypes[type].nnode;
-  const PetscBool two =
-    (PetscBool)(type == SB_GMSH_TET10 || type == SB_GMSH_TRIANGLE6 || type == SB_GMSH_LINE3);
   int64_t n, point, reference;
   PetscInt vert[10], tags;
 
@@ -52,7 +50,7 @@ static PetscErrorCode read_elements(SbImport *im, int type)
     }
     PetscCall(SbScanText(s, "reference of an element", &reference));
     tags = 0;
-    if ((nnode == dim + 1 || two) && (reference || dim == 3))
+    if (SbGmshIsSimplex(type) && (reference || dim == 3))
       PetscCall(SbImportTagsAlone(im, dim, reference, NULL, &tags));
     PetscCall(SbImportAddElement(im, type, vert, tags, i + 1));
   }

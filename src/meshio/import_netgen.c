@@ -95,8 +95,7 @@ static PetscErrorCode read_elements(SbImport *im, const Layout *l)
       if (k < 10) vert[place[k]] = (PetscInt)(point - 1);
     }
     tags = 0;
-    if (nnode == l->dim + 1 || type == SB_GMSH_TET10 || type == SB_GMSH_TRIANGLE6)
-      PetscCall(SbImportTagsAlone(im, l->dim, value[l->mark], NULL, &tags));
+    if (SbGmshIsSimplex(type)) PetscCall(SbImportTagsAlone(im, l->dim, value[l->mark], NULL, &tags));
     PetscCall(SbImportAddElement(im, type, vert, tags, i + 1));
     SbScanEndOfLine(s);
   }

@@ -39,6 +39,12 @@ typedef struct {
   int dim, nnode;
 } SbGmshType;
 extern const SbGmshType SbGmshTypes[SB_GMSH_NTYPES];
+/* Whether it is a simplex, of first or second order. */
+static inline PetscBool SbGmshIsSimplex(int type)
+{
+  return (PetscBool)(SbGmshTypes[type].nnode == SbGmshTypes[type].dim + 1 || type == SB_GMSH_TET10 ||
+                     type == SB_GMSH_TRIANGLE6 || type == SB_GMSH_LINE3);
+}
 
 /* Counts an element, and keeps it when it is of use: a tet, a simplex of groups, a triangle where a surface is wanted. Of second order the corners count;
    vert[10] of a 10-node tet, in the order of gmsh. */

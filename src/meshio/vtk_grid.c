@@ -132,10 +132,9 @@ PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
                       (long long)im->nvert - 1);
       if (k < 10) vert[SbGmshNode((int)k)] = (PetscInt)point;
     }
-    // a simplex, but not a line of many pieces, has a group from each array in use
+    // a simplex, but not points or a line of many pieces, has a group from each array in use
     tags = 0;
-    if (end - begin == SbGmshTypes[type].dim + 1 || type == SB_GMSH_LINE3 || type == SB_GMSH_TRIANGLE6 ||
-        type == SB_GMSH_TET10) {
+    if (SbGmshIsSimplex(type) && end - begin == SbGmshTypes[type].nnode) {
       int dim = SbGmshTypes[type].dim;
       static const char *const kind[4] = {"point", "curve", "surface", "volume"};
       PetscInt group[SB_VTK_ARRAYS], n = 0;
