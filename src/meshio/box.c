@@ -20,23 +20,6 @@ typedef struct {
 #define BOX_HELP \
   "write box:lx,ly,lz:n or box:lx,ly,lz:nx,ny,nz with lengths in m above 0 and numbers of cells from 1 on"
 
-/* Reads up to three numbers separated by commas; *text is left behind them. */
-static int read_numbers(const char **text, double value[3])
-{
-  int n = 0;
-  char *end;
-
-  while (n < 3) {
-    value[n] = strtod(*text, &end);
-    if (end == *text) return 0;
-    n++;
-    *text = end;
-    if (*end != ',') break;
-    (*text)++;
-  }
-  return n;
-}
-
 static inline PetscInt vertex(const Box *box, PetscInt i, PetscInt j, PetscInt k)
 {
   return (k * (box->n[1] + 1) + j) * (box->n[0] + 1) + i;
@@ -72,21 +55,20 @@ PetscErrorCode SbImportRead_Box(const char *text, SbImport *im)
 {
   Box box;
   PetscInt at[3], v = 0;
-  const char *p = text + strlen("box:");
-  double l[3], n[3], total = 6;
+  const char *sides = text + strlen("box:"), *colon = strchr(sides, ':');
+  char lengths[PETSC_MAX_PATH_LEN];
+  PetscReal l[3], n[3], total = 6;
   int count;
 
   PetscFunctionBeginUser;
   // the lengths and the numbers of cells
-  PetscCheck(read_numbers(&p, l) == 3 && *p == ':', PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s: " BOX_HELP,
-             im->where);
-  p++;
-  count = read_numbers(&p, n);
-  PetscCheck((count == 1 || count == 3) && !*p, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s: " BOX_HELP,
-             im->where);
+  (void)snprintf(lengths, sizeof(lengths), "%.*s", (int)strcspn(sides, ":"), sides);
+  count = colon ? SbParseNumbers(colon + 1, 3, n) : 0;
+  PetscCheck((count == 1 || count == 3) && SbParseNumbers(lengths, 3, l) == 3, PETSC_COMM_SELF,
+             PETSC_ERR_USER_INPUT, "%s: " BOX_HELP, im->where);
   for (int i = 0; i < 3; i++) {
-    PetscCheck(l[i] > 0 && isfinite(l[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "%s: length %g m; " BOX_HELP, im->where, l[i]);
+    PetscCheck(l[i] > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s: length %g m; " BOX_HELP, im->where,
+               l[i]);
   }
   if (count == 1) {
     const double n0 = n[0], shortest = PetscMin(PetscMin(l[0], l[1]), l[2]);
@@ -123,11 +105,10 @@ PetscErrorCode SbImportRead_Box(const char *text, SbImport *im)
   for (int side = 0; side < 6; side++) {
     static const char *const names[6] = {"xmin", "xmax", "ymin", "ymax", "zmin", "zmax"};
     const int d = side / 2, e = (d + 1) % 3, f = (d + 2) % 3;
-    PetscInt group, tags;
+    PetscInt tags;
 
     // two triangles on each cell side of the face `side` of the box; the diagonal is the one that the tets have
-    PetscCall(SbImportGroup(im, 2, side + 1, names[side], &group));
-    PetscCall(SbImportTagSet(im, 1, &group, &tags));
+    PetscCall(SbImportTagsAlone(im, 2, side + 1, names[side], &tags));
     at[d] = side % 2 ? box.n[d] : 0;
     for (PetscInt i = 0; i < box.n[e]; i++) {
       for (PetscInt j = 0; j < box.n[f]; j++) {

@@ -261,7 +261,6 @@ static PetscErrorCode read_elements_22_run(Gmsh *g, int64_t left, int64_t *nread
                   (long long)n, (long long)left);
   for (int64_t i = 0; i < n; i++) {
     int64_t tag = 0, other;
-    PetscInt group;
 
     if (s->binary) PetscCall(SbScanInt4(s, "number of an element", &number));
     // the first tag is the group, 0 for none; the others are not used
@@ -269,8 +268,7 @@ static PetscErrorCode read_elements_22_run(Gmsh *g, int64_t left, int64_t *nread
     for (int64_t k = 0; k < ntag; k++)
       PetscCall(SbScanInt4(&g->im->scan, "tag of an element", k ? &other : &tag));
     if (tag && (tag != g->last.tag || SbGmshTypes[type].dim != g->last.dim)) {
-      PetscCall(SbImportGroup(g->im, SbGmshTypes[type].dim, tag < 0 ? -tag : tag, NULL, &group));
-      PetscCall(SbImportTagSet(g->im, 1, &group, &g->last.tags));
+      PetscCall(SbImportTagsAlone(g->im, SbGmshTypes[type].dim, tag < 0 ? -tag : tag, NULL, &g->last.tags));
       g->last.dim = SbGmshTypes[type].dim;
       g->last.tag = tag;
     }

@@ -345,7 +345,7 @@ PetscErrorCode SbH5BodyNames(hid_t file, const char *mesh, char **names)
 static PetscErrorCode read_bodies(const File *f)
 {
   SbImport *im = f->im;
-  PetscInt n, *body, nbody = 0, group, *tags;
+  PetscInt n, *body, nbody = 0, *tags;
   char *names, *name, *rest;
 
   PetscFunctionBeginUser;
@@ -363,8 +363,7 @@ static PetscErrorCode read_bodies(const File *f)
 
     name = strsep(&rest, ",");
     (void)snprintf(plain, sizeof(plain), "body_%d", (int)b + 1);
-    PetscCall(SbImportGroup(im, 3, b + 1, name && name[0] ? name : plain, &group));
-    PetscCall(SbImportTagSet(im, 1, &group, &tags[b]));
+    PetscCall(SbImportTagsAlone(im, 3, b + 1, name && name[0] ? name : plain, &tags[b]));
   }
   for (PetscInt c = 0; c < n; c++) im->item[3].tags[c] = tags[body[c]];
   PetscCall(PetscFree(tags));

@@ -125,14 +125,14 @@ PetscErrorCode SbDeckFind(SbDeck *deck, PetscInt set);
 
 PetscErrorCode SbWrite_Gmsh(const SbImport *import, const char *path, SbMeshFormat format);
 PetscErrorCode SbWrite_H5(const SbImport *import, const char *path);
+/* Closes a file; a write that failed since errno was 0 is an error. */
+PetscErrorCode SbWriteEnd(FILE *file, const char *path);
 /* The index for ParaView of a mesh that was written to `h5`. */
 PetscErrorCode SbWrite_Xdmf(const SbImport *import, const char *path, const char *h5);
 
 /* gmsh_library.c: what SbGmshRun() does in the child. */
 PetscErrorCode SbGmshCall(const SbGmshJob *job, SbImport *result);
 
-/* Closes a file; a write that failed since errno was 0 is an error. */
-PetscErrorCode SbWriteEnd(FILE *file, const char *path);
 /* Opens a regular file and tells its size; else says what is wrong with the name. */
 PetscErrorCode SbScanOpenFile(const char *where, const char *path, FILE **file, size_t *size);
 /* Moves to the beginning of a text; false when it does not come. */

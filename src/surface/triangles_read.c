@@ -177,9 +177,7 @@ PetscErrorCode SbTrianglesRead_OBJ(SbScan *s, SbTriangleFile *f)
         char *after;
         long long v;
 
-        while (s->at < s->end && (*s->at == ' ' || *s->at == '\t' || *s->at == '\r')) s->at++;
-        if (s->at >= s->end || *s->at == '\n' || *s->at == '#') break;
-        s->token = s->at;
+        if (!SbScanMore(s, '#')) break;
         v = strtoll(s->at, &after, 10);
         if (after == s->at || v == 0 || (*after && !strchr("/ \t\r\n", *after)))
           SB_SCAN_ERROR(s, "expected the number of a vertex, not zero");
@@ -200,8 +198,7 @@ PetscErrorCode SbTrianglesRead_OBJ(SbScan *s, SbTriangleFile *f)
       for (;;) {
         char name[SB_NAME_MAX];
 
-        while (s->at < s->end && (*s->at == ' ' || *s->at == '\t' || *s->at == '\r')) s->at++;
-        if (s->at >= s->end || *s->at == '\n') break;
+        if (!SbScanMore(s, '\n')) break;
         PetscCall(SbScanWord(s, sizeof(name), name));
         if (!object && names.ngroup < 8)
           PetscCall(PetscStrncpy(names.group[names.ngroup++], name, SB_NAME_MAX));
