@@ -41,7 +41,6 @@ struct _p_SbContacts {
   SbContactPoint *point; /* [share.n] of this rank's share, sorted */
   SbOrder share;         /* which rows are this rank's; it has no star forest */
   void *column;          /* [share.n][3] of one quantity, as in the file */
-  SbIndex index;         /* rank 0 only */
 };
 
 /* ------------------------------------------------------------------ to the ranks that write them */
@@ -172,30 +171,17 @@ PetscInt SbContactsCount(SbOutput out)
 
 PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, PetscInt n, PetscInt bytes)
 {
-  SbContacts c = out->contacts;
   SbIndexValues values[NTABLE];
   char group[64];
 
   PetscFunctionBeginUser;
-  if (!c || !c->index || n < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!out->contact_index || n < 0) PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < NTABLE; k++)
     values[k] =
       (SbIndexValues){table[k].name, table[k].ncomp, table[k].whole ? 4 : (int)bytes, table[k].whole};
   (void)snprintf(group, sizeof(group), "%s/contacts", frame);
-  PetscCall(SbIndexAddPoints(c->index, time, group, n, NTABLE, values));
+  PetscCall(SbIndexAddPoints(out->contact_index, time, group, n, NTABLE, values));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-void SbContactsIndex(SbOutput out, PetscBool last, char message[SB_MESSAGE_MAX])
-{
-  const SbContacts c = out->contacts;
-
-  if (c && c->index) SbIndexWrite(c->index, last, message);
-}
-
-void SbContactsRemoveIndex(SbOutput out)
-{
-  if (out->contacts && out->contacts->index) SbIndexRemove(out->contacts->index);
 }
 
 /* ------------------------------------------------------------------ life */
@@ -216,7 +202,7 @@ PetscErrorCode SbContactsCreate(SbRun run, SbOutput out)
   c->share.each = 1;
   if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 3 && mesh->nvert; k++) nowhere[k] = mesh->x[k];
-  PetscCall(SbIndexCreate(out, "contacts", nowhere, &c->index));
+  PetscCall(SbIndexCreate(out, "contacts", nowhere, &out->contact_index));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -226,7 +212,7 @@ PetscErrorCode SbContactsDestroy(SbOutput out)
 
   PetscFunctionBeginUser;
   if (!c) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbIndexDestroy(&c->index));
+  PetscCall(SbIndexDestroy(&out->contact_index));
   PetscCall(PetscFree(c->list.point));
   PetscCall(PetscFree(c->point));
   PetscCall(PetscFree(c->column));

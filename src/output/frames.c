@@ -223,7 +223,7 @@ static PetscErrorCode write_field(SbRun run, SbOutput out, const SbStep *step, c
 static void write_indices(SbOutput out, PetscBool last, char message[SB_MESSAGE_MAX])
 {
   SbIndexWrite(out->frames->index, last, message);
-  if (!message[0]) SbContactsIndex(out, last, message);
+  if (!message[0] && out->contact_index) SbIndexWrite(out->contact_index, last, message);
 }
 
 static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
@@ -573,7 +573,7 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
     SbFrames fr = out->frames;
 
     if (fr->index) SbIndexRemove(fr->index);
-    SbContactsRemoveIndex(out);
+    if (out->contact_index) SbIndexRemove(out->contact_index);
     PetscCall(SbH5Create(out->comm, path, &fr->h5));
     PetscCall(SbH5PutText(&fr->h5, fr->h5.file, "program", "supple " SB_VERSION));
     PetscCall(write_mesh(run, out));

@@ -129,6 +129,7 @@ typedef struct _p_SbHistory *SbHistory;   /* history.c */
 typedef struct _p_SbProgress *SbProgress; /* progress.c */
 typedef struct _p_SbPoints *SbPoints;     /* points.c */
 typedef struct _p_SbContacts *SbContacts; /* contacts.c */
+typedef struct _p_SbIndex *SbIndex;       /* index.c */
 
 typedef struct _p_SbOutput *SbOutput;
 struct _p_SbOutput {
@@ -180,7 +181,8 @@ struct _p_SbOutput {
   SbPoints points; /* NULL when nothing needs values at vertices */
 
   SbFrames frames;
-  SbContacts contacts; /* NULL when there are none to write and none to keep */
+  SbContacts contacts;   /* NULL when there are none to write and none to keep */
+  SbIndex contact_index; /* of them, on rank 0; NULL likewise */
   SbHistory hist;
   SbProgress line;
   char started[32]; /* date and time */
@@ -245,7 +247,7 @@ PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame);
 void SbContactsRead(hid_t frame, PetscInt *n, PetscInt *bytes);
 /* How many the last SbContactsFind() found on all ranks, -1 without the option. */
 PetscInt SbContactsCount(SbOutput out);
-/* Adds a frame of n points to the index, at the path of its group; rank 0. The next brings it to disk, or removes it. */
+/* Adds a frame of n points to the index, at the path of its group; rank 0. */
 PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, PetscInt n, PetscInt bytes);
 void SbContactsIndex(SbOutput out, PetscBool last, char message[SB_MESSAGE_MAX]);
 void SbContactsRemoveIndex(SbOutput out);
@@ -295,7 +297,6 @@ PetscErrorCode SbProgressEnd(SbOutput out); /* ends a line that is being rewritt
 PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char *reason); /* collective */
 
 /* index.c: what viewers open to find the frames of fields.h5, NAME.xmf and NAME.vtkhdf. Rank 0. */
-typedef struct _p_SbIndex *SbIndex;
 /* nowhere[3]: of contact points, of which a frame may have none; NULL: of tets. */
 PetscErrorCode SbIndexCreate(SbOutput out, const char *name, const PetscReal *nowhere, SbIndex *index);
 PetscErrorCode SbIndexDestroy(SbIndex *index);
