@@ -200,42 +200,22 @@ PetscErrorCode SbCheckpointFind(SbOutput out, const char *file, int k, size_t si
 
 /* ------------------------------------------------------------------ all of it */
 
-/* Moves one file into the folder `ctx` beside it. */
-static PetscErrorCode move_aside(const char *name, PetscInt64 bytes, void *ctx)
-{
-  const char *aside = (const char *)ctx;
-  char from[PETSC_MAX_PATH_LEN], to[PETSC_MAX_PATH_LEN];
-
-  PetscFunctionBeginUser;
-  (void)bytes;
-  SbFormat(sizeof(from), from, "%.*s/%s", (int)(strrchr(aside, '/') - aside), aside, name);
-  SbFormat(sizeof(to), to, "%s/%s", aside, name);
-  PetscCheck(!rename(from, to), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "cannot move %s to %s: %s", from, to,
-             strerror(errno));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode count_file(const char *name, PetscInt64 bytes, void *ctx)
-{
-  PetscFunctionBeginUser;
-  (void)name;
-  (void)bytes;
-  ++*(PetscInt *)ctx;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* What an earlier run left goes into a folder named by when it ended. */
 static PetscErrorCode keep_earlier(SbOutput out)
 {
   char path[PETSC_MAX_PATH_LEN], name[SB_FILE_MAX], date[32];
+  SbOutputFileSize *file;
   struct stat info;
   struct tm local;
-  PetscInt n = 0;
+  PetscInt n;
   int made = -1;
 
   PetscFunctionBeginUser;
-  PetscCall(SbOutputFiles(out, count_file, &n));
-  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbOutputFiles(out, &n, &file));
+  if (!n) {
+    PetscCall(PetscFree(file));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(SbOutputPath(out, "run.json", sizeof(path), path));
   if (stat(path, &info)) info.st_mtime = time(NULL);
   (void)strftime(date, sizeof(date), "%Y-%m-%d_%H-%M-%S", localtime_r(&info.st_mtime, &local));
@@ -253,7 +233,15 @@ static PetscErrorCode keep_earlier(SbOutput out)
     "cannot make the folder %s for the results of an earlier run: %s; -output_overwrite yes replaces "
     "them",
     path, strerror(errno));
-  PetscCall(SbOutputFiles(out, move_aside, path));
+  for (PetscInt i = 0; i < n; i++) {
+    char from[PETSC_MAX_PATH_LEN], to[PETSC_MAX_PATH_LEN + SB_FILE_MAX];
+
+    PetscCall(SbOutputPath(out, file[i].name, sizeof(from), from));
+    SbFormat(sizeof(to), to, "%s/%s", path, file[i].name);
+    PetscCheck(!rename(from, to), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "cannot move %s to %s: %s", from, to,
+               strerror(errno));
+  }
+  PetscCall(PetscFree(file));
   if (!out->quiet)
     PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: results of an earlier run are kept in %s\n", out->dir, name));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -284,21 +272,26 @@ PetscErrorCode SbFolderClear(SbOutput out, PetscInt step0)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbOutputFiles(SbOutput out, SbFileFn fn, void *ctx)
+PetscErrorCode SbOutputFiles(SbOutput out, PetscInt *n, SbOutputFileSize **files)
 {
   enum { NOURS = PETSC_STATIC_ARRAY_LENGTH(ours) };
   struct dirent **checkpoint;
-  const int n = list_checkpoints(out->dir, &checkpoint);
+  const int ncheckpoint = list_checkpoints(out->dir, &checkpoint);
 
   PetscFunctionBeginUser;
-  for (int i = 0; i < NOURS + n; i++) {
-    const char *name = i < NOURS ? ours[i] : checkpoint[i - NOURS]->d_name;
+  *n = 0;
+  PetscCall(PetscMalloc1(NOURS + ncheckpoint, files));
+  for (int i = 0; i < NOURS + ncheckpoint; i++) {
+    SbOutputFileSize *file = &(*files)[*n];
     char path[PETSC_MAX_PATH_LEN];
     struct stat info;
 
-    PetscCall(SbOutputPath(out, name, sizeof(path), path));
-    if (!stat(path, &info)) PetscCall(fn(name, (PetscInt64)info.st_size, ctx));
+    SbFormat(sizeof(file->name), file->name, "%s", i < NOURS ? ours[i] : checkpoint[i - NOURS]->d_name);
+    PetscCall(SbOutputPath(out, file->name, sizeof(path), path));
+    if (stat(path, &info)) continue;
+    file->bytes = (PetscInt64)info.st_size;
+    (*n)++;
   }
-  free_names(n, checkpoint);
+  free_names(ncheckpoint, checkpoint);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

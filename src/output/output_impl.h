@@ -249,8 +249,6 @@ void SbContactsRead(hid_t frame, PetscInt *n, PetscInt *bytes);
 PetscInt SbContactsCount(SbOutput out);
 /* Adds a frame of n points to the index, at the path of its group; rank 0. */
 PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, PetscInt n, PetscInt bytes);
-void SbContactsIndex(SbOutput out, PetscBool last, char message[SB_MESSAGE_MAX]);
-void SbContactsRemoveIndex(SbOutput out);
 PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryReattach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryDestroy(SbOutput out);
@@ -291,7 +289,6 @@ PetscErrorCode SbCheckpointFind(SbOutput out, const char *file, int k, size_t si
 PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out);
 /* Removes those of steps after `step`, and all but the newest `keep` of the others. Rank 0. */
 PetscErrorCode SbCheckpointPrune(SbOutput out, PetscInt step, PetscInt keep);
-typedef PetscErrorCode (*SbFileFn)(const char *name, PetscInt64 bytes, void *ctx);
 PetscErrorCode SbProgressAttach(SbRun run, SbOutput out);
 PetscErrorCode SbProgressEnd(SbOutput out); /* ends a line that is being rewritten */
 PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char *reason); /* collective */
@@ -331,8 +328,12 @@ typedef struct {
 /* CPU time of this process since it began, s. */
 #define SB_CPU_SECONDS ((PetscReal)clock() / CLOCKS_PER_SEC)
 PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *phases); /* collective */
-/* Files of the run with their sizes: calls fn for each one that exists. Rank 0. */
-PetscErrorCode SbOutputFiles(SbOutput out, SbFileFn fn, void *ctx);
+/* The files of the run that exist, with their sizes; PetscFree(). Rank 0. */
+typedef struct {
+  char name[SB_FILE_MAX];
+  PetscInt64 bytes;
+} SbOutputFileSize;
+PetscErrorCode SbOutputFiles(SbOutput out, PetscInt *n, SbOutputFileSize **files);
 /* Name of the time preset, e.g. "newmark". */
 void SbPresetName(SbRun run, size_t size, char name[]);
 

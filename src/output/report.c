@@ -216,16 +216,6 @@ static void size_text(PetscReal bytes, size_t size, char text[])
   SbFormat(size, text, k ? "%.3g %s" : "%.0f %s", (double)bytes, unit[k]);
 }
 
-static PetscErrorCode add_file(const char *name, PetscInt64 bytes, void *ctx)
-{
-  char *text = (char *)ctx, length[32];
-
-  PetscFunctionBeginUser;
-  size_text((PetscReal)bytes, sizeof(length), length);
-  SbAppend(1024, text, "%s%s %s", text[0] ? ", " : "", name, length);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbReportSummary(SbRun run)
 {
   SbOutput out = (SbOutput)run->output;
@@ -233,6 +223,8 @@ PetscErrorCode SbReportSummary(SbRun run)
   SbPhases phases;
   char files[1024] = "", memory[32], sum[32], solver[SB_NAME_MAX];
   char text[512];
+  SbOutputFileSize *file;
+  PetscInt nfile;
 
   PetscFunctionBeginUser;
   PetscCall(SbProgressEnd(out));
@@ -292,7 +284,12 @@ PetscErrorCode SbReportSummary(SbRun run)
     PetscCall(entry("memory", "%s at the peak of the largest rank, %s together", memory, sum));
   else
     PetscCall(entry("memory", "%s at the peak", memory));
-  PetscCall(SbOutputFiles(out, add_file, files));
+  PetscCall(SbOutputFiles(out, &nfile, &file));
+  for (PetscInt i = 0; i < nfile; i++) {
+    size_text((PetscReal)file[i].bytes, sizeof(memory), memory);
+    SbAppend(sizeof(files), files, "%s%s %s", i ? ", " : "", file[i].name, memory);
+  }
+  PetscCall(PetscFree(file));
   PetscCall(entry("files", "in %s: %s", out->dir, files));
   if (stopped) PetscCall(entry("stopped", "%s", run->stop_reason));
   (void)fflush(PETSC_STDOUT);

@@ -65,35 +65,17 @@ static PetscErrorCode put_settings(FILE *f, SbRun run)
   put_real(f, "dt", run->dt, ",\n  ");
   put_real(f, "t_start", run->t0, ",\n  ");
   put_real(f, "t_end", run->t_end, ",\n");
-  (void)fprintf(f, "  \"effects\": [");
-  for (PetscInt e = 0; e < run->model->neffect; e++) {
-    (void)fprintf(f, "%s", e ? ", " : "");
-    put_string(f, run->model->effect[e]->name);
+  for (int notes = 0; notes < 2; notes++) {
+    (void)fprintf(f, "  \"%s\": [", notes ? "effect_notes" : "effects");
+    for (PetscInt e = 0; e < run->model->neffect; e++) {
+      (void)fprintf(f, "%s", e ? ", " : "");
+      put_string(f, notes ? run->model->effect[e]->note : run->model->effect[e]->name);
+    }
+    (void)fprintf(f, "],\n");
   }
-  (void)fprintf(f, "],\n  \"effect_notes\": [");
-  for (PetscInt e = 0; e < run->model->neffect; e++) {
-    (void)fprintf(f, "%s", e ? ", " : "");
-    put_string(f, run->model->effect[e]->note);
-  }
-  (void)fprintf(f, "],\n");
   PetscCall(PetscOptionsGetAll(NULL, &options));
   put_text(f, "options", options);
   PetscCall(PetscFree(options));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-typedef struct {
-  FILE *f;
-  int n;
-} FileList;
-
-static PetscErrorCode put_file(const char *name, PetscInt64 bytes, void *ctx)
-{
-  FileList *list = (FileList *)ctx;
-
-  PetscFunctionBeginUser;
-  (void)fprintf(list->f, "%s\n    {\"name\": \"%s\", \"bytes\": %" PetscInt64_FMT "}", list->n++ ? "," : "",
-                name, bytes);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -177,7 +159,8 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
   }
   // what the run took: steps, iterations, seconds, memory, files
   if (phases) {
-    FileList list = {f, 0};
+    SbOutputFileSize *file;
+    PetscInt nfile;
 
     (void)fprintf(f,
                   "  \"steps\": %" PetscInt_FMT ",\n  \"newton_iterations\": %" PetscInt_FMT
@@ -193,7 +176,11 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
     put_real(f, "memory_max_bytes", phases->memory_max, ",\n  ");
     put_real(f, "memory_sum_bytes", phases->memory_sum, ",\n");
     (void)fprintf(f, "  \"files\": [");
-    PetscCall(SbOutputFiles(out, put_file, &list));
+    PetscCall(SbOutputFiles(out, &nfile, &file));
+    for (PetscInt i = 0; i < nfile; i++)
+      (void)fprintf(f, "%s\n    {\"name\": \"%s\", \"bytes\": %" PetscInt64_FMT "}", i ? "," : "",
+                    file[i].name, file[i].bytes);
+    PetscCall(PetscFree(file));
     (void)fprintf(f, "\n  ],\n");
   }
   put_text(f, "reason", reason);
