@@ -28,40 +28,25 @@ PetscErrorCode SbMassForm(SbLedger l, Vec D, PetscReal *form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the last tangent of a step is K + shift M with the lumped mass, as a matrix. */
-static PetscBool has_matrix(const SbRun run)
-{
-  return (PetscBool)(run->J && run->ts && run->shift_a > 0. && !run->damped &&
-                     !run->solver_used->matrix_free && !run->model->space->consistent_mass);
-}
-
-/* D.K D of the free unknowns, from the last tangent of the step. Collective. */
-static PetscErrorCode form_by_matrix(SbLedger l, Vec D, PetscReal *form)
-{
-  Vec free = l->w[1], product = l->w[2];
-  PetscReal mass;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecCopy(D, free));
-  PetscCall(SbSpaceZeroPrescribed(l->run->model->space, PETSC_TRUE, free));
-  PetscCall(MatMult(l->run->J, free, product));
-  PetscCall(VecDot(product, free, form));
-  PetscCall(SbMassForm(l, free, &mass));
-  *form = PetscMax(0., *form - l->run->shift_a * mass);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal *form)
 {
-  PetscReal length, at[2];
+  const SbRun run = l->run;
+  PetscReal length, mass, at[2];
   Vec moved = l->w[1], R = l->w[2];
 
   PetscFunctionBeginUser;
   *form = 0.;
   PetscCall(SbDifferenceLength(l, D, &length));
   if (!(length > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
-  if (has_matrix(l->run)) {
-    PetscCall(form_by_matrix(l, D, form));
+  /* by the last tangent of the step, where that is K + shift M with the lumped mass, as a matrix: of the free unknowns */
+  if (run->J && run->ts && run->shift_a > 0. && !run->damped && !run->solver_used->matrix_free &&
+      !run->model->space->consistent_mass) {
+    PetscCall(VecCopy(D, moved));
+    PetscCall(SbSpaceZeroPrescribed(run->model->space, PETSC_TRUE, moved));
+    PetscCall(MatMult(run->J, moved, R));
+    PetscCall(VecDot(R, moved, form));
+    PetscCall(SbMassForm(l, moved, &mass));
+    *form = PetscMax(0., *form - run->shift_a * mass);
     l->own_work += 1.;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -69,7 +54,7 @@ PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal 
   l->residuals -= MPI_Wtime();
   for (int side = 0; side < 2; side++) {
     PetscCall(VecWAXPY(moved, side ? length : -length, D, U));
-    PetscCall(SbModelResidual(l->run->model, t, moved, NULL, NULL, PETSC_FALSE, R));
+    PetscCall(SbModelResidual(run->model, t, moved, NULL, NULL, PETSC_FALSE, R));
     PetscCall(VecDot(R, D, &at[side]));
   }
   l->residuals += MPI_Wtime();

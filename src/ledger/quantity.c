@@ -143,20 +143,6 @@ static PetscErrorCode stiffness_times(SbLedger l, PetscReal t, Vec U, Vec D, Vec
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* dQ/du on what is not prescribed. */
-static PetscErrorCode gradient(SbLedger l, const SbStep *step, Vec B)
-{
-  SbQuantity *q = &l->quantity;
-
-  PetscFunctionBeginUser;
-  if (q->kind == SB_QUANTITY_REACTION)
-    PetscCall(stiffness_times(l, step->t, step->U, q->weight, B));
-  else
-    PetscCall(VecCopy(q->weight, B));
-  PetscCall(SbSpaceZeroPrescribed(l->run->model->space, PETSC_TRUE, B));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step)
 {
   SbQuantity *q = &l->quantity;
@@ -174,7 +160,12 @@ PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step)
 
     PetscCall(VecDuplicate(step->U, &B));
     PetscCall(VecDuplicate(step->U, &Z));
-    PetscCall(gradient(l, step, B));
+    // dQ/du on what is not prescribed
+    if (q->kind == SB_QUANTITY_REACTION)
+      PetscCall(stiffness_times(l, step->t, step->U, q->weight, B));
+    else
+      PetscCall(VecCopy(q->weight, B));
+    PetscCall(SbSpaceZeroPrescribed(m->space, PETSC_TRUE, B));
     PetscCall(VecDot(B, l->delta, &left));
     left = PetscAbsReal(left) / PetscSqrtReal(PetscMax(both, PETSC_MIN_REAL));
     q->error[SB_ERROR_LINEAR] = left * l->step_linear;

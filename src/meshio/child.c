@@ -92,24 +92,6 @@ static void child(FILE *file, const SbGmshJob *job)
 
 /* ------------------------------------------------------------------ the parent */
 
-/* The arrays, instead of those that `im` has. */
-static PetscErrorCode take_body(FILE *file, const Header *h, SbImport *im, PetscBool *complete)
-{
-  Part part[NPART];
-
-  PetscFunctionBeginUser;
-  list_parts(im, h, part);
-  for (int i = 0; i < NPART && *complete; i++) {
-    PetscCall(PetscFree(*part[i].array));
-    PetscCall(PetscMalloc(part[i].bytes, part[i].array));
-    *complete = (PetscBool)(!part[i].bytes || fread(*part[i].array, part[i].bytes, 1, file) == 1);
-  }
-  if (!*complete) PetscFunctionReturn(PETSC_SUCCESS);
-  im->nvert = h->nvert;
-  for (int d = 0; d < 4; d++) im->item[d].n = im->item[d].capacity = h->n[d];
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbGmshRun(const SbGmshJob *job, SbImport *im)
 {
   const pid_t self = getpid();
@@ -118,8 +100,8 @@ PetscErrorCode SbGmshRun(const SbGmshJob *job, SbImport *im)
   int status = 0;
   pid_t pid;
   Header h;
+  Part part[NPART];
   PetscBool complete;
-  PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBeginUser;
   PetscCheck(file, PETSC_COMM_SELF, PETSC_ERR_SYS, "%s: no memory shared with a child process (%s)",
@@ -134,9 +116,18 @@ PetscErrorCode SbGmshRun(const SbGmshJob *job, SbImport *im)
   rewind(file);
   complete =
     (PetscBool)(pid > 0 && WIFEXITED(status) && !WEXITSTATUS(status) && fread(&h, sizeof(h), 1, file) == 1);
-  if (complete && !h.caught.code) ierr = take_body(file, &h, im, &complete);
+  // its arrays, instead of those that `im` has
+  if (complete && !h.caught.code) {
+    list_parts(im, &h, part);
+    for (int i = 0; i < NPART && complete; i++) {
+      PetscCall(PetscFree(*part[i].array));
+      PetscCall(PetscMalloc(part[i].bytes, part[i].array));
+      complete = (PetscBool)(!part[i].bytes || fread(*part[i].array, part[i].bytes, 1, file) == 1);
+    }
+    im->nvert = complete ? h.nvert : 0;
+    for (int d = 0; d < 4; d++) im->item[d].n = im->item[d].capacity = complete ? h.n[d] : 0;
+  }
   (void)fclose(file);
-  PetscCall(ierr);
   PetscCheck(pid > 0, PETSC_COMM_SELF, PETSC_ERR_SYS, "%s: no child process for gmsh (%s)", im->where,
              strerror(errno));
 

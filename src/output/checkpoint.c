@@ -235,34 +235,26 @@ PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out)
 
 /* ------------------------------------------------------------------ reading */
 
-/* Where two option texts part: the line of each, in `a` and `b`. */
-static void first_difference(const char *theirs, const char *ours, size_t size, char a[], char b[])
-{
-  while (*theirs || *ours) {
-    const size_t n = strcspn(theirs, "\n"), m = strcspn(ours, "\n");
-
-    if (n != m || strncmp(theirs, ours, n)) {
-      (void)snprintf(a, size, "%.*s", (int)n, n ? theirs : "nothing");
-      (void)snprintf(b, size, "%.*s", (int)m, m ? ours : "nothing");
-      if (!n) (void)snprintf(a, size, "nothing");
-      if (!m) (void)snprintf(b, size, "nothing");
-      return;
-    }
-    theirs += n + (theirs[n] == '\n');
-    ours += m + (ours[m] == '\n');
-  }
-}
-
 /* Refuses a checkpoint of other bodies, meshes or effects. */
 static PetscErrorCode check_identity(SbRun run, SbOutput out, SbH5 *h, int64_t mesh_hash)
 {
   PetscBool ok = PETSC_TRUE;
-  char *options;
-  char a[200] = "", b[200] = "";
+  char *options, a[200] = "", b[200] = "";
+  const char *theirs, *ours = out->identity;
 
   PetscFunctionBeginUser;
   PetscCall(SbH5ReadText(h, "options", &options, &ok));
-  if (ok && strcmp(options, out->identity)) first_difference(options, out->identity, sizeof(a), a, b);
+  // the first lines in which the texts of options differ
+  for (theirs = options; ok && !a[0] && (*theirs || *ours);) {
+    const size_t n = strcspn(theirs, "\n"), m = strcspn(ours, "\n");
+
+    if (n != m || strncmp(theirs, ours, n)) {
+      SbFormat(sizeof(a), a, "%.*s", n ? (int)n : 7, n ? theirs : "nothing");
+      SbFormat(sizeof(b), b, "%.*s", m ? (int)m : 7, m ? ours : "nothing");
+    }
+    theirs += n + (theirs[n] == '\n');
+    ours += m + (ours[m] == '\n');
+  }
   PetscCall(PetscFree(options));
   PetscCheck(
     !ok || !a[0], out->comm, PETSC_ERR_USER_INPUT,

@@ -29,22 +29,6 @@ static PetscErrorCode add_boundary(SbImport *im, SbTriangleFile *f)
   PetscFunctionReturn(ierr);
 }
 
-static PetscErrorCode read_gmsh(const char *path, SbTriangleFile *f)
-{
-  SbImport *im = f->im;
-  const SbItems *tri = &im->item[2];
-
-  PetscFunctionBeginUser;
-  im->surface = PETSC_TRUE;
-  PetscCall(SbImportRead_Gmsh(path, im));
-  if (im->item[3].n) PetscCall(add_boundary(im, f));
-  for (PetscInt i = 0; !im->item[3].n && i < tri->n; i++)
-    PetscCall(
-      SbTrianglesAdd(f, tri->vert[3 * i], tri->vert[3 * i + 1], tri->vert[3 * i + 2], tri->number[i]));
-  for (PetscInt v = 0; v < im->nvert; v++) PetscCall(SbTrianglesAddVertex(f, im->x + 3 * v));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ files */
 
 const SbTriangleFormat *SbTrianglesFormat(const char *path)
@@ -69,17 +53,26 @@ const SbTriangleFormat *SbTrianglesFormat(const char *path)
 PetscErrorCode SbTrianglesReadFile(const char *path, SbTriangleFile *f)
 {
   const SbTriangleFormat *format = SbTrianglesFormat(path);
-  SbScan *scan = &f->im->scan;
+  SbImport *im = f->im;
+  const SbItems *tri = &im->item[2];
 
   PetscFunctionBeginUser;
   f->path = path;
   f->sheets = format->sheets;
   if (format->read) {
-    PetscCall(SbScanOpen(f->where, path, scan));
-    PetscCall((*format->read)(scan, f));
-  } else
-    PetscCall(read_gmsh(path, f));
-  PetscCall(SbScanClose(scan));
+    PetscCall(SbScanOpen(f->where, path, &im->scan));
+    PetscCall((*format->read)(&im->scan, f));
+  } else {
+    // of gmsh, the boundary of its tets, or else its triangles
+    im->surface = PETSC_TRUE;
+    PetscCall(SbImportRead_Gmsh(path, im));
+    if (im->item[3].n) PetscCall(add_boundary(im, f));
+    for (PetscInt i = 0; !im->item[3].n && i < tri->n; i++)
+      PetscCall(
+        SbTrianglesAdd(f, tri->vert[3 * i], tri->vert[3 * i + 1], tri->vert[3 * i + 2], tri->number[i]));
+    for (PetscInt v = 0; v < im->nvert; v++) PetscCall(SbTrianglesAddVertex(f, im->x + 3 * v));
+  }
+  PetscCall(SbScanClose(&im->scan));
   PetscCheck(f->t->ntri, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
              "%s: holds no triangles; give a closed surface of triangles, or a mesh of tetrahedra", f->where);
   PetscFunctionReturn(PETSC_SUCCESS);
