@@ -120,14 +120,12 @@ PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum)
 /* Numbers of vertices lie in their range: nothing else may be read beyond its end. */
 static PetscBool in_range(const SbMemoryMesh *g)
 {
-  for (PetscInt i = 0; i < 4 * g->ncell; i++) {
-    if (g->cell[i] < 0 || g->cell[i] >= g->nvert) return PETSC_FALSE;
-  }
-  for (PetscInt i = 0; i < 3 * g->ntri; i++) {
-    if (g->tri[i] < 0 || g->tri[i] >= g->nvert) return PETSC_FALSE;
-  }
-  for (PetscInt i = 0; i < 2 * g->nedge; i++) {
-    if (g->edge[i] < 0 || g->edge[i] >= g->nvert) return PETSC_FALSE;
+  const PetscInt *const list[] = {g->cell, g->tri, g->edge};
+  const PetscInt n[] = {4 * g->ncell, 3 * g->ntri, 2 * g->nedge};
+
+  for (int k = 0; k < 3; k++) {
+    for (PetscInt i = 0; i < n[k]; i++)
+      if (list[k][i] < 0 || list[k][i] >= g->nvert) return PETSC_FALSE;
   }
   return PETSC_TRUE;
 }
