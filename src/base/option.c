@@ -109,8 +109,7 @@ PetscErrorCode SbOptionFindRecord(const SbScope *scope, const SbOption *row, SbO
     PetscBool same;
 
     r = &SbTheOptions.record[i];
-    PetscCall(PetscStrcasecmp(r->name, name, &same));
-    if (!same) continue;
+    if (strcasecmp(r->name, name)) continue;
     PetscCheck(!strcmp(r->row->key, row->key), PETSC_COMM_SELF, PETSC_ERR_USER,
                "%s has two meanings: %s of %s '%s' and %s of %s '%s'; rename one of the two", name,
                r->row->key, r->scope.klass, r->scope.instance, row->key, scope->klass, scope->instance);

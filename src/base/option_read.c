@@ -133,21 +133,16 @@ static PetscBool is_absent(const SbOptionRecord *r)
 
 PetscErrorCode SbOptionBool(const SbScope *scope, const char *key, PetscBool *value)
 {
-  static const char *const words[2][5] = {{"false", "no", "off", "0", "n"}, {"true", "yes", "on", "1", "y"}};
+  static const char *const words[] = {"false", "true", "no", "yes", "off", "on", "0", "1", "n", "y"};
   const SbOptionRecord *r;
 
   PetscFunctionBeginUser;
   PetscCall(text_of(scope, key, SB_OPTION_BOOL, &r));
   if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
-  for (int truth = 0; truth < 2; truth++) {
-    for (int i = 0; i < 5; i++) {
-      PetscBool same;
-
-      PetscCall(PetscStrcasecmp(r->text, words[truth][i], &same));
-      if (!same) continue;
-      *value = truth ? PETSC_TRUE : PETSC_FALSE;
-      PetscFunctionReturn(PETSC_SUCCESS);
-    }
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(words); i++) {
+    if (strcasecmp(r->text, words[i])) continue;
+    *value = i % 2 ? PETSC_TRUE : PETSC_FALSE;
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is neither true nor false: %s", r->name, r->text,
           r->row->help);
