@@ -52,6 +52,7 @@ typedef struct {
   char type[SB_NAME_MAX];
   char instance[SB_NAME_MAX]; /* "liver" */
 } SbScope;
+extern const SbScope SbRunScope; /* of the program-wide options */
 
 /* Adds rows to the table. `rows` must live as long as the program. Not collective. */
 PetscErrorCode SbOptionsRegister(const char *klass, const char *type, PetscInt n, const SbOption rows[]);

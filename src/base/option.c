@@ -8,6 +8,7 @@
 #include "option.h"
 
 SbOptionTable SbTheOptions;
+const SbScope SbRunScope = {.klass = ""};
 
 /* Makes room for one more element of an array of `size` bytes each; doubles, so that growth is cheap. */
 static PetscErrorCode grow(PetscInt n, size_t size, void *array)
@@ -106,8 +107,6 @@ PetscErrorCode SbOptionFindRecord(const SbScope *scope, const SbOption *row, SbO
   PetscFunctionBeginUser;
   PetscCall(SbOptionName(scope, row->key, sizeof(name), name));
   for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
-    PetscBool same;
-
     r = &SbTheOptions.record[i];
     if (strcasecmp(r->name, name)) continue;
     PetscCheck(!strcmp(r->row->key, row->key), PETSC_COMM_SELF, PETSC_ERR_USER,

@@ -131,14 +131,13 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
   if (*response != AUTO) PetscFunctionReturn(PETSC_SUCCESS);
 
   /* the integrator, where the program has one */
-  PetscCall(SbScopeSet(&scope, "", "", ""));
-  if (SbOptionExists(&scope, "time")) {
-    PetscCall(SbOptionChoice(&scope, "time", &method));
+  if (SbOptionExists(&SbRunScope, "time")) {
+    PetscCall(SbOptionChoice(&SbRunScope, "time", &method));
     guarded = (PetscBool)(method == 0 || method == 6); /* euler_implicit, static */
   }
 
   /* the other effects */
-  if (SbOptionExists(&scope, "effects")) PetscCall(SbOptionNames(&scope, "effects", &n, &names));
+  if (SbOptionExists(&SbRunScope, "effects")) PetscCall(SbOptionNames(&SbRunScope, "effects", &n, &names));
   for (PetscInt i = 0; i < n; i++) {
     char type[SB_NAME_MAX];
     Needs more;

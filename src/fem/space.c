@@ -161,7 +161,6 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
 {
   SbSpace s;
   PetscInt mass;
-  SbScope scope;
   PetscMPIInt size;
 
   PetscFunctionBeginUser;
@@ -170,8 +169,7 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
   s->comm = mesh->comm;
   s->mesh = mesh;
   s->block_scale = 1.;
-  PetscCall(SbScopeSet(&scope, "", "", ""));
-  PetscCall(SbOptionChoice(&scope, "mass", &mass));
+  PetscCall(SbOptionChoice(&SbRunScope, "mass", &mass));
   s->consistent_mass = (PetscBool)(mass == 1);
   s->element = element;
   s->material = material;

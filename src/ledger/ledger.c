@@ -45,15 +45,13 @@ PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger)
 {
   PetscReal accuracy, budget;
   PetscBool named;
-  SbScope scope;
   SbLedger l;
 
   PetscFunctionBeginUser;
   *ledger = NULL;
-  PetscCall(SbScopeSet(&scope, "", "", ""));
-  PetscCall(SbOptionBool(&scope, "ledger", &named));
-  PetscCall(SbOptionReal(&scope, "accuracy", &accuracy));
-  PetscCall(SbOptionReal(&scope, "step_time_budget", &budget));
+  PetscCall(SbOptionBool(&SbRunScope, "ledger", &named));
+  PetscCall(SbOptionReal(&SbRunScope, "accuracy", &accuracy));
+  PetscCall(SbOptionReal(&SbRunScope, "step_time_budget", &budget));
   if (!named && accuracy == 0. && budget == 0.) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCheck(
     run->preset != SB_TIME_ALPHA2, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
@@ -63,8 +61,8 @@ PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger)
   PetscCall(SbLogNamed("Est", "ledger", &l->event));
   l->accuracy = accuracy;
   l->budget = budget;
-  PetscCall(SbOptionInt(&scope, "ledger_every", &l->every));
-  PetscCall(SbQuantitySetFromOptions(l, &scope));
+  PetscCall(SbOptionInt(&SbRunScope, "ledger_every", &l->every));
+  PetscCall(SbQuantitySetFromOptions(l, &SbRunScope));
   PetscCall(SbAdaptiveToleranceSetFromOptions(l));
   *ledger = l;
   PetscFunctionReturn(PETSC_SUCCESS);

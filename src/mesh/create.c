@@ -29,7 +29,6 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
                             SbMesh *mesh)
 {
   SbMesh m;
-  SbScope scope;
   SbMergedMesh merged, curved;
   SbLocalMesh local;
   PetscInt partitioner, reading;
@@ -38,10 +37,9 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   PetscFunctionBeginUser;
   PetscCheck(nset <= SB_SET_MAX, comm, PETSC_ERR_USER_INPUT,
              "%" PetscInt_FMT " sets; a scenario may have up to %d", nset, SB_SET_MAX);
-  PetscCall(SbScopeSet(&scope, "", "", ""));
-  PetscCall(SbOptionChoice(&scope, "mesh_partitioner", &partitioner));
-  PetscCall(SbOptionChoice(&scope, "mesh_reading", &reading));
-  PetscCall(SbOptionBool(&scope, "mesh_report", &full));
+  PetscCall(SbOptionChoice(&SbRunScope, "mesh_partitioner", &partitioner));
+  PetscCall(SbOptionChoice(&SbRunScope, "mesh_reading", &reading));
+  PetscCall(SbOptionBool(&SbRunScope, "mesh_report", &full));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
   PetscCall(SbMergedMeshCreate(comm, (SbReading)reading, nbody, body, nset, set, &merged));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));

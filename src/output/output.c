@@ -97,14 +97,12 @@ static PetscErrorCode read_fields(SbOutput out, const SbScope *scope, PetscBool 
 
 static PetscErrorCode read_options(SbOutput out, SbModel model)
 {
-  SbScope scope;
   PetscInt precision;
   char **args;
   int n;
 
   PetscFunctionBeginUser;
   /* the folder; without a name, out/<scenario without folder and ending> */
-  PetscCall(SbScopeSet(&scope, "", "", ""));
   // the scenario file on the command line; empty without one
   out->scenario[0] = 0;
   PetscCall(PetscGetArgs(&n, &args));
@@ -119,7 +117,7 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
       break;
     }
   }
-  PetscCall(SbOptionString(&scope, "output_dir", sizeof(out->dir), out->dir));
+  PetscCall(SbOptionString(&SbRunScope, "output_dir", sizeof(out->dir), out->dir));
   if (!out->dir[0]) {
     const char *base = strrchr(out->scenario, '/'), *dot;
 
@@ -132,51 +130,51 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
                      dot && dot > base ? (int)(dot - base) : (int)strlen(base), base);
   }
 
-  PetscCall(SbOptionBool(&scope, "output_overwrite", &out->overwrite));
+  PetscCall(SbOptionBool(&SbRunScope, "output_overwrite", &out->overwrite));
 
   /* what is written into it, and how often */
-  PetscCall(read_fields(out, &scope, model->dynamic));
-  PetscCall(SbOptionReal(&scope, "output_every", &out->every));
-  PetscCall(SbOptionInt(&scope, "output_every_steps", &out->every_steps));
-  PetscCall(SbOptionChoice(&scope, "output_precision", &precision));
+  PetscCall(read_fields(out, &SbRunScope, model->dynamic));
+  PetscCall(SbOptionReal(&SbRunScope, "output_every", &out->every));
+  PetscCall(SbOptionInt(&SbRunScope, "output_every_steps", &out->every_steps));
+  PetscCall(SbOptionChoice(&SbRunScope, "output_precision", &precision));
   out->precise = precision ? PETSC_TRUE : PETSC_FALSE;
-  PetscCall(SbOptionBool(&scope, "output_discontinuous", &out->discontinuous));
-  PetscCall(SbOptionBool(&scope, "output_quadratic", &out->quadratic));
+  PetscCall(SbOptionBool(&SbRunScope, "output_discontinuous", &out->discontinuous));
+  PetscCall(SbOptionBool(&SbRunScope, "output_quadratic", &out->quadratic));
   PetscCheck(!out->quadratic || !out->discontinuous, out->comm, PETSC_ERR_USER_INPUT,
              "-output_quadratic yes and -output_discontinuous yes: give one of them");
   for (PetscInt b = 0; out->quadratic && b < model->nbody; b++)
     PetscCheck(!strcmp(model->body[b].element, "p2"), out->comm, PETSC_ERR_USER_INPUT,
                "-output_quadratic yes: all bodies must be of element p2, but '%s' is of %s",
                model->body[b].name, model->body[b].element);
-  PetscCall(SbOptionBool(&scope, "output_contacts", &out->contact_points));
+  PetscCall(SbOptionBool(&SbRunScope, "output_contacts", &out->contact_points));
   PetscCheck(
     !out->contact_points || out->nfield, out->comm, PETSC_ERR_USER_INPUT,
     "-output_contacts yes needs frames, but -output_fields is none: give -output_fields body at least");
-  PetscCall(SbOptionBool(&scope, "output_history", &out->history));
-  PetscCall(SbOptionBool(&scope, "output_history_bodies", &out->history_bodies));
-  PetscCall(SbOptionInt(&scope, "output_history_every", &out->history_every));
-  PetscCall(SbOptionReal(&scope, "checkpoint_every_time", &out->checkpoint_every));
-  PetscCall(SbOptionInt(&scope, "checkpoint_every_steps", &out->checkpoint_every_steps));
-  PetscCall(SbOptionInt(&scope, "checkpoint_keep", &out->checkpoint_keep));
-  PetscCall(SbOptionString(&scope, "restart", sizeof(out->restart), out->restart));
+  PetscCall(SbOptionBool(&SbRunScope, "output_history", &out->history));
+  PetscCall(SbOptionBool(&SbRunScope, "output_history_bodies", &out->history_bodies));
+  PetscCall(SbOptionInt(&SbRunScope, "output_history_every", &out->history_every));
+  PetscCall(SbOptionReal(&SbRunScope, "checkpoint_every_time", &out->checkpoint_every));
+  PetscCall(SbOptionInt(&SbRunScope, "checkpoint_every_steps", &out->checkpoint_every_steps));
+  PetscCall(SbOptionInt(&SbRunScope, "checkpoint_keep", &out->checkpoint_keep));
+  PetscCall(SbOptionString(&SbRunScope, "restart", sizeof(out->restart), out->restart));
 
-  PetscCall(SbProbesSetFromOptions(out, &scope, model->dynamic));
+  PetscCall(SbProbesSetFromOptions(out, &SbRunScope, model->dynamic));
 
   /* the file in which others say what live formulas are to be */
   if (SbLiveCount()) {
     char path[PETSC_MAX_PATH_LEN];
     PetscReal speed, angular_speed, pace;
 
-    PetscCall(SbOptionReal(&scope, "live_speed", &speed));
-    PetscCall(SbOptionReal(&scope, "live_angular_speed", &angular_speed));
-    PetscCall(SbOptionReal(&scope, "live_pace", &pace));
+    PetscCall(SbOptionReal(&SbRunScope, "live_speed", &speed));
+    PetscCall(SbOptionReal(&SbRunScope, "live_angular_speed", &angular_speed));
+    PetscCall(SbOptionReal(&SbRunScope, "live_pace", &pace));
     PetscCall(SbOutputPath(out, "live.txt", sizeof(path), path));
     PetscCall(SbLiveSetUp(path, speed, angular_speed, pace));
   }
 
   /* what the screen shows */
-  PetscCall(SbOptionBool(&scope, "progress", &out->progress));
-  PetscCall(SbOptionBool(&scope, "quiet", &out->quiet));
+  PetscCall(SbOptionBool(&SbRunScope, "progress", &out->progress));
+  PetscCall(SbOptionBool(&SbRunScope, "quiet", &out->quiet));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -72,7 +72,6 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
 {
   PetscBool named, any = PETSC_FALSE, comes = PETSC_FALSE, given;
   PetscInt from, n;
-  SbScope scope;
   SbRemesh r;
   char(*words)[SB_NAME_MAX];
   char(*names)[SB_NAME_MAX];
@@ -82,11 +81,10 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
 
   PetscFunctionBeginUser;
   *remesh = NULL;
-  PetscCall(SbScopeSet(&scope, "", "", ""));
   // whether the scenario asks for it, by any option but those that say how
   named = PETSC_FALSE;
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(keys); k++) {
-    PetscCall(SbOptionGiven(&scope, keys[k], &given));
+    PetscCall(SbOptionGiven(&SbRunScope, keys[k], &given));
     named = (PetscBool)(named || given);
   }
   for (PetscInt b = 0; b < m->nbody; b++) {
@@ -118,7 +116,7 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
   }
   if (!named) PetscFunctionReturn(PETSC_SUCCESS);
   // the bodies that are named; without names all of them
-  PetscCall(SbOptionNames(&scope, "remesh_bodies", &n, &names));
+  PetscCall(SbOptionNames(&SbRunScope, "remesh_bodies", &n, &names));
   for (PetscInt b = 0; b < m->nbody; b++) r->named[b] = (PetscBool)!n;
   for (PetscInt i = 0; i < n; i++) {
     PetscInt b = 0;
@@ -133,7 +131,7 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
   PetscCheck(!wrong[0], PETSC_COMM_SELF, PETSC_ERR_USER,
              "-remesh_bodies: the scenario has no body '%s'; give names of -bodies", wrong);
   // their bounds
-  PetscCall(SbOptionReal(&scope, "remesh_quality", &all));
+  PetscCall(SbOptionReal(&SbRunScope, "remesh_quality", &all));
   for (PetscInt b = 0; b < m->nbody; b++) {
     SbScope own;
 
@@ -145,7 +143,7 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
     any = (PetscBool)(any || r->asked[b] > 0.);
   }
   // times at which meshes are renewed
-  PetscCall(SbOptionNames(&scope, "remesh_times", &r->ntime, &words));
+  PetscCall(SbOptionNames(&SbRunScope, "remesh_times", &r->ntime, &words));
   PetscCall(PetscMalloc1(r->ntime, &r->time));
   for (PetscInt i = 0; i < r->ntime; i++) {
     char *end;
@@ -163,9 +161,9 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
     }
   }
   PetscCall(PetscFree(words));
-  PetscCall(SbOptionBool(&scope, "remesh_failed", &r->failed));
-  PetscCall(SbOptionChoice(&scope, "remesh_from", &from));
-  PetscCall(SbOptionReal(&scope, "remesh_size", &r->how.size));
+  PetscCall(SbOptionBool(&SbRunScope, "remesh_failed", &r->failed));
+  PetscCall(SbOptionChoice(&SbRunScope, "remesh_from", &from));
+  PetscCall(SbOptionReal(&SbRunScope, "remesh_size", &r->how.size));
   r->how.rest = (PetscBool)(from == 1);
   r->how.quality = QUALITY_LEAST;
   r->how.mesher = SbMesherDefault;

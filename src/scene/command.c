@@ -36,12 +36,10 @@ PetscErrorCode SbCommandRegister(void)
 
 PetscErrorCode SbCommandSetErrorTrace(void)
 {
-  SbScope scope;
   PetscBool trace;
 
   PetscFunctionBeginUser;
-  PetscCall(SbScopeSet(&scope, "", "", ""));
-  PetscCall(SbOptionBool(&scope, "error_trace", &trace));
+  PetscCall(SbOptionBool(&SbRunScope, "error_trace", &trace));
   SbErrorSetTrace(trace);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

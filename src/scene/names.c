@@ -35,12 +35,10 @@ static const char *name_problem(const char *name)
 
 PetscErrorCode SbSceneReadNames(const char *key, const char *what, PetscInt *n, char (**names)[SB_NAME_MAX])
 {
-  SbScope scope;
   char problem[4 * SB_NAME_MAX] = "";
 
   PetscFunctionBeginUser;
-  PetscCall(SbScopeSet(&scope, "", "", ""));
-  PetscCall(SbOptionNames(&scope, key, n, names));
+  PetscCall(SbOptionNames(&SbRunScope, key, n, names));
   // the first thing that is wrong with them
   for (PetscInt i = 0; i < *n && !problem[0]; i++) {
     const char *name = (*names)[i], *wrong = name_problem(name);

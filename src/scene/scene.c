@@ -226,7 +226,6 @@ PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model)
   char(*names)[SB_NAME_MAX];
   PetscInt n;
   static const char *const keys[] = {"mass", "mesh_partitioner", "mesh_reading", "mesh_report", "validate"};
-  SbScope scope;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(model));
@@ -245,19 +244,17 @@ PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model)
   PetscCall(SbSceneReadSets(*model));
 
   /* options whose readers come after the mesh: read ahead, so that a bad value is found before it */
-  PetscCall(SbScopeSet(&scope, "", "", ""));
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(keys); i++) PetscCall(SbOptionCheckEarly(&scope, keys[i]));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(keys); i++)
+    PetscCall(SbOptionCheckEarly(&SbRunScope, keys[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbSceneValidate(SbModel model)
 {
-  SbScope scope;
   PetscBool validate;
 
   PetscFunctionBeginUser;
-  PetscCall(SbScopeSet(&scope, "", "", ""));
-  PetscCall(SbOptionBool(&scope, "validate", &validate));
+  PetscCall(SbOptionBool(&SbRunScope, "validate", &validate));
   if (!validate) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbMeshValidate(model->mesh));
   PetscCall(SbSpaceValidate(model->space));

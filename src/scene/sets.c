@@ -108,8 +108,7 @@ PetscErrorCode SbSceneReadSets(SbModel model)
     PetscCall(PetscFree(names));
   }
   /* those over which probes take means */
-  PetscCall(SbScopeSet(&scope, "", "", ""));
-  PetscCall(SbOptionNames(&scope, "probes", &n, &names));
+  PetscCall(SbOptionNames(&SbRunScope, "probes", &n, &names));
   for (PetscInt i = 0; i < 2 * n && model->nset <= SB_SET_MAX; i++) {
     char name[SB_NAME_MAX];
 

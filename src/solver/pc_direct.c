@@ -10,11 +10,9 @@
 
 PetscErrorCode SbSolverReproducible(PetscBool *reproducible)
 {
-  SbScope scope;
 
   PetscFunctionBeginUser;
-  PetscCall(SbScopeSet(&scope, "", "", ""));
-  PetscCall(SbOptionBool(&scope, "reproducible", reproducible));
+  PetscCall(SbOptionBool(&SbRunScope, "reproducible", reproducible));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

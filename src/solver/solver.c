@@ -135,13 +135,11 @@ PetscErrorCode SbSolverRegister(void)
 
 PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size)
 {
-  SbScope scope;
   PetscInt index;
 
   PetscFunctionBeginUser;
-  PetscCall(SbScopeSet(&scope, "", "", ""));
-  PetscCall(SbOptionChoice(&scope, "solver", &index));
-  PetscCall(SbOptionCheckEarly(&scope, "reproducible"));
+  PetscCall(SbOptionChoice(&SbRunScope, "solver", &index));
+  PetscCall(SbOptionCheckEarly(&SbRunScope, "reproducible"));
   /* the choices are auto, direct and then the rows of the table */
   PetscCall(PetscStrncpy(choice, index > 1 ? presets[index - 2].name : index ? "direct" : "auto", size));
   PetscFunctionReturn(PETSC_SUCCESS);

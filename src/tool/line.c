@@ -156,7 +156,6 @@ PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *li
   PetscInt n = 0;
   PetscMPIInt size;
   int nfile;
-  SbScope scope;
   PetscInt format;
   PetscInt backend, surface;
 
@@ -187,29 +186,28 @@ PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *li
   tool->in = line->word[1];
   tool->out = command->nfile > 1 ? line->word[2] : NULL;
   PetscCall(PetscStrncpy(tool->body.mesh, tool->in, sizeof(tool->body.mesh)));
-  PetscCall(SbScopeSet(&scope, "", "", ""));
   tool->merge_tolerance = -1;
-  PetscCall(SbOptionReal(&scope, "merge_tolerance", &tool->merge_tolerance));
+  PetscCall(SbOptionReal(&SbRunScope, "merge_tolerance", &tool->merge_tolerance));
 
   /* how a surface becomes tets */
   SbTetDefaults(&tool->body.tet);
-  PetscCall(SbOptionReal(&scope, "size", &tool->body.tet.size));
-  PetscCall(SbOptionChoice(&scope, "surface", &surface));
-  PetscCall(SbOptionReal(&scope, "angle", &tool->body.tet.angle));
-  PetscCall(SbOptionChoice(&scope, "tetrahedralizer", &backend));
-  PetscCall(SbOptionReal(&scope, "seconds", &tool->body.tet.seconds));
-  PetscCall(SbOptionReal(&scope, "untangle", &tool->body.tet.untangle));
-  PetscCall(SbOptionReal(&scope, "merge_tolerance", &tool->body.tet.merge_tolerance));
+  PetscCall(SbOptionReal(&SbRunScope, "size", &tool->body.tet.size));
+  PetscCall(SbOptionChoice(&SbRunScope, "surface", &surface));
+  PetscCall(SbOptionReal(&SbRunScope, "angle", &tool->body.tet.angle));
+  PetscCall(SbOptionChoice(&SbRunScope, "tetrahedralizer", &backend));
+  PetscCall(SbOptionReal(&SbRunScope, "seconds", &tool->body.tet.seconds));
+  PetscCall(SbOptionReal(&SbRunScope, "untangle", &tool->body.tet.untangle));
+  PetscCall(SbOptionReal(&SbRunScope, "merge_tolerance", &tool->body.tet.merge_tolerance));
   tool->body.tet.backend = (SbTetBackend)backend; /* in the order of the rows */
   tool->body.tet.surface = (SbTetSurface)surface;
-  PetscCall(SbOptionInt(&scope, "levels", &tool->levels));
-  PetscCall(SbOptionChoice(&scope, "format", &format));
+  PetscCall(SbOptionInt(&SbRunScope, "levels", &tool->levels));
+  PetscCall(SbOptionChoice(&SbRunScope, "format", &format));
   tool->format = (SbMeshFormat)format; /* in the order of the row */
-  PetscCall(SbOptionInt(&scope, "step", &tool->body.mesh_step));
-  PetscCall(SbOptionReal(&scope, "scale", &tool->body.scale));
-  PetscCall(SbOptionReals(&scope, "rotate", tool->body.rotate));
-  PetscCall(SbOptionReals(&scope, "translate", tool->body.translate));
-  PetscCall(SbOptionString(&scope, "view", sizeof(tool->view), tool->view));
-  PetscCall(SbOptionBool(&scope, "quiet", &tool->quiet));
+  PetscCall(SbOptionInt(&SbRunScope, "step", &tool->body.mesh_step));
+  PetscCall(SbOptionReal(&SbRunScope, "scale", &tool->body.scale));
+  PetscCall(SbOptionReals(&SbRunScope, "rotate", tool->body.rotate));
+  PetscCall(SbOptionReals(&SbRunScope, "translate", tool->body.translate));
+  PetscCall(SbOptionString(&SbRunScope, "view", sizeof(tool->view), tool->view));
+  PetscCall(SbOptionBool(&SbRunScope, "quiet", &tool->quiet));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
