@@ -638,10 +638,32 @@ static PetscErrorCode explain_failure(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Says which effects have their time before or after the run. */
+static PetscErrorCode warn_of_idle_effects(SbRun run)
+{
+  const char *unit = run->model->dynamic ? " s" : "";
+
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < run->model->neffect && !run->arc.on; k++) {
+    const SbEffect e = run->model->effect[k];
+    const PetscBool before = (PetscBool)(e->until <= 0.);
+
+    if (!before && e->from < run->t_end) continue;
+    PetscCall(SbWarning(run->model->comm,
+                        "the effect %s never acts: -effect_%s_%s %g%s, and the run goes from 0 to %g%s",
+                        e->name, e->name, before ? "until" : "from", (double)(before ? e->until : e->from),
+                        unit, (double)run->t_end, unit));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRunSolve(SbRun run)
 {
   PetscFunctionBeginUser;
-  if (run->wall_start == 0.) run->wall_start = MPI_Wtime();
+  if (run->wall_start == 0.) {
+    run->wall_start = MPI_Wtime();
+    PetscCall(warn_of_idle_effects(run));
+  }
   run->paused = PETSC_FALSE;
   run->seen.U = NULL;
   if (run->model->npotential) PetscCall(SbModelPotentialStart(run->model, run->t0, run->dt, run->U));

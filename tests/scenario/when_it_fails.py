@@ -90,6 +90,8 @@ CASES = [
     ("O6", "error", "bar.opts -pc_type bddc", ["-pc_type bddc"]),
     ("O6", "error", "RANKS 2 bar.opts -body_bar_element cr -solver pressure -pressure_ksp_type cg", ["-pressure_ksp_type cg"]),
     ("O7", "warning", "bar.opts -static_steps 3", ["-static_steps"]),
+    ("O7", "warning", "bar.opts -effect_pull_from 0.02", ["pull", "-effect_pull_from", "0.02"]),
+    ("O7", "warning", "bar.opts -effect_pull_until 0", ["pull", "-effect_pull_until"]),
     ("O7", "warning", "bar.opts -output_dir restarted -output_overwrite yes -body_bar_state saved/checkpoint_000002.h5 -body_bar_velocity 0,0,1", ["-body_bar_state", "saved/checkpoint_000002.h5"]),
     ("O7", "warning", "bar.opts -ksp_nothing 1e-3", ["-ksp_nothing", "1e-3"]),
     ("F1", "error", "nix.opts", ["nix.opts"]),
