@@ -47,6 +47,12 @@ def install():
         check(f"not installed: {name}", (root / name).is_file())
     done = run(root / "bin/supple", root / "share/supple/scenarios/cantilever.opts", "-progress", "no", cwd=OUT)
     check(f"the installed program: {done.stderr}", done.returncode == 0 and (OUT / "out/cantilever/history.csv").is_file())
+    # the Python environment of a copy that the user may not write to is in the user's cache
+    cache = OUT / "cache/supple"
+    cache.mkdir(parents=True)
+    (cache / "venv").symlink_to(TOP / ".venv")
+    done = run("/usr/bin/env", f"XDG_CACHE_HOME={OUT}/cache", "python3", "-S", root / "share/supple/scripts/plot", OUT / "out/cantilever", "-o", OUT / "plot.png", cwd=OUT)
+    check(f"scripts/plot of the installed copy: {done.stderr[-400:]}", done.returncode == 0 and (OUT / "plot.png").is_file())
     return root
 
 
