@@ -25,6 +25,7 @@ static struct {
   char file[PETSC_MAX_PATH_LEN];
   PetscReal speed, angular_speed, pace; /* m/s; degree/s; simulated seconds per second, 0: no limit */
   PetscReal clock, begun;               /* s, from which the pace counts; clock 0: not yet */
+  PetscBool warned;                     /* of a line that says nothing */
 } live = {.file = "live.txt", .speed = 0.2, .angular_speed = 90., .pace = 1.};
 
 /* From `from` at time t on to `to`. */
@@ -116,14 +117,16 @@ void SbLiveSet(PetscInt i, PetscReal t, PetscReal value)
   set_rows(live.value[i].formula, t, value, 1., value);
 }
 
-/* What the file wants; what it does not name, or not with as many numbers, keeps its target. Rank 0. */
-static void read_targets(PetscReal target[])
+/* What the file wants; what it does not name, or not with as many numbers, keeps its target. The first whole line that says nothing is a warning. Rank 0. */
+static PetscErrorCode read_targets(PetscReal target[])
 {
   FILE *f = fopen(live.file, "r");
   char line[512];
 
+  PetscFunctionBeginUser;
   while (f && fgets(line, sizeof(line), f)) {
-    const size_t n = strcspn(line, " \t,");
+    const size_t n = strcspn(line, " \t,\r\n");
+    PetscBool useful = (PetscBool)(!n || line[0] == '#');
 
     for (PetscInt i = 0; i < live.n; i += live.value[i].n) {
       char *next = line + n, *end;
@@ -138,9 +141,17 @@ static void read_targets(PetscReal target[])
         next = end;
       }
       if (k == live.value[i].n) memcpy(&target[i], x, (size_t)k * sizeof(*x));
+      useful = (PetscBool)(useful || k == live.value[i].n);
     }
+    if (useful || live.warned || !strchr(line, '\n')) continue;
+    line[strcspn(line, "\r\n")] = 0;
+    live.warned = PETSC_TRUE;
+    PetscCall(SbWarning(
+      PETSC_COMM_SELF, "%s: the line '%s' is not one of a value that is live, as `%s` with %d number%s",
+      live.file, line, live.value[0].name, live.value[0].n, live.value[0].n > 1 ? "s" : ""));
   }
   if (f) (void)fclose(f);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbLiveAdvance(MPI_Comm comm, PetscReal t)
@@ -165,7 +176,7 @@ PetscErrorCode SbLiveAdvance(MPI_Comm comm, PetscReal t)
   /* from here to where they are wanted */
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   for (PetscInt i = 0; i < live.n; i++) target[i] = live.value[i].formula->value[1];
-  if (!rank) read_targets(target);
+  if (!rank) PetscCall(read_targets(target));
   PetscCallMPI(MPI_Bcast(target, (PetscMPIInt)live.n, MPIU_REAL, 0, comm));
   for (PetscInt first = 0; first < live.n; first += live.value[first].n) {
     const Value *v = &live.value[first];

@@ -57,7 +57,8 @@ shutil.rmtree(OUT, ignore_errors=True)
 # Down into the block, and when force is there sideways: what it does next depends on what came.
 put("live", "# x y z\nnobody 1 1 1\ntool 0 0 -0.02\n")
 begun = time.monotonic()
-run = subprocess.Popen(command(2, "live", "-effect_tool_displacement", "live", "-live_speed", "0.1", "-live_pace", "0.4", "-ts_max_time", "1000", "-checkpoint_every_steps", "20", "-checkpoint_keep", "1000"))
+run = subprocess.Popen(command(2, "live", "-effect_tool_displacement", "live", "-live_speed", "0.1", "-live_pace", "0.4", "-ts_max_time", "1000", "-checkpoint_every_steps", "20", "-checkpoint_keep", "1000"),
+                       stderr=(OUT / "told.txt").open("w"))
 # However busy the machine is: it is stopped when the tool has been where it was wanted last for some steps.
 there = 0
 while run.poll() is None and time.monotonic() - begun < 600:
@@ -76,6 +77,9 @@ elapsed = time.monotonic() - begun
 if run.returncode != 75:
     run.kill()
     fail(f"exit code {run.returncode}, {there} steps at the place that was wanted")
+told = (OUT / "told.txt").read_text()
+if told.count("warning") != 1 or "nobody 1 1 1" not in told or "`tool`" not in told:
+    fail(f"of a line that names nothing the run says: {told}")
 h = history("live")
 place = numpy.stack([h[f"tool_live_{k}"] for k in "xyz"], 1)
 speed = numpy.linalg.norm(numpy.diff(place, axis=0), axis=1) / numpy.diff(h["time"])
