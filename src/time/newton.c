@@ -103,6 +103,7 @@ typedef struct {
   PetscReal norm;         /* of the residual there, N */
   PetscReal first, rise;  /* change of E over it, and over all since, J */
   PetscReal change;       /* of E over the last step, J */
+  PetscBool patient;      /* guarded contact, without -snes_max_it: it may go on */
   SbContactSystem system; /* guarded contact: NULL before surfaces have pushed each other */
   SbBlocks blocks;        /* its second derivative, when the last direction was solved for */
   PetscInt nblock;        /* of all ranks */
@@ -342,7 +343,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
   PetscBool enough, back, provisional, better,
     flat = PETSC_FALSE, guarded,
     plain = (PetscBool)(n->nblock > 0 || *s < 1.); /* a barrier is nothing to come back from */
-  PetscReal change, noise, total, goal;
+  PetscReal change, noise, total, goal, undone = 0.;
   PetscReal low = 0., high = 0.; /* parts of the step between which E is lowest; 0: not known yet */
   PetscInt nactive, tries = 0;
 
@@ -448,6 +449,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
       PetscCall(find_slopes(n, Y, from));
       slope = n->slope;
       change = n->first;
+      undone = n->rise;
       n->provisional = 0;
       *s = 1.; /* the first one was whole; surfaces may have shortened the one from there */
     }
@@ -471,7 +473,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
     n->rise = 0.;
   }
   n->rise += change;
-  n->change = change;
+  n->change = change - undone;
   PetscCall(linearise_pressure(n->run, X, Y, *s));
   PetscCall(VecCopy(to->x, X));
   PetscCall(VecCopy(to->r, F));
@@ -656,8 +658,8 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     /* a collapse takes hundreds of steps down, and as many from halfway: on while they are worth it */
     fall -= n->change;
     if (!snes->reason && snes->iter >= first + snes->max_its &&
-        (!guarded || snes->max_its != SB_NEWTON_ITERATIONS ||
-         ((snes->iter - first) % PATIENCE == 0 && fall - fall_before < WORTH * fall)))
+        (!n->patient ||
+         ((snes->iter - first) % PATIENCE == 0 && fall - fall_before <= WORTH * PetscAbsReal(fall))))
       snes->reason = SNES_DIVERGED_MAX_IT;
     if ((snes->iter - first) % PATIENCE == 0) fall_before = fall;
     if (!guarded && !n->run->model->dynamic && !n->provisional) creeps = s < CREEP ? creeps + 1 : 0;
@@ -776,7 +778,11 @@ PetscErrorCode SbNewtonSetRun(SNES snes, SbRun run)
   PetscCall(PetscObjectTypeCompare((PetscObject)snes, SB_SNES_NEWTON, &ours));
   if (ours) {
     Newton *n = (Newton *)snes->data;
+    PetscBool given;
 
+    PetscCall(
+      PetscOptionsHasName(((PetscObject)snes)->options, ((PetscObject)snes)->prefix, "-snes_max_it", &given));
+    n->patient = (PetscBool)(m->npotential && !given);
     n->run = run;
     n->least = 0.;
     for (PetscInt b = 0; b < m->nbody; b++)
