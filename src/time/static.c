@@ -94,21 +94,24 @@ static PetscErrorCode find_free_body(const LoadStep *l, PetscBool failed, PetscB
   const SbRun run = l->run;
   PetscInt body;
   char motion[256];
+  const char *loads = "";
 
   PetscFunctionBeginUser;
-  /* stress and follower loads far from equilibrium resist rotations that nothing holds: where the step began they do not */
-  if (failed && !run->model->linear) {
+  PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion));
+  run->free_body = (PetscBool)(body >= 0 && !run->model->nbegin_step && !run->model->npotential);
+  /* stress and loads resist rotations that nothing else holds: where the step began they may not. A load that holds, as the weight of what hangs, does so in shorter steps, too */
+  if (body < 0 && failed && !run->model->linear) {
     run->model->load = l->factor - l->length;
     PetscCall(SNESComputeJacobian(run->snes, run->U, run->operator, run->J));
+    PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion));
+    run->model->load = l->factor;
+    loads = " but its loads";
   }
-  PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion));
-  run->model->load = l->factor;
   *found = (PetscBool)(body >= 0);
-  run->free_body = (PetscBool)(*found && !run->model->nbegin_step && !run->model->npotential);
   if (*found)
     PetscCall(SbRunFail(
-      run, "load factor %g: nothing holds the body %s against %s; hold it by a support%s", (double)l->factor,
-      run->model->body[body].name, motion,
+      run, "load factor %g: nothing%s holds the body %s against %s; hold it by a support%s",
+      (double)l->factor, loads, run->model->body[body].name, motion,
       run->model->nbegin_step || run->model->npotential ? ", or let it come to rest in a dynamic run" : ""));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

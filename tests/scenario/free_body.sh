@@ -100,7 +100,7 @@ cat >follower.opts <<'END'
 END
 for more in "cr -static_steps 3" "dg"; do
   # shellcheck disable=SC2086
-  error 2 "nothing holds|$hinge" -options_file bar.opts -options_file follower.opts $two -body_a_element $more
+  error 2 "nothing but its loads holds|$hinge" -options_file bar.opts -options_file follower.opts $two -body_a_element $more
 done
 # shellcheck disable=SC2086
 error 1 "load factor 1.|body a|(0.00, 0.00, 1.00)" -options_file bar.opts $two \
@@ -123,6 +123,13 @@ done
 "$supple" -options_file bar.opts -options_file stiff.opts -solver cg_jacobi -ksp_max_it 20 >out.txt 2>err.txt
 code=$?
 check "another solver takes over: exit code $code" test "$code" = 0
+# what holds: the weight, where a body hangs from a hinge, in steps that are short enough
+# shellcheck disable=SC2086
+"$supple" -options_file bar.opts -body_a_material neohookean -body_a_young 3e3 -set_part_at box:-1,0.0499,0.0999,1,0.0501,0.101 \
+  -snes_max_it 3 >out.txt 2>err.txt
+code=$?
+check "hangs from a hinge: exit code $code, $(cat err.txt)" test "$code" = 0
+check "in steps that were shortened: $(grep attempts out.txt)" grep -q "([1-9][0-9]* attempts rejected)" out.txt
 # what holds: a support of the sides
 # shellcheck disable=SC2086
 "$supple" -options_file bodies.opts $floor -effects gravity,hold,side,meet -sets low,under,side \
