@@ -90,7 +90,8 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
   PetscCall(read_all(o->mesh, "body", SB_H5_INT, sizeof(PetscInt), 1, &n, &cell_body));
   PetscCall(read_all(o->frame, "displacement", H5T_NATIVE_DOUBLE, sizeof(double), 3, &nu, &o->u));
   PetscCall(read_all(o->frame, "velocity", H5T_NATIVE_DOUBLE, sizeof(double), 3, &n, &o->v));
-  PetscCheck(o->x && o->cell && o->u && nu == o->npoint, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+  PetscCheck(o->x && o->cell && o->u && nu == o->npoint && (!o->v || n == nu), PETSC_COMM_SELF,
+             PETSC_ERR_FILE_UNEXPECTED,
              "%s %s: %s has no whole mesh with displacements; -output_fields displacement,velocity there",
              option, text, o->path);
 
@@ -288,7 +289,7 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
     if (k) PetscCall(tell_velocity(run->model, option, b, path, has));
     if (!has) continue;
     PetscCall(read_all(h.file, k ? "v" : "u", H5T_NATIVE_DOUBLE, sizeof(double), 3, &n, &all));
-    ok = (PetscBool)(all != NULL);
+    ok = (PetscBool)(all && n == (PetscInt)SbH5Rows(h.file, "u"));
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &ok, 1, SB_MPI_BOOL, MPI_LAND, out->comm));
     PetscCall(VecGetArray(target[k], &x));
     for (PetscInt i = 0; i < 3 * s->nnode_owned && ok; i++)

@@ -8,6 +8,7 @@ guide has a row, and every row a class.
 """
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -107,6 +108,7 @@ CASES = [
     ("F5", "error", "bar.opts -output_dir restarted -restart saved", ["-restart saved", "-output_dir saved", "latest"]),
     ("F5", "error", "bar.opts -output_dir restarted -body_bar_state saved,7777", ["-body_bar_state saved,7777", "7777", " 2"]),
     ("F5", "error", "bar.opts -output_dir restarted -body_bar_state table.txt", ["-body_bar_state table.txt", "folder"]),
+    ("F5", "error", "bar.opts -output_dir restarted -body_bar_state short.h5", ["short.h5", "damaged"]),
     ("F6", "warning", "bar.opts -output_dir cut -restart latest", ["cut/checkpoint_000002.h5"]),
     ("F7", "warning", "bar.opts -output_dir restarted -output_overwrite yes -body_bar_state saved/checkpoint_000002.h5 -body_bar_element p2", ["-body_bar_state", "saved/checkpoint_000002.h5", "saved,2"]),
     ("M1", "error", f"cube.opts -body_a_mesh {DATA}/bad_flat.msh {HELD}", ["bad_flat.msh", " 1 ", "1.67e-15 m^3"]),
@@ -192,6 +194,12 @@ def main():
         check(f"checkpoints: {text}", code == 0)
     last = OUT / "cut/checkpoint_000002.h5"
     last.write_bytes(last.read_bytes()[:1000])
+    # a state whose velocities are fewer than its displacements
+    shutil.copy(OUT / "saved/checkpoint_000002.h5", OUT / "short.h5")
+    with h5py.File(OUT / "short.h5", "r+") as f:
+        v = f["v"][:-1]
+        del f["v"]
+        f["v"] = v
 
     for name, kind, arguments, named in CASES:
         if name == "R8" and "mumps" not in os.environ["SB_PACKAGES"].split():  # which counts the eigenvalues
