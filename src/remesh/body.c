@@ -20,8 +20,9 @@
 #include "remesh_impl.h"
 
 #define SWEEPS 30
-#define ROUNDS 6      /* of moving vertices and splitting edges */
-#define PLACES 6      /* on the way to the middle of the neighbours, each half as far as the one before */
+#define GROWTH 2 /* times its tets: a mesh that splits have made so large is not repaired by more of them */
+#define ROUNDS 6 /* of moving vertices and splitting edges */
+#define PLACES 6 /* on the way to the middle of the neighbours, each half as far as the one before */
 #define STRAIGHT 1e-6 /* of the length of an edge: nearer to the middle its node is there */
 
 /* What finds the old material. */
@@ -293,6 +294,7 @@ static PetscErrorCode split_edge(const Material *at_old, const PetscInt ends[2],
 static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, const SbSurface *hull,
                                   SbNewMesh *m)
 {
+  const PetscInt most = GROWTH * m->ncell;
   PetscBool split = PETSC_TRUE;
   SbKey *edge;
 
@@ -302,7 +304,7 @@ static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, co
   for (PetscInt i = 0; i < 3 * hull->ntri; i++)
     edge[i] = (SbKey){SbKeyOfPair(hull->tri[i], hull->tri[i % 3 == 2 ? i - 2 : i + 1]), i};
   SbKeysSort(3 * hull->ntri, edge);
-  for (int round = 0; round < ROUNDS && split; round++) {
+  for (int round = 0; round < ROUNDS && split && m->ncell <= most; round++) {
     const PetscInt ncell = m->ncell;
     PetscBool *moved, better = PETSC_TRUE;
     Stars stars;
@@ -328,7 +330,7 @@ static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, co
     PetscCall(PetscFree(stars.start));
     PetscCall(PetscFree(stars.cells));
     split = PETSC_FALSE;
-    for (PetscInt c = 0; c < ncell && round + 1 < ROUNDS; c++) {
+    for (PetscInt c = 0; c < ncell && round + 1 < ROUNDS && m->ncell <= most; c++) {
       PetscInt ends[2] = {-1, -1};
 
       if (worse(m, c) >= how->quality || !inner_edge(hull, edge, m, c, ends)) continue;
