@@ -62,9 +62,9 @@ static const char *const common[] = {
 */
 static void guess(const char *name, size_t size, char text[])
 {
-  const size_t n = strcspn(name, "_") + 1;
+  const size_t n = strcspn(name, "_"); /* of its first word, which may be all */
   const PetscBool more =
-    (PetscBool)(strlen(name) > n && !looks_like_petsc(name) && !looks_like_petsc(name + n));
+    (PetscBool)(!looks_like_petsc(name) && (!name[n] || (name[n + 1] && !looks_like_petsc(name + n + 1))));
 
   text[0] = 0;
   for (PetscInt i = 0; i < SbTheOptions.nblock && !text[0]; i++) {
@@ -75,7 +75,7 @@ static void guess(const char *name, size_t size, char text[])
 
       if (block->klass[0] && !strcasecmp(key, name))
         SbFormat(size, text, "; did you mean -%s_NAME_%s?", block->klass, key);
-      else if (!block->klass[0] && more && !strncasecmp(key, name, n))
+      else if (!block->klass[0] && more && !strncasecmp(key, name, n) && key[n] == '_')
         SbFormat(size, text, "; -help all lists them");
     }
   }

@@ -67,6 +67,7 @@ SNAP = f"{TOP}/scenarios/snap.opts -body_bar_mesh box:0.2,0.004,0.005:40,1,2 -ou
 
 CASES = [
     ("O1", "error", "bar.opts -body_bar_yuong 3", ["-body_bar_yuong", "-body_bar_young"]),
+    ("O1", "error", "bar.opts -output out/x", ["-output "]),
     ("O1", "error", "bar.opts -effcts gravity", ["-effcts", "-effects"]),
     ("O1", "error", "bar.opts -time_budget 1", ["-time_budget"]),
     ("O1", "error", "bar.opts -young 1", ["-young", "-body_NAME_young"]),
