@@ -162,6 +162,7 @@ def check_window():
 
 
 def load_module():
+    sys.path.insert(0, str(Path(LIVE).parent))
     loader = importlib.machinery.SourceFileLoader("live", LIVE)
     found = importlib.util.module_from_spec(importlib.util.spec_from_loader("live", loader))
     loader.exec_module(found)
