@@ -97,6 +97,7 @@ cat >follower.opts <<'END'
 -effect_push_type pressure
 -effect_push_on top
 -effect_push_value 100
+-time_max_halvings 2
 END
 for more in "cr -static_steps 3" "dg"; do
   # shellcheck disable=SC2086
