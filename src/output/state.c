@@ -280,23 +280,28 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
 
   /* displacement and velocity of its nodes; supports, which follow the faces' nodes in the file, may be other ones */
   PetscCall(find_rows(run, (PetscInt)SbH5Rows(h.file, "u"), row, &ok));
-  for (int k = 0; k < 2 && ok; k++) {
-    PetscScalar *x;
-    PetscReal *all = NULL;
-    PetscInt n;
-    const PetscBool has = (PetscBool)(H5Lexists(h.file, k ? "v" : "u", H5P_DEFAULT) > 0);
+  if (ok) {
+    SbOrder order;
+    PetscReal *slice, *owned;
 
-    if (k) PetscCall(tell_velocity(run->model, option, b, path, has));
-    if (!has) continue;
-    PetscCall(read_all(h.file, k ? "v" : "u", H5T_NATIVE_DOUBLE, sizeof(double), 3, &n, &all));
-    ok = (PetscBool)(all && n == (PetscInt)SbH5Rows(h.file, "u"));
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &ok, 1, SB_MPI_BOOL, MPI_LAND, out->comm));
-    PetscCall(VecGetArray(target[k], &x));
-    for (PetscInt i = 0; i < 3 * s->nnode_owned && ok; i++)
-      if (s->node_body[i / 3] == b)
-        x[i] = k && s->fixed[i / 3] & (1 << i % 3) ? 0. : all[3 * row[i / 3] + i % 3];
-    PetscCall(VecRestoreArray(target[k], &x));
-    PetscCall(PetscFree(all));
+    PetscCall(SbOrderCreate(out->comm, (PetscInt)SbH5Rows(h.file, "u"), s->nnode_owned, row, &order));
+    PetscCall(PetscMalloc2(3 * order.n, &slice, 3 * s->nnode_owned, &owned));
+    for (int k = 0; k < 2 && ok; k++) {
+      const PetscBool has = (PetscBool)(H5Lexists(h.file, k ? "v" : "u", H5P_DEFAULT) > 0);
+      PetscScalar *x;
+
+      if (k) PetscCall(tell_velocity(run->model, option, b, path, has));
+      if (!has) continue;
+      PetscCall(SbH5ReadSlice(&h, k ? "v" : "u", &order, 3, slice, &ok));
+      if (!ok) break;
+      PetscCall(SbOrderScatter(&order, 3, slice, owned));
+      PetscCall(VecGetArray(target[k], &x));
+      for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
+        if (s->node_body[i / 3] == b) x[i] = k && s->fixed[i / 3] & (1 << i % 3) ? 0. : owned[i];
+      PetscCall(VecRestoreArray(target[k], &x));
+    }
+    PetscCall(PetscFree2(slice, owned));
+    PetscCall(SbOrderDestroy(&order));
   }
   PetscCall(PetscFree(row));
   PetscCall(SbH5Close(&h));

@@ -109,7 +109,7 @@ CASES = [
     ("F5", "error", "bar.opts -output_dir restarted -restart saved", ["-restart saved", "-output_dir saved", "latest"]),
     ("F5", "error", "bar.opts -output_dir restarted -body_bar_state saved,7777", ["-body_bar_state saved,7777", "7777", " 2"]),
     ("F5", "error", "bar.opts -output_dir restarted -body_bar_state table.txt", ["-body_bar_state table.txt", "folder"]),
-    ("F5", "error", "bar.opts -output_dir restarted -body_bar_state short.h5", ["short.h5", "damaged"]),
+    ("F5", "error", "bar.opts -output_dir restarted -body_bar_state short.h5", ["-body_bar_state short.h5"]),
     ("F6", "warning", "bar.opts -output_dir cut -restart latest", ["cut/checkpoint_000002.h5"]),
     ("F7", "warning", "bar.opts -output_dir restarted -output_overwrite yes -body_bar_state saved/checkpoint_000002.h5 -body_bar_element p2", ["-body_bar_state", "saved/checkpoint_000002.h5", "saved,2"]),
     ("M1", "error", f"cube.opts -body_a_mesh {DATA}/bad_flat.msh {HELD}", ["bad_flat.msh", " 1 ", "1.67e-15 m^3"]),
@@ -131,9 +131,9 @@ CASES = [
      "-body_b_young 1e5 -body_b_poisson 0.3 -effects meet -effect_meet_type contact -time euler_implicit -ts_dt 1e-3 -ts_max_time 1e-3",
      ["body b", "body a", "-body_b_translate"]),
     ("R1", "error", "bar.opts -effect_pull_vector 0;0;1e9 -snes_max_it 2 -time_max_halvings 2", ["0.0025 s"]),
-    # beyond 0.0152 s there is no load: steps that are halved without end do not go on for ever
     # PETSc's own integrator gives up without a word
     ("R1", "error", "bar.opts -effect_pull_vector 0;0;1e9 -snes_max_it 2 -time alpha2", ["-ts_dt", "genalpha"]),
+    # beyond 0.0152 s there is no load: steps that are halved without end do not go on for ever
     ("R1", "error", "bar.opts -effect_pull_vector 0;0;sqrt(0.0152-t)", ["1.86265e-11 s", "-ts_dt"]),
     # the inverted cube, which carries the load as well, is no answer
     ("R2", "error", f"{LIMIT} -effect_press_type traction -effect_press_vector 0;0;-0.2", ["0.962"]),

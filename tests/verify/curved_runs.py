@@ -3,7 +3,6 @@ are taken up on other numbers of ranks as if the run had not been interrupted; a
 """
 import itertools
 import re
-import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -122,9 +121,8 @@ for name, state in (("frame", f"{OUT / 'whole'},3"), ("checkpoint", str(OUT / "w
 (OUT / "ball.geo").write_text('SetFactory("OpenCASCADE"); Sphere(1) = {0, 0, 0, 0.05}; Sphere(2) = {0, 0, 0, 0.025}; BooleanDifference(3) = {Volume{1}; Delete;}{Volume{2}; Delete;};\n'
                               'Physical Volume("ball") = {3}; Mesh.MeshSizeMin = 0.025; Mesh.MeshSizeMax = 0.025; Mesh.HighOrderOptimize = 0; Mesh.ElementOrder = 2;\n')
 subprocess.run(["gmsh", "-3", "-format", "msh41", "-v", "0", "-o", OUT / "ball.msh", OUT / "ball.geo"], check=True)
-before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
 done = subprocess.run([SUPPLE, *SCENE, "-body_a_mesh", str(OUT / "ball.msh"), "-set_foot_at", "halfspace:0,0,1,-0.03", "-ts_max_time", "0.03", "-checkpoint_every_steps", "0", "-output_dir", str(OUT / "ball")],
                       capture_output=True, text=True)
-seconds = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
-check(done.returncode == 0 and seconds < 60, f"a coarse shell, {seconds:.0f} s: {done.stderr}")
+# 304 tets, which splits had made 8,000
+check(done.returncode == 0 and max(map(int, re.findall(r"\d+", done.stderr)), default=0) < 2000, f"a coarse shell: {done.stderr}")
 print("curved tets in .h5 and .msh, in slabs, across restarts, re-meshing and states of other runs")
