@@ -53,13 +53,15 @@ class Surface:
 
 class Mesh:
     """The bodies' mesh at rest: x [npoint][3] m, cells [ncell][4] points, vertices [ncell][4] (which tell what points coincide where each
-    cell has its own), cells10 [ncell][10] points of quadratic tets, or None, body [ncell] number of the body, `arrays` the names of what else there is (sets, ranks)."""
+    cell has its own), body [ncell] number of the body, `arrays` the names of what else there is (sets, ranks). Where a body is of p2,
+    cells10 [n][10] are the points of the scene's tets, -1 in those of other elements (else None); without -output_quadratic `cells` are what these are cut into, and parent [ncell] says of which each is part (else None)."""
 
     def __init__(self, group):
         self.path = group.name
         self.x, self.cells, self.body = group["x"][()], group["cells"][()], group["body"][()]
         self.vertices = group["vertices"][()] if "vertices" in group else self.cells
         self.cells10 = group["cells10"][()] if "cells10" in group else None
+        self.parent = group["parent"][()] if "parent" in group else None
         self.arrays = [name for name in group if name not in ("x", "cells", "cells10", "vertices")]
 
     @cached_property
@@ -279,7 +281,7 @@ class Run:
         mesh, names = self.mesh(k), self.fields(k)
         fields = {name: self.field(name, k) for name in names}
         on_cells = {name: [values] for name, values in fields.items() if len(values) == len(mesh.cells)}
-        cells = ("tetra", mesh.cells) if mesh.cells10 is None else ("tetra10", mesh.cells10)
+        cells = ("tetra", mesh.cells) if mesh.cells10 is None or mesh.parent is not None else ("tetra10", mesh.cells10)
         return meshio.Mesh(self.positions(k), [cells], cell_data=on_cells,
                            point_data={name: values for name, values in fields.items() if name not in on_cells})
 

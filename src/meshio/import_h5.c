@@ -2,7 +2,8 @@
   import_h5.c - reader of HDF5 meshes: supple's own (write_h5.c has the layout) and what a run writes, fields.h5.
 
   Both hold /mesh/x and /mesh/cells. Own meshes have groups; in a run's output /mesh/body says which body a tet belongs to,
-  and the bodies become groups of tets. When each tet of the output has points of its own (-output_discontinuous),
+  and the bodies become groups of tets. Where a body was of p2, /mesh/cells10 has the nodes of its tets, and what /mesh/cells has are
+  parts of them: /mesh/parent says of which. When each tet of the output has points of its own (-output_discontinuous),
   /mesh/vertices says which of them are one vertex: positions are averaged there. With a step, its displacement is added.
 
   An .xmf names the .h5 that its mesh is in.
@@ -371,12 +372,53 @@ static PetscErrorCode read_bodies(const File *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Tets of P2, with their nodes at edges, take the place of the linear ones that they are cut into. at[f->nvert]: the vertex at each point of the file; NULL: itself. */
+static PetscErrorCode read_quadratic(const File *f, const PetscInt at[])
+{
+  SbItems *item = &f->im->item[3];
+  PetscInt n, nparent, *parent;
+  int64_t *node;
+
+  PetscFunctionBeginUser;
+  PetscCall(read_array(f, &(Array){.name = "/mesh/cells10", .klass = H5T_INTEGER, .ncomp = 10, .bound = -1},
+                       &n, &node));
+  if (is_there(f, "/mesh/parent")) {
+    PetscCall(read_table(f, "/mesh/parent", 1, n, &nparent, &parent));
+    if (nparent != item->n) H5_ERROR(f, "/mesh/parent does not fit /mesh/cells; the file is damaged");
+    for (PetscInt i = 0; i < nparent; i++) {
+      if (parent[i] > i) H5_ERROR(f, "/mesh/parent jumps in row %lld; the file is damaged", (long long)i + 1);
+      SbItemsMove(item, 3, parent[i], i);
+    }
+  }
+  if (n > item->n) H5_ERROR(f, "/mesh/cells10 does not fit /mesh/cells; the file is damaged");
+  item->n = n;
+  for (PetscInt c = 0; c < n; c++) {
+    PetscInt vert[10];
+
+    for (int k = 0; k < 10; k++) {
+      const int64_t point = node[10 * c + SbGmshNode(k)];
+
+      // only nodes at edges may be missing: where the body is of another element
+      if (point < (k < 4 ? 0 : -1) || point >= f->nvert)
+        H5_ERROR(f, "/mesh/cells10 holds %lld in row %lld; the file is damaged", (long long)point,
+                 (long long)c + 1);
+      vert[k] = point >= 0 && at ? at[point] : (PetscInt)point;
+    }
+    PetscCall(PetscArraycpy(item->vert + 4 * c, vert, 4));
+    item->number[c] = c + 1;
+    PetscCall(SbImportAddMiddles(f->im, vert));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode read_output(const File *f)
 {
+  SbImport *im = f->im;
+  PetscInt *at = NULL;
+
   PetscFunctionBeginUser;
   // positions at the step
   if (f->frame[0]) {
-    SbImport *im = f->im;
     char name[96];
     PetscInt n;
     PetscReal *u;
@@ -389,20 +431,7 @@ static PetscErrorCode read_output(const File *f)
       H5_ERROR(f, "%s has %lld rows for %lld points", name, (long long)n, (long long)im->nvert);
     for (PetscInt i = 0; i < 3 * n; i++) im->x[i] += u[i];
   }
-  // nodes at the edges of P2
-  if (is_there(f, "/mesh/cells10") && !is_there(f, "/mesh/vertices")) {
-    PetscInt n, *node;
-
-    PetscCall(read_table(f, "/mesh/cells10", 10, f->nvert, &n, &node));
-    for (PetscInt c = 0; c < n; c++) {
-      PetscInt vert[10];
-
-      for (int k = 0; k < 10; k++) vert[k] = node[10 * c + SbGmshNode(k)];
-      PetscCall(SbImportAddMiddles(f->im, vert));
-    }
-  }
   if (is_there(f, "/mesh/vertices")) {
-    SbImport *im = f->im;
     PetscInt n, *vertex, *share, nvert = 0;
     PetscReal *x;
 
@@ -412,9 +441,12 @@ static PetscErrorCode read_output(const File *f)
     if (n != im->item[3].n || nvert > im->nvert)
       H5_ERROR(f, "/mesh/vertices does not fit /mesh/cells; the file is damaged");
     PetscCall(PetscCalloc2(3 * (size_t)nvert, &x, nvert, &share));
+    PetscCall(SbImportScratch(im, (size_t)f->nvert * sizeof(*at), &at));
+    PetscCall(PetscArrayzero(at, f->nvert));
     for (PetscInt i = 0; i < 4 * n; i++) {
       for (int k = 0; k < 3; k++) x[3 * vertex[i] + k] += im->x[3 * im->item[3].vert[i] + k];
       share[vertex[i]]++;
+      at[im->item[3].vert[i]] = vertex[i];
     }
     for (PetscInt v = 0; v < nvert; v++) {
       for (int k = 0; k < 3; k++) im->x[3 * v + k] = share[v] ? x[3 * v + k] / share[v] : 0;
@@ -425,6 +457,7 @@ static PetscErrorCode read_output(const File *f)
     PetscCall(PetscFree2(x, share));
   }
   PetscCall(read_bodies(f));
+  if (is_there(f, "/mesh/cells10")) PetscCall(read_quadratic(f, at));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -29,13 +29,12 @@ static PetscErrorCode vector(const SbField *f, SbRun run, const SbStep *step, Pe
 static PetscErrorCode position(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
 {
   SbOutput out = (SbOutput)run->output;
-  const SbMesh mesh = run->model->mesh;
-  const PetscReal *x = out->quadratic ? run->model->space->node_x : mesh->x;
 
   PetscFunctionBeginUser;
   PetscCall(vector(f, run, step, values));
-  for (PetscInt i = 0; i < 3 * out->point.nowned; i++)
-    values[i] += x[3 * (out->discontinuous ? mesh->cell[i / 3] : i / 3) + i % 3];
+  for (PetscInt i = 0; i < out->point.nowned; i++) {
+    for (int k = 0; k < 3; k++) values[3 * i + k] += SbPointsRest(run, out, i)[k];
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,13 +1,15 @@
 /*
   fields.h5: one group per frame, one dataset per field, written by all ranks together in original order.
 
-  With -output_quadratic points are nodes, the vertices first, and /mesh/cells10 has the ten of each cell. With -output_discontinuous point 4 c + a is corner a of cell c, and /mesh/vertices says which vertices coincide.
+  Where a body is of P2, its nodes at edges are points behind the vertices, and each of its cells is cut into eight linear tets: one at each corner, and the octahedron between them in four around one
+  of its diagonals. With -output_quadratic it is one tet of ten points. With -output_discontinuous each cell has points of its own, and /mesh/vertices says which of them coincide.
 
   A frame gets its name in the file when it is complete (h5.c), and is then listed in the indices fields.xmf and fields.vtkhdf. After a restart in
   the same folder frames up to the restart stay, later ones are removed and their space in the file is used again.
 */
 #include <ctype.h>
 #include "output_impl.h"
+#include "sbgeometry.h"
 
 typedef struct {
   PetscReal time;
@@ -29,7 +31,7 @@ struct _p_SbFrames {
   PetscInt nframe;
   PetscInt mesh;            /* of frames that are written, as in SbFrame */
   SbIndex index;            /* rank 0 only */
-  PetscReal *owned, *slice; /* work: six numbers per cell or three per point */
+  PetscReal *owned, *slice; /* work: three numbers per point, or those of a field per cell or tet */
   void *packed;             /* slice in the type of the file; NULL when that is double */
 };
 
@@ -43,75 +45,153 @@ static void mesh_name(PetscInt step, size_t size, char name[])
     SbFormat(size, name, "mesh");
 }
 
-/* A constant whole number per entity, or the four vertices of each cell. */
-static PetscErrorCode write_whole(SbFrames fr, hid_t where, const char *name, const SbOrder *order,
-                                  PetscInt ncomp)
+/* What fr->owned has of points or cells as rows of the file, out->point or out->tet, in fr->slice: of a cell that is cut each of its tets has the values. */
+static PetscErrorCode gather(SbOutput out, PetscBool cell, PetscInt ncomp)
 {
+  SbFrames fr = out->frames;
+  PetscInt n = out->tet.n;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOrderGather(cell ? &out->cell : &out->point, ncomp, fr->owned, fr->slice));
+  /* in place, from the end on */
+  for (PetscInt i = out->cell.n - 1; cell && out->split && i >= 0; i--) {
+    for (int k = 0; k < (out->split[i] ? 8 : 1); k++)
+      PetscCall(PetscArraymove(fr->slice + ncomp * --n, fr->slice + ncomp * i, ncomp));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A constant whole number per point or cell. */
+static PetscErrorCode write_whole(SbOutput out, hid_t where, const char *name, PetscBool cell)
+{
+  const SbOrder *order = cell ? &out->tet : &out->point;
+  SbFrames fr = out->frames;
   int32_t *whole;
 
   PetscFunctionBeginUser;
-  PetscCall(SbOrderGather(order, ncomp, fr->owned, fr->slice));
-  PetscCall(PetscMalloc1(order->n * ncomp, &whole));
-  for (PetscInt i = 0; i < order->n * ncomp; i++) whole[i] = (int32_t)fr->slice[i];
-  PetscCall(SbH5WriteSlice(&fr->h5, where, name, "1", order, ncomp, H5T_STD_I32LE, H5T_NATIVE_INT32, whole));
+  PetscCall(gather(out, cell, 1));
+  PetscCall(PetscMalloc1(order->n, &whole));
+  for (PetscInt i = 0; i < order->n; i++) whole[i] = (int32_t)fr->slice[i];
+  PetscCall(SbH5WriteSlice(&fr->h5, where, name, "1", order, 1, H5T_STD_I32LE, H5T_NATIVE_INT32, whole));
   PetscCall(PetscFree(whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The ten points of each cell in the order of VTK: corners, then the edges 01 12 02 03 13 23. */
-static PetscErrorCode write_quadratic_cells(SbRun run, SbOutput out, hid_t group)
+/* Of the nodes of P2: the tets at the corners of a cell; the ends of each diagonal of the octahedron between them, and the others around it. */
+static const int corner_tet[4][4] = {{0, 4, 5, 6}, {4, 1, 7, 8}, {5, 7, 2, 9}, {6, 8, 9, 3}};
+static const int around[3][6] = {{4, 9, 5, 6, 8, 7}, {5, 8, 7, 9, 6, 4}, {6, 7, 4, 5, 9, 8}};
+
+/* Corner j of tet k of the eight. */
+static int child_corner(int diagonal, int k, int j)
 {
-  static const int edge[6] = {0, 3, 1, 2, 4, 5}; /* as SbTetEdge counts them */
+  if (k < 4) return corner_tet[k][j];
+  return j < 2 ? around[diagonal][j] : around[diagonal][2 + (k + j - 6) % 4];
+}
+
+/* The diagonal that cuts the octahedron best at rest: its worst tet has most volume for the diagonal's length. Straight cells have equal volumes, so the shortest. */
+static int best_diagonal(SbSpace s, PetscInt cell)
+{
+  PetscReal x[SB_CELL_NODES][3], best = PETSC_MIN_REAL;
+  int found = 0;
+
+  SbSpaceCellPositions(s, cell, x);
+  for (int d = 0; d < 3; d++) {
+    const PetscReal *p = x[around[d][0]], *q = x[around[d][1]];
+    const PetscReal length =
+      PetscSqrtReal(PetscSqr(p[0] - q[0]) + PetscSqr(p[1] - q[1]) + PetscSqr(p[2] - q[2]));
+    PetscReal worst = PETSC_MAX_REAL;
+
+    for (int k = 4; k < 8; k++) {
+      PetscInt vert[4];
+
+      for (int j = 0; j < 4; j++) vert[j] = child_corner(d, k, j);
+      worst = PetscMin(worst, SbTetDeterminant(x[0], vert) / (length * length * length));
+    }
+    // of diagonals that differ by rounding the first one
+    if (worst > best + 1e-9 * PetscAbsReal(best)) {
+      best = worst;
+      found = d;
+    }
+  }
+  return found;
+}
+
+/*
+  The tets by their points; where points are those of cells, the vertices that these lie at, too. With P2 the ten points of its cells in the order of VTK (corners, then the edges 01 12 02 03 13 23), and
+  the cell that each tet is part of.
+*/
+static PetscErrorCode write_cells(SbRun run, SbOutput out, hid_t group)
+{
+  static const int to_vtk[SB_CELL_NODES] = {0, 1, 2, 3, 4, 7, 5, 6, 8, 9};
   SbFrames fr = out->frames;
   const SbSpace s = run->model->space;
-  PetscReal *number, *owned;
+  const SbMesh mesh = s->mesh;
+  const PetscInt wide = s->edge_node ? SB_CELL_NODES + 1 : 4, ncut = (out->tet.start - out->cell.start) / 7;
+  int32_t *corner, *vertex, *ten, *parent, first = (int32_t)(4 * out->cell.start + 6 * ncut);
+  PetscInt t = 0;
 
   PetscFunctionBeginUser;
-  /* numbers of the nodes in the file, also of ghosts */
-  PetscCall(PetscCalloc1(3 * s->nnode, &number));
-  PetscCall(PetscMalloc1(s->nnode_owned, &owned));
-  for (PetscInt i = 0; i < out->point.n; i++) fr->slice[i] = (PetscReal)(out->point.start + i);
-  PetscCall(SbOrderScatter(&out->point, 1, fr->slice, owned));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) number[3 * i] = owned[i];
-  PetscCall(SbSpaceUpdateGhosts(s, number));
-  for (PetscInt c = 0; c < s->mesh->ncell_owned; c++) {
-    for (int a = 0; a < SB_CELL_NODES; a++)
-      fr->owned[SB_CELL_NODES * c + a] = number[3 * SbSpaceCellNode(s, c, a < 4 ? a : 4 + edge[a - 4])];
+  /* numbers of vertices, of nodes at edges (-1: the cell has none), and the diagonal (-1: it is one tet) */
+  for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
+    PetscReal *number = fr->owned + wide * c;
+    const PetscBool ten_nodes = (PetscBool)(wide > 4 && SbSpaceCellNode(s, c, 4) >= 0);
+
+    for (PetscInt a = 0; a < wide; a++)
+      number[a] = a < 4                            ? (PetscReal)mesh->vert_orig[mesh->cell[4 * c + a]]
+                  : ten_nodes && a < SB_CELL_NODES ? (PetscReal)out->edge_number[SbSpaceCellNode(s, c, a)]
+                                                   : -1.;
+    if (ten_nodes && !out->quadratic) number[SB_CELL_NODES] = best_diagonal(s, c);
   }
-  PetscCall(PetscFree(number));
-  PetscCall(PetscFree(owned));
-  PetscCall(write_whole(fr, group, "cells10", &out->cell, SB_CELL_NODES));
+  PetscCall(SbOrderGather(&out->cell, wide, fr->owned, fr->slice));
+
+  /* the rows of this rank; points of cells are numbered one cell behind the other */
+  PetscCall(PetscMalloc4(4 * out->tet.n, &corner, 4 * out->tet.n, &vertex,
+                         wide > 4 ? SB_CELL_NODES * out->cell.n : 0, &ten, out->tet.n, &parent));
+  for (PetscInt i = 0; i < out->cell.n; i++) {
+    const PetscReal *number = fr->slice + wide * i;
+    const int n = wide > 4 && number[4] >= 0. ? SB_CELL_NODES : 4, cut = out->split && out->split[i];
+    int32_t point[SB_CELL_NODES];
+
+    for (int a = 0; a < SB_CELL_NODES; a++)
+      point[a] = a >= n ? -1 : out->discontinuous ? first + a : (int32_t)number[a];
+    first += n;
+    for (int a = 0; a < SB_CELL_NODES && wide > 4; a++) ten[SB_CELL_NODES * i + a] = point[to_vtk[a]];
+    for (int k = 0; k < (cut ? 8 : 1); k++) {
+      for (int j = 0; j < 4; j++) {
+        const int a = cut ? child_corner((int)number[SB_CELL_NODES], k, j) : j;
+
+        corner[4 * t + j] = point[a];
+        vertex[4 * t + j] = (int32_t)number[a];
+      }
+      parent[t++] = (int32_t)(out->cell.start + i);
+    }
+  }
+  if (out->discontinuous)
+    PetscCall(
+      SbH5WriteSlice(&fr->h5, group, "vertices", "1", &out->tet, 4, H5T_STD_I32LE, H5T_NATIVE_INT32, vertex));
+  PetscCall(
+    SbH5WriteSlice(&fr->h5, group, "cells", "1", &out->tet, 4, H5T_STD_I32LE, H5T_NATIVE_INT32, corner));
+  if (wide > 4)
+    PetscCall(SbH5WriteSlice(&fr->h5, group, "cells10", "1", &out->cell, SB_CELL_NODES, H5T_STD_I32LE,
+                             H5T_NATIVE_INT32, ten));
+  if (wide > 4 && !out->quadratic)
+    PetscCall(
+      SbH5WriteSlice(&fr->h5, group, "parent", "1", &out->tet, 1, H5T_STD_I32LE, H5T_NATIVE_INT32, parent));
+  PetscCall(PetscFree4(corner, vertex, ten, parent));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Coordinates of the points and the four points of each cell. */
+/* Where the points are at rest. */
 static PetscErrorCode write_points(SbRun run, SbOutput out, hid_t group)
 {
   SbFrames fr = out->frames;
-  const SbMesh mesh = run->model->mesh;
-  const PetscReal *x = out->quadratic ? run->model->space->node_x : mesh->x;
 
   PetscFunctionBeginUser;
-  /* x: the vertices, or the corners of each cell, or vertices and then edges */
-  if (out->discontinuous) {
-    for (PetscInt i = 0; i < 12 * mesh->ncell_owned; i++)
-      fr->owned[i] = mesh->x[3 * mesh->cell[i / 3] + i % 3];
-    x = fr->owned;
-  }
-  PetscCall(SbOrderGather(&out->point, 3, x, fr->slice));
+  for (PetscInt i = 0; i < out->point.nowned; i++)
+    PetscCall(PetscArraycpy(fr->owned + 3 * i, SbPointsRest(run, out, i), 3));
+  PetscCall(gather(out, PETSC_FALSE, 3));
   PetscCall(
     SbH5WriteSlice(&fr->h5, group, "x", "m", &out->point, 3, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, fr->slice));
-
-  /* the vertices of each cell, and where points are corners the numbers of these */
-  for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++)
-    fr->owned[i] = (PetscReal)mesh->vert_orig[mesh->cell[i]];
-  PetscCall(write_whole(fr, group, out->discontinuous ? "vertices" : "cells", &out->cell, 4));
-  if (out->quadratic) PetscCall(write_quadratic_cells(run, out, group));
-  if (!out->discontinuous) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
-    for (PetscInt a = 0; a < 4; a++) fr->owned[4 * c + a] = (PetscReal)(4 * mesh->cell_orig[c] + a);
-  }
-  PetscCall(write_whole(fr, group, "cells", &out->cell, 4));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -128,20 +208,23 @@ static PetscErrorCode write_set(SbRun run, SbOutput out, PetscInt k, hid_t group
 {
   SbFrames fr = out->frames;
   const SbMesh mesh = run->model->mesh;
-  const uint64_t *set = out->quadratic ? run->model->space->node_set : mesh->vert_set;
   char name[SB_NAME_MAX + 8];
 
   PetscFunctionBeginUser;
   array_of_set("set", mesh->set[k].name, sizeof(name), name);
   if (H5Lexists(group, name, H5P_DEFAULT) > 0)
     PetscFunctionReturn(PETSC_SUCCESS); /* another set has this name: "fat tissue" and "fat_tissue" */
-  for (PetscInt i = 0; i < out->point.nowned; i++)
-    fr->owned[i] = (set[out->discontinuous ? mesh->cell[i] : i] & SB_SET_BIT(k)) != 0;
-  PetscCall(write_whole(fr, group, name, &out->point, 1));
+  for (PetscInt i = 0; i < out->point.nowned; i++) {
+    const SbPlace at = SbPointsPlace(run, out, i);
+
+    fr->owned[i] =
+      ((at.node < 0 ? mesh->vert_set[at.vertex] : run->model->space->node_set[at.node]) & SB_SET_BIT(k)) != 0;
+  }
+  PetscCall(write_whole(out, group, name, PETSC_FALSE));
   if (!mesh->set[k].ncell) PetscFunctionReturn(PETSC_SUCCESS);
   array_of_set("tets", mesh->set[k].name, sizeof(name), name);
   for (PetscInt c = 0; c < mesh->ncell_owned; c++) fr->owned[c] = (mesh->cell_set[c] & SB_SET_BIT(k)) != 0;
-  PetscCall(write_whole(fr, group, name, &out->cell, 1));
+  PetscCall(write_whole(out, group, name, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -159,8 +242,8 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
   if (H5Lexists(fr->h5.file, name, H5P_DEFAULT) > 0) (void)H5Ldelete(fr->h5.file, name, H5P_DEFAULT);
 
   /* room on disk for all of it, then points and cells */
-  PetscCall(SbH5Reserve(&fr->h5, (PetscInt64)out->point.N * 24 +
-                                   (PetscInt64)out->cell.N * (out->quadratic ? 80 : 40) + 65536));
+  PetscCall(SbH5Reserve(&fr->h5, (PetscInt64)out->point.N * 24 + (PetscInt64)out->tet.N * 40 +
+                                   (out->place ? (PetscInt64)out->cell.N * 40 : 0) + 65536));
   PetscCall(SbH5GroupCreate(&fr->h5, 8, 8, &group));
   PetscCall(SbH5PutInt(&fr->h5, group, "hash", (int64_t)out->mesh_hash));
 
@@ -171,6 +254,7 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
   PetscCall(SbH5PutText(&fr->h5, group, "bodies", names));
   PetscCall(PetscFree(names));
   PetscCall(write_points(run, out, group));
+  PetscCall(write_cells(run, out, group));
 
   /* fields that do not change in a run: numbers of bodies and ranks, sets */
   for (PetscInt i = 0; i < out->nfield; i++) {
@@ -178,11 +262,11 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
     PetscCall(PetscLogEventBegin(out->field_event[i], 0, 0, 0, 0));
     if (out->field[i]->compute) {
       PetscCall(out->field[i]->compute(out->field[i], run, NULL, fr->owned));
-      PetscCall(write_whole(fr, group, out->field[i]->name, &out->cell, 1));
+      PetscCall(write_whole(out, group, out->field[i]->name, PETSC_TRUE));
     } else {
       /* sets: one array each */
       PetscCall(SbH5Reserve(&fr->h5, (PetscInt64)run->model->mesh->nset *
-                                       (4 * ((PetscInt64)out->point.N + out->cell.N) + 8192)));
+                                       (4 * ((PetscInt64)out->point.N + out->tet.N) + 8192)));
       for (PetscInt k = 0; k < run->model->mesh->nset; k++) PetscCall(write_set(run, out, k, group));
     }
     PetscCall(PetscLogEventEnd(out->field_event[i], 0, 0, 0, 0));
@@ -200,12 +284,12 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
 static PetscErrorCode write_field(SbRun run, SbOutput out, const SbStep *step, const SbField *f, hid_t group)
 {
   SbFrames fr = out->frames;
-  const SbOrder *order = f->cell ? &out->cell : &out->point;
+  const SbOrder *order = f->cell ? &out->tet : &out->point;
   const PetscInt n = order->n * f->ncomp;
 
   PetscFunctionBeginUser;
   PetscCall(f->compute(f, run, step, fr->owned));
-  PetscCall(SbOrderGather(order, f->ncomp, fr->owned, fr->slice));
+  PetscCall(gather(out, f->cell, f->ncomp));
   if (out->precise) {
     PetscCall(SbH5WriteSlice(&fr->h5, group, f->name, f->unit, order, f->ncomp, H5T_IEEE_F64LE,
                              H5T_NATIVE_DOUBLE, fr->slice));
@@ -242,7 +326,7 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   PetscCall(SbContactsFind(run, out, step, &room));
   room += 65536 + 8192 * out->nfield;
   for (PetscInt i = 0; i < out->nfield; i++)
-    room += (PetscInt64)(out->field[i]->cell ? out->cell.N : out->point.N) * out->field[i]->ncomp *
+    room += (PetscInt64)(out->field[i]->cell ? out->tet.N : out->point.N) * out->field[i]->ncomp *
             (out->precise ? 8 : 4);
   PetscCall(SbH5Reserve(&fr->h5, room));
 
@@ -495,7 +579,7 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
 {
   SbH5 h;
   char path[PETSC_MAX_PATH_LEN];
-  PetscBool ok, corners, edges;
+  PetscBool ok, corners, edges, linear;
 
   PetscFunctionBeginUser;
   if (!out->nfield) PetscFunctionReturn(PETSC_SUCCESS);
@@ -505,7 +589,8 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
   if (!ok) PetscFunctionReturn(PETSC_SUCCESS);
   (void)find_mesh(run, out, h.file, &ok);
   corners = (PetscBool)(ok && H5Lexists(h.file, "mesh/vertices", H5P_DEFAULT) > 0);
-  edges = (PetscBool)(ok && H5Lexists(h.file, "mesh/cells10", H5P_DEFAULT) > 0);
+  linear = (PetscBool)(ok && H5Lexists(h.file, "mesh/parent", H5P_DEFAULT) > 0);
+  edges = (PetscBool)(ok && !linear && H5Lexists(h.file, "mesh/cells10", H5P_DEFAULT) > 0);
   PetscCall(SbH5Close(&h));
   /* a file of another mesh is replaced, one of this mesh continued */
   PetscCheck(!ok || corners == out->discontinuous, out->comm, PETSC_ERR_USER_INPUT,
@@ -513,10 +598,10 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
              "or give another -output_dir",
              out->discontinuous ? "true" : "false", path, corners ? "true" : "false");
   PetscCheck(
-    !ok || edges == out->quadratic, out->comm, PETSC_ERR_USER_INPUT,
-    "-output_quadratic is %s, but the frames in %s were written with %s: go on with the same, or give "
-    "another -output_dir",
-    out->quadratic ? "true" : "false", path, edges ? "true" : "false");
+    !ok || (edges == out->quadratic && linear == (out->place && !edges)), out->comm, PETSC_ERR_USER_INPUT,
+    "-output_quadratic is %s, but the frames in %s have tets of p2 otherwise: go on with the same, or "
+    "give another -output_dir",
+    out->quadratic ? "true" : "false", path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -526,11 +611,15 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
 static PetscErrorCode allocate(SbRun run, SbOutput out)
 {
   SbFrames fr = out->frames;
-  const PetscInt most = out->quadratic ? SB_CELL_NODES : 6; /* numbers of a cell */
-  const PetscInt nowned = PetscMax(3 * out->point.nowned, most * out->cell.nowned);
-  const PetscInt nslice = PetscMax(3 * out->point.n, most * out->cell.n);
+  PetscInt most = 1, wide = out->place ? SB_CELL_NODES + 1 : 4; /* numbers of a field's cell, of the mesh's */
+  PetscInt nowned, nslice;
 
   PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < out->nfield; i++)
+    if (out->field[i]->cell) most = PetscMax(most, out->field[i]->ncomp);
+  wide = PetscMax(wide, most);
+  nowned = PetscMax(3 * out->point.nowned, wide * out->cell.nowned);
+  nslice = PetscMax(PetscMax(3 * out->point.n, wide * out->cell.n), most * out->tet.n);
   PetscCall(PetscMalloc1(nowned, &fr->owned));
   PetscCall(PetscMalloc1(nslice, &fr->slice));
   if (!out->precise) PetscCall(PetscMalloc((size_t)nslice * sizeof(float), &fr->packed));

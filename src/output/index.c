@@ -97,7 +97,7 @@ typedef struct {
   PetscErrorCode ierr;
 } List;
 
-/* An array that belongs to the mesh; `vertices` is ours alone. */
+/* An array that belongs to the mesh; `vertices` is ours alone, as are `cells10` beside linear tets. */
 static herr_t list_array(hid_t where, const char *name, const H5L_info_t *info, void *ctx)
 {
   List *l = (List *)ctx;
@@ -105,7 +105,8 @@ static herr_t list_array(hid_t where, const char *name, const H5L_info_t *info, 
   SbArray a = {.ncomp = 1, .bytes = 4, .whole = PETSC_TRUE, .cell = PETSC_TRUE, .constant = PETSC_TRUE};
 
   (void)where, (void)info;
-  if (!strcmp(name, "vertices") || !strcmp(name, "x") || (!strcmp(name, "cells") && x->corners > 4)) return 0;
+  if (!strcmp(name, "vertices") || !strcmp(name, "x") || !strcmp(name, x->corners > 4 ? "cells" : "cells10"))
+    return 0;
   SbFormat(sizeof(a.name), a.name, "%s", !strcmp(name, "cells10") ? "cells" : name);
   a.cell = (PetscBool)(strncmp(name, "set_", 4) != 0);
   if (!strcmp(a.name, "cells")) a.ncomp = (int)x->corners;
@@ -121,7 +122,10 @@ PetscErrorCode SbIndexSetMesh(SbIndex x, hid_t file, const char *name)
 
   PetscFunctionBeginUser;
   SbFormat(sizeof(group), group, "/%s", name);
-  x->corners = mesh >= 0 && H5Lexists(mesh, "cells10", H5P_DEFAULT) > 0 ? 10 : 4;
+  x->corners =
+    mesh >= 0 && H5Lexists(mesh, "cells10", H5P_DEFAULT) > 0 && H5Lexists(mesh, "parent", H5P_DEFAULT) <= 0
+      ? 10
+      : 4;
   PetscCall(add_part(x, (PetscInt)SbH5Rows(mesh, "x"), (PetscInt)SbH5Rows(mesh, "cells"), group));
   if (mesh >= 0) (void)H5Literate(mesh, H5_INDEX_NAME, H5_ITER_INC, NULL, list_array, &list);
   if (mesh >= 0) (void)H5Gclose(mesh);

@@ -24,6 +24,75 @@ uint64_t SbMixReal(uint64_t position, PetscReal value)
   return mix(position ^ mix(bits));
 }
 
+/* Points and tets where a body is of P2: nodes at edges are points, too, and its cells are eight tets each, but for -output_quadratic. */
+static PetscErrorCode order_quadratic(SbRun run, SbOutput out)
+{
+  const SbMesh mesh = run->model->mesh;
+  const SbSpace s = run->model->space;
+  const PetscInt first = mesh->Nvert + 8 * mesh->Ncell; /* of the numbers of nodes at edges */
+  PetscInt *key, *node, nedge = 0, n = 0, size = SB_CELL_NODES * mesh->ncell_owned, before, all;
+  PetscReal *number, *owned, *slice;
+  SbOrder edges;
+
+  PetscFunctionBeginUser;
+  /* numbers of the nodes at edges, behind those of the vertices; ghosts have them, too */
+  if (!out->discontinuous) size = mesh->nvert_owned + s->nnode_owned;
+  PetscCall(PetscMalloc2(PetscMax(size, s->nnode_owned), &key, s->nnode_owned, &node));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    if (s->node_orig[i] < first) continue;
+    node[nedge] = i;
+    key[nedge++] = s->node_orig[i] - first;
+  }
+  PetscCall(SbOrderCreateSparse(out->comm, 6 * mesh->Ncell, nedge, key, &edges));
+  PetscCall(PetscMalloc2(PetscMax(nedge, mesh->ncell_owned), &owned, PetscMax(edges.n, out->cell.n), &slice));
+  for (PetscInt i = 0; i < edges.n; i++) slice[i] = (PetscReal)(mesh->Nvert + edges.start + i);
+  PetscCall(SbOrderScatter(&edges, 1, slice, owned));
+  PetscCall(PetscCalloc1(3 * s->nnode, &number));
+  for (PetscInt i = 0; i < nedge; i++) number[3 * node[i]] = owned[i];
+  PetscCall(SbSpaceUpdateGhosts(s, number));
+  PetscCall(PetscMalloc1(s->nnode, &out->edge_number));
+  for (PetscInt i = 0; i < s->nnode; i++) out->edge_number[i] = (PetscInt)number[3 * i];
+  PetscCall(PetscFree(number));
+
+  /* the points: each cell's own ones, or the vertices and then these nodes */
+  PetscCall(PetscMalloc1(size, &out->place));
+  if (out->discontinuous) {
+    for (PetscInt i = 0; i < size; i++) {
+      const PetscInt cell = i / SB_CELL_NODES, a = i % SB_CELL_NODES;
+
+      if (a >= 4 && SbSpaceCellNode(s, cell, a) < 0) continue;
+      out->place[n] = i;
+      key[n++] = SB_CELL_NODES * mesh->cell_orig[cell] + a;
+    }
+    PetscCall(SbOrderCreateSparse(out->comm, SB_CELL_NODES * mesh->Ncell, n, key, &out->point));
+  } else {
+    for (n = 0; n < mesh->nvert_owned + nedge; n++) {
+      const PetscInt edge = n - mesh->nvert_owned;
+
+      out->place[n] = edge < 0 ? n : node[edge];
+      key[n] = edge < 0 ? mesh->vert_orig[n] : out->edge_number[node[edge]];
+    }
+    PetscCall(SbOrderCreate(out->comm, mesh->Nvert + edges.N, n, key, &out->point));
+  }
+
+  /* the cells that are cut, and where their tets begin */
+  PetscCall(PetscCalloc1(out->cell.n, &out->split));
+  for (PetscInt c = 0; c < mesh->ncell_owned; c++)
+    owned[c] = !out->quadratic && SbSpaceCellNode(s, c, 4) >= 0;
+  PetscCall(SbOrderGather(&out->cell, 1, owned, slice));
+  n = 0;
+  for (PetscInt i = 0; i < out->cell.n; i++) n += out->split[i] = slice[i] > 0.;
+  PetscCallMPI(MPI_Scan(&n, &before, 1, MPIU_INT, MPI_SUM, out->comm));
+  PetscCallMPI(MPI_Allreduce(&n, &all, 1, MPIU_INT, MPI_SUM, out->comm));
+  out->tet.N += 7 * all;
+  out->tet.n += 7 * n;
+  out->tet.start += 7 * (before - n);
+  PetscCall(PetscFree2(key, node));
+  PetscCall(PetscFree2(owned, slice));
+  PetscCall(SbOrderDestroy(&edges));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbOutputOrder(SbRun run, SbOutput out)
 {
   const SbMesh mesh = run->model->mesh;
@@ -41,10 +110,11 @@ PetscErrorCode SbOutputOrder(SbRun run, SbOutput out)
   } else {
     PetscCall(SbOrderRepeat(&out->vertex, 1, &out->node));
   }
-  if (out->discontinuous)
+  PetscCall(SbOrderRepeat(&out->cell, 1, &out->tet));
+  if (space->edge_node)
+    PetscCall(order_quadratic(run, out));
+  else if (out->discontinuous)
     PetscCall(SbOrderRepeat(&out->cell, 4, &out->point));
-  else if (out->quadratic)
-    PetscCall(SbOrderRepeat(&out->node, 1, &out->point));
   else
     PetscCall(SbOrderRepeat(&out->vertex, 1, &out->point));
 
@@ -84,8 +154,12 @@ PetscErrorCode SbOutputForgetMesh(SbOutput out)
     PetscCall(SbOrderDestroy(&out->cell));
     PetscCall(SbOrderDestroy(&out->node));
     PetscCall(SbOrderDestroy(&out->point));
+    PetscCall(SbOrderDestroy(&out->tet));
   }
   out->ordered = PETSC_FALSE;
+  PetscCall(PetscFree(out->split));
+  PetscCall(PetscFree(out->edge_number));
+  PetscCall(PetscFree(out->place));
   PetscCall(PetscFree(out->sigma));
   PetscCall(PetscFree(out->J));
   PetscCall(PetscFree(out->psi));

@@ -25,8 +25,8 @@ static const SbOption rows[] = {
    "each tet in fields.h5 has its own four points, so that cr and dg are discontinuous as computed; if not, "
    "values are averaged at the vertices"},
   {"output_quadratic", SB_OPTION_BOOL, 1, "", "false", "",
-   "where all bodies are of p2: fields.h5 has all their nodes, and viewers show quadratic tets; if not, the "
-   "vertices only"},
+   "where all bodies are of p2: viewers show quadratic tets; if not, each is eight linear ones over its ten "
+   "nodes"},
   {"output_contacts", SB_OPTION_BOOL, 1, "", "false", "",
    "contacts.vtkhdf, contacts.xmf: the active contact points of each frame, with normals, gaps and forces"},
   {"output_history", SB_OPTION_BOOL, 1, "", "true", "", "write history.csv"},

@@ -110,10 +110,11 @@ typedef enum { SB_PROBE_POINT, SB_PROBE_FACETS, SB_PROBE_TETS } SbProbeKind;
 typedef struct {
   char name[SB_NAME_MAX];
   PetscReal at[3]; /* asked for, m */
-  PetscReal x[3];  /* the material point that it follows: the nearest vertex of the first mesh, at rest, m */
-  PetscBool found; /* x and body are known */
-  PetscInt body;   /* that x belongs to */
-  PetscInt original; /* number of that vertex, -1: it is gone */
+  PetscReal x
+    [3]; /* the material point that it follows: the nearest vertex, or node of P2, of the first mesh, at rest, m */
+  PetscBool found;   /* x and body are known */
+  PetscInt body;     /* that x belongs to */
+  PetscInt original; /* number of that vertex or node, -1: it is gone */
   PetscInt local;    /* owned local vertex at x, or -1: on the other ranks, and where there is none */
   SbProbeKind kind;
   char set[SB_NAME_MAX]; /* of a mean over facets or tets */
@@ -148,7 +149,7 @@ struct _p_SbOutput {
   PetscInt every_steps;
   PetscBool precise;        /* double instead of float */
   PetscBool discontinuous;  /* each cell has four points of its own */
-  PetscBool quadratic;      /* points are the nodes of P2, cells have ten */
+  PetscBool quadratic;      /* tets of P2 are not cut into linear ones */
   PetscBool contact_points; /* where contact pushes, in each frame */
   PetscBool history, history_bodies;
   PetscInt history_every;
@@ -165,9 +166,15 @@ struct _p_SbOutput {
     PetscLogEvent fields, contacts, history, probes, checkpoint, progress;
   } event; /* SbOut_<name>, of those that the scenario asks for */
   SbOrder vertex, cell;
-  SbOrder node;         /* the unknowns: that of the vertices when no body has its nodes at faces */
-  SbOrder point;        /* of vertex fields: vertices, corners 4 cell + a, or nodes of P2 */
-  PetscBool ordered;    /* the four exist */
+  SbOrder node;     /* the unknowns: that of the vertices when no body has its nodes at faces */
+  SbOrder point;    /* of vertex fields: vertices and then P2's nodes at edges, or each cell's own points */
+  SbOrder tet;      /* of the tets that points are the corners of: slices only, see split */
+  PetscBool *split; /* [cell.n] cells of the slice that are eight of these; NULL: none */
+  PetscInt
+    *edge_number; /* [nnode] the point at a node at an edge, as if cells shared theirs; NULL without P2 */
+  PetscInt *
+    place; /* [point.nowned] 10 cell + a with -output_discontinuous; else the node at an edge behind the vertices; NULL without P2 */
+  PetscBool ordered;    /* the five exist */
   PetscBool attached;   /* run.json exists */
   PetscInt *body_nodes; /* [nbody] nodes of each body, supports of faces among them */
   uint64_t mesh_hash;
@@ -222,7 +229,14 @@ PetscBool SbFieldIsProbed(const SbField *field);
 PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out);       /* not collective */
 PetscErrorCode SbPointsPrepareForces(SbRun run, SbOutput out); /* for SbPointsForces(). Collective */
 PetscErrorCode SbPointsDestroy(SbOutput out);
-/* values[out->point.nowned][3] of a vector of the space: nodal values of P1, means of the cells around, or each cell's own. Collective. */
+/* Where an owned point is: at a vertex, or at an edge of P2 (vertex -1), where there is a node; of a cell (4 cell + a of the vertex), if it is that cell's alone. */
+typedef struct {
+  PetscInt vertex, node, corner;
+} SbPlace;
+SbPlace SbPointsPlace(SbRun run, SbOutput out, PetscInt point);
+/* Position at rest, m. */
+const PetscReal *SbPointsRest(SbRun run, SbOutput out, PetscInt point);
+/* values[out->point.nowned][3] of a vector of the space: nodal values of P1 and P2, means of the cells around, or each cell's own. Collective. */
 PetscErrorCode SbPointsValues(SbRun run, SbOutput out, Vec x, PetscReal values[]);
 /* The same for forces at nodes, or at their prescribed unknowns only: resultant and moment of the nodal forces are kept. Collective. */
 PetscErrorCode SbPointsForces(SbRun run, SbOutput out, PetscBool prescribed, Vec R, PetscReal values[]);

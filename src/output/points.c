@@ -8,7 +8,7 @@
 
   A nodal force of CR or DG acts at the centroid of a face. One third of it goes to each vertex of the face, which keeps its
   resultant and its moment. Where a node belongs to several cells and these have points of their own, each has an equal part.
-  Half of a force at an edge of P2 goes to each of its ends. What a DG cell does to the support of a face is a force of that face, too.
+  What a DG cell does to the support of a face is a force of that face, too. P2 has points at its nodes, with the values there.
 */
 #include "output_impl.h"
 
@@ -81,6 +81,38 @@ PetscErrorCode SbPointsDestroy(SbOutput out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* ------------------------------------------------------------------ places */
+
+SbPlace SbPointsPlace(SbRun run, SbOutput out, PetscInt i)
+{
+  const SbMesh mesh = run->model->mesh;
+  const PetscInt place = out->place           ? out->place[i]
+                         : out->discontinuous ? SB_CELL_NODES * (i / 4) + i % 4
+                                              : i;
+  SbPlace p = {.vertex = place, .node = -1, .corner = -1};
+
+  if (out->discontinuous) {
+    const PetscInt cell = place / SB_CELL_NODES, a = place % SB_CELL_NODES;
+
+    if (a < 4)
+      p.corner = 4 * cell + a;
+    else
+      p.node = SbSpaceCellNode(run->model->space, cell, a);
+    p.vertex = a < 4 ? mesh->cell[4 * cell + a] : -1;
+  } else if (i >= mesh->nvert_owned) {
+    p.node = place;
+    p.vertex = -1;
+  }
+  return p;
+}
+
+const PetscReal *SbPointsRest(SbRun run, SbOutput out, PetscInt i)
+{
+  const SbPlace p = SbPointsPlace(run, out, i);
+
+  return p.node < 0 ? run->model->mesh->x + 3 * p.vertex : run->model->space->node_x + 3 * p.node;
+}
+
 /* ------------------------------------------------------------------ values */
 
 /* x at a corner of a cell, as the cell has it; corner = 4 cell + a. */
@@ -133,17 +165,22 @@ PetscErrorCode SbPointsValues(SbRun run, SbOutput out, Vec x, PetscReal values[]
   const PetscReal *array;
 
   PetscFunctionBeginUser;
-  if (out->quadratic || (s->vertices && !out->discontinuous)) {
+  if (s->vertices && !out->discontinuous) {
     PetscCall(VecGetArrayRead(x, &array));
     PetscCall(PetscArraycpy(values, array, 3 * out->point.nowned));
     PetscCall(VecRestoreArrayRead(x, &array));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(SbSpaceGetLocalRead(s, x, &array));
-  if (out->discontinuous) {
-    for (PetscInt i = 0; i < 4 * s->mesh->ncell_owned; i++) corner_value(s, i, array, values + 3 * i);
-  } else {
-    for (PetscInt v = 0; v < s->mesh->nvert_owned; v++) SbPointsVertex(run, out, v, array, values + 3 * v);
+  for (PetscInt i = 0; i < out->point.nowned; i++) {
+    const SbPlace p = SbPointsPlace(run, out, i);
+
+    if (p.node >= 0)
+      PetscCall(PetscArraycpy(values + 3 * i, array + 3 * p.node, 3));
+    else if (p.corner >= 0)
+      corner_value(s, p.corner, array, values + 3 * i);
+    else
+      SbPointsVertex(run, out, p.vertex, array, values + 3 * i);
   }
   PetscCall(SbSpaceRestoreLocalRead(s, x, &array));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -174,12 +211,6 @@ static void add_corner_force(const Forces *f, const PetscReal valence[], PetscIn
 
   if (SbSpaceCellElement(s, corner / 4)->nodes_per[0]) {
     add_force(f, node[corner % 4], 1. / valence[node[corner % 4]], value);
-    for (int e = 0; s->edge_node && e < 6; e++) {
-      const PetscInt at = s->edge_node[6 * (corner / 4) + e];
-
-      if (at >= 0 && (SbTetEdge[e][0] == corner % 4 || SbTetEdge[e][1] == corner % 4))
-        add_force(f, at, 0.5 / valence[at], value);
-    }
   } else {
     // node a lies opposite vertex a: this corner belongs to the faces of the others
     for (int a = 0; a < 4; a++) {
@@ -203,16 +234,15 @@ PetscErrorCode SbPointsForces(SbRun run, SbOutput out, PetscBool prescribed, Vec
   PetscCall(PetscArrayzero(values, 3 * n));
   PetscCall(SbSpaceGetLocalRead(s, R, &f.r));
   for (PetscInt i = 0; i < n; i++) {
-    const PetscInt corner = s->vertices || out->discontinuous || out->quadratic ? 0 : p->corner[p->start[i]];
-    const PetscBool edges = (PetscBool)(s->edge_node && s->edge_node[6 * (corner / 4)] >= 0);
-    const PetscInt node = out->quadratic ? i : out->discontinuous || edges ? -1 : vertex_node(s, p, i);
+    const SbPlace at = SbPointsPlace(run, out, i);
+    const PetscInt node = at.vertex < 0 ? at.node : at.corner < 0 ? vertex_node(s, p, at.vertex) : -1;
 
-    if (out->discontinuous) {
-      add_corner_force(&f, p->valence, i, values + 3 * i);
+    if (at.corner >= 0) {
+      add_corner_force(&f, p->valence, at.corner, values + 3 * i);
     } else if (node >= 0) {
-      add_force(&f, node, 1., values + 3 * i);
+      add_force(&f, node, out->discontinuous ? 1. / p->valence[node] : 1., values + 3 * i);
     } else {
-      for (PetscInt k = p->start[i]; k < p->start[i + 1]; k++)
+      for (PetscInt k = p->start[at.vertex]; k < p->start[at.vertex + 1]; k++)
         add_corner_force(&f, p->valence, p->corner[k], values + 3 * i);
     }
   }

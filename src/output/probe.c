@@ -2,7 +2,7 @@
   Probes: what history.csv follows at a point, or as a mean over facets or tets. Each is a list of nodes with weights for vectors,
   sum_i w_i x_i, and one of tets with weights for what tets have.
 
-  At a point: the vertex nearest to it in the rest state; of equally near ones that with the smallest original number. Vectors are what vertex fields show there: the
+  At a point: the vertex, or node of P2, nearest to it in the rest state; of equally near ones that with the smallest original number. Vectors are what vertex fields show there: the
   unknown of P1 and P2, the mean of the cells around it for CR and DG; quantities of tets are means over the tets around it, by volume. On a set: the mean over its boundary facets,
   by area at rest; in a set: over its tets, by volume at rest. Both integrate the basis functions, so they are exact for each element; a facet has what its tet has.
 
@@ -19,7 +19,7 @@
 static const SbOption rows[] = {
   {"at", SB_OPTION_REALS, 3, "m", NULL, "(-inf, inf)",
    "position of the probe in the reference configuration (after scale, rotate, translate); the nearest "
-   "vertex is taken"},
+   "vertex is taken, of p2 also the middle of an edge"},
   {"on", SB_OPTION_STRING, 1, "", "", "",
    "instead of a position: mean over the boundary facets of this set (of -sets, a physical group, a body, "
    "boundary), weighted by reference area"},
@@ -156,19 +156,34 @@ PetscErrorCode SbProbesColumn(SbOutput out, PetscInt c, size_t size, char name[]
 
 /* ------------------------------------------------------------------ where they are */
 
-/* The nearest vertex that this rank owns, of a body unless that is -1: squared distance, local number (-1 when it owns none). */
-static void nearest_owned(const SbMesh mesh, PetscInt body, const PetscReal at[3], PetscReal *best,
-                          PetscInt *local)
+/* Numbers of nodes at edges, SbSpace.node_orig, begin here. */
+static PetscInt first_edge(const SbSpace s)
 {
+  return s->mesh->Nvert + 8 * s->mesh->Ncell;
+}
+
+/*
+  The nearest vertex or node at an edge that this rank owns, of a body unless that is -1: squared distance, original number, local number: of a vertex, or nvert_owned behind that of a node (-1 when it
+  owns none).
+*/
+static void nearest_owned(const SbSpace s, PetscInt body, const PetscReal at[3], PetscReal *best,
+                          PetscInt *original, PetscInt *local)
+{
+  const SbMesh mesh = s->mesh;
+
   *best = PETSC_MAX_REAL;
-  *local = -1;
-  for (PetscInt i = 0; i < mesh->nvert_owned; i++) {
-    const PetscReal *x = mesh->x + 3 * i;
+  *local = *original = -1;
+  for (PetscInt i = 0; i < mesh->nvert_owned + (s->edge_node ? s->nnode_owned : 0); i++) {
+    const PetscInt node = i - mesh->nvert_owned;
+    const PetscInt number = node < 0 ? mesh->vert_orig[i] : s->node_orig[node];
+    const PetscReal *x = node < 0 ? mesh->x + 3 * i : s->node_x + 3 * node;
     const PetscReal d2 = PetscSqr(x[0] - at[0]) + PetscSqr(x[1] - at[1]) + PetscSqr(x[2] - at[2]);
 
-    if (body >= 0 && mesh->vert_body[i] != body) continue;
-    if (d2 < *best || (d2 == *best && *local >= 0 && mesh->vert_orig[i] < mesh->vert_orig[*local])) {
+    if (node >= 0 && number < first_edge(s)) continue;
+    if (body >= 0 && (node < 0 ? mesh->vert_body[i] : s->node_body[node]) != body) continue;
+    if (d2 < *best || (d2 == *best && number < *original)) {
       *best = d2;
+      *original = number;
       *local = i;
     }
   }
@@ -280,17 +295,16 @@ static PetscErrorCode sum_set(SbRun run, SbProbe *probe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Another mesh: the vertex at the position that it followed, or the tet around it. */
+/* Another mesh: the vertex or node at the position that it followed, or the tet around it. */
 static PetscErrorCode find_again(const SbSpace s, SbOutput out, SbProbe *probe)
 {
   const SbMesh mesh = s->mesh;
   PetscReal mine, best, L[4] = {0., 0., 0., 0.}, Q[SB_CELL_NODES];
-  PetscInt cell, tet;
+  PetscInt cell, tet, original;
 
   PetscFunctionBeginUser;
-  nearest_owned(mesh, probe->body, probe->x, &mine, &probe->local);
-  PetscCall(agree(out, mine, probe->local < 0 ? 0 : mesh->vert_orig[probe->local], &probe->local,
-                  &probe->original, &best));
+  nearest_owned(s, probe->body, probe->x, &mine, &original, &probe->local);
+  PetscCall(agree(out, mine, original, &probe->local, &probe->original, &best));
   if (best == 0.) PetscFunctionReturn(PETSC_SUCCESS);
   probe->local = probe->original = -1;
   mine = deepest_owned(mesh, probe, &cell, L);
@@ -315,18 +329,20 @@ static PetscErrorCode find_again(const SbSpace s, SbOutput out, SbProbe *probe)
 }
 
 /* The first time: where it goes. */
-static PetscErrorCode find_first(const SbMesh mesh, SbOutput out, SbProbe *probe)
+static PetscErrorCode find_first(const SbSpace s, SbOutput out, SbProbe *probe)
 {
+  const SbMesh mesh = s->mesh;
   PetscReal mine, best, here[3] = {0., 0., 0.};
-  PetscInt body = -1;
+  PetscInt body = -1, original;
 
   PetscFunctionBeginUser;
-  nearest_owned(mesh, -1, probe->at, &mine, &probe->local);
-  PetscCall(agree(out, mine, probe->local < 0 ? 0 : mesh->vert_orig[probe->local], &probe->local,
-                  &probe->original, &best));
+  nearest_owned(s, -1, probe->at, &mine, &original, &probe->local);
+  PetscCall(agree(out, mine, original, &probe->local, &probe->original, &best));
   if (probe->local >= 0) {
-    PetscCall(PetscArraycpy(here, mesh->x + 3 * probe->local, 3));
-    body = mesh->vert_body[probe->local];
+    const PetscInt node = probe->local - mesh->nvert_owned;
+
+    PetscCall(PetscArraycpy(here, node < 0 ? mesh->x + 3 * probe->local : s->node_x + 3 * node, 3));
+    body = node < 0 ? mesh->vert_body[probe->local] : s->node_body[node];
   }
   PetscCallMPI(MPI_Allreduce(here, probe->x, 3, MPIU_REAL, MPI_SUM, out->comm));
   PetscCallMPI(MPI_Allreduce(&body, &probe->body, 1, MPIU_INT, MPI_MAX, out->comm));
@@ -355,22 +371,36 @@ PetscErrorCode SbProbesFind(SbRun run, SbOutput out)
     else if (probe->found)
       PetscCall(find_again(s, out, probe));
     else
-      PetscCall(find_first(s->mesh, out, probe));
+      PetscCall(find_first(s, out, probe));
+    /* a node at an edge is one of a sum */
+    if (probe->local >= s->mesh->nvert_owned) {
+      PetscCall(PetscMalloc2(1, &probe->node, 1, &probe->weight));
+      probe->nnode = 1;
+      probe->node[0] = probe->local - s->mesh->nvert_owned;
+      probe->weight[0] = 1.;
+    }
     if (cells && probe->kind == SB_PROBE_POINT && probe->original >= 0) {
-      PetscInt vertex = probe->local < 0 ? -1 : s->mesh->gvert[probe->local], n = 0;
+      const PetscInt per = probe->original < first_edge(s) ? 4 : 6;
+      PetscInt here = probe->nnode ? s->gnode[probe->node[0]] : -1, n = 0;
       PetscReal total = 0.;
 
-      /* The tets around the vertex of a probe, by volume; the lowest numbers first. */
-      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &vertex, 1, MPIU_INT, MPI_MAX, s->mesh->comm));
+      /* The tets around the vertex or node of a probe, by volume; the lowest numbers first. */
+      if (probe->local >= 0 && per == 4) here = s->mesh->gvert[probe->local];
+      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &here, 1, MPIU_INT, MPI_MAX, s->mesh->comm));
       for (int pass = 0; pass < 2; pass++) {
-        for (PetscInt i = 0; i < 4 * s->mesh->ncell_owned; i++) {
-          if (s->mesh->gvert[s->mesh->cell[i]] != vertex) continue;
+        for (PetscInt i = 0; i < per * s->mesh->ncell_owned; i++) {
+          const PetscInt *vert = s->mesh->cell + 4 * (i / per);
+
+          if ((per == 4              ? s->mesh->gvert[s->mesh->cell[i]]
+               : s->edge_node[i] < 0 ? -1
+                                     : s->gnode[s->edge_node[i]]) != here)
+            continue;
           if (!pass) {
             n++;
             continue;
           }
-          probe->cell[probe->ncell] = i / 4;
-          probe->cell_weight[probe->ncell] = SbTetDeterminant(s->mesh->x, s->mesh->cell + 4 * (i / 4)) / 6.;
+          probe->cell[probe->ncell] = i / per;
+          probe->cell_weight[probe->ncell] = SbTetDeterminant(s->mesh->x, vert) / 6.;
           total += probe->cell_weight[probe->ncell++];
         }
         if (!pass) PetscCall(PetscMalloc2(n, &probe->cell, n, &probe->cell_weight));
@@ -378,6 +408,7 @@ PetscErrorCode SbProbesFind(SbRun run, SbOutput out)
       PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_REAL, MPI_SUM, s->mesh->comm));
       for (PetscInt i = 0; i < n; i++) probe->cell_weight[i] /= total;
     }
+    if (probe->nnode) probe->local = -1;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -172,7 +172,10 @@ PetscErrorCode SbReportHeader(SbRun run)
                       probe->kind == SB_PROBE_FACETS ? "facets" : "tets", probe->set));
       continue;
     }
-    if (probe->original >= 0) (void)snprintf(where, sizeof(where), "vertex %lld", (long long)probe->original);
+    if (probe->original >= run->model->mesh->Nvert)
+      (void)snprintf(where, sizeof(where), "the node of an edge");
+    else if (probe->original >= 0)
+      (void)snprintf(where, sizeof(where), "vertex %lld", (long long)probe->original);
     PetscCall(entry("probe", "%s at %s (%g, %g, %g) m, %.3g m from the position asked for", probe->name,
                     where, (double)probe->x[0], (double)probe->x[1], (double)probe->x[2],
                     (double)PetscSqrtReal(PetscSqr(probe->x[0] - probe->at[0]) +

@@ -2,7 +2,7 @@
   A body begins where another run has brought it: -body_<name>_state RUN[,STEP] or CHECKPOINT.
 
   Displacement and velocity are those of a frame of that run's fields.h5, evaluated at the nodes of this run: u(X) = sum_a w_a u_a with the weights of the tet that holds the place X at
-  rest there, or of the nearest one; of a run with -output_quadratic they are the ten of P2. So element, mesh, material, effects and integrator may be others; where nodes are the vertices of that run, values are those of the file. Every rank
+  rest there, or of the nearest one; in a tet of P2 they are its ten. So element, mesh, material, effects and integrator may be others; where nodes are the vertices of that run, values are those of the file. Every rank
   reads the body's part of the file. A checkpoint has no mesh, but all digits of all unknowns: for scenes with the same meshes and elements, whatever else is different there; others take the frame of its step.
 */
 #include <sys/stat.h>
@@ -20,7 +20,8 @@ typedef struct {
   PetscInt npoint, ncell;
   PetscReal *x, *u, *v; /* [npoint][3] at rest, m; displacement, m; velocity, m/s, NULL: the frame has none */
   PetscInt *cell;       /* [ncell][4] those of the body */
-  PetscInt *cell10;     /* [ncell][10] with the middles of the edges 01 12 02 03 13 23; or NULL */
+  PetscInt
+    *cell10; /* [ncell][10] with the nodes at the edges 01 12 02 03 13 23, -1: none; or NULL without P2 */
 } Other;
 
 /* A whole dataset as numbers of `type`, [n] or [n][ncomp]; NULL when it is not there. PetscFree. */
@@ -41,7 +42,7 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
   char name[32] = "mesh", *comma, *names, *rest;
   struct stat info;
   SbH5Frames frames = {.wanted = -1};
-  PetscInt which = -1, n = 0, nu, *cell_body;
+  PetscInt which = -1, n = 0, nu, nparent = 0, *cell_body, *parent = NULL;
   int64_t mesh = 0;
   PetscBool ok = PETSC_TRUE;
 
@@ -85,9 +86,17 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
              text, o->path, body->name);
   PetscCall(read_all(o->mesh, "x", H5T_NATIVE_DOUBLE, sizeof(double), 3, &o->npoint, &o->x));
   PetscCall(read_all(o->mesh, "cells", SB_H5_INT, sizeof(PetscInt), 4, &o->ncell, &o->cell));
+  PetscCall(read_all(o->mesh, "body", SB_H5_INT, sizeof(PetscInt), 1, &n, &cell_body));
+  /* tets that are parts of others, and these with the corners that come first */
   if (H5Lexists(o->mesh, "cells10", H5P_DEFAULT) > 0)
     PetscCall(read_all(o->mesh, "cells10", SB_H5_INT, sizeof(PetscInt), 10, &n, &o->cell10));
-  PetscCall(read_all(o->mesh, "body", SB_H5_INT, sizeof(PetscInt), 1, &n, &cell_body));
+  if (H5Lexists(o->mesh, "parent", H5P_DEFAULT) > 0)
+    PetscCall(read_all(o->mesh, "parent", SB_H5_INT, sizeof(PetscInt), 1, &nparent, &parent));
+  for (PetscInt i = 0; i < nparent && cell_body; i++) cell_body[parent[i]] = cell_body[i];
+  if (o->cell10) o->ncell = n;
+  for (PetscInt c = 0; c < o->ncell && o->cell10 && o->cell; c++)
+    PetscCall(PetscArraycpy(o->cell + 4 * c, o->cell10 + 10 * c, 4));
+  PetscCall(PetscFree(parent));
   PetscCall(read_all(o->frame, "displacement", H5T_NATIVE_DOUBLE, sizeof(double), 3, &nu, &o->u));
   PetscCall(read_all(o->frame, "velocity", H5T_NATIVE_DOUBLE, sizeof(double), 3, &n, &o->v));
   PetscCheck(o->x && o->cell && o->u && nu == o->npoint && (!o->v || n == nu), PETSC_COMM_SELF,
@@ -143,12 +152,12 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
 
   PetscFunctionBeginUser;
   // where the nodes at edges of that run are off their middles, at rest
-  if (o->cell10) PetscCall(PetscMalloc1(18 * (size_t)o->ncell, &off));
+  if (o->cell10) PetscCall(PetscCalloc1(18 * (size_t)o->ncell, &off));
   for (PetscInt i = 0; o->cell10 && i < 6 * o->ncell; i++) {
     const PetscInt *point = o->cell10 + 10 * (i / 6);
     const int *e = SbTetEdge[i % 6];
 
-    for (int k = 0; k < 3; k++)
+    for (int k = 0; k < 3 && point[4] >= 0; k++)
       off[3 * i + k] =
         o->x[3 * point[4 + place[i % 6]] + k] - 0.5 * (o->x[3 * point[e[0]] + k] + o->x[3 * point[e[1]] + k]);
   }
@@ -156,13 +165,14 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
   PetscCall(VecGetArray(run->U, &u));
   PetscCall(VecGetArray(run->V, &v));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    const PetscInt n = o->cell10 ? 10 : 4, *point;
     PetscReal weight[10];
-    PetscInt cell;
+    PetscInt cell, n;
+    const PetscInt *point;
 
     if (s->node_body[i] != b) continue;
     far = PetscMax(far, SbLocatorFind(locator, s->node_x + 3 * i, &cell, weight));
-    point = o->cell10 ? o->cell10 + 10 * cell : o->cell + 4 * cell;
+    n = o->cell10 && o->cell10[10 * cell + 4] >= 0 ? 10 : 4;
+    point = n == 10 ? o->cell10 + 10 * cell : o->cell + 4 * cell;
     for (int e = 0; e < n - 4; e++) weight[4 + e] = 4. * weight[edge[e][0]] * weight[edge[e][1]];
     for (int a = 0; a < 4 && n == 10; a++) weight[a] *= 2. * weight[a] - 1.;
     for (int k = 0; k < 3; k++) {
