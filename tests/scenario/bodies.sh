@@ -92,18 +92,18 @@ for n in 1 2; do
   check "kinetic energy $(row0 kinetic) J of a state that is thrown" awk -v e="$(row0 kinetic)" 'BEGIN { d = e / 0.5 - 1; exit d > 1e-9 || d < -1e-9 }'
 done
 
-# between p1 and p2: values at the nodes are those of the other run, whose edges count when they were written
+# between p1 and p2: values at the nodes are those of the other run, those at edges among them
 bend="-bodies bar -body_bar_mesh box:0.4,0.1,0.1:4,1,1 -body_bar_poisson 0.3 -ts_max_time 1e-6 -ts_dt 1e-6 -output_precision double -output_fields displacement,velocity -output_overwrite yes"
 strain=() kinetic=()
 # shellcheck disable=SC2086
-for way in "p1 " "p2 -output_quadratic yes"; do
+for way in "p1 " "p2 -output_quadratic yes" "p2 -output_discontinuous yes" "p2 "; do
   "$supple" defaults.opts $bend -body_bar_element $way -body_bar_displacement "0.01*x^2,0.02*y,0.03*z*x" -body_bar_velocity "y,x*z,0" -output_dir start || fail "$way: a start by formulas does not run"
-  cp -r start "state_${way%% *}"
+  cp -r start "state_${way//[ -]/}"
   strain+=("$(row0 strain)") kinetic+=("$(row0 kinetic)")
 done
 # shellcheck disable=SC2086
 for n in 1 3; do
-  for way in "p2 p1 0" "p2 p2 1" "p1 p1 0" "p1 p2 0"; do
+  for way in "p2 p1 0" "p2 p2 1" "p2output_quadraticyes p2 1" "p2output_discontinuousyes p2 1" "p1 p1 0" "p1 p2 0"; do
     set -- $way
     "${mpi[@]}" $n "$supple" defaults.opts $bend -body_bar_element $2 -body_bar_state state_$1,0 -output_dir start || fail "a state of $1 for $2"
     # what comes from p1 has its energy, as its functions are of p2, too

@@ -36,14 +36,14 @@ SCENARIO = """
 """
 
 
-# Two more bars beside it, so that all elements are in one scene.
-MIXED = ["-bodies", "bar,crouzeix,galerkin", "-body_bar_element", "p1"]
-for k, (body, element) in enumerate((("crouzeix", "cr"), ("galerkin", "dg"))):
+# More bars beside it, so that all elements are in one scene; tets of p2 between others.
+MIXED = ["-bodies", "bar,crouzeix,quadratic,galerkin", "-body_bar_element", "p1"]
+for k, (body, element) in enumerate((("crouzeix", "cr"), ("galerkin", "dg"), ("quadratic", "p2"))):
     for option, value in (("element", element), ("mesh", "box:0.3,0.1,0.1:4,2,2"), ("translate", f"0,{0.2 * (k + 1)},0"),
                           ("material", "linear"), ("young", "4e4"), ("poisson", "0.45"), ("density", "1000")):
         MIXED += [f"-body_{body}_{option}", value]
 # Options by the name of what is tested; a direct solver serves all of them.
-ELEMENTS = {element: ["-body_bar_element", element, "-solver", "direct"] for element in ("p1", "cr", "dg")}
+ELEMENTS = {element: ["-body_bar_element", element, "-solver", "direct"] for element in ("p1", "cr", "dg", "p2")}
 ELEMENTS["mixed"] = [*MIXED, "-solver", "direct"]
 
 
@@ -144,7 +144,7 @@ def check_vtkhdf(folder):
             meshes.add(mesh.name)
             expected = {"points": frame["position"] if "position" in frame else mesh["x"], "cells": mesh["cells"]}
             expected |= {name: data for name, data in frame.items() if isinstance(data, h5py.Dataset) and name != "position"}
-            expected |= {name: data for name, data in mesh.items() if name not in ("x", "cells", "vertices")}
+            expected |= {name: data for name, data in mesh.items() if name not in ("x", "cells", "cells10", "vertices")}
             found = {"points": grid.GetPoints().GetData(), "cells": grid.GetCells().GetConnectivityArray()}
             for data in (grid.GetPointData(), grid.GetCellData()):
                 found |= {data.GetArrayName(k): data.GetArray(k) for k in range(data.GetNumberOfArrays())}
