@@ -10,13 +10,15 @@
 
   Vertex fields of bodies with nodes at faces (cr, dg) hold at each vertex the mean of the cells around it, weighted with
   their volumes; forces are handed from the faces to their vertices in equal parts. With -output_discontinuous each cell has
-  its own four points and the values that it has there. Probes show vertex fields. Checkpoints hold the unknowns themselves.
+  points of its own and the values that it has there. Bodies of p2 have their nodes at edges, too. Probes show vertex fields. Checkpoints hold the unknowns themselves.
 
   fields.h5
-    /mesh/x        [npoint][3] double, rest position, m; points are the vertices, or 4 c + a for corner a of cell c
-    /mesh/cells    [ncell][4] int32, point numbers, positively oriented
-    /mesh/cells10  [ncell][10] int32, likewise the corners and the middles of the edges 01 12 02 03 13 23; only with -output_quadratic
-    /mesh/vertices [ncell][4] int32, vertex numbers; only with -output_discontinuous
+    /mesh/x        [npoint][3] double, rest position, m; points are the vertices, then the nodes of p2 at edges; or with -output_discontinuous the corners, of p2 the ten nodes, of one tet
+                   of the scene behind the other
+    /mesh/cells    [ncell][4] int32, point numbers, positively oriented; a tet of p2 is eight of these, one behind the other, but for -output_quadratic
+    /mesh/cells10  [ntet][10] int32, where a body is of p2: of each tet of the scene the corners and the nodes at the edges 01 12 02 03 13 23, -1 where its body is of another element
+    /mesh/parent   [ncell] int32, the row there that a cell is, or is a part of; not with -output_quadratic, where cells are these tets
+    /mesh/vertices [ncell][4] int32, vertex numbers (nodes at edges count behind the vertices); only with -output_discontinuous
     /mesh_000123   the same for the mesh that bodies have after a re-meshing behind step 123; frames of it have the attribute `mesh` (123)
     /mesh/body     [ncell] int32, number of the body; /mesh/rank likewise when asked for
     /mesh/set_NAME [npoint] int32, 1 at points of this set of the scenario, and /mesh/tets_NAME [ncell] when it holds tets; only with the field `sets`

@@ -33,7 +33,9 @@ static PetscErrorCode position(const SbField *f, SbRun run, const SbStep *step, 
   PetscFunctionBeginUser;
   PetscCall(vector(f, run, step, values));
   for (PetscInt i = 0; i < out->point.nowned; i++) {
-    for (int k = 0; k < 3; k++) values[3 * i + k] += SbPointsRest(run, out, i)[k];
+    const PetscReal *x = SbPointsRest(run, out, i);
+
+    for (int k = 0; k < 3; k++) values[3 * i + k] += x[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -22,7 +22,7 @@ static const SbOption rows[] = {
    "steps between frames of fields.h5, while output_every is 0"},
   {"output_precision", SB_OPTION_CHOICE, 1, "", "float", "float|double", "numbers in fields.h5"},
   {"output_discontinuous", SB_OPTION_BOOL, 1, "", "false", "",
-   "each tet in fields.h5 has its own four points, so that cr and dg are discontinuous as computed; if not, "
+   "each tet in fields.h5 has points of its own, so that cr and dg are discontinuous as computed; if not, "
    "values are averaged at the vertices"},
   {"output_quadratic", SB_OPTION_BOOL, 1, "", "false", "",
    "where all bodies are of p2: viewers show quadratic tets; if not, each is eight linear ones over its ten "
