@@ -55,8 +55,10 @@ static PetscErrorCode gather(SbOutput out, PetscBool cell, PetscInt ncomp)
   PetscCall(SbOrderGather(cell ? &out->cell : &out->point, ncomp, fr->owned, fr->slice));
   /* in place, from the end on */
   for (PetscInt i = out->cell.n - 1; cell && out->split && i >= 0; i--) {
-    for (int k = 0; k < (out->split[i] ? 8 : 1); k++)
-      PetscCall(PetscArraymove(fr->slice + ncomp * --n, fr->slice + ncomp * i, ncomp));
+    for (int k = 0; k < (out->split[i] ? 8 : 1); k++) {
+      n--;
+      PetscCall(PetscArraymove(fr->slice + ncomp * n, fr->slice + ncomp * i, ncomp));
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

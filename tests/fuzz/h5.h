@@ -56,6 +56,7 @@ static const char *const fuzz_h5_names[] = {
   "/mesh/curved_edges",
   "/mesh/edge_offsets",
   "/mesh/cells10",
+  "/mesh/parent",
 };
 enum { FUZZ_H5_NAMES = (int)(sizeof(fuzz_h5_names) / sizeof(fuzz_h5_names[0])) };
 enum { FUZZ_H5_VALUES = 4096 }; /* arrays of more are left without */

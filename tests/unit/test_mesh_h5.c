@@ -196,6 +196,63 @@ static PetscErrorCode test_discontinuous(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A tet of p2 that is cut into eight, behind a linear one: the two tets, with six nodes at edges, one of which is off the middle; and what is wrong with the arrays that say so. */
+static PetscErrorCode test_cut(void)
+{
+  static const struct {
+    int nparent, at, parent, nten, where, ten;
+    const char *words; /* NULL: it is sound */
+  } cases[] = {
+    {9, 0, 0, 2, 0, 0, NULL},
+    {8, 0, 0, 2, 0, 0, "/mesh/parent|/mesh/cells"},
+    {9, 8, 2, 2, 0, 0, "/mesh/parent|2|row 9|0|1"},
+    {9, 0, 1, 2, 0, 0, "/mesh/parent|row 1"},
+    {-1, 0, 0, 10, 0, 0, "/mesh/cells10|/mesh/cells"},
+    {9, 0, 0, 2, 3, -1, "/mesh/cells10|-1|row 1"},
+    {9, 0, 0, 2, 19, -2, "/mesh/cells10|-2|row 2"},
+    {9, 0, 0, 2, 19, 14, "/mesh/cells10|14|row 2"},
+  };
+  const double x[42] = {5, 0, 0, 6,  0, 0, 5,  1,  0, 5, 0,  1,  0, 0, 0,  1,  0, 0,  0, 1,  0,
+                        0, 0, 1, .5, 0, 0, .5, .5, 0, 0, .5, .1, 0, 0, .5, .5, 0, .5, 0, .5, .5};
+  const int cells[36] = {0,  1, 2, 3,  4,  8,  10, 11, 8,  5,  9, 12, 10, 9, 6, 13, 11, 12,
+                         13, 7, 8, 13, 10, 11, 8,  13, 11, 12, 8, 13, 12, 9, 8, 13, 9,  10};
+  const hsize_t points[2] = {14, 3}, tets[2] = {9, 4};
+  char path[256];
+  SbImport *im;
+
+  PetscFunctionBeginUser;
+  test_path("cut.h5", sizeof(path), path);
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
+    const hid_t file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+    int body[9] = {0, 1, 1, 1, 1, 1, 1, 1, 1}, parent[9] = {0, 1, 1, 1, 1, 1, 1, 1, 1};
+    int ten[100] = {0, 1, 2, 3, -1, -1, -1, -1, -1, -1, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13};
+    const hsize_t nbody[1] = {9}, nparent[1] = {(hsize_t)PetscMax(cases[i].nparent, 0)},
+                  nten[2] = {(hsize_t)cases[i].nten, 10};
+
+    if (cases[i].at || cases[i].parent) parent[cases[i].at] = cases[i].parent;
+    if (cases[i].where) ten[cases[i].where] = cases[i].ten;
+    put_array(file, "/mesh/x", 2, points, H5T_NATIVE_DOUBLE, x);
+    put_array(file, "/mesh/cells", 2, tets, H5T_NATIVE_INT, cells);
+    put_array(file, "/mesh/body", 1, nbody, H5T_NATIVE_INT, body);
+    put_array(file, "/mesh/cells10", 2, nten, H5T_NATIVE_INT, ten);
+    if (cases[i].nparent >= 0) put_array(file, "/mesh/parent", 1, nparent, H5T_NATIVE_INT, parent);
+    (void)H5Fclose(file);
+    if (cases[i].words) {
+      SB_CHECK_ERROR(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED, cases[i].words);
+      continue;
+    }
+    PetscCall(test_read(path, 0, &im));
+    SB_CHECK(im->nvert == 8 && im->item[3].n == 2, "%d vertices, %d tets", (int)im->nvert,
+             (int)im->item[3].n);
+    SB_CHECK(im->nmiddle.n == 1 && PetscAbsReal(im->middle[0].off[2] - 0.1) < 1e-15,
+             "%d nodes off the middle", (int)im->nmiddle.n);
+    SB_CHECK(im->item[3].vert[4] == 4 && im->item[3].number[1] == 2, "the tet of ten nodes");
+    PetscCall(SbMeshFileDestroy(&im));
+  }
+  (void)unlink(path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* ------------------------------------------------------------------ damage */
 
 /* Read on all ranks by rank 0, in slabs, and by supple-mesh, it must fail with these words (NULL: it is sound); with a note only for p2, and supple-mesh has the note. */
@@ -445,6 +502,7 @@ int main(int argc, char **argv)
   PetscCall(test_distributed());
   PetscCall(test_output());
   PetscCall(test_discontinuous());
+  PetscCall(test_cut());
   PetscCall(test_damage());
   PetscCall(test_curved_damage());
   PetscCall(test_truncated());
