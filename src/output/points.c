@@ -89,21 +89,11 @@ SbPlace SbPointsPlace(SbRun run, SbOutput out, PetscInt i)
   const PetscInt place = out->place           ? out->place[i]
                          : out->discontinuous ? SB_CELL_NODES * (i / 4) + i % 4
                                               : i;
-  SbPlace p = {.vertex = place, .node = -1, .corner = -1};
+  const PetscInt cell = place / SB_CELL_NODES, a = place % SB_CELL_NODES;
 
-  if (out->discontinuous) {
-    const PetscInt cell = place / SB_CELL_NODES, a = place % SB_CELL_NODES;
-
-    if (a < 4)
-      p.corner = 4 * cell + a;
-    else
-      p.node = SbSpaceCellNode(run->model->space, cell, a);
-    p.vertex = a < 4 ? mesh->cell[4 * cell + a] : -1;
-  } else if (i >= mesh->nvert_owned) {
-    p.node = place;
-    p.vertex = -1;
-  }
-  return p;
+  if (!out->discontinuous) return i < mesh->nvert_owned ? (SbPlace){i, -1, -1} : (SbPlace){-1, place, -1};
+  return a < 4 ? (SbPlace){mesh->cell[4 * cell + a], -1, 4 * cell + a}
+               : (SbPlace){-1, SbSpaceCellNode(run->model->space, cell, a), -1};
 }
 
 const PetscReal *SbPointsRest(SbRun run, SbOutput out, PetscInt i)

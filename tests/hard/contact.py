@@ -511,7 +511,7 @@ def run(name, ranks, short, more):
         found += [text for check in scene.checks if (text := check(h))]
     gaps = np.concatenate([h[f"{e}_gap"] for e in scene.effects if f"{e}_gap" in h])
     with h5py.File(out / "fields.h5") as f:
-        tets = len(f["mesh/cells"])
+        tets = len(f["mesh/cells10" if "cells10" in f["mesh"] else "mesh/cells"])
     ended = "yes" if not result.returncode else f"at {h['time'][-1]:g} s of {end:g}"
     print(f"contact|{name}|{ranks}|{tets}|{steps}|{ended}|{len(seen)}|{np.median(newton):g}|{newton.max():g}"
           f"|{h['rejected'].sum():g}|{f'{gaps[gaps > 0].min():.1e}' if (gaps > 0).any() else '-'}|{max(made, 0) + 0.0:.0e}|{cpu:.1f}|{1e6 * cpu / steps / tets:.1f}")
