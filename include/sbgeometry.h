@@ -129,13 +129,12 @@ void SbDistanceHessian(const PetscReal x[], const SbDistance *distance, const Pe
                        PetscBool clamp, PetscReal H[]);
 
 /*
-  SbEdgeMollifier - e = (2 - s/eps) s/eps with s = |u x v|^2 of two edges u, v, and 1 for s > eps: it switches a pair of edges off where they become
-  parallel and their distance is not smooth.
+  SbEdgeCross - |u x v|^2 of two edges u, v, m^4: zero where they are parallel and their distance is not smooth.
 
-  Not collective. Input: x[4][3], ends of the first and of the second edge, m; eps, m^4. Output: g[12], H[12][12], first and second
-  derivatives of e; either may be NULL.
+  Not collective. Input: x[4][3], ends of the first and of the second edge, m. Output: g[12], H[12][12], its first and second derivatives;
+  either may be NULL.
 */
-PetscReal SbEdgeMollifier(const PetscReal x[], PetscReal eps, PetscReal g[], PetscReal H[]);
+PetscReal SbEdgeCross(const PetscReal x[], PetscReal g[], PetscReal H[]);
 
 /* Replaces a symmetric matrix A[n][n] by its positive semi-definite part. Not collective; n <= SB_CLAMP_MAX. */
 #define SB_CLAMP_MAX 12

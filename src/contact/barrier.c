@@ -6,12 +6,14 @@
 
     b = -k w (s - 1)^2 ln s,   b' = k (-2 (s - 1) ln s - (s - 1)^2 / s),   b'' = k/w (-2 ln s - 2 (s - 1)/s - (s^2 - 1)/s^2)
 
-  Parallel edges: the nearest points jump; their energy is multiplied by (2 - c/e) c/e, c = |a x b|^2 below e = 1e-3 |a|^2 |b|^2 at rest (the same
-  article, section 5). Vertices and triangles carry what is left out. With e = 1e-5 blocks a little askew on each other take a third more iterations (docs/reports/contact.md).
+  Parallel edges: the nearest points jump. The energy of an edge pair is multiplied by (2 - y) y, y = c/e, c = |a x b|^2, where c is below e (the same article, section 5); vertices and
+  triangles carry what is left out. There e = 1e-3 |a|^2 |b|^2 at rest; here it is at most 2 |a| |b| d^2, too: edges that cross have their ends farther from each other than the gap d, and when the
+  ends keep nothing apart the gap shrinks to 1e-9 m, at which steps crawl (docs/reports/contact.md).
 */
 #include "sbbarrier.h"
 
-#define MOLLIFIED 1e-3 /* e above */
+#define MOLLIFIED 1e-3 /* e above, of |a|^2 |b|^2 */
+#define NEAR 2.        /* the same, of |a| |b| d^2 */
 
 void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal b[3])
 {
@@ -28,11 +30,30 @@ void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal 
   b[2] = k * area / w * (-2. * PetscLogReal(s) - 2. * (s - 1.) / s - (s * s - 1.) / (s * s));
 }
 
+/*
+  The part of the energy that counts of edges with c as above, a gap d and rest = |a|^2 |b|^2: f = (p, p_d, p_c, p_dd, p_dc, p_cc), with its derivatives by d and c; f is left as it is where all
+  counts.
+*/
+static void mollify(PetscReal c, PetscReal rest, PetscReal d, PetscReal f[6])
+{
+  const PetscReal near = NEAR * PetscSqrtReal(rest) * d * d, e = PetscMin(MOLLIFIED * rest, near), y = c / e;
+
+  if (y >= 1.) return;
+  f[0] = (2. - y) * y;
+  f[1] = f[3] = f[4] = 0.;
+  f[2] = 2. * (1. - y) / e;
+  f[5] = -2. / (e * e);
+  if (e < near) return;
+  f[1] = -4. * y * (1. - y) / d;
+  f[3] = (12. - 20. * y) * y / (d * d);
+  f[4] = -4. * (1. - 2. * y) / (d * e);
+}
+
 void SbBarrierPair(SbContactMesh m, const SbContactPair *pair, PetscReal gap, const SbDistance *g,
                    const PetscReal x[], PetscReal width, PetscReal pressure, PetscReal *energy,
                    PetscReal gradient[12], PetscBool clamp, PetscReal H[144])
 {
-  PetscReal b[3], at[12], grad[12], C[144], e = 1.;
+  PetscReal b[3], at[12], across[12], C[144], f[6] = {1.};
 
   SbBarrier(gap, width, pressure, pair->area, b);
   for (int k = 0; k < 12; k++) {
@@ -54,32 +75,34 @@ void SbBarrierPair(SbContactMesh m, const SbContactPair *pair, PetscReal gap, co
     return;
   }
 
-  /* parallel edges: the factor */
+  /* parallel edges: a part of it */
   if (pair->kind == SB_PAIR_EDGE_EDGE) {
-    PetscReal rest[2];
+    PetscReal rest = 1.;
 
     for (int k = 0; k < 2; k++) {
       const PetscReal *p = m->X + 3 * pair->v[2 * k], *q = m->X + 3 * pair->v[2 * k + 1],
                       r[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
 
-      rest[k] = SbDot3(r, r);
+      rest *= SbDot3(r, r);
     }
-    e = SbEdgeMollifier(at, MOLLIFIED * rest[0] * rest[1], grad, H ? C : NULL);
+    mollify(SbEdgeCross(at, across, H ? C : NULL), rest, gap, f);
   }
-  *energy = e * b[0];
+  *energy = f[0] * b[0];
 
-  /* e b'' dd dd + e b' d2d + b d2e + b' (de dd + dd de), or its positive part */
+  /* second derivative of the energy E(d, c): E_dd dd dd + E_d d2d + E_cc dc dc + E_c d2c + E_dc (dd dc + dc dd), or its positive part */
   if (H) {
-    const PetscReal factor[2] = {e * b[2], e * b[1]};
+    const PetscReal factor[2] = {f[0] * b[2] + 2. * f[1] * b[1] + f[3] * b[0], f[0] * b[1] + f[1] * b[0]};
 
-    SbDistanceHessian(at, g, factor, (PetscBool)(clamp && e == 1.), H);
-    if (e < 1.) {
+    SbDistanceHessian(at, g, factor, (PetscBool)(clamp && f[0] == 1.), H);
+    if (f[0] < 1.) {
       for (int i = 0; i < 12; i++) {
         for (int j = 0; j < 12; j++)
-          H[12 * i + j] += b[0] * C[12 * i + j] + b[1] * (grad[i] * gradient[j] + gradient[i] * grad[j]);
+          H[12 * i + j] += b[0] * (f[5] * across[i] * across[j] + f[2] * C[12 * i + j]) +
+                           (f[2] * b[1] + f[4] * b[0]) * (across[i] * gradient[j] + gradient[i] * across[j]);
       }
       if (clamp) SbSymmetricProjectPSD(12, H);
     }
   }
-  for (int k = 0; k < 12; k++) gradient[k] = e * b[1] * gradient[k] + (e < 1. ? b[0] * grad[k] : 0.);
+  for (int k = 0; k < 12; k++)
+    gradient[k] = (f[0] * b[1] + f[1] * b[0]) * gradient[k] + (f[0] < 1. ? f[2] * b[0] * across[k] : 0.);
 }

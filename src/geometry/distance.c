@@ -341,18 +341,13 @@ void SbDistanceHessian(const PetscReal x[], const SbDistance *s, const PetscReal
   }
 }
 
-PetscReal SbEdgeMollifier(const PetscReal x[], PetscReal eps, PetscReal g[], PetscReal H[])
+PetscReal SbEdgeCross(const PetscReal x[], PetscReal g[], PetscReal H[])
 {
-  PetscReal u[3], v[3], c[3], uu, vv, uv, d[2][3], area, value, first, second;
+  PetscReal u[3], v[3], c[3], uu, vv, uv, d[2][3];
 
   SbSubtract(x + 3, x, u);
   SbSubtract(x + 9, x + 6, v);
   SbCross(u, v, c);
-  area = SbDot3(c, c);
-  value = area < eps ? (2 - area / eps) * area / eps : 1;
-  first = area < eps ? 2 * (1 - area / eps) / eps : 0;
-  second = area < eps ? -2 / (eps * eps) : 0;
-  if (!g && !H) return value;
 
   // |u x v|^2 = (u . u) (v . v) - (u . v)^2, derivatives with respect to u and v, then to the ends
   uu = SbDot3(u, u);
@@ -363,7 +358,7 @@ PetscReal SbEdgeMollifier(const PetscReal x[], PetscReal eps, PetscReal g[], Pet
     d[1][k] = 2 * (uu * v[k] - uv * u[k]);
   }
   for (int a = 0; g && a < 4; a++) {
-    for (int k = 0; k < 3; k++) g[3 * a + k] = (a % 2 ? 1 : -1) * first * d[a / 2][k];
+    for (int k = 0; k < 3; k++) g[3 * a + k] = (a % 2 ? 1 : -1) * d[a / 2][k];
   }
   for (int a = 0; H && a < 4; a++) {
     for (int b = 0; b < 4; b++) {
@@ -379,10 +374,10 @@ PetscReal SbEdgeMollifier(const PetscReal x[], PetscReal eps, PetscReal g[], Pet
             dd = 2 * (2 * e[p] * f[q] - f[p] * e[q] - (p == q) * uv);
           } else
             dd = 2 * ((p == q) * (a / 2 ? uu : vv) - (a / 2 ? u[p] * u[q] : v[p] * v[q]));
-          H[12 * (3 * a + p) + 3 * b + q] = sign * (first * dd + second * d[a / 2][p] * d[b / 2][q]);
+          H[12 * (3 * a + p) + 3 * b + q] = sign * dd;
         }
       }
     }
   }
-  return value;
+  return SbDot3(c, c);
 }

@@ -42,6 +42,29 @@ static PetscReal energy_at(SbContactMesh m, const SbContactPair *pair, const Pet
   return energy;
 }
 
+/* Edges that cross at an angle of 0.01, both of length 1 at rest: apart they count in part, which their derivatives show; close together the whole barrier keeps them so. */
+static void check_crossing(void)
+{
+  PetscReal X[12] = {0., 0., 0., 1., 0., 0., 0., 0., 0., 1., 0., 0.}, x[12], gradient[12], last = 0., b[3];
+  struct _p_SbContactMesh mesh = {.nbody_vertex = 4, .nvertex = 4, .X = X};
+  const SbContactPair pair = {.kind = SB_PAIR_EDGE_EDGE, .v = {0, 1, 2, 3}, .area = 0.7};
+
+  for (PetscReal gap = 0.02; gap > 1e-5; gap *= 0.8) {
+    PetscReal energy;
+
+    for (int k = 0; k < 12; k++) x[k] = X[k] + (k % 3 == 2 && k > 5 ? gap : 0.);
+    x[7] -= 0.005;
+    x[10] += 0.005;
+    energy = energy_at(&mesh, &pair, x, gradient);
+    SbBarrier(gap, width, pressure, pair.area, b);
+    SB_CHECK(energy > last && energy <= (1. + 1e-6) * b[0],
+             "energy %g at the gap %g, %g of edges at any angle", energy, gap, b[0]);
+    SB_CHECK(gap > 0.012 ? energy < 0.9 * b[0] : gap > 0.005 || energy > 0.999 * b[0],
+             "part %g of the barrier at the gap %g", energy / b[0], gap);
+    last = energy;
+  }
+}
+
 /* Gradient, Hessian and clamped Hessian against central differences, by the motion of the first nv vertices, which are those of bodies. */
 static void check_pair(SbContactMesh m, const SbContactPair *pair, PetscReal x[12], int nv, PetscInt *tried)
 {
@@ -86,12 +109,13 @@ static void check_pair(SbContactMesh m, const SbContactPair *pair, PetscReal x[1
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscReal x[12], X[12];
+  PetscReal x[12], X[12], u[3], n[3];
   struct _p_SbContactMesh mesh = {.nbody_vertex = 4, .nvertex = 4, .X = X};
   SbContactPair pair = {.kind = SB_PAIR_VERTEX_TRIANGLE, .v = {0, 1, 2, 3}, .area = 0.7};
-  PetscInt tried[5] = {0};
+  PetscInt tried[6] = {0};
 
   check_function();
+  check_crossing();
   for (int i = 0; i < NRANDOM; i++) {
     for (int k = 0; k < 12; k++) X[k] = x[k] = pair_random();
     pair.side = PETSC_FALSE;
@@ -110,6 +134,16 @@ int main(int argc, char **argv)
     }
     check_pair(&mesh, &pair, x, 4, &tried[2]);
 
+    /* and so near that what counts depends on the gap */
+    for (int k = 0; k < 3; k++) u[k] = x[3 + k] - x[k];
+    SbCross(u, X, n);
+    for (int k = 0; k < 3; k++) {
+      x[6 + k] = x[k] + 0.03 * n[k] / PetscSqrtReal(SbDot3(n, n));
+      x[9 + k] = x[6 + k] + u[k] + 0.01 * pair_random();
+      x[6 + k] -= 0.01 * pair_random();
+    }
+    check_pair(&mesh, &pair, x, 4, &tried[5]);
+
     /* a half-space and a bowl: only the first vertex moves */
     pair.side = PETSC_TRUE;
     mesh.nbody_vertex = 1;
@@ -120,6 +154,6 @@ int main(int argc, char **argv)
     mesh.radius = 1.;
     check_pair(&mesh, &pair, x, 1, &tried[4]);
   }
-  for (int k = 0; k < 5; k++) SB_CHECK(tried[k] > 100, "%d pairs of kind %d examined", (int)tried[k], k);
+  for (int k = 0; k < 6; k++) SB_CHECK(tried[k] > 100, "%d pairs of kind %d examined", (int)tried[k], k);
   SB_TEST_END();
 }
