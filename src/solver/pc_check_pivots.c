@@ -1,7 +1,7 @@
 /*
   CHOLMOD through PETSc ends the program with a trace when it meets a pivot that is not positive: a body that nothing holds, or a
   tangent that is indefinite in compression. Here that is a factorisation that failed, like those of other packages: the solve fails, the
-  step is cut or the run stops with one line. Where the matrix is gathered on one rank (pc_direct.c), all learn of it.
+  step is cut or the run stops with one line. Where the matrix is gathered on one rank (pc_direct.c), all learn of it. MUMPS is made to factor again after a failure.
 
   petsc/private/pcimpl.h: the operations of a PC that PETSc implements have no public setter.
 */
@@ -45,9 +45,21 @@ static PetscErrorCode guarded_setup(PC pc)
 {
   PetscErrorCode (*original)(PC) = NULL;
   PetscErrorCode error;
+  MatFactorError before = MAT_FACTOR_NOERROR;
+  MatSolverType package;
+  PetscBool mumps;
+  Mat factor;
 
   PetscFunctionBeginUser;
   PetscCall(PetscObjectQueryFunction((PetscObject)pc, ORIGINAL, &original));
+  // MUMPS factors nothing more where it has failed, as PETSc takes that for a failure of the analysis, and says nothing: the factor is made anew
+  PetscCall(PCFactorGetMatSolverType(pc, &package));
+  PetscCall(PetscStrcmp(package, MATSOLVERMUMPS, &mumps));
+  if (mumps && pc->setupcalled) {
+    PetscCall(PCFactorGetMatrix(pc, &factor));
+    PetscCall(MatFactorGetError(factor, &before));
+    if (before) pc->flag = DIFFERENT_NONZERO_PATTERN;
+  }
   noted.allocate = PetscTrMalloc;
   noted.release = PetscTrFree;
   noted.n = 0;
@@ -122,16 +134,16 @@ static PetscErrorCode gathered_setup(PC pc)
 
 PetscErrorCode SbPCCheckPivots(PC pc)
 {
-  PetscBool cholesky, gathered;
+  PetscBool factored, gathered;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &cholesky));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &factored, PCCHOLESKY, PCLU, ""));
   PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCTELESCOPE, &gathered));
-  if (!cholesky && !gathered) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!factored && !gathered) PetscFunctionReturn(PETSC_SUCCESS);
   if (pc->ops->setup == guarded_setup || pc->ops->setup == gathered_setup) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscObjectComposeFunction((PetscObject)pc, ORIGINAL, pc->ops->setup));
   PetscCall(PetscObjectComposeFunction((PetscObject)pc, ORIGINAL_APPLY, pc->ops->apply));
-  pc->ops->setup = cholesky ? guarded_setup : gathered_setup;
+  pc->ops->setup = factored ? guarded_setup : gathered_setup;
   pc->ops->apply = guarded_apply;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -56,11 +56,12 @@ static PetscErrorCode solve(KSP ksp, Mat A, KSPConvergedReason *reason, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A factorisation of a matrix that is not definite, of one that is, and of both again. Only CHOLMOD fails at the former, on all ranks alike. */
+/* A factorisation of a matrix that is not definite, of one that is, and of both again; then of zeros, which no package factors, and of what can be factored again. Only CHOLMOD fails
+   where a matrix is not definite, on all ranks alike. */
 static PetscErrorCode check_indefinite(const char *package, KSPType type)
 {
-  const PetscReal shift[4] = {-1e5, 0., -1e5,
-                              0.}; /* 1/s^2; the lowest frequency of the bar is about 40 rad/s */
+  /* 1/s^2; the lowest frequency of the bar is about 40 rad/s */
+  const PetscReal shift[6] = {-1e5, 0., -1e5, 0., 0., 0.};
   const PetscBool fails = (PetscBool)!strcmp(package, MATSOLVERCHOLMOD);
   TestScene t;
   PetscBool has;
@@ -81,13 +82,16 @@ static PetscErrorCode check_indefinite(const char *package, KSPType type)
   PetscCall(SbPCDirectSet(pc, package, PETSC_TRUE));
   PetscCall(KSPSetFromOptions(ksp));
   PetscCall(SbPCCheckPivots(pc));
-  for (int k = 0; k < 4; k++) {
+  for (int k = 0; k < 6; k++) {
     KSPConvergedReason reason;
     PetscReal residual;
 
     PetscCall(SbModelTangent(t.model, 0., 0., shift[k], 1., t.run->U, NULL, A));
+    if (k == 4) PetscCall(MatZeroEntries(A));
     PetscCall(solve(ksp, A, &reason, &residual));
-    if (fails && shift[k] < 0.)
+    if (k == 4)
+      SB_CHECK(reason < 0, "%s, zeros: %s", package, KSPConvergedReasons[reason]);
+    else if (fails && shift[k] < 0.)
       SB_CHECK(reason == KSP_DIVERGED_PC_FAILED, "%s, indefinite: %s", package, KSPConvergedReasons[reason]);
     else
       SB_CHECK(reason > 0 && residual < 1e-10, "%s, matrix %d: %s, residual %g", package, k,
