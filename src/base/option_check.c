@@ -33,7 +33,7 @@ static PetscBool looks_like_petsc(const char *name)
     "ksp_ pc_ snes_ ts_ mat_ vec_ dm_ is_ sub_ mg_ fieldsplit_ asm_ log_ malloc options_ petsc on_error_ "
     "memory_ fp_trap start_in_debugger stop_for_debugger debugger_ citations no_signal_handler info viewer_ "
     "draw_ display nox saws objects_ checkstack get_total_flops skip_petscrc error_output_ shared_tmp "
-    "not_shared_tmp tmp partition sf_ history python blas_ omp_ use_gpu device cuda hip event_ help version "
+    "not_shared_tmp tmp partition sf_ python blas_ omp_ use_gpu device cuda hip event_ help version "
     "redundant_ est esteig gamg_ hypre ml_ superlu sbaij inner_ coarse_ saddle_ telescope_ levels_ prefix_");
 }
 
@@ -57,8 +57,8 @@ static const char *const common[] = {
 };
 
 /*
-  What a name that is near none may have meant: an option of a class without its prefix, as -young, or one that begins with the same word as a program-wide option, as -time_budget with
-  that of -time_predictor (-contact_ksp_type is PETSc's). "" when it is nothing of ours.
+  What a name that is near none may have meant: an option of a class without its prefix, as -young, the end of a program-wide one, as -history_every, or what begins with the first word of
+  one, as -solver_type or -time_budget (-contact_ksp_type is PETSc's). "" when it is nothing of ours.
 */
 static void guess(const char *name, size_t size, char text[])
 {
@@ -72,9 +72,14 @@ static void guess(const char *name, size_t size, char text[])
 
     for (PetscInt j = 0; j < block->n && !text[0]; j++) {
       const char *key = block->rows[j].key;
+      const size_t length = strlen(key), end = length > strlen(name) + 1 ? length - strlen(name) : 0;
 
       if (block->klass[0] && !strcasecmp(key, name))
         SbFormat(size, text, "; did you mean -%s_NAME_%s?", block->klass, key);
+      else if (!block->klass[0] && more &&
+               ((length == n && !strncasecmp(key, name, n)) ||
+                (end && key[end - 1] == '_' && !strcasecmp(key + end, name))))
+        SbFormat(size, text, "; did you mean -%s?", key);
       else if (!block->klass[0] && more && !strncasecmp(key, name, n) && key[n] == '_')
         SbFormat(size, text, "; -help all lists them");
     }

@@ -112,6 +112,9 @@ check "-ksp_nothing is not reported" grep -qxF "supple: warning: nobody read the
 error 2 "-ksp_rtoll|-ksp_rtol" bar.opts -ksp_rtoll 1e-3
 error 1 "-pc_tpye|-pc_type" bar.opts -pc_tpye jacobi
 error 1 "-snes_monitr|-snes_monitor" bar.opts -snes_monitr
+# as does what begins or ends like one of ours
+error 1 "-solver_type|-solver?" bar.opts -solver_type mumps
+error 2 "-history_every|-output_history_every" bar.opts -history_every 2
 
 # options that are right and of no use in this run are warned of by name, and the run goes on
 unused() { # RANKS OPTION ARGUMENT...
