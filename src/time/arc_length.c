@@ -260,7 +260,7 @@ static PetscErrorCode explain(SbRun run, PetscReal factor, PetscReal l)
 
   PetscFunctionBeginUser;
   PetscCall(PetscStrncpy(why, run->stop_reason, sizeof(why)));
-  PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion));
+  PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
   if (run->rejected_inverted) PetscFunctionReturn(PETSC_SUCCESS);
   if (body >= 0 && !run->steps_total)
     PetscCall(SbRunFail(run, "load factor %g: nothing holds the body %s against %s; hold it by a support",

@@ -110,6 +110,7 @@ typedef struct {
   PetscInt iterations;    /* of the last linear solve */
   SbContactHessian kind;
   PetscReal shift;     /* of the last direction: times the mass added to the tangent, 1/s^2 */
+  PetscBool unstable;  /* an exact tangent of this solve was not positive definite */
   PetscBool whole;     /* the last step was */
   PetscBool rounding;  /* and as good as none, with a residual that has not fallen */
   PetscInt branch;     /* static, such forces: negative eigenvalues of the symmetric part where it begins */
@@ -283,7 +284,7 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
                         ": the exact tangent is not definite (%s, slope %g J, %" PetscInt_FMT
                         " negative eigenvalues)\n",
                         snes->iter, KSPConvergedReasons[reason], (double)*slope, negative));
-    *filtered = PETSC_TRUE;
+    *filtered = n->unstable = PETSC_TRUE;
   }
   if (reason < 0) {
     snes->reason = SNES_DIVERGED_LINEAR_SOLVE;
@@ -615,7 +616,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   n->kind = SB_HESSIAN_PROJECTED;
   n->shift = 0.;
   n->branch = 0;
-  n->whole = PETSC_FALSE;
+  n->whole = n->unstable = PETSC_FALSE;
   if (guarded) PetscCall(approach(snes));
   if (snes->reason) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(linearise_pressure(n->run, X, NULL, 1.));
@@ -766,6 +767,14 @@ PetscErrorCode SbNewtonRegister(void)
 {
   PetscFunctionBeginUser;
   PetscCall(SNESRegister(SB_SNES_NEWTON, SNESCreate_Newton));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbNewtonUnstable(SNES snes, PetscBool *is)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SB_SNES_NEWTON, is));
+  if (*is) *is = ((const Newton *)snes->data)->unstable;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

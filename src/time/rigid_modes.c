@@ -190,8 +190,8 @@ static PetscErrorCode choose_axis(SbRun run, Vec d, Vec lost[6], Vec z[6], Part 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The free motions of a part. */
-static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *part)
+/* The free motions of a part; along: one of them (may be NULL). */
+static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *part, Vec along)
 {
   PetscReal x[36];
   PetscInt n = 0;
@@ -265,6 +265,10 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
     PetscCall(VecDestroy(&w));
   }
   if (part->nfree > 1) PetscCall(choose_axis(run, d, Z, z, part));
+  if (part->nfree && along) {
+    PetscCall(VecZeroEntries(along));
+    PetscCall(VecMAXPY(along, 6, part->motion, z));
+  }
   PetscCall(VecDestroyVecs(6, &Z));
   PetscCall(VecDestroyVecs(6, &z));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -342,7 +346,7 @@ static PetscErrorCode describe_part(SbRun run, const PetscInt label[], const Par
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion[])
+PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion[], Vec along)
 {
   PetscInt *label, *list, npart = 0, nbrother = 0;
   PetscBool diagonal;
@@ -362,7 +366,7 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
   PetscCall(list_parts(run->model->space, label, &npart, &list));
   for (PetscInt k = 0; k < npart && *body < 0; k++) {
     part.label = list[k];
-    PetscCall(examine(run, label, d, &part));
+    PetscCall(examine(run, label, d, &part, along));
     if (part.nfree) *body = part.body;
   }
 

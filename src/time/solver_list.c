@@ -98,7 +98,7 @@ static PetscErrorCode may_replace(SbSolverList l, KSP ksp, Vec b, PetscBool *is)
   if (PetscIsInfOrNanReal(size)) PetscFunctionReturn(PETSC_SUCCESS);
 
   /* a static system with a free motion is singular for every solver */
-  if (!run->model->dynamic) PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion));
+  if (!run->model->dynamic) PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
   *is = (PetscBool)(body < 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -10,6 +10,7 @@
 #include "time_impl.h"
 
 #define LIMIT 10. /* softening from which on a limit load is likely */
+#define PUSH 1e-3 /* cosine between forces and a motion from which on they do not hold it */
 #define EXCESS \
   0.5 /* of the strain energy at the end of a step: what may be there beyond the work of the forces */
 
@@ -92,20 +93,37 @@ static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
 static PetscErrorCode find_free_body(const LoadStep *l, PetscBool failed, PetscBool *found)
 {
   const SbRun run = l->run;
+  const PetscBool apart = (PetscBool)(!run->model->nbegin_step && !run->model->npotential);
   PetscInt body;
   char motion[256];
   const char *loads = "";
 
   PetscFunctionBeginUser;
-  PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion));
-  run->free_body = (PetscBool)(body >= 0 && !run->model->nbegin_step && !run->model->npotential);
-  /* stress and loads resist rotations that nothing else holds: where the step began they may not. A load that holds, as the weight of what hangs, does so in shorter steps, too */
+  PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
+  run->free_body = (PetscBool)(body >= 0 && apart);
+  /* stress and loads resist rotations that nothing else holds: where the step began they may not. A load that holds, as the weight of what hangs, does so in shorter steps, too;
+     one that pushes along the motion has no equilibrium near */
   if (body < 0 && failed && !run->model->linear) {
+    PetscReal work, force, way;
+    Vec along, F;
+
+    PetscCall(VecDuplicate(run->U, &along));
+    PetscCall(VecDuplicate(run->U, &F));
     run->model->load = l->factor - l->length;
     PetscCall(SNESComputeJacobian(run->snes, run->U, run->operator, run->J));
-    PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion));
+    PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, along));
     run->model->load = l->factor;
-    loads = " but its loads";
+    if (body >= 0 && apart) {
+      PetscCall(contact_residual((void *)l, run->U, F));
+      PetscCall(SbSpaceProjectAdmissible(run->model->space, F));
+      PetscCall(VecDot(F, along, &work));
+      PetscCall(VecNorm(F, NORM_2, &force));
+      PetscCall(VecNorm(along, NORM_2, &way));
+      run->free_body = (PetscBool)(PetscAbsReal(work) > PUSH * force * way);
+    }
+    if (!run->free_body) loads = " but its loads";
+    PetscCall(VecDestroy(&along));
+    PetscCall(VecDestroy(&F));
   }
   *found = (PetscBool)(body >= 0);
   if (*found)
@@ -189,6 +207,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
     /* a step that failed is halved, as far as that makes sense */
     if (!ok) {
       char why[sizeof(run->stop_reason)];
+      PetscBool unstable;
 
       run->rejected_step++;
       run->rejected_total++;
@@ -202,12 +221,20 @@ PetscErrorCode SbStaticSolve(SbRun run)
 
       /* steps have become too short: how far the load has got, and what is likely in the way */
       PetscCall(PetscStrncpy(why, run->stop_reason, sizeof(why)));
+      PetscCall(SbNewtonUnstable(run->snes, &unstable));
       if (run->softening > LIMIT)
         PetscCall(SbRunFail(run,
                             "the load factor reached %.7g of 1, and no equilibrium was found %.1e further "
                             "on: a limit load is likely, as displacements grow %.0f times as fast with the "
                             "load as before; -static_control arc_length goes past it",
                             (double)factor, (double)(2. * length), (double)run->softening));
+      else if (factor > 0. && unstable && !run->model->nbegin_step && !run->model->npotential)
+        PetscCall(SbRunFail(run,
+                            "the load factor reached %.7g of 1, and no equilibrium was found %.1e further "
+                            "on, where the tangent is not positive definite: a limit load is likely, or a "
+                            "bifurcation; -static_control arc_length goes past it%s%s",
+                            (double)factor, (double)(2. * length), run->rejected_inverted ? "; " : "",
+                            run->rejected_inverted ? why : ""));
       else if (factor > 0.)
         PetscCall(SbRunFail(run, "the load factor reached %.7g of 1; %s", (double)factor, why));
       break;

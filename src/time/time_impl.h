@@ -62,6 +62,8 @@ PetscErrorCode SbRunAfterStep(TS ts);
 #define SB_SNES_NEWTON "newton"
 PetscErrorCode SbNewtonRegister(void);
 PetscErrorCode SbNewtonSetRun(SNES snes, SbRun run);
+/* Whether a tangent of its last solve was found not to be positive definite; never with another SNESType, or where none is `auto`. Not collective. */
+PetscErrorCode SbNewtonUnstable(SNES snes, PetscBool *is);
 
 /* stop.c: the reason that a run gives when it ends early. */
 /* Options -wall_time and -stop_grace. */
@@ -127,8 +129,9 @@ PetscErrorCode SbStaticSolve(SbRun run); /* static.c: the load path */
    contact, and for solvers that take definite matrices only. */
 PetscErrorCode SbArcLengthCheck(SbRun run);
 PetscErrorCode SbArcLengthSolve(SbRun run);
-/* rigid_modes.c, after a static solve: a body that can move rigidly without a force, -1: none is found; how, in words. Collective. */
-PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion[]);
+/* rigid_modes.c, after a static solve: a body that can move rigidly without a force, -1: none is found; how, in words, and as displacements of the nodes, any length (along may be
+   NULL). Collective. */
+PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion[], Vec along);
 /* Whether displacements are so many times the bodies' size that the matrix must have been singular. Collective. */
 PetscErrorCode SbRunTooFar(SbRun run, Vec X, PetscBool *far);
 

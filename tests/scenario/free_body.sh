@@ -97,11 +97,11 @@ cat >follower.opts <<'END'
 -effect_push_type pressure
 -effect_push_on top
 -effect_push_value 100
--time_max_halvings 2
 END
 for more in "cr -static_steps 3" "dg"; do
   # shellcheck disable=SC2086
   error 2 "load factor |$hinge" -options_file bar.opts -options_file follower.opts $two -body_a_element $more
+  check "shorter steps do not help: $(grep rejected out/bar/run.json)" grep -Eq '"rejected[a-z_]*": 1\b' out/bar/run.json
 done
 # shellcheck disable=SC2086
 error 1 "load factor 1.|body a|(0.00, 0.00, 1.00)" -options_file bar.opts $two \
