@@ -77,8 +77,11 @@ static void sum_face_terms(SbSpace s, SbPlan p)
 {
   const PetscInt *nodes, nbatch = SbJumpCliques(s, &nodes);
 
-  for (int q = 0; q < 2; q++)
-    memset(p->face_term[q], 0, sizeof(PetscReal) * (size_t)(q ? p->oi : p->di)[s->nnode_owned]);
+  for (int q = 0; q < 2; q++) {
+    const PetscInt n = (q ? p->oi : p->di)[s->nnode_owned];
+
+    for (PetscInt k = 0; k < n; k++) p->face_term[q][k] = 0.;
+  }
   for (PetscInt b = 0; b < nbatch; b++) {
     for (PetscInt l = 0; l < SB_BATCH; l++) {
       const PetscInt *node = nodes + (size_t)b * 8 * SB_BATCH + l;

@@ -494,6 +494,9 @@ static PetscErrorCode choose_package(SbSpace s, PC pc, const char *type)
   if (package) PetscCall(PCFactorSetMatSolverType(pc, package));
   if (package && !strcmp(package, MATSOLVERMUMPS))
     PetscCall(set_options("-mat_mumps_icntl_13 1 -mat_mumps_icntl_14 100", PETSC_FALSE));
+  /* a pivot that is not positive shows in the solver's reason */
+  if (package && !strcmp(package, MATSOLVERCHOLMOD))
+    PetscCall(set_options("-mat_cholmod_print 0", PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
