@@ -89,21 +89,28 @@ static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* When free bodies are looked for. */
+typedef enum {
+  BEFORE, /* a step is solved */
+  FAILED,
+  SOLVED
+} When;
+
 /* Finds a body that nothing holds; *found, and the run's reason to stop says so. */
-static PetscErrorCode find_free_body(const LoadStep *l, PetscBool failed, PetscBool *found)
+static PetscErrorCode find_free_body(const LoadStep *l, When when, PetscBool *found)
 {
   const SbRun run = l->run;
   const PetscBool apart = (PetscBool)(!run->model->nbegin_step && !run->model->npotential);
-  PetscInt body;
+  PetscInt body = -1;
   char motion[256];
   const char *loads = "";
 
   PetscFunctionBeginUser;
-  PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
+  if (when != BEFORE) PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
   run->free_body = (PetscBool)(body >= 0 && apart);
   /* stress and loads resist rotations that nothing else holds: where the step began they may not. A load that holds, as the weight of what hangs, does so in shorter steps, too;
      one that pushes along the motion has no equilibrium near */
-  if (body < 0 && failed && !run->model->linear) {
+  if (body < 0 && when != SOLVED && !run->model->linear) {
     PetscReal work, force, way;
     Vec along, F;
 
@@ -155,7 +162,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
   if (!*ok && !other && !l->run->stopped) {
     char why[512] = "use more -static_steps";
 
-    PetscCall(find_free_body(l, PETSC_TRUE, &found));
+    PetscCall(find_free_body(l, FAILED, &found));
     if (!found) {
       char near[256];
 
@@ -169,7 +176,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
   /* loads in balance leave a singular system with a solution, and a solver may find it with any rigid motion on top */
   if (*ok && !l->run->steps_total && !l->run->model->nbegin_step && !l->run->model->npotential &&
       l->run->newton_step) {
-    PetscCall(find_free_body(l, PETSC_FALSE, &found));
+    PetscCall(find_free_body(l, SOLVED, &found));
     if (found) *ok = PETSC_FALSE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -197,12 +204,15 @@ PetscErrorCode SbStaticSolve(SbRun run)
   run->newton_step = run->linear_step = run->rejected_step = 0;
   while (factor < 1.) {
     const PetscReal next = factor + length > 1. - 1e-9 ? 1. : factor + length;
-    PetscBool ok = PETSC_FALSE;
+    PetscBool ok = PETSC_FALSE, found;
 
     load = (LoadStep){run, next, next - factor, X};
     attempt.t = factor;
     attempt.dt = next - factor;
-    PetscCall(SbRunAttempt(run, &attempt, &ok));
+    /* follower loads stiffen a hinge wherever Newton's method goes from here, and it takes long to fail */
+    if (run->nonsymmetric.U && !run->steps_total && !run->model->nbegin_step && !run->model->npotential)
+      PetscCall(find_free_body(&load, BEFORE, &found));
+    if (!run->free_body) PetscCall(SbRunAttempt(run, &attempt, &ok));
 
     /* a step that failed is halved, as far as that makes sense */
     if (!ok) {
