@@ -376,7 +376,7 @@ static PetscErrorCode read_bodies(const File *f)
 static PetscErrorCode read_quadratic(const File *f, const PetscInt at[])
 {
   SbItems *item = &f->im->item[3];
-  PetscInt n, nparent, *parent;
+  PetscInt n, nparent, *parent, last = -1;
   int64_t *node;
 
   PetscFunctionBeginUser;
@@ -386,12 +386,13 @@ static PetscErrorCode read_quadratic(const File *f, const PetscInt at[])
     PetscCall(read_table(f, "/mesh/parent", 1, n, &nparent, &parent));
     if (nparent != item->n) H5_ERROR(f, "/mesh/parent does not fit /mesh/cells; the file is damaged");
     for (PetscInt i = 0; i < nparent; i++) {
-      if (parent[i] > i) H5_ERROR(f, "/mesh/parent jumps in row %lld; the file is damaged", (long long)i + 1);
+      if (parent[i] != last && parent[i] != ++last)
+        H5_ERROR(f, "/mesh/parent jumps in row %lld; the file is damaged", (long long)i + 1);
       SbItemsMove(item, 3, parent[i], i);
     }
+    item->n = last + 1;
   }
-  if (n > item->n) H5_ERROR(f, "/mesh/cells10 does not fit /mesh/cells; the file is damaged");
-  item->n = n;
+  if (n != item->n) H5_ERROR(f, "/mesh/cells10 does not fit /mesh/cells; the file is damaged");
   for (PetscInt c = 0; c < n; c++) {
     PetscInt vert[10];
 
@@ -457,7 +458,7 @@ static PetscErrorCode read_output(const File *f)
     PetscCall(PetscFree2(x, share));
   }
   PetscCall(read_bodies(f));
-  if (is_there(f, "/mesh/cells10")) PetscCall(read_quadratic(f, at));
+  if (is_there(f, "/mesh/cells10") || is_there(f, "/mesh/parent")) PetscCall(read_quadratic(f, at));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -37,12 +37,58 @@ static PetscErrorCode read_all(hid_t where, const char *name, hid_t type, size_t
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether each of n numbers is that of one of npoint points. */
+static PetscBool are_points(const PetscInt number[], PetscInt n, PetscInt npoint)
+{
+  for (PetscInt i = 0; i < n; i++)
+    if (number[i] < 0 || number[i] >= npoint) return PETSC_FALSE;
+  return PETSC_TRUE;
+}
+
+/* The points, and the tets of body number `which`; ok: the arrays are there and fit each other. */
+static PetscErrorCode read_tets(Other *o, PetscInt which, PetscBool *ok)
+{
+  PetscInt n = 0, nbody, nten, nparent, *body, *parent;
+
+  PetscFunctionBeginUser;
+  PetscCall(read_all(o->mesh, "x", H5T_NATIVE_DOUBLE, sizeof(double), 3, &o->npoint, &o->x));
+  PetscCall(read_all(o->mesh, "cells", SB_H5_INT, sizeof(PetscInt), 4, &o->ncell, &o->cell));
+  PetscCall(read_all(o->mesh, "body", SB_H5_INT, sizeof(PetscInt), 1, &nbody, &body));
+  PetscCall(read_all(o->mesh, "cells10", SB_H5_INT, sizeof(PetscInt), 10, &nten, &o->cell10));
+  PetscCall(read_all(o->mesh, "parent", SB_H5_INT, sizeof(PetscInt), 1, &nparent, &parent));
+  *ok = (PetscBool)(o->x && o->cell && (!nbody || (body && nbody == o->ncell)) && (!nten || o->cell10) &&
+                    (nparent
+                       ? parent && nparent == o->ncell && nten <= nparent && are_points(parent, nparent, nten)
+                       : !nten || nten == o->ncell));
+
+  /* in the place of parts of tets these, with the corners that come first */
+  for (PetscInt i = 0; *ok && body && i < nparent; i++) body[parent[i]] = body[i];
+  if (nten) o->ncell = nten;
+  for (PetscInt c = 0; *ok && c < nten; c++) {
+    PetscCall(PetscArraycpy(o->cell + 4 * c, o->cell10 + 10 * c, 4));
+    if (o->cell10[10 * c + 4] >= 0) *ok = are_points(o->cell10 + 10 * c + 4, 6, o->npoint);
+  }
+  *ok = (PetscBool)(*ok && are_points(o->cell, 4 * o->ncell, o->npoint));
+
+  /* those of the body */
+  for (PetscInt c = 0; *ok && c < o->ncell; c++) {
+    if (body && body[c] != which) continue;
+    PetscCall(PetscArraymove(o->cell + 4 * n, o->cell + 4 * c, 4));
+    if (o->cell10) PetscCall(PetscArraymove(o->cell10 + 10 * n, o->cell10 + 10 * c, 10));
+    n++;
+  }
+  o->ncell = n;
+  PetscCall(PetscFree(body));
+  PetscCall(PetscFree(parent));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode read_other(const char *option, const char *text, const SbBody *body, Other *o)
 {
   char name[32] = "mesh", *comma, *names, *rest;
   struct stat info;
   SbH5Frames frames = {.wanted = -1};
-  PetscInt which = -1, n = 0, nu, nparent = 0, *cell_body, *parent = NULL;
+  PetscInt which = -1, n = 0, nu;
   int64_t mesh = 0;
   PetscBool ok = PETSC_TRUE;
 
@@ -84,36 +130,13 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
   }
   PetscCheck(which >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s has no body '%s'", option,
              text, o->path, body->name);
-  PetscCall(read_all(o->mesh, "x", H5T_NATIVE_DOUBLE, sizeof(double), 3, &o->npoint, &o->x));
-  PetscCall(read_all(o->mesh, "cells", SB_H5_INT, sizeof(PetscInt), 4, &o->ncell, &o->cell));
-  PetscCall(read_all(o->mesh, "body", SB_H5_INT, sizeof(PetscInt), 1, &n, &cell_body));
-  /* tets that are parts of others, and these with the corners that come first */
-  if (H5Lexists(o->mesh, "cells10", H5P_DEFAULT) > 0)
-    PetscCall(read_all(o->mesh, "cells10", SB_H5_INT, sizeof(PetscInt), 10, &n, &o->cell10));
-  if (H5Lexists(o->mesh, "parent", H5P_DEFAULT) > 0)
-    PetscCall(read_all(o->mesh, "parent", SB_H5_INT, sizeof(PetscInt), 1, &nparent, &parent));
-  for (PetscInt i = 0; i < nparent && cell_body; i++) cell_body[parent[i]] = cell_body[i];
-  if (o->cell10) o->ncell = n;
-  for (PetscInt c = 0; c < o->ncell && o->cell10 && o->cell; c++)
-    PetscCall(PetscArraycpy(o->cell + 4 * c, o->cell10 + 10 * c, 4));
-  PetscCall(PetscFree(parent));
+  PetscCall(read_tets(o, which, &ok));
   PetscCall(read_all(o->frame, "displacement", H5T_NATIVE_DOUBLE, sizeof(double), 3, &nu, &o->u));
   PetscCall(read_all(o->frame, "velocity", H5T_NATIVE_DOUBLE, sizeof(double), 3, &n, &o->v));
-  PetscCheck(o->x && o->cell && o->u && nu == o->npoint && (!o->v || n == nu), PETSC_COMM_SELF,
-             PETSC_ERR_FILE_UNEXPECTED,
-             "%s %s: %s has no whole mesh with displacements; -output_fields displacement,velocity there",
+  PetscCheck(ok && o->u && nu == o->npoint && (!o->v || n == nu), PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s %s: %s has no whole mesh with displacements; -output_fields displacement,velocity there, or "
+             "it is damaged",
              option, text, o->path);
-
-  /* its tets of that body */
-  n = 0;
-  for (PetscInt c = 0; c < o->ncell; c++) {
-    if (cell_body && cell_body[c] != which) continue;
-    PetscCall(PetscArraymove(o->cell + 4 * n, o->cell + 4 * c, 4));
-    if (o->cell10) PetscCall(PetscArraymove(o->cell10 + 10 * n, o->cell10 + 10 * c, 10));
-    n++;
-  }
-  o->ncell = n;
-  PetscCall(PetscFree(cell_body));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

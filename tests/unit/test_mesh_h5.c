@@ -208,6 +208,10 @@ static PetscErrorCode test_cut(void)
     {9, 8, 2, 2, 0, 0, "/mesh/parent|2|row 9|0|1"},
     {9, 0, 1, 2, 0, 0, "/mesh/parent|row 1"},
     {-1, 0, 0, 10, 0, 0, "/mesh/cells10|/mesh/cells"},
+    {-1, 0, 0, 2, 0, 0, "/mesh/cells10|/mesh/cells"},
+    {9, 0, 0, 3, 0, 0, "/mesh/cells10|/mesh/cells"},
+    {9, 8, 0, 2, 0, 0, "/mesh/parent|row 9"},
+    {9, 0, 0, -1, 0, 0, "/mesh/cells10"},
     {9, 0, 0, 2, 3, -1, "/mesh/cells10|-1|row 1"},
     {9, 0, 0, 2, 19, -2, "/mesh/cells10|-2|row 2"},
     {9, 0, 0, 2, 19, 14, "/mesh/cells10|14|row 2"},
@@ -227,14 +231,14 @@ static PetscErrorCode test_cut(void)
     int body[9] = {0, 1, 1, 1, 1, 1, 1, 1, 1}, parent[9] = {0, 1, 1, 1, 1, 1, 1, 1, 1};
     int ten[100] = {0, 1, 2, 3, -1, -1, -1, -1, -1, -1, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13};
     const hsize_t nbody[1] = {9}, nparent[1] = {(hsize_t)PetscMax(cases[i].nparent, 0)},
-                  nten[2] = {(hsize_t)cases[i].nten, 10};
+                  nten[2] = {(hsize_t)PetscMax(cases[i].nten, 0), 10};
 
     if (cases[i].at || cases[i].parent) parent[cases[i].at] = cases[i].parent;
     if (cases[i].where) ten[cases[i].where] = cases[i].ten;
     put_array(file, "/mesh/x", 2, points, H5T_NATIVE_DOUBLE, x);
     put_array(file, "/mesh/cells", 2, tets, H5T_NATIVE_INT, cells);
     put_array(file, "/mesh/body", 1, nbody, H5T_NATIVE_INT, body);
-    put_array(file, "/mesh/cells10", 2, nten, H5T_NATIVE_INT, ten);
+    if (cases[i].nten >= 0) put_array(file, "/mesh/cells10", 2, nten, H5T_NATIVE_INT, ten);
     if (cases[i].nparent >= 0) put_array(file, "/mesh/parent", 1, nparent, H5T_NATIVE_INT, parent);
     (void)H5Fclose(file);
     if (cases[i].words) {

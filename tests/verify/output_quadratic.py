@@ -160,6 +160,18 @@ for state, ranks in ((OUT / "cut1", 1), (OUT / "cut3", 3), (OUT / "apart", 1), (
     run(ranks, "on", *STILL, "-body_bar_state", str(state), "-output_overwrite", "yes")
     energy = first_row("on")["strain"] / last_row("cut3")["strain"] - 1
     check(abs(energy) < 1e-12, f"the strain energy of a state of {state} is off by {energy:.3g}")
+# a damaged one is refused, before anything is taken at a number that it holds
+(OUT / "damaged").mkdir(exist_ok=True)
+for name, row, value in (("parent", 5, 2**31 - 1), ("parent", 5, -1), ("parent", None, None), ("cells10", 5, 2**31 - 1), ("cells10", 5, -1), ("cells10", None, None), ("cells", 5, None)):
+    (OUT / "damaged/fields.h5").write_bytes((OUT / "cut1/fields.h5").read_bytes())
+    with h5py.File(OUT / "damaged/fields.h5", "a") as file:
+        array = file[f"mesh/{name}"][:]
+        del file[f"mesh/{name}"]
+        if value is not None:
+            array.reshape(len(array), -1)[row, -1] = value
+        if row is not None:
+            file[f"mesh/{name}"] = array if value is not None else array[:row]
+    run(1, "on", *STILL, "-body_bar_state", str(OUT / "damaged"), "-output_overwrite", "yes", fails="damaged")
 # probes at the middle of an edge: the vertices are multiples of 0.05 m
 PROBE = ["-probes", "middle", "-probe_middle_at", "0.126,0.05,0.026", "-probe_middle_fields", "displacement,position,stress"]
 for ranks in (1, 3):
