@@ -7,7 +7,7 @@
     b = -k w (s - 1)^2 ln s,   b' = k (-2 (s - 1) ln s - (s - 1)^2 / s),   b'' = k/w (-2 ln s - 2 (s - 1)/s - (s^2 - 1)/s^2)
 
   Parallel edges: the nearest points jump. The energy of an edge pair is multiplied by (2 - y) y, y = c/e, c = |a x b|^2, where c is below e (the same article, section 5); vertices and
-  triangles carry what is left out. There e = 1e-3 |a|^2 |b|^2 at rest; here it is at most 2 |a| |b| d^2, too: edges that cross have their ends farther from each other than the gap d, and when the
+  triangles carry what is left out. There e = 1e-3 |a|^2 |b|^2 at rest; here it is at most 2 |a| |b| ((d + r)^2 - r^2), too, with the radius r of an obstacle: edges that cross have their ends farther from each other than the gap d, and when the
   ends keep nothing apart the gap shrinks to 1e-9 m, at which steps crawl (docs/reports/contact.md).
 */
 #include "sbbarrier.h"
@@ -31,12 +31,13 @@ void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal 
 }
 
 /*
-  The part of the energy that counts of edges with c as above, a gap d and rest = |a|^2 |b|^2: f = (p, p_d, p_c, p_dd, p_dc, p_cc), with its derivatives by d and c; f is left as it is where all
+  The part of the energy that counts of edges with c as above, a gap d, the radius r of the obstacle that is in it, and rest = |a|^2 |b|^2: f = (p, p_d, p_c, p_dd, p_dc, p_cc), with its derivatives by d and c; f is left as it is where all
   counts.
 */
-static void mollify(PetscReal c, PetscReal rest, PetscReal d, PetscReal f[6])
+static void mollify(PetscReal c, PetscReal rest, PetscReal d, PetscReal r, PetscReal f[6])
 {
-  const PetscReal near = NEAR * PetscSqrtReal(rest) * d * d, e = PetscMin(MOLLIFIED * rest, near), y = c / e;
+  const PetscReal square = d * (d + 2. * r), near = NEAR * PetscSqrtReal(rest) * square,
+                  slope = 2. * (d + r) / square, e = PetscMin(MOLLIFIED * rest, near), y = c / e;
 
   if (y >= 1.) return;
   f[0] = (2. - y) * y;
@@ -44,9 +45,9 @@ static void mollify(PetscReal c, PetscReal rest, PetscReal d, PetscReal f[6])
   f[2] = 2. * (1. - y) / e;
   f[5] = -2. / (e * e);
   if (e < near) return;
-  f[1] = -4. * y * (1. - y) / d;
-  f[3] = (12. - 20. * y) * y / (d * d);
-  f[4] = -4. * (1. - 2. * y) / (d * e);
+  f[1] = -2. * y * (1. - y) * slope;
+  f[3] = y * (4. * (1. - y) * (slope * slope - 1. / square) - 2. * y * slope * slope);
+  f[4] = -2. * (1. - 2. * y) * slope / e;
 }
 
 void SbBarrierPair(SbContactMesh m, const SbContactPair *pair, PetscReal gap, const SbDistance *g,
@@ -85,7 +86,7 @@ void SbBarrierPair(SbContactMesh m, const SbContactPair *pair, PetscReal gap, co
 
       rest *= SbDot3(r, r);
     }
-    mollify(SbEdgeCross(at, across, H ? C : NULL), rest, gap, f);
+    mollify(SbEdgeCross(at, across, H ? C : NULL), rest, gap, g->d - gap, f);
   }
   *energy = f[0] * b[0];
 

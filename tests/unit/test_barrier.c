@@ -112,7 +112,7 @@ int main(int argc, char **argv)
   PetscReal x[12], X[12], u[3], n[3];
   struct _p_SbContactMesh mesh = {.nbody_vertex = 4, .nvertex = 4, .X = X};
   SbContactPair pair = {.kind = SB_PAIR_VERTEX_TRIANGLE, .v = {0, 1, 2, 3}, .area = 0.7};
-  PetscInt tried[6] = {0};
+  PetscInt tried[7] = {0};
 
   check_function();
   check_crossing();
@@ -144,6 +144,12 @@ int main(int argc, char **argv)
     }
     check_pair(&mesh, &pair, x, 4, &tried[5]);
 
+    /* the same, one of them an edge of a capsule */
+    mesh.nbody_vertex = 2;
+    mesh.radius = 0.01;
+    for (int k = 0; k < 6; k++) x[6 + k] += 0.01 * n[k % 3] / PetscSqrtReal(SbDot3(n, n));
+    check_pair(&mesh, &pair, x, 4, &tried[6]);
+
     /* a half-space and a bowl: only the first vertex moves */
     pair.side = PETSC_TRUE;
     mesh.nbody_vertex = 1;
@@ -154,6 +160,6 @@ int main(int argc, char **argv)
     mesh.radius = 1.;
     check_pair(&mesh, &pair, x, 1, &tried[4]);
   }
-  for (int k = 0; k < 6; k++) SB_CHECK(tried[k] > 100, "%d pairs of kind %d examined", (int)tried[k], k);
+  for (int k = 0; k < 7; k++) SB_CHECK(tried[k] > 100, "%d pairs of kind %d examined", (int)tried[k], k);
   SB_TEST_END();
 }
