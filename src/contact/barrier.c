@@ -7,13 +7,13 @@
     b = -k w (s - 1)^2 ln s,   b' = k (-2 (s - 1) ln s - (s - 1)^2 / s),   b'' = k/w (-2 ln s - 2 (s - 1)/s - (s^2 - 1)/s^2)
 
   Parallel edges: the nearest points jump. The energy of an edge pair is multiplied by (2 - y) y, y = c/e, c = |a x b|^2, where c is below e (the same article, section 5); vertices and
-  triangles carry what is left out. There e = 1e-3 |a|^2 |b|^2 at rest; here it is at most 2 |a| |b| ((d + r)^2 - r^2), too, with the radius r of an obstacle: edges that cross have their ends farther from each other than the gap d, and when the
-  ends keep nothing apart the gap shrinks to 1e-9 m, at which steps crawl (docs/reports/contact.md).
+  triangles carry what is left out. There e = 1e-3 |a|^2 |b|^2 at rest; here it is at most 2 |a| |b| ((d + r)^2 - r^2), too, with the radius r of an obstacle: edges that cross have their ends
+  farther from each other than the gap d, and when the ends keep nothing apart the gap shrinks to 1e-9 m, at which steps crawl (docs/reports/contact.md).
 */
 #include "sbbarrier.h"
 
 #define MOLLIFIED 1e-3 /* e above, of |a|^2 |b|^2 */
-#define NEAR 2.        /* the same, of |a| |b| d^2 */
+#define NEAR 2.        /* the same, of |a| |b| ((d + r)^2 - r^2) */
 
 void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal b[3])
 {
@@ -31,8 +31,8 @@ void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal 
 }
 
 /*
-  The part of the energy that counts of edges with c as above, a gap d, the radius r of the obstacle that is in it, and rest = |a|^2 |b|^2: f = (p, p_d, p_c, p_dd, p_dc, p_cc), with its derivatives by d and c; f is left as it is where all
-  counts.
+  The part of the energy that counts of edges with c, d and r as above and rest = |a|^2 |b|^2: f = (p, p_d, p_c, p_dd, p_dc, p_cc), with its derivatives by d and c; f is left as it is where
+  all counts.
 */
 static void mollify(PetscReal c, PetscReal rest, PetscReal d, PetscReal r, PetscReal f[6])
 {
