@@ -49,6 +49,9 @@ typedef struct {
   PetscErrorCode (*setup)(SbEffect e, SbSpace space);
   /* writes prescribed displacements at time t into space->fixed_value (rows are positions in space->fixed_node). Not collective. */
   PetscErrorCode (*prescribe)(SbEffect e, SbSpace space, PetscReal t);
+  /* for supports that turn: what reactions r0 at t0 and r1 at t1 (of owned nodes, N) do on the way beyond their mean along the straight line, J; this rank's. Not collective. */
+  PetscErrorCode (*turning_work)(SbEffect e, SbSpace space, PetscReal t0, PetscReal t1, const PetscReal r0[],
+                                 const PetscReal r1[], PetscReal *work);
   /* contact, before the first solve of an attempt at a step from t to t + dt: local displacements u0 at t and u as predicted at
      t + dt, m; v0 are the velocities at t, m/s, NULL unless an effect has `restitution`. Collective. */
   PetscErrorCode (*begin_step)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, const PetscReal u0[],

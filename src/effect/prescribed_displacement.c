@@ -71,26 +71,63 @@ static PetscErrorCode setup_displacement(SbEffect e, SbSpace space)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What the turn by theta adds to a place X, without cancellation at small angles. */
+static void turn(const PrescribedDisplacement *d, const PetscReal X[], PetscReal theta, PetscReal u[3])
+{
+  const PetscReal r[3] = {X[0] - d->point[0], X[1] - d->point[1], X[2] - d->point[2]};
+  const PetscReal half = PetscSinReal(theta / 2);
+  PetscReal kr[3], kkr[3];
+
+  SbCross(d->axis, r, kr);
+  SbCross(d->axis, kr, kkr);
+  for (int c = 0; c < 3; c++) u[c] = PetscSinReal(theta) * kr[c] + 2 * half * half * kkr[c];
+}
+
 static PetscErrorCode prescribe_displacement(SbEffect e, SbSpace space, PetscReal t)
 {
   PrescribedDisplacement *d = (PrescribedDisplacement *)e->data;
   const PetscReal theta = SbFormulaEval(d->angle, t, NULL) * PETSC_PI / 180;
-  const PetscReal half = PetscSinReal(theta / 2);
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < d->prescribed.n; i++) {
     const PetscReal *X = &space->node_x[3 * d->prescribed.node[i]];
-    const PetscReal r[3] = {X[0] - d->point[0], X[1] - d->point[1], X[2] - d->point[2]};
-    PetscReal kr[3], kkr[3];
+    PetscReal *value = d->value + 3 * i;
 
-    SbCross(d->axis, r, kr);
-    SbCross(d->axis, kr, kkr);
-    for (int c = 0; c < 3; c++) {
-      d->value[3 * i + c] =
-        SbFormulaEval(d->displacement[c], t, X) + PetscSinReal(theta) * kr[c] + 2 * half * half * kkr[c];
-    }
+    turn(d, X, theta, value);
+    for (int c = 0; c < 3; c++) value[c] += SbFormulaEval(d->displacement[c], t, X);
   }
   PetscCall(SbPrescribedSetValues(&d->prescribed, space, d->value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Forces turn with the body, so their work is that of their moments over the angle; over the chord a constant moment would do but sin(angle) of it. */
+static PetscErrorCode turning_work_displacement(SbEffect e, SbSpace space, PetscReal t0, PetscReal t1,
+                                                const PetscReal r0[], const PetscReal r1[], PetscReal *work)
+{
+  const PrescribedDisplacement *d = (const PrescribedDisplacement *)e->data;
+  const PetscReal theta[2] = {SbFormulaEval(d->angle, t0, NULL) * PETSC_PI / 180,
+                              SbFormulaEval(d->angle, t1, NULL) * PETSC_PI / 180};
+
+  PetscFunctionBeginUser;
+  *work = 0;
+  if (theta[0] == theta[1]) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = 0; i < d->prescribed.nowned; i++) {
+    const PetscInt node = d->prescribed.node[i];
+    const PetscReal *X = &space->node_x[3 * node], *force[2] = {r0 + 3 * node, r1 + 3 * node};
+    PetscReal u[2][3], arm[3], way[2][3];
+
+    for (int k = 0; k < 2; k++) {
+      turn(d, X, theta[k], u[k]);
+      for (int c = 0; c < 3; c++) arm[c] = X[c] - d->point[c] + u[k][c];
+      SbCross(d->axis, arm, way[k]); // by the angle
+    }
+    for (int k = 0; k < 2; k++) {
+      for (int c = 0; c < 3; c++) {
+        if (d->prescribed.components[i] & (1 << c))
+          *work += 0.5 * force[k][c] * ((theta[1] - theta[0]) * way[k][c] - u[1][c] + u[0][c]);
+      }
+    }
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -140,6 +177,7 @@ const SbEffectType SbEffectPrescribedDisplacement = {
   .ops = {.setfromoptions = options_displacement,
           .setup = setup_displacement,
           .prescribe = prescribe_displacement,
+          .turning_work = turning_work_displacement,
           .history = history_displacement,
           .destroy = destroy_displacement},
 };

@@ -1,7 +1,7 @@
 /*
   The account of energies. With R the residual without constraints (the reaction on prescribed unknowns) and f the loads, a step from 0 to 1
   does the work (f0 + f1)/2 . (u1 - u0) by the loads (exact for constant loads: minus the change of their potential),
-  (R0 + R1)/2 . (u1 - u0) by moving supports, and loses (p0 + p1)/2 h with p = v . C v to damping. What contact by barrier does it
+  (R0 + R1)/2 . (u1 - u0) by moving supports (those that turn: by their moments over the angle), and loses (p0 + p1)/2 h with p = v . C v to damping. What contact by barrier does it
   knows itself (src/effect/barrier.c): the energy of its gaps may change by much within a step. What is missing then
   between start and now was taken (or, negative, given) by the integrator. None of the implicit ones gives much while it is stable; one
   that gives most of what there is will go on, and what the run shows from there on is no motion of a body.
@@ -30,11 +30,31 @@ PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What reactions do beyond their mean along straight lines, J; this rank's. */
+static PetscErrorCode turning_work(SbRun run, PetscReal t, PetscReal dt, Vec reaction, PetscReal *work)
+{
+  const SbModel m = run->model;
+  const PetscScalar *before, *now;
+  PetscReal one;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArrayRead(run->reaction, &before));
+  PetscCall(VecGetArrayRead(reaction, &now));
+  for (PetscInt e = 0; e < m->nprescribe; e++) {
+    if (!m->prescribe[e]->ops.turning_work) continue;
+    SbEffectCall(m->prescribe[e], turning_work, m->space, t - dt, t, before, now, &one);
+    *work += one;
+  }
+  PetscCall(VecRestoreArrayRead(reaction, &now));
+  PetscCall(VecRestoreArrayRead(run->reaction, &before));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool first)
 {
   SbModel m = run->model;
   SbEnergies *e = &run->energies;
-  PetscReal work[4], power = 0., contact = 0.;
+  PetscReal work[4], power = 0., own[2] = {0., 0.}; /* of contact, of supports that turn: this rank's */
   Vec loads, reaction;
 
   PetscFunctionBeginUser;
@@ -42,7 +62,7 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   PetscCall(VecDuplicate(run->U, &loads));
   PetscCall(VecDuplicate(run->U, &reaction));
   PetscCall(SbModelLoads(m, t, run->U, run->V, loads));
-  if (m->npotential) PetscCall(SbModelPotentialWork(m, run->U, &contact, loads));
+  if (m->npotential) PetscCall(SbModelPotentialWork(m, run->U, &own[0], loads));
   PetscCall(SbRunReactions(run, t, reaction));
   if (run->damped) PetscCall(SbModelDampingPower(m, run->U, run->V, &power));
   if (!first) {
@@ -57,9 +77,10 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
     PetscCall(VecDot(reaction, moved, &work[2]));
     PetscCall(VecDot(run->reaction, moved, &work[3]));
     PetscCall(VecDestroy(&moved));
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &contact, 1, MPIU_REAL, MPI_SUM, m->comm));
-    e->load_work += 0.5 * (work[0] + work[1]) + contact;
-    e->prescribed_work += 0.5 * (work[2] + work[3]);
+    PetscCall(turning_work(run, t, dt, reaction, &own[1]));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, own, 2, MPIU_REAL, MPI_SUM, m->comm));
+    e->load_work += 0.5 * (work[0] + work[1]) + own[0];
+    e->prescribed_work += 0.5 * (work[2] + work[3]) + own[1];
     e->damping_loss += 0.5 * dt * (power + run->damping_power);
   } else if (run->step0 == 0)
     run->energy_start = e->kinetic + e->strain;

@@ -6,6 +6,7 @@
     decay      implicit Euler on a linear body: energy falls in every step, and what the account calls the integrator's
                loss is exactly 1/2 dv.M dv + 1/2 du.K du of the steps
     account    a nonlinear body, loaded, driven and damped: what is missing in the account falls with h^2 for Newmark
+    turning    the end of a bar turns by 9 degrees a step: implicit Euler gives no energy, nor does a static load path
     swing      a soft bar of CR or DG lets go under its weight: the penalty of jumps follows the pressure of bending, and gives no energy
     momentum   free flight with spin: linear momentum to rounding with every integrator; angular momentum to rounding with
                symplectic Euler, whose step cannot change it, else to the order of the method
@@ -277,6 +278,45 @@ static PetscErrorCode check_flight(const char *preset, const char *element, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* ------------------------------------------------------------------ turning */
+
+static PetscErrorCode watch_gain(SbRun run, const SbStep *step, void *ctx)
+{
+  PetscReal *gain = (PetscReal *)ctx;
+
+  PetscFunctionBeginUser;
+  (void)run;
+  *gain = PetscMax(*gain, -step->energies.integrator_loss);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_turning(const char *time, const char *element)
+{
+  TestScene t;
+  char text[VERIFY_TEXT];
+  PetscReal gain = 0., given;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(
+    text, sizeof(text),
+    "-bodies a -body_a_mesh box:0.3,0.1,0.1:2" BODY "-body_a_element %s -body_a_material neohookean -effects "
+                                                    "clamp,end -effect_clamp_type fixed -effect_clamp_on "
+    "xmin -effect_end_type prescribed_displacement -effect_end_on xmax -effect_end_displacement "
+    "0;0;0.01*t -effect_end_angle 90*t -effect_end_axis 1,0,0 -effect_end_axis_point 0,0.05,0.05 -time %s",
+    element, time));
+  PetscCall(test_scene_open(text, &t));
+  t.run->want_energies = PETSC_TRUE;
+  PetscCall(SbRunAddMonitor(t.run, watch_gain, &gain));
+  PetscCall(verify_solve(&t, "turning"));
+  given = t.run->energies.prescribed_work;
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  turning, %s, %s: %.1e of the work %g J is given\n", element,
+                        time, (double)(gain / given), (double)given));
+  SB_CHECK(given > 0. && gain < 1e-4 * given, "turning, %s: energy %g J was made, work %g J", time,
+           (double)gain, (double)given);
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   PetscMPIInt size;
@@ -297,6 +337,8 @@ int main(int argc, char **argv)
   PetscCall(check_account("newmark", "cr", "corotated", 0, 6e-4));
   PetscCall(check_account("newmark", "dg", "corotated", 0, 6e-4));
   PetscCall(check_account("newmark", "p2", "corotated", 2, 1e-3));
+  PetscCall(check_turning("euler_implicit -ts_dt 0.1 -ts_max_time 1", "p1"));
+  PetscCall(check_turning("static -static_steps 10", "p2"));
   PetscCall(check_swing("cr"));
   PetscCall(check_swing("dg"));
   PetscCall(check_flight("euler_implicit", "p1", "corotated", 2e-3, 1));
