@@ -300,7 +300,7 @@ static PetscErrorCode check_turning(const char *time, const char *element)
   PetscCall(PetscSNPrintf(
     text, sizeof(text),
     "-bodies a -body_a_mesh box:0.3,0.1,0.1:2" BODY "-body_a_element %s -body_a_material neohookean -effects "
-                                                    "clamp,end -effect_clamp_type fixed -effect_clamp_on "
+    "clamp,end -effect_clamp_type fixed -effect_clamp_on "
     "xmin -effect_end_type prescribed_displacement -effect_end_on xmax -effect_end_displacement "
     "0;0;0.01*t -effect_end_angle 90*t -effect_end_axis 1,0,0 -effect_end_axis_point 0,0.05,0.05 -time %s",
     element, time));
