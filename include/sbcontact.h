@@ -41,10 +41,13 @@ PetscReal SbObstacleDistance(SbObstacle obstacle, const PetscReal x[3], PetscRea
 
 /* Obstacles that vertices alone meet: a half-space, as a point of its surface and the tip of the unit normal there; a bowl, as its centre. */
 typedef enum { SB_SIDE_NONE, SB_SIDE_PLANE, SB_SIDE_BOWL } SbObstacleSide;
-/* A rigid motion: x = c + R (X - c) + d. */
+/* A rigid motion: x = c + R (X - c) + d; R turns by an angle (rad) about the unit axis. */
 typedef struct {
-  PetscReal R[9], c[3], d[3];
+  PetscReal R[9], c[3], d[3], axis[3], angle;
 } SbPose;
+/* The way from one pose to the next of a point at x in `at`, one of them, as it sets off or arrives there: that of its arc, d1 - d0 + (angle1 - angle0) axis x (x - c - d), m. */
+void SbPoseWay(const SbPose *from, const SbPose *to, const SbPose *at, const PetscReal x[3],
+               PetscReal way[3]);
 /* Rotation by an angle (rad) about the unit axis through c, then the translation d. */
 void SbPoseSet(const PetscReal axis[3], PetscReal angle, const PetscReal c[3], const PetscReal d[3],
                SbPose *pose);

@@ -333,7 +333,18 @@ void SbPoseSet(const PetscReal axis[3], PetscReal angle, const PetscReal c[3], c
   for (int i = 0; i < 3; i++) {
     pose->c[i] = c[i];
     pose->d[i] = d[i];
+    pose->axis[i] = axis[i];
   }
+  pose->angle = angle;
+}
+
+void SbPoseWay(const SbPose *from, const SbPose *to, const SbPose *at, const PetscReal x[3], PetscReal way[3])
+{
+  PetscReal arm[3];
+
+  for (int i = 0; i < 3; i++) arm[i] = x[i] - at->c[i] - at->d[i];
+  SbCross(at->axis, arm, way);
+  for (int i = 0; i < 3; i++) way[i] = (to->angle - from->angle) * way[i] + to->d[i] - from->d[i];
 }
 
 void SbPoseApply(const SbPose *pose, const PetscReal X[3], PetscReal x[3])

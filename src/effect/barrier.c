@@ -292,8 +292,11 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the forces of obstacles do over their way in this step, N m: those of gaps, and those of friction. */
-static void obstacle_works(const Barrier *b, PetscReal *gaps, PetscReal *friction)
+/*
+  What the forces of obstacles do over their way in this step, N m: those of gaps, as they are at its start or its end, and those of friction. Forces turn with an
+  obstacle, so gaps count along its arc: their moment over the angle.
+*/
+static void obstacle_works(const Barrier *b, PetscBool end, PetscReal *gaps, PetscReal *friction)
 {
   const SbContactMesh m = b->mesh;
 
@@ -311,9 +314,15 @@ static void obstacle_works(const Barrier *b, PetscReal *gaps, PetscReal *frictio
     for (int k = 0; k < 4; k++) {
       const PetscInt v = 3 * (pair->v[k] - m->nbody_vertex);
       const PetscReal *g = gradient + 3 * k;
+      PetscReal way[3];
 
       if (v < 0) continue;
-      for (int j = 0; j < 3; j++) *(a ? gaps : friction) += g[j] * (b->to[v + j] - b->from[v + j]);
+      if (a) {
+        SbPoseWay(&b->pose[0], &b->pose[1], &b->pose[end], (end ? b->to : b->from) + v, way);
+        *gaps += SbDot3(g, way);
+      } else {
+        for (int j = 0; j < 3; j++) *friction += g[j] * (b->to[v + j] - b->from[v + j]);
+      }
     }
     /* and where it turns under what slips */
     if (!a) {
@@ -417,7 +426,7 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
   PetscCheck(least > 0., PETSC_COMM_SELF, PETSC_ERR_PLIB,
              "The effect %s: a gap of %g m at the start of a step", e->name, (double)least);
   b->energy = gap_energy(b);
-  obstacle_works(b, &b->obstacle_power, &unused);
+  obstacle_works(b, PETSC_FALSE, &b->obstacle_power, &unused);
 
   /* friction with the forces of the start */
   b->slip = e->dynamic ? PetscMax(SLIP * speed * dt, SLIP_LEAST * m->size) : SLIP_STATIC * m->size;
@@ -510,7 +519,7 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   /* what contact has done in the step */
   before = b->energy;
   b->energy = gap_energy(b);
-  obstacle_works(b, &power, &friction);
+  obstacle_works(b, PETSC_TRUE, &power, &friction);
   for (PetscInt i = 0; i < b->nrub; i++) {
     PetscReal u[3];
 

@@ -111,25 +111,32 @@ static void check_poses(void)
   const PetscReal axis[3] = {2. / 3, 1. / 3, -2. / 3}, c[3] = {0.1, 0.2, 0.3}, d[3] = {1, -2, 0.5};
   const PetscReal z[3] = {0, 0, 1}, none[3] = {0, 0, 0}, e[3] = {1, 0, 0};
   PetscReal x[3], X[3];
+  const PetscReal moved[3] = {1 + 3e-6, -2, 0.5};
   unsigned state = 3;
-  SbPose pose;
+  SbPose pose, next;
 
   SbPoseSet(z, PETSC_PI / 2, none, d, &pose);
   SbPoseApply(&pose, e, x);
   SB_CHECK_NEAR(x[0], 1, 1e-15, "a right-handed quarter turn, then the shift");
   SB_CHECK_NEAR(x[1], -1, 1e-15, "a right-handed quarter turn, then the shift");
   SbPoseSet(axis, 1.1, c, d, &pose);
+  SbPoseSet(axis, 1.1 + 1e-6, c, moved, &next);
   SbPoseApply(&pose, c, x);
   for (int k = 0; k < 3; k++) SB_CHECK_NEAR(x[k], c[k] + d[k], 1e-15, "the centre is only shifted");
   for (int i = 0; i < 9; i++)
     SB_CHECK_NEAR(SbDot3(pose.R + 3 * (i / 3), pose.R + 3 * (i % 3)), i % 4 == 0, 1e-15, "R R^T");
   for (int i = 0; i < 20; i++) {
-    PetscReal p[3];
+    PetscReal p[3], way[3];
 
     for (int k = 0; k < 3; k++) p[k] = number(&state);
     SbPoseApply(&pose, p, x);
     SbPoseInvert(&pose, x, X);
     for (int k = 0; k < 3; k++) SB_CHECK_NEAR(X[k], p[k], 1e-15, "there and back");
+    SbPoseWay(&pose, &next, &pose, x, way);
+    SbPoseApply(&next, p, X);
+    for (int k = 0; k < 3; k++) SB_CHECK_NEAR(way[k], X[k] - x[k], 1e-11, "a short arc is its chord");
+    SbPoseWay(&pose, &next, &next, X, way);
+    for (int k = 0; k < 3; k++) SB_CHECK_NEAR(way[k], X[k] - x[k], 1e-11, "from its other end, too");
   }
 }
 

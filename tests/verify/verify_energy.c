@@ -7,6 +7,7 @@
                loss is exactly 1/2 dv.M dv + 1/2 du.K du of the steps
     account    a nonlinear body, loaded, driven and damped: what is missing in the account falls with h^2 for Newmark
     turning    the end of a bar turns by 9 degrees a step: implicit Euler gives no energy, nor does a static load path
+    grip       two obstacles turn the end of a bar by 2 degrees a step: the same
     swing      a soft bar of CR or DG lets go under its weight: the penalty of jumps follows the pressure of bending, and gives no energy
     momentum   free flight with spin: linear momentum to rounding with every integrator; angular momentum to rounding with
                symplectic Euler, whose step cannot change it, else to the order of the method
@@ -318,6 +319,40 @@ static PetscErrorCode check_turning(const char *time, const char *element)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode check_grip(void)
+{
+  const char *const rod =
+    "type contact -effect_%s_obstacle capsule:%g,-0.1,0.28,%g,0.1,0.28,0.01 -effect_%s_response barrier "
+    "-effect_%s_axis 0,0,1 -effect_%s_angle 40*t -effect_%s_";
+  TestScene t;
+  char text[VERIFY_TEXT], one[VERIFY_TEXT], other[VERIFY_TEXT];
+  PetscReal gain = 0., given;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(one, sizeof(one), rod, "left", -0.0612, -0.0612, "left", "left", "left", "left"));
+  PetscCall(
+    PetscSNPrintf(other, sizeof(other), rod, "right", 0.0612, 0.0612, "right", "right", "right", "right"));
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text),
+                  "-bodies a -body_a_mesh box:0.1,0.1,0.3:2,2,6 -body_a_translate -0.05,-0.05,0" BODY
+                  "-body_a_material neohookean -effects clamp,left,right -effect_clamp_type fixed "
+                  "-effect_clamp_on zmin -effect_left_%saxis_point 0,0,0 -effect_right_%saxis_point 0,0,0 "
+                  "-time static -static_steps 20",
+                  one, other));
+  PetscCall(test_scene_open(text, &t));
+  t.run->want_energies = PETSC_TRUE;
+  PetscCall(SbRunAddMonitor(t.run, watch_gain, &gain));
+  PetscCall(verify_solve(&t, "grip"));
+  given = t.run->energies.load_work;
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  grip: %.1e of the work %g J is given\n", (double)(gain / given),
+                        (double)given));
+  /* along the chord 1.5e-3 would be missing */
+  SB_CHECK(given > 0. && gain < 3e-4 * given, "grip: energy %g J was made, work %g J", (double)gain,
+           (double)given);
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   PetscMPIInt size;
@@ -340,6 +375,7 @@ int main(int argc, char **argv)
   PetscCall(check_account("newmark", "p2", "corotated", 2, 1e-3));
   PetscCall(check_turning("euler_implicit -ts_dt 0.1 -ts_max_time 1", "p1"));
   PetscCall(check_turning("static -static_steps 10", "p2"));
+  PetscCall(check_grip());
   PetscCall(check_swing("cr"));
   PetscCall(check_swing("dg"));
   PetscCall(check_flight("euler_implicit", "p1", "corotated", 2e-3, 1));
