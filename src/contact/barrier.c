@@ -1,19 +1,19 @@
 /*
-  barrier.c - what keeps the features of a pair apart.
+  barrier.c - the barrier potential of a contact pair and its derivatives.
 
   The energy of a gap d below the width w, s = d / w, per area (Li et al., "Incremental potential contact", ACM TOG 39(4), 2020, in the physical form
   of ipc-toolkit):
 
     b = -k w (s - 1)^2 ln s,   b' = k (-2 (s - 1) ln s - (s - 1)^2 / s),   b'' = k/w (-2 ln s - 2 (s - 1)/s - (s^2 - 1)/s^2)
 
-  Parallel edges: the nearest points jump. The energy of an edge pair is multiplied by (2 - y) y, y = c/e, c = |a x b|^2, where c is below e (the same article, section 5); vertices and
-  triangles carry what is left out. There e = 1e-3 |a|^2 |b|^2 at rest; here it is at most 2 |a| |b| ((d + r)^2 - r^2), too, with the radius r of an obstacle: edges that cross have their ends
-  farther from each other than the gap d, and when the ends keep nothing apart the gap shrinks to 1e-9 m, at which steps crawl (docs/reports/contact.md).
+  Nearly parallel edges a, b: the closest points are discontinuous. The energy of an edge pair is multiplied by (2 - y) y, y = c/e, c = |a x b|^2, where c < e (the same article, section 5);
+  vertex-triangle pairs supply the rest. There e = 1e-3 |a|^2 |b|^2 at rest; here also e <= 2 |a| |b| ((d + r)^2 - r^2), with the radius r of an obstacle: crossing edges have their ends
+  farther apart than the gap d, so vertex-triangle pairs are inactive; without this bound gaps fell to 1e-9 m, where Newton steps become tiny (docs/reports/contact.md).
 */
 #include "sbbarrier.h"
 
-#define MOLLIFIED 1e-3 /* e above, of |a|^2 |b|^2 */
-#define NEAR 2.        /* the same, of |a| |b| ((d + r)^2 - r^2) */
+#define MOLLIFIED 1e-3 /* e / (|a|^2 |b|^2) */
+#define NEAR 2.        /* bound of e / (|a| |b| ((d + r)^2 - r^2)) */
 
 void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal b[3])
 {
@@ -31,8 +31,7 @@ void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal 
 }
 
 /*
-  The part of the energy that counts of edges with c, d and r as above and rest = |a|^2 |b|^2: f = (p, p_d, p_c, p_dd, p_dc, p_cc), with its derivatives by d and c; f is left as it is where
-  all counts.
+  The factor p on the energy of edges with c, d, r as above and rest = |a|^2 |b|^2, and its derivatives: f = (p, p_d, p_c, p_dd, p_dc, p_cc). Unchanged where p = 1.
 */
 static void mollify(PetscReal c, PetscReal rest, PetscReal d, PetscReal r, PetscReal f[6])
 {
@@ -76,7 +75,7 @@ void SbBarrierPair(SbContactMesh m, const SbContactPair *pair, PetscReal gap, co
     return;
   }
 
-  /* parallel edges: a part of it */
+  /* nearly parallel edges: the factor of mollify() */
   if (pair->kind == SB_PAIR_EDGE_EDGE) {
     PetscReal rest = 1.;
 

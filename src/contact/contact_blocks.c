@@ -1,9 +1,9 @@
 /*
-  contact_blocks.c - the second derivative of contact, summed up by pairs of surface vertices and then spread over the nodes.
+  contact_blocks.c - the Hessian of contact, summed over pairs of surface vertices, then assembled at the nodes.
 
   A vertex of the surface is at x_v = X_v + sum_j w_vj u_j, so the derivative by the nodes is S^T H S with S = (w_vj). H is summed first, in blocks of two
-  vertices: pairs of features share them, and a vertex of CR and DG has some twenty nodes. Then come the rows of T = H S, and those of S^T T, in which each
-  column stands once.
+  vertices: pairs of features share them, and a vertex of CR and DG has some twenty nodes. Then the rows of T = H S, and of S^T T, are formed, each
+  column once.
 
   Sums run in the order of the pairs of features and in that of the vertices' numbers: neither depends on the partition.
 */
@@ -19,7 +19,7 @@ PetscErrorCode SbContactBlocksFree(SbContactBlocks *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where the pair is in the table, or would be. */
+/* Slot of the vertex pair in the hash table: where it is, or the free one where it belongs. */
 static inline PetscInt find_slot(const SbContactBlocks *b, PetscInt v, PetscInt w)
 {
   PetscInt at =

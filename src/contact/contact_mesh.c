@@ -1,14 +1,14 @@
 /*
-  contact_mesh.c - the surfaces of bodies and of an obstacle as vertices, edges and triangles, whole on every rank.
+  contact_mesh.c - the surfaces of bodies and of an obstacle as vertices, edges and triangles, replicated on every rank.
 
-  A vertex of a body follows its nodes: with P1 the one that it is; with CR and DG, whose displacement jumps from cell to cell, the mean over the cells
+  A vertex of a body moves by a weighted mean of nodes: with P1 its own node; with CR and DG, whose displacement is discontinuous, the mean over the cells
   behind the facets around it, so that the surface is closed and linear fields are reproduced. A facet of P2 is four flat triangles over its six nodes: its corners and
   the middles of its sides are vertices. The rank that owns the vertex in the
   mesh knows all facets around it (the overlap), makes its list of nodes and moves it; positions are gathered by all ranks, 24 bytes per
   vertex of the surface. Numbers follow the original ones of the mesh: nothing below depends on the partition.
 
-  The obstacle: a sphere is a vertex, a capsule an edge, with a radius. Box, cylinder and mesh are triangles. A half-space and a bowl are everything on one side,
-  met by vertices alone; they are kept as two vertices, a point and the tip of the normal there, or as the centre.
+  The obstacle: a sphere is a vertex, a capsule an edge, with a radius. Box, cylinder and mesh are triangles. A half-space and a bowl touch
+  vertices only; they are stored as two vertices, a point and the tip of the normal there, or as one, the centre.
 */
 #include "contact_mesh.h"
 #include "obstacle.h"

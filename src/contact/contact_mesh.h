@@ -1,5 +1,5 @@
 /*
-  contact_mesh.h - what the files about surfaces in contact share.
+  contact_mesh.h - shared by the files about surfaces in contact.
 */
 #pragma once
 #include "sbbarrier.h"
@@ -18,9 +18,9 @@ static inline PetscReal SbContactTriangleArea(const PetscReal x[], const PetscIn
 }
 
 /*
-  SbContactMeshCrossings - edges that go through triangles of another part, or of the same one (self), at x.
+  SbContactMeshCrossings - edges that intersect triangles of another body, or of the same one (self), at x[nvertex][3], current positions, m.
 
-  Collective. Output, of all ranks on each: hit[n][2], edge and triangle, ascending; the caller frees it. It knows nothing of pairs and motions.
+  Collective. Output, of all ranks on each: hit[n][2], edge and triangle, ascending; the caller frees it. Independent of the pair search.
 */
 PetscErrorCode SbContactMeshCrossings(SbContactMesh mesh, PetscBool self, const PetscReal x[], PetscInt *n,
                                       PetscInt **hit);

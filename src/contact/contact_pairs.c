@@ -1,9 +1,9 @@
 /*
-  contact_pairs.c - which features of the surfaces may meet, how near they are, and how far they may go.
+  contact_pairs.c - pairs of features (vertex-triangle, edge-edge) that may come into contact, their gaps, and the collision-free part of a motion.
 
-  Search. Each vertex has a box around its motion, grown by a margin; those of edges and triangles hold the boxes of their vertices. Trees of
+  Search. Each vertex has a box around its motion, grown by a margin; those of edges and triangles enclose the boxes of their vertices. Trees of
   boxes, which are refitted, give all pairs of a vertex and a triangle, and of two edges, whose boxes are within the reach. They stay valid while every vertex stays in its box: iterations that move
-  little, and most do, search for nothing. A motion that meets too many features for that is halved: the rest has to wait for another iteration.
+  little, as most do, need no search. A motion with too many pairs is halved: the next iteration continues it.
 
   Safe part of a motion. Additive continuous collision detection (Li, Kaufman and Jiang, "Codimensional incremental potential contact", ACM TOG 40(4), 2021,
   section 5; src/geometry/ccd.c) leaves a tenth of each gap. A half-space and a bowl have roots of quadratic polynomials.
@@ -12,8 +12,9 @@
 #include "sbgeometry.h"
 #include "sblog.h"
 
-#define LEFT 0.1      /* fraction of its gap that a pair keeps at least */
-#define LEFT_MOST 0.5 /* of the reach: no more need be left; what comes from afar is within it at once */
+#define LEFT 0.1 /* fraction of its gap that a pair keeps at least */
+#define LEFT_MOST \
+  0.5 /* largest gap that is kept, over the reach: a distant pair may come within the reach at once */
 
 static inline void places(const SbContactPair *pair, const PetscReal x[], PetscReal at[12])
 {
@@ -50,12 +51,12 @@ PetscReal SbContactPairGap(SbContactMesh m, const SbContactPair *pair, const Pet
 
 /* ------------------------------------------------------------------ search */
 
-#define MARGIN 0.1 /* of the mean edge, by which boxes are grown at least */
-#define CROWD 200  /* pairs for each vertex, and for CROWD_LEAST more, beyond which a motion is halved */
+#define MARGIN 0.1 /* of the mean edge: least growth of the boxes */
+#define CROWD 200  /* a motion with more pairs than CROWD (number of vertices + CROWD_LEAST) is halved */
 #define CROWD_LEAST 1000
 #define CHUNK 256 /* pairs of boxes at once */
 
-/* Features of one kind that touch nodes of this rank, or do not, with a tree over their boxes. */
+/* Features of one kind, those with a node of this rank or the others, with a tree over their boxes. */
 enum { VERTEX, TRIANGLE, EDGE };
 struct SbContactFeatures {
   PetscInt n, *item;   /* [n] numbers in the mesh */
@@ -78,8 +79,8 @@ static PetscErrorCode add_pair(SbContactPairs p, const SbContactPair *pair)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the features of a pair stay farther apart than the reach, wherever its vertices are in their boxes: the distance in the middle of the boxes
-   less what vertices may move from there, as the points between them move no farther. Boxes of neighbours in a surface overlap, but they seldom meet. */
+/* Whether the features of a pair stay farther apart than the reach for all positions of its vertices in their boxes: the distance at the centres
+   less the largest displacement of a vertex from there. */
 static PetscBool stays_apart(SbContactPairs p, const SbContactPair *pair)
 {
   const int split = pair->kind == SB_PAIR_EDGE_EDGE ? 2 : 1;
@@ -101,7 +102,7 @@ static PetscBool stays_apart(SbContactPairs p, const SbContactPair *pair)
                      p->reach + PetscSqrtReal(far[0]) + PetscSqrtReal(far[1]));
 }
 
-/* Whether features of a and b may meet at all: of different parts or self-contact, not both driven or the obstacle's. */
+/* Whether features of the vertices a and b can be in contact at all: different bodies or self-contact, not both prescribed or of the obstacle. */
 static inline PetscBool wanted(SbContactPairs p, PetscInt a, PetscInt b)
 {
   const SbContactMesh m = p->mesh;
@@ -111,7 +112,7 @@ static inline PetscBool wanted(SbContactPairs p, PetscInt a, PetscInt b)
                                               : p->self && a < m->nbody_vertex);
 }
 
-/* Whether features with these vertices, the first `split` on one side, are in each other or next to what is, and one of them in the midst of it. */
+/* Whether features with these vertices, the first `split` on one side, belong to an overlap (SbContactOverlap.near): such pairs are excluded. */
 static inline PetscBool overlaps(SbContactPairs p, const PetscInt v[4], int split)
 {
   int near[2] = {0, 0};
@@ -322,7 +323,7 @@ static PetscErrorCode find_pairs(SbContactPairs p, const PetscReal x0[], const P
     }
   }
 
-  /* a half-space or a bowl: vertices whose boxes come near */
+  /* a half-space or a bowl: vertices whose boxes come within the reach */
   for (PetscInt v = 0; v < m->nbody_vertex && m->side != SB_SIDE_NONE; v++) {
     SbContactPair pair = {
       .side = PETSC_TRUE, .v = {v, m->nbody_vertex, m->nvertex - 1, v}, .area = m->area[v]};
@@ -368,7 +369,7 @@ static PetscReal first_root(PetscReal a, PetscReal b, PetscReal c)
   return t;
 }
 
-/* The part of the way that is safe for one pair. */
+/* The collision-free fraction of the motion for one pair. */
 static PetscReal safe_part(SbContactMesh m, const SbContactPair *pair, PetscReal most, const PetscReal x0[],
                            const PetscReal x1[])
 {
@@ -406,7 +407,7 @@ PetscErrorCode SbContactPairsMaxStep(SbContactPairs p, const PetscReal x0[], con
   PetscBool full;
 
   PetscFunctionBeginUser;
-  /* as much of the way as there is room for its pairs */
+  /* halve the motion until it has few enough pairs */
   PetscCall(find_pairs(p, x0, x1, most, &full));
   while (full) {
     whole *= 0.5;

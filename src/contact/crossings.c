@@ -1,12 +1,12 @@
 /*
   crossings.c - intersections of surfaces: edges that intersect triangles. It shares nothing with the search for pairs but the tree of boxes.
 
-  An edge goes through a triangle where its ends are on different sides of the plane and the line passes the three sides the same way round; signs of volumes of tets tell. Volumes
-  below rounding, that of the coordinates too, count as neither: bodies in contact do not intersect.
+  An edge goes through a triangle where its ends are on different sides of the plane and the line passes the three sides in the same sense: signs of volumes of tets. A volume
+  within rounding, also that of the coordinates, counts as no intersection: bodies in contact do not intersect.
 */
 #include "contact_mesh.h"
 
-#define ROUNDING 64 /* eps of the products that make a volume, with the coordinates for its height */
+#define ROUNDING 64 /* rounding of a volume, in machine epsilons of its products */
 
 typedef struct {
   SbContactMesh mesh;
@@ -36,7 +36,7 @@ static int side_of(const PetscReal *a, const PetscReal *b, const PetscReal *c, c
   return volume > 0. ? 1 : -1;
 }
 
-/* Whether the edge that is searched for goes through a triangle. */
+/* Whether the edge of the search intersects a triangle. */
 static PetscBool goes_through(const Search *s, PetscInt t)
 {
   const SbContactMesh m = s->mesh;
@@ -45,7 +45,7 @@ static PetscBool goes_through(const Search *s, PetscInt t)
                   *r = s->x + 3 * v[2];
   int around;
 
-  /* with an obstacle bodies are not each other's business */
+  /* with an obstacle, contact between bodies belongs to another effect */
   if (m->nvertex > m->nbody_vertex && e[0] < m->nbody_vertex && v[0] < m->nbody_vertex) return PETSC_FALSE;
   if (m->part[e[0]] == m->part[v[0]] && (!s->self || e[0] >= m->nbody_vertex)) return PETSC_FALSE;
   for (int k = 0; k < 6; k++) {
@@ -139,7 +139,7 @@ PetscErrorCode SbContactMeshIsInside(SbContactMesh m, const PetscReal x[], Petsc
   PetscCallMPI(
     MPI_Allreduce(MPI_IN_PLACE, point, (PetscMPIInt)(3 * nbody), MPIU_REAL, MPI_SUM, m->space->comm));
 
-  /* how often each surface goes around it */
+  /* winding number of each surface about it */
   for (PetscInt t = 0; t < m->nbody_triangle; t++) {
     const PetscInt *v = m->triangle + 3 * t, to = m->part[v[0]];
 

@@ -170,7 +170,7 @@ static void across(const PetscReal a[3], PetscReal n[3])
   (void)unit(c, c, n);
 }
 
-/* Place s along the axis (m from the first end), distance from the axis, directions along and away from it. */
+/* Coordinate s along the axis (m from the first end), distance from the axis, unit vectors along and away from it. */
 static PetscReal axial(const PetscReal p[6], const PetscReal x[3], PetscReal *s, PetscReal *length,
                        PetscReal a[3], PetscReal away[3])
 {

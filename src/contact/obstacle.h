@@ -4,7 +4,7 @@
 #pragma once
 #include "sbcontact.h"
 
-/* The surface of an obstacle at rest: vertices, and triangles; without triangles one vertex (sphere) or an edge of two (capsule), rounded by a radius. */
+/* The surface of an obstacle at rest: vertices, and triangles; without triangles one vertex (sphere) or an edge of two (capsule), with a radius. */
 typedef struct {
   SbObstacleSide side;
   PetscReal radius; /* m; of a bowl, too */

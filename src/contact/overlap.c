@@ -1,32 +1,32 @@
 /*
   overlap.c - penetrations: where, how deep, and the separation direction.
 
-  Between surfaces of triangles, edges that go through a triangle (crossings.c) say which of their ends is inside and the normal there. From these vertices the separation direction and the depth along it spread over the
-  edges that intersect nothing, so that neighbours leave to the same side (Heidelberger, Teschner, Keiser, Mueller and Gross, "Consistent penetration depth estimation for deformable
-  collision response", VMV 2004). Of an edge that enters and leaves a body only the midpoint of the inner part is inside. The depth ends at the triangle that the direction meets from the back.
+  Between triangulated surfaces, an edge that intersects a triangle (crossings.c) shows which of its ends is inside, and the normal there. From these vertices separation direction and depth are propagated along
+  edges that intersect nothing, so that neighbours separate to the same side (Heidelberger, Teschner, Keiser, Mueller and Gross, "Consistent penetration depth estimation for deformable
+  collision response", VMV 2004). Of an edge that enters and leaves a body only the midpoint of the inner part counts as inside. The depth is the distance to the surface along the direction.
 
-  Of a half-space and a bowl a vertex is behind; of a ball and a capsule features are nearer to the centre or axis than the radius: their separation direction is known.
+  For a half-space, bowl, sphere and capsule, whose distance is analytic, penetration and direction follow from it.
 
-  Everything is done alike by every rank.
+  All ranks compute all of it.
 */
 #include "contact_mesh.h"
 #include "sbgeometry.h"
 
-#define CANCEL 1e-3 /* of their sum: what is left of ways that oppose each other is none */
-#define TINY 1e-12  /* of the bodies' size: a vertex that is nearer to a surface is not told from it */
-#define AGAINST 0.1 /* cosine to the normal of its own surface, beyond which it separates */
-#define JITTER 1e-7 /* of that size: vertices move by it, so that none lies in a triangle or on an edge */
-#define FAR 4.      /* times its depth: a direction is followed so far, then the nearest place is taken */
+#define CANCEL 1e-3 /* relative length below which a sum of directions counts as zero */
+#define TINY 1e-12  /* of the bodies' size: a vertex nearer to a surface counts as on it */
+#define AGAINST 0.1 /* |cosine| beyond which separation direction and own outward normal agree or oppose */
+#define JITTER 1e-7 /* of that size: perturbation of vertices, so that none lies on a triangle or an edge */
+#define FAR 4.      /* ray length over depth; beyond it the closest point of the surface is taken */
 
-/* What is known of vertices while ways spread. */
+/* Separation directions ("ways") of the vertices while they are propagated. */
 typedef struct {
   const PetscReal *x;
   PetscReal *normal;      /* [nvertex][3] outward, unit vectors */
-  PetscInt *in;           /* [nvertex] the part that it is in, -1: none */
-  PetscReal *way;         /* [nvertex][3] sum of weighted ways, then the way */
-  PetscReal *depth;       /* [nvertex] sum of weighted depths, then the depth, m */
-  PetscReal *sum;         /* [nvertex] of weights, m^-2 */
-  PetscInt *layer;        /* [nvertex] in which its way was found, from 1; 0: none */
+  PetscInt *in;           /* [nvertex] the body that it is inside, -1: none */
+  PetscReal *way;         /* [nvertex][3] weighted sum, then the unit direction */
+  PetscReal *depth;       /* [nvertex] weighted sum, then the depth, m */
+  PetscReal *sum;         /* [nvertex] sum of weights, m^-2 */
+  PetscInt *layer;        /* [nvertex] layer of the propagation, from 1; 0: none */
   PetscInt *start, *edge; /* [nvertex+1], edges of each vertex */
   uint8_t *through;       /* [nedge] goes through a triangle */
 } Ways;
@@ -39,7 +39,7 @@ static PetscErrorCode add_point(SbContactOverlap *o, const SbPenetration *point)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds a way n out of `part` over the depth d to what is known of vertex v, with a weight; not where the own surface looks that way: its neighbours leave there. Returns whether it did. */
+/* Adds the direction n out of `part`, of depth d, to the weighted sums of vertex v, unless its own outward normal points that way. Returns whether it did. */
 static PetscBool suggest(Ways *w, PetscInt v, PetscInt part, PetscReal weight, const PetscReal n[3],
                          PetscReal d)
 {
@@ -51,7 +51,7 @@ static PetscBool suggest(Ways *w, PetscInt v, PetscInt part, PetscReal weight, c
   return PETSC_TRUE;
 }
 
-/* Place on edge e where it goes through triangle t, as part of the edge; unit normal of the triangle; side of the edge's first end, m. */
+/* Intersection of edge e and triangle t, as a fraction of the edge; unit normal of the triangle; signed distance of the edge's first end, m. */
 static PetscReal pierce(SbContactMesh m, const PetscReal x[], PetscInt e, PetscInt t, PetscReal n[3],
                         PetscReal *first)
 {
@@ -68,7 +68,7 @@ static PetscReal pierce(SbContactMesh m, const PetscReal x[], PetscInt e, PetscI
   return side[0] / (side[0] - side[1]);
 }
 
-/* The point inside leaves along its way through a triangle of the part that it is in: that becomes the other side. */
+/* The triangle of the penetrated body that the ray along the separation direction leaves through: the pair's other side. */
 static PetscErrorCode find_way_out(SbContactMesh m, const PetscReal x[], const SbBoxTree *tree, PetscInt part,
                                    PetscReal depth, const PetscReal p[3], SbPenetration *point,
                                    PetscBool *found)
@@ -97,7 +97,7 @@ static PetscErrorCode find_way_out(SbContactMesh m, const PetscReal x[], const S
     PetscCall(PetscArraycpy(best, weight, 3));
   }
 
-  /* none: where the surface is nearest to the end of the way */
+  /* none: the point of the surface closest to the end of the ray */
   if (exit < 0) {
     SbBoxNearest near;
     PetscReal point_box[6];
@@ -123,7 +123,7 @@ static PetscErrorCode find_way_out(SbContactMesh m, const PetscReal x[], const S
   }
   *found = (PetscBool)(exit >= 0);
   if (!*found) PetscFunctionReturn(PETSC_SUCCESS);
-  if (nearest == PETSC_MAX_REAL) { /* straight there */
+  if (nearest == PETSC_MAX_REAL) { /* directly towards it */
     PetscReal way[3], length;
 
     for (int i = 0; i < 3; i++) {
@@ -149,7 +149,7 @@ static PetscErrorCode find_way_out(SbContactMesh m, const PetscReal x[], const S
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Outward normals of the vertices, by area. */
+/* Outward normals of the vertices, weighted by area. */
 static void add_normals(SbContactMesh m, const PetscReal x[], PetscReal normal[])
 {
   for (PetscInt t = 0; t < m->ntriangle; t++) {
@@ -166,7 +166,7 @@ static void add_normals(SbContactMesh m, const PetscReal x[], PetscReal normal[]
   }
 }
 
-/* Whether a point's own surface looks against its way out; along others neighbours leave, or nothing is in the way. */
+/* Whether a point's own outward normal opposes its separation direction. */
 static PetscBool leads(const PetscReal normal[], const SbPenetration *p)
 {
   PetscReal n[3] = {0.};
@@ -177,12 +177,12 @@ static PetscBool leads(const PetscReal normal[], const SbPenetration *p)
   return (PetscBool)(SbDot3(n, p->normal) < -AGAINST * PetscSqrtReal(SbDot3(n, n)));
 }
 
-/* Ways go on from the first layer, the n vertices of list[], layer by layer over edges that go through nothing. */
+/* Propagates directions from the first layer, the n vertices of list[], layer by layer along edges that intersect nothing. */
 static PetscErrorCode spread_ways(SbContactMesh m, Ways *w, PetscInt n, PetscInt list[])
 {
   PetscFunctionBeginUser;
   for (PetscInt first = 0, last = n, layer = 1; first < last; first = last, last = n, layer++) {
-    /* ways and depths of what was added up; a vertex whose ways cancel has none */
+    /* means of the sums; a vertex whose directions cancel has none */
     for (PetscInt k = first; k < last; k++) {
       PetscReal *way = w->way + 3 * list[k];
       const PetscReal length = PetscSqrtReal(SbDot3(way, way));
@@ -211,7 +211,7 @@ static PetscErrorCode spread_ways(SbContactMesh m, Ways *w, PetscInt n, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What an edge that goes through nothing leads to from inside is inside, too. list: room for all vertices. */
+/* Vertices joined to an inside one by an edge that intersects nothing are inside, too. list: work, [nvertex]. */
 static void mark_inside(SbContactMesh m, const Ways *w, PetscInt list[], uint8_t near[])
 {
   PetscInt n = 0;
@@ -230,7 +230,7 @@ static void mark_inside(SbContactMesh m, const Ways *w, PetscInt list[], uint8_t
   }
 }
 
-/* Points inside surfaces of triangles, by the crossings hit[n][2] of edges and triangles, sorted by edges. */
+/* Points inside triangulated surfaces, from the intersections hit[n][2] of edges and triangles, sorted by edges. */
 static PetscErrorCode look_inside(SbContactMesh m, const PetscReal x[], PetscInt n, const PetscInt hit[],
                                   SbContactOverlap *o)
 {
@@ -265,7 +265,7 @@ static PetscErrorCode look_inside(SbContactMesh m, const PetscReal x[], PetscInt
     }
     if (paired[i]) continue;
 
-    /* it goes out of the same part again: the middle between both places is inside */
+    /* it leaves the same body again: the midpoint between both intersections is inside */
     while (j < n && hit[2 * j] == e && (paired[j] || m->part[m->triangle[3 * hit[2 * j + 1]]] != part)) j++;
     if (j < n && hit[2 * j] == e) {
       PetscReal unused, length, chord = 0.;
@@ -317,7 +317,7 @@ static PetscErrorCode look_inside(SbContactMesh m, const PetscReal x[], PetscInt
   }
   mark_inside(m, &w, list, o->near);
 
-  /* those that lead, where any does */
+  /* keep those whose normal opposes the direction, if there are any */
   for (PetscInt i = 0; i < o->n; i++) {
     if (leads(w.normal, &o->point[i])) o->point[nleading++] = o->point[i];
   }
@@ -332,7 +332,7 @@ static PetscErrorCode look_inside(SbContactMesh m, const PetscReal x[], PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A pair of a feature and an obstacle that is round or all on one side, where it is behind. */
+/* A feature that penetrates a half-space, bowl, sphere or capsule. */
 static PetscErrorCode add_behind(SbContactMesh m, const PetscReal x[], const SbContactPair *pair,
                                  SbContactOverlap *o)
 {
@@ -403,7 +403,7 @@ PetscErrorCode SbContactOverlapFind(SbContactMesh m, PetscBool self, const Petsc
   PetscCall(PetscArrayzero(o->near, m->nvertex));
   PetscCall(SbContactMeshCrossings(m, self, x, &n, &hit));
 
-  /* a point exactly on a surface is on neither side of it, and ways would spread past it: moved by JITTER, each alike in every run, it does not */
+  /* vertices exactly on a surface are on neither side: perturb all by JITTER, the same in every run */
   if (n || inside) {
     PetscInt nmoved, *other;
     PetscReal *moved;
@@ -434,7 +434,7 @@ PetscErrorCode SbContactOverlapFind(SbContactMesh m, PetscBool self, const Petsc
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
-  /* the first place, and the deepest one */
+  /* the first intersection, and the largest depth */
   o->part[0] = m->part[n ? m->edge[2 * hit[0]] : o->point[0].v[0]];
   o->part[1] = n ? m->part[m->triangle[3 * hit[1]]] : m->space->mesh->nbody;
   PetscCall(PetscArraycpy(o->place, x + 3 * (n ? m->edge[2 * hit[0]] : o->point[0].v[0]), 3));
@@ -442,7 +442,7 @@ PetscErrorCode SbContactOverlapFind(SbContactMesh m, PetscBool self, const Petsc
   o->deepest = 0.;
   for (PetscInt i = 0; i < o->n; i++) o->deepest = PetscMax(o->deepest, o->point[i].depth);
 
-  /* what is next to it may get in while it leaves */
+  /* vertices next to the overlap may enter while it separates */
   PetscCall(PetscMalloc1(m->nvertex, &around));
   PetscCall(PetscArraycpy(around, o->near, m->nvertex));
   for (PetscInt e = 0; e < m->nedge; e++) {

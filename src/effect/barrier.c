@@ -1,47 +1,46 @@
 /*
-  barrier.c - contact by a barrier, with friction: surfaces never touch, and no step lets them through each other.
+  barrier.c - contact by a barrier potential, with friction: surfaces never touch or pass through each other.
 
   Below the width w pairs of features repel each other by the barrier of src/contact/barrier.c, an energy that is infinite at contact. It is part of the
-  potential that Newton's method minimises (src/time/newton.c), and no iteration goes farther than the pairs allow (src/contact/contact_pairs.c). So a state that is accepted can be reached
+  potential that Newton's method minimises (src/time/newton.c), and every iteration is limited by continuous collision detection (src/contact/contact_pairs.c). So an accepted state can be reached
   from the one before it without surfaces passing through each other.
 
   Prescribed motions, such as an obstacle on its path, are linear within a step; `progress` is the fraction that is completed. Newton's method raises
   it to one as fast as the surfaces allow.
 
-  Friction: Coulomb's law with the normal forces N and nearest places that the pairs have when the step begins (Li et al., "Incremental potential contact",
+  Friction: Coulomb's law with the normal forces N and closest points of the pairs at the start of the step (Li et al., "Incremental potential contact",
   ACM TOG 39(4), 2020, section 4): the energy mu N f0(|u_t|) of the slip u_t since then, whose slope rises from 0 to 1 within the slip e = dt times a small speed:
 
     f0 = u^2/e - u^3/(3 e^2) + e/3,   f0' = 2 u/e - u^2/e^2   for u < e;   f0 = u, f0' = 1   beyond.
 
-  In a static run, or when asked for, a solution gives its normal forces and places to the next solve of the same step, until friction changes by less than a tolerance
-  (barrier_friction.c). By how much it still would is reported.
+  In a static run, or with friction_solves, the step is solved again with the normal forces and closest points of the last solution until friction changes by less than a tolerance
+  (barrier_friction.c). The remaining change is reported.
 
   Initial contact. Bodies that touch when a run begins are moved apart rigidly (src/model/potential.c), by the width or, in a static run, half of it; where that fails, by their vertices. Bodies that intersect are separated by penalty springs (barrier_springs.c).
 */
 #include "barrier_impl.h"
 
-#define WIDTH 1e-3       /* of the size of the smallest body: default of w */
-#define WIDTH_CUBE 3e-3  /* at most so much of the edge of a cube of its volume, as thin bodies are long */
+#define WIDTH 1e-3       /* default w over the size of the smallest body */
+#define WIDTH_CUBE 3e-3  /* largest default w over the cube root of its volume */
 #define PRESSURE 0.1     /* of Young's modulus of the softer side */
-#define SLIP 1e-4        /* of the speed of a step (src/model/potential.c): below it friction sticks */
-#define SLIP_LEAST 1e-7  /* of the size of the smallest body: the slip of a time step is not smaller */
-#define SLIP_STATIC 1e-5 /* of the size: the same in a static run, as a length */
-#define LAGS 100         /* solves of a load step with the friction of the one before */
-#define STUCK 5          /* solutions in turn that lag by FALLS of the least and more: it goes in a circle */
+#define SLIP 1e-4        /* sticking speed over the speed of a step (src/model/potential.c) */
+#define SLIP_LEAST 1e-7  /* least sticking slip e of a time step over the size of the smallest body */
+#define SLIP_STATIC 1e-5 /* the same of a static load step */
+#define LAGS 100         /* largest number of lagged-friction iterations of a load step */
+#define STUCK 5 /* successive solutions whose lag stays above FALLS times the least: it does not converge */
 #define FALLS 0.9
-#define MUCH \
-  0.5 /* of mu N: friction that lags behind by more is solved for once more in a time step, as where contact begins */
-#define PARTINGS 20 /* solves of a load step in which things are parted */
-#define HALF 0.5    /* of what springs were to part: where they reach less, they get stiffer */
-#define APART 0.5   /* of w: gap at the start where bodies cannot move apart by w, and in static runs */
-#define NEARBY 5.   /* of w: gaps that bodies may come to when they are moved apart */
-#define PASSES 200  /* over all pairs for that */
+#define MUCH 0.5    /* lag over mu N above which a time step is solved once more, as where contact begins */
+#define PARTINGS 20 /* solves of a load step that separate overlaps */
+#define HALF 0.5    /* fraction of the prescribed separation below which springs get stiffer */
+#define APART 0.5   /* initial gap over w where bodies cannot move apart by w, and in static runs */
+#define NEARBY 5.   /* search distance over w for gaps that moving apart may close */
+#define PASSES 200  /* sweeps over all pairs for that */
 #define WIDTH_LEAST \
-  1e-8 /* of the size of the smallest body, and of coordinates: with -accuracy no width is smaller, as its hundredth has to be far above rounding */
+  1e-8 /* least w with -accuracy over the size of the smallest body and over coordinates, so that gaps of w/100 are far above rounding */
 
 /* ------------------------------------------------------------------ set-up */
 
-/* The surfaces, when they are asked for first. */
+/* Creates the surfaces at the first call. */
 static PetscErrorCode make_surfaces(SbEffect e, SbSpace s)
 {
   Barrier *b = (Barrier *)e->data;
@@ -110,7 +109,7 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
 
 /* ------------------------------------------------------------------ a step */
 
-/* Unit outward normals of all vertices at rest of the step, by area. */
+/* Unit outward normals of all vertices at x, weighted by area. */
 static PetscErrorCode vertex_normals(const Barrier *b, const PetscReal x[], PetscReal normal[])
 {
   const SbContactMesh m = b->mesh;
@@ -131,7 +130,7 @@ static PetscErrorCode vertex_normals(const Barrier *b, const PetscReal x[], Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Places of the obstacle's vertices when a step from t to t + dt begins, and when it ends. */
+/* Positions of the obstacle's vertices at the start and the end of a step from t to t + dt. */
 static void find_path(Barrier *b, PetscReal t, PetscReal dt)
 {
   const SbContactMesh m = b->mesh;
@@ -146,8 +145,7 @@ static void find_path(Barrier *b, PetscReal t, PetscReal dt)
 }
 
 /*
-  The direction in which bodies of a pair at distance zero part: the normal of the triangle, or that of both edges, where surfaces face each other. n: from the second side to the first; false: it
-  has none, other pairs tell.
+  The separation direction of a pair at distance zero: the normal of the triangle, or of both edges, where surfaces face each other. n: from the second side to the first; false: none.
 */
 static PetscBool facing(const Barrier *b, const SbContactPair *pair, const PetscReal normal[], PetscReal n[3])
 {
@@ -214,8 +212,8 @@ static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, Petsc
 }
 
 /*
-  Surfaces that touch are moved apart to APART of the width: each pair that is nearer moves its vertices by its weights, again and again. u: local displacements, written.
-  Every rank sees its own pairs; what vertices move by is gathered.
+  Moves touching surfaces apart to the gap APART w: Jacobi iterations over all closer pairs. u: local displacements, changed.
+  Every rank treats its own pairs; displacements of vertices are summed over all.
 */
 static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscBool *moved)
 {
@@ -248,7 +246,7 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
       if (gap >= 0.9 * goal) continue;
       for (int k = 0; k < 3; k++) direction[k] = d.n[k];
       if (!pair->side && d.d < tiny) {
-        /* no direction: outwards from the second side */
+        /* distance zero: along the outward normal of the second side */
         for (int k = 0; k < 3; k++) {
           direction[k] = 0.;
           for (int v = pair->kind == SB_PAIR_EDGE_EDGE ? 2 : 1; v < 4; v++)
@@ -293,8 +291,8 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
 }
 
 /*
-  What the forces of obstacles do over their way in this step, N m: those of gaps, as they are at its start or its end, and those of friction. Forces turn with an
-  obstacle, so gaps count along its arc: their moment over the angle.
+  Work of the obstacle's forces along its path in this step, J, this rank's: of the barrier, with its forces at the start or the end, and of friction. Forces rotate with the
+  obstacle, so the barrier's are integrated along the arc: moment times angle.
 */
 static void obstacle_works(const Barrier *b, PetscBool end, PetscReal *gaps, PetscReal *friction)
 {
@@ -324,7 +322,7 @@ static void obstacle_works(const Barrier *b, PetscBool end, PetscReal *gaps, Pet
         for (int j = 0; j < 3; j++) *friction += g[j] * (b->to[v + j] - b->from[v + j]);
       }
     }
-    /* and where it turns under what slips */
+    /* friction: rotation of the obstacle beyond the displacement of its vertices */
     if (!a) {
       const Rub *rub = &b->rub[i - b->nactive];
       PetscReal u[3];
@@ -335,7 +333,7 @@ static void obstacle_works(const Barrier *b, PetscBool end, PetscReal *gaps, Pet
   }
 }
 
-/* Energy of the gaps at the places known, J; this rank's. */
+/* Energy of the barrier at the current positions, J; this rank's. */
 static PetscReal gap_energy(const Barrier *b)
 {
   PetscReal sum = 0., energy, gradient[12];
@@ -348,7 +346,7 @@ static PetscReal gap_energy(const Barrier *b)
   return sum;
 }
 
-/* w <- scale times its default. */
+/* w = scale times its default. */
 static void set_scale(SbEffect e, PetscReal scale)
 {
   Barrier *b = (Barrier *)e->data;
@@ -377,7 +375,7 @@ static PetscErrorCode scale_width_barrier(SbEffect e, PetscReal factor, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A step begins with the local displacements u: the width may grow, as far as the energy of gaps hardly does. */
+/* At the start of a step, local displacements u: widens the barrier as far as its energy grows by at most `growth`. */
 static PetscErrorCode widen(SbEffect e, const PetscReal u[])
 {
   Barrier *b = (Barrier *)e->data;
@@ -428,7 +426,7 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
   b->energy = gap_energy(b);
   obstacle_works(b, PETSC_FALSE, &b->obstacle_power, &unused);
 
-  /* friction with the forces of the start */
+  /* friction with the normal forces at the start */
   b->slip = e->dynamic ? PetscMax(SLIP * speed * dt, SLIP_LEAST * m->size) : SLIP_STATIC * m->size;
   b->nlag = b->nstuck = 0;
   b->lag = 0.;
@@ -438,7 +436,7 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What follows a solution: friction has its forces and directions from now on, as often as it may and what it lags behind by is too much. */
+/* After a solve: friction takes the normal forces and directions of this solution, while its lag is too large and iterations are left. */
 static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscBool solved,
                                   PetscBool *again)
 {
@@ -453,7 +451,7 @@ static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], Pe
   if (last && (b->lags || e->dynamic)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBarrierLook(b, u));
 
-  /* in a static run what overlaps is parted within the step */
+  /* in a static run overlaps are separated within the step */
   if (b->overlapping && !e->dynamic && b->nlag < PARTINGS) {
     PetscCall(SbBarrierPart(e, s, 0., PETSC_FALSE));
     b->parted = *again = PETSC_TRUE;
@@ -493,7 +491,7 @@ static PetscErrorCode safe_barrier(SbEffect e, SbSpace s, const PetscReal u0[], 
   PetscCall(SbContactMeshGetPositions(b->mesh, u1, NULL, b->other));
   SbBarrierPlaceObstacle(b, progress, b->other);
   PetscCall(SbContactPairsMaxStep(b->pairs, b->x, b->other, part, &worst));
-  /* pairs that were found for the way are others than those of its start */
+  /* the pairs were searched for anew */
   if (b->pairs->nsearch != nsearch) b->known = PETSC_FALSE;
   b->shortest = PetscMin(b->shortest, *part);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -516,7 +514,7 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
 
   PetscFunctionBeginUser;
   PetscCall(SbBarrierLook(b, stage->u));
-  /* what contact has done in the step */
+  /* work of contact in the step */
   before = b->energy;
   b->energy = gap_energy(b);
   obstacle_works(b, PETSC_TRUE, &power, &friction);
@@ -565,7 +563,7 @@ static PetscErrorCode work_barrier(SbEffect e, PetscReal *work)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Forces follow from the places; what goes on are sums. */
+/* Forces follow from the positions: only accumulated sums are saved. */
 static PetscErrorCode save_barrier(SbEffect e, SbSpace s, PetscInt *n, PetscReal **records)
 {
   const Barrier *b = (const Barrier *)e->data;

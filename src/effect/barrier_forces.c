@@ -5,7 +5,7 @@
 
 /* ------------------------------------------------------------------ where things are */
 
-/* Places of the obstacle's vertices after the part `progress` of its way. */
+/* Positions of the obstacle's vertices after the fraction `progress` of its path. */
 void SbBarrierPlaceObstacle(const Barrier *b, PetscReal progress, PetscReal x[])
 {
   const PetscInt first = 3 * b->mesh->nbody_vertex;
@@ -28,7 +28,7 @@ static int compare_active(const void *x, const void *y, void *ctx)
   return 0;
 }
 
-/* The places at the local displacements u, and the pairs below their width, in the order of their numbers. Collective. */
+/* Positions at the local displacements u, and the pairs with gaps below the width, in the order of their numbers. Collective. */
 PetscErrorCode SbBarrierLook(Barrier *b, const PetscReal u[])
 {
   const PetscInt n = 3 * b->mesh->space->nnode_owned;
@@ -103,7 +103,7 @@ PetscReal SbBarrierPush(const Barrier *b, const Active *a, PetscReal *energy, Pe
   return PetscMax(0., force / w2);
 }
 
-/* f += sign times the force with which each of n vertices pushes its owned nodes. */
+/* f += sign times the gradient of n vertices, distributed to their owned nodes, N. */
 static void spread(const Barrier *b, PetscInt n, const PetscInt vertex[], PetscReal sign,
                    const PetscReal gradient[], PetscReal f[])
 {
@@ -121,8 +121,8 @@ static void spread(const Barrier *b, PetscInt n, const PetscInt vertex[], PetscR
 }
 
 /*
-  With the width w a gap g in balance is in proportion to it, and so is by how much the state is off: (K + H) w du/dw = sum b'' g n, H the second derivative of the barrier. Its sign does
-  not matter here.
+  An equilibrium gap g is proportional to the width w, so the error of the state is w du/dw to first order: (K + H) w du/dw = sum b'' g n, H the Hessian of the barrier. Its sign
+  does not matter here.
 */
 PetscErrorCode SbEffectGapForces_Barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscReal f[],
                                          PetscReal *bound)
@@ -149,7 +149,7 @@ PetscErrorCode SbEffectGapForces_Barrier(SbEffect e, SbSpace s, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* f += sign times the gradient of all energies at the places known, N; their sum over the pairs that this rank counts, J. */
+/* f += sign times the gradient of all energies at the current positions, N; returns their sum over this rank's pairs, J. */
 PetscReal SbBarrierGradient(const Barrier *b, PetscReal sign, PetscReal f[])
 {
   PetscReal sum = 0., energy, gradient[12];
@@ -202,7 +202,7 @@ PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal 
   PetscCall(SbBarrierLook(b, u));
   *energy = SbBarrierGradient(b, 1., f);
 
-  /* what slips the other way than Newton's method thought */
+  /* pairs whose slip has reversed since the Hessian was evaluated */
   for (PetscInt i = 0; i < b->nrub; i++) {
     PetscReal slip[3];
 
@@ -212,7 +212,7 @@ PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sums up H of a pair by its vertices, as far as one of two has nodes here; weight: H is that of their weighted sum, 3x3 (NULL: of all four). */
+/* Adds the blocks of a pair's Hessian where one of both vertices has nodes here; H[144], or with `weight` H[9] with respect to the weighted sum of positions. */
 static PetscErrorCode add_blocks(Barrier *b, const SbContactPair *pair, const PetscReal weight[4],
                                  const PetscReal H[])
 {
@@ -253,8 +253,8 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
   }
 
   /*
-    friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2); the parabola that touches f0 from above has f0'/u in the place of f0''. What slides, but went the other way with the last
-    step that was tried, sticks: a spring in the place of mu N f0' that has the force mu N at the slip e. A whole step that leaves it beyond e says that it slides.
+  friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2); the parabola that bounds f0 from above has f0'/u instead of f0''. A sliding pair whose slip reversed in the last trial step
+    is treated as sticking: a spring with the force mu N at the slip e replaces mu N f0'. If a full step leaves it beyond e, it slides.
   */
   for (PetscInt i = 0; i < b->nrub; i++) {
     Rub *rub = &b->rub[i];
@@ -282,7 +282,7 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
     PetscCall(add_blocks(b, &rub->pair, rub->weight, T));
   }
 
-  /* springs that push */
+  /* active springs */
   for (PetscInt i = 0; i < b->nspring; i++) {
     const Spring *spring = &b->spring[i];
 

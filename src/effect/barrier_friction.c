@@ -1,13 +1,13 @@
 /*
-  barrier_friction.c - which pairs of the response `barrier` rub on each other, with which normal forces and in which directions; by how much friction lags behind these.
+  barrier_friction.c - lagged friction of the response `barrier`: normal forces and slip directions of its pairs, and the lag.
 
-  Both are those of a state before the solution: of the start of the step, or of the solve before. A solution x with the friction F(x; lag) would have F(x; x). By how
-  much it lags behind is told as sum |F(x; x) - F(x; lag)| over the nodes, of the sum of mu N over the pairs: what normal forces, places and directions of slip have
-  changed by. Fixed-point iterations, a solve each, end where that is small; Li et al. (2020, section 5.7) do the same. They converge where friction changes normal forces by less than itself.
+  Both are those of an earlier state y: the start of the step, or the solve before. A solution x has the friction F(x; y) instead of F(x; x). The
+  lag is sum |F(x; x) - F(x; y)| over the nodes, relative to the sum of mu N over the pairs: the change of normal forces, closest points and
+  slip directions. Fixed-point iterations, one solve each, end when it is small (Li et al. 2020, section 5.7). They converge if a change of friction changes normal forces by less than itself.
 */
 #include "barrier_impl.h"
 
-/* How far the point of the obstacle that a pair rubs on moves in the step, beyond what its vertices say. */
+/* Displacement in the step of the obstacle's contact point by rotation, beyond the interpolated one of its vertices. */
 static void carry_along(const Barrier *b, PetscBool end, const Active *a, Rub *rub)
 {
   const SbContactMesh m = b->mesh;
@@ -74,7 +74,7 @@ PetscErrorCode SbBarrierLag(Barrier *b)
   PetscFunctionBeginUser;
   PetscCall(SbBarrierFindFriction(b, PETSC_TRUE));
 
-  /* the forces of gaps cancel */
+  /* the normal forces cancel */
   PetscCall(PetscCalloc1(3 * s->nnode, &f));
   (void)SbBarrierGradient(b, 1., f);
   SbBarrierSwapFriction(b);

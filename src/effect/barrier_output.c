@@ -1,5 +1,5 @@
 /*
-  barrier_output.c - what the response `barrier` says of itself: forces, points, gaps, history, summary.
+  barrier_output.c - output of the response `barrier`: forces, contact points, gaps, history, summary.
 */
 #include "barrier_impl.h"
 
@@ -15,7 +15,7 @@ PetscErrorCode SbEffectContactForce_Barrier(SbEffect e, SbSpace s, const SbStage
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* values += force and torque of the obstacle on the bodies, by the gradient of an energy by n vertices. */
+/* values += force, N, and torque, N m, of the obstacle on the bodies, from the gradient of an energy with respect to n vertices. */
 static void add_force(const Barrier *b, const SbPose *pose, PetscInt n, const PetscInt v[],
                       const PetscReal gradient[], PetscReal values[6])
 {
@@ -32,7 +32,7 @@ static void add_force(const Barrier *b, const SbPose *pose, PetscInt n, const Pe
   }
 }
 
-/* The bodies of a pair, and the force on the first one by the gradient of its energy, N. */
+/* The bodies of a pair, and the force on the first one from the gradient of its energy, N. */
 static void force_between(const Barrier *b, const SbContactPair *pair, const PetscReal gradient[12],
                           PetscInt body[2], PetscReal force[3])
 {
@@ -46,7 +46,7 @@ static void force_between(const Barrier *b, const SbContactPair *pair, const Pet
   }
 }
 
-/* How deep what overlapped when the step began is now, m. */
+/* Largest current depth of the overlaps found at the start of the step, m. */
 static PetscReal deepest_of(const Barrier *b)
 {
   PetscReal deepest = 0.;
@@ -156,7 +156,7 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A point of the list for a pair at its nearest places: where it is on the body that is pushed, normal and gap. */
+/* The output point of a pair: its closest point on the body, normal and gap. */
 static SbContactPoint point_of(const Barrier *b, const SbContactPair *pair, const PetscReal weight[4],
                                const PetscReal n[3], PetscReal gap)
 {
@@ -178,7 +178,7 @@ static SbContactPoint point_of(const Barrier *b, const SbContactPair *pair, cons
   return p;
 }
 
-/* p.force -= the gradient of an energy by the vertices of the side that is pushed. */
+/* p.force -= the gradient of an energy with respect to the vertices of the point's side. */
 static void push_point(const Barrier *b, const SbContactPair *pair, const PetscReal gradient[12],
                        SbContactPoint *p)
 {
@@ -212,7 +212,7 @@ PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStag
     (void)SbBarrierPush(b, a, &energy, gradient);
     push_point(b, pair, gradient, &p);
 
-    /* what friction does there */
+    /* friction there */
     for (PetscInt k = 0; k < b->nrub; k++) {
       const Rub *rub = &b->rub[k];
       PetscBool same;
@@ -227,7 +227,7 @@ PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStag
     PetscCall(SbContactPointsAdd(list, &p));
   }
 
-  /* and where pairs were near enough when the step began only */
+  /* friction of pairs in contact only at the start of the step */
   for (PetscInt k = 0; k < b->nrub; k++) {
     const Rub *rub = &b->rub[k];
     SbContactPoint p;
@@ -241,7 +241,7 @@ PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStag
   }
   PetscCall(PetscFree(told));
 
-  /* what parts overlap */
+  /* springs that separate overlaps */
   for (PetscInt i = 0; i < b->nspring; i++) {
     const Spring *spring = &b->spring[i];
     const PetscInt first = m->part[spring->v[0]], second = m->part[spring->v[spring->n - 1]];

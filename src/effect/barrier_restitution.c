@@ -1,21 +1,21 @@
 /*
-  barrier_restitution.c - restitution with the response `barrier`: what meets within a step leaves with a part of its speed (the law and its energy: src/model/restitution.c).
+  barrier_restitution.c - Newton's law of restitution with the response `barrier` (its energy: src/model/restitution.c).
 
-  When a step begins, all that is not within the width of a barrier flies on with its velocity. A pair that comes to the width on this way, or nearly, has
-  the direction n and the weights of its nearest places there, and the speed of approach v = -n . sum weight v. In this step it is pushed, not pulled, to
+  At the start of a step the vertices are moved in free flight. A pair whose gap falls to the barrier's width, or nearly, on this path has
+  the direction n and the weights of its closest points there, and the speed of approach v = -n . sum weight v. In this step a one-sided spring holds it at or above
 
       n . sum weight x = g0 + h e v,   g0 the same sum when the step begins,
 
-  by a spring that is stiff against the lighter body: a whole body arrives and leaves. Below the width nothing bounces: what rests does not begin to jump.
+  which is stiff relative to the lighter body, as whole bodies collide. Pairs already within the width get none, so that a body at rest stays at rest.
 */
 #include "barrier_impl.h"
 
-#define STIFF 1e5  /* of the mass of the lighter body by the square of the step */
-#define EARLY 0.05 /* of the way: what would only just not arrive arrives, too */
+#define STIFF 1e5  /* stiffness over mass of the lighter body / dt^2 */
+#define EARLY 0.05 /* extension of the path over its length: near misses count as impacts */
 #define REST 0.999 /* of the width: a smaller gap is contact */
-#define KEEP 0.01  /* of the gap above the width: how near to it the place of the impact is looked for */
+#define KEEP 0.01  /* tolerance of the impact's position, over the gap above the width */
 
-/* Where on the way from x0 to x1 the pair comes to the gap w: the part of it; 2: nowhere. */
+/* Fraction of the motion from x0 to x1 at which the pair's gap falls to w; 2: none. */
 static PetscReal meets(const Barrier *b, const SbContactPair *pair, const PetscReal x0[],
                        const PetscReal x1[], PetscReal w)
 {
@@ -41,7 +41,7 @@ static PetscReal meets(const Barrier *b, const SbContactPair *pair, const PetscR
   return PetscMin(1., part * (1. + EARLY));
 }
 
-/* What the pair is pushed by, at the places x of its impact; false: it does not approach. Vertices with positive weights come first, those of bodies before others. */
+/* The spring of a pair at the positions x of its impact; false: it does not approach. Vertices with positive weights come first, those of bodies before others. */
 static PetscBool find_spring(const Barrier *b, const SbContactPair *pair, const PetscReal x[], Spring *spring)
 {
   const SbContactMesh m = b->mesh;
@@ -91,7 +91,7 @@ PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const P
   PetscCall(SbContactPairsFind(b->pairs, b->x, b->other));
   b->known = PETSC_FALSE;
 
-  /* who meets on it */
+  /* impacts on it */
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
     const PetscReal w = width_of(b, pair);
@@ -148,7 +148,7 @@ PetscErrorCode SbEffectScaleRestitution_Barrier(SbEffect e, PetscReal share)
   for (PetscInt i = b->nspring - b->nbounce; i < b->nspring; i++) {
     Spring *spring = &b->spring[i];
 
-    /* the goal comes nearer by more than the spring gives: without what it held, the next iteration would begin in free flight */
+    /* a goal lowered below the spring's deflection would release it: keep it active for the next iteration */
     spring->held = (PetscBool)(SbBarrierSpringPlace(b, spring) < spring->goal);
     spring->goal = spring->start + SbRestitutionGap(&b->bounce, 0., spring->arrives);
   }

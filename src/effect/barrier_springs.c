@@ -1,16 +1,16 @@
 /*
-  barrier_springs.c - what is in each other when a run begins is parted, and what bounces leaves: by springs that push along fixed directions.
+  barrier_springs.c - one-sided springs along fixed directions, which separate initial overlaps and enforce restitution.
 
-  A spring has the energy k/2 (g - goal)^2 while g = n . sum weight x is below its goal. It is of one step: the next one finds out anew what is in what.
+  A spring has the energy k/2 (g - goal)^2 while g = n . sum weight x is below its goal. Overlaps and springs are found anew in each step.
 
-  Overlap. Each point inside (src/contact/overlap.c) is to be out by a part of its depth when the step ends: what is left after -effect_X_separation_steps steps is 1/e of it; never less than the
-  width of the barrier is asked for, and in a static run all. Where springs reach less than half of that they get stiffer. Pairs of features there are no pairs of the barrier, and not guarded, until nothing is in anything.
+  Overlap. Each penetrating point (src/contact/overlap.c) is moved out by a part of its depth in each step, so that the depth falls to 1/e in -effect_X_separation_steps steps; by the width
+  of the barrier at least, and in a static run at once. Springs that reach less than half of that get stiffer. Pairs of the overlap are excluded from barrier and collision detection until there is none left.
 */
 #include "barrier_impl.h"
 
-#define STIFF 10.     /* in a static run, of the stiffness of the barrier: what springs push should arrive */
-#define SAME 1e-5     /* of the bodies' size: within this they are in the same place, and a gap is none */
-#define ROUNDING 1e-9 /* of that size: what is no deeper touches, when a run begins */
+#define STIFF 10.     /* static run: stiffness over that of the barrier */
+#define SAME 1e-5     /* of the bodies' size: positions this close coincide */
+#define ROUNDING 1e-9 /* of that size: a smaller initial depth counts as touching */
 
 PetscErrorCode SbBarrierAddSpring(Barrier *b, const Spring *spring)
 {
@@ -23,7 +23,7 @@ PetscErrorCode SbBarrierAddSpring(Barrier *b, const Spring *spring)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Pairs without a gap to speak of, as where a vertex lies in a triangle, are none either while things overlap. */
+/* Excludes pairs of gap zero, as of a vertex in a triangle, while there is overlap. */
 static PetscErrorCode exempt_nearest(Barrier *b)
 {
   const SbContactMesh m = b->mesh;
@@ -44,7 +44,7 @@ static PetscErrorCode exempt_nearest(Barrier *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Says once what is in what. */
+/* Warns once, naming what overlaps. */
 static PetscErrorCode announce(SbEffect e, const SbSpace s, const SbContactOverlap *o)
 {
   const char *name[2];
@@ -67,7 +67,7 @@ static PetscErrorCode announce(SbEffect e, const SbSpace s, const SbContactOverl
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether two bodies have the same extent: in the same place all their points are on each other's surface, and no way leads out. */
+/* Whether two bodies coincide: then no separation direction exists. */
 static PetscBool same_place(const Barrier *b, const PetscInt body[2])
 {
   const SbContactMesh m = b->mesh;
@@ -83,7 +83,7 @@ static PetscBool same_place(const Barrier *b, const PetscInt body[2])
   return (PetscBool)(most < SAME * m->size);
 }
 
-/* A body that is in the obstacle without an edge through its surface has no way out. x: places of the start. */
+/* Error if a body is wholly inside the obstacle: no separation direction exists. x: initial positions. */
 static PetscErrorCode check_obstacle(SbEffect e, SbSpace s, PetscReal t)
 {
   const Barrier *b = (const Barrier *)e->data;

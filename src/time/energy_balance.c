@@ -1,14 +1,12 @@
 /*
-  The account of energies. With R the residual without constraints (the reaction on prescribed unknowns) and f the loads, a step from 0 to 1
-  does the work (f0 + f1)/2 . (u1 - u0) by the loads (exact for constant loads: minus the change of their potential),
-  (R0 + R1)/2 . (u1 - u0) by moving supports (those that turn: by their moments over the angle), and loses (p0 + p1)/2 h with p = v . C v to damping. What contact by barrier does it
-  knows itself (src/effect/barrier.c): the energy of its gaps may change by much within a step. What is missing then
-  between start and now was taken (or, negative, given) by the integrator. None of the implicit ones gives much while it is stable; one
-  that gives most of what there is will go on, and what the run shows from there on is no motion of a body.
+  Energy balance. With R the residual without constraints (the reaction on prescribed unknowns) and f the loads, the work in a step from 0 to 1 is (f0 + f1)/2 . (u1 - u0) by the loads (exact for constant loads: minus the change of their potential),
+  (R0 + R1)/2 . (u1 - u0) by moving supports (of rotating ones: moment times angle); damping dissipates (p0 + p1)/2 h with p = v . C v. Barrier contact integrates its own
+  work (src/effect/barrier.c), as the energy of its gaps may change much within a step. The remaining difference between the energies at the start and now was dissipated
+  (or, negative, added) by the integrator. A stable implicit one adds little; one that adds most of the energy is unstable, and the run means nothing from there on.
 */
 #include "time_impl.h"
 
-#define GIVEN 0.5 /* of the largest energy so far: what an integrator has given when it is unstable */
+#define GIVEN 0.5 /* energy added by an unstable integrator, over the largest energy so far */
 
 PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R)
 {
@@ -19,7 +17,7 @@ PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R)
   PetscFunctionBeginUser;
   PetscCall(SbModelResidual(run->model, t, run->U, run->V, run->A, PETSC_FALSE, R));
   if (s->constraints) {
-    /* what is on prescribed unknowns, and what contact has exerted */
+    /* keep reactions at prescribed unknowns, and contact forces */
     PetscCall(SbSpaceGetLocalRead(s, run->U, &u));
     PetscCall(VecGetArray(R, &r));
     SbConstraintsComputeForces(s, u, r);
@@ -30,7 +28,7 @@ PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What reactions do beyond their mean along straight lines, J; this rank's. */
+/* Work of reactions along rotations beyond that of their mean along the chord, J; this rank's. */
 static PetscErrorCode turning_work(SbRun run, PetscReal t, PetscReal dt, Vec reaction, PetscReal *work)
 {
   const SbModel m = run->model;
@@ -54,7 +52,7 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
 {
   SbModel m = run->model;
   SbEnergies *e = &run->energies;
-  PetscReal work[4], power = 0., own[2] = {0., 0.}; /* of contact, of supports that turn: this rank's */
+  PetscReal work[4], power = 0., own[2] = {0., 0.}; /* of contact, of rotating supports: this rank's */
   Vec loads, reaction;
 
   PetscFunctionBeginUser;
@@ -68,7 +66,7 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   if (!first) {
     Vec moved;
 
-    /* twice the work of the loads; reactions work on prescribed unknowns, elsewhere with contact only, now or a step ago */
+    /* twice the work of the loads and of reactions: at prescribed unknowns, and where contact acts now or did a step ago */
     PetscCall(VecDuplicate(run->U, &moved));
     PetscCall(VecWAXPY(moved, -1., run->previous, run->U));
     PetscCall(VecDot(loads, moved, &work[0]));

@@ -5,35 +5,35 @@
 
     E(u) = a_M/2 |u - u^|_M^2 + psi(u) - f . u + D(u)
 
-  (inertia about the predictor u^, strain, loads, Rayleigh damping); the residual F(u) is its gradient. Each iteration solves K p = -F and goes along
-  p by a length s that makes E fall enough: E(u + s p) - E(u) <= c s F . p (Armijo; Nocedal and Wright, Numerical Optimization, 2006, section 3.1).
+  (inertia about the predictor u^, strain, loads, Rayleigh damping); the residual F(u) is its gradient. Each iteration solves K p = -F and takes the
+  step s p, with s such that E decreases sufficiently: E(u + s p) - E(u) <= c s F . p (Armijo; Nocedal and Wright, Numerical Optimization, 2006, section 3.1).
 
-  The change of E. Strain is evaluated as such; the rest of F is linear in u but for follower loads and what contact adds, so the trapezoidal
+  The change of E. Strain energy is evaluated directly; the rest of F is linear in u but for follower loads and contact, so the trapezoidal
   rule with the slopes at both ends of the step gives its work: psi(u + s p) - psi(u) + s/2 (r(0) + r(s)), r = (F - dpsi/du) . p. Where that
-  is rounding, near the solution, the residual decides.
+  is within rounding, near the solution, the norm of the residual decides.
 
-  Provisional steps. In bending and rotation the first full step stretches what it should turn, and E rises a long way that the next step comes back
-  from; a search that never lets E rise creeps where full steps need five. So a full step that turns no tet inverted and comes to no barrier may raise E,
-  and the next one has to bring it below where it was, with an accurate linear solve where a loose one is not enough, or the search starts again from there (watchdog technique: Chamberlain et al. 1982; Nocedal
+  Provisional steps. In bending and rotation a full step stretches what should rotate: E rises far, and the next step brings it back; a monotone search takes very many
+  short steps where five full ones are enough. So a full step that inverts no tet and meets no barrier may raise E, and the next one has to bring E below the old
+  value, by an accurate linear solve if need be; else the search starts again from the old iterate (watchdog technique: Chamberlain et al. 1982; Nocedal
   and Wright, section 15.6).
 
-  Pressure. In static runs the term of the tangent with the pressure of a cell has that of the linearisation behind the step, as if the pressure were an unknown of its own (src/fem/quadratic.c):
-  what a full step in bending leaves of changes of volume says nothing about stress, and with it steps were a hundredth long. The first of such steps raises E far, and the next two bring it back. Steps in time are short enough without.
+  Pressure. In static runs the geometric stiffness uses the linearised pressure of a cell after the step, as if the pressure were an unknown of its own (src/fem/quadratic.c): the spurious
+  changes of volume of a full step in bending would give wrong pressures, and steps of a hundredth. The first such step raises E far, and the next two bring it back. Time steps are short enough without.
 
-  Tangent. With -body_NAME_tangent auto it is the exact one. When the linear solver meets a direction of negative curvature or counts negative pivots, or p goes up, the eigenvalues of
-  the cells are raised to zero and the system is solved once more (Longva et al. 2023, "Pitfalls of projection"); after a full step the exact one is tried again.
-  Forces without a potential (the free rim of a follower pressure) have equilibria at which its symmetric part is not definite: it is kept with as many negative eigenvalues
-  as where the load step began, and after a full step to a residual smaller than the first whatever it is; the residual decides about a direction that goes up. In a slender body it rises
-  as much as E does where a full step turns what is soft, so that such a step may be provisional, too: those that follow have to bring the residual, or E, below where it was.
+  Tangent. With -body_NAME_tangent auto it is the exact one. When the linear solver meets negative curvature or negative pivots, or p is no descent direction, negative eigenvalues of
+  the cells are set to zero and the system is solved once more (Longva et al. 2023, "Pitfalls of projection"); after a full step the exact one is tried again.
+  Forces without a potential (the free rim of a follower pressure) have equilibria at which its symmetric part is not definite: the exact tangent is kept if it has as many negative eigenvalues
+  as at the start of the load step, or after a full step to a residual smaller than the first; along an ascent direction the norm of the residual decides. In a slender body it rises
+  as much as E does in rotation, so such a step may be provisional, too: the next ones have to bring the residual, or E, below the old value.
 
-  Where surfaces push each other, the second derivative of contact is the positive part of each pair's, and the exact one after a whole step, as near the end only that converges
-  faster than linearly. Friction that slipped the other way than expected is taken for one that sticks (src/effect/barrier_forces.c), and where p goes up, bounded from above. A tangent that is not
-  definite is shifted by a multiple of the mass, as small a one as will do (Nocedal and Wright, algorithm 3.3), before cells are filtered: in a collapse nearly all cells have a negative eigenvalue,
-  though their sum has but a few, and filtered ones make steps of a hundredth.
+  Barrier contact. Its Hessian is the positive part of each pair's, and the exact one after a full step, as only that converges superlinearly near the solution. Friction
+  whose slip reversed is treated as sticking (src/effect/barrier_forces.c), and bounded from above where p is no descent direction. An indefinite tangent is shifted by the least sufficient
+  multiple of the mass matrix (Nocedal and Wright, algorithm 3.3) before cells are filtered: in a collapse nearly all cells have a negative eigenvalue but the assembled tangent has few,
+  and filtering leads to steps of a hundredth.
 
-  Lengths of steps, there. E is that of the model up to a barrier that the model does not know yet, and rises steeply behind it. A step that Armijo's rule stops in front of
-  it has nothing new for the next tangent: so the search goes on between the longest part that is good enough and the shortest that is not, until the slope has halved. Where
-  E still falls half as steeply behind a whole step, which has too stiff a model, longer ones are tried.
+  Its line search. E follows the quadratic model until new pairs come within the barrier, and rises steeply from there. A step that Armijo's rule ends before that gives
+  the next tangent no new pairs: so the search bisects between the longest sufficient step and the shortest insufficient one until the slope has halved. Where
+  E still decreases half as steeply after a full step, the model being too stiff, longer steps are tried.
 */
 #include <petsc/private/snesimpl.h> /* PETSc has no public way to write a SNESType */
 #include "sbsolver.h"
@@ -42,27 +42,24 @@
 #define DECREASE 1e-4   /* Armijo's constant, c above */
 #define SHORTEST 1e-7   /* shortest fraction of a step that the line search tries */
 #define ROUNDING 1e-11  /* relative rounding of the terms of E */
-#define CREEP 0.05      /* fraction of a step that is next to nothing */
-#define CREEPS 5        /* such steps in a row that end a load step, which a shorter one replaces */
+#define CREEP 0.05      /* fraction of a step that counts as stagnation */
+#define CREEPS 5        /* such steps in a row after which a load step is halved */
 #define NOTHING 1e-6    /* relative to E's rounding: predicted decrease that counts as none */
-#define ACCURATE 1e-6   /* relative tolerance of linear solves whose direction is used again */
+#define ACCURATE 1e-6   /* relative tolerance of an accurate linear solve */
 #define APPROACHES 50   /* iterations in which prescribed motions have to be completed */
-#define UNAVOIDABLE 0.2 /* of a step there: one so short may turn tets over */
+#define UNAVOIDABLE 0.2 /* a step there shorter than this may invert tets */
 #define DIFFERENCE 1e-7 /* fraction of a prescribed motion, for finite differences by it */
 #define SETTLED \
-  1e-4 /* of the speed of the time step (src/model/potential.c): a step that is short enough, where surfaces push each other */
-#define STICKING 1e-2 /* of that, with friction, whose forces follow from as small speeds */
-#define SETTLED_STATIC \
-  1e-7 /* of the smallest body's size: the same in a static run, whose forces are all that is asked for */
-#define SETTLED_LEAST \
-  1e-8 /* of that size: no step of a whole time step need be shorter, however short these are */
-#define SETTLED_GAP \
-  1e-2 /* of the width below which surfaces push each other: how much the last step may change gaps */
-#define PATIENCE \
-  50 /* iterations, where surfaces push each other, after which it is asked whether they were worth it */
-#define WORTH 0.01 /* of the fall of E until then: what so many have to add beyond SB_NEWTON_ITERATIONS */
-#define EARLY 10   /* iterations in which friction is not lagged: normal forces are updated in each */
-#define SHIFT 0.1  /* of the shift by inertia: the least one of a tangent that is not definite */
+  1e-4 /* barrier contact: tolerance of the last iteration's step, over the speed of the time step (src/model/potential.c) times dt */
+#define STICKING 1e-2       /* factor on it with friction, whose forces depend on such small slips */
+#define SETTLED_STATIC 1e-7 /* the same tolerance in a static run, over the size of the smallest body */
+#define SETTLED_LEAST 1e-8  /* least tolerance in time steps of full length, over that size */
+#define SETTLED_GAP 1e-2    /* largest change of gaps in the last iteration, over the barrier's width */
+#define PATIENCE 50         /* barrier contact: iterations between checks of progress */
+#define WORTH \
+  0.01 /* least further decrease of E in these, beyond SB_NEWTON_ITERATIONS, over the decrease before */
+#define EARLY 10         /* iterations in which friction is not lagged: normal forces are updated in each */
+#define SHIFT 0.1        /* least shift of an indefinite tangent, over that of inertia */
 #define SHIFT_STIFF 1e-4 /* the same, relative to the mean ratio of stiffness and mass */
 #define SHIFTS 8         /* tries, each with a shift SHIFT_MORE times as large, before cells are projected */
 #define SHIFT_MORE 4.
@@ -74,51 +71,53 @@
 #define PROVISIONAL 1 /* non-monotone steps that may follow each other while E is above where they began */
 #define PROVISIONAL_STATIC 2 /* the same in a static run, whose pressures are linearised */
 
-/* The potential at an iterate, as far as lengths of steps ask. */
+/* The potential at an iterate, as the line search needs it. */
 typedef struct {
-  Vec x, r;            /* the iterate and its residual; of the last one these are the solver's own */
+  Vec x, r;            /* the iterate and its residual; of the last iterate borrowed from the SNES */
   Vec elastic;         /* gradient of the strain energy, N */
-  Vec contact;         /* guarded contact: the same of its energy */
-  PetscReal norm;      /* of the residual, N */
+  Vec contact;         /* barrier contact: the same of its energy */
+  PetscReal norm;      /* norm of the residual, N */
   PetscReal psi;       /* strain energy, J */
-  PetscReal gaps;      /* energy of guarded contact, J: part of psi */
-  PetscReal rest;      /* slope of all but strain and guarded contact along the step, J */
-  PetscReal slope;     /* of E along the step, J */
-  PetscReal s, change; /* part of the step, and of E over it, J */
+  PetscReal gaps;      /* energy of barrier contact, J: part of psi */
+  PetscReal rest;      /* slope of all but strain and barrier contact along the step, J */
+  PetscReal slope;     /* slope of E along the step, J */
+  PetscReal s, change; /* fraction of the step; change of E over it, J */
   PetscInt ninverted;
 } Iterate;
 
-/* What a solve keeps from iteration to iteration. */
+/* Data of a solve. */
 typedef struct {
   SbRun run;
   Iterate from;    /* the last iterate */
-  PetscBool known; /* and all about it but slopes */
+  PetscBool known; /* `from` is up to date, but for its slopes */
   Iterate to;      /* a trial */
-  Iterate best;    /* guarded contact: the longest trial that is good enough */
-  Vec rhs;         /* guarded contact: residual of its model */
-  Vec start, step; /* where provisional steps began; the first of them led to start - step */
-  PetscReal least; /* rounding of the strain energy of a body that has turned: E V to the last digit, J */
-  PetscInt provisional;   /* how many there were since */
-  PetscReal slope;        /* of E at `start` along that step, J */
-  PetscReal norm;         /* of the residual there, N */
+  Iterate best;    /* barrier contact: the longest sufficient trial */
+  Vec rhs;         /* barrier contact: right-hand side of its quadratic model */
+  Vec start, step; /* iterate before the provisional steps; the first of them led to start - step */
+  PetscReal
+    least; /* rounding of the strain energy of a rotated body: eps times Young's modulus times volume, J */
+  PetscInt provisional;   /* number of provisional steps */
+  PetscReal slope;        /* slope of E at `start` along that step, J */
+  PetscReal norm;         /* norm of the residual there, N */
   PetscReal first, rise;  /* change of E over it, and over all since, J */
-  PetscReal change;       /* of E over the last step, J */
-  PetscBool patient;      /* guarded contact, without -snes_max_it: it may go on */
-  SbContactSystem system; /* guarded contact: NULL before surfaces have pushed each other */
-  SbBlocks blocks;        /* its second derivative, when the last direction was solved for */
-  PetscInt nblock;        /* of all ranks */
-  PetscInt iterations;    /* of the last linear solve */
+  PetscReal change;       /* change of E over the last step, J */
+  PetscBool patient;      /* barrier contact, without -snes_max_it: may exceed SB_NEWTON_ITERATIONS */
+  SbContactSystem system; /* barrier contact: NULL before the first contact */
+  SbBlocks blocks;        /* its Hessian at the last linear solve */
+  PetscInt nblock;        /* number of its blocks, all ranks */
+  PetscInt iterations;    /* iterations of the last linear solve */
   SbContactHessian kind;
-  PetscReal shift;     /* of the last direction: times the mass added to the tangent, 1/s^2 */
-  PetscBool unstable;  /* an exact tangent of this solve was not positive definite */
-  PetscBool whole;     /* the last step was */
-  PetscBool rounding;  /* and as good as none, with a residual that has not fallen */
-  PetscInt branch;     /* static, such forces: negative eigenvalues of the symmetric part where it begins */
-  PetscReal tolerance; /* of the last solve, N */
+  PetscReal shift;    /* factor on the mass matrix added to the tangent of the last direction, 1/s^2 */
+  PetscBool unstable; /* an exact tangent of this solve was not positive definite */
+  PetscBool whole;    /* the last step was a full one */
+  PetscBool rounding; /* the last step changed nothing beyond rounding */
+  PetscInt
+    branch; /* static, forces without a potential: negative eigenvalues of the symmetric part at the start */
+  PetscReal tolerance; /* absolute tolerance of the last solve, N */
   PetscReal initial;   /* norm of the first residual, N */
 } Newton;
 
-/* Energies and forces of an iterate with its residual, or the residual's norm alone where that is no number. */
+/* Energies and forces of an iterate with a residual; only its norm where that is not finite. */
 static PetscErrorCode evaluate(Newton *n, Iterate *at)
 {
   const SbRun run = n->run;
@@ -130,12 +129,12 @@ static PetscErrorCode evaluate(Newton *n, Iterate *at)
   at->ninverted = 0;
   PetscCall(VecNorm(at->r, NORM_2, &at->norm));
   if (PetscIsInfOrNanReal(at->norm)) PetscFunctionReturn(PETSC_SUCCESS);
-  /* forces are those of a stage between the start of the step and x, divided by its part of the step */
+  /* forces are those of a stage between the start of the step and x, divided by the stage's fraction of the step */
   if (run->stage) PetscCall(VecAXPBYPCZ(run->stage, 1. - part, part, 0., run->stage_start, at->x));
   PetscCall(
     SbModelStrainEnergy(run->model, run->stage ? run->stage : at->x, at->elastic, &at->psi, &at->ninverted));
   at->psi /= PetscSqr(part);
-  /* that of contact is at x */
+  /* contact is evaluated at x */
   if (run->model->npotential) {
     PetscCall(VecZeroEntries(at->contact));
     PetscCall(
@@ -146,7 +145,7 @@ static PetscErrorCode evaluate(Newton *n, Iterate *at)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Static runs: the pressures in the next tangent, those of the linearisation at X after the part s of -Y; Y NULL: of X (src/fem/quadratic.c). */
+/* Static runs: sets the pressures of the next tangent, linearised at X after the fraction s of -Y; Y NULL: at X (src/fem/quadratic.c). */
 static PetscErrorCode linearise_pressure(const SbRun run, Vec X, Vec Y, PetscReal s)
 {
   PetscFunctionBeginUser;
@@ -168,7 +167,7 @@ static PetscErrorCode find_slopes(Newton *n, Vec Y, Iterate *at)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves K Y = F, K with the second derivative of guarded contact, or what stands for it, where surfaces push each other. */
+/* Solves K Y = F, K with the Hessian of barrier contact, or its substitute, where there is contact. */
 static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
 {
   Newton *n = (Newton *)snes->data;
@@ -258,9 +257,10 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
     PetscCall(solve_linear(snes, &reason));
     PetscCall(VecDot(F, Y, slope));
     *slope = -*slope;
-    /* friction that is taken for one that sticks has a right-hand side of its own: the direction has to go down E as well */
+    /* friction treated as sticking changes the right-hand side: Y has to be a descent direction of E as well */
     if (n->nblock) PetscCall(VecDot(n->rhs, Y, &modelled));
-    if (n->nblock && reason == KSP_DIVERGED_ITS) break; /* of -pc_type: says nothing of the tangent */
+    if (n->nblock && reason == KSP_DIVERGED_ITS)
+      break; /* by -pc_type: not evidence of an indefinite tangent */
     if (n->nblock && n->kind != SB_HESSIAN_MAJORIZED &&
         (reason < 0 || *slope >= -STEEP * PetscMax(modelled, 0.))) {
       n->kind = n->kind == SB_HESSIAN_EXACT ? SB_HESSIAN_PROJECTED : SB_HESSIAN_MAJORIZED;
@@ -273,7 +273,7 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
     n->shift = shift;
     if (*filtered || !m->may_filter) break;
     if (keep && reason > 0) break;
-    /* L D L^T factors what is not definite without a word, and p may go down on the way to a saddle point */
+    /* L D L^T factors an indefinite matrix without an error, and p may descend to a saddle point */
     negative = -1;
     if (reason > 0 && *slope < 0. && !n->nblock)
       PetscCall(SbSolverCountNegativeEigenvalues(snes, m->space, &negative));
@@ -293,7 +293,7 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves once more, to a tolerance of ACCURATE; `better`: what was there was worse. */
+/* Solves once more, to a tolerance of ACCURATE; `better`: the old direction was less accurate. */
 static PetscErrorCode solve_accurately(SNES snes, PetscReal *slope, PetscBool *better)
 {
   Newton *n = (Newton *)snes->data;
@@ -332,18 +332,18 @@ static void swap(Iterate *a, Iterate *b)
   *b = c;
 }
 
-/* Goes from X along -Y, E having the slope `slope` there, to the next X and F; s: how far, as part of Y, in: at most. */
+/* Line search from X along -Y, where E has the slope `slope`, J, to the next X and F; s: step length as a fraction of Y, in: the largest. */
 static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
 {
   Newton *n = (Newton *)snes->data;
   const SbModel m = n->run->model;
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
   Iterate *from = &n->from, *to = &n->to, *best = &n->best;
-  /* forces without a potential: steps that go up may be provisional, too */
+  /* forces without a potential: ascent steps may be provisional, too */
   const PetscBool circulatory = (PetscBool)(n->run->nonsymmetric.U && !m->dynamic && !m->npotential);
   PetscBool enough, back, provisional, better,
     flat = PETSC_FALSE, guarded,
-    plain = (PetscBool)(n->nblock > 0 || *s < 1.); /* a barrier is nothing to come back from */
+    plain = (PetscBool)(n->nblock > 0 || *s < 1.); /* no provisional step into a barrier */
   PetscReal change, noise, total, goal, undone = 0.;
   PetscReal low = 0., high = 0.; /* parts of the step between which E is lowest; 0: not known yet */
   PetscInt nactive, tries = 0;
@@ -374,14 +374,14 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
       "iteration %" PetscInt_FMT ": %g of the step changes E by %g J (slope %g J), residual %g -> %g N\n",
       snes->iter, (double)*s, (double)change, (double)slope, (double)from->norm, (double)to->norm));
 
-    /* enough; where it is too little to decide, or the step goes up at once, as forces without a potential may make it, the residual has to */
+    /* sufficient decrease; where it is within rounding, or the step an ascent (forces without a potential), the residual decides */
     total = n->provisional ? n->rise + change : change;
     goal = DECREASE * (n->provisional ? n->slope : *s * slope);
     back = (PetscBool)(circulatory && n->provisional);
     enough = (PetscBool)(slope < 0. && goal < 0. && total <= goal);
     if (slope >= 0. || back || total <= noise)
       enough = (PetscBool)(enough || to->norm <= (1. - DECREASE * *s) * (back ? n->norm : from->norm));
-    /* at the solution, where residuals are rounding as well, the step is as good as none */
+    /* at the solution, where residuals are rounding as well */
     n->rounding =
       (PetscBool)(*s == 1. && !enough && slope < 0. && total <= noise && -slope <= NOTHING * noise);
     if (slope < 0. && total <= noise) enough = (PetscBool)(enough || -slope <= NOTHING * noise);
@@ -390,7 +390,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
                   n->provisional < (m->dynamic ? PROVISIONAL : PROVISIONAL_STATIC) &&
                   change < PETSC_INFINITY && to->ninverted <= from->ninverted && to->gaps <= from->gaps);
 
-    /* with a barrier on the way E is lowest in front of it, and where it hardly curves far behind a whole step: between what is known by slopes */
+    /* the minimum of E is before a barrier, or where E hardly curves far beyond a full step: bracket it by slopes */
     guarded = (PetscBool)(m->npotential && plain);
     if (guarded && enough && to->slope < 0.)
       low = *s;
@@ -429,18 +429,18 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
     }
     if (enough || provisional) break;
 
-    /* to come back from far above takes more than a loose solve: what it leaves may be more than E has to fall by */
+    /* the error of a loose linear solve may exceed the decrease of E that is needed */
     if (n->provisional) {
       PetscCall(solve_accurately(snes, &slope, &better));
       if (better) {
         if (m->npotential)
-          PetscCall(SbModelPotentialMaxStep(m, X, Y, 1., s, &nactive)); /* another way than before */
+          PetscCall(SbModelPotentialMaxStep(m, X, Y, 1., s, &nactive)); /* for the new direction */
         PetscCall(find_slopes(n, Y, from));
         continue;
       }
     }
 
-    /* back to where provisional steps began, and a shorter step: to where the parabola through slope and both ends is lowest */
+    /* back to the iterate before the provisional steps, and a shorter step: to the minimum of the parabola through slope and both ends */
     if (n->provisional) {
       PetscCall(VecCopy(n->start, X));
       PetscCall(VecCopy(n->step, Y));
@@ -452,7 +452,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
       change = n->first;
       undone = n->rise;
       n->provisional = 0;
-      *s = 1.; /* the first one was whole; surfaces may have shortened the one from there */
+      *s = 1.; /* the first one was full; collision detection may have limited the one from there */
     }
     plain = PETSC_TRUE;
     *s *= PetscMax(high > 0. ? 0.3 : 0.1, PetscMin(0.5, -slope * *s / (2. * (change - slope * *s))));
@@ -462,7 +462,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
     }
   }
 
-  /* the new iterate; where provisional steps began is kept until E has fallen below */
+  /* the new iterate; the one before provisional steps is kept until E is below its value */
   if (enough)
     n->provisional = 0;
   else if (!n->provisional++) {
@@ -486,10 +486,10 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
 }
 
 /*
-  Guarded contact: from the start of the step to a first X at which all that moves by order, prescribed unknowns and obstacles, is where it belongs.
+  Barrier contact: from the start of the step to a first X that has the prescribed displacements, and obstacles at their end positions.
 
-  The guess of the integrator serves where its motion is free and ends so. Else free unknowns begin at the start of the step. Where what moves by order would go through something, Newton's
-  steps take it along: their system has the derivative of the residual by that motion on its right-hand side, so that what is pushed gives way.
+  The integrator's predictor is taken if its motion is free of contact. Else free unknowns begin at the start of the step. Where the prescribed motion would intersect a surface, it is part of
+  Newton's steps: the right-hand side has the derivative of the residual with respect to it, so that the bodies it pushes move with it.
 */
 static PetscErrorCode approach(SNES snes)
 {
@@ -511,7 +511,7 @@ static PetscErrorCode approach(SNES snes)
     if (!nactive) PetscFunctionReturn(PETSC_SUCCESS);
     PetscCall(SbModelPotentialAdvance(m, 0.));
   }
-  /* D is the way of what is prescribed */
+  /* D: increment of the prescribed displacements */
   PetscCall(VecWAXPY(D, -1., start, X));
   PetscCall(SbSpaceZeroPrescribed(m->space, PETSC_FALSE, D));
   PetscCall(VecCopy(start, X));
@@ -519,7 +519,7 @@ static PetscErrorCode approach(SNES snes)
     PetscBool filtered = PETSC_FALSE;
     PetscReal s, whole;
 
-    /* all the rest at once */
+    /* the rest of the motion at once */
     PetscCall(VecCopy(D, Y));
     PetscCall(VecScale(Y, progress - 1.));
     PetscCall(SbModelPotentialMaxStep(m, X, Y, 1., &part, &nactive));
@@ -529,7 +529,7 @@ static PetscErrorCode approach(SNES snes)
       PetscFunctionReturn(PETSC_SUCCESS);
     }
 
-    /* as far as it goes when bodies give way */
+    /* in part, with Newton's steps of the bodies */
     PetscCall(SNESComputeFunction(snes, X, F));
     PetscCall(VecWAXPY(n->to.x, DIFFERENCE, D, X));
     PetscCall(SbModelPotentialAdvance(m, progress + DIFFERENCE));
@@ -546,7 +546,7 @@ static PetscErrorCode approach(SNES snes)
       PetscCall(VecWAXPY(n->to.x, -s, Y, X));
       PetscCall(SbModelPotentialAdvance(m, progress + s * (1. - progress)));
       PetscCall(SbModelStrainEnergy(m, n->to.x, NULL, &energy, &inverted));
-      /* what moves by order may turn a tet over that nothing can keep from it */
+      /* a prescribed motion may invert a tet unavoidably */
       if (s < SHORTEST || ((inverted <= before || s < UNAVOIDABLE * whole) && !PetscIsInfOrNanReal(energy)))
         break;
     }
@@ -562,7 +562,7 @@ static PetscErrorCode approach(SNES snes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the step along s Y was the last one; by its length where surfaces push each other: residuals are those of stiff gaps there. */
+/* Whether the step s Y was the last one; in barrier contact by its length: residuals are dominated by stiff gaps. */
 static PetscErrorCode converged(SNES snes, PetscReal s)
 {
   Newton *n = (Newton *)snes->data;
@@ -574,7 +574,7 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
   PetscFunctionBeginUser;
   if (!n->nblock) {
     PetscCall(SbSNESConverged(snes, snes->iter, snes->xnorm, snes->ynorm, snes->norm));
-    /* what rounding leaves of the residual may be more than the tolerance */
+    /* the residual's rounding may exceed the tolerance */
     if (!snes->reason && n->rounding) snes->reason = SNES_CONVERGED_SNORM_RELATIVE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -603,7 +603,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   const PetscBool guarded = (PetscBool)(n->run->model->npotential > 0);
   PetscBool filtered = PETSC_FALSE;
   PetscReal slope = 0., s = 1., fall = 0.,
-            fall_before = 0.; /* of E in this solve, and until it was asked last, J */
+            fall_before = 0.; /* decrease of E in this solve, and until the last check of progress, J */
   PetscInt nactive, first = 0, creeps = 0;
 
   PetscFunctionBeginUser;
@@ -638,7 +638,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
       break;
     }
 
-    /* where to, and how far */
+    /* direction, and largest step */
     PetscCall(find_direction(snes, &filtered, &slope));
     s = 1.;
     if (guarded && !snes->reason) PetscCall(SbModelPotentialMaxStep(n->run->model, X, Y, 1., &s, &nactive));
@@ -648,7 +648,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     if (n->whole) filtered = PETSC_FALSE;
     n->kind = s < 1. ? SB_HESSIAN_PROJECTED : SB_HESSIAN_EXACT;
 
-    /* whether that is near enough */
+    /* convergence */
     snes->iter++;
     PetscCall(VecNorm(X, NORM_2, &snes->xnorm));
     PetscCall(VecNorm(Y, NORM_2, &snes->ynorm));
@@ -656,7 +656,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     PetscCall(SNESLogConvergenceHistory(snes, snes->norm, snes->linear_its - linear));
     PetscCall(converged(snes, s));
     PetscCall(SNESMonitor(snes, snes->iter, snes->norm));
-    /* a collapse takes hundreds of steps down, and as many from halfway: on while they are worth it */
+    /* a collapse takes hundreds of descent steps, and halving the time step saves none: go on while E decreases enough */
     fall -= n->change;
     if (!snes->reason && snes->iter >= first + snes->max_its &&
         (!n->patient ||
@@ -666,7 +666,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     if (!guarded && !n->run->model->dynamic && !n->provisional) creeps = s < CREEP ? creeps + 1 : 0;
     if (!snes->reason && creeps == CREEPS) snes->reason = SNES_DIVERGED_LINE_SEARCH;
 
-    /* friction with the normal forces of this iterate, where its lag is iterated: at once while loads arrive, then when it has settled */
+    /* lagged friction takes the normal forces of this iterate: in the first iterations each time, then after convergence */
     if (guarded && (snes->reason > 0 || (!snes->reason && snes->iter <= EARLY))) {
       PetscBool again;
 

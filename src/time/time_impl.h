@@ -1,13 +1,13 @@
 /*
-  time_impl.h - what the files of src/time share.
+  time_impl.h - shared by the files of src/time.
 */
 #pragma once
 #define SB_CONTACT_ROUNDS \
   250 /* solves of one step before contact counts as failed; response augmented may take more than 100 */
 #define SB_TIME_OF_IMPACT_LEAST \
-  0.05 /* of a step: where points come into contact nearer to one of its ends, it is not cut at their arrival */
-#define SB_FORGET 0.9 /* the longest step of late counts less with every step */
-#define SB_LOOKS 4    /* so often may a step be solved again for who examines it */
+  0.05                /* fraction of a step: times of impact nearer to one of its ends do not cut it */
+#define SB_FORGET 0.9 /* factor per step on the longest recent step */
+#define SB_LOOKS 4    /* most repetitions of a step that a post-solve callback asks for */
 #include "sbtime.h"
 
 #define SB_TS_SECOND_ORDER "sb_second_order"
@@ -23,7 +23,7 @@ typedef struct {
   SbMethod method;
   PetscReal alpha_m, alpha_f, beta, gamma; /* generalized-alpha; fraction of the new state, as in TSALPHA2 */
   PetscBool impulses;                      /* Newmark with contact: newmark_contact.c */
-  PetscBool separate;                      /* Newmark with guarded contact: the acceleration is without it */
+  PetscBool separate;                      /* Newmark with barrier contact: the acceleration is without it */
 } SbMethodSettings;
 
 static inline PetscBool SbRunIsExplicit(SbRun run)
@@ -48,13 +48,14 @@ typedef struct {
   PetscErrorCode (*complete)(void *ctx, SNESConvergedReason reason, SbSolvedStep *step, PetscBool *ok);
   void *ctx;
 } SbAttempt;
-/* The penalty of jumps of CR and DG is made what the state asks for (src/fem/jump.c); where that changes forces, accelerations and reactions that were taken from them too. Explicit integrators have no
-   matrix, and a step that is stable for the penalty of the rest state; PETSc's own steps (alpha2) do not say when they begin, and have that penalty, too. Collective. */
+/* Updates the penalty on jumps of CR and DG by the state (src/fem/jump.c), and accelerations and reactions with it; changed: it did. Explicit integrators, whose stable step
+   is that of the rest state, and alpha2, without a pre-step callback, keep the penalty of the rest state. Collective. */
 PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed);
-/* ok: the step can be accepted. Collective. */
+/* Attempts a step; ok: it can be accepted. Collective. */
 PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *attempt, PetscBool *ok);
-PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt,
-                                 PetscBool last); /* after it was accepted; also once at the start */
+PetscErrorCode
+SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt,
+                  PetscBool last); /* calls monitors after an accepted step; also once at the start */
 #define SB_NEWTON_ITERATIONS 100
 /* transfer.c: the post-step function of the TS. */
 PetscErrorCode SbRunAfterStep(TS ts);
@@ -65,7 +66,7 @@ PetscErrorCode SbNewtonSetRun(SNES snes, SbRun run);
 /* Whether a tangent of its last solve was found not to be positive definite; never with another SNESType, or where none is `auto`. Not collective. */
 PetscErrorCode SbNewtonUnstable(SNES snes, PetscBool *is);
 
-/* stop.c: the reason that a run gives when it ends early. */
+/* stop.c: runs that end early. */
 /* Options -wall_time and -stop_grace. */
 PetscErrorCode SbRunReadStop(SbRun run, const SbScope *scope);
 /* After a step that ended at t (within: while the next one is solved): whether the run is to end there, in run->stopped. Collective. */
@@ -73,9 +74,9 @@ PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool w
 /* While a step is solved: whether it is to be given up. Collective. */
 PetscErrorCode SbRunGiveUp(SbRun run, PetscBool *given_up);
 PetscErrorCode SbRunFail(SbRun run, const char *format, ...) __attribute__((format(printf, 2, 3)));
-/* A step of length dt, s, was refused: a warning, once until steps are whole again, when that is much less than was asked for. */
+/* After a rejected step of length dt, s: a warning when that is much less than the requested length, once until steps have that length again. */
 PetscErrorCode SbRunWarnShorter(SbRun run, PetscReal dt);
-/* Whether the last step was refused by inverted.c, and one of this length is not worth trying. */
+/* Whether the last step was rejected by inverted.c, and one of length dt, s, would be, too. */
 PetscBool SbRunTooShort(SbRun run, PetscReal dt);
 
 /*
@@ -89,7 +90,7 @@ PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const V
 PetscErrorCode SbFormI2Function(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *run);
 PetscErrorCode SbFormI2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal shift_v, PetscReal shift_a,
                                 Mat J, Mat P, void *run);
-/* run->operator: what solves see where the matrix lacks a part of the tangent. Collective. */
+/* run->operator: the shell matrix of linear solves where the assembled one lacks a part of the tangent. Collective. */
 PetscErrorCode SbFormCreateOperator(SbRun run);
 PetscErrorCode SbFormStaticFunction(SNES snes, Vec U, Vec F, void *run);
 PetscErrorCode SbFormStaticJacobian(SNES snes, Vec U, Mat J, Mat P, void *run);
@@ -102,7 +103,7 @@ PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A);
   Input:
     U       - displacement at t
   In and out:
-    V       - velocity at t by Newmark's formulas, m/s; out: with what the impulses of contact make of it
+    V       - velocity at t by Newmark's formulas, m/s; out: with the changes by contact impulses
     A       - acceleration likewise, m/s^2; out: the one with which M A + f_int - f_ext is the mean force of contact
   Output:
     own     - acceleration at t without contact: the next step begins with it
@@ -121,7 +122,7 @@ PetscErrorCode SbSolverListCreate(SbRun run);
 /* After a Newton step whose linear solve failed: "linear solver: ", each solver that was tried with its reason, iterations and residual, what is known of the
    causes, and advice. Collective. */
 PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[]);
-/* For that text: the last solve of guarded contact's system failed so. Not collective. */
+/* Records for that text how the last solve of barrier contact's system failed. Not collective. */
 PetscErrorCode SbSolverListContactFailed(SbRun run, KSPConvergedReason reason, PetscInt iterations);
 
 PetscErrorCode SbStaticSolve(SbRun run); /* static.c: the load path */
@@ -132,18 +133,18 @@ PetscErrorCode SbArcLengthSolve(SbRun run);
 /* rigid_modes.c, after a static solve: a body that can move rigidly without a force, -1: none is found; how, in words, and as displacements of the nodes, any length (along may be
    NULL). Collective. */
 PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion[], Vec along);
-/* Whether displacements are so many times the bodies' size that the matrix must have been singular. Collective. */
+/* Whether the displacements X exceed the bodies' size so far that the matrix must have been singular. Collective. */
 PetscErrorCode SbRunTooFar(SbRun run, Vec X, PetscBool *far);
 
-/* energy_balance.c: energies of the state at t and the account of the step of the length dt that ended there; `first` opens the account. Collective. */
+/* energy_balance.c: energies of the state at t, s, and the energy balance of the step of length dt that ended there; `first`: at the start. Collective. */
 PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool first);
 /* R <- the residual at t with the acceleration of the integrator, without constraints: reactions on prescribed unknowns; where it keeps none
    (TSALPHA2), inertia is left out. Forces between bodies are taken out. Collective. */
 PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R);
 
 /*
-  SbRunSolveContact - an attempt at a step with contact: as many solves as its set of touching nodes takes, U from its guess to the
-  solution. Collective. reason: that of the last solve, SNES_DIVERGED_MAX_IT when the set does not settle.
+  SbRunSolveContact - an attempt at a step with contact: solves until the active set does not change, U from its guess to the
+  solution. Collective. reason: that of the last solve, SNES_DIVERGED_MAX_IT when the set does not converge.
   With run->may_cut it ends after the first solve when points come into contact within the step: reason is then SNES_CONVERGED_ITERATING, and the
   step is to be repeated with run->arrival of its length.
 */
