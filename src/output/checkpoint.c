@@ -2,9 +2,9 @@
   Checkpoints: the state of a run in one HDF5 file, from which it goes on as if it had not stopped.
 
   Displacement, velocity and acceleration (the integrator's own) of all nodes in original order and double precision, the step, its time,
-  the next step's length, work and dissipation so far, and what effects remember (checkpoint_effects.c). A file is written beside its target, flushed and renamed; the newest ones
-  are kept. What makes it fit a run: a hash of the mesh (every coordinate and cell by its original number), and the text of
-  the options that decide the mechanics. A checksum over the three vectors detects a file that was damaged later (mesh.c says what both sums are of).
+  the next step's length, work and dissipation so far, and the history variables of effects (checkpoint_effects.c). A file is written beside its target, flushed and renamed; the newest ones
+  are kept. It is accepted by a run with the same hash of the mesh (every coordinate and cell by its original number), and the same text of
+  the options that determine the mechanics. A checksum over the three vectors detects a file that was damaged later (both sums: mesh.c).
 */
 #include <errno.h>
 #include <sys/stat.h>
@@ -21,7 +21,7 @@ typedef struct {
 } Part;
 
 #define NPART 4
-#define PATH 3 /* with arc length only, with a checksum of its own: runs without it go on from such a file */
+#define PATH 3 /* arc length only, with its own checksum: runs without arc length accept such a file */
 static void parts_of(SbRun run, Part part[NPART])
 {
   part[0] = (Part){"u", run->U};
@@ -30,12 +30,12 @@ static void parts_of(SbRun run, Part part[NPART])
   part[PATH] = (Part){"path", run->path};
 }
 
-/* When the file was written, and how the run goes on. */
+/* Step and time of the file, and the next step's length. */
 typedef struct {
   PetscReal t, next, dt, t_end, paused;
 } Times;
 
-/* The numbers, by name. Optional ones are zero where they are missing: those of re-meshing, and of a pause. */
+/* Scalars, by name. Optional ones are zero where they are missing: those of re-meshing, and of a pause. */
 typedef struct {
   const char *name;
   PetscReal *value;
@@ -112,7 +112,7 @@ static PetscErrorCode write_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether what faces hold goes on from step to step, so that it is part of the state. */
+/* Whether the penalty data of faces are history variables, and so part of the state. */
 static PetscBool faces_remember(SbRun run)
 {
   const SbModel m = run->model;
@@ -121,7 +121,7 @@ static PetscBool faces_remember(SbRun run)
                      !m->space->linear);
 }
 
-/* It is written like the path, with a checksum of its own. */
+/* Written like the arc-length data, with its own checksum. */
 static PetscErrorCode write_jumps(SbRun run, SbOutput out, SbH5 *h)
 {
   PetscReal *slice, *own;
@@ -153,7 +153,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   Number number[NNUMBER];
 
   PetscFunctionBeginUser;
-  /* whether this step is to be kept: by time, by number, as the last one, or to go on from */
+  /* whether this step is to be written: by time, by number, as the last one, or because the run stops */
   if (step->step == run->step0) PetscFunctionReturn(PETSC_SUCCESS);
   if (out->checkpoint_every > 0.)
     due = (PetscBool)(due || SbOutputDue(out->checkpoint_every, step->t, step->dt));
@@ -165,7 +165,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscCall(PetscLogStagePush(SbLogStageOutput));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CHECKPOINT], 0, 0, 0, 0));
   PetscCall(PetscLogEventBegin(out->event.checkpoint, 0, 0, 0, 0));
-  /* a file beside its target, with room for all of it: a full disk shows before anything is written */
+  /* a temporary file beside its target, its space reserved: a full disk is an error before anything is written */
   (void)snprintf(name, sizeof(name), "checkpoint_%06" PetscInt_FMT ".h5", step->step);
   PetscCall(SbOutputPath(out, name, sizeof(path), path));
   PetscCall(SbOutputPath(out, "checkpoint.tmp", sizeof(tmp), tmp));
@@ -179,7 +179,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscCall(write_jumps(run, out, &h));
   PetscCall(SbCheckpointWriteEffects(run, &h, &checksum));
   PetscCall(SbCheckpointWriteMeshes(run, &h, &checksum));
-  /* where in time it is, work and dissipation so far */
+  /* time, work and dissipation so far */
   if (run->ts) PetscCall(TSGetTimeStep(run->ts, &times.next));
   numbers_of(run, &times, number);
   for (int i = 0; i < NNUMBER; i++)
@@ -187,16 +187,16 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
       PetscCall(SbH5PutReal(&h, h.file, number[i].name, *number[i].value));
   PetscCall(SbH5PutInt(&h, h.file, "step", step->step));
 
-  /* errors that the ledger has added up, and the material points that probes follow */
+  /* accumulated error estimates, and the material points of probes */
   for (PetscInt i = 0; i < run->ncarried; i++)
     PetscCall(SbH5PutReal(&h, h.file, run->carried[i].name, *run->carried[i].value));
   PetscCall(SbProbesWrite(run, out, &h));
 
-  /* what is set by hand */
+  /* values of live formulas */
   for (PetscInt i = 0; i < SbLiveCount(); i++)
     PetscCall(SbH5PutReal(&h, h.file, SbLiveColumn(i, NULL), SbLiveGet(i, step->t)));
 
-  /* by what a restart knows that the file fits the run and is whole */
+  /* identity of the run, and the checksum */
   PetscCall(SbH5PutInt(&h, h.file, "mesh_hash", (int64_t)out->mesh_hash));
   PetscCall(SbH5PutInt(&h, h.file, "checksum", (int64_t)checksum));
   PetscCall(SbH5PutInt(&h, h.file, "format", FORMAT));
@@ -204,7 +204,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscCall(SbH5Flush(&h));
   PetscCall(SbH5Close(&h));
 
-  /* once it is on disk, it takes its place, and the oldest ones go */
+  /* flushed: rename it, and remove the oldest ones */
   if (!out->rank) {
     if (rename(tmp, path))
       SbFormat(sizeof(message), message, "cannot rename %s to %s: %s", tmp, path, strerror(errno));
@@ -223,7 +223,7 @@ PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out)
   const PetscBool asked = (PetscBool)(out->checkpoint_every > 0. || out->checkpoint_every_steps);
 
   PetscFunctionBeginUser;
-  // A run that is asked to stop writes one, too, with what it knows of work and dissipation, which are part of the state.
+  // A run that may be asked to stop writes one, too: it needs work and dissipation, which are part of the state.
   if (!asked && !run->stop.listens) PetscFunctionReturn(PETSC_SUCCESS);
   if (asked) {
     PetscCall(SbOutputOrder(run, out));
@@ -349,7 +349,7 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   }
   if (*ok && format != FORMAT) *ok = PETSC_FALSE;
 
-  /* the state, and whether it is what was written for such a run */
+  /* the identity, the state and its checksum */
   if (*ok) PetscCall(check_identity(run, out, &h, mesh_hash));
   PetscCall(PetscCalloc1(run->model->neffect, &records));
   if (*ok) PetscCall(read_vectors(run, out, &h, &sum, ok));
@@ -358,12 +358,12 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   if (*ok) PetscCall(SbCheckpointSumMeshes(run, &h, &sum, ok));
   if (sum != (uint64_t)checksum) *ok = PETSC_FALSE;
 
-  /* the numbers; the next step is that of the uninterrupted run, which may be a short one before t_end; with another fixed step or end the run takes its own */
+  /* scalars; the next step has the length of the uninterrupted run, unless -ts_dt or -ts_max_time differ */
   for (int i = 0; i < NNUMBER && *ok; i++) *number[i].value = values[i];
   if (*ok && run->ts && (!run->fixed_step || (times.dt == run->dt && times.t_end == run->t_end)))
     PetscCall(TSSetTimeStep(run->ts, times.next));
 
-  /* errors that the ledger has added up: all or none, as a run without -ledger writes none */
+  /* accumulated error estimates: all or none, as a run without -ledger writes none */
   if (*ok && run->ncarried) {
     PetscBool all = PETSC_TRUE;
     PetscReal *errors;
@@ -386,7 +386,7 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   }
   PetscCall(SbH5Close(&h));
 
-  /* effects take up what they remember, and the run stands where the file was written */
+  /* history variables of effects; the run is at the file's step */
   if (*ok) PetscCall(SbCheckpointLoadEffects(run, times.t, records));
   for (PetscInt k = 0; k < run->model->neffect; k++) PetscCall(PetscFree(records[k].record));
   PetscCall(PetscFree(records));
@@ -412,7 +412,7 @@ PetscErrorCode SbCheckpointLoad(SbRun run, const char *file)
              file, file);
   for (int k = 0; !ok; k++) {
     PetscCall(SbCheckpointFind(out, file, k, sizeof(path), path));
-    /* one that cannot be read is passed over where another one may be taken */
+    /* an unreadable one is skipped if an older one may be taken */
     PetscCheck(path[0], out->comm, PETSC_ERR_FILE_OPEN, "-restart latest: there is no %scheckpoint in %s",
                k ? "readable " : "", out->dir);
     PetscCall(load(run, out, path, &ok));

@@ -1,15 +1,15 @@
 /*
-  What effects remember from step to step, in checkpoints: who touches and who slides. Each effect hands over records of numbers, in which things
-  have names that no partition changes (SbEffectOps.save); they are one dataset per effect, `state_<name>`, in any order. Reading,
-  every rank gets all of them, which are those of surfaces in touch, and the effect takes its own.
+  History variables of effects in checkpoints: active contact constraints, friction states. Each effect gives records of numbers, whose entities
+  have numbers that no partition changes (SbEffectOps.save); they are one dataset per effect, `state_<name>`, in any order. Reading,
+  every rank gets all of them, and the effect takes those of its entities.
 
-  A checkpoint without such a dataset is an older one, or nothing touched: the effects begin as at the start of a run.
+  Without such a dataset (no contact, or an older file) the effects begin as at the start of a run.
 */
 #include "output_impl.h"
 
 #define SALT 0x5bd1e995u
 
-/* Of a record the order counts, of records it does not. */
+/* Checksum: depends on the order within a record, not on the order of records. */
 static uint64_t sum_of(PetscInt n, PetscInt width, const PetscReal record[])
 {
   uint64_t sum = 0;

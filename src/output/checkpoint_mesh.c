@@ -117,7 +117,7 @@ PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum)
 
 /* ------------------------------------------------------------------ reading; one rank */
 
-/* Numbers of vertices lie in their range: nothing else may be read beyond its end. */
+/* Whether all vertex numbers are in range. */
 static PetscBool in_range(const SbMemoryMesh *g)
 {
   const PetscInt *const list[] = {g->cell, g->tri, g->edge};
@@ -147,7 +147,7 @@ static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_
   group = H5Gopen2(file, name, H5P_DEFAULT);
   *ok = (PetscBool)(group >= 0);
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
-  /* files of before know no curved edges */
+  /* older files have no curved edges */
   for (int k = 0; k < NCOUNT; k++) {
     if (k < 3 || H5Aexists(group, counts[k]) > 0) SbH5GetInt(group, counts[k], &n[k], ok);
     *ok = (PetscBool)(*ok && n[k] >= 0 && n[k] < PETSC_MAX_INT / 8);
@@ -157,7 +157,7 @@ static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_
   SbH5GetReal(group, "bound", &bound, ok);
   SbH5GetInt(group, "sum", &sum, ok);
   for (int k = 0; k < NCOUNT; k++) count[k] = *ok ? (PetscInt)n[k] : 0;
-  /* a count that lies shows when its dataset has another one: nothing is allocated for it */
+  /* counts must agree with the sizes of the datasets before anything is allocated */
   *ok = (PetscBool)(*ok && SbH5Rows(group, "x") == n[0] && SbH5Rows(group, "cells") == n[1] &&
                     (!n[2] || SbH5Rows(group, "triangles") == n[2]) &&
                     (!n[3] || SbH5Rows(group, "curved_edges") == n[3]));
@@ -170,7 +170,7 @@ static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_
     arrays_of(*in_memory, count, a);
     for (int k = 0; k < NARRAY && *ok; k++)
       if (a[k].n) *ok = SbH5Read(group, a[k].name, a[k].memtype, a[k].n, a[k].ncomp, a[k].data);
-    /* checked before the mesh is used: else a damaged file would be taken for one of another mesh */
+    /* check before the mesh is compared: a damaged file is not one of another mesh */
     *ok = (PetscBool)(*ok && in_range(*in_memory) && (int64_t)sum_of(*in_memory) == sum);
     if (!*ok) PetscCall(SbMemoryMeshDestroy(in_memory));
   }

@@ -1,5 +1,5 @@
 /*
-  The points where contact pushes bodies, with normals, gaps and forces: -output_contacts.
+  The active contact points, with normals, gaps and forces: -output_contacts.
 
   Each frame of fields.h5 then has a group `contacts` with one dataset per quantity and one row per point, in an order that no partition
   changes. Their number differs from frame to frame, so they have indices of their own, contacts.xmf and contacts.vtkhdf.
@@ -10,7 +10,7 @@
 #include <stddef.h>
 #include "output_impl.h"
 
-/* What is written of a point: where it is in SbContactPoint, or what is made of that. */
+/* Quantities written for a point: their offset in SbContactPoint, or one of the two below. */
 #define ROW ((size_t)-1)    /* the number of the row itself: VTK needs a cell for each point */
 #define NORMAL ((size_t)-2) /* the force along the normal */
 #define FRICTION ((size_t)-3)
@@ -71,7 +71,7 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
   PetscCall(PetscLogEventBegin(out->event.contacts, 0, 0, 0, 0));
   c->list.n = 0;
   PetscCall(SbModelContactPoints(run->model, step->t, step->U, &c->list));
-  /* The contact points of this rank to the ranks that have their share of the numbers of points and edges; those that came, sorted. */
+  /* Sends this rank's contact points to the ranks of their slices; sorts the received ones. */
   for (PetscInt i = 0; i < c->list.n; i++) bound = PetscMax(bound, c->list.point[i].id[1]);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &bound, 1, MPIU_INT, MPI_MAX, c->share.comm));
   PetscCall(PetscMalloc1(c->list.n, &dest));
@@ -189,7 +189,7 @@ PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, P
 PetscErrorCode SbContactsCreate(SbRun run, SbOutput out)
 {
   const SbMesh mesh = run->model->mesh;
-  PetscReal nowhere[3] = {0., 0., 0.}; /* a vertex, where a frame without points shows one */
+  PetscReal nowhere[3] = {0., 0., 0.}; /* position of the dummy point of a frame without contact */
   SbContacts c;
 
   PetscFunctionBeginUser;

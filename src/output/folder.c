@@ -1,9 +1,9 @@
 /*
-  The folder of the results: made, tried and locked before anything is computed; what an earlier run left there under our names is moved aside when the run is about to
-  start, and files with other names are never touched. Checkpoints are found by the number in their names.
+  The folder of the results: created, write-tested and locked before anything is computed; an earlier run's results are moved aside when the run
+  starts, and files with other names are never touched. Checkpoints are found by the number in their names.
 
-  The lock is one of the file system (fcntl) on a file that names host and process: it goes with its process, however that ends, and holds between hosts where the file
-  system has such locks. Where it has none, folders are not locked.
+  The lock is one of the file system (fcntl) on a file that names host and process: it is released with its process, however that ends, and works between hosts where the file
+  system supports it. Else folders are not locked.
 */
 #include <ctype.h>
 #include <dirent.h>
@@ -61,7 +61,7 @@ PetscErrorCode SbFolderMake(SbOutput out, char message[SB_MESSAGE_MAX])
 
 #define LOCK ".supple_running"
 
-/* Lock file of this process, for runs that an error ends; empty: none. */
+/* Lock file of this process, removed after an error; empty: none. */
 static char locked[PETSC_MAX_PATH_LEN];
 
 static void remove_lock(void)
@@ -70,7 +70,7 @@ static void remove_lock(void)
   locked[0] = 0;
 }
 
-/* The lock file open and locked, or why not; rank 0. A file that its owner removed meanwhile is no lock. */
+/* Opens and locks the lock file, or says why not; rank 0. Repeated if its owner removed the file meanwhile. */
 static PetscErrorCode lock_folder(SbOutput out, char message[SB_MESSAGE_MAX])
 {
   struct flock all = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
@@ -200,7 +200,7 @@ PetscErrorCode SbCheckpointFind(SbOutput out, const char *file, int k, size_t si
 
 /* ------------------------------------------------------------------ all of it */
 
-/* What an earlier run left goes into a folder named by when it ended. */
+/* Moves an earlier run's results into a subfolder named by its end time. */
 static PetscErrorCode keep_earlier(SbOutput out)
 {
   char path[PETSC_MAX_PATH_LEN], name[SB_FILE_MAX], date[32];
@@ -252,7 +252,7 @@ PetscErrorCode SbFolderClear(SbOutput out, PetscInt step0)
   char name[SB_FILE_MAX], path[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
-  /* what was not whole when a run ended */
+  /* temporary files of an aborted run */
   PetscCall(SbOutputPath(out, "checkpoint.tmp", sizeof(path), path));
   (void)unlink(path);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++) {
@@ -262,7 +262,7 @@ PetscErrorCode SbFolderClear(SbOutput out, PetscInt step0)
   }
   if (!out->restarted && !out->overwrite) PetscCall(keep_earlier(out));
 
-  // Checkpoints of what is computed again would be the latest ones.
+  // Later checkpoints would be taken for the latest ones.
   PetscCall(SbCheckpointPrune(out, out->restarted ? step0 : -1, PETSC_MAX_INT));
   if (out->restarted) PetscFunctionReturn(PETSC_SUCCESS);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++) {

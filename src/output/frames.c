@@ -18,15 +18,15 @@ typedef struct {
   PetscInt nfield;
   const SbField *field[SB_FIELD_MAX];
   PetscInt bytes[SB_FIELD_MAX];
-  PetscInt npoint, point_bytes; /* of contact; -1: it was not asked for */
-  PetscInt mesh;                /* step behind which its mesh was made, 0: the first one */
+  PetscInt npoint, point_bytes; /* contact points, -1: not written; bytes of their numbers */
+  PetscInt mesh;                /* step after which its mesh was made, 0: the first one */
 } SbFrame;
 
 struct _p_SbFrames {
   SbH5 h5;
   hid_t top;             /* /step */
-  hid_t node;            /* group of the current hundred; negative before the first frame */
-  PetscInt nnode, nlink; /* hundreds so far; links in the current one */
+  hid_t node;            /* group of the current hundred frames; negative before the first frame */
+  PetscInt nnode, nlink; /* groups of a hundred frames so far; links in the current one */
   PetscInt last_step;    /* of the last frame in the file, or -1 */
   PetscInt nframe;
   PetscInt mesh;            /* of frames that are written, as in SbFrame */
@@ -45,7 +45,7 @@ static void mesh_name(PetscInt step, size_t size, char name[])
     SbFormat(size, name, "mesh");
 }
 
-/* What fr->owned has of points or cells as rows of the file, out->point or out->tet, in fr->slice: of a cell that is cut each of its tets has the values. */
+/* Values of points or cells from fr->owned to rows of the file, in fr->slice: each of a cell's tets gets the cell's values. */
 static PetscErrorCode gather(SbOutput out, PetscBool cell, PetscInt ncomp)
 {
   SbFrames fr = out->frames;
@@ -63,7 +63,7 @@ static PetscErrorCode gather(SbOutput out, PetscBool cell, PetscInt ncomp)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A constant whole number per point or cell. */
+/* A constant integer per point or cell. */
 static PetscErrorCode write_whole(SbOutput out, hid_t where, const char *name, PetscBool cell)
 {
   const SbOrder *order = cell ? &out->tet : &out->point;
@@ -79,7 +79,7 @@ static PetscErrorCode write_whole(SbOutput out, hid_t where, const char *name, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of the nodes of P2: the tets at the corners of a cell; the ends of each diagonal of the octahedron between them, and the others around it. */
+/* Nodes of P2: of the tets at the corners of a cell; the ends of each diagonal of the octahedron between them, and the other four. */
 static const int corner_tet[4][4] = {{0, 4, 5, 6}, {4, 1, 7, 8}, {5, 7, 2, 9}, {6, 8, 9, 3}};
 static const int around[3][6] = {{4, 9, 5, 6, 8, 7}, {5, 8, 7, 9, 6, 4}, {6, 7, 4, 5, 9, 8}};
 
@@ -90,7 +90,7 @@ static int child_corner(int diagonal, int k, int j)
   return j < 2 ? around[diagonal][j] : around[diagonal][2 + (k + j - 6) % 4];
 }
 
-/* The diagonal that cuts the octahedron best at rest: its worst tet has most volume for the diagonal's length. Straight cells have equal volumes, so the shortest. */
+/* The diagonal whose smallest tet has the largest volume over the diagonal's length, at rest. In straight cells volumes are equal: the shortest. */
 static int best_diagonal(SbSpace s, PetscInt cell)
 {
   PetscReal x[SB_CELL_NODES][3], best = PETSC_MIN_REAL;
@@ -109,7 +109,7 @@ static int best_diagonal(SbSpace s, PetscInt cell)
       for (int j = 0; j < 4; j++) vert[j] = child_corner(d, k, j);
       worst = PetscMin(worst, SbTetDeterminant(x[0], vert) / (length * length * length));
     }
-    // of diagonals that differ by rounding the first one
+    // of diagonals equal within rounding the first one
     if (worst > best + 1e-9 * PetscAbsReal(best)) {
       best = worst;
       found = d;
@@ -119,7 +119,7 @@ static int best_diagonal(SbSpace s, PetscInt cell)
 }
 
 /*
-  The tets by their points; where points are those of cells, the vertices that these lie at, too. With P2 the ten points of its cells in the order of VTK (corners, then the edges 01 12 02 03 13 23), and
+  The tets by their points; with points per cell, also the vertex of each. With P2 the ten points of its cells in the order of VTK (corners, then the edges 01 12 02 03 13 23), and
   the cell that each tet is part of.
 */
 static PetscErrorCode write_cells(SbRun run, SbOutput out, hid_t group)
@@ -183,7 +183,7 @@ static PetscErrorCode write_cells(SbRun run, SbOutput out, hid_t group)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where the points are at rest. */
+/* Reference positions of the points. */
 static PetscErrorCode write_points(SbRun run, SbOutput out, hid_t group)
 {
   SbFrames fr = out->frames;
@@ -197,7 +197,7 @@ static PetscErrorCode write_points(SbRun run, SbOutput out, hid_t group)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* "set_fat_tissue": letters with a meaning in paths or XML become underscores. */
+/* "set_fat_tissue": characters special in paths or XML become underscores. */
 static void array_of_set(const char *prefix, const char *set, size_t size, char name[])
 {
   SbFormat(size, name, "%s_%s", prefix, set);
@@ -205,7 +205,7 @@ static void array_of_set(const char *prefix, const char *set, size_t size, char 
     if (!isalnum((unsigned char)*p) && !strchr("_-.", *p)) *p = '_';
 }
 
-/* One set: which points are in it, and which tets when there are any: 1, or 0. */
+/* Indicator, 0 or 1, of one set: at points, and of tets if it has any. */
 static PetscErrorCode write_set(SbRun run, SbOutput out, PetscInt k, hid_t group)
 {
   SbFrames fr = out->frames;
@@ -243,7 +243,7 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
   /* a run that was restarted before a re-meshing repeats it: its mesh is replaced */
   if (H5Lexists(fr->h5.file, name, H5P_DEFAULT) > 0) (void)H5Ldelete(fr->h5.file, name, H5P_DEFAULT);
 
-  /* room on disk for all of it, then points and cells */
+  /* reserve disk space, then write points and cells */
   PetscCall(SbH5Reserve(&fr->h5, (PetscInt64)out->point.N * 24 + (PetscInt64)out->tet.N * 40 +
                                    (out->place ? (PetscInt64)out->cell.N * 40 : 0) + 65536));
   PetscCall(SbH5GroupCreate(&fr->h5, 8, 8, &group));
@@ -305,7 +305,7 @@ static PetscErrorCode write_field(SbRun run, SbOutput out, const SbStep *step, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What viewers open, with all frames so far. Rank 0. */
+/* Writes the index files for viewers, with all frames so far. Rank 0. */
 static void write_indices(SbOutput out, PetscBool last, char message[SB_MESSAGE_MAX])
 {
   SbIndexWrite(out->frames->index, last, message);
@@ -324,7 +324,7 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   hid_t group;
 
   PetscFunctionBeginUser;
-  /* room on disk for the whole frame with its metadata, so that a full disk shows before anything is written */
+  /* reserve disk space for the frame and its metadata: a full disk is an error before anything is written */
   PetscCall(SbContactsFind(run, out, step, &room));
   room += 65536 + 8192 * out->nfield;
   for (PetscInt i = 0; i < out->nfield; i++)
@@ -613,7 +613,8 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
 static PetscErrorCode allocate(SbRun run, SbOutput out)
 {
   SbFrames fr = out->frames;
-  PetscInt most = 1, wide = out->place ? SB_CELL_NODES + 1 : 4; /* numbers of a field's cell, of the mesh's */
+  PetscInt most = 1,
+           wide = out->place ? SB_CELL_NODES + 1 : 4; /* components of a cell field; points of a cell */
   PetscInt nowned, nslice;
 
   PetscFunctionBeginUser;

@@ -1,8 +1,8 @@
 /*
   HDF5 through MPI-IO, laid out so that a kill at any moment leaves every completed frame readable.
 
-  HDF5 changes its metadata in place, and an index that is half written is not readable. Here nothing that a reader of
-  the finished part follows is ever written by more than one call:
+  HDF5 changes its metadata in place, and half-written metadata is unreadable. Here all metadata that leads to
+  completed frames is changed by single writes:
   - A frame is written as a group without a name: new objects at new positions, to which nothing points yet. It is flushed,
     all ranks meet, and only then does it get its name in the group of its hundred.
   - Such a group keeps its links in its own object header, in the old format (no checksum), with room for all of them from
@@ -38,7 +38,7 @@ static herr_t take_message(unsigned n, const H5E_error2_t *error, void *ctx)
   return 0;
 }
 
-/* Keeps why a call failed on this rank, the first time. */
+/* Keeps the first error message of this rank. */
 static void note(SbH5 *h, PetscBool bad)
 {
   if (!bad || h->reason[0]) return;
@@ -60,7 +60,7 @@ static PetscErrorCode agree(SbH5 *h)
   if (ierr) {
     int key;
 
-    // HDF5 must not come to its end of the program: attributes of MPI_COMM_SELF are deleted first by MPI_Finalize(), the newest before its own.
+    // Skip HDF5's own cleanup at exit: attributes of MPI_COMM_SELF are deleted first by MPI_Finalize(), the newest before its own.
     if (!h->failed && !MPI_Comm_create_keyval(MPI_COMM_NULL_COPY_FN, leave_at_once, &key, NULL)) {
       h->failed = PETSC_TRUE;
       (void)MPI_Comm_set_attr(MPI_COMM_SELF, key, NULL);
@@ -79,7 +79,7 @@ static PetscErrorCode agree(SbH5 *h)
     }                      \
   } while (0)
 
-/* A file that is about to be opened, and how. */
+/* Initialises h and the access properties of a file. */
 static PetscErrorCode begin(MPI_Comm comm, const char *path, SbH5 *h, hid_t *list)
 {
   PetscFunctionBeginUser;

@@ -2,11 +2,11 @@
   history.csv: one row of scalars per step, each written to the file at once and by one call.
 
   First line: names. Second line: units behind a '#', so that pandas and numpy skip it with comment='#'. Numbers have 17
-  digits: what is read back is what was computed. `total` is kinetic + strain - load_work - prescribed_work, which stays what it
-  was at the start as long as nothing is dissipated.
+  digits: what is read back is what was computed. `total` is kinetic + strain - load_work - prescribed_work, constant
+  as long as nothing is dissipated.
 
-  The sums that effects, probes and bodies need travel in one reduction per row; with them the news that the row before could not be
-  written. Such a row is taken back.
+  One reduction per row sums the values of effects, probes and bodies, and a flag that the row before could not be
+  written. Such a row is removed.
 */
 #include <errno.h>
 #include <fcntl.h>
@@ -28,11 +28,11 @@ struct _p_SbHistory {
   PetscInt nextra;    /* columns of effects, probes and bodies */
   PetscReal (
     *mass)[4]; /* [nbody] centre at rest, m, and mass, kg, of each body; NULL without columns of bodies */
-  PetscReal *mine, *sum;        /* [nextra + 1] of this rank, of all; the last: the row before failed */
+  PetscReal *mine, *sum; /* [nextra + 1] values of this rank, sums of all; the last: the row before failed */
   char message[SB_MESSAGE_MAX]; /* why it failed; empty when it did not */
 };
 
-/* The columns of every run: where in the step each is; `total` is the sum of others. */
+/* The columns of every run, with their offset in SbStep; `total` is a sum of others. */
 static const struct {
   const char *name, *unit;
   enum { REAL, COUNT, TOTAL } kind;
@@ -174,7 +174,7 @@ static PetscErrorCode effect_columns(SbRun run, const SbStep *step, PetscReal *v
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Brings the row to the file in one call; a row that was cut off by a full disk is taken back. */
+/* Writes the row in one call; a row truncated by a full disk is removed. */
 static void write_row(SbHistory h, char message[SB_MESSAGE_MAX])
 {
   const off_t before = lseek(h->fd, 0, SEEK_END);

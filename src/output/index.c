@@ -1,5 +1,5 @@
 /*
-  What the frames of fields.h5 have, for viewers: fields.xmf and fields.vtkhdf, or contacts.xmf and contacts.vtkhdf. Rank 0 keeps the list;
+  The index files of fields.h5 for viewers: fields.xmf and fields.vtkhdf, or contacts.xmf and contacts.vtkhdf. Rank 0 keeps the list;
   xdmf.c and vtkhdf.c make the files of it.
 */
 #include <stdlib.h>
@@ -47,7 +47,7 @@ void SbIndexRemove(SbIndex x)
   (void)unlink(x->vtkhdf);
 }
 
-/* One more piece of the array of this name, which is made when it is new: group/dataset of fields.h5. */
+/* Adds group/dataset of fields.h5 as a piece of the array of this name, which is created if it is new. */
 static PetscErrorCode add_piece(SbIndex x, const SbArray *like, PetscInt block, const char *group,
                                 const char *dataset)
 {
@@ -97,7 +97,7 @@ typedef struct {
   PetscErrorCode ierr;
 } List;
 
-/* An array that belongs to the mesh; `vertices` is ours alone, as are `cells10` beside linear tets. */
+/* An array of the mesh; viewers need neither `vertices` nor `cells10` beside linear tets. */
 static herr_t list_array(hid_t where, const char *name, const H5L_info_t *info, void *ctx)
 {
   List *l = (List *)ctx;

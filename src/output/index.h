@@ -1,13 +1,13 @@
 /*
-  index.h - what the frames of fields.h5 have, as a list, from which the files that viewers open are made.
+  index.h - the contents of the frames of fields.h5, for the index files of viewers.
 */
 #pragma once
 #include "output_impl.h"
 
-/* A run of values in fields.h5: rows of one dataset, in one frame or one mesh. */
+/* A piece of an array: rows of one dataset of fields.h5, in one frame or one mesh. */
 typedef struct {
   PetscInt block; /* number of the frame; of the part for what does not change with time */
-  int bytes;      /* of a number */
+  int bytes;      /* per number */
   char path[96];  /* of the dataset */
 } SbPiece;
 
@@ -16,7 +16,7 @@ typedef struct {
   int ncomp, bytes;                /* most bytes of its pieces */
   PetscBool whole, cell, constant; /* whole numbers; per cell; one piece per part, else per frame */
   PetscInt npiece, size;
-  SbPiece *piece; /* [npiece], the blocks rise */
+  SbPiece *piece; /* [npiece], blocks ascending */
 } SbArray;
 
 /* A mesh, or the contact points of one frame. */

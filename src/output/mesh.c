@@ -1,8 +1,7 @@
 /*
-  What of the output belongs to the mesh: original orders, numbers of nodes, and one number that distinguishes it from other meshes. All of it is forgotten and made again
-  when a body is re-meshed.
+  Mesh-dependent data of the output: original orders, numbers of nodes, and a hash of the mesh. They are rebuilt when a body is re-meshed.
 
-  The mesh's number is a sum of mixed 64-bit words (the finaliser of splitmix64; Steele, Lea and Flood 2014), which does not depend on the order of its entities.
+  The hash is a sum of mixed 64-bit words (the finaliser of splitmix64; Steele, Lea and Flood 2014), which does not depend on the order of its entities.
 */
 #include "output_impl.h"
 
@@ -14,7 +13,7 @@ static uint64_t mix(uint64_t x)
   return x ^ (x >> 31);
 }
 
-/* A number at a position. Zero has one sign here. */
+/* Hash of a number at a position; -0 counts as 0. */
 uint64_t SbMixReal(uint64_t position, PetscReal value)
 {
   uint64_t bits;
@@ -24,7 +23,7 @@ uint64_t SbMixReal(uint64_t position, PetscReal value)
   return mix(position ^ mix(bits));
 }
 
-/* Points and tets where a body is of P2: nodes at edges are points, too, and its cells are eight tets each, but for -output_quadratic. */
+/* Points and tets where a body is of P2: edge nodes are points, too, and each cell is eight tets, unless -output_quadratic. */
 static PetscErrorCode order_quadratic(SbRun run, SbOutput out)
 {
   const SbMesh mesh = run->model->mesh;

@@ -1,5 +1,5 @@
 /*
-  What a run leaves behind: options, the complete scenario, and which monitors are attached.
+  Options of the output, the complete scenario, and the monitors of a run.
 */
 #include <signal.h>
 #include <time.h>
@@ -75,7 +75,7 @@ static void add_field(SbOutput out, const SbField *f)
   out->field[out->nfield++] = f;
 }
 
-/* Fields asked for, those of a static run only where it is one; body always. */
+/* The fields of -output_fields, without those that a static run lacks; and body. */
 static PetscErrorCode read_fields(SbOutput out, const SbScope *scope, PetscBool dynamic)
 {
   char(*names)[SB_NAME_MAX];
@@ -132,7 +132,7 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
 
   PetscCall(SbOptionBool(&SbRunScope, "output_overwrite", &out->overwrite));
 
-  /* what is written into it, and how often */
+  /* contents and intervals */
   PetscCall(read_fields(out, &SbRunScope, model->dynamic));
   PetscCall(SbOptionReal(&SbRunScope, "output_every", &out->every));
   PetscCall(SbOptionInt(&SbRunScope, "output_every_steps", &out->every_steps));
@@ -160,7 +160,7 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
 
   PetscCall(SbProbesSetFromOptions(out, &SbRunScope, model->dynamic));
 
-  /* the file in which others say what live formulas are to be */
+  /* live.txt, which has the values of live formulas */
   if (SbLiveCount()) {
     char path[PETSC_MAX_PATH_LEN];
     PetscReal speed, angular_speed, pace;
@@ -172,7 +172,7 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
     PetscCall(SbLiveSetUp(path, speed, angular_speed, pace));
   }
 
-  /* what the screen shows */
+  /* console output */
   PetscCall(SbOptionBool(&SbRunScope, "progress", &out->progress));
   PetscCall(SbOptionBool(&SbRunScope, "quiet", &out->quiet));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -180,7 +180,7 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
 
 /* ------------------------------------------------------------------ scenario.opts */
 
-/* Of the complete scenario, the lines that decide the mechanics: what a checkpoint must agree with. */
+/* The lines of the complete scenario that determine the mechanics, on which a checkpoint must agree. */
 static PetscErrorCode keep_identity(SbRun run, SbOutput out, const char *text)
 {
   static const char *const prefix[] = {"-bodies",  "-body_",   "-sets", "-set_",
@@ -284,7 +284,7 @@ PetscErrorCode SbOutputAttach(SbRun run)
     PetscCall(SbLogNamed("Out", "checkpoint", &out->event.checkpoint));
   if (out->progress && !out->quiet) PetscCall(SbLogNamed("Out", "progress", &out->event.progress));
 
-  /* the state to go on from; a checkpoint that is refused leaves the folder as it was */
+  /* load the checkpoint first: if it is refused, the folder stays unchanged */
   PetscCall(SbOutputCountNodes(run->model->space, out));
   // the complete scenario as text on rank 0, and on all ranks the part of it that checkpoints carry
   memory = out->rank ? NULL : open_memstream(&scenario, &size);
@@ -304,7 +304,7 @@ PetscErrorCode SbOutputAttach(SbRun run)
   if (out->restart[0]) PetscCall(SbFramesCheck(run, out));
   if (!out->rank) PetscCall(SbFolderClear(out, run->step0));
 
-  /* the complete scenario, and what runs, beside the results */
+  /* scenario.opts and run.json */
   chunk.text = scenario;
   chunk.size = size;
   PetscCall(SbOutputPath(out, "scenario.opts", sizeof(path), path));
@@ -315,7 +315,7 @@ PetscErrorCode SbOutputAttach(SbRun run)
   PetscCall(SbRunJson(run, out, "running", ""));
   out->attached = PETSC_TRUE;
 
-  /* who looks on from now on */
+  /* attach monitors */
   PetscCall(SbFramesAttach(run, out));
   PetscCall(SbHistoryAttach(run, out));
   PetscCall(SbCheckpointAttach(run, out));
@@ -324,7 +324,7 @@ PetscErrorCode SbOutputAttach(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The row and the frame of the step are there already, on the old mesh; the next ones are on the new one. */
+/* Row and frame of this step are written, on the old mesh; the next ones are on the new mesh. */
 PetscErrorCode SbOutputReattach(SbRun from, SbRun to)
 {
   SbOutput out = (SbOutput)from->output;

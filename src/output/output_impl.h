@@ -1,5 +1,5 @@
 /*
-  output_impl.h - what the files of src/output share: the state of a run's output, original order, HDF5 and file helpers.
+  output_impl.h - shared by the files of src/output: the state of a run's output, original order, HDF5 and file helpers.
 */
 #pragma once
 #include <hdf5.h>
@@ -27,7 +27,7 @@ typedef struct {
 
 PetscErrorCode SbOrderCreate(MPI_Comm comm, PetscInt N, PetscInt nowned, const PetscInt original[],
                              SbOrder *order);
-/* The same for numbers key[nowned] in [0, bound) with gaps, which are closed: N is how many there are. Collective. */
+/* The same for numbers key[nowned] in [0, bound) with gaps, which are closed; N: their count. Collective. */
 PetscErrorCode SbOrderCreateSparse(MPI_Comm comm, PetscInt bound, PetscInt nowned, const PetscInt key[],
                                    SbOrder *order);
 /* An order of `each` entities instead of every one of `order`: a cell's corners for a cell. Destroy both. */
@@ -44,7 +44,7 @@ PetscErrorCode SbOrderScatter(const SbOrder *order, PetscInt ncomp, const PetscR
 typedef struct {
   MPI_Comm comm;
   hid_t file;       /* negative when closed */
-  PetscInt64 bytes; /* of what is being written, for messages */
+  PetscInt64 bytes; /* size of the data being written, for messages */
   PetscBool failed; /* a write failed, and all ranks know */
   char reason[160]; /* why a write failed on this rank; the next flush reports it to the others */
   char path[PETSC_MAX_PATH_LEN];
@@ -57,8 +57,7 @@ PetscErrorCode SbH5Create(MPI_Comm comm, const char *path, SbH5 *h);
 PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH5 *h,
                         PetscBool *ok); /* no error: see ok */
 PetscErrorCode SbH5Close(SbH5 *h);
-/* Brings everything to disk; returns when every rank has written. What failed since the last flush ends the run here.
-   Collective. */
+/* Flushes to disk on all ranks. A write that failed since the last flush ends the run here. Collective. */
 PetscErrorCode SbH5Flush(SbH5 *h);
 /* A dataset [order->N][ncomp] of `filetype` below `where` out of slices of `memtype`, with its unit. Collective. */
 PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char *unit, const SbOrder *order,
@@ -88,9 +87,9 @@ PetscErrorCode SbH5GroupCreate(SbH5 *h, unsigned links, unsigned letters, hid_t 
 PetscErrorCode SbH5GroupLink(SbH5 *h, hid_t group, hid_t parent, const char *name);
 #define SB_H5_NODE_LINKS 100 /* with 6 letters: a block of 4080 bytes */
 
-/* The same for an open HDF5 file, whose messages name these bytes from then on. Collective. */
+/* SbFileReserve() for an open HDF5 file; messages name these bytes from then on. Collective. */
 PetscErrorCode SbH5Reserve(SbH5 *h, PetscInt64 bytes);
-/* Asks the file system for `bytes` behind the end of a file, before anything in it is touched. Collective. */
+/* Reserves `bytes` of disk space beyond the end of a file, without changing it. Collective. */
 PetscErrorCode SbFileReserve(MPI_Comm comm, const char *path, PetscInt64 bytes);
 /* Ends the run on all ranks when the message of any rank is not empty; the lowest rank's is reported. Collective. */
 #define SB_NO_ROOM "make room and go on with -restart auto, or give another -output_dir"
@@ -99,7 +98,7 @@ typedef struct {
   const char *text;
   size_t size;
 } SbChunk;
-/* path.tmp is written and takes the place of path in one step. Rank 0 calls; `message` becomes the error, if any. */
+/* Writes path.tmp and renames it to path. Rank 0 only; message: the error, if any. */
 void SbFileReplace(const char *path, int nchunk, const SbChunk chunk[], char message[SB_MESSAGE_MAX]);
 /* The whole file; NULL when it cannot be read. One rank. PetscFree. */
 PetscErrorCode SbFileRead(const char *path, char **text, size_t *size);
@@ -109,18 +108,18 @@ PetscErrorCode SbFileRead(const char *path, char **text, size_t *size);
 typedef enum { SB_PROBE_POINT, SB_PROBE_FACETS, SB_PROBE_TETS } SbProbeKind;
 typedef struct {
   char name[SB_NAME_MAX];
-  PetscReal at[3]; /* asked for, m */
+  PetscReal at[3]; /* requested position, m */
   PetscReal x
     [3]; /* the material point that it follows: the nearest vertex, or node of P2, of the first mesh, at rest, m */
   PetscBool found;   /* x and body are known */
-  PetscInt body;     /* that x belongs to */
-  PetscInt original; /* number of that vertex or node, -1: it is gone */
+  PetscInt body;     /* body of x */
+  PetscInt original; /* original number of that vertex or node, -1: removed by re-meshing */
   PetscInt local;    /* owned local vertex at x, or -1: on the other ranks, and where there is none */
   SbProbeKind kind;
-  char set[SB_NAME_MAX]; /* of a mean over facets or tets */
+  char set[SB_NAME_MAX]; /* set of a mean over facets or tets */
   PetscInt nfield;
   const SbField *field[SB_FIELD_MAX];
-  PetscInt nnode, ncell; /* this rank's parts of sums over nodes (without a vertex at x) and over tets */
+  PetscInt nnode, ncell; /* this rank's nodes of a weighted sum (if there is no vertex at x), and tets */
   PetscInt *node, *cell;
   PetscReal *weight, *cell_weight;
 } SbProbe;
@@ -138,7 +137,7 @@ struct _p_SbOutput {
   PetscMPIInt rank, size;
   PetscReal wall_start, cpu_start; /* s */
 
-  /* what the scenario asks for */
+  /* options */
   char dir[PETSC_MAX_PATH_LEN];
   char scenario[PETSC_MAX_PATH_LEN]; /* file given on the command line; empty without one */
   char restart[PETSC_MAX_PATH_LEN];
@@ -150,23 +149,23 @@ struct _p_SbOutput {
   PetscBool precise;        /* double instead of float */
   PetscBool discontinuous;  /* each cell has four points of its own */
   PetscBool quadratic;      /* tets of P2 are not cut into linear ones */
-  PetscBool contact_points; /* where contact pushes, in each frame */
+  PetscBool contact_points; /* contact points in each frame */
   PetscBool history, history_bodies;
   PetscInt history_every;
   PetscReal checkpoint_every; /* s of simulated time; 0: off */
   PetscInt checkpoint_every_steps, checkpoint_keep;
   PetscBool progress, quiet;
-  PetscBool overwrite; /* results of an earlier run may go */
+  PetscBool overwrite; /* results of an earlier run may be replaced */
   int lock;            /* file descriptor of the folder's lock, -1: none */
   PetscInt nprobe;
   SbProbe *probe; /* [nprobe] */
 
-  /* after SbOutputAttach() */
+  /* set by SbOutputAttach() */
   struct {
     PetscLogEvent fields, contacts, history, probes, checkpoint, progress;
   } event; /* SbOut_<name>, of those that the scenario asks for */
   SbOrder vertex, cell;
-  SbOrder node;     /* the unknowns: that of the vertices when no body has its nodes at faces */
+  SbOrder node;     /* order of the unknowns: that of the vertices if no body has nodes at faces */
   SbOrder point;    /* of vertex fields: vertices and then P2's nodes at edges, or each cell's own points */
   SbOrder tet;      /* of the tets that points are the corners of: slices only, see split */
   PetscBool *split; /* [cell.n] cells of the slice that are eight of these; NULL: none */
@@ -174,11 +173,11 @@ struct _p_SbOutput {
     *edge_number; /* [nnode] the point at a node at an edge, as if cells shared theirs; NULL without P2 */
   PetscInt *
     place; /* [point.nowned] 10 cell + a with -output_discontinuous; else the node at an edge behind the vertices; NULL without P2 */
-  PetscBool ordered;    /* the five exist */
+  PetscBool ordered;    /* the orders above exist */
   PetscBool attached;   /* run.json exists */
   PetscInt *body_nodes; /* [nbody] nodes of each body, supports of faces among them */
   uint64_t mesh_hash;
-  char *identity; /* options that decide the mechanics, one per line */
+  char *identity; /* options that determine the mechanics, one per line */
   PetscBool restarted;
   /* cell quantities of the instant being written, computed once for all fields that need them */
   PetscBool state_valid;
@@ -197,11 +196,11 @@ struct _p_SbOutput {
   SbRemeshed *remeshed; /* [nremeshed] for run.json */
 };
 
-/* folder.c: the folder with its parents is made, and tried by writing into it; why it cannot be is in message. Rank 0. */
+/* folder.c: creates the folder with its parents, and tests that it is writable; message: the error, if any. Rank 0. */
 PetscErrorCode SbFolderMake(SbOutput out, char message[SB_MESSAGE_MAX]);
-/* Gives up the lock of SbOutputLock(), if there is one. */
+/* Releases the lock of SbOutputLock(), if there is one. */
 void SbFolderUnlock(SbOutput out);
-/* Moves what an earlier run left under our names into a folder of its own (overwrite: removes it), after a restart only removes checkpoints of later steps. Rank 0. */
+/* Moves an earlier run's results into a subfolder (overwrite: removes them); after a restart only removes checkpoints of later steps. Rank 0. */
 PetscErrorCode SbFolderClear(SbOutput out, PetscInt step0);
 /* Path of a file of the run's folder. */
 PetscErrorCode SbOutputPath(SbOutput out, const char *name, size_t size, char path[]);
@@ -246,16 +245,16 @@ void SbPointsVertex(SbRun run, SbOutput out, PetscInt vertex, const PetscReal x[
 /* Before the folder is touched: refuses to go on with frames that have other points. Collective. */
 PetscErrorCode SbFramesCheck(SbRun run, SbOutput out);
 PetscErrorCode SbFramesAttach(SbRun run, SbOutput out);
-/* The same output goes on with the run of another mesh, as does that of the functions below. Collective. */
+/* Continues the output with the run of a new mesh; so do the functions ..Reattach below. Collective. */
 PetscErrorCode SbFramesReattach(SbRun run, SbOutput out);
 PetscErrorCode SbFramesClose(SbOutput out);
 PetscErrorCode SbFramesDestroy(SbOutput out);
-/* contacts.c; without -output_contacts they only keep, after a restart, what is in the index. */
+/* contacts.c. Without -output_contacts: after a restart keeps the entries of the index. */
 PetscErrorCode SbContactsCreate(SbRun run, SbOutput out);
 PetscErrorCode SbContactsDestroy(SbOutput out);
 /* The points of contact after a step, on the ranks that write them; bytes: what they take in a frame. Collective. */
 PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt64 *bytes);
-/* Those as a group of the frame. Collective. */
+/* Writes these points as a group of the frame. Collective. */
 PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame);
 /* How many points a frame has, -1: it was written without; bytes of their numbers. Not collective. */
 void SbContactsRead(hid_t frame, PetscInt *n, PetscInt *bytes);
@@ -273,7 +272,7 @@ PetscErrorCode SbProbesFind(SbRun run, SbOutput out);
 /* Their columns of history.csv: how many, and name and unit of one. */
 PetscInt SbProbesCount(SbOutput out);
 PetscErrorCode SbProbesColumn(SbOutput out, PetscInt column, size_t size, char name[], const char **unit);
-/* In a checkpoint of a run that was re-meshed: the positions that they follow. Collective. */
+/* Writes the reference positions of probes into a checkpoint of a re-meshed run. Collective. */
 PetscErrorCode SbProbesWrite(SbRun run, SbOutput out, SbH5 *h);
 PetscErrorCode SbProbesRead(SbRun run, SbOutput out, SbH5 *h);
 /* values[SbProbesCount()] += this rank's part of the columns of all probes. Collective. */
@@ -289,7 +288,7 @@ PetscErrorCode SbCheckpointWriteEffects(SbRun run, SbH5 *h, uint64_t *sum);
 PetscErrorCode SbCheckpointReadEffects(SbRun run, SbH5 *h, SbRecords records[], uint64_t *sum, PetscBool *ok);
 /* Hands them to the effects, for the state of the run at time t. Collective. */
 PetscErrorCode SbCheckpointLoadEffects(SbRun run, PetscReal t, const SbRecords records[]);
-/* A number at a position, as 64 mixed bits. */
+/* Hash of a number at a position of an array. */
 uint64_t SbMixReal(uint64_t position, PetscReal value);
 
 /* checkpoint_mesh.c: the meshes of bodies that were re-meshed, as they are in memory. Writes them; sum is raised by their checksum. Collective. */
@@ -307,8 +306,8 @@ PetscErrorCode SbProgressAttach(SbRun run, SbOutput out);
 PetscErrorCode SbProgressEnd(SbOutput out); /* ends a line that is being rewritten */
 PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char *reason); /* collective */
 
-/* index.c: what viewers open to find the frames of fields.h5, NAME.xmf and NAME.vtkhdf. Rank 0. */
-/* nowhere[3]: of contact points, of which a frame may have none; NULL: of tets. */
+/* index.c: the index files of fields.h5 for viewers, NAME.xmf and NAME.vtkhdf. Rank 0. */
+/* nowhere[3]: an index of contact points, with the dummy point of frames without any, m; NULL: an index of tets. */
 PetscErrorCode SbIndexCreate(SbOutput out, const char *name, const PetscReal *nowhere, SbIndex *index);
 PetscErrorCode SbIndexDestroy(SbIndex *index);
 void SbIndexRemove(SbIndex index); /* the files, if they are there */
@@ -329,7 +328,7 @@ PetscErrorCode SbIndexAddPoints(SbIndex index, PetscReal time, const char *group
 /* Replaces the files; `message` becomes the error, if any. The last ones of a run are written in any case. */
 void SbIndexWrite(SbIndex index, PetscBool last, char message[SB_MESSAGE_MAX]);
 
-/* phases.c: where the time went, from the log events. */
+/* phases.c: times of the phases, from the log events. */
 typedef struct {
   struct {
     const char *name;

@@ -1,5 +1,5 @@
 /*
-  Where the time went, as the closing table shows it: the seconds of a phase are those of the slowest rank, the last phase is the remainder
+  Times of the phases for the closing table: the seconds of a phase are those of the slowest rank, the last phase is the remainder
   of the wall time.
 */
 #include <sys/resource.h>

@@ -1,9 +1,9 @@
 /*
-  Values at points, whatever the element: what vertex fields and probes are made of.
+  Values at output points for all elements: for vertex fields and probes.
 
   P1 has the values at vertices as its unknowns. Of CR and DG the value at vertex v of a cell is sum_a vertex[v][a] u_a
   (SbElementOps), another one in each cell around the vertex: a vertex field holds their mean, weighted with the volumes of
-  the cells and summed by the cells' original numbers, so that no partition changes a bit of it. With -output_discontinuous
+  the cells and summed by the cells' original numbers, so that it does not depend on the partition. With -output_discontinuous
   nothing is averaged: each cell has four points of its own.
 
   A nodal force of CR or DG acts at the centroid of a face. One third of it goes to each vertex of the face, which keeps its
@@ -49,7 +49,7 @@ PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Each rank knows all cells of its own nodes; the ghosts hear it from their owners. */
+/* Each rank has all cells of its own nodes; ghosts get the number from their owners. */
 PetscErrorCode SbPointsPrepareForces(SbRun run, SbOutput out)
 {
   const SbSpace s = run->model->space;
@@ -105,7 +105,7 @@ const PetscReal *SbPointsRest(SbRun run, SbOutput out, PetscInt i)
 
 /* ------------------------------------------------------------------ values */
 
-/* x at a corner of a cell, as the cell has it; corner = 4 cell + a. */
+/* The cell's value of x at its corner; corner = 4 cell + a. */
 static void corner_value(SbSpace s, PetscInt corner, const PetscReal x[], PetscReal value[3])
 {
   const SbElement e = SbSpaceCellElement(s, corner / 4);
@@ -193,7 +193,7 @@ static void add_force(const Forces *f, PetscInt node, PetscReal factor, PetscRea
   }
 }
 
-/* What a cell's share of the forces at its nodes brings to one of its corners. */
+/* Adds a cell's share of the forces at its nodes to one of its corners. */
 static void add_corner_force(const Forces *f, const PetscReal valence[], PetscInt corner, PetscReal value[3])
 {
   const SbSpace s = f->s;

@@ -38,7 +38,7 @@ PetscErrorCode SbProbesRegister(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where a probe is and what it follows. */
+/* Options of a probe: position or set, fields. */
 static PetscErrorCode read_probe(SbProbe *probe, PetscBool dynamic)
 {
   SbScope scope;
@@ -189,7 +189,7 @@ static void nearest_owned(const SbSpace s, PetscInt body, const PetscReal at[3],
   }
 }
 
-/* Of all ranks the one that has the best, with the lowest number: its local number there, -1 on the others. */
+/* The nearest of all ranks, by the lowest number if equal: its local number on its rank, -1 on the others. */
 static PetscErrorCode agree(SbOutput out, PetscReal mine, PetscInt original, PetscInt *local,
                             PetscInt *winner, PetscReal *best)
 {
@@ -203,7 +203,7 @@ static PetscErrorCode agree(SbOutput out, PetscReal mine, PetscInt original, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The owned cell of the probe's body in which its point lies deepest: how far outside (negative: how deep), and the weights. */
+/* The owned cell of the probe's body that contains its point, or the nearest one: distance outside (negative inside), and the weights. */
 static PetscReal deepest_owned(const SbMesh mesh, const SbProbe *probe, PetscInt *cell, PetscReal weight[4])
 {
   PetscReal best = PETSC_MAX_REAL;
@@ -242,7 +242,7 @@ static void add_nodes(const SbSpace s, SbProbe *probe, PetscInt cell, const Pets
   }
 }
 
-/* The sums of a probe that is a mean over the boundary facets, or the tets, of its set; tets count with their owners. */
+/* Nodes, tets and weights of a mean over the facets or tets of a set; each tet on its owner. */
 static PetscErrorCode sum_set(SbRun run, SbProbe *probe)
 {
   const SbSpace s = run->model->space;
@@ -295,7 +295,7 @@ static PetscErrorCode sum_set(SbRun run, SbProbe *probe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Another mesh: the vertex or node at the position that it followed, or the tet around it. */
+/* On a new mesh: the vertex or node at the probe's reference position, or the tet that contains it. */
 static PetscErrorCode find_again(const SbSpace s, SbOutput out, SbProbe *probe)
 {
   const SbMesh mesh = s->mesh;
@@ -328,7 +328,7 @@ static PetscErrorCode find_again(const SbSpace s, SbOutput out, SbProbe *probe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The first time: where it goes. */
+/* On the first mesh: the nearest vertex or node. */
 static PetscErrorCode find_first(const SbSpace s, SbOutput out, SbProbe *probe)
 {
   const SbMesh mesh = s->mesh;

@@ -20,7 +20,7 @@ struct _p_SbProgress {
   PetscReal within;               /* MPI_Wtime() of the last line within a step */
 };
 
-#define LONG 5. /* s, after which a step that goes on says so, and again */
+#define LONG 5. /* s between lines within a long step */
 
 static PetscBool is_terminal(void)
 {
@@ -47,7 +47,7 @@ static void duration(PetscReal seconds, size_t size, char text[])
     SbFormat(size, text, "%ld:%02ld", s / 60, s % 60);
 }
 
-/* On rank 0 only: nobody else has anything to say. */
+/* On rank 0 only. */
 static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
   SbProgress p = (SbProgress)ctx;
@@ -56,7 +56,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscReal done, speed;
 
   PetscFunctionBeginUser;
-  /* it was printed before a re-meshing, or is the last one after all */
+  /* already printed: first step after a re-meshing, or the last one again */
   if ((p->titled && step->step == run->step0) || step->again) PetscFunctionReturn(PETSC_SUCCESS);
   if (!p->titled) {
     p->titled = PETSC_TRUE;

@@ -1,5 +1,5 @@
 /*
-  What a person reads on the screen: a header before the run, a table after it. Eighty columns.
+  Console output: a header before the run, a table after it. Eighty columns.
 */
 #include <stdarg.h>
 #include "output_impl.h"
@@ -115,14 +115,14 @@ PetscErrorCode SbReportHeader(SbRun run)
 
   PetscFunctionBeginUser;
   if (out->quiet || out->rank) PetscFunctionReturn(PETSC_SUCCESS);
-  /* a library that does not obey is named by what it may use */
+  /* number of threads of a library that cannot be limited to one */
   most = SbThreadsSetOne();
   if (most > 1) (void)snprintf(threads, sizeof(threads), "up to %d threads", most);
   PetscCall(PetscPrintf(PETSC_COMM_SELF, "supple %s with PETSc %s on %d rank%s, %s each\n", SB_VERSION,
                         SB_PETSC_VERSION, (int)out->size, out->size == 1 ? "" : "s", threads));
   PetscCall(print_bodies(run->model, out));
   if (out->scenario[0]) PetscCall(entry("scenario", "%s", out->scenario));
-  // effects, and what they have to say
+  // effects, with the notes of their set-up
   for (PetscInt e = 0; e < run->model->neffect; e++) {
     const SbEffect effect = run->model->effect[e];
 
@@ -262,7 +262,7 @@ PetscErrorCode SbReportSummary(SbRun run)
     PetscCall(PetscPrintf(PETSC_COMM_SELF, "%-15s %10.3f\n\n", "total", (double)phases.total));
   }
 
-  /* what effects have to say of their work */
+  /* summaries of effects */
   for (PetscInt e = 0; e < run->model->neffect; e++) {
     const SbEffect effect = run->model->effect[e];
 

@@ -58,7 +58,7 @@ static PetscErrorCode put_settings(FILE *f, SbRun run)
   put_text(f, "time", name);
   put_text(f, "solver", run->solver);
   put_text(f, "solver_reason", run->solver_reason);
-  /* as it is now: a fallback may have changed it */
+  /* the current one: a fallback may have replaced it */
   if (run->solver_parts[0]) PetscCall(SbSolverDescribe(run->snes, run->model->space, sizeof(parts), parts));
   put_text(f, "solver_parts", parts);
   (void)fprintf(f, "  \"unknowns\": %" PetscInt_FMT ",\n  ", 3 * run->model->space->Nnode);
@@ -157,7 +157,7 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
     }
     (void)fprintf(f, "\n  ],\n");
   }
-  // what the run took: steps, iterations, seconds, memory, files
+  // cost: steps, iterations, seconds, memory, files
   if (phases) {
     SbOutputFileSize *file;
     PetscInt nfile;

@@ -1,9 +1,9 @@
 /*
-  A body begins where another run has brought it: -body_<name>_state RUN[,STEP] or CHECKPOINT.
+  Initial state from another run: -body_<name>_state RUN[,STEP] or CHECKPOINT.
 
-  Displacement and velocity are those of a frame of that run's fields.h5, evaluated at the nodes of this run: u(X) = sum_a w_a u_a with the weights of the tet that holds the place X at
-  rest there, or of the nearest one; in a tet of P2 they are its ten. So element, mesh, material, effects and integrator may be others; where nodes are the vertices of that run, values are those of the file. Every rank
-  reads the body's part of the file. A checkpoint has no mesh, but all digits of all unknowns: for scenes with the same meshes and elements, whatever else is different there; others take the frame of its step.
+  Displacement and velocity are those of a frame of that run's fields.h5, evaluated at the nodes of this run: u(X) = sum_a w_a u_a with the weights of the tet that contains X at rest
+  there, or of the nearest one; ten weights in a tet of P2. So element, mesh, material, effects and integrator may differ. Every rank reads the body's part of the file.
+  A checkpoint has no mesh, but all unknowns in full precision: for scenes with the same meshes and elements; other scenes take the frame of its step.
 */
 #include <sys/stat.h>
 #include <unistd.h>
@@ -11,7 +11,7 @@
 #include "sbgeometry.h"
 #include "sbmeshio.h"
 
-#define OUTSIDE 0.05 /* of the body's diagonal: a node farther from the other run's body is worth a warning */
+#define OUTSIDE 0.05 /* of the body's diagonal: warn of nodes farther from the other run's body */
 
 /* The body of another run. */
 typedef struct {
@@ -61,7 +61,7 @@ static PetscErrorCode read_tets(Other *o, PetscInt which, PetscBool *ok)
                        ? parent && nparent == o->ncell && nten <= nparent && are_points(parent, nparent, nten)
                        : !nten || nten == o->ncell));
 
-  /* in the place of parts of tets these, with the corners that come first */
+  /* replace parts of P2 tets by the tets, corners first */
   for (PetscInt i = 0; *ok && body && i < nparent; i++) body[parent[i]] = body[i];
   if (nten) o->ncell = nten;
   for (PetscInt c = 0; *ok && c < nten; c++) {
@@ -119,7 +119,7 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
   if (mesh) (void)snprintf(name, sizeof(name), "mesh_%06ld", (long)mesh);
   o->mesh = H5Gopen2(o->file, name, H5P_DEFAULT);
 
-  /* its number for a body of this name, or of what it is a copy of; where there is one body, it is the one */
+  /* number of the body of this name, or of the one that it is a copy of; the only body, if there is one */
   if (o->mesh >= 0) {
     PetscCall(SbH5BodyNames(o->file, name, &names));
     rest = names;
@@ -140,7 +140,7 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Which velocity a body begins with: that of the state, or, of one without, that of its options. */
+/* The initial velocity: of the state, or of the options if it has none. */
 static PetscErrorCode tell_velocity(SbModel m, const char *option, PetscInt b, const char *path,
                                     PetscBool has)
 {
@@ -174,7 +174,7 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
   PetscReal *off = NULL;
 
   PetscFunctionBeginUser;
-  // where the nodes at edges of that run are off their middles, at rest
+  // offsets of that run's edge nodes from the midpoints, at rest
   if (o->cell10) PetscCall(PetscCalloc1(18 * (size_t)o->ncell, &off));
   for (PetscInt i = 0; o->cell10 && i < 6 * o->ncell; i++) {
     const PetscInt *point = o->cell10 + 10 * (i / 6);
@@ -223,8 +223,8 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
 }
 
 /*
-  row[nnode_owned]: the row of each owned node in a checkpoint with n nodes of the same meshes and elements. Its supports of dg may be others: each of this run's begins where the node of its
-  face is. ok: the file can be of these. Collective.
+  row[nnode_owned]: the row of each owned node in a checkpoint with n nodes of the same meshes and elements. Supports of dg may differ: each of this run's takes the row of its
+  face's node. ok: the number of nodes agrees. Collective.
 */
 static PetscErrorCode find_rows(SbRun run, PetscInt n, PetscInt row[], PetscBool *ok)
 {
@@ -255,7 +255,7 @@ static PetscErrorCode find_rows(SbRun run, PetscInt n, PetscInt row[], PetscBool
 }
 
 /*
-  The unknowns of body b from a checkpoint of the same bodies; is: the file is one. Where it is one of other bodies, meshes or elements, it is not, and frame[] names the frame of its step in its
+  The unknowns of body b from a checkpoint; is: the file is one of the same bodies, meshes and elements. For another checkpoint frame[] names the frame of its step in its
   run's folder. Collective.
 */
 static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b, const char *path,
@@ -283,7 +283,7 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
-  /* its bodies have the meshes and elements of these */
+  /* compare meshes and elements */
   PetscCall(SbOutputOrder(run, out));
   SbH5GetInt(h.file, "mesh_hash", &hash, &ok);
   SbH5GetInt(h.file, "step", &step, &ok);
@@ -351,7 +351,7 @@ PetscErrorCode SbOutputLoadState(SbRun run)
   PetscBool any = PETSC_FALSE, checkpoint;
 
   PetscFunctionBeginUser;
-  if (out->restart[0]) PetscFunctionReturn(PETSC_SUCCESS); /* the checkpoint has the state */
+  if (out->restart[0]) PetscFunctionReturn(PETSC_SUCCESS); /* a restart has its own state */
   for (PetscInt b = 0; b < m->nbody; b++) {
     Other o = {.file = -1, .frame = -1, .mesh = -1};
     SbCaughtError caught = {0, ""};

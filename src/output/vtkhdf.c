@@ -5,8 +5,8 @@
   mesh (there are several in a run that was re-meshed); steps name the part that they show and where their values begin. Their points are the field
   `position`, so that bodies move; frames without it show the rest shape. Contact points are PolyData, one part per frame.
 
-  The file is made in memory and replaced as a whole. That takes the longer the more frames there are, so it is made again when the run has worked
-  BETWEEN times as long as the last time took, and at the end of the run: a twentieth of the run at most, however often it writes frames.
+  The file is built in memory and replaced as a whole, in a time that grows with the number of frames. So it is rebuilt after BETWEEN times the seconds
+  of the last time, and at the end of the run: at most a twentieth of the run.
 
   Reference: VTKHDF file format, version 2.0 (docs.vtk.org, "VTK File Formats"): Steps of UnstructuredGrid and PolyData. Symmetric tensors
   have the order xx yy zz xy yz xz there.
@@ -33,7 +33,7 @@ static PetscInt rows_of(SbIndex v, const SbArray *a, PetscInt block)
   return a->cell ? p->ncell : p->npoint;
 }
 
-/* The virtual dataset of an array as `name`: all frames or parts one behind the other; of the corners of cells as one list. */
+/* The virtual dataset of an array as `name`: all frames or parts in sequence; corners of cells as one list. */
 static void write_array(SbIndex v, hid_t where, const char *name, const SbArray *a, PetscBool *ok)
 {
   static const hsize_t to_vtk[6] = {0, 3, 5, 1, 4, 2}; // column in fields.h5 of each of xx yy zz xy yz xz
@@ -80,7 +80,7 @@ static void write_array(SbIndex v, hid_t where, const char *name, const SbArray 
   (void)H5Pclose(list);
 }
 
-/* A dataset [n], or [n][m] when m > 0, of that type, from numbers in memory, integers of 64 bits; packed when they are many. Of bytes there is one, which all of them are. */
+/* A dataset [n], or [n][m] when m > 0, of that type, from 64-bit numbers in memory; compressed when large. Of type uint8 all values are data[0]. */
 static void write_numbers(hid_t where, const char *name, PetscInt n, PetscInt m, hid_t type,
                           const void *values, PetscBool *ok)
 {
