@@ -1,5 +1,5 @@
 /*
-  sbassembly.h - layer 3: what linear solvers see of a space beside sbfem.h: the assembly plan, gathers of batches, rows of operators.
+  sbassembly.h - layer 3: for linear solvers, beside sbfem.h: the assembly plan, gathers of batches, rows of operators.
 */
 #pragma once
 #include "sbfem.h"
@@ -51,7 +51,7 @@ typedef struct {
 PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n, const SbSpace space[],
                                     const Mat A[], const SbVolumetric *out);
 
-/* How an operator that is more, or less, than one matrix of blocks is assembled. */
+/* Assembly of an operator other than one block matrix. */
 typedef struct {
   Mat stored; /* what SbSpaceAddCellBlock() adds to; borrowed; NULL: there is no such matrix */
   PetscErrorCode (*assemble)(Mat A, const SbStage *stage); /* for SbSpaceAssembleTangent(). Not collective */
@@ -82,7 +82,7 @@ static inline const PetscInt *sb_batch_nodes(SbSpace s, PetscInt b)
   return s->batch_clique + (size_t)(b * s->width) * SB_BATCH;
 }
 
-/* Longest side of a box: what a rotation of unit size is relative to. */
+/* Longest side of a box: length scale of rotations. */
 SB_INLINE PetscReal SbRigidSize(const PetscReal box[6])
 {
   return PetscMax(box[3] - box[0], PetscMax(box[4] - box[1], box[5] - box[2]));
@@ -99,7 +99,7 @@ PetscErrorCode SbAttachModes(Mat A, PetscErrorCode (*fill)(PetscInt mode, PetscS
                              const void *ctx);
 
 /*
-  What strains are computed from, u[3 nnode]: the nodes of the cells; for DG the means m = p + w (u - p) of the own node u and the one
+  Nodal values that strains are computed from, u[3 nnode]: of the cells' nodes; for DG the means m = p + w (u - p) of the own node u and the one
   across the face p.
 */
 static inline void sb_gather_strain(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[],

@@ -1,9 +1,9 @@
 /*
-  sbbarrier.h - layer 3: surfaces that are kept apart. Vertices, edges and triangles of bodies and of an obstacle, their pairs, how far they may move, and the
-  barrier between them.
+  sbbarrier.h - layer 5: barrier contact of surfaces. Vertices, edges and triangles of bodies and of an obstacle, contact pairs, continuous collision detection, the
+  barrier potential.
 
-  Every rank holds the whole surface; a vertex of a body is a weighted mean of nodes, so elements make no difference here. A rank
-  evaluates every pair that touches one of its own nodes: forces on them are complete without communication, and summed in an order that no partition changes.
+  Every rank holds the whole surface; a vertex of a body is a weighted mean of nodes, for every element. A rank
+  evaluates every pair that has one of its own nodes: forces on them are complete without communication, and summed in an order that no partition changes.
 */
 #pragma once
 #include "sbcontact.h"
@@ -21,19 +21,19 @@ struct _p_SbContactMesh {
   PetscReal *weight; /* [start[nbody_vertex]] */
   uint8_t *
     fixed; /* [start[nbody_vertex]] bit c: component c of the node is prescribed; SbContactMeshMarkDriven() */
-  PetscInt *part;              /* [nvertex] body, nbody: the obstacle */
-  PetscInt *id;                /* [nbody_vertex] number in the mesh that no partition changes */
-  uint8_t *mine;               /* [nvertex] some node is owned here */
-  uint8_t *own;                /* [nvertex] this rank speaks for it: one rank does; the obstacle's: rank 0 */
-  uint8_t *driven;             /* [nvertex] its motion is prescribed in all directions */
-  PetscInt *triangle;          /* [ntriangle][3] counter-clockwise seen from outside */
-  PetscInt *edge;              /* [nedge][2] */
-  PetscReal *X;                /* [nvertex][3] at rest, m; obstacle: its rest frame */
+  PetscInt *part;     /* [nvertex] body, nbody: the obstacle */
+  PetscInt *id;       /* [nbody_vertex] number in the mesh that no partition changes */
+  uint8_t *mine;      /* [nvertex] some node is owned here */
+  uint8_t *own;       /* [nvertex] this rank counts it: exactly one rank does; the obstacle's: rank 0 */
+  uint8_t *driven;    /* [nvertex] its motion is prescribed in all directions */
+  PetscInt *triangle; /* [ntriangle][3] counter-clockwise seen from outside */
+  PetscInt *edge;     /* [nedge][2] */
+  PetscReal *X;       /* [nvertex][3] at rest, m; obstacle: its rest frame */
   PetscReal *area, *edge_area; /* [nvertex], [nedge] a third of the triangles around, at rest, m^2 */
   PetscReal radius;            /* of the obstacle's vertices and edges (sphere, capsule), m */
-  SbObstacleSide side;         /* what vertices alone meet, kept as vertices of the obstacle */
-  PetscReal shortest;          /* edge of the bodies at rest, m */
-  PetscReal size;              /* of the smallest body, diagonal, m */
+  SbObstacleSide side;         /* half-space or bowl, whose vertices are described there */
+  PetscReal shortest;          /* shortest edge of the bodies at rest, m */
+  PetscReal size;              /* diagonal of the smallest body, m */
   /* of SbContactMeshGetPositions() */
   PetscInt nlocal, *local;    /* own vertices of bodies */
   PetscMPIInt *count, *first; /* [ranks] */
@@ -44,7 +44,7 @@ struct _p_SbContactMesh {
 /*
   SbContactMeshCreate - the surface of the facets of SbEffectFacets() and of an obstacle (NULL: none), which is set up.
 
-  Collective; the caller destroys it. Prescribed unknowns of effects that are set up later are not known yet: SbContactMeshMarkDriven().
+  Collective; the caller destroys it. Call SbContactMeshMarkDriven() once all effects are set up, to mark prescribed unknowns.
 */
 PetscErrorCode SbContactMeshCreate(SbSpace space, PetscInt n, const SbFacet facet[], SbObstacle obstacle,
                                    SbContactMesh *mesh);
@@ -66,30 +66,30 @@ typedef struct {
 typedef struct _p_SbContactPairs *SbContactPairs;
 struct _p_SbContactPairs {
   SbContactMesh mesh;     /* borrowed */
-  PetscBool self, others; /* bodies meet themselves, and each other */
+  PetscBool self, others; /* self-contact; contact between bodies */
   PetscReal reach;        /* pairs nearer than this are found, m */
   PetscReal margin;       /* by which boxes are grown, m */
   PetscReal *box;     /* [nvertex][6] within which vertices may move before pairs are searched for again */
   PetscReal *shorter; /* [nvertex][3] end of a motion that was halved */
   struct SbContactFeatures *features; /* [6] vertices, triangles and edges, each of this rank and of others */
   PetscBool known;
-  const uint8_t
-    *near; /* [nvertex] borrowed; features that both have such vertices are not guarded; NULL: all are */
+  const uint8_t *
+    near; /* [nvertex] SbContactOverlap.near, borrowed; pairs of such features are excluded; NULL: none are */
   PetscInt n, size;
-  SbContactPair *pair; /* [n] all that touch nodes of this rank, in no order */
+  SbContactPair *pair; /* [n] all that have nodes of this rank, in no order */
   PetscInt nsearch;
 };
 PetscErrorCode SbContactPairsCreate(SbContactMesh mesh, PetscBool self, PetscBool others, PetscReal reach,
                                     SbContactPairs *pairs);
 PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs);
-/* Vertices inside with triangles near there, edges of what crosses with each other are no pairs from now on, by SbContactOverlap.near (borrowed); NULL: all may be. Not collective. */
+/* Excludes pairs of an overlap from now on, by near[nvertex] = SbContactOverlap.near (borrowed); NULL: none. Not collective. */
 PetscErrorCode SbContactPairsIgnore(SbContactPairs pairs, const uint8_t near[]);
-/* All pairs that come within the reach on the straight way from x0 to x1, and more. Not collective. */
+/* All pairs that come within the reach on the linear motion from x0 to x1, and some more. Not collective. */
 PetscErrorCode SbContactPairsFind(SbContactPairs pairs, const PetscReal x0[], const PetscReal x1[]);
-/* The gap, m: the distance less the radius of a rounded obstacle; nearest places and direction in `distance`. Not collective. */
+/* The gap, m: the distance less the radius of a rounded obstacle; closest points and direction in `distance`. Not collective. */
 PetscReal SbContactPairGap(SbContactMesh mesh, const SbContactPair *pair, const PetscReal x[],
                            SbDistance *distance);
-/* Whether the boxes of both features on the straight way from x0 to x1 are farther apart than `distance`, m; false for the side of an obstacle. */
+/* Whether the boxes of both features swept from x0 to x1 are farther apart than `distance`, m; false for a half-space or bowl. */
 static inline PetscBool SbContactPairSweptApart(SbContactMesh mesh, const SbContactPair *pair,
                                                 const PetscReal x0[], const PetscReal x1[],
                                                 PetscReal distance)
@@ -121,7 +121,7 @@ typedef struct {
   PetscReal weight[5]; /* sum 0, n . sum weight x = -depth; for a round obstacle less its radius */
   PetscReal normal[3], depth, area;
 } SbPenetration;
-/* Of a vertex: next to intersected ones; its edges or triangles intersect a surface; it is inside one. */
+/* Of a vertex: adjacent to intersected ones; its edges or triangles intersect a surface; it is inside one. */
 enum { SB_OVERLAP_ADJACENT = 1, SB_OVERLAP_INTERSECTED, SB_OVERLAP_INSIDE };
 /* Start with {0}. The same on every rank. */
 typedef struct {
@@ -130,7 +130,7 @@ typedef struct {
   PetscReal place[3], deepest; /* position of it; largest penetration, m */
   PetscInt n, size;
   SbPenetration *point; /* [n] with a separation direction */
-  uint8_t *near;        /* [nvertex] SB_OVERLAP_INSIDE, _CROSSED, _AROUND or 0 */
+  uint8_t *near;        /* [nvertex] SB_OVERLAP_ADJACENT, _INTERSECTED, _INSIDE or 0 */
 } SbContactOverlap;
 /* Penetration at x; `inside`: there is some, even if no edge intersects a triangle. Collective; release with SbContactOverlapFree(). */
 PetscErrorCode SbContactOverlapFind(SbContactMesh mesh, PetscBool self, const PetscReal x[], PetscBool inside,
@@ -160,12 +160,12 @@ typedef struct {
   PetscInt n, size;
   PetscInt (*v)[2];      /* [n] vertices, the lower number first */
   PetscReal (*block)[9]; /* [n] row-major, N/m */
-  PetscInt nslot, *slot; /* [nslot] number of a pair by its hash, -1: free; a power of two */
+  PetscInt nslot, *slot; /* [nslot] hash table of block numbers, -1: free; nslot: a power of two */
 } SbContactBlocks;
 PetscErrorCode SbContactBlocksClear(SbContactBlocks *blocks);
 PetscErrorCode SbContactBlocksFree(SbContactBlocks *blocks);
 /* Adds the 3x3 block of vertices v and w of bodies, whose rows are `ld` numbers apart, and its transpose for w and v. */
 PetscErrorCode SbContactBlocksAdd(SbContactBlocks *blocks, PetscInt v, PetscInt w, const PetscReal H[],
                                   PetscInt ld);
-/* Adds their blocks between own nodes and all nodes of the vertices, zero at prescribed components, each place once. Not collective. */
+/* Adds the blocks to `nodes`: rows of own nodes, columns of all nodes of the vertices, zero at prescribed components, each pair of nodes once. Not collective. */
 PetscErrorCode SbContactBlocksToNodes(SbContactMesh mesh, const SbContactBlocks *blocks, SbBlocks *nodes);

@@ -1,6 +1,6 @@
 /*
-  sbconstraint.h - layer 2: constraints of single nodes, n . u = value, exactly or by springs: what contact with rigid obstacles needs beside
-  prescribed unknowns (src/fem/constraint.c, which describes the method).
+  sbconstraint.h - layer 3: constraints of single nodes, n . u = value, exactly or by springs, for contact with rigid obstacles (method:
+  src/fem/constraint.c).
 
   SbSpaceCreateConstraints() during set-up of an effect that may need them. Then, as often as they change: SbSpaceClearConstraints(),
   SbSpaceAddConstraint() by the owners of the nodes, SbSpaceAssembleConstraints(). SbModelPrescribe(), residuals, tangents and solves follow.
@@ -8,86 +8,86 @@
 #pragma once
 #include "sbfem.h"
 
-/* How solves that see K as it is treat exact constraints: in their null space by iterations, or by a factorisation in which their forces are eliminated. */
+/* Treatment of exact constraints outside K: iterations in their null space, or a factorisation with the multipliers condensed. */
 typedef enum { SB_SADDLE_NONE, SB_SADDLE_DIRECT } SbSaddle;
 
 typedef struct {
   PetscInt node;     /* owned local node */
-  PetscReal n[3];    /* of the sum n . u, of length one */
-  PetscReal push[3]; /* of the force; other than n where the node slides with friction */
-  PetscReal value;   /* of the sum, m */
-  PetscBool spring;  /* the force is constant + stiffness (value - n . u); else what keeps the sum */
+  PetscReal n[3];    /* unit vector of the constraint n . u */
+  PetscReal push[3]; /* direction of the force; differs from n where the node slides with friction */
+  PetscReal value;   /* right-hand side: n . u = value, m */
+  PetscBool spring;  /* the force is constant + stiffness (value - n . u); else a multiplier */
   PetscReal stiffness, constant; /* N/m, >= 0, and N */
-  PetscReal velocity;            /* of the sum at the end of the step, m/s */
-  PetscReal force; /* of the last SbConstraintsComputeForces(), N; positive: it raises the sum */
-  PetscReal sum;   /* n . u then, m */
-  PetscInt next;   /* another one of the node, -1: none; filled by SbSpaceAddConstraint() */
+  PetscReal velocity;            /* of n . u at the end of the step, m/s */
+  PetscReal force;               /* by the last SbConstraintsComputeForces(), N; positive: along push */
+  PetscReal sum;                 /* n . u then, m */
+  PetscInt next;                 /* next constraint of the node, -1: none; filled by SbSpaceAddConstraint() */
 } SbConstraint;
 
 typedef struct _p_SbSaddleFactor *SbSaddleFactor; /* src/solver/saddle_factor.c */
 
 struct _p_SbConstraints {
-  PetscBool beside;       /* solves see them beside K (SbConstraintsCreateOperator()), else in it */
-  PetscBool nonsymmetric; /* some may push along another direction than n */
+  PetscBool beside; /* solves treat them outside K (SbConstraintsCreateOperator()), else K is projected */
+  PetscBool nonsymmetric; /* some may have push other than n */
   PetscInt n, size;
   SbConstraint *constraint; /* [n] */
-  PetscInt *first;          /* [nnode_owned] the latest one of a node, -1: none */
-  PetscReal *Q;             /* [nnode][9] what they take of a residual at a node is Q r */
+  PetscInt *first;          /* [nnode_owned] last constraint of a node, -1: none */
+  PetscReal *Q;             /* [nnode][9] the projection of a residual at a node is r - Q r */
   /* of all ranks, since the last SbSpaceAssembleConstraints() */
   PetscInt ntotal, nexact;
-  PetscBool tilted; /* some push along another direction */
+  PetscBool tilted; /* some have push other than n */
 
-  /* src/solver: the solves beside K */
+  /* src/solver: solves with constraints outside K */
   SbSaddle saddle;
   Mat K;                    /* borrowed; NULL before SbConstraintsCreateOperator() */
-  Mat whole;                /* borrowed: K with the part of the tangent that it lacks, or K */
-  PetscReal *added;         /* [nnode_owned][3] what K holds beside the tangent, N/m; NULL: nothing */
+  Mat whole;                /* borrowed: the complete tangent, K plus SbModelNonsymmetric(), or K */
+  PetscReal *added;         /* [nnode_owned][3] diagonal regularisation added to K, N/m; NULL: none */
   PetscInt version, matrix; /* raised when the constraints change, and when K does */
   SbSaddleFactor factored;  /* NULL before the first solve with SB_SADDLE_DIRECT */
-  PetscErrorCode (*destroy_factored)(SbSaddleFactor *); /* by who made it */
-  PetscBool general; /* a method for symmetric systems has given way to one for others */
+  PetscErrorCode (*destroy_factored)(SbSaddleFactor *); /* set by its creator */
+  PetscBool general;                                    /* FGMRES replaces a method for symmetric systems */
   char method[SB_NAME_MAX];
   KSPNormType norm;
-  PCSide side; /* of that method */
+  PCSide side; /* of the replaced method */
 };
 
-/* The constraints that solves see beside K; NULL: there are none. Not collective. */
+/* The constraints that solves treat outside K; NULL: there are none. Not collective. */
 static inline SbConstraints SbConstraintsSeparate(SbSpace space)
 {
   return space->constraints && space->constraints->beside ? space->constraints : NULL;
 }
 
-/* beside: solves see K as it is, and the constraints beside it; nonsymmetric: they may push along other directions than n, which needs that. The
-   most that an effect asks for holds for all. Alike on all ranks. Not collective. */
+/* beside: solves treat the constraints outside K; nonsymmetric: push may differ from n, which needs `beside`. Flags of several calls are
+   joined by or. Alike on all ranks. Not collective. */
 PetscErrorCode SbSpaceCreateConstraints(SbSpace space, PetscBool beside, PetscBool nonsymmetric);
 void SbSpaceClearConstraints(SbSpace space);
-/* Output: number of the constraint on this rank; -1, and nothing is done, for an exact one that earlier exact ones of the node and supports say already.
+/* Output: number of the constraint on this rank; -1: redundant, as it follows from earlier exact ones and supports of the node, and not added.
    Not collective. */
 PetscErrorCode SbSpaceAddConstraint(SbSpace space, const SbConstraint *constraint, PetscInt *number);
-/* Collective. */
+/* After the last SbSpaceAddConstraint(): builds Q and the global counts. Collective. */
 PetscErrorCode SbSpaceAssembleConstraints(SbSpace space);
 /* Whether there is one on any rank. Not collective, alike on all ranks. */
 PetscBool SbSpaceIsConstrained(SbSpace space);
 /* Lends constraint `number` of this rank till the next one is added. */
 SbConstraint *SbSpaceGetConstraint(SbSpace space, PetscInt number);
 
-/* Not collective, on owned nodes [nnode_owned][3]: u <- where exact constraints hold; x <- x - Q x: a residual without what they take, a direction that leaves their sums. */
+/* Not collective, on owned nodes [nnode_owned][3]: u <- the closest one that satisfies exact constraints; x <- x - Q x: projected residual or direction. */
 void SbConstraintsPrescribe(SbSpace space, PetscReal u[]);
 void SbConstraintsProject(SbSpace space, PetscReal x[]);
-/* z <- the part of it that moves nothing that is prescribed or constrained exactly. Not collective. */
+/* z <- its projection onto directions admissible for prescribed unknowns and exact constraints. Not collective. */
 PetscErrorCode SbSpaceProjectAdmissible(SbSpace space, Vec z);
-/* f <- f less the springs' forces, and less what exact constraints take when `constrain`. */
+/* f[nnode_owned][3], N, less the springs' forces; projected by exact constraints when `constrain`. Not collective. */
 void SbConstraintsResidual(SbSpace space, const PetscReal u[], PetscBool constrain, PetscReal f[]);
-/* y <- y + (F^T k G) x of springs, less what K holds beside the tangent; that matrix of one node added to its block. */
+/* y <- y + (F^T k G - added) x, F, G, k: push, n and stiffness of springs; the same added to the diagonal block of a node. Not collective. */
 void SbConstraintsAddTangent(SbSpace space, const PetscReal x[], PetscReal y[]);
 void SbConstraintsAddSprings(SbSpace space, PetscInt node, PetscReal block[9]);
-/* Forces and sums of all constraints, for the displacement u and its residual r without constraints (but with springs), N. */
+/* Computes `force` and `sum` of all constraints, for u[nnode_owned][3], m, and its residual r without constraints (but with springs), N. */
 void SbConstraintsComputeForces(SbSpace space, const PetscReal u[], const PetscReal r[]);
-/* After it: f <- f + what all constraints push with, N. */
+/* After it: adds the forces of all constraints to f[nnode_owned][3], N. */
 void SbConstraintsAddForces(SbSpace space, PetscReal f[]);
-/* After it: of that residual r what supports exert, at prescribed unknowns, and what constraints exert, elsewhere. */
+/* After it: turns that residual r into reactions: of supports at prescribed unknowns, of constraints elsewhere, N. */
 void SbConstraintsReactions(SbSpace space, PetscReal r[]);
-/* v <- the nearest velocity at which exact constraints' sums have theirs. Not for those that push along another direction. */
+/* v <- the closest velocity with n . v = velocity of all exact constraints, m/s. Not for push other than n. */
 void SbConstraintsVelocity(SbSpace space, PetscReal v[]);
-/* For a block of a matrix between local nodes i and j: B <- P_i B P_j, on the diagonal with its size times Q_i added; its rows are rs apart, its columns cs. */
+/* Block B of a matrix between local nodes i and j: B <- P_i B P_j, P = I - Q, on the diagonal plus |B| Q_i; strides rs of rows, cs of columns. */
 void SbConstraintsProjectBlock(SbSpace space, PetscInt i, PetscInt j, size_t rs, size_t cs, PetscScalar *v);

@@ -1,5 +1,5 @@
 /*
-  sbcontact.h - layer 3: what bodies meet. Rigid obstacles, still or on a given path.
+  sbcontact.h - layer 5: rigid obstacles, fixed or on a prescribed path.
 */
 #pragma once
 #include "sbfem.h"
@@ -39,13 +39,13 @@ PetscErrorCode SbObstacleSetUp(SbObstacle obstacle, MPI_Comm comm, const char *o
 */
 PetscReal SbObstacleDistance(SbObstacle obstacle, const PetscReal x[3], PetscReal normal[3]);
 
-/* Obstacles that vertices alone meet: a half-space, as a point of its surface and the tip of the unit normal there; a bowl, as its centre. */
+/* Obstacles that only vertices can touch: a half-space, stored as a point of its surface and the tip of the unit normal there; a bowl, as its centre. */
 typedef enum { SB_SIDE_NONE, SB_SIDE_PLANE, SB_SIDE_BOWL } SbObstacleSide;
 /* A rigid motion: x = c + R (X - c) + d; R turns by an angle (rad) about the unit axis. */
 typedef struct {
   PetscReal R[9], c[3], d[3], axis[3], angle;
 } SbPose;
-/* The way from one pose to the next of a point at x in `at`, one of them, as it sets off or arrives there: that of its arc, d1 - d0 + (angle1 - angle0) axis x (x - c - d), m. */
+/* Tangent of the arc from pose `from` to pose `to` at the end `at`, for the point x there: way = d1 - d0 + (angle1 - angle0) axis x (x - c - d), m. Not collective. */
 void SbPoseWay(const SbPose *from, const SbPose *to, const SbPose *at, const PetscReal x[3],
                PetscReal way[3]);
 /* Rotation by an angle (rad) about the unit axis through c, then the translation d. */

@@ -1,5 +1,5 @@
 /*
-  sbeffect.h - layer 3: what acts on the bodies beyond their own elasticity and inertia.
+  sbeffect.h - layer 5: effects: loads, supports, damping, contact.
 
   An effect is one file in src/effect/. An operation left NULL means "nothing to do" and is never called: the model
   sorts the effects into one list per operation after set-up. An effect that the scenario does not name is never created.
@@ -24,7 +24,7 @@ typedef struct {
   PetscReal gap;       /* m; negative inside */
   PetscReal force[3];  /* on body[0], with friction, N */
 } SbContactPoint;
-/* Start with {0}; the room is kept when n is set to zero. Release with PetscFree(list->point). */
+/* Start with {0}; n = 0 empties it and keeps the memory. Release with PetscFree(list->point). */
 typedef struct {
   PetscInt n, size;
   SbContactPoint *point; /* [n] */
@@ -49,32 +49,32 @@ typedef struct {
   PetscErrorCode (*setup)(SbEffect e, SbSpace space);
   /* writes prescribed displacements at time t into space->fixed_value (rows are positions in space->fixed_node). Not collective. */
   PetscErrorCode (*prescribe)(SbEffect e, SbSpace space, PetscReal t);
-  /* for supports that turn: what reactions r0 at t0 and r1 at t1 (of owned nodes, N) do on the way beyond their mean along the straight line, J; this rank's. Not collective. */
+  /* for rotating supports: work of the reactions r0[nnode_owned][3] at t0 and r1 at t1, N, along the arc, less that of their mean along the chord, J; this rank's. Not collective. */
   PetscErrorCode (*turning_work)(SbEffect e, SbSpace space, PetscReal t0, PetscReal t1, const PetscReal r0[],
                                  const PetscReal r1[], PetscReal *work);
   /* contact, before the first solve of an attempt at a step from t to t + dt: local displacements u0 at t and u as predicted at
      t + dt, m; v0 are the velocities at t, m/s, NULL unless an effect has `restitution`. Collective. */
   PetscErrorCode (*begin_step)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, const PetscReal u0[],
                                const PetscReal v0[], const PetscReal u[]);
-  /* adds the constraints of contact by SbSpaceAddConstraint(): called for all effects first for those along normals, then for those across. Not collective. */
+  /* adds the constraints of contact by SbSpaceAddConstraint(): called for all effects first for normal, then for tangential ones (across). Not collective. */
   PetscErrorCode (*assemble_constraints)(SbEffect e, SbSpace space, PetscBool across);
   /* after a solve, for whose solution SbConstraintsComputeForces() has been called: sets `changed` when another solve is needed. Collective. */
   PetscErrorCode (*update_active_set)(SbEffect e, SbSpace space, const PetscReal u[], PetscBool *changed);
-  /* after the first solve of an attempt, for effects that want steps cut where points come into contact: the part of the step, 0..1, after which
-     the first point that was apart before touches, as the motion without it says; 1: none does. This rank's. Not collective. */
+  /* after the first solve of an attempt, with -effect_<name>_time_of_impact: the fraction of the step, 0..1, at which the first new point
+     comes into contact in the motion without contact; 1: none does. This rank's. Not collective. */
   PetscErrorCode (*time_of_impact)(SbEffect e, PetscReal *part);
-  /* restitution (src/model/restitution.c): the work of the forces on what bounces, as the last solve has it and in the frame of what it leaves,
+  /* restitution (src/model/restitution.c): work of the contact forces of impacts in the last solve, in the frame of the other side,
      J; this rank's. Not collective. */
   PetscErrorCode (*restitution)(SbEffect e, PetscReal *work);
-  /* its coefficients have `share` left of them in this step, 0..1: what bounces is constrained accordingly from now on. Not collective. */
+  /* multiplies its coefficients of restitution by `share`, 0..1, in this step, and updates its constraints. Not collective. */
   PetscErrorCode (*scale_restitution)(SbEffect e, PetscReal share);
-  /* contact, when a step of Newmark that ends at t has been solved: at what velocity that moves to which it constrains something, at the end
+  /* contact, after the solve of a Newmark step that ends at t: sets the velocity of the obstacle at the end in its constraints
      (SbConstraint.velocity). Not collective. */
   PetscErrorCode (*target_velocity)(SbEffect e, SbSpace space, const SbStage *stage);
-  /* f[nnode][3] += what contact pushes owned nodes with, N. For output only; constraints add theirs without it. Not collective. */
+  /* f[nnode][3] += contact forces on owned nodes, N, but those of constraints. For output only. Not collective. */
   PetscErrorCode (*contact_force)(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[]);
-  /* gap[nnode] of owned nodes, m, and normal[nnode][3] towards them, where something that they may touch is nearer than the gap says so
-     far. For output only. Not collective. */
+  /* lowers gap[nnode] of owned nodes, m, where a contact candidate is closer, and sets normal[nnode][3] there, towards the node. For
+     output only. Not collective. */
   PetscErrorCode (*gap)(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[], PetscReal normal[]);
   /* f[nnode][3] += external force, N; must be right on owned nodes without communication */
   PetscErrorCode (*force)(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[]);
@@ -85,26 +85,26 @@ typedef struct {
   PetscErrorCode (*nonsymmetric)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal x[],
                                  PetscReal y[]);
   /*
-    Guarded contact (-effect_NAME_response barrier), whose energy belongs to the potential that Newton's method lowers (src/time/newton.c). Collective.
+    Barrier contact (-effect_NAME_response barrier), whose energy is part of the potential that Newton's method minimises (src/time/newton.c). Collective.
 
-    touching      - a run begins at t, its first step has the length dt: adds what has a gap at the local displacements u that is too small, or not much larger, of this
-                    rank. first: it was that step, alike on all ranks; else nothing was done.
-    begin_guarded - a step from t to t + dt begins with the local displacements u0, and the speed of potential.c, m/s; when the run begins they may be changed (moved), ghosts too, where surfaces
-                    touch. What moves by order is where it is at t: `progress` 0.
-    meet          - after begin_guarded, for effects with restitution: what bounces in the step, by the local displacements u0 and velocities v0 at its start.
-    advance       - it is where its way from t to t + dt has the part `progress` behind it, 0..1. Not collective.
-    safe          - `part` of the way from the local displacements u0 to u1, and from the present progress to `progress`, that can be gone, for the pairs of this
-                    rank; nactive: pairs of this rank that push each other at u0.
-    nearest       - the smallest gap of the places that were examined last, m, and what is there, in words; PETSC_MAX_REAL and "" without one.
-    lag           - a solve of the step ended (solved), or is, at the local displacements u: friction, whose normal forces and directions are those of before, may take those of u;
-                    again: it did, and the step wants one more solve.
+    touching      - at the start t of a run, with first step length dt: adds this rank's pairs whose gap at the local displacements u is too small, or little
+                    larger. first: it was the first step, alike on all ranks; else nothing was done.
+    begin_guarded - a step from t to t + dt begins with the local displacements u0, and the speed of potential.c, m/s; at the start of the run they may be changed (moved), ghosts too, where surfaces
+                    touch. Prescribed motions are at t: `progress` 0.
+    meet          - after begin_guarded, for effects with restitution: finds the impacts of the step, from the local displacements u0 and velocities v0 at its start.
+    advance       - moves obstacles to the fraction `progress` of their path from t to t + dt, 0..1. Not collective.
+    safe          - part: largest collision-free fraction of the motion from the local displacements u0 to u1, and from the present progress to `progress`, for this
+                    rank's pairs; nactive: this rank's active pairs at u0.
+    nearest       - the smallest gap at the last positions, m, and its pair, in words; PETSC_MAX_REAL and "" without one.
+    lag           - lagged friction, at the local displacements u of an iterate or (solved) of a solution: may take normal forces and slip directions from u;
+                    again: it did, and the step needs one more solve.
     potential     - energy at the local displacements u, this rank's part, J; f[nnode][3] += its gradient on owned nodes, N.
-    hessian       - adds the blocks of its second derivative at u, or of what stands for it (SbContactHessian), and to r[nnode][3] on owned nodes, N, what the gradient of
-                    the quadratic energy that they belong to has more than the gradient.
-    gap_forces    - f[nnode][3] += on owned nodes what closes the gaps at u, to first order, as a load on body and contact, N; `bound`: half of force times gap, which bounds the energy
-                    of the error that gaps are, this rank's, J.
-    scale_width   - the gap below which it pushes becomes `factor` times what it is, if it is the program's. Smaller: at once, not below what rounding allows; changed: it did, alike on
-                    all ranks. Larger: when the next step begins, if the energy of gaps does not grow by more than `growth` with it, J, and not beyond the default. Not collective.
+    hessian       - adds the blocks of its Hessian at u, or of the substitute (SbContactHessian), and to r[nnode][3] on owned nodes, N, the gradient of the
+                    substitute's quadratic model less the true gradient.
+    gap_forces    - f[nnode][3] += on owned nodes the load that closes the gaps at u to first order, N; `bound`: half of force times gap, which bounds the energy
+                    of the error by gaps, this rank's, J.
+    scale_width   - multiplies a default width of the barrier by `factor`. Smaller: at once, not below what rounding allows; changed: it did, alike on all ranks. Larger: at the
+                    start of the next step, if the barrier's energy grows by at most `growth`, J, and not beyond the default. Not collective.
   */
   PetscErrorCode (*touching)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, const PetscReal u[],
                              PetscBool *first, SbInitialContacts *list);
@@ -123,28 +123,28 @@ typedef struct {
   PetscErrorCode (*gap_forces)(SbEffect e, SbSpace space, const PetscReal u[], PetscReal f[],
                                PetscReal *bound);
   PetscErrorCode (*scale_width)(SbEffect e, PetscReal factor, PetscReal growth, PetscBool *changed);
-  /* of guarded contact: what it did to the bodies in the last accepted step, J; this rank's. Not collective. */
+  /* of barrier contact: its work on the bodies in the last accepted step, J; this rank's. Not collective. */
   PetscErrorCode (*work)(SbEffect e, PetscReal *work);
   /* after a step was accepted */
   PetscErrorCode (*accept)(SbEffect e, SbSpace space, const SbStage *stage);
-  /* for checkpoints: what the effect takes from step to step beyond displacement and velocity, as records of `nstate` numbers each, in
-     which things have numbers that no partition changes; n of this rank, allocated here, the caller frees. Collective. */
+  /* for checkpoints: history variables of the effect, as records of `nstate` numbers each, which identify entities by numbers that no
+     partition changes; n of this rank, allocated here, the caller frees. Collective. */
   PetscErrorCode (*save)(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records);
-  /* takes from the n records of all ranks what is this rank's, instead of what was there; local displacements u (m) at the time t at which they
-     were saved. assemble_constraints() then gives the constraints of that time. Collective. */
+  /* replaces the history variables by this rank's of the n records of all ranks; local displacements u (m) at the time t of the
+     checkpoint. assemble_constraints() then gives the constraints of that time. Collective. */
   PetscErrorCode (*load)(SbEffect e, SbSpace space, PetscReal t, const PetscReal u[], PetscInt n,
                          const PetscReal records[]);
-  /* for re-meshing: the n records of all ranks from save() get the names of another mesh, in which node from[i] (original number; ascending) is to[i];
-     those of what is not there are taken out. Not collective. */
+  /* for re-meshing: renumbers the n records of all ranks from save() for another mesh, in which node from[i] (original number; ascending) is to[i];
+     records of removed nodes are dropped. Not collective. */
   PetscErrorCode (*rename)(SbEffect e, PetscInt nnode, const PetscInt from[], const PetscInt to[],
                            PetscInt *n, PetscReal records[]);
   /* numbers for the history: n values with the names given by `columns`; residual[nnode][3] is the unbalanced force, N,
      which on prescribed unknowns is the reaction. Values are this rank's part and are summed. */
   PetscErrorCode (*history)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal residual[],
                             PetscReal values[]);
-  /* adds the points where it pushes the bodies, those of this rank; for output only. Not collective. */
+  /* adds the active contact points of this rank; for output only. Not collective. */
   PetscErrorCode (*contact_points)(SbEffect e, SbSpace space, const SbStage *stage, SbContactPoints *list);
-  /* for the summary when a run ends: a line on its work, "": nothing. Collective. */
+  /* a line for the summary at the end of a run, "": nothing. Collective. */
   PetscErrorCode (*summary)(SbEffect e, SbSpace space, size_t size, char text[]);
   PetscErrorCode (*destroy)(SbEffect e);
 } SbEffectOps;
@@ -184,11 +184,11 @@ struct _p_SbEffect {
   PetscBool springs;     /* of contact: springs or friction, not constraints alone. Default PETSC_FALSE */
   PetscBool prescribed;  /* it prescribes the nodes of its sets in all directions */
   PetscInt nstate;       /* numbers in a record of save() */
-  PetscReal width;       /* of guarded contact: the smallest gap below which it pushes, m */
+  PetscReal width;       /* of barrier contact: the smallest width, the gap below which surfaces repel, m */
   PetscInt ncolumn;      /* history columns, known after set-up */
   const char *const
     *column;      /* [ncolumn] "force_x", ...; written as <name>_<column>; owned by the type or by `data` */
-  char note[256]; /* what set-up has to say in the run's report; "": nothing */
+  char note[256]; /* note of the set-up for the run's header; "": none */
   void *data;     /* the type's own; freed with the effect */
 };
 

@@ -1,5 +1,5 @@
 /*
-  sbelement.h - layer 1: element kernels on batches of SB_BATCH tets with four nodes and constant basis gradients.
+  sbelement.h - layer 2: element kernels on batches of SB_BATCH tets with four nodes and constant basis gradients.
 
   The kernels take arrays and return arrays: no MPI, no allocation, no mesh. Lanes as in sbmaterial.h; inputs and outputs
   never overlap. The four gradients sum to zero: g holds those of nodes 1..3, everything about node 0 follows from them.

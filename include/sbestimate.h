@@ -1,5 +1,5 @@
 /*
-  sbestimate.h - layer 5: how large the errors of a run are. The errors of space: src/ledger/estimate_space.c.
+  sbestimate.h - layer 7: how large the errors of a run are. The errors of space: src/ledger/estimate_space.c.
 */
 #pragma once
 #include "sbmodel.h"

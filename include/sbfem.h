@@ -1,11 +1,11 @@
 /*
-  sbfem.h - layer 2: nodes and unknowns, batches of cells, assembly by precomputed offsets, constraints, solver set-up.
+  sbfem.h - layer 3: nodes and unknowns, batches of cells, assembly by precomputed offsets, constraints, solver set-up.
 */
 #pragma once
 #include "sbelement.h"
 #include "sbmesh.h"
 
-/* What the integrator asks about: one evaluation. Arrays are local (owned nodes, then ghosts), [nnode][3]. */
+/* The arguments of an evaluation of forces and tangent. Arrays are local (owned nodes, then ghosts), [nnode][3]. */
 typedef struct {
   PetscReal t;  /* s */
   PetscReal dt; /* length of the step being taken, s; 0 in a static run */
@@ -82,7 +82,7 @@ struct _p_SbSpace {
   PetscBool coupled;         /* an effect may couple nodes that share no cell, in an assembled tangent */
   SbPack *batch_g;    /* [nbatch][9] basis gradients of nodes 1..3, 1/m, of straight cells; 64-byte aligned */
   SbPack *batch_V;    /* [nbatch] volumes, m^3; 0 in padding; 64-byte aligned */
-  void *batch_memory; /* what batch_g, batch_V and those of curved cells live in */
+  void *batch_memory; /* memory of batch_g, batch_V and those of curved cells */
   PetscReal *node_mass;      /* [nnode] lumped mass, kg, complete on owned nodes */
   PetscReal *node_share;     /* [nnode] integral of density phi_a, kg; node_mass itself without P2 */
   PetscReal *alpha, *beta;   /* [nbody] Rayleigh damping C = alpha M + beta K, 1/s and s */
@@ -91,16 +91,16 @@ struct _p_SbSpace {
   uint8_t *fixed;         /* [nnode] bit c set: component c of the node is prescribed */
   PetscInt nfixed;        /* local nodes with any bit */
   PetscInt *fixed_node;   /* [nfixed] ascending */
-  PetscReal *fixed_value; /* [nfixed][3] prescribed displacement at the time last asked for, m */
+  PetscReal *fixed_value; /* [nfixed][3] prescribed displacement at the last evaluation, m */
   PetscBool ghosted; /* more than one rank: vectors carry ghosts, also where a rank happens to have none */
   Vec template_vec;  /* ghosted (more than one rank) or sequential; block size 3 */
   struct _p_SbPlan *plan; /* cell blocks -> matrix values; NULL before SbSpaceCreateMatrix() */
   PetscReal block_scale;  /* on blocks of SbSpaceAddCellBlock(): the load factor of a static run, or 1 */
-  PetscBool rough;        /* the solve that contact examines was a rough one: forces are not to be trusted */
+  PetscBool rough;        /* the last solve had a loose tolerance: its contact forces are inaccurate */
   PetscBool linear;       /* every region's law is linear */
   SbPack
     *linear_pressure; /* [nbatch] SbSpaceLinearisePressure(); NULL: tangents have the pressures of states */
-  void *pressure_memory; /* what it lives in */
+  void *pressure_memory; /* memory of linear_pressure */
 };
 
 /* Collective. Borrowed: materials by the numbers in the mesh (one per body, then those of inclusions), elements one per body. Options
@@ -128,23 +128,23 @@ PetscErrorCode SbSpaceAddInternalForce(SbSpace space, const SbStage *stage, Pets
 void SbSpaceAddInertia(SbSpace space, const SbStage *stage, PetscReal f[]);
 
 /*
-  SbSpaceLinearisePressure - lets the pressures of cells in tangents be those of a linearisation (src/fem/quadratic.c).
+  SbSpaceLinearisePressure - sets the cell pressures of tangents to linearised ones (src/fem/quadratic.c).
 
-  Collective. Input: U, m; step, m; along: factor on it; part: of the way to p(U) + dp/dU . along step that the pressures go. step NULL: p(U). U
-  NULL: tangents have the pressures of their states again.
+  Collective. Input: U, m; step, m; along: factor on it; part: p = p(U) + part dp/dU . along step. step NULL: p(U). U NULL: tangents have the
+  pressures of their states again.
 */
 PetscErrorCode SbSpaceLinearisePressure(SbSpace space, Vec U, Vec step, PetscReal along, PetscReal part);
 
 /*
-  SbSpaceFollowJumps - makes the penalty of jumps of CR and DG as stiff as the state asks for (src/fem/jump.c).
+  SbSpaceFollowJumps - adapts the penalty on jumps of CR and DG to the state (src/fem/jump.c).
 
-  Collective. Input: U, m; steps: of loads, with energies of whole jumps; in time, where those of faces at U stay as they are within bounds; in time without damping, where no penalty falls. Output: changed (or NULL):
-  somewhere, for load steps by a percent or more. Until the next call the face terms are constant; at first they are those of the rest state.
+  Collective. Input: U, m; steps: load steps, with the energies of full jumps; time steps, where the energy of each face at U is kept within bounds; time steps without damping, where no penalty falls. Output: changed (or NULL):
+  some penalty did, for load steps by a percent or more. Until the next call the face terms are constant; at first they are those of the rest state.
 */
 typedef enum { SB_STEPS_OF_LOAD, SB_STEPS_IN_TIME, SB_STEPS_UNDAMPED } SbStepsOf;
 PetscErrorCode SbSpaceFollowJumps(SbSpace space, Vec U, SbStepsOf steps, PetscBool *changed);
-/* For a run that goes on: the stiffness that whole jumps at U would need for the energy of each of the four faces of a cell, N/m, 0: no such face, and what its penalty follows, Pa: k[5 ncell_owned].
-   And back, before SbSpaceFollowJumps(). Collective. */
+/* For checkpoints and re-meshing, k[5 ncell_owned]: for each of a cell's four faces the stiffness of the full jump at U that has the face's energy, N/m, 0: no such face; and the stress that the penalty depends on, Pa.
+   Set: the same, before SbSpaceFollowJumps(). Collective. */
 PetscErrorCode SbSpaceGetJumps(SbSpace space, Vec U, PetscReal k[]);
 PetscErrorCode SbSpaceSetJumps(SbSpace space, const PetscReal k[]);
 
@@ -158,8 +158,8 @@ PetscErrorCode SbSpaceFinishTangent(SbSpace space, Mat A);
 /* Between the two: A += a 3x3 block (row-major, N/m) for two nodes a, b of a local cell, as SbSpaceCellNode() numbers them. Not collective. */
 PetscErrorCode SbSpaceAddCellBlock(SbSpace space, Mat A, PetscInt cell, PetscInt a, PetscInt b,
                                    const PetscReal block[9]);
-/* The same for a spring from node a to something rigid, which may be all that supports a body: it reaches the coarse spaces of
-   -solver pressure too. The block is not negative; the rank that owns the node must be among the callers. */
+/* The same for a spring from node a to a rigid support, possibly the only one of a body: it is also added to the coarse spaces of
+   -solver pressure. The block is positive semi-definite; the node's owner must be among the callers. */
 PetscErrorCode SbSpaceAddSpring(SbSpace space, Mat A, PetscInt cell, PetscInt a, const PetscReal block[9]);
 
 /* f[nnode][3] += factor dV/du, V the current volume of a body (m^3) at displacement u. Right on owned nodes. Not collective. */
@@ -241,7 +241,7 @@ PetscErrorCode SbSpaceCreateMatrixFree(SbSpace space, Mat *A);
 PetscErrorCode SbSpaceAllowsMatrixFree(SbSpace space, PetscBool *has);
 
 /*
-  SbSpaceNodeRotations - how the material around each owned node is turned: the proper rotation next to the volume-weighted
+  SbSpaceNodeRotations - rotation of the material around each owned node: the proper rotation closest to the volume-weighted
   mean of the rotations of the cells around it.
 
   Not collective. Input: u[nnode][3] with ghosts, m. Output: R[nnode_owned][9], row-major; spread[nnode_owned] (may be NULL), the

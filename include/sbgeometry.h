@@ -8,7 +8,7 @@
 #include "sbkernel.h"
 #include "sbquadratic.h"
 
-#define SB_BOX_ROUNDING 16 /* in units of eps |x|: what the corners of a box may be off */
+#define SB_BOX_ROUNDING 16 /* rounding of a box's corners, in units of eps |x| */
 
 /* Boxes: lower and upper corner, m. An empty one has its lower corner above the upper. */
 static inline void SbBoxClear(PetscReal box[6])
@@ -19,7 +19,7 @@ static inline void SbBoxClear(PetscReal box[6])
   }
 }
 
-/* Places that are no numbers are passed over: then a diverged solve makes no difference between ranks. */
+/* NaN is ignored, so that ranks agree also after a diverged solve. */
 static inline void SbBoxJoin(PetscReal box[6], const PetscReal low[3], const PetscReal high[3])
 {
   for (int k = 0; k < 3; k++) {
@@ -87,14 +87,14 @@ PetscBool SbRayTriangle(const PetscReal p[3], const PetscReal way[3], const Pets
 
 /*
   Whether a segment from p to q and a triangle with the corners t share a point; whether two triangles with the vertices a[3] and b[3] of
-  x[][3] share more than common vertices and a common edge. Not collective. To touch is to meet; rounding is no error (the head of the file).
+  x[][3] share more than common vertices and a common edge. Not collective. Touching counts; rounding: src/geometry/intersection.c.
 */
 PetscBool SbSegmentMeetsTriangle(const PetscReal p[3], const PetscReal q[3], PetscReal const *const t[3]);
 PetscBool SbTrianglesCross(const PetscReal x[], const PetscInt a[3], const PetscInt b[3]);
 
 /* ------------------------------------------------------------------ distance.c, ccd.c: pairs of vertices, edges, triangles */
 
-/* What a pair consists of, and which features of it are closest; the vertices in their order, those of the first side before the bar. */
+/* Kind of a pair, or of its closest features; vertices of the first side before the bar. */
 typedef enum {
   SB_PAIR_VERTEX_VERTEX,   /* 0 | 1 */
   SB_PAIR_VERTEX_EDGE,     /* 0 | 1 2 */
@@ -141,23 +141,22 @@ PetscReal SbEdgeCross(const PetscReal x[], PetscReal g[], PetscReal H[]);
 void SbSymmetricProjectPSD(int n, PetscReal A[]);
 
 /*
-  SbTimeOfImpact - how much of a step a pair may go before the gap between its sides is used up; never later than the true time.
+  SbTimeOfImpact - a conservative time of impact of a pair of features: never later than the true one.
 
   Not collective. The vertices go on straight lines from x0[4][3] to x1[4][3], m. The gap is their distance less the radius. Let g be the gap at
   the start, and least = min(separation, g / 2). At the time returned the gap is between least + 0.9 k and least + k with k = min(keep (g - least), most), and
   nowhere before is it smaller. Much rotation at a small gap takes many steps; after 1024 the time reached is returned, at which more is left.
 
-  least is not below SB_CCD_ROUNDING eps |x|, what coordinates may be rounded to; the same of |x1 - x0| is added in the course of the step. A gap
-  that is not larger than this at the start, or negative, cannot be guarded: the time is 0, unless nothing moves relative to each other. So it
-  is with a NaN.
+  least is not below SB_CCD_ROUNDING eps |x|, the rounding of coordinates, plus the same of |x1 - x0|. For a gap not larger than this at the
+  start, or negative, or NaN, the time is 0, unless there is no relative motion.
 
   Output: time, in [0, 1]; 1 if there is no impact. Returns whether there is one.
 */
 typedef struct {
   PetscReal radius;     /* sum of the radii of the balls or capsules around vertices and edges, m */
-  PetscReal separation; /* gap that is not used up, m */
-  PetscReal keep;       /* part of the rest that is not used up, above 0 and below 1; 0.1 is usual */
-  PetscReal most;       /* of a gap to be kept, m; 0: any */
+  PetscReal separation; /* gap that remains, m */
+  PetscReal keep;       /* fraction of the gap beyond it that remains, above 0 and below 1; usually 0.1 */
+  PetscReal most;       /* largest gap kept by `keep`, m; 0: no limit */
 } SbCCDLimits;
 #define SB_CCD_ROUNDING 32
 PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal x1[],
@@ -167,7 +166,7 @@ PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal 
 
 /*
   A tree over boxes with four children to a node: four boxes form a group, four groups one of the next level. Not collective. Boxes that are empty
-  or have coordinates that are no numbers meet nothing; they may come and go with the positions.
+  or have NaN coordinates intersect nothing; that may change with the positions.
 */
 #define SB_BOX_TREE_LEVELS 32
 typedef struct {
@@ -179,11 +178,11 @@ typedef struct {
   PetscReal (*group)[6][4]; /* [start[nlevel]] lower and upper corners of the four boxes or groups in it, m */
   PetscReal hull[6];        /* of all, m */
   PetscReal size;           /* of all hulls over that of the boxes, when the order was made */
-  PetscInt built;           /* how often the order was made */
+  PetscInt built;           /* number of rebuilds */
 } SbBoxTree;
 PetscErrorCode SbBoxTreeCreate(PetscInt n, const PetscReal (*box)[6], SbBoxTree *tree);
 PetscErrorCode SbBoxTreeDestroy(SbBoxTree *tree);
-/* The same boxes elsewhere, O(n); where that has made the groups half as large again against their boxes, they are ordered anew. box[n][6], m. */
+/* Refits the tree to moved boxes, O(n); rebuilds it when groups have grown by half relative to their boxes. box[n][6], m. */
 PetscErrorCode SbBoxTreeRefit(SbBoxTree *tree, const PetscReal (*box)[6]);
 
 /*
@@ -194,7 +193,7 @@ PetscErrorCode SbBoxTreeRefit(SbBoxTree *tree, const PetscReal (*box)[6]);
 typedef struct {
   const SbBoxTree *tree; /* borrowed */
   PetscReal box[6];
-  unsigned hits; /* children of the last group that are still to be given */
+  unsigned hits; /* children of the last group not yet returned */
   PetscInt leaf; /* place of its first child */
   int depth;
   PetscInt stack[3 * SB_BOX_TREE_LEVELS + 4][2]; /* level and group */
@@ -282,31 +281,31 @@ static inline PetscBool SbUnionJoin(PetscInt up[], PetscInt a, PetscInt b)
 }
 
 /*
-  SbWeld - points that are one: those within `tolerance` of each other, m; 0: at the same place. Not collective.
+  SbWeld - merges points within `tolerance` of each other, m; 0: at the same position. Not collective.
 
-  Input: x[n][3], m; chains, whether chains of such pairs become one as a whole, else each point joins the first one before it that has not joined
-  another. Output: map[n], the first point of those that each point is one with.
+  Input: x[n][3], m; chains, whether chains of such pairs are merged as a whole, else each point joins the first earlier one that is not merged
+  itself. Output: map[n], the first of the points merged with each point.
 */
 PetscErrorCode SbWeld(PetscInt n, const PetscReal x[], PetscReal tolerance, PetscBool chains, PetscInt map[]);
 /* Numbers the trees in the order of their roots, in place: up[n] is the tree of each; returns how many there are. */
 PetscInt SbUnionLabel(PetscInt n, PetscInt up[]);
-/* Leaves out points that none of used[nused] names, and renumbers these. The order stays. */
+/* Removes points that are not in used[nused], and renumbers these. Keeps the order. */
 PetscErrorCode SbDropUnusedPoints(PetscInt *n, PetscReal x[], PetscInt nused, PetscInt used[]);
 
 /* ------------------------------------------------------------------ keys.c: which of many things are the same edge, or the same face */
 
 typedef struct {
   uint64_t key;
-  PetscInt slot; /* which thing has it */
+  PetscInt slot; /* index of the item */
 } SbKey;
-/* Of an edge, or whatever two numbers below 2^32 name, in either order. */
+/* Key of an edge, or of any two numbers below 2^32, independent of their order. */
 static inline uint64_t SbKeyOfPair(PetscInt a, PetscInt b)
 {
   return (uint64_t)PetscMin(a, b) << 32 | (uint64_t)PetscMax(a, b);
 }
 /* Sorts by key, then by slot. */
 void SbKeysSort(PetscInt n, SbKey item[]);
-/* Of sorted items: how many from position i on have the key of that one; the first position whose key is not below this one, n when all are. */
+/* Of sorted items: number of items from i on with the key of item i; first position whose key is not below `key`, or n. */
 PetscInt SbKeysAlike(PetscInt n, const SbKey item[], PetscInt i);
 PetscInt SbKeysFind(PetscInt n, const SbKey item[], uint64_t key);
 
@@ -316,7 +315,7 @@ PetscReal SbTetDeterminant(const PetscReal x[], const PetscInt vert[4]);
 /* ------------------------------------------------------------------ locate.c */
 
 /*
-  SbLocator - which tet holds a point. Not collective; the arrays are borrowed. Tets without volume, or inverted, hold nothing. Tets are curved by
+  SbLocator - which tet holds a point. Not collective; the arrays are borrowed. Flat and inverted tets contain no point. Tets are curved by
   edge_off[ncell][6][3], nodes at edges 01 02 03 12 13 23 from their middles; NULL: straight. The weights of a curved one are l of its map x(l) (sbquadratic.h).
 
   SbLocatorFind: the tet and the weights of its corners, none negative, sum 1. Of several that hold the point the one in which it lies

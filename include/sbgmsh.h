@@ -1,5 +1,5 @@
 /*
-  sbgmsh.h - layer 1: the gmsh library at work in a process of its own: it makes tetrahedra. Rank 0 only.
+  sbgmsh.h - layer 2: the gmsh library at work in a process of its own: it makes tetrahedra. Rank 0 only.
 
   How to use it: write a function of type SbGmshWork and hand it to SbGmshRun(). That forks; the child loads libgmsh, calls
   the function with a fresh, empty model, and what the function puts into its SbImport

@@ -1,5 +1,5 @@
 /*
-  sbledger.h - layer 5: what a run's result is wrong by, source by source, beside the seconds spent on each.
+  sbledger.h - layer 7: what a run's result is wrong by, source by source, beside the seconds spent on each.
 
   Errors are in the norm of the energy: the square of an error is its energy, J, as a displacement that strains the bodies and a velocity that they
   have; relative is the root of its share of the largest energy, kinetic and strain, that the run has had (of the strain energy in a static run).

@@ -1,5 +1,5 @@
 /*
-  sbmaterial.h - layer 1: material laws on batches of deformation gradients.
+  sbmaterial.h - layer 2: material laws on batches of deformation gradients.
 
   A batch holds SB_BATCH tets side by side (sbkernel.h): every quantity is an array over lanes, so the compiler vectorises
   each loop, and a lane's result does not depend on the other lanes. Laws know neither meshes nor elements. Sign and frame:

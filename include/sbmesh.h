@@ -1,5 +1,5 @@
 /*
-  sbmesh.h - layer 1: bodies read from files or made as boxes, placed, checked, merged, partitioned with the help of METIS,
+  sbmesh.h - layer 2: bodies read from files or made as boxes, placed, checked, merged, partitioned with the help of METIS,
   and held as plain arrays with one layer of overlap.
 */
 #pragma once
@@ -9,29 +9,29 @@
 #define SB_ON_BOUNDARY ((uint64_t)1) /* bit 0 of SbMesh.face_set: the face has no cell on the other side */
 #define SB_CURVED ((uint64_t)1)      /* bit 0 of SbMesh.cell_set: an edge is curved at rest */
 #define SB_SET_BIT(k) ((uint64_t)1 << ((k) + 1))
-#define SB_SLIVER 0.5       /* degrees: tets with a smaller dihedral angle are slivers, which solvers feel */
+#define SB_SLIVER 0.5 /* degrees: tets with a smaller dihedral angle are slivers, which slow down solvers */
 #define SB_INCLUSION_MAX 16 /* inclusions of a body: tets with a material of their own */
 
-/* Who makes tets from a surface. */
+/* Program that fills a surface with tets. */
 typedef enum {
   SB_TET_AUTO, /* gmsh, and tetgen where that fails */
   SB_TET_GMSH,
   SB_TET_TETGEN
 } SbTetBackend;
-/* Whether the triangles of a surface stay as they are. */
+/* Whether the triangles of a surface are kept. */
 typedef enum {
   SB_TET_SURFACE_AUTO, /* kept when their mean edge is within a factor of 1.5 of the size */
   SB_TET_KEEP,
   SB_TET_REMESH
 } SbTetSurface;
-/* How a surface becomes tets; lengths as those of the surface. */
+/* Parameters of filling a surface with tets; lengths in the surface's unit. */
 typedef struct {
   PetscReal size;            /* wanted edge; 0: the mean edge of the surface */
-  PetscReal merge_tolerance; /* vertices no farther apart are one; negative: 1e-7 of the diagonal */
+  PetscReal merge_tolerance; /* closer vertices are merged; negative: 1e-7 of the diagonal */
   PetscReal
-    untangle; /* by which vertices may part triangles that cut each other; negative: half the mean edge */
+    untangle; /* largest displacement of vertices that removes self-intersections; negative: half the mean edge */
   PetscReal angle;   /* degrees; edges with sharper turns are kept when the surface is remeshed */
-  PetscReal seconds; /* that gmsh or tetgen may take, s */
+  PetscReal seconds; /* time limit of gmsh, and of tetgen, s */
   SbTetBackend backend;
   SbTetSurface surface;
 } SbTetOptions;
@@ -40,7 +40,7 @@ typedef struct {
   Groups of the file are there as the bits of the sets that they mean.
 */
 typedef struct {
-  PetscInt step;   /* after which it was made; 0: it is the mesh of the file */
+  PetscInt step;   /* step after which it was made; 0: the mesh of the file */
   PetscReal mass;  /* kg, of the body on this mesh: densities are scaled; 0: as its materials say */
   PetscReal bound; /* the body is re-meshed when its quality falls below it; 0: as the options say */
   PetscInt nvert, ncell, ntri, nedge;
@@ -67,7 +67,7 @@ typedef struct {
   PetscReal translate[3];    /* m, third */
   SbTetOptions tet;          /* for a mesh that is a surface; m */
   char element[SB_NAME_MAX]; /* p1, p2, cr, dg */
-  PetscBool other_nodes;     /* nodes elsewhere than at vertices: every cell of the overlap is needed */
+  PetscBool other_nodes;     /* nodes at faces or edges: needs the full overlap */
   PetscBool edge_nodes; /* nodes at edges, where a mesh of second order has them; else tets are straight */
   char material[SB_NAME_MAX];    /* linear | corotated | stvk | neohookean */
   PetscReal density;             /* kg/m^3 */
@@ -86,7 +86,7 @@ typedef struct {
   PetscInt nsliver;              /* tets with one below SB_SLIVER */
   PetscReal max_radius_ratio;    /* circumradius / (3 inradius), 1 for the regular tet; the worst cell */
   PetscReal bbox[6];             /* xmin ymin zmin xmax ymax zmax, placed, m */
-  char note[768]; /* what was repaired or is odd, "unused vertices left out: 3, ..."; "" when nothing */
+  char note[768];                /* repairs and remarks, "unused vertices left out: 3, ..."; "" when none */
 } SbBody;
 /* Diagonal of the smallest body's box, m. Not collective. */
 PetscReal SbBodySmallest(PetscInt nbody, const SbBody body[]);

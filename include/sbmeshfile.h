@@ -1,5 +1,5 @@
 /*
-  sbmeshfile.h - layer 1: a mesh as a file, on one rank: read, measured, repaired, refined, written. What supple-mesh is made of.
+  sbmeshfile.h - layer 2: a mesh as a file, on one rank: read, measured, repaired, refined, written. What supple-mesh is made of.
 
   Not collective throughout. Errors: PETSC_ERR_USER_INPUT / PETSC_ERR_FILE_*, one line that names the file and what to do.
 */

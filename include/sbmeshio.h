@@ -1,5 +1,5 @@
 /*
-  sbmeshio.h - layer 1: a body on rank 0 as its reader delivers it, and what reading a file takes. Not collective throughout.
+  sbmeshio.h - layer 2: a body on rank 0 as its reader delivers it, and what reading a file takes. Not collective throughout.
 */
 #pragma once
 #include <hdf5.h>

@@ -1,20 +1,22 @@
 /*
-  sbmodel.h - layer 4: composition of a scene, evaluation of its forces and tangent, energies and momenta.
+  sbmodel.h - layer 6: composition of a scene, evaluation of its forces and tangent, energies and momenta.
 */
 #pragma once
 #include "sbeffect.h"
 
 /* Scalars of one instant, summed over all ranks. SI. */
 typedef struct {
-  PetscReal kinetic;          /* 1/2 v.M v, J */
-  PetscReal strain;           /* J */
-  PetscReal load_work;        /* by the loads since the start (less their potential when they have one), J */
-  PetscReal prescribed_work;  /* work done by moving supports since the start, J */
-  PetscReal damping_loss;     /* dissipated by Rayleigh damping since the start, J */
-  PetscReal remesh_loss;      /* taken by re-meshing since the start, J */
-  PetscReal remesh_mass;      /* change by re-meshings since the start, each as its absolute value, kg */
-  PetscReal remesh_momentum;  /* likewise of the momentum, kg m/s */
-  PetscReal integrator_loss;  /* what is missing: start + works - damping_loss - remesh_loss - now, J */
+  PetscReal kinetic; /* 1/2 v.M v, J */
+  PetscReal strain;  /* J */
+  PetscReal
+    load_work; /* work done by the loads since the start (constant loads: minus the change of their potential), J */
+  PetscReal prescribed_work; /* work done by moving supports since the start, J */
+  PetscReal damping_loss;    /* dissipated by Rayleigh damping since the start, J */
+  PetscReal remesh_loss;     /* energy lost by re-meshing since the start, J */
+  PetscReal remesh_mass;     /* change by re-meshings since the start, each as its absolute value, kg */
+  PetscReal remesh_momentum; /* likewise of the momentum, kg m/s */
+  PetscReal
+    integrator_loss; /* dissipated by the integrator: start + works - damping_loss - remesh_loss - now, J */
   PetscReal momentum[3];      /* kg m/s */
   PetscReal angular[3];       /* about the origin, kg m^2/s */
   PetscReal centre[3];        /* centre of mass, m */
@@ -25,12 +27,12 @@ typedef struct {
   PetscInt ninverted;         /* cells with det F <= 0 */
 } SbEnergies;
 
-/* How a body begins. */
+/* Initial state of a body. */
 typedef struct {
   SbFormula displacement[3],
-    velocity[3];   /* m, m/s, of the place at rest; owned. Numbers are the body's, and NULL here */
+    velocity[3];   /* m, m/s, functions of the reference position; owned. NULL: constants, in SbBody */
   PetscBool moved; /* displacements are given */
-  char state[PETSC_MAX_PATH_LEN]; /* run whose state it takes; "": none */
+  char state[PETSC_MAX_PATH_LEN]; /* run that the initial state is taken from; "": none */
 } SbStart;
 
 typedef struct _p_SbModel *SbModel;
@@ -45,7 +47,7 @@ struct _p_SbModel {
   char (*inclusion)[SB_NAME_MAX]; /* [nmaterial - nbody] names of the inclusions */
   SbElement *element;             /* [nbody] */
   SbStart *start;                 /* [nbody] NULL: at rest, with the bodies' velocities */
-  PetscReal t_begin; /* s, when it is set up; 0, or that of a scene that is made again while a run goes on */
+  PetscReal t_begin;              /* s, at set-up: 0, or the time of re-meshing */
   SbMesh mesh;
   SbSpace space;
   PetscInt neffect;
@@ -56,15 +58,15 @@ struct _p_SbModel {
   SbEffect *lists, *prescribe, *begin_step, *assemble_constraints, *update_active_set, *force, *tangent,
     *nonsymmetric, *accept, *history, *time_of_impact, *restitution, *potential;
   struct {
-    Vec U0, V0;     /* state when the step began; borrowed */
+    Vec U0, V0;     /* state at the start of the step; borrowed */
     PetscReal dt;   /* length of the step, s */
-    PetscReal left; /* of the coefficients of restitution in this step */
+    PetscReal left; /* factor on the coefficients of restitution in this step */
     int reductions;
-  } bounce;              /* src/model/restitution.c; only with effects that bounce */
+  } bounce;              /* src/model/restitution.c; only with restitution */
   PetscBool linear;      /* laws and effects: the tangent depends on the shifts only */
   PetscBool may_filter;  /* some law has the tangent auto */
-  PetscBool guard_apart; /* residuals that are solved leave guarded contact out: SbModelPotentialGradient() */
-  PetscReal guard_speed; /* by which tolerances of guarded contact are judged in the step, m/s; 0: static */
+  PetscBool guard_apart; /* residuals of solves leave barrier contact out: SbModelPotentialGradient() */
+  PetscReal guard_speed; /* scale of barrier contact's tolerances in the step, m/s; 0: static */
   PetscReal mass;        /* kg */
   PetscBool dynamic;
   PetscReal load; /* load factor, 0..1 in static runs: on loads and displacements whose formulas have no t */
@@ -75,7 +77,7 @@ PetscErrorCode SbModelDestroy(SbModel *model);
 PetscErrorCode SbModelSetUp(SbModel model);
 /* F = M a + C v + f_int(u) - f_ext(t, u, v); on prescribed unknowns zero when constrain, else the reaction. V, A may be NULL. Collective. */
 PetscErrorCode SbModelResidual(SbModel model, PetscReal t, Vec U, Vec V, Vec A, PetscBool constrain, Vec F);
-/* f_ext alone */
+/* F = f_ext, N. Collective. */
 PetscErrorCode SbModelLoads(SbModel model, PetscReal t, Vec U, Vec V, Vec F);
 /* A = shift_a M + shift_v C + shift_k K(u) and the effects' part, prescribed unknowns replaced. Collective. */
 PetscErrorCode SbModelTangent(SbModel model, PetscReal t, PetscReal shift_v, PetscReal shift_a,
@@ -90,12 +92,12 @@ PetscErrorCode SbModelNonsymmetric(SbModel model, PetscReal t, Vec U, Vec X, Vec
 PetscErrorCode SbModelPrescribe(SbModel model, PetscReal t, Vec U);
 /*
   Contact, for effects that have it (model->nbegin_step > 0). Begin: before the first solve of a step from t to t + dt, U0 and V0 (NULL in
-  a static run) at t, to stay as they are until the step ends; U, the guess at t + dt, is put where the constraints hold. Update: after a solve with the residual R without constraints; `again` when
-  what is constrained has changed: U is put there, and has to be solved for once more. Collective.
+  a static run) at t, unchanged until the step ends; U, the guess at t + dt, is projected onto the constraints. Update: after a solve with the residual R without constraints; `again`: the
+  active set has changed, U is projected onto the new constraints, and another solve is needed. Collective.
 */
 PetscErrorCode SbModelContactBeginStep(SbModel model, PetscReal t, PetscReal dt, Vec U0, Vec V0, Vec U);
 PetscErrorCode SbModelContactUpdateActiveSet(SbModel model, PetscReal t, Vec U, Vec R, PetscBool *again);
-/* After effects have loaded their state from a checkpoint: assembles the constraints of then, so that forces and reactions of that time are known.
+/* After effects have loaded their state from a checkpoint: assembles its constraints, for contact forces and reactions.
    Collective. */
 PetscErrorCode SbModelContactResume(SbModel model);
 /* After the first solve of a step: the fraction of the step at which the first point comes into contact, 1: none
@@ -109,13 +111,13 @@ PetscErrorCode SbModelContactGap(SbModel model, PetscReal t, Vec U, Vec G);
 /* F = contact forces on the nodes, N, after the step that ended at t with the displacement U, for which SbRunReactions() has been called.
    Collective. */
 PetscErrorCode SbModelContactForce(SbModel model, PetscReal t, Vec U, Vec F);
-/* Appends the points of this rank where contact pushes bodies, after the same step. Collective. */
+/* Appends the active contact points of this rank, after the same step. Collective. */
 PetscErrorCode SbModelContactPoints(SbModel model, PetscReal t, Vec U, SbContactPoints *list);
 /*
   Contact with a potential, response barrier, as Newton's method sees it: all effects that have it together, where model->npotential > 0; operations of the same names in sbeffect.h. Collective.
 
-  Start: a run begins with U, dt being the length of its first step; bodies that touch are moved apart whole. Begin: a step begins with U0, which is changed when the run begins
-  with surfaces that still touch. MaxStep: largest collision-free fraction of the way from X to X - Y over all ranks, by continuous
+  Start: a run begins with U, dt being the length of its first step; bodies that touch are moved apart rigidly. Begin: a step begins with U0, which is changed when the run begins
+  with surfaces that still touch. MaxStep: largest collision-free fraction of the motion from X to X - Y over all ranks, by continuous
   collision detection, and the number of active pairs. UpdateFriction: lagged friction and restitution from X, an iterate of the step or (solved) its solution; again: another solve is wanted. V0: velocities when the step begins, NULL without.
 */
 PetscErrorCode SbModelPotentialStart(SbModel model, PetscReal t, PetscReal dt, Vec U);
@@ -126,7 +128,7 @@ PetscErrorCode SbModelPotentialMaxStep(SbModel model, Vec X, Vec Y, PetscReal pr
 /* The closest pair in the last attempt at a step, in words, for the message of its failure. */
 PetscErrorCode SbModelPotentialNearest(SbModel model, size_t size, char text[]);
 PetscErrorCode SbModelPotentialUpdateFriction(SbModel model, Vec X, PetscBool solved, PetscBool *again);
-/* Of the last accepted step: what contact did to the bodies, J, and its forces taken out of those of SbModelLoads() at U, F, N. */
+/* Work of contact on the bodies in the last accepted step, J; F, N, from SbModelLoads() at U, less contact forces. */
 PetscErrorCode SbModelPotentialWork(SbModel model, Vec U, PetscReal *work, Vec F);
 /* F += scale times the gradient of the energy at U, N; free_only: not at prescribed unknowns. energy of all ranks, J (NULL: not wanted). */
 PetscErrorCode SbModelPotentialGradient(SbModel model, Vec U, PetscReal scale, PetscBool free_only,
@@ -148,10 +150,10 @@ PetscErrorCode SbModelEnergies(SbModel model, Vec U, Vec V, SbEnergies *e);
 /*
   SbModelStrainEnergy - strain energy at U, J, its gradient, the internal forces without damping, F[nnode][3] N, and how many tets are inverted there.
 
-  Collective. F: NULL where nobody asks for it.
+  Collective. F may be NULL.
 */
 PetscErrorCode SbModelStrainEnergy(SbModel model, Vec U, Vec F, PetscReal *psi, PetscInt *ninverted);
 /* For laws with -body_NAME_tangent auto: from now on tangents with each cell projected to positive semi-definite, or the exact ones. Not collective. */
 PetscErrorCode SbModelProjectTangent(SbModel model, PetscBool filter);
-/* Power taken by Rayleigh damping, v . C v, W. Collective. */
+/* Power dissipated by Rayleigh damping, v . C v, W. Collective. */
 PetscErrorCode SbModelDampingPower(SbModel model, Vec U, Vec V, PetscReal *power);

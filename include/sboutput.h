@@ -1,5 +1,5 @@
 /*
-  sboutput.h - layer 5: one folder per run. fields.h5 with its indices fields.vtkhdf and fields.xmf, history.csv, scenario.opts, run.json, checkpoints, progress.
+  sboutput.h - layer 7: one folder per run. fields.h5 with its indices fields.vtkhdf and fields.xmf, history.csv, scenario.opts, run.json, checkpoints, progress.
 
   Everything here attaches to a run as a monitor; what the scenario does not ask for is not attached. Order of calls:
   SbOutputRegister(), SbRunCreate(), SbOutputSetFromOptions(), SbOptionsCheck(), SbModelSetUp(), SbRunSetUp(),

@@ -1,5 +1,5 @@
 /*
-  sbremesh.h - layer 6: bodies get other meshes while a run goes on; who makes their tets.
+  sbremesh.h - layer 8: bodies get other meshes while a run goes on; who makes their tets.
 */
 #pragma once
 #include "sbledger.h"

@@ -1,5 +1,5 @@
 /*
-  sbscene.h - layer 6: from the command line and an option file to a model; the names of everything a scenario may use.
+  sbscene.h - layer 8: from the command line and an option file to a model; the names of everything a scenario may use.
 */
 #pragma once
 #include "sbledger.h"

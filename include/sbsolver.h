@@ -1,10 +1,10 @@
 /*
-  sbsolver.h - layer 2: linear solvers by name, and the choice of one by problem and rank count.
+  sbsolver.h - layer 4: linear solvers by name, and the choice of one by problem and rank count.
 */
 #pragma once
 #include "sbconstraint.h"
 
-/* A row of the solver table: a matrix type and PETSc options that are set where the user is silent. */
+/* A row of the solver table: a matrix type and default PETSc options. */
 typedef struct _SbSolverPreset {
   const char *name;
   SbMatrixKind matrix;                             /* on several ranks SBAIJ becomes BAIJ */
@@ -21,7 +21,7 @@ typedef struct _SbSolverPreset {
 PetscErrorCode SbSolverRegister(void);
 /* Reads -solver: "auto" or a name of the table. */
 PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size);
-/* The preset for `choice`; with "auto" by number of unknowns, ranks and law; for a -pc_type of the user's, a row that it works with. The reason in
+/* The preset for `choice`; with "auto" by number of unknowns, ranks and law; with -pc_type, a row whose matrix type it supports. The reason in
    words. Collective. */
 PetscErrorCode SbSolverChoose(SbSpace space, PetscBool dynamic, PetscBool linear, PetscBool explicit_run,
                               const char *choice, const SbSolverPreset **preset, char reason[], size_t size);
@@ -35,18 +35,18 @@ PetscErrorCode SbSolverChooseIndefinite(MPI_Comm comm, size_t size, char choice[
 */
 PetscErrorCode SbSolverCountNegativeEigenvalues(SNES snes, SbSpace space, PetscInt *negative);
 /*
-  SbSolverNextFallback - what to try after a solver that failed: first a factorisation, for large systems iterations first.
+  SbSolverNextFallback - the next solver after one that failed: first a factorisation, for large systems iterations first.
 
   Collective. Input: reason - why it failed; memory - for want of memory. In and out: tried, bits of the rows that failed in this run; preset,
   the one that failed, then the next one that this PETSc has and that can solve for the space, NULL when there is none.
 */
 PetscErrorCode SbSolverNextFallback(SbSpace space, KSPConvergedReason reason, PetscBool memory,
                                     uint32_t *tried, const SbSolverPreset **preset);
-/* Takes the row's options out of the database again, but for those with another value: they are the user's. Not collective. */
+/* Removes the row's options from the options database, unless their values differ: those are the user's. Not collective. */
 PetscErrorCode SbSolverClear(const SbSolverPreset *preset);
 /* Gives the linear solver of `snes` the preset's options and tolerances; before SNESSetFromOptions(). Collective. */
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace space, const SbSolverPreset *preset);
-/* A method for symmetric systems gives way to FGMRES while contact constraints slide with friction, and comes back after them. Collective; before
+/* Replaces a method for symmetric systems by FGMRES while nodes in contact slide with friction, and restores it after. Collective; before
    each solve. */
 PetscErrorCode SbSolverUpdateSymmetry(KSP ksp, SbSpace space);
 /* M of such a pc, else pc itself. Not collective. */
@@ -60,11 +60,10 @@ PetscErrorCode SbPCConstrainedIsFactored(PC pc, PetscBool *is);
 */
 PetscErrorCode SbSaddleChoose(SbSpace space, PetscBool dynamic, PetscInt choice, SbSaddle *saddle,
                               char reason[], size_t size);
-#define SB_DIRECT_SMALL \
-  30000 /* unknowns up to which one rank may factor for all, and beyond which auto does not */
+#define SB_DIRECT_SMALL 30000 /* largest number of unknowns for which auto lets one rank factor for all */
 /*
-  SbDirectPackage - the package of this PETSc that factors a symmetric matrix of so many unknowns soonest on the ranks of comm: one of PETSc's
-  MATSOLVER names, NULL without any; with -reproducible one that works on one rank. Indefinite ones need other packages than those that are positive definite. Not collective.
+  SbDirectPackage - the fastest factorisation package of this PETSc for a symmetric matrix of this many unknowns on the ranks of comm: one of PETSc's
+  MATSOLVER names, NULL without any; with -reproducible one that works on one rank. Indefinite matrices need other packages than positive definite ones. Not collective.
 */
 PetscErrorCode SbDirectPackage(MPI_Comm comm, PetscInt unknowns, PetscBool definite, const char **package);
 /*
@@ -75,8 +74,8 @@ PetscErrorCode SbDirectPackage(MPI_Comm comm, PetscInt unknowns, PetscBool defin
   PETSc's PCCHOLESKY or PCLU, with the prefix telescope_ where the matrix is gathered.
 */
 PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric);
-/* A Cholesky factorisation whose pivot is not positive is one that failed (KSP_DIVERGED_PC_FAILED), with CHOLMOD too and where it is gathered on
-   one rank; other types of pc are left alone. After PCSetFromOptions(). Not collective. */
+/* Makes non-positive pivots of a Cholesky factorisation fail the solve (KSP_DIVERGED_PC_FAILED), also with CHOLMOD and where it is gathered on
+   one rank; no effect on other types of pc. After PCSetFromOptions(). Not collective. */
 PetscErrorCode SbPCCheckPivots(PC pc);
 /*
   SbSolverFinish - the last set-up of the solver of `snes` after SNESSetFromOptions().
@@ -120,8 +119,8 @@ PetscErrorCode SbPCCoarseGetStats(PC pc, PetscInt *naggregate, PetscInt *nsolved
 PetscErrorCode SbPCPMultigridCreate(SbSpace space, PC pc);
 
 /*
-  SbPressureOperatorCreate - the tangent of a space with CR or DG bodies, its volumetric part apart, so that a large lambda
-  does no harm.
+  SbPressureOperatorCreate - the tangent of a space with CR or DG bodies, with its volumetric part stored separately, for nu
+  near 1/2.
 
   Collective, after SbSpacePrescribeDone(). K is a MATSHELL owned by the caller; the space is borrowed. It is filled by
   SbSpaceAssembleTangent() and SbSpaceFinishTangent() as a matrix is, and effects may add to it. Errors: PETSC_ERR_USER for a space
@@ -132,44 +131,44 @@ PetscErrorCode SbPressureOperatorCreate(SbSpace space, Mat *K);
 PetscErrorCode SbPCPressureGetStats(PC pc, PetscInt *nsolve, PetscInt *total, PetscInt *most);
 
 /*
-  SbPCRotatedCreate - makes pc a preconditioner that factors seldom: P = Q A0 Q^T, A0 a past operator, Q its nodes' rotations since.
+  SbPCRotatedCreate - makes pc a preconditioner with a reused factorisation: P = Q A0 Q^T, A0 a past operator, Q the nodes' rotations since.
 
   Collective. The operator is a matrix-free operator, or an assembled matrix of the space on which the displacement
   belonging to it is composed as "sb_state" (PetscObjectCompose() with a vector of SbSpaceCreateVec()). One factorisation lasts
   as long as the iterations stay low; it is renewed at the next change of the operator when they do not, when the solver
   fails, or when SbPCRotatedRenew() is called.
-  Options read: -pc_rotated_spread (rad), from which angle on between a cell and its node the node is solved exactly.
+  Options read: -pc_rotated_spread (rad), the angle between a cell's and its node's rotation above which the node is solved exactly.
   Memory: besides the factor 72 n^2 bytes on each rank during a factorisation, with n of SbSpaceInterfaceSize(); 9 n^2 of all ranks
   together stay. An operator that is not positive definite fails the solve.
 */
 PetscErrorCode SbPCRotatedCreate(SbSpace space, PC pc);
 PetscErrorCode SbPCRotatedRenew(PC pc);
 /*
-  SbSpaceInterfaceSize - nodes at which the parts of the ranks meet, n, and how many of them a factor that turns takes, most.
+  SbSpaceInterfaceSize - number n of interface nodes between ranks, and the largest, most, for which -solver rotated works.
 
   Collective; prescribed unknowns are known. Makes the plan of the space. Options read: -pc_rotated_interface (1500).
 */
 PetscErrorCode SbSpaceInterfaceSize(SbSpace space, PetscInt *n, PetscInt *most);
 /* Factorisations so far, nodes solved exactly at present (this rank), entries of the factor (this rank). Outputs may be NULL. */
 PetscErrorCode SbPCRotatedGetStats(PC pc, PetscInt *nfactor, PetscInt *nexact, PetscInt64 *entries);
-/* What one application reads on this rank, bytes: the factor of its interior, twice, and its rows of the interface's; 0 before the
+/* Bytes that one application reads on this rank: the factor of its interior, twice, and its rows of the interface's; 0 before the
    factorisation. nface: nodes of the interface. Outputs may be NULL. Not collective. */
 PetscErrorCode SbPCRotatedGetWork(PC pc, PetscInt64 *interior, PetscInt64 *interface, PetscInt *nface);
 
-/* The operator of solves: `whole`, which is K or K with what it lacks, its springs, projected. singular: K may be so, because only constraints support some body: it is made regular for
-   preconditioners, but for the operator; SB_SADDLE_DIRECT needs none of that. Collective; the caller destroys it; K and `whole` are borrowed until then. */
+/* The operator of solves: `whole`, the complete tangent, plus springs, projected onto the constraints. singular: K may be, if only constraints support some body: it is regularised for
+   preconditioners, not for the operator; SB_SADDLE_DIRECT needs none of that. Collective; the caller destroys it; K and `whole` are borrowed until then. */
 PetscErrorCode SbConstraintsCreateOperator(SbSpace space, Mat K, Mat whole, PetscBool singular,
                                            SbSaddle saddle, Mat *A);
 
 /* ------------------------------------------------------------------ contact_system.c: a tangent with blocks between any nodes */
 
-/* 3x3 blocks between owned nodes and any nodes, best row by row; start with {0}, released with SbBlocksFree(). Several of one place are added. */
+/* 3x3 blocks, rows of owned nodes, columns of any nodes, best in row order; start with {0}, released with SbBlocksFree(). Duplicates are summed. */
 typedef struct {
   PetscInt n, size;
   PetscInt (*node)[2];   /* [n] owned local node, global node */
   PetscReal (*block)[9]; /* [n] row-major, N/m */
 } SbBlocks;
-/* Room for `more` blocks behind the n that there are. */
+/* Reserves memory for `more` further blocks. */
 PetscErrorCode SbBlocksReserve(SbBlocks *blocks, PetscInt more);
 PetscErrorCode SbBlocksFree(SbBlocks *blocks);
 typedef struct _p_SbContactSystem *SbContactSystem;
@@ -179,10 +178,10 @@ PetscErrorCode SbContactSystemCreate(SbSpace space, PetscInt choice, SbContactSy
 PetscErrorCode SbContactSystemDescribe(PetscInt choice, char text[], size_t size);
 PetscErrorCode SbContactSystemDestroy(SbContactSystem *system);
 /*
-  SbContactSystemSolve - Y = (K + blocks)^-1 F. The places of the blocks may be others each time.
+  SbContactSystemSolve - Y = (K + blocks)^-1 F. The sparsity of the blocks may change with each call.
 
   Collective. Input: K, the tangent of the space, prescribed unknowns replaced; blocks, symmetric when those of all ranks are taken together, none for prescribed unknowns;
-  fresh, K or blocks are others than in the last call. Output: reason, negative where the matrix is not positive definite; iterations.
+  fresh, K or blocks have changed since the last call. Output: reason, negative where the matrix is not positive definite; iterations.
 */
 PetscErrorCode SbContactSystemSolve(SbContactSystem system, Mat K, const SbBlocks *blocks, PetscBool fresh,
                                     Vec F, Vec Y, KSPConvergedReason *reason, PetscInt *iterations);

@@ -1,5 +1,5 @@
 /*
-  sbsurface.h - layer 1: closed surfaces of triangles and the tets that fill them. Rank 0 only.
+  sbsurface.h - layer 2: closed surfaces of triangles and the tets that fill them. Rank 0 only.
 */
 #pragma once
 #include "sbmeshio.h"

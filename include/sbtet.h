@@ -1,5 +1,5 @@
 /*
-  sbtet.h - layer 1: tets as plain arrays on one rank: their faces, their shape, which one holds a point. Not collective throughout.
+  sbtet.h - layer 2: tets as plain arrays on one rank: their faces, their shape, which one holds a point. Not collective throughout.
 */
 #pragma once
 #include "sbmeshio.h"

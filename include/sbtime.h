@@ -1,5 +1,5 @@
 /*
-  sbtime.h - layer 5: presets of the integrators, the second-order TSType, what happens around each step.
+  sbtime.h - layer 7: presets of the integrators, the second-order TSType, steps and their monitors.
 */
 #pragma once
 #include "sbmodel.h"
@@ -22,13 +22,13 @@ typedef struct {
   PetscReal t_end;
   PetscInt step_end; /* last step if it is known from dt, else -1 */
   Vec U, V, A;       /* V, A NULL in a static run */
-  Vec R; /* residual without constraints: reactions on prescribed unknowns; NULL unless somebody asked */
+  Vec R; /* residual without constraints: reactions on prescribed unknowns; NULL unless SbRun.want_residual */
   SbEnergies energies;     /* filled when some monitor needs them (SbRun.want_energies) */
   PetscInt newton, linear; /* iterations of this step */
   PetscInt rejected;       /* rejected attempts, this step */
   PetscReal wall;          /* seconds since the time loop began */
   PetscBool last;
-  PetscBool again; /* it was seen before, and turned out to be the last one: the next one was given up */
+  PetscBool again; /* repeated call: the step was the last one, as the next one failed */
 } SbStep;
 
 typedef struct _p_SbRun *SbRun;
@@ -53,14 +53,14 @@ typedef struct {
   const PetscReal *value; /* borrowed */
 } SbColumn;
 
-/* A number that a checkpoint carries over a restart; the same on all ranks. Names begin with who asks for it. */
+/* A number that is saved in checkpoints; the same on all ranks. Names begin with the owner's. */
 typedef struct {
   char name[SB_NAME_MAX];
   PetscReal *value; /* borrowed */
 } SbCheckpointValue;
 
 typedef PetscErrorCode (*SbMonitorFn)(SbRun run, const SbStep *step, void *ctx);
-/* After a step that ended at t was solved and before monitors see it: whether the time loop is to come back then. Collective. */
+/* After the solve of a step that ended at t, before monitors: whether SbRunSolve() returns after this step. Collective. */
 typedef PetscErrorCode (*SbPauseFn)(SbRun run, PetscInt step, PetscReal t, PetscReal dt, void *ctx,
                                     PetscBool *pause);
 
@@ -68,93 +68,96 @@ typedef PetscErrorCode (*SbPauseFn)(SbRun run, PetscInt step, PetscReal t, Petsc
 struct _p_SbRun {
   SbModel model; /* borrowed */
   SbIntegrator preset;
-  TS ts;           /* NULL in a static run */
-  SNES snes;       /* of the TS, or own in a static run; borrowed from ts when there is one */
-  Mat J, operator; /* tangent; what solves see of it: J itself, its projection (sbfem.h, SbConstraints), or
-                     with what it lacks (SbModelNonsymmetric()) */
-  Mat whole;       /* what constraints project beside the matrix: J with what it lacks; NULL without such */
+  TS ts;     /* NULL in a static run */
+  SNES snes; /* of the TS, or own in a static run; borrowed from ts when there is one */
+  Mat J,
+  operator;  /* tangent; operator of linear solves: J itself, its projection (sbfem.h, SbConstraints), or
+                     J plus SbModelNonsymmetric() */
+  Mat whole; /* the operator that constraints project: J plus SbModelNonsymmetric(); NULL: J is complete */
   struct {
-    Vec U, x, y; /* displacement of J; factor and product; NULL where J lacks nothing */
+    Vec U, x, y; /* displacement of J; factor and product; NULL where J is complete */
     PetscReal t; /* J's time or load factor */
   } nonsymmetric;
   Vec U, V, A;            /* A: acceleration of the last step, state of the integrator */
   Vec R;                  /* residual for contact; NULL without */
-  Vec guard_start;        /* guarded contact: displacement when the attempt at a step began; borrowed */
+  Vec guard_start;        /* barrier contact: displacement at the start of the step; borrowed */
   PetscReal guard_dt;     /* its length, s */
-  PetscReal guard_weight; /* of its forces at the end of a step in the residual that is solved */
+  PetscReal guard_weight; /* weight of its end-of-step forces in the residual of the solve */
   Vec stage,
     stage_start; /* where the integrator evaluates forces, stage_start + stage_part (X - stage_start), in a solve for X; NULL: at X */
   PetscReal stage_part;
   PetscBool dt_given, velocity_predictor, fixed_step, damped;
-  PetscBool reject_inverted, rejected_inverted; /* steps that invert tets; the last attempt was such a one */
+  PetscBool reject_inverted, rejected_inverted; /* -time_inverted; the last attempt was rejected by it */
   PetscBool may_end_at_impact;                  /* this attempt may end where points come into contact */
-  PetscInt contact_round;                       /* solves of this step for who touches, 0: without contact */
-  PetscBool shortened;                          /* it was said that steps had to be much shorter */
-  PetscReal time_of_impact;                     /* the part of the step at which it did, 1: it did not */
+  PetscInt contact_round;                       /* active-set iterations of this step, 0: without contact */
+  PetscBool shortened;                          /* the warning of much shorter steps was given */
+  PetscReal time_of_impact;                     /* fraction of the step at which it ended, 1: it did not */
   PetscReal spectral_radius, newmark[2];        /* newmark: beta, gamma */
   PetscInt max_halvings, static_steps;
-  PetscBool goes_on;       /* a solve from another one's solution, to that one's tolerance */
+  PetscBool goes_on;       /* a solve that starts from the last one's solution, with its tolerance */
   PetscReal min_increment; /* static: smallest load increment as a part of 1 / static_steps */
   PetscReal softening;     /* static: |du|/dlambda of the last step over that of the slowest; 0: none */
   struct {
     PetscBool on;   /* static: steps along the path of equilibria, with the load factor as an unknown */
-    PetscInt steps; /* at most so many */
-    PetscReal longest, first; /* longest step as a multiple of the first, and that one, m; 0: not known */
-    PetscReal displacement;   /* at which the path ends, m; 0: at none */
+    PetscInt steps; /* largest number */
+    PetscReal longest,
+      first; /* longest step as a multiple of the first; length of the first, m, 0: not known */
+    PetscReal displacement; /* -static_max_displacement, m; 0: no limit */
   } arc;
-  Vec path; /* with arc.on the last step's displacement, as long as the next step; zero at the start */
-  PetscInt bifurcations;   /* that a factorisation has shown */
-  PetscBool free_body;     /* static, without contact: nothing holds some body; no shorter load steps */
+  Vec path; /* with arc.on: direction of the last step, scaled to the next step's length; zero at the start */
+  PetscInt bifurcations; /* number detected by changes of negative pivots */
+  PetscBool free_body;   /* static, without contact: some body can move rigidly; load steps are not halved */
   PetscBool tangent_known; /* J holds the tangent for shift_v, shift_a */
   PetscReal shift_v, shift_a;
   PetscBool saddle;        /* some effect asks for multipliers as unknowns */
   PetscInt saddle_choice;  /* -saddle_solver: 0 by size, 1 direct, 2 iterative */
   PetscInt contact_choice; /* -contact_solver: likewise */
   SbSaddle saddle_used;
-  char solver_choice[SB_NAME_MAX]; /* as the scenario says: "auto" or a name */
+  char solver_choice[SB_NAME_MAX]; /* -solver: "auto" or a name */
   const struct _SbSolverPreset *solver_used;
-  char solver[SB_NAME_MAX];       /* preset chosen, "cg_gamg"; with -pc_type what solves, "cg, gamg" */
-  char solver_parts[SB_NAME_MAX]; /* what solves at first, "cg, cholesky of mumps"; "" without systems */
+  char solver[SB_NAME_MAX]; /* preset chosen, "cg_gamg"; with -pc_type its methods, "cg, gamg" */
+  char
+    solver_parts[SB_NAME_MAX]; /* methods at the start, "cg, cholesky of mumps"; "" without linear systems */
   char solver_reason[256];
-  struct _p_SbSolverList *solver_list; /* what happens when it fails (solver_list.c); NULL without systems */
+  struct _p_SbSolverList *solver_list; /* fallbacks (solver_list.c); NULL without linear systems */
   PetscInt nmonitor;
   struct {
     SbMonitorFn fn;
     void *ctx;
   } monitor[8];
   struct {
-    SbStepSolvedFn fn; /* examines each step that was solved; NULL: nobody does */
+    SbStepSolvedFn fn; /* called after each solve of a step; NULL: none */
     void *ctx;
-    /* error of the step that was just solved over what is allowed, which falls with the power `order` of its length, for adaptive steps;
+    /* error of the step over the allowed one, proportional to its length to the power `order`, for adaptive steps;
        NULL: displacements are compared with -ts_atol */
     PetscErrorCode (*error)(SbRun run, const SbSolvedStep *step, void *ctx, PetscInt *order,
                             PetscReal *ratio);
   } post_solve;
   struct {
-    SbPauseFn fn; /* asked after each step; NULL: nobody asks */
-    PetscReal dt; /* of the step asked about last; of a restart from a pause; else 0 */
+    SbPauseFn fn; /* called after each step; NULL: none */
+    PetscReal dt; /* length of the last step that it was called for, or of a restart from a pause; else 0 */
     void *ctx;
   } after;
   struct {
-    PetscBool listens;                      /* somebody may ask the run to stop */
-    PetscReal wall_time, grace;             /* s; 0: no such limit; that a step has after a signal */
+    PetscBool listens;                      /* signals are caught, or there is a wall time limit */
+    PetscReal wall_time, grace;             /* s, 0: no limit; time for the current step after a signal */
     PetscReal begun;                        /* MPI_Wtime() when options were read */
     PetscReal step_begun;                   /* likewise of the step */
-    PetscReal longest_step, longest_output; /* s, of late; of what monitors write after a step */
+    PetscReal longest_step, longest_output; /* s, recent maxima: of a step, and of the output after it */
   } stop;
-  PetscBool stopped; /* the run ends because it was asked to, and can go on; stop_reason says who */
-  SbStep seen;       /* what monitors saw last */
-  PetscBool paused;  /* SbRunSolve() came back because of that; nothing has ended */
+  PetscBool stopped; /* the run was asked to end, and can be restarted; why: stop_reason */
+  SbStep seen;       /* last argument of monitors */
+  PetscBool paused;  /* SbRunSolve() returned by `after`; the run continues */
   PetscInt ncolumn;
   const SbColumn *column; /* [ncolumn] of history.csv; borrowed */
   PetscInt ncarried;
   const SbCheckpointValue *carried; /* [ncarried] in checkpoints; borrowed */
-  /* values[ncell_owned] = energy of the error of space discretisation per rest volume, J/m^3; NULL: nobody estimates it. Collective. */
+  /* values[ncell_owned] = energy of the error of space discretisation per rest volume, J/m^3; NULL: no estimate. Collective. */
   PetscErrorCode (*cell_error)(SbRun run, const SbStep *step, PetscReal values[]);
   PetscBool want_energies, want_residual;
   SbEnergies energies;    /* running totals of work and dissipation */
   PetscReal energy_most;  /* the largest kinetic + strain so far (kept over restarts), J */
-  PetscBool gain_said;    /* that the integrator is unstable */
+  PetscBool gain_said;    /* the warning of an unstable integrator was given */
   PetscReal energy_start; /* kinetic + strain at the start of the run (kept over restarts), J */
   PetscInt step0;         /* first step and time when restarted */
   PetscReal t0;
@@ -162,28 +165,27 @@ struct _p_SbRun {
   PetscReal t_now;
   PetscInt newton_total, linear_total, rejected_total, steps_total;
   PetscReal good_steps; /* dynamic: steps accepted since one was shortened, or they became longer again */
-  PetscInt newton_before, linear_before; /* of the runs that this one goes on from */
+  PetscInt newton_before, linear_before; /* of the runs before a re-meshing */
   PetscReal wall_start, seconds_solve;
   PetscReal dt, t_end; /* length of a step (the first one when adaptive) and end, s */
   PetscInt newton_step, linear_step, rejected_step; /* iterations and rejections of the current step */
   PetscInt rejected_seen;
   Vec loads, reaction,
-    previous; /* f_ext and residual at the last step, its displacement: for works; only with want_energies */
-  PetscReal damping_power; /* at the last step, W */
-  char stop_reason[1024];  /* why the run ended early; empty when it reached its end */
-  void *output;            /* what src/output keeps for this run; NULL when no output was asked for */
+    previous; /* f_ext, residual and displacement of the last step, for works; only with want_energies */
+  PetscReal damping_power;                     /* at the last step, W */
+  char stop_reason[1024];                      /* why the run ended early; empty when it reached its end */
+  void *output;                                /* data of src/output; NULL without output */
   PetscErrorCode (*output_destroy)(SbRun run); /* frees it; called by SbRunDestroy() when not NULL */
 };
 
 /*
-  SbRunLocalError - what one step of the integrator of a dynamic run loses, for small steps: in the norm of the energy c h^(p+1)
-  |d^(p+1) (u, v) / dt^(p+1)|.
+  SbRunLocalError - local truncation error of the integrator: in the energy norm c h^(p+1) |d^(p+1) (u, v) / dt^(p+1)| for small steps h.
 
-  Not collective. Output: order p and constant c, from the eigenvalue of the method for an undamped oscillator; `ahead`, the time in lengths of a
-  step by which symplectic Euler's velocities are behind, whose error does not add up; 0 for the others.
+  Not collective. Output: order p and constant c, from the eigenvalue of the method for an undamped oscillator; `ahead`: time, in steps, by which
+  symplectic Euler's velocities lag, an error that does not accumulate; 0 for the others.
 */
 void SbRunLocalError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead);
-/* X = (K + H)^-1 B with the tangent K of the last direction of Newton's method and the second derivative H of guarded contact, where surfaces pushed each other there (solved). Collective. */
+/* X = (K + H)^-1 B with the tangent K of Newton's last iteration and the Hessian H of barrier contact; solved: false without contact. Collective. */
 PetscErrorCode SbRunSolveTangent(SbRun run, Vec B, Vec X, PetscInt *iterations, PetscBool *solved);
 PetscErrorCode SbTimeRegister(void); /* option rows and the TSType */
 PetscErrorCode SbRunCreate(SbModel model,
@@ -191,19 +193,19 @@ PetscErrorCode SbRunCreate(SbModel model,
 PetscErrorCode
 SbRunSetUp(SbRun run); /* after SbModelSetUp(): vectors, matrix, solver, integrator. Collective */
 PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx);
-/* From now on SIGTERM, SIGINT and SIGUSR1 end the run after its step: SbRun.stopped. A second SIGINT ends the process. Of one run at a time. */
+/* From now on SIGTERM, SIGINT and SIGUSR1 end the run after its step: SbRun.stopped. A second SIGINT ends the process. One run at a time. */
 PetscErrorCode SbRunCatchSignals(SbRun run);
 /* After SbRunSetUp(). */
 void SbRunSetPause(SbRun run, SbPauseFn fn, void *ctx);
 /*
-  SbRunTransferState - `to` goes on where `from` has come to, on another model of the same scene. Collective.
+  SbRunTransferState - continues the run `from` as the run `to` of a re-meshed model. Collective.
 
   After SbRunSetUp(to), before monitors are added. Takes over totals, work and dissipation, the step and its time, and lengths of steps; with explicit
   integrators that is the stable one of the new model, unless it was given. U, V and A are the caller's to fill.
 */
 PetscErrorCode SbRunTransferState(SbRun from, SbRun to);
-/* A <- the acceleration with which the integrator goes on at t_now from U and V: where it takes the one of the residual, that one; but A stays
-   as it is where displacements are prescribed, and with integrators that keep their own. Collective. */
+/* Recomputes the acceleration A at t_now from U and V by the residual. Unchanged at prescribed displacements, and with integrators whose
+   acceleration is a history variable. Collective. */
 PetscErrorCode SbRunRestartAcceleration(SbRun run);
 PetscErrorCode SbRunSolve(
   SbRun run); /* the whole time loop or load path; an early end is in run->stop_reason, not an error */

@@ -1,5 +1,5 @@
 /*
-  sbtriangles.h - layer 1: a closed surface of triangles from a file, as a rigid obstacle.
+  sbtriangles.h - layer 2: a closed surface of triangles from a file, as a rigid obstacle.
 */
 #pragma once
 #include "sbmesh.h"
