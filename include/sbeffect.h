@@ -89,9 +89,9 @@ typedef struct {
 
     touching      - at the start t of a run, with first step length dt: adds this rank's pairs whose gap at the local displacements u is too small, or little
                     larger. first: it was the first step, alike on all ranks; else nothing was done.
-    begin_guarded - a step from t to t + dt begins with the local displacements u0, and the speed of potential.c, m/s; at the start of the run they may be changed (moved), ghosts too, where surfaces
+    begin_barrier - a step from t to t + dt begins with the local displacements u0, and the speed of potential.c, m/s; at the start of the run they may be changed (moved), ghosts too, where surfaces
                     touch. Prescribed motions are at t: `progress` 0.
-    meet          - after begin_guarded, for effects with restitution: finds the impacts of the step, from the local displacements u0 and velocities v0 at its start.
+    meet          - after begin_barrier, for effects with restitution: finds the impacts of the step, from the local displacements u0 and velocities v0 at its start.
     advance       - moves obstacles to the fraction `progress` of their path from t to t + dt, 0..1. Not collective.
     safe          - part: largest collision-free fraction of the motion from the local displacements u0 to u1, and from the present progress to `progress`, for this
                     rank's pairs; nactive: this rank's active pairs at u0.
@@ -108,7 +108,7 @@ typedef struct {
   */
   PetscErrorCode (*touching)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, const PetscReal u[],
                              PetscBool *first, SbInitialContacts *list);
-  PetscErrorCode (*begin_guarded)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, PetscReal speed,
+  PetscErrorCode (*begin_barrier)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, PetscReal speed,
                                   PetscReal u0[], PetscBool *moved);
   PetscErrorCode (*meet)(SbEffect e, SbSpace space, PetscReal dt, const PetscReal u0[], const PetscReal v0[]);
   PetscErrorCode (*advance)(SbEffect e, PetscReal progress);

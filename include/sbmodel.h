@@ -62,12 +62,12 @@ struct _p_SbModel {
     PetscReal dt;   /* length of the step, s */
     PetscReal left; /* factor on the coefficients of restitution in this step */
     int reductions;
-  } bounce;              /* src/model/restitution.c; only with restitution */
-  PetscBool linear;      /* laws and effects: the tangent depends on the shifts only */
-  PetscBool may_filter;  /* some law has the tangent auto */
-  PetscBool guard_apart; /* residuals of solves leave barrier contact out: SbModelPotentialGradient() */
-  PetscReal guard_speed; /* scale of barrier contact's tolerances in the step, m/s; 0: static */
-  PetscReal mass;        /* kg */
+  } bounce;                /* src/model/restitution.c; only with restitution */
+  PetscBool linear;        /* laws and effects: the tangent depends on the shifts only */
+  PetscBool may_filter;    /* some law has the tangent auto */
+  PetscBool barrier_apart; /* residuals of solves leave barrier contact out: SbModelPotentialGradient() */
+  PetscReal barrier_speed; /* scale of barrier contact's tolerances in the step, m/s; 0: static */
+  PetscReal mass;          /* kg */
   PetscBool dynamic;
   PetscReal load; /* load factor, 0..1 in static runs: on loads and displacements whose formulas have no t */
 };

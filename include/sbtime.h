@@ -78,11 +78,11 @@ struct _p_SbRun {
     Vec U, x, y; /* displacement of J; factor and product; NULL where J is complete */
     PetscReal t; /* J's time or load factor */
   } nonsymmetric;
-  Vec U, V, A;            /* A: acceleration of the last step, state of the integrator */
-  Vec R;                  /* residual for contact; NULL without */
-  Vec guard_start;        /* barrier contact: displacement at the start of the step; borrowed */
-  PetscReal guard_dt;     /* its length, s */
-  PetscReal guard_weight; /* weight of its end-of-step forces in the residual of the solve */
+  Vec U, V, A;              /* A: acceleration of the last step, state of the integrator */
+  Vec R;                    /* residual for contact; NULL without */
+  Vec barrier_start;        /* barrier contact: displacement at the start of the step; borrowed */
+  PetscReal barrier_dt;     /* its length, s */
+  PetscReal barrier_weight; /* weight of its end-of-step forces in the residual of the solve */
   Vec stage,
     stage_start; /* where the integrator evaluates forces, stage_start + stage_part (X - stage_start), in a solve for X; NULL: at X */
   PetscReal stage_part;

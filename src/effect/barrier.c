@@ -672,7 +672,7 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrier
                   .setup = setup_barrier,
                   .force = SbEffectForce_Barrier,
                   .touching = touching_barrier,
-                  .begin_guarded = begin_barrier,
+                  .begin_barrier = begin_barrier,
                   .safe = safe_barrier,
                   .advance = advance_barrier,
                   .lag = lag_barrier,

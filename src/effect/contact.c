@@ -113,7 +113,7 @@ static PetscErrorCode examine(const char *name, Needs *needs)
 /* The response of an effect; why: the effect leaves the choice, NULL: it does not. */
 static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
 {
-  PetscBool guarded = PETSC_TRUE;
+  PetscBool possible = PETSC_TRUE;
   PetscInt n = 0, method;
   char(*names)[SB_NAME_MAX] = NULL;
   SbResponse other = AUTO;
@@ -133,7 +133,7 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
   /* the integrator, where the program has one */
   if (SbOptionExists(&SbRunScope, "time")) {
     PetscCall(SbOptionChoice(&SbRunScope, "time", &method));
-    guarded = (PetscBool)(method == 0 || method == 6); /* euler_implicit, static */
+    possible = (PetscBool)(method == 0 || method == 6); /* euler_implicit, static */
   }
 
   /* the other effects */
@@ -158,15 +158,15 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
     *why = "bodies meet each other";
   } else if (other != AUTO) {
     *response = other == BARRIER ? BARRIER : PROJECTED;
-    *why = "as another effect has it";
-  } else if (!guarded || needs.others || needs.vertices) {
+    *why = "the same as another effect";
+  } else if (!possible || needs.others || needs.vertices) {
     *response = PROJECTED;
-    *why = !guarded       ? "-time"
-           : needs.others ? "an option that barrier has not"
+    *why = !possible      ? "-time"
+           : needs.others ? "an option that barrier lacks"
                           : "half-spaces and bowls only";
   } else {
     *response = BARRIER;
-    *why = "surfaces, edges and corners meet";
+    *why = "edges and corners may touch";
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -89,7 +89,7 @@ PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolvedStep *step);
 PetscErrorCode SbEstimateRounding(SbLedger l, PetscReal t, Vec U, PetscReal *error);
 /* estimate_contact.c: J^(1/2). Collective. */
 PetscErrorCode SbEstimateContact(SbLedger l, const SbStep *step, PetscReal *error);
-/* What the gaps of guarded contact at U are in error by, or a bound of it that is less than `enough`, J^(1/2). Collective. */
+/* What the gaps of barrier contact at U are in error by, or a bound of it that is less than `enough`, J^(1/2). Collective. */
 PetscErrorCode SbEstimateGaps(SbLedger l, Vec U, PetscReal enough, PetscReal *error);
 
 /* adaptive_tolerance.c */

@@ -240,7 +240,7 @@ PetscErrorCode SbModelResidual(SbModel m, PetscReal t, Vec U, Vec V, Vec A, Pets
   PetscFunctionBeginUser;
   PetscCall(stage_begin(m, t, U, V, A, &stage));
   PetscCall(SbSpaceGetLocalWrite(m->space, F, &f));
-  PetscCall(SbModelExternalForces(m, &stage, (PetscBool)(constrain && m->guard_apart), -1., f));
+  PetscCall(SbModelExternalForces(m, &stage, (PetscBool)(constrain && m->barrier_apart), -1., f));
   PetscCall(SbSpaceAddInternalForce(m->space, &stage, f));
   if (A || V) SbSpaceAddInertia(m->space, &stage, f);
   if (constrain) constrain_residual(m->space, f);

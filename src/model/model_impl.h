@@ -8,6 +8,6 @@
    coefficients had to be reduced. Collective. */
 void SbModelRestitutionBegin(SbModel model, PetscReal dt, Vec U0, Vec V0);
 PetscErrorCode SbModelRestitutionUpdate(SbModel model, Vec U, PetscBool *again);
-/* model.c: f[nnode][3] = sign * f_ext, N; apart: without guarded contact. Not collective. */
+/* model.c: f[nnode][3] = sign * f_ext, N; apart: without barrier contact. Not collective. */
 PetscErrorCode SbModelExternalForces(SbModel model, const SbStage *stage, PetscBool apart, PetscReal sign,
                                      PetscReal f[]);

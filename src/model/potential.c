@@ -216,7 +216,7 @@ PetscErrorCode SbModelPotentialStart(SbModel m, PetscReal t, PetscReal dt, Vec U
 }
 
 /*
-  The speed V of a step from t to t + dt, m/s, by which tolerances of guarded contact are judged in any units: m V^2 / 2 is the energy that bodies of the mass m have when it begins,
+  The speed V of a step from t to t + dt, m/s, by which tolerances of barrier contact are judged in any units: m V^2 / 2 is the energy that bodies of the mass m have when it begins,
   of motion and of strain, and half of what all loads and supports together do over the size of the smallest body.
 */
 static PetscErrorCode step_speed(SbModel m, PetscReal t, PetscReal dt, Vec U, Vec V, PetscReal *speed)
@@ -258,13 +258,13 @@ PetscErrorCode SbModelPotentialBegin(SbModel m, PetscReal t, PetscReal dt, Vec U
   Vec local;
 
   PetscFunctionBeginUser;
-  m->guard_speed = 0.;
-  if (V0) PetscCall(step_speed(m, t, dt, U0, V0, &m->guard_speed));
+  m->barrier_speed = 0.;
+  if (V0) PetscCall(step_speed(m, t, dt, U0, V0, &m->barrier_speed));
   PetscCall(open_state(m, U0, &local, &u));
   for (PetscInt e = 0; e < m->npotential; e++) {
     PetscBool mine;
 
-    CONTACT_CALL(m->potential[e], begin_guarded, m->space, t, dt, m->guard_speed, u, &mine);
+    CONTACT_CALL(m->potential[e], begin_barrier, m->space, t, dt, m->barrier_speed, u, &mine);
     moved = (PetscBool)(moved || mine);
   }
   PetscCall(close_state(m, U0, moved, &local, &u));

@@ -122,11 +122,11 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
   SbRun r;
   SbScope scope;
   PetscInt preset, predictor, inverted, control;
-  PetscBool guarded = PETSC_FALSE;
+  PetscBool barrier = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&r));
-  r->guard_weight = 1.;
+  r->barrier_weight = 1.;
   r->model = model;
   PetscCall(SbScopeSet(&scope, "", "", ""));
   PetscCall(SbOptionChoice(&scope, "time", &preset));
@@ -172,8 +172,8 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
     r->saddle = (PetscBool)(r->saddle || model->effect[e]->saddle);
   if (r->saddle) PetscCall(SbOptionChoice(&scope, "saddle_solver", &r->saddle_choice));
   for (PetscInt e = 0; e < model->neffect; e++)
-    guarded = (PetscBool)(guarded || model->effect[e]->ops.hessian);
-  if (guarded) PetscCall(SbOptionChoice(&scope, "contact_solver", &r->contact_choice));
+    barrier = (PetscBool)(barrier || model->effect[e]->ops.hessian);
+  if (barrier) PetscCall(SbOptionChoice(&scope, "contact_solver", &r->contact_choice));
   PetscCall(SbSolverSetFromOptions(r->solver_choice, sizeof(r->solver_choice)));
   if (r->arc.on) PetscCall(read_arc_length(r, &scope));
   *run = r;
@@ -419,15 +419,15 @@ static PetscErrorCode set_up_ts(SbRun run)
   PetscCall(TSGetAdapt(run->ts, &adapt));
   PetscCall(PetscObjectTypeCompare((PetscObject)adapt, TSADAPTNONE, &run->fixed_step));
   method_settings(run, &settings);
-  run->model->guard_apart = (PetscBool)(m->npotential && run->preset != SB_TIME_EULER_IMPLICIT);
-  if (run->model->guard_apart)
-    run->guard_weight = settings.separate ? 0.5 / settings.beta : 1. / settings.alpha_f;
+  run->model->barrier_apart = (PetscBool)(m->npotential && run->preset != SB_TIME_EULER_IMPLICIT);
+  if (run->model->barrier_apart)
+    run->barrier_weight = settings.separate ? 0.5 / settings.beta : 1. / settings.alpha_f;
   if (run->preset != SB_TIME_ALPHA2) SbSecondOrderSet(run->ts, run, &settings);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What guarded contact needs: a potential, our own Newton method, and no other contact, which knows of no guard. */
-static PetscErrorCode check_guarded(SbRun run)
+/* What barrier contact needs: a potential, our own Newton method, and no contact with another response. */
+static PetscErrorCode check_barrier(SbRun run)
 {
   const SbModel m = run->model;
   const char *name = m->potential[0]->name;
@@ -463,7 +463,7 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
     PetscCheck(!m->effect[e]->euler || run->preset == SB_TIME_EULER_IMPLICIT, m->comm, PETSC_ERR_USER_INPUT,
                "-effect_%s_restitution needs -time euler_implicit, whose velocities are those of a step",
                m->effect[e]->name);
-  if (m->npotential) PetscCall(check_guarded(run));
+  if (m->npotential) PetscCall(check_barrier(run));
   if (!m->nbegin_step) PetscFunctionReturn(PETSC_SUCCESS);
   name = m->begin_step[0]->name;
   PetscCheck(

@@ -138,8 +138,8 @@ static PetscErrorCode evaluate(Newton *n, Iterate *at)
   if (run->model->npotential) {
     PetscCall(VecZeroEntries(at->contact));
     PetscCall(
-      SbModelPotentialGradient(run->model, at->x, run->guard_weight, PETSC_TRUE, &energy, at->contact));
-    at->gaps = run->guard_weight * energy;
+      SbModelPotentialGradient(run->model, at->x, run->barrier_weight, PETSC_TRUE, &energy, at->contact));
+    at->gaps = run->barrier_weight * energy;
     at->psi += at->gaps;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -178,9 +178,9 @@ static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
   n->blocks.n = n->nblock = 0;
   if (m->npotential) {
     PetscCall(SbModelPotentialHessian(m, snes->vec_sol, n->kind, &n->blocks, n->rhs));
-    PetscCall(VecAYPX(n->rhs, n->run->guard_weight, snes->vec_func));
+    PetscCall(VecAYPX(n->rhs, n->run->barrier_weight, snes->vec_func));
     for (PetscInt k = 0; k < n->blocks.n; k++) {
-      for (int i = 0; i < 9; i++) n->blocks.block[k][i] *= n->run->guard_weight;
+      for (int i = 0; i < 9; i++) n->blocks.block[k][i] *= n->run->barrier_weight;
     }
     PetscCallMPI(MPI_Allreduce(&n->blocks.n, &n->nblock, 1, MPIU_INT, MPI_SUM, m->comm));
   }
@@ -212,7 +212,7 @@ static PetscErrorCode least_shift(SNES snes, PetscReal *shift)
   for (PetscInt i = 0; i < s->nnode_owned; i++) mass += 3. * s->node_mass[i];
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &mass, 1, MPIU_REAL, MPI_SUM, s->comm));
   *shift = SHIFT_STIFF * PetscRealPart(stiff) / mass;
-  if (n->run->model->dynamic) *shift = PetscMax(*shift, SHIFT / PetscSqr(n->run->guard_dt));
+  if (n->run->model->dynamic) *shift = PetscMax(*shift, SHIFT / PetscSqr(n->run->barrier_dt));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -342,7 +342,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
   /* forces without a potential: ascent steps may be provisional, too */
   const PetscBool circulatory = (PetscBool)(n->run->nonsymmetric.U && !m->dynamic && !m->npotential);
   PetscBool enough, back, provisional, better,
-    flat = PETSC_FALSE, guarded,
+    flat = PETSC_FALSE, barrier,
     plain = (PetscBool)(n->nblock > 0 || *s < 1.); /* no provisional step into a barrier */
   PetscReal change, noise, total, goal, undone = 0.;
   PetscReal low = 0., high = 0.; /* parts of the step between which E is lowest; 0: not known yet */
@@ -391,12 +391,12 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
                   change < PETSC_INFINITY && to->ninverted <= from->ninverted && to->gaps <= from->gaps);
 
     /* the minimum of E is before a barrier, or where E hardly curves far beyond a full step: bracket it by slopes */
-    guarded = (PetscBool)(m->npotential && plain);
-    if (guarded && enough && to->slope < 0.)
+    barrier = (PetscBool)(m->npotential && plain);
+    if (barrier && enough && to->slope < 0.)
       low = *s;
-    else if (guarded && slope < 0. && (to->gaps > from->gaps || best->s > 0.))
+    else if (barrier && slope < 0. && (to->gaps > from->gaps || best->s > 0.))
       high = *s;
-    if (guarded && enough) {
+    if (barrier && enough) {
       flat = (PetscBool)(to->slope >= WOLFE * slope);
       if (best->s == 0. || change < best->change) {
         to->s = *s;
@@ -495,7 +495,7 @@ static PetscErrorCode approach(SNES snes)
 {
   Newton *n = (Newton *)snes->data;
   const SbModel m = n->run->model;
-  const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update, start = n->run->guard_start,
+  const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update, start = n->run->barrier_start,
             D = n->step;
   PetscReal part, progress = 0., slope, energy;
   PetscInt nactive, inverted, before;
@@ -578,7 +578,7 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
     if (!snes->reason && n->rounding) snes->reason = SNES_CONVERGED_SNORM_RELATIVE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  enough = m->dynamic ? SETTLED * m->guard_speed * run->guard_dt : SETTLED_STATIC * size;
+  enough = m->dynamic ? SETTLED * m->barrier_speed * run->barrier_dt : SETTLED_STATIC * size;
   for (PetscInt e = 0; e < m->npotential; e++) {
     if (m->potential[e]->springs) {
       enough *= STICKING;
@@ -586,7 +586,7 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
     }
   }
   for (PetscInt e = 0; e < m->npotential; e++) width = PetscMin(width, m->potential[e]->width);
-  if (m->dynamic) enough = PetscMax(enough, SETTLED_LEAST * size * run->guard_dt / run->dt);
+  if (m->dynamic) enough = PetscMax(enough, SETTLED_LEAST * size * run->barrier_dt / run->dt);
   enough = PetscMin(enough, SETTLED_GAP * width);
   PetscCall(VecNorm(snes->vec_sol_update, NORM_INFINITY, &longest));
   PetscCall(PetscInfo(snes,
@@ -600,7 +600,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
 {
   Newton *n = (Newton *)snes->data;
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
-  const PetscBool guarded = (PetscBool)(n->run->model->npotential > 0);
+  const PetscBool barrier = (PetscBool)(n->run->model->npotential > 0);
   PetscBool filtered = PETSC_FALSE;
   PetscReal slope = 0., s = 1., fall = 0.,
             fall_before = 0.; /* decrease of E in this solve, and until the last check of progress, J */
@@ -617,7 +617,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   n->shift = 0.;
   n->branch = 0;
   n->whole = n->unstable = PETSC_FALSE;
-  if (guarded) PetscCall(approach(snes));
+  if (barrier) PetscCall(approach(snes));
   if (snes->reason) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(linearise_pressure(n->run, X, NULL, 1.));
   PetscCall(SNESComputeFunction(snes, X, F));
@@ -641,7 +641,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     /* direction, and largest step */
     PetscCall(find_direction(snes, &filtered, &slope));
     s = 1.;
-    if (guarded && !snes->reason) PetscCall(SbModelPotentialMaxStep(n->run->model, X, Y, 1., &s, &nactive));
+    if (barrier && !snes->reason) PetscCall(SbModelPotentialMaxStep(n->run->model, X, Y, 1., &s, &nactive));
     if (!snes->reason) PetscCall(search(snes, slope, &s));
     if (snes->reason) break;
     n->whole = (PetscBool)(s >= 1.);
@@ -663,11 +663,11 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
          ((snes->iter - first) % PATIENCE == 0 && fall - fall_before <= WORTH * PetscAbsReal(fall))))
       snes->reason = SNES_DIVERGED_MAX_IT;
     if ((snes->iter - first) % PATIENCE == 0) fall_before = fall;
-    if (!guarded && !n->run->model->dynamic && !n->provisional) creeps = s < CREEP ? creeps + 1 : 0;
+    if (!barrier && !n->run->model->dynamic && !n->provisional) creeps = s < CREEP ? creeps + 1 : 0;
     if (!snes->reason && creeps == CREEPS) snes->reason = SNES_DIVERGED_LINE_SEARCH;
 
     /* lagged friction takes the normal forces of this iterate: in the first iterations each time, then after convergence */
-    if (guarded && (snes->reason > 0 || (!snes->reason && snes->iter <= EARLY))) {
+    if (barrier && (snes->reason > 0 || (!snes->reason && snes->iter <= EARLY))) {
       PetscBool again;
 
       PetscCall(SbModelPotentialUpdateFriction(n->run->model, X, (PetscBool)(snes->reason > 0), &again));
@@ -703,19 +703,19 @@ PetscErrorCode SbRunSolveTangent(SbRun run, Vec B, Vec X, PetscInt *iterations, 
 static PetscErrorCode SNESSetUp_Newton(SNES snes)
 {
   Newton *n = (Newton *)snes->data;
-  const PetscBool guarded = (PetscBool)(n->run->model->npotential > 0);
+  const PetscBool barrier = (PetscBool)(n->run->model->npotential > 0);
   Iterate *const of[3] = {&n->from, &n->to, &n->best};
 
   PetscFunctionBeginUser;
   PetscCall(SNESSetUpMatrices(snes));
   PetscCall(VecDuplicate(snes->vec_sol, &n->start));
   PetscCall(VecDuplicate(snes->vec_sol, &n->step));
-  if (guarded) PetscCall(VecDuplicate(snes->vec_sol, &n->rhs));
-  for (int k = 0; k < (guarded ? 3 : 2); k++) {
+  if (barrier) PetscCall(VecDuplicate(snes->vec_sol, &n->rhs));
+  for (int k = 0; k < (barrier ? 3 : 2); k++) {
     if (k) PetscCall(VecDuplicate(snes->vec_sol, &of[k]->x));
     if (k) PetscCall(VecDuplicate(snes->vec_sol, &of[k]->r));
     PetscCall(VecDuplicate(snes->vec_sol, &of[k]->elastic));
-    if (guarded) PetscCall(VecDuplicate(snes->vec_sol, &of[k]->contact));
+    if (barrier) PetscCall(VecDuplicate(snes->vec_sol, &of[k]->contact));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -8,7 +8,7 @@
     Newmark: alpha_m = alpha_f = 1
     implicit Euler: v1 = s / h, a1 = (v1 - v0) / h (it is not a Newmark method)
   Newmark with contact: a0 is the acceleration without it, newmark_contact.c describes the rest
-  Guarded contact: its force f = -dB/du is that of the end of the step, the only place that no surface has passed on the way to; generalized-alpha adds it there. Newmark
+  Barrier contact: its force f = -dB/du is that of the end of the step, the only place that no surface has passed on the way to; generalized-alpha adds it there. Newmark
   would take it from both ends and gain energy; there it is implicit (Kane, Repetto, Ortiz and Marsden 1999), with a the acceleration without contact, which is what is kept:
     u1 = u0 + h v0 + h^2 ((1/2 - beta) a0 + beta a1) + h^2/2 M^-1 f,  v1 = v0 + h ((1 - gamma) a0 + gamma a1) + h M^-1 f
   Its formula for a1 then gives a1 + M^-1 f / (2 beta), the residual that is solved has -f / (2 beta), and damping has the velocity 2 (u1 - u0) / h - v0. The impulse h f adds the motion
@@ -103,8 +103,8 @@ static PetscErrorCode SNESTSFormFunction_SecondOrder(SNES snes, Vec X, Vec F, TS
   PetscCall(stage_state(ts, X, &t, &U, &V, &A));
   PetscCall(TSComputeI2Function(ts, t, U, V, A, F));
   if (so->set.alpha_f != 1.) PetscCall(VecScale(F, 1. / so->set.alpha_f));
-  if (so->run->model->guard_apart)
-    PetscCall(SbModelPotentialGradient(so->run->model, X, so->run->guard_weight, PETSC_TRUE, NULL, F));
+  if (so->run->model->barrier_apart)
+    PetscCall(SbModelPotentialGradient(so->run->model, X, so->run->barrier_weight, PETSC_TRUE, NULL, F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -198,7 +198,7 @@ static SbSolvedStep solved_step(TS ts)
                         so->V1,    so->A1,        (PetscBool)!SbRunIsExplicit(so->run)};
 }
 
-/* Guarded contact: the velocity has its impulse, the acceleration is without it. */
+/* Barrier contact: the velocity has its impulse, the acceleration is without it. */
 static PetscErrorCode separate_contact(TS ts)
 {
   SecondOrder *so = (SecondOrder *)ts->data;

@@ -37,11 +37,11 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   for (int solves = 0; again; solves++) {
     SbSolvedStep step;
 
-    /* guarded contact begins where the step does */
+    /* barrier contact begins where the step does */
     if (run->model->npotential) {
       PetscCall(SbModelPotentialBegin(run->model, a->t, a->dt, a->U0, run->V));
-      run->guard_start = a->U0;
-      run->guard_dt = a->dt;
+      run->barrier_start = a->U0;
+      run->barrier_dt = a->dt;
     }
 
     /* a first guess, and the solution from there; with contact, as often as finding out what touches takes */

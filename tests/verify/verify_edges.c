@@ -38,7 +38,7 @@ static PetscErrorCode contact_values(SbRun run, PetscReal values[NVALUE])
   SbEffect e = NULL;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < m->neffect && !e; i++) e = m->effect[i]->ops.begin_guarded ? m->effect[i] : NULL;
+  for (PetscInt i = 0; i < m->neffect && !e; i++) e = m->effect[i]->ops.begin_barrier ? m->effect[i] : NULL;
   PetscCall(PetscArrayzero(values, NVALUE));
   PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
   PetscCall((*e->ops.history)(e, m->space, &stage, NULL, values));
