@@ -156,7 +156,7 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The output point of a pair: its closest point on the body, normal and gap. */
+/* The contact point of a pair: its closest point on the body, normal and gap. */
 static SbContactPoint point_of(const Barrier *b, const SbContactPair *pair, const PetscReal weight[4],
                                const PetscReal n[3], PetscReal gap)
 {

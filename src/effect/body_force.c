@@ -12,7 +12,7 @@ typedef struct {
 } BodyForce;
 
 static const SbOption rows[] = {
-  {"on", SB_OPTION_NAMES, 1, "", "", "", "sets whose tets carry the force; default: all bodies"},
+  {"on", SB_OPTION_NAMES, 1, "", "", "", "sets on whose tets the force acts; default: all bodies"},
   {"density", SB_OPTION_FORMULA, 3, "N/m^3", NULL, "",
    "force per reference volume, three formulas of t and the reference position x, y, z"},
   {"time", SB_OPTION_FORMULA, 1, "", "1", "", "amplitude: factor on the force, a formula of the time t"},

@@ -1,12 +1,12 @@
 /*
   contact.c - the effect `contact`: its options, and which response a scene gets.
 
-  Without an obstacle the bodies of the sets meet each other, and themselves where that is asked for: by `barrier`, which lets nothing through. With an obstacle the surfaces that it is given meet
-  that, by `barrier` or by responses of nodes against it (contact_node.c).
+  Without an obstacle: contact between the bodies of the sets, and self-contact on request, by `barrier`. With an obstacle: contact of the surfaces `on` with it,
+  by `barrier` or by responses of nodes (contact_node.c).
 
-  Response `auto`. All effects of a scene answer alike, as Newton's method has one potential and one set of constraints: where bodies meet each other it is `barrier`. `projected` is exact, and
-  safe where the surface is out of the obstacle whenever its vertices are: half-spaces and bowls. Everything else can cut through edges and faces, or be passed within a step: there
-  it is `barrier`, unless the scene asks for what only the others have.
+  Response `auto` is the same for all effects of a scene, as Newton's method has one potential and one set of constraints: `barrier` with contact between bodies. `projected` is exact, and
+  safe for half-spaces and bowls, where the surface is outside whenever its vertices are. Other obstacles can penetrate edges and faces, or be passed within a step: there
+  it is `barrier`, unless the scene needs an option of the other responses.
 */
 #include "contact.h"
 
@@ -30,7 +30,7 @@ static const SbOption rows[] = {
   {"friction", SB_OPTION_REAL, 1, "", "0", "[0, inf)", "static coefficient of friction"},
   {"response", SB_OPTION_CHOICE, 1, "", "auto", "auto|projected|multiplier|augmented|penalty|barrier",
    "how contact is enforced. auto: barrier between bodies; with an obstacle projected where it is a "
-   "half-space or bowl, or where an option is set that only projected has, else barrier. projected: active "
+   "half-space or bowl, or where an option needs it, else barrier. projected: active "
    "set, constraints eliminated by solving in their null space; multiplier: Lagrange multipliers; augmented: "
    "augmented Lagrangian, penalty with multipliers updated by Uzawa's method; penalty: springs; barrier: a "
    "potential that grows without bound as the gap closes (incremental potential contact), so that surfaces "
@@ -47,7 +47,7 @@ static const SbOption rows[] = {
    "run"},
   {"friction_solves", SB_OPTION_INT, 1, "", "0", "[0, inf)",
    "response barrier: largest number of lagged-friction iterations of a step, each with the normal forces "
-   "and slip directions at the end of the one before; 0: one, two where friction changes by more than half, "
+   "and slip directions at the end of the one before; 0: one, or two if friction changes by more than half, "
    "in static runs 100"},
   {"friction_tolerance", SB_OPTION_REAL, 1, "", "1e-3", "(0, inf)",
    "response barrier: tolerance of lagged friction, its change in an iteration relative to Coulomb's limit"},
@@ -75,16 +75,17 @@ static const SbOption rows[] = {
 
 static const char *const names_of_responses[] = {"auto",      "projected", "multiplier",
                                                  "augmented", "penalty",   "barrier"};
-/* Options that bodies that meet each other have not. */
+/* Options that contact between bodies does not have. */
 static const char *const obstacles_only[] = {"time_of_impact", "damping", "stiffness", "friction_kinetic"};
-/* Options that ask for another response than `barrier` against an obstacle. */
+/* Options that need another response than `barrier` against an obstacle. */
 static const char *const exact_only[] = {"restitution", "time_of_impact", "damping", "stiffness",
                                          "friction_kinetic"};
 
-/* What decides on the response of an effect, its own one among it. */
+/* Criteria of the response of an effect, its option `response` among them. */
 typedef struct {
   SbResponse response;
-  PetscBool bodies, vertices, others; /* bodies meet; half-spaces, bowls; options `barrier` has not */
+  PetscBool bodies, vertices,
+    others; /* contact between bodies; half-spaces and bowls only; options that `barrier` lacks */
 } Needs;
 
 static PetscErrorCode examine(const char *name, Needs *needs)
@@ -110,7 +111,7 @@ static PetscErrorCode examine(const char *name, Needs *needs)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The response of an effect; why: the effect leaves the choice, NULL: it does not. */
+/* The response of an effect; why: the reason of `auto`, NULL: the response is given. */
 static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
 {
   PetscBool possible = PETSC_TRUE;
@@ -161,9 +162,7 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
     *why = "the same as another effect";
   } else if (!possible || needs.others || needs.vertices) {
     *response = PROJECTED;
-    *why = !possible      ? "-time"
-           : needs.others ? "an option that barrier lacks"
-                          : "half-spaces and bowls only";
+    *why = !possible ? "-time" : needs.others ? "an option that barrier lacks" : "half-spaces and bowls only";
   } else {
     *response = BARRIER;
     *why = "edges and corners may touch";
@@ -217,9 +216,9 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   PetscCall(read_common(e, scope, &o));
   if (why) (void)snprintf(e->note, sizeof(e->note), "response %s: %s", names_of_responses[o.response], why);
   e->linear = PETSC_TRUE;
-  e->steady = PETSC_FALSE; /* a load factor does not make an obstacle softer */
+  e->steady = PETSC_FALSE; /* contact is not scaled by the load factor */
   e->euler = (PetscBool)(o.restitution > 0);
-  if (!text[0]) { /* bodies meet each other */
+  if (!text[0]) { /* contact between bodies */
     SbBarrierScene scene = {.on = &e->on, .friction = o.friction.mu, .restitution = o.restitution};
 
     for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(obstacles_only); k++) {

@@ -1,5 +1,5 @@
 /*
-  contact.h - what all responses of the effect `contact` share (contact.c).
+  contact.h - shared by all responses of the effect `contact` (contact.c).
 */
 #pragma once
 #include "barrier.h"
@@ -8,26 +8,26 @@
 
 typedef enum { AUTO, PROJECTED, MULTIPLIER, AUGMENTED, PENALTY, BARRIER } SbResponse;
 
-/* Whether what touches is held exactly. */
+/* Whether constraints are exact. */
 static inline PetscBool SbResponseIsExact(SbResponse response)
 {
   return (PetscBool)(response == PROJECTED || response == MULTIPLIER);
 }
 
-/* Coefficients of an effect, and how its friction settles in a step (friction.c). */
+/* Coefficients of friction of an effect, and convergence in a step (friction.c). */
 typedef struct {
   PetscReal mu, mu_kinetic;
-  PetscBool exact;     /* what sticks has exact constraints; else springs */
-  int updates;         /* within the step */
-  PetscReal unsettled; /* largest error of friction after the last solve, as a part of the largest friction */
-  PetscBool said;      /* that friction did not settle */
-  PetscReal loss;      /* since the start, this rank, J */
+  PetscBool exact;     /* sticking by exact constraints; else by springs */
+  int updates;         /* number of updates within the step */
+  PetscReal unsettled; /* largest error of friction after the last solve, relative to the largest friction */
+  PetscBool said;      /* the warning that friction did not converge was given */
+  PetscReal loss;      /* dissipation since the start, this rank's, J */
 } SbFriction;
 
 /* Options of all responses. */
 typedef struct {
   SbResponse response; /* not AUTO */
-  PetscBool cut;       /* steps end where points come into contact */
+  PetscBool cut;       /* steps end at the first time of impact */
   SbFriction friction;
   PetscReal stiffness, damping, restitution, separation_steps;
 } SbContactOptions;

@@ -1,19 +1,20 @@
 /*
   contact_facets.c - constrained nodes where facets of an obstacle's mesh meet.
 
-  There a node may alternate between facets with every update of the active set. At a concave edge both act: constrained on one of them it penetrates the
-  other one. So it is constrained on both for a solve, which tells what each has to exert. If neither pulls, the resultant is the
-  normal with which forces balance in the valley, and it is constrained along that till the step ends; else the one that pulls is left. On
-  two facets it slides along the valley, and maybe behind a third one, which then takes the place of that which pushes less.
+  There a node may alternate between facets with every update of the active set. At a concave edge ("valley") both act: constrained on one of them it penetrates the
+  other one. So it is constrained on both for a solve, which gives both forces. If neither is tensile, their resultant is the
+  normal in equilibrium, and the node is constrained along it until the end of the step; else the tensile one is released. On
+  two facets it slides along the edge, possibly behind a third one, which then replaces the one with the smaller force.
 
-  Elsewhere (ridges, and with friction) normals of facets are averaged from search to search, and after many of them the plane is kept.
+  Elsewhere (convex edges, and with friction) normals are averaged over the searches, and after many of them kept.
 */
 #include "contact_node.h"
 
-#define VALLEY 2 /* flips of a held node between facets in a step, after which it may be constrained on two */
+#define VALLEY \
+  2 /* flips of an active node between facets in a step, after which it may be constrained on two */
 #define AVERAGED 4  /* flips after which normals are averaged */
 #define GIVEN_UP 16 /* flips after which it is not constrained on two any more */
-#define KEPT 24     /* flips after which it is constrained on the same plane till the step ends */
+#define KEPT 24     /* flips after which its plane is kept until the end of the step */
 #define JUMP 1e-6   /* 1 - cosine: a flip */
 
 static void set_plane(const PetscReal n[3], PetscReal value, PetscReal to[3], PetscReal *to_value)
@@ -22,7 +23,7 @@ static void set_plane(const PetscReal n[3], PetscReal value, PetscReal to[3], Pe
   *to_value = value;
 }
 
-/* n . u of the plane of the facet with the normal n that a node at x is by `gap` off, m. */
+/* Right-hand side n . u of the constraint on the plane with normal n at distance `gap` from a node at x, m. */
 static PetscReal level_of(const PetscReal X[3], const PetscReal x[3], PetscReal gap, const PetscReal n[3],
                           const Touch *touch)
 {
@@ -82,7 +83,7 @@ void SbContactValley(const Contact *c, SbSpace space, const PetscReal x[3], Pets
     set_plane(n, level, touch->n, &touch->value);
     if (touch->flips > GIVEN_UP) touch->valley = PETSC_FALSE;
   } else if (space->rough)
-    touch->undecided = PETSC_FALSE; /* a rough solve does not tell forces */
+    touch->undecided = PETSC_FALSE; /* a loose solve gives no accurate forces */
   else {
     for (int i = 0; i < 3; i++) sum[i] = force * touch->n[i] + other * touch->other[i];
     length = PetscSqrtReal(SbDot3(sum, sum));

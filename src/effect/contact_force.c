@@ -1,5 +1,5 @@
 /*
-  contact_force.c - where the obstacle is, and what it pushes nodes with: forces and their derivatives, the end of a step, history. The
+  contact_force.c - pose of the obstacle, contact forces on nodes and their derivatives, the end of a step, history. The
   method is described in contact.c.
 */
 #include "contact_node.h"
@@ -27,8 +27,8 @@ PetscReal SbContactGap(const Contact *c, const SbPose *pose, const PetscReal x[3
 /* ------------------------------------------------------------------ forces */
 
 /*
-  Normal force on a node at x, N; n: the normal. Springs follow their normal; a node that is constrained keeps the one it is constrained along: were it
-  to turn during a solve, where facets meet it would jump, and Newton's method with it.
+  Normal force on a node at x, N; n: the normal. Springs follow the current normal; a constrained node keeps that of its constraint: at edges between
+  facets a current one would jump within Newton's method.
 */
 static PetscReal normal_force(const Contact *c, const SbPose *pose, const Touch *touch, const PetscReal x[3],
                               PetscReal n[3])
@@ -58,7 +58,7 @@ PetscErrorCode SbEffectForce_Contact(SbEffect e, SbSpace space, const SbStage *s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The turning of the normal is left out. */
+/* The rotation of the normal is neglected. */
 PetscErrorCode SbEffectTangent_Contact(SbEffect e, SbSpace space, const SbStage *stage, Mat A)
 {
   const Contact *c = (const Contact *)e->data;
@@ -102,7 +102,7 @@ PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *
 
     place(space, touch->node, stage->u, x);
     if (!exact(c)) touch->on = (PetscBool)(normal_force(c, &pose, touch, x, n) > 0);
-    if (c->friction.mu > 0) { /* what it leaves for the next step */
+    if (c->friction.mu > 0) { /* history variables */
       SbFrictionAccept(&c->friction, touch,
                        (PetscBool)(touch->on && touch->along >= 0 && SbContactForce(c, touch) > 0));
       SbContactStretch(&pose, touch);
@@ -163,13 +163,13 @@ PetscErrorCode SbEffectContactPoints_Contact(SbEffect e, SbSpace space, const Sb
     if (normal_force(c, &pose, touch, p.x, p.normal) <= 0) continue;
     force_on(c, &pose, space, touch, p.x, p.force);
     p.gap = SbContactGap(c, &pose, p.x, p.normal);
-    if (exact(c)) PetscCall(PetscArraycpy(p.normal, touch->n, 3)); /* that it is constrained along */
+    if (exact(c)) PetscCall(PetscArraycpy(p.normal, touch->n, 3)); /* the normal of the constraint */
     PetscCall(SbContactPointsAdd(list, &p));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Force and torque of the obstacle on the bodies, touching nodes, deepest penetration. */
+/* Force and torque of the obstacle on the bodies, number of active nodes, deepest penetration. */
 PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage *stage,
                                        const PetscReal residual[], PetscReal values[])
 {
@@ -200,7 +200,7 @@ PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage 
   }
   PetscCallMPI(MPI_Allreduce(&deepest[0], &deepest[1], 1, MPIU_REAL, MPI_MAX, space->comm));
   PetscCallMPI(MPI_Comm_rank(space->comm, &rank));
-  /* less is the rounding of where nodes are put */
+  /* smaller values are within the tolerance */
   if (!rank && deepest[1] > TOLERANCE * c->size) values[7] = deepest[1];
   PetscFunctionReturn(PETSC_SUCCESS);
 }

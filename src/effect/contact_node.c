@@ -1,36 +1,35 @@
 /*
   contact_node.c - nodes of the surface against a rigid obstacle, still or on a given path, with Coulomb friction.
 
-  A node at x has the gap g = signed distance from the obstacle where it is at that time, and the normal n there. Nodes are
-  those that carry the surface: vertices of P1, centroids of boundary faces of CR and DG (there g is the mean gap of the face), vertices and edges of P2. A uniform
-  pressure is carried by the edges of P2 alone, which exact responses find by themselves; springs have the areas of the four triangles over the six nodes of a facet.
+  A node at x has the gap g = signed distance from the obstacle in its current pose, and the normal n there. Nodes are
+  those of the surface: vertices of P1, centroids of boundary faces of CR and DG (there g is the mean gap of the face), vertices and edges of P2. A uniform
+  pressure acts on the edge nodes of P2 alone, as exact responses reproduce; springs have the areas of the four triangles over the six nodes of a facet.
 
-  Response `projected`: touching nodes are constrained on the obstacle (src/fem/constraint.c): n . u is prescribed, and the force that this
-  takes is the multiplier lambda. Primal-dual active set: after each solve nodes in tension are released, penetrating nodes are added, the normal is updated on a
+  Response `projected`: active nodes are constrained to the obstacle (src/fem/constraint.c): n . u is prescribed, and the constraint
+  force is the multiplier lambda. Primal-dual active set: after each solve nodes in tension are released, penetrating nodes are added, the normal is updated on a
   curved obstacle, and the solve is repeated until the set does not change (Kikuchi and Oden 1988; Hueeber and Wohlmuth 2005). A node that
-  has left and come back several times within a step stays: the loop ends. `multiplier`: the same with the forces as
+  has been released and added several times within a step stays active, so that the loop ends. `multiplier`: the same with the forces as
   unknowns of the solves.
 
-  Response `penalty`: springs, N = k <-g>, <x> = max(x, 0), with k from the stiffness of the cell behind, where that hardly changes its volume as if poisson were 0.45: a surface gives by shear, and
-  springs that are stiffer by orders make E so narrow a valley that the line search crawls in it. `augmented`: the penalty with a multiplier,
+  Response `penalty`: springs, N = k <-g>, <x> = max(x, 0), with k from the stiffness of the cell behind, near incompressibility that of nu = 0.45: a surface deforms by shear, and
+  springs stiffer by orders make E so ill-conditioned that the line search takes tiny steps. `augmented`: the penalty with a multiplier,
   N = <lambda - k g>, which is updated after each solve until the penetration is within the tolerance (Simo and Laursen 1992).
 
-  Friction (friction.c) is solved for with N. It needs constraints: with it all responses write their nodes as such, `projected` exact ones in whose
-  null space the solves run, `penalty` and `augmented` springs, linear while normals and the active set stay fixed, which is examined after each
-  solve. A node sticks to the place of the obstacle where it was when the step began, and moves with it.
+  Friction (friction.c) is solved together with N. With it all responses use constraints: `projected` exact ones, with solves in their
+  null space, `penalty` and `augmented` springs, linear while normals and the active set stay fixed, which are updated after each
+  solve. A sticking node keeps its initial position of the step on the moving obstacle.
 
-  Penetration that is there when a step begins is resolved gradually: a node may stay behind the obstacle by that depth, which falls to
-  1/e in `separation_steps` steps. With springs that is the depth beyond what they give. A static run closes it at once.
+  Penetration at the start of a step is resolved gradually: its depth falls to 1/e in `separation_steps` steps. With springs that is the
+  depth beyond their deflection. A static run resolves it at once.
 
-  Restitution is described in contact_restitution.c, what happens where facets of a mesh meet in
-  contact_facets.c, forces and what is reported of them are in contact_force.c.
+  Restitution: contact_restitution.c. Edges of an obstacle's mesh: contact_facets.c. Forces and output: contact_force.c.
 */
 #include "contact_node.h"
 
 #define STIFFEST 11. /* of the shear modulus: lambda + 2 mu at nu = 0.45 */
-#define TOGGLES 3    /* how often a node may come within a step before it stays */
-#define PULLING 1e-6 /* of the largest contact force: what a node must pull with to leave */
-#define SETTLED 1e-4 /* of the largest contact force: what that of a spring may be off */
+#define TOGGLES 3    /* activations of a node within a step after which it stays active */
+#define PULLING 1e-6 /* tension at which a node is released, over the largest contact force */
+#define SETTLED 1e-4 /* tolerance of spring forces, over the largest contact force */
 
 static PetscErrorCode setup_obstacle(SbEffect e, SbSpace space, void *data)
 {
@@ -76,7 +75,7 @@ PetscErrorCode SbContactOptions_Node(SbEffect e, const SbScope *scope, const SbC
   for (int i = 0; i < 3; i++) c->axis[i] /= length;
   c->response = o->response;
   c->friction = o->friction;
-  if (c->response == BARRIER) { /* another file does the work */
+  if (c->response == BARRIER) { /* implemented in barrier.c */
     SbBarrierScene scene = {.on = &e->on,
                             .obstacle = c->obstacle,
                             .pose = pose_of,
@@ -95,7 +94,7 @@ PetscErrorCode SbContactOptions_Node(SbEffect e, const SbScope *scope, const SbC
   SbOverlapSet(&c->overlap, o->separation_steps);
   c->held = (PetscBool)(exact(c) || c->friction.mu > 0);
   if (c->held) {
-    e->ops.force = e->ops.contact_force = NULL; /* constraints push without it */
+    e->ops.force = e->ops.contact_force = NULL; /* forces come from the constraints */
     e->ops.tangent = NULL;
   } else {
     e->ops.assemble_constraints = NULL;
@@ -105,7 +104,7 @@ PetscErrorCode SbContactOptions_Node(SbEffect e, const SbScope *scope, const SbC
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds a facet's share of area and stiffness to one of its nodes; slot[] holds the place of owned nodes, -1: none yet. */
+/* Adds a facet's share of area and stiffness to one of its nodes; slot[]: index of owned nodes, -1: none yet. */
 static void add_share(SbSpace space, const SbFacet *facet, PetscInt a, PetscReal share, PetscInt slot[],
                       Contact *c)
 {
@@ -170,7 +169,7 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
 
 /* ------------------------------------------------------------------ who touches */
 
-/* Gap of the node at x beyond what it is constrained at, with its normal and the value of n . u that puts it there. */
+/* Gap of the node at x less the gap it is constrained to, with its normal and the right-hand side of n . u for that. */
 static PetscReal look(const Contact *c, SbSpace space, const PetscReal x[3], Touch *touch)
 {
   const PetscReal *X = space->node_x + 3 * touch->node;
@@ -192,11 +191,11 @@ static PetscReal look(const Contact *c, SbSpace space, const PetscReal x[3], Tou
   return gap - touch->rest;
 }
 
-/* Gap that a node is constrained at which was at x0 when the step began. */
+/* Gap that a node is constrained to, from its position x0 at the start of the step. */
 static PetscReal rest_of(const Contact *c, const SbPose *from, const Touch *touch, const PetscReal x0[3])
 {
   PetscReal n[3];
-  /* what touches springs is behind by what they give; projected it is where it was constrained */
+  /* with springs penetration includes their deflection; projected nodes are where they were constrained */
   const PetscReal depth = touch->was && !exact(c) ? -touch->kept : -SbContactGap(c, from, x0, n);
 
   return depth > TOLERANCE * c->size ? -c->overlap.left * depth : 0;
@@ -214,7 +213,7 @@ static void set_damper(const Contact *c, const SbPose *from, PetscReal dt, const
   touch->before = touch->k * c->damping / dt * PetscMin(0, SbContactGap(c, from, x0, n) - touch->rest);
 }
 
-/* A node is behind the obstacle: from now on it is constrained. */
+/* Activates a penetrating node. */
 static void enter(const Contact *c, Touch *touch)
 {
   if (!touch->on && c->friction.mu > 0) SbFrictionEnter(&c->friction, touch, -touch->gap);
@@ -222,7 +221,7 @@ static void enter(const Contact *c, Touch *touch)
   if (c->bounce.e > 0) SbContactHit(c, touch);
 }
 
-/* A node that was apart and is behind the obstacle now, by a motion that did not know of it: when it came. */
+/* Time of impact of a node that was separated and penetrates now, in the motion without contact. */
 static void watch_arrival(Contact *c, const Touch *touch)
 {
   const PetscReal small = TOLERANCE * c->size;
@@ -237,14 +236,15 @@ static PetscErrorCode arrive_contact(SbEffect e, PetscReal *part)
 
   PetscFunctionBeginUser;
   *part = c->arrival;
-  for (PetscInt i = 0; c->arrival < 1 && i < c->n; i++) { /* what arrived has pressed for a whole step */
+  for (PetscInt i = 0; c->arrival < 1 && i < c->n;
+       i++) { /* springs of new contacts have acted for a whole step */
     if (!c->touch[i].was) c->touch[i].lambda = 0;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The place on the obstacle where a node was when the step began, x0, moves with it: there the node sticks. One that arrives in this
-   step sticks to where it was at its start. */
+/* The node's initial position x0, moved with the obstacle: where it would stick. A node that comes into contact in this
+   step sticks to its initial position. */
 static void start_friction(const Contact *c, SbSpace space, const SbPose *from, const PetscReal x0[3],
                            Touch *touch)
 {
@@ -281,7 +281,7 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
 
     touch->toggles = touch->flips = 0;
     touch->valley = PETSC_FALSE;
-    /* an attempt that was cut begins as it did; one that failed goes on with what it has found to touch */
+    /* a cut attempt restarts with the initial active set; a failed one keeps the active set found so far */
     if (c->cut || c->bounce.e > 0) touch->on = touch->was;
     touch->idle = (PetscBool)(c->cut && !touch->was && !exact(c));
     place(space, touch->node, u, x);
@@ -305,7 +305,7 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The constraints of touching nodes: along their normals, or across them. */
+/* The constraints of active nodes: normal, or tangential (across). */
 static PetscErrorCode hold_contact(SbEffect e, SbSpace space, PetscBool across)
 {
   Contact *c = (Contact *)e->data;
@@ -371,7 +371,7 @@ static PetscErrorCode measure(const Contact *c, SbSpace space, const PetscReal u
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a node is constrained, or not, as it should be; changes it if not. */
+/* Whether the active set was right for this node; changes it if not. */
 static PetscBool settle_held(const Contact *c, PetscReal largest, Touch *touch)
 {
   if (!touch->on) {
@@ -391,8 +391,8 @@ static PetscBool settle_held(const Contact *c, PetscReal largest, Touch *touch)
   return (PetscBool)(PetscAbsReal(touch->gap) <= TOLERANCE * c->size);
 }
 
-/* Whether a spring pushes with what its place asks for, and for `augmented`, whose multiplier is raised, until the remainder of the penetration
-   does not matter. */
+/* Whether a spring's force agrees with its position; for `augmented`, which updates the multiplier, also whether the penetration is within
+   the tolerance. */
 static PetscBool settle_spring(const Contact *c, PetscReal largest, Touch *touch)
 {
   const PetscReal force = spring(touch, touch->gap);
@@ -420,7 +420,7 @@ static PetscErrorCode settle_contact(SbEffect e, SbSpace space, const PetscReal 
 
   PetscFunctionBeginUser;
   PetscCall(measure(c, space, u, &largest));
-  /* after the first solve of a step: who arrives in it; springs of all nodes from now on */
+  /* after the first solve of a step: times of impact; from now on all springs act */
   for (PetscInt i = 0; c->first && c->cut && i < c->n; i++) {
     Touch *touch = &c->touch[i];
 
@@ -435,7 +435,7 @@ static PetscErrorCode settle_contact(SbEffect e, SbSpace space, const PetscReal 
 
     if (!right) mine = PETSC_TRUE;
   }
-  /* which nodes stick and which slide from now on */
+  /* update stick and slip */
   for (PetscInt i = 0; c->friction.mu > 0 && i < c->n; i++) {
     Touch *touch = &c->touch[i];
     PetscReal error;
@@ -445,7 +445,7 @@ static PetscErrorCode settle_contact(SbEffect e, SbSpace space, const PetscReal 
     worst = PetscMax(worst, error); /* a macro: its arguments are evaluated twice */
   }
   if (c->friction.mu > 0) SbFrictionJudge(&c->friction, worst, largest, &mine);
-  /* springs that have stayed as constraints and pull when all else is settled: they go, a few times */
+  /* release springs in tension once all else has converged, a few times */
   wait = mine;
   if (c->held && !exact(c))
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &wait, 1, SB_MPI_BOOL, MPI_LOR, space->comm));

@@ -1,10 +1,10 @@
 /*
-  contact_restitution.c - velocities at a rigid obstacle: restitution of nodes that meet it, whose law and what it does to the energy are described in
-  src/model/restitution.c, and how fast it moves where it holds nodes.
+  contact_restitution.c - velocities at a rigid obstacle: restitution of impacting nodes (law and energy:
+  src/model/restitution.c), and the obstacle's velocity at active nodes.
 */
 #include "contact_node.h"
 
-#define INSTANT 1e-3 /* of a step: over so much of its end the obstacle's speed is taken */
+#define INSTANT 1e-3 /* fraction of a step for the difference quotient of the obstacle's velocity */
 
 PetscBool SbContactComes(const Contact *c, const SbPose *from, const PetscReal x0[3], const PetscReal v0[3],
                          Touch *touch)
@@ -22,7 +22,7 @@ PetscBool SbContactComes(const Contact *c, const SbPose *from, const PetscReal x
   return SbRestitutionApproaches(&c->bounce, touch->gap0, v);
 }
 
-/* The node is constrained elsewhere. */
+/* Changes the gap that the node is constrained to. */
 static void move_to(PetscReal rest, Touch *touch)
 {
   touch->value += rest - touch->rest;
@@ -64,7 +64,7 @@ PetscErrorCode SbEffectScaleRestitution_Contact(SbEffect e, PetscReal share)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The obstacle's point at each node that it holds moves with it. */
+/* Velocity of the obstacle at each active node. */
 PetscErrorCode SbEffectTargetVelocity_Contact(SbEffect e, SbSpace space, const SbStage *stage)
 {
   const Contact *c = (const Contact *)e->data;

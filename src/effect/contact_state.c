@@ -1,8 +1,8 @@
 /*
-  contact_state.c - what a node that touches an obstacle takes from step to step, for checkpoints.
+  contact_state.c - history variables of nodes in contact with an obstacle, for checkpoints.
 
-  A record is a node by its original number: whether it touches and did so, what it is constrained at and along, multiplier, gap, and its
-  friction. With that the constraints of the last solve can be written again, and the next step begins as if the run had not stopped.
+  A record has the node's original number, whether it is and was active, right-hand side and normal of its constraint, multiplier, gap, and
+  friction state: enough to rebuild the constraints of the last solve, and to continue as the uninterrupted run.
 */
 #include "contact_node.h"
 
@@ -47,7 +47,7 @@ PetscErrorCode SbEffectLoad_Contact(SbEffect e, SbSpace space, PetscReal t, cons
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
 
-    /* nothing touches but what has a record */
+    /* nodes without a record are inactive */
     touch->on = touch->was = touch->idle = PETSC_FALSE;
     touch->along = -1;
     touch->rest = touch->kept = touch->lambda = touch->gap = touch->arrives = 0;

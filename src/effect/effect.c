@@ -1,5 +1,5 @@
 /*
-  effect.c - the registry of effects, and how one comes to be from its name in the scenario.
+  effect.c - the registry of effects, and their creation by name.
 
   An effect gets the operations of its type and private data of zeros; then it reads its options. Everything that needs the
   mesh waits for its setup operation.
@@ -23,7 +23,7 @@ PetscErrorCode SbEffectRegister(const SbEffectType *type)
   PetscInt i = 0;
 
   PetscFunctionBeginUser;
-  // What there is may be registered again and again: the options may have been forgotten.
+  // Repeated registration is allowed: SbOptionsReset() may have removed the options.
   while (i < ntype && types[i] != type) i++;
   PetscCheck(i < SB_EFFECT_TYPES, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No room for effects of type %s",
              type->name);
@@ -86,7 +86,7 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
   }
   if (e->ops.setfromoptions) PetscCall((*e->ops.setfromoptions)(e, &scope));
 
-  /* when it acts: what comes and goes are loads and supports */
+  /* time in which it acts, for loads and supports */
   e->from = PETSC_MIN_REAL;
   e->until = PETSC_MAX_REAL;
   PetscCall(SbOptionReal(&scope, "from", &e->from));
@@ -104,7 +104,7 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define ROUNDING 1e-9 /* of a time: by so much ends of steps may be off */
+#define ROUNDING 1e-9 /* relative rounding of the end of a step */
 
 PetscBool SbEffectActs(SbEffect e, PetscReal t)
 {

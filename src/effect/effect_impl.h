@@ -1,5 +1,5 @@
 /*
-  effect_impl.h - what several effects share: formulas, selection by sets, dead loads, prescribed unknowns, contact points.
+  effect_impl.h - shared by effects: formulas, selection by sets, dead loads, prescribed unknowns, contact points.
 */
 #pragma once
 #include "sbeffect.h"
@@ -23,7 +23,7 @@ PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt 
                                 SbFormula formulas[], PetscBool *steady);
 
 /*
-  What the named sets select on this rank, each item once even when it is in several of the sets. Collective; the caller
+  Items of the named sets on this rank, each once even when it is in several of the sets. Collective; the caller
   releases the array with PetscFree(). Errors (PETSC_ERR_USER_INPUT, alike on all ranks): no such set; a set that selects
   nothing of the kind, with what it does select.
 
@@ -40,7 +40,7 @@ PetscErrorCode SbEffectCells(SbSpace space, const SbEffectOn *on, PetscInt *n, P
 
 /*
   SbDeadLoad - a force per volume or per area, given by three formulas of time and rest position, integrated against the
-  basis functions of the cells or facets that carry it (src/effect/deadload.c). What is kept is one force per node; it is
+  basis functions of its cells or facets (src/effect/deadload.c). It is stored as one force per node, which is
   integrated again only when the formulas use t and t has changed.
 */
 typedef struct _p_SbDeadLoad *SbDeadLoad;

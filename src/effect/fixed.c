@@ -1,5 +1,5 @@
 /*
-  fixed.c - nodes constrained where they are at rest, in all directions or in some.
+  fixed.c - nodes with zero displacement, in all directions or in some.
 
   Prescribes u_c = 0 for the chosen components c. history.csv has the reaction, the force of the support on the body
   (prescribed.c has the sign). Of several effects that prescribe one unknown, the first in the scenario counts.

@@ -1,28 +1,27 @@
 /*
-  friction.c - Coulomb friction where a pair touches: |T| <= mu N, and what slides has T = -mu N along its slip.
+  friction.c - Coulomb friction of pairs in contact: |T| <= mu N, and T = -mu N along the slip if it slides.
 
-  A pair sticks or slides. What sticks does not move across the normal: two exact constraints, or two springs where rows are springs. What
-  slides takes its friction with the normal force: that one pushes along n - mu d, d the direction of the slip, so that N is of the
-  same solve and nothing waits for it. Across d a spring turns it. After a solve what sticks with more than mu N begins to slide,
-  and what slid backwards sticks: a semismooth Newton method (Alart and Curnier 1991; Hueeber, Stadler, Wohlmuth 2008), an active
-  set in rows instead of a tangent.
+  A sticking pair has two exact tangential constraints, or two springs. A
+  sliding pair has its contact force along n - mu d, d the direction of the slip, so that friction uses N of the
+  same solve; a spring normal to d adapts the direction. After a solve a sticking pair with more than mu N slides,
+  and one that slid backwards sticks: a semismooth Newton method (Alart and Curnier 1991; Hueeber, Stadler, Wohlmuth 2008) as an
+  active-set method.
 
-  The slip is that of the step, as implicit Euler has it; with springs it has the stretch that was there before.
+  The slip is that of the step, as in implicit Euler, plus with springs their deflection at its start.
 
-  A node in the corner of two obstacles cannot stick to both by exact constraints: they would say the same twice, and take from each other's
-  normal force. Such a pair sticks by springs as long as it touches.
+  A node in the corner of two obstacles cannot stick to both by exact constraints: they would be redundant. Such a pair sticks by springs while in contact.
 */
 #include "contact_node.h"
 
-#define SETTLED 1e-4 /* of the largest friction: error that is left */
-#define LATE 1e-2    /* the same after UPDATES solves, with a warning; what does not get there is cut */
+#define SETTLED 1e-4 /* tolerance of friction, relative to the largest */
+#define LATE 1e-2    /* the same after UPDATES solves, with a warning; else the step is halved */
 #define UPDATES 30   /* solves of a step with friction */
-#define FLIPS 10     /* of a pair within a step, after which it has springs */
+#define FLIPS 10     /* changes of a pair between stick and slip within a step, after which it has springs */
 #define STIFF 1e-3   /* smallest relative difference of trial force and limit, for the stiffness across */
 
 void SbFrictionBegin(SbFrictionState *g, PetscBool touches)
 {
-  if (!touches) { /* a point that arrives in this step sticks to where it was at its start */
+  if (!touches) { /* a point that comes into contact in this step sticks to its initial position */
     for (int k = 0; k < 3; k++) g->stretch[k] = 0;
     g->pressing = 0;
     g->slid = g->crowded = PETSC_FALSE;
@@ -37,7 +36,7 @@ static inline PetscBool springs(const SbFriction *f, const SbFrictionState *g)
   return (PetscBool)(!f->exact || g->crowded);
 }
 
-/* Whether a pair that cannot decide has springs of the solve before: a secant (Kacanov's method), slow and sure. */
+/* Whether a pair that alternates has secant springs of the last solve (Kacanov's method), slow but robust. */
 static inline PetscBool careful(const SbFrictionState *g)
 {
   return (PetscBool)(g->flips > FLIPS);
@@ -48,7 +47,7 @@ static PetscReal coefficient(const SbFriction *f, const SbFrictionState *g)
   return g->slid ? f->mu_kinetic : f->mu;
 }
 
-/* Part of a vector across the normal; returns its length. */
+/* Tangential part of a vector; returns its length. */
 static PetscReal across(const PetscReal n[3], PetscReal v[3])
 {
   const PetscReal along = SbDot3(n, v);
@@ -57,14 +56,14 @@ static PetscReal across(const PetscReal n[3], PetscReal v[3])
   return PetscSqrtReal(SbDot3(v, v));
 }
 
-/* Slip of the step and what springs were stretched by before, across the normal, m; returns its length. */
+/* Tangential slip of the step plus earlier deflection of springs, m; returns its length. */
 static PetscReal slip(const Touch *touch, PetscReal s[3])
 {
   for (int k = 0; k < 3; k++) s[k] = touch->grip.stretch[k] + touch->now[k] - touch->start[k];
   return across(touch->n, s);
 }
 
-/* Turns the two directions across the normal, the first one along v or the remainder of it. */
+/* Rotates the two tangents, the first one along v or its tangential part. */
 static void turn(Touch *touch, const PetscReal v[3])
 {
   const PetscReal *n = touch->n;
@@ -111,7 +110,7 @@ PetscErrorCode SbFrictionHold(const SbFriction *f, SbSpace space, Touch *touch)
   PetscFunctionBeginUser;
   if (g->slides)
     turn(touch, g->tangent[0]);
-  else { /* a prescribed component has no say, and the other direction is to be one that is free */
+  else { /* drop prescribed components; the second tangent must be a free direction */
     const uint8_t bits = space->fixed[touch->node];
     const PetscReal fixed[3] = {bits == 1, bits == 2, bits == 4};
     PetscReal v[3];
@@ -127,7 +126,7 @@ PetscErrorCode SbFrictionHold(const SbFriction *f, SbSpace space, Touch *touch)
     if (!g->slides && !springs(f, g) && !careful(g)) {
       PetscCall(SbSpaceAddConstraint(space, &row, &g->slide[q]));
       if (g->slide[q] >= 0) continue;
-      g->crowded = PETSC_TRUE; /* others hold it there */
+      g->crowded = PETSC_TRUE; /* constraints of other effects hold it */
     }
     row.spring = PETSC_TRUE;
     if (careful(g))
@@ -154,7 +153,7 @@ void SbFrictionRead(const SbFriction *f, SbSpace space, Touch *touch, PetscReal 
   }
 }
 
-/* The same with springs for a pair that cannot decide; N is halfway between this solve's and the one before. */
+/* The same with springs for a pair that alternates; N is the mean of this solve and the last. */
 static PetscReal settle_carefully(const SbFriction *f, PetscReal before, Touch *touch)
 {
   SbFrictionState *g = &touch->grip;
@@ -171,8 +170,8 @@ static PetscReal settle_carefully(const SbFriction *f, PetscReal before, Touch *
 }
 
 /*
-  What a pair does from now on; returns the error of its friction, N. With T the force against the slip s and a stiffness k, a trial force
-  is T + k s, or with springs k s alone. It slides where that is longer than mu N, with T = mu N along it; the derivative of that
+  Updates stick or slip of a pair; returns the error of its friction, N. With T the force opposing the slip s and a stiffness k, the trial force
+  is T + k s, or k s with springs. It slides where that is longer than mu N, with T = mu N along it; the derivative of that
   direction is the stiffness across it.
 */
 static PetscReal settle(const SbFriction *f, Touch *touch)
@@ -185,7 +184,7 @@ static PetscReal settle(const SbFriction *f, Touch *touch)
   slip(touch, s);
   for (int k = 0; k < 3; k++) trial[k] = touch->k * s[k] - (springs(f, g) ? 0 : g->drag[k]);
   size = PetscSqrtReal(SbDot3(trial, trial));
-  /* what slid backwards went too far */
+  /* slid backwards: sticks */
   g->slides = (PetscBool)(size > most && (!slid || SbDot3(trial, g->tangent[0]) >= 0));
   if (g->slides) {
     const PetscReal over = springs(f, g) ? size : PetscMax(size - most, STIFF * size);

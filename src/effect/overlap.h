@@ -1,5 +1,5 @@
 /*
-  overlap.h - penetration that is there when a step begins: how much of it is left when the step ends.
+  overlap.h - gradual resolution of penetration: fraction of the depth that remains at the end of a step.
 
   It decays to 1/e in `separation_steps` whole steps. A shorter step resolves less of it, at the same speed.
 */

@@ -1,9 +1,9 @@
 /*
-  pair_columns.c - columns of the history for each pair of bodies: what they do to each other.
+  pair_columns.c - columns of the history for each pair of bodies: contact forces and numbers of contacts.
 */
 #include "barrier.h"
 
-#define PAIRS 200 /* that the history may have columns for */
+#define PAIRS 200 /* most pairs with columns */
 
 static const char *const apart_names[] = {"force_x", "force_y", "force_z", "contacts"};
 static const char *const self_names[] = {"normal_force", "contacts"};

@@ -1,5 +1,5 @@
 /*
-  prescribed.c - unknowns with a prescribed displacement, and the force that keeps them there.
+  prescribed.c - unknowns with a prescribed displacement, and their reaction force.
 
   The unbalanced force r = M a + C v + f_int - f_ext of a prescribed unknown is what the support must
   exert: the support acts on the body with +r. A body hanging at rest under its weight m g pulls its support

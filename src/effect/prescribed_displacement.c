@@ -6,7 +6,7 @@
 
     u(X, t) = d(t, X) + sin(theta) k x r + 2 sin^2(theta/2) k x (k x r).
 
-  X being a vertex, or with CR and DG the centroid of a triangle. Written this way nothing cancels at small angles. Reaction: force of the effect on the body (prescribed.c has the
+  X being a vertex, or with CR and DG the centroid of a triangle. This form has no cancellation at small angles. Reaction: force of the effect on the body (prescribed.c has the
   sign); torque: moment of that force about the axis at rest, taken with the current positions.
 */
 #include "effect_impl.h"
@@ -71,7 +71,7 @@ static PetscErrorCode setup_displacement(SbEffect e, SbSpace space)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the turn by theta adds to a place X, without cancellation at small angles. */
+/* Displacement of X by the rotation theta, without cancellation at small angles. */
 static void turn(const PrescribedDisplacement *d, const PetscReal X[], PetscReal theta, PetscReal u[3])
 {
   const PetscReal r[3] = {X[0] - d->point[0], X[1] - d->point[1], X[2] - d->point[2]};
@@ -100,7 +100,7 @@ static PetscErrorCode prescribe_displacement(SbEffect e, SbSpace space, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Forces turn with the body, so their work is that of their moments over the angle; over the chord a constant moment would do but sin(angle) of it. */
+/* Forces rotate with the body, so their work is moment times angle; along the chord a constant moment would give only the factor sin(angle). */
 static PetscErrorCode turning_work_displacement(SbEffect e, SbSpace space, PetscReal t0, PetscReal t1,
                                                 const PetscReal r0[], const PetscReal r1[], PetscReal *work)
 {

@@ -1,5 +1,5 @@
 /*
-  pressure.c - a pressure on part of the surface, pushing inwards where it is positive.
+  pressure.c - a pressure on part of the surface, positive in compression.
 
   On a facet with current corners x0, x1, x2, counter-clockwise seen from outside, N = (x1 - x0) x (x2 - x0)
   is twice the outward area vector, and each corner receives
@@ -17,16 +17,16 @@
 
     -df_a = -p/2 int_R phi_a dx x w.
 
-  Where the rim is free the operator of the linear solver applies it, and the matrix preconditions. Newton's method without it converges
-  linearly, and not at all under a load that turns a body far round.
+  Where the rim is free the operator of the linear solver applies it, and the matrix is the preconditioner. Without it Newton's method
+  converges linearly, and not at all for large rotations.
 
   The facets of CR and DG bodies do not meet at their edges, so that forces facet by facet do not quite add up to
   zero. Where the pressure acts on the whole surface of such a body, it is taken as -p dV/du of the volume inside
   (src/fem/body_volume.c): at rest that is the same, and force and moment vanish for every displacement. On part of the
-  surface the gaps stay; they close with the mesh. There nothing cancels between facets: with CR the force stands at the facet's own
-  node, and N depends on the other three of the cell, so that the derivative has nothing opposite, and its symmetric part is wrong by as much as it is large.
-  Newton's method with it stalls near p = mu. The matrix gets none of it; the operator of the linear solver applies it
-  exactly, facet by facet, dN = sum_b w_b x c_b, and the matrix preconditions.
+  surface small gaps remain, which vanish with mesh refinement. There contributions of facets do not cancel: with CR the force acts at the facet's own
+  node, while N depends on the other three of the cell, so the derivative is far from symmetric.
+  Newton's method with its symmetric part stalls near p = mu. So the operator of the linear solver applies the derivative
+  exactly, facet by facet, dN = sum_b w_b x c_b, and the matrix, without it, is the preconditioner.
 
   A facet of P2 has six nodes and is curved once it moves. With X, Y its derivatives along two of its barycentric coordinates, and phi_a its basis,
 
@@ -42,7 +42,7 @@
 
 #define STRAIGHT 1e-9 /* relative: components of an edge below which it has none, as in a plane of symmetry */
 
-/* Where the surface under pressure ends, and its nodes are free to move: from, to, and between them (-1: none, it is straight). The
+/* An edge of the free rim of the surface under pressure: nodes from, to, and between them (-1: none, it is straight). The
    surface lies to the left, seen from outside. */
 typedef struct {
   PetscInt node[3];
@@ -52,15 +52,16 @@ typedef struct {
   SbFormula value;
   PetscBool follower;
   PetscInt nfacet, nedge;
-  SbFacet *facet;   /* [nfacet] of owned and ghost cells */
-  RimEdge *rim;     /* [nedge] of P1 and P2, with an owned node */
-  PetscBool *whole; /* [nbody] taken by its volume: its facets are not in the list */
+  SbFacet *facet; /* [nfacet] of owned and ghost cells */
+  RimEdge *rim;   /* [nedge] of P1 and P2, with an owned node */
+  PetscBool
+    *whole; /* [nbody] pressure acts on the whole body, by its volume: its facets are not in the list */
 } Pressure;
 
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose boundary facets are under pressure"},
   {"value", SB_OPTION_FORMULA, 1, "Pa", NULL, "",
-   "pressure, a formula of the time t; positive pushes inwards"},
+   "pressure, a formula of the time t; positive is compressive"},
   {"follower", SB_OPTION_BOOL, 1, "", "true", "",
    "follower load, on the current area and normal; if not, a dead load on those of the reference "
    "configuration"},
@@ -116,7 +117,7 @@ static RimEdge side_of(SbSpace space, const SbFacet *facet, PetscInt c)
   return e;
 }
 
-/* Whether the tangent has a part along the edge that supports leave. */
+/* Whether the tangent has a part along the edge, not eliminated by supports. */
 static PetscBool is_free(SbSpace space, const RimEdge *edge)
 {
   const PetscInt n = edge->node[2] < 0 ? 2 : 3;
@@ -336,7 +337,7 @@ static PetscErrorCode add_quadratic_tangent(SbSpace space, const SbFacet *facet,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether it meets no other facet at its edges, and its tangent is applied beside the matrix. */
+/* Whether it does not share edges with other facets (CR, DG): its tangent is applied outside the matrix. */
 static inline PetscBool apart(SbSpace space, const SbFacet *facet)
 {
   return (PetscBool)!SbSpaceCellElement(space, facet->cell)->nodes_per[0];

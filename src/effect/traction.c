@@ -17,7 +17,7 @@ typedef struct {
 } Traction;
 
 static const SbOption rows[] = {
-  {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose boundary facets carry the traction"},
+  {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets on whose boundary facets the traction acts"},
   {"vector", SB_OPTION_FORMULA, 3, "Pa", "0;0;0", "",
    "force per reference area, three formulas of t and the reference position x, y, z"},
   {"total", SB_OPTION_REALS, 3, "N", "0,0,0", "",

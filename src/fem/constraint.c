@@ -1,31 +1,32 @@
 /*
-  Constraints of single nodes beside prescribed unknowns: what contact with rigid obstacles needs. n . u = c exactly, or by a spring.
+  Constraints of single nodes, for contact with rigid obstacles: n . u = c exactly, or by a spring.
 
-  A node has up to three exact constraints, the lines of G, with the values c. Forces along the lines of F keep them: F = G but where the
-  node slides with friction mu, which pushes along n - mu d, d the direction of the slip. All of it is of the node alone: with
+  A node has up to three exact constraints, the rows of G, with the values c, and constraint forces along the rows of F: F = G unless the
+  node slides with friction mu, with a row n - mu d, d the direction of the slip. Node by node, with
 
     Q = F^T (G F^T)^-1 G,   P = I - Q
 
-  lambda = (G F^T)^-1 G r are the forces that a residual r asks for, P r is what they leave of it, P x keeps every sum, and
-  u + F^T (G F^T)^-1 (c - G u) is where they hold. Components that a support prescribes have no say in G and F. The solution is put where the
-  constraints hold before a solve; the solve then changes the rest only. Constraints that earlier ones of the node say already are left out.
+  lambda = (G F^T)^-1 G r are the multipliers for a residual r, P r is the projected residual, G P x = 0, and
+  u + F^T (G F^T)^-1 (c - G u) satisfies the constraints. Components prescribed by a support are removed from G and F. The solution is projected onto the
+  constraints before a solve, which then changes the rest only. Redundant constraints of a node are removed.
 
-  Solves see them in one of two ways.
+  Solves treat them in one of two ways.
 
   Projected into the matrix, where F = G (Baraff and Witkin 1998), with s the size of the diagonal block:
 
     A_ij <- P_i A_ij P_j,   A_ii += s_i Q_i
 
-  Beside the matrix K, with springs F^T k G and where F is not G (Gould, Hribar, Nocedal 2001, On the solution of equality constrained
-  quadratic programming problems arising in optimization): A = P (K + F^T k G) P, M_A^-1 = P M^-1 P. Every preconditioner M of K serves, and neither K nor M are renewed when
-  constraints come and go. (src/solver/constraint_operator.c; by a factorisation: saddle_factor.c.)
+  Outside the matrix K, with springs F^T k G and where F is not G (Gould, Hribar, Nocedal 2001, On the solution of equality constrained
+  quadratic programming problems arising in optimization): A = P (K + F^T k G) P, M_A^-1 = P M^-1 P. Any preconditioner M of K can be used, and neither K nor M changes with the
+  active set. (src/solver/constraint_operator.c; by a factorisation: saddle_factor.c.)
 */
 #include "fem_impl.h"
 #include "sbconstraint.h"
 #include "sbkernel.h"
 
-#define SAID 1e-6    /* squared part outside the span of the node's others; below it these say it already */
-#define NO_SAY 1e-12 /* squared length of what supports leave of a direction; below it nothing is left */
+#define SAID \
+  1e-6 /* squared part outside the span of the node's other constraints below which it is redundant */
+#define NO_SAY 1e-12 /* squared length of the free part of a direction that counts as zero */
 
 PetscErrorCode SbSpaceCreateConstraints(SbSpace s, PetscBool beside, PetscBool nonsymmetric)
 {
@@ -74,7 +75,7 @@ void SbSpaceClearConstraints(SbSpace s)
   c->n = 0;
 }
 
-/* v without what a support prescribes. */
+/* v without components prescribed by a support. */
 static void free_part(SbSpace s, PetscInt node, const PetscReal v[3], PetscReal part[3])
 {
   for (int k = 0; k < 3; k++) part[k] = s->fixed[node] & (1 << k) ? 0. : v[k];
@@ -125,7 +126,7 @@ PetscErrorCode SbSpaceAddConstraint(SbSpace s, const SbConstraint *constraint, P
     PetscReal G[9], g[3], b[3] = {0}, x[3], full;
     const int n = exact_constraints(s, node, others, G, NULL);
 
-    /* what the node's others leave of it */
+    /* its part outside the span of the node's others */
     free_part(s, node, constraint->n, g);
     full = SbDot3(g, g);
     if (n == 3 || full < NO_SAY) PetscFunctionReturn(PETSC_SUCCESS);
@@ -242,7 +243,7 @@ PetscErrorCode SbSpaceProjectAdmissible(SbSpace s, Vec z)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* x <- where the sums of the exact constraints are the values, or the velocities. */
+/* Projects x onto the exact constraints, with their values or velocities. */
 static void move(SbSpace s, PetscBool velocities, PetscReal x[])
 {
   const SbConstraints c = s->constraints;
@@ -383,8 +384,8 @@ void SbConstraintsProjectBlock(SbSpace s, PetscInt i, PetscInt j, size_t rs, siz
 }
 
 /*
-  A body that only constraints support makes K singular, which no factorisation takes. In a static run K gets s_i times the squares of
-  the directions' components on its diagonal, s_i the size of the node's block; solves take it away again, so that only M knows of it.
+  If only constraints support a body K is singular. In a static run K is regularised by s_i times the squares of
+  the directions' components on its diagonal, s_i the size of the node's block; the operator subtracts it again, so that only M contains it.
 */
 static void anchor(SbSpace s, const SbValues *x)
 {

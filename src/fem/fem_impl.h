@@ -1,5 +1,5 @@
 /*
-  fem_impl.h - what the files of src/fem share: the assembly plan and the gather of a batch.
+  fem_impl.h - shared by the files of src/fem: the assembly plan and the gather of a batch.
 */
 #pragma once
 #include "sbassembly.h"
@@ -13,17 +13,17 @@ PetscErrorCode SbLayoutDestroy(SbSpace space);
 typedef enum { SB_JUMP_STIFFNESS, SB_JUMP_DAMPING } SbJumpFactor;
 PetscErrorCode SbJumpCreate(SbSpace space, SbJump *jump);
 PetscErrorCode SbJumpDestroy(SbJump *jump);
-/* f[nnode][3] += (factor) K_F x, as displacements less what the step leaves out of jumps; right on owned nodes. x[nnode][3] with ghosts. */
+/* f[nnode][3] += (factor) K_F x, x displacements, whose jumps are reduced by the offsets r; right on owned nodes. x[nnode][3] with ghosts. */
 void SbJumpAdd(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal f[]);
-/* Its energy, 1/2 x . (factor) K_F x, this rank's part. */
+/* The energy 1/2 x . (factor) K_F x of the face terms, this rank's part, J. */
 PetscReal SbJumpEnergy(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal body[]);
 /* node[nbatch][8][SB_BATCH] of the faces, borrowed; returns nbatch. */
 PetscInt SbJumpCliques(SbSpace space, const PetscInt **node);
-/* What the penalty of jumps follows is made that of the state: whether a cell on this rank asks for another than before, or faces leave out parts of jumps, which turn. */
+/* Updates the moduli m of the penalty by the state: whether one changed on this rank, or faces have offsets r, which rotate. */
 PetscBool SbJumpFollow(SbSpace space, const PetscReal x[], SbStepsOf steps);
 /* Whether this is the first call, and SbJumpSetStiffness() has not been called. */
 PetscBool SbJumpBegin(SbSpace space);
-/* Then the penalties; with x the energies of faces there stay as they were, or, first, their forces; else they are those of whole jumps. changed: set where one on this rank is another by a percent or more. */
+/* Then the penalties; with x the energies of faces there are kept, or, first, their forces; else r = 0. changed: set if one changed on this rank by a percent or more. */
 PetscErrorCode SbJumpRenew(SbSpace space, const PetscReal x[], PetscBool first, PetscBool *changed);
 /* As SbSpaceGetJumps() says; and back, k[5 ncell] with ghosts, before SbJumpRenew(). */
 void SbJumpStiffness(SbSpace space, const PetscReal x[], PetscReal k[]);
@@ -31,7 +31,7 @@ void SbJumpSetStiffness(SbSpace space, const PetscReal k[]);
 /* The matrix of the face in lane l of batch b, times the 3x3 identity; zero in padding. */
 void SbJumpMatrix(SbSpace space, PetscInt b, PetscInt l, PetscReal K[8][8]);
 
-/* plan.c. Where a cell begins in SbPlan.offset: block (a, b) follows at SB_BATCH (width a + b). */
+/* plan.c. Start of a cell in SbPlan.offset: block (a, b) follows at SB_BATCH (width a + b). */
 size_t SbPlanCellOffset(SbSpace space, PetscInt cell);
 PetscErrorCode SbPlanDestroy(SbPlan *plan);
 
@@ -97,7 +97,7 @@ SB_INLINE const SbPointRule *SbVolumeRule(const SbPoints *at)
 {
   return at->step ? at->rule : &SbRuleCubic;
 }
-/* What a law says at the points of a cell. P (Pa), psi (J/m^3), pressure (Pa, compression) may be NULL. */
+/* Evaluates the law at the points of a cell. P (Pa), psi (J/m^3), pressure (Pa, compression) may be NULL. */
 void SbBatchState(SbSpace space, const SbRegion *region, PetscInt b, const PetscReal x[],
                   SbPack F[SB_POINTS][9], SbPack P[SB_POINTS][9], SbPack psi[SB_POINTS],
                   SbPack pressure[SB_POINTS]);
@@ -113,7 +113,7 @@ void SbInsertBatch(SbSpace space, const SbValues *x, PetscInt b, int npair, cons
 /* The same for DG cells, whose blocks stand between the means of their faces. */
 void SbInsertBroken(SbSpace space, const SbValues *x, PetscInt b, const SbPack K[10][9]);
 
-/* constraint.c: projects an assembled matrix, or makes it regular. Not collective. */
+/* constraint.c: projects an assembled matrix, or regularises it. Not collective. */
 void SbConstraintsFinishTangent(SbSpace space, const SbValues *x);
 PetscErrorCode SbConstraintsDestroy(SbConstraints *constraints);
 

@@ -1,5 +1,5 @@
 /*
-  The face terms of CR and DG: what holds the two sides of a face together beyond the means that they share.
+  The face terms of CR and DG: penalty on the jump across a face.
 
   On a face F between cells + and -, with [u] the jump and [u]_0 its mean,
 
@@ -18,21 +18,21 @@
   dW/dJ_i = c1 J_i + (c1 + c0) sum J,  c1 = kappa1 |F| / 12,  c0 = kappa0 |F| / 9, is spread over the eight nodes as J was
   gathered. For CR the two sides have the node of the face in common, and its parts cancel.
 
-  Under compression mu is not enough. A law whose energy has a part that depends on det F, or on another function of F that is not convex, has twists
+  Under compression mu is not sufficient. A law whose energy depends on det F, or on another non-convex function of F, has twist modes
   with a negative stiffness (P_i + P_j) / (s_i + s_j), P_i and s_i principal values of the first Piola stress and of F: under an even pressure p that is mu - p. For
-  continuous displacements the sum of these over the cells vanishes but for the boundary; for broken ones it is jumps that have to balance it. So
+  continuous displacements the sum of these over the cells vanishes but for the boundary; for discontinuous ones the penalty has to balance it. So
 
     kappa1 = gamma1 H(2 m |F| / V),   m = max(mu, FOLLOW max_ij -(P_i + P_j) / (s_i + s_j)),
 
   with the state before the step, so that within a step the terms are constant, and their energy a quadratic one. A dependence on the state of the
   step itself would have to be differentiated: the energy of jumps would become a pressure of its own, lambda times as large as it should be.
 
-  In time that is the rate of a force, and twice as large: from step to step the energy of a face stays as it was, that of [u] - r, r the part of the jump
-  at the start of the step that leaves it. A kappa1 for whole jumps would put in 1/2 (kappa1' - kappa1) int |[u]|^2 with every step, and pump where it goes
-  up and down with waves of pressure. So that a body at rest has no force, that of a jump is along it and belongs to a part between (kappa1 with m = mu / kappa1)^2
-  and all of it. What the upper bound cuts is lost; the lower one gives little. Load steps, which may be long, have r = 0: their end shall depend on the loads alone. A dynamic run
-  that begins in a state which no step has led to has the forces of a load step there. With Newmark, which damps nothing, m never falls: near nu = 1/2 it
-  would go up and down a hundredfold with each wave.
+  In time steps kappa1 is a tangent, and twice as large: at the start of a step the energy of a face is kept as that of [u] - r, with an offset r
+  of the jump. With r = 0 every change of kappa1 would add 1/2 (kappa1' - kappa1) int |[u]|^2, and waves of pressure would pump
+  energy. So that a body at rest has no force, [u] - r is along [u], with a factor between (kappa1 with m = mu / kappa1)^2
+  and one. The upper bound dissipates, the lower one adds little. Load steps, which may be long, have r = 0, so that their result depends on the loads alone; so has the start of a
+  dynamic run from a given state. With Newmark, without damping, m never falls: near nu = 1/2 it
+  would change a hundredfold with each wave.
 
   A boundary face with a support (layout.c): the other side is constant, the displacement of the support, and infinitely
   stiff. H(k) is 2 k then; there is no kappa1, because supports prescribe means.
@@ -41,9 +41,9 @@
 #include "sbkernel.h"
 
 #define FOLLOW \
-  4. /* factor on the negative stiffness that the penalty of load steps follows; docs/reference/theory.md */
+  4. /* factor on the negative stiffness in the penalty of load steps; docs/reference/theory.md */
 #define RATE \
-  2. /* and on that, of steps in time: a force that grows with the jump has the mean of its rates */
+  2. /* further factor in time steps: the secant stiffness of a growing penalty is about half its tangent */
 #define LEAST \
   1e-3 /* sum of two stretches below which a cell is inverted or a line, and has no stiffness against twists */
 #define RENEWED 0.01 /* relative change of a penalty that counts as one */
@@ -66,7 +66,7 @@ struct _p_SbJump {
   PetscInt *node;   /* [nbatch][8][SB_BATCH]; padding lanes repeat the first face */
   SbPack *c0, *c1;  /* [nbatch] N/m; zero in padding */
   SbPack *r;        /* [nbatch][9] m; NULL before a kappa1 follows in a dynamic run */
-  PetscBool began;  /* steps in time, or what a checkpoint says of them, have led here */
+  PetscBool began;  /* the state follows from time steps, or from a checkpoint of them */
   PetscBool renew;  /* a checkpoint says that faces are not those of the rest state */
   SbPack *share;    /* [nbatch] how much of a face's energy this rank counts: 1, or 1/2 between ranks */
 };
@@ -203,7 +203,7 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Raises the moduli of n cells to what twists ask for, times a factor, at F, under the first Piola stress P. */
+/* Raises the moduli of n cells to the negative stiffness of twist modes times a factor, at F, with the first Piola stress P. */
 static void follow_twists(PetscInt n, const SbPack F[9], const SbPack P[9], PetscReal factor,
                           PetscReal modulus[])
 {
@@ -270,7 +270,7 @@ SB_INLINE void gather_jumps(const PetscInt node[8 * SB_BATCH], const PetscReal x
   }
 }
 
-/* How much of the jumps J of a face at x its force belongs to: the part along them in the product of the energy, which is never more. */
+/* Fraction of the jumps J of a face at x that its force belongs to: the component along J in the product of the energy, at most one. */
 static PetscReal held_part(SbJump j, PetscInt b, PetscInt l, const PetscReal x[], PetscReal J[9])
 {
   PetscReal sum[3], square = 0., along = 0.;
@@ -421,7 +421,7 @@ SB_KERNEL static void jump_forces(const PetscInt node[restrict 8 * SB_BATCH],
   }
 }
 
-/* What is left out of the jumps of a batch; of velocities nothing. */
+/* The offsets r of a batch; none for velocities. */
 static const SbPack *left_out(SbJump j, PetscInt b, SbJumpFactor factor)
 {
   static const SbPack nothing[9];

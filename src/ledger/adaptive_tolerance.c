@@ -1,5 +1,5 @@
 /*
-  The two adaptive tolerances: -accuracy sets what decides the error from the error that is asked for, -step_time_budget from the seconds that a step may take.
+  Adaptive tolerances: -accuracy by a target error, -step_time_budget by a limit on the seconds of a step.
 
   -accuracy e: steps are as long as the integrator's loss allows, which is shared out over the run (TSAdapt, error per unit of time), and the
   solves leave a tenth of e, which the estimate of each step holds them to. The mesh is as it is.

@@ -1,6 +1,6 @@
 /*
-  What the estimates ask of the run: how far to move along a direction so that differences of forces are the tangent's, and
-  solves with the tangent of the last step.
+  Services for the estimates: step lengths of finite differences of forces, and
+  solves with the last tangent.
 */
 #include "ledger_impl.h"
 

@@ -1,19 +1,19 @@
 /*
-  What contact left open. A force on a point whose gap is not closed would do the work force times gap if it were: half of it (forces grow from zero)
-  bounds the energy of the error from above, but a body that springs let down as a whole is not strained by that.
+  Error by gaps or penetration in contact. Closing a gap would do the work force times gap: half of it (forces grow from zero)
+  bounds the energy of the error, but a rigid displacement by deflection of springs is not a strain.
 
-  Springs, then, are examined closer. With F what they exert, one more step of Uzawa's iteration, (K + springs) delta = F, moves the body to
+  So springs are estimated more closely. With F their forces, one more step of Uzawa's iteration, (K + springs) delta = F, moves the body to
   where the exact contact would hold it, up to the ratio of its stiffness to theirs; the elastic energy of delta is that of the error.
 
-  The gaps of a barrier go with its width: (K + H) delta = sum b'' g n (src/effect/barrier_forces.c) is by how much the state is off. K holds inertia in a dynamic run: there delta is what a step can
-  move, and the error is that against the same steps without gaps.
+  The gaps of a barrier are proportional to its width: (K + H) delta = sum b'' g n (src/effect/barrier_forces.c) is the error of the state. K includes inertia in a dynamic run: there the
+  error is relative to the same step without gaps.
 */
 #include "ledger_impl.h"
 #include "sbkernel.h"
 
 #define CLOSELY 1e-3 /* delta is nearly the gap, and what strains is the difference */
 
-/* Elastic energy of what the forces F move bodies and contact by. */
+/* Elastic energy of the displacement of bodies and contact by the forces F. */
 static PetscErrorCode moved_energy(SbLedger l, Vec U, Vec F, PetscReal *energy)
 {
   PetscReal length, work[2];

@@ -1,5 +1,5 @@
 /*
-  What the solves of a step left: with F the residual of its equations at the solution and J their tangent, the correction that is missing is
+  Error of the solves of a step: with F the residual of its equations at the solution and J their tangent, the missing correction is
   delta = J^-1 F, and the energy of the error 1/2 delta . F (of state: J holds inertia, too). One more solve, to a tenth, gives it: a
   fraction of the iterations of the step.
 
@@ -8,7 +8,7 @@
 */
 #include "ledger_impl.h"
 
-#define ROUGHLY 0.1 /* of delta: how well it is solved for */
+#define ROUGHLY 0.1 /* relative tolerance of delta */
 
 /* What the next step leaves of an error like delta, in which inertia has the share shift_a delta.M delta of the energy delta.J delta: of an oscillation of
    the frequency w implicit Euler leaves 1 / (1 + (w h)^2)^(1/2), which is the root of that share. Other methods do not damp so, but

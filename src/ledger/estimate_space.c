@@ -1,5 +1,5 @@
 /*
-  estimate_space.c - the error of the space discretisation, from the stresses that the elements have.
+  estimate_space.c - the error of the space discretisation, by recovery of the elements' stresses.
 
   Recovery. P_h is the first Piola-Kirchhoff stress of the cells, constant in each; for DG that of the gradient of the means. P* is linear in each
   cell with the values that recovery.c finds at the vertices. The error of a cell is taken to be that of P_h as an approximation of P*:
@@ -38,7 +38,7 @@
 
   Limits. The norm is that of Hooke's law in the cell's own frame: for strains of order one it is not the tangent's. theta takes
   supports that turn by large angles for ones that do work, and the force of one body on another for a support: a locked body is
-  estimated too low then. Where a mesh is too coarse to show the shape of the answer nothing here knows it.
+  estimated too low then. Features that the mesh does not resolve at all are not detected.
   In a dynamic run the error is that of the state of the moment: against the continuum under the loads and inertia of this moment (elliptic
   reconstruction, Makridakis and Nochetto, SIAM J. Numer. Anal. 41, 2003), not what has added up since the start.
 */

@@ -1,5 +1,5 @@
 /*
-  What the integrator loses. With E_j the energy of the j-th derivative of the state (u, v), 1/2 d.K d + 1/2 d'.M d' for d = u^(j), a step of
+  Error of the integrator. With E_j the energy of the j-th derivative of the state (u, v), 1/2 d.K d + 1/2 d'.M d' for d = u^(j), a step of
   a method of order p loses c h^(p+1) E_(p+1)^(1/2): its eigenvalue z for an oscillator of the frequency w has |z - exp(i w h)| = c (w h)^(p+1), and
   each derivative multiplies the motion by w.
 

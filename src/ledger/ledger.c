@@ -1,16 +1,16 @@
 /*
   The ledger of a run: when estimates are made, and how the errors of steps add up.
 
-  What a step loses is carried on by the motion, which keeps its energy or, with damping, takes from it as it takes from the motion itself: so the errors of
-  steps are summed in the norm of the energy ("Lady Windermere's fan": Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.3).
+  The motion propagates the error of a step with constant energy or, with damping, with that of the motion itself: so the errors of
+  steps are summed in the energy norm ("Lady Windermere's fan": Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.3).
 
-  Steps are examined as long as estimates stay below a fixed share of the run's work, counted in residuals, not in seconds: two runs examine
- the same steps. A step that was not examined loses what the last one lost; with -accuracy the integrator's loss of each is known.
+  Steps are examined as long as estimates stay below a fixed share of the run's work, counted in residuals, not in seconds: repeated runs examine
+  the same steps. A step that was not examined loses what the last one lost; with -accuracy the integrator's loss of each is known.
 */
 #include "ledger_impl.h"
 #include "sblog.h"
 
-#define SHARE 0.08    /* of the work may go into estimates */
+#define SHARE 0.08    /* largest fraction of the work for estimates */
 #define SPACE_WORK 6. /* residuals that the estimate of space costs */
 
 static const SbOption rows[] = {

@@ -136,10 +136,10 @@ static void say_quadratic(SbLedger l, PetscReal price_of_half, char w[ROOM])
 static void say_largest(SbLedger l, const SbLedgerSeconds *s, char w[ROOM])
 {
   static const char *const what[SB_ERROR_COUNT] = {
-    "the mesh is the largest source of error: half of it takes edges of %.3g times the length",
-    "the time step is the largest source of error: half of it takes steps of %.3g s",
-    "Newton's method stops too early: half of its error takes a smaller -snes_rtol",
-    "the linear solver is the largest source of error: half of it takes a smaller -ksp_rtol",
+    "the mesh is the largest source of error: halving it takes edges of %.3g times the length",
+    "the time step is the largest source of error: halving it takes steps of %.3g s",
+    "Newton's method stops too early: halving its error takes a smaller -snes_rtol",
+    "the linear solver is the largest source of error: halving it takes a smaller -ksp_rtol",
     "contact is the largest source of error: a smaller -effect_..._barrier_width, or response projected",
     "rounding is the largest source of error: only other units or a smaller range of stiffnesses helps"};
   const int most = largest(l);
@@ -152,7 +152,7 @@ static void say_largest(SbLedger l, const SbLedgerSeconds *s, char w[ROOM])
   SbAppend(ROOM, w, "Of an error of %.2g %%, ", (double)(100. * together(l) / PetscSqrtReal(l->stored)));
   if (most == SB_ERROR_TIME)
     SbAppend(
-      ROOM, w, "the time step is the largest source: half of it takes steps of %.3g s",
+      ROOM, w, "the time step is the largest source: halving it takes steps of %.3g s",
       (double)(run->t_end / PetscMax(1, run->steps_total) / PetscPowReal(2., 1. / (PetscReal)l->order)));
   else if (most == SB_ERROR_SPACE)
     SbAppend(ROOM, w, what[most], (double)PetscPowReal(0.5, 1. / order_of_space(l)));

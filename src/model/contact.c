@@ -1,5 +1,5 @@
 /*
-  Contact around the solves of a step: who touches, what is constrained, whether that was right.
+  Active-set iteration of contact: constraints before a solve of a step, update of the active set after it.
 */
 #include "model_impl.h"
 #include "sblog.h"
@@ -19,7 +19,7 @@ PetscErrorCode SbModelContactResume(SbModel m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The constraints of all effects, and U is moved to where they hold. */
+/* Assembles the constraints of all effects, and projects U onto them. */
 static PetscErrorCode constrain(SbModel m, PetscReal t, Vec U)
 {
   PetscFunctionBeginUser;
@@ -68,7 +68,7 @@ PetscErrorCode SbModelContactUpdateActiveSet(SbModel m, PetscReal t, Vec U, Vec 
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, again, 1, SB_MPI_BOOL, MPI_LOR, m->comm));
   if (m->nrestitution && !*again && !m->space->rough) PetscCall(SbModelRestitutionUpdate(m, U, again));
-  /* a look changes normals and weights: constraints that are solved again are those of the last search */
+  /* a search changes normals and weights: repeated solves have the constraints of the last one */
   if (*again || m->space->rough) PetscCall(constrain(m, t, U));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);

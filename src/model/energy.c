@@ -1,6 +1,6 @@
 /*
   Energies and momenta of one instant: 1/2 v.M v, the strain energy of the laws, sum m v, sum x cross m v with the current
-  positions x = X + u, the centre of mass, and the extremes that show whether a run is healthy. One reduction each for sums,
+  positions x = X + u, the centre of mass, and the extremes that indicate problems. One reduction each for sums,
   maxima and minima.
 
   With the consistent mass the kinetic energy and the momenta use it too; the centre of mass is the same for both.
@@ -143,7 +143,7 @@ PetscErrorCode SbModelCentres(SbModel m, Vec U, PetscReal centre[][4])
 }
 
 /*
-  Power taken by Rayleigh damping, v . C v, J/s: alpha v.M v + beta v.K(u) v per region. Owned cells, summed over ranks.
+  Power dissipated by Rayleigh damping, v . C v, J/s: alpha v.M v + beta v.K(u) v per region. Owned cells, summed over ranks.
 */
 PetscErrorCode SbModelDampingPower(SbModel m, Vec U, Vec V, PetscReal *power)
 {

@@ -38,7 +38,7 @@ PetscErrorCode SbModelDestroy(SbModel *model)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An inclusion without tets is a slip of the pen. */
+/* An inclusion without tets is an error. */
 static PetscErrorCode check_inclusions(SbModel m)
 {
   PetscInt *count;
@@ -61,7 +61,7 @@ static PetscErrorCode check_inclusions(SbModel m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A body that was re-meshed has the mass that it had. */
+/* Scales densities so that a re-meshed body keeps its mass. */
 static PetscErrorCode match_mass(SbModel m, PetscInt b)
 {
   const SbMesh mesh = m->mesh;
@@ -86,7 +86,7 @@ static PetscErrorCode match_mass(SbModel m, PetscInt b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Effects that have the operation, in scenario order; the lists lie one behind the other in m->lists, which has room for NLIST. */
+/* Effects that have the operation, in scenario order; the lists are consecutive in m->lists, of NLIST lists. */
 #define NLIST 12
 #define SORT_INTO_LIST(m, op)                                               \
   do {                                                                      \
@@ -118,7 +118,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
   }
   for (PetscInt k = 0; k < m->nmaterial; k++)
     m->may_filter = (PetscBool)(m->may_filter || m->material[k]->adaptive);
-  /* supports that do not act now are none */
+  /* skip supports that do not act at this time */
   for (PetscInt e = 0; e < m->neffect; e++) {
     SbEffect effect = m->effect[e];
 
@@ -131,7 +131,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
   m->load = 1.;
   m->linear = m->space->linear;
-  /* supports first: others ask which unknowns are prescribed */
+  /* supports first: other effects need the prescribed unknowns */
   for (PetscInt k = 0; k < 2 * m->neffect; k++) {
     const PetscBool supports = (PetscBool)(k < m->neffect);
     SbEffect effect = m->effect[k % m->neffect];
@@ -161,7 +161,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The arrays of an evaluation. Ghosts of v and a are brought only where something reads them. */
+/* The arrays of an evaluation. Ghosts of v and a are updated only if needed. */
 static PetscErrorCode stage_begin(SbModel m, PetscReal t, Vec U, Vec V, Vec A, SbStage *stage)
 {
   PetscFunctionBeginUser;
@@ -220,7 +220,7 @@ PetscErrorCode SbModelExternalForces(SbModel m, const SbStage *stage, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every initial guess carries the prescribed values and no solve changes them: nothing is left to do in their rows. */
+/* Zero residuals at prescribed unknowns: every initial guess has the prescribed values, and no solve changes them. */
 static void constrain_residual(SbSpace s, PetscReal f[])
 {
   for (PetscInt k = 0; k < s->nfixed; k++) {

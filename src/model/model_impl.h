@@ -1,11 +1,11 @@
 /*
-  model_impl.h - what the files of src/model share.
+  model_impl.h - shared by the files of src/model.
 */
 #pragma once
 #include "sbmodel.h"
 
-/* restitution.c, for SbModelContactBeginStep() and SbModelContactUpdateActiveSet(): Begin starts an attempt at a step; Update, once the active set is right, sees to the energy: `again` when
-   coefficients had to be reduced. Collective. */
+/* restitution.c, for SbModelContactBeginStep() and SbModelContactUpdateActiveSet(): Begin starts an attempt at a step; Update, once the active set has converged, checks the energy: `again` when
+   coefficients were reduced. Collective. */
 void SbModelRestitutionBegin(SbModel model, PetscReal dt, Vec U0, Vec V0);
 PetscErrorCode SbModelRestitutionUpdate(SbModel model, Vec U, PetscBool *again);
 /* model.c: f[nnode][3] = sign * f_ext, N; apart: without barrier contact. Not collective. */

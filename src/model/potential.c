@@ -1,5 +1,5 @@
 /*
-  The potential of contact, response barrier, as Newton's method sees it: all effects that have it together.
+  The potential of barrier contact for Newton's method: sums over the effects with this response.
 */
 #include "model_impl.h"
 #include "sblog.h"
@@ -12,11 +12,11 @@
     PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));   \
   } while (0)
 
-#define ROUNDS 20   /* rounds of moving bodies in initial contact apart, at most */
+#define ROUNDS 20   /* most iterations of moving bodies in initial contact apart */
 #define SWEEPS 1000 /* Gauss-Seidel sweeps over the contacts in each round */
-#define FAR 2.      /* of the target gap: how far a round moves bodies at most */
+#define FAR 2.      /* largest displacement of a body in an iteration, over the target gap */
 #define CLOSE 0.9   /* of the target gap: nearer counts as contact */
-#define MISSED 1e-3 /* of the target gap: by which a sweep may miss it */
+#define MISSED 1e-3 /* of the target gap: tolerance of the sweeps */
 
 static int by_value(const void *a, const void *b)
 {
@@ -28,7 +28,7 @@ static int by_value(const void *a, const void *b)
   return 0;
 }
 
-/* What touches on any rank, the same on all and in an order that no partition changes: bodies, direction, gap and the one to have. */
+/* Initial contacts of all ranks, in an order that does not depend on the partition: bodies, direction, gap, target gap. */
 static PetscErrorCode gather_touches(MPI_Comm comm, const SbInitialContacts *mine, PetscInt *n,
                                      PetscReal (**all)[7])
 {
@@ -51,7 +51,7 @@ static PetscErrorCode gather_touches(MPI_Comm comm, const SbInitialContacts *min
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How far the sides of a touch are apart after the motions of both bodies, m. */
+/* Gap of a contact after the displacements `way` of both bodies, m. */
 static PetscReal gap_after(const PetscReal touch[7], const PetscReal way[])
 {
   const PetscReal *one = way + 3 * (PetscInt)touch[0], *two = way + 3 * (PetscInt)touch[1];
@@ -59,7 +59,7 @@ static PetscReal gap_after(const PetscReal touch[7], const PetscReal way[])
   return touch[5] + SbDot3(touch + 2, one) - SbDot3(touch + 2, two);
 }
 
-/* Each touch in turn moves both of its bodies along its direction, again and again, but for fixed components: way[nbody + 1][3], m. */
+/* Gauss-Seidel: each contact in turn moves its bodies along its direction, but for fixed components; way[nbody + 1][3]: displacements, m. */
 static void sweep_touches(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, const uint8_t fixed[],
                           PetscReal way[])
 {
@@ -88,9 +88,9 @@ static void sweep_touches(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, con
 }
 
 /*
-  Motions of bodies after which what touches has the gaps it is to have, as far as prescribed components let them. Bodies between others that leave no room for that
-  stay. None is longer than a few gaps; within those all that is near was told. fixed[nbody + 1]: bit c, the component is prescribed or, from now on, stays;
-  way[nbody + 1][3], m; moved: there is something to do.
+  Displacements of bodies that open all contacts to their target gaps, as far as prescribed components allow. Bodies without room between others
+  stay. Displacements are limited to a few gaps, the distance within which contacts are known. fixed[nbody + 1]: bit c, component c is prescribed or, from now on, stays;
+  way[nbody + 1][3], m; moved: some body moves.
 */
 static void find_ways(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, uint8_t fixed[], PetscReal way[],
                       PetscBool *moved)
@@ -110,7 +110,7 @@ static void find_ways(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, uint8_t
   }
   if (!*moved) return;
 
-  /* nothing may come nearer than it was: bodies for which it would have no room */
+  /* no gap may become smaller: such bodies stay */
   do {
     again = PETSC_FALSE;
     sweep_touches(n, touch, nbody, fixed, way);
@@ -125,7 +125,7 @@ static void find_ways(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, uint8_t
     }
   } while (again);
 
-  /* not too far at once */
+  /* limit the displacement */
   for (PetscInt b = 0; b <= nbody; b++)
     longest = PetscMax(longest, PetscSqrtReal(SbDot3(way + 3 * b, way + 3 * b)));
   *moved = (PetscBool)(longest > MISSED * most);
@@ -134,8 +134,8 @@ static void find_ways(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, uint8_t
 }
 
 /*
-  Bodies that touch each other or an obstacle when a run begins are moved apart as they are, without strain, to where nothing pushes them in a dynamic run. What that
-  does not part, effects part by their vertices. u: local displacements, written.
+  Initial contact: moves touching bodies apart rigidly, in a dynamic run until the barrier does not act. Effects move the vertices of remaining contacts.
+  u: local displacements, changed.
 */
 static PetscErrorCode move_apart(SbModel m, PetscReal t, PetscReal dt, PetscReal u[], PetscBool *moved)
 {
@@ -177,7 +177,7 @@ static PetscErrorCode move_apart(SbModel m, PetscReal t, PetscReal dt, PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A copy of U with ghosts that may be written; what was written goes back into U. */
+/* A copy of U with ghosts, for writing; close_state() copies it back. */
 static PetscErrorCode open_state(SbModel m, Vec U, Vec *local, PetscReal **u)
 {
   PetscFunctionBeginUser;
@@ -216,8 +216,8 @@ PetscErrorCode SbModelPotentialStart(SbModel m, PetscReal t, PetscReal dt, Vec U
 }
 
 /*
-  The speed V of a step from t to t + dt, m/s, by which tolerances of barrier contact are judged in any units: m V^2 / 2 is the energy that bodies of the mass m have when it begins,
-  of motion and of strain, and half of what all loads and supports together do over the size of the smallest body.
+  The speed V of a step from t to t + dt, m/s, which scales tolerances of barrier contact: m V^2 / 2 is the kinetic and strain energy of the bodies, of mass m, at its start,
+  plus half of the work of all loads and support forces over the size of the smallest body.
 */
 static PetscErrorCode step_speed(SbModel m, PetscReal t, PetscReal dt, Vec U, Vec V, PetscReal *speed)
 {
@@ -235,7 +235,7 @@ static PetscErrorCode step_speed(SbModel m, PetscReal t, PetscReal dt, Vec U, Ve
   PetscCall(SbModelExternalForces(m, &stage, PETSC_TRUE, 1., f));
   for (PetscInt i = 0; i < s->nnode_owned; i++) load += PetscSqrtReal(SbDot3(f + 3 * i, f + 3 * i));
 
-  /* what supports bear: forces of the strains at nodes of theirs */
+  /* support forces: internal forces at prescribed nodes */
   if (m->nprescribe) {
     PetscCall(PetscArrayzero(f, 3 * s->nnode));
     PetscCall(SbSpaceAddInternalForce(s, &stage, f));
@@ -269,7 +269,7 @@ PetscErrorCode SbModelPotentialBegin(SbModel m, PetscReal t, PetscReal dt, Vec U
   }
   PetscCall(close_state(m, U0, moved, &local, &u));
 
-  /* what bounces in this step */
+  /* impacts of this step */
   if (m->nrestitution && V0) {
     const PetscReal *u0, *v0;
 

@@ -1,30 +1,29 @@
 /*
-  Restitution: what two things that meet within a step have left of their speed, and that a step gains no energy by it.
+  Restitution: the relative speed after an impact within a step, and a limit on it so that no step gains energy.
 
   Newton's law in Moreau's form (Moreau 1988; Jean, "The non-smooth contact dynamics method", CMAME 177, 1999) for the normal velocity of
-  a point of a body relative to an obstacle or to its position on another body: v+ + e v- >= 0, force >= 0, and one of them zero, for what would
-  be behind the other at the end of the step, with the velocity v- or by what the solves find. v- is the velocity when the step begins.
+  a point of a body relative to an obstacle or to its position on another body: v+ + e v- >= 0, force >= 0, and one of them zero, for pairs that would
+  penetrate at the end of the step, by the velocity v- or in a solve. v- is the velocity at the start of the step.
   Implicit Euler has v+ = (gap1 - gap0) / h: the pair is constrained at
 
       gap1 = gap0 + h e |v-|,
 
-  or let go when that takes a pull and it moves beyond; in the next step it is free. Force and elasticity are solved for together, so what
-  bounces is all that moves with the point within a step: a body that is stiff against its inertia, sqrt(k/m) h >> 1, bounces as a
-  whole. In a soft one the point's share is small, whatever e is; it bounces by its elasticity (Doyen, Ern, Piperno, SIAM J. Sci.
-  Comput. 33, 2011). The effects see to this (src/effect/restitution.h, barrier_bounce.c).
+  or released if that needs a tensile force; in the next step it is free. Force and elasticity are solved together, so
+  the whole body bounces if it is stiff relative to its inertia, sqrt(k/m) h >> 1. In a soft one only the neighbourhood of the point does, whatever e is; it bounces by its elasticity (Doyen, Ern, Piperno, SIAM J. Sci.
+  Comput. 33, 2011). Implemented by the effects (src/effect/restitution.h, barrier_restitution.c).
 
   Energy. With W = sum h N v+ over these pairs, D = 1/2 |v1 - v0|^2 in the norm of the mass and S the strain energy, a step of implicit
-  Euler gains W - D + C plus the work of the loads, C = S(u1) - S(u0) - f_int(u1) . (u1 - u0); friction and pairs that stay only take. C is
-  not positive where S is convex, that is but for rotations under stress, and not counted then. After each solve W + C <= D is seen to, W of
-  all effects and in the frame of the obstacle: where it does not hold, all e are reduced and the step is solved again. Of two bodies that
-  arrive unstressed and stiff, one of which may be an obstacle, W / D = 2 e / (1 + e) <= 1, so that nothing is reduced there.
+  Euler gains W - D + C plus the work of the loads, C = S(u1) - S(u0) - f_int(u1) . (u1 - u0); friction and persistent pairs only dissipate. C is
+  not positive where S is convex (all but rotations under stress), and is then left out. After each solve W + C <= D is checked, W of
+  all effects, in the frame of the obstacle: if it is violated, all e are reduced and the step is solved again. For two unstressed stiff
+  bodies, or one and an obstacle, W / D = 2 e / (1 + e) <= 1, so e is not reduced.
 */
 #include "model_impl.h"
 
-#define REDUCTIONS 8 /* of e within a step; then it is 0 */
-#define SAFE 0.9     /* of the reduction that would do if W grew with e */
+#define REDUCTIONS 8 /* most reductions of e within a step; then e = 0 */
+#define SAFE 0.9     /* factor on e beside the exact one for W proportional to e */
 #define STEEP 2.1    /* the same for a small excess, as of a stiff body: its W / D grows with the root of e */
-#define ROUND 1e-9   /* of D: W that counts as not larger */
+#define ROUND 1e-9   /* relative tolerance of W <= D */
 
 void SbModelRestitutionBegin(SbModel m, PetscReal dt, Vec U0, Vec V0)
 {

@@ -17,7 +17,7 @@ static const SbOption rows[] = {
    "von_mises, pressure, mean_pressure, J, energy_density, space_error, rank; sets: where the sets and "
    "groups are that the scenario names; none: no such file"},
   {"output_every", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
-   "simulated time between frames of fields.h5; 0: output_every_steps counts"},
+   "simulated time between frames of fields.h5; 0: by output_every_steps"},
   {"output_every_steps", SB_OPTION_INT, 1, "", "1", "[1, inf)",
    "steps between frames of fields.h5, while output_every is 0"},
   {"output_precision", SB_OPTION_CHOICE, 1, "", "float", "float|double", "numbers in fields.h5"},

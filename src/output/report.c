@@ -176,8 +176,8 @@ PetscErrorCode SbReportHeader(SbRun run)
       (void)snprintf(where, sizeof(where), "the node of an edge");
     else if (probe->original >= 0)
       (void)snprintf(where, sizeof(where), "vertex %lld", (long long)probe->original);
-    PetscCall(entry("probe", "%s at %s (%g, %g, %g) m, %.3g m from the position asked for", probe->name,
-                    where, (double)probe->x[0], (double)probe->x[1], (double)probe->x[2],
+    PetscCall(entry("probe", "%s at %s (%g, %g, %g) m, %.3g m from the given position", probe->name, where,
+                    (double)probe->x[0], (double)probe->x[1], (double)probe->x[2],
                     (double)PetscSqrtReal(PetscSqr(probe->x[0] - probe->at[0]) +
                                           PetscSqr(probe->x[1] - probe->at[1]) +
                                           PetscSqr(probe->x[2] - probe->at[2]))));

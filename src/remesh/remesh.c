@@ -42,7 +42,7 @@ struct _p_SbRemesh {
 static const SbOption rows[] = {
   {"remesh_quality", SB_OPTION_REAL, 1, "", "0", "[0, 1)",
    "a body is re-meshed when the radius ratio 3 r/R (inscribed and circumscribed sphere) of a tet falls "
-   "below this (1: regular, 0: flat, negative: inverted); 0: not for that reason"},
+   "below this (1: regular, 0: flat, negative: inverted); 0: off"},
   {"remesh_times", SB_OPTION_NAMES, 1, "s", "", "",
    "times at which bodies are re-meshed, separated by commas"},
   {"remesh_failed", SB_OPTION_BOOL, 1, "", "false", "",

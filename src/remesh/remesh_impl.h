@@ -1,5 +1,5 @@
 /*
-  remesh_impl.h - what the files of re-meshing share: a scene with its state on rank 0, and the one that takes its place.
+  remesh_impl.h - shared by the files of re-meshing: the old scene with its state on rank 0, and the new one.
 */
 #pragma once
 #include "sbremesh.h"
@@ -101,10 +101,10 @@ PetscErrorCode SbCornerPositions(SbSpace space, Vec U, PetscReal x[]);
 PetscErrorCode SbBodyQualities(SbModel model, Vec U, const PetscBool named[], PetscReal worst[]);
 /* Momentum and angular momentum about the origin of each body, [nbody][6], SI. Collective. */
 PetscErrorCode SbBodyMomenta(SbModel model, Vec U, Vec V, PetscReal momenta[][6]);
-/* Adds a rigid motion to the velocities of each body that is named, but not where they are prescribed, with which it has these momenta.
+/* Adds rigid velocities to the named bodies, except at prescribed unknowns, so that they have these momenta.
    Collective. `largest`: speed that was added, m/s. */
 PetscErrorCode SbBodySetMomenta(SbModel model, Vec U, Vec V, const PetscBool named[],
                                 const PetscReal momenta[][6], PetscReal *largest);
 
-/* effects.c: what effects remember goes from one model to the other. Collective. */
+/* effects.c: transfers the history variables of effects to the new model. Collective. */
 PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed);

@@ -1,5 +1,5 @@
 /*
-  command.c - the command line: what is for the program itself, and mistakes that PETSc would pass over.
+  command.c - the command line: options of the program itself, and errors that PETSc would ignore.
 
   PETSc takes the word after an option as its value and skips every other word in silence; so `-translate 0, 0, 1` would
   become `-translate 0,`. Such words are an error here. PETSc reads option files on rank 0 while the other ranks wait: a

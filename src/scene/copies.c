@@ -1,5 +1,5 @@
 /*
-  copies.c - many bodies of one mesh: where each of them is, from a file or on a grid.
+  copies.c - copies of a body, placed by a file or on a grid.
 
   With the scale s, rotation R and shift t of the body's own options and those of a copy (s', R', t') a point x of the mesh is at R' R s' s x + t + t'. Rotations are multiplied as
   quaternions: q' q.
@@ -133,7 +133,7 @@ void SbPlacementAdd(const SbPlacement *place, SbBody *body)
   }
   if (place->rotate[3] == 0.) return;
 
-  /* the turn of the copy after that of the body */
+  /* the rotation of the copy after that of the body */
   quaternion(place->rotate, p);
   quaternion(body->rotate, q);
   r[0] = p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3];

@@ -43,7 +43,7 @@ static const SbOption body_rows[] = {
   {"state", SB_OPTION_STRING, 1, "", "", "",
    "RUN or RUN,STEP: initial displacement and velocity are those of this body in the results of another run "
    "(its folder or fields.h5; without STEP the last frame), which may have another mesh, element, material, "
-   "integrator and other effects; or of a checkpoint, with all digits where bodies, meshes and elements are "
+   "integrator and other effects; or of a checkpoint, in full precision if bodies, meshes and elements are "
    "the same"},
   {"velocity", SB_OPTION_FORMULA, 3, "m/s", "0,0,0", "",
    "initial velocity: numbers or formulas of the reference position x, y, z"},

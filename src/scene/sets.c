@@ -1,7 +1,7 @@
 /*
-  sets.c - the named sets of a scene: those that -sets defines by a shape, and those that effects and probes name without more ado.
+  sets.c - the named sets of a scene: those that -sets defines by a shape, and those that effects and probes name directly.
 
-  An effect says in its option `on` where it acts, a probe in `on` or `in` over what it takes a mean, a body in `inclusions` which of its tets are of another material. A name there that -sets does not define means, in this order: the body
+  Sets are named by the options `on` of effects, `on` and `in` of probes, `inclusions` of bodies. A name there that -sets does not define means, in this order: the body
   of that name, `all` bodies, the whole `boundary`, the physical group of that name. All such names are collected before
   the mesh is made, because it marks every set while it reads the bodies.
 */

@@ -16,7 +16,7 @@
 
 #define RESTART 100 /* of FGMRES */
 /* From docs/reports/solver_choice.md. Unknowns up to which a factorisation ... */
-#define ROTATED 60000          /* turns with the nodes */
+#define ROTATED 60000          /* rotated factorisation */
 #define ROTATED_SLIVERS 120000 /* also with slivers, up to NU_SLIVERS */
 #define DIRECT_P1 80000        /* is faster for P1 than iterations, from NU_LOCKED on */
 #define P_MULTIGRID 5000       /* is as fast as P2's multigrid, up to nu NU_SLIVERS */
@@ -75,7 +75,7 @@ static const SbSolverPreset presets[] = {
   {"mumps", SB_MATRIX_AIJ, "-ksp_type fgmres", .package = MATSOLVERMUMPS, .direct = PETSC_TRUE,
    .help = "sparse factorisation of MUMPS on all ranks: takes indefinite tangents"},
   {"rotated", SB_MATRIX_BAIJ, "-ksp_type cg", .precondition = SbPCRotatedCreate,
-   .help = "CG, one factorisation that turns with the nodes and is seldom renewed: dynamic runs of up to "
+   .help = "CG, one factorisation that is rotated with the nodes and seldom renewed: dynamic runs of up to "
            "about 100k tets"},
   {"realtime", SB_MATRIX_BAIJ, "-ksp_type cg -ksp_initial_guess_nonzero", .matrix_free = PETSC_TRUE,
    .create = create_frames, .precondition = SbPCRotatedCreate,
@@ -265,7 +265,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   PetscCall(PetscOptionsGetString(NULL, NULL, "-ksp_type", method, sizeof(method), NULL));
   *preset = NULL;
   if (!explicit_run) PetscCall(find_type(choice, preset, &option));
-  /* a factorisation that turns with the nodes, unless ranks meet at too many of them */
+  /* a rotated factorisation, unless the interfaces between ranks have too many nodes */
   turns = (PetscBool)(!strcmp(choice, "rotated") || !strcmp(choice, "realtime"));
   if (!strcmp(choice, "auto"))
     turns = (PetscBool)(dynamic && !linear && hard.face_nu <= NU_ROTATED && strcmp(method, KSPMINRES) &&
@@ -304,7 +304,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
     name = "rotated";
     PetscCall(PetscSNPrintf(reason, size,
                             "dynamic, %" PetscInt_FMT
-                            " unknowns: one factorisation turns with the nodes and serves many steps",
+                            " unknowns: one factorisation, rotated with the nodes, serves many steps",
                             unknowns));
   } else if (s->edge_node && !s->faces && hard.nu <= (hard.slivers ? NU_PRESSURE : NU_SLIVERS) &&
              unknowns > (indefinite || hard.slivers ? SB_DIRECT_SMALL : P_MULTIGRID)) {
@@ -319,7 +319,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
     /* 28k unknowns of P1 on 16 ranks, dynamic, ms per step of mumps and cg_two_level: 300 to 450 and 50 (docs/reports/realtime_ranks.md) */
     name = package;
     PetscCall(PetscSNPrintf(
-      reason, size, "%" PetscInt_FMT " unknowns: a factorisation is fast and holds at any Poisson's ratio%s",
+      reason, size, "%" PetscInt_FMT " unknowns: a factorisation is fast and works at any Poisson's ratio%s",
       unknowns, indefinite ? "; the exact tangent may be indefinite" : ""));
   } else if (!dynamic && package &&
              unknowns <= (hard.nu > NU_PRESSURE && hard.slivers               ? DIRECT_NEXT

@@ -3,7 +3,7 @@
 
     R(u, lambda) = f_int(u) - f_ext(u, lambda) = 0,   |d| = l,   d = u - u_n,
 
-  so that the path goes on where the load has a maximum, and where displacements turn back, too. |d| is the root mean square over the mass of the
+  so that the path continues past limit points of load and displacement. |d| is the root mean square over the mass of the
   bodies, m, prescribed displacements included: a cylinder (Crisfield, Comput. Struct. 13, 1981). Both equations are linearised together
   (Schweizerhof and Wriggers, Comput. Methods Appl. Mech. Eng. 59, 1986). With the exact tangent K and q = -dR/dlambda an
   iteration is two solves with one factorisation,
@@ -33,7 +33,7 @@ typedef struct {
   SbRun run;
   union {
     struct {
-      Vec weight;               /* of each displacement: its share of the mass */
+      Vec weight;               /* of each displacement: its mass over the total */
       Vec X, d, r, v, q, begin; /* end of the step and its parts as above; v where the step begins */
       Vec w, du;                /* work; correction of X */
     };
@@ -41,7 +41,7 @@ typedef struct {
   };
   PetscReal factor, delta; /* lambda at X; its step for q */
   PetscReal load;          /* |q| where the run begins, N */
-  PetscInt negative;       /* eigenvalues of K where the last step began; -1: not known */
+  PetscInt negative;       /* negative eigenvalues of K at the start of the last step; -1: not known */
   PetscReal turned;        /* sign of dlambda then */
 } Path;
 
@@ -54,7 +54,7 @@ static PetscErrorCode product(Path *p, Vec a, Vec b, PetscReal *value)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The load factor at X, with what is prescribed then. */
+/* Sets the load factor, and its prescribed displacements in X. */
 static PetscErrorCode put_at(Path *p, PetscReal factor)
 {
   PetscFunctionBeginUser;
@@ -118,7 +118,7 @@ static PetscErrorCode solve(Path *p, Vec b, Vec x, PetscBool *ok)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* K at X, and v from the residual there, which is in r. */
+/* K at X, and v; r: the residual at X. */
 static PetscErrorCode tangent(Path *p, PetscBool *ok)
 {
   const SbRun run = p->run;
@@ -127,7 +127,7 @@ static PetscErrorCode tangent(Path *p, PetscBool *ok)
   PetscFunctionBeginUser;
   PetscCall(SNESComputeJacobian(run->snes, p->X, run->operator, run->J));
   run->newton_step++;
-  /* q, with w the way of what is prescribed */
+  /* q, with w the derivative of the prescribed displacements */
   PetscCall(VecCopy(p->X, p->w));
   PetscCall(put_at(p, factor + p->delta));
   PetscCall(SNESComputeFunction(run->snes, p->X, p->q));
@@ -311,7 +311,7 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
   PetscCall(product(&p, run->path, run->path, &l));
   l = PetscSqrtReal(l);
   while (!last) {
-    /* where the path goes on, and how far */
+    /* direction and length of the step */
     if (!known) {
       PetscCall(VecCopy(run->U, p.X));
       PetscCall(put_at(&p, factor));
@@ -320,7 +320,7 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
       known = PETSC_TRUE;
     }
 
-    /* length of a first step: its load increment is 1 / static_steps; near a limit load, where a load path ended, by what the load has moved so far */
+    /* length of a first step: its load increment is 1 / static_steps; near a limit load, where a load path ended, by the displacement of the load so far */
     if (l == 0.) {
       PetscReal rate, uu;
 
@@ -361,7 +361,7 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
     PetscCall(VecScale(run->path, l / PetscSqrtReal(length)));
     PetscCall(VecCopy(p.X, run->U));
 
-    /* whether some displacement is as large as asked for */
+    /* end at -static_max_displacement */
     if (run->arc.displacement != 0.) {
       const PetscScalar *u;
       PetscReal most = 0.;

@@ -5,7 +5,7 @@
 #include "sbsolver.h"
 #include "time_impl.h"
 
-/* True when J is still the tangent for these shifts. */
+/* Whether J is still the tangent for these shifts. */
 static PetscBool tangent_is_current(SbRun run, PetscReal shift_v, PetscReal shift_a)
 {
   const PetscReal tiny = 1e-10;
@@ -21,7 +21,7 @@ static PetscErrorCode form_tangent(SbRun run, PetscReal t, PetscReal shift_v, Pe
   PetscFunctionBeginUser;
   if (tangent_is_current(run, shift_v, shift_a)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbModelTangent(run->model, t, shift_v, shift_a, 1., U, V, P));
-  /* a preconditioner that turns with the nodes asks for the displacement that the matrix belongs to */
+  /* a rotated preconditioner needs the displacement of the matrix */
   if (run->solver_used->precondition)
     PetscCall(PetscObjectCompose((PetscObject)P, "sb_state", (PetscObject)U));
   if (run->nonsymmetric.U) {
@@ -34,7 +34,7 @@ static PetscErrorCode form_tangent(SbRun run, PetscReal t, PetscReal shift_v, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y = (J + what it lacks) x */
+/* y = (J + its nonsymmetric part) x */
 static PetscErrorCode multiply(Mat A, Vec x, Vec y)
 {
   SbRun run;

@@ -1,18 +1,18 @@
 /*
-  The solves of a step with contact: who touches is guessed, the equations are solved, the guess is examined, and so on until it was
-  right.
+  The active-set iteration of a step with contact: solve with the current active set, update it, repeat until it does not
+  change.
 
-  A later solve begins next to its solution, and a tolerance relative to its own start would ask for digits that rounding does not
-  leave beside large contact forces. So all solves of a step aim at what the first one aims at. While guesses are wrong, those of a time
-  step aim at a thousand times more: a rough solution is enough to see who touches.
+  A later solve starts near its solution, and a tolerance relative to its first residual could be below rounding
+  beside large contact forces. So all solves of a step have the absolute tolerance of the first one. While the active set changes, those of a time
+  step have a thousand times that ("rough" solves).
 */
 #include "sbsolver.h"
 #include "time_impl.h"
 
-#define DIGITS 1e-11    /* of the forces of contact and supports: what rounding leaves of a residual */
-#define LOOSER 1e3      /* rough solves may have so many times the residual that is asked for */
-#define ROUGH 1e-3      /* of the first residual */
-#define ROUGH_ROUNDS 10 /* what has not settled then may wait for digits that rough solves do not have */
+#define DIGITS 1e-11    /* rounding of a residual, over the forces of contact and supports */
+#define LOOSER 1e3      /* factor on the tolerance of rough solves */
+#define ROUGH 1e-3      /* largest tolerance of rough solves, over the first residual */
+#define ROUGH_ROUNDS 10 /* iterations after which solves are no longer rough */
 
 /* Tolerances of the solvers as the user left them. */
 typedef struct {
@@ -22,7 +22,7 @@ typedef struct {
   PetscBool single; /* one linear solve instead of Newton */
 } Aim;
 
-/* Absolute tolerances for solves of a step whose first residual is `size`, N; 0: those of the user. least: what can be had, N. */
+/* Absolute tolerances for solves of a step whose first residual is `size`, N; 0: those of the user. least: rounding, N. */
 static PetscErrorCode set_aim(SNES snes, const Aim *aim, PetscReal size, PetscReal least, PetscBool rough)
 {
   const PetscReal rtol = aim->single ? aim->linear_rtol : aim->rtol;
@@ -58,20 +58,20 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
   PetscCall(KSPGetTolerances(aim.ksp, &aim.linear_rtol, &aim.linear_atol, &aim.dtol, &aim.linear_max));
   PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &aim.single));
 
-  /* a first guess of who touches */
+  /* the initial active set */
   PetscCall(SbModelContactBeginStep(m, t, dt, U0, run->V, U));
   constrained = SbSpaceIsConstrained(m->space);
   rough = (PetscBool)(constrained && m->dynamic);
   /* the matrix holds what was constrained before */
   if (projected || !m->dynamic) run->tangent_known = PETSC_FALSE;
   if (constrained) {
-    /* a body at rest has no residual but for rounding: then contact and supports carry all there is */
+    /* a body at rest has only a residual by rounding: then contact and support forces are the scale */
     PetscCall((*step->residual)(step->ctx, U, run->R));
     PetscCall(VecNorm(run->R, NORM_2, &least));
     least = PetscIsInfOrNanReal(least) ? 0 : DIGITS * least;
   }
 
-  /* the aim of all solves of this step: what the first one would go for */
+  /* the tolerance of all solves of this step: that of the first one */
   PetscCall(SNESComputeFunction(snes, U, run->R));
   PetscCall(VecNorm(run->R, NORM_2, &size));
   if (PetscIsInfOrNanReal(size)) size = 0;
@@ -79,14 +79,14 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
   PetscCall(SbSolverUpdateSymmetry(aim.ksp, m->space));
   PetscCall((*step->solve)(step->ctx, U, reason));
 
-  /* examined, and solved again until the guess was right */
+  /* repeat until the active set does not change */
   for (PetscInt round = 1; *reason > 0; round++) {
     run->contact_round = round;
     PetscCall((*step->residual)(step->ctx, U, run->R));
     m->space->rough = rough;
     PetscCall(SbModelContactUpdateActiveSet(m, t + dt, U, run->R, &again));
     if (round == 1 && run->may_end_at_impact) {
-      /* where in the step the first points come into contact, if it is worth cutting there */
+      /* the first time of impact, if the step is to be cut there */
       PetscCall(SbModelContactTimeOfImpact(run->model, &run->time_of_impact));
       if (run->time_of_impact < SB_TIME_OF_IMPACT_LEAST || run->time_of_impact > 1. - SB_TIME_OF_IMPACT_LEAST)
         run->time_of_impact = 1.;

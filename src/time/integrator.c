@@ -15,7 +15,7 @@
 #include "sbsolver.h"
 
 #define FORCING 0.1         /* loosest relative tolerance of Newton's linear solves */
-#define FORCING_BESIDE 1e-6 /* the same where a part of the tangent is beside the matrix */
+#define FORCING_BESIDE 1e-6 /* the same where a part of the tangent is outside the matrix */
 
 const char *const SbIntegrators =
   "euler_implicit|newmark|genalpha|euler_symplectic|euler_explicit|alpha2|static";
@@ -92,7 +92,7 @@ PetscErrorCode SbTimeRegister(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Arc length needs the tangents that are exact: those of laws that were not chosen become so. */
+/* Arc length needs exact tangents: `auto` becomes exact. */
 static PetscErrorCode read_arc_length(SbRun run, const SbScope *scope)
 {
   const SbModel m = run->model;
@@ -363,7 +363,7 @@ static PetscErrorCode set_up_ts(SbRun run)
 
   PetscFunctionBeginUser;
   if (SbRunIsExplicit(run)) {
-    /* explicit integrators know the step that they can take */
+    /* the stable step of explicit integrators */
     PetscReal stable;
 
     PetscCall(SbSpaceStableStep(run->model->space, &stable));
@@ -376,7 +376,7 @@ static PetscErrorCode set_up_ts(SbRun run)
                           (double)run->dt, (double)stable));
   }
 
-  /* the equation of motion and who integrates it */
+  /* the equation of motion and its integrator */
   PetscCall(SbSpaceCreateVec(m->space, &F));
   PetscCall(TSCreate(m->comm, &run->ts));
   PetscCall(TSSetProblemType(run->ts, TS_NONLINEAR));
@@ -534,7 +534,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
   PetscCall(PetscStrncpy(run->solver, run->solver_used->name, sizeof(run->solver)));
   PetscCall(check_contact(run, explicit));
 
-  /* how systems of contact are solved, and what is said of it */
+  /* the solver of systems with contact, for the header */
   if (m->npotential) {
     PetscCall(SbContactSystemDescribe(run->contact_choice, reason, sizeof(reason)));
     SbAppend(sizeof(run->solver_reason), run->solver_reason, "; %s", reason);
@@ -545,7 +545,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
     SbAppend(sizeof(run->solver_reason), run->solver_reason, "; %s", reason);
   }
 
-  /* the matrix, and what solves see of it when constraints stand beside it */
+  /* the matrix, and the operator of solves with constraints outside it */
   if (!explicit) {
     PetscCall(SbSolverCreateOperator(m->space, run->solver_used, &run->J));
     if (m->nnonsymmetric)
@@ -583,7 +583,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
     if (run->arc.on) PetscCall(SbArcLengthCheck(run));
   }
   PetscCall(SbSolverListCreate(run));
-  /* options may have made something else of the preset */
+  /* PETSc's options may have changed the preset */
   if (!explicit) {
     PetscCall(SbSolverDescribe(run->snes, m->space, sizeof(run->solver_parts), run->solver_parts));
     if (!run->solver_used->help ||
@@ -591,7 +591,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
       PetscCall(PetscStrncpy(run->solver, run->solver_parts, sizeof(run->solver)));
   }
 
-  /* one solve per step, begun where the body flies to, with a tangent that may be softer than the forces: no bound on the energy (docs/reference/theory.md) */
+  /* one solve per step from the velocity predictor, with a tangent that may be softer than the forces: no bound on the energy (docs/reference/theory.md) */
   if (run->velocity_predictor && !run->model->linear && run->snes) {
     PetscCall(PetscObjectTypeCompare((PetscObject)run->snes, SNESKSPONLY, &single));
     for (PetscInt r = 0; r < s->nregion; r++)
@@ -616,7 +616,7 @@ PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* PETSc's own integrators give up without a word. */
+/* PETSc's own integrators fail without a message. */
 static PetscErrorCode explain_failure(SbRun run)
 {
   TSConvergedReason reason;
@@ -638,7 +638,7 @@ static PetscErrorCode explain_failure(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Says which effects have their time before or after the run. */
+/* Warns of effects whose time is before or after the run. */
 static PetscErrorCode warn_of_idle_effects(SbRun run)
 {
   const char *unit = run->model->dynamic ? " s" : "";

@@ -1,9 +1,9 @@
 /*
-  Whether a step turned tets, for runs that refuse that (-time_inverted reject).
+  Whether a step inverted tets, for runs with -time_inverted reject.
 
-  det F <= 0 in a tet is no deformation of a body. Energies that are finite there carry a run on, and what it shows behind that may be
-  anything. A step after which more tets have it than before is refused, so a start from tets that are inverted may recover. It is repeated with half its
-  length; from 2^-time_max_halvings of the nominal length on the run stops: halving again would only creep up to where the tet is flat.
+  det F <= 0 in a tet is no deformation of a body. Where energies are finite there a run could continue, with meaningless
+  results. A step that increases the number of such tets is rejected, so inverted initial states may recover. It is repeated with half its
+  length; below 2^-time_max_halvings of the nominal length the run stops: shorter steps would only approach the flat tet.
 */
 #include "time_impl.h"
 

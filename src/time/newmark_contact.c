@@ -1,20 +1,20 @@
 /*
   Newmark's method with contact: the trapezoidal rule for everything but the forces of contact, which are implicit.
 
-  With a the acceleration without contact, M a = f_ext - f_int(u) - C v, and G^T lambda the forces of what touches at the end of the step
+  With a the acceleration without contact, M a = f_ext - f_int(u) - C v, and G^T lambda the contact forces at the end of the step
   (Kane, Repetto, Ortiz and Marsden, "Finite element analysis of nonsmooth contact", CMAME 180, 1999: beta = 1/4, gamma = 1/2 there,
   1/2 and 1 for contact)
 
     u1 = u0 + h v0 + h^2/4 (a0 + a1) + h^2/2 M^-1 G^T lambda,    v* = v0 + h/2 (a0 + a1) + h M^-1 G^T lambda.
 
-  So u1 - u0 = h (v0 + v*) / 2, and a linear body gains lambda . (g1 - g0), g the gaps: what touches has g1 = 0, so that arriving takes energy
-  and resting does not change it. But v* is not at rest along G: where g0 = 0 a node that came with v0 has v* = -v0, leaves in the next step or
-  throws its force to and fro. Hence the velocity of the end is
+  So u1 - u0 = h (v0 + v*) / 2, and a linear body gains lambda . (g1 - g0), g the gaps: active nodes have g1 = 0, so an impact dissipates energy
+  and persistent contact keeps it. But G v* is not zero: where g0 = 0 a node with v0 has v* = -v0, separates in the next step or
+  its force oscillates. Hence the velocity at the end is
 
     v1 = v* + M^-1 G^T mu  with  G v1 = w,
 
-  w the speeds of obstacles: the persistency that Laursen and Love (IJNME 53, 2002) ask for. It is the nearest one in the norm of the
-  mass, so that it takes energy again, in all m v^2 / 2 of each node that arrives, m its own mass: an impact without restitution of
+  w the velocities of obstacles: the persistency condition of Laursen and Love (IJNME 53, 2002). It is the closest one in the norm of the
+  mass, so it dissipates energy, too, in all m v^2 / 2 of each impacting node, m its own mass: an impact without restitution of
   the nodes that touch, which vanishes with the size of the cells. In the next step their a0 + contact balances from the start, and the
   forces are steady. (Deuflhard, Krause and Ertel, IJNME 73, 2008, project the predictor instead; velocities of what touches then
   stay as they came until it leaves, and momentum of obstacles with them.)

@@ -8,16 +8,16 @@
     Newmark: alpha_m = alpha_f = 1
     implicit Euler: v1 = s / h, a1 = (v1 - v0) / h (it is not a Newmark method)
   Newmark with contact: a0 is the acceleration without it, newmark_contact.c describes the rest
-  Barrier contact: its force f = -dB/du is that of the end of the step, the only place that no surface has passed on the way to; generalized-alpha adds it there. Newmark
-  would take it from both ends and gain energy; there it is implicit (Kane, Repetto, Ortiz and Marsden 1999), with a the acceleration without contact, which is what is kept:
+  Barrier contact: its force f = -dB/du is that at the end of the step, the only state known to be free of collisions; generalized-alpha adds it there. In Newmark's
+  method, where the mean of both ends would gain energy, it is implicit (Kane, Repetto, Ortiz and Marsden 1999), with a the acceleration without contact, which is stored:
     u1 = u0 + h v0 + h^2 ((1/2 - beta) a0 + beta a1) + h^2/2 M^-1 f,  v1 = v0 + h ((1 - gamma) a0 + gamma a1) + h M^-1 f
-  Its formula for a1 then gives a1 + M^-1 f / (2 beta), the residual that is solved has -f / (2 beta), and damping has the velocity 2 (u1 - u0) / h - v0. The impulse h f adds the motion
-  that f does work for over u1 - u0, and as B is convex that is at most what B loses: contact takes energy, never gives it.
+  Its formula for a1 then gives a1 + M^-1 f / (2 beta), the residual that is solved has -f / (2 beta), and damping has the velocity 2 (u1 - u0) / h - v0. The work of the impulse h f
+  over u1 - u0 is at most the decrease of B, as B is convex: contact only dissipates.
   and, with a0 = M^-1 (f(t0, u0, v0)),
     explicit Euler: u1 = u0 + h v0, v1 = v0 + h a0;  symplectic Euler: v1 = v0 + h a0, u1 = u0 + h v1.
 
   The acceleration is state (run->A): nothing is recovered from differences, so a restart continues exactly.
-  A step in which points of contact arrive may be repeated up to that moment, once; the remainder of it is the next step (src/time/contact.c).
+  A step may be repeated up to the first time of impact, once; the remainder is the next step (src/time/contact.c).
   A step whose solve fails is halved and repeated; after four good steps it doubles, until the nominal length is back. The local error for TSAdapt
   is h^2 (beta - 1/6) (a1 - a0) (Zienkiewicz and Xie 1991), for implicit Euler h^2/2 a1.
 
@@ -35,9 +35,8 @@ typedef struct {
   Vec own0, own1; /* Newmark with contact: accelerations without it, at the start and at the end; else NULL */
   Vec Xa, Va, Aa; /* stage of generalized-alpha; NULL when the stage is the end */
   Vec work;
-  PetscReal
-    rest; /* of a step that was cut where points come into contact: what follows it, s; 0: no such step */
-  PetscReal whole;   /* its length before, s: the rest takes the time back to where it would have been */
+  PetscReal rest;    /* remaining length of a step that was cut at a time of impact, s; 0: none */
+  PetscReal whole;   /* length before the cut, s: the remainder ends at the original time */
   PetscBool started; /* run->A holds the acceleration of the current state */
 } SecondOrder;
 
@@ -66,7 +65,7 @@ static PetscErrorCode end_state(TS ts, Vec X)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lends the three vectors at which the equation is asked for. */
+/* Lends the three vectors at which the equation is evaluated. */
 static PetscErrorCode stage_state(TS ts, Vec X, PetscReal *t, Vec *U, Vec *V, Vec *A)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
@@ -174,7 +173,7 @@ static PetscErrorCode solve(void *ctx, Vec X, SNESConvergedReason *reason)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What contact is the answer to. */
+/* The residual without contact forces. */
 static PetscErrorCode contact_residual(void *ts, Vec X, Vec R)
 {
   SecondOrder *so = (SecondOrder *)((TS)ts)->data;
@@ -184,7 +183,7 @@ static PetscErrorCode contact_residual(void *ts, Vec X, Vec R)
   PetscFunctionBeginUser;
   PetscCall(stage_state((TS)ts, X, &t, &U, &V, &A));
   PetscCall(SbModelResidual(so->run->model, t, U, V, A, PETSC_FALSE, R));
-  /* Newmark takes the contact of the end twice: the force of its start is not there */
+  /* Newmark weights the contact force of the end by two, that of the start by zero */
   PetscCall(VecScale(R, so->set.impulses ? 0.5 : 1. / so->set.alpha_f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -292,7 +291,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
   if (!so->started && so->run->step0 == 0 && so->set.method != SB_METHOD_EULER_IMPLICIT)
     PetscCall(SbFormAcceleration(so->run, ts->ptime, ts->vec_sol, ts->vec_dot, so->run->A));
 
-  /* from here on the faces of CR and DG have other forces */
+  /* the penalty on jumps of CR and DG for this step */
   PetscCall(SbRunFollowJumps(so->run, &jumps));
   if (so->own0 && (!so->started || jumps))
     PetscCall(SbNewmarkOwn(so->run, ts->ptime, ts->vec_sol, ts->vec_dot, so->run->A, so->own0));
@@ -332,7 +331,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
         ts->time_step = next;
         so->run->stop_reason[0] = 0;
 
-        /* a step that was cut was taken, or its rest was */
+        /* a cut step, or its remainder, was accepted */
         if (so->rest > 0.)
           so->rest = 0.;
         else
@@ -340,7 +339,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
         break;
       }
     } else if (!so->run->rejected_inverted && so->run->time_of_impact < 1.) {
-      /* the step ends where points come into contact, and another one takes the rest of it */
+      /* the step is repeated up to the time of impact, the next one is the remainder */
       next = so->run->time_of_impact * ts->time_step;
       so->whole = ts->time_step;
       so->rest = ts->time_step - next;
@@ -350,7 +349,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
       next = 0.5 * ts->time_step;
     }
 
-    /* rejected: the state of the start comes back, and the step is tried with another length */
+    /* rejected: restore the initial state, and repeat the step with another length */
     PetscCall(VecCopy(so->X0, ts->vec_sol));
     PetscCall(VecCopy(so->V0, ts->vec_dot));
     ts->reject++;

@@ -10,14 +10,14 @@
 #include "time_impl.h"
 
 #define LIMIT 10. /* softening from which on a limit load is likely */
-#define PUSH 1e-3 /* cosine between forces and a motion from which on they do not hold it */
+#define PUSH 1e-3 /* cosine between forces and a free motion above which they drive it */
 #define EXCESS \
-  0.5 /* of the strain energy at the end of a step: what may be there beyond the work of the forces */
+  0.5 /* of the strain energy at the end of a step: tolerated excess over the work of the forces */
 
-/* What one load step works with. */
+/* Data of a load step. */
 typedef struct {
   SbRun run;
-  PetscReal factor, length; /* load factor at its end, and what it adds */
+  PetscReal factor, length; /* load factor at its end, and its increment */
   Vec X;                    /* displacement at its end, m */
 } LoadStep;
 
@@ -59,8 +59,8 @@ static PetscErrorCode predict(void *ctx)
 }
 
 /*
-  Whether a solution with contact is one that loads do not lead to. Who touches is guessed, and what went far through an obstacle before the guess was
-  right comes back violently crumpled, to another equilibrium. Along a path on which forces grow, strain energy grows by no more than (f_0 + f_1) . du, f_0 and f_1 the
+  Whether a solution with contact is a distant equilibrium that the loads do not lead to: while the active set is wrong, a body may pass far through an obstacle
+  and end crumpled. Along a path on which forces grow, strain energy grows by no more than (f_0 + f_1) . du, f_0 and f_1 the
   internal forces at the ends of the step; linear forces make it half of that.
 */
 static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
@@ -89,14 +89,14 @@ static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* When free bodies are looked for. */
+/* Occasions to search for free bodies. */
 typedef enum {
   BEFORE, /* a step is solved */
   FAILED,
   SOLVED
 } When;
 
-/* Finds a body that nothing holds; *found, and the run's reason to stop says so. */
+/* Finds an unsupported body; *found, with the run's stop_reason. */
 static PetscErrorCode find_free_body(const LoadStep *l, When when, PetscBool *found)
 {
   const SbRun run = l->run;
@@ -108,8 +108,8 @@ static PetscErrorCode find_free_body(const LoadStep *l, When when, PetscBool *fo
   PetscFunctionBeginUser;
   if (when != BEFORE) PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
   run->free_body = (PetscBool)(body >= 0 && apart);
-  /* stress and loads resist rotations that nothing else holds: where the step began they may not. A load that holds, as the weight of what hangs, does so in shorter steps, too;
-     one that pushes along the motion has no equilibrium near */
+  /* stress and loads may resist a free rotation, but not at the start of the step. A stabilising load, as the weight of a hanging body, is so in shorter steps, too;
+     one that drives the motion has no equilibrium nearby */
   if (body < 0 && when != SOLVED && !run->model->linear) {
     PetscReal work, force, way;
     Vec along, F;
@@ -173,7 +173,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
     }
   }
 
-  /* loads in balance leave a singular system with a solution, and a solver may find it with any rigid motion on top */
+  /* with balanced loads a singular system has solutions, up to any rigid motion */
   if (*ok && !l->run->steps_total && !l->run->model->nbegin_step && !l->run->model->npotential &&
       l->run->newton_step) {
     PetscCall(find_free_body(l, SOLVED, &found));
@@ -209,7 +209,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
     load = (LoadStep){run, next, next - factor, X};
     attempt.t = factor;
     attempt.dt = next - factor;
-    /* follower loads stiffen a hinge wherever Newton's method goes from here, and it takes long to fail */
+    /* check at the start: follower loads stiffen a hinge in later iterations, and failure takes long */
     if (run->nonsymmetric.U && !run->steps_total && !run->model->nbegin_step && !run->model->npotential)
       PetscCall(find_free_body(&load, BEFORE, &found));
     if (!run->free_body) PetscCall(SbRunAttempt(run, &attempt, &ok));
@@ -229,7 +229,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
       if (run->model->linear && !run->model->nbegin_step && !run->model->npotential) cuts = run->max_halvings;
       if (++cuts <= run->max_halvings && length >= least && !SbRunTooShort(run, length)) continue;
 
-      /* steps have become too short: how far the load has got, and what is likely in the way */
+      /* steps have become too short: report the load reached, and the likely cause */
       PetscCall(PetscStrncpy(why, run->stop_reason, sizeof(why)));
       PetscCall(SbNewtonUnstable(run->snes, &unstable));
       if (run->softening > LIMIT)
@@ -251,7 +251,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
     }
     run->stop_reason[0] = 0;
 
-    /* the new equilibrium, and how many times as fast as in the slowest step displacements grow with the load */
+    /* the new equilibrium, and its growth of displacement with the load, relative to the slowest step */
     PetscCall(VecAXPY(run->U, -1., X));
     PetscCall(VecNorm(run->U, NORM_2, &rate));
     rate /= next - factor;
@@ -259,7 +259,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
     if (slowest > 0. && run->newton_step) run->softening = rate / slowest;
     PetscCall(VecCopy(X, run->U));
 
-    /* who wants to go on with another mesh, effects and monitors */
+    /* re-meshing, effects and monitors */
     run->after.dt = next - factor;
     if (run->after.fn && next < 1.)
       PetscCall((*run->after.fn)(run, step + 1, next, next - factor, run->after.ctx, &run->paused));
@@ -269,7 +269,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
     run->newton_step = run->linear_step = run->rejected_step = 0;
     if (run->paused || run->stopped) break;
 
-    /* and the next one may be longer again */
+    /* lengthen the next one */
     factor = next;
     length = PetscMin(2. * length, nominal);
   }

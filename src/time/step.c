@@ -1,8 +1,8 @@
 /*
-  One step, dynamic or static, from its start to its acceptance. second_order.c and static.c say what a step's unknowns are and how long it is.
+  One step, dynamic or static, from its start to its acceptance. second_order.c and static.c define a step's unknowns and length.
 
-    attempt: a first guess, Newton's method with the loop of contact around it, who examines solutions, what is refused
-    accepted: effects keep their history, the account of energies is closed (energy_balance.c), monitors look
+    attempt: predictor, Newton's method within the active-set iteration of contact, post-solve callback, rejection
+    accepted: effects save their history, the energy balance is updated (energy_balance.c), monitors are called
 */
 #include "time_impl.h"
 
@@ -20,7 +20,7 @@ PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed)
                                changed));
   if (!m->dynamic || !*changed) PetscFunctionReturn(PETSC_SUCCESS);
 
-  /* what was taken from the forces before */
+  /* the acceleration follows from the changed forces */
   PetscCall(SbRunRestartAcceleration(run));
   if (run->reaction) PetscCall(SbRunReactions(run, run->t_now, run->reaction));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -37,40 +37,40 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   for (int solves = 0; again; solves++) {
     SbSolvedStep step;
 
-    /* barrier contact begins where the step does */
+    /* begin the step in barrier contact */
     if (run->model->npotential) {
       PetscCall(SbModelPotentialBegin(run->model, a->t, a->dt, a->U0, run->V));
       run->barrier_start = a->U0;
       run->barrier_dt = a->dt;
     }
 
-    /* a first guess, and the solution from there; with contact, as often as finding out what touches takes */
+    /* the predictor, and the solution from there; with contact by active-set iterations */
     if (a->predict && !run->goes_on) PetscCall((*a->predict)(a->ctx));
     if (run->model->nbegin_step)
       PetscCall(SbRunSolveContact(run, a, &reason));
     else
       PetscCall((*a->solve)(a->ctx, a->U, &reason));
 
-    /* the state at the end, or why there is none */
+    /* the state at the end, or the reason of failure */
     PetscCall((*a->complete)(a->ctx, reason, &step, ok));
 
-    /* jumps of CR and DG are penalised as the state at the start asks for: of a load step, which may be long, once more as its end does */
+    /* the penalty on jumps of CR and DG depends on the initial state: solve a load step, which may be long, once more with that of its end */
     if (*ok && !run->model->dynamic && !run->goes_on) {
       PetscCall(SbSpaceFollowJumps(run->model->space, a->U, SB_STEPS_OF_LOAD, &run->goes_on));
       if (run->goes_on) continue;
     }
     run->goes_on = PETSC_FALSE;
 
-    /* who examines solutions may ask for a better one, after the solver knows what is wanted */
+    /* the post-solve callback may request a more accurate solution */
     again = PETSC_FALSE;
     if (*ok && run->post_solve.fn && solves < SB_LOOKS)
       PetscCall((*run->post_solve.fn)(run, &step, run->post_solve.ctx, &again));
   }
 
-  /* a step that turns tets inverted is refused where that was asked for */
+  /* -time_inverted reject */
   PetscCall(SbRunRejectInverted(run, a->t, a->dt, (Vec[2]){a->U0, a->U}, ok));
 
-  /* what moves by order is where it was when the step began, if the run ends there */
+  /* prescribed motions back at the start of the step, in case the run ends there */
   if (!*ok && run->model->npotential) PetscCall(SbModelPotentialAdvance(run->model, 0.));
 
   if (!*ok) PetscCall(SbRunWarnShorter(run, a->dt));
@@ -90,7 +90,7 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
   run->t_now = t;
   if (first) PetscCall(SbRunFollowJumps(run, &jumps));
 
-  /* a step that was seen already: there was no other after it */
+  /* already seen: it turned out to be the last one */
   if (run->seen.U && run->seen.step == step) {
     if (!run->stopped || first) PetscFunctionReturn(PETSC_SUCCESS);
     now = run->seen;
@@ -115,7 +115,7 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
     PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
   }
 
-  /* the account of energies is closed */
+  /* energy balance */
   if (run->want_energies)
     PetscCall(SbRunAccount(run, t, dt, first));
   else if (run->want_residual) {
@@ -123,7 +123,7 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
     PetscCall(SbRunReactions(run, t, run->reaction));
   }
 
-  /* monitors look at the state, what it cost, and how far it is to the end */
+  /* call monitors */
   now.R = run->reaction;
   now.energies = run->energies;
   now.step_end = run->fixed_step ? step + (PetscInt)PetscCeilReal((run->t_end - t) / run->dt - 1e-6) : -1;

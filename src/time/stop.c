@@ -1,8 +1,8 @@
 /*
-  Why a run ends before its end: the reason that it gives, when steps are no longer worth halving, and who asks it to stop.
+  Early end of a run: its reason, the end of halving, and requests to stop.
 
   A signal (SIGTERM, SIGINT, SIGUSR1 on any rank) or the end of -wall_time lets the step that is being solved end; monitors see that step as the last one, so
-  that a checkpoint and the last frame are written. A step that takes longer than -stop_grace, or would take longer than what is left of -wall_time, is given up
+  that a checkpoint and the last frame are written. A step that takes longer than -stop_grace, or would take longer than what is left of -wall_time, is abandoned
   between two iterations of Newton's method, and the run ends with the step before. All ranks decide alike: by one reduction after each step and each iteration.
 */
 #include <signal.h>
@@ -16,14 +16,14 @@
 #define WALL_TIME 1000      /* as the number of a signal */
 #define RESERVE_PART 0.05   /* of -wall_time, for the last files, */
 #define RESERVE_LONGEST 60. /* but no more than so many s; twice what files have taken so far comes on top */
-#define STEP_FACTOR 1.5     /* the next step may take so many times as long as the longest of late */
+#define STEP_FACTOR 1.5     /* time reserved for the next step, over the longest recent one */
 #define AGAIN 0.5           /* s, within which a second SIGINT comes from the same key */
 
-/* What a signal leaves: of the process, as signals are. */
+/* State set by signal handlers, global to the process. */
 static struct {
   volatile sig_atomic_t signal; /* the first one; 0: none */
   volatile double since;        /* s, when it came */
-  int speak;                    /* this rank says that it came */
+  int speak;                    /* this rank reports it */
 } asked;
 
 PetscErrorCode SbRunFail(SbRun run, const char *format, ...)
@@ -31,7 +31,7 @@ PetscErrorCode SbRunFail(SbRun run, const char *format, ...)
   va_list args;
 
   PetscFunctionBeginUser;
-  /* what fails because it is given up has no reason of its own */
+  /* keep the reason of an abandoned step */
   if (run->stopped && run->stop_reason[0]) PetscFunctionReturn(PETSC_SUCCESS);
   va_start(args, format);
   PetscCall(PetscVSNPrintf(run->stop_reason, sizeof(run->stop_reason), format, NULL, args));
@@ -71,7 +71,7 @@ static double seconds(void)
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* Calls only what a handler may call. */
+/* Signal handler: async-signal-safe calls only. */
 static void note_signal(int number)
 {
   static const char text[] =
@@ -171,7 +171,7 @@ PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool w
                                                : "USR1"));
     who = signal_name;
   }
-  /* a job that is put back into the queue would come here again */
+  /* else a requeued job would repeat this for ever */
   PetscCheck(
     reason != WALL_TIME || step > run->step0, run->model->comm, PETSC_ERR_USER_INPUT,
     "-wall_time: the %.6g s are over before a step is done: give more time or ranks, or a coarser mesh",

@@ -1,8 +1,8 @@
 /*
-  A run that goes on with another model of the same scene: what the first one has come to, and how the second one begins.
+  Continuation of a run with another model of the same scene, after re-meshing.
 
-  Integrators that take their acceleration from the residual (the explicit ones, Newmark) get that of the new model. Implicit Euler and generalized-alpha have one
-  of their own, which does not follow from the state.
+  Integrators whose acceleration follows from the residual (the explicit ones, Newmark) recompute it. That of implicit Euler and
+  generalized-alpha is a history variable.
 */
 #include "time_impl.h"
 
@@ -40,7 +40,7 @@ PetscErrorCode SbRunTransferState(SbRun from, SbRun to)
   PetscFunctionBeginUser;
   to->step0 = to->step_now = from->step_now;
   to->t0 = to->t_now = from->t_now;
-  to->model->load = to->model->dynamic ? 1. : from->t_now; /* an attempt that failed has left its own */
+  to->model->load = to->model->dynamic ? 1. : from->t_now; /* a failed attempt has changed it */
   to->energies = from->energies;
   to->energy_start = from->energy_start;
   to->energy_most = from->energy_most;
@@ -52,7 +52,7 @@ PetscErrorCode SbRunTransferState(SbRun from, SbRun to)
   to->wall_start = from->wall_start;
   to->stop = from->stop;
 
-  /* fixed steps have their nominal length again, also where the last one was cut */
+  /* fixed steps return to their nominal length, also after a shortened one */
   if (!SbRunIsExplicit(to) || from->dt_given) to->dt = from->dt;
   to->dt_given = from->dt_given;
   if (to->ts) {
