@@ -247,7 +247,7 @@ PetscBool SbFormulaUsesTime(SbFormula formula);
 PetscBool SbFormulaUsesPosition(SbFormula formula);
 PetscErrorCode SbFormulaDestroy(SbFormula *formula);
 /*
-  Live formulas (src/base/live.c): numbers that somebody sets while a run goes on, where a formula of an effect is the word `live`.
+  Live formulas (src/base/live.c): numbers set during a run, where a formula of an effect is the word `live`.
 
   SetUp: the file with them, the largest speeds of what moves (m/s) and turns (degree/s), and how many simulated seconds may pass per second, 0: any; before the first step. Of number i = 0 .. SbLiveCount() - 1: Column, its
   name in the history and its unit (may be NULL); Get, its value at time t of the present step; Set puts it there. Advance: a step that ended at t was accepted, from now on they go to what the file says. Collective.

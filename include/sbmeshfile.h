@@ -59,7 +59,7 @@ typedef struct {
   PetscInt64 ratio[SB_RATIO_BINS]; /* radius ratios of the tets, 1 for the regular tet */
 } SbMeshStatistics;
 /*
-  SbMeshFileMeasure - checks the mesh as a run would, and measures it. What a run would leave out or turn is left out and turned.
+  SbMeshFileMeasure - checks the mesh as a run would, with the same repairs (unused vertices, orientation), and measures it.
 
   Errors: what SbMeshCreate() refuses.
 */

@@ -38,8 +38,8 @@ PetscErrorCode SbRemeshSetMesher(SbRemesh remesh, SbMesher mesher, void *ctx);
 /* NULL: nothing. Not collective. */
 PetscErrorCode SbRemeshAttach(SbRemesh remesh, SbRun run);
 /*
-  The whole time loop or load path, as SbRunSolve(). model, run and ledger (NULL: there is none) are other ones afterwards when a body was
-  re-meshed; the old ones are gone. remesh NULL: SbRunSolve() alone. Collective.
+  The whole time loop or load path, as SbRunSolve(). model, run and ledger (NULL: there is none) are replaced when a body is
+  re-meshed; the old ones are destroyed. remesh NULL: SbRunSolve() alone. Collective.
 */
 PetscErrorCode SbRemeshSolve(SbRemesh remesh, SbModel *model, SbRun *run, SbLedger *ledger);
 PetscErrorCode SbRemeshDestroy(SbRemesh *remesh);

@@ -11,7 +11,7 @@
 #include "sb.h"
 #include "sblog.h"
 
-/* What there is of a simulation; re-meshing replaces the first three. */
+/* Objects of a simulation; re-meshing replaces the first three. */
 typedef struct {
   SbModel model;
   SbRun run;
@@ -19,7 +19,7 @@ typedef struct {
   SbRemesh remesh;
 } Scene;
 
-/* The run failed: says so in its folder. */
+/* Failure handler: writes the failure to the run's folder. */
 static void report_failure(const char *message, void *scene)
 {
   (void)SbReportFailure(((Scene *)scene)->run, message);
@@ -32,7 +32,7 @@ static PetscErrorCode simulate(Scene *s)
 
   PetscFunctionBeginUser;
   SbErrorSetFailureHandler(report_failure, s);
-  /* set-up: meshes of a restart, space, integrator, who looks on */
+  /* set-up: meshes of a restart, space, integrator, monitors */
   PetscCall(PetscLogStagePush(SbLogStageSetup));
   PetscCall(SbOutputLock(s->run));
   PetscCall(SbOutputRestoreMeshes(s->run));
@@ -80,7 +80,7 @@ static PetscErrorCode supple(int argc, char *argv[])
   (void)SbThreadsSetOne();
   (void)signal(SIGPIPE, SIG_IGN); /* a terminal that is gone must not end a run that writes files */
 
-  /* options: what may be given, and what was */
+  /* register and read options */
   PetscCheck(!command.problem[0], PETSC_COMM_SELF, PETSC_ERR_USER, "%s", command.problem);
   PetscCall(SbOptionsRemember());
   PetscCall(PetscOptionsHasName(NULL, NULL, "-options_left", &left));
@@ -101,7 +101,7 @@ static PetscErrorCode supple(int argc, char *argv[])
   } else if (command.table[0]) {
     PetscCall(SbOptionsTable(PETSC_COMM_WORLD, command.table));
   } else {
-    /* what options say, checked: nothing is computed yet */
+    /* check options: nothing is computed yet */
     PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene.model));
     PetscCall(SbRunCreate(scene.model, &scene.run));
     PetscCall(SbLedgerSetFromOptions(scene.run, &scene.ledger));

@@ -190,7 +190,7 @@ void SbErrorSetCleanup(void (*fn)(void))
   state.at_end = fn;
 }
 
-/* What the run has to say, by one rank. */
+/* Prints the error line, on one rank. */
 static void speak(void)
 {
   if (state.failure_handler) (*state.failure_handler)(state.message, state.farewell_ctx);

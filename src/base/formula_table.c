@@ -9,7 +9,7 @@
 #include <errno.h>
 #include "formula.h"
 
-/* Reads one line: 1 when it holds two numbers, 0 when it holds nothing, -1 otherwise. */
+/* Reads one line: 1 with two numbers, 0 when it is blank, -1 otherwise. */
 static int read_line(char *line, PetscReal row[2])
 {
   char *next = line, *end;

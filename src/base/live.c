@@ -8,7 +8,7 @@
 */
 #include "formula.h"
 
-#define VALUE_MAX 48 /* numbers that are set while a run goes on */
+#define VALUE_MAX 48 /* numbers set during a run */
 
 typedef struct {
   char name[2 * SB_NAME_MAX];   /* begins its line of the file: tool, tool_angle */
@@ -25,7 +25,7 @@ static struct {
   char file[PETSC_MAX_PATH_LEN];
   PetscReal speed, angular_speed, pace; /* m/s; degree/s; simulated seconds per second, 0: no limit */
   PetscReal clock, begun;               /* s, from which the pace counts; clock 0: not yet */
-  PetscBool warned;                     /* of a line that says nothing */
+  PetscBool warned;                     /* of an invalid line */
 } live = {.file = "live.txt", .speed = 0.2, .angular_speed = 90., .pace = 1.};
 
 /* From `from` at time t on to `to`. */
@@ -60,7 +60,7 @@ PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula fo
     v->n = n;
     v->k = k;
 
-    /* a scene that is made again goes on where it was */
+    /* after re-meshing the values continue */
     for (PetscInt i = 0; i < live.n; i++) {
       if (!strcmp(live.value[i].column, v->column)) old = live.value[i].formula->value[0];
     }
@@ -117,7 +117,7 @@ void SbLiveSet(PetscInt i, PetscReal t, PetscReal value)
   set_rows(live.value[i].formula, t, value, 1., value);
 }
 
-/* What the file wants; what it does not name, or not with as many numbers, keeps its target. The first whole line that says nothing is a warning. Rank 0. */
+/* Reads the targets from the file; names without a valid line keep their target. The first invalid line is a warning. Rank 0. */
 static PetscErrorCode read_targets(PetscReal target[])
 {
   FILE *f = fopen(live.file, "r");

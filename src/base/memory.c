@@ -9,7 +9,7 @@
 #include <malloc.h>
 #include "sbbase.h"
 
-#define LARGE (32 << 20) /* bytes; what a step allocates is smaller but for very large meshes */
+#define LARGE (32 << 20) /* bytes; more than a step allocates, but for very large meshes */
 
 void SbMemoryReturnLarge(void)
 {

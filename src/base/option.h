@@ -14,7 +14,7 @@ typedef struct {
   const SbOption *rows; /* [n] borrowed, static */
 } SbOptionBlock;
 
-/* A value that some reader asked for. */
+/* A value that was read. */
 typedef struct {
   char name[SB_OPTION_NAME_MAX]; /* "-body_liver_young" */
   SbScope scope;
@@ -52,7 +52,7 @@ PetscErrorCode SbOptionFindValue(const SbScope *scope, const char *key, SbScope 
                                  PetscBool *given);
 /* The record of an option, by its full name; made when there is none yet. Lent. */
 PetscErrorCode SbOptionFindRecord(const SbScope *scope, const SbOption *row, SbOptionRecord **record);
-/* The error that a required option is missing; names the option of the user's that looks like a slip of it, if there is one. */
+/* The error that a required option is missing; names a misspelt option of the user, if there is one. */
 PetscErrorCode SbOptionMissing(const SbOptionRecord *record);
 /* The database as it is now: every name and value. Free with SbOptionUsersFree(). */
 PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users);

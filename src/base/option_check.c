@@ -132,7 +132,7 @@ static PetscBool has_type(const char *klass, const char *instance, size_t n, con
   return PETSC_FALSE;
 }
 
-/* What is to be said of an option that nobody read. */
+/* Error or warning for an unread option. */
 typedef enum {
   NOT_OURS,
   UNUSED,   /* right, for another type or setting: `text` is the reason */

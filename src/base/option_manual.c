@@ -10,7 +10,7 @@
   "  supple SCENARIO.opts [-option value ...]\n" \
   "  mpirun -n 4 supple SCENARIO.yml [-option value ...]\n"
 
-/* What a first scenario is made of: [class, type, key]. */
+/* Options of a first scenario: [class, type, key]. */
 static const char *const first_options[][3] = {
   {"", "", "bodies"},      {"body", "", "mesh"},    {"body", "", "material"}, {"body", "", "young"},
   {"body", "", "poisson"}, {"body", "", "density"}, {"body", "", "element"},  {"", "", "effects"},
@@ -132,7 +132,7 @@ static PetscErrorCode print_manual(PetscViewer viewer, const char *topic, int le
 
     for (PetscInt k = 0; i >= 0 && k < nordered; k++) seen = (PetscBool)(seen || !strcmp(order[k], klass));
     if (seen || (i >= 0 && !is_first(i, PETSC_FALSE))) continue;
-    /* what all instances have comes before what one type has */
+    /* options of all instances first, then those of a type */
     for (int typed = 0; typed < 2; typed++) {
       for (PetscInt j = 0; j < SbTheOptions.nblock; j++) {
         const SbOptionBlock *b = &SbTheOptions.block[j];

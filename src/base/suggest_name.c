@@ -34,7 +34,7 @@ static PetscInt edit_distance(const char *a, const char *b)
 PetscErrorCode SbSuggestNames(const char *word, PetscInt n, const char *const names[], size_t size,
                               char text[])
 {
-  const PetscInt farthest = strlen(word) < 6 ? 1 : 2; /* edits that still look like a slip */
+  const PetscInt farthest = strlen(word) < 6 ? 1 : 2; /* edit distance of a misspelling */
   PetscInt best = farthest + 1, nbest = 0;
 
   PetscFunctionBeginUser;

@@ -10,7 +10,7 @@
 #include <link.h>
 #include "sbbase.h"
 
-/* What sets a library to one thread, and what asks it how many it would use. */
+/* Functions of a library that set and get its number of threads. */
 static const struct {
   const char *set, *ask;
   int one; /* the argument that stands for one thread */

@@ -14,8 +14,8 @@
 #include "sblog.h"
 
 /*
-  Elastic forces of a region (elastic), and those of its damping. P2: each point has its part of the volume; the volumetric part is that of the mean of the cell. Damping
-  alike: mu (H + R H^T R) at the points, lambda times the mean of R : H.
+  Elastic forces of a region (elastic), and those of its damping. P2: each point with its fraction of the volume; the volumetric part by the mean of the cell. Damping
+  likewise: mu (H + R H^T R) at the points, lambda times the mean of R : H.
 */
 static void add_forces(SbSpace s, const SbRegion *region, PetscBool elastic, const SbStage *stage,
                        PetscReal f[])

@@ -15,7 +15,7 @@
 */
 #include "sbgeometry.h"
 
-#define STEPS 1024 /* at most; what has been reached then is returned, it is safe */
+#define STEPS 1024 /* most iterations; the time reached by then is returned, which is safe */
 #define AIM 0.9    /* of the gap to be kept, aimed at: then a few steps get below it */
 #define CLOSER 0.5 /* of a gap that is below the separation already, to be kept */
 

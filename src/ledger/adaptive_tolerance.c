@@ -17,12 +17,12 @@
 #define STEPS 0.7   /* of it to the integrator */
 #define GAPS 0.5    /* of it to contact that keeps a gap */
 #define MESH 0.1    /* of the mesh's error, that contact may have */
-#define AIM 0.5     /* of what is allowed, that a new width goes for */
-#define ROOM 0.1    /* of what is allowed: below, a width may grow */
+#define AIM 0.5     /* target of a new width, over the allowed error */
+#define ROOM 0.1    /* error below which a width may grow, over the allowed one */
 #define GROWTH 0.01 /* of the energy of the allowed error: by how much that of gaps may grow with a width */
 #define LOOSEST 0.3 /* relative residual */
 #define TIGHTEST 1e-12
-#define NOISE 4.      /* times what a solve leaves */
+#define NOISE 4.      /* factor on the error of a solve */
 #define SHORTEST 1e-6 /* step, of the run */
 
 PetscErrorCode SbAdaptiveToleranceSetFromOptions(SbLedger l)

@@ -11,7 +11,7 @@
 #include "ledger_impl.h"
 #include "sbkernel.h"
 
-#define CLOSELY 1e-3 /* delta is nearly the gap, and what strains is the difference */
+#define CLOSELY 1e-3 /* tolerance of delta: it is nearly the gap, and strains are by the difference */
 
 /* Elastic energy of the displacement of bodies and contact by the forces F. */
 static PetscErrorCode moved_energy(SbLedger l, Vec U, Vec F, PetscReal *energy)

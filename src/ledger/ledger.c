@@ -165,7 +165,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     *nonlinear = left * PetscSqrtReal(l->kept_part) * *nonlinear + part * l->step_nonlinear;
   }
 
-  /* what is computed at this state, at the price that goes into own_work */
+  /* estimates at this state, with their cost in own_work */
   begin(l);
   if (!first && (step->last || (l->every && step->step % l->every == 0))) {
     const SbModel m = l->run->model;
@@ -220,7 +220,7 @@ static PetscErrorCode cell_error(SbRun run, const SbStep *step, PetscReal values
 
 /* ------------------------------------------------------------------ beginning and end */
 
-/* What the errors add up from goes on over a restart. */
+/* Accumulated errors are saved in checkpoints. */
 static PetscErrorCode carry(SbLedger l)
 {
   const struct {

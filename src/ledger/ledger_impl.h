@@ -1,5 +1,5 @@
 /*
-  ledger_impl.h - what the files of src/ledger share.
+  ledger_impl.h - shared by the files of src/ledger.
 */
 #pragma once
 #include "sbledger.h"
@@ -47,14 +47,14 @@ struct _p_SbLedger {
   /* of the last step that was examined, J^(1/2) */
   PetscReal step_time, step_linear, step_nonlinear, offset;
   PetscReal residual, seen_residual; /* after the last solve, and at the last step examined, N */
-  PetscReal kept_part;               /* of what solves left before: the integrator damps it */
+  PetscReal kept_part;               /* of earlier errors of solves: the integrator damps them */
   PetscBool seen;                    /* the step that is about to be accepted was */
   PetscBool anew;                    /* another mesh, on which the old accelerations are in no balance */
 
   Vec kept, before;            /* accelerations at the start of this step and of the one before, m/s^2 */
   PetscReal kept_t, before_dt; /* s; before_dt 0: there was none */
   Vec w[3];                    /* work */
-  Vec delta;                   /* what the solve left, m: the quantity's share of it */
+  Vec delta;                   /* error of the solve, m, for that of the quantity */
 
   PetscReal work, own_work; /* in residuals, of the run and of the estimates: the same on every run */
   PetscReal seconds, solving, residuals; /* of estimates on this rank: all, linear solves, residuals */
@@ -75,7 +75,7 @@ PetscErrorCode SbDifferenceLength(SbLedger l, Vec D, PetscReal *length);
 /* X = J^-1 B with the solver and tangent of the last solve, to the relative residual rtol, from zero; its may be NULL. Collective. */
 PetscErrorCode SbProbeSolve(SbLedger l, PetscReal rtol, Vec B, Vec X, PetscInt *its);
 
-/* estimate_time.c: what the step loses, into step_time and offset; all: what bounds the sum of steps, too. Collective. */
+/* estimate_time.c: error of the step, into step_time and offset; all: also the bounds of the sum over steps. Collective. */
 PetscErrorCode SbEstimateTime(SbLedger l, const SbSolvedStep *step, PetscBool all);
 /* Adds it to the error of the run, of whose old part damping leaves `left`, 0..1. Not collective. */
 void SbEstimateTimeAdd(SbLedger l, PetscReal dt, PetscReal left);
@@ -85,11 +85,11 @@ PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal 
 PetscErrorCode SbMassForm(SbLedger l, Vec D, PetscReal *form);
 /* estimate_solver.c: what the solves of the step left, into step_linear, step_nonlinear and delta. Collective. */
 PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolvedStep *step);
-/* What rounding of the displacements leaves, J^(1/2). Collective. */
+/* Error by rounding of the displacements, J^(1/2). Collective. */
 PetscErrorCode SbEstimateRounding(SbLedger l, PetscReal t, Vec U, PetscReal *error);
 /* estimate_contact.c: J^(1/2). Collective. */
 PetscErrorCode SbEstimateContact(SbLedger l, const SbStep *step, PetscReal *error);
-/* What the gaps of barrier contact at U are in error by, or a bound of it that is less than `enough`, J^(1/2). Collective. */
+/* Error by the gaps of barrier contact at U, or a bound of it below `enough`, J^(1/2). Collective. */
 PetscErrorCode SbEstimateGaps(SbLedger l, Vec U, PetscReal enough, PetscReal *error);
 
 /* adaptive_tolerance.c */
@@ -103,7 +103,7 @@ PetscErrorCode SbAdaptiveToleranceAccept(SbLedger l, const SbStep *step);
 /* quantity.c */
 PetscErrorCode SbQuantitySetFromOptions(SbLedger l, const SbScope *scope);
 PetscErrorCode SbQuantityAttach(SbLedger l);
-/* The run goes on with other meshes: says so when the node of the number is another one. Collective. */
+/* After re-meshing: warns if the node of the quantity has changed. Collective. */
 PetscErrorCode SbQuantityContinue(SbLedger from, SbLedger to);
 PetscErrorCode SbQuantityValue(SbLedger l, const SbStep *step);
 PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step);

@@ -160,7 +160,7 @@ PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step)
 
     PetscCall(VecDuplicate(step->U, &B));
     PetscCall(VecDuplicate(step->U, &Z));
-    // dQ/du on what is not prescribed
+    // dQ/du at free unknowns
     if (q->kind == SB_QUANTITY_REACTION)
       PetscCall(stiffness_times(l, step->t, step->U, q->weight, B));
     else
@@ -172,7 +172,7 @@ PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step)
     q->error[SB_ERROR_NONLINEAR] = left * l->step_nonlinear;
     PetscCall(SbProbeSolve(l, ADJOINT, B, Z, NULL));
     PetscCall(VecDot(B, Z, &energy));
-    /* of a reaction: what a motion of the support does to the body, which moves as a whole where nothing else holds it */
+    /* of a reaction: effect of a support displacement on the body, rigid if it has no other support */
     if (q->kind == SB_QUANTITY_REACTION) PetscCall(VecAYPX(Z, -1., q->weight));
 
     /* the mesh's share: a(e_u, e_z) */

@@ -22,7 +22,7 @@ static PetscReal error_of(SbLedger l, int source)
   return l->error[source] + (source == SB_ERROR_TIME ? l->offset : 0.);
 }
 
-/* The errors are of different things and as likely to help as to hinder each other. */
+/* Root of the sum of squares: errors of different sources are independent. */
 static PetscReal together(SbLedger l)
 {
   PetscReal sum = 0.;
@@ -84,7 +84,7 @@ static PetscReal growth(SbRun run)
   return 2.;
 }
 
-/* What half the error of a source costs, as a factor on the time of the run. */
+/* Cost of halving the error of a source, as a factor on the time of the run. */
 static PetscReal price(SbLedger l, const SbLedgerSeconds *s, int source)
 {
   const SbRun run = l->run;
@@ -191,7 +191,7 @@ static void say_wasted(SbLedger l, const SbLedgerSeconds *s, char w[ROOM])
   }
 }
 
-/* Whether -accuracy was met, and what is in the way. */
+/* Whether -accuracy was met, and if not, why. */
 static void say_dial(SbLedger l, char w[ROOM])
 {
   const PetscReal all = together(l) / PetscSqrtReal(PetscMax(l->stored, PETSC_MIN_REAL));

@@ -77,7 +77,7 @@ typedef struct {
   PetscInt n[2];    /* of them, and how many fold over themselves */
   int64_t number;   /* the first that does, in the file */
   PetscReal least;  /* its least Jacobian over that of the straight tet */
-  PetscReal volume; /* what all add to that of straight tets, m^3 */
+  PetscReal volume; /* sum of the changes relative to straight tets, m^3 */
 } Curved;
 
 /* This rank's, with their edges unless they are only measured, without cell[]. */
@@ -155,7 +155,7 @@ PetscErrorCode SbMeshCurve(SbMesh mesh, PetscInt n, const PetscInt orig[], const
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_INT, MPI_SUM, mesh->comm));
   if (!total) PetscFunctionReturn(PETSC_SUCCESS);
-  // from who has read them to the ranks that numbers are dealt to
+  // from the ranks that read them to the home ranks of their numbers
   PetscCall(PetscLayoutCreateFromSizes(mesh->comm, PETSC_DECIDE, mesh->Ncell, 1, &rows));
   PetscCall(PetscLayoutGetLocalSize(rows, &ndealt));
   PetscCall(PetscMalloc1(18 * (size_t)ndealt, &dealt));

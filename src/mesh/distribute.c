@@ -80,14 +80,14 @@ static PetscErrorCode send_cells(const Cells *from, const SbRoute *route, const 
     for (PetscInt i = 4 * route->rfirst[r]; i < 4 * (route->rfirst[r] + route->rcount[r]); i++)
       to->cell[i] += vertices.rfirst[r];
   }
-  /* what belongs to cells */
+  /* data of cells */
   if (which) {
     PetscCall(PetscMalloc1(route->nsend, &data));
     for (PetscInt i = 0; i < route->nsend; i++) data[i] = from->data[which[i]];
   }
   PetscCall(SbRouteSend(route, sizeof(SbCellData), which ? data : from->data, &to->data));
   PetscCall(PetscFree(data));
-  /* what belongs to vertices */
+  /* data of vertices */
   PetscCall(PetscMalloc1(nlist, &vertex));
   for (PetscInt i = 0; i < nlist; i++) vertex[i] = from->vertex[list[i]];
   PetscCall(SbRouteSend(&vertices, sizeof(SbVertexData), vertex, &to->vertex));
@@ -285,7 +285,7 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
                            .data = from.data,
                            .vertex = from.vertex};
   } else {
-    // several cut the mesh, and each cell goes to its owner
+    // several ranks: partition the mesh, send each cell to its owner
     PetscCall(PetscMalloc1(w->ncell, &part));
     PetscCall(SbPartition(comm, type, w, part));
     PetscCall(PetscFree(w->neighbour));

@@ -1,5 +1,5 @@
 /*
-  measure.c - what there is to know about a mesh before it is simulated: groups, size, shape of its tets.
+  measure.c - statistics of a mesh: groups, size, shape of its tets.
 */
 #include "sbkernel.h"
 #include "mesh_impl.h"

@@ -81,7 +81,7 @@ static PetscErrorCode merge(PetscInt nbody, const SbBody body[], SbImport im[], 
   for (PetscInt b = 0; b < nbody; b++) {
     PetscInt ncurved = 0;
 
-    // what travels with the points of body b
+    // data sent with the points of body b
     for (PetscInt c = 0; c < im[b].item[3].n; c++) {
       SbCellData *p = &w->data[at.cell + c];
 

@@ -86,14 +86,14 @@ PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport i
 
 /* ------------------------------------------------------------------ route.c: see sbmesh.h */
 
-/* Brings answer[nrecv] back to who sent the records: result[nsend], room of the caller. Collective. */
+/* Returns answer[nrecv] to the senders of the records: result[nsend], allocated by the caller. Collective. */
 PetscErrorCode SbRouteReply(const SbRoute *route, size_t unit, const void *answer, void *result);
 /* The rank that sent record i of those received. */
 PetscMPIInt SbRouteSource(const SbRoute *route, PetscInt i);
 
 /* ------------------------------------------------------------------ merge.c, partition.c, distribute.c, order.c, number.c */
 
-/* What travels with a vertex and with a cell. */
+/* Data sent with a vertex and with a cell. */
 typedef struct {
   PetscInt orig, body;
   uint64_t set;

@@ -61,7 +61,7 @@ static PetscErrorCode split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3],
     if (along[i] > cut) next = PetscMin(next, along[i]);
   if (!(along[0] < cut)) cut = next;
   PetscCall(PetscFree(along));
-  // the samples below it come first; what lies on it goes up, as tets will, and not by the order of the samples
+  // samples below it first; those on it count as above, as tets do, independent of the order of samples
   for (PetscInt i = 0; i < n; i++) {
     if (x[i][axis] >= cut) continue;
     for (int d = 0; d < 3; d++) {

@@ -58,7 +58,7 @@ static PetscErrorCode ask_home_ranks(Slab *s)
   PetscInt n = 0, before;
 
   PetscFunctionBeginUser;
-  // the home ranks learn who uses their vertices
+  // the home ranks get the users of their vertices
   PetscCall(PetscMalloc1(im->nvert, &dest));
   for (PetscInt v = 0; v < im->nvert; v++) dest[v] = home(s, s->used[v]);
   PetscCall(SbRouteCreate(s->comm, im->nvert, dest, &s->vert));
@@ -111,7 +111,7 @@ typedef struct {
   int64_t number;
 } Across;
 
-/* What lies across each of the faces that came here. */
+/* The cells across the received faces. */
 static PetscErrorCode match_faces(const Slab *s, const SbRoute *route, Face face[], Across across[])
 {
   PetscInt nshared = 0, first = -1, m;
@@ -202,7 +202,7 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
       n++;
     }
   }
-  // the home ranks match them, and say what lies across
+  // the home ranks match them, and return the cell across
   PetscCall(SbRouteCreate(s->comm, n, dest, &route));
   PetscCall(SbRouteSend(&route, sizeof(Face), face, &got));
   PetscCall(PetscMalloc2(route.nrecv, &across, n, &result));
@@ -569,7 +569,7 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   }
   for (PetscInt i = 0; i < 4 * tets->n; i++) tets->vert[i] = map[tets->vert[i] - low];
   PetscCall(PetscFree(map));
-  /* what was read is what this rank keeps */
+  /* this rank keeps exactly what it read */
   s->nkept = im->nvert;
   s->x = im->x;
   im->x = NULL;

@@ -14,7 +14,7 @@ static PetscInt lowest(const PetscInt v[4])
   return PetscMin(PetscMin(v[0], v[1]), PetscMin(v[2], v[3]));
 }
 
-/* What all ranks must agree on. */
+/* Global quantities, equal on all ranks. */
 static PetscErrorCode check_sums(SbMesh m)
 {
   enum { VERT, CELL, PAIR, VERT_MIX, CELL_MIX, FACET, NSUM };

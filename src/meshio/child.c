@@ -131,7 +131,7 @@ PetscErrorCode SbGmshRun(const SbGmshJob *job, SbImport *im)
   PetscCheck(pid > 0, PETSC_COMM_SELF, PETSC_ERR_SYS, "%s: no child process for gmsh (%s)", im->where,
              strerror(errno));
 
-  /* what is said of a child that left nothing complete */
+  /* message for a child without a complete result */
   PetscCheck(complete || !WIFSIGNALED(status) || WTERMSIG(status) != SIGALRM, PETSC_COMM_SELF,
              PETSC_ERR_FILE_UNEXPECTED,
              "%s: gmsh was stopped: after %g s it had not %s; give a smaller or repaired input", im->where,

@@ -112,7 +112,7 @@ static PetscErrorCode find_reader(const SbBody *body, SbReader *read)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What is given about a body before it is read. */
+/* Sets the inputs of a reader from the body. */
 static PetscErrorCode begin(const SbBody *body, SbImport *im)
 {
   PetscInt none;

@@ -38,7 +38,7 @@ typedef struct {
 
 /* ------------------------------------------------------------------ the file */
 
-/* The path of what is named, in the mesh of the step. */
+/* The path of an object in the mesh of the step. */
 static void path_of(const File *f, const char *name, char path[256])
 {
   const PetscBool mesh = (PetscBool)!strncmp(name, "/mesh/", strlen("/mesh/"));
@@ -46,7 +46,7 @@ static void path_of(const File *f, const char *name, char path[256])
   (void)snprintf(path, 256, "%s%s", mesh ? f->mesh : "", mesh ? name + strlen("/mesh") : name);
 }
 
-/* Whether every group on the way to what is named exists. */
+/* Whether all groups on a path exist. */
 static PetscBool is_there(const File *f, const char *name)
 {
   char path[256], part[256];
@@ -62,7 +62,7 @@ static PetscBool is_there(const File *f, const char *name)
 
 /* ------------------------------------------------------------------ arrays */
 
-/* What is wanted of an array, and what there is of it. */
+/* Expected type and shape of an array, and the actual ones. */
 typedef struct {
   const char *name;
   H5T_class_t klass;
@@ -464,7 +464,7 @@ static PetscErrorCode read_output(const File *f)
 
 /* ------------------------------------------------------------------ the mesh */
 
-/* What is in the file, for a reader who gave another one. */
+/* Contents of the file, for the message about a wrong one. */
 static herr_t list_name(hid_t where, const char *name, const H5L_info_t *info, void *ctx)
 {
   char *text = (char *)ctx;

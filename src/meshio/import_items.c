@@ -297,7 +297,7 @@ PetscErrorCode SbImportMiddles(SbImport *im, PetscBool found[], PetscReal *large
   }
   im->nmiddle.n = n;
   *largest = PetscSqrtReal(most);
-  // nodes that only lie at edges are no vertices
+  // nodes at edges only are not vertices
   for (PetscInt i = 0; keep && i < 4 * im->item[3].n; i++) keep[im->item[3].vert[i]] = 1;
   if (keep) PetscCall(SbImportDropVertices(im, keep));
   PetscFunctionReturn(PETSC_SUCCESS);

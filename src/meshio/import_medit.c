@@ -9,7 +9,7 @@
 #include <ctype.h>
 #include "meshio_impl.h"
 
-/* Elements by their keyword: what gmsh calls them. */
+/* Keywords of elements, with gmsh's types. */
 static const struct {
   const char *word;
   int type;

@@ -270,7 +270,7 @@ static PetscErrorCode read_grid(Nastran *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Elements by name: what gmsh calls them with all nodes of their corners, and with one more. */
+/* Names of elements, with gmsh's types for all corner nodes, and for more nodes. */
 static const struct {
   const char *name;
   int ncorner, linear, higher;

@@ -34,7 +34,7 @@ static PetscErrorCode read_points(SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What stands before the points of an element: numbers of no use, its group, and in .vol how many points it has. */
+/* Columns before the points of an element: skipped numbers, its group, and in .vol the number of points. */
 typedef struct {
   int dim, room; /* bytes that a line takes at least */
   const char *before[5];

@@ -11,7 +11,7 @@
 */
 #include "meshio_impl.h"
 
-/* The files: what their items are, and the first line says. */
+/* The files: their items, and the contents of the first line. */
 static const struct {
   const char *ending, *count, *title, *mark;
   int dim, ncount, room; /* numbers of the first line that are of use; bytes that an item takes at least */

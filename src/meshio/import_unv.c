@@ -8,7 +8,7 @@
 #include <ctype.h>
 #include "meshio_impl.h"
 
-/* FE descriptor ids: what gmsh calls them. Others (springs, masses) have no place in a body and are passed over. */
+/* FE descriptor ids, with gmsh's types. Others (springs, masses) are skipped. */
 static const struct {
   int id, type;
 } types[] = {

@@ -12,7 +12,7 @@ typedef struct {
   SbScan *scan;
   SbImport *im;
   SbVtkGrid grid;
-  PetscBool binary, points, cells, on_cells; /* on_cells: what follows is data of cells */
+  PetscBool binary, points, cells, on_cells; /* on_cells: the following arrays are cell data */
   int64_t ntuple;                            /* of what follows */
   const char *cells_at;                      /* for messages */
 } Vtk;

@@ -1,12 +1,12 @@
 /*
   vtk_grid.c - cells of VTK's files as items of a body.
 
-  Types of cells as in VTK's vtkCellType.h; they are counted as what gmsh calls them, to say what else is there in the same words.
+  Types of cells as in VTK's vtkCellType.h; they are counted by gmsh's types, for the same messages.
 */
 #include <strings.h>
 #include "vtk_grid.h"
 
-/* VTK's types of cells: what gmsh calls them. nnode 0: any number of nodes. */
+/* VTK's types of cells, with gmsh's types. nnode 0: any number of nodes. */
 static const struct {
   int type, gmsh, nnode;
 } cells[] = {
@@ -56,7 +56,7 @@ PetscErrorCode SbVtkSetPoints(PetscInt n, const double x[], SbImport *im)
 
 /* ------------------------------------------------------------------ cells */
 
-/* What gmsh calls a cell; a type that is not known is an error. */
+/* gmsh's type of a cell; an unknown type is an error. */
 static PetscErrorCode cell_type(SbScan *s, const SbVtkGrid *grid, PetscInt c, int64_t nnode, int *type)
 {
   const double vtk = grid->type[c];

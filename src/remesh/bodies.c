@@ -99,7 +99,7 @@ static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
   PetscBool *surface;
 
   PetscFunctionBeginUser;
-  // a set that holds what lies inside as points, curves or triangles of a file would lose it
+  // a set with inner points, curves or triangles of a file would lose them
   PetscCall(PetscCalloc2(old.nvert, &volume, old.nvert, &surface));
   for (PetscInt i = 0; i < 4 * w->ncell; i++) {
     volume[w->cell[i]] |= g->cell_set[5 * (w->cell0 + i / 4)];
@@ -420,7 +420,7 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
     PetscCall(SbLocatorCreate(work[b].ncell, work[b].cell, g->X + 3 * work[b].vert0, off_of(&work[b], 0),
                               &work[b].rest));
     r->outcome[b] = (SbRemeshOutcome){{nvert, nvert}, {work[b].ncell, work[b].ncell}, 0, 0., ""};
-    // meshes the body again; what it cannot do goes to the message
+    // re-mesh the body; failures go to the message
     if (due[b]) {
       SbCaughtError caught = {0, ""};
 

@@ -25,7 +25,7 @@
 #define PLACES 6 /* on the way to the middle of the neighbours, each half as far as the one before */
 #define STRAIGHT 1e-6 /* of the length of an edge: nearer to the middle its node is there */
 
-/* What finds the old material. */
+/* Locator of points in the old mesh. */
 typedef struct {
   const SbOldMesh *old;
   SbLocator rest, flat; /* tets at rest; straight ones of a body with curved ones, else NULL */
@@ -367,7 +367,7 @@ static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how
     before += !(quality > 0);
     worst = PetscMin(worst, quality);
   }
-  // no worse than before, and better where that was asked for
+  // not worse than before, better if required
   PetscCheck(!at_rest, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%" PetscInt_FMT " of %" PetscInt_FMT
              " new tetrahedra would be inverted or flat at rest: the deformation differs too much from one "

@@ -1,7 +1,7 @@
 /*
-  What effects remember of one model (who touches, who sticks), for another one: as a checkpoint would carry it, with the names of nodes changed.
+  Transfers history variables of effects (active contact, friction) to the new model: as through a checkpoint, with nodes renumbered.
 
-  What does not say how its names change (SbEffectOps.rename) begins again, as at the start of a run.
+  Effects without the operation `rename` start as at the start of a run.
 */
 #include "remesh_impl.h"
 

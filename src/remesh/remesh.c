@@ -281,7 +281,7 @@ PetscErrorCode SbRemeshAttach(SbRemesh r, SbRun run)
 
 /* ------------------------------------------------------------------ the scene once more */
 
-/* What is being replaced, and what takes its place. */
+/* A scene: the old one, or the new one. */
 typedef struct {
   SbModel model;
   SbRun run;
@@ -328,7 +328,7 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   PetscCall(SbRunTransferState(old->run, run));
   PetscCall(SbScatter(&result->next, run));
   PetscCall(SbModelPrescribe(s.model, run->t_now, run->U));
-  // keeps the bodies' momenta, and their rates where the integrator carries accelerations
+  // keep the bodies' momenta, and their rates where accelerations are states of the integrator
   if (run->V) {
     PetscCall(PetscCalloc1(old->model->nbody, &momenta));
     PetscCall(SbBodyMomenta(old->model, before->U, before->V, momenta));
@@ -342,7 +342,7 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
     PetscCall(PetscFree(momenta));
   }
   PetscCall(SbEffectsHandOver(old->run, run, &result->renamed));
-  // faces of CR and DG have what the run goes on with, before accelerations and energies are those of it
+  // penalty of CR and DG for the new state, before accelerations and energies are computed
   if (run->J && run->model->dynamic && run->preset != SB_TIME_ALPHA2)
     PetscCall(SbSpaceFollowJumps(run->model->space, run->U,
                                  run->preset == SB_TIME_NEWMARK ? SB_STEPS_UNDAMPED : SB_STEPS_IN_TIME,

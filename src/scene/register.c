@@ -24,7 +24,7 @@ PetscErrorCode SbRegisterAll(void)
   /* or PETSc never frees the partitioners that are registered before the first one is used */
   PetscCall(PetscPartitionerInitializePackage());
 
-  /* what a run has once, in the order of the manual */
+  /* options of the run, in the order of the manual */
   PetscCall(SbSceneRegister());
   PetscCall(SbMeshRegister());
   PetscCall(SbSpaceRegister());

@@ -1,5 +1,5 @@
 /*
-  scene_impl.h - what the files of layer 6 share.
+  scene_impl.h - shared by the files of src/scene.
 */
 #pragma once
 #include "sbledger.h"
@@ -19,7 +19,7 @@ typedef struct {
 } SbPlacement;
 /* Those of -body_<name>_copies, n of them, 0: it is one body; a file is read by rank 0. Collective; the caller frees. */
 PetscErrorCode SbSceneReadCopies(MPI_Comm comm, const char *name, PetscInt *n, SbPlacement **place);
-/* The body is scaled and turned more, and shifted. */
+/* Applies further scale, rotation and translation to the body. */
 void SbPlacementAdd(const SbPlacement *place, SbBody *body);
 
 /*

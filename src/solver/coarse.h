@@ -24,7 +24,7 @@ struct _p_SbCoarse {
   PetscInt *agg;            /* [nnode] aggregate by global number, -1 for fully prescribed nodes */
   PetscReal *d;             /* [nnode][3] */
   PetscReal *centre;        /* [n][4] position, m, and radius, m; 0 for a single node */
-  PetscBool spread;         /* multigrid stands for E^-1, else one rank factors E */
+  PetscBool spread;         /* multigrid approximates E^-1, else one rank factors E */
   PetscReal *null;          /* [n][36] projector onto the modes that vanish (single nodes, nodes on a line) */
   PetscInt *member_start;   /* [n+1] */
   PetscInt *member;         /* own nodes by aggregate */
@@ -46,7 +46,7 @@ PetscErrorCode SbCoarseSetUp(SbCoarse coarse, Mat A);
 PetscErrorCode SbCoarseRestrict(SbCoarse coarse, Vec r, PetscReal *share);
 /* z += Z E^-1 c, E = Z^T A Z, with the c of the last SbCoarseRestrict(). Collective. */
 PetscErrorCode SbCoarseAdd(SbCoarse coarse, Vec z);
-/* E without values, and what solves with it, once (coarse_solver.c). Collective. */
+/* E without values, and its solver, once (coarse_solver.c). Collective. */
 PetscErrorCode SbCoarseCreateSolver(SbCoarse coarse);
 /* Brings the blocks in coarse->value into them. Collective. */
 PetscErrorCode SbCoarseSetUpSolver(SbCoarse coarse);

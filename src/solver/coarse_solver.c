@@ -99,7 +99,7 @@ PetscErrorCode SbCoarseSetUpSolver(SbCoarse c)
       const PetscReal *block = c->value + 36 * k;
 
       PetscCall(MatSetValuesBlocked(c->E, 1, &row, 1, c->column + k, block, INSERT_VALUES));
-      /* what is not a number is not larger than zero either */
+      /* also false for NaN */
       for (PetscInt e = 0; e < 36; e++) {
         if (k == c->start[a] && e % 7 == 0 && !(block[e] >= least)) least = block[e];
         if (PetscIsInfOrNanReal(block[e])) least = -1.;

@@ -84,7 +84,7 @@ static PetscErrorCode free_pattern(Contact *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Columns in local numbers, and what brings values of other ranks' nodes. */
+/* Columns in local numbers, and the scatter of other ranks' nodes. */
 static PetscErrorCode find_ghosts(Contact *p)
 {
   const SbContactRows *r = p->rows;
@@ -159,7 +159,7 @@ static PetscErrorCode find_units(Contact *p)
   PetscCall(PetscCalloc2(36 * p->nagg, &p->null, p->nagg, &p->row_of));
   PetscCall(PetscCalloc2(4 * p->nagg, &centre, p->nagg, &count));
 
-  /* centre and radius of what is left of each aggregate */
+  /* centre and radius of the remainder of each aggregate */
   for (PetscInt i = 0; i < n; i++) {
     p->way[i] = (uint8_t)way_of(p, i);
     if (p->way[i] != MEMBER) continue;

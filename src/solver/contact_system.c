@@ -15,14 +15,14 @@
 #include "sblog.h"
 #include "sbsolver.h"
 
-#define KEEP 20      /* solves for which a place without values stays */
+#define KEEP 20      /* solves for which an entry without values stays in the pattern */
 #define SMALL 2000   /* unknowns that are factored, so that numbers are the same on any number of ranks */
 #define FORCING 1e-2 /* of the preconditioned residual */
 #define WORK 130     /* operations of a factorisation in the time of an iteration for a 3x3 block */
 #define SET_UP 4     /* iterations in the time that the coarse space takes besides its factor */
-#define SAVED 10     /* times the iterations of a factorisation that CG may have left */
+#define SAVED 10     /* factor on the iterations that a factorisation costs */
 #define PAUSE 20     /* solves that are factored where CG was the slower one */
-#define LARGE 100000 /* unknowns, above which nobody asks what a factorisation would cost */
+#define LARGE 100000 /* unknowns above which the cost of a factorisation is not computed */
 #define MOST 300     /* iterations in any case */
 /* The same of the user's, which nothing replaces, and whose last errors are those of soft motions: a step looks short with them. */
 #define FORCING_USER 1e-4
@@ -296,7 +296,7 @@ static PetscErrorCode fill_matrix(SbContactSystem c)
 
 /* ------------------------------------------------------------------ solutions */
 
-/* PETSc's matrix, and CG or what the user wants in its place. */
+/* PETSc's matrix, and CG or the user's method. */
 static PetscErrorCode set_up_iteration(SbContactSystem c)
 {
   const SbSpace s = c->space;
@@ -323,7 +323,7 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
   PetscCall(fill_matrix(c));
   if (!c->ksp) {
     PetscCall(KSPCreate(s->comm, &c->ksp));
-    /* what goes with -pc_type, its row in solver.c and the user's options, stands in the database without a prefix */
+    /* options of -pc_type, by its row in solver.c and the user, have no prefix in the database */
     PetscCall(PetscOptionsHasName(NULL, "contact_", "-pc_type", &apart));
     if (own || apart) PetscCall(KSPSetOptionsPrefix(c->ksp, "contact_"));
     PetscCall(
@@ -339,7 +339,7 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
     PetscCall(KSPGetTolerances(c->ksp, NULL, NULL, NULL, &c->limit));
   }
   P = c->A;
-  if (!own) { /* what most of PETSc's preconditioners take */
+  if (!own) { /* the type that most of PETSc's preconditioners support */
     PetscCall(MatConvert(c->A, MATAIJ, MAT_INITIAL_MATRIX, &P));
     PetscCall(MatSetOption(P, MAT_SYMMETRIC, PETSC_TRUE));
   }
@@ -438,7 +438,7 @@ PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *bl
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   if (fresh || !c->rows.value) PetscCall(merge(c, K, blocks));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
-  /* what has a factor already is solved with it */
+  /* use an existing factor */
   factored = (PetscBool)(is_factored(c->choice, c->type) ||
                          (!c->type[0] && !c->choice &&
                           (3 * c->space->Nnode <= SMALL || c->nsolve < c->resume || !c->fresh[1])));

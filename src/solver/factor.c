@@ -379,7 +379,7 @@ SB_KERNEL static void backward(SbFactor f)
     }
     for (size_t k = 3 * (size_t)p->nrow; k < height; k++) below[k] = 0.f;
     panel_transposed(height, ncol, a + (size_t)ncol * square / 2, below, scale + 1, pivot);
-    // the unknowns of the panel: transposed inverse times what is left
+    // the unknowns of the panel: transposed inverse times the remainder
     for (PetscInt j = 0; j < ncol; j++) pivot[j] = x[j] - pivot[j];
     for (size_t j = (size_t)ncol; j < square; j++) pivot[j] = 0.f;
     panel_transposed(square, ncol, a, pivot, scale, x);
@@ -390,7 +390,7 @@ void SbFactorForward(SbFactor f, const float b[], float kept[])
 {
   const SbElimination *e = &f->e;
 
-  // into the order of elimination; what reaches the kept nodes is handed out
+  // into the order of elimination; returns the right-hand side at the kept nodes
   for (PetscInt i = 0; i < e->n; i++) {
     for (PetscInt c = 0; c < 3; c++) f->w[3 * i + c] = b[3 * e->order[i] + c];
   }

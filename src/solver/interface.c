@@ -134,7 +134,7 @@ static PetscErrorCode factor_columns(MPI_Comm comm, PetscInt n, PetscInt nblock,
     PetscCall(PetscMPIIntCast((PetscInt)nc * n, &count));
     PetscCallMPI(MPI_Bcast(column, count, MPIU_REAL, (PetscMPIInt)(k % size), comm));
     *ok = (PetscBool)(corner[0] > 0.);
-    /* what it takes from the columns of this rank */
+    /* contribution of this rank's columns */
     for (PetscInt b = k + 1; b < nblock && *ok; b++) {
       if (b % size != rank) continue;
       PetscCall(PetscBLASIntCast(block_of(n, b, &j), &nj));

@@ -76,11 +76,11 @@ static PetscErrorCode guarded_setup(PC pc)
     PetscCall(PetscInfo(pc, "CHOLMOD: a pivot is not positive\n"));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(error); /* what else went wrong is reported as ever, but for its trace */
+  PetscCall(error); /* other errors are reported as usual, without the trace */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* PETSc's solvers go on after a set-up that failed, until they meet what is not a number; CHOLMOD has nothing to solve with then. */
+/* PETSc's solvers continue after a failed set-up until they get NaN; CHOLMOD then has no factor to solve with. */
 static PetscErrorCode guarded_apply(PC pc, Vec x, Vec y)
 {
   PetscErrorCode (*original)(PC, Vec, Vec) = NULL;

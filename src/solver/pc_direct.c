@@ -72,7 +72,7 @@ PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric)
     PetscCall(PCSetType(pc, PCTELESCOPE));
     PetscCall(PCTelescopeSetReductionFactor(pc, size));
     PetscCall(
-      PCSetApplicationContext(pc, (void *)(uintptr_t)package)); /* what is made of it at its first set-up */
+      PCSetApplicationContext(pc, (void *)(uintptr_t)package)); /* options applied at its first set-up */
   }
   /* all negative pivots are counted when the last front is not spread over the ranks */
   if (mumps) PetscCall(SbSolverSetDefault(prefix, "mat_mumps_icntl_13", "1"));

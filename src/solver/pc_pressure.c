@@ -35,7 +35,7 @@
 #define TIGHTER 0.03       /* times that after a correction that did not help */
 #define OF_PART 1e-2 /* aim of GMRES where the operator has a part that K lacks, which FGMRES corrects */
 #define AT_MOST 1e-2 /* of the right-hand side: more is never accepted */
-#define ROUNDING 4.  /* times the rounding errors of K u: what is accepted */
+#define ROUNDING 4.  /* accepted residual, over the rounding error of K u */
 
 typedef struct {
   SbSpace space;
@@ -178,7 +178,7 @@ static PetscErrorCode PCApply_Pressure(PC pc, Vec r, Vec z)
   PetscCall(PetscArraycpy(to, from, n));
   PetscCall(VecRestoreArrayRead(r, &from));
   PetscCall(VecRestoreArray(s->b, &to));
-  // the solve; what it needs counts against the limit
+  // the solve; its iterations count against the limit
   PetscCall(KSPSetTolerances(s->inner, rtol, 0., PETSC_DEFAULT, PetscMax(1, s->limit - s->its)));
   PetscCall(KSPSolve(s->inner, s->b, s->x));
   PetscCall(KSPGetIterationNumber(s->inner, &its));

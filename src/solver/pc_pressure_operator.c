@@ -285,7 +285,7 @@ static PetscErrorCode finish(Mat K)
   for (PetscInt k = 0; k < op->levels->n; k++)
     PetscCall(SbSpaceFinishTangent(op->levels->at[k], op->levels->A[k]));
   cell_numbers(op);
-  PetscCall(MatAssemblyBegin(K, MAT_FINAL_ASSEMBLY)); /* says that it has changed */
+  PetscCall(MatAssemblyBegin(K, MAT_FINAL_ASSEMBLY)); /* increases the object state */
   PetscCall(MatAssemblyEnd(K, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -269,7 +269,7 @@ static PetscErrorCode apply_factor(Rotated *p, const float r[], float z[])
   PetscCall(PetscArrayzero(p->b + 3 * ninterior, 3 * p->nkeep));
   SbFactorForward(p->factor, p->b, p->kept);
   if (f->n) {
-    // the interface: its own right-hand side and what the interior leaves there
+    // the interface: its own right-hand side and the contributions of the interior
     PetscCall(PetscArrayzero(p->edge, 3 * f->n));
     for (PetscInt k = 0; k < f->nmine; k++) {
       const PetscInt i = f->mine[k];

@@ -54,7 +54,7 @@ struct _p_SbPressureOperator {
   SbLevels levels;
   SbAssembly assembly; /* of the matrix */
   SbVolumetric volume;
-  void *memory;    /* what volume lives in */
+  void *memory;    /* memory of volume */
   PetscReal *C;    /* [ncell_owned] m^3/Pa; 1 where the cell is whole in A */
   PetscReal *Cinv; /* [ncell_owned] Pa/m^3; 0 there */
   PetscReal *S;    /* [ncell_owned] C + S0 V / (2 mu), m^3/Pa: stands for C + B A^-1 B^T */

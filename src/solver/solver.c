@@ -89,7 +89,7 @@ static const SbSolverPreset presets[] = {
      "Poisson's ratio"},
 };
 
-/* Preconditioners that the user names by -pc_type: what they work on, and what goes with them. The last row: all others. */
+/* Preconditioners of -pc_type: their matrix types and options. The last row: all others. */
 static const SbSolverPreset by_type[] = {
   {.name = PCNONE, .matrix = SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type none"},
   {.name = PCJACOBI, .matrix = SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type jacobi"},
@@ -182,11 +182,11 @@ static PetscErrorCode preset_value(const SbSolverPreset *preset, const char *nam
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What of the bodies makes systems hard. */
+/* Properties of the bodies that make systems hard to solve. */
 typedef struct {
   PetscReal nu, face_nu; /* largest Poisson's ratio; that of bodies with nodes at faces, -1 without any */
   PetscReal sliver_part; /* tets with an angle below SB_SLIVER as a part of all */
-  PetscBool slivers;     /* so many that they count */
+  PetscBool slivers;     /* above the threshold */
   PetscBool dg;          /* some element has nodes of its own in each cell */
 } Hardness;
 
@@ -401,11 +401,11 @@ PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscB
     if (3 * s->Nnode > others[k].most || (memory && direct)) continue;
     /* multigrid on displacements of nodes at faces takes thousands of iterations near 1/2 */
     if (!strcmp(others[k].name, "cg_gamg") && hard.face_nu > NU_PRESSURE) continue;
-    /* what a factorisation finds singular no iteration solves */
+    /* a system that is singular for a factorisation is so for iterations */
     if (failed->direct && !memory && !direct) continue;
     /* The row of a name in that list that has not failed yet and can solve for this space; NULL: there is none. */
     *preset = direct ? NULL : find_preset(others[k].name);
-    /* what is not definite by rounding or by stress is next */
+    /* next: indefinite by rounding or by stress */
     for (int j = indefinite; direct && j < 2 && !*preset; j++) {
       const char *package;
 
@@ -420,8 +420,8 @@ PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscB
 }
 
 /*
-  Puts the options of a row into PETSc's database where the user is silent, or takes them out again (clear), but for those with another value. The types are set by calls,
-  so that what stands there is the user's.
+  Adds the options of a row to PETSc's database, unless the user gave them, or removes them again (clear), unless their values differ. Types are set by calls,
+  so that those in the database are the user's.
 */
 static PetscErrorCode set_options(const char *text, PetscBool clear)
 {
@@ -543,7 +543,7 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   PetscCall(KSPSetType(ksp, given ? users : method));
   PetscCall(is_symmetric(ksp, &symmetric));
   if (type[0]) PetscCall(PCSetType(pc, type));
-  /* what keeps the preconditioner symmetric */
+  /* options that keep the preconditioner symmetric */
   if (symmetric && !strcmp(type, PCASM)) PetscCall(set_options("-pc_asm_type basic", PETSC_FALSE));
   if (symmetric && !strcmp(type, PCCOMPOSITE))
     PetscCall(set_options("-sub_0_pc_sor_local_symmetric", PETSC_FALSE));
@@ -674,10 +674,10 @@ PetscErrorCode SbSolverFinish(SNES snes, SbSpace s, const SbSolverPreset *preset
     PetscCall(PCSetFromOptions(pc));
   }
   PetscCall(SbPCCheckPivots(pc));
-  /* what cannot work is said before anything is computed */
+  /* unsupported combinations are errors before anything is computed */
   PetscCall(check_factor(pc, P));
   PetscCall(check_method(s, ksp, pc, preset, &direct));
-  /* a matrix without what is not symmetric preconditions the whole tangent */
+  /* the matrix without the nonsymmetric part is the preconditioner of the complete tangent */
   PetscCall(SNESGetJacobian(snes, &A, NULL, NULL, NULL));
   PetscCall(is_symmetric(ksp, &symmetric));
   PetscCall(PetscObjectTypeCompareAny((PetscObject)ksp, &single, KSPRICHARDSON, KSPPREONLY, ""));

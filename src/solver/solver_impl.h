@@ -1,5 +1,5 @@
 /*
-  solver_impl.h - what the files of src/solver share and nobody else needs.
+  solver_impl.h - shared by the files of src/solver.
 */
 #pragma once
 #include "sbsolver.h"

@@ -19,7 +19,7 @@
 #include "sbsolver.h"
 #include <petsc/private/kspimpl.h>
 
-#define AT_MOST 1e-2 /* of the right-hand side, where no more than that is asked for */
+#define AT_MOST 1e-2 /* relative to the right-hand side, if no smaller tolerance is requested */
 
 static PetscErrorCode check_residual(KSP ksp, Vec b, Vec x, void *ctx)
 {
@@ -31,7 +31,7 @@ static PetscErrorCode check_residual(KSP ksp, Vec b, Vec x, void *ctx)
   PetscFunctionBeginUser;
   (void)ctx;
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPPREONLY, &single));
-  /* a number of iterations that was asked for is no promise */
+  /* a given number of iterations does not mean convergence */
   if (ksp->reason <= 0 || (ksp->reason == KSP_CONVERGED_ITS && !single)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(KSPGetOperators(ksp, &A, NULL));
   PetscCall(VecDuplicate(b, &r));

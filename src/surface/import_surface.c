@@ -154,7 +154,7 @@ static PetscErrorCode make_surface(const char *path, const PetscReal at[3], SbTr
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Triangles with material on one side, turned to it, and who is whose neighbour. */
+/* Triangles with material on one side, oriented by it, and their neighbours. */
 static PetscErrorCode take_boundary(const SbTriangleFile *f, const SbSurface *s, PetscInt *nwall)
 {
   SbTriangles *t = f->t;

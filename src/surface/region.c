@@ -304,7 +304,7 @@ static PetscErrorCode empty_cavities(Arrangement *s)
       PetscInt top = k;
       PetscBool outwards, cavity;
 
-      // inwards, as the outermost surface around it says, and in material: a cavity
+      // inwards relative to the outermost surface around it, and in material: a cavity
       if (depth_of(s, k) != depth || s->surfaces[k].branched) continue;
       while (s->surfaces[top].parent != OUTSIDE) top = s->shells[s->surfaces[top].parent].surface;
       outwards = (PetscBool)(turned_outwards(s, k) == (turned_outwards(s, top) || s->surfaces[top].branched));
@@ -352,7 +352,7 @@ static PetscErrorCode groups_of_shell(const Arrangement *s, PetscInt shell, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every region is region_1, ...; also NAME_region when its outer limit lies in the group NAME; and what the file says. */
+/* Every region is region_1, ...; also NAME_region when its outer limit lies in the group NAME; and its name in the file. */
 static PetscErrorCode name_regions(const Arrangement *s, SbSurface *out)
 {
   SbImport *im = s->f->im;

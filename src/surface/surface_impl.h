@@ -14,7 +14,7 @@
 */
 PetscErrorCode SbSurfaceRead(const char *path, SbImport *im, SbSurface *body_surface);
 
-/* What was found and repaired, for the note of the body. */
+/* Repairs, for the note of the body. */
 typedef struct {
   PetscReal tolerance, moved;  /* vertices within this distance were joined, and the largest such distance */
   PetscInt nwelded;            /* vertices joined with another */

@@ -1,5 +1,5 @@
 /*
-  tet_backends.h - what tetrahedralize.c hands to gmsh or tetgen, and what comes back. Rank 0 only.
+  tet_backends.h - input and output of gmsh and tetgen for tetrahedralize.c. Rank 0 only.
 */
 #pragma once
 #include "surface_impl.h"
@@ -12,7 +12,7 @@ typedef struct {
   const SbSurface *surface;
   SbTetOptions options;
   PetscReal size, edge; /* wanted edge, mean edge of the surface */
-  PetscReal expected;   /* about so many tets */
+  PetscReal expected;   /* estimated number of tets */
   PetscBool remesh;     /* the surface gets triangles of the wanted size; else they stay */
 } SbTetJob;
 

@@ -219,7 +219,7 @@ PetscErrorCode SbTetRun_Gmsh(const SbTetJob *job, SbImport *tets)
   if (job->remesh)
     PetscCall(nearest_triangles(job->surface, &tets->item[2], tets->x));
   else {
-    // a kept surface is not asked back: its triangles are the input's
+    // a kept surface is not read back: its triangles are those of the input
     tets->item[2].n = 0;
     for (PetscInt f = 0; f < job->surface->ntri; f++)
       PetscCall(SbImportAddItem(tets, 2, job->surface->tri + 3 * f, f, job->surface->number[f]));

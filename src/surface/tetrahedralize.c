@@ -177,7 +177,7 @@ static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscB
       tri->number[n++] = job->surface->number[f];
     }
     tri->n = n;
-    // a word on who made the tets
+    // note the program that made the tets
     surface = job->remesh ? "remeshed" : "kept";
     if (job->remesh && backend + 1 == SB_TET_TETGEN) surface = job->size < job->edge ? "split" : "kept";
     SbImportShape(body, SLIVER, &shape);

@@ -139,7 +139,7 @@ static PetscReal ear_quality(const Polygon *p, PetscInt n, const PetscInt vert[]
   return area / longest2;
 }
 
-/* Corners are taken out of `left` one by one; what is no polygon without crossings ends as a fan, for the checks to refuse. */
+/* Corners are taken out of `left` one by one; a self-intersecting polygon becomes a fan, which the checks refuse. */
 static PetscErrorCode cut_ears(const Polygon *p, PetscInt n, PetscInt left[], int64_t number,
                                SbTriangleFile *f)
 {

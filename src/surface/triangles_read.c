@@ -51,7 +51,7 @@ static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
   PetscInt nsolid = 0;
 
   PetscFunctionBeginUser;
-  /* what DOS and careless programs leave at the end */
+  /* padding that some programs write at the end */
   while (s->end > s->at && (s->end[-1] == 0 || s->end[-1] == 0x1a)) s->end--;
   PetscCall(stl_next(s, word));
   if (strcasecmp(word, "solid"))

@@ -141,7 +141,7 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
       (void)snprintf(label, sizeof(label), "%4.4g and more", (double)SbRatioBinEdges[i]);
     bar(label, facts.ratio[i], most);
   }
-  // what a run of it needs
+  // memory of a run
   (void)printf("a dynamic run on one rank, estimated\n  %-8s %14s %14s %14s\n", "element", "unknowns",
                "matrix MiB", "memory MiB");
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements); i++) {

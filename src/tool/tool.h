@@ -33,7 +33,7 @@ PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *li
 PetscErrorCode SbToolHelp(void);
 PetscErrorCode SbToolRegister(void);
 
-/* commands.c: finds and does what the command says. */
+/* commands.c: runs the command. */
 PetscErrorCode SbToolRun(SbTool *tool);
 /* Names of the commands, NULL at the end; nfile: how many files each wants; help: a line about each. */
 typedef struct {
