@@ -25,7 +25,7 @@ static struct {
   char file[256];      /* option files, for messages about YAML */
   const char *program; /* begins every line */
   void (*failure_handler)(const char *message, void *ctx); /* called by the rank that speaks for the run */
-  void *farewell_ctx;
+  void *failure_ctx;
   void (*at_end)(void);
 } state = {.comm = MPI_COMM_NULL, .program = "supple", .code = 1};
 
@@ -182,7 +182,7 @@ void SbErrorSetStopped(void)
 void SbErrorSetFailureHandler(void (*failure_handler)(const char *message, void *ctx), void *ctx)
 {
   state.failure_handler = failure_handler;
-  state.farewell_ctx = ctx;
+  state.failure_ctx = ctx;
 }
 
 void SbErrorSetCleanup(void (*fn)(void))
@@ -191,9 +191,9 @@ void SbErrorSetCleanup(void (*fn)(void))
 }
 
 /* Prints the error line, on one rank. */
-static void speak(void)
+static void print_error(void)
 {
-  if (state.failure_handler) (*state.failure_handler)(state.message, state.farewell_ctx);
+  if (state.failure_handler) (*state.failure_handler)(state.message, state.failure_ctx);
   (void)fflush(stdout);
   (void)fprintf(stderr, "%s: %s: %s\n", state.program, state.code == SB_EXIT_STOPPED ? "stopped" : "error",
                 state.message);
@@ -224,10 +224,10 @@ int SbErrorFinish(PetscErrorCode ierr)
     if (!done) (void)usleep(1000);
   }
   if (!done) {
-    speak();
+    print_error();
     (void)MPI_Abort(state.comm, 1);
   }
-  if (all[FAILED] && all[SPEAKER] == mine[SPEAKER]) speak();
+  if (all[FAILED] && all[SPEAKER] == mine[SPEAKER]) print_error();
   (void)MPI_Comm_free(&state.comm);
   (void)MPI_Finalize();
   return all[FAILED];

@@ -69,9 +69,8 @@ static PetscReal pierce(SbContactMesh m, const PetscReal x[], PetscInt e, PetscI
 }
 
 /* The triangle of the penetrated body that the ray along the separation direction leaves through: the pair's other side. */
-static PetscErrorCode find_way_out(SbContactMesh m, const PetscReal x[], const SbBoxTree *tree, PetscInt part,
-                                   PetscReal depth, const PetscReal p[3], SbPenetration *point,
-                                   PetscBool *found)
+static PetscErrorCode find_exit(SbContactMesh m, const PetscReal x[], const SbBoxTree *tree, PetscInt part,
+                                PetscReal depth, const PetscReal p[3], SbPenetration *point, PetscBool *found)
 {
   PetscReal box[6], goal[3], nearest = PETSC_MAX_REAL, best[3] = {0};
   PetscInt t, exit = -1;
@@ -231,7 +230,7 @@ static void mark_inside(SbContactMesh m, const Ways *w, PetscInt list[], uint8_t
 }
 
 /* Points inside triangulated surfaces, from the intersections hit[n][2] of edges and triangles, sorted by edges. */
-static PetscErrorCode look_inside(SbContactMesh m, const PetscReal x[], PetscInt n, const PetscInt hit[],
+static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt n, const PetscInt hit[],
                                   SbContactOverlap *o)
 {
   Ways w = {.x = x};
@@ -283,7 +282,7 @@ static PetscErrorCode look_inside(SbContactMesh m, const PetscReal x[], PetscInt
       length = PetscSqrtReal(SbDot3(point.normal, point.normal));
       if (length <= CANCEL) continue;
       for (int k = 0; k < 3; k++) point.normal[k] /= length;
-      PetscCall(find_way_out(m, x, &tree, part, PetscSqrtReal(chord), p, &point, &found));
+      PetscCall(find_exit(m, x, &tree, part, PetscSqrtReal(chord), p, &point, &found));
       if (found) PetscCall(add_point(o, &point));
       continue;
     }
@@ -312,7 +311,7 @@ static PetscErrorCode look_inside(SbContactMesh m, const PetscReal x[], PetscInt
     if (!w.layer[v]) continue;
     if (SbDot3(w.way + 3 * v, w.way + 3 * v) == 0. || w.depth[v] <= 0.) continue;
     PetscCall(PetscArraycpy(point.normal, w.way + 3 * v, 3));
-    PetscCall(find_way_out(m, x, &tree, w.in[v], w.depth[v], x + 3 * v, &point, &found));
+    PetscCall(find_exit(m, x, &tree, w.in[v], w.depth[v], x + 3 * v, &point, &found));
     if (found) PetscCall(add_point(o, &point));
   }
   mark_inside(m, &w, list, o->near);
@@ -359,7 +358,7 @@ static PetscErrorCode add_behind(SbContactMesh m, const PetscReal x[], const SbC
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode look_behind(SbContactMesh m, const PetscReal x[], SbContactOverlap *o)
+static PetscErrorCode find_behind(SbContactMesh m, const PetscReal x[], SbContactOverlap *o)
 {
   const PetscInt first = m->nbody_vertex;
 
@@ -423,11 +422,11 @@ PetscErrorCode SbContactOverlapFind(SbContactMesh m, PetscBool self, const Petsc
       hit = other;
     } else
       PetscCall(PetscFree(other));
-    if (n) PetscCall(look_inside(m, nmoved ? moved : x, n, hit, o));
+    if (n) PetscCall(find_inside(m, nmoved ? moved : x, n, hit, o));
     PetscCall(PetscFree(moved));
   }
   o->ncrossing = n;
-  PetscCall(look_behind(m, x, o));
+  PetscCall(find_behind(m, x, o));
   if (!n) o->ncrossing = o->n;
   if (!o->ncrossing) {
     PetscCall(PetscFree(hit));

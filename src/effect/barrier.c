@@ -67,13 +67,13 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   s->coupled = PETSC_TRUE;
   if (!b->scene.obstacle) {
     PetscBool *takes_part;
-    PetscInt nskin = 0;
+    PetscInt nsurface = 0;
 
     PetscCall(PetscCalloc1(nbody, &takes_part));
     for (PetscInt v = 0; v < b->mesh->nbody_vertex; v++) takes_part[b->mesh->part[v]] = PETSC_TRUE;
-    for (PetscInt i = 0; i < nbody; i++) nskin += takes_part[i];
+    for (PetscInt i = 0; i < nbody; i++) nsurface += takes_part[i];
     PetscCheck(
-      nskin > 1 || b->scene.self, s->comm, PETSC_ERR_USER_INPUT,
+      nsurface > 1 || b->scene.self, s->comm, PETSC_ERR_USER_INPUT,
       "The effect %s has only one body to examine: give -effect_%s_self yes for a body that may meet "
       "itself, more sets with -effect_%s_on, or -effect_%s_obstacle",
       e->name, e->name, e->name, e->name);
@@ -183,8 +183,8 @@ static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, Petsc
   PetscCall(SbContactMeshMarkDriven(m));
   PetscCall(SbContactMeshGetPositions(m, u, NULL, b->x));
   SbBarrierPlaceObstacle(b, 0., b->x);
-  PetscCall(SbBarrierPart(e, s, dt, (PetscBool)!b->looked));
-  b->looked = PETSC_TRUE;
+  PetscCall(SbBarrierSeparate(e, s, dt, (PetscBool)!b->searched));
+  b->searched = PETSC_TRUE;
   PetscCall(PetscMalloc1(3 * m->nvertex, &normal));
   PetscCall(vertex_normals(b, b->x, normal));
   PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
@@ -294,21 +294,21 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
   Work of the obstacle's forces along its path in this step, J, this rank's: of the barrier, with its forces at the start or the end, and of friction. Forces rotate with the
   obstacle, so the barrier's are integrated along the arc: moment times angle.
 */
-static void obstacle_works(const Barrier *b, PetscBool end, PetscReal *gaps, PetscReal *friction)
+static void obstacle_works(const Barrier *b, PetscBool end, PetscReal *gaps, PetscReal *slip_work)
 {
   const SbContactMesh m = b->mesh;
 
-  *gaps = *friction = 0.;
-  for (PetscInt i = 0; b->scene.obstacle && i < b->nactive + b->nrub; i++) {
+  *gaps = *slip_work = 0.;
+  for (PetscInt i = 0; b->scene.obstacle && i < b->nactive + b->nfriction; i++) {
     const Active *a = i < b->nactive ? &b->active[i] : NULL;
-    const SbContactPair *pair = a ? &b->pairs->pair[a->pair] : &b->rub[i - b->nactive].pair;
+    const SbContactPair *pair = a ? &b->pairs->pair[a->pair] : &b->friction[i - b->nactive].pair;
     PetscReal energy, gradient[12];
 
     if (!counts(b, pair)) continue;
     if (a)
-      (void)SbBarrierPush(b, a, &energy, gradient);
+      (void)SbBarrierForce(b, a, &energy, gradient);
     else
-      (void)SbBarrierRub(b, &b->rub[i - b->nactive], gradient);
+      (void)SbBarrierFriction(b, &b->friction[i - b->nactive], gradient);
     for (int k = 0; k < 4; k++) {
       const PetscInt v = 3 * (pair->v[k] - m->nbody_vertex);
       const PetscReal *g = gradient + 3 * k;
@@ -319,16 +319,16 @@ static void obstacle_works(const Barrier *b, PetscBool end, PetscReal *gaps, Pet
         SbPoseWay(&b->pose[0], &b->pose[1], &b->pose[end], (end ? b->to : b->from) + v, way);
         *gaps += SbDot3(g, way);
       } else {
-        for (int j = 0; j < 3; j++) *friction += g[j] * (b->to[v + j] - b->from[v + j]);
+        for (int j = 0; j < 3; j++) *slip_work += g[j] * (b->to[v + j] - b->from[v + j]);
       }
     }
     /* friction: rotation of the obstacle beyond the displacement of its vertices */
     if (!a) {
-      const Rub *rub = &b->rub[i - b->nactive];
+      const FrictionPair *friction = &b->friction[i - b->nactive];
       PetscReal u[3];
-      const PetscReal y = SbBarrierSlip(b, rub, u), slope = SbBarrierSlope(b, y);
+      const PetscReal y = SbBarrierSlip(b, friction, u), slope = SbBarrierSlope(b, y);
 
-      *friction -= rub->force * slope * SbDot3(u, rub->carry);
+      *slip_work -= friction->force * slope * SbDot3(u, friction->rotation);
     }
   }
 }
@@ -340,7 +340,7 @@ static PetscReal gap_energy(const Barrier *b)
 
   for (PetscInt i = 0; i < b->nactive; i++) {
     if (!counts(b, &b->pairs->pair[b->active[i].pair])) continue;
-    (void)SbBarrierPush(b, &b->active[i], &energy, gradient);
+    (void)SbBarrierForce(b, &b->active[i], &energy, gradient);
     sum += energy;
   }
   return sum;
@@ -383,10 +383,10 @@ static PetscErrorCode widen(SbEffect e, const PetscReal u[])
   PetscReal energy[2];
 
   PetscFunctionBeginUser;
-  PetscCall(SbBarrierLook(b, u));
+  PetscCall(SbBarrierUpdate(b, u));
   energy[0] = gap_energy(b);
   set_scale(e, PetscMin(1., b->wider * old));
-  PetscCall(SbBarrierLook(b, u));
+  PetscCall(SbBarrierUpdate(b, u));
   energy[1] = gap_energy(b);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 2, MPIU_REAL, MPI_SUM, b->mesh->space->comm));
   if (energy[1] - energy[0] > b->growth) set_scale(e, old);
@@ -405,20 +405,20 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
   *moved = PETSC_FALSE;
   find_path(b, t, dt);
   b->progress = 0.;
-  b->nrub = b->nspring = b->nbounce = 0;
+  b->nfriction = b->nspring = b->nbounce = 0;
   if (!b->begun) PetscCall(SbContactMeshMarkDriven(m));
   if (!b->begun || b->overlapping || b->parted) {
     PetscCall(SbContactMeshGetPositions(m, u0, NULL, b->x));
     SbBarrierPlaceObstacle(b, 0., b->x);
-    PetscCall(SbBarrierPart(e, s, dt, (PetscBool)(!b->begun && !b->looked && t == 0.)));
+    PetscCall(SbBarrierSeparate(e, s, dt, (PetscBool)(!b->begun && !b->searched && t == 0.)));
   }
   if (!b->begun && t == 0.) { /* not when it goes on from a checkpoint */
     PetscCall(part_touching(e, s, u0, moved));
-    if (*moved) PetscCall(SbBarrierPart(e, s, dt, PETSC_FALSE));
+    if (*moved) PetscCall(SbBarrierSeparate(e, s, dt, PETSC_FALSE));
   }
   b->begun = PETSC_TRUE;
   if (b->wider > 0.) PetscCall(widen(e, u0));
-  PetscCall(SbBarrierLook(b, u0));
+  PetscCall(SbBarrierUpdate(b, u0));
   PetscCall(PetscArraycpy(b->start, b->x, 3 * m->nvertex));
   for (PetscInt i = 0; i < b->nactive; i++) least = PetscMin(least, b->active[i].gap);
   PetscCheck(least > 0., PETSC_COMM_SELF, PETSC_ERR_PLIB,
@@ -449,11 +449,11 @@ static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], Pe
   if (e->dynamic && !b->lags && !solved) PetscFunctionReturn(PETSC_SUCCESS);
   last = (PetscBool)(++b->nlag >= (b->lags ? b->lags : e->dynamic ? 2 : LAGS));
   if (last && (b->lags || e->dynamic)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbBarrierLook(b, u));
+  PetscCall(SbBarrierUpdate(b, u));
 
   /* in a static run overlaps are separated within the step */
   if (b->overlapping && !e->dynamic && b->nlag < PARTINGS) {
-    PetscCall(SbBarrierPart(e, s, 0., PETSC_FALSE));
+    PetscCall(SbBarrierSeparate(e, s, 0., PETSC_FALSE));
     b->parted = *again = PETSC_TRUE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -485,7 +485,7 @@ static PetscErrorCode safe_barrier(SbEffect e, SbSpace s, const PetscReal u0[], 
 
   PetscFunctionBeginUser;
   (void)s;
-  PetscCall(SbBarrierLook(b, u0));
+  PetscCall(SbBarrierUpdate(b, u0));
   nsearch = b->pairs->nsearch;
   *nactive = b->nactive;
   PetscCall(SbContactMeshGetPositions(b->mesh, u1, NULL, b->other));
@@ -510,20 +510,20 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
 {
   Barrier *b = (Barrier *)e->data;
   const SbContactMesh m = b->mesh;
-  PetscReal before, power, friction, lost = 0., pushed = 0., gained = 0., asked = 0.;
+  PetscReal before, power, slip_work, lost = 0., pushed = 0., gained = 0., asked = 0.;
 
   PetscFunctionBeginUser;
-  PetscCall(SbBarrierLook(b, stage->u));
+  PetscCall(SbBarrierUpdate(b, stage->u));
   /* work of contact in the step */
   before = b->energy;
   b->energy = gap_energy(b);
-  obstacle_works(b, PETSC_TRUE, &power, &friction);
-  for (PetscInt i = 0; i < b->nrub; i++) {
+  obstacle_works(b, PETSC_TRUE, &power, &slip_work);
+  for (PetscInt i = 0; i < b->nfriction; i++) {
     PetscReal u[3];
 
-    if (!counts(b, &b->rub[i].pair)) continue;
-    lost += b->rub[i].force * PetscSqr(SbBarrierSlip(b, &b->rub[i], u)) *
-            SbBarrierSlope(b, SbBarrierSlip(b, &b->rub[i], u));
+    if (!counts(b, &b->friction[i].pair)) continue;
+    lost += b->friction[i].force * PetscSqr(SbBarrierSlip(b, &b->friction[i], u)) *
+            SbBarrierSlope(b, SbBarrierSlip(b, &b->friction[i], u));
   }
   for (PetscInt i = 0; i < b->nspring; i++) {
     const Spring *spring = &b->spring[i];
@@ -536,7 +536,7 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
     gained += PetscMin(way, spring->goal - spring->start);
     asked += spring->goal - spring->start;
   }
-  b->step_work = before - b->energy + 0.5 * (b->obstacle_power + power) + friction - lost + pushed;
+  b->step_work = before - b->energy + 0.5 * (b->obstacle_power + power) + slip_work - lost + pushed;
   b->work += b->step_work;
   b->friction_loss += lost;
   b->parted = PETSC_FALSE;
@@ -629,7 +629,7 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   PetscCall(PetscFree3(b->u, b->from, b->to));
   PetscCall(SbPairsFree(&b->columns));
   PetscCall(PetscFree(b->active));
-  PetscCall(PetscFree(b->rub));
+  PetscCall(PetscFree(b->friction));
   PetscCall(PetscFree(b->next));
   PetscCall(SbContactBlocksFree(&b->blocks));
   PetscCall(PetscFree(b->spring));

@@ -29,7 +29,7 @@ static int compare_active(const void *x, const void *y, void *ctx)
 }
 
 /* Positions at the local displacements u, and the pairs with gaps below the width, in the order of their numbers. Collective. */
-PetscErrorCode SbBarrierLook(Barrier *b, const PetscReal u[])
+PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
 {
   const PetscInt n = 3 * b->mesh->space->nnode_owned;
   PetscBool same;
@@ -65,31 +65,32 @@ PetscErrorCode SbBarrierLook(Barrier *b, const PetscReal u[])
 /* ------------------------------------------------------------------ forces */
 
 /* The tangential slip of a pair since the step began, m. */
-PetscReal SbBarrierSlip(const Barrier *b, const Rub *rub, PetscReal u[3])
+PetscReal SbBarrierSlip(const Barrier *b, const FrictionPair *friction, PetscReal u[3])
 {
   PetscReal normal = 0.;
 
   for (int i = 0; i < 3; i++) {
-    u[i] = -b->progress * rub->carry[i];
+    u[i] = -b->progress * friction->rotation[i];
     for (int k = 0; k < 4; k++)
-      u[i] += rub->weight[k] * (b->x[3 * rub->pair.v[k] + i] - b->start[3 * rub->pair.v[k] + i]);
-    normal += u[i] * rub->n[i];
+      u[i] +=
+        friction->weight[k] * (b->x[3 * friction->pair.v[k] + i] - b->start[3 * friction->pair.v[k] + i]);
+    normal += u[i] * friction->n[i];
   }
-  for (int i = 0; i < 3; i++) u[i] -= normal * rub->n[i];
+  for (int i = 0; i < 3; i++) u[i] -= normal * friction->n[i];
   return PetscSqrtReal(SbDot3(u, u));
 }
 
 /* Energy of friction, J, its gradient by the pair's vertices, N. */
-PetscReal SbBarrierRub(const Barrier *b, const Rub *rub, PetscReal gradient[12])
+PetscReal SbBarrierFriction(const Barrier *b, const FrictionPair *friction, PetscReal gradient[12])
 {
   PetscReal u[3];
-  const PetscReal y = SbBarrierSlip(b, rub, u), e = b->slip, slope = SbBarrierSlope(b, y);
+  const PetscReal y = SbBarrierSlip(b, friction, u), e = b->slip, slope = SbBarrierSlope(b, y);
 
-  for (int k = 0; k < 12; k++) gradient[k] = rub->force * slope * rub->weight[k / 3] * u[k % 3];
-  return rub->force * (y < e ? y * y / e - y * y * y / (3. * e * e) + e / 3. : y);
+  for (int k = 0; k < 12; k++) gradient[k] = friction->force * slope * friction->weight[k / 3] * u[k % 3];
+  return friction->force * (y < e ? y * y / e - y * y * y / (3. * e * e) + e / 3. : y);
 }
 
-PetscReal SbBarrierPush(const Barrier *b, const Active *a, PetscReal *energy, PetscReal gradient[12])
+PetscReal SbBarrierForce(const Barrier *b, const Active *a, PetscReal *energy, PetscReal gradient[12])
 {
   const SbContactPair *pair = &b->pairs->pair[a->pair];
   PetscReal force = 0., w2 = 0.;
@@ -132,12 +133,12 @@ PetscErrorCode SbEffectGapForces_Barrier(SbEffect e, SbSpace s, const PetscReal 
   PetscFunctionBeginUser;
   (void)s;
   *bound = 0.;
-  PetscCall(SbBarrierLook(b, u));
+  PetscCall(SbBarrierUpdate(b, u));
   for (PetscInt i = 0; i < b->nactive; i++) {
     const Active *a = &b->active[i];
     const SbContactPair *pair = &b->pairs->pair[a->pair];
     PetscReal d[3], energy, gradient[12];
-    const PetscReal force = SbBarrierPush(b, a, &energy, gradient);
+    const PetscReal force = SbBarrierForce(b, a, &energy, gradient);
 
     SbBarrier(a->gap, width_of(b, pair), pressure_of(b, pair), pair->area, d);
     if (d[0] <= 0.) continue;
@@ -158,14 +159,14 @@ PetscReal SbBarrierGradient(const Barrier *b, PetscReal sign, PetscReal f[])
     const Active *a = &b->active[i];
     const SbContactPair *pair = &b->pairs->pair[a->pair];
 
-    (void)SbBarrierPush(b, a, &energy, gradient);
+    (void)SbBarrierForce(b, a, &energy, gradient);
     spread(b, pair->side ? 1 : 4, pair->v, sign, gradient, f);
     if (counts(b, pair)) sum += energy;
   }
-  for (PetscInt i = 0; i < b->nrub; i++) {
-    energy = SbBarrierRub(b, &b->rub[i], gradient);
-    spread(b, b->rub[i].pair.side ? 1 : 4, b->rub[i].pair.v, sign, gradient, f);
-    if (counts(b, &b->rub[i].pair)) sum += energy;
+  for (PetscInt i = 0; i < b->nfriction; i++) {
+    energy = SbBarrierFriction(b, &b->friction[i], gradient);
+    spread(b, b->friction[i].pair.side ? 1 : 4, b->friction[i].pair.v, sign, gradient, f);
+    if (counts(b, &b->friction[i].pair)) sum += energy;
   }
   for (PetscInt i = 0; i < b->nspring; i++) {
     const Spring *spring = &b->spring[i];
@@ -185,7 +186,7 @@ PetscErrorCode SbEffectForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage
   PetscFunctionBeginUser;
   (void)s;
   if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbBarrierLook(b, stage->u));
+  PetscCall(SbBarrierUpdate(b, stage->u));
   (void)SbBarrierGradient(b, -1., f);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -199,15 +200,15 @@ PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal 
   (void)s;
   *energy = 0.;
   if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbBarrierLook(b, u));
+  PetscCall(SbBarrierUpdate(b, u));
   *energy = SbBarrierGradient(b, 1., f);
 
   /* pairs whose slip has reversed since the Hessian was evaluated */
-  for (PetscInt i = 0; i < b->nrub; i++) {
+  for (PetscInt i = 0; i < b->nfriction; i++) {
     PetscReal slip[3];
 
-    (void)SbBarrierSlip(b, &b->rub[i], slip);
-    if (SbDot3(slip, b->rub[i].slip) < 0.) b->rub[i].turns = PETSC_TRUE;
+    (void)SbBarrierSlip(b, &b->friction[i], slip);
+    if (SbDot3(slip, b->friction[i].slip) < 0.) b->friction[i].turns = PETSC_TRUE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -241,7 +242,7 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
 
   PetscFunctionBeginUser;
   (void)s;
-  PetscCall(SbBarrierLook(b, u));
+  PetscCall(SbBarrierUpdate(b, u));
   PetscCall(SbContactBlocksClear(&b->blocks));
   for (PetscInt i = 0; i < b->nactive; i++) {
     const Active *a = &b->active[i];
@@ -256,30 +257,30 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
   friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2); the parabola that bounds f0 from above has f0'/u instead of f0''. A sliding pair whose slip reversed in the last trial step
     is treated as sticking: a spring with the force mu N at the slip e replaces mu N f0'. If a full step leaves it beyond e, it slides.
   */
-  for (PetscInt i = 0; i < b->nrub; i++) {
-    Rub *rub = &b->rub[i];
+  for (PetscInt i = 0; i < b->nfriction; i++) {
+    FrictionPair *friction = &b->friction[i];
     PetscReal T[9];
-    const PetscReal y = SbBarrierSlip(b, rub, rub->slip), w = b->slip;
+    const PetscReal y = SbBarrierSlip(b, friction, friction->slip), w = b->slip;
     PetscReal slope = SbBarrierSlope(b, y), curve = y < w ? 2. / w - 2. * y / (w * w) : 0.;
 
-    rub->sticks = (PetscBool)(y > w && kind != SB_HESSIAN_MAJORIZED &&
-                              (rub->turns || (rub->sticks && kind != SB_HESSIAN_EXACT)));
-    rub->turns = PETSC_FALSE;
-    if (rub->sticks) {
+    friction->sticks = (PetscBool)(y > w && kind != SB_HESSIAN_MAJORIZED &&
+                                   (friction->turns || (friction->sticks && kind != SB_HESSIAN_EXACT)));
+    friction->turns = PETSC_FALSE;
+    if (friction->sticks) {
       PetscReal force[12];
 
       for (int k = 0; k < 12; k++)
-        force[k] = rub->force * (1. / w - slope) * rub->weight[k / 3] * rub->slip[k % 3];
-      spread(b, rub->pair.side ? 1 : 4, rub->pair.v, 1., force, r);
+        force[k] = friction->force * (1. / w - slope) * friction->weight[k / 3] * friction->slip[k % 3];
+      spread(b, friction->pair.side ? 1 : 4, friction->pair.v, 1., force, r);
       slope = curve = 1. / w;
     } else if (kind == SB_HESSIAN_MAJORIZED)
       curve = slope;
     for (int k = 0; k < 9; k++) {
-      T[k] = slope * ((k % 4 ? 0. : 1.) - rub->n[k / 3] * rub->n[k % 3]);
-      if (y > 0.) T[k] += (curve - slope) * rub->slip[k / 3] * rub->slip[k % 3] / (y * y);
-      T[k] *= rub->force;
+      T[k] = slope * ((k % 4 ? 0. : 1.) - friction->n[k / 3] * friction->n[k % 3]);
+      if (y > 0.) T[k] += (curve - slope) * friction->slip[k / 3] * friction->slip[k % 3] / (y * y);
+      T[k] *= friction->force;
     }
-    PetscCall(add_blocks(b, &rub->pair, rub->weight, T));
+    PetscCall(add_blocks(b, &friction->pair, friction->weight, T));
   }
 
   /* active springs */

@@ -8,25 +8,26 @@
 #include "barrier_impl.h"
 
 /* Displacement in the step of the obstacle's contact point by rotation, beyond the interpolated one of its vertices. */
-static void carry_along(const Barrier *b, PetscBool end, const Active *a, Rub *rub)
+static void find_rotation(const Barrier *b, PetscBool end, const Active *a, FrictionPair *friction)
 {
   const SbContactMesh m = b->mesh;
   const PetscInt *v = b->pairs->pair[a->pair].v;
   PetscReal X[3], at[3] = {0}, other[3], sign = 0.;
 
   for (int k = 0; k < 4; k++) {
-    if (v[k] >= m->nbody_vertex || rub->weight[k] == 0.) continue;
-    sign = rub->weight[k] > 0. ? 1. : -1.;
-    for (int i = 0; i < 3; i++) at[i] += PetscAbsReal(rub->weight[k]) * b->x[3 * v[k] + i];
+    if (v[k] >= m->nbody_vertex || friction->weight[k] == 0.) continue;
+    sign = friction->weight[k] > 0. ? 1. : -1.;
+    for (int i = 0; i < 3; i++) at[i] += PetscAbsReal(friction->weight[k]) * b->x[3 * v[k] + i];
   }
-  for (int i = 0; i < 3; i++) at[i] -= sign * a->gap * rub->n[i];
+  for (int i = 0; i < 3; i++) at[i] -= sign * a->gap * friction->n[i];
   SbPoseInvert(&b->pose[end], at, X);
   SbPoseApply(&b->pose[!end], X, other);
-  for (int i = 0; i < 3; i++) rub->carry[i] = sign * (end ? at[i] - other[i] : other[i] - at[i]);
+  for (int i = 0; i < 3; i++) friction->rotation[i] = sign * (end ? at[i] - other[i] : other[i] - at[i]);
   for (int k = 0; k < 4; k++) {
     const PetscInt o = 3 * (v[k] - m->nbody_vertex);
 
-    for (int i = 0; i < 3 && o >= 0; i++) rub->carry[i] += rub->weight[k] * (b->to[o + i] - b->from[o + i]);
+    for (int i = 0; i < 3 && o >= 0; i++)
+      friction->rotation[i] += friction->weight[k] * (b->to[o + i] - b->from[o + i]);
   }
 }
 
@@ -38,32 +39,32 @@ PetscErrorCode SbBarrierFindFriction(Barrier *b, PetscBool end)
     const Active *a = &b->active[i];
     const SbContactPair *pair = &b->pairs->pair[a->pair];
     PetscReal energy, gradient[12];
-    Rub rub = {.pair = *pair};
+    FrictionPair friction = {.pair = *pair};
 
-    rub.force = b->scene.friction * SbBarrierPush(b, a, &energy, gradient);
-    PetscCall(PetscArraycpy(rub.weight, a->at.weight, 4));
-    PetscCall(PetscArraycpy(rub.n, a->at.n, 3));
-    if (b->scene.obstacle) carry_along(b, end, a, &rub);
+    friction.force = b->scene.friction * SbBarrierForce(b, a, &energy, gradient);
+    PetscCall(PetscArraycpy(friction.weight, a->at.weight, 4));
+    PetscCall(PetscArraycpy(friction.n, a->at.n, 3));
+    if (b->scene.obstacle) find_rotation(b, end, a, &friction);
     if (b->nnext == b->next_size) {
       b->next_size = PetscMax(64, 2 * b->next_size);
       PetscCall(PetscRealloc((size_t)b->next_size * sizeof(*b->next), &b->next));
     }
-    b->next[b->nnext++] = rub;
+    b->next[b->nnext++] = friction;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 void SbBarrierSwapFriction(Barrier *b)
 {
-  const PetscInt n = b->nrub, size = b->rub_size;
-  Rub *rub = b->rub;
+  const PetscInt n = b->nfriction, size = b->friction_size;
+  FrictionPair *friction = b->friction;
 
-  b->nrub = b->nnext;
-  b->rub_size = b->next_size;
-  b->rub = b->next;
+  b->nfriction = b->nnext;
+  b->friction_size = b->next_size;
+  b->friction = b->next;
   b->nnext = n;
   b->next_size = size;
-  b->next = rub;
+  b->next = friction;
 }
 
 PetscErrorCode SbBarrierLag(Barrier *b)

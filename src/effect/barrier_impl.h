@@ -17,11 +17,11 @@ typedef struct {
 typedef struct {
   SbContactPair pair;
   PetscReal weight[4], n[3], force; /* mu N, N */
-  PetscReal carry
+  PetscReal rotation
     [3]; /* displacement of the obstacle's contact point by rotation, beyond that of its vertices, m; with the sign of its weights */
   PetscReal slip[3];       /* at the last Hessian, m */
   PetscBool turns, sticks; /* slip has reversed since: treated as sticking in the Hessian */
-} Rub;
+} FrictionPair;
 
 /* A one-sided spring along a direction in this step: separates an overlap, or enforces restitution. */
 typedef struct {
@@ -30,7 +30,7 @@ typedef struct {
   PetscReal goal, stiffness; /* of normal . sum weight x, m; N/m */
   PetscReal start, depth;    /* that sum and the penetration at the start of the step, m */
   PetscBool held;            /* two-sided: it was active when its goal was changed */
-  PetscReal arrives;         /* restitution: speed of approach, m/s */
+  PetscReal approach;        /* restitution: speed of approach, m/s */
 } Spring;
 
 typedef struct {
@@ -45,7 +45,7 @@ typedef struct {
   PetscReal scale; /* w over its default, 0..1 (-accuracy) */
   PetscReal wider,
     growth; /* largest factor on it at the next step, 0: none; largest growth of the barrier's energy by it, J */
-  PetscBool verify, begun, looked; /* option; the run has begun; overlaps were searched for */
+  PetscBool verify, begun, searched; /* option; the run has begun; overlaps were searched for */
   PetscReal *x, *u;        /* [nvertex][3] current positions, m; [nnode_owned][3] displacements of them, m */
   PetscReal *start;        /* [nvertex][3] at the start of the step, m */
   PetscReal *from, *to;    /* [obstacle's vertices][3] positions at the start and the end of the step, m */
@@ -54,11 +54,11 @@ typedef struct {
   PetscBool known;         /* x and active are up to date for u and progress */
   PetscInt nactive, size;
   Active *active;
-  PetscInt nrub, rub_size;
-  Rub *rub;
+  PetscInt nfriction, friction_size;
+  FrictionPair *friction;
   SbContactBlocks blocks;    /* of the last Hessian */
   PetscInt nnext, next_size; /* the same with closest points and normal forces at the end of the step */
-  Rub *next;
+  FrictionPair *next;
   SbPose pose[2];               /* of the obstacle at the start and the end of the step */
   PetscInt lags, nlag;          /* lagged-friction iterations of a step: the most; of this step */
   PetscReal lag_tolerance, lag; /* tolerance of the lag; the lag, relative to mu N of all pairs */
@@ -108,11 +108,11 @@ static inline PetscBool counts(const Barrier *b, const SbContactPair *pair)
 }
 
 /* Positions at the local displacements u, and the pairs with gaps below the width, in the order of their numbers. Collective. */
-PetscErrorCode SbBarrierLook(Barrier *b, const PetscReal u[]);
+PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[]);
 /* Normal force of a pair, N, its energy, J, and the gradient of that by the pair's vertices, N. */
-PetscReal SbBarrierPush(const Barrier *b, const Active *a, PetscReal *energy, PetscReal gradient[12]);
+PetscReal SbBarrierForce(const Barrier *b, const Active *a, PetscReal *energy, PetscReal gradient[12]);
 /* Tangential slip u of a pair since the step began, m; its length. */
-PetscReal SbBarrierSlip(const Barrier *b, const Rub *rub, PetscReal u[3]);
+PetscReal SbBarrierSlip(const Barrier *b, const FrictionPair *friction, PetscReal u[3]);
 /* f0'/y of the slip y, 1/m. */
 static inline PetscReal SbBarrierSlope(const Barrier *b, PetscReal y)
 {
@@ -125,9 +125,9 @@ void SbBarrierSwapFriction(Barrier *b);
 /* Computes `lag` (barrier_friction.c), with the normal forces and directions at the end of the step in `next`. Collective. */
 PetscErrorCode SbBarrierLag(Barrier *b);
 /* Energy of friction, J, its gradient by the pair's vertices, N. */
-PetscReal SbBarrierRub(const Barrier *b, const Rub *rub, PetscReal gradient[12]);
+PetscReal SbBarrierFriction(const Barrier *b, const FrictionPair *friction, PetscReal gradient[12]);
 /* Finds overlaps at the current positions, and the springs that separate them in a step of length dt, s; `first` of a run: errors where they cannot. Collective. */
-PetscErrorCode SbBarrierPart(SbEffect e, SbSpace space, PetscReal dt, PetscBool first);
+PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace space, PetscReal dt, PetscBool first);
 /* normal . sum weight x of a spring at the current positions, m. */
 static inline PetscReal SbBarrierSpringPlace(const Barrier *b, const Spring *spring)
 {

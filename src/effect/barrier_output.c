@@ -10,7 +10,7 @@ PetscErrorCode SbEffectContactForce_Barrier(SbEffect e, SbSpace s, const SbStage
   PetscFunctionBeginUser;
   (void)s;
   if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbBarrierLook(b, stage->u));
+  PetscCall(SbBarrierUpdate(b, stage->u));
   (void)SbBarrierGradient(b, -1., f);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -70,7 +70,7 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
   (void)r;
   PetscCall(PetscArrayzero(values, e->ncolumn));
   if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbBarrierLook(b, stage->u));
+  PetscCall(SbBarrierUpdate(b, stage->u));
   for (PetscInt i = 0; i < b->nactive; i++) least = PetscMin(least, b->active[i].gap);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPIU_REAL, MPI_MIN, s->comm));
   if (least == PETSC_MAX_REAL) least = 0.;
@@ -83,16 +83,16 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
       const SbContactPair *pair = &b->pairs->pair[b->active[i].pair];
 
       if (!counts(b, pair)) continue;
-      (void)SbBarrierPush(b, &b->active[i], &energy, gradient);
+      (void)SbBarrierForce(b, &b->active[i], &energy, gradient);
       add_force(b, &pose, pair->side ? 1 : 4, pair->v, gradient, v);
       v[6]++;
       v[9] += energy;
     }
-    for (PetscInt i = 0; i < b->nrub; i++) {
-      const SbContactPair *pair = &b->rub[i].pair;
+    for (PetscInt i = 0; i < b->nfriction; i++) {
+      const SbContactPair *pair = &b->friction[i].pair;
 
       if (!counts(b, pair)) continue;
-      (void)SbBarrierRub(b, &b->rub[i], gradient);
+      (void)SbBarrierFriction(b, &b->friction[i], gradient);
       add_force(b, &pose, pair->side ? 1 : 4, pair->v, gradient, v);
     }
     for (PetscInt i = 0; i < b->nspring; i++) {
@@ -118,17 +118,17 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
     PetscReal normal;
 
     if (!counts(b, pair)) continue;
-    normal = SbBarrierPush(b, &b->active[i], &energy, gradient);
+    normal = SbBarrierForce(b, &b->active[i], &energy, gradient);
     v[0]++;
     v[3] += normal;
     v[8] += energy;
     force_between(b, pair, gradient, body, force);
     SbPairsAdd(&b->columns, body[0], body[1], normal, force, values);
   }
-  for (PetscInt i = 0; i < b->nrub; i++) {
-    if (!counts(b, &b->rub[i].pair)) continue;
-    (void)SbBarrierRub(b, &b->rub[i], gradient);
-    force_between(b, &b->rub[i].pair, gradient, body, force);
+  for (PetscInt i = 0; i < b->nfriction; i++) {
+    if (!counts(b, &b->friction[i].pair)) continue;
+    (void)SbBarrierFriction(b, &b->friction[i], gradient);
+    force_between(b, &b->friction[i].pair, gradient, body, force);
     v[4] += PetscSqrtReal(SbDot3(force, force));
     SbPairsAdd(&b->columns, body[0], body[1], 0., force, values);
   }
@@ -200,8 +200,8 @@ PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStag
 
   PetscFunctionBeginUser;
   if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbBarrierLook(b, stage->u));
-  PetscCall(PetscCalloc1(b->nrub, &told));
+  PetscCall(SbBarrierUpdate(b, stage->u));
+  PetscCall(PetscCalloc1(b->nfriction, &told));
   for (PetscInt i = 0; i < b->nactive; i++) {
     const Active *a = &b->active[i];
     const SbContactPair *pair = &b->pairs->pair[a->pair];
@@ -209,17 +209,17 @@ PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStag
 
     if (!counts(b, pair)) continue;
     p = point_of(b, pair, a->at.weight, a->at.n, a->gap);
-    (void)SbBarrierPush(b, a, &energy, gradient);
+    (void)SbBarrierForce(b, a, &energy, gradient);
     push_point(b, pair, gradient, &p);
 
     /* friction there */
-    for (PetscInt k = 0; k < b->nrub; k++) {
-      const Rub *rub = &b->rub[k];
+    for (PetscInt k = 0; k < b->nfriction; k++) {
+      const FrictionPair *friction = &b->friction[k];
       PetscBool same;
 
-      PetscCall(PetscArraycmp(rub->pair.v, pair->v, 4, &same));
-      if (!same || rub->pair.kind != pair->kind || rub->pair.side != pair->side) continue;
-      (void)SbBarrierRub(b, rub, gradient);
+      PetscCall(PetscArraycmp(friction->pair.v, pair->v, 4, &same));
+      if (!same || friction->pair.kind != pair->kind || friction->pair.side != pair->side) continue;
+      (void)SbBarrierFriction(b, friction, gradient);
       push_point(b, pair, gradient, &p);
       told[k] = PETSC_TRUE;
       break;
@@ -228,15 +228,16 @@ PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStag
   }
 
   /* friction of pairs in contact only at the start of the step */
-  for (PetscInt k = 0; k < b->nrub; k++) {
-    const Rub *rub = &b->rub[k];
+  for (PetscInt k = 0; k < b->nfriction; k++) {
+    const FrictionPair *friction = &b->friction[k];
     SbContactPoint p;
     SbDistance d;
 
-    if (told[k] || !counts(b, &rub->pair)) continue;
-    p = point_of(b, &rub->pair, rub->weight, rub->n, SbContactPairGap(m, &rub->pair, b->x, &d));
-    (void)SbBarrierRub(b, rub, gradient);
-    push_point(b, &rub->pair, gradient, &p);
+    if (told[k] || !counts(b, &friction->pair)) continue;
+    p = point_of(b, &friction->pair, friction->weight, friction->n,
+                 SbContactPairGap(m, &friction->pair, b->x, &d));
+    (void)SbBarrierFriction(b, friction, gradient);
+    push_point(b, &friction->pair, gradient, &p);
     PetscCall(SbContactPointsAdd(list, &p));
   }
   PetscCall(PetscFree(told));
@@ -276,7 +277,7 @@ PetscErrorCode SbEffectGap_Barrier(SbEffect e, SbSpace s, const SbStage *stage, 
 
   PetscFunctionBeginUser;
   if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbBarrierLook(b, stage->u));
+  PetscCall(SbBarrierUpdate(b, stage->u));
   for (PetscInt i = 0; i < b->nactive; i++) {
     const Active *a = &b->active[i];
     const SbContactPair *pair = &b->pairs->pair[a->pair];
@@ -303,19 +304,19 @@ PetscErrorCode SbEffectSummary_Barrier(SbEffect e, SbSpace s, size_t size, char 
   Barrier *b = (Barrier *)e->data;
   PetscReal value[2] = {b->least, b->shortest};
   PetscInt most = b->most;
-  char friction[96] = "";
+  char note[96] = "";
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, 2, MPIU_REAL, MPI_MIN, s->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_INT, MPI_MAX, s->comm));
   if (b->scene.friction > 0.)
-    (void)snprintf(friction, sizeof(friction),
-                   ", friction lagged behind normal forces by at most %.2g of itself", (double)b->most_lag);
+    (void)snprintf(note, sizeof(note), ", friction lagged behind normal forces by at most %.2g of itself",
+                   (double)b->most_lag);
   if (most)
     (void)snprintf(text, size,
                    "%" PetscInt_FMT " pairs at most on a rank, smallest gap %.3g m of a width of %.3g m, "
                    "shortest safe part of an iteration %.2g%s",
-                   most, (double)value[0], (double)b->w[0], (double)value[1], friction);
+                   most, (double)value[0], (double)b->w[0], (double)value[1], note);
   else
     (void)snprintf(text, size, "nothing came nearer than %.3g m", (double)b->w[0]);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -64,10 +64,10 @@ static PetscBool find_spring(const Barrier *b, const SbContactPair *pair, const 
     const PetscInt v = 3 * spring->v[k];
 
     spring->start += spring->weight[k] * SbDot3(spring->normal, b->x + v);
-    spring->arrives -= spring->weight[k] * SbDot3(spring->normal, b->other + v);
+    spring->approach -= spring->weight[k] * SbDot3(spring->normal, b->other + v);
   }
-  spring->arrives = (spring->arrives + spring->start) / b->bounce.dt;
-  return (PetscBool)(spring->arrives > 0.);
+  spring->approach = (spring->approach + spring->start) / b->bounce.dt;
+  return (PetscBool)(spring->approach > 0.);
 }
 
 PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const PetscReal u0[],
@@ -85,7 +85,7 @@ PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const P
   /* free flight */
   PetscCall(PetscMalloc2(3 * s->nnode, &u1, 3 * m->nvertex, &x));
   for (PetscInt i = 0; i < 3 * s->nnode; i++) u1[i] = u0[i] + dt * v0[i];
-  PetscCall(SbBarrierLook(b, u0));
+  PetscCall(SbBarrierUpdate(b, u0));
   PetscCall(SbContactMeshGetPositions(m, u1, NULL, b->other));
   SbBarrierPlaceObstacle(b, 1., b->other);
   PetscCall(SbContactPairsFind(b->pairs, b->x, b->other));
@@ -115,7 +115,7 @@ PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const P
         mass = PetscMin(mass, s->material[part[k]]->density * s->mesh->body[part[k]].volume);
     }
     spring.stiffness = STIFF * mass / PetscSqr(dt);
-    spring.goal = spring.start + SbRestitutionGap(&b->bounce, 0., spring.arrives);
+    spring.goal = spring.start + SbRestitutionGap(&b->bounce, 0., spring.approach);
     PetscCall(SbBarrierAddSpring(b, &spring));
     b->nbounce++;
   }
@@ -150,7 +150,7 @@ PetscErrorCode SbEffectScaleRestitution_Barrier(SbEffect e, PetscReal share)
 
     /* a goal lowered below the spring's deflection would release it: keep it active for the next iteration */
     spring->held = (PetscBool)(SbBarrierSpringPlace(b, spring) < spring->goal);
-    spring->goal = spring->start + SbRestitutionGap(&b->bounce, 0., spring->arrives);
+    spring->goal = spring->start + SbRestitutionGap(&b->bounce, 0., spring->approach);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -106,7 +106,7 @@ static PetscErrorCode check_obstacle(SbEffect e, SbSpace s, PetscReal t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbBarrierPart(SbEffect e, SbSpace s, PetscReal dt, PetscBool first)
+PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool first)
 {
   Barrier *b = (Barrier *)e->data;
   SbContactOverlap *o = &b->overlap;

@@ -17,11 +17,11 @@ static inline PetscBool SbResponseIsExact(SbResponse response)
 /* Coefficients of friction of an effect, and convergence in a step (friction.c). */
 typedef struct {
   PetscReal mu, mu_kinetic;
-  PetscBool exact;     /* sticking by exact constraints; else by springs */
-  int updates;         /* number of updates within the step */
-  PetscReal unsettled; /* largest error of friction after the last solve, relative to the largest friction */
-  PetscBool said;      /* the warning that friction did not converge was given */
-  PetscReal loss;      /* dissipation since the start, this rank's, J */
+  PetscBool exact; /* sticking by exact constraints; else by springs */
+  int updates;     /* number of updates within the step */
+  PetscReal error; /* largest error of friction after the last solve, relative to the largest friction */
+  PetscBool said;  /* the warning that friction did not converge was given */
+  PetscReal loss;  /* dissipation since the start, this rank's, J */
 } SbFriction;
 
 /* Options of all responses. */

@@ -84,7 +84,7 @@ void SbContactStretch(const SbPose *pose, Touch *touch)
 {
   for (int k = 0; k < 3; k++) {
     touch->stretch[k] = 0;
-    for (int i = 0; i < 3; i++) touch->stretch[k] += pose->R[3 * i + k] * touch->grip.stretch[i];
+    for (int i = 0; i < 3; i++) touch->stretch[k] += pose->R[3 * i + k] * touch->friction.stretch[i];
   }
 }
 
@@ -122,7 +122,7 @@ static void force_on(const Contact *c, const SbPose *pose, SbSpace space, const 
   f[0] = f[1] = f[2] = 0;
   if (normal <= 0) return;
   if (c->held) normal = SbSpaceGetConstraint(space, touch->along)->force;
-  for (int k = 0; k < 3; k++) f[k] = normal * n[k] + (c->friction.mu > 0 ? touch->grip.drag[k] : 0);
+  for (int k = 0; k < 3; k++) f[k] = normal * n[k] + (c->friction.mu > 0 ? touch->friction.force[k] : 0);
 }
 
 PetscErrorCode SbEffectGap_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],

@@ -170,7 +170,7 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
 /* ------------------------------------------------------------------ who touches */
 
 /* Gap of the node at x less the gap it is constrained to, with its normal and the right-hand side of n . u for that. */
-static PetscReal look(const Contact *c, SbSpace space, const PetscReal x[3], Touch *touch)
+static PetscReal search(const Contact *c, SbSpace space, const PetscReal x[3], Touch *touch)
 {
   const PetscReal *X = space->node_x + 3 * touch->node;
   PetscReal n[3], at[3], gap;
@@ -222,21 +222,21 @@ static void enter(const Contact *c, Touch *touch)
 }
 
 /* Time of impact of a node that was separated and penetrates now, in the motion without contact. */
-static void watch_arrival(Contact *c, const Touch *touch)
+static void find_impact(Contact *c, const Touch *touch)
 {
   const PetscReal small = TOLERANCE * c->size;
 
   if (!c->cut || touch->was || touch->gap0 <= small || touch->gap >= -small) return;
-  c->arrival = PetscMin(c->arrival, touch->gap0 / (touch->gap0 - touch->gap));
+  c->impact = PetscMin(c->impact, touch->gap0 / (touch->gap0 - touch->gap));
 }
 
-static PetscErrorCode arrive_contact(SbEffect e, PetscReal *part)
+static PetscErrorCode impact_contact(SbEffect e, PetscReal *part)
 {
   Contact *c = (Contact *)e->data;
 
   PetscFunctionBeginUser;
-  *part = c->arrival;
-  for (PetscInt i = 0; c->arrival < 1 && i < c->n;
+  *part = c->impact;
+  for (PetscInt i = 0; c->impact < 1 && i < c->n;
        i++) { /* springs of new contacts have acted for a whole step */
     if (!c->touch[i].was) c->touch[i].lambda = 0;
   }
@@ -255,9 +255,9 @@ static void start_friction(const Contact *c, SbSpace space, const SbPose *from, 
   SbPoseApply(&c->to, at, x1);
   for (int k = 0; k < 3; k++) {
     touch->start[k] = x1[k] - X[k];
-    touch->grip.stretch[k] = SbDot3(c->to.R + 3 * k, touch->stretch);
+    touch->friction.stretch[k] = SbDot3(c->to.R + 3 * k, touch->stretch);
   }
-  SbFrictionBegin(&touch->grip, touch->on);
+  SbFrictionBegin(&touch->friction, touch->on);
 }
 
 static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, PetscReal dt,
@@ -271,7 +271,7 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
   SbContactPose(c, t + dt, &c->to);
   c->friction.updates = 0;
   c->first = PETSC_TRUE;
-  c->arrival = 1;
+  c->impact = 1;
   SbRestitutionBegin(&c->bounce, dt);
   SbOverlapBegin(&c->overlap, dt);
   for (PetscInt i = 0; i < c->n; i++) {
@@ -292,8 +292,8 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
       (PetscBool)(c->bounce.e > 0 && SbContactComes(c, &from, x0, v0 ? v0 + 3 * touch->node : NULL, touch));
     if (c->friction.mu > 0) start_friction(c, space, &from, x0, touch);
     set_damper(c, &from, dt, x0, touch);
-    touch->gap = look(c, space, x, touch);
-    watch_arrival(c, touch);
+    touch->gap = search(c, space, x, touch);
+    find_impact(c, touch);
     for (int k = 0; k < 3; k++) touch->now[k] = u[3 * touch->node + k];
     if ((touch->gap < 0 || comes) && exact(c)) enter(c, touch);
     if (!c->held || exact(c)) continue;
@@ -306,7 +306,7 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
 }
 
 /* The constraints of active nodes: normal, or tangential (across). */
-static PetscErrorCode hold_contact(SbEffect e, SbSpace space, PetscBool across)
+static PetscErrorCode constrain_contact(SbEffect e, SbSpace space, PetscBool across)
 {
   Contact *c = (Contact *)e->data;
 
@@ -316,10 +316,10 @@ static PetscErrorCode hold_contact(SbEffect e, SbSpace space, PetscBool across)
     SbConstraint row = {.node = touch->node, .value = touch->value};
 
     if (across) {
-      if (touch->along >= 0 && c->friction.mu > 0) PetscCall(SbFrictionHold(&c->friction, space, touch));
+      if (touch->along >= 0 && c->friction.mu > 0) PetscCall(SbFrictionConstrain(&c->friction, space, touch));
       continue;
     }
-    touch->along = touch->other_along = touch->grip.slide[0] = touch->grip.slide[1] = -1;
+    touch->along = touch->other_along = touch->friction.slide[0] = touch->friction.slide[1] = -1;
     if (!touch->on) continue;
     for (int k = 0; k < 3; k++) row.n[k] = row.push[k] = touch->n[k];
     if (c->friction.mu > 0) SbFrictionDirection(&c->friction, touch, row.push);
@@ -357,7 +357,7 @@ static PetscErrorCode measure(const Contact *c, SbSpace space, const PetscReal u
       touch->other_lambda =
         touch->other_along < 0 ? 0 : SbSpaceGetConstraint(space, touch->other_along)->force;
     place(space, touch->node, u, x);
-    touch->gap = look(c, space, x, touch);
+    touch->gap = search(c, space, x, touch);
     *largest = PetscMax(*largest, SbContactForce(c, touch));
     if (!exact(c) && c->held) {
       const PetscReal force =
@@ -372,7 +372,7 @@ static PetscErrorCode measure(const Contact *c, SbSpace space, const PetscReal u
 }
 
 /* Whether the active set was right for this node; changes it if not. */
-static PetscBool settle_held(const Contact *c, PetscReal largest, Touch *touch)
+static PetscBool update_constraint(const Contact *c, PetscReal largest, Touch *touch)
 {
   if (!touch->on) {
     if (touch->gap >= -TOLERANCE * c->size) return PETSC_TRUE;
@@ -393,7 +393,7 @@ static PetscBool settle_held(const Contact *c, PetscReal largest, Touch *touch)
 
 /* Whether a spring's force agrees with its position; for `augmented`, which updates the multiplier, also whether the penetration is within
    the tolerance. */
-static PetscBool settle_spring(const Contact *c, PetscReal largest, Touch *touch)
+static PetscBool update_spring(const Contact *c, PetscReal largest, Touch *touch)
 {
   const PetscReal force = spring(touch, touch->gap);
   PetscBool right = PETSC_TRUE;
@@ -412,7 +412,7 @@ static PetscBool settle_spring(const Contact *c, PetscReal largest, Touch *touch
   return PETSC_FALSE;
 }
 
-static PetscErrorCode settle_contact(SbEffect e, SbSpace space, const PetscReal u[], PetscBool *changed)
+static PetscErrorCode update_contact(SbEffect e, SbSpace space, const PetscReal u[], PetscBool *changed)
 {
   Contact *c = (Contact *)e->data;
   PetscReal largest, worst = 0;
@@ -424,14 +424,15 @@ static PetscErrorCode settle_contact(SbEffect e, SbSpace space, const PetscReal 
   for (PetscInt i = 0; c->first && c->cut && i < c->n; i++) {
     Touch *touch = &c->touch[i];
 
-    if (!touch->on || !exact(c)) watch_arrival(c, touch);
+    if (!touch->on || !exact(c)) find_impact(c, touch);
     if (touch->idle && touch->gap < 0) mine = PETSC_TRUE;
     touch->idle = PETSC_FALSE;
   }
   c->first = PETSC_FALSE;
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
-    const PetscBool right = exact(c) ? settle_held(c, largest, touch) : settle_spring(c, largest, touch);
+    const PetscBool right =
+      exact(c) ? update_constraint(c, largest, touch) : update_spring(c, largest, touch);
 
     if (!right) mine = PETSC_TRUE;
   }
@@ -441,7 +442,7 @@ static PetscErrorCode settle_contact(SbEffect e, SbSpace space, const PetscReal 
     PetscReal error;
 
     if (!touch->on || touch->along < 0) continue;
-    error = SbFrictionSettle(&c->friction, touch, SbContactForce(c, touch));
+    error = SbFrictionUpdate(&c->friction, touch, SbContactForce(c, touch));
     worst = PetscMax(worst, error); /* a macro: its arguments are evaluated twice */
   }
   if (c->friction.mu > 0) SbFrictionJudge(&c->friction, worst, largest, &mine);
@@ -485,9 +486,9 @@ PetscErrorCode SbContactCreate_Node(SbEffect e)
   e->steady = PETSC_FALSE; /* a load factor does not make an obstacle softer */
   e->ops.setup = setup_contact;
   e->ops.begin_step = touch_contact;
-  e->ops.assemble_constraints = hold_contact;
-  e->ops.update_active_set = settle_contact;
-  e->ops.time_of_impact = arrive_contact;
+  e->ops.assemble_constraints = constrain_contact;
+  e->ops.update_active_set = update_contact;
+  e->ops.time_of_impact = impact_contact;
   e->ops.restitution = SbEffectRestitution_Contact;
   e->ops.scale_restitution = SbEffectScaleRestitution_Contact;
   e->ops.target_velocity = SbEffectTargetVelocity_Contact;

@@ -17,7 +17,7 @@ typedef struct {
   PetscReal tangent[2][3]; /* tangents; the first one is the slip direction */
   PetscReal turning;       /* tangential stiffness normal to the slip direction, N/m */
   PetscReal stretch[3];    /* deflection of sticking springs at the start of the step, m */
-  PetscReal drag[3];       /* friction force on the node in the last solve, N */
+  PetscReal force[3];      /* friction force on the node in the last solve, N */
   PetscReal pressing;      /* normal force of the solve before, N */
 } SbFrictionState;
 
@@ -40,15 +40,15 @@ typedef struct {
   PetscReal other_lambda;          /* N */
   PetscReal n[3];                  /* normal of its constraint, outward from the obstacle */
   PetscReal value;                 /* n . u that puts it on the obstacle, m */
-  PetscReal rest;    /* gap it is constrained to: 0, minus the remaining overlap, or that of a rebound, m */
-  PetscReal kept;    /* springs: the same at the end of the last step, m */
-  PetscReal gap;     /* after the last solve, beyond `rest`, m */
-  PetscReal arrives; /* restitution: speed of approach, m/s; 0: no rebound */
-  PetscReal stiff;   /* of the spring in this step with its damper, N/m */
-  PetscReal before;  /* damper: force from the node's gap at the start of the step, N */
-  PetscReal lambda;  /* multiplier of the last solve, N */
-  PetscReal wrong;   /* constraints as springs: force at its position less that of the last solve, N */
-  SbFrictionState grip; /* friction */
+  PetscReal rest;     /* gap it is constrained to: 0, minus the remaining overlap, or that of a rebound, m */
+  PetscReal kept;     /* springs: the same at the end of the last step, m */
+  PetscReal gap;      /* after the last solve, beyond `rest`, m */
+  PetscReal approach; /* restitution: speed of approach, m/s; 0: no rebound */
+  PetscReal stiff;    /* of the spring in this step with its damper, N/m */
+  PetscReal before;   /* damper: force from the node's gap at the start of the step, N */
+  PetscReal lambda;   /* multiplier of the last solve, N */
+  PetscReal wrong;    /* constraints as springs: force at its position less that of the last solve, N */
+  SbFrictionState friction;
   PetscReal start[3];   /* displacement with which it would stick, m */
   PetscReal now[3];     /* that of the last solve, m */
   PetscReal stretch[3]; /* of springs that stick, in the obstacle's rest frame, after the last step, m */
@@ -67,12 +67,12 @@ typedef struct {
   PetscReal axis[3], point[3];
   SbRestitution bounce;
   PetscInt n;
-  Touch *touch;      /* [n] */
-  PetscReal size;    /* of the bodies, m */
-  PetscBool cut;     /* steps end at times of impact */
-  PetscBool first;   /* the step has not been solved yet */
-  PetscReal arrival; /* fraction of the step at the first time of impact, 1: none */
-  SbPose to;         /* at the end of the step */
+  Touch *touch;     /* [n] */
+  PetscReal size;   /* of the bodies, m */
+  PetscBool cut;    /* steps end at times of impact */
+  PetscBool first;  /* the step has not been solved yet */
+  PetscReal impact; /* fraction of the step at the first time of impact, 1: none */
+  SbPose to;        /* at the end of the step */
 } Contact;
 
 /* Whether active nodes are constrained exactly. */
@@ -122,16 +122,16 @@ PetscBool SbContactKept(const Touch *touch);
 
 /*
   Friction (friction.c). Not collective but for Warn. Begin: a step; touches: active at the end of the last one. Enter: activates it: it sticks or slides by its motion
-  without contact, which penetrates by `depth` (m). Direction: of the contact force. Hold: adds its tangential
+  without contact, which penetrates by `depth` (m). Direction: of the contact force. Constrain: adds its tangential
   constraints. Read: their forces after a solve, N being the normal force.
 */
-void SbFrictionBegin(SbFrictionState *grip, PetscBool touches);
+void SbFrictionBegin(SbFrictionState *friction, PetscBool touches);
 void SbFrictionEnter(const SbFriction *f, Touch *touch, PetscReal depth);
 void SbFrictionDirection(const SbFriction *f, const Touch *touch, PetscReal push[3]);
-PetscErrorCode SbFrictionHold(const SbFriction *f, SbSpace space, Touch *touch);
+PetscErrorCode SbFrictionConstrain(const SbFriction *f, SbSpace space, Touch *touch);
 void SbFrictionRead(const SbFriction *f, SbSpace space, Touch *touch, PetscReal N);
 /* Updates stick or slip of a node. Returns the error of its friction in the last solve, N. N: its normal force. */
-PetscReal SbFrictionSettle(const SbFriction *f, Touch *touch, PetscReal N);
+PetscReal SbFrictionUpdate(const SbFriction *f, Touch *touch, PetscReal N);
 /* After all nodes: worst of their errors on this rank and largest normal force of all ranks, N; changed: the solve was not right. */
 void SbFrictionJudge(SbFriction *f, PetscReal worst, PetscReal largest, PetscBool *changed);
 /* Accepts a step for a node; presses: its normal force is positive. */
@@ -140,8 +140,8 @@ void SbFrictionAccept(SbFriction *f, Touch *touch, PetscBool presses);
 PetscErrorCode SbFrictionWarn(SbFriction *f, const char effect[], SbSpace space, PetscReal t);
 /* History variables, for checkpoints: state[SB_FRICTION_STATE]. */
 #define SB_FRICTION_STATE 9
-void SbFrictionSave(const SbFrictionState *grip, PetscReal state[]);
-void SbFrictionLoad(const PetscReal state[], SbFrictionState *grip);
+void SbFrictionSave(const SbFrictionState *friction, PetscReal state[]);
+void SbFrictionLoad(const PetscReal state[], SbFrictionState *friction);
 
 /*
   Restitution (contact_restitution.c), of a node at x0 with the velocity v0 (m/s; NULL: not known) at the start of the step. Comes: it would

@@ -11,14 +11,14 @@ PetscBool SbContactComes(const Contact *c, const SbPose *from, const PetscReal x
 {
   PetscReal n[3], X[3], x1[3], v = 0;
 
-  touch->arrives = 0;
+  touch->approach = 0;
   if (!v0 || touch->was || touch->rest < 0) return PETSC_FALSE;
   touch->gap0 = PetscMax(0, SbContactGap(c, from, x0, n));
   /* the obstacle's point there moves with it */
   SbPoseInvert(from, x0, X);
   SbPoseApply(&c->to, X, x1);
   for (int i = 0; i < 3; i++) v -= n[i] * (v0[i] - (x1[i] - x0[i]) / c->bounce.dt);
-  touch->arrives = PetscMax(0, v);
+  touch->approach = PetscMax(0, v);
   return SbRestitutionApproaches(&c->bounce, touch->gap0, v);
 }
 
@@ -32,8 +32,8 @@ static void move_to(PetscReal rest, Touch *touch)
 
 void SbContactHit(const Contact *c, Touch *touch)
 {
-  if (touch->arrives > 0 && touch->rest == 0)
-    move_to(SbRestitutionGap(&c->bounce, touch->gap0, touch->arrives), touch);
+  if (touch->approach > 0 && touch->rest == 0)
+    move_to(SbRestitutionGap(&c->bounce, touch->gap0, touch->approach), touch);
 }
 
 PetscErrorCode SbEffectRestitution_Contact(SbEffect e, PetscReal *work)
@@ -59,7 +59,7 @@ PetscErrorCode SbEffectScaleRestitution_Contact(SbEffect e, PetscReal share)
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
 
-    if (touch->rest > 0) move_to(SbRestitutionGap(&c->bounce, touch->gap0, touch->arrives), touch);
+    if (touch->rest > 0) move_to(SbRestitutionGap(&c->bounce, touch->gap0, touch->approach), touch);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -29,7 +29,7 @@ PetscErrorCode SbEffectSave_Contact(SbEffect e, SbSpace space, PetscInt *n, Pets
     PetscCall(PetscArraycpy(r, head, 8));
     PetscCall(PetscArraycpy(r + 8, touch->n, 3));
     PetscCall(PetscArraycpy(r + 11, touch->surface, 3));
-    SbFrictionSave(&touch->grip, r + 14);
+    SbFrictionSave(&touch->friction, r + 14);
     (*n)++;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -50,8 +50,8 @@ PetscErrorCode SbEffectLoad_Contact(SbEffect e, SbSpace space, PetscReal t, cons
     /* nodes without a record are inactive */
     touch->on = touch->was = touch->idle = PETSC_FALSE;
     touch->along = -1;
-    touch->rest = touch->kept = touch->lambda = touch->gap = touch->arrives = 0;
-    touch->grip = (SbFrictionState){.slide = {-1, -1}};
+    touch->rest = touch->kept = touch->lambda = touch->gap = touch->approach = 0;
+    touch->friction = (SbFrictionState){.slide = {-1, -1}};
     for (int k = 0; k < 3; k++) {
       touch->start[k] = touch->now[k] = u[3 * touch->node + k];
       touch->stretch[k] = 0;
@@ -77,7 +77,7 @@ PetscErrorCode SbEffectLoad_Contact(SbEffect e, SbSpace space, PetscReal t, cons
     touch->gap = r[7];
     PetscCall(PetscArraycpy(touch->n, r + 8, 3));
     PetscCall(PetscArraycpy(touch->surface, r + 11, 3));
-    SbFrictionLoad(r + 14, &touch->grip);
+    SbFrictionLoad(r + 14, &touch->friction);
     SbContactStretch(&c->to, touch);
   }
   PetscCall(PetscFree2(number, at));

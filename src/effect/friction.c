@@ -59,7 +59,7 @@ static PetscReal across(const PetscReal n[3], PetscReal v[3])
 /* Tangential slip of the step plus earlier deflection of springs, m; returns its length. */
 static PetscReal slip(const Touch *touch, PetscReal s[3])
 {
-  for (int k = 0; k < 3; k++) s[k] = touch->grip.stretch[k] + touch->now[k] - touch->start[k];
+  for (int k = 0; k < 3; k++) s[k] = touch->friction.stretch[k] + touch->now[k] - touch->start[k];
   return across(touch->n, s);
 }
 
@@ -67,7 +67,7 @@ static PetscReal slip(const Touch *touch, PetscReal s[3])
 static void turn(Touch *touch, const PetscReal v[3])
 {
   const PetscReal *n = touch->n;
-  SbFrictionState *g = &touch->grip;
+  SbFrictionState *g = &touch->friction;
   PetscReal t[3] = {v[0], v[1], v[2]}, length = across(n, t);
 
   if (length <= 1e-12 * PetscSqrtReal(SbDot3(v, v))) {
@@ -82,7 +82,7 @@ static void turn(Touch *touch, const PetscReal v[3])
 
 void SbFrictionEnter(const SbFriction *f, Touch *touch, PetscReal depth)
 {
-  SbFrictionState *g = &touch->grip;
+  SbFrictionState *g = &touch->friction;
   PetscReal s[3];
   const PetscReal length = slip(touch, s), most = coefficient(f, g) * PetscMax(0, depth);
 
@@ -94,7 +94,7 @@ void SbFrictionEnter(const SbFriction *f, Touch *touch, PetscReal depth)
 
 void SbFrictionDirection(const SbFriction *f, const Touch *touch, PetscReal push[3])
 {
-  const SbFrictionState *g = &touch->grip;
+  const SbFrictionState *g = &touch->friction;
   PetscReal t[3], length, part;
 
   for (int k = 0; k < 3; k++) t[k] = g->tangent[0][k];
@@ -103,9 +103,9 @@ void SbFrictionDirection(const SbFriction *f, const Touch *touch, PetscReal push
   for (int k = 0; k < 3; k++) push[k] = touch->n[k] - part * t[k];
 }
 
-PetscErrorCode SbFrictionHold(const SbFriction *f, SbSpace space, Touch *touch)
+PetscErrorCode SbFrictionConstrain(const SbFriction *f, SbSpace space, Touch *touch)
 {
-  SbFrictionState *g = &touch->grip;
+  SbFrictionState *g = &touch->friction;
 
   PetscFunctionBeginUser;
   if (g->slides)
@@ -142,26 +142,26 @@ PetscErrorCode SbFrictionHold(const SbFriction *f, SbSpace space, Touch *touch)
 
 void SbFrictionRead(const SbFriction *f, SbSpace space, Touch *touch, PetscReal N)
 {
-  SbFrictionState *g = &touch->grip;
+  SbFrictionState *g = &touch->friction;
 
   for (int k = 0; k < 3; k++)
-    g->drag[k] = g->slides && !careful(g) ? -coefficient(f, g) * PetscMax(0, N) * g->tangent[0][k] : 0;
+    g->force[k] = g->slides && !careful(g) ? -coefficient(f, g) * PetscMax(0, N) * g->tangent[0][k] : 0;
   for (int q = 0; q < 2; q++) {
     const PetscReal force = SbSpaceGetConstraint(space, g->slide[q])->force;
 
-    for (int k = 0; k < 3; k++) g->drag[k] += force * g->tangent[q][k];
+    for (int k = 0; k < 3; k++) g->force[k] += force * g->tangent[q][k];
   }
 }
 
 /* The same with springs for a pair that alternates; N is the mean of this solve and the last. */
-static PetscReal settle_carefully(const SbFriction *f, PetscReal before, Touch *touch)
+static PetscReal update_by_secant(const SbFriction *f, PetscReal before, Touch *touch)
 {
-  SbFrictionState *g = &touch->grip;
+  SbFrictionState *g = &touch->friction;
   const PetscReal mu = coefficient(f, g), most = mu * PetscMax(0, g->pressing);
   PetscReal s[3], wrong[3];
   const PetscReal length = slip(touch, s), part = length > 0 ? PetscMin(touch->k, most / length) : touch->k;
 
-  for (int k = 0; k < 3; k++) wrong[k] = g->drag[k] + part * s[k];
+  for (int k = 0; k < 3; k++) wrong[k] = g->force[k] + part * s[k];
   g->slides = (PetscBool)(touch->k * length > most);
   g->pressing = 0.5 * (before + g->pressing);
   g->turning = length > 0 ? PetscMin(touch->k, mu * PetscMax(0, g->pressing) / length) : touch->k;
@@ -174,15 +174,15 @@ static PetscReal settle_carefully(const SbFriction *f, PetscReal before, Touch *
   is T + k s, or k s with springs. It slides where that is longer than mu N, with T = mu N along it; the derivative of that
   direction is the stiffness across it.
 */
-static PetscReal settle(const SbFriction *f, Touch *touch)
+static PetscReal update(const SbFriction *f, Touch *touch)
 {
-  SbFrictionState *g = &touch->grip;
+  SbFrictionState *g = &touch->friction;
   const PetscReal most = coefficient(f, g) * PetscMax(0, g->pressing);
   const PetscBool slid = g->slides;
   PetscReal s[3], trial[3], wrong[3] = {0}, size;
 
   slip(touch, s);
-  for (int k = 0; k < 3; k++) trial[k] = touch->k * s[k] - (springs(f, g) ? 0 : g->drag[k]);
+  for (int k = 0; k < 3; k++) trial[k] = touch->k * s[k] - (springs(f, g) ? 0 : g->force[k]);
   size = PetscSqrtReal(SbDot3(trial, trial));
   /* slid backwards: sticks */
   g->slides = (PetscBool)(size > most && (!slid || SbDot3(trial, g->tangent[0]) >= 0));
@@ -190,7 +190,7 @@ static PetscReal settle(const SbFriction *f, Touch *touch)
     const PetscReal over = springs(f, g) ? size : PetscMax(size - most, STIFF * size);
 
     if (!slid || SbDot3(trial, g->tangent[0]) < 0.5 * size) g->flips++;
-    for (int k = 0; k < 3; k++) wrong[k] = g->drag[k] + most / size * trial[k];
+    for (int k = 0; k < 3; k++) wrong[k] = g->force[k] + most / size * trial[k];
     g->turning = touch->k * most / over;
     turn(touch, trial);
   } else if (slid) {
@@ -200,15 +200,15 @@ static PetscReal settle(const SbFriction *f, Touch *touch)
   return PetscSqrtReal(SbDot3(wrong, wrong));
 }
 
-PetscReal SbFrictionSettle(const SbFriction *f, Touch *touch, PetscReal N)
+PetscReal SbFrictionUpdate(const SbFriction *f, Touch *touch, PetscReal N)
 {
-  SbFrictionState *g = &touch->grip;
+  SbFrictionState *g = &touch->friction;
   const PetscReal before = g->pressing;
   PetscReal error;
 
   g->pressing = N;
   if (g->slide[0] < 0) return 0;
-  error = careful(g) ? settle_carefully(f, before, touch) : settle(f, touch);
+  error = careful(g) ? update_by_secant(f, before, touch) : update(f, touch);
   if (careful(g) && g->flips < 2 * FLIPS) { /* begins now */
     g->flips = 2 * FLIPS;
     g->turning = touch->k;
@@ -219,29 +219,29 @@ PetscReal SbFrictionSettle(const SbFriction *f, Touch *touch, PetscReal N)
 void SbFrictionJudge(SbFriction *f, PetscReal worst, PetscReal largest, PetscBool *changed)
 {
   f->updates++;
-  f->unsettled = largest > 0 ? worst / (f->mu * largest) : 0;
-  if (f->unsettled > (f->updates > UPDATES ? LATE : SETTLED)) *changed = PETSC_TRUE;
+  f->error = largest > 0 ? worst / (f->mu * largest) : 0;
+  if (f->error > (f->updates > UPDATES ? LATE : SETTLED)) *changed = PETSC_TRUE;
 }
 
 void SbFrictionAccept(SbFriction *f, Touch *touch, PetscBool presses)
 {
-  SbFrictionState *g = &touch->grip;
+  SbFrictionState *g = &touch->friction;
 
   if (!presses) { /* nothing holds it where it was */
-    for (int k = 0; k < 3; k++) g->stretch[k] = g->drag[k] = 0;
+    for (int k = 0; k < 3; k++) g->stretch[k] = g->force[k] = 0;
     g->slid = g->crowded = PETSC_FALSE;
     return;
   }
   g->slid = g->slides;
   for (int k = 0; k < 3; k++) {
-    f->loss -= g->drag[k] * (touch->now[k] - touch->start[k]);
-    g->stretch[k] = springs(f, g) ? -g->drag[k] / touch->k : 0;
+    f->loss -= g->force[k] * (touch->now[k] - touch->start[k]);
+    g->stretch[k] = springs(f, g) ? -g->force[k] / touch->k : 0;
   }
 }
 
 PetscErrorCode SbFrictionWarn(SbFriction *f, const char effect[], SbSpace space, PetscReal t)
 {
-  PetscReal most = f->unsettled;
+  PetscReal most = f->error;
 
   PetscFunctionBeginUser;
   if (f->updates <= UPDATES || f->said) PetscFunctionReturn(PETSC_SUCCESS); /* alike on all ranks */

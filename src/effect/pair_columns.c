@@ -38,22 +38,22 @@ PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh, const PetscBool takes_part[
   PetscFunctionBeginUser;
   if (!p->wanted) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(mesh->nbody, &p->slot));
-  for (PetscInt b = 0; b < mesh->nbody; b++) p->slot[b] = takes_part[b] ? p->nskin++ : -1;
-  npair = (PetscInt64)p->nskin * (p->nskin - 1) / 2 + (self ? p->nskin : 0);
+  for (PetscInt b = 0; b < mesh->nbody; b++) p->slot[b] = takes_part[b] ? p->nsurface++ : -1;
+  npair = (PetscInt64)p->nsurface * (p->nsurface - 1) / 2 + (self ? p->nsurface : 0);
   PetscCheck(npair <= PAIRS, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-effect_%s_pairs yes: the %" PetscInt_FMT " bodies of -effect_%s_on make %" PetscInt64_FMT
              " pairs, more than the %d that history.csv may have columns for: name fewer sets, or use "
              "-output_contacts yes",
-             e->name, p->nskin, e->name, npair, PAIRS);
+             e->name, p->nsurface, e->name, npair, PAIRS);
   n = p->fixed = e->ncolumn;
   PetscCall(PetscMalloc1(n + APART * (PetscInt)npair, &p->column));
   PetscCall(PetscMalloc1(APART * npair, &p->text));
-  PetscCall(PetscMalloc1(p->nskin * p->nskin, &p->place));
+  PetscCall(PetscMalloc1(p->nsurface * p->nsurface, &p->place));
   PetscCall(PetscArraycpy(p->column, e->column, n));
   for (PetscInt a = 0; a < mesh->nbody; a++) {
     for (PetscInt b = a; b < mesh->nbody; b++) {
       if (p->slot[a] < 0 || p->slot[b] < 0 || (a == b && !self)) continue;
-      p->place[p->nskin * p->slot[a] + p->slot[b]] = n;
+      p->place[p->nsurface * p->slot[a] + p->slot[b]] = n;
       PetscCall(name_columns(e, p, mesh->body[a].name, mesh->body[b].name, &n));
     }
   }
@@ -69,7 +69,7 @@ void SbPairsAdd(const SbPairs *p, PetscInt first, PetscInt second, PetscReal nor
   PetscReal *at;
 
   if (!p->wanted) return;
-  at = values + p->place[p->nskin * p->slot[low] + p->slot[high]];
+  at = values + p->place[p->nsurface * p->slot[low] + p->slot[high]];
   if (low == high) {
     at[0] += normal_force;
     at[1] += normal_force > 0.;

@@ -85,7 +85,7 @@ static PetscReal growth(SbRun run)
 }
 
 /* Cost of halving the error of a source, as a factor on the time of the run. */
-static PetscReal price(SbLedger l, const SbLedgerSeconds *s, int source)
+static PetscReal cost(SbLedger l, const SbLedgerSeconds *s, int source)
 {
   const SbRun run = l->run;
   const PetscReal total = PetscMax(s->total, 1e-9), solving = s->source[SB_ERROR_LINEAR] / total;
@@ -107,7 +107,7 @@ static PetscReal price(SbLedger l, const SbLedgerSeconds *s, int source)
   order one, both relative, while that is small (the bar of docs/reports/quadratic_tets.md: 0.4 to 0.7 of the square). So edges may be longer by r^(-1/2), and
   the run takes c r^(3/2) times as long, c being the ratio of bytes of the matrix per tet.
 */
-static void say_quadratic(SbLedger l, PetscReal price_of_half, char w[ROOM])
+static void say_quadratic(SbLedger l, PetscReal cost_of_half, char w[ROOM])
 {
   const SbModel m = l->run->model;
   const PetscInt body = worst_body(l), *nodes = m->element[body]->nodes_per;
@@ -125,7 +125,7 @@ static void say_quadratic(SbLedger l, PetscReal price_of_half, char w[ROOM])
     return;
   }
   /* contact has an edge, where solutions are not smooth */
-  if (m->nbegin_step || m->npotential || times >= price_of_half) return;
+  if (m->nbegin_step || m->npotential || times >= cost_of_half) return;
   SbAppend(
     ROOM, w,
     "Where the solution is smooth and tets are well shaped, -body_%s_element p2 does it with edges of %.2g "
@@ -159,9 +159,9 @@ static void say_largest(SbLedger l, const SbLedgerSeconds *s, char w[ROOM])
   else
     SbAppend(ROOM, w, "%s", what[most]);
   if (most != SB_ERROR_CONTACT && most != SB_ERROR_ROUNDING)
-    SbAppend(ROOM, w, ", and %.2g times the time", (double)price(l, s, most));
+    SbAppend(ROOM, w, ", and %.2g times the time", (double)cost(l, s, most));
   SbAppend(ROOM, w, ". ");
-  if (most == SB_ERROR_SPACE) say_quadratic(l, price(l, s, most), w);
+  if (most == SB_ERROR_SPACE) say_quadratic(l, cost(l, s, most), w);
 }
 
 /* Settings that cost and gain nothing. */
@@ -192,7 +192,7 @@ static void say_wasted(SbLedger l, const SbLedgerSeconds *s, char w[ROOM])
 }
 
 /* Whether -accuracy was met, and if not, why. */
-static void say_dial(SbLedger l, char w[ROOM])
+static void report_accuracy(SbLedger l, char w[ROOM])
 {
   const PetscReal all = together(l) / PetscSqrtReal(PetscMax(l->stored, PETSC_MIN_REAL));
   const PetscReal mesh = l->error[SB_ERROR_SPACE] / PetscSqrtReal(PetscMax(l->stored, PETSC_MIN_REAL));
@@ -325,7 +325,7 @@ PetscErrorCode SbLedgerReport(SbLedger l, const char *file, PetscBool quiet)
   PetscCall(print_line("together", together(l), scale * together(l), NULL, s.total, s.total, ""));
   say_largest(l, &s, words);
   say_wasted(l, &s, words);
-  say_dial(l, words);
+  report_accuracy(l, words);
   for (char *word = strtok(words, " "); word; word = strtok(NULL, " ")) {
     const int n = (int)strlen(word);
 
