@@ -10,8 +10,7 @@
 */
 #include "contact_node.h"
 
-#define VALLEY \
-  2 /* flips of an active node between facets in a step, after which it may be constrained on two */
+#define VALLEY 2    /* flips of an active node between facets in a step that allow two constraints */
 #define AVERAGED 4  /* flips after which normals are averaged */
 #define GIVEN_UP 16 /* flips after which it is not constrained on two any more */
 #define KEPT 24     /* flips after which its plane is kept until the end of the step */

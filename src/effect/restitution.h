@@ -4,8 +4,7 @@
 #pragma once
 #include "sbbase.h"
 
-#define SB_RESTITUTION_EARLY \
-  1e-6 /* of the path: near misses count as impacts, so that a flat base hits as a whole */
+#define SB_RESTITUTION_EARLY 1e-6 /* of the path: near misses count as impacts */
 
 /* Restitution of an effect. */
 typedef struct {

@@ -5,10 +5,9 @@
 */
 #include "sbgeometry.h"
 
-#define FLAT 1e-12 /* area over squared length, below which a triangle has none */
-#define SLIM 1e-4  /* the same, below which the region of the nearest point may be the wrong one */
-#define RIM \
-  1e-6 /* tolerance of barycentric coordinates, so that a ray through an edge hits one of its triangles */
+#define FLAT 1e-12     /* area over squared length, below which a triangle has none */
+#define SLIM 1e-4      /* the same, below which the region of the nearest point may be the wrong one */
+#define RIM 1e-6       /* tolerance of barycentric coordinates: rays through edges hit */
 #define PARALLEL 1e-10 /* volume of way and edges over the squared length of one: it lies in the plane */
 
 /* p minus the point with these weights. */

@@ -4,10 +4,9 @@
 #pragma once
 #define SB_CONTACT_ROUNDS \
   250 /* solves of one step before contact counts as failed; response augmented may take more than 100 */
-#define SB_TIME_OF_IMPACT_LEAST \
-  0.05                /* fraction of a step: times of impact nearer to one of its ends do not cut it */
-#define SB_FORGET 0.9 /* factor per step on the longest recent step */
-#define SB_LOOKS 4    /* most repetitions of a step that a post-solve callback asks for */
+#define SB_TIME_OF_IMPACT_LEAST 0.05 /* times of impact nearer to an end of a step do not cut it */
+#define SB_FORGET 0.9                /* factor per step on the longest recent step */
+#define SB_LOOKS 4                   /* most repetitions of a step that a post-solve callback asks for */
 #include "sbtime.h"
 
 #define SB_TS_SECOND_ORDER "sb_second_order"
