@@ -53,7 +53,7 @@ PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n,
 
 /* Assembly of an operator other than one block matrix. */
 typedef struct {
-  Mat stored; /* what SbSpaceAddCellBlock() adds to; borrowed; NULL: there is no such matrix */
+  Mat stored; /* target of SbSpaceAddCellBlock(); borrowed; NULL: none */
   PetscErrorCode (*assemble)(Mat A, const SbStage *stage); /* for SbSpaceAssembleTangent(). Not collective */
   /* for SbSpaceAddSpring(): factor times a block, N/m, of a local node; it is in `stored` already. NULL: nothing more. Not collective */
   PetscErrorCode (*add_spring)(Mat A, PetscInt node, PetscReal factor, const PetscReal block[9]);

@@ -11,7 +11,7 @@
 #define SB_NAME_MAX 64         /* longest name of a body, set or effect, with the terminating zero */
 #define SB_OPTION_COUNT_MAX 16 /* most numbers or formulas in one option */
 
-#define SB_OPTION_DEFAULT "default" /* -body_default_<key> is what bodies take that are not given a <key> */
+#define SB_OPTION_DEFAULT "default" /* -body_default_<key> applies to bodies without their own <key> */
 
 /* ------------------------------------------------------------------ options */
 
@@ -72,7 +72,7 @@ PetscErrorCode SbOptionNames(const SbScope *scope, const char *key, PetscInt *n,
                              char (**names)[SB_NAME_MAX]); /* PetscFree */
 PetscErrorCode SbOptionChoice(const SbScope *scope, const char *key,
                               PetscInt *index); /* position in `range` */
-/* From now on -<klass>_<instance>_<key> that is not given is -<klass>_<from>_<key>, and one record with it: `instance` is a copy of `from`. Not collective. */
+/* From now on -<klass>_<instance>_<key>, if not given, has the value of -<klass>_<from>_<key>: `instance` is a copy of `from`. Not collective. */
 PetscErrorCode SbOptionsInherit(const char *klass, const char *instance, const char *from);
 PetscErrorCode SbOptionGiven(const SbScope *scope, const char *key, PetscBool *given); /* by the user */
 
@@ -114,7 +114,7 @@ PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic);
 /* The table for programs (scripts/manual): tabs between the columns class, type, option, kind, count, unit, required (yes, no), default, range and
    meaning, whose names are the first line. Collective; rank 0 writes to a file, or to standard output when file is "-". */
 PetscErrorCode SbOptionsTable(MPI_Comm comm, const char *file);
-/* ASCII viewer on a file, or on standard output when file is "" or "-"; that it cannot be written is an error on every rank. Collective. */
+/* ASCII viewer on a file, or on standard output when file is "" or "-"; if it cannot be written, an error on every rank. Collective. */
 PetscErrorCode SbViewerOpen(MPI_Comm comm, const char *file, PetscViewer *viewer);
 PetscErrorCode SbOptionsReset(void); /* forgets what was read and registered; at exit and in tests */
 
@@ -144,17 +144,17 @@ void SbErrorSetTrace(
 void SbErrorSetProgram(const char *name);
 /* The option file that PETSc is about to read: PETSc's messages about YAML do not name it. */
 void SbErrorSetFile(const char *file);
-/* Where the YAML file that PETSc has just refused goes wrong, as "line 6: ..." in the message of that error. Not collective. */
+/* Adds the line of a syntax error in a YAML file, "line 6: ...", to the message of PETSc's error. Not collective. */
 void SbErrorFindYamlLine(void);
 /* An error line at the end of a run whose calls all succeeded: a solver gave up, the output is complete. A printf format. */
 void SbErrorPost(const char *format, ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
 #define SB_EXIT_STOPPED \
   75 /* exit code of a run that was asked to stop and can go on: EX_TEMPFAIL of sysexits.h */
-/* What is posted is no error, but that the run was asked to stop: the line says so, and the exit code is SB_EXIT_STOPPED. */
+/* The posted line is not an error, but a requested stop: the line says so, and the exit code is SB_EXIT_STOPPED. */
 void SbErrorSetStopped(void);
-/* What one rank does when the run fails, before the error line: with PETSc as it was left, no communication. NULL: nothing. */
+/* Callback on one rank when the run fails, before the error line; PETSc may be in any state, no communication. NULL: none. */
 void SbErrorSetFailureHandler(void (*failure_handler)(const char *message, void *ctx), void *ctx);
-/* What SbErrorFinish() calls first on this rank, with or without an error: files that must not stay. NULL: nothing. */
+/* Callback on this rank at the start of SbErrorFinish(), with or without an error, to remove files. NULL: none. */
 void SbErrorSetCleanup(void (*fn)(void));
 /*
   SbErrorFinish - last call of main() on every rank: `supple: error: ...` on stderr, once for the run; then MPI_Finalize(),
@@ -162,7 +162,7 @@ void SbErrorSetCleanup(void (*fn)(void));
   one failed. `ierr` is the code that came up, 0 after PetscFinalize().
 */
 int SbErrorFinish(PetscErrorCode ierr);
-/* What one rank has to say, to be raised by all: rank 0 of a mesh, a child process. */
+/* An error of one rank (rank 0, a child process), to be raised by all. */
 typedef struct {
   int code;
   char text[1024];
@@ -179,22 +179,22 @@ PetscErrorCode SbCatchError(MPI_Comm comm, int line, const char *function, const
     PetscCall(PetscPopErrorHandler());                      \
     (caught)->code = (int)sb_ierr;                          \
   } while (0)
-/* Raises on all ranks what the lowest rank that failed has caught. Collective. */
+/* Raises the error caught by the lowest failed rank on all ranks. Collective. */
 PetscErrorCode SbCaughtRaise(MPI_Comm comm, const SbCaughtError *caught);
 /* One line `supple: warning: ...` on stderr by rank 0 of comm; a printf format without newline. Collective. */
 PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
 
 /* ------------------------------------------------------------------ texts */
 
-/* Prints into text, or behind what is in it; what does not fit is cut off. */
+/* Prints into text, or appends to it; truncated to size. */
 void SbFormat(size_t size, char text[], const char *format, ...) PETSC_ATTRIBUTE_FORMAT(3, 4);
 void SbAppend(size_t size, char text[], const char *format, ...) PETSC_ATTRIBUTE_FORMAT(3, 4);
-/* Numbers with commas, into p[most]; how many there are, -1 when the text is something else or holds more. */
+/* Comma-separated numbers, into p[most]; returns their count, -1 for other text or more numbers. */
 int SbParseNumbers(const char *text, int most, PetscReal p[]);
 
 /* ------------------------------------------------------------------ arrays */
 
-/* Room for at least `need` elements of `unit` bytes in *array, which has *size of them; doubles, so that appending is cheap. Not collective. */
+/* Enlarges *array, of *size elements of `unit` bytes, to at least `need`; at least doubles it, so that appending is cheap. Not collective. */
 PetscErrorCode SbReserve(PetscInt need, size_t unit, PetscInt *size, void *array);
 /*
   SbBucketByKey - positions 0..n-1 by their keys: those with key k are item[start[k]..start[k + 1]), ascending.
@@ -249,8 +249,8 @@ PetscErrorCode SbFormulaDestroy(SbFormula *formula);
 /*
   Live formulas (src/base/live.c): numbers set during a run, where a formula of an effect is the word `live`.
 
-  SetUp: the file with them, the largest speeds of what moves (m/s) and turns (degree/s), and how many simulated seconds may pass per second, 0: any; before the first step. Of number i = 0 .. SbLiveCount() - 1: Column, its
-  name in the history and its unit (may be NULL); Get, its value at time t of the present step; Set puts it there. Advance: a step that ended at t was accepted, from now on they go to what the file says. Collective.
+  SetUp: file, largest speed (m/s) and angular speed (degree/s), largest ratio of simulated to real time, 0: no limit; before the first step. Of number i = 0 .. SbLiveCount() - 1: Column, its
+  name in the history and its unit (may be NULL); Get, its value at time t of the present step; Set changes it. Advance: after an accepted step that ended at t, reads new targets from the file. Collective.
 */
 PetscErrorCode SbLiveSetUp(const char *file, PetscReal speed, PetscReal angular_speed, PetscReal pace);
 PetscInt SbLiveCount(void);

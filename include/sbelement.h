@@ -85,7 +85,7 @@ void SbCellBlocksGeneral(const SbPack g[9], const SbPack V, const SbPack C[81], 
 
 extern const SbPointRule SbRuleQuadratic; /* degree 2: where stresses are taken */
 extern const SbPointRule SbRuleCubic;     /* degree 3 */
-/* u[12] at the vertices of the P1 cell that has the gradient of U[30] at L. And the transpose: F[30] += what f[12] on that cell is. */
+/* u[12] at the vertices of the P1 cell that has the gradient of U[30] at L. And the transpose: F[30] += the forces f[12] on that cell. */
 void SbQuadraticAt(const PetscReal L[4], const SbPack U[30], SbPack u[12]);
 void SbQuadraticAdd(const PetscReal L[4], const SbPack f[12], SbPack F[30]);
 /* K[p] for p = 0..54 from the ten blocks of P1 at the four points of SbRuleQuadratic, and factor b_a b_b^T. */

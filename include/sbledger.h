@@ -1,5 +1,5 @@
 /*
-  sbledger.h - layer 7: what a run's result is wrong by, source by source, beside the seconds spent on each.
+  sbledger.h - layer 7: error estimates of a run by source, beside the seconds spent on each.
 
   Errors are in the norm of the energy: the square of an error is its energy, J, as a displacement that strains the bodies and a velocity that they
   have; relative is the root of its share of the largest energy, kinetic and strain, that the run has had (of the strain energy in a static run).
@@ -17,8 +17,8 @@
 typedef enum {
   SB_ERROR_SPACE,     /* of the mesh: estimate_space.c */
   SB_ERROR_TIME,      /* of the integrator, summed over the steps */
-  SB_ERROR_NONLINEAR, /* what Newton's method left */
-  SB_ERROR_LINEAR,    /* what the linear solver left */
+  SB_ERROR_NONLINEAR, /* remaining residual of Newton's method */
+  SB_ERROR_LINEAR,    /* remaining residual of the linear solver */
   SB_ERROR_CONTACT,   /* forces on gaps that are not closed */
   SB_ERROR_ROUNDING,  /* of displacements in double precision */
   SB_ERROR_COUNT
@@ -36,7 +36,7 @@ PetscErrorCode SbLedgerRegister(void); /* option rows */
 PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger);
 /* After SbRunSetUp() and before SbOutputAttach(), whose history gets its columns. NULL: nothing. Collective. */
 PetscErrorCode SbLedgerAttach(SbLedger ledger);
-/* `to`, attached, goes on with the errors and the work that `from` has summed, on another model of the same scene. Not collective. */
+/* `to`, attached, continues the sums of errors and work of `from`, on a re-meshed model. Not collective. */
 PetscErrorCode SbLedgerContinue(SbLedger from, SbLedger to);
 /* The error of a source in the norm of the energy, J^(1/2), and the energy that it is relative to, J. Not collective. */
 PetscErrorCode SbLedgerGet(SbLedger ledger, SbErrorSource source, PetscReal *error, PetscReal *stored);

@@ -39,7 +39,7 @@ PetscErrorCode SbLogInitialize(void);
     event      - of all that have this name
 */
 PetscErrorCode SbLogNamed(const char *kind, const char *name, PetscLogEvent *event);
-/* What a run spends its time on. Events of a phase do not contain each other; the linear solve is what PETSc's KSP and PC events cover. */
+/* Phases of a run. Events of a phase do not contain each other; the linear solve is what PETSc's KSP and PC events cover. */
 typedef enum {
   SB_PHASE_MESH,
   SB_PHASE_SETUP,
@@ -50,7 +50,7 @@ typedef enum {
   SB_PHASE_SEARCH,
   SB_PHASE_ENERGY,
   SB_PHASE_OUTPUT,
-  SB_PHASE_OTHER, /* for what no event covers: 0 */
+  SB_PHASE_OTHER, /* time outside all events: 0 */
   SB_PHASE_COUNT
 } SbPhase;
 /* Seconds of each phase so far on this rank. Not collective. */

@@ -12,7 +12,7 @@
 
 typedef struct _p_SbMaterial *SbMaterial;
 
-/* Which tangent a law hands out. A law that has no warped one refuses it. */
+/* Tangents of a law. A law without a warped one refuses it. */
 typedef enum {
   SB_TANGENT_WARPED,   /* Hooke's tensor turned by R: symmetric, positive definite, leaves out dR/dF */
   SB_TANGENT_EXACT,    /* dP/dF: Newton converges quadratically; indefinite in compression */
@@ -25,7 +25,7 @@ typedef struct {
   /* checks that the law has this tangent and sets `tangent` and `frame` below; NULL when there is one tangent only */
   PetscErrorCode (*settangent)(SbMaterial m, SbTangentKind kind);
   /*
-    Stiffness at rest, from the parameters of the material alone: what scales with it or chooses by it asks here, once per
+    Stiffness at rest, from the parameters of the material alone, for scaling; called once per
     region, face or facet, never per cell. Laws that are Hooke's with E and nu at rest share their answers.
   */
   PetscReal (*shear_modulus)(const struct _p_SbMaterial *m); /* G = mu, Pa */
@@ -37,15 +37,15 @@ typedef struct {
   /* psi = energy per rest volume, J/m^3; zero at rest */
   void (*energy)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack psi);
   /* Every law is psi = psi_mu(F) + lambda/2 theta(F)^2 with theta the law's measure of the change of volume: tr(eps) (linear),
-     tr(S - I) (corotated), tr(E) (stvk), J - 1 (neohookean). p = -lambda theta, Pa, positive in compression: what resists the
-     change of volume, and what oscillates from cell to cell where an element locks. */
+     tr(S - I) (corotated), tr(E) (stvk), J - 1 (neohookean). p = -lambda theta, Pa, positive in compression: resists the
+     change of volume, and oscillates from cell to cell where an element locks. */
   void (*pressure)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack p);
   /* P = dPsi/dF, Pa */
   void (*stress)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack P[9]);
   /* The tangent is the isotropic Hooke tensor of volumetric_modulus and shear_modulus, turned by R: fills R. NULL when the law needs the full tangent.
      Co-rotated has it with the warped tangent, linear always (R = I). */
   void (*frame)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack R[9]);
-  /* The tangent is dP = 2 mu dF + lambda (R : dF) R + R [W y]x with y = axial(R^T dF - dF^T R), what a law of R^T F has:
+  /* The tangent is dP = 2 mu dF + lambda (R : dF) R + R [W y]x with y = axial(R^T dF - dF^T R), as for a law of R^T F:
      fills R and the symmetric W (Pa), for SbCellBlocksCorotated(), which is cheaper than the full tangent. W = -mu I is Hooke's
      tensor turned by R. NULL when the law is not of this kind. Co-rotated has it with its exact tangents. */
   void (*spin)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack R[9], SbPack W[9]);
@@ -69,9 +69,9 @@ struct _p_SbMaterial {
   PetscBool linear;    /* stress is linear in F: K is constant */
   PetscBool symmetric; /* always true for hyperelastic laws */
   PetscBool adaptive;  /* -body_NAME_tangent auto: the solver of a step chooses between the two exact ones */
-  PetscBool softens;   /* stress has a maximum in compression: what carries more is turned inside out */
+  PetscBool softens;   /* stress has a maximum in compression, beyond which cells invert */
   PetscBool jacobian;  /* theta is J - 1, cubic in the displacement; of other laws at most quadratic */
-  SbTangentKind tangent; /* what ops.frame or ops.tangent hands out */
+  SbTangentKind tangent; /* tangent of ops.frame or ops.tangent */
   SbMaterial shear;      /* SbMaterialGetShear(); NULL until it is asked for; owned */
   void *data;
 };

@@ -36,7 +36,7 @@ typedef struct {
   SbTetSurface surface;
 } SbTetOptions;
 /*
-  A mesh in memory, which takes the place of a body's file. The arrays are on rank 0, NULL elsewhere; the rest is alike on all ranks.
+  A mesh in memory, instead of a body's file. The arrays are on rank 0, NULL elsewhere; the rest is alike on all ranks.
   Groups of the file are there as the bits of the sets that they mean.
 */
 typedef struct {
@@ -46,7 +46,7 @@ typedef struct {
   PetscInt nvert, ncell, ntri, nedge;
   PetscReal *x;       /* [nvert][3] rest position, placed, m */
   PetscInt *cell;     /* [ncell][4] positively oriented; every vertex is used */
-  PetscInt *tri;      /* [ntri][3] triangles that sets of groups hold */
+  PetscInt *tri;      /* [ntri][3] triangles in sets of groups */
   uint64_t *vert_set; /* [nvert] SB_SET_BIT() of sets that are groups */
   uint64_t *tri_set;  /* [ntri] */
   uint64_t *cell_set; /* [ncell] */
@@ -168,7 +168,7 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
                             SbMesh *mesh);
 PetscErrorCode SbMeshDestroy(SbMesh *mesh);
 /*
-  SbMeshNeighbours - which local cell lies across each face.
+  SbMeshNeighbours - local cell across each face.
 
   Not collective. Output: neighbour[ncell][4], -1 on the boundary and where the other cell is not on this rank; PetscFree().
 */
@@ -190,12 +190,12 @@ PetscErrorCode SbMeshBroadcastCells(SbMesh mesh, PetscInt n, MPI_Datatype type, 
 PetscErrorCode SbMeshBroadcastVertices(SbMesh mesh, PetscInt n, MPI_Datatype type, void *value);
 PetscErrorCode SbMeshValidate(SbMesh mesh); /* ordering, ranges, ownership, sums; for -validate and tests */
 PetscErrorCode SbMeshRegister(void);        /* rows of the option table, the METIS partitioner */
-/* Defaults of SbTetOptions; what -body_<name>_tet_... says when the mesh is a surface. Not collective. */
+/* Defaults of SbTetOptions; values of -body_<name>_tet_... for a mesh that is a surface. Not collective. */
 void SbTetDefaults(SbTetOptions *options);
 PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOptions *options);
-/* Room for a mesh in memory; zeroed. Not collective. */
+/* Allocates a mesh in memory, zeroed. Not collective. */
 PetscErrorCode SbMemoryMeshCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri, SbMemoryMesh **in_memory);
-/* Room for curved edges. */
+/* Allocates curved edges. Not collective. */
 PetscErrorCode SbMemoryMeshCurve(SbMemoryMesh *in_memory, PetscInt nedge);
 PetscErrorCode SbMemoryMeshDestroy(SbMemoryMesh **in_memory);
 /* From rank 0, whose mesh it is, its step, mass and bound to all ranks, which get an empty one; NULL there: NULL on all. Collective. */

@@ -1,5 +1,5 @@
 /*
-  sbmeshfile.h - layer 2: a mesh as a file, on one rank: read, measured, repaired, refined, written. What supple-mesh is made of.
+  sbmeshfile.h - layer 2: a mesh as a file, on one rank: read, measured, repaired, refined, written: the operations of supple-mesh.
 
   Not collective throughout. Errors: PETSC_ERR_USER_INPUT / PETSC_ERR_FILE_*, one line that names the file and what to do.
 */
@@ -8,7 +8,7 @@
 
 typedef struct _p_SbImport SbImport; /* vertices, simplices of every dimension and their groups */
 
-/* Told now and then how far something long is: `what` are counted ("tets read"), total 0: not known. */
+/* Progress callback: `done` of `total` items, named by `what` ("tets read"); total 0: not known. */
 typedef PetscErrorCode (*SbMeshProgress)(const char *what, PetscInt64 done, PetscInt64 total, void *ctx);
 
 /*
@@ -59,7 +59,7 @@ typedef struct {
   PetscInt64 ratio[SB_RATIO_BINS]; /* radius ratios of the tets, 1 for the regular tet */
 } SbMeshStatistics;
 /*
-  SbMeshFileMeasure - checks the mesh as a run would, with the same repairs (unused vertices, orientation), and measures it.
+  SbMeshFileMeasure - checks the mesh as a run would, with the same repairs (unused vertices, orientation), and computes its statistics.
 
   Errors: what SbMeshCreate() refuses.
 */
@@ -73,10 +73,11 @@ typedef struct {
   PetscInt ncollapsed;       /* tets that used a vertex twice, dropped */
   PetscInt nflat;            /* flat tets, dropped */
   PetscInt nslit;      /* those of them that had no face on the boundary: a slit without width is left */
-  PetscInt nduplicate; /* tets given again, dropped; their groups are joined */
-  PetscInt nturned;    /* inverted tets, turned */
+  PetscInt nduplicate; /* duplicate tets, removed; their groups are joined */
+  PetscInt nturned;    /* inverted tets, reoriented */
   PetscInt nunused;    /* vertices that no tet uses, dropped */
-  PetscInt nitem; /* triangles, lines, points of groups given again, collapsed or not of the tets, dropped */
+  PetscInt
+    nitem; /* triangles, lines, points of groups that are duplicate, collapsed or not part of tets, removed */
 } SbRepair;
 /*
   SbMeshFileRepair - makes a mesh that a run accepts, where dropping, turning and welding can do it.
@@ -84,8 +85,8 @@ typedef struct {
   Input:
     weld - vertices at most so far apart become one, m; 0: none do; below 0: 1e-9 of the diagonal of the extent
   Output:
-    done - what was done
-  Errors: what is left and SbMeshCreate() would refuse: overlapping tets, nothing left.
+    done - counts of repairs
+  Errors: remaining defects that SbMeshCreate() would refuse: overlapping tets, no tets.
 */
 PetscErrorCode SbMeshFileRepair(SbImport *import, PetscReal merge_tolerance, SbRepair *done);
 

@@ -1,5 +1,5 @@
 /*
-  sbmeshio.h - layer 2: a body on rank 0 as its reader delivers it, and what reading a file takes. Not collective throughout.
+  sbmeshio.h - layer 2: a body on rank 0 as its reader delivers it, and services for readers. Not collective throughout.
 */
 #pragma once
 #include <hdf5.h>
@@ -19,7 +19,7 @@ typedef struct {
   int64_t first, ntable;
   PetscInt *table;    /* [ntable] index of number first + i, or -1; NULL when the numbers are far apart */
   SbNumbered *sorted; /* [n] then this */
-  PetscBool repeated; /* a number stands twice */
+  PetscBool repeated; /* a number occurs twice */
   int64_t twice;      /* this one */
 } SbNumbers;
 
@@ -36,7 +36,7 @@ typedef struct {
   char *data;        /* whole file and a terminating zero */
   const char *end;
   const char *at;    /* next byte */
-  const char *token; /* what was read last, for messages */
+  const char *token; /* the last token, for messages */
   PetscBool binary;  /* the numbers that follow are binary */
   PetscBool bytes;   /* messages count bytes instead of lines */
   PetscBool swap;    /* from a machine with the other byte order */
@@ -46,16 +46,16 @@ PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *scan);
 PetscErrorCode SbScanClose(SbScan *scan);
 /* "line 12" or "byte 4711" of the last token. */
 const char *SbScanPosition(const SbScan *scan, char position[64]);
-/* Numbers, as text or, but for SbScanText(), in binary; `what` names what is expected there. */
+/* Numbers, as text or, but for SbScanText(), in binary; `what` names the expected item, for messages. */
 PetscErrorCode SbScanText(SbScan *scan, const char *what, int64_t *value);
 PetscErrorCode SbScanReal(SbScan *scan, const char *what, int64_t number,
                           PetscReal *value); /* `what` of `number` */
 PetscErrorCode SbScanPoint(SbScan *scan, const char *what, int64_t number,
                            PetscReal x[3]); /* three finite ones */
-/* A count of things that take at least so many bytes each as text and in binary: more than the file holds is an error. */
+/* A count of items with at least these bytes each, as text and in binary: an error if the file is shorter. */
 PetscErrorCode SbScanRoom(SbScan *scan, const char *what, int64_t n, int64_t text_bytes,
                           int64_t binary_bytes);
-/* How a number stands in binary data. */
+/* Binary format of a number. */
 typedef struct {
   char kind; /* 'i' signed, 'u' unsigned, 'f' floating point */
   int size;  /* bytes */
@@ -85,10 +85,10 @@ typedef struct {
   PetscInt dim; /* 0 points, 1 curves, 2 surfaces, 3 volumes */
   int64_t tag;  /* number in the file */
   char name[SB_GROUP_MAX];
-  PetscInt alone; /* tag set that holds only this group; -1 until somebody wants it */
+  PetscInt alone; /* tag set with only this group; -1: not created yet */
 } SbGroup;
 
-/* Types of elements as gmsh numbers them: what readers of all formats count. */
+/* gmsh's numbers of element types, by which readers of all formats count. */
 enum {
   SB_GMSH_LINE = 1,
   SB_GMSH_TRIANGLE = 2,
@@ -144,12 +144,12 @@ struct _p_SbImport {
   SbCount nmiddle;
   SbMiddle *
     middle; /* [nmiddle] edges of 10-node tets, for each tet; once read those that are off the middle, each once, ascending */
-  PetscBool surface; /* given: all triangles are wanted, and tets need not be there */
-  SbTetOptions tet;  /* given: how a surface becomes tets */
-  PetscReal scale;   /* given: factor that placing will use; a reader that has scaled sets it to 1 */
-  char note[512];    /* what the reader repaired, for SbBody.note */
-  PetscInt step; /* given: step of a run's output whose positions are wanted; 0 at rest, -1 the last one */
-  SbMeshProgress progress; /* given: called with how far a long read is; may be NULL */
+  PetscBool surface; /* input: all triangles are read, and tets are optional */
+  SbTetOptions tet;  /* input: parameters for filling a surface with tets */
+  PetscReal scale;   /* input: scale factor, applied after reading; a reader that has scaled sets it to 1 */
+  char note[512];    /* repairs by the reader, for SbBody.note */
+  PetscInt step;     /* input: step of a run's output whose positions are read; 0 at rest, -1 the last one */
+  SbMeshProgress progress; /* input: progress callback of long reads; may be NULL */
   void *progress_ctx;
   /* while a file is read; SbImportForget() */
   SbScan scan;
@@ -205,22 +205,22 @@ PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *body);
 /* TetGen's files; path: one of them, or what they have in common. */
 PetscErrorCode SbImportRead_TetGen(const char *path, SbImport *body);
 
-/* In a forked child of `parent`: nothing of the parent's is left in the way, handlers, masks, terminal; it dies with it, and after so many seconds by SIGALRM,
-   which holds for a program that it becomes. */
+/* In a forked child of `parent`: resets signal handlers, masks and terminal of the parent; the child ends with the parent, and after `seconds` by SIGALRM,
+   also after exec. */
 void SbChildIsolate(pid_t parent, PetscReal seconds);
-/* Room of so many bytes for an array of a reader: *array is NULL, or grows and keeps what is in it. SbImportDestroy() gives it back, at the latest. */
+/* Allocates or enlarges an array of a reader to this many bytes; *array: NULL or an earlier one, whose contents are kept. Freed by SbImportDestroy() at the latest. */
 PetscErrorCode SbImportScratch(SbImport *import, size_t bytes, void *array);
 /* The same for one more of `unit` bytes each. */
 PetscErrorCode SbImportGrow(SbImport *import, SbCount *count, size_t unit, void *array);
-/* Room for n vertices. */
+/* Allocates n vertices. */
 PetscErrorCode SbImportSetVertices(SbImport *import, PetscInt n);
 /* Appends a simplex; vert[dim + 1]. */
 PetscErrorCode SbImportAddItem(SbImport *import, int dim, const PetscInt vert[], PetscInt tags,
                                int64_t number);
-/* Room for exactly n simplices of a dimension that has none yet, numbered from 1 on, for the caller to fill. */
+/* Allocates exactly n simplices of a dimension that has none yet, numbered from 1 on; the caller fills them. */
 PetscErrorCode SbImportSetItems(SbImport *import, int dim, PetscInt n);
 PetscErrorCode SbItemsFree(SbItems *items);
-/* Item `from` takes the place of item `to`. */
+/* Copies item `from` to item `to`. */
 void SbItemsMove(SbItems *items, int dim, PetscInt to, PetscInt from);
 /* The group (dim, tag), made when new; a NULL name means "surface_12" until somebody gives one. */
 PetscErrorCode SbImportGroup(SbImport *import, PetscInt dim, int64_t tag, const char *name, PetscInt *group);

@@ -1,7 +1,7 @@
 /*
   sboutput.h - layer 7: one folder per run. fields.h5 with its indices fields.vtkhdf and fields.xmf, history.csv, scenario.opts, run.json, checkpoints, progress.
 
-  Everything here attaches to a run as a monitor; what the scenario does not ask for is not attached. Order of calls:
+  Everything here attaches to a run as a monitor; output that the scenario does not select is not attached. Order of calls:
   SbOutputRegister(), SbRunCreate(), SbOutputSetFromOptions(), SbOptionsCheck(), SbModelSetUp(), SbRunSetUp(),
   SbOutputAttach(), SbReportHeader(), SbRunSolve(), SbReportSummary(), SbRunDestroy().
 
@@ -9,7 +9,7 @@
   It does not depend on the number of ranks.
 
   Vertex fields of bodies with nodes at faces (cr, dg) hold at each vertex the mean of the cells around it, weighted with
-  their volumes; forces are handed from the faces to their vertices in equal parts. With -output_discontinuous each cell has
+  their volumes; forces at faces are distributed equally to their vertices. With -output_discontinuous each cell has
   points of its own and the values that it has there. Bodies of p2 have their nodes at edges, too. Probes show vertex fields. Checkpoints hold the unknowns themselves.
 
   fields.h5
@@ -36,12 +36,12 @@ struct SbField {
   const char *unit;
   PetscInt ncomp; /* 1 scalar, 3 vector, 6 symmetric tensor: xx xy xz yy yz zz, the Tensor6 order of XDMF */
   PetscBool cell; /* per cell, else per vertex, or corner of a cell with -output_discontinuous */
-  PetscBool constant; /* whole numbers, written once with the mesh */
+  PetscBool constant; /* integers, written once with the mesh */
   PetscBool dynamic;  /* does not exist in a static run */
   const char *help;
   PetscErrorCode (*compute)(const SbField *field, SbRun run, const SbStep *step,
                             PetscReal *values); /* NULL: `sets`, several arrays */
-  /* what some compute() need: */
+  /* parameters of compute(): */
   size_t from; /* where in the step or the output the quantity is */
   void (*of_stress)(const PetscReal sigma[6], PetscReal value[]); /* value[ncomp] from xx yy zz xy yz xz */
 };
@@ -87,7 +87,7 @@ PetscErrorCode SbOutputLoadState(SbRun run);
 PetscErrorCode SbOutputRestoreMeshes(SbRun run);
 
 /*
-  SbOutputReattach - the output of a run goes on with another one of the same scene, whose bodies have other meshes: the same files, in which
+  SbOutputReattach - continues the output with another run of the same scene, whose bodies were re-meshed: the same files, in which
   the mesh changes. Collective; instead of SbOutputSetFromOptions() and SbOutputAttach() for `to`.
 */
 PetscErrorCode SbOutputReattach(SbRun from, SbRun to);

@@ -1,5 +1,5 @@
 /*
-  sbremesh.h - layer 8: bodies get other meshes while a run goes on; who makes their tets.
+  sbremesh.h - layer 8: re-meshing of bodies during a run, and its mesher.
 */
 #pragma once
 #include "sbledger.h"
@@ -24,7 +24,7 @@ PetscErrorCode SbMesherDefault(const char *where, const SbSurface *hull, PetscRe
                                SbTets *tets);
 
 /*
-  SbRemesh - bodies get other meshes while the run goes on (src/remesh/remesh.c).
+  SbRemesh - re-meshing of bodies during a run (src/remesh/remesh.c).
 
   Order of calls: SbRemeshSetFromOptions() after SbSceneCreate(); SbRemeshAttach() after SbRunSetUp() and SbLedgerAttach(), before
   SbOutputAttach(), whose history gets the column remesh_loss; SbRemeshSolve() instead of SbRunSolve(); SbRemeshDestroy().

@@ -29,13 +29,13 @@ PetscReal SbSurfaceMeasure(const SbSurface *surface, PetscReal volume[]);
   Input:
     where   - begins every message
     surface - closed; no two triangles cut each other; lengths in any unit
-    options - size in that unit, who does it, whether the triangles stay
+    options - size in that unit, mesher, whether the triangles are kept
   Output:
     body - zeroed or with groups and tag sets alone: gets x, vert_number, item[3] with the tags of its region, item[2] with every
            triangle whose tag set is not empty, and note. With SB_TET_KEEP the first surface->nvert vertices are those of the surface,
            bit by bit and in order, and its triangles are the facets of the tets, inner ones too.
 
-  Errors: PETSC_ERR_USER_INPUT, one line with what gmsh and what tetgen said and what to do; then body holds no mesh.
+  Errors: PETSC_ERR_USER_INPUT, one line with the messages of gmsh and tetgen and a remedy; then body has no mesh.
 */
 PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *surface, const SbTetOptions *options,
                                 SbImport *body);

@@ -1,5 +1,5 @@
 /*
-  sbtet.h - layer 2: tets as plain arrays on one rank: their faces, their shape, which one holds a point. Not collective throughout.
+  sbtet.h - layer 2: tets as plain arrays on one rank: their faces, their shape, checks. Not collective throughout.
 */
 #pragma once
 #include "sbmeshio.h"
@@ -29,7 +29,7 @@ PetscInt SbFacesFind(const SbFaces *faces, const PetscInt vert[3], PetscInt slot
 
 /* Leaves out vertices that no tet uses, and items with such a one; counts them in nunused and nlost. */
 PetscErrorCode SbImportDropUnused(SbImport *import);
-/* Drops unused vertices, turns cells, refuses what would make the physics wrong; builds the faces. */
+/* Removes unused vertices, orients cells, checks for defects; builds the faces. */
 PetscErrorCode SbImportCheck(SbImport *import, SbFaces *faces);
 /* Sums and maxima over tets and vertices; neutral where there are none. */
 typedef struct {

@@ -23,7 +23,7 @@ typedef struct {
   Collective; rank 0 reads and checks, every rank gets all of it.
 
   Input: option - for messages; path; scale > 0; at, m.
-  What is repaired is named in a warning: vertices that differ by rounding, doubled, flat and turned triangles, a surface inverted; triangles with material on
+  Repairs are named in a warning: vertices that differ by rounding, duplicate, flat and wrongly oriented triangles, an inverted surface; triangles with material on
   both sides, of solids within each other or side by side, are left out.
   Errors: PETSC_ERR_FILE_*, PETSC_ERR_USER_INPUT, alike on all ranks, one line with option, file, line or triangle (numbered as in the
   file) and what to do: unreadable; open; more than two triangles at an edge; no volume.

@@ -231,7 +231,7 @@ PetscErrorCode SbOutputRestoreMeshes(SbRun run)
     }
     PetscCallMPI(MPI_Bcast(&ok, 1, SB_MPI_BOOL, 0, out->comm));
   }
-  // all ranks know which bodies have a mesh of their own, and its numbers
+  // broadcast which bodies have their own mesh, and its sizes
   for (PetscInt b = 0; b < m->nbody; b++) {
     PetscCall(SbMemoryMeshShare(out->comm, &in_memory[b]));
     if (in_memory[b]) m->body[b].in_memory = in_memory[b];

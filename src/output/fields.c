@@ -126,7 +126,7 @@ static void mean_pressure(const PetscReal s[6], PetscReal value[])
   value[0] = -(s[0] + s[1] + s[2]) / 3.;
 }
 
-/* What f->of_stress makes of the Cauchy stress. */
+/* A function of the Cauchy stress, f->of_stress. */
 static PetscErrorCode of_stress(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
 {
   const PetscReal *sigma = NULL;

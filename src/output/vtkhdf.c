@@ -127,7 +127,7 @@ static void write_cells(SbIndex v, hid_t root, int64_t *work, PetscBool *ok)
     write_numbers(root, "Types", ncell, 0, H5T_STD_U8LE, v->corners > 4 ? &quadratic : &linear, ok);
     for (PetscInt p = 0; p < v->npart; p++)
       for (PetscInt c = 0; c <= v->part[p].ncell; c++) work[n++] = v->corners * (int64_t)c;
-    /* of the type of the corners: ParaView 5.13 takes no other */
+    /* with the integer type of the corners: ParaView 5.13 accepts no other */
     write_numbers(root, "Offsets", n, 0, H5T_STD_I32LE, work, ok);
     return;
   }
