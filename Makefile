@@ -108,7 +108,7 @@ meshes/%.msh: meshes/%.geo
 deps:
 	@scripts/install-deps run
 
-demo: deps ## install what is missing, build, run scenarios/demo.opts on 2 ranks, draw it: out/demo
+demo: deps ## install missing packages, build, run scenarios/demo.opts on 2 ranks, draw it: out/demo
 	$(AGAIN) bin/supple meshes/organ_coarse.msh
 	@scripts/venv
 	@scripts/mpi 2 bin/supple scenarios/demo.opts
@@ -122,7 +122,7 @@ pictures: deps ## run the scenarios of contact on 1 rank and draw them: docs/pic
 	@scripts/pictures
 
 CHECK = tests/run --build $(BUILD) $(if $(T),--match '$(T)')
-check: deps ## install what is missing, build, run the tests (25 minutes of processor time, on all cores; one of them: T=name)
+check: deps ## install missing packages, build, run the tests (25 minutes of processor time, on all cores; one of them: T=name)
 	$(AGAIN) bin/supple bin/supple-mesh tests $(MESHES)
 	@scripts/check-layers $(BUILD)/src
 	@scripts/venv
@@ -134,7 +134,7 @@ check-long: deps ## the tests that take longer or need ParaView
 	@scripts/venv
 	@$(CHECK) --long
 
-check-hard: deps ## every hard case on 1, 2 and 3 ranks, ten jittered runs each, and the table of their margins (an hour and more; one: T=name)
+check-hard: deps ## robustness tests on 1, 2 and 3 ranks, ten perturbed runs each, and the table of their margins (an hour and more; one: T=name)
 	$(AGAIN) $(BUILD)/tests/hard/hard
 	@tests/run --build $(BUILD) --group hard --all $(if $(T),--match '$(T)'); status=$$?; scripts/stability --build $(BUILD); exit $$status
 
@@ -182,7 +182,7 @@ solvers: deps ## linear solvers for CR and DG near nu = 1/2, measured into docs/
 	$(AGAIN) $(BUILD)/tests/perf/solvers
 	@scripts/solvers --build $(BUILD) $(if $(QUICK),--quick)
 
-accuracy: deps ## error against time for every choice, measured into docs/reports/accuracy.md with plots and a CSV (5 to 10 minutes); QUICK=1: a test, in build
+accuracy: deps ## error against time for all methods, measured into docs/reports/accuracy.md with plots and a CSV (5 to 10 minutes); QUICK=1: a test, in build
 	$(AGAIN) bin/supple
 	@scripts/venv
 	@.venv/bin/python scripts/accuracy --build $(BUILD) $(if $(QUICK),--quick)
@@ -224,10 +224,10 @@ dist: ## build/supple-VERSION.tar.gz of the last commit, and its checksum
 deb: ## a Debian package of the last commit: build/deb/*.deb, examined by lintian (about 8 minutes of processor time)
 	@scripts/package deb
 
-packaging: ## the linters of what hands supple on: package of Debian, container file, recipes, CITATION.cff
+packaging: ## linters of the packaging: Debian package, container file, recipes, CITATION.cff
 	@scripts/check-packaging
 
-clean: ## remove what was built and meshed; results in out/ stay
+clean: ## remove build results and meshes; results in out/ stay
 	rm -rf build build-* bin meshes/*.msh
 
 help: ## this list
