@@ -74,7 +74,7 @@ PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[
           const PetscInt own = column[e] / 3 - s->gnode_start;
           PetscInt ghost;
 
-          /* the place of its block, own columns first; not all of them are in the graph */
+          /* index of its block, own columns first; not all are in the graph */
           if (own >= 0 && own < s->nnode_owned)
             PetscCall(PetscFindInt(own, nd, p->dj + p->di[i], &at));
           else {

@@ -10,7 +10,7 @@
   W. Where theta is J - 1, m is the exact change of the volume of the cell: det F is cubic. Otherwise m is that of the four points,
   which is exact for the linear law and St. Venant's and Kirchhoff's.
 
-  Pressures of single cells may oscillate where the mesh is coarse and held all around; means over the cells around a vertex do not.
+  Pressures of single cells may oscillate on coarse meshes that are constrained all around; means over the cells around a vertex do not.
 
   Cells that are curved at rest are regions of their own: they have gradients and a part of the volume at each of the points of SbRuleQuintic,
   which is exact for all that is needed: a constant stress and a constant pressure are in equilibrium.

@@ -120,7 +120,7 @@ SB_KERNEL static void remove_volumetric(PetscReal lambda, const SbPack D[restric
   }
 }
 
-/* A law with the full tangent; its damping comes on top and stays whole. */
+/* A law with the full tangent; its damping is added, without a split. */
 static void general_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
                            const SbPack F[9], Split *split, SbPack K[10][9])
 {

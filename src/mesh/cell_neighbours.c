@@ -1,6 +1,6 @@
 /*
-  cell_neighbours.c - what elements with nodes at faces or edges need of the mesh: who is across a face, which cells share an edge, and
-  numbers of ghost cells; forests of PETSc that bring them there.
+  cell_neighbours.c - connectivity for elements with nodes at faces or edges: cells across faces, cells around edges,
+  numbers of ghost cells; star forests for their exchange.
 */
 #include "mesh_impl.h"
 

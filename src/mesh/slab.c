@@ -323,7 +323,7 @@ static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
   for (PetscInt i = 0; i < route.nrecv; i++) is[i] = (PetscBool)(s->number[got[i] - s->rows.first] >= 0);
   PetscCall(SbRouteReply(&route, sizeof(PetscBool), is, there));
   PetscCall(PetscFree(is));
-  // items with all their vertices mark these by their tag sets; then points and lines go
+  // items with all their vertices mark these by their tag sets; then points and lines are removed
   n = 0;
   for (int d = 0; d < 3; d++) {
     for (PetscInt i = 0; i < im->item[d].n; i++) {

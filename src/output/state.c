@@ -70,7 +70,7 @@ static PetscErrorCode read_tets(Other *o, PetscInt which, PetscBool *ok)
   }
   *ok = (PetscBool)(*ok && are_points(o->cell, 4 * o->ncell, o->npoint));
 
-  /* those of the body */
+  /* the cells of the body */
   for (PetscInt c = 0; *ok && c < o->ncell; c++) {
     if (body && body[c] != which) continue;
     PetscCall(PetscArraymove(o->cell + 4 * n, o->cell + 4 * c, 4));

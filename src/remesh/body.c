@@ -22,7 +22,7 @@
 #define SWEEPS 30
 #define GROWTH 2 /* times its tets: a mesh that splits have made so large is not repaired by more of them */
 #define ROUNDS 6 /* of moving vertices and splitting edges */
-#define PLACES 6 /* on the way to the middle of the neighbours, each half as far as the one before */
+#define PLACES 6 /* positions tried towards the mean of the neighbours, each half as far as the one before */
 #define STRAIGHT 1e-6 /* of the length of an edge: nearer to the middle its node is there */
 
 /* Locator of points in the old mesh. */

@@ -1,5 +1,5 @@
 /*
-  The coarse space of the two-level preconditioner: modes of the aggregates, which rank knows what of them, and the two maps
+  The coarse space of the two-level preconditioner: modes of the aggregates, their distribution over ranks, and the two maps
   between nodes and modes.
 
   Modes that vanish, as the rotations of an aggregate of one node, are found once from the Gram matrix sum Z_i^T Z_i: its
@@ -63,7 +63,7 @@ static PetscErrorCode find_vanishing(SbCoarse c, PetscInt a, PetscReal projector
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Which aggregates meet: those at the neighbours of an aggregate's nodes, the aggregate itself first. */
+/* Adjacency of aggregates: those at the neighbours of an aggregate's nodes, the aggregate itself first. */
 static PetscErrorCode find_pattern(SbCoarse c)
 {
   SbPlan p = c->space->plan;

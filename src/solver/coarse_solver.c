@@ -1,8 +1,8 @@
 /*
   What solves with the coarse operator, the rows of which are where their aggregates are.
 
-  A few hundred aggregates: one rank has the whole and factors it for all (pc_direct.c). Many: a V-cycle of PETSc's algebraic multigrid
-  stands for E^-1, so that a rank's work for it is bounded by its own aggregates.
+  A few hundred aggregates: one rank gathers and factors E for all (pc_direct.c). Many: a V-cycle of PETSc's algebraic multigrid
+  approximates E^-1, so that a rank's work for it is bounded by its own aggregates.
 
   E is a matrix of blocks of six whose near null space is known exactly: a rigid motion t + w x (x - x_b) of the body is on an aggregate
   with centre x_a and radius r the six numbers t + w x (x_a - x_b) and r w. Smoothed aggregation coarsens on (Vanek, Mandel, Brezina 1996,

@@ -1,6 +1,6 @@
 /*
-  What solves see of constraints that stand beside the matrix K (src/fem/constraint.c): the operator A = P (K + F^T k G) P, and M_A^-1 = P M^-1 P around
-  any preconditioner M. Where K lacks a part of the tangent, A has the whole one, and K preconditions.
+  Solves with constraints outside the matrix K (src/fem/constraint.c): the operator A = P (K + F^T k G) P, and M_A^-1 = P M^-1 P around
+  any preconditioner M. If K lacks a part of the tangent, A has the complete one, and K is the preconditioner's matrix.
 
   With SB_SADDLE_DIRECT the part of M is taken by a factorisation of the projected matrix, which is A's inverse in the null space: one
   iteration and what rounding asks for. Where nothing touches, M itself is used.

@@ -3,8 +3,8 @@
 
       P^-1 = Q + (1 - Q A) M (1 - A Q),   Q = Z E^-1 Z^T,   E = Z^T A Z,   A = K + C
 
-  Z has the unknowns of the nodes of contact themselves, and six rigid-body modes for each aggregate of the other nodes: what contact makes stiff is
-  solved exactly, in one coarse space with what is slow. Either alone takes five to twenty times the iterations. M is Chebyshev's iteration of
+  Z has the unknowns of the nodes in contact, and six rigid-body modes for each aggregate of the other nodes: stiff contact modes are
+  solved exactly, in one coarse space with the slow modes. Either alone takes five to twenty times the iterations. M is Chebyshev's iteration of
   DEGREE with the blocks D on the diagonal, on the nodes without contact, where A is K. There D^-1 A has no eigenvalue above four, the nodes of a cell (Wathen, "Realistic eigenvalue
   bounds for the Galerkin mass matrix", 1987, whose argument holds for sums of any semi-definite matrices; those of terms at faces, c [P, -P; -P, P] with P = 1 - 1/3 (1, 1, 1) (1, 1, 1)^T
   for jumps and c [1, -1; -1, 1] for their mean, have three and two), so nothing is estimated, and nothing depends on the number of ranks or on what contact makes stiff. After a guess that makes Z^T r zero it stays so, and the right factor is 1, as in pc_coarse.c.

@@ -152,7 +152,7 @@ static PetscErrorCode PCSetUp_Pressure(PC pc)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One correction: z = K^-1 r to the accuracy that is wanted. */
+/* One correction: z = K^-1 r to the required accuracy. */
 static PetscErrorCode PCApply_Pressure(PC pc, Vec r, Vec z)
 {
   KSPConvergedReason reason;
