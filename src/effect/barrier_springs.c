@@ -52,16 +52,16 @@ static PetscErrorCode announce(SbEffect e, const SbSpace s, const SbContactOverl
   PetscFunctionBeginUser;
   for (int k = 0; k < 2; k++)
     name[k] = o->part[k] < s->mesh->nbody ? s->mesh->body[o->part[k]].name : "the obstacle";
-  PetscCheck(
-    o->n > 0, s->comm, PETSC_ERR_USER_INPUT,
-    "The effect %s: %s and %s are in each other at (%g, %g, %g) m, and no way leads out of it: %" PetscInt_FMT
-    " edges go through triangles; move one of them by -body_NAME_translate",
-    e->name, name[0], name[1], (double)o->place[0], (double)o->place[1], (double)o->place[2], o->ncrossing);
+  PetscCheck(o->n > 0, s->comm, PETSC_ERR_USER_INPUT,
+             "The effect %s: %s and %s overlap at (%g, %g, %g) m, and no separation direction was found: "
+             "%" PetscInt_FMT " edges intersect triangles; move one of them by -body_NAME_translate",
+             e->name, name[0], name[1], (double)o->place[0], (double)o->place[1], (double)o->place[2],
+             o->ncrossing);
   PetscCall(SbWarning(
     s->comm,
-    "The effect %s: %s and %s are in each other at (%g, %g, %g) m when the run begins; %" PetscInt_FMT
-    " points are up to %g m deep. They are parted (-effect_%s_separation_steps); until then they are not "
-    "kept from going through each other there",
+    "The effect %s: %s and %s overlap at (%g, %g, %g) m when the run begins; %" PetscInt_FMT
+    " points are up to %g m deep. They are separated gradually (-effect_%s_separation_steps); until then "
+    "they may pass through each other there",
     e->name, name[0], name[1], (double)o->place[0], (double)o->place[1], (double)o->place[2], o->n,
     (double)o->deepest, e->name));
   PetscFunctionReturn(PETSC_SUCCESS);

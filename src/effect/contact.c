@@ -182,8 +182,8 @@ static PetscErrorCode read_common(SbEffect e, const SbScope *scope, SbContactOpt
   PetscCall(SbOptionReal(scope, "friction_kinetic", &o->friction.mu_kinetic));
   if (o->friction.mu_kinetic < 0) o->friction.mu_kinetic = o->friction.mu;
   PetscCheck(o->friction.mu_kinetic <= o->friction.mu, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_friction_kinetic %g is above -effect_%s_friction %g: what slips would stop and "
-             "go at once",
+             "-effect_%s_friction_kinetic %g is above -effect_%s_friction %g: sliding would "
+             "start and stop in turn",
              e->name, (double)o->friction.mu_kinetic, e->name, (double)o->friction.mu);
   o->friction.exact = SbResponseIsExact(o->response);
   PetscCall(SbOptionChoice(scope, "time_of_impact", &choice));
@@ -197,8 +197,8 @@ static PetscErrorCode read_common(SbEffect e, const SbScope *scope, SbContactOpt
              "-effect_%s_restitution %g needs -effect_%s_response projected, multiplier or barrier", e->name,
              (double)o->restitution, e->name);
   PetscCheck(o->restitution <= 0 || !o->cut, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_restitution %g and -effect_%s_time_of_impact yes do not go together: what is let go "
-             "within a step never arrives at its end; leave one of them out",
+             "-effect_%s_restitution %g and -effect_%s_time_of_impact yes do not go together: a step "
+             "that ends at the impact has no rebound; leave one of them out",
              e->name, (double)o->restitution, e->name);
   PetscCall(SbOptionReal(scope, "separation_steps", &o->separation_steps));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -30,10 +30,9 @@ PetscErrorCode SbAdaptiveToleranceSetFromOptions(SbLedger l)
   PetscBool given, rtol[2];
 
   PetscFunctionBeginUser;
-  PetscCheck(
-    l->accuracy == 0. || l->budget == 0., PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-    "-accuracy %g and -step_time_budget %g s: what one of them sets the other would change; give one of them",
-    (double)l->accuracy, (double)l->budget);
+  PetscCheck(l->accuracy == 0. || l->budget == 0., PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-accuracy %g and -step_time_budget %g s both choose tolerances; give one of them",
+             (double)l->accuracy, (double)l->budget);
   PetscCheck(l->budget == 0. || l->run->model->dynamic, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-step_time_budget %g s is about time steps, and -time static has none: give -accuracy",
              (double)l->budget);

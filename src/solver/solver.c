@@ -651,7 +651,7 @@ static PetscErrorCode check_method(SbSpace s, KSP ksp, PC pc, const SbSolverPres
              "-pc_type cholesky or lu, or a -ksp_type that iterates (cg, minres, gmres)",
              strcmp(type, PCSHELL) ? "-pc_type" : "-solver", strcmp(type, PCSHELL) ? type : preset->name);
   PetscCheck(!SbConstraintsSeparate(s) || s->constraints->saddle == SB_SADDLE_DIRECT, s->comm, PETSC_ERR_USER,
-             "-ksp_type preonly does not hold the contact constraints, which stand beside the matrix: "
+             "-ksp_type preonly ignores the contact constraints, which are outside the matrix: "
              "choose -ksp_type cg or fgmres");
   PetscFunctionReturn(PETSC_SUCCESS);
 }

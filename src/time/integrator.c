@@ -446,7 +446,7 @@ static PetscErrorCode check_barrier(SbRun run)
              "both the same",
              name, m->begin_step[0]->name);
   PetscCheck(!run->solver_used->matrix_free && strcmp(run->solver, "pressure"), m->comm, PETSC_ERR_USER_INPUT,
-             "-solver %s has no matrix of everything, to which the effect %s could add: use -solver auto or "
+             "-solver %s has no complete matrix, to which the effect %s could add: use -solver auto or "
              "cg_two_level",
              run->solver, name);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -476,11 +476,10 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
                "-time newmark with the effect %s needs -time_newmark_beta 0.25 and -time_newmark_gamma 0.5, "
                "not %g and %g: else impacts may gain energy",
                m->begin_step[0]->name, (double)run->newmark[0], (double)run->newmark[1]);
-    PetscCheck(
-      !m->space->consistent_mass, m->comm, PETSC_ERR_USER_INPUT,
-      "-time newmark with the effect %s needs -mass lumped: velocities of what touches are put right "
-      "node by node",
-      m->begin_step[0]->name);
+    PetscCheck(!m->space->consistent_mass, m->comm, PETSC_ERR_USER_INPUT,
+               "-time newmark with the effect %s needs -mass lumped: velocities of contact are corrected "
+               "node by node",
+               m->begin_step[0]->name);
     for (PetscInt e = 0; e < m->nbegin_step; e++)
       PetscCheck(
         !m->begin_step[e]->springs, m->comm, PETSC_ERR_USER_INPUT,
@@ -498,7 +497,7 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
              m->ntime_of_impact ? m->time_of_impact[0]->name : name);
   PetscCheck(!run->solver_used->matrix_free && (strcmp(run->solver, "pressure") || !m->nassemble_constraints),
              m->comm, PETSC_ERR_USER_INPUT,
-             "-solver %s has no matrix of everything, in which the effect %s could hold nodes: use -solver "
+             "-solver %s has no complete matrix, in which the effect %s could constrain nodes: use -solver "
              "rotated or cg_two_level",
              run->solver, name);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -521,7 +520,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
     if (run->preset != SB_TIME_ALPHA2) PetscCall(SbSpaceCreateVec(m->space, &run->A));
   }
   PetscCheck(m->dynamic || !SbLiveCount(), m->comm, PETSC_ERR_USER_INPUT,
-             "-effect_<name>_... live: what is set while a run goes on needs a time, and -time static has "
+             "-effect_<name>_... live: interactive values need a time, and -time static has "
              "none: choose -time euler_implicit, newmark or genalpha");
   if (!m->dynamic) m->load = run->t0; /* a static run begins without loads and prescribed displacements */
   PetscCall(SbModelInitialState(m, run->U, run->V));
