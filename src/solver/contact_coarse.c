@@ -1,20 +1,20 @@
 /*
-  Two-level preconditioner for K + C, the tangent of bodies and the stiffness of their contact, which may be a million times larger.
+  Two-level preconditioner for K + C: the tangent of the bodies and the contact stiffness, which may be a million times larger.
 
       P^-1 = Q + (1 - Q A) M (1 - A Q),   Q = Z E^-1 Z^T,   E = Z^T A Z,   A = K + C
 
-  Z has the unknowns of the nodes in contact, and six rigid-body modes for each aggregate of the other nodes: stiff contact modes are
-  solved exactly, in one coarse space with the slow modes. Either alone takes five to twenty times the iterations. M is Chebyshev's iteration of
-  DEGREE with the blocks D on the diagonal, on the nodes without contact, where A is K. There D^-1 A has no eigenvalue above four, the nodes of a cell (Wathen, "Realistic eigenvalue
-  bounds for the Galerkin mass matrix", 1987, whose argument holds for sums of any semi-definite matrices; those of terms at faces, c [P, -P; -P, P] with P = 1 - 1/3 (1, 1, 1) (1, 1, 1)^T
-  for jumps and c [1, -1; -1, 1] for their mean, have three and two), so nothing is estimated, and nothing depends on the number of ranks or on what contact makes stiff. After a guess that makes Z^T r zero it stays so, and the right factor is 1, as in pc_coarse.c.
+  Z contains the unknowns of the nodes in contact, and six rigid-body modes for each aggregate of the other nodes: one coarse space holds the stiff contact
+  modes and the slow modes. A coarse space of only one kind takes five to twenty times the iterations. M is the Chebyshev iteration of degree
+  DEGREE with the block diagonal D of A, on the nodes without contact, where A is K. There the eigenvalues of D^-1 A are at most four, the number of nodes of a cell (Wathen, "Realistic eigenvalue
+  bounds for the Galerkin mass matrix", 1987, whose argument holds for sums of any semi-definite matrices; for the face terms, c [P, -P; -P, P] with P = 1 - 1/3 (1, 1, 1) (1, 1, 1)^T
+  for jumps and c [1, -1; -1, 1] for their mean, the bounds are three and two), so no eigenvalue is estimated, and M depends neither on the number of ranks nor on the contact stiffness. After an initial guess with Z^T r = 0 the residuals keep this property, and the factor 1 - A Q is left out, as in pc_coarse.c.
 
-  For P2 bodies aggregates are too coarse a space, and D^-1 A has eigenvalues above four near nu = 1/2. Up to VERTICES vertices of such bodies Z has, in the place of
-  aggregates, these: an edge node that is none of contact moves by the mean of its two vertices, if they are of its rank, and by itself if not. Around the correction stand
-  sweeps of Gauss-Seidel over all rows, as in pc_p_multigrid.c, each of half a product, and nothing is asked of the guess.
+  For P2 bodies aggregates are too coarse a space, and D^-1 A has eigenvalues above four near nu = 1/2. Bodies with up to VERTICES vertices have the vertices in Z instead of
+  aggregates: an edge node without contact moves by the mean of its two vertices if its rank owns them, otherwise it is in Z itself. Before and after the coarse correction a
+  Gauss-Seidel sweep over all rows smooths, as in pc_p_multigrid.c, at half the cost of a product with A; any initial guess is allowed.
 
-  E consists of 3x3 blocks: one row for a node of contact or a vertex, two for an aggregate, translation and rotation. One rank factors it (block_solver.c). Modes that vanish
-  on what is left of an aggregate get the mean diagonal, as in coarse_operator.c.
+  E consists of 3x3 blocks: one block row for a node in contact or a vertex, two for an aggregate, translation and rotation. One rank factors it (block_solver.c). Modes that vanish
+  on the nodes of an aggregate without contact get the mean diagonal, as in coarse_operator.c.
 */
 #include "coarse.h"
 #include "contact_coarse.h"
@@ -22,49 +22,49 @@
 #include "solver_impl.h"
 #include <petscblaslapack.h>
 
-#define NODES 60        /* of an aggregate */
-#define NODES_FACES 15  /* the same where nodes are at faces: a tet has two of them, not a fifth */
-#define AGGREGATES 1500 /* at most of these, unless they have NODES: one rank factors them */
-#define LARGEST 4.      /* eigenvalue of D^-1 A */
-#define RANGE 8.        /* eigenvalues that the smoother reduces, largest over smallest */
-#define DEGREE 2        /* of the smoother */
-#define IN_SPAN 1e-5    /* share of the residual in the span of Z that rounding may leave */
-#define VERTICES \
-  16000 /* of P2 bodies, up to which they are in Z: one rank factors E, and more were not measured */
-#define VANISHING 1e-8 /* squared size of a mode over that of the largest one of its aggregate */
+#define NODES 60        /* nodes per aggregate */
+#define NODES_FACES 15  /* the same for nodes at faces: two per tet, P1 has a fifth */
+#define AGGREGATES 1500 /* largest number of aggregates, unless each has NODES nodes: one rank factors E */
+#define LARGEST 4.      /* upper bound of the eigenvalues of D^-1 A */
+#define RANGE 8.        /* ratio of the largest to the smallest eigenvalue that the smoother reduces */
+#define DEGREE 2        /* degree of the smoother's polynomial */
+#define IN_SPAN 1e-5    /* relative size of the residual in the span of Z that counts as rounding */
+#define VERTICES 16000  /* largest number of P2 vertices in Z: larger systems were not measured */
+#define VANISHING 1e-8  /* squared size of a mode over that of the largest one of its aggregate */
 
-/* How a node moves with Z: in an aggregate; by itself; by the mean of two vertices. */
+/* Motion of a node by Z: as a member of an aggregate; by unknowns of its own; by the mean of two vertices. */
 typedef enum { MEMBER, ITSELF, MEAN } Way;
 
 typedef struct {
   SbSpace space;
   const SbContactRows *rows;
-  PetscInt *parent;     /* [nnode][2] of SbSpaceEdgeParents(); NULL: P2 is aggregated as the others */
-  uint8_t *vertex;      /* [nnode] the node is a vertex of a P2 body; likewise */
-  PetscInt nagg, *body; /* aggregates; [n] that of each own node, -1: fully prescribed */
-  PetscBool stale[2];   /* values, pattern */
+  PetscInt
+    *parent; /* [nnode][2] vertices of an edge node (SbSpaceEdgeParents()); NULL: P2 is aggregated, too */
+  uint8_t *vertex;      /* [nnode] the node is a vertex of a P2 body; NULL likewise */
+  PetscInt nagg, *body; /* number of aggregates; [n] aggregate of each own node, -1: fully prescribed */
+  PetscBool stale[2];   /* the values, the pattern are out of date */
   PetscBool ok;
-  /* of the pattern */
+  /* rows of the block matrix A: */
   PetscInt n, nghost, *ghost,
-    *column; /* own nodes; other nodes of the rows, global, ascending; [ia[n]] columns as own nodes or n + ghost */
+    *column; /* number of own nodes; number and [nghost] global numbers of the other nodes in the rows, ascending; [ia[n]] columns: own node or n + ghost */
   VecScatter scatter;
-  Vec local;            /* [nghost][3] */
-  PetscInt *unit;       /* [n+nghost][2] block rows of the node in E, global; -1: none. Two of a MEAN */
-  uint8_t *way;         /* [n+nghost] */
-  uint8_t *moved;       /* [n+nghost] of a MEAN: bits of the components moved by its two vertices */
-  PetscReal *d;         /* [n+nghost][3] position in its aggregate, in units of the radius */
-  PetscInt nrow, first; /* own block rows of E, number of the first one */
-  PetscInt *ia, *ja;    /* E */
-  PetscReal *value;     /* [ia[nrow]][9] */
-  int stride;           /* 4 with parents, else 1 */
-  PetscInt *slot;       /* [rows->ia[n]][stride] of a block, by vertices: place of its column in E's row */
+  Vec local;      /* [nghost][3] values at ghosts */
+  PetscInt *unit; /* [n+nghost][2] global block rows in E by which the node moves, -1: none; two for MEAN */
+  uint8_t *way;   /* [n+nghost] Way of each node */
+  uint8_t *moved; /* [n+nghost] for MEAN: bits of the components that move by the two vertices */
+  PetscReal *d;   /* [n+nghost][3] position relative to the centre of its aggregate, over its radius */
+  PetscInt nrow, first; /* number of own block rows of E, global number of the first one */
+  PetscInt *ia, *ja;    /* pattern of E */
+  PetscReal *value;     /* [ia[nrow]][9] blocks of E */
+  int stride;           /* places per block in slot: 4 with parents, else 1 */
+  PetscInt *slot;       /* [rows->ia[n]][stride] position in E's row of the block that a block of A adds to */
   PetscReal *null;      /* [nagg][36] projector onto the modes that vanish */
-  PetscInt *row_of;     /* [nagg] first own row in E, -1: no node is left */
-  PetscReal *weight;    /* [nrow] one over the nodes of the row's unit */
+  PetscInt *row_of;     /* [nagg] first own row in E, -1: it has no nodes without contact */
+  PetscReal *weight;    /* [nrow] 1 / number of nodes of the row's aggregate, vertex or node */
   SbBlockSolver solver;
-  PetscReal *inverse; /* [n][9] of the blocks on the diagonal; without parents zero at nodes of contact */
-  PetscReal *extra;   /* [n][3] of the sweeps */
-  PetscReal *c;       /* [nrow][3] */
+  PetscReal *inverse; /* [n][9] inverse diagonal blocks of A; without parents zero at nodes in contact */
+  PetscReal *extra;   /* [n][3] diagonal added in the sweeps (gauss_seidel.c) */
+  PetscReal *c;       /* [nrow][3] coarse vector */
   Vec p, s, t, w;
 } Contact;
 
@@ -84,7 +84,7 @@ static PetscErrorCode free_pattern(Contact *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Columns in local numbers, and the scatter of other ranks' nodes. */
+/* Finds the local numbers of the columns, and creates the scatter of ghost values. */
 static PetscErrorCode find_ghosts(Contact *p)
 {
   const SbContactRows *r = p->rows;
@@ -118,7 +118,7 @@ static PetscErrorCode find_ghosts(Contact *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* x[n+nghost][3]: the ghosts' from their owners. */
+/* Copies the ghosts' values x[n+nghost][3] from their owners. */
 static PetscErrorCode update_ghosts(Contact *p, PetscReal x[])
 {
   const PetscScalar *ghost;
@@ -136,7 +136,7 @@ static PetscErrorCode update_ghosts(Contact *p, PetscReal x[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How the own node moves with Z; one that is fully prescribed has no unit then. */
+/* Motion of an own node by Z; a fully prescribed node has no rows in E. */
 static Way way_of(const Contact *p, PetscInt i)
 {
   const PetscInt *v = p->parent ? p->parent + 2 * i : NULL;
@@ -146,7 +146,7 @@ static Way way_of(const Contact *p, PetscInt i)
   return v && p->vertex[i] ? ITSELF : MEMBER;
 }
 
-/* Rows of E for nodes of contact, vertices and aggregates; where nodes are in these, and which modes vanish. */
+/* Numbers the rows of E for nodes in contact, vertices and aggregates; finds the nodes' relative positions and the modes that vanish. */
 static PetscErrorCode find_units(Contact *p)
 {
   const SbSpace s = p->space;
@@ -159,7 +159,7 @@ static PetscErrorCode find_units(Contact *p)
   PetscCall(PetscCalloc2(36 * p->nagg, &p->null, p->nagg, &p->row_of));
   PetscCall(PetscCalloc2(4 * p->nagg, &centre, p->nagg, &count));
 
-  /* centre and radius of the remainder of each aggregate */
+  /* centre and radius of each aggregate without its nodes in contact */
   for (PetscInt i = 0; i < n; i++) {
     p->way[i] = (uint8_t)way_of(p, i);
     if (p->way[i] != MEMBER) continue;
@@ -177,7 +177,7 @@ static PetscErrorCode find_units(Contact *p)
     }
   }
 
-  /* rows */
+  /* block rows */
   p->nrow = 0;
   for (PetscInt i = 0; i < n; i++) {
     p->unit[2 * i] = p->unit[2 * i + 1] = -1;
@@ -241,7 +241,7 @@ static PetscErrorCode find_units(Contact *p)
   }
   PetscCall(PetscFree2(centre, count));
 
-  /* the same of ghosts */
+  /* block rows and Way of the ghosts */
   PetscCall(PetscMalloc1(3 * nall, &share));
   for (PetscInt i = 0; i < n; i++) {
     share[3 * i] = (PetscReal)p->unit[2 * i];
@@ -261,7 +261,7 @@ static PetscErrorCode find_units(Contact *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The pattern of E, and where blocks of A go in it. */
+/* The pattern of E, and the block of E to which each block of A contributes. */
 static PetscErrorCode find_pattern(Contact *p)
 {
   const SbContactRows *r = p->rows;
@@ -269,7 +269,7 @@ static PetscErrorCode find_pattern(Contact *p)
   const int stride = p->stride;
 
   PetscFunctionBeginUser;
-  /* places of own nodes in unit by the unit */
+  /* nodes by block row; each is listed for each of its rows */
   PetscCall(PetscCalloc1(p->nrow + 2, &start));
   PetscCall(PetscMalloc1(2 * p->n, &member));
   for (PetscInt m = 0; m < 2 * p->n; m++) {
@@ -288,7 +288,7 @@ static PetscErrorCode find_pattern(Contact *p)
   PetscCall(PetscMalloc2(highest - lowest, &mark, highest - lowest, &place));
   PetscCall(PetscMalloc2(p->nrow + 1, &p->ia, stride * (size_t)r->ia[p->n], &p->slot));
 
-  /* once to count, once to fill */
+  /* first pass: count; second pass: fill */
   for (int pass = 0; pass < 2; pass++) {
     for (PetscInt b = 0; b < highest - lowest; b++) mark[b] = -1;
     nz = 0;
@@ -318,7 +318,7 @@ static PetscErrorCode find_pattern(Contact *p)
         }
       }
       nz += length;
-      /* the second row of an aggregate, which has no members of its own in the list */
+      /* the rotation row of an aggregate shares the members of its translation row */
       if (start[u + 1] > start[u] && p->way[member[start[u]] / 2] == MEMBER) {
         p->ia[u + 1] = nz;
         for (PetscInt q = 0; q < length && pass; q++) p->ja[nz + q] = p->ja[nz - length + q];
@@ -337,7 +337,7 @@ static PetscErrorCode find_pattern(Contact *p)
 
 /* ------------------------------------------------------------------ set-up of the values */
 
-/* The inverse of a symmetric positive definite 3x3 block; false where it is none. */
+/* B = A^-1 of a symmetric positive definite 3x3 block; false if A is not positive definite. */
 static PetscBool invert(const PetscReal A[9], PetscReal B[9])
 {
   const PetscReal a = A[0], b = 0.5 * (A[1] + A[3]), c = 0.5 * (A[2] + A[6]), d = A[4],
@@ -364,7 +364,7 @@ static inline void add_block(const Contact *p, PetscInt i, PetscInt j, const Pet
     for (int e = 0; e < 9; e++) to[0][e] += A[e];
     return;
   }
-  /* columns: as they are, and their moments */
+  /* moments of the columns about the aggregate's centre */
   for (int q = 0; q < 3; q++) {
     const PetscReal *a = A + 3 * q;
 
@@ -386,7 +386,7 @@ static inline void add_block(const Contact *p, PetscInt i, PetscInt j, const Pet
   }
 }
 
-/* E, and the inverse blocks on the diagonal of A. */
+/* E, and the inverse diagonal blocks of A. */
 static PetscErrorCode set_values(Contact *p, PetscBool *ok)
 {
   const SbSpace s = p->space;
@@ -406,7 +406,7 @@ static PetscErrorCode set_values(Contact *p, PetscBool *ok)
           PetscCall(PetscArrayzero(p->inverse + 9 * i, 9));
         else if (!p->parent && !invert(A, p->inverse + 9 * i))
           *ok = PETSC_FALSE;
-        /* prescribed unknowns of others have only their diagonal, which is not in the span of Z */
+        /* rows of prescribed unknowns contain only their diagonal, which does not contribute to E */
         for (int e = 0; e < 9 && p->way[i] != ITSELF; e++) D[e] = s->fixed[i] & (1 << (e / 3)) ? 0. : A[e];
         if (p->way[i] != ITSELF) A = D;
       }
@@ -485,7 +485,7 @@ static PetscErrorCode PCSetUp_Contact(PC pc)
 
 /* ------------------------------------------------------------------ application */
 
-/* c = Z^T r; share: |c|, weighted so that it is |r| for an r of translations of aggregates, over |r|. */
+/* c = Z^T r; share: a weighted norm of c over |r|; the weights give |c| = |r| for r constant on each aggregate. */
 static PetscErrorCode restrict_to(Contact *p, Vec R, PetscReal *share)
 {
   PetscReal norm2[2] = {0., 0.};
@@ -544,7 +544,7 @@ static PetscErrorCode add_coarse(Contact *p, Vec Z)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* p = factor p + other D^-1 (r - t), z = z + p; t NULL: 0, and the first step. */
+/* One Chebyshev step: p = factor p + other D^-1 (r - t), z = z + p; t NULL: first step, z = 0. */
 static PetscErrorCode advance(Contact *p, PetscReal factor, PetscReal other, Vec R, Vec T, Vec Z)
 {
   const PetscScalar *r, *t = NULL;
@@ -661,7 +661,7 @@ PetscErrorCode SbPCContactCorrect(PC pc, Vec F, Vec X)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ life */
+/* ------------------------------------------------------------------ create and destroy */
 
 static PetscErrorCode PCDestroy_Contact(PC pc)
 {
@@ -716,7 +716,7 @@ PetscErrorCode SbPCContactCreate(SbSpace s, const SbContactRows *rows, PC pc)
   nodes = s->plan->face_term[0] ? PetscClipInterval(s->Nnode / AGGREGATES, NODES_FACES, NODES) : NODES;
   PetscCall(SbAggregate(s, (s->nnode_owned + nodes - 1) / nodes, &p->nagg, p->body));
 
-  /* the level of vertices below P2, while it is small */
+  /* P2: the vertices are the coarse space while there are few */
   if (s->edge_node) {
     PetscCall(SbSpaceEdgeParents(s, &p->parent));
     PetscCall(PetscCalloc1(s->nnode, &p->vertex));

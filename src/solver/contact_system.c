@@ -1,51 +1,51 @@
 /*
-  contact_system.c - linear systems of bodies that touch: the tangent and blocks between nodes that share no cell.
+  contact_system.c - linear systems of bodies in contact: the sparse tangent plus contact blocks, which couple nodes without a common cell.
 
-  Both are one matrix of 3x3 blocks, whose pattern grows where contact needs it; what contact has not used for KEEP solves is dropped when it grows
-  the next time. So most iterations bring values only: the factor's elimination and the coarse space stay.
+  Their sum is one matrix of 3x3 blocks, whose pattern grows as contact needs; blocks that contact has not used for KEEP solves are dropped at the next
+  growth. So most Newton iterations change values only, and the symbolic factorisation and the coarse space are reused.
 
-  Systems are solved by CG with the coarse space of contact_coarse.c, to a tolerance of FORCING in the norm of the preconditioner, or factored on one rank (block_solver.c). CG may take as many
-  iterations as cost what factorisations would: the operations of both eliminations are known before, the work of an iteration is that for the blocks of the matrix and of the coarse factor. What a solve
-  leaves of them, a later one may take. A system that needs more is factored, and so are those of the next PAUSE solves, twice as many each time that CG fails at once. So thin bodies are factored, those with much in contact,
-  and some near nu = 1/2. A matrix that is not
-  positive definite fails: in the factor, or by a direction of CG with negative curvature. With -pc_type or -contact_pc_type, PETSc's preconditioner of that name takes the place of
-  both; -ksp_type and -contact_ksp_type name another method than CG. What goes with -pc_type (-ksp_max_it, -sub_pc_type) counts here, too.
+  Systems are solved by CG with the coarse space of contact_coarse.c, to a tolerance of FORCING in the norm of the preconditioner, or factored on one rank (block_solver.c). The limit of CG's
+  iterations costs as much as the factorisation: the operations of both factorisations follow from the symbolic ones, the work of an iteration from the numbers of blocks of the matrix and of the coarse factor. Unused
+  iterations are credited to later solves. A system that needs more is factored, and so are those of the next PAUSE solves, twice as many each time that CG fails again at once. So thin bodies, those with much contact,
+  and some near nu = 1/2 are factored. A solve with a matrix that is not
+  positive definite fails: by a pivot of the factor, or by a direction of negative curvature in CG. With -pc_type or -contact_pc_type, PETSc's preconditioner of that name replaces
+  both; -ksp_type and -contact_ksp_type replace CG. Options that go with -pc_type (-ksp_max_it, -sub_pc_type) apply here, too.
 */
 #include "contact_coarse.h"
 #include "sblog.h"
 #include "sbsolver.h"
 
-#define KEEP 20      /* solves for which an entry without values stays in the pattern */
-#define SMALL 2000   /* unknowns that are factored, so that numbers are the same on any number of ranks */
-#define FORCING 1e-2 /* of the preconditioned residual */
-#define WORK 130     /* operations of a factorisation in the time of an iteration for a 3x3 block */
-#define SET_UP 4     /* iterations in the time that the coarse space takes besides its factor */
-#define SAVED 10     /* factor on the iterations that a factorisation costs */
-#define PAUSE 20     /* solves that are factored where CG was the slower one */
-#define LARGE 100000 /* unknowns above which the cost of a factorisation is not computed */
-#define MOST 300     /* iterations in any case */
-/* The same of the user's, which nothing replaces, and whose last errors are those of soft motions: a step looks short with them. */
+#define KEEP 20      /* solves after which an unused block is dropped from the pattern */
+#define SMALL 2000   /* unknowns up to which all is factored: same numbers on any number of ranks */
+#define FORCING 1e-2 /* relative tolerance of CG, norm of the preconditioned residual */
+#define WORK 130     /* operations of a factorisation in the time that an iteration takes for one 3x3 block */
+#define SET_UP 4     /* set-up time of the coarse space without its factor, in iterations */
+#define SAVED 10     /* largest credit of iterations, over those that cost as much as a factorisation */
+#define PAUSE 20     /* solves that are factored after CG was slower */
+#define LARGE 100000 /* number of unknowns above which the cost of a factorisation is not computed */
+#define MOST 300     /* limit of iterations in any case */
+/* Relative tolerance with a preconditioner of the user: no factorisation follows, and its errors are in soft modes, which make a step look short. */
 #define FORCING_USER 1e-4
 #define MOST_USER 5000
 
 struct _p_SbContactSystem {
   SbSpace space;
-  PetscInt choice; /* 0 by cost, 1 factored, 2 by iterations */
+  PetscInt choice; /* 0 by cost, 1 factorisation, 2 CG */
   SbContactRows rows;
-  PetscInt *all;     /* [nnode_owned] their numbers */
-  PetscInt *ka, *kj; /* of the tangent: [n+1], [ka[n]] global nodes */
-  PetscInt *place;   /* [ka[n]] of its blocks in the rows */
-  PetscInt *used;    /* [rows.ia[n]] solve in which contact used the place last; -1: the tangent's */
-  PetscInt *last;    /* [n] solve in which contact used the row last, -1: never */
-  PetscInt *where;   /* [Nnode] place of a column in the row that was marked last */
+  PetscInt *all;     /* [nnode_owned] 0, 1, 2, ... */
+  PetscInt *ka, *kj; /* pattern of the tangent: [n+1]; [ka[n]] global nodes */
+  PetscInt *place;   /* [ka[n]] position of the tangent's blocks in rows.value */
+  PetscInt *used;    /* [rows.ia[n]] last solve in which contact used the block; -1: a block of the tangent */
+  PetscInt *last;    /* [n] last solve in which contact used the row, -1: never */
+  PetscInt *where;   /* [Nnode] position of each column in the row of the last mark_row() */
   PetscInt nsolve;
-  PetscInt limit, most;      /* iterations by options, and in the time of a factorisation */
-  PetscInt budget;           /* iterations that solves have not taken, and may */
-  PetscInt resume, pause;    /* solve from which CG is tried again; solves between */
-  PetscReal *tangent;        /* [ka[n]][9] */
-  PetscBool fresh[2];        /* matrix and factor do not have the values yet */
-  PetscBool foreign[2];      /* pattern is other than theirs */
-  char method[32], type[32]; /* of the user's */
+  PetscInt limit, most;      /* limits of CG's iterations: by options; by the cost of a factorisation */
+  PetscInt budget;           /* credit of iterations */
+  PetscInt resume, pause;    /* number of the solve in which CG is tried again; solves until then */
+  PetscReal *tangent;        /* [ka[n]][9] blocks of the tangent */
+  PetscBool fresh[2];        /* matrix, factor: lack the current values */
+  PetscBool foreign[2];      /* matrix, factor: have an old pattern */
+  char method[32], type[32]; /* the user's Krylov method and preconditioner, "": none */
   SbBlockSolver factor;
   KSP ksp;
   Mat A;
@@ -70,7 +70,7 @@ PetscErrorCode SbBlocksFree(SbBlocks *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The user's method, unless NULL, and preconditioner, where there are any; both have room for 32 characters. */
+/* The user's Krylov method, unless NULL, and preconditioner, "" if not set; room for 32 characters each. */
 static PetscErrorCode user_types(char method[], char type[])
 {
   static const char *const options[] = {"-ksp_type", "-contact_ksp_type", "-pc_type", "-contact_pc_type"};
@@ -107,7 +107,7 @@ PetscErrorCode SbContactSystemCreate(SbSpace s, PetscInt choice, SbContactSystem
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the user wants it factored. */
+/* Whether the system is factored by the user's choice. */
 static PetscBool is_factored(PetscInt choice, const char type[])
 {
   return (PetscBool)(type[0] ? !strcmp(type, PCCHOLESKY) || !strcmp(type, PCLU) : choice == 1);
@@ -131,13 +131,13 @@ PetscErrorCode SbContactSystemDescribe(PetscInt choice, char text[], size_t size
 
 /* ------------------------------------------------------------------ the matrix */
 
-/* Notes where the columns of row r are, for place_of(). */
+/* Stores the positions of the columns of row r for place_of(). */
 static inline void mark_row(SbContactSystem c, PetscInt r)
 {
   for (PetscInt k = c->rows.ia[r]; k < c->rows.ia[r + 1]; k++) c->where[c->rows.ja[k]] = k;
 }
 
-/* The place of column g in row r, which was marked last; -1: none. */
+/* Position of column g in row r, the row of the last mark_row(); -1: none. */
 static inline PetscInt place_of(SbContactSystem c, PetscInt r, PetscInt g)
 {
   const PetscInt k = c->where[g];
@@ -145,7 +145,7 @@ static inline PetscInt place_of(SbContactSystem c, PetscInt r, PetscInt g)
   return k >= c->rows.ia[r] && k < c->rows.ia[r + 1] && c->rows.ja[k] == g ? k : -1;
 }
 
-/* A pattern with room for the blocks; nodes of contact are marked. */
+/* Creates a pattern that contains the blocks, and marks nodes in contact. */
 static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
 {
   const PetscInt n = c->rows.n;
@@ -153,7 +153,7 @@ static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
   const SbContactRows old = c->rows;
 
   PetscFunctionBeginUser;
-  /* blocks by rows */
+  /* contact blocks by rows */
   PetscCall(PetscCalloc1(n + 2, &first));
   PetscCall(PetscMalloc1(b->n, &order));
   for (PetscInt k = 0; k < b->n; k++) first[b->node[k][0] + 2]++;
@@ -162,7 +162,7 @@ static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
   for (PetscInt r = 0; r < n; r++)
     most = PetscMax(most, c->ka[r + 1] - c->ka[r] + first[r + 1] - first[r] + old.ia[r + 1] - old.ia[r]);
 
-  /* each row: columns of the tangent, of the old pattern as far as they are used, of the blocks */
+  /* each row: columns of the tangent, those of the old pattern that are still in use, those of the contact blocks */
   PetscCall(PetscMalloc2(most, &column, most, &stamp));
   PetscCall(PetscMalloc1(n + 1, &ia));
   PetscCall(PetscMalloc2(c->ka[n] + b->n + old.ia[n], &ja, c->ka[n] + b->n + old.ia[n], &used));
@@ -212,7 +212,7 @@ static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Places of the blocks, place[n]; false: some have none yet. */
+/* Positions of the blocks, place[n]; false if the pattern lacks some. */
 static PetscBool find_places(SbContactSystem c, const SbBlocks *b, PetscInt place[])
 {
   PetscBool all = PETSC_TRUE;
@@ -225,7 +225,7 @@ static PetscBool find_places(SbContactSystem c, const SbBlocks *b, PetscInt plac
   return all;
 }
 
-/* The values of both. */
+/* Sums the tangent and the contact blocks into rows.value. */
 static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
 {
   SbContactRows *rows = &c->rows;
@@ -249,7 +249,7 @@ static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
     c->foreign[0] = c->foreign[1] = PETSC_TRUE;
   }
   PetscCall(SbSpaceGetRows(c->space, K, rows->n, c->all, c->ka, NULL, c->tangent));
-  /* blocks of the tangent are set, those of contact alone begin at zero */
+  /* blocks of the tangent are overwritten, those of contact alone start from zero */
   for (PetscInt k = 0; k < rows->ia[rows->n]; k++) {
     if (c->used[k] >= 0) PetscCall(PetscArrayzero(rows->value + 9 * (size_t)k, 9));
   }
@@ -267,7 +267,7 @@ static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Values of the rows in the parts of the matrix, whose blocks are stored by columns; SBAIJ has those on and above the diagonal. */
+/* Copies the rows into the parts of PETSc's matrix, which stores blocks column-major; SBAIJ only those on and above the diagonal. */
 static PetscErrorCode fill_matrix(SbContactSystem c)
 {
   const SbContactRows *rows = &c->rows;
@@ -288,7 +288,7 @@ static PetscErrorCode fill_matrix(SbContactSystem c)
     }
   }
   PetscCall(SbMatRestoreBlocks(&b));
-  /* its assembly is that of its parts, too: they count as changed */
+  /* assembles the sequential parts as well: their state increases */
   PetscCall(MatAssemblyBegin(c->A, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(c->A, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -296,7 +296,7 @@ static PetscErrorCode fill_matrix(SbContactSystem c)
 
 /* ------------------------------------------------------------------ solutions */
 
-/* PETSc's matrix, and CG or the user's method. */
+/* Creates PETSc's matrix, and CG or the user's method. */
 static PetscErrorCode set_up_iteration(SbContactSystem c)
 {
   const SbSpace s = c->space;
@@ -323,7 +323,7 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
   PetscCall(fill_matrix(c));
   if (!c->ksp) {
     PetscCall(KSPCreate(s->comm, &c->ksp));
-    /* options of -pc_type, by its row in solver.c and the user, have no prefix in the database */
+    /* options for -pc_type, from its preset in solver.c and the user, have no prefix in the database */
     PetscCall(PetscOptionsHasName(NULL, "contact_", "-pc_type", &apart));
     if (own || apart) PetscCall(KSPSetOptionsPrefix(c->ksp, "contact_"));
     PetscCall(
@@ -339,7 +339,7 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
     PetscCall(KSPGetTolerances(c->ksp, NULL, NULL, NULL, &c->limit));
   }
   P = c->A;
-  if (!own) { /* the type that most of PETSc's preconditioners support */
+  if (!own) { /* most preconditioners take AIJ */
     PetscCall(MatConvert(c->A, MATAIJ, MAT_INITIAL_MATRIX, &P));
     PetscCall(MatSetOption(P, MAT_SYMMETRIC, PETSC_TRUE));
   }
@@ -351,7 +351,7 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Iterations that cost as much as the factorisation. */
+/* Finds the number of iterations that cost as much as the factorisation. */
 static PetscErrorCode find_most(SbContactSystem c, PC pc)
 {
   const SbContactRows *rows = &c->rows;
@@ -360,7 +360,7 @@ static PetscErrorCode find_most(SbContactSystem c, PC pc)
   PetscFunctionBeginUser;
   c->most = c->limit;
   if (c->choice || 3 * c->space->Nnode > LARGE) PetscFunctionReturn(PETSC_SUCCESS);
-  /* a pattern with a little more contact costs as much as the one that was examined last */
+  /* a pattern with little more contact costs as much as the one examined last */
   if (!c->factor) {
     PetscCall(SbBlockSolverCreate(c->space->comm, &c->factor));
     PetscCall(SbBlockSolverAnalyze(c->factor, rows->n, rows->ia, rows->ja));
@@ -385,7 +385,7 @@ static PetscErrorCode iterate(SbContactSystem c, Vec F, Vec Y, KSPConvergedReaso
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   if (c->fresh[0]) PetscCall(set_up_iteration(c));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
-  /* PETSc's own events count these */
+  /* PETSc's log events count these */
   PetscCall(KSPSetUp(c->ksp));
   if (!c->type[0]) {
     PetscCall(KSPGetPC(c->ksp, &pc));
@@ -438,7 +438,7 @@ PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *bl
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   if (fresh || !c->rows.value) PetscCall(merge(c, K, blocks));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
-  /* use an existing factor */
+  /* CG only where a factor of these values does not exist and would cost more */
   factored = (PetscBool)(is_factored(c->choice, c->type) ||
                          (!c->type[0] && !c->choice &&
                           (3 * c->space->Nnode <= SMALL || c->nsolve < c->resume || !c->fresh[1])));

@@ -1,57 +1,58 @@
 /*
   Multifrontal Cholesky factorisation of a matrix of 3x3 blocks (Duff and Reid 1983; Liu, "The multifrontal method for
-  sparse matrix solution", 1992), and solves that read as few bytes as possible.
+  sparse matrix solution", 1992), with triangular solves that read as little memory as possible.
 
   Each supernode, a group of columns with one pattern (factor_order.c), has a dense front: its entries of A and the updates of its children. LAPACK factors
-  the leading block, BLAS forms the update for the parent. Nodes may be kept, that is, not eliminated: the updates (contribution blocks) of the roots add up to the Schur complement on them. In exact mode L is stored in double precision.
+  the leading block, BLAS forms the update for the parent. Some nodes may be kept, that is, not eliminated: the updates (contribution blocks) of the roots sum to the Schur complement on them. An exact factor has L in double precision.
 
-  A solve touches every entry of L twice and does little with it: it is as fast as the memory. Entries are therefore
-  kept as 16-bit integers times a scale per column: the rounding, 1.5e-5 of the largest entry of a column, does not change
+  A solve reads every entry of L twice, and memory bandwidth limits its speed. Entries are therefore
+  stored as 16-bit integers times a scale per column: the rounding, 1.5e-5 of the largest entry of a column, does not change
   the iterations of a preconditioned solver, and 2 bytes instead of 8 per entry make it three to four times faster. Two
-  entries share a 32-bit word, so that reading them takes little more than a conversion: shifted up, the word is the
-  lower one; as it is, it is the upper one, the lower one being a fraction that was taken into account in rounding.
-  Columns of a supernode are cut into panels of at most PANEL nodes, whose diagonal block is stored inverted; the rows below lie
-  in blocks of ROWS, each [column][row], so that both passes read memory in order.
+  entries share a 32-bit word; quantized.h describes the format.
+  The columns of a supernode are divided into panels of at most PANEL nodes, whose diagonal block is stored inverted; the rows below lie
+  in blocks of ROWS, each [column][row], so that both substitutions read memory in order.
 
-  Not handled: indefinite matrices (reported), refinement.
+  Not handled: indefinite matrices (ok = PETSC_FALSE), iterative refinement.
 */
 #include "factor.h"
 #include "quantized.h"
 #include <petscblaslapack.h>
 
 typedef struct {
-  PetscInt first, ncol; /* first position, nodes across */
-  PetscInt group;       /* its supernode */
-  PetscInt nrow;        /* nodes below */
-  const PetscInt *row;  /* [nrow] their positions, borrowed from the elimination */
-  size_t offset;        /* of the inverted diagonal block in word[]; the rows below follow it */
+  PetscInt first, ncol; /* first position; number of nodes in the panel */
+  PetscInt group;       /* supernode of the panel */
+  PetscInt nrow;        /* number of nodes in the rows below */
+  const PetscInt *row;  /* [nrow] positions of these, borrowed from the elimination */
+  size_t offset;        /* position of the inverted diagonal block in word[]; the rows below follow it */
 } Panel;
 
 struct _p_SbFactor {
   SbElimination e;
-  PetscInt npanel, widest, tallest; /* unknowns in the widest and the tallest front */
+  PetscInt npanel, widest,
+    tallest; /* number of panels; unknowns in the widest panel and in the largest front */
   Panel *panel;
   size_t nword;
-  int32_t *word; /* [nword] */
-  float *scale;  /* [3 nfree][2] of each column, in the diagonal block and below */
+  int32_t *word; /* [nword] stored entries */
+  float *scale;  /* [3 nfree][2] scale of each column in the diagonal block and below */
   float *w;      /* [3 n] right-hand side and solution in order of elimination */
-  float *below;  /* [tallest] rows below a panel */
-  /* in double precision, in place of the panels */
-  size_t *column;     /* [nsuper+1] where the columns of a supernode are in L; NULL: L is in panels */
-  PetscScalar *L, *y; /* their fronts, column-major; [3 n + tallest] solution, rows below a supernode */
+  float *below;  /* [tallest] values in the rows below a panel */
+  /* an exact factor, in place of the panels */
+  size_t *column; /* [nsuper+1] position in L of a supernode's columns; NULL: L is stored in panels */
+  PetscScalar *L,
+    *y; /* factored fronts, column-major; [3 n + tallest] solution, then rows below a supernode */
 };
 
-/* The panels of all supernodes, and where each one is stored. */
+/* Divides all supernodes into panels, and finds their positions in storage. */
 static PetscErrorCode cut_panels(SbFactor f)
 {
   const SbElimination *e = &f->e;
 
   PetscFunctionBeginUser;
-  // how many: a supernode is cut evenly into panels of at most PANEL nodes
+  // number of panels: a supernode is divided evenly into panels of at most PANEL nodes
   for (PetscInt g = 0; g < e->nsuper; g++) f->npanel += (e->first[g + 1] - e->first[g] + PANEL - 1) / PANEL;
   PetscCall(PetscMalloc1(f->npanel, &f->panel));
   f->npanel = 0;
-  // each panel's nodes, the rows below it, and its part of the stored words
+  // each panel's nodes, rows below and position of its words
   for (PetscInt g = 0; g < e->nsuper; g++) {
     const PetscInt ncol = e->first[g + 1] - e->first[g], nall = e->start[g + 1] - e->start[g];
     const PetscInt npart = (ncol + PANEL - 1) / PANEL;
@@ -81,7 +82,7 @@ PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], c
   PetscCall(PetscNew(&f));
   PetscCall(SbEliminationCreate(n, nkeep, ia, ja, NULL, &f->e));
   PetscCall(cut_panels(f));
-  // storage of the panels, which reading may run ahead of, and of a solve
+  // storage of the panels, with room for reads beyond the end, and work arrays of a solve
   PetscCall(allocate_pages(sizeof(*f->word) * (f->nword + 4096), &f->word));
   PetscCall(allocate_pages(sizeof(float) * 6 * (size_t)f->e.nfree, &f->scale));
   PetscCall(allocate_pages(sizeof(float) * (3 * (size_t)n + WIDTH), &f->w));
@@ -101,7 +102,7 @@ PetscErrorCode SbFactorCreateExact(PetscInt n, const PetscInt ia[], const PetscI
   PetscCall(PetscNew(&f));
   PetscCall(SbEliminationCreate(n, 0, ia, ja, order, &f->e));
   e = &f->e;
-  // the columns of the supernodes follow each other
+  // positions of the supernodes' columns in L
   PetscCall(PetscMalloc1(e->nsuper + 1, &f->column));
   f->column[0] = 0;
   for (PetscInt g = 0; g < e->nsuper; g++) {
@@ -156,7 +157,7 @@ PetscReal SbFactorFlops(SbFactor f)
   const SbElimination *e = &f->e;
   PetscReal sum = 0.;
 
-  // n columns with m rows below: the leading block, those rows, the update
+  // entries in n columns with m rows below; operations for the leading block, the rows below, the update
   for (PetscInt g = 0; g < e->nsuper; g++) {
     const PetscReal n = 3. * (PetscReal)(e->first[g + 1] - e->first[g]);
     const PetscReal m = 3. * (PetscReal)(e->start[g + 1] - e->start[g]) - n;
@@ -170,13 +171,13 @@ PetscReal SbFactorFlops(SbFactor f)
 
 /* Work space of a factorisation. */
 typedef struct {
-  PetscInt *position;        /* [n] index in the current front of a position */
+  PetscInt *position;        /* [n] index of a position in the current front */
   PetscScalar *front;        /* [tallest^2] column-major, lower triangle */
-  PetscScalar **update;      /* [nsuper] of each supernode for its parent; NULL when taken */
+  PetscScalar **update;      /* [nsuper] update of each supernode for its parent; NULL: none, or used */
   PetscInt *child, *sibling; /* [nsuper] lists of children in the assembly tree */
 } Work;
 
-/* Extend-add: the update of a supernode joins a lower triangle; at[k] is the node index there of its k-th row. */
+/* Extend-add of a supernode's update to a lower triangle; at[k]: node index there of its k-th row. */
 static void add_update(const PetscScalar *update, PetscInt nrow, const PetscInt at[], PetscScalar *to,
                        PetscInt ld)
 {
@@ -206,7 +207,7 @@ static PetscErrorCode factor_front(PetscScalar *front, PetscInt size, PetscInt n
   PetscCall(PetscBLASIntCast(ncol, &n));
   PetscCall(PetscBLASIntCast(size - ncol, &m));
   PetscCall(PetscBLASIntCast(size, &ld));
-  // leading block = L L^T; a pivot that is not positive ends the factorisation
+  // leading block = L L^T; stop at a non-positive pivot
   PetscCallBLAS("LAPACKpotrf", LAPACKpotrf_("L", &n, front, &ld, &info));
   *ok = (PetscBool)(info == 0);
   if (info || !m) PetscFunctionReturn(PETSC_SUCCESS);
@@ -229,7 +230,7 @@ static PetscErrorCode eliminate(SbFactor f, PetscInt g, const PetscInt ia[], con
   const PetscInt *list = e->list + e->start[g], nrow = nall - ncol;
 
   PetscFunctionBeginUser;
-  // the front begins with the entries of A in the columns of the supernode
+  // start the front from the entries of A in the columns of the supernode
   for (PetscInt k = 0; k < nall; k++) work->position[list[k]] = k;
   for (size_t j = 0, n = 3 * (size_t)nall; j < n; j++)
     PetscCall(PetscArrayzero(work->front + n * j + j / 3 * 3, n - j / 3 * 3));
@@ -248,7 +249,7 @@ static PetscErrorCode eliminate(SbFactor f, PetscInt g, const PetscInt ia[], con
       }
     }
   }
-  // the updates of the children join it and are freed
+  // add the updates of the children and free them
   for (PetscInt c = work->child[g]; c >= 0; c = work->sibling[c]) {
     const PetscInt below = e->start[c] + e->first[c + 1] - e->first[c], n = e->start[c + 1] - below;
     PetscInt *at;
@@ -259,7 +260,7 @@ static PetscErrorCode eliminate(SbFactor f, PetscInt g, const PetscInt ia[], con
     PetscCall(PetscFree(at));
     PetscCall(PetscFree(work->update[c]));
   }
-  // the columns of the supernode are factored; what is left is the update for its parent
+  // factor the columns of the supernode; the update is for its parent
   if (nrow) PetscCall(PetscMalloc1(9 * (size_t)nrow * (size_t)nrow, &work->update[g]));
   PetscCall(factor_front(work->front, 3 * nall, 3 * ncol, work->update[g], ok));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -273,7 +274,7 @@ PetscErrorCode SbFactorNumeric(SbFactor f, const PetscInt ia[], const PetscInt j
   Work work;
 
   PetscFunctionBeginUser;
-  // room for the largest front, and the lists of children
+  // storage for the largest front, and lists of children
   PetscCall(PetscMalloc2(e->n, &work.position, (size_t)f->tallest * (size_t)f->tallest, &work.front));
   PetscCall(PetscMalloc2(e->nsuper, &work.child, e->nsuper, &work.sibling));
   PetscCall(PetscCalloc1(e->nsuper, &work.update));
@@ -283,7 +284,7 @@ PetscErrorCode SbFactorNumeric(SbFactor f, const PetscInt ia[], const PetscInt j
   for (PetscInt g = 0; g < e->nsuper && *ok; g++) {
     PetscCall(eliminate(f, g, ia, ja, block, &work, ok));
     if (!*ok) break;
-    // its factored columns are kept, or rounded into its panels: diagonal blocks inverted, rows below as they are
+    // store the factored columns, or round them into panels: diagonal blocks inverted, rows below unchanged
     if (f->column) PetscCall(PetscArraycpy(f->L + f->column[g], work.front, f->column[g + 1] - f->column[g]));
     for (; q < f->npanel && f->panel[q].group == g; q++) {
       const Panel *p = &f->panel[q];
@@ -305,7 +306,7 @@ PetscErrorCode SbFactorNumeric(SbFactor f, const PetscInt ia[], const PetscInt j
         scale[2 * j + 1] = store_column(3 * (size_t)p->nrow, 0, L + m + j * ld, m, j, below);
       }
     }
-    // its update waits for the parent; one that reaches kept nodes only belongs to the Schur complement
+    // keep its update for the parent; without a parent it has kept nodes only and is added to the Schur complement
     if (e->parent[g] >= 0) {
       work.sibling[g] = work.child[e->parent[g]];
       work.child[e->parent[g]] = g;
@@ -320,7 +321,7 @@ PetscErrorCode SbFactorNumeric(SbFactor f, const PetscInt ia[], const PetscInt j
       PetscCall(PetscFree(work.update[g]));
     }
   }
-  // after a failure updates are left that no parent took
+  // after a failure: free the updates that no parent has used
   for (PetscInt g = 0; g < e->nsuper; g++) PetscCall(PetscFree(work.update[g]));
   PetscCall(PetscFree2(work.position, work.front));
   PetscCall(PetscFree2(work.child, work.sibling));
@@ -343,7 +344,7 @@ SB_KERNEL static void forward(SbFactor f)
     // the unknowns of the panel: inverse of its diagonal block times their right-hand side
     const int32_t *a = panel_multiply(round_up(ncol), ncol, f->word + p->offset, x, scale, pivot);
 
-    // and leave the rows below without their part
+    // subtract their contribution from the rows below
     for (PetscInt j = 0; j < ncol; j++) x[j] = pivot[j];
     panel_multiply(round_up(3 * p->nrow), ncol, a, pivot, scale + 1, below);
     for (PetscInt k = 0; k < p->nrow; k++) {
@@ -369,7 +370,7 @@ SB_KERNEL static void backward(SbFactor f)
     const int32_t *a = f->word + p->offset;
     float *x = w + 3 * p->first;
 
-    // what the solution in the rows below takes from the right-hand side of the panel
+    // contribution of the solution in the rows below to the right-hand side of the panel
     for (PetscInt k = 0; k < p->nrow; k++) {
       const float *from = w + 3 * p->row[k];
 
@@ -379,7 +380,7 @@ SB_KERNEL static void backward(SbFactor f)
     }
     for (size_t k = 3 * (size_t)p->nrow; k < height; k++) below[k] = 0.f;
     panel_transposed(height, ncol, a + (size_t)ncol * square / 2, below, scale + 1, pivot);
-    // the unknowns of the panel: transposed inverse times the remainder
+    // the unknowns of the panel: transposed inverse times the difference
     for (PetscInt j = 0; j < ncol; j++) pivot[j] = x[j] - pivot[j];
     for (size_t j = (size_t)ncol; j < square; j++) pivot[j] = 0.f;
     panel_transposed(square, ncol, a, pivot, scale, x);
@@ -390,7 +391,7 @@ void SbFactorForward(SbFactor f, const float b[], float kept[])
 {
   const SbElimination *e = &f->e;
 
-  // into the order of elimination; returns the right-hand side at the kept nodes
+  // copy into the order of elimination; at the end return the right-hand side of the kept nodes
   for (PetscInt i = 0; i < e->n; i++) {
     for (PetscInt c = 0; c < 3; c++) f->w[3 * i + c] = b[3 * e->order[i] + c];
   }
@@ -402,7 +403,7 @@ void SbFactorBackward(SbFactor f, const float kept[], float x[])
 {
   const SbElimination *e = &f->e;
 
-  // from the values at the kept nodes back to all others, and into the order of the caller
+  // from the values at the kept nodes to all others, then into the order of the caller
   for (PetscInt i = 3 * e->nfree; i < 3 * e->n; i++) f->w[i] = kept[i - 3 * e->nfree];
   backward(f);
   for (PetscInt i = 0; i < e->n; i++) {
@@ -418,7 +419,7 @@ PetscErrorCode SbFactorSolve(SbFactor f, const PetscReal b[], PetscReal x[])
   PetscScalar *y = f->y, *below = f->y + 3 * e->n;
 
   PetscFunctionBeginUser;
-  // into the order of elimination
+  // copy into the order of elimination
   for (PetscInt i = 0; i < 3 * e->n; i++) y[i] = b[3 * e->order[i / 3] + i % 3];
   // L y = b from the first supernode to the last, then L^T x = y from the last to the first
   for (PetscInt step = 0; step < 2 * e->nsuper; step++) {
@@ -447,7 +448,7 @@ PetscErrorCode SbFactorSolve(SbFactor f, const PetscReal b[], PetscReal x[])
       for (PetscInt k = 0; k < m; k++) y[3 * row[ncol + k / 3] + k % 3] -= below[k];
     }
   }
-  // back into the order of the caller
+  // copy back into the order of the caller
   for (PetscInt i = 0; i < 3 * e->n; i++) x[3 * e->order[i / 3] + i % 3] = y[i];
   PetscFunctionReturn(PETSC_SUCCESS);
 }

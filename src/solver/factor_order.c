@@ -2,17 +2,17 @@
   Order of elimination and structure of the factor, on nodes (3x3 blocks) throughout.
 
   1. Nested dissection of the graph by METIS.
-  2. Elimination tree (Liu, "The role of elimination trees in sparse factorization", 1990, algorithm 4.2), made postordered:
-     children come right before their parent, so that updates live on a stack.
+  2. Elimination tree (Liu, "The role of elimination trees in sparse factorization", 1990, algorithm 4.2), in postorder:
+     children come before their parent.
   3. Structure of column j: its own entries and those of its children's structures, below j. A column whose structure is
-     that of the previous column less itself continues that one's group (a supernode).
-  4. Groups are merged with their parent while the explicit zeros that this brings stay few: dense kernels on wider panels
+     that of the previous column without itself joins its group (a supernode).
+  4. Groups are merged with their parent while this adds few explicit zeros: dense kernels on wider panels
      outweigh them. The limits are those of CHOLMOD (Chen, Davis, Hager, Rajamanickam 2008), in nodes.
 */
 #include <metis.h>
 #include "factor.h"
 
-/* A group of columns may hold this share of zeros when it has at most this many nodes. */
+/* Largest fraction of explicit zeros in a group of columns, by its number of nodes. */
 static const struct {
   PetscInt nodes;
   PetscReal share;
@@ -40,7 +40,7 @@ static PetscErrorCode dissect(PetscInt n, const PetscInt ia[], const PetscInt ja
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* parent[] of the elimination tree of the free nodes, by positions; ancestor[] is work space. */
+/* Finds parent[] of the elimination tree of the free nodes, by positions; ancestor[] is work space. */
 static void elimination_tree(const SbElimination *e, const PetscInt ia[], const PetscInt ja[],
                              PetscInt parent[], PetscInt ancestor[])
 {
@@ -62,7 +62,7 @@ static void elimination_tree(const SbElimination *e, const PetscInt ia[], const 
   }
 }
 
-/* Renumbers the positions so that every subtree is consecutive and ends with its root. parent[] follows. */
+/* Renumbers the positions and parent[] in postorder: every subtree is consecutive and ends with its root. */
 static PetscErrorCode postorder(SbElimination *e, PetscInt parent[])
 {
   const PetscInt n = e->nfree;
@@ -78,7 +78,7 @@ static PetscErrorCode postorder(SbElimination *e, PetscInt parent[])
     next[j] = head[p];
     head[p] = j;
   }
-  // depth first: a number for each node after its children
+  // depth-first search: a node is numbered after its children
   stack[0] = n;
   for (top = 0; top >= 0;) {
     const PetscInt j = stack[top], child = head[j];
@@ -91,7 +91,7 @@ static PetscErrorCode postorder(SbElimination *e, PetscInt parent[])
       top--;
     }
   }
-  // order, parents and inverse by the new numbers
+  // order, parents and inverse in the new numbers
   for (PetscInt j = 0; j < n; j++) {
     old[j] = e->order[j];
     next[j] = parent[j];
@@ -105,11 +105,11 @@ static PetscErrorCode postorder(SbElimination *e, PetscInt parent[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One group of columns while groups are being found: a stack of these, the last one being open. */
+/* A group of columns under construction, on a stack with the open group last. */
 typedef struct {
-  PetscInt first, ncol, nrow; /* first column, columns, rows below them */
+  PetscInt first, ncol, nrow; /* first column, number of columns, number of rows below them */
   PetscInt *row;              /* [nrow] positions, ascending; owned */
-  PetscReal zeros;            /* blocks of the lower triangle that are zero */
+  PetscReal zeros;            /* number of zero blocks in the lower triangle */
 } Group;
 
 static PetscReal blocks_of(PetscInt ncol, PetscInt nrow)
@@ -117,7 +117,7 @@ static PetscReal blocks_of(PetscInt ncol, PetscInt nrow)
   return 0.5 * (PetscReal)ncol * (PetscReal)(ncol + 1) + (PetscReal)ncol * (PetscReal)nrow;
 }
 
-/* Merges groups at the end of the list with their parent, the last one, while the zeros stay few. */
+/* Merges groups at the end of the list into their parent, the last one, while explicit zeros are few. */
 static PetscErrorCode merge_groups(PetscInt *ngroup, Group group[])
 {
   PetscFunctionBeginUser;
@@ -129,7 +129,7 @@ static PetscErrorCode merge_groups(PetscInt *ngroup, Group group[])
       blocks - (blocks_of(p->ncol, p->nrow) - p->zeros) - (blocks_of(c->ncol, c->nrow) - c->zeros);
     size_t k = 0;
 
-    /* a child right before its parent has it as its first row */
+    /* the first row of a child is a column of its parent */
     if (!c->nrow || c->row[0] < p->first || c->row[0] >= p->first + p->ncol) break;
     while (ncol > limits[k].nodes) k++;
     if (zeros > limits[k].share * blocks) break;
@@ -141,8 +141,8 @@ static PetscErrorCode merge_groups(PetscInt *ngroup, Group group[])
 }
 
 /*
-  Structure of column j without j itself, sorted: own entries and the rows of the groups whose first row is j. Those are
-  linked in child[] (first group of column j) and sibling[]. Its count is nrows[j].
+  Structure of column j without j, sorted: own entries and the rows of the groups whose first row is j, which are
+  linked by child[] (first group of column j) and sibling[]. nrows[j]: its length.
 */
 static PetscErrorCode column_structure(const SbElimination *e, PetscInt j, const PetscInt ia[],
                                        const PetscInt ja[], const PetscInt child[], const PetscInt sibling[],
@@ -177,7 +177,7 @@ static PetscErrorCode column_structure(const SbElimination *e, PetscInt j, const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Finds the groups of columns and their rows. rows[j], nrows[j]: structure of column j while its parent still needs it. */
+/* Finds the groups of columns and their rows. rows[j], nrows[j]: structure of column j, kept until its parent has used it. */
 static PetscErrorCode find_groups(SbElimination *e, const PetscInt ia[], const PetscInt ja[],
                                   const PetscInt parent[], PetscInt *ngroup, Group group[])
 {

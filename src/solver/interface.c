@@ -1,38 +1,38 @@
 /*
-  The interface between the parts of several ranks, for substructuring.
+  The Schur complement on the interface between ranks, for substructuring.
 
-  Without its nodes (interface_nodes.c) those of different ranks are never neighbours, so each rank eliminates its interior, and what is left is a
-  dense matrix S on the interface: the sum of the ranks' Schur complements. Its factorisation S = L L^T is made by block columns that
-  are distributed cyclically, and it is applied as S^-1 = W^T W with W = L^-1. Each rank has some rows W_r of the triangle W and adds
-  W_r^T (W_r b): symmetric and positive definite however W is rounded, which an inverse would not be. Hence W can be of 16-bit integers
-  (quantized.h), and as a block of rows is used twice while it is in the cache, the memory is read once: a quarter of the bytes of
-  the inverse in single precision. An application sums two short vectors over the ranks. Ranks with less to do in their interior have
+  The interface nodes (interface_nodes.c) separate the ranks, so each rank eliminates its interior. The remaining matrix on the interface is a
+  dense S, the sum of the ranks' Schur complements. The factorisation S = L L^T works on block columns,
+  distributed cyclically, and S^-1 = W^T W with W = L^-1. Each rank has some rows W_r of the triangle W and adds
+  W_r^T (W_r b): symmetric and positive definite for any rounding of W, unlike a rounded inverse. Hence W is stored in 16-bit integers
+  (quantized.h); a block of rows is used twice while it is in the cache, so memory is read once: a quarter of the bytes of
+  the inverse in single precision. An application sums two short vectors over the ranks. Ranks with less work in their interior have
   more rows.
 
-  Not handled: zeros of W between parts of the interface that do not touch each other.
+  Not handled: zeros of W between parts of the interface that are not connected.
 */
 #include "sbsolver.h"
 #include "rotated.h"
 #include "quantized.h"
 #include <petscblaslapack.h>
 
-#define BLOCK 48        /* unknowns in a block of rows of W and of columns of L */
-#define MOST_NODES 1500 /* 162 MB per rank while it is factored */
+#define BLOCK 48        /* unknowns in a block of rows of W and of block columns of L */
+#define MOST_NODES 1500 /* most interface nodes: 162 MB per rank during the factorisation */
 
-/* Rows of W of this rank, the transpose of which is a panel. */
+/* A block of rows of W on this rank; its transpose is a panel. */
 typedef struct {
   PetscInt first, nrow;
-  size_t offset; /* in word */
+  size_t offset; /* position in word */
 } Rows;
 
 struct _p_SbInterfaceFactor {
-  PetscInt nblock; /* of all ranks */
+  PetscInt nblock; /* number of row blocks, all ranks */
   PetscInt nrows;
-  Rows *rows;     /* [nrows] */
-  size_t nword;   /* words in use */
-  int32_t *word;  /* reading may run ahead of the last panel */
-  float *scale;   /* [3 n][2] of the rows; the second ones are not used */
-  float *sum, *y; /* [3 n] right-hand side of all ranks, part of the solution; room for a block more */
+  Rows *rows;     /* [nrows] row blocks of this rank */
+  size_t nword;   /* number of words in use */
+  int32_t *word;  /* words, with room for reads beyond the last panel */
+  float *scale;   /* [3 n][2] scales of the rows; the second ones are unused */
+  float *sum, *y; /* [3 n] sum of the right-hand sides; own part of the solution; room for one block more */
 };
 
 PetscErrorCode SbSpaceInterfaceSize(SbSpace s, PetscInt *n, PetscInt *most)
@@ -96,14 +96,14 @@ PetscInt64 SbInterfaceBytes(SbInterface f)
 
 /* ------------------------------------------------------------------ factorisation */
 
-/* First column of block k of n columns, and how many it has. */
+/* First column of block k of n columns; returns its width. */
 static inline PetscInt block_of(PetscInt n, PetscInt k, PetscInt *first)
 {
   *first = k * BLOCK;
   return PetscMin(BLOCK, n - *first);
 }
 
-/* S = L L^T in place, a lower triangle [n][n] in columns; in the end each rank has all of L. Block column k is rank k's, modulo their number. */
+/* S = L L^T in place, S a lower triangle [n][n], column-major; at the end each rank has all of L. Block column k belongs to rank k modulo the number of ranks. */
 static PetscErrorCode factor_columns(MPI_Comm comm, PetscInt n, PetscInt nblock, PetscReal S[], PetscBool *ok)
 {
   const PetscScalar one = 1., minus = -1.;
@@ -126,7 +126,7 @@ static PetscErrorCode factor_columns(MPI_Comm comm, PetscInt n, PetscInt nblock,
       PetscCallBLAS("LAPACKpotrf", LAPACKpotrf_("L", &nc, corner, &ld, &info));
       below = ld - (PetscBLASInt)c - nc;
       if (info)
-        corner[0] = -1.; /* a sign for the others */
+        corner[0] = -1.; /* tells the other ranks of the failure */
       else if (below)
         PetscCallBLAS("BLAStrsm",
                       BLAStrsm_("R", "L", "T", "N", &below, &nc, &one, corner, &ld, corner + nc, &ld));
@@ -146,7 +146,7 @@ static PetscErrorCode factor_columns(MPI_Comm comm, PetscInt n, PetscInt nblock,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Deals out the rows of W, long ones first, each to the rank with the least work until then. */
+/* Distributes the row blocks of W, long ones first, each to the rank with the least work so far. */
 static PetscErrorCode share_rows(SbInterface f, PetscInt64 work)
 {
   SbInterfaceFactor w = f->factor;
@@ -182,7 +182,7 @@ static PetscErrorCode share_rows(SbInterface f, PetscInt64 work)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rows of W = L^-1 of this rank: L^T w = e for each of them. */
+/* Computes and stores the rows of W = L^-1 of this rank: L^T w = e for each of them. */
 static PetscErrorCode store_rows(SbInterface f, const PetscReal L[])
 {
   const SbInterfaceFactor w = f->factor;
@@ -222,7 +222,7 @@ PetscErrorCode SbInterfaceFactorise(SbInterface f, PetscInt64 work, PetscReal sc
   if (!f->n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCallMPI(MPI_Comm_size(f->comm, &size));
   PetscCallMPI(MPI_Comm_rank(f->comm, &rank));
-  /* each block column is summed where it is worked on */
+  /* each block column is summed on the rank that factors it */
   for (PetscInt k = 0; k < f->factor->nblock; k++) {
     const PetscMPIInt owner = (PetscMPIInt)(k % size);
     PetscInt first;

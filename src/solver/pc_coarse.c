@@ -1,33 +1,33 @@
 /*
-  Two-level preconditioner for CG: an incomplete factorisation and a coarse correction, joined as balancing does,
+  Two-level preconditioner for CG: an incomplete factorisation and a coarse correction, combined as in balancing,
 
       P^-1 = Q + (1 - Q A) M (1 - A Q),   Q = Z E^-1 Z^T,   E = Z^T A Z
 
-  with M the fine level, Z six rigid-body modes for each of some hundred or thousand aggregates of nodes. It is symmetric and positive
+  with M the preconditioner of the fine level, Z six rigid-body modes for each of some hundred or thousand aggregates of nodes. It is symmetric and positive
   definite when M and A are. Mandel (1993), Balancing domain decomposition; Tang, Nabben, Vuik, Erlangga (2009),
   Comparison of two-level preconditioners derived from deflation, domain decomposition and multigrid methods, J. Sci. Comput. 39.
 
-  When the start of the iteration makes Z^T r = 0, which the hook before a solve does, it stays so and the right factor is 1: what
-  is left is their A-DEF2, with one product by A and one coarse solve for each application. That is examined each time; a
-  residual with a part in the span of Z gets the whole.
+  PCPreSolve corrects the initial guess so that Z^T r = 0. All residuals keep this property, the factor 1 - A Q is left out, and P is
+  A-DEF2 there, with one product by A and one coarse solve per application. Each application tests this; a
+  residual with a part in the span of Z gets the complete P^-1.
 
-  While E is small beside a rank's own part, one rank factors it for all: few aggregates are best. On many ranks that would soon be most
-  of the work, and the incomplete factorisation, which ends at the border of a rank, is weaker. E stays with its ranks then, a
-  cycle of multigrid C stands for E^-1 (coarse_solver.c), and there are more aggregates, of NODES_PER_SPREAD nodes each. Q = Z C Z^T corrects
-  only in part, so that the whole is always taken, with what the correction leaves corrected once more:
+  While E is small compared with a rank's part of A, one rank factors it for all, and few aggregates are best. On many ranks that would be most
+  of the work, and the incomplete factorisation, which is block diagonal by ranks, is weaker. Then E stays distributed, a
+  multigrid cycle C approximates E^-1 (coarse_solver.c), and there are more aggregates, of NODES_PER_SPREAD nodes each. Q = Z C Z^T is no
+  exact coarse solve, so that the complete form is used, with two coarse corrections:
 
-      P^-1 = 2 Q - Q A Q + (1 - Q A) M (1 - A Q),   symmetric, and positive definite as C has no eigenvalue of C E above 2.
+      P^-1 = 2 Q - Q A Q + (1 - Q A) M (1 - A Q),   symmetric, and positive definite if the eigenvalues of C E are below 2.
 
   docs/reports/many_ranks.md lists the iterations, messages and memory.
 
-  Fine level: ICC(0) of the rows and columns of each rank, made from the SBAIJ matrix that the product has at hand (product.h):
-  given BAIJ, PETSc would first make one. Where that is not positive definite (at Poisson's ratio 0.45, not yet at 0.4;
-  very flat tets), the diagonal: twice the iterations, each at half the price. Bar of 192,000 tets, one rank, residual 1e-8, iterations
+  Fine level: ICC(0) of the diagonal block of each rank, from the SBAIJ matrix of the fast product (product.h):
+  for BAIJ PETSc would first convert. Where ICC(0) is not positive definite (at Poisson's ratio 0.45, not yet at 0.4;
+  very flat tets), the diagonal: twice the iterations, each at half the cost. Bar of 192,000 tets, one rank, residual 1e-8, iterations
   and CPU s: at nu 0.3 ICC 39, 0.37 and diagonal 84, 0.48; at 0.45 diagonal 143, 0.70.
 
   PETSc's PCDEFLATION on the same aggregates takes AIJ only: 0.64 s on one rank, 0.83 on two (this: 0.37, 0.54). On a bar
-  sixty times as long as thick CG stopped there with an indefinite preconditioner after 41 iterations (why was not found out; its
-  fine level was the ICC of AIJ); this takes 49.
+  sixty times as long as thick CG with PCDEFLATION stopped with an indefinite preconditioner after 41 iterations (cause unknown; its
+  fine level was ICC of AIJ); this one converges in 49.
 */
 #include "coarse.h"
 #include "sbassembly.h"
@@ -35,31 +35,32 @@
 #include "sblog.h"
 
 #define NAME "two-level"
-#define NU_ICC 0.4   /* up to this Poisson's ratio the incomplete factorisation is tried */
-#define IN_SPAN 1e-5 /* share of the residual in the span of Z below which the right factor is 1 */
+#define NU_ICC 0.4   /* largest Poisson's ratio for which the incomplete factorisation is tried */
+#define IN_SPAN 1e-5 /* relative size of the residual in the span of Z that counts as rounding */
 
-/* Aggregates that one rank factors: one for so many nodes of a rank, within these bounds. */
+/* Number of aggregates when one rank factors E: a rank's nodes over this, within these bounds. */
 #define NODES_PER_FACTORED 10
 #define LEAST_FACTORED 50
 #define MOST_FACTORED 1000
-#define NODES_PER_SPREAD 16 /* bar of 80,000 tets on 16 ranks: 12, 16 and 24 take 37, 37 and 38 iterations */
+#define NODES_PER_SPREAD \
+  16 /* nodes per aggregate; bar of 80,000 tets, 16 ranks: 12, 16, 24 take 37, 37, 38 iterations */
 
 typedef struct {
   SbSpace space;
   SbCoarse coarse;
-  PetscInt wanted;  /* aggregates, 0: by size */
-  PetscInt limit;   /* of the aggregates that one rank factors, -1: by size */
-  PC fine;          /* of this rank alone, unless it is the diagonal */
-  PetscBool simple; /* the diagonal as fine level */
+  PetscInt wanted;  /* number of aggregates, 0: by the number of nodes */
+  PetscInt limit;   /* largest number of aggregates for one rank to factor, -1: by size */
+  PC fine;          /* fine level on this rank, unless it is the diagonal */
+  PetscBool simple; /* the fine level is the diagonal */
   Vec s, w, t;
-  Vec own_in, own_out; /* rows of this rank, without memory of their own */
+  Vec own_in, own_out; /* owned rows; they borrow their arrays */
   PetscInt nsetup;
   PetscBool guess_given;
 } TwoLevel;
 
 /* ------------------------------------------------------------------ set-up */
 
-/* Incomplete Cholesky of the rows and columns of this rank, or what replaces it. */
+/* Creates the incomplete Cholesky factorisation of this rank's diagonal block, or its replacement. */
 static PetscErrorCode create_fine(TwoLevel *p, PC pc, Mat A)
 {
   const char *prefix;
@@ -73,7 +74,7 @@ static PetscErrorCode create_fine(TwoLevel *p, PC pc, Mat A)
   PetscCall(PCAppendOptionsPrefix(p->fine, "fine_"));
   if (p->simple)
     PetscCall(PCSetType(p->fine, symmetric ? PCJACOBI : PCPBJACOBI));
-  else if (!p->space->nnode_owned) /* PETSc 3.26 does not survive the factorisation of nothing */
+  else if (!p->space->nnode_owned) /* PETSc 3.26 fails for an empty matrix */
     PetscCall(PCSetType(p->fine, PCNONE));
   else {
     PetscCall(PCSetType(p->fine, PCICC));
@@ -93,7 +94,7 @@ static PetscErrorCode set_up_fine(TwoLevel *p, PC pc, Mat A, PetscBool *ok)
   PetscCall(PCSetOperators(p->fine, A, A));
   PetscCall(PCSetReusePreconditioner(p->fine, PETSC_FALSE));
   PetscCall(PCSetUp(p->fine));
-  /* else PETSc would renew it in an application after the values have changed, the coarse level not */
+  /* else PETSc would renew it in an application after the values have changed, but not the coarse level */
   PetscCall(PCSetReusePreconditioner(p->fine, PETSC_TRUE));
   PetscCall(PCGetFailedReason(p->fine, &reason));
   *ok = (PetscBool)(reason == PC_NOERROR);
@@ -101,7 +102,7 @@ static PetscErrorCode set_up_fine(TwoLevel *p, PC pc, Mat A, PetscBool *ok)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From here on without the incomplete factorisation. */
+/* Replaces the incomplete factorisation by the diagonal from here on. */
 static PetscErrorCode simplify(TwoLevel *p)
 {
   PetscFunctionBeginUser;
@@ -132,7 +133,7 @@ static PetscErrorCode PCSetUp_Coarse(PC pc)
     PetscMPIInt size;
 
     PetscCallMPI(MPI_Comm_size(s->comm, &size));
-    /* 300 at 36,000 nodes (192,000 tets) was best; the work of a factor grows faster than the number of aggregates */
+    /* 300 was best for 36,000 nodes (192,000 tets); the cost of the factor grows faster than the number of aggregates */
     if (!wanted)
       wanted = PetscMax(1, (PetscInt)(300. * PetscPowReal((PetscReal)s->Nnode / 36000., 0.7) + 0.5));
     if (limit < 0)
@@ -206,7 +207,7 @@ static PetscErrorCode PCApply_Coarse(PC pc, Vec r, Vec z)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Corrects the first guess, so that its residual has no part in the span of Z. */
+/* Corrects the initial guess, so that its residual has no part in the span of Z. */
 static PetscErrorCode PCPreSolve_Coarse(PC pc, KSP ksp, Vec b, Vec x)
 {
   PetscReal share;
@@ -241,7 +242,7 @@ static PetscErrorCode PCPostSolve_Coarse(PC pc, KSP ksp, Vec b, Vec x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ life */
+/* ------------------------------------------------------------------ create and destroy */
 
 static PetscErrorCode PCView_Coarse(PC pc, PetscViewer viewer)
 {
@@ -314,7 +315,7 @@ PetscErrorCode SbPCCoarseCreate(SbSpace s, PC pc)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The context when pc is one of these, else NULL. */
+/* The context of pc if it is of this type, else NULL. */
 static PetscErrorCode context_of(PC pc, TwoLevel **p)
 {
   PetscBool is;

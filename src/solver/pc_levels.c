@@ -1,18 +1,18 @@
 /*
-  A fixed symmetric approximation of A^-1, A the tangent of CR and DG elements without its volumetric part: no large number is
-  in it, so linear elements at the vertices do not lock and serve as a coarse space for those at the faces.
+  A fixed symmetric approximation of A^-1, A the tangent of CR and DG elements without its volumetric part: without the bulk stiffness
+  P1 elements do not lock, and serve as a coarse space for CR.
 
   DG: with the mean m and the jump d of the two nodes of a face, u = m + (1 - w) d on one side, the cells' energy depends on m
-  only, as the energy of CR does, and d has a stiffness of its own. The two meet in the penalty of jumps alone, which is of
-  the size of either: m by the cycle for CR, d by its diagonal.
+  only, as the energy of CR does, and d has the stiffness of the face terms. Only the penalty of jumps couples m and d, and it is no larger
+  than either stiffness: the cycle for CR approximates the inverse for m, a diagonal that for d.
 
-  CR: Gauss-Seidel from the last row on, a correction by P1, Gauss-Seidel from the first one on (between ranks: block Jacobi). A P1 function has at the
+  CR: a backward Gauss-Seidel sweep, a correction by P1, a forward sweep (between ranks: block Jacobi). A P1 function has at the
   centroid of a face the mean of its values at the three vertices; its jumps vanish and its strains are the same, so the Galerkin
-  product is P1's own matrix, which is assembled from the same blocks. A vertex of a face with a prescribed unknown is constrained.
-  A DG cell that touches this rank's cells with a vertex only may have neighbours that are not here; its strain is that of its own
-  nodes there, so that in a strained body the P1 matrix is slightly nonsymmetric at the border of ranks. GMRES does not mind.
-  Springs of effects are in P1's matrix as the Galerkin product has them: they may be all that supports a body.
-  P1 by algebraic multigrid. With a P2 body: pc_p_multigrid.c. Hiptmair and Xu (2007), Nodal auxiliary space preconditioning; Brenner (2003), Poincare-Friedrichs
+  product is the P1 matrix, which is assembled by the same kernels. The vertices of a face with a prescribed unknown are prescribed.
+  A DG cell that shares only a vertex with this rank's cells may have neighbours unknown here; its strain is then that of its own
+  nodes, so that in a strained body the P1 matrix is slightly nonsymmetric at interfaces between ranks, which GMRES allows.
+  Springs of effects are added to the P1 matrix by the Galerkin product: they may be a body's only support.
+  The P1 matrix is inverted by one cycle of algebraic multigrid. With a P2 body: pc_p_multigrid.c. Hiptmair and Xu (2007), Nodal auxiliary space preconditioning; Brenner (2003), Poincare-Friedrichs
   inequalities for piecewise H1 functions.
 */
 #include "pressure.h"
@@ -20,11 +20,11 @@
 #include "sbsolver.h"
 
 /*
-  Couplings of P1 that are zero do not count when multigrid coarsens: boxes have many. Bar of CR, nu 0.49, 53,000 tets: 59 iterations on 1, 2, 3 and
-  4 ranks; with PETSc's -1, which takes them all, 59, 81, 59 and 79, as the cut falls.
+  Threshold of multigrid's coarsening: zero couplings of P1, of which boxes have many, are ignored. Bar of CR, nu 0.49, 53,000 tets: 59 iterations on 1, 2, 3 and
+  4 ranks; with PETSc's default -1, which keeps all, 59, 81, 59 and 79, depending on the partition.
 */
 #define WEAK 0.
-/* Unknowns of the last level and of a rank on those before it: that bar on 64 ranks, 333 messages of a rank in an iteration; with PETSc's 50 and 50 556. */
+/* Unknowns of the coarsest level, and least unknowns per rank on finer levels: that bar on 64 ranks needs 333 messages of a rank per iteration; with PETSc's 50 and 50, 556. */
 #define LAST_LEVEL 600
 #define PER_RANK 300
 
@@ -44,7 +44,7 @@ static PetscErrorCode create_elements(SbSpace s, PetscBool p1, SbElement **eleme
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What is prescribed in `from` is so in `to`: at the same node, or at every vertex of the face. A support holds its face. */
+/* Prescribes in `to` the components prescribed in `from`: at the same node, or at every vertex of the face. */
 static PetscErrorCode fix_like(SbSpace from, SbSpace to)
 {
   uint8_t *mark;
@@ -63,7 +63,7 @@ static PetscErrorCode fix_like(SbSpace from, SbSpace to)
     } else
       mark[node[a]] |= fixed;
   }
-  /* owners know all cells of their nodes: the other ranks hear it from them */
+  /* owners know all cells of their nodes, and send the marks to the other ranks */
   for (PetscInt i = 0; i < to->nnode_owned; i++) shared[3 * i] = mark[i];
   PetscCall(SbSpaceUpdateGhosts(to, shared));
   for (PetscInt i = 0; i < to->nnode; i++) {
@@ -86,9 +86,9 @@ static PetscErrorCode add_level(SbLevels v, PetscBool p1)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ ways between them */
+/* ------------------------------------------------------------------ transfer between levels */
 
-/* DG: the CR node at each node, the node across and the weights. */
+/* DG: the CR node of each DG node, its node on the other side of the face, and the weights of both. */
 static PetscErrorCode find_means(SbLevels v)
 {
   SbSpace s = v->space, m = v->at[1];
@@ -115,7 +115,7 @@ static PetscErrorCode find_means(SbLevels v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The owned part of a plain vector into one with ghosts, and these. */
+/* Copies the owned values of a plain vector into one with ghosts, and updates the ghosts. */
 static PetscErrorCode load(SbSpace s, Vec from, Vec to, const PetscReal **x)
 {
   PetscFunctionBeginUser;
@@ -124,7 +124,7 @@ static PetscErrorCode load(SbSpace s, Vec from, Vec to, const PetscReal **x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Prescribed components of node i are not passed on. */
+/* x, or 0 at a prescribed component of node i. */
 static inline PetscReal unless_fixed(SbSpace s, PetscInt i, PetscInt c, PetscReal x)
 {
   return s->fixed[i] & (1 << c) ? 0. : x;
@@ -185,7 +185,7 @@ static PetscErrorCode cycle_faces(SbLevels v, Vec r, Vec z)
 
 /* ------------------------------------------------------------------ DG */
 
-/* r of the means: the two sides of a face together. */
+/* Restricts a residual x to the means: the sum over the two sides of a face. */
 static PetscErrorCode restrict_to_means(SbLevels v, const PetscReal x[])
 {
   SbSpace s = v->space, m = v->at[1];
@@ -226,7 +226,7 @@ PetscErrorCode SbLevelsApply(SbLevels v, Vec r, Vec z)
   PetscCall(load(v->at[1], v->z[1], v->z[1], &mean));
   PetscCall(VecGetArrayRead(v->t[0], &diagonal));
   PetscCall(VecGetArray(z, &out));
-  /* u = m + (1 - w) d, with the jump's own residual (1 - w) r_own - w r_across. */
+  /* u = m + (1 - w) d; the residual of the jump is (1 - w) r_own - w r_across. */
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     const PetscInt other = v->across[i];
     const PetscReal w = v->weight[i];
@@ -249,7 +249,7 @@ PetscErrorCode SbLevelsApply(SbLevels v, Vec r, Vec z)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Diagonal of the face terms and the mass, without the cells. */
+/* Diagonal of the face terms and the mass matrix, without the cells. */
 static PetscErrorCode loose_diagonal(SbLevels v, Vec D)
 {
   SbSpace s = v->space;
@@ -285,7 +285,7 @@ PetscErrorCode SbLevelsAddSpring(SbLevels v, PetscInt node, PetscReal factor, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Springs of all ranks at the nodes of at[n-2], ghosts among them, one row of the blocks after the other. */
+/* Gathers the springs of all ranks at nodes at[n-2], ghosts included; one row of blocks after the other. */
 static PetscErrorCode gather_springs(SbLevels v)
 {
   const SbSpace s = v->space;
@@ -316,7 +316,7 @@ PetscErrorCode SbLevelsShareSprings(SbLevels v)
   SbSpace s, p;
 
   PetscFunctionBeginUser;
-  if (v->multigrid) PetscFunctionReturn(PETSC_SUCCESS); /* made from the matrix */
+  if (v->multigrid) PetscFunctionReturn(PETSC_SUCCESS); /* created with the first matrix */
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, SB_MPI_BOOL, MPI_LOR, v->space->comm));
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(gather_springs(v));
@@ -335,12 +335,12 @@ PetscErrorCode SbLevelsShareSprings(SbLevels v)
         PetscCall(
           SbSpaceAddCellBlock(p, v->A[v->n - 1], c, face ? (a + k) % 4 : a, face ? (a + l) % 4 : a, ninth));
     }
-    PetscCall(PetscArrayzero(d, 9)); /* another cell has this node too */
+    PetscCall(PetscArrayzero(d, 9)); /* the node belongs to another cell, too */
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ assembly and life */
+/* ------------------------------------------------------------------ assembly, create and destroy */
 
 PetscErrorCode SbLevelsAssemble(SbLevels v, const SbStage *stage, const SbVolumetric *out)
 {
@@ -371,7 +371,7 @@ PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
     const SbPlan p = s->plan;
     const PetscReal *own;
 
-    /* Inverse stiffness of the jumps: (1-w)^2 A_ii - 2 w (1-w) A_ij + w^2 A_jj of the face terms and the mass. */
+    /* Inverse stiffness of the jumps: (1-w)^2 A_ii - 2 w (1-w) A_ij + w^2 A_jj , A the face terms and the mass matrix. */
     PetscCall(MatGetDiagonal(v->A[0], v->t[0]));
     PetscCall(loose_diagonal(v, v->r[0]));
     PetscCall(load(s, v->r[0], v->r[0], &own));

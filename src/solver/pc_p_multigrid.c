@@ -1,18 +1,18 @@
 /*
-  Multigrid in the degree of the polynomials, for spaces with P2 bodies: P1 on the vertices below P2.
+  p-multigrid for spaces with P2 bodies: the coarse level is P1 on the vertices of P2.
 
-  z = S^T-sweep, correction, S-sweep: Gauss-Seidel from the last row on, z += P E^-1 P^T (r - A z), Gauss-Seidel from the first row on (gauss_seidel.c). P gives an
-  edge node the mean of its two vertices and every other node itself, so that bodies with other elements are whole on the lower level. E =
-  P^T A P is summed from the rows of A, with everything that effects have added to them. It is factored by the fastest package up to
-  FACTORED unknowns, and beyond that one cycle of algebraic multigrid with the rigid motions of the bodies stands for E^-1. Between ranks the
-  sweeps are block Jacobi's. Symmetric, and positive definite when A is.
+  One application: a backward Gauss-Seidel sweep, the correction z += P E^-1 P^T (r - A z), a forward Gauss-Seidel sweep (gauss_seidel.c). P interpolates an
+  edge node by the mean of its two vertices and is the identity at other nodes, so that bodies with other elements are unchanged on the coarse level. E =
+  P^T A P is summed from the rows of A, contributions of effects included. It is factored by the fastest package up to
+  FACTORED unknowns; beyond that one cycle of algebraic multigrid, with the rigid-body modes of the bodies, approximates E^-1. Between ranks the
+  sweeps are block Jacobi. Symmetric, and positive definite when A is.
 
   Ronquist and Patera (1987), Spectral element multigrid I, J. Sci. Comput. 2; Helenbrook, Mavriplis, Atkins (2003), Analysis of p-multigrid.
 
-  Iterations do not depend on the mesh. They grow towards nu = 1/2, where the sweeps do not see what keeps the volume of each cell
+  The number of iterations does not depend on the mesh size. It grows towards nu = 1/2, where the sweeps do not reduce errors with a change of volume of cells
   (docs/reports/solvers.md).
 
-  Prescribed unknowns: those of an edge node take no part; those of a vertex have their diagonal in E and are not passed on.
+  Prescribed unknowns: those of an edge node are left out; those of a vertex have their diagonal in E and are not interpolated.
 */
 #include "sbassembly.h"
 #include "sbsolver.h"
@@ -21,8 +21,8 @@
 #include "solver_impl.h"
 
 #define NAME "p-multigrid"
-#define FACTORED 200000 /* unknowns of E up to which it is factored */
-/* Algebraic multigrid, as in pc_levels.c: couplings that count, unknowns of the last level and of a rank on those before it. */
+#define FACTORED 200000 /* largest number of unknowns of E that is factored */
+/* Algebraic multigrid, as in pc_levels.c: threshold of strong couplings, unknowns of the coarsest level, least unknowns per rank on finer ones. */
 #define WEAK 0.
 #define LAST_LEVEL 600
 #define PER_RANK 300
@@ -30,19 +30,19 @@
 typedef struct {
   SbSpace space;
   PetscInt *parent;   /* [nnode][2] local nodes: the vertices of an edge node, else the node itself twice */
-  PetscInt *gcoarse;  /* [nnode] global numbers on the lower level, -1 at edges */
-  PetscInt n;         /* nodes of the lower level of this rank */
+  PetscInt *gcoarse;  /* [nnode] global numbers on the coarse level, -1 at edge nodes */
+  PetscInt n;         /* number of own nodes of the coarse level */
   PetscInt *node;     /* [n] local nodes */
-  PetscInt *row;      /* [nnode_owned] inverse, -1 at edges */
-  PetscInt *start;    /* [n+1] */
-  PetscInt *column;   /* blocks of own rows: local nodes, ascending */
+  PetscInt *row;      /* [nnode_owned] inverse of node, -1 at edge nodes */
+  PetscInt *start;    /* [n+1] first block of each row of E */
+  PetscInt *column;   /* [start[n]] blocks of own rows: local nodes, ascending */
   PetscReal *value;   /* [start[n]][9], row-major, N/m */
-  PetscReal *inverse; /* [nnode_owned][9] of the diagonal blocks of A */
-  PetscReal *extra;   /* [nnode_owned][3] */
+  PetscReal *inverse; /* [nnode_owned][9] inverse diagonal blocks of A */
+  PetscReal *extra;   /* [nnode_owned][3] diagonal added in the sweeps (gauss_seidel.c) */
   Mat E;
   PC solver;
-  Vec t, g; /* residual, and a vector with ghosts */
-  Vec r, w; /* of the lower level */
+  Vec t, g; /* residual; vector with ghosts */
+  Vec r, w; /* residual and correction of the coarse level */
 } Multigrid;
 
 /* ------------------------------------------------------------------ set-up, once */
@@ -70,7 +70,7 @@ static PetscErrorCode number_nodes(Multigrid *p)
   PetscFunctionBeginUser;
   PetscCall(SbSpaceEdgeParents(s, &p->parent));
   PetscCall(PetscMalloc1(s->nnode, &p->gcoarse));
-  // own nodes of the lower level, and what their numbers are on all ranks
+  // own nodes of the coarse level, and their global numbers on all ranks
   PetscCall(PetscMalloc2(s->nnode_owned, &p->node, s->nnode_owned, &p->row));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     p->row[i] = -1;
@@ -89,7 +89,7 @@ static PetscErrorCode number_nodes(Multigrid *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A rigid motion of each body on the lower level, zero on prescribed unknowns. */
+/* Fills v with rigid-body mode m of a body on the coarse level, zero at prescribed unknowns. */
 static PetscErrorCode fill_mode(PetscInt m, PetscScalar v[], const void *ctx)
 {
   const Multigrid *p = ctx;
@@ -106,7 +106,7 @@ static PetscErrorCode fill_mode(PetscInt m, PetscScalar v[], const void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* E without values: a node of the lower level meets those that it shares a cell with. */
+/* Pattern of E: each coarse node couples to those with which it shares a cell. */
 static PetscErrorCode create_operator(Multigrid *p)
 {
   const SbSpace s = p->space;
@@ -176,15 +176,15 @@ static PetscErrorCode create_solver(Multigrid *p)
 
 /* ------------------------------------------------------------------ E = P^T A P */
 
-/* Sums of a row's blocks by nodes of the lower level. */
+/* Blocks of one row of A P, by nodes of the coarse level. */
 typedef struct {
   PetscInt n;
   PetscInt *node;    /* [n] local nodes */
-  PetscInt *slot;    /* [nnode] where a node stands, -1 outside of the row */
-  PetscReal (*W)[9]; /* [n], row-major */
+  PetscInt *slot;    /* [nnode] index of a node in the row, -1: not in it */
+  PetscReal (*W)[9]; /* [n] blocks, row-major */
 } RowSums;
 
-/* W += weight K of the column of node j, K by columns; a vertex passes on what is not prescribed there. */
+/* W += weight K for the column of node j, K column-major; columns prescribed at a vertex are left out. */
 static void add_column(const Multigrid *p, const PetscScalar K[9], PetscReal weight, PetscInt j, RowSums *row)
 {
   const PetscInt *parent = p->parent + 2 * j;
@@ -208,7 +208,7 @@ static void add_column(const Multigrid *p, const PetscScalar K[9], PetscReal wei
   }
 }
 
-/* Row i of A; of a symmetric one from its diagonal on, with half of that. */
+/* Sums row i of A P; for symmetric storage from the diagonal on, with half of the diagonal block. */
 static void sum_row(const Multigrid *p, const SbMatBlocks *A, PetscInt i, RowSums *row)
 {
   const SbPlan plan = p->space->plan;
@@ -222,7 +222,7 @@ static void sum_row(const Multigrid *p, const SbMatBlocks *A, PetscInt i, RowSum
     const PetscInt j = plan->dj[k];
     PetscScalar D[9];
 
-    // prescribed unknowns have nothing but their diagonal, which stays with vertices
+    // rows of prescribed unknowns contain only their diagonal, kept at vertices only
     for (int e = 0; j == i && e < 9; e++) D[e] = edge && p->space->fixed[i] & (1 << (e / 3)) ? 0. : K[e];
     add_column(p, j == i ? D : K, symmetric && j == i ? 0.5 : 1., j, row);
   }
@@ -245,7 +245,7 @@ static inline PetscReal *block_of(const Multigrid *p, PetscInt row, PetscInt nod
   return p->value + 9 * (size_t)low;
 }
 
-/* The row's sums go to the rows of its parents; those of other ranks get them by PETSc. */
+/* Adds P^T times the row to the rows of its parents in E; PETSc sends those of other ranks. */
 static PetscErrorCode add_row(Multigrid *p, PetscInt i, const RowSums *row, PetscScalar text[],
                               PetscInt columns[])
 {
@@ -289,7 +289,7 @@ static PetscErrorCode assemble(Multigrid *p, Mat A)
   RowSums row;
 
   PetscFunctionBeginUser;
-  // the arrays of A, and room for one row
+  // the arrays of A, and storage for one row
   PetscCall(SbMatGetBlocks(A, &blocks));
   for (PetscInt i = 0; i < s->nnode_owned; i++)
     widest = PetscMax(widest, 2 * (plan->di[i + 1] - plan->di[i] + plan->oi[i + 1] - plan->oi[i]));
@@ -297,7 +297,7 @@ static PetscErrorCode assemble(Multigrid *p, Mat A)
                          &columns));
   for (PetscInt i = 0; i < s->nnode; i++) row.slot[i] = -1;
 
-  // own rows are summed here, parts of others by PETSc
+  // own rows are summed here; PETSc adds contributions of other ranks
   PetscCall(MatZeroEntries(p->E));
   PetscCall(PetscArrayzero(p->value, 9 * (size_t)p->start[p->n]));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
@@ -307,7 +307,7 @@ static PetscErrorCode assemble(Multigrid *p, Mat A)
   PetscCall(SbMatRestoreBlocks(&blocks));
   PetscCall(PetscFree5(row.node, row.slot, row.W, text, columns));
 
-  // into E; of the half of a symmetric one, the other half is the transpose
+  // into E; for symmetric storage the other half is the transpose
   PetscCall(PetscMalloc2(9 * widest, &text, widest, &columns));
   for (PetscInt k = 0; k < p->n; k++) {
     const PetscInt n = p->start[k + 1] - p->start[k];
@@ -363,7 +363,7 @@ static PetscErrorCode PCSetUp_Multigrid(PC pc)
 
 /* ------------------------------------------------------------------ application */
 
-/* r of the lower level = P^T t */
+/* r of the coarse level = P^T t */
 static PetscErrorCode restrict_residual(Multigrid *p)
 {
   const SbSpace s = p->space;
@@ -440,7 +440,7 @@ static PetscErrorCode PCApply_Multigrid(PC pc, Vec r, Vec z)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ life */
+/* ------------------------------------------------------------------ create and destroy */
 
 static PetscErrorCode PCView_Multigrid(PC pc, PetscViewer viewer)
 {

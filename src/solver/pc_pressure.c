@@ -1,26 +1,26 @@
 /*
   Nearly incompressible CR and DG: the pressures of the cells as unknowns of the iteration.
 
-  K = A + B^T C^-1 B (pc_pressure_operator.c) has a condition that grows with lambda. K u = r is the first half of
+  The condition number of K = A + B^T C^-1 B (pc_pressure_operator.c) grows with lambda. K u = r is equivalent to
 
     [ A  B^T ] [u]   [r]
     [ B  -C  ] [p] = [0],      C = V / lambda,
 
   which stays well conditioned up to lambda = infinity: with one pressure per cell, CR satisfies the inf-sup condition on every
-  mesh (Crouzeix and Raviart 1973), so that S = C + 1.5 V / (2 mu) on the diagonal stands for C + B A^-1 B^T. GMRES with the
+  mesh (Crouzeix and Raviart 1973), so that the diagonal S = C + 1.5 V / (2 mu) approximates C + B A^-1 B^T. GMRES with the
   upper triangular preconditioner of A^ (pc_levels.c) and -S on its right takes a number of iterations that depends neither on
   lambda nor on the mesh. Benzi, Golub and Liesen (2005), Numerical solution of saddle point problems, sections 10 and 8.
 
-  Around it, refinement: the residual f - K u is computed again, and is the next right-hand side. That is what -ksp_rtol
-  asks; the iterations reported are those of GMRES. f - K u = r_u - B^T C^-1 r_p has
-  the residual of the cells times lambda, and GMRES minimises both with these weights, up to lambda = 1e4 mu. Beyond that
-  doubles end: with nu = 0.499999 K u is known no better than eps |B^T| C^-1 |B| |u|, whoever has solved. A residual below four times
-  this is accepted, said by -info, unless it is so large that the matrix must be singular.
+  The outer iteration is iterative refinement: the residual f - K u is computed again and is the next right-hand side. -ksp_rtol
+  applies to it; the iterations reported are those of GMRES. f - K u = r_u - B^T C^-1 r_p contains
+  the residual of the cells times lambda, and GMRES minimises a norm with these weights, up to lambda = 1e4 mu. Beyond that
+  double precision is the limit: at nu = 0.499999 the rounding error of K u is eps |B^T| C^-1 |B| |u| for any solver. A residual below four times
+  this is accepted, with a line of -info, unless it is so large that the matrix must be singular.
 
-  Not handled: with inertia S takes no notice of it; time steps far below the time in which a shear wave crosses a cell cost more
+  Not handled: inertia in S; time steps far below the time in which a shear wave crosses a cell take more
   iterations.
 
-  petsc/private/kspimpl.h: the outer solver would report its own handful of corrections as iterations.
+  petsc/private/kspimpl.h: else the outer solver would report its few corrections as iterations.
 */
 #include "solver_impl.h"
 #include "pressure.h"
@@ -29,29 +29,30 @@
 #include <petsc/private/kspimpl.h>
 
 #define NAME "pressure"
-#define RESTART 120 /* vectors that GMRES keeps at most: 80 cost 97 iterations instead of 81 on 64 ranks */
-#define LARGEST_WEIGHT 1e4 /* lambda / mu in the norm of GMRES */
-#define MARGIN 0.3         /* how far below the target GMRES aims */
-#define TIGHTER 0.03       /* times that after a correction that did not help */
-#define OF_PART 1e-2 /* aim of GMRES where the operator has a part that K lacks, which FGMRES corrects */
-#define AT_MOST 1e-2 /* of the right-hand side: more is never accepted */
+#define RESTART 120        /* restart length of GMRES: 80 took 97 iterations instead of 81 on 64 ranks */
+#define LARGEST_WEIGHT 1e4 /* largest lambda / mu in the weighted norm of GMRES */
+#define MARGIN 0.3         /* target of GMRES over the target of the whole solve */
+#define TIGHTER 0.03       /* the same after a correction that did not reduce the residual */
+#define OF_PART 1e-2 /* tolerance of GMRES where the operator has terms that K lacks, which FGMRES corrects */
+#define AT_MOST 1e-2 /* largest accepted residual over the right-hand side */
 #define ROUNDING 4.  /* accepted residual, over the rounding error of K u */
 
 typedef struct {
   SbSpace space;
-  SbPressureOperator op; /* of the operator at the last set-up */
+  SbPressureOperator op; /* operator of the last set-up */
   KSP inner;
   Mat M;
-  Vec x, b, t;               /* of the inner system; of the nodes */
-  PetscReal *weight;         /* [ncell_owned] on the rows of the cells, N/m^3 */
-  KSP ksp;                   /* that has the convergence test below; borrowed */
-  PetscReal target, last;    /* residual wanted, the one before, N */
-  PetscReal size, margin;    /* of the right-hand side, N; of the next correction */
-  PetscInt its, limit, slow; /* of GMRES in this solve; corrections that did not help */
+  Vec x, b, t;            /* vectors of the mixed system; vector of the nodes */
+  PetscReal *weight;      /* [ncell_owned] weights of the cells' rows, N/m^3 */
+  KSP ksp;                /* solver with the convergence test below; borrowed */
+  PetscReal target, last; /* target of the residual norm; the last residual norm, N */
+  PetscReal size, margin; /* norm of the right-hand side, N; MARGIN or TIGHTER, for the next correction */
+  PetscInt its, limit,
+    slow; /* iterations of GMRES in this solve; their limit; corrections that did not help */
   PetscInt nsolve, total, most;
 } Pressure;
 
-/* ------------------------------------------------------------------ the system of nodes and cells */
+/* ------------------------------------------------------------------ the mixed system */
 
 static PetscErrorCode MatMult_Mixed(Mat M, Vec X, Vec Y)
 {
@@ -165,13 +166,13 @@ static PetscErrorCode PCApply_Pressure(PC pc, Vec r, Vec z)
   Mat A, K;
 
   PetscFunctionBeginUser;
-  // a relative tolerance from the aim for the whole solve and the residual that is left
+  // relative tolerance: target of the whole solve over the current residual
   PetscCall(PCShellGetContext(pc, &s));
   n = 3 * s->space->nnode_owned;
   PetscCall(PCGetOperators(pc, &A, &K));
   PetscCall(VecNorm(r, NORM_2, &norm));
   rtol = A == K ? PetscMin(0.5, PetscMax(1e-10, s->margin * s->target / norm)) : OF_PART;
-  // the right-hand side, with no part of pressures
+  // the right-hand side, zero for the pressures
   PetscCall(VecZeroEntries(s->b));
   PetscCall(VecGetArray(s->b, &to));
   PetscCall(VecGetArrayRead(r, &from));
@@ -185,7 +186,7 @@ static PetscErrorCode PCApply_Pressure(PC pc, Vec r, Vec z)
   PetscCall(KSPGetConvergedReason(s->inner, &reason));
   s->its += its;
   if (reason < 0 && reason != KSP_DIVERGED_ITS) PetscCall(PCSetFailedReason(pc, PC_SUBPC_ERROR));
-  // its displacements
+  // the displacements of the solution
   PetscCall(VecGetArrayRead(s->x, &from));
   PetscCall(VecGetArray(z, &to));
   PetscCall(PetscArraycpy(to, from, n));
@@ -194,9 +195,9 @@ static PetscErrorCode PCApply_Pressure(PC pc, Vec r, Vec z)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ the solver around it */
+/* ------------------------------------------------------------------ the outer solver */
 
-/* PETSc's test; then whether the residual is one of rounding, or no longer falls. */
+/* PETSc's test; then whether the residual is one of rounding or stagnates. */
 static PetscErrorCode converged(KSP ksp, PetscInt it, PetscReal norm, KSPConvergedReason *reason, void *ctx)
 {
   PetscReal level;
@@ -268,7 +269,7 @@ static PetscErrorCode PCPostSolve_Pressure(PC pc, KSP ksp, Vec b, Vec x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ life */
+/* ------------------------------------------------------------------ create and destroy */
 
 static PetscErrorCode PCView_Pressure(PC pc, PetscViewer viewer)
 {

@@ -1,19 +1,19 @@
 /*
-  The tangent with the volumetric part apart: K = A + B^T C^-1 B.
+  The tangent with a separate volumetric part: K = A + B^T C^-1 B.
 
-  Every law's tangent is A + sum over cells of lambda / V b b^T, b_a = V D grad psi_a (SbMaterialOps.volumetric). A has no large
-  number in it and is stored; a row of B is the vector b of a cell; C = V / lambda is a number per cell. K x is formed from
-  these: nothing is ever subtracted to get rid of lambda.
+  Every law's tangent is A + sum over cells of lambda / V b b^T, b_a = V D grad psi_a (SbMaterialOps.volumetric). A does not contain
+  lambda and is stored; a row of B is the vector b of a cell; C is diagonal, V / lambda of each cell. K x is computed from
+  these, without cancellation of terms with lambda.
 
-  Unknowns p of the cells stand behind the nodes' in the vectors of the iteration. A cell's pressure lives on the rank that owns
-  the cell; B^T p brings those of the ghost cells. Prescribed unknowns: their columns of B are zero.
+  In the vectors of the iteration the pressures p of the cells follow the displacements of the nodes. A cell's pressure belongs to the rank that owns
+  the cell; B^T p updates those of the ghost cells. Prescribed unknowns: their columns of B are zero.
 */
 #include "pressure.h"
 #include "sbkernel.h"
 #include "sbsolver.h"
 
 #define PRESSURE_OPERATOR "SbPressureOperator"
-#define S0 1.5 /* B A^-1 B^T is about S0 V / (2 mu): fewest iterations among 0.5, 1 and 1.5 */
+#define S0 1.5 /* factor in B A^-1 B^T ~ S0 V / (2 mu): fewest iterations among 0.5, 1 and 1.5 */
 
 /* ------------------------------------------------------------------ B and its transpose */
 
@@ -28,7 +28,7 @@ static void clear_fixed(SbSpace s, PetscInt nnode, PetscReal x[])
   }
 }
 
-/* d = B u. */
+/* d = B u; absolute: with |B|. */
 static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar u[], PetscBool absolute,
                                        PetscScalar d[])
 {
@@ -62,7 +62,7 @@ static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y += factor B^T p. */
+/* y += factor B^T p; absolute: with |B|. */
 static PetscErrorCode add_gradient(SbPressureOperator op, const PetscScalar p[], PetscBool absolute,
                                    PetscReal factor, PetscScalar y[])
 {
@@ -84,7 +84,7 @@ static PetscErrorCode add_gradient(SbPressureOperator op, const PetscScalar p[],
   PetscCall(VecGetArrayRead(local, &q));
   PetscCall(SbSpaceGetLocalWrite(s, op->y, &f));
   PetscCall(PetscArrayzero(f, 3 * s->nnode));
-  /* y[nnode][3] += B^T p, right on owned nodes; p[ncell] with ghosts. */
+  /* y[nnode][3] += B^T p, complete on owned nodes; p[ncell] with ghosts. */
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
 
@@ -130,7 +130,7 @@ PetscErrorCode SbPressureOperatorApply(SbPressureOperator op, const PetscScalar 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Y += B^T C^-1 B X, or that of the absolute values. */
+/* Y += B^T C^-1 B X; absolute: with |B|. */
 static PetscErrorCode add_volumetric(SbPressureOperator op, PetscBool absolute, Vec X, Vec Y)
 {
   const PetscScalar *x;
@@ -189,7 +189,7 @@ static PetscErrorCode MatGetDiagonal_Pressure(Mat K, Vec D)
   PetscCall(MatShellGetContext(K, &op));
   PetscCall(MatGetDiagonal(op->levels->A[0], D));
   PetscCall(PetscCalloc1(3 * op->space->nnode, &y));
-  /* Squares of the entries of B C^-1/2 at each node, added to y[nnode][3]; right on owned nodes. */
+  /* Adds the squares of the entries of B C^-1/2 at each node to y[nnode][3]; complete on owned nodes. */
   s = op->space;
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
@@ -250,7 +250,7 @@ static PetscErrorCode add_spring(Mat K, PetscInt node, PetscReal factor, const P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Numbers of the cells, from the moduli of the last assembly. */
+/* C, its inverse and S of the cells, from the moduli of the last assembly. */
 static void cell_numbers(SbPressureOperator op)
 {
   SbSpace s = op->space;
@@ -290,7 +290,7 @@ static PetscErrorCode finish(Mat K)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ life */
+/* ------------------------------------------------------------------ create and destroy */
 
 static PetscErrorCode MatDestroy_Pressure(Mat K)
 {
@@ -311,7 +311,7 @@ static PetscErrorCode MatDestroy_Pressure(Mat K)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A vector of cells with ghosts. */
+/* Creates a ghosted vector with one value per cell. */
 static PetscErrorCode create_cell_vector(SbMesh mesh, Vec *p)
 {
   PetscMPIInt size;

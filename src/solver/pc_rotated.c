@@ -1,48 +1,48 @@
 /*
-  A preconditioner that factors seldom: P^-1 = Q A0^-1 Q^T.
+  A preconditioner that rarely factors: P^-1 = Q A0^-1 Q^T.
 
-  The tangent of a body that has turned is nearly the old one turned with it: with Q block diagonal, one rotation per node
-  since the factorisation, P = Q A0 Q^T differs from A by how much rotations vary across a cell. Where they vary little the
-  iteration hardly notices; where they vary much the nodes are solved exactly (exact_nodes.c). So one factorisation serves a
+  The tangent A of a rotated body is nearly the rotated old tangent A0: with Q block diagonal, one rotation per node
+  since the factorisation, P = Q A0 Q^T differs from A only as far as rotations vary across a cell. Small variations hardly
+  change the number of iterations; nodes with large ones are solved exactly (exact_nodes.c). So one factorisation serves a
   whole run, and a step of a swinging bar takes six to ten iterations to 1e-4.
 
-  A0^-1 is applied by a factor in 16-bit integers (factor.c). On several ranks each eliminates its interior, and what is left on
-  the nodes between them is solved by all together (interface.c): the same preconditioner as on one rank, but for rounding.
+  A0^-1 is applied by a factor in 16-bit integers (factor.c). On several ranks each eliminates its interior nodes, and all ranks together
+  solve the Schur complement on the interface nodes (interface.c): up to rounding the same preconditioner as on one rank.
 
-  Prescribed unknowns: nodes with all three take no part and are divided by their diagonal; nodes with one or two are not
-  turned. Renewal: see SbPCRotatedCreate(); by counts of iterations only, so that runs are repeatable.
+  Prescribed unknowns: fully prescribed nodes are left out and divided by their diagonal; nodes with one or two are not
+  rotated. Renewal of the factor: see SbPCRotatedCreate(); by iteration counts only, so that runs are repeatable.
 */
 #include "sbsolver.h"
 #include "rotated.h"
 #include "sblog.h"
 
-#define WORSE_FACTOR 4 /* renew when a solve takes this many times the iterations right after factoring */
-#define WORSE_PLUS 16  /* and this many more */
+#define WORSE_FACTOR 4 /* refactor when a solve takes this many times the iterations of the first solve */
+#define WORSE_PLUS 16  /* and at least this many more */
 
 typedef struct {
   SbSpace space;
   SbInterface face;
-  PetscInt n, nkeep; /* nodes of the factor: interior ones, then those of the interface that they touch */
+  PetscInt n, nkeep; /* nodes of the factor: interior ones, then the nkeep interface nodes adjacent to them */
   PetscInt *node;    /* [n] local nodes of the space */
-  PetscInt *local;   /* [nnode] inverse, -1 for nodes without part */
+  PetscInt *local;   /* [nnode] inverse of node, -1 for nodes not in the factor */
   PetscInt *ia, *ja; /* graph of the interior rows */
   SbFactor factor;
-  SbPack *cells;     /* rotations of the cells, when the operator does not hold them */
-  PetscReal *turn;   /* [nnode_owned][9] rotations of the nodes now */
-  PetscReal *turn0;  /* and at the factorisation */
-  PetscReal *spread; /* [nnode_owned] */
-  float *Q;          /* [nnode_owned][9] the turn since the factorisation */
+  SbPack *cells;     /* rotations of the cells, owned; NULL: the operator has them */
+  PetscReal *turn;   /* [nnode_owned][9] current rotations of the nodes */
+  PetscReal *turn0;  /* [nnode_owned][9] rotations at the factorisation */
+  PetscReal *spread; /* [nnode_owned] variation of the rotation in the cells around a node */
+  float *Q;          /* [nnode_owned][9] rotation since the factorisation */
   float *diagonal;   /* [nnode_owned][3] inverse diagonal of fully prescribed nodes */
-  float *b, *x;      /* [n][3] */
-  float *kept;       /* [nkeep][3] */
-  float *edge;       /* [3 face->n] */
-  float *r, *r1, *z; /* [nnode_owned][3] */
+  float *b, *x;      /* [n][3] right-hand side and solution of the factor */
+  float *kept;       /* [nkeep][3] values at the kept nodes */
+  float *edge;       /* [3 face->n] values at the interface */
+  float *r, *r1, *z; /* [nnode_owned][3] work vectors */
   SbExactNodes exact;
-  PetscReal limit; /* spread from which on a node is solved exactly */
-  PetscReal scale; /* residuals are multiplied by this, to stay clear of the ends of the range of float */
-  PetscInt fresh;  /* iterations of the first solve with the present factor, -1 before it */
+  PetscReal limit; /* spread above which a node is solved exactly */
+  PetscReal scale; /* factor on residuals, to stay inside the range of float */
+  PetscInt fresh;  /* iterations of the first solve with this factor, -1: not known */
   PetscInt nfactor;
-  PetscBool renew; /* no factor, or one that is to be renewed */
+  PetscBool renew; /* the next set-up has to factor */
 } Rotated;
 
 /* ------------------------------------------------------------------ set-up, once */
@@ -64,7 +64,7 @@ static PetscErrorCode number_nodes(Rotated *p)
     p->node[p->n++] = i;
     nz += plan->di[i + 1] - plan->di[i] + plan->oi[i + 1] - plan->oi[i];
   }
-  // then those of the interface, which are kept
+  // then the adjacent interface nodes, which are kept
   ninterior = p->n;
   for (PetscInt i = 0; i < s->nnode; i++) {
     if (p->face->index[i] < 0) continue;
@@ -72,7 +72,7 @@ static PetscErrorCode number_nodes(Rotated *p)
     p->node[p->n++] = i;
   }
   p->nkeep = p->n - ninterior;
-  // rows of the interior: neighbours that are numbered
+  // rows of the interior: columns in the factor
   PetscCall(PetscMalloc2(ninterior + 1, &p->ia, nz, &p->ja));
   p->ia[0] = nz = 0;
   for (PetscInt k = 0; k < ninterior; k++) {
@@ -91,7 +91,7 @@ static PetscErrorCode number_nodes(Rotated *p)
 
 /* ------------------------------------------------------------------ set-up for a new operator */
 
-/* Rotations of cells that belong to the operator. */
+/* The rotations of cells that belong to the operator. */
 static PetscErrorCode find_cells(Rotated *p, Mat A, const SbPack **cells)
 {
   SbSpace s = p->space;
@@ -116,7 +116,7 @@ static PetscErrorCode find_cells(Rotated *p, Mat A, const SbPack **cells)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the rows of own interface nodes to the Schur complement; diagonals of prescribed nodes. */
+/* Adds the rows of own interface nodes to the Schur complement, and stores the diagonals of prescribed nodes. */
 static PetscErrorCode add_other_rows(Rotated *p, Mat A, PetscReal schur[])
 {
   SbSpace s = p->space;
@@ -165,7 +165,7 @@ static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
   PetscCall(SbSpaceGetRows(s, A, ninterior, p->node, ia, NULL, NULL));
   PetscCall(PetscMalloc2(ia[ninterior], &ja, 9 * ia[ninterior], &block));
   PetscCall(SbSpaceGetRows(s, A, ninterior, p->node, ia, ja, block));
-  /* columns of fully prescribed nodes drop out */
+  /* drop the columns of fully prescribed nodes */
   for (PetscInt at = 0; at < ia[ninterior]; at++) {
     if (p->local[ja[at]] < 0) continue;
     for (PetscInt e = 0; e < 9; e++) block[9 * nz + e] = block[9 * at + e];
@@ -175,7 +175,7 @@ static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
                          9 * (size_t)p->face->n * (size_t)p->face->n, &schur));
   PetscCall(SbFactorNumeric(p->factor, p->ia, p->ja, block, own, ok));
   PetscCall(add_other_rows(p, A, schur));
-  /* the Schur complement of the own interior, which is numbered locally, joins the one of the interface */
+  /* add the Schur complement of the own interior, numbered locally, to that of the interface */
   for (size_t j = 0; j < k; j++) {
     for (size_t i = j; i < k; i++) {
       const size_t row = 3 * (size_t)p->face->index[kept[i / 3]] + i % 3;
@@ -269,7 +269,7 @@ static PetscErrorCode apply_factor(Rotated *p, const float r[], float z[])
   PetscCall(PetscArrayzero(p->b + 3 * ninterior, 3 * p->nkeep));
   SbFactorForward(p->factor, p->b, p->kept);
   if (f->n) {
-    // the interface: its own right-hand side and the contributions of the interior
+    // interface: right-hand side of own rows plus the contributions of the interior
     PetscCall(PetscArrayzero(p->edge, 3 * f->n));
     for (PetscInt k = 0; k < f->nmine; k++) {
       const PetscInt i = f->mine[k];
@@ -282,7 +282,7 @@ static PetscErrorCode apply_factor(Rotated *p, const float r[], float z[])
     for (PetscInt k = 0; k < 3 * p->nkeep; k++)
       p->kept[k] = p->edge[3 * f->index[p->node[ninterior + k / 3]] + k % 3];
   }
-  // backward substitution, and Q
+  // backward substitution, and multiplication by Q
   SbFactorBackward(p->factor, p->kept, p->x);
   for (PetscInt k = 0; k < ninterior; k++)
     turn_forth(p->Q + 9 * p->node[k], p->x + 3 * k, z + 3 * p->node[k]);
@@ -291,7 +291,7 @@ static PetscErrorCode apply_factor(Rotated *p, const float r[], float z[])
 
     turn_forth(p->Q + 9 * i, p->edge + 3 * f->index[i], z + 3 * i);
   }
-  // prescribed nodes have a diagonal of their own
+  // prescribed nodes: divide by the diagonal
   for (PetscInt k = 0; k < s->nfixed && s->fixed_node[k] < s->nnode_owned; k++) {
     const PetscInt i = s->fixed_node[k];
 
@@ -337,7 +337,7 @@ static PetscErrorCode PCPreSolve_Rotated(PC pc, KSP ksp, Vec b, Vec x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Decides whether the next operator is to be factored. */
+/* Decides by the number of iterations whether the next operator is factored. */
 static PetscErrorCode PCPostSolve_Rotated(PC pc, KSP ksp, Vec b, Vec x)
 {
   KSPConvergedReason reason;
@@ -357,7 +357,7 @@ static PetscErrorCode PCPostSolve_Rotated(PC pc, KSP ksp, Vec b, Vec x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ life */
+/* ------------------------------------------------------------------ create and destroy */
 
 static PetscErrorCode PCView_Rotated(PC pc, PetscViewer viewer)
 {

@@ -1,32 +1,32 @@
 /*
-  Linear solvers by name. Each is a row of options for PETSc, put into its database where the user is silent, so that
-  everything stays adjustable by PETSc's own options; the matrix type is what the row's preconditioner takes.
+  Linear solvers by name. Each is a table row with PETSc options, set in the options database unless the user set them, so that
+  everything stays adjustable by PETSc's own options, and the matrix type that its preconditioner needs.
 
-  A -pc_type of the user's that is not the row's own takes the row's place: `by_type` says which matrix it works on. The method is CG
-  then, or what -ksp_type says. SbSolverFinish() refuses what cannot work, before anything is computed.
+  A -pc_type of the user other than the row's replaces the row: `by_type` gives the matrix type. The Krylov method is then
+  CG, or that of -ksp_type. SbSolverFinish() reports unsupported combinations as errors before anything is computed.
 
-  Convergence is judged by the true residual wherever the method computes it: the preconditioned norm can be off by orders of magnitude for nearly
-  incompressible bodies. Gauss-Seidel and SOR are wrapped in a PCCOMPOSITE of one: Richardson hands its whole loop to a bare
-  PCSOR, which does the largest number of sweeps without examining the residual. A solve that does not reach its tolerance fails; the
-  next row of a list is then tried on the same system (time/solver_list.c), and only after the last one is the step cut or the run stopped.
+  The convergence test uses the true residual wherever the method computes it: the preconditioned norm can be off by orders of magnitude for nearly
+  incompressible bodies. Gauss-Seidel and SOR are wrapped in a PCCOMPOSITE with one member: a bare
+  PCSOR takes over Richardson's loop and does the maximum number of sweeps without testing the residual. A solve that does not reach its tolerance fails; the
+  next solver of a list is then tried on the same system (time/solver_list.c), and only if all fail is the step halved or the run stopped.
 */
 #include "solver_impl.h"
 #include "sbconstraint.h"
 #include "sbsolver.h"
 
-#define RESTART 100 /* of FGMRES */
-/* From docs/reports/solver_choice.md. Unknowns up to which a factorisation ... */
-#define ROTATED 60000          /* rotated factorisation */
-#define ROTATED_SLIVERS 120000 /* also with slivers, up to NU_SLIVERS */
-#define DIRECT_P1 80000        /* is faster for P1 than iterations, from NU_LOCKED on */
-#define P_MULTIGRID 5000       /* is as fast as P2's multigrid, up to nu NU_SLIVERS */
-#define DIRECT_NEXT 200000     /* is faster with slivers from NU_PRESSURE on, and the first fallback */
-/* Poisson's ratio */
-#define NU_PRESSURE 0.45 /* from which on CR does better with the pressures apart in dynamic runs, too */
+#define RESTART 100 /* restart length of FGMRES */
+/* Thresholds from docs/reports/solver_choice.md. Largest number of unknowns for ... */
+#define ROTATED 60000          /* the rotated factorisation */
+#define ROTATED_SLIVERS 120000 /* the same, with slivers and nu up to NU_SLIVERS */
+#define DIRECT_P1 80000        /* a factorisation for P1, from nu = NU_LOCKED on: faster than iterations */
+#define P_MULTIGRID 5000       /* a factorisation for P2, up to nu = NU_SLIVERS: as fast as p-multigrid */
+#define DIRECT_NEXT 200000     /* a factorisation with slivers from NU_PRESSURE on, or as first fallback */
+/* Poisson's ratio ... */
+#define NU_PRESSURE 0.45 /* from which on dynamic CR, too, has the pressures as unknowns */
 #define NU_SLIVERS 0.49
 #define NU_LOCKED 0.4995
-#define NU_ROTATED 0.4999 /* up to which nodes of CR and DG at faces may turn a factorisation with them */
-#define SLIVERS 0.001     /* part of the tets from which on slivers count */
+#define NU_ROTATED 0.4999 /* up to which the rotated factorisation is used for CR and DG */
+#define SLIVERS 0.001     /* fraction of the tets from which on slivers matter */
 
 static PetscErrorCode create_frames(SbSpace s, Mat *A)
 {
@@ -89,7 +89,7 @@ static const SbSolverPreset presets[] = {
      "Poisson's ratio"},
 };
 
-/* Preconditioners of -pc_type: their matrix types and options. The last row: all others. */
+/* Matrix types and options for preconditioners of -pc_type. The last row: all others. */
 static const SbSolverPreset by_type[] = {
   {.name = PCNONE, .matrix = SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type none"},
   {.name = PCJACOBI, .matrix = SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type jacobi"},
@@ -140,7 +140,7 @@ PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size)
   PetscFunctionBeginUser;
   PetscCall(SbOptionChoice(&SbRunScope, "solver", &index));
   PetscCall(SbOptionCheckEarly(&SbRunScope, "reproducible"));
-  /* the choices are auto, direct and then the rows of the table */
+  /* choice 0 is auto, 1 is direct, then follow the rows of the table */
   PetscCall(PetscStrncpy(choice, index > 1 ? presets[index - 2].name : index ? "direct" : "auto", size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -153,8 +153,8 @@ static const SbSolverPreset *find_preset(const char *name)
   return NULL;
 }
 
-/* Whether some law always hands out its exact tangent, which is indefinite in compression: CHOLMOD fails there. Where Newton's method chooses (auto), it takes that
-   failure for a reason to filter. */
+/* Whether some law always uses its exact tangent, which is indefinite in compression, so that CHOLMOD fails. Where Newton's method chooses the tangent (auto), such a
+   failure makes it project the cells' tangents. */
 static PetscErrorCode may_be_indefinite(SbSpace s, PetscBool *maybe)
 {
   PetscFunctionBeginUser;
@@ -168,7 +168,7 @@ static PetscErrorCode may_be_indefinite(SbSpace s, PetscBool *maybe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The value of a row's option, "cholesky" of -pc_type; "" where there is none. */
+/* Value of an option in a preset's option string, "cholesky" for a direct preset's -pc_type; "" if it has none. */
 static PetscErrorCode preset_value(const SbSolverPreset *preset, const char *name, size_t size, char value[])
 {
   const char *at = strstr(preset->options, name);
@@ -184,10 +184,10 @@ static PetscErrorCode preset_value(const SbSolverPreset *preset, const char *nam
 
 /* Properties of the bodies that make systems hard to solve. */
 typedef struct {
-  PetscReal nu, face_nu; /* largest Poisson's ratio; that of bodies with nodes at faces, -1 without any */
-  PetscReal sliver_part; /* tets with an angle below SB_SLIVER as a part of all */
-  PetscBool slivers;     /* above the threshold */
-  PetscBool dg;          /* some element has nodes of its own in each cell */
+  PetscReal nu, face_nu; /* largest Poisson's ratio; that of bodies with nodes at faces, -1: none */
+  PetscReal sliver_part; /* fraction of tets with an angle below SB_SLIVER */
+  PetscBool slivers;     /* sliver_part is above SLIVERS */
+  PetscBool dg;          /* some element has its nodes in one cell only (DG) */
 } Hardness;
 
 static PetscErrorCode find_hardness(SbSpace s, Hardness *h)
@@ -216,8 +216,8 @@ static PetscErrorCode find_hardness(SbSpace s, Hardness *h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The row for what the user chose by an option of PETSc, *option. -pc_type: that of -solver when it has the same one. -pc_factor_mat_solver_type, where
-   nothing else than a factorisation is chosen: that of the package. NULL: the user gave none. */
+/* Finds the preset for a PETSc option of the user, *option. -pc_type: that of -solver if it has this type, else one of by_type. -pc_factor_mat_solver_type, if
+   -solver is auto or direct: that of the package. NULL: the user set neither. */
 static PetscErrorCode find_type(const char *choice, const SbSolverPreset **preset, const char **option)
 {
   const SbSolverPreset *base = find_preset(choice);
@@ -265,7 +265,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   PetscCall(PetscOptionsGetString(NULL, NULL, "-ksp_type", method, sizeof(method), NULL));
   *preset = NULL;
   if (!explicit_run) PetscCall(find_type(choice, preset, &option));
-  /* a rotated factorisation, unless the interfaces between ranks have too many nodes */
+  /* rotated factorisation, unless too many nodes are on interfaces between ranks */
   turns = (PetscBool)(!strcmp(choice, "rotated") || !strcmp(choice, "realtime"));
   if (!strcmp(choice, "auto"))
     turns = (PetscBool)(dynamic && !linear && hard.face_nu <= NU_ROTATED && strcmp(method, KSPMINRES) &&
@@ -298,8 +298,8 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   } else if (strcmp(choice, "auto")) {
     PetscCall(PetscSNPrintf(reason, size, "chosen by -solver"));
   } else if (turns) {
-    /* 51k unknowns of CR, 36k of DG, nu 0.4: ms per step of this and cg_two_level 22 and 89, 22 and 94 on two ranks, 12 and 50, 16
-       and 76 on four (docs/reports/realtime_ranks.md). Ten steps of 1.3k to 2.3k unknowns, linear iterations of this and pressure,
+    /* 51k unknowns of CR, 36k of DG, nu 0.4: ms per step of rotated and cg_two_level 22 and 89, 22 and 94 on two ranks, 12 and 50, 16
+       and 76 on four (docs/reports/realtime_ranks.md). Ten steps of 1.3k to 2.3k unknowns, linear iterations of rotated and pressure,
        DG: 1150 and 1478 at nu 0.4999, 14521 and 1652 at 0.49999, 634312 and 4348 at 0.499999 */
     name = "rotated";
     PetscCall(PetscSNPrintf(reason, size,
@@ -337,7 +337,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
              (s->edge_node
                 ? !s->faces && hard.nu > NU_SLIVERS
                 : s->faces && (hard.face_nu > NU_PRESSURE || (!hard.slivers && (!dynamic || hard.dg))))) {
-    /* docs/reports/solver_choice.md; 24k tets of CR, dynamic, CPU s of this and cg_two_level at nu 0.3 12 and 7, at 0.45 15 and 11, at 0.49 17 and 17 */
+    /* docs/reports/solver_choice.md; 24k tets of CR, dynamic, CPU s of pressure and cg_two_level at nu 0.3 12 and 7, at 0.45 15 and 11, at 0.49 17 and 17 */
     name = "pressure";
     PetscCall(PetscSNPrintf(
       reason, size,
@@ -346,7 +346,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
       dynamic ? "dynamic" : "static", unknowns, s->edge_node ? "p2" : "cr or dg",
       (double)(s->edge_node ? hard.nu : hard.face_nu)));
   } else {
-    /* 192k tets, CPU s of one rank. Static: 0.36 (cg_gamg 1.7, cg_icc 1.4), at nu 0.45 0.7 (2.3), at 0.499 4.2 (18); dynamic, h = 0.01 s: 0.22 (1.7, 0.40) */
+    /* 192k tets, CPU s of cg_two_level on one rank. Static: 0.36 (cg_gamg 1.7, cg_icc 1.4), at nu 0.45 0.7 (2.3), at 0.499 4.2 (18); dynamic, h = 0.01 s: 0.22 (1.7, 0.40) */
     name = s->edge_node && !s->faces ? "cg_p_multigrid" : "cg_two_level";
     PetscCall(
       PetscSNPrintf(reason, size,
@@ -372,7 +372,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solvers after one that failed, in this order, and up to how many unknowns: a factorisation fails seldom, and costs most. */
+/* Fallback solvers in the order of trial, and their largest numbers of unknowns: a factorisation fails rarely but costs most. */
 static const struct {
   const char *name;
   PetscInt most;
@@ -393,19 +393,19 @@ PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscB
   PetscCall(find_hardness(s, &hard));
   if (find_preset(failed->name) == failed) *tried |= 1U << (failed - presets);
   PetscCall(may_be_indefinite(s, &indefinite));
-  /* where the tangent itself is not definite, and may be so, the iteration is not to blame: that is Newton's affair */
+  /* where the tangent itself may be indefinite, Newton's method changes the tangent; no other solver is tried */
   if (indefinite && reason == KSP_DIVERGED_INDEFINITE_MAT) PetscFunctionReturn(PETSC_SUCCESS);
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(others) && !*preset; k++) {
     const PetscBool direct = (PetscBool)!strcmp(others[k].name, "direct");
 
     if (3 * s->Nnode > others[k].most || (memory && direct)) continue;
-    /* multigrid on displacements of nodes at faces takes thousands of iterations near 1/2 */
+    /* algebraic multigrid takes thousands of iterations on CR and DG near nu = 1/2 */
     if (!strcmp(others[k].name, "cg_gamg") && hard.face_nu > NU_PRESSURE) continue;
-    /* a system that is singular for a factorisation is so for iterations */
+    /* a matrix that is singular for a factorisation is singular for iterations */
     if (failed->direct && !memory && !direct) continue;
-    /* The row of a name in that list that has not failed yet and can solve for this space; NULL: there is none. */
+    /* The first listed fallback of a name that has not failed yet and supports this space; NULL: none. */
     *preset = direct ? NULL : find_preset(others[k].name);
-    /* next: indefinite by rounding or by stress */
+    /* next factorisation: one for indefinite matrices, whether by rounding or by stress */
     for (int j = indefinite; direct && j < 2 && !*preset; j++) {
       const char *package;
 
@@ -420,8 +420,8 @@ PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscB
 }
 
 /*
-  Adds the options of a row to PETSc's database, unless the user gave them, or removes them again (clear), unless their values differ. Types are set by calls,
-  so that those in the database are the user's.
+  Adds a preset's options to PETSc's database unless the user set them, or (clear) removes those whose values are still the preset's. Types are set by calls,
+  so that types in the database are always the user's.
 */
 static PetscErrorCode set_options(const char *text, PetscBool clear)
 {
@@ -459,8 +459,8 @@ PetscErrorCode SbSolverCreateOperator(SbSpace s, const SbSolverPreset *preset, M
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(s->comm, &nrank));
-  /* PETSc's incomplete factors of blocks have no shift, and those of CR and DG are indefinite at any tangent; P1's need none, and are faster by
-     two fifths than those of numbers */
+  /* PETSc's block ICC has no shift, and breaks down for CR and DG with any tangent; P1 needs no shift, and its block ICC takes
+     two fifths less time than the scalar one */
   if (kind == SB_MATRIX_SBAIJ && !preset->precondition && s->faces) kind = SB_MATRIX_AIJ;
   if (kind == SB_MATRIX_SBAIJ && nrank > 1) kind = SB_MATRIX_BAIJ;
   if (preset->create)
@@ -470,7 +470,7 @@ PetscErrorCode SbSolverCreateOperator(SbSpace s, const SbSolverPreset *preset, M
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The package that factors where the user names neither one nor -solver: PETSc's own choice knows neither sizes nor ranks. */
+/* The factorisation package where the user names neither one nor -solver: PETSc's default depends on neither size nor number of ranks. */
 static PetscErrorCode choose_package(SbSpace s, PC pc, const char *type)
 {
   const PetscBool lu = (PetscBool)!strcmp(type, PCLU);
@@ -483,7 +483,7 @@ static PetscErrorCode choose_package(SbSpace s, PC pc, const char *type)
   PetscCall(may_be_indefinite(s, &indefinite));
   PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, (PetscBool)(!lu && !indefinite), &package));
   if (size > 1) {
-    /* a type of the user's is one for distributed matrices */
+    /* on several ranks, MUMPS for any other matrix type */
     package = MATSOLVERMUMPS;
     PetscCall(SbHasPackage(package, &has));
     if (!has && lu) package = MATSOLVERSUPERLU_DIST;
@@ -494,13 +494,13 @@ static PetscErrorCode choose_package(SbSpace s, PC pc, const char *type)
   if (package) PetscCall(PCFactorSetMatSolverType(pc, package));
   if (package && !strcmp(package, MATSOLVERMUMPS))
     PetscCall(set_options("-mat_mumps_icntl_13 1 -mat_mumps_icntl_14 100", PETSC_FALSE));
-  /* a pivot that is not positive shows in the solver's reason */
+  /* a non-positive pivot appears as a reason of the solve, not as an error */
   if (package && !strcmp(package, MATSOLVERCHOLMOD))
     PetscCall(set_options("-mat_cholmod_print 0", PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Methods for symmetric systems only. */
+/* Whether the Krylov method is for symmetric systems only. */
 static PetscErrorCode is_symmetric(KSP ksp, PetscBool *is)
 {
   PetscFunctionBeginUser;
@@ -518,24 +518,24 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   PC pc;
 
   PetscFunctionBeginUser;
-  /* multigrid sums its coarse matrices up in the order in which messages arrive */
+  /* algebraic multigrid sums its coarse matrices in the order in which messages arrive */
   PetscCall(SbSolverReproducible(&reproducible));
   PetscCallMPI(MPI_Comm_size(s->comm, &size));
   if (reproducible && size > 1)
     PetscCall(set_options("-matptap_via allatonce -matstash_reproduce yes", PETSC_FALSE));
   PetscCall(SNESGetKSP(snes, &ksp));
-  if (s->constraints && s->constraints->general) { /* another solver begins as the first one did */
+  if (s->constraints && s->constraints->general) { /* each solver starts from the original method */
     PetscCall(KSPSetNormType(ksp, s->constraints->norm));
     PetscCall(KSPSetPCSide(ksp, s->constraints->side));
     s->constraints->general = PETSC_FALSE;
   }
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(KSPSetTolerances(ksp, 1e-8, PETSC_DEFAULT, PETSC_DEFAULT, 5000));
-  /* in a null space the residual of CG may grow a long way before it falls */
+  /* the residual norm of CG in a null space may grow far before it decreases */
   if (SbConstraintsSeparate(s))
     PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, PETSC_DEFAULT, 1e10, PETSC_DEFAULT));
   PetscCall(SbPCConstrainedCreate(s, pc, &pc));
-  /* the row, and over it the types of the user's */
+  /* the preset's types, or those of the user */
   PetscCall(preset_value(preset, "-ksp_type", sizeof(method), method));
   PetscCall(preset_value(preset, "-pc_type", sizeof(type), type));
   PetscCall(PetscOptionsGetString(NULL, NULL, "-pc_type", type, sizeof(type), NULL));
@@ -543,11 +543,11 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   PetscCall(KSPSetType(ksp, given ? users : method));
   PetscCall(is_symmetric(ksp, &symmetric));
   if (type[0]) PetscCall(PCSetType(pc, type));
-  /* options that keep the preconditioner symmetric */
+  /* variants that keep the preconditioner symmetric */
   if (symmetric && !strcmp(type, PCASM)) PetscCall(set_options("-pc_asm_type basic", PETSC_FALSE));
   if (symmetric && !strcmp(type, PCCOMPOSITE))
     PetscCall(set_options("-sub_0_pc_sor_local_symmetric", PETSC_FALSE));
-  /* eigenvalues of the first matrix, which PETSc keeps with the interpolation, are too small once springs of contact stand in it */
+  /* PETSc keeps the eigenvalue estimate of the first matrix with the interpolation; it is too small once contact stiffness is added */
   PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &given));
   if (!given && !strcmp(type, PCGAMG)) PetscCall(set_options("-pc_gamg_use_sa_esteig no", PETSC_FALSE));
   PetscCall(set_options(preset->options, PETSC_FALSE));
@@ -568,7 +568,8 @@ PetscErrorCode SbSolverUpdateSymmetry(KSP ksp, SbSpace s)
   PetscFunctionBeginUser;
   if (!c || !c->nonsymmetric || c->general == c->tilted) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(is_symmetric(ksp, &symmetric));
-  if (!symmetric && !c->general) PetscFunctionReturn(PETSC_SUCCESS); /* general enough */
+  if (!symmetric && !c->general)
+    PetscFunctionReturn(PETSC_SUCCESS); /* the method handles nonsymmetric systems */
   if (symmetric) {
     PetscCall(KSPGetType(ksp, &type));
     PetscCall(PetscStrncpy(c->method, type, sizeof(c->method)));
@@ -584,7 +585,7 @@ PetscErrorCode SbSolverUpdateSymmetry(KSP ksp, SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A factorisation that the matrix's type, the number of ranks or -reproducible rules out. */
+/* Errors for a factorisation that the matrix type, the number of ranks or -reproducible rules out. */
 static PetscErrorCode check_factor(PC pc, Mat A)
 {
   static const struct {
@@ -622,7 +623,7 @@ static PetscErrorCode check_factor(PC pc, Mat A)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One application of a preconditioner that does not solve; MINRES with one that is symmetric to single precision only. */
+/* Errors for a single application of a preconditioner that is no solver, and for MINRES with a preconditioner that is symmetric to single precision only. */
 static PetscErrorCode check_method(SbSpace s, KSP ksp, PC pc, const SbSolverPreset *preset, PetscBool *direct)
 {
   PetscBool single, parts, minres;
@@ -687,7 +688,7 @@ PetscErrorCode SbSolverFinish(SNES snes, SbSpace s, const SbSolverPreset *preset
     PetscCall(KSPGMRESSetRestart(ksp, restart));
   }
   PetscCall(SbKSPCheckNorm(ksp));
-  /* a solve that no Newton step examines, or whose own norm is not to be trusted */
+  /* check true residuals where no Newton step does, or where the method's norm is unreliable */
   PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &single));
   if (s->constraints && s->constraints->saddle == SB_SADDLE_DIRECT) direct = PETSC_TRUE;
   PetscCall(SbKSPCheckTrueResidual(ksp, direct, single));
