@@ -1,8 +1,8 @@
 /*
-  A matrix of 3x3 blocks that rank 0 factors for all (factor.c): its rows go there, and each right-hand side; solutions come back.
+  Direct solver for a distributed matrix of 3x3 blocks: rank 0 gathers and factors it (factor.c), gathers right-hand sides and scatters solutions.
 
-  The order of elimination is kept when the pattern grows by a little, as that of contact does from iteration to iteration: METIS is asked for
-  a new one only when the factor has become larger than WORSE times that of its last one.
+  The order of elimination is kept while the pattern grows little, as in contact from iteration to iteration: METIS computes
+  a new one only when the factor has more than WORSE times the entries of the one that METIS ordered last.
 */
 #include "block_solver.h"
 
@@ -11,13 +11,14 @@
 struct _p_SbBlockSolver {
   MPI_Comm comm;
   PetscMPIInt rank, size;
-  PetscInt n, N; /* block rows of this rank; rank 0: of all */
+  PetscInt n, N; /* number of block rows of this rank; of all ranks */
   MPI_Datatype triple, block;
-  PetscMPIInt *row_count, *row_first, *entry_count, *entry_first; /* [size] */
-  PetscInt *ia, *ja;                                              /* rank 0: pattern of all rows */
-  PetscReal *value, *x; /* rank 0, several ranks: blocks of all rows; right-hand side and solution */
+  PetscMPIInt *row_count, *row_first, *entry_count,
+    *entry_first;       /* [size] counts and displacements of the ranks, for MPI */
+  PetscInt *ia, *ja;    /* rank 0: pattern of all rows */
+  PetscReal *value, *x; /* rank 0 of several: blocks of all rows; right-hand side and solution */
   SbFactor factor;
-  PetscInt64 dissected; /* entries of the factor when METIS ordered it */
+  PetscInt64 dissected; /* number of entries of the factor when METIS ordered it */
 };
 
 PetscErrorCode SbBlockSolverCreate(MPI_Comm comm, SbBlockSolver *solver)
@@ -55,7 +56,7 @@ PetscErrorCode SbBlockSolverDestroy(SbBlockSolver *solver)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Counts of all ranks, and where each begins; returns the sum. */
+/* Gathers the counts of all ranks and their displacements; returns the sum. */
 static PetscInt sum_counts(PetscMPIInt size, const PetscMPIInt count[], PetscMPIInt first[])
 {
   PetscInt sum = 0;
@@ -67,7 +68,7 @@ static PetscInt sum_counts(PetscMPIInt size, const PetscMPIInt count[], PetscMPI
   return sum;
 }
 
-/* The pattern of all rows on rank 0, and its elimination. */
+/* Gathers the pattern on rank 0, and factors it symbolically. */
 PetscErrorCode SbBlockSolverAnalyze(SbBlockSolver b, PetscInt n, const PetscInt ia[], const PetscInt ja[])
 {
   const PetscBool root = (PetscBool)!b->rank;
@@ -99,7 +100,7 @@ PetscErrorCode SbBlockSolverAnalyze(SbBlockSolver b, PetscInt n, const PetscInt 
   b->ia[0] = 0;
   for (PetscInt i = 0; i < b->N; i++) b->ia[i + 1] += b->ia[i];
 
-  /* the old order while it serves */
+  /* keep the old order while its factor is not too large */
   if (b->factor && before == b->N) {
     PetscCall(PetscMalloc1(b->N, &order));
     PetscCall(PetscArraycpy(order, SbFactorOrder(b->factor), b->N));

@@ -1,18 +1,19 @@
 /*
-  The coarse space of the two-level preconditioner: modes of the aggregates, their distribution over ranks, and the two maps
-  between nodes and modes.
+  The coarse space of the two-level preconditioner: modes of the aggregates, their distribution over ranks, restriction and
+  prolongation.
 
-  Modes that vanish, as the rotations of an aggregate of one node, are found once from the Gram matrix sum Z_i^T Z_i: its
-  eigenvectors with eigenvalues near zero. They are all that can make E = Z^T A Z singular (coarse_operator.c).
+  Modes that vanish, as the rotations of an aggregate of one node, are the eigenvectors of the Gram matrix sum Z_i^T Z_i
+  with eigenvalues near zero. Only they can make E = Z^T A Z singular (coarse_operator.c).
 */
 #include "coarse.h"
 #include <petscblaslapack.h>
 
-#define SB_VANISHING 1e-8 /* squared size of a mode over that of the largest one of its aggregate */
+#define SB_VANISHING \
+  1e-8 /* largest size of a vanishing mode, squared, relative to the largest mode of its aggregate */
 
 /* ------------------------------------------------------------------ set-up, once */
 
-/* Places relative to the centre in units of the radius. */
+/* Positions relative to the aggregate's centre, over its radius. */
 static void find_positions(SbCoarse c)
 {
   SbSpace s = c->space;
@@ -34,7 +35,7 @@ static void find_positions(SbCoarse c)
   }
 }
 
-/* Projector onto the modes of one aggregate that vanish: eigenvectors of the Gram matrix. */
+/* Projector onto the vanishing modes of one aggregate: eigenvectors of the Gram matrix. */
 static PetscErrorCode find_vanishing(SbCoarse c, PetscInt a, PetscReal projector[36])
 {
   SbSpace s = c->space;
@@ -63,14 +64,14 @@ static PetscErrorCode find_vanishing(SbCoarse c, PetscInt a, PetscReal projector
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adjacency of aggregates: those at the neighbours of an aggregate's nodes, the aggregate itself first. */
+/* Adjacency of aggregates: the aggregate itself, then those of the neighbours of its nodes. */
 static PetscErrorCode find_pattern(SbCoarse c)
 {
   SbPlan p = c->space->plan;
   PetscInt lowest = c->N, highest = c->first + c->n, *mark, nz = 0;
 
   PetscFunctionBeginUser;
-  /* marks from the lowest to the highest aggregate that this rank knows of */
+  /* marks for the range of aggregates that this rank knows */
   for (PetscInt i = 0; i < c->space->nnode; i++) {
     if (c->agg[i] >= 0) lowest = PetscMin(lowest, c->agg[i]);
     highest = PetscMax(highest, c->agg[i] + 1);
@@ -126,14 +127,14 @@ PetscErrorCode SbCoarseCreate(SbSpace s, PetscInt wanted, PetscBool spread, SbCo
   PetscCallMPI(MPI_Allreduce(&c->n, &c->N, 1, MPIU_INT, MPI_SUM, s->comm));
   PetscCallMPI(MPI_Scan(&c->n, &c->first, 1, MPIU_INT, MPI_SUM, s->comm));
   c->first -= c->n;
-  /* own nodes by aggregate: agg still counts from 0 on this rank */
+  /* own nodes by aggregate: agg is still numbered from 0 on this rank */
   PetscCall(SbBucketByKey(s->nnode_owned, c->agg, c->n, &c->member_start, &c->member));
   PetscCall(PetscMalloc1(4 * c->n, &c->centre));
   find_positions(c);
   PetscCall(PetscMalloc1(36 * c->n, &c->null));
   for (PetscInt a = 0; a < c->n; a++) PetscCall(find_vanishing(c, a, c->null + 36 * a));
 
-  /* numbers and positions of the nodes on every rank that knows them */
+  /* aggregates and positions of the nodes on every rank that has them */
   PetscCall(PetscCalloc1(3 * s->nnode, &number));
   for (PetscInt i = 0; i < s->nnode_owned; i++)
     number[3 * i] = c->agg[i] < 0 ? -1. : (PetscReal)(c->first + c->agg[i]);
@@ -175,7 +176,7 @@ PetscErrorCode SbCoarseDestroy(SbCoarse *coarse)
 PetscErrorCode SbCoarseRestrict(SbCoarse c, Vec R, PetscReal *share)
 {
   SbSpace s = c->space;
-  PetscReal norm2[2] = {0., 0.}; /* of c, weighted, and of r on the aggregates */
+  PetscReal norm2[2] = {0., 0.}; /* squared norm of c, weighted; of r on the aggregates */
   const PetscScalar *r;
   PetscScalar *m;
 

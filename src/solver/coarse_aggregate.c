@@ -1,17 +1,17 @@
 /*
-  Aggregates of nodes for the coarse space: balls, then their rounding.
+  Aggregates of nodes for the coarse space: breadth-first balls, improved by Lloyd's iteration.
 
-  Balls of equal numbers of nodes are grown breadth first over the graph, each from the first free node that the balls
-  before it have touched; remainders of less than half a ball are dropped. From the centres of what is left the graph is
-  flooded again (each node goes to the centre it is nearest to, counted in edges) and the centres are moved to the middle,
-  a few times: Lloyd's iteration on a graph, Bell (2008), Algebraic multigrid for discontinuous and anisotropic problems,
-  section 4. Everything is linear in the number of edges: about 20 ms for 200,000 tets.
+  Balls of equal numbers of nodes are grown breadth first over the graph, each from the first free neighbour of the
+  balls before it; balls of less than half the size are dropped. Then, a few times, each node is
+  assigned to the nearest seed, counted in edges, and the seeds are moved to the centres
+  of their aggregates: Lloyd's iteration on a graph, Bell (2008), Algebraic multigrid for discontinuous and anisotropic problems,
+  section 4. The cost is linear in the number of edges: about 20 ms for 200,000 tets.
 */
 #include "coarse.h"
 
-#define ROUNDS 3 /* further ones change the number of iterations by less than one in fifty */
+#define ROUNDS 3 /* iterations; further ones change the solver's iterations by less than 2 % */
 
-/* Grows one ball of at most `size` free nodes from queue[0]; returns how many it has. */
+/* Grows one ball of at most `size` free nodes from queue[0]; returns its number of nodes. */
 static PetscInt grow(SbPlan p, PetscInt size, PetscInt name, PetscInt queue[], PetscInt agg[])
 {
   PetscInt tail = 1;
@@ -28,7 +28,7 @@ static PetscInt grow(SbPlan p, PetscInt size, PetscInt name, PetscInt queue[], P
   return tail;
 }
 
-/* A free neighbour of the nodes at the front, -1 when they have none left. */
+/* A free neighbour of the nodes in the front, -1 if there is none. */
 static PetscInt free_neighbour(SbPlan p, const PetscInt agg[], const PetscInt front[], PetscInt *head,
                                PetscInt tail)
 {
@@ -40,7 +40,7 @@ static PetscInt free_neighbour(SbPlan p, const PetscInt agg[], const PetscInt fr
   return -1;
 }
 
-/* Balls over all free nodes; the seeds of those worth keeping. agg: -2 on prescribed nodes, -1 on others; overwritten. */
+/* Grows balls over all free nodes; returns the seeds of those kept. agg: -2 on prescribed nodes, -1 on others; overwritten. */
 static void find_seeds(SbPlan p, PetscInt nnode, PetscInt size, PetscInt agg[], PetscInt queue[],
                        PetscInt front[], PetscInt *nseed, PetscInt seed[])
 {
@@ -60,7 +60,7 @@ static void find_seeds(SbPlan p, PetscInt nnode, PetscInt size, PetscInt agg[], 
   *nseed = count;
 }
 
-/* Gives each free node to the seed it is nearest to. */
+/* Assigns each free node to the nearest seed. */
 static void flood(SbPlan p, PetscInt nseed, const PetscInt seed[], PetscInt queue[], PetscInt agg[])
 {
   PetscInt tail = 0;
@@ -80,7 +80,7 @@ static void flood(SbPlan p, PetscInt nseed, const PetscInt seed[], PetscInt queu
   }
 }
 
-/* Moves each seed to the node nearest to the centre of its aggregate. */
+/* Moves each seed to the node nearest to the centroid of its aggregate. */
 static void centre(SbSpace s, PetscInt nseed, const PetscInt agg[], PetscReal sum[], PetscReal best[],
                    PetscInt seed[])
 {

@@ -1,16 +1,16 @@
 /*
-  The operator on the coarse space, E = Z^T A Z: its blocks by direct loops over the block rows of A, its factor.
+  The coarse operator E = Z^T A Z, by loops over the block rows of A.
 
   For a node i and an aggregate b among its neighbours, W_ib = sum_j A_ij Z_j over the neighbours in b, 3x6; then
-  E_ab += Z_i^T W_ib with a the aggregate of i. Each rank makes the rows of its own aggregates; where A has
-  only blocks above the diagonal, those of E below it are their transposes.
+  E_ab += Z_i^T W_ib with a the aggregate of i. Each rank computes the rows of its own aggregates; where A has
+  only the upper triangle, blocks of E below the diagonal are transposes.
 
-  Modes that vanish make E singular, but decoupled: they get the mean diagonal of their block, and multiply zeros.
+  Vanishing modes have zero rows and columns in E: their diagonal is set to the mean diagonal of their block, and right-hand sides are zero there.
 */
 #include "coarse.h"
 #include "sbassembly.h"
 
-/* W[3][6] += factor K Z_j; K by columns. */
+/* W[3][6] += factor K Z_j; K column-major. */
 static inline void add_column(const PetscScalar K[9], PetscReal factor, const PetscReal d[3], PetscReal W[18])
 {
   for (int r = 0; r < 3; r++) {
@@ -28,7 +28,7 @@ static inline void add_column(const PetscScalar K[9], PetscReal factor, const Pe
 /* The sums W of one row, by aggregate. */
 typedef struct {
   PetscInt n;
-  PetscInt *b;  /* aggregates */
+  PetscInt *b;  /* number of aggregates; [n] aggregates */
   PetscReal *W; /* [n][18] */
 } RowSums;
 
@@ -44,7 +44,7 @@ static inline PetscReal *sum_of(RowSums *row, PetscInt b)
   return row->W + 18 * k;
 }
 
-/* Rows of prescribed components hold only their diagonal, columns likewise, which is not in the span of Z: left out by the masks. */
+/* W of row i. Prescribed components are left out: their rows and columns have only the diagonal. */
 static void sum_row(SbCoarse c, const SbMatBlocks *x, PetscInt i, RowSums *row)
 {
   const SbPlan p = c->space->plan;
@@ -71,7 +71,7 @@ static void sum_row(SbCoarse c, const SbMatBlocks *x, PetscInt i, RowSums *row)
   }
 }
 
-/* Block (a, b), a own. */
+/* Pointer to block (a, b) of E, a own. */
 static inline PetscReal *block_of(SbCoarse c, PetscInt a, PetscInt b)
 {
   PetscInt k = c->start[a - c->first];
@@ -118,7 +118,7 @@ PetscErrorCode SbCoarseSetUp(SbCoarse c, Mat A)
     }
   }
   PetscCall(SbMatRestoreBlocks(&x));
-  /* Diagonal blocks: symmetric, with their vanishing modes filled; those below them from those above where A has only these. */
+  /* Diagonal blocks: made symmetric, vanishing modes filled. With symmetric storage, blocks below them are copied from above. */
   for (PetscInt a = 0; a < c->n; a++) {
     PetscReal *E = c->value + 36 * c->start[a], trace = 0.;
 

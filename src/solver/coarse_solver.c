@@ -1,27 +1,27 @@
 /*
-  What solves with the coarse operator, the rows of which are where their aggregates are.
+  Solver for the coarse operator, which is distributed by rows like its aggregates.
 
   A few hundred aggregates: one rank gathers and factors E for all (pc_direct.c). Many: a V-cycle of PETSc's algebraic multigrid
   approximates E^-1, so that a rank's work for it is bounded by its own aggregates.
 
-  E is a matrix of blocks of six whose near null space is known exactly: a rigid motion t + w x (x - x_b) of the body is on an aggregate
-  with centre x_a and radius r the six numbers t + w x (x_a - x_b) and r w. Smoothed aggregation coarsens on (Vanek, Mandel, Brezina 1996,
-  Algebraic multigrid by smoothed aggregation); it puts small levels on fewer ranks and factors the last one on one. The smoother
-  is Chebyshev's with 6x6 diagonal blocks, which does not depend on the number of ranks. The cycle is symmetric and
+  E is a matrix of blocks of six whose near null space is known exactly: on an aggregate with centre x_a and radius r,
+  a rigid-body mode t + w x (x - x_b) has the six coefficients t + w x (x_a - x_b) and r w. Smoothed aggregation coarsens further (Vanek, Mandel, Brezina 1996,
+  Algebraic multigrid by smoothed aggregation); it agglomerates small levels on fewer ranks; one rank factors the coarsest one. The smoother
+  is Chebyshev with 6x6 diagonal blocks, independent of the number of ranks. The cycle is symmetric and
   positive definite.
 */
 #include "coarse.h"
 #include "solver_impl.h"
 
 /*
-  Unknowns of the last level, which one rank factors, and of a rank on those before it. Bar of 332,000 tets on 64 ranks: 35 iterations
-  and 114 messages of a rank in each; with PETSc's 50 and 50 43 and 290. Coarsening by the square of the graph, PETSc's default on the
+  Unknowns of the coarsest level, which one rank factors, and least unknowns per rank on finer levels. Bar of 332,000 tets on 64 ranks: 35 iterations
+  with 114 messages of a rank each; with PETSc's defaults 50 and 50: 43 and 290. Coarsening by the square of the graph, PETSc's default on the
   first level, takes 50 iterations instead of 38 on 16 ranks.
 */
 #define LAST_LEVEL 600
 #define PER_RANK 300
 
-/* One mode of the body in the modes of its aggregates. */
+/* Fills v with rigid-body mode m of a body, by the modes of its aggregates. */
 static PetscErrorCode fill_mode(PetscInt m, PetscScalar v[], const void *ctx)
 {
   const struct _p_SbCoarse *c = ctx;
@@ -45,7 +45,7 @@ PetscErrorCode SbCoarseCreateSolver(SbCoarse c)
   const char *package;
 
   PetscFunctionBeginUser;
-  // entries of each row on this rank and on others
+  // entries of each row in columns of this rank and of others
   PetscCall(PetscCalloc2(6 * c->n, &own, 6 * c->n, &foreign));
   for (PetscInt a = 0; a < c->n; a++) {
     for (PetscInt k = c->start[a]; k < c->start[a + 1]; k++) {
@@ -64,7 +64,7 @@ PetscErrorCode SbCoarseCreateSolver(SbCoarse c)
   PetscCall(PetscFree2(own, foreign));
   PetscCall(MatSetOption(c->E, MAT_SPD, PETSC_TRUE));
   PetscCall(MatCreateVecs(c->E, &c->c, &c->y));
-  // its solver: a factorisation where this PETSc has one for the size, else algebraic multigrid with rigid motions
+  // its solver: a factorisation if one rank factors E, else algebraic multigrid with rigid-body modes
   PetscCall(PCCreate(c->space->comm, &c->solver));
   PetscCall(PCSetOptionsPrefix(c->solver, "pc_coarse_"));
   PetscCall(SbDirectPackage(c->space->comm, 6 * c->N, PETSC_TRUE, &package));

@@ -2,14 +2,14 @@
   Solves with constraints outside the matrix K (src/fem/constraint.c): the operator A = P (K + F^T k G) P, and M_A^-1 = P M^-1 P around
   any preconditioner M. If K lacks a part of the tangent, A has the complete one, and K is the preconditioner's matrix.
 
-  With SB_SADDLE_DIRECT the part of M is taken by a factorisation of the projected matrix, which is A's inverse in the null space: one
-  iteration and what rounding asks for. Where nothing touches, M itself is used.
+  With SB_SADDLE_DIRECT a factorisation of the projected matrix replaces M. It is the inverse of A in the null space, so that one
+  iteration is enough, but for rounding. Without active constraints M itself is used.
 */
 #include "solver_impl.h"
 #include "sbsolver.h"
 #include "sblog.h"
 
-/* x <- P x, timed. */
+/* x <- P x, with its log event. */
 static PetscErrorCode project(SbSpace s, Vec x)
 {
   PetscScalar *a;
@@ -23,7 +23,7 @@ static PetscErrorCode project(SbSpace s, Vec x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y = P (K + F^T k G) x for x in the null space, where the iteration stays. */
+/* y = P (K + F^T k G) x for x in the null space, to which the iteration is confined. */
 static PetscErrorCode multiply(Mat A, Vec x, Vec y)
 {
   const PetscScalar *from;
@@ -66,10 +66,10 @@ PetscErrorCode SbConstraintsCreateOperator(SbSpace s, Mat K, Mat whole, PetscBoo
 typedef struct {
   SbSpace space;
   PC inner;
-  Vec r; /* a projected residual */
+  Vec r; /* projected residual */
 } Wrapped;
 
-/* Whether solves go by a factorisation of the saddle-point system now. */
+/* Whether the saddle-point system is factored at present. */
 static PetscBool is_factored(SbSpace s)
 {
   return (PetscBool)(s->constraints->saddle == SB_SADDLE_DIRECT && s->constraints->nexact);

@@ -1,14 +1,14 @@
 /*
   Nodes that are solved exactly within the rotated preconditioner (rotated.h says why and how).
 
-  A bar of 32,000 tets swinging freely: 75 such nodes in the mean, 176 at most, all in the crease where it is constrained;
-  iterations per step 7.6 in the mean and 11 at most with them, 18 and 65 without.
+  A bar of 32,000 tets swinging freely: 75 such nodes in the mean, 176 at most, all in the crease at the support;
+  iterations per step 7.6 in the mean and 11 at most; without exact nodes 18 and 65.
 
-  Only nodes whose neighbours are all owned are taken, so that nothing here communicates.
+  Only nodes whose neighbours are all owned are chosen: no communication here.
 */
 #include "rotated.h"
 
-#define MOST_NODES 600 /* beyond that their own factorisation costs more than it saves */
+#define MOST_NODES 600 /* largest number of nodes: with more their factorisation costs more than it saves */
 
 PetscErrorCode SbExactNodesCreate(SbSpace s, SbExactNodes *e)
 {
@@ -70,7 +70,7 @@ PetscErrorCode SbExactNodesSetUp(SbExactNodes *e, SbSpace s, Mat A, const PetscR
   PetscCall(PetscMalloc5(nz, &e->ja, nz, &e->kja, 9 * nz, &e->block, 9 * nz, &e->kblock, 9 * nz, &e->value));
   PetscCall(SbSpaceGetRows(s, A, e->n, e->node, e->ia, e->ja, e->block));
   for (PetscInt k = 0; k < 9 * nz; k++) e->value[k] = (float)e->block[k];
-  /* the blocks between the nodes themselves */
+  /* the blocks between exact nodes */
   e->ka[0] = nz = 0;
   for (PetscInt k = 0; k < e->n; k++) {
     for (PetscInt at = e->ia[k]; at < e->ia[k + 1]; at++) {
@@ -84,7 +84,7 @@ PetscErrorCode SbExactNodesSetUp(SbExactNodes *e, SbSpace s, Mat A, const PetscR
   }
   PetscCall(SbFactorCreate(e->n, 0, e->ka, e->kja, &e->factor));
   PetscCall(SbFactorNumeric(e->factor, e->ka, e->kja, e->kblock, NULL, &ok));
-  /* an indefinite block: the nodes are left to the preconditioner */
+  /* an indefinite block: no node is solved exactly */
   if (!ok) {
     PetscCall(free_arrays(e));
     for (PetscInt i = 0; i < s->nnode_owned; i++) e->index[i] = -1;

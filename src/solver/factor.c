@@ -28,8 +28,7 @@ typedef struct {
 
 struct _p_SbFactor {
   SbElimination e;
-  PetscInt npanel, widest,
-    tallest; /* number of panels; unknowns in the widest panel and in the largest front */
+  PetscInt npanel, widest, tallest; /* panels; unknowns in the widest panel, the largest front */
   Panel *panel;
   size_t nword;
   int32_t *word; /* [nword] stored entries */

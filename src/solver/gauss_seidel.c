@@ -1,23 +1,23 @@
 /*
-  Gauss-Seidel sweeps from the upper triangle alone, with the residual on the way: between ranks block Jacobi.
+  Gauss-Seidel sweeps that read the upper triangle only, and return the residual; block Jacobi between ranks.
 
-  With A = L + D + L^T by 3x3 blocks, of the rows and columns of this rank, and A_o the columns of other ranks,
-    down   z = (D + L^T)^-1 r, from the last row on: z_i = D_i^-1 (r_i - sum_{j > i} A_ij z_j). What is left of r, -L z - A_o z, needs
+  With A = L + D + L^T by 3x3 blocks, for the rows and columns of this rank, and A_o the columns of other ranks,
+    down   z = (D + L^T)^-1 r, from the last row on: z_i = D_i^-1 (r_i - sum_{j > i} A_ij z_j). The residual, -L z - A_o z, needs
            the same blocks: t_j -= A_ij^T z_i for j > i, while they are in the cache;
     up     z + (D + L)^-1 (r - A z), from the first row on: z_i = D_i^-1 (b_i - sum_{j > i} A_ij z_j) with the old z_j, then
            b_j -= A_ij^T z_i for j > i; b = r - A_o z at first.
-  So a sweep with its residual reads the stored half of the matrix once, as a product does. The two are adjoint to each other: a correction
-  between them, and the whole is symmetric.
+  So a sweep with its residual reads the stored half of the matrix once, as a product does. The two sweeps are adjoint: with a symmetric correction
+  between them the preconditioner is symmetric.
 
-  Between ranks a sweep may enlarge the energy of an error, near nu = 1/2 it does. It does not with D' = D + E in the place of D, E diagonal, half the sum of the
-  magnitudes in the columns of other ranks (Baker, Falgout, Kolev, Yang 2011, Multigrid smoothers for ultraparallel computing, SIAM J. Sci. Comput. 33). t begins
-  with E z then, and D_i^-1 (b_i - ..) becomes D'_i^-1 (b_i + E_i z_i - ..).
+  Block Jacobi between ranks may increase the energy norm of the error, and does near nu = 1/2. With D' = D + E for D it converges; E is diagonal, half the sum of the
+  magnitudes in the columns of other ranks (Baker, Falgout, Kolev, Yang 2011, Multigrid smoothers for ultraparallel computing, SIAM J. Sci. Comput. 33). t then starts
+  from E z, and D_i^-1 (b_i - ..) becomes D'_i^-1 (b_i + E_i z_i - ..).
 */
 #include "sbfour.h"
 #include "sbassembly.h"
 #include "gauss_seidel.h"
 
-/* z_j -= A_ij^T x for the n blocks behind the diagonal; what is in the fourth lane meets a zero of x. */
+/* z_j -= A_ij^T x for the n blocks right of the diagonal; the fourth lane of x is zero. */
 SB_INLINE void push(const PetscScalar *a, PetscInt n, const PetscInt column[], const PetscReal x[3],
                     PetscScalar z[])
 {
@@ -36,9 +36,9 @@ SB_INLINE void push(const PetscScalar *a, PetscInt n, const PetscInt column[], c
   }
 }
 
-#define AHEAD (9 * 32) /* numbers: rows from the last one on are not foreseen by the processor */
+#define AHEAD (9 * 32) /* prefetch distance in numbers: the hardware does not predict backward row order */
 
-/* sum_j A_ij z_j over the n blocks behind the diagonal. */
+/* sum_j A_ij z_j over the n blocks right of the diagonal. */
 SB_INLINE void pull(const PetscScalar *a, PetscInt n, const PetscInt column[], const PetscScalar z[],
                     PetscReal sum[3])
 {
@@ -54,7 +54,7 @@ SB_INLINE void pull(const PetscScalar *a, PetscInt n, const PetscInt column[], c
   for (int c = 0; c < 3; c++) sum[c] = s[c];
 }
 
-/* y = D^-1 x, D^-1 by rows. */
+/* y = D^-1 x, D^-1 row-major. */
 SB_INLINE void divide(const PetscReal inverse[9], const PetscReal x[3], PetscScalar y[3])
 {
   for (int i = 0; i < 3; i++) y[i] = SbDot3(inverse + 3 * i, x);
@@ -95,7 +95,7 @@ SB_KERNEL static void up(PetscInt nrow, const PetscInt start[restrict], const Pe
   }
 }
 
-/* The diagonal that makes block Jacobi between ranks convergent (l1-Gauss-Seidel, Baker et al. 2011): half the sums of the magnitudes in the off-diagonal part of a parallel matrix. */
+/* l1-Gauss-Seidel (Baker et al. 2011): half the sums of the magnitudes of each row in the off-diagonal part of a parallel matrix. */
 static PetscErrorCode sum_magnitudes(Mat A, PetscInt n, PetscReal extra[])
 {
   const PetscInt *start, *column;

@@ -1,10 +1,10 @@
 /*
-  Which nodes make the interface between the parts of several ranks (interface.c): few of them.
+  Chooses the interface nodes between ranks (interface.c), as few as possible.
 
-  They have to cover all edges of the graph between nodes of different ranks. A greedy cover takes the node with the most edges that none has covered yet, again and
-  again. A smallest one, from matchings, has 2 to 5 % fewer nodes (docs/reports/decisions.md).
+  They are a vertex cover of the graph's edges between nodes of different ranks. The greedy cover repeatedly takes the node with the most uncovered
+  edges. A minimum cover, from matchings, has 2 to 5 % fewer nodes (docs/reports/decisions.md).
 
-  The edges are few, all ranks have all of them and find the same nodes.
+  These edges are few: each rank gathers all of them and chooses the same nodes.
 */
 #include "rotated.h"
 
@@ -18,7 +18,7 @@ PetscErrorCode SbInterfaceChooseNodes(SbSpace s, PetscInt index[], PetscInt *nmi
   *nmine = *n = 0;
   if (!s->ghosted) PetscFunctionReturn(PETSC_SUCCESS);
 
-  /* ends of the edges of free nodes with those of lower ranks, of all ranks, as global numbers */
+  /* global numbers of the ends of edges between free own nodes and those of lower ranks; gathered from all ranks */
   PetscCall(PetscMalloc1(2 * p->oi[s->nnode_owned], &mine));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     for (PetscInt k = p->oi[i]; k < p->oi[i + 1] && s->fixed[i] != 7; k++) {
@@ -32,7 +32,7 @@ PetscErrorCode SbInterfaceChooseNodes(SbSpace s, PetscInt index[], PetscInt *nmi
   PetscCall(SbAllgatherv(s->comm, MPIU_INT, count, mine, &nend, &end, NULL));
   PetscCall(PetscFree(mine));
 
-  /* the nodes, ascending, and their graph by positions among them; left: edges of each */
+  /* the nodes, ascending, and their graph by positions among them; left: uncovered edges of each */
   nnode = nend;
   PetscCall(PetscMalloc2(nend, &node, nend, &left));
   PetscCall(PetscArraycpy(node, end, nend));
@@ -45,7 +45,7 @@ PetscErrorCode SbInterfaceChooseNodes(SbSpace s, PetscInt index[], PetscInt *nmi
     most = PetscMax(most, left[k]);
   }
 
-  /* taken: -1 */
+  /* taken nodes: -1 */
   for (; most > 0; most--) {
     for (PetscInt k = 0; k < nnode; k++) {
       if (left[k] < most) continue;
@@ -54,7 +54,7 @@ PetscErrorCode SbInterfaceChooseNodes(SbSpace s, PetscInt index[], PetscInt *nmi
     }
   }
 
-  /* numbered over all ranks: the nodes of a rank are consecutive */
+  /* number them over all ranks: the nodes of a rank are consecutive */
   for (PetscInt k = 0; k < nnode; k++) left[k] = left[k] < 0 ? (*n)++ : -1;
   for (PetscInt i = 0; i < s->nnode; i++) {
     PetscInt k;

@@ -1,7 +1,7 @@
 /*
-  CHOLMOD through PETSc ends the program with a trace when it meets a pivot that is not positive: a body that nothing holds, or a
-  tangent that is indefinite in compression. Here that is a factorisation that failed, like those of other packages: the solve fails, the
-  step is cut or the run stops with one line. Where the matrix is gathered on one rank (pc_direct.c), all learn of it. MUMPS is made to factor again after a failure.
+  CHOLMOD through PETSc raises an error with a trace at a non-positive pivot: a body without supports, or a
+  tangent that is indefinite in compression. Here it is a failed factorisation, as with other packages: the solve fails, and the
+  step is halved or the run stops with one line. If the matrix is gathered on one rank (pc_direct.c), all ranks get the failure. MUMPS can factor again after a failure.
 
   petsc/private/pcimpl.h: the operations of a PC that PETSc implements have no public setter.
 */
@@ -12,8 +12,8 @@
 #define ORIGINAL_APPLY "SbPCApplyOriginal_C"
 
 /*
-  PETSc's error path forgets the arrays that wrap the matrix for CHOLMOD (MatWrapCholmod_seqaij: as much as the matrix itself, for each factorisation that
-  fails). They are noted while the factorisation runs, through PETSc's table of allocators, and freed when it has failed.
+  PETSc's error path leaks the arrays that wrap the matrix for CHOLMOD (MatWrapCholmod_seqaij: as large as the matrix, at each failed
+  factorisation). A wrapper of PetscTrMalloc records them during the factorisation, and they are freed after a failure.
 */
 static struct {
   PetscErrorCode (*allocate)(size_t, PetscBool, int, const char[], const char[], void **);
@@ -52,7 +52,7 @@ static PetscErrorCode guarded_setup(PC pc)
 
   PetscFunctionBeginUser;
   PetscCall(PetscObjectQueryFunction((PetscObject)pc, ORIGINAL, &original));
-  // MUMPS factors nothing more where it has failed, as PETSc takes that for a failure of the analysis, and says nothing: the factor is made anew
+  // after a failure PETSc treats MUMPS' analysis as failed, and does not factor again: create a new factor
   PetscCall(PCFactorGetMatSolverType(pc, &package));
   PetscCall(PetscStrcmp(package, MATSOLVERMUMPS, &mumps));
   if (mumps && pc->setupcalled) {
@@ -80,7 +80,7 @@ static PetscErrorCode guarded_setup(PC pc)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* PETSc's solvers continue after a failed set-up until they get NaN; CHOLMOD then has no factor to solve with. */
+/* After a failed set-up PETSc's solvers continue until NaN; CHOLMOD has no factor to solve with. */
 static PetscErrorCode guarded_apply(PC pc, Vec x, Vec y)
 {
   PetscErrorCode (*original)(PC, Vec, Vec) = NULL;
@@ -95,7 +95,7 @@ static PetscErrorCode guarded_apply(PC pc, Vec x, Vec y)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* PETSc would factor at the first solve; here all ranks know after the set-up whether the one that factors has failed. */
+/* Factors in the set-up instead of the first solve, and tells all ranks whether the factorisation failed. */
 static PetscErrorCode gathered_setup(PC pc)
 {
   PetscErrorCode (*original)(PC) = NULL;
@@ -112,9 +112,9 @@ static PetscErrorCode gathered_setup(PC pc)
     const char *package;
     PetscBool cholmod;
 
-    /* there is none on ranks that wait */
+    /* idle ranks have no inner KSP */
     PetscCall(KSPGetPC(ksp, &inner));
-    /* The factorisation on the rank that has the matrix; made at the first set-up, before which PETSc has nothing inside a telescope. */
+    /* Wraps the factorisation on the rank that has the matrix; called at the first set-up, before which the telescope is empty. */
     PetscCall(PCGetApplicationContext(pc, &package));
     if (package && !inner->setupcalled) {
       PetscCall(PetscStrcmp(package, MATSOLVERCHOLMOD, &cholmod));

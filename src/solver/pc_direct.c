@@ -1,9 +1,9 @@
 /*
-  Factorisations by the package that this PETSc was built with, on any number of ranks.
+  Direct solvers by MUMPS or SuiteSparse, on any number of ranks.
 
   MUMPS factors a distributed matrix. CHOLMOD (positive definite matrices) and UMFPACK (any), both of SuiteSparse, work on one rank: on several,
-  PETSc's telescope gathers the matrix and each right-hand side there, and the others wait: cheaper than to factor the whole on each of
-  them (redundant), and up to SB_DIRECT_SMALL unknowns than MUMPS (docs/reports/gathered.md).
+  PCTELESCOPE gathers the matrix and each right-hand side there, and the others wait: cheaper than to factor the matrix on every
+  rank (PCREDUNDANT), and up to SB_DIRECT_SMALL unknowns cheaper than MUMPS (docs/reports/gathered.md).
 */
 #include "solver_impl.h"
 #include "sbsolver.h"
@@ -72,13 +72,13 @@ PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric)
     PetscCall(PCSetType(pc, PCTELESCOPE));
     PetscCall(PCTelescopeSetReductionFactor(pc, size));
     PetscCall(
-      PCSetApplicationContext(pc, (void *)(uintptr_t)package)); /* options applied at its first set-up */
+      PCSetApplicationContext(pc, (void *)(uintptr_t)package)); /* its options are set at the first set-up */
   }
-  /* all negative pivots are counted when the last front is not spread over the ranks */
+  /* MUMPS counts all negative pivots only if the last front is not distributed */
   if (mumps) PetscCall(SbSolverSetDefault(prefix, "mat_mumps_icntl_13", "1"));
   if (mumps) PetscCall(SbSolverSetDefault(prefix, "mat_mumps_icntl_14", "100"));
   if (umfpack) PetscCall(SbSolverSetDefault(prefix, "mat_umfpack_ordering", "METIS"));
-  /* for small matrices CHOLMOD's own choice is L D L^T, which takes indefinite ones without a word; a failure shows in the solver's reason */
+  /* for small matrices CHOLMOD would choose L D L^T, which factors indefinite ones; a failed L L^T appears as the solver's reason */
   if (!mumps && !umfpack) {
     PetscCall(SbSolverSetDefault(prefix, "mat_cholmod_factor", "supernodal"));
     PetscCall(SbSolverSetDefault(prefix, "mat_cholmod_print", "0"));

@@ -42,13 +42,12 @@ typedef struct {
   SbPressureOperator op; /* operator of the last set-up */
   KSP inner;
   Mat M;
-  Vec x, b, t;            /* vectors of the mixed system; vector of the nodes */
-  PetscReal *weight;      /* [ncell_owned] weights of the cells' rows, N/m^3 */
-  KSP ksp;                /* solver with the convergence test below; borrowed */
-  PetscReal target, last; /* target of the residual norm; the last residual norm, N */
-  PetscReal size, margin; /* norm of the right-hand side, N; MARGIN or TIGHTER, for the next correction */
-  PetscInt its, limit,
-    slow; /* iterations of GMRES in this solve; their limit; corrections that did not help */
+  Vec x, b, t;               /* vectors of the mixed system; vector of the nodes */
+  PetscReal *weight;         /* [ncell_owned] weights of the cells' rows, N/m^3 */
+  KSP ksp;                   /* solver with the convergence test below; borrowed */
+  PetscReal target, last;    /* target of the residual norm; the last residual norm, N */
+  PetscReal size, margin;    /* norm of the right-hand side, N; MARGIN or TIGHTER, for the next correction */
+  PetscInt its, limit, slow; /* iterations of GMRES, their limit; corrections without effect */
   PetscInt nsolve, total, most;
 } Pressure;
 

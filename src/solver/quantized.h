@@ -1,9 +1,9 @@
 /*
-  quantized.h - dense panels in 16-bit integers, for solves that read as few bytes as possible: factor.c, interface.c.
+  quantized.h - dense panels in 16-bit integers, for triangular solves limited by memory bandwidth: factor.c, interface.c.
 
-  Entries are 16-bit integers times a scale per column. Two of them share a 32-bit word, so that reading them takes little more than
-  a conversion: shifted up, the word is the lower one; as it is, it is the upper one, the lower one being a fraction that was
-  taken into account in rounding. A panel has at most 3 PANEL columns; its rows lie in blocks of ROWS, each [column][row], so that
+  Entries are 16-bit integers times a scale per column. Two entries share a 32-bit word, so that reading them costs little more than
+  a conversion: the word shifted up is the lower entry; the unshifted word is HALF times the upper entry, with the lower entry as a fraction that
+  rounding has accounted for. A panel has at most 3 PANEL columns; its rows lie in blocks of ROWS, each [column][row], so that
   both products read memory in order.
 */
 #pragma once
@@ -12,26 +12,26 @@
 #endif
 #include "sbkernel.h"
 
-#define PANEL 32      /* nodes across a panel */
-#define ROWS 64       /* unknowns in a block of rows */
-#define WIDTH 16      /* words side by side */
-#define PAIR 32       /* entries in so many words */
-#define LANES 8       /* floats in a vector of AVX2; wider ones are spilled where a processor has none */
-#define HALF 65536    /* a word over its upper entry */
-#define AHEAD 512     /* words to fetch ahead */
+#define PANEL 32   /* nodes per panel */
+#define ROWS 64    /* unknowns in a block of rows */
+#define WIDTH 16   /* words per vector operation */
+#define PAIR 32    /* entries in WIDTH words */
+#define LANES 8    /* floats in a vector of AVX2; compilers spill wider ones on processors without AVX-512 */
+#define HALF 65536 /* value of a word over its upper entry */
+#define AHEAD 512  /* prefetch distance in words */
 #define LARGEST 32767 /* largest magnitude of a stored entry */
 #define HUGE_PAGE ((size_t)1 << 21)
 
 typedef float Lanes __attribute__((vector_size(4 * LANES)));
 typedef int IntLanes __attribute__((vector_size(4 * LANES)));
 
-/* Rows that are stored for n of them. */
+/* Number of rows stored for n rows: a multiple of PAIR. */
 static inline size_t round_up(PetscInt n)
 {
   return ((size_t)n + PAIR - 1) / PAIR * PAIR;
 }
 
-/* Zeroed memory; large pieces on pages of 2 MB where the system has them: fewer misses of the address cache. */
+/* Zeroed memory; large blocks on pages of 2 MB if the system has them, for fewer misses of the TLB. */
 static inline PetscErrorCode allocate_pages(size_t bytes, void *memory)
 {
   void *p = NULL;
@@ -59,7 +59,7 @@ static inline int32_t *panel_word(int32_t *panel, size_t height, size_t ncol, si
   return panel + (top * ncol + j * tall + pair * PAIR) / 2 + i % WIDTH;
 }
 
-/* Rounds column j, of which entries from..n-1 are not zero, and returns its scale. */
+/* Rounds column j, whose entries from..n-1 are nonzero, and returns its scale. */
 static float store_column(size_t n, size_t from, const PetscScalar y[], size_t ncol, size_t j, int32_t *panel)
 {
   const size_t height = round_up((PetscInt)n);
@@ -79,7 +79,7 @@ static float store_column(size_t n, size_t from, const PetscScalar y[], size_t n
   return (float)(largest / LARGEST / HALF);
 }
 
-/* The two entries of eight words, times HALF. */
+/* The upper and the lower entries of LANES words, times HALF. */
 #define UPPER(w) __builtin_convertvector(w, Lanes)
 #define LOWER(w) __builtin_convertvector((w) << 16, Lanes)
 
@@ -92,7 +92,7 @@ SB_INLINE float sum_lanes(const Lanes lanes[2])
   return v[0] + v[1];
 }
 
-/* y = A x for a block of m * PAIR rows, [column][row]. m is a constant where this is inlined. */
+/* y = A x for a block of m * PAIR rows, [column][row]; m is a compile-time constant. */
 SB_INLINE const int32_t *multiply(int m, PetscInt ncol, const int32_t *a, const float x[], float y[])
 {
   Lanes sum[8] = {{0}};

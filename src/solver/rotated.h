@@ -1,29 +1,29 @@
 /*
-  rotated.h - what the files of the real-time solver share: rotations of cells, rows of an operator, the exactly solved nodes.
+  rotated.h - the real-time solver: rotations of cells, rows of an operator, interface nodes, exactly solved nodes.
 */
 #pragma once
 #include "sbassembly.h"
 #include "sbsolver.h"
 #include "factor.h"
 
-/* ------------------------------------------------------------------ nodes between the parts of several ranks */
+/* ------------------------------------------------------------------ interface between ranks */
 
 /*
-  SbInterfaceChooseNodes - few nodes, without which the parts of the ranks are not coupled.
+  SbInterfaceChooseNodes - few nodes that separate the ranks' interiors.
 
-  Collective; the space has a plan. Fully prescribed nodes are left out. Output: index[nnode] number among them of a local node, -1 for
-  others; those of a rank are consecutive. nmine: owned by this rank; n: of all ranks.
+  Collective; the space has a plan. Fully prescribed nodes are left out. Output: index[nnode], number of a local node in the interface, -1 for
+  others; those of a rank are consecutive. nmine: number owned by this rank; n: by all ranks.
 */
 PetscErrorCode SbInterfaceChooseNodes(SbSpace space, PetscInt index[], PetscInt *nmine, PetscInt *n);
 
-/* These nodes, and the factored inverse of their Schur complement, of which each rank has some rows (interface.c). */
+/* The interface nodes, and their factored inverse Schur complement, distributed by rows (interface.c). */
 typedef struct _p_SbInterface *SbInterface;
 typedef struct _p_SbInterfaceFactor *SbInterfaceFactor;
 struct _p_SbInterface {
   MPI_Comm comm;
-  PetscInt n;               /* nodes of all ranks */
-  PetscInt *index;          /* [nnode] number among them of a local node, -1 for others */
-  PetscInt nmine;           /* owned by this rank */
+  PetscInt n;               /* number of interface nodes, all ranks */
+  PetscInt *index;          /* [nnode] number of a local node in the interface, -1 for others */
+  PetscInt nmine;           /* number owned by this rank */
   PetscInt *mine;           /* [nmine] local nodes */
   SbInterfaceFactor factor; /* owned */
 };
@@ -32,10 +32,10 @@ struct _p_SbInterface {
 PetscErrorCode SbInterfaceCreate(SbSpace space, SbInterface *face);
 PetscErrorCode SbInterfaceDestroy(SbInterface *face);
 /*
-  SbInterfaceFactorise - factors the sum over ranks of their contributions.
+  SbInterfaceFactorise - factors the sum over ranks of their Schur complements.
 
-  Collective. Input: work, bytes that this rank reads for its interior in each application, which is evened out. In and out:
-  schur[(3 n)^2], column-major, lower triangle: this rank's contribution; destroyed. Output: ok, PETSC_FALSE on all ranks when the
+  Collective. Input: work, bytes that this rank reads for its interior in each application, for load balance. In and out:
+  schur[(3 n)^2], column-major, lower triangle: this rank's contribution; overwritten. Output: ok, PETSC_FALSE on all ranks if the
   sum is not positive definite.
 */
 PetscErrorCode SbInterfaceFactorise(SbInterface face, PetscInt64 work, PetscReal schur[], PetscBool *ok);
@@ -47,29 +47,29 @@ PetscInt64 SbInterfaceBytes(SbInterface face);
 /* ------------------------------------------------------------------ nodes solved exactly */
 
 /*
-  Where cells around a node are turned very differently (creases, inverted cells) no rotation of the node is right, and a few
-  such nodes spoil the whole iteration. They are solved exactly: with B = A_BB^-1 on them the preconditioner is
+  Where the rotations of the cells around a node differ much (creases, inverted cells) no rotation of the node fits, and a few
+  such nodes dominate the number of iterations. They are solved exactly: with B = A_BB^-1 on them the preconditioner is
   B + (1 - B A) P (1 - A B), symmetric and positive definite for any P that is.
 */
 typedef struct {
-  PetscInt n;         /* how many */
+  PetscInt n;         /* number of nodes */
   PetscInt *node;     /* [n] owned local nodes */
   PetscInt *index;    /* [nnode_owned] position in node, -1 for others */
-  PetscInt *ia, *ja;  /* rows of the operator */
-  PetscReal *block;   /* [ia[n]][9] */
-  float *value;       /* [ia[n]][9] the same */
-  PetscInt *ka, *kja; /* graph among the nodes themselves */
+  PetscInt *ia, *ja;  /* pattern of their rows in the operator */
+  PetscReal *block;   /* [ia[n]][9] blocks of these rows */
+  float *value;       /* [ia[n]][9] the same in single precision */
+  PetscInt *ka, *kja; /* pattern of the blocks between exact nodes */
   PetscReal *kblock;
-  float *x, *y; /* [n][3] */
+  float *x, *y; /* [n][3] work vectors */
   SbFactor factor;
 } SbExactNodes;
 
 PetscErrorCode SbExactNodesCreate(SbSpace space, SbExactNodes *e);
 PetscErrorCode SbExactNodesDestroy(SbExactNodes *e);
-/* Chooses the free nodes whose spread exceeds `limit` (raised while they are too many) and whose row is local, and factors. */
+/* Chooses the free nodes with a spread above `limit` (raised while there are too many) and all neighbours owned, and factors. */
 PetscErrorCode SbExactNodesSetUp(SbExactNodes *e, SbSpace space, Mat A, const PetscReal spread[],
                                  PetscReal limit);
-/* y = B r on the nodes, r -= A B r, in place on r[nnode_owned][3]; to be called before P. */
+/* y = B r on the nodes, r -= A y, in place on r[nnode_owned][3]; to be called before P. */
 void SbExactNodesBefore(SbExactNodes *e, float r[]);
-/* z += B (r - A (z + y)) + y after z = P r; r is the residual from before. */
+/* z += B (r - A (z + y)) + y after z = P r; r is the residual before SbExactNodesBefore(). */
 void SbExactNodesAfter(SbExactNodes *e, const float r[], float z[]);

@@ -1,27 +1,27 @@
 /*
-  The saddle-point system of exact constraints by a sparse factorisation, for response `multiplier`:
+  Sparse factorisation of the saddle-point system of exact constraints, for response `multiplier`:
 
     [ K + F^T k G   F^T ] [ z ]   [ r ]
     [ G             0   ] [ m ] = [ 0 ]
 
-  Each constraint is of one node, so that its force m is eliminated there (src/fem/constraint.c): with P and Q of the nodes, s the sizes of
+  Each constraint acts on one node, so that its multiplier m is eliminated there (src/fem/constraint.c): with projectors P and Q of the nodes, s the sizes of
   their blocks and r = P r
 
     (P (K + F^T k G) P + s Q) z = r.
 
-  This is regular where K is not: a body that only constraints support needs no anchors. It is symmetric but for friction: LDL^T or LU of
-  MUMPS, or LU of UMFPACK on one of the ranks (pc_direct.c). Made again when K or the constraints have changed, and only then.
+  This is regular even for a singular K, of a body that only constraints support. It is symmetric without friction: LDL^T or LU of
+  MUMPS, or LU of UMFPACK on one rank (pc_direct.c). It is factored again only when K or the constraints have changed.
 */
 #include "solver_impl.h"
 #include "rotated.h"
 #include "sbsolver.h"
 
-#define DIRECT_STATIC 30000 /* unknowns up to which it is factored; docs/reports/contact.md */
+#define DIRECT_STATIC 30000 /* static: largest number of unknowns that is factored; docs/reports/contact.md */
 #define DIRECT_DYNAMIC 1000
 
 struct _p_SbSaddleFactor {
   PC pc;
-  PetscInt version, matrix; /* of the constraints and of K */
+  PetscInt version, matrix; /* versions of the constraints and of K that were factored */
   PCFailedReason failed;
 };
 
@@ -69,16 +69,16 @@ PetscErrorCode SbSaddleFactorSolve(SbSpace s, Vec r, Vec z, PCFailedReason *fail
   }
   f = c->factored;
 
-  /* a factorisation of K as it is now with the constraints as they are */
+  /* the factorisation of this K with these constraints is missing */
   if (!f->pc || f->matrix != c->matrix || f->version != c->version) {
     PetscInt n, *node, *ia, *ja, *near, *far;
     PetscReal *block;
 
     PetscCall(PCDestroy(&f->pc));
     PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, PETSC_FALSE, &package));
-    /* The matrix by scalars. MatConvert() is not asked: it takes a parallel block matrix apart, whose parts others hold. */
+    /* The projected matrix as AIJ. MatConvert() would need parts of a parallel block matrix that are held elsewhere. */
     n = s->nnode_owned;
-    /* K by its blocks */
+    /* K, block by block */
     PetscCall(PetscMalloc4(n, &node, n + 1, &ia, 3 * n, &near, 3 * n, &far));
     for (PetscInt k = 0; k < n; k++) node[k] = k;
     PetscCall(SbSpaceGetRows(s, c->K, n, node, ia, NULL, NULL));
@@ -90,7 +90,7 @@ PetscErrorCode SbSaddleFactorSolve(SbSpace s, Vec r, Vec z, PCFailedReason *fail
     }
     PetscCall(MatCreateAIJ(s->comm, 3 * n, 3 * n, 3 * s->Nnode, 3 * s->Nnode, 0, near, 0, far, &A));
 
-    /* springs are added and blocks are projected on their way */
+    /* springs are added and blocks projected while they are copied */
     for (PetscInt k = 0; k < n; k++) {
       const PetscInt row = 3 * s->gnode[k], rows[3] = {row, row + 1, row + 2};
 
@@ -110,7 +110,7 @@ PetscErrorCode SbSaddleFactorSolve(SbSpace s, Vec r, Vec z, PCFailedReason *fail
     PetscCall(PCCreate(s->comm, &f->pc));
     PetscCall(PCSetOptionsPrefix(f->pc, "saddle_"));
     PetscCall(PCSetOperators(f->pc, A, A));
-    PetscCall(MatDestroy(&A)); /* the preconditioner keeps it */
+    PetscCall(MatDestroy(&A)); /* the preconditioner keeps a reference */
     PetscCall(SbPCDirectSet(f->pc, package, (PetscBool)!c->nonsymmetric));
     PetscCall(PCSetFromOptions(f->pc));
     PetscCall(SbPCCheckPivots(f->pc));

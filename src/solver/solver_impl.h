@@ -1,51 +1,51 @@
 /*
-  solver_impl.h - shared by the files of src/solver.
+  solver_impl.h - functions shared by the files of src/solver.
 */
 #pragma once
 #include "sbsolver.h"
 
-/* Errors: PETSC_ERR_USER for a norm or side that the type of ksp does not have. After KSPSetFromOptions(). Not collective. */
+/* PETSC_ERR_USER if the type of ksp does not support its norm and side. After KSPSetFromOptions(). Not collective. */
 PetscErrorCode SbKSPCheckNorm(KSP ksp);
 
 /*
-  SbKSPCheckTrueResidual - solves of ksp whose true residual is far above the tolerance fail (KSP_DIVERGED_BREAKDOWN).
+  SbKSPCheckTrueResidual - makes solves with a true residual far above the tolerance fail (KSP_DIVERGED_BREAKDOWN).
 
-  Not collective; after KSPSetFromOptions(). Input: direct, the preconditioner is a factorisation; alone, no Newton step examines what a solve has left.
-  Nothing is done for an iteration that is judged by the true residual, or by none, nor for one with a norm of its own inside Newton's method.
+  Not collective; after KSPSetFromOptions(). Input: direct, the preconditioner is a factorisation; alone, no Newton step tests the residual afterwards.
+  No check is added to an iteration that tests the true residual or no norm, nor to one that tests another norm inside Newton's method.
 */
 PetscErrorCode SbKSPCheckTrueResidual(KSP ksp, PetscBool direct, PetscBool alone);
 
-/* The true residual decides, unless the user chose a norm or a side, or the type of ksp does not compute it. After KSPSetType(). Not collective. */
+/* Makes ksp test the true residual, unless the user chose a norm or side, or the method does not compute it. After KSPSetType(). Not collective. */
 PetscErrorCode SbKSPPreferTrueResidual(KSP ksp);
 
 /*
-  SbKSPSetForceTolerance - makes the absolute tolerance of ksp one of the true residual, N, whatever norm it is judged by.
+  SbKSPSetForceTolerance - makes the absolute tolerance of ksp apply to the true residual, N, for any norm in the convergence test.
 
-  Not collective; after KSPSetFromOptions(). A norm that is not the true one is compared with its own start, by the factor that the true residual has to fall by.
-  Nothing is done for a method that is judged by the true residual, or with -ksp_convergence_test of the user's.
+  Not collective; after KSPSetFromOptions(). Another norm has to decrease by the factor by which the true residual has to.
+  Without effect on a method that tests the true residual, or with -ksp_convergence_test of the user.
 */
 PetscErrorCode SbKSPSetForceTolerance(KSP ksp);
 
 /*
-  SbPCConstrainedCreate - for a space with constraints beside the matrix: makes pc a preconditioner in the null space of the exact ones, P M^-1 P.
+  SbPCConstrainedCreate - for a space with constraints outside the matrix: makes pc a preconditioner in the null space of the exact constraints, P M^-1 P.
 
-  Collective. Output: inner, M; borrowed. It takes the options of pc, which gives up its prefix. inner is pc itself for a space
+  Collective. Output: inner, M; borrowed. inner gets the options prefix of pc. inner is pc itself for a space
   without such constraints.
 */
 PetscErrorCode SbPCConstrainedCreate(SbSpace space, PC pc, PC *inner);
 
-/* negative: pivots below zero of a factorisation that is done, -1 where it is unknown: L D L^T of MUMPS counts them. Collective. */
+/* negative: number of negative pivots of a finished factorisation, -1: unknown; only MUMPS' L D L^T counts them. Collective. */
 PetscErrorCode SbPCDirectCountNegative(PC pc, PetscInt *negative);
 
-/* parent[nnode][2], to be freed by the caller: local nodes, the vertices of a node at an edge of P2, else the node itself twice. Not collective. */
+/* parent[nnode][2], freed by the caller: local nodes, the vertices of a P2 edge node, else the node itself twice. Not collective. */
 PetscErrorCode SbSpaceEdgeParents(SbSpace space, PetscInt **parent);
 
-/* The package of such a factorisation that is gathered on one rank, NULL for any other pc. Not collective. */
+/* The package of a factorisation that is gathered on one rank, NULL for any other pc. Not collective. */
 PetscErrorCode SbPCDirectGathered(PC pc, const char **package);
 
 /*
-  SbPCPressureCreate - makes pc the solver for such an operator: GMRES in nodes and pressures. Put it into KSPRICHARDSON with
-  the unpreconditioned norm, which then refines until -ksp_rtol holds for the true residual, or it is one of rounding.
+  SbPCPressureCreate - makes pc the solver for a SbPressureOperator: GMRES for displacements and pressures. Use it in KSPRICHARDSON with
+  the unpreconditioned norm, which refines until -ksp_rtol holds for the true residual, or the residual is one of rounding.
 
   Collective. The space is borrowed. -ksp_max_it limits the iterations of GMRES, and they are what the KSP reports. A residual
   that two corrections no longer halve fails the solve (KSP_DIVERGED_BREAKDOWN).
@@ -54,16 +54,16 @@ PetscErrorCode SbPCDirectGathered(PC pc, const char **package);
 PetscErrorCode SbPCPressureCreate(SbSpace space, PC pc);
 
 /*
-  z of [K + F^T k G, F^T; G, 0] [z; m] = [r; 0] by a factorisation, which is renewed when K or the constraints have changed; r is projected already. Collective.
+  Solves [K + F^T k G, F^T; G, 0] [z; m] = [r; 0] for z by a factorisation, renewed when K or the constraints have changed; r must be projected. Collective.
 
-  Output: failed, why the matrix could not be factored; z is not a number then.
+  Output: failed, the reason of a failed factorisation; z is NaN then.
 */
 PetscErrorCode SbSaddleFactorSolve(SbSpace space, Vec r, Vec z, PCFailedReason *failed);
-/* Negative eigenvalues of K + F^T k G in the null space of the constraints, from that factorisation; -1: it is unknown. Collective. */
+/* Number of negative eigenvalues of K + F^T k G in the null space of the constraints, from that factorisation; -1: unknown. Collective. */
 PetscErrorCode SbSaddleFactorCountNegative(SbSpace space, PetscInt *negative);
 
-/* Puts -<prefix><key> into PETSc's database where the user is silent. Not collective. */
+/* Sets -<prefix><key> in PETSc's database unless the user has. Not collective. */
 PetscErrorCode SbSolverSetDefault(const char *prefix, const char *key, const char *value);
 
-/* -reproducible: runs on the same number of ranks have the same bits. Not collective. */
+/* -reproducible: runs on the same number of ranks are bitwise equal. Not collective. */
 PetscErrorCode SbSolverReproducible(PetscBool *reproducible);

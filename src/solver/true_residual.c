@@ -1,25 +1,25 @@
 /*
-  Which norm a solve is judged by, and what examines its answer.
+  The norm in the convergence test of linear solves, and checks of their solutions.
 
-  The true residual is preferred wherever the method computes it and the user does not choose a norm; a method that cannot (minres) has its own.
+  The unpreconditioned (true) residual is used wherever the method computes it and the user does not choose a norm; else (minres) the method's default.
 
-  A direct solver's answer is examined: |b - A x| is computed once more after the solve.
+  After a direct solve |b - A x| is computed once.
 
-  A singular matrix (a body that can still turn, constrained by two of its faces only) is factored without complaint by threshold
-  pivoting, and FGMRES, which judges by its own recurrence, then reports convergence with a residual larger than the
-  right-hand side. Such a solve ends as failed. What rounding leaves is far below the bound: near nu = 1/2, where lambda / mu is a
+  Threshold pivoting factors a singular matrix (a body that can still rotate) without an error;
+  FGMRES, which tests its recurrence, then reports convergence with a true residual larger than the
+  right-hand side. Such a solve fails here. Residuals of rounding are far below the bound: near nu = 1/2, with lambda / mu a
   million, 1e-5 of the right-hand side.
 
-  Likewise that of a method with a norm of its own where no Newton step examines it again, and of one that ends early, as CG does when a
-  preconditioner makes nothing of its residual.
+  The same check follows a solve with another norm where no Newton step tests the residual, and one that ends early by the absolute tolerance, as CG does when
+  the preconditioner maps its residual to zero.
 
-  petsc/private/kspimpl.h: the reason of a solve has no public setter, the norms that a method supports no public getter.
+  petsc/private/kspimpl.h: the converged reason has no public setter, the supported norms of a method no public getter.
 */
 #include "solver_impl.h"
 #include "sbsolver.h"
 #include <petsc/private/kspimpl.h>
 
-#define AT_MOST 1e-2 /* relative to the right-hand side, if no smaller tolerance is requested */
+#define AT_MOST 1e-2 /* largest true residual over the right-hand side, unless 2 rtol is larger */
 
 static PetscErrorCode check_residual(KSP ksp, Vec b, Vec x, void *ctx)
 {
@@ -31,7 +31,7 @@ static PetscErrorCode check_residual(KSP ksp, Vec b, Vec x, void *ctx)
   PetscFunctionBeginUser;
   (void)ctx;
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPPREONLY, &single));
-  /* a given number of iterations does not mean convergence */
+  /* a fixed number of iterations is not convergence */
   if (ksp->reason <= 0 || (ksp->reason == KSP_CONVERGED_ITS && !single)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(KSPGetOperators(ksp, &A, NULL));
   PetscCall(VecDuplicate(b, &r));
@@ -64,7 +64,7 @@ PetscErrorCode SbKSPCheckTrueResidual(KSP ksp, PetscBool direct, PetscBool alone
   PetscFunctionBeginUser;
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPPREONLY, &single));
   PetscCall(KSPGetNormType(ksp, &norm));
-  /* a Newton step looks better than a comparison of norms that differ by orders of magnitude */
+  /* inside Newton's method no check: its next residual is a better test than norms of different scale */
   if (single || (direct && norm == KSP_NORM_UNPRECONDITIONED) ||
       (alone && (norm == KSP_NORM_PRECONDITIONED || norm == KSP_NORM_NATURAL)))
     PetscCall(KSPSetPostSolve(ksp, check_residual, NULL));
@@ -73,7 +73,7 @@ PetscErrorCode SbKSPCheckTrueResidual(KSP ksp, PetscBool direct, PetscBool alone
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* As KSPConvergedDefault(), but for the meaning of abstol. */
+/* KSPConvergedDefault() with abstol as a tolerance of the true residual. */
 static PetscErrorCode converged(KSP ksp, PetscInt n, PetscReal norm, KSPConvergedReason *reason, void *ctx)
 {
   PetscReal size;
@@ -108,7 +108,7 @@ PetscErrorCode SbKSPSetForceTolerance(KSP ksp)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How well the method of ksp supports a norm with the side that the user may have set; 0: not at all. */
+/* Priority of a norm in ksp's method, with the user's side if set; 0: not supported. */
 static PetscInt norm_support(KSP ksp, KSPNormType norm)
 {
   PetscInt best = 0;
