@@ -1,12 +1,12 @@
 /*
-  Rows of an operator as 3x3 blocks with local columns, whatever the operator is: a matrix-free operator, AIJ, BAIJ or SBAIJ.
+  Rows of an operator as 3x3 blocks with local columns, for a matrix-free operator, AIJ, BAIJ or SBAIJ.
 
-  The block storages are read in place, by the plan that they were assembled with (both keep a block by columns; the
-  symmetric one keeps only the upper triangle). AIJ goes through MatGetRow(), three times slower.
+  BAIJ and SBAIJ are read in place, by the assembly plan (both store a block column-major; SBAIJ
+  only the upper triangle). AIJ is read by MatGetRow(), three times slower.
 */
 #include "fem_impl.h"
 
-/* A block by columns to one by rows; `turned`: of the transposed block. */
+/* Copies a column-major block to a row-major one; `turned`: its transpose. */
 static inline void copy_block(const PetscScalar *from, PetscBool turned, PetscReal to[9])
 {
   for (int e = 0; e < 9; e++) to[e] = from[turned ? e : 3 * (e % 3) + e / 3];
@@ -43,7 +43,7 @@ PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[
       const PetscInt i = node[k];
       PetscReal *to = block + 9 * ia[k];
 
-      /* of a symmetric matrix, blocks left of the diagonal are found, transposed, in the rows of their columns */
+      /* for SBAIJ, blocks left of the diagonal are transposed from the rows of their columns */
       for (PetscInt e = p->di[i]; e < p->di[i + 1]; e++, to += 9) {
         const PetscBool lower = (PetscBool)(b.symmetric && p->dj[e] < i);
         const PetscInt row = lower ? p->dj[e] : i;
@@ -74,7 +74,7 @@ PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[
           const PetscInt own = column[e] / 3 - s->gnode_start;
           PetscInt ghost;
 
-          /* index of its block, own columns first; not all are in the graph */
+          /* index of its block, own columns first; not all columns are in the graph */
           if (own >= 0 && own < s->nnode_owned)
             PetscCall(PetscFindInt(own, nd, p->dj + p->di[i], &at));
           else {

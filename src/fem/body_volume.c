@@ -1,9 +1,9 @@
 /*
-  The current volume of a body, V = sum |T| det F over its cells, and its derivatives: what a pressure on the whole surface
-  works on.
+  The current volume of a body, V = sum |T| det F over its cells, and its derivatives, for a pressure on the
+  whole surface.
 
-  For P1 dV/du is a force on the surface alone. For CR and DG, whose surface has gaps at its edges, the sum of the facets'
-  forces does not vanish, but V, made of strains, changes neither under translations nor rotations: force and moment vanish
+  For P1 dV/du acts on surface nodes only. For CR and DG, whose surface has gaps at its edges, the sum of the facets'
+  forces does not vanish, but V depends on strains only and is invariant under translations and rotations: resultant force and moment vanish
   to rounding, and the tangent is exact and symmetric.
 
     dV/dF = |T| cof F,   d cof F_ij / dF_kl = eps_ikm eps_jln F_mn.
@@ -46,7 +46,7 @@ PetscErrorCode SbSpaceAddVolumeTangent(SbSpace s, PetscInt body, const PetscReal
       SbPack U[30], F[SB_POINTS][9], C[81], K[10][9] __attribute__((aligned(64)));
 
       SbBatchGradients(s, region, b, x, PETSC_FALSE, U, F);
-      /* C = factor d cof F / dF. The two indices that i and k leave free make one term each way. */
+      /* C = factor d cof F / dF: one term for each of the two remaining indices j of i and k. */
       for (int c = 0; c < 81; c++) {
         const int i = c / 27, j = c / 9 % 3, k = c / 3 % 3, n = c % 3;
         const PetscReal sign = ((k + 3 - i) % 3 == 1 ? 1. : -1.) * ((n + 3 - j) % 3 == 1 ? 1. : -1.);

@@ -1,12 +1,12 @@
 /*
-  The stress of each cell in the frame of the rest state, with the rotation that turns it into the cell's own. For DG F is that of the means of
-  the two sides. P2 has one stress at each point: then that of a cell is their mean.
+  The stress of each cell in the rest frame, and the cell's rotation. For DG F is computed from the means of
+  the two sides. P2 has one stress at each point: the stress of a cell is their mean.
 */
 #include "fem_impl.h"
 #include "sbkernel.h"
 
 /*
-  Of a curved cell: the linear function of l nearest to P in the straight tet, at the points of SbRuleQuadratic. With b_i = sum_q w_q l_i P_q it has 20 b_i -
+  For a curved cell: the linear function of l next to P (L2 projection on the straight tet), at the points of SbRuleQuadratic. With b_i = sum_q w_q l_i P_q it has 20 b_i -
   4 sum_j b_j at corner i.
 */
 static void linear_at_points(const SbPoints *at, const SbPack P[SB_POINTS][9], PetscInt n, PetscReal point[])

@@ -1,5 +1,5 @@
 /*
-  Constraints of single nodes, for contact with rigid obstacles: n . u = c exactly, or by a spring.
+  Constraints of single nodes, for contact with rigid obstacles: n . u = c exactly, or by a spring (penalty).
 
   A node has up to three exact constraints, the rows of G, with the values c, and constraint forces along the rows of F: F = G unless the
   node slides with friction mu, with a row n - mu d, d the direction of the slip. Node by node, with
@@ -7,10 +7,10 @@
     Q = F^T (G F^T)^-1 G,   P = I - Q
 
   lambda = (G F^T)^-1 G r are the multipliers for a residual r, P r is the projected residual, G P x = 0, and
-  u + F^T (G F^T)^-1 (c - G u) satisfies the constraints. Components prescribed by a support are removed from G and F. The solution is projected onto the
-  constraints before a solve, which then changes the rest only. Redundant constraints of a node are removed.
+  u + F^T (G F^T)^-1 (c - G u) satisfies the constraints. Prescribed components are removed from G and F. The solution is projected onto the
+  constraints before a solve, which then stays in their null space. Redundant constraints of a node are removed.
 
-  Solves treat them in one of two ways.
+  Linear solves treat them in one of two ways.
 
   Projected into the matrix, where F = G (Baraff and Witkin 1998), with s the size of the diagonal block:
 
@@ -25,7 +25,7 @@
 #include "sbkernel.h"
 
 #define SAID \
-  1e-6 /* squared part outside the span of the node's other constraints below which it is redundant */
+  1e-6 /* squared distance from the span of the node's other constraints below which one is redundant */
 #define NO_SAY 1e-12 /* squared length of the free part of a direction that counts as zero */
 
 PetscErrorCode SbSpaceCreateConstraints(SbSpace s, PetscBool beside, PetscBool nonsymmetric)
@@ -75,13 +75,13 @@ void SbSpaceClearConstraints(SbSpace s)
   c->n = 0;
 }
 
-/* v without components prescribed by a support. */
+/* v without prescribed components. */
 static void free_part(SbSpace s, PetscInt node, const PetscReal v[3], PetscReal part[3])
 {
   for (int k = 0; k < 3; k++) part[k] = s->fixed[node] & (1 << k) ? 0. : v[k];
 }
 
-/* The exact constraints of a node: their numbers, the free parts of their directions (NULL: not wanted). Returns how many, 0..3. */
+/* The exact constraints of a node: their numbers and the free parts of their directions (NULL: not wanted). Returns their number, 0..3. */
 static int exact_constraints(SbSpace s, PetscInt node, PetscInt number[3], PetscReal G[9], PetscReal F[9])
 {
   const SbConstraints c = s->constraints;
@@ -126,7 +126,7 @@ PetscErrorCode SbSpaceAddConstraint(SbSpace s, const SbConstraint *constraint, P
     PetscReal G[9], g[3], b[3] = {0}, x[3], full;
     const int n = exact_constraints(s, node, others, G, NULL);
 
-    /* its part outside the span of the node's others */
+    /* its component orthogonal to the node's other constraints */
     free_part(s, node, constraint->n, g);
     full = SbDot3(g, g);
     if (n == 3 || full < NO_SAY) PetscFunctionReturn(PETSC_SUCCESS);
@@ -194,7 +194,7 @@ PetscErrorCode SbSpaceAssembleConstraints(SbSpace s)
     }
   }
 
-  /* that of other ranks' nodes, for the columns of a matrix */
+  /* Q of ghosts, for the columns of a matrix */
   if (s->ghosted) {
     PetscReal *row;
 
@@ -211,7 +211,7 @@ PetscErrorCode SbSpaceAssembleConstraints(SbSpace s)
 
 /* ------------------------------------------------------------------ displacements, residuals, velocities */
 
-/* Q x of a node. */
+/* y = Q x of a node. */
 static inline void taken(const PetscReal Q[9], const PetscReal x[3], PetscReal y[3])
 {
   for (int k = 0; k < 3; k++) y[k] = SbDot3(Q + 3 * k, x);
@@ -243,7 +243,7 @@ PetscErrorCode SbSpaceProjectAdmissible(SbSpace s, Vec z)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Projects x onto the exact constraints, with their values or velocities. */
+/* Projects x onto the exact constraints, with their values or velocities as right-hand sides. */
 static void move(SbSpace s, PetscBool velocities, PetscReal x[])
 {
   const SbConstraints c = s->constraints;
@@ -346,7 +346,7 @@ void SbConstraintsReactions(SbSpace s, PetscReal r[])
 
       if (!(s->fixed[a->node] & (1 << k)))
         r[3 * a->node + k] += force;
-      else if (!a->spring) /* the residual has the springs' */
+      else if (!a->spring) /* spring forces are part of the residual */
         r[3 * a->node + k] -= force;
     }
   }
@@ -384,8 +384,8 @@ void SbConstraintsProjectBlock(SbSpace s, PetscInt i, PetscInt j, size_t rs, siz
 }
 
 /*
-  If only constraints support a body K is singular. In a static run K is regularised by s_i times the squares of
-  the directions' components on its diagonal, s_i the size of the node's block; the operator subtracts it again, so that only M contains it.
+  If only constraints support a body K is singular. In a static run s_i times the squared components of
+  the constraint directions are added to its diagonal, s_i the size of the node's block; the operator subtracts them again, so that only M contains them.
 */
 static void anchor(SbSpace s, const SbValues *x)
 {

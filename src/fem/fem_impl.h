@@ -1,10 +1,10 @@
 /*
-  fem_impl.h - shared by the files of src/fem: the assembly plan and the gather of a batch.
+  fem_impl.h - functions shared by the files of src/fem: layout, face terms, assembly, points of a batch.
 */
 #pragma once
 #include "sbassembly.h"
 
-/* layout.c: nodes of the space; then, with batches in place, the nodes that each cell's stress acts on. Collective. */
+/* layout.c: creates the nodes of the space. After the batches: the nodes that each cell's stress acts on. Collective. */
 PetscErrorCode SbLayoutNodes(SbSpace space);
 PetscErrorCode SbLayoutCliques(SbSpace space);
 PetscErrorCode SbLayoutDestroy(SbSpace space);
@@ -13,41 +13,41 @@ PetscErrorCode SbLayoutDestroy(SbSpace space);
 typedef enum { SB_JUMP_STIFFNESS, SB_JUMP_DAMPING } SbJumpFactor;
 PetscErrorCode SbJumpCreate(SbSpace space, SbJump *jump);
 PetscErrorCode SbJumpDestroy(SbJump *jump);
-/* f[nnode][3] += (factor) K_F x, x displacements, whose jumps are reduced by the offsets r; right on owned nodes. x[nnode][3] with ghosts. */
+/* f[nnode][3] += (factor) K_F x; the jumps of displacements x are reduced by the offsets r; complete on owned nodes. x[nnode][3] with ghosts. */
 void SbJumpAdd(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal f[]);
 /* The energy 1/2 x . (factor) K_F x of the face terms, this rank's part, J. */
 PetscReal SbJumpEnergy(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal body[]);
 /* node[nbatch][8][SB_BATCH] of the faces, borrowed; returns nbatch. */
 PetscInt SbJumpCliques(SbSpace space, const PetscInt **node);
-/* Updates the moduli m of the penalty by the state: whether one changed on this rank, or faces have offsets r, which rotate. */
+/* Updates the moduli m of the penalty from x. Returns whether one changed on this rank, or faces have offsets r, which rotate. */
 PetscBool SbJumpFollow(SbSpace space, const PetscReal x[], SbStepsOf steps);
-/* Whether this is the first call, and SbJumpSetStiffness() has not been called. */
+/* Whether this is the first call, without SbJumpSetStiffness() before. */
 PetscBool SbJumpBegin(SbSpace space);
-/* Then the penalties; with x the energies of faces there are kept, or, first, their forces; else r = 0. changed: set if one changed on this rank by a percent or more. */
+/* Updates the penalties. With x the faces' energies are kept or, first, their forces; NULL: r = 0. changed: set if one changed on this rank by a percent or more. */
 PetscErrorCode SbJumpRenew(SbSpace space, const PetscReal x[], PetscBool first, PetscBool *changed);
-/* As SbSpaceGetJumps() says; and back, k[5 ncell] with ghosts, before SbJumpRenew(). */
+/* SbSpaceGetJumps() for local x; SbJumpSetStiffness() restores k[5 ncell], with ghosts, before SbJumpRenew(). */
 void SbJumpStiffness(SbSpace space, const PetscReal x[], PetscReal k[]);
 void SbJumpSetStiffness(SbSpace space, const PetscReal k[]);
-/* The matrix of the face in lane l of batch b, times the 3x3 identity; zero in padding. */
+/* The matrix of the face in lane l of batch b, to be multiplied by the 3x3 identity; zero in padding. */
 void SbJumpMatrix(SbSpace space, PetscInt b, PetscInt l, PetscReal K[8][8]);
 
-/* plan.c. Start of a cell in SbPlan.offset: block (a, b) follows at SB_BATCH (width a + b). */
+/* plan.c. Position of a cell in SbPlan.offset; block (a, b) follows at SB_BATCH (width a + b). */
 size_t SbPlanCellOffset(SbSpace space, PetscInt cell);
 PetscErrorCode SbPlanDestroy(SbPlan *plan);
 
-/* The value arrays of a matrix and how blocks lie in them. */
+/* The value arrays of a matrix, and their block layout. */
 typedef struct {
   SbMatrixKind kind;
   Mat part[2]; /* diagonal and off-diagonal part; the second is NULL on one rank */
   PetscScalar *value[2];
-  const PetscReal *face_term; /* [nbody] factor on the face terms that its rows begin with, or NULL */
+  const PetscReal *face_term; /* [nbody] factor on the face terms from which its rows start, or NULL */
 } SbValues;
 
-/* tangent.c: the values of a matrix of the space; what was changed shows after SbSpaceFinishTangent(). Not collective. */
+/* tangent.c: borrows the value arrays of a matrix; its state increases in SbSpaceFinishTangent(). Not collective. */
 PetscErrorCode SbValuesBegin(Mat A, SbValues *x);
 PetscErrorCode SbValuesEnd(SbValues *x);
 
-/* Where block k (as in SbPlan.offset) of row i begins in its value array, and the distance between its rows and columns. */
+/* Address of block k (as in SbPlan.offset) of a row, and the distances between its rows and columns. */
 static inline PetscScalar *sb_block(const SbValues *x, SbPlan p, PetscInt row, PetscInt k, size_t *row_stride,
                                     size_t *column_stride)
 {
@@ -66,33 +66,33 @@ static inline PetscScalar *sb_block(const SbValues *x, SbPlan p, PetscInt row, P
   return x->value[q] + 9 * (size_t)k;
 }
 
-/* Clears the rows that batch b reaches first, or fills them with the face terms; call it for every batch in turn, each before SbInsertBatch(). */
+/* Clears the rows that batch b adds to first, or sets them to the face terms; for every batch in order, before its SbInsertBatch(). */
 void SbInsertClear(SbSpace space, const SbValues *x, PetscInt b);
-/* quadratic.c: cells at their points. Not collective. The points of a batch: one of P1, CR and DG; four of a P2 cell; those of SbRuleQuintic of a curved one. */
+/* quadratic.c: points of a batch. P1, CR and DG have one; P2 cells four, curved ones those of SbRuleQuintic. Not collective. */
 typedef struct {
-  int n, step;             /* gradients of point q: g + step q */
-  const SbPointRule *rule; /* of P2 */
-  const SbPack *g, *V;     /* V[0]: volume of the cell */
-  const SbPack *weight;    /* [n] parts of it */
+  int n, step;             /* number of points; gradients of point q: g + step q */
+  const SbPointRule *rule; /* rule of P2 */
+  const SbPack *g, *V;     /* gradients; V[0]: volume of the cell */
+  const SbPack *weight;    /* [n] fractions of the volume */
 } SbPoints;
 SbPoints SbBatchPoints(SbSpace space, const SbRegion *region, PetscInt b);
-/* W = the part of the volume of a point. */
+/* W = the volume of a point. */
 SB_INLINE void SbPointVolume(const SbPoints *at, int q, SbPack W)
 {
   for (int l = 0; l < SB_BATCH; l++) W[l] = at->weight[q][l] * (*at->V)[l];
 }
-/* U[3 nnode] of sb_gather_strain() for x, zero where that is NULL, and F (rate: without the identity) at the points. */
+/* Gathers U[3 nnode] as sb_gather_strain() for x (NULL: zero), and F at the points (rate: without the identity). */
 void SbBatchGradients(SbSpace space, const SbRegion *region, PetscInt b, const PetscReal x[], PetscBool rate,
                       SbPack U[30], SbPack F[SB_POINTS][9]);
-/* The forces of a stress P at point q, on what sb_gather_strain() gathers: added for P2, all that there is for others, which have one point. */
+/* Forces of a stress P at point q on the values of sb_gather_strain(): added for P2, set for others, which have one point. */
 void SbPointForce(const SbPoints *at, int q, const SbPack P[9], SbPack f[30]);
 /*
   The volumetric part of the energy, V lambda/2 (mean of theta)^2: pressure = lambda times the mean (Pa, tension), b[30] = V d mean/du (m^2; NULL: not
-  wanted). F at the points.
+  wanted). F: at the points.
 */
 void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const SbPack U[30],
                        const SbPack F[SB_POINTS][9], SbPack pressure, SbPack b[30]);
-/* The rule that is exact for det F: of a curved cell that of its points. */
+/* The rule that is exact for det F; for a curved cell that of its points. */
 SB_INLINE const SbPointRule *SbVolumeRule(const SbPoints *at)
 {
   return at->step ? at->rule : &SbRuleCubic;
@@ -101,22 +101,22 @@ SB_INLINE const SbPointRule *SbVolumeRule(const SbPoints *at)
 void SbBatchState(SbSpace space, const SbRegion *region, PetscInt b, const PetscReal x[],
                   SbPack F[SB_POINTS][9], SbPack P[SB_POINTS][9], SbPack psi[SB_POINTS],
                   SbPack pressure[SB_POINTS]);
-/* Consistent mass of a straight cell / (density V). */
+/* Entry (a, b) of the consistent mass of a straight cell, over density V. */
 SB_INLINE PetscReal SbCellMass(const SbRegion *region, int a, int b)
 {
   if (region->quadratic) return SbQuadraticMass(a, b);
   return a == b ? region->element->ops.mass_diagonal : region->element->ops.mass_coupling;
 }
 
-/* Adds the blocks of each cell of batch b, ten or, of P2, SB_PAIRS; K is 32-byte aligned. */
+/* Adds the blocks of each cell of batch b, ten or, for P2, SB_PAIRS; K is 32-byte aligned. */
 void SbInsertBatch(SbSpace space, const SbValues *x, PetscInt b, int npair, const SbPack K[][9]);
-/* The same for DG cells, whose blocks stand between the means of their faces. */
+/* The same for DG cells, whose blocks couple the means at their faces. */
 void SbInsertBroken(SbSpace space, const SbValues *x, PetscInt b, const SbPack K[10][9]);
 
 /* constraint.c: projects an assembled matrix, or regularises it. Not collective. */
 void SbConstraintsFinishTangent(SbSpace space, const SbValues *x);
 PetscErrorCode SbConstraintsDestroy(SbConstraints *constraints);
 
-/* The part of it that a matrix-free operator does. */
+/* The same projection for rows of a matrix-free operator. */
 PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],
                                    PetscReal block[]);

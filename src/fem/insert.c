@@ -1,20 +1,20 @@
 /*
-  From lanes to the matrix: the blocks of a batch of cells, ten or, for P2, 55, added at their positions in the value arrays.
+  Insertion of the blocks of a batch of cells, ten or, for P2, 55 per cell, at their positions in the matrix's value arrays.
 
-  The kernel leaves the blocks with the lanes side by side, K[pair][entry][lane]; BAIJ and SBAIJ keep the nine entries of a
-  block together, by columns. So the entries of four lanes are transposed in registers, and each block is added as two
-  vectors of four and a last number: measured in cache 20 ns per tet for SBAIJ, where one number after the other took 52.
-  Lanes are added one after the other: neighbouring cells of a batch share blocks.
+  The kernel returns interleaved blocks, K[pair][entry][lane]; BAIJ and SBAIJ store the nine entries of a
+  block together, column-major. So the entries of four lanes are transposed in registers, and each block is added as two
+  vectors of four and a last number: in cache 20 ns per tet for SBAIJ, entry by entry 52.
+  Lanes are added sequentially: neighbouring cells of a batch share blocks.
 
-  A row of the matrix is cleared by the first batch that adds to it (the plan knows which): its lines are in the cache then,
-  and main memory is crossed once instead of twice. Measured at 200,000 tets, SBAIJ: 33 ns per tet instead of 49.
+  A row of the matrix is cleared by the first batch that adds to it (listed in the plan): it is in the cache then,
+  and main memory is accessed once instead of twice. Measured at 200,000 tets, SBAIJ: 33 ns per tet instead of 49.
 
-  AIJ keeps the rows of a block apart: its blocks go one by one, number by number.
+  AIJ does not store blocks contiguously: they are added entry by entry.
 */
 #include "fem_impl.h"
 #include "sbfour.h"
 
-/* Part q of row i begins with the face terms, one number times the identity in each block; one pass where blocks lie together. */
+/* Initialises part q of row i with the face terms, a multiple of the identity in each block; one pass where blocks are contiguous. */
 static void begin_with_face_terms(SbSpace s, const SbValues *x, PetscInt i, int q)
 {
   const SbPlan p = s->plan;
@@ -51,7 +51,7 @@ void SbInsertClear(SbSpace s, const SbValues *x, PetscInt b)
   }
 }
 
-/* A block, or its transpose, times a factor, at its position in a row that this rank owns. */
+/* Adds a block, or its transpose, times a factor, at its position in an owned row. */
 static inline void add_block(SbSpace s, const SbValues *x, PetscInt row, PetscInt column, PetscInt position,
                              PetscReal factor, PetscBool turn, const PetscReal k[9])
 {
@@ -65,7 +65,7 @@ static inline void add_block(SbSpace s, const SbValues *x, PetscInt row, PetscIn
   }
 }
 
-/* Any storage, any rank: the cell in lane l of batch b, block by block. */
+/* Any storage, any rank: adds the cell in lane l of batch b, block by block. */
 static void insert_cell(SbSpace s, const SbValues *x, PetscInt b, PetscInt l, int npair, const SbPack K[][9])
 {
   const PetscInt w = s->width, *node = s->batch_clique + (size_t)(b * w) * SB_BATCH + l;
@@ -86,7 +86,7 @@ static void insert_cell(SbSpace s, const SbValues *x, PetscInt b, PetscInt l, in
 
 /* ------------------------------------------------------------------ four lanes at a time */
 
-/* Entry e of the transposed block. */
+/* Index in the block of entry e of the transposed block. */
 static const int swapped[9] = {0, 3, 6, 1, 4, 7, 2, 5, 8};
 
 /* out[l][e] = in[e][l] */
@@ -102,7 +102,7 @@ SB_INLINE void transpose(const Four in[4], Four out[4])
 }
 
 /*
-  One block in each of four lanes: k[e] its entries by columns, position[l] its number. With `edge` the position may be in the
+  Adds one block in each of four lanes: k[e] its entries, column-major, position[l] its position. With `edge` the position may be in the
   off-diagonal part, or on another rank.
 */
 SB_INLINE void add_blocks(const Four k[9], const PetscInt position[4], PetscBool edge,
@@ -124,7 +124,7 @@ SB_INLINE void add_blocks(const Four k[9], const PetscInt position[4], PetscBool
   }
 }
 
-/* Padding lanes have volume zero and add nothing to the blocks of the first. */
+/* Both triangles, BAIJ. Padding lanes have volume zero and add nothing to the blocks of the first lane. */
 SB_INLINE void insert_both(int npair, const SbPack K[][9], const PetscInt offset[], PetscInt width,
                            PetscBool edge, PetscScalar *const value[2])
 {
@@ -149,7 +149,7 @@ SB_KERNEL static void insert_baij(const SbPack K[restrict 10][9], const PetscInt
   insert_both(10, K, offset, width, PETSC_FALSE, value);
 }
 
-/* Batches that touch nodes of another rank. */
+/* Batches with nodes of another rank. */
 SB_KERNEL static void insert_baij_edge(const SbPack K[restrict 10][9], const PetscInt offset[restrict],
                                        PetscInt width, PetscScalar *const value[2])
 {
@@ -227,7 +227,7 @@ void SbInsertBatch(SbSpace s, const SbValues *x, PetscInt b, int npair, const Sb
   }
 }
 
-/* Each block between means is spread over the own nodes and those across the faces. */
+/* DG: each block between means is distributed to the own nodes and those across the faces. */
 void SbInsertBroken(SbSpace s, const SbValues *x, PetscInt b, const SbPack K[10][9])
 {
   for (PetscInt l = 0; l < s->batch_n[b]; l++) {

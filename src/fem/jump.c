@@ -1,5 +1,5 @@
 /*
-  The face terms of CR and DG: penalty on the jump across a face.
+  The face terms of CR and DG: an interior penalty on the jump across a face.
 
   On a face F between cells + and -, with [u] the jump and [u]_0 its mean,
 
@@ -7,71 +7,69 @@
     kappa1 = gamma1 H(2 mu |F| / V),   kappa0 = gamma0 H((2 mu + lambda) |F| / V)  (DG only),
 
   H(k) = 2 k+ k- / (k+ + k-) the harmonic mean of the two sides; for one material H(mu |F| / V) = mu / h with
-  h = (V+ + V-) / (2 |F|) (Hansbo and Larson 2002). The terms take world vectors, are isotropic and constant within a step: no rotation
-  changes them, and rigid motions have no jumps.
+  h = (V+ + V-) / (2 |F|) (Hansbo and Larson 2002). The terms act on displacements, are isotropic and constant within a step: they are invariant under
+  rotations, and rigid motions have no jumps.
 
   A cell's function at vertex v is S - 3 u_v, S the sum of its four nodes and u_v the one opposite v. So the jump at the three
   vertices i of the face is J_i = (S+ - 3 u+_i) - (S- - 3 u-_i), and since J is linear there
 
     int_F |[u]|^2 = |F| / 12 (sum |J_i|^2 + |sum J_i|^2),   [u]_0 = sum J_i / 3.
 
-  dW/dJ_i = c1 J_i + (c1 + c0) sum J,  c1 = kappa1 |F| / 12,  c0 = kappa0 |F| / 9, is spread over the eight nodes as J was
-  gathered. For CR the two sides have the node of the face in common, and its parts cancel.
+  dW/dJ_i = c1 J_i + (c1 + c0) sum J,  c1 = kappa1 |F| / 12,  c0 = kappa0 |F| / 9, is distributed to the eight nodes by the transpose of
+  this map. For CR both sides share the node of the face, whose contributions cancel.
 
-  Under compression mu is not sufficient. A law whose energy depends on det F, or on another non-convex function of F, has twist modes
-  with a negative stiffness (P_i + P_j) / (s_i + s_j), P_i and s_i principal values of the first Piola stress and of F: under an even pressure p that is mu - p. For
-  continuous displacements the sum of these over the cells vanishes but for the boundary; for discontinuous ones the penalty has to balance it. So
+  Under compression kappa1 with mu is too small. A law whose energy depends on det F, or on another non-convex function of F, has twist modes
+  with a negative stiffness (P_i + P_j) / (s_i + s_j), P_i and s_i principal values of the first Piola stress and of F: under a hydrostatic pressure p it is mu - p. For
+  continuous displacements the sum over the cells vanishes but for the boundary; for discontinuous ones the penalty has to balance it. So
 
     kappa1 = gamma1 H(2 m |F| / V),   m = max(mu, FOLLOW max_ij -(P_i + P_j) / (s_i + s_j)),
 
-  with the state before the step, so that within a step the terms are constant, and their energy a quadratic one. A dependence on the state of the
-  step itself would have to be differentiated: the energy of jumps would become a pressure of its own, lambda times as large as it should be.
+  evaluated at the start of the step, so that the terms are constant within it and their energy is quadratic. A dependence on the current state
+  would have to be differentiated: the energy of jumps would add a spurious pressure, proportional to lambda.
 
-  In time steps kappa1 is a tangent, and twice as large: at the start of a step the energy of a face is kept as that of [u] - r, with an offset r
-  of the jump. With r = 0 every change of kappa1 would add 1/2 (kappa1' - kappa1) int |[u]|^2, and waves of pressure would pump
-  energy. So that a body at rest has no force, [u] - r is along [u], with a factor between (kappa1 with m = mu / kappa1)^2
+  In time steps kappa1 is twice as large, and acts on [u] - r, with an offset r of the jump that keeps the energy of a face when kappa1 changes
+  at the start of a step. With r = 0 every change of kappa1 would add 1/2 (kappa1' - kappa1) int |[u]|^2, and pressure waves would pump
+  energy. [u] - r is parallel to [u], so that a body at rest has no force, with a factor between (kappa1 with m = mu / kappa1)^2
   and one. The upper bound dissipates, the lower one adds little. Load steps, which may be long, have r = 0, so that their result depends on the loads alone; so has the start of a
-  dynamic run from a given state. With Newmark, without damping, m never falls: near nu = 1/2 it
+  dynamic run from a given state. With Newmark, without damping, m never decreases: near nu = 1/2 it
   would change a hundredfold with each wave.
 
-  A boundary face with a support (layout.c): the other side is constant, the displacement of the support, and infinitely
-  stiff. H(k) is 2 k then; there is no kappa1, because supports prescribe means.
+  A boundary face with a support node (layout.c): the other side is rigid and has the displacement of that
+  node. H(k) is 2 k then; kappa1 = 0, because the support prescribes the mean only.
 */
 #include "fem_impl.h"
 #include "sbkernel.h"
 
-#define FOLLOW \
-  4. /* factor on the negative stiffness in the penalty of load steps; docs/reference/theory.md */
+#define FOLLOW 4. /* FOLLOW, factor on the negative stiffness; docs/reference/theory.md */
 #define RATE \
   2. /* further factor in time steps: the secant stiffness of a growing penalty is about half its tangent */
-#define LEAST \
-  1e-3 /* sum of two stretches below which a cell is inverted or a line, and has no stiffness against twists */
-#define RENEWED 0.01 /* relative change of a penalty that counts as one */
-#define SAME 1e-12   /* and of one that is rounding */
+#define LEAST 1e-3   /* sum of two stretches below which a cell counts as degenerate: no twist stiffness */
+#define RENEWED 0.01 /* relative change of a penalty that is reported */
+#define SAME 1e-12   /* relative change that is rounding */
 
-/* A face between two local cells; cell[1] = SUPPORT: between a cell and a support. */
+/* A face between two local cells; cell[1] = SUPPORT: between a cell and a support node. */
 typedef struct {
   PetscInt cell[2], face[2], region;
 } Face;
 #define SUPPORT (-1)
 
 struct _p_SbJump {
-  Face *face;          /* in the order of batches and lanes */
-  PetscInt *region_of; /* [ncell] */
-  PetscReal *V;        /* [ncell] m^3 */
-  PetscReal *modulus;  /* [ncell] m above, Pa */
+  Face *face;          /* faces in the order of batches and lanes */
+  PetscInt *region_of; /* [ncell] region of each cell */
+  PetscReal *V;        /* [ncell] rest volume, m^3 */
+  PetscReal *modulus;  /* [ncell] modulus m above, Pa */
   PetscInt nbatch;
-  PetscInt *region; /* [nbatch] region of the first side: damping is that of its body */
-  PetscInt *n;      /* [nbatch] faces in it */
-  PetscInt *node;   /* [nbatch][8][SB_BATCH]; padding lanes repeat the first face */
-  SbPack *c0, *c1;  /* [nbatch] N/m; zero in padding */
-  SbPack *r;        /* [nbatch][9] m; NULL before a kappa1 follows in a dynamic run */
-  PetscBool began;  /* the state follows from time steps, or from a checkpoint of them */
-  PetscBool renew;  /* a checkpoint says that faces are not those of the rest state */
-  SbPack *share;    /* [nbatch] how much of a face's energy this rank counts: 1, or 1/2 between ranks */
+  PetscInt *region; /* [nbatch] region of the first side: its body's beta is used */
+  PetscInt *n;      /* [nbatch] number of faces in the batch */
+  PetscInt *node;   /* [nbatch][8][SB_BATCH] nodes; padding lanes repeat the first face */
+  SbPack *c0, *c1;  /* [nbatch] factors above, N/m; zero in padding */
+  SbPack *r;        /* [nbatch][9] offsets of the jumps, m; NULL before kappa1 changes in a dynamic run */
+  PetscBool began;  /* the run has made time steps, or its checkpoint has */
+  PetscBool renew;  /* penalties of a checkpoint differ from those of the rest state */
+  SbPack *share;    /* [nbatch] fraction of a face's energy that this rank counts: 1, or 1/2 between ranks */
 };
 
-/* Nodes of a face: for each side the one on the face, then those opposite the three vertices, in one order for both. */
+/* Nodes of a face: for each side the one on the face, then those opposite the three vertices, in the same order. */
 static void face_nodes(SbSpace s, const Face *face, PetscInt node[8])
 {
   const PetscInt plus = 4 * face->cell[0], minus = 4 * face->cell[1];
@@ -96,7 +94,7 @@ static inline PetscReal harmonic(PetscReal a, PetscReal b)
   return a + b > 0. ? 2. * a * b / (a + b) : 0.;
 }
 
-/* c0 and c1 of a face; at rest: with m = mu. */
+/* c0 and c1 of a face; `rest`: with m = mu. */
 static void face_factors(SbSpace s, SbJump j, const Face *face, PetscBool rest, PetscReal *c0, PetscReal *c1)
 {
   const PetscInt *v = s->mesh->cell + 4 * face->cell[0], f = face->face[0];
@@ -124,7 +122,7 @@ static void face_factors(SbSpace s, SbJump j, const Face *face, PetscBool rest, 
   }
 }
 
-/* Faces with an owned node, those of one body together. */
+/* Lists the faces with an owned node, sorted by body. */
 static PetscErrorCode find_faces(SbSpace s, const PetscInt region_of[], PetscInt *nface, Face **faces)
 {
   PetscInt n = 0;
@@ -171,7 +169,7 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
     }
   }
   PetscCall(find_faces(s, j->region_of, &nface, &j->face));
-  /* a batch never mixes bodies: one more each at most */
+  /* a batch has faces of one body: at most one more batch per body */
   j->nbatch = nface / SB_BATCH + s->mesh->nbody;
   PetscCall(PetscMalloc3(j->nbatch, &j->region, j->nbatch, &j->n, j->nbatch * 8 * SB_BATCH, &j->node));
   PetscCall(PetscCalloc3(j->nbatch, &j->c0, j->nbatch, &j->c1, j->nbatch, &j->share));
@@ -203,7 +201,7 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Raises the moduli of n cells to the negative stiffness of twist modes times a factor, at F, with the first Piola stress P. */
+/* Raises the moduli of n cells to `factor` times the negative stiffness of twist modes, at F, with the first Piola stress P. */
 static void follow_twists(PetscInt n, const SbPack F[9], const SbPack P[9], PetscReal factor,
                           PetscReal modulus[])
 {
@@ -211,7 +209,7 @@ static void follow_twists(PetscInt n, const SbPack F[9], const SbPack P[9], Pets
 
   SbStretches(F, U, stretch, V);
   for (PetscInt l = 0; l < n; l++) {
-    PetscReal principal[3] = {0.}; /* values of the stress in these axes */
+    PetscReal principal[3] = {0.}; /* principal stresses in the axes of F */
 
     for (int k = 0; k < 27; k++)
       principal[k % 3] += U[3 * (k / 9) + k % 3][l] * P[k / 3][l] * V[3 * (k / 3 % 3) + k % 3][l];
@@ -224,7 +222,7 @@ static void follow_twists(PetscInt n, const SbPack F[9], const SbPack P[9], Pets
   }
 }
 
-/* The modulus m of each cell of a batch, from its state; keep: not less than it was. Whether one is another than before. */
+/* Updates the modulus m of each cell of a batch from x; keep: m may not decrease. Returns whether some m changed. */
 static PetscBool follow_batch(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[],
                               PetscReal factor, PetscBool keep)
 {
@@ -243,7 +241,7 @@ static PetscBool follow_batch(SbSpace s, const SbRegion *region, PetscInt b, con
   SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, F);
   m->ops.stress(m, (const SbPack *)F, P);
 
-  /* principal values are below sqrt(2) |P| in pairs: mostly that is all there is to know */
+  /* skip most batches: sums of two principal stresses are at most sqrt(2) |P| */
   for (PetscInt l = 0; l < n; l++) {
     PetscReal square = 0.;
 
@@ -270,7 +268,7 @@ SB_INLINE void gather_jumps(const PetscInt node[8 * SB_BATCH], const PetscReal x
   }
 }
 
-/* Fraction of the jumps J of a face at x that its force belongs to: the component along J in the product of the energy, at most one. */
+/* Projection coefficient of J - r on the jumps J of a face at x, in the inner product of the energy with c1; not negative, 1 for J = 0. */
 static PetscReal held_part(SbJump j, PetscInt b, PetscInt l, const PetscReal x[], PetscReal J[9])
 {
   PetscReal sum[3], square = 0., along = 0.;
@@ -317,7 +315,7 @@ PetscErrorCode SbJumpRenew(SbSpace s, const PetscReal x[], PetscBool first, Pets
       if (PetscAbsReal(j->c1[b][l] - before) > RENEWED * before) *changed = PETSC_TRUE;
       if (!x || j->c1[b][l] == 0.) continue;
 
-      /* the part of the jumps that has the energy of before; or, first, the force */
+      /* fraction of the jumps that keeps the energy or, first, the force */
       face_factors(s, j, &j->face[i], PETSC_TRUE, &c0, &least);
       kept = before / j->c1[b][l];
       held =
@@ -356,7 +354,7 @@ void SbJumpSetStiffness(SbSpace s, const PetscReal k[])
       const PetscReal before = j->c1[b][l];
 
       if (face->cell[1] == SUPPORT) continue;
-      /* the owner of a cell need not know each of its faces */
+      /* the owner of a cell may not have each of its faces */
       j->c1[b][l] = PetscMax(k[5 * face->cell[0] + face->face[0]], k[5 * face->cell[1] + face->face[1]]);
       if (PetscAbsReal(j->c1[b][l] - before) > SAME * before) j->renew = PETSC_TRUE;
     }
@@ -397,7 +395,7 @@ PetscErrorCode SbJumpDestroy(SbJump *jump)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* t[8][3] of each lane: forces on the nodes, of jumps less r. */
+/* t[4][3] of each lane: forces on the nodes of the first side, from jumps minus r. */
 SB_KERNEL static void jump_forces(const PetscInt node[restrict 8 * SB_BATCH],
                                   const PetscReal c0[restrict SB_BATCH],
                                   const PetscReal c1[restrict SB_BATCH], const SbPack r[restrict 9],
@@ -421,7 +419,7 @@ SB_KERNEL static void jump_forces(const PetscInt node[restrict 8 * SB_BATCH],
   }
 }
 
-/* The offsets r of a batch; none for velocities. */
+/* The offsets r of a batch; zero for damping, which acts on velocities. */
 static const SbPack *left_out(SbJump j, PetscInt b, SbJumpFactor factor)
 {
   static const SbPack nothing[9];
@@ -485,7 +483,7 @@ PetscInt SbJumpCliques(SbSpace s, const PetscInt **node)
   return s->jump->nbatch;
 }
 
-/* Entry (a, b) of the 8x8 matrix of a face, the same in each component: sum_i d_ia d_ib c1 + (c1 + c0) D_a D_b. */
+/* Entry (a, b) of the 8x8 matrix of a face, equal for the three components: sum_i d_ia d_ib c1 + (c1 + c0) D_a D_b. */
 void SbJumpMatrix(SbSpace s, PetscInt b, PetscInt l, PetscReal K[8][8])
 {
   static const PetscReal d[3][4] = {{1, -2, 1, 1}, {1, 1, -2, 1}, {1, 1, 1, -2}}, D[4] = {3, 0, 0, 0};

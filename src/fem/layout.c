@@ -1,18 +1,18 @@
 /*
-  Which nodes there are, who owns them, and which four belong to each cell.
+  The nodes of a space, their owners, and the four nodes of each cell.
 
-  P1 has its nodes at the vertices: when every body is P1, nodes are the mesh's vertices and nothing is done here. P2 has more at the
-  edges, of the rank that owns one certain cell around the edge: all ranks with a cell there have all of them, and choose alike. CR has one
+  P1 has its nodes at the vertices: when every body is P1, nodes are the mesh's vertices and nothing is done here. P2 also has nodes at the
+  edges; one of the cells around an edge decides the owner, and all ranks with a cell there make the same choice. CR has one
   node per face, DG four per cell, on its faces; node a of a cell lies opposite vertex a. A rank owns all nodes of its DG cells
   and, of the CR faces between it and another rank, about every second one.
 
-  A boundary face of a DG cell that an effect prescribes in all directions has one more node, its support, which the effect
-  prescribes. To the cell it is what a neighbour of infinite stiffness would be: the mean of the two sides is the support's
-  displacement, and the face terms (jump.c) tie the cell to it. What the cell does to it is the reaction.
+  A boundary face of a DG cell that an effect prescribes in all directions has an additional node, the support node, which the effect
+  prescribes. It acts as a rigid neighbour: the mean of the two sides is the support's
+  displacement, and the face terms (jump.c) connect the cell to it. The force of the cell on it is the reaction.
 
-  Owned nodes are numbered in the order of the cells. Each rank knows the numbers of its own ones; two broadcasts over the
-  cells inform the others: after the first a cell has the numbers that belong to the rank of its neighbour, the second brings
-  complete cells to the ghosts, also on faces whose other side is not on this rank.
+  Owned nodes are numbered in the order of the cells. Each rank numbers its own nodes; two broadcasts over the
+  cells distribute the numbers: the first gives a cell the numbers owned by the rank of its neighbour, the second sends
+  complete cells to the ghosts, including faces whose other side is not on this rank.
 */
 #include "fem_impl.h"
 
@@ -27,7 +27,7 @@ static inline PetscInt face_towards(SbSpace s, PetscInt other, PetscInt cell)
   return f;
 }
 
-/* Whether this rank numbers the CR node between an owned cell and a ghost: both ranks decide alike. */
+/* Whether this rank numbers the CR node between an owned cell and a ghost; both ranks get consistent answers. */
 static inline PetscBool takes_face(SbMesh mesh, PetscInt owned, PetscInt ghost)
 {
   const PetscInt a = mesh->cell_orig[owned], b = mesh->cell_orig[ghost];
@@ -35,7 +35,7 @@ static inline PetscBool takes_face(SbMesh mesh, PetscInt owned, PetscInt ghost)
   return (PetscBool)((a < b) == ((a + b) % 2 != 0));
 }
 
-/* Number of a CR node of an owned cell, UNKNOWN when it is another rank's. */
+/* Number of a CR node of an owned cell, UNKNOWN if another rank owns it. */
 static PetscInt number_face(SbSpace s, const PetscInt node[], PetscInt cell, PetscInt face, PetscInt *n)
 {
   const PetscInt other = s->neighbour[4 * cell + face];
@@ -45,15 +45,15 @@ static PetscInt number_face(SbSpace s, const PetscInt node[], PetscInt cell, Pet
   return (*n)++;
 }
 
-/* The edges of the local cells: which they are, who numbers them. */
+/* Edges of the local cells, and their owners. */
 typedef struct {
-  PetscInt n, *edge; /* [ncell][6] numbers of edges */
+  PetscInt n, *edge; /* number of edges; [ncell][6] edges of each cell */
   PetscInt *first;   /* [n] lowest original number of the P2 cells around it */
   PetscBool *own;    /* [n] this rank numbers its node */
-  PetscInt *at;      /* [n] the node, UNKNOWN */
+  PetscInt *at;      /* [n] number of its node, UNKNOWN: not yet */
 } Edges;
 
-/* Of every other edge the lowest of its cells decides, of the rest the highest. */
+/* Finds the edges; every second one belongs to the rank of its lowest P2 cell, the others to that of the highest. */
 static PetscErrorCode find_edges(SbSpace s, Edges *edges)
 {
   SbMesh mesh = s->mesh;
@@ -84,7 +84,7 @@ static PetscErrorCode find_edges(SbSpace s, Edges *edges)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Owned nodes from zero on: node[ncell][4] and, for faces in these sets, s->support[ncell][4]; UNKNOWN elsewhere. */
+/* Numbers the owned nodes from zero: node[ncell][4] and, for faces in these sets, s->support[ncell][4]; UNKNOWN elsewhere. */
 static PetscErrorCode number_owned(SbSpace s, uint64_t prescribed, Edges *edges, PetscInt node[])
 {
   SbMesh mesh = s->mesh;
@@ -126,7 +126,7 @@ static PetscErrorCode number_owned(SbSpace s, uint64_t prescribed, Edges *edges,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After the first broadcast: owned cells get what their ghost neighbours know. */
+/* After the first broadcast: owned cells get the numbers that their ghost neighbours have. */
 static PetscErrorCode complete_owned(SbSpace s, Edges *edges, PetscInt node[])
 {
   SbMesh mesh = s->mesh;
@@ -163,7 +163,7 @@ static PetscErrorCode complete_owned(SbSpace s, Edges *edges, PetscInt node[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the numbers that are another rank's to a list. */
+/* Adds the numbers owned by other ranks to a list. */
 static void add_ghosts(SbSpace s, PetscInt n, const PetscInt number[], PetscInt *nghost, PetscInt ghost[])
 {
   for (PetscInt i = 0; i < n; i++) {
@@ -173,7 +173,7 @@ static void add_ghosts(SbSpace s, PetscInt n, const PetscInt number[], PetscInt 
   }
 }
 
-/* From global numbers to local ones: owned nodes, then ghosts by global number. */
+/* Converts global numbers to local ones: owned nodes, then ghosts by global number. */
 static PetscErrorCode make_local(SbSpace s, PetscInt n, PetscInt number[])
 {
   PetscFunctionBeginUser;
@@ -192,7 +192,7 @@ static PetscErrorCode make_local(SbSpace s, PetscInt n, PetscInt number[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Ghosts, and local numbers in s->cell_node, s->edge_node and s->dirichlet_node. */
+/* Finds the ghosts, and the local numbers in s->cell_node, s->edge_node and s->dirichlet_node. */
 static PetscErrorCode localise(SbSpace s)
 {
   const PetscInt four = 4 * s->mesh->ncell, six = 6 * s->mesh->ncell;
@@ -216,8 +216,8 @@ static PetscErrorCode localise(SbSpace s)
 }
 
 /*
-  Sets of a node at a face. On the boundary those of the face. Inside: a set that holds the triangle or its three vertices;
-  both cells of the face, and a rank that has one of them, find the same.
+  Sets of a node at a face. On the boundary those of the face. Inside: sets that contain the triangle or its three vertices;
+  the result is the same from either cell, on any rank.
 */
 static uint64_t face_sets(SbMesh mesh, PetscInt cell, PetscInt face)
 {
@@ -232,9 +232,9 @@ static uint64_t face_sets(SbMesh mesh, PetscInt cell, PetscInt face)
 }
 
 /*
-  Place, body and sets of the nodes at edges. A set that is a shape holds an edge with both its vertices, as does a group without triangles
-  and tets; other groups hold the edges of what they hold, so that no edge through a thin body is in the group of its surface. Owned cells
-  know all cells around their edges, and tell the ghosts.
+  Position, body and sets of the nodes at edges. A geometric set, or a group without triangles and tets, contains an edge if it contains both
+  vertices; other groups contain the edges of their triangles and tets, so that no edge through a thin body is in the group of its surface. Owners
+  have all cells around their edges, and send the result to the ghosts.
 */
 static PetscErrorCode describe_edges(SbSpace s, const Edges *edges)
 {
@@ -279,7 +279,7 @@ static PetscErrorCode describe_edges(SbSpace s, const Edges *edges)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Place, body and sets of every node. */
+/* Position, body and sets of every node. */
 static PetscErrorCode describe_nodes(SbSpace s, const Edges *edges)
 {
   SbMesh mesh = s->mesh;
@@ -306,7 +306,7 @@ static PetscErrorCode describe_nodes(SbSpace s, const Edges *edges)
     }
   }
   if (s->edge_node) PetscCall(describe_edges(s, edges));
-  /* a support lies where the node of its face lies, and takes over its sets: what prescribes the face prescribes the support */
+  /* a support node has the position and the sets of the node of its face: an effect that prescribes the face prescribes it */
   for (PetscInt i = 0; s->dirichlet_node && i < 4 * mesh->ncell; i++) {
     const PetscInt own = s->cell_node[i], node = s->dirichlet_node[i];
 
@@ -356,8 +356,7 @@ PetscErrorCode SbLayoutNodes(SbSpace s)
     PetscCall(layout_vertices(s));
   else {
     SbMesh mesh = s->mesh;
-    uint64_t prescribed =
-      0; /* sets that an effect prescribes; none when no body ties its faces to supports */
+    uint64_t prescribed = 0; /* sets that an effect prescribes; none if no body has support nodes */
     Edges edges = {0};
 
     for (PetscInt k = 0; k < mesh->nset * mesh->nbody; k++) {
@@ -415,7 +414,7 @@ PetscErrorCode SbLayoutDestroy(SbSpace s)
 }
 
 /*
-  Nodes across the faces of DG cells. The mean of the two sides of a face is weighted by (2 mu + lambda) / |T|: then the
+  Opposite nodes across the faces of DG cells, and the weights of both sides. The mean of the two sides of a face is weighted by (2 mu + lambda) / |T|: then the
   constant in the bound of the lifting does not depend on the volumes and moduli on the two sides (docs/reference/theory.md).
 */
 PetscErrorCode SbLayoutCliques(SbSpace s)
@@ -460,7 +459,7 @@ PetscErrorCode SbLayoutCliques(SbSpace s)
     PetscInt *node = &s->batch_clique[(s->width * b + 4 + a) * SB_BATCH + l];
     PetscReal *weight = &s->batch_weight[4 * b + a][l];
 
-    /* the node across face a, and the weight of the cell's own one in the mean of the two */
+    /* the node opposite across face a, and the weight of the cell's own node in the mean */
     *weight = 1.;
     if (!SbSpaceCellElement(s, cell)->nodes_per[3]) continue;
     *node = s->cell_node[4 * cell + a];

@@ -1,19 +1,19 @@
 /*
-  The tangent without a matrix, for laws whose tangent is Hooke's tensor turned by a rotation.
+  Matrix-free tangent, for laws whose tangent is Hooke's tensor rotated by R.
 
-  With rotated gradients h_a = R grad phi_a a cell's part of A p is
+  With rotated gradients h_a = R grad phi_a the product A p of a cell is
     H = sum_a p_a h_a^T,  T = 2 mu sym(H) + lambda tr(H) I,  q_a = V T h_a,
-  linear elasticity in the turned frame; R is not applied to anything else. A state costs a rotation and nine products per cell,
-  an application about as much as one with a stored matrix, and no blocks are formed at all: for a handful of iterations per
-  step this is several times cheaper than assembling.
+  linear elasticity in the rotated frame; R enters only h. A new state costs a rotation and nine products per cell,
+  an application about as much as a product with a stored matrix, and no blocks are formed: with few iterations per
+  step this is several times cheaper than assembly.
 
   A cell of P2 has the rotated gradients of its four points, and lambda acts on the mean of tr(H) over them (quadratic.c). With
   far and near the two barycentric coordinates of the points, point q sees a linear cell whose vertices i move by
     (4 far - 1) p_i + 4 far sum_j p_ij + 4 (near - far) p_iq,   p_ii = p_i:
-  all but the last term is the same at the four points.
+  all terms but the last are the same at the four points.
 
-  Vectors are copied to four doubles per node, so that a node is one load and one store of the processor. Eight cells side by
-  side: a 4x4 transpose turns eight loads of a node into lanes.
+  Vectors are copied to four doubles per node, so that a node is one vector load or store. Eight cells are evaluated at
+  a time: 4x4 transposes turn eight loads of a node into lanes.
 
   Prescribed unknowns: p is zero there, and their rows are a multiple of the identity.
   Not handled: the consistent mass, tangents of effects.
@@ -24,14 +24,14 @@
 
 typedef struct {
   SbSpace space;
-  void *memory;                  /* what R and h live in */
+  void *memory;                  /* allocation that contains R and h */
   SbPack *R;                     /* [nbatch][sb_rotation_points()][9] rotations */
-  SbPack *h;                     /* likewise: rotated gradients of nodes 1..3, 1/m */
-  PetscReal *lambda, *mu;        /* [nregion] times the factor of the stiffness, Pa */
+  SbPack *h;                     /* [nbatch][sb_rotation_points()][9] rotated gradients of nodes 1..3, 1/m */
+  PetscReal *lambda, *mu;        /* [nregion] Lame constants times the factor of the stiffness, Pa */
   PetscReal *inertia;            /* [nnode_owned] diagonal from mass and its damping, kg/s^2 */
   PetscReal prescribed_diagonal; /* diagonal of prescribed unknowns, kg/s^2 or N/m */
-  Vec ghosted;                   /* NULL on one rank */
-  PetscReal *p, *q;              /* [nnode][4] */
+  Vec ghosted;                   /* ghosted work vector; NULL on one rank */
+  PetscReal *p, *q;              /* [nnode][4] input and output of the product */
 } Operator;
 
 typedef double Four __attribute__((vector_size(32)));
@@ -56,7 +56,7 @@ SB_INLINE void gather(const PetscReal *p, const PetscInt node[SB_BATCH], Eight l
   lanes[2] = __builtin_shufflevector(even01, even23, 2, 3, 10, 11, 6, 7, 14, 15);
 }
 
-/* The reverse, added to q. */
+/* Adds component c of eight nodes, lanes[c], to q. */
 SB_INLINE void scatter_add(const Eight lanes[3], const PetscInt node[SB_BATCH], PetscReal *q)
 {
   const Eight zero = {0}, x = lanes[0], y = lanes[1], z = lanes[2];
@@ -75,7 +75,7 @@ SB_INLINE void scatter_add(const Eight lanes[3], const PetscInt node[SB_BATCH], 
   }
 }
 
-/* q += A p of the batches of one region, whose gradients are `stride` apart. Padding lanes have volume zero. */
+/* q += A p for the batches of one region, whose gradients are `stride` apart. Padding lanes have volume zero. */
 SB_KERNEL static void apply_region(PetscInt nbatch, const PetscInt *node, PetscInt stride,
                                    const SbPack *gradient, const SbPack *volume, PetscReal lambda,
                                    PetscReal mu, const PetscReal *p, PetscReal *q)
@@ -105,7 +105,7 @@ SB_KERNEL static void apply_region(PetscInt nbatch, const PetscInt *node, PetscI
   }
 }
 
-/* The same of P2. lambda[2]: at the points, and of the mean over them. */
+/* The same for P2. lambda[2]: at the points, and for their mean. */
 SB_KERNEL static void apply_quadratic(PetscInt nbatch, PetscInt width, const PetscInt *node,
                                       const SbPack *gradient, const SbPack *volume, const PetscReal lambda[2],
                                       PetscReal mu, const PetscReal *p, PetscReal *q)
@@ -119,7 +119,7 @@ SB_KERNEL static void apply_quadratic(PetscInt nbatch, PetscInt width, const Pet
     Eight u[10][3], same[4][3], H[4][9], f[4][4][3], mean = {0};
 
     for (int a = 0; a < 10; a++) gather(p, node + a * SB_BATCH, u[a]);
-    // what vertices move by at all points; then the gradients there
+    // terms of the vertices that are the same at all points; then the gradients at each point
     for (int i = 0; i < 3; i++) {
       for (int a = 0; a < 4; a++) {
         same[a][i] = (far4 - 1.) * u[a][i];
@@ -156,7 +156,7 @@ SB_KERNEL static void apply_quadratic(PetscInt nbatch, PetscInt width, const Pet
       }
       for (int i = 0; i < 3; i++) f[k][0][i] = -(f[k][1][i] + f[k][2][i] + f[k][3][i]);
     }
-    // and back as they came
+    // adjoint of the above: back to vertices and edge nodes
     for (int i = 0; i < 3; i++) {
       for (int a = 0; a < 4; a++) same[a][i] = f[0][a][i] + f[1][a][i] + f[2][a][i] + f[3][a][i];
       for (int a = 0; a < 4; a++) {
@@ -267,7 +267,7 @@ SB_KERNEL static void rotate_gradients(const SbPack R[restrict 9], const SbPack 
   }
 }
 
-/* Rotations and factors of a stage. */
+/* Computes rotations and factors of a stage. */
 static PetscErrorCode assemble(Mat A, const SbStage *stage)
 {
   Operator *o;
@@ -296,7 +296,7 @@ static PetscErrorCode assemble(Mat A, const SbStage *stage)
       }
     }
   }
-  /* of the size of the other diagonal entries: E times the edge of a typical cell; equal on all ranks is not needed */
+  /* as large as other diagonal entries: E times the edge of a typical cell; ranks may differ */
   o->prescribed_diagonal =
     s->nbatch ? stiffest * PetscCbrtReal(s->batch_V[0][0]) + (s->nnode_owned ? o->inertia[0] : 0.) : 1.;
   PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
@@ -407,7 +407,7 @@ PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], con
         const SbPack *h = (const SbPack *)o->h + 9 * sb_rotation_points(s) * b;
         SbPack B[4][10][9] __attribute__((aligned(64))), V, one[9], factor, force[12], volume[30] = {{0}};
 
-        // the points in the turned frame, and lambda/V b b^T with b = sum_q V_q h_q (quadratic.c)
+        // the points in the rotated frame, and lambda/V b b^T with b = sum_q V_q h_q (quadratic.c)
         for (PetscInt l = 0; l < SB_BATCH; l++) {
           V[l] = 0.25 * s->batch_V[b][l];
           factor[l] = mean && V[l] > 0. ? o->lambda[r] / (4. * V[l]) : 0.;
@@ -440,7 +440,7 @@ PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], con
       }
     }
   }
-  /* what belongs to prescribed unknowns is cleared */
+  /* clear rows and columns of prescribed unknowns */
   for (PetscInt k = 0; k < n; k++) {
     const PetscInt i = node[k], nd = p->di[i + 1] - p->di[i];
 

@@ -1,11 +1,11 @@
 /*
   Rotations of cells and of nodes.
 
-  A node's rotation is the proper rotation next to sum_T V_T R_T over the cells around it (Markley 2007, "Averaging
-  quaternions", gives the same maximiser of sum_T V_T R : R_T). All cells that touch an owned node are local, so owned nodes
-  need no communication. R_T of a P2 cell is the mean over its points: of the ways to make rotations of nodes from those of the points this
-  takes the fewest iterations of -solver realtime (8.0 a step for the bar of 1,536 tets; with the linear function through the points 10, with the
-  rotation of the four vertices 11.7). Where rotations cancel out (cells turned against each other by pi) the result is some rotation.
+  A node's rotation is the proper rotation nearest to sum_T V_T R_T over the cells around it (Markley 2007, "Averaging
+  quaternions": the same maximiser of sum_T V_T R : R_T). All cells of an owned node are local, so owned nodes
+  need no communication. R_T of a P2 cell is the mean over its points: compared with other averages it
+  takes the fewest iterations of -solver realtime (8.0 per step for a bar of 1,536 tets; with the linear function through the points 10, with the
+  rotation of the four vertices 11.7). Where rotations cancel (relative rotation pi) the result is an arbitrary rotation.
 */
 #include "fem_impl.h"
 
@@ -20,14 +20,14 @@ void SbSpaceCellRotations(SbSpace s, const PetscReal x[], SbPack R[])
       SbPack U[30], F[SB_POINTS][9];
 
       SbBatchGradients(s, region, b, x, PETSC_FALSE, U, F);
-      /* of a curved cell at the first four of its points */
+      /* for a curved cell at the first four of its points */
       for (int q = 0; q < (region->quadratic ? 4 : 1); q++)
         SbMaterialRotation(region->material, (const SbPack *)F[q], R + stride * b + 9 * q);
     }
   }
 }
 
-/* The rotation of the cell in lane l, that of P2 the mean over its points; returns at how many nodes it counts. */
+/* Rotation r of the cell in lane l, for P2 the mean over its points; returns the number of its nodes. */
 static PetscInt cell_rotation(SbSpace s, const SbPack *R, PetscInt b, PetscInt l, PetscReal r[9])
 {
   const PetscBool quadratic = (PetscBool)(s->edge_node && s->edge_node[6 * s->batch_cell[b]] >= 0);
@@ -63,7 +63,7 @@ PetscErrorCode SbSpaceAverageRotations(SbSpace s, const SbPack R[], PetscReal no
     const PetscInt n = PetscMin(SB_BATCH, s->nnode_owned - first);
     SbPack M[9], Q[9];
 
-    /* the volume around the node is the scale: SbPolar() wants numbers near one */
+    /* divide by the volume around the node: SbPolar() expects numbers near one */
     for (PetscInt l = 0; l < SB_BATCH; l++) {
       const PetscReal *from = sum + 9 * (first + (l < n ? l : 0));
       const PetscReal size = PetscSqrtReal(SbDot9(from, from) / 3.);

@@ -1,33 +1,33 @@
 /*
-  The assembly plan: the graph of node blocks and, for each cell, where its blocks lie in it.
+  The assembly plan: the graph of node blocks and, for each cell, the positions of its blocks in the matrix.
 
-  Built in one sweep over nodes: the cells (and with CR and DG the faces) around an owned node give the columns of its row;
-  while they are at hand, the positions of the blocks of that row are written into the cells' tables. The face terms are constant within a step:
-  they are summed here, and every assembly begins with them. There is no search. Measured at 200k tets this
-  takes a small part of what DMCreateMatrix takes for the same graph (`make bench`, row matrix_setup).
+  Built in one loop over nodes: the cells (and with CR and DG the faces) around an owned node give the columns of its row;
+  at the same time the positions of the blocks of that row are stored for the cells, without a search. The face terms are constant within a step:
+  they are summed here, and every assembly starts from them. Measured at 200k tets this
+  takes a small fraction of the time of DMCreateMatrix for the same graph (`make bench`, row matrix_setup).
 */
 #include "fem_impl.h"
 #include "sblog.h"
 
 /*
-  Groups of nodes that are all coupled, in lanes: the cells' (width nodes each) and the faces' (eight), node a of lane l of
-  batch b at SB_BATCH (nodes b + a) + l. A slot is such a position.
+  Cliques of coupled nodes in lanes: those of the cells (width nodes each) or of the faces (eight). The slot of node a, lane l,
+  batch b is SB_BATCH (nodes b + a) + l.
 */
 typedef struct {
   const PetscInt *node;
-  PetscInt nodes; /* in a group */
+  PetscInt nodes; /* number of nodes in a group */
   PetscInt nbatch;
-  PetscInt *start, *slot; /* slots at which each owned node stands, one for each group around it */
-  PetscInt *offset;       /* [nbatch][nodes^2][SB_BATCH] to be filled; NULL: not wanted */
+  PetscInt *start, *slot; /* [nnode_owned+1] offsets; slots of each owned node, one per group around it */
+  PetscInt *offset;       /* [nbatch][nodes^2][SB_BATCH] positions of the blocks, output; NULL: not wanted */
 } Groups;
 
-/* Node 0 of the group that has a node at a slot; its node b follows SB_BATCH b behind. */
+/* Node 0 of the group of a slot; node b of the group is at SB_BATCH b. */
 static inline const PetscInt *slot_group(const Groups *g, PetscInt slot)
 {
   return g->node + slot / (g->nodes * SB_BATCH) * (g->nodes * SB_BATCH) + slot % SB_BATCH;
 }
 
-/* Regions are runs of cells and of batches. */
+/* Binary search for the cell's region: regions are ranges of cells and of batches. */
 size_t SbPlanCellOffset(SbSpace s, PetscInt cell)
 {
   PetscInt low = 0, high = s->nregion - 1, lane;
@@ -48,7 +48,7 @@ size_t SbPlanCellOffset(SbSpace s, PetscInt cell)
          (size_t)lane;
 }
 
-/* Rows in the order in which the batches reach them. */
+/* Lists the rows in the order in which the batches add to them first. */
 static PetscErrorCode plan_fresh(SbSpace s, SbPlan p)
 {
   PetscBool *seen;
@@ -72,7 +72,7 @@ static PetscErrorCode plan_fresh(SbSpace s, SbPlan p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The face terms as they are now, summed for the matrix. */
+/* Sums the current face terms for the matrix. */
 static void sum_face_terms(SbSpace s, SbPlan p)
 {
   const PetscInt *nodes, nbatch = SbJumpCliques(s, &nodes);
@@ -113,7 +113,7 @@ static PetscErrorCode create_groups(SbSpace s, const PetscInt node[], PetscInt n
   g->node = node;
   g->nodes = nodes;
   g->nbatch = nbatch;
-  /* padding lanes count as the group that they repeat: its columns are marked once more, and they get its positions */
+  /* padding lanes count as the group that they repeat: its columns are marked again, and they get its positions */
   PetscCall(SbBucketByKey(nodes * SB_BATCH * nbatch, node, s->nnode_owned, &g->start, &g->slot));
   g->offset = NULL;
   if (!places) PetscFunctionReturn(PETSC_SUCCESS);
@@ -131,14 +131,14 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&p));
-  // for each owned node the cells around it, and the faces where jumps across them are penalised
+  // for each owned node: the cells around it, and the faces with a penalty on jumps
   PetscCall(create_groups(s, s->batch_clique, s->width, s->nbatch, PETSC_TRUE, &group[0]));
   if (s->jump) {
     const PetscInt *node, nbatch = SbJumpCliques(s, &node);
 
     PetscCall(create_groups(s, node, 8, nbatch, PETSC_FALSE, &group[1]));
   }
-  // room for the graph: a node shares each group with all its other nodes, and with none twice
+  // upper bound for the graph: a node shares each group with all its other nodes
   for (PetscInt i = 0; i < nrow; i++) {
     PetscInt most = 1;
 
@@ -169,9 +169,9 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
         }
       }
     }
-    // in local order: ghosts are sorted globally, so global order within each part
+    // sort in local order: ghosts are sorted by global number, so each part is in global order
     PetscCall(PetscSortInt(n, column));
-    // the row of the graph: owned columns in the diagonal part, ghosts in the other one
+    // the row of the graph: owned columns in the diagonal part, ghosts in the off-diagonal part
     for (PetscInt k = 0; k < n; k++) {
       if (column[k] < nrow) {
         position[column[k]] = nd;
@@ -184,7 +184,7 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
     p->diagonal[i] = position[i];
     p->di[i + 1] = nd;
     p->oi[i + 1] = no;
-    // while the positions of the row are known, the cells around take those of their blocks
+    // store the positions of the row's blocks for the cells around the node
     for (PetscInt at = group[0].start[i]; at < group[0].start[i + 1]; at++) {
       const Groups *g = &group[0];
       const PetscInt *node = slot_group(g, g->slot[at]), lane = g->slot[at] % SB_BATCH;
@@ -203,7 +203,7 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
     PetscCall(PetscFree(group[k].slot));
   }
   PetscCall(PetscFree3(seen, position, column));
-  // where assembly first touches each row, so that it is cleared while in the cache
+  // the first batch of each row, which clears it while it is in the cache
   PetscCall(plan_fresh(s, p));
   *plan = p;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -219,7 +219,7 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, SbStepsOf steps, PetscBool *
   if (changed) *changed = PETSC_FALSE;
   if (!s->jump || s->linear) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbSpaceGetLocalRead(s, U, &x));
-  /* a state that no step has led to has the forces of a load step */
+  /* the initial state of a dynamic run has the forces of a load step */
   first = (PetscBool)(in_time && SbJumpBegin(s));
   if (first && SbJumpFollow(s, x, SB_STEPS_OF_LOAD)) PetscCall(SbJumpRenew(s, NULL, PETSC_FALSE, &mine));
   any = SbJumpFollow(s, x, steps);
@@ -273,7 +273,7 @@ PetscErrorCode SbPlanDestroy(SbPlan *plan)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For SBAIJ on one rank: the first upper block of each row, and where in the upper triangle the blocks of each cell go. */
+/* SBAIJ on one rank: the first upper block of each row, and the positions of each cell's blocks in the upper triangle. */
 static PetscErrorCode plan_upper(SbSpace s, SbPlan p)
 {
   const PetscInt nrow = s->nnode_owned;
@@ -284,11 +284,11 @@ static PetscErrorCode plan_upper(SbSpace s, SbPlan p)
   p->npair = s->edge_node ? SB_PAIRS : 10;
   PetscCall(PetscMalloc1((size_t)s->nbatch * (size_t)p->npair * SB_BATCH, &p->upper));
 
-  /* a row has the blocks from its diagonal on */
+  /* a row consists of the blocks from its diagonal on */
   p->ui[0] = 0;
   for (PetscInt i = 0; i < nrow; i++) p->ui[i + 1] = p->ui[i] + p->di[i + 1] - p->diagonal[i];
 
-  /* a pair of nodes goes to the row of the lower one; ~u: its block is to be transposed */
+  /* a pair of nodes belongs to the row of the lower one; ~u: its block has to be transposed */
   for (PetscInt b = 0; b < s->nbatch; b++) {
     const PetscInt *node = s->batch_clique + s->width * SB_BATCH * b,
                    *offset = p->offset + (size_t)b * (size_t)(s->width * s->width) * SB_BATCH;
@@ -320,8 +320,8 @@ static PetscInt widest_row(SbSpace s, SbPlan p)
 }
 
 /*
-  Pattern of the diagonal part of AIJ, three scalar rows at a time. With MAT_SORTED_FULL (rows come sorted and complete) PETSc copies
-  them as they are: six times faster at 200,000 tets than block by block.
+  Pattern of the diagonal part of AIJ, three scalar rows at a time. With MAT_SORTED_FULL (sorted, complete rows) PETSc copies
+  them unchanged: six times faster at 200,000 tets than block by block.
 */
 static PetscErrorCode fill_diagonal_aij(SbSpace s, SbPlan p, Mat A)
 {
@@ -358,7 +358,7 @@ static PetscErrorCode fill_pattern(SbSpace s, SbPlan p, Mat A, SbMatrixKind kind
   PetscScalar *zeros;
 
   PetscFunctionBeginUser;
-  /* AIJ has its diagonal part by scalar rows; the blocks inserted below are those of its off-diagonal part */
+  /* the diagonal part of AIJ is set by scalar rows; the blocks inserted below are those of its off-diagonal part */
   if (kind == SB_MATRIX_AIJ) PetscCall(fill_diagonal_aij(s, p, A));
   PetscCall(PetscMalloc1(widest, &column));
   PetscCall(PetscCalloc1(9 * widest, &zeros));
@@ -444,7 +444,7 @@ PetscErrorCode SbAttachModes(Mat A, PetscErrorCode (*fill)(PetscInt mode, PetscS
     PetscCall(fill(m, v, ctx));
     PetscCall(VecRestoreArray(mode[kept], &v));
 
-    /* orthonormal to the earlier ones, as MatNullSpaceCreate() demands; modes that vanish by this or by prescribed unknowns are left out */
+    /* orthonormal to the earlier modes, as MatNullSpaceCreate() requires; modes that vanish are left out */
     PetscCall(VecNormalize(mode[kept], &norm));
     for (PetscInt k = 0; k < kept; k++) {
       PetscCall(VecDot(mode[kept], mode[k], &dot));
@@ -463,7 +463,7 @@ PetscErrorCode SbAttachModes(Mat A, PetscErrorCode (*fill)(PetscInt mode, PetscS
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A rigid mode of each body at its nodes, zero on prescribed unknowns. */
+/* Fills v with rigid-body mode m of a body, zero at prescribed unknowns. */
 static PetscErrorCode fill_rigid_mode(PetscInt m, PetscScalar v[], const void *ctx)
 {
   const struct _p_SbSpace *s = ctx;
@@ -491,13 +491,13 @@ PetscErrorCode SbSpaceCreateMatrix(SbSpace s, SbMatrixKind kind, Mat *A)
   PetscCheck(kind != SB_MATRIX_SBAIJ || size == 1, s->comm, PETSC_ERR_SUP,
              "Symmetric block storage is for one rank: there is no public access to its parallel parts");
 
-  /* what the plan needs for this kind of storage and these prescribed unknowns */
+  /* parts of the plan for this storage and these prescribed unknowns */
   if (!s->plan) PetscCall(SbPlanCreate(s, &s->plan));
   p = s->plan;
   PetscCall(plan_fixed(s, p));
   if (kind == SB_MATRIX_SBAIJ) PetscCall(plan_upper(s, p));
 
-  /* a matrix of the type, with exact preallocation and the whole pattern */
+  /* a matrix of the type, with exact preallocation and the complete pattern */
   PetscCall(PetscMalloc3(s->nnode_owned, &dnnz, s->nnode_owned, &onnz, s->nnode_owned, &unnz));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     dnnz[i] = p->di[i + 1] - p->di[i];
@@ -515,7 +515,7 @@ PetscErrorCode SbSpaceCreateMatrix(SbSpace s, SbMatrixKind kind, Mat *A)
   PetscCall(MatSetOption(*A, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(MatSetOption(*A, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
 
-  /* AIJ is for multigrid, which needs the rigid modes; block storages get the fast product */
+  /* AIJ is for multigrid, which needs the rigid-body modes; block storages get the fast product */
   if (kind == SB_MATRIX_AIJ)
     PetscCall(SbAttachModes(*A, fill_rigid_mode, s));
   else

@@ -1,7 +1,7 @@
 /*
   Prescribed unknowns. They stay in the system, so that the block size is three everywhere: their rows are u = prescribed
-  (see tangent.c for the matrix). The initial guess of every solve carries the prescribed values, which makes their
-  residual zero and moves their effect on free unknowns to the right-hand side.
+  (see tangent.c for the matrix). The initial guess of every solve has the prescribed values, so that their
+  residual is zero and their effect on free unknowns is in the right-hand side.
 */
 #include "fem_impl.h"
 

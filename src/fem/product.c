@@ -1,14 +1,14 @@
 /*
-  Products with block matrices, from the upper triangle of the diagonal part alone: the matrices of this program are symmetric.
+  Products with symmetric block matrices that read the upper triangle of the diagonal part only.
 
-  A product is paid in bytes. BAIJ holds both triangles and moves twice what SBAIJ moves; PETSc has SBAIJ's product for one
-  rank, not vectorised, and gives no access to the parallel one. Here a row i takes y_i += A_ij x_j and y_j += A_ij^T x_i block by block,
-  four numbers at a time. Of BAIJ the upper blocks are copied together when the values have changed, which costs about two
-  products; a product then reads them without gaps, which defeat the prefetching of the processor (measured: three times
-  slower than reading both triangles). The columns of other ranks are added by PETSc. The copy is a SBAIJ matrix of its own, so that
-  an incomplete factorisation can take it and need not make one (SbProductGetSymmetric).
+  Memory bandwidth limits a product. BAIJ stores both triangles and reads twice as much as SBAIJ; PETSc's SBAIJ product
+  is not vectorised, and the parallel one not accessible. Here a row i computes y_i += A_ij x_j and y_j += A_ij^T x_i block by block,
+  four numbers at a time. The upper blocks of BAIJ are copied when the values have changed, at the cost of about two
+  products; reading them in place would leave gaps, which defeat the prefetcher (measured: three times
+  slower than reading both triangles). PETSc adds the columns of other ranks. The copy is a SBAIJ matrix, which
+  an incomplete factorisation can use, too (SbProductGetSymmetric).
 
-  petsc/private/petscimpl.h: asking a matrix whether its values have changed has no public call.
+  petsc/private/petscimpl.h: there is no public call that tells whether a matrix has changed.
 
   Measured at 200,000 tets on one rank: 0.9 ms instead of 1.4 (SBAIJ) and 1.7 (BAIJ); in cache half the time.
 */
@@ -17,17 +17,17 @@
 #include <petsc/private/petscimpl.h>
 
 typedef struct {
-  Mat diagonal, other;     /* parts of the matrix, borrowed; other NULL on one rank */
+  Mat diagonal, other;     /* parts of the matrix, borrowed; off-diagonal: NULL on one rank */
   PetscScalar *full;       /* values of BAIJ's diagonal part; NULL for SBAIJ */
   Mat symmetric;           /* the upper blocks: SBAIJ itself (borrowed), or a copy of BAIJ's (owned) */
-  PetscScalar *upper;      /* its values, by rows */
-  PetscObjectState copied; /* state of `diagonal` that the copy belongs to */
-  VecScatter scatter;      /* x -> ghosts */
+  PetscScalar *upper;      /* values of `symmetric`, by rows */
+  PetscObjectState copied; /* state of `diagonal` at the last copy */
+  VecScatter scatter;      /* scatter of x to the ghosts */
   Vec ghosts;
 } Product;
 
 /*
-  Row i: y_i += A_ii x_i, and for each block behind the diagonal y_i += A_ij x_j and y_j += A_ij^T x_i. a: the row's blocks by
+  Row i: y_i += A_ii x_i, and for each block right of the diagonal y_i += A_ij x_j and y_j += A_ij^T x_i. a: the row's blocks by
   columns; column: their n columns, i first.
 */
 SB_INLINE void row_product(const PetscScalar *a, PetscInt n, const PetscInt column[], const PetscScalar x[],
@@ -39,7 +39,7 @@ SB_INLINE void row_product(const PetscScalar *a, PetscInt n, const PetscInt colu
   Four sum = *(const Four *)a * u[0] + *(const Four *)(a + 3) * u[1] + last * u[2];
 
   for (PetscInt k = 1; k < n; k++) {
-    /* the columns of the block; what else is in the fourth lane meets the zero of xi, and is left out of y_i */
+    /* the columns of the block; the fourth lane is multiplied by the zero of xi, and not added to y_i */
     const PetscScalar *b = a + 9 * k, *xj = x + 3 * (size_t)column[k];
     PetscScalar *yj = y + 3 * (size_t)column[k];
     const Four c0 = *(const Four *)b, c1 = *(const Four *)(b + 3), c5 = *(const Four *)(b + 5);
@@ -54,7 +54,7 @@ SB_INLINE void row_product(const PetscScalar *a, PetscInt n, const PetscInt colu
   for (int k = 0; k < 3; k++) w[k] += sum[k];
 }
 
-/* y += A x; row i has the columns column[start[i]..start[i+1]), the first of them i. */
+/* y += A x; row i has the columns column[start[i]..start[i+1]), the diagonal first. */
 SB_KERNEL static void multiply(PetscInt nrow, const PetscInt start[restrict], const PetscInt column[restrict],
                                const PetscScalar a[restrict], const PetscScalar x[restrict],
                                PetscScalar y[restrict])
@@ -63,7 +63,7 @@ SB_KERNEL static void multiply(PetscInt nrow, const PetscInt start[restrict], co
     row_product(a + 9 * (size_t)start[i], start[i + 1] - start[i], column + start[i], x, y);
 }
 
-/* Lends the rows of blocks of a sequential BAIJ or SBAIJ matrix. */
+/* Borrows the block pattern of a sequential BAIJ or SBAIJ matrix. */
 PetscErrorCode SbMatGetPattern(Mat A, PetscInt *n, const PetscInt *start[], const PetscInt *column[])
 {
   PetscBool done;
@@ -74,7 +74,7 @@ PetscErrorCode SbMatGetPattern(Mat A, PetscInt *n, const PetscInt *start[], cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Brings the copy of BAIJ's upper blocks up to date. */
+/* Updates the copy of BAIJ's upper blocks. */
 static PetscErrorCode copy_upper(Product *p)
 {
   const PetscInt *all, *start, *column;
@@ -97,7 +97,7 @@ static PetscErrorCode copy_upper(Product *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The data of A, its copy up to date. */
+/* The data of A, with an updated copy. */
 static PetscErrorCode product_of(Mat A, Product **p)
 {
   PetscObject container;
@@ -215,7 +215,7 @@ static PetscErrorCode destroy_product(void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An empty SBAIJ matrix with the graph of the diagonal part, which is symmetric. */
+/* Creates a SBAIJ matrix without values, with the symmetric graph of the diagonal part. */
 static PetscErrorCode create_symmetric(Product *p)
 {
   const PetscInt *all, *columns;
@@ -241,7 +241,7 @@ static PetscErrorCode create_symmetric(Product *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The arrays of values stay where they are for the life of the matrix: its pattern is fixed. */
+/* The value arrays keep their addresses for the life of the matrix: its pattern is fixed. */
 static PetscErrorCode find_parts(Mat A, Product *p)
 {
   const PetscInt *columns;
@@ -261,7 +261,7 @@ static PetscErrorCode find_parts(Mat A, Product *p)
   PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
   if (parallel) {
     PetscCall(MatMPIBAIJGetSeqBAIJ(A, &p->diagonal, &p->other, &columns));
-    /* ghosts in the order in which the off-diagonal part numbers its columns */
+    /* ghosts in the order of the off-diagonal part's columns */
     PetscCall(MatCreateVecs(p->other, &p->ghosts, NULL));
     PetscCall(MatCreateVecs(A, &x, NULL));
     PetscCall(VecGetLocalSize(p->ghosts, &n));

@@ -1,19 +1,19 @@
 /*
-  Cells of P2: strains at the four points of SbRuleQuadratic, and the part of the energy that goes with the change of volume.
+  Cells of P2: strains at the four points of SbRuleQuadratic, and the volumetric energy.
 
-  A law is psi = psi_mu(F) + lambda/2 theta(F)^2 (SbMaterialOps.pressure). Taken at every point, theta would have to vanish at all of them
-  near nu = 1/2, and the element locks. Here the energy of a cell is
+  A law is psi = psi_mu(F) + lambda/2 theta(F)^2 (SbMaterialOps.pressure). With theta at each of the points all of them would be constrained
+  near nu = 1/2, and the element would lock. Here the energy of a cell is
 
     W = sum_q w_q V psi_mu(F_q) + V lambda/2 m^2,   m = (1/V) int theta dV:
 
-  one condition per cell, a pressure that is constant in it (P2/P0; Simo, Taylor and Pister 1985 for J - 1). Force, tangent and stress follow from
+  one constraint and one constant pressure per cell (P2/P0; Simo, Taylor and Pister 1985 for J - 1). Force, tangent and stress follow from
   W. Where theta is J - 1, m is the exact change of the volume of the cell: det F is cubic. Otherwise m is that of the four points,
   which is exact for the linear law and St. Venant's and Kirchhoff's.
 
-  Pressures of single cells may oscillate on coarse meshes that are constrained all around; means over the cells around a vertex do not.
+  Pressures of single cells may oscillate on coarse meshes with supports on the whole boundary; means over the cells around a vertex do not.
 
-  Cells that are curved at rest are regions of their own: they have gradients and a part of the volume at each of the points of SbRuleQuintic,
-  which is exact for all that is needed: a constant stress and a constant pressure are in equilibrium.
+  Cells that are curved at rest form separate regions, with gradients and a fraction of the volume at each of the points of SbRuleQuintic,
+  whose degree suffices: a constant stress and a constant pressure are in equilibrium.
 */
 #include "fem_impl.h"
 
@@ -74,7 +74,8 @@ void SbPointForce(const SbPoints *at, int q, const SbPack P[9], SbPack f[30])
 void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const SbPack U[30],
                        const SbPack F[SB_POINTS][9], SbPack pressure, SbPack b[30])
 {
-  const PetscBool cubic = (PetscBool)(m->jacobian && !at->step); /* at more points than the law */
+  const PetscBool cubic =
+    (PetscBool)(m->jacobian && !at->step); /* det F is cubic: more points than the law's */
   const SbPointRule *rule = cubic ? &SbRuleCubic : at->rule;
   const PetscReal lambda = m->ops.volumetric_modulus(m);
 
@@ -90,7 +91,7 @@ void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const 
       here = (const SbPack *)own;
     }
     if (m->linear || m->ops.frame || m->ops.spin) {
-      // theta = R : F - 3, with its derivative at once
+      // theta = R : F - 3, with its derivative
       m->ops.volumetric(m, here, D);
       for (int l = 0; l < SB_BATCH; l++) p[l] = 3. * lambda;
       for (int k = 0; k < 9; k++) {
@@ -127,7 +128,7 @@ void SbBatchState(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal
   }
   if (m == region->material) return;
 
-  /* what the mean adds */
+  /* contribution of the mean theta */
   const PetscReal lambda = region->material->ops.volumetric_modulus(region->material);
 
   SbQuadraticVolume(region->material, &at, (const SbPack *)U, (const SbPack(*)[9])F, p, NULL);
@@ -146,10 +147,9 @@ void SbBatchState(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal
 }
 
 /*
-  Pressures of a linearisation. A step du of Newton's method keeps theta + D : dF where it should be, D = dtheta/dF, but theta itself is off by terms of
-  second order: in bending and rotation p(u + du) is lambda times them, orders of magnitude more than any stress, and the term of the tangent with p is of no use
-  there. The pressure as an unknown of its own, p = -lambda theta a second equation, has p(u) + dp/dF : dF after the step, and that in the tangent; eliminated, the right-hand side
-  remains the residual of u (Magisano, Leonetti and Garcea, Int. J. Numer. Methods Eng. 109, 2017: all stresses). Both agree at the solution.
+  Pressures of a linearisation. A step du of Newton's method satisfies the linearised theta + D : dF, D = dtheta/dF, but theta(u + du) has an error of
+  second order: in bending and rotation p(u + du) is lambda times this error, orders of magnitude above any stress, and makes the geometric stiffness useless. With the pressure as an unknown and p = -lambda theta as a second equation, the tangent after the step has p(u) + dp/dF : dF; after its elimination the right-hand side
+  is still the residual of u (Magisano, Leonetti and Garcea, Int. J. Numer. Methods Eng. 109, 2017: all stresses). Both formulations have the same solution.
 */
 PetscErrorCode SbSpaceLinearisePressure(SbSpace s, Vec U, Vec step, PetscReal along, PetscReal part)
 {
@@ -168,7 +168,7 @@ PetscErrorCode SbSpaceLinearisePressure(SbSpace s, Vec U, Vec step, PetscReal al
     const SbMaterial m = region->material;
     const PetscReal lambda = m->ops.volumetric_modulus(m);
 
-    /* those whose tangents take it */
+    /* regions whose tangents use these pressures */
     if (region->quadratic ? region->pointwise == m : !m->ops.curvature) continue;
     for (PetscInt b = region->bstart; b < region->bend; b++) {
       const SbPoints at = SbBatchPoints(s, region, b);

@@ -1,12 +1,12 @@
 /*
-  Internal forces, inertia and the state of cells.
+  Internal forces, inertial forces, and stresses and strains of cells.
 
   f_a = V P grad phi_a with P from the law, and beta (dP/dF : H) for stiffness-proportional damping, H = grad v. Ghost cells are
-  evaluated too: every owned node then has all its contributions. Energies sum over owned cells only.
+  evaluated, too, so that forces on owned nodes are complete. Energies sum over owned cells only.
 
-  The pressure that goes with lambda, p = -lambda theta(F), theta the change of volume as the law measures it: where poisson is near 0.5
-  lambda is large and theta small. P1 has fewer displacements than such cells have conditions on their volume: it locks, and p alternates
-  between neighbours. CR and DG satisfy the conditions in the mean of each cell and p converges (Crouzeix and Raviart 1973; Hansbo and
+  The volumetric pressure is p = -lambda theta(F), theta the law's measure of the change of volume: for a Poisson's ratio near 0.5
+  lambda is large and theta small. P1 has fewer displacements than volume constraints of cells: it locks, and p alternates
+  between neighbours. CR and DG satisfy the constraints in the mean of each cell and p converges (Crouzeix and Raviart 1973; Hansbo and
   Larson 2002).
 */
 #include "fem_impl.h"
@@ -14,7 +14,7 @@
 #include "sblog.h"
 
 /*
-  Elastic forces of a region (elastic), and those of its damping. P2: each point with its fraction of the volume; the volumetric part by the mean of the cell. Damping
+  Elastic forces (if `elastic`) and damping forces of a region. P2: each point with its fraction of the volume; the volumetric part by the mean of the cell. Damping
   likewise: mu (H + R H^T R) at the points, lambda times the mean of R : H.
 */
 static void add_forces(SbSpace s, const SbRegion *region, PetscBool elastic, const SbStage *stage,
@@ -82,7 +82,7 @@ PetscErrorCode SbSpaceAddInternalForce(SbSpace s, const SbStage *stage, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Consistent mass of a region times w = a + alpha v. */
+/* Force of the consistent mass of a region times w = a + alpha v. */
 static void add_consistent_inertia(SbSpace s, const SbRegion *region, const SbStage *stage, PetscReal f[])
 {
   const PetscReal alpha = stage->v ? s->alpha[region->body] : 0., density = region->material->density;
@@ -174,7 +174,7 @@ void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscRe
           if (J) J[c] += part * det;
           if (psi) psi[c] += part * energy[q][l];
           if (pressure) pressure[c] += part * pressures[q][l];
-          /* Cauchy stress P F^T / J; small strain has one stress, P itself */
+          /* Cauchy stress P F^T / J; for small strain it is P itself */
           for (int k = 0; sigma && k < 6; k++) {
             const int i = row[k], j = column[k];
             const SbPack *p = (const SbPack *)P[q] + 3 * i, *f = (const SbPack *)F[q] + 3 * j;
@@ -190,7 +190,7 @@ void SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscRe
   }
 }
 
-/* Exact volumes of the cells of a P2 batch, and the least det F at the points of the rule for them. */
+/* Exact volumes of the cells of a P2 batch, and the smallest det F at the points of the exact rule. */
 static void quadratic_volume(SbSpace s, PetscInt b, const SbPoints *at, const PetscReal x[], SbPack volume,
                              SbPack least)
 {

@@ -1,13 +1,13 @@
 /*
-  The space: which nodes carry unknowns, which cells belong to which law, and the cells' geometry in batches.
+  The finite element space: nodes, regions of cells with one material law, and the cells' geometry in batches.
 
   Nodes are numbered on each rank with the owned ones first and the ghosts after them, which is the storage order of a
   ghosted PETSc vector: the global vector and the local array that the kernels read are the same memory, and an update
-  moves ghost values only. With one layer of overlap every cell that touches an owned node is local, so a residual or a
+  moves ghost values only. With one layer of overlap every cell with an owned node is local, so a residual or a
   matrix row is complete without communication.
 
-  Cells are grouped in regions (one body, one law, owned or ghost), each cut into batches of SB_BATCH cells whose
-  gradients and volumes lie side by side. Which nodes there are is in layout.c, the face terms of CR and DG in jump.c.
+  Cells are grouped in regions (one body, one law, owned or ghost), each divided into batches of SB_BATCH cells with
+  interleaved gradients and volumes. layout.c numbers the nodes; jump.c has the face terms of CR and DG.
 */
 #include "sbfem.h"
 #include "fem_impl.h"
@@ -31,7 +31,7 @@ static PetscBool is_curved(SbSpace s, PetscInt cell)
   return (PetscBool)(s->edge_node && s->mesh->edge_off && (s->mesh->cell_set[cell] & SB_CURVED));
 }
 
-/* Owned and ghost cells are each sorted by body, inclusion, and whether they are curved: a region is a run of cells. */
+/* Finds the regions: owned and ghost cells are each sorted by body, inclusion and curved edges, so that a region is a range of cells. */
 static PetscErrorCode find_regions(SbSpace s, const SbMaterial material[], const SbElement element[])
 {
   SbMesh mesh = s->mesh;
@@ -74,7 +74,7 @@ static PetscErrorCode find_regions(SbSpace s, const SbMaterial material[], const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A curved P2 cell, which is a P1 cell with corners of its own at each point: fills lane l of batch b. */
+/* A curved P2 cell: gradients and volume at each point, as of a P1 tet with the map's derivatives there; fills lane l of batch b. */
 static void tabulate_curved(SbSpace s, SbRegion *region, PetscInt b, PetscInt cell, PetscInt l)
 {
   const PetscInt k = b - region->bstart;
@@ -272,7 +272,7 @@ PetscErrorCode SbSpaceValidate(SbSpace s)
     }
   }
   PetscCallMPI(MPI_Allreduce(sums, all, 2, MPIU_REAL, MPI_SUM, s->comm));
-  /* many equal terms are rounded alike: the error of a sum grows with their number */
+  /* the tolerance includes rounding, which grows with the number of equal terms */
   PetscCheck(
     PetscAbsReal(all[0] - all[1]) <= (1e-12 + PETSC_MACHINE_EPSILON * (PetscReal)s->mesh->Ncell) * all[1],
     s->comm, PETSC_ERR_PLIB, "Mass of the nodes %g kg, of the cells %g kg", (double)all[0], (double)all[1]);
@@ -297,7 +297,7 @@ PetscReal SbSpaceCurvedIntegrals(SbSpace s, PetscInt cell, const SbFacet *facet,
   for (int q = 0; q < rule->n; q++) {
     PetscReal L[4] = {0., 0., 0., 0.}, corner[4][3], e[3][3], normal[3], phi[SB_CELL_NODES], measure;
 
-    /* the P1 tet, or triangle, with the derivatives of the map there */
+    /* the P1 tet or triangle with the map's derivatives at the point */
     for (int c = 0; c < (facet ? 3 : 4); c++) L[facet ? facet->corner[c] : c] = rule->L[q][c];
     SbQuadraticCorners(L, (const PetscReal(*)[3])x, corner);
     for (int c = 0; c < (facet ? 2 : 3); c++)

@@ -1,26 +1,26 @@
 /*
-  Largest step with which an explicit run is stable.
+  Critical time step of explicit integration.
 
   An undamped oscillator of frequency w is stable up to h w = 2; with the damping ratio zeta = (alpha/w + beta w)/2, whose
-  force is taken at the old velocity, up to h w = 2 (sqrt(1 + zeta^2) - zeta). Stiffness-proportional damping can make
-  that many times smaller.
+  force uses the old velocity, up to h w = 2 (sqrt(1 + zeta^2) - zeta). Stiffness-proportional damping can reduce
+  this step many times.
 
-  The highest frequency of the mesh at rest comes from the power method on M^-1 K: y = M^-1 K x grows by w^2 in the end, and
-  |y| / |x| in the norm of M is never above it. After n steps from a start without order about ln(unknowns) / (2 n) is
-  missing: a few percent of w, which users of this number cover by a factor. Each step costs one evaluation of forces. The
-  start turns with the body, so that the answer does not depend on directions, nor on the number of ranks.
+  The highest frequency of the mesh at rest comes from the power method on M^-1 K: the growth of y = M^-1 K x in the norm of M converges to w^2
+  from below. After n steps from a random start the relative error is about ln(unknowns) / (2 n):
+  a few percent of w, which callers cover by a safety factor. Each step costs one evaluation of forces. The
+  start rotates with the body, so that the result does not depend on its orientation, nor on the number of ranks.
 
-  The consistent mass of a tet is nowhere below 1/5 of its lumped one for P1, 9/70 for P2, and nowhere below it for CR and DG, which
-  bounds w then.
+  The consistent mass matrix of a tet is at least 1/5 of its lumped one for P1, 9/70 for P2, and 1 for CR and DG, which
+  bounds w for a consistent mass.
 
-  Not handled: frequencies rise where a body is compressed.
+  Not handled: frequencies that increase where a body is compressed.
 */
 #include "fem_impl.h"
 #include "sbkernel.h"
 
 #define POWER_STEPS 100
 
-/* f = K x at rest, every law being Hooke's there. */
+/* f = K x at rest, with Hooke's tensor of every law. */
 static void multiply_stiffness(SbSpace s, const PetscReal x[], PetscReal f[])
 {
   for (PetscInt r = 0; r < s->nregion; r++) {
@@ -53,7 +53,7 @@ static void multiply_stiffness(SbSpace s, const PetscReal x[], PetscReal f[])
   if (s->jump) SbJumpAdd(s, x, SB_JUMP_STIFFNESS, f);
 }
 
-/* Highest angular frequency of K x = w^2 M x with the lumped mass, from below; 0 when nothing can move. */
+/* Lower bound of the highest angular frequency of K x = w^2 M x with the lumped mass; 0 if nothing can move. */
 static PetscErrorCode highest_frequency(SbSpace s, PetscReal *w)
 {
   const PetscInt n = 3 * s->nnode_owned;
@@ -65,7 +65,7 @@ static PetscErrorCode highest_frequency(SbSpace s, PetscReal *w)
   PetscCall(SbSpaceCreateVec(s, &X));
   PetscCall(PetscCalloc1(3 * s->nnode, &f));
 
-  /* the start: each node along its own radius, by an amount that has no pattern */
+  /* the start: each node along its radius, by a pseudorandom amount */
   for (PetscInt i = 0; i < 4 * s->nnode_owned; i++)
     centre[i % 4] += s->node_mass[i / 4] * (i % 4 == 3 ? 1. : s->node_x[3 * (i / 4) + i % 4]);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, centre, 4, MPIU_REAL, MPI_SUM, s->comm));
@@ -75,7 +75,7 @@ static PetscErrorCode highest_frequency(SbSpace s, PetscReal *w)
 
   *w = 0.;
   for (int step = 0; step <= POWER_STEPS; step++) {
-    /* y.M y, with zeros at prescribed unknowns */
+    /* y . M y, with zeros at prescribed unknowns */
     square = 0.;
     for (PetscInt i = 0; i < n; i++) {
       if (s->fixed[i / 3] & (1 << i % 3)) f[i] = 0.;
@@ -83,7 +83,7 @@ static PetscErrorCode highest_frequency(SbSpace s, PetscReal *w)
     }
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &square, 1, MPIU_REAL, MPI_SUM, s->comm));
     if (square <= 0.) break;
-    /* x had length one: the growth of |y| is w^2 */
+    /* x had unit length: the growth of |y| is w^2 */
     if (step) *w = PetscMax(*w, PetscPowReal(square, 0.25));
     PetscCall(VecGetArray(X, &x));
     for (PetscInt i = 0; i < n; i++) x[i] = f[i] / PetscSqrtReal(square);
@@ -111,7 +111,7 @@ PetscErrorCode SbSpaceStableStep(SbSpace s, PetscReal *dt)
 
     damping[0] = PetscMax(damping[0], s->alpha[b]);
     damping[1] = PetscMax(damping[1], s->beta[b]);
-    /* the smallest eigenvalue of a cell's consistent mass relative to the lumped one; the constant function has one */
+    /* the smallest eigenvalue of a cell's consistent mass relative to the lumped one, or 1 */
     if (s->consistent_mass)
       least =
         PetscMin(least, s->element[b]->nodes_per[1] ? 9. / 70.
@@ -121,7 +121,7 @@ PetscErrorCode SbSpaceStableStep(SbSpace s, PetscReal *dt)
   *dt = PETSC_MAX_REAL;
   if (w <= 0.) PetscFunctionReturn(PETSC_SUCCESS);
   zeta = 0.5 * (damping[0] / w + damping[1] * w);
-  /* without cancellation when the damping is strong */
+  /* form without cancellation for strong damping */
   *dt = 2. / (w * (PetscSqrtReal(1. + zeta * zeta) + zeta));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

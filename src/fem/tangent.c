@@ -1,15 +1,15 @@
 /*
-  The tangent A = shift_a M + shift_v C + shift_k K(u), written straight into the value arrays of the matrix.
+  The tangent A = shift_a M + shift_v C + shift_k K(u), written directly to the value arrays of the matrix.
 
-  K is summed from the cells' blocks (sbelement.h) at the positions that the plan knows (plan.c); C = alpha M + beta K per
-  region; the lumped M is added to the diagonal blocks. Cells are taken in batches: the kernel works across the lanes, and the
-  blocks of all lanes are added to the matrix (insert.c), whose rows are cleared on the way.
+  K is summed from the cells' blocks (sbelement.h) at the positions of the assembly plan (plan.c); C = alpha M + beta K per
+  region; the lumped M is added to the diagonal blocks. Cells are evaluated in batches: the kernel is vectorised over the lanes, and the
+  blocks of all lanes are added to the matrix (insert.c), which clears each row before its first block.
 
-  petsc/private/petscimpl.h: raising the state of the outer parallel matrix, which writing into its parts does not do, has no
-  public call.
+  petsc/private/petscimpl.h: there is no public call to increase the state of a parallel matrix after writing to its
+  sequential parts.
 
-  Prescribed unknowns: their rows and columns are cleared but for the diagonal entry, whose magnitude stays what the cells
-  made it, so that the scaling of the matrix is not disturbed.
+  Prescribed unknowns: their rows and columns are cleared but for the diagonal entry, which keeps its
+  magnitude, so that the scaling of the matrix is unchanged.
 */
 #include "fem_impl.h"
 #include "sbkernel.h"
@@ -30,7 +30,7 @@ PetscErrorCode SbMatrixSetAssembly(Mat A, const SbAssembly *assembly)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* NULL for a matrix of blocks. */
+/* Assembly data of a matrix; NULL for a matrix of blocks. */
 static PetscErrorCode get_assembly(Mat A, const SbAssembly **assembly)
 {
   PetscObject container;
@@ -89,14 +89,14 @@ PetscErrorCode SbValuesEnd(SbValues *x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What one evaluation multiplies with in a region. */
+/* Factors of one evaluation in a region. */
 typedef struct {
-  PetscReal stiffness;    /* on dP/dF */
-  PetscReal damping;      /* on Hooke's tensor turned by R (sbmaterial.h, SbMaterialDampingStress) */
-  PetscReal inertia;      /* on the consistent mass */
+  PetscReal stiffness;    /* factor on dP/dF */
+  PetscReal damping;      /* factor on Hooke's tensor rotated by R (sbmaterial.h, SbMaterialDampingStress) */
+  PetscReal inertia;      /* factor on the consistent mass */
   PetscReal lambda;       /* volumetric modulus of the law, Pa */
   PetscReal mu;           /* shear modulus of the law, Pa */
-  const SbPack *pressure; /* that the law is under beside its own, Pa, tension; NULL: none */
+  const SbPack *pressure; /* pressure in addition to the law's own, Pa, tension; NULL: none */
 } Factors;
 
 static void scaled_volumes(const SbPack V, PetscReal factor, SbPack W)
@@ -104,7 +104,7 @@ static void scaled_volumes(const SbPack V, PetscReal factor, SbPack W)
   for (int l = 0; l < SB_BATCH; l++) W[l] = factor * V[l];
 }
 
-/* What a cell's blocks leave out: D (SbMaterialOps.volumetric) and the factor on lambda and mu. */
+/* Volumetric part left out of a cell's blocks: D (SbMaterialOps.volumetric), and the factor on lambda and mu. */
 typedef struct {
   SbPack D[9];
   PetscReal factor;
@@ -120,7 +120,7 @@ SB_KERNEL static void remove_volumetric(PetscReal lambda, const SbPack D[restric
   }
 }
 
-/* A law with the full tangent; its damping is added, without a split. */
+/* Blocks of a law with a full tangent dP/dF; damping is added; the volumetric part cannot be split off. */
 static void general_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
                            const SbPack F[9], Split *split, SbPack K[10][9])
 {
@@ -147,7 +147,7 @@ static void general_blocks(const SbMaterial m, const SbPack *g, const SbPack V, 
   }
 }
 
-/* A law whose tangent is Hooke's tensor turned by R and a part T of the spins (sbelement.h); damping is the same form with T = -mu I. */
+/* Blocks of a law with Hooke's tensor rotated by R plus a tensor T on the spins (sbelement.h) as tangent; damping has the same form, T = -mu I. */
 static void spin_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
                         const SbPack F[9], Split *split, SbPack K[10][9])
 {
@@ -155,7 +155,7 @@ static void spin_blocks(const SbMaterial m, const SbPack *g, const SbPack V, con
   SbPack R[9], T[9], W;
 
   m->ops.spin(m, F, R, T);
-  /* T is proportional to pressure - 2 mu; a filtered one keeps to what is not negative */
+  /* T is proportional to pressure - 2 mu; a filtered tangent clips it to be semi-definite */
   for (int l = 0; x->pressure && l < SB_BATCH; l++) {
     const PetscReal p =
       m->tangent == SB_TANGENT_EXACT_SPD ? PetscMax(0., (*x->pressure)[l]) : (*x->pressure)[l];
@@ -175,7 +175,7 @@ static void spin_blocks(const SbMaterial m, const SbPack *g, const SbPack V, con
   }
 }
 
-/* Blocks of a law at F, without mass; `split` NULL: whole. */
+/* Blocks of a law at F, without mass; `split` NULL: with the volumetric part. */
 static void law_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
                        const SbPack F[9], Split *split, SbPack K[10][9])
 {
@@ -183,7 +183,7 @@ static void law_blocks(const SbMaterial m, const SbPack *g, const SbPack V, cons
   SbPack R[9], W;
 
   if (m->linear || m->ops.frame) {
-    /* Hooke's tensor turned by R, with its damping */
+    /* Hooke's tensor rotated by R, with its damping */
     m->ops.frame(m, F, R);
     scaled_volumes(V, both, W);
     SbCellBlocksIsotropic(g, W, split ? 0. : x->lambda, x->mu, m->linear ? NULL : (const SbPack *)R, K);
@@ -210,16 +210,16 @@ SB_KERNEL static void add_dyad(const SbPack factor, const SbPack b[restrict 30],
 }
 
 /*
-  Of lambda of a P2 cell that stays in the matrix when the volumetric part is kept out of it. With one pressure per cell the inf-sup constant of P2 is weak on some meshes; what stays stiffens the modes that the
-  pressures see badly. Iterations of -solver pressure, bar at nu 0.4999, 3, 6, 8, 12 cells across: 93, 168, 212, - without; 54, 62, 77, 102 with 10; 92, 105, 111, 118 with 30.
+  Volumetric modulus of a P2 cell that stays in the matrix when the volumetric part is split off. With one pressure per cell the inf-sup constant of P2 is small on some meshes; the remaining modulus stiffens the modes that the
+  pressures hardly constrain. Iterations of -solver pressure, bar at nu 0.4999, 3, 6, 8, 12 cells across: 93, 168, 212, - without; 54, 62, 77, 102 with 10; 92, 105, 111, 118 with 30.
 */
 #define KEPT 10.      /* times mu, */
-#define KEPT_MOST 0.9 /* but at most this part of lambda */
+#define KEPT_MOST 0.9 /* but at most this fraction of lambda */
 
 /*
-  A P2 batch (quadratic.c). The law at the points, with the curvature of theta under the mean pressure; then lambda/V b b^T, b = V dm/du, and,
-  where theta is J - 1, V lambda m d^2 m/du^2, which a filtered tangent goes without. Damping has R in the place of D in b. `out` takes b in the
-  place of lambda/V b b^T.
+  Blocks of a P2 batch (quadratic.c): the law at the points, with the second derivative of theta times the mean pressure; lambda/V b b^T, b = V dm/du; and,
+  for theta = J - 1, V lambda m d^2 m/du^2, which a filtered tangent omits. For damping R replaces D in b. With `out`, b is stored
+  there and lambda/V b b^T is not added.
 */
 static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal displacement[],
                              const Factors *x, PetscInt batch, const SbVolumetric *out, SbPack K[SB_PAIRS][9])
@@ -238,7 +238,7 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
     SbQuadraticVolume(m, &points, (const SbPack *)U, (const SbPack(*)[9])F, p, b);
     if (s->linear_pressure) memcpy(p, s->linear_pressure[batch], sizeof(p));
     at.lambda = 0.;
-    at.pressure = m->jacobian ? NULL : &p; /* the exact mean of theta has a derivative of its own, below */
+    at.pressure = m->jacobian ? NULL : &p; /* the second derivative of the exact mean is added below */
   }
   for (int q = 0; q < points.n; q++) {
     SbPointVolume(&points, q, W);
@@ -285,7 +285,7 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
   add_dyad(factor, (const SbPack *)b, K);
 }
 
-/* b_a = V D grad psi_a and the moduli of a batch. */
+/* Stores b_a = V D grad psi_a and the moduli of a batch. */
 static void keep_volumetric(SbSpace s, const Factors *x, PetscInt batch, const Split *split,
                             const SbVolumetric *out)
 {
@@ -308,14 +308,14 @@ static void keep_volumetric(SbSpace s, const Factors *x, PetscInt batch, const S
   }
 }
 
-/* A matrix that an assembly fills. */
+/* A matrix to assemble. */
 typedef struct {
   SbSpace space;
   SbValues x;
   PetscReal *face_term;
 } Fill;
 
-/* Adds the blocks of a batch, ten or SB_PAIRS, and its consistent mass; K is overwritten. */
+/* Adds the blocks of a batch, ten or SB_PAIRS per cell, and its consistent mass; K is work space. */
 static void fill_batch(const Fill *fill, PetscInt r, PetscInt b, PetscReal inertia, SbPack K[][9])
 {
   const SbSpace s = fill->space;
@@ -354,7 +354,7 @@ static void fill_batch(const Fill *fill, PetscInt r, PetscInt b, PetscReal inert
   SbInsertBatch(s, &fill->x, b, npair, (const SbPack(*)[9])K);
 }
 
-/* fill[0] is the matrix of the space itself. */
+/* Assembles region r into several matrices; fill[0] is that of the space itself. */
 static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nfill, const Fill fill[],
                         const SbVolumetric *out)
 {
@@ -388,7 +388,7 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
       law_blocks(m, s->batch_g + 9 * b, s->batch_V[b], &at, (const SbPack *)F[0], split, K);
       if (out) keep_volumetric(s, &factors, b, split, out);
     }
-    /* the same cells in another space: between vertices the gradients are a third of those between faces, with the opposite sign */
+    /* the same cells in another space: the gradients of P1 are -1/3 times those of CR */
     for (PetscInt n = nfill - 1; n > 0 && !region->quadratic; n--) {
       const PetscReal scale = faces && fill[n].space->region[r].element->nodes_per[0] ? 1. / 9. : 1.;
 
@@ -419,7 +419,7 @@ PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n,
     fill[k].space = space[k];
     PetscCall(SbValuesBegin(A[k], &fill[k].x));
     fill[k].face_term = NULL;
-    /* what the rows of each body begin with: its face terms, as stiffness and damping */
+    /* initial values of each body's rows: its face terms, as stiffness and damping */
     if (space[k]->jump) PetscCall(PetscMalloc1(s->mesh->nbody, &fill[k].face_term));
     for (PetscInt b = 0; space[k]->jump && b < s->mesh->nbody; b++)
       fill[k].face_term[b] = stage->shift_k + stage->shift_v * s->beta[b];
@@ -431,7 +431,7 @@ PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n,
     PetscCall(PetscLogEventEnd(s->region[r].material->event, 0, 0, 0, 0));
   }
   for (PetscInt k = 0; k < n; k++) {
-    /* the lumped mass, and its damping */
+    /* the lumped mass matrix, and its damping */
     for (PetscInt i = 0;
          !s->consistent_mass && (stage->shift_a != 0. || stage->shift_v != 0.) && i < space[k]->nnode_owned;
          i++)
@@ -534,7 +534,7 @@ PetscErrorCode SbSpaceFinishTangent(SbSpace s, Mat A)
   clear_fixed(s, &x);
   if (s->constraints) SbConstraintsFinishTangent(s, &x);
   PetscCall(SbValuesEnd(&x));
-  /* the parts' cached diagonals are stale: their own (local) assembly drops them; the outer matrix only needs its state raised */
+  /* local assembly of the parts invalidates their cached diagonals; of the parallel matrix only the state is increased */
   for (int q = 0; q < 2 && x.part[q]; q++) {
     PetscCall(MatAssemblyBegin(x.part[q], MAT_FINAL_ASSEMBLY));
     PetscCall(MatAssemblyEnd(x.part[q], MAT_FINAL_ASSEMBLY));

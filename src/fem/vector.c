@@ -1,7 +1,7 @@
 /*
   Vectors of a space: the storage of a ghosted PETSc vector is the local array that the kernels read, owned nodes first.
 
-  A read brings the ghosts up to date; a write does not send anything. On one rank there are no ghosts, and vectors are plain ones.
+  Reading updates the ghosts; writing does not communicate. On one rank there are no ghosts, and vectors are plain sequential ones.
 */
 #include "fem_impl.h"
 
@@ -13,7 +13,7 @@ PetscErrorCode SbSpaceCreateVec(SbSpace s, Vec *v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The storage of a ghosted vector goes on behind its owned entries. */
+/* The storage of a ghosted vector continues after its owned entries. */
 PetscErrorCode SbSpaceGetLocalRead(SbSpace s, Vec v, const PetscReal **array)
 {
   PetscFunctionBeginUser;

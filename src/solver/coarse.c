@@ -8,8 +8,7 @@
 #include "coarse.h"
 #include <petscblaslapack.h>
 
-#define SB_VANISHING \
-  1e-8 /* largest size of a vanishing mode, squared, relative to the largest mode of its aggregate */
+#define SB_VANISHING 1e-8 /* squared size of a mode, over the largest of its aggregate, that counts as zero */
 
 /* ------------------------------------------------------------------ set-up, once */
 
