@@ -1,29 +1,30 @@
 /*
-  Adaptive tolerances: -accuracy by a target error, -step_time_budget by a limit on the seconds of a step.
+  Adaptive tolerances: -accuracy sets a target error, -step_time_budget a limit on the seconds per step.
 
-  -accuracy e: steps are as long as the integrator's loss allows, which is shared out over the run (TSAdapt, error per unit of time), and the
-  solves leave a tenth of e, which the estimate of each step holds them to. The mesh is as it is.
-  Contact that keeps a gap leaves half of e: the width below which surfaces push each other follows the error of its gaps, which is in proportion to it. A width becomes smaller at once, and the step is
-  solved again; it becomes larger only between steps and as far as what the gaps store hardly grows by that, as bodies would be thrown apart. Contact need not be better than a tenth of the mesh's error.
+  -accuracy e: the time step is chosen so that the integrator's error is uniform over the run (TSAdapt, error per unit of time), and the tolerance of solves so that
+  their estimated error is a tenth of e. The mesh is not changed.
+  Barrier contact may have half of e: the width of the barrier is adapted to the error of its gaps, which is proportional to it. It is reduced at once, and the step is
+  solved again; it is increased only between steps and only while the energy stored in the gaps hardly grows, which would accelerate the bodies apart. The error of contact need not be less than a tenth of the mesh's error.
 
-  -step_time_budget s: the time step is yours. Solves are looser when a step took longer than s, and tighter when it took less than half of it. What they do
-  depends on the machine, and no two runs are the same.
+  -step_time_budget s: the time step is the user's. The tolerance of solves is increased when a step took longer than s, and reduced when it took less than s / 2. Results
+  depend on the machine and differ from run to run.
 
-  A tolerance that the user gave (-snes_rtol, -ksp_rtol, -ts_adapt_type) stays.
+  Values of the user (-snes_rtol, -ksp_rtol, -ts_adapt_type) are kept.
 */
 #include "ledger_impl.h"
 
-#define SOLVERS 0.1 /* of the accuracy is left to solves */
-#define STEPS 0.7   /* of it to the integrator */
-#define GAPS 0.5    /* of it to contact that keeps a gap */
-#define MESH 0.1    /* of the mesh's error, that contact may have */
-#define AIM 0.5     /* target of a new width, over the allowed error */
-#define ROOM 0.1    /* error below which a width may grow, over the allowed one */
-#define GROWTH 0.01 /* of the energy of the allowed error: by how much that of gaps may grow with a width */
-#define LOOSEST 0.3 /* relative residual */
+#define SOLVERS 0.1 /* fraction of the accuracy for solves */
+#define STEPS 0.7   /* fraction for the integrator */
+#define GAPS 0.5    /* fraction for gaps of barrier contact */
+#define MESH 0.1    /* allowed error of contact, over that of the mesh */
+#define AIM 0.5     /* target error of a new width, over the allowed error */
+#define ROOM 0.1    /* error over the allowed one below which a width may grow */
+#define GROWTH \
+  0.01 /* largest growth of the gaps' energy with a width, over the energy of the allowed error */
+#define LOOSEST 0.3 /* largest relative tolerance of a solve */
 #define TIGHTEST 1e-12
 #define NOISE 4.      /* factor on the error of a solve */
-#define SHORTEST 1e-6 /* step, of the run */
+#define SHORTEST 1e-6 /* shortest step over the length of the run */
 
 PetscErrorCode SbAdaptiveToleranceSetFromOptions(SbLedger l)
 {
@@ -46,7 +47,7 @@ PetscErrorCode SbAdaptiveToleranceSetFromOptions(SbLedger l)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The relative tolerance of solves: Newton's, or the linear solver's where there is one solve per step. */
+/* Sets the relative tolerance of solves: Newton's, or the linear solver's for one solve per step. */
 PetscErrorCode SbAdaptiveToleranceSet(SbLedger l, PetscReal rtol)
 {
   const SNES snes = l->run->snes;
@@ -68,7 +69,7 @@ PetscErrorCode SbAdaptiveToleranceSet(SbLedger l, PetscReal rtol)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the solves of the step that was just solved left, J^(1/2): of one that was not examined, by its residual. */
+/* Error of the solves of the last step, J^(1/2): if not estimated, the last estimate scaled by the residual. */
 static PetscReal left_by_solves(SbLedger l)
 {
   const PetscReal part = l->seen_residual > 0. ? l->residual / l->seen_residual : 1.;
@@ -76,8 +77,8 @@ static PetscReal left_by_solves(SbLedger l)
   return part * PetscSqrtReal(PetscSqr(l->step_linear) + PetscSqr(l->step_nonlinear));
 }
 
-/* Error of the step that was just solved over what it may have: that of the whole run shared out over its time. What solves leave is in the
-   differences of accelerations, too, the more so the shorter a step is: no shorter one would help against that. */
+/* Ratio of the error of the last solved step to the allowed one: that of the run times dt / its length. Errors of solves are part of the
+   differences of accelerations, the more the shorter the step, and are subtracted: shorter steps would not reduce them. */
 static PetscErrorCode step_error(SbRun run, const SbSolvedStep *step, void *ctx, PetscInt *order,
                                  PetscReal *ratio)
 {
@@ -100,7 +101,7 @@ PetscErrorCode SbAdaptiveToleranceAttach(SbLedger l)
   if (l->accuracy > 0. && run->ts) {
     run->post_solve.error = step_error;
     PetscCall(TSGetAdapt(run->ts, &adapt));
-    /* explicit steps are no longer than the stable one */
+    /* explicit steps are at most the stable one */
     PetscCall(
       TSAdaptSetStepLimits(adapt, SHORTEST * run->t_end, run->snes && run->J ? 0.1 * run->t_end : run->dt));
   }
@@ -109,7 +110,7 @@ PetscErrorCode SbAdaptiveToleranceAttach(SbLedger l)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Holds the gaps of contact to their share; `again`: the step has to be solved with the new width. */
+/* Adapts the barrier's width to its allowed error; `again`: the step has to be solved with the new width. */
 static PetscErrorCode update_widths(SbLedger l, const SbSolvedStep *step, PetscBool *again)
 {
   PetscReal allowed = GAPS * l->accuracy * PetscSqrtReal(l->stored), error, mesh = 0.;
@@ -126,7 +127,7 @@ static PetscErrorCode update_widths(SbLedger l, const SbSolvedStep *step, PetscB
   }
   if (error <= allowed) PetscFunctionReturn(PETSC_SUCCESS);
 
-  /* too large, unless the mesh is worse by far */
+  /* too large, unless the error of the mesh is much larger */
   PetscCall(SbSpaceEstimateCompute(l->space, step->t + step->dt, step->U, step->V, step->A));
   for (PetscInt b = 0; b < l->run->model->nbody; b++) mesh += l->space->body2[b];
   mesh = PetscSqrtReal(mesh);
@@ -149,7 +150,7 @@ PetscErrorCode SbAdaptiveToleranceUpdate(SbLedger l, const SbSolvedStep *step, P
   PetscReal allowed, left;
 
   PetscFunctionBeginUser;
-  /* until something has moved, the energy that counts is that of the first attempt */
+  /* until something moves, the reference energy is that of the first attempt */
   if (!step->V || step->t == run->t0) {
     SbEnergies e;
 
@@ -162,7 +163,7 @@ PetscErrorCode SbAdaptiveToleranceUpdate(SbLedger l, const SbSolvedStep *step, P
   left = left_by_solves(l);
   if (!(left > 0.) || !(allowed > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
   if (left > allowed) {
-    /* a little too much in one step of many is made up for by the next */
+    /* a small excess in one of many steps is compensated by the next */
     if (l->rtol > TIGHTEST && left > (step->V ? 3. : 1.) * allowed) {
       *again = PETSC_TRUE;
       l->repeats++;

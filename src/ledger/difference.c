@@ -1,10 +1,11 @@
 /*
-  Services for the estimates: step lengths of finite differences of forces, and
+  Helpers of the estimates: step lengths of finite differences of forces, and
   solves with the last tangent.
 */
 #include "ledger_impl.h"
 
-#define PROBE 1e-6 /* of the bodies' size: far enough for digits, near enough to be linear */
+#define PROBE \
+  1e-6 /* finite difference step over the bodies' size: above rounding, small enough to be linear */
 
 PetscErrorCode SbDifferenceLength(SbLedger l, Vec D, PetscReal *length)
 {

@@ -1,19 +1,19 @@
 /*
-  Error by gaps or penetration in contact. Closing a gap would do the work force times gap: half of it (forces grow from zero)
-  bounds the energy of the error, but a rigid displacement by deflection of springs is not a strain.
+  Error by gaps or penetration in contact. Closing a gap takes the work force times gap: half of it (forces grow from zero)
+  bounds the energy of the error, but includes rigid displacements from the deflection of springs.
 
-  So springs are estimated more closely. With F their forces, one more step of Uzawa's iteration, (K + springs) delta = F, moves the body to
-  where the exact contact would hold it, up to the ratio of its stiffness to theirs; the elastic energy of delta is that of the error.
+  So the estimate for springs is sharper. With F their forces, one step of Uzawa's iteration, (K + springs) delta = F, moves the body to
+  its position with exact contact, up to the ratio of its stiffness to theirs; the elastic energy of delta is that of the error.
 
-  The gaps of a barrier are proportional to its width: (K + H) delta = sum b'' g n (src/effect/barrier_forces.c) is the error of the state. K includes inertia in a dynamic run: there the
+  The gaps of a barrier are proportional to its width: (K + H) delta = sum b'' g n (src/effect/barrier_forces.c) is the error of the state. In a dynamic run K includes inertia: the
   error is relative to the same step without gaps.
 */
 #include "ledger_impl.h"
 #include "sbkernel.h"
 
-#define CLOSELY 1e-3 /* tolerance of delta: it is nearly the gap, and strains are by the difference */
+#define CLOSELY 1e-3 /* tolerance of delta: mostly rigid, by the gap, while strains are differences */
 
-/* Elastic energy of the displacement of bodies and contact by the forces F. */
+/* Elastic energy of the displacement of bodies in contact under the forces F. */
 static PetscErrorCode moved_energy(SbLedger l, Vec U, Vec F, PetscReal *energy)
 {
   PetscReal length, work[2];

@@ -1,18 +1,18 @@
 /*
-  Error of the solves of a step: with F the residual of its equations at the solution and J their tangent, the missing correction is
-  delta = J^-1 F, and the energy of the error 1/2 delta . F (of state: J holds inertia, too). One more solve, to a tenth, gives it: a
+  Error of the solves of a step: with F the residual at the computed solution and J the tangent, the missing correction is
+  delta = J^-1 F, and the energy of the error 1/2 delta . F (J includes inertia). One more linear solve, to a tenth, computes delta in a
   fraction of the iterations of the step.
 
-  With one linear solve per step that is the linear solver's; with Newton's method, whose iteration ends by its own tolerance and whose linear solves are as
-  accurate as that needs, all of it is Newton's. What its steps leave has one direction and adds up.
+  With one linear solve per step this is the error of the linear solver; with Newton's method, whose tolerance also controls
+  the linear solves, all of it is assigned to Newton's. Errors of its steps have the same direction and add up.
 */
 #include "ledger_impl.h"
 
 #define ROUGHLY 0.1 /* relative tolerance of delta */
 
-/* What the next step leaves of an error like delta, in which inertia has the share shift_a delta.M delta of the energy delta.J delta: of an oscillation of
-   the frequency w implicit Euler leaves 1 / (1 + (w h)^2)^(1/2), which is the root of that share. Other methods do not damp so, but
-   their next solve sees the residual that was left, in the acceleration. */
+/* Factor of the next step on an error like delta, from the fraction shift_a delta.M delta of inertia in its energy delta.J delta: on an oscillation of
+   frequency w implicit Euler has the factor 1 / (1 + (w h)^2)^(1/2), the root of this fraction. Other methods do not damp like this, but
+   the acceleration passes the remaining residual to their next solve. */
 static PetscErrorCode damp(SbLedger l, PetscReal energy)
 {
   PetscReal mass;
@@ -47,7 +47,7 @@ PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolvedStep *step)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Each displacement is off by up to half its last digit, in no direction that is preferred: signs by a hash of the node. */
+/* Rounding error of up to half the last digit of each displacement, in a random direction: signs by a hash of the node. */
 PetscErrorCode SbEstimateRounding(SbLedger l, PetscReal t, Vec U, PetscReal *error)
 {
   const SbSpace s = l->run->model->space;
@@ -66,7 +66,7 @@ PetscErrorCode SbEstimateRounding(SbLedger l, PetscReal t, Vec U, PetscReal *err
   PetscCall(VecRestoreArray(l->w[0], &d));
   PetscCall(VecRestoreArrayRead(U, &u));
   PetscCall(SbStiffnessForm(l, t, U, l->w[0], &form));
-  /* once in a static run; in each step of a dynamic one, without a sign that stays */
+  /* once in a static run; in each step of a dynamic one, with random signs */
   *error =
     PetscSqrtReal(0.5 * form * PetscMax(1., (PetscReal)(s->mesh && l->run->ts ? l->run->steps_total : 1)));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,62 +1,62 @@
 /*
-  estimate_space.c - the error of the space discretisation, by recovery of the elements' stresses.
+  estimate_space.c - the discretisation error in space, by stress recovery.
 
-  Recovery. P_h is the first Piola-Kirchhoff stress of the cells, constant in each; for DG that of the gradient of the means. P* is linear in each
-  cell with the values that recovery.c finds at the vertices. The error of a cell is taken to be that of P_h as an approximation of P*:
+  Recovery. P_h is the first Piola-Kirchhoff stress, constant in each cell; for DG that of the gradient of the means. P* is linear in each
+  cell, with the recovered values at the vertices (recovery.c). The error of a cell is estimated by the difference:
 
     off_T = 1/2 int_T (P* - P_h) : C^-1 : (P* - P_h),     C^-1: |dev s|^2 / (2 mu) + tr(s)^2 / (9 K),   s = sym(R^T (P* - P_h)),
 
   K = lambda + 2/3 mu, R the rotation in F (Zienkiewicz and Zhu 1992; for CR and DG with averages instead of fits: Carstensen and Funken,
-  Math. Comp. 70, 2001). In this norm the estimate stays bounded as nu -> 1/2. For CR and DG this is all. It needs neither loads
-  nor inertia, which P_h has in it.
+  Math. Comp. 70, 2001). In this norm the estimate stays bounded as nu -> 1/2. For CR and DG the estimate is complete. It needs neither loads
+  nor inertia, which P_h balances.
 
-  Stiffness. The answer of P1 is too stiff, near nu = 1/2 by any factor (locking): then P_h is wrong as a whole, and what recovery takes out of it
-  is a part of a small energy only. But P* shows how much too stiff. Let a be the energy of P_h in the norm above and b the remainder of
-  it without what the mesh has added, a - b the part that is not smooth. Among the multiples s u_h of the answer, under the same loads, the one that is best
-  when only the smooth part resists, s^2 b - 2 s a -> min, has s = a / b, and its potential lies below that of u_h by
+  Stiffness. P1 is too stiff, near nu = 1/2 by any factor (locking): then P_h is wrong everywhere, and P* - P_h
+  has only a fraction of a small energy. But P* shows how much too stiff P1 is. Let a be the energy of P_h in the norm above, b its smooth part
+  and a - b the part that the mesh has added. Among the multiples s u_h of the solution, under the same loads, the best one
+  with the stiffness of the smooth part only, s^2 b - 2 s a -> min, has s = a / b, and its potential energy is below that of u_h by
 
     |e|^2 = s a - a = (a - b) a / b:
 
-  one step of Galerkin's method in a space of one dimension. With prescribed displacements instead of loads u_h cannot be
-  scaled and |e|^2 = a - b; in between, with the part theta of the work that is done by loads,
+  a Galerkin solution in a space of one dimension. With prescribed displacements instead of loads u_h cannot be
+  scaled and |e|^2 = a - b; in general, with theta the fraction of the work that is done by loads,
 
     |e|^2 = (a - b) (1 + theta (a / b - 1)),     theta = 1 - sum R . (u - m) / (2 a), at least 0 and at most 1,
 
-  R the forces of supports and contact, m for each component the mean of u weighted by |R|: supports that all move alike do no
-  work. A mesh that does not lock has a / b -> 1, and the estimate is that of recovery. a - b is the sum of off_T, of its
-  shear part as it is; of its pressure part, which is what locks, more: where P_h oscillates from cell to cell the fit over some
-  twenty cells keeps a little of it (measured: up to a fifth of the energy), so that of the pressure's energy no more than that of P* less a quarter of off counts
-  as smooth, but a - b has off twice at most.
+  R the forces of supports and contact, m for each component the mean of u weighted by |R|: supports with the same motion do no
+  work. Without locking a / b -> 1, and the estimate is that of recovery. a - b is the sum of off_T: its
+  shear part unchanged, its pressure part, which locks, enlarged. Where P_h oscillates from cell to cell the fit over some
+  twenty cells keeps a little of it (measured: up to a fifth of the energy), so the smooth energy of the pressure is at most that of P* less a quarter of off,
+  but a - b contains off at most twice.
 
-  This is done for each body of P1, and the factor is the same in all its cells.
+  The factor on off_T is computed for each P1 body, and is the same in all its cells.
 
-  P2. Deviators of P_h are linear in a cell, with the values at its points, and P* is quadratic; of the pressure, constant in a cell, its mean counts:
+  P2. The deviator of P_h is linear in a cell, given at its points, and P* is quadratic; the pressure is constant in a cell and compared with the mean of p*:
 
     off_T = 1/(4 mu) int_T |dev (s* - s_h)|^2 + V/(2 K) (mean p* - p_h)^2.
 
-  Displacements are as accurate as these, one order better than the pressure in between. The element does not lock, and this is all.
+  Displacements have the accuracy of the deviators and mean pressures, one order above that of pointwise pressures. The element does not lock: no factor.
 
-  Limits. The norm is that of Hooke's law in the cell's own frame: for strains of order one it is not the tangent's. theta takes
-  supports that turn by large angles for ones that do work, and the force of one body on another for a support: a locked body is
-  estimated too low then. Features that the mesh does not resolve at all are not detected.
-  In a dynamic run the error is that of the state of the moment: against the continuum under the loads and inertia of this moment (elliptic
-  reconstruction, Makridakis and Nochetto, SIAM J. Numer. Anal. 41, 2003), not what has added up since the start.
+  Limits. The norm is that of Hooke's law in the rotated frame of the cell: for strains of order one it is not the tangent's. theta counts
+  supports that rotate by large angles as doing work, and contact between bodies as a support: the estimate of a locked body is
+  too low then. Features that the mesh does not resolve at all are not detected.
+  In a dynamic run the error is that of the current state: against the continuum under the current loads and inertia (elliptic
+  reconstruction, Makridakis and Nochetto, SIAM J. Numer. Anal. 41, 2003), without errors accumulated since the start.
 */
 #include "recovery.h"
 #include "sbestimate.h"
 #include "sbkernel.h"
 
-#define KEPT 0.25  /* of the energy of an oscillating pressure, at most, that recovery keeps */
-#define FLOOR 1e-8 /* smooth part of the energy, at least */
+#define KEPT 0.25  /* largest fraction of the energy of an oscillating pressure that recovery keeps */
+#define FLOOR 1e-8 /* least smooth fraction of the energy */
 
 /* Sums over a body. Energies in J. */
 typedef enum {
-  SHEAR,           /* of P_h */
-  PRESSURE,        /* of P_h */
-  SHEAR_OFF,       /* of P* - P_h */
-  PRESSURE_OFF,    /* of P* - P_h */
-  PRESSURE_SMOOTH, /* of P* */
-  STRAIN,          /* of the law */
+  SHEAR,           /* shear energy of P_h */
+  PRESSURE,        /* pressure energy of P_h */
+  SHEAR_OFF,       /* shear energy of P* - P_h */
+  PRESSURE_OFF,    /* pressure energy of P* - P_h */
+  PRESSURE_SMOOTH, /* pressure energy of P* */
+  STRAIN,          /* strain energy */
   FORCE_SIZE,      /* |R|, three components, N */
   SHIFT = FORCE_SIZE + 3,
   FORCE = SHIFT + 3,
@@ -64,7 +64,7 @@ typedef enum {
   NSUM = WORK + 3
 } Sum;
 
-/* P1 is the element that may be too stiff by any factor. */
+/* Whether a body is P1, the element that locks. */
 static inline PetscBool is_stiff(SbModel model, PetscInt body)
 {
   return (PetscBool)(model->element[body]->nodes_per[0] && !model->element[body]->nodes_per[1]);
@@ -116,7 +116,7 @@ PetscErrorCode SbSpaceEstimateDestroy(SbSpaceEstimate *estimate)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* s = sym(R^T T), 00 11 22 01 12 02, what a cell sees of T in its own frame; R NULL: the identity. */
+/* s = sym(R^T T), 00 11 22 01 12 02: T in the rotated frame of the cell; R NULL: identity. */
 static inline void turn(const PetscReal R[9], const PetscReal T[9], PetscReal s[6])
 {
   PetscReal turned[9];
@@ -159,7 +159,7 @@ static PetscReal cell_volume(SbMesh mesh, PetscInt c)
 }
 
 /*
-  Adds the energies of an owned cell whose law has the moduli G and K, and gives off_T. The integral over a tet of the square of what is linear there with the values d_a at the
+  Adds the energies of an owned cell whose law has the moduli G and K, and returns off_T. The integral over a tet of the square of a linear function with the values d_a at the
   vertices is V / 20 (sum |d_a|^2 + |sum d_a|^2).
 */
 static PetscReal add_cell(SbSpaceEstimate est, PetscInt c, PetscReal G, PetscReal K, PetscReal sum[NSUM])
@@ -191,7 +191,7 @@ static PetscReal add_cell(SbSpaceEstimate est, PetscInt c, PetscReal G, PetscRea
   return squares[0] + squares[1];
 }
 
-/* off_T of an owned cell of P2 by the values at its ten nodes: SbQuadraticMass() integrates products of what is quadratic. */
+/* off_T of an owned P2 cell from the values at its ten nodes; SbQuadraticMass() integrates products of quadratic functions. */
 static PetscReal quadratic_off(SbSpaceEstimate est, PetscInt c, PetscReal G, PetscReal K)
 {
   const PetscReal *R = est->R ? est->R + 9 * c : NULL, V = cell_volume(est->model->mesh, c);
@@ -224,7 +224,7 @@ static PetscReal quadratic_off(SbSpaceEstimate est, PetscInt c, PetscReal G, Pet
   return V / (4. * G) * square + V / (2. * K) * PetscSqr(pressure - at->pressure);
 }
 
-/* Adds what theta is made of: the forces of supports and contact on each body of P1 and how its nodes have moved there. */
+/* Adds the terms of theta: the forces of supports and contact on each P1 body, and the displacements of its nodes there. */
 static PetscErrorCode add_reactions(SbSpaceEstimate est, PetscReal t, Vec U, Vec V, Vec A,
                                     PetscReal (*sum)[NSUM])
 {
@@ -248,7 +248,7 @@ static PetscErrorCode add_reactions(SbSpaceEstimate est, PetscReal t, Vec U, Vec
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* |e|^2 of a body of P1. */
+/* |e|^2 of a P1 body. */
 static PetscReal stiff_error(const PetscReal sum[NSUM])
 {
   const PetscReal a = sum[SHEAR] + sum[PRESSURE], off = sum[PRESSURE_OFF];
@@ -290,7 +290,7 @@ PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, V
   if (est->stress) PetscCall(SbRecoveryApplyQuadratic(est->recovery, est->stress));
   PetscCall(SbRecoveryApply(est->recovery, est->P));
 
-  /* sums over the cells of each body, with the moduli of each law asked for once */
+  /* sums over the cells of each body; the moduli of each law are computed once */
   PetscCall(PetscCalloc1(model->nbody, &sum));
   PetscCall(PetscMalloc2(model->nmaterial, &G, model->nmaterial, &K));
   for (PetscInt k = 0; k < model->nmaterial; k++) {

@@ -1,15 +1,15 @@
 /*
-  Error of the integrator. With E_j the energy of the j-th derivative of the state (u, v), 1/2 d.K d + 1/2 d'.M d' for d = u^(j), a step of
-  a method of order p loses c h^(p+1) E_(p+1)^(1/2): its eigenvalue z for an oscillator of the frequency w has |z - exp(i w h)| = c (w h)^(p+1), and
+  Error of the time integrator. With E_j the energy of the j-th derivative of the state (u, v), 1/2 d.K d + 1/2 d'.M d' for d = u^(j), the local error of
+  a method of order p is c h^(p+1) E_(p+1)^(1/2): its eigenvalue z for an oscillator of the frequency w has |z - exp(i w h)| = c (w h)^(p+1), and
   each derivative multiplies the motion by w.
 
-  The losses of the steps add up, but an oscillation does not lose more than it has. One that the steps do not resolve has lost all of it soon, which the sum of
-  asymptotic losses does not see. With x = c h^(p+1) w^(p+1) per step, min(sum x, 1) <= (sum x)^(j/(p+1)) for every j, so that
+  Local errors add up, but the error of an oscillation is bounded by its own energy. An oscillation that the steps do not resolve reaches this bound soon, which the sum of
+  asymptotic errors ignores. With x = c h^(p+1) w^(p+1) per step, min(sum x, 1) <= (sum x)^(j/(p+1)) for every j, so that
 
     (sum c h^(p+1))^(j/(p+1)) E_j^(1/2),   j = 0 .. p,
 
-  are bounds of the same kind; the smallest of them and of the sum is taken. (With implicit Euler and j = 1 it is the energy that the method has taken.)
-  Derivatives are differences of the accelerations, which are states of the integrators (second_order.c).
+  are also bounds; the smallest of them and of the sum is used. (With implicit Euler and j = 1 it is the energy that the method has dissipated.)
+  Derivatives are finite differences of the accelerations, which the integrators store (second_order.c).
 */
 #include "ledger_impl.h"
 #include "sbsolver.h"
@@ -38,7 +38,7 @@ PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal 
   *form = 0.;
   PetscCall(SbDifferenceLength(l, D, &length));
   if (!(length > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
-  /* by the last tangent of the step, where that is K + shift M with the lumped mass, as a matrix: of the free unknowns */
+  /* use the last tangent of the step where it is a matrix K + shift M of the free unknowns with the lumped mass */
   if (run->J && run->ts && run->shift_a > 0. && !run->damped && !run->solver_used->matrix_free &&
       !run->model->space->consistent_mass) {
     PetscCall(VecCopy(D, moved));
@@ -50,7 +50,7 @@ PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal 
     l->own_work += 1.;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  /* a difference of forces */
+  /* else a difference of forces */
   l->residuals -= MPI_Wtime();
   for (int side = 0; side < 2; side++) {
     PetscCall(VecWAXPY(moved, side ? length : -length, D, U));
@@ -63,7 +63,7 @@ PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Energy of a derivative of the state: D as displacement, its rate. Collective. */
+/* Energy of a derivative of the state, with displacement D and velocity rate. Collective. */
 static PetscErrorCode derivative_energy(SbLedger l, const SbSolvedStep *step, Vec D, Vec rate,
                                         PetscReal *energy)
 {
@@ -86,7 +86,7 @@ PetscErrorCode SbEstimateTime(SbLedger l, const SbSolvedStep *step, PetscBool al
   if (all) PetscCall(derivative_energy(l, step, step->V, step->A, &l->derivative[1]));
   PetscCall(VecWAXPY(rate, -1., step->A0, step->A));
   PetscCall(VecScale(rate, 1. / h));
-  /* implicit Euler begins without an acceleration; on another mesh no integrator has one */
+  /* implicit Euler starts without an acceleration; after re-meshing no integrator has a valid one */
   if (step->t == l->run->t0 && (l->anew || (l->order == 1 && l->run->step0 == 0)))
     PetscCall(VecZeroEntries(rate));
   if (all || l->order == 1) PetscCall(derivative_energy(l, step, step->A, rate, &l->derivative[2]));

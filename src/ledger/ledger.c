@@ -1,17 +1,17 @@
 /*
-  The ledger of a run: when estimates are made, and how the errors of steps add up.
+  Error estimates of a run: which steps are estimated, and how the errors of steps accumulate.
 
-  The motion propagates the error of a step with constant energy or, with damping, with that of the motion itself: so the errors of
+  The energy of a propagated error is constant or, with damping, decreases like that of the motion: so the errors of
   steps are summed in the energy norm ("Lady Windermere's fan": Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.3).
 
-  Steps are examined as long as estimates stay below a fixed share of the run's work, counted in residuals, not in seconds: repeated runs examine
-  the same steps. A step that was not examined loses what the last one lost; with -accuracy the integrator's loss of each is known.
+  Steps are estimated while the work for estimates is below a fixed fraction of the run's work, counted in residual evaluations, not in seconds, so that repeated runs estimate
+  the same steps. Other steps are assigned the error of the last estimated one; with -accuracy the integrator's error of each step is estimated.
 */
 #include "ledger_impl.h"
 #include "sblog.h"
 
 #define SHARE 0.08    /* largest fraction of the work for estimates */
-#define SPACE_WORK 6. /* residuals that the estimate of space costs */
+#define SPACE_WORK 6. /* cost of the space estimate, in residual evaluations */
 
 static const SbOption rows[] = {
   {"ledger", SB_OPTION_BOOL, 1, "", "false", "",
@@ -68,7 +68,7 @@ PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ a step that was solved */
+/* ------------------------------------------------------------------ after the solve of a step */
 
 static void begin(SbLedger l)
 {
@@ -87,7 +87,7 @@ static PetscErrorCode examine_step(SbRun run, const SbSolvedStep *step, void *ct
   SbLedger l = (SbLedger)ctx;
 
   PetscFunctionBeginUser;
-  /* the accelerations that third differences need; an attempt that is repeated does not count twice */
+  /* keep the accelerations for third differences; a repeated step counts once */
   if (step->A0 && l->order == 2) {
     Vec spare = l->before;
 
@@ -102,7 +102,7 @@ static PetscErrorCode examine_step(SbRun run, const SbSolvedStep *step, void *ct
   }
   l->seen = (PetscBool)(!run->model->dynamic || l->own_work <= SHARE * l->work);
 
-  /* what the solver has seen of the residual that it left, N: known without an evaluation */
+  /* norm of the last residual, N, known from the solver without an evaluation */
   if (step->solved) {
     PetscBool single;
     KSP ksp;
@@ -126,9 +126,9 @@ static PetscErrorCode examine_step(SbRun run, const SbSolvedStep *step, void *ct
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ a step that was accepted */
+/* ------------------------------------------------------------------ after an accepted step */
 
-/* What damping leaves of an error in a step: as of the motion, its power over twice its energy. */
+/* Fraction of an error that remains after a step with damping: as for the motion, by the damping power over twice its energy. */
 static PetscReal damped_part(const SbRun run, const SbStep *step)
 {
   const PetscReal energy = step->energies.kinetic + step->energies.strain;
@@ -147,13 +147,13 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionBeginUser;
   if (step->again) PetscFunctionReturn(PETSC_SUCCESS);
   l->stored = run->model->dynamic ? PetscMax(l->stored, energy) : energy;
-  // in units of a residual: a tangent is three, an iteration with its preconditioner two
+  // in residual evaluations: a tangent costs three, an iteration with its preconditioner two
   l->work += run->snes ? 4. * (PetscReal)step->newton + 2. * (PetscReal)step->linear + 1. : 1.;
 
   /*
-    Errors of a static run are those of the last solve. In a dynamic one losses of the integrator add up. What linear solves leave is rough and
-    has another direction in each step; what linearisation leaves is smooth and has the same one. A step that was not examined left as much
-    more as its last residual is larger.
+    A static run has the errors of its last solve. In a dynamic one the integrator's errors add up. Errors of linear solves are rough, with
+    a different direction in each step, and add in squares; errors of linearisation are smooth, with the same direction, and add linearly. The errors of a step
+    without an estimate are scaled by its last residual.
   */
   if (!first) {
     const PetscReal left = step->V ? damped_part(run, step) : 0.;
@@ -165,7 +165,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     *nonlinear = left * PetscSqrtReal(l->kept_part) * *nonlinear + part * l->step_nonlinear;
   }
 
-  /* estimates at this state, with their cost in own_work */
+  /* estimates at this state; their cost is added to own_work */
   begin(l);
   if (!first && (step->last || (l->every && step->step % l->every == 0))) {
     const SbModel m = l->run->model;
@@ -188,7 +188,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     if (l->quantity.kind) PetscCall(SbQuantityErrors(l, step));
   }
 
-  /* in parts of the energy that is stored */
+  /* relative to the stored energy */
   scale = l->stored > 0. ? 1. / PetscSqrtReal(l->stored) : 0.;
   for (int i = 0; i < SB_ERROR_COUNT; i++) l->relative[i] = scale * l->error[i];
   l->relative[SB_ERROR_TIME] += scale * l->offset;
@@ -197,7 +197,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For the field: of the frame's own state. */
+/* For the output field: errors of the frame's state. */
 static PetscErrorCode cell_error(SbRun run, const SbStep *step, PetscReal values[])
 {
   const SbSpace space = run->model->space;
@@ -220,7 +220,7 @@ static PetscErrorCode cell_error(SbRun run, const SbStep *step, PetscReal values
 
 /* ------------------------------------------------------------------ beginning and end */
 
-/* Accumulated errors are saved in checkpoints. */
+/* Lists the accumulated errors for checkpoints. */
 static PetscErrorCode carry(SbLedger l)
 {
   const struct {

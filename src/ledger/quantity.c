@@ -1,16 +1,16 @@
 /*
-  The one number that the user cares for, and what it is wrong by.
+  The quantity of interest of the user, and its error.
 
-  In a static run by duality (Becker and Rannacher, Acta Numerica 10, 2001): with z the displacement under the load that makes the number,
-  K z = dQ/du, the mesh's share is the energy of the errors of u and z on each other, a(e_u, e_z), which the estimate of space
-  gives as (eta^2(u + s z) - eta^2(u - s z)) / 2 s; the solver's share is dQ/du . delta. For all else, and in a dynamic run, the relative
-  error in the norm of the energy stands for that of the number, times the range that it went through.
+  In a static run by duality (Becker and Rannacher, Acta Numerica 10, 2001): with z the dual solution,
+  K z = dQ/du, the error by the mesh is a(e_u, e_z), the energy product of the errors of u and z, which the space estimate eta
+  gives as (eta^2(u + s z) - eta^2(u - s z)) / 2 s; the error by the solver is dQ/du . delta. For other sources, and in a dynamic run, the error is the relative
+  error in the energy norm times the range of values of the quantity.
 */
 #include "ledger_impl.h"
 #include "sbkernel.h"
 
-#define ADJOINT 1e-2 /* how well z is solved for */
-#define MIX 1e-3     /* share of z that is added to u, in the norm of the energy */
+#define ADJOINT 1e-2 /* relative tolerance of the dual solve */
+#define MIX 1e-3     /* s above: size of s z over that of u, in the energy norm */
 
 PetscErrorCode SbQuantitySetFromOptions(SbLedger l, const SbScope *scope)
 {
@@ -51,7 +51,7 @@ PetscErrorCode SbQuantityAttach(SbLedger l)
     PetscReal least = PETSC_MAX_REAL, all;
     PetscInt first = PETSC_MAX_INT, winner;
 
-    /* The node nearest to the position, over all ranks; of several the one with the lowest number, whatever the partition. */
+    /* The node nearest to the position, over all ranks; of equally near ones that with the lowest number, for any partition. */
     for (int pass = 0; pass < 2; pass++) {
       for (PetscInt k = 0; k < s->nnode_owned; k++) {
         PetscReal r = 0.;
@@ -123,7 +123,7 @@ PetscErrorCode SbQuantityValue(SbLedger l, const SbStep *step)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The residual's change along a displacement, N. */
+/* Change of the residual along a displacement D, N. */
 static PetscErrorCode stiffness_times(SbLedger l, PetscReal t, Vec U, Vec D, Vec R)
 {
   const SbModel m = l->run->model;
@@ -160,7 +160,7 @@ PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step)
 
     PetscCall(VecDuplicate(step->U, &B));
     PetscCall(VecDuplicate(step->U, &Z));
-    // dQ/du at free unknowns
+    // right-hand side: dQ/du at free unknowns
     if (q->kind == SB_QUANTITY_REACTION)
       PetscCall(stiffness_times(l, step->t, step->U, q->weight, B));
     else
@@ -172,10 +172,10 @@ PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step)
     q->error[SB_ERROR_NONLINEAR] = left * l->step_nonlinear;
     PetscCall(SbProbeSolve(l, ADJOINT, B, Z, NULL));
     PetscCall(VecDot(B, Z, &energy));
-    /* of a reaction: effect of a support displacement on the body, rigid if it has no other support */
+    /* reaction: add the displacement of the support itself; Z is rigid without another support */
     if (q->kind == SB_QUANTITY_REACTION) PetscCall(VecAYPX(Z, -1., q->weight));
 
-    /* the mesh's share: a(e_u, e_z) */
+    /* error by the mesh: a(e_u, e_z) */
     q->error[SB_ERROR_SPACE] = 0.;
     if (energy > 0. && l->stored > 0.) {
       s = MIX * PetscSqrtReal(2. * l->stored / energy);

@@ -6,44 +6,45 @@
 
     sum_c |p(X_c) - P_c|^2 + r |grad p|^2,   r = 0.05 sum_c |X_c - X_v|^2,
 
-  over the cells c around v, X_c their centroids. r decides where there are too few cells for a slope, at corners and edges
-  of a body; constants are recovered whatever it is. Only cells of one material are fitted together, because the stress jumps where the
-  material does: a vertex has one value for each material around it, at most `nlayer`. Bodies have no vertices in common.
+  over the cells c around v, X_c their centroids. r regularises the slope where cells are too few, at corners and edges
+  of a body; constants are recovered for any r. Only cells of one material are fitted together, because the stress jumps at
+  interfaces: a vertex has one value for each material around it, at most `nlayer`. Bodies share no vertices.
 
-  p(X_v) is a fixed sum of the P_c, of which the weights are kept. An owned vertex has all its cells on the rank, so ghosts are needed only of the P_c, before, and of the values, after.
+  p(X_v) is a linear combination of the P_c with constant weights, which are stored. All cells of an owned vertex are local: only ghosts of the P_c, before, and of the values, after, are communicated.
 
-  For P2 p has degree two and is fitted to the stresses at the four points of each cell; another such polynomial to the mean pressures of the cells, by
-  its own means there: of the pressure an element with one per cell knows no more. Slopes of the pressure and second derivatives are kept small like slopes above. The recovered
-  stress is quadratic in a cell, with p(X_v) at its vertices and, in the middle of an edge, the mean of what the polynomials of its two ends have there.
+  For P2 p has degree two and is fitted to the stresses at the four points of each cell; another one is fitted by
+  its means over the cells to their mean pressures, as the element has one pressure per cell. Slopes of the pressure and second derivatives are regularised like the slopes above. The recovered
+  stress is quadratic in a cell, with p(X_v) at its vertices and, at the middle of an edge, the mean of the polynomials of its two ends.
 */
 #include "recovery.h"
 #include "sbelement.h"
 #include "sbkernel.h"
 #include <petscblaslapack.h>
 
-#define RIDGE 0.05        /* r above, as a part of the sum of squares of distances */
-#define RIDGE_SLOPE 0.01  /* of slopes of the pressure, as a part of the number of cells */
-#define RIDGE_SECOND 1e-3 /* of second derivatives, likewise */
-#define NFIT 10           /* monomials of degree two and less */
-#define NVALUE 10         /* that are fitted: nine of P, the pressure */
+#define RIDGE 0.05        /* factor in r above */
+#define RIDGE_SLOPE 0.01  /* factor on slopes of the pressure, over the number of cells */
+#define RIDGE_SECOND 1e-3 /* the same for second derivatives */
+#define NFIT 10           /* monomials up to degree two */
+#define NVALUE 10         /* fitted values: nine of P, the pressure */
 
 struct _p_SbRecovery {
   SbMesh mesh;       /* borrowed */
-  PetscInt nlayer;   /* most materials that meet at a vertex, over all ranks */
-  PetscInt *slot;    /* [ncell][4] where the value for a corner of a cell is: nlayer vertex + layer */
-  PetscReal *weight; /* [ncell][4] of a cell's P in the value for a corner; 0 where the vertex is not owned */
-  PetscReal *value;  /* [nvert nlayer][9] */
-  /* of P2, NULL without a body of it */
-  PetscBool *quadratic; /* [nbody] */
+  PetscInt nlayer;   /* largest number of materials around a vertex, all ranks */
+  PetscInt *slot;    /* [ncell][4] index of the value of each corner of a cell: nlayer vertex + layer */
+  PetscReal *weight; /* [ncell][4] weight of a cell's P in the value of a corner; 0: vertex not owned */
+  PetscReal *value;  /* [nvert nlayer][9] recovered values */
+  /* for P2; NULL without a P2 body */
+  PetscBool *quadratic; /* [nbody] the body is P2 */
   PetscReal (
-    *factor)[2][NFIT * NFIT]; /* [nvert_owned nlayer] Cholesky factors of the sums for P and pressure */
+    *factor)[2][NFIT *
+                NFIT]; /* [nvert_owned nlayer] Cholesky factors of the normal equations for P and pressure */
   struct Fit {
     PetscReal c[NVALUE][NFIT]; /* coefficients of the monomials of (X - X_v) / size */
-    PetscReal size;            /* m */
+    PetscReal size;            /* length scale, m */
   } * fit;                     /* [nvert nlayer] */
 };
 
-/* Different materials of the cells around a vertex, ascending, in found[]: how many. */
+/* Lists the materials of the cells around a vertex, ascending, in found[]; returns their number. */
 static PetscErrorCode list_materials(SbMesh mesh, PetscInt n, const PetscInt at[], PetscInt found[],
                                      PetscInt *count)
 {
@@ -54,14 +55,14 @@ static PetscErrorCode list_materials(SbMesh mesh, PetscInt n, const PetscInt at[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Which materials meet at each vertex, as its owner sees it, and so the slot of each corner of each cell. */
+/* Lists the materials around each vertex on its owner, and finds the slot of each corner of each cell. */
 static PetscErrorCode create_slots(SbRecovery r)
 {
   SbMesh mesh = r->mesh;
   PetscInt *start, *at, *found, *material, most = 1, longest = 0;
 
   PetscFunctionBeginUser;
-  /* cells around each vertex: corners 4 c + a, at[start[v]..start[v + 1]) */
+  /* corners 4 c + a of cells at each vertex: at[start[v]..start[v + 1]) */
   PetscCall(SbBucketByKey(4 * mesh->ncell, mesh->cell, mesh->nvert, &start, &at));
   for (PetscInt v = 0; v < mesh->nvert_owned; v++) longest = PetscMax(longest, start[v + 1] - start[v]);
   PetscCall(PetscMalloc1(longest, &found));
@@ -94,7 +95,7 @@ static PetscErrorCode create_slots(SbRecovery r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* 1 and the centroid of a cell seen from its corner a. */
+/* 1 and the centroid of a cell relative to its corner a. */
 static inline void monomials(SbMesh mesh, PetscInt cell, int a, PetscReal p[4])
 {
   const PetscInt *v = mesh->cell + 4 * cell;
@@ -107,7 +108,7 @@ static inline void monomials(SbMesh mesh, PetscInt cell, int a, PetscReal p[4])
 }
 
 /*
-  First row of the inverse of [n b^T; b B], moments[10] = n, b, B (upper triangle, row by row): with y = B^-1 b it is (1, -y) / (n - b.y).
+  First row of the inverse of [n b^T; b B], moments[10] = n, b, B (upper triangle, row-major): with y = B^-1 b it is (1, -y) / (n - b.y).
 */
 static void solve_fit(const PetscReal moments[10], PetscReal row[4])
 {
@@ -169,7 +170,7 @@ static void monomials_of(const PetscReal d[3], PetscReal size, PetscReal p[NFIT]
   memcpy(p, all, sizeof(all));
 }
 
-/* Monomials at the points of a cell seen from its corner a, and their means over the cell, which the rule has exactly. */
+/* Monomials at the points of a cell relative to its corner a, and their means over the cell, which the point rule integrates exactly. */
 static void point_monomials(SbMesh mesh, PetscInt cell, int a, PetscReal size, PetscReal p[5][NFIT])
 {
   const PetscInt *v = mesh->cell + 4 * cell;
@@ -203,7 +204,7 @@ static PetscErrorCode create_quadratic(SbRecovery r, const PetscBool quadratic[]
   PetscCall(PetscCalloc1(r->nlayer * mesh->nvert, &r->fit));
   PetscCall(PetscCalloc1(n, &r->factor));
 
-  // root of the mean square of the distances of centroids
+  // length scales: root mean square of the distances of centroids
   PetscCall(PetscCalloc1(n, &ncell));
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
     PetscReal p[4];
@@ -217,7 +218,7 @@ static PetscErrorCode create_quadratic(SbRecovery r, const PetscBool quadratic[]
     if (ncell[k]) r->fit[k].size = PetscSqrtReal(r->fit[k].size / (PetscReal)ncell[k]);
   }
 
-  // sums of products of monomials
+  // normal equations: sums of products of monomials
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
     const PetscInt slot = r->slot[i];
     PetscReal p[5][NFIT];

@@ -1,21 +1,21 @@
 /*
-  The table that a person reads at the end: errors beside seconds, and in plain words what to do about them.
+  Table at the end of a run: errors and seconds of each source, and advice.
 
-  What halving an error costs, as a factor on the time of the run: of the mesh, edges of half the length (errors fall with the length; with P2 with its square: shorter
-  by 2^(1/2)), as many more tets as that makes, and more iterations where the preconditioner's count grows with the mesh; of the integrator of order p, steps shorter by 2^(1/p); of the
-  solves, the iterations that take half a residual at the rate that was measured.
+  Cost of halving an error, as a factor on the time of the run. Mesh: edges of half the length (errors are proportional to the length; P2: to its square, so edges shorter
+  by 2^(1/2)), hence more tets, and more iterations where their number grows with the mesh. Integrator of order p: steps shorter by 2^(1/p).
+  Solves: the iterations that halve the residual at the measured rate.
 */
 #include "ledger_impl.h"
 
-#define WASTE 1e3 /* a source so many times below the largest one is worked on for nothing */
+#define WASTE 1e3 /* a source with an error smaller than the largest one by this factor is too accurate */
 #define WIDTH 79
 
 static const char *const names[SB_ERROR_COUNT] = {"space",  "time",    "nonlinear",
                                                   "linear", "contact", "rounding"};
 
-/* ------------------------------------------------------------------ words */
+/* ------------------------------------------------------------------ advice */
 
-#define ROOM 2048 /* for them */
+#define ROOM 2048 /* length of the advice text */
 
 static PetscReal error_of(SbLedger l, int source)
 {
@@ -53,7 +53,7 @@ static PetscReal mesh_size(SbModel m)
   return PetscPowReal(6. * PetscSqrtReal(2.) * volume / n, 1. / 3.);
 }
 
-/* The body with the largest error of the mesh, and the order in which its element's errors fall with the length of edges. */
+/* The body with the largest error of the mesh. */
 static PetscInt worst_body(SbLedger l)
 {
   PetscInt worst = 0;
@@ -69,7 +69,7 @@ static PetscReal order_of_space(SbLedger l)
   return l->run->model->element[worst_body(l)]->nodes_per[1] ? 2. : 1.;
 }
 
-/* By what the seconds per tet of a solve grow when edges are halved: a factorisation (n^2 in space), iterations that grow with the mesh, or not. */
+/* Factor on the seconds per tet of a solve when edges are halved: 8 for a factorisation (n^2), 2 where iterations grow with the mesh, else 1. */
 static PetscReal growth(SbRun run)
 {
   static const struct {
@@ -93,7 +93,7 @@ static PetscReal cost(SbLedger l, const SbLedgerSeconds *s, int source)
 
   switch (source) {
   case SB_ERROR_SPACE:
-    /* explicit steps are bounded by the smallest tet */
+    /* explicit: twice as many steps, which the smallest tet bounds */
     return PetscPowReal(8. * (run->J ? 1. + solving * (growth(run) - 1.) : 2.), 1. / order_of_space(l));
   case SB_ERROR_TIME:
     return 1. + (PetscPowReal(2., 1. / (PetscReal)PetscMax(l->order, 1)) - 1.) * (1. - s->setup / total);
@@ -103,9 +103,9 @@ static PetscReal cost(SbLedger l, const SbLedgerSeconds *s, int source)
 }
 
 /*
-  Whether P2 halves the error of the mesh for less than edges of half the length do. On the same tets its error is about half the square of that of an element of
-  order one, both relative, while that is small (the bar of docs/reports/quadratic_tets.md: 0.4 to 0.7 of the square). So edges may be longer by r^(-1/2), and
-  the run takes c r^(3/2) times as long, c being the ratio of bytes of the matrix per tet.
+  Whether P2 halves the error of the mesh at a lower cost than edges of half the length. On the same tets its relative error is about half the square of the relative error r of a
+  first-order element, for small r (bar of docs/reports/quadratic_tets.md: 0.4 to 0.7 of the square). So edges may be longer by r^(-1/2), and
+  the run takes c r^(3/2) times as long, c the ratio of matrix bytes per tet.
 */
 static void say_quadratic(SbLedger l, PetscReal cost_of_half, char w[ROOM])
 {
@@ -115,16 +115,16 @@ static void say_quadratic(SbLedger l, PetscReal cost_of_half, char w[ROOM])
   const PetscReal r = l->error[SB_ERROR_SPACE] / PetscSqrtReal(l->stored);
   const PetscReal times = (nodes[0] ? 14. : nodes[2] ? 0.9 : 0.45) * r * PetscSqrtReal(r);
 
-  /* P2 itself, and explicit steps, which the smallest distance of nodes bounds */
+  /* not for P2 itself, nor for explicit runs, whose steps the smallest distance of nodes bounds */
   if (nodes[1] || !l->run->J) return;
-  /* nu > 0.45: errors of P1 do not fall with the mesh */
+  /* nu > 0.45: P1 locks, its errors do not decrease with the mesh size */
   if (nodes[0] && law->ops.bulk_modulus(law) > 9.7 * law->ops.shear_modulus(law)) {
     SbAppend(ROOM, w,
              "At this Poisson's ratio P1 locks, finer meshes help little: -body_%s_element %s does not. ",
              m->body[body].name, m->nbegin_step || m->npotential ? "cr" : "p2 (or cr)");
     return;
   }
-  /* contact has an edge, where solutions are not smooth */
+  /* solutions are not smooth at the boundary of a contact area */
   if (m->nbegin_step || m->npotential || times >= cost_of_half) return;
   SbAppend(
     ROOM, w,
@@ -164,7 +164,7 @@ static void say_largest(SbLedger l, const SbLedgerSeconds *s, char w[ROOM])
   if (most == SB_ERROR_SPACE) say_quadratic(l, cost(l, s, most), w);
 }
 
-/* Settings that cost and gain nothing. */
+/* Settings that are more accurate than needed, and cost time. */
 static void say_wasted(SbLedger l, const SbLedgerSeconds *s, char w[ROOM])
 {
   static const struct {
@@ -175,7 +175,7 @@ static void say_wasted(SbLedger l, const SbLedgerSeconds *s, char w[ROOM])
             {SB_ERROR_TIME, "-ts_dt"}};
   const PetscReal most = error_of(l, largest(l));
 
-  if (l->may_tune) return; /* the adaptive tolerance changes them */
+  if (l->may_tune) return; /* the adaptive tolerance sets them */
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
     const PetscReal e = error_of(l, of[i].source);
     const PetscReal spent = s->source[of[i].source] / PetscMax(s->total, 1e-9);
@@ -183,7 +183,7 @@ static void say_wasted(SbLedger l, const SbLedgerSeconds *s, char w[ROOM])
     if (!(e > 0.) || e * WASTE > most || (of[i].source != SB_ERROR_TIME && spent < 0.1)) continue;
     if (of[i].source == SB_ERROR_TIME && !l->run->model->dynamic) continue;
     if (of[i].source != SB_ERROR_TIME && l->run->linear_total <= l->run->newton_total)
-      continue; /* factorisations */
+      continue; /* factorisations have no tolerance */
     SbAppend(
       ROOM, w,
       "%s is wasted: its error is %.1g times the largest one, and could be %.1g times as large unnoticed. ",
@@ -191,7 +191,7 @@ static void say_wasted(SbLedger l, const SbLedgerSeconds *s, char w[ROOM])
   }
 }
 
-/* Whether -accuracy was met, and if not, why. */
+/* Whether -accuracy was reached, and if not, why. */
 static void report_accuracy(SbLedger l, char w[ROOM])
 {
   const PetscReal all = together(l) / PetscSqrtReal(PetscMax(l->stored, PETSC_MIN_REAL));

@@ -1,9 +1,9 @@
 /*
-  Seconds by source of error, those of the slowest rank.
+  Seconds by source of error, on the slowest rank.
 
-  space: residuals and tangents; linear: the solves, both without what Newton's iterations beyond the first of a step took, which are the
-  nonlinear source's; contact: its search and what it decides; time: the remainder of the loop. Estimates are counted apart, also where they
-  call what the run calls.
+  space: residuals and tangents; linear: linear solves; nonlinear: both of these in Newton's iterations after the first of a step;
+  contact: search and active-set decisions; time: the remainder of the loop. Estimates are counted separately, including their
+  residuals and solves.
 */
 #include "ledger_impl.h"
 #include "sblog.h"

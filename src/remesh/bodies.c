@@ -1,24 +1,25 @@
 /*
-  On rank 0: from a scene and its state to the same scene with other meshes for some of its bodies.
+  On rank 0: new meshes for some bodies of a scene, and the state on these.
 
-  The vectors are functions of the position at rest, linear in each tet, quadratic in those of P2: what a new node gets is the value there (body.c says where that is). A node
-  on the surface has its triangle, its vertex, or its edge, in the old mesh too, and gets what is there to the last bit. A DG cell takes the value from its own
+  The vectors are functions of the position at rest, linear in each tet, quadratic in those of P2: a new node gets the value at its rest position (body.c). A node
+  on a kept vertex, edge or triangle of the surface gets the old value bitwise. A DG cell takes the value from its own
   side of a face.
 
-  Sets that are groups of a file go with the tets that they hold, by the old tet in the middle of the new one; on the surface with its triangles
+  A new tet is in the file's groups of the old tet around its centroid; on the surface groups keep their triangles
   and vertices.
 */
 #include "remesh_impl.h"
 
-#define INWARDS 1e-6 /* of the way from a face to the middle of its DG cell: tells the side */
+#define INWARDS \
+  1e-6 /* distance from a face towards the centre of its DG cell, over the distance of both: selects the side */
 
-/* The edge e of a cell at the place at = 6 cell + e. */
+/* Key of edge e of a cell, at = 6 cell + e. */
 static SbKey edge_of(const PetscInt v[], PetscInt at)
 {
   return (SbKey){SbKeyOfPair(v[SbTetEdge[at % 6][0]], v[SbTetEdge[at % 6][1]]), at};
 }
 
-/* Edges of tets, each once, with the first place that it has. */
+/* Lists the edges of tets, sorted, each with its first slot 6 cell + e. */
 static PetscErrorCode list_edges(PetscInt ncell, const PetscInt cell[], PetscInt *n, SbKey **edge)
 {
   const PetscInt all = 6 * ncell;
@@ -34,26 +35,26 @@ static PetscErrorCode list_edges(PetscInt ncell, const PetscInt cell[], PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One body on its way from the old mesh to the new one. Vertices and tets count from the body's first. */
+/* Data of one body during the transfer. Vertices and tets are numbered from the body's first. */
 typedef struct {
   SbModel model;
   const SbGathered *g;
   PetscInt body, vert0, cell0, ncell;
   SbElement element;
-  PetscInt each;  /* numbers of a node: 3 nfield */
+  PetscInt each;  /* numbers per node: 3 nfield */
   PetscInt *cell; /* [ncell][4] old tets */
   PetscInt *at;   /* [nvert] a corner 4 cell + a of each old vertex */
-  SbFaces faces;  /* of the old tets */
-  SbKey *edge;    /* [nedge] of the old tets of P2, ascending */
+  SbFaces faces;  /* faces of the old tets */
+  SbKey *edge;    /* [nedge] edges of the old P2 tets, ascending */
   PetscInt nedge;
   SbLocator rest;
-  PetscBool done; /* there is a new mesh */
+  PetscBool done; /* the body has a new mesh */
   SbNewMesh mesh;
-  uint64_t groups;     /* bits of sets that are groups */
-  uint64_t inclusions; /* and of those that are inclusions of the body */
+  uint64_t groups;     /* bits of the sets that are groups */
+  uint64_t inclusions; /* bits of those groups that are inclusions of the body */
 } Work;
 
-/* Nodes of the edges of an old cell from their middles, at rest; NULL: no cell is curved. */
+/* Offsets of the edge nodes of an old cell from the edges' middles, at rest; NULL: no cell is curved. */
 static const PetscReal *off_of(const Work *w, PetscInt cell)
 {
   return w->edge && w->g->edge_off ? w->g->edge_off + 18 * (size_t)(w->cell0 + cell) : NULL;
@@ -65,7 +66,7 @@ static uint64_t face_set(const Work *w, PetscInt slot)
   return w->g->cell_set[5 * (w->cell0 + slot / 4) + 1 + slot % 4];
 }
 
-/* The face of the old surface that a face of the next mesh is, -1: it is inside. */
+/* The face of the old surface that equals a face of the next mesh, -1: it is inside. */
 static PetscInt old_slot(const Work *w, PetscInt slot)
 {
   const PetscInt *v = w->mesh.cell + 4 * (slot / 4);
@@ -99,7 +100,7 @@ static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
   PetscBool *surface;
 
   PetscFunctionBeginUser;
-  // a set with inner points, curves or triangles of a file would lose them
+  // error for sets with inner points, curves or triangles of a file, which would be lost
   PetscCall(PetscCalloc2(old.nvert, &volume, old.nvert, &surface));
   for (PetscInt i = 0; i < 4 * w->ncell; i++) {
     volume[w->cell[i]] |= g->cell_set[5 * (w->cell0 + i / 4)];
@@ -119,7 +120,7 @@ static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
                w->model->set[k].group);
   PetscCall(PetscSNPrintf(where, sizeof(where), "body '%s', re-meshed", w->model->body[w->body].name));
   PetscCall(PetscMalloc1(w->ncell, &region));
-  // tets of another material, or of other groups, stay apart
+  // tets of different materials or groups must be separated by faces
   PetscCall(PetscMalloc1(w->ncell, &kind));
   for (PetscInt c = 0; c < w->ncell; c++) {
     const uint64_t material = (uint64_t)g->cell_material[w->cell0 + c],
@@ -141,7 +142,7 @@ static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Triangles in groups, of an old mesh also inside: counted, or written. */
+/* Counts triangles in groups, or writes them; for an old mesh also inner ones. */
 static PetscInt list_triangles(const Work *w, PetscInt ncell, const PetscInt cell[], SbMemoryMesh *in_memory)
 {
   PetscInt n = 0;
@@ -167,7 +168,7 @@ static const PetscReal *old_value(const Work *w, PetscInt cell, PetscInt k)
   return w->g->value + ((size_t)(w->cell0 + cell) * (size_t)w->g->width + (size_t)k) * (size_t)w->each;
 }
 
-/* The first place of the old edge that an edge of the next mesh is, -1: it is another one. */
+/* First slot of the old edge that equals an edge of the next mesh, -1: it is a new one. */
 static PetscInt old_edge(const Work *w, uint64_t key)
 {
   const PetscInt low = (PetscInt)(key >> 32), high = (PetscInt)(key & 0xffffffff);
@@ -179,7 +180,7 @@ static PetscInt old_edge(const Work *w, uint64_t key)
   return at < w->nedge && w->edge[at].key == key ? w->edge[at].slot : -1;
 }
 
-/* The old fields at a position at rest, as the tet has them that holds `near`. */
+/* The old fields at a rest position X, from the tet that contains `near`. */
 static void interpolate_old(const Work *w, const PetscReal X[3], const PetscReal near[3], PetscReal value[])
 {
   PetscReal weight[4];
@@ -219,7 +220,7 @@ static void new_values(const Work *w, PetscInt c, PetscReal value[])
       const PetscReal *at = w->mesh.X, *apex = at + 3 * v;
       PetscInt face[3];
 
-      // the middle of the face, bitwise the same from both cells, and a point slightly inside
+      // the centroid of the face, bitwise equal from both cells, and a point slightly inside
       for (int k = 0; k < 3; k++) face[k] = w->mesh.cell[4 * c + SbFaceVertex[a][k]];
       (void)PetscSortInt(3, face);
       for (int k = 0; k < 3; k++) {
@@ -246,16 +247,16 @@ static void new_values(const Work *w, PetscInt c, PetscReal value[])
   }
 }
 
-/* ------------------------------------------------------------------ names of nodes */
+/* ------------------------------------------------------------------ renumbering of nodes */
 
-/* Room for two names per corner of the surface of all bodies; n of them so far. */
+/* Adds a renumbered node; the arrays hold two nodes per corner of the surfaces of all bodies. */
 static void rename_node(SbRenamed *r, PetscInt from, PetscInt to)
 {
   r->from[r->n] = from;
   r->to[r->n++] = to;
 }
 
-/* Nodes of the body's surface: vertices and, of P2, edges that there were; or faces and their supports. vert1, cell1: first ones of the body in the next scene. */
+/* Renumbers the nodes of the body's surface: vertices and old edges (P2), or faces and their supports. vert1, cell1: first ones of the body in the next scene. */
 static PetscErrorCode rename_surface(const Work *w, PetscInt vert1, PetscInt cell1, const SbGathered *next,
                                      SbRenamed *r)
 {
@@ -290,7 +291,7 @@ static PetscErrorCode rename_surface(const Work *w, PetscInt vert1, PetscInt cel
 
 /* ------------------------------------------------------------------ all bodies */
 
-/* Edges of the next mesh that are curved. */
+/* Lists the curved edges of the next mesh. */
 static PetscErrorCode list_curved(const Work *w, PetscInt ncell, const PetscInt cell[], SbMemoryMesh *p)
 {
   PetscInt nedge, n = 0;
@@ -318,7 +319,7 @@ static PetscErrorCode list_curved(const Work *w, PetscInt ncell, const PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Mesh, values and names of one body. */
+/* Mesh, values and renumbered nodes of one body. */
 static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *result)
 {
   SbGathered *next = &result->next;
@@ -332,7 +333,7 @@ static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *
   const PetscInt *cell;
 
   PetscFunctionBeginUser;
-  // the new mesh, or the old one as it is
+  // the new mesh, or the unchanged old one
   nold = g->vert0[w->body + 1] - w->vert0;
   ncell = w->done ? m->ncell : w->ncell;
   nvert = w->done ? m->nvert : nold;
@@ -353,7 +354,7 @@ static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *
     for (PetscInt c = 0; c < w->mesh.ncell; c++) new_values(w, c, value + each * (size_t)c);
     (*in_memory)->step = step;
     (*in_memory)->mass = w->g->mass[w->body];
-    (*in_memory)->bound = w->mesh.quality; /* the caller makes a bound of it */
+    (*in_memory)->bound = w->mesh.quality; /* the caller derives a bound from it */
   } else {
     PetscCall(PetscArraycpy(value, w->g->value + each * (size_t)w->cell0, each * (size_t)w->ncell));
     if (body->in_memory) {
@@ -420,7 +421,7 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
     PetscCall(SbLocatorCreate(work[b].ncell, work[b].cell, g->X + 3 * work[b].vert0, off_of(&work[b], 0),
                               &work[b].rest));
     r->outcome[b] = (SbRemeshOutcome){{nvert, nvert}, {work[b].ncell, work[b].ncell}, 0, 0., ""};
-    // re-mesh the body; failures go to the message
+    // re-mesh the body; an error becomes the message
     if (due[b]) {
       SbCaughtError caught = {0, ""};
 
@@ -438,7 +439,7 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
     r->done[b] = work[b].done;
     room += nvert + 2 * work[b].faces.nboundary + work[b].nedge;
   }
-  // counts of the next meshes, and room for their values
+  // counts of the next meshes, and arrays for their values
   r->next.nbody = g->nbody;
   r->next.nfield = g->nfield;
   r->next.width = g->width;

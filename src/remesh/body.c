@@ -1,42 +1,44 @@
 /*
-  body.c - another mesh of the same body in the same state, on rank 0.
+  body.c - a new mesh of a body in its current state, on rank 0.
 
-  The hull stays: every triangle of the surface, and every one between regions that must stay apart, with its vertices. What it encloses is filled
-  again, in the shape that the body has now or at rest. A new vertex y in the shape of now lies in a tet of the old mesh with the weights w,
-  y = sum w_a x_a; its rest position is X = sum w_a X_a: the material that is there. So the volume at rest is the same,
-  and the motion from X to x that the old mesh has is only examined in other positions.
+  The hull is kept: all triangles of the surface and of interfaces between regions, with their vertices. Its interior is tetrahedralised
+  again, in the current or the reference configuration. A new vertex y in the current configuration lies in a tet of the old mesh with barycentric coordinates w,
+  y = sum w_a x_a; its rest position is X = sum w_a X_a, that of the same material point. So the volume at rest is the same,
+  and the old motion from X to x is interpolated at other points.
 
-  Between these the motion is not linear, so a new tet may be inverted at rest although it is none now. Such tets, and those
-  that are too flat, are repaired by moving their inner vertices through the material, towards the middle of their neighbours: to the position of a few on the
-  way where the worst tet around is best, until all are good or nothing helps. A tet between four vertices of a side that was flat at rest and bulges
-  now has no volume at rest, and no inner vertex: an inner edge of it gets one in its middle, with all tets around, which then moves
-  inwards.
+  The motion is not linear between these points, so a new tet may be inverted at rest but not in the current configuration. Inverted and flat tets
+  are repaired by moving their inner vertices through the material towards the mean of their neighbours: of a few positions on the
+  way the one with the best worst tet is chosen, until all are good or nothing helps. A tet with four vertices on a face that was plane at rest and bulges
+  now has no volume at rest, and no inner vertex: one of its inner edges is split at the middle, with all tets around, and the new vertex
+  moves inwards.
 
-  Of a body with curved tets the triangles of the hull keep their curved edges, so its shape is the same. Filled is what the flat triangles enclose. Old tets make a map of that,
-  as it is at rest, to the body: from the place with the weights w in a tet with straight edges to that with l = w in the curved tet. New vertices, and nodes at
-  the middles of new edges, go along with it, so that edges inside bend as much as the surface near them. A new tet may still fold over itself, and is repaired like one that
-  is flat.
+  In a body with curved tets the triangles of the hull keep their curved edges, so its shape is the same. The flat triangles enclose the tetrahedralised volume. The old tets define a map
+  from it, at rest, to the body: from the point with barycentric coordinates w in a straight tet to that with l = w in the curved tet. New vertices, and nodes at
+  the middles of new edges, are mapped, so that inner edges follow the curvature of the surface. A new tet may still have a negative Jacobian, and is repaired like a
+  flat one.
 */
 #include "remesh_impl.h"
 
 #define SWEEPS 30
-#define GROWTH 2 /* times its tets: a mesh that splits have made so large is not repaired by more of them */
-#define ROUNDS 6 /* of moving vertices and splitting edges */
-#define PLACES 6 /* positions tried towards the mean of the neighbours, each half as far as the one before */
-#define STRAIGHT 1e-6 /* of the length of an edge: nearer to the middle its node is there */
+#define GROWTH 2 /* largest number of tets by edge splits, over the initial number */
+#define ROUNDS 6 /* rounds of moving vertices and splitting edges */
+#define PLACES \
+  6 /* trial positions towards the mean of the neighbours, each at half the distance of the last */
+#define STRAIGHT \
+  1e-6 /* offset of an edge node from the middle, over the edge length, below which the edge is straight */
 
-/* Locator of points in the old mesh. */
+/* Point locators in the old mesh. */
 typedef struct {
   const SbOldMesh *old;
-  SbLocator rest, flat; /* tets at rest; straight ones of a body with curved ones, else NULL */
+  SbLocator rest, flat; /* locator at rest; among straight tets, for a body with curved ones, else NULL */
   PetscInt ncurved;
   SbKey *
-    curved; /* [ncurved] curved edges between vertices that stay, by SbKeyOfPair() of new ones; places 6 cell + edge in the old mesh */
+    curved; /* [ncurved] curved edges between kept vertices, key: SbKeyOfPair() of new numbers, slot: 6 cell + edge in the old mesh */
 } Material;
 
 /* ------------------------------------------------------------------ the hull */
 
-/* Whether the hull has face f of tet c: each triangle once. */
+/* Whether face f of tet c belongs to the hull; each triangle once. */
 static PetscBool in_hull(const SbOldMesh *old, const PetscInt component[], PetscInt c, int f)
 {
   const PetscInt other = old->faces->neighbour[4 * c + f];
@@ -44,7 +46,7 @@ static PetscBool in_hull(const SbOldMesh *old, const PetscInt component[], Petsc
   return (PetscBool)(other < 0 || (c < other && component[other] != component[c]));
 }
 
-/* ------------------------------------------------------------------ the material at new vertices */
+/* ------------------------------------------------------------------ material points of new vertices */
 
 static void mix(const SbOldMesh *old, const PetscReal at[], PetscInt cell, const PetscReal w[4],
                 PetscReal value[3])
@@ -55,7 +57,7 @@ static void mix(const SbOldMesh *old, const PetscReal at[], PetscInt cell, const
   }
 }
 
-/* The position at rest of weights in a tet. */
+/* Rest position X of the point with barycentric coordinates w in a tet. */
 static void mix_rest(const SbOldMesh *old, PetscInt cell, const PetscReal w[4], PetscReal X[3])
 {
   mix(old, old->X, cell, w, X);
@@ -63,7 +65,7 @@ static void mix_rest(const SbOldMesh *old, PetscInt cell, const PetscReal w[4], 
     X[i % 3] += 4 * w[SbTetEdge[i / 3][0]] * w[SbTetEdge[i / 3][1]] * old->edge_off[18 * (size_t)cell + i];
 }
 
-/* From the rest position of a vertex to where the old mesh has it now. */
+/* Current position of a vertex from its rest position, by the old mesh. */
 static void follow(const Material *at, SbNewMesh *m, PetscInt v)
 {
   PetscInt cell;
@@ -74,7 +76,7 @@ static void follow(const Material *at, SbNewMesh *m, PetscInt v)
   if (m->flat) mix(at->old, at->old->X, cell, w, m->flat + 3 * v);
 }
 
-/* The nodes at the edges of a new tet, or at those of one of its vertices, unless that is -1. */
+/* Sets the edge nodes of a new tet, or only those at edges of one of its vertices, unless that is -1. */
 static void bend(const Material *at, SbNewMesh *m, PetscInt c, PetscInt vertex)
 {
   for (int e = 0; m->edge_off && e < 6; e++) {
@@ -84,7 +86,7 @@ static void bend(const Material *at, SbNewMesh *m, PetscInt c, PetscInt vertex)
     PetscInt cell;
 
     if (vertex >= 0 && a != vertex && b != vertex) continue;
-    // an old one, or the middle goes along
+    // a kept edge has its old node, others that of the map at the middle
     if (i < at->ncurved && at->curved[i].key == SbKeyOfPair(a, b)) {
       for (int k = 0; k < 3; k++) off[k] = at->old->edge_off[3 * (size_t)at->curved[i].slot + k];
       continue;
@@ -101,7 +103,7 @@ static void bend(const Material *at, SbNewMesh *m, PetscInt c, PetscInt vertex)
   }
 }
 
-/* Rest positions of vertices that were placed now, and where the old mesh has them now. */
+/* Rest positions of vertices created in the current configuration, and their current positions by the old mesh. */
 static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, SbNewMesh *m)
 {
   const SbOldMesh *old = at->old;
@@ -136,7 +138,7 @@ static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ tets that are inverted or flat */
+/* ------------------------------------------------------------------ repair of inverted and flat tets */
 
 static PetscReal shape_at(const SbNewMesh *m, const PetscReal at[], PetscInt cell)
 {
@@ -148,7 +150,7 @@ static PetscReal shape_at(const SbNewMesh *m, const PetscReal at[], PetscInt cel
   return SbTetQuality((const PetscReal(*)[3])x);
 }
 
-/* Its shape at rest; of a curved one as much worse as its least Jacobian says. */
+/* Quality of a tet at rest; for a curved one the worse of this and its least relative Jacobian. */
 static PetscReal shape_at_rest(const SbNewMesh *m, PetscInt cell)
 {
   const PetscReal shape = shape_at(m, m->X, cell),
@@ -162,7 +164,7 @@ static PetscReal shape_at_rest(const SbNewMesh *m, PetscInt cell)
   return shape * PetscMin(1, least);
 }
 
-/* The worse of its shapes at rest and now. */
+/* The worse of its qualities at rest and now. */
 static PetscReal worse(const SbNewMesh *m, PetscInt cell)
 {
   const PetscReal rest = shape_at_rest(m, cell), now = shape_at(m, m->x, cell);
@@ -187,7 +189,7 @@ static PetscReal worst_around(const SbNewMesh *m, const Stars *s, PetscInt v)
   return worst;
 }
 
-/* Tries positions on the way to the middle of the neighbours at rest; says whether one was better. */
+/* Tries positions on the way to the mean of the neighbours at rest; returns whether one was better. */
 static PetscBool move_vertex(const Material *at, const Stars *s, PetscInt v, SbNewMesh *m)
 {
   PetscReal middle[3] = {0, 0, 0}, X[3], best_X[3], best_x[3], best_flat[3], best = worst_around(m, s, v),
@@ -228,7 +230,7 @@ static PetscBool move_vertex(const Material *at, const Stars *s, PetscInt v, SbN
   return better;
 }
 
-/* The longest edge of a tet, now, that is not of the hull; false when there is none. */
+/* The longest edge of a tet, in the current configuration, that is not on the hull; false: there is none. */
 static PetscBool inner_edge(const SbSurface *hull, const SbKey edge[], const SbNewMesh *m, PetscInt c,
                             PetscInt ends[2])
 {
@@ -252,7 +254,7 @@ static PetscBool inner_edge(const SbSurface *hull, const SbKey edge[], const SbN
   return (PetscBool)(longest >= 0);
 }
 
-/* A vertex in the middle of an edge at rest; each tet around it becomes two. */
+/* Inserts a vertex at the middle of an edge at rest; each tet around the edge is divided in two. */
 static PetscErrorCode split_edge(const Material *at_old, const PetscInt ends[2], SbNewMesh *m)
 {
   const PetscInt middle = m->nvert, ncell = m->ncell;
@@ -290,7 +292,7 @@ static PetscErrorCode split_edge(const Material *at_old, const PetscInt ends[2],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Vertices are moved, and edges of tets that have none to move are split, until all tets are good enough or nothing helps. */
+/* Moves vertices, and splits edges of tets without movable vertices, until all tets are good enough or nothing helps. */
 static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, const SbSurface *hull,
                                   SbNewMesh *m)
 {
@@ -309,7 +311,7 @@ static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, co
     PetscBool *moved, better = PETSC_TRUE;
     Stars stars;
 
-    // moves inner vertices until all tets are good enough, or nothing helps
+    // move inner vertices until all tets are good enough, or nothing helps
     PetscCall(SbBucketByKey(4 * m->ncell, m->cell, m->nvert, &stars.start, &stars.cells));
     for (PetscInt i = 0; i < 4 * m->ncell; i++) stars.cells[i] /= 4;
     PetscCall(PetscCalloc1(m->nvert, &moved));
@@ -342,14 +344,14 @@ static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Refuses what could not be repaired: tets inverted now are allowed where the old mesh had some, too. */
+/* Error if a bad tet remains; inverted tets in the current configuration are allowed if the old mesh has some. */
 static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how, SbNewMesh *m)
 {
   PetscInt at_rest = 0, now = 0, before = 0;
   PetscReal worst = 1;
 
   PetscFunctionBeginUser;
-  // the new tets, at rest and now
+  // quality of the new tets, at rest and now
   m->quality = 1;
   for (PetscInt c = 0; c < m->ncell; c++) {
     const PetscReal quality = shape_at(m, m->x, c);
@@ -358,7 +360,7 @@ static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how
     now += !(quality > 0);
     m->quality = PetscMin(m->quality, quality);
   }
-  // the old ones now
+  // quality of the old tets now
   for (PetscInt c = 0; c < old->ncell; c++) {
     PetscReal x[4][3], quality;
 
@@ -367,7 +369,7 @@ static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how
     before += !(quality > 0);
     worst = PetscMin(worst, quality);
   }
-  // not worse than before, better if required
+  // error if worse than before, or not better where required
   PetscCheck(!at_rest, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%" PetscInt_FMT " of %" PetscInt_FMT
              " new tetrahedra would be inverted or flat at rest: the deformation differs too much from one "
@@ -384,7 +386,7 @@ static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ from beginning to end */
+/* ------------------------------------------------------------------ re-meshing of a body */
 
 static PetscErrorCode prepare(const SbOldMesh *old, const SbNewMesh *m, Material *at)
 {
@@ -418,7 +420,7 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(old->ncell, &component));
-  // parts of the body that hang together by faces between tets of one number
+  // components: tets of one region that are connected by faces
   for (PetscInt c = 0; c < old->ncell; c++) component[c] = c;
   for (PetscInt s = 0; s < 4 * old->ncell; s++) {
     const PetscInt other = old->faces->neighbour[s];
@@ -426,7 +428,7 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
     if (other >= 0 && old->region[other] == old->region[s / 4]) (void)SbUnionJoin(component, other, s / 4);
   }
   nregion = SbUnionLabel(old->ncell, component);
-  // the hull: outer surface and interfaces between regions, in the shape that is filled
+  // the hull: outer surface and interfaces between regions, in the configuration to be filled
   for (PetscInt s = 0; s < 4 * old->ncell; s++) ntri += in_hull(old, component, s / 4, s % 4);
   PetscCall(SbSurfaceCreate(old->nvert, ntri, nregion, hull));
   for (PetscInt s = 0; s < 4 * old->ncell; s++) {
@@ -452,7 +454,7 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
   m->ncell = tets.ncell;
   m->x = tets.x;
   m->cell = tets.cell;
-  // a mesher must return tets that use all vertices
+  // a mesher has to return tets that use all vertices
   PetscCheck(m->ncell && m->nvert >= hull->nvert, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "the mesher made no tetrahedra");
   PetscCall(PetscCalloc1(m->nvert, &used));
@@ -467,7 +469,7 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
   for (PetscInt c = 0; c < m->ncell; c++) bend(at, m, c, -1);
   PetscCall(repair_tets(at, how, hull, m));
   PetscCall(check_quality(old, how, m));
-  // the old tet around the middle of each new one
+  // the old tet that contains the centroid of each new one
   PetscCall(PetscMalloc1(m->ncell, &m->within));
   for (PetscInt c = 0; c < m->ncell; c++) {
     PetscReal middle[3], w[4];

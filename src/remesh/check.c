@@ -1,15 +1,15 @@
 /*
-  How bad the tets of a body are now, and its momenta.
+  Quality of the tets of a body in the current configuration, and conservation of its momenta.
 
-  A tet is examined where its corners are now; of CR and DG these are the means of the cells around, as vertex fields have them.
+  The corners of a tet are at their current positions; for CR and DG these are means over the cells around, as in vertex fields.
 
-  Velocities on another mesh have other momenta, by as much as the mesh is wrong. With p = M v, the six rigid velocities w_k (three translations,
-  three rotations about the origin at the positions of now) and D, which leaves out what is prescribed, the momenta are w_k . p, and v + sum_l c_l D w_l
-  has those that are wanted when
+  Interpolation to another mesh changes momenta by a discretisation error. With p = M v, the six rigid velocities w_k (three translations,
+  three rotations about the origin in the current configuration) and D, which is zero on prescribed unknowns, the momenta are w_k . p, and v + sum_l c_l D w_l
+  has the wanted ones if
 
     sum_l (w_k . M D w_l) c_l = wanted_k - w_k . M v.
 
-  The rotations are about the middle of the body and lengths in its size, so that this small system is solved to rounding; once more with what is left.
+  Rotations are taken about the centre of the body and lengths relative to its size, so that this small system is well conditioned; one refinement step follows.
 */
 #include "remesh_impl.h"
 #include "sbkernel.h"
@@ -35,7 +35,7 @@ PetscErrorCode SbCornerPositions(SbSpace s, Vec U, PetscReal x[])
       for (int v = 0; v < 4; v++) {
         const PetscInt vertex = mesh->cell[4 * c + v];
 
-        // a node at the vertex tells it; else the mean of the cells around, weighted with their volumes
+        // the displacement of a node at the vertex, else the volume-weighted mean of the cells around
         weight[vertex] = e->nodes_per[0] ? 1. : weight[vertex] + s->batch_V[b][l];
         for (int k = 0; e->nodes_per[0] && k < 3; k++) x[3 * vertex + k] = u[3 * node[v] + k];
         for (int i = 0; !e->nodes_per[0] && i < 12; i++)
@@ -120,7 +120,7 @@ PetscErrorCode SbBodyMomenta(SbModel m, Vec U, Vec V, PetscReal momenta[][6])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* v[nnode][3] += sum_l c[b][l] D w_l; rotations about the middles, lengths in sizes. Returns the largest speed added here. */
+/* v[nnode][3] += sum_l c[b][l] D w_l; rotations about the centres, lengths over the sizes. Returns the largest speed added on this rank. */
 static PetscReal add_rigid(SbModel m, const PetscReal u[], const PetscReal middle[][4],
                            const PetscReal size[], const PetscReal c[][6], PetscReal v[])
 {
@@ -143,12 +143,12 @@ static PetscReal add_rigid(SbModel m, const PetscReal u[], const PetscReal middl
   return largest;
 }
 
-/* One correction. wanted: about the origin. */
+/* One correction of the momenta. wanted: about the origin. */
 static PetscErrorCode correct(SbModel m, Vec U, const PetscBool named[], const PetscReal middle[][4],
                               const PetscReal size[], const PetscReal wanted[][6], PetscReal v[],
                               PetscReal *largest)
 {
-  /* shares of motions that supports take away stay zero: of all solutions the smallest one */
+  /* components removed by supports stay zero: the minimum norm solution */
   PetscBLASInt six = 6, one = 1, rank, nwork = 64, info = 0;
   PetscReal(*now)[6], (*c)[6], (*G)[6][6], *w, speed, singular[6], work[64], least = 1e-11;
   const PetscReal *u;

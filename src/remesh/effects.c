@@ -1,7 +1,7 @@
 /*
-  Transfers history variables of effects (active contact, friction) to the new model: as through a checkpoint, with nodes renumbered.
+  Transfers history variables of effects (active contact, friction) to the new model, like a checkpoint with renumbered nodes.
 
-  Effects without the operation `rename` start as at the start of a run.
+  Effects without the operation `rename` start from their initial state.
 */
 #include "remesh_impl.h"
 
@@ -18,7 +18,7 @@ PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed)
     PetscInt n, nown, total;
 
     if (!e->ops.save || !e->ops.rename) continue;
-    // the records of all ranks, on all of them
+    // gather the records of all ranks on each rank
     SbEffectCall(e, save, a->space, &nown, &own);
     PetscCall(SbAllgatherv(a->space->comm, MPIU_REAL, nown * e->nstate, own, &total, &records, NULL));
     n = e->nstate ? total / e->nstate : 0;

@@ -1,9 +1,9 @@
 /*
-  A scene with its state from all ranks to rank 0, and back.
+  Gathers a scene and its state on rank 0, and scatters vectors back.
 
-  A star forest joins the cells of each rank (leaves) with their positions on rank 0 (roots), by their original numbers. With a cell travel its vertices, its
-  sets, and the values of the vectors at its nodes: so every element is carried alike, and a node that several cells share
-  comes with each of them.
+  A star forest connects the cells of each rank (leaves) with their positions on rank 0 (roots), by their original numbers. Each cell is sent with its vertices, its
+  sets, and the values of the vectors at its nodes: the same for every element; a node of several cells
+  is sent with each of them.
 */
 #include "remesh_impl.h"
 
@@ -90,7 +90,7 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   PetscCall(SbForestReduce(sf, 1, MPIU_INT, mesh->cell_material, g->cell_material));
   PetscCall(SbForestReduce(sf, 5, MPI_UINT64_T, set, g->cell_set));
   PetscCall(PetscFree2(cell, set));
-  // nodes of curved edges
+  // offsets of the nodes of curved edges
   if (mesh->edge_off) {
     if (!rank) PetscCall(PetscMalloc1(18 * (size_t)g->ncell, &g->edge_off));
     PetscCall(SbForestReduce(sf, 18, MPIU_REAL, mesh->edge_off, g->edge_off));

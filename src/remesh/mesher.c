@@ -1,18 +1,18 @@
 /*
-  mesher.c - the mesher of re-meshing: the hull is filled by SbTetrahedralize(), which keeps its triangles.
+  mesher.c - tetrahedralisation of the hull by SbTetrahedralize(), which keeps its triangles.
 
-  Its tets hang on the last bits of the coordinates, and these on the number of ranks: solvers add in other orders. So it gets coordinates that are
-  rounded to a thousandth of an edge, in which such bits are gone, and the same body gets the same tets on any number of ranks. Where the rounded
-  surface cannot be filled, as where it nearly touches itself, it gets the exact ones. The vertices of the hull are where they were in either case.
+  The tets depend on the last bits of the coordinates, and these on the number of ranks, because solvers sum in different orders. So coordinates are
+  rounded to a thousandth of an edge, and the same body gets the same tets on any number of ranks. Where this fails for the rounded
+  surface, as where it nearly touches itself, exact coordinates are used. The vertices of the hull keep their positions in either case.
 */
 #include "sbremesh.h"
 #include "sbsurface.h"
 #include "sbtet.h"
 
-#define BITS 10   /* an edge has 2^10 to 2^11 steps */
-#define AHEAD 0.3 /* of a step: with one half, round numbers would lie where rounding is not sure */
+#define BITS 10   /* an edge is 2^10 to 2^11 rounding steps */
+#define AHEAD 0.3 /* shift over a rounding step; 1/2 would put round numbers where rounding is ambiguous */
 
-/* One attempt. step: coordinates are rounded to multiples of it, m; 0: they stay as they are. */
+/* One attempt. step: coordinates are rounded to multiples of it, m; 0: no rounding. */
 static PetscErrorCode fill(const char *where, const SbSurface *hull, PetscReal size, PetscReal step,
                            SbImport *im)
 {
@@ -51,7 +51,7 @@ PetscErrorCode SbMesherDefault(const char *where, const SbSurface *hull, PetscRe
   ierr = fill(where, hull, size, step, &im);
   PetscCall(PetscPopErrorHandler());
   if (ierr) PetscCall(fill(where, hull, size, 0, &im));
-  // vertices and tets move to the caller; inverted tets are turned
+  // vertices and tets move to the caller; inverted tets are reoriented
   *tets = (SbTets){.nvert = im.nvert, .ncell = im.item[3].n, .x = im.x, .cell = im.item[3].vert};
   im.x = NULL;
   im.item[3].vert = NULL;

@@ -1,42 +1,42 @@
 /*
-  Re-meshing while a run goes on: when the tets of a body have become too bad, or at given times, it is remeshed and the run goes on.
+  Re-meshing during a run: a body is re-meshed when the quality of its tets is too low, or at given times, and the run continues.
 
-  After each step the time loop asks whether to come back (SbRun.after). Then the state is brought to rank 0 (gather.c), bodies get their new
-  meshes and the state is looked up there (bodies.c), the scene is made once more from its options with these meshes in memory, and the
-  state goes there: vectors, what effects remember (effects.c), totals, output, ledger. Mass is that of before because densities are scaled (SbMemoryMesh.mass),
-  momenta because a rigid motion is added to the velocities (check.c). What kinetic and strain energy have changed by is the remesh_loss of the
-  account.
+  After each step a callback decides whether the time loop returns (SbRun.after). Then the state is gathered on rank 0 (gather.c), bodies are
+  re-meshed and the state is interpolated (bodies.c), the scene is set up again from its options with these meshes in memory, and the
+  state is transferred: vectors, history variables of effects (effects.c), totals, output, ledger. Scaled densities conserve mass (SbMemoryMesh.mass),
+  a rigid motion added to the velocities conserves momenta (check.c). The change of kinetic and strain energy is remesh_loss in the
+  energy balance.
 
-  A body that could not be re-meshed keeps its mesh, and the run goes on with a warning; it is tried again when its quality has halved, but after 1, 2, 4, ...
-  steps at the soonest. The same bound holds after a mesh that came out little better: no body is re-meshed step by step.
+  If re-meshing fails the body keeps its mesh, and the run continues with a warning; the next try is when its quality has halved, but at the earliest after 1, 2, 4, ...
+  steps. The same bound holds after a mesh that is hardly better: no body is re-meshed in every step.
 */
 #include "remesh_impl.h"
 #include "sbscene.h"
 #include "sblog.h"
 
-#define AGAIN 0.5          /* of the quality that was reached: below it a body may be re-meshed again */
-#define QUALITY_LEAST 1e-3 /* of new tets at rest and now, below which vertices are moved */
+#define AGAIN 0.5          /* factor on the quality reached: below that a body may be re-meshed again */
+#define QUALITY_LEAST 1e-3 /* quality of new tets at rest and now below which vertices are moved */
 
 struct _p_SbRemesh {
   PetscLogEvent event;
   PetscInt nbody;
   PetscBool *named; /* [nbody] may be re-meshed */
-  PetscBool *due;   /* [nbody] is to be, now */
-  PetscReal *asked; /* [nbody] quality that the options name; 0: none */
-  PetscReal *bound; /* [nbody] the one that counts */
-  PetscReal *worst; /* [nbody] after the last step */
-  PetscInt *from;   /* [nbody] step from which its quality counts again */
-  PetscInt *rest;   /* [nbody] steps that it was left alone after the last attempt without success */
+  PetscBool *due;   /* [nbody] is to be re-meshed now */
+  PetscReal *asked; /* [nbody] quality bound of the options; 0: none */
+  PetscReal *bound; /* [nbody] current quality bound */
+  PetscReal *worst; /* [nbody] quality of the worst tet after the last step */
+  PetscInt *from;   /* [nbody] step from which the quality bound applies again */
+  PetscInt *rest;   /* [nbody] steps without a try after the last failure */
   PetscInt ntime;
-  PetscReal *time; /* [ntime] s */
+  PetscReal *time; /* [ntime] times of re-meshing, s */
   PetscInt nchange;
-  PetscReal *change; /* [nchange] s, when supports come or go: the scene is made again */
-  PetscBool meshes;  /* bodies may be re-meshed; else it is here for supports alone */
+  PetscReal *change; /* [nchange] times when supports come or go, s: the scene is set up again */
+  PetscBool meshes;  /* bodies may be re-meshed; else only supports change */
   PetscBool changes; /* supports come or go now */
-  PetscBool failed;  /* also when a step fails */
-  PetscInt tried;    /* the step after which that was tried last, -1: never */
+  PetscBool failed;  /* -remesh_failed */
+  PetscInt tried;    /* last step after which -remesh_failed applied, -1: never */
   SbRemeshing how;
-  SbColumn *column; /* those of the ledger and remesh_loss */
+  SbColumn *column; /* columns of the ledger and remesh_loss */
 };
 
 static const SbOption rows[] = {
@@ -81,7 +81,7 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
 
   PetscFunctionBeginUser;
   *remesh = NULL;
-  // whether the scenario asks for it, by any option but those that say how
+  // whether the scenario asks for re-meshing, by any option but the settings
   named = PETSC_FALSE;
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(keys); k++) {
     PetscCall(SbOptionGiven(&SbRunScope, keys[k], &given));
@@ -115,7 +115,7 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
     if (effect->until > 0. && effect->until < PETSC_MAX_REAL) r->change[r->nchange++] = effect->until;
   }
   if (!named) PetscFunctionReturn(PETSC_SUCCESS);
-  // the bodies that are named; without names all of them
+  // the named bodies; all if none is named
   PetscCall(SbOptionNames(&SbRunScope, "remesh_bodies", &n, &names));
   for (PetscInt b = 0; b < m->nbody; b++) r->named[b] = (PetscBool)!n;
   for (PetscInt i = 0; i < n; i++) {
@@ -130,7 +130,7 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
   PetscCall(PetscFree(names));
   PetscCheck(!wrong[0], PETSC_COMM_SELF, PETSC_ERR_USER,
              "-remesh_bodies: the scenario has no body '%s'; give names of -bodies", wrong);
-  // their bounds
+  // their quality bounds
   PetscCall(SbOptionReal(&SbRunScope, "remesh_quality", &all));
   for (PetscInt b = 0; b < m->nbody; b++) {
     SbScope own;
@@ -142,7 +142,7 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
     r->bound[b] = r->asked[b];
     any = (PetscBool)(any || r->asked[b] > 0.);
   }
-  // times at which meshes are renewed
+  // times of re-meshing
   PetscCall(SbOptionNames(&SbRunScope, "remesh_times", &r->ntime, &words));
   PetscCall(PetscMalloc1(r->ntime, &r->time));
   for (PetscInt i = 0; i < r->ntime; i++) {
@@ -194,12 +194,12 @@ PetscErrorCode SbRemeshDestroy(SbRemesh *remesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ whether, and which bodies */
+/* ------------------------------------------------------------------ when, and which bodies */
 
 static PetscErrorCode check_quality(SbRun run, PetscInt step, PetscReal t, PetscReal dt, void *ctx,
                                     PetscBool *pause)
 {
-  const PetscReal ahead = 1e-6 * dt; /* a step that ends there but for rounding has reached it */
+  const PetscReal ahead = 1e-6 * dt; /* tolerance for rounding: a step that ends there has reached the time */
   SbRemesh r = (SbRemesh)ctx;
   PetscBool time = PETSC_FALSE;
 
@@ -228,7 +228,7 @@ static PetscErrorCode check_quality(SbRun run, PetscInt step, PetscReal t, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The step that follows failed: the body with the worst tet is due, once for each state. */
+/* After a failed step: the body with the worst tet is due, once per state. */
 static PetscErrorCode check_after_failure(SbRemesh r, SbRun run, PetscBool *again)
 {
   PetscInt worst = -1;
@@ -279,7 +279,7 @@ PetscErrorCode SbRemeshAttach(SbRemesh r, SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ the scene once more */
+/* ------------------------------------------------------------------ the new scene */
 
 /* A scene: the old one, or the new one. */
 typedef struct {
@@ -293,9 +293,9 @@ static PetscReal distance(const PetscReal a[3], const PetscReal b[3])
   return PetscSqrtReal(PetscSqr(a[0] - b[0]) + PetscSqr(a[1] - b[1]) + PetscSqr(a[2] - b[2]));
 }
 
-/* ------------------------------------------------------------------ a re-meshing from beginning to end */
+/* ------------------------------------------------------------------ re-meshing */
 
-/* The new scene, or the message why it cannot be made: then the old one goes on. */
+/* Sets up the new scene and transfers the state; on an error the message is kept, and the old scene continues. */
 static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
 {
   Scene s = {NULL, NULL, NULL};
@@ -307,12 +307,12 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   const SbRemeshOutcome *outcome = result->outcome;
 
   PetscFunctionBeginUser;
-  // everything from the options again, on the new meshes; the solver stays the one chosen before
+  // set up the scene from its options, on the new meshes; the solver is the one chosen before
   PetscCall(SbSceneCreate(old->model->comm, &s.model));
   PetscCall(SbRunCreate(s.model, &s.run));
   PetscCall(PetscStrncpy(s.run->solver_choice, old->run->solver, sizeof(s.run->solver_choice)));
   PetscCall(SbLedgerSetFromOptions(s.run, &s.ledger));
-  // the bodies' meshes, which are on rank 0; the model owns them from now on
+  // the bodies' meshes, on rank 0; the model owns them from now on
   for (PetscInt b = 0; b < s.model->nbody; b++) {
     PetscCall(SbMemoryMeshShare(s.model->comm, &result->in_memory[b]));
     s.model->body[b].in_memory = result->in_memory[b];
@@ -323,12 +323,12 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   PetscCall(SbSceneValidate(s.model));
   PetscCall(SbRunSetUp(s.run));
   PetscCall(PetscStrncpy(s.run->solver_reason, old->run->solver_reason, sizeof(s.run->solver_reason)));
-  // the state goes from the old scene to the new one
+  // transfer the state
   run = s.run;
   PetscCall(SbRunTransferState(old->run, run));
   PetscCall(SbScatter(&result->next, run));
   PetscCall(SbModelPrescribe(s.model, run->t_now, run->U));
-  // keep the bodies' momenta, and their rates where accelerations are states of the integrator
+  // conserve the bodies' momenta, and their rates where the integrator stores accelerations
   if (run->V) {
     PetscCall(PetscCalloc1(old->model->nbody, &momenta));
     PetscCall(SbBodyMomenta(old->model, before->U, before->V, momenta));
@@ -348,7 +348,7 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
                                  run->preset == SB_TIME_NEWMARK ? SB_STEPS_UNDAMPED : SB_STEPS_IN_TIME,
                                  NULL));
   PetscCall(SbRunRestartAcceleration(run));
-  // energy, mass and momentum of both states: the difference is the loss by remeshing
+  // energy, mass and momentum of both states; the difference of energy is remesh_loss
   PetscCall(PetscMemzero(e, 2 * sizeof(*e)));
   PetscCall(SbModelEnergies(old->model, old->run->U, old->run->V, &e[0]));
   PetscCall(SbModelEnergies(s.model, s.run->U, s.run->V, &e[1]));
@@ -359,7 +359,7 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   if (s.ledger) PetscCall(SbLedgerContinue(old->ledger, s.ledger));
   PetscCall(SbRemeshAttach(r, s.run));
   if (old->run->output) PetscCall(SbOutputReattach(old->run, s.run));
-  // one entry for each body that was meshed again
+  // one line for each body that was re-meshed
   for (PetscInt b = 0; b < r->nbody; b++) {
     SbRemeshed entry = {.step = s.run->step_now, .t = s.run->t_now};
 
@@ -399,7 +399,7 @@ static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
   PetscCall(PetscLogStagePush(SbLogStageSetup));
   PetscCall(PetscLogEventBegin(r->event, 0, 0, 0, 0));
   PetscCall(SbRemeshResultCreate(scene->model->nbody, &result));
-  // new meshes on rank 0; all ranks know the messages, numbers and names
+  // new meshes on rank 0; messages, counts and names are sent to all ranks
   PetscCallMPI(MPI_Comm_rank(m->comm, &rank));
   PetscCall(SbGather(scene->run, &g));
   if (!rank) PetscCall(SbRemeshBodies(m, &g, r->due, scene->run->step_now, &r->how, &result));
@@ -421,7 +421,7 @@ static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
       PetscCall(SbWarning(m->comm, "body '%s' keeps its mesh after step %" PetscInt_FMT ": %s",
                           m->body[b].name, scene->run->step_now, result.outcome[b].message));
   }
-  // quality and step from which a body may be remeshed again
+  // quality and step from which a body may be re-meshed again
   outcome = result.outcome;
   done = result.done;
   for (PetscInt b = 0; b < r->nbody; b++) {
@@ -457,7 +457,7 @@ PetscErrorCode SbRemeshSolve(SbRemesh r, SbModel *model, SbRun *run, SbLedger *l
   SbRun first;
 
   PetscFunctionBeginUser;
-  // a checkpoint taken before a due remeshing holds the old meshes: a restart remeshes first
+  // a checkpoint before a due re-meshing contains the old meshes: a restart re-meshes first
   first = scene.run;
   if (r && first->step0 && first->after.dt > 0.) {
     first->step_now = first->step0;
@@ -465,7 +465,7 @@ PetscErrorCode SbRemeshSolve(SbRemesh r, SbModel *model, SbRun *run, SbLedger *l
     PetscCall(check_quality(first, first->step0, first->t0, first->after.dt, r, &again));
     if (again) PetscCall(apply(r, &scene, &any));
   } else if (r && first->step0 && r->nchange) {
-    // the scene was made as at the start of the first run
+    // the new scene is in its initial state, as at the start of the first run
     first->step_now = first->step0;
     first->t_now = first->t0;
     PetscCall(check_quality(first, first->step0, first->t0, first->t0, r, &again));
