@@ -19,8 +19,7 @@
 #define MESH 0.1    /* allowed error of contact, over that of the mesh */
 #define AIM 0.5     /* target error of a new width, over the allowed error */
 #define ROOM 0.1    /* error over the allowed one below which a width may grow */
-#define GROWTH \
-  0.01 /* largest growth of the gaps' energy with a width, over the energy of the allowed error */
+#define GROWTH 0.01 /* largest energy of gaps from a growing width, over that of the allowed error */
 #define LOOSEST 0.3 /* largest relative tolerance of a solve */
 #define TIGHTEST 1e-12
 #define NOISE 4.      /* factor on the error of a solve */

@@ -4,8 +4,7 @@
 */
 #include "ledger_impl.h"
 
-#define PROBE \
-  1e-6 /* finite difference step over the bodies' size: above rounding, small enough to be linear */
+#define PROBE 1e-6 /* finite difference step over the bodies' size: above rounding, nearly linear */
 
 PetscErrorCode SbDifferenceLength(SbLedger l, Vec D, PetscReal *length)
 {

@@ -58,8 +58,7 @@ struct _p_SbLedger {
   Vec delta;                   /* error of the solve, m, for the quantity */
 
   PetscReal work, own_work; /* work of the run and of estimates, in residual evaluations: reproducible */
-  PetscReal seconds, solving,
-    residuals; /* seconds of estimates on this rank: all, linear solves, residuals */
+  PetscReal seconds, solving, residuals; /* seconds on this rank: all estimates, solves, residuals */
 
   /* adaptive_tolerance.c */
   PetscBool may_tune; /* the program chooses tolerances */
@@ -67,7 +66,7 @@ struct _p_SbLedger {
   PetscInt repeats;   /* number of solves that were repeated for their accuracy */
   PetscInt narrowed;  /* number of reductions of contact widths */
   PetscBool mesh_bounds,
-    width_bounds; /* contact exceeds its allowed error: the mesh's is far larger; widths are fixed or minimal */
+    width_bounds; /* too large an error of contact is accepted: the mesh's is far larger; widths are fixed or minimal */
   PetscInt nstep, nkept;          /* -step_time_budget: number of steps; of those within the budget */
   PetscReal wall, longest, total; /* seconds at the last step; longest step; sum */
 };

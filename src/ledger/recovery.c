@@ -34,10 +34,8 @@ struct _p_SbRecovery {
   PetscReal *weight; /* [ncell][4] weight of a cell's P in the value of a corner; 0: vertex not owned */
   PetscReal *value;  /* [nvert nlayer][9] recovered values */
   /* for P2; NULL without a P2 body */
-  PetscBool *quadratic; /* [nbody] the body is P2 */
-  PetscReal (
-    *factor)[2][NFIT *
-                NFIT]; /* [nvert_owned nlayer] Cholesky factors of the normal equations for P and pressure */
+  PetscBool *quadratic;                /* [nbody] the body is P2 */
+  PetscReal (*factor)[2][NFIT * NFIT]; /* [nvert_owned nlayer] Cholesky factors for P, pressure */
   struct Fit {
     PetscReal c[NVALUE][NFIT]; /* coefficients of the monomials of (X - X_v) / size */
     PetscReal size;            /* length scale, m */

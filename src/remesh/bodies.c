@@ -10,8 +10,7 @@
 */
 #include "remesh_impl.h"
 
-#define INWARDS \
-  1e-6 /* distance from a face towards the centre of its DG cell, over the distance of both: selects the side */
+#define INWARDS 1e-6 /* fraction of the way from a face to the centre of its DG cell */
 
 /* Key of edge e of a cell, at = 6 cell + e. */
 static SbKey edge_of(const PetscInt v[], PetscInt at)

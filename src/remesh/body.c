@@ -20,12 +20,10 @@
 #include "remesh_impl.h"
 
 #define SWEEPS 30
-#define GROWTH 2 /* largest number of tets by edge splits, over the initial number */
-#define ROUNDS 6 /* rounds of moving vertices and splitting edges */
-#define PLACES \
-  6 /* trial positions towards the mean of the neighbours, each at half the distance of the last */
-#define STRAIGHT \
-  1e-6 /* offset of an edge node from the middle, over the edge length, below which the edge is straight */
+#define GROWTH 2      /* largest number of tets by edge splits, over the initial number */
+#define ROUNDS 6      /* rounds of moving vertices and splitting edges */
+#define PLACES 6      /* trial positions of a vertex, each half as far as the one before */
+#define STRAIGHT 1e-6 /* offset of an edge node over the edge length that counts as zero */
 
 /* Point locators in the old mesh. */
 typedef struct {
@@ -33,7 +31,7 @@ typedef struct {
   SbLocator rest, flat; /* locator at rest; among straight tets, for a body with curved ones, else NULL */
   PetscInt ncurved;
   SbKey *
-    curved; /* [ncurved] curved edges between kept vertices, key: SbKeyOfPair() of new numbers, slot: 6 cell + edge in the old mesh */
+    curved; /* [ncurved] curved edges between kept vertices: SbKeyOfPair() of new numbers; slot 6 cell + edge in the old mesh */
 } Material;
 
 /* ------------------------------------------------------------------ the hull */

@@ -42,8 +42,7 @@
 #define NODES_PER_FACTORED 10
 #define LEAST_FACTORED 50
 #define MOST_FACTORED 1000
-#define NODES_PER_SPREAD \
-  16 /* 80,000 tets on 16 ranks: 12, 16, 24 nodes per aggregate: 37, 37, 38 iterations */
+#define NODES_PER_SPREAD 16 /* nodes per aggregate; 12, 16, 24: 37, 37, 38 iterations (80,000 tets) */
 
 typedef struct {
   SbSpace space;

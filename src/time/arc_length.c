@@ -1,48 +1,48 @@
 /*
-  The path of a static run by arc length: the load factor lambda is an unknown, and the length l of a step the equation for it,
+  Arc-length method for static runs: the load factor lambda is an unknown, and the length l of a step the additional equation,
 
     R(u, lambda) = f_int(u) - f_ext(u, lambda) = 0,   |d| = l,   d = u - u_n,
 
-  so that the path continues past limit points of load and displacement. |d| is the root mean square over the mass of the
-  bodies, m, prescribed displacements included: a cylinder (Crisfield, Comput. Struct. 13, 1981). Both equations are linearised together
+  so that the path continues past limit points of load and displacement. |d| is the mass-weighted root mean square,
+  in m, with prescribed displacements: a cylindrical constraint (Crisfield, Comput. Struct. 13, 1981). Both equations are linearised together
   (Schweizerhof and Wriggers, Comput. Methods Appl. Mech. Eng. 59, 1986). With the exact tangent K and q = -dR/dlambda an
-  iteration is two solves with one factorisation,
+  iteration takes two solves with one factorisation,
 
     K r = -R,   K v = q,   dlambda = ((l^2 - |d|^2)/2 - (d, r)) / (d, v),   du = r + dlambda v.
 
-  A step begins along v, in the direction in which (v, d) > 0 with the step d before (de Souza Neto and Feng, Comput. Methods Appl. Mech.
-  Eng. 179, 1999): unlike the sign of the determinant or of the work of the loads it is right at limit loads, where displacements turn back
-  and behind bifurcations. The first step has the load increment 1 / static_steps, later ones are longer while iterations are few. A step that does
-  not converge, or ends far from the direction in which it began (on another branch), is halved.
+  The predictor is along v, with the sign of (v, d), d the last step (de Souza Neto and Feng, Comput. Methods Appl. Mech.
+  Eng. 179, 1999): unlike the sign of the determinant or of the work of the loads it is right at limit points of load and displacement
+  and after bifurcations. The first step has the load increment 1 / static_steps, later ones are longer while iterations are few. A step that does
+  not converge, or ends at a large angle to its predictor (on another branch), is halved.
 
-  q is a difference of residuals. It is exact for loads that are proportional to lambda; with moving supports and formulas of t, which is
-  lambda, the step of the difference is small. The last step is solved at lambda = 1.
+  q is a finite difference of residuals. It is exact for loads that are proportional to lambda; with moving supports and formulas of t (here
+  lambda), the step of the difference is small. The last step is solved at lambda = 1.
 
-  K has negative eigenvalues behind limit loads. Where its factorisation counts them, one that changes while the load does not turn is a
-  bifurcation: another branch begins there, which is not searched for. Not handled: contact, re-meshing.
+  K has negative eigenvalues after limit loads. If the factorisation counts them, a changed number while the load does not change direction is a
+  bifurcation: it is reported, but the other branch is not followed. Not handled: contact, re-meshing.
 */
 #include "sbsolver.h"
 #include "time_impl.h"
 
-#define DESIRED 4.  /* iterations below which steps become longer */
-#define MOST 25     /* iterations after which a step is halved */
-#define STRAIGHT .7 /* smallest cosine of the angle between the directions in which a step begins and ends */
+#define DESIRED 4.  /* number of iterations below which steps become longer */
+#define MOST 25     /* largest number of iterations; then a step is halved */
+#define STRAIGHT .7 /* smallest cosine of the angle between a step and its predictor */
 #define FINE 1e-6   /* step of lambda for q where R is not linear in it */
 
 typedef struct {
   SbRun run;
   union {
     struct {
-      Vec weight;               /* of each displacement: its mass over the total */
-      Vec X, d, r, v, q, begin; /* end of the step and its parts as above; v where the step begins */
-      Vec w, du;                /* work; correction of X */
+      Vec weight;               /* mass of each displacement over the total mass */
+      Vec X, d, r, v, q, begin; /* end of the step; d, r, v, q as above; v at the start of the step */
+      Vec w, du;                /* work vector; correction of X */
     };
     Vec all[9]; /* the same vectors */
   };
-  PetscReal factor, delta; /* lambda at X; its step for q */
-  PetscReal load;          /* |q| where the run begins, N */
-  PetscInt negative;       /* negative eigenvalues of K at the start of the last step; -1: not known */
-  PetscReal turned;        /* sign of dlambda then */
+  PetscReal factor, delta; /* lambda at X; its finite difference step for q */
+  PetscReal load;          /* |q| at the start of the run, N */
+  PetscInt negative;       /* negative eigenvalues of K at the start of the last step; -1: unknown */
+  PetscReal turned;        /* sign of dlambda at the start of the last step */
 } Path;
 
 /* (a, b), m^2. */
@@ -118,7 +118,7 @@ static PetscErrorCode solve(Path *p, Vec b, Vec x, PetscBool *ok)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* K at X, and v; r: the residual at X. */
+/* Assembles K at X, and solves for v; r: the residual at X. */
 static PetscErrorCode tangent(Path *p, PetscBool *ok)
 {
   const SbRun run = p->run;
@@ -127,7 +127,7 @@ static PetscErrorCode tangent(Path *p, PetscBool *ok)
   PetscFunctionBeginUser;
   PetscCall(SNESComputeJacobian(run->snes, p->X, run->operator, run->J));
   run->newton_step++;
-  /* q, with w the derivative of the prescribed displacements */
+  /* q; w: derivative of the prescribed displacements by lambda */
   PetscCall(VecCopy(p->X, p->w));
   PetscCall(put_at(p, factor + p->delta));
   PetscCall(SNESComputeFunction(run->snes, p->X, p->q));
@@ -139,7 +139,7 @@ static PetscErrorCode tangent(Path *p, PetscBool *ok)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Newton's method from X for R and the length l of the step; with l = 0 for R at the present load factor. */
+/* Newton's method from X for R and the length l of the step; l = 0: for R at fixed lambda. */
 static PetscErrorCode correct(Path *p, PetscReal l, PetscInt *its, PetscBool *ok)
 {
   PetscReal atol, rtol, norm, dd, dr, dv, more = 0.;
@@ -179,7 +179,7 @@ static PetscErrorCode correct(Path *p, PetscReal l, PetscInt *its, PetscBool *ok
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A step of the length l from U, where the load factor is `from`; sign: whether the load rises along it at first. */
+/* Attempts a step of length l from U with the load factor `from`; sign: whether the load increases initially. */
 static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal sign, PetscInt *its,
                               PetscBool *ok)
 {
@@ -193,7 +193,7 @@ static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal si
   PetscCall(VecWAXPY(p->X, sign * l / PetscSqrtReal(vv), p->begin, run->U));
   PetscCall(put_at(p, from + sign * l / PetscSqrtReal(vv)));
   PetscCall(correct(p, l, its, ok));
-  /* another branch */
+  /* too large an angle: another branch */
   PetscCall(VecWAXPY(p->d, -1., run->U, p->X));
   PetscCall(product(p, p->d, p->d, &dd));
   PetscCall(product(p, p->d, p->begin, &dv));
@@ -203,7 +203,7 @@ static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal si
   }
   PetscCall(SbRunTooFar(run, p->X, &far));
   if (far) *ok = PETSC_FALSE;
-  /* the end of the path */
+  /* past the end of the path: solve at lambda = 1 */
   if (*ok && from < 1. && p->factor > 1.) {
     PetscCall(VecWAXPY(p->X, (1. - from) / (p->factor - from), p->d, run->U));
     PetscCall(put_at(p, 1.));
@@ -221,7 +221,7 @@ static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal si
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* v at U, where the residual is zero but for the tolerance, in `begin`; a bifurcation on the way there is reported. */
+/* v at the equilibrium U, in `begin`; reports a bifurcation since the last step. */
 static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
 {
   const SbRun run = p->run;
@@ -238,7 +238,7 @@ static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
   PetscCall(product(p, run->path, p->begin, &along));
   *sign = along < 0. ? -1. : 1.;
   PetscCall(SbSolverCountNegativeEigenvalues(run->snes, run->model->space, &negative));
-  if (run->nonsymmetric.U) negative = -1; /* the matrix lacks a part of K */
+  if (run->nonsymmetric.U) negative = -1; /* the matrix lacks a part of K: its inertia is unknown */
   if (negative >= 0 && p->negative >= 0 && PetscAbsInt(negative - p->negative) != (*sign != p->turned) &&
       !run->bifurcations++)
     PetscCall(SbWarning(run->model->comm,
@@ -252,7 +252,7 @@ static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Why no step succeeded. */
+/* Sets the reason why no step succeeded. */
 static PetscErrorCode explain(SbRun run, PetscReal factor, PetscReal l)
 {
   char why[sizeof(run->stop_reason)], motion[256];
@@ -320,7 +320,7 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
       known = PETSC_TRUE;
     }
 
-    /* length of a first step: its load increment is 1 / static_steps; near a limit load, where a load path ended, by the displacement of the load so far */
+    /* length of the first step: load increment 1 / static_steps or, if a load path ended near a limit load, the displacement per load so far */
     if (l == 0.) {
       PetscReal rate, uu;
 
@@ -335,7 +335,7 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
       l = run->arc.first = rate / (PetscReal)run->static_steps;
     }
 
-    /* a step along it, half as long where that fails */
+    /* a step along it, halved on failure */
     PetscCall(attempt(&p, factor, l, sign, &its, &ok));
     if (!ok) {
       run->rejected_step++;
@@ -350,7 +350,7 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
       break;
     }
 
-    /* the new equilibrium, and the length of the step behind it */
+    /* the new equilibrium, and the length of the next step */
     run->stop_reason[0] = 0;
     known = PETSC_FALSE;
     cuts = 0;

@@ -1,6 +1,6 @@
 /*
-  The model as PETSc's TS and SNES see it. A tangent that cannot have changed (linear laws, loads that do not depend on the
-  displacement, the same shifts) is not assembled again, and the preconditioner stays.
+  Callbacks of PETSc's TS and SNES. A tangent that cannot have changed (linear laws, loads that do not depend on the
+  displacement, the same shifts) is not assembled again, and the preconditioner is reused.
 */
 #include "sbsolver.h"
 #include "time_impl.h"
@@ -123,7 +123,7 @@ PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A)
     KSP ksp;
     PC pc;
 
-    /* With the consistent mass the system is solved by CG to rounding; the lumped mass is a division. */
+    /* with the consistent mass the system is solved by CG to rounding; the lumped mass is a division */
     PetscCall(SbSpaceCreateMatrix(run->model->space, SB_MATRIX_BAIJ, &M));
     PetscCall(SbModelTangent(run->model, 0., 0., 1., 0., run->U, run->V, M));
     PetscCall(KSPCreate(run->model->comm, &ksp));

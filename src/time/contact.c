@@ -2,9 +2,9 @@
   The active-set iteration of a step with contact: solve with the current active set, update it, repeat until it does not
   change.
 
-  A later solve starts near its solution, and a tolerance relative to its first residual could be below rounding
-  beside large contact forces. So all solves of a step have the absolute tolerance of the first one. While the active set changes, those of a time
-  step have a thousand times that ("rough" solves).
+  Later solves start near their solution, and a tolerance relative to their first residual could be below the rounding of
+  large contact forces. So all solves of a step have the absolute tolerance of the first one. While the active set changes, the tolerance in time
+  steps is a thousand times larger ("rough" solves).
 */
 #include "sbsolver.h"
 #include "time_impl.h"
@@ -12,17 +12,17 @@
 #define DIGITS 1e-11    /* rounding of a residual, over the forces of contact and supports */
 #define LOOSER 1e3      /* factor on the tolerance of rough solves */
 #define ROUGH 1e-3      /* largest tolerance of rough solves, over the first residual */
-#define ROUGH_ROUNDS 10 /* iterations after which solves are no longer rough */
+#define ROUGH_ROUNDS 10 /* number of iterations after which solves are no longer rough */
 
-/* Tolerances of the solvers as the user left them. */
+/* Tolerances of the solvers as set by the user. */
 typedef struct {
   PetscReal atol, rtol, stol, linear_rtol, linear_atol, dtol;
   PetscInt max_it, max_f, linear_max;
   KSP ksp;
-  PetscBool single; /* one linear solve instead of Newton */
+  PetscBool single; /* one linear solve per step instead of Newton's method */
 } Aim;
 
-/* Absolute tolerances for solves of a step whose first residual is `size`, N; 0: those of the user. least: rounding, N. */
+/* Sets absolute tolerances for solves of a step whose first residual is `size`, N; 0: those of the user. least: rounding, N. */
 static PetscErrorCode set_aim(SNES snes, const Aim *aim, PetscReal size, PetscReal least, PetscBool rough)
 {
   const PetscReal rtol = aim->single ? aim->linear_rtol : aim->rtol;
@@ -52,7 +52,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
   if (!run->R) PetscCall(VecDuplicate(U, &run->R));
   run->time_of_impact = 1.;
 
-  /* tolerances as the user left them */
+  /* tolerances as set by the user */
   PetscCall(SNESGetKSP(snes, &aim.ksp));
   PetscCall(SNESGetTolerances(snes, &aim.atol, &aim.rtol, &aim.stol, &aim.max_it, &aim.max_f));
   PetscCall(KSPGetTolerances(aim.ksp, &aim.linear_rtol, &aim.linear_atol, &aim.dtol, &aim.linear_max));
@@ -62,10 +62,10 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
   PetscCall(SbModelContactBeginStep(m, t, dt, U0, run->V, U));
   constrained = SbSpaceIsConstrained(m->space);
   rough = (PetscBool)(constrained && m->dynamic);
-  /* the matrix holds what was constrained before */
+  /* the matrix has the old constraints */
   if (projected || !m->dynamic) run->tangent_known = PETSC_FALSE;
   if (constrained) {
-    /* a body at rest has only a residual by rounding: then contact and support forces are the scale */
+    /* scale of rounding: a body at rest has a residual of rounding only, but contact and support forces */
     PetscCall((*step->residual)(step->ctx, U, run->R));
     PetscCall(VecNorm(run->R, NORM_2, &least));
     least = PetscIsInfOrNanReal(least) ? 0 : DIGITS * least;
@@ -75,7 +75,8 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
   PetscCall(SNESComputeFunction(snes, U, run->R));
   PetscCall(VecNorm(run->R, NORM_2, &size));
   if (PetscIsInfOrNanReal(size)) size = 0;
-  if (constrained) PetscCall(set_aim(snes, &aim, size, least, rough)); /* if not, as without contact */
+  if (constrained)
+    PetscCall(set_aim(snes, &aim, size, least, rough)); /* without constraints the tolerances stay */
   PetscCall(SbSolverUpdateSymmetry(aim.ksp, m->space));
   PetscCall((*step->solve)(step->ctx, U, reason));
 
@@ -86,7 +87,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
     m->space->rough = rough;
     PetscCall(SbModelContactUpdateActiveSet(m, t + dt, U, run->R, &again));
     if (round == 1 && run->may_end_at_impact) {
-      /* the first time of impact, if the step is to be cut there */
+      /* the first time of impact, if the step may end there */
       PetscCall(SbModelContactTimeOfImpact(run->model, &run->time_of_impact));
       if (run->time_of_impact < SB_TIME_OF_IMPACT_LEAST || run->time_of_impact > 1. - SB_TIME_OF_IMPACT_LEAST)
         run->time_of_impact = 1.;

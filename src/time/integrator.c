@@ -1,21 +1,21 @@
 /*
-  Integrators by name: each preset is a method of second_order.c with its parameters, set where the user is silent; all of
-  PETSc's own options (-ts_, -snes_, -ksp_, -pc_) go on working.
+  Integrators by name: each preset is a method of second_order.c with its parameters; options of the user have precedence, and all of
+  PETSc's own options (-ts_, -snes_, -ksp_, -pc_) apply.
 
     euler_implicit    first order, damps; never gains energy in linear runs
     newmark           second order, (1/4, 1/2) conserves energy in linear runs
     genalpha          second order, damps high frequencies; parameters from the spectral radius at infinity
     euler_symplectic  explicit, first order, bounded energy below the stable step
-    euler_explicit    explicit, first order, gains energy: the baseline that blows up
+    euler_explicit    explicit, first order, gains energy and is unstable: a baseline
     alpha2            PETSc's TSALPHA2, for comparison
-    static            equilibrium, no inertia: a load path
+    static            equilibrium without inertia: load steps
 */
 #include <complex.h>
 #include "time_impl.h"
 #include "sbsolver.h"
 
 #define FORCING 0.1         /* loosest relative tolerance of Newton's linear solves */
-#define FORCING_BESIDE 1e-6 /* the same where a part of the tangent is outside the matrix */
+#define FORCING_BESIDE 1e-6 /* the same where the matrix lacks a part of the tangent */
 
 const char *const SbIntegrators =
   "euler_implicit|newmark|genalpha|euler_symplectic|euler_explicit|alpha2|static";
@@ -92,7 +92,7 @@ PetscErrorCode SbTimeRegister(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Arc length needs exact tangents: `auto` becomes exact. */
+/* Options of the arc-length method, which needs exact tangents: `auto` becomes exact. */
 static PetscErrorCode read_arc_length(SbRun run, const SbScope *scope)
 {
   const SbModel m = run->model;
@@ -136,7 +136,7 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
     char text[64];
     PetscBool given, given_new;
 
-    /* both names of the step option work with every PETSc: -ts_time_step is the new one */
+    /* every PETSc accepts both names of the step option: -ts_time_step is the new one */
     PetscCall(PetscOptionsHasName(NULL, NULL, "-ts_dt", &given));
     PetscCall(PetscOptionsGetString(NULL, NULL, "-ts_time_step", text, sizeof(text), &given_new));
     if (given_new && !given) PetscCall(PetscOptionsSetValue(NULL, "-ts_dt", text));
@@ -180,7 +180,7 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The method behind a preset. */
+/* Fills the parameters of a preset's method. */
 static void method_settings(SbRun run, SbMethodSettings *set)
 {
   *set =
@@ -210,7 +210,7 @@ static void method_settings(SbRun run, SbMethodSettings *set)
   }
 }
 
-/* The eigenvalue of generalized-alpha for an undamped oscillator of the frequency w, h = 1, that is next to exp(i w): with (u, v, a) growing by z a
+/* Eigenvalue z of generalized-alpha for an undamped oscillator of frequency w, h = 1, nearest to exp(i w): with (u, v, a) multiplied by z per
    step, (1 - alpha_m + alpha_m z) (z - 1)^2 + w^2 (1 - alpha_f + alpha_f z) (1 - gamma + gamma z + (1/2 - beta + beta z) (z - 1)) = 0. */
 static double complex alpha_eigenvalue(const SbMethodSettings *s, double w)
 {
@@ -250,14 +250,14 @@ void SbRunLocalError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead)
     z = 1 + I * w;
     break;
   default:
-    z = cexp(2 * I * asin(w / 2)); /* of the central differences that it is */
+    z = cexp(2 * I * asin(w / 2)); /* the method is central differences */
     *order = 2;
     *ahead = 0.5;
   }
   *c = (PetscReal)(cabs(z - cexp(I * w)) / pow(w, (double)*order + 1));
 }
 
-/* Newton on nonlinear models, one linear solve on linear ones; tolerances that hold in any unit system. */
+/* SNES: Newton for nonlinear models, one linear solve for linear ones; tolerances independent of units. */
 static PetscErrorCode set_up_snes(SbRun run)
 {
   SbModel m = run->model;
@@ -265,14 +265,14 @@ static PetscErrorCode set_up_snes(SbRun run)
   PetscBool asked;
 
   PetscFunctionBeginUser;
-  /* rounding of the internal forces: below 1e-13 of (stress modulus) x (area of the body) no residual is meaningful; near
-     nu = 1/2 it is the pressure that rounds, lambda times the last digit of the change of volume */
+  /* rounding of the internal forces: residuals below 1e-13 of (stress modulus) x (area of the body) are meaningless; near
+     nu = 1/2 the modulus is lambda, as the pressure is lambda times the rounding error of the change of volume */
   for (PetscInt b = 0; b < m->nbody; b++) {
     const SbMaterial law = m->material[b];
 
     force += (law->E + 0.01 * law->ops.volumetric_modulus(law)) * PetscPowReal(m->body[b].volume, 2. / 3.);
   }
-  /* a line search of PETSc's comes with PETSc's loop, and TSALPHA2 has stages of its own */
+  /* PETSc's line searches need PETSc's Newton loop, and TSALPHA2 has its own stages */
   PetscCall(PetscOptionsHasName(NULL, NULL, "-snes_linesearch_type", &asked));
   PetscCall(SNESSetType(run->snes, m->linear                                ? SNESKSPONLY
                                    : asked || run->preset == SB_TIME_ALPHA2 ? SNESNEWTONLS
@@ -285,10 +285,10 @@ static PetscErrorCode set_up_snes(SbRun run)
 }
 
 /*
-  Newton's linear solves are as accurate as its progress needs (Eisenstat and Walker), unless the user sets a tolerance.
+  Tolerance of Newton's linear solves by its progress (Eisenstat and Walker), unless the user sets a tolerance.
 
-  In a static run whose forces have a part of the tangent beside the matrix (the free rim of a follower pressure), a factor is no exact solve, and
-  a residual that changes of volume make says nothing about bending: with loose solves Newton's method converges linearly near nu = 1/2.
+  In a static run where the matrix lacks a part of the tangent (the free rim of a follower pressure), a factorisation is no exact solve, and
+  changes of volume dominate the residual over bending: with loose solves Newton's method converges only linearly near nu = 1/2.
 */
 static PetscErrorCode forcing_terms(SNES snes, SbModel m)
 {
@@ -315,7 +315,7 @@ static PetscErrorCode step_accepted(TS ts, PetscInt step, PetscReal t, Vec U, vo
 
   PetscFunctionBeginUser;
   (void)U;
-  /* TSSolve calls once more, with step -1, when it has interpolated */
+  /* TSSolve calls monitors again after an interpolation, with step -1 */
   if (step < 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(TSGetSNESIterations(ts, &newton));
   PetscCall(TSGetKSPIterations(ts, &linear));
@@ -331,7 +331,7 @@ static PetscErrorCode step_accepted(TS ts, PetscInt step, PetscReal t, Vec U, vo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Twice the largest distance of a node from the middle of its body, m: like the length, but of no direction. */
+/* Twice the largest distance of a node from the centre of its body, m: a size independent of orientation. */
 static PetscErrorCode largest_body(SbModel m, PetscReal *size)
 {
   SbSpace s = m->space;
@@ -390,7 +390,7 @@ static PetscErrorCode set_up_ts(SbRun run)
   } else
     PetscCall(TSSetType(run->ts, SB_TS_SECOND_ORDER));
 
-  /* displacement error per step that adaptive runs allow, relative to the size of the bodies: unit-free */
+  /* allowed displacement error per step of adaptive runs, over the size of the bodies: independent of units */
   PetscCall(TSGetAdapt(run->ts, &adapt));
   PetscCall(TSAdaptSetType(adapt, TSADAPTNONE));
   PetscCall(largest_body(m, &size));
@@ -399,18 +399,18 @@ static PetscErrorCode set_up_ts(SbRun run)
   PetscCall(TSSetExactFinalTime(run->ts, TS_EXACTFINALTIME_MATCHSTEP));
   PetscCall(TSSetErrorIfStepFails(run->ts, PETSC_FALSE));
 
-  /* solvers; PETSc's own options go over all that is set so far */
+  /* solvers; PETSc's own options override all settings so far */
   PetscCall(TSGetSNES(run->ts, &run->snes));
   PetscCall(set_up_snes(run));
   PetscCall(SbSolverSetUp(run->snes, m->space, run->solver_used));
-  /* read already, and set below */
+  /* it has been read, and is set below */
   if (SB_TS_DT_RENAMED) PetscCall(PetscOptionsClearValue(NULL, "-ts_dt"));
   PetscCall(TSSetFromOptions(run->ts));
   PetscCall(SbSolverFinish(run->snes, m->space, run->solver_used, run->J));
   PetscCall(SbNewtonSetRun(run->snes, run));
   PetscCall(forcing_terms(run->snes, run->model));
 
-  /* the end and the length of steps; their monitors */
+  /* end time and step length; monitors */
   PetscCall(TSSetMaxTime(run->ts, run->t_end));
   PetscCall(TSSetTimeStep(run->ts, run->dt));
   PetscCall(TSMonitorSet(run->ts, step_accepted, run, NULL));
@@ -426,7 +426,7 @@ static PetscErrorCode set_up_ts(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What barrier contact needs: a potential, our own Newton method, and no contact with another response. */
+/* Errors unless barrier contact has its potential, SB_SNES_NEWTON, and no contact with another response beside it. */
 static PetscErrorCode check_barrier(SbRun run)
 {
   const SbModel m = run->model;
@@ -452,7 +452,7 @@ static PetscErrorCode check_barrier(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What contact needs: several solves in a step, and a matrix that can be projected. */
+/* Errors unless contact has several solves per step and, where needed, a matrix that can be projected. */
 static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
 {
   const SbModel m = run->model;
@@ -471,7 +471,7 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
     "The effect %s needs several solves in a step: use -time euler_implicit, newmark, genalpha or static",
     name);
   if (run->preset == SB_TIME_NEWMARK) {
-    /* What contact with Newmark rests on (newmark_contact.c): the trapezoidal rule, the lumped mass, and forces of what is constrained alone. */
+    /* contact with Newmark (newmark_contact.c) needs the trapezoidal rule, the lumped mass, and forces on constrained nodes only */
     PetscCheck(run->newmark[0] == 0.25 && run->newmark[1] == 0.5, m->comm, PETSC_ERR_USER_INPUT,
                "-time newmark with the effect %s needs -time_newmark_beta 0.25 and -time_newmark_gamma 0.5, "
                "not %g and %g: else impacts may gain energy",
@@ -522,7 +522,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
   PetscCheck(m->dynamic || !SbLiveCount(), m->comm, PETSC_ERR_USER_INPUT,
              "-effect_<name>_... live: interactive values need a time, and -time static has "
              "none: choose -time euler_implicit, newmark or genalpha");
-  if (!m->dynamic) m->load = run->t0; /* a static run begins without loads and prescribed displacements */
+  if (!m->dynamic) m->load = run->t0; /* a static run starts with load factor t0 */
   PetscCall(SbModelInitialState(m, run->U, run->V));
   if (run->arc.on) {
     PetscCall(SbSpaceCreateVec(m->space, &run->path));
@@ -533,7 +533,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
   PetscCall(PetscStrncpy(run->solver, run->solver_used->name, sizeof(run->solver)));
   PetscCall(check_contact(run, explicit));
 
-  /* the solver of systems with contact, for the header */
+  /* the solver for barrier contact, for the log's header */
   if (m->npotential) {
     PetscCall(SbContactSystemDescribe(run->contact_choice, reason, sizeof(reason)));
     SbAppend(sizeof(run->solver_reason), run->solver_reason, "; %s", reason);
@@ -544,7 +544,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
     SbAppend(sizeof(run->solver_reason), run->solver_reason, "; %s", reason);
   }
 
-  /* the matrix, and the operator of solves with constraints outside it */
+  /* the matrix, and the operator for constraints outside of it */
   if (!explicit) {
     PetscCall(SbSolverCreateOperator(m->space, run->solver_used, &run->J));
     if (m->nnonsymmetric)
@@ -590,7 +590,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
       PetscCall(PetscStrncpy(run->solver, run->solver_parts, sizeof(run->solver)));
   }
 
-  /* one solve per step from the velocity predictor, with a tangent that may be softer than the forces: no bound on the energy (docs/reference/theory.md) */
+  /* one solve per step from the velocity predictor, with a tangent that may be too soft: no bound on the energy (docs/reference/theory.md) */
   if (run->velocity_predictor && !run->model->linear && run->snes) {
     PetscCall(PetscObjectTypeCompare((PetscObject)run->snes, SNESKSPONLY, &single));
     for (PetscInt r = 0; r < s->nregion; r++)
@@ -615,7 +615,7 @@ PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* PETSc's own integrators fail without a message. */
+/* Sets the reason of a failure of PETSc's own integrators, which give none. */
 static PetscErrorCode explain_failure(SbRun run)
 {
   TSConvergedReason reason;
@@ -637,7 +637,7 @@ static PetscErrorCode explain_failure(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Warns of effects whose time is before or after the run. */
+/* Warns of effects that act only before or after the run. */
 static PetscErrorCode warn_of_idle_effects(SbRun run)
 {
   const char *unit = run->model->dynamic ? " s" : "";

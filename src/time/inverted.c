@@ -1,7 +1,7 @@
 /*
-  Whether a step inverted tets, for runs with -time_inverted reject.
+  Rejects steps that invert tets, with -time_inverted reject.
 
-  det F <= 0 in a tet is no deformation of a body. Where energies are finite there a run could continue, with meaningless
+  det F <= 0 in a tet is not an admissible deformation. With laws of finite energy a run could continue, with meaningless
   results. A step that increases the number of such tets is rejected, so inverted initial states may recover. It is repeated with half its
   length; below 2^-time_max_halvings of the nominal length the run stops: shorter steps would only approach the flat tet.
 */
@@ -20,7 +20,7 @@ PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const V
     PetscReal energy, volume;
     const PetscReal *u;
 
-    /* Tets with det F <= 0 of all ranks, and the smallest det F. */
+    /* number of tets with det F <= 0, all ranks, and the smallest det F */
     PetscCall(SbSpaceGetLocalRead(s, U[k], &u));
     SbSpaceStrainEnergy(s, u, NULL, &energy, &least[k], &n[k], &volume);
     PetscCall(SbSpaceRestoreLocalRead(s, U[k], &u));

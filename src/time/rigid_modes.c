@@ -1,24 +1,24 @@
 /*
-  Free rigid motions: whether a part of a body can move rigidly without any force, which makes a static problem singular. Shorter load
-  steps do not help then.
+  Rigid-body modes without resistance (free motions) of a part of a body, which make a static problem singular, for any length of the load
+  steps.
 
   A part is a set of nodes that are connected by cells, Z its six rigid motions, P the projection onto admissible displacements
   (SbSpaceProjectAdmissible()). Two eigenvalue problems of size six decide:
 
-  1. (Z - P Z)^T (Z - P Z) x = l Z^T Z x. The motion Z x is admissible where l is zero but for rounding: geometry alone, no stiffness.
+  1. (Z - P Z)^T (Z - P Z) x = l Z^T Z x. The motion Z x is admissible if l is zero up to rounding: geometry only, no stiffness.
   2. (P Z x)^T A (P Z x) y = l (P Z x)^T D (P Z x) y of the admissible motions, A the operator of the last solve, D the diagonal of its
-     matrix. Where l is zero but for rounding neither springs nor friction nor stress resist: the motion is free.
+     matrix. If l is zero up to rounding neither springs nor friction nor stress resist: the motion is free.
 
-  Not found: parts that are free only together, joined by contact; a part on springs whose stiffness is rounding beside that of its
-  cells.
+  Not found: parts that are free only together, connected by contact. A part on springs so soft that their stiffness is within the rounding of that of its
+  cells counts as free.
 */
 #include "sbgeometry.h"
 #include "time_impl.h"
 #include <petscblaslapack.h>
 
-#define ALLOWED 1e-13 /* part of its square that a motion may lose by rounding */
-#define FREE 1e-13    /* of the cells' stiffness: rounding of sums over the nodes leaves 1e-15 */
-#define FAR 1e6       /* times its size: a body that went so far in a static run was not constrained */
+#define ALLOWED 1e-13 /* largest l of an admissible motion: rounding */
+#define FREE 1e-13    /* largest l of a free motion: sums over the nodes have rounding of 1e-15 */
+#define FAR 1e6       /* displacement over the body's size beyond which a static system was singular */
 
 /* ------------------------------------------------------------------ connected parts */
 
@@ -38,7 +38,7 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
     if (s->dirichlet_node && s->dirichlet_node[k] >= 0)
       (void)SbUnionJoin(parent, s->cell_node[k], s->dirichlet_node[k]);
   }
-  /* cells of dg have nodes of their own: they are joined across faces; those of P2 at edges follow */
+  /* the cells of DG have separate nodes: united across faces; edge nodes of P2 follow */
   for (PetscInt i = 0; s->edge_node && i < 6 * s->mesh->ncell; i++) {
     if (s->edge_node[i] >= 0) (void)SbUnionJoin(parent, s->cell_node[4 * (i / 6)], s->edge_node[i]);
   }
@@ -50,7 +50,7 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
     }
   }
 
-  /* the lowest number of a part that several ranks share: exchanged with the owners until it does not change */
+  /* the lowest number in parts on several ranks: exchanged with the owners until it does not change */
   for (PetscInt i = 0; i < s->nnode; i++) lowest[i] = s->gnode[i];
   PetscCall(PetscCalloc1(3 * s->nnode, &all));
   while (changed) {
@@ -77,7 +77,7 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The labels of all parts, ascending, alike on all ranks. The caller frees them. */
+/* The labels of all parts, ascending, the same on all ranks. The caller frees them. */
 static PetscErrorCode list_parts(SbSpace s, const PetscInt label[], PetscInt *npart, PetscInt **part)
 {
   PetscInt *own, mine = 0;
@@ -95,15 +95,16 @@ static PetscErrorCode list_parts(SbSpace s, const PetscInt label[], PetscInt *np
 
 /* ------------------------------------------------------------------ rigid motions */
 
-/* A part and its free motions. */
+/* A part of a body and its free motions. */
 typedef struct {
   PetscInt label, body;
-  PetscReal centre[3], size; /* of its nodes, m */
-  PetscInt nfree;            /* free motions */
-  PetscReal motion[6]; /* one of them: along the axes, m, and about axes through the centre, rad times size */
+  PetscReal centre[3], size; /* centre and size of its nodes, m */
+  PetscInt nfree;            /* number of free motions */
+  PetscReal motion
+    [6]; /* one of them: displacements along the axes, m; rotations about axes through the centre times size, m */
 } Part;
 
-/* Coordinate of a node in the state of the tangent: the rest state with linear laws. */
+/* Coordinate of a node in the configuration of the tangent: the reference configuration for linear laws. */
 static inline PetscReal coordinate(SbSpace s, const PetscScalar u[], PetscInt k)
 {
   return s->node_x[k] + (s->linear ? 0. : u[k]);
@@ -113,7 +114,7 @@ static inline PetscReal coordinate(SbSpace s, const PetscScalar u[], PetscInt k)
 static PetscErrorCode measure(SbRun run, const PetscInt label[], Part *part)
 {
   SbSpace s = run->model->space;
-  PetscReal sum[6] = {0.}; /* nodes, coordinates, squares, body */
+  PetscReal sum[6] = {0.}; /* sums: nodes, coordinates, squares, body */
   const PetscScalar *u;
 
   PetscFunctionBeginUser;
@@ -137,7 +138,7 @@ static PetscErrorCode measure(SbRun run, const PetscInt label[], Part *part)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Eigenvalues of E x = value M x, n <= 6, ascending; their vectors, M-orthonormal, into the columns of E. ok: M is definite. */
+/* Eigenvalues of E x = value M x, n <= 6, ascending; M-orthonormal eigenvectors in the columns of E. ok: M is definite. */
 static PetscErrorCode eigen(PetscInt n, PetscReal E[36], PetscReal M[36], PetscReal value[6], PetscBool *ok)
 {
   PetscBLASInt one = 1, six = 6, m, lwork = 64, info = 0;
@@ -150,7 +151,7 @@ static PetscErrorCode eigen(PetscInt n, PetscReal E[36], PetscReal M[36], PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Admissible motions of a part (problem 1): *n of them, coefficients of the six in the columns of x. Z becomes Z - P Z. */
+/* Admissible motions of a part (problem 1): their number *n, coefficients of the six motions in the columns of x. Z becomes Z - P Z. */
 static PetscErrorCode find_admissible(Vec Z[6], Vec z[6], PetscInt *n, PetscReal x[36])
 {
   PetscReal M[36], value[6];
@@ -166,7 +167,7 @@ static PetscErrorCode find_admissible(Vec Z[6], Vec z[6], PetscInt *n, PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* With several free motions a message is plainest with one along or about an axis: the first such one, if any. lost: Z - P Z. */
+/* Of several free motions the message describes the first one along or about an axis, if any. lost: Z - P Z. */
 static PetscErrorCode choose_axis(SbRun run, Vec d, Vec lost[6], Vec z[6], Part *part)
 {
   PetscReal off, on, stiffness, size;
@@ -207,7 +208,7 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
     const PetscScalar *u;
     PetscScalar *to;
 
-    /* Motion k = 0..2: along an axis, 3..5: about one through the centre; z: its admissible part. */
+    /* motion k = 0..2: translation along an axis, 3..5: rotation about one through the centre; z: its admissible part */
     PetscCall(VecZeroEntries(Z[k]));
     PetscCall(VecGetArrayRead(run->U, &u));
     PetscCall(VecGetArray(Z[k], &to));
@@ -256,7 +257,7 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
                         "part of body %s: softest of %" PetscInt_FMT " motions %g of the cells' stiffness\n",
                         run->model->body[part->body].name, n, ok ? (double)value[0] : -1.));
 
-    /* the softest one in terms of the six */
+    /* coefficients of the softest one */
     for (int c = 0; c < 6 && part->nfree; c++) {
       part->motion[c] = 0.;
       for (PetscInt i = 0; i < n; i++) part->motion[c] += E[i] * x[6 * i + c];
@@ -305,7 +306,7 @@ static PetscErrorCode describe_motion(const Part *part, size_t size, char text[]
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   direction(w, e);
-  /* t + w / size x (p - centre) has no part across w there */
+  /* point where t + w / size x (p - centre) has no component normal to w */
   for (int c = 0; c < 3; c++) {
     p[c] =
       part->centre[c] + part->size * (w[(c + 1) % 3] * t[(c + 2) % 3] - w[(c + 2) % 3] * t[(c + 1) % 3]) / w2;
@@ -317,7 +318,7 @@ static PetscErrorCode describe_motion(const Part *part, size_t size, char text[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Appends further free motions, which of several parts it is, and a hint for elements with nodes at centres of facets. */
+/* Appends the number of further free motions, which of several parts it is, and a hint for elements with nodes at centroids of facets. */
 static PetscErrorCode describe_part(SbRun run, const PetscInt label[], const Part *part, PetscInt nbrother,
                                     size_t size, char text[])
 {
@@ -332,7 +333,7 @@ static PetscErrorCode describe_part(SbRun run, const PetscInt label[], const Par
     SbAppend(size, text, " (one of its %" PetscInt_FMT " parts, around (%.4g, %.4g, %.4g) m)", nbrother,
              (double)part->centre[0], (double)part->centre[1], (double)part->centre[2]);
   }
-  /* one or two constrained facets of cr or dg leave rotations free */
+  /* one or two constrained facets of CR or DG leave rotations free */
   for (PetscInt k = 0; k < s->nfixed; k++) {
     if (s->fixed_node[k] < s->nnode_owned && label[s->fixed_node[k]] == part->label) nfixed[0]++;
   }
@@ -356,7 +357,8 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
   PetscFunctionBeginUser;
   *body = -1;
   PetscCall(MatHasOperation(run->J, MATOP_GET_DIAGONAL, &diagonal));
-  if (!diagonal) PetscFunctionReturn(PETSC_SUCCESS); /* -solver realtime, which is for dynamic runs */
+  if (!diagonal)
+    PetscFunctionReturn(PETSC_SUCCESS); /* -solver realtime has no diagonal, and is for dynamic runs only */
 
   /* the first part with a free motion */
   PetscCall(SbSpaceCreateVec(run->model->space, &d));

@@ -1,5 +1,5 @@
 /*
-  The TSType of the second-order integrators, with n unknowns, one residual and one tangent per linear solve.
+  The TSType of the second-order integrators, with the n displacements as unknowns.
 
   The unknown of a step is the end displacement u1; with s = u1 - u0
     generalized-alpha (Chung and Hulbert 1993; fractions of the new state as in PETSc's TSALPHA2)
@@ -7,18 +7,18 @@
       F(t0 + alpha_f h, u0 + alpha_f s, v0 + alpha_f (v1 - v0), a0 + alpha_m (a1 - a0)) = 0
     Newmark: alpha_m = alpha_f = 1
     implicit Euler: v1 = s / h, a1 = (v1 - v0) / h (it is not a Newmark method)
-  Newmark with contact: a0 is the acceleration without it, newmark_contact.c describes the rest
-  Barrier contact: its force f = -dB/du is that at the end of the step, the only state known to be free of collisions; generalized-alpha adds it there. In Newmark's
+  Newmark with contact: newmark_contact.c; a0 is the acceleration without contact
+  Barrier contact: its force f = -dB/du is evaluated at the end of the step, the only state known to be free of collisions. In Newmark's
   method, where the mean of both ends would gain energy, it is implicit (Kane, Repetto, Ortiz and Marsden 1999), with a the acceleration without contact, which is stored:
     u1 = u0 + h v0 + h^2 ((1/2 - beta) a0 + beta a1) + h^2/2 M^-1 f,  v1 = v0 + h ((1 - gamma) a0 + gamma a1) + h M^-1 f
-  Its formula for a1 then gives a1 + M^-1 f / (2 beta), the residual that is solved has -f / (2 beta), and damping has the velocity 2 (u1 - u0) / h - v0. The work of the impulse h f
+  Newmark's formula for a1 then gives a1 + M^-1 f / (2 beta), the residual contains -f / (2 beta), and damping the velocity 2 (u1 - u0) / h - v0. The work of the impulse h f
   over u1 - u0 is at most the decrease of B, as B is convex: contact only dissipates.
   and, with a0 = M^-1 (f(t0, u0, v0)),
     explicit Euler: u1 = u0 + h v0, v1 = v0 + h a0;  symplectic Euler: v1 = v0 + h a0, u1 = u0 + h v1.
 
-  The acceleration is state (run->A): nothing is recovered from differences, so a restart continues exactly.
-  A step may be repeated up to the first time of impact, once; the remainder is the next step (src/time/contact.c).
-  A step whose solve fails is halved and repeated; after four good steps it doubles, until the nominal length is back. The local error for TSAdapt
+  The acceleration is part of the state (run->A), so a restart continues exactly.
+  A step may be repeated once, up to the first time of impact; the remainder is the next step (src/time/contact.c).
+  A step whose solve fails is halved and repeated; after four good steps its length doubles, up to the nominal one. The local error for TSAdapt
   is h^2 (beta - 1/6) (a1 - a0) (Zienkiewicz and Xie 1991), for implicit Euler h^2/2 a1.
 
   petsc/private/tsimpl.h: PETSc has no public way to write a TSType.
@@ -26,21 +26,21 @@
 #include <petsc/private/tsimpl.h>
 #include "time_impl.h"
 
-#define SHORTEST 1e-9 /* of the nominal length: a step that fails below that ends the run */
+#define SHORTEST 1e-9 /* shortest step over the nominal one; a failure below that ends the run */
 
 typedef struct {
   SbRun run;
   SbMethodSettings set;
-  Vec X0, V0, X1, V1, A1; /* state at the start of the step; end of the step */
-  Vec own0, own1; /* Newmark with contact: accelerations without it, at the start and at the end; else NULL */
+  Vec X0, V0, X1, V1, A1; /* state at the start of the step; state at its end */
+  Vec own0, own1; /* Newmark with contact: accelerations without contact at start and end; else NULL */
   Vec Xa, Va, Aa; /* stage of generalized-alpha; NULL when the stage is the end */
   Vec work;
-  PetscReal rest;    /* remaining length of a step that was cut at a time of impact, s; 0: none */
-  PetscReal whole;   /* length before the cut, s: the remainder ends at the original time */
+  PetscReal rest;    /* length of the remainder of a step after a time of impact, s; 0: none */
+  PetscReal whole;   /* length of the step before its division, s: the remainder ends at the original time */
   PetscBool started; /* run->A holds the acceleration of the current state */
 } SecondOrder;
 
-/* v1 and a1 that belong to the end displacement X. */
+/* Computes v1 and a1 from the end displacement X. */
 static PetscErrorCode end_state(TS ts, Vec X)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
@@ -65,7 +65,7 @@ static PetscErrorCode end_state(TS ts, Vec X)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lends the three vectors at which the equation is evaluated. */
+/* Borrows the three vectors at which the equation is evaluated. */
 static PetscErrorCode stage_state(TS ts, Vec X, PetscReal *t, Vec *U, Vec *V, Vec *A)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
@@ -90,7 +90,7 @@ static PetscErrorCode stage_state(TS ts, Vec X, PetscReal *t, Vec *U, Vec *V, Ve
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Divided by alpha_f, so that the stiffness enters the tangent with factor one. */
+/* Divided by alpha_f, so that the factor of the stiffness in the tangent is one. */
 static PetscErrorCode SNESTSFormFunction_SecondOrder(SNES snes, Vec X, Vec F, TS ts)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
@@ -125,7 +125,7 @@ static PetscErrorCode SNESTSFormJacobian_SecondOrder(SNES snes, Vec X, Mat J, Ma
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets X1 to the initial guess, with prescribed values of the end time in place. */
+/* Sets X1 to the initial guess, with the prescribed values of the end time. */
 static PetscErrorCode predict(void *ctx)
 {
   const TS ts = (TS)ctx;
@@ -137,7 +137,7 @@ static PetscErrorCode predict(void *ctx)
   PetscCall(VecCopy(so->X0, so->X1));
   if (so->run->velocity_predictor) PetscCall(VecAXPY(so->X1, ts->time_step, so->V0));
   PetscCall(SbModelPrescribe(so->run->model, ts->ptime + ts->time_step, so->X1));
-  /* one linear solve per step, warm-started: the update (X <- X - Y) begins as that of free flight */
+  /* one linear solve per step: the update (X <- X - Y) has free flight as initial guess */
   PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, SNESKSPONLY, &single));
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(KSPGetInitialGuessNonzero(ksp, &warm));
@@ -155,7 +155,7 @@ static PetscErrorCode predict(void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves for the end displacement X, from the one that it holds. */
+/* Solves for the end displacement X, which holds the initial guess. */
 static PetscErrorCode solve(void *ctx, Vec X, SNESConvergedReason *reason)
 {
   const TS ts = (TS)ctx;
@@ -183,7 +183,7 @@ static PetscErrorCode contact_residual(void *ts, Vec X, Vec R)
   PetscFunctionBeginUser;
   PetscCall(stage_state((TS)ts, X, &t, &U, &V, &A));
   PetscCall(SbModelResidual(so->run->model, t, U, V, A, PETSC_FALSE, R));
-  /* Newmark weights the contact force of the end by two, that of the start by zero */
+  /* Newmark multiplies the contact force at the end by two, that at the start by zero */
   PetscCall(VecScale(R, so->set.impulses ? 0.5 : 1. / so->set.alpha_f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -197,7 +197,7 @@ static SbSolvedStep solved_step(TS ts)
                         so->V1,    so->A1,        (PetscBool)!SbRunIsExplicit(so->run)};
 }
 
-/* Barrier contact: the velocity has its impulse, the acceleration is without it. */
+/* Barrier contact: adds its impulse to the velocity, and removes it from the acceleration. */
 static PetscErrorCode separate_contact(TS ts)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
@@ -219,7 +219,7 @@ static PetscErrorCode separate_contact(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Velocity and acceleration of the end. */
+/* Computes velocity and acceleration at the end. */
 static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedStep *step, PetscBool *ok)
 {
   const TS ts = (TS)ctx;
@@ -255,7 +255,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The explicit rules need no solver. */
+/* The explicit methods need no solver. */
 static PetscErrorCode step_explicitly(void *ctx, Vec X, SNESConvergedReason *reason)
 {
   const TS ts = (TS)ctx;
@@ -287,7 +287,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
 
   PetscFunctionBeginUser;
 
-  /* a restarted run brings its acceleration along: that of generalized-alpha does not follow from the state */
+  /* a restarted run has its acceleration: that of generalized-alpha does not follow from the other state */
   if (!so->started && so->run->step0 == 0 && so->set.method != SB_METHOD_EULER_IMPLICIT)
     PetscCall(SbFormAcceleration(so->run, ts->ptime, ts->vec_sol, ts->vec_dot, so->run->A));
 
@@ -297,7 +297,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     PetscCall(SbNewmarkOwn(so->run, ts->ptime, ts->vec_sol, ts->vec_dot, so->run->A, so->own0));
   so->started = PETSC_TRUE;
 
-  /* the state of the start, to which a step that is rejected returns */
+  /* copy the initial state, to which a rejected step returns */
   PetscCall(VecCopy(ts->vec_sol, so->X0));
   PetscCall(VecCopy(ts->vec_dot, so->V0));
   so->run->stage = so->Xa;
@@ -308,7 +308,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     PetscBool fixed;
     PetscReal next, h;
 
-    /* an attempt */
+    /* one attempt */
     so->run->may_end_at_impact = (PetscBool)(so->run->model->ntime_of_impact && !cuts && so->whole == 0.);
     so->run->time_of_impact = 1.;
     attempt.t = ts->ptime;
@@ -318,7 +318,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
       PetscCall(VecCopy(so->X1, ts->vec_sol));
       PetscCall(VecCopy(so->V1, ts->vec_dot));
 
-      /* back towards the nominal length when four steps after a cut went well */
+      /* return to the nominal length: double it after four steps without halving */
       PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &fixed));
       h = fixed && so->run->good_steps >= 3 ? PetscMin(2. * ts->time_step, so->run->dt) : ts->time_step;
       if (fixed && so->whole > 0.) h = so->rest > 0. ? so->rest : so->whole;
@@ -331,7 +331,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
         ts->time_step = next;
         so->run->stop_reason[0] = 0;
 
-        /* a cut step, or its remainder, was accepted */
+        /* a step up to an impact, or its remainder, was accepted */
         if (so->rest > 0.)
           so->rest = 0.;
         else
@@ -339,7 +339,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
         break;
       }
     } else if (!so->run->rejected_inverted && so->run->time_of_impact < 1.) {
-      /* the step is repeated up to the time of impact, the next one is the remainder */
+      /* repeat the step up to the time of impact; the next one is the remainder */
       next = so->run->time_of_impact * ts->time_step;
       so->whole = ts->time_step;
       so->rest = ts->time_step - next;
@@ -355,7 +355,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     ts->reject++;
     so->run->rejected_total++;
     so->run->good_steps = 0;
-    // steps that succeed in between may be halved without end, until t + h is t
+    // bounds the number of halvings, also when steps in between succeed
     if (SbRunIsExplicit(so->run) || so->run->stopped || ++cuts > so->run->max_halvings ||
         next < SHORTEST * so->run->dt || SbRunTooShort(so->run, next)) {
       ts->reason = TS_DIVERGED_STEP_REJECTED;
@@ -375,7 +375,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* order: power of h with which the error of one step falls. */
+/* order: power of h in the error of one step. */
 static PetscErrorCode TSEvaluateWLTE_SecondOrder(TS ts, NormType type, PetscInt *order, PetscReal *wlte)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
@@ -401,7 +401,7 @@ static PetscErrorCode TSEvaluateWLTE_SecondOrder(TS ts, NormType type, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Cubic through both ends; t lies in the last step. */
+/* Cubic Hermite interpolation between both ends; t lies in the last step. */
 static PetscErrorCode TSInterpolate_SecondOrder(TS ts, PetscReal t, Vec X)
 {
   SecondOrder *so = (SecondOrder *)ts->data;

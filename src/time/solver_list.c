@@ -1,31 +1,31 @@
 /*
-  Fallback solvers: after a linear solve that fails, the next solver of a list (SbSolverNextFallback()) solves the same system, in the same
-  Newton iteration, and stays for the rest of the run. Only when the last one fails is the step cut.
+  Fallback solvers: after a failed linear solve the next solver of a list (SbSolverNextFallback()) solves the same system, in the same
+  Newton iteration, and is used for the rest of the run. Only if the last one fails is the step halved.
 
-  The fallback is the post-solve callback of the KSP. The KSP remains the same object, with another type, another preconditioner and, where
-  the next solver needs another kind of matrix, another operator, assembled at Newton's iterate.
+  A post-solve callback of the KSP does this. The KSP object is kept, with another type, another preconditioner and, if
+  the next solver needs another matrix type, another operator, assembled at Newton's iterate.
 
   Not replaced: solvers that the user chose by -ksp_type or -pc_type; factorisations of the saddle-point system of contact; solves along
-  an arc length; static systems with a free rigid motion (rigid_modes.c), which are singular; exact tangents that Newton's method will filter
+  an arc length; static systems with a free rigid motion (rigid_modes.c), which are singular; exact tangents that Newton's method will project
   (newton.c).
 
-  petsc/private/kspimpl.h: the reason and the iterations of a solve and the callback that was set before have no public access.
+  petsc/private/kspimpl.h: there is no public access to the reason and iterations of a solve, nor to the previous callback.
 */
 #include "sbsolver.h"
 #include "time_impl.h"
 #include <petsc/private/kspimpl.h>
 
-#define RATIO 1e4    /* of Young's moduli: a larger one is named as a cause */
-#define NU_HARD 0.45 /* Poisson's ratio from which on it is named as a cause */
+#define RATIO 1e4    /* ratio of Young's moduli above which it is named as a cause */
+#define NU_HARD 0.45 /* Poisson's ratio above which it is named as a cause */
 
 typedef struct _p_SbSolverList *SbSolverList;
 struct _p_SbSolverList {
   SbRun run;
-  PetscBool own;  /* the solver is of the table, not the user's: it may be replaced */
-  uint32_t tried; /* rows of the table that failed */
-  PetscErrorCode (*before)(KSP, Vec, Vec, void *); /* the callback that was set before; NULL: none */
+  PetscBool own;                                   /* the solver is one of the presets, and may be replaced */
+  uint32_t tried;                                  /* bits of the presets that failed */
+  PetscErrorCode (*before)(KSP, Vec, Vec, void *); /* the previous post-solve callback; NULL: none */
   void *before_ctx;
-  PetscBool again; /* within the solve of a fallback */
+  PetscBool again; /* a fallback is solving */
   char failures[384];
 };
 
@@ -41,7 +41,7 @@ static PetscErrorCode attach(SbSolverList l, KSP ksp)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Describes the failure in text and appends it to l->failures: "DIVERGED_ITS of cg after 5000 iterations, ...". memory: out of it. */
+/* Describes the failure in text and appends it to l->failures: "DIVERGED_ITS of cg after 5000 iterations, ...". memory: it was out of memory. */
 static PetscErrorCode describe_failure(SbSolverList l, KSP ksp, Vec b, Vec x, char text[], size_t size,
                                        PetscBool *memory)
 {
@@ -76,7 +76,7 @@ static PetscErrorCode describe_failure(SbSolverList l, KSP ksp, Vec b, Vec x, ch
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the solver may be replaced, and another one can succeed: *is. */
+/* *is: the solver may be replaced, and another one can succeed. */
 static PetscErrorCode may_replace(SbSolverList l, KSP ksp, Vec b, PetscBool *is)
 {
   SbRun run = l->run;
@@ -88,7 +88,7 @@ static PetscErrorCode may_replace(SbSolverList l, KSP ksp, Vec b, PetscBool *is)
 
   PetscFunctionBeginUser;
   *is = PETSC_FALSE;
-  /* a solver of the table, in Newton's method, with a finite right-hand side */
+  /* conditions: a preset, in Newton's method, with a finite right-hand side */
   PetscCall(PetscObjectTypeCompareAny((PetscObject)run->snes, &newton, SB_SNES_NEWTON, SNESNEWTONLS,
                                       SNESKSPONLY, ""));
   PetscCall(SNESGetSolution(run->snes, &X));
@@ -103,7 +103,7 @@ static PetscErrorCode may_replace(SbSolverList l, KSP ksp, Vec b, PetscBool *is)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Turns the run's KSP into the solver `next`, with the tangent at Newton's iterate. */
+/* Changes the run's KSP to the solver `next`, with the tangent at Newton's iterate. */
 static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *next)
 {
   PetscErrorCode (*jacobian)(SNES, Vec, Mat, Mat, void *);
@@ -116,7 +116,7 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
   PC pc;
 
   PetscFunctionBeginUser;
-  /* the options of the old solver go, and what it left in the KSP but its tolerances */
+  /* remove the options of the old solver and its settings of the KSP, except tolerances */
   PetscCall(KSPGetTolerances(ksp, &rtol, &atol, NULL, NULL));
   PetscCall(SbSolverClear(old));
   PetscCall(KSPReset(ksp));
@@ -129,13 +129,13 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
   PetscCall(KSPSetConvergenceTest(ksp, KSPConvergedDefault, test, KSPConvergedDefaultDestroy));
   PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_FALSE));
 
-  /* another operator where `next` needs another kind of matrix */
+  /* another operator if `next` needs another matrix type */
   if (old->create || next->create || old->matrix != next->matrix) {
     SbSpace s = run->model->space;
 
     PetscCall(MatDestroy(&run->J));
     PetscCall(SbSolverCreateOperator(s, next, &run->J));
-    /* the nonsymmetric operator multiplies by run->J in any case */
+    /* the nonsymmetric operator multiplies by run->J anyway */
     if (!run->nonsymmetric.U) {
       Mat *whole = SbConstraintsSeparate(s) ? &run->whole : &run->operator;
 
@@ -150,7 +150,7 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
     PetscCall(SNESSetJacobian(run->snes, run->operator, run->J, NULL, NULL));
   }
 
-  /* the options of the new one, set up as at the start of a run */
+  /* the options of the new solver, set up as at the start of a run */
   run->solver_used = next;
   PetscCall(PetscStrncpy(run->solver, next->name, sizeof(run->solver)));
   PetscCall(SbSolverSetUp(run->snes, run->model->space, next));
@@ -159,7 +159,7 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
   PetscCall(KSPSetTolerances(ksp, rtol, atol, PETSC_DEFAULT, PETSC_DEFAULT));
   PetscCall(attach(l, ksp));
 
-  /* the tangent at Newton's iterate; one that was kept from an earlier step is of the old matrix */
+  /* the tangent at Newton's iterate, in the new matrix */
   run->tangent_known = PETSC_FALSE;
   PetscCall(SNESGetSolution(run->snes, &X));
   PetscCall(SNESGetJacobian(run->snes, NULL, NULL, &jacobian, &ctx));
@@ -178,7 +178,7 @@ static PetscErrorCode solve_again(SbSolverList l, KSP ksp, Vec b, Vec x)
 
   PetscFunctionBeginUser;
   PetscCall(VecZeroEntries(x));
-  /* the relative tolerance of this Newton step stays as it is (Eisenstat and Walker) */
+  /* keep the relative tolerance of this Newton step (Eisenstat and Walker) */
   PetscCall(SNESKSPGetUseEW(l->run->snes, &forcing));
   PetscCall(SNESKSPSetUseEW(l->run->snes, PETSC_FALSE));
   l->again = PETSC_TRUE;
@@ -200,19 +200,19 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
   PC pc;
 
   PetscFunctionBeginUser;
-  /* the callback that was set before may judge the solve as failed */
+  /* the previous callback may set the solve to failed */
   if (l->before) PetscCall((*l->before)(ksp, b, x, l->before_ctx));
   if (ksp->reason > 0) {
     if (!l->again) l->failures[0] = 0;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  /* Newton's method will filter the tangent and solve again */
+  /* Newton's method will project the tangent and solve again */
   if (run->model->space->tentative) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(describe_failure(l, ksp, b, x, text, sizeof(text), &memory));
 
-  /* first a simpler form of the same preconditioner, if it has one: its incomplete factorisation may have broken down */
+  /* first a simpler form of the same preconditioner, if any: its incomplete factorisation may have broken down */
   PetscCall(SbPCConstrainedGetInner(ksp->pc, &pc));
-  /* MINRES reports an indefinite matrix, or none of it, where the preconditioner is indefinite */
+  /* with an indefinite preconditioner MINRES fails with various reasons: report the preconditioner */
   reason = ksp->reason;
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPMINRES, &minres));
   if (minres && (reason == KSP_DIVERGED_INDEFINITE_MAT || reason == KSP_DIVERGED_ITS))
@@ -249,7 +249,7 @@ PetscErrorCode SbSolverListCreate(SbRun run)
   l->own = (PetscBool)!given;
   PetscCall(PetscOptionsHasName(NULL, NULL, "-pc_type", &given));
   l->own =
-    (PetscBool)(l->own && !given && !run->arc.on); /* the arc length needs the inertia of its factorisation */
+    (PetscBool)(l->own && !given && !run->arc.on); /* arc length needs the inertia from its factorisation */
   PetscCall(SNESGetKSP(run->snes, &ksp));
   PetscCall(attach(l, ksp));
   run->solver_list = l;
@@ -284,7 +284,7 @@ PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[])
   PetscInt nsliver = 0, ntet = 0;
 
   PetscFunctionBeginUser;
-  /* Properties of the bodies that are known to make systems ill-conditioned: "; nu is up to 0.4999". */
+  /* properties of the bodies that may cause ill-conditioning: "; nu is up to 0.4999" */
   for (PetscInt k = 0; k < m->nmaterial; k++) {
     nu = PetscMax(nu, m->material[k]->nu);
     soft = PetscMin(soft, m->material[k]->E);

@@ -1,27 +1,26 @@
 /*
-  The load path of a static run: f_int(u) = lambda f_ext, u = lambda u_prescribed on supports, lambda from 0 to 1 in
-  -static_steps equal steps. There is no mass, no damping and no TS. A step whose solve fails is halved and tried again from the
-  last equilibrium; each step that succeeds doubles it again.
+  Load steps of a static run: f_int(u) = lambda f_ext, u = lambda u_prescribed on supports, lambda from 0 to 1 in
+  -static_steps equal steps, without mass, damping and TS. A step whose solve fails is halved and repeated from the
+  last equilibrium; after each successful step the length doubles again.
 
-  Towards a limit load lambda* displacements go like sqrt(lambda* - lambda), and steps become shorter without end. Below
-  -static_min_increment the run stops; how much faster displacements grow with the load than where they grew slowest distinguishes a limit load from
-  other failures. A shortened step without an iteration (a change of load below rounding) is no sign that steps may be longer.
+  Near a limit load lambda* displacements vary like sqrt(lambda* - lambda), and steps would be halved forever. Below
+  -static_min_increment the run stops; the growth of displacements with the load, relative to its minimum over the steps, distinguishes a limit load from
+  other failures. A shortened step without an iteration (a change of load below rounding) does not double the length.
 */
 #include "time_impl.h"
 
-#define LIMIT 10. /* softening from which on a limit load is likely */
-#define PUSH 1e-3 /* cosine between forces and a free motion above which they drive it */
-#define EXCESS \
-  0.5 /* of the strain energy at the end of a step: tolerated excess over the work of the forces */
+#define LIMIT 10.  /* growth of displacements with the load, over its minimum, that indicates a limit load */
+#define PUSH 1e-3  /* cosine of the angle between forces and a free motion above which forces drive it */
+#define EXCESS 0.5 /* tolerated strain energy beyond the work of the forces in a step, over that at its end */
 
 /* Data of a load step. */
 typedef struct {
   SbRun run;
-  PetscReal factor, length; /* load factor at its end, and its increment */
+  PetscReal factor, length; /* load factor at the end of the step, and its increment */
   Vec X;                    /* displacement at its end, m */
 } LoadStep;
 
-/* Newton from the displacement that X holds. */
+/* Newton's method from the displacement in X. */
 static PetscErrorCode solve(void *ctx, Vec X, SNESConvergedReason *reason)
 {
   const SbRun run = ((LoadStep *)ctx)->run;
@@ -46,7 +45,7 @@ static PetscErrorCode contact_residual(void *ctx, Vec X, Vec R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From the last equilibrium with the prescribed values of the new load factor. */
+/* Initial guess: the last equilibrium with the prescribed values of the new load factor. */
 static PetscErrorCode predict(void *ctx)
 {
   const LoadStep *l = (LoadStep *)ctx;
@@ -59,9 +58,9 @@ static PetscErrorCode predict(void *ctx)
 }
 
 /*
-  Whether a solution with contact is a distant equilibrium that the loads do not lead to: while the active set is wrong, a body may pass far through an obstacle
-  and end crumpled. Along a path on which forces grow, strain energy grows by no more than (f_0 + f_1) . du, f_0 and f_1 the
-  internal forces at the ends of the step; linear forces make it half of that.
+  Whether a solution with contact is a distant equilibrium, off the load path: while the active set is wrong, a body may pass far through an obstacle
+  and end heavily deformed. While forces grow along the path, strain energy grows by at most (f_0 + f_1) . du, f_0 and f_1 the
+  internal forces at the ends of the step; for linear forces by half of that.
 */
 static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
 {
@@ -89,14 +88,14 @@ static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Occasions to search for free bodies. */
+/* When find_free_body() is called. */
 typedef enum {
-  BEFORE, /* a step is solved */
+  BEFORE, /* before a step is solved */
   FAILED,
   SOLVED
 } When;
 
-/* Finds an unsupported body; *found, with the run's stop_reason. */
+/* Searches for an unsupported body; *found: run->stop_reason describes it. */
 static PetscErrorCode find_free_body(const LoadStep *l, When when, PetscBool *found)
 {
   const SbRun run = l->run;
@@ -108,8 +107,8 @@ static PetscErrorCode find_free_body(const LoadStep *l, When when, PetscBool *fo
   PetscFunctionBeginUser;
   if (when != BEFORE) PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
   run->free_body = (PetscBool)(body >= 0 && apart);
-  /* stress and loads may resist a free rotation, but not at the start of the step. A stabilising load, as the weight of a hanging body, is so in shorter steps, too;
-     one that drives the motion has no equilibrium nearby */
+  /* stress and loads may resist a free rotation, but not at the start of the step. A stabilising load, as the weight of a hanging body, makes shorter steps
+     succeed; a load that drives the motion has no equilibrium nearby */
   if (body < 0 && when != SOLVED && !run->model->linear) {
     PetscReal work, force, way;
     Vec along, F;
@@ -158,7 +157,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
       "have done work; use more -static_steps",
       (double)l->factor));
 
-  /* why the solve failed */
+  /* find the cause of a failed solve */
   if (!*ok && !other && !l->run->stopped) {
     char why[512] = "use more -static_steps";
 
@@ -209,12 +208,12 @@ PetscErrorCode SbStaticSolve(SbRun run)
     load = (LoadStep){run, next, next - factor, X};
     attempt.t = factor;
     attempt.dt = next - factor;
-    /* check at the start: follower loads stiffen a hinge in later iterations, and failure takes long */
+    /* check at the start: follower loads stiffen a mechanism in later iterations, and a late failure takes long */
     if (run->nonsymmetric.U && !run->steps_total && !run->model->nbegin_step && !run->model->npotential)
       PetscCall(find_free_body(&load, BEFORE, &found));
     if (!run->free_body) PetscCall(SbRunAttempt(run, &attempt, &ok));
 
-    /* a step that failed is halved, as far as that makes sense */
+    /* halve a failed step, if that may help */
     if (!ok) {
       char why[sizeof(run->stop_reason)];
       PetscBool unstable;
@@ -225,11 +224,11 @@ PetscErrorCode SbStaticSolve(SbRun run)
       run->tangent_known = PETSC_FALSE;
       if (run->stopped) PetscCall(SbRunStepAccepted(run, step, factor, 0., PETSC_TRUE));
       if (run->free_body || run->stopped) break;
-      /* half of a linear problem is as hard, unless contact comes with the load */
+      /* halving does not help in a linear problem, unless contact is active */
       if (run->model->linear && !run->model->nbegin_step && !run->model->npotential) cuts = run->max_halvings;
       if (++cuts <= run->max_halvings && length >= least && !SbRunTooShort(run, length)) continue;
 
-      /* steps have become too short: report the load reached, and the likely cause */
+      /* steps are too short: report the load reached, and the likely cause */
       PetscCall(PetscStrncpy(why, run->stop_reason, sizeof(why)));
       PetscCall(SbNewtonUnstable(run->snes, &unstable));
       if (run->softening > LIMIT)
@@ -269,7 +268,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
     run->newton_step = run->linear_step = run->rejected_step = 0;
     if (run->paused || run->stopped) break;
 
-    /* lengthen the next one */
+    /* lengthen the next step */
     factor = next;
     length = PetscMin(2. * length, nominal);
   }

@@ -54,7 +54,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
     /* the state at the end, or the reason of failure */
     PetscCall((*a->complete)(a->ctx, reason, &step, ok));
 
-    /* the penalty on jumps of CR and DG depends on the initial state: solve a load step, which may be long, once more with that of its end */
+    /* the penalty on jumps of CR and DG depends on the initial state: repeat a load step, which may be long, once with the penalty of its end */
     if (*ok && !run->model->dynamic && !run->goes_on) {
       PetscCall(SbSpaceFollowJumps(run->model->space, a->U, SB_STEPS_OF_LOAD, &run->goes_on));
       if (run->goes_on) continue;
@@ -70,7 +70,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   /* -time_inverted reject */
   PetscCall(SbRunRejectInverted(run, a->t, a->dt, (Vec[2]){a->U0, a->U}, ok));
 
-  /* prescribed motions back at the start of the step, in case the run ends there */
+  /* restore prescribed motions to the start of the step, in case the run ends there */
   if (!*ok && run->model->npotential) PetscCall(SbModelPotentialAdvance(run->model, 0.));
 
   if (!*ok) PetscCall(SbRunWarnShorter(run, a->dt));
@@ -90,7 +90,7 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
   run->t_now = t;
   if (first) PetscCall(SbRunFollowJumps(run, &jumps));
 
-  /* already seen: it turned out to be the last one */
+  /* monitors have seen this step already, before it was known to be the last one */
   if (run->seen.U && run->seen.step == step) {
     if (!run->stopped || first) PetscFunctionReturn(PETSC_SUCCESS);
     now = run->seen;
@@ -105,7 +105,7 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
 
   if (dt > 0.9 * run->dt) run->shortened = PETSC_FALSE;
 
-  /* effects keep their history */
+  /* effects save their history */
   run->step_now = step;
   if (!first && m->naccept) {
     PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));

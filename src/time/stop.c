@@ -1,9 +1,9 @@
 /*
-  Early end of a run: its reason, the end of halving, and requests to stop.
+  Early end of a run: reason of the failure, end of halving, requests to stop.
 
-  A signal (SIGTERM, SIGINT, SIGUSR1 on any rank) or the end of -wall_time lets the step that is being solved end; monitors see that step as the last one, so
-  that a checkpoint and the last frame are written. A step that takes longer than -stop_grace, or would take longer than what is left of -wall_time, is abandoned
-  between two iterations of Newton's method, and the run ends with the step before. All ranks decide alike: by one reduction after each step and each iteration.
+  A signal (SIGTERM, SIGINT, SIGUSR1 on any rank) or the end of -wall_time ends the run after the current step; monitors treat that step as the last one, so
+  that a checkpoint and the last frame are written. A step that takes longer than -stop_grace, or would exceed -wall_time, is abandoned
+  between two iterations of Newton's method, and the run ends with the step before. All ranks decide together, by one reduction after each step and each iteration.
 */
 #include <signal.h>
 #include <stdarg.h>
@@ -12,18 +12,18 @@
 #include <unistd.h>
 #include "time_impl.h"
 
-#define SHORT 0.13          /* of the length asked for: three halvings */
-#define WALL_TIME 1000      /* as the number of a signal */
-#define RESERVE_PART 0.05   /* of -wall_time, for the last files, */
-#define RESERVE_LONGEST 60. /* but no more than so many s; twice what files have taken so far comes on top */
+#define SHORT 0.13          /* step over the requested one, below which a warning follows: three halvings */
+#define WALL_TIME 1000      /* request by -wall_time, beside signal numbers */
+#define RESERVE_PART 0.05   /* part of -wall_time reserved for the last files, */
+#define RESERVE_LONGEST 60. /* at most so many s; plus twice the time that files have taken */
 #define STEP_FACTOR 1.5     /* time reserved for the next step, over the longest recent one */
-#define AGAIN 0.5           /* s, within which a second SIGINT comes from the same key */
+#define AGAIN 0.5           /* interval within which a second SIGINT belongs to the same key press, s */
 
 /* State set by signal handlers, global to the process. */
 static struct {
-  volatile sig_atomic_t signal; /* the first one; 0: none */
-  volatile double since;        /* s, when it came */
-  int speak;                    /* this rank reports it */
+  volatile sig_atomic_t signal; /* first signal; 0: none */
+  volatile double since;        /* time of the signal, s */
+  int speak;                    /* this rank prints messages */
 } asked;
 
 PetscErrorCode SbRunFail(SbRun run, const char *format, ...)
@@ -61,7 +61,7 @@ PetscBool SbRunTooShort(SbRun run, PetscReal dt)
                      dt < 0.999 * PetscPowReal(0.5, (PetscReal)run->max_halvings) * run->dt);
 }
 
-/* ------------------------------------------------------------------ who asks */
+/* ------------------------------------------------------------------ requests to stop */
 
 static double seconds(void)
 {
@@ -101,7 +101,7 @@ PetscErrorCode SbRunCatchSignals(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Seconds of "h:mm:ss" or "d-hh:mm:ss", as batch systems write them; negative: it is neither. */
+/* Seconds of "h:mm:ss" or "d-hh:mm:ss", as in batch systems; negative: neither. */
 static PetscReal duration(const char *text)
 {
   int day = 0, hour, minute, second, end = 0;
@@ -131,9 +131,9 @@ PetscErrorCode SbRunReadStop(SbRun run, const SbScope *scope)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ when the run ends for it */
+/* ------------------------------------------------------------------ decisions */
 
-/* The signal, or WALL_TIME, for which the run is to end, the same on all ranks; 0: none. within: a step is being solved. */
+/* The signal or WALL_TIME that ends the run, the same on all ranks; 0: none. within: a step is being solved. */
 static PetscErrorCode find_reason(SbRun run, PetscBool within, int *reason)
 {
   const double now = MPI_Wtime();
@@ -171,7 +171,7 @@ PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool w
                                                : "USR1"));
     who = signal_name;
   }
-  /* else a requeued job would repeat this for ever */
+  /* no step fits into -wall_time: an error, else a requeued job would repeat this forever */
   PetscCheck(
     reason != WALL_TIME || step > run->step0, run->model->comm, PETSC_ERR_USER_INPUT,
     "-wall_time: the %.6g s are over before a step is done: give more time or ranks, or a coarser mesh",

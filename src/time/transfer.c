@@ -40,7 +40,7 @@ PetscErrorCode SbRunTransferState(SbRun from, SbRun to)
   PetscFunctionBeginUser;
   to->step0 = to->step_now = from->step_now;
   to->t0 = to->t_now = from->t_now;
-  to->model->load = to->model->dynamic ? 1. : from->t_now; /* a failed attempt has changed it */
+  to->model->load = to->model->dynamic ? 1. : from->t_now; /* a failed attempt has changed the load factor */
   to->energies = from->energies;
   to->energy_start = from->energy_start;
   to->energy_most = from->energy_most;
