@@ -1,8 +1,8 @@
 /*
   Elements with their nodes at the centroids of the faces: Crouzeix-Raviart, and piecewise linear DG in the same basis.
 
-  With the barycentric coordinates l_a the basis is psi_a = 1 - 3 l_a, node a on the face opposite vertex a: one at its own
-  centroid, zero at the three others. Hence
+  With the barycentric coordinates l_a the basis is psi_a = 1 - 3 l_a, node a on the face opposite vertex a: one at the centroid of its
+  face, zero at the three others. Hence
 
     grad psi_a = -3 grad l_a;   psi_a(vertex v) = 1 - 3 delta_av;
     mass / (density V): consistent M_aa = 2/5, M_ab = -1/20; lumped (row sums) 1/4.

@@ -4,13 +4,13 @@
     phi_i = l_i (2 l_i - 1) at vertex i,   phi_ij = 4 l_i l_j at the middle of edge ij,
     grad phi_i = (4 l_i - 1) grad l_i,     grad phi_ij = 4 (l_j grad l_i + l_i grad l_j).
 
-  So at a point the tet has the gradient of a P1 tet with the displacements u_i' = (4 l_i - 1) u_i + sum_j 4 l_j u_ij at its vertices,
-  and everything that P1's kernels make of it goes back the same way: these are the two maps below.
+  So at a point the gradient is that of a P1 tet with the vertex displacements u_i' = (4 l_i - 1) u_i + sum_j 4 l_j u_ij,
+  and the results of P1's kernels are mapped back by the transpose: this file has both maps.
 
-  Stresses are taken at the four points of the rule of degree 2 (Keast 1986), each with a quarter of the volume. Cubic functions, as the
-  determinant of a deformation gradient that is linear in the tet, have the rule of degree 3 with five points.
+  Stresses are evaluated at the four points of the rule of degree 2 (Keast 1986), each with a quarter of the volume. Cubic functions, as the
+  determinant of a linear deformation gradient, are integrated by the rule of degree 3 with five points.
 
-  Tets with curved edges are P1 tets with other corners at each of the points of SbRuleQuintic (src/base/quadratic_map.c).
+  Tets with curved edges are P1 tets with different corners at each of the points of SbRuleQuintic (src/base/quadratic_map.c).
 
   Mass / (density V): the consistent one is the integral of phi_a phi_b; lumped (Hinton, Rock and Zienkiewicz 1976) is its diagonal, scaled
   to the mass of the tet: row sums at vertices would be negative, -1/20.
@@ -66,7 +66,7 @@ SB_KERNEL void SbQuadraticAdd(const PetscReal L[4], const SbPack f[restrict 12],
   }
 }
 
-/* Vertices that gradient a is made of, with their factors at L: one of a vertex, two of an edge. */
+/* Vertices on which gradient a depends, with their factors at L: one for a vertex, two for an edge. */
 SB_INLINE int gradient_of(int a, const PetscReal L[4], int vertex[2], PetscReal factor[2])
 {
   if (a < 4) {
@@ -96,7 +96,7 @@ SB_INLINE void blocks(const SbPointRule *rule, const int npoint, const SbPack (*
     const SbPack *block[4 * SB_POINTS];
     int turned[4 * SB_POINTS], n = 0;
 
-    // the blocks between vertices at the points that this one is a sum of
+    // sum over the points of the P1 blocks that contribute
     for (int q = 0; q < npoint; q++) {
       PetscReal fa[2], fb[2];
       int va[2], vb[2];

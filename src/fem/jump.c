@@ -40,7 +40,7 @@
 #include "fem_impl.h"
 #include "sbkernel.h"
 
-#define FOLLOW 4. /* FOLLOW, factor on the negative stiffness; docs/reference/theory.md */
+#define FOLLOW 4. /* factor on the negative stiffness in load steps; docs/reference/theory.md */
 #define RATE \
   2. /* further factor in time steps: the secant stiffness of a growing penalty is about half its tangent */
 #define LEAST 1e-3   /* sum of two stretches below which a cell counts as degenerate: no twist stiffness */

@@ -66,7 +66,7 @@ struct _p_SbLedger {
   PetscInt repeats;   /* number of solves that were repeated for their accuracy */
   PetscInt narrowed;  /* number of reductions of contact widths */
   PetscBool mesh_bounds,
-    width_bounds; /* too large an error of contact is accepted: the mesh's is far larger; widths are fixed or minimal */
+    width_bounds;                 /* contact error above its share: mesh error is larger; width is fixed */
   PetscInt nstep, nkept;          /* -step_time_budget: number of steps; of those within the budget */
   PetscReal wall, longest, total; /* seconds at the last step; longest step; sum */
 };

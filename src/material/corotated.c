@@ -5,19 +5,19 @@
 
   Tangents. With q = tr(S), kappa = lambda (q - 3) - 2 mu,
     dP = 2 mu dF + lambda (R : dF) R + kappa dR,   dR = R [w]x,   (q I - S) w = axial(R^T dF - dF^T R),
-  which follows from R^T F staying symmetric. `exact` is this. The eigenvalues of dP/dF are 2 mu, 2 mu + 3 lambda and, for
+  which follows from R^T F staying symmetric. This is `exact`. The eigenvalues of dP/dF are 2 mu, 2 mu + 3 lambda and, for
   the twist about the principal axis k, 2 mu + 2 kappa / (q - s_k) with q - s_k = s_i + s_j >= 0 (Smith, de Goes, Kim,
   "Analytic eigensystems for isotropic distortion energies", 2019, section 4.1): only the twists can be negative, and
   `exact_spd` raises those to zero by limiting kappa / (s_i + s_j) to -mu. `warped` leaves out kappa dR and replaces the
-  identity by its symmetric part in the rotated frame: Hooke's tensor turned by R.
+  identity by its symmetric part in the rotated frame: Hooke's tensor rotated by R.
 
-  Where s_i + s_j = 0 the rotation, and so the force, jumps and there is no derivative: `exact` bounds the determinant of
-  (q I - S) below, `exact_spd` each s_i + s_j.
+  Where s_i + s_j = 0 the rotation and the force are discontinuous: `exact` bounds the determinant of
+  (q I - S) from below, `exact_spd` each s_i + s_j.
 */
 #include "material_impl.h"
 
-#define SMALLEST_DET 1e-9 /* of q I - S, which is 8 at rest */
-#define SMALLEST_SUM 1e-2 /* of two stretches, 2 at rest */
+#define SMALLEST_DET 1e-9 /* least determinant of q I - S, which is 8 at rest */
+#define SMALLEST_SUM 1e-2 /* least sum of two stretches, 2 at rest */
 
 SB_KERNEL static void energy_corotated(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack psi)
 {
@@ -141,8 +141,8 @@ SB_KERNEL static void twist_spd(PetscReal mu, const SbPack S[restrict 6], const 
 }
 
 /*
-  C = 2 mu identity + lambda R R + Z W Z^T, the columns of Z being R [e_n]x: of row (i, j) only columns j+1 and j+2 (cyclic)
-  are not zero, -R_i,j+2 and R_i,j+1.
+  C = 2 mu identity + lambda R R + Z W Z^T with the columns R [e_n]x of Z: in row (i, j) only columns j+1 and j+2 (cyclic)
+  are nonzero, -R_i,j+2 and R_i,j+1.
 */
 SB_KERNEL static void add_modes(const struct _p_SbMaterial *m, const SbPack R[restrict 9],
                                 const SbPack W[restrict 9], SbPack C[restrict 81])

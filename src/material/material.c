@@ -1,5 +1,5 @@
 /*
-  Creation of material laws by name, and what several laws share: Hooke's stiffness at rest, two exact tangents, damping.
+  Creation of material laws by name, and functions shared by several laws: Hooke's stiffness at rest, two exact tangents, damping.
 
   Lame parameters: mu = E / (2 (1 + nu)), lambda = E nu / ((1 + nu) (1 - 2 nu)).
 */
@@ -26,7 +26,7 @@ PetscErrorCode SbMaterialRegister(const char *law, PetscErrorCode (*create)(SbMa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* `where` names what asked for it. */
+/* Creates a law; `where`: name of its user, for messages. */
 static PetscErrorCode create_law(const char *law, PetscReal E, PetscReal nu, PetscReal density,
                                  const char *where, SbMaterial *material)
 {

@@ -1,5 +1,5 @@
 /*
-  material_impl.h - what the laws share: their constructors, and the projection of an isotropic tangent.
+  material_impl.h - shared by the laws: constructors, Hooke's stiffness at rest, projection of an isotropic tangent.
 */
 #pragma once
 #include <sbmaterial.h>
@@ -15,24 +15,24 @@ typedef struct {
 } SbLame;
 
 /*
-  SbMaterialSetHooke - makes m->data an SbLame from E and nu, and the law answer for its stiffness with it.
+  SbMaterialSetHooke - sets m->data to an SbLame from E and nu, and the law's operations for its stiffness.
 
-  Not collective. Sets shear_modulus, bulk_modulus, volumetric_modulus and wave_speed of the table. For laws whose tangent
-  at rest is Hooke's tensor; another law sets its own.
+  Not collective. Sets shear_modulus, bulk_modulus, volumetric_modulus and wave_speed of the table. For laws with Hooke's tensor as tangent
+  at rest; other laws set their own operations.
 */
 PetscErrorCode SbMaterialSetHooke(SbMaterial m);
-/* Of a law that called SbMaterialSetHooke(). */
+/* Lame parameters of a law that called SbMaterialSetHooke(). */
 SB_INLINE const SbLame *sb_lame(const struct _p_SbMaterial *m)
 {
   return (const SbLame *)m->data;
 }
 
-/* Options of laws whose tangents are exact and exact_spd: reads `tangent`. And the check behind it. */
+/* Options of laws with the tangents exact and exact_spd: reads and checks `tangent`. */
 PetscErrorCode SbMaterialSetFromOptions_Exact(SbMaterial m, const SbScope *scope);
 PetscErrorCode SbMaterialSetTangent_Exact(SbMaterial m, SbTangentKind kind);
 
 /*
-  SbSpectralTangent - C[81] of an isotropic energy psi(s0, s1, s2), its negative eigenvalues raised to zero.
+  SbSpectralTangent - tangent C[81] of an isotropic energy psi(s0, s1, s2), with negative eigenvalues set to zero.
 
   Input, Pa, with (i, j, k) cyclic: hessian[6] = d^2 psi / ds_i ds_j as 00 01 02 11 12 22;
     flip[k]  = (psi_i - psi_j) / (s_i - s_j), eigenvalue of the symmetric shear of the axes i and j;

@@ -1,17 +1,17 @@
 /*
   Stable neo-Hookean material of Smith, de Goes and Kim ("Stable neo-Hookean flesh simulation", 2018, equation 14, with the
-  logarithmic term that keeps the origin from being a flat point). With I1 = |F|^2, J = det F:
+  logarithmic term that makes F = 0 no stationary point). With I1 = |F|^2, J = det F:
 
     psi = a/2 (I1 - 3) - a/2 log((I1 + 1)/4) + b/2 (J - 1)^2 - 3a/4 (J - 1)
     P   = a (1 - 1/(I1 + 1)) F + (b (J - 1) - 3a/4) cof F
 
-  which is their energy with alpha = 1 + 3a/(4b), less a constant. Rest is stress-free, and psi is finite for every F
-  including inverted ones: it pulls them back. Linearised at F = I, dP = 3a/4 (H + H^T) + (b - 5a/8) tr(H) I, so that
+  which is their energy with alpha = 1 + 3a/(4b), less a constant. F = I is stress-free, and psi is finite for every F,
+  including inverted ones, which it drives back. Linearised at F = I, dP = 3a/4 (H + H^T) + (b - 5a/8) tr(H) I, so that
 
     a = 4/3 mu,   b = lambda + 5/6 mu
 
-  make the small-strain limit exactly Hooke's law with (E, nu), for every nu in (-1, 0.5) (b > 0 there). This b goes with
-  the log term; without it other constants are right.
+  make the small-strain limit exactly Hooke's law with (E, nu), for every nu in (-1, 0.5) (b > 0 there). This b is for psi with
+  the log term; without it the constants differ.
 
   Tangent, exact: with g = 1/(I1 + 1), p = b (J - 1) - 3a/4, c = cof F
     dP/dF = a (1 - g) identity + 2 a g^2 F F + b c c + p d(cof F)/dF,   d(cof F)_ij/dF_kl = eps_ikm eps_jln F_mn.
@@ -21,7 +21,7 @@
 
 /*
   Energy from H = F - I, whose first-order terms cancel: with x = (I1 - 3)/4, I1 - 3 = 2 tr H + |H|^2 and
-  J - 1 = tr H + h2 + det H (h2: sum of the principal 2x2 minors) taken by hand, small strains keep their digits.
+  J - 1 = tr H + h2 + det H (h2: sum of the principal 2x2 minors) inserted, there is no cancellation at small strains.
 */
 SB_KERNEL static void energy_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack psi)
 {
@@ -59,7 +59,7 @@ SB_KERNEL static void stress_neohookean(const struct _p_SbMaterial *m, const SbP
   }
 }
 
-/* J - 1 from H = F - I as in the energy. */
+/* J - 1 from H = F - I, as in the energy. */
 SB_KERNEL static void pressure_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack p)
 {
   for (int l = 0; l < SB_BATCH; l++) {
@@ -94,7 +94,8 @@ SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbPack 
   for (int ij = 0; ij < 9; ij++) {
     for (int kl = ij; kl < 9; kl++) {
       const int row = kl / 3 - ij / 3,
-                column = (kl % 3 - ij % 3 + 3) % 3; /* 0 the same, 1 the next, 2 the one before */
+                column = (kl % 3 - ij % 3 + 3) %
+                         3; /* column of kl relative to that of ij: 0 the same, 1 the next, 2 the previous */
       const int third = 3 * ((6 - ij / 3 - kl / 3) % 3) + (6 - ij % 3 - kl % 3) % 3;
       const PetscReal same = ij == kl, sign = row && column ? (row == column ? 1 : -1) : 0;
       SbPack c;

@@ -5,24 +5,24 @@
   4x4 matrix N linear in F (Davenport's q-method; Horn, "Closed-form solution of absolute orientation using unit
   quaternions", 1987), so q is the eigenvector of the largest eigenvalue. In terms of the signed stretches s1 >= s2 >= |s3|
   that eigenvalue is lambda = s1 + s2 + s3 = tr(R^T F), and the gap to the next one is 2 (s2 + s3). Reflections, singular F
-  and rotations by any angle need no special case; only a small gap is hard, and there the answer itself is ill-conditioned.
+  and rotations by any angle need no special case; only a small gap is difficult, where R itself is ill-conditioned.
 
-  Fast path, all lanes at once and without branches, after Higham and Noferini ("An algorithm to compute the polar
+  Fast path, vectorised over the lanes and without branches, after Higham and Noferini ("An algorithm to compute the polar
   decomposition of a 3x3 matrix", 2016), with the adjugate instead of a factorisation:
     1. lambda is the largest root of  p(x) = x^4 - 2 a x^2 - 8 d x + a^2 - 4 b,  a = |F|^2, d = det F, b = |cof F|^2. All
-       four roots are real: Laguerre's method falls monotonically onto it from the upper bound sqrt(3 a), in the end with
+       four roots are real: Laguerre's method converges to it monotonically from the upper bound sqrt(3 a), with
        order three. For F = I the bound is the root.
     2. adj(lambda I - N) is q q^T times p'(lambda) up to the error of lambda: its column with the largest diagonal entry
-       is one step of inverse iteration, multiplying by it once more is another.
-  A lane is trusted when the gap is not small (p' = 8 (s1+s2)(s2+s3)(s3+s1) against lambda^3) and the last step towards
-  the root was so short that both steps together leave less than rounding. Other lanes go one by one to the robust path:
-  Jacobi's method on N, which is right to rounding for any symmetric matrix.
+       is the result of one inverse iteration; multiplying this column by the adjugate is a second one.
+  A lane is accepted if the gap is not small (p' = 8 (s1+s2)(s2+s3)(s3+s1) relative to lambda^3) and the last Laguerre step
+  was so short that the error is below rounding. Other lanes are computed one by one by the robust path:
+  Jacobi's method on N, which is accurate to rounding for any symmetric matrix.
 */
 #include <sbkernel.h>
 
 #define ROOT_STEPS 3
-#define SMALLEST_GAP 1e-3 /* of p'(lambda) / (4 lambda^3), at most 16/27 */
-#define LAST_STEP 1e-3    /* of the last step towards the root, relative to the gap */
+#define SMALLEST_GAP 1e-3 /* least p'(lambda) / (4 lambda^3) of an accepted lane; at most 16/27 */
+#define LAST_STEP 1e-3    /* largest last step of an accepted lane, relative to the gap */
 
 /* N[10] = 00 01 02 03 11 12 13 22 23 33 with q^T N q = R(q) : F, q = (w, x, y, z). */
 SB_INLINE void davenport(const PetscReal F[9], PetscReal N[10])
@@ -39,7 +39,7 @@ SB_INLINE void davenport(const PetscReal F[9], PetscReal N[10])
   N[9] = F[8] - F[0] - F[4];
 }
 
-/* Rotation of a quaternion of any length but zero. */
+/* Rotation of a nonzero quaternion of any length. */
 SB_INLINE void quaternion_rotation(const PetscReal q[4], PetscReal R[9])
 {
   const PetscReal w = q[0], x = q[1], y = q[2], z = q[3], s = 2 / (w * w + x * x + y * y + z * z);
@@ -80,7 +80,7 @@ SB_INLINE void adjugate4(const PetscReal M[10], PetscReal A[10])
   A[9] = M[2] * t3 - M[5] * t1 + M[7] * t0;
 }
 
-/* The column of a positive semi-definite A (00 01 02 03 11 12 13 22 23 33) that holds its largest diagonal entry. */
+/* The column of a positive semi-definite A (00 01 02 03 11 12 13 22 23 33) with the largest diagonal entry. */
 SB_INLINE void largest_column(const PetscReal A[10], PetscReal q[4])
 {
   const PetscReal c1[4] = {A[1], A[4], A[5], A[6]}, c2[4] = {A[2], A[5], A[7], A[8]},
@@ -95,7 +95,7 @@ SB_INLINE void largest_column(const PetscReal A[10], PetscReal q[4])
   for (int k = 0; k < 4; k++) q[k] = A[9] > best ? c3[k] : q[k];
 }
 
-/* Fast path of one lane. Returns 1 when the result is to be trusted, else 0; a NaN is not trusted. */
+/* Fast path of one lane. Returns 1 if the result is accepted, else 0, also for NaN. */
 SB_INLINE PetscReal polar_fast(const PetscReal F[9], PetscReal R[9])
 {
   PetscReal cof[9], N[10], A[10], q[4], p[4], step = 0, slope = 0;
@@ -112,7 +112,7 @@ SB_INLINE PetscReal polar_fast(const PetscReal F[9], PetscReal R[9])
     x -= step;
   }
 
-  /* Its eigenvector: the largest column of the adjugate, once more through the adjugate. */
+  /* Its eigenvector: the largest column of the adjugate, multiplied by the adjugate. */
   davenport(F, N);
   for (int k = 0; k < 10; k++) N[k] = -N[k];
   N[0] += x;
@@ -127,13 +127,13 @@ SB_INLINE PetscReal polar_fast(const PetscReal F[9], PetscReal R[9])
   p[3] = A[3] * q[0] + A[6] * q[1] + A[8] * q[2] + A[9] * q[3];
   quaternion_rotation(p, R);
 
-  /* The gap is at least slope / (2 x^2). The limits on a keep the powers above inside the range of a double. */
+  /* The gap is at least slope / (2 x^2). The limits on a keep these powers within the range of a double. */
   slope = (a < 1e16 ? slope : 0) > SMALLEST_GAP * x * x * x ? slope : 0;
   slope = a > 1e-16 ? slope : 0;
   return LAST_STEP * slope > 2 * x * x * fabs(step) ? 1 : 0;
 }
 
-/* One Jacobi rotation of a symmetric 4x4 matrix N that zeroes N[p][q]; V collects the rotations. */
+/* One Jacobi rotation of a symmetric 4x4 matrix N that zeroes N[p][q]; V accumulates the rotations. */
 static void jacobi4(PetscReal N[4][4], PetscReal V[4][4], int p, int q)
 {
   const PetscReal tau = (N[q][q] - N[p][p]) / (2 * N[p][q]);
@@ -157,7 +157,7 @@ static void jacobi4(PetscReal N[4][4], PetscReal V[4][4], int p, int q)
   N[p][q] = N[q][p] = 0;
 }
 
-/* Any F: scaled to largest entry one, Jacobi's method to the end. */
+/* Any F: scaled to a largest entry of one, Jacobi's method to convergence. */
 static void polar_robust(const PetscReal F[9], PetscReal R[9])
 {
   PetscReal scale = 0, G[9], n[10], V[4][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}, q[4];
@@ -175,7 +175,7 @@ static void polar_robust(const PetscReal F[9], PetscReal R[9])
   PetscReal N[4][4] = {
     {n[0], n[1], n[2], n[3]}, {n[1], n[4], n[5], n[6]}, {n[2], n[5], n[7], n[8]}, {n[3], n[6], n[8], n[9]}};
 
-  /* Convergence is quadratic: about six sweeps; the bound only keeps the loop finite. */
+  /* Convergence is quadratic: about six sweeps; the bound only makes the loop finite. */
   for (int sweep = 0; sweep < 30; sweep++) {
     PetscReal largest = 0;
 

@@ -1,5 +1,5 @@
 /*
-  The laws of the program and the options that they read.
+  Registration of the material laws and of the options that they read.
 */
 #include "material_impl.h"
 

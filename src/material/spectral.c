@@ -1,13 +1,13 @@
 /*
-  Eigenvalues on lanes: symmetric 3x3 matrices, signed stretches of F, and tangents without their negative part.
+  Vectorised eigenvalues: symmetric 3x3 matrices, signed stretches of F, tangents with negative eigenvalues set to zero.
 
-  SbSymEig: in closed form but for three Newton steps, so that no chain of rotations is waited for (in the spirit of
+  SbSymEig: in closed form except for three Newton steps, without iterated rotations (similar to
   Eberly, "A robust eigensolver for 3x3 symmetric matrices", 2014). With m = tr(S)/3, A = (S - m I)/p, 6 p^2 = |S - m I|^2,
   the eigenvalues of A are the roots of y^3 - 3 y = det A. The one with the sign of det A has |y| in [sqrt(3), 2] and lies
-  at least sqrt(3) from the others: Newton's method is in its quadratic range from the start, and the largest column of
-  adj(A - y I) is the eigenvector without loss. What is left is a 2x2 problem in the plane normal to it: one rotation.
+  at least sqrt(3) from the others: Newton's method converges quadratically from the start, and the largest column of
+  adj(A - y I) is the eigenvector without loss of accuracy. A 2x2 problem in the plane normal to it remains: one rotation.
 
-  SbSpectralTangent: the tangent of an isotropic energy is diagonal in known matrices (Smith, de Goes, Kim, "Analytic
+  SbSpectralTangent: the tangent of an isotropic energy has known eigenmatrices (Smith, de Goes, Kim, "Analytic
   eigensystems for isotropic distortion energies", 2019, sections 4 and 5). With F = U diag(s) V^T, columns u_i and v_i:
   three twists (u_i v_j^T - u_j v_i^T) / sqrt(2), three flips (u_i v_j^T + u_j v_i^T) / sqrt(2), and three stretches
   sum_i q_i u_i v_i^T with the eigenvectors q of the Hessian of psi(s). C is the sum of the outer products of these
@@ -15,7 +15,7 @@
 */
 #include "material_impl.h"
 
-/* y >= sqrt(3) with y^3 - 3 y = 2 t for t in [0, 1]. The parabola is right to 0.003, and Newton squares 0.75 times that. */
+/* y >= sqrt(3) with y^3 - 3 y = 2 t for t in [0, 1]. The initial parabola has an error of 0.003, which a Newton step squares times 0.75. */
 SB_INLINE PetscReal isolated_root(PetscReal t)
 {
   PetscReal y = 1.7320508 + t * (0.3333333 - 0.0653841 * t);
@@ -64,7 +64,7 @@ SB_INLINE void sym_eig(const PetscReal S[6], PetscReal s[3], PetscReal V[9])
   const PetscReal mean = (S[0] + S[3] + S[5]) / 3;
   PetscReal A[6] = {S[0] - mean, S[1], S[2], S[3] - mean, S[4], S[5] - mean}, v[3], u[3], w[3], Au[3], Aw[3];
 
-  /* deviator of unit size; zero when S is a multiple of I, and then every basis is right */
+  /* deviator of unit size; zero if S is a multiple of I, when any basis is correct */
   const PetscReal diagonal = A[0] * A[0] + A[3] * A[3] + A[5] * A[5],
                   rest = A[1] * A[1] + A[2] * A[2] + A[4] * A[4];
   const PetscReal p = sqrt(diagonal / 6 + rest / 3), inverse = 1 / (p + 1e-300);
@@ -133,7 +133,7 @@ SB_KERNEL void SbStretches(const SbPack F[restrict 9], SbPack U[restrict 9], SbP
   }
 }
 
-/* E[m] = root of eigenvalue m times its matrix, for the twist and the flip of the axes i and j. */
+/* E[m] = root of eigenvalue m times its eigenmatrix, for the twist and the flip of the axes i and j. */
 SB_KERNEL static void shear_modes(const SbPack U[restrict 9], const SbPack V[restrict 9], int i, int j,
                                   const SbPack flip, const SbPack twist, SbPack Eflip[restrict 9],
                                   SbPack Etwist[restrict 9])

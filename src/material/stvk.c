@@ -9,7 +9,7 @@
 */
 #include "material_impl.h"
 
-/* f = F of lane l, e = Green's strain. */
+/* f = F of lane l, e = its Green strain. */
 SB_INLINE void green_strain(const SbPack F[9], int l, PetscReal f[9], PetscReal e[9])
 {
   SbPackGet(9, F, l, f);

@@ -68,7 +68,7 @@ PetscErrorCode SbModelContactUpdateActiveSet(SbModel m, PetscReal t, Vec U, Vec 
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, again, 1, SB_MPI_BOOL, MPI_LOR, m->comm));
   if (m->nrestitution && !*again && !m->space->rough) PetscCall(SbModelRestitutionUpdate(m, U, again));
-  /* a search changes normals and weights: repeated solves have the constraints of the last one */
+  /* a search has changed normals and weights; repeated solves always have the last constraints */
   if (*again || m->space->rough) PetscCall(constrain(m, t, U));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);

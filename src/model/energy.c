@@ -1,9 +1,9 @@
 /*
-  Energies and momenta of one instant: 1/2 v.M v, the strain energy of the laws, sum m v, sum x cross m v with the current
-  positions x = X + u, the centre of mass, and the extremes that indicate problems. One reduction each for sums,
-  maxima and minima.
+  Energies and momenta of a state: 1/2 v.M v, the strain energy of the laws, sum m v, sum x cross m v with the current
+  positions x = X + u, the centre of mass, and extremes of speed, displacement and det F. One reduction for the sums, one
+  for the extremes.
 
-  With the consistent mass the kinetic energy and the momenta use it too; the centre of mass is the same for both.
+  With the consistent mass matrix the kinetic energy and the momenta use it, too; the centre of mass is the same for both.
 */
 #include "sbmodel.h"
 #include "sblog.h"
@@ -19,10 +19,10 @@ typedef enum {
   NSUM = CENTRE + 3
 } Sum;
 
-/* M v with the run's mass matrix, [nnode][3], right on owned nodes; v holds ghosts. PetscFree. */
+/* M v with the run's mass matrix, [nnode][3], complete on owned nodes; v with ghosts. The caller frees it. */
 static PetscErrorCode nodal_momenta(SbSpace s, const PetscReal v[], PetscReal **p)
 {
-  const SbStage stage = {.a = v}; /* no v: inertia alone, without mass-proportional damping */
+  const SbStage stage = {.a = v}; /* no velocity: inertia only, without mass-proportional damping */
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(3 * s->nnode, p));
@@ -38,7 +38,7 @@ PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
   SbSpace s = m->space;
   const PetscReal *u, *v = NULL;
   PetscReal sum[NSUM] = {0.}, extreme[3] = {0., 0., 0.},
-            *p = NULL; /* extreme: speed^2, displacement^2, -min J */
+            *p = NULL; /* extremes: speed^2, displacement^2, -min J */
   PetscInt ninverted;
 
   PetscFunctionBeginUser;

@@ -1,8 +1,8 @@
 /*
-  The model: the semi-discrete equation M a + C v + f_int(u) = f_ext(t, u, v) of everything that a scene names.
+  The model: the semi-discrete equation M a + C v + f_int(u) = f_ext(t, u, v) of a scene.
 
-  Set-up sorts the effects into one list per operation. An evaluation walks the lists; with no effects it walks empty
-  ones. In a static run there is no M and no C, and loads and prescribed displacements are multiplied by the load factor.
+  Set-up makes one list of effects per operation; an evaluation calls the effects in these lists.
+  A static run has no M and no C, and loads and prescribed displacements are multiplied by the load factor.
 */
 #include "model_impl.h"
 #include "sblog.h"
@@ -38,7 +38,7 @@ PetscErrorCode SbModelDestroy(SbModel *model)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An inclusion without tets is an error. */
+/* Error for an inclusion without tets. */
 static PetscErrorCode check_inclusions(SbModel m)
 {
   PetscInt *count;
@@ -86,7 +86,7 @@ static PetscErrorCode match_mass(SbModel m, PetscInt b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Effects that have the operation, in scenario order; the lists are consecutive in m->lists, of NLIST lists. */
+/* Lists of the effects that have an operation, in scenario order, one after the other in m->lists; number of lists. */
 #define NLIST 12
 #define SORT_INTO_LIST(m, op)                                               \
   do {                                                                      \
@@ -161,7 +161,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The arrays of an evaluation. Ghosts of v and a are updated only if needed. */
+/* Borrows the arrays of an evaluation. Ghosts of v and a are updated only if needed. */
 static PetscErrorCode stage_begin(SbModel m, PetscReal t, Vec U, Vec V, Vec A, SbStage *stage)
 {
   PetscFunctionBeginUser;
@@ -184,8 +184,8 @@ static PetscErrorCode stage_end(SbModel m, Vec U, Vec V, Vec A, SbStage *stage)
 }
 
 /*
-  Factor on an effect: in a static run the load factor, unless its formulas use t, which is the load factor there: then they
-  describe the path themselves.
+  Factor on an effect: in a static run the load factor, except for formulas of t, which is the load factor there: they
+  prescribe the load path themselves.
 */
 static inline PetscReal load_factor(SbModel m, SbEffect e)
 {
@@ -201,7 +201,7 @@ PetscErrorCode SbModelExternalForces(SbModel m, const SbStage *stage, PetscBool 
   PetscCall(PetscArrayzero(f, n));
   if (!m->nforce) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_EFFECTS], 0, 0, 0, 0));
-  /* the steady ones first: they share their factor */
+  /* constant ones first: they have a common factor */
   for (PetscInt e = 0; e < m->nforce; e++) {
     if (m->force[e]->steady && SbEffectActs(m->force[e], stage->t))
       SbEffectCall(m->force[e], force, m->space, stage, f);
@@ -220,7 +220,7 @@ PetscErrorCode SbModelExternalForces(SbModel m, const SbStage *stage, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Zero residuals at prescribed unknowns: every initial guess has the prescribed values, and no solve changes them. */
+/* Sets the residual at prescribed unknowns to zero: every initial guess has the prescribed values, and no solve changes them. */
 static void constrain_residual(SbSpace s, PetscReal f[])
 {
   for (PetscInt k = 0; k < s->nfixed; k++) {

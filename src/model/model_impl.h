@@ -1,10 +1,10 @@
 /*
-  model_impl.h - shared by the files of src/model.
+  model_impl.h - functions shared by the files of src/model.
 */
 #pragma once
 #include "sbmodel.h"
 
-/* restitution.c, for SbModelContactBeginStep() and SbModelContactUpdateActiveSet(): Begin starts an attempt at a step; Update, once the active set has converged, checks the energy: `again` when
+/* restitution.c, for SbModelContactBeginStep() and SbModelContactUpdateActiveSet(): Begin: at the start of an attempted step; Update: energy check once the active set has converged; `again` if
    coefficients were reduced. Collective. */
 void SbModelRestitutionBegin(SbModel model, PetscReal dt, Vec U0, Vec V0);
 PetscErrorCode SbModelRestitutionUpdate(SbModel model, Vec U, PetscBool *again);

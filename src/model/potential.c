@@ -4,7 +4,7 @@
 #include "model_impl.h"
 #include "sblog.h"
 
-/* SbEffectCall() that counts as contact in the table of phases, too. */
+/* SbEffectCall() with its time added to the contact phase as well. */
 #define CONTACT_CALL(e, op, ...)                                           \
   do {                                                                     \
     PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0)); \
@@ -12,11 +12,11 @@
     PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));   \
   } while (0)
 
-#define ROUNDS 20   /* most iterations of moving bodies in initial contact apart */
+#define ROUNDS 20   /* most iterations of the separation of initial contacts */
 #define SWEEPS 1000 /* Gauss-Seidel sweeps over the contacts in each round */
-#define FAR 2.      /* largest displacement of a body in an iteration, over the target gap */
-#define CLOSE 0.9   /* of the target gap: nearer counts as contact */
-#define MISSED 1e-3 /* of the target gap: tolerance of the sweeps */
+#define FAR 2.      /* largest displacement of a body per iteration, over the target gap */
+#define CLOSE 0.9   /* gap over the target gap below which there is contact */
+#define MISSED 1e-3 /* tolerance of the sweeps over the target gap */
 
 static int by_value(const void *a, const void *b)
 {
@@ -28,7 +28,7 @@ static int by_value(const void *a, const void *b)
   return 0;
 }
 
-/* Initial contacts of all ranks, in an order that does not depend on the partition: bodies, direction, gap, target gap. */
+/* Gathers the initial contacts of all ranks, in an order independent of the partition: bodies, direction, gap, target gap. */
 static PetscErrorCode gather_touches(MPI_Comm comm, const SbInitialContacts *mine, PetscInt *n,
                                      PetscReal (**all)[7])
 {
@@ -51,7 +51,7 @@ static PetscErrorCode gather_touches(MPI_Comm comm, const SbInitialContacts *min
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gap of a contact after the displacements `way` of both bodies, m. */
+/* Gap of a contact after the displacements `way` of its two bodies, m. */
 static PetscReal gap_after(const PetscReal touch[7], const PetscReal way[])
 {
   const PetscReal *one = way + 3 * (PetscInt)touch[0], *two = way + 3 * (PetscInt)touch[1];
@@ -59,7 +59,7 @@ static PetscReal gap_after(const PetscReal touch[7], const PetscReal way[])
   return touch[5] + SbDot3(touch + 2, one) - SbDot3(touch + 2, two);
 }
 
-/* Gauss-Seidel: each contact in turn moves its bodies along its direction, but for fixed components; way[nbody + 1][3]: displacements, m. */
+/* Gauss-Seidel: each contact in turn moves its bodies along its direction, except fixed components; way[nbody + 1][3]: displacements, m. */
 static void sweep_touches(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, const uint8_t fixed[],
                           PetscReal way[])
 {
@@ -88,8 +88,8 @@ static void sweep_touches(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, con
 }
 
 /*
-  Displacements of bodies that open all contacts to their target gaps, as far as prescribed components allow. Bodies without room between others
-  stay. Displacements are limited to a few gaps, the distance within which contacts are known. fixed[nbody + 1]: bit c, component c is prescribed or, from now on, stays;
+  Finds displacements of bodies that open all contacts to their target gaps, as far as prescribed components allow. Bodies enclosed by others without enough
+  space are fixed. Displacements are limited to a few gaps, the distance within which contacts were searched. fixed[nbody + 1]: bit c, component c is prescribed or was fixed here;
   way[nbody + 1][3], m; moved: some body moves.
 */
 static void find_ways(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, uint8_t fixed[], PetscReal way[],
@@ -110,7 +110,7 @@ static void find_ways(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, uint8_t
   }
   if (!*moved) return;
 
-  /* no gap may become smaller: such bodies stay */
+  /* fix the bodies of contacts whose gap would decrease */
   do {
     again = PETSC_FALSE;
     sweep_touches(n, touch, nbody, fixed, way);
@@ -134,8 +134,8 @@ static void find_ways(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, uint8_t
 }
 
 /*
-  Initial contact: moves touching bodies apart rigidly, in a dynamic run until the barrier does not act. Effects move the vertices of remaining contacts.
-  u: local displacements, changed.
+  Separates bodies in initial contact by rigid displacements, in a dynamic run until the barrier is inactive. Effects move the vertices of remaining contacts.
+  u: local displacements, in and out.
 */
 static PetscErrorCode move_apart(SbModel m, PetscReal t, PetscReal dt, PetscReal u[], PetscBool *moved)
 {
@@ -177,7 +177,7 @@ static PetscErrorCode move_apart(SbModel m, PetscReal t, PetscReal dt, PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A copy of U with ghosts, for writing; close_state() copies it back. */
+/* Copies U to a writable vector with ghosts; close_state() copies it back. */
 static PetscErrorCode open_state(SbModel m, Vec U, Vec *local, PetscReal **u)
 {
   PetscFunctionBeginUser;
@@ -216,8 +216,8 @@ PetscErrorCode SbModelPotentialStart(SbModel m, PetscReal t, PetscReal dt, Vec U
 }
 
 /*
-  The speed V of a step from t to t + dt, m/s, which scales tolerances of barrier contact: m V^2 / 2 is the kinetic and strain energy of the bodies, of mass m, at its start,
-  plus half of the work of all loads and support forces over the size of the smallest body.
+  The speed V of a step from t to t + dt, m/s, the scale of tolerances of barrier contact: m V^2 / 2 is the kinetic and strain energy of the bodies, of mass m, at its start,
+  plus half of the work of all loads and support forces along the size of the smallest body.
 */
 static PetscErrorCode step_speed(SbModel m, PetscReal t, PetscReal dt, Vec U, Vec V, PetscReal *speed)
 {
@@ -269,7 +269,7 @@ PetscErrorCode SbModelPotentialBegin(SbModel m, PetscReal t, PetscReal dt, Vec U
   }
   PetscCall(close_state(m, U0, moved, &local, &u));
 
-  /* impacts of this step */
+  /* impact velocities of this step */
   if (m->nrestitution && V0) {
     const PetscReal *u0, *v0;
 

@@ -3,26 +3,26 @@
 
   Newton's law in Moreau's form (Moreau 1988; Jean, "The non-smooth contact dynamics method", CMAME 177, 1999) for the normal velocity of
   a point of a body relative to an obstacle or to its position on another body: v+ + e v- >= 0, force >= 0, and one of them zero, for pairs that would
-  penetrate at the end of the step, by the velocity v- or in a solve. v- is the velocity at the start of the step.
+  penetrate at the end of the step, by extrapolation with v- or in a solve. v- is the velocity at the start of the step.
   Implicit Euler has v+ = (gap1 - gap0) / h: the pair is constrained at
 
       gap1 = gap0 + h e |v-|,
 
-  or released if that needs a tensile force; in the next step it is free. Force and elasticity are solved together, so
-  the whole body bounces if it is stiff relative to its inertia, sqrt(k/m) h >> 1. In a soft one only the neighbourhood of the point does, whatever e is; it bounces by its elasticity (Doyen, Ern, Piperno, SIAM J. Sci.
+  or released if that needs a tensile force; in the next step it is not constrained. Contact forces and deformation are solved together, so
+  the whole body bounces if it is stiff relative to its inertia, sqrt(k/m) h >> 1. In a soft one e acts only on the neighbourhood of the point, and the body rebounds by its elasticity (Doyen, Ern, Piperno, SIAM J. Sci.
   Comput. 33, 2011). Implemented by the effects (src/effect/restitution.h, barrier_restitution.c).
 
-  Energy. With W = sum h N v+ over these pairs, D = 1/2 |v1 - v0|^2 in the norm of the mass and S the strain energy, a step of implicit
-  Euler gains W - D + C plus the work of the loads, C = S(u1) - S(u0) - f_int(u1) . (u1 - u0); friction and persistent pairs only dissipate. C is
-  not positive where S is convex (all but rotations under stress), and is then left out. After each solve W + C <= D is checked, W of
-  all effects, in the frame of the obstacle: if it is violated, all e are reduced and the step is solved again. For two unstressed stiff
-  bodies, or one and an obstacle, W / D = 2 e / (1 + e) <= 1, so e is not reduced.
+  Energy. With W = sum h N v+ over these pairs, D = 1/2 |v1 - v0|^2 in the mass norm and S the strain energy, a step of implicit
+  Euler gains W - D + C plus the work of the loads, C = S(u1) - S(u0) - f_int(u1) . (u1 - u0); friction and persistent pairs only dissipate. C <= 0
+  where S is convex (except for rotations under stress), and is then neglected. After each solve W + C <= D is checked, W of
+  all effects, in the frame of the obstacle: if this is violated, all e are reduced and the step is solved again. For two unstressed stiff
+  bodies, or a body and an obstacle, W / D = 2 e / (1 + e) <= 1, so e is not reduced.
 */
 #include "model_impl.h"
 
 #define REDUCTIONS 8 /* most reductions of e within a step; then e = 0 */
-#define SAFE 0.9     /* factor on e beside the exact one for W proportional to e */
-#define STEEP 2.1    /* the same for a small excess, as of a stiff body: its W / D grows with the root of e */
+#define SAFE 0.9     /* factor on e, beside most / W, which is exact for W proportional to e */
+#define STEEP 2.1    /* factor on the excess 1 - most / W: a stiff body's W / D grows with the root of e */
 #define ROUND 1e-9   /* relative tolerance of W <= D */
 
 void SbModelRestitutionBegin(SbModel m, PetscReal dt, Vec U0, Vec V0)
@@ -59,7 +59,7 @@ static PetscErrorCode convexity(SbModel m, Vec U, PetscReal *C)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* W, and D less what of C is positive, of the step that ends at U, J, of all ranks. */
+/* W, and D less the positive part of C, of the step that ends at U, J, all ranks. */
 static PetscErrorCode measure(SbModel m, Vec U, PetscReal *W, PetscReal *most)
 {
   PetscReal C;

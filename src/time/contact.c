@@ -65,7 +65,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
   /* the matrix has the old constraints */
   if (projected || !m->dynamic) run->tangent_known = PETSC_FALSE;
   if (constrained) {
-    /* scale of rounding: a body at rest has a residual of rounding only, but contact and support forces */
+    /* scale of rounding: contact and support forces, as a body at rest has a residual of rounding only */
     PetscCall((*step->residual)(step->ctx, U, run->R));
     PetscCall(VecNorm(run->R, NORM_2, &least));
     least = PetscIsInfOrNanReal(least) ? 0 : DIGITS * least;

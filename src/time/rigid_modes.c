@@ -100,8 +100,7 @@ typedef struct {
   PetscInt label, body;
   PetscReal centre[3], size; /* centre and size of its nodes, m */
   PetscInt nfree;            /* number of free motions */
-  PetscReal motion
-    [6]; /* one of them: displacements along the axes, m; rotations about axes through the centre times size, m */
+  PetscReal motion[6];       /* one of them: translations; rotations about the centre times size; m */
 } Part;
 
 /* Coordinate of a node in the configuration of the tangent: the reference configuration for linear laws. */

@@ -212,7 +212,7 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
 
   /* first a simpler form of the same preconditioner, if any: its incomplete factorisation may have broken down */
   PetscCall(SbPCConstrainedGetInner(ksp->pc, &pc));
-  /* with an indefinite preconditioner MINRES fails with various reasons: report the preconditioner */
+  /* MINRES reports an indefinite preconditioner as an indefinite matrix, or reaches its iteration limit */
   reason = ksp->reason;
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPMINRES, &minres));
   if (minres && (reason == KSP_DIVERGED_INDEFINITE_MAT || reason == KSP_DIVERGED_ITS))
