@@ -22,7 +22,7 @@ static void tabulate_face(const PetscReal x[4][3], PetscReal g[3][3], PetscReal 
 
 static void fill_face(SbElement e)
 {
-  e->gamma1 = 0.6; /* docs/reports/locking.md */
+  e->gamma1 = 0.6; /* chosen in docs/reports/locking.md */
   e->ops.tabulate = tabulate_face;
   e->ops.mass_lumped = 1. / 4;
   e->ops.mass_diagonal = 2. / 5;

@@ -181,7 +181,7 @@ PetscErrorCode SbSpaceAssembleConstraints(SbSpace s)
     PetscReal G[9], F[9];
     int n;
 
-    if (c->first[node] != i) continue; /* once for each node */
+    if (c->first[node] != i) continue; /* once per node */
     n = exact_constraints(s, node, number, G, F);
     for (int j = 0; j < 3 && n; j++) {
       const PetscReal b[3] = {G[j], n > 1 ? G[3 + j] : 0., n > 2 ? G[6 + j] : 0.};

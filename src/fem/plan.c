@@ -88,7 +88,7 @@ static void sum_face_terms(SbSpace s, SbPlan p)
       PetscReal K[8][8];
 
       SbJumpMatrix(s, b, l, K);
-      if (K[0][0] == 0.) continue; // padding
+      if (K[0][0] == 0.) continue; // padding lanes are zero
       for (int k = 0; k < 64; k++) {
         const PetscInt row = node[k / 8 * SB_BATCH], column = node[k % 8 * SB_BATCH];
         const int q = column >= s->nnode_owned;

@@ -61,14 +61,13 @@ struct _p_SbLedger {
   PetscReal seconds, solving, residuals; /* seconds on this rank: all estimates, solves, residuals */
 
   /* adaptive_tolerance.c */
-  PetscBool may_tune; /* the program chooses tolerances */
-  PetscReal rtol;     /* relative tolerance of solves */
-  PetscInt repeats;   /* number of solves that were repeated for their accuracy */
-  PetscInt narrowed;  /* number of reductions of contact widths */
-  PetscBool mesh_bounds,
-    width_bounds;                 /* contact error above its share: mesh error is larger; width is fixed */
-  PetscInt nstep, nkept;          /* -step_time_budget: number of steps; of those within the budget */
-  PetscReal wall, longest, total; /* seconds at the last step; longest step; sum */
+  PetscBool may_tune;                  /* the program chooses tolerances */
+  PetscReal rtol;                      /* relative tolerance of solves */
+  PetscInt repeats;                    /* number of solves that were repeated for their accuracy */
+  PetscInt narrowed;                   /* number of reductions of contact widths */
+  PetscBool mesh_bounds, width_bounds; /* contact may exceed its share: mesh error is larger; width fixed */
+  PetscInt nstep, nkept;               /* -step_time_budget: number of steps; of those within the budget */
+  PetscReal wall, longest, total;      /* seconds at the last step; longest step; sum */
 };
 
 /* difference.c: step length for finite differences along D: moves bodies by at most a millionth of their size; 0 for D = 0. Collective. */
@@ -96,9 +95,7 @@ PetscErrorCode SbEstimateGaps(SbLedger l, Vec U, PetscReal enough, PetscReal *er
 /* adaptive_tolerance.c */
 PetscErrorCode SbAdaptiveToleranceSetFromOptions(SbLedger l);
 PetscErrorCode SbAdaptiveToleranceAttach(SbLedger l);
-PetscErrorCode
-SbAdaptiveToleranceSet(SbLedger l,
-                       PetscReal rtol); /* sets the tolerance of solves, unless it is the user's */
+PetscErrorCode SbAdaptiveToleranceSet(SbLedger l, PetscReal rtol); /* sets the tolerance of solves */
 PetscErrorCode SbAdaptiveToleranceUpdate(SbLedger l, const SbSolvedStep *step, PetscBool *again);
 PetscErrorCode SbAdaptiveToleranceAccept(SbLedger l, const SbStep *step);
 

@@ -93,9 +93,7 @@ SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbPack 
   }
   for (int ij = 0; ij < 9; ij++) {
     for (int kl = ij; kl < 9; kl++) {
-      const int row = kl / 3 - ij / 3,
-                column = (kl % 3 - ij % 3 + 3) %
-                         3; /* column of kl relative to that of ij: 0 the same, 1 the next, 2 the previous */
+      const int row = kl / 3 - ij / 3, column = (kl % 3 - ij % 3 + 3) % 3; /* 0 same, 1 next, 2 previous */
       const int third = 3 * ((6 - ij / 3 - kl / 3) % 3) + (6 - ij % 3 - kl % 3) % 3;
       const PetscReal same = ij == kl, sign = row && column ? (row == column ? 1 : -1) : 0;
       SbPack c;

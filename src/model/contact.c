@@ -11,7 +11,7 @@ PetscErrorCode SbModelContactResume(SbModel m)
   PetscFunctionBeginUser;
   if (!s->constraints) PetscFunctionReturn(PETSC_SUCCESS);
   SbSpaceClearConstraints(s);
-  for (int across = 0; across < 2; across++) { /* normals of all effects first */
+  for (int across = 0; across < 2; across++) { /* first the normals of all effects */
     for (PetscInt e = 0; e < m->nassemble_constraints; e++)
       SbEffectCall(m->assemble_constraints[e], assemble_constraints, s, (PetscBool)across);
   }

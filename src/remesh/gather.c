@@ -7,7 +7,7 @@
 */
 #include "remesh_impl.h"
 
-/* The vectors of a run. */
+/* Vectors of a run: U, then V, A if it has them; returns their number. */
 static PetscInt vectors_of(SbRun run, Vec vec[3])
 {
   PetscInt n = 0;

@@ -105,7 +105,7 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
   r->tried = -1;
   PetscCall(PetscCalloc7(m->nbody, &r->named, m->nbody, &r->due, m->nbody, &r->asked, m->nbody, &r->bound,
                          m->nbody, &r->worst, m->nbody, &r->from, m->nbody, &r->rest));
-  // when supports come and go after the start
+  // times at which supports come and go after the start
   PetscCall(PetscMalloc1(2 * m->neffect, &r->change));
   for (PetscInt e = 0; e < m->neffect; e++) {
     const SbEffect effect = m->effect[e];
@@ -281,7 +281,7 @@ PetscErrorCode SbRemeshAttach(SbRemesh r, SbRun run)
 
 /* ------------------------------------------------------------------ the new scene */
 
-/* A scene: the old one, or the new one. */
+/* A scene: model, run and ledger. */
 typedef struct {
   SbModel model;
   SbRun run;

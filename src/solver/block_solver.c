@@ -13,10 +13,9 @@ struct _p_SbBlockSolver {
   PetscMPIInt rank, size;
   PetscInt n, N; /* number of block rows of this rank; of all ranks */
   MPI_Datatype triple, block;
-  PetscMPIInt *row_count, *row_first, *entry_count,
-    *entry_first;       /* [size] counts and displacements of the ranks, for MPI */
-  PetscInt *ia, *ja;    /* rank 0: pattern of all rows */
-  PetscReal *value, *x; /* rank 0 of several: blocks of all rows; right-hand side and solution */
+  PetscMPIInt *row_count, *row_first, *entry_count, *entry_first; /* [size] MPI counts and displacements */
+  PetscInt *ia, *ja;                                              /* rank 0: pattern of all rows */
+  PetscReal *value, *x; /* rank 0 of several: blocks of all rows; right-hand side, solution */
   SbFactor factor;
   PetscInt64 dissected; /* number of entries of the factor when METIS ordered it */
 };

@@ -20,7 +20,7 @@ PetscErrorCode SbAggregate(SbSpace space, PetscInt wanted, PetscInt *n, PetscInt
 typedef struct _p_SbCoarse *SbCoarse;
 struct _p_SbCoarse {
   SbSpace space;
-  PetscInt n, first, N;   /* number of own aggregates, global number of the first one, number of all */
+  PetscInt n, first, N;   /* number of own aggregates, of the first one, of all */
   PetscInt *agg;          /* [nnode] global number of the aggregate, -1 for fully prescribed nodes */
   PetscReal *d;           /* [nnode][3] position relative to the aggregate's centre, over its radius */
   PetscReal *centre;      /* [n][4] centre, m, and radius, m; 0 for a single node */

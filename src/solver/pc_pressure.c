@@ -32,7 +32,7 @@
 #define RESTART 120        /* restart length of GMRES: 80 took 97 iterations instead of 81 on 64 ranks */
 #define LARGEST_WEIGHT 1e4 /* largest lambda / mu in the weighted norm of GMRES */
 #define MARGIN 0.3         /* target of GMRES over the target of the whole solve */
-#define TIGHTER 0.03       /* the same after a correction that did not reduce the residual */
+#define TIGHTER 0.03       /* factor on it after a correction that did not reduce the residual */
 #define OF_PART 1e-2 /* tolerance of GMRES where the operator has terms that K lacks, which FGMRES corrects */
 #define AT_MOST 1e-2 /* largest accepted residual over the right-hand side */
 #define ROUNDING 4.  /* accepted residual, over the rounding error of K u */
@@ -46,7 +46,7 @@ typedef struct {
   PetscReal *weight;         /* [ncell_owned] weights of the cells' rows, N/m^3 */
   KSP ksp;                   /* solver with the convergence test below; borrowed */
   PetscReal target, last;    /* target of the residual norm; the last residual norm, N */
-  PetscReal size, margin;    /* norm of the right-hand side, N; MARGIN or TIGHTER, for the next correction */
+  PetscReal size, margin;    /* norm of the right-hand side, N; current value of MARGIN */
   PetscInt its, limit, slow; /* iterations of GMRES, their limit; corrections without effect */
   PetscInt nsolve, total, most;
 } Pressure;

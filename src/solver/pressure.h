@@ -17,7 +17,7 @@ struct _p_SbLevels {
   Mat A[3];      /* matrices of the levels: BAIJ; the last one AIJ */
   SbElement *element[3];
   PetscReal shift_a, shift_v, shift_k; /* shifts of the last assembly */
-  PetscInt *mean;    /* [nnode] CR node (at[1]) of each DG node; NULL without a DG body, as the next three */
+  PetscInt *mean;    /* [nnode] CR node (at[1]) of a DG node; NULL without DG, as the next three */
   PetscInt *across;  /* [nnode] node on the other side of the face, -1: none */
   PetscReal *weight; /* [nnode] own weight in the mean of the two sides */
   PetscReal *jump;   /* [nnode_owned] inverse stiffness of the jump, m/N */
@@ -27,7 +27,7 @@ struct _p_SbLevels {
   Vec t[3], w[3];       /* work vectors without ghosts; t[0] is the diagonal of A[0] with a DG body */
   PetscBool sprung;     /* this rank has had springs since the last assembly */
   PetscReal *spring;    /* [nnode_owned][9] sum of the springs of effects, N/m; NULL: none */
-  PetscReal *shared;    /* [nodes of at[n-2]][9] the same on that level; NULL before any rank has springs */
+  PetscReal *shared;    /* [nodes of at[n-2]][9] the same there; NULL before any rank has springs */
   KSP coarse;           /* solver of the P1 level; NULL with a P2 body */
   PC multigrid;         /* preconditioner of a space with a P2 body, else NULL */
   PetscReal *inverse;   /* [nodes of at[n-2]][9] inverse diagonal blocks of that level, m/N */

@@ -308,7 +308,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
                             unknowns));
   } else if (s->edge_node && !s->faces && hard.nu <= (hard.slivers ? NU_PRESSURE : NU_SLIVERS) &&
              unknowns > (indefinite || hard.slivers ? SB_DIRECT_SMALL : P_MULTIGRID)) {
-    /* docs/reports/solver_choice.md */
+    /* measured in docs/reports/solver_choice.md */
     name = "cg_p_multigrid";
     PetscCall(PetscSNPrintf(
       reason, size,
@@ -326,7 +326,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
                           : s->edge_node && !s->faces && hard.nu > NU_SLIVERS ? DIRECT_NEXT
                           : !s->faces && hard.nu > NU_LOCKED                  ? DIRECT_P1
                                                                               : 0)) {
-    /* docs/reports/solver_choice.md */
+    /* measured in docs/reports/solver_choice.md */
     name = package;
     PetscCall(PetscSNPrintf(reason, size,
                             "%" PetscInt_FMT
@@ -405,7 +405,7 @@ PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscB
     if (failed->direct && !memory && !direct) continue;
     /* The first listed fallback of a name that has not failed yet and supports this space; NULL: none. */
     *preset = direct ? NULL : find_preset(others[k].name);
-    /* next factorisation: one for indefinite matrices, whether by rounding or by stress */
+    /* factorisation: one for definite matrices, then one for indefinite ones, which stress or rounding may cause */
     for (int j = indefinite; direct && j < 2 && !*preset; j++) {
       const char *package;
 
@@ -568,8 +568,7 @@ PetscErrorCode SbSolverUpdateSymmetry(KSP ksp, SbSpace s)
   PetscFunctionBeginUser;
   if (!c || !c->nonsymmetric || c->general == c->tilted) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(is_symmetric(ksp, &symmetric));
-  if (!symmetric && !c->general)
-    PetscFunctionReturn(PETSC_SUCCESS); /* the method handles nonsymmetric systems */
+  if (!symmetric && !c->general) PetscFunctionReturn(PETSC_SUCCESS); /* handles nonsymmetric systems */
   if (symmetric) {
     PetscCall(KSPGetType(ksp, &type));
     PetscCall(PetscStrncpy(c->method, type, sizeof(c->method)));

@@ -45,7 +45,7 @@ typedef struct {
   PetscReal turned;        /* sign of dlambda at the start of the last step */
 } Path;
 
-/* (a, b), m^2. */
+/* Weighted product (a, b), m^2. */
 static PetscErrorCode product(Path *p, Vec a, Vec b, PetscReal *value)
 {
   PetscFunctionBeginUser;

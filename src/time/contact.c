@@ -75,8 +75,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
   PetscCall(SNESComputeFunction(snes, U, run->R));
   PetscCall(VecNorm(run->R, NORM_2, &size));
   if (PetscIsInfOrNanReal(size)) size = 0;
-  if (constrained)
-    PetscCall(set_aim(snes, &aim, size, least, rough)); /* without constraints the tolerances stay */
+  if (constrained) PetscCall(set_aim(snes, &aim, size, least, rough)); /* else the user's tolerances */
   PetscCall(SbSolverUpdateSymmetry(aim.ksp, m->space));
   PetscCall((*step->solve)(step->ctx, U, reason));
 

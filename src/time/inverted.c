@@ -20,7 +20,7 @@ PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const V
     PetscReal energy, volume;
     const PetscReal *u;
 
-    /* number of tets with det F <= 0, all ranks, and the smallest det F */
+    /* number of tets with det F <= 0, all ranks, and smallest det F */
     PetscCall(SbSpaceGetLocalRead(s, U[k], &u));
     SbSpaceStrainEnergy(s, u, NULL, &energy, &least[k], &n[k], &volume);
     PetscCall(SbSpaceRestoreLocalRead(s, U[k], &u));

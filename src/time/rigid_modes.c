@@ -109,7 +109,7 @@ static inline PetscReal coordinate(SbSpace s, const PetscScalar u[], PetscInt k)
   return s->node_x[k] + (s->linear ? 0. : u[k]);
 }
 
-/* Body, centre and size of a part. */
+/* Finds body, centre and size of a part. */
 static PetscErrorCode measure(SbRun run, const PetscInt label[], Part *part)
 {
   SbSpace s = run->model->space;
@@ -190,7 +190,7 @@ static PetscErrorCode choose_axis(SbRun run, Vec d, Vec lost[6], Vec z[6], Part 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The free motions of a part; along: one of them (may be NULL). */
+/* Finds the free motions of a part; along: displacements of one of them (may be NULL). */
 static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *part, Vec along)
 {
   PetscReal x[36];
@@ -356,8 +356,7 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
   PetscFunctionBeginUser;
   *body = -1;
   PetscCall(MatHasOperation(run->J, MATOP_GET_DIAGONAL, &diagonal));
-  if (!diagonal)
-    PetscFunctionReturn(PETSC_SUCCESS); /* -solver realtime has no diagonal, and is for dynamic runs only */
+  if (!diagonal) PetscFunctionReturn(PETSC_SUCCESS); /* realtime is for dynamic runs */
 
   /* the first part with a free motion */
   PetscCall(SbSpaceCreateVec(run->model->space, &d));

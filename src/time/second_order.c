@@ -173,7 +173,7 @@ static PetscErrorCode solve(void *ctx, Vec X, SNESConvergedReason *reason)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The residual without contact forces. */
+/* R = the residual without contact forces, for contact iterations. */
 static PetscErrorCode contact_residual(void *ts, Vec X, Vec R)
 {
   SecondOrder *so = (SecondOrder *)((TS)ts)->data;
