@@ -65,7 +65,7 @@ struct _p_SbJump {
   SbPack *c0, *c1;  /* [nbatch] factors above, N/m; zero in padding */
   SbPack *r;        /* [nbatch][9] offsets of the jumps, m; NULL before kappa1 changes in a dynamic run */
   PetscBool began;  /* the run has made time steps, or its checkpoint has */
-  PetscBool renew;  /* penalties of a checkpoint differ from those of the rest state */
+  PetscBool renew;  /* penalties restored from a checkpoint differ from those of the rest state */
   SbPack *share;    /* [nbatch] fraction of a face's energy that this rank counts: 1, or 1/2 between ranks */
 };
 
@@ -315,7 +315,7 @@ PetscErrorCode SbJumpRenew(SbSpace s, const PetscReal x[], PetscBool first, Pets
       if (PetscAbsReal(j->c1[b][l] - before) > RENEWED * before) *changed = PETSC_TRUE;
       if (!x || j->c1[b][l] == 0.) continue;
 
-      /* fraction of the jumps that keeps the energy or, first, the force */
+      /* scale the jumps so that the face keeps its energy or, in the first step, its force */
       face_factors(s, j, &j->face[i], PETSC_TRUE, &c0, &least);
       kept = before / j->c1[b][l];
       held =

@@ -8,7 +8,7 @@
   petsc/private/petscimpl.h: there is no public call to increase the state of a parallel matrix after writing to its
   sequential parts.
 
-  Prescribed unknowns: their rows and columns are cleared but for the diagonal entry, which keeps its
+  Prescribed unknowns: their rows and columns are zero except for the diagonal entry, which keeps its
   magnitude, so that the scaling of the matrix is unchanged.
 */
 #include "fem_impl.h"

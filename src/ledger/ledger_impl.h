@@ -107,7 +107,7 @@ PetscErrorCode SbQuantityContinue(SbLedger from, SbLedger to);
 PetscErrorCode SbQuantityValue(SbLedger l, const SbStep *step);
 PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step);
 
-/* Seconds by source, and the others; largest value of all ranks. */
+/* Seconds by source of error, and other seconds; maximum over the ranks. */
 typedef struct {
   PetscReal source[SB_ERROR_COUNT], search, setup, output, estimates, total;
 } SbLedgerSeconds;

@@ -21,7 +21,7 @@
 #include "model_impl.h"
 
 #define REDUCTIONS 8 /* most reductions of e within a step; then e = 0 */
-#define SAFE 0.9     /* factor on e, beside most / W, which is exact for W proportional to e */
+#define SAFE 0.9     /* safety factor on the reduced e; most / W is exact for W proportional to e */
 #define STEEP 2.1    /* factor on the excess 1 - most / W: a stiff body's W / D grows with the root of e */
 #define ROUND 1e-9   /* relative tolerance of W <= D */
 

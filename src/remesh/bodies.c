@@ -353,7 +353,8 @@ static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *
     for (PetscInt c = 0; c < w->mesh.ncell; c++) new_values(w, c, value + each * (size_t)c);
     (*in_memory)->step = step;
     (*in_memory)->mass = w->g->mass[w->body];
-    (*in_memory)->bound = w->mesh.quality; /* the caller derives a bound from it */
+    (*in_memory)->bound =
+      w->mesh.quality; /* quality of the worst tet; the caller derives the bound for re-meshing */
   } else {
     PetscCall(PetscArraycpy(value, w->g->value + each * (size_t)w->cell0, each * (size_t)w->ncell));
     if (body->in_memory) {

@@ -3,7 +3,7 @@
   any preconditioner M. If K lacks a part of the tangent, A has the complete one, and K is the preconditioner's matrix.
 
   With SB_SADDLE_DIRECT a factorisation of the projected matrix replaces M. It is the inverse of A in the null space, so that one
-  iteration is enough, but for rounding. Without active constraints M itself is used.
+  iteration is enough, up to rounding. Without active constraints M itself is used.
 */
 #include "solver_impl.h"
 #include "sbsolver.h"
@@ -87,7 +87,7 @@ static PetscErrorCode setup_wrapped(PC pc)
   PetscCall(PCSetOperators(w->inner, K, K));
   PetscCall(PCSetFailedReason(pc, PC_NOERROR));
   w->space->constraints->matrix++;
-  if (is_factored(w->space)) PetscFunctionReturn(PETSC_SUCCESS); /* K alone may be singular */
+  if (is_factored(w->space)) PetscFunctionReturn(PETSC_SUCCESS); /* no set-up of M: K alone may be singular */
   PetscCall(PCSetUp(w->inner));
   PetscCall(PCGetFailedReason(w->inner, &reason));
   PetscCall(PCSetFailedReason(pc, reason));

@@ -438,7 +438,7 @@ PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *bl
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   if (fresh || !c->rows.value) PetscCall(merge(c, K, blocks));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
-  /* CG only where a factor of these values does not exist and would cost more */
+  /* factor by choice, if small, while CG pauses, or if a factor of these values exists */
   factored = (PetscBool)(is_factored(c->choice, c->type) ||
                          (!c->type[0] && !c->choice &&
                           (3 * c->space->Nnode <= SMALL || c->nsolve < c->resume || !c->fresh[1])));

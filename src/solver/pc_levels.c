@@ -285,7 +285,7 @@ PetscErrorCode SbLevelsAddSpring(SbLevels v, PetscInt node, PetscReal factor, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gathers the springs of all ranks at nodes at[n-2], ghosts included; one row of blocks after the other. */
+/* Adds the springs of all ranks in shared[nodes of at[n-2]][9], ghosts included, one row of the blocks at a time. */
 static PetscErrorCode gather_springs(SbLevels v)
 {
   const SbSpace s = v->space;

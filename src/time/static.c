@@ -88,7 +88,7 @@ static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* When find_free_body() is called. */
+/* Calls of find_free_body(). */
 typedef enum {
   BEFORE, /* before a step is solved */
   FAILED,
