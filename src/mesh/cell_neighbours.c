@@ -1,6 +1,6 @@
 /*
-  cell_neighbours.c - connectivity for elements with nodes at faces or edges: cells across faces, cells around edges,
-  numbers of ghost cells; star forests for their exchange.
+  cell_neighbours.c - mesh connectivity for elements with nodes at faces or edges: neighbours of a cell across its faces, cells around an edge,
+  global numbers of ghost cells; star forests for the exchange of cell and face data.
 */
 #include "mesh_impl.h"
 
@@ -16,7 +16,7 @@ PetscErrorCode SbMeshNeighbours(SbMesh mesh, PetscInt **neighbour)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The edges go into the bucket of their lower vertex (a counting sort); in it those with the same higher vertex are one. */
+/* Counting sort: each edge goes into the bucket of its lower vertex; equal higher vertices within a bucket are one edge. */
 PetscErrorCode SbMeshEdges(SbMesh mesh, PetscInt *nedge, PetscInt **edge)
 {
   const PetscInt n = 6 * mesh->ncell;
@@ -62,7 +62,7 @@ PetscErrorCode SbForestOnRank0(MPI_Comm comm, PetscInt N, PetscInt n, const Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* n numbers as one. */
+/* MPI type of n contiguous items of type `one`. */
 static PetscErrorCode create_type(PetscInt n, MPI_Datatype one, MPI_Datatype *type)
 {
   PetscMPIInt count;

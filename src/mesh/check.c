@@ -1,12 +1,12 @@
 /*
-  check.c - what must hold for a body's mesh before anything is computed on it.
+  check.c - validity checks of a body's mesh, before anything is computed on it.
 
-  Repaired and counted: vertices that no tet uses are left out, tets with negative orientation get two vertices swapped.
-  Refused: a tet without volume, a tet given twice, a face of three tets; with these the mass or the stiffness would be
-  wrong. Counted: triangles of groups that are no face of a tet, surface edges where more than two facets meet (parts of
-  the body hang together like hinges there).
+  Repaired and counted: unused vertices are removed; tets with negative orientation have two vertices swapped.
+  Errors: a tet of zero volume, a duplicate tet, a face of three tets; each would make the mass or the stiffness matrix
+  wrong. Counted: group triangles that are not a face of any tet; surface edges with more than two facets, which
+  connect parts of the body like hinges.
 
-  A tet is flat when its height over the longest edge L is below 1e-12, or below the rounding of its coordinates:
+  A tet is flat when its height over the longest edge L is below 1e-12 L, or below the rounding of its coordinates:
   |det| <= (1e-12 L + 8 eps max|x|) L^2. The thinnest slivers worth simulating are nine orders above the first term.
 */
 #include "mesh_impl.h"
@@ -68,7 +68,7 @@ PetscErrorCode SbImportOrient(SbImport *im, PetscReal largest)
   for (PetscInt c = 0; c < im->item[3].n; c++) {
     PetscInt *v = im->item[3].vert + 4 * c;
 
-    // flat, perhaps because it uses a node twice
+    // a flat tet, perhaps because it has the same node twice
     if (SbTetFlat(im->x, v, largest, &det)) {
       for (int i = 0; i < 4; i++) {
         for (int j = 0; j < i; j++) {
@@ -115,7 +115,7 @@ PetscErrorCode SbImportOverlap(const SbImport *im, const int64_t number[3], Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Two cells with equal vertices share all four faces; a third cell at one of these faces makes it a shared one. */
+/* Two cells with equal vertices share all four faces; with a third cell at one of them the face counts as shared by three. */
 PetscErrorCode SbImportCheckFaces(const SbImport *im, const SbFaces *faces)
 {
   const int64_t *number = im->item[3].number;
@@ -181,10 +181,10 @@ PetscErrorCode SbImportCheck(SbImport *im, SbFaces *faces)
   PetscCall(SbImportOrient(im, SbImportLargest(im)));
   PetscCall(SbFacesCreate(im->nvert, im->item[3].n, im->item[3].vert, faces));
   PetscCall(SbImportCheckFaces(im, faces));
-  // triangles of groups that are no face of a tet
+  // group triangles that are not a face of any tet
   for (PetscInt t = 0; t < im->item[2].n; t++)
     im->nlost += !SbFacesFind(faces, im->item[2].vert + 3 * t, slots);
-  // on a closed surface two facets meet at every edge
+  // on a closed surface each edge has two facets
   PetscCall(PetscMalloc1(3 * faces->nboundary, &edge));
   SbBoundaryEdges(im, faces, NULL, edge);
   PetscCall(SbCountPinched(3 * faces->nboundary, edge, &im->npinched));

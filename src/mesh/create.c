@@ -1,4 +1,4 @@
-/* create.c - the mesh of a scene, from files to numbered pieces on all ranks. */
+/* create.c - the distributed mesh of a scenario, from the mesh files to the numbered local meshes of all ranks. */
 #include "mesh_impl.h"
 #include "sbsurface.h"
 #include "sblog.h"
@@ -43,7 +43,7 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
   PetscCall(SbMergedMeshCreate(comm, (SbReading)reading, nbody, body, nset, set, &merged));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
-  // repairs and oddities always, once for copies of one mesh, the rest on request
+  // repairs and warnings are always reported, once for copies of the same mesh; the statistics on request
   for (PetscInt b = 0; b < nbody; b++) {
     const SbBody *p = &body[b];
     const PetscBool again = (PetscBool)(b && p->copy_of[0] && !strcmp(p[-1].copy_of, p->copy_of) &&

@@ -1,8 +1,8 @@
 /*
-  curve.c - tets with curved edges: a mesh of second order whose nodes at edges lie off the middle.
+  curve.c - tets with curved edges: cells of a second-order mesh whose edge nodes are not at the midpoints.
 
-  x(l) = sum_a phi_a(l) x_a with the basis of P2 (src/base/quadratic_map.c). The map must have a positive Jacobian, which is examined where it is used, at the
-  points of the rule, and at the ten nodes. The volume is the integral of the Jacobian, a cubic polynomial.
+  x(l) = sum_a phi_a(l) x_a with the P2 basis (src/base/quadratic_map.c). The Jacobian of the map must be positive: it is checked at the
+  quadrature points and at the ten nodes. The volume is the integral of the Jacobian, a cubic polynomial.
 */
 #include "mesh_impl.h"
 #include "sbkernel.h"
@@ -15,7 +15,7 @@ static int compare(const void *a, const void *b)
   return (p[1] > q[1]) - (p[1] < q[1]);
 }
 
-/* Six times the volume of the P1 tet with the derivatives at L. */
+/* Jacobian of the map at the barycentric coordinates L: six times the volume of the P1 tet with the same gradients. */
 static PetscReal jacobian(const PetscReal x[SB_CELL_NODES][3], const PetscReal L[4])
 {
   static const PetscInt own[4] = {0, 1, 2, 3};
@@ -47,7 +47,7 @@ PetscReal SbTetCurvedLeast(const PetscReal x[], const PetscInt v[4], const Petsc
     if (n >= 0 && n < 4) L[n] = 1;
     if (n >= 4) L[SbTetEdge[n - 4][0]] = L[SbTetEdge[n - 4][1]] = 0.5;
     at = jacobian((const PetscReal(*)[3])node, n < 0 ? SbRuleQuintic.L[q] : L);
-    if (at < least || isnan(at)) least = at; /* offsets may overflow */
+    if (at < least || isnan(at)) least = at; /* NaN: the offsets may overflow */
   }
   return least / SbTetDeterminant(x, v);
 }
@@ -72,15 +72,15 @@ PetscBool SbImportOffsets(const SbImport *im, int dim, const PetscInt v[], Petsc
   return curved;
 }
 
-/* Curved cells. */
+/* Statistics of curved cells. */
 typedef struct {
-  PetscInt n[2];    /* of them, and how many fold over themselves */
-  int64_t number;   /* the first that does, in the file */
-  PetscReal least;  /* its least Jacobian over that of the straight tet */
-  PetscReal volume; /* sum of the changes relative to straight tets, m^3 */
+  PetscInt n[2];    /* numbers of curved cells, and of those whose Jacobian is not positive */
+  int64_t number;   /* file number of the first cell whose Jacobian is not positive */
+  PetscReal least;  /* its smallest Jacobian over that of the straight tet */
+  PetscReal volume; /* sum of the volume changes relative to straight tets, m^3 */
 } Curved;
 
-/* This rank's, with their edges unless they are only measured, without cell[]. */
+/* The curved cells of this rank, with their edge offsets if `keep`; without cell[] they are only counted. */
 static PetscErrorCode find_curved(const SbImport *im, PetscBool keep, uint64_t cell[], PetscReal **edge_off,
                                   Curved *found)
 {
@@ -95,7 +95,7 @@ static PetscErrorCode find_curved(const SbImport *im, PetscBool keep, uint64_t c
     found->n[0]++;
     if (!keep) continue;
 
-    // its Jacobian where it is used and at its nodes, and its volume instead of that of the straight tet
+    // smallest Jacobian at quadrature points and nodes, and the change of volume relative to the straight tet
     least = SbTetCurvedLeast(im->x, v, off);
     if (!(least > 0) && !found->n[1]++) {
       found->number = im->item[3].number[c];
@@ -155,7 +155,7 @@ PetscErrorCode SbMeshCurve(SbMesh mesh, PetscInt n, const PetscInt orig[], const
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_INT, MPI_SUM, mesh->comm));
   if (!total) PetscFunctionReturn(PETSC_SUCCESS);
-  // from the ranks that read them to the home ranks of their numbers
+  // offsets go from the ranks that read them to the home ranks of the cells' original numbers
   PetscCall(PetscLayoutCreateFromSizes(mesh->comm, PETSC_DECIDE, mesh->Ncell, 1, &rows));
   PetscCall(PetscLayoutGetLocalSize(rows, &ndealt));
   PetscCall(PetscMalloc1(18 * (size_t)ndealt, &dealt));
@@ -163,7 +163,7 @@ PetscErrorCode SbMeshCurve(SbMesh mesh, PetscInt n, const PetscInt orig[], const
   PetscCall(PetscSFSetGraphLayout(sf, rows, n, NULL, PETSC_COPY_VALUES, orig));
   PetscCall(SbForestReduce(sf, 18, MPIU_REAL, off, dealt));
   PetscCall(PetscSFDestroy(&sf));
-  // and from there to where the cells are
+  // and from the home ranks to all ranks that have the cells, ghosts included
   PetscCall(PetscCalloc1(18 * (size_t)mesh->ncell, &mesh->edge_off));
   PetscCall(PetscMalloc2(mesh->ncell, &leaf, mesh->ncell, &root));
   for (PetscInt c = 0; c < mesh->ncell; c++) {

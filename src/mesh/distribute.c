@@ -1,19 +1,19 @@
 /*
-  distribute.c - the whole, cut into parts: each rank gets its cells, their vertices, and copies of cells of other ranks (ghosts).
+  distribute.c - distribution of the merged mesh: each rank gets its cells, their vertices, and copies of cells of other ranks (ghosts).
 
-  Cells go straight to their owners, with their vertices; a vertex is written down once for each rank that it goes to. Which ranks have a vertex is
-  found by a directory: rank r keeps the list of the vertices with the original numbers of the r-th block. Vertices on the border of the same
-  ranks are sorted along the longest side of their box and shared out in equal runs: all ranks that have them decide alike, everybody owns about as many, and
-  the runs are compact, so that few cells have to be copied. Then each rank sends copies of its cells to the owners of their vertices.
+  Cells are sent directly to their owners, with their vertices: a vertex is sent once to each rank that needs it. A distributed directory
+  tells which ranks have a vertex: rank r keeps the r-th block of original vertex numbers. Vertices that are shared by the same set of
+  ranks are sorted along the longest axis of their bounding box and divided among these ranks in equal contiguous parts: all of them compute the same
+  owners, the load is balanced, and the parts are compact, so that there are few ghosts. Then each rank sends copies of its cells to the owners of their vertices.
 */
 #include <stdlib.h>
 #include "mesh_impl.h"
 
-/* ------------------------------------------------------------------ cells on their way */
+/* ------------------------------------------------------------------ sending cells */
 
-/* Cells with their vertices, and the owners of these where they are known. */
+/* Cells with their vertices, and the owners of the vertices once they are assigned. */
 typedef struct {
-  PetscBool owned; /* they are known; alike on all ranks, also on those without cells */
+  PetscBool owned; /* owner[] is assigned; equal on all ranks, also on those without cells */
   PetscInt ncell, nvert;
   PetscInt *cell;       /* [ncell][4] positions in vertex[] */
   SbCellData *data;     /* [ncell] */
@@ -31,7 +31,7 @@ static PetscErrorCode cells_destroy(Cells *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sends the cells which[] (NULL: all) to ranks dest[], as the route says. */
+/* Sends the cells which[] (NULL: all cells) to ranks dest[] of the route. */
 static PetscErrorCode send_cells(const Cells *from, const SbRoute *route, const PetscInt which[],
                                  const PetscMPIInt dest[], Cells *to)
 {
@@ -43,7 +43,7 @@ static PetscErrorCode send_cells(const Cells *from, const SbRoute *route, const 
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(to, sizeof(*to)));
-  // for each rank the vertices of the cells that go there, in the order of their first cell; at[][4]: the places of a cell's vertices in that list
+  // for each rank the list of vertices to send, in the order of the cells; at[][4]: positions of a cell's vertices in the list of its rank
   PetscCall(PetscMalloc1(4 * (size_t)route->nsend, &at));
   PetscCall(
     PetscMalloc4(route->nsend, &order, from->nvert, &position, route->size, &count, from->nvert, &mark));
@@ -80,14 +80,14 @@ static PetscErrorCode send_cells(const Cells *from, const SbRoute *route, const 
     for (PetscInt i = 4 * route->rfirst[r]; i < 4 * (route->rfirst[r] + route->rcount[r]); i++)
       to->cell[i] += vertices.rfirst[r];
   }
-  /* data of cells */
+  /* cell data */
   if (which) {
     PetscCall(PetscMalloc1(route->nsend, &data));
     for (PetscInt i = 0; i < route->nsend; i++) data[i] = from->data[which[i]];
   }
   PetscCall(SbRouteSend(route, sizeof(SbCellData), which ? data : from->data, &to->data));
   PetscCall(PetscFree(data));
-  /* data of vertices */
+  /* vertex data */
   PetscCall(PetscMalloc1(nlist, &vertex));
   for (PetscInt i = 0; i < nlist; i++) vertex[i] = from->vertex[list[i]];
   PetscCall(SbRouteSend(&vertices, sizeof(SbVertexData), vertex, &to->vertex));
@@ -103,7 +103,7 @@ static PetscErrorCode send_cells(const Cells *from, const SbRoute *route, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Places of numbers in ascending order: order[n]. */
+/* Permutation that sorts the numbers in ascending order: order[n]. */
 static PetscErrorCode ascending(PetscInt n, const PetscInt number[], PetscInt order[])
 {
   PetscFunctionBeginUser;
@@ -112,20 +112,20 @@ static PetscErrorCode ascending(PetscInt n, const PetscInt number[], PetscInt or
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ vertices on several ranks */
+/* ------------------------------------------------------------------ shared vertices */
 
 typedef struct {
   PetscInt vert, orig, n;
-  const PetscInt *rank; /* [n] that have it, ascending; every second number of the list */
+  const PetscInt *rank; /* [n] ranks that have the vertex, ascending; stride 2 in Border.pair */
   PetscReal along;
 } Shared;
 typedef struct {
   PetscInt n;
   Shared *vert;   /* [n] */
-  PetscInt *pair; /* {original number, rank} of all of them, ascending */
+  PetscInt *pair; /* pairs {original number, rank} of all shared vertices, ascending */
 } Border;
 
-/* Vertices that other ranks have, too, with these ranks: from the directory. */
+/* Shared vertices of this rank with the ranks that have them, from the directory. */
 static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbLocalMesh *local, Border *border)
 {
   const PetscInt n = local->nvert_cells;
@@ -146,13 +146,13 @@ static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbLocal
   PetscCall(SbRouteCreate(comm, n, dest, &there));
   PetscCall(SbRouteSend(&there, sizeof(PetscInt), orig, &got));
   PetscCall(PetscFree2(orig, dest));
-  /* ranks of each vertex of the block, ascending */
+  /* ranks that have each vertex of this rank's block, ascending */
   for (PetscInt i = 0; i < there.nrecv; i++) got[i] -= first;
   PetscCall(SbBucketByKey(there.nrecv, got, block, &start, &holder));
   for (PetscInt i = 0; i < there.nrecv; i++) holder[i] = SbRouteSource(&there, holder[i]);
   PetscCall(SbRouteDestroy(&there));
   PetscCall(PetscFree(got));
-  /* each of them gets all of them */
+  /* each of these ranks gets the whole list */
   for (PetscInt v = 0; v < block; v++) {
     const PetscInt m = start[v + 1] - start[v];
 
@@ -175,7 +175,7 @@ static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbLocal
   PetscCall(SbRouteCreate(comm, npair, pair_dest, &back));
   PetscCall(SbRouteSend(&back, 2 * sizeof(PetscInt), pair, &border->pair));
   PetscCall(PetscFree2(pair, pair_dest));
-  /* blocks follow each other: the numbers ascend */
+  /* received from blocks of ascending ranks, so original numbers ascend */
   border->n = 0;
   for (PetscInt i = 0; i < back.nrecv; i++) border->n += !i || border->pair[2 * i] != border->pair[2 * i - 2];
   PetscCall(PetscMalloc1(border->n, &border->vert));
@@ -213,7 +213,7 @@ static int compare_shared(const void *a, const void *b)
 
 /* ------------------------------------------------------------------ ghosts */
 
-/* Which owned cells are copied to which ranks. */
+/* Lists the owned cells to copy, and the destination ranks. */
 static PetscErrorCode list_copies(const SbLocalMesh *local, const Border *border, PetscBool all,
                                   PetscMPIInt me, PetscMPIInt size, PetscInt *ncopy, PetscInt **copied,
                                   PetscMPIInt **dest)
@@ -221,11 +221,11 @@ static PetscErrorCode list_copies(const SbLocalMesh *local, const Border *border
   PetscInt *shared, *mark, n = 0;
 
   PetscFunctionBeginUser;
-  // where each vertex stands in the border
+  // position of each vertex in border->vert, -1: not shared
   PetscCall(PetscMalloc2(local->nvert_cells, &shared, size, &mark));
   for (PetscInt v = 0; v < local->nvert_cells; v++) shared[v] = -1;
   for (PetscInt i = 0; i < border->n; i++) shared[border->vert[i].vert] = i;
-  // counted, then listed: a cell goes to each rank that shares or owns one of its vertices, once
+  // count, then list: a cell goes once to each rank that owns one of its vertices (`all`: that has one)
   for (int pass = 0; pass < 2; pass++) {
     for (PetscMPIInt r = 0; r < size; r++) mark[r] = -1;
     n = 0;
@@ -258,7 +258,7 @@ static PetscErrorCode list_copies(const SbLocalMesh *local, const Border *border
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ all of it */
+/* ------------------------------------------------------------------ distribution */
 
 PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, SbMergedMesh *w,
                             SbLocalMesh *local)
@@ -272,7 +272,7 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
   PetscCall(PetscMemzero(local, sizeof(*local)));
   PetscCallMPI(MPI_Comm_size(comm, &size));
   from = (Cells){PETSC_FALSE, w->ncell, w->nvert, w->cell, w->data, w->vertex, NULL};
-  // one rank takes the arrays as they are
+  // on one rank the arrays are taken over without a copy
   if (size == 1) {
     w->cell = NULL;
     w->data = NULL;
@@ -295,12 +295,12 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
     PetscCall(SbRouteDestroy(&route));
     PetscCall(PetscFree(part));
   }
-  // owners of the vertices, and a layer of ghosts
+  // convert the received cells, assign vertex owners, add a layer of ghosts
   PetscCall(SbMergedMeshDestroy(w));
   if (size > 1) {
     PetscInt *number, *order, *position, n = 0;
 
-    // owned cells and their vertices by original number; a vertex that came from several ranks becomes one
+    // sort owned cells and their vertices by original number; merge the copies of a vertex received from several ranks
     PetscCall(PetscMalloc3(PetscMax(owned.nvert, owned.ncell), &number, PetscMax(owned.nvert, owned.ncell),
                            &order, owned.nvert, &position));
     for (PetscInt v = 0; v < owned.nvert; v++) number[v] = owned.vertex[v].orig;
@@ -328,7 +328,7 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
     PetscCall(cells_destroy(&owned));
   }
   PetscCall(PetscCalloc1(local->nvert, &local->owner));
-  // ghosts: who owns the vertices at the borders, which cells are sent to whom
+  // ghosts: owners of the shared vertices, then the cells to send
   if (size > 1) {
     PetscMPIInt rank, *dest;
     PetscInt *orig, *number, *order, *position, n = 0;
@@ -337,7 +337,7 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
 
     PetscCallMPI(MPI_Comm_rank(comm, &rank));
     PetscCall(border_create(comm, Nvert, local, &border));
-    // vertices of the same ranks go to them in equal runs along the longest side of their box
+    // the vertices of each set of ranks, in equal parts along the longest axis of their bounding box
     for (PetscInt v = 0; v < local->nvert_cells; v++) local->owner[v] = rank;
     if (border.n) qsort(border.vert, (size_t)border.n, sizeof(Shared), compare_shared);
     for (PetscInt i = 0; i < border.n; i += n) {
@@ -362,7 +362,7 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
       (Cells){PETSC_TRUE, local->ncell, local->nvert, local->cell, local->data, local->vertex, local->owner};
     PetscCall(send_cells(&own, &local->ghost, local->copied, dest, &ghost));
     PetscCall(PetscFree(dest));
-    // appends the ghosts and those of their vertices that are new here
+    // append the ghost cells, and those of their vertices that this rank does not have
     n = local->nvert;
     PetscCall(PetscMalloc4(local->nvert_cells, &orig, ghost.nvert, &number, ghost.nvert, &order, ghost.nvert,
                            &position));

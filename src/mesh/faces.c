@@ -1,15 +1,15 @@
 /*
-  faces.c - which cells share a face.
+  faces.c - face connectivity of a tet mesh: which cells share a face.
 
-  The four faces of every cell go into the bucket of their lowest vertex (a counting sort), and each bucket, some twenty
-  faces long, is sorted by the other two vertices: equal neighbours in it are one face. No hash table, no comparison of
-  triples; linear in the number of cells for meshes whose vertices have bounded degree, n log n for all others.
+  Counting sort: the four faces of every cell go into the bucket of their lowest vertex. Each bucket, of about twenty
+  faces, is sorted by the other two vertices; adjacent equal entries are one face. No hash table, no comparison of
+  triples. O(n) in the number of cells for meshes of bounded vertex degree, O(n log n) for all others.
 */
 #include "mesh_impl.h"
 
 const int SbFaceVertex[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
 
-/* Lowest vertex of a face, and the key of the other two. */
+/* Lowest vertex of a face, and the sort key of the other two vertices. */
 static inline PetscInt face_key(PetscInt a, PetscInt b, PetscInt c, uint64_t *key)
 {
   const PetscInt lo = PetscMin(PetscMin(a, b), c), hi = PetscMax(PetscMax(a, b), c);
@@ -51,14 +51,14 @@ PetscErrorCode SbFacesCreate(PetscInt nvert, PetscInt ncell, const PetscInt cell
     }
   }
   PetscCall(PetscFree(next));
-  // neighbours: each bucket, sorted
+  // neighbours: sort each bucket
   PetscCall(PetscMalloc1(4 * (size_t)ncell, &faces->neighbour));
   for (PetscInt s = 0; s < 4 * ncell; s++) faces->neighbour[s] = -1;
   for (PetscInt v = 0; v < nvert; v++) {
     SbKey *face = faces->face;
     const PetscInt begin = faces->start[v], end = faces->start[v + 1];
 
-    // short buckets by insertion: the order of their faces is that of the cells
+    // insertion sort of short buckets, stable: equal faces stay in the order of their cells
     if (end - begin > 64) SbKeysSort(end - begin, face + begin);
     for (PetscInt i = begin + 1; i < end && end - begin <= 64; i++) {
       const SbKey f = face[i];
@@ -67,7 +67,7 @@ PetscErrorCode SbFacesCreate(PetscInt nvert, PetscInt ncell, const PetscInt cell
       for (; j > begin && face[j - 1].key > f.key; j--) face[j] = face[j - 1];
       face[j] = f;
     }
-    // equal keys: one is a boundary face, two are neighbours, more is an error
+    // equal keys: one face is on the boundary, two are neighbours, three are an error
     for (PetscInt i = begin, n; i < end; i += n) {
       n = SbKeysAlike(end, face, i);
       if (n == 1)

@@ -1,5 +1,5 @@
 /*
-  measure.c - statistics of a mesh: groups, size, shape of its tets.
+  measure.c - statistics of a mesh file: measures of groups, size of the mesh, shape of its tets.
 */
 #include "sbkernel.h"
 #include "mesh_impl.h"
@@ -8,7 +8,7 @@ const PetscReal SbRatioBinEdges[SB_RATIO_BINS] = {1, 1.25, 1.5, 2, 3, 5, 10, 100
 
 /* ------------------------------------------------------------------ groups */
 
-/* Length, area or volume of a simplex with straight edges; that of an inverted tet is negative. */
+/* Length, area or signed volume of a simplex with straight edges. */
 static PetscReal straight(const PetscReal x[], int dim, const PetscInt v[])
 {
   PetscReal a[2][3], n[3];
@@ -21,7 +21,7 @@ static PetscReal straight(const PetscReal x[], int dim, const PetscInt v[])
   return PetscSqrtReal(SbDot3(n, n)) / 2;
 }
 
-/* With edges as they are: the integral of what simplices with the derivatives of the map have. */
+/* Length, area or volume of a simplex with curved edges: the integral of the Jacobian of its map by Gauss quadrature. */
 static PetscReal measure(const SbImport *im, int dim, const PetscInt v[])
 {
   static const SbPointRule line = {
@@ -87,7 +87,7 @@ PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshStatistics *facts)
   if (!ierr) ierr = SbImportQuality(im, &faces, &facts->body);
   facts->body.edge_nodes = PETSC_TRUE;
   if (!ierr) ierr = SbImportCurve(PETSC_COMM_SELF, im, &facts->body, NULL, NULL);
-  // faces, and the area of the surface
+  // number of faces, and surface area
   facts->nface = (4 * faces.ncell - faces.nboundary) / 2 + faces.nboundary;
   for (PetscInt s = 0; !ierr && s < 4 * faces.ncell; s++) {
     const PetscInt *v = im->item[3].vert + 4 * (s / 4);
@@ -97,7 +97,7 @@ PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshStatistics *facts)
   }
   PetscCall(SbFacesDestroy(&faces));
   PetscCall(ierr);
-  // edges of the tets alone: lines and triangles of groups may lie elsewhere
+  // edges of the tets only: lines and triangles of groups may have others
   tets = *im;
   tets.item[1].n = tets.item[2].n = 0;
   PetscCall(SbImportEdgesCreate(&tets, &edges));

@@ -1,8 +1,8 @@
 /*
-  memory_mesh.c - a body whose mesh is in memory, on rank 0: what re-meshing has made, or what a checkpoint holds.
+  memory_mesh.c - import of a mesh in memory, which is on rank 0: after re-meshing, or from a checkpoint.
 
-  There are no groups any more, but the sets that they mean are known by their bits. Shapes are looked up again, but for the tets of inclusions: these stay
-  what they were, also where a new tet lies across the shape.
+  Such a mesh has no groups: members of sets that are groups are stored as bits. Sets that are shapes are evaluated again on the new mesh, except the
+  tets of inclusions, which keep their material even where a new tet crosses the shape.
 */
 #include "mesh_impl.h"
 

@@ -1,16 +1,16 @@
 /*
-  merge.c - all bodies in one mesh: read, placed, checked, marked by sets, numbered one after the other.
+  merge.c - merges all bodies into one mesh: reads, places and checks each body, marks its sets, numbers bodies one after the other.
 
-  Rank 0 reads a body alone, unless its file has slabs: then every rank reads one (slab.c). When a rank fails alone, its message is caught, sent to
-  the others, and raised by all of them, so that nobody waits for a rank that is gone.
+  Rank 0 reads a body alone, unless its file format can be read in slabs: then each rank reads one slab (slab.c). An error on one rank is caught, sent to
+  all ranks and raised by all of them, so that no rank waits for one that has failed.
 
-  Reading a mesh takes the most memory here: what is no longer needed is freed before the next thing is made.
+  Peak memory of a run is reached while a mesh is read: arrays are freed before the next ones are allocated.
 
-  Original numbers follow from here: bodies in the order of the scenario, vertices and cells in the order of their files.
+  Original numbers are assigned here: bodies in the order of the scenario, vertices and cells in the order of their files.
 */
 #include "mesh_impl.h"
 
-#define FEW 50000 /* tets that rank 0 reads alone: it takes 0.02 s */
+#define FEW 50000 /* tets of the largest body that rank 0 reads alone, in 0.02 s */
 
 static PetscErrorCode prepare(PetscInt nbody, SbBody body[], PetscInt b, PetscInt nset, SbSet set[],
                               SbImport *shared, SbImport *im, SbPart *part)
@@ -25,12 +25,12 @@ static PetscErrorCode prepare(PetscInt nbody, SbBody body[], PetscInt b, PetscIn
   PetscCall(SbSetsMark(im, &part->faces, nbody, body, b, nset, set, &part->masks));
   PetscCall(SbImportCurve(PETSC_COMM_SELF, im, &body[b], part->masks.cell, &part->edge_off));
   PetscCall(SbSetsCount(PETSC_COMM_SELF, im->nvert, im->item[3].n, &part->masks, nset, set));
-  PetscCall(PetscFree(part->faces.face)); /* the neighbours are found */
+  PetscCall(PetscFree(part->faces.face)); /* no longer needed: neighbours are known */
   PetscCall(PetscFree(part->faces.start));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where a body begins: among the original numbers, and on this rank. */
+/* First numbers of a body: original vertex and cell numbers; vertex, cell and remote numbers on this rank. */
 typedef struct {
   PetscInt orig_vert, orig_cell, vert, cell, remote;
 } Begin;
@@ -44,7 +44,7 @@ static void next_body(const SbBody *body, const SbImport *im, PetscInt ncell, co
   at->remote += part->nremote;
 }
 
-/* All bodies one after the other. */
+/* Appends all bodies to the merged mesh. */
 static PetscErrorCode merge(PetscInt nbody, const SbBody body[], SbImport im[], SbPart part[],
                             SbMergedMesh *w)
 {
@@ -57,7 +57,7 @@ static PetscErrorCode merge(PetscInt nbody, const SbBody body[], SbImport im[], 
   for (PetscInt b = 0; b < nbody; b++) {
     const PetscInt ncell = im[b].item[3].n;
 
-    // tets of the body behind those already there; its own are freed
+    // append the tets of the body, then free its items
     for (PetscInt i = 0; i < 4 * ncell; i++) {
       const PetscInt n = part[b].faces.neighbour[i];
 
@@ -67,7 +67,7 @@ static PetscErrorCode merge(PetscInt nbody, const SbBody body[], SbImport im[], 
     PetscCall(PetscArraycpy(w->remote + at.remote, part[b].remote, part[b].nremote));
     PetscCall(SbFacesDestroy(&part[b].faces));
     for (int d = 0; d < 4; d++) PetscCall(SbItemsFree(&im[b].item[d]));
-    im[b].item[3].n = ncell; /* still needed */
+    im[b].item[3].n = ncell; /* the count is used below */
     next_body(&body[b], &im[b], ncell, &part[b], &at);
   }
   PetscCall(PetscMalloc1(w->ncell, &w->data));
@@ -81,7 +81,7 @@ static PetscErrorCode merge(PetscInt nbody, const SbBody body[], SbImport im[], 
   for (PetscInt b = 0; b < nbody; b++) {
     PetscInt ncurved = 0;
 
-    // data sent with the points of body b
+    // data of the cells and vertices of body b
     for (PetscInt c = 0; c < im[b].item[3].n; c++) {
       SbCellData *p = &w->data[at.cell + c];
 
@@ -107,7 +107,7 @@ static PetscErrorCode merge(PetscInt nbody, const SbBody body[], SbImport im[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0: more than can be numbered, and sets that hold nothing. */
+/* Errors on rank 0: more tets than PetscInt can number; sets without members. */
 static PetscErrorCode check_all(PetscInt nbody, const SbBody body[], const SbImport im[], PetscInt nset,
                                 const SbSet set[])
 {
@@ -149,7 +149,7 @@ static PetscErrorCode build(MPI_Comm comm, const PetscBool slabs[], PetscInt nbo
   }
   if (!rank) SB_CATCH(&caught, check_all(nbody, body, im, nset, set));
   PetscCall(SbCaughtRaise(comm, &caught));
-  // bodies and sets as rank 0 has them, to all ranks; a mesh in memory is each rank's own
+  // broadcast bodies and sets of rank 0; pointers to meshes in memory are local to each rank
   PetscCall(PetscMalloc1(nbody, &in_memory));
   for (PetscInt b = 0; b < nbody; b++) in_memory[b] = body[b].in_memory;
   PetscCallMPI(MPI_Bcast(body, (int)((size_t)nbody * sizeof(*body)), MPI_BYTE, 0, comm));
@@ -177,7 +177,7 @@ PetscErrorCode SbMergedMeshCreate(MPI_Comm comm, SbReading reading, PetscInt nbo
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(w, sizeof(*w)));
   PetscCall(PetscCalloc3(nbody, &im, nbody, &part, nbody, &slabs));
-  // which bodies are read in slabs, alike on all ranks
+  // bodies that are read in slabs, decided on rank 0
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   PetscCallMPI(MPI_Comm_size(comm, &size));
   for (PetscInt b = 0; b < nbody; b++) {

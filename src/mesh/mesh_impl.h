@@ -1,14 +1,14 @@
 /*
-  mesh_impl.h - what the files of src/mesh/ share: edges and shapes of a body, its sets, all bodies in one mesh.
+  mesh_impl.h - shared declarations of src/mesh/: import of a body, edges and shape of its cells, its sets, the merged mesh of all bodies.
 
-  A body lives on rank 0 until distribute.c hands the pieces to their ranks.
+  A body is on rank 0, or in slabs on all ranks, until distribute.c sends the cells to their owners.
 */
 #pragma once
 #include <petscsf.h>
 #include "sbquadratic.h"
 #include "sbtet.h"
 
-/* A number for a number, without pattern (splitmix64, Steele et al. 2014). */
+/* Pseudorandom hash of an integer (splitmix64, Steele et al. 2014). */
 static inline uint64_t SbMix(PetscInt i)
 {
   uint64_t z = ((uint64_t)i + 1) * 0x9e3779b97f4a7c15u;
@@ -18,69 +18,69 @@ static inline uint64_t SbMix(PetscInt i)
   return z ^ (z >> 31);
 }
 
-/* memory_mesh.c: the mesh that a body has in memory. */
+/* memory_mesh.c: imports the body's mesh in memory. */
 PetscErrorCode SbImportMemoryMesh(const SbBody *body, SbImport *import);
 
 /* ------------------------------------------------------------------ check.c, quality.c, sets.c */
 
-/* Largest coordinate in size, m. */
+/* Largest absolute coordinate, m. */
 PetscReal SbImportLargest(const SbImport *import);
-/* Turns inverted tets, refuses flat ones; `largest` is the largest coordinate in size. */
+/* Swaps two vertices of inverted tets; a flat tet is an error. `largest`: largest absolute coordinate, m. */
 PetscErrorCode SbImportOrient(SbImport *import, PetscReal largest);
-/* Refuses tets given twice and faces of three tets. */
+/* Errors: duplicate tets, faces of three tets. */
 PetscErrorCode SbImportCheckFaces(const SbImport *import, const SbFaces *faces);
-/* Their errors: numbers of the tets in the file, and how many faces have more than two. */
+/* Raise these two errors: file numbers of the tets, number of faces with more than two tets. */
 PetscErrorCode SbImportTwice(const SbImport *import, int64_t a, int64_t b);
 PetscErrorCode SbImportOverlap(const SbImport *import, const int64_t number[3], PetscInt nshared);
-/* The edges of the boundary facets, edge[3 nboundary], each a pair of vertices or of their numbers (SbKeyOfPair); those with more than two facets are counted. */
+/* Edges of the boundary facets, edge[3 nboundary], each a key of two vertices or of their numbers (SbKeyOfPair); counts the edges with more than two facets. */
 void SbBoundaryEdges(const SbImport *import, const SbFaces *faces, const PetscInt number[],
                      PetscInt64 edge[]);
 PetscErrorCode SbCountPinched(PetscInt n, PetscInt64 edge[], PetscInt *npinched);
-/* The "found" fields that follow from them. */
+/* Copies the statistics to the "found" fields of the body. */
 void SbShapeKeep(const SbShape *shape, SbBody *body);
-/* What was repaired or is odd: fills the note of the body, whose number of parts is known. */
+/* Writes repairs and warnings to the note of the body, whose number of parts is known. */
 PetscErrorCode SbImportNote(const SbImport *import, SbBody *body);
-/* parent[nvert]: the lowest vertex of the part that each vertex belongs to. */
+/* Connected parts: parent[nvert] is the lowest vertex of the part that each vertex belongs to. */
 void SbImportJoin(const SbImport *import, PetscInt parent[], PetscInt *npart);
-/* Volume, shape, extent and number of parts: fills the "found" fields of the body. */
+/* Volume, shape quality, bounding box and number of parts: sets the "found" fields of the body. */
 PetscErrorCode SbImportQuality(const SbImport *import, const SbFaces *faces, SbBody *body);
 /* Volume, cosines of the six dihedral angles, radius ratio of a tet. */
 void SbTetShape(const PetscReal x[], const PetscInt vert[4], PetscReal *V, PetscReal cosine[6],
                 PetscReal *ratio);
-/* A tet that check.c refuses as flat; `largest` is the largest coordinate in size. */
+/* Whether a tet is flat as defined in check.c; `largest`: largest absolute coordinate, m. */
 PetscBool SbTetFlat(const PetscReal x[], const PetscInt vert[4], PetscReal largest, PetscReal *det);
 
-/* Masks of one body. */
+/* Set membership of the vertices, cells and faces of one body, bits SB_SET_BIT(). */
 typedef struct {
   uint64_t *vert; /* [nvert] */
   uint64_t *cell; /* [ncell] */
   uint64_t *face; /* [ncell][4] */
 } SbMasks;
-/* Marks boundary faces and the members of all sets in body b; the arrays are made here. */
+/* Marks boundary faces and the members of all sets in body b; allocates the arrays. */
 PetscErrorCode SbSetsMark(const SbImport *import, const SbFaces *faces, PetscInt nbody, const SbBody body[],
                           PetscInt b, PetscInt nset, const SbSet set[], SbMasks *masks);
-/* The bits of sets that are groups, for each tag set: bits[ntags]. */
+/* Bits of the sets that are groups, for each tag set: bits[ntags]. */
 PetscErrorCode SbSetsBits(const SbImport *import, PetscInt nbody, const SbBody body[], PetscInt b,
                           PetscInt nset, const SbSet set[], uint64_t bits[]);
-/* Adds the vertices, boundary facets and cells that each set holds on all ranks. Collective. */
+/* Adds the numbers of vertices, boundary facets and cells of each set, summed over all ranks. Collective. */
 PetscErrorCode SbSetsCount(MPI_Comm comm, PetscInt nvert, PetscInt ncell, const SbMasks *masks, PetscInt nset,
                            SbSet set[]);
 /*
-  curve.c: cells with curved edges of a body whose element has nodes there are marked; the volume of the body becomes that of them; a note for other elements.
+  curve.c: marks cells with curved edges if the body's element has edge nodes, and corrects the body's volume; other elements get a note.
   The cells are those of all ranks of comm. Collective.
 
-  Output: edge_off[][6][3] of the marked cells, NULL where there are none. Error: a cell whose map has no positive Jacobian at a point; with cell NULL they are counted
+  Output: edge_off[][6][3] of the marked cells, NULL if there are none. Error: a cell whose Jacobian is not positive; with cell NULL such cells are counted
   in the note of the body.
 */
 PetscErrorCode SbImportCurve(MPI_Comm comm, const SbImport *import, SbBody *body, uint64_t cell[],
                              PetscReal **edge_off);
-/* Offsets of the edges 01 02 03 12 13 23 of a simplex of dim + 1 vertices, zero where it has none or straight ones; whether one is curved. Not collective. */
+/* Offsets of the edge nodes from the midpoints, edges 01 02 03 12 13 23 of a simplex of dim + 1 vertices; zero for straight and missing edges. Returns whether one is curved. Not collective. */
 PetscBool SbImportOffsets(const SbImport *import, int dim, const PetscInt vert[], PetscReal off[18]);
-/* Brings off[n][6][3] of cells orig[n], by original number, to where the cells are. Collective. */
+/* Distributes off[n][6][3] of the cells orig[n] (original numbers) to the ranks that have the cells. Collective. */
 PetscErrorCode SbMeshCurve(SbMesh mesh, PetscInt n, const PetscInt orig[], const PetscReal off[]);
-/* Adds the members of sets that are groups. */
+/* Adds the members of sets that are groups, for a mesh in memory. */
 void SbMemoryMeshMark(const SbBody *body, const SbFaces *faces, SbMasks *masks);
-/* A set that selects nothing is an error, which lists the groups that exist. */
+/* Raises an error for a set without members; the message lists the existing groups. */
 PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport import[], PetscInt nset,
                            const SbSet set[]);
 
@@ -88,7 +88,7 @@ PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport i
 
 /* Returns answer[nrecv] to the senders of the records: result[nsend], allocated by the caller. Collective. */
 PetscErrorCode SbRouteReply(const SbRoute *route, size_t unit, const void *answer, void *result);
-/* The rank that sent record i of those received. */
+/* Rank that sent the received record i. */
 PetscMPIInt SbRouteSource(const SbRoute *route, PetscInt i);
 
 /* ------------------------------------------------------------------ merge.c, partition.c, distribute.c, order.c, number.c */
@@ -105,71 +105,71 @@ typedef struct {
 } SbCellData;
 
 /*
-  All bodies in one mesh, before it is cut into parts: some cells on each rank, with all their vertices. A vertex of cells on several ranks is on each of
-  them with the same data.
+  Merged mesh of all bodies before it is distributed: some cells on each rank, with all their vertices. A vertex of cells on several ranks is stored on
+  each of them with the same data.
 */
 typedef struct {
-  PetscInt Nvert, Ncell; /* on all ranks together */
+  PetscInt Nvert, Ncell; /* global counts */
   PetscInt nvert, ncell;
   SbVertexData *vertex; /* [nvert] ascending original numbers */
   PetscInt *cell;       /* [ncell][4] positions in vertex[] */
   SbCellData *data;     /* [ncell] */
-  PetscInt *neighbour;  /* [ncell][4] cell across the face, -1: boundary, ncell + k: remote[k] */
+  PetscInt *neighbour;  /* [ncell][4] cell across the face; -1: boundary; ncell + k: remote[k] */
   PetscInt nremote;
-  PetscSFNode *remote; /* [nremote] */
+  PetscSFNode *remote; /* [nremote] cells of other ranks across faces */
   PetscInt ncurved;
-  PetscInt *curved;    /* [ncurved] original numbers of curved cells, some on each rank */
+  PetscInt *curved;    /* [ncurved] original numbers of curved cells, on the ranks that read them */
   PetscReal *edge_off; /* [ncurved][6][3] as in SbMesh */
 } SbMergedMesh;
 
 typedef enum {
-  SB_READING_AUTO,  /* slabs of large meshes on several ranks, where the format has them */
-  SB_READING_RANK0, /* rank 0 reads all */
-  SB_READING_SLABS  /* each rank a slab, where the format has them */
+  SB_READING_AUTO,  /* slabs for large meshes on several ranks, if the format supports them */
+  SB_READING_RANK0, /* rank 0 reads everything */
+  SB_READING_SLABS  /* each rank reads a slab, if the format supports it */
 } SbReading;
-/* Reads, checks and merges all bodies, fills their "found" fields and those of the sets, alike on all ranks. Collective. */
+/* Reads, checks and merges all bodies; sets their "found" fields and those of the sets, equal on all ranks. Collective. */
 PetscErrorCode SbMergedMeshCreate(MPI_Comm comm, SbReading reading, PetscInt nbody, SbBody body[],
                                   PetscInt nset, SbSet set[], SbMergedMesh *merged);
 
-/* A body before the merge: what this rank has of it, beside its SbImport. */
+/* This rank's part of a body before the merge, in addition to its SbImport. */
 typedef struct {
-  SbFaces faces; /* neighbours: ncell + k is remote[k] */
+  SbFaces faces; /* neighbour ncell + k is remote[k] */
   SbMasks masks;
   PetscInt first;      /* original number of the first cell */
   PetscInt *orig;      /* [nvert] original numbers, ascending; NULL: 0, 1, ... */
   PetscReal *edge_off; /* [][6][3] of cells with SB_CURVED */
   PetscInt nremote;
-  PetscSFNode *remote; /* [nremote] cells of other ranks, numbered there from its first body on */
+  PetscSFNode *remote; /* [nremote] cells of other ranks; indices count from the first body of that rank */
 } SbPart;
-/* slab.c: reads and prepares body b of `body` in slabs; `before` cells of earlier bodies are on this rank. Collective. */
+/* slab.c: reads and prepares body b of `body` in slabs; `before`: number of cells of earlier bodies on this rank. Collective. */
 PetscErrorCode SbSlabPrepare(MPI_Comm comm, PetscInt before, PetscInt nbody, SbBody body[], PetscInt b,
                              PetscInt nset, SbSet set[], SbImport *import, SbPart *part);
 PetscErrorCode SbMergedMeshDestroy(SbMergedMesh *merged);
 
 typedef enum {
-  SB_PARTITION_AUTO, /* METIS for small meshes, bisection for others */
+  SB_PARTITION_AUTO, /* METIS for small meshes, recursive bisection for others */
   SB_PARTITION_METIS,
   SB_PARTITION_BISECTION
 } SbPartitioner;
-/* The rank that will own each cell: part[ncell]. Collective. */
+/* Owner rank of each cell: part[ncell]. Collective. */
 PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh *merged, PetscMPIInt part[]);
 
-/* What a rank has of the mesh before it is numbered: owned cells by original number, then ghost ones; vertices of owned cells by original number, then the others. */
+/* Local mesh before renumbering: owned cells, then ghost cells; vertices of owned cells, then others; each sorted by original number. */
 typedef struct {
   PetscInt ncell_owned, ncell, nvert;
   PetscInt *cell;       /* [ncell][4] positions in vertex[] */
   SbCellData *data;     /* [ncell] */
   SbVertexData *vertex; /* [nvert] */
   PetscMPIInt *owner;   /* [nvert] */
-  SbRoute ghost;        /* copies of owned cells to other ranks, on several ranks */
-  PetscInt *copied;     /* [ghost.nsend] the cell that is copied */
-  PetscInt nvert_cells; /* vertices of owned cells */
+  SbRoute ghost;        /* communication of copies of owned cells to other ranks; several ranks only */
+  PetscInt *copied;     /* [ghost.nsend] owned cell that is copied */
+  PetscInt nvert_cells; /* number of vertices of owned cells */
 } SbLocalMesh;
 
-/* Hands the whole out to the ranks and destroys it. `all`: ghosts are all cells that share a vertex with an owned cell, else those with an owned vertex. Collective. */
+/* Distributes the merged mesh and destroys it. `all`: ghosts are all cells that share a vertex with an owned cell, else those with an owned vertex. Collective. */
 PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, SbMergedMesh *merged,
                             SbLocalMesh *local);
-/* Own local numbering: fills the arrays and counts of the mesh and destroys the local mesh. Collective. */
+/* Local numbering: fills the arrays and counts of the mesh and frees the local mesh. Collective. */
 PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *local);
-/* Reverse Cuthill-McKee order: order[i] is the vertex that gets number i. A cell's vertex may be -1: it takes no part. */
+/* Reverse Cuthill-McKee order: order[i] is the vertex with the new number i. Cell vertices of -1 are ignored. */
 PetscErrorCode SbOrderRCM(PetscInt nvert, PetscInt ncell, const PetscInt cell[], PetscInt order[]);

@@ -1,23 +1,23 @@
 /*
-  number.c - own local numbering of what has come to this rank.
+  number.c - local and global numbering of the distributed mesh.
 
-  Vertices: owned ones first, in reverse Cuthill-McKee order, then ghosts by global number. The owned ones of all ranks,
-  one rank after the other, are the global numbers. Cells: owned ones first, then ghosts; both sorted by body, inclusion and whether they are curved, then by
-  lowest local vertex, so that a loop over cells walks through the vertices.
+  Vertices: owned ones first, in reverse Cuthill-McKee order, then ghosts by global number. Global numbers count the owned vertices
+  of rank 0, then those of rank 1 and so on. Cells: owned ones first, then ghosts; each sorted by body, inclusion, curved or straight, and
+  lowest local vertex, so that a loop over cells accesses vertices nearly in order.
 */
 #include "mesh_impl.h"
 
-/* The local mesh and the way to the own numbers. */
+/* The local mesh before renumbering, and the maps to the new numbers. */
 typedef struct {
   const SbLocalMesh *p;
   PetscMPIInt rank, size;
-  PetscInt *local;  /* [nvert] own number of a vertex of the local mesh */
-  PetscInt *global; /* [nvert] */
+  PetscInt *local;  /* [nvert] new local number of a vertex */
+  PetscInt *global; /* [nvert] global number of a vertex */
 } Work;
 
 /* ------------------------------------------------------------------ vertices */
 
-/* Own numbers of owned vertices; global numbers of them. */
+/* Local and global numbers of owned vertices. */
 static PetscErrorCode number_owned(Work *w, SbMesh mesh)
 {
   const SbLocalMesh *p = w->p;
@@ -51,7 +51,7 @@ static PetscErrorCode number_owned(Work *w, SbMesh mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Ghosts: their owners know them by their original numbers. */
+/* Ghost vertices: their owners are asked for global numbers, by original number. */
 static PetscErrorCode number_ghosts(Work *w, SbMesh mesh)
 {
   const SbLocalMesh *p = w->p;
@@ -91,7 +91,7 @@ static PetscErrorCode number_ghosts(Work *w, SbMesh mesh)
 
 /* ------------------------------------------------------------------ cells */
 
-/* The inclusion of its body that a cell belongs to: 0 for the bulk, else one more than its position in the list. */
+/* Inclusion of its body that a cell belongs to: 0 for the bulk, else its position in the list plus one. */
 static PetscInt inclusion_of(SbMesh mesh, const SbCellData *cell)
 {
   const SbBody *body = &mesh->body[cell->body];
@@ -111,7 +111,7 @@ static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(mesh->ncell, &order));
-  // the cells of the local mesh in the order of their own numbers
+  // order of the cells: two bucket sorts, by lowest vertex, then by body, inclusion and curved or straight
   PetscCall(PetscMalloc1(p->ncell, &key));
   for (PetscInt c = 0; c < p->ncell; c++) {
     const PetscInt *v = p->cell + 4 * (size_t)c;
@@ -133,7 +133,7 @@ static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
   PetscCall(PetscFree(some));
   PetscCall(PetscFree(at));
   PetscCall(PetscFree(start));
-  // from owned cells to their copies on other ranks
+  // star forest from owned cells to their ghost copies
   if (w->size > 1) {
     PetscCall(PetscMalloc2(p->ncell, &number, p->ghost.nsend, &sent));
     for (PetscInt c = 0; c < p->ncell; c++) number[order[c]] = c;
@@ -142,7 +142,8 @@ static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
     PetscCall(PetscMalloc1(nghost, &leaf));
     PetscCall(PetscMalloc1(nghost, &remote));
     for (PetscInt g = 0; g < nghost; g++) {
-      const PetscInt came = order[p->ncell_owned + g] - p->ncell_owned; /* as which of the ghosts */
+      const PetscInt came =
+        order[p->ncell_owned + g] - p->ncell_owned; /* position among the received ghosts */
 
       leaf[g] = p->ncell_owned + g;
       remote[g].rank = SbRouteSource(&p->ghost, came);
@@ -185,7 +186,7 @@ PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *local)
   PetscCall(PetscMalloc2(local->nvert, &w.local, local->nvert, &w.global));
   PetscCall(number_owned(&w, mesh));
   PetscCall(number_ghosts(&w, mesh));
-  // the arrays of the vertices, in their new order
+  // vertex arrays in the new order
   PetscCall(PetscMalloc5(mesh->nvert, &mesh->gvert, mesh->nvert, &mesh->vert_orig, mesh->nvert,
                          &mesh->vert_body, mesh->nvert, &mesh->vert_set, 3 * (size_t)mesh->nvert, &mesh->x));
   for (PetscInt v = 0; v < mesh->nvert; v++) {

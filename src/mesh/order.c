@@ -1,18 +1,18 @@
 /*
-  order.c - reverse Cuthill-McKee order of this rank's vertices (Cuthill and McKee, 1969; George and Liu, 1979).
+  order.c - reverse Cuthill-McKee order of the vertices of this rank (Cuthill and McKee, 1969; George and Liu, 1979).
 
-  Two vertices are neighbours when a cell holds both, so the search goes from vertices to cells and on to their vertices,
-  visiting each cell once; the graph of vertices is never formed. Each connected part starts at an end, which a search
-  from anywhere finds (further searches did not narrow the bandwidth of real meshes), and is numbered as a whole, parts
-  in the order of their first vertex.
+  Two vertices are adjacent when a cell has both: the search visits the cells of a vertex, each cell once, and then
+  their vertices; the vertex graph is never formed. Each connected component starts at a peripheral vertex, which one search
+  from an arbitrary vertex finds (further searches did not reduce the bandwidth of real meshes). Components are numbered one after
+  the other, in the order of their first vertex.
 */
 #include "mesh_impl.h"
 
 typedef struct {
-  const PetscInt *cell; /* [ncell][4] vertices, -1 where one takes no part */
-  PetscInt *start;      /* [nvert + 1] into incident */
+  const PetscInt *cell; /* [ncell][4] vertices, -1: ignored */
+  PetscInt *start;      /* [nvert + 1] offsets into incident[] */
   PetscInt *incident;   /* corners 4 cell + a at each vertex */
-  PetscInt *vert_mark;  /* [nvert] number of the search that came by last */
+  PetscInt *vert_mark;  /* [nvert] number of the last search that visited the vertex */
   PetscInt *cell_mark;  /* [ncell] */
   PetscInt search;
 } Graph;
@@ -22,7 +22,7 @@ static inline PetscInt degree(const Graph *g, PetscInt v)
   return g->start[v + 1] - g->start[v];
 }
 
-/* Breadth-first search from a vertex: the number of vertices reached, and where the last level of them begins. */
+/* Breadth-first search from a vertex: returns the number of vertices reached; `last`: position of the first vertex of the last level. */
 static PetscInt search(Graph *g, PetscInt root, PetscInt queue[], PetscInt *last)
 {
   PetscInt n = 1, level_end = 1, begin;
@@ -36,7 +36,7 @@ static PetscInt search(Graph *g, PetscInt root, PetscInt queue[], PetscInt *last
       *last = level_end;
       level_end = n;
     }
-    // appends the unseen neighbours, those with few cells first
+    // append the unvisited neighbours, sorted by ascending degree
     begin = n;
     for (PetscInt k = g->start[queue[i]]; k < g->start[queue[i] + 1]; k++) {
       const PetscInt c = g->incident[k] / 4;
@@ -68,8 +68,8 @@ PetscErrorCode SbOrderRCM(PetscInt nvert, PetscInt ncell, const PetscInt cell[],
   for (PetscInt v = 0, done = 0; v < nvert; v++) {
     PetscInt n, last, root;
 
-    if (g.vert_mark[v]) continue; /* seen by the search of an earlier part */
-    // Cuthill-McKee order of the part that holds v, from a vertex of few cells as far away as any
+    if (g.vert_mark[v]) continue; /* in an earlier component */
+    // Cuthill-McKee order of the component of v, from a vertex of lowest degree in the last level; then reversed
     n = search(&g, v, order + done, &last);
     root = order[done + last];
     for (PetscInt k = last; k < n; k++) {

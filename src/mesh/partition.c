@@ -1,10 +1,10 @@
 /*
-  partition.c - which rank owns which tet.
+  partition.c - mesh partitioning: the owner rank of each tet.
 
-  METIS cuts the graph of tets that share a face, on rank 0: short borders, but the graph of all tets is on one rank, and the others wait. Bisection halves the
-  centres of the tets across the longest side of their box, again and again, in parallel: the medians are those of a sample that all ranks have, taken
-  by a hash of the original numbers, so that the number of ranks has no influence on it. Then tets at the borders move to the part
-  where most of their neighbours are. Its borders are 1.0 (bars) to 1.8 times (1,240,000 tets of a bunny) as long as those of METIS, in a tenth of the time.
+  METIS partitions the dual graph of the tets on rank 0: few faces are cut, but the whole graph is on one rank while the others wait. Recursive coordinate bisection
+  runs in parallel: it halves the set of tet centres at the median along the longest axis of their bounding box, recursively. Medians are those of a sample that
+  all ranks have, selected by a hash of the original numbers, hence independent of the number of ranks. Then each tet at an interface moves to the part
+  of most of its neighbours. Bisection cuts 1.0 (bars) to 1.8 times (1,240,000 tets of a bunny) as many faces as METIS, in a tenth of the time.
 
   References: Karypis and Kumar, "A fast and high quality multilevel scheme for partitioning irregular graphs", 1998; Berger and Bokhari, "A partitioning
   strategy for nonuniform problems on multiprocessors", 1987.
@@ -12,17 +12,17 @@
 #include <metis.h>
 #include "mesh_impl.h"
 
-#define MOST 50000    /* tets that METIS is given by itself: it takes 0.05 s for them */
-#define SAMPLE 1024   /* tets of the sample for each part, at least: a part is within 3 % of its share */
-#define SAMPLES 65536 /* and of all parts together */
-#define SWEEPS 4      /* over the borders of parts */
+#define MOST 50000    /* largest mesh for METIS by default, tets: it takes 0.05 s */
+#define SAMPLE 1024   /* sampled tets per part, at least: part sizes are within 3 % of the mean */
+#define SAMPLES 65536 /* sampled tets of all parts together, at least */
+#define SWEEPS 4      /* number of sweeps that improve the interfaces */
 
-/* ------------------------------------------------------------------ boxes */
+/* ------------------------------------------------------------------ bisection */
 
 typedef struct {
-  int axis; /* -1: a leaf */
+  int axis; /* axis of the cut, -1: leaf */
   PetscReal cut;
-  PetscInt next; /* the child below the cut, the other one follows; of a leaf: its number */
+  PetscInt next; /* inner node: first child, below the cut; the second one is next + 1; leaf: its number */
 } Node;
 typedef struct {
   PetscInt nnode, nleaf;
@@ -37,7 +37,7 @@ static inline void centre(const SbMergedMesh *w, PetscInt c, PetscReal x[3])
     x[i] = w->vertex[v[0]].x[i] + w->vertex[v[1]].x[i] + w->vertex[v[2]].x[i] + w->vertex[v[3]].x[i];
 }
 
-/* Splits the samples x[n] into k leaves below a node. */
+/* Splits the samples x[n] recursively into k leaves below node `at`. */
 static PetscErrorCode split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3], PetscInt k)
 {
   PetscReal *along, box[6], cut, next = PETSC_MAX_REAL;
@@ -52,7 +52,7 @@ static PetscErrorCode split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3],
   SbBoxClear(box);
   for (PetscInt i = 0; i < n; i++) SbBoxAdd(box, x[i]);
   axis = SbBoxLongest(box);
-  // the cut is the median; when nothing is below it, it is raised
+  // the cut is at the median; if no sample is below it, at the next larger value
   PetscCall(PetscMalloc1(n, &along));
   for (PetscInt i = 0; i < n; i++) along[i] = x[i][axis];
   PetscCall(PetscRealSortSemiOrdered(n, along));
@@ -61,7 +61,7 @@ static PetscErrorCode split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3],
     if (along[i] > cut) next = PetscMin(next, along[i]);
   if (!(along[0] < cut)) cut = next;
   PetscCall(PetscFree(along));
-  // samples below it first; those on it count as above, as tets do, independent of the order of samples
+  // partition the samples: below the cut first; equality counts as above, as for tets, independent of the order of samples
   for (PetscInt i = 0; i < n; i++) {
     if (x[i][axis] >= cut) continue;
     for (int d = 0; d < 3; d++) {
@@ -81,7 +81,7 @@ static PetscErrorCode split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3],
 
 /* ------------------------------------------------------------------ METIS */
 
-/* Collects the graph on rank 0, by original numbers, so that its partition has nothing to do with who had what. */
+/* Gathers the graph on rank 0, ordered by original numbers, so that the partition is independent of the distribution of cells. */
 static PetscErrorCode cut_graph(MPI_Comm comm, const SbMergedMesh *w, PetscSF sf, PetscInt part[])
 {
   PetscInt *orig, *remote, *across, *all_orig, *all_across, *all_part;
@@ -114,7 +114,7 @@ static PetscErrorCode cut_graph(MPI_Comm comm, const SbMergedMesh *w, PetscSF sf
     PetscInt *position;
     int status;
 
-    // the part of each cell, of a graph on one rank
+    // graph in compressed row form, partitioned by METIS
     PetscCall(
       PetscMalloc4(w->Ncell + 1, &start, 4 * (size_t)w->Ncell, &adj, w->Ncell, &result, w->Ncell, &position));
     for (PetscInt c = 0; c < w->Ncell; c++) position[all_orig[c]] = c;
@@ -144,7 +144,7 @@ static PetscErrorCode cut_graph(MPI_Comm comm, const SbMergedMesh *w, PetscSF sf
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ borders */
+/* ------------------------------------------------------------------ partition */
 
 PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh *w, PetscMPIInt part[])
 {
@@ -155,7 +155,7 @@ PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(comm, &size));
-  /* METIS wants two parts at least, and more cells than parts */
+  /* METIS requires at least two parts, and more cells than parts */
   if (size == 1 || w->Ncell <= size) {
     for (PetscInt c = 0; c < w->ncell; c++) part[c] = size == 1 ? 0 : (PetscMPIInt)w->data[c].orig;
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -172,7 +172,7 @@ PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh
     PetscReal(*all)[3];
     PetscInt n = 0, total, *now, *across;
 
-    // a tree with a leaf for each rank, cut through a sample of the tets
+    // bisection tree with a leaf for each rank, from a sample of the tets
     wanted = PetscMax((PetscInt64)SAMPLE * size, SAMPLES);
     bound = wanted >= w->Ncell ? UINT64_MAX : UINT64_MAX / (uint64_t)w->Ncell * (uint64_t)wanted;
     for (PetscInt c = 0; c < w->ncell; c++) n += SbMix(w->data[c].orig) <= bound;
@@ -187,7 +187,7 @@ PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh
     tree.nleaf = 0;
     PetscCall(split(&tree, 0, total / 3, all, size));
     PetscCall(PetscFree(all));
-    // the leaf that each cell lies in
+    // leaf that contains each cell centre
     for (PetscInt c = 0; c < w->ncell; c++) {
       const Node *node = tree.node;
       PetscReal x[3];
@@ -197,7 +197,7 @@ PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh
       to[c] = node->next;
     }
     PetscCall(PetscFree(tree.node));
-    // a cell moves to the part that most of its neighbours are in, when that takes faces from the border
+    // move a cell to the part of most of its neighbours, if that cuts fewer faces
     PetscCall(PetscMalloc2(w->ncell, &now, w->nremote, &across));
     for (int sweep = 0; sweep < SWEEPS; sweep++) {
       PetscCall(PetscSFBcastBegin(sf, MPIU_INT, to, across, MPI_REPLACE));

@@ -1,5 +1,5 @@
 /*
-  quality.c - size and shape of a body's mesh.
+  quality.c - size and shape quality of a body's mesh.
 
   With outward area vectors n_i of the faces opposite vertex i, the dihedral angle at the edge that faces i and j share is
   acos(-n_i . n_j / (|n_i| |n_j|)). The radius ratio is R / (3 r), 1 for the regular tet: r = 3 V / sum |n_i| and
@@ -19,7 +19,7 @@ void SbTetShape(const PetscReal x[], const PetscInt v[4], PetscReal *V, PetscRea
     b[i] = x[3 * v[2] + i] - x[3 * v[0] + i];
     c[i] = x[3 * v[3] + i] - x[3 * v[0] + i];
   }
-  /* Twice the area vectors; they sum to zero. */
+  /* twice the area vectors; their sum is zero */
   SbCross(c, b, n[1]);
   SbCross(a, c, n[2]);
   SbCross(b, a, n[3]);
@@ -48,7 +48,7 @@ PetscReal SbTetQuality(const PetscReal x[4][3])
   return (V > 0 ? 1 : -1) / ratio;
 }
 
-/* Sets of vertices, joined by every tet. */
+/* Connected parts by union-find: the vertices of each tet are joined. */
 void SbImportJoin(const SbImport *im, PetscInt parent[], PetscInt *npart)
 {
   for (PetscInt v = 0; v < im->nvert; v++) parent[v] = v;
@@ -58,11 +58,11 @@ void SbImportJoin(const SbImport *im, PetscInt parent[], PetscInt *npart)
 
     for (int i = 1; i < 4; i++) *npart -= SbUnionJoin(parent, v[0], v[i]);
   }
-  /* a parent is lower than its child */
+  /* parents have lower numbers than their children */
   for (PetscInt v = 0; v < im->nvert; v++) parent[v] = parent[parent[v]];
 }
 
-/* What was repaired or is odd, in one line; empty when there is nothing. */
+/* Repairs and warnings in one line; empty if there are none. */
 PetscErrorCode SbImportNote(const SbImport *im, SbBody *body)
 {
   const struct {

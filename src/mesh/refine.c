@@ -1,21 +1,21 @@
 /*
-  refine.c - regular refinement: every edge gets a vertex in its middle, every tet becomes eight.
+  refine.c - regular refinement: each edge is bisected, each tet is divided into eight.
 
-  Four children are cut off at the corners, each half as large as its parent. What is left is an octahedron, cut into four
-  around one of its three diagonals: the shortest one, which keeps the shapes of repeated refinement bounded (Zhang,
-  "Successive subdivisions of tetrahedra and multigrid methods on tetrahedral meshes", 1995). Diagonals lie inside a tet,
-  so that neighbours fit whatever they choose. Children have the orientation of their parent.
+  Four children are at the corners. The remaining octahedron is cut into four tets around the shortest of its three diagonals,
+  which keeps the shape quality of repeated refinement bounded (Zhang, "Successive subdivisions of tetrahedra and multigrid methods on
+  tetrahedral meshes", 1995). Diagonals are inside a tet, so the refined mesh is conforming for any choice. Children have the
+  orientation of their parent.
 
-  The surface keeps its facets: new vertices lie in their middle, not on a rounder shape. A curved tet keeps its shape: the map of ten nodes, restricted to a child, has its
-  nodes at edges off their middles by o/4 on the halves of an edge that is off by o, by o/4 of the opposite edge of the triangle between two middles, and on the diagonal by
-  a quarter of what the four edges that it does not join are off together, less that of the two that it joins.
+  New vertices on the boundary are at the middle of straight edges; the original geometry is unknown. A curved tet keeps its shape: the P2 map, restricted to a child, has
+  the following offsets of edge nodes from the midpoint: o/4 on both halves of an edge with offset o; o/4 of the opposite edge of the triangle, on an edge between two midpoints; on
+  the diagonal a quarter of the sum of the offsets of the four edges that it does not connect, less a quarter of those of the two edges that it connects.
 */
 #include "sbkernel.h"
 #include "mesh_impl.h"
 
-enum { M01, M02, M03, M12, M13, M23 }; /* middles of the edges of a tet, in the order of edges */
+enum { M01, M02, M03, M12, M13, M23 }; /* midpoints of the edges of a tet, in the order of SbTetEdge */
 
-/* The three diagonals of the octahedron, and the four middles around each so that (from, to, ring[i], ring[i + 1]) is positive. */
+/* Three diagonals of the octahedron, and the four midpoints around each, such that (from, to, ring[i], ring[i + 1]) is positively oriented. */
 static const struct {
   int from, to, ring[4];
 } diagonals[3] = {
@@ -24,7 +24,7 @@ static const struct {
   {M03, M12, {M01, M02, M23, M13}},
 };
 
-/* The eight children of the tet v with the middles m. */
+/* Vertices of the eight children of the tet v with the edge midpoints m. */
 static void split_tet(const PetscReal x[], const PetscInt v[4], const PetscInt m[6], PetscInt child[8][4])
 {
   const PetscInt corner[4][4] = {{v[0], m[M01], m[M02], m[M03]},
@@ -41,7 +41,7 @@ static void split_tet(const PetscReal x[], const PetscInt v[4], const PetscInt m
     SbSubtract(x + 3 * m[diagonals[d].from], x + 3 * m[diagonals[d].to], r);
     length = SbDot3(r, r);
 
-    /* A tie must not be decided by rounding: the first one stays. */
+    /* tolerance: among equal diagonals the first one is taken, independent of rounding */
     if (length < shortest * (1 - 1e-12)) shortest = length, best = d;
   }
   for (int k = 0; k < 4; k++) {
@@ -52,7 +52,7 @@ static void split_tet(const PetscReal x[], const PetscInt v[4], const PetscInt m
   }
 }
 
-/* Adds the edge between two vertices when it is off its middle. */
+/* Adds a curved edge, if its offset is not zero. */
 static PetscErrorCode add_middle(SbImport *im, PetscInt a, PetscInt b, const PetscReal off[3])
 {
   PetscFunctionBeginUser;
@@ -63,7 +63,7 @@ static PetscErrorCode add_middle(SbImport *im, PetscInt a, PetscInt b, const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The curved edges of the children of a tet; off[][3] of edges by their middles, which are numbered from nvert on. */
+/* Curved edges of the children of a tet; off[][3]: offsets of the parent edges, indexed by midpoint vertex - nvert. */
 static PetscErrorCode curve_children(SbImport *im, const PetscInt v[4], PetscInt nvert, const PetscReal off[],
                                      const PetscInt child[8][4])
 {
@@ -84,7 +84,7 @@ static PetscErrorCode curve_children(SbImport *im, const PetscInt v[4], PetscInt
     }
     for (int i = 0; i < 2; i++) PetscCall(add_middle(im, v[p[i]], m[e], quarter[e]));
   }
-  // between the middles of two edges from corner i to j and k
+  // edge between the midpoints of the edges from corner i to j and k
   for (int i = 0; i < 4; i++)
     for (int j = 0; j < 4; j++)
       for (int k = 0; k < j; k++)
@@ -94,7 +94,7 @@ static PetscErrorCode curve_children(SbImport *im, const PetscInt v[4], PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Children of one item, [2^dim][dim + 1]. */
+/* Vertices of the children of one item, [2^dim][dim + 1]. */
 static void split(const SbImport *im, int dim, const PetscInt v[], const SbImportEdges *edges,
                   PetscInt child[])
 {
@@ -131,7 +131,7 @@ PetscErrorCode SbMeshFileRefine(SbImport *im)
              "%s: %" PetscInt_FMT " tets, refined, are more than this build can number", im->where,
              im->item[3].n);
   PetscCall(SbImportEdgesCreate(im, &edges));
-  // vertices at the nodes of the edges, behind the old ones
+  // new vertices at the edge nodes, after the old ones
   n = im->nvert + edges.nedge;
   PetscCall(PetscRealloc(3 * (size_t)n * sizeof(PetscReal), &im->x));
   PetscCall(PetscRealloc((size_t)n * sizeof(int64_t), &im->vert_number));
@@ -146,7 +146,7 @@ PetscErrorCode SbMeshFileRefine(SbImport *im)
   im->nmiddle.n = 0;
   for (PetscInt v = 0; v < n; v++) im->vert_number[v] = v + 1;
   im->nvert = n;
-  // children of the items, with the tags of their parents
+  // children of each item, with its tags
   for (int d = 1; d < 4; d++) {
     static const char *const what[4] = {"points", "lines", "triangles", "tets"};
     SbItems parent = im->item[d], *item = &im->item[d];

@@ -1,18 +1,18 @@
 /*
-  repair.c - makes a mesh that a run accepts, where dropping, turning and welding can do it.
+  repair.c - repair of a mesh file by merging vertices, dropping and reorienting tets, until a run accepts it, if possible.
 
-  In this order: vertices closer than a tolerance become one, each with the first before it; tets that then use a vertex twice are dropped, these are
-  collapsed and leave no gap; so are further copies of a tet, whose groups go to the first; flat tets are dropped, which leaves a slit
-  without width where they had a neighbour at every face, and these are counted; inverted tets are turned; triangles and lines of groups that
-  collapsed, came again or are no face of a tet, and unused vertices, are dropped. The check of a run has the last word: what overlaps cannot
-  be repaired here.
+  In this order: vertices within a tolerance are merged into the first of them; tets that then use a vertex twice are dropped (they have collapsed and leave
+  no gap); duplicate tets are dropped, and their groups go to the first one; flat tets are dropped and counted, and each one with a neighbour
+  at every face leaves a slit of zero width, counted too; inverted tets are reoriented; group triangles and lines that have
+  collapsed, are duplicates or are no face of a tet are dropped, and so are unused vertices. Overlapping tets cannot be repaired: the check of a run
+  reports them.
 */
 #include "sbgeometry.h"
 #include "mesh_impl.h"
 
 /* ------------------------------------------------------------------ welding */
 
-/* Lets items use the first of the vertices that lie together. Those left over are unused from then on. */
+/* Replaces each vertex in items by the first vertex within the tolerance; the others become unused. */
 static PetscErrorCode weld(SbImport *im, PetscReal tolerance, SbRepair *done)
 {
   PetscReal box[6], diagonal;
@@ -42,7 +42,7 @@ static PetscErrorCode weld(SbImport *im, PetscReal tolerance, SbRepair *done)
 
 /* ------------------------------------------------------------------ single items */
 
-/* Keeps the items that are not marked. */
+/* Removes the marked items and counts them. */
 static void drop_marked(SbItems *item, int dim, const PetscBool drop[], PetscInt *ndropped)
 {
   PetscInt kept = 0;
@@ -95,7 +95,7 @@ PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *don
     PetscCall(drop_collapsed(im, d, &ndropped));
     PetscCall(SbImportJoinRepeats(im, d, PETSC_TRUE, &ndropped));
   }
-  // flat tets; those with a neighbour at every face leave a slit
+  // flat tets; one with a neighbour at every face leaves a slit
   PetscCall(PetscCalloc1(item->n, &drop));
   for (PetscInt c = 0; c < item->n; c++) {
     drop[c] = SbTetFlat(im->x, item->vert + 4 * c, largest, &det);
@@ -120,7 +120,7 @@ PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *don
   ierr = SbImportCheck(im, &faces);
   done->nturned = im->nreoriented - turned;
   done->nunused = im->nunused - done->nwelded;
-  // triangles that are no face of a tet
+  // triangles that are not a face of any tet
   PetscCall(PetscCalloc1(im->item[2].n, &drop));
   for (PetscInt i = 0; i < im->item[2].n && !ierr; i++)
     drop[i] = (PetscBool)!SbFacesFind(&faces, im->item[2].vert + 3 * i, slots);
@@ -128,7 +128,7 @@ PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *don
   PetscCall(PetscFree(drop));
   PetscCall(SbFacesDestroy(&faces));
   PetscCall(ierr);
-  PetscCall(SbImportMiddles(im, NULL, &off)); /* of the tets that are left */
+  PetscCall(SbImportMiddles(im, NULL, &off)); /* curved edges of the remaining tets */
   for (PetscInt v = 0; v < im->nvert; v++) im->vert_number[v] = v + 1;
   done->nitem = nitem - im->item[0].n - im->item[1].n - im->item[2].n;
   im->nunused = im->nreoriented = im->nlost = 0;

@@ -1,11 +1,11 @@
 /*
-  route.c - records to other ranks, and answers back: one exchange of counts, then one of the records of all ranks with all ranks.
+  route.c - sparse communication of fixed-size records: one all-to-all exchange of counts, then one of the records; replies return by the reverse route.
 
-  What stays on a rank takes the same way, so that callers have one case.
+  Records to the own rank take the same route, so that callers need no special case.
 */
 #include "mesh_impl.h"
 
-/* Where the records of each rank begin. */
+/* Offsets of the records of each rank: prefix sums of the counts. */
 static PetscErrorCode first_of_each(PetscMPIInt size, const PetscMPIInt count[], PetscMPIInt first[],
                                     PetscInt *total)
 {

@@ -1,21 +1,21 @@
 /*
-  sets.c - named sets: their specification, and which vertices, facets and cells they contain, as bits.
+  sets.c - named sets: their definition, and their members (vertices, facets, cells) as bit masks.
 
-  A shape holds the vertices inside it, the boundary facets with all three vertices inside, and the tets with all four.
-  Inside is meant with a tolerance of 1e-6 times the diagonal of the body, so that a plane through the nodes of a curved or
-  rotated side finds them. A group of points or curves holds vertices; a group of surfaces holds its triangles (also
-  inner ones, seen from both tets) with their vertices; a group of volumes holds its tets, their vertices and their
-  boundary facets. Groups of one name and several dimensions are joined.
+  A shape contains the vertices inside it, the boundary facets with all three vertices inside, and the tets with all four.
+  The tolerance is 1e-6 times the diagonal of the body's bounding box, so that a plane contains the nodes of a curved or rotated
+  side. A group of points or curves contains vertices; a group of surfaces contains its triangles (interior ones as faces of both
+  tets) and their vertices; a group of volumes contains its tets, their vertices and their boundary facets. Groups with equal
+  names and different dimensions are one set.
 */
 #include <stdlib.h>
 #include "mesh_impl.h"
 
-/* ------------------------------------------------------------------ text */
+/* ------------------------------------------------------------------ parsing */
 
 static const struct {
   const char *name, *form;
   SbSetShape shape;
-  int least, most; /* numbers; 0: a name */
+  int least, most; /* range of the number of parameters; 0: a name; -1: none */
 } shapes[] = {
   {"group", "group:NAME or group:BODY.NAME", SB_SET_GROUP, 0, 0},
   {"box", "box:xmin,ymin,zmin,xmax,ymax,zmax (m)", SB_SET_BOX, 6, 6},
@@ -61,7 +61,7 @@ PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set)
 
     PetscCheck(colon && SbParseNumbers(colon + 1, shapes[i].most, set->p) >= shapes[i].least, PETSC_COMM_SELF,
                PETSC_ERR_USER_INPUT, "%s '%s': write %s", option, text, shapes[i].form);
-    // norms the direction of planes (with their distance), refuses empty shapes
+    // normalise plane normals (and distances); an empty shape is an error
     p = set->p;
     if (set->shape == SB_SET_BOX) {
       PetscCheck(p[0] <= p[3] && p[1] <= p[4] && p[2] <= p[5], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -108,7 +108,7 @@ static PetscBool inside(const SbSet *set, const PetscReal x[3], PetscReal slack)
   }
 }
 
-/* The group that a set means in body b: NULL when it speaks of another body. */
+/* Name of the set's group in body b; NULL if the set names a group of another body. */
 static const char *group_in_body(const SbSet *set, PetscInt nbody, const SbBody body[], PetscInt b)
 {
   for (PetscInt i = 0; i < nbody; i++) {
@@ -120,7 +120,7 @@ static const char *group_in_body(const SbSet *set, PetscInt nbody, const SbBody 
   return set->group;
 }
 
-/* Names of options cannot hold blanks: an underscore stands for one, too. */
+/* Compares the name of a group; option values have no blanks, so an underscore matches a blank. */
 static PetscBool is_named(const SbGroup *group, const char *name)
 {
   const char *p = group->name;
@@ -162,7 +162,7 @@ PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbo
   PetscCall(PetscCalloc1(im->nvert, &m->vert));
   PetscCall(PetscCalloc1(im->item[3].n, &m->cell));
   PetscCall(PetscCalloc1(4 * (size_t)im->item[3].n, &m->face));
-  // shapes, whole bodies, the boundary: `all` holds the bits of sets that are this body, `hull` those of the boundary
+  // shapes, bodies, the boundary: `all` has the bits of sets that contain the whole body, `hull` of those that contain its boundary
   for (PetscInt k = 0; k < nset; k++) {
     if (set[k].shape == SB_SET_BODY && (!strcmp(set[k].group, body[b].name) ||
                                         (body[b].copy_of[0] && !strcmp(set[k].group, body[b].copy_of))))
@@ -193,7 +193,7 @@ PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbo
   }
   PetscCall(PetscMalloc1(im->ntags, &bits));
   PetscCall(SbSetsBits(im, nbody, body, b, nset, set, bits));
-  // members of groups: vertices, faces of tets, tets with their faces on the boundary
+  // members of groups: vertices, faces of tets, tets with their boundary faces
   for (int d = 0; d < 4; d++) {
     const SbItems *item = &im->item[d];
 
@@ -240,7 +240,7 @@ PetscErrorCode SbSetsCount(MPI_Comm comm, PetscInt nvert, PetscInt ncell, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ sets that hold nothing */
+/* ------------------------------------------------------------------ empty sets */
 
 static PetscErrorCode empty_group(PetscInt nbody, const SbBody body[], const SbImport import[],
                                   const SbSet *set)
@@ -307,7 +307,7 @@ PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport i
       SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "set '%s': there is no body '%s'%s%s%s", set[k].name,
               set[k].group, near[0] ? "; did you mean " : "", near, near[0] ? "?" : "");
     }
-    // a shape beside the bodies
+    // a shape outside the bodies
     for (int i = 0; i < NSHAPE; i++) {
       if (shapes[i].shape == set[k].shape) name = shapes[i].name;
     }

@@ -1,14 +1,14 @@
 /*
-  slab.c - one body read by all ranks: each has a block of the file's tets and keeps a block of its vertices.
+  slab.c - parallel import of one body: each rank reads a slab, that is a block of the file's tets and a block of its vertices.
 
-  The home rank of a vertex (vertices are dealt to ranks by their numbers, a rendezvous) is asked for its position, and knows which ranks' tets use it; there vertices that no tet uses are found, and
-  what belongs to a vertex on several ranks is joined. A face between tets of two ranks is matched by the home rank of its lowest
-  vertex, and so are the edges of the surface. A triangle of a group, and the node of a curved edge, goes to the home rank of its lowest vertex, and from there to all
-  ranks that use it: one of them has the tet. The parts that tets hang together in on each rank are joined on rank 0, along vertices that several ranks use.
+  Rendezvous algorithm: vertices are assigned to home ranks by blocks of their numbers. The home rank of a vertex has its position and knows the ranks whose tets
+  use it; there unused vertices are found and vertex data of several ranks is combined. A face between tets of two ranks is matched at the home rank of its lowest
+  vertex; so are the edges of the surface. A group triangle or a curved edge goes to the home rank of its lowest vertex and from there to all ranks that use
+  this vertex, one of which has the tet. Each rank finds its connected parts; rank 0 joins them by their shared vertices.
 
-  A rank has about as much of the mesh as any other: everything here is of the size of its block, but for the pairs of parts that rank 0 joins (few,
-  unless the tets of the file are in random order) and 4 bytes for each vertex between the lowest and the highest one of its tets.
-  What comes out is, number by number, what rank 0 alone makes of the file (merge.c), whatever the ranks; volumes may differ in the last bits.
+  Memory per rank is proportional to the size of its slab, apart from the pairs of parts that rank 0 joins (few, unless the tets of the file are in random order) and 4 bytes
+  for each vertex number between the lowest and the highest one of its tets.
+  The result is the same as that of a serial import (merge.c) on any number of ranks; volumes may differ by rounding.
 */
 #include <stdlib.h>
 #include "mesh_impl.h"
@@ -18,17 +18,17 @@ typedef struct {
   PetscMPIInt rank, size;
   SbImport *im;
   SbPart *part;
-  SbSlabRows rows; /* vertices that this rank keeps */
+  SbSlabRows rows; /* block of vertices for which this rank is the home */
   PetscInt nkept;
-  PetscReal *x;      /* [nkept][3] */
-  PetscInt *number;  /* [nkept] original number, -1: no tet uses it */
-  uint64_t *mask;    /* [nkept] sets */
-  SbRoute vert;      /* vertices of this rank's tets, to their home ranks */
-  PetscInt *used;    /* [im->nvert] their numbers in the file, ascending */
-  PetscInt *asked;   /* [vert.nrecv] position of each among those that are kept */
-  PetscInt *start;   /* [nkept + 1] */
+  PetscReal *x;      /* [nkept][3] position, m */
+  PetscInt *number;  /* [nkept] original number, -1: unused by tets */
+  uint64_t *mask;    /* [nkept] sets of each vertex */
+  SbRoute vert;      /* communication from the vertices of this rank's tets to their home ranks */
+  PetscInt *used;    /* [im->nvert] file numbers of these vertices, ascending */
+  PetscInt *asked;   /* [vert.nrecv] position of each received vertex in the block */
+  PetscInt *start;   /* [nkept + 1] offsets into user[] */
   PetscInt *user;    /* [start[nkept]] ranks that use a vertex, ascending */
-  PetscBool *shared; /* [im->nvert] other ranks use it, too */
+  PetscBool *shared; /* [im->nvert] whether other ranks use the vertex too */
 } Slab;
 
 static inline PetscMPIInt home(const Slab *s, PetscInt vert)
@@ -45,7 +45,7 @@ static PetscErrorCode sum(const Slab *s, PetscInt n, PetscInt value[])
 
 /* ------------------------------------------------------------------ vertices */
 
-/* Places and original numbers of the vertices of this rank's tets. */
+/* Positions and original numbers of the vertices of this rank's tets. */
 static PetscErrorCode ask_home_ranks(Slab *s)
 {
   typedef struct {
@@ -58,13 +58,13 @@ static PetscErrorCode ask_home_ranks(Slab *s)
   PetscInt n = 0, before;
 
   PetscFunctionBeginUser;
-  // the home ranks get the users of their vertices
+  // send vertex numbers to the home ranks
   PetscCall(PetscMalloc1(im->nvert, &dest));
   for (PetscInt v = 0; v < im->nvert; v++) dest[v] = home(s, s->used[v]);
   PetscCall(SbRouteCreate(s->comm, im->nvert, dest, &s->vert));
   PetscCall(PetscFree(dest));
   PetscCall(SbRouteSend(&s->vert, sizeof(PetscInt), s->used, &s->asked));
-  // who uses the vertices that are kept here, and their original numbers
+  // ranks that use each vertex of the block; original numbers of used vertices
   for (PetscInt i = 0; i < s->vert.nrecv; i++) s->asked[i] -= s->rows.first;
   PetscCall(SbBucketByKey(s->vert.nrecv, s->asked, s->nkept, &s->start, &s->user));
   for (PetscInt i = 0; i < s->vert.nrecv; i++) s->user[i] = SbRouteSource(&s->vert, s->user[i]);
@@ -74,7 +74,7 @@ static PetscErrorCode ask_home_ranks(Slab *s)
   PetscCall(PetscMalloc1(s->nkept, &s->number));
   for (PetscInt v = 0; v < s->nkept; v++) s->number[v] = s->start[v + 1] > s->start[v] ? before++ : -1;
   s->im->nunused = s->nkept - n;
-  // they answer with place, number and how many ranks use it
+  // reply with position, original number and number of ranks
   PetscCall(PetscMalloc2(s->vert.nrecv, &answer, im->nvert, &result));
   for (PetscInt i = 0; i < s->vert.nrecv; i++) {
     const PetscInt v = s->asked[i];
@@ -85,7 +85,7 @@ static PetscErrorCode ask_home_ranks(Slab *s)
   }
   PetscCall(SbRouteReply(&s->vert, sizeof(Answer), answer, result));
   PetscCall(PetscFree(s->x));
-  // which are the vertices of this rank
+  // vertex arrays of this rank
   PetscCall(SbImportSetVertices(im, im->nvert));
   PetscCall(PetscMalloc1(im->nvert, &s->part->orig));
   PetscCall(PetscMalloc1(im->nvert, &s->shared));
@@ -102,16 +102,16 @@ static PetscErrorCode ask_home_ranks(Slab *s)
 /* ------------------------------------------------------------------ faces between tets of two ranks */
 
 typedef struct {
-  PetscInt vert[3], at; /* ascending; position among those received */
-  PetscInt cell;        /* as SbPart.remote numbers it */
-  int64_t number;       /* of the tet in the file */
+  PetscInt vert[3], at; /* ascending; position in the received array */
+  PetscInt cell;        /* local index plus the number of cells of earlier bodies, as in SbPart.remote */
+  int64_t number;       /* file number of the tet */
 } Face;
 typedef struct {
   PetscInt rank, cell;
   int64_t number;
 } Across;
 
-/* The cells across the received faces. */
+/* Finds pairs of equal faces among those received, and the cell across each face. */
 static PetscErrorCode match_faces(const Slab *s, const SbRoute *route, Face face[], Across across[])
 {
   PetscInt nshared = 0, first = -1, m;
@@ -139,7 +139,7 @@ static PetscErrorCode match_faces(const Slab *s, const SbRoute *route, Face face
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Cells of other ranks become neighbours; one that lies across all four faces is the same tet again. */
+/* Makes cells of other ranks neighbours; one that is the neighbour across all four faces is a duplicate tet. */
 static PetscErrorCode link_faces(Slab *s, PetscInt nsend, const PetscInt slot[], const Across across[])
 {
   SbFaces *faces = &s->part->faces;
@@ -165,7 +165,7 @@ static PetscErrorCode link_faces(Slab *s, PetscInt nsend, const PetscInt slot[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All faces whose vertices other ranks use, too, those with a tet of this rank on both sides among them: a third one is found. */
+/* Matches all faces whose three vertices are shared by ranks, including those with two local tets, in order to find a third one. */
 static PetscErrorCode join_faces(Slab *s, PetscInt before)
 {
   const SbItems *tets = &s->im->item[3];
@@ -177,7 +177,7 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
   Across *across, *result;
 
   PetscFunctionBeginUser;
-  // counted, then listed: faces with three shared vertices, at the home rank of their lowest one
+  // count, then list: faces with three shared vertices, sent to the home rank of the lowest one
   for (int pass = 0; pass < 2; pass++) {
     if (pass) PetscCall(PetscMalloc3(n, &face, n, &slot, n, &dest));
     n = 0;
@@ -202,14 +202,14 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
       n++;
     }
   }
-  // the home ranks match them, and return the cell across
+  // home ranks match the faces and reply with the cell across
   PetscCall(SbRouteCreate(s->comm, n, dest, &route));
   PetscCall(SbRouteSend(&route, sizeof(Face), face, &got));
   PetscCall(PetscMalloc2(route.nrecv, &across, n, &result));
   SB_CATCH(&caught, match_faces(s, &route, got, across));
   PetscCall(SbRouteReply(&route, sizeof(Across), across, result));
   if (!caught.code) SB_CATCH(&caught, link_faces(s, n, slot, result));
-  // an error of any rank is one of all
+  // an error of one rank is raised on all ranks
   PetscCall(PetscFree(got));
   PetscCall(PetscFree2(across, result));
   PetscCall(PetscFree3(face, slot, dest));
@@ -218,7 +218,7 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Edges of the surface with more than two facets: the home rank of the lower vertex has all facets of an edge. */
+/* Counts surface edges with more than two facets; the home rank of the lower vertex has all facets of an edge. */
 static PetscErrorCode count_pinched(Slab *s)
 {
   const PetscInt n = 3 * s->part->faces.nboundary;
@@ -239,7 +239,7 @@ static PetscErrorCode count_pinched(Slab *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ parts that share no vertex */
+/* ------------------------------------------------------------------ connected parts */
 
 static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
 {
@@ -250,7 +250,7 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
   SbRoute route;
 
   PetscFunctionBeginUser;
-  /* parts of this rank, numbered over all ranks */
+  /* parts of this rank, numbered across all ranks */
   PetscCall(PetscMalloc1(im->nvert, &part));
   SbImportJoin(im, part, &n);
   total = n;
@@ -258,12 +258,12 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
   PetscCall(sum(s, 1, &total));
   first -= n;
   for (PetscInt v = 0; v < im->nvert; v++) part[v] = part[v] == v ? first++ : part[part[v]];
-  /* those that meet at a vertex, each pair once */
+  /* pairs of parts that share a vertex, each pair once */
   PetscCall(SbRouteSend(&s->vert, sizeof(PetscInt), part, &got));
   PetscCall(PetscFree(part));
   PetscCall(PetscMalloc2(s->vert.nrecv, &user, s->vert.nrecv, &pair));
   for (PetscInt v = 0; v < s->nkept; v++)
-    if (s->number[v] >= 0) user[s->start[v]] = -1; /* some tet uses it */
+    if (s->number[v] >= 0) user[s->start[v]] = -1; /* the vertex is used by a tet */
   for (PetscInt i = 0; i < s->vert.nrecv; i++) {
     PetscInt *other = &user[s->start[s->asked[i]]];
 
@@ -274,7 +274,7 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
   PetscCall(PetscSortInt64(npair, pair));
   for (PetscInt i = 0; i < npair; i++)
     if (!kept || pair[i] != pair[kept - 1]) pair[kept++] = pair[i];
-  // rank 0 joins the parts of all ranks along these pairs
+  // rank 0 joins the parts of all ranks by union-find
   PetscCall(PetscCalloc1(kept, &dest));
   PetscCall(SbRouteCreate(s->comm, kept, dest, &route));
   PetscCall(SbRouteSend(&route, sizeof(*pair), pair, &all));
@@ -294,7 +294,7 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
 
 /* ------------------------------------------------------------------ points, lines and triangles of groups */
 
-/* The home ranks of the vertices of items get the bits of their tag sets, but not of items with a vertex that no tet uses. */
+/* Adds the set bits of items to the masks of their vertices at the home ranks, unless one of the item's vertices is unused. */
 static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
 {
   SbImport *im = s->im;
@@ -305,7 +305,7 @@ static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
   PetscBool *there, *is;
 
   PetscFunctionBeginUser;
-  // the vertices of all items, and who keeps them
+  // vertices of all items, and their home ranks
   for (int d = 0; d < 3; d++) n += (d + 1) * im->item[d].n;
   PetscCall(PetscMalloc4(n, &vert, n, &dest, n, &mark, n, &there));
   n = 0;
@@ -316,14 +316,14 @@ static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
       n++;
     }
   }
-  // the home ranks say which of them a tet uses
+  // home ranks reply whether a tet uses each vertex
   PetscCall(SbRouteCreate(s->comm, n, dest, &route));
   PetscCall(SbRouteSend(&route, sizeof(PetscInt), vert, &got));
   PetscCall(PetscMalloc1(route.nrecv, &is));
   for (PetscInt i = 0; i < route.nrecv; i++) is[i] = (PetscBool)(s->number[got[i] - s->rows.first] >= 0);
   PetscCall(SbRouteReply(&route, sizeof(PetscBool), is, there));
   PetscCall(PetscFree(is));
-  // items with all their vertices mark these by their tag sets; then points and lines are removed
+  // mark the vertices of items whose vertices are all used; then drop points and lines
   n = 0;
   for (int d = 0; d < 3; d++) {
     for (PetscInt i = 0; i < im->item[d].n; i++) {
@@ -334,7 +334,7 @@ static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
     }
     if (d < 2) im->item[d].n = 0;
   }
-  // the marks of all ranks come together at the home ranks
+  // combine the marks of all ranks at the home ranks
   PetscCall(SbRouteSend(&route, sizeof(uint64_t), mark, &got_mark));
   for (PetscInt i = 0; i < route.nrecv; i++) s->mask[got[i] - s->rows.first] |= got_mark[i];
   PetscCall(PetscFree(got));
@@ -345,9 +345,9 @@ static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
 }
 
 /*
-  Records of `unit` bytes go to all ranks that use the vertex that they begin with, by way of its home.
+  Sends records of `unit` bytes, whose first entry is a vertex, by its home rank to all ranks that use the vertex.
 
-  Output: there, the route to the homes; on, the route from there, of records from[on.nsend] that came there; in[on.nrecv], which PetscFree() frees, as from.
+  Output: `there`, the route to the home ranks; `on`, the route to the users, with from[on.nsend], the position of each record at the home rank; in[on.nrecv], received records. The caller frees from and in.
 */
 static PetscErrorCode send_to_users(Slab *s, PetscInt n, size_t unit, const void *record, SbRoute *there,
                                     SbRoute *on, PetscInt **from, void *in)
@@ -390,7 +390,7 @@ static PetscErrorCode send_to_users(Slab *s, PetscInt n, size_t unit, const void
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Ends an exchange of send_to_users(): whether any rank has found each of the records, anywhere[there->nsend], from what this one has, found[on->nrecv]. */
+/* Ends the exchange of send_to_users(): anywhere[there->nsend] tells whether any rank has found a record, from found[on->nrecv] of all ranks. */
 static PetscErrorCode end_search(SbRoute *there, SbRoute *on, PetscInt *from, const PetscBool found[],
                                  PetscBool anywhere[])
 {
@@ -411,10 +411,10 @@ static PetscErrorCode end_search(SbRoute *there, SbRoute *on, PetscInt *from, co
 }
 
 typedef struct {
-  PetscInt vert[3], tags; /* the lowest vertex first */
+  PetscInt vert[3], tags; /* vertices ascending; tag set */
 } Triangle;
 
-/* Each triangle goes to all ranks that use its lowest vertex. */
+/* Sends each group triangle to the ranks that use its lowest vertex; the rank whose tets have it keeps it. */
 static PetscErrorCode find_triangles(Slab *s)
 {
   const SbItems *item = &s->im->item[2];
@@ -436,7 +436,7 @@ static PetscErrorCode find_triangles(Slab *s)
   PetscCall(send_to_users(s, n, sizeof(*mine), mine, &there, &on, &from, &in));
   PetscCall(PetscFree(mine));
   PetscCall(PetscMalloc2(on.nrecv, &found, n, &anywhere));
-  // the triangles that are faces of this rank's tets become the triangles of its import
+  // keep the received triangles that are faces of this rank's tets
   im->item[2].n = 0;
   for (PetscInt i = 0; i < on.nrecv; i++) {
     PetscInt v[3];
@@ -458,7 +458,7 @@ static PetscErrorCode find_triangles(Slab *s)
 
 /* ------------------------------------------------------------------ curved edges */
 
-/* Each goes to all ranks that use its lower vertex, and stays where it is one of a tet. */
+/* Sends each curved edge to the ranks that use its lower vertex; the ranks whose tets have it keep it. */
 static PetscErrorCode find_edges(Slab *s)
 {
   SbImport *im = s->im;
@@ -476,13 +476,14 @@ static PetscErrorCode find_edges(Slab *s)
   PetscCall(send_to_users(s, nmine, sizeof(*in), mine, &there, &on, &from, &in));
   for (PetscInt i = 0; i < on.nrecv; i++)
     for (int k = 0; k < 2; k++)
-      PetscCall(PetscFindInt(in[i].end[k], im->nvert, s->used, &in[i].end[k])); /* negative: not here */
+      PetscCall(
+        PetscFindInt(in[i].end[k], im->nvert, s->used, &in[i].end[k])); /* negative: not on this rank */
   im->middle = in;
   im->nmiddle = (SbCount){on.nrecv, on.nrecv};
   PetscCall(PetscMalloc2(on.nrecv, &found, nmine, &anywhere));
   SB_CATCH(&caught, SbImportMiddles(im, found, &largest));
   PetscCall(end_search(&there, &on, from, found, anywhere));
-  // a tet of some rank has each of those in the file
+  // an edge in the file that no tet has is an error
   for (PetscInt i = 0; i < nmine && !caught.code; i++)
     if (!anywhere[i]) SB_CATCH(&caught, SbImportLostMiddle(im, &mine[i]));
   PetscCall(PetscFree2(found, anywhere));
@@ -509,13 +510,13 @@ static PetscErrorCode mark(Slab *s, PetscInt nbody, const SbBody body[], PetscIn
   PetscCall(mark_items(s, bits));
   PetscCall(find_triangles(s));
   PetscCall(SbSetsMark(im, &s->part->faces, nbody, body, b, nset, set, m));
-  // a vertex belongs to the sets that it has on any rank
+  // combine the set bits of shared vertices over all ranks
   PetscCall(SbRouteSend(&s->vert, sizeof(uint64_t), s->part->masks.vert, &got));
   for (PetscInt i = 0; i < s->vert.nrecv; i++) s->mask[s->asked[i]] |= got[i];
   for (PetscInt i = 0; i < s->vert.nrecv; i++) got[i] = s->mask[s->asked[i]];
   PetscCall(SbRouteReply(&s->vert, sizeof(uint64_t), got, s->part->masks.vert));
   PetscCall(PetscFree(got));
-  /* vertices are counted by their home ranks */
+  /* count vertices at their home ranks */
   kept = *m;
   kept.vert = s->mask;
   PetscCall(SbSetsCount(s->comm, s->nkept, im->item[3].n, &kept, nset, set));
@@ -523,7 +524,7 @@ static PetscErrorCode mark(Slab *s, PetscInt nbody, const SbBody body[], PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ all of it */
+/* ------------------------------------------------------------------ import */
 
 static PetscErrorCode check_cells(Slab *s, PetscReal largest)
 {
@@ -550,7 +551,7 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   SB_CATCH(&caught, SbImportSlab(&body[b], s->rank, s->size, im, &s->rows));
   PetscCall(SbCaughtRaise(s->comm, &caught));
   s->part->first = im->item[3].n ? (PetscInt)im->item[3].number[0] - 1 : 0;
-  // the vertices of the tets, ascending; tets then refer to them
+  // vertices used by this rank's tets, ascending; renumber the tets
   for (PetscInt i = 0; i < 4 * tets->n; i++) {
     low = PetscMin(low, tets->vert[i]);
     high = PetscMax(high, tets->vert[i]);
@@ -569,7 +570,7 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   }
   for (PetscInt i = 0; i < 4 * tets->n; i++) tets->vert[i] = map[tets->vert[i] - low];
   PetscCall(PetscFree(map));
-  /* this rank keeps exactly what it read */
+  /* the vertices that were read are this rank's block */
   s->nkept = im->nvert;
   s->x = im->x;
   im->x = NULL;
@@ -584,7 +585,7 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   PetscCall(join_faces(s, before));
   PetscCall(sum(s, 1, &im->nunused));
   PetscCall(sum(s, 1, &im->nreoriented));
-  // size and shape of the body, from those of all ranks
+  // size and shape quality of the body, reduced over all ranks
   SbImportShape(im, SB_SLIVER, &shape);
   PetscCall(sum(s, 1, &shape.nsliver));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &shape.volume, 1, MPIU_REAL, MPI_SUM, s->comm));
@@ -602,7 +603,7 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   PetscCall(sum(s, 1, &im->nlost));
   PetscCall(SbImportNote(im, &body[b]));
   PetscCall(SbImportCurve(s->comm, im, &body[b], s->part->masks.cell, &s->part->edge_off));
-  PetscCall(PetscFree(s->part->faces.face)); /* the neighbours are found */
+  PetscCall(PetscFree(s->part->faces.face)); /* no longer needed: neighbours are known */
   PetscCall(PetscFree(s->part->faces.start));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

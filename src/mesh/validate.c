@@ -1,9 +1,9 @@
 /*
-  validate.c - what is promised about a mesh, looked up: ranges, order, ownership, sums over the ranks.
+  validate.c - checks of the guarantees of SbMesh: index ranges, order, ownership, sums over the ranks.
 
-  Every cell that touches an owned vertex is local when the pairs (owned vertex, local cell that holds it), counted on all
-  ranks, number four per cell of the whole mesh. Original numbers are a permutation when each occurs once; that is seen
-  from the sums of the numbers and of their mixed bits.
+  Every cell with an owned vertex is local if and only if the number of pairs (owned vertex, local cell that has it), summed over all
+  ranks, is four times the global number of cells. Original numbers are a permutation if each occurs once; this is checked
+  by the sums of the numbers and of their hashes.
 */
 #include "mesh_impl.h"
 
@@ -14,7 +14,7 @@ static PetscInt lowest(const PetscInt v[4])
   return PetscMin(PetscMin(v[0], v[1]), PetscMin(v[2], v[3]));
 }
 
-/* Global quantities, equal on all ranks. */
+/* Checks of global sums, equal on all ranks. */
 static PetscErrorCode check_sums(SbMesh m)
 {
   enum { VERT, CELL, PAIR, VERT_MIX, CELL_MIX, FACET, NSUM };
@@ -22,7 +22,7 @@ static PetscErrorCode check_sums(SbMesh m)
   PetscReal volume = 0, volumes = 0, rest = 0;
 
   PetscFunctionBeginUser;
-  // sums over what this rank owns
+  // sums over owned vertices and cells
   mine[VERT] = (uint64_t)m->nvert_owned;
   mine[CELL] = (uint64_t)m->ncell_owned;
   for (PetscInt v = 0; v < m->nvert_owned; v++) mine[VERT_MIX] += SbMix(m->vert_orig[v]);
@@ -36,7 +36,7 @@ static PetscErrorCode check_sums(SbMesh m)
   }
   PetscCallMPI(MPI_Allreduce(mine, all, NSUM, MPI_UINT64_T, MPI_SUM, m->comm));
   PetscCallMPI(MPI_Allreduce(&volume, &volumes, 1, MPIU_REAL, MPI_SUM, m->comm));
-  // what they must be: every vertex and cell once
+  // expected: each vertex and cell once
   expected[VERT] = (uint64_t)m->Nvert;
   expected[CELL] = (uint64_t)m->Ncell;
   expected[PAIR] = 4 * (uint64_t)m->Ncell;
@@ -46,7 +46,7 @@ static PetscErrorCode check_sums(SbMesh m)
     expected[FACET] += (uint64_t)m->body[b].nfacet;
     rest += m->body[b].volume;
   }
-  // compared; volumes to rounding
+  // comparison; volumes up to rounding
   for (int i = 0; i < NSUM; i++) {
     static const char *const what[NSUM] = {
       "owned vertices",          "owned cells",           "cells around owned vertices",
@@ -119,7 +119,7 @@ PetscErrorCode SbMeshValidate(SbMesh mesh)
           "Cells are out of order at %" PetscInt_FMT, c);
   }
   PetscCall(check_sums(mesh));
-  // ghost vertices carry what their owners have
+  // ghost vertices have the data of their owners
   PetscCall(PetscMalloc2(3 * (size_t)mesh->nvert, &x, mesh->nvert, &orig));
   PetscCall(PetscArraycpy(x, mesh->x, 3 * (size_t)mesh->nvert_owned));
   PetscCall(PetscArraycpy(orig, mesh->vert_orig, mesh->nvert_owned));
