@@ -1,19 +1,19 @@
 /*
-  box.c - a box of tets: box:lx,ly,lz:n or box:lx,ly,lz:nx,ny,nz, from the origin to (lx, ly, lz).
+  box.c - structured tet mesh of a box from the origin to (lx, ly, lz): box:lx,ly,lz:n or box:lx,ly,lz:nx,ny,nz.
 
-  n counts cells along the shortest side; the other sides get as many as make the cells nearest to cubes. Each cell is cut
-  into six tets around one of its diagonals (Kuhn, 1960), and neighbouring cells are mirror images of each other. Without
-  the mirroring all tets have the same shapes, but the mesh has a preferred direction: on a clamped bar of 32 x 8 x 8
+  n is the number of cells along the shortest side; the numbers along the other sides make the cells nearest to cubes. Each cell is divided
+  into six tets around one of its diagonals (Kuhn, 1960), and adjacent cells are mirror images of each other. Without
+  mirroring all tets have the same shapes, but the mesh has a preferred direction: on a clamped bar of 32 x 8 x 8
   cells under its weight it recovers 93.3 % of the strain energy at a Poisson ratio of 0.3 and 60 % at 0.49, the mirrored
   one 95.6 % and 93 %, with the same number of unknowns and matrix entries; and a symmetric load on an even number of
-  cells gives a symmetric answer.
+  cells gives a symmetric solution.
 
   The sides are the groups xmin, xmax, ymin, ymax, zmin, zmax.
 */
 #include "meshio_impl.h"
 
 typedef struct {
-  PetscReal l[3]; /* m */
+  PetscReal l[3]; /* side lengths, m */
   PetscInt n[3];
 } Box;
 
@@ -26,8 +26,8 @@ static inline PetscInt vertex(const Box *box, PetscInt i, PetscInt j, PetscInt k
 }
 
 /*
-  The six tets of a cell: corners as bits (1: far in x, 2: in y, 4: in z), along the six ways from corner 0 to corner 7.
-  `mirror` holds the directions in which the cell is reflected. Odd ways and odd reflections each turn the tet inverted.
+  Six tets of a cell; corners as bits (1: far in x, 2: in y, 4: in z), each tet along one of the six edge paths from corner 0 to corner 7.
+  `mirror`: bits of the directions in which the cell is reflected. An odd permutation and an odd number of reflections each change the orientation of the tet.
 */
 static PetscErrorCode add_cell(const Box *box, const PetscInt at[3], SbImport *im)
 {
@@ -42,7 +42,7 @@ static PetscErrorCode add_cell(const Box *box, const PetscInt at[3], SbImport *i
 
     for (int a = 0; a < 4; a++) {
       const int corner = ways[w][a] ^ mirror;
-      const int position = odd ^ (w >= 3) && a >= 2 ? 5 - a : a; /* swaps the last two */
+      const int position = odd ^ (w >= 3) && a >= 2 ? 5 - a : a; /* swap the last two vertices */
 
       vert[position] = vertex(box, at[0] + (corner & 1), at[1] + (corner >> 1 & 1), at[2] + (corner >> 2));
     }
@@ -61,7 +61,7 @@ PetscErrorCode SbImportRead_Box(const char *text, SbImport *im)
   int count;
 
   PetscFunctionBeginUser;
-  // the lengths and the numbers of cells
+  // side lengths and numbers of cells
   (void)snprintf(lengths, sizeof(lengths), "%.*s", (int)strcspn(sides, ":"), sides);
   count = colon ? SbParseNumbers(colon + 1, 3, n) : 0;
   PetscCheck((count == 1 || count == 3) && SbParseNumbers(lengths, 3, l) == 3, PETSC_COMM_SELF,
@@ -107,14 +107,14 @@ PetscErrorCode SbImportRead_Box(const char *text, SbImport *im)
     const int d = side / 2, e = (d + 1) % 3, f = (d + 2) % 3;
     PetscInt tags;
 
-    // two triangles on each cell side of the face `side` of the box; the diagonal is the one that the tets have
+    // two triangles for each cell on the side `side` of the box, with the diagonals of the tets
     PetscCall(SbImportTagsAlone(im, 2, side + 1, names[side], &tags));
     at[d] = side % 2 ? box.n[d] : 0;
     for (PetscInt i = 0; i < box.n[e]; i++) {
       for (PetscInt j = 0; j < box.n[f]; j++) {
         PetscInt c[4];
 
-        /* Corners by bits; the diagonals of a row of mirrored cells alternate. */
+        /* corners by bits; the diagonals of adjacent mirrored cells alternate */
         for (int corner = 0; corner < 4; corner++) {
           at[e] = i + ((corner & 1) ^ (i & 1));
           at[f] = j + ((corner >> 1) ^ (j & 1));

@@ -1,10 +1,10 @@
 /*
-  child.c - gmsh at work in a forked child: when it crashes or hangs the program goes on, with a message.
+  child.c - gmsh in a forked child process: if it crashes or hangs, the program continues with an error message.
 
-  The child must not disturb what it inherits: it never returns but ends by _exit() (no MPI, no buffers, no
-  PetscFinalize()), takes back every signal handler (of PETSc and MPI), prints nothing, leaves no core file, dies with its parent, and by a
-  timer of its own when it takes too long. It calls neither MPI nor HDF5. It leaves what it made in a file in memory that both
-  have: a header with counts and the text of its error, then the arrays one after the other.
+  The child must not disturb inherited state: it never returns but ends by _exit() (no MPI, no flush of buffers, no
+  PetscFinalize()), resets all signal handlers (of PETSc and MPI), prints nothing, writes no core file, dies with its parent, and ends by a
+  timer after a time limit. It calls neither MPI nor HDF5. It writes its result to a memory file that both processes
+  have open: a header with counts and the error message, then the arrays in sequence.
 */
 #include <errno.h>
 #include <fcntl.h>
@@ -19,10 +19,10 @@
 
 typedef struct {
   SbCaughtError caught;
-  PetscInt nvert, n[4]; /* vertices, items by dimension */
+  PetscInt nvert, n[4]; /* numbers of vertices, and of items by dimension */
 } Header;
 
-/* The arrays of a body by their position and size in bytes: alike for who sends and who receives. */
+/* Addresses and sizes in bytes of the arrays of a body, in the same order for sender and receiver. */
 typedef struct {
   void **array;
   size_t bytes;
@@ -67,7 +67,7 @@ void SbChildIsolate(pid_t parent, PetscReal seconds)
   for (int i = 0; nothing >= 0 && i < 3; i++) (void)dup2(nothing, i);
 }
 
-/* Never returns. */
+/* Body of the child process; never returns. */
 static void child(FILE *file, const SbGmshJob *job)
 {
   Header h;
@@ -116,7 +116,7 @@ PetscErrorCode SbGmshRun(const SbGmshJob *job, SbImport *im)
   rewind(file);
   complete =
     (PetscBool)(pid > 0 && WIFEXITED(status) && !WEXITSTATUS(status) && fread(&h, sizeof(h), 1, file) == 1);
-  // its arrays, instead of those that `im` has
+  // replace the arrays of `im` by the result
   if (complete && !h.caught.code) {
     list_parts(im, &h, part);
     for (int i = 0; i < NPART && complete; i++) {
@@ -131,7 +131,7 @@ PetscErrorCode SbGmshRun(const SbGmshJob *job, SbImport *im)
   PetscCheck(pid > 0, PETSC_COMM_SELF, PETSC_ERR_SYS, "%s: no child process for gmsh (%s)", im->where,
              strerror(errno));
 
-  /* message for a child without a complete result */
+  /* error messages for a child without a complete result */
   PetscCheck(complete || !WIFSIGNALED(status) || WTERMSIG(status) != SIGALRM, PETSC_COMM_SELF,
              PETSC_ERR_FILE_UNEXPECTED,
              "%s: gmsh was stopped: after %g s it had not %s; give a smaller or repaired input", im->where,

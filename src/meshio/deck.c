@@ -1,8 +1,8 @@
 /*
-  deck.c - nodes, elements and sets of a file that names them by labels, in any order: collected first, then put together.
+  deck.c - builds a mesh from nodes, elements and sets that a file lists by labels in any order: everything is collected first, then converted.
 
-  What Abaqus, Nastran and universal files have in common. A set may name nodes, elements and other sets that come later, hence it is taken
-  apart when all are there.
+  Common part of the Abaqus, Nastran and universal file readers. A set may refer to nodes, elements and sets that are defined later, hence its members are
+  found after the whole file has been read.
 */
 #include "meshio_impl.h"
 
@@ -56,7 +56,7 @@ PetscErrorCode SbDeckAddRange(SbDeck *d, PetscInt set, int64_t first, int64_t la
   SbDeckRange *before = s->nrange.n ? &s->range[s->nrange.n - 1] : NULL;
 
   PetscFunctionBeginUser;
-  /* consecutive labels, as an element gives its set, are merged into one range, except where messages need the line of each */
+  /* merge consecutive labels into one range, unless messages need the line of each label */
   if (before && !d->strict && before->set < 0 && before->step == 1 && step == 1 && first == before->last + 1)
     before->last = last;
   else
@@ -69,20 +69,20 @@ PetscErrorCode SbDeckAddSet(SbDeck *d, PetscInt set, PetscInt other)
   return add_range(d, set, (SbDeckRange){.set = other});
 }
 
-/* ------------------------------------------------------------------ put together */
+/* ------------------------------------------------------------------ conversion */
 
-/* Adds the nodes or elements of a range to those found, by their places. */
+/* Appends the indices of the nodes or elements in a range to deck->found. */
 static PetscErrorCode find_range(SbDeck *d, const SbDeckSet *set, const SbDeckRange *r)
 {
   SbImport *im = d->im;
   const SbNumbers *numbers = set->of_nodes ? &im->nodes : &im->elements;
   const int64_t length = (r->last - r->first) / r->step + 1;
   const PetscBool all =
-    (PetscBool)(length > numbers->n); /* then each node or element is looked at instead of each label */
+    (PetscBool)(length > numbers->n); /* then test each node or element instead of each label */
   const int64_t n = all ? numbers->n : length;
 
   PetscFunctionBeginUser;
-  /* sets that name each other can name far more members than a file of this size has use for */
+  /* nested sets could multiply the members of a damaged file: limit the number */
   im->scan.token = r->at;
   d->nlooked += n;
   if (d->nlooked > 64 * (int64_t)(im->scan.end - im->scan.data))
@@ -142,11 +142,11 @@ PetscErrorCode SbDeckBuild(SbDeck *d)
 {
   SbImport *im = d->im;
   int64_t *label = NULL;
-  PetscInt *point = NULL, group; /* [nvert] item of a node that is in a set, or -1 */
+  PetscInt *point = NULL, group; /* [nvert] item of each node that is in a set, -1: none */
 
   PetscFunctionBeginUser;
   PetscCall(SbImportCheckTypes(im));
-  // nodes become vertices; each label may stand once
+  // nodes become vertices; duplicate labels are an error
   PetscCall(SbImportSetVertices(im, d->nnode.n));
   for (PetscInt v = 0; v < im->nvert; v++) {
     PetscCall(PetscArraycpy(im->x + 3 * v, d->node[v].x, 3));
@@ -157,7 +157,7 @@ PetscErrorCode SbDeckBuild(SbDeck *d)
     if (d->node[v].label == im->nodes.twice) im->scan.token = d->node[v].at;
   if (im->nodes.repeated)
     SB_SCAN_ERROR(&im->scan, "node %lld is given twice; %s", (long long)im->nodes.twice, d->cure);
-  // the simplices, with the groups of their properties
+  // simplices, with the groups of their properties
   PetscCall(SbImportScratch(im, (size_t)d->nelement.n * sizeof(*label), &label));
   for (PetscInt e = 0; e < d->nelement.n; e++) {
     SbDeckElement *element = &d->element[e];
@@ -174,7 +174,7 @@ PetscErrorCode SbDeckBuild(SbDeck *d)
 
       vert[SbGmshNode(k)] = v;
       if (v < 0 &&
-          (k < 4 || element->node[k] || d->strict)) // Nastran may leave out nodes of edges that are straight
+          (k < 4 || element->node[k] || d->strict)) // Nastran may omit the edge nodes of straight edges
         SB_SCAN_ERROR(&im->scan, "element %lld uses node %lld, which is not there", (long long)element->label,
                       (long long)element->node[k]);
     }
@@ -186,7 +186,7 @@ PetscErrorCode SbDeckBuild(SbDeck *d)
   PetscCall(SbNumbersCreate(d->nelement.n, label, &im->elements));
   if (im->elements.repeated && d->unique)
     SB_SCAN_ERROR(&im->scan, "element %lld is given twice; %s", (long long)im->elements.twice, d->cure);
-  // sets become groups of their members; a node of a set becomes a point
+  // sets become groups of their members; each node of a set becomes a point item
   PetscCall(SbImportScratch(im, (size_t)im->nvert * sizeof(*point), &point));
   for (PetscInt v = 0; v < im->nvert; v++) point[v] = -1;
   for (PetscInt s = 0; s < d->nset.n; s++) {

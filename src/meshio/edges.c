@@ -1,14 +1,14 @@
 /*
-  edges.c - edges: pairs of vertices that a tet, triangle or line joins, each once.
+  edges.c - list of the unique edges of all tets, triangles and lines.
 
-  The edges of every item go into the bucket of their lower vertex (a counting sort); each bucket is sorted, equal neighbours
-  in it are one edge. The number of an edge is its position in the list.
+  Counting sort: each edge goes into the bucket of its lower vertex; each bucket is sorted, and equal neighbours in it
+  are one edge. The number of an edge is its position in the list.
 */
 #include "meshio_impl.h"
 #include "sbquadratic.h"
 
 static const int edge_count[4] = {0, 1, 3,
-                                  6}; /* of an item, by dimension; triangles use the pairs 0, 1 and 3 */
+                                  6}; /* edges of an item, by dimension; triangles use the pairs 0, 1 and 3 */
 static const int edge_row[4][6] = {{0}, {0}, {0, 1, 3}, {0, 1, 2, 3, 4, 5}};
 
 PetscErrorCode SbImportEdgesCreate(const SbImport *im, SbImportEdges *edges)
@@ -22,7 +22,7 @@ PetscErrorCode SbImportEdgesCreate(const SbImport *im, SbImportEdges *edges)
   for (int d = 1; d < 4; d++) total += (PetscInt64)edge_count[d] * im->item[d].n;
   PetscCheck(total <= PETSC_MAX_INT, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: has more edges than this build can number", im->where);
-  // those of all items, by their lower vertices
+  // edges of all items, by their lower vertices
   PetscCall(PetscMalloc2((size_t)total, &low, (size_t)total, &high));
   for (int d = 1; d < 4; d++) {
     for (PetscInt i = 0; i < edge_count[d] * im->item[d].n; i++) {
@@ -35,7 +35,7 @@ PetscErrorCode SbImportEdgesCreate(const SbImport *im, SbImportEdges *edges)
   }
   PetscCall(SbBucketByKey(n, low, im->nvert, &edges->start, &item));
   PetscCall(PetscMalloc1(n, &edges->high));
-  // each bucket is sorted, and the gaps of repeated edges are closed
+  // sort each bucket, and remove duplicate edges
   for (PetscInt v = 0; v < edges->nvert; v++) {
     const PetscInt end = edges->start[v + 1];
 

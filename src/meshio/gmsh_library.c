@@ -1,19 +1,19 @@
 /*
-  gmsh_library.c - the gmsh library, loaded in a child process when it is needed.
+  gmsh_library.c - loads the gmsh library at run time, in a child process.
 
-  It is found by its name, with the version in it: gmshInitialize() has another list of arguments from 4.9 on. Its output is off; its
-  messages are kept by its logger, whose last error (or warning) becomes our message.
+  The library is found by its versioned file name: the arguments of gmshInitialize() changed in 4.9. Its output is switched off; its
+  logger keeps the messages, and the last error (or warning) becomes part of our message.
 */
 #include <dlfcn.h>
 #include <stddef.h>
 #include "meshio_impl.h"
 
-enum { OLDEST = 8, NEWEST = 30 }; /* 4.8 to 4.30 */
+enum { OLDEST = 8, NEWEST = 30 }; /* minor versions: 4.8 to 4.30 */
 
-/* A gmsh that holds METIS and others within itself must find those, not the ones of this program. The address sanitizer forbids that. */
+/* RTLD_DEEPBIND: a gmsh with its own METIS and other libraries must use those, not the ones of this program. The address sanitizer forbids it. */
 #if defined(__has_feature)
   #if __has_feature(address_sanitizer)
-    #define SANITIZED /* as clang says it */
+    #define SANITIZED /* as clang tells it */
   #endif
 #endif
 #if defined(SANITIZED) || defined(__SANITIZE_ADDRESS__) || !defined(RTLD_DEEPBIND)
@@ -33,7 +33,7 @@ static const struct {
 #undef ROW
 };
 
-/* The newest version that is there. */
+/* Loads the newest installed version. */
 static PetscErrorCode load(const char *where, void **library, int *minor)
 {
   char name[64], why[256] = "";
@@ -45,7 +45,7 @@ static PetscErrorCode load(const char *where, void **library, int *minor)
     (void)snprintf(name, sizeof(name), "libgmsh.so.4.%d", *minor);
     *library = dlopen(name, BIND);
     if (*library) PetscFunctionReturn(PETSC_SUCCESS);
-    /* A library that is there but lacks another one says more than those that are not there. */
+    /* the error of an installed library with a missing dependency is more useful than "not found" */
     error = dlerror();
     if (error && !strstr(error, name)) (void)snprintf(why, sizeof(why), "; %s", error);
   }
@@ -58,7 +58,7 @@ static PetscErrorCode load(const char *where, void **library, int *minor)
 
 /* ------------------------------------------------------------------ messages */
 
-/* The last line of the log that begins like this, without that; "" when there is none. */
+/* Last line of the log with the prefix `level`, without the prefix; "" if there is none. */
 static void last_line(const SbGmsh *g, const char *level, size_t size, char text[])
 {
   char **log = NULL;
@@ -105,7 +105,7 @@ PetscErrorCode SbGmshCall(const SbGmshJob *job, SbImport *im)
   PetscCall(PetscMemzero(&g, sizeof(g)));
   g.where = job->where;
   PetscCall(load(g.where, &library, &minor));
-  // the functions of the library, by name
+  // look up the functions of the library by name
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(functions); i++) {
     void *address = dlsym(library, functions[i].name);
 
@@ -114,7 +114,7 @@ PetscErrorCode SbGmshCall(const SbGmshJob *job, SbImport *im)
                functions[i].name);
     memcpy((char *)&g + functions[i].offset, &address, sizeof(address));
   }
-  // the library starts: quiet, on one thread, with an empty model
+  // initialise the library: no output, one thread, an empty model
   start = dlsym(library, "gmshInitialize");
   if (start && minor < 9) {
     memcpy(&before_9, &start, sizeof(start));

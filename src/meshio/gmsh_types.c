@@ -1,5 +1,5 @@
 /*
-  gmsh_types.c - the types of elements as gmsh numbers them (reference manual, "MSH file format"), and which of them make a body.
+  gmsh_types.c - table of gmsh's element types (reference manual, "MSH file format"), by number.
 */
 #include "meshio_impl.h"
 

@@ -1,7 +1,7 @@
 /*
-  import.c - a body on rank 0: the reader chosen by the name of its mesh, its groups, its placement.
+  import.c - import of a body on rank 0: the reader is chosen by the mesh name; the body is placed after reading.
 
-  A new format is one file with one SbReader and one row in the table below.
+  A new format needs one file with one SbReader and one row in the table below.
 
   Placement: x <- R (s x) + t, with the rotation R by Rodrigues' formula about an axis through the origin of the file.
 */
@@ -17,7 +17,7 @@ static PetscErrorCode transform_body(const SbBody *body, SbImport *im)
   char scale[SB_IMPORT_OPTION_MAX], translate[SB_IMPORT_OPTION_MAX];
 
   PetscFunctionBeginUser;
-  // rotation about an axis; exact for quarter turns about the axes of the frame
+  // rotation about an axis; exact for multiples of 90 degrees about the coordinate axes
   if (body->rotate[3] != 0) {
     const PetscReal *w = body->rotate;
     const PetscReal angle = body->rotate[3] * PETSC_PI / 180,
@@ -59,7 +59,7 @@ static PetscErrorCode transform_body(const SbBody *body, SbImport *im)
 
 /* ------------------------------------------------------------------ choice of the reader */
 
-/* Files by their extension. */
+/* File readers by extension. */
 static const struct {
   const char *extension;
   SbReader read;
@@ -77,7 +77,7 @@ static const struct {
   {".poly", SbImportRead_Surface}, {".smesh", SbImportRead_Surface},
 };
 
-/* The reader of a file with this ending; NULL when there is none: then `known` lists all endings. */
+/* Reader for the extension of a file; NULL if unknown: then `known` lists all extensions. */
 static SbReader reader_of(const char *mesh, size_t size, char known[])
 {
   const char *dot = strrchr(mesh, '.');
@@ -89,7 +89,7 @@ static SbReader reader_of(const char *mesh, size_t size, char known[])
   return NULL;
 }
 
-/* The name may be what the files of TetGen have in common. */
+/* Finds the reader; the name may also be the common stem of TetGen's files. */
 static PetscErrorCode find_reader(const SbBody *body, SbReader *read)
 {
   char known[256] = "", node[PETSC_MAX_PATH_LEN + 8];
@@ -130,7 +130,7 @@ static PetscErrorCode begin(const SbBody *body, SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The mesh of a body's file, before it is placed. */
+/* Reads the mesh of a body, without placing it. */
 static PetscErrorCode read_body(const SbBody *body, SbImport *im)
 {
   SbReader read;
@@ -151,7 +151,7 @@ static PetscErrorCode read_body(const SbBody *body, SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Arrays of their own for what is read of a file; before it is placed. */
+/* Deep copy of an import, before it is placed. */
 static PetscErrorCode copy_import(const SbImport *from, SbImport *to)
 {
 #define COPY(array, n)                                     \
@@ -200,7 +200,7 @@ PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImpo
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
-  /* the first copy reads the file, and its mesh is kept as it was there until another file comes; bodies are zero before they are filled, padding too */
+  /* the first copy of a body reads the file and keeps the unplaced mesh for the next ones, until another file is read; SbBody is zero-initialised, so memcmp() may compare padding */
   // NOLINTBEGIN(bugprone-suspicious-memory-comparison)
   if (!shared->x || !before || strcmp(before->copy_of, body->copy_of) || strcmp(before->mesh, body->mesh) ||
       before->mesh_step != body->mesh_step || memcmp(&before->tet, &body->tet, sizeof(body->tet)) ||

@@ -1,13 +1,13 @@
 /*
-  import_abaqus.c - reader of Abaqus input files, .inp (Abaqus Analysis User's Guide, "Input syntax rules"; also what CalculiX,
-  PrePoMax, Cubit, meshio and gmsh write).
+  import_abaqus.c - reader of Abaqus input files, .inp (Abaqus Analysis User's Guide, "Input syntax rules"; also written by CalculiX,
+  PrePoMax, Cubit, meshio and gmsh).
 
   Lines that begin with * and a word are keywords with parameters between commas; two stars are a comment; the lines after a
   keyword are its data. Read: *NODE, *ELEMENT (C3D4..., S3 and other triangles, two-node lines), *NSET, *ELSET (also GENERATE,
-  and sets by name), *SURFACE of elements with sides S1 to S4. The parameters ELSET of *ELEMENT and NSET of *NODE make sets too. Names of sets
-  are those of groups; an element of a set that the file does not define is left out. One part, with one instance that is not moved.
+  and sets by name), *SURFACE of elements with sides S1 to S4. The parameters ELSET of *ELEMENT and NSET of *NODE define sets too. Sets
+  become groups of the same names; undefined elements of a set are ignored. Only one part with one untransformed instance is supported.
 
-  Everything is collected first and put together at the end, since sets may name what comes later.
+  Everything is collected first and converted at the end, since sets may refer to later definitions.
 */
 #include <ctype.h>
 #include <stdlib.h>
@@ -16,18 +16,18 @@
 
 enum { WORD = 128 };
 
-/* A side of a surface: of an element, or of all those of a set. */
+/* A side of an element, or of all elements of a set, in a surface. */
 typedef struct {
-  PetscInt surface, set; /* set of elements; -1: the element */
+  PetscInt surface, set; /* index of the surface; set of elements, -1: a single element */
   int64_t element;
-  int side; /* 0 ... 3; -1: the element itself, a triangle */
+  int side; /* side 0 to 3; -1: the element itself, a triangle */
   const char *at;
 } Side;
 
 typedef struct {
   SbDeck deck;
   SbScan *scan;
-  const char *line_end; /* of the line being taken apart */
+  const char *line_end; /* end of the current line */
   SbCount nside, nsurface;
   Side *side;
   char (*surface)[SB_GROUP_MAX];
@@ -35,7 +35,7 @@ typedef struct {
 
 /* ------------------------------------------------------------------ lines and words */
 
-/* The next line that is no comment; false at the end of the file. */
+/* Goes to the next line that is not a comment; false at the end of the file. */
 static PetscBool next_line(Abaqus *a)
 {
   SbScan *s = a->scan;
@@ -57,7 +57,7 @@ static void leave_line(Abaqus *a)
   a->scan->at = a->line_end < a->scan->end ? a->line_end + 1 : a->scan->end;
 }
 
-/* The next value on this line, between commas, without blanks around it; false when there is none. */
+/* Next comma-separated value on this line, trimmed; false if there is none. */
 static PetscBool next_word(Abaqus *a, char word[WORD])
 {
   SbScan *s = a->scan;
@@ -78,7 +78,7 @@ static PetscBool next_word(Abaqus *a, char word[WORD])
 static PetscErrorCode number_of(Abaqus *a, const char *word, const char *what, int64_t *value)
 {
   char *end;
-  const char *dot = strrchr(word, '.'); /* instance.12 */
+  const char *dot = strrchr(word, '.'); /* instance name and label: instance.12 */
 
   PetscFunctionBeginUser;
   if (dot && !isdigit((unsigned char)word[0])) word = dot + 1;
@@ -88,7 +88,7 @@ static PetscErrorCode number_of(Abaqus *a, const char *word, const char *what, i
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Value of parameter NAME= of the keyword line that begins at `line`; false when it is not there. */
+/* Value of the parameter NAME= on the keyword line that begins at `line`; false if absent. */
 static PetscBool parameter(Abaqus *a, const char *line, const char *name, char value[WORD])
 {
   SbScan *s = a->scan;
@@ -113,7 +113,7 @@ static PetscBool parameter(Abaqus *a, const char *line, const char *name, char v
 
 /* ------------------------------------------------------------------ sets */
 
-/* The set of this kind and name, made when new; what stands before a dot names an instance. */
+/* Finds or creates the set of this kind and name; an instance name before a dot is ignored. */
 static PetscErrorCode find_set(Abaqus *a, PetscBool of_nodes, const char *name, PetscInt *set)
 {
   const char *dot = strrchr(name, '.');
@@ -123,7 +123,7 @@ static PetscErrorCode find_set(Abaqus *a, PetscBool of_nodes, const char *name, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A label, or else the set that the word names; *set is -1 for a label. */
+/* Parses a label, or the name of a set; *set is -1 for a label. */
 static PetscErrorCode label_of(Abaqus *a, PetscBool of_nodes, const char *word, int64_t *label, PetscInt *set)
 {
   const char *dot = strrchr(word, '.');
@@ -187,7 +187,7 @@ static PetscErrorCode read_nodes(Abaqus *a, const char *line)
     for (int i = 0; i < 3; i++) {
       char *end = word;
 
-      if (!next_word(a, word)) continue; /* what is left out is zero */
+      if (!next_word(a, word)) continue; /* omitted values are zero */
       x[i] = strtod(word, &end);
       if (*end || !isfinite(x[i]))
         SB_SCAN_ERROR(a->scan, "expected a coordinate of node %lld, found '%.24s'", (long long)label, word);
@@ -196,7 +196,7 @@ static PetscErrorCode read_nodes(Abaqus *a, const char *line)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What gmsh calls an element of Abaqus: by the beginning of its name, and what follows is no digit. */
+/* gmsh type of an Abaqus element type, by the prefix of its name, which must not be followed by a digit. */
 static int type_of(const char *name)
 {
   static const struct {
@@ -238,7 +238,7 @@ static PetscErrorCode read_elements(Abaqus *a, const char *line)
     SbDeckElement e = {.type = type, .property = -1, .at = a->scan->token};
     const int nnode = SbGmshTypes[type].nnode;
 
-    // one element, on as many lines as its nodes need
+    // one element, continued on further lines until it has all nodes
     (void)next_word(a, word);
     PetscCall(number_of(a, word, "label of an element", &e.label));
     for (int k = 0; k < nnode; k++) {
@@ -268,7 +268,7 @@ static PetscErrorCode read_surface(Abaqus *a, const char *line)
   if (!parameter(a, line, "NAME", name)) SB_SCAN_ERROR(a->scan, "a surface without a name");
   leave_line(a);
   if (parameter(a, line, "TYPE", kind) && strcasecmp(kind, "ELEMENT"))
-    PetscFunctionReturn(PETSC_SUCCESS); /* of nodes, or analytical: nothing of the mesh */
+    PetscFunctionReturn(PETSC_SUCCESS); /* node-based or analytical surfaces have no facets */
   PetscCall(SbImportGrow(a->deck.im, &a->nsurface, sizeof(*a->surface), &a->surface));
   (void)snprintf(a->surface[a->nsurface.n - 1], SB_GROUP_MAX, "%s", name);
   for (; next_line(a) && *a->scan->at != '*'; leave_line(a)) {
@@ -289,10 +289,11 @@ static PetscErrorCode read_surface(Abaqus *a, const char *line)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One side of one element: a triangle of the surface's group. */
+/* Adds one side of an element as a triangle of the surface's group. */
 static PetscErrorCode use_side(Abaqus *a, const Side *side, const SbDeckElement *e)
 {
-  static const int corners[4][3] = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}}; /* S1 to S4 */
+  static const int corners[4][3] = {
+    {0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}}; /* corners of the sides S1 to S4 */
   const int64_t tag = SB_DECK_TAG + a->deck.nset.n + side->surface;
   SbImport *im = a->deck.im;
   PetscInt group, tags, vert[3];
@@ -331,7 +332,7 @@ PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
   while (next_line(&a)) {
     const char *line = s->at;
 
-    // data lines of keywords that are passed over; behind *INSTANCE they move it
+    // data lines of ignored keywords; after *INSTANCE they are a transformation
     if (*line != '*') {
       if (in_instance)
         SB_SCAN_ERROR(s,
@@ -340,7 +341,7 @@ PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
       leave_line(&a);
       continue;
     }
-    // keywords that make a mesh
+    // keywords that define the mesh
     (void)next_word(&a, word);
     if (!strcasecmp(word, "*NODE"))
       PetscCall(read_nodes(&a, line));
@@ -351,7 +352,7 @@ PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
     else if (!strcasecmp(word, "*SURFACE"))
       PetscCall(read_surface(&a, line));
     else {
-      // keywords that another file or a second part hides behind
+      // errors: mesh data in another file or in a second part
       s->token = line;
       if (!strcasecmp(word, "*INCLUDE"))
         SB_SCAN_ERROR(s, "*INCLUDE: another file holds a part of the mesh; write it in one file");
@@ -361,11 +362,11 @@ PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
       leave_line(&a);
     }
   }
-  // elements and sets find their nodes
+  // find the nodes of elements and sets
   s->token = s->end;
   if (!a.deck.nnode.n) SB_SCAN_ERROR(s, "there is no *NODE in it; this is no input file of Abaqus");
   PetscCall(SbDeckBuild(&a.deck));
-  // sides of elements become triangles
+  // convert element sides to triangles
   for (PetscInt k = 0; k < a.nside.n; k++) {
     const Side *side = &a.side[k];
 

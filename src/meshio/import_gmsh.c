@@ -1,16 +1,16 @@
 /*
   import_gmsh.c - reader of gmsh's .msh files: versions 1, 2 (2.0 to 2.2), 4.0 and 4.1, text and binary (gmsh reference manual, "File
-  formats" and "Legacy formats"). Own reader, because a body needs every physical group of every entity, also where groups overlap.
+  formats" and "Legacy formats"). It reads every physical group of every entity, also where groups overlap.
 
-  Version 4 gives groups per entity of the geometry; an entity may have several. Versions 1 and 2 give one group per
-  element and write an element again for each further group: such repeats are merged, groups joined.
+  Version 4 assigns groups to entities of the geometry; an entity may have several. Versions 1 and 2 assign one group to each
+  element and repeat an element for each further group: repeated elements are merged and their groups joined.
 
-  Kept: points, lines, triangles that belong to a group, and all tets; all triangles where a surface is wanted, which needs no tets.
-  Sections that do not concern us are skipped. Refused: volume elements other than 4-node tets, files cut into partitions, other versions.
+  Kept: points, lines and triangles that belong to a group, and all tets; for a surface all triangles, and tets are optional.
+  Other sections are skipped. Errors: volume elements other than 4- and 10-node tets, partitioned files, other versions.
 */
 #include "meshio_impl.h"
 
-/* An entity of the geometry in a file of version 4. */
+/* Entity of the geometry in a file of version 4. */
 typedef struct {
   PetscInt dim, tags;
   int64_t tag;
@@ -18,7 +18,7 @@ typedef struct {
 
 typedef struct {
   SbImport *im;
-  int version; /* 1, 2, 40 or 41 */
+  int version; /* file version: 1, 2, 40 or 41 */
   PetscBool binary;
   PetscInt nentity;
   Entity *entity; /* [nentity] */
@@ -26,7 +26,7 @@ typedef struct {
     int dim;
     int64_t tag;
     PetscInt tags;
-  } last; /* group of the last element of a 2.2 file: most often also that of the next */
+  } last; /* cache of the last group of a 2.2 file: usually that of the next element too */
 } Gmsh;
 
 /* ------------------------------------------------------------------ format, names, entities */
@@ -68,7 +68,7 @@ static PetscErrorCode read_format(Gmsh *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Entities of each dimension: number, extent, physical groups, bounding entities. */
+/* Reads the entities of each dimension: tag, bounding box, physical groups, bounding entities. */
 static PetscErrorCode read_entities(Gmsh *g)
 {
   SbScan *s = &g->im->scan;
@@ -92,7 +92,7 @@ static PetscErrorCode read_entities(Gmsh *g)
       PetscCall(SbScanInt4(s, "number of an entity", &e->tag));
       for (int k = 0; k < (d || g->version == 40 ? 6 : 3); k++)
         PetscCall(SbScanReal(s, "extent of an entity", 0, &box));
-      // its groups; a minus sign is gmsh's sign of the orientation, it means nothing here
+      // physical groups; the sign of a tag is the orientation, which is ignored
       PetscCall(SbScanInt8(s, "number of physical groups of an entity", &n));
       PetscCall(SbScanRoom(s, "physical groups", n, 2, 4));
       if (n) PetscCall(SbImportScratch(g->im, (size_t)n * sizeof(*group), &group));
@@ -112,7 +112,7 @@ static PetscErrorCode read_entities(Gmsh *g)
 
 /* ------------------------------------------------------------------ blocks of nodes and elements, in version 4 */
 
-/* Before them: how many blocks and things there are; in 4.1 also their lowest and highest number. */
+/* Reads the totals of a section: number of blocks, number of nodes or elements; in 4.1 also lowest and highest tag. */
 static PetscErrorCode read_totals(Gmsh *g, int64_t *nblock, int64_t *n)
 {
   SbScan *s = &g->im->scan;
@@ -126,7 +126,7 @@ static PetscErrorCode read_totals(Gmsh *g, int64_t *nblock, int64_t *n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Begins a block: its entity, whether nodes have parameters or which type elements have, how many follow. */
+/* Reads the header of a block: entity, kind (nodes: parametric or not; elements: type), number of nodes or elements. */
 static PetscErrorCode read_block(Gmsh *g, int64_t *dim, int64_t *tag, int64_t *kind, int64_t *n)
 {
   SbScan *s = &g->im->scan;
@@ -140,7 +140,7 @@ static PetscErrorCode read_block(Gmsh *g, int64_t *dim, int64_t *tag, int64_t *k
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The number of a node or element: 8 bytes of binary data in 4.1. */
+/* Reads the tag of a node or element: 8 bytes in binary files of version 4.1. */
 static PetscErrorCode read_number(Gmsh *g, const char *what, int64_t *number)
 {
   PetscFunctionBeginUser;
@@ -153,7 +153,7 @@ static PetscErrorCode read_number(Gmsh *g, const char *what, int64_t *number)
 
 /* ------------------------------------------------------------------ nodes */
 
-/* Number and place of each, in version 4 by blocks and with up to three parameters on the entity; in 4.1 all numbers of a block come first. */
+/* Reads tag and coordinates of each node; in version 4 in blocks, with up to three parametric coordinates; in 4.1 all tags of a block come first. */
 static PetscErrorCode read_nodes(Gmsh *g)
 {
   SbImport *im = g->im;
@@ -196,7 +196,7 @@ static PetscErrorCode read_nodes(Gmsh *g)
           PetscCall(SbScanReal(s, "parameter", im->vert_number[v], &parameter));
       }
     }
-    // gmsh may announce too many in 4.0, where it saves some of the entities alone
+    // version 4.0 may announce more nodes than it has, when only some of the entities are saved
     if (g->version == 40) im->nvert = v;
     if (v < im->nvert)
       SB_SCAN_ERROR(s, "%lld nodes are announced, the blocks hold %lld", (long long)im->nvert, (long long)v);
@@ -220,7 +220,7 @@ static PetscErrorCode check_type(Gmsh *g, int64_t type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads the nodes of one element and keeps what is of use. */
+/* Reads the nodes of one element, and adds it to the import. */
 static PetscErrorCode read_element(Gmsh *g, int type, int64_t number, PetscInt tags)
 {
   SbScan *s = &g->im->scan;
@@ -240,7 +240,7 @@ static PetscErrorCode read_element(Gmsh *g, int type, int64_t number, PetscInt t
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Elements of one type: as text one, whose line has the type and the number of tags; in binary as many as their header says. */
+/* Reads elements of one type: in text files one, whose line has the type and the number of tags; in binary files the number in the block header. */
 static PetscErrorCode read_elements_22_run(Gmsh *g, int64_t left, int64_t *nread)
 {
   SbScan *s = &g->im->scan;
@@ -263,7 +263,7 @@ static PetscErrorCode read_elements_22_run(Gmsh *g, int64_t left, int64_t *nread
     int64_t tag = 0, other;
 
     if (s->binary) PetscCall(SbScanInt4(s, "number of an element", &number));
-    // the first tag is the group, 0 for none; the others are not used
+    // the first tag is the physical group, 0 for none; the others are ignored
     PetscCall(SbScanRoom(&g->im->scan, "tags of an element", ntag, 2, 4));
     for (int64_t k = 0; k < ntag; k++)
       PetscCall(SbScanInt4(&g->im->scan, "tag of an element", k ? &other : &tag));
@@ -273,7 +273,7 @@ static PetscErrorCode read_elements_22_run(Gmsh *g, int64_t left, int64_t *nread
       g->last.tag = tag;
     }
     tags = tag ? g->last.tags : 0;
-    // in version 1 every element states its number of nodes
+    // in version 1 each element line has its number of nodes
     if (g->version == 1) {
       int64_t nnode;
 
@@ -304,7 +304,7 @@ static PetscErrorCode read_elements_4(Gmsh *g)
     if (n < 0 || n > total - nread)
       SB_SCAN_ERROR(s, "block of %lld elements; only %lld of those announced for the section are left",
                     (long long)n, (long long)(total - nread));
-    // its tag set; an entity that the file does not list has no groups
+    // tag set of the entity; an unlisted entity has no groups
     for (PetscInt i = 0; i < g->nentity && !tags; i++)
       if (g->entity[i].dim == dim && g->entity[i].tag == tag) tags = g->entity[i].tags;
     if (tags && dim != SbGmshTypes[type].dim)
@@ -322,7 +322,7 @@ static PetscErrorCode read_elements_4(Gmsh *g)
 
 /* ------------------------------------------------------------------ the file */
 
-/* The sections that concern us; all others are skipped. */
+/* Reads one section; `known` is false for a section to be skipped. */
 static PetscErrorCode read_section(Gmsh *g, const char *name, PetscBool *known)
 {
   SbScan *s = &g->im->scan;
@@ -330,7 +330,7 @@ static PetscErrorCode read_section(Gmsh *g, const char *name, PetscBool *known)
 
   PetscFunctionBeginUser;
   *known = PETSC_TRUE;
-  // names of groups, as text also in binary files
+  // names of groups, text also in binary files
   if (!strcmp(name, "$PhysicalNames")) {
     int64_t nname, dim, tag;
     PetscInt group;
@@ -393,7 +393,7 @@ PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
     char end[64], closing[72];
     PetscBool known;
 
-    // a section, read or passed over, then its closing word
+    // a section, read or skipped, then its end marker
     if (name[0] != '$')
       SB_SCAN_ERROR(s, "expected the beginning of a section, as $Nodes, found '%.20s'", name);
     (void)snprintf(closing, sizeof(closing), g.version == 1 ? "$END%s" : "$End%s", name + 1);
@@ -416,7 +416,7 @@ PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
   PetscCheck(im->x, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
              "%s: has no section $Nodes; it is truncated or not a mesh", im->where);
   PetscCall(SbImportCheckTypes(im));
-  // an element of several groups is given once for each; two of one group are for check.c to find
+  // merge repeated elements of several groups; duplicates in one group are left for check.c
   if (g.version <= 2 && im->ngroup > 1) PetscCall(SbImportJoinRepeats(im, 3, PETSC_FALSE, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

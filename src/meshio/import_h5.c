@@ -1,18 +1,18 @@
 /*
-  import_h5.c - reader of HDF5 meshes: supple's own (write_h5.c has the layout) and what a run writes, fields.h5.
+  import_h5.c - reader of HDF5 meshes: supple's own mesh format (layout in write_h5.c) and the output of a run, fields.h5.
 
-  Both hold /mesh/x and /mesh/cells. Own meshes have groups; in a run's output /mesh/body says which body a tet belongs to,
-  and the bodies become groups of tets. Where a body was of p2, /mesh/cells10 has the nodes of its tets, and what /mesh/cells has are
-  parts of them: /mesh/parent says of which. When each tet of the output has points of its own (-output_discontinuous),
-  /mesh/vertices says which of them are one vertex: positions are averaged there. With a step, its displacement is added.
+  Both have /mesh/x and /mesh/cells. A mesh file has groups; in the output of a run /mesh/body is the body number of each tet,
+  and each body becomes a group of tets. For P2 bodies /mesh/cells10 has the nodes of the tets, /mesh/cells has the linear tets into which
+  they are subdivided, and /mesh/parent the P2 tet of each. If each tet of the output has its own points (-output_discontinuous),
+  /mesh/vertices is the vertex of each point: positions are averaged there. For a given step, its displacement is added.
 
-  An .xmf names the .h5 that its mesh is in.
+  An .xmf file refers to the .h5 file of the mesh.
 
-  Of own meshes a block of rows may be wanted of each array under /mesh: several ranks read one each (mesh/slab.c).
+  For a mesh file, only a block of rows of each array under /mesh may be read: in parallel import each rank reads one (mesh/slab.c).
 
-  A file is not trusted: shape and type of every array, every number of a vertex, group or tag set is checked, and nothing
-  is allocated for an array that the file is too short to hold (stored without compression, as here, it takes its full size;
-  compressed by others, at most a thousandth of it).
+  Files are not trusted: shape and type of every array and the range of every index are checked, and no array is
+  allocated that is larger than the file can hold (uncompressed, as written here, at most the file size;
+  compressed by others, at most a thousand times that).
 */
 #include <hdf5.h>
 #include <stdlib.h>
@@ -21,12 +21,11 @@
 typedef struct {
   SbImport *im;
   hid_t file;
-  size_t bytes;   /* length of the file */
-  char frame[64]; /* group of the wanted step; "" at rest */
-  char mesh
-    [32]; /* group of its mesh: "/mesh", behind a re-meshing "/mesh_000123"; stands for "/mesh" in names */
-  PetscInt part, nparts; /* which block of rows of how many; nparts 0: all rows */
-  PetscInt nvert;        /* of the file */
+  size_t bytes;          /* file size in bytes */
+  char frame[64];        /* HDF5 group of the wanted step; "": rest positions */
+  char mesh[32];         /* path that replaces "/mesh" in names: "/mesh", after re-meshing "/mesh_000123" */
+  PetscInt part, nparts; /* block to read, and number of blocks; nparts 0: all rows */
+  PetscInt nvert;        /* number of vertices in the file */
 } File;
 
 #define H5_ERROR(f, ...)                                                                    \
@@ -38,7 +37,7 @@ typedef struct {
 
 /* ------------------------------------------------------------------ the file */
 
-/* The path of an object in the mesh of the step. */
+/* Full path of an object in the mesh of the wanted step. */
 static void path_of(const File *f, const char *name, char path[256])
 {
   const PetscBool mesh = (PetscBool)!strncmp(name, "/mesh/", strlen("/mesh/"));
@@ -46,7 +45,7 @@ static void path_of(const File *f, const char *name, char path[256])
   (void)snprintf(path, 256, "%s%s", mesh ? f->mesh : "", mesh ? name + strlen("/mesh") : name);
 }
 
-/* Whether all groups on a path exist. */
+/* Whether an object and all groups on its path exist. */
 static PetscBool is_there(const File *f, const char *name)
 {
   char path[256], part[256];
@@ -62,20 +61,20 @@ static PetscBool is_there(const File *f, const char *name)
 
 /* ------------------------------------------------------------------ arrays */
 
-/* Expected type and shape of an array, and the actual ones. */
+/* Expected type and shape of an array, then the actual ones. */
 typedef struct {
   const char *name;
   H5T_class_t klass;
-  hsize_t ncomp;   /* 1: a list */
-  int64_t bound;   /* whole numbers lie in [0, bound); -1: they may be any, of 64 bits */
-  PetscBool block; /* of the rows only the block that is wanted */
+  hsize_t ncomp;   /* number of columns; 1: a list */
+  int64_t bound;   /* integers are in [0, bound); -1: any 64-bit integer */
+  PetscBool block; /* only the rows of the wanted block are read */
   hid_t set, type;
-  hsize_t n;    /* rows that are read */
-  size_t width; /* bytes of a value in the file */
+  hsize_t n;    /* number of rows to read */
+  size_t width; /* bytes per value in the file */
   SbSlabRows rows;
 } Array;
 
-/* Opens an array and checks its kind and shape. */
+/* Opens an array and checks its type and shape. */
 static PetscErrorCode open_array(const File *f, Array *a)
 {
   hsize_t size[2] = {0, 1};
@@ -108,12 +107,12 @@ static PetscErrorCode open_array(const File *f, Array *a)
              (unsigned long long)size[1], (unsigned long long)a->ncomp);
   if (size[0] > (hsize_t)PETSC_MAX_INT / 8)
     H5_ERROR(f, "%s has %llu rows, more than this build can number", a->name, (unsigned long long)size[0]);
-  // an array larger than the file can hold is refused before anything is allocated
+  // an array larger than the file can hold is an error, before anything is allocated
   want = (double)size[0] * (double)a->ncomp * (double)a->width;
   if (want > (packed ? 1000. : 1.) * (double)f->bytes)
     H5_ERROR(f, "%s announces %llu x %llu numbers, more than the %zu bytes of the file hold; it is damaged",
              a->name, (unsigned long long)size[0], (unsigned long long)a->ncomp, f->bytes);
-  // the rows of the block
+  // rows of the block
   a->rows = (SbSlabRows){(PetscInt)size[0], (PetscInt)size[0], 0};
   a->n = size[0];
   if (a->block && f->nparts) {
@@ -124,7 +123,7 @@ static PetscErrorCode open_array(const File *f, Array *a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rows of an open array, checked; what is out of range is named with its position. */
+/* Reads the rows of an open array; an error names the position of a value out of range. */
 static PetscErrorCode read_values(const File *f, const Array *a, void *values)
 {
   const hid_t whole = a->bound >= 0 && sizeof(PetscInt) == 4 ? H5T_NATIVE_INT32 : H5T_NATIVE_INT64;
@@ -158,7 +157,7 @@ static PetscErrorCode read_values(const File *f, const Array *a, void *values)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Both, into an array of the reader. */
+/* Opens and reads an array into scratch memory of the reader. */
 static PetscErrorCode read_array(const File *f, Array *a, PetscInt *n, void *values)
 {
   PetscFunctionBeginUser;
@@ -170,7 +169,7 @@ static PetscErrorCode read_array(const File *f, Array *a, PetscInt *n, void *val
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A list or table of whole numbers in [0, bound). */
+/* Reads an array of integers in [0, bound). */
 static PetscErrorCode read_table(const File *f, const char *name, hsize_t ncomp, int64_t bound, PetscInt *n,
                                  PetscInt **values)
 {
@@ -178,7 +177,7 @@ static PetscErrorCode read_table(const File *f, const char *name, hsize_t ncomp,
                     values);
 }
 
-/* Simplices of one dimension, without groups yet. */
+/* Reads the simplices of one dimension, without groups. */
 static PetscErrorCode read_items(const File *f, int dim, const char *name)
 {
   SbItems *item = &f->im->item[dim];
@@ -194,7 +193,7 @@ static PetscErrorCode read_items(const File *f, int dim, const char *name)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Edges with their node off the middle, in layout 2. */
+/* Reads the curved edges: vertices, and offsets of the edge nodes from the midpoints; layout 2 only. */
 static PetscErrorCode read_curved(const File *f, int layout)
 {
   SbImport *im = f->im;
@@ -233,7 +232,7 @@ static PetscErrorCode read_curved(const File *f, int layout)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ groups of an own mesh */
+/* ------------------------------------------------------------------ groups of a mesh file */
 
 static PetscErrorCode read_own(const File *f)
 {
@@ -245,7 +244,7 @@ static PetscErrorCode read_own(const File *f)
   Array text = {.name = "/groups/name", .klass = H5T_STRING, .ncomp = 1};
 
   PetscFunctionBeginUser;
-  // the groups of the file, group[] leads to their numbers here; its tag sets likewise with map[]
+  // group[] and map[]: numbers of the file's groups and tag sets in the import
   PetscCall(read_array(f, &text, &ngroup, &title));
   PetscCall(read_table(f, "/groups/dim", 1, 4, &ndim, &dim));
   PetscCall(read_array(f, &(Array){.name = "/groups/number", .klass = H5T_INTEGER, .ncomp = 1, .bound = -1},
@@ -290,7 +289,7 @@ static PetscErrorCode read_own(const File *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ what a run wrote */
+/* ------------------------------------------------------------------ output of a run */
 
 static herr_t visit_frame(hid_t where, const char *name, const H5L_info_t *info, void *ctx)
 {
@@ -342,7 +341,7 @@ PetscErrorCode SbH5BodyNames(hid_t file, const char *mesh, char **names)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Each body is a group of tets. */
+/* Makes each body a group of tets. */
 static PetscErrorCode read_bodies(const File *f)
 {
   SbImport *im = f->im;
@@ -355,7 +354,7 @@ static PetscErrorCode read_bodies(const File *f)
   if (n != im->item[3].n)
     H5_ERROR(f, "/mesh/body has %lld rows for %lld tets", (long long)n, (long long)im->item[3].n);
   for (PetscInt c = 0; c < n; c++) nbody = PetscMax(nbody, body[c] + 1);
-  // names of the bodies; none in old files
+  // names of the bodies; old files have none
   PetscCall(SbH5BodyNames(f->file, f->mesh, &names));
   rest = names;
   PetscCall(PetscMalloc1(nbody, &tags));
@@ -372,7 +371,7 @@ static PetscErrorCode read_bodies(const File *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Tets of P2, with their nodes at edges, take the place of the linear ones that they are cut into. at[f->nvert]: the vertex at each point of the file; NULL: itself. */
+/* Replaces the linear tets of P2 bodies by the P2 tets, with edge nodes. at[f->nvert]: vertex of each point of the file; NULL: identity. */
 static PetscErrorCode read_quadratic(const File *f, const PetscInt at[])
 {
   SbItems *item = &f->im->item[3];
@@ -399,7 +398,7 @@ static PetscErrorCode read_quadratic(const File *f, const PetscInt at[])
     for (int k = 0; k < 10; k++) {
       const int64_t point = node[10 * c + SbGmshNode(k)];
 
-      // only nodes at edges may be missing: where the body is of another element
+      // edge nodes may be -1, for tets of other elements; corners may not
       if (point < (k < 4 ? 0 : -1) || point >= f->nvert)
         H5_ERROR(f, "/mesh/cells10 holds %lld in row %lld; the file is damaged", (long long)point,
                  (long long)c + 1);
@@ -418,7 +417,7 @@ static PetscErrorCode read_output(const File *f)
   PetscInt *at = NULL;
 
   PetscFunctionBeginUser;
-  // positions at the step
+  // positions at the wanted step
   if (f->frame[0]) {
     char name[96];
     PetscInt n;
@@ -436,7 +435,7 @@ static PetscErrorCode read_output(const File *f)
     PetscInt n, *vertex, *share, nvert = 0;
     PetscReal *x;
 
-    // points of each tet become the vertices that they lie at, in their mean position
+    // merge the points of each vertex, at their mean position
     PetscCall(read_table(f, "/mesh/vertices", 4, PETSC_MAX_INT / 8, &n, &vertex));
     for (PetscInt i = 0; i < 4 * n; i++) nvert = PetscMax(nvert, vertex[i] + 1);
     if (n != im->item[3].n || nvert > im->nvert)
@@ -464,7 +463,7 @@ static PetscErrorCode read_output(const File *f)
 
 /* ------------------------------------------------------------------ the mesh */
 
-/* Contents of the file, for the message about a wrong one. */
+/* Lists the contents of the file, for an error message. */
 static herr_t list_name(hid_t where, const char *name, const H5L_info_t *info, void *ctx)
 {
   char *text = (char *)ctx;
@@ -474,7 +473,7 @@ static herr_t list_name(hid_t where, const char *name, const H5L_info_t *info, v
   return 0;
 }
 
-/* The layout of an own mesh, 0 of a run's output. */
+/* Layout version of a mesh file; 0 for the output of a run. */
 static PetscErrorCode check_layout(const File *f, int *layout)
 {
   char content[256] = "";
@@ -508,7 +507,7 @@ static PetscErrorCode read_mesh(File *f, SbSlabRows *rows)
 
   PetscFunctionBeginUser;
   PetscCall(check_layout(f, &layout));
-  // the group of the wanted step
+  // HDF5 group of the wanted step
   if (im->step) {
     if (!is_there(f, "/step"))
       H5_ERROR(f, "holds a mesh, no steps of a run; leave out the step %lld", (long long)s.wanted);
@@ -551,14 +550,14 @@ PetscErrorCode SbImportSlab_H5(const char *path, PetscInt k, PetscInt n, SbImpor
   FILE *file;
 
   PetscFunctionBeginUser;
-  // says why HDF5 cannot open it: not there, no HDF5, or cut off
+  // error: missing file, not an HDF5 file, or truncated
   access = H5Pcreate(H5P_FILE_ACCESS);
   PetscCall(SbScanOpenFile(f.im->where, path, &file, &f.bytes));
   (void)fclose(file);
-  (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL); /* its stack of errors becomes one line of ours */
+  (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL); /* HDF5's error stack is replaced by one line of ours */
   is_hdf5 = H5Fis_hdf5(path);
   (void)H5Pset_fclose_degree(
-    access, H5F_CLOSE_STRONG); /* with the file all of its arrays are closed, also after an error */
+    access, H5F_CLOSE_STRONG); /* closing the file closes all its objects, also after an error */
   f.file = is_hdf5 > 0 ? H5Fopen(path, H5F_ACC_RDONLY, access) : -1;
   (void)H5Pclose(access);
   if (is_hdf5 <= 0)
@@ -606,7 +605,7 @@ PetscErrorCode SbImportSlabs_H5(const char *path, PetscInt *ncell)
 
 /* ------------------------------------------------------------------ .xmf */
 
-/* The .h5 of the first array that an .xmf names, from the folder of the .xmf. */
+/* Reads the .h5 file to which the first array of an .xmf refers, relative to the folder of the .xmf. */
 PetscErrorCode SbImportRead_Xdmf(const char *path, SbImport *im)
 {
   static const char mark[] = ".h5:/mesh/";

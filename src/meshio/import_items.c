@@ -1,18 +1,19 @@
 /*
-  import_items.c - what a reader fills: vertices, simplices of each dimension, and the groups they belong to.
+  import_items.c - construction of an import by a reader: vertices, simplices of each dimension, edge nodes, and physical groups.
 
-  An entity of a file may belong to several physical groups. The set of groups of an item is stored once (a "tag set") and items
-  refer to it; set 0 is the empty one.
+  An entity of a file may belong to several physical groups. Each distinct set of groups is stored once (a "tag set"), and items
+  refer to it by number; set 0 is the empty set.
 */
 #include <stdlib.h>
 #include "meshio_impl.h"
 #include "sbquadratic.h"
 
-#define STRAIGHT 1e-6 /* of the length of an edge: nearer to the middle its node is there */
+#define STRAIGHT \
+  1e-6 /* relative to the length of an edge: with a smaller offset of its node the edge is straight */
 
 /* ------------------------------------------------------------------ arrays of readers */
 
-/* Stands before each array. */
+/* Header before each scratch array. */
 struct _p_SbScratch {
   struct _p_SbScratch *next, *before;
 };
@@ -165,7 +166,7 @@ PetscErrorCode SbImportDropVertices(SbImport *im, PetscInt keep[])
   for (int d = 0; d < 4; d++) {
     PetscInt kept = 0;
 
-    // items have the new numbers; those that use a vertex which is gone are dropped
+    // renumber the vertices of items, and drop items with a dropped vertex
     for (PetscInt i = 0; i < im->item[d].n; i++) {
       PetscInt *v = im->item[d].vert + (d + 1) * i;
       PetscBool gone = PETSC_FALSE;
@@ -182,11 +183,12 @@ PetscErrorCode SbImportDropVertices(SbImport *im, PetscInt keep[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ nodes at edges */
+/* ------------------------------------------------------------------ edge nodes */
 
 PetscErrorCode SbImportAddMiddles(SbImport *im, const PetscInt vert[])
 {
-  static const int place[6] = {4, 6, 7, 5, 9, 8}; /* of the nodes at the edges 01 02 03 12 13 23 */
+  static const int place[6] = {4, 6, 7,
+                               5, 9, 8}; /* positions in vert[] of the nodes of the edges 01 02 03 12 13 23 */
 
   PetscFunctionBeginUser;
   for (int a = 0, e = 0; a < 4; a++) {
@@ -210,7 +212,7 @@ PetscErrorCode SbImportLostMiddle(const SbImport *im, const SbMiddle *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Leaves out those that no tet has: of tets that went. In a list this is an error, unless found[] is there to tell. */
+/* Drops edge nodes of edges that no tet has. For a list of curved edges in a file this is an error, unless found[] returns it. */
 static PetscErrorCode drop_lost(SbImport *im, PetscBool found[])
 {
   SbMiddle lost = {.node = -1};
@@ -222,7 +224,7 @@ static PetscErrorCode drop_lost(SbImport *im, PetscBool found[])
   PetscCall(PetscCalloc1(im->nmiddle.n, &of_tet));
   for (PetscInt i = 0; i < im->nmiddle.n; i++) low[i] = im->middle[i].end[0];
   PetscCall(SbBucketByKey(im->nmiddle.n, low, im->nvert, &start, &at));
-  // those with the lower vertex of an edge of a tet are a few
+  // only few edges have the same lower vertex
   for (PetscInt i = 0; i < 6 * im->item[3].n; i++) {
     const PetscInt *v = im->item[3].vert + 4 * (i / 6), a = v[SbTetEdge[i % 6][0]],
                    b = v[SbTetEdge[i % 6][1]];
@@ -275,7 +277,7 @@ PetscErrorCode SbImportMiddles(SbImport *im, PetscBool found[], PetscReal *large
       length += PetscSqr(b[k] - a[k]);
       off += PetscSqr(m.off[k]);
     }
-    // each edge once; two nodes at the same place are one
+    // each edge once; its nodes in different tets must be at the same position
     if (last && last->end[0] == m.end[0] && last->end[1] == m.end[1]) {
       PetscCheck(
         row <= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
@@ -297,7 +299,7 @@ PetscErrorCode SbImportMiddles(SbImport *im, PetscBool found[], PetscReal *large
   }
   im->nmiddle.n = n;
   *largest = PetscSqrtReal(most);
-  // nodes at edges only are not vertices
+  // drop vertices that are only edge nodes
   for (PetscInt i = 0; keep && i < 4 * im->item[3].n; i++) keep[im->item[3].vert[i]] = 1;
   if (keep) PetscCall(SbImportDropVertices(im, keep));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -313,7 +315,7 @@ void SbImportNoteMiddles(SbImport *im, PetscInt n, PetscReal largest)
 
 /* ------------------------------------------------------------------ groups */
 
-/* Slot of a group, or the free one where it belongs. */
+/* Hash slot of a group, or the free slot for it. */
 static PetscInt find_slot(const SbImport *im, PetscInt dim, int64_t tag)
 {
   const uint64_t hash = ((uint64_t)tag * 4 + (uint64_t)dim) * 0x9e3779b97f4a7c15u;
@@ -327,7 +329,7 @@ static PetscInt find_slot(const SbImport *im, PetscInt dim, int64_t tag)
   return s;
 }
 
-/* Slots for all groups and one more, at most half of them taken. */
+/* Rebuilds the hash table for all groups and one more, at most half full. */
 static PetscErrorCode hash_groups(SbImport *im)
 {
   PetscFunctionBeginUser;
@@ -404,7 +406,7 @@ PetscErrorCode SbImportTagSet(SbImport *im, PetscInt n, PetscInt groups[], Petsc
 
   PetscFunctionBeginUser;
   PetscCall(PetscSortRemoveDupsInt(&n, groups));
-  /* Set 0 exists from the first call on. */
+  /* set 0 is created by the first call */
   if (!im->ntags) {
     PetscCall(SbReserve(2, sizeof(PetscInt), &im->capacity[1], &im->tags_start));
     im->tags_start[0] = im->tags_start[1] = 0;
@@ -464,7 +466,7 @@ PetscErrorCode SbImportJoinRepeats(SbImport *im, int dim, PetscBool all, PetscIn
   PetscInt *head, *next, *group, kept = 0;
 
   PetscFunctionBeginUser;
-  // lists of items by their lowest vertex
+  // linked lists of items by their lowest vertex
   PetscCall(PetscMalloc3(im->nvert, &head, item->n, &next, 2 * (size_t)im->ngroup, &group));
   for (PetscInt v = 0; v < im->nvert; v++) head[v] = -1;
   for (PetscInt i = 0; i < item->n; i++) {
@@ -473,7 +475,7 @@ PetscErrorCode SbImportJoinRepeats(SbImport *im, int dim, PetscBool all, PetscIn
     PetscBool join = PETSC_FALSE;
 
     for (int a = 1; a <= dim; a++) low = PetscMin(low, v[a]);
-    // the one before it with the same vertices
+    // an earlier item with the same vertices
     for (same = head[low]; same >= 0; same = next[same]) {
       const PetscInt *w = item->vert + (dim + 1) * (size_t)same;
       int nequal = 0;
@@ -486,7 +488,7 @@ PetscErrorCode SbImportJoinRepeats(SbImport *im, int dim, PetscBool all, PetscIn
       }
       if (nequal == dim + 1) break;
     }
-    // gets the groups of both, unless they share one
+    // join the groups of both items, unless they have one in common
     if (same >= 0) {
       const PetscInt *start = im->tags_start, own = item->tags[i], its = item->tags[same];
 

@@ -1,15 +1,15 @@
 /*
   import_medit.c - reader of Medit's text files, .mesh ("MEDIT: an interactive mesh visualization software", P. Frey, INRIA RT-0253, 2001),
-  also as mmg, CGAL and FreeFEM write them.
+  also written by mmg, CGAL and FreeFEM.
 
-  Keywords, each with a count and that many lines of numbers, the last of which is a reference: N gives volume_N, surface_N or
-  curve_N, and 0 none but for tets. A # begins a comment. Keywords of no concern (Corners, Ridges, Normals, Required...) are passed over, with
-  their numbers. Refused: binary files (.meshb), elements other than tets of 4 or 10 nodes in the volume.
+  Each keyword is followed by a count and that many lines of numbers, the last of which is a reference: N gives the group volume_N, surface_N or
+  curve_N, and 0 gives none except for tets. A # begins a comment. Other keywords (Corners, Ridges, Normals, Required...) are skipped with
+  their numbers. Errors: binary files (.meshb), volume elements other than tets of 4 or 10 nodes.
 */
 #include <ctype.h>
 #include "meshio_impl.h"
 
-/* Keywords of elements, with gmsh's types. */
+/* Keywords of elements, and gmsh's element types. */
 static const struct {
   const char *word;
   int type;
@@ -70,7 +70,7 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
   if (strcmp(word, "MeshVersionFormatted"))
     SB_SCAN_ERROR(s, "expected 'MeshVersionFormatted', found '%s'; this is no text file of Medit", word);
   for (;;) {
-    // sections that are not of use: on to the next word that is no number
+    // skip other sections: go to the next word that is not a number
     for (SbScanNext(s, '#'); s->at < s->end && !isalpha((unsigned char)*s->at); SbScanNext(s, '#')) {
       while (s->at < s->end && !isspace((unsigned char)*s->at)) s->at++;
     }
@@ -79,7 +79,7 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
       SB_SCAN_ERROR(
         s, "the file ends where a section, or 'End', is expected; it is truncated, write or copy it again");
     if (!strcmp(word, "End")) break;
-    // coordinates and a reference, which is of no use
+    // coordinates and a reference, which is ignored
     if (!strcmp(word, "Vertices")) {
       int64_t n;
       PetscReal reference;
@@ -109,7 +109,7 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The two share their ending: Netgen's begins with a number. */
+/* Medit and Netgen share the extension .mesh: a file of Netgen begins with a number. */
 PetscErrorCode SbImportRead_Mesh(const char *path, SbImport *im)
 {
   SbScan *s = &im->scan;

@@ -1,16 +1,16 @@
 /*
-  import_nastran.c - reader of Nastran bulk data, .bdf and .nas (MSC Nastran Quick Reference Guide, "Bulk Data Entries"; also what NX,
-  HyperMesh, ANSA, Femap, Patran, gmsh, meshio and pyNastran write).
+  import_nastran.c - reader of Nastran bulk data, .bdf and .nas (MSC Nastran Quick Reference Guide, "Bulk Data Entries"; also written by NX,
+  HyperMesh, ANSA, Femap, Patran, gmsh, meshio and pyNastran).
 
-  An entry has ten fields a line, the first one its name: of 8 columns, of 16 where the name ends with a star, or between commas; a line
-  whose first field is empty or begins with + or * goes on with the entry before it. Tabs lead to the next column after a
-  multiple of 8. Reals may leave out the letter of the exponent (1.5-3).
+  An entry has ten fields per line, the first one is its name. Fields have 8 columns, 16 if the name ends with a star, or are separated by commas; a line
+  whose first field is empty or begins with + or * continues the previous entry. Tabs advance to the next multiple
+  of 8 columns. Reals may omit the letter of the exponent (1.5-3).
 
   Read: GRID, solid, shell and line elements with their property, SPC, SPC1 and SET1 as sets of nodes. Property N is the group volume_N,
-  surface_N or curve_N, or has the name that a comment gives it (ANSA, HyperMesh, Femap, Patran). Lines in front of BEGIN BULK and
-  behind ENDDATA, and other entries, are passed over. Refused: points in a coordinate system of their own, INCLUDE.
+  surface_N or curve_N, or has the name given in a comment (ANSA, HyperMesh, Femap, Patran). Lines before BEGIN BULK and
+  after ENDDATA, and other entries, are skipped. Errors: points in a local coordinate system, INCLUDE.
 
-  Elements may stand before their points: all is collected first and put together at the end.
+  Elements may precede their points: everything is collected first and converted at the end.
 */
 #include <ctype.h>
 #include <stdlib.h>
@@ -27,18 +27,18 @@ typedef struct {
 typedef struct {
   SbDeck deck;
   SbScan *scan;
-  size_t length;         /* of the line */
-  char line[LINE];       /* the current one, tabs replaced, without its comment */
-  PetscBool commas, cut; /* cut: it was longer than this */
-  int field, per_line;   /* last field taken; fields of values on the line */
+  size_t length;         /* length of the line */
+  char line[LINE];       /* current line, tabs expanded, without its comment */
+  PetscBool commas, cut; /* fields are separated by commas; the line was longer than the buffer */
+  int field, per_line;   /* last field read; number of value fields on the line */
   SbCount nname;
-  Name *name;                 /* [nname] of properties */
-  char pending[SB_GROUP_MAX]; /* name that Patran gives to the next property */
+  Name *name;                 /* [nname] names of properties */
+  char pending[SB_GROUP_MAX]; /* name that a Patran comment gives to the next property */
 } Nastran;
 
 /* ------------------------------------------------------------------ names in comments */
 
-/* The text from `p` to a delimiter or the end of the line, without blanks around it; blanks within become underscores. */
+/* Copies the text from `p` to a delimiter or the end of the line, trimmed; blanks in it become underscores. */
 static void copy_name(const char *p, const char *end, char delimiter, char name[SB_GROUP_MAX])
 {
   size_t n = 0;
@@ -60,7 +60,7 @@ static PetscErrorCode add_name(Nastran *b, int64_t number, const char *name)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* $ANSA_NAME_COMMENT;12;PSOLID;liver;   $HMNAME PROP 12"liver"   $ Femap Property 12 : liver   $ ... Properties for region : liver */
+/* Reads the name of a property: $ANSA_NAME_COMMENT;12;PSOLID;liver;   $HMNAME PROP 12"liver"   $ Femap Property 12 : liver   $ ... Properties for region : liver */
 static PetscErrorCode read_comment(Nastran *b, const char *text, const char *end)
 {
   char line[LINE], name[SB_GROUP_MAX] = "", *p = line;
@@ -72,7 +72,7 @@ static PetscErrorCode read_comment(Nastran *b, const char *text, const char *end
   line[n] = 0;
   if (!strncmp(line, "$ANSA_NAME_COMMENT;", 19)) {
     number = strtoll(line + 19, &p, 10);
-    p = *p == ';' && p[1] == 'P' ? strchr(p + 1, ';') : NULL; /* not of a material or a set */
+    p = *p == ';' && p[1] == 'P' ? strchr(p + 1, ';') : NULL; /* properties only, not materials or sets */
     if (p) copy_name(p + 1, line + n, ';', name);
   } else if (!strncmp(line, "$HMNAME PROP", 12)) {
     number = strtoll(line + 12, &p, 10);
@@ -100,7 +100,7 @@ static void trim(const char *from, const char *to, char word[WORD])
   word[n] = 0;
 }
 
-/* Field k of this line, 0 its name. */
+/* Field k of this line; field 0 is the name. */
 static void get_field(const Nastran *b, int k, char word[WORD])
 {
   const size_t length = b->length, width = b->per_line == 4 ? 16 : 8;
@@ -118,7 +118,7 @@ static void get_field(const Nastran *b, int k, char word[WORD])
   trim(p + from, p + to, word);
 }
 
-/* Takes the next line that is neither a comment nor empty; false at the end. */
+/* Goes to the next line that is neither a comment nor empty; false at the end of the file. */
 static PetscErrorCode next_line(Nastran *b, PetscBool *there)
 {
   SbScan *s = b->scan;
@@ -132,7 +132,7 @@ static PetscErrorCode next_line(Nastran *b, PetscBool *there)
     s->token = s->at;
     if (!end) end = s->end;
     if (*s->at == '$') PetscCall(read_comment(b, s->at, end));
-    // its text without a comment; tabs become blanks up to the next multiple of 8 columns
+    // text without the comment; tabs become blanks up to the next multiple of 8 columns
     for (n = 0, from = s->at; from < end && *from != '$' && n + 1 < LINE; from++) {
       do b->line[n++] = isprint((unsigned char)*from) ? *from : ' ';
       while (*from == '\t' && n % 8 && n + 1 < LINE);
@@ -165,7 +165,7 @@ static PetscBool continues(const Nastran *b)
   return (PetscBool)(!name[0] || name[0] == '+' || name[0] == '*');
 }
 
-/* The next field of the entry, on this line or one that continues it; false at the end of the entry. */
+/* Next field of the entry, on this line or on a continuation line; false at the end of the entry. */
 static PetscErrorCode next_field(Nastran *b, char word[WORD], PetscBool *there)
 {
   SbScan *s = b->scan;
@@ -175,7 +175,7 @@ static PetscErrorCode next_field(Nastran *b, char word[WORD], PetscBool *there)
   word[0] = 0;
   *there = PETSC_FALSE;
   if (b->field == b->per_line && s->at < s->end && isalpha((unsigned char)*s->at))
-    PetscFunctionReturn(PETSC_SUCCESS); /* most often another entry begins there */
+    PetscFunctionReturn(PETSC_SUCCESS); /* fast path: another entry begins on the next line */
   if (b->field == b->per_line) {
     char line[LINE];
     const size_t length = b->length;
@@ -184,7 +184,7 @@ static PetscErrorCode next_field(Nastran *b, char word[WORD], PetscBool *there)
     PetscCall(PetscStrncpy(line, b->line, sizeof(line)));
     PetscCall(next_line(b, there));
     if (!*there || !continues(b)) {
-      /* that line is for later; this one stays at its end */
+      /* the next line belongs to another entry: keep this one, at its end */
       PetscCall(PetscStrncpy(b->line, line, sizeof(line)));
       b->length = length;
       b->commas = commas;
@@ -200,7 +200,7 @@ static PetscErrorCode next_field(Nastran *b, char word[WORD], PetscBool *there)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A whole number; `empty` where the field is. */
+/* Parses an integer; `empty` is the value of an empty field. */
 static PetscErrorCode to_number(Nastran *b, const char *word, const char *what, int64_t empty, int64_t *value)
 {
   char *end;
@@ -225,7 +225,7 @@ static PetscErrorCode next_number(Nastran *b, const char *what, int64_t empty, i
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A number that must be there. */
+/* Reads a required integer. */
 static PetscErrorCode next_label(Nastran *b, const char *what, int64_t *value)
 {
   PetscFunctionBeginUser;
@@ -250,7 +250,7 @@ static PetscErrorCode read_grid(Nastran *b)
                   "of GRID empty or 0)",
                   (long long)label, (long long)system);
   PetscCall(SbDeckAddNode(&b->deck, label, &x));
-  // 1.5, 1.5E-3, 1.5D-3, 1.5-3; nothing is 0
+  // formats 1.5, 1.5E-3, 1.5D-3, 1.5-3; an empty field is 0
   for (int i = 0; i < 3; i++) {
     char word[WORD], full[WORD + 1], *end;
     size_t n = 0;
@@ -270,11 +270,11 @@ static PetscErrorCode read_grid(Nastran *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Names of elements, with gmsh's types for all corner nodes, and for more nodes. */
+/* Names of elements, and gmsh's types for corner nodes only and with edge nodes. */
 static const struct {
   const char *name;
   int ncorner, linear, higher;
-  PetscBool property; /* the second field is one */
+  PetscBool property; /* the second field is a property */
 } kinds[] = {
   {"CTETRA", 4, 4, 11, PETSC_TRUE}, {"CHEXA", 8, 5, 17, PETSC_TRUE},  {"CPENTA", 6, 6, 18, PETSC_TRUE},
   {"CPYRAM", 5, 7, 19, PETSC_TRUE}, {"CPYRA", 5, 7, 19, PETSC_TRUE},  {"CTRIA3", 3, 2, 2, PETSC_TRUE},
@@ -299,7 +299,7 @@ static PetscErrorCode read_element(Nastran *b, int kind)
     PetscCall(next_label(b, "node of an element", &node));
     if (k < 4) e.node[k] = node;
   }
-  /* nodes at the middle of edges; the last fields of shells and lines are something else */
+  /* edge nodes; the last fields of shells and lines have other meanings */
   for (int k = 4;
        kinds[kind].linear != kinds[kind].higher && (!more || (kinds[kind].higher == SB_GMSH_TET10 && k < 10));
        k++) {
@@ -315,7 +315,7 @@ static PetscErrorCode read_element(Nastran *b, int kind)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes first to last are in set `number` of this kind: spc_12. */
+/* Adds the nodes first to last to the set KIND_NUMBER, as spc_12. */
 static PetscErrorCode add_range(Nastran *b, const char *kind, int64_t number, int64_t first, int64_t last)
 {
   char name[SB_GROUP_MAX];
@@ -328,7 +328,7 @@ static PetscErrorCode add_range(Nastran *b, const char *kind, int64_t number, in
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes one by one or from THRU to, behind the number of the set and `nskip` fields. */
+/* Reads a list of nodes, or first THRU last, after the set number and `nskip` fields. */
 static PetscErrorCode read_list(Nastran *b, const char *kind, int nskip)
 {
   char word[WORD];
@@ -359,11 +359,11 @@ static PetscErrorCode read_entry(Nastran *b)
   int64_t number = 0;
 
   PetscFunctionBeginUser;
-  if (continues(b)) PetscFunctionReturn(PETSC_SUCCESS); /* of an entry that is passed over */
+  if (continues(b)) PetscFunctionReturn(PETSC_SUCCESS); /* continuation of a skipped entry */
   get_field(b, 0, name);
   name[strcspn(name, "*")] = 0;
   if (!strcasecmp(name, "GRID")) PetscCall(read_grid(b));
-  // coordinate system of the points that name none
+  // default coordinate system of points
   if (!strcasecmp(name, "GRDSET")) {
     char word[WORD];
     PetscBool there;
@@ -411,7 +411,7 @@ PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *im)
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, b.scan));
-  // behind the line BEGIN BULK, or at the start of a file that has none
+  // after the line BEGIN BULK, or from the start of a file without that line
   for (const char *p = b.scan->data, *end; p; p = end ? end + 1 : NULL) {
     const char *word = p + strspn(p, " \t");
 
@@ -431,7 +431,7 @@ PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *im)
   }
   PetscCall(SbDeckBuild(&b.deck));
   PetscCall(SbImportJoinGroups(im));
-  /* properties that elements use get their names */
+  /* name the groups of properties that elements use */
   for (PetscInt i = 0; i < b.nname.n; i++)
     for (PetscInt dim = 1; dim < 4; dim++)
       PetscCall(SbImportNameGroup(im, dim, b.name[i].number, b.name[i].name));

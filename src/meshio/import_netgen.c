@@ -1,16 +1,16 @@
 /*
-  import_netgen.c - reader of Netgen's meshes: .vol, and the neutral format (Netgen manual, "Export formats", and what Netgen 4 to 6
-  writes).
+  import_netgen.c - reader of Netgen's meshes: .vol, and the neutral format (Netgen manual, "Export formats", and files written by Netgen
+  4 to 6).
 
-  Neutral: the number of points, their coordinates; the number of tets, each with its subdomain and four points; the number of
+  Neutral format: the number of points, their coordinates; the number of tets, each with its subdomain and four points; the number of
   surface triangles, each with its boundary condition and three points. Points count from 1. A # begins a comment.
 
   .vol: sections, each a word on a line of its own, a count, and that many lines; "surfnr bcnr domin domout np p1 p2 p3" for a surface
-  element, "matnr np p1 p2 p3 p4" for a volume element. Sections come in any order, hence each is searched for.
+  element, "matnr np p1 p2 p3 p4" for a volume element. Sections are in any order, hence each is searched for.
 
   Kept: subdomain or material N is volume_N, boundary condition N is surface_N; the sections materials and bcnames of .vol give
-  them names. Curves (edgesegments) are left out. Of second order, tets have 10 points and triangles 6, in both formats.
-  Refused: other elements.
+  them names. Curves (edgesegments) are ignored. Second-order tets have 10 points and triangles 6, in both formats.
+  Errors: other elements.
 */
 #include <ctype.h>
 #include "meshio_impl.h"
@@ -34,11 +34,12 @@ static PetscErrorCode read_points(SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Columns before the points of an element: skipped numbers, its group, and in .vol the number of points. */
+/* Format of an element line: numbers before the points, which are the group and, in .vol, the number of points. */
 typedef struct {
-  int dim, room; /* bytes that a line takes at least */
+  int dim, room; /* dimension; least number of bytes per line */
   const char *before[5];
-  int mark, nnode; /* which of them; nnode -1: all words that are left on the line are points */
+  int mark,
+    nnode; /* positions of the group and of the number of points; nnode -1: all remaining words on the line are points */
 } Layout;
 
 static const Layout neutral_volume = {
@@ -61,7 +62,7 @@ static const Layout vol_surface = {
 static PetscErrorCode read_elements(SbImport *im, const Layout *l)
 {
   SbScan *s = &im->scan;
-  /* the nodes at the edges 01 02 03 12 13 23 of a tet, as gmsh numbers them */
+  /* positions of the nodes in gmsh's order; edges 01 02 03 12 13 23 */
   static const int place[10] = {0, 1, 2, 3, 4, 6, 7, 5, 9, 8};
   int64_t n, value[5], nnode, point;
   PetscInt vert[10], tags;
@@ -76,7 +77,7 @@ static PetscErrorCode read_elements(SbImport *im, const Layout *l)
 
     SbScanNext(s, '#');
     for (int k = 0; k < 5 && l->before[k]; k++) PetscCall(SbScanText(s, l->before[k], &value[k]));
-    // how many points: said before, or as many as there are words on the rest of the line
+    // number of points: given, or the number of words on the rest of the line
     nnode = l->nnode < 0 ? 0 : value[l->nnode];
     for (at = s->at, token = s->token; l->nnode < 0 && SbScanMore(s, '#'); nnode++)
       while (s->at < s->end && !isspace((unsigned char)*s->at)) s->at++;
@@ -118,7 +119,7 @@ PetscErrorCode SbImportRead_NetgenNeutral(const char *path, SbImport *im)
 
 /* ------------------------------------------------------------------ .vol */
 
-/* To what follows the line that holds only this word; false when there is none. */
+/* Goes behind the line that consists of this word; false if there is none. */
 static PetscBool find_section(SbScan *s, const char *name)
 {
   const size_t n = strlen(name);
@@ -139,7 +140,7 @@ static PetscBool find_section(SbScan *s, const char *name)
   return PETSC_FALSE;
 }
 
-/* Lines of a number and a name, which may hold blanks. Numbers that no element has are left out. */
+/* Reads lines of a number and a name, which may contain blanks. Numbers without elements are ignored. */
 static PetscErrorCode read_names(SbImport *im, const char *section, PetscInt dim)
 {
   SbScan *s = &im->scan;
@@ -176,7 +177,7 @@ PetscErrorCode SbImportRead_Netgen(const char *path, SbImport *im)
     SB_SCAN_ERROR(s, "there is no section 'points'; the file is truncated or damaged");
   PetscCall(read_points(im));
   if (find_section(s, "volumeelements")) PetscCall(read_elements(im, &vol_volume));
-  /* Netgen writes the word with an ending that names what else stands at the end of the lines */
+  /* Netgen appends a suffix to the section name if the lines have more columns */
   if (find_section(s, "surfaceelements") || find_section(s, "surfaceelementsgi") ||
       find_section(s, "surfaceelementsuv"))
     PetscCall(read_elements(im, &vol_surface));

@@ -1,20 +1,20 @@
 /*
-  import_tetgen.c - reader of TetGen's meshes: NAME.node and NAME.ele, with NAME.face and NAME.edge when they are there
+  import_tetgen.c - reader of TetGen's meshes: NAME.node and NAME.ele, with optional NAME.face and NAME.edge
   (TetGen 1.5 manual, section 5.2).
 
-  Every file begins with a line of counts; each line after that is one item: its number, then its values. Numbers of points begin at 0 or
-  1, as the first line of NAME.node says. A # begins a comment. What stands at the end of a line beyond the announced values (TetGen's -nn
-  writes neighbours there, of faces) is not read, but for tets an error.
+  Each file begins with a line of counts; each further line is one item: its number, then its values. Point numbers begin at 0 or
+  1, as in the first line of NAME.node. A # begins a comment. Values at the end of a line beyond the announced ones (neighbours of faces, by
+  tetgen -nn) are ignored; for tets they are an error.
 
-  Kept: the first attribute of a tet is its region, volume_N; the marker of a face, an edge or a point other than 0 is surface_N,
-  curve_N or point_N. Of second order (tetgen -o2) faces have 6 points and edges 3. Refused: attributes that are no whole numbers.
+  Kept: the first attribute of a tet is its region, volume_N; the nonzero marker of a face, an edge or a point is surface_N,
+  curve_N or point_N. Second-order meshes (tetgen -o2) have faces of 6 points and edges of 3. Errors: attributes that are not integers.
 */
 #include "meshio_impl.h"
 
-/* The files: their items, and the contents of the first line. */
+/* Files of a mesh: extension, items, and the counts on the first line. */
 static const struct {
   const char *ending, *count, *title, *mark;
-  int dim, ncount, room; /* numbers of the first line that are of use; bytes that an item takes at least */
+  int dim, ncount, room; /* dimension; numbers read from the first line; least number of bytes per item */
 } files[] = {
   {".node", "number of points", "points", "marker of a point", 0, 4, 8},
   {".ele", "number of tetrahedra", "tetrahedra", "attribute of a tetrahedron", 3, 3, 10},
@@ -22,7 +22,7 @@ static const struct {
   {".edge", "number of edges", "edges", "marker of an edge", 1, 2, 6},
 };
 
-/* A value that must stand on this line. */
+/* Requires another value on this line. */
 static PetscErrorCode on_line(SbScan *s, const char *what)
 {
   PetscFunctionBeginUser;
@@ -30,12 +30,12 @@ static PetscErrorCode on_line(SbScan *s, const char *what)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One file: the line of counts, then a line for each item: number, what it is, attributes, mark. A mark of 0 is one only for tets. */
+/* Reads one file: the line of counts, then a line for each item: number, coordinates or points, attributes, marker. A marker of 0 is a group for tets only. */
 static PetscErrorCode read_file(SbImport *im, int f)
 {
   static const int types[2][4] = {{SB_GMSH_POINT, SB_GMSH_LINE, SB_GMSH_TRIANGLE, SB_GMSH_TET},
                                   {SB_GMSH_POINT, SB_GMSH_LINE3, SB_GMSH_TRIANGLE6, SB_GMSH_TET10}};
-  /* the nodes at the edges 23 03 01 12 13 02 of a tet, as gmsh numbers them */
+  /* positions of the nodes in gmsh's order; edges 23 03 01 12 13 02 */
   static const int place[10] = {0, 1, 2, 3, 8, 7, 4, 5, 9, 6};
   SbScan *s = &im->scan;
   const int dim = files[f].dim;
@@ -44,7 +44,7 @@ static PetscErrorCode read_file(SbImport *im, int f)
   PetscReal attribute;
 
   PetscFunctionBeginUser;
-  /* the first of the counts is needed, those left out are 0 */
+  /* the first count is required, the others default to 0 */
   SbScanNext(s, '#');
   PetscCall(SbScanText(s, files[f].count, &count[0]));
   for (int i = 1; i < files[f].ncount && SbScanMore(s, '#'); i++)
@@ -65,7 +65,7 @@ static PetscErrorCode read_file(SbImport *im, int f)
       SB_SCAN_ERROR(s, "elements of %lld points; expected 4 or 10", (long long)count[1]);
     if (count[1] == 10) type = SB_GMSH_TET10;
   }
-  /* only the file of the tets says what order they have */
+  /* only the file of the tets has the order of the elements */
   if (dim && im->count[SB_GMSH_TET10]) type = types[1][dim];
   if (dim) npoint = SbGmshTypes[type].nnode;
 
@@ -75,7 +75,7 @@ static PetscErrorCode read_file(SbImport *im, int f)
 
     SbScanNext(s, '#');
     PetscCall(SbScanText(s, dim ? "number of an item" : "number of a point", &number));
-    // a point has the number after the one before it, and a position; a tet, face or edge has points
+    // point numbers are consecutive; a point has coordinates, a tet, face or edge has points
     if (dim == 0) im->vert_number[i] = number;
     first = im->vert_number[0];
     if (dim == 0 && first != 0 && first != 1)
@@ -109,7 +109,7 @@ static PetscErrorCode read_file(SbImport *im, int f)
       const char *what;
       PetscReal value = 0;
 
-      // a whole number, written with or without decimals
+      // an integer, written with or without decimals
       what = files[f].mark;
       PetscCall(on_line(s, what));
       PetscCall(SbScanReal(s, what, 0, &value));
@@ -119,7 +119,7 @@ static PetscErrorCode read_file(SbImport *im, int f)
       mark = (int64_t)value;
       if (mark || dim == 3) PetscCall(SbImportTagsAlone(im, dim, mark, NULL, &tags));
     }
-    // a tet with more points than its file says would be another one
+    // more points than announced for a tet are an error
     for (int64_t k = 1; dim == 3 && k < count[2] && SbScanMore(s, '#'); k++)
       PetscCall(SbScanReal(s, files[f].mark, 0, &attribute));
     if (dim == 3 && SbScanMore(s, '#'))
@@ -142,18 +142,18 @@ PetscErrorCode SbImportRead_TetGen(const char *path, SbImport *im)
   size_t stem = tail;
 
   PetscFunctionBeginUser;
-  /* the name without one of the endings */
+  /* name without extension */
   for (size_t f = 0; dot && f < PETSC_STATIC_ARRAY_LENGTH(files); f++)
     if (!strcmp(dot, files[f].ending)) stem = (size_t)(dot - path);
   for (int f = 0; f < 4; f++) {
     char name[PETSC_MAX_PATH_LEN + 8], *where = NULL;
     PetscBool exists = PETSC_TRUE;
 
-    /* faces and edges need not be there */
+    /* faces and edges are optional */
     (void)snprintf(name, sizeof(name), "%.*s%s", (int)stem, path, files[f].ending);
     if (f > 1) PetscCall(PetscTestFile(name, 'r', &exists));
     if (!exists) continue;
-    /* messages name this file instead of what the scenario says */
+    /* error messages name this file */
     PetscCall(SbImportScratch(im, sizeof(im->where) + 8, &where));
     (void)snprintf(where, sizeof(im->where) + 8, "%.*s%s", lead, im->where, name);
     PetscCall(SbScanClose(&im->scan));

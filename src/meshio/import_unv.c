@@ -1,14 +1,14 @@
 /*
   import_unv.c - reader of universal files, .unv (SDRC I-DEAS; data set 15 or 2411: nodes, 2412: elements, 2429 to 2477: groups).
 
-  A data set stands between two lines of -1 and begins with its number. Read: nodes with their coordinates, as they are (units and
-  coordinate systems are not applied); tets, triangles, lines. An element belongs to volume_N, surface_N or curve_N by the number N of its
-  physical property, and to the groups that list it, by name. Groups of nodes are kept too. Refused: volume elements other than tets of 4 or 10 nodes.
+  A data set is enclosed by two lines of -1 and begins with its number. Read: nodes with their coordinates (units and
+  coordinate systems are ignored); tets, triangles, lines. An element belongs to the group volume_N, surface_N or curve_N of its
+  physical property N, and to the named groups that list it. Groups of nodes are kept too. Errors: volume elements other than tets of 4 or 10 nodes.
 */
 #include <ctype.h>
 #include "meshio_impl.h"
 
-/* FE descriptor ids, with gmsh's types. Others (springs, masses) are skipped. */
+/* FE descriptor ids, and gmsh's types. Others (springs, masses) are skipped. */
 static const struct {
   int id, type;
 } types[] = {
@@ -21,7 +21,7 @@ static const struct {
 
 /* ------------------------------------------------------------------ lines */
 
-/* Whether this line holds -1 and nothing else. */
+/* Whether this line is a delimiter: -1 and nothing else. */
 static PetscBool is_mark(const SbScan *s)
 {
   const char *p = s->at;
@@ -43,7 +43,7 @@ static PetscErrorCode read_element(SbDeck *d)
     "material of an element", "colour of an element", "number of nodes of an element"};
   SbScan *s = &d->im->scan;
   int64_t head[6], n, other, node;
-  static const int around[10] = {0, 4, 1, 5, 2, 6, 7, 9, 8, 3}; /* as gmsh numbers the nodes */
+  static const int around[10] = {0, 4, 1, 5, 2, 6, 7, 9, 8, 3}; /* position of each node in gmsh's order */
   SbDeckElement e = {.type = 0};
 
   PetscFunctionBeginUser;
@@ -58,7 +58,7 @@ static PetscErrorCode read_element(SbDeck *d)
   if (e.type && SbGmshTypes[e.type].nnode != n)
     SB_SCAN_ERROR(s, "element %lld of kind %lld has %lld nodes; expected %d", (long long)e.label,
                   (long long)head[1], (long long)n, SbGmshTypes[e.type].nnode);
-  if (e.type == 1 || e.type == 8) { /* a beam has a record of its own */
+  if (e.type == 1 || e.type == 8) { /* beams have an additional record */
     for (int i = 0; i < 3; i++) PetscCall(SbScanText(s, "section of a beam", &other));
   }
   for (int64_t k = 0; k < n; k++) {
@@ -66,7 +66,7 @@ static PetscErrorCode read_element(SbDeck *d)
 
     PetscCall(SbScanText(s, "node of an element", &node));
     if (!k) e.at = s->token;
-    // around the face of a quadratic tet, corner and edge in turn, then up; of other quadratic simplices the corners count
+    // quadratic tets: around the first face, corners and edge nodes in turn, then upwards; of other quadratic simplices only the corners are kept
     if (e.type == SB_GMSH_TET10)
       e.node[SbGmshNode(around[k])] = node;
     else if (e.type == SB_GMSH_LINE3 || e.type == SB_GMSH_TRIANGLE6) {
@@ -80,7 +80,7 @@ static PetscErrorCode read_element(SbDeck *d)
 
 /* ------------------------------------------------------------------ groups */
 
-/* Each member has so many values: kind (7 a node, 8 an element) and label, and since set 2435 two more. */
+/* Reads one group. Each member has `nvalue` values: kind (7 a node, 8 an element), label, and since data set 2435 two more. */
 static PetscErrorCode read_group(SbDeck *d, int nvalue)
 {
   SbScan *s = &d->im->scan;
@@ -123,22 +123,22 @@ PetscErrorCode SbImportRead_UNV(const char *path, SbImport *im)
 
     SbScanNext(s, 0);
     if (s->at >= s->end) break;
-    while (s->at > s->data && s->at[-1] != '\n') s->at--; /* the whole line */
+    while (s->at > s->data && s->at[-1] != '\n') s->at--; /* back to the beginning of the line */
     if (!is_mark(s)) SB_SCAN_ERROR(s, "expected a line of -1; this is no universal file, or it is damaged");
     SbScanEndOfLine(s);
-    // a data set: its number, then as many of what it holds as there are
+    // a data set: its number, then its records
     PetscCall(SbScanText(s, "number of a data set", &id));
     SbScanEndOfLine(s);
     if (id == 2412 && !d.nnode.n) SB_SCAN_ERROR(s, "elements before the nodes");
     for (;;) {
-      // the data set ends at a mark; with the file it is an error
+      // the data set ends at a delimiter; the end of the file is an error
       while (s->at < s->end && (*s->at == '\n' || *s->at == '\r')) s->at++;
       s->token = s->at;
       if (s->at >= s->end)
         SB_SCAN_ERROR(
           s, "the file ends where a line of -1 is expected; it is truncated, write or copy it again");
       if (is_mark(s)) break;
-      // set 2411 has the coordinates on a line of their own, set 15 on the same one
+      // data set 2411 has the coordinates on a line of their own, data set 15 on the same line
       if (id == 2411 || id == 781 || id == 15) {
         int64_t label, other;
         PetscReal *x;
@@ -151,7 +151,7 @@ PetscErrorCode SbImportRead_UNV(const char *path, SbImport *im)
       if (id == 2412) PetscCall(read_element(&d));
       if (id == 2429 || id == 2430 || id == 2432) PetscCall(read_group(&d, 2));
       if (id == 2435 || id == 2452 || id == 2467 || id == 2477) PetscCall(read_group(&d, 4));
-      SbScanEndOfLine(s); /* data sets of no concern are passed over */
+      SbScanEndOfLine(s); /* other data sets are skipped */
     }
     SbScanEndOfLine(s);
   }

@@ -2,8 +2,8 @@
   import_vtk.c - reader of VTK's legacy files of unstructured grids, text or binary (VTK User's Guide, "File formats"; version 5.1
   is described in VTK's "VTK 5.1 legacy format"): cells with their counts, or as OFFSETS and CONNECTIVITY.
 
-  Kept: tets, triangles, lines and points; arrays of cells that hold whole numbers become groups, see vtk_grid.h. Data of points is
-  passed over. Binary data is big-endian. Refused: other data sets, volume cells other than 4-node tets.
+  Kept: tets, triangles, lines and points; cell arrays of integers become groups, see vtk_grid.h. Point data is
+  skipped. Binary data is big-endian. Errors: other data sets, volume cells other than 4- and 10-node tets.
 */
 #include <strings.h>
 #include "vtk_grid.h"
@@ -12,21 +12,21 @@ typedef struct {
   SbScan *scan;
   SbImport *im;
   SbVtkGrid grid;
-  PetscBool binary, points, cells, on_cells; /* on_cells: the following arrays are cell data */
-  int64_t ntuple;                            /* of what follows */
-  const char *cells_at;                      /* for messages */
+  PetscBool binary, points, cells, on_cells; /* on_cells: the arrays that follow are cell data */
+  int64_t ntuple;                            /* number of tuples of the arrays that follow */
+  const char *cells_at;                      /* position of the cells, for messages */
 } Vtk;
 
 /* ------------------------------------------------------------------ numbers */
 
-/* n numbers of this type; value NULL: they are passed over, else it is allocated. */
+/* Reads n numbers of this type into an array that it allocates; value NULL: skips them. */
 static PetscErrorCode read_array(Vtk *v, const char *what, int64_t n, SbNumberType type, double **value)
 {
   SbScan *s = v->scan;
   const size_t bytes = (size_t)n * (size_t)type.size;
 
   PetscFunctionBeginUser;
-  // binary data begins behind the end of the line
+  // binary data begins after the end of the line
   if (v->binary) SbScanEndOfLine(s);
   s->binary = v->binary;
   PetscCall(SbScanRoom(s, what, n, 2, type.size));
@@ -73,10 +73,10 @@ static PetscErrorCode read_cells(Vtk *v)
   if (!strcasecmp(word, "OFFSETS")) {
     SbNumberType type;
 
-    // from version 5 on: `n` offsets from 0 to the number of points, then the points
+    // since version 5: `n` offsets from 0 to the number of points, then the points
     PetscCall(SbScanType(v->scan, &type));
     PetscCall(read_array(v, "offsets", n, type, &grid->end));
-    for (int64_t c = 0; c + 1 < n; c++) grid->end[c] = grid->end[c + 1]; /* the first is 0 */
+    for (int64_t c = 0; c + 1 < n; c++) grid->end[c] = grid->end[c + 1]; /* drop the first offset, 0 */
     PetscCall(SbScanWord(v->scan, sizeof(word), word));
     if (strcasecmp(word, "CONNECTIVITY")) SB_SCAN_ERROR(v->scan, "expected CONNECTIVITY, found '%s'", word);
     PetscCall(SbScanType(v->scan, &type));
@@ -88,7 +88,7 @@ static PetscErrorCode read_cells(Vtk *v)
   s->at = at;
   grid->ncell = (PetscInt)n;
   PetscCall(read_array(v, "list of cells", size, (SbNumberType){'i', 4}, &all));
-  // before version 5: [n, p1 ... pn] one cell after the other
+  // before version 5: [n, p1 ... pn] for each cell
   PetscCall(SbImportScratch(v->im, (size_t)size * sizeof(double), &grid->connect));
   PetscCall(SbImportScratch(v->im, (size_t)grid->ncell * sizeof(double), &grid->end));
   for (PetscInt c = 0; c < grid->ncell; c++) {
@@ -107,7 +107,7 @@ static PetscErrorCode read_cells(Vtk *v)
 
 /* ------------------------------------------------------------------ data */
 
-/* An array of `ncomponent` numbers for each tuple: kept when it is one number for each cell. */
+/* Reads an array of `ncomponent` numbers per tuple; kept if it has one number per cell. */
 static PetscErrorCode read_data(Vtk *v, const char *name, int64_t ncomponent, int64_t ntuple,
                                 SbNumberType type)
 {
@@ -162,7 +162,7 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
       SB_SCAN_ERROR(s, "%lld types of cells for %lld cells", (long long)n, (long long)v->grid.ncell);
     PetscCall(read_array(v, "types of cells", n, (SbNumberType){'i', 4}, &v->grid.type));
   } else if (on_cells || !strcasecmp(section, "POINT_DATA")) {
-    // what the arrays that follow belong to
+    // cells or points to which the following arrays belong
     n = on_cells ? v->grid.ncell : v->im->nvert;
     if (!v->points || !v->cells) SB_SCAN_ERROR(s, "data before the sections POINTS and CELLS");
     PetscCall(SbScanText(s, "number of data", &v->ntuple));
@@ -204,13 +204,13 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
       PetscCall(read_data(v, name, ncomponent, ntuple, type));
     }
   } else if (!strcasecmp(section, "LOOKUP_TABLE")) {
-    // four bytes, or four numbers, for each entry
+    // 4 bytes or 4 numbers per entry
     PetscCall(SbScanWord(s, sizeof(name), name));
     PetscCall(SbScanText(s, "number of colours", &n));
     PetscCall(SbScanRoom(s, "colours", n, 1, 1));
     PetscCall(read_array(v, "colours", 4 * n, (SbNumberType){'u', 1}, NULL));
   } else if (!strcasecmp(section, "METADATA")) {
-    // a block of lines up to an empty one
+    // a block of lines up to an empty line
     do SbScanEndOfLine(s);
     while (SbScanMore(s, '\n'));
   } else if (k < PETSC_STATIC_ARRAY_LENGTH(tuples)) {
@@ -230,11 +230,11 @@ PetscErrorCode SbImportRead_VTK(const char *path, SbImport *im)
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
-  // the header: text or binary, an unstructured grid
+  // header: text or binary, unstructured grid
   if ((size_t)(s->end - s->at) < 5 || strncasecmp(s->at, "# vtk", 5))
     SB_SCAN_ERROR(s, "expected '# vtk DataFile Version'; this is no legacy file of VTK");
   SbScanEndOfLine(s);
-  SbScanEndOfLine(s); /* the title */
+  SbScanEndOfLine(s); /* title */
   PetscCall(SbScanWord(s, sizeof(kind), kind));
   if (strcasecmp(kind, "ASCII") && strcasecmp(kind, "BINARY"))
     SB_SCAN_ERROR(s, "expected ASCII or BINARY, found '%s'", kind);

@@ -1,36 +1,36 @@
 /*
   import_vtu.c - reader of VTK's XML files of unstructured grids, .vtu (VTK User's Guide, "XML file formats").
 
-  Arrays stand in the elements DataArray as text, as base64, or behind the mark _ of AppendedData as bytes or base64. Binary ones
-  begin with their length or, compressed by zlib, with the number and sizes of their blocks. Base64 that ends in = may go on after
-  it: writers encode the lengths and the data apart, or together.
+  Arrays are in DataArray elements as text or base64, or after the mark _ of AppendedData as raw bytes or base64. A binary array
+  begins with its length or, if compressed by zlib, with the number and sizes of its blocks. Base64 may continue after a final =:
+  some writers encode lengths and data separately.
 
-  Kept: tets, triangles, lines and points; arrays of cells that hold whole numbers become groups, see vtk_grid.h. Refused:
-  several pieces, other compressors, volume cells other than 4-node tets.
+  Kept: tets, triangles, lines and points; cell arrays of integers become groups, see vtk_grid.h. Errors:
+  several pieces, other compressors, volume cells other than 4- and 10-node tets.
 */
 #include <ctype.h>
 #include <stdlib.h>
 #include <zlib.h>
 #include "vtk_grid.h"
 
-enum { ZLIB_RATIO = 1032 }; /* no compressed byte stands for more */
+enum { ZLIB_RATIO = 1032 }; /* largest compression ratio of zlib */
 
 typedef struct {
   SbScan *scan;
   SbImport *im;
   SbVtkGrid grid;
   PetscBool big_endian, zlib;
-  int header;              /* bytes of a length: 4 or 8 */
-  const char *xml_end;     /* what is XML ends here */
-  const char *appended;    /* first byte behind the mark _, or NULL */
-  PetscBool appended_text; /* and it is base64 */
-  const char *cells_at;    /* for messages */
-  unsigned char *raw;      /* the bytes of the last array */
+  int header;              /* bytes of a length field: 4 or 8 */
+  const char *xml_end;     /* end of the XML part */
+  const char *appended;    /* first byte after the mark _, or NULL */
+  PetscBool appended_text; /* the appended data is base64 */
+  const char *cells_at;    /* position of the cells, for messages */
+  unsigned char *raw;      /* decoded bytes of the last array */
 } Vtu;
 
 /* ------------------------------------------------------------------ XML */
 
-/* The next element of this name before `end`: from < to the byte behind its >; false when there is none. */
+/* Finds the next element of this name before `end`: `open` at its <, `close` after its >; false if there is none. */
 static PetscBool find_element(const char *from, const char *end, const char *name, const char **open,
                               const char **close)
 {
@@ -49,7 +49,7 @@ static PetscBool find_element(const char *from, const char *end, const char *nam
   return PETSC_FALSE;
 }
 
-/* The value of an attribute, "" when it is not there. */
+/* Value of an attribute, "" if absent. */
 static void attribute(const char *open, const char *close, const char *name, size_t size, char value[])
 {
   const size_t n = strlen(name);
@@ -71,7 +71,7 @@ static void attribute(const char *open, const char *close, const char *name, siz
   }
 }
 
-/* A whole number given by an attribute. */
+/* Integer value of an attribute. */
 static PetscErrorCode attribute_number(Vtu *v, const char *open, const char *close, const char *name,
                                        int64_t *n)
 {
@@ -88,7 +88,7 @@ static PetscErrorCode attribute_number(Vtu *v, const char *open, const char *clo
 
 /* ------------------------------------------------------------------ bytes */
 
-/* Bytes on their way out of raw data or base64. */
+/* Decoder of raw or base64 bytes. */
 typedef struct {
   const char *at, *end;
   PetscBool text;
@@ -96,7 +96,7 @@ typedef struct {
   int nheld, from;
 } Bytes;
 
-/* Four characters become up to three bytes; false at the end, or at what is no base64. */
+/* Decodes four base64 characters to at most three bytes; false at the end, or at a character that is not base64. */
 static PetscBool next_quad(Bytes *b)
 {
   static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -124,7 +124,7 @@ static PetscBool next_quad(Bytes *b)
   return PETSC_TRUE;
 }
 
-/* Takes n bytes; false when there are fewer. */
+/* Takes n bytes; false if there are fewer. */
 static PetscBool take_bytes(Bytes *b, size_t n, unsigned char out[])
 {
   if (!b->text) {
@@ -142,7 +142,7 @@ static PetscBool take_bytes(Bytes *b, size_t n, unsigned char out[])
   return PETSC_TRUE;
 }
 
-/* A length of 4 or 8 bytes. */
+/* Takes a length field of 4 or 8 bytes. */
 static PetscErrorCode take_length(Vtu *v, Bytes *b, const char *name, size_t *length)
 {
   unsigned char raw[8];
@@ -162,7 +162,7 @@ static PetscErrorCode take_length(Vtu *v, Bytes *b, const char *name, size_t *le
 
 /* ------------------------------------------------------------------ arrays */
 
-/* Compressed: number of blocks, their size, that of the last when it is smaller, then the packed size of each. */
+/* Decompresses an array: number of blocks, block size, size of a smaller last block, compressed size of each; then the blocks. */
 static PetscErrorCode take_blocks(Vtu *v, Bytes *b, const char *name, size_t want, unsigned char out[])
 {
   size_t nblock, size, last, full, *packed = NULL, at = 0;
@@ -197,7 +197,7 @@ static PetscErrorCode take_blocks(Vtu *v, Bytes *b, const char *name, size_t wan
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The n numbers of the array whose element stands between open and close; *value is allocated. */
+/* Reads the n numbers of the array whose element is from open to close; *value is allocated. */
 static PetscErrorCode read_array(Vtu *v, const char *open, const char *close, int64_t n, double **value)
 {
   SbNumberType type;
@@ -230,7 +230,7 @@ static PetscErrorCode read_array(Vtu *v, const char *open, const char *close, in
       SB_SCAN_ERROR(v->scan, "array '%s' should hold %lld numbers, which is more than stand there", name,
                     (long long)n);
     PetscCall(SbImportScratch(v->im, (size_t)n * sizeof(**value), value));
-    // text: numbers between blanks
+    // text: numbers separated by blanks
     s = *v->scan;
     s.at = close;
     s.end = end;
@@ -243,7 +243,7 @@ static PetscErrorCode read_array(Vtu *v, const char *open, const char *close, in
     }
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  // where the bytes of an array are
+  // inline or appended binary data
   b = (Bytes){close, v->scan->end, PETSC_TRUE, {0}, 0, 0};
   if (!strcmp(format, "appended")) {
     PetscCall(attribute_number(v, open, close, "offset", &offset));
@@ -282,7 +282,7 @@ static PetscErrorCode read_array(Vtu *v, const char *open, const char *close, in
 
 /* ------------------------------------------------------------------ the parts of a grid */
 
-/* The content of an element, from behind its > to the < of its end. */
+/* Content of an element, from after its > to the < of its end tag. */
 static PetscErrorCode content(Vtu *v, const char *name, const char **from, const char **end)
 {
   const char *open, *close;
@@ -298,7 +298,7 @@ static PetscErrorCode content(Vtu *v, const char *name, const char **from, const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The array of this name in the element Cells. */
+/* Reads the array of this name in the element Cells. */
 static PetscErrorCode read_cell_array(Vtu *v, const char *name, int64_t n, double **value)
 {
   const char *from, *end, *open, *close;
@@ -332,7 +332,7 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
-  // where the XML ends and the appended data begins
+  // end of the XML part, beginning of the appended data
   v->xml_end = s->end;
   if (find_element(s->data, s->end, "AppendedData", &open, &close)) {
     v->xml_end = s->token = open;
@@ -343,7 +343,7 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
     if (!v->appended) SB_SCAN_ERROR(s, "the appended data has no mark _ at its beginning");
     v->appended++;
   }
-  // what the file is, and how its arrays are packed
+  // type, byte order and compression of the file
   if (!find_element(s->data, v->xml_end, "VTKFile", &open, &close))
     SB_SCAN_ERROR(s, "expected an element VTKFile; this is no XML file of VTK");
   s->token = open;
@@ -371,7 +371,7 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
   if (npoint > PETSC_MAX_INT / 8 || ncell > PETSC_MAX_INT / 8)
     SB_SCAN_ERROR(s, "%lld points and %lld cells are more than this build can number", (long long)npoint,
                   (long long)ncell);
-  // the one array of the element Points
+  // the only array of the element Points
   PetscCall(content(v, "Points", &from, &end));
   v->scan->token = from;
   if (!find_element(from, end, "DataArray", &open, &close))
@@ -381,7 +381,7 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
     SB_SCAN_ERROR(v->scan, "points of %lld coordinates; expected 3", (long long)ncomponent);
   PetscCall(read_array(v, open, close, 3 * npoint, &x));
   PetscCall(SbVtkSetPoints((PetscInt)npoint, x, v->im));
-  // types of cells, where their points end, then so many points
+  // cell types, end offsets of cells, then the connectivity
   grid->ncell = (PetscInt)ncell;
   PetscCall(read_cell_array(v, "offsets", ncell, &grid->end));
   PetscCall(read_cell_array(v, "types", ncell, &grid->type));
@@ -391,7 +391,7 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
     SB_SCAN_ERROR(v->scan, "the last of the offsets is %g; expected the number of points of all cells", last);
   grid->nconnect = (int64_t)last;
   PetscCall(read_cell_array(v, "connectivity", grid->nconnect, &grid->connect));
-  // data of cells with one number for each; the others are passed over
+  // cell data with one number per cell; other arrays are skipped
   if (find_element(s->data, v->xml_end, "CellData", &open, &from) && from[-2] != '/') {
     PetscCall(content(v, "CellData", &from, &end));
     for (; find_element(from, end, "DataArray", &open, &close) && grid->narray < SB_VTK_ARRAYS;

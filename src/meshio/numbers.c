@@ -1,7 +1,7 @@
 /*
-  numbers.c - from the numbers that a file gives to its nodes or elements to their indices in memory.
+  numbers.c - map from the numbers of nodes or elements in a file to their indices in memory.
 
-  A table when the numbers are dense, else pairs sorted by number.
+  A table if the numbers are dense, else pairs sorted by number.
 */
 #include <stdlib.h>
 #include "meshio_impl.h"

@@ -1,9 +1,9 @@
 /*
-  scan.c - a file read into memory in one piece, then taken apart token by token, as text or binary.
+  scan.c - scanner: a file is read into memory in one piece, then parsed token by token, as text or binary.
 
-  Every read is checked against the end of the file. Text is only walked once; the line of an error is counted when the
-  error occurs. A number of items announced in a file is compared with what the rest of the file can hold before anything
-  is allocated for it.
+  Every read is checked against the end of the file. Line numbers are counted only when an
+  error occurs. A number of items announced in a file is compared with the number that the rest of the file can hold before
+  memory is allocated.
 */
 #include <ctype.h>
 #include <errno.h>
@@ -42,7 +42,7 @@ PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *s)
   got = fread(s->data, 1, size, file);
   (void)fclose(file);
   s->data[got] = 0;
-  /* without the three bytes that some editors put in front of text to say that it is UTF-8 */
+  /* skip the UTF-8 byte order mark */
   if (got >= 3 && !memcmp(s->data, "\xef\xbb\xbf", 3)) {
     got -= 3;
     size -= 3;
@@ -88,7 +88,7 @@ static inline PetscBool ends_token(const SbScan *s, const char *p)
   return (PetscBool)(p >= s->end || isspace((unsigned char)*p));
 }
 
-/* The error of a token that is not what was expected. */
+/* Raises the error of an unexpected token. */
 static PetscErrorCode unexpected(SbScan *s, const char *what, int64_t number)
 {
   char found[24], of[32] = "";
@@ -125,7 +125,7 @@ PetscErrorCode SbScanText(SbScan *s, const char *what, int64_t *value)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Takes n bytes, in the byte order of this machine. */
+/* Takes n bytes, converted to the byte order of this machine. */
 static inline PetscErrorCode take(SbScan *s, const char *what, size_t n, void *value)
 {
   PetscFunctionBeginUser;
@@ -182,7 +182,7 @@ PetscErrorCode SbScanReal(SbScan *s, const char *what, int64_t number, PetscReal
   skip_blanks(s);
   *value = strtod(s->at, &p);
   if (s->at < s->end && p > s->at && (*p == 'D' || *p == 'd')) {
-    // with the exponent letter of Fortran, 1.5D+00
+    // exponent letter of Fortran, 1.5D+00
     char copy[64], *end;
     size_t n = 0;
 

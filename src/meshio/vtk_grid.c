@@ -1,12 +1,12 @@
 /*
-  vtk_grid.c - cells of VTK's files as items of a body.
+  vtk_grid.c - conversion of the cells of VTK files to the items of a body.
 
-  Types of cells as in VTK's vtkCellType.h; they are counted by gmsh's types, for the same messages.
+  Cell types are those of vtkCellType.h, counted by gmsh's types, for common error messages.
 */
 #include <strings.h>
 #include "vtk_grid.h"
 
-/* VTK's types of cells, with gmsh's types. nnode 0: any number of nodes. */
+/* VTK's cell types, and gmsh's types. nnode 0: any number of nodes. */
 static const struct {
   int type, gmsh, nnode;
 } cells[] = {
@@ -33,7 +33,7 @@ static const struct {
   {29, 12, 27},
 };
 
-/* Names of arrays that number regions, in the order of preference. */
+/* Names of arrays that number regions, in order of preference. */
 static const char *const region_names[] = {
   "CellEntityIds", "gmsh:physical", "medit:ref", "region", "regions", "RegionId",  "RegionIds", "material",
   "MaterialId",    "MaterialIds",   "subdomain", "label",  "labels",  "cell_tags", "tag"};
@@ -87,14 +87,14 @@ PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
   int regions, type, nuse = 0;
 
   PetscFunctionBeginUser;
-  // which arrays become groups, and which of them is the one of regions
+  // arrays that become groups, and the array of region numbers among them
   regions = -1;
   PetscCall(PetscMalloc1(grid->ncell, &sorted));
   for (int a = 0; a < grid->narray; a++) {
     const double *value = grid->array[a].value;
     PetscInt different = 1;
 
-    // those of whole numbers with few different values
+    // arrays of integers with few distinct values
     use[a] = PETSC_TRUE;
     for (PetscInt c = 0; c < grid->ncell && use[a]; c++)
       use[a] = (PetscBool)(PetscAbsReal(value[c]) < 1e12 && value[c] == PetscFloorReal(value[c]));
@@ -117,13 +117,13 @@ PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
   for (PetscInt c = 0; c < grid->ncell; c++, begin = end) {
     const double value = grid->end[c];
 
-    // the cell has a point at least and ends within the list
+    // a cell has at least one point, and its end is in the list
     if (!(value > (double)begin && value <= (double)grid->nconnect) || value != PetscFloorReal(value))
       SB_SCAN_ERROR(s, "the points of cell %lld end at %g; expected a whole number above %lld, up to %lld",
                     (long long)c, value, (long long)begin, (long long)grid->nconnect);
     end = (int64_t)value;
     PetscCall(cell_type(s, grid, c, end - begin, &type));
-    // the points of the cell, checked
+    // points of the cell, checked
     for (int64_t k = 0; k < end - begin; k++) {
       const double point = grid->connect[begin + k];
 
@@ -132,7 +132,7 @@ PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
                       (long long)im->nvert - 1);
       if (k < 10) vert[SbGmshNode((int)k)] = (PetscInt)point;
     }
-    // a simplex, but not points or a line of many pieces, has a group from each array in use
+    // a simplex, but not a polyline or several points, gets a group from each array in use
     tags = 0;
     if (SbGmshIsSimplex(type) && end - begin == SbGmshTypes[type].nnode) {
       int dim = SbGmshTypes[type].dim;
@@ -144,7 +144,7 @@ PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
         const int64_t number = use[a] ? (int64_t)grid->array[a].value[c] : 0;
 
         if (!use[a]) continue;
-        /* numbers of regions stay; those of other arrays lie apart from them */
+        /* region numbers are unchanged; numbers of other arrays are shifted to be distinct */
         PetscCall(
           SbImportGroup(im, dim, a == regions ? number : number + ((int64_t)(a + 1) << 42), NULL, &group[n]));
         if (im->ngroup > known)

@@ -1,19 +1,19 @@
 /*
-  vtk_grid.h - cells as VTK's files hold them, on their way to a body: what import_vtk.c and import_vtu.c share.
+  vtk_grid.h - cells and cell arrays of a VTK file, shared by import_vtk.c and import_vtu.c.
 */
 #pragma once
 #include "meshio_impl.h"
 
-#define SB_VTK_ARRAYS 16    /* cell arrays that are examined */
-#define SB_VTK_REGIONS 1000 /* an array of more different values is no number of regions */
+#define SB_VTK_ARRAYS 16    /* largest number of cell arrays that are examined */
+#define SB_VTK_REGIONS 1000 /* an array with more distinct values is not a region number */
 
-/* All numbers as double: exact for every position of a node. Arrays are those of the reader, see SbImportScratch(). */
+/* Cells of a grid. All numbers as double, exact for node indices. Arrays are scratch memory of the reader, see SbImportScratch(). */
 typedef struct {
   PetscInt ncell;
   int64_t nconnect;
-  double *connect; /* [nconnect] points, from 0 */
-  double *end;     /* [ncell] where the points of a cell end in `connect` */
-  double *type;    /* [ncell] VTK's type of cell */
+  double *connect; /* [nconnect] points of the cells, from 0 */
+  double *end;     /* [ncell] end of each cell in `connect` */
+  double *type;    /* [ncell] VTK's cell type */
   int narray;
   struct {
     char name[SB_NAME_MAX];
@@ -22,11 +22,11 @@ typedef struct {
 } SbVtkGrid;
 
 /*
-  SbVtkGridFill - the cells of a grid as items of a body whose vertices are there; arrays of whole numbers become groups. Not collective.
+  SbVtkGridFill - adds the cells of a grid to a body that has its vertices; arrays of integers become groups. Not collective.
 
-  The array of regions (CellEntityIds, gmsh:physical, medit:ref, region, ...; or the only one) gives the groups volume_N, surface_N,
-  ...; each other one NAME_volume_N, ... Errors of a cell name the position import->scan.token.
+  The array of region numbers (CellEntityIds, gmsh:physical, medit:ref, region, ...; or the only array) gives the groups volume_N, surface_N,
+  ...; each other array NAME_volume_N, ... Errors of a cell name the position import->scan.token.
 */
 PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im);
-/* Coordinates, [nvert][3], into the body; number i of a bad one is named. */
+/* Sets the vertices of the body from coordinates x[n][3]; an error names the index of an invalid one. */
 PetscErrorCode SbVtkSetPoints(PetscInt n, const double x[], SbImport *im);

@@ -1,5 +1,5 @@
 /*
-  write.c - meshes as files: formats by the extension of the name. A file is written under a temporary name and renamed when it is complete.
+  write.c - writes a mesh file in the format of its extension. A file is written under a temporary name and renamed when it is complete.
 */
 #include <errno.h>
 #include <strings.h>
@@ -62,7 +62,7 @@ PetscErrorCode SbMeshFileWrite(const SbImport *im, const char *path, SbMeshForma
   const char *dot;
 
   PetscFunctionBeginUser;
-  // the format by the ending of the name
+  // format by the extension of the name
   if (format == SB_MESH_AUTO) {
     dot = strrchr(path, '.');
     if (dot && !strcasecmp(dot, ".msh"))

@@ -1,14 +1,14 @@
 /*
-  write_gmsh.c - writes gmsh's .msh files, versions 4.1 and 2.2, text and binary (gmsh reference manual, "File formats").
+  write_gmsh.c - writer of gmsh's .msh files, versions 4.1 and 2.2, text and binary (gmsh reference manual, "File formats").
 
-  Version 4.1 gives groups to entities of the geometry: each tag set of a dimension becomes one entity, and all nodes
-  belong to the first of the highest dimension. Blocks follow the order of the items, a new one begins where the tag set
-  changes: what is read again has the same order. Version 2.2 has one group per element: an element of several groups is
-  written once for each, which supple joins again.
+  Version 4.1 assigns groups to entities of the geometry: each tag set of a dimension becomes one entity, and all nodes
+  belong to the first entity of the highest dimension. Blocks follow the order of the items, and a new one begins where the tag set
+  changes: reading the file gives the same order. Version 2.2 has one group per element: an element of several groups is
+  written once for each; supple's reader merges them.
 
-  A mesh with curved edges is written as one of second order: every edge of an item has a node, behind the vertices.
+  A mesh with curved edges is written as a second-order mesh: every edge of an item has a node, numbered after the vertices.
 
-  Numbers are from 1 on. A double is written with 17 digits as text: what is read is what was written.
+  Numbers count from 1. A double is written as text with 17 digits, so that it is read back exactly.
 */
 #include <errno.h>
 #include <stdlib.h>
@@ -18,25 +18,25 @@ typedef struct {
   const SbImport *im;
   FILE *file;
   PetscBool binary;
-  PetscBool *used[4];     /* [ntags] whether an item of the dimension has this tag set */
-  int home_dim;           /* entity of the nodes */
-  PetscInt home;          /* its tag set */
-  int64_t *number;        /* [ngroup] of the groups in the file */
-  PetscInt64 total, done; /* items, for the progress */
+  PetscBool *used[4];     /* [ntags] whether items of the dimension have the tag set */
+  int home_dim;           /* dimension of the entity that has the nodes */
+  PetscInt home;          /* tag set of that entity */
+  int64_t *number;        /* [ngroup] numbers of the groups in the file */
+  PetscInt64 total, done; /* numbers of items to write and written, for progress reports */
   PetscInt nnode;
-  SbImportEdges edges; /* of a mesh with curved edges, else empty */
-  PetscReal *x;        /* [nnode][3] vertices, then the nodes of edges */
+  SbImportEdges edges; /* edges of a mesh with curved edges, else empty */
+  PetscReal *x;        /* [nnode][3] coordinates: vertices, then edge nodes */
 } Out;
 
-/* Of items by dimension; of second order. */
+/* gmsh's element types by order and dimension. */
 static const int gmsh_type[2][4] = {{SB_GMSH_POINT, SB_GMSH_LINE, SB_GMSH_TRIANGLE, SB_GMSH_TET},
                                     {SB_GMSH_POINT, SB_GMSH_LINE3, SB_GMSH_TRIANGLE6, SB_GMSH_TET10}};
-/* Edges of an item, in the order of gmsh. */
+/* Edges of an item by dimension, in gmsh's order. */
 static const int nedge_of[4] = {0, 1, 3, 6}, edge_of[6][2] = {{0, 1}, {1, 2}, {2, 0}, {3, 0}, {2, 3}, {1, 3}};
 
 /* ------------------------------------------------------------------ numbers */
 
-/* Digits of a whole number above or equal to 0 and a blank: fprintf() takes four times as long. */
+/* Writes a non-negative integer and a separator; fprintf() takes four times as long. */
 static void put_text(FILE *file, int64_t value, char after)
 {
   char digits[24], *p = digits + sizeof(digits);
@@ -87,7 +87,7 @@ static PetscErrorCode report_progress(Out *out)
 
 /* ------------------------------------------------------------------ nodes */
 
-/* The nodes of an item of a dimension. */
+/* Writes the nodes of an item of dimension d. */
 static void put_nodes(Out *out, int d, const PetscInt v[], void (*put)(Out *, int64_t, char))
 {
   const int nedge = out->edges.nedge ? nedge_of[d] : 0;
@@ -102,7 +102,7 @@ static void put_nodes(Out *out, int d, const PetscInt v[], void (*put)(Out *, in
 
 /* ------------------------------------------------------------------ groups */
 
-/* Whether the name of a group says more than its number in the file. */
+/* Whether the name of a group differs from the default for its number. */
 static PetscBool has_name(const Out *out, PetscInt g)
 {
   static const char *const kind[4] = {"point", "curve", "surface", "volume"};
@@ -112,7 +112,7 @@ static PetscBool has_name(const Out *out, PetscInt g)
   return (PetscBool)(strcmp(text, out->im->group[g].name) != 0);
 }
 
-/* A group of a dimension in a tag set: the next one from *k on; -1 when there is none. */
+/* Next group of dimension dim in a tag set, from position *k on; -1 if there is none. */
 static PetscInt next_group(const SbImport *im, PetscInt tags, int dim, PetscInt *k)
 {
   while (*k < im->tags_start[tags + 1]) {
@@ -140,7 +140,7 @@ static void write_entity(Out *out, int dim, PetscInt tags)
   PetscInt k = im->tags_start[tags], g;
   const SbItems *item = &out->im->item[dim];
 
-  // extent of the items of this tag set
+  // bounding box of the items of this tag set
   for (int i = 0; i < 3; i++) box[i] = PETSC_MAX_REAL, box[3 + i] = PETSC_MIN_REAL;
   for (PetscInt j = 0; j < item->n; j++) {
     if (item->tags[j] != tags) continue;
@@ -163,7 +163,7 @@ static void write_entity(Out *out, int dim, PetscInt tags)
   if (!out->binary) (void)fputc('\n', out->file);
 }
 
-/* Items from i on that have the same tag set. */
+/* Number of consecutive items from i on with the same tag set. */
 static PetscInt run_length(const SbItems *item, PetscInt i)
 {
   PetscInt n = 1;
@@ -230,8 +230,10 @@ static PetscErrorCode write_elements_22(Out *out)
       const PetscInt *v;
       PetscInt k, g;
 
-      /* an element, once for each of its groups; without any, once with group 0. In binary each has a header
-         of its own. */
+      /*
+        an element, once for each of its groups; without groups once with group 0. In binary each element has a
+        header
+      */
       v = item->vert + (size_t)(d + 1) * (size_t)i;
       k = out->im->tags_start[item->tags[i]];
       g = next_group(out->im, item->tags[i], d, &k);
@@ -269,7 +271,7 @@ static PetscErrorCode write_all(Out *out, PetscBool version22)
     (void)fputc('\n', out->file);
   }
   (void)fprintf(out->file, "$EndMeshFormat\n");
-  // names of the groups that have one
+  // names of the groups, except default names
   for (PetscInt g = 0; g < im->ngroup; g++) nname += has_name(out, g);
   if (nname) (void)fprintf(out->file, "$PhysicalNames\n%lld\n", (long long)nname);
   for (PetscInt g = 0; g < im->ngroup; g++) {
@@ -289,7 +291,7 @@ static PetscErrorCode write_all(Out *out, PetscBool version22)
   } else {
     PetscInt n[4] = {0, 0, 0, 0};
 
-    // entities: one for each tag set of a dimension
+    // entities: one for each tag set of each dimension
     for (int d = 0; d < 4; d++)
       for (PetscInt t = 0; t < im->ntags; t++) n[d] += out->used[d][t];
     (void)fprintf(out->file, "$Entities\n");
@@ -343,7 +345,7 @@ PetscErrorCode SbWrite_Gmsh(const SbImport *im, const char *path, SbMeshFormat f
   PetscCheck(out.file, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path,
              strerror(errno));
   (void)setvbuf(out.file, NULL, _IOFBF, 1 << 20);
-  // which tag sets each dimension has; nodes belong to the first entity of the highest dimension
+  // tag sets of each dimension; nodes belong to the first entity of the highest dimension
   out.home_dim = 3;
   for (int d = 0; d < 4; d++) {
     PetscCall(PetscCalloc1(out.im->ntags, &out.used[d]));
@@ -354,7 +356,7 @@ PetscErrorCode SbWrite_Gmsh(const SbImport *im, const char *path, SbMeshFormat f
     }
     out.total += out.im->item[d].n;
   }
-  // numbers of groups from 1 to INT32_MAX stay; gmsh knows no others, and these get the next ones that are free
+  // group numbers from 1 to INT32_MAX are kept; others are invalid in gmsh and get the next free numbers
   PetscCall(PetscMalloc1(im->ngroup, &out.number));
   for (int later = 0; later < 2; later++) {
     for (PetscInt g = 0; g < im->ngroup; g++) {
@@ -368,7 +370,7 @@ PetscErrorCode SbWrite_Gmsh(const SbImport *im, const char *path, SbMeshFormat f
         out.number[g] = ++highest[p->dim];
     }
   }
-  // nodes: the vertices and, where edges are curved, those of all edges
+  // nodes: the vertices and, if there are curved edges, a node for each edge
   if (im->nmiddle.n) PetscCall(SbImportEdgesCreate(im, &out.edges));
   out.nnode = im->nvert + out.edges.nedge;
   PetscCall(PetscMalloc1(3 * (size_t)out.nnode, &out.x));

@@ -1,29 +1,29 @@
 /*
-  write_h5.c - supple's own mesh file, HDF5, and its index for ParaView. The layout is described in docs/reference/meshes.md.
+  write_h5.c - writer of supple's own mesh file, HDF5, and its .xmf file for ParaView. The layout is described in docs/reference/meshes.md.
 
     /                attribute supple_mesh: version of the layout, 1; 2 with curved edges
     /mesh/x          [nvert][3]   double   coordinates
-    /mesh/cells      [ntet][4]    int32    vertices from 0 on
+    /mesh/cells      [ntet][4]    int32    vertices, from 0
     /mesh/cell_tags  [ntet]       int32    tag set of each tet
     /mesh/triangles  [n][3], /mesh/triangle_tags [n]; lines [n][2], line_tags; points [n][1], point_tags
-    /mesh/curved_edges [n][2] int32, vertices of edges whose node is off their middle, /mesh/edge_offsets [n][3] double, by this
+    /mesh/curved_edges [n][2] int32: vertices of curved edges; /mesh/edge_offsets [n][3] double: offset of the edge node from the midpoint
     /groups/name     [ngroup] text, /groups/dim [ngroup] int32, /groups/number [ngroup] int64
     /tag_sets/start  [nset + 1] int32, /tag_sets/group: groups of set k are group[start[k]] .. group[start[k + 1] - 1]
 
-  Written and read by one rank in one piece, without compression: reading takes what the disk takes.
+  Written by one rank in one piece, without compression: reading is limited by the disk only.
 */
 #include <errno.h>
 #include <stdarg.h>
 #include <hdf5.h>
 #include "meshio_impl.h"
 
-/* An open file with the first thing that failed. */
+/* An open file; remembers the first failed call. */
 typedef struct {
   hid_t file;
   PetscBool failed;
 } H5;
 
-/* Keeps in mind that something failed; HDF5's handles are negative then, and further calls with them fail as well. */
+/* Records a failure; invalid HDF5 handles are negative, and further calls with them fail too. */
 static hid_t keep(H5 *h, hid_t id)
 {
   if (id < 0) h->failed = PETSC_TRUE;
@@ -43,7 +43,7 @@ static void write_array(H5 *h, const char *name, int ncomp, size_t n, hid_t file
   if (space >= 0) (void)H5Sclose(space);
 }
 
-/* Whole numbers of the program; in the file with 32 bits. */
+/* Writes an array of PetscInt as 32-bit integers. */
 static void write_ints(H5 *h, const char *name, int ncomp, size_t n, const PetscInt data[])
 {
   write_array(h, name, ncomp, n, H5T_STD_I32LE, sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32,
@@ -73,12 +73,12 @@ PetscErrorCode SbWrite_H5(const SbImport *im, const char *path)
   PetscFunctionBeginUser;
   PetscCheck(im->nvert <= INT32_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: more vertices than the 32 bits of an .h5 mesh can number", im->where);
-  (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL); /* its stack of errors becomes one line of ours */
+  (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL); /* HDF5's error stack is replaced by one line of ours */
   errno = 0;
   h.file = keep(&h, H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT));
   PetscCheck(!h.failed, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path,
              errno ? strerror(errno) : "HDF5 cannot make it");
-  // version of the layout
+  // layout version
   space = keep(&h, H5Screate(H5S_SCALAR));
   mark = keep(&h, H5Acreate2(h.file, "supple_mesh", H5T_STD_I32LE, space, H5P_DEFAULT, H5P_DEFAULT));
   (void)keep(&h, H5Awrite(mark, H5T_NATIVE_INT, &version));
@@ -98,7 +98,7 @@ PetscErrorCode SbWrite_H5(const SbImport *im, const char *path)
     (void)snprintf(array, sizeof(array), "/mesh/%s_tags", name[d]);
     write_ints(&h, array, 1, (size_t)item->n, item->tags);
   }
-  // nodes of curved edges
+  // curved edges
   if (im->nmiddle.n) {
     PetscCall(PetscMalloc2(2 * (size_t)im->nmiddle.n, &end, 3 * (size_t)im->nmiddle.n, &off));
     for (PetscInt i = 0; i < im->nmiddle.n; i++) {
@@ -131,7 +131,7 @@ PetscErrorCode SbWrite_H5(const SbImport *im, const char *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ for ParaView */
+/* ------------------------------------------------------------------ XDMF */
 
 void SbXdmfArray(FILE *file, PetscInt64 n, int ncomp, const char *type, int bytes, const char *format, ...)
 {
@@ -148,7 +148,7 @@ void SbXdmfArray(FILE *file, PetscInt64 n, int ncomp, const char *type, int byte
   (void)fputs("</DataItem>", file);
 }
 
-/* One grid: the simplices of a dimension, coloured by tag set. */
+/* Writes one grid: the simplices of a dimension, coloured by tag set. */
 static void write_grid(FILE *file, const SbImport *im, int dim, const char *h5)
 {
   static const char *const grid[4] = {"points", "lines", "surface", "tets"};
@@ -179,7 +179,7 @@ PetscErrorCode SbWrite_Xdmf(const SbImport *im, const char *path, const char *h5
   file = fopen(path, "w");
   PetscCheck(file, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path, strerror(errno));
   (void)fprintf(file, "<?xml version=\"1.0\" ?>\n<Xdmf Version=\"3.0\">\n<Domain>\n");
-  // the groups behind each number of tag_set
+  // names of the groups of each tag set
   for (PetscInt t = 1; t < im->ntags; t++) {
     (void)fprintf(file, "<Information Name=\"tag_set %d\" Value=\"", (int)t);
     for (PetscInt k = im->tags_start[t]; k < im->tags_start[t + 1]; k++) {
