@@ -8,8 +8,7 @@
 #include "meshio_impl.h"
 #include "sbquadratic.h"
 
-#define STRAIGHT \
-  1e-6 /* relative to the length of an edge: with a smaller offset of its node the edge is straight */
+#define STRAIGHT 1e-6 /* offset of the node of a straight edge over its length, at most */
 
 /* ------------------------------------------------------------------ arrays of readers */
 
