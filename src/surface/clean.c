@@ -1,16 +1,15 @@
 /*
-  clean.c - small defects of a surface: vertices that differ by rounding, doubles, triangles without area, open edges.
+  clean.c - repair of small defects of a surface: nearly coincident vertices, duplicate and degenerate triangles; detection of open edges.
 
-  Repaired, counted and reported: vertices within a tolerance of each other become one (chains of such pairs as a whole, at the position of the
-  first), a triangle that thereby has a corner twice is left out, so is one that is given twice. Two triangles back to
-  back are one wall. A triangle whose corners lie on a line is taken into its neighbour at the longest edge, which is cut in two at
-  the corner between: the shape stays what it was. Refused: open edges.
+  Repaired, counted and reported: vertices within a tolerance are merged, transitively, at the position of the first one; triangles that thereby
+  collapse, and duplicates, are removed. Two coincident triangles with opposite orientation become one wall between two regions. For a
+  triangle with collinear corners, the neighbour at its longest edge is divided at the opposite corner, so that the shape is unchanged. Open edges are an error.
 */
 #include "sbkernel.h"
 #include "surface_impl.h"
 
-#define PASSES 20         /* of the search for flat triangles: one may lie behind the other */
-#define PARTNERS_MAX 4000 /* open edges for which partners are searched for */
+#define PASSES 20         /* passes over flat triangles: one may be adjacent to another */
+#define PARTNERS_MAX 4000 /* largest number of open edges for the search for matching edges */
 
 static PetscReal distance2(const SbTriangles *t, PetscInt v, PetscInt w)
 {
@@ -19,9 +18,9 @@ static PetscReal distance2(const SbTriangles *t, PetscInt v, PetscInt w)
   return SbDot3(d, d);
 }
 
-/* ------------------------------------------------------------------ triangles left out */
+/* ------------------------------------------------------------------ duplicate triangles */
 
-/* Keeps the triangles marked so. */
+/* Removes the triangles that are not marked. */
 static PetscErrorCode keep_triangles(SbTriangleFile *f, const PetscBool keep[])
 {
   SbTriangles *t = f->t;
@@ -41,10 +40,10 @@ static PetscErrorCode keep_triangles(SbTriangleFile *f, const PetscBool keep[])
 typedef struct {
   PetscInt vert[3]; /* ascending */
   PetscInt triangle;
-  PetscBool odd; /* the order of the corners is turned */
+  PetscBool odd; /* the corners are an odd permutation of vert[] */
 } Triple;
 
-/* Of triangles with the same corners the first one stays; the others give it their groups. */
+/* Keeps the first of several triangles with the same corners, with the groups of all of them. */
 static PetscErrorCode drop_doubled(SbTriangleFile *f, PetscBool keep[], SbSurfaceRepairs *m)
 {
   SbTriangles *t = f->t;
@@ -68,7 +67,7 @@ static PetscErrorCode drop_doubled(SbTriangleFile *f, PetscBool keep[], SbSurfac
     for (n = 1; i + n < t->ntri && !memcmp(triple[i].vert, triple[i + n].vert, sizeof(triple[i].vert)); n++) {
       keep[triple[i + n].triangle] = PETSC_FALSE;
       wall = (PetscBool)(wall || triple[i + n].odd != triple[i].odd);
-      // the groups of both
+      // union of the groups
       if (f->tags[triple[i].triangle] != f->tags[triple[i + n].triangle]) {
         const SbImport *im = f->im;
         PetscInt group[64], ngroup = 0;
@@ -104,7 +103,7 @@ PetscErrorCode SbSurfaceMergeVertices(SbTriangleFile *f, PetscReal tolerance, Sb
     const PetscReal d2 = distance2(t, v, first[v]);
 
     moved2 = PetscMax(moved2, d2);
-    m->nwelded += d2 > 0; /* those at one position are nothing to speak of */
+    m->nwelded += d2 > 0; /* exactly coincident vertices are not counted */
   }
   for (PetscInt i = 0; i < t->ntri; i++) {
     PetscInt *v = t->tri + 3 * i;
@@ -122,9 +121,9 @@ PetscErrorCode SbSurfaceMergeVertices(SbTriangleFile *f, PetscReal tolerance, Sb
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ triangles without area */
+/* ------------------------------------------------------------------ flat triangles */
 
-/* The edge of a triangle that is longest. */
+/* Longest edge of a triangle. */
 static int longest_edge(const SbTriangles *t, PetscInt f)
 {
   const PetscInt *v = t->tri + 3 * f;
@@ -142,7 +141,7 @@ static int longest_edge(const SbTriangles *t, PetscInt f)
   return edge;
 }
 
-/* One pass over the edges; a triangle takes part in one change at most. */
+/* One pass over the edges that removes flat triangles; each triangle is changed at most once per pass. */
 static PetscErrorCode cut_flat(SbTriangleFile *f, PetscBool touched[], SbKey edge[], PetscInt *ncut,
                                PetscInt *nflat)
 {
@@ -168,8 +167,10 @@ static PetscErrorCode cut_flat(SbTriangleFile *f, PetscBool touched[], SbKey edg
       PetscInt middle, *v, *w, a, b, c;
 
       if (!flat[mine] || touched[mine] || touched[other] || e != longest_edge(t, mine)) continue;
-      /* two triangles become two others: the neighbour is cut at the corner of the flat one that lies on the
-         edge */
+      /*
+        edge (a, b) between the neighbour (a, b, c) and the flat triangle, whose third corner is on the edge: the two become
+        (a, middle, c) and (middle, b, c)
+      */
       middle = t->tri[3 * mine + (e + 2) % 3];
       v = f->t->tri + 3 * other;
       w = f->t->tri + 3 * mine;
@@ -194,13 +195,13 @@ static PetscErrorCode cut_flat(SbTriangleFile *f, PetscBool touched[], SbKey edg
 
 /* ------------------------------------------------------------------ open edges */
 
-/* Corner of an edge: its beginning (0) or end (1). */
+/* Vertex of an edge: its first (0) or second (1). */
 static PetscInt edge_end(const SbTriangles *t, PetscInt slot, int end)
 {
   return t->tri[end ? (slot % 3 == 2 ? slot - 2 : slot + 1) : slot];
 }
 
-/* The tolerance that would lay each open edge on another one; 0 when it were no matter of rounding. */
+/* Smallest tolerance with which each open edge coincides with another one; 0 if it is too large to be due to rounding. */
 static PetscReal partner_distance(const SbTriangles *t, PetscInt n, const PetscInt slot[])
 {
   PetscReal need = 0, edge = 0;
@@ -235,13 +236,13 @@ PetscErrorCode SbSurfaceRepairTriangles(SbTriangleFile *f, SbSurfaceRepairs *rep
   char option[SB_IMPORT_OPTION_MAX], what[256] = "close the holes (meshlab: close holes; blender: fill)";
 
   PetscFunctionBeginUser;
-  // triangles without area go into their neighbours, as far as these can take them
+  // remove flat triangles as far as possible
   PetscCall(PetscMalloc3(n, &edge, t->ntri, &touched, n, &slot));
   for (int pass = 0; pass < PASSES && ncut; pass++) {
     PetscCall(cut_flat(f, touched, edge, &ncut, &nflat));
     repairs->nflat += ncut;
   }
-  // edges with a triangle on one side only
+  // open edges: edges of one triangle only
   SbTrianglesEdges(t, edge);
   for (PetscInt i = 0, m; i < n; i += m) {
     m = SbKeysAlike(n, edge, i);
@@ -262,7 +263,7 @@ PetscErrorCode SbSurfaceRepairTriangles(SbTriangleFile *f, SbSurfaceRepairs *rep
       f->where, (long long)f->number[i], (double)x[0], (double)x[1], (double)x[2], nflat);
   }
   if (!nopen) PetscFunctionReturn(PETSC_SUCCESS);
-  // what is wrong: the first open edge, and whether joining would close all of them
+  // error message: the first open edge, and the merge tolerance that would close the surface, if there is one
   a = t->x + 3 * edge_end(t, first, 0);
   b = t->x + 3 * edge_end(t, first, 1);
   if (need > 0 && f->body)

@@ -1,12 +1,13 @@
 /*
-  import_surface.c - a body or a rigid obstacle from a closed surface: read, repaired, checked, cut into regions; a body is filled with tets.
+  import_surface.c - import of a body or a rigid obstacle from a closed surface: read, repaired, checked, divided into regions; a body is tetrahedralized.
 
-  The steps and what each refuses or repairs are in triangles_read.c and its neighbours, clean.c, self_intersection.c,
-  region.c and tetrahedralize.c. Lengths are in metres from the reader on: the surface is scaled first.
+  Each step with its repairs and errors is described in triangles*.c (readers), clean.c, self_intersection.c,
+  region.c and tetrahedralize.c. The surface is scaled to metres right after it is read.
 */
 #include "surface_impl.h"
 
-#define WELD 1e-7 /* default tolerance over the diagonal of the surface: what text loses of coordinates */
+#define WELD \
+  1e-7 /* default merge tolerance over the diagonal of the surface: the precision of coordinates in text files */
 
 static const SbOption rows[] = {
   {"tet_size", SB_OPTION_REAL, 1, "m", "", "(0, inf)",
@@ -59,7 +60,7 @@ PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOpt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ what was repaired */
+/* ------------------------------------------------------------------ note of repairs */
 
 static void write_repairs(const SbTriangles *t, const SbSurfaceRepairs *m, size_t size, char text[])
 {
@@ -93,7 +94,7 @@ static void write_repairs(const SbTriangles *t, const SbSurfaceRepairs *m, size_
 
 /* ------------------------------------------------------------------ from file to tets */
 
-/* The tolerance of joining, which must be far below the shape, and the mean edge. */
+/* Merge tolerance, which must be far below the mean edge length; mean edge length. */
 static PetscErrorCode weld_tolerance(const SbTriangleFile *f, PetscReal given, PetscReal *tolerance,
                                      PetscReal *edge)
 {
@@ -117,7 +118,7 @@ static PetscErrorCode weld_tolerance(const SbTriangleFile *f, PetscReal given, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The surface of a body, or of an obstacle at a place, with its regions: what was repaired goes to the note. */
+/* Surface of a body, or of an obstacle translated to `at`, with its regions; the repairs become a note. */
 static PetscErrorCode make_surface(const char *path, const PetscReal at[3], SbTriangleFile *f, SbSurface *s,
                                    SbSurfaceRepairs *repairs)
 {
@@ -129,7 +130,7 @@ static PetscErrorCode make_surface(const char *path, const PetscReal at[3], SbTr
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(repairs, sizeof(*repairs)));
   PetscCall(SbTrianglesReadFile(path, f));
-  // scaled and placed, and nothing that is not a number
+  // scale and translate; check for invalid numbers
   for (PetscInt i = 0; i < 3 * t->nvert; i++) {
     t->x[i] = im->scale * t->x[i] + at[i % 3];
     PetscCheck(isfinite(t->x[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -140,7 +141,7 @@ static PetscErrorCode make_surface(const char *path, const PetscReal at[3], SbTr
   for (PetscInt i = 0; i < 3 * f->nhole; i++) f->hole[i / 3].x[i % 3] *= im->scale;
   for (PetscInt i = 0; i < 3 * f->nregion; i++) f->region[i / 3].x[i % 3] *= im->scale;
   PetscCall(SbDropUnusedPoints(&t->nvert, t->x, 3 * t->ntri, t->tri));
-  // repaired; triangles of an obstacle may cut each other far from their edges
+  // repair; triangles of an obstacle may intersect each other away from their edges
   PetscCall(weld_tolerance(f, im->tet.merge_tolerance, &tolerance, &edge));
   PetscCall(SbSurfaceMergeVertices(f, tolerance, repairs));
   PetscCheck(t->ntri, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -154,7 +155,7 @@ static PetscErrorCode make_surface(const char *path, const PetscReal at[3], SbTr
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Triangles with material on one side, oriented by it, and their neighbours. */
+/* Keeps the boundary triangles (material on one side only), oriented outwards, and finds their neighbours. */
 static PetscErrorCode take_boundary(const SbTriangleFile *f, const SbSurface *s, PetscInt *nwall)
 {
   SbTriangles *t = f->t;
@@ -162,7 +163,7 @@ static PetscErrorCode take_boundary(const SbTriangleFile *f, const SbSurface *s,
   PetscReal longest2, around;
 
   PetscFunctionBeginUser;
-  // triangles with material on both sides are walls, which an obstacle has no use for
+  // triangles with material on both sides are walls, which an obstacle does not need
   PetscCall(PetscArraycpy(t->x, s->x, 3 * (size_t)s->nvert));
   t->nvert = s->nvert;
   t->ntri = 0;
@@ -179,13 +180,13 @@ static PetscErrorCode take_boundary(const SbTriangleFile *f, const SbSurface *s,
     f->number[t->ntri++] = s->number[i];
   }
   PetscCall(SbDropUnusedPoints(&t->nvert, t->x, 3 * t->ntri, t->tri));
-  // volume and mean edge
+  // volume and mean edge length
   for (PetscInt i = 0; i < t->ntri; i++) {
     t->volume += SbTetVolumeTo(t, i, t->x);
     (void)SbTriangleMeasure(t, i, &longest2, &around);
     t->edge += around / (3 * (PetscReal)t->ntri);
   }
-  // neighbours across each edge; one of more than two triangles is refused
+  // neighbour across each edge; an edge of more than two triangles is an error
   PetscCall(PetscMalloc1(3 * (size_t)t->ntri, &t->across));
   PetscCall(PetscMalloc1(3 * (size_t)t->ntri, &edge));
   SbTrianglesEdges(t, edge);
@@ -208,7 +209,7 @@ static PetscErrorCode take_boundary(const SbTriangleFile *f, const SbSurface *s,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On rank 0: repaired and checked as the surface of a body; triangles with material on both sides are left out. */
+/* Rank 0: reads an obstacle, repaired and checked as the surface of a body; walls are removed. */
 static PetscErrorCode read_obstacle(const char *path, const PetscReal at[3], SbTriangleFile *f)
 {
   const SbTriangleFormat *format = SbTrianglesFormat(path);
@@ -224,7 +225,7 @@ static PetscErrorCode read_obstacle(const char *path, const PetscReal at[3], SbT
   if (!ierr) ierr = take_boundary(f, &s, &repairs.ninner);
   PetscCall(SbSurfaceDestroy(&s));
   PetscCall(ierr);
-  repairs.ncavity = 0; /* nothing was changed for them */
+  repairs.ncavity = 0; /* cavities of an obstacle need no note */
   write_repairs(f->t, &repairs, sizeof(f->im->note), f->im->note);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -237,13 +238,13 @@ PetscErrorCode SbTrianglesRead(MPI_Comm comm, const char *option, const char *pa
   SbTriangles head;
   PetscMPIInt rank, n[2];
   PetscInt none;
-  char note[sizeof(im.note)]; /* of rank 0, as warnings are */
+  char note[sizeof(im.note)]; /* rank 0 prints warnings only */
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(t, sizeof(*t)));
   (void)snprintf(im.where, sizeof(im.where), "%s: %s", option, path);
   PetscCall(SbImportTagSet(&im, 0, NULL, &none));
-  // rank 0 reads; all ranks fail together
+  // rank 0 reads; an error is raised on all ranks
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   if (!rank) {
     SbTriangleFile file = {.im = &im, .where = im.where, .t = t};
@@ -254,7 +255,7 @@ PetscErrorCode SbTrianglesRead(MPI_Comm comm, const char *option, const char *pa
   (void)snprintf(note, sizeof(note), "%s", im.note);
   PetscCall(SbImportDestroy(&im));
   PetscCall(SbCaughtRaise(comm, &caught));
-  // the surface goes to the others
+  // broadcast the surface
   head = *t;
   PetscCallMPI(MPI_Bcast(&head, (int)sizeof(head), MPI_BYTE, 0, comm));
   if (rank) {
@@ -292,7 +293,7 @@ PetscErrorCode SbSurfaceRead(const char *path, SbImport *im, SbSurface *s)
     write_repairs(&t, &repairs, sizeof(im->note), im->note);
   PetscCall(SbTrianglesDestroy(&t));
   PetscCall(ierr);
-  im->scale = 1; /* it is in metres now */
+  im->scale = 1; /* the surface is in metres now */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

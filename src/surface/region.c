@@ -1,50 +1,50 @@
 /*
-  region.c - regions: the parts of space that closed surfaces separate, also where more than two triangles meet at an edge.
+  region.c - regions: the parts of space that are bounded by closed surfaces, including non-manifold ones, in which more than two triangles share an edge.
 
-  In this order: triangles are oriented alike, sides that see each other are joined to shells, shells are measured and checked, surfaces are
-  nested by winding numbers, cavities and holes are emptied, what is left is numbered and named.
+  Steps: orient the triangles of each surface consistently; join sides of triangles that face each other to shells; compute shell volumes; find
+  the nesting of surfaces by winding numbers; mark cavities and holes as empty; number and name the remaining regions.
 
-  Every triangle has two sides, 2 f in front and 2 f + 1 behind. Around an edge triangles are sorted by angle; the two sides that face each
-  other between neighbours belong to one region and are joined. A set of joined sides is a shell: one with a positive volume is the
-  outer boundary of a region, one with a negative volume is a surface seen from the region around it. Which region that is, the winding
-  number decides (sum of solid angles, van Oosterom and Strackee 1983): the smallest positive shell around it.
+  Every triangle f has two sides, 2 f in front and 2 f + 1 behind. Around an edge triangles are sorted by angle; the two sides that face each
+  other between consecutive triangles bound the same region and are joined. A connected set of sides is a shell: one with a positive volume is the
+  outer boundary of a region, one with a negative volume is a surface seen from the region around it. That region is bounded by the smallest
+  positive shell with a nonzero winding number there (sum of solid angles, van Oosterom and Strackee 1983).
 
-  Material. In formats with oriented triangles (.stl, .obj, .off, .ply) the triangles of a surface are first oriented alike, as the majority
-  is. A surface with outward normals encloses material, also within another one (a region of its own); one with inward normals within
-  material is a cavity; one with inward normals that is in no other is reversed. Where more than two triangles meet at an edge of a
-  surface, and in formats without orientation (.poly, .smesh), every region is material but for the holes that the file names.
+  Material. In formats with oriented triangles (.stl, .obj, .off, .ply) the triangles of a surface are first oriented consistently, by
+  majority. A surface with outward normals encloses material, also inside another one (then a separate region); one with inward normals inside
+  material is a cavity; an outermost one with inward normals is reversed. For non-manifold surfaces, and in formats without
+  orientation (.poly, .smesh), every region is material except the holes given in the file.
 */
 #include <stdlib.h>
 #include "sbkernel.h"
 #include "surface_impl.h"
 
 #define OUTSIDE (-1)
-#define PARTS_MAX 1000 /* each is searched for in all others */
+#define PARTS_MAX 1000 /* largest number of parts, as each is tested against all others */
 
 typedef struct {
-  PetscInt first;   /* triangle */
-  PetscInt surface; /* to which its triangles belong */
-  PetscInt parent;  /* of a negative shell: the positive one around it, or OUTSIDE */
+  PetscInt first;   /* a triangle of the shell */
+  PetscInt surface; /* surface of its triangles */
+  PetscInt parent;  /* negative shell: the positive shell around it, or OUTSIDE */
   PetscReal volume, area;
   PetscReal box[6];
-  PetscBool empty; /* of a positive shell: no material in it */
-  PetscInt region; /* of a positive shell with material */
+  PetscBool empty; /* positive shell without material */
+  PetscInt region; /* region number of a positive shell with material */
 } Shell;
 
 typedef struct {
   PetscInt first;
-  PetscBool branched; /* more than two triangles meet at an edge */
-  PetscInt parent;    /* positive shell around it */
-  PetscInt outer;     /* its negative shell */
+  PetscBool branched; /* non-manifold: an edge has more than two triangles */
+  PetscInt parent;    /* positive shell around the surface, or OUTSIDE */
+  PetscInt outer;     /* its shell of negative volume */
 } Surface;
 
 typedef struct {
   SbTriangleFile *f;
   SbTriangles *t;
   SbSurfaceRepairs *m;
-  SbKey *edge;       /* [3 ntri] */
-  PetscInt *shell;   /* [2 ntri] of each side */
-  PetscInt *surface; /* [ntri] */
+  SbKey *edge;       /* [3 ntri] edges, sorted */
+  PetscInt *shell;   /* [2 ntri] shell of each side */
+  PetscInt *surface; /* [ntri] surface of each triangle */
   PetscInt nshell, nsurface;
   Shell *shells;
   Surface *surfaces;
@@ -52,7 +52,7 @@ typedef struct {
 
 /* ------------------------------------------------------------------ orientation */
 
-/* Reverses the minority of each set of triangles that are connected by edges of two. */
+/* Reverses the minority orientation in each set of triangles connected by manifold edges. */
 static PetscErrorCode reverse_minority(Arrangement *s, const PetscInt across[], int sense[], PetscInt stack[])
 {
   PetscFunctionBeginUser;
@@ -63,7 +63,7 @@ static PetscErrorCode reverse_minority(Arrangement *s, const PetscInt across[], 
     PetscInt done = 0;
 
     if (sense[f]) continue;
-    // what is connected to this triangle, breadth first; stack[0 .. n) was reached, sense is 1 where it is oriented as this one, else -1
+    // breadth-first search from this triangle: stack[0 .. n) is reached, sense is 1 for the same orientation, else -1
     n = 0;
     stack[n++] = f;
     sense[f] = 1;
@@ -75,7 +75,7 @@ static PetscErrorCode reverse_minority(Arrangement *s, const PetscInt across[], 
         int same;
 
         if (g < 0) continue;
-        // neighbours that are oriented alike have their edge in opposite directions
+        // consistently oriented neighbours traverse their edge in opposite directions
         same = t->tri[across[k]] != t->tri[k] ? 1 : -1;
         if (!sense[g]) {
           sense[g] = same * sense[old];
@@ -88,7 +88,7 @@ static PetscErrorCode reverse_minority(Arrangement *s, const PetscInt across[], 
         }
       }
     }
-    // what is fewer: those like the first one, or the others
+    // reverse the smaller number of triangles
     for (PetscInt i = 0; i < n; i++) nother += sense[stack[i]] < 0;
     wrong = 2 * nother > n ? 1 : -1;
     for (PetscInt i = 0; i < n; i++) {
@@ -104,7 +104,7 @@ static PetscErrorCode reverse_minority(Arrangement *s, const PetscInt across[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Orients the triangles of each surface alike, for formats with orientation. */
+/* Orients the triangles of each surface consistently, for formats with orientation. */
 static PetscErrorCode orient_alike(Arrangement *s)
 {
   PetscInt *across, *stack;
@@ -116,7 +116,7 @@ static PetscErrorCode orient_alike(Arrangement *s)
   if (s->f->sheets) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc3(3 * (size_t)s->t->ntri, &across, s->t->ntri, &stack, s->t->ntri, &sense));
   PetscCall(PetscArrayzero(sense, s->t->ntri));
-  // the slot on the other side of each edge of two triangles; -1 where more meet
+  // slot on the other side of each manifold edge; -1 for edges of more than two triangles
   for (PetscInt i = 0, m; i < n; i += m) {
     m = SbKeysAlike(n, s->edge, i);
     for (PetscInt k = 0; k < m; k++) across[s->edge[i + k].slot] = m == 2 ? s->edge[i + 1 - k].slot : -1;
@@ -124,16 +124,16 @@ static PetscErrorCode orient_alike(Arrangement *s)
   ierr = reverse_minority(s, across, sense, stack);
   PetscCall(PetscFree3(across, stack, sense));
   PetscCall(ierr);
-  SbTrianglesEdges(s->t, s->edge); /* corners have changed their order */
+  SbTrianglesEdges(s->t, s->edge); /* the order of corners has changed */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ shells */
 
-/* A triangle at an edge, seen along the edge. */
+/* A triangle around an edge. */
 typedef struct {
-  PetscReal angle; /* about the edge, from the first triangle on, rad */
-  PetscInt slot;   /* of the edge in the triangle */
+  PetscReal angle; /* dihedral angle about the edge from the first triangle, rad */
+  PetscInt slot;   /* slot of the edge in the triangle */
 } Spoke;
 
 static int compare_spokes(const void *a, const void *b)
@@ -144,7 +144,7 @@ static int compare_spokes(const void *a, const void *b)
   return (p->slot > q->slot) - (p->slot < q->slot);
 }
 
-/* The side of a triangle that faces growing angles around the edge from vertex p on (ahead), or falling ones. */
+/* Side of a triangle that faces increasing (ahead) or decreasing angles around the edge from vertex p. */
 static PetscInt facing(const SbTriangles *t, PetscInt slot, PetscInt p, PetscBool ahead)
 {
   const PetscBool along = (PetscBool)(t->tri[slot] == p);
@@ -159,9 +159,9 @@ static PetscErrorCode join_at_edge(const SbTriangles *t, PetscInt n, const SbKey
   Spoke few[8], *spoke = few;
 
   PetscFunctionBeginUser;
-  // the triangles in the order of their angles
+  // triangles sorted by angle
   if (n > 8) PetscCall(PetscMalloc1(n, &spoke));
-  // angles of triangles around the edge from p to q, from the first one on
+  // angles of triangles about the edge from p to q, relative to the first one
   if (n > 2) {
     const PetscReal *a = t->x + 3 * p, *b = t->x + 3 * q;
     PetscReal axis[3], u[3], v[3], length;
@@ -173,7 +173,7 @@ static PetscErrorCode join_at_edge(const SbTriangles *t, PetscInt n, const SbKey
       const PetscReal *c = t->x + 3 * t->tri[3 * (slot / 3) + (slot % 3 + 2) % 3];
       const PetscReal w[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
 
-      if (!i) { /* v = axis x w is normal to the first one, u = v x axis points along it */
+      if (!i) { /* v = axis x w is normal to the first triangle, u = v x axis lies in it */
         SbCross(axis, w, v);
         SbCross(v, axis, u);
         for (int k = 0; k < 3; k++) u[k] /= length;
@@ -184,7 +184,7 @@ static PetscErrorCode join_at_edge(const SbTriangles *t, PetscInt n, const SbKey
     qsort(spoke, (size_t)n, sizeof(*spoke), compare_spokes);
   } else
     for (PetscInt i = 0; i < n; i++) spoke[i].slot = edge[i].slot;
-  // each with the next one
+  // join facing sides of consecutive triangles
   for (PetscInt i = 0; i < n; i++)
     (void)SbUnionJoin(up, facing(t, spoke[i].slot, p, PETSC_TRUE),
                       facing(t, spoke[(i + 1) % n].slot, p, PETSC_FALSE));
@@ -192,7 +192,7 @@ static PetscErrorCode join_at_edge(const SbTriangles *t, PetscInt n, const SbKey
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Shells from sides that face each other, surfaces from triangles that share an edge. */
+/* Shells: connected facing sides. Surfaces: triangles connected by edges. */
 static PetscErrorCode find_shells(Arrangement *s)
 {
   const PetscInt n = 3 * s->t->ntri;
@@ -207,7 +207,7 @@ static PetscErrorCode find_shells(Arrangement *s)
     for (PetscInt k = 1; k < m; k++)
       (void)SbUnionJoin(s->surface, s->edge[i].slot / 3, s->edge[i + k].slot / 3);
   }
-  // numbers from 0 on
+  // numbers from 0
   s->nshell = SbUnionLabel(2 * s->t->ntri, s->shell);
   s->nsurface = SbUnionLabel(s->t->ntri, s->surface);
   PetscCheck(s->nsurface <= PARTS_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -217,14 +217,14 @@ static PetscErrorCode find_shells(Arrangement *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Volume, area and box of every shell; every surface has one shell with a negative volume. */
+/* Volume, area and bounding box of every shell. */
 static PetscErrorCode measure_shells(Arrangement *s)
 {
   const SbTriangles *t = s->t;
   PetscReal longest2, around;
 
   PetscFunctionBeginUser;
-  // sums over the sides; volumes from a corner of the shell, so that a surface far from the origin loses no digits
+  // sums over the sides; volumes relative to a vertex of the shell, to avoid cancellation far from the origin
   PetscCall(PetscCalloc1(s->nshell, &s->shells));
   PetscCall(PetscCalloc1(s->nsurface, &s->surfaces));
   for (PetscInt k = 0; k < s->nshell; k++) s->shells[k].first = -1;
@@ -244,7 +244,7 @@ static PetscErrorCode measure_shells(Arrangement *s)
     p->area += 0.5 * SbTriangleMeasure(t, i / 2, &longest2, &around);
     if (s->surfaces[s->surface[i / 2]].first < 0) s->surfaces[s->surface[i / 2]].first = i / 2;
   }
-  // surfaces with an edge of more than two triangles
+  // non-manifold surfaces
   for (PetscInt i = 0, m; i < 3 * t->ntri; i += m) {
     m = SbKeysAlike(3 * t->ntri, s->edge, i);
     if (m > 2) s->surfaces[s->surface[s->edge[i].slot / 3]].branched = PETSC_TRUE;
@@ -254,7 +254,7 @@ static PetscErrorCode measure_shells(Arrangement *s)
 
 /* ------------------------------------------------------------------ nesting */
 
-/* The smallest positive shell around a point, not of the surface `except`; OUTSIDE when there is none. */
+/* Smallest positive shell around a point, other than those of the surface `except`; OUTSIDE if there is none. */
 static PetscInt shell_around(const Arrangement *s, const PetscReal o[3], PetscInt except)
 {
   PetscInt best = OUTSIDE;
@@ -264,7 +264,7 @@ static PetscInt shell_around(const Arrangement *s, const PetscReal o[3], PetscIn
     PetscReal around = 0;
     PetscBool within = (PetscBool)(p->volume > 0 && p->surface != except);
 
-    // by the boxes, then by the winding number
+    // test the bounding box, then the winding number
     for (int i = 0; i < 3; i++) within = (PetscBool)(within && o[i] >= p->box[i] && o[i] <= p->box[3 + i]);
     if (!within || (best >= 0 && s->shells[best].volume <= p->volume)) continue;
     for (PetscInt i = 0; i < 2 * s->t->ntri; i++) {
@@ -281,7 +281,7 @@ static PetscBool turned_outwards(const Arrangement *s, PetscInt k)
   return (PetscBool)(s->shell[2 * s->surfaces[k].first] == s->surfaces[k].outer);
 }
 
-/* How many surfaces are around a surface. */
+/* Number of surfaces around a surface. */
 static PetscInt depth_of(const Arrangement *s, PetscInt k)
 {
   PetscInt depth = 0;
@@ -290,26 +290,26 @@ static PetscInt depth_of(const Arrangement *s, PetscInt k)
   return depth;
 }
 
-/* Cavities, for formats with orientation. Surfaces within an outermost one with inward normals are taken as reversed with it. */
+/* Marks cavities, for formats with orientation. If an outermost surface has inward normals, it and all surfaces inside it are taken as reversed. */
 static PetscErrorCode empty_cavities(Arrangement *s)
 {
   PetscInt deepest = 0;
 
   PetscFunctionBeginUser;
   if (s->f->sheets) PetscFunctionReturn(PETSC_SUCCESS);
-  /* from the outside to the inside: whether the region around a surface is material is known then */
+  /* from outside to inside, so that it is known whether the region around a surface is material */
   for (PetscInt k = 0; k < s->nsurface; k++) deepest = PetscMax(deepest, depth_of(s, k));
   for (PetscInt depth = 0; depth <= deepest; depth++) {
     for (PetscInt k = 0; k < s->nsurface; k++) {
       PetscInt top = k;
       PetscBool outwards, cavity;
 
-      // inwards relative to the outermost surface around it, and in material: a cavity
+      // cavity: normals inward relative to the outermost surface around it, inside material
       if (depth_of(s, k) != depth || s->surfaces[k].branched) continue;
       while (s->surfaces[top].parent != OUTSIDE) top = s->shells[s->surfaces[top].parent].surface;
       outwards = (PetscBool)(turned_outwards(s, k) == (turned_outwards(s, top) || s->surfaces[top].branched));
       cavity = (PetscBool)(depth > 0 && !outwards && !s->shells[s->surfaces[k].parent].empty);
-      // counted, and what is reversed is noted
+      // note reversed surfaces, count cavities
       s->t->turned = (PetscBool)(s->t->turned || (!turned_outwards(s, k) && !cavity));
       s->m->ncavity += cavity;
       for (PetscInt i = 0; cavity && i < s->nshell; i++) {
@@ -320,13 +320,13 @@ static PetscErrorCode empty_cavities(Arrangement *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ the result */
+/* ------------------------------------------------------------------ output */
 
-/* The groups that all triangles of a shell belong to: group[n], n at most 16. */
+/* Groups that all triangles of a shell have in common: group[n], n at most 16. */
 static PetscErrorCode groups_of_shell(const Arrangement *s, PetscInt shell, PetscInt *n, PetscInt group[16])
 {
   const SbImport *im = s->f->im;
-  PetscInt last = -1; /* the tag set of the triangle before, which has been examined */
+  PetscInt last = -1; /* tag set of the previous triangle, already examined */
 
   PetscFunctionBeginUser;
   *n = -1;
@@ -336,7 +336,7 @@ static PetscErrorCode groups_of_shell(const Arrangement *s, PetscInt shell, Pets
 
     if (s->shell[i] != shell || set == last) continue;
     last = set;
-    // those of the first triangle, less what the others have not
+    // intersection of the groups
     if (*n < 0) {
       *n = PetscMin(end - start, 16);
       for (PetscInt k = 0; k < *n; k++) group[k] = im->tags_group[start + k];
@@ -352,7 +352,7 @@ static PetscErrorCode groups_of_shell(const Arrangement *s, PetscInt shell, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every region is region_1, ...; also NAME_region when its outer limit lies in the group NAME; and its name in the file. */
+/* Group names of each region: region_1, ...; NAME_region if its outer boundary is in the group NAME; its name in the file. */
 static PetscErrorCode name_regions(const Arrangement *s, SbSurface *out)
 {
   SbImport *im = s->f->im;
@@ -382,7 +382,7 @@ static PetscErrorCode name_regions(const Arrangement *s, SbSurface *out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All of it, in the order of the head of this file. */
+/* Finds the regions in the steps of the file header. */
 static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
 {
   PetscInt n, kept = 0;
@@ -394,7 +394,7 @@ static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
   PetscCall(orient_alike(s));
   PetscCall(find_shells(s));
   PetscCall(measure_shells(s));
-  // every shell encloses a volume, and every surface has one shell towards the outside
+  // each shell must enclose a volume, and each surface must have exactly one shell of negative volume
   for (PetscInt k = 0; k < s->nshell; k++) {
     const Shell *p = &s->shells[k];
     const long long number = (long long)s->f->number[p->first];
@@ -413,7 +413,7 @@ static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
     PetscCheck(s->surfaces[k].outer >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
                "%s: the triangles around triangle %lld cut each other; join the parts into one", s->f->where,
                (long long)s->f->number[s->surfaces[k].first]);
-  // the shell around each surface, from the middle of one of its triangles
+  // shell around each surface, found from the centre of one of its triangles
   for (PetscInt k = 0; k < s->nsurface; k++) {
     const PetscInt *v = s->t->tri + 3 * s->surfaces[k].first;
     PetscReal middle[3];
@@ -424,7 +424,7 @@ static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
     s->shells[s->surfaces[k].outer].parent = s->surfaces[k].parent;
   }
   PetscCall(empty_cavities(s));
-  // the regions around the hole points of the file hold no material
+  // regions of the hole points in the file are empty
   for (PetscInt i = 0; i < s->f->nhole; i++) {
     const SbSeed *h = &s->f->hole[i];
     const PetscInt k = shell_around(s, h->x, -1);
@@ -436,7 +436,7 @@ static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
     s->m->ncavity += !s->shells[k].empty;
     s->shells[k].empty = PETSC_TRUE;
   }
-  // every region point of the file must lie in a region
+  // each region point in the file must be in a region
   for (PetscInt i = 0; i < s->f->nregion; i++) {
     const SbSeed *r = &s->f->region[i];
 
@@ -445,7 +445,7 @@ static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
       "%s: the point of region %lld at (%.6g, %.6g, %.6g) m lies in no region; move it, or remove it",
       s->f->where, (long long)r->number, (double)r->x[0], (double)r->x[1], (double)r->x[2]);
   }
-  // numbers regions by their first triangle; an inner shell has the number of the region around it
+  // number the positive shells with material; a negative shell has the number of the region around it
   n = 0;
   for (PetscInt k = 0; k < s->nshell; k++) {
     Shell *p = &s->shells[k];
@@ -459,7 +459,7 @@ static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
   }
   PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: no region is left beside its holes; remove one of them", s->f->where);
-  // triangles with material on a side, and their vertices
+  // output triangles with material on at least one side, and their vertices
   PetscCall(SbSurfaceCreate(t->nvert, t->ntri, n, out));
   PetscCall(PetscArraycpy(out->x, t->x, 3 * (size_t)t->nvert));
   for (PetscInt f = 0; f < t->ntri; f++) {

@@ -1,23 +1,23 @@
 /*
-  self_intersection.c - whether triangles of a surface cut or touch each other beyond the corners that they share, and small folds smoothed out.
+  self_intersection.c - detects intersections of the triangles of a surface beyond shared corners, and removes small ones by smoothing.
 
-  Pairs come from a tree of boxes, the exact test from src/geometry/intersection.c.
+  Candidate pairs by a bounding volume hierarchy, exact test in src/geometry/intersection.c.
 */
 #include "surface_impl.h"
 
-#define NAMED 3   /* pairs that a message names */
-#define PASSES 60 /* of smoothing */
-#define FEW 0.02  /* part of the triangles that may cross others and be smoothed */
+#define NAMED 3   /* largest number of pairs in a message */
+#define PASSES 60 /* largest number of smoothing passes */
+#define FEW 0.02  /* largest fraction of intersecting triangles that is smoothed */
 
-/* ------------------------------------------------------------------ all pairs */
+/* ------------------------------------------------------------------ intersecting pairs */
 
 typedef struct {
-  PetscInt n; /* pairs found */
+  PetscInt n; /* number of pairs found */
   PetscInt pair[NAMED][2];
-  PetscBool *crossing; /* [ntri] */
+  PetscBool *crossing; /* [ntri] triangle intersects another one */
 } Search;
 
-/* All pairs, into *s, which has room for the marks. */
+/* Finds all pairs; *s has crossing[] allocated. */
 static PetscErrorCode find_pairs(const SbTriangles *t, Search *s)
 {
   SbBoxTree tree;
@@ -45,9 +45,9 @@ static PetscErrorCode find_pairs(const SbTriangles *t, Search *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ small folds are smoothed out */
+/* ------------------------------------------------------------------ removal by smoothing */
 
-/* Active vertices go half the way to the mean of their neighbours; sum[nvert][4]. */
+/* Laplacian smoothing: active vertices move halfway to the mean of their neighbours; sum[nvert][4] is work space. */
 static void smooth(SbTriangles *t, const PetscBool active[], PetscReal (*sum)[4])
 {
   for (PetscInt v = 0; v < t->nvert; v++) sum[v][0] = sum[v][1] = sum[v][2] = sum[v][3] = 0;
@@ -67,7 +67,7 @@ static void smooth(SbTriangles *t, const PetscBool active[], PetscReal (*sum)[4]
   }
 }
 
-/* Smooths around what crosses until nothing does; gives up beyond the reach. s: pairs at the start, then those that are left. */
+/* Smooths around intersecting triangles until there are none, with displacements up to `reach`, m; else restores positions. s: pairs before, then remaining pairs. */
 static PetscErrorCode untangle(SbTriangles *t, PetscReal reach, Search *s, SbSurfaceRepairs *m)
 {
   PetscBool *active;
@@ -81,7 +81,7 @@ static PetscErrorCode untangle(SbTriangles *t, PetscReal reach, Search *s, SbSur
     PetscReal most = 0;
     PetscBool *before;
 
-    // vertices of triangles that cross are active; every fourth time those around them, too
+    // activate the vertices of intersecting triangles; in every fourth pass also adjacent vertices
     for (PetscInt i = 0; i < 3 * t->ntri; i++)
       active[t->tri[i]] = (PetscBool)(active[t->tri[i]] || s->crossing[i / 3]);
     PetscCall(PetscMalloc1(t->nvert, &before));
@@ -141,7 +141,7 @@ PetscErrorCode SbSurfaceUntangle(SbTriangleFile *f, PetscReal reach, SbSurfaceRe
     const PetscReal *x = t->x + 3 * t->tri[3 * search.pair[0][0]];
     char text[256] = "";
 
-    // some of the pairs, and where the first one is
+    // message: some of the pairs, and the position of the first one
     for (PetscInt k = 0; k < PetscMin(search.n, NAMED); k++)
       SbAppend(sizeof(text), text, "%s%lld and %lld", k ? ", " : "", (long long)f->number[search.pair[k][0]],
                (long long)f->number[search.pair[k][1]]);

@@ -1,5 +1,5 @@
 /*
-  surface_impl.h - what the files of src/surface/ share: from a file to a surface with regions, boxes around its triangles. Rank 0 only.
+  surface_impl.h - shared declarations of src/surface/: from a file to a surface with regions. Rank 0 only.
 */
 #pragma once
 #include "sbgeometry.h"
@@ -7,34 +7,35 @@
 #include "triangles.h"
 
 /*
-  SbSurfaceRead - a surface from a file, repaired and checked, with its regions; groups and im->note are those of the body `im`. Not collective.
+  SbSurfaceRead - reads a surface, repairs and checks it, and finds its regions; sets groups and im->note of the body `im`. Not collective.
 
-  Input: path; im->where, im->scale (1 afterwards: the surface is in metres), im->tet (weld and untangle).
-  Errors: PETSC_ERR_FILE_*, PETSC_ERR_USER_INPUT, one line that names the triangles and what to do; then there is no surface.
+  Input: path; im->where, im->scale (1 afterwards: the surface is in metres), im->tet (merge_tolerance and untangle).
+  Errors: PETSC_ERR_FILE_*, PETSC_ERR_USER_INPUT, one line that names the triangles and a remedy; no surface is returned.
 */
 PetscErrorCode SbSurfaceRead(const char *path, SbImport *im, SbSurface *body_surface);
 
-/* Repairs, for the note of the body. */
+/* Counts of repairs, for the note of the body. */
 typedef struct {
-  PetscReal tolerance, moved;  /* vertices within this distance were joined, and the largest such distance */
-  PetscInt nwelded;            /* vertices joined with another */
-  PetscInt ncollapsed;         /* triangles that lost an edge thereby, left out */
-  PetscInt ndoubled;           /* triangles given twice, left out */
-  PetscInt nwall;              /* pairs of triangles back to back: one is kept as a wall between regions */
-  PetscInt nflat;              /* triangles without area, taken into their neighbour */
-  PetscInt nturned;            /* triangles turned to the side of their neighbours */
-  PetscInt ncavity;            /* parts taken as cavities */
-  PetscInt npairs, nuntangled; /* triangles that cut each other, and vertices moved to part them */
-  PetscReal untangled;         /* by how much */
-  PetscInt nidle;              /* triangles with nothing on both sides, left out */
-  PetscInt ninner;             /* triangles of an obstacle with material on both sides, left out */
+  PetscReal tolerance, moved; /* merge tolerance, m; largest distance of merged vertices, m */
+  PetscInt nwelded;           /* vertices merged with another one */
+  PetscInt ncollapsed;        /* triangles removed because two of their corners were merged */
+  PetscInt ndoubled;          /* duplicate triangles removed */
+  PetscInt
+    nwall; /* pairs of coincident triangles with opposite orientation: one is kept as a wall between regions */
+  PetscInt nflat;              /* flat triangles merged into their neighbours */
+  PetscInt nturned;            /* triangles reversed for consistent orientation */
+  PetscInt ncavity;            /* parts that are cavities */
+  PetscInt npairs, nuntangled; /* pairs of intersecting triangles; vertices moved by smoothing */
+  PetscReal untangled;         /* largest displacement by smoothing, m */
+  PetscInt nidle;              /* triangles without material on either side, removed */
+  PetscInt ninner;             /* triangles of an obstacle with material on both sides, removed */
 } SbSurfaceRepairs;
 
-/* Joins vertices no farther apart than the tolerance; leaves out what collapses, doubles and unused vertices. */
+/* Merges vertices within the tolerance, m; removes collapsed and duplicate triangles and unused vertices. */
 PetscErrorCode SbSurfaceMergeVertices(SbTriangleFile *file, PetscReal tolerance, SbSurfaceRepairs *repairs);
-/* Takes triangles without area into their neighbours; refuses those that have none to go to, and open edges. */
+/* Merges flat triangles into their neighbours. Errors: remaining flat triangles, open edges. */
 PetscErrorCode SbSurfaceRepairTriangles(SbTriangleFile *file, SbSurfaceRepairs *repairs);
-/* Takes small folds apart by moving vertices no farther than the reach; refuses all else that cuts or touches itself. */
+/* Removes small self-intersections by moving vertices at most by `reach`, m. Error: remaining self-intersections. */
 PetscErrorCode SbSurfaceUntangle(SbTriangleFile *file, PetscReal reach, SbSurfaceRepairs *repairs);
-/* The regions: fills side of each triangle; regions get groups region_1, ... and those that the file names. */
+/* Finds the regions: sets the sides of each triangle; regions get the groups region_1, ... and those that the file names. */
 PetscErrorCode SbSurfaceFindRegions(SbTriangleFile *file, SbSurfaceRepairs *repairs, SbSurface *surface);

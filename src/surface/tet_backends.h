@@ -1,25 +1,25 @@
 /*
-  tet_backends.h - input and output of gmsh and tetgen for tetrahedralize.c. Rank 0 only.
+  tet_backends.h - interface of the mesh generators gmsh and tetgen, used by tetrahedralize.c. Rank 0 only.
 */
 #pragma once
 #include "surface_impl.h"
 
-#define SB_TET_MOST 5e7 /* tets that one surface may become */
+#define SB_TET_MOST 5e7 /* largest expected number of tets for one surface */
 
 typedef struct {
-  const char *where;    /* begins every message */
-  const SbImport *body; /* whose options messages name */
+  const char *where;    /* beginning of error messages */
+  const SbImport *body; /* body whose options messages name */
   const SbSurface *surface;
   SbTetOptions options;
-  PetscReal size, edge; /* wanted edge, mean edge of the surface */
+  PetscReal size, edge; /* target edge length, mean edge length of the surface */
   PetscReal expected;   /* estimated number of tets */
-  PetscBool remesh;     /* the surface gets triangles of the wanted size; else they stay */
+  PetscBool remesh;     /* remesh the surface with triangles of the target size; else keep its triangles */
 } SbTetJob;
 
 /*
-  A backend fills x, vert_number, item[3] with the number of the region as tags, item[2] with the facets between regions and
-  outside: as tags the triangle of the surface that they are or, remeshed, lie next to.
-  Errors: PETSC_ERR_USER_INPUT, PETSC_ERR_FILE_*: the reason why it did not work.
+  Each backend sets x, vert_number, item[3] with the region number as tags, and item[2], the facets between regions and outside,
+  with the number of a surface triangle as tags: the facet's own or, after remeshing, the nearest one.
+  Errors: PETSC_ERR_USER_INPUT, PETSC_ERR_FILE_*: the reason of the failure.
 */
 PetscErrorCode SbTetRun_Gmsh(const SbTetJob *job, SbImport *tets);
 PetscErrorCode SbTetRun_TetGen(const SbTetJob *job, SbImport *tets);

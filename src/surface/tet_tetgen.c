@@ -1,11 +1,11 @@
 /*
-  tet_tetgen.c - tets by the program tetgen (Hang Si 2015), called as a process in a folder of its own that is removed afterwards.
+  tet_tetgen.c - tetrahedralization by the program tetgen (Hang Si 2015), as a child process in a temporary folder.
 
-  Every triangle of the surface is a facet with its number as marker. The program gives back facets, and tets with a number for each part of space
-  that facets bound (-A). Which region that is follows from the tets at facets: they lie in the region on that side of its triangle. What
-  lies in no region, a cavity, is left out. So neither points in holes nor points in regions are needed.
+  Each triangle of the surface is a facet with its number as marker. The output has facets, and tets with a number for each part of space
+  bounded by facets (-A). The region of a part follows from its tets at facets: they are in the region on that side of the triangle. Parts
+  without a region, cavities, are dropped. Hence neither hole points nor region points are needed.
 
-  Kept, the surface stays as it is (-Y). Else tetgen may split its triangles, where the size asks for it; it cannot make it coarser.
+  If the surface is kept, tetgen does not split it (-Y). Else it may split triangles to reach the target size; it cannot coarsen the surface.
 */
 #include <dirent.h>
 #include <errno.h>
@@ -19,10 +19,10 @@
 #include "sbtet.h"
 #include "tet_backends.h"
 
-#define UNKNOWN (-2) /* region of a part of space that is not found yet */
+#define UNKNOWN (-2) /* region of a part that is not found yet */
 #define PATH_LENGTH (PETSC_MAX_PATH_LEN + 300)
 
-/* ------------------------------------------------------------------ the process */
+/* ------------------------------------------------------------------ child process */
 
 static PetscErrorCode check_end(const char *folder, int status)
 {
@@ -33,7 +33,7 @@ static PetscErrorCode check_end(const char *folder, int status)
   PetscCheck(!WIFEXITED(status) || WEXITSTATUS(status) != 127, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "there is no program tetgen; install the package tetgen (Debian, Ubuntu)");
   if (WIFEXITED(status) && !WEXITSTATUS(status)) PetscFunctionReturn(PETSC_SUCCESS);
-  // the last lines of the log as one line
+  // last lines of the log, joined to one line
   (void)snprintf(path, sizeof(path), "%s/log", folder);
   f = fopen(path, "r");
   while (f && fgets(line, (int)sizeof(line), f)) {
@@ -50,7 +50,7 @@ static PetscErrorCode check_end(const char *folder, int status)
 
 /* ------------------------------------------------------------------ regions */
 
-/* Whether the point lies in front of a triangle of the surface (0) or behind it (1). */
+/* Whether the point is in front of a triangle of the surface (0) or behind it (1). */
 static int side_of(const SbSurface *s, PetscInt f, const PetscReal x[3])
 {
   const PetscInt *v = s->tri + 3 * f;
@@ -62,7 +62,7 @@ static int side_of(const SbSurface *s, PetscInt f, const PetscReal x[3])
   return SbDot3(n, w) < 0;
 }
 
-/* The region of each tag set of tets, from the tets at facets; facets get the number of their triangle as tags. */
+/* Finds the region of each tag set of tets from the tets at facets; tags of facets become the number of their triangle. */
 static PetscErrorCode match_regions(const SbSurface *s, const SbFaces *faces, SbImport *im, PetscInt region[])
 {
   SbItems *tri = &im->item[2];
@@ -70,7 +70,7 @@ static PetscErrorCode match_regions(const SbSurface *s, const SbFaces *faces, Sb
   PetscFunctionBeginUser;
   for (PetscInt t = 0; t < im->ntags; t++) region[t] = UNKNOWN;
   for (PetscInt i = 0; i < tri->n; i++) {
-    // TetGen hands on the marker of the facet: the number of the triangle of the surface, from 1 on
+    // facet marker of TetGen: number of the surface triangle, from 1
     const PetscInt f = (PetscInt)im->group[im->tags_group[im->tags_start[tri->tags[i]]]].tag - 1;
     PetscInt slots[2];
     const PetscInt n = SbFacesFind(faces, tri->vert + 3 * i, slots);
@@ -90,7 +90,7 @@ static PetscErrorCode match_regions(const SbSurface *s, const SbFaces *faces, Sb
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ the backend */
+/* ------------------------------------------------------------------ backend */
 
 static PetscErrorCode work_in(const char *folder, const SbTetJob *job, SbImport *im)
 {
@@ -106,7 +106,7 @@ static PetscErrorCode work_in(const char *folder, const SbTetJob *job, SbImport 
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  // the surface; each triangle has its number as a marker
+  // write the surface; markers are triangle numbers
   (void)snprintf(path, sizeof(path), "%s/s.smesh", folder);
   f = fopen(path, "w");
   PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s (%s)", path, strerror(errno));
@@ -122,13 +122,13 @@ static PetscErrorCode work_in(const char *folder, const SbTetJob *job, SbImport 
   fprintf(f, "0\n0\n");
   PetscCheck(!fclose(f), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s (%s); is the disk full?",
              path, strerror(errno));
-  /* Tets of the wanted size have this volume on average, so some must be allowed to be larger. */
+  /* 1.8 times the volume of a tet of the target size, as some tets must be larger than the mean */
   (void)snprintf(flags, sizeof(flags), "-p%sMQAq1.4/10a%.6f", job->remesh && job->size < job->edge ? "" : "Y",
                  (double)(1.8 * volume));
-  // the process, and how it ended
+  // run the program and check its exit status
   self = getpid();
   pid = fork();
-  // in the child, which never returns; 127 says that there is no such program
+  // child process: exit code 127 if the program is missing
   if (!pid) {
     int log;
 
@@ -149,8 +149,8 @@ static PetscErrorCode work_in(const char *folder, const SbTetJob *job, SbImport 
   (void)snprintf(path, sizeof(path), "%s/s.1", folder);
   PetscCall(SbImportTagSet(im, 0, NULL, &none));
   PetscCall(SbImportRead_TetGen(path, im));
-  im->item[0].n = im->item[1].n = 0; /* points and edges with markers */
-  // coordinates come back as text: a kept surface gets its exact ones again
+  im->item[0].n = im->item[1].n = 0; /* marked points and edges */
+  // restore the exact coordinates of a kept surface, which were rounded to text
   if (!job->remesh) {
     PetscCheck(im->nvert >= s->nvert, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
                "vertices of the surface are gone");
@@ -160,7 +160,7 @@ static PetscErrorCode work_in(const char *folder, const SbTetJob *job, SbImport 
       im->x[i] = s->x[i];
     }
   }
-  // tets get the number of their region as tags; those of no region, a cavity, are left out
+  // tags of tets become region numbers; tets of cavities are dropped
   PetscCall(SbFacesCreate(im->nvert, tet->n, tet->vert, &faces));
   PetscCall(PetscMalloc1(im->ntags, &region));
   ierr = match_regions(job->surface, &faces, im, region);
@@ -187,14 +187,14 @@ PetscErrorCode SbTetRun_TetGen(const SbTetJob *job, SbImport *tets)
   char path[PATH_LENGTH];
 
   PetscFunctionBeginUser;
-  // a temporary folder of its own
+  // temporary folder
   base = getenv("TMPDIR");
   (void)snprintf(folder, sizeof(folder) - 16, "%s/supple-tetgen-XXXXXX", base && base[0] ? base : "/tmp");
   PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
              "no temporary folder %s (%s); set TMPDIR to a folder that can be written", folder,
              strerror(errno));
   ierr = work_in(folder, job, tets);
-  // removes the folder with the files in it
+  // remove the folder with its files
   d = opendir(folder);
   while (d && (entry = readdir(d)) != NULL) {
     (void)snprintf(path, sizeof(path), "%s/%s", folder, entry->d_name);

@@ -1,20 +1,20 @@
 /*
-  tetrahedralize.c - tets from a surface that knows its regions: gmsh, then tetgen, and what must hold for their result.
+  tetrahedralize.c - tetrahedralization of a surface with regions by gmsh or else tetgen, and checks of the result.
 
-  A backend delivers vertices, tets with the number of their region, and triangles with the number of the surface's triangle that they lie on.
-  Here both are checked (every region is there and has its volume: to rounding when the triangles were kept, else within a few
-  percent), groups are given to tets and triangles, and slivers are counted.
+  A backend returns vertices, tets with region numbers, and triangles with the number of the surface triangle at their position.
+  Both are checked here (every region exists and has its volume: up to rounding if the surface was kept, else within ten
+  percent), groups are assigned to tets and triangles, and slivers are counted.
 */
 #include "sbkernel.h"
 #include "sbtet.h"
 #include "tet_backends.h"
 
-#define NEAR 1.5   /* between size and mean edge: the triangles are kept */
-#define EXACT 1e-9 /* relative error of a region's volume when the triangles are kept */
-#define ROUGH 0.1  /* the same when they are rebuilt: a coarse size rounds a curved surface off */
+#define NEAR 1.5   /* largest ratio of target size and mean edge for which the surface is kept */
+#define EXACT 1e-9 /* tolerance of region volumes relative to those of the surface, if the surface is kept */
+#define ROUGH 0.1  /* the same if it is remeshed: a coarse mesh of a curved surface loses volume */
 #define SLIVER 5.  /* degrees */
 
-/* ------------------------------------------------------------------ surfaces */
+/* ------------------------------------------------------------------ surface */
 
 PetscErrorCode SbSurfaceCreate(PetscInt nvert, PetscInt ntri, PetscInt nregion, SbSurface *s)
 {
@@ -59,7 +59,7 @@ static const struct {
   const char *name;
   PetscErrorCode (*run)(const SbTetJob *job, SbImport *tets);
 } backends[] = {{"gmsh", SbTetRun_Gmsh},
-                {"tetgen", SbTetRun_TetGen}}; /* SB_TET_GMSH - 1, SB_TET_TETGEN - 1 */
+                {"tetgen", SbTetRun_TetGen}}; /* order: SB_TET_GMSH - 1, SB_TET_TETGEN - 1 */
 
 static PetscErrorCode run_checked(int backend, const SbTetJob *job, SbImport *tets)
 {
@@ -70,7 +70,7 @@ static PetscErrorCode run_checked(int backend, const SbTetJob *job, SbImport *te
   PetscFunctionBeginUser;
   PetscCall((*backends[backend].run)(job, tets));
   PetscCheck(tets->item[3].n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "it made no tets");
-  // a kept surface has its vertices first and unmoved
+  // the vertices of a kept surface must come first and unchanged
   if (!job->remesh) {
     PetscCheck(tets->nvert >= s->nvert, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
                "vertices of the surface are gone");
@@ -78,7 +78,7 @@ static PetscErrorCode run_checked(int backend, const SbTetJob *job, SbImport *te
       PetscCheck(tets->x[i] == s->x[i], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
                  "vertex %" PetscInt_FMT " of the surface was moved", i / 3 + 1);
   }
-  // volume of each region against that of its surface
+  // volume of each region, compared with that of its surface
   PetscCall(PetscCalloc2(s->nregion, &want, s->nregion, &got));
   (void)SbSurfaceMeasure(s, want);
   for (PetscInt c = 0; c < tets->item[3].n; c++)
@@ -93,7 +93,7 @@ static PetscErrorCode run_checked(int backend, const SbTetJob *job, SbImport *te
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One backend; its error becomes a reason. Errors that are not the input's are raised. */
+/* Runs one backend; an error about the input becomes a reason, other errors are raised. */
 static PetscErrorCode try_backend(int backend, const SbTetJob *job, SbImport *tets, PetscBool *done,
                                   size_t size, char reasons[])
 {
@@ -114,7 +114,7 @@ static PetscErrorCode try_backend(int backend, const SbTetJob *job, SbImport *te
   PetscCheck(ierr == PETSC_ERR_USER_INPUT || ierr == PETSC_ERR_FILE_OPEN || ierr == PETSC_ERR_FILE_READ ||
                ierr == PETSC_ERR_FILE_UNEXPECTED,
              PETSC_COMM_SELF, ierr, "%s: %s", job->where, caught.text);
-  // without the beginning that our own message has, too
+  // remove the prefix that our message has too
   if (!strncmp(why, job->where, n)) why += n + strspn(why + n, ": ");
   SbAppend(size, reasons, "%s%s: %s", reasons[0] ? "; " : "", backends[backend].name, why);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -131,7 +131,7 @@ void SbTetDefaults(SbTetOptions *o)
                       .surface = SB_TET_SURFACE_AUTO};
 }
 
-/* The first backend that works; its mesh goes to the body. */
+/* Runs the first backend that works; its mesh becomes that of the body. */
 static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscBool *done, size_t size,
                                    char reasons[], SbImport *body)
 {
@@ -148,7 +148,7 @@ static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscB
     if (job->options.backend != SB_TET_AUTO && (int)job->options.backend != backend + 1) continue;
     PetscCall(try_backend(backend, job, &tets, done, size, reasons));
     if (!*done) continue;
-    // the body keeps its groups and tag sets, and gets the rest
+    // the body keeps its groups and tag sets
     PetscCall(PetscFree(body->x));
     PetscCall(PetscFree(body->vert_number));
     body->nvert = tets.nvert;
@@ -165,7 +165,7 @@ static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscB
     for (PetscInt v = 0; v < body->nvert; v++) body->vert_number[v] = v + 1;
     for (PetscInt c = 0; c < body->item[3].n; c++) body->item[3].number[c] = c + 1;
     PetscCall(SbImportDestroy(&tets));
-    // numbers of regions and triangles become tag sets; triangles of no group are left out
+    // region and triangle numbers become tag sets; triangles without groups are dropped
     for (PetscInt c = 0; c < body->item[3].n; c++)
       body->item[3].tags[c] = job->surface->region_tags[body->item[3].tags[c]];
     for (PetscInt i = 0; i < tri->n; i++) {
@@ -177,7 +177,7 @@ static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscB
       tri->number[n++] = job->surface->number[f];
     }
     tri->n = n;
-    // note the program that made the tets
+    // note which program made the tets
     surface = job->remesh ? "remeshed" : "kept";
     if (job->remesh && backend + 1 == SB_TET_TETGEN) surface = job->size < job->edge ? "split" : "kept";
     SbImportShape(body, SLIVER, &shape);
@@ -206,7 +206,7 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *s, const SbT
   char option[SB_IMPORT_OPTION_MAX];
 
   PetscFunctionBeginUser;
-  // the size, whether the triangles stay, and what follows from the shape of the surface
+  // target size, whether the surface is kept, expected number of tets
   PetscCheck(s->ntri > 3 && s->nregion > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: %" PetscInt_FMT " triangles around %" PetscInt_FMT " regions enclose nothing", where,
              s->ntri, s->nregion);
@@ -235,7 +235,7 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *s, const SbT
   job.remesh =
     (PetscBool)(o->surface == SB_TET_REMESH ||
                 (o->surface == SB_TET_SURFACE_AUTO && (job.size > NEAR * edge || edge > NEAR * job.size)));
-  /* A tet of edge h has the volume h^3 / (6 sqrt(2)); a mesh has some ten percent more tets. */
+  /* a regular tet of edge h has the volume h^3 / (6 sqrt(2)) */
   job.expected = 6 * PETSC_SQRT2 * all / (job.size * job.size * job.size);
   PetscCheck(job.expected < SB_TET_MOST, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: a size of %g m makes about %.2g tets out of %.4g m^3; give a size of at least %.3g m (%s)",
@@ -244,7 +244,7 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *s, const SbT
              SbImportOption(body, "tet_size", option));
   (void)frexp(job.size, &exponent);
   factor = ldexp(1, 1 - exponent);
-  // lengths times a power of two, which is exact: backends with absolute bounds see a size between 1 and 2
+  // scale lengths by a power of two, which is exact, to a target size between 1 and 2, for absolute tolerances in the backends
   scaled = *s;
   PetscCall(PetscMalloc1(3 * (size_t)s->nvert, &scaled.x));
   for (PetscInt i = 0; i < 3 * s->nvert; i++) scaled.x[i] = factor * s->x[i];

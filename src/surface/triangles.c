@@ -1,7 +1,7 @@
 /*
-  triangles.c - the triangles of a file: the reader by the name of the file.
+  triangles.c - reads the triangles of a surface file; the reader is chosen by the file name.
 
-  The boundary of a gmsh file is that of its tets; without tets its triangles are the surface.
+  For a gmsh file the surface is the boundary of its tets, or, without tets, its triangles.
 */
 #include <strings.h>
 #include "sbtet.h"
@@ -9,7 +9,7 @@
 
 /* ------------------------------------------------------------------ gmsh */
 
-/* The faces of tets without a tet beyond; they have no number in the file. */
+/* Adds the boundary faces of the tets; their number in the file is 0. */
 static PetscErrorCode add_boundary(SbImport *im, SbTriangleFile *f)
 {
   SbFaces faces;
@@ -63,7 +63,7 @@ PetscErrorCode SbTrianglesReadFile(const char *path, SbTriangleFile *f)
     PetscCall(SbScanOpen(f->where, path, &im->scan));
     PetscCall((*format->read)(&im->scan, f));
   } else {
-    // of gmsh, the boundary of its tets, or else its triangles
+    // gmsh: boundary of the tets, else the triangles
     im->surface = PETSC_TRUE;
     PetscCall(SbImportRead_Gmsh(path, im));
     if (im->item[3].n) PetscCall(add_boundary(im, f));

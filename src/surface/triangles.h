@@ -1,80 +1,80 @@
 /*
-  triangles.h - a surface of triangles on its way from a file to a rigid obstacle: what the files triangles*.c share. Rank 0 only.
+  triangles.h - triangles read from a surface file, before they become a body or a rigid obstacle: shared by triangles*.c. Rank 0 only.
 */
 #pragma once
 #include "sbgeometry.h"
 #include "sbmeshio.h"
 #include "sbtriangles.h"
 
-#define SB_TRIANGLE_FLAT 1e-10 /* twice the area over the longest edge squared, below which it has no side */
-#define SB_TRIANGLE_EMPTY 1e-9 /* volume over (area / 6)^1.5, below which a part encloses nothing */
+#define SB_TRIANGLE_FLAT 1e-10 /* flat triangle: largest twice the area over the longest edge squared */
+#define SB_TRIANGLE_EMPTY 1e-9 /* a part without volume: largest volume over (area / 6)^1.5 */
 
-/* A point that a file gives for the region around it. */
+/* Hole or region point of a file. */
 typedef struct {
   PetscReal x[3];
-  int64_t attribute; /* of a region */
-  int64_t number;    /* in the file */
+  int64_t attribute; /* attribute of a region */
+  int64_t number;    /* number in the file */
 } SbSeed;
 
-/* Filled by a reader, item by item. */
+/* Surface file being read; the readers add vertices and triangles. */
 typedef struct {
-  SbImport *im;      /* gets the groups of the triangles; arrays here are its own, see SbImportScratch() */
-  const char *where; /* im->where: begins every message */
-  const char *path;  /* while it is read */
-  PetscBool body;    /* it becomes one, by the options of im; else an obstacle */
+  SbImport *im;      /* owner of the groups, and of arrays here as scratch memory, see SbImportScratch() */
+  const char *where; /* im->where: beginning of error messages */
+  const char *path;  /* file name during reading */
+  PetscBool body;    /* a body, with the options of im; else an obstacle */
   SbTriangles *t;
-  PetscInt vert_size, tri_size; /* allocated */
-  int64_t *number;              /* [ntri] of the face in the file, from 1 */
-  PetscInt now;                 /* tag set of the triangles that come next */
-  PetscInt *tags;               /* [ntri] tag set */
+  PetscInt vert_size, tri_size; /* allocated capacity */
+  int64_t *number;              /* [ntri] number of the face in the file, from 1 */
+  PetscInt now;                 /* tag set of the triangles that are added next */
+  PetscInt *tags;               /* [ntri] tag set of each triangle */
   SbCount ncorner;
-  PetscInt *corner; /* [ncorner] of the face that is being read */
-  PetscBool sheets; /* the order of corners says nothing about the side: .poly, .smesh */
+  PetscInt *corner; /* [ncorner] corners of the face being read */
+  PetscBool sheets; /* the order of corners has no meaning: .poly, .smesh */
   PetscInt nhole, nregion;
   SbSeed *hole, *region;
 } SbTriangleFile;
 
-/* Readers of a file in memory. Errors name the file, and the line or byte. Not collective. */
+/* Readers of a file in memory. Error messages name the file and the line or byte. Not collective. */
 PetscErrorCode SbTrianglesRead_STL(SbScan *scan, SbTriangleFile *file);
 PetscErrorCode SbTrianglesRead_OBJ(SbScan *scan, SbTriangleFile *file);
 PetscErrorCode SbTrianglesRead_OFF(SbScan *scan, SbTriangleFile *file);
 PetscErrorCode SbTrianglesRead_PLY(SbScan *scan, SbTriangleFile *file);
-PetscErrorCode SbTrianglesRead_Poly(SbScan *scan, SbTriangleFile *file); /* and .smesh */
-/* Appends a vertex, or a triangle of vertices that are there. */
+PetscErrorCode SbTrianglesRead_Poly(SbScan *scan, SbTriangleFile *file); /* .poly and .smesh */
+/* Add a vertex, or a triangle of existing vertices. */
 PetscErrorCode SbTrianglesAddVertex(SbTriangleFile *file, const PetscReal x[3]);
 PetscErrorCode SbTrianglesAdd(SbTriangleFile *file, PetscInt a, PetscInt b, PetscInt c, int64_t number);
-/* Adds corner v, from 0, to the face `number` that is being read, and the face when it has all. Errors: a vertex that is not there; fewer than three. */
+/* Add corner v, from 0, to the face `number` being read; add the face after its last corner. Errors: a missing vertex; fewer than three corners. */
 PetscErrorCode SbTrianglesAddCorner(SbScan *scan, int64_t number, int64_t v, SbTriangleFile *file);
 PetscErrorCode SbTrianglesAddFace(SbScan *scan, int64_t number, SbTriangleFile *file);
-/* Appends a polygon, convex or not, as triangles between its corners; vert[n] from 0. An error names what was scanned last. */
+/* Triangulates a polygon, convex or not, without new vertices; vert[n] from 0. An error names the last scanned token. */
 PetscErrorCode SbTrianglesAddPolygon(SbScan *scan, PetscInt n, const PetscInt vert[], int64_t number,
                                      SbTriangleFile *file);
 /*
-  The same for polygons within each other: vert[start[k]] to vert[start[k + 1] - 1] is the k-th of nloop; those around one of the points
-  hole[nhole][3] are left empty, whatever else is enclosed is filled.
+  Triangulates nested polygons: vert[start[k]] to vert[start[k + 1] - 1] is polygon k of nloop; the areas with a point of
+  hole[nhole][3] are left empty, all other enclosed areas are filled.
 */
 PetscErrorCode SbTrianglesAddLoops(SbScan *scan, PetscInt nloop, const PetscInt start[],
                                    const PetscInt vert[], PetscInt nhole, const PetscReal hole[],
                                    int64_t number, SbTriangleFile *file);
-/* The triangles that come next belong to these groups; blanks in names become underscores. n = 0: to none. */
+/* Sets the groups of the triangles that are added next; blanks in names become underscores. n = 0: none. */
 PetscErrorCode SbTrianglesGroups(SbTriangleFile *file, PetscInt n, const char *const names[]);
-/* What is known of a kind of file, by its name; NULL: of no known kind. */
+/* File format by file name; NULL if unknown. */
 typedef struct {
   const char *extension;
-  PetscErrorCode (*read)(SbScan *, SbTriangleFile *); /* NULL: gmsh's, which the reader of meshes reads */
-  PetscBool sheets;                                   /* as of SbTriangleFile */
+  PetscErrorCode (*read)(SbScan *, SbTriangleFile *); /* reader; NULL: gmsh, read by src/meshio */
+  PetscBool sheets;                                   /* as in SbTriangleFile */
 } SbTriangleFormat;
 const SbTriangleFormat *SbTrianglesFormat(const char *path);
-/* Reads a file of a known kind. */
+/* Reads a file of a known format. */
 PetscErrorCode SbTrianglesReadFile(const char *path, SbTriangleFile *file);
 
 /* ------------------------------------------------------------------ triangles_measure.c */
 
-/* edge[3 ntri], sorted: those with one key are one edge. Slots 3 triangle + edge; edge k runs from corner k to the next. */
+/* edge[3 ntri], sorted: slots with equal keys are one edge. Slot: 3 triangle + k; edge k is from corner k to the next. */
 void SbTrianglesEdges(const SbTriangles *triangles, SbKey edge[]);
-/* Twice the area of a triangle, m^2, its longest edge squared and the sum of its edges. */
+/* Returns twice the area of a triangle, m^2; its longest edge squared, m^2, and its perimeter, m. */
 PetscReal SbTriangleMeasure(const SbTriangles *triangles, PetscInt f, PetscReal *longest2, PetscReal *around);
-/* Volume of the tet between a triangle and the point o, m^3, positive when o is behind. */
+/* Signed volume of the tet between a triangle and the point o, m^3, positive if o is behind it. */
 PetscReal SbTetVolumeTo(const SbTriangles *triangles, PetscInt f, const PetscReal o[3]);
-/* Solid angle of a triangle seen from o, positive from behind. */
+/* Solid angle of a triangle seen from o, positive if o is behind it. */
 PetscReal SbTriangleSolidAngle(const SbTriangles *triangles, PetscInt f, const PetscReal o[3]);

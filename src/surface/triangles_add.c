@@ -1,21 +1,21 @@
 /*
-  triangles_add.c - vertices, triangles and polygons, added as a file gives them; a polygon becomes triangles between its corners: a fan
-  where that works, else ear by ear.
+  triangles_add.c - adds vertices, triangles and polygons of a file to a surface; polygons are triangulated without new vertices: as a fan
+  if possible, else by ear clipping.
 
-  Signs are those of areas seen along the polygon's normal (Newell's sum over its edges, which a slightly warped one has, too). An
-  ear is a corner that turns left and whose triangle holds no other corner; cut off is the one whose triangle has the largest smallest
-  angle, so that corners on a straight line do not end as triangles without area (Meisters, "Polygons have ears", 1975). Polygons
-  within a polygon become one with it by bridges: pairs of edges there and back.
+  Areas are projected along the polygon's normal (Newell's sum over its edges, valid for slightly non-planar polygons). An
+  ear is a convex corner whose triangle contains no other corner; the ear with the best ratio of area to longest edge squared is cut
+  first, so that collinear corners do not end as flat triangles (Meisters, "Polygons have ears", 1975). Polygons inside
+  a polygon are connected to it by bridges: pairs of coincident edges of opposite directions.
 */
 #include <ctype.h>
 #include "sbkernel.h"
 #include "triangles.h"
 
-#define CORNERS_MAX 1000 /* of a polygon that is no fan: the search for ears takes their number cubed */
-#define LOOPS_MAX 100    /* polygons of one facet */
-#define THIN 1e-9        /* area over longest edge squared, below which a fan's triangle is not taken */
+#define CORNERS_MAX 1000 /* corners of a non-convex polygon, at most: ear clipping is cubic in their number */
+#define LOOPS_MAX 100    /* polygons of one facet, at most */
+#define THIN 1e-9        /* smallest area over longest edge squared of the triangles of a fan */
 
-/* ------------------------------------------------------------------ one by one, with the groups of triangles */
+/* ------------------------------------------------------------------ vertices, triangles, groups */
 
 PetscErrorCode SbTrianglesAddVertex(SbTriangleFile *f, const PetscReal x[3])
 {
@@ -57,7 +57,7 @@ PetscErrorCode SbTrianglesGroups(SbTriangleFile *f, PetscInt n, const char *cons
   n = PetscMin(n, 16);
   for (PetscInt i = 0; i < n; i++) {
     char name[SB_GROUP_MAX];
-    uint64_t hash = 0xcbf29ce484222325u; /* stands for the name where groups have numbers (FNV-1a) */
+    uint64_t hash = 0xcbf29ce484222325u; /* number of a group that has only a name (FNV-1a hash) */
 
     PetscCall(PetscStrncpy(name, names[i], sizeof(name)));
     for (char *c = name; *c; c++) {
@@ -70,7 +70,7 @@ PetscErrorCode SbTrianglesGroups(SbTriangleFile *f, PetscInt n, const char *cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ a polygon as triangles */
+/* ------------------------------------------------------------------ polygons */
 
 typedef struct {
   const PetscReal *x;
@@ -93,7 +93,7 @@ static void find_normal(PetscInt n, const PetscInt vert[], Polygon *p)
   }
 }
 
-/* Twice the area of a triangle seen along the normal, times the normal's length; longest2: longest edge squared. */
+/* Twice the projected area of a triangle times the length of the normal; longest2: longest edge squared. */
 static PetscReal seen_area(const Polygon *p, PetscInt a, PetscInt b, PetscInt c, PetscReal *longest2)
 {
   const PetscReal *x = p->x + 3 * a, *y = p->x + 3 * b, *z = p->x + 3 * c;
@@ -107,7 +107,7 @@ static PetscReal seen_area(const Polygon *p, PetscInt a, PetscInt b, PetscInt c,
   return SbDot3(n, p->normal);
 }
 
-/* Whether the triangles from corner o on all have an area. */
+/* Whether all triangles of the fan at corner o have a positive projected area. */
 static PetscBool is_fan(const Polygon *p, PetscInt n, const PetscInt vert[], PetscInt o, PetscReal length)
 {
   PetscReal longest2;
@@ -120,7 +120,7 @@ static PetscBool is_fan(const Polygon *p, PetscInt n, const PetscInt vert[], Pet
   return PETSC_TRUE;
 }
 
-/* Area over longest edge squared of the triangle at corner i; negative when it is no ear. */
+/* Quality of the ear at corner i: area over longest edge squared; -1 if it is not an ear. */
 static PetscReal ear_quality(const Polygon *p, PetscInt n, const PetscInt vert[], PetscInt i)
 {
   const PetscInt a = vert[(i + n - 1) % n], b = vert[i], c = vert[(i + 1) % n];
@@ -139,7 +139,7 @@ static PetscReal ear_quality(const Polygon *p, PetscInt n, const PetscInt vert[]
   return area / longest2;
 }
 
-/* Corners are taken out of `left` one by one; a self-intersecting polygon becomes a fan, which the checks refuse. */
+/* Ear clipping, removes corners from left[]; of a self-intersecting polygon any triangulation results, which later checks report. */
 static PetscErrorCode cut_ears(const Polygon *p, PetscInt n, PetscInt left[], int64_t number,
                                SbTriangleFile *f)
 {
@@ -184,7 +184,7 @@ PetscErrorCode SbTrianglesAddPolygon(SbScan *s, PetscInt n, const PetscInt vert[
   if (n > 3) {
     PetscInt first = 0;
 
-    // begins at the lowest corner: copies of a polygon are cut alike wherever they begin
+    // start at the lexicographically smallest corner: the triangulation is independent of the first corner
     for (PetscInt i = 1; i < n; i++) {
       const PetscReal *a = p.x + 3 * vert[i], *b = p.x + 3 * vert[first];
       int k = 0;
@@ -229,12 +229,12 @@ PetscErrorCode SbTrianglesAddFace(SbScan *s, int64_t number, SbTriangleFile *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ polygons within each other */
+/* ------------------------------------------------------------------ nested polygons */
 
 typedef struct {
   Polygon p;
-  PetscInt n;            /* loops */
-  const PetscInt *start; /* [n + 1] */
+  PetscInt n;            /* number of polygons */
+  const PetscInt *start; /* [n + 1] first corner of each polygon */
   const PetscInt *vert;
 } Loops;
 
@@ -243,7 +243,7 @@ static PetscInt corners_of(const Loops *l, PetscInt k)
   return l->start[k + 1] - l->start[k];
 }
 
-/* Area seen along the normal of the whole facet; the sign is the sense of the loop. */
+/* Signed projected area of polygon k; the sign is its orientation. */
 static PetscReal loop_area(const Loops *l, PetscInt k)
 {
   Polygon one = {.x = l->p.x};
@@ -252,7 +252,7 @@ static PetscReal loop_area(const Loops *l, PetscInt k)
   return SbDot3(one.normal, l->p.normal);
 }
 
-/* The smallest loop around a point of the plane, not `except`; -1 when there is none. */
+/* Smallest polygon around a point of the plane, other than `except`; -1 if there is none. */
 static PetscInt loop_around(const Loops *l, const PetscReal x[3], PetscInt except)
 {
   const PetscReal *m = l->p.normal;
@@ -265,7 +265,7 @@ static PetscInt loop_around(const Loops *l, const PetscReal x[3], PetscInt excep
   for (PetscInt k = 0; k < l->n; k++) {
     PetscBool inside = PETSC_FALSE;
 
-    // crossings of a ray in the two coordinates that see most of the facet
+    // even-odd rule, in the two coordinates with the largest projection
     for (PetscInt i = l->start[k]; i < l->start[k + 1]; i++) {
       const PetscReal *a = l->p.x + 3 * l->vert[i],
                       *b = l->p.x + 3 * l->vert[i + 1 < l->start[k + 1] ? i + 1 : l->start[k]];
@@ -279,7 +279,7 @@ static PetscInt loop_around(const Loops *l, const PetscReal x[3], PetscInt excep
   return best;
 }
 
-/* Whether the segment from a to b meets an edge of the polygon that has no end in common with it. */
+/* Whether the segment from a to b intersects an edge of the polygon without a common vertex. */
 static PetscBool meets_edge(const Polygon *p, PetscInt a, PetscInt b, PetscInt n, const PetscInt vert[])
 {
   for (PetscInt i = 0; i < n; i++) {
@@ -293,7 +293,7 @@ static PetscBool meets_edge(const Polygon *p, PetscInt a, PetscInt b, PetscInt n
   return PETSC_FALSE;
 }
 
-/* The polygon between loop k and the loops that lie directly in it. */
+/* Triangulates the area between polygon k and the polygons directly inside it. */
 static PetscErrorCode add_between(SbScan *s, const Loops *l, PetscInt k, const PetscInt parent[],
                                   int64_t number, SbTriangleFile *f)
 {
@@ -318,7 +318,7 @@ static PetscErrorCode add_between(SbScan *s, const Loops *l, PetscInt k, const P
 
     if (parent[inner] != k) continue;
     if (n + ninner + 2 > CORNERS_MAX) PetscCall(too_many(s, n + ninner + 2, number));
-    // the shortest free way from a corner of the polygon (position i) to one of this loop (position j)
+    // shortest bridge from a corner of the outer polygon (position i) to one of the inner one (position j) that intersects no edge
     for (PetscInt a = 0; a < n; a++) {
       for (PetscInt b = 0; b < ninner; b++) {
         const PetscReal *x = l->p.x + 3 * left[a], *y = l->p.x + 3 * other[b],
@@ -336,7 +336,7 @@ static PetscErrorCode add_between(SbScan *s, const Loops *l, PetscInt k, const P
     }
     if (best == PETSC_MAX_REAL)
       SB_SCAN_ERROR(s, "the polygons of facet %lld cross each other; repair it", (long long)number);
-    // walked against the polygon, it becomes part of it by two bridges
+    // insert the inner polygon, with opposite orientation, and the two bridge edges
     PetscCall(PetscArraymove(left + i + ninner + 2, left + i, n - i));
     for (PetscInt c = 0; c <= ninner; c++)
       left[i + 1 + c] = other[((j + step * c) % ninner + ninner) % ninner];

@@ -1,6 +1,5 @@
 /*
-  triangles_measure.c - triangles and edges of a surface: areas, volumes, solid angles (van Oosterom and Strackee 1983), which triangles meet at an
-  edge.
+  triangles_measure.c - areas, volumes and solid angles (van Oosterom and Strackee 1983) of surface triangles; sorted edges of a surface.
 */
 #include "sbkernel.h"
 #include "triangles.h"

@@ -1,16 +1,17 @@
 /*
-  triangles_ply.c - surfaces from .ply files (Stanford polygon format 1.0): text, and binary of both byte orders.
+  triangles_ply.c - reader of .ply surfaces (Stanford polygon format 1.0): text, and binary in both byte orders.
 
-  The header lists which properties an element has, in which order and of which types. Of `vertex` x, y and z are taken, of `face` the
-  list vertex_indices (or vertex_index); everything else is walked over. Triangle strips are refused.
+  The header lists the properties of each element with their order and types. Read: x, y and z of `vertex`, the
+  list vertex_indices (or vertex_index) of `face`; everything else is skipped. Triangle strips are an error.
 */
 #include "triangles.h"
 
 enum { ELEMENTS_MAX = 16, PROPERTIES_MAX = 64 };
 
 typedef struct {
-  SbNumberType type, count; /* count: type of a list's length, of no size for a single value */
-  int axis; /* 0, 1, 2: a coordinate of a vertex; 3: the corners of a face; -1: nothing of use */
+  SbNumberType type,
+    count;  /* type of the values; type of the length of a list, of size 0 for a single value */
+  int axis; /* 0, 1, 2: coordinate of a vertex; 3: corners of a face; -1: ignored */
 } Property;
 
 typedef struct {
@@ -68,7 +69,7 @@ static PetscErrorCode read_header(Ply *p)
   PetscBool format = PETSC_FALSE, binary = PETSC_FALSE;
 
   PetscFunctionBeginUser;
-  // the first line, then one keyword per line
+  // first line, then one keyword per line
   PetscCall(SbScanWord(p->s, sizeof(word), word));
   if (strcmp(word, "ply")) SB_SCAN_ERROR(p->s, "expected 'ply', found '%s'; it is no PLY file", word);
   for (;;) {
@@ -79,7 +80,7 @@ static PetscErrorCode read_header(Ply *p)
                     "the file ends where 'end_header' is expected; it is truncated, write or copy it again");
     if (!strcmp(word, "end_header")) break;
     if (!strcmp(word, "format")) {
-      // text, or binary of either order of bytes
+      // text, or binary in either byte order
       PetscCall(SbScanWord(p->s, sizeof(word), word));
       if (strcmp(word, "ascii") && strcmp(word, "binary_little_endian") && strcmp(word, "binary_big_endian"))
         SB_SCAN_ERROR(p->s, "format '%s'; expected ascii, binary_little_endian or binary_big_endian", word);
@@ -87,7 +88,7 @@ static PetscErrorCode read_header(Ply *p)
       p->big_endian = (PetscBool)!strcmp(word, "binary_big_endian");
       format = PETSC_TRUE;
     } else if (!strcmp(word, "element")) {
-      // a kind of element, whose properties follow
+      // an element, followed by its properties
       Element *e;
 
       if (p->nelement == ELEMENTS_MAX)
@@ -111,7 +112,7 @@ static PetscErrorCode read_header(Ply *p)
 
 /* ------------------------------------------------------------------ values */
 
-/* A number of any type. */
+/* Reads a number of any type. */
 static PetscErrorCode read_value(Ply *p, SbNumberType type, const char *what, double *value)
 {
   SbScan *s = p->s;
@@ -156,7 +157,7 @@ PetscErrorCode SbTrianglesRead_PLY(SbScan *s, SbTriangleFile *f)
     int64_t bytes = 0;
     int axes = 0;
 
-    // coordinates must be there; the least number of bytes of an item bounds how many the file can hold
+    // coordinates are required; check the number of items against the file size
     for (int i = 0; i < p->element[k].nproperty; i++) {
       const Property *q = &p->element[k].property[i];
 
@@ -171,7 +172,7 @@ PetscErrorCode SbTrianglesRead_PLY(SbScan *s, SbTriangleFile *f)
       SB_SCAN_ERROR(p->s, "the element '%s' has no properties", p->element[k].name);
     PetscCall(SbScanRoom(p->s, p->element[k].name, p->element[k].n, PetscMax(1, 2 * p->element[k].nproperty),
                          PetscMax(1, bytes)));
-    // one vertex, face or whatever: its properties in their order
+    // all properties of one vertex, face or other item
     for (int64_t i = 0; i < p->element[k].n; i++) {
       PetscReal x[3] = {0, 0, 0};
       double value;
@@ -181,7 +182,7 @@ PetscErrorCode SbTrianglesRead_PLY(SbScan *s, SbTriangleFile *f)
         int64_t n = 1;
 
         if (q->axis == 3) {
-          // the corners of a face
+          // corners of a face
           PetscCall(read_count(p, q, &n));
           for (int64_t c = 0; c < n; c++) {
             PetscCall(read_value(p, q->type, "vertex of a face", &value));

@@ -1,13 +1,13 @@
 /*
-  triangles_poly.c - surfaces from TetGen's .poly and .smesh files (TetGen 1.5 manual, section 5.2).
+  triangles_poly.c - reader of TetGen's .poly and .smesh surfaces (TetGen 1.5 manual, section 5.2).
 
-  Four parts: points (or their number 0: then they are in NAME.node), facets, holes, regions. A facet of .smesh is one polygon; one of
-  .poly may have several, within each other, and points that mark holes between them. A # begins a comment. Numbers of points begin
-  at 0 or 1, as the first one says.
+  Four parts: points (if their number is 0, they are in NAME.node), facets, holes, regions. A facet of .smesh is one polygon; one of
+  .poly may have several nested polygons, and hole points. A # begins a comment. Point numbers begin
+  at 0 or 1, as the first one.
 
-  Kept: the marker of a facet other than 0 is the group surface_N; a hole is a cavity; a region names its tets volume_N by its attribute (its
-  largest volume is not used: sizes are chosen by -body_<name>_tet_size). Refused: polygons of one or two corners, which only
-  mark points and edges within a facet.
+  Kept: a nonzero facet marker N is the group surface_N; a hole is a cavity; the attribute N of a region gives its tets the group volume_N (its
+  largest volume is ignored: sizes are set by -body_<name>_tet_size). Errors: polygons of one or two corners, which
+  mark points and edges of a facet.
 */
 #include <strings.h>
 #include "triangles.h"
@@ -17,12 +17,12 @@ typedef struct {
   SbTriangleFile *f;
   /* polygons of one facet */
   PetscInt nloop, nvert, nhole;
-  PetscInt *start; /* [nloop + 1] */
+  PetscInt *start; /* [nloop + 1] first corner of each polygon */
   PetscInt *vert;
-  PetscReal *hole; /* [nhole][3] points of holes in the facet */
+  PetscReal *hole; /* [nhole][3] hole points of the facet */
 } Poly;
 
-/* A count at the beginning of a part; the marks behind it, 0 where there are none. */
+/* Reads the counts at the beginning of a part; omitted ones are 0. */
 static PetscErrorCode read_counts(SbScan *s, const char *what, int n, int64_t count[])
 {
   PetscFunctionBeginUser;
@@ -37,7 +37,7 @@ static PetscErrorCode read_counts(SbScan *s, const char *what, int n, int64_t co
 
 /* ------------------------------------------------------------------ points */
 
-/* From this file, or all of NAME.node. */
+/* Reads points from this file, or from NAME.node. */
 static PetscErrorCode read_points(Poly *p, int64_t n)
 {
   SbNumbers *index = &p->f->im->nodes;
@@ -83,7 +83,7 @@ static PetscErrorCode read_node_file(Poly *p)
 
 /* ------------------------------------------------------------------ facets */
 
-/* n corners, which may go on over several lines. */
+/* Reads n corners, on one or more lines. */
 static PetscErrorCode read_polygon(Poly *p, int64_t n, int64_t facet)
 {
   int64_t number;
@@ -111,7 +111,7 @@ static PetscErrorCode read_polygon(Poly *p, int64_t n, int64_t facet)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The triangles of the facet that was read belong to this marker. */
+/* Adds the triangles of the facet, in the group of its marker. */
 static PetscErrorCode end_facet(Poly *p, int64_t marker, int64_t facet)
 {
   PetscInt group;
@@ -126,7 +126,7 @@ static PetscErrorCode end_facet(Poly *p, int64_t marker, int64_t facet)
 
 /* ------------------------------------------------------------------ holes and regions */
 
-/* The part may be missing at the end of the file. */
+/* Reads hole or region points; the part may be missing at the end of the file. */
 static PetscErrorCode read_seeds(Poly *p, const char *what, PetscBool attribute, PetscInt *n, SbSeed **seed)
 {
   int64_t count[1] = {0};
@@ -183,7 +183,7 @@ PetscErrorCode SbTrianglesRead_Poly(SbScan *s, SbTriangleFile *f)
     } else {
       int64_t facet[3], n, number;
 
-      // one facet of .poly: numbers of polygons and holes, marker; then these
+      // one facet of .poly: numbers of polygons and holes, marker; then the polygons and holes
       PetscCall(read_counts(p->s, "number of polygons of a facet", 3, facet));
       for (int64_t k = 0; k < facet[0]; k++) {
         SbScanNext(p->s, '#');

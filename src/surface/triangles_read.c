@@ -1,13 +1,13 @@
 /*
-  triangles_read.c - surfaces from .stl (text and binary), .obj and .off files.
+  triangles_read.c - readers of .stl (text and binary), .obj and .off surfaces.
 
-  Groups, where they are wanted: the solids of an STL text (solid_1, ... without a name), the objects (o) and groups (g) of an OBJ file.
+  Groups of bodies: the solids of a text STL file (solid_1, ... without a name), the objects (o) and groups (g) of an OBJ file.
 
-  STL lists triangles with three corners each, which become common vertices when near vertices are joined (clean.c). The normals in the file are
-  not used: the order of the corners gives the side. It is binary when its size is what its count of triangles says (80 bytes, the count,
-  50 bytes per triangle), whatever its first word is, or when it is larger and there is a byte 0 near its beginning, which text has not:
-  what follows the triangles is left out with a warning. Words of the text may be in capitals, and `end solid` be two of them. OBJ: the lines v, f, o and g; OFF: the plain kind. Faces with more
-  than three corners are cut into triangles, see triangles_add.c.
+  STL lists the three corners of each triangle; equal corners are merged later (clean.c). Normals in the file are
+  ignored: the order of corners is the orientation. A file is binary if its size matches its number of triangles (80 bytes, the count,
+  50 bytes per triangle), whatever its first word is, or if it is larger and has a zero byte near its beginning; bytes
+  after the triangles are then ignored with a warning. Keywords in text may be upper case, and `end solid` may be two words. OBJ: the lines v, f, o and g. OFF: the basic format. Faces with more
+  than three corners are triangulated, see triangles_add.c.
 */
 #include <ctype.h>
 #include <stdlib.h>
@@ -23,7 +23,7 @@ static uint32_t little(const char *p)
   return (uint32_t)b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
 }
 
-/* The next word; `end solid` is `endsolid`. */
+/* Reads the next word; `end solid` becomes `endsolid`. */
 static PetscErrorCode stl_next(SbScan *s, char word[32])
 {
   PetscFunctionBeginUser;
@@ -44,14 +44,14 @@ static PetscErrorCode stl_word(SbScan *s, const char *wanted)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One or more solids: together they are the surface. */
+/* Reads one or more solids, which together are the surface. */
 static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
 {
   char word[32];
   PetscInt nsolid = 0;
 
   PetscFunctionBeginUser;
-  /* padding that some programs write at the end */
+  /* padding bytes that some programs write at the end */
   while (s->end > s->at && (s->end[-1] == 0 || s->end[-1] == 0x1a)) s->end--;
   PetscCall(stl_next(s, word));
   if (strcasecmp(word, "solid"))
@@ -75,10 +75,10 @@ static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
       PetscCall(SbTrianglesGroups(f, 1, names));
       SbScanEndOfLine(s);
     }
-    if (!strcasecmp(word, "endsolid")) SbScanEndOfLine(s); /* its name again */
-    // a facet: its normal, which is not read, and three vertices
+    if (!strcasecmp(word, "endsolid")) SbScanEndOfLine(s); /* repeated name */
+    // a facet: normal (ignored), three vertices
     if (open && !strcasecmp(word, "facet")) {
-      SbScanEndOfLine(s); /* the normal */
+      SbScanEndOfLine(s); /* normal */
       PetscCall(stl_word(s, "outer"));
       PetscCall(stl_word(s, "loop"));
       for (int k = 0; k < 3; k++) {
@@ -116,7 +116,7 @@ PetscErrorCode SbTrianglesRead_STL(SbScan *s, SbTriangleFile *f)
     if (size > known)
       PetscCall(SbWarning(PETSC_COMM_SELF, "%s: %zu bytes behind the %lld triangles are left out", f->where,
                           size - known, (long long)n));
-    // binary: 84 bytes, then 50 for each triangle, a normal and three vertices
+    // binary: 84 bytes, then 50 per triangle: normal, three vertices, 2 bytes
     s->bytes = PETSC_TRUE;
     for (uint32_t i = 0; i < n; i++) {
       for (int k = 0; k < 3; k++) {
@@ -156,7 +156,7 @@ static PetscErrorCode add_vertex(SbScan *s, SbTriangleFile *f)
 PetscErrorCode SbTrianglesRead_OBJ(SbScan *s, SbTriangleFile *f)
 {
   int64_t nface = 0;
-  struct { /* the words behind o and g: one object, and the groups that the next faces belong to */
+  struct { /* names of the object (o) and the groups (g) of the faces that follow */
     char object[SB_NAME_MAX], group[8][SB_NAME_MAX];
     PetscInt ngroup;
   } names;
@@ -168,8 +168,10 @@ PetscErrorCode SbTrianglesRead_OBJ(SbScan *s, SbTriangleFile *f)
     PetscCall(SbScanWord(s, sizeof(word), word));
     if (!word[0]) break;
     if (!strcmp(word, "v")) PetscCall(add_vertex(s, f));
-    /* the rest of a line f: numbers from 1, or from the last vertex back when negative; what follows a slash
-       is not read */
+    /*
+      the rest of a line f: vertex numbers from 1, or negative ones counted back from the last vertex; indices after a slash
+      are ignored
+    */
     if (!strcmp(word, "f")) {
       int64_t number = ++nface;
 
