@@ -1,9 +1,9 @@
 /*
-  main.c - the program from its first to its last call.
+  main.c - main program of supple.
 
     supple SCENARIO.opts [-option value ...]          or     mpirun -n 4 supple SCENARIO.yml
 
-  Options are read and checked before anything is computed; a run that gives up keeps its output and ends with an error
+  Options are read and checked before the computation; a run that fails keeps its output and ends with an error
   line and a non-zero code. Open MPI refuses to start as root unless OMPI_ALLOW_RUN_AS_ROOT=1 and
   OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 are set.
 */
@@ -19,7 +19,7 @@ typedef struct {
   SbRemesh remesh;
 } Scene;
 
-/* Failure handler: writes the failure to the run's folder. */
+/* Failure handler: writes the failure to the folder of the run. */
 static void report_failure(const char *message, void *scene)
 {
   (void)SbReportFailure(((Scene *)scene)->run, message);
@@ -47,7 +47,7 @@ static PetscErrorCode simulate(Scene *s)
   PetscCall(SbOutputAttach(s->run));
   PetscCall(PetscLogStagePop());
 
-  /* the run, from header to summary */
+  /* run, from header to summary */
   PetscCall(SbReportHeader(s->run));
   PetscCall(SbRemeshSolve(s->remesh, &s->model, &s->run, &s->ledger));
   PetscCall(SbReportSummary(s->run));
@@ -62,7 +62,7 @@ static PetscErrorCode simulate(Scene *s)
 static PetscErrorCode supple(int argc, char *argv[])
 {
   SbCommand command;
-  static Scene scene; /* an error that ends the program asks for it */
+  static Scene scene; /* static: used by the failure handler */
   const PetscBool bare = (PetscBool)(argc < 2);
   PetscErrorCode ierr;
   PetscBool left;
@@ -70,7 +70,7 @@ static PetscErrorCode supple(int argc, char *argv[])
   char petsc[256];
 
   PetscFunctionBeginUser;
-  /* the libraries, and how errors reach the user */
+  /* initialise libraries and error handling */
   PetscCall(SbErrorHandlerInstall());
   PetscCall(SbCommandLine(&argc, argv, &command));
   ierr = PetscInitialize(&argc, &argv, command.scenario[0] ? command.scenario : NULL, NULL);
@@ -78,21 +78,22 @@ static PetscErrorCode supple(int argc, char *argv[])
   PetscCall(ierr);
   SbMemoryReturnLarge();
   (void)SbThreadsSetOne();
-  (void)signal(SIGPIPE, SIG_IGN); /* a terminal that is gone must not end a run that writes files */
+  (void)signal(SIGPIPE, SIG_IGN); /* a closed terminal must not end a run that writes files */
 
   /* register and read options */
   PetscCheck(!command.problem[0], PETSC_COMM_SELF, PETSC_ERR_USER, "%s", command.problem);
   PetscCall(SbOptionsRemember());
   PetscCall(PetscOptionsHasName(NULL, NULL, "-options_left", &left));
-  if (!left) PetscCall(PetscOptionsSetValue(NULL, "-options_left", "no")); /* SbOptionsUnused() says it */
+  if (!left)
+    PetscCall(PetscOptionsSetValue(NULL, "-options_left", "no")); /* SbOptionsUnused() reports them */
   PetscCall(SbRegisterAll());
   PetscCall(SbCommandSetErrorTrace());
   for (PetscInt i = 0; i < command.nfile; i++) PetscCall(SbOptionsFile(PETSC_COMM_WORLD, command.file[i]));
 
   if (bare)
-    PetscCall(SbOptionsHelp(PETSC_COMM_WORLD, "")); /* and then the error that there is nothing to run */
+    PetscCall(SbOptionsHelp(PETSC_COMM_WORLD, "")); /* followed by the error that there is nothing to run */
 
-  /* -help, -version, -options_table: answers, and nothing is simulated */
+  /* -help, -version, -options_table: print, without a simulation */
   if (command.help) {
     PetscCall(SbOptionsHelp(PETSC_COMM_WORLD, command.topic));
   } else if (command.version) {
@@ -101,7 +102,7 @@ static PetscErrorCode supple(int argc, char *argv[])
   } else if (command.table[0]) {
     PetscCall(SbOptionsTable(PETSC_COMM_WORLD, command.table));
   } else {
-    /* check options: nothing is computed yet */
+    /* check options; nothing is computed yet */
     PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene.model));
     PetscCall(SbRunCreate(scene.model, &scene.run));
     PetscCall(SbLedgerSetFromOptions(scene.run, &scene.ledger));
@@ -110,7 +111,7 @@ static PetscErrorCode supple(int argc, char *argv[])
     PetscCall(SbOptionsCheck());
     PetscCall(SbSceneCheck(scene.model));
 
-    /* the scenario with all its defaults, or the simulation */
+    /* print the scenario with all defaults, or run the simulation */
     if (command.view) {
       PetscViewer viewer;
 
@@ -120,7 +121,7 @@ static PetscErrorCode supple(int argc, char *argv[])
     } else
       PetscCall(simulate(&scene));
 
-    /* the end; options that nobody has read are named */
+    /* clean up; report unread options */
     PetscCall(SbRemeshDestroy(&scene.remesh));
     PetscCall(SbLedgerDestroy(&scene.ledger));
     PetscCall(SbRunDestroy(&scene.run));
@@ -133,7 +134,7 @@ static PetscErrorCode supple(int argc, char *argv[])
 
 int main(int argc, char *argv[])
 {
-  // Open MPI tries a lock file beside each file that HDF5 opens, for file pointers that nobody shares, and aborts where its path has more than 255 letters
+  // for each file of HDF5, Open MPI would create a lock file for shared file pointers, which are unused, and abort if its path has more than 255 characters
   (void)setenv("OMPI_MCA_sharedfp", "^lockedfile", 0);
   if (MPI_Init(&argc, &argv)) return 1;
   return SbErrorFinish(supple(argc, argv));

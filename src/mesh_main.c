@@ -1,9 +1,9 @@
 /*
-  mesh_main.c - supple-mesh from its first to its last call.
+  mesh_main.c - main program of supple-mesh.
 
     supple-mesh COMMAND FILE [OUT] [-option value ...]
 
-  A second front of the same library: it reads every mesh that a run reads, with the same readers and checks.
+  It uses the same readers and checks as supple.
 */
 #include <signal.h>
 #include "tool/tool.h"

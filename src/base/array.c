@@ -1,5 +1,5 @@
 /*
-  array.c - arrays that grow, are sorted into groups, and are put together of all ranks.
+  array.c - growing arrays, bucket sort, gathering over all ranks.
 */
 #include "sbbase.h"
 
@@ -18,7 +18,7 @@ PetscErrorCode SbBucketByKey(PetscInt n, const PetscInt key[], PetscInt nkey, Pe
   PetscInt *first;
 
   PetscFunctionBeginUser;
-  /* counted two places ahead, so that filling leaves first[k] at the first position of key k */
+  /* counts are offset by two, so that filling leaves first[k] at the first position of key k */
   PetscCall(PetscCalloc1((size_t)nkey + 2, &first));
   for (PetscInt i = 0; i < n; i++) {
     if (key[i] >= 0 && key[i] < nkey) first[key[i] + 2]++;

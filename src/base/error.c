@@ -1,30 +1,30 @@
 /*
-  error.c - how an error reaches the user: one line, once, and every rank ends with a non-zero code.
+  error.c - error handling: an error reaches the user as one line, printed once, and every rank ends with a non-zero code.
 
-  PETSc's own handler prints a trace on every rank, which buries the line that matters. A *user error* (a wrong option, an
-  unreadable file) needs no trace; its message is kept while the error code travels up to main(), and SbErrorFinish()
-  prints it. There the ranks find out who has something to say: those that failed alike meet in a non-blocking
-  reduction, and the lowest one prints. A rank that failed alone waits in vain for others that are stuck in a collective
-  call; after a short grace it prints and aborts the run, the last resort against a hang.
+  PETSc's own handler prints a trace on every rank, which hides the relevant message. A *user error* (a wrong option, an
+  unreadable file) needs no trace; its message is kept while the error code is returned up to main(), and SbErrorFinish()
+  prints it. There all ranks enter a non-blocking reduction, which selects the lowest rank with an error to
+  print. If other ranks are blocked in a collective call, a rank that failed alone cannot complete the reduction: after a grace
+  period it prints the message and aborts the run, to avoid a hang.
 
-  Errors that are not the user's get PETSc's trace at once, and the line at the end as well.
+  Internal errors are printed with PETSc's trace immediately, and as one line at the end too.
 */
 #include <stdarg.h>
 #include <unistd.h>
 #include "option.h"
 
-#define GRACE 3.0 /* s that a failed rank waits for the others */
+#define GRACE 3.0 /* s; grace period in which a failed rank waits for the others */
 
 static struct {
-  MPI_Comm comm;       /* ours alone, so that nothing else can be pending on it */
-  PetscBool pending;   /* a user error is on its way up, or was posted */
+  MPI_Comm comm;       /* duplicate of MPI_COMM_WORLD without other pending communication */
+  PetscBool pending;   /* a user error is being returned to main(), or was posted */
   PetscBool posted;    /* by SbErrorPost(): the run counts as failed */
-  int code;            /* with which the program then ends */
-  PetscBool trace;     /* -error_trace */
-  char message[2048];  /* of the last error */
-  char file[256];      /* option files, for messages about YAML */
-  const char *program; /* begins every line */
-  void (*failure_handler)(const char *message, void *ctx); /* called by the rank that speaks for the run */
+  int code;            /* exit code of the program */
+  PetscBool trace;     /* option -error_trace */
+  char message[2048];  /* message of the last error */
+  char file[256];      /* names of the option files, for messages about YAML */
+  const char *program; /* program name, prefix of every message */
+  void (*failure_handler)(const char *message, void *ctx); /* called on the rank that prints the error */
   void *failure_ctx;
   void (*at_end)(void);
 } state = {.comm = MPI_COMM_NULL, .program = "supple", .code = 1};
@@ -37,14 +37,14 @@ static PetscBool is_user_error(PetscErrorCode n, const char *function)
 
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++)
     if ((int)n == ours[i]) return PETSC_TRUE;
-  /* PETSc reads its options and option files itself, under other codes */
+  /* errors in options and option files, which PETSc raises under other codes */
   return (PetscBool)((function && (!strncmp(function, "PetscOptionsInsert", 18) ||
                                    !strncmp(function, "PetscOptionsStringTo", 20) ||
                                    !strncmp(function, "PetscOptionsSetValue", 20) ||
                                    !strcmp(function, "PetscParseLayerYAML"))));
 }
 
-/* What PETSc's own objects cannot do because of types or tolerances that the user gave them: `given`, "-ksp_type cg -pc_type bddc". */
+/* Whether an error of PETSc's objects is due to types or tolerances set by the user; `given`: these options, "-ksp_type cg -pc_type bddc". */
 static PetscBool is_wrong_choice(PetscErrorCode n, const char *function, const char *file, size_t size,
                                  char given[])
 {
@@ -93,7 +93,7 @@ static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, con
     }
   }
   if (state.pending && !state.trace) return n;
-  /* PETSC_COMM_SELF: PETSc's handler puts the other ranks of a larger communicator to sleep and ends them with code 0 */
+  /* PETSC_COMM_SELF: on a larger communicator PETSc's handler lets the other ranks sleep and exit with code 0 */
   return PetscTraceBackErrorHandler(PETSC_COMM_SELF, line, function, file, n, p, mess, NULL);
 }
 
@@ -120,7 +120,7 @@ void SbErrorSetFile(const char *file)
   SbAppend(sizeof(state.file), state.file, "%s%s", state.file[0] ? ", " : "", file);
 }
 
-/* Whether PETSc reads the first n lines of a text; *end: where they end. */
+/* Whether PETSc can parse the first n lines of a text as YAML; *end: end of these lines. */
 static PetscBool reads_lines(char text[], PetscInt n, char **end)
 {
   PetscOptions trial;
@@ -138,7 +138,7 @@ static PetscBool reads_lines(char text[], PetscInt n, char **end)
   return (PetscBool)!ierr;
 }
 
-/* The first line from which on no beginning of the file can be read. */
+/* Adds the first line to the message with which the YAML file can no longer be parsed. */
 void SbErrorFindYamlLine(void)
 {
   char text[1 << 16], *end, message[sizeof(state.message)];
@@ -190,7 +190,7 @@ void SbErrorSetCleanup(void (*fn)(void))
   state.at_end = fn;
 }
 
-/* Prints the error line, on one rank. */
+/* Prints the error line; on one rank only. */
 static void print_error(void)
 {
   if (state.failure_handler) (*state.failure_handler)(state.message, state.failure_ctx);
@@ -203,7 +203,7 @@ static void print_error(void)
 int SbErrorFinish(PetscErrorCode ierr)
 {
   enum {
-    SPEAKER, /* the lowest rank with a user error, else the lowest one that failed */
+    SPEAKER, /* encoded: lowest rank with a user error, else lowest rank with any error */
     FAILED
   };
   const int failed = ierr ? 1 : state.posted ? state.code : 0;

@@ -1,5 +1,5 @@
 /*
-  formula.c - formulas of time and position: recursive descent to a postfix program, run on a small stack.
+  formula.c - formulas of time and position: a recursive descent parser compiles them to postfix code for a stack machine.
 
     expression = term { (+|-) term }
     term       = unary { (*|/) unary }
@@ -7,8 +7,8 @@
     power      = primary [ ^ unary ]              so -2^2 = -4 and 2^3^2 = 2^9
     primary    = number | t | x | y | z | pi | function ( expression {, expression} ) | ( expression )
 
-  The program never branches, so its stack depth is known when it is compiled; deeper formulas are refused.
-  Not handled: comparisons (step(a) serves), units, names of the user's own.
+  The code has no branches, so its stack depth is known when it is compiled; formulas that need a deeper stack are an error.
+  Not supported: comparisons (use step(a)), units, user-defined names.
 */
 #include <ctype.h>
 #include "formula.h"
@@ -49,11 +49,11 @@ static const char *const variables[] = {"t", "x", "y", "z"};
 /* ------------------------------------------------------------------ compiler */
 
 typedef struct {
-  const char *text;  /* the whole formula */
-  const char *next;  /* first character not read yet */
-  const char *where; /* option, for messages */
+  const char *text;  /* the complete formula */
+  const char *next;  /* first unread character */
+  const char *where; /* name of the option, for messages */
   SbFormula formula;
-  int nesting, depth; /* of the recursion; of the stack at this point of the program */
+  int nesting, depth; /* depth of the recursion; depth of the stack at this point of the code */
 } Parser;
 
 static PetscErrorCode expression(Parser *p);
@@ -63,7 +63,7 @@ static void skip_blanks(Parser *p)
   while (isspace((unsigned char)*p->next)) p->next++;
 }
 
-/* One line that says what is wrong and in which column (from 1). */
+/* Raises a one-line error that says what is wrong and in which column, from 1. */
 static PetscErrorCode complain(const Parser *p, const char *at, const char *what)
 {
   PetscFunctionBeginUser;
@@ -124,7 +124,7 @@ static PetscErrorCode word(Parser *p)
   }
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(functions); i++) {
     if (strcmp(name, functions[i].name)) continue;
-    // sin(expression), atan2(expression, expression), ...
+    // function call: sin(expression), atan2(expression, expression), ...
     PetscCall(expect(p, '('));
     for (int k = 0; k < functions[i].narg; k++) {
       if (k) PetscCall(expect(p, ','));
@@ -134,7 +134,7 @@ static PetscErrorCode word(Parser *p)
     PetscCall(emit(p, SB_OP_CALL, (int)i, 0, 1 - functions[i].narg));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  // a name that is unknown, and what it may mean
+  // an unknown name: suggest similar ones
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(functions); i++) known[nknown++] = functions[i].name;
   for (int i = 0; i < 4; i++) known[nknown++] = variables[i];
   known[nknown++] = "pi";
@@ -160,7 +160,7 @@ static PetscErrorCode unary(Parser *p)
   } else {
     unsigned char c;
 
-    // a number, a name or what stands in parentheses
+    // a number, a name or an expression in parentheses
     skip_blanks(p);
     c = (unsigned char)*p->next;
     if (isdigit(c) || (c == '.' && isdigit((unsigned char)p->next[1]))) {
@@ -220,14 +220,14 @@ static PetscErrorCode expression(Parser *p)
 PetscReal SbFormulaEval(SbFormula f, PetscReal t, const PetscReal x[3])
 {
   PetscReal stack[SB_FORMULA_STACK + 1];
-  int n = 0; /* values on the stack */
+  int n = 0; /* number of values on the stack */
 
   if (!f->step) return SbFormulaEvalTable(f, t);
   for (PetscInt i = 0; i < f->nstep; i++) {
     const SbFormulaStep *s = &f->step[i];
     PetscReal *a;
 
-    /* Operands are the top of the stack, the first one deepest; the result takes the place of the first. */
+    /* Operands are on top of the stack, the first one deepest; the result replaces the first. */
     switch (s->op) {
     case SB_OP_NUMBER:
       stack[n++] = s->number;
@@ -308,7 +308,7 @@ PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *wher
     PetscCall(SbFormulaReadTable(comm, p.next + 6, where, f));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  /* every step of the program comes from at least one character of the text */
+  /* each instruction comes from at least one character of the text */
   PetscCall(PetscMalloc1(strlen(text) + 1, &f->step));
   p.formula = f;
   PetscCall(expression(&p));

@@ -1,10 +1,10 @@
 /*
-  formula.h - the compiled form of a formula, shared by its compiler and the reader of tables.
+  formula.h - compiled form of a formula, shared by the compiler and the reader of tables.
 */
 #pragma once
 #include "sbbase.h"
 
-#define SB_FORMULA_STACK 64 /* deepest stack of a formula */
+#define SB_FORMULA_STACK 64 /* largest stack depth of a formula */
 
 typedef enum {
   SB_OP_NUMBER,
@@ -20,24 +20,24 @@ typedef enum {
 
 typedef struct {
   SbFormulaOp op;
-  int index; /* SB_OP_VARIABLE: 0..3 for t, x, y, z; SB_OP_CALL: row of the table of functions */
+  int index; /* SB_OP_VARIABLE: 0 to 3 for t, x, y, z; SB_OP_CALL: row of the table of functions */
   PetscReal number;
 } SbFormulaStep;
 
 struct _p_SbFormula {
   PetscInt nstep;
-  SbFormulaStep *step; /* [nstep] postfix; NULL for a table */
+  SbFormulaStep *step; /* [nstep] postfix code; NULL for a table */
   PetscBool uses_time, uses_position;
   PetscInt nrow;
   PetscReal *time;  /* [nrow] s, ascending */
   PetscReal *value; /* [nrow] */
 };
 
-/* Reads a two-column file on rank 0 and gives it to all. Collective. Errors name option, file and line. */
+/* Reads a two-column file on rank 0 and broadcasts it. Collective. Errors name option, file and line. */
 PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *where, SbFormula formula);
-/* The formulas, as many as the row says, of an option that is `live` (live.c); where: its name. Destroy each. */
+/* Creates the row->count formulas of an option with the value `live` (live.c); where: name of the option. The caller destroys each. */
 PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula formula[]);
-/* A live formula is destroyed. */
+/* Removes a live formula that is being destroyed. */
 void SbLiveForget(SbFormula formula);
-/* Linear in between, constant outside. */
+/* Linear interpolation, constant outside. */
 PetscReal SbFormulaEvalTable(const struct _p_SbFormula *formula, PetscReal t);

@@ -1,15 +1,15 @@
 /*
-  formula_table.c - a function of time given by a text file with two columns.
+  formula_table.c - function of time given by a table in a text file with two columns.
 
-  Each line: time (s) and value, separated by blanks, a comma or a semicolon; `#` starts a comment; empty lines do not
-  count. Times must ascend. Linear in between, constant outside. Rank 0 reads, so that thousands of ranks do not open one
-  file; an error is known to all ranks, which raise it alike.
+  Each line: time (s) and value, separated by blanks, a comma or a semicolon; `#` starts a comment; empty lines are
+  ignored. Times must ascend. Linear interpolation, constant outside. Only rank 0 reads the file, which scales to thousands of
+  ranks; an error is broadcast and raised on all ranks.
 */
 #include <ctype.h>
 #include <errno.h>
 #include "formula.h"
 
-/* Reads one line: 1 with two numbers, 0 when it is blank, -1 otherwise. */
+/* Parses one line: returns 1 for two numbers, 0 for a blank line, else -1. */
 static int read_line(char *line, PetscReal row[2])
 {
   char *next = line, *end;
@@ -26,7 +26,7 @@ static int read_line(char *line, PetscReal row[2])
   return *next ? -1 : 1;
 }
 
-/* Reads the whole file. Rank 0 only. */
+/* Reads the complete file. Rank 0 only. */
 static PetscErrorCode read_rows(FILE *f, const char *file, const char *where, PetscInt *n, PetscReal **rows)
 {
   char line[512];
@@ -42,7 +42,7 @@ static PetscErrorCode read_rows(FILE *f, const char *file, const char *where, Pe
                "%s: %s, line %d: expected two numbers, time (s) and value", where, file, number);
     if (!found) continue;
     if (*n && row[0] <= (*rows)[2 * (*n - 1)]) {
-      char times[64]; /* PETSc would write "2." */
+      char times[64]; /* PetscSNPrintf() would write "2." */
 
       (void)snprintf(times, sizeof(times), "%g s does not come after %g s", (double)row[0],
                      (double)(*rows)[2 * (*n - 1)]);

@@ -1,21 +1,21 @@
 /*
-  live.c - formulas that follow what somebody does while a run goes on: -effect_<name>_displacement live, and any other formula of an effect.
+  live.c - interactive control: formulas whose values are read from a file during the run; -effect_<name>_displacement live, and other formulas of effects.
 
-  A file, live.txt in the run's folder, has a line `NAME x y z` (m) for each effect that is moved, and lines `NAME_angle a` (degrees), `NAME_vector x y z` (N), ... for other options of effects. Others rewrite it as often as they like, best by
-  renaming a new one. After each accepted step rank 0 reads it, and the effect goes from where it is towards the new place in a straight line, at -live_speed at most, or turns at -live_angular_speed; what is neither has
-  its new value from the next step on. All are tables of two rows, so a step that is tried again is the same one.
-  A run that is faster than -live_pace simulated seconds per second waits; one that is slower does not hurry afterwards.
+  The file, live.txt in the folder of the run, has a line `NAME x y z` (m) for each effect with a live displacement, and lines `NAME_angle a` (degrees), `NAME_vector x y z` (N), ... for other options of effects. Another program may rewrite it at any time, best by
+  renaming a new file. Rank 0 reads it after each accepted step. A displacement then moves from its current value towards the target in a straight line with the speed -live_speed, an angle with -live_angular_speed; other values
+  change at once. Each value is a table of two rows, so that a repeated step has the same values.
+  A run that is faster than -live_pace simulated seconds per second waits; a slower one does not catch up later.
 */
 #include "formula.h"
 
-#define VALUE_MAX 48 /* numbers set during a run */
+#define VALUE_MAX 48 /* largest number of live values */
 
 typedef struct {
-  char name[2 * SB_NAME_MAX];   /* begins its line of the file: tool, tool_angle */
-  char column[3 * SB_NAME_MAX]; /* of the history: tool_live_x, tool_angle_live */
+  char name[2 * SB_NAME_MAX];   /* first word of its line in the file: tool, tool_angle */
+  char column[3 * SB_NAME_MAX]; /* column of the history file: tool_live_x, tool_angle_live */
   const char *unit;
-  const PetscReal *speed; /* unit/s; NULL: none, it jumps */
-  int n, k;               /* number k of the n of its option, which follow each other */
+  const PetscReal *speed; /* unit/s; NULL: unlimited, the value changes at once */
+  int n, k; /* size of the vector option, component of this value; the components are consecutive */
   SbFormula formula;
 } Value;
 
@@ -23,12 +23,13 @@ static struct {
   PetscInt n;
   Value value[VALUE_MAX];
   char file[PETSC_MAX_PATH_LEN];
-  PetscReal speed, angular_speed, pace; /* m/s; degree/s; simulated seconds per second, 0: no limit */
-  PetscReal clock, begun;               /* s, from which the pace counts; clock 0: not yet */
-  PetscBool warned;                     /* of an invalid line */
+  PetscReal speed, angular_speed, pace; /* m/s; degree/s; simulated seconds per second, 0: unlimited */
+  PetscReal clock,
+    begun;          /* wall time and simulated time from which the pace is counted, s; clock 0: not started */
+  PetscBool warned; /* a warning about an invalid line was printed */
 } live = {.file = "live.txt", .speed = 0.2, .angular_speed = 90., .pace = 1.};
 
-/* From `from` at time t on to `to`. */
+/* Linear change from `from` at time t to `to` at t + duration. */
 static void set_rows(SbFormula f, PetscReal t, PetscReal from, PetscReal duration, PetscReal to)
 {
   f->time[0] = t;
@@ -51,7 +52,7 @@ PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula fo
     Value *v = &live.value[live.n + k];
     PetscReal old = 0.;
 
-    /* its names: those of the effect where this is moved */
+    /* names in the file and in the history; a displacement has the name of its effect */
     (void)snprintf(v->name, sizeof(v->name), "%.*s", length, name + 1);
     (void)snprintf(v->column, sizeof(v->column), n == 1 ? "%.*s_live" : "%.*s_live_%c", length, name + 1,
                    'x' + k);
@@ -60,7 +61,7 @@ PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula fo
     v->n = n;
     v->k = k;
 
-    /* after re-meshing the values continue */
+    /* keep the value after re-meshing */
     for (PetscInt i = 0; i < live.n; i++) {
       if (!strcmp(live.value[i].column, v->column)) old = live.value[i].formula->value[0];
     }
@@ -117,7 +118,7 @@ void SbLiveSet(PetscInt i, PetscReal t, PetscReal value)
   set_rows(live.value[i].formula, t, value, 1., value);
 }
 
-/* Reads the targets from the file; names without a valid line keep their target. The first invalid line is a warning. Rank 0. */
+/* Reads targets from the file; values without a valid line keep their target. Warns of the first invalid line. Rank 0. */
 static PetscErrorCode read_targets(PetscReal target[])
 {
   FILE *f = fopen(live.file, "r");
@@ -160,7 +161,7 @@ PetscErrorCode SbLiveAdvance(MPI_Comm comm, PetscReal t)
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
-  /* in time with the clock */
+  /* wait if simulated time is ahead of wall time */
   if (live.clock == 0.) {
     live.clock = MPI_Wtime();
     live.begun = t;
@@ -173,7 +174,7 @@ PetscErrorCode SbLiveAdvance(MPI_Comm comm, PetscReal t)
     live.begun = t;
   }
 
-  /* from here to where they are wanted */
+  /* from the current values to the targets */
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   for (PetscInt i = 0; i < live.n; i++) target[i] = live.value[i].formula->value[1];
   if (!rank) PetscCall(read_targets(target));

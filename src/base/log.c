@@ -1,8 +1,8 @@
 /*
-  log.c - one PETSc log event per phase that can take one percent of a run, the three stages of a run, and one event for each
-  effect, law, element and output that a scene names.
+  log.c - PETSc log events: one per phase of at least about one percent of a run, three stages, and one event for each
+  effect, material, element and output of a scene.
 
-  The names are what -log_view prints. Events are class-less (PETSC_OBJECT_CLASSID), because they time phases, not
+  The names are those printed by -log_view. Events belong to no class (PETSC_OBJECT_CLASSID), because they time phases, not
   objects.
 */
 #include "sbbase.h"
@@ -47,7 +47,7 @@ PetscErrorCode SbLogNamed(const char *kind, const char *name, PetscLogEvent *eve
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the seconds of an event in all stages. */
+/* Adds the time of an event in all stages, s. */
 static PetscErrorCode add_seconds(PetscLogEvent event, PetscReal *seconds)
 {
   const PetscLogStage stages[] = {0, SbLogStageSetup, SbLogStageSolve, SbLogStageOutput};

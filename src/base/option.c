@@ -1,16 +1,16 @@
 /*
-  option.c - the table of options: which rows are registered, which values were read, what the user gave.
+  option.c - registry of options: registered rows, values read so far, options given by the user.
 
-  PETSc's database holds the texts; this table holds their meaning. A row is found by class, type and key; the full name
-  is -<class>_<instance>_<key>. Two rows that lead to one full name (key b_c of body a, key c of body a_b) are found when
-  the second one is read. PETSc compares names without regard to case, so does this table.
+  PETSc's database has the texts; this table has their meaning. A row is found by class, type and key; the full name
+  is -<class>_<instance>_<key>. Two rows with the same full name (key b_c of body a, key c of body a_b) are an error when
+  the second one is read. Names are case-insensitive, as in PETSc.
 */
 #include "option.h"
 
 SbOptionTable SbTheOptions;
 const SbScope SbRunScope = {.klass = ""};
 
-/* Makes room for one more element of an array of `size` bytes each; doubles, so that growth is cheap. */
+/* Grows an array with n elements of `size` bytes by one; capacity is doubled, for constant amortised cost. */
 static PetscErrorCode grow(PetscInt n, size_t size, void *array)
 {
   PetscFunctionBeginUser;
@@ -26,7 +26,7 @@ static PetscErrorCode at_end(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Frees the table at the end, once: PETSc has room for 256 such functions, and a test may read options more often. */
+/* Registers the destructor of the table once: PETSc allows 256 such functions, and a test may read options more often. */
 static PetscErrorCode free_at_end(void)
 {
   PetscFunctionBeginUser;
@@ -154,7 +154,7 @@ PetscErrorCode SbOptionFindValue(const SbScope *scope, const char *key, SbScope 
   SbScope all;
 
   PetscFunctionBeginUser;
-  /* the instance's own, or that of the one which it is a copy of */
+  /* the instance's own value, or that of the instance it is a copy of */
   *where = *scope;
   PetscCall(SbOptionName(where, key, sizeof(name), name));
   PetscCall(PetscOptionsFindPair(NULL, NULL, name, value, given));
@@ -168,7 +168,7 @@ PetscErrorCode SbOptionFindValue(const SbScope *scope, const char *key, SbScope 
     break;
   }
 
-  /* or that of all bodies, which counts as read also where it is not needed */
+  /* else the value for all bodies, which always counts as read */
   if (strcmp(scope->klass, "body")) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbScopeSet(&all, "body", "", SB_OPTION_DEFAULT));
   PetscCall(SbOptionName(&all, key, sizeof(name), name));
@@ -188,7 +188,7 @@ PetscErrorCode SbOptionGiven(const SbScope *scope, const char *key, PetscBool *g
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a token of PetscOptionsGetAll() is the name of an option that somebody has read, and not part of a value. */
+/* Whether a token of PetscOptionsGetAll() is the name of an option that has been read, and not part of a value. */
 static PetscErrorCode is_read_name(const char *token, PetscBool *is)
 {
   PetscFunctionBeginUser;
@@ -209,8 +209,8 @@ static PetscErrorCode add_user(PetscInt *n, SbOptionUser **users, const char *na
 }
 
 /*
-  PETSc distinguishes names and values only for options that nobody has read yet. Those that were read come as one
-  string; their names are known by being read, and a value goes on until the next name.
+  PETSc separates names and values only for options that have not been read. Those read are returned as one
+  string: names are recognised because they have been read, and a value extends to the next name.
 */
 PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users)
 {
@@ -220,10 +220,10 @@ PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users)
   PetscFunctionBeginUser;
   *n = 0;
   *users = NULL;
-  // those that nobody has read
+  // unread options
   PetscCall(PetscOptionsLeftGet(NULL, &nleft, &names, &values));
   for (PetscInt i = 0; i < nleft; i++) PetscCall(add_user(n, users, names[i], values[i]));
-  // those that were read: a name, then words up to the next name of either kind
+  // read options: a name, then words up to the next name of either kind
   PetscCall(PetscOptionsGetAll(NULL, &all));
   token = strtok_r(all, " ", &rest);
   while (token) {
@@ -280,7 +280,7 @@ PetscBool SbOptionIsRead(const char *name)
   return PETSC_FALSE;
 }
 
-/* Whether an option without its dash is a list of names: -effects, -body_liver_inclusions. */
+/* Whether an option, without its dash, is a list of names: -effects, -body_liver_inclusions. */
 static PetscBool is_list(const char *name)
 {
   for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {

@@ -1,5 +1,5 @@
 /*
-  option.h - what the option files of layer 0 share: the registered rows, and the values read so far.
+  option.h - shared declarations of option*.c: registered rows, values read so far.
 */
 #pragma once
 #include "sbbase.h"
@@ -14,48 +14,48 @@ typedef struct {
   const SbOption *rows; /* [n] borrowed, static */
 } SbOptionBlock;
 
-/* A value that was read. */
+/* A value that has been read. */
 typedef struct {
   char name[SB_OPTION_NAME_MAX]; /* "-body_liver_young" */
   SbScope scope;
   const SbOption *row;
-  PetscBool given; /* by the user, else `text` is the preset */
+  PetscBool given; /* given by the user, else `text` is the default */
   char *text;      /* owned */
 } SbOptionRecord;
 
-/* An option of the user's, ours or PETSc's. */
+/* An option given by the user, of supple or PETSc. */
 typedef struct {
-  char *name;  /* without the dash; owned */
-  char *value; /* owned; NULL when there is none */
+  char *name;  /* name without the dash; owned */
+  char *value; /* value; owned; NULL: none */
 } SbOptionUser;
 
 typedef struct {
-  PetscBool at_end; /* freed in PetscFinalize() */
+  PetscBool at_end; /* the destructor is registered with PetscFinalize() */
   PetscInt nblock, nrecord, nuser;
   SbOptionBlock *block;   /* [nblock] in the order of registration */
   SbOptionRecord *record; /* [nrecord] in the order of the first reading */
-  PetscBool remembered;   /* SbOptionsRemember() filled `user` */
+  PetscBool remembered;   /* SbOptionsRemember() has filled `user` */
   SbOptionUser *user;     /* [nuser] */
   PetscInt ninherit;
-  SbScope *inherit; /* [ninherit] `instance` of `klass` takes what it is not given from the instance `type` */
+  SbScope *inherit; /* [ninherit] `instance` of `klass` inherits missing values from the instance `type` */
   PetscInt nlisted;
-  char **listed; /* [nlisted] names in the lists of the scenario files, with repeats; owned */
+  char **listed; /* [nlisted] names in the lists of the scenario files, with duplicates; owned */
 } SbOptionTable;
 extern SbOptionTable SbTheOptions; /* the registry of options */
 
-/* The row of a key in a scope; NULL when there is none. */
+/* Row of a key in a scope; NULL if there is none. */
 const SbOption *SbOptionFind(const SbScope *scope, const char *key);
-/* Whether something has read the option of this full name, without its dash. */
+/* Whether the option of this full name, without its dash, has been read. */
 PetscBool SbOptionIsRead(const char *name);
-/* The text of an option, given for the instance or for what it inherits from, and the scope under which it is recorded: its own, or that of what it is a copy of. */
+/* Value of an option, given for the instance or for one from which it inherits, and the scope in which it is recorded: its own, or that of the original of a copy. */
 PetscErrorCode SbOptionFindValue(const SbScope *scope, const char *key, SbScope *where, const char **value,
                                  PetscBool *given);
-/* The record of an option, by its full name; made when there is none yet. Lent. */
+/* Finds or creates the record of an option by its full name; borrowed. */
 PetscErrorCode SbOptionFindRecord(const SbScope *scope, const SbOption *row, SbOptionRecord **record);
-/* The error that a required option is missing; names a misspelt option of the user, if there is one. */
+/* Raises the error of a missing required option; the message suggests a misspelt option of the user, if there is one. */
 PetscErrorCode SbOptionMissing(const SbOptionRecord *record);
-/* The database as it is now: every name and value. Free with SbOptionUsersFree(). */
+/* All names and values in the database at present. Free with SbOptionUsersFree(). */
 PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users);
 PetscErrorCode SbOptionUsersFree(PetscInt *n, SbOptionUser **users);
-/* Name as in the manual: "-body_<name>_young", "-ts_dt". */
+/* Full name as in the manual: "-body_<name>_young", "-ts_dt". */
 PetscErrorCode SbOptionManualName(const SbOptionBlock *block, const SbOption *row, size_t size, char name[]);

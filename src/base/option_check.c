@@ -1,19 +1,19 @@
 /*
-  option_check.c - options that nobody read: which are ours and misspelt, which are right but of no use in this run, which are PETSc's and did nothing.
+  option_check.c - checks options that have not been read: misspelt ones of supple, ones that do not apply to this run, and unused ones of PETSc.
 
-  PETSc cannot distinguish a misspelt option from one that an object created later would read, so it stays silent; here a slip in one of its most common
-  ones is an error. Ours are all read before anything is computed. A name is ours when it begins with the prefix of one of our classes or the first word of a
-  program-wide key, or when it is a key or within two edits of one, and does not begin like an option of PETSc.
+  PETSc cannot distinguish a misspelt option from one that an object created later would read, so it reports nothing; here a misspelling of one of its most common
+  options is an error. All options of supple are read before the computation starts. A name belongs to supple if it begins with the prefix of one of its classes or the first word of a
+  program-wide key, or if it is a key or within two edits of one, and does not have a prefix of PETSc.
 
-  A misspelt one ends the run; one that is right and unused is warned of, with the reason: its integrator, type or effect is not the one of this run. What belongs to
-  an instance that nobody has read is right when some list of the scenario file names that instance and the class has the key:
-  then the command line has left it out. An instance that no list names is a slip.
+  A misspelt option ends the run; a valid but unused one causes a warning with the reason: it is for another integrator, type or effect. An option of
+  an unread instance is valid if a list in the scenario file has that instance and the class has the key:
+  then the command line has removed it from the list. An instance that is in no list is an error.
 */
 #include "option.h"
 
-/* ------------------------------------------------------------------ whose option */
+/* ------------------------------------------------------------------ owner of an option */
 
-/* The row of a program-wide option, by its name without dash; NULL when there is none. */
+/* Row of a program-wide option, by its name without dash; NULL if there is none. */
 static const SbOption *program_row(const char *name)
 {
   for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
@@ -25,7 +25,7 @@ static const SbOption *program_row(const char *name)
   return NULL;
 }
 
-/* Beginnings of PETSc's own options, as far as a run of ours can meet them. */
+/* Prefixes of PETSc's options that occur in runs of supple. */
 static PetscBool looks_like_petsc(const char *name)
 {
   return SbHasPrefix(
@@ -37,7 +37,7 @@ static PetscBool looks_like_petsc(const char *name)
     "redundant_ est esteig gamg_ hypre ml_ superlu sbaij inner_ coarse_ saddle_ telescope_ levels_ prefix_");
 }
 
-/* PETSc's options of solvers that are asked for most, and some that differ from them by two letters. */
+/* Most common options of PETSc's solvers, and some that differ from them by two letters. */
 static const char *const common[] = {
   "-ksp_type",         "-ksp_rtol",          "-ksp_atol",
   "-ksp_divtol",       "-ksp_max_it",        "-ksp_min_it",
@@ -57,12 +57,12 @@ static const char *const common[] = {
 };
 
 /*
-  What a name that is near none may have meant: an option of a class without its prefix, as -young, the end of a program-wide one, as -history_every, or what begins with the first word of
-  one, as -solver_type or -time_budget (-contact_ksp_type is PETSc's). "" when it is nothing of ours.
+  Suggestion for a name that is not similar to any option: a key without its prefix, as -young; the end of a program-wide key, as -history_every; or the first word of
+  one, as -solver_type or -time_budget (-contact_ksp_type is PETSc's). "" if it does not belong to supple.
 */
 static void guess(const char *name, size_t size, char text[])
 {
-  const size_t n = strcspn(name, "_"); /* of its first word, which may be all */
+  const size_t n = strcspn(name, "_"); /* length of its first word, perhaps the whole name */
   const PetscBool more =
     (PetscBool)(!looks_like_petsc(name) && (!name[n] || (name[n + 1] && !looks_like_petsc(name + n + 1))));
 
@@ -86,7 +86,7 @@ static void guess(const char *name, size_t size, char text[])
   }
 }
 
-/* The class whose prefix a name begins with; NULL when there is none. */
+/* Class whose prefix the name has; NULL if there is none. */
 static const char *class_of(const char *name)
 {
   for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
@@ -98,7 +98,7 @@ static const char *class_of(const char *name)
   return NULL;
 }
 
-/* The length of the name's instance, "liver" in "body_liver_young": the longest one that is known; 0: none. read: it has been read, else it is only listed in a file. */
+/* Length of the instance in a name, "liver" in "body_liver_young": the longest known one; 0: none. read: options of it have been read, else it is only in a list of a file. */
 static size_t instance_of(const char *klass, const char *name, PetscBool *read)
 {
   const char *at = name + strlen(klass) + 1;
@@ -119,7 +119,7 @@ static size_t instance_of(const char *klass, const char *name, PetscBool *read)
   return best;
 }
 
-/* Whether some record of the instance (n letters behind the class) is of this type. */
+/* Whether a record of the instance (n letters) is of this type. */
 static PetscBool has_type(const char *klass, const char *instance, size_t n, const char *type)
 {
   for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
@@ -132,15 +132,15 @@ static PetscBool has_type(const char *klass, const char *instance, size_t n, con
   return PETSC_FALSE;
 }
 
-/* Error or warning for an unread option. */
+/* Classification of an unread option. */
 typedef enum {
   NOT_OURS,
-  UNUSED,   /* right, for another type or setting: `text` is the reason */
-  LEFT_OUT, /* right, of an instance that only a scenario file names: `text` is "effect floor" */
-  WRONG     /* `text` is the message */
+  UNUSED,   /* valid, for another type or setting: `text` is the reason */
+  LEFT_OUT, /* valid, of an instance that only a scenario file names: `text` is "effect floor" */
+  WRONG     /* invalid: `text` is the message */
 } Verdict;
 
-/* An option with the prefix of a class, if some type of the class has its key. */
+/* Classifies an option with the prefix of a class: valid if some type of the class has its key. */
 static PetscErrorCode verdict_of_class(const char *klass, const char *name, size_t size, char text[],
                                        Verdict *verdict)
 {
@@ -151,7 +151,7 @@ static PetscErrorCode verdict_of_class(const char *klass, const char *name, size
 
   PetscFunctionBeginUser;
   *verdict = WRONG;
-  // one for all bodies: "default_young"
+  // option for all bodies: "default_young"
   if (!strcmp(klass, "body") &&
       !strncasecmp(instance, SB_OPTION_DEFAULT "_", strlen(SB_OPTION_DEFAULT "_"))) {
     key = instance + strlen(SB_OPTION_DEFAULT "_");
@@ -203,7 +203,7 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
     PetscCall(PetscStrncpy(text, row->help, size));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (!klass && looks_like_petsc(name) && !SbHasPrefix(name, "ts_")) { /* -ts_dt is ours, too */
+  if (!klass && looks_like_petsc(name) && !SbHasPrefix(name, "ts_")) { /* -ts_dt is an option of supple */
     if (SbHasPrefix(name, "ksp_ pc_ snes_"))
       PetscCall(SbSuggestNames(dashed, PETSC_STATIC_ARRAY_LENGTH(common), common, sizeof(near), near));
     if (!near[0] || !strcasecmp(near, dashed)) PetscFunctionReturn(PETSC_SUCCESS);
@@ -215,15 +215,15 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
     PetscCall(verdict_of_class(klass, name, size, text, verdict));
     if (*verdict != WRONG) PetscFunctionReturn(PETSC_SUCCESS);
   }
-  // near full names: everything read so far, every program-wide option, and the options of what a scenario file names. `near` is empty when none is
+  // similar full names: all options read so far, all program-wide options, and those of all instances named in scenario files; `near` is "" if there is none
   for (PetscInt i = 0; i < SbTheOptions.nblock; i++)
     room += SbTheOptions.block[i].n * (SbTheOptions.block[i].klass[0] ? SbTheOptions.nlisted + 1 : 1);
   PetscCall(PetscMalloc2(room, &list, room, &names));
   for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) list[n++] = SbTheOptions.record[i].name;
   for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
     const SbOptionBlock *block = &SbTheOptions.block[i];
-    const PetscInt instances =
-      block->klass[0] ? SbTheOptions.nlisted + !strcmp(block->klass, "body") : 1; /* for all bodies, too */
+    const PetscInt instances = block->klass[0] ? SbTheOptions.nlisted + !strcmp(block->klass, "body")
+                                               : 1; /* also the one for all bodies */
 
     for (PetscInt j = 0; j < block->n * instances; j++) {
       const char *key = block->rows[j % block->n].key;
@@ -247,11 +247,11 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
   if (near[0])
     PetscCall(PetscSNPrintf(why, sizeof(why), "; did you mean %s?", near));
   else if (klass) {
-    /* why an option with the prefix of a class was not read, when no name is near */
+    /* reason for an unread option with the prefix of a class, without a similar name */
     char keys[768] = "", instances[256] = "";
     const SbOptionRecord *last = NULL;
 
-    // keys that were read for the instance that a name belongs to: "body liver has mesh, young"; "" when there are none
+    // keys read for the instance of the name: "body liver has mesh, young"; "" if there are none
     for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
       const SbOptionRecord *r = &SbTheOptions.record[i];
       const size_t length = strlen(r->scope.instance);
@@ -262,7 +262,7 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
       if (!keys[0]) SbFormat(sizeof(keys), keys, "%s %s has ", klass, r->scope.instance);
       SbAppend(sizeof(keys), keys, "%s%s", keys[strlen(keys) - 1] == ' ' ? "" : ", ", r->row->key);
     }
-    /* instances of a class that have been read, "liver, stone"; "" when there are none */
+    /* instances of the class that have been read, "liver, stone"; "" if there are none */
     for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
       const SbOptionRecord *r = &SbTheOptions.record[i];
 
@@ -292,7 +292,7 @@ PetscErrorCode SbOptionMissing(const SbOptionRecord *r)
   PetscFunctionBeginUser;
   PetscCall(PetscOptionsLeftGet(NULL, &nleft, &names, NULL));
   PetscCall(PetscMalloc1(nleft, &list));
-  // of the same instance, and not an option itself
+  // unread names of the same instance that are not valid options
   for (PetscInt i = 0; i < nleft; i++) {
     const char *key;
 
@@ -325,7 +325,7 @@ PetscErrorCode SbOptionsCheck(void)
     PetscCall(find_verdict(names[i], sizeof(*text), text[i], &verdict[i]));
     if (verdict[i] == WRONG && !nbad++) PetscCall(PetscStrncpy(first, text[i], sizeof(first)));
   }
-  /* what is right is warned of where nothing is wrong; options of one instance that is left out in one line */
+  /* if there is no error: warnings of valid unused options; those of one excluded instance in one line */
   for (PetscInt i = 0; i < nleft && !nbad; i++) {
     PetscInt others = 0;
 
@@ -356,7 +356,7 @@ PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n)
   char **names, **values;
 
   PetscFunctionBeginUser;
-  *n = 0; /* ours were warned of by SbOptionsCheck() */
+  *n = 0; /* SbOptionsCheck() has warned of options of supple */
   PetscCall(PetscOptionsLeftGet(NULL, &nleft, &names, &values));
   for (PetscInt i = 0; i < nleft; i++) {
     PetscBool users = (PetscBool)!SbTheOptions.remembered;

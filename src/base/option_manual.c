@@ -1,8 +1,8 @@
 /*
-  option_manual.c - the reference manual from the table of options: for the terminal (-help TOPIC) and, for scripts/manual, as a table (-options_table).
+  option_manual.c - reference manual generated from the table of options: for the terminal (-help TOPIC) and, for scripts/manual, as a table (-options_table).
 
-  Blocks come by class, the run and the bodies first: what every instance of the class has, then each type. A topic is a class (body), a
-  type (pressure), the first word of options (solver), or any word in their names and texts.
+  Sections are ordered by class, the run and the bodies first: options of all instances of the class, then those of each type. A topic is a class (body), a
+  type (pressure), the first word of options (solver), or any word in their names and help texts.
 */
 #include "option.h"
 
@@ -30,7 +30,7 @@ static PetscErrorCode help_row(PetscViewer viewer, const SbOptionBlock *block, c
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionManualName(block, row, sizeof(name), name));
-  // what the value looks like: "3 numbers", "euler_implicit|newmark"
+  // description of the value: "3 numbers", "euler_implicit|newmark"
   with = row->kind == SB_OPTION_REALS ? "comma-separated " : row->count > 1 ? "semicolon-separated " : "";
   if (row->count > 1) PetscCall(PetscSNPrintf(number, sizeof(number), "%" PetscInt_FMT " ", row->count));
   PetscCall(PetscSNPrintf(value, sizeof(value), "%s%s%s%s", number, with, kinds[row->kind],
@@ -47,7 +47,7 @@ static PetscErrorCode help_row(PetscViewer viewer, const SbOptionBlock *block, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How well an option answers a topic: 3: its class or type, 2: its first word, 1: a word in its name or text, 0: not. */
+/* Relevance of an option to a topic: 3: its class or type, 2: its first word, 1: a word in its name or text, 0: none. */
 static PetscErrorCode answers(const SbOptionBlock *block, const SbOption *row, const char *topic, int *how)
 {
   const size_t n = strlen(topic);
@@ -65,7 +65,7 @@ static PetscErrorCode answers(const SbOptionBlock *block, const SbOption *row, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The options of a class and type that answer the topic at least so well, under one headline; *n += how many. */
+/* Prints the options of a class and type with at least the relevance `least`, under one headline; adds their number to *n. */
 static PetscErrorCode print_type(PetscViewer viewer, const SbOptionBlock *first, const char *topic, int least,
                                  PetscBool table, PetscInt *n)
 {
@@ -78,7 +78,7 @@ static PetscErrorCode print_type(PetscViewer viewer, const SbOptionBlock *first,
     for (PetscInt i = 0; i < b->n; i++) {
       PetscCall(answers(b, &b->rows[i], topic, &how));
       if (how < least) continue;
-      // headline of a block: "The run", "Every body", "body: corotated"
+      // headline of a section: "The run", "Every body", "body: corotated"
       if (!printed++ && !table) {
         if (!first->klass[0])
           PetscCall(PetscViewerASCIIPrintf(viewer, "\nThe run\n"));
@@ -87,7 +87,7 @@ static PetscErrorCode print_type(PetscViewer viewer, const SbOptionBlock *first,
         else
           PetscCall(PetscViewerASCIIPrintf(viewer, "\n%s: %s\n", first->klass, first->type));
       }
-      // one line of the table for programs; its columns are those of SbOptionsTable()
+      // one line of the table for scripts; its columns are those of SbOptionsTable()
       if (table) {
         static const char *const kinds[] = {
           [SB_OPTION_BOOL] = "bool",     [SB_OPTION_INT] = "int",        [SB_OPTION_REAL] = "real",
@@ -117,11 +117,12 @@ static PetscBool is_first(PetscInt i, PetscBool by_type)
   return PETSC_TRUE;
 }
 
-/* All options that answer the topic at least so well; n: how many. */
+/* Prints all options with at least the relevance `least`; n: their number. */
 static PetscErrorCode print_manual(PetscViewer viewer, const char *topic, int least, PetscBool table,
                                    PetscInt *n)
 {
-  static const char *const order[] = {"", "body", "effect"}; /* then as they were registered */
+  static const char *const order[] = {"", "body",
+                                      "effect"}; /* then the others in the order of registration */
   const PetscInt nordered = PETSC_STATIC_ARRAY_LENGTH(order);
 
   PetscFunctionBeginUser;
@@ -132,7 +133,7 @@ static PetscErrorCode print_manual(PetscViewer viewer, const char *topic, int le
 
     for (PetscInt k = 0; i >= 0 && k < nordered; k++) seen = (PetscBool)(seen || !strcmp(order[k], klass));
     if (seen || (i >= 0 && !is_first(i, PETSC_FALSE))) continue;
-    /* options of all instances first, then those of a type */
+    /* options of all instances first, then those of each type */
     for (int typed = 0; typed < 2; typed++) {
       for (PetscInt j = 0; j < SbTheOptions.nblock; j++) {
         const SbOptionBlock *b = &SbTheOptions.block[j];
@@ -153,7 +154,7 @@ PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic)
 
   PetscFunctionBeginUser;
   PetscCall(SbViewerOpen(comm, "", &viewer));
-  // how to run it, what a first scenario needs, and where the rest is
+  // usage, options of a first scenario, and further help
   if (!topic[0] || all) {
     char word[SB_NAME_MAX], words[1024] = " ";
 
@@ -175,7 +176,7 @@ PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic)
         if (row) PetscCall(help_row(viewer, b, row));
       }
     }
-    // topics that have options of their own: classes and their types, first words that several options of the run share
+    // topics with options: classes, their types, and first words that several options of the run share
     PetscCall(PetscViewerASCIIPrintf(viewer, "\nTopics of -help\n"));
     for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
       const SbOptionBlock *b = &SbTheOptions.block[i];
@@ -205,7 +206,7 @@ PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic)
                                      "  all: everything; petsc: a run that lists PETSc's own options\n"));
   }
   if (all) PetscCall(print_manual(viewer, "", 0, PETSC_FALSE, &n));
-  /* the best kind of answer that there is */
+  /* only the options of highest relevance */
   for (int least = 3; topic[0] && !n && least > 0; least--)
     PetscCall(print_manual(viewer, topic, least, PETSC_FALSE, &n));
   PetscCall(PetscViewerDestroy(&viewer));

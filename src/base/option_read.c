@@ -1,17 +1,17 @@
 /*
-  option_read.c - the readers: from the text of an option to a checked value.
+  option_read.c - conversion of option texts to checked values.
 
-  A number must fill its text; it is compared with the interval of its row, "[a, b)", whose ends may be inf. NaN lies in
-  no interval. The message of a failed check names option, value, interval, unit and what the option means; advice about
-  a forbidden end belongs into the help text of the row.
+  A number must be the whole text; it is compared with the interval of its row, "[a, b)", whose ends may be inf. NaN is in
+  no interval. The error message has the option, value, interval, unit and help text; advice about
+  an excluded end belongs to the help text of the row.
 */
 #include <ctype.h>
 #include "formula.h"
 #include "option.h"
 
-/* ------------------------------------------------------------------ pieces of text */
+/* ------------------------------------------------------------------ text */
 
-/* Copies [begin, end) without blanks at both ends; says whether it fits. */
+/* Copies [begin, end), trimmed; returns whether it fits. */
 static PetscBool copy_trimmed(const char *begin, const char *end, size_t size, char text[])
 {
   size_t n;
@@ -25,7 +25,7 @@ static PetscBool copy_trimmed(const char *begin, const char *end, size_t size, c
   return PETSC_TRUE;
 }
 
-/* Pieces between separators: "a,b" has two, "" and "  " have none. */
+/* Number of items between separators: "a,b" has two, "" and "  " have none. */
 static PetscInt count_pieces(const char *text, char separator)
 {
   PetscInt n = 1;
@@ -36,7 +36,7 @@ static PetscInt count_pieces(const char *text, char separator)
   return n;
 }
 
-/* Takes the next piece off *text. */
+/* Removes the next item from *text. */
 static PetscBool next_piece(const char **text, char separator, size_t size, char piece[])
 {
   const char *end = strchr(*text, separator);
@@ -58,7 +58,7 @@ static PetscBool parse_real(const char *text, PetscReal *value)
 
 /* ------------------------------------------------------------------ ranges */
 
-/* " in (0, inf) Pa", " in m"; "" for what has neither. */
+/* Text " in (0, inf) Pa", " in m"; "" without interval and unit. */
 static const char *wanted(const SbOption *row, size_t size, char text[])
 {
   const PetscBool range = (PetscBool)(row->range[0] == '(' || row->range[0] == '[');
@@ -77,7 +77,7 @@ static PetscErrorCode check_range(const SbOptionRecord *r, PetscReal x)
   PetscReal lo, hi;
 
   PetscFunctionBeginUser;
-  /* whether x lies in "[a, b)"; an empty range holds every number but NaN. Our own rows only: a bad range is our error */
+  /* whether x is in "[a, b)"; an empty range has every number except NaN; an invalid range is an internal error */
   in = (PetscBool)(x == x);
   if (r->row->range[0]) {
     PetscCheck(sscanf(r->row->range, "%c%63[^,],%63[^])]%c", &open, lo_text, hi_text, &close) == 4 &&
@@ -95,7 +95,7 @@ static PetscErrorCode check_range(const SbOptionRecord *r, PetscReal x)
 
 /* ------------------------------------------------------------------ readers */
 
-/* The record of an option of this kind, with its text: the user's, or else the preset. */
+/* Record of an option of this kind, with the user's text or else the default. */
 static PetscErrorCode text_of(const SbScope *scope, const char *key, SbOptionKind kind,
                               const SbOptionRecord **record)
 {
@@ -125,7 +125,7 @@ static PetscErrorCode text_of(const SbScope *scope, const char *key, SbOptionKin
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An empty preset: the caller's value stays. */
+/* Whether the default is empty: the caller's value is kept. */
 static PetscBool is_absent(const SbOptionRecord *r)
 {
   return (PetscBool)(!r->given && !r->text[0]);
@@ -288,7 +288,7 @@ PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula
     PetscCall(SbLiveCreate(r->name, r->row, formulas));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  // between formulas stand semicolons or, as in other vectors, commas outside parentheses; those become semicolons
+  // formulas are separated by semicolons or by commas outside parentheses; replace those by semicolons
   if (count > 1 && !strchr(r->text, ';')) {
     int depth = 0;
 

@@ -1,17 +1,17 @@
 /*
-  option_view.c - the complete scenario as an option file that runs again.
+  option_view.c - writes the complete scenario as an option file that can be run.
 
-  Every value that was read so far, with the user's own text or the preset's, so that no digit is lost; then the user's
-  options for PETSc. PETSc's file format cuts a line at '#', takes quotes off a value and knows no escapes: a value with a
-  blank is quoted; one that begins with a minus sign and a letter gets a blank in front, or PETSc takes it for a name. A
-  value with '#' or a quote can only come from the command line, and the file says so.
+  Every value read so far, as the user's or the default text, without loss of digits; then the user's
+  options for PETSc. PETSc's file format cuts a line at '#', removes quotes around a value and has no escapes: a value with a
+  blank is quoted; one that begins with a minus sign and a letter is preceded by a blank, or PETSc would take it for a name. A
+  value with '#' or a quote can only be given on the command line, and the file says so.
 */
 #include <ctype.h>
 #include <errno.h>
 #include <unistd.h>
 #include "option.h"
 
-/* PETSc 3.18 holds at most 512 options; beyond this many lines the presets become comments. */
+/* PETSc 3.18 allows 512 options; beyond this number of lines defaults are written as comments. */
 #define LINES_MAX 420
 
 static PetscErrorCode print_value(PetscViewer viewer, const char *value, int width)
@@ -93,7 +93,7 @@ PetscErrorCode SbOptionsView(PetscViewer viewer)
     PetscCall(
       PetscViewerASCIIPrintf(viewer, "# Defaults are comments: PETSc 3.18 holds at most 512 options.\n"));
 
-  /* the program-wide records in the order of the manual, which does not depend on who reads first */
+  /* program-wide records in the order of the manual, independent of the order of reading */
   PetscCall(PetscViewerASCIIPrintf(viewer, "\n# the run\n"));
   for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
     const SbOptionBlock *block = &SbTheOptions.block[i];
@@ -140,7 +140,7 @@ PetscErrorCode SbViewerOpen(MPI_Comm comm, const char *file, PetscViewer *viewer
     PetscCall(PetscViewerASCIIOpen(comm, "stdout", viewer));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  /* only rank 0 opens the file; the others must learn that it failed, or they wait for ever */
+  /* only rank 0 opens the file; a failure is broadcast, to avoid a deadlock */
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   if (!rank) {
     FILE *f = fopen(file, "w");

@@ -1,8 +1,8 @@
 /*
-  suggest_name.c - which of some names a misspelt one may mean.
+  suggest_name.c - names similar to a misspelt one.
 
-  Distance between words: optimal string alignment (Levenshtein's distance, an exchange of neighbours counts as one edit;
-  Damerau, Communications of the ACM 7, 1964). Case does not count, as in PETSc.
+  Distance between words: optimal string alignment (Levenshtein's distance, in which a transposition of neighbours is one edit;
+  Damerau, Communications of the ACM 7, 1964). Case-insensitive, as in PETSc.
 */
 #include <ctype.h>
 #include <stdlib.h>
@@ -34,7 +34,7 @@ static PetscInt edit_distance(const char *a, const char *b)
 PetscErrorCode SbSuggestNames(const char *word, PetscInt n, const char *const names[], size_t size,
                               char text[])
 {
-  const PetscInt farthest = strlen(word) < 6 ? 1 : 2; /* edit distance of a misspelling */
+  const PetscInt farthest = strlen(word) < 6 ? 1 : 2; /* largest edit distance of a similar name */
   PetscInt best = farthest + 1, nbest = 0;
 
   PetscFunctionBeginUser;
@@ -79,7 +79,7 @@ PetscErrorCode SbListAdvise(PetscFunctionList list, const char *word, size_t siz
   PetscFunctionBeginUser;
   PetscCall(PetscFunctionListGet(list, &names, &n));
   while (n && !names[n - 1])
-    n--; /* PETSc 3.18 counts the closing NULL; newer releases have no order of their own */
+    n--; /* PETSc 3.18 counts the terminating NULL; newer releases use another function */
   qsort(names, (size_t)n, sizeof(*names), compare_texts);
   PetscCall(SbSuggestName(word, n, names, size, text));
   PetscCall(PetscFree(names));

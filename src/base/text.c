@@ -1,5 +1,5 @@
 /*
-  text.c - texts of a fixed size, printed into, where what does not fit is cut off; numbers from a text.
+  text.c - formatted texts of fixed size, truncated if too long; numbers in a text.
 */
 #include <math.h>
 #include <stdarg.h>

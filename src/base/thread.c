@@ -1,10 +1,10 @@
 /*
-  thread.c - one thread per rank: ranks are the parallelism of this program.
+  thread.c - limits each rank to one thread: the program is parallel by MPI ranks only.
 
-  CHOLMOD's OpenMP regions ask for a number of threads that was fixed when it was compiled, whatever OMP_NUM_THREADS says, and idle
-  threads of GNU's OpenMP spin: two ranks on four cores then fight for them. A largest nesting level of 0 makes every
-  region run on its own thread. Threaded BLAS libraries are set separately. The functions are looked up among the libraries of the
-  process, so nothing of OpenMP is needed to build; where a library has none of them it has no threads either.
+  CHOLMOD's OpenMP regions use a number of threads fixed when it was compiled, whatever OMP_NUM_THREADS is, and idle
+  threads of GNU's OpenMP spin: two ranks on four cores then compete for them. With a maximum of 0 active levels every
+  region runs on its own thread. Threaded BLAS libraries are limited separately. The functions are looked up in the loaded
+  libraries, so that the build needs no OpenMP; a library without them has no threads.
 */
 #include <dlfcn.h>
 #include <link.h>
@@ -13,7 +13,7 @@
 /* Functions of a library that set and get its number of threads. */
 static const struct {
   const char *set, *ask;
-  int one; /* the argument that stands for one thread */
+  int one; /* argument for one thread */
 } controls[] = {
   {"omp_set_max_active_levels", NULL, 0},
   {"openblas_set_num_threads", "openblas_get_num_threads", 1},
@@ -21,7 +21,7 @@ static const struct {
   {"bli_thread_set_num_threads", NULL, 1},
 };
 
-/* One library of the process: set its threads, and count those that it would still use. */
+/* Callback for one loaded library: limits its threads, and finds the largest number that remains. */
 static int set_library(struct dl_phdr_info *info, size_t size, void *most)
 {
   void *library = dlopen(info->dlpi_name[0] ? info->dlpi_name : NULL, RTLD_LAZY | RTLD_NOLOAD);
@@ -33,14 +33,14 @@ static int set_library(struct dl_phdr_info *info, size_t size, void *most)
     void (*set)(int) = NULL;
     int (*ask)(void) = NULL;
 
-    /* the conversion that POSIX describes for functions */
+    /* conversion to a function pointer as described by POSIX */
     *(void **)&set = dlsym(library, controls[k].set);
     if (controls[k].ask) *(void **)&ask = dlsym(library, controls[k].ask);
     if (set) (*set)(controls[k].one);
     if (ask) *threads = PetscMax(*threads, (*ask)());
   }
 
-  /* OpenMP without nested levels to switch off, or one that did not obey */
+  /* OpenMP without active levels to limit, or one that ignored the call */
   {
     int (*levels)(void) = NULL, (*ask)(void) = NULL;
 

@@ -1,19 +1,19 @@
 /*
-  box_tree.c - which of many boxes meet a given one, or those of another tree, or each other, and which is nearest: a bounding
-  volume hierarchy of axis-aligned boxes with four children per node.
+  box_tree.c - bounding volume hierarchy of axis-aligned boxes with four children per node: overlap queries with a box, with another tree or
+  within a tree, and nearest-neighbour search.
 
-  The boxes are ordered so that neighbours follow each other: the range is halved again and again at the median of the middles along the longer
-  axis, always at a multiple of the number of boxes below a child. Four boxes in this order form a group, four groups one of the next level; each
-  group holds the bounding boxes (hulls) of its four children side by side, so that they are tested together, and nothing but the order has to be stored.
-  When boxes move, the tree is refitted: the order stays, the hulls are made anew. When these have grown too much, as where bodies go different ways, it is rebuilt.
+  The order of the boxes is found by recursive bisection: the range is split at the median of the box centres along the longest
+  axis, always at a multiple of the number of boxes below a child. Four consecutive boxes form a group, four groups one of the next level; each
+  group stores the bounding boxes (hulls) of its four children as arrays, so that they are tested together, and only the order has to be stored.
+  When boxes move, the tree is refitted: the order is kept and the hulls are updated. It is rebuilt when hulls have grown too large.
 
-  Traversals keep their stack with the caller and return what they find piece by piece: nothing is allocated, and what is found need not fit into memory.
+  Traversals use a stack owned by the caller and return one result per call: they need no allocation, and results need not fit into memory.
 */
 #include "sbgeometry.h"
 
-#define WORSE 1.5 /* size of the hulls against the boxes, over that of a new tree: then it is built anew */
+#define WORSE 1.5 /* largest growth of hulls relative to boxes since the last build, before a rebuild */
 
-/* ------------------------------------------------------------------ making a tree */
+/* ------------------------------------------------------------------ construction */
 
 typedef struct {
   PetscReal middle[3];
@@ -34,7 +34,7 @@ static inline void swap(Item *a, Item *b)
   *b = keep;
 }
 
-/* Quickselect: brings the m first along the axis to the front (Hoare, "Algorithm 65: Find", 1961, with the median of three as pivot). */
+/* Quickselect: moves the m smallest items along the axis to the front (Hoare, "Algorithm 65: Find", 1961, with median-of-three pivots). */
 static void select_first(Item item[], PetscInt n, PetscInt m, int axis)
 {
   PetscInt low = 0, high = n - 1;
@@ -44,7 +44,7 @@ static void select_first(Item item[], PetscInt n, PetscInt m, int axis)
     PetscInt i = low, j = high;
     Item pivot;
 
-    // the median of three, then all smaller ones to its left
+    // median-of-three pivot; partition
     if (before(&item[centre], &item[low], axis)) swap(&item[centre], &item[low]);
     if (before(&item[high], &item[low], axis)) swap(&item[high], &item[low]);
     if (before(&item[high], &item[centre], axis)) swap(&item[high], &item[centre]);
@@ -54,7 +54,7 @@ static void select_first(Item item[], PetscInt n, PetscInt m, int axis)
       while (before(&pivot, &item[j], axis)) j--;
       if (i <= j) swap(&item[i++], &item[j--]);
     }
-    // the m-th is on one side, or in place
+    // continue in the part with position m
     if (m <= j)
       high = j;
     else if (m >= i)
@@ -64,29 +64,29 @@ static void select_first(Item item[], PetscInt n, PetscInt m, int axis)
   }
 }
 
-/* Orders n boxes, of which `below` go into each child of their node, by halving along the longer axis. */
+/* Orders n boxes by recursive bisection along the longest axis; `below`: number of boxes below each child of the node. */
 static void order_items(Item item[], PetscInt n, PetscInt below)
 {
   PetscReal box[6];
   PetscInt nchild, left;
   int axis;
 
-  // the left half takes whole children
+  // the left half has a whole number of children
   while (below >= n) below /= 4;
   if (below == 0) return;
   nchild = (n + below - 1) / below;
   left = (nchild + 1) / 2 * below;
-  // the longest axis of the box of all middles
+  // longest axis of the bounding box of the box centres
   SbBoxClear(box);
   for (PetscInt i = 0; i < n; i++) SbBoxAdd(box, item[i].middle);
   axis = SbBoxLongest(box);
-  // split there, and go on with the halves
+  // partition, and recurse into both halves
   select_first(item, n, left, axis);
   order_items(item, left, below);
   order_items(item + left, n - left, below);
 }
 
-/* Size of a box: the sum of its edges; none of an empty one. */
+/* Size of a box: sum of its edge lengths; 0 for an empty box. */
 static inline PetscReal size_of(const PetscReal box[6])
 {
   const PetscReal size = box[3] - box[0] + (box[4] - box[1]) + (box[5] - box[2]);
@@ -94,7 +94,7 @@ static inline PetscReal size_of(const PetscReal box[6])
   return size > 0 ? size : 0;
 }
 
-/* Refits: the hulls of all groups, level by level from the boxes up; returns the size of all over that of the boxes. */
+/* Refit: updates the hulls of all groups from the lowest level up; returns the total size of hulls over that of the boxes. */
 static PetscReal fill(SbBoxTree *tree, const PetscReal (*box)[6])
 {
   PetscReal groups = 0, boxes = 0;
@@ -106,7 +106,7 @@ static PetscReal fill(SbBoxTree *tree, const PetscReal (*box)[6])
     for (PetscInt g = 0; g < n; g++) {
       PetscReal hull[6];
 
-      // the hull of the four children; those of the lowest level are the boxes
+      // hull of the four children; on the lowest level these are boxes
       SbBoxClear(hull);
       for (int l = 0; l < 4; l++) {
         const PetscInt i = level == 0 ? tree->order[4 * g + l] : -1;
@@ -118,7 +118,7 @@ static PetscReal fill(SbBoxTree *tree, const PetscReal (*box)[6])
         if (level == 0) boxes += size_of(child);
       }
       groups += size_of(hull);
-      // it is a child of the next level, or that of the tree
+      // store it as a child of the next level, or as the hull of the tree
       for (int k = 0; k < 6; k++) {
         if (level + 1 == tree->nlevel)
           tree->hull[k] = hull[k];
@@ -130,7 +130,7 @@ static PetscReal fill(SbBoxTree *tree, const PetscReal (*box)[6])
   return groups / PetscMax(boxes + size_of(tree->hull), PETSC_SMALL * PETSC_SMALL);
 }
 
-/* A new order of the boxes from their middles, and the hulls. */
+/* Builds the order of the boxes from their centres, then the hulls. */
 static PetscErrorCode build(SbBoxTree *tree, const PetscReal (*box)[6])
 {
   PetscInt below = 1;
@@ -167,7 +167,7 @@ PetscErrorCode SbBoxTreeCreate(PetscInt n, const PetscReal (*box)[6], SbBoxTree 
   tree->n = n;
   SbBoxClear(tree->hull);
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
-  // groups of each level: a quarter of those below, up to one
+  // number of groups per level: a quarter of the level below, down to one
   for (ngroup = n; ngroup > 1 || !tree->nlevel;) {
     ngroup = (ngroup + 3) / 4;
     tree->start[tree->nlevel + 1] = tree->start[tree->nlevel] + ngroup;
@@ -175,7 +175,7 @@ PetscErrorCode SbBoxTreeCreate(PetscInt n, const PetscReal (*box)[6], SbBoxTree 
   }
   PetscCall(PetscMalloc2(4 * (size_t)tree->start[1], &tree->order, tree->start[tree->nlevel], &tree->group));
   for (PetscInt i = n; i < 4 * tree->start[1]; i++) tree->order[i] = -1;
-  // places without a child are empty
+  // initialise unused children as empty boxes
   for (PetscInt g = 0; g < tree->start[tree->nlevel]; g++) {
     for (int k = 0; k < 6; k++) {
       for (int l = 0; l < 4; l++) tree->group[g][k][l] = k < 3 ? PETSC_MAX_REAL : -PETSC_MAX_REAL;
@@ -195,7 +195,7 @@ PetscErrorCode SbBoxTreeDestroy(SbBoxTree *tree)
 
 /* ------------------------------------------------------------------ traversals */
 
-/* Bit l: child l of the group meets the box. */
+/* Bit l is set if child l of the group overlaps the box. */
 static inline unsigned meeting(const PetscReal (*group)[4], const PetscReal box[6])
 {
   unsigned mask = 0;
@@ -207,7 +207,7 @@ static inline unsigned meeting(const PetscReal (*group)[4], const PetscReal box[
   return mask;
 }
 
-/* The hull of child l, grown on all sides. */
+/* Hull of child l, enlarged by `grown` on all sides. */
 static inline void grow(PetscReal (*group)[4], int l, PetscReal grown, PetscReal box[6])
 {
   for (int k = 0; k < 3; k++) {
@@ -230,7 +230,7 @@ PetscBool SbBoxQueryNext(SbBoxQuery *query, PetscInt *i)
 {
   const SbBoxTree *tree = query->tree;
 
-  // down the stack to a lowest group that meets the box
+  // pop groups until one of the lowest level overlaps the box
   while (!query->hits) {
     PetscInt level, g;
     unsigned mask;
@@ -251,7 +251,7 @@ PetscBool SbBoxQueryNext(SbBoxQuery *query, PetscInt *i)
       query->stack[query->depth++][1] = 4 * g + l;
     }
   }
-  // its children that do, one per call
+  // return the overlapping boxes, one per call
   for (int l = 0; l < 4; l++) {
     if (!(query->hits >> l & 1)) continue;
     query->hits &= ~(1U << l);
@@ -283,14 +283,14 @@ PetscBool SbBoxNearestNext(SbBoxNearest *nearest, PetscInt *i)
     PetscReal d2[4] = {0, 0, 0, 0};
     int n = 0;
 
-    // farther than the limit, which the caller lowers; or a box
+    // skip what is farther than the limit, which the caller lowers; return a box
     if (!(top.d2 <= nearest->limit2)) continue;
     if (top.level < 0) {
       *i = tree->order[top.index];
       return PETSC_TRUE;
     }
     group = (const PetscReal(*)[4])tree->group[tree->start[top.level] + top.index];
-    // squared distances of the children; an empty one is infinitely far
+    // squared distances to the children; infinite for empty ones
     for (int k = 0; k < 3; k++) {
       for (int l = 0; l < 4; l++) {
         const PetscReal above = group[k][l] - nearest->box[3 + k], below = nearest->box[k] - group[3 + k][l];
@@ -299,7 +299,7 @@ PetscBool SbBoxNearestNext(SbBoxNearest *nearest, PetscInt *i)
         d2[l] += off > 0 ? off * off : 0;
       }
     }
-    // those within the limit go onto the stack, the nearest last, so that it is taken first
+    // push the children within the limit, the nearest last, to be visited first
     for (int l = 0; l < 4; l++) {
       int at = n;
 
@@ -335,7 +335,7 @@ PetscInt SbBoxPairsNext(SbBoxPairs *pairs, PetscInt room, PetscInt pair[])
     PetscReal box[6];
 
     if (top.level[0] != top.level[1]) {
-      // the children of the group of the higher level against the hull of the other
+      // test the children of the group on the higher level against the hull of the other
       const int up = top.level[1] > top.level[0], down = 1 - up, level = top.level[down] + 1;
       const SbBoxTree *t = pairs->tree[down];
       unsigned mask;
@@ -356,7 +356,7 @@ PetscInt SbBoxPairsNext(SbBoxPairs *pairs, PetscInt room, PetscInt pair[])
       }
       continue;
     }
-    // groups of one level: each child of the first against all four of the second, in a tree against itself each pair once
+    // same level: children of the first against those of the second; for a tree against itself each pair once
     for (int i = 3; i >= 0; i--) {
       unsigned mask;
 

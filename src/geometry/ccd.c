@@ -1,23 +1,23 @@
 /*
-  ccd.c - how far two simplices may move before they meet: conservative advancement, for all kinds of pairs alike.
+  ccd.c - continuous collision detection of two simplices (vertex and triangle, two edges, ...) by conservative advancement.
 
-  Vertices move on straight lines, x_a(t) = x_a + t q_a. Let n be the direction of the distance d at time t. Each side lies behind a
-  plane with the normal n, and the planes are d apart: for all i of the first side and j of the second, n . (x_i - x_j) >= d. So the distance
-  is at least the least of n . (x_i - x_j) + (s - t) n . (q_i - q_j) at a later time s, and t may grow until this is the gap that is to
-  be kept. Repeated, t converges from below to the time at which that gap is reached.
+  Vertices move linearly, x_a(t) = x_a + t q_a. Let n be the unit vector along the shortest connection, of length d, at time t. Each side is behind a
+  plane with normal n, and the planes are d apart: for all i of the first side and j of the second, n . (x_i - x_j) >= d. So the distance
+  at a later time s is at least the minimum of n . (x_i - x_j) + (s - t) n . (q_i - q_j), and t can be advanced until this bound equals the
+  gap to be kept. The iteration converges from below to the time at which that gap is reached.
 
   This is additive CCD (Li, Kaufman, Jiang, "Codimensional Incremental Potential Contact", 2021, section 4), which bounds the approach by the
-  lengths of q, with the bound of Mirtich ("Impulse-based dynamic simulation", 1996, section 2.3): sliding and receding pairs are done after one distance.
+  norms of q, with the bound of Mirtich ("Impulse-based dynamic simulation", 1996, section 2.3): sliding and separating pairs need one distance only.
 
-  Rounding: the bound holds for any unit vector, thus for a wrong one, too. Differences are taken of coordinates of one time, so they are right but
-  for their own rounding, however far from the origin or however fast both move. What the caller's coordinates are rounded to
-  when it goes a part of the step, eps |x| at first and eps |x1 - x0| in addition for the whole step, is kept free: SB_CCD_ROUNDING times that.
+  Rounding: the bound holds for any unit vector n, also an inaccurate one. Differences are formed between coordinates at the same time, so their relative
+  error is small, far from the origin and for fast motion too. The rounding of the caller's coordinates at a fraction of the step, eps |x| initially plus eps |x1 - x0|
+  for the full step, is added to the gap: SB_CCD_ROUNDING times that.
 */
 #include "sbgeometry.h"
 
-#define STEPS 1024 /* most iterations; the time reached by then is returned, which is safe */
-#define AIM 0.9    /* of the gap to be kept, aimed at: then a few steps get below it */
-#define CLOSER 0.5 /* of a gap that is below the separation already, to be kept */
+#define STEPS 1024 /* largest number of iterations; then the time reached is returned, which is safe */
+#define AIM 0.9    /* iterations aim at this fraction of the gap to be kept, so that few of them are enough */
+#define CLOSER 0.5 /* fraction to keep of a gap that is below the separation already */
 
 PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal x1[],
                          const SbCCDLimits *limits, PetscReal *time)
@@ -26,7 +26,7 @@ PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal 
   const int n = kind == SB_PAIR_EDGE_EDGE ? 4 : 2 + (int)kind;
   PetscReal y[12], q[12], x[12], at = 0, speed = 0, far = 0, fast = 0, aim = 0, stop = 0;
 
-  // positions and motions relative to the first vertex
+  // positions and displacements relative to the first vertex
   for (int a = 0; a < n; a++) {
     for (int k = 0; k < 3; k++) {
       const int i = 3 * a + k;
@@ -75,7 +75,7 @@ PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal 
     } else if (!(gap - at * fast > stop))
       break;
 
-    // how long each vertex of one side stays away from each of the other, along n; at the least as long as speed tells
+    // time until a vertex of one side may reach one of the other, along n; at least the time given by the largest relative speed
     for (int a = 0; a < n; a++) {
       PetscReal *p = a < nfirst ? first[a] : second[a - nfirst];
 
@@ -88,7 +88,7 @@ PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal 
         const PetscReal approach = second[j][1] - first[i][1] + fast;
 
         if (above < 0)
-          length = 0; // n is wrong by rounding
+          length = 0; // rounding of n
         else if (approach > 0 && above < length * approach)
           length = above / approach;
       }

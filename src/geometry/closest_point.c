@@ -1,16 +1,18 @@
 /*
-  closest_point.c - a point and a triangle: the nearest place, and where a half-line meets it.
+  closest_point.c - closest point of a triangle to a point, and intersection of a ray with a triangle.
 
-  Nearest point by the regions of Ericson, "Real-Time Collision Detection", 2005, 5.1.5.
+  Closest point by the Voronoi regions of Ericson, "Real-Time Collision Detection", 2005, 5.1.5.
 */
 #include "sbgeometry.h"
 
-#define FLAT 1e-12     /* area over squared length, below which a triangle has none */
-#define SLIM 1e-4      /* the same, below which the region of the nearest point may be the wrong one */
-#define RIM 1e-6       /* tolerance of barycentric coordinates: rays through edges hit */
-#define PARALLEL 1e-10 /* volume of way and edges over the squared length of one: it lies in the plane */
+#define FLAT 1e-12 /* flat triangle: largest area over squared edge length */
+#define SLIM \
+  1e-4 /* slim triangle, whose Voronoi regions may be affected by rounding: largest area over squared edge length */
+#define RIM 1e-6 /* tolerance of barycentric coordinates: rays through edges hit */
+#define PARALLEL \
+  1e-10 /* parallel ray: largest triple product of ray and edges over the squared edge length */
 
-/* p minus the point with these weights. */
+/* r = p minus the point with barycentric coordinates w. */
 static inline void away(const PetscReal p[3], const PetscReal *const x[3], const PetscReal w[3],
                         PetscReal r[3])
 {
@@ -27,7 +29,7 @@ static SbTriangleFeature put(SbTriangleFeature place, PetscReal w0, PetscReal w1
   return place;
 }
 
-/* The nearest of the three edges, when that is nearer than d2. */
+/* Closest point on the three edges, if its squared distance is less than d2. */
 static SbTriangleFeature closest_edge(const PetscReal p[3], const PetscReal *const x[3],
                                       SbTriangleFeature place, PetscReal w[3], PetscReal *d2)
 {
@@ -57,7 +59,7 @@ SbTriangleFeature SbTriangleClosestPoint(const PetscReal p[3], const PetscReal *
   PetscReal ab[3], ac[3], r[3], d[6], area[3];
   SbTriangleFeature place;
 
-  // products of both edges at corner 0 with the vectors from each corner to p; areas of the three parts
+  // products of both edges at corner 0 with the vectors from the corners to p; unnormalised barycentric coordinates
   SbSubtract(x[1], x[0], ab);
   SbSubtract(x[2], x[0], ac);
   for (int k = 0; k < 3; k++) {
@@ -68,7 +70,7 @@ SbTriangleFeature SbTriangleClosestPoint(const PetscReal p[3], const PetscReal *
   area[2] = d[0] * d[3] - d[2] * d[1];
   area[1] = d[4] * d[1] - d[0] * d[5];
   area[0] = d[2] * d[5] - d[4] * d[3];
-  // Voronoi regions of the corners, of the edges, then the inside
+  // Voronoi regions of the corners, of the edges, then the face
   if (d[0] <= 0 && d[1] <= 0)
     place = put(SB_FEATURE_CORNER_0, 1, 0, 0, w);
   else if (d[2] >= 0 && d[3] <= d[2])
@@ -88,7 +90,7 @@ SbTriangleFeature SbTriangleClosestPoint(const PetscReal p[3], const PetscReal *
     const PetscReal scale = PetscMax(d[0] - d[2], d[1] - d[5]); /* squared lengths of ab, ac */
     const PetscReal total = area[0] + area[1] + area[2];
 
-    // by areas, and with slim triangles by a second look at the edges
+    // barycentric coordinates; for slim triangles also test the edges
     *d2 = PETSC_MAX_REAL;
     if (total > FLAT * FLAT * scale * scale) {
       w[1] = area[1] / total;

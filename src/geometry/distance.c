@@ -1,32 +1,33 @@
 /*
-  distance.c - the distance between two simplices, a vertex and a triangle or two edges, with its derivatives.
+  distance.c - distance between two simplices (vertex and triangle, two edges, ...), with gradient and Hessian.
 
-  The closest points are sum_a w_a x_a = r, from the second side to the first, d = |r|. Vertices with a weight other than zero are the
-  closest feature: two vertices, a vertex and an edge, or the inside of both sides. Let t_k = sum_a w_a,k x_a be the derivatives of r with respect
-  to the coordinates on the feature (none, one or two), q_k their dual basis, and c_a = sum_k w_a,k q_k. As r is orthogonal to all t_k,
+  The vector between the closest points, from the second side to the first, is r = sum_a w_a x_a, d = |r|. The vertices with nonzero weight are the
+  closest feature: two vertices, a vertex and an edge, or the interior of both sides. Let t_k = sum_a w_a,k x_a be the derivatives of r with respect
+  to the (none, one or two) coordinates on the feature, q_k their dual basis, and c_a = sum_k w_a,k q_k. As r is orthogonal to all t_k,
 
       d,a    = w_a n,                                              n = r / d
       d,ab   = w_a w_b P / d - w_a c_b n^T - w_b n c_a^T - d (c_a . c_b) n n^T
 
-  with P the projection on what is orthogonal to n and all t_k. P is zero in the inside of both sides: there no term grows as d falls.
+  with P the projection orthogonal to n and all t_k. P is zero in the interior of both sides: there no term is singular as d vanishes.
 
-  a grad d grad d^T + b Hess d acts on five dimensions only: n on the three sets of weights whose sum is zero, and the two directions
-  orthogonal to n on w. Its positive semi-definite part is found there.
+  a grad d grad d^T + b Hess d has rank five at most, on the space spanned by n times three vectors of weights with zero sum, and by the two directions
+  orthogonal to n times w. Its projection to the positive semi-definite matrices is computed there.
 
-  Near a plane that both sides lie in, r is a small difference of large numbers; where it is less certain than the normal of the plane,
+  If both sides are nearly in one plane, r is a small difference of large numbers; where it is less accurate than the normal of the plane,
   n is that normal and d the distance along it.
 
-  Edges: the lines' closest points where they are on both edges, else the nearest end (after Lumelsky, "On fast computation of distance
-  between line segments", 1985; cross products in place of differences of squares, which near-parallel edges do not bear). Mollifier: Li et
+  Edges: closest points of the lines if they are on both edges, else the nearest endpoint (after Lumelsky, "On fast computation of distance
+  between line segments", 1985; with cross products instead of differences of squares, which are inaccurate for nearly parallel edges). Mollifier: Li et
   al., "Incremental Potential Contact", 2020, section 5.
 */
 #include "sbgeometry.h"
 
-#define ALONG 1e-4     /* sine between edges, below which the lines' closest points may be wrong */
-#define PARALLEL 1e-12 /* the same, below which there are none */
+#define ALONG \
+  1e-4 /* sine of the angle between edges, below which the closest points of the lines are inaccurate */
+#define PARALLEL 1e-12 /* the same, below which lines count as parallel */
 
 /*
-  The distance of `vertex` from the edge from a to b, when it is less than s->d, which is squared here. The vertex is on the first
+  Distance between `vertex` and the edge from a to b, stored if it is less than s->d (squared here). The vertex is on the first
   side for sign = 1, on the second for -1.
 */
 static inline void try_edge(const PetscReal x[], int vertex, int a, int b, PetscReal sign, SbDistance *s)
@@ -38,7 +39,7 @@ static inline void try_edge(const PetscReal x[], int vertex, int a, int b, Petsc
   ee = SbDot3(e, e);
   er = SbDot3(e, r);
   t = er <= 0 ? 0 : er >= ee ? 1 : er / ee;
-  // from the nearer end, where the difference is smaller
+  // relative to the nearer endpoint, for accuracy
   if (t > 0.5) SbSubtract(x + 3 * vertex, x + 3 * b, r);
   for (int k = 0; k < 3; k++) r[k] -= (t > 0.5 ? t - 1 : t) * e[k];
   d2 = SbDot3(r, r);
@@ -53,7 +54,7 @@ static inline void try_edge(const PetscReal x[], int vertex, int a, int b, Petsc
   for (int k = 0; k < 3; k++) s->n[k] = sign * r[k];
 }
 
-/* Length and direction from r, left in s->n, or from the normal of a plane in which both sides lie but for d; size2: squared. */
+/* Distance and unit vector from r = s->n, or from the normal of the plane if both sides are nearly in one plane; size2: squared edge length. */
 static inline void finish(const PetscReal between[3], const PetscReal normal[3], PetscReal size2,
                           SbDistance *s)
 {
@@ -161,7 +162,7 @@ void SbDistanceFind(SbPairKind kind, const PetscReal x[], SbDistance *s)
 
 /* ------------------------------------------------------------------ derivatives */
 
-/* c_a of the head of this file. */
+/* c_a of the file header. */
 static void point_derivatives(const PetscReal x[], const SbDistance *s, PetscReal c[4][3])
 {
   PetscReal t[2][3], q[2][3], normal[3];
@@ -170,7 +171,7 @@ static void point_derivatives(const PetscReal x[], const SbDistance *s, PetscRea
   if (s->feature == SB_PAIR_VERTEX_EDGE) {
     int end[2], n = 0, npositive = 0;
 
-    // the ends of the edge have weights of one sign, the vertex that of the other
+    // the ends of the edge have weights of equal sign, the vertex of the opposite sign
     for (int a = 0; a < 4; a++) npositive += s->weight[a] > 0;
     for (int a = 0; a < 4; a++) {
       if (npositive == 1 ? s->weight[a] < 0 : s->weight[a] > 0) end[n++] = a;
@@ -206,7 +207,7 @@ static inline void clamp_eigenvalues(const int n, PetscReal A[])
   PetscReal V[SB_CLAMP_MAX * SB_CLAMP_MAX], D[SB_CLAMP_MAX * SB_CLAMP_MAX], size = 0;
   PetscBool negative = PETSC_FALSE;
 
-  // Jacobi's method: each rotation makes one entry zero
+  // Jacobi's eigenvalue algorithm: each rotation zeroes one off-diagonal entry
   for (int i = 0; i < n; i++) {
     for (int j = 0; j < n; j++) {
       V[n * i + j] = i == j;
@@ -274,7 +275,7 @@ void SbDistanceHessian(const PetscReal x[], const SbDistance *s, const PetscReal
                       : (PetscAbsReal(n[1]) < PetscAbsReal(n[2]) ? 1 : 2);
   PetscReal c[4][3], m[2][3], along[4][2], alpha[3], C[3][2], K[25], bend[2], length;
 
-  // directions orthogonal to n; the derivatives of the closest points along them
+  // two directions m orthogonal to n; components of c_a along them
   point_derivatives(x, s, c);
   for (int k = 0; k < 3; k++) m[0][k] = (k == least) - n[least] * n[k];
   length = PetscSqrtReal(SbDot3(m[0], m[0]));
@@ -289,7 +290,7 @@ void SbDistanceHessian(const PetscReal x[], const SbDistance *s, const PetscReal
       C[i][l] = h[i][0] * along[0][l] + h[i][1] * along[1][l] + h[i][2] * along[2][l] + h[i][3] * along[3][l];
   }
 
-  // in five dimensions: n on the weights h, and m on w / |w|
+  // 5 x 5 matrix: n times the weights h, and m times w / |w|
   for (int i = 0; i < 3; i++) {
     for (int j = 0; j < 3; j++)
       K[5 * i + j] = a * alpha[i] * alpha[j] - b * s->d * (C[i][0] * C[j][0] + C[i][1] * C[j][1]);
@@ -298,7 +299,7 @@ void SbDistanceHessian(const PetscReal x[], const SbDistance *s, const PetscReal
   K[18] = K[24] = s->feature <= SB_PAIR_VERTEX_EDGE ? b * size * size / s->d : 0;
   K[19] = K[23] = 0;
   if (s->feature == SB_PAIR_VERTEX_EDGE) {
-    // without the direction of the edge
+    // remove the direction of the edge
     int end = 0;
     PetscReal ee;
 
@@ -312,7 +313,7 @@ void SbDistanceHessian(const PetscReal x[], const SbDistance *s, const PetscReal
   }
   if (clamp) clamp_eigenvalues(5, K);
 
-  // back to the vertices: blocks in the frame of n and m, turned; vertices of no weight do not take part
+  // expand to 3 x 3 blocks of the vertices in the frame (n, m), rotated to global axes; vertices of zero weight have no blocks
   for (int i = 0; i < 4; i++) {
     for (int j = i; j < 4; j++) {
       const PetscReal f = w[i] * w[j] / (size * size);
@@ -349,7 +350,7 @@ PetscReal SbEdgeCross(const PetscReal x[], PetscReal g[], PetscReal H[])
   SbSubtract(x + 9, x + 6, v);
   SbCross(u, v, c);
 
-  // |u x v|^2 = (u . u) (v . v) - (u . v)^2, derivatives with respect to u and v, then to the ends
+  // |u x v|^2 = (u . u) (v . v) - (u . v)^2: derivatives with respect to u and v, then to the endpoints
   uu = SbDot3(u, u);
   vv = SbDot3(v, v);
   uv = SbDot3(u, v);

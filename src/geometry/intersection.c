@@ -1,11 +1,11 @@
 /*
-  intersection.c - whether a segment meets a triangle, and whether two triangles meet beyond the corners that they share.
+  intersection.c - intersection of a segment and a triangle, and of two triangles beyond their common corners.
 
-  Two triangles meet exactly when an edge of one meets the other. With a common corner only the two edges opposite to it need
-  be examined; with a common edge only whether one triangle is folded onto the other. Signs of determinants decide:
-  orient(a, b, c, d) = (a - d) . (b - d) x (c - d), in double precision where its size is above the bound of its rounding (Shewchuk, "Adaptive
-  precision floating-point arithmetic", 1997, the first stage), else in long double, and zero below the bound of that. What is
-  in one plane is decided in that plane.
+  Two triangles intersect if and only if an edge of one intersects the other. With a common corner only the two opposite edges are
+  tested; with a common edge, whether one triangle is folded onto the other. Decisions are made by the signs of determinants,
+  orient(a, b, c, d) = (a - d) . (b - d) x (c - d), in double precision if its magnitude exceeds the rounding error bound (Shewchuk, "Adaptive
+  precision floating-point arithmetic", 1997, the first stage), else in long double, and zero below the error bound of that. Coplanar cases are
+  decided in two dimensions.
 */
 #include <float.h>
 #include "sbgeometry.h"
@@ -33,7 +33,7 @@ static int orient_long(const PetscReal a[3], const PetscReal b[3], const PetscRe
   return sign_of(det, 16 * LDBL_EPSILON * size);
 }
 
-/* On which side of the plane through a, b, c the point d lies: -1 above (the corners are seen counter-clockwise), 0 in it, 1. */
+/* Side of the plane through a, b, c on which d lies: -1 above (corners counter-clockwise seen from d), 0 in the plane, 1 below. */
 static int orient(const PetscReal a[3], const PetscReal b[3], const PetscReal c[3], const PetscReal d[3])
 {
   PetscReal u[3], v[3], w[3], det = 0, size = 0;
@@ -51,9 +51,9 @@ static int orient(const PetscReal a[3], const PetscReal b[3], const PetscReal c[
   return orient_long(a, b, c, d);
 }
 
-/* ------------------------------------------------------------------ in one plane */
+/* ------------------------------------------------------------------ coplanar */
 
-/* The two coordinates of the plane that see most of it. */
+/* The two coordinates in which the projected area of the triangle is largest. */
 static void axes_of(PetscReal const *const t[3], int axis[2])
 {
   PetscReal e[3], f[3], n[3];
@@ -69,7 +69,7 @@ static void axes_of(PetscReal const *const t[3], int axis[2])
   axis[1] = (most + 2) % 3;
 }
 
-/* Which side of the line from a to b the point c lies on, in these two coordinates. */
+/* Side of the line from a to b on which c lies, in these two coordinates. */
 static int orient_plane(const int axis[2], const PetscReal a[3], const PetscReal b[3], const PetscReal c[3])
 {
   const int x = axis[0], y = axis[1];
@@ -79,7 +79,7 @@ static int orient_plane(const int axis[2], const PetscReal a[3], const PetscReal
   return sign_of(l - r, 8 * LDBL_EPSILON * (fabsl(l) + fabsl(r)));
 }
 
-/* Whether c, known to be on the line through a and b, lies between them. */
+/* Whether c, collinear with a and b, is between them. */
 static PetscBool between(const int axis[2], const PetscReal a[3], const PetscReal b[3], const PetscReal c[3])
 {
   for (int k = 0; k < 2; k++) {
@@ -103,7 +103,7 @@ static PetscBool segments_meet(const int axis[2], const PetscReal a[3], const Pe
   return (PetscBool)(!cdb && between(axis, c, d, b));
 }
 
-/* A segment and a triangle in one plane. */
+/* Whether a segment and a triangle in one plane intersect. */
 static PetscBool meet_in_plane(const PetscReal p[3], const PetscReal q[3], PetscReal const *const t[3])
 {
   int axis[2], side[3];
@@ -116,7 +116,7 @@ static PetscBool meet_in_plane(const PetscReal p[3], const PetscReal q[3], Petsc
   return (PetscBool)(side[0] && side[0] == side[1] && side[1] == side[2]);
 }
 
-/* ------------------------------------------------------------------ in space */
+/* ------------------------------------------------------------------ three dimensions */
 
 PetscBool SbSegmentMeetsTriangle(const PetscReal p[3], const PetscReal q[3], PetscReal const *const t[3])
 {
@@ -134,7 +134,7 @@ PetscBool SbSegmentMeetsTriangle(const PetscReal p[3], const PetscReal q[3], Pet
   return (PetscBool)(least >= 0 || most <= 0);
 }
 
-/* Triangles at one edge, a the corner of one and b that of the other opposite to it. */
+/* Whether two triangles with the common edge pq, opposite corners a and b, are folded onto each other. */
 static PetscBool folded(const PetscReal p[3], const PetscReal q[3], const PetscReal a[3],
                         const PetscReal b[3])
 {
@@ -150,8 +150,11 @@ PetscBool SbTrianglesCross(const PetscReal x[], const PetscInt a[3], const Petsc
 {
   const PetscInt *v[2] = {a, b};
   PetscReal const *c[2][3];
-  int ncommon = 0,
-      own[2] = {3, 3}; /* sum of the common corners' places: the remainder of 0 + 1 + 2 is the other one */
+  int
+    ncommon = 0,
+    own[2] = {
+      3,
+      3}; /* 3 - sum of the positions of common corners: with two common corners the position of the third */
   int common[2] = {0, 0};
 
   for (int i = 0; i < 3; i++) {

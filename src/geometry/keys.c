@@ -1,5 +1,5 @@
 /*
-  keys.c - items with keys, sorted: those with one key follow each other.
+  keys.c - sorts items by keys, so that items with equal keys are consecutive.
 */
 #include <stdlib.h>
 #include "sbgeometry.h"

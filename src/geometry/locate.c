@@ -1,13 +1,13 @@
 /*
-  locate.c - which tet holds a point.
+  locate.c - point location: the tet that contains a point, or the nearest one.
 
-  With the weights w of the corners of a tet (barycentric coordinates) the point lies in it when none is negative. Outside, negative ones are set to
-  zero and the others scaled to the sum 1; the distance is that from the point so found. It is not less than the distance of the tet, so the tree of
-  boxes need not be searched farther than that.
+  A point is in a tet if none of its barycentric coordinates w is negative. For a point outside, negative ones are set to
+  zero and the others scaled to the sum 1; the distance to that point is an upper bound of the distance to the tet, and limits
+  the search in the box tree.
 
-  In a curved tet, x(l) = sum_a phi_a(l) x_a, l is found by Newton's method from the weights of the straight one on: with the corners c_i of the P1 tet that has the
-  derivatives of the map at l (src/base/quadratic_map.c) the next l is the barycentric coordinates there of p - x(l) + sum l_i c_i. The tet lies in the hull of its
-  corners and of the middles of its edges moved by twice their offsets (Bernstein form), which gives its box.
+  In a curved tet, x(l) = sum_a phi_a(l) x_a, l is found by Newton's method from the barycentric coordinates in the straight tet: with the corners c_i of the P1 tet that has the
+  derivatives of the map at l (src/base/quadratic_map.c), the next l are the barycentric coordinates in it of p - x(l) + sum l_i c_i. The bounding box is that of the
+  corners and the edge midpoints shifted by twice the offsets of the edge nodes (Bernstein form).
 */
 #include "sbgeometry.h"
 
@@ -23,11 +23,11 @@ PetscReal SbTetDeterminant(const PetscReal x[], const PetscInt v[4])
 struct _p_SbLocator {
   const PetscInt *cell;
   const PetscReal *x, *edge_off;
-  SbBoxTree tree; /* tets without volume, or inverted, have empty boxes */
+  SbBoxTree tree; /* boxes of the tets; those of flat and inverted tets are empty */
 };
 
-#define STEPS 20    /* of Newton's method; it takes 3 to 6 */
-#define CLOSE 1e-14 /* of the diagonal of the tet: where it ends */
+#define STEPS 20    /* largest number of Newton iterations; 3 to 6 are needed */
+#define CLOSE 1e-14 /* tolerance of Newton's method over the diagonal of the tet */
 
 void SbTetNodes(const PetscReal x[], const PetscInt v[4], const PetscReal off[18],
                 PetscReal node[SB_CELL_NODES][3])
@@ -38,7 +38,7 @@ void SbTetNodes(const PetscReal x[], const PetscInt v[4], const PetscReal off[18
       0.5 * (x[3 * v[SbTetEdge[k / 3][0]] + k % 3] + x[3 * v[SbTetEdge[k / 3][1]] + k % 3]) + off[k];
 }
 
-/* The edges of a cell are off their middles; NULL: it is straight. */
+/* Edge offsets of a curved cell; NULL: straight. */
 static const PetscReal *off_of(SbLocator l, PetscInt cell)
 {
   const PetscReal *off = l->edge_off ? l->edge_off + 18 * (size_t)cell : NULL;
@@ -48,7 +48,7 @@ static const PetscReal *off_of(SbLocator l, PetscInt cell)
   return NULL;
 }
 
-/* r = p - x(w), from the first corner: small tets may lie far from the origin. */
+/* r = p - x(w), relative to the first corner for accuracy far from the origin. */
 static void remainder_at(const PetscReal node[SB_CELL_NODES][3], const PetscReal p[3], const PetscReal w[4],
                          PetscReal r[3])
 {
@@ -84,7 +84,7 @@ PetscBool SbTetCurvedBarycentric(const PetscReal x[], const PetscInt v[4], const
   return PETSC_FALSE;
 }
 
-/* The weights of the place in a curved tet nearest to p, or one close to it; returns the square of the distance. */
+/* Barycentric coordinates of a point in a curved tet near the closest one to p; returns the squared distance. */
 static PetscReal find_curved(SbLocator l, PetscInt cell, const PetscReal off[18], const PetscReal p[3],
                              PetscReal w[4], PetscReal *depth)
 {
@@ -138,7 +138,7 @@ PetscErrorCode SbLocatorDestroy(SbLocator *locator)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Volumes of the tets that the point makes with the faces, over that of the tet. */
+/* Ratios of determinants: signed volumes of the tets of the point and each face, over that of the tet. */
 void SbTetBarycentric(const PetscReal x[], const PetscInt v[4], const PetscReal p[3], PetscReal w[4])
 {
   PetscReal e[3][3], r[3], n[3], det;
@@ -168,7 +168,7 @@ PetscReal SbLocatorFind(SbLocator l, const PetscReal p[3], PetscInt *cell, Petsc
     const PetscReal *off = off_of(l, c);
     PetscReal w[4], depth, sum = 0, d2 = 0;
 
-    // moves the weights into the tet
+    // nearest tet: clip the coordinates of points outside
     SbTetBarycentric(l->x, l->cell + 4 * c, p, w);
     depth = PetscMin(PetscMin(w[0], w[1]), PetscMin(w[2], w[3]));
     if (off)

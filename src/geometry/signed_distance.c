@@ -1,20 +1,21 @@
 /*
-  signed_distance.c - signed distance from a closed surface of triangles.
+  signed_distance.c - signed distance from a closed triangulated surface.
 
-  A tree of boxes finds the nearest triangle. The sign is that of the angle-weighted pseudonormal at the nearest point (Baerentzen and Aanaes,
-  "Signed distance computation using the angle weighted pseudonormal", IEEE TVCG 11(3), 2005). Distance and normal are those of the
-  facets themselves to rounding; nothing is sampled or smoothed.
+  The nearest triangle is found by a box tree. The sign is that of the angle-weighted pseudonormal at the closest point (Baerentzen and Aanaes,
+  "Signed distance computation using the angle weighted pseudonormal", IEEE TVCG 11(3), 2005). Distance and normal are exact
+  up to rounding; nothing is sampled or smoothed.
 */
 #include "sbgeometry.h"
 
-#define TOUCH 1e-9 /* of the size: nearer than this to an edge or corner the pseudonormal is the direction */
+#define TOUCH \
+  1e-9 /* over the size of the surface: nearer to an edge or corner, the normal is the pseudonormal */
 
 struct _p_SbSignedDistance {
   const PetscReal *x;         /* [nvert][3] m */
   const PetscInt *tri;        /* [ntri][3] */
-  const PetscInt *across;     /* [ntri][3] */
-  PetscReal *normal, *corner; /* [ntri][3] of the faces; [nvert][3] weighted by angles */
-  PetscReal touch;            /* m */
+  const PetscInt *across;     /* [ntri][3] neighbour across each edge */
+  PetscReal *normal, *corner; /* [ntri][3] unit face normals; [nvert][3] angle-weighted vertex normals */
+  PetscReal touch;            /* TOUCH times the size of the surface, m */
   SbBoxTree tree;
 };
 
@@ -34,7 +35,7 @@ PetscErrorCode SbSignedDistanceCreate(PetscInt nvert, const PetscReal x[], Petsc
   for (int k = 0; k < 3 && ntri; k++)
     s->touch = PetscMax(s->touch, TOUCH * (s->tree.hull[3 + k] - s->tree.hull[k]));
 
-  // normals of faces, and at vertices by the angles of the faces there
+  // face normals, and vertex normals weighted by the angles of the faces
   PetscCall(PetscMalloc1(3 * (size_t)ntri, &s->normal));
   PetscCall(PetscCalloc1(3 * (size_t)nvert, &s->corner));
   for (PetscInt f = 0; f < ntri; f++) {
@@ -78,7 +79,7 @@ PetscReal SbSignedDistanceEvaluate(SbSignedDistance s, const PetscReal x[3], Pet
   SbBoxNearest walk;
   PetscInt f, nearest = 0;
 
-  // the nearest triangle; a point that is no number has none
+  // nearest triangle; a point with NaN or infinite coordinates has none
   SbBoxNearestBegin(&s->tree, box, SbDot3(x, x) <= PETSC_MAX_REAL ? PETSC_MAX_REAL : -1, &walk);
   while (SbBoxNearestNext(&walk, &f)) {
     const PetscInt *v = s->tri + 3 * f;
@@ -94,7 +95,7 @@ PetscReal SbSignedDistanceEvaluate(SbSignedDistance s, const PetscReal x[3], Pet
       r[i] = w[0] * (x[i] - p[0][i]) + w[1] * (x[i] - p[1][i]) + w[2] * (x[i] - p[2][i]);
   }
 
-  // over a face the height, which is smooth through the surface
+  // closest point inside a face: signed height, smooth across the surface
   face = s->normal + 3 * nearest;
   if (feature == SB_FEATURE_FACE) {
     const PetscReal *a = s->x + 3 * s->tri[3 * nearest], up[3] = {x[0] - a[0], x[1] - a[1], x[2] - a[2]};
@@ -103,7 +104,7 @@ PetscReal SbSignedDistanceEvaluate(SbSignedDistance s, const PetscReal x[3], Pet
     return SbDot3(face, up);
   }
 
-  // at an edge or corner away from it, and very near in the direction of the pseudonormal
+  // closest point on an edge or corner: normal along the connection, or the pseudonormal at very small distances
   for (int i = 0; i < 3; i++)
     pseudo[i] = feature >= SB_FEATURE_EDGE_0
                   ? face[i] + s->normal[3 * s->across[3 * nearest + (feature - SB_FEATURE_EDGE_0)] + i]

@@ -1,5 +1,5 @@
 /*
-  weld.c - points that are one: those within a tolerance of each other; points that nothing uses.
+  weld.c - merges points within a tolerance; removes unused points.
 */
 #include "sbgeometry.h"
 
@@ -43,7 +43,7 @@ PetscInt SbUnionLabel(PetscInt n, PetscInt up[])
   PetscInt count = 0;
 
   for (PetscInt i = 0; i < n; i++) up[i] = SbUnionRoot(up, i);
-  // a root comes before the others of its tree, and then holds its number
+  // roots precede the other points of their tree; a root's entry becomes its label
   for (PetscInt i = 0; i < n; i++) up[i] = up[i] == i ? count++ : up[up[i]];
   return count;
 }

@@ -1,19 +1,19 @@
 /*
-  check.c - checks across options, before anything is computed.
+  check.c - consistency checks of several options, before the computation.
 
-  A missing mesh file is found here, with the names in its folder that are near, instead of by the reader after other
-  bodies were read. A static run without a prescribed displacement has no unique answer: its matrix is singular.
+  A missing mesh file is an error here, before other bodies are read; the message suggests similar names in its
+  folder. A static run without prescribed displacements has a singular matrix.
 */
 #include <dirent.h>
 #include <errno.h>
 #include <unistd.h>
 #include "scene_impl.h"
 
-#define NAMES_MAX 1000 /* entries of a folder that are compared */
-#define LARGE 2.       /* m; files of larger soft bodies are mostly in mm */
-#define LIGHT 10.      /* kg/m^3; no soft body in SI units has less */
+#define NAMES_MAX 1000 /* largest number of directory entries that are compared */
+#define LARGE 2.       /* m; files of larger soft bodies are usually in mm */
+#define LIGHT 10.      /* kg/m^3; no soft body in SI units has a lower density */
 
-/* Names in the folder of `path` that are near its own, with the folder; "" when there are none. Rank 0 only. */
+/* Similar file names in the folder of `path`, with the folder; "" if there are none. Rank 0 only. */
 static PetscErrorCode near_files(const char *path, size_t size, char text[])
 {
   const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
@@ -39,7 +39,7 @@ static PetscErrorCode near_files(const char *path, size_t size, char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0 looks, all ranks learn the result. */
+/* Rank 0 checks that the mesh file exists; collective. */
 static PetscErrorCode check_mesh_file(MPI_Comm comm, const SbBody *body)
 {
   char near[PETSC_MAX_PATH_LEN] = "", folder[PETSC_MAX_PATH_LEN], make[PETSC_MAX_PATH_LEN + 32] = "";
@@ -49,12 +49,12 @@ static PetscErrorCode check_mesh_file(MPI_Comm comm, const SbBody *body)
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  // the file, or the points of a mesh of TetGen whose files are named without their endings
+  // the file, or the .node file of a TetGen mesh given by its stem
   (void)snprintf(node, sizeof(node), "%s.node", body->mesh);
   if (!rank && access(node, R_OK) && access(body->mesh, R_OK)) {
     error = errno;
 
-    /* "; make meshes/lobe.msh makes it" where its description for gmsh lies beside it, as for those of the scenarios */
+    /* advice "; make meshes/lobe.msh makes it", if there is a .geo file, as for the meshes of the scenarios */
     if (error == ENOENT) {
       const char *dot = strrchr(body->mesh, '.');
       char geo[PETSC_MAX_PATH_LEN + 4];
@@ -114,7 +114,7 @@ PetscErrorCode SbSceneCheckSizes(SbModel model)
     SbScope scope;
     PetscBool given;
 
-    /* a box is as large as it was asked for; densities below are those of other units, t/mm^3 or g/cm^3 */
+    /* a box has the size given by the user; densities below the limit are in t/mm^3 or g/cm^3 */
     if (length < LARGE || body->density < LIGHT || !strncmp(body->mesh, "box:", 4)) continue;
     if (i && body->copy_of[0] && !strcmp(body->copy_of, model->body[i - 1].copy_of)) continue;
     PetscCall(SbScopeSet(&scope, "body", "", body->copy_of[0] ? body->copy_of : body->name));

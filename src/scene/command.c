@@ -1,9 +1,9 @@
 /*
   command.c - the command line: options of the program itself, and errors that PETSc would ignore.
 
-  PETSc takes the word after an option as its value and skips every other word in silence; so `-translate 0, 0, 1` would
-  become `-translate 0,`. Such words are an error here. PETSc reads option files on rank 0 while the other ranks wait: a
-  file that is not there is found before.
+  PETSc takes the word after an option as its value and ignores every other word; so `-translate 0, 0, 1` would
+  become `-translate 0,`. Such words are an error here. PETSc reads option files on rank 0 while the other ranks wait:
+  missing files are found before.
 */
 #include <errno.h>
 #include <sys/stat.h>
@@ -49,7 +49,7 @@ static PetscBool is_one_of(const char *word, const char *a, const char *b)
   return (PetscBool)(!strcasecmp(word, a) || !strcasecmp(word, b));
 }
 
-/* Whether rank 0 can read an option file: it is noted; else that is said in command->problem. Collective. */
+/* Whether rank 0 can read an option file, whose name is then recorded; else sets command->problem. Collective. */
 static PetscBool readable(const char *file, SbCommand *command)
 {
   int error = 0;
@@ -71,7 +71,7 @@ static PetscBool readable(const char *file, SbCommand *command)
   return PETSC_FALSE;
 }
 
-/* One option with its value (NULL when it has none); says whether it stays in the command line. */
+/* Handles one option with its value (NULL: none); returns whether it remains on the command line. */
 static PetscBool take_option(const char *name, const char *value, SbCommand *command)
 {
   if (is_one_of(name, "-help", "--help") || !strcmp(name, "-h")) {

@@ -1,15 +1,15 @@
 /*
-  copies.c - copies of a body, placed by a file or on a grid.
+  copies.c - copies of a body, placed as listed in a file or on a grid.
 
-  With the scale s, rotation R and shift t of the body's own options and those of a copy (s', R', t') a point x of the mesh is at R' R s' s x + t + t'. Rotations are multiplied as
+  With scale s, rotation R and translation t of the body's own options and those of a copy (s', R', t'), a mesh point x is at R' R s' s x + t + t'. Rotations are composed as
   quaternions: q' q.
 */
 #include <errno.h>
 #include "scene_impl.h"
 
-#define NUMBERS 11 /* of a line: x y z, axis, degrees, scale, velocity */
+#define NUMBERS 11 /* numbers on a line: x y z, axis, degrees, scale, velocity */
 
-/* The placement that a line gives, blanks or commas between numbers; false: it gives none, but blanks or a comment. */
+/* Parses the placement on a line, numbers separated by blanks or commas; `found` is false for a blank line or a comment. */
 static PetscErrorCode read_line(const char *option, const char *file, int number, char *line,
                                 SbPlacement *place, PetscBool *found)
 {
@@ -100,7 +100,7 @@ PetscErrorCode SbSceneReadCopies(MPI_Comm comm, const char *name, PetscInt *n, S
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
-  /* a file, which rank 0 reads for all */
+  /* a file, read on rank 0 and broadcast */
   PetscCall(SbOptionName(&scope, "copies", sizeof(option), option));
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   if (!rank) SB_CATCH(&caught, read_file(option, text, n, place));
@@ -112,7 +112,7 @@ PetscErrorCode SbSceneReadCopies(MPI_Comm comm, const char *name, PetscInt *n, S
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Axis and degrees as a quaternion, scalar first. */
+/* Quaternion of a rotation by axis and angle in degrees, scalar first. */
 static void quaternion(const PetscReal rotate[4], PetscReal q[4])
 {
   const PetscReal length = PetscSqrtReal(PetscSqr(rotate[0]) + PetscSqr(rotate[1]) + PetscSqr(rotate[2]));
@@ -133,7 +133,7 @@ void SbPlacementAdd(const SbPlacement *place, SbBody *body)
   }
   if (place->rotate[3] == 0.) return;
 
-  /* the rotation of the copy after that of the body */
+  /* rotation of the copy after that of the body */
   quaternion(place->rotate, p);
   quaternion(body->rotate, q);
   r[0] = p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3];

@@ -1,16 +1,16 @@
 /*
-  names.c - lists of names that a scenario gives.
+  names.c - lists of names in a scenario.
 
-  Names of bodies, sets and effects become parts of option names: -body_<name>_young. PETSc does not distinguish upper from lower
-  case there, so neither may names. It also takes `-body_young` for a missing `-body_1_young`; a part of a name that is
-  only digits would silently read another one's options and is refused.
+  Names of bodies, sets and effects are parts of option names: -body_<name>_young. These are case-insensitive in PETSc,
+  hence names must differ in more than case. PETSc also takes `-body_young` for a missing `-body_1_young`; a part of a name
+  that has only digits could thus read the option of another name and is an error.
 */
 #include <ctype.h>
 #include "scene_impl.h"
 
-#define NAME_LENGTH 31 /* PETSc holds 63 characters of an option's name in YAML files */
+#define NAME_LENGTH 31 /* PETSc allows 63 characters of an option's name in YAML files */
 
-/* What is wrong with a name; NULL when nothing is. */
+/* Describes what is wrong with a name; NULL if it is valid. */
 static const char *name_problem(const char *name)
 {
   PetscBool only_digits = PETSC_FALSE;
@@ -39,7 +39,7 @@ PetscErrorCode SbSceneReadNames(const char *key, const char *what, PetscInt *n, 
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionNames(&SbRunScope, key, n, names));
-  // the first thing that is wrong with them
+  // the first invalid name
   for (PetscInt i = 0; i < *n && !problem[0]; i++) {
     const char *name = (*names)[i], *wrong = name_problem(name);
 

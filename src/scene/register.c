@@ -1,5 +1,5 @@
 /*
-  register.c - everything that a scenario can name: one line per type. A new type is one file in its folder and one line
+  register.c - registers all types that a scenario can name, one line per type. A new type is one file in its folder and one line
   here.
 */
 #include "sbremesh.h"
@@ -21,7 +21,7 @@ PetscErrorCode SbRegisterAll(void)
   PetscFunctionBeginUser;
   PetscCall(SbLogInitialize());
 
-  /* or PETSc never frees the partitioners that are registered before the first one is used */
+  /* otherwise PETSc does not free partitioners that are registered before the first use */
   PetscCall(PetscPartitionerInitializePackage());
 
   /* options of the run, in the order of the manual */

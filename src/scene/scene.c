@@ -1,9 +1,9 @@
 /*
-  scene.c - from options to a model: bodies with material and element, effects, sets. Nothing is computed here.
+  scene.c - builds the model from options: bodies with material and element, effects, sets. Nothing is computed here.
 */
 #include "scene_impl.h"
 
-/* Those of material/register.c, for the manual. */
+/* Materials registered by material/register.c, for the manual. */
 #define LAWS "linear|corotated|stvk|neohookean"
 
 static const SbOption run_rows[] = {
@@ -82,7 +82,7 @@ static PetscErrorCode read_type(const SbScope *scope, const char *key, PetscFunc
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not one of %s", option, word, all);
 }
 
-/* A vector of formulas of the place. */
+/* Reads a vector of formulas of position. */
 static PetscErrorCode read_start(const SbScope *scope, const char *key, SbFormula formula[3])
 {
   char option[3 * SB_NAME_MAX];
@@ -124,7 +124,7 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
   PetscCall(read_start(&scope, "displacement", model->start[i].displacement));
   PetscCall(read_start(&scope, "velocity", model->start[i].velocity));
   for (int k = 0; k < 3; k++) {
-    /* numbers are the body's own */
+    /* constant velocities are stored in the body */
     if (SbFormulaUsesPosition(model->start[i].velocity[k])) continue;
     body->velocity[k] = SbFormulaEval(model->start[i].velocity[k], 0., NULL);
     PetscCall(SbFormulaDestroy(&model->start[i].velocity[k]));
@@ -138,7 +138,7 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The n bodies of these names, each as often as there are copies of it; copy[i]: [ncopy[i]], the caller's. */
+/* Reads the n bodies of these names, with all copies; copy[i][ncopy[i]] is allocated here and freed by the caller. */
 static PetscErrorCode read_named_bodies(SbModel model, PetscInt n, const char (*names)[SB_NAME_MAX],
                                         PetscInt ncopy[], SbPlacement *copy[])
 {
@@ -156,7 +156,7 @@ static PetscErrorCode read_named_bodies(SbModel model, PetscInt n, const char (*
   PetscCall(PetscCalloc1(nbody, &model->start));
   model->nmaterial = model->nbody = nbody;
 
-  /* each body with its options, those of a copy with its place */
+  /* each body with its options, each copy with its placement */
   for (PetscInt i = 0, b = 0; i < n; i++) {
     for (PetscInt k = 0; k < PetscMax(ncopy[i], 1); k++, b++) {
       SbBody *body = &model->body[b];
@@ -180,7 +180,7 @@ static PetscErrorCode read_named_bodies(SbModel model, PetscInt n, const char (*
     SbScope scope;
     PetscInt ninclusion;
 
-    // the materials of the inclusions of body i, behind those that are there
+    // append the materials of the inclusions of body i
     PetscCall(SbScopeSet(&scope, "body", "", body->name));
     PetscCall(SbOptionNames(&scope, "inclusions", &ninclusion, &inclusions));
     PetscCheck(ninclusion <= SB_INCLUSION_MAX, PETSC_COMM_SELF, PETSC_ERR_USER,
@@ -219,7 +219,7 @@ static PetscErrorCode read_bodies(SbModel model)
   PetscFunctionReturn(ierr);
 }
 
-/* ------------------------------------------------------------------ the whole scene */
+/* ------------------------------------------------------------------ scene */
 
 PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model)
 {
@@ -243,7 +243,7 @@ PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model)
   PetscCall(PetscFree(names));
   PetscCall(SbSceneReadSets(*model));
 
-  /* options whose readers come after the mesh: read ahead, so that a bad value is found before it */
+  /* check options that are read after the mesh already now, to report errors early */
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(keys); i++)
     PetscCall(SbOptionCheckEarly(&SbRunScope, keys[i]));
   PetscFunctionReturn(PETSC_SUCCESS);

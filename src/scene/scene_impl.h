@@ -1,30 +1,31 @@
 /*
-  scene_impl.h - shared by the files of src/scene.
+  scene_impl.h - shared declarations of src/scene/.
 */
 #pragma once
 #include "sbledger.h"
 #include "sbscene.h"
 
-/* Option rows of the command line and of the scene. */
+/* Register the options of the command line and of the scene. */
 PetscErrorCode SbCommandRegister(void);
 PetscErrorCode SbSceneRegister(void);
 PetscErrorCode SbSetsRegister(void);
 
-/* Sets of -sets, then those that effects name without a definition; fills model->set. Not collective, same on all ranks. */
+/* Reads the sets of -sets, then those that effects name without a definition; sets model->set. Not collective, equal on all ranks. */
 PetscErrorCode SbSceneReadSets(SbModel model);
 
-/* Where a copy of a body is. */
+/* Placement of a copy of a body. */
 typedef struct {
-  PetscReal x[3], rotate[4], scale, velocity[3]; /* m; axis and degrees; 1; m/s */
+  PetscReal x[3], rotate[4], scale,
+    velocity[3]; /* translation, m; axis and angle, degrees; scale factor; velocity, m/s */
 } SbPlacement;
-/* Those of -body_<name>_copies, n of them, 0: it is one body; a file is read by rank 0. Collective; the caller frees. */
+/* Reads the placements of -body_<name>_copies, n of them, 0: no copies; a file is read on rank 0. Collective; the caller frees. */
 PetscErrorCode SbSceneReadCopies(MPI_Comm comm, const char *name, PetscInt *n, SbPlacement **place);
-/* Applies further scale, rotation and translation to the body. */
+/* Adds a further scale, rotation and translation to the body. */
 void SbPlacementAdd(const SbPlacement *place, SbBody *body);
 
 /*
-  Names of bodies, sets or effects, as an option of class "" gives them: each begins with a letter, goes on with letters,
-  digits and underscores, is no word of its own meaning, and is there once. `what` is "body", "set" or "effect".
-  PetscFree the names.
+  Reads the names of bodies, sets or effects from an option of class "": each begins with a letter and has letters,
+  digits and underscores, is not a reserved word, and occurs once. `what` is "body", "set" or "effect".
+  The caller frees the names with PetscFree().
 */
 PetscErrorCode SbSceneReadNames(const char *key, const char *what, PetscInt *n, char (**names)[SB_NAME_MAX]);

@@ -1,9 +1,9 @@
 /*
-  sets.c - the named sets of a scene: those that -sets defines by a shape, and those that effects and probes name directly.
+  sets.c - named sets of a scene: those defined by a shape in -sets, and those that effects, probes and bodies name directly.
 
-  Sets are named by the options `on` of effects, `on` and `in` of probes, `inclusions` of bodies. A name there that -sets does not define means, in this order: the body
+  Sets are named by the options `on` of effects, `on` and `in` of probes, `inclusions` of bodies. A name that -sets does not define means, in this order: the body
   of that name, `all` bodies, the whole `boundary`, the physical group of that name. All such names are collected before
-  the mesh is made, because it marks every set while it reads the bodies.
+  the mesh is read, because its sets are marked while the bodies are read.
 */
 #include "scene_impl.h"
 
@@ -21,7 +21,7 @@ PetscErrorCode SbSetsRegister(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A body of this name, or the first copy of it. */
+/* Index of the body of this name, or of its first copy. */
 static PetscInt find_body(SbModel model, const char *name)
 {
   for (PetscInt i = 0; i < model->nbody; i++)
@@ -56,7 +56,7 @@ static PetscErrorCode read_set(SbModel model, const char *name)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the set that a name means where no set is defined. */
+/* Adds the set of a name without a definition in -sets. */
 static PetscErrorCode use_name(SbModel model, const char *name)
 {
   SbSet *set = &model->set[model->nset];
@@ -68,7 +68,7 @@ static PetscErrorCode use_name(SbModel model, const char *name)
     set->shape = SB_SET_BODY;
     PetscCall(PetscStrncpy(set->group, name, sizeof(set->group)));
   } else if (!strcmp(name, "all")) {
-    /* the half-space that holds every point */
+    /* a half-space that contains every point */
     set->shape = SB_SET_HALFSPACE;
     set->p[2] = 1;
     set->p[3] = PETSC_MAX_REAL;
@@ -100,14 +100,14 @@ PetscErrorCode SbSceneReadSets(SbModel model)
   }
   PetscCall(PetscFree(names));
   for (PetscInt e = 0; e < model->neffect; e++) {
-    // the sets that an effect acts on; none when its type has no such option
+    // sets of an effect; none if its type has no such option
     PetscCall(SbScopeSet(&scope, "effect", model->effect[e]->type, model->effect[e]->name));
     if (!SbOptionExists(&scope, "on")) continue;
     PetscCall(SbOptionNames(&scope, "on", &n, &names));
     for (PetscInt i = 0; i < n && model->nset <= SB_SET_MAX; i++) PetscCall(use_name(model, names[i]));
     PetscCall(PetscFree(names));
   }
-  /* those over which probes take means */
+  /* sets over which probes average */
   PetscCall(SbOptionNames(&SbRunScope, "probes", &n, &names));
   for (PetscInt i = 0; i < 2 * n && model->nset <= SB_SET_MAX; i++) {
     char name[SB_NAME_MAX];

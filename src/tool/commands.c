@@ -1,5 +1,5 @@
 /*
-  commands.c - what supple-mesh does: one function per command, and the table of them.
+  commands.c - commands of supple-mesh: one function per command, and their table.
 */
 #include "tool.h"
 
@@ -16,7 +16,7 @@ static PetscErrorCode write_mesh(SbTool *tool, SbImport *mesh)
   (void)snprintf(phase, sizeof(phase), "writing %s", tool->out);
   SB_TOOL_PHASE(tool, phase, SbMeshFileWrite(mesh, tool->out, tool->format));
 
-  /* "out.h5: 1,234 vertices, 5,678 tets, 910 triangles" */
+  /* message "out.h5: 1,234 vertices, 5,678 tets, 910 triangles" */
   if (!tool->quiet) {
     SbMeshFileCount(mesh, &nvert, n);
     PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s vertices", tool->out, SbToolNumber(nvert, number)));
@@ -96,7 +96,7 @@ PetscErrorCode SbToolRun(SbTool *tool)
              "%s: is no surface that tet can fill, by its name; give a closed surface of triangles (.stl, "
              ".obj, .off, .ply, ...); supple-mesh info says what a mesh of tets holds",
              tool->in);
-  // the mesh is read, with a word about it
+  // read the mesh, with a progress message
   (void)snprintf(phase, sizeof(phase), "%s %s",
                  SbMeshFileIsSurface(tool->in) ? "making tets from" : "reading", tool->in);
   SB_TOOL_PHASE(tool, phase, SbMeshFileRead(&tool->body, SbToolProgress, tool, &mesh));

@@ -1,24 +1,25 @@
 /*
-  info.c - supple-mesh info: what is in a mesh, whether a run accepts it, and what a run will take.
+  info.c - supple-mesh info: contents and quality of a mesh, whether a run accepts it, and an estimate of the memory of a run.
 
-  What a run will take, from the counts of a mesh. Nodes are those of the element: vertices (p1), faces (cr), four in every tet (dg), vertices and edges (p2). A row of the matrix has a block of
-  3 x 3 numbers for itself and for every node that a term joins it with:
+  The estimate uses counts of the mesh. N nodes of the element: vertices (p1), faces (cr), four in every tet (dg), vertices and edges (p2). A row of the matrix has a block of
+  3 x 3 numbers for its node and for each node coupled with it; total number of blocks:
 
     p1  N + 2 edges
-    cr  N + 12 for each tet (six pairs of faces, each in one tet only) + 18 for each inner face, whose jump joins the three other
+    cr  N + 12 per tet (six pairs of faces, each pair in one tet only) + 18 per interior face, whose jump term couples the three other
         faces of one side with those of the other
-    dg  16 for each tet + 32 for each inner face
-    p2  N + 6 for each edge + 12 for each face + 6 for each tet (three edges of a triangle meet in pairs, its corners each the edge across;
-        a tet has three pairs of edges apart)
+    dg  16 per tet + 32 per interior face
+    p2  N + 6 per edge + 12 per face + 6 per tet (the three edges of a triangle are coupled with each other and each with the opposite corner;
+        a tet has three pairs of opposite edges)
 
-  The rest was measured: see the constants. docs/reference/meshes.md says how good it is.
+  The other constants were measured, see below. docs/reference/meshes.md gives the accuracy.
 */
 #include "tool.h"
 
-#define PROCESS 43e6   /* bytes of a run without a mesh to speak of */
-#define TET 600.       /* bytes: mesh and geometry of a tet, with vertices and boundary */
-#define FACTOR 4096.   /* bytes for each unknown of a factorisation */
-#define FACTORED 60000 /* unknowns up to which -solver auto factors the matrix of a dynamic run */
+#define PROCESS 43e6 /* memory of a run with a very small mesh, bytes */
+#define TET 600.     /* memory of a tet in mesh and geometry, with vertices and boundary, bytes */
+#define FACTOR 4096. /* memory of a factorisation per unknown, bytes */
+#define FACTORED \
+  60000 /* largest number of unknowns for which -solver auto factorises the matrix of a dynamic run */
 
 /* ------------------------------------------------------------------ parts of the report */
 
@@ -42,7 +43,7 @@ static PetscErrorCode groups(const SbImport *mesh)
       titled = PETSC_TRUE;
       (void)printf("  %-26s %12s %s", group.name, SbToolNumber(group.n, number), item[d]);
       if (d) (void)printf(", %.6g %s", (double)group.size, unit[d]);
-      /* readers of formats that have names only make up numbers */
+      /* formats with names only have no group numbers */
       if (group.tag > 0 && group.tag <= INT32_MAX) (void)printf(" (number %lld)", (long long)group.tag);
       (void)printf("\n");
     }
@@ -50,7 +51,7 @@ static PetscErrorCode groups(const SbImport *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A line of a histogram: at most 40 signs; what is there has at least one. */
+/* Prints a line of a histogram: at most 40 signs, at least one if n > 0. */
 static void bar(const char *label, PetscInt64 n, PetscInt64 most)
 {
   char signs[41], number[32];
@@ -61,12 +62,12 @@ static void bar(const char *label, PetscInt64 n, PetscInt64 most)
   (void)printf("  %-14s %14s %s\n", label, SbToolNumber(n, number), signs);
 }
 
-/* Bytes that a run of one step takes on one rank, by element. */
+/* Memory in bytes of a run of one step on one rank, by element. */
 static PetscReal memory(const SbMeshStatistics *f, const char *element, PetscInt *unknowns, PetscReal *matrix)
 {
   const PetscReal inner = f->nface - f->body.nfacet, ncell = f->body.ncell;
   PetscReal nodes = f->body.nvert, blocks = nodes + 2. * f->nedge,
-            times = 1.9; /* matrix, plan, preconditioner */
+            times = 1.9; /* matrix, assembly plan, preconditioner */
 
   if (!strcmp(element, "cr")) {
     nodes = f->nface;
@@ -106,7 +107,7 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
   PetscCall(groups(mesh));
   (void)fflush(stdout);
   SB_TOOL_PHASE(tool, "measuring", SbMeshFileMeasure(mesh, &facts));
-  // size and counts
+  // dimensions and counts
   b = facts.body.bbox;
   (void)printf("size (coordinates in m)\n");
   (void)printf("  from (%.6g, %.6g, %.6g) to (%.6g, %.6g, %.6g)\n", (double)b[0], (double)b[1], (double)b[2],
@@ -120,7 +121,7 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
                (double)facts.edge[2]);
   (void)printf("  %-26s %12s\n", "faces", SbToolNumber(facts.nface, number));
   if (facts.body.note[0]) (void)printf("  to know: %s\n", facts.body.note);
-  // shape of the tets
+  // shape quality of the tets
   (void)printf("dihedral angles, degrees: %.3g to %.4g (70.5 in the regular tet)\n",
                (double)facts.body.min_dihedral, (double)facts.max_dihedral);
   for (int i = 0; i < SB_ANGLE_BINS; i++) most = PetscMax(most, facts.angle[i]);

@@ -1,7 +1,7 @@
 /*
-  line.c - the command line of supple-mesh: a command, one or two files, options in any place.
+  line.c - command line of supple-mesh: a command, one or two files, options in any order.
 
-  Options are rows of a table as in the program itself; each says which commands read it, and one that a command does not
+  Options are rows of a table as in supple itself; each row lists the commands that read it. An option that the command does not
   read is an error, as is a misspelt one.
 */
 #include <strings.h>
@@ -36,7 +36,7 @@ static const SbOption rows[] = {
   {"view", SB_OPTION_STRING, 1, "", "", "", "draw the mesh to this .png"},
   {"quiet", SB_OPTION_BOOL, 1, "", "false", "", "print nothing but errors"},
 };
-/* Which commands read each row; "" for all. */
+/* Commands that read each row; "" for all. */
 static const char *const readers[] = {
   "tet", "tet", "tet", "tet", "tet", "tet", "tet repair", "refine", "convert tet repair refine",
   "",    "",    "",    "",    "",    ""};
@@ -106,7 +106,7 @@ PetscErrorCode SbToolCommandLine(int *argc, char *argv[], SbToolLine *line)
     } else if (is_option) {
       const SbOption *row = find_row(argv[i] + 1);
 
-      // the word behind an option is its value, but for a switch only where it says true or false
+      // the word after an option is its value, for a switch only if it is a truth value
       argv[kept++] = argv[i];
       if (!argv[i + 1]) break;
       PetscCall(PetscOptionsValidKey(argv[i + 1], &is_option));
@@ -161,7 +161,7 @@ PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *li
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(tool, sizeof(*tool)));
-  // one process, a command, and as many files as it takes
+  // one process, a command, and the number of files that it takes
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCheck(size == 1, PETSC_COMM_WORLD, PETSC_ERR_USER, "runs on one process, not on %d; leave out mpirun",
              (int)size);
@@ -189,7 +189,7 @@ PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *li
   tool->merge_tolerance = -1;
   PetscCall(SbOptionReal(&SbRunScope, "merge_tolerance", &tool->merge_tolerance));
 
-  /* how a surface becomes tets */
+  /* options of tetrahedralization */
   SbTetDefaults(&tool->body.tet);
   PetscCall(SbOptionReal(&SbRunScope, "size", &tool->body.tet.size));
   PetscCall(SbOptionChoice(&SbRunScope, "surface", &surface));

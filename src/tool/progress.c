@@ -1,6 +1,6 @@
 /*
-  progress.c - a line of progress on standard error: rewritten in place on a terminal, else a plain
-  line now and then. What takes less than a second says nothing.
+  progress.c - progress line on standard error: overwritten in place on a terminal, else a new
+  line at intervals. Phases of less than a second print nothing.
 */
 #include <unistd.h>
 #include "tool.h"

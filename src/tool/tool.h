@@ -1,41 +1,41 @@
 /*
-  tool.h - what the files of supple-mesh share: its command line, its commands.
+  tool.h - shared declarations of supple-mesh: command line and commands.
 */
 #pragma once
 #include "sbmeshfile.h"
 
-/* The command line of supple-mesh, taken apart. */
+/* Command line of supple-mesh, parsed. */
 typedef struct {
   PetscBool help, version;
   int nword;
-  const char *word[4];              /* command, then files; more are counted only */
-  char problem[PETSC_MAX_PATH_LEN]; /* what is wrong; "" when nothing is */
+  const char *word[4];              /* command, then files; further words are only counted */
+  char problem[PETSC_MAX_PATH_LEN]; /* error message; "" if there is none */
 } SbToolLine;
 
 typedef struct _SbTool {
-  const char *command, *in, *out; /* out: NULL when the command writes no mesh */
-  SbBody body;                    /* of `in`: name of the file, step, scale, rotate, translate, tet */
-  PetscReal merge_tolerance;      /* -merge_tolerance, m; below 0: the default */
-  PetscInt levels;                /* -levels */
-  SbMeshFormat format;            /* -format */
-  char view[PETSC_MAX_PATH_LEN];  /* -view; "" for no picture */
+  const char *command, *in, *out; /* out: NULL if the command writes no mesh */
+  SbBody body;                    /* body of the file `in`: name, step, scale, rotate, translate, tet */
+  PetscReal merge_tolerance;      /* option -merge_tolerance, m; below 0: the default */
+  PetscInt levels;                /* option -levels */
+  SbMeshFormat format;            /* option -format */
+  char view[PETSC_MAX_PATH_LEN];  /* option -view; "": no picture */
   PetscBool quiet;
-  PetscLogDouble start, last; /* wall time of the phase that is reported, and of the last report, s */
-  PetscBool terminal, open;   /* standard error is a terminal; a line is being rewritten there */
-  const char *phase;          /* "reading liver.msh" */
+  PetscLogDouble start, last; /* wall time of the beginning of the phase and of the last report, s */
+  PetscBool terminal, open;   /* standard error is a terminal; the line there is to be overwritten */
+  const char *phase;          /* description of the phase: "reading liver.msh" */
 } SbTool;
 
 /* line.c */
-/* Takes words that are no options, -help and -version out of argc, argv. Before PetscInitialize(). */
+/* Removes the words that are not options, -help and -version from argc, argv. Before PetscInitialize(). */
 PetscErrorCode SbToolCommandLine(int *argc, char *argv[], SbToolLine *line);
-/* Checks command, number of files and options, and reads these. */
+/* Checks command, number of files and options, and reads the options. */
 PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *line, SbTool *tool);
 PetscErrorCode SbToolHelp(void);
 PetscErrorCode SbToolRegister(void);
 
 /* commands.c: runs the command. */
 PetscErrorCode SbToolRun(SbTool *tool);
-/* Names of the commands, NULL at the end; nfile: how many files each wants; help: a line about each. */
+/* Table of commands, ends with NULL; nfile: number of files; help: one line. */
 typedef struct {
   const char *name, *files, *help;
   int nfile;
@@ -46,14 +46,14 @@ extern const SbToolCommand SbToolCommands[];
 /* info.c */
 PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh);
 
-/* view.c: draws the mesh to tool->view. */
+/* view.c: renders the mesh to the picture tool->view. */
 PetscErrorCode SbToolView(SbTool *tool, const SbImport *mesh);
 
-/* progress.c: a line on standard error while something takes long. */
+/* progress.c: begins a phase that may take long, with a progress line. */
 void SbToolBegin(SbTool *tool, const char *phase);
 PetscErrorCode SbToolProgress(const char *what, PetscInt64 done, PetscInt64 total, void *ctx);
 void SbToolEnd(SbTool *tool);
-/* A call that may take long, with that line while it goes on. */
+/* Runs a call as a phase with a progress line. */
 #define SB_TOOL_PHASE(tool, phase, call) \
   do {                                   \
     PetscErrorCode sb_ierr;              \
@@ -62,5 +62,5 @@ void SbToolEnd(SbTool *tool);
     SbToolEnd(tool);                     \
     PetscCall(sb_ierr);                  \
   } while (0)
-/* 1234567 as "1,234,567". */
+/* Number with separators: 1234567 is "1,234,567". */
 const char *SbToolNumber(PetscInt64 n, char text[32]);

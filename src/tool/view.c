@@ -1,7 +1,7 @@
 /*
-  view.c - a picture of a mesh, drawn by scripts/render from a file in supple's own format.
+  view.c - picture of a mesh, rendered by scripts/render from a file in supple's own format.
 
-  The script is searched for beside the program: ../scripts of the folder that the program is in, or, installed,
+  The script is searched for relative to the program: ../scripts of its folder or, if installed,
   ../share/supple/scripts.
 */
 #include <errno.h>
@@ -33,7 +33,7 @@ static PetscErrorCode find_render(size_t size, char path[])
           program, folders[1]);
 }
 
-/* Runs the script; its messages go to standard error. */
+/* Runs the script; its output goes to standard error. */
 static PetscErrorCode draw(const char *render, const char *file, const char *picture, const char *caption)
 {
   const char *const words[] = {render, file, "-o", picture, "--caption", caption, NULL};
