@@ -84,8 +84,7 @@ static PetscErrorCode supple(int argc, char *argv[])
   PetscCheck(!command.problem[0], PETSC_COMM_SELF, PETSC_ERR_USER, "%s", command.problem);
   PetscCall(SbOptionsRemember());
   PetscCall(PetscOptionsHasName(NULL, NULL, "-options_left", &left));
-  if (!left)
-    PetscCall(PetscOptionsSetValue(NULL, "-options_left", "no")); /* SbOptionsUnused() reports them */
+  if (!left) PetscCall(PetscOptionsSetValue(NULL, "-options_left", "no")); /* SbOptionsUnused() does it */
   PetscCall(SbRegisterAll());
   PetscCall(SbCommandSetErrorTrace());
   for (PetscInt i = 0; i < command.nfile; i++) PetscCall(SbOptionsFile(PETSC_COMM_WORLD, command.file[i]));

@@ -24,9 +24,8 @@ static struct {
   Value value[VALUE_MAX];
   char file[PETSC_MAX_PATH_LEN];
   PetscReal speed, angular_speed, pace; /* m/s; degree/s; simulated seconds per second, 0: unlimited */
-  PetscReal clock,
-    begun;          /* wall time and simulated time from which the pace is counted, s; clock 0: not started */
-  PetscBool warned; /* a warning about an invalid line was printed */
+  PetscReal clock, begun;               /* origin of wall time and simulated time, s; clock 0: not started */
+  PetscBool warned;                     /* a warning about an invalid line was printed */
 } live = {.file = "live.txt", .speed = 0.2, .angular_speed = 90., .pace = 1.};
 
 /* Linear change from `from` at time t to `to` at t + duration. */

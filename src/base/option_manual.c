@@ -121,8 +121,7 @@ static PetscBool is_first(PetscInt i, PetscBool by_type)
 static PetscErrorCode print_manual(PetscViewer viewer, const char *topic, int least, PetscBool table,
                                    PetscInt *n)
 {
-  static const char *const order[] = {"", "body",
-                                      "effect"}; /* then the others in the order of registration */
+  static const char *const order[] = {"", "body", "effect"}; /* then as registered */
   const PetscInt nordered = PETSC_STATIC_ARRAY_LENGTH(order);
 
   PetscFunctionBeginUser;

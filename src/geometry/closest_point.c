@@ -5,12 +5,10 @@
 */
 #include "sbgeometry.h"
 
-#define FLAT 1e-12 /* flat triangle: largest area over squared edge length */
-#define SLIM \
-  1e-4 /* slim triangle, whose Voronoi regions may be affected by rounding: largest area over squared edge length */
-#define RIM 1e-6 /* tolerance of barycentric coordinates: rays through edges hit */
-#define PARALLEL \
-  1e-10 /* parallel ray: largest triple product of ray and edges over the squared edge length */
+#define FLAT 1e-12     /* flat triangle: largest area over squared edge length */
+#define SLIM 1e-4      /* slim triangle, where rounding may change the region: likewise */
+#define RIM 1e-6       /* tolerance of barycentric coordinates: rays through edges hit */
+#define PARALLEL 1e-10 /* parallel ray: largest triple product over squared edge length */
 
 /* r = p minus the point with barycentric coordinates w. */
 static inline void away(const PetscReal p[3], const PetscReal *const x[3], const PetscReal w[3],

@@ -22,8 +22,7 @@
 */
 #include "sbgeometry.h"
 
-#define ALONG \
-  1e-4 /* sine of the angle between edges, below which the closest points of the lines are inaccurate */
+#define ALONG 1e-4     /* sine between edges below which the lines' closest points are inaccurate */
 #define PARALLEL 1e-12 /* the same, below which lines count as parallel */
 
 /*

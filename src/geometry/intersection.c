@@ -150,11 +150,7 @@ PetscBool SbTrianglesCross(const PetscReal x[], const PetscInt a[3], const Petsc
 {
   const PetscInt *v[2] = {a, b};
   PetscReal const *c[2][3];
-  int
-    ncommon = 0,
-    own[2] = {
-      3,
-      3}; /* 3 - sum of the positions of common corners: with two common corners the position of the third */
+  int ncommon = 0, own[2] = {3, 3}; /* with two common corners: position of the third one */
   int common[2] = {0, 0};
 
   for (int i = 0; i < 3; i++) {

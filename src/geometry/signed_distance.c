@@ -7,8 +7,7 @@
 */
 #include "sbgeometry.h"
 
-#define TOUCH \
-  1e-9 /* over the size of the surface: nearer to an edge or corner, the normal is the pseudonormal */
+#define TOUCH 1e-9 /* of the size; nearer to an edge or corner the normal is the pseudonormal */
 
 struct _p_SbSignedDistance {
   const PetscReal *x;         /* [nvert][3] m */

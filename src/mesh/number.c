@@ -142,8 +142,7 @@ static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
     PetscCall(PetscMalloc1(nghost, &leaf));
     PetscCall(PetscMalloc1(nghost, &remote));
     for (PetscInt g = 0; g < nghost; g++) {
-      const PetscInt came =
-        order[p->ncell_owned + g] - p->ncell_owned; /* position among the received ghosts */
+      const PetscInt came = order[p->ncell_owned + g] - p->ncell_owned; /* position as received */
 
       leaf[g] = p->ncell_owned + g;
       remote[g].rank = SbRouteSource(&p->ghost, came);

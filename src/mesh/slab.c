@@ -476,8 +476,7 @@ static PetscErrorCode find_edges(Slab *s)
   PetscCall(send_to_users(s, nmine, sizeof(*in), mine, &there, &on, &from, &in));
   for (PetscInt i = 0; i < on.nrecv; i++)
     for (int k = 0; k < 2; k++)
-      PetscCall(
-        PetscFindInt(in[i].end[k], im->nvert, s->used, &in[i].end[k])); /* negative: not on this rank */
+      PetscCall(PetscFindInt(in[i].end[k], im->nvert, s->used, &in[i].end[k])); /* -1: not here */
   im->middle = in;
   im->nmiddle = (SbCount){on.nrecv, on.nrecv};
   PetscCall(PetscMalloc2(on.nrecv, &found, nmine, &anywhere));

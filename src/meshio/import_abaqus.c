@@ -292,8 +292,7 @@ static PetscErrorCode read_surface(Abaqus *a, const char *line)
 /* Adds one side of an element as a triangle of the surface's group. */
 static PetscErrorCode use_side(Abaqus *a, const Side *side, const SbDeckElement *e)
 {
-  static const int corners[4][3] = {
-    {0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}}; /* corners of the sides S1 to S4 */
+  static const int corners[4][3] = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}}; /* sides S1 to S4 */
   const int64_t tag = SB_DECK_TAG + a->deck.nset.n + side->surface;
   SbImport *im = a->deck.im;
   PetscInt group, tags, vert[3];

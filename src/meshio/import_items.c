@@ -186,8 +186,7 @@ PetscErrorCode SbImportDropVertices(SbImport *im, PetscInt keep[])
 
 PetscErrorCode SbImportAddMiddles(SbImport *im, const PetscInt vert[])
 {
-  static const int place[6] = {4, 6, 7,
-                               5, 9, 8}; /* positions in vert[] of the nodes of the edges 01 02 03 12 13 23 */
+  static const int place[6] = {4, 6, 7, 5, 9, 8}; /* nodes of the edges 01 02 03 12 13 23 */
 
   PetscFunctionBeginUser;
   for (int a = 0, e = 0; a < 4; a++) {

@@ -38,8 +38,7 @@ static PetscErrorCode read_points(SbImport *im)
 typedef struct {
   int dim, room; /* dimension; least number of bytes per line */
   const char *before[5];
-  int mark,
-    nnode; /* positions of the group and of the number of points; nnode -1: all remaining words on the line are points */
+  int mark, nnode; /* positions of group and number of points; nnode -1: all other words are points */
 } Layout;
 
 static const Layout neutral_volume = {

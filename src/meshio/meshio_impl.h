@@ -46,10 +46,8 @@ static inline PetscBool SbGmshIsSimplex(int type)
                      type == SB_GMSH_TRIANGLE6 || type == SB_GMSH_LINE3);
 }
 
-/*
-  Counts an element, and adds it if it is needed: a tet, a simplex in a group, or a triangle of a surface. Of second-order elements the corners are kept,
-  of a 10-node tet, vert[10] in gmsh's order, also the edge nodes.
-*/
+/* Counts an element, and adds it if it is needed: a tet, a simplex in a group, or a triangle of a surface. Of second-order elements the corners are kept,
+   of a 10-node tet, vert[10] in gmsh's order, also the edge nodes. */
 PetscErrorCode SbImportAddElement(SbImport *import, int type, const PetscInt vert[], PetscInt tags,
                                   int64_t number);
 /*

@@ -230,10 +230,8 @@ static PetscErrorCode write_elements_22(Out *out)
       const PetscInt *v;
       PetscInt k, g;
 
-      /*
-        an element, once for each of its groups; without groups once with group 0. In binary each element has a
-        header
-      */
+      /* an element, once for each of its groups; without groups once with group 0. In binary each element has a
+         header */
       v = item->vert + (size_t)(d + 1) * (size_t)i;
       k = out->im->tags_start[item->tags[i]];
       g = next_group(out->im, item->tags[i], d, &k);

@@ -15,8 +15,7 @@ PetscErrorCode SbSceneReadSets(SbModel model);
 
 /* Placement of a copy of a body. */
 typedef struct {
-  PetscReal x[3], rotate[4], scale,
-    velocity[3]; /* translation, m; axis and angle, degrees; scale factor; velocity, m/s */
+  PetscReal x[3], rotate[4], scale, velocity[3]; /* m; axis, degrees; factor; m/s */
 } SbPlacement;
 /* Reads the placements of -body_<name>_copies, n of them, 0: no copies; a file is read on rank 0. Collective; the caller frees. */
 PetscErrorCode SbSceneReadCopies(MPI_Comm comm, const char *name, PetscInt *n, SbPlacement **place);

@@ -167,10 +167,8 @@ static PetscErrorCode cut_flat(SbTriangleFile *f, PetscBool touched[], SbKey edg
       PetscInt middle, *v, *w, a, b, c;
 
       if (!flat[mine] || touched[mine] || touched[other] || e != longest_edge(t, mine)) continue;
-      /*
-        edge (a, b) between the neighbour (a, b, c) and the flat triangle, whose third corner is on the edge: the two become
-        (a, middle, c) and (middle, b, c)
-      */
+      /* neighbour (a, b, c) at the longest edge (a, b), on which the third corner of the flat triangle lies: the two
+         become (a, middle, c) and (middle, b, c) */
       middle = t->tri[3 * mine + (e + 2) % 3];
       v = f->t->tri + 3 * other;
       w = f->t->tri + 3 * mine;

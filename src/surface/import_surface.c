@@ -6,8 +6,7 @@
 */
 #include "surface_impl.h"
 
-#define WELD \
-  1e-7 /* default merge tolerance over the diagonal of the surface: the precision of coordinates in text files */
+#define WELD 1e-7 /* default merge tolerance over the diagonal: the precision of text files */
 
 static const SbOption rows[] = {
   {"tet_size", SB_OPTION_REAL, 1, "m", "", "(0, inf)",

@@ -20,11 +20,10 @@ typedef struct {
   PetscInt nwelded;           /* vertices merged with another one */
   PetscInt ncollapsed;        /* triangles removed because two of their corners were merged */
   PetscInt ndoubled;          /* duplicate triangles removed */
-  PetscInt
-    nwall; /* pairs of coincident triangles with opposite orientation: one is kept as a wall between regions */
-  PetscInt nflat;              /* flat triangles merged into their neighbours */
-  PetscInt nturned;            /* triangles reversed for consistent orientation */
-  PetscInt ncavity;            /* parts that are cavities */
+  PetscInt nwall;   /* pairs of coincident triangles of opposite orientation: one is kept as a wall */
+  PetscInt nflat;   /* flat triangles merged into their neighbours */
+  PetscInt nturned; /* triangles reversed for consistent orientation */
+  PetscInt ncavity; /* parts that are cavities */
   PetscInt npairs, nuntangled; /* pairs of intersecting triangles; vertices moved by smoothing */
   PetscReal untangled;         /* largest displacement by smoothing, m */
   PetscInt nidle;              /* triangles without material on either side, removed */

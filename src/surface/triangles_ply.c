@@ -9,9 +9,8 @@
 enum { ELEMENTS_MAX = 16, PROPERTIES_MAX = 64 };
 
 typedef struct {
-  SbNumberType type,
-    count;  /* type of the values; type of the length of a list, of size 0 for a single value */
-  int axis; /* 0, 1, 2: coordinate of a vertex; 3: corners of a face; -1: ignored */
+  SbNumberType type, count; /* type of values; of a list's length, size 0: a single value */
+  int axis;                 /* 0, 1, 2: coordinate of a vertex; 3: corners of a face; -1: ignored */
 } Property;
 
 typedef struct {

@@ -168,10 +168,8 @@ PetscErrorCode SbTrianglesRead_OBJ(SbScan *s, SbTriangleFile *f)
     PetscCall(SbScanWord(s, sizeof(word), word));
     if (!word[0]) break;
     if (!strcmp(word, "v")) PetscCall(add_vertex(s, f));
-    /*
-      the rest of a line f: vertex numbers from 1, or negative ones counted back from the last vertex; indices after a slash
-      are ignored
-    */
+    /* the rest of a line f: vertex numbers from 1, or negative ones counted back from the last vertex; indices
+       after a slash are ignored */
     if (!strcmp(word, "f")) {
       int64_t number = ++nface;
 

@@ -15,11 +15,10 @@
 */
 #include "tool.h"
 
-#define PROCESS 43e6 /* memory of a run with a very small mesh, bytes */
-#define TET 600.     /* memory of a tet in mesh and geometry, with vertices and boundary, bytes */
-#define FACTOR 4096. /* memory of a factorisation per unknown, bytes */
-#define FACTORED \
-  60000 /* largest number of unknowns for which -solver auto factorises the matrix of a dynamic run */
+#define PROCESS 43e6   /* memory of a run with a very small mesh, bytes */
+#define TET 600.       /* memory of a tet in mesh and geometry, with vertices and boundary, bytes */
+#define FACTOR 4096.   /* memory of a factorisation per unknown, bytes */
+#define FACTORED 60000 /* largest number of unknowns that -solver auto factorises in a dynamic run */
 
 /* ------------------------------------------------------------------ parts of the report */
 
