@@ -1,5 +1,5 @@
 /*
-  cells.h - what any element's function is in a cell and at a vertex, and boxes whose inner vertices were moved.
+  cells.h - displacement function of any element in a cell and at a vertex; boxes with perturbed interior vertices.
 */
 #pragma once
 #include "verify.h"

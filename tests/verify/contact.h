@@ -1,5 +1,5 @@
 /*
-  contact.h - what the verification of contact shares: history columns by name, sums over each body, the history of a run as a
+  contact.h - common functions of the verification of contact: history columns by name, sums over each body, the history as a
   table, balls made of boxes.
 */
 #pragma once

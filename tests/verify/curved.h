@@ -1,6 +1,6 @@
 /*
-  curved.h - meshes of second order: a prism over a triangle, n cells along its sides and m layers, three tets in each cell, with all ten nodes where a map
-  puts them, or with the four at their vertices.
+  curved.h - second-order meshes: a triangular prism, n cells along its sides, m layers, three tets per cell, mapped at all ten nodes of each tet
+  (curved) or at the four vertices only (straight).
 */
 #pragma once
 #include "verify.h"

@@ -1,15 +1,15 @@
 /*
-  hertz.h - contact of two elastic bodies after Hertz (1882; Johnson, Contact Mechanics, 1985, chapter 4):
+  hertz.h - Hertz contact of two elastic bodies (Hertz 1882; Johnson, Contact Mechanics, 1985, chapter 4):
 
     F = 4/3 E* sqrt(R) d^(3/2),   1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2,   1/R = 1/R1 + 1/R2,   a = sqrt(R d),
 
-  for a sphere on a half-space of another material, and for two equal spheres; d is the approach of points far away, a the radius of
-  contact. Quarters of both bodies, meshes that do not match, graded to the point where they meet. The materials are linear and a is
-  R/80 at most, so that what is left is the error of the mesh.
+  for a sphere on a half-space of another material, and for two equal spheres; d is the approach of distant points, a the contact
+  radius. Quarters of both bodies, non-matching meshes, graded towards the contact point. The materials are linear and a is at most
+  R/80, so that the discretisation error dominates.
 
-  The blocks are finite: their far faces move as half-spaces do under the force F at a point (Boussinesq), where the rest is of the order
-  (a/r)^2 of it, r > 8 a. That takes the formula's F. It cannot hide an error of the contact: this field is at most a tenth of d there,
-  so an F wrong by 5 % shifts the bodies by 0.5 % of d.
+  The blocks are finite: their far faces have the displacement of half-spaces under a point force F (Boussinesq), whose relative error is of order
+  (a/r)^2, r > 8 a. F is taken from the formula. This cannot hide an error of the contact force: the displacement there is at most a tenth of d,
+  so an error of 5 % in F changes the approach by 0.5 % of d.
 */
 #pragma once
 #include "contact.h"

@@ -1,6 +1,6 @@
 /*
-  locking.h - the problems on which elements are compared near nu = 1/2: each as a function of the mesh, Poisson's ratio and
-  more options (element, penalties, solver). What they return is read from the element's own functions.
+  locking.h - problems for the comparison of elements near nu = 1/2: each is a function of the mesh, Poisson's ratio and
+  further options (element, penalties, solver). Results are evaluated from the element's own functions.
 */
 #pragma once
 #include <time.h>

@@ -1,13 +1,13 @@
 /*
-  manufactured.h - a displacement without divergence on the unit cube: with phi = (sin pi x sin pi y sin pi z)^2,
+  manufactured.h - a divergence-free displacement of the unit cube: with phi = (sin pi x sin pi y sin pi z)^2,
 
     u = (phi_y - phi_z, phi_z - phi_x, phi_x - phi_y),   u = 0 on the boundary,   f = -mu Lap u,   E = 3.
 
-  The force does not contain lambda, so the exact answer is the same at every Poisson's ratio, and what changes with it is
-  the element's alone. Locking shows on meshes whose inner vertices were moved: the mirrored cells of a box leave linear tets
-  enough displacements without divergence.
+  The force does not depend on lambda, so the exact solution is the same for every Poisson's ratio, and any dependence on it is
+  due to the element. Locking shows on meshes with perturbed interior vertices: on the mirrored cells of a box linear tets
+  have enough divergence-free displacements.
 
-  Errors are those of the element's own function in each cell, by a rule of degree 5 (Walkington 2000), relative to
+  Errors are those of the element's own function in each cell, by a quadrature rule of degree 5 (Walkington 2000), relative to
   the norm of u.
 */
 #pragma once

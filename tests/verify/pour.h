@@ -1,9 +1,9 @@
 /*
-  pour.h - small bodies poured into a bowl: what the short and the long program share.
+  pour.h - small bodies poured into a bowl: common part of the short and the long test.
 
-  Boxes of a few tets, turned this way and that, fall in layers. Energy with the potential of gravity never exceeds that of the start;
-  momentum changes by weight and the force of the bowl; no vertex of the surface ends a step behind the bowl, and none ever is deep in
-  another body; centres end inside the bowl, and what came to rest below is carried.
+  Boxes of a few tets with various orientations fall in layers. Checks: the energy including gravity never exceeds the initial one;
+  the momentum changes by weight and the force of the bowl; no surface vertex is behind the bowl at the end of a step, or deep inside another
+  body; body centres end inside the bowl, and resting bodies are supported.
 */
 #pragma once
 #include "../../src/effect/barrier_impl.h"

@@ -1,5 +1,5 @@
 /*
-  verify.h - what the verification programs share: scenes, meshes of boxes with moved vertices, 3x3 algebra, Richardson's
+  verify.h - common functions of the verification programs: scenes, boxes with perturbed vertices, 3x3 algebra, Richardson
   extrapolation.
 */
 #pragma once

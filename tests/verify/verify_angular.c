@@ -1,13 +1,13 @@
 // @ranks 1 2
 /*
-  Two free blocks that collide obliquely, without friction: what their contact does to the angular momentum.
+  Oblique frictionless collision of two free blocks: effect of contact on the angular momentum.
 
   Implicit Euler itself changes it. From x1 = x0 + h v1 and M (v1 - v0) = h f,
 
       L1 - L0 = h sum x1 x f + h sum m v1 x v0,
 
-  where the internal forces have no torque. What is left beside the last sum is the torque of the contact forces: it is zero
-  as the energy of a pair does not change when both bodies turn.
+  where the internal forces have no torque. The difference to the last sum is the torque of the contact forces: it is zero
+  because the contact energy of a pair is invariant under rotation of both bodies.
 */
 #include "contact.h"
 

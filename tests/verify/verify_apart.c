@@ -1,13 +1,13 @@
 // @ranks 1 2
 /*
-  A body that touches nothing moves as if the others were not there.
+  A body without contact moves as if the other bodies were absent.
 
-    named    two bodies far apart, and an obstacle far away: with contact named and without, the same to the last bit, where
-             the preconditioner depends on the matrix alone
-             (friction between bodies takes FGMRES in the place of CG, and so another way to the tolerance)
-    beside   a body that flies past two others which collide, against the same body alone in the world. One linear system holds all
-             bodies, and Newton's method and CG end when the sum over all of them is small: the motion is the same to what these tolerances
-             leave
+    named    two distant bodies and a distant obstacle: bitwise the same result with and without contact effects, if
+             the preconditioner depends on the matrix only
+             (friction between bodies uses FGMRES instead of CG, whose result differs within the tolerance)
+    beside   a body that flies past a collision of two others, against the same body alone. One linear system has all
+             bodies, and Newton's method and CG stop by a norm over all of them: the motion is the same within these
+             tolerances
 */
 #include "contact.h"
 

@@ -1,16 +1,16 @@
 // @ranks 1
 /*
-  Bars in bending and under their own weight, static, against theory and against computed solutions of the continuum.
+  Bars in bending and under their own weight, static, against theory and reference solutions of the continuum.
 
     hanging   bar under its weight with the exact displacement at its top (code_aster SSLV07): order 2 at the vertices
     shear     cantilever with an end load, L/h = 5, nu = 0: P L^3/(3 E I) + P L/(kappa G A), kappa = 5/6 (Timoshenko)
-    weight    clamped bar 0.4 x 0.1 x 0.1 m under its weight, E = 5e4, nu = 0.3, rho = 1000: end -0.785713 m, strain energy
+    weight    clamped bar 0.4 x 0.1 x 0.1 m under its weight, E = 5e4, nu = 0.3, rho = 1000: tip displacement -0.785713 m, strain energy
               6.38808 J, computed with graded hexahedra of high order
     elastica  slender bar with an end load of fixed direction, alpha = P L^2/(E I) (Bisshopp and Drucker 1945)
 
-  P1 is too stiff in bending: errors fall with h^2 from far away, so a sequence of meshes is extrapolated to h = 0
-  (Richardson). With nu = 0 bending in a plane does not depend on the width: one layer of cells between two planes that
-  cannot leave themselves is enough.
+  P1 is too stiff in bending: errors decrease as h^2 but are large, so results on several meshes are extrapolated to h = 0
+  (Richardson). With nu = 0 plane bending does not depend on the width: one layer of cells between two symmetry planes
+  is enough.
 */
 #include "verify.h"
 

@@ -1,11 +1,11 @@
 // @ranks 1 2
 /*
-  Restitution: what bounces off a rigid obstacle.
+  Restitution at a rigid obstacle.
 
-    ball       a stiff ball that falls on a plane rises to e^2 of its height, again and again
-    block      a stiff block that lands flat, its whole base at once, leaves with e times its speed
-    bat        a plane that comes with the speed w throws a ball that rests with (1 + e) w
-    soft       whatever body, mesh, step and e: no step gains energy
+    ball       a stiff ball that falls on a plane rises to e^2 of its height, repeatedly
+    block      a stiff block that lands flat on its base leaves with e times its speed
+    bat        a plane that moves with the speed w throws a resting ball with (1 + e) w
+    soft       soft bodies of any mesh, time step and e: no step gains energy
 */
 #include "contact.h"
 

@@ -1,18 +1,18 @@
 // @ranks 1
 /*
-  Is the stiffness of CR, DG and P2 positive on every mesh, for every Poisson ratio and every penalty? All eigenvalues of
-  D^-1/2 K D^-1/2, D the diagonal of K, of free bodies on small meshes by LAPACK: six are zero, the rigid motions, and no other,
-  none is negative. The scaling takes sizes out: the largest eigenvalue is between 1 and the number of entries of a row.
+  Positive semi-definiteness of the stiffness of CR, DG and P2 for all meshes, Poisson ratios and penalties. All eigenvalues of
+  D^-1/2 K D^-1/2, D the diagonal of K, of free bodies on small meshes by LAPACK: exactly six are zero, the rigid modes,
+  none is negative. The scaling removes mesh size: the largest eigenvalue is between 1 and the number of entries of a row.
 
-    meshes    vertices moved at random; sizes of tets in the ratio 1000 to 1; tets of 0.06 degrees
-    gammas    CR and DG as they come, and DG with both gammas at 0.01: positive for every positive gamma
-    state     at rest, where all laws are Hooke's, and turned by two rad, where K is that at rest turned
-    pressed   nu = 0.499, squeezed or stretched evenly to a pressure of half the shear modulus, the boundary held: still
-              positive. The face terms are as stiff as the shear modulus, so that a pressure above it makes CR and DG unstable
-              where the solid is not, as neo-Hookean P2; how far they go is printed
-    not so    with gamma1 = 1e-12 CR keeps many motions without energy (Falk 1991): the test sees them
+    meshes    random perturbations of vertices; size ratios of tets of 1000 to 1; tets with angles of 0.06 degrees
+    gammas    CR and DG with default penalties, and DG with both gammas at 0.01: positive for every positive gamma
+    state     at rest, where all materials are linear elastic, and rotated by two rad, where K is the rotated one at rest
+    pressed   nu = 0.499, uniformly compressed or stretched to a pressure of half the shear modulus, with fixed boundary: still
+              positive. Face terms are as stiff as the shear modulus, so that CR and DG are unstable at a larger pressure where
+              the solid is stable, as neo-Hookean P2; the limits are printed
+    not so    with gamma1 = 1e-12 CR has many zero-energy modes (Falk 1991): the test detects them
 
-  Rounding: the matrix is right to 1e-15 of its largest entry, so eigenvalues are to about 1e-14 of the largest one.
+  Rounding: matrix entries are accurate to 1e-15 of the largest one, so eigenvalues to about 1e-14 of the largest one.
 */
 #include "verify.h"
 

@@ -2,11 +2,11 @@
 /*
   Contact between bodies.
 
-    stack      a block on a block with another mesh, loaded from above: the stress is uniform where the method can give that, the
+    stack      a block on a block with another mesh, loaded from above: uniform stress if the method can represent it, the
                lower block carries the load, gaps are closed
-    bars       two equal bars that collide end to end: time of contact and exchange of velocities of the wave solution
-    momentum   two free blocks collide obliquely, with friction: momentum and angular momentum stay, energy is never gained
-    slope      friction between two bodies: a block stays on one of tan 0.5 with 0.51, and slides with 0.49
+    bars       two equal bars that collide end to end: contact duration and exchange of velocities of the wave solution
+    momentum   oblique collision of two free blocks, with friction: momentum and angular momentum are conserved, energy never increases
+    slope      friction between two bodies: a block on a slope of tan 0.5 sticks with a coefficient of 0.51, and slides with 0.49
 */
 #include "contact.h"
 

@@ -2,14 +2,14 @@
 /*
   Contact with rigid obstacles.
 
-    press      a block under a load on a plane: the stress is uniform, the obstacle carries the load, its gap is closed
-    fall       a block falls on a plane: no step gives energy (implicit Euler), the momentum changes by weight and contact
-               force alone, and no node ends a step behind the plane
-    incline    friction: 0.51 holds a block on a slope of tan = 0.5, with 0.5 it keeps its speed, with 0.49 it slides at g (sin - mu cos)
-    held       a static run in which friction alone holds a block against a load along the floor
+    press      a block under a load on a plane: uniform stress, the obstacle carries the load, the gap is closed
+    fall       a block falls on a plane: no step gains energy (implicit Euler), the momentum changes by weight and contact
+               force only, and no node is behind the plane at the end of a step
+    incline    friction on a slope of tan = 0.5: a block sticks with 0.51, keeps its speed with 0.5, slides at g (sin - mu cos) with 0.49
+    held       static friction balances a load along the floor
     corner     a block slides along a floor and a wall, each with friction: g - mu (N + N')
-    indent     a capsule presses and drags: the four responses give the same force
-    bounds     a beam that sags on a plane: PETSc's solver of variational inequalities finds the same displacement
+    indent     a capsule indents a block and is dragged: the four responses give the same force
+    bounds     a beam that sags on a plane: the same displacement as by PETSc's solver of variational inequalities
     hertz      a rigid sphere on a half-space: force against approach
 */
 #include "contact.h"

@@ -1,15 +1,15 @@
 // @ranks 1 2 3
 /*
-  P2 on meshes of second order with curved tets, all edges inside too:
+  P2 on second-order meshes with curved tets, interior edges included:
 
-    patch       an affine displacement of the boundary is that of all nodes, for every law; a uniform pressure on the curved surface is in
-                equilibrium with the uniform stress; both to rounding, as the rule is exact for the polynomials that decide
-    rigid       a turn leaves neither force nor energy
-    sums        volume of the body, mass of the nodes, lumped and consistent, force of a load on a curved facet: exact ones
-    sphere      Lame's thick sphere, nu 0.3 and 0.4999: order of the displacement at the inner wall, curved and straight tets; the error that
-                the ledger estimates beside the true one
-    ranks       the same displacement as on one rank, also from an .h5 that all ranks read in slabs
-    refused     a tet that folds over itself, by its number
+    patch       an affine displacement of the boundary extends to all nodes, for every material; a uniform pressure on the curved surface is in
+                equilibrium with the uniform stress; both up to rounding, as the quadrature is exact for these polynomials
+    rigid       a rotation gives neither force nor energy
+    sums        volume of the body, lumped and consistent mass, force of a load on a curved facet: exact
+    sphere      Lame's thick sphere, nu 0.3 and 0.4999: order of the displacement at the inner wall, curved and straight tets; effectivity of the
+                error estimate of the ledger
+    ranks       the same displacement as on one rank, also from an .h5 file read in slabs
+    refused     error for a tet whose Jacobian is not positive, with its number
 */
 #include "curved.h"
 #include "sbestimate.h"

@@ -1,14 +1,14 @@
 // @ranks 1 2
 /*
-  A ball is dropped on a plane and bounces, with implicit Euler and with generalized-alpha.
+  A ball bounces on a plane, with implicit Euler and with generalized-alpha.
 
-  Energy with the potential of gravity never exceeds that of the start: at all by implicit Euler, but for the stated part of the fall's
-  energy by generalized-alpha. In every step momentum changes by weight and the force of the plane. For generalized-alpha these act at
+  The energy including gravity never exceeds the initial one: exactly for implicit Euler, within the stated fraction of the fall
+  energy for generalized-alpha. In every step the momentum changes by weight and the force of the plane. For generalized-alpha these act at
   the stage, where M a = force - weight with a = a0 + alpha_m (a1 - a0), and so
 
       p1 - p0 = h (force - weight) + h (gamma - alpha_m) M (a1 - a0).
 
-  No vertex ends a step behind the plane, and each rise is lower than the one before.
+  No vertex is behind the plane at the end of a step, and each rebound is lower than the previous one.
 */
 #include "contact.h"
 

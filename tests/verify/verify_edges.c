@@ -1,15 +1,15 @@
 // @ranks 1 2
 /*
-  Contact between edges.
+  Edge-edge contact.
 
-    bars     two bars laid crosswise, each turned by 45 degrees about its axis so that only edges meet, come to rest on each other: they
-             are not in each other, the force is the weight; the same on all ranks together and on one
-    fast     thin bars that meet so fast that one would be past the other after a step
-    box      a box falls on a thin plate at 5 m/s, corner first and edge first: it does not go through, in any step
-    rings    two linked coarse rings with edges inside are pulled apart: they stay linked to the end
+    bars     two crossed bars, each rotated by 45 degrees about its axis so that only edges are in contact, come to rest on each other:
+             no penetration, the force is the weight; the same on all ranks together and on one
+    fast     thin bars so fast that one would pass through the other within a step
+    box      a box falls on a thin plate at 5 m/s, corner first and edge first: no penetration in any step
+    rings    two linked coarse rings with interior edges are pulled apart: they stay linked
 
-  How deep bodies are in each other is measured without the detector: many places on all edges of one surface, of which those inside
-  the other one, by its solid angle, have a distance from it.
+  Penetration is measured independently of the detector: many sample points on all edges of one surface; for those inside
+  the other one, by its solid angle, the distance from it.
 */
 #include <sbgeometry.h>
 #include "verify.h"

@@ -1,15 +1,15 @@
 // @ranks 1 3
 /*
-  Effects on bodies of every element, through whole runs.
+  Effects on bodies of every element, in complete runs.
 
-    supports    a bar under its weight and a traction: reaction and its moment balance the loads; with DG, supports by a
-                penalty and by the mean displacement come to the same answer as the mesh is refined, in the order of the
+    supports    a bar under its weight and a traction: reaction and its moment balance the loads; with DG, supports by
+                penalty and by the mean displacement converge to the same solution with the order of the
                 method
-    drive       both ends of a bar turned and moved by a drive: it follows without strain and without reaction
-    mixed       bodies of each element in one scene: each support carries its own body
-    flight      velocity and spin of a free body: momenta are those of the rigid body from the start, and stay
-    motion      a clamped bar swings: energy stays with Newmark; symplectic Euler follows it, below its largest step
-    pressure    a body under pressure all around does not move away
+    drive       both ends of a bar move and rotate by prescribed displacements: it follows without strain and without reaction
+    mixed       bodies of different elements in one scene: each support carries its own body
+    flight      initial velocity and spin of a free body: momenta are those of the rigid body initially, and are conserved
+    motion      a clamped bar oscillates: energy is conserved with Newmark; symplectic Euler agrees with it, below its largest step
+    pressure    a body under pressure on its whole surface does not move
 */
 #include "verify.h"
 

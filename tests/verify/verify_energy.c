@@ -2,15 +2,15 @@
 /*
   Energy and momentum over many steps.
 
-    drift      Newmark (1/4, 1/2) on a linear body: energy stays, to rounding, for 1e5 steps (one rank)
-    decay      implicit Euler on a linear body: energy falls in every step, and what the account calls the integrator's
-               loss is exactly 1/2 dv.M dv + 1/2 du.K du of the steps
-    account    a nonlinear body, loaded, driven and damped: what is missing in the account falls with h^2 for Newmark
-    turning    the end of a bar turns by 9 degrees a step: implicit Euler gives no energy, nor does a static load path
-    grip       two obstacles turn the end of a bar by 2 degrees a step: the same
-    swing      a soft bar of CR or DG lets go under its weight: the penalty of jumps follows the pressure of bending, and gives no energy
-    momentum   free flight with spin: linear momentum to rounding with every integrator; angular momentum to rounding with
-               symplectic Euler, whose step cannot change it, else to the order of the method
+    drift      Newmark (1/4, 1/2) on a linear body: energy is conserved up to rounding for 1e5 steps (one rank)
+    decay      implicit Euler on a linear body: energy decreases in every step, and the integrator's loss in the energy
+               balance is exactly 1/2 dv.M dv + 1/2 du.K du of the steps
+    account    a nonlinear body with loads, prescribed motion and damping: the residual of the energy balance is O(h^2) for Newmark
+    turning    the end of a bar rotates by 9 degrees per step: implicit Euler gains no energy, nor does a static load path
+    grip       two obstacles rotate the end of a bar by 2 degrees per step: the same
+    swing      a soft bar of CR or DG is released under its weight: the jump penalty follows the bending pressure, and gains no energy
+    momentum   free flight with spin: linear momentum up to rounding with every integrator; angular momentum up to rounding with
+               symplectic Euler, which conserves it, else to the order of the method
 */
 #include "verify.h"
 

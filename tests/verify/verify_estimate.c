@@ -1,22 +1,22 @@
 // @ranks 1
 /*
-  Effectivity of the estimate of the error of space: estimate over true error in the energy norm (sbestimate.h), for P1, CR, DG and P2, on
-  problems whose stress is known, or is taken from a mesh at least twice as fine.
+  Effectivity of the spatial error estimate: estimate over true error in the energy norm (sbestimate.h), for P1, CR, DG and P2, on
+  problems with known stress, or with a reference on a mesh at least twice as fine.
 
-    cube      manufactured.h, n distorted cells along an edge; at nu = 0.49999 P1 has a thousandth of the exact displacement
-    shell     Lame's hollow sphere (locking.h), edges of 0.3
-    bar       clamped at one end, under its weight, n cells across; the stress is infinite at the edge of the clamp
-    cook      Cook's membrane, clamped on its left, sheared on its right, plane strain, 4 n cells each way
-    two       the bar with an upper half forty times as stiff: the stress jumps where they meet
-    turned    the bar with a nonlinear law, its end turned by more than half a radian
-    squeeze   a plate between two stiff ones that it sticks to, driven together: no loads, so a locked answer has too much energy, not too
+    cube      manufactured.h, n perturbed cells along an edge; at nu = 0.49999 P1 has a thousandth of the exact displacement
+    shell     Lame's hollow sphere (locking.h), edge length 0.3
+    bar       clamped at one end, under its weight, n cells across; the stress is singular at the edge of the clamp
+    cook      Cook's membrane, clamped on its left, sheared on its right, plane strain, 4 n cells in each direction
+    two       the bar with an upper half forty times as stiff: the stress jumps at the interface
+    turned    the bar with a nonlinear material, its end rotated by more than half a radian
+    squeeze   a plate tied to two stiff ones that approach each other: no loads, so a locked solution has too much energy, not too
               little
-    sphere    a rigid sphere that is pressed into a quarter of a block
-    wave      a rod that vibrates along its axis: half of what loads it is inertia
+    sphere    a rigid sphere that indents a quarter of a block
+    wave      axial vibration of a rod: half of its load is inertia
 
-  Each ratio must lie between 0.6 and 1.3 (measured: 0.65 to 1.26). The last two columns are what other estimators say on P1: recovery
-  alone (Zienkiewicz and Zhu 1992), which does not see what has locked; and jumps of tractions (Verfuerth 1996), eta^2 = c sum_F h |F| |[P N]|^2 / mu with c
-  such that it is right for the cube, n = 16 and nu = 0.3, which grow beyond the error where the pressure oscillates.
+  Each ratio must be between 0.6 and 1.3 (measured: 0.65 to 1.26). The last two columns are other estimators on P1: recovery
+  only (Zienkiewicz and Zhu 1992), which does not detect locking; and traction jumps (Verfuerth 1996), eta^2 = c sum_F h |F| |[P N]|^2 / mu with c
+  calibrated for the cube, n = 16 and nu = 0.3, which exceed the error if the pressure oscillates.
 */
 #include "locking.h"
 

@@ -1,6 +1,6 @@
 // @ranks 1
 /*
-  Contact of two elastic bodies of P1 after Hertz: what hertz.h tells, on meshes that are refined.
+  Hertz contact of two elastic P1 bodies (hertz.h) under mesh refinement.
 */
 #include "hertz.h"
 

@@ -1,7 +1,7 @@
 // @ranks 1
 // @long
 /*
-  Hertz's contact (hertz.h) with CR and DG (P2: verify_quadratic_contact.c), and of one body on a rigid plane.
+  Hertz contact (hertz.h) with CR and DG (P2: verify_quadratic_contact.c), and of one body on a rigid plane.
 */
 #include "hertz.h"
 

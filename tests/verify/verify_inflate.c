@@ -1,27 +1,27 @@
 // @ranks 1 2
 /*
-  A thick sphere and a thick cylinder (plane strain), radii A = 1 and B = 2, blown up by a pressure that follows their inner wall, to 1.5 times its
-  radius: CR, stable neo-Hookean law, mu = 1, nu = 0.499, between planes of symmetry. The pressure acts on part of the surface, whose facets do not
-  meet at their edges.
+  Inflation of a thick sphere and a thick cylinder (plane strain), radii A = 1 and B = 2, by a follower pressure on the inner wall, to 1.5 times its
+  radius: CR, stable neo-Hookean material, mu = 1, nu = 0.499, between symmetry planes. The pressure acts on part of the surface, whose facets are
+  discontinuous at their edges.
 
-  Without change of volume the hoop stretch falls from la = a/A inside to lb, lb^k = 1 + (la^k - 1) (A/B)^k, and equilibrium along the radius gives
+  Without change of volume the hoop stretch decreases from la = a/A inside to lb, lb^k = 1 + (la^k - 1) (A/B)^k, and radial equilibrium gives
 
     p = int_lb^la dW/dl / (l^k - 1) dl,   k = 3 for the sphere, 2 for the cylinder, W(l) the energy at that stretch.
 
-  W = mu/2 (I1 - 3) makes it mu/2 [(4/lb + lb^-4) - (4/la + la^-4)] for the sphere, mu [ln(la/lb) + (lb^-2 - la^-2)/2] for the cylinder. The law of this program is
+  W = mu/2 (I1 - 3) gives mu/2 [(4/lb + lb^-4) - (4/la + la^-4)] for the sphere, mu [ln(la/lb) + (lb^-2 - la^-2)/2] for the cylinder. The material of this program is
 
     W = 2/3 mu [(I1 - 3) - log((I1 + 1)/4)],   dW/dI1 = 2/3 mu I1/(I1 + 1):
 
   mu/2 at rest, and up to a third stiffer when stretched. Both are computed: the quadrature is checked with the classical energy.
 
-    pressure   of the closed form at the stretch that the run has reached, against the one applied: within 1 % on one mesh of 1,920 tets, and
-               nearing it with the mesh
+    pressure   of the closed form at the computed stretch, against the applied one: within 1 % on one mesh of 1,920 tets, and
+               converging
 
-  A facet of CR is as large as the middle of its tet says, h/4 behind the wall, where the hoop stretch is less than at the wall: the force of a pressure
-  that follows is too small by some h/2 dln(l)/dR, 4 % of it for h = A/11 and l = 1.5. Layers are therefore thinner towards the inner wall, by GROWTH
+  A facet of CR has the area at the centre of its tet, h/4 behind the wall, where the hoop stretch is less than at the wall: the force of a follower
+  pressure is too small by about h/2 dln(l)/dR, 4 % for h = A/11 and l = 1.5. Layers are therefore graded towards the inner wall, by GROWTH
   each on the fine mesh; the coarse one has half as many.
-    iterations are bounded, with CHOLMOD, which fails where the tangent is indefinite, and with MUMPS, which only counts negative pivots
-    order      a disturbance of the answer falls with its square in one iteration of Newton's method
+    iterations are bounded, with CHOLMOD, which fails if the tangent is indefinite, and with MUMPS, which only counts negative pivots
+    order      the error of a perturbed solution is squared by one iteration of Newton's method
 */
 #include "verify.h"
 

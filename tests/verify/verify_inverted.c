@@ -1,11 +1,11 @@
 // @ranks 1 2
 /*
-  Runs that refuse steps which invert tets (-time_inverted reject).
+  Runs that reject steps with inverted tets (-time_inverted reject).
 
-    stops     a box that is pressed flat, which it would be at 2/3 of the way: every integrator stops before that with the reason, no farther from it than
-              the shortest step, and with every tet the right side out; one that counts gets to the end with all of them inverted
-    mirrored  a body that is inverted where it begins goes on: no more tets are so than before
-    alpha2    cannot refuse, and says so
+    stops     a box whose compression would invert it at 2/3 of the path: every integrator stops before that with the reason, within the
+              shortest step of it, and without inverted tets; a run that accepts them reaches the end with all tets inverted
+    mirrored  a body that is inverted initially goes on: the number of inverted tets does not increase
+    alpha2    cannot reject steps, and says so
 */
 #include "scene.h"
 

@@ -1,10 +1,10 @@
 // @ranks 1 2
 /*
-  Effectivity of the ledger's estimates, estimate over true error in the norm of the energy: of time steps on a bar that oscillates, by every
-  integrator and with damping; of solves that stop early, linear and Newton's; of springs and of a barrier's gaps in contact. And: a ledger changes no result, the same
-  estimates on any number of ranks, and -accuracy is met, also where contact is the largest error.
-  The true error of a step size is that against the same run with steps 32 times as short by Newmark's method, of a solve that against the one
-  solved to rounding.
+  Effectivity of the error estimates of the ledger, estimate over true error in the energy norm: of time steps on an oscillating bar, for every
+  integrator and with damping; of linear and Newton solves with loose tolerances; of contact springs and barrier gaps. And: the ledger changes no result, its
+  estimates are the same on any number of ranks, and -accuracy is reached, also if contact is the largest error.
+  The true error of the time step is relative to the same run with 32 times shorter steps by Newmark's method, that of a solve relative to a
+  solution up to rounding.
 */
 #include "verify.h"
 

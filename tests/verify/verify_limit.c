@@ -1,15 +1,15 @@
 // @ranks 1,2
 /*
-  Limit loads. A cube of St. Venant-Kirchhoff with Poisson's ratio 0 that is pressed along one axis and stretched by s there carries the nominal
+  Limit loads. A cube of St. Venant-Kirchhoff material with Poisson's ratio 0, compressed along one axis to the stretch s, has the nominal
   stress P = E/2 (s^3 - s), which is largest at s = 1/sqrt 3: 0.19245 E.
 
-  A load path that asks for 0.2 E ends there in few steps, says how far it got, and that displacements grow without bound with the load. One that stays
-  below gets to its end. By arc length each equilibrium of the path is one of the formula, past the maximum, through s = 0, where the cube has no height, to the
-  branch on which it is inverted and carries 0.2 E; with dead and follower loads, and with all elements. A restart goes on along the same path, also from the
+  A load path to 0.2 E ends there in few steps, reports the load reached, and that displacements grow without bound with the load. A path to a lower load
+  reaches its end. With arc length control each equilibrium satisfies the formula, past the maximum, through s = 0, where the height is zero, to the
+  inverted branch, which carries 0.2 E; with dead and follower loads, and with all elements. A restart continues the same path, also from the
   end of a load path.
 
-  Follower pressure on part of a surface has no potential. Its load path ends at the limit as well, and a cantilever that it curls up takes the
-  iterations of Newton's method, where it meets indefinite symmetric parts of the tangent on the way. So does a strip that it pulls by its end.
+  Follower pressure on part of a surface has no potential. Its load path ends at the limit too; for a cantilever curled up by it the number of
+  Newton iterations is bounded, although symmetric parts of the tangent are indefinite on the way; likewise for a strip that it pulls by its end.
 */
 #include "verify.h"
 

@@ -2,11 +2,11 @@
 /*
   Newmark with contact (src/time/newmark_contact.c).
 
-    wall      an elastic bar flies onto a wall: duration and speed after against the wave solution and implicit Euler; no step gains energy
-    bars      two bars collide: they exchange their velocities but for what the ends' own mass takes; momentum
-    ball      a soft ball that falls on a plane again and again: no step gains energy, forces explain the momentum
-    rest      a block that lies on a plane, and one on another: forces are the weights, and steady
-    push      a plane that speeds up takes a block along
+    wall      an elastic bar hits a wall: contact duration and rebound speed against the wave solution and implicit Euler; no step gains energy
+    bars      two bars collide: they exchange their velocities, apart from the effect of the mass of the contact nodes; momentum
+    ball      a soft ball bounces on a plane: no step gains energy, the momentum changes by the forces
+    rest      a block at rest on a plane, and one on another: forces are the weights, and constant
+    push      an accelerating plane pushes a block
 */
 #include "contact.h"
 

@@ -1,10 +1,10 @@
 // @ranks 1 2
 /*
-  Newton's method on steps that full steps do not survive: a bar of CR that bends under its weight in one load step, near nu = 1/2.
+  Newton's method where undamped full steps would fail: a bar of CR that bends under its weight in one load step, near nu = 1/2.
 
-  It ends in one load step, without a rejected one, and takes at most twice the iterations of the best of 2, 4 and 8 equal load steps; all of them end in the same
-  state. Where the exact tangent is indefinite, it is filtered: with the exact one alone the same load takes more, and with the filtered one
-  alone the last iterations are not quadratic. Linear solves that are loose do not spoil what comes back from a provisional step.
+  It converges in one load step, without a rejected one, and takes at most twice the iterations of the best of 2, 4 and 8 equal load steps, all with the same final
+  state. An indefinite tangent is projected: with the exact one only the same load takes more iterations, and with the projected one
+  only the last iterations are not quadratic. Loose linear solves do not prevent the recovery from a provisional step.
 */
 #include "verify.h"
 

@@ -1,16 +1,16 @@
 // @ranks 1 2
 /*
-  Newton's method and what happens when it fails.
+  Newton's method, and the treatment of its failures.
 
-    quadratic   with an exact tangent the number of right digits doubles; with the warped one convergence is linear, and the
-                answer the same; so with CR and DG
-    load steps  a static state does not depend on the number of load steps, and passes through the states of partial load
-    long steps  implicit Euler with steps of 1 s, many periods long, settles at the static answer
-    adaptive    the error of an adaptive run follows its tolerance
-    cuts        a step whose solve fails is halved and repeated, later ones grow again; at the limit the run stops, says why
-                and keeps the last good state
-    silent      a linear solver that stops at its iteration limit fails the step: it never passes
-    one solve   -snes_type ksponly solves one linear system in each step
+    quadratic   quadratic convergence with the exact tangent; linear with the warped one, and the same
+                solution; also with CR and DG
+    load steps  a static solution does not depend on the number of load steps, and passes through those of partial loads
+    long steps  implicit Euler with steps of 1 s, many periods long, converges to the static solution
+    adaptive    the error of an adaptive run is proportional to its tolerance
+    cuts        a step whose solve fails is halved and repeated, later steps grow again; at the limit the run stops with the reason
+                and keeps the last valid state
+    silent      a linear solver that stops at its iteration limit makes the step fail
+    one solve   -snes_type ksponly solves one linear system per step
 */
 #include "verify.h"
 

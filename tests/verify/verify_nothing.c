@@ -1,15 +1,15 @@
 // @ranks 1 2
 /*
-  What a scene does not name costs nothing.
+  Features that a scene does not use cost nothing.
 
-    lists       without effects the model holds no effect, no list of operations has an entry, and the log events of effects
-                and of contact are never begun, while that of forces is
-    memory      a scene allocates the same number of bytes whether the program knows an effect of another type or not, and
+    lists       without effects the model has no effect, all lists of operations are empty, and the log events of effects
+                and contact are never begun, while that of forces is
+    memory      a scene allocates the same number of bytes whether the program has an unused effect type or not, and
                 the type's options are not read
-    trajectory  bit by bit the same with that type in the program; with effects that are named and do nothing too
-    elements    with P1 alone there is nothing of CR and DG: no neighbours, no face terms, no second list of nodes; the nodes
-                are the mesh's own arrays. Named or not, the run is the same to the last bit and byte. Beside a body of another
-                element a P1 body moves as alone, but for rounding
+    trajectory  bitwise the same motion with that type in the program; with effects that do nothing too
+    elements    with P1 only there are no data of CR and DG: no neighbours, no face terms, no second node list; the node arrays
+                are those of the mesh. With or without the option, the run is the same in every bit and byte. Next to a body of another
+                element a P1 body moves as alone, up to rounding
     linear      a linear run assembles its tangent once; a static run has no mass, no velocity and no integrator
 */
 #include "../../src/fem/fem_impl.h"

@@ -1,13 +1,13 @@
 // @ranks 1 2
 /*
-  Rigid obstacles given by a mesh, and bodies that overlap an obstacle at first.
+  Rigid obstacles given by a mesh, and bodies that initially overlap an obstacle.
 
-    mesh       a block that falls on a box and slides over its edge moves as well when the box is a mesh of tets
-    facets     a ball of facets that presses and drags gives the force of the round one, and no step fails
-    groove     the edge of a block in a groove, where facets of one mesh push from two sides, against two planes
-    overlap    a block that begins 30 % of its height behind a plane is brought out: how fast, how deep it still is after
-               1 and 5 times `recovery`, and what energy it gets; with every response and element
-    at_once    a static run closes the same overlap in its first step
+    mesh       a block that falls on a box and slides over its edge moves in the same way if the box is a mesh of tets
+    facets     a triangulated ball that indents and is dragged gives the force of the sphere, and no step fails
+    groove     the edge of a block in a groove, with contact at two facets of one mesh, against two planes
+    overlap    a block that begins 30 % of its height behind a plane is separated: speed, penetration after
+               1 and 5 times `recovery`, and energy gained; with every response and element
+    at_once    a static run removes the same overlap in its first step
 */
 #include "../unit/surface_files.h"
 #include "contact.h"

@@ -1,9 +1,9 @@
 // @ranks 1 2
 /*
-  What is in each other when a run begins is parted: cubes that are half in each other, turned ones, crossed bars without a vertex in the other, a finger deep in a block, bodies in rigid
-  obstacles. The depth is taken back by the option's steps, with no more than twice the energy M v^2 of a bar that is pushed with the speed v at which it is; momentum stays. At the end
-  nothing goes through anything and everything is guarded; -effect_NAME_verify sees to what comes after. A body beside the other is not touched. A bar bent into itself knows
-  its ways out.
+  Initially overlapping bodies are separated: cubes that overlap by half, rotated ones, crossed bars without a vertex inside the other, a finger deep inside a block, bodies in rigid
+  obstacles. The penetration is removed in the number of steps of the option, with at most twice the energy M v^2 of a bar pushed with that speed v; momentum is conserved. At the end
+  there are no intersections and all pairs are included in the barrier; -effect_NAME_verify checks the rest. A neighbouring body is not affected. A self-intersecting bent bar
+  has separation directions.
 */
 #include "contact.h"
 #include "sbbarrier.h"

@@ -1,13 +1,13 @@
 // @ranks 1 2
 /*
-  What pairs of bodies do to each other: columns of the history for each pair, and places of contact.
+  Contact forces by pairs of bodies: history columns of each pair, and contact points.
 
-    heap    three bodies fly into each other above a floor, with friction and without: in every step the columns of a body's
-            pairs sum to the net force of contact on it, places sum to the columns, and there are as many as are counted
-    fold    a hairpin is pressed together: its pair with itself has all contacts and the whole normal force
-    refused more pairs than the history takes; names of bodies that make two columns alike
+    heap    three bodies collide above a floor, with and without friction: in every step the columns of a body's
+            pairs sum to the net contact force on it, contact points sum to the columns, and their number is the reported one
+    fold    a hairpin is compressed: its self-contact pair has all contacts and the complete normal force
+    refused errors: more pairs than the history supports; body names that give two columns the same name
 
-  Sums are compared with the forces that the rows of the solve put into the equations of motion, which do not know of pairs.
+  Sums are compared with the contact forces in the equations of motion, which are computed without pairs.
 */
 #include "contact.h"
 

@@ -1,13 +1,13 @@
 // @ranks 1 2
 /*
-  The patch test (MacNeal and Harder, "A proposed standard set of problems to test finite element accuracy", 1985): a body
-  that is constrained on its boundary, or pulled there, as a homogeneous deformation x = F X asks for must take it inside too, on
-  any mesh. Small strains with the displacement of that paper, and a large strain with every law: the stress is compared
-  with the law's formula, which is written down here once more. The linear system is solved directly. The same for P2, CR and DG:
-  their nodes on the boundary are moved or pulled, and those inside, among them all jumps, must follow.
+  Patch test (MacNeal and Harder, "A proposed standard set of problems to test finite element accuracy", 1985): if the boundary
+  displacements or tractions of a body are those of a homogeneous deformation x = F X, the interior must have it too, on
+  any mesh. Small strains with the displacement of that paper, and a large strain with every material: the stress is compared
+  with the formula of the material, implemented here independently. The linear system is solved directly. The same for P2, CR and DG:
+  boundary nodes are prescribed or loaded, and the interior ones, with all jumps, must follow.
 
-  Tolerances: displacements 1e-10 of the largest; 1e-9 with CR and DG at nu = 0.4999, whose many unknowns inside feel the
-  condition of the law. Stresses 1e-9 of the largest, times the condition of the law: rounding of
+  Tolerances: displacements 1e-10 of the largest; 1e-9 with CR and DG at nu = 0.4999, because of the condition number. Stresses 1e-9 of the
+  largest times the condition number of the material: rounding of
   the strain is multiplied by lambda / mu.
 */
 #include "verify.h"

@@ -1,6 +1,6 @@
 // @ranks 1 2
 /*
-  Eight small bodies poured into a bowl; verify_pour_long pours fifty. What is examined is described in pour.h.
+  Eight small bodies poured into a bowl; verify_pour_long pours fifty. pour.h describes the checks.
 */
 #include "pour.h"
 

@@ -1,10 +1,10 @@
 // @ranks 1 2
 /*
-  Contact of bodies of p2 by the barrier, whose surface is four flat triangles for each of their facets.
+  Barrier contact of p2 bodies, whose surface has four flat triangles per facet.
 
-    press   two blocks, the upper one smaller, sharp edges: nothing crosses, forces balance, and the force is that of P1 on meshes with the same nodes
-    patch   blocks of one section with other meshes, pressed: the force is right, and stress is uniform but for cells at the surface, where pressures
-            that are linear in the four triangles are not what six nodes of a quadratic facet would share; finer gaps do not change that
+    press   two blocks, the upper one smaller, sharp edges: no intersections, forces balance, and the force is that of P1 on meshes with the same nodes
+    patch   compressed blocks of equal cross-section with different meshes: correct force, and uniform stress except in cells at the surface, as pressures
+            that are linear in the four triangles are not distributed like the nodal forces of a quadratic facet; smaller gaps do not change that
     hertz   hertz.h: two spheres, a sphere on a half-space
 */
 #include "hertz.h"

@@ -1,10 +1,10 @@
 // @ranks 2 3 4
 /*
-  The same scene on one rank and on all of them: every rank runs it alone and then all run it together. Displacements,
-  velocities (by original number of the node) and scalars of the last state must agree.
+  The same scene on one rank and on all: every rank runs it alone, then all run it together. Displacements,
+  velocities (by original node number) and scalars of the last state must agree.
 
-  Tolerances, of the largest value: 1e-10 where the linear system is solved directly or not at all; 1e-8 where Newton ends at
-  1e-9 of its first residual, which is what the solvers of different rank counts may differ by.
+  Tolerances, relative to the largest value: 1e-10 if the linear system is solved directly or not at all; 1e-8 if Newton's method stops at
+  1e-9 of its first residual, the difference between solvers on different numbers of ranks.
 */
 #include "verify.h"
 
