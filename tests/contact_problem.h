@@ -1,5 +1,5 @@
 /*
-  contact_problem.h - the linear system of two blocks that push each other by a barrier, of a given stiffness.
+  contact_problem.h - linear system of two blocks in barrier contact, with a given contact stiffness.
 */
 #pragma once
 #include "scene.h"

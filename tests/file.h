@@ -1,5 +1,5 @@
 /*
-  file.h - files of one test run: written by rank 0, read by any rank, of no other run.
+  file.h - temporary files of one test run: written by rank 0, read by any rank, with names unique to the run.
 */
 #pragma once
 #include <stdlib.h>

@@ -1,9 +1,9 @@
 /*
-  parts.h - what a scene can name, each on one scene: effects, elements, laws, integrators, fields, other output, estimators.
+  parts.h - test scenes, one for each effect, element, material, integrator, field, other output and estimator of the program.
 
-  What there is comes from the program's own registries; the table below says how each is named on the scene. The test of what is
-  not named (tests/verify/verify_unnamed.c) and the list of costs (tests/perf/effect_cost.c) go through both, so that what is
-  new fails the test until it has a row here.
+  The lists come from the program's registries; the table below has the options that name each one in the scene. The test of unused
+  features (tests/verify/verify_unnamed.c) and the cost table (tests/perf/effect_cost.c) loop over both, so that a
+  new type fails the test until it has a row here.
 */
 #pragma once
 #include "../src/base/option.h"

@@ -1,5 +1,5 @@
 /*
-  remesh.h - a mesher for tests: every triangle of the hull with one point in the middle.
+  remesh.h - a simple mesher for tests: connects every triangle of the surface with one interior point.
 */
 #pragma once
 #include "scene.h"

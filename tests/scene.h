@@ -1,5 +1,5 @@
 /*
-  scene.h - a scene from an option string, inside a test program. Each call starts from an empty option database.
+  scene.h - builds a scene from an option string in a test program. Each call begins with an empty option database.
 */
 #pragma once
 #include <sb.h>

@@ -1,8 +1,8 @@
 /*
-  slivers.h - a box of tets, some of them so flat that their smallest dihedral angle is a given one.
+  slivers.h - a box of tets with a given fraction of slivers of a given smallest dihedral angle.
 
-  Inner vertices whose stars share no tet are moved, each along a random direction, until the first tet of its star has the angle; so
-  many of them, in random order, that the part of the tets that is wanted has it. No tet is inverted.
+  Interior vertices without common tets are moved, each in a random direction, until the first of its tets has the angle;
+  vertices are taken in random order until the fraction is reached. No tet is inverted.
 */
 #pragma once
 #include "verify/verify.h"

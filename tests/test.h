@@ -1,8 +1,8 @@
 /*
-  test.h - what a test program needs: counted checks that go on after a failure, the same verdict on every rank.
+  test.h - framework of test programs: checks are counted and continue after a failure; the verdict is the same on every rank.
 
   A test is `SB_TEST_BEGIN(argc, argv); ... SB_CHECK(...); ... SB_TEST_END();` inside main(). A failed check prints its
-  place and values; the closing line is "N passed, N failed", and the exit code is 1 when any rank had a failure.
+  position and values; the last line is "N passed, N failed", and the exit code is 1 if a check failed on any rank.
 */
 #pragma once
 #include <sbbase.h>

@@ -1,8 +1,8 @@
 /*
-  material_checks.h - what every law must satisfy, written once: energy, stress and tangent are derivatives of each other,
-  nothing depends on the frame, a lane does not depend on its neighbours, projected tangents are the projected exact ones.
+  material_checks.h - checks for every material: stress is the derivative of the energy and the tangent that of the stress,
+  frame invariance, independence of SIMD lanes, projected tangents are the projections of the exact ones.
 
-  One deformation gradient at a time goes through a whole batch; the lanes around it hold others.
+  Deformation gradients are evaluated one at a time in each lane of a batch whose other lanes have different ones.
 */
 #pragma once
 #include "../test.h"

@@ -1,5 +1,5 @@
 /*
-  mesh_same.h - whether two meshes in memory are the same: vertices, simplices of every dimension, and the groups of each.
+  mesh_same.h - comparison of two meshes in memory: vertices, simplices of every dimension, and their groups.
 */
 #pragma once
 #include <unistd.h>

@@ -1,5 +1,5 @@
 /*
-  mesh_test.h - what the tests of the mesh layer share: bodies and sets in one line, meshes read and checked as a run does.
+  mesh_test.h - common functions of the tests of the mesh layer: bodies and sets in one line, meshes read and checked as in a run.
 */
 #pragma once
 #include <sbmeshfile.h>

@@ -1,8 +1,8 @@
 /*
-  output_fixture.h - a scene whose motion is prescribed, for the tests of the output: no solve, exact numbers.
+  output_fixture.h - a scene with prescribed motion, for the tests of the output: no solve, exact numbers.
 
-  The vectors of the run are filled from formulas of rest position and time, and the monitors are called as the time loop
-  calls them. Everything goes to a folder of its own, which is removed at the end.
+  The vectors of the run are set by formulas of rest position and time, and the monitors are called in the order of the time
+  loop. Output goes to a temporary folder, which is removed at the end.
 */
 #pragma once
 #include <dirent.h>

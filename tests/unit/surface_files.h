@@ -1,5 +1,5 @@
 /*
-  surface_files.h - closed surfaces for tests, written as files of each kind that is read.
+  surface_files.h - closed surfaces for tests, written in every supported file format.
 */
 #pragma once
 #include "../file.h"

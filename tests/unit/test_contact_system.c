@@ -1,7 +1,7 @@
 // @ranks 1 2 3 4
 /*
-  Linear systems of contact: iterations bounded over stiffness, mesh and ranks, the solution of a factorisation, patterns that grow and
-  shrink, negative curvature noticed, methods of PETSc's in the place of the own ones.
+  Linear systems of contact: iteration counts bounded for all stiffnesses, meshes and numbers of ranks; agreement with a factorisation; changing sparsity
+  patterns; detection of negative curvature; PETSc's methods instead of supple's.
 */
 #include "../contact_problem.h"
 

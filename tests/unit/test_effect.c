@@ -1,6 +1,6 @@
 /*
-  The registry of effects: types by name and by option, unknown types, options of the wrong kind; and that a second
-  registration after a reset of the option table works.
+  Registry of effects: types by name and by option, unknown types, options of the wrong kind; a second
+  registration after a reset of the option table.
 */
 // @ranks 1 3
 #include "effect_fixture.h"

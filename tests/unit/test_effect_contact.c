@@ -1,6 +1,6 @@
 /*
-  Contact as an effect: options and their errors, who may not go with it, what a scene without it has of it, the tangent of springs against
-  differences of their force, and Coulomb's law in the rows of friction.
+  Contact effect: options and their errors, incompatible settings, a scene without contact, the tangent of contact springs against finite
+  differences of the force, and Coulomb's law in the friction constraints.
 */
 // @ranks 1 3
 #include "../scene.h"

@@ -1,6 +1,6 @@
 /*
-  Damping: its numbers for the bodies that it names, of all when it names none, added where two meet; body
-  names that do not exist; the power that it takes, with every element.
+  Damping: coefficients for the named bodies, for all bodies by default, summed over effects; invalid body
+  names; dissipated power, with every element.
 */
 // @ranks 1 3
 #include "effect_fixture.h"

@@ -1,9 +1,9 @@
 /*
-  Quadrature of dead loads: force and first moments of polynomial densities up to the degree that the rules promise, on the
-  cells and on one face of a unit cube; degree 5 and above must show an error (or the test would not see the degree);
-  densities that change with time; with every element.
+  Quadrature of dead loads: force and first moments of polynomial densities up to the documented degree, on the
+  cells and on one face of a unit cube; degree 5 and above must show an error (otherwise the test would not detect the degree);
+  time-dependent densities; every element.
 
-  With linear basis functions sum_a f_a = integral q and sum_a f_a x_a = integral q x, exactly when q phi_a is integrated
+  With linear basis functions sum_a f_a = integral q and sum_a f_a x_a = integral q x, exactly if q phi_a is integrated
   exactly: degree 4 of q on rules of degree 5.
 */
 // @ranks 1 3

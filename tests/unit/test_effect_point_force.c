@@ -1,6 +1,6 @@
 /*
-  Point force: the total on one vertex and on a face, each node its share; the work is that of the vertex, whose displacement
-  is averaged over the cells around it; time; the same on every number of ranks; with every element.
+  Point force: the total on one vertex and on a face, shares of the nodes; the work is that of the vertex, whose displacement
+  is averaged over the adjacent cells; time; independence of the number of ranks; every element.
 */
 // @ranks 1 3
 #include "effect_fixture.h"

@@ -1,6 +1,6 @@
 /*
-  Prescribed unknowns shared by several effects: the first one has them, values and reactions are the owner's alone, and an
-  effect that is left with nothing is an error; with every element; supports of DG faces.
+  Unknowns prescribed by several effects: the first one owns them, with their values and reactions, and an
+  effect without any is an error; every element; supports of DG faces.
 */
 // @ranks 1 3
 #include "../../src/effect/effect_impl.h"

@@ -1,7 +1,7 @@
 /*
-  Pressure: no resultant and the work -p dV on a closed deformed surface; force on one face; the tangent by Taylor's
-  remainder on a closed surface and on an open one, with its rim free and held; the matrix is symmetric on any; a rim that supports hold,
-  or that lies in planes of symmetry, needs nothing beside it; rest normals on demand; with every element.
+  Pressure: no resultant and the work -p dV on a closed deformed surface; force on one face; the tangent by Taylor
+  remainders on a closed surface and on an open one, with free and fixed boundary; symmetry of the matrix; boundaries that are supported,
+  or in symmetry planes, need no boundary term; rest normals if requested; every element.
 */
 // @ranks 1 3
 #include "effect_fixture.h"

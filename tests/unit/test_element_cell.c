@@ -1,7 +1,7 @@
 // @ranks 1
 /*
-  Cell kernels on random tets, one different tet in each lane: gradients of affine maps, forces as derivatives of the
-  energy, blocks as derivatives of the forces, what must vanish, and a patch of tets under constant strain.
+  Cell kernels on random tets, a different one in each lane: gradients of affine maps, forces as derivatives of the
+  energy, blocks as derivatives of the forces, vanishing terms, and a patch of tets under constant strain.
 */
 #include "material_checks.h"
 #include <sbelement.h>

@@ -1,7 +1,7 @@
 /*
-  test_error.c - an error of some ranks: one line for the run, the same exit code on all ranks, no hang.
+  test_error.c - errors on some ranks: one line per run, the same exit code on all ranks, no hang.
 
-  The verdict is reached after MPI_Finalize(), so this test counts by itself: all ranks write their stderr to one file,
+  The result is known after MPI_Finalize(), so this test counts its checks itself: all ranks write their stderr to one file,
   which rank 0 reads.
 */
 // @ranks 1 3

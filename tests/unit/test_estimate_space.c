@@ -1,10 +1,10 @@
 // @ranks 1 2 3 4
 /*
-  The estimate of the error of space: nothing where the element has the exact answer or the body moves as it is, nothing
-  across materials where each has its own constant stress, the same for a body that is turned as a whole, sums, and the same numbers on any
+  Spatial error estimate: zero for solutions that the element represents exactly and for rigid motions, zero
+  across materials with different constant stresses, invariant under rotation of the body, additive, and independent of the
   number of ranks.
 
-  Tolerances. Rounding of the strains, 1e-16 over a cell's share of the size, is squared in the energies: 1e-24 of them.
+  Tolerances. Rounding of the strains, 1e-16 over the relative cell size, is squared in the energies: 1e-24 of them.
 */
 #include "../scene.h"
 

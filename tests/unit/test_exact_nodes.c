@@ -1,7 +1,7 @@
 // @ranks 1 3
 /*
-  Nodes solved exactly: whatever the rest of the preconditioner does, the residual on them is gone afterwards (to the 1e-4 of
-  the 16-bit factor); the correction is symmetric; nodes that are constrained or whose row is not local are never chosen.
+  Nodes solved exactly: for any preconditioner of the rest, the residual at these nodes vanishes afterwards (to the 1e-4 of
+  the 16-bit factor); the correction is symmetric; constrained nodes and nodes with non-local rows are never chosen.
 */
 #include "../../src/solver/rotated.h"
 #include "../scene.h"

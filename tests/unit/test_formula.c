@@ -1,5 +1,5 @@
 /*
-  test_formula.c - formulas and tables: values against C's own arithmetic, messages of what cannot be read.
+  test_formula.c - formulas and tables: values against C arithmetic, messages of invalid ones.
 */
 // @ranks 1 3
 #include "file.h"

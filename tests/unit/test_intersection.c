@@ -1,7 +1,7 @@
 // @ranks 1
 /*
-  Segments and triangles on a lattice of few points, where much touches, lies in one plane or on one line: they meet exactly where a vertex or an
-  edge is at no distance from the other, or where signs of integer volumes tell that one goes through the other.
+  Segments and triangles with vertices on a small lattice, with many contacts, coplanar and collinear cases: reported as intersecting exactly if a vertex or an
+  edge has zero distance to the other, or if signs of integer volumes show that one crosses the other.
 */
 #include <sbkernel.h>
 #include "pair_reference.h"

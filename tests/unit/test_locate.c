@@ -1,6 +1,6 @@
 // @ranks 1
 /*
-  Which tet holds a point: against all tets one by one, at corners, outside, beside tets that are inverted, in curved ones. Shapes of tets.
+  Point location in tets: against a search over all tets, at corners, outside, next to inverted tets, in curved ones. Shape quality of tets.
 */
 #include "../../src/meshio/meshio_impl.h"
 #include "../test.h"

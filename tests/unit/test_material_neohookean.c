@@ -1,7 +1,7 @@
 // @ranks 1
 /*
-  Stable neo-Hookean: the energy as its paper prints it, homogeneous states worked out from it by hand, the small-strain
-  limit, and what every law must satisfy.
+  Stable neo-Hookean: the energy as published, homogeneous states calculated by hand, the small-strain
+  limit, and the checks for every material.
 */
 #include "material_checks.h"
 

@@ -1,4 +1,4 @@
-// A body whose mesh is in memory: its vertices, tets, sets, inclusions and mass are those that it is given.
+// Body with a mesh in memory: vertices, tets, sets, inclusions and mass are the given ones.
 // @ranks 1 2
 #include "memory_mesh_fixture.h"
 

@@ -1,4 +1,4 @@
-// The mesh of a scene on any number of ranks: every piece agrees with the whole, errors reach all ranks.
+// Mesh of a scene on any number of ranks: local meshes agree with the global one, errors are raised on all ranks.
 // @ranks 1 2 3 4
 #include "../../src/mesh/mesh_impl.h"
 #include "mesh_test.h"

@@ -1,4 +1,4 @@
-// The box generator: counts, volumes, conformity, sides, quality, and what it refuses.
+// Box generator: counts, volumes, conformity, sides, quality, errors.
 // @ranks 1
 #include "mesh_test.h"
 

@@ -1,4 +1,4 @@
-// Checks, repairs and quality of one body's mesh.
+// Checks, repairs and quality of the mesh of one body.
 // @ranks 1
 #include "mesh_test.h"
 

@@ -1,4 +1,4 @@
-// Matching of faces: against a comparison of all pairs, on a box and on a fan with vertices of high degree.
+// Face connectivity against a comparison of all pairs, on a box and on a fan with vertices of high degree.
 // @ranks 1
 #include "mesh_test.h"
 

@@ -1,5 +1,5 @@
-// One mesh in every format gives the same tets, regions and surfaces. Files of tests/data come from gmsh 4.8 (two_cubes.*), VTK 9.7
-// (two_cubes_*.vtu, _51.vtk), TetGen 1.5 and Netgen 6; what is not there is written here.
+// One mesh in every format gives the same tets, regions and surfaces. Files of tests/data are from gmsh 4.8 (two_cubes.*), VTK 9.7
+// (two_cubes_*.vtu, _51.vtk), TetGen 1.5 and Netgen 6; the other files are written here.
 // @ranks 1
 #include <stdlib.h>
 #include <unistd.h>

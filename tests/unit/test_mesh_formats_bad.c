@@ -1,4 +1,4 @@
-// What is wrong with a file of each format is said with the file, the line or byte, and what to do.
+// Error messages of invalid files in each format have the file, the line or byte, and a remedy.
 // @ranks 1
 #include <stdlib.h>
 #include <unistd.h>

@@ -1,4 +1,4 @@
-// What once broke a reader, and every damaged file of tests/data: each ends in a mesh or in an error that keeps its promises.
+// Files that once broke a reader, and every damaged file of tests/data: each gives a mesh or an error as documented.
 // @ranks 1
 #include <dirent.h>
 #include <stdlib.h>

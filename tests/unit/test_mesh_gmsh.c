@@ -1,4 +1,4 @@
-// The reader of gmsh files: the four variants of one mesh hold the same, each kind of damage has its message.
+// Reader of gmsh files: the four variants of one mesh give the same result, each kind of damage has its message.
 // @ranks 1
 #include <stdlib.h>
 #include <unistd.h>

@@ -1,4 +1,4 @@
-// The gmsh library in its child process: what it makes, and what is said when it fails, crashes or hangs.
+// The gmsh library in a child process: its results, and messages when it fails, crashes or hangs.
 // @ranks 1 3
 #include <signal.h>
 #include <stdlib.h>

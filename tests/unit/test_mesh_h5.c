@@ -1,4 +1,4 @@
-// Meshes in HDF5: what supple-mesh writes and what a run writes, distributed as from any other file; damage has its message.
+// Meshes in HDF5, written by supple-mesh and by a run: the same distributed mesh as from other files; each kind of damage has its message.
 // @ranks 1 2 3
 #include <hdf5.h>
 #include "mesh_same.h"

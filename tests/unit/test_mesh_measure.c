@@ -1,4 +1,4 @@
-// What supple-mesh info says of a mesh: counts, sizes and shapes of known bodies, sizes of groups.
+// Statistics of supple-mesh info: counts, sizes and shapes of known bodies, sizes of groups.
 // @ranks 1
 #include "mesh_same.h"
 

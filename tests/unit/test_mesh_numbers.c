@@ -1,4 +1,4 @@
-// Numbers of a file to places, and groups given to items after these: against a plain search.
+// Map from file numbers to indices, and groups assigned to items by number: against a linear search.
 // @ranks 1
 #include <stdlib.h>
 #include "mesh_test.h"

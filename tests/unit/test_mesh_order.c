@@ -1,4 +1,4 @@
-// Reverse Cuthill-McKee order: a permutation, narrow where the body is slender, parts one after the other.
+// Reverse Cuthill-McKee order: a permutation, small bandwidth for slender bodies, components one after the other.
 // @ranks 1
 #include "../../src/mesh/mesh_impl.h"
 #include "mesh_test.h"

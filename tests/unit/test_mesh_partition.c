@@ -1,4 +1,4 @@
-// The cut of a mesh into parts: balance and length of the border, few cells, and the exchange of records.
+// Mesh partitioning: balance, cut faces, very small meshes; communication of records.
 // @ranks 1 2 3 4
 #include "../../src/mesh/mesh_impl.h"
 #include "mesh_test.h"

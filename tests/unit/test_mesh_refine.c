@@ -1,4 +1,4 @@
-// Refinement: eight children that fill their parent, groups and orientation carried over, shapes that stay; edges once each.
+// Refinement: eight children that fill their parent, groups, orientation, bounded shape quality; unique edges.
 // @ranks 1
 #include "../../src/mesh/mesh_impl.h"
 #include "mesh_same.h"

@@ -1,4 +1,4 @@
-// Repair: each kind of damage is found, counted and gone afterwards; what it cannot repair is an error.
+// Repair: each kind of damage is found, counted and removed; damage that cannot be repaired is an error.
 // @ranks 1
 #include "mesh_same.h"
 

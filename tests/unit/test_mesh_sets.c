@@ -1,4 +1,4 @@
-// Named sets: their text, what they hold, what is said when they hold nothing.
+// Named sets: parsing, members, messages of empty sets.
 // @ranks 1
 #include "../../src/mesh/mesh_impl.h"
 #include "mesh_test.h"

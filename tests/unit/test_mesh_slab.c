@@ -1,4 +1,4 @@
-// A mesh read in slabs by all ranks is, number by number, the one that rank 0 reads: vertices, tets, curved edges, sets, parts, notes, errors.
+// A mesh read in slabs by all ranks equals the one read by rank 0 exactly: vertices, tets, curved edges, sets, parts, notes, errors.
 // @ranks 1 2 3 4
 #include "../../src/mesh/mesh_impl.h"
 #include "mesh_same.h"

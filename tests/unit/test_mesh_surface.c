@@ -1,4 +1,4 @@
-// Bodies from closed surfaces: regions, cavities and groups of each kind of file; what is repaired is said; what is wrong is named.
+// Bodies from closed surfaces: regions, cavities and groups of each file format; notes of repairs; errors name the triangle.
 // @ranks 1 3
 #include "../../src/surface/surface_impl.h"
 #include "mesh_test.h"

@@ -1,4 +1,4 @@
-// Tets from closed surfaces: volumes of nested regions are exact, kept triangles stay, sizes give counts, both backends, texts of errors.
+// Tets from closed surfaces: exact volumes of nested regions, kept triangles, number of tets by size, both backends, error messages.
 // @ranks 1 3
 #include "../../src/surface/surface_impl.h"
 #include "mesh_test.h"

@@ -1,4 +1,4 @@
-// Surfaces from files: each kind gives the same cube on every rank; what has no inside is refused with its triangle.
+// Surfaces from files: each format gives the same cube on every rank; errors of surfaces without volume name the triangle.
 // @ranks 1 3
 #include "mesh_test.h"
 #include "sbtriangles.h"

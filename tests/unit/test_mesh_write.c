@@ -1,4 +1,4 @@
-// Meshes that were written are read again as they were: all formats, groups that overlap, orientation, order.
+// Written meshes are read back unchanged: all formats, overlapping groups, orientation, order.
 // @ranks 1
 #include "../../src/meshio/meshio_impl.h"
 #include "mesh_same.h"

@@ -1,7 +1,7 @@
 // @ranks 1
 /*
-  Rigid obstacles: signed distances at points where they are known, normals against differences of the distance, the foot
-  point on the surface; poses; errors of the description.
+  Rigid obstacles: known signed distances, normals against finite differences of the distance, closest
+  points on the surface; poses; errors of the description.
 */
 #include "effect_fixture.h"
 #include <sbcontact.h>

@@ -1,4 +1,4 @@
-// Checkpoints: every bit comes back, on the ranks that there are; which ones are kept; what does not fit is refused.
+// Checkpoints: every bit is restored, on any number of ranks; which ones are kept; errors of incompatible ones.
 // @ranks 1 2 3
 #include "output_fixture.h"
 

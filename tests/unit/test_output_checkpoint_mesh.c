@@ -1,4 +1,4 @@
-// Meshes in checkpoints: every bit comes back, and one that is damaged is not taken.
+// Meshes in checkpoints: every bit is restored, and a damaged one is an error.
 // @ranks 1 2
 #include "memory_mesh_fixture.h"
 

@@ -1,4 +1,4 @@
-// The folder of a run: made with its parents, refused when it cannot be written, cleared of our files only; scenario.opts;
+// Folder of a run: created with its parents, an error if not writable, only files of supple are removed; scenario.opts;
 // names of fields; when a multiple of a time is due.
 #include "output_fixture.h"
 

@@ -1,4 +1,4 @@
-// fields.h5 and fields.xmf: values in original order, which frames are written, where their names lie, going on after a
+// fields.h5 and fields.xmf: values in original order, which frames are written, paths of the arrays, continuation after a
 // restart.
 // @ranks 1 2 3 4
 #include "output_fixture.h"

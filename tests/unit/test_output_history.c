@@ -1,4 +1,4 @@
-// history.csv: columns, values that come back as they were, effects and probes, which rows are written, going on after a
+// history.csv: columns, exact values, effects and probes, which rows are written, continuation after a
 // restart.
 #include "output_fixture.h"
 

@@ -1,5 +1,5 @@
-// The parts below the monitors: original order, HDF5 slices and attributes, files that are replaced, errors that one rank
-// meets and all report.
+// Functions below the monitors: original order, HDF5 slices and attributes, replaced files, errors on one rank
+// that all ranks report.
 // @ranks 1 2 4
 #include "output_fixture.h"
 

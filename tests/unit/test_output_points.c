@@ -1,5 +1,5 @@
-// Vectors at the points of vertex fields, by element: affine functions are exact, others the volumes' mean of the cells
-// around; each cell's own values; reactions keep resultant and moment; probes. Bodies of all elements in one scene.
+// Vectors at the points of vertex fields, by element: exact for affine functions, else the volume-weighted mean of adjacent
+// cells; values per cell; reactions keep resultant and moment; probes. Bodies of all elements in one scene.
 // @ranks 1 2 3 4
 #include "output_fixture.h"
 

@@ -1,4 +1,4 @@
-// What a person reads: header, progress, closing table within 80 columns; run.json at the start, at the end, after a failure.
+// Printed report: header, progress, final table within 80 columns; run.json at the start, at the end, after a failure.
 #include "output_fixture.h"
 
 static char dir[PETSC_MAX_PATH_LEN];

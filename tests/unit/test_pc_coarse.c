@@ -1,7 +1,7 @@
 // @ranks 1 2 3
 /*
-  The two-level preconditioner: symmetric and positive definite; iterations that hardly grow with the mesh, also on a slender
-  bar where incomplete Cholesky alone fails; the solution of a factorisation, with several and held bodies; failures said.
+  Two-level preconditioner: symmetric and positive definite; iteration counts nearly independent of the mesh, also on a slender
+  bar where incomplete Cholesky alone fails; agreement with a factorisation, with several and supported bodies; reported failures.
 */
 #include "../scene.h"
 #include <sbsolver.h>

@@ -1,8 +1,8 @@
 // @ranks 1 2 3
 /*
-  The solver with the pressures of the cells apart: its operator is the tangent, for every law and element; what it keeps in the
-  matrix does not grow with lambda; the preconditioner is symmetric and positive; solutions are those of a factorisation;
-  iterations stay bounded as nu goes to 1/2 and the mesh is refined; failures are said.
+  Solver with separate cell pressures: its operator is the tangent, for every material and element; the entries of its
+  matrix do not grow with lambda; the preconditioner is symmetric and positive; agreement with a factorisation;
+  iterations stay bounded as nu approaches 1/2 and the mesh is refined; reported failures.
 */
 #include "../../src/solver/pressure.h"
 #include "../scene.h"

@@ -1,7 +1,7 @@
 // @ranks 1 2 3 4
 /*
-  The rotated factor: exact (to the rounding of its 16-bit entries) for the operator that it was made from and for that one
-  turned as a whole, few iterations in a bent body, the same on any number of ranks and for every kind of operator.
+  Rotated factor: exact (up to its 16-bit rounding) for the original operator and for the one
+  of the rigidly rotated body; few iterations in a bent body; independence of the number of ranks; every kind of operator.
 */
 #include "sbsolver.h"
 #include "../scene.h"

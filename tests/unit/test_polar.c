@@ -1,7 +1,7 @@
 // @ranks 1
 /*
-  Polar rotations against a reference that shares nothing with them: singular values by one-sided Jacobi in long double,
-  itself checked by what defines the answer (R orthogonal, R^T F symmetric, every sum of two signed stretches >= 0).
+  Polar rotations against an independent reference: singular values by one-sided Jacobi in long double,
+  itself checked by the definition (R orthogonal, R^T F symmetric, every sum of two signed stretches >= 0).
 */
 #include "../test.h"
 #include <sbkernel.h>

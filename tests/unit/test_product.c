@@ -1,6 +1,6 @@
 /*
-  Products with block matrices: they agree with those of AIJ, follow every change of the values, and survive a copy of the matrix. The
-  same for the symmetric matrix of the rows and columns of this rank.
+  Products with block matrices: agreement with AIJ, after changes of the values, and after a copy of the matrix. The
+  same for the symmetric diagonal block of this rank.
 */
 #include "../scene.h"
 #include "sbassembly.h"

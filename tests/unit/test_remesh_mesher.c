@@ -1,4 +1,4 @@
-// The mesher of re-meshing: the same tets whatever the last bits, vertices of the hull first, and exact places where rounded ones cannot be filled.
+// The mesher of re-meshing: results independent of the last bits, surface vertices first, exact positions where rounded ones cannot be meshed.
 // @ranks 1
 #include "../test.h"
 #include "sbremesh.h"

@@ -1,5 +1,5 @@
 /*
-  test_scene.c - from options to a model, and what is refused before anything is computed.
+  test_scene.c - from options to a model; errors before anything is computed.
 */
 // @ranks 1 3
 #include "test.h"

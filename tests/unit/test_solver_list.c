@@ -1,7 +1,7 @@
 // @ranks 1 2
 /*
-  A solver that fails gives way to the next one on the same system: no step is cut, the solution is that of a factorisation, and the run goes on with
-  it. A method of the user's is not replaced, nor is any where a body is free.
+  If a solver fails, the next one of the list solves the same system: no step is rejected, the solution agrees with a factorisation, and the run continues
+  with it. A method chosen by the user is not replaced, nor is any if a body is free.
 */
 #include <sbsolver.h>
 #include "../slivers.h"

@@ -1,10 +1,10 @@
 // @ranks 1 2
 /*
-  PETSc's -ksp_type, -pc_type and -ksp_norm_type over every preset of -solver, for all elements, static and dynamic, with and without what contact
-  adds: each run reaches the answer of the plain solver, or is refused before anything is computed by one line that names the option.
-  What has to be refused is a table here, so a run that is refused for no reason fails, too.
+  PETSc's -ksp_type, -pc_type and -ksp_norm_type combined with every preset of -solver, for all elements, static and dynamic, with and without
+  contact: each run gives the solution of the default solver, or ends before the computation with one line that names the option.
+  Expected errors are a table here, so an unexpected one fails the test too.
 
-  Every method with every preconditioner is run in each case. Presets below them are run whole where `whole` says so, or with the argument "all"; elsewhere with the methods that
+  Every method with every preconditioner is run in each case. With presets all combinations are run where `whole` is set, or with the argument "all"; elsewhere the methods that
   differ most.
 */
 #include "../scene.h"

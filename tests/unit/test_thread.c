@@ -1,5 +1,5 @@
 /*
-  test_thread.c - a factorisation makes no threads: those of the process are counted before and after it, and no library says that it
+  test_thread.c - a factorisation creates no threads: the threads of the process are counted before and after it, and no library reports that it
   would use more than one.
 */
 #include <sbbase.h>

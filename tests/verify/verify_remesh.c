@@ -1,15 +1,15 @@
 // @ranks 1 2 3
 /*
-  A state on another mesh of the same body.
+  Transfer of a state to another mesh of the same body.
 
-    linear     a linear displacement and acceleration are the same functions there, for every element, on a body that is deformed by them; for P2 a
-               quadratic velocity, too
-    same       what lies on the surface has its values to the last bit; so has a body that is not re-meshed
+    linear     linear displacements and accelerations are reproduced, for every element, on a body deformed by them; for P2 a
+               quadratic velocity too
+    same       values at surface nodes are bitwise the same; so are those of a body that is not re-meshed
     curved     all of this on a body of curved tets, whose surface keeps its shape to the last bit
-    momenta    mass, momentum and angular momentum of each body are those of before to 1e-12, free and held, with both masses
-    energy     a new mesh changes the energy of a smooth motion less the finer it is, like the square of its edges
-    run        a run that is re-meshed on its way: steps, time, totals; the account closes with remesh_loss; Newmark and symplectic Euler go on
-    refused    a mesher that cannot: the run goes on as one that is not re-meshed, to the last bit
+    momenta    mass, momentum and angular momentum of each body are conserved to 1e-12, free and supported, with both mass matrices
+    energy     the change of energy of a smooth motion decreases with the square of the edge length
+    run        a run with re-meshing: steps, time, totals; the energy balance closes with remesh_loss; Newmark and symplectic Euler continue
+    refused    a mesher that fails: the run is bitwise the same as without re-meshing
     sets       groups of a file and shapes hold the same triangles, vertices of the surface and volume
 */
 #include "../../src/remesh/remesh_impl.h"

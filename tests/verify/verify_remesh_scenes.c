@@ -1,13 +1,13 @@
 // @ranks 1 2
 /*
-  Re-meshing where bodies touch, hold, are made of several materials, or fail.
+  Re-meshing with contact, supports, several materials, and failures.
 
-    touch      the same nodes touch before and after it, with the same forces, frictions and normals: a plane and another body
-    runs       bodies that are re-meshed while they touch: momentum, penetration, energy, end
-    inclusion  every tet's material has the mass that it had, also where the inclusion is a shape that new tets would lie across
+    touch      the same nodes are in contact before and after, with the same forces, friction and normals: a plane and another body
+    runs       bodies that are re-meshed during contact: momentum, penetration, energy, final state
+    inclusion  the mass of each material is unchanged, also if the inclusion is a shape whose boundary new tets would cross
     held       cr, dg and p2 on a support, with adaptive steps
-    ledger     errors go on, and -accuracy finds its steps
-    failed     -remesh_failed: tried once for each state, then the run stops with its reason; not where the first step fails
+    ledger     error estimates continue, and -accuracy selects time steps
+    failed     -remesh_failed: one attempt for each state, then the run stops with the reason; not if the first step fails
 */
 #include "../../src/remesh/remesh_impl.h"
 #include "../remesh.h"

@@ -2,12 +2,12 @@
 /*
   Restitution between bodies.
 
-    head-on    stiff blocks and balls that meet head-on leave each other with e times their speed, whatever their masses, meshes and the
-               response; momentum stays, and nothing is gained
-    tower      a block that lands on a floor with another one close above it: two effects that bounce in a step
-    oblique    stiff blocks that meet at an angle, with friction and without: momentum stays, no step gains energy
-    soft       soft balls, whatever e: no step gains energy
-    self       the arms of a soft horseshoe that meet: no step gains energy, the momentum stays
+    head-on    stiff blocks and balls in a head-on collision separate with e times their speed, for all masses, meshes and
+               responses; momentum is conserved, and no energy is gained
+    tower      a block that lands on a floor with another one close above it: two impacts of different effects in a step
+    oblique    stiff blocks in an oblique collision, with and without friction: momentum is conserved, no step gains energy
+    soft       soft balls, for every e: no step gains energy
+    self       self-contact of the arms of a soft horseshoe: no step gains energy, momentum is conserved
 */
 #include "contact.h"
 

@@ -1,14 +1,14 @@
 // @ranks 1 2 3
 /*
-  Response `multiplier` against `projected`: the same nonlinear problem by another linear solve, so the same answer to what contact
-  settles to.
+  Response `multiplier` against `projected`: the same nonlinear problem with another linear solver, hence the same converged
+  solution.
 
-    pressed    a body that only contact carries, between two obstacles that stand still: its matrix alone is singular
-    corner     obstacles, one and two at a node, beside a plane of symmetry: rows that depend on others
-    drive      a moving obstacle: its work and its force in the account of energies
-    limit      a limit of iterations that is reached is a failed solve
-    bent       a cantilever that a pressure bends onto a plane: as many iterations where the pressure's tangent is not symmetric, and not the crumpled
-               equilibrium that is next to where it bends without the plane
+    pressed    a body supported by contact only, between two fixed obstacles: its matrix alone is singular
+    corner     one and two obstacles at a node, next to a symmetry plane: linearly dependent constraints
+    drive      a moving obstacle: its work and its force in the energy balance
+    limit      reaching the iteration limit is a failed solve
+    bent       a cantilever bent onto a plane by a pressure: as many iterations although the pressure's tangent is nonsymmetric, and not the crumpled
+               equilibrium that is close to the shape without the plane
 */
 #include "verify.h"
 

@@ -2,17 +2,17 @@
 /*
   Rotation.
 
-    turned     a body turned as a whole by 15 degree steps through a full turn, and moved: no force with the laws that know
-               rotation, |f|_max / (E L^2) <= 1e-12, and sigma_xx = 2 (mu + lambda)(cos t - 1) about z with the linear one
+    turned     a body rotated rigidly in steps of 15 degrees through a full revolution, and translated: no force with rotation-invariant
+               materials, |f|_max / (E L^2) <= 1e-12, and sigma_xx = 2 (mu + lambda)(cos t - 1) about z with the linear one
     spin       a stiff free body that spins about a principal axis, implicit Euler. A step minimises the distance to
-               x0 + h v0 under rigidity: the nearest rotation to it. In the plane of the spin x0 + h v0 is x0 times the
-               complex number 2 - e^(-i d), d being the turn of the last step, so that the turns obey
+               x0 + h v0 over rigid motions: its closest rotation. In the plane of the spin x0 + h v0 is x0 times the
+               complex number 2 - e^(-i d), d being the rotation of the last step, so that the rotations satisfy
 
                  d' = arg(2 - e^(-i d)),  first one atan(w0 h),
 
-               for small w0 h the law w(t) = w0 / sqrt(1 + 2 w0^2 h t), whatever the stiffness
-    rod        a thin rod that spins stretches by u = rho w^2 l^3 / (3 E) on each side of its middle. Stiffness-proportional
-               damping takes the vibration away, and must leave the spin alone
+               for small w0 h the law w(t) = w0 / sqrt(1 + 2 w0^2 h t), for any stiffness
+    rod        a thin spinning rod stretches by u = rho w^2 l^3 / (3 E) on each side of its centre. Stiffness-proportional
+               damping removes the vibration, and must not change the spin
 */
 #include <complex.h>
 #undef I

@@ -1,10 +1,10 @@
 // @ranks 1
 /*
-  A cushion between two plates that both move, until it is half as high; quarter of it, planes of symmetry x = 0 and y = 0, no friction.
+  A cushion compressed to half its height between two moving plates; a quarter of it, symmetry planes x = 0 and y = 0, no friction.
 
-  Both plates push alike, the force rises in every step, no cell is inverted, and nothing moves up or down in the middle. The work of
-  the plates is the energy that the cushion has taken. With Poisson's ratio 0.49 the volume hardly changes, and CR and P2 give the same force
-  (with a penalty of jumps that does not follow the state CR gives less than half of it).
+  Both plates have the same force, which increases in every step, no cell is inverted, and the midplane does not move. The work of
+  the plates is the energy of the cushion. With Poisson's ratio 0.49 the volume is nearly constant, and CR and P2 give the same force
+  (with a jump penalty that does not follow the state CR gives less than half of it).
   With P1, x itself is an
   admissible test function: the integral of the trace of the stress is the sum of x . f, which is minus the height times the force.
 */

@@ -1,13 +1,13 @@
 // @ranks 1 2
 /*
-  Five blocks on a floor, neighbours of very different mass and mesh, fall onto each other and come to rest.
+  Five blocks of very different masses and meshes fall onto each other and come to rest.
 
-  At rest each interface carries the weight above it, which is read from the field of contact forces (on each body), from the history
-  of the floor and from that of the bodies (the sum over all interfaces). Nothing moves any more, nothing is inside another.
+  At rest each interface carries the weight above it, as given by the field of contact forces (on each body), by the history
+  of the floor and by that of the bodies (the sum over all interfaces). There is no motion and no penetration.
 
-    smooth   without friction, a quarter of the stack between its planes of symmetry: standing free, it would slide apart at the
-             least push, as a real one would
-    rough    with friction 0.5, blocks turned and off the centre
+    smooth   without friction, a quarter of the stack between its symmetry planes: a free one would slide apart at the
+             smallest perturbation, as a real one would
+    rough    with friction 0.5, blocks rotated and off the centre
 */
 #include "contact.h"
 

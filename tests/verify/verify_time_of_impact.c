@@ -1,12 +1,12 @@
 // @ranks 1 2
 /*
-  What a step does in which points come into contact (-effect_<name>_time_of_impact). An elastic bar flies onto a wall: the wave solution has it there from the
-  moment of arrival for the time 2 L / c, and then away with the speed that it came with. Steps begin at several distances before
-  the wall, so that it is met in every part of a step.
+  Time of impact within a step (-effect_<name>_time_of_impact). An elastic bar hits a wall: in the wave solution the contact lasts
+  for the time 2 L / c from the impact, and the rebound speed is the initial one. Runs begin at several distances from
+  the wall, so that the impact is at different times within a step.
 
-    wall        a rigid wall: first touch, duration and speed after, whole and cut, with every response; a cut
-                step and its rest take the time back to where it would have been
-    bounds      steps that points enter near one of their ends, or not at all, are not cut
+    wall        a rigid wall: time of first contact, duration and rebound speed, without and with steps divided at the impact, with every response; a divided
+                step and its remainder end at the time of the undivided one
+    bounds      steps are not divided if the impact is near one of their ends, or if there is none
 */
 #include "contact.h"
 

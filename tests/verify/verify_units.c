@@ -1,13 +1,13 @@
 // @ranks 1 2
 /*
-  Nothing depends on the units or on the directions of the axes: a scene in m, kg, s is run again in mm, g, ms, with all
-  lengths times 1e-6 and times 1e3 (density and stiffness kept, so times go with lengths), with stiffness and density times
-  1e-9 and 1e9, and turned by 37 degrees about (1,2,3). The displacements, in the units of the first, agree to 1e-8 of the
-  largest (turned: 1e-9). Tolerances, initial guesses, step control and the choice of the explicit step are the
-  program's own: none of them may have a unit or a direction, nor may the face terms of CR and DG. Newton's tolerance alone is made smaller: the preconditioner
-  works in single precision, and what it leaves in the answer has a direction.
+  Independence of units and of the directions of the axes: a scene in m, kg, s is run again in mm, g, ms, with all
+  lengths times 1e-6 and times 1e3 (density and stiffness kept, so times scale with lengths), with stiffness and density times
+  1e-9 and 1e9, and rotated by 37 degrees about (1,2,3). The displacements, in the units of the first, agree to 1e-8 of the
+  largest (rotated: 1e-9). Tolerances, initial guesses, step control and the choice of the explicit step have
+  default values: none of them may depend on units or directions, nor may the face terms of CR and DG. Only Newton's tolerance is smaller: the preconditioner
+  is in single precision, and its effect on the solution depends on the direction.
 
-  Contact by the barrier, a block that slides to rest with friction and two that meet in flight: as many iterations in m kg s, mm t s, m kg ms and cm g us, and the same displacements to CONTACT.
+  Barrier contact, a block that slides to rest with friction and two that collide in flight: as many iterations in m kg s, mm t s, m kg ms and cm g us, and the same displacements to CONTACT.
 */
 #include "verify.h"
 

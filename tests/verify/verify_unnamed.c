@@ -1,17 +1,17 @@
 // @ranks 1 2
 /*
-  Every effect, element, law, field and other output there is (tests/parts.h takes them from the registries): named alone it shows its log
-  events; unnamed it shows none, allocates nothing and leaves the motion as it is, to the last bit.
+  Every effect, element, material, field and other output (tests/parts.h lists them from the registries): if a scene names one, its log
+  events occur; if not, none occur, nothing is allocated and the motion is bitwise the same.
 
-    first    a process that has run the base scene alone has no log event of anything else, and has allocated nothing in files of effects,
+    first    a process that has run only the base scene has no log event of anything else, and has allocated nothing in files of effects,
              contact and output
-    named    against the same scene without it, exactly its own events come, and for an element or a law that of the one it replaces
-             goes; an effect is the only one of the model, and allocates; output leaves the motion as it is to the last bit
-    after    the base scene run again allocates as often and as much as before, in set-up and in steps, has its own events alone
-             and the same motion to the last bit
-    apart    two bodies far apart in an explicit run, no tolerance of a solver between them: what is named for one leaves the other's
-             motion as it is: to the last bit for effects and laws, and but for rounding for elements, which change the order of sums
-    rows     an effect, element, law or option of the output without a row in tests/parts.h fails here
+    named    compared with the base scene, exactly its own events are added, and for an element or a material that of the replaced one
+             is missing; an effect is the only one of the model, and allocates; output leaves the motion bitwise the same
+    after    the base scene run again has the same number and size of allocations as before, in set-up and in steps, its own events only
+             and bitwise the same motion
+    apart    two distant bodies in an explicit run, without solver tolerances: what is named for one does not change the
+             motion of the other: bitwise for effects and materials, up to rounding for elements, which change the order of sums
+    rows     an effect, element, material or output option without a row in tests/parts.h fails here
 */
 #include <dirent.h>
 #include "../parts.h"
