@@ -1,8 +1,8 @@
 /*
-  fuzz.c - a reader under clang's libFuzzer: SB_FUZZ_READER=tetgen build-fuzz/tests/fuzz/fuzz FOLDER (scripts/fuzz calls it).
+  fuzz.c - runs a reader with clang's libFuzzer: SB_FUZZ_READER=tetgen build-fuzz/tests/fuzz/fuzz FOLDER (called by scripts/fuzz).
 
-  Besides what the sanitizers find, it stops at memory that a reader did not give back, and at an error that breaks its promises
-  (readers.h). Memory is counted by functions of our own below PetscMalloc().
+  In addition to sanitizer errors, it stops at memory leaks of a reader, and at errors that violate the guarantees of readers.h.
+  Memory is counted by functions below PetscMalloc().
 */
 #include <stdlib.h>
 #include "readers.h"

@@ -1,14 +1,14 @@
 /*
-  h5.h - an HDF5 file made from the bytes of a fuzzer, for the reader of meshes in HDF5.
+  h5.h - an HDF5 file generated from the bytes of a fuzzer, for the reader of meshes in HDF5.
 
-  The bytes do not become the file itself: HDF5 1.10 reads beyond its memory with damaged containers (H5Aexists() and others, found within
-  seconds), which this program cannot repair. They choose which arrays a sound file holds, their types, shapes and values:
+  The bytes are not the file itself: HDF5 1.10 reads out of bounds with damaged containers (H5Aexists() and others, found within
+  seconds), which this program cannot repair. They define the arrays in a valid file, with their types, shapes and values:
 
-    layout, step          bit 0: an own mesh, bits 1 to 2: its version less one; step that is read, signed
+    layout, step          bit 0: a mesh file, bits 1 to 2: its version less one; step to be read, signed
     then arrays           name, type, number of dimensions, dimensions, values; the last one of a name counts
 
-  A dimension is a byte, from 250 on a lie; a value a signed byte, 127 and -128 stand for the largest and the smallest number, or not a
-  number and infinity. Values that the bytes are too few for are zero.
+  A dimension is one byte, from 250 on an invalid size; a value one signed byte; 127 and -128 stand for the largest and the smallest number, or NaN
+  and infinity. Missing values are zero.
 */
 #pragma once
 #include <hdf5.h>

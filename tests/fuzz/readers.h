@@ -1,8 +1,8 @@
 /*
-  readers.h - one input through one reader, as make fuzz does it millions of times and the unit test once for each file of tests/fuzz.
+  readers.h - one input through one reader, used by make fuzz millions of times and by the unit test once for each file of tests/fuzz.
 
-  The input stands in a file with the ending of its format. TetGen's mesh is four files: here they stand one after the other, apart
-  by lines of %%. For a mesh in HDF5 it says what the file holds (h5.h).
+  The input is written to a file with the extension of its format. TetGen's mesh has four files: in the input they follow each other, separated
+  by lines of %%. For a mesh in HDF5 the input describes the contents of the file (h5.h).
 */
 #pragma once
 #include <sys/stat.h>

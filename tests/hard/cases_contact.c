@@ -1,6 +1,6 @@
 /*
-  cases_contact.c - contact at its limits: impacts at the speed of waves, deep overlap, bodies squeezed flat, ratios of mass and stiffness,
-  and sizes far from a metre.
+  cases_contact.c - contact in extreme cases: impacts at wave speed, deep overlap, bodies compressed flat, large ratios of mass and stiffness,
+  and very small and large sizes.
 */
 #include "hard.h"
 

@@ -1,5 +1,5 @@
 /*
-  cases_material.c - materials at their limits: beams that are constrained at one end.
+  cases_material.c - materials in extreme cases: cantilevers.
 */
 #include "hard.h"
 

@@ -1,5 +1,5 @@
 /*
-  cases_mesh.c - meshes that are bad on purpose: a block that stands on the floor and is let go under its weight.
+  cases_mesh.c - meshes of very poor quality: a block on the floor under sudden gravity.
 */
 #include "hard.h"
 

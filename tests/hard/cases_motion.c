@@ -1,5 +1,5 @@
 /*
-  cases_motion.c - large motions and strains, and scales of length.
+  cases_motion.c - large motions and strains, and very small and large lengths.
 */
 #include "hard.h"
 

@@ -1,8 +1,8 @@
 /*
-  cases_recovery.c - bodies that start far from anything physical, and have to come back to their rest shape.
+  cases_recovery.c - bodies with unphysical initial positions, which have to return to their rest shape.
 
-  A cube of 0.1 m that is free and not damped but by implicit Euler: it may come back anywhere and turned, and HARD_SHAPE does not examine
-  that. Steps of a tenth of the slowest period (0.06 s) leave motion enough to get past folds: with longer ones the body creeps downhill, and may
+  A free cube of 0.1 m without damping except by implicit Euler: it may return at any position and orientation, which HARD_SHAPE
+  ignores. Steps of a tenth of the slowest period (0.06 s) keep enough motion to overcome folds: with longer ones the body decreases its energy slowly, and may
   end in an equilibrium in which tets wind twice around an edge, all of them with J > 0.
 */
 #include "hard.h"

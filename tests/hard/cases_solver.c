@@ -1,7 +1,7 @@
 /*
-  cases_solver.c - solvers that fail: made to, or because there is no solution.
+  cases_solver.c - failing solvers: forced to fail, or without a solution.
 
-  What is made to fail counts calls of a convergence test: `ctx` holds how many are left until it says that the solve diverged.
+  A forced failure counts calls of a convergence test: `ctx` is the number of calls until it reports divergence.
 */
 #include "hard.h"
 

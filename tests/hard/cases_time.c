@@ -1,7 +1,7 @@
 /*
-  cases_time.c - steps that are too long, and runs that are.
+  cases_time.c - steps that are too long, and very long runs.
 
-  The cube of 0.1 m swings with a period of about 0.05 s.
+  The cube of 0.1 m oscillates with a period of about 0.05 s.
 */
 #include "hard.h"
 

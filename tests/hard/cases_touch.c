@@ -1,6 +1,6 @@
 /*
-  cases_touch.c - contact that is hard to decide: what touches in a point or a line or says the same many times, who touches wants to cycle, normals
-  that jump, solves that fail; and the same contact in the size of a cell and of a mountain.
+  cases_touch.c - degenerate contact: contact in points or lines, redundant constraints, cycling active sets, discontinuous normals,
+  failing solves; and the same contact at the size of a cell and of a mountain.
 */
 #include "hard.h"
 #include <unistd.h>

@@ -1,7 +1,7 @@
 /*
   Runs hard cases (hard.h): hard -case NAME [-runs N] [-verbose] [-more "OPTIONS"], or -list.
 
-  -list writes one line per case: name, ranks with commas, quick runs, processor time in s on each rank, what is hard, separated by tabs. A case prints one
+  -list writes one line per case: name, ranks with commas, quick runs, processor time in s on each rank, difficulty, separated by tabs. A case prints one
   line per limit, which tests/run and scripts/stability read:
     limit|case|ranks|runs|quantity|measured|relation|bound|unit
     work|case|run|steps|rejected|Newton|linear iterations|CPU s of rank 0

@@ -1,20 +1,20 @@
 /*
-  hard.h - hard cases: scenarios that break simulations of soft bodies, each with limits on what it may do.
+  hard.h - hard cases: scenarios in which simulations of soft bodies fail, each with limits on measured quantities.
 
   To add a case: one row in a table cases_*.c,
     {.name = "spin.p1", .what = "spin at 1000 rad/s, P1", .options = "-bodies a ...", .quick = 1,
      .limits = {{HARD_ANGULAR, '<', 1e-3}, {HARD_MIN_J, '>', 0.1}}}
   and, for a new table, one line in hard.c. Every run of a case must reach its end (or end early with the text `stops`), with
-  everything finite; then each limit must hold. A case runs `runs` times: the first time as it is, then with the start jittered
-  by `jitter` and `jitter_speed`; the worst of all runs counts. What options cannot say: `mesh` writes a mesh, `start` changes
-  the state before the first step, `look` sees each step (and may measure HARD_OWN...), `solve` replaces SbRunSolve().
+  finite results, and satisfy every limit. A case has `runs` runs: the first one as given, the others with the initial state perturbed
+  by `jitter` and `jitter_speed`; the worst result of all runs counts. Callbacks beyond options: `mesh` writes a mesh, `start` changes
+  the state before the first step, `look` is called after each step (and may measure HARD_OWN...), `solve` replaces SbRunSolve().
   These functions use limits for verdicts, not SB_CHECK(), which counts in hard.c only.
 
   `make build/tests/hard/hard`, then
-    scripts/mpi 2 build/tests/hard/hard -case spin.p1     all runs of a case; -runs 1: the first only; -verbose: each step; -more "OPTIONS": on top
-    tests/run --build build --group hard --match spin     cases with `quick` runs, on two ranks: what `make check` does
-    tests/run --build build --group hard --all            everything, on the ranks of each case: what `make check-hard` does
-    scripts/stability                                     table of the margins of the last runs; --write: into docs/reports/stability.md
+    scripts/mpi 2 build/tests/hard/hard -case spin.p1     all runs of a case; -runs 1: the first only; -verbose: each step; -more "OPTIONS": further options
+    tests/run --build build --group hard --match spin     cases with `quick` runs, on two ranks: as in `make check`
+    tests/run --build build --group hard --all            everything, on the ranks of each case: as in `make check-hard`
+    scripts/stability                                     table of the safety factors of the last runs; --write: into docs/reports/stability.md
 */
 #pragma once
 #include <sb.h>

@@ -1,5 +1,5 @@
 /*
-  measure.c - what the limits of hard cases are about, from each step of a run and from its end.
+  measure.c - measures the limited quantities of hard cases, after each step and at the end of a run.
 */
 #include "hard.h"
 #include "../verify/contact.h"

@@ -1,8 +1,8 @@
 /*
-  meshes.c - meshes that are bad on purpose, of the unit cube.
+  meshes.c - meshes of very poor quality, of the unit cube.
 
-  Slivers: two layers of cubes, whose diagonals disagree at the vertices between the layers. Those vertices are moved up and down by
-  turns, and a tet fills each gap of four vertices that are nearly in a plane.
+  Slivers: two layers of cubes, whose diagonals do not match between the layers. The vertices there are moved alternately up and
+  down, and a tet fills each gap between four nearly coplanar vertices.
 */
 #include "hard.h"
 #include "../verify/verify.h"

@@ -1,7 +1,7 @@
 /*
-  start.c - states that hard cases start from: jitter, and bodies that are nothing like their rest shape.
+  start.c - initial states of hard cases: perturbations, and bodies far from their rest shape.
 
-  Random numbers belong to the number of a node that no partition changes (SbSpace.node_orig), so that a run is the same on any
+  Random numbers are generated from the original node number (SbSpace.node_orig), so that a run is the same on any
   number of ranks.
 */
 #include "hard.h"

@@ -1,15 +1,15 @@
 /*
-  Microseconds per tet: residual and tangent beside the bare element kernel, MatSetValuesBlockedLocal() and
-  DMPlexMatSetClosure(); then MatMult() beside the memory bandwidth of the machine.
+  Microseconds per tet: residual and tangent, compared with the element kernel alone, MatSetValuesBlockedLocal() and
+  DMPlexMatSetClosure(); then MatMult() compared with the memory bandwidth of the machine.
 
     assembly -mesh box:0.4,0.1,0.1:8 -rounds 5
 
-  The bare kernel does for each batch what the tangent does (gather, F, polar rotation, ten blocks) and writes the blocks to the same
-  small buffer again and again. The alternatives get their blocks from the same kernel; they insert the owned cells and
-  then communicate, as programs do that have no overlap. DMPlexMatSetClosure() walks through the cells in the DM's own
-  order into a matrix in the DM's own numbering; which values it adds does not matter for its speed.
+  The kernel alone does the work of the tangent for each batch (gather, F, polar rotation, ten blocks) and writes the blocks repeatedly to the same
+  small buffer. The alternatives get their blocks from the same kernel; they insert the owned cells and
+  then communicate, as programs without overlap do. DMPlexMatSetClosure() visits the cells in the DM's own
+  order and adds to a matrix in the DM's own numbering; the values do not matter for its speed.
 
-  The displacement bends and twists the bar, with rotations of every size.
+  The displacement bends and twists the bar, with small and large rotations.
 */
 #include "perf.h"
 

@@ -1,12 +1,12 @@
 /*
-  A static run of a clamped bar under its weight, whole: what -solver auto takes, and what a single solver does, for docs/reports/solver_choice.md.
+  A complete static run of a clamped bar under its weight: the cost of -solver auto and of single solvers, for docs/reports/solver_choice.md.
 
     choice -cells 30,7,8 -slivers 0.01 -element cr -nu 0.4999 -with " -solver auto"
 
-  -slivers: part of the tets with a smallest dihedral angle of -degrees 0.1 (slivers.h). -with: further options; the blank in front of
-  them is needed, PETSc takes them for another option else. -write PATH: keeps the mesh there and solves nothing.
+  -slivers: fraction of the tets with a smallest dihedral angle of -degrees 0.1 (slivers.h). -with: further options; they must begin with
+  a blank, or PETSc takes them for another option. -write PATH: writes the mesh and solves nothing.
 
-  Prints the solver and why the run stopped, if it did, then `fact NAME VALUE`: tets, slivers, unknowns, newton, linear, rejected, cpu (seconds of set-up and solve on the
+  Prints the solver and the reason if the run stopped, then `fact NAME VALUE`: tets, slivers, unknowns, newton, linear, rejected, cpu (seconds of set-up and solve on the
   slower rank, which sleeps while it waits), memory (MB of the larger rank).
 */
 #include <sys/resource.h>

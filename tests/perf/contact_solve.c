@@ -1,8 +1,8 @@
 /*
-  What a solve of the linear system of contact takes: contact_solve -cells 10 [-element p1] [-step 0.01] [-rtol 1e-3] [-rounds 3]
+  Time of a linear solve with contact: contact_solve -cells 10 [-element p1] [-step 0.01] [-rtol 1e-3] [-rounds 3]
 
-  Two blocks that push each other by a barrier; its stiffness is 1, 1e2, 1e4, 1e6 times the diagonal of K + M / step^2. For each, by turns:
-  CPU ms of a solve in two levels with new values, and with a new pattern too, its iterations, and the same of the factorisation.
+  Two blocks in barrier contact, whose stiffness is 1, 1e2, 1e4, 1e6 times the diagonal of K + M / step^2. For each, alternately:
+  CPU ms of a two-level solve with new values, and with a new sparsity pattern too, its iterations, and the same of the factorisation.
 */
 #include "../contact_problem.h"
 #include "perf.h"

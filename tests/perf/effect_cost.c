@@ -1,18 +1,18 @@
 /*
-  What each effect, element, law, integrator, field and other output costs on one scene, named and not named by turns.
+  Cost of each effect, element, material, integrator, field and other output on one scene, by alternate runs with and without it.
 
     effect_cost -mesh box:0.4,0.1,0.1:8 -rounds 3 -folder DIR [-family effect]
 
-  Output goes to DIR. The scene and what names each part are those of tests/parts.h, where the registries say what there is. Every run has eight
-  steps; the first one, which holds what a solver sets up once, is left out. Per round and part:
+  Output goes to DIR. The scene and the options of each part are in tests/parts.h, which lists them from the registries. Every run has eight
+  steps; the first one, with the set-up of the solver, is excluded. Per round and part:
 
     FAMILY/NAME/without   ms of CPU time per step without it
     FAMILY/NAME/with      the same with it
-    FAMILY/NAME/own       ms per step within its own log event, where it has one in steps
-    FAMILY/NAME/setup     bytes more in use at the end of the set-up
-    FAMILY/NAME/step      bytes more allocated per step, most of them free again when it ends
+    FAMILY/NAME/own       ms per step within its own log event, if it has one in steps
+    FAMILY/NAME/setup     additional bytes in use at the end of the set-up
+    FAMILY/NAME/step      additional bytes allocated per step, most of them freed when it ends
 
-  A run without serves up to three parts of the same scene that follow it. Memory of MUMPS, METIS and HDF5 is not seen.
+  A run without serves up to three parts of the same scene that follow it. Memory of MUMPS, METIS and HDF5 is not included.
 */
 #include "../parts.h"
 #include "perf.h"

@@ -1,11 +1,11 @@
 /*
-  What the elements cost beside each other on the same mesh: microseconds per tet of residual and tangent, seconds per million
+  Cost of the elements on the same mesh: microseconds per tet of residual and tangent, seconds per million
   tets to plan and create the matrix, bytes and unknowns per tet.
 
     elements -element cr -mesh box:0.4,0.1,0.1:8 -rounds 5
 
-  Matrix: the symmetric one on one rank, blocks on several. The displacement bends and twists the bar. For p2 also the bare kernel: gradients, law and blocks of P1 at
-  the four points, and the 55 blocks of each tet of them, written to the same small buffer again and again; without the mean volume.
+  Matrix: symmetric on one rank, blocks on several. The displacement bends and twists the bar. For p2 also the kernel alone: gradients, material and blocks of P1 at
+  the four points, and the 55 blocks of each tet from them, written repeatedly to the same small buffer; without the mean volume.
 */
 #include "perf.h"
 

@@ -1,10 +1,10 @@
 /*
-  One problem of tests/verify/locking.h, for scripts/locking: how near the answer is, and what it cost.
+  One problem of tests/verify/locking.h, for scripts/locking: accuracy and cost.
 
     locking -problem cube -n 8 -nu 0.4999 -with " -body_a_element cr -solver cholmod"
 
   problem: cube, bar, cook, shell, beam, swing, twist, hang, modes. `n` cells across, or a file as -mesh (cook, shell, cube).
-  beam: -mu, Pa. The blank in front of the text behind -with is needed: PETSc takes it for another option else. Prints `fact NAME VALUE`.
+  beam: -mu, Pa. The text after -with must begin with a blank, or PETSc takes it for another option. Prints `fact NAME VALUE`.
 */
 #include "perf.h"
 #include "../verify/locking.h"

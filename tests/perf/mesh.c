@@ -1,14 +1,14 @@
 /*
-  Seconds and memory from a mesh file to the distributed mesh, phase by phase.
+  Time and memory from a mesh file to the distributed mesh, phase by phase.
 
     mesh -mesh big.msh
     mesh -mesh big.h5 -slabs      (all ranks read)
 
-  Seconds are elapsed ones, and as NAME_cpu those that the busiest rank has computed for (also while it waits for messages).
+  Seconds are wall time, and as NAME_cpu the largest CPU time of a rank (including waiting for messages).
 
-  read: the file to arrays on rank 0; read_and_check: and what a run checks, all bodies in one local; distribute: partition and
-  migration; number: own numbering. Memory is the largest resident size within a phase (VmHWM, set back before it), of rank 0
-  and of the largest other rank, less what the process had at its start. One run per process: pages that were freed stay.
+  read: the file to arrays on rank 0; read_and_check: with the checks of a run, all bodies in the merged mesh; distribute: partition and
+  migration; number: local numbering. Memory is the largest resident size within a phase (VmHWM, reset before it), of rank 0
+  and of the largest other rank, less that of the process at its start. One run per process: freed pages may remain.
 */
 #include "perf.h"
 #include "../../src/mesh/mesh_impl.h"

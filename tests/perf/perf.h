@@ -1,12 +1,12 @@
 /*
-  perf.h - what the benchmark programs share: clocks, samples, the swinging bar.
+  perf.h - common functions of the benchmark programs: clocks, samples, the swinging bar.
 
-  A program prints one line per measurement, `sample NAME UNIT VALUE`, and facts about its case as `fact NAME VALUE`;
-  scripts/bench runs the programs, interleaves them, and makes medians, ratios and tables. Alternatives that are compared
-  within one program take turns, round by round, so that a disturbance of the machine hits all of them.
+  A program prints one line per measurement, `sample NAME UNIT VALUE`, and properties of its case as `fact NAME VALUE`;
+  scripts/bench runs the programs, interleaves them, and computes medians, ratios and tables. Alternatives within one
+  program alternate, round by round, so that a disturbance of the machine affects all of them.
 
   Work without communication is measured in CPU seconds of the slowest rank, which other programs on the machine disturb
-  less than elapsed time; what communicates, or has to be in time, is measured by the clock on the wall.
+  less than wall time; communication, and real-time performance, are measured in wall time.
 */
 #pragma once
 #include <time.h>

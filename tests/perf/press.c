@@ -1,10 +1,10 @@
 /*
-  What contact between bodies costs in steps that have it: press -scene press|heap -cells 6 [-friction 0.3] [-steps 10]
+  Cost of contact between bodies in steps with contact: press -scene press|heap -cells 6 [-friction 0.3] [-steps 10]
 
-  press: a block is driven by 6 % into a larger one that stands still, meshes apart, no friction: most of the points of one surface
-  touch all the time. heap: eight boxes, each turned a little, in two layers, fall by 2 mm on a floor and onto each other, with friction.
+  press: a block is pushed by 6 % into a larger fixed one, with non-matching meshes, no friction: most of the points of one surface
+  are always in contact. heap: eight boxes, each slightly rotated, in two layers, fall by 2 mm on a floor and onto each other, with friction.
 
-  For each step in which something touches, but the first: milliseconds of the step and of the search for pairs, of the slowest rank. Work of the monitor is not counted.
+  For each step with contact, except the first: milliseconds of the step and of the search for pairs, of the slowest rank. Work of the monitor is not counted.
 */
 #include "../verify/contact.h"
 #include "perf.h"

@@ -1,11 +1,11 @@
 /*
-  Set-up seconds per million tets, by phase: reading (or making) and checking the mesh, distributing and numbering it, the
-  space, the assembly plan, the matrices; beside DMCreateMatrix() on a DMPlex of the same tets.
+  Set-up seconds per million tets, by phase: reading (or generating) and checking the mesh, distributing and numbering it, the
+  space, the assembly plan, the matrices; compared with DMCreateMatrix() on a DMPlex of the same tets.
 
     setup -mesh box:0.4,0.1,0.1:8 -rounds 3
 
-  The phases of the mesh are what PETSc's log says of their events; the matrices are timed here. The plan is made with the
-  first matrix of a space: a second one of the same kind (SBAIJ, on several ranks BAIJ) shows what it took.
+  The phases of the mesh are timed by PETSc's log events; the matrices are timed here. The plan is made with the
+  first matrix of a space: the difference to a second one of the same kind (SBAIJ, on several ranks BAIJ) is its time.
 */
 #include "perf.h"
 #include <sblog.h>

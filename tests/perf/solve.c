@@ -1,6 +1,6 @@
 /*
-  Seconds of a static solve: the bar of 200,000 tets (perf.h) under gravity, linear law, relative residual 1e-8. Measured are the residual,
-  the tangent, the set-up of the preconditioner and the iterations, on as many ranks as the program runs on.
+  Time of a static solve: the bar of 200,000 tets (perf.h) under gravity, linear material, relative residual 1e-8: the residual,
+  the tangent, the set-up of the preconditioner and the iterations, on the ranks of the program.
 
     solve -mesh box:0.4,0.1,0.1:20 -solver auto -rounds 3
 */

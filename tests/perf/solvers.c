@@ -1,20 +1,20 @@
 /*
-  One linear solve of a nearly incompressible body, for scripts/solvers: what a solver costs and whether it gets there.
+  One linear solve of a nearly incompressible body, for scripts/solvers: cost and convergence of a solver.
 
     solvers -mesh box:0.4,0.1,0.1:6 -hold plane:1,0,0,0 -element cr -nu 0.4999 -with " -solver pressure"
 
-  A body under its weight, clamped at the set -hold, small strains, relative residual 1e-8. -with: further options; the blank in
-  front of them is needed, PETSc takes them for another option else. -plain: algebraic multigrid is not told the rigid-body modes.
-  -star: on the matrix of -solver cg_gamg, additive Schwarz with one block per vertex, all the nodes of the faces that
-  contain it, and P1 as a coarse space, both solved exactly. P1 is the Galerkin product: a CR or DG function that is P1 has at a
+  A body under its weight, clamped at the set -hold, small strains, relative residual 1e-8. -with: further options, which must begin with
+  a blank, or PETSc takes them for another option. -plain: algebraic multigrid without the rigid-body modes.
+  -star: on the matrix of -solver cg_gamg, additive Schwarz with one block per vertex, all nodes of the faces at
+  the vertex, and P1 as a coarse space, both solved exactly. P1 is the Galerkin product: a CR or DG function that is P1 has on a
   face the mean of its three vertices. Schoeberl (1999), Multigrid methods for a parameter dependent problem in primal variables:
-  such blocks hold the functions of a vertex without divergence, which is what a smoother needs for nu near 1/2.
+  such blocks contain the local divergence-free functions, which a smoother needs for nu near 1/2.
 
-  Prints `fact NAME VALUE`: tets, unknowns, iterations, reason (PETSc's number of why the iteration ended, negative: it failed),
-  residual (|b - K x| / |b|, computed again), simpler (1: the fine level of cg_two_level is the diagonal), setup and
+  Prints `fact NAME VALUE`: tets, unknowns, iterations, reason (PETSc's KSPConvergedReason, negative: failure),
+  residual (|b - K x| / |b|, recomputed), simpler (1: the fine level of cg_two_level is the diagonal), setup and
   solve (CPU seconds of the slower rank), memory (MB of the larger rank). Set-up: plan, matrices, tangent, preconditioner. A rank that
-  waits for another one sleeps: on a busy machine its CPU time would be one of waiting else. After -limit CPU seconds
-  of a rank it prints `fact late` and gives up, with a code that is not zero.
+  waits for another one sleeps, so that its CPU time does not include waiting on a busy machine. After -limit CPU seconds
+  of a rank it prints `fact late` and exits with a non-zero code.
 */
 #ifdef __linux__
   #include <sys/prctl.h>

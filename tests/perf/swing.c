@@ -1,10 +1,10 @@
 /*
-  Milliseconds per step of the swinging bar (perf.h) with one linear solver, without output; -mesh and -hold take another body.
+  Milliseconds per step of the swinging bar (perf.h) with one linear solver, without output; -mesh and -hold select another body.
 
     swing -mesh box:0.4,0.1,0.1:8 -solver realtime -element p1 -steps 120 -seconds 10
 
-  The bar is let go at rest, falls and swings for 2 s in 120 steps of 1/60 s. Ends early after so many seconds. The first
-  step is told apart: it holds what a solver sets up once. Iterations are those of CG.
+  The bar is released at rest, falls and swings for 2 s in 120 steps of 1/60 s. Ends early after -seconds. The first
+  step is reported separately: it includes the set-up of the solver. Iterations are those of CG.
 */
 #include "sbsolver.h"
 #include "perf.h"

@@ -1,12 +1,12 @@
 /*
-  Counts, not seconds: what a static solve costs each rank when the mesh grows with the number of ranks. A bar under gravity, clamped
-  at one end, linear law, relative residual 1e-8, of about -tets tets for each rank. scripts/many_ranks makes the table.
+  Weak scaling in counts, not seconds: cost of a static solve per rank when the mesh grows with the number of ranks. A bar under gravity, clamped
+  at one end, linear material, relative residual 1e-8, of about -tets tets for each rank. scripts/many_ranks makes the table.
 
     scripts/mpi 64 build/tests/perf/weak -tets 5000 -element p1 -poisson 0.3 -solver cg_two_level -length 4
 
   Printed are the iterations; the messages, bytes sent, reductions and bytes received in gathers of the solve and, within it, of
-  the set-up of the preconditioner, of the rank with most and the mean; the aggregates that a rank solves for; the largest
-  memory of a rank from its start on, and that of rank 0, which hands out the mesh.
+  the set-up of the preconditioner, largest of a rank and mean; the aggregates that a rank solves for; the largest
+  memory of a rank since its start, and that of rank 0, which distributes the mesh.
 */
 #include "perf.h"
 #include <sblog.h>

@@ -1,7 +1,7 @@
 // @ranks 1
 /*
-  The tree of boxes against all boxes one by one: boxes that meet one, pairs of two trees and of one, the nearest; at once and after the boxes
-  moved. Welding of points against all pairs of points.
+  Box tree against all boxes one by one: boxes that overlap one, pairs of two trees and within one, the nearest; initially and after motion
+  of the boxes. Merging of points against all pairs of points.
 */
 #include <sbgeometry.h>
 #include <math.h>

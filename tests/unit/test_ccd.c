@@ -1,7 +1,7 @@
 // @ranks 1
 /*
-  Time of impact: never later than the true one, and how close to it, on random and degenerate motions; against roots of the cubic, the
-  shortest distance over the step in extended precision, and times from another library.
+  Time of impact: never later than the true one, and its accuracy, on random and degenerate motions; against roots of the cubic, the
+  smallest distance over the step in extended precision, and times from another library.
 */
 #include "pair_reference.h"
 

@@ -1,5 +1,5 @@
-// The pressure that goes with lambda: lambda/2 theta^2 is the part of every law's energy that vanishes with lambda, its sign
-// is that of compression, and for small strains it is -lambda tr(eps). Cells of a scene get it from their own law.
+// Cell pressure of the volumetric term: lambda/2 theta^2 is the part of every material's energy that vanishes with lambda, positive
+// in compression, and for small strains it is -lambda tr(eps). Cells of a scene get it from their own material.
 #include "../scene.h"
 
 static const char *const laws[] = {"linear", "corotated", "stvk", "neohookean"};
