@@ -1,14 +1,14 @@
-"""Hard cases of contact: scenes of the literature that break simulations of contact, each judged by what may never happen.
+"""Hard cases of contact: scenes of the literature in which contact simulations fail, each with conditions that must always hold.
 
-  contact.py -list                     names, ranks, whether there is a short run, seconds, what is hard, with tabs between (as tests/hard/hard -list)
+  contact.py -list                     names, ranks, whether there is a short run, seconds, difficulty, separated by tabs (as tests/hard/hard -list)
   contact.py -case NAME [-ranks N] [-runs N] [-more "OPTIONS"]
       runs a case, by default on one rank; -runs: its short run. SB_SUPPLE, SB_MPI and SB_OUT as tests/run sets them.
   contact.py -table LOGS [-into docs/reports/contact.md]
       the table of the suite from the logs of tests/run, build/test-logs, which have lines `contact|...`: printed, or written into the report.
 
-Every case: it ends where it should; no edge goes through a triangle, in no accepted state by the program's own test (-effect_NAME_verify) and in no frame
-that is examined by contact_crossings.py; nothing is behind an obstacle; kinetic, strain and contact energy never exceed those of the start and the work done; no tet inverts (neo-Hookean);
-Newton's method takes a bounded number of iterations. Options are those that the documents recommend, alike for all cases but for what a case is about.
+Every case: it reaches the expected end; no edge intersects a triangle, in any accepted state by the program's own test (-effect_NAME_verify) and in any frame
+that contact_crossings.py checks; nothing is behind an obstacle; kinetic, strain and contact energy never exceed the initial ones plus the work done; no tet inverts (neo-Hookean);
+the number of Newton iterations is bounded. Options are those recommended in the documents, the same for all cases except those that a case tests.
 """
 import argparse
 import csv
@@ -34,7 +34,7 @@ GRAVITY = 9.81
 
 
 class Scene:
-    """What a case is made of: bodies, effects, time; written as options into a folder."""
+    """A case: bodies, effects, time; written as options into a folder."""
 
     def __init__(self, folder):
         self.folder, self.bodies, self.effects, self.options = folder, [], [], []
@@ -49,7 +49,7 @@ class Scene:
         return str(path)
 
     def body(self, name, mesh, young=1e5, poisson=0.4, law="neohookean", density=1000, **more):
-        """mesh: points and tets, or what -body_NAME_mesh takes."""
+        """mesh: points and tets, or the value of -body_NAME_mesh."""
         self.bodies.append(name)
         options = dict(mesh=mesh if isinstance(mesh, str) else self.file(name, mesh), young=young, poisson=poisson, material=law,
                        density=density, **more)
@@ -61,7 +61,7 @@ class Scene:
         scene.options += [f"-effect_{name}_{key} {value}" for key, value in options.items()]
 
     def obstacle(self, name, obstacle, solid=None, **options):
-        """solid(points, t): signed distance, which the frames are examined with."""
+        """solid(points, t): signed distance, for the check of the frames."""
         self.effect(name, type="contact", obstacle=obstacle, response="barrier", verify="yes", **options)
         if solid:
             self.solids.append(solid)
@@ -102,7 +102,7 @@ CASES = {}
 
 
 def case(name, what, ranks=(1, 2, 3), short=None, seconds=600, **arguments):
-    """Registers a scene: the function that it stands above builds it. short: its end in the short run, s; 0: all of it; None: no short run."""
+    """Decorator that registers the function that builds a scene. short: end time of the short run, s; 0: the complete run; None: no short run."""
     def register(build):
         CASES[name] = dict(build=lambda s: build(s, **arguments), what=what, ranks=ranks, short=short, seconds=seconds)
         return build
@@ -501,7 +501,7 @@ def run(name, ranks, short, more):
     limits = [("crossed frames", len(seen), "<", 1), ("Newton iterations of a step, most", newton.max(), "<", scene.newton + 1), ("rejected steps", h["rejected"].sum(), "<", 1),
               ("energy made, of the largest", made, "<", EXCESS),
               ("smallest det F of all steps", h["min_J"].min(), ">", scene.min_J)]
-    if not short:  # a short run may be the impact alone
+    if not short:  # a short run may end right after the impact
         limits.append(("Newton iterations of a step, median", np.median(newton), "<", scene.median + 1))
     for what, value, relation, bound in limits:
         print(f"limit|{name}|{ranks}|1|{what}|{value:.4g}|{relation}|{bound:g}|")
@@ -530,7 +530,7 @@ def table(folder):
     for name, c in CASES.items():
         if name not in rows:
             continue
-        # the worst of the numbers of ranks, but for the seconds of each
+        # the worst result over the numbers of ranks, except the seconds of each
         ranks, found = zip(*sorted(rows[name].items()))
         tets, steps, end, crossed, median, most, rejected, gap, made, cpu, each = zip(*found)
         largest = lambda values: max(values, key=float)

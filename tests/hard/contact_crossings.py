@@ -1,6 +1,6 @@
-"""Whether surfaces are in each other, found without anything of the program: edges that go through triangles, in double precision.
+"""Intersections of surfaces, computed independently of the program: edges that intersect triangles, in double precision.
 
-With the package ipctk in the environment its test looks at the same frames, too.
+If the package ipctk is installed, its test checks the same frames too.
 """
 import h5py
 import numpy as np
@@ -18,7 +18,7 @@ def edges_of(triangles):
 
 
 def volume(a, b, c, d):
-    """Signed volumes of tets, six times; 0 within rounding."""
+    """Six times the signed volumes of tets; 0 within rounding."""
     p, q, r = b - a, c - a, d - a
     v = np.einsum("ij,ij->i", np.cross(p, q), r)
     size = np.abs(p).max(axis=1) * np.abs(q).max(axis=1) * np.abs(r).max(axis=1)
@@ -26,7 +26,7 @@ def volume(a, b, c, d):
 
 
 def crossings(x, edges, triangles):
-    """Pairs of an edge and a triangle, without common vertices, that go through each other."""
+    """Intersecting pairs of an edge and a triangle without common vertices."""
     axis = np.ptp(x, axis=0).argmax()
     e, t = x[edges], x[triangles]
     elow, ehigh, tlow, thigh = e.min(axis=1), e.max(axis=1), t.min(axis=1), t.max(axis=1)
@@ -37,7 +37,7 @@ def crossings(x, edges, triangles):
     last = np.searchsorted(start, thigh[:, axis], "right")
     count = last - first
     found = []
-    # in portions, as there may be many pairs
+    # in blocks, to limit memory
     for part in np.array_split(np.arange(len(triangles)), max(1, int(count.sum() // 2_000_000) + 1)):
         n = count[part]
         ti = np.repeat(part, n)
@@ -55,7 +55,7 @@ def crossings(x, edges, triangles):
 
 
 def weld(path):
-    """A run whose tets have points of their own: the matrix that takes these to the surface that touches, means over the boundary facets around each
+    """For a run whose tets have separate points: the matrix from these points to the contact surface, means over the boundary facets at each
     vertex, as rows (vertex, point, weight); with triangles and the body of each vertex."""
     with h5py.File(path) as f:
         x, cells, body = f["mesh/x"][...], f["mesh/cells"][...], f["mesh/body"][...]
@@ -72,7 +72,7 @@ def weld(path):
 
 
 def frames(path, most, to=None):
-    """Positions of the frames of a run, at most so many, the last one among them, with their steps: step, x; to: of weld()."""
+    """Steps and positions x of the frames of a run, a limited number including the last one; to: the matrix of weld()."""
     with h5py.File(path) as f:
         x, steps = f["mesh/x"][...], f["step"]
         names = sorted(f"{group}/{name}" for group in steps for name in steps[group])
@@ -96,14 +96,14 @@ def topology(path):
 
 
 def samples(x, triangles):
-    """Points on triangles: a lattice of fifteen on each."""
+    """Sample points on triangles: a lattice of fifteen on each."""
     b = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4
     return np.einsum("kc,tcx->tkx", b, x[triangles]).reshape(-1, 3)
 
 
 def check(path, most=40, self_contact=True, solids=(), tool=None, split=False, times=None):
-    """Looks at the frames of fields.h5. solids: functions (points, t) -> signed distance from an obstacle, m; tool: function (t) -> points and
-    triangles of an obstacle that is a mesh; split: tets have points of their own; times: s by step. Returns a list of what was found."""
+    """Checks the frames of fields.h5. solids: functions (points, t) -> signed distance from an obstacle, m; tool: function (t) -> points and
+    triangles of an obstacle given by a mesh; split: tets have separate points; times: s by step. Returns a list of the failures found."""
     to = weld(path) if split else None
     triangles, body = to[:2] if split else topology(path)
     found = []

@@ -1,11 +1,11 @@
-"""Meshes of the hard cases of contact: mapped grids of cubes, each cut into six tets, whose flat tets and double vertices are dropped."""
+"""Meshes of the hard cases of contact: mapped grids of cubes, each divided into six tets, without flat tets and duplicate vertices."""
 import itertools
 
 import numpy as np
 
 
 def grid(lines, keep=None, place=None):
-    """Tets between the lines (x, y, z) of a grid; keep(i, j, k): whether a cube is there; place(p): where points go. Returns points, tets."""
+    """Tets of a grid with the given coordinates (x, y, z); keep(i, j, k): whether a cube is kept; place(p): map of the points. Returns points, tets."""
     lines = [np.asarray(line, float) for line in lines]
     n = [len(line) for line in lines]
     number = np.arange(n[0] * n[1] * n[2]).reshape(n)
@@ -23,7 +23,7 @@ def grid(lines, keep=None, place=None):
 
 
 def clean(x, tets):
-    """Points that are alike become one; tets without volume go, the others are turned to positive volume."""
+    """Merges coincident points, drops flat tets, and orients the others to positive volume."""
     size = np.ptp(x, axis=0).max()
     _, first, inverse = np.unique(np.round(x / size, 9), axis=0, return_index=True, return_inverse=True)
     x, tets = x[first], inverse.ravel()[tets]
@@ -79,7 +79,7 @@ def hole(n, side=0.15, height=0.1, width=0.03):
 
 
 def ball(n, radius):
-    """A cube, bulged to a ball."""
+    """A cube mapped to a ball."""
     def place(p):
         p = np.array(p)
         most = np.abs(p).max()
@@ -98,7 +98,7 @@ def ring(radius, half, around, n, turns=1.0):
 
 
 def surface(tets, also=None):
-    """Outward triangles; also: and the same corners in another numbering of the tets."""
+    """Surface triangles, oriented outwards; also: the same corners in another numbering of the tets."""
     corners = ([1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1])
     faces = np.concatenate([tets[:, c] for c in corners])
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)

@@ -1,6 +1,6 @@
-"""What the response `barrier` makes of bad scenes: each stops with what is wrong and where, or runs as mechanics say.
+"""Response `barrier` with invalid scenes: each stops with the reason and the position, or gives the correct motion.
 
-Overlap, bodies in one place, widths larger than edges and plates thinner than the motion of a step are in contact_start.opts and barrier_speed.opts.
+Overlap, coincident bodies, widths larger than edges and plates thinner than the motion of a step are in contact_start.opts and barrier_speed.opts.
 @ranks 1 2
 @cpu 60
 """
@@ -21,7 +21,7 @@ found = []
 
 
 def run(name, *options):
-    """Last line of what it says, and the history by column; None for its code: it ran to its end."""
+    """Last line of its output, and the history by column; None for its code: it reached its end."""
     out = OUT / name
     result = subprocess.run([*MPI, SUPPLE, *" ".join(options).split(), "-output_dir", str(out), "-quiet"], capture_output=True, text=True)
     rows = []
@@ -37,7 +37,7 @@ def expect(name, what, fine):
         found.append(f"{name}: {what}")
 
 
-# a path that cannot be resolved: the run stops with time, pair and place, and its output is complete up to there
+# a motion without solution: the run stops with time, pair and position, and its output is complete up to there
 for name, path, begin, end in (("jumps", "0;0;-0.2*min(max(1e6*(t-0.045),0),1)", 0.04, 0.045), ("leaves", "0;0;-2*t", 0.03, 0.055)):
     code, text, rows = run(name, BLOCK, HELD, PLATE, ABOVE, f"-effect_plate_displacement {path}", TIME)
     expect(name, f"no error: {text}", code != 0)
@@ -45,11 +45,11 @@ for name, path, begin, end in (("jumps", "0;0;-0.2*min(max(1e6*(t-0.045),0),1)",
         expect(name, f"'{word}' is not in: {text}", word in text)
     expect(name, f"the history ends at {rows[-1]['time'] if rows else None} s", rows and begin - 1e-9 < rows[-1]["time"] < end + 1e-5)
 
-# the same path where the block is free: it is carried along
+# the same motion with a free block, which is pushed along
 code, text, rows = run("free", BLOCK, "-effects plate", PLATE, ABOVE, "-effect_plate_displacement 0;0;-0.4*t", TIME)
 expect("free", text, code == 0 and rows[-1]["centre_z"] < 0.05 - 0.4 * 0.1 + 0.02)
 
-# an obstacle from a surface that is open
+# an obstacle with an open surface
 (OUT / "open.off").write_text("OFF\n4 3 0\n0 0 0\n1 0 0\n0 1 0\n0 0 -1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n")
 code, text, _ = run("open", BLOCK, "-effects plate", PLATE, f"-effect_plate_obstacle mesh:{OUT / 'open.off'}", TIME)
 expect("open", text, code != 0 and "open.off" in text and "edge" in text)
@@ -67,7 +67,7 @@ code, text, rows = run("wall", BLOCK, "-effects gravity,plate", PLATE, "-effect_
 fallen = 9.81 * 0.1 * 0.11 / 2  # as implicit Euler has it
 expect("wall", f"{text} {rows[-1:]}", code == 0 and abs(rows[-1]["centre_z"] - (0.05 - fallen)) < 1e-9 and rows[-1]["plate_friction_loss"] == 0)
 
-# and holds nothing: statically a block above a floor is free
+# no support either: a static block above a floor is free
 code, text, _ = run("above", BLOCK, "-effects gravity,plate", PLATE, "-effect_plate_obstacle plane:0,0,1,-0.01 -effect_plate_friction 1 -time static")
 expect("above", text, code != 0 and "block" in text)
 

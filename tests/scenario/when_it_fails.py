@@ -1,6 +1,6 @@
-"""Each class of errors and warnings in docs/guides/when_it_fails.md, shown by a scenario that is broken on purpose: a row of CASES.
+"""Each class of errors and warnings in docs/guides/when_it_fails.md, shown by an invalid scenario: a row of CASES.
 
-A row is: class of the guide; "error" or "warning"; arguments of the program; what the line must name: options, values, files, line numbers, bodies, never its words.
+A row is: class of the guide; "error" or "warning"; arguments of the program; what the message must contain: options, values, files, line numbers, bodies, never its wording.
 An error ends the run with exit code 1 and one line `supple: error:` that names all of it, and no trace; a warning leaves the exit code 0, or 1 where the row says so. Every class of the
 guide has a row, and every row a class.
 
@@ -131,16 +131,16 @@ CASES = [
      "-body_b_young 1e5 -body_b_poisson 0.3 -effects meet -effect_meet_type contact -time euler_implicit -ts_dt 1e-3 -ts_max_time 1e-3",
      ["body b", "body a", "-body_b_translate"]),
     ("R1", "error", "bar.opts -effect_pull_vector 0;0;1e9 -snes_max_it 2 -time_max_halvings 2", ["0.0025 s"]),
-    # PETSc's own integrator gives up without a word
+    # PETSc's own integrator stops without a message
     ("R1", "error", "bar.opts -effect_pull_vector 0;0;1e9 -snes_max_it 2 -time alpha2", ["-ts_dt", "genalpha"]),
-    # beyond 0.0152 s there is no load: steps that are halved without end do not go on for ever
+    # there is no load beyond 0.0152 s: repeated halving of the step must end
     ("R1", "error", "bar.opts -effect_pull_vector 0;0;sqrt(0.0152-t)", ["1.86265e-11 s", "-ts_dt"]),
-    # the inverted cube, which carries the load as well, is no answer
+    # the inverted cube, which carries the load too, is not accepted
     ("R2", "error", f"{LIMIT} -effect_press_type traction -effect_press_vector 0;0;-0.2", ["0.962"]),
     ("R2", "error", f"{LIMIT} -effect_press_type traction -effect_press_vector 0;0;-0.2 -body_a_element p2 -static_steps 1", ["0.96"]),
     ("R2", "error", f"{LIMIT} -effect_press_type pressure -effect_press_follower no -effect_press_value 0.2 -body_a_element cr", ["0.96"]),
     ("R2", "error", f"{LIMIT} -effect_press_type pressure -effect_press_value 0.2", ["0.962"]),
-    # a symmetric state that buckles before its load has a maximum
+    # a symmetric state that buckles before its limit load
     *(("R2", "error", f"{LIMIT} -effect_x_on zmin -effect_y_on zmin -effect_press_type traction -effect_press_vector 0;0;-0.25 -body_a_element {more}",
        ["the load factor reached 0.", "a limit load", "-static_control arc_length"]) for more in ("p2 -solver cg_gamg -static_steps 1", "cr -solver cg_gamg", "p1 -pc_type cholesky -mat_cholmod_factor supernodal")),
     ("R3", "warning", "bar.opts -solver cg_jacobi -ksp_max_it 2", ["cg_jacobi", "-solver"]),
@@ -155,7 +155,7 @@ CASES = [
     ("R11", "warning", "bar.opts -effect_pull_vector 0;0;1e9 -snes_max_it 2 -time_max_halvings 2 -remesh_failed yes", ["-remesh_failed"]),
     ("R12", "warning", "cube.opts -body_a_mesh box:0.4,0.1,0.1:1 -body_a_material stvk -body_a_young 1e6 -body_a_density 1000 -body_a_velocity 30*y,-30*x,20*x "
      "-time newmark -ts_dt 0.02 -ts_max_time 0.5", ["-ts_dt", "genalpha"]),
-    # friction that goes in a circle where contact begins took 900 iterations of Newton's method for nothing
+    # cycling friction at the beginning of contact took 900 useless Newton iterations
     ("R13", "warning", "cube.opts -bodies a,b -body_a_mesh box:0.1,0.1,0.05:3 -body_b_mesh box:0.06,0.06,0.05:2 -body_a_material neohookean -body_b_material neohookean "
      "-body_b_young 1e5 -body_b_poisson 0.3 -body_b_translate 0.02,0.013,0.052 -effects hold,push,meet -effect_hold_type fixed -effect_hold_on a.zmin "
      "-effect_push_type prescribed_displacement -effect_push_on b.zmax -effect_push_displacement 0;0;-0.012*t -effect_meet_type contact -effect_meet_friction 0.3 "
@@ -186,19 +186,19 @@ def run(arguments):
 def main():
     for name, text in FILES.items():
         (OUT / name).write_text(text)
-    # a cube with one curved edge: no tet has it, or it is so curved that tets fold
+    # a cube with one curved edge: no tet has it, or its Jacobian is not positive
     for name, edge in (("lost.h5", [1, 6]), ("folded.h5", [0, 7])):
         subprocess.run([Path(SUPPLE).with_name("supple-mesh"), "convert", "box:1,1,1:1", name, "-quiet"], cwd=OUT, check=True)
         with h5py.File(OUT / name, "r+") as f:
             f["mesh/curved_edges"], f["mesh/edge_offsets"] = [edge], [[0.9, 0, 0]]
             f.attrs["supple_mesh"] = 2
-    # checkpoints: of two steps, and with the newer one cut off
+    # checkpoints of two steps, and with the newer one truncated
     for folder in ("saved", "cut"):
         code, text = run(f"bar.opts -output_dir {folder} -checkpoint_every_steps 1 -output_fields displacement")
         check(f"checkpoints: {text}", code == 0)
     last = OUT / "cut/checkpoint_000002.h5"
     last.write_bytes(last.read_bytes()[:1000])
-    # a state whose velocities are fewer than its displacements
+    # a state with fewer velocities than displacements
     shutil.copy(OUT / "saved/checkpoint_000002.h5", OUT / "short.h5")
     with h5py.File(OUT / "short.h5", "r+") as f:
         v = f["v"][:-1]
