@@ -70,7 +70,7 @@ static PetscErrorCode prepare(HardRun *r, PetscInt k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the run said at its end must be what the case says. */
+/* Checks that a run ended as the case requires. */
 static void check_end(const HardRun *r)
 {
   const char *reason = r->run->stop_reason, *stops = r->c->stops;
@@ -174,7 +174,7 @@ int main(int argc, char **argv)
   PetscCall(PetscOptionsHasName(NULL, NULL, "-list", &list));
   PetscCall(PetscOptionsHasName(NULL, NULL, "-verbose", &verbose));
   PetscCall(PetscOptionsGetString(NULL, NULL, "-case", name, sizeof(name), &named));
-  /* PETSc would take options behind -more for its own */
+  /* options after -more must not be parsed by PETSc */
   for (int i = 1; i + 1 < argc; i++) {
     if (!strcmp(argv[i], "-more")) PetscCall(PetscStrncpy(more, argv[i + 1], sizeof(more)));
   }

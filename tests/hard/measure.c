@@ -82,7 +82,7 @@ static PetscErrorCode look_finite(HardRun *r, const SbStep *step)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* As the histories of contact have it: of obstacles and of bodies. */
+/* Penetration as in the histories of contact: with obstacles and between bodies. */
 static PetscErrorCode look_depth(HardRun *r, const SbStep *step)
 {
   PetscFunctionBeginUser;
@@ -105,7 +105,7 @@ static void look_energies(HardRun *r, const SbStep *step)
     r->start = *e;
     r->last = now;
   }
-  /* what is behind of the account now may only have been lent */
+  /* energy that is missing in the balance may be regained later */
   r->most = PetscMax(r->most, PetscMax(now, r->run->energy_start + PetscAbsReal(e->load_work) +
                                               PetscAbsReal(e->prescribed_work)));
   r->gain = PetscMax(r->gain, -e->integrator_loss);
@@ -153,7 +153,7 @@ PetscErrorCode HardMeasureStep(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Largest relative change of the lines between the nodes of a cell. */
+/* Largest relative change of the distances between nodes of a cell. */
 static PetscErrorCode measure_shape(HardRun *r)
 {
   const SbSpace s = r->model->space;

@@ -30,7 +30,7 @@ PetscErrorCode HardMeshNeedle(char path[512])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Cubic shells around the corner at the origin, each so many times smaller than the next: x times r(s) / s, s = max x. */
+/* Grading by cubic shells around the corner at the origin, with sizes in geometric progression: x times r(s) / s, s = max x. */
 static void graded(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
 {
   const PetscReal s = PetscMax(x[0], PetscMax(x[1], x[2]));

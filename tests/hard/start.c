@@ -7,9 +7,10 @@
 #include "hard.h"
 #include "../verify/verify.h"
 
-#define POINT 1e-4 /* of the size: exactly one point is an equilibrium of the neo-Hookean law */
+#define POINT \
+  1e-4 /* over the size: a body exactly at one point is in equilibrium for the neo-Hookean material */
 
-/* Random numbers in -1..1 for each number that nodes draw from, [verify_numbers()][3]; the caller frees them. */
+/* Random numbers in [-1, 1] for each original node number, [verify_numbers()][3]; the caller frees them. */
 static PetscErrorCode draw(HardRun *r, PetscReal **value)
 {
   const PetscInt n = 3 * verify_numbers(r->model);

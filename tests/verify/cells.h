@@ -4,17 +4,17 @@
 #pragma once
 #include "verify.h"
 
-/* The function of an element in one cell: linear, with P2 that and four times b_i b_j of each edge. */
+/* Displacement function of an element in one cell: linear; for P2 plus 4 b_i b_j e_ij for each edge. */
 typedef struct {
   PetscReal x[4][3]; /* vertices at rest, m */
-  PetscReal u[4][3]; /* values there, seen from this cell */
-  PetscReal e[6][3]; /* P2: values at the middles of edges less the means of their vertices; else 0 */
+  PetscReal u[4][3]; /* vertex values in this cell */
+  PetscReal e[6][3]; /* P2: values at the edge nodes less the means of the end vertices; else 0 */
   PetscReal g[4][3]; /* P1, P2: gradients of the barycentric coordinates, 1/m */
   PetscReal H[9];    /* gradient of the linear part, H[3*i+j] = du_i/dX_j */
   PetscReal V;       /* volume, m^3 */
 } VerifyCell;
 
-/* u[nnode][3] with ghosts. */
+/* Evaluates the function of cell c from u[nnode][3], ghosts included. */
 static inline void verify_cell(SbSpace s, const PetscReal u[], PetscInt c, VerifyCell *cell)
 {
   const SbElement e = SbSpaceCellElement(s, c);
@@ -62,7 +62,7 @@ static inline void verify_cell_at(const VerifyCell *cell, const PetscReal b[4], 
   }
 }
 
-/* Value at the vertex nearest to a rest position: the mean of what the cells around it say, on every rank. Collective. */
+/* Value at the vertex nearest to a rest position: mean over the adjacent cells, on every rank. Collective. */
 static inline PetscErrorCode verify_value_at(SbModel m, Vec U, const PetscReal at[3], PetscReal value[3])
 {
   SbSpace s = m->space;
@@ -96,7 +96,7 @@ typedef struct {
   PetscReal size[3]; /* of the box, m */
 } VerifyBox;
 
-/* Inner vertices moved at random by up to 0.2 cells. */
+/* Random displacement of interior vertices by up to 0.2 cells. */
 static inline void verify_move_vertex(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
 {
   const VerifyBox *box = (const VerifyBox *)ctx;
@@ -111,7 +111,7 @@ static inline void verify_move_vertex(const PetscInt n[3], const PetscInt at[3],
   }
 }
 
-/* Such a box as a file; the same for the same n on any number of ranks. test_file_remove() it. Collective. */
+/* Writes such a box to a file; the same for equal n on any number of ranks. Remove it with test_file_remove(). Collective. */
 static inline PetscErrorCode verify_distorted_box(const PetscInt n[3], const PetscReal size[3],
                                                   char path[512])
 {

@@ -15,7 +15,7 @@ static inline SbEffect contact_effect(SbModel m, const char *name)
   return NULL;
 }
 
-/* The columns of the history of an effect for the residual R (N, without constraints), on every rank: value[ncolumn]. */
+/* History columns of an effect for the residual R (N, without constraints), on every rank: value[ncolumn]. */
 static inline PetscErrorCode contact_columns(SbRun run, PetscReal t, Vec R, SbEffect e, PetscReal value[])
 {
   SbModel m = run->model;
@@ -33,7 +33,7 @@ static inline PetscErrorCode contact_columns(SbRun run, PetscReal t, Vec R, SbEf
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One of them by its name. */
+/* One of these columns by its name. */
 static inline PetscErrorCode contact_column_of(SbRun run, PetscReal t, Vec R, const char *effect,
                                                const char *column, PetscReal *value)
 {
@@ -50,7 +50,7 @@ static inline PetscErrorCode contact_column_of(SbRun run, PetscReal t, Vec R, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same as history.csv has it after a step: for monitors of a run with want_energies, and after it. */
+/* The value of a column in history.csv after a step: for monitors of a run with want_energies, and after it. */
 static inline PetscErrorCode contact_column(SbRun run, PetscReal t, const char *effect, const char *column,
                                             PetscReal *value)
 {
@@ -59,7 +59,7 @@ static inline PetscErrorCode contact_column(SbRun run, PetscReal t, const char *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sum of a vector over the nodes of each body, each times its mass (kg) when `weigh`: sum[nbody][3] on every rank. */
+/* Sum of a vector over the nodes of each body, weighted by nodal mass (kg) if `weigh`: sum[nbody][3] on every rank. */
 static inline PetscErrorCode contact_body_sums(SbModel m, Vec V, PetscBool weigh, PetscReal sum[])
 {
   const SbSpace s = m->space;
@@ -85,7 +85,7 @@ static inline PetscErrorCode contact_body_masses(SbModel m, PetscReal mass[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Net force of contact on each body after the last step, N: force[nbody][3] on every rank. For a run with want_energies. */
+/* Net contact force on each body after the last step, N: force[nbody][3] on every rank. For a run with want_energies. */
 static inline PetscErrorCode contact_body_forces(SbRun run, PetscReal t, PetscReal force[])
 {
   Vec F;
@@ -99,23 +99,23 @@ static inline PetscErrorCode contact_body_forces(SbRun run, PetscReal t, PetscRe
 }
 
 /*
-  The history of a run: a row per step, the start included, of named columns: t, dt, kinetic, strain, energy (both, the
-  potential of gravity g along -z, and what the gaps of barriers hold), momentum_x, angular_x, centre_x, volume, min_J, speed, BODY_vx (of its centre), EFFECT_COLUMN of the
-  effects of contact, missing (largest component of the change of momentum in the step that weight and the forces of obstacles do not
-  explain, kg m/s), and, when asked for, net (likewise of the sum of contact forces on all bodies) and push (on the first), N.
+  History of a run: a row per step, initial state included, with named columns: t, dt, kinetic, strain, energy (total with the
+  potential of gravity g along -z and the barrier energy), momentum_x, angular_x, centre_x, volume, min_J, speed, BODY_vx (of its centre), EFFECT_COLUMN of the
+  contact effects, missing (largest component of the change of momentum in the step less that by weight and obstacle forces,
+  kg m/s), and, if requested, net (likewise of the sum of contact forces on all bodies) and push (on the first body), N.
 */
 typedef struct {
-  PetscReal g;            /* set before the run, m/s^2 */
-  PetscBool forces;       /* likewise: net and push */
-  PetscReal from;         /* rows up to this time are left out by record_max, record_min, record_gain; s */
-  PetscReal mass, lowest; /* kg; lowest node at rest, z, m */
+  PetscReal g;                      /* set before the run, m/s^2 */
+  PetscBool forces;                 /* set before the run: record net and push */
+  PetscReal from;                   /* record_max, record_min, record_gain ignore rows up to this time, s */
+  PetscReal mass, lowest;           /* kg; lowest node at rest, z, m */
   PetscInt newton, steps, rejected; /* totals of the run */
-  PetscInt n, ncolumn, room, at;    /* rows, columns, room for values, column that is filled next */
+  PetscInt n, ncolumn, room, at;    /* numbers of rows and columns, allocated values, next column to be set */
   char (*name)[2 * SB_NAME_MAX];    /* [ncolumn] */
   PetscReal *value;                 /* [n][ncolumn] */
 } Record;
 
-/* A column in every row: [n], the distance between rows is ncolumn. */
+/* Column values in every row: [n], with a stride of ncolumn. */
 static inline const PetscReal *record_column(const Record *r, const char *name)
 {
   static PetscReal none = NAN;
@@ -155,7 +155,7 @@ static inline PetscReal record_extreme(const Record *r, const char *name, PetscR
 #define record_min(r, name) record_extreme(r, name, -1, PETSC_FALSE)
 #define record_gain(r, name) record_extreme(r, name, 1, PETSC_TRUE) /* largest increase in a step */
 
-/* Largest size of three columns NAME_x, NAME_y, NAME_z, or of their change in a step. */
+/* Largest norm of the vector NAME_x, NAME_y, NAME_z, or of its change in a step. */
 static inline PetscReal record_size(const Record *r, const char *name, PetscBool change)
 {
   PetscReal most = 0;
@@ -179,7 +179,7 @@ static inline PetscReal record_impulse(const Record *r, const char *name)
   return sum;
 }
 
-/* How often a column rises above zero after the start. */
+/* Number of times that a column rises above zero after the start. */
 static inline PetscInt record_starts(const Record *r, const char *name)
 {
   PetscInt starts = 0;
@@ -189,7 +189,7 @@ static inline PetscInt record_starts(const Record *r, const char *name)
   return starts;
 }
 
-/* The first step in which a column is above `least`: where it began; the end of the last one; 0 without one. s */
+/* Beginning of the first and end of the last step in which a column is above `least`, s; 0 if there is none. */
 static inline void record_span(const Record *r, const char *name, PetscReal least, PetscReal *first,
                                PetscReal *last)
 {
@@ -201,7 +201,7 @@ static inline void record_span(const Record *r, const char *name, PetscReal leas
   }
 }
 
-/* Puts the next value of a row; the first row names the columns. */
+/* Appends the next value of a row; the first row defines the columns. */
 static inline PetscErrorCode record_put(Record *r, const char *first, const char *second, const char *third,
                                         PetscReal value)
 {
@@ -239,14 +239,14 @@ static inline PetscErrorCode record_step(SbRun run, const SbStep *step, void *ct
   PetscCall(record_put(r, "volume", "", "", e->volume));
   PetscCall(record_put(r, "min_J", "", "", e->min_J));
   PetscCall(record_put(r, "speed", "", "", e->max_speed));
-  // Velocities of the centres of the bodies.
+  // velocities of the centres of the bodies
   if (step->V && m->nbody <= CONTACT_BODIES) {
     PetscCall(contact_body_sums(m, step->V, PETSC_TRUE, sum));
     PetscCall(contact_body_masses(m, mass));
     for (PetscInt i = 0; i < 3 * m->nbody; i++)
       PetscCall(record_put(r, m->body[i / 3].name, "_v", xyz[i % 3], sum[i] / mass[i / 3]));
   }
-  // The columns of contact; the forces of obstacles and the energy of gaps among them.
+  // contact columns, with obstacle forces and barrier energy
   for (PetscInt i = 0; i < m->neffect; i++) {
     const SbEffect f = m->effect[i];
     PetscReal value[64] = {0};
@@ -306,7 +306,7 @@ static inline PetscErrorCode record_free(Record *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves a scene that is open, with its record; it stays open. */
+/* Solves an open scene and records it; the scene stays open. */
 static inline PetscErrorCode record_solve(TestScene *t, Record *r)
 {
   PetscFunctionBeginUser;
@@ -318,7 +318,7 @@ static inline PetscErrorCode record_solve(TestScene *t, Record *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The scene of these options, solved and closed; the record is freed by the caller with record_free(). */
+/* Solves and closes the scene of these options; the caller frees the record with record_free(). */
 static inline PetscErrorCode record_run(Record *r, const char *format, ...)
 {
   TestScene t;
@@ -333,7 +333,7 @@ static inline PetscErrorCode record_run(Record *r, const char *format, ...)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A ball, or its quarter x, y > 0: the layers of a cube become spheres. */
+/* A ball, or its quarter x, y > 0: layers of cubes mapped to spheres. */
 typedef struct {
   PetscReal radius; /* m */
   PetscBool quarter;
@@ -354,7 +354,7 @@ static inline void contact_ball(const PetscInt n[3], const PetscInt at[3], Petsc
   for (int k = 0; k < 3; k++) x[k] *= length > 0 ? b->radius * layer / length : 0;
 }
 
-/* A ball of n layers of cells around its middle, on each side n / 2; remove the file with test_file_remove(). */
+/* Writes a ball of n layers of cells across; remove the file with test_file_remove(). */
 static inline PetscErrorCode contact_ball_write(PetscInt n, PetscReal radius, char path[512])
 {
   ContactBall ball = {.radius = radius};

@@ -5,10 +5,10 @@
 #pragma once
 #include "verify.h"
 
-/* Place of the point x = (s, t, h) of the prism s, t >= 0, s + t <= 1, 0 <= h <= 1. */
+/* Map of the point x = (s, t, h) of the prism s, t >= 0, s + t <= 1, 0 <= h <= 1. */
 typedef void (*CurvedMap)(PetscReal x[3]);
 
-/* Points at half steps are numbered row by row in each layer. */
+/* Number of a point at half steps, row by row in each layer. */
 static inline PetscInt curved_number(PetscInt n, const PetscInt at[3])
 {
   const PetscInt row = 2 * n + 1;
@@ -16,13 +16,13 @@ static inline PetscInt curved_number(PetscInt n, const PetscInt at[3])
   return at[2] * row * (row + 1) / 2 + at[1] * row - at[1] * (at[1] - 1) / 2 + at[0];
 }
 
-/* Tet number w of the prism over base[3], which ascend, from layer k on; positive when its base turns to the left. */
+/* Writes tet w of the prism over base[3], ascending, from layer k; positively oriented if the base is counter-clockwise. */
 static inline void curved_tet(FILE *f, PetscInt n, const PetscInt base[3][2], PetscInt k, int w,
                               PetscInt number, PetscBool second)
 {
   static const int vertex[3][4][2] = {
     {{0, 0}, {1, 0}, {2, 0}, {2, 1}}, {{0, 0}, {1, 0}, {2, 1}, {1, 1}}, {{0, 0}, {1, 1}, {2, 1}, {0, 1}}};
-  static const int edge[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {2, 3}, {1, 3}}; /* as gmsh numbers them */
+  static const int edge[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {2, 3}, {1, 3}}; /* gmsh's order */
   PetscInt at[4][3];
 
   fprintf(f, "%d %d 2 0 1", (int)number, second ? 11 : 4);
@@ -41,7 +41,7 @@ static inline void curved_tet(FILE *f, PetscInt n, const PetscInt base[3][2], Pe
   fprintf(f, "\n");
 }
 
-/* As verify_mesh_write(). */
+/* See verify_mesh_write(). */
 static inline PetscErrorCode curved_mesh_write(PetscInt n, PetscInt m, CurvedMap map, PetscBool second,
                                                char path[512])
 {
@@ -85,7 +85,7 @@ static inline PetscErrorCode curved_mesh_write(PetscInt n, PetscInt m, CurvedMap
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A body with no straight edge. */
+/* Map without any straight edge. */
 static inline void curved_wobble(PetscReal x[3])
 {
   const PetscReal s = x[0], t = x[1], h = x[2];
@@ -95,7 +95,7 @@ static inline void curved_wobble(PetscReal x[3])
   x[2] += 0.07 * PetscCosReal(2. * s + 3. * t);
 }
 
-/* An eighth of the hollow sphere of radii 1 and 2. */
+/* Map to an eighth of the hollow sphere of radii 1 and 2. */
 static inline void curved_shell(PetscReal x[3])
 {
   PetscReal d[3] = {x[0], x[1], 1. - x[0] - x[1]}, length;

@@ -16,14 +16,14 @@
 
 enum { CONTACTS, DEEPEST, MEAN, NORMAL, FRICTION, WORK, LOSS, NVALUE = 16 };
 
-#define SIZE 1.0 /* of the blocks, m */
+#define SIZE 1.0 /* edge length of the blocks, m */
 #define POISSON 0.3
 #define RADIUS 10.0 /* R, m */
-#define CELLS 20    /* along an edge of the finest mesh */
+#define CELLS 20    /* cells along an edge of the finest mesh */
 
 /*
-  One body: cells at the contact `fine` times those of an even mesh, above (side 1) or below (side -1) the plane z = 0, its surface
-  bent by `radius` (0: flat).
+  One body above (side 1) or below (side -1) the plane z = 0: cells at the contact are `fine` times those of a uniform mesh; the surface
+  has the radius `radius` (0: flat).
 */
 typedef struct {
   PetscReal fine, side, radius;
@@ -43,7 +43,7 @@ static inline void bend(const PetscInt n[3], const PetscInt at[3], PetscReal x[3
   x[2] = b->side * (depth + (1 - depth / SIZE) * cap);
 }
 
-/* Two bodies. The width of their barrier is a hundredth of d. */
+/* Two bodies. The barrier width is d / 100. */
 typedef struct {
   const char *name;
   PetscReal young[2];  /* below, above, Pa */
@@ -52,8 +52,8 @@ typedef struct {
 
 typedef struct {
   PetscInt cells;
-  PetscReal a;      /* radius of contact, m */
-  PetscReal honest; /* how far the force in the history may be from the one that acts, as a part of it */
+  PetscReal a;      /* contact radius, m */
+  PetscReal honest; /* tolerance of the force in the history, relative to the acting force */
   const char *element;
 } Case;
 
@@ -69,7 +69,7 @@ static inline PetscErrorCode write_meshes(const Pair *p, PetscInt cells, char pa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Displacement of a half-space on the given side of z = 0 under the force P at the origin, three formulas; `shift` along z is added. */
+/* Formulas of the displacement of a half-space on the given side of z = 0 under the force P at the origin; `shift` is added along z. */
 static inline PetscErrorCode boussinesq(PetscReal P, PetscReal E, PetscReal side, PetscReal shift,
                                         size_t size, char text[])
 {
@@ -86,8 +86,8 @@ static inline PetscErrorCode boussinesq(PetscReal P, PetscReal E, PetscReal side
 }
 
 /*
-  Both bodies between the planes of symmetry x = 0 and y = 0. The surface that may touch is what lies within a few d of z = 0: out to
-  some a, and nothing of the sides, whose first layer of cells is thicker.
+  Both bodies between the symmetry planes x = 0 and y = 0. The contact surface is the part within a few d of z = 0: up to
+  a few a, without the sides, whose first layer of cells is thicker.
 */
 static inline PetscErrorCode open_pair(const Pair *p, const Case *c, PetscReal d, PetscReal P,
                                        char path[2][512], TestScene *t)
@@ -116,7 +116,7 @@ static inline PetscErrorCode open_pair(const Pair *p, const Case *c, PetscReal d
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* History columns of the effect of contact, and the force along z that the drive `high` puts on the upper body. */
+/* History columns of the contact effect, and the force along z of the prescribed displacement `high` on the upper body. */
 static inline PetscErrorCode read_forces(SbRun run, PetscReal values[NVALUE], PetscReal *reaction)
 {
   SbModel m = run->model;
@@ -144,8 +144,8 @@ static inline PetscErrorCode read_forces(SbRun run, PetscReal values[NVALUE], Pe
 }
 
 /*
-  Force of a case, taken from the far face of the upper body, as a part of the formula's. The force in the history, a sum over pairs of which those of
-  edges lean a little, must be the same but for that.
+  Force of a case on the far face of the upper body, over that of the formula. The force in the history is a sum over pairs, those of
+  edges being slightly inclined; it must be equal within the tolerance.
 */
 static inline PetscErrorCode hertz(const Pair *p, const Case *c, PetscReal *force)
 {

@@ -9,11 +9,11 @@
 
 #define LOCKING_TEXT (2 * VERIFY_TEXT)
 
-/* What a run cost. */
+/* Cost of a run. */
 typedef struct {
   PetscInt cells, unknowns, newton, linear;
   double
-    seconds; /* CPU time of the solution, matrix and factorisation included, mesh and set-up not; this rank */
+    seconds; /* CPU time of the solution on this rank, with matrix and factorisation, without mesh and set-up */
 } LockingCost;
 
 static inline double locking_clock(void)
@@ -24,7 +24,7 @@ static inline double locking_clock(void)
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* Opens and solves; the caller closes. */
+/* Opens and solves a scene; the caller closes it. */
 static inline PetscErrorCode locking_run(const char *scene, const char *more, TestScene *t, LockingCost *cost)
 {
   char *text;
@@ -45,7 +45,7 @@ static inline PetscErrorCode locking_run(const char *scene, const char *more, Te
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The manufactured solution on n^3 distorted cells, or on the mesh of a file: relative errors in L2 and H1. */
+/* Manufactured solution on n^3 perturbed cells, or on the mesh of a file: relative errors in L2 and H1. */
 static inline PetscErrorCode locking_cube(PetscInt n, const char *file, PetscReal nu, const char *more,
                                           PetscReal error[2], LockingCost *cost)
 {
@@ -65,7 +65,7 @@ static inline PetscErrorCode locking_cube(PetscInt n, const char *file, PetscRea
 }
 
 /*
-  Bar of 0.4 x 0.1 x 0.1 m, x = 0 clamped, under its weight, small strains, n distorted cells across: u_z in the middle of the
+  Bar of 0.4 x 0.1 x 0.1 m, x = 0 clamped, under its weight, small strains, n perturbed cells across: u_z at the centre of the
   end face, strain energy.
 */
 static inline PetscErrorCode locking_bar(PetscInt n, PetscReal nu, const char *more, PetscReal value[2],
@@ -131,8 +131,8 @@ static inline PetscReal locking_shell_displacement(PetscReal nu, PetscReal r)
 }
 
 /*
-  Adds the squares of one cell: radial and hoop stress, error and exact, sum[0..3]; displacement at the centroid, error and
-  exact, sum[4..5]; sum[6] is the volume.
+  Adds the squares of one cell: radial and hoop stress, error and exact value, sum[0..3]; displacement at the centroid, error and
+  exact value, sum[4..5]; sum[6] is the volume.
 */
 static inline void locking_shell_cell(const VerifyCell *cell, const PetscReal sigma[6], PetscReal nu,
                                       PetscReal sum[7])
@@ -160,9 +160,9 @@ static inline void locking_shell_cell(const VerifyCell *cell, const PetscReal si
 }
 
 typedef struct {
-  PetscReal u;         /* displacement at centroids: relative error in the mean square */
-  PetscReal stress[2]; /* radial and hoop stress of cells: the same, all cells */
-  PetscReal wall[2];   /* cells with a facet on the inner wall */
+  PetscReal u;         /* relative rms error of the displacement at centroids */
+  PetscReal stress[2]; /* relative rms error of radial and hoop stress, all cells */
+  PetscReal wall[2];   /* the same, cells with a facet on the inner wall */
   PetscReal at_wall;   /* radial displacement of (1,0,0) / exact */
 } LockingShell;
 
@@ -225,7 +225,7 @@ static inline PetscErrorCode locking_shell(const char *mesh, PetscReal nu, const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A box to the beam of Turek and Hron, its left side on the circle (0.2, 0.2) of radius 0.05 m; one layer in z. */
+/* Maps a box to the beam of Turek and Hron, its left side to the circle (0.2, 0.2) of radius 0.05 m; one layer in z. */
 static inline void locking_beam_map(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
 {
   const PetscReal y = 0.19 + 0.02 * x[1], root = 0.2 + PetscSqrtReal(0.0025 - PetscSqr(y - 0.2));
@@ -316,8 +316,8 @@ static inline PetscErrorCode locking_twist(PetscInt n, PetscReal nu, const char 
 }
 
 /*
-  A soft block, 0.1 x 0.1 x 0.2 m, hangs from its top under gravity, n distorted cells across; `more` has the law and
-  Young's modulus: its largest displacement (m), change of volume / volume, smallest J.
+  A soft block, 0.1 x 0.1 x 0.2 m, hangs from its top under gravity, n perturbed cells across; `more` has the material and
+  Young's modulus: largest displacement (m), relative change of volume, smallest J.
 */
 static inline PetscErrorCode locking_hang(PetscInt n, PetscReal nu, const char *more, PetscReal value[3],
                                           LockingCost *cost)
@@ -346,8 +346,8 @@ static inline PetscErrorCode locking_hang(PetscInt n, PetscReal nu, const char *
 }
 
 /*
-  The same block without support: number of its eigenvalues that are zero (below 1e-6 of E / (rho L^2), L = 0.2 m), and the
-  lowest two above, in that unit.
+  The same block without support: number of zero eigenvalues (below 1e-6 of E / (rho L^2), L = 0.2 m), and the
+  lowest two nonzero ones, in that unit.
 */
 static inline PetscErrorCode locking_modes(PetscInt n, PetscReal nu, const char *more, PetscReal value[3])
 {
@@ -379,7 +379,7 @@ static inline PetscErrorCode locking_modes(PetscInt n, PetscReal nu, const char 
 typedef PetscErrorCode (*LockingProblem)(PetscInt n, PetscReal nu, const char *more, PetscReal value[4],
                                          LockingCost *cost);
 
-/* Largest difference of the displacements, m, and relative one of the energies. */
+/* Largest difference of the displacements, m, and relative difference of the energies. */
 static inline void locking_difference(const PetscReal a[4], const PetscReal b[4], PetscReal d[2])
 {
   d[0] = 0.;

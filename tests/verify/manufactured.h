@@ -40,7 +40,7 @@ static inline void manufactured_exact(const PetscReal x[3], PetscReal u[3], Pets
   }
 }
 
-/* The formula of -mu Lap u_i as text: the variables of sin^2 written out. */
+/* Formula of -mu Lap u_i as text, with sin^2 written in the variables. */
 static inline PetscErrorCode manufactured_force(PetscReal mu, int i, char text[], size_t size)
 {
   static const char *const name = "xyz";
@@ -62,7 +62,7 @@ static inline PetscErrorCode manufactured_force(PetscReal mu, int i, char text[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Barycentric points and weights (sum 1) of degree 5. */
+/* Quadrature rule of degree 5: barycentric points, weights of sum 1. */
 static inline void manufactured_rule(PetscReal b[14][4], PetscReal w[14])
 {
   const PetscReal a[2] = {0.31088591926330060980, 0.092735250310891226402}, e = 0.045503704125649649492;
@@ -83,7 +83,7 @@ static inline void manufactured_rule(PetscReal b[14][4], PetscReal w[14])
   }
 }
 
-/* Adds the squares of a tet: L2 error, H1 error, and of u itself. */
+/* Adds the squares of a tet: L2 error, H1 error, and norms of u. */
 static inline void manufactured_add_cell(const VerifyCell *cell, PetscReal sum[4])
 {
   PetscReal b[14][4], w[14];
@@ -128,7 +128,7 @@ static inline PetscErrorCode manufactured_errors(SbModel m, Vec U, PetscReal err
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Options of the scene but for mesh and element. */
+/* Options of the scene except mesh and element. */
 static inline PetscErrorCode manufactured_scene(PetscReal nu, char text[], size_t size)
 {
   const PetscReal mu = 3. / (2. * (1. + nu));

@@ -23,7 +23,7 @@ static inline PetscErrorCode modes_times_mass(SbSpace s, Vec X, Vec Y)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rayleigh and Ritz: X, MX = M X_old, Z = A^-1 MX become the next X; value = eigenvalues of A, ascending. */
+/* Rayleigh-Ritz procedure: X, MX = M X_old, Z = A^-1 MX become the next X; value = eigenvalues of A, ascending. */
 static inline PetscErrorCode modes_ritz(SbSpace s, Vec X[], Vec MX[], Vec Z[], PetscReal value[MODES_BLOCK])
 {
   const PetscBLASInt n = MODES_BLOCK, lwork = 4 * MODES_BLOCK;
@@ -43,7 +43,7 @@ static inline PetscErrorCode modes_ritz(SbSpace s, Vec X[], Vec MX[], Vec Z[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The lowest MODES_BLOCK eigenvalues, 1/s^2, the first half of them to 1e-6; `shift` (1/s^2) is of their size. Collective. */
+/* Lowest MODES_BLOCK eigenvalues, 1/s^2, the first half of them to 1e-6; `shift` (1/s^2) is of the same magnitude. Collective. */
 static inline PetscErrorCode modes_lowest(SbModel m, PetscReal shift, PetscReal value[MODES_BLOCK])
 {
   PetscReal last = 0.;

@@ -10,10 +10,10 @@
 #include "contact.h"
 
 #define POUR_G 9.81
-#define POUR_RADIUS 0.2 /* of the bowl, m */
-#define POUR_SIZE 0.06  /* edges of the bodies are about that, m */
+#define POUR_RADIUS 0.2 /* radius of the bowl, m */
+#define POUR_SIZE 0.06  /* approximate edge length of the bodies, m */
 
-/* A number in [-1, 1] for each body and purpose. */
+/* Pseudorandom number in [-1, 1] for each body and purpose. */
 static inline PetscReal pour_noise(PetscInt body, PetscInt purpose)
 {
   const PetscReal x = 12.9898 * (PetscReal)(body + 1) + 78.233 * (PetscReal)(purpose + 1);
@@ -21,7 +21,7 @@ static inline PetscReal pour_noise(PetscInt body, PetscInt purpose)
   return PetscSinReal(x * x);
 }
 
-/* Options of n bodies in layers: rings of four, of many bodies rings of eight with one in the middle. */
+/* Options of n bodies in layers: rings of four, or for many bodies rings of eight with one in the centre. */
 static inline PetscErrorCode pour_bodies(PetscInt n, size_t size, char text[])
 {
   const PetscInt many = n > 8 ? 9 : 4;
