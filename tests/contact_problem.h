@@ -9,11 +9,11 @@ typedef struct {
   Mat K;
   Vec F, Y;
   SbBlocks blocks;
-  PetscInt npair;  /* places between nodes, of all ranks */
-  PetscReal scale; /* of the blocks now: their mean diagonal over that of K, of the nodes that have both */
+  PetscInt npair;  /* number of contact blocks of all ranks */
+  PetscReal scale; /* current mean diagonal of the contact blocks over that of K, at nodes in contact */
 } ContactProblem;
 
-/* The tangent K + M / h^2 at rest of two blocks of an element, `cells` along the edge of the upper one, and the blocks of its contact. Collective. */
+/* Tangent K + M / h^2 at rest of two blocks of an element, `cells` along the edge of the upper one, and their contact blocks. Collective. */
 static inline PetscErrorCode contact_problem_open(PetscInt cells, const char *element, PetscReal h,
                                                   const char *more, ContactProblem *p)
 {
@@ -40,7 +40,7 @@ static inline PetscErrorCode contact_problem_open(PetscInt cells, const char *el
   PetscCall(test_scene_open(text, &p->scene));
   s = p->scene.model->space;
 
-  /* tangent and blocks at rest; the barrier is not soft where nothing has moved yet */
+  /* tangent and contact blocks at rest, where the barrier is not softened */
   PetscCall(SbSpaceCreateMatrix(s, size == 1 ? SB_MATRIX_SBAIJ : SB_MATRIX_BAIJ, &p->K));
   PetscCall(SbSpaceCreateVec(s, &zero));
   PetscCall(SbModelPotentialBegin(p->scene.model, 0., h, zero, NULL));
@@ -53,7 +53,7 @@ static inline PetscErrorCode contact_problem_open(PetscInt cells, const char *el
   PetscCall(VecDestroy(&zero));
   PetscCallMPI(MPI_Allreduce(&p->blocks.n, &p->npair, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
 
-  /* a load that differs from node to node */
+  /* a load that varies from node to node */
   PetscCall(SbSpaceCreateVec(s, &p->F));
   PetscCall(VecDuplicate(p->F, &p->Y));
   PetscCall(VecGetArray(p->F, &f));
@@ -69,7 +69,7 @@ static inline PetscErrorCode contact_problem_open(PetscInt cells, const char *el
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Makes the mean diagonal of contact, where there is any, `ratio` times that of K. Collective. */
+/* Scales the contact blocks so that their mean diagonal is `ratio` times that of K. Collective. */
 static inline PetscErrorCode contact_problem_scale(ContactProblem *p, PetscReal ratio)
 {
   const SbSpace s = p->scene.model->space;
@@ -100,7 +100,7 @@ static inline PetscErrorCode contact_problem_scale(ContactProblem *p, PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* |F - (K + C) Y| / |F|, C multiplied block by block. Collective. */
+/* |F - (K + C) Y| / |F|, with the product of C computed block by block. Collective. */
 static inline PetscErrorCode contact_problem_residual(ContactProblem *p, PetscReal *relative)
 {
   const PetscScalar *y;

@@ -31,7 +31,7 @@ static inline PetscErrorCode test_file_open(const char ending[], char path[512],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From here on every rank finds in the file what rank 0 wrote. Collective. */
+/* Closes the file: afterwards every rank can read what rank 0 wrote. Collective. */
 static inline PetscErrorCode test_file_close(FILE *file)
 {
   PetscFunctionBeginUser;
@@ -40,7 +40,7 @@ static inline PetscErrorCode test_file_close(FILE *file)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Removes it when no rank reads it any more. Collective. */
+/* Removes the file after all ranks have read it. Collective. */
 static inline PetscErrorCode test_file_remove(const char path[])
 {
   PetscMPIInt rank;

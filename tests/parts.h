@@ -10,17 +10,17 @@
 #include "scene.h"
 #include <sblog.h>
 
-#define PART_TEXT 4096 /* longest scenario */
-#define PART_STEPS "8" /* of every run */
+#define PART_TEXT 4096 /* longest scenario, characters */
+#define PART_STEPS "8" /* steps of every run */
 
-/* A soft bar along x that turns about its middle; one linear solve per step. Its sets are for the parts; they do nothing. */
+/* A soft bar along x that rotates about its centre; one linear solve per step. Its sets are used by the parts only. */
 #define PART_SCENE                                                                                        \
   "-bodies bar -body_bar_mesh %s -body_bar_material corotated -body_bar_young 5e4 -body_bar_poisson 0.4 " \
   "-body_bar_density 1000 -body_bar_angular_velocity 0,2,0 -sets end,tip,skin -set_end_at plane:1,0,0,0 " \
   "-set_tip_at plane:1,0,0,0.4 -set_skin_at body:bar -snes_type ksponly -ksp_rtol 1e-4 -solver cg_icc "   \
   "-output_fields none -output_history false -progress false "
 #define PART_TIME "-time euler_implicit -ts_dt 0.0166666666666666667 -ts_max_time 0.13333333333333333 "
-/* Below its end a plane into which it turns. */
+/* A plane below the end of the bar, which it hits. */
 #define PART_FLOOR                                                                                    \
   "-effects floor -effect_floor_type contact -effect_floor_response projected -effect_floor_on skin " \
   "-effect_floor_obstacle plane:0,0,1,-1e-4 "
@@ -29,10 +29,11 @@
 
 typedef struct {
   const char *family, *name;
-  const char *options; /* what names it; "": the scene does */
-  const char *scene;   /* what it needs besides, also there when it is not named; NULL: nothing */
-  const char *events;  /* log events that it begins, with commas; NULL: the one of its family and name */
-  PetscBool apart;     /* it can be kept to one body of two, and explicit integrators take it */
+  const char *options; /* options that name the part; "": the scene does */
+  const char *scene;   /* further options that it needs, also in the run without it; NULL: none */
+  const char
+    *events;       /* log events that it begins, separated by commas; NULL: the one of its family and name */
+  PetscBool apart; /* it can be restricted to one of two bodies, and works with explicit integrators */
 } Part;
 
 static const Part parts[] = {
@@ -84,10 +85,10 @@ static const Part parts[] = {
   {"output", "checkpoint", "-checkpoint_every_steps 1", NULL, NULL, PETSC_FALSE},
   {"output", "progress", "-progress true", NULL, NULL, PETSC_FALSE},
   {"estimator", "ledger", "-ledger true", NULL, NULL, PETSC_FALSE},
-  {"remesh", "remesh", "-remesh_quality 1e-6", NULL, NULL, PETSC_FALSE}, /* asked for, but never due */
+  {"remesh", "remesh", "-remesh_quality 1e-6", NULL, NULL, PETSC_FALSE}, /* enabled, but never necessary */
 };
 
-/* Options of the output that belong to a part above: which one each names, or only changes. */
+/* Output options that belong to a part above: the one that each names, or modifies. */
 static const struct {
   const char *key, *part;
 } part_options[] = {
@@ -112,16 +113,16 @@ static const struct {
   {"output_overwrite", ""},
 };
 
-/* The families, and how their log events begin; NULL: none of their own. */
+/* Families, and prefixes of their log events; NULL: none. */
 static const struct {
   const char *name, *kind;
 } part_families[] = {
   {"effect", "Eff"},  {"element", "Elem"}, {"material", "Mat"},  {"time", NULL},
   {"field", "Field"}, {"output", "Out"},   {"estimator", "Est"}, {"remesh", "Mesh"},
 };
-#define PART_NAMES 64 /* most names of a family */
+#define PART_NAMES 64 /* largest number of names in a family */
 
-/* The output's own rows of the option table: those registered with output_dir. */
+/* Rows of the output in the option table: the block with output_dir. */
 static inline const SbOptionBlock *part_output_block(void)
 {
   for (PetscInt b = 0; b < SbTheOptions.nblock; b++) {
@@ -184,7 +185,7 @@ static inline PetscErrorCode part_names(const char *family, PetscInt *n, char na
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The row of a name; fields need none. `part` lends what it points to until the next call. Not collective. */
+/* Row of a name; fields need none. `part` has borrowed pointers that are valid until the next call. Not collective. */
 static inline PetscErrorCode part_find(const char *family, const char *name, Part *part, PetscBool *found)
 {
   static char options[2 * SB_NAME_MAX], events[4 * SB_NAME_MAX];
@@ -214,7 +215,7 @@ static inline PetscErrorCode part_find(const char *family, const char *name, Par
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The scenario: the scene with what a part needs, and with what names it ("": it is not named). Not collective. */
+/* Scenario: the scene with the options that a part needs, and those that name it ("": without the part). Not collective. */
 static inline PetscErrorCode part_text(const char *mesh, const char *scene, const char *options,
                                        char text[PART_TEXT])
 {
@@ -227,7 +228,7 @@ static inline PetscErrorCode part_text(const char *mesh, const char *scene, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How often an event has been begun in all stages, and the seconds in it; 0 for one that does not exist. Not collective. */
+/* Number of calls of an event in all stages, and its time, s; 0 if it does not exist. Not collective. */
 static inline PetscErrorCode part_event(const char *name, PetscInt *count, PetscLogDouble *seconds)
 {
   const PetscLogStage stages[] = {0, SbLogStageSetup, SbLogStageSolve, SbLogStageOutput};
@@ -249,11 +250,11 @@ static inline PetscErrorCode part_event(const char *name, PetscInt *count, Petsc
 
 /* ------------------------------------------------------------------ what is allocated */
 
-/* PETSc's allocations since part_watch(), those made by files of ours apart, and of the folders of what can go unnamed. */
+/* Allocations of PETSc since part_watch(); separately those in files of supple, and in the folders of optional features. */
 static struct {
-  PetscInt n, n_ours;          /* how many */
-  double bytes, bytes_ours;    /* in all, also what is free again */
-  PetscInt n_effect, n_output; /* by files of effects and contact, of output */
+  PetscInt n, n_ours;          /* numbers of allocations */
+  double bytes, bytes_ours;    /* total bytes, including freed ones */
+  PetscInt n_effect, n_output; /* allocations in files of effects and contact, of output */
 } part_allocated;
 
 static PetscErrorCode (*part_malloc)(size_t, PetscBool, int, const char[], const char[], void **);
@@ -278,14 +279,14 @@ static inline PetscErrorCode part_count(size_t size, PetscBool clear, int line, 
   return (*part_malloc)(size, clear, line, function, file, memory);
 }
 
-/* From here on allocations are counted; after PetscInitialize(). What PETSc reallocates is not seen. */
+/* Starts counting allocations; after PetscInitialize(). Reallocations of PETSc are not counted. */
 static inline void part_watch(void)
 {
   part_malloc = PetscTrMalloc;
   PetscTrMalloc = part_count;
 }
 
-/* PETSc's own routine has to be in place when PETSc ends. */
+/* Restores PETSc's own routine, which PetscFinalize() needs. */
 static inline void part_unwatch(void)
 {
   PetscTrMalloc = part_malloc;

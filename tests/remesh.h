@@ -4,7 +4,7 @@
 #pragma once
 #include "scene.h"
 
-/* Fills what can be seen whole from its middle. ctx: NULL, or an int that counts the calls. */
+/* Mesher for star-shaped surfaces around the centre. ctx: NULL, or an int that counts the calls. */
 static inline PetscErrorCode fixture_cone(const char *where, const SbSurface *hull, PetscReal size, void *ctx,
                                           SbTets *tets)
 {
@@ -27,7 +27,7 @@ static inline PetscErrorCode fixture_cone(const char *where, const SbSurface *hu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One that cannot. */
+/* A mesher that fails. */
 static inline PetscErrorCode fixture_refuse(const char *where, const SbSurface *hull, PetscReal size,
                                             void *ctx, SbTets *tets)
 {

@@ -8,11 +8,11 @@
 typedef struct {
   SbModel model;
   SbRun run;
-  SbLedger ledger; /* NULL unless the options ask for one */
-  SbRemesh remesh; /* likewise */
+  SbLedger ledger; /* NULL unless requested by the options */
+  SbRemesh remesh; /* NULL unless requested by the options */
 } TestScene;
 
-/* The run of a scene whose model is there, and its ledger if the options ask for one. */
+/* Creates the run of a scene that has a model, and its ledger if requested by the options. */
 static inline PetscErrorCode test_scene_run(TestScene *scene)
 {
   PetscFunctionBeginUser;
@@ -22,12 +22,12 @@ static inline PetscErrorCode test_scene_run(TestScene *scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Model and run on the ranks of `comm` as the program makes them, ready for SbRunSolve(); with output to the folder `dir` unless it is NULL. */
+/* Creates model and run on the ranks of `comm`, as the program does, ready for SbRunSolve(); with output to the folder `dir` unless it is NULL. */
 static inline PetscErrorCode test_scene_open_on(MPI_Comm comm, const char *dir, const char *options,
                                                 TestScene *scene)
 {
   PetscFunctionBeginUser;
-  *scene = (TestScene){NULL, NULL, NULL, NULL}; /* what a call that fails leaves can be closed */
+  *scene = (TestScene){NULL, NULL, NULL, NULL}; /* so that the scene can be closed after an error */
   PetscCall(PetscOptionsClear(NULL));
   PetscCall(SbOptionsReset());
   PetscCall(SbRegisterAll());
@@ -64,7 +64,7 @@ static inline PetscErrorCode test_scene_open(const char *options, TestScene *sce
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The time loop, with re-meshing if the options ask for it: model, run and ledger may be other ones then. */
+/* Time loop, with re-meshing if requested by the options, which replaces model, run and ledger. */
 static inline PetscErrorCode test_scene_solve(TestScene *scene)
 {
   PetscFunctionBeginUser;
@@ -114,7 +114,7 @@ static inline PetscErrorCode test_value_at(SbModel m, Vec U, const PetscReal at[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fills a vector from a function of the rest position, so that it does not depend on the partition. */
+/* Sets a vector by a function of the rest position, independent of the partition. */
 static inline PetscErrorCode test_fill(SbModel m, void (*f)(const PetscReal x[3], PetscReal value[3]), Vec U)
 {
   SbSpace s = m->space;

@@ -8,13 +8,13 @@
 #include "verify/verify.h"
 
 typedef struct {
-  PetscInt n[3];     /* cells */
-  PetscReal size[3]; /* m */
-  PetscReal part;    /* of the tets, at most 0.01 */
-  PetscReal degrees; /* smallest dihedral angle of these */
+  PetscInt n[3];     /* numbers of cells */
+  PetscReal size[3]; /* side lengths, m */
+  PetscReal part;    /* fraction of slivers, at most 0.01 */
+  PetscReal degrees; /* smallest dihedral angle of the slivers */
 } Slivers;
 
-/* Smallest dihedral angle in degrees of a tet with the corners x[v[a]], below zero when it is inverted. */
+/* Smallest dihedral angle in degrees of a tet with the corners x[v[a]], negative if it is inverted. */
 static inline PetscReal slivers_angle(const PetscReal x[], const PetscInt v[4])
 {
   PetscReal e[3][3], normal[4][3], most = -1., det = 0.;
@@ -48,7 +48,7 @@ static inline PetscReal slivers_angle(const PetscReal x[], const PetscInt v[4])
   return (det > 0. ? 180. : -180.) / PETSC_PI * acos(PetscMin(1., most));
 }
 
-/* Smallest angle among the tets around a vertex at[3], and how many have less than a hundredth more than `degrees`. */
+/* Smallest angle of the tets at vertex at[3], and number of those within a hundredth of `degrees`. */
 static inline PetscReal slivers_star(const Slivers *s, const PetscInt at[3], const PetscReal x[],
                                      PetscInt *count)
 {
@@ -73,7 +73,7 @@ static inline PetscReal slivers_star(const Slivers *s, const PetscInt at[3], con
   return least;
 }
 
-/* Moves a vertex along a random direction; returns how many tets have become slivers. */
+/* Moves a vertex in a random direction; returns the number of new slivers. */
 static inline PetscInt slivers_move(const Slivers *s, PetscRandom random, const PetscInt at[3], PetscReal x[])
 {
   PetscReal *p = x + 3 * verify_vertex(s->n, at), start[3], e[3], good = 0., bad = 0.;
@@ -105,7 +105,7 @@ static inline void slivers_place(const PetscInt n[3], const PetscInt at[3], Pets
   for (int k = 0; k < 3; k++) x[k] = all[3 * verify_vertex(n, at) + k];
 }
 
-/* Writes the mesh; remove it with test_file_remove(). Collective. Output: made, slivers of 6 n[0] n[1] n[2] tets. */
+/* Writes the mesh; remove it with test_file_remove(). Collective. Output: made, number of slivers among 6 n[0] n[1] n[2] tets. */
 static inline PetscErrorCode slivers_write(const Slivers *s, char path[512], PetscInt *made)
 {
   const PetscInt nvert = (s->n[0] + 1) * (s->n[1] + 1) * (s->n[2] + 1);

@@ -50,7 +50,7 @@ static inline PetscErrorCode sb_test_keep(MPI_Comm comm, int line, const char *f
   return code;
 }
 
-/* Each part of `names`, with | between them, stands in the text, and no part of a longer word or number does for it. */
+/* Whether the text contains each part of `names`, separated by |, as a whole word or number. */
 static inline PetscBool sb_test_names(const char *text, const char *names)
 {
 #define SB_WORD(c) (isalnum((unsigned char)(c)) || (c) == '_')

@@ -4,7 +4,7 @@
 */
 #include "hard.h"
 
-/* A law for a body, its modulus (Pa) and density (kg/m^3). */
+/* A material for a body: modulus (Pa) and density (kg/m^3). */
 #define FLESH(body, young, density)                                                                          \
   "-body_" body "_material neohookean -body_" body "_young " young " -body_" body "_poisson 0.3 -body_" body \
   "_density " density " "
@@ -13,7 +13,7 @@
 #define MEET "-effect_meet_type contact "
 #define GROUND "-effect_floor_type contact -effect_floor_obstacle plane:0,0,1,0 "
 
-/* A block of 64 g flies onto a plate of a tenth of its thickness; waves have 1000 m/s. */
+/* A block of 64 g hits a plate of a tenth of its thickness; wave speed 1000 m/s. */
 #define PLATE(element)                                                                                     \
   "-bodies block,plate -body_block_mesh box:0.04,0.04,0.04:2 -body_block_element " element                 \
   " -body_block_translate 0.03,0.03,0.0061 -body_block_velocity 0,0,-100 " FLESH(                          \
@@ -21,7 +21,7 @@
                             " " FLESH("plate", "1e9", "1000") "-effects rim,meet -effect_rim_type fixed "  \
                                                               "-effect_rim_on plate.xmin,plate.xmax " MEET \
                                                               "-ts_dt 1e-5 -ts_max_time 6e-4"
-/* A block on its corner, onto a rigid floor. */
+/* A block falls on its corner onto a rigid floor. */
 #define CORNER(element)                                                                         \
   "-bodies a -body_a_mesh box:0.04,0.04,0.04:2 -body_a_element " element                        \
   " -body_a_rotate 1,-1,0,54.7356 -body_a_translate 0,0,0.05 -body_a_velocity 0,0,-100 " FLESH( \
@@ -31,7 +31,7 @@
   "-body_a_element " element " -body_b_element " element " " FLESH("a", "1e5", "1000") FLESH(             \
     "b", "1e5", "1000") "-effects damping,meet -effect_damping_beta 0.01 " MEET                           \
                         "-effect_meet_separation_steps 30 -ts_dt 0.004 -ts_max_time 0.6 -snes_rtol 1e-9"
-/* Jittered, some vertices begin inside the plates by up to 1e-5 of the size: the depth counts that. */
+/* With jitter some vertices are initially inside the plates by up to 1e-5 of the size, which counts as penetration. */
 #define SQUEEZED(element, mesh)                                                                           \
   {                                                                                                       \
     .name = "squeeze." element, .seconds = 600,                                                           \
@@ -50,7 +50,7 @@
       {HARD_REJECTED, '<', 50}                                                                            \
     }                                                                                                     \
   }
-/* A block of 1000 kg on one of 0.1 kg, which weighs a thousandth of its stiffness. */
+/* A block of 1000 kg on one of 0.1 kg, whose weight is a thousandth of its stiffness. */
 #define STACK                                                                                         \
   "-bodies a,b -body_a_mesh box:0.1,0.1,0.1:2 -body_b_mesh box:0.1,0.1,0.1:3 -body_b_translate "      \
   "0,0,0.1 " FLESH("a", "1e8", "100")                                                                 \
@@ -86,7 +86,7 @@
     }                                                                                                \
   }
 
-/* The largest energy of HALF as a part of that of bars pushed with the speed of the recovery, M v^2 = 2 kg (50 mm / 30 / 4 ms)^2. */
+/* Largest energy of HALF relative to that of bars pushed with the speed of the separation, M v^2 = 2 kg (50 mm / 30 / 4 ms)^2. */
 static PetscErrorCode measure_push(HardRun *r, const SbStep *step)
 {
   PetscFunctionBeginUser;

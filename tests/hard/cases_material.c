@@ -19,7 +19,7 @@
     }                                                                                                 \
   }
 
-/* A stiff core, of Young's modulus 1e9 Pa in 1e3 Pa, away from the ends. */
+/* A stiff core, Young's modulus 1e9 Pa inside 1e3 Pa, away from the ends. */
 #define INCLUSION(ELEMENT, LAW, QUICK)                                                                       \
   {                                                                                                          \
     .name = "inclusion." ELEMENT "." LAW, .what = "core a million times stiffer, " ELEMENT ", " LAW,         \

@@ -66,7 +66,7 @@
     }                                                                                                      \
   }
 
-/* Drawn out in a second, back in the next one. */
+/* Stretched in one second, back in the next. */
 #define STRETCH(ELEMENT, LAW, WHAT, BY, QUICK)                                                              \
   {                                                                                                         \
     .name = "stretch." ELEMENT "." LAW, .what = "drawn to " WHAT " its length and back, " ELEMENT ", " LAW, \
@@ -80,7 +80,7 @@
     }                                                                                                       \
   }
 
-/* To a third of the length in a second, back in the next one: the ends cannot grow wider. */
+/* Compressed to a third of the length in one second, back in the next; the ends cannot widen. */
 #define SHORTEN(ELEMENT, LAW, QUICK)                                                                        \
   {                                                                                                         \
     .name = "shorten." ELEMENT "." LAW,                                                                     \
@@ -95,7 +95,7 @@
     }                                                                                                       \
   }
 
-/* Lengths and times grow alike, so all three bend alike. */
+/* Lengths and times scale alike, so all three have the same deformation. */
 #define SCALE(NAME, WHAT, BOX, STEP, END)                                                                  \
   {                                                                                                        \
     .name = "length." NAME, .what = WHAT,                                                                  \

@@ -24,7 +24,7 @@
     }                                                                                                  \
   }
 
-/* Equilibria of the law although tets are inverted or flat: nothing moves, and the tets are counted. */
+/* Equilibria with inverted or flat tets: there is no motion, and the tets are counted. */
 #define STAYS(NAME, WHAT, START, LAW)                                                                        \
   {                                                                                                          \
     .name = NAME ".p1." LAW,                                                                                 \
@@ -37,7 +37,7 @@
     }                                                                                                        \
   }
 
-/* What is promised of CR and DG from here: no inverted cell is left, and the energy falls. The shape may be another one. */
+/* Guarantee for CR and DG from this state: no inverted cells at the end, and decreasing energy. The shape may differ. */
 #define UNFOLDS(NAME, WHAT, START, ELEMENT, LAW, CELLS, QUICK)                                         \
   {                                                                                                    \
     .name = NAME "." ELEMENT "." LAW, .what = WHAT ", " ELEMENT ", " LAW,                              \

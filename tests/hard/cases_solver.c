@@ -10,7 +10,7 @@
   "-effects clamp,gravity -effect_clamp_type fixed -effect_clamp_on xmin -body_a_material corotated "    \
   "-ts_dt 0.02 -ts_max_time 0.4 "
 
-/* Calls until the next failure, and how many failures there are still to be. */
+/* Number of calls until the next failure, and of remaining failures. */
 typedef struct {
   PetscInt until, failures;
 } Saboteur;
@@ -67,7 +67,7 @@ static PetscErrorCode make_linear_fail(HardRun *r, PetscInt until, PetscInt fail
 static PetscErrorCode linear_fails_once(HardRun *r)
 {
   PetscFunctionBeginUser;
-  PetscCall(make_linear_fail(r, 20, 2)); /* with the exact tangent and with the filtered one */
+  PetscCall(make_linear_fail(r, 20, 2)); /* with the exact and with the projected tangent */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -98,7 +98,7 @@ static PetscErrorCode forget_newton(void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Three times over: the step is halved until it is an eighth. */
+/* Three failures: the step is halved to an eighth. */
 static PetscErrorCode newton_fails_often(HardRun *r)
 {
   Saboteur *s;

@@ -24,7 +24,7 @@
     }                                                                                                   \
   }
 
-/* Vertices are thrown apart in the end, and the run says why. */
+/* Vertices finally move apart without bound, and the run stops with the reason. */
 #define BEYOND(TIME)                                                                                         \
   {                                                                                                          \
     .name = "beyond." TIME, .what = "five times the stable step of " TIME,                                   \

@@ -11,7 +11,7 @@
   "_velocity " velocity " -body_" body "_material neohookean -body_" body "_poisson 0.3 -body_" body \
   "_density 1000 -body_" body "_young " law " "
 
-/* Two blocks of the same mesh, the upper one at a place where surfaces just touch, and coming down obliquely. */
+/* Two blocks of the same mesh, the upper one initially in exact contact, and moving down obliquely. */
 #define JUST(place)                                       \
   "-bodies a,b " BLOCK("a", "2", "0,0,0", "0,0,0", "1e5") \
     BLOCK("b", "2", place, "-0.3,-0.2,-1",                \
@@ -25,7 +25,7 @@
     }                                                                                                        \
   }
 
-/* A block falls onto another one that stands on the floor and slides over it. */
+/* A block falls onto another one that stands on the floor, and slides over it. */
 #define SLIDES                                                                      \
   "-bodies a,b " BLOCK("a", "3", "0,0,0", "0,0,0", "1e5")                           \
     BLOCK("b", "2", "0.02,0.01,0.102", "0.2,0,-0.5",                                \
@@ -42,7 +42,7 @@
     }                                                                                                    \
   }
 
-/* Length L in all of it, waves as fast as the times are long: the same solution but for L. */
+/* All lengths scale with L, and times with the same wave speed: the same solution, scaled. */
 #define SCALE(L, near, at, dt, end)                                                                          \
   "-bodies a,b -body_a_mesh box:" L "," L "," L ":3 -body_b_mesh box:" L "," L "," L                         \
   ":2 -body_b_translate " near "," near "," at                                                               \
@@ -60,7 +60,7 @@
     }                                                                                                    \
   }
 
-/* A fine body under a coarse one: 169 places of the fine surface push on the four vertices of a face of the coarse one. */
+/* A fine body below a coarse one: 169 vertices of the fine surface are in contact with one face of the coarse one. */
 #define HUNDRED(friction)                                                                               \
   "-bodies a,b -body_a_mesh box:0.1,0.1,0.02:12,12,1 -body_b_mesh box:0.1,0.1,0.1:1 -body_b_translate " \
   "0,0,0.0201 -body_a_material neohookean -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 "  \
@@ -77,20 +77,20 @@
     }                                                                                                   \
   }
 
-/* A band over a saddle of facets that comes up: in the valleys across it two facets push. Once %s is the path of the saddle. */
+/* A band over a rising triangulated saddle: two facets are in contact in its transverse valleys. %s is the path of the saddle. */
 #define SADDLE                                                                                      \
   "-bodies a -body_a_mesh box:0.12,0.024,0.01:16,4,1 -body_a_material corotated -body_a_young 2e4 " \
   "-body_a_poisson 0.4 -body_a_density 1000 -effects gravity,ends,tool -effect_ends_type fixed "    \
   "-effect_ends_on xmin,xmax -effect_tool_type contact -effect_tool_response projected "            \
   "-effect_tool_obstacle mesh:%s -effect_tool_obstacle_at 0.06,0.012,-0.004 "                       \
   "-effect_tool_displacement 0;0;0.02*ramp(t/0.4) -ts_dt 0.02 -ts_max_time 0.6"
-/* A block with a rigid plate in it whose middle plane has a layer of its nodes: both separation directions are as long. */
+/* A block with a rigid plate inside, whose midplane contains a layer of nodes: both separation directions have equal length. */
 #define MIDDLE                                                                           \
   "-bodies a " BLOCK(                                                                    \
     "a", "2", "0,0,0", "0,0,0",                                                          \
     "1e5") "-effects plate -effect_plate_type contact -effect_plate_response projected " \
            "-effect_plate_obstacle box:-0.05,-0.05,0.045,0.15,0.15,0.055 -ts_dt 0.005 -ts_max_time 0.4"
-/* Steps in which the block goes six times through its height, and Newton's method may not take long. */
+/* Steps in which the block moves by six times its height, with a limit on Newton iterations. */
 #define LONG_STEPS(most)                                                                                   \
   "-bodies a " BLOCK("a", "2", "0,0,0.02", "1,0,-10",                                                      \
                      "1e5") "-effects floor -effect_floor_type contact -effect_floor_response projected "  \
@@ -135,7 +135,7 @@ static PetscErrorCode write_saddle(char path[512])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Most pairs that touch at a time. */
+/* Largest number of simultaneous contact pairs. */
 static PetscErrorCode count_pairs(HardRun *r, const SbStep *step)
 {
   PetscReal pairs;

@@ -6,9 +6,9 @@
 #include "../file.h"
 #include "../scene.h"
 
-#define VERIFY_TEXT 4096 /* longest scenario of a test */
+#define VERIFY_TEXT 4096 /* longest scenario of a test, characters */
 
-/* Place of the vertex at[3] = 0..n of a box with n[3] cells; x comes in as the point of the unit cube. */
+/* Map of the vertex at[3] = 0..n of a box with n[3] cells; x is the point of the unit cube on entry. */
 typedef void (*VerifyMap)(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx);
 
 static inline PetscInt verify_vertex(const PetscInt n[3], const PetscInt at[3])
@@ -16,13 +16,13 @@ static inline PetscInt verify_vertex(const PetscInt n[3], const PetscInt at[3])
   return (at[2] * (n[1] + 1) + at[1]) * (n[0] + 1) + at[0];
 }
 
-/* Vertices of tet w = 0..5 of the cell c[3]: six around a diagonal, mirrored from cell to cell as those of a box: mesh. */
+/* Vertices of tet w = 0..5 of the cell c[3]: six around a diagonal, mirrored between adjacent cells as in a box: mesh. */
 static inline void verify_tet(const PetscInt n[3], const PetscInt c[3], int w, PetscInt vertex[4])
 {
   static const int ways[6][4] = {{0, 1, 3, 7}, {0, 2, 6, 7}, {0, 4, 5, 7},
                                  {0, 1, 5, 7}, {0, 2, 3, 7}, {0, 4, 6, 7}};
   const int mirror = (int)((c[0] & 1) | (c[1] & 1) << 1 | (c[2] & 1) << 2);
-  const PetscBool swap = (PetscBool)(((c[0] + c[1] + c[2]) & 1) ^ (w >= 3)); /* positive volumes */
+  const PetscBool swap = (PetscBool)(((c[0] + c[1] + c[2]) & 1) ^ (w >= 3)); /* for positive orientation */
 
   for (int a = 0; a < 4; a++) {
     const int corner = ways[w][swap && a >= 2 ? 5 - a : a] ^ mirror;
@@ -83,7 +83,7 @@ static inline PetscErrorCode verify_mesh_write(const PetscInt n[3], VerifyMap ma
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How many numbers SbSpace.node_orig draws from: vertices; with nodes at faces or edges also four of each cell, their supports, and six. */
+/* Upper bound of SbSpace.node_orig: vertices; with nodes at faces or edges also four per cell, their supports, and six. */
 static inline PetscInt verify_numbers(SbModel m)
 {
   return m->mesh->Nvert + (m->space->faces || m->space->edge_node ? 14 * m->mesh->Ncell : 0);
@@ -146,19 +146,19 @@ static inline void verify_apply(const PetscReal A[9], const PetscReal x[3], Pets
   for (int i = 0; i < 3; i++) y[i] = A[3 * i] * x[0] + A[3 * i + 1] * x[1] + A[3 * i + 2] * x[2];
 }
 
-/* Limit of a sequence whose error falls by the factor 2^order when the mesh is halved. */
+/* Richardson extrapolation of two values, the second with half the mesh size, error of the given order. */
 static inline PetscReal verify_extrapolate(PetscReal coarse, PetscReal fine, PetscReal order)
 {
   return fine + (fine - coarse) / (PetscPowReal(2., order) - 1.);
 }
 
-/* Limit of three values, each of half the mesh size of the one before, of unknown order (Aitken). */
+/* Aitken extrapolation of three values, each with half the mesh size of the previous one, of unknown order. */
 static inline PetscReal verify_aitken(const PetscReal v[3])
 {
   return v[2] - PetscSqr(v[2] - v[1]) / ((v[2] - v[1]) - (v[1] - v[0]));
 }
 
-/* test_scene_open() of options that are written as with printf. */
+/* test_scene_open() of options in printf format. */
 static inline PetscErrorCode verify_vopen(TestScene *t, const char *format, va_list args)
 {
   char text[VERIFY_TEXT];
@@ -183,7 +183,7 @@ static inline PetscErrorCode verify_open(TestScene *t, const char *format, ...)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The end of the run must be its planned one. */
+/* Checks that a run reaches its planned end. */
 static inline PetscErrorCode verify_solve(TestScene *t, const char *what)
 {
   PetscFunctionBeginUser;
@@ -192,7 +192,7 @@ static inline PetscErrorCode verify_solve(TestScene *t, const char *what)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The case that the next checks are about. */
+/* Title of the checks that follow. */
 static char verify_title[256];
 
 static inline void verify_case(const char *format, ...)
@@ -205,13 +205,13 @@ static inline void verify_case(const char *format, ...)
   (void)PetscPrintf(PETSC_COMM_WORLD, "  %s\n", verify_title);
 }
 
-/* A number that a report quotes. */
+/* Prints a number that a report quotes. */
 static inline void verify_show(const char *what, PetscReal value)
 {
   (void)PetscPrintf(PETSC_COMM_WORLD, "    %s: %.5g\n", what, (double)value);
 }
 
-/* Checks that say what they compare, also when it is right. */
+/* Checks that print the compared values, also if they pass. */
 #define VERIFY_NEAR(value, expected, tolerance, what)                                                       \
   do {                                                                                                      \
     const double verify_v = (double)(value), verify_e = (double)(expected), verify_t = (double)(tolerance); \
