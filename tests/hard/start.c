@@ -7,8 +7,7 @@
 #include "hard.h"
 #include "../verify/verify.h"
 
-#define POINT \
-  1e-4 /* over the size: a body exactly at one point is in equilibrium for the neo-Hookean material */
+#define POINT 1e-4 /* over the size; exactly one point is an equilibrium of the neo-Hookean material */
 
 /* Random numbers in [-1, 1] for each original node number, [verify_numbers()][3]; the caller frees them. */
 static PetscErrorCode draw(HardRun *r, PetscReal **value)
