@@ -9,12 +9,12 @@
 
 static const SbCCDLimits usual = {0, 0, 0.1, 0};
 
-/* ------------------------------------------------------------------ truth */
+/* ------------------------------------------------------------------ reference solutions */
 
 typedef struct {
   SbPairKind kind;
-  long double x[12], q[12]; /* start and motion, relative to the first vertex */
-  long double speed;        /* bound of how fast the distance changes */
+  long double x[12], q[12]; /* start and displacement, relative to the first vertex */
+  long double speed;        /* bound of the rate of change of the distance */
 } Motion;
 
 static void make_motion(SbPairKind kind, const PetscReal x0[], const PetscReal x1[], Motion *m)
@@ -42,7 +42,7 @@ static long double distance_at(const Motion *m, long double t)
   return pair_distance(m->kind, x);
 }
 
-/* The first time in [from, to] at which the distance is at most `level`, to 1e-6; above 1: never. */
+/* First time in [from, to] at which the distance is at most `level`, within 1e-6; above 1: never. */
 static long double first_below(const Motion *m, long double level, long double from, long double to)
 {
   const long double middle = 0.5L * (from + to), half = 0.5L * (to - from), d = distance_at(m, middle);
@@ -64,7 +64,7 @@ static long double dot(const long double a[3], const long double b[3])
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Volume of the four vertices at time t; `inside`, how far inside both sides the point is where their planes or lines meet. */
+/* Volume spanned by the four vertices at time t; `inside`: least barycentric coordinate of the intersection point in both primitives. */
 static long double volume(const Motion *m, long double t, long double *inside)
 {
   long double x[12], u[3], v[3], r[3], n[3], c[3], a, b, nn;
@@ -92,7 +92,7 @@ static long double volume(const Motion *m, long double t, long double *inside)
   return dot(r, n);
 }
 
-/* The first time at which the sides go through each other, not at their rims; above 1: never. Roots of the cubic between its turning points. */
+/* First time at which the primitives cross in their interiors; above 1: never. Roots of the cubic between its stationary points. */
 static long double first_crossing(const Motion *m)
 {
   long double f[4], c[4], turn[4] = {0}, disc;
@@ -143,13 +143,13 @@ static void make_random(int i, PetscReal x0[12], PetscReal x1[12])
     x1[k] = x0[k] + speed * pair_random();
   }
   switch (i % 12) {
-  case 1: /* flat, slow against how far it goes along */
+  case 1: /* flat configuration, normal motion slow against the tangential motion */
     for (int a = 0; a < 4; a++) {
       x0[3 * a + 2] *= 1e-3;
       x1[3 * a + 2] = x0[3 * a + 2] + 1e-3 * pair_random();
     }
     break;
-  case 2: /* in one plane */
+  case 2: /* coplanar */
     for (int a = 0; a < 4; a++) x0[3 * a + 2] = x1[3 * a + 2] = 0;
     break;
   case 3: /* parallel edges */
@@ -158,13 +158,13 @@ static void make_random(int i, PetscReal x0[12], PetscReal x1[12])
       x1[9 + k] = x1[6 + k] + 0.5 * (x1[3 + k] - x1[k]);
     }
     break;
-  case 4: /* nearly */
+  case 4: /* nearly parallel edges */
     for (int k = 0; k < 3; k++) {
       x0[9 + k] = x0[6 + k] + 0.5 * (x0[3 + k] - x0[k]) + 1e-8 * pair_random();
       x1[9 + k] = x1[6 + k] + 0.5 * (x1[3 + k] - x1[k]) + 1e-8 * pair_random();
     }
     break;
-  case 5: /* head-on, through */
+  case 5: /* head-on passage */
   case 6:
     for (int a = 0; a < 4; a++) {
       const PetscBool first = (PetscBool)(i % 12 == 6 && a == 1 ? 1 : a == 0);
@@ -173,16 +173,16 @@ static void make_random(int i, PetscReal x0[12], PetscReal x1[12])
       for (int k = 0; k < 3; k++) x1[3 * a + k] = x0[3 * a + k] + (k == 2 && first ? -0.25 * speed : 0);
     }
     break;
-  case 7: /* close to each other */
+  case 7: /* initially close */
     for (int k = 0; k < 3; k++) {
       x0[k] = 0.2 * x0[3 + k] + 0.3 * x0[6 + k] + 0.5 * x0[9 + k] + 1e-5 * pair_random();
       x1[k] = x0[k] + speed * pair_random();
     }
     break;
-  case 8: /* rigid triangle, moving vertex */
+  case 8: /* fixed triangle, moving vertex */
     for (int k = 3; k < 12; k++) x1[k] = x0[k];
     break;
-  case 9: /* a sliver */
+  case 9: /* nearly collinear vertices (sliver triangle) */
     for (int k = 0; k < 3; k++) {
       x0[9 + k] = 0.4 * x0[3 + k] + 0.6 * x0[6 + k] + 1e-6 * pair_random();
       x1[9 + k] = 0.4 * x1[3 + k] + 0.6 * x1[6 + k] + 1e-6 * pair_random();
@@ -204,7 +204,7 @@ static int ascending(const void *a, const void *b)
   return (p > q) - (p < q);
 }
 
-/* Never later than the passage, and how close to it; every gap that is left is what it says. */
+/* The time of impact precedes the passage and is close to it; the remaining gap is as specified. */
 static PetscErrorCode check_random(void)
 {
   PetscInt late = 0, missed = 0, loose = 0, touching = 0, through[2] = {0, 0}, impacts = 0;
@@ -233,7 +233,7 @@ static PetscErrorCode check_random(void)
     if (i % 8 < 2) {
       const long double gap = distance_at(&m, 0), left = distance_at(&m, t);
 
-      /* some gap is left, a tenth or a little less where there is an impact */
+      /* the remaining gap is positive; after an impact it is a tenth of the first gap or a little less */
       touching += t > 0 && !(left > 0);
       loose += impact && t > 0 && left > 0.1000001L * gap + 1e-9L * m.speed + 1e-10L * fabs(x0[0]);
       touching += impact && left < 0.0899L * gap;
@@ -247,7 +247,7 @@ static PetscErrorCode check_random(void)
   SB_CHECK(late == 0, "%d impacts are later than the passage", (int)late);
   SB_CHECK(touching == 0, "at %d impacts less gap is left than should be", (int)touching);
   SB_CHECK(loose < NRANDOM / 100000, "%d impacts are early", (int)loose);
-  /* a passage straight through leaves 0.1 to 0.09 of the way */
+  /* in a straight passage 0.1 to 0.09 of the path remains */
   SB_CHECK(ratio[(through[0] + through[1]) / 2] >= 0.9,
            "median of the time of impact over that of the passage %g",
            (double)ratio[(through[0] + through[1]) / 2]);
@@ -258,7 +258,7 @@ static PetscErrorCode check_random(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All kinds, with radii and separations: the time is between those at which the gap falls to what is kept, and to nine tenths of it. */
+/* All pair kinds, with radii and separations: the time is between those at which the gap falls to the kept gap and to nine tenths of it. */
 static void check_levels(void)
 {
   PetscInt impacts = 0, inside = 0, seen[4] = {0};
@@ -308,7 +308,7 @@ static void check_levels(void)
 
 /*
   Times of Tight Inclusion CCD (Wang et al., "A large-scale benchmark and an inclusion-based algorithm for continuous collision detection", 2021), ipc-toolkit
-  1.6.1, tolerance 1e-9, a ten-thousandth of the gap kept; -1: no impact. Of the triangle without extent by hand.
+  1.6.1, tolerance 1e-9, kept gap a ten-thousandth; -1: no impact. The time of the degenerate triangle is computed by hand.
 */
 typedef struct {
   const char *name;
@@ -492,7 +492,7 @@ static void check_named(void)
   }
 }
 
-/* Units, places far away, motions without end or none, and numbers that are none. */
+/* Units, distant positions, unbounded and zero motions, and values that are not finite. */
 static void check_limits(void)
 {
   const PetscReal above[12] = {0.25, 0.25, 0.5, 0, 0, 0, 1, 0, 0, 0, 1, 0};
@@ -525,7 +525,7 @@ static void check_limits(void)
       SB_CHECK(t >= 0.9 * 0.5 / v && t <= 0.911 * 0.5 / v, "moves by %g: %g", (double)v, (double)t);
   }
 
-  /* gaps that rounding of the coordinates takes away */
+  /* gaps below the rounding error of the coordinates */
   for (int k = 0; k < 12; k++) x[k] = above[k] - (k == 2);
   for (int e = 0; e < 24; e++) {
     PetscReal a[12], b[12];
@@ -540,7 +540,7 @@ static void check_limits(void)
       SB_CHECK(t > 0 && t <= 0.46, "at %g m the time is %g", (double)far, (double)t);
   }
 
-  /* nearer than the separation: half is kept, and what recedes or slides is let go */
+  /* gap below the separation: half of it is kept; a receding or sliding pair moves freely */
   limits.separation = 2;
   for (int k = 0; k < 12; k++) x[k] = above[k] - (k == 2 ? 1 : 0);
   SB_CHECK(SbTimeOfImpact(SB_PAIR_VERTEX_TRIANGLE, above, x, &limits, &t), "no impact");

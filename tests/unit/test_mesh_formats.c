@@ -7,7 +7,7 @@
 
 #define DATA "tests/data/"
 
-/* ------------------------------------------------------------------ items of a group, in numbers of the reference */
+/* ------------------------------------------------------------------ items of a group, in vertex numbers of the reference */
 
 typedef struct {
   PetscInt v[4];
@@ -18,7 +18,7 @@ static int compare_rows(const void *a, const void *b)
   return memcmp(a, b, sizeof(Row));
 }
 
-/* The items of one dimension in a group (NULL: all), their vertices replaced by map[] and sorted, and they themselves sorted. */
+/* Items of one dimension in a group (NULL: all), with vertices renumbered by map[] and sorted; the items are sorted too. */
 static PetscErrorCode list_items(const SbImport *im, const PetscInt map[], int dim, const char *name,
                                  PetscInt *n, Row **rows)
 {
@@ -41,7 +41,7 @@ static PetscErrorCode list_items(const SbImport *im, const PetscInt map[], int d
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Vertices of the reference with the same coordinates. */
+/* Vertex of the reference with the same coordinates, for each vertex. */
 static PetscErrorCode map_vertices(const char *path, const SbImport *im, const SbImport *reference,
                                    PetscInt map[])
 {
@@ -80,10 +80,10 @@ static PetscErrorCode same_group(const char *path, const SbImport *im, const SbI
 
 typedef struct {
   int dim;
-  const char *name, *as; /* group of the file, of the reference */
+  const char *name, *as; /* group in the file, group in the reference */
 } Same;
 
-/* A list of groups that ends with an empty name. */
+/* Compares a file with the reference; the list of groups ends with a NULL name. */
 static PetscErrorCode test_file(const char *path, const SbImport *reference, const Same same[])
 {
   SbImport im;
@@ -104,7 +104,7 @@ static PetscErrorCode test_file(const char *path, const SbImport *reference, con
 
 /* ------------------------------------------------------------------ files of gmsh and VTK */
 
-/* Numbers of VTK's regions stay those of the file, beside another array: a conversion keeps them. */
+/* The region numbers of a VTK file with a second array are preserved by conversion. */
 static PetscErrorCode test_numbers(void)
 {
   SbImport im;
@@ -172,9 +172,9 @@ static PetscErrorCode test_foreign(const SbImport *reference)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ files written here */
+/* ------------------------------------------------------------------ files written by the test */
 
-/* Number of an item in what is written: 1 and 2 for tets left and right, 3 for the wall, 5 inside, 9 for other sides; 0 elsewhere. */
+/* Marker of an item in written files: 1 and 2 for left and right tets, 3 for the wall, 5 for inner, 9 for other triangles; 0 otherwise. */
 static int mark_of(const SbImport *im, int dim, PetscInt i)
 {
   const PetscInt tags = im->item[dim].tags[i];
@@ -189,7 +189,7 @@ static void write_vert(FILE *file, const SbImport *im, int dim, PetscInt i, int 
   for (int k = 0; k <= dim; k++) fprintf(file, " %d", (int)im->item[dim].vert[(dim + 1) * i + k] + first);
 }
 
-/* TetGen's files, numbered from `first`, with comments and blank lines. */
+/* TetGen files, numbered from `first`, with comments and blank lines. */
 static PetscErrorCode write_tetgen(const char *stem, const SbImport *im, int first)
 {
   char path[256];
@@ -218,7 +218,7 @@ static PetscErrorCode write_tetgen(const char *stem, const SbImport *im, int fir
   for (PetscInt i = 0; i < im->item[2].n; i++) {
     fprintf(file, "%d", (int)i + first);
     write_vert(file, im, 2, i, first);
-    fprintf(file, " %d -1 7\n", mark_of(im, 2, i)); /* with neighbours, as tetgen -nn writes */
+    fprintf(file, " %d -1 7\n", mark_of(im, 2, i)); /* with neighbours, as tetgen -nn writes them */
   }
   fclose(file);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -244,7 +244,7 @@ static PetscErrorCode write_neutral(const char *path, const SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The points stand last; names with a blank, and of what is not there. */
+/* Netgen volume file with the points last; a name with a blank, an empty name, and a name without triangles. */
 static PetscErrorCode write_vol(const char *path, const SbImport *im)
 {
   FILE *file = fopen(path, "w");
@@ -273,10 +273,10 @@ static PetscErrorCode write_vol(const char *path, const SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Which side of which tet a triangle is: S1 lies opposite the fourth node, S2 the third, S3 the first, S4 the second. */
+/* Tet and side number of a triangle: S1 is opposite the fourth node, S2 the third, S3 the first, S4 the second. */
 static void find_side(const SbImport *im, PetscInt triangle, int *tet, int *side)
 {
-  static const int opposite[4] = {3, 4, 2, 1}; /* node i lies opposite this side */
+  static const int opposite[4] = {3, 4, 2, 1}; /* side opposite node i */
 
   for (PetscInt c = 0; c < im->item[3].n; c++) {
     int n = 0, other = -1;
@@ -296,7 +296,7 @@ static void find_side(const SbImport *im, PetscInt triangle, int *tet, int *side
   }
 }
 
-/* One part and its instance; sets that count up, that name others, also ones that come later, and a surface of sides. */
+/* One part and its instance; generated sets, a set of other sets that are defined later, and surfaces of element sides. */
 static PetscErrorCode write_abaqus(const char *path, const SbImport *im)
 {
   FILE *file = fopen(path, "w");
@@ -337,7 +337,7 @@ static PetscErrorCode write_abaqus(const char *path, const SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A node in one of the ways that Nastran knows: between commas, of 8 columns by tabs, of 16, of 8 without the letter of the exponent. */
+/* Node in one of four Nastran formats: free with commas, short fields with tabs, long fields, short fields without the letter of the exponent. */
 static void write_grid(FILE *file, int way, int label, const PetscReal x[3])
 {
   if (way == 0)
@@ -351,7 +351,7 @@ static void write_grid(FILE *file, int way, int label, const PetscReal x[3])
     fprintf(file, "%-8s%8d%8s%6.2f-2%6.2f+0%8.4f\n", "GRID", label, "", 100 * x[0], x[1], x[2]);
 }
 
-/* A deck with its head and its end; elements before their points, names as four programs write them, sets of nodes. */
+/* Nastran deck with executive section and ENDDATA; elements before their points, names in the comments of four programs, sets of nodes. */
 static PetscErrorCode write_nastran(const char *path, const SbImport *im)
 {
   FILE *file = fopen(path, "w");
@@ -446,7 +446,7 @@ static PetscInt count_items(const SbImport *im, int dim, const char *name)
   return n;
 }
 
-/* A unit cube with its sides 11 to 16 and region 7: tetgen -pqaAfenn. */
+/* Unit cube with side markers 11 to 16 and region 7: tetgen -pqaAfenn. */
 static PetscErrorCode test_tetgen(void)
 {
   SbImport im;
@@ -478,7 +478,7 @@ static PetscErrorCode test_tetgen(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Two unit cubes side by side, with names of materials and boundary conditions; the neutral format has numbers. */
+/* Two unit cubes side by side, with names of materials and boundary conditions; the neutral format has numbers only. */
 static PetscErrorCode test_netgen(void)
 {
   SbImport vol, neu;
@@ -513,7 +513,7 @@ static PetscErrorCode test_netgen(void)
 
 #define UNV(label, x) label " 0 0 11\n" x "\n"
 
-/* One tet of second order: the nodes of its edges, those of edges 02, 13 and 23 off the middle by parts of 0.1, however a format numbers them. */
+/* One second-order tet in each format's node order: the nodes of edges 02, 13 and 23 are displaced from the edge midpoints by multiples of 0.1. */
 static PetscErrorCode test_second_order(const char *folder)
 {
   static const struct {
@@ -533,7 +533,7 @@ static PetscErrorCode test_second_order(const char *folder)
     {"q.bdf", "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nGRID,4,,0.,0.,1.\nGRID,7,,-.1,.5,0."
               "\nGRID,9,,.5,.3,.5\nGRID,10,,0.,.5,.7\n"
               "CTETRA,1,1,1,2,3,4,,,+\n+,7,,9,10\nENDDATA\n"},
-    /* nodes as gmsh numbers them, each where its format has it; with a triangle and where there is one a line, to be sure of the corners */
+    /* node positions in each format's order; a triangle and, where the format has them, a line identify the corners */
     {"q.unv", "    -1\n  2411\n" UNV("1", "0 0 0") UNV("2", "1 0 0") UNV("3", "0 1 0") UNV("4", "0 0 1") UNV(
                 "5", ".5 0 0") UNV("6", ".5 .5 0") UNV("7", "-.1 .5 0") UNV("8", "0 0 .5") UNV("9", "0 .5 .7")
                 UNV("10", ".5 .3 .5") "    -1\n    -1\n  2412\n1 118 1 1 7 10\n1 5 2 6 3 7 8 10\n9 4\n"
@@ -567,7 +567,7 @@ static PetscErrorCode test_second_order(const char *folder)
     out = fopen(path, "w");
     if (out) (void)fputs(file[f].text, out);
     if (out) (void)fclose(out);
-    /* of TetGen the last of its files */
+    /* TetGen's mesh is read by the last of its files */
     if (strstr(file[f].name, ".node") || strstr(file[f].name, ".face") || strstr(file[f].name, ".edge"))
       continue;
     PetscCall(test_mesh_read(test_body("b", path), &m));

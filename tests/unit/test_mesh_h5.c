@@ -5,7 +5,7 @@
 
 #define DATA "tests/data/"
 
-/* The same name on all ranks; rank 0 writes. */
+/* Path that is the same on all ranks, from the process id of rank 0. */
 static PetscErrorCode shared_path(const char *name, size_t size, char path[])
 {
   int id = (int)getpid();
@@ -59,7 +59,7 @@ static PetscErrorCode fingerprint(const char *mesh_path, PetscReal sum[4])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From the .h5 and through its .xmf, every rank gets what it gets from the .msh. */
+/* The .h5 file and its .xmf give every rank the same sums as the .msh. */
 static PetscErrorCode test_distributed(void)
 {
   PetscReal gmsh[4], own[4], indexed[4];
@@ -90,7 +90,7 @@ static PetscErrorCode test_distributed(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ files made by hand */
+/* ------------------------------------------------------------------ files written by the test */
 
 static void put_array(hid_t file, const char *name, int ndim, const hsize_t size[], hid_t type,
                       const void *data)
@@ -123,7 +123,7 @@ static const double corner[12] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
 static const int tet[4] = {0, 1, 2, 3};
 static const hsize_t four_by_three[2] = {4, 3}, one_by_four[2] = {1, 4}, one[1] = {1};
 
-/* fields.h5 of a run of one tet: displacement at steps 3 and 120, in single precision. */
+/* fields.h5 of a run with one tet: displacement at steps 3 and 120, in single precision. */
 static void write_output(const char *path)
 {
   const hid_t file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
@@ -167,7 +167,7 @@ static PetscErrorCode test_output(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -output_discontinuous: two tets with points of their own; a shared vertex lies at the mean of its points. */
+/* -output_discontinuous: two tets with separate points; a shared vertex is at the mean of its points. */
 static PetscErrorCode test_discontinuous(void)
 {
   const double x[24] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1};
@@ -184,7 +184,7 @@ static PetscErrorCode test_discontinuous(void)
   put_array(file, "/mesh/x", 2, points, H5T_NATIVE_DOUBLE, x);
   put_array(file, "/mesh/cells", 2, tets, H5T_NATIVE_INT, cells);
   put_array(file, "/mesh/vertices", 2, tets, H5T_NATIVE_INT, vertices);
-  u[3 * 1] = 0.5; /* of vertex 1 in the first tet only */
+  u[3 * 1] = 0.5; /* vertex 1, in the first tet only */
   put_array(file, "/step/0000/000001/displacement", 2, points, H5T_NATIVE_DOUBLE, u);
   (void)H5Fclose(file);
   PetscCall(test_read(path, 1, &im));
@@ -196,12 +196,12 @@ static PetscErrorCode test_discontinuous(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A tet of p2 that is cut into eight, behind a linear one: the two tets, with six nodes at edges, one of which is off the middle; and what is wrong with the arrays that say so. */
+/* A linear tet and a P2 tet that is cut into eight: both are read, with six edge nodes, one of them off its midpoint; damaged arrays are reported. */
 static PetscErrorCode test_cut(void)
 {
   static const struct {
     int nparent, at, parent, nten, where, ten;
-    const char *words; /* NULL: it is sound */
+    const char *words; /* NULL: valid */
   } cases[] = {
     {9, 0, 0, 2, 0, 0, NULL},
     {8, 0, 0, 2, 0, 0, "/mesh/parent|/mesh/cells"},
@@ -257,9 +257,9 @@ static PetscErrorCode test_cut(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ damage */
+/* ------------------------------------------------------------------ damaged files */
 
-/* Read on all ranks by rank 0, in slabs, and by supple-mesh, it must fail with these words (NULL: it is sound); with a note only for p2, and supple-mesh has the note. */
+/* Reading must fail with these words (NULL: it succeeds), with both -mesh_reading types and in supple-mesh; with a note, supple-mesh succeeds and gives the note. */
 static PetscErrorCode refuse(const char *path, PetscErrorCode code, const char *words, const char *note)
 {
   static const char *const reading[] = {"rank0", "slabs"};
@@ -294,7 +294,7 @@ static PetscErrorCode refuse(const char *path, PetscErrorCode code, const char *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0: an own mesh. */
+/* Rank 0: writes a mesh in the program's own format. */
 static PetscErrorCode write_mesh(const char *mesh, const char *path)
 {
   SbImport *im;
@@ -306,7 +306,7 @@ static PetscErrorCode write_mesh(const char *mesh, const char *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One array of a file replaced; without dimensions it is gone. */
+/* Replaces one array of a file; ndim 0 removes it. */
 static void replace(const char *path, const char *name, int ndim, const hsize_t size[], hid_t type,
                     const void *data)
 {
@@ -362,7 +362,7 @@ static PetscErrorCode test_damage(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Layout 2 of a cube of six tets around its diagonal from vertex 0 to 7, with two vertices that no tet uses: the rows of both arrays (-1: there is none), and what is wrong with them. */
+/* Layout 2 of a cube of six tets around its diagonal 0-7, with two unused vertices: rows of both arrays (-1: absent), and the expected message. */
 static PetscErrorCode test_curved_damage(void)
 {
   static const struct {
@@ -427,7 +427,7 @@ static PetscErrorCode test_curved_damage(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Cut off anywhere, a file is refused: none is read beyond its end, none is half a mesh. */
+/* A truncated file is refused: no read past its end, no partial mesh. */
 static PetscErrorCode test_truncated(void)
 {
   char path[256], cut[256], index[256], *bytes;

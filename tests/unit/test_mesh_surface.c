@@ -6,7 +6,7 @@
 
 static PetscMPIInt rank;
 
-/* A file made of a surface or a text, read as a body on rank 0, where *here is true; it has been checked. */
+/* Writes a surface or a text to a file and reads it as a measured body on rank 0, where *here is true. */
 static PetscErrorCode import(const char *extension, PetscBool binary, const TestSurface *s, const char *text,
                              const SbTetOptions *options, SbImport *im, SbBody *body, PetscBool *here)
 {
@@ -32,7 +32,7 @@ static PetscErrorCode import(const char *extension, PetscBool binary, const Test
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reading must fail with this text. */
+/* Reading must fail with this message. */
 static PetscErrorCode refuse(const char *extension, const TestSurface *s, const char *text,
                              const SbTetOptions *options, const char *words)
 {
@@ -58,7 +58,7 @@ static PetscErrorCode refuse(const char *extension, const TestSurface *s, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Volume of the tets, or number of triangles, of a group; -1: there is no such group. */
+/* Volume of the tets or number of triangles of a group; -1 if there is no such group. */
 static PetscReal of_group(const SbImport *im, int dim, const char *name)
 {
   PetscReal sum = -1;
@@ -114,7 +114,7 @@ static void turn(TestSurface *s, PetscInt f)
 
 /* ------------------------------------------------------------------ regions and groups */
 
-/* Appends the triangles of a surface to a text as a solid of STL, or as a group of OBJ. */
+/* Appends the triangles first..last-1 of a surface to an STL text as a solid. */
 static void append_solid(const TestSurface *s, PetscInt first, PetscInt last, const char *name, char **text)
 {
   char *grown = (char *)realloc(*text, strlen(*text) + 400 * (size_t)(last - first) + 200);
@@ -134,7 +134,7 @@ static void append_solid(const TestSurface *s, PetscInt first, PetscInt last, co
   (void)sprintf(grown, "endsolid %s\n", name);
 }
 
-/* A sphere in a sphere: solids of an STL text name surfaces and regions, whose volumes are those between the triangles. */
+/* Sphere in a sphere: solids of an STL text name surfaces and regions; a region's volume is that between the surfaces. */
 static PetscErrorCode check_nested(void)
 {
   TestSurface s, outer;
@@ -172,7 +172,7 @@ static PetscErrorCode check_nested(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One box on the other, each with its own copy of the side between them: two regions with a wall; groups of an OBJ. */
+/* Box on a box, each with its own copy of the common face: two regions with an interface; groups of an OBJ. */
 static PetscErrorCode check_wall(void)
 {
   static const char text[] =
@@ -201,7 +201,7 @@ static PetscErrorCode check_wall(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A cavity in a box, with a box in it; the same inverted as a whole. */
+/* Box with a cavity that contains a box; turned: all orientations inverted. */
 static PetscErrorCode check_cavity(PetscBool turned)
 {
   TestSurface s;
@@ -228,7 +228,7 @@ static PetscErrorCode check_cavity(PetscBool turned)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A box with a box in it, told apart by the points of TetGen's file alone; numbers from 0 or 1. */
+/* Box in a box, distinguished only by the region and hole points of TetGen's file; numbers from 0 or 1. */
 static PetscErrorCode check_smesh(PetscInt first, PetscBool hole)
 {
   static const int side[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
@@ -260,7 +260,7 @@ static PetscErrorCode check_smesh(PetscInt first, PetscBool hole)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A box with a square way through it: two facets have a polygon in a polygon and a hole; an L of nine corners around. */
+/* Box with a square through hole: two facets have an inner polygon and a hole point; an L-shaped prism. */
 static PetscErrorCode check_poly(void)
 {
   static const char text[] =
@@ -270,7 +270,7 @@ static PetscErrorCode check_poly(void)
     "2 1 4\n4 5 6 7 8\n4 13 16 15 14\n1 1.5 1.5 1\n1 0 1\n4 1 2 6 5\n1 0 1\n4 2 3 7 6\n1\n4 3 4 8 7\n1\n4 4 "
     "1 5 8\n"
     "1 0 2\n4 9 10 14 13\n1 0 2\n4 10 11 15 14\n1 0 2\n4 11 12 16 15\n1 0 2\n4 12 9 13 16\n0\n";
-  static const char bent[] = /* an L, its two sides not convex */
+  static const char bent[] = /* L-shaped prism with two nonconvex facets */
     "12 3 0 0\n0 0 0 0\n1 2 0 0\n2 2 1 0\n3 1 1 0\n4 1 2 0\n5 0 2 0\n6 0 0 1\n7 2 0 1\n8 2 1 1\n9 1 1 1\n10 "
     "1 2 1\n11 0 2 1\n"
     "8 0\n1\n6 0 1 2 3 4 5\n1\n6 6 7 8 9\n10 11\n1\n4 0 1 7 6\n1\n4 1 2 8 7\n1\n4 2 3 9 8\n1\n4 3 4 10 "
@@ -308,7 +308,7 @@ static void put(char **at, const void *data, int size, PetscBool turned)
   for (int i = 0; i < size; i++) *(*at)++ = ((const char *)data)[turned ? size - 1 - i : i];
 }
 
-/* A cube of six squares with properties that nobody asked for. */
+/* Cube of six squares with properties that the reader ignores. */
 static size_t write_ply(int kind, char text[])
 {
   static const int side[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
@@ -396,9 +396,9 @@ static PetscErrorCode check_ply(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ repaired */
+/* ------------------------------------------------------------------ repaired surfaces */
 
-/* Cubes whose defects are repaired give their volume and say so. */
+/* A cube with repairable defects has this volume and this note. */
 static PetscErrorCode mend(TestSurface *s, const SbTetOptions *options, PetscReal volume, const char *words)
 {
   SbImport im;
@@ -424,7 +424,7 @@ static PetscErrorCode check_mended(void)
   PetscFunctionBeginUser;
   memset(&s, 0, sizeof(s));
   SbTetDefaults(&options);
-  cube_at(0, 1, PETSC_FALSE, &s); /* a corner twice, a little apart */
+  cube_at(0, 1, PETSC_FALSE, &s); /* a duplicate corner, displaced by 1e-6 */
   test_surface_grow(&s, 1, 0);
   for (int k = 0; k < 3; k++) s.x[8][k] = s.x[7][k] + 1e-6;
   s.nvert = 9;
@@ -433,10 +433,10 @@ static PetscErrorCode check_mended(void)
   PetscCall(refuse(".off", &s, NULL, NULL, "triangle 3|-body_b_merge_tolerance 1.9e-06"));
   options.merge_tolerance = 1e-5;
   PetscCall(mend(&s, &options, 1, "vertices joined within 1e-05 m: 1 (by up to 1.7e-06 m)"));
-  cube_at(0, 1, PETSC_FALSE, &s); /* a tolerance that joins everything */
+  cube_at(0, 1, PETSC_FALSE, &s); /* a merge tolerance close to the edge length */
   options.merge_tolerance = 0.9;
   PetscCall(refuse(".off", &s, NULL, &options, "-body_b_merge_tolerance 0.9 m"));
-  test_surface_grow(&s, 1, 2); /* given twice, and a corner twice */
+  test_surface_grow(&s, 1, 2); /* a duplicate triangle, and one with a repeated corner */
   for (int k = 0; k < 3; k++) {
     s.tri[12][k] = s.tri[3][(k + 1) % 3];
     s.tri[13][k] = k / 2;
@@ -444,25 +444,25 @@ static PetscErrorCode check_mended(void)
   s.ntri = 14;
   PetscCall(mend(&s, NULL, 1,
                  "triangles with two corners at one place left out: 1, triangles given twice left out: 1"));
-  cube_at(0, 1, PETSC_FALSE, &s); /* a side cut by a triangle without area */
+  cube_at(0, 1, PETSC_FALSE, &s); /* a face split at an edge, with a triangle of zero area */
   test_surface_grow(&s, 1, 2);
   for (int k = 0; k < 3; k++) s.x[8][k] = 0.5 * (s.x[s.tri[0][0]][k] + s.x[s.tri[0][1]][k]);
   s.nvert = 9;
   for (int k = 0; k < 3; k++) s.tri[12][k] = s.tri[13][k] = s.tri[0][k];
   s.tri[12][1] = 8;
   s.tri[13][0] = 8;
-  s.tri[0][2] = 8; /* 0 1 8 lie on a line */
+  s.tri[0][2] = 8; /* its corners are collinear */
   s.ntri = 14;
   PetscCall(mend(&s, NULL, 1, "triangles without area taken into their neighbours: 1"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ refused */
+/* ------------------------------------------------------------------ refused surfaces */
 
-/* A strip of n squares around z with half a twist; its edge is closed by a second one: a surface with one side. */
+/* Klein bottle of n x m squares: a closed surface with one side. */
 static void one_sided(TestSurface *s)
 {
-  const PetscInt n = 24, m = 12; /* a Klein bottle: tube around a circle, turned over on the way */
+  const PetscInt n = 24, m = 12; /* squares along the circle, around the tube */
 
   test_surface_grow(s, n * m, 2 * n * m);
   for (PetscInt i = 0; i < n; i++) {
@@ -473,7 +473,7 @@ static void one_sided(TestSurface *s)
         3 + PetscCosReal(a / 2) * PetscSinReal(b) - PetscSinReal(a / 2) * PetscSinReal(2 * b);
       const PetscInt j1 = (j + 1) % m, i1 = (i + 1) % n;
       const PetscInt k = i1 ? j : (m - j) % m,
-                     k1 = i1 ? j1 : (m - j1) % m; /* the seam turns the circle over */
+                     k1 = i1 ? j1 : (m - j1) % m; /* the seam reverses the direction around the tube */
       PetscInt *t = s->tri[s->ntri++], *u = s->tri[s->ntri++];
       PetscReal *x = s->x[s->nvert++];
 
@@ -508,25 +508,25 @@ static PetscErrorCode check_refused(void)
   s.ntri = 11;
   PetscCall(refuse(".off", &s, NULL, NULL, "body 'b'|3 edges"));
   clear(&s);
-  cube_at(0, 1, PETSC_FALSE, &s); /* two boxes through each other */
+  cube_at(0, 1, PETSC_FALSE, &s); /* two intersecting boxes */
   cube_at(0.5, 1, PETSC_FALSE, &s);
   PetscCall(refuse(".off", &s, NULL, NULL, "body 'b'|18 pairs|12 of 24"));
   clear(&s);
-  cube_at(0, 1, PETSC_FALSE, &s); /* beside each other, with a common plane but no common corner */
+  cube_at(0, 1, PETSC_FALSE, &s); /* adjacent boxes with a common plane but no common corner */
   test_surface_box((PetscReal[3]){1, 0.25, 0.25}, (PetscReal[3]){2, 0.75, 0.75}, PETSC_FALSE, &s);
   PetscCall(refuse(".off", &s, NULL, NULL, "body 'b'|18 pairs|3 and 13"));
   clear(&s);
-  cube_at(0, 1, PETSC_FALSE, &s); /* two sheets on each other */
+  cube_at(0, 1, PETSC_FALSE, &s); /* two nearly coincident sheets */
   for (int v = 0; v < 8; v++) s.x[v][2] *= 1.5e-10;
   SbTetDefaults(&options);
   options.merge_tolerance = 0;
   PetscCall(refuse(".off", &s, NULL, &options, "body 'b'"));
   clear(&s);
-  for (int i = 0; i < 1001; i++) cube_at(2 * i, 1, PETSC_FALSE, &s); /* specks */
+  for (int i = 0; i < 1001; i++) cube_at(2 * i, 1, PETSC_FALSE, &s); /* separate parts */
   PetscCall(refuse(".off", &s, NULL, NULL, "1001 parts|1000"));
   clear(&s);
   PetscCall(refuse(".obj", NULL, "v 0 0 0\nv 1 0 0\n", NULL, "body 'b'"));
-  /* one side only: it also cuts itself, so that it is asked for its regions alone */
+  /* one side only: the surface also intersects itself, so only the search for regions is called */
   one_sided(&s);
   memset(&mended, 0, sizeof(mended));
   memset(&t, 0, sizeof(t));
@@ -541,7 +541,7 @@ static PetscErrorCode check_refused(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A sphere of many triangles with a small fold is smoothed there; without leave it is refused with its triangles. */
+/* A small fold of a fine sphere is smoothed; if the untangling distance is zero or too small, the surface is refused. */
 static PetscErrorCode check_fold(void)
 {
   SbTetOptions options;

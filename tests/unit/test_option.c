@@ -34,7 +34,7 @@ static const SbOption run_rows[] = {
 
 static SbScope run_scope, body_scope;
 
-/* A fresh database and table; `options` as on a command line, or a file. */
+/* Creates a database with `options` and registers the option tables. */
 static PetscErrorCode begin(const char *options, PetscOptions *database)
 {
   PetscFunctionBeginUser;
@@ -59,7 +59,7 @@ static PetscErrorCode end(PetscOptions *database)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One option with a text that must be refused. */
+/* Reading one option must fail with this message. */
 static PetscErrorCode refused_real(const char *options, const char *key, const char *message)
 {
   PetscOptions database;
@@ -97,7 +97,7 @@ static PetscErrorCode test_refused_numbers(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The ends of an interval that belong to it. */
+/* Values at the ends of intervals. */
 static PetscErrorCode test_ends(void)
 {
   PetscOptions database;
@@ -320,7 +320,7 @@ static PetscErrorCode test_view_text(const char *folder)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* `options` beside two good ones; everything is read but "other"; the check must say `message`. */
+/* Checks `options` beside two valid ones; all but "other" are read; the check fails with `message` (NULL: it succeeds). */
 static PetscErrorCode unread(const char *options, const char *message)
 {
   PetscOptions database;
@@ -347,20 +347,20 @@ static PetscErrorCode test_check(void)
   PetscCall(unread("-integratr 3", "-integratr|-integrator"));
   PetscCall(unread("-body_liver_colour red", "-body_liver_colour|body liver"));
   PetscCall(unread("-body_spleen_mesh a.msh", "-body_spleen_mesh"));
-  /* right, and of no use here: a warning */
+  /* valid but not used by this run: a warning */
   PetscCall(unread("-other 2", NULL));
   PetscCall(unread("-body_liver_yuong 3 -body_liver_yung 4", "-body_liver_yung|-body_liver_young|1"));
   PetscCall(unread("-ksp_rtoll 1e-3", "-ksp_rtoll|-ksp_rtol"));
   PetscCall(unread("-ts_dtt 3", "-ts_dtt|-ts_dt"));
-  /* one of a class without its prefix, or with the first word of a program-wide one */
+  /* option of a class without its prefix, or with the first word of a program-wide option */
   PetscCall(unread("-young 3", "-young|-body_NAME_young"));
   PetscCall(unread("-write_nothing 3", "-write_nothing"));
-  /* not ours: PETSc's, or near nothing */
+  /* PETSc's options, and names that resemble no option */
   PetscCall(unread("-ksp_nothing 1e-3 -frobnicate 2 -ts_view 3 -write_ksp_type cg", NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What a scenario file names and this run does not is right, unless its key is misspelt or no list names it. */
+/* Options of instances that only a scenario file lists are valid, unless the key is misspelt or no list names the instance. */
 static PetscErrorCode test_left_out(const char *folder)
 {
   static const struct {
@@ -393,7 +393,7 @@ static PetscErrorCode test_left_out(const char *folder)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A required option that is missing, with a slip of it in the database: the slip is named. */
+/* A required option is missing and a misspelling of it is in the database: the message names the misspelling. */
 static PetscErrorCode test_missing(void)
 {
   PetscOptions database;
@@ -407,14 +407,14 @@ static PetscErrorCode test_missing(void)
                  "-body_liver_yuong|-body_liver_young");
   SB_CHECK_ERROR(SbOptionNames(&run_scope, "bodies", &n, &names), PETSC_ERR_USER, "-bodis|-bodies");
   PetscCall(end(&database));
-  /* the same key of another instance is no slip */
+  /* the same key of another instance is not a misspelling */
   PetscCall(begin("-body_livre_young 3", &database));
   SB_CHECK_ERROR(SbOptionReal(&body_scope, "young", &x), PETSC_ERR_USER, "-body_liver_young|(0, inf)");
   PetscCall(end(&database));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reading ahead checks, and counts as reading. */
+/* An early check validates a value and counts as reading. */
 static PetscErrorCode test_ahead(void)
 {
   static const char *const keys[] = {"scale", "translate", "tags", "pull", "mesh"};
@@ -438,7 +438,7 @@ static PetscErrorCode test_ahead(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Names with underscores are allowed; two meanings of one full name are not. */
+/* Names with underscores are allowed; an ambiguous full name is an error. */
 static PetscErrorCode test_underscores(void)
 {
   static const SbOption long_rows[] = {

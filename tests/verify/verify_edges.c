@@ -15,7 +15,7 @@
 #include "verify.h"
 
 enum { CONTACTS, DEEPEST, MEAN, NORMAL, FRICTION, WORK, LOSS, GAP, ENERGY, LAG, UNGUARDED, NVALUE };
-enum { ROW = 10, SAMPLES = 6 }; /* of a facet: part, corners; of a side */
+enum { ROW = 10, SAMPLES = 6 }; /* a facet's row: part and corners; sample points per edge */
 
 static PetscErrorCode open_on(MPI_Comm comm, TestScene *t, const char *format, ...)
 {
@@ -30,7 +30,7 @@ static PetscErrorCode open_on(MPI_Comm comm, TestScene *t, const char *format, .
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* History columns of the effect of contact, on every rank. */
+/* History columns of the contact effect, on every rank. */
 static PetscErrorCode contact_values(SbRun run, PetscReal values[NVALUE])
 {
   SbModel m = run->model;
@@ -47,9 +47,9 @@ static PetscErrorCode contact_values(SbRun run, PetscReal values[NVALUE])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ how deep */
+/* ------------------------------------------------------------------ penetration depth */
 
-/* All facets of set 0 of all ranks, where they are: [n][ROW]. */
+/* Facets of set 0 of all ranks in the deformed configuration: [n][ROW]. */
 static PetscErrorCode gather_skin(SbModel m, Vec U, PetscInt *n, PetscReal **all)
 {
   const SbSpace s = m->space;
@@ -101,7 +101,7 @@ static PetscReal solid_angle(const PetscReal p[3], const PetscReal x[9])
                                       SbDot3(r[1], r[2]) * length[0] + SbDot3(r[2], r[0]) * length[1]);
 }
 
-/* How deep a place is inside the surface of a body, 0 outside. */
+/* Penetration depth of a point in the surface of a body, m; 0 outside. */
 static PetscReal depth_at(const PetscReal p[3], PetscReal part, PetscInt n, const PetscReal row[])
 {
   PetscReal angle = 0, nearest = PETSC_MAX_REAL;
@@ -126,7 +126,7 @@ static inline void box_of(const PetscReal x[9], PetscReal box[6])
   }
 }
 
-/* The deepest of many places on the sides of all facets of two bodies in the other one, m. */
+/* Largest penetration depth of the sample points on the facet edges of two bodies in the other body, m. */
 static PetscErrorCode depth_of(SbModel m, Vec U, PetscReal *depth)
 {
   PetscReal *row, body[2][6];
@@ -164,17 +164,17 @@ static PetscErrorCode depth_of(SbModel m, Vec U, PetscReal *depth)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the steps of a run have seen. */
+/* Extreme values over the steps of a run. */
 typedef struct {
-  PetscReal depth, deepest, force; /* by places, by the history, m; largest force, N */
-  PetscReal above;   /* least height of the second body's middle over a vertex of the first, m */
-  PetscReal at[3];   /* rest position of that vertex */
-  PetscReal kinetic; /* at the last step, J */
+  PetscReal depth, deepest, force; /* depth by sample points and by the history, m; largest force, N */
+  PetscReal above;   /* least height of the second body's centre above a vertex of the first, m */
+  PetscReal at[3];   /* reference position of that vertex */
+  PetscReal kinetic; /* kinetic energy of the last step, J */
   PetscInt steps, touching;
-  int linked; /* rings: sum over steps of their linking number */
+  int linked; /* rings: number of steps with linking number 1 */
 } Seen;
 
-/* Height of the middle of the second body over a vertex of the first. */
+/* Height of the second body's centre above a vertex of the first. */
 static PetscErrorCode height_over(SbModel m, Vec U, const PetscReal at[3], PetscReal *height)
 {
   PetscReal sum[2] = {0, 0}, u[3];
@@ -221,7 +221,7 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
   " -body_a_material corotated -body_a_young " young                                          \
   " -body_a_poisson 0.3 -body_a_density 1000 -body_b_material corotated -body_b_young " young \
   " -body_b_poisson 0.3 -body_b_density 1000 "
-/* The ends of the lower bar are constrained, those of the upper one guided. */
+/* The ends of the lower bar are fixed, those of the upper one are guided vertically. */
 #define ENDS                                                                                                \
   "-sets skin,a0,a1,b0,b1 -set_skin_at boundary -set_a0_at plane:1,0,0,0 -set_a1_at plane:1,0,0,0.21 "      \
   "-set_b0_at plane:0,1,0,-0.105 -set_b1_at plane:0,1,0,0.105 -effect_a0_type fixed -effect_a0_on a0 "      \
@@ -234,7 +234,7 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
   "0.02 -effect_calm_alpha 5 -time euler_implicit -ts_dt 0.01 -ts_max_time 0.5 -ksp_rtol 1e-10 -snes_rtol " \
   "1e-8 " LAWS("1e5") ENDS
 
-/* On the ranks of comm; the last depth, force and displacement of the middle of the upper bar. */
+/* Solves on the ranks of comm; returns the last history values and the displacement of the centre of the upper bar. */
 static PetscErrorCode lay_bars(MPI_Comm comm, const char *more, Seen *seen, PetscReal values[NVALUE],
                                PetscReal u[3])
 {
@@ -252,7 +252,7 @@ static PetscErrorCode lay_bars(MPI_Comm comm, const char *more, Seen *seen, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* With one cell in the section the edges of CR and DG slope where they meet: the force has a part that the guides take. */
+/* With one cell in the section the edges of CR and DG are inclined at the contact: the guides take part of the force. */
 static PetscErrorCode check_bars(const char *more, PetscReal tolerance)
 {
   const PetscReal weight = 0.21 * 0.03 * 0.03 * 1000 * 9.81;
@@ -283,7 +283,7 @@ static PetscErrorCode check_bars(const char *more, PetscReal tolerance)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Thin bars, so fast that one would be past the other within a step: by more than the thickness of both, in the first. */
+/* Thin bars that would pass each other by more than their thicknesses within the first step. */
 static PetscErrorCode check_fast(void)
 {
   Seen seen = {.above = PETSC_MAX_REAL, .at = {0.09, 0, 0.0084853}};
@@ -348,15 +348,15 @@ static PetscErrorCode check_box(const char *what, const char *turn, PetscReal mo
 /* ------------------------------------------------------------------ rings */
 
 #define SEGMENTS 12
-#define RADIUS 0.1 /* m, of the middle line at the vertices */
-#define TUBE 0.02  /* m, half the diagonal of the square section, which stands on an edge */
+#define RADIUS 0.1 /* radius of the centre line at the vertices, m */
+#define TUBE 0.02  /* half the diagonal of the square section, which stands on an edge, m */
 
-/* A ring in the plane z = 0 as a gmsh file; segment 0 lies symmetric to the x axis. Collective. */
+/* Writes a ring in the plane z = 0 as a gmsh file; segment 0 is symmetric to the x axis. Collective. */
 static PetscErrorCode write_ring(char path[512])
 {
   static const int ways[6][4] = {{0, 1, 3, 7}, {0, 2, 6, 7}, {0, 4, 5, 7},
                                  {0, 1, 5, 7}, {0, 2, 3, 7}, {0, 4, 6, 7}};
-  const PetscReal corner[4][2] = {{-TUBE, 0}, {0, -TUBE}, {0, TUBE}, {TUBE, 0}}; /* outwards, along z */
+  const PetscReal corner[4][2] = {{-TUBE, 0}, {0, -TUBE}, {0, TUBE}, {TUBE, 0}}; /* radial, axial */
   FILE *f;
 
   PetscFunctionBeginUser;
@@ -392,7 +392,7 @@ static PetscErrorCode write_ring(char path[512])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The middle of each section of both rings, from the vertices by their original numbers. */
+/* Centre of each section of both rings, from the vertices by their original numbers. */
 static PetscErrorCode middle_lines(SbModel m, Vec U, PetscReal line[2][SEGMENTS][3])
 {
   const SbSpace s = m->space;
@@ -411,7 +411,7 @@ static PetscErrorCode middle_lines(SbModel m, Vec U, PetscReal line[2][SEGMENTS]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Linking number of two closed polygons: solid angles of the four-cornered surfaces b - a over all pairs of segments, by 4 pi. */
+/* Linking number of two closed polygons: sum over all pairs of segments of the solid angle of the quadrilateral b - a, over 4 pi. */
 static PetscReal linking(PetscReal line[2][SEGMENTS][3])
 {
   const PetscReal origin[3] = {0, 0, 0};
@@ -449,7 +449,7 @@ static PetscErrorCode watch_rings(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The second ring stands upright in the first and is pulled away along x, the first one being constrained at its far side. */
+/* The second ring is perpendicular to the first and is pulled along x; the first ring is fixed at its far side. */
 static PetscErrorCode check_rings(PetscReal most)
 {
   const PetscReal inner = (RADIUS - TUBE) * PetscCosReal(PETSC_PI / SEGMENTS), away = 2 * inner - 0.002;

@@ -26,7 +26,7 @@ typedef struct {
   PetscReal nu;
 } Case;
 
-/* Stress of the continuum at a rest position, Pa. */
+/* Stress of the continuum at a reference position, Pa. */
 typedef void (*Exact)(PetscReal nu, const PetscReal x[3], PetscReal S[9]);
 
 static void exact_cube(PetscReal nu, const PetscReal x[3], PetscReal S[9])
@@ -47,7 +47,7 @@ static void exact_shell(PetscReal nu, const PetscReal x[3], PetscReal S[9])
   for (int k = 0; k < 9; k++) S[k] = (k % 4 == 0) * hoop + (radial - hoop) * x[k / 3] * x[k % 3] / (r * r);
 }
 
-/* Rod of length 1, E = 1, rho = 1, nu = 0, the end x = 0 held: u_x = (1 - cos(k t)) sin(k x), k = pi/2, at k t = pi. */
+/* Rod of length 1, E = 1, rho = 1, nu = 0, fixed at x = 0: u_x = (1 - cos(k t)) sin(k x), k = pi/2, at k t = pi. */
 static void exact_wave(PetscReal nu, const PetscReal x[3], PetscReal S[9])
 {
   (void)nu;
@@ -55,7 +55,7 @@ static void exact_wave(PetscReal nu, const PetscReal x[3], PetscReal S[9])
   S[0] = PETSC_PI * PetscCosReal(0.5 * PETSC_PI * x[0]);
 }
 
-/* Energy of the deviator of the symmetric part of R^T T (R NULL: of T), J/m^3; its trace, of which trace^2 / (18 K) is the rest. */
+/* Deviatoric energy density of the symmetric part of R^T T (R NULL: of T), J/m^3; *trace: its trace, with the volumetric energy density trace^2 / (18 K). */
 static PetscReal energy(SbMaterial m, const PetscReal R[9], const PetscReal T[9], PetscReal *trace)
 {
   PetscReal s[9], square = 0.;
@@ -69,14 +69,14 @@ static PetscReal energy(SbMaterial m, const PetscReal R[9], const PetscReal T[9]
   return (square - *trace * *trace / 3.) / (4. * m->ops.shear_modulus(m));
 }
 
-/* Stresses of a solved run, linear in each cell: of P2 deviators are, and the pressure is constant. */
+/* Stresses of a solved run, linear in each cell; for P2 the deviator is linear and the pressure is constant. */
 typedef struct {
-  PetscInt n, npoint;    /* cells; points of each, for sums */
+  PetscInt n, npoint;    /* number of cells; sample points per cell for the sums */
   PetscReal *V;          /* [n] volumes, m^3 */
-  PetscReal (*x)[4][3];  /* [n] points, m */
-  PetscReal (*P)[4][9];  /* [n] at these */
-  PetscReal (*at)[4][9]; /* [n] at the vertices */
-  PetscReal *R;          /* [n][9] */
+  PetscReal (*x)[4][3];  /* [n] coordinates of the sample points, m */
+  PetscReal (*P)[4][9];  /* [n] Piola stresses at the sample points, Pa */
+  PetscReal (*at)[4][9]; /* [n] Piola stresses at the vertices, Pa */
+  PetscReal *R;          /* [n][9] rotations */
   PetscInt *material;
 } Stress;
 
@@ -131,7 +131,7 @@ static PetscErrorCode stress_free(Stress *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* S less the stress of a cell where its barycentric coordinates are b. */
+/* Subtracts from S the stress of a cell at barycentric coordinates b. */
 static void subtract(const Stress *s, PetscInt cell, const PetscReal b[4], PetscReal S[9])
 {
   for (int a = 0; a < 4; a++) {
@@ -140,7 +140,7 @@ static void subtract(const Stress *s, PetscInt cell, const PetscReal b[4], Petsc
 }
 
 /*
-  The energies of differences, summed up: of the pressure those of its means in a cell for P2, else of all of it. weight, trace[ncell].
+  Sum of the energies of stress differences. P2: the pressure energy is that of the mean pressure of a cell. weight, trace[ncell].
 */
 typedef struct {
   PetscReal error2, *weight, *trace;
@@ -171,7 +171,7 @@ static PetscReal sum_end(SbModel m, const Stress *s, Sum *sum)
   return sum->error2;
 }
 
-/* Square of the error against an exact stress. */
+/* Squared error against an exact stress. */
 static PetscErrorCode exact_error(SbModel m, Vec U, PetscReal nu, Exact exact, PetscReal *error2)
 {
   PetscReal b[14][4], w[14];
@@ -202,7 +202,7 @@ static PetscErrorCode exact_error(SbModel m, Vec U, PetscReal nu, Exact exact, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Square of the error against the stresses of a finer mesh at its points. */
+/* Squared error against the stresses of a finer mesh at its sample points. */
 static PetscErrorCode finer_error(SbModel m, Vec U, const Stress *fine, PetscReal *error2)
 {
   SbMesh mesh = m->mesh;
@@ -227,7 +227,7 @@ static PetscErrorCode finer_error(SbModel m, Vec U, const Stress *fine, PetscRea
     PetscReal best = -PETSC_MAX_REAL, S[9], at_b[4] = {0.};
     PetscInt at = 0;
 
-    /* the cell that it lies in, or nearly so where surfaces are not the same */
+    /* the cell that contains the point, or the nearest one where the surfaces of the meshes differ */
     for (PetscInt c = 0; c < s.n && best < 0.; c++) {
       PetscReal d[3], b[4], least = 0.;
 
@@ -252,7 +252,7 @@ static PetscErrorCode finer_error(SbModel m, Vec U, const Stress *fine, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* sum over inner faces of h |F| |[P N]|^2 / mu, h |F| the mean of the two volumes; without the constant. */
+/* Sum over interior faces of h |F| |[P N]|^2 / mu, with h |F| the mean of the two volumes; without the constant c. */
 static PetscErrorCode jump_estimate(SbModel m, Vec U, PetscReal *eta2)
 {
   SbMesh mesh = m->mesh;
@@ -285,10 +285,10 @@ static PetscErrorCode jump_estimate(SbModel m, Vec U, PetscReal *eta2)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One row of the table. */
+/* Prints and checks one row of the table. */
 static PetscErrorCode report(const Case *c, TestScene *t, PetscReal error2)
 {
-  const PetscReal jump = 0.143; /* c */
+  const PetscReal jump = 0.143; /* constant c of the estimator */
   const PetscBool stiff = (PetscBool)!strcmp(c->element, "p1");
   SbRun run = t->run;
   SbSpaceEstimate est;
@@ -384,9 +384,9 @@ static PetscErrorCode check_wave(const char *element, PetscInt n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ problems with a finer mesh */
+/* ------------------------------------------------------------------ problems with a reference on a finer mesh */
 
-/* A box of shape[3] n cells and this size, bent by `map` if not NULL; `options` of the scene. */
+/* Box of shape[3] n cells and the given size, deformed by `map` if not NULL; `options` of the scene. */
 typedef struct {
   const char *name, *options;
   PetscInt shape[3];
@@ -418,7 +418,7 @@ static PetscErrorCode open_problem(const Problem *p, const Case *c, TestScene *t
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* `cases` end with one without an element; `fine` is what they are compared with, its nu that of all. */
+/* `cases` ends with an entry without an element; `fine` is the reference mesh; nu applies to all of them. */
 static PetscErrorCode check_finer(const Problem *p, PetscReal nu, Case fine, const Case cases[])
 {
   Stress stress;
@@ -442,7 +442,7 @@ static PetscErrorCode check_finer(const Problem *p, PetscReal nu, Case fine, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A regular box. */
+/* Map of a regular box. */
 static void straight_map(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
 {
   const PetscReal *size = (const PetscReal *)ctx;
@@ -452,7 +452,7 @@ static void straight_map(const PetscInt n[3], const PetscInt at[3], PetscReal x[
   for (int k = 0; k < 3; k++) x[k] *= size[k];
 }
 
-/* Cells grow with the distance from the corner (0, 0, 0), which is on top. */
+/* Map of a graded mesh: cells grow with the distance from the corner (0, 0, 0) in the top face. */
 static void sphere_map(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
 {
   (void)n;
@@ -496,7 +496,7 @@ static PetscErrorCode check_bars(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Cook's membrane, plane strain. */
+/* Map of Cook's membrane, plane strain. */
 static void cook_map(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
 {
   const PetscReal low = 44. * x[0], high = 44. + 16. * x[0];
@@ -551,7 +551,7 @@ static PetscErrorCode check_squeeze(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* law: with its options and the weight in m/s^2. */
+/* law: material model and its options, with the weight in m/s^2. */
 static PetscErrorCode check_turned(const char *name, const char *law)
 {
   static const Case cases[] = {{.element = "p1", .n = 2}, {.element = "cr", .n = 2}, {.element = NULL}};
@@ -566,7 +566,7 @@ static PetscErrorCode check_turned(const char *name, const char *law)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Radius of the sphere 1 m, depth 0.01 m: by Hertz the radius of contact is 0.1 m, two or four cells. */
+/* Radius of the sphere 1 m, indentation 0.01 m: the contact radius by Hertz is 0.1 m, two or four cells. */
 static PetscErrorCode check_sphere(void)
 {
   static const Problem sphere = {
