@@ -25,7 +25,7 @@ static void make_cells(SbElement e, PetscReal size, Cells *c)
   }
 }
 
-/* u = (A - I) X + b, another A and b in each lane. */
+/* u = (A - I) X + b, with different A and b in each lane. */
 static void affine(const Cells *c, const SbPack A[9], const SbPack b[3], SbPack u[12])
 {
   for (int l = 0; l < SB_BATCH; l++) {
@@ -142,7 +142,7 @@ static PetscReal entry(const SbPack K[10][9], int row, int column, int l)
   return NAN;
 }
 
-/* Blocks of a row sum to zero; diagonal blocks are symmetric to the last bit. */
+/* Blocks of a row sum to zero; diagonal blocks are bitwise symmetric. */
 static void check_block_sums(const SbPack K[10][9], PetscReal scale)
 {
   static const int diagonal[4] = {0, 4, 7, 9};
@@ -165,7 +165,7 @@ static void check_block_sums(const SbPack K[10][9], PetscReal scale)
   }
 }
 
-/* Exact tangents: blocks against central differences of the force. exact_spd: the special form against the general. */
+/* Exact tangents: blocks against central differences of the force. exact_spd: the specialised form against the general one. */
 static PetscErrorCode test_blocks(SbElement e, SbMaterial m, SbTangentKind kind)
 {
   const PetscReal size = 0.01, h = 1e-5 * size;
@@ -275,7 +275,7 @@ static PetscErrorCode test_warped(SbElement e, SbMaterial m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* No force after any rotation and translation, in steps of 15 degrees. */
+/* Zero force after any rotation and translation, in steps of 15 degrees. */
 static void test_rotation(SbElement e, SbMaterial m)
 {
   const PetscReal axis[3] = {1, 2, 3};
@@ -300,7 +300,7 @@ static void test_rotation(SbElement e, SbMaterial m)
 }
 
 /*
-  Patch: the unit cube cut into twelve tets around an inner point that is off the centre. Under constant strain the inner
+  Patch test: the unit cube cut into twelve tets around an off-centre interior point. Under constant strain the interior
   point is in equilibrium, and the forces on the corners sum to zero and to the virial sum_a f_a X_a^T = V P.
 */
 static void test_patch(SbElement e, SbMaterial m)
@@ -354,7 +354,7 @@ static void test_patch(SbElement e, SbMaterial m)
   }
 }
 
-/* Same cell in every lane among others: same bits. */
+/* The same cell in several lanes, among others, gives bitwise the same result. */
 static void test_lanes(SbElement e)
 {
   Cells c;

@@ -5,7 +5,7 @@
 
 static char dir[PETSC_MAX_PATH_LEN];
 
-/* Opens what the run wrote; the caller closes. */
+/* Opens the fields.h5 of the run; the caller closes it. */
 static PetscErrorCode open_fields(SbH5 *h)
 {
   char path[PETSC_MAX_PATH_LEN];
@@ -18,7 +18,7 @@ static PetscErrorCode open_fields(SbH5 *h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Vertex fields against the formula at the rest positions of the same file; cell fields against the constant state. */
+/* Vertex fields against the formula at the reference positions in the file; cell fields against the constant state. */
 static PetscErrorCode check_values(SbOutput out, SbH5 *h, const char *group, PetscReal t, PetscReal tolerance)
 {
   const PetscReal mu = 400., lambda = 400.;                            // E = 1000, nu = 1/4
@@ -70,7 +70,7 @@ static PetscErrorCode check_values(SbOutput out, SbH5 *h, const char *group, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cells of the file, by their numbers in the file's vertices, fill the box; each belongs to body 0 or 1. */
+/* The cells of the file, by its vertex numbers, fill the box; each belongs to body 0 or 1. */
 static PetscErrorCode check_mesh(SbOutput out, SbH5 *h, PetscReal volume)
 {
   const PetscInt nvert = out->vertex.N;
@@ -144,7 +144,7 @@ static PetscErrorCode test_values(const char *precision, PetscReal tolerance)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The reaction is the residual on held vertices and zero elsewhere. */
+/* The reaction is the residual at constrained vertices and zero elsewhere. */
 static PetscErrorCode test_reaction(void)
 {
   TestScene scene;
@@ -172,7 +172,7 @@ static PetscErrorCode test_reaction(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets are 1 at their points, and in their tets when they hold some; with points of the cells, too. */
+/* The field of a set is 1 at its points, and in its tets if it has any; also with separate points per cell. */
 static PetscErrorCode check_sets(const char *more)
 {
   TestScene scene;
@@ -241,7 +241,7 @@ static PetscErrorCode test_two_bodies(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Which of the steps 0..n are frames. */
+/* Marks which of the steps 0..n are frames. */
 static PetscErrorCode frames_of(const char *more, PetscInt n, PetscReal dt, char frames[])
 {
   TestScene scene;
@@ -270,8 +270,8 @@ static PetscErrorCode test_which_frames(void)
     const char *frames;
   } cases[] = {
     {"", 0.1, "11111111111"},
-    {"-output_every_steps 4", 0.1, "10001000101"}, // the last step always
-    {"-output_every 0.3", 0.1, "10010010011"},     // 3 * 0.1 is above 0.3 by rounding
+    {"-output_every_steps 4", 0.1, "10001000101"}, // the last step is always a frame
+    {"-output_every 0.3", 0.1, "10010010011"},     // 3 * 0.1 exceeds 0.3 by rounding
     {"-output_every 0.25", 0.1, "10010100101"},    // the first step at or after each multiple
     {"-output_every 0.01", 0.1, "11111111111"},    // shorter than a step: every step, once
   };
@@ -286,7 +286,7 @@ static PetscErrorCode test_which_frames(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Address and size of the header of a group in the file. */
+/* Address and size of the object header of a group in the file. */
 static void header_of(hid_t file, const char *name, unsigned long *address, unsigned long *size)
 {
   H5O_info_t info;
@@ -312,7 +312,7 @@ static void header_of(hid_t file, const char *name, unsigned long *address, unsi
   (void)H5Oclose(group);
 }
 
-/* More than a hundred frames; each hundred has its links within one page of the file, so that a name appears at once. */
+/* More than a hundred frames; the links of each hundred fit in one page of the file, so that a name is added atomically. */
 static PetscErrorCode test_hundreds(void)
 {
   TestScene scene;
@@ -344,7 +344,7 @@ static PetscErrorCode test_hundreds(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A run to step 6 that is taken up again at the checkpoint of step 4. */
+/* A run to step 6 that is restarted from the checkpoint of step 4. */
 static PetscErrorCode test_restart(void)
 {
   TestScene scene;

@@ -14,7 +14,7 @@
 #define CLAMPED "-effects gravity,clamp -effect_clamp_type fixed -effect_clamp_on xmin "
 #define STATIC "-time static "
 
-/* ------------------------------------------------------------------ laws */
+/* ------------------------------------------------------------------ materials */
 
 /* theta (sbmaterial.h) of s F, the same in each lane. */
 static PetscReal volume_measure(SbMaterial m, const PetscReal f[9], PetscReal scale, SbPack F[9])
@@ -28,7 +28,7 @@ static PetscReal volume_measure(SbMaterial m, const PetscReal f[9], PetscReal sc
   return -p[0] / m->ops.volumetric_modulus(m);
 }
 
-/* dP/dF - lambda D D^T at a state whose theta vanishes, over mu. */
+/* dP/dF - lambda D D^T at a state with theta = 0, divided by mu. */
 static PetscErrorCode rest_of_tangent(const char *law, PetscReal nu, const PetscReal f[9], PetscReal rest[81])
 {
   const PetscReal mu = 1e4;
@@ -55,7 +55,7 @@ static PetscErrorCode rest_of_tangent(const char *law, PetscReal nu, const Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where nothing changes its volume, all that depends on lambda is lambda D D^T. */
+/* At isochoric states all that depends on lambda is lambda D D^T. */
 static PetscErrorCode test_laws(void)
 {
   static const char *laws[] = {"linear", "corotated", "stvk", "neohookean"};
@@ -71,14 +71,14 @@ static PetscErrorCode test_laws(void)
       difference = PetscMax(difference, PetscAbsReal(soft[k] - hard[k]));
       largest = PetscMax(largest, PetscAbsReal(soft[k]));
     }
-    /* lambda / mu is 5e5, and so is the loss of digits of the difference and of theta = 0 */
+    /* lambda / mu is 5e5: the difference and theta = 0 lose as many digits */
     SB_CHECK(difference < 1e-8 && largest > 0.5 && largest < 10., "%s: %g differ, largest %g", laws[n],
              (double)difference, (double)largest);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ the operator */
+/* ------------------------------------------------------------------ operator */
 
 static PetscErrorCode assemble(SbSpace s, const SbStage *like, Vec U, Mat A)
 {
@@ -92,7 +92,7 @@ static PetscErrorCode assemble(SbSpace s, const SbStage *like, Vec U, Mat A)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Random, zero on prescribed unknowns. */
+/* Random vector, zero at prescribed unknowns. */
 static PetscErrorCode random_free(SbSpace s, PetscRandom random, PetscReal size, Vec x)
 {
   PetscScalar *v;
@@ -108,7 +108,7 @@ static PetscErrorCode random_free(SbSpace s, PetscRandom random, PetscReal size,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* K x of the operator and of the matrix, and the symmetry of what stands for A^-1. */
+/* K x by the operator and by the matrix; symmetry of the approximation of A^-1. */
 static PetscErrorCode test_operator(const char *options, PetscReal amplitude, const SbStage *stage)
 {
   PetscReal norm, error, tolerance = 1e-9;
@@ -154,7 +154,7 @@ static PetscErrorCode test_operator(const char *options, PetscReal amplitude, co
   PetscCall(VecDot(x, Ax, &xMy));
   PetscCall(VecDot(y, Kx, &yMx));
   PetscCall(VecDot(x, Kx, &xMx));
-  /* of a DG cell that only touches this rank's cells with a vertex, not all neighbours are here: its strain is not quite the same */
+  /* a rank lacks some neighbours of a DG cell that shares only a vertex with its own cells: the strain there differs slightly */
   PetscCallMPI(MPI_Comm_size(s->comm, &size));
   if (size > 1 && s->width > 4 && amplitude > 0.) tolerance = 1e-3;
   SB_CHECK(xMx > 0. && PetscAbsReal(xMy - yMx) < tolerance * xMx, "%s: x M x = %g, x M y = %g, y M x = %g",
@@ -218,7 +218,7 @@ static PetscErrorCode run_scene(const char *options, const char *solver, Result 
   PC pc;
 
   PetscFunctionBeginUser;
-  /* a method of the user's is not replaced when it fails */
+  /* a method that the user has chosen is not replaced when it fails */
   PetscCall(PetscSNPrintf(text, sizeof(text), "%s -solver %s%s", options, solver,
                           strcmp(solver, "pressure") ? "" : " -ksp_type richardson"));
   PetscCall(test_scene_open(text, &scene));
@@ -234,7 +234,7 @@ static PetscErrorCode run_scene(const char *options, const char *solver, Result 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same scene with this solver and with a factorisation. */
+/* Solves a scene with this solver and with a factorisation. */
 static PetscErrorCode test_solution(const char *options, PetscInt bound, PetscReal tolerance)
 {
   Result iterative, direct;
@@ -256,7 +256,7 @@ static PetscErrorCode test_solution(const char *options, PetscInt bound, PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Linear bars; measured: 39, 63 and 68 iterations at most. */
+/* Linear bars; at most 39, 63 and 68 iterations were measured. */
 static PetscErrorCode test_bounds(void)
 {
   static const char *element[] = {"cr", "dg", "p2"}, *nu[] = {"0.3", "0.4999", "0.499999"},
@@ -273,15 +273,15 @@ static PetscErrorCode test_bounds(void)
                     "-body_bar_young 1e6 -body_bar_density 1000 -body_bar_element %s -body_bar_poisson %s "
                     "-effects gravity,clamp -effect_clamp_type fixed -effect_clamp_on xmin " STATIC,
                     cells[k / 9], element[k / 3 % 3], nu[k % 3]));
-    /* relative residuals of 1e-8 times the condition of the bar, above all in bending; at 0.499999 factorisations of the same
-       matrix differ by 1e-5 among themselves */
+    /* relative residuals of 1e-8 times the condition number of the bar, largest in bending; at 0.499999 factorisations of the
+       same matrix differ by 1e-5 */
     PetscCall(test_solution(options, bound[k % 3], k % 3 == 2 ? 1e-4 : 1e-6));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A cube with a half of lambda = 5e6 mu pulled between smooth walls: the first corrections do not help, because GMRES's norm
-   bounds lambda; with a smaller margin they do. Measured: 98 iterations at most. */
+/* A cube, half of it with lambda = 5e6 mu, pulled between smooth walls: the first corrections do not help, because GMRES's norm
+   bounds lambda; with a smaller safety factor they do. At most 98 iterations were measured. */
 static PetscErrorCode test_contrast(void)
 {
   static const char *element[] = {"cr", "dg"};
@@ -308,7 +308,7 @@ static PetscErrorCode test_contrast(void)
 static PetscErrorCode test_scenes(void)
 {
   PetscFunctionBeginUser;
-  /* large displacements, a load with a tangent of its own, at a free rim beside the matrix: solved to 1e-6, 86 iterations */
+  /* large displacements; the boundary term of the load's tangent is outside the matrix: solved to 1e-6, 86 iterations */
   PetscCall(test_solution(
     "-bodies one " BODY(
       "one", "box:0.3,0.1,0.1:2", "neohookean", "dg",
@@ -320,12 +320,12 @@ static PetscErrorCode test_scenes(void)
                                               "-body_one_poisson 0.4999 -body_one_tangent exact ")
                             CLAMPED STATIC "-body_one_young 5e5 ",
                           80, 1e-5));
-  /* in time */
+  /* time-dependent */
   PetscCall(
     test_solution("-bodies one " BODY("one", "box:0.3,0.1,0.1:2", "stvk", "dg", "-body_one_poisson 0.499 ")
                     CLAMPED "-time newmark -ts_dt 0.01 -ts_max_time 0.05",
                   80, 1e-5));
-  /* several bodies, all elements; P1 at its ease */
+  /* several bodies, all elements; P1 with moderate nu */
   PetscCall(
     test_solution("-bodies a,b,c " BODY("a", "box:0.2,0.1,0.1:3", "linear", "p1", "-body_a_poisson 0.3 ")
                     BODY("b", "box:0.2,0.1,0.1:3", "linear", "cr", "-body_b_poisson 0.4999 ")
@@ -334,8 +334,8 @@ static PetscErrorCode test_scenes(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Columns on springs of a contact, without which they could move along z; two touch the floor, one at an edge only. Measured: 52
-   iterations at most. */
+/* Columns on contact springs, without which they are free to move along z; two touch the floor, one along an edge only. At most 52
+   iterations were measured. */
 static PetscErrorCode test_springs(void)
 {
   static const char *element[] = {"cr", "dg", "p2"}, *floor[] = {"plane:0,0,1,0.001", "plane:0.02,0,1,0.001"};
@@ -371,13 +371,13 @@ static PetscErrorCode test_failures(void)
               "pressure", &r));
   SB_CHECK(!r.ok && r.its == 7, "7 iterations are enough, or %d were done", (int)r.its);
   PetscCall(VecDestroy(&r.U));
-  /* constrained at the middles of two faces, it may turn about the line through them: the residual is less than rounding explains */
+  /* fixed at the centres of two faces, the body is free to turn about the line through them: the residual is less than rounding explains */
   PetscCall(run_scene("-bodies one " BODY("one", "box:1,1,1:1", "linear", "cr", "-body_one_poisson 0.4999 ")
                         CLAMPED STATIC "-pressure_coarse_pc_type redundant -time_max_halvings 0",
                       "pressure", &r));
   SB_CHECK(!r.ok, "a singular matrix passes");
   PetscCall(VecDestroy(&r.U));
-  /* a diagonal block that is not positive fails the solve, not the program */
+  /* a diagonal block that is not positive definite fails the solve, not the program */
   PetscCall(
     run_scene("-bodies one " BODY("one", "box:1,1,1:1", "neohookean", "cr", "-body_one_poisson 0.4999 ")
                 CLAMPED STATIC "-body_one_young 1e6 -time_max_halvings 10",

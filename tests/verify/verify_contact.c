@@ -78,7 +78,7 @@ static PetscErrorCode check_fall(const char *element, const char *response)
                        "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_response %s -time euler_implicit "
                        "-ts_dt 0.005 -ts_max_time 0.25 -snes_rtol 1e-11 -ksp_rtol 1e-10",
     element, response));
-  /* 0.5 J of kinetic energy and weight at the start; 0.7 kg m/s on impact */
+  /* kinetic and potential energy 0.5 J at the start; momentum 0.7 kg m/s at impact */
   VERIFY_LESS(record_gain(&r, "energy"), 1e-7, "largest gain of a step, J");
   VERIFY_LESS(record_max(&r, "missing"), 1e-7, "momentum that no force explains, kg m/s");
   VERIFY_MORE(record_impulse(&r, "floor_force_z"), 1, "impulse of the floor, N s");
@@ -94,7 +94,7 @@ static PetscErrorCode check_incline(const char *element, const char *response, P
 {
   static const PetscReal time[2] = {0.3, 0.6};
   const PetscReal normal = 9.81 * 2 / PetscSqrtReal(5), a = normal * (0.5 - mu);
-  PetscReal t[2] = {0}, v[2], x[2], h, way; /* of the centre along the slope */
+  PetscReal t[2] = {0}, v[2], x[2], h, way; /* of the centroid along the slope */
   Record r = {0};
 
   PetscFunctionBeginUser;
@@ -119,7 +119,7 @@ static PetscErrorCode check_incline(const char *element, const char *response, P
   }
   h = t[1] - t[0];
   way = x[1] - x[0];
-  /* with the N of the solve before it took 540 to 910 where it slides */
+  /* solves that take N from the previous solve needed 540 to 910 when the block slides */
   VERIFY_LESS(r.newton, 7 * 60, "solves for 60 steps");
   if (mu > 0.5) {
     VERIFY_NEAR(way, 0, 1e-8, "motion of a block that sticks, m");
@@ -133,11 +133,11 @@ static PetscErrorCode check_incline(const char *element, const char *response, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ held */
+/* ------------------------------------------------------------------ static friction */
 
 static PetscErrorCode check_held(const char *response)
 {
-  const PetscReal load = 100 * 0.1 * 0.05; /* of a weight of 4.9 N, friction could hold 1.47 N */
+  const PetscReal load = 100 * 0.1 * 0.05; /* N; the weight is 4.9 N, so the friction limit is 1.47 N */
   Record r = {0};
 
   PetscFunctionBeginUser;
@@ -160,7 +160,7 @@ static PetscErrorCode check_held(const char *response)
 
 /* ------------------------------------------------------------------ corner */
 
-/* Nodes of the edge between touch both: what holds them must not take from each other's force. */
+/* Nodes on the common edge are in contact with both planes: friction with one must not reduce the force of the other. */
 static PetscErrorCode check_corner(const char *response)
 {
   const PetscReal push[3] = {-5, 6, -8}, mu = 0.3, a = push[1] + mu * (push[0] + push[2]), end = 0.3;
@@ -194,7 +194,7 @@ static PetscErrorCode check_corner(const char *response)
 #define INDENT_STEPS 20
 #define INDENT_DT 0.02 /* s */
 
-/* Force of the tool, N, at the ends of the steps [INDENT_STEPS + 1][3]; the bound of the solves. */
+/* Force of the indenter, N, at the ends of the steps [INDENT_STEPS + 1][3]; at most `most` linear solves. */
 static PetscErrorCode indent(const char *response, const char *more, PetscInt most, PetscReal force[][3])
 {
   static const char *const columns[3] = {"tool_force_x", "tool_force_y", "tool_force_z"};
@@ -212,14 +212,14 @@ static PetscErrorCode indent(const char *response, const char *more, PetscInt mo
                        "0.02*ramp(t/0.2-1);0;-0.01*ramp(t/0.2) -effect_tool_response %s "
                        "-effect_tool_friction 0.3 -time euler_implicit -ts_dt %g -ts_max_time 0.4 %s",
     response, INDENT_DT, more));
-  /* with the N of the solve before it took 1700 to 2400 */
+  /* solves that take N from the previous solve needed 1700 to 2400 */
   VERIFY_LESS(r.newton, most, "solves");
   PetscCall(PetscArrayzero(force[0], 3 * (INDENT_STEPS + 1)));
   for (PetscInt i = 1; i < r.n; i++) {
     const PetscReal step = record_at(&r, "t", i) / INDENT_DT;
     const PetscInt at = (PetscInt)PetscFloorReal(step + 0.5);
 
-    if (PetscAbsReal(step - (PetscReal)at) > 1e-7) continue; /* cut */
+    if (PetscAbsReal(step - (PetscReal)at) > 1e-7) continue; /* a substep */
     for (int k = 0; k < 3; k++) force[at][k] = record_at(&r, columns[k], i);
   }
   PetscCall(record_free(&r));
@@ -274,7 +274,7 @@ static PetscErrorCode vi_jacobian(SNES snes, Vec U, Mat A, Mat P, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same beam without contact, u_z bounded from below. */
+/* Solves the same beam without contact, u_z bounded from below. */
 static PetscErrorCode solve_bounded(SbModel m, Mat A, PetscReal floor, Vec U)
 {
   PetscScalar *low;
@@ -310,7 +310,7 @@ static PetscErrorCode solve_bounded(SbModel m, Mat A, PetscReal floor, Vec U)
   PetscCall(PCSetType(pc, PCJACOBI));
   PetscCall(KSPSetTolerances(ksp, 1e-13, 1e-14, PETSC_DEFAULT, 10000));
   PetscCall(SNESSetOptionsPrefix(snes, "vi_"));
-  PetscCall(PetscOptionsSetValue(NULL, "-vi_snes_vi_zero_tolerance", "1e-9")); /* m: what lies on a bound */
+  PetscCall(PetscOptionsSetValue(NULL, "-vi_snes_vi_zero_tolerance", "1e-9")); /* m: active bounds */
   PetscCall(SNESSetFromOptions(snes));
   PetscCall(SNESSolve(snes, NULL, U));
   PetscCall(SNESGetConvergedReason(snes, &reason));
@@ -356,10 +356,10 @@ static PetscErrorCode check_bounds(void)
 
 /* ------------------------------------------------------------------ hertz */
 
-#define HERTZ_A 0.05 /* radius of contact, m; that of the sphere is 1 */
+#define HERTZ_A 0.05 /* contact radius, m; the sphere has radius 1 */
 #define HERTZ_SIZE 1.0
 
-/* A quarter of a block, its cells growing with the distance from the corner where the sphere presses. */
+/* Quarter of a block; cells grow with the distance from the corner under the sphere. */
 static void hertz_map(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
 {
   const PetscReal g = 3.5;
@@ -376,9 +376,9 @@ static void hertz_map(const PetscInt n[3], const PetscInt at[3], PetscReal x[3],
 }
 
 /*
-  Hertz: a rigid sphere of radius R pushed by d into a half-space has contact of radius a = sqrt(R d) and takes the force
-  4/3 E / (1 - nu^2) sqrt(R) d^(3/2). Far faces move as the half-space does under that force at a point (Boussinesq); there,
-  20 a away, the rest is of the order (a/r)^2 of it.
+  Hertz: a rigid sphere of radius R with approach d to a half-space has the contact radius a = sqrt(R d) and the force
+  4/3 E / (1 - nu^2) sqrt(R) d^(3/2). The far faces have the displacement of a half-space under that point force (Boussinesq); at
+  their distance of 20 a the difference is of the order (a/r)^2 of it.
 */
 static PetscErrorCode check_hertz(const char *element, PetscInt cells, PetscReal tolerance)
 {
@@ -392,7 +392,7 @@ static PetscErrorCode check_hertz(const char *element, PetscInt cells, PetscReal
   verify_case("hertz, %s, %d^3 cells", element, (int)cells);
   PetscCall(verify_mesh_write(n, hertz_map, NULL, path));
   PetscCall(PetscSNPrintf(r, sizeof(r), "sqrt(x^2+y^2+z^2)"));
-  /* radial part over the distance from the axis, and the depth is -z */
+  /* radial displacement over the distance from the axis; the depth is -z */
   PetscCall(PetscSNPrintf(sideways, sizeof(sideways), "%.15g*(-z/%s^3-%.15g/(%s*(%s-z)))",
                           (double)(P * (1 + nu) / (2 * PETSC_PI * E)), r, (double)(1 - 2 * nu), r, r));
   PetscCall(record_run(
@@ -436,7 +436,7 @@ int main(int argc, char **argv)
   PetscCall(check_fall("p1", "multiplier"));
   PetscCall(check_incline("p1", "multiplier", 0.49));
   PetscCall(check_incline("p1", "projected", 0.51));
-  PetscCall(check_incline("p1", "projected", 0.5)); /* keeps what it got when it lay down */
+  PetscCall(check_incline("p1", "projected", 0.5)); /* keeps the velocity of its initial settling */
   PetscCall(check_incline("p1", "projected", 0.49));
   PetscCall(check_held("projected"));
   PetscCall(check_corner("projected"));
@@ -444,7 +444,7 @@ int main(int argc, char **argv)
   PetscCall(check_hertz("p1", 8, 0.3));
   PetscCall(check_hertz("p2", 6, 0.02));
   PetscCall(check_incline("p2", "projected", 0.49));
-  if (size == 1) { /* that other ranks agree is what the scenarios drop and indent show */
+  if (size == 1) { /* agreement of ranks is tested by the scenarios drop and indent */
     PetscCall(check_fall("cr", "projected"));
     PetscCall(check_fall("dg", "projected"));
     PetscCall(check_fall("p2", "projected"));

@@ -19,7 +19,7 @@ static const char *const laws[] = {"linear", "corotated", "stvk", "neohookean"};
 
 /* ------------------------------------------------------------------ patch, rigid motion, sums */
 
-/* The largest error of a displacement (A - 1) X, relative to the largest one. */
+/* Largest error of the displacement (A - 1) X, relative to the largest displacement. */
 static PetscErrorCode affine_error(TestScene *t, const PetscReal A[9], PetscReal *error)
 {
   const SbSpace s = t->model->space;
@@ -112,7 +112,7 @@ static PetscErrorCode check_equilibrium(const char *mesh)
   Vec U;
 
   PetscFunctionBeginUser;
-  /* K = E / (3 (1 - 2 nu)); a uniform strain of -1e-3 has the pressure 3 K 1e-3 */
+  /* K = E / (3 (1 - 2 nu)); the volumetric strain 3 (-1e-3) gives the pressure 3 K 1e-3 */
   PetscCall(
     verify_open(&t,
                 "-bodies a" VERIFY_BODY(
@@ -219,7 +219,7 @@ static PetscErrorCode sphere_error(PetscInt n, PetscBool second, PetscReal nu, c
   PetscCall(curved_mesh_write(n, n, curved_shell, second, mesh));
   PetscCall(verify_open(&t, SHELL, mesh, (double)nu, element));
   PetscCall(verify_solve(&t, "sphere"));
-  /* at the vertices, weighted by 1: those of both meshes are the same */
+  /* error at the vertices with equal weights; both meshes have the same vertices */
   PetscCall(VecGetArrayRead(t.run->U, &u));
   for (PetscInt i = 0; i < t.model->space->nnode_owned; i++) {
     const PetscReal *x = t.model->space->node_x + 3 * i,
@@ -235,7 +235,7 @@ static PetscErrorCode sphere_error(PetscInt n, PetscBool second, PetscReal nu, c
   *error = PetscSqrtReal(sum[0] / sum[1]);
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  sphere, nu %g, %s, %5d %s tets: error %.3e\n", (double)nu,
                         element, (int)t.model->mesh->Ncell, second ? "curved" : "straight", (double)*error));
-  /* the energy of the error is what the body stores less than it should: half of the work of the pressure on the displacement of the wall */
+  /* energy of the error: missing strain energy; the exact one is half the work of the pressure on the wall displacement */
   PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &energies));
   missing = 0.25 * PETSC_PI * (1. - 2. * nu + 4. * (1. + nu)) / 7. - energies.strain;
   PetscCall(SbSpaceEstimateCreate(t.model, &est));
@@ -244,7 +244,7 @@ static PetscErrorCode sphere_error(PetscInt n, PetscBool second, PetscReal nu, c
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "    in energy %.3e J^(1/2), estimated %.2f times that\n",
                         (double)PetscSqrtReal(PetscAbsReal(missing)),
                         (double)(guess / PetscSqrtReal(PetscAbsReal(missing)))));
-  /* 1.20 to 1.24 times the true one on these meshes; the band is that of verify_estimate */
+  /* 1.20 to 1.24 times the true error on these meshes; the bounds are those of verify_estimate */
   if (second)
     SB_CHECK(guess > 0.6 * PetscSqrtReal(missing) && guess < 1.3 * PetscSqrtReal(missing),
              "estimated %g, true %g J^(1/2)", (double)guess, (double)PetscSqrtReal(missing));
@@ -265,7 +265,7 @@ static PetscErrorCode check_sphere(PetscReal nu)
   }
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  orders: curved %.2f, straight %.2f\n",
                         log(curved[0] / curved[1]) / log(2.), log(straight[0] / straight[1]) / log(2.)));
-  /* in theory 3 in the mean square, and 2 with the geometry of straight tets, here on coarse meshes */
+  /* theoretical orders in the mean square: 3, and 2 with the geometry of straight tets; here on coarse meshes */
   SB_CHECK(curved[0] > 7. * curved[1] && straight[0] < 5. * straight[1], "orders: curved %g, straight %g",
            log(curved[0] / curved[1]) / log(2.), log(straight[0] / straight[1]) / log(2.));
   SB_CHECK(curved[0] < 0.2 * straight[0] && curved[1] < 0.1 * straight[1], "curved %g, %g, straight %g, %g",
@@ -273,15 +273,15 @@ static PetscErrorCode check_sphere(PetscReal nu)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ ranks, what is refused */
+/* ------------------------------------------------------------------ ranks, errors */
 
-/* Straight and curved regions: the inner layer stays as it is. */
+/* Straight and curved regions: the inner layer is unchanged. */
 static void half(PetscReal x[3])
 {
   x[0] *= 0.9 + 0.2 * PetscMax(0., x[2] - 0.5) * x[1];
 }
 
-/* As supple-mesh converts it, on rank 0. */
+/* Converts a mesh as supple-mesh does, on rank 0. */
 static PetscErrorCode convert(const char *msh, char h5[512])
 {
   SbBody body = {.scale = 1.};
@@ -318,7 +318,7 @@ static PetscErrorCode check_ranks(void)
     PetscReal *value[3], volume[3];
     PetscInt n = 0;
 
-    /* all ranks, one, all in slabs */
+    /* all ranks, one rank, all ranks in slabs */
     for (int r = 0; r < 3; r++) {
       TestScene t;
       char text[VERIFY_TEXT];
@@ -357,7 +357,7 @@ static PetscErrorCode check_ranks(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The node at half of the edge from (0, 0, 0) to (0, 0, 1) beyond its end. */
+/* Moves the midpoint node of the edge from (0, 0, 0) to (0, 0, 1) beyond the end of the edge. */
 static void fold(PetscReal x[3])
 {
   if (x[0] == 0. && x[1] == 0. && x[2] == 0.5) x[2] = 1.2;
@@ -376,7 +376,7 @@ static PetscErrorCode check_refused(void)
       &t, "-bodies a" VERIFY_BODY("a", "%s", "linear", "1", "0.3") "-body_a_element p2 -time static", mesh),
     PETSC_ERR_USER_INPUT, words);
   PetscCall(test_scene_close(&t));
-  /* others take the straight tet */
+  /* other elements use the straight tet */
   PetscCall(verify_open(
     &t, "-bodies a" VERIFY_BODY("a", "%s", "linear", "1", "0.3") "-body_a_element p1 -time static", mesh));
   SB_CHECK_NEAR(t.model->body[0].volume, 0.5, 1e-14, "volume of the straight tets");

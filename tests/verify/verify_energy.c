@@ -58,7 +58,7 @@ static PetscErrorCode check_drift(const char *element, PetscInt steps)
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
                         "  drift of Newmark, %s, over %d steps: %.1e of the energy (%.0f s)\n", element,
                         (int)t.run->steps_total, (double)d.largest, MPI_Wtime() - begin));
-  /* rounding of one step, 1e-15, more with the many unknowns of the others (4.4e-15 on one machine, below 4e-15 on others), if every one had the same sign */
+  /* rounding of one step if all signs are equal: 1e-15 for P1, more for elements with more unknowns (4.4e-15 on one machine, below 4e-15 on others) */
   SB_CHECK(d.largest < (strcmp(element, "p1") ? 8e-15 : 1e-15) * (double)steps,
            "%s: energy drifts by %g in %d steps", element, (double)d.largest, (int)steps);
   PetscCall(test_scene_close(&t));
@@ -68,12 +68,12 @@ static PetscErrorCode check_drift(const char *element, PetscInt steps)
 /* ------------------------------------------------------------------ decay */
 
 typedef struct {
-  Vec U, V, F; /* last step; work */
+  Vec U, V, F; /* last step; work vectors */
   PetscReal energy, loss;
   PetscInt ups;
 } Decay;
 
-/* Adds 1/2 dv.M dv + 1/2 du.K du; K du is the force of du, the body being linear. */
+/* Adds 1/2 dv.M dv + 1/2 du.K du; K du is the force of du, because the body is linear. */
 static PetscErrorCode watch_decay(SbRun run, const SbStep *step, void *ctx)
 {
   Decay *d = (Decay *)ctx;
@@ -130,9 +130,9 @@ static PetscErrorCode check_decay(const char *element, PetscReal h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ account */
+/* ------------------------------------------------------------------ energy balance */
 
-/* Missing in the account after half a second, relative to the energy that went through it. */
+/* Residual of the energy balance after half a second, relative to the work and the damping loss. */
 static PetscErrorCode missing(const char *preset, const char *element, const char *law, PetscReal h,
                               PetscReal *loss)
 {
@@ -164,7 +164,7 @@ static PetscErrorCode missing(const char *preset, const char *element, const cha
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* order 0: none, as faces of CR and DG lose or give a little where their force leaves its bounds. */
+/* order 0: not checked, because CR and DG faces lose or gain some energy where their force reaches its bounds. */
 static PetscErrorCode check_account(const char *preset, const char *element, const char *law, int order,
                                     PetscReal bound)
 {
@@ -196,7 +196,7 @@ static PetscErrorCode watch_swing(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What is given: hardly more than the account of the method, 4e-4; penalties of whole jumps gave an eighth. What bounds of forces take in a second is 1 %. */
+/* Energy gain: little above the residual of the integrator, 4e-4; penalties on whole jumps gained an eighth. Bounds of forces lose 1 % in a second. */
 static PetscErrorCode check_swing(const char *element)
 {
   Swing w = {0};
@@ -256,7 +256,7 @@ static PetscErrorCode fly(const char *preset, const char *element, const char *l
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* order of the angular momentum; 0: exact; -1: not examined */
+/* order: of the angular momentum; 0: exact; -1: not checked */
 static PetscErrorCode check_flight(const char *preset, const char *element, const char *law, PetscReal h,
                                    int order)
 {
@@ -312,7 +312,7 @@ static PetscErrorCode check_turning(const char *time, const char *element)
   given = t.run->energies.prescribed_work;
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  turning, %s, %s: %.1e of the work %g J is given\n", element,
                         time, (double)(gain / given), (double)given));
-  /* trapezoids miss 2e-5 at most here; along the chord 3e-3 would be missing */
+  /* the trapezoidal rule has an error of at most 2e-5 here; the work along the chord would have 3e-3 */
   SB_CHECK(given > 0. && gain < 1e-4 * given, "turning, %s: energy %g J was made, work %g J", time,
            (double)gain, (double)given);
   PetscCall(test_scene_close(&t));
@@ -346,7 +346,7 @@ static PetscErrorCode check_grip(void)
   given = t.run->energies.load_work;
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  grip: %.1e of the work %g J is given\n", (double)(gain / given),
                         (double)given));
-  /* along the chord 1.5e-3 would be missing */
+  /* the work along the chord would have an error of 1.5e-3 */
   SB_CHECK(given > 0. && gain < 3e-4 * given, "grip: energy %g J was made, work %g J", (double)gain,
            (double)given);
   PetscCall(test_scene_close(&t));
@@ -385,7 +385,7 @@ int main(int argc, char **argv)
   PetscCall(check_flight("newmark", "cr", "corotated", 2e-3, 2));
   PetscCall(check_flight("newmark", "dg", "corotated", 2e-3, 2));
   PetscCall(check_flight("newmark", "p2", "corotated", 2e-3, 2));
-  if (size > 1) SB_TEST_END(); /* laws and short steps do not know of ranks */
+  if (size > 1) SB_TEST_END(); /* materials and short steps do not depend on ranks */
   PetscCall(check_flight("newmark", "p1", "neohookean", 2e-3, 2));
   PetscCall(check_flight("genalpha", "p1", "linear", 2e-3, -1));
   PetscCall(check_flight("alpha2", "p1", "corotated", 2e-3, -1));

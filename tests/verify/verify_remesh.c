@@ -22,7 +22,7 @@
   "-body_b_material corotated -body_b_young 2e4 -body_b_poisson 0.3 -body_b_density 700 "
 #define EULER "-time euler_implicit -ts_dt 0.01 -ts_max_time 0.05 "
 
-/* Two scenes: the second one is the first on other meshes. */
+/* Two scenes: the second one is the first one on other meshes. */
 typedef struct {
   TestScene a, b;
   SbRemeshOutcome outcome[2];
@@ -49,7 +49,7 @@ static void curved(const PetscReal x[3], PetscReal u[3])
   u[2] = PetscSinReal(5 * x[0]) * 0.05 + 0.3 * x[1] * x[1];
 }
 
-/* The second scene of a pair, with body a remeshed. */
+/* Creates the second scene of a pair, with body a remeshed. */
 static PetscErrorCode make_second(Pair *p, SbMesher mesher)
 {
   const SbRemeshing how = {.mesher = mesher, .size = 1., .quality = 1e-3};
@@ -93,7 +93,7 @@ static PetscErrorCode close_pair(Pair *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Largest difference of a vector from a function of the rest position. */
+/* Largest difference between a vector and a function of the reference position. */
 static PetscErrorCode difference(SbModel m, void (*f)(const PetscReal x[3], PetscReal value[3]), Vec U,
                                  PetscReal *worst)
 {
@@ -151,7 +151,7 @@ static PetscErrorCode check_linear(const char *element, const char *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sum over the nodes of a body of the bits of their places and values, whatever their order: of those on its surface, or of all. */
+/* Sum of the bits of positions and values over the nodes of a body, of its surface or all, independent of their order. */
 static PetscErrorCode bits_of(SbModel m, Vec U, PetscInt body, PetscBool surface, uint64_t *sum)
 {
   const SbSpace s = m->space;
@@ -253,7 +253,7 @@ static PetscErrorCode check_momenta(const char *more)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Part of the strain energy of a smooth motion that a new mesh changes it by, with n cells along the shortest side. */
+/* Relative change of the strain energy of a smooth motion on a new mesh, with n cells along the shortest side. */
 static PetscErrorCode energy_change(int n, PetscBool bent, PetscReal *part)
 {
   SbEnergies e[2];
@@ -277,7 +277,7 @@ static PetscErrorCode energy_change(int n, PetscBool bent, PetscReal *part)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* It falls like the square of the edges: by four when they are halved. Of P2, curved or straight, from finer meshes on: 7.8e-4, 2.9e-4. */
+/* The change is proportional to the squared edge length: a factor of four per halving. P2, curved or straight, on finer meshes: 7.8e-4, 2.9e-4. */
 static PetscErrorCode check_energy(PetscBool bent)
 {
   PetscReal coarse, fine;
@@ -332,7 +332,7 @@ static PetscErrorCode check_run(const char *more, const char *element, PetscBool
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The sum of squares of the displacement at the end. */
+/* Sum of squares of the final displacement. */
 static PetscErrorCode refused_run(SbMesher mesher, const char *more, PetscReal *norm)
 {
   TestScene s;

@@ -29,9 +29,9 @@
     a) "-sets end -set_end_at plane:1,0,0,0 -effects hold,weight -effect_hold_type fixed " \
        "-effect_hold_on end -effect_weight_type gravity "
 
-/* ------------------------------------------------------------------ who touches */
+/* ------------------------------------------------------------------ contact nodes */
 
-/* What an effect would write to a checkpoint, of all ranks, in order; but for its sums. */
+/* Checkpoint records of an effect from all ranks, sorted, without its sums. */
 typedef struct {
   PetscInt n;
   PetscReal *r; /* [n][nstate] */
@@ -64,13 +64,13 @@ static PetscErrorCode gather(SbEffect e, SbSpace space, Records *all)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* In the order of their names. */
+/* Sorts the records by their names. */
 static void put_in_order(SbEffect e, Records *all)
 {
   qsort(all->r, (size_t)all->n, (size_t)e->nstate * sizeof(PetscReal), by_name);
 }
 
-/* The second scene is the first one with body a remeshed by the program's own mesher. */
+/* Creates the second scene: the first one with body a remeshed by the default mesher. */
 static PetscErrorCode hand_over(TestScene *a, TestScene *b, SbRemeshResult *result)
 {
   const SbRemeshing how = {.mesher = SbMesherDefault, .size = 1., .quality = 1e-3};
@@ -108,7 +108,7 @@ static PetscErrorCode hand_over(TestScene *a, TestScene *b, SbRemeshResult *resu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Runs until bodies touch; the last effect is the one that is examined. */
+/* Runs until bodies are in contact; the last effect is checked. */
 static PetscErrorCode check_touch(const char *scene)
 {
   TestScene a, b = {NULL, NULL, NULL, NULL};
@@ -150,7 +150,7 @@ static PetscErrorCode check_touch(const char *scene)
 
 /* ------------------------------------------------------------------ runs */
 
-/* The largest penetration that the last effect reports, m. */
+/* Largest penetration that the last effect reports, m. */
 static PetscErrorCode penetration(SbRun run, const char *name, PetscReal *depth)
 {
   const SbModel m = run->model;
@@ -172,7 +172,7 @@ static PetscErrorCode penetration(SbRun run, const char *name, PetscReal *depth)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How far nodes are below z = 0. */
+/* Largest depth of a node below z = 0. */
 static PetscErrorCode below(SbModel m, Vec U, PetscReal *depth)
 {
   const PetscScalar *u;
@@ -187,7 +187,7 @@ static PetscErrorCode below(SbModel m, Vec U, PetscReal *depth)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* pair: two bodies and nothing else, whose momenta cancel. */
+/* pair: two bodies without external forces, whose momenta cancel. */
 static PetscErrorCode check_run(const char *scene, PetscBool pair, PetscReal end)
 {
   PetscReal depth, scale, lost, drift;
@@ -272,7 +272,7 @@ static PetscErrorCode check_inclusion(const char *more)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ supports, adaptive steps, ledger */
+/* ------------------------------------------------------------------ supports, adaptive steps, error estimates */
 
 static PetscErrorCode check_held(const char *more)
 {
@@ -302,7 +302,7 @@ static PetscErrorCode check_held(const char *more)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Relative errors of the time steps and of the mesh at the end, and the steps. */
+/* Relative errors of time steps and of the mesh at the end, and the number of steps. */
 static PetscErrorCode ledger_run(const char *more, PetscReal error[2], PetscInt *steps)
 {
   PetscReal stored;
@@ -332,7 +332,7 @@ static PetscErrorCode check_ledger(const char *more, PetscReal accuracy)
   PetscCall(ledger_run(more, without, &steps[0]));
   PetscCall(PetscSNPrintf(text, sizeof(text), "%s -remesh_times 0.06", more));
   PetscCall(ledger_run(text, with, &steps[1]));
-  /* most of the run was before it, so errors that did not go on would be smaller; a re-meshed body vibrates, so they are larger */
+  /* most of the run precedes re-meshing, so errors that restart at zero would be smaller; a re-meshed body vibrates, so errors are larger */
   SB_CHECK(with[0] > 0.9 * without[0] || (accuracy > 0. && with[0] < accuracy),
            "%s: time %g, not re-meshed %g", more, (double)with[0], (double)without[0]);
   SB_CHECK(with[0] < (accuracy > 0. ? accuracy : 0.5), "%s: time %g", more, (double)with[0]);
@@ -342,9 +342,9 @@ static PetscErrorCode check_ledger(const char *more, PetscReal accuracy)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ steps that fail */
+/* ------------------------------------------------------------------ failed steps */
 
-/* A solve that may take few iterations. */
+/* Runs with a limit on the iterations of a solve. */
 static PetscErrorCode check_failed(const char *iterations, PetscBool first)
 {
   TestScene s;
