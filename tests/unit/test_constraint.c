@@ -48,7 +48,7 @@ static PetscBool at_end(SbSpace s, PetscInt node, PetscReal x)
   return (PetscBool)(PetscAbsReal(s->node_x[3 * node] - x) < 1e-9);
 }
 
-/* n . u = value at a node; stiffness < 0: exactly. */
+/* Constraint n . u = value at a node; stiffness < 0: exact. */
 static PetscErrorCode add(SbSpace s, PetscInt node, const PetscReal n[3], const PetscReal push[3],
                           PetscReal value, PetscReal stiffness, PetscInt *number)
 {
@@ -78,7 +78,7 @@ static PetscErrorCode fill(Vec x, unsigned state)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y.A x = x.A y and x.A x > 0 for what is free, and A x makes no force along the directions. */
+/* y.A x = x.A y and x.A x > 0 for free unknowns, and A x has no force along the constrained directions. */
 static PetscErrorCode check_operator(TestScene *t, const char *what)
 {
   SbSpace s = t->model->space;
@@ -113,7 +113,7 @@ static PetscErrorCode check_operator(TestScene *t, const char *what)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The end of a clamped bar along an oblique direction, pushed along it or, mu > 0, as if it slid with friction. */
+/* End of a clamped bar constrained along an oblique direction, and loaded along it or, mu > 0, as in sliding friction. */
 static PetscErrorCode check_oblique(const char *element, const char *solver, How how, PetscReal mu)
 {
   const PetscReal push[3] = {oblique[0] + mu * 0.8, oblique[1] - mu * 0.6, oblique[2]};
@@ -142,7 +142,7 @@ static PetscErrorCode check_oblique(const char *element, const char *solver, How
   PetscCall(SbRunSolve(t.run));
   SB_CHECK(!t.run->stop_reason[0], "%s: %s", solver, t.run->stop_reason);
 
-  /* where the end is, and what holds it there */
+  /* displacement of the end, and its constraint force */
   PetscCall(VecDuplicate(t.run->U, &R));
   PetscCall(SbModelResidual(t.model, 1, t.run->U, NULL, NULL, PETSC_FALSE, R));
   PetscCall(SbSpaceGetLocalRead(s, t.run->U, &u));
@@ -184,7 +184,7 @@ static PetscErrorCode compare(const TestScene *t, const TestScene *other, PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Constrained along x and y one after the other, not orthogonal: as by a support of x and y. */
+/* Constraints along x and y, added one after the other and not orthogonal: equal to a support of x and y. */
 static PetscErrorCode check_axes(const char *element, How how)
 {
   const PetscReal x[3] = {1, 0, 0}, skew[3] = {0.6, 0.8, 0}, z[3] = {0, 0, 1};
@@ -221,7 +221,7 @@ static PetscErrorCode check_axes(const char *element, How how)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A body that nothing but constraints carries, exact ones or, stiffness >= 0, springs; negative: eigenvalues are counted. */
+/* A body that only constraints support: exact ones or, stiffness >= 0, springs; negative: the negative eigenvalues are counted. */
 static PetscErrorCode check_carried(const char *solver, How how, PetscReal stiffness, PetscInt most,
                                     PetscBool negative, const TestScene *clamped)
 {
@@ -246,7 +246,7 @@ static PetscErrorCode check_carried(const char *solver, How how, PetscReal stiff
   SB_CHECK(t.run->linear_total < most, "%s: %d iterations", solver, (int)t.run->linear_total);
   SB_CHECK(!t.model->space->constraints->added == (how != BESIDE), "%s: anchors", solver);
 
-  /* in the null space none of K is negative, all of -K are */
+  /* K has no negative eigenvalue in the null space of the constraints; all of -K are negative */
   if (negative) {
     PetscCall(SbSolverCountNegativeEigenvalues(t.run->snes, t.model->space, &count));
     SB_CHECK(count == 0, "%" PetscInt_FMT " negative eigenvalues", count);
@@ -261,7 +261,7 @@ static PetscErrorCode check_carried(const char *solver, How how, PetscReal stiff
     SB_CHECK(count == 3 * t.model->space->Nnode - t.model->space->constraints->nexact,
              "%" PetscInt_FMT " negative eigenvalues", count);
   }
-  PetscCall(compare(&t, clamped, stiffness < 0 ? 1e-8 : 1e-4, solver)); /* springs give 1/k */
+  PetscCall(compare(&t, clamped, stiffness < 0 ? 1e-8 : 1e-4, solver)); /* springs have an error of 1/k */
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

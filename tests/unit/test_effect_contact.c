@@ -85,7 +85,7 @@ static PetscErrorCode check_options(void)
 
 /* ------------------------------------------------------------------ forces and tangent */
 
-/* Shear and a slight twist, pushed into the obstacle: some nodes slip, some stick. */
+/* Shear and a slight twist with a displacement into the obstacle: some nodes slip, some stick. */
 static void push(Fixture *x, PetscReal amplitude)
 {
   for (PetscInt i = 0; i < x->space->nnode; i++) {
@@ -97,7 +97,7 @@ static void push(Fixture *x, PetscReal amplitude)
   }
 }
 
-/* Touch at rest, then a displacement as if solved for. */
+/* Begins a step at zero displacement, then takes the displacement of push() as a solution. */
 static PetscErrorCode press(Fixture *x, SbEffect e)
 {
   PetscBool changed = PETSC_FALSE;
@@ -123,7 +123,7 @@ static PetscErrorCode to_vec(const Fixture *x, const PetscReal values[], Vec v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Force at u + h w, w a smooth field. */
+/* Contact force at u + h w, w a smooth field. */
 static PetscErrorCode force_beside(Fixture *x, SbEffect e, PetscReal h, Vec F)
 {
   PetscFunctionBeginUser;
@@ -140,7 +140,7 @@ static PetscErrorCode force_beside(Fixture *x, SbEffect e, PetscReal h, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On a plane the tangent is the derivative. */
+/* On a plane the tangent is the derivative of the force. */
 static PetscErrorCode check_tangent(const char *element, const char *options)
 {
   const PetscReal h = 1e-6;
@@ -197,7 +197,7 @@ static PetscErrorCode check_tangent(const char *element, const char *options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the constraints of friction push with at a displacement, after who slides has been settled for it. */
+/* Friction forces of the constraints at a displacement, after three updates of the active set. */
 static PetscErrorCode rub(Fixture *x, const char *options)
 {
   SbEffect e;
@@ -225,7 +225,7 @@ static PetscErrorCode rub(Fixture *x, const char *options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Coulomb's cone at every node, friction against the motion, and the same on any number of ranks. */
+/* Coulomb's cone at every node, friction opposite to the motion, and the same result on any number of ranks. */
 static PetscErrorCode check_friction(const char *element)
 {
   const char *options = FLOOR "-effect_floor_response penalty -effect_floor_friction 0.4 "

@@ -34,7 +34,7 @@ static PetscErrorCode volume(const Fixture *x, const PetscReal u[], PetscReal *a
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A smooth direction w[nnode][3], another one for another seed; zero where `rim` says so: on the edges of the top. */
+/* Smooth direction w[nnode][3] that depends on the seed; with `rim` zero on the edges of the top. */
 static void direction(const Fixture *x, PetscReal seed, PetscBool rim, PetscReal w[])
 {
   for (PetscInt i = 0; i < x->space->nnode; i++) {
@@ -76,7 +76,7 @@ static PetscErrorCode check_closed(Fixture *x, Fixture *serial)
   PetscCall(check_resultant(x, zero, zero, P, "pressure all around"));
   PetscCall(check_serial(x, serial, P, "parallel and serial pressure at a node"));
 
-  // V is a cubic polynomial along w: this difference is its exact derivative but for rounding, 1e-16 V / h.
+  // V is a cubic polynomial along w: this difference is its exact derivative up to rounding, 1e-16 V / h.
   PetscCall(PetscMalloc2(3 * x->space->nnode, &w, 3 * x->space->nnode, &v));
   direction(x, 1, PETSC_FALSE, w);
   for (int k = 0; k < 4; k++) {
@@ -100,7 +100,7 @@ static PetscErrorCode check_face(Fixture *x)
   const PetscReal F[3] = {0, 0, -3 * P}, M[3] = {-1.5 * P, 1.5 * P, 0};
   const char *options =
     "-effect_hat_type pressure -effect_hat_on top -effect_hat_value 125*t -effect_hat_time t+1";
-  // A turn by 90 degrees about x takes (x, y, z) to (x, -z, y): the top then faces -y, and is pushed along +y at (.5, -1, .5).
+  // A rotation by 90 degrees about x maps (x, y, z) to (x, -z, y): the top then faces -y, and its load is along +y at (.5, -1, .5).
   const PetscReal G[3] = {0, 3 * P, 0}, N[3] = {-1.5 * P, 0, 1.5 * P};
   SbEffect e;
 
@@ -120,7 +120,7 @@ static PetscErrorCode check_face(Fixture *x)
   PetscCall(check_resultant(x, G, N, 3 * P, "pressure on the turned top"));
   PetscCall(SbEffectDestroy(&e));
 
-  // Not a follower: at the turned position it still pushes down, and now is linear.
+  // Not a follower load: on the rotated body it still acts downwards, and is linear.
   PetscCall(effect_create(x, "hat", "-effect_hat_follower no", &e));
   SB_CHECK(e->linear && !e->steady && !e->ops.tangent, "a dead pressure");
   PetscCall(effect_force(x, e, 2));
@@ -131,7 +131,7 @@ static PetscErrorCode check_face(Fixture *x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A = what the effect adds to the tangent, at x->u. */
+/* A = contribution of the effect to the tangent at x->u. */
 static PetscErrorCode tangent(Fixture *x, SbEffect e, PetscReal shift_k, Mat A)
 {
   SbStage stage;
@@ -171,8 +171,8 @@ static PetscErrorCode apply(Fixture *x, Mat A, const PetscReal w[], PetscReal y[
 }
 
 /*
-  |f(u + h w) - f(u) + h A w| must fall with h^2: it is -p times a quadratic in h w on facets, so the quotient of two
-  steps is 100 to rounding. Without the tangent it would be 10.
+  |f(u + h w) - f(u) + h A w| must decrease as h^2: it is -p times a quadratic in h w on facets, so the ratio of two
+  steps is 100 up to rounding. Without the tangent it is 10.
 */
 static PetscErrorCode check_taylor(Fixture *x, SbEffect e, Mat A, PetscBool rim)
 {
@@ -188,7 +188,7 @@ static PetscErrorCode check_taylor(Fixture *x, SbEffect e, Mat A, PetscBool rim)
   PetscCall(PetscArraycpy(f, x->f, 3 * n));
   PetscCall(tangent(x, e, 1, A));
   PetscCall(apply(x, A, w, Aw));
-  // The part that is applied beside the matrix.
+  // The part that is applied outside the matrix.
   if (e->ops.nonsymmetric) {
     const SbStage stage = {.t = 2, .u = x->u, .shift_k = 1};
     PetscReal *y;
@@ -204,7 +204,7 @@ static PetscErrorCode check_taylor(Fixture *x, SbEffect e, Mat A, PetscBool rim)
     for (PetscInt i = 0; i < 3 * n; i++) x->u[i] = u[i] + h * w[i];
     PetscCall(effect_force(x, e, 2));
     for (PetscInt i = 0; i < 3 * x->space->nnode_owned; i++) x->f[i] += h * Aw[i] - f[i];
-    // With the rim held its own rows have no say.
+    // With a constrained rim its own rows do not count.
     if (rim) {
       for (PetscInt i = 0; i < 3 * x->space->nnode_owned; i++) x->f[i] *= w[3 * (i / 3)] == 0 ? 0 : 1;
     }
@@ -233,12 +233,12 @@ static PetscErrorCode check_tangent(Fixture *x)
   PetscCall(SbSpacePrescribeDone(x->space));
   PetscCall(SbSpaceCreateMatrix(x->space, SB_MATRIX_BAIJ, &A));
   PetscCall(check_taylor(x, closed, A, PETSC_FALSE));
-  // Of P1 and P2 the part at the rim is beside the matrix, of CR and DG, whose facets do not meet at their edges, the whole tangent of an open surface.
+  // P1 and P2: the boundary term is outside the matrix; CR and DG, whose facets do not meet at edges: the whole tangent of an open surface is.
   SB_CHECK(!closed->ops.nonsymmetric && open->ops.nonsymmetric, "what is beside the matrix");
   PetscCall(check_taylor(x, open, A, PETSC_FALSE));
   PetscCall(check_taylor(x, open, A, PETSC_TRUE));
 
-  // The matrix is symmetric also where the rim is free, and has nothing where no stiffness is wanted.
+  // The matrix is symmetric also with a free rim, and zero if no stiffness is requested.
   PetscCall(PetscMalloc3(3 * n, &v, 3 * n, &w, 3 * n, &y));
   deform(x, 1);
   direction(x, 1, PETSC_FALSE, v);
@@ -260,7 +260,7 @@ static PetscErrorCode check_tangent(Fixture *x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rim of the top in planes of symmetry, x = 1 held altogether: nothing is left of the tangent along it. */
+/* Rim of the top in symmetry planes, the edge at x = 1 fixed: no boundary term of the tangent is left. */
 static PetscErrorCode check_rim(Fixture *x)
 {
   SbEffect e;

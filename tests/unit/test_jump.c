@@ -7,7 +7,7 @@
 #include "../../src/fem/fem_impl.h"
 #include "../scene.h"
 
-/* Two bodies, one of them of tets of many shapes; gammas unlike the defaults. */
+/* Two bodies, one of them with tets of many shapes; gammas other than the defaults. */
 static const char *const scene =
   "-bodies a,b -body_a_mesh box:0.5,0.4,0.3:2 -body_a_material corotated -body_a_young 1e5 "
   "-body_a_poisson 0.3 -body_a_density 1000 -body_a_element %s -body_a_gamma1 0.7 %s "
@@ -29,7 +29,7 @@ static void affine(const PetscReal x[3], PetscReal v[3])
   v[2] = 0.1 - 0.3 * x[2] + 0.5 * x[0];
 }
 
-/* Adds something to every node that no two nodes share, the same on any rank. */
+/* Adds a different value to every node, the same on any number of ranks. */
 static PetscErrorCode roughen(SbSpace s, PetscReal size, Vec U)
 {
   PetscScalar *u;
@@ -42,7 +42,7 @@ static PetscErrorCode roughen(SbSpace s, PetscReal size, Vec U)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A cell's function at a place: nodal values times 1 - 3 times a ratio of volumes. */
+/* Value of a cell's function at a point: nodal values times 1 - 3 times a ratio of volumes. */
 static void cell_value(SbSpace s, PetscInt cell, const PetscReal u[], const PetscReal at[3],
                        PetscReal value[3])
 {
@@ -89,7 +89,7 @@ static PetscReal face_corners(SbMesh mesh, PetscInt i, const PetscReal *corner[3
   return 0.5 * PetscSqrtReal(SbDot3(n, n));
 }
 
-/* Energy of an inner face. */
+/* Energy of an interior face. */
 static PetscReal face_energy(SbModel m, PetscInt i, const PetscReal u[])
 {
   const SbSpace s = m->space;
@@ -116,7 +116,7 @@ static PetscReal face_energy(SbModel m, PetscInt i, const PetscReal u[])
             SbDot3(mean, mean));
 }
 
-/* A DG face that is constrained: its mean against that of the support, which is infinitely stiff. */
+/* Energy of a constrained DG face: its mean against that of the rigid support. */
 static PetscReal support_energy(SbModel m, PetscInt i, const PetscReal u[])
 {
   const SbSpace s = m->space;
@@ -131,7 +131,7 @@ static PetscReal support_energy(SbModel m, PetscInt i, const PetscReal u[])
   return SbSpaceCellElement(s, i / 4)->gamma0 * k * area * square;
 }
 
-/* Sum over all faces; each rank takes half of a face for each of its cells. */
+/* Sum over all faces; each rank counts half of a face for each of its cells. */
 static PetscErrorCode formula(SbModel m, const PetscReal u[], PetscReal *energy)
 {
   const SbSpace s = m->space;
@@ -165,7 +165,7 @@ static PetscErrorCode dot(SbSpace s, const PetscReal f[], const PetscReal u[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Largest difference of K u by the matrices of the faces from the forces f, relative to the largest of these. */
+/* Largest difference between K u by the face matrices and the forces f, relative to the largest force. */
 static PetscErrorCode by_matrix(SbSpace s, const PetscReal u[], const PetscReal f[], PetscReal *worst)
 {
   const PetscInt *node, nbatch = SbJumpCliques(s, &node);
@@ -240,7 +240,7 @@ static PetscErrorCode check_state(SbModel m, const char *what, const PetscReal u
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A field without jumps: rounding alone, measured by the stiffness of a node times the displacement. */
+/* A field without jumps: only rounding, relative to the nodal stiffness times the displacement. */
 static PetscErrorCode check_affine(SbModel m, const PetscReal u[])
 {
   const SbSpace s = m->space;

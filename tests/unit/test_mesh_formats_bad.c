@@ -31,7 +31,7 @@ typedef struct {
   const char *text, *words; /* words NULL: it is sound */
 } Case;
 
-/* A list of cases that ends with an empty text. */
+/* A list of cases that ends with a NULL text. */
 static PetscErrorCode test_cases(const char *name, const Case cases[])
 {
   PetscFunctionBeginUser;
@@ -240,7 +240,7 @@ static PetscErrorCode test_abaqus(void)
 
   PetscFunctionBeginUser;
   PetscCall(test_cases("a.inp", cases));
-  /* as many lines that each tell of all nodes: no file of this size can mean that */
+  /* many lines that each list all nodes: no valid file of this size does that */
   (void)snprintf(path, sizeof(path), "%s/many.inp", folder);
   file = fopen(path, "w");
   SB_CHECK(file, "%s cannot be written", path);
@@ -279,7 +279,7 @@ static PetscErrorCode test_unv(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* gmsh 4.0: also behind a blank line or the mark of UTF-8. */
+/* gmsh 4.0: also after a blank line or a UTF-8 byte order mark. */
 static PetscErrorCode test_gmsh_40(void)
 {
 #define FORMAT40 "$MeshFormat\n4.0 0 8\n$EndMeshFormat\n"

@@ -12,7 +12,7 @@ static void cube(PetscBool inwards, TestSurface *s)
   test_surface_box(zero, unit, inwards, s);
 }
 
-/* Neighbours know each other, and share the edge the other way round. */
+/* Adjacent triangles refer to each other and have their common edge in opposite directions. */
 static void check_across(const SbTriangles *t)
 {
   PetscInt bad = 0;
@@ -55,7 +55,7 @@ static PetscErrorCode check_cube(const char *extension, PetscBool binary, PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The surface of a mesh of tets: two unit cubes side by side, the triangles between them do not count. */
+/* Surface of a mesh of tets: two unit cubes side by side, without the triangles between them. */
 static PetscErrorCode check_tets(void)
 {
   SbTriangles t;
@@ -69,7 +69,7 @@ static PetscErrorCode check_tets(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Faces with four corners; a cavity; two parts side by side. */
+/* Quadrilateral faces; a cavity; two separate parts. */
 static PetscErrorCode check_more(void)
 {
   const PetscReal lo[3] = {0.25, 0.25, 0.25}, hi[3] = {0.75, 0.75, 0.75}, far[3] = {3, 3, 3},
@@ -101,7 +101,7 @@ static PetscErrorCode check_more(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A tetrahedron of 1/6 m^3 as a text of STL: its first and last line, and how its lines begin and end. */
+/* A tetrahedron of 1/6 m^3 as an STL text: its first and last line, the case of its keywords and its line ends. */
 static PetscErrorCode check_stl(const char *first, const char *last, PetscBool capitals, const char *line_end)
 {
   static const char *const corner[4][3] = {{"0 0 0", "0 1 0", "1 0 0"},
@@ -135,7 +135,7 @@ static PetscErrorCode check_stl(const char *first, const char *last, PetscBool c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What exporters write that the format does not know. */
+/* Deviations from the STL format that exporters write. */
 static PetscErrorCode check_stl_variants(void)
 {
   TestSurface s;
@@ -151,10 +151,10 @@ static PetscErrorCode check_stl_variants(void)
   PetscCall(check_stl("solid name", "EndSolid other name\r\n\r\n\x1a", PETSC_FALSE, "\r\n"));
   PetscCall(check_stl("solid name", "endsolid name\n", PETSC_TRUE, "\n\n \n"));
   PetscCall(check_stl("\xef\xbb\xbfsolid name", "end solid\n\n", PETSC_FALSE, "\n"));
-  /* several solids; the last one has nothing in it */
+  /* several solids; the last one is empty */
   PetscCall(check_stl("solid none\nend solid\nsolid name", "endsolid name\nsolid more\nend solid more\n",
                       PETSC_FALSE, "\n"));
-  /* a binary file with something behind its triangles; its header begins with `solid` */
+  /* a binary file with data after its triangles; its header begins with `solid` */
   cube(PETSC_FALSE, &s);
   PetscCall(test_file_open(".stl", path, &file));
   if (file) {
@@ -205,7 +205,7 @@ static PetscErrorCode refuse(TestSurface *s, const char *words)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What can be repaired is: so many triangles around so much. */
+/* A repairable surface is accepted, with this number of triangles and this volume. */
 static PetscErrorCode accept(TestSurface *s, PetscInt ntri, PetscReal volume, const char *what)
 {
   SbTriangles t;
@@ -233,31 +233,31 @@ static PetscErrorCode check_surfaces(void)
   cube(PETSC_FALSE, &s); /* a hole */
   s.ntri = 11;
   PetscCall(refuse(&s, "3 edges"));
-  cube(PETSC_FALSE, &s); /* one triangle turned */
+  cube(PETSC_FALSE, &s); /* one inverted triangle */
   s.tri[4][0] = s.tri[4][1];
   s.tri[4][1] = 0;
   PetscCall(accept(&s, 12, 1, "one triangle turned"));
-  cube(PETSC_FALSE, &s); /* given twice */
+  cube(PETSC_FALSE, &s); /* a duplicate triangle */
   test_surface_grow(&s, 0, 1);
   for (int k = 0; k < 3; k++) s.tri[12][k] = s.tri[3][k];
   s.ntri = 13;
   PetscCall(accept(&s, 12, 1, "one triangle twice"));
-  cube(PETSC_FALSE, &s); /* a corner twice, and so a hole */
+  cube(PETSC_FALSE, &s); /* a repeated corner, and therefore a hole */
   s.tri[6][1] = s.tri[6][0];
   PetscCall(refuse(&s, "3 edges"));
   cube(PETSC_FALSE, &s); /* two cubes with a common edge */
   test_surface_box((PetscReal[3]){1, 1, 0}, end, PETSC_FALSE, &s);
   PetscCall(refuse(&s, "4 triangles|1"));
-  cube(PETSC_FALSE, &s); /* two cubes, each with its own side where they touch */
+  cube(PETSC_FALSE, &s); /* two cubes, each with its own face at the interface */
   test_surface_box(beside, (PetscReal[3]){2, 1, 1}, PETSC_FALSE, &s);
   PetscCall(accept(&s, 20, 2, "two cubes side by side"));
   cube(PETSC_FALSE, &s); /* a solid within a solid */
   test_surface_box(lo, hi, PETSC_FALSE, &s);
   PetscCall(accept(&s, 12, 1, "a solid within a solid"));
-  cube(PETSC_FALSE, &s); /* a part inverted */
+  cube(PETSC_FALSE, &s); /* an inverted part */
   test_surface_box((PetscReal[3]){3, 3, 3}, (PetscReal[3]){3.5, 3.5, 3.5}, PETSC_TRUE, &s);
   PetscCall(accept(&s, 24, 1.125, "a part inverted"));
-  cube(PETSC_FALSE, &s); /* flat: its sides collapse, top and bottom are one */
+  cube(PETSC_FALSE, &s); /* flat: the side faces collapse, top and bottom coincide */
   for (int v = 0; v < 8; v++) s.x[v][2] = 0;
   PetscCall(refuse(&s, "4 edges"));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -291,7 +291,7 @@ static PetscErrorCode check_files(void)
   PetscCall(refuse_text(".off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1\n", "line 6|face 1|2 corners"));
   PetscCall(refuse_text(".msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n1\n1 0 0 0\n$EndNodes\n",
                         "-effect_tool_obstacle"));
-  /* a binary file that lost its end is taken for text, and is none */
+  /* a truncated binary file is read as text, and is invalid */
   cube(PETSC_FALSE, &s);
   s.ntri = 11;
   PetscCall(test_file_write(".stl", PETSC_TRUE, &s, "lost", path));

@@ -27,7 +27,7 @@
                                      "-effect_rest_type fixed -effect_rest_on floor "                       \
                                      "-effect_rest_components yz "
 
-/* A matrix K + shift M of the scene's space at rest, with a system of its own. */
+/* Matrix K + shift M of the scene's space at the reference state, with its own linear solver. */
 typedef struct {
   TestScene scene;
   Mat A;
@@ -127,13 +127,13 @@ static PetscErrorCode iterations(const char *options, PetscInt *its)
   PetscCall(KSPGetConvergedReason(y.ksp, &reason));
   PetscCall(true_residual(&y, &residual));
   SB_CHECK(reason > 0, "%s: %s", options, KSPConvergedReasons[reason]);
-  /* recurrence and true residual drift apart by rounding: 1e-16 times the condition of the slender bar, 1e9 */
+  /* the residual of the recurrence and the true one differ by rounding: 1e-16 times the condition number of the slender bar, 1e9 */
   SB_CHECK(residual < 1e-6, "%s: the true residual is %g", options, (double)residual);
   PetscCall(system_close(&y));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* x . P^-1 y = y . P^-1 x and x . P^-1 x > 0 for random vectors, which have a large part in the coarse space or none. */
+/* x . P^-1 y = y . P^-1 x and x . P^-1 x > 0 for random vectors, with a large component in the coarse space or none. */
 static PetscErrorCode test_symmetry(const char *options, PetscReal shift, const char *what)
 {
   PetscRandom random;
@@ -154,7 +154,7 @@ static PetscErrorCode test_symmetry(const char *options, PetscReal shift, const 
   for (int k = 0; k < 4; k++) {
     PetscCall(VecSetRandom(x, random));
     PetscCall(VecSetRandom(y, random));
-    if (k % 2) { /* smooth: what the coarse space is for */
+    if (k % 2) { /* smooth, for the coarse space */
       PetscCall(VecShift(x, 3.));
       PetscCall(VecPointwiseMult(y, y, x));
     }
@@ -180,7 +180,7 @@ static PetscErrorCode test_symmetry(const char *options, PetscReal shift, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Renewal with the matrix, and an indefinite operator, which must fail the solve and be got over. */
+/* Renewal with a new matrix; an indefinite operator must fail the solve, and later solves must succeed. */
 static PetscErrorCode test_renewal(const char *more)
 {
   KSPConvergedReason reason;
@@ -200,7 +200,7 @@ static PetscErrorCode test_renewal(const char *more)
   PetscCall(assemble(&y, 1., -1e4));
   PetscCall(KSPSolve(y.ksp, y.b, y.x));
   PetscCall(KSPGetConvergedReason(y.ksp, &reason));
-  /* multigrid may not notice: then CG does */
+  /* multigrid may not detect it: then CG does */
   SB_CHECK(reason == KSP_DIVERGED_PC_FAILED || (more[0] && reason == KSP_DIVERGED_INDEFINITE_MAT),
            "an indefinite operator: %s", KSPConvergedReasons[reason]);
   PetscCall(assemble(&y, 1., 1e3));
@@ -211,7 +211,7 @@ static PetscErrorCode test_renewal(const char *more)
   PetscCall(true_residual(&y, &residual));
   SB_CHECK(reason > 0 && again == 3, "after it: %s, %d set-ups", KSPConvergedReasons[reason], (int)again);
   SB_CHECK(residual < 2e-8, "after it: residual %g", (double)residual);
-  /* a warm start at the solution: the hook must not spoil it, and leave the choice of the start as it was */
+  /* the initial guess is the solution: the hook must keep it, and the choice of the initial guess */
   PetscCall(KSPSetInitialGuessNonzero(y.ksp, PETSC_TRUE));
   PetscCall(KSPSolve(y.ksp, y.b, y.x));
   PetscCall(KSPGetIterationNumber(y.ksp, &its));
@@ -220,7 +220,7 @@ static PetscErrorCode test_renewal(const char *more)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Who solves for which aggregates: every rank for all, or for its own. */
+/* Distribution of the coarse problem: every rank solves for all aggregates, or for its own. */
 static PetscErrorCode test_spread(void)
 {
   static const char *const more[] = {"-pc_coarse_gathered 300 ", SPREAD};
@@ -248,7 +248,7 @@ static PetscErrorCode test_spread(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The displacement of a run with the preset against a factorisation; simple: whether the diagonal must have taken over. */
+/* Displacement of a run with the preset against a factorisation; simple: whether the diagonal must have replaced the preset. */
 static PetscErrorCode test_solution(const char *scene, PetscBool simple, const char *what)
 {
   static const char *const solvers[] = {"-solver direct ", "-solver cg_two_level "};
@@ -300,7 +300,7 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   PetscCall(test_symmetry(BAR("box:0.4,0.1,0.1:5") STATIC, 0., "bar"));
   PetscCall(test_symmetry(BAR("box:0.4,0.1,0.1:5") STATIC "-pc_coarse_aggregates 3", 0., "three aggregates"));
-  /* more aggregates than nodes: single nodes, whose rotations vanish */
+  /* more aggregates than nodes: each is a single node, whose rotations vanish */
   PetscCall(test_symmetry(BAR("box:0.4,0.1,0.1:2") STATIC "-pc_coarse_aggregates 1000", 0., "single nodes"));
   PetscCall(test_symmetry(BAR("box:0.4,0.1,0.1:3") STATIC "-pc_coarse_aggregates 60", 0., "pairs of nodes"));
   PetscCall(
@@ -308,7 +308,7 @@ int main(int argc, char **argv)
   PetscCall(iterations(BAR("box:0.4,0.1,0.1:6") STATIC, &coarse));
   PetscCall(iterations(BAR("box:0.4,0.1,0.1:12") STATIC, &fine));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "5k and 41k tets: %d and %d iterations\n", (int)coarse, (int)fine));
-  /* incomplete Cholesky alone doubles here; the aggregates grow by 2^(0.3), and the iterations with their size */
+  /* incomplete Cholesky alone doubles the iterations; the aggregates grow by 2^(0.3), and the iterations with their size */
   SB_CHECK(fine <= 1.6 * coarse, "iterations grow from %d to %d", (int)coarse, (int)fine);
   PetscCall(iterations(BAR("box:6,0.1,0.1:4") STATIC, &slender));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "slender bar: %d iterations\n", (int)slender));

@@ -10,7 +10,7 @@
 typedef long double Long;
 static const PetscReal eps = 2.2204460492503131e-16;
 
-/* Of the reference: its fault, and what it is compared within; wider where long double holds no more digits than double. */
+/* Error of the reference, and tolerance of the comparison; both larger where long double has no more digits than double. */
 static PetscReal fault = 5e-17, rounding = 8 * 2.2204460492503131e-16;
 
 static PetscRandom the_random;
@@ -24,7 +24,7 @@ static PetscReal uniform(void)
   return 2 * x - 1;
 }
 
-/* The larger of two; unlike fmax() it keeps a NaN, so that no check passes on one. */
+/* Maximum of two numbers; unlike fmax() it keeps a NaN, so that no check passes on one. */
 static PetscReal larger(PetscReal a, PetscReal b)
 {
   return b > a || isnan(b) ? b : a;
@@ -76,7 +76,7 @@ static Long dot(const Long a[3], const Long b[3])
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Columns a[0..2] of F V made orthogonal by rotations V (columns too), longest first. */
+/* Orthogonalises the columns a[0..2] of F V by rotations V (columns too), longest first. */
 static void one_sided_jacobi(Long a[3][3], Long v[3][3])
 {
   for (int sweep = 0; sweep < 40; sweep++) {
@@ -138,7 +138,7 @@ static void reference(const PetscReal F[9], Long R[9], Long s[3])
   }
 }
 
-/* Largest violation of what a reference must be, relative to |F|: the check of the checker. */
+/* Largest violation of the defining properties of the reference, relative to |F|. */
 static PetscReal reference_fault(const PetscReal F[9], const Long R[9], const Long s[3])
 {
   Long worst = 0, norm = sqrtl(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
@@ -168,8 +168,8 @@ static PetscReal orthogonality(const PetscReal R[9])
 }
 
 /*
-  A rotation to rounding; and next to the reference within `rounding` |F| / (s2 + s3), the rounding of F and of the
-  intermediate sums seen through the condition number. Where that exceeds 1e-3 only the maximum itself is compared.
+  R is a rotation up to rounding, and within `rounding` |F| / (s2 + s3) of the reference: the rounding of F and of the
+  intermediate sums times the condition number. Where that exceeds 1e-3 only the maximum itself is compared.
 */
 static void check_against_reference(const PetscReal F[9], const char *what)
 {
@@ -211,7 +211,7 @@ static void test_rest(void)
   }
 }
 
-/* Pure rotations, and stretches 1.1, 1, 0.9 under them, by every angle through a full turn; half turns exactly too. */
+/* Pure rotations, and rotated stretches 1.1, 1, 0.9, at angles through a full turn; exact half turns too. */
 static void test_angles(void)
 {
   const PetscReal axes[5][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.6, 0.8, 0}, {0.48, -0.6, 0.64}};
@@ -268,7 +268,7 @@ static void test_singular(void)
   SB_CHECK(!memcmp(R, identity, sizeof(R)), "the rotation of F = 0 is not I");
   polar_one(flat, R);
   for (int k = 0; k < 9; k++) SB_CHECK_NEAR(R[k], turned[k], 4 * eps, "rotation of a flattened quarter turn");
-  /* rank one and the full reflection: any maximiser will do; the maxima are 3 and 1 */
+  /* rank one and the full reflection: any maximiser is valid; the maxima are 3 and 1 */
   polar_one(one, R);
   SB_CHECK(orthogonality(R) < 8 * eps, "rank one: not a rotation");
   SB_CHECK_NEAR(SbDot9(R, one), 3, 16 * eps, "rank one: R : F");
@@ -281,7 +281,7 @@ static void test_singular(void)
   }
 }
 
-/* The size of F does not matter, over the whole range of a double; what is not finite stays so and harms no neighbour. */
+/* Independence of the magnitude of F over the range of a double; nonfinite values stay nonfinite and do not affect other lanes. */
 static void test_range(void)
 {
   const int power[] = {-1060, -500, -150, -90, -60, -30, 30, 60, 90, 150, 500, 1020};
@@ -292,7 +292,7 @@ static void test_range(void)
   for (size_t p = 0; p < sizeof(power) / sizeof(power[0]); p++) {
     for (int k = 0; k < 9; k++) G[k] = ldexp(F[k], power[p]);
     polar_one(G, Q);
-    /* below 2^-1022 the entries of G themselves have lost digits */
+    /* below 2^-1022 the entries of G themselves are subnormal */
     const PetscReal tolerance = power[p] < -1022 ? ldexp(1, -1074 - power[p]) * 8 : 16 * eps;
     for (int k = 0; k < 9; k++) SB_CHECK_NEAR(Q[k], R[k], tolerance, "rotation of a scaled F");
   }
@@ -304,7 +304,7 @@ static void test_range(void)
   for (int k = 0; k < 9; k++) SB_CHECK(isnan(R[k]), "the rotation of an infinity is %g", R[k]);
 }
 
-/* The same F in every lane, among neighbours that need the robust path or are not finite: the same bits. */
+/* The same F in every lane, among lanes that need the robust path or are not finite, gives bitwise the same result. */
 static void test_lanes(void)
 {
   PetscInt different = 0;
@@ -329,7 +329,7 @@ static void test_lanes(void)
   SB_CHECK(!different, "%d results depend on their neighbours", (int)different);
 }
 
-/* Valgrind and some processors compute long double as double, whatever the compiler says. */
+/* Valgrind and some processors evaluate long double in double precision, whatever the compiler states. */
 static void measure_long(void)
 {
   volatile Long step = 1, sum = 2;

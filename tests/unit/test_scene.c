@@ -80,7 +80,7 @@ static void check_two_bodies(SbModel m, const char *where)
   SB_CHECK(!m->mesh && !m->space, "%s: something was computed", where);
 }
 
-/* From options, from the printed scenario of those, and from YAML. */
+/* The model from options, from the scenario printed from them, and from YAML. */
 static PetscErrorCode test_model(const char *folder)
 {
   static const char yaml[] = "bodies: [liver, big_stone]\n"
@@ -153,7 +153,7 @@ static PetscErrorCode create_and_check(SbModel *model)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creation, or the check after it, must fail and name these. */
+/* Creation, or the check after it, must fail with a message that contains these names. */
 static PetscErrorCode refused(const char *options, const char *names)
 {
   PetscOptions database;
@@ -229,7 +229,7 @@ static PetscErrorCode test_check(const char *folder)
     PetscSNPrintf(message, sizeof(message), "-body_liver_mesh %s/livr.msh|%s/liver.msh", folder, folder));
   PetscCall(refused(options, message));
   PetscCall(refused("-bodies liver -body_liver_mesh nowhere.msh" LAW, "-body_liver_mesh nowhere.msh"));
-  /* not dynamic, and nothing holds the body */
+  /* a static run of a body without supports */
   PetscCall(refused(LIVER " -effects gravity", "-time static"));
   PetscCall(begin(LIVER " -effects hold -effect_hold_type fixed -effect_hold_on xmin", &database));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &model));

@@ -30,7 +30,7 @@ static void ripple(const PetscReal x[3], PetscReal v[3])
   v[2] = x[0] * PetscSinReal(9. * x[0] + 1.);
 }
 
-/* Error that one step of Newton's method leaves of a disturbance of the solution U. */
+/* Error after one step of Newton's method from a perturbation of the solution U. */
 static PetscErrorCode one_step(TestScene *t, Vec U, PetscReal size, PetscReal *error)
 {
   Vec X;
@@ -77,9 +77,9 @@ static PetscErrorCode check_order(const char *element, const char *law, const ch
 }
 
 /*
-  All laws and tangents of an element. P1 on this mesh is twice too stiff; CR and DG are not, and get a stiffer bar. Their
-  pressure keeps its direction: a surface with gaps has a tangent that is not symmetric, of which the matrix has the symmetric
-  part (src/effect/pressure.c).
+  All materials and tangents of an element. P1 on this mesh is twice too stiff; CR and DG are not, and get a stiffer bar. Their
+  pressure has a fixed direction: follower pressure on a surface with gaps has a nonsymmetric tangent, of which the matrix has the
+  symmetric part (src/effect/pressure.c).
 */
 static PetscErrorCode check_orders(const char *element)
 {
@@ -118,7 +118,7 @@ static PetscErrorCode watch_path(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Everything constant is multiplied by the load factor: gravity, pressure, a pushed end. A stiffer bar for CR and DG, as above. */
+/* All constant loads are multiplied by the load factor: gravity, pressure, a displaced end. A stiffer bar for CR and DG, as above. */
 static PetscErrorCode follow(const char *element, const char *law, int steps, PetscReal load, Path *path)
 {
   TestScene t;
@@ -145,7 +145,7 @@ static PetscErrorCode follow(const char *element, const char *law, int steps, Pe
 
 static PetscErrorCode check_path(const char *element, const char *law)
 {
-  /* a stiffer bar has larger first residuals, which is where Newton's tolerance comes from */
+  /* a stiffer bar has larger initial residuals, to which Newton's tolerance is relative */
   const PetscReal tolerance = strcmp(element, "p1") ? 1e-8 : 1e-9;
   Path four, one, half;
 
@@ -168,7 +168,7 @@ static PetscErrorCode check_path(const char *element, const char *law)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ runs in time */
+/* ------------------------------------------------------------------ time-dependent runs */
 
 typedef struct {
   PetscReal u[3], t;           /* end of the bar, time reached */
@@ -225,7 +225,7 @@ static PetscErrorCode check_long_steps(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sudden gravity: short steps first, longer ones after; the error goes with the tolerance (its power depends on the order). */
+/* Sudden gravity: short steps first, longer ones later; the error decreases with the tolerance (the exponent depends on the order). */
 static PetscErrorCode check_adaptive(const char *preset)
 {
   Result fine, r;
@@ -253,7 +253,7 @@ static PetscErrorCode check_adaptive(const char *preset)
                   preset, (double)PetscPowRealInt(10., -4 - k), (int)r.steps, (double)r.shortest,
                   (double)r.longest, (int)r.rejected, (double)error[k]));
     SB_CHECK(r.rejected < 3 + r.steps / 10, "%d of %d steps were rejected", (int)r.rejected, (int)r.steps);
-    /* errors of steps add up, and swing on */
+    /* errors of the steps accumulate and keep oscillating */
     SB_CHECK(error[k] < 2. * (PetscReal)r.steps * PetscPowRealInt(10., -4 - k), "error of %g m",
              (double)error[k]);
   }
@@ -263,7 +263,7 @@ static PetscErrorCode check_adaptive(const char *preset)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Three iterations are too few for steps of 0.05 s, and enough for shorter ones. */
+/* Three iterations are too few for steps of 0.05 s and enough for shorter ones. */
 static PetscErrorCode check_cuts(void)
 {
   Result whole, cut, stopped;

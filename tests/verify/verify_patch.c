@@ -22,8 +22,8 @@ typedef struct {
 } MeshContext;
 
 /*
-  Inner vertices of the unit cube: moved at random by up to 0.3 cells; or every second one moved onto the plane of a face
-  that it examines, but for a thousandth, which leaves flat tets.
+  Interior vertices of the unit cube: moved at random by up to 0.3 cells; or a line of them moved to within a thousandth of the
+  plane of faces, which leaves flat tets.
 */
 static void move_vertex(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
 {
@@ -58,7 +58,7 @@ static PetscErrorCode write_mesh(Shape shape, PetscInt cells, char path[512])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* C = A^T B, and back with the plain product. */
+/* C = A^T B if transposed, else A B. */
 static void product(const PetscReal A[9], PetscBool transposed, const PetscReal B[9], PetscReal C[9])
 {
   for (int i = 0; i < 3; i++) {
@@ -82,7 +82,7 @@ static PetscReal cofactor(const PetscReal F[9], PetscReal c[9])
   return F[0] * c[0] + F[1] * c[1] + F[2] * c[2];
 }
 
-/* First Piola-Kirchhoff stress of each law. */
+/* First Piola-Kirchhoff stress of each material. */
 static void exact_stress(const char *law, PetscReal E, PetscReal nu, const PetscReal F[9], PetscReal P[9])
 {
   const PetscReal mu = E / (2. * (1. + nu)), lambda = E * nu / ((1. + nu) * (1. - 2. * nu));
@@ -121,7 +121,7 @@ static void exact_stress(const char *law, PetscReal E, PetscReal nu, const Petsc
   product(R, PETSC_FALSE, S, P);
 }
 
-/* The linear law has one stress, the others Cauchy's P F^T / J; in the order of SbSpaceCellState(). */
+/* Small-strain stress of the linear material, Cauchy stress P F^T / J of the others; in the order of SbSpaceCellState(). */
 static void exact_cauchy(const char *law, const PetscReal F[9], const PetscReal P[9], PetscReal sigma[6])
 {
   static const int row[6] = {0, 1, 2, 0, 1, 0}, column[6] = {0, 1, 2, 1, 2, 2};
@@ -172,7 +172,7 @@ static PetscErrorCode errors(TestScene *t, const PetscReal F[9], const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Displacement of the boundary, or of x = 0 alone with the traction P N on the other five sides. */
+/* Prescribed displacement of the boundary, or of x = 0 only with the traction P N on the other five sides. */
 static PetscErrorCode load_options(PetscBool pulled, const PetscReal F[9], const PetscReal P[9], char text[],
                                    size_t size)
 {
@@ -205,14 +205,14 @@ static PetscErrorCode load_options(PetscBool pulled, const PetscReal F[9], const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A mesh with the element that is tried on it. */
+/* Mesh and the element that is tested on it. */
 typedef struct {
   Shape shape;
   const char *element;
   char path[512];
 } Patch;
 
-/* known: normal and shear stress of the paper; NULL: not examined. */
+/* known: normal and shear stress of the paper; NULL: not checked. */
 static PetscErrorCode check_patch(const Patch *p, const char *law, PetscReal nu, PetscBool pulled,
                                   const PetscReal F[9], const PetscReal known[2])
 {
@@ -255,13 +255,13 @@ static PetscErrorCode check_patch(const Patch *p, const char *law, PetscReal nu,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All that is asked of an element on one mesh. */
+/* All checks of an element on one mesh. */
 static PetscErrorCode check_mesh(const Patch *p)
 {
   const PetscReal small[9] = {1. + 1e-3, 5e-4, 5e-4, 5e-4, 1. + 1e-3, 5e-4, 5e-4, 5e-4, 1. + 1e-3};
-  /* a stretch by a quarter with shear and a turn, nearly without change of volume */
+  /* a stretch by a quarter with shear and rotation, nearly isochoric */
   const PetscReal large[9] = {1.25, 0.1, 0.05, -0.2, 0.9, 0.1, 0.1, -0.15, 0.9};
-  /* CR and DG with nonlinear laws are not stable under pressures above their shear modulus: without change of volume */
+  /* CR and DG with nonlinear materials are unstable under pressures above their shear modulus: isochoric */
   const PetscReal even[9] = {1. + 2e-3, 5e-4, 5e-4, 5e-4, 1. - 1e-3, 5e-4, 5e-4, 5e-4, 1. - 1e-3};
   const PetscReal paper[2] = {2000., 400.};
 
@@ -270,10 +270,10 @@ static PetscErrorCode check_mesh(const Patch *p)
     PetscCall(check_patch(p, "linear", 0.25, (PetscBool)pulled, small, paper));
     PetscCall(check_patch(p, "linear", 0.4999, (PetscBool)pulled, small, NULL));
   }
-  /* the laws ask for many solves, and the mesh of slivers is the largest */
+  /* the materials need many solves, and the mesh of slivers is the largest */
   for (int law = 0; law < (p->shape == SLIVERS && strcmp(p->element, "p1") ? 1 : 4); law++) {
     PetscCall(check_patch(p, laws[law], 0.25, PETSC_FALSE, large, NULL));
-    /* flat tets next to incompressible ones: hundreds of Newton steps lead there, to the same digits */
+    /* flat tets of nearly incompressible material: hundreds of Newton steps are needed, for the same digits */
     if (p->shape == SLIVERS && law > 0) continue;
     PetscCall(check_patch(p, laws[law], 0.4999, PETSC_FALSE, strcmp(p->element, "p1") ? even : large, NULL));
   }
@@ -289,7 +289,7 @@ int main(int argc, char **argv)
   for (p.shape = REGULAR; p.shape <= SLIVERS; p.shape++) {
     PetscCall(write_mesh(p.shape, p.shape == SLIVERS ? 5 : 3, p.path));
     for (int e = 0; e < 4; e++) {
-      /* the others: one mesh without slivers is enough */
+      /* other elements: one mesh without slivers is enough */
       if (e > 0 && p.shape == REGULAR) continue;
       p.element = elements[e];
       PetscCall(check_mesh(&p));

@@ -17,13 +17,13 @@
 #include "../parts.h"
 #include "verify.h"
 
-#define EVENTS 128 /* most names of all families */
+#define EVENTS 128 /* upper bound of the number of event names */
 
 typedef struct {
   PetscBool bare; /* the space holds nothing of supports, contact and faces, nobody watches the run */
   PetscInt n;     /* unknowns: u[n], v[n] by original number */
   PetscReal *u, *v;
-  PetscInt events[EVENTS]; /* how often each was begun */
+  PetscInt events[EVENTS]; /* number of times that each event began */
   PetscInt setup_n, step_n, neffect, n_effect, n_output;
   double setup_bytes, step_bytes, all_n, all_bytes,
     live; /* of our files; of all; in use before the run is destroyed */
@@ -59,7 +59,7 @@ static PetscErrorCode count_events(PetscInt count[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A scene from its beginning to its end. */
+/* Runs a scene from set-up to destruction. */
 static PetscErrorCode run(const char *options, Trace *trace)
 {
   PetscInt first[EVENTS];
@@ -94,7 +94,7 @@ static PetscErrorCode run(const char *options, Trace *trace)
   PetscCall(test_scene_close(&t));
   PetscCall(count_events(trace->events));
   for (PetscInt i = 0; i < nevent; i++) trace->events[i] -= first[i];
-  /* the line of progress is rank 0's */
+  /* only rank 0 prints progress */
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, trace->events, EVENTS, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -113,7 +113,7 @@ static PetscBool same_motion(const Trace *a, const Trace *b, PetscInt n)
                      !memcmp(a->v, b->v, sizeof(PetscReal) * (size_t)n));
 }
 
-/* Whether a name is one of those in a text with commas. */
+/* Whether a comma-separated list contains a name. */
 static PetscBool among(const char *name, const char *list)
 {
   const size_t length = strlen(name);
@@ -150,7 +150,7 @@ static PetscErrorCode check_output_rows(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The events of `with` are those of `without` and those of the part; an element or a law takes the place of one. */
+/* The events of `with` are those of `without` and those of the part; an element or a material replaces one event. */
 static void check_events(const Part *part, const Trace *without, const Trace *with)
 {
   const PetscBool replaces =
@@ -171,7 +171,7 @@ static void check_events(const Part *part, const Trace *without, const Trace *wi
   SB_CHECK(gone == (replaces ? 1 : 0), "with %s %s %d events are gone", part->family, part->name, (int)gone);
 }
 
-/* The preconditioner is one that needs nothing but the matrix. */
+/* Scene with a preconditioner that needs only the matrix. */
 static PetscErrorCode scene_text(const char *mesh, const char *scene, const char *options,
                                  char text[PART_TEXT])
 {
@@ -183,7 +183,7 @@ static PetscErrorCode scene_text(const char *mesh, const char *scene, const char
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Named, beside the same scene without it; then the base scene as it was. */
+/* Compares a scene that names the part with the same scene without it; then repeats the base scene. */
 static PetscErrorCode check_part(const Part *part, const char *base, const Trace *reference)
 {
   const PetscBool output = (PetscBool)(!strcmp(part->family, "output") || !strcmp(part->family, "field") ||
@@ -230,14 +230,14 @@ static PetscErrorCode check_part(const Part *part, const char *base, const Trace
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What is named for the bar leaves a body alone that is far away; it is the first, so that its numbers stay. */
+/* A part that is named for the bar does not change the motion of a distant body; that body is the first one, so that its numbers stay the same. */
 static PetscErrorCode check_apart(const Part *part, PetscBool exact)
 {
   static const char far[] =
     "-bodies still,bar -body_still_mesh box:0.1,0.1,0.1:2 -body_still_translate -9,0,0 "
     "-body_still_material corotated -body_still_young 5e4 -body_still_poisson 0.4 "
     "-body_still_angular_velocity 1,2,3 -time euler_symplectic -ts_dt 1e-4 -ts_max_time 8e-4";
-  const PetscInt n = 3 * 27; /* numbers of the first body's vertices */
+  const PetscInt n = 3 * 27; /* unknowns of the first body */
   Trace without, with;
   char text[PART_TEXT];
 
@@ -269,7 +269,7 @@ static PetscErrorCode check_family(const char *family, const char *base, const T
 
     PetscCall(part_find(family, names[i], &part, &found));
     SB_CHECK(found, "%s %s has no row in tests/parts.h: say how the scene there names it", family, names[i]);
-    /* what the base scene names itself is seen by what takes its place; the number of the body is written with any field */
+    /* parts of the base scene are tested by their replacements; the number of the body is written with any field */
     if (!found || !part.options[0] || !strcmp(part.events, "")) continue;
     PetscCall(check_part(&part, base, reference));
     if (part.apart) PetscCall(check_apart(&part, (PetscBool)strcmp(family, "element")));
@@ -277,7 +277,7 @@ static PetscErrorCode check_family(const char *family, const char *base, const T
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Before anything else was named: what is not in the scene does not exist. */
+/* Before any other scene is run: parts that the base scene does not name do not exist. */
 static PetscErrorCode check_first(const Trace *trace)
 {
   PetscFunctionBeginUser;
@@ -325,7 +325,7 @@ int main(int argc, char **argv)
   char base[PART_TEXT];
   PetscMPIInt rank;
 
-  /* the count of bytes wants PETSc's own malloc */
+  /* the count of bytes requires PETSc's own malloc */
   (void)setenv("PETSC_OPTIONS", "-malloc_dump", 1);
   SB_TEST_BEGIN(argc, argv);
   PetscCall(PetscLogDefaultBegin());
@@ -340,7 +340,7 @@ int main(int argc, char **argv)
   PetscCall(scene_text("box:0.4,0.1,0.1:2", "", "", base));
   PetscCall(run(base, &first));
   PetscCall(check_first(&first));
-  PetscCall(run(base, &reference)); /* parts of PETSc are set up by the first run that needs them */
+  PetscCall(run(base, &reference)); /* the first run that needs them sets up parts of PETSc */
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(part_families); k++)
     PetscCall(check_family(part_families[k].name, base, &reference));
   PetscCall(run(base, &last));
