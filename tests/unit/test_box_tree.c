@@ -24,7 +24,7 @@ static PetscReal number(void)
   return (PetscReal)(state >> 8) / 8388608. - 1;
 }
 
-/* Boxes of a kind: anywhere, on a lattice (many touch exactly), one inside the next, points, all the same, a few that are empty or no numbers. */
+/* Boxes of a kind: random, on a lattice (many touch exactly), nested, points, all the same, a few that are empty or not finite. */
 static void make_boxes(int kind, PetscInt n, PetscReal (*box)[6])
 {
   for (PetscInt i = 0; i < n; i++) {
@@ -44,7 +44,7 @@ static void make_boxes(int kind, PetscInt n, PetscReal (*box)[6])
   }
 }
 
-/* Each box that meets is given once: marks[i] is how often i was. */
+/* A query returns each overlapping box once: marks[i] counts box i. */
 static void check_query(const SbBoxTree *tree, PetscInt n, const PetscReal (*box)[6])
 {
   static PetscInt marks[MOST];
@@ -86,7 +86,7 @@ static void check_nearest(const SbBoxTree *tree, PetscInt n, const PetscReal (*b
   }
   SB_CHECK(nearest.limit2 == best && (found >= 0) == (best < limit2), "the nearest box is %g away, not %g",
            (double)best, (double)nearest.limit2);
-  /* without lowering the limit all within it are given */
+  /* if the limit is not reduced, all boxes within it are returned */
   for (SbBoxNearestBegin(tree, b, 0.01, &nearest); SbBoxNearestNext(&nearest, &i);) given++;
   for (i = 0; i < n; i++) within += distance2(box[i], b) <= 0.01;
   SB_CHECK(given == within, "%d boxes are given within the limit, there are %d", (int)given, (int)within);
@@ -168,7 +168,7 @@ static PetscErrorCode check_trees(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A cloud that moves, turns and grows keeps its order; one whose halves go different ways is ordered anew, once. */
+/* A cloud that moves, is inverted and grows keeps its tree; if its halves move apart, the tree is rebuilt, few times. */
 static PetscErrorCode check_refit(void)
 {
   static PetscReal box[MOST][6], moved[MOST][6];
@@ -201,7 +201,7 @@ static PetscErrorCode check_refit(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Points in clusters, on chains and at the same place, far from the origin too; against all pairs, gone over again and again for chains. */
+/* Points in clusters, in chains and coincident, far from the origin too; against all pairs, repeated until chains are complete. */
 static PetscErrorCode check_weld(void)
 {
   static PetscReal x[3 * MOST];

@@ -5,7 +5,7 @@
 
 #define NRANDOM 120000
 
-/* A pair out of one of several families, some of them degenerate; returns its size. */
+/* Pair from one of several families, some of them degenerate; returns its size. */
 static PetscReal make_pair(int i, PetscReal x[12])
 {
   static const PetscReal sizes[] = {1, 1e-6, 1, 1e4};
@@ -20,27 +20,27 @@ static PetscReal make_pair(int i, PetscReal x[12])
       break;
     case 2:
       x[3 * a + k] = x[3 * b + k];
-      break; /* two at one place */
+      break; /* coincident vertices */
     case 3:
       x[3 * a + k] = x[3 * b + k] + 1e-9 * x[3 * a + k];
-      break; /* nearly */
+      break; /* nearly coincident */
     case 4:
       x[9 + k] = x[6 + k] + (x[3 + k] - x[k]) * 0.7;
       break; /* parallel edges */
     case 5:
       x[9 + k] = x[6 + k] - (x[3 + k] - x[k]) + 1e-7 * x[9 + k];
-      break; /* nearly */
+      break; /* nearly parallel edges */
     case 6:
       x[9 + k] = 0.3 * x[3 + k] + 0.7 * x[6 + k] + 1e-6 * x[9 + k];
-      break; /* a sliver */
+      break; /* sliver triangle */
     case 7:
       x[3 * k + 2] = 0.25;
       x[11] = 0.25;
-      break; /* in one plane */
+      break; /* coplanar */
     case 8:
       x[3 * k + 2] = 0.25 + 1e-11 * x[3 * k + 2];
       x[11] = 0.25;
-      break; /* nearly */
+      break; /* nearly coplanar */
     case 9:
       x[k] = 0.2 * x[3 + k] + 0.3 * x[6 + k] + 0.5 * x[9 + k] + 1e-7 * x[k];
       break; /* close to a triangle */
@@ -69,7 +69,7 @@ static void check_random(void)
     SbDistanceFind(kind, x, &s);
     seen[kind][s.feature]++;
     SB_CHECK_NEAR(s.d, d, 4e-15 * size, "distance");
-    /* the closest points: on both sides, of weight one, as far from each other as it says, along the direction */
+    /* closest points: in both primitives, weights of sum one, at the returned distance along the normal */
     for (int a = 0; a < n; a++) {
       side[a >= pair_first(kind)] += s.weight[a];
       if ((a < pair_first(kind) ? s.weight[a] : -s.weight[a]) < 0) off = 1;
@@ -98,7 +98,7 @@ static void check_random(void)
   }
 }
 
-/* A vertex over a triangle and an edge over an edge, closer than rounding of differences would tell, far from the origin too. */
+/* A vertex above a triangle and two crossing edges, at gaps below the rounding error of differences, far from the origin too. */
 static void check_close(void)
 {
   for (int i = 0; i < 20; i++) {
@@ -118,7 +118,7 @@ static void check_close(void)
   }
 }
 
-/* First and second derivatives of d against central differences along random directions, where the feature is the same around. */
+/* First and second derivatives of d against central differences along random directions, where the closest feature does not change. */
 static void check_derivatives(void)
 {
   PetscInt seen[4] = {0};
@@ -150,7 +150,7 @@ static void check_derivatives(void)
       size = PetscMax(size, PetscAbsReal(H[k]));
       other = PetscMax(other, PetscAbsReal(H[k] - H[12 * (k % 12) + k / 12]));
     }
-    regular = (PetscBool)(size < 30 && s[0].d > 0.03); /* else the third derivative is large */
+    regular = (PetscBool)(size < 30 && s[0].d > 0.03); /* otherwise the third derivative is large */
     SB_CHECK_NEAR(other, 0, 1e-14 * size, "asymmetry of the second derivative");
     if (!same || !regular) continue;
     seen[s[0].feature]++;
@@ -164,7 +164,7 @@ static void check_derivatives(void)
                                                      (2 * step)));
     }
     SB_CHECK_NEAR(error, 0, 2e6 * step * step + 1e-9, "second derivative of the distance");
-    /* the factors, and nothing in rows of vertices that the kind has not */
+    /* the factors; zero rows of vertices that the kind does not have */
     SbDistanceHessian(x, &s[0], both, PETSC_FALSE, G);
     for (int k = 0; k < 144; k++) {
       const int a = k / 12, b = k % 12;
@@ -178,7 +178,7 @@ static void check_derivatives(void)
   for (int f = 0; f < 4; f++) SB_CHECK(seen[f] > 1000, "feature %d: %d", f, (int)seen[f]);
 }
 
-/* The least value of y . A y / y . y that a few steps of power iteration on s - A find. */
+/* Smallest value of y . A y / y . y after a few steps of power iteration on s - A. */
 static PetscReal least_eigenvalue(const PetscReal A[144])
 {
   PetscReal y[12], size = 0, value = 0;
@@ -200,7 +200,7 @@ static PetscReal least_eigenvalue(const PetscReal A[144])
   return value;
 }
 
-/* P is the part with eigenvalues above zero of A when P and P - A have none below and P (P - A) = 0. */
+/* P is the positive semidefinite part of A if P and P - A have no negative eigenvalues and P (P - A) = 0. */
 static void check_part(const PetscReal A[144], const PetscReal P[144], const char *what)
 {
   PetscReal N[144], size = 0, product = 0;

@@ -27,7 +27,7 @@ static PetscErrorCode open_fields(SbH5 *h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every point of every body shows the motion, which all elements hold exactly. */
+/* Every point of every body has the motion, which all elements represent exactly. */
 static PetscErrorCode test_affine(const char *more)
 {
   static const char *const names[] = {"displacement", "velocity", "acceleration"};
@@ -83,7 +83,7 @@ static void bumps(const PetscReal x[3], PetscReal value[3])
   value[2] = -bump(x);
 }
 
-/* What corner v of a cell with nodes at its faces has of `bump`, from the places of its vertices alone; its volume. */
+/* Contribution of a cell with nodes at its faces to `bump` at corner v, from the vertex positions only; its volume. */
 static PetscReal corner_of(SbMesh mesh, PetscInt cell, int v, PetscReal *V)
 {
   const PetscInt *p = mesh->cell + 4 * cell;
@@ -105,7 +105,7 @@ static PetscReal corner_of(SbMesh mesh, PetscInt cell, int v, PetscReal *V)
   return sum;
 }
 
-/* A function that CR and DG do not hold: vertices against a mean found by going through all cells. */
+/* A function that CR and DG do not represent exactly: vertex values against a mean over all cells. */
 static PetscErrorCode test_mean(PetscBool discontinuous)
 {
   TestScene scene;
@@ -150,7 +150,7 @@ static PetscErrorCode test_mean(PetscBool discontinuous)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Half a newton in each component at every held node: same sum and same moment as of the nodes, zero away from them. */
+/* Half a newton in each component at every constrained node: same sum and same moment as at the nodes, zero elsewhere. */
 static PetscErrorCode test_reactions(const char *more)
 {
   TestScene scene;
@@ -196,7 +196,7 @@ static PetscErrorCode test_reactions(const char *more)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A probe shows the vertex field at the nearest vertex, in any body, with and without fields. */
+/* A probe has the vertex field at the nearest vertex, in any body, with and without fields. */
 static PetscErrorCode test_probes(const char *fields)
 {
   static const PetscReal at[3][3] = {{0.4, 0.1, 0.2}, {0.3, 0.3, 0.1}, {0.1, 0.6, 0.1}};
@@ -228,7 +228,7 @@ static PetscErrorCode test_probes(const char *fields)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Frames go on with the points that they began with, or not at all; a refusal leaves the folder alone. */
+/* A restart keeps the type of points of the first run, or is an error; an error leaves the folder unchanged. */
 static PetscErrorCode test_restart(void)
 {
   TestScene scene;
@@ -262,7 +262,7 @@ static PetscErrorCode test_restart(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* P1 alone needs nothing. */
+/* P1 without vertex fields needs no additional data. */
 static PetscErrorCode test_nothing(void)
 {
   TestScene scene;

@@ -18,7 +18,7 @@ static const char *const guided =
 
 static PetscReal turn_angle, bend_angle; /* of the states below, rad */
 
-/* The bar turned about the y axis as a whole. */
+/* Rigid rotation of the bar about the y axis. */
 static void turned(const PetscReal x[3], PetscReal u[3])
 {
   const PetscReal c = PetscCosReal(turn_angle), s = PetscSinReal(turn_angle);
@@ -28,7 +28,7 @@ static void turned(const PetscReal x[3], PetscReal u[3])
   u[2] = -s * x[0] + (c - 1.) * x[2];
 }
 
-/* The bar bent to an arc of bend_angle, its axis keeping its length. */
+/* Bar bent to an arc of bend_angle, with constant length of its axis. */
 static void bent(const PetscReal x[3], PetscReal u[3])
 {
   const PetscReal radius = 0.4 / bend_angle, phi = x[0] / radius, z = x[2] - 0.05;
@@ -64,7 +64,7 @@ static PetscErrorCode open_case(const char *law, const char *extra, PetscBool fr
   PetscCall(SbSpaceCreateVec(c->t.model->space, &c->U));
   PetscCall(SbSpaceCreateVec(c->t.model->space, &c->b));
   PetscCall(SbSpaceCreateVec(c->t.model->space, &c->x));
-  PetscCall(SbModelProjectTangent(c->t.model, PETSC_TRUE)); /* definite at any state */
+  PetscCall(SbModelProjectTangent(c->t.model, PETSC_TRUE)); /* positive semidefinite at any state */
   c->frames = frames;
   if (frames)
     PetscCall(SbSpaceCreateMatrixFree(c->t.model->space, &c->A));
@@ -93,7 +93,7 @@ static PetscErrorCode close_case(Case *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Iterations at a state for h = 1/60 s; the true residual is checked. -1 when the solve failed. */
+/* Iterations at a state for h = 1/60 s; the true residual is checked. -1 if the solve failed. */
 static PetscErrorCode solve(Case *c, void (*state)(const PetscReal x[3], PetscReal u[3]), PetscReal rtol,
                             PetscInt *its)
 {
@@ -116,7 +116,7 @@ static PetscErrorCode solve(Case *c, void (*state)(const PetscReal x[3], PetscRe
     PetscCall(SbModelTangent(m, 0., stage.shift_v, stage.shift_a, 1., c->U, c->U, c->A));
   PetscCall(test_fill(m, push, c->b));
   PetscCall(KSPSetTolerances(c->ksp, rtol, PETSC_DEFAULT, PETSC_DEFAULT, 300));
-  PetscCall(KSPSetOperators(c->ksp, c->A, c->A)); /* tells the solver that A changed, as SNES does */
+  PetscCall(KSPSetOperators(c->ksp, c->A, c->A)); /* signals a change of A to the solver, as SNES does */
   PetscCall(KSPSolve(c->ksp, c->b, c->x));
   PetscCall(KSPGetIterationNumber(c->ksp, its));
   PetscCall(KSPGetConvergedReason(c->ksp, &reason));
@@ -132,7 +132,7 @@ static PetscErrorCode solve(Case *c, void (*state)(const PetscReal x[3], PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A free body: turned as a whole, the preconditioner is the exact inverse still. */
+/* Free body: after a rigid rotation the preconditioner is still the exact inverse. */
 static PetscErrorCode check_turn(const char *law, PetscBool frames)
 {
   PetscInt fresh, its, nfactor;
@@ -157,7 +157,7 @@ static PetscErrorCode check_turn(const char *law, PetscBool frames)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A held bar bent to an arc. Without turning the factor it takes three times as many iterations. */
+/* Clamped bar bent to an arc. Without rotation of the factor it needs three times as many iterations. */
 static PetscErrorCode check_bent(const char *law, const char *extra, PetscBool frames, PetscReal angle,
                                  PetscInt most, PetscInt *its)
 {
@@ -172,7 +172,7 @@ static PetscErrorCode check_bent(const char *law, const char *extra, PetscBool f
   PetscCall(solve(&c, bent, 1e-4, its));
   SB_CHECK(*its > 0 && *its <= most, "%s%s: %" PetscInt_FMT " iterations bent, allowed %" PetscInt_FMT, law,
            extra, *its, most);
-  /* renewed there, one or two do, and one more factorisation was made */
+  /* after renewal one or two iterations suffice; one more factorisation was made */
   PetscCall(KSPGetPC(c.ksp, &pc));
   PetscCall(SbPCRotatedRenew(pc));
   PetscCall(solve(&c, bent, 1e-4, &fresh));
@@ -183,7 +183,7 @@ static PetscErrorCode check_bent(const char *law, const char *extra, PetscBool f
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An operator that is not positive definite fails the solve, and the next good one is factored. */
+/* An operator that is not positive definite fails the solve; the next definite one is factored. */
 static PetscErrorCode check_indefinite(void)
 {
   PetscInt its;
@@ -204,7 +204,7 @@ static PetscErrorCode check_indefinite(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What an application reads is shared: all ranks together read little more than one does alone, and none much more than its part. */
+/* The work of an application is distributed: all ranks together read little more than a single rank, and none much more than its share. */
 static PetscErrorCode check_work(PetscMPIInt size)
 {
   const char *options = "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:24,7,7 -body_bar_material linear "
@@ -270,8 +270,7 @@ int main(int argc, char **argv)
   PetscCall(
     PetscPrintf(PETSC_COMM_WORLD, "bent bar on %d ranks: %" PetscInt_FMT " iterations\n", (int)size, its[0]));
   PetscCall(check_bent(WARPED, guided, PETSC_TRUE, 2., 13, &its[0]));
-  PetscCall(
-    check_bent("corotated", held, PETSC_FALSE, 2., 25, &its[0])); /* the exact tangent, made definite */
+  PetscCall(check_bent("corotated", held, PETSC_FALSE, 2., 25, &its[0])); /* exact tangent, projected */
   PetscCall(check_bent("neohookean", held, PETSC_FALSE, 0.5, 15, &its[0]));
   PetscCall(check_indefinite());
   PetscCall(check_work(size));

@@ -10,14 +10,14 @@
 
 static const PetscReal zero[3] = {0, 0, 0};
 
-/* Numbers in -1..1 that are the same everywhere. */
+/* Reproducible numbers in -1..1. */
 static PetscReal number(unsigned *state)
 {
   *state = *state * 1664525u + 1013904223u;
   return (PetscReal)(*state >> 8) / (1 << 23) - 1;
 }
 
-/* The obstacle mesh:FILE of a surface. */
+/* Creates the obstacle mesh:FILE of a surface. */
 static PetscErrorCode make(const TestSurface *s, SbObstacle *o, size_t size, char note[])
 {
   char path[512], text[600];
@@ -33,7 +33,7 @@ static PetscErrorCode make(const TestSurface *s, SbObstacle *o, size_t size, cha
 
 /* ------------------------------------------------------------------ cube */
 
-/* The same distances as the box. */
+/* Same distances as the box. */
 static PetscErrorCode check_cube(void)
 {
   const PetscReal lo[3] = {-0.5, -0.4, -0.3}, hi[3] = {0.6, 0.5, 0.7};
@@ -69,7 +69,7 @@ static PetscErrorCode check_cube(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* At a corner, on an edge and on a face: no distance, and a normal between those of the sides. */
+/* At a corner, on an edge and on a face: zero distance, and a normal between those of the adjacent faces. */
 static PetscErrorCode check_on(void)
 {
   static const PetscReal at[4][3] = {{1, 1, 1}, {1, 1, 0.3}, {1, 0.2, 0.3}, {1 - 1e-13, 0.2, 0.3}};
@@ -88,7 +88,7 @@ static PetscErrorCode check_on(void)
     SB_CHECK_NEAR(d, i < 3 ? 0 : -1e-13, 1e-15, "on the surface");
     SB_CHECK_NEAR(SbDot3(n, n), 1, 1e-14, "length of the normal");
     for (int k = 0; k < 3; k++) {
-      /* the triangles at a corner weigh by their angles: the three sides alike */
+      /* normals of the triangles at a corner are weighted by their angles: the three faces count equally */
       const PetscReal exact = i == 0 ? 1 / PetscSqrtReal(3.) : i == 1 ? (k < 2) / PETSC_SQRT2 : k == 0;
 
       SB_CHECK_NEAR(n[k], exact, 1e-14, "normal on the surface");
@@ -99,7 +99,7 @@ static PetscErrorCode check_on(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ any surface */
+/* ------------------------------------------------------------------ arbitrary surfaces */
 
 static PetscReal solid_angle(const TestSurface *s, PetscInt f, const PetscReal x[3])
 {
@@ -114,7 +114,7 @@ static PetscReal solid_angle(const TestSurface *s, PetscInt f, const PetscReal x
                                       SbDot3(a[1], a[2]) * l[0] + SbDot3(a[2], a[0]) * l[1]);
 }
 
-/* Distance of a point from a triangle by its inside and its three edges, all tried: slow and plain. */
+/* Distance between a point and a triangle by brute force: its interior and its three edges. */
 static PetscReal from_triangle(const TestSurface *s, PetscInt f, const PetscReal x[3])
 {
   const PetscReal *p[3] = {s->x[s->tri[f][0]], s->x[s->tri[f][1]], s->x[s->tri[f][2]]};
@@ -146,7 +146,7 @@ static PetscReal from_triangle(const TestSurface *s, PetscInt f, const PetscReal
   return over ? PetscMin(best, PetscAbsReal(h)) : best;
 }
 
-/* Against all triangles: distances, signs, the nearest point of the surface. */
+/* Against all triangles: distances, signs, closest points on the surface. */
 static PetscErrorCode check_surface(const TestSurface *s, PetscReal box, const char *what)
 {
   SbObstacle o;
@@ -192,7 +192,7 @@ static PetscErrorCode check_torus(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A cube with a cavity and a thin plate beside it. */
+/* A cube with a cavity and a separate thin plate. */
 static PetscErrorCode check_parts(void)
 {
   const PetscReal a[3] = {-0.5, -0.5, -0.5}, b[3] = {0.5, 0.5, 0.5}, c[3] = {-0.3, -0.3, -0.3},
@@ -223,7 +223,7 @@ static PetscReal longest_edge(const TestSurface *s)
   return longest;
 }
 
-/* A triangle in the unit sphere with edges up to h is at most h^2 / 6 away from it, and its normal turned by less than h. */
+/* A triangle in the unit sphere with edges up to h is at most h^2 / 6 away from it, and its normal deviates by less than h. */
 static PetscErrorCode check_sphere(int split)
 {
   TestSurface s;
@@ -275,7 +275,7 @@ static PetscErrorCode check_errors(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Time to make the tree and of a query, for who wants to know: nothing is checked. */
+/* Time of building the tree and of a query, for information: nothing is checked. */
 static PetscErrorCode measure(void)
 {
   TestSurface s;

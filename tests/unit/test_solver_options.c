@@ -51,7 +51,7 @@ static const char *const presets[] = {
   "auto",         "direct",  "cg",       "cg_jacobi",    "cg_pbjacobi",   "cg_icc",  "cg_ssor",
   "cg_two_level", "cg_gamg", "cg_hypre", "gauss_seidel", "sor",           "cholmod", "umfpack",
   "mumps",        "rotated", "realtime", "pressure",     "cg_p_multigrid"};
-/* Norms that a method can be judged by, of PETSc's manual. */
+/* Norms that a method supports, from PETSc's manual. */
 static const char *const norms[][2] = {
   {"cg", "none preconditioned unpreconditioned natural"},
   {"fcg", "none preconditioned unpreconditioned natural"},
@@ -65,7 +65,7 @@ static const char *const norms[][2] = {
   {"bcgs", "none preconditioned unpreconditioned"},
 };
 
-/* Runs a case with more options; x: the largest displacement of all nodes, m. */
+/* Runs a case with additional options; x: 2-norm of the displacement vector, m. */
 static PetscErrorCode run(const Case *c, const char *more, PetscErrorCode *code, PetscReal *x, char stop[512])
 {
   char text[2048];
@@ -88,7 +88,7 @@ static PetscErrorCode run(const Case *c, const char *more, PetscErrorCode *code,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Does what it must: the answer `exact` (0: any), or a refusal that names `option`. */
+/* Expects the solution `exact` (0: any), or an error that names `option`. */
 static PetscErrorCode check(const Case *c, const char *more, PetscReal exact, const char *option)
 {
   PetscErrorCode code;
@@ -105,14 +105,14 @@ static PetscErrorCode check(const Case *c, const char *more, PetscReal exact, co
   } else {
     SB_CHECK(!code && !stop[0], "%s, %s: code %d, %s%s", c->name, more, (int)code, sb_test_text, stop);
     if (!code && !stop[0] && exact > 0.)
-      /* where surfaces push each other Newton's method ends by the length of its step */
+      /* with contact between surfaces Newton's method stops by the length of its step */
       SB_CHECK(PetscAbsReal(x - exact) <= (strcmp(c->name, "pairs") ? 1e-4 : 1e-3) * exact,
                "%s, %s: %.10g, not %.10g", c->name, more, (double)x, (double)exact);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether this PETSc has what a type or a preset needs here. */
+/* Whether this PETSc has the package that a type or a preset needs here. */
 static PetscErrorCode available(const char *name, PetscMPIInt size, PetscBool *has)
 {
   const char *package = !strcmp(name, "cg_hypre") ? "hypre" : name;
@@ -126,7 +126,7 @@ static PetscErrorCode available(const char *name, PetscMPIInt size, PetscBool *h
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What -ksp_type with -pc_type is refused by; NULL: by nothing. */
+/* Option that the error of -ksp_type with -pc_type names; NULL: no error. */
 static const char *refused(PetscMPIInt size, const char *method, const char *type)
 {
   if (size > 1 && !strcmp(type, "icc")) return "-pc_type icc";
@@ -134,7 +134,7 @@ static const char *refused(PetscMPIInt size, const char *method, const char *typ
                                                                                        : "-ksp_type preonly";
 }
 
-/* What a preset is refused by when the user leaves its preconditioner. */
+/* Option that the error of a preset names if the user keeps its preconditioner. */
 static const char *refused_preset(const Case *c, const char *method, const char *preset)
 {
   const PetscBool direct = (PetscBool)(!strcmp(preset, "cholmod") || !strcmp(preset, "mumps") ||
@@ -186,7 +186,7 @@ static PetscErrorCode check_case(const Case *c, PetscMPIInt size, PetscBool all)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every norm of every method. */
+/* Tests every norm of every method. */
 static PetscErrorCode check_norms(const Case *c)
 {
   static const char *const all[] = {"none", "preconditioned", "unpreconditioned", "natural"};
@@ -210,14 +210,14 @@ static PetscErrorCode check_norms(const Case *c)
       }
       PetscCall(PetscSNPrintf(more, sizeof(more), "-ksp_type %s -pc_type bjacobi -ksp_norm_type %s%s",
                               norms[k][0], all[n], n ? "" : " -ksp_convergence_test skip -ksp_max_it 25"));
-      /* a number of iterations instead of a norm leaves what it leaves */
+      /* a fixed number of iterations instead of a norm leaves an unknown error */
       PetscCall(check(c, more, n ? exact : 0., has ? NULL : "-ksp_norm_type"));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* GAMG follows the springs of contact, which stiffen the matrix from one iteration of Newton's method to the next. */
+/* GAMG with contact springs, which stiffen the matrix from one Newton iteration to the next. */
 static PetscErrorCode check_springs(void)
 {
   static const Case springs = {
@@ -260,7 +260,7 @@ static PetscErrorCode check_barrier(void)
   PetscFunctionBeginUser;
   PetscCall(run(&barrier, "", &code, &exact, stop));
   SB_CHECK(!code && !stop[0], "barrier: code %d, %s%s", (int)code, sb_test_text, stop);
-  /* 7 Newton iterations by a factorisation; without the shift 60 and more, so load steps are halved */
+  /* a factorisation needs 7 Newton iterations; without the shift 60 and more are needed, so load steps are halved */
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(more); k++) {
     char text[256];
 
@@ -296,7 +296,7 @@ static PetscErrorCode check_said(void)
   SB_CHECK(t.run->stop_reason[0] && t.run->rejected_total == 1, "%d steps are rejected, '%s'",
            (int)t.run->rejected_total, t.run->stop_reason);
   PetscCall(test_scene_close(&t));
-  // PETSc 3.18: CG ends as converged where the preconditioner makes nothing of its residual, as that of a matrix of updates before the first of them.
+  // PETSc 3.18: CG ends as converged if the preconditioner maps its residual to zero, as a matrix of updates does before its first update.
   PetscCall(test_scene_open(STATIC "-body_a_material linear -ksp_type cg -pc_type lmvm ", &t));
   PetscCall(SbRunSolve(t.run));
   PetscCall(VecNorm(t.run->U, NORM_INFINITY, &largest));

@@ -26,7 +26,7 @@ static void shear(const PetscReal x[3], PetscReal v[3])
   v[2] = x[0] * (x[1] - x[2]);
 }
 
-/* J w from one storage, its norm and its distance to the BAIJ one */
+/* J w with one storage format, its norm, and its difference from that of BAIJ. */
 static PetscErrorCode storage(TestScene *t, SbMatrixKind kind, Vec U, Vec V, Vec W, Vec Y)
 {
   Mat A;
@@ -111,7 +111,7 @@ static PetscErrorCode energy_slope(TestScene *t, const char *what, Vec U, Vec W)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* w . J v = v . J w, with v and w of no symmetry */
+/* w . J v = v . J w for v and w without symmetry */
 static PetscErrorCode symmetry(TestScene *t, const char *what, Vec U, Vec V, Vec W)
 {
   PetscScalar a, b;
@@ -136,7 +136,7 @@ static PetscErrorCode symmetry(TestScene *t, const char *what, Vec U, Vec V, Vec
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Internal forces of free bodies balance, also with jumps: the sum over all unknowns of one direction. */
+/* Internal forces of free bodies balance, also with jumps: the sum over all nodes of one component. */
 static PetscErrorCode balance(TestScene *t, const char *what, Vec U, Vec F)
 {
   PetscReal norm, total;
@@ -153,7 +153,7 @@ static PetscErrorCode balance(TestScene *t, const char *what, Vec U, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lumped mass of all nodes, and the force of unit acceleration with the mass that the scene asks for. */
+/* Lumped mass of all nodes, and the force of unit acceleration with the mass of the scene. */
 static PetscErrorCode total_mass(TestScene *t, const char *what, Vec A, Vec F)
 {
   const SbSpace s = t->model->space;
@@ -200,7 +200,7 @@ static PetscErrorCode one_scene(const char *law, const char *mass, const char *e
   PetscCall(storage(&t, SB_MATRIX_BAIJ, U, V, W, Y[0]));
   PetscCall(storage(&t, SB_MATRIX_AIJ, U, V, W, Y[1]));
   PetscCall(VecNorm(Y[0], NORM_2, &norm));
-  /* the same partition-independent vectors: the norm is the same number on any rank count */
+  /* partition-independent vectors: the norm is the same on any number of ranks */
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "%s %s %s: |J w| = %.12g\n", law, mass, extra, (double)norm));
   PetscCall(VecAXPY(Y[1], -1., Y[0]));
   PetscCall(VecNorm(Y[1], NORM_2, &diff));
@@ -213,7 +213,7 @@ static PetscErrorCode one_scene(const char *law, const char *mass, const char *e
     SB_CHECK(diff < 1e-13 * norm, "%s: SBAIJ and BAIJ differ by %g of %g", law, (double)diff, (double)norm);
   }
   PetscCall(taylor(&t, exact, U, V, W));
-  /* at rest the tangent of damping is complete too: it leaves out only how it changes with the displacement */
+  /* at zero velocity the tangent of damping is complete too: it omits only the dependence of damping on the displacement */
   PetscCall(VecZeroEntries(V));
   PetscCall(taylor(&t, strcmp(law, "corotated") || strstr(extra, "exact"), U, V, W));
   PetscCall(PetscSNPrintf(text, sizeof(text), "%s, %s mass %s", law, mass, extra));
@@ -229,7 +229,7 @@ static PetscErrorCode one_scene(const char *law, const char *mass, const char *e
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Each element with each law; a body of P1 or of the other element beside. `exact` where the tangent leaves nothing out. */
+/* Each element with each material, beside a body of P1 or of the other element. `exact`: the tangent is complete. */
 static PetscErrorCode one_element(const char *a, const char *b)
 {
   const char *const exact = " -body_a_tangent exact -body_b_tangent exact -effect_damping_beta 0";
@@ -244,7 +244,7 @@ static PetscErrorCode one_element(const char *a, const char *b)
   PetscCall(one_scene("corotated", "lumped", text, PETSC_TRUE));
   PetscCall(one_scene("stvk", "consistent", text, PETSC_TRUE));
   PetscCall(one_scene("neohookean", "lumped", text, PETSC_TRUE));
-  /* beta K v: the tangent leaves out dK/du, so the exact check runs without damping */
+  /* beta K v: the tangent omits dK/du, so the exact check runs without damping */
   PetscCall(PetscSNPrintf(text, sizeof(text), "%s -body_a_tangent exact -body_b_tangent exact", bodies));
   PetscCall(one_scene("corotated", "lumped", text, PETSC_FALSE));
   PetscCall(one_scene("neohookean", "lumped", text, PETSC_FALSE));

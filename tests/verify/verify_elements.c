@@ -16,7 +16,7 @@
 #define BODY " -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 "
 #define EXACT " -ksp_rtol 1e-13 -snes_rtol 1e-13 -snes_stol 0 "
 
-/* Name in messages, and options, of body a. */
+/* Name in messages and options of body a. */
 static const char *const kinds[][2] = {
   {"p1", " -body_a_element p1"},      {"cr", " -body_a_element cr"},
   {"dg weak", " -body_a_element dg"}, {"dg strong", " -body_a_element dg -body_a_dirichlet strong"},
@@ -24,7 +24,7 @@ static const char *const kinds[][2] = {
 };
 #define NKIND ((int)PETSC_STATIC_ARRAY_LENGTH(kinds))
 
-/* Force, N, of the unconstrained residual at prescribed unknowns of a body, and its moment, N m, about the origin at rest. */
+/* Force, N, of the residual at prescribed unknowns of a body, and its moment, N m, about the origin of the reference configuration. */
 static PetscErrorCode reaction(const TestScene *t, PetscInt body, PetscReal sum[6])
 {
   const SbSpace s = t->model->space;
@@ -55,7 +55,7 @@ static PetscErrorCode reaction(const TestScene *t, PetscInt body, PetscReal sum[
 
 /* ------------------------------------------------------------------ supports */
 
-/* Strain energy of a bar of n cells across, kind as above. Small strains: forces balance at rest. */
+/* Strain energy of a bar of n cells across, kind as above. Small strains: equilibrium in the reference configuration. */
 static PetscErrorCode bar(int kind, PetscInt n, PetscReal *strain)
 {
   // 2 kg at (.1, .05, .05), and 3 N along y, 6 N along z spread over the end x = 0.2.
@@ -95,13 +95,13 @@ static PetscErrorCode check_supports(void)
     PETSC_COMM_WORLD,
     "  supports: strain energy of weak and strong ones differs by %.1e, %.1e on a mesh half as wide\n",
     (double)difference[0], (double)difference[1]));
-  /* second order: a quarter; a rest for the edge of the clamp, where stress is singular */
+  /* second order: a quarter; the tolerance covers the singular stress at the edge of the clamp */
   SB_CHECK(difference[0] < 5e-3 && difference[1] < 0.35 * difference[0],
            "weak and strong supports differ by %g, %g", (double)difference[0], (double)difference[1]);
-  /* the singular edge again: all are within a few percent, P1 is stiff */
+  /* the singular edge again: all elements are within a few percent, P1 is stiff */
   for (int kind = 1; kind < 4; kind++) SB_CHECK_NEAR(strain[kind][1] / strain[3][1], 1, 2e-3, kinds[kind][0]);
   SB_CHECK(strain[0][1] < strain[1][1], "P1 is softer than CR");
-  /* DG on this mesh is softer than the limit by as much */
+  /* DG on this mesh is softer than the limit by the same amount */
   SB_CHECK_NEAR(strain[4][1] / strain[3][1], 1, 1e-2, "P2");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -128,10 +128,10 @@ static PetscErrorCode check_drive(int kind)
   PetscCall(verify_solve(&t, kinds[kind][0]));
   PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &e));
   PetscCall(reaction(&t, 0, sum));
-  // Rounding: stresses of 1e-16 E on 0.1 x 0.1 m, strains of 1e-16; Newton's tolerance adds its own.
+  // Rounding: stresses of 1e-16 E on 0.1 x 0.1 m, strains of 1e-16; plus Newton's tolerance.
   SB_CHECK_NEAR(e.strain, 0, 1e-12, kinds[kind][0]);
   for (int k = 0; k < 3; k++) SB_CHECK_NEAR(sum[k], 0, 1e-7, kinds[kind][0]);
-  // Every node has followed, also inside.
+  // Every node follows, interior ones too.
   {
     const SbSpace s = t.model->space;
     const PetscScalar *x;
@@ -181,7 +181,7 @@ static PetscErrorCode check_mixed(void)
   for (PetscInt b = 0; b < 4; b++) {
     const PetscReal density[] = {1000, 500, 250, 200};
     PetscReal sum[6];
-    // 5 x 3 vertices of a and of b lie in the set, three layers of 9 of c, and nothing of d.
+    // 5 x 3 vertices of a and of b are in the set, three layers of 9 of c, and none of d.
     const PetscReal poke = (b < 2 ? 15. : b == 2 ? 27. : 0.) / 57.;
 
     PetscCall(reaction(&t, b, sum));
@@ -245,7 +245,7 @@ static PetscErrorCode check_flight(int kind, const char *mass)
 
 /* ------------------------------------------------------------------ motion */
 
-/* A clamped bar thrown up: the sum of energies and the strain energy at the end. */
+/* A clamped bar with an initial upward velocity: the sum of energies and the strain energy at the end. */
 static PetscErrorCode swing(int kind, const char *time, PetscReal energy[2])
 {
   char text[VERIFY_TEXT];
@@ -280,7 +280,7 @@ static PetscErrorCode check_motion(int kind)
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
                         "  %s: strain energy at the end %.6g by Newmark, %.6g by symplectic Euler\n",
                         kinds[kind][0], (double)implicit[1], (double)explicit[1]));
-  /* the steps resolve the swing, not the fastest waves that the start sends through the bar */
+  /* the steps resolve the oscillation, not the fastest waves that the start excites in the bar */
   SB_CHECK_NEAR(explicit[1] / implicit[1], 1, 0.05, kinds[kind][0]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -27,7 +27,7 @@
 
 #define NU 0.499
 #define STRETCH 1.5
-#define GROWTH 1.3 /* of the thickness from layer to layer */
+#define GROWTH 1.3 /* ratio of the thicknesses of successive layers */
 #define WALLS "-set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 -set_z0_at plane:0,0,1,0 "
 
 /* (dW/dl) / (l^k - 1) by dW/dI1 with mu = 1; I1 - 3 >= 0 has a double zero at l = 1. */
@@ -69,7 +69,7 @@ static void check_quadrature(void)
                 1e-9, "cylinder, classical energy");
 }
 
-/* Radius of the surface below a layer of so many in all; the fine mesh has ten. */
+/* Radius of the surface below a layer, of nlayer in all; the fine mesh has ten. */
 static PetscReal radius(PetscInt layer, PetscInt nlayer)
 {
   const PetscReal growth = PetscPowReal(GROWTH, 10. / (PetscReal)nlayer);
@@ -78,8 +78,8 @@ static PetscReal radius(PetscInt layer, PetscInt nlayer)
 }
 
 /*
-  An eighth of the sphere: nlayer layers of n^2 triangles of an octahedron's face each, whose prisms are cut into three tets along the diagonals to the
-  vertex of the higher number. Collective.
+  An eighth of the sphere: nlayer layers, each with the n^2 triangles of an octahedron's face, whose prisms are cut into three tets along the diagonals to the
+  vertex with the higher number. Collective.
 */
 static PetscErrorCode write_sphere(PetscInt n, PetscInt nlayer, char path[512])
 {
@@ -91,7 +91,7 @@ static PetscErrorCode write_sphere(PetscInt n, PetscInt nlayer, char path[512])
   if (f) {
     PetscInt count = 0;
 
-    /* vertex (i, j) of a layer has the number of those before it: rows j of n + 1 - j vertices */
+    /* number of vertex (i, j) of a layer: rows j of n + 1 - j vertices */
     fprintf(f, "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n%d\n", (int)((nlayer + 1) * per_layer));
     for (PetscInt layer = 0; layer <= nlayer; layer++) {
       const PetscReal r = radius(layer, nlayer);
@@ -114,9 +114,9 @@ static PetscErrorCode write_sphere(PetscInt n, PetscInt nlayer, char path[512])
 
       for (PetscInt j = 0; j < n; row += n + 1 - j, j++) {
         for (PetscInt c = 0; c < 2 * (n - j) - 1; c++) {
-          const PetscInt a = row + c / 2 + 1, b = a + n + 1 - j; /* below and above, which has one less */
+          const PetscInt a = row + c / 2 + 1, b = a + n + 1 - j; /* in this row; in the next, shorter one */
           const PetscInt low[3] = {c % 2 ? a + 1 : a, c % 2 ? b : a + 1, c % 2 ? b + 1 : b};
-          const PetscInt way = c % 2 ? 1 : 0; /* the two kinds of triangles turn opposite ways */
+          const PetscInt way = c % 2 ? 1 : 0; /* the two kinds of triangles have opposite orientations */
 
           for (PetscInt k = 0; k < 3; k++) {
             PetscInt v[4];
@@ -139,7 +139,7 @@ static PetscErrorCode write_sphere(PetscInt n, PetscInt nlayer, char path[512])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A quarter of a ring, one layer in z. */
+/* Map of a quarter of a ring, one layer in z. */
 static void ring(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
 {
   const PetscReal r = radius(at[0], n[0]), angle = 0.5 * PETSC_PI * x[1];
@@ -150,7 +150,7 @@ static void ring(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void
   x[2] *= 0.1;
 }
 
-/* Mean stretch of the inner wall: of the radii of its facets' centroids. */
+/* Mean stretch of the inner wall, from the radii of its facets' centroids. */
 static PetscErrorCode inner_stretch(TestScene *t, PetscInt k, PetscReal *stretch)
 {
   const SbSpace s = t->model->space;
@@ -187,7 +187,7 @@ static void ripple(const PetscReal x[3], PetscReal v[3])
   v[2] = x[2] * PetscSinReal(2. * x[0] + 1.);
 }
 
-/* Error that one iteration leaves of a disturbance of the solution. */
+/* Error after one iteration from a perturbation of the solution. */
 static PetscErrorCode one_step(TestScene *t, PetscReal size, PetscReal *error)
 {
   Vec X;
@@ -243,7 +243,7 @@ static PetscErrorCode check(PetscInt k, const char *mesh, const char *more, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On two meshes. */
+/* Compares two meshes. */
 static PetscErrorCode check_body(PetscInt k, const char *more)
 {
   PetscReal error[2], again;

@@ -12,7 +12,7 @@
   "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:2 -body_bar_young 1e5 -body_bar_poisson 0.3 " \
   "-body_bar_density 1000 -effects gravity,hold -effect_hold_type fixed -effect_hold_on xmin "
 
-/* The norm of the energy of the difference of two states of the model, whose law is linear or nearly so between them. */
+/* Energy norm of the difference of two states of the model, whose material is linear or nearly linear between them. */
 static PetscErrorCode distance(SbModel m, Vec U, Vec V, Vec U1, Vec V1, PetscReal *error)
 {
   PetscReal unused, mass = 0., all;
@@ -55,7 +55,7 @@ static void judge(const char *what, const char *source, PetscReal estimate, Pets
            (double)ratio, (double)low, (double)high);
 }
 
-/* The error of `source` in a run against a reference run. */
+/* Error of `source` in a run against a reference run. */
 static PetscErrorCode compare(const char *what, const char *name, SbErrorSource source, const char *scene,
                               const char *coarse, const char *fine, PetscReal low, PetscReal high)
 {
@@ -69,7 +69,7 @@ static PetscErrorCode compare(const char *what, const char *name, SbErrorSource 
   PetscCall(verify_solve(&t, what));
   PetscCall(distance(reference.model, reference.run->U, reference.run->V, t.run->U, t.run->V, &error));
   PetscCall(SbLedgerGet(t.ledger, source, &estimate, &stored));
-  /* what Newton's method left is in part its linear solves' */
+  /* the remainder of Newton's method is partly that of its linear solves */
   if (source == SB_ERROR_NONLINEAR) PetscCall(SbLedgerGet(t.ledger, SB_ERROR_LINEAR, &linear, &stored));
   estimate = PetscSqrtReal(PetscSqr(estimate) + PetscSqr(linear));
   judge(what, name, estimate, error, PetscSqrtReal(stored), low, high);
@@ -105,7 +105,7 @@ static PetscErrorCode steps(void)
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
     char scene[VERIFY_TEXT];
 
-    /* thousands of steps of a small system: on several ranks an implicit and an explicit integrator */
+    /* thousands of steps of a small system: on several ranks only an implicit and an explicit integrator */
     if (size > 1 && i != 2 && i != 4) continue;
     PetscCall(PetscSNPrintf(scene, sizeof(scene),
                             BAR "-body_bar_material linear -ts_max_time 0.4 -ksp_rtol 1e-10 %s",
@@ -155,7 +155,7 @@ static PetscErrorCode solves(void)
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
     char scene[VERIFY_TEXT];
 
-    /* with a factor per rank what CG leaves is smooth and adds up: docs/reports/error_estimates.md */
+    /* with a factor per rank the error of CG is smooth and accumulates: docs/reports/error_estimates.md */
     if (size > 1 && strstr(of[i].scene, "ts_dt") && of[i].source == SB_ERROR_LINEAR) continue;
     PetscCall(PetscSNPrintf(scene, sizeof(scene), BAR "%s %s", cg, of[i].scene));
     PetscCall(compare(of[i].what, of[i].name, of[i].source, scene, of[i].coarse, of[i].fine, 0.3, 3));
@@ -163,7 +163,7 @@ static PetscErrorCode solves(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Springs in the place of a rigid contact, against the exact one: a block pressed by a ball, and one that its springs let down evenly. */
+/* Penalty springs against the exact rigid contact: a block indented by a ball, and one that settles evenly on its springs. */
 static PetscErrorCode springs(void)
 {
   static const char block[] =
@@ -190,7 +190,7 @@ static PetscErrorCode springs(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A ledger is a spectator: the same state, to the last bit. */
+/* A ledger does not change the state: bitwise the same result. */
 static PetscErrorCode spectator(const char *options)
 {
   PetscReal difference;
@@ -213,7 +213,7 @@ static PetscErrorCode spectator(const char *options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What is asked for is reached, and not by far more than what is asked for. */
+/* The requested accuracy is reached, and not exceeded by a large factor. */
 static PetscErrorCode dial(PetscReal accuracy, PetscInt *steps)
 {
   PetscReal error = 0., form, stored;
@@ -255,8 +255,8 @@ static PetscErrorCode dials(void)
 }
 
 /*
-  A block between rollers and a plate, which is driven by a hundredth of the height onto it: uniform strain, no error but the gaps, whose part of the way is that of force and state. And a ball that
-  is pressed into a block against the same with a tiny width: the error is what is asked for, or a tenth of the mesh's.
+  A block between rollers and a plate that is displaced onto it by a hundredth of the height: uniform strain; the gaps are the only error, and their share of the displacement is that of force and state. And
+  a ball that indents a block against the same with a tiny width: the error is the requested one, or a tenth of that of the mesh.
 */
 static PetscErrorCode gaps(void)
 {
@@ -287,7 +287,7 @@ static PetscErrorCode gaps(void)
     PetscCall(verify_open(&t, "%s -accuracy %g", plate, (double)asked[i]));
     PetscCall(verify_solve(&t, "plate"));
     PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &energies));
-    error = PetscSqrtReal(energies.strain / exact) - 1.; /* of strain, and so of force */
+    error = PetscSqrtReal(energies.strain / exact) - 1.; /* of the strain, and therefore of the force */
     PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  plate, -accuracy %g: force off by %.1e, width %.1e m\n",
                           (double)asked[i], (double)error, (double)t.model->potential[0]->width));
     SB_CHECK(error > 0.02 * asked[i] && error < asked[i], "plate, -accuracy %g: force off by %g",
@@ -318,7 +318,7 @@ int main(int argc, char **argv)
   PetscCall(steps());
   PetscCall(solves());
   PetscCall(springs());
-  /* a factorization on several ranks adds in the order in which messages come */
+  /* a factorisation on several ranks sums in the order in which messages arrive */
   PetscCall(spectator("-body_bar_material linear -time static -solver cg_icc"));
   PetscCall(spectator("-body_bar_material corotated -ts_dt 0.01 -ts_max_time 0.1"));
   PetscCall(spectator("-body_bar_material corotated -time genalpha -ts_dt 0.01 -ts_max_time 0.1"));

@@ -47,7 +47,7 @@ static PetscErrorCode check_end(PetscReal load, int steps, const char *more)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The end under a follower pressure, in few iterations. */
+/* Path with a follower pressure: it ends at the limit, in few iterations. */
 static PetscErrorCode check_follower_end(const char *element)
 {
   const PetscReal load = 0.25, reached = limit / load;
@@ -62,7 +62,7 @@ static PetscErrorCode check_follower_end(const char *element)
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  follower %g E, %s: %.9g in %d steps, %d iterations\n    %s\n",
                         (double)load, element, (double)t.run->t_now, (int)t.run->steps_total,
                         (int)t.run->newton_total, t.run->stop_reason));
-  /* below the limit by the least increment; twice the iterations of the slowest */
+  /* below the limit by the least increment; the iterations are bounded by twice those of the slowest element */
   SB_CHECK_NEAR(t.run->t_now, reached, 1e-3, "load factor");
   SB_CHECK(t.run->softening > 10., "%s: softening %g", element, (double)t.run->softening);
   SB_CHECK(t.run->newton_total < 280, "%s: %d iterations", element, (int)t.run->newton_total);
@@ -70,7 +70,7 @@ static PetscErrorCode check_follower_end(const char *element)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A cantilever that a pressure on its upper face curls up. */
+/* Cantilever that a follower pressure on its upper face curls up. */
 static PetscErrorCode check_curl(const char *element, PetscReal nu, PetscReal pressure, PetscReal iterations)
 {
   TestScene t;
@@ -96,8 +96,8 @@ static PetscErrorCode check_curl(const char *element, PetscReal nu, PetscReal pr
 }
 
 /*
-  A clamped strip that a follower pressure pulls by its end. It stays nearly straight, and the less stiff against bending the harder it is pulled: the lowest eigenvalue of the
-  tangent falls like exp(-k length), k^2 = load / (EI), that of its symmetric part is negative from the first load step on. Full steps go up, and the next one comes back.
+  Clamped strip under a follower pressure that pulls its end. It stays nearly straight, and the more it is pulled the less stiff it is in bending: the lowest eigenvalue of the
+  tangent decreases as exp(-k length), k^2 = load / (EI); that of its symmetric part is negative from the first load step on. Full Newton steps increase the residual, and the next ones reduce it.
 */
 static PetscErrorCode check_pull(const char *element, PetscReal nu)
 {
@@ -119,7 +119,7 @@ static PetscErrorCode check_pull(const char *element, PetscReal nu)
     (double)nu, (int)t.run->newton_total, (int)t.run->rejected_total, (double)t.run->energies.strain));
   SB_CHECK(t.run->t_now == 1. && !t.run->rejected_total, "%s: load factor %g, %d rejected", element,
            (double)t.run->t_now, (int)t.run->rejected_total);
-  /* half as many again as there were */
+  /* 1.5 times the measured number */
   SB_CHECK(t.run->newton_total < 250, "%s: %d Newton iterations", element, (int)t.run->newton_total);
   /* P1 is too stiff by 6 % */
   SB_CHECK_NEAR(t.run->energies.strain, energy, 0.08 * energy, "strain energy");
@@ -128,10 +128,10 @@ static PetscErrorCode check_pull(const char *element, PetscReal nu)
 }
 
 typedef struct {
-  PetscReal load;  /* of E */
+  PetscReal load;  /* load, of E */
   PetscReal error; /* largest difference from the formula, of E */
   PetscReal top;   /* largest load factor */
-  PetscReal s;     /* of the last step */
+  PetscReal s;     /* stretch of the last step */
 } Branch;
 
 static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
@@ -146,7 +146,7 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Opens the cube with the load 0.2 E. */
+/* Opens the cube with a load of 0.2 E. */
 static PetscErrorCode open_branch(const char *dir, PetscBool follower, const char *more, Branch *b,
                                   TestScene *t)
 {
@@ -164,7 +164,7 @@ static PetscErrorCode open_branch(const char *dir, PetscBool follower, const cha
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The branch: with a dead load until the inverted cube carries it, with a follower load to beyond the limit. */
+/* Solution branch: with a dead load until the inverted cube carries it, with a follower load to beyond the limit. */
 static PetscErrorCode check_branch(PetscBool follower, const char *more)
 {
   TestScene t;
@@ -185,7 +185,7 @@ static PetscErrorCode check_branch(PetscBool follower, const char *more)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Moving supports scale with the load factor: s = 1 - lambda / 2, and Newton's method converges as with loads. */
+/* Prescribed displacements scale with the load factor: s = 1 - lambda / 2, and Newton's method converges as with loads. */
 static PetscErrorCode check_drive(void)
 {
   TestScene t;
@@ -208,7 +208,7 @@ static PetscErrorCode check_drive(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A run that goes on from a checkpoint in its middle, or from where a load path ended, is on the same branch. */
+/* A restart from a checkpoint within a run, or at the end of a load path, continues on the same branch. */
 static PetscErrorCode check_restart(const char *first, const char *checkpoint, PetscReal tolerance)
 {
   const char *folder = getenv("TMPDIR");
@@ -241,17 +241,17 @@ int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_end(0.19, 5, "-body_a_tangent exact"));
-  /* Newton's method with the exact tangent may find the inverted cube */
+  /* Newton's method with the exact tangent can converge to the inverted cube */
   PetscCall(check_end(0.2, 10, "-body_a_tangent exact -time_inverted reject"));
   PetscCall(check_end(0.2, 10, "-body_a_tangent exact_spd"));
-  /* increments of rounding: the number of attempts ends it */
+  /* increments as small as rounding: the limit of attempts ends the path */
   PetscCall(check_end(0.2, 10, "-body_a_tangent exact_spd -static_min_increment 1e-15"));
   PetscCall(check_follower_end("p1"));
   PetscCall(check_follower_end("p2"));
   PetscCall(check_follower_end("cr"));
   PetscCall(check_curl("p1", 0.3, 2e4, 90));
   PetscCall(check_curl("p2", 0.3, 8e3, 110));
-  /* the symmetric part of the tangent is not definite from load factors of 0.75 on */
+  /* the symmetric part of the tangent is indefinite from load factors of 0.75 on */
   PetscCall(check_curl("p2", 0.4999, 1.2e3, 250));
   PetscCall(check_pull("p1", 0.4999));
   PetscCall(check_pull("cr", 0.49));

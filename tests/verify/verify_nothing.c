@@ -16,7 +16,7 @@
 #include "verify.h"
 #include <sblog.h>
 
-/* A type that nobody names. Its options must not be read. */
+/* An effect type that no scene names. Its options must not be read. */
 static int storms;
 
 static PetscErrorCode options_storm(SbEffect e, const SbScope *scope)
@@ -33,7 +33,7 @@ static const SbEffectType storm_type = {.name = "storm", .ops = {.setfromoptions
 typedef struct {
   PetscInt n;
   PetscReal *u, *v;
-  PetscInt events[SB_EVENT_COUNT]; /* how often each phase was begun */
+  PetscInt events[SB_EVENT_COUNT]; /* number of times that each phase began */
   PetscLogDouble bytes;            /* allocated by the scene, before and after the run */
 } Trace;
 
@@ -108,7 +108,7 @@ static PetscErrorCode destroy(Trace *trace)
   "-bodies a -body_a_mesh box:0.3,0.2,0.1:2 -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 " \
   "-body_a_velocity 0.3,-0.2,0.1 -body_a_angular_velocity 1,2,6 -ts_dt 0.01 -ts_max_time 0.2 "
 
-/* A free body with and without a type that is not named. */
+/* A free body with and without an effect type that is not named. */
 static PetscErrorCode check_unnamed(const char *law, const char *time)
 {
   Trace plain, with;
@@ -147,7 +147,7 @@ static PetscErrorCode check_unnamed(const char *law, const char *time)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Effects that are named and do nothing. */
+/* Effects that are named but do nothing. */
 static PetscErrorCode check_idle(const char *effects, const char *options)
 {
   Trace plain, with;
@@ -170,7 +170,7 @@ static PetscErrorCode check_idle(const char *effects, const char *options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Contact is searched for where it is named only: its log event counts there, so that none elsewhere means none. */
+/* Contact search occurs only if contact is named: its log event counts there, so that a count of zero elsewhere is meaningful. */
 static PetscErrorCode check_contact(void)
 {
   Trace named;
@@ -200,7 +200,7 @@ static PetscErrorCode check_static(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The space of a P1 scene, with its plan. */
+/* Space of a P1 scene, with its plan. */
 static PetscErrorCode check_plain_space(void)
 {
   TestScene t;
@@ -222,7 +222,7 @@ static PetscErrorCode check_plain_space(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An explicit run: no tolerance of a solver between the two. */
+/* An explicit run: no solver tolerance affects the comparison. */
 static PetscErrorCode check_elements(const char *law, const char *other)
 {
   Trace plain, named, beside;
@@ -262,11 +262,11 @@ int main(int argc, char **argv)
 {
   Trace first;
 
-  /* the count of bytes wants PETSc's own malloc */
+  /* the count of bytes requires PETSc's own malloc */
   (void)setenv("PETSC_OPTIONS", "-malloc_dump", 1);
   SB_TEST_BEGIN(argc, argv);
   PetscCall(PetscLogDefaultBegin());
-  /* parts of PETSc are set up by the first run that needs them, linear or with Newton's method; and each law's log event */
+  /* the first run that needs them sets up parts of PETSc, linear or with Newton's method, and the log event of each material */
   PetscCall(run(FREE "-body_a_material linear -time newmark -solver cg_jacobi", PETSC_FALSE, &first));
   PetscCall(destroy(&first));
   PetscCall(run(FREE "-body_a_material corotated -time euler_implicit", PETSC_FALSE, &first));
@@ -275,7 +275,7 @@ int main(int argc, char **argv)
   PetscCall(destroy(&first));
   PetscCall(run(FREE "-body_a_material stvk -time euler_symplectic -ts_dt 0.002", PETSC_FALSE, &first));
   PetscCall(destroy(&first));
-  /* MUMPS shares its work out again in each run: the last bits differ */
+  /* MUMPS distributes its work anew in each run: the last bits differ */
   PetscCall(check_unnamed("linear", "newmark -solver cg_jacobi"));
   PetscCall(check_unnamed("corotated", "euler_implicit"));
   PetscCall(check_unnamed("neohookean", "genalpha"));

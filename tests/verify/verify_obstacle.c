@@ -14,7 +14,7 @@
 
 /* ------------------------------------------------------------------ mesh */
 
-/* The box of the obstacle, 0.3 x 0.2 x 0.1 m below z = 0. */
+/* The box of the obstacle, 0.3 x 0.2 x 0.1 m, below z = 0. */
 static void table(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
 {
   (void)n;
@@ -60,7 +60,7 @@ static PetscErrorCode check_mesh(void)
   PetscCall(fall_on("box:-0.2,-0.1,-0.1,0.1,0.1,0", &u[0], &length, &r[0]));
   PetscCall(fall_on(text, &u[1], &length, &r[1]));
   VERIFY_MORE(record_max(&r[0], "floor_force_z"), 20, "largest force of the box, N");
-  /* distances agree to rounding; friction is settled to a part of its force, which rounding may decide */
+  /* distances agree up to rounding; friction converges to a tolerance relative to its force, which rounding can affect */
   VERIFY_LESS(verify_difference(length, u[0], u[1]), 1e-6, "difference of displacements on box and mesh");
   for (int k = 0; k < 2; k++) {
     PetscCall(PetscFree(u[k]));
@@ -76,7 +76,7 @@ static PetscErrorCode check_mesh(void)
 #define DOWN_STEPS 10
 #define DRAG_DT 0.02 /* s */
 
-/* Force of the tool after each step, N: [DRAG_STEPS + 1][3]. */
+/* Force of the indenter after each step, N: [DRAG_STEPS + 1][3]. */
 static PetscErrorCode drag(const char *obstacle, PetscReal force[])
 {
   static const char *const columns[3] = {"tool_force_x", "tool_force_y", "tool_force_z"};
@@ -102,9 +102,9 @@ static PetscErrorCode drag(const char *obstacle, PetscReal force[])
 }
 
 /*
-  Edges of 3 to 5 mm with their corners on the sphere, one of them pointing down and ridges along the rows of vertices of the block.
-  The middles of facets are 0.2 mm inside of the sphere: at a depth of 10 mm that is 2 % of it and 3 % of the force. Then nodes
-  come and go one by one, at other moments than with the sphere; no step fails.
+  Edges of 3 to 5 mm with their vertices on the sphere, one vertex pointing down and ridges along the vertex rows of the block.
+  Facet centroids are 0.2 mm inside the sphere: at an indentation of 10 mm that is 2 % of it and 3 % of the force. Then nodes
+  come into contact and leave one by one, at other times than with the sphere; no step fails.
 */
 static PetscErrorCode check_facets(void)
 {
@@ -182,8 +182,8 @@ static PetscErrorCode check_groove(void)
 #define RECOVERY 30
 
 /*
-  The lowest nodes begin with the speed v = depth / recovery, 0.2 m/s. A bar that is pushed with v from one end moves with 2 v at the other when the
-  wave arrives there, and has the energy M v^2 then: half of it motion, half of it strain. That of its weight is 1e-3 J.
+  The initial speed of the lowest nodes is v = depth / recovery, 0.2 m/s. If one end of a bar is moved with v, the other end moves with 2 v when the
+  wave arrives there; the bar then has the energy M v^2, half kinetic and half strain energy. That of its weight is 1e-3 J.
 */
 static PetscErrorCode check_overlap(const char *element, const char *response, const char *obstacle)
 {
@@ -204,7 +204,7 @@ static PetscErrorCode check_overlap(const char *element, const char *response, c
     -DEPTH, element, obstacle, response, RECOVERY, STEP, (5 * RECOVERY + 3) * STEP));
   VERIFY_LESS(record_max(&r, "speed"), 2 * v, "fastest node, m/s");
   VERIFY_LESS(record_max(&r, "energy"), MASS * v * v + 1e-3, "energy of the block, J");
-  /* the springs give a little under the weight */
+  /* springs have a small penetration under the weight */
   for (int k = 1; k <= 5; k += 4)
     VERIFY_NEAR(record_at(&r, "floor_penetration", k * RECOVERY) / DEPTH, PetscExpReal(-k),
                 springs ? 2e-3 : 1e-4, "depth after the recovery, once and five times");
@@ -214,7 +214,7 @@ static PetscErrorCode check_overlap(const char *element, const char *response, c
 
 /* ------------------------------------------------------------------ at once */
 
-/* Deep in a mesh its field is coarser: the separation direction is found all the same. */
+/* Deep in a mesh its distance field is coarser: the separation direction must still be found. */
 static PetscErrorCode check_overlap_mesh(void)
 {
   const PetscInt n[3] = {30, 20, 10};
@@ -240,7 +240,7 @@ static PetscErrorCode check_at_once(void)
                                       "zmax -effect_floor_type contact -effect_floor_response projected "
                                       "-effect_floor_obstacle plane:0,0,1,0.02 -time static"));
   VERIFY_LESS(record_last(&r, "floor_penetration"), 1e-7, "depth, m");
-  /* E = 5e4 Pa, a strain of 0.2 and an area of 0.01 m^2: about 100 N */
+  /* E = 5e4 Pa, strain 0.2, area 0.01 m^2: about 100 N */
   VERIFY_MORE(record_last(&r, "floor_force_z"), 90, "force, N");
   PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
