@@ -8,7 +8,7 @@
 */
 #include "../scene.h"
 
-#define FAR 40. /* young of the inclusion over that of the body, nu = 0 */
+#define FAR 40. /* Young's modulus of the inclusion over that of the body, nu = 0 */
 
 static PetscErrorCode open_scene(MPI_Comm comm, const char *options, SbModel *m)
 {
@@ -35,7 +35,7 @@ static void linear_field(const PetscReal x[3], PetscReal u[3])
   u[2] = -0.01 * x[0] + 0.01 * x[1] + 0.02 * x[2] - 0.2;
 }
 
-/* Turned by 1 rad about (0, 0, 1) and moved. */
+/* Rotated by 1 rad about (0, 0, 1) and translated. */
 static void rigid_field(const PetscReal x[3], PetscReal u[3])
 {
   const PetscReal c = PetscCosReal(1.), s = PetscSinReal(1.);
@@ -45,7 +45,7 @@ static void rigid_field(const PetscReal x[3], PetscReal u[3])
   u[2] = 0.1;
 }
 
-/* The same stress on both sides of x = 1/2. */
+/* Equal stress on both sides of x = 1/2. */
 static void two_field(const PetscReal x[3], PetscReal u[3])
 {
   u[0] = 0.01 * (x[0] < 0.5 ? x[0] : 0.5 + (x[0] - 0.5) / FAR);
@@ -53,7 +53,7 @@ static void two_field(const PetscReal x[3], PetscReal u[3])
   u[2] = 0.;
 }
 
-/* The same strain: the stress jumps. */
+/* Equal strain: the stress jumps. */
 static void jump_field(const PetscReal x[3], PetscReal u[3])
 {
   u[0] = 0.01 * x[0];
@@ -68,7 +68,7 @@ static void wavy_field(const PetscReal x[3], PetscReal u[3])
   u[2] = 0.01 * PetscSinReal(2. * x[2] + x[0]);
 }
 
-/* The same, turned as a whole by 1 rad about (0, 0, 1). */
+/* The same, rotated rigidly by 1 rad about (0, 0, 1). */
 static void turned_field(const PetscReal x[3], PetscReal u[3])
 {
   const PetscReal c = PetscCosReal(1.), s = PetscSinReal(1.);
@@ -83,7 +83,7 @@ static void turned_field(const PetscReal x[3], PetscReal u[3])
 
 /* ------------------------------------------------------------------ checks */
 
-/* Sums over bodies. Collective. */
+/* Estimate for a field, with sums over bodies. Collective. */
 static PetscErrorCode estimate(SbModel m, void (*field)(const PetscReal x[3], PetscReal value[3]),
                                SbSpaceEstimate *est)
 {
@@ -163,7 +163,7 @@ static PetscErrorCode check_materials(const char *element)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bodies of all elements, one with an inclusion, loads and supports: n values of each body in order. */
+/* Bodies of all elements, one with an inclusion, loads and supports: n values per body, in order. */
 #define NVALUE 3
 static PetscErrorCode many_bodies(MPI_Comm comm, PetscReal value[4 * NVALUE])
 {

@@ -13,7 +13,7 @@ typedef struct {
   PetscReal *block, *dense;    /* [ia[n]][9]; [3n][3n] */
 } Problem;
 
-/* Two nodes are joined when they are neighbours in a grid of nx x ny x nz nodes whose layers `gap` apart are cut off. */
+/* Two nodes are connected if they are neighbours in a grid of nx x ny x nz nodes that is disconnected every `gap` layers. */
 static PetscBool joined(const PetscInt d[3], PetscInt gap, PetscInt i, PetscInt j)
 {
   const PetscInt p[3] = {i % d[0], i / d[0] % d[1], i / (d[0] * d[1])};
@@ -43,7 +43,7 @@ static PetscErrorCode make_problem(const PetscInt d[3], PetscInt gap, PetscInt n
       if (joined(d, gap, i, j)) p->ja[p->ia[i + 1]++] = j;
     }
   }
-  /* off-diagonal entries in (-1, 1), a diagonal that dominates them */
+  /* off-diagonal entries in (-1, 1), with a dominant diagonal */
   for (PetscInt i = 0; i < 3 * n; i++) {
     for (PetscInt j = 0; j < i; j++) {
       if (!joined(d, gap, i / 3, j / 3)) continue;
@@ -71,7 +71,7 @@ static PetscErrorCode destroy_problem(Problem *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A x = b with x known; the Schur complement, dense, solves for the kept nodes. */
+/* Solves A x = b with known x; the dense Schur complement solves for the kept nodes. */
 static PetscErrorCode check_solve(const Problem *p, PetscRandom random, const char *name)
 {
   const PetscInt n = 3 * p->n, m = 3 * p->nkeep, free = n - m;
@@ -91,7 +91,7 @@ static PetscErrorCode check_solve(const Problem *p, PetscRandom random, const ch
   for (int again = 0; again < 2; again++) {
     PetscReal *work = NULL;
 
-    /* the second time must not add to the first */
+    /* the second call must not add to the first result */
     PetscCall(PetscMalloc1(m * m + 1, &work));
     PetscCall(PetscArraycpy(work, schur, m * m));
     PetscCall(SbFactorNumeric(f, p->ia, p->ja, p->block, work, &ok));
@@ -151,7 +151,7 @@ static PetscErrorCode check_solve(const Problem *p, PetscRandom random, const ch
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Exactly (in doubles): A_kk - A_ki A_ii^-1 A_ik by dense elimination. */
+/* Exact Schur complement (in doubles): A_kk - A_ki A_ii^-1 A_ik by dense elimination. */
 static PetscErrorCode check_schur(const Problem *p)
 {
   const PetscInt n = 3 * p->n, m = 3 * p->nkeep, free = n - m;

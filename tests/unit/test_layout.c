@@ -45,16 +45,16 @@ static PetscInt expected_nodes(SbModel m)
     const SbBody *body = &m->mesh->body[b];
     const PetscInt *per = m->space->element[b]->nodes_per;
 
-    /* each inner face is one of two cells; a box has vertices - edges + faces - cells = 1 */
+    /* each interior face belongs to two cells; a box has vertices - edges + faces - cells = 1 */
     if (per[1]) n += body->nvert + (4 * body->ncell + body->nfacet) / 2 - body->ncell - 1;
     n += per[0] ? body->nvert : per[3] ? 4 * body->ncell : (4 * body->ncell + body->nfacet) / 2;
-    /* the first body stands on the plane that is constrained: 3 x 3 squares of two triangles */
+    /* the first body is fixed on a plane: 3 x 3 squares of two triangles */
     if (b == 0 && per[3]) n += 18;
   }
   return n;
 }
 
-/* Cells: node a lies where the element says, and the two sides of a face share it in CR and do not in DG. */
+/* Cells: node a is where the element defines it; the two cells of a face share its node in CR and not in DG. */
 static void check_cells(SbModel m)
 {
   const SbMesh mesh = m->mesh;
@@ -89,7 +89,7 @@ static void check_cells(SbModel m)
   }
 }
 
-/* What an owned node is known by, at 8 node_orig: place, mass, sets, body, components prescribed, and one as a count. */
+/* Description of an owned node, at 8 node_orig: position, mass, sets, body, prescribed components, and one as a count. */
 static PetscErrorCode describe(SbModel m, PetscInt n, PetscReal **table)
 {
   const SbSpace s = m->space;
@@ -111,7 +111,7 @@ static PetscErrorCode describe(SbModel m, PetscInt n, PetscReal **table)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every node has one owner, and the space of all ranks has the nodes of the space of one. */
+/* Every node has one owner, and the space of all ranks has the same nodes as the space of one rank. */
 static PetscErrorCode compare(SbModel m, SbModel alone)
 {
   const PetscInt n = m->mesh->Nvert + 14 * m->mesh->Ncell;
@@ -143,7 +143,7 @@ static PetscErrorCode compare(SbModel m, SbModel alone)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Ghosts are the nodes that their owners mean: places sent by the owners arrive where the place is that. */
+/* Ghost nodes match their owners: positions sent by the owners equal the local ones. */
 static PetscErrorCode check_ghosts(SbSpace s)
 {
   const PetscReal *x;
@@ -162,7 +162,7 @@ static PetscErrorCode check_ghosts(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Means of DG: the own node and the one across its face, or its support, lie at one place. */
+/* Means of DG: a node and the one across its face, or its support, have the same position. */
 static void check_cliques(SbSpace s)
 {
   PetscBool broken = PETSC_FALSE;

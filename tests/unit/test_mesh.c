@@ -24,7 +24,7 @@ static PetscErrorCode make_scene(SbBody body[3], SbSet set[NSET])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every rank builds the whole mesh once more and looks up what it was given. */
+/* Every rank builds the whole mesh again and compares its local mesh with it. */
 static PetscErrorCode compare_with_whole(SbMesh mesh, const SbMergedMesh *whole)
 {
   PetscInt wrong_vert = 0, wrong_cell = 0;
@@ -53,7 +53,7 @@ static PetscErrorCode compare_with_whole(SbMesh mesh, const SbMergedMesh *whole)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A number that each owned cell has comes to all its ghosts. */
+/* A value of each owned cell arrives at all its ghosts. */
 static PetscErrorCode check_broadcast(SbMesh mesh)
 {
   PetscInt *value, wrong = 0;
@@ -72,7 +72,7 @@ static PetscErrorCode check_broadcast(SbMesh mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* With nodes at faces: every cell at a vertex of an owned cell is here, each once. Counted over all ranks by the corners of owned cells. */
+/* With nodes at faces: every cell at a vertex of an owned cell is local, exactly once. Counted over all ranks by the corners of owned cells. */
 static PetscErrorCode check_layer(SbMesh mesh)
 {
   PetscInt *around, *total, missing = 0;
@@ -110,7 +110,7 @@ static PetscErrorCode test_scene(const char *partitioner, PetscBool face_nodes)
   PetscCall(compare_with_whole(mesh, &whole));
   PetscCall(check_broadcast(mesh));
   if (face_nodes) PetscCall(check_layer(mesh));
-  /* What rank 0 found is known to all. */
+  // What rank 0 found is the same on all ranks.
   SB_CHECK(!memcmp(set, set_again, sizeof(set)), "counts of the sets");
   for (int b = 0; b < 3; b++) {
     SB_CHECK(body[b].ncell == body_again[b].ncell && body[b].volume == body_again[b].volume &&
@@ -127,7 +127,7 @@ static PetscErrorCode test_scene(const char *partitioner, PetscBool face_nodes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Hardly more tets than ranks, or fewer: some ranks are idle, the mesh is whole. */
+/* Few more tets than ranks, or fewer: some ranks are idle, the mesh is complete. */
 static PetscErrorCode test_few(const char *file, PetscInt ncell)
 {
   SbBody body = test_body("b", file);
@@ -141,7 +141,7 @@ static PetscErrorCode test_few(const char *file, PetscInt ncell)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Vertices of one rank are near each other in number: the largest distance within a cell of a slender bar. */
+/* Vertices of one rank have close numbers: the largest difference within a cell of a slender bar. */
 static PetscErrorCode test_order(void)
 {
   SbBody body = test_body("b", "box:60,2,2:60,2,2");
@@ -159,7 +159,7 @@ static PetscErrorCode test_order(void)
       }
     }
   }
-  /* three layers of 9 vertices; a middle rank is searched from one of its two ends all the same */
+  /* three layers of 9 vertices; the numbering of a middle rank also starts at one of its two ends */
   SB_CHECK(width <= 27, "bandwidth %d", (int)width);
   PetscCall(SbMeshDestroy(&mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -178,7 +178,7 @@ static PetscErrorCode create(const char *file, const char *set_text)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Only rank 0 reads, but all ranks leave with the same error and message. */
+/* Only rank 0 reads, but all ranks return the same error and message. */
 static PetscErrorCode test_errors(void)
 {
   PetscFunctionBeginUser;
@@ -190,7 +190,7 @@ static PetscErrorCode test_errors(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The validation sees what it is there for; damage is done on all ranks, so that all stop at the same check. */
+/* The validation detects the damage that it is made for; all ranks have the damage, so that all stop at the same check. */
 static PetscErrorCode test_validation(void)
 {
   SbBody body = test_body("b", "box:1,1,1:4");

@@ -6,7 +6,7 @@
 #define DATA "tests/data/"
 enum { NSET = 8 };
 
-/* Puts the tets in a random order. */
+/* Shuffles the tets. */
 static PetscErrorCode shuffle(SbImport *im)
 {
   PetscRandom r;
@@ -46,7 +46,7 @@ static PetscErrorCode add_group(SbImport *im, int dim, const char *name, PetscIn
 }
 
 /*
-  Two boxes apart, some of their edges curved, of which the second has its first tets inverted; vertices in between that no tet uses; an inner triangle and one that is no face; a line, a point;
+  Two separate boxes with some curved edges, the second one with its first tets inverted; unused vertices between them; an interior triangle and one that is no face; a line, a point;
   lines and triangles at unused vertices.
 */
 static PetscErrorCode make_mesh(const char *path, PetscBool random)
@@ -184,9 +184,9 @@ static PetscErrorCode test_same_mesh(PetscBool random, const char *partitioner)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ what is refused */
+/* ------------------------------------------------------------------ errors */
 
-/* The first `ncell` tets of a box of 48, and one more: the error is raised by all ranks, whoever reads. The last coordinate moves by x. */
+/* The first `ncell` tets of a box of 48, and one more: all ranks raise the error, whichever ranks read. The last coordinate is moved by x. */
 static PetscErrorCode test_refused(PetscInt ncell, const PetscInt vert[4], PetscReal x, const char *words)
 {
   SbBody body;

@@ -5,7 +5,7 @@
 
 static char dir[PETSC_MAX_PATH_LEN];
 
-/* Numbers dealt out to the ranks like cards, backwards. */
+/* Numbers dealt cyclically to the ranks, in descending order. */
 static PetscErrorCode test_order(void)
 {
   const PetscInt N = 23;
@@ -36,7 +36,7 @@ static PetscErrorCode test_order(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Numbers 3 k^2 + k, dealt out backwards: their gaps are closed, and each brings two entities along. */
+/* Numbers 3 k^2 + k, dealt in descending order: the order has no gaps, and each number has two entities. */
 static PetscErrorCode test_order_with_gaps(void)
 {
   const PetscInt N = 17;
@@ -63,14 +63,14 @@ static PetscErrorCode test_order_with_gaps(void)
     SB_CHECK(slice[i] == 0.5 * (PetscReal)(pairs.start + i), "%g is in the place of %g", (double)slice[i],
              0.5 * (double)(pairs.start + i));
   PetscCall(SbOrderDestroy(&pairs));
-  PetscCall(SbOrderGather(&order, 2, owned, slice)); // outlives the other
+  PetscCall(SbOrderGather(&order, 2, owned, slice)); // remains valid without `pairs`
   SB_CHECK(!order.n || slice[0] == (PetscReal)order.start, "%g is in the place of %d", (double)slice[0],
            (int)order.start);
   PetscCall(SbOrderDestroy(&order));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A layout with two entities on three or more ranks leaves ranks without any. */
+/* A layout of two entities leaves some of three or more ranks without any. */
 static PetscErrorCode test_h5(void)
 {
   SbOrder order;
@@ -104,7 +104,7 @@ static PetscErrorCode test_h5(void)
   SB_CHECK(ok && time == 1. / 3. && step == -((int64_t)1 << 60) && !strcmp(text, "two\nlines"),
            "attributes or text");
   PetscCall(PetscFree(text));
-  // what is not there, or is something else, is said and not an error
+  // an array that is absent or of another type is reported, but not an error
   PetscCall(SbH5ReadSlice(&h, "v", &order, 2, back, &ok));
   SB_CHECK(!ok, "an array of another shape was read");
   PetscCall(SbH5ReadSlice(&h, "w", &order, 3, back, &ok));
@@ -169,7 +169,7 @@ static PetscErrorCode test_files(void)
     PetscCall(SbFileRead(path, &text, &size));
     SB_CHECK(!text && !size, "a file that is not there was read");
   }
-  // more than there is on any disk: refused, and the file keeps its length
+  // more than any disk has: an error, and the length of the file does not change
   SbFormat(sizeof(path), path, "%s/reserve", dir);
   PetscCall(SbFileReserve(PETSC_COMM_WORLD, path, 1000));
   SB_CHECK_ERROR(SbFileReserve(PETSC_COMM_WORLD, path, (PetscInt64)1 << 55), PETSC_ERR_FILE_WRITE,
@@ -182,7 +182,7 @@ static PetscErrorCode test_files(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A message of any one rank ends the call on all of them. */
+/* A message of any rank ends the call on all ranks. */
 static PetscErrorCode test_agree(void)
 {
   PetscMPIInt rank, size;

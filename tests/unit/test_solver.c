@@ -29,7 +29,7 @@ static PetscErrorCode tip(const char *options, PetscReal *z, char stop[512], Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves A x = b for random b: the reason, and |b - A x| / |b|. */
+/* Solves A x = b for random b; returns the reason and |b - A x| / |b|. */
 static PetscErrorCode solve(KSP ksp, Mat A, KSPConvergedReason *reason, PetscReal *residual)
 {
   PetscRandom random;
@@ -60,7 +60,7 @@ static PetscErrorCode solve(KSP ksp, Mat A, KSPConvergedReason *reason, PetscRea
    where a matrix is not definite, on all ranks alike. */
 static PetscErrorCode check_indefinite(const char *package, KSPType type)
 {
-  /* 1/s^2; the lowest frequency of the bar is about 40 rad/s */
+  /* 1/s^2; the lowest natural frequency of the bar is about 40 rad/s */
   const PetscReal shift[6] = {-1e5, 0., -1e5, 0., 0., 0.};
   const PetscBool fails = (PetscBool)!strcmp(package, MATSOLVERCHOLMOD);
   TestScene t;
@@ -103,7 +103,7 @@ static PetscErrorCode check_indefinite(const char *package, KSPType type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A factorisation that turns with the nodes serves short of nu = 1/2; near it DG took hundreds of times the iterations of others. */
+/* A rotated factorisation serves up to near nu = 1/2; close to it DG took hundreds of times the iterations of other solvers. */
 static PetscErrorCode check_choice(const char *element, const char *nu, PetscBool turns)
 {
   char text[512];
@@ -121,7 +121,7 @@ static PetscErrorCode check_choice(const char *element, const char *nu, PetscBoo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where ranks meet at more nodes than a factorisation that turns takes, another solver does it. */
+/* If ranks share more nodes than a rotated factorisation supports, another solver is used. */
 static PetscErrorCode check_meeting(const char *solver, const char *most, PetscBool turns)
 {
   char text[512];
@@ -143,7 +143,7 @@ static PetscErrorCode check_meeting(const char *solver, const char *most, PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where a bar is after some steps of Newton's method, turned by large angles. */
+/* Position of a bar after some time steps with large rotations. */
 static PetscErrorCode swing(const char *element, const char *options, PetscReal x[3])
 {
   const PetscReal at[3] = {0.4, 0.1, 0.1};
@@ -170,7 +170,7 @@ static PetscErrorCode swing(const char *element, const char *options, PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The operator without a matrix and its turned factor lead to the state of an assembled matrix and a factorisation. */
+/* The matrix-free operator and its rotated factor give the same state as an assembled matrix and a factorisation. */
 static PetscErrorCode check_realtime(const char *element)
 {
   PetscReal exact[3], x[3];
@@ -183,7 +183,7 @@ static PetscErrorCode check_realtime(const char *element)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Their face terms are not in it. */
+/* The factor does not contain the face terms of these elements. */
 static PetscErrorCode check_faces(const char *element)
 {
   char text[512];

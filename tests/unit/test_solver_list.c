@@ -37,7 +37,7 @@ static PetscErrorCode run(const char *options, const char *more, Outcome *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A run whose solver fails, against one with a factorisation: the same steps of Newton's method and the same displacement. */
+/* A run whose solver fails against one with a factorisation: the same number of Newton iterations and the same displacement. */
 static PetscErrorCode check_replaced(const char *options, const char *solver, const char *more,
                                      PetscReal tolerance)
 {
@@ -58,7 +58,7 @@ static PetscErrorCode check_replaced(const char *options, const char *solver, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Slivers near nu = 1/2: iterations for the pressures that are too few, on every kind of matrix. */
+/* Slivers near nu = 1/2: too few iterations for the pressures, with every matrix format. */
 static PetscErrorCode check_slivers(void)
 {
   const Slivers s = {.n = {12, 4, 4}, .size = {0.3, 0.1, 0.1}, .part = 0.01, .degrees = 0.1};
@@ -84,7 +84,7 @@ static PetscErrorCode check_slivers(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where rounding leaves more of the residual than the tolerance, 6e-8 of the first one here, Newton's method ends. */
+/* If rounding leaves a residual above the tolerance, 6e-8 of the first one here, Newton's method stops. */
 static PetscErrorCode check_rounding(void)
 {
   const Slivers s = {.n = {8, 4, 4}, .size = {0.3, 0.1, 0.1}, .part = 0.01, .degrees = 0.1};
@@ -106,7 +106,7 @@ static PetscErrorCode check_rounding(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The solver of a clamped bar with so many slivers, without solving. */
+/* Returns the solver that is chosen for a clamped bar with slivers, without solving. */
 static PetscErrorCode choose(const char *path, const char *solver, const char *body, char name[SB_NAME_MAX])
 {
   char text[1024];
@@ -123,7 +123,7 @@ static PetscErrorCode choose(const char *path, const char *solver, const char *b
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Slivers count in the choice: beyond the size up to which everything is factored, auto factors for them near 1/2, and leaves `pressure` far from it. */
+/* Slivers affect the choice: above the size limit of a full factorisation, auto factorises near nu = 1/2, and does not choose `pressure` far from it. */
 static PetscErrorCode check_choice(void)
 {
   static const PetscReal part[] = {0., 0.01};
@@ -147,7 +147,7 @@ static PetscErrorCode check_choice(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* With the tangent auto the factorisation is the one for definite matrices, whichever tangent Newton's method has just used; with exact one for others. */
+/* With the tangent auto the factorisation is that for definite matrices, whichever tangent Newton's method has used last; with exact it is one for indefinite ones. */
 static PetscErrorCode check_tangent(const char *tangent, PetscBool definite)
 {
   const SbSolverPreset *preset;
@@ -174,7 +174,7 @@ int main(int argc, char **argv)
   Outcome o;
 
   SB_TEST_BEGIN(argc, argv);
-  /* matrices of all kinds give way to AIJ, static and in time */
+  /* all matrix formats are replaced by AIJ, static and time-dependent */
   PetscCall(check_replaced(STATIC, "cg", "-ksp_max_it 3", 1e-6));
   PetscCall(check_replaced(STATIC, "cg_icc", "-ksp_max_it 3", 1e-6));
   PetscCall(check_replaced(STATIC, "gauss_seidel", "-ksp_max_it 3", 1e-6));
@@ -183,7 +183,7 @@ int main(int argc, char **argv)
   PetscCall(
     check_replaced(BAR "-body_a_material linear -time newmark -ts_dt 0.02 -ts_max_time 0.1 -ksp_rtol 1e-10",
                    "rotated", "-ksp_max_it 1", 1e-5));
-  /* nodes constrained by an obstacle, and contact constraints between bodies */
+  /* nodes on an obstacle, and contact constraints between bodies */
   PetscCall(
     check_replaced(BAR "-body_a_material corotated -ts_dt 0.02 -ts_max_time 0.2 -effects gravity,clamp,floor "
                        "-effect_floor_type contact -effect_floor_response projected "
@@ -200,10 +200,10 @@ int main(int argc, char **argv)
   PetscCall(check_choice());
   PetscCall(check_tangent("auto", PETSC_TRUE));
   PetscCall(check_tangent("exact", PETSC_FALSE));
-  /* the user's own method stays, and the run says that it failed */
+  /* the user's own method is not replaced, and the run reports its failure */
   PetscCall(run(STATIC, "-solver cg -ksp_type cg -ksp_max_it 3 -time_max_halvings 0", &o));
   SB_CHECK(o.stop[0] && !strcmp(o.solver, "cg"), "the user's method was replaced by %s", o.solver);
-  /* a body that nothing holds: no solver would do */
+  /* a body without supports: no solver can succeed */
   PetscCall(run(STATIC, "-effect_clamp_components xy -solver cg_jacobi -ksp_max_it 300", &o));
   SB_CHECK(o.stop[0] && !strcmp(o.solver, "cg_jacobi"), "%s was tried on a free body", o.solver);
   SB_TEST_END();

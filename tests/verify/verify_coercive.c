@@ -37,14 +37,14 @@ static void place_vertex(const PetscInt n[3], const PetscInt at[3], PetscReal x[
   if (m->shape == MOVED) {
     for (int k = 0; k < 3; k++) x[k] += (0.5 * r[k] - 0.25) / (PetscReal)n[k];
   } else if (m->shape == GRADED) {
-    /* a cone cut off at a thousandth of its length */
+    /* a cone truncated at a thousandth of its length */
     const PetscReal size = PetscPowReal(10., 3. * (x[0] - 1.));
 
     x[0] = size;
     x[1] *= size * (1. + 0.1 * r[1]);
     x[2] *= size * (1. + 0.1 * r[2]);
   } else if (at[0] == 1 && at[1] == 0) {
-    /* a line of vertices moved onto the plane of faces that it examines, but for a thousandth */
+    /* a line of vertices moved to within a thousandth of the plane of faces */
     const PetscReal part = 0.499 * (1. - 0.002 * r[0]);
 
     x[0] -= part / (PetscReal)n[0];
@@ -66,7 +66,7 @@ static PetscErrorCode write_mesh(Shape shape, char path[512])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The whole body turned about (1, 2, 3). */
+/* Rigid rotation of the body about (1, 2, 3). */
 static PetscErrorCode turn(TestScene *t, PetscReal angle)
 {
   const PetscReal axis[3] = {1., 2., 3.};
@@ -103,7 +103,7 @@ static PetscErrorCode spectrum(TestScene *t, PetscInt *count, PetscReal **w)
   PetscCall(PetscMalloc1(*count, w));
   PetscCall(PetscMalloc2(*count, &d, lwork, &work));
   PetscCall(MatDenseGetArray(dense, &a));
-  /* a diagonal entry below zero keeps its sign, and so does the lowest eigenvalue */
+  /* a negative diagonal entry keeps its sign, and so does the lowest eigenvalue */
   for (PetscInt i = 0; i < *count; i++) d[i] = PetscSqrtReal(PetscAbsReal(a[i + *count * i]));
   for (PetscInt i = 0; i < *count * *count; i++) a[i] /= d[i % *count] * d[i / *count];
   PetscCallBLAS("LAPACKsyev", LAPACKsyev_("N", "U", &n, a, &n, *w, work, &lwork, &info));
@@ -120,7 +120,7 @@ typedef struct {
   PetscReal nu, angle;
 } Case;
 
-/* Zero modes are those of rounding; with spurious ones there are more of them, or hardly stiffer ones. */
+/* Zero eigenvalues are those at the level of rounding; spurious modes add more of them, or hardly stiffer ones. */
 static PetscErrorCode check_case(Shape shape, const char *path, const Case *c, PetscBool sound)
 {
   TestScene t;
@@ -162,7 +162,7 @@ static PetscErrorCode check_case(Shape shape, const char *path, const Case *c, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Smallest eigenvalue, relative to the largest, of a cube under an even pressure of `ratio` times mu. */
+/* Smallest eigenvalue, relative to the largest, of a cube under a uniform pressure of `ratio` times mu. */
 static PetscErrorCode pressed(const char *element, const char *law, PetscReal ratio, PetscReal *smallest)
 {
   TestScene t;
@@ -211,7 +211,7 @@ static PetscErrorCode check_pressed(const char *element, const char *law)
   /* the energy of the mean volume, summed over the body, is that of its boundary */
   if (!strcmp(element, "p2") && !strcmp(law, "neohookean"))
     SB_CHECK(reached[0] == 50. && reached[1] == 50., "P2 is not stable under even pressures");
-  /* the penalty of jumps follows */
+  /* the jump penalty grows with the pressure */
   if ((!strcmp(element, "cr") || !strcmp(element, "dg")) && !strcmp(law, "neohookean"))
     SB_CHECK(reached[0] == 50., "%s is not stable under even pressures", element);
   SB_CHECK(reached[0] >= 0.5 && reached[1] >= 0.5,

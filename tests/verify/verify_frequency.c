@@ -18,7 +18,7 @@
 
 static const PetscReal end[3] = {0.4, 0.05, 0.05};
 
-/* Y = M X with the lumped mass; zero on prescribed unknowns. */
+/* Y = M X with the lumped mass; zero at prescribed unknowns. */
 static PetscErrorCode times_mass(SbSpace s, Vec X, Vec Y)
 {
   PetscScalar *y;
@@ -65,7 +65,7 @@ static PetscErrorCode lowest_mode(TestScene *t, Vec X, PetscReal *w)
   PetscCall(VecDuplicate(X, &Z));
   PetscCall(test_fill(m, bend, X));
   *w = 0.;
-  /* bending in y and in z have nearly the same frequency on the odd mesh: slow, and cheap */
+  /* bending modes in y and in z have nearly the same frequency on the odd mesh: convergence is slow, but cheap */
   for (int k = 0; k < 3000 && (k < 2 || PetscAbsReal(*w - last) > 1e-14 * *w); k++) {
     PetscReal kinetic, strain;
 
@@ -90,7 +90,7 @@ static PetscErrorCode lowest_mode(TestScene *t, Vec X, PetscReal *w)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Released from the mode: n steps of Newmark must be the exact oscillation of the method. */
+/* Released from the mode shape: n steps of Newmark must give the exact oscillation of the discrete method. */
 static PetscErrorCode check_release(const char *element, PetscInt n, PetscReal *frequency)
 {
   const PetscReal h = 0.02;
@@ -114,7 +114,7 @@ static PetscErrorCode check_release(const char *element, PetscInt n, PetscReal *
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
                         "    %s n %2d: %.6f Hz; after %d steps of Newmark %.1e from its exact swing\n",
                         element, (int)n, (double)*frequency, (int)steps, (double)error));
-  /* tolerance of the linear solver times the number of steps; on the odd mesh two modes are hard to tell apart */
+  /* tolerance of the linear solver times the number of steps; on the odd mesh two modes are nearly degenerate */
   SB_CHECK(n % 2 || error < 1e-8, "the released mode is off by %g after %d steps", (double)error, (int)steps);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -125,7 +125,7 @@ typedef struct {
   PetscReal min_t, min_u;
 } Minimum;
 
-/* First minimum of the end, by the parabola through three samples. */
+/* First minimum of the end displacement, by a parabola through three samples. */
 static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
 {
   Minimum *m = (Minimum *)ctx;
@@ -185,14 +185,14 @@ int main(int argc, char **argv)
                         "extrapolated %.4f m at %.4f s (reference -1.5696 m at 0.7203 s)\n",
                         (double)limit[0], (double)limit[1], (double)limit[2]));
   SB_CHECK_NEAR(limit[0], 0.68846, 3e-3 * 0.68846, "extrapolated frequency");
-  /* the minimum is flat, and small waves of high modes, which each mesh has in other places, decide where it is */
+  /* the minimum is flat: small high-frequency waves, which depend on the mesh, determine its position */
   SB_CHECK_NEAR(limit[1], -1.5696, 1e-2 * 1.5696, "extrapolated first minimum");
   SB_CHECK_NEAR(limit[2], 0.7203, 1e-2 * 0.7203, "its time");
   for (int e = 0; e < 3; e++) {
     static const char *const elements[] = {"cr", "dg", "p2"};
     const char *element = elements[e];
 
-    /* the lumped mass of P2 makes it 1.3 % too slow with two cells */
+    /* the lumped mass of P2 lowers the frequency by 1.3 % with two cells */
     for (int k = e == 2; k < 2; k++) {
       PetscCall(check_release(element, 2 << k, f));
       SB_CHECK_NEAR(f[0], 0.68846, 5e-3 * 0.68846, element);

@@ -18,7 +18,7 @@
 #define WIDTH 3.
 #define AT 24.
 
-/* A bar along the frame, mitred at the corner: x[0] along the middle, x[1] across it, outside first. */
+/* Map of a bar along the frame, mitred at the corner: x[0] along the centre line, x[1] across it, from the outside. */
 static void frame(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
 {
   const PetscReal across = DEPTH * (0.5 - x[1]), s = 2. * x[0];
@@ -41,7 +41,7 @@ static void frame(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], voi
 
 typedef struct {
   PetscReal full, point[3];
-  PetscReal v[MOST], P[MOST]; /* the path: way down of the point under the load, load in EI/L^2 */
+  PetscReal v[MOST], P[MOST]; /* the path: downward displacement of the loaded point, load in EI/L^2 */
   PetscInt n;
 } Frame;
 
@@ -58,7 +58,7 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The first two extrema of x[n]: those of the parabolas through three values each; how many there are. The last step, cut to the full load, does not count. */
+/* First two extrema of x[n], each from a parabola through three values; returns the number of extrema. The last step, shortened to end at the full load, is ignored. */
 static PetscInt find_extrema(PetscInt n, const PetscReal x[], PetscReal extremum[2])
 {
   PetscInt found = 0;
@@ -73,7 +73,7 @@ static PetscInt find_extrema(PetscInt n, const PetscReal x[], PetscReal extremum
   return found;
 }
 
-/* From a point (way down, load) to the nearest one of a path, in lengths L and in largest loads. */
+/* Offset of a point (downward displacement, load) from the nearest point of a path, in units of L and of the largest load. */
 static void to_path(const Frame *f, const PetscReal point[2], PetscReal way[2])
 {
   const PetscReal unit[2] = {LENGTH, LARGEST};
@@ -97,7 +97,7 @@ static PetscErrorCode solve(const char *element, PetscInt nx, PetscInt ny, Frame
 {
   const PetscInt n[3] = {nx, ny, 1};
   const PetscReal width = DEPTH / (PetscReal)ny; /* of a cell, which is longer by half */
-  /* an even number of cells has nodes in the middle: a hinge is a line of them */
+  /* with an even number of cells there are nodes on the centre line: a hinge is a line of them */
   const PetscReal off = ny % 2 ? width / 6. : 0., high = ny % 2 ? width / 3. : width / 2.;
   /* which of the two triangles of a square has three vertices near the middle: the mesh is mirrored from cell to cell */
   const PetscReal sign[2] = {ny % 4 == 3 ? -1. : 1., ny % 4 == 3 ? 1. : -1.};
@@ -130,14 +130,14 @@ static PetscErrorCode solve(const char *element, PetscInt nx, PetscInt ny, Frame
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Simo and Vu-Quoc: way down, load in EI/L^2 */
+/* Simo and Vu-Quoc: downward displacement, load in EI/L^2 */
 static const PetscReal published[][2] = {
   {5.307, 6.329},   {14.537, 11.813}, {24.057, 14.798}, {34.384, 17.026}, {44.355, 18.665}, {50.842, 18.734},
   {56.547, 17.291}, {60.973, 13.243}, {61.263, 11.737}, {59.054, 6.979},  {54.621, 1.856},  {51.088, -1.877},
   {50.660, -4.093}, {51.210, -6.501}, {54.359, -8.958}, {57.573, -9.466}, {62.725, -8.830}, {70.667, -7.142},
   {77.886, -4.705}, {86.750, 2.156},  {91.817, 12.200}, {93.326, 22.752}};
 static const PetscReal turns[2] = {
-  61.263, 50.660}; /* its point farthest down before the load turns negative, and farthest back */
+  61.263, 50.660}; /* largest displacement before the load becomes negative, and smallest one after */
 
 /* P2 with two cells through the depth, without extrapolation. */
 static PetscErrorCode check_quadratic(void)
@@ -208,7 +208,7 @@ int main(int argc, char **argv)
     "  distance from the published curve, of L and the limit load: %.4f, %.4f, extrapolated %.4f\n",
     (double)far[0], (double)far[1], (double)far[2]));
   SB_CHECK(far[1] < 0.6 * far[0], "%g and %g from the published curve", (double)far[0], (double)far[1]);
-  /* measured 0.031: graph read to 0.01, straight lines between the steps, what two meshes leave */
+  /* measured 0.031: graph read to 0.01, linear interpolation between the steps, remaining error of two meshes */
   SB_CHECK(far[2] < 0.04, "%g from the published curve", (double)far[2]);
   PetscCall(check_quadratic());
   SB_TEST_END();

@@ -11,13 +11,13 @@
 #include "contact.h"
 
 #define SPEED 0.1                          /* m/s; bars are 1 m long, waves run at 10 m/s */
-#define ENERGY (0.5 * 2.5 * SPEED * SPEED) /* J, of a bar */
-#define TOUCH (1e-3 * 2.5)                 /* N, of the force of the wave solution: it touches */
+#define ENERGY (0.5 * 2.5 * SPEED * SPEED) /* J, of one bar */
+#define TOUCH (1e-3 * 2.5)                 /* N, of the force of the wave solution: threshold of contact */
 #define BAR(b) VERIFY_BODY(b, "box:1,0.05,0.05:1", "linear", "1e5", "0")
 #define BLOCK(b, poisson) VERIFY_BODY(b, "box:0.1,0.1,0.1:2", "linear", "1e5", poisson)
 #define EXACT " -ksp_rtol 1e-11 -snes_rtol 1e-11 "
 
-/* Bars: what is left of the relative speed and of the energy, the span of contact. */
+/* Bars: remaining fractions of relative speed and energy, first and last time of contact, s, and energy gain, J. */
 typedef struct {
   PetscReal speed, energy, first, last, gain;
 } Left;
@@ -45,10 +45,10 @@ static PetscErrorCode check_wall(const char *time, const char *more, PetscReal d
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Against implicit Euler: more of both is left. */
+/* Compares with implicit Euler: larger fractions of both remain. */
 static void check_better(const Left *left, const Left *euler, PetscBool energy)
 {
-  /* the node at the end of 20 cells has 1/40 of the mass */
+  /* the end node of 20 cells has 1/40 of the mass */
   if (energy)
     VERIFY_LESS(1 - left->energy, 0.4 * (1 - euler->energy), "energy lost, with implicit Euler more");
   VERIFY_MORE(left->speed, euler->speed + 0.02, "speed that is left, with implicit Euler less");
@@ -92,7 +92,7 @@ static PetscErrorCode collide(const char *time, const char *more, Left *left)
                     record_at(&r, "momentum_x", 0) - record_min(&r, "momentum_x"));
   VERIFY_NEAR(left->first, 0.01, 0.003, "first touch, s"); /* the width of the barrier before */
   VERIFY_NEAR(left->last - left->first, 0.2, 0.01, "time of contact, s");
-  /* how exactly gaps are closed, 1e-7 of the size, times the force of the wave solution */
+  /* tolerance of the gaps, 1e-7 of the size, times the force of the wave solution */
   VERIFY_LESS(left->gain, 2e-7 * 2.5, "largest gain of a step, J");
   VERIFY_LESS(change, 1e-10 * 2.5 * SPEED, "change of momentum, kg m/s");
   verify_show("part of the velocities that is exchanged", left->speed);
@@ -139,7 +139,7 @@ static PetscErrorCode check_ball(const char *material, PetscReal tolerance)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Largest change of the change of a force from step to step, after `from`. */
+/* Largest second difference of a force over the steps after `from`. */
 static PetscReal roughness(const Record *r, const char *name)
 {
   PetscReal most = 0;
@@ -152,7 +152,7 @@ static PetscReal roughness(const Record *r, const char *name)
   return most;
 }
 
-/* A block on a floor and one on it, which settle by damping: 9.81 N each. */
+/* A block on a floor and another one on it come to rest by damping: 9.81 N each. */
 static PetscErrorCode check_rest(void)
 {
   static const char *const force[2] = {"floor_force_z", "meet_normal_force"};
@@ -167,7 +167,7 @@ static PetscErrorCode check_rest(void)
                             "-effect_floor_type contact -effect_floor_obstacle plane:0,0,1,0 "
                             "-effect_meet_type contact -time newmark -ts_dt 0.004 "
                             "-ts_max_time 0.85" EXACT));
-  /* normal forces of pairs at edges lean a little */
+  /* normal forces of pairs at edges are slightly inclined */
   for (int k = 0; k < 2; k++) {
     VERIFY_NEAR(record_min(&r, force[k]), k ? 9.81 : 19.62, k ? 0.1 : 1e-3, "smallest force, N");
     VERIFY_NEAR(record_max(&r, force[k]), k ? 9.81 : 19.62, k ? 0.1 : 1e-3, "largest force, N");
@@ -177,7 +177,7 @@ static PetscErrorCode check_rest(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A block on a plane that begins to lie there without stress: it moves up and down for ever, and the force with it, smoothly. */
+/* A block on a plane, initially without stress: it oscillates without damping, and the force oscillates smoothly with it. */
 static PetscErrorCode check_smooth(void)
 {
   Record r = {.from = 0.02 - 1e-9};
@@ -195,7 +195,7 @@ static PetscErrorCode check_smooth(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A floor that speeds up by 10 m/s^2 lifts a soft block: it goes along. */
+/* A floor with an acceleration of 10 m/s^2 lifts a soft block: they move together. */
 static PetscErrorCode check_push(const char *response)
 {
   Record r = {0};

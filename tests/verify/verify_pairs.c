@@ -26,13 +26,13 @@
                "-time euler_implicit -ts_dt 0.002 -ts_max_time 0.02 -snes_rtol 1e-9 -ksp_rtol 1e-8 "
 
 typedef struct {
-  PetscReal worst[4]; /* errors of columns, of places, of obstacles (N), and of numbers of contacts */
+  PetscReal worst[4]; /* errors of columns, of contact points, of obstacles (N), and of contact counts */
   PetscReal largest;  /* net force, N */
   PetscInt places, edges, steps;
   PetscBool met[BODIES * BODIES];
 } Watch;
 
-/* Sums of the places of all ranks: force[e][a][b][3] of body b on body a by effect e, b = nbody for an obstacle; n[e] of those that push. */
+/* Sums over the contact points of all ranks: force[e][a][b][3] of body b on body a by effect e, b = nbody for an obstacle; n[e] points with a force. */
 static PetscErrorCode sum_places(SbRun run, PetscReal t, Watch *w, PetscReal force[2][BODIES][BODIES + 1][3],
                                  PetscReal n[2])
 {
@@ -136,9 +136,9 @@ static PetscErrorCode check_heap(const char *more)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ with itself */
+/* ------------------------------------------------------------------ self-contact */
 
-/* A strip of 8 mm that goes forth, around a half circle, and back. */
+/* Strip of 8 mm that is straight, bends around a half circle, and returns. */
 static void hairpin(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
 {
   const PetscReal leg = 0.08, radius = 0.02, way = 2 * leg + PETSC_PI * radius;
@@ -201,9 +201,9 @@ static PetscErrorCode check_fold(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ refused */
+/* ------------------------------------------------------------------ errors */
 
-/* Bodies with these names, one above the other, and what the scenario names that refuses them; NULL: it is fine. */
+/* Bodies with these names, one above the other; names: text of the error, NULL: no error. */
 static PetscErrorCode try_bodies(int n, const char *const name[], const char *more, const char *names)
 {
   char text[32 * 256] = "-bodies ", one[256];

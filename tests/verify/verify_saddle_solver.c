@@ -31,7 +31,7 @@ static PetscErrorCode solve(const char *scene, const char *more, PetscReal **u, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A scene with projected (more[0]) and otherwise (more[1..]). */
+/* Compares a scene with more[1..] to the same scene with more[0], `projected`. */
 static PetscErrorCode compare(const char *name, const char *scene, PetscInt n, const char *const more[],
                               PetscReal tolerance)
 {
@@ -48,7 +48,7 @@ static PetscErrorCode compare(const char *name, const char *scene, PetscInt n, c
     PetscCall(solve(scene, more[k], &u, &size, &e));
     off = verify_difference(size, exact, u);
     work = PetscAbsReal(e.prescribed_work - e0.prescribed_work) +
-           PetscAbsReal(e.load_work - e0.load_work); /* against the elastic energy */
+           PetscAbsReal(e.load_work - e0.load_work); /* relative to the elastic energy */
     PetscCall(PetscPrintf(PETSC_COMM_WORLD, "    differs by %.1e, works by %.1e of %.3g J\n", (double)off,
                           (double)work, (double)e0.strain));
     SB_CHECK(off < tolerance, "%s, %s: differs from projected by %g", name, more[k], (double)off);
@@ -64,12 +64,12 @@ static PetscErrorCode compare(const char *name, const char *scene, PetscInt n, c
 #define LAW(name)                                                                                  \
   "-body_" name "_material linear -body_" name "_young 1e5 -body_" name "_poisson 0.3 -body_" name \
   "_density 1000 "
-#define SETTLED 1e-8 /* of the displacements; they agree to 5e-10 */
+#define SETTLED 1e-8 /* tolerance of displacements; they agree to 5e-10 */
 #define EXACT "-ksp_rtol 1e-12 -snes_rtol 1e-11 "
 
 /* ------------------------------------------------------------------ obstacles */
 
-/* A block on a floor, under another one and beside planes of symmetry: nothing but contact holds it in z. */
+/* A block on a floor, under another obstacle and beside symmetry planes: only contact supports it in z. */
 #define PRESSED                                                                                              \
   "-bodies a -body_a_mesh box:0.1,0.1,0.05:3 " LAW(                                                          \
     "a") "-time static -effects x,y,floor,roof -effect_x_type fixed -effect_x_on xmin -effect_x_components " \
@@ -93,7 +93,7 @@ static PetscErrorCode check_pressed(PetscInt n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A wedge of two planes at a small angle under the same nodes, the same plane twice, and a wall that supported nodes cannot leave. */
+/* A wedge of two planes at a small angle under the same nodes, the same plane twice, and a wall at supported nodes. */
 #define CORNER                                                                                            \
   "-bodies a -body_a_mesh box:0.1,0.1,0.05:3 " LAW(                                                       \
     "a") "-time static -effects x,gravity,top,floor,tilted,again,wall -effect_x_type fixed -effect_x_on " \
@@ -120,7 +120,7 @@ static PetscErrorCode check_corner(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A ball that is pressed into a clamped block and drawn along, without friction. */
+/* A ball that indents a clamped block and is dragged along it, without friction. */
 #define DRIVE                                                                                              \
   "-bodies a -body_a_mesh box:0.1,0.06,0.04:3 -body_a_material corotated -body_a_young 2e4 "               \
   "-body_a_poisson 0.4 -body_a_density 1000 -effects bed,tool -effect_bed_type fixed -effect_bed_on zmin " \
@@ -200,10 +200,10 @@ static PetscErrorCode check_bent(void)
   for (int k = 1; k < 3; k++) {
     SB_CHECK(PetscAbsReal(strain[k] - strain[0]) < 1e-6 * strain[0], "%g J, projected %g J",
              (double)strain[k], (double)strain[0]);
-    /* the same Newton's method, with directions that differ by the tolerance; without the part at the rim 110 and 201 for 83 */
+    /* the same Newton's method, with directions that differ by the tolerance; without the boundary term 110 and 201 iterations instead of 83 */
     SB_CHECK(newton[k] < 1.2 * newton[0], "%d iterations, projected %d", (int)newton[k], (int)newton[0]);
   }
-  /* CR: one load step against four */
+  /* CR: one load step instead of four */
   PetscCall(bend("-effect_load_value 1200 -effect_load_follower no -body_a_element cr -static_steps 4",
                  &strain[0], &newton[0]));
   PetscCall(
@@ -219,7 +219,7 @@ int main(int argc, char **argv)
 
   SB_TEST_BEGIN(argc, argv);
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  /* many solves of small systems: on several ranks what differs there */
+  /* many solves of small systems: on several ranks only the cases that differ there */
   PetscCall(check_pressed(size > 1 ? 4 : 6));
   PetscCall(check_corner());
   PetscCall(check_limit());

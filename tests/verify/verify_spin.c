@@ -104,7 +104,7 @@ static PetscErrorCode check_turned(const char *element, const char *law)
 
 /* ------------------------------------------------------------------ spin */
 
-/* Rest place of the node nearest to a point: a vertex, or the centroid of a face. */
+/* Reference position of the node nearest to a point: a vertex, or the centroid of a face. */
 static PetscErrorCode nearest_node(SbModel m, const PetscReal at[3], PetscReal place[3])
 {
   PetscScalar *x;
@@ -121,7 +121,7 @@ static PetscErrorCode nearest_node(SbModel m, const PetscReal at[3], PetscReal p
 }
 
 typedef struct {
-  PetscReal left[3], right[3];      /* two nodes at rest */
+  PetscReal left[3], right[3];      /* reference positions of two nodes */
   PetscReal last[2], d, w0h, worst; /* direction from one to the other, turn expected next, largest error */
 } Spin;
 

@@ -13,7 +13,7 @@
 #define RADIUS 0.05 /* m */
 #define STEPS 20
 
-/* A quarter of a block with bulging top and bottom, so that contact begins in the middle. */
+/* Map of a quarter of a block with bulging top and bottom, so that contact begins at the centre. */
 static void cushion(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
 {
   (void)n;
@@ -99,9 +99,9 @@ static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscRe
                 "behind a plate, m");
   VERIFY_NEAR(record_last(&r, "volume") / record_at(&r, "volume", 0), 1, swell, "volume, of that at rest");
   VERIFY_NEAR(work / record_last(&r, "strain"), 1, 0.02, "work of the plates against the energy");
-  /* P2 on two cells across is 4 % below that on three */
+  /* P2 with two cells across is 4 % below P2 with three */
   if (newtons > 0) VERIFY_NEAR(force / newtons, 1, 0.05, "force, of that of P2 with three cells across");
-  /* it is RADIUS high now */
+  /* the height is now RADIUS */
   if (!strcmp(element, "p1"))
     VERIFY_NEAR(-force * RADIUS / trace, 1, 1e-6, "height times force against the trace of the stress");
   PetscCall(record_free(&r));
@@ -109,7 +109,7 @@ static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Springs as stiff as a body is against compression, at nu = 0.4999 a thousand times as stiff as against shear, take 1,800 iterations here. */
+/* Contact springs scaled by the bulk modulus, at nu = 0.4999 a thousand times as stiff as by the shear modulus, need 1,800 iterations here. */
 static PetscErrorCode check_springs(const char *element)
 {
   Record r = {0};
@@ -129,7 +129,7 @@ static PetscErrorCode check_springs(const char *element)
   PetscCall(record_solve(&t, &r));
   PetscCall(test_scene_close(&t));
   VERIFY_LESS((PetscReal)r.newton, 80, "iterations");
-  /* `projected` has 3.430 N (P2); what the springs give, 0.5 % of the stress over the shear modulus, is below the error of the mesh */
+  /* `projected` gives 3.430 N (P2); the penetration of the springs, 0.5 % of the stress over the shear modulus, is below the error of the mesh */
   if (!strcmp(element, "p2"))
     VERIFY_NEAR(record_last(&r, "floor_force_z") / 3.430, 1, 0.01, "force, of that without springs");
   PetscCall(record_free(&r));
@@ -144,7 +144,7 @@ static void block(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], voi
   for (int k = 0; k < 3; k++) x[k] *= (k == 2 ? 2 : 1) * RADIUS;
 }
 
-/* The penalty of jumps changes from step to step: a block that is thrown onto a floor, to two thirds of its height, gains no energy by it in steps of any length, s. */
+/* The jump penalty changes from step to step: it adds no energy to a block that is thrown onto a floor, to two thirds of its height, in steps of any length, s. */
 static PetscErrorCode check_thrown(const char *element, PetscReal dt, PetscReal height)
 {
   const PetscInt n[3] = {2, 2, 4};
@@ -165,14 +165,14 @@ static PetscErrorCode check_thrown(const char *element, PetscReal dt, PetscReal 
   PetscCall(record_solve(&t, &r));
   PetscCall(test_scene_close(&t));
   VERIFY_LESS(record_gain(&r, "energy"), 1e-6 * record_at(&r, "energy", 0), "energy gained in a step, J");
-  /* of P2 on the same mesh; with a penalty that does not follow some 0.03 m less */
+  /* that of P2 on the same mesh; a constant penalty gives some 0.03 m less */
   VERIFY_NEAR(record_last(&r, "centre_z"), height, 0.003, "height of the centre, m");
   PetscCall(record_free(&r));
   PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Pressed to a fifth of its height and let go, without damping: the penalty of jumps follows strong compression, and must not pump. */
+/* Compressed to a fifth of its height and released, without damping: the jump penalty grows with strong compression, and must not add energy. */
 static PetscErrorCode check_released(const char *element)
 {
   Record r = {0};
@@ -191,7 +191,7 @@ static PetscErrorCode check_released(const char *element)
     element));
   PetscCall(record_solve(&t, &r));
   PetscCall(test_scene_close(&t));
-  /* pressed, it holds 1 J; of that the integrator gives 0.035, most of it in one step where it is pressed fastest */
+  /* the compressed body has 1 J; the integrator adds 0.035 J, most of it in one step at the fastest compression */
   VERIFY_LESS(record_gain(&r, "energy"), 0.1, "energy gained in a step, J");
   VERIFY_LESS(record_last(&r, "energy"), 0.1, "energy at the end, J");
   VERIFY_NEAR(record_last(&r, "centre_z"), 0.025, 0.002, "height of the centre, m");
@@ -199,8 +199,8 @@ static PetscErrorCode check_released(const char *element)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Pressed to half its height and let go in long steps near nu = 1/2, where the pressure of a cell goes up and down with waves: the penalty that follows it must not make what Newmark's method gains
-   there without bound. P1 and P2 gain 6 and 9 % of the energy in half the motion. */
+/* Compressed to half its height and released in long steps near nu = 1/2, where waves change the pressure of a cell: the penalty that depends on it must not make the energy gain of Newmark's
+   method unbounded. P1 and P2 gain 6 and 9 % of the energy in half the motion. */
 static PetscErrorCode check_waves(const char *element)
 {
   Record r = {0};

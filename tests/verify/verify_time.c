@@ -14,7 +14,7 @@
 static const double complex unit = 1.0i;
 static const PetscReal young = 1000., nu = 0.25, rho = 8., v0 = 0.2;
 
-/* share: part of the tet's mass at the apex, 1/4 lumped and 1/10 consistent */
+/* share: fraction of the tet's mass at the apex, 1/4 lumped and 1/10 consistent */
 static PetscReal frequency(PetscReal share)
 {
   const PetscReal lambda = young * nu / ((1. + nu) * (1. - 2. * nu)), mu = young / (2. * (1. + nu));
@@ -22,7 +22,7 @@ static PetscReal frequency(PetscReal share)
   return PetscSqrtReal((lambda + 2. * mu) / (share * rho * HEIGHT * HEIGHT));
 }
 
-/* Runs n steps of length h; u and v of the apex along z. */
+/* Runs n steps of length h; returns u and v of the apex along z. */
 static PetscErrorCode oscillate(const char *options, PetscInt n, PetscReal h, PetscReal *u, PetscReal *v)
 {
   const PetscReal apex[3] = {0., 0., HEIGHT};
@@ -71,7 +71,7 @@ static PetscErrorCode check_oscillator(const char *options, int kind)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Error at a fixed time against the exact oscillation must fall with the order of the method; damped by alpha and beta. */
+/* The error at a fixed time against the exact oscillation, damped by alpha and beta, decreases with the order of the method. */
 static PetscErrorCode check_order(const char *options, PetscReal share, PetscReal alpha, PetscReal beta,
                                   int order)
 {
@@ -107,7 +107,7 @@ static PetscErrorCode check_dissipation(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A free body under gravity: implicit Euler falls g h^2 n (n + 1) / 2, Newmark g t^2 / 2. */
+/* Free body under gravity: the fall is g h^2 n (n + 1) / 2 with implicit Euler, g t^2 / 2 with Newmark. */
 static PetscErrorCode check_free_fall(const char *element, const char *preset, PetscReal expected)
 {
   TestScene t;
@@ -134,7 +134,7 @@ static PetscErrorCode check_free_fall(const char *element, const char *preset, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* End of a bar that gravity bends, and how fast it goes there. */
+/* Displacement and velocity of the end of a bar that bends under gravity. */
 static PetscErrorCode bend(const char *element, const char *options, PetscInt n, PetscReal value[6])
 {
   const PetscReal end[3] = {0.2, 0.05, 0.05}, T = 0.02;
@@ -158,7 +158,7 @@ static PetscErrorCode bend(const char *element, const char *options, PetscInt n,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Steps of h, h/2, h/4: the differences fall with the order of the method; a first-order one shows it with smaller steps. */
+/* Steps of h, h/2, h/4: the differences decrease with the order of the method; a first-order one needs smaller steps to show it. */
 static PetscErrorCode check_bar_order(const char *element, const char *options, int order)
 {
   PetscReal x[3][6], order_u, order_v;

@@ -11,7 +11,7 @@
 */
 #include "verify.h"
 
-/* How many new units one m, kg, s is; angle of the turn, rad. */
+/* Number of new units in one m, kg, s; angle of rotation, rad. */
 typedef struct {
   const char *what;
   PetscReal m, kg, s, angle, tolerance;
@@ -32,7 +32,7 @@ static PetscErrorCode add(char text[], const char *format, ...)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Two bars, one of them flying, all kinds of loads. */
+/* Two bars, one of them in free flight, and all kinds of loads. */
 static PetscErrorCode scenario(const char *element, const char *law, const char *time, PetscReal seconds,
                                const Units *q, char text[])
 {
@@ -82,7 +82,7 @@ static PetscErrorCode scenario(const char *element, const char *law, const char 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Displacements in m and turned back. */
+/* Displacements in m, rotated back. */
 static PetscErrorCode solve(const char *element, const char *law, const char *time, PetscReal seconds,
                             const Units *q, PetscInt *n, PetscReal **u, PetscInt *steps)
 {
