@@ -7,7 +7,7 @@
 
 static const PetscReal width = 0.5, pressure = 3.;
 
-/* b and its derivatives: positive, falling, convex; nothing from the width on, infinite at zero. */
+/* b and its derivatives: positive, decreasing, convex; zero from the width on, infinite at zero gap. */
 static void check_function(void)
 {
   PetscReal b[3], c[3], d[3];
@@ -42,7 +42,7 @@ static PetscReal energy_at(SbContactMesh m, const SbContactPair *pair, const Pet
   return energy;
 }
 
-/* Edges that cross at an angle of 0.01, both of length 1 at rest: apart they count in part, which their derivatives show; close together the whole barrier keeps them so. */
+/* Edges of length 1 that cross at an angle of 0.01: at larger gaps their barrier is reduced by the mollifier, which its derivatives include; at small gaps it is complete. */
 static void check_crossing(void)
 {
   PetscReal X[12] = {0., 0., 0., 1., 0., 0., 0., 0., 0., 1., 0., 0.}, x[12], gradient[12], last = 0., b[3];
@@ -65,7 +65,7 @@ static void check_crossing(void)
   }
 }
 
-/* Gradient, Hessian and clamped Hessian against central differences, by the motion of the first nv vertices, which are those of bodies. */
+/* Gradient, Hessian and projected Hessian against central differences, for the motion of the first nv vertices, which belong to bodies. */
 static void check_pair(SbContactMesh m, const SbContactPair *pair, PetscReal x[12], int nv, PetscInt *tried)
 {
   const PetscReal step = 1e-6;
@@ -89,7 +89,7 @@ static void check_pair(SbContactMesh m, const SbContactPair *pair, PetscReal x[1
     for (int l = 0; l < 3 * nv; l++) reference[12 * k + l] = (g[1][l] - g[0][l]) / (2. * step);
   }
 
-  /* the feature may change within the differences: there they are not symmetric or large, and the pair is passed over */
+  /* the closest feature can change within the differences: then these are not symmetric or are large, and the pair is skipped */
   for (int k = 0; k < 144; k++) {
     largest = PetscMax(largest, PetscAbsReal(reference[k]));
     worst = PetscMax(worst, PetscAbsReal(reference[k] - reference[12 * (k % 12) + k / 12]));
@@ -127,14 +127,14 @@ int main(int argc, char **argv)
     pair.kind = SB_PAIR_EDGE_EDGE;
     check_pair(&mesh, &pair, x, 4, &tried[1]);
 
-    /* nearly parallel ones, a little apart */
+    /* nearly parallel edges at a small distance */
     for (int k = 0; k < 3; k++) {
       x[6 + k] = x[k] + 0.1 * pair_random() + (k == 2 ? 0.2 : 0.);
       x[9 + k] = x[6 + k] + x[3 + k] - x[k] + 0.01 * pair_random();
     }
     check_pair(&mesh, &pair, x, 4, &tried[2]);
 
-    /* and so near that what counts depends on the gap */
+    /* the same at such a small distance that the mollifier depends on the gap */
     for (int k = 0; k < 3; k++) u[k] = x[3 + k] - x[k];
     SbCross(u, X, n);
     for (int k = 0; k < 3; k++) {
@@ -144,13 +144,13 @@ int main(int argc, char **argv)
     }
     check_pair(&mesh, &pair, x, 4, &tried[5]);
 
-    /* the same, one of them an edge of a capsule */
+    /* the same with one edge of a capsule */
     mesh.nbody_vertex = 2;
     mesh.radius = 0.01;
     for (int k = 0; k < 6; k++) x[6 + k] += 0.01 * n[k % 3] / PetscSqrtReal(SbDot3(n, n));
     check_pair(&mesh, &pair, x, 4, &tried[6]);
 
-    /* a half-space and a bowl: only the first vertex moves */
+    /* half-space and bowl: only the first vertex moves */
     pair.side = PETSC_TRUE;
     mesh.nbody_vertex = 1;
     mesh.side = SB_SIDE_PLANE;

@@ -21,7 +21,7 @@ typedef struct {
   PetscReal *block;
 } Rows;
 
-/* Every second owned node, backwards: rows come in the order asked for. */
+/* Every second owned node in reverse order: rows are returned in the requested order. */
 static PetscErrorCode get(SbSpace s, Mat A, Rows *r)
 {
   PetscFunctionBeginUser;
@@ -42,7 +42,7 @@ static PetscErrorCode put(Rows *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Largest difference to the rows of `to`; on prescribed diagonals only that both are positive. */
+/* Largest difference from the rows of `to`; prescribed diagonal entries need only be positive in both. */
 static PetscReal difference(SbSpace s, const Rows *r, const Rows *to)
 {
   PetscReal worst = 0.;

@@ -7,7 +7,7 @@
 
 #define TIGHT "-contact_ksp_rtol 1e-8 "
 
-/* Solves the problem; reason may be NULL: it has to converge. */
+/* Solves the problem; the solve must converge. */
 static PetscErrorCode solve(ContactProblem *p, SbContactSystem system, const char *what, PetscInt *its)
 {
   KSPConvergedReason reason;
@@ -17,7 +17,7 @@ static PetscErrorCode solve(ContactProblem *p, SbContactSystem system, const cha
   PetscCall(SbContactSystemSolve(system, p->K, &p->blocks, PETSC_TRUE, p->F, p->Y, &reason, its));
   SB_CHECK(reason > 0, "%s: %s", what, KSPConvergedReasons[reason]);
   PetscCall(contact_problem_residual(p, &left));
-  /* the energy of the error has fallen by 1e-16; the residual weighs what is stiff by its root, stiff cells of the mesh among it */
+  /* the energy of the error is reduced by 1e-16; the residual weights stiff components, those of the mesh included, by the root of the stiffness */
   SB_CHECK(left < 2e-6 * PetscMax(1., PetscSqrtReal(p->scale)), "%s: residual %g", what, (double)left);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -62,7 +62,7 @@ static PetscErrorCode check_stiffness(PetscInt cells, const char *element, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One system for blocks that come and go, then for some that make it indefinite. */
+/* One system for changing sets of blocks, then for blocks that make it indefinite. */
 static PetscErrorCode check_changes(PetscInt way)
 {
   ContactProblem p;
@@ -76,13 +76,13 @@ static PetscErrorCode check_changes(PetscInt way)
   PetscCall(SbContactSystemCreate(p.scene.model->space, way, &system));
   all = p.blocks.n;
   for (int round = 0; round < 60; round++) {
-    /* all of them in two rounds of three; from round 30 on none, until the pattern has forgotten them; at the end all */
+    /* all of them in two of three rounds; after round 30 none, until the pattern drops them; in the last round all */
     p.blocks.n = round % 3 == 0 || round > 30 ? 0 : all;
     if (round == 59) p.blocks.n = all;
     PetscCall(solve(&p, system, "blocks that come and go", &its));
   }
 
-  /* a diagonal far below zero */
+  /* a large negative diagonal */
   for (PetscInt k = 0; k < p.blocks.n; k++) {
     for (int e = 0; e < 9; e++) p.blocks.block[k][e] *= -1.;
   }
@@ -97,7 +97,7 @@ static PetscErrorCode check_changes(PetscInt way)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Small systems are factored, as are those for which CG takes too long, and the next ones; others are not; the user's types are taken. */
+/* Small systems are factorised, as are those for which CG is too slow, and the following ones; others are not; the user's types are respected. */
 static PetscErrorCode check_choice(void)
 {
   static const struct {
@@ -124,7 +124,7 @@ static PetscErrorCode check_choice(void)
     SbContactSystem system;
     PetscInt its;
 
-    /* several ranks have PETSc's cholesky with MUMPS only, and say so */
+    /* on several ranks PETSc's cholesky requires MUMPS, and an error says so */
     if (size > 1 && !mumps && strstr(c[k].more, "cholesky")) continue;
 
     PetscCall(PetscSNPrintf(more, sizeof(more), TIGHT "%s", c[k].more));

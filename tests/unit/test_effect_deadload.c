@@ -37,7 +37,7 @@ static PetscErrorCode get_corners(Fixture *x, PetscInt ncorner, PetscInt *n, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sums over owned nodes of all ranks: f_x, and f_x x, f_x y, f_x z. */
+/* Sums over the owned nodes of all ranks: f_x, and f_x x, f_x y, f_x z. */
 static PetscErrorCode moments(Fixture *x, SbDeadLoad load, PetscReal t, PetscReal factor, PetscReal all[4])
 {
   PetscReal sum[4] = {0};

@@ -19,7 +19,7 @@ static PetscErrorCode make_on(const char *name, SbEffectOn *on)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Number of unknowns held, over all ranks. */
+/* Number of prescribed unknowns over all ranks. */
 static PetscErrorCode count(const SbPrescribed *hold, PetscInt *all)
 {
   PetscInt n = 0;
@@ -32,7 +32,7 @@ static PetscErrorCode count(const SbPrescribed *hold, PetscInt *all)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All local nodes, ghosts too, carry the bits that their place asks for. */
+/* All local nodes, ghosts included, have the bits of their position. */
 static void check_bits(const Fixture *x)
 {
   for (PetscInt i = 0; i < x->space->nnode; i++) {
@@ -44,7 +44,7 @@ static void check_bits(const Fixture *x)
   }
 }
 
-/* Values and reactions by the rule: bottom holds x and z of its nodes, west the rest of its own. */
+/* Values and reactions: bottom prescribes x and z of its nodes, west the remaining components of its own. */
 static PetscErrorCode check_values(Fixture *x, SbPrescribed *bottom, SbPrescribed *west)
 {
   const PetscInt side = x->space->faces ? 8 : 9, shared = x->space->faces ? 0 : 3; // nodes
@@ -112,7 +112,7 @@ static PetscErrorCode check_element(const char *element)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The face of a DG cell with a support is constrained there, whoever comes first, and its own node is free. */
+/* The support of a DG face is prescribed, whichever effect is first, and the node of the cell is free. */
 static PetscErrorCode check_supports(void)
 {
   Fixture x;

@@ -11,7 +11,7 @@ static const char *const sets[][2] = {
   {"corner", "sphere:0,0,0,0.1"}, {"lower", "box:-1,-1,-1,2,2,0.5"},
 };
 
-/* A list of sets without the option behind it. */
+/* List of sets without an option. */
 static PetscErrorCode make_on(const char *a, const char *b, SbEffectOn *on)
 {
   PetscFunctionBeginUser;
@@ -114,7 +114,7 @@ static PetscErrorCode check_errors(Fixture *x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Facets and cells do not depend on the element; the nodes of CR and DG are faces. */
+/* Facets and cells are independent of the element; the nodes of CR and DG are at faces. */
 static PetscErrorCode check_faces(const char *element, PetscInt all, PetscInt bottom)
 {
   Fixture x;

@@ -14,7 +14,7 @@ static PetscErrorCode value(const char *text, PetscReal expected)
 
   PetscFunctionBeginUser;
   PetscCall(SbFormulaCreate(PETSC_COMM_WORLD, text, "-test", &f));
-  /* the same operations in the same order give the same bits */
+  /* the same operations in the same order give bitwise the same result */
   SB_CHECK(SbFormulaEval(f, 4, X) == expected, "%s is %.17g, expected %.17g", text,
            (double)SbFormulaEval(f, 4, X), (double)expected);
   PetscCall(SbFormulaDestroy(&f));
@@ -79,7 +79,7 @@ static PetscErrorCode test_uses(void)
              place);
     PetscCall(SbFormulaDestroy(&f));
   }
-  /* without place, x may be NULL */
+  /* without a dependence on position, x may be NULL */
   PetscCall(SbFormulaCreate(PETSC_COMM_WORLD, "3*t", "-test", &f));
   SB_CHECK(SbFormulaEval(f, 2, NULL) == 6, "3*t");
   PetscCall(SbFormulaDestroy(&f));
@@ -87,7 +87,7 @@ static PetscErrorCode test_uses(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creation must fail and name these; what was built so far is freed. */
+/* Creation must fail with a message that contains these names; partial results are freed. */
 static PetscErrorCode refused(const char *text, const char *names)
 {
   SbFormula f = NULL;
@@ -117,7 +117,7 @@ static PetscErrorCode test_refused(void)
   PetscCall(refused("t & 1", "-test|column 3|'t & 1'"));
   PetscCall(refused("inf", "-test|column 1|name 'inf'"));
 
-  /* 300 open brackets; a sum whose terms all wait on the stack */
+  /* 300 open brackets; a sum whose terms all remain on the stack */
   memset(deep, '(', 300);
   deep[300] = 0;
   PetscCall(refused(deep, "-test|column 257"));
@@ -127,7 +127,7 @@ static PetscErrorCode test_refused(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creates a formula from a table with this content; on the ranks' common folder. */
+/* Creates a formula from a table with this content, in a folder that all ranks share. */
 static PetscErrorCode table(const char *file, const char *content, const char *line, SbFormula *f)
 {
   char text[PETSC_MAX_PATH_LEN], message[2 * PETSC_MAX_PATH_LEN];

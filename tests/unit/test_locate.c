@@ -8,7 +8,7 @@
 
 #define N 6
 
-/* The vertices of a box: mesh, with those inside moved. */
+/* Vertices of a box: mesh, with the interior ones moved. */
 static PetscErrorCode make_box(PetscRandom random, SbImport *im)
 {
   PetscFunctionBeginUser;
@@ -84,7 +84,7 @@ static PetscErrorCode check_inside(PetscRandom random)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* In curved tets, far from the origin too: a point at l is found there, or on the side of a neighbour. */
+/* Curved tets, far from the origin too: a point with coordinates l is found in its tet, or on the face of a neighbour. */
 static PetscErrorCode check_curved(PetscRandom random, PetscReal far)
 {
   PetscReal *off;
@@ -132,7 +132,7 @@ static PetscErrorCode check_curved(PetscRandom random, PetscReal far)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Outside a box the nearest place is known. */
+/* Outside a box the closest point is known. */
 static PetscErrorCode check_outside(void)
 {
   const PetscReal p[3][3] = {{1.3, 0.7, 0.2}, {0.4, -0.5, 0.1}, {0.5, 0.9, 0.9}},
@@ -154,7 +154,7 @@ static PetscErrorCode check_outside(void)
     for (int a = 0; a < 4; a++) SB_CHECK(w[a] >= 0 && w[a] <= 1, "weight %g", (double)w[a]);
   }
   PetscCall(SbLocatorDestroy(&l));
-  /* of two tets around one place that which is not inverted holds it */
+  /* of two coincident tets the one that is not inverted contains the point */
   {
     const PetscReal x[12] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}, q[3] = {0.2, 0.2, 0.2};
     const PetscInt cells[8] = {0, 2, 1, 3, 0, 1, 2, 3};

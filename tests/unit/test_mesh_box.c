@@ -30,7 +30,7 @@ static PetscErrorCode free_box(Box *box)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A conforming box has no other boundary facets than two per cell side on its six sides. */
+/* A conforming box has two boundary facets per cell side on its six sides, and no others. */
 static PetscErrorCode test_box(const char *text, PetscInt nx, PetscInt ny, PetscInt nz, PetscReal volume)
 {
   Box box;
@@ -50,7 +50,7 @@ static PetscErrorCode test_box(const char *text, PetscInt nx, PetscInt ny, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every triangle of a side lies in its plane and on the boundary. */
+/* Every triangle of a side is in the plane of the side and on the boundary. */
 static PetscErrorCode test_sides(void)
 {
   Box box;
@@ -97,7 +97,7 @@ static PetscErrorCode test_quality(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Mirrored neighbours: with even numbers of cells the edges are symmetric about the middle of the box. */
+/* Mirrored neighbours: with even numbers of cells the edges are symmetric about the centre of the box. */
 static PetscErrorCode test_symmetry(void)
 {
   Box box;

@@ -6,7 +6,7 @@
 
 #define DATA "tests/data/"
 
-/* The groups of two_cubes, as gmsh writes them: items of each. */
+/* Groups of two_cubes, as gmsh writes them: number of items of each. */
 static const struct {
   int dim;
   const char *group;
@@ -14,7 +14,7 @@ static const struct {
 } cubes[] = {{3, "left", 24}, {3, "all", 48},       {2, "wall", 4}, {2, "both ends", 8},
              {2, "inner", 4}, {2, "surface_77", 4}, {1, "edge", 1}, {0, "corner", 1}};
 
-/* Two adjoining unit cubes: 24 tets each, 4 triangles on each side (two_cubes.geo). */
+/* Two adjacent unit cubes: 24 tets each, 4 triangles on each side (two_cubes.geo). */
 static PetscErrorCode test_variant(const char *path)
 {
   SbImport im, reference;
@@ -41,7 +41,7 @@ static PetscErrorCode test_variant(const char *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A binary file from a machine with the other byte order: the 4.1 file with every number of its sections turned round. */
+/* Binary file with the other byte order: the 4.1 file with every number of its sections reversed. */
 static PetscErrorCode test_other_byte_order(void)
 {
   static const unsigned char one[4] = {0, 0, 0, 1};
@@ -84,7 +84,7 @@ static PetscErrorCode test_other_byte_order(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes with far-apart numbers, unused nodes, a section of no concern. */
+/* Nodes with widely separated numbers, unused nodes, an irrelevant section. */
 static PetscErrorCode test_odd(void)
 {
   SbImport im;
@@ -137,7 +137,7 @@ static PetscErrorCode test_damage(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Cut anywhere, each variant ends in an error, never in a crash or a mesh. */
+/* Any truncation of each variant gives an error, never a crash or a mesh. */
 static PetscErrorCode test_cut(const char *whole_path, size_t step)
 {
   char path[] = "/tmp/sbmesh_XXXXXX.msh", *data;

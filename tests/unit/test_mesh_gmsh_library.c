@@ -15,7 +15,7 @@ static PetscErrorCode run(const char *doing, PetscReal seconds, SbGmshWork work,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Runs and frees. */
+/* Runs a task and frees it. */
 static PetscErrorCode try_work(PetscReal seconds, SbGmshWork work, void *ctx)
 {
   SbImport im;
@@ -29,9 +29,9 @@ static PetscErrorCode try_work(PetscReal seconds, SbGmshWork work, void *ctx)
   PetscFunctionReturn(ierr);
 }
 
-/* ------------------------------------------------------------------ a volume from a surface */
+/* ------------------------------------------------------------------ volume from a surface */
 
-/* The unit cube as twelve triangles of a discrete surface; its volume, at the size that ctx points to. */
+/* Unit cube as twelve triangles of a discrete surface; its volume mesh has the size that ctx points to. */
 static PetscErrorCode mesh_cube(const SbGmsh *gmsh, void *ctx, SbImport *result)
 {
   double x[24];
@@ -89,13 +89,13 @@ static PetscErrorCode test_cube(void)
   SB_CHECK(im.item[3].n >= 6 && im.nvert >= 8, "%d tets, %d vertices", (int)im.item[3].n, (int)im.nvert);
   PetscCall(SbMeshFileMeasure(&im, &facts));
   SB_CHECK_NEAR(facts.body.volume, 1, 1e-12, "volume");
-  /* the body can go on growing */
+  /* more items can be added to the body */
   PetscCall(SbImportAddItem(&im, 3, (PetscInt[]){0, 1, 2, 3}, 0, 1));
   PetscCall(SbImportDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ what goes wrong */
+/* ------------------------------------------------------------------ errors */
 
 static PetscErrorCode crash(const SbGmsh *gmsh, void *ctx, SbImport *result)
 {
@@ -149,7 +149,7 @@ static PetscErrorCode test_failures(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Without a work function that calls for it, the library is not in this process. */
+/* Without a work function that calls it, the library is not loaded in this process. */
 static PetscErrorCode test_not_loaded(void)
 {
   char line[512];
@@ -174,7 +174,7 @@ int main(int argc, char **argv)
     PetscCall(test_failures());
     PetscCall(test_not_loaded());
   }
-  /* MPI still works after the children, and the other ranks have waited */
+  /* MPI still works after the child processes, and the other ranks have waited */
   PetscCallMPI(MPI_Bcast(&rank, 1, MPI_INT, 0, PETSC_COMM_WORLD));
   SB_CHECK(rank == 0, "rank %d from rank 0", (int)rank);
   SB_TEST_END();

@@ -62,7 +62,7 @@ static PetscErrorCode test_groups(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A quarter of the hollow cylinder of radii 1 and 2 and of height 1. */
+/* Quarter of a hollow cylinder with radii 1 and 2 and height 1. */
 static void cylinder(PetscReal x[3])
 {
   const PetscReal r = 1 + x[0], angle = 0.5 * PETSC_PI * x[1];
@@ -138,7 +138,7 @@ static PetscErrorCode measure_cylinder(PetscInt n, PetscBool curved, PetscReal e
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sizes of curved bodies, their regions, surfaces and curves converge with order 4, straight ones with order 2. */
+/* Sizes of curved bodies, their regions, surfaces and curves converge with order 4, those of straight ones with order 2. */
 static PetscErrorCode test_curved(void)
 {
   PetscReal error[2][2][7];
@@ -155,7 +155,7 @@ static PetscErrorCode test_curved(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What a run refuses is refused. */
+/* Errors of a run are errors here too. */
 static PetscErrorCode test_refused(void)
 {
   SbImport *im;

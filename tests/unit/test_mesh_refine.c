@@ -30,7 +30,7 @@ static PetscErrorCode test_edges(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Six times the volume of the children of cell c, and the smallest of them. */
+/* Six times the volume of the children of cell c, and that of the smallest child. */
 static PetscReal family(const SbImport *im, PetscInt c, PetscReal *smallest)
 {
   PetscReal sum = 0;
@@ -45,7 +45,7 @@ static PetscReal family(const SbImport *im, PetscInt c, PetscReal *smallest)
   return sum;
 }
 
-/* The children of each tet have its volume and groups, all positive, none less than an eighth. */
+/* The children of each tet have its total volume and its groups; all are positive, none has less than an eighth. */
 static PetscErrorCode test_children(const char *path)
 {
   SbImport *im, *fine;
@@ -80,7 +80,7 @@ static PetscErrorCode test_children(const char *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A refined mesh is sound, its triangles are faces, and the boundary has four facets for each. */
+/* A refined mesh is valid, its triangles are faces, and the boundary has four facets for each of the old ones. */
 static PetscErrorCode test_sound(void)
 {
   SbImport *im;
@@ -100,7 +100,7 @@ static PetscErrorCode test_sound(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Five times refined, the shapes are no worse than after the first time by more than the bound of the method allows. */
+/* After five refinements the shapes are worse than after the first one only within the bound of the method. */
 static PetscErrorCode test_shapes(void)
 {
   SbImport *im;
@@ -121,7 +121,7 @@ static PetscErrorCode test_shapes(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The children of curved tets are curved as the map of their parents is: volumes to rounding, nothing folds, also of children of children. */
+/* The children of curved tets are curved by the map of their parents: exact volumes up to rounding, no folds, also for children of children. */
 static PetscErrorCode test_curved(const char *path)
 {
   SbImport *im;

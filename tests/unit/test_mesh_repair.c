@@ -13,7 +13,7 @@ static PetscErrorCode repaired(SbImport *im, PetscReal merge_tolerance, SbRepair
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every tet gets vertices of its own, shifted by up to `by`. */
+/* Gives every tet separate vertices, shifted by up to `by`. */
 static PetscErrorCode tear(SbImport *im, PetscReal by)
 {
   const PetscInt n = 4 * im->item[3].n;
@@ -70,7 +70,7 @@ static PetscErrorCode test_weld(void)
            (int)facts.body.npart);
   PetscCall(SbMeshFileDestroy(&im));
 
-  /* a tolerance above the size of the cells: tets collapse, and what is left is sound */
+  /* a tolerance above the cell size: tets collapse, and the remaining mesh is valid */
   PetscCall(test_read("box:1,1,1:4", 0, &im));
   PetscCall(repaired(im, 0.3, &r, &facts));
   SB_CHECK(r.nwelded > 0 && r.ncollapsed > 0 && facts.body.ncell > 0, "%d welded, %d collapsed",
@@ -79,7 +79,7 @@ static PetscErrorCode test_weld(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Two groups that both hold one tet, given twice; a flat tet between others; an inverted one; an unused vertex. */
+/* Two groups with one tet, given twice; a flat tet between others; an inverted one; an unused vertex. */
 static PetscErrorCode test_all_at_once(void)
 {
   SbImport *im;
@@ -114,7 +114,7 @@ static PetscErrorCode test_all_at_once(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A tet pressed flat between its neighbours leaves a slit; one on the boundary does not. */
+/* Removal of a flat tet between its neighbours leaves a slit; that of one on the boundary does not. */
 static PetscErrorCode test_flat(void)
 {
   static const PetscInt ring[5] = {0, 1, 2, 3, 0};
@@ -127,7 +127,7 @@ static PetscErrorCode test_flat(void)
   PetscCall(PetscMemzero(&im, sizeof(im)));
   (void)snprintf(im.where, sizeof(im.where), "flat");
   PetscCall(SbImportTagSet(&im, 0, NULL, &v[0]));
-  /* a square 0 1 2 3 that is itself a flat tet, with a pyramid above and below, cut along the two diagonals */
+  /* a square 0 1 2 3 that is itself a flat tet, with a pyramid above and one below, divided along the two diagonals */
   PetscCall(SbImportSetVertices(&im, 6));
   {
     static const PetscReal x[18] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, .5, .5, 1, .5, .5, -1};
@@ -148,7 +148,7 @@ static PetscErrorCode test_flat(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A curved edge goes with the flat tet that alone had it: the repaired mesh can be read again. */
+/* A curved edge is removed with the flat tet that alone has it: the repaired mesh can be read again. */
 static PetscErrorCode test_curved_edges(void)
 {
   static const PetscInt flat[4] = {0, 1, 2, 3}, end[2][2] = {{1, 2}, {0, 7}};

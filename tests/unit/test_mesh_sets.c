@@ -66,7 +66,7 @@ static PetscErrorCode build(const char *text, SbSet *set, SbMergedMesh *whole)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a neighbour is in the same body and has this cell for a neighbour. */
+/* Whether the neighbour is in the same body and has this cell as a neighbour. */
 static PetscBool sees_back(const SbMergedMesh *whole, PetscInt c, PetscInt neighbour)
 {
   const PetscInt *n = whole->neighbour + 4 * neighbour;
@@ -86,7 +86,7 @@ static PetscErrorCode test_counts(const char *text, PetscInt nvert, PetscInt nfa
   PetscCall(build(text, &set, &whole));
   SB_CHECK(set.nvert == nvert && set.nfacet == nfacet && set.ncell == ncell,
            "%s: %d vertices, %d facets, %d cells", text, (int)set.nvert, (int)set.nfacet, (int)set.ncell);
-  /* The masks say the same. */
+  /* The masks agree. */
   for (PetscInt v = 0; v < whole.nvert; v++) n[0] += !!(whole.vertex[v].set & SB_SET_BIT(0));
   for (PetscInt c = 0; c < whole.ncell; c++) {
     n[2] += !!(whole.data[c].set & SB_SET_BIT(0));
@@ -106,7 +106,7 @@ static PetscErrorCode test_counts(const char *text, PetscInt nvert, PetscInt nfa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An inner surface is seen from the cells on both sides, and both sides agree. */
+/* An interior surface is marked in the cells on both sides. */
 static PetscErrorCode test_inner(void)
 {
   SbMergedMesh whole;
@@ -171,16 +171,16 @@ int main(int argc, char **argv)
   PetscCall(test_counts("group:b.xmax", 9, 8, 0));
   PetscCall(test_counts("group:zmin", 9, 8, 0));
   PetscCall(test_counts("body:b", 27, 48, 48));
-  PetscCall(
-    test_counts("boundary", 23 - 1 + 26, 88, 0)); /* all but the centres of the inner square and of the box */
+  PetscCall(test_counts("boundary", 23 - 1 + 26, 88,
+                        0)); /* all but the centres of the interior square and of the box */
   PetscCall(test_counts("plane:1,0,0,0", 5, 4, 0));
   PetscCall(test_counts("plane:-2,0,0,-12", 9, 8, 0));
   PetscCall(test_counts("plane:1,0,0,4.9,0.11", 9, 8, 0));
   PetscCall(
-    test_counts("plane:1,0,0,1", 5, 0, 0)); /* the inner square: shapes take facets of the boundary only */
+    test_counts("plane:1,0,0,1", 5, 0, 0)); /* the interior square: shapes contain boundary facets only */
   PetscCall(test_counts("box:5,0,0,5.5,1,1", 18, 8 + 4 * 4, 24));
   PetscCall(
-    test_counts("box:5.0000001,0.1,0.1,5.9999999,1,1", 2 * 2 * 3, 12, 12)); /* within the slack of 1e-6 */
+    test_counts("box:5.0000001,0.1,0.1,5.9999999,1,1", 2 * 2 * 3, 12, 12)); /* within the tolerance of 1e-6 */
   PetscCall(test_counts("sphere:5,0,0,0.71", 7, 6, 0)); /* all corners of the cell but the far one */
   PetscCall(test_counts("halfspace:-1,0,0,-5.5", 18, 8 + 4 * 4, 24));
   PetscCall(test_inner());

@@ -4,7 +4,7 @@
 #include "mesh_test.h"
 #include "surface_files.h"
 
-/* One region around which all triangles are seen counter-clockwise, or two: behind those from `inner` on is the second. */
+/* Surface of one region with counter-clockwise triangles as seen from outside, or of two: the triangles from `inner` on bound the second region. */
 static PetscErrorCode make_skin(const TestSurface *t, PetscInt inner, SbSurface *s)
 {
   PetscFunctionBeginUser;
@@ -29,7 +29,7 @@ static void measure(const SbImport *im, PetscInt n, PetscReal volume[])
     volume[im->item[3].tags[c]] += PetscAbsReal(SbTetDeterminant(im->x, im->item[3].vert + 4 * c)) / 6;
 }
 
-/* A sphere within a sphere, each a region of its own; the triangles stay. */
+/* A sphere within a sphere, each a separate region; the triangles are preserved. */
 static PetscErrorCode check_kept(SbTetBackend backend)
 {
   TestSurface t;
@@ -78,7 +78,7 @@ static PetscErrorCode check_kept(SbTetBackend backend)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The unit sphere at three sizes: half the size makes about eight times the tets, none of them bad. */
+/* The unit sphere at three sizes: half the size gives about eight times as many tets, none of them bad. */
 static PetscErrorCode check_sizes(void)
 {
   const PetscReal sizes[3] = {0.5, 0.35, 0.25};
@@ -123,7 +123,7 @@ static PetscErrorCode check_sizes(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A ring thinner than the size: gmsh's new surface would lose its volume, which is seen; tetgen keeps the triangles, and it is said why. */
+/* A ring thinner than the size: gmsh's new surface would lose its volume, which is detected; tetgen preserves the triangles, and a note gives the reason. */
 static PetscErrorCode check_second_road(void)
 {
   const PetscInt n[2] = {60, 10};
@@ -158,7 +158,7 @@ static PetscErrorCode check_second_road(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What neither backend can do: two boxes through each other, passed by the checks. */
+/* What neither backend supports: two intersecting boxes that bypass the checks. */
 static PetscErrorCode check_failure(void)
 {
   const PetscReal lo[3] = {0, 0, 0}, hi[3] = {1, 1, 1}, lo2[3] = {0.5, 0.4, 0.3}, hi2[3] = {1.5, 1.6, 1.7};

@@ -13,14 +13,14 @@ static const char *const texts[] = {"plane:0,3,4,5",
                                     "cylinder:-0.4,0.1,0,0.5,0.3,0.2,0.35",
                                     "bowl:0.1,0,0.2,1.3"};
 
-/* Numbers in -1..1 that are the same everywhere. */
+/* Reproducible numbers in -1..1. */
 static PetscReal number(unsigned *state)
 {
   *state = *state * 1664525u + 1013904223u;
   return (PetscReal)(*state >> 8) / (1 << 23) - 1;
 }
 
-/* At a kink of the distance differences mean nothing: whether the normal jumps between the points around x. */
+/* Whether the normal is continuous around x; at a kink of the distance finite differences are meaningless. */
 static PetscBool smooth(SbObstacle o, const PetscReal x[3], PetscReal h)
 {
   PetscReal n[3], other[3];

@@ -57,7 +57,7 @@ static PetscErrorCode test_round_trip(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every node comes back to its place, whatever the elements; another element is refused. */
+/* Every node is restored, with any element; a different element is an error. */
 static PetscErrorCode test_elements(void)
 {
   static const char *const elements[] = {
@@ -92,7 +92,7 @@ static PetscErrorCode test_elements(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The next step's length: that of the interrupted run, unless the new run has another step or end. */
+/* Length of the next step: that of the interrupted run, unless the new run has a different step or end. */
 static PetscErrorCode test_next_step(void)
 {
   static const struct {
@@ -121,7 +121,7 @@ static PetscErrorCode test_next_step(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The hash of the mesh does not depend on the partition, but on every coordinate and cell. */
+/* The hash of the mesh is independent of the partition, and depends on every coordinate and cell. */
 static PetscErrorCode test_hash(void)
 {
   static const struct {
@@ -147,7 +147,7 @@ static PetscErrorCode test_hash(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Folder with a checkpoint of step 1; then a scene that tries to go on from it must fail. */
+/* Writes a folder with a checkpoint of step 1; a scene that restarts from it must fail. */
 static PetscErrorCode test_refused(void)
 {
   static const char *const others[] = {" -body_a_young 1001", " -body_a_material stvk", " -mass consistent",

@@ -4,7 +4,7 @@
 
 static char dir[PETSC_MAX_PATH_LEN];
 
-/* Column `name` of row `row` (0 is the first row of numbers) of the file; NAN when it is not there. */
+/* Column `name` of row `row` (0 is the first row of numbers) of the file; NAN if it is absent. */
 static PetscReal value_of(const char *text, const char *name, int row)
 {
   const size_t length = strlen(name);
@@ -75,7 +75,7 @@ static PetscErrorCode test_values(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of equally near vertices the one with the smallest original number is taken, on any number of ranks. */
+/* Of equidistant vertices the one with the smallest original number is selected, on any number of ranks. */
 static PetscErrorCode test_tie(void)
 {
   TestScene scene;
@@ -122,7 +122,7 @@ static PetscErrorCode test_every(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What a kill leaves: a row without its end. It and the rows after the checkpoint go, the others stay. */
+/* A row without its end, as after a kill: it and the rows after the checkpoint are removed, the others remain. */
 static PetscErrorCode test_restart(void)
 {
   TestScene scene;

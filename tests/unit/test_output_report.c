@@ -3,7 +3,7 @@
 
 static char dir[PETSC_MAX_PATH_LEN];
 
-/* Runs `call` with PETSc's output going to a text. */
+/* Runs `call` and stores PETSc's output in a text. */
 #define CAPTURE(text, call)                         \
   do {                                              \
     FILE *stdout_ = PETSC_STDOUT;                   \
@@ -89,7 +89,7 @@ static PetscErrorCode test_report(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes and unknowns are those of the element: 30 vertices, 124 faces, 48 cells with four each. */
+/* Numbers of nodes and unknowns depend on the element: 30 vertices, 124 faces, 48 cells with four each. */
 static PetscErrorCode test_elements(void)
 {
   static const struct {

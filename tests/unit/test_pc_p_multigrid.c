@@ -64,7 +64,7 @@ static PetscErrorCode check_symmetry(const char *nu)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The displacements and iterations of a run. */
+/* Displacements and iterations of a run. */
 static PetscErrorCode solve(const char *options, const char *solver, PetscInt *iterations, PetscReal *size)
 {
   char text[2048];
@@ -127,7 +127,7 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_symmetry("0.3"));
   PetscCall(check_symmetry("0.4999"));
-  /* one rank: 18, 29, 65; with parts that meet everywhere 22, 33, 69 */
+  /* one rank: 18, 29, 65; with subdomains that all adjoin each other 22, 33, 69 */
   PetscCall(check_iterations("0.3", 24));
   PetscCall(check_iterations("0.45", 36));
   PetscCall(check_iterations("0.49", 76));
@@ -146,7 +146,7 @@ int main(int argc, char **argv)
         "-body_c_poisson 0.3 -body_c_translate 0,2,0 -body_c_element cr ") "-effects gravity,clamp "
                                                                            "-effect_clamp_type fixed "
                                                                            "-effect_clamp_on xmin " STATIC));
-  /* the lower level by algebraic multigrid, as where it is too large for a factorisation */
+  /* algebraic multigrid on the lower level, as for sizes too large for a factorisation */
   PetscCall(check_answer("-pc_coarse_pc_type gamg -bodies a " BODY(
     "a", "box:0.3,0.1,0.1:3",
     "-body_a_element p2 -body_a_poisson 0.3 ") "-effects gravity,clamp -effect_clamp_type fixed "

@@ -102,7 +102,7 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* rest: what linear solves may leave, relative; of CR a force of faces under pressure is along the jump that a step begins with (src/fem/jump.c), which turns a little in it. */
+/* rest: relative error of the linear solves; CR: the force of a face under pressure is along the jump at the start of the step (src/fem/jump.c), which rotates slightly within the step. */
 static PetscErrorCode check(const char *element, PetscReal dt, PetscReal rest)
 {
   const PetscReal tolerance = 1e-12;

@@ -21,7 +21,7 @@ typedef struct {
   PetscReal strain; /* J */
 } Bar;
 
-/* Solves a static scene given by the rest of its options. */
+/* Solves a static scene with the given additional options. */
 static PetscErrorCode solve(const char *options, Bar *bar)
 {
   SbEnergies e;
@@ -93,10 +93,10 @@ static PetscErrorCode check_hanging(void)
                         "  hanging bar: largest error at vertices n 2, 4, 8: %.2e %.2e %.2e of the largest "
                         "displacement, order %.2f\n",
                         (double)error[0], (double)error[1], (double)error[2], (double)order));
-  /* the maximum over vertices is not smooth in h: 0.3 off the order, and small in itself */
+  /* the maximum over the vertices is not smooth in h: the order deviates by 0.3; the error itself is small */
   SB_CHECK_NEAR(order, 2., 0.3, "order at the vertices of the hanging bar");
   SB_CHECK(error[2] < 1e-3, "hanging bar, n = 8: error of %g", (double)error[2]);
-  /* the displacement is quadratic: P2 has it, but for the volume, which it takes as constant in each tet */
+  /* the displacement is quadratic: P2 represents it except for the volume, which is constant in each tet */
   PetscCall(hanging_error(2, "-body_a_element p2 -body_a_volume pointwise -solver direct", &error[0]));
   PetscCall(hanging_error(2, "-body_a_element p2 -solver direct", &error[1]));
   PetscCall(hanging_error(4, "-body_a_element p2 -solver direct", &error[2]));
@@ -115,7 +115,7 @@ static PetscErrorCode check_hanging(void)
   " -effects clamp,plane,end -effect_clamp_type fixed -effect_clamp_on xmin -effect_plane_type fixed " \
   "-effect_plane_on all -effect_plane_components y -effect_end_type traction -effect_end_on xmax"
 
-/* Deflection of the cantilever with n cells across, of Timoshenko's. */
+/* Deflection of the cantilever with n cells across, relative to Timoshenko's. */
 static PetscErrorCode shear(PetscInt n, const char *element, PetscReal *w)
 {
   const PetscReal L = 1., h = 0.2, E = 1e6, P = 1e3 /* N per m of width */, G = E / 2.;
@@ -147,13 +147,13 @@ static PetscErrorCode check_shear(void)
                         "%.5f; P2, n 2: %.5f\n",
                         (double)w[0], (double)w[1], (double)w[2], (double)limit, (double)w[3]));
   SB_CHECK_NEAR(PetscLog2Real((1. - w[1]) / (1. - w[2])), 2., 0.15, "order of the end deflection");
-  /* the clamp keeps the end plane, which beam theory does not: about (h/L)^3 / 10 */
+  /* the clamp keeps the end section plane, beam theory does not: about (h/L)^3 / 10 */
   SB_CHECK_NEAR(limit, 1., 2e-3, "extrapolated deflection / Timoshenko");
   SB_CHECK_NEAR(w[3], 1., 2e-3, "deflection with P2 / Timoshenko");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The order is not 2 here (the edge of the clamp is singular): three meshes give order and limit (Aitken). */
+/* The order is not 2 here (singularity at the edge of the clamp): three meshes give order and limit (Aitken). */
 static PetscErrorCode check_weight(void)
 {
   const PetscReal end = -0.785713, strain = 6.38808;
@@ -172,7 +172,7 @@ static PetscErrorCode check_weight(void)
     PetscCall(solve(text, &bar));
     u[k] = bar.u[2];
     w[k] = bar.strain;
-    /* the energy of a conforming element is below the exact one under given loads */
+    /* under given loads the energy of a conforming element is below the exact one */
     SB_CHECK(w[k] < strain, "strain energy of %g J is above the exact one", (double)w[k]);
   }
   limit_u = verify_aitken(u);
@@ -188,7 +188,7 @@ static PetscErrorCode check_weight(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* L = 1, h = 0.05: stretch and shear, which the elastica leaves out, are alpha/12 (h/L)^2 and 0.6 (h/L)^2. */
+/* L = 1, h = 0.05: stretch and shear, which the elastica neglects, are alpha/12 (h/L)^2 and 0.6 (h/L)^2. */
 static PetscErrorCode elastica(const char *law, const char *element, PetscInt n, PetscReal alpha,
                                PetscReal value[2])
 {
@@ -226,7 +226,7 @@ static PetscErrorCode check_elastica(const char *law, PetscReal alpha, PetscReal
                           "(exact %.5f)\n",
                           law, (double)alpha, k ? "deflection" : "shortening", (double)coarse[k],
                           (double)fine[k], (double)limit[k], (double)quadratic[k], (double)exact[k]));
-    /* 1 % of the length: what two meshes leave after extrapolation, and the slenderness */
+    /* 1 % of the length: remaining error of the extrapolation, and the finite slenderness */
     SB_CHECK_NEAR(limit[k], exact[k], 0.01 * deflection, k ? "deflection" : "shortening");
     SB_CHECK_NEAR(quadratic[k], exact[k], 0.01 * deflection, "P2");
   }

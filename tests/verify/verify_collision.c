@@ -15,7 +15,7 @@
 #define LOAD 500.0 /* Pa */
 #define BLOCK(b, mesh) VERIFY_BODY(b, mesh, "linear", "1e5", "0.3")
 
-/* Largest deviation of the stress from uniaxial pressure, as a part of it. */
+/* Largest deviation of the stress from uniaxial pressure, relative to it. */
 static PetscErrorCode stress_error(TestScene *t, PetscReal *worst)
 {
   SbSpace s = t->model->space;
@@ -61,7 +61,7 @@ static PetscErrorCode check_stack(const char *element, int upper, PetscReal tole
   PetscCall(contact_body_forces(t.run, 1, force));
   PetscCall(test_scene_close(&t));
   VERIFY_LESS(worst, tolerance, "stress from uniform, of the load");
-  /* pairs at edges push a little aside */
+  /* pairs at edges have small lateral forces */
   VERIFY_NEAR(record_last(&r, "meet_normal_force"), LOAD * 0.01, 0.01 * LOAD * 0.01,
               "load on the lower block, N");
   VERIFY_NEAR(record_last(&r, "meet_penetration"), 0, 1e-7 * 0.2, "penetration, m");
@@ -73,9 +73,9 @@ static PetscErrorCode check_stack(const char *element, int upper, PetscReal tole
 
 /* ------------------------------------------------------------------ bars */
 
-#define SPEED 0.1 /* m/s, of each towards the other */
+#define SPEED 0.1 /* m/s, speed of each bar */
 
-/* Length 1, wave speed 10: in touch for 0.2 s from t = 0.01, then each with the other's velocity. */
+/* Length 1, wave speed 10: in contact for 0.2 s from t = 0.01, then with exchanged velocities. */
 static PetscErrorCode check_bars(const char *element)
 {
   Record r = {0};
@@ -133,7 +133,7 @@ static PetscErrorCode check_momentum(const char *element, PetscReal friction)
 
 /* ------------------------------------------------------------------ slope */
 
-/* A stiff block on a stiff one, gravity as on a slope of tan 0.5: its speed along the slope is that of a rigid one. */
+/* A stiff block on a stiff one, gravity as on a slope of tan 0.5: its speed along the slope is that of a rigid block. */
 static PetscErrorCode check_slope(PetscReal mu, PetscReal tolerance)
 {
   const PetscReal c = 9.81 / PetscSqrtReal(1.25), end = 0.2, rigid = PetscMax(0.5 - mu, 0) * c * end;
@@ -160,7 +160,7 @@ int main(int argc, char **argv)
 
   SB_TEST_BEGIN(argc, argv);
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  /* single tets: pairs at edges and corners carry shares of area that are not those of a uniform pressure; 11 to 19 % of it */
+  /* stress of single tets: areas of pairs at edges and corners differ from those of a uniform pressure; errors of 11 to 19 % */
   PetscCall(check_stack("p1", 3, 0.2));
   PetscCall(check_stack("cr", 2, 0.25));
   PetscCall(check_stack("p2", 2, 0.25));
@@ -173,7 +173,7 @@ int main(int argc, char **argv)
   PetscCall(check_bars("cr"));
   PetscCall(check_bars("p2"));
   PetscCall(check_momentum("p1", 0));
-  /* friction sticks below 1e-4 of the step's speed, some m/s with what weight and supports do */
+  /* friction sticks below 1e-4 of the speed scale of the step, which for weights and supports is some m/s */
   PetscCall(check_slope(0.51, 2e-4));
   PetscCall(check_slope(0.49, 0.08 * 0.01 * 1.755));
   PetscCall(check_slope(0.2, 0.01 * 0.3 * 1.755));

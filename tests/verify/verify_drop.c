@@ -14,7 +14,7 @@
 
 #define G 9.81
 #define RADIUS 0.05 /* m */
-#define HEIGHT 0.05 /* m, of the fall */
+#define HEIGHT 0.05 /* m, height of the fall */
 #define RISES 16
 
 typedef struct {
@@ -49,7 +49,7 @@ static PetscErrorCode check_momentum(SbRun run, const SbStep *step, Bounce *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The acceleration that the integrator begins with, which it finds after the monitors have seen the start. */
+/* Initial acceleration of the integrator, which computes it after the monitors have the initial state. */
 static PetscErrorCode fall_freely(SbModel m, Vec A)
 {
   PetscScalar *a;
@@ -81,7 +81,7 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bounds: energy above the start as a part of that of the fall; how many landings there must be. */
+/* bound: energy gain relative to the energy of the fall; landings: minimum number of impacts. */
 static PetscErrorCode check_bounce(const char *time, PetscReal bound, PetscInt landings)
 {
   const PetscBool alpha = (PetscBool)!strcmp(time, "genalpha");

@@ -8,9 +8,9 @@
 */
 #include "verify.h"
 
-#define MOST 16 /* residuals that are kept */
+#define MOST 16 /* number of residuals that are stored */
 
-/* One run: iterations, rejected load steps, displacement of the end, ratios of the residuals at the end. */
+/* One run: iterations, rejected load steps, last residuals, strain energy. */
 typedef struct {
   PetscInt iterations, rejected, n;
   PetscReal residual[MOST]; /* the last ones, N */
@@ -88,14 +88,14 @@ static PetscErrorCode check_bend_far(const char *element)
   SB_CHECK(one.rejected == 0 && one.iterations <= four.iterations,
            "%s: %d iterations, %d rejected load steps, %d iterations in four", element, (int)one.iterations,
            (int)one.rejected, (int)four.iterations);
-  /* twice what they take; with the pressures of states 52, 147 and 236, the last two after a rejected load step */
+  /* twice the measured number; with the pressures of the states 52, 147 and 236, the last two after a rejected load step */
   SB_CHECK(one.iterations <= 50, "%s: %d iterations", element, (int)one.iterations);
-  /* the penalty of jumps of CR follows the load steps, as far as it changes by a percent */
+  /* the jump penalty of CR depends on the load steps, to the extent that it changes by a percent */
   SB_CHECK_NEAR(four.strain, one.strain, 1e-4 * one.strain, "strain energy with more load steps");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* With exact tangents each of the last iterations squares the residual, as far as rounding lets it. */
+/* With exact tangents each of the last iterations squares the residual, up to rounding. */
 static PetscErrorCode check_quadratic(void)
 {
   Outcome o, filtered;
@@ -107,7 +107,7 @@ static PetscErrorCode check_quadratic(void)
   if (o.n >= 4 && o.n < MOST) {
     const PetscReal *r = o.residual + o.n - 3;
 
-    /* of order two the logarithms' ratio is 2; the last residual is one of rounding, so 1.4 */
+    /* for order two the ratio of the logarithms is 2; the last residual is at the level of rounding, hence 1.4 */
     SB_CHECK(PetscLogReal(r[2] / r[1]) < 1.4 * PetscLogReal(r[1] / r[0]),
              "residuals %g, %g, %g are not quadratic", (double)r[0], (double)r[1], (double)r[2]);
   }
@@ -116,7 +116,7 @@ static PetscErrorCode check_quadratic(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A full step in rotation stores hundreds of times the energy that it should set free; the next one comes back although its linear solve is loose. */
+/* A full Newton step in rotation stores hundreds of times the energy that it should release; the next step recovers although its linear solve is inexact. */
 static PetscErrorCode check_come_back(void)
 {
   PetscInt iterations[2];

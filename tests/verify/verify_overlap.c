@@ -10,18 +10,18 @@
 
 #define DEPTH 0.05
 #define STEP 0.004
-#define STEPS 30 /* of recovery */
+#define STEPS 30 /* of separation */
 #define MEET "-effects meet -effect_meet_type contact -effect_meet_verify yes "
 #define STEPPING "-time euler_implicit -ts_dt %g -ts_max_time %g -snes_rtol 1e-9 "
 #define SOFT(b, mesh) VERIFY_BODY(b, mesh, "corotated", "1e5", "0.3")
 
-/* mass (kg) times the square of the speed at which the depth (m) is taken back at first, J. */
+/* Mass (kg) times the square of the initial separation speed for a depth (m), J. */
 static PetscReal parting_energy(PetscReal mass, PetscReal depth)
 {
   return mass * PetscSqr(depth * (1 - PetscExpReal(-1. / STEPS)) / STEP);
 }
 
-/* Bodies of `mass` (kg) in all; deepest: at the start, bounds, m. */
+/* Bodies with a total mass of `mass` (kg); deepest: bounds of the initial depth, m. */
 static PetscErrorCode check_bodies(const char *what, const char *bodies, PetscReal mass, PetscReal time,
                                    const PetscReal deepest[2])
 {
@@ -49,7 +49,7 @@ static PetscErrorCode check_bodies(const char *what, const char *bodies, PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* They do not touch: nothing happens. */
+/* Bodies without contact do not move. */
 static PetscErrorCode check_apart(void)
 {
   Record r = {0};
@@ -66,7 +66,7 @@ static PetscErrorCode check_apart(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Faces in common planes, where it is a matter of rounding what is inside: parted all the same. */
+/* Faces in common planes, where rounding decides what is inside: the bodies are separated all the same. */
 static PetscErrorCode check_aligned(void)
 {
   Record r = {0};
@@ -84,7 +84,7 @@ static PetscErrorCode check_aligned(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A cube, its weight on it, that begins a tenth deep in an obstacle under it comes up and lies on it. */
+/* A cube under its weight that initially overlaps an obstacle below it by a tenth of its height rises and comes to rest on it. */
 static PetscErrorCode check_obstacle(const char *obstacle)
 {
   const PetscReal weight = 9.81;
@@ -108,7 +108,7 @@ static PetscErrorCode check_obstacle(const char *obstacle)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A bar bent to more than a ring, wider on one side, so that its ends are in each other. */
+/* A bar bent beyond a full ring, wider on one side, so that its ends overlap. */
 static PetscErrorCode check_ring(const char *element)
 {
   SbContactOverlap o = {0};

@@ -135,7 +135,7 @@ static PetscErrorCode check_orders(void)
   PetscCall(solve(8, 0.49, "mean", near));
   PetscCall(solve(8, 0.4999, "mean", nearer));
   PetscCall(solve(8, 0.4999, "pointwise", locked));
-  /* four to six cells in a half wave: a little below the limit */
+  /* four to six cells per half wave: a little below the asymptotic order */
   SB_CHECK_NEAR(log(fine[0] / finest[0]) / log(1.5), 3., 0.3, "order in L2");
   SB_CHECK_NEAR(log(fine[1] / finest[1]) / log(1.5), 2., 0.3, "order in H1");
   for (int k = 0; k < 2; k++) {

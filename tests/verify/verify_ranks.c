@@ -99,7 +99,7 @@ static PetscErrorCode check(const char *what, PetscReal tolerance, const char *o
   "-body_block_translate 0,0,0.5 -body_block_young 2e5 -body_block_poisson 0.3 -body_block_density 500 " \
   "-body_block_velocity 0.3,0,1 -body_block_angular_velocity 1,2,3 "
 
-/* Bodies with nodes at faces, alone and beside one of P1: held, pulled, pressed, damped. */
+/* Bodies with nodes at faces, alone and beside one of P1: fixed, with tractions, pressure and damping. */
 static PetscErrorCode check_element(const char *bar, const char *block)
 {
   char text[VERIFY_TEXT], what[64], elements[1024];

@@ -15,7 +15,7 @@
 #define STIFF(b, mesh) VERIFY_BODY(b, mesh, "corotated", "1e9", "0.3")
 #define MEET "-effect_meet_type contact -effect_meet_restitution %g "
 
-/* The bodies meet; bounds of what a step gains, of the energy, and of the change of momentum in a step, of the sum of its components. */
+/* The bodies collide; bounds of the energy gain in a step, relative to `energy`, and of the change of momentum in a step, relative to the sum of its components. */
 static void check_meeting(const Record *r, PetscReal energy, PetscReal gain, PetscReal momentum)
 {
   static const char *const v[6] = {"a_vx", "a_vy", "a_vz", "b_vx", "b_vy", "b_vz"};
@@ -46,13 +46,13 @@ static PetscErrorCode check_pair(const char *what, const char *bodies, PetscReal
   after = record_last(&r, "b_vx") - record_last(&r, "a_vx");
   VERIFY_NEAR(after / before, e, 0.01, "relative speed after, of that before");
   VERIFY_LESS(record_max(&r, "net"), 1e-13 * record_max(&r, "push"), "forces of contact in all, N");
-  /* stiff bodies: 1e-11 of the forces is what solves aim at */
+  /* stiff bodies: the tolerance of the solves is 1e-11 of the forces */
   check_meeting(&r, record_at(&r, "energy", 0), 1e-9, 2e-10);
   PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A vertex of the first meets the middle of a flat piece of the second. */
+/* A vertex of the first ball hits the centre of a flat part of the second. */
 static PetscErrorCode check_balls(void)
 {
   char path[2][512], bodies[VERIFY_TEXT / 2];
@@ -125,14 +125,14 @@ static PetscErrorCode check_soft(PetscReal young, PetscReal dt, PetscReal e)
                         "2000 -body_b_translate 0.11,0.02,0 -body_b_velocity -0.5,0,0 -effects meet " MEET
                         "-time euler_implicit -ts_dt %g -ts_max_time 0.1 -snes_rtol 1e-8",
                path, (double)young, path, (double)(2 * young), (double)e, (double)dt));
-  /* the energy of co-rotated tets that turn is not quite convex: also where nothing touches */
+  /* the energy of rotating co-rotated tets is not exactly convex, even without contact */
   check_meeting(&r, record_at(&r, "energy", 0), 1e-5, 1e-8);
   PetscCall(record_free(&r));
   PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A ring with a gap of a twentieth of its way round. */
+/* Map of a ring with a gap of 4 % of its circumference. */
 static void horseshoe(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
 {
   const PetscReal angle = (0.02 + 0.96 * x[0]) * 2 * PETSC_PI, r = 0.09 - 0.03 * x[1];

@@ -62,7 +62,7 @@ static PetscErrorCode write_blocks(PetscBool rough, size_t size, char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Keeps the displacement at a time. */
+/* Stores the displacement at a given time. */
 typedef struct {
   PetscReal since; /* s */
   Vec U;           /* m */
@@ -80,7 +80,7 @@ static PetscErrorCode keep(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Net contact forces against weights, interface by interface from above; returns the largest error as a part of the weight there. */
+/* Compares net contact forces with weights, interface by interface from above; returns the largest error relative to the weight there. */
 static PetscErrorCode check_forces(SbRun run, PetscReal t, PetscReal *vertical, PetscReal *sideways,
                                    PetscReal *sum)
 {
@@ -93,7 +93,7 @@ static PetscErrorCode check_forces(SbRun run, PetscReal t, PetscReal *vertical, 
   for (int k = BLOCKS - 1; k >= 0; k--) {
     carried += force[3 * k + 2];
     weight += G * mass[k];
-    if (k > 0) *sum += weight; /* what lies on the floor is another effect's */
+    if (k > 0) *sum += weight; /* the floor is another effect */
     *vertical = PetscMax(*vertical, PetscAbsReal(carried / weight - 1));
     for (int i = 0; i < 2; i++)
       *sideways = PetscMax(*sideways, PetscAbsReal(force[3 * k + i]) / (G * mass[k]));
@@ -101,7 +101,7 @@ static PetscErrorCode check_forces(SbRun run, PetscReal t, PetscReal *vertical, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bounds: of the speed at the end, m/s. */
+/* slow: bound of the speed at the end, m/s. */
 static PetscErrorCode check_stack(PetscReal friction, PetscReal slow)
 {
   const PetscReal end = friction > 0 ? 0.8 : 1, size = 0.12;
@@ -136,7 +136,7 @@ static PetscErrorCode check_stack(PetscReal friction, PetscReal slow)
   VERIFY_NEAR(record_last(&r, "meet_normal_force") / sum, 1, 2e-3,
               "normal forces in the history against the weights");
   VERIFY_LESS(record_last(&r, "speed"), slow, "fastest node, m/s");
-  /* what sticks creeps with less than 1e-3 of the size per second */
+  /* sticking contacts creep with less than 1e-3 of the size per second */
   VERIFY_LESS(drift, (friction > 0 ? 1e-4 : 1e-5) * size, "motion at rest, m");
   VERIFY_LESS(record_max(&r, "floor_penetration"), 1e-6 * size, "behind the floor, m");
   VERIFY_NEAR(record_max(&r, "meet_penetration"), 0, 0, "in each other, m");
