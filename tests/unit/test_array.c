@@ -12,7 +12,7 @@ int main(int argc, char **argv)
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
 
-  /* keys from -1 to NKEY: the lowest and the highest take no part, key 3 is nobody's */
+  /* keys from -1 to NKEY: the lowest and the highest are ignored, key 3 has no items */
   for (PetscInt i = 0; i < N; i++) key[i] = i * i % 9 == 4 ? 4 : i * i % 9 - 1;
   PetscCall(SbBucketByKey(N, key, NKEY, &start, &item));
   for (PetscInt k = 0; k < NKEY; k++) {
@@ -31,7 +31,7 @@ int main(int argc, char **argv)
   PetscCall(PetscFree(start));
   PetscCall(PetscFree(item));
 
-  /* by two keys, of which many are alike; the third number goes along */
+  /* sorted by two keys, many of them equal; the third number is carried along */
   for (PetscInt i = 0; i < N; i++) {
     triple[i][0] = i * i % 5;
     triple[i][1] = -(i * 7 % N);

@@ -4,7 +4,7 @@
 
 static const char *const laws[] = {"linear", "corotated", "stvk", "neohookean"};
 
-/* F = I + size times numbers in [-1, 1], the same in every run. */
+/* F = I + size times reproducible numbers in [-1, 1]. */
 static PetscErrorCode deform(PetscRandom random, PetscReal size, SbPack F[9])
 {
   PetscFunctionBeginUser;
@@ -26,7 +26,7 @@ static PetscErrorCode test_energy(const char *law, PetscRandom random)
 
   PetscFunctionBeginUser;
   PetscCall(SbMaterialCreateElastic(law, 1000., 0.45, 1., &m));
-  /* with nu = 0 lambda is 0, and mu that of m */
+  /* lambda is 0 for nu = 0; mu is that of m */
   PetscCall(SbMaterialCreateElastic(law, 2. * m->ops.shear_modulus(m), 0., 1., &shear));
   for (int i = 0; i < 20; i++) {
     PetscCall(deform(random, 0.3, F));
@@ -78,7 +78,7 @@ static void squeeze(const PetscReal x[3], PetscReal u[3])
   u[2] = -0.03 * x[2];
 }
 
-/* Bodies with an element and a law each: every cell has the pressure of its law. */
+/* Bodies with different elements and materials: every cell has the pressure of its material. */
 static PetscErrorCode test_scene(void)
 {
   static const PetscReal lambda[3] = {1000. * 0.3 / (1.3 * 0.4), 5000. * 0.25 / (1.25 * 0.5),

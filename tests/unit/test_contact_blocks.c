@@ -4,7 +4,7 @@
 #include "pair_reference.h"
 
 #define NV 7 /* vertices, the last one with its nodes on other ranks alone */
-#define NN 9 /* nodes, the first OWN ones of this rank */
+#define NN 9 /* vertices; the nodes of the last one are only on other ranks */
 #define OWN 6
 #define EACH 3   /* nodes of a vertex */
 #define NPAIR 40 /* blocks given, some of them for the same two vertices, either way round */

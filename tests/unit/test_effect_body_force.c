@@ -26,7 +26,7 @@ static const LoadCase cases[] = {
    {3 * 5 * 0.5, 0, 0},
    {0, 3 * 5 * 0.25, -3 * 5 * 0.25},
    0},
-  /* 8 N/m^3 on the lower half, also when it is named twice; the last one, whose force is looked at */
+  /* 8 N/m^3 on the lower half, also if it is named twice; the force of the last effect is checked */
   {"half",
    "-effect_half_type body_force -effect_half_on lower,lower -effect_half_density 0;0;8",
    PETSC_TRUE,

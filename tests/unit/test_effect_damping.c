@@ -14,7 +14,7 @@ static void check_bodies(const Fixture *x, const PetscReal alpha[2], const Petsc
   }
 }
 
-/* The power that damping takes is v.C v, C v being the force that it adds; a translation has the mass-proportional part only. */
+/* Dissipated power v.C v, with C v the force that damping adds; a translation has the mass-proportional part only. */
 static PetscErrorCode check_power(const char *block, const char *other, PetscBool held)
 {
   static const char *const sets[][2] = {{"bottom", "plane:0,0,1,0"}};

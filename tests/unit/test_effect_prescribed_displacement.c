@@ -8,7 +8,7 @@
 
 static const char *const sets[][2] = {{"top", "plane:0,0,1,1"}, {"bottom", "plane:0,0,1,0"}};
 
-/* Prescribed values of a drive at time t against the function `expected`; nodes of other sets are left out. */
+/* Prescribed values of the effect at time t against the function `expected`; nodes of other sets are ignored. */
 static PetscErrorCode check_values(Fixture *x, SbEffect e, PetscReal t, PetscReal z, int components,
                                    void (*expected)(const PetscReal X[3], PetscReal t, PetscReal u[3]))
 {
@@ -35,7 +35,7 @@ static PetscErrorCode check_values(Fixture *x, SbEffect e, PetscReal t, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Turn by 90 t degrees about the axis through (1, 0, 0) along +z, and lift by t / 2. */
+/* Rotation by 90 t degrees about the axis through (1, 0, 0) along +z, and translation by t / 2 along it. */
 static void turn_and_lift(const PetscReal X[3], PetscReal t, PetscReal u[3])
 {
   const PetscReal a = t * PETSC_PI / 2, r[2] = {X[0] - 1, X[1]};
@@ -45,7 +45,7 @@ static void turn_and_lift(const PetscReal X[3], PetscReal t, PetscReal u[3])
   u[2] = t / 2;
 }
 
-/* x follows a table: 0 to 3 m within 2 s, then it stays; z is stretched with the place. */
+/* x is given by a table: 0 to 3 m within 2 s, then constant; z is scaled with the position. */
 static void table_and_stretch(const PetscReal X[3], PetscReal t, PetscReal u[3])
 {
   u[0] = 1.5 * PetscMin(t, 2);
@@ -53,7 +53,7 @@ static void table_and_stretch(const PetscReal X[3], PetscReal t, PetscReal u[3])
   u[2] = t * X[0] * X[1];
 }
 
-/* A residual that turns about the drive's axis: force k x (x - c) at each node of the top, once at rest, once turned. */
+/* A residual tangential to the axis of the effect: force k x (x - c) at each node of the top, in the reference state and after rotation. */
 static PetscErrorCode check_torque(Fixture *x, SbEffect e)
 {
   const PetscReal n = x->space->faces ? 8 : 9; // nodes of the top

@@ -27,7 +27,7 @@ static const LoadCase cases[] = {
    {6, -12, 18},
    {9 + 9, 4.5 - 13.5, -9 - 3},
    0},
-  /* total and vector together, 2 N in x by the latter, and three times that at t = 2 */
+  /* total force and vector together, 2 N in x by the vector, and three times that at t = 2 */
   {"push",
    "-effect_push_vector 1;0;0 -effect_push_time 1+t",
    PETSC_FALSE,
@@ -47,7 +47,7 @@ int main(int argc, char **argv)
     FixturePair p;
 
     fixture_use(elements[k], elements[k],
-                (PetscBool)(k == 3)); /* a face with a support bears loads as any other */
+                (PetscBool)(k == 3)); /* a face with a support has loads like any other */
     PetscCall(fixture_pair_create(1, PETSC_STATIC_ARRAY_LENGTH(sets), sets, &p));
     PetscCall(check_loads(&p, PETSC_STATIC_ARRAY_LENGTH(cases), cases));
     PetscCall(check_effect_refused(&p.all, "dot",

@@ -15,7 +15,7 @@ static PetscErrorCode fails(const char *what)
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s", what);
 }
 
-/* The last rank fails alone, after all that the ranks do together; PetscFinalize() would be one thing more. */
+/* The last rank fails alone, after the last common operation; PetscFinalize() would be another one. */
 static PetscErrorCode program(int argc, char **argv, PetscMPIInt rank, PetscMPIInt size)
 {
   PetscFunctionBeginUser;
@@ -71,7 +71,7 @@ int main(int argc, char **argv)
   SB_CHECK(code == 1, "exit code %d on rank %d", code, rank);
   SB_CHECK(spoken == (rank == size - 1), "rank %d said farewell %d times", rank, spoken);
   if (!rank) {
-    (void)usleep(500000); /* what the others should not write would come now */
+    (void)usleep(500000); /* waits for output that the other ranks must not write */
     count_lines(file, "supple: error: the last rank failed", &matches, &all);
     SB_CHECK(matches == 1, "%d error lines", matches);
     SB_CHECK(all == 2, "%d lines on stderr", all);

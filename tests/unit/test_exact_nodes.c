@@ -18,7 +18,7 @@ static void wave(const PetscReal x[3], PetscReal v[3])
   v[2] = 0.5 * PetscSinReal(x[0] + 4. * x[2]) * x[0];
 }
 
-/* z = M r with P = a multiple of the identity inside. */
+/* z = M r, with P a multiple of the identity. */
 static void apply(SbExactNodes *e, PetscInt n, const float r[], float work[], float z[])
 {
   for (PetscInt i = 0; i < n; i++) work[i] = r[i];

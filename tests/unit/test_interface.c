@@ -20,11 +20,11 @@ static PetscErrorCode check_structure(SbSpace s, SbInterface f, PetscInt *mine)
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     *mine += f->index[i] >= 0;
     for (PetscInt k = s->plan->oi[i]; k < s->plan->oi[i + 1] && f->index[i] < 0 && s->fixed[i] != 7; k++) {
-      /* an interior node's neighbours elsewhere are on the interface, or held */
+      /* neighbours of an interior node on other ranks are in the interface, or fixed */
       if (f->index[s->plan->oj[k]] < 0 && s->fixed[s->plan->oj[k]] != 7) lost++;
     }
   }
-  /* all nodes that touch a lower rank would do it, too */
+  /* bound: all nodes adjacent to a lower rank */
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     PetscBool touches = PETSC_FALSE;
 
@@ -44,7 +44,7 @@ static PetscErrorCode check_structure(SbSpace s, SbInterface f, PetscInt *mine)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The share of a rank in exp(-|i - j| / 20) + (i == j) / 20, condition about 800; the shares are unequal. */
+/* Share of a rank in exp(-|i - j| / 20) + (i == j) / 20, condition number about 800; the shares are unequal. */
 static void fill(PetscMPIInt rank, PetscMPIInt size, PetscInt n, PetscReal S[])
 {
   const PetscReal share = 2. * (rank + 1) / ((PetscReal)size * (size + 1));
@@ -104,9 +104,9 @@ int main(int argc, char **argv)
     worst = PetscMax(worst, PetscAbsReal(expected[j] - x[j]));
     largest = PetscMax(largest, PetscAbsReal(expected[j]));
   }
-  /* entries are rounded at 1.5e-5 of the largest one of their row */
+  /* entries are rounded to 1.5e-5 of the largest one of their row */
   SB_CHECK(worst <= 5e-4 * largest, "off by %g of %g", (double)worst, (double)largest);
-  /* the triangle in 16-bit integers, in blocks of 48 rows with columns padded to 32, evenly shared */
+  /* the triangle in 16-bit integers, in blocks of 48 rows with columns padded to 32, evenly distributed */
   bytes = SbInterfaceBytes(f);
   PetscCallMPI(MPI_Allreduce(&bytes, &sum, 1, MPIU_INT64, MPI_SUM, PETSC_COMM_WORLD));
   PetscCallMPI(MPI_Allreduce(&bytes, &most, 1, MPIU_INT64, MPI_MAX, PETSC_COMM_WORLD));
@@ -114,7 +114,7 @@ int main(int argc, char **argv)
            sum, n);
   SB_CHECK(n < 48 * size || (PetscReal)most <= 1.5 * (PetscReal)sum / size,
            "%" PetscInt64_FMT " of %" PetscInt64_FMT " bytes on one rank", most, sum);
-  /* a rank that is busy otherwise gets none */
+  /* a rank with much other work gets no share */
   fill(rank, size, n, schur);
   PetscCall(SbInterfaceFactorise(f, rank == 0 ? 1000000000 : 0, schur, &ok));
   SB_CHECK(ok && (rank || !SbInterfaceBytes(f)), "%" PetscInt64_FMT " bytes on the busy rank",

@@ -3,7 +3,7 @@
 #include "../test.h"
 #include <sbmaterial.h>
 
-/* Options of a body, one for each law, read as the program does. */
+/* Options of a body, one set for each material, read as the program does. */
 static PetscErrorCode create(const char *law, const char *young, const char *poisson, const char *density,
                              const char *tangent, SbMaterial *m)
 {

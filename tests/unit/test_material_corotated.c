@@ -60,7 +60,7 @@ static PetscErrorCode test_warped(SbMaterial m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Collapsed and mirrored cells: everything stays finite. */
+/* Collapsed and mirrored cells: all results are finite. */
 static PetscErrorCode test_degenerate(SbMaterial m)
 {
   const PetscReal F[5][9] = {{0},

@@ -39,7 +39,7 @@ static void test_states(SbMaterial m)
   }
 }
 
-/* psi(I + t H) is Hooke's energy up to a relative error of order t: halved with t, and kept down to strains of 1e-7. */
+/* psi(I + t H) is Hooke's energy up to a relative error of order t, down to strains of 1e-7. */
 static void test_small_strains(SbMaterial m)
 {
   PetscReal H[9], F[9], difference_before = 0;
@@ -56,7 +56,7 @@ static void test_small_strains(SbMaterial m)
     for (int k = 0; k < 9; k++) F[k] = (k % 4 == 0) + t * H[k];
     const PetscReal error = fabs(energy_of(m, F) / (t * t * hooke) - 1);
     if (n > 9 && n < 14) SB_CHECK_NEAR(difference_before / error, 2, 0.2, "order of the small-strain limit");
-    /* F holds t H with an error of eps: relative to the energy eps / t; the law must not lose more than a few of these */
+    /* F represents t H with an error of eps, eps / t relative to the energy; the material may lose only a few times that */
     if (n > 16) SB_CHECK(error < 4 * t + 1e-14 / t, "energy of a strain of %g is off by %g", t, error);
     difference_before = error;
   }

@@ -5,7 +5,7 @@
 
 static const PetscReal eps = 2.2204460492503131e-16;
 
-/* S = V diag(s) V^T and V^T V = I to rounding of the largest entry, for eigenvalues of any ratio, equal ones, zero. */
+/* S = V diag(s) V^T and V^T V = I up to rounding of the largest entry, for eigenvalues of any ratio, equal ones, zero. */
 static void test_eig(void)
 {
   for (int t = 0; t < 20000; t++) {
@@ -40,7 +40,7 @@ static void test_eig(void)
   }
 }
 
-/* F = U diag(s) V^T with rotations, also for mirrored and singular F. */
+/* F = U diag(s) V^T with rotations U and V, also for mirrored and singular F. */
 static void test_stretches(void)
 {
   for (int t = 0; t < 5000; t++) {
@@ -54,14 +54,14 @@ static void test_stretches(void)
     SbPackGet(9, (const SbPack *)V, 2, v);
     for (int k = 0; k < 9; k++) d[k] = u[k] * s[k % 3][2];
     SbMatMulTranspose(d, v, G);
-    /* gap of the polar rotation at least 0.05 here */
+    /* the gap of the polar rotation is at least 0.05 here */
     SB_CHECK(difference(9, F, G) < 1e-13, "U diag(s) V^T is %g from F", difference(9, F, G));
     SB_CHECK_NEAR(SbMatDet(u), 1, 50 * eps, "det U");
     SB_CHECK_NEAR(SbMatDet(v), 1, 50 * eps, "det V");
   }
 }
 
-/* Any nonnegative flips, twists and Hessian: the tangent has exactly these eigenvalues on exactly these matrices. */
+/* For any nonnegative flips, twists and Hessian the tangent has exactly these eigenvalues and eigenmatrices. */
 static void test_modes(void)
 {
   for (int t = 0; t < 500; t++) {

@@ -24,7 +24,7 @@ static void other(const PetscReal x[3], PetscReal v[3])
   v[2] = x[0] * (x[1] - x[2]);
 }
 
-/* Zeroes prescribed entries: there the two operators have different multiples of the identity. */
+/* Zeroes prescribed entries, where the two operators have different multiples of the identity. */
 static PetscErrorCode hold(SbSpace s, Vec X)
 {
   PetscScalar *x;
@@ -82,7 +82,7 @@ static PetscErrorCode compare(const char *law)
   PetscCall(VecNorm(Z, NORM_2, &difference));
   SB_CHECK(norm > 0. && difference < 1e-13 * norm, "%s: the operators differ by %g of %g", law,
            (double)difference, (double)norm);
-  /* what prescribed entries hold has no part in the free rows */
+  /* values at prescribed entries do not affect the free rows */
   PetscCall(test_fill(t.model, other, Y));
   PetscCall(MatMult(F, Y, Z));
   PetscCall(hold(s, Z));

@@ -4,7 +4,7 @@
 
 #define DATA "tests/data/"
 
-/* What is repaired and what is only counted. */
+/* Repaired defects, and defects that are only counted. */
 static PetscErrorCode test_repairs(void)
 {
   TestMesh m;
@@ -54,7 +54,7 @@ static PetscErrorCode test_refusals(void)
     SB_CHECK_ERROR(test_mesh_read(test_body("b", path), &m), PETSC_ERR_USER_INPUT, bad[i].words);
     PetscCall(SbImportDestroy(&m.im));
   }
-  /* Moved so far away that a tet drowns in the rounding of its coordinates. */
+  /* Moved so far away that a tet is below the rounding of its coordinates. */
   body = test_body("b", "box:1e-6,1e-6,1e-6:1");
   body.translate[0] = 1e9;
   SB_CHECK_ERROR(test_mesh_read(body, &m), PETSC_ERR_USER_INPUT, "body 'b'|box:1e-6,1e-6,1e-6|tetrahedron 1");
@@ -62,7 +62,7 @@ static PetscErrorCode test_refusals(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sizes from a nanometre to a thousand kilometres and a mirrored body are fine; shape does not depend on size. */
+/* Sizes from a nanometre to a thousand kilometres and a mirrored body are valid; shape measures are independent of size. */
 static PetscErrorCode test_scales(void)
 {
   TestMesh m;
@@ -100,7 +100,7 @@ static PetscErrorCode test_shape(const PetscReal x[12], PetscReal dihedral, Pets
   PetscCall(SbImportAddItem(&m.im, 3, (PetscInt[]){0, 1, 2, 3}, 0, 1));
   PetscCall(SbMeshFileMeasure(&m.im, &m.facts));
   SB_CHECK_NEAR(body->min_dihedral, dihedral, 1e-9 * dihedral,
-                "smallest dihedral angle"); /* acos near 1 costs digits */
+                "smallest dihedral angle"); /* acos near 1 loses digits */
   SB_CHECK_NEAR(body->max_radius_ratio, ratio, 1e-9 * ratio, "radius ratio");
   for (int i = 0; i < 3; i++)
     worst = PetscMax(
@@ -123,7 +123,7 @@ int main(int argc, char **argv)
   PetscCall(test_shape((PetscReal[]){0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1},
                        acos(1 / PetscSqrtReal(3.)) / degree,
                        PetscSqrtReal(3.) / 2 * (3 + PetscSqrtReal(3.)) / 3));
-  /* the diagonals of a unit square, one lifted by h; four equal faces of area sqrt(1 + 2 h^2) / 2 */
+  /* diagonals of a unit square, one lifted by h; four equal faces of area sqrt(1 + 2 h^2) / 2 */
   PetscCall(test_shape((PetscReal[]){0, 0, 0, 1, 1, 0, 1, 0, h, 0, 1, h}, acos(1 / (1 + 2 * h * h)) / degree,
                        PetscSqrtReal((2 + h * h) * (1 + 2 * h * h)) / (3 * h)));
   SB_TEST_END();

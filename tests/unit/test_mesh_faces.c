@@ -2,7 +2,7 @@
 // @ranks 1
 #include "mesh_test.h"
 
-/* Vertices that two cells have in common. */
+/* Number of vertices that two cells share. */
 static int common(const PetscInt a[4], const PetscInt b[4])
 {
   int n = 0;
@@ -61,7 +61,7 @@ static PetscErrorCode test_box(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A ring of tets around the edge from vertex 0 to 1: hundreds of faces with one lowest vertex. */
+/* A ring of tets around the edge from vertex 0 to 1: hundreds of faces with the same lowest vertex. */
 static PetscErrorCode test_ring(void)
 {
   enum { N = 90 };

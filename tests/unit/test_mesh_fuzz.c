@@ -27,7 +27,7 @@ static PetscErrorCode replay(int reader, const char *scratch, const char *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All files of a folder with this ending; NULL for any. */
+/* All files of a folder with this extension; NULL: any. */
 static PetscErrorCode replay_folder(int reader, const char *scratch, const char *folder, const char *ending)
 {
   DIR *dir = opendir(folder);
@@ -48,7 +48,7 @@ static PetscErrorCode replay_folder(int reader, const char *scratch, const char 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What h5.h makes a sound mesh from is read: the fuzzer begins with them. */
+/* The valid meshes that h5.h makes are read: fuzzing starts from them. */
 static PetscErrorCode test_sound(const char *scratch)
 {
   static const char *const names[] = {"own", "packed", "no_members", "run", "last_step", "split"};

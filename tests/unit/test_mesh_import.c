@@ -30,7 +30,7 @@ static PetscErrorCode test_groups(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Many items of every dimension survive the growth of the arrays. */
+/* Many items of every dimension are preserved when the arrays grow. */
 static PetscErrorCode test_growth(void)
 {
   SbImport im;
@@ -55,7 +55,7 @@ static PetscErrorCode test_growth(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Vertex (1, 1, 1) of a unit box, scaled, then turned, then moved. */
+/* Vertex (1, 1, 1) of a unit box, scaled, then rotated, then translated. */
 static PetscErrorCode test_place(PetscReal scale, const PetscReal rotate[4], const PetscReal translate[3],
                                  const PetscReal expected[3], PetscReal tolerance)
 {
@@ -95,7 +95,7 @@ int main(int argc, char **argv)
   PetscCall(test_growth());
   PetscCall(test_place(1, none, zero, (PetscReal[]){1, 1, 1}, 0));
   PetscCall(test_place(0.01, none, (PetscReal[]){1, 2, 3}, (PetscReal[]){1.01, 2.01, 3.01}, 0));
-  /* quarter turns are exact; counter-clockwise seen from the tip of the axis, whatever its length */
+  /* quarter rotations are exact; counter-clockwise as seen from the tip of the axis, whatever its length */
   PetscCall(test_place(1, (PetscReal[]){0, 0, 5, 90}, zero, (PetscReal[]){-1, 1, 1}, 0));
   PetscCall(test_place(2, (PetscReal[]){0.1, 0, 0, 90}, (PetscReal[]){0, 0, 1}, (PetscReal[]){2, -2, 3}, 0));
   PetscCall(test_place(1, (PetscReal[]){0, 1, 0, -90}, zero, (PetscReal[]){-1, 1, 1}, 0));

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include "mesh_test.h"
 
-/* Every number is found at its place, its neighbours where they are numbers too. */
+/* Every number is found at its position, and its neighbours if they are numbers too. */
 static PetscErrorCode test_find(PetscInt n, const int64_t number[], PetscBool table)
 {
   SbNumbers index;
@@ -59,7 +59,7 @@ static PetscBool has_group(const SbImport *im, int dim, PetscInt item, PetscInt 
   return PETSC_FALSE;
 }
 
-/* Random memberships, some twice, beside one group that the items have from the beginning. */
+/* Random group memberships, some repeated, beside one group that the items have from the beginning. */
 static PetscErrorCode test_members(void)
 {
   enum { NITEM = 40, NGROUP = 9 };
@@ -99,7 +99,7 @@ static PetscErrorCode test_members(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Many groups are found again, each with its own tag set. */
+/* Many groups are found again, each with a separate tag set. */
 static PetscErrorCode test_many_groups(void)
 {
   enum { N = 5000 };

@@ -3,7 +3,7 @@
 #include "../../src/mesh/mesh_impl.h"
 #include "mesh_test.h"
 
-/* Largest difference of the numbers of two vertices of one cell. */
+/* Largest difference between the numbers of two vertices of a cell. */
 static PetscErrorCode bandwidth(PetscInt nvert, PetscInt ncell, const PetscInt cell[], PetscInt *width)
 {
   PetscInt *order, *number, wrong = 0;
@@ -37,7 +37,7 @@ int main(int argc, char **argv)
   PetscInt width, n, two[16] = {0, 2, 4, 6, 2, 4, 6, 8, 1, 3, 5, 7, 3, 5, 7, 9}, order[10];
 
   SB_TEST_BEGIN(argc, argv);
-  /* A bar of 3 x 3 x 40 vertices, numbered across: levels start at a corner and slant, within three layers of 9 vertices. */
+  /* A bar of 3 x 3 x 40 vertices, numbered across: levels start at a corner and are oblique, within three layers of 9 vertices. */
   PetscCall(test_import("box:2,2,39:2,2,39", &im));
   PetscCall(bandwidth(im.nvert, im.item[3].n, im.item[3].vert, &width));
   SB_CHECK(width <= 3 * 9, "bandwidth %d of the upright bar", (int)width);
@@ -45,7 +45,7 @@ int main(int argc, char **argv)
   PetscCall(test_import("box:39,2,2:39,2,2", &im)); /* as given, the bandwidth is 161 */
   PetscCall(bandwidth(im.nvert, im.item[3].n, im.item[3].vert, &width));
   SB_CHECK(width <= 3 * 9, "bandwidth %d of the lying bar", (int)width);
-  /* Vertices that take no part: the far half of the bar. */
+  /* Vertices that are excluded: the far half of the bar. */
   n = 0;
   for (PetscInt i = 0; i < 4 * im.item[3].n; i++) {
     PetscInt *v = &im.item[3].vert[i];
@@ -59,7 +59,7 @@ int main(int argc, char **argv)
   PetscCall(bandwidth(n, im.item[3].n, im.item[3].vert, &width));
   SB_CHECK(width <= 3 * 9, "bandwidth %d of half the bar", (int)width);
   PetscCall(SbImportDestroy(&im));
-  /* Two parts with alternating numbers come one after the other, the one with vertex 0 first. */
+  /* Two parts with alternating numbers are numbered one after the other, the part of vertex 0 first. */
   PetscCall(SbOrderRCM(10, 4, two, order));
   for (int i = 0; i < 10; i++) SB_CHECK(order[i] % 2 == i / 5, "vertex %d at place %d", (int)order[i], i);
   PetscCall(SbOrderRCM(0, 0, NULL, order)); /* a rank without vertices */

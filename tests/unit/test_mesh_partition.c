@@ -3,7 +3,7 @@
 #include "../../src/mesh/mesh_impl.h"
 #include "mesh_test.h"
 
-/* A box on rank 0, cut; the most cells of a part, their sum over all parts, and faces between parts. */
+/* Partitions a box of rank 0; returns the largest part, the sum over all parts, and the faces between parts, in cells. */
 static PetscErrorCode cut(const char *mesh, SbPartitioner type, PetscInt *most, PetscInt *cells,
                           PetscInt *faces)
 {
@@ -59,7 +59,7 @@ static PetscErrorCode test_bar(SbPartitioner type, PetscReal slack)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* With two cells two ranks get one each. */
+/* With two cells each of two ranks gets one. */
 static PetscErrorCode test_few(void)
 {
   PetscInt most, cells, faces;
@@ -72,7 +72,7 @@ static PetscErrorCode test_few(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank r sends i to rank (r + i) % size for i below r + 3: it arrives there, in order, and the answer i + 100 r comes back. */
+/* Rank r sends i to rank (r + i) % size for i below r + 3: it arrives in order, and the answer i + 100 r returns. */
 static PetscErrorCode test_route(void)
 {
   PetscMPIInt rank, size, dest[16];

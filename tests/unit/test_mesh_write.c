@@ -27,7 +27,7 @@ static PetscErrorCode test_formats(const char *path, PetscBool curved)
 
     (void)snprintf(what, sizeof(what), "%s%s as %s", path, curved ? ", curved," : "", formats[i].name);
     PetscCall(test_round(im, formats[i].name, formats[i].format, &again));
-    /* version 2.2 repeats what has several groups; the reader joins tets, repairing the others */
+    /* version 2.2 repeats items of several groups; the reader merges tets and repairs the others */
     if (formats[i].format == SB_MESH_MSH22 || formats[i].format == SB_MESH_MSH22_BINARY)
       PetscCall(SbMeshFileRepair(again, 0, &done));
     test_same(im, again, what);
@@ -37,7 +37,7 @@ static PetscErrorCode test_formats(const char *path, PetscBool curved)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An inverted tet stays inverted, unused vertices stay, numbers that need all digits stay. */
+/* An inverted tet, unused vertices, and coordinates that need all digits are preserved. */
 static PetscErrorCode test_as_it_is(void)
 {
   SbImport *im, *again;
@@ -57,7 +57,7 @@ static PetscErrorCode test_as_it_is(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* gmsh knows numbers of groups from 1 on: others get a free one and keep their name. */
+/* gmsh numbers groups from 1 on: others get an unused number and keep their name. */
 static PetscErrorCode test_numbers(void)
 {
   SbImport *im, *again;

@@ -25,7 +25,7 @@ static void bent(const PetscReal x[3], PetscReal u[3])
   u[2] = (radius + z) * PetscCosReal(phi) - radius - z;
 }
 
-/* Largest |R - Q(angle at x)| and largest spread; the turn about y is `angle`, or grows along the bar when it is bent. */
+/* Largest |R - Q(angle at x)| and largest spread; the rotation about y is `angle`, or increases along the bar when it is bent. */
 static PetscErrorCode measure(const char *law, PetscBool bend, PetscReal *error, PetscReal *spread)
 {
   TestScene t;
@@ -77,7 +77,7 @@ int main(int argc, char **argv)
   PetscCall(measure("linear", PETSC_FALSE, &error, &spread));
   SB_CHECK(error > 1. && spread == 0., "a linear law is not turned, but error is %g, spread %g",
            (double)error, (double)spread);
-  /* a cell spans 1/16 of the bar: its turn differs from its nodes' by about angle / 32, at the ends by twice that */
+  /* a cell has 1/16 of the length of the bar: its rotation differs from that of its nodes by about angle / 32, at the ends by twice that */
   PetscCall(measure("corotated", PETSC_TRUE, &error, &spread));
   SB_CHECK(error > 0. && error < angle / 16., "bent by 2: error %g", (double)error);
   SB_CHECK(spread < 8. * PetscSqr(angle / 16.), "bent by 2: spread %g", (double)spread);

@@ -49,7 +49,7 @@ static PetscErrorCode check_back(PetscInt step)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Another number in an array of the newest file. */
+/* Changes a number in an array of the newest file. */
 static PetscErrorCode damage(const char *array, hid_t type, const void *value, hsize_t n)
 {
   char path[PETSC_MAX_PATH_LEN];
@@ -83,7 +83,7 @@ int main(int argc, char *argv[])
   PetscCall(fixture_folder(sizeof(dir), dir));
   PetscCall(write_two());
   PetscCall(check_back(5));
-  /* a vertex that is no such number may not be read beyond the end: the older checkpoint is taken */
+  /* an invalid vertex number must not be read beyond the end: the older checkpoint is used */
   PetscCall(write_two());
   PetscCall(damage("mesh_a/cells", H5T_NATIVE_INT, &far, 1));
   PetscCall(check_back(4));

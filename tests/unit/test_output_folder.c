@@ -49,7 +49,7 @@ static PetscErrorCode test_folder(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* scenario.opts holds what was given and what was not. */
+/* scenario.opts contains the given options and the default values of the others. */
 static PetscErrorCode test_scenario(void)
 {
   TestScene scene;
@@ -77,7 +77,7 @@ static PetscErrorCode test_fields(void)
   for (PetscInt i = 0; i < n; i++) {
     PetscCall(SbFieldFind("-output_fields", fields[i].name, &found));
     SB_CHECK(found == &fields[i], "field %s is not found by its name", fields[i].name);
-    /* `sets` are several arrays, which another function writes */
+    /* `sets` are several arrays, which a separate function writes */
     SB_CHECK((fields[i].compute || !strcmp(fields[i].name, "sets")) && fields[i].unit[0] && fields[i].help[0],
              "field %s is not complete", fields[i].name);
   }

@@ -33,7 +33,7 @@ static PetscErrorCode compare(Mat A, Mat B, Vec x, const char *what)
   PetscCall(VecNorm(z, NORM_2, &size));
   PetscCall(VecAXPY(y, -1., z));
   PetscCall(VecNorm(y, NORM_2, &difference));
-  /* sums of some 45 products: rounding stays below 1e-14 of the largest, the result is not small */
+  /* sums of some 45 products: rounding is below 1e-14 of the largest product, and the result is not small */
   SB_CHECK(size > 1. && difference < 1e-13 * size, "%s: the products differ by %g of %g", what,
            (double)difference, (double)size);
   PetscCall(VecDestroy(&y));
@@ -41,7 +41,7 @@ static PetscErrorCode compare(Mat A, Mat B, Vec x, const char *what)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The part of this rank alone. */
+/* Product of the local part of this rank only. */
 static PetscErrorCode compare_own(Mat A, Mat B, Vec x, const char *what)
 {
   Mat own, part;
@@ -67,7 +67,7 @@ static PetscErrorCode one_storage(TestScene *t, SbMatrixKind kind, const char *n
   PetscCall(SbSpaceCreateMatrix(s, kind, &A));
   PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_AIJ, &B));
   for (int k = 0; k < 2; k++) {
-    /* twice, with other values: nothing of the first may be left */
+    /* twice with different values: no values of the first product may remain */
     PetscCall(SbModelTangent(t->model, 0., 0., k ? 50. : 3000., 1., x, NULL, A));
     PetscCall(SbModelTangent(t->model, 0., 0., k ? 50. : 3000., 1., x, NULL, B));
     PetscCall(compare(A, B, x, name));

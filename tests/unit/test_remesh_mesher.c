@@ -8,7 +8,7 @@
 #define NVERT (6 * N * N + 2)
 #define NTRI (12 * N * N)
 
-/* Number of a place of the lattice on the surface, -1 inside. */
+/* Number of a lattice point on the surface, -1 in the interior. */
 static PetscInt number_of(const PetscInt at[3])
 {
   PetscInt n = 0;
@@ -112,7 +112,7 @@ static PetscErrorCode check_same(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Thinner than a step of the rounding: rounded it has no volume. */
+/* Thinner than the rounding unit: after rounding it has no volume. */
 static PetscErrorCode check_thin(void)
 {
   const PetscReal size[3] = {1., 1., 2e-4};

@@ -2,7 +2,7 @@
 /* Stable step of explicit runs: an oscillator with a known frequency, and bodies run just below and above it. */
 #include "../scene.h"
 
-/* Linear elasticity that is twice as stiff at rest as E and nu say. */
+/* Linear elasticity with twice the stiffness of E and nu in the reference state. */
 static PetscReal twice_mu(const struct _p_SbMaterial *m)
 {
   return m->E / (1. + m->nu);
@@ -25,7 +25,7 @@ static PetscErrorCode create_doubled(SbMaterial m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One tet constrained at its base: the apex moves along z with w^2 = (lambda + 2 mu) / (rho H^2 / 4), the highest frequency. */
+/* One tet fixed at its base: the apex moves along z with w^2 = (lambda + 2 mu) / (rho H^2 / 4), the highest frequency. */
 static PetscErrorCode check_oscillator(const char *law, PetscReal stiffer, PetscReal alpha, PetscReal beta,
                                        const char *more, PetscReal share)
 {
@@ -52,7 +52,7 @@ static PetscErrorCode check_oscillator(const char *law, PetscReal stiffer, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Energy after 400 steps of `factor` times the stable one, over that at the start. */
+/* Energy after 400 steps of `factor` times the stable one, relative to the initial energy. */
 static PetscErrorCode energy_ratio(const char *body, PetscReal factor, PetscReal *ratio)
 {
   SbEnergies before, after;
@@ -86,7 +86,7 @@ static PetscErrorCode check_body(const char *body)
   PetscReal below, above;
 
   PetscFunctionBeginUser;
-  /* the power method may be a few percent above the limit, never below */
+  /* the estimate by the power method may exceed the exact value by a few percent, and is never below it */
   PetscCall(energy_ratio(body, 0.95, &below));
   PetscCall(energy_ratio(body, 1.05, &above));
   SB_CHECK(below < 30., "%s: 0.95 of the stable step multiplies the energy by %g", body, (double)below);
@@ -99,10 +99,10 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_oscillator("linear", 1., 0., 0., "", 0.25));
   PetscCall(check_oscillator("linear", 1., 3., 0.02, "", 0.25));
-  /* the step asks the law, not E and nu */
+  /* the stable step uses the stiffness of the material, not E and nu */
   PetscCall(SbMaterialRegister("doubled", create_doubled, 0, NULL));
   PetscCall(check_oscillator("doubled", 2., 0., 0., "", 0.25));
-  /* the bound of the consistent mass: 1/5 of the lumped one, here 1/20 of the tet */
+  /* bound of the consistent mass: 1/5 of the lumped one, here 1/20 of the tet */
   PetscCall(check_oscillator("linear", 1., 0., 0., "-mass consistent", 0.05));
   PetscCall(check_body("-body_a_mesh box:0.2,0.1,0.1:1 -body_a_poisson 0.3 -effects clamp "
                        "-effect_clamp_type fixed -effect_clamp_on xmin"));

@@ -8,7 +8,7 @@
 
 #define SIDE 24 /* unknowns along an edge of the cube: supernodes large enough for CHOLMOD's parallel loops */
 
-/* Threads of this process, -1 where the system does not tell. */
+/* Number of threads of this process, -1 if the system does not report it. */
 static int count_threads(void)
 {
   FILE *f = fopen("/proc/self/status", "r");
@@ -20,7 +20,7 @@ static int count_threads(void)
   return n;
 }
 
-/* Laplace's equation on a cube of points, by CHOLMOD. */
+/* Solves Laplace's equation on a cube of points with CHOLMOD. */
 static PetscErrorCode factor_and_solve(PetscReal *residual)
 {
   const PetscInt n = SIDE * SIDE * SIDE, step[3] = {1, SIDE, SIDE * SIDE};

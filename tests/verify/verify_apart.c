@@ -59,7 +59,7 @@ static PetscErrorCode check_named(const char *element, const char *time, const c
   PetscFunctionBeginUser;
   for (int k = 0; k < 4; k++) {
     value[k] = NULL;
-    if (k == 2 && !strncmp(time, "newmark", 7)) continue; /* which takes no friction */
+    if (k == 2 && !strncmp(time, "newmark", 7)) continue; /* does not support friction */
     PetscCall(PetscSNPrintf(text, sizeof(text),
                             "-bodies a,b " BODY("a", "%s", "0,0,0", "0,3,9")
                               BODY("b", "%s", "0.3,0,0", "2,0,-5") TIME "%s",

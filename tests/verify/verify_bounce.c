@@ -38,11 +38,11 @@ static PetscErrorCode check_ball(const char *element, PetscReal e)
     bounces += i && record_at(&r, "momentum_z", i) > 0 && !(record_at(&r, "momentum_z", i - 1) > 0);
     if (bounces < 3) peak[bounces] = PetscMax(peak[bounces], height);
   }
-  /* it hits somewhere within a step, on a way of v h; 0.002 for what it is not stiff */
+  /* the impact is anywhere within a step, on a path of v h; 0.002 for the finite stiffness */
   for (int k = 1; k < 3; k++)
     VERIFY_NEAR(peak[k] / peak[k - 1], e * e, STEP * PetscSqrtReal(2 * GRAVITY / peak[k - 1]) + 0.002,
                 "part of the height after a bounce");
-  /* how exactly nodes are put on the obstacle, 1e-7 of the size, times the weight: where it comes to rest */
+  /* accuracy of nodes on the obstacle, 1e-7 of the size, times the weight: when the ball comes to rest */
   VERIFY_LESS(record_gain(&r, "energy"), 1e-7 * 4 * RADIUS * r.mass * GRAVITY, "largest gain of a step, J");
   PetscCall(record_free(&r));
   PetscCall(test_file_remove(path));
@@ -84,7 +84,7 @@ static PetscErrorCode check_soft(PetscReal young, PetscReal dt, PetscReal e)
                        "-effect_floor_obstacle plane:0,0.1,1,0 -effect_floor_restitution %g "
                        "-time euler_implicit -ts_dt %g -ts_max_time 0.4 -snes_rtol 1e-8",
     path, (double)young, 0.05 + RADIUS, (double)e, (double)dt));
-  /* of 0.5 J; the energy of co-rotated tets that turn is not quite convex */
+  /* of 0.5 J; the energy of rotating co-rotated tets is not exactly convex */
   VERIFY_LESS(record_gain(&r, "energy"), 1e-6, "largest gain of a step, J");
   PetscCall(record_free(&r));
   PetscCall(test_file_remove(path));

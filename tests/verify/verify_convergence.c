@@ -50,7 +50,7 @@ int main(int argc, char **argv)
     SB_CHECK_NEAR(order[1], 1., 0.1, "order in H1");
     SB_CHECK(fine[0] < 0.06 && fine[1] < 0.2, "errors of n = 16: %g and %g", (double)fine[0],
              (double)fine[1]);
-    /* known, and printed: the answer is too small, but never larger than the exact one is away from zero */
+    /* known locking, printed: the displacement is too small, but its error is below the exact solution */
     SB_CHECK(locked[0] > fine[0] && locked[0] < 1., "nu 0.4999: an error of %g", (double)locked[0]);
   }
   SB_TEST_END();

@@ -104,11 +104,11 @@ int main(int argc, char **argv)
                 "  extrapolated: lowest u_y %.2f mm (reference %.2f), u_x %.2f mm (%.2f), %.4f Hz (%.4f)\n",
                 (double)(1e3 * limit[0]), (double)(1e3 * exact[0]), (double)(1e3 * limit[1]),
                 (double)(1e3 * exact[1]), (double)limit[2], (double)exact[2]));
-  /* the finer mesh is 2 %, 4 % and 1 % off */
+  /* the finer mesh has errors of 2 %, 4 % and 1 % */
   SB_CHECK_NEAR(limit[0], exact[0], 0.01 * PetscAbsReal(exact[0]), "lowest u_y");
   SB_CHECK_NEAR(limit[1], exact[1], 0.03 * PetscAbsReal(exact[1]), "lowest u_x");
   SB_CHECK_NEAR(limit[2], exact[2], 0.01 * exact[2], "frequency");
-  /* in CSM1 this mesh bends 4.7 % and shortens 9.8 % too much, with 4 cells across 1.1 and 2.3 % (verify_turning.c) */
+  /* in CSM1 this mesh bends 4.7 % and shortens 9.8 % too much, one with 4 cells across 1.1 and 2.3 % (verify_turning.c) */
   PetscCall(swing("p2", 2, 0.01, 2.2, fine));
   SB_CHECK_NEAR(fine[0], exact[0], 0.06 * PetscAbsReal(exact[0]), "lowest u_y, P2");
   SB_CHECK_NEAR(fine[1], exact[1], 0.13 * PetscAbsReal(exact[1]), "lowest u_x, P2");

@@ -12,7 +12,7 @@
 #define FACTOR 1e-3 /* `stiffness` */
 #define STEP 1e-4   /* s */
 
-/* Speed after the impact of the oscillator, by steps a hundred times as short. */
+/* Speed of the oscillator after the impact, with steps a hundred times as short. */
 static PetscReal leaving(PetscReal k, PetscReal tau)
 {
   const PetscReal h = STEP / 100;
@@ -46,7 +46,7 @@ static PetscErrorCode check(const char *what, const char *scene, PetscReal tau, 
   verify_show("springs, N/m", *k);
   speed = PetscSqrtReal(2 * record_last(&r, "kinetic") / MASS);
   VERIFY_NEAR(speed, leaving(*k, tau), 0.02 * SPEED, "speed after the impact, m/s");
-  /* what a spring gives back is motion again: less than there was */
+  /* the springs return a part of the kinetic energy */
   VERIFY_LESS(speed, SPEED * (1 + PETSC_SMALL), "speed after the impact, m/s");
   PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -15,7 +15,7 @@
 #define THICK 0.004 /* m */
 #define DROP 0.01   /* m */
 
-/* How much lower the middle, the middles of the sides and the corners of the plate are, m; the least of their kind. */
+/* Minimum depth of the plate's centre, of the centres of its sides, and of its corners below the start, m. */
 static PetscErrorCode lowered(TestScene *t, PetscReal depth[3])
 {
   static const PetscInt at[9][3] = {{0, 0, 0}, {1, 0, 1},  {-1, 0, 1}, {0, 1, 1},  {0, -1, 1},

@@ -18,7 +18,7 @@ static PetscErrorCode check_element(const Pair *p, const char *element, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The upper body alone on a rigid plane, E1 being infinite. */
+/* Only the upper body, on a rigid plane: E1 is infinite. */
 static PetscErrorCode check_plane(const char *element, PetscInt cells, PetscReal tolerance)
 {
   const PetscReal young = 1e5, d = PetscSqr(0.12) / RADIUS;

@@ -53,7 +53,7 @@ static void mirror(const PetscReal x[3], PetscReal u[3])
   u[2] = 0.;
 }
 
-/* Held as its mirror image, where it begins. */
+/* Prescribes the mirror image of the body, which is its initial state. */
 static PetscErrorCode check_mirrored(void)
 {
   SbEnergies e;

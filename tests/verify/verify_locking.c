@@ -19,7 +19,7 @@ static PetscErrorCode measure(const char *element, PetscInt n, PetscReal nu, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* `times`: how much larger the errors may be than those at nu = 0.3. */
+/* `times`: ratio of the largest allowed errors to those at nu = 0.3. */
 static PetscErrorCode check_element(const char *element, PetscInt nnu, const PetscReal nu[], PetscReal times)
 {
   PetscReal first[2] = {0., 0.};
@@ -50,7 +50,7 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_element("cr", 4, nu, 1.2));
   PetscCall(check_element("dg", 2, ends, 1.2));
-  /* the reason for the other two */
+  /* the motivation for the other two elements */
   PetscCall(measure("p1", 8, 0.4999, locked));
   SB_CHECK(locked[0] > 0.9, "P1 has an error of %g only: this mesh shows no locking", (double)locked[0]);
   SB_TEST_END();

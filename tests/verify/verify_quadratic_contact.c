@@ -42,7 +42,7 @@ static PetscErrorCode press(const char *element, PetscInt cells, PetscReal *forc
 
 /* ------------------------------------------------------------------ patch */
 
-/* Two blocks, Poisson's ratio 0, the upper one pushed down by 0.1 mm: the stress along z of the cells, its largest deviation from the mean. */
+/* Two blocks, Poisson's ratio 0, the upper one pressed down by 0.1 mm: axial stress of the cells, and its largest deviation from the mean. */
 static PetscErrorCode patch(void)
 {
   PetscReal *sigma, mean = 0, away = 0, worst = 0;
@@ -82,7 +82,7 @@ static PetscErrorCode patch(void)
   PetscCall(PetscFree(sigma));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPIU_REAL, MPI_MAX, t.model->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &away, 1, MPIU_REAL, MPI_SUM, t.model->comm));
-  /* both are 0.1 m high, and what is missing of 0.1 mm is the gap */
+  /* both are 0.1 m high; the gap reduces the compression of 0.1 mm */
   VERIFY_NEAR(mean, -50, 1, "mean stress, Pa");
   VERIFY_LESS(PetscSqrtReal(away), 0.03, "root mean square of its deviation, of it");
   VERIFY_LESS(worst, 0.15, "largest deviation, of it");

@@ -20,7 +20,7 @@
 #define YOUNG 1.03e7
 #define LIMIT 34.0392 /* published largest load, lb */
 
-/* How much shorter a member would have to be than it is under the compression N, and the load, lb. */
+/* Difference between the required shortening of a member and its shortening under the compression N, and the load, lb. */
 static PetscReal excess(PetscReal N, PetscReal delta, PetscReal *P)
 {
   const PetscReal EI = YOUNG * WIDTH * DEPTH * DEPTH * DEPTH / 12., EA = YOUNG * WIDTH * DEPTH;

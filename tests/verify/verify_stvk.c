@@ -81,14 +81,14 @@ static PetscErrorCode check_csm(const char *what, PetscReal mu, PetscReal ux, Pe
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s: extrapolated %.6f %.6f mm (reference %.6f %.6f)\n", what,
                         (double)(1e3 * limit[0]), (double)(1e3 * limit[1]), (double)(1e3 * ux),
                         (double)(1e3 * uy)));
-  /* the finer mesh is 1 % off, its extrapolation must be ten times better than that at least */
+  /* the finer mesh has an error of 1 %, its extrapolation must be at least ten times better */
   SB_CHECK_NEAR(u[1][1], uy, 0.015 * PetscAbsReal(uy), what);
   SB_CHECK_NEAR(limit[0], ux, 3e-3 * PetscAbsReal(ux), what);
   SB_CHECK_NEAR(limit[1], uy, 1e-3 * PetscAbsReal(uy), what);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The corner (0, 44) is singular: the order is not known, three meshes give it. */
+/* The corner (0, 44) is singular: the order is unknown, three meshes give it. */
 static PetscErrorCode check_cook(PetscReal nu, PetscReal uy)
 {
   const PetscReal corner[3] = {48., 60., 0.};

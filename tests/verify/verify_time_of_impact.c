@@ -12,7 +12,7 @@
 
 #define SPEED 0.1 /* m/s; the bar is 1 m long, its waves run at 10 m/s */
 #define FORCE 2.5 /* N, of the wave solution: rho c v A */
-#define PHASES 5  /* on one rank; elsewhere one will do */
+#define PHASES 5  /* on one rank; on several ranks one suffices */
 
 typedef struct {
   PetscReal first, last, velocity, gain; /* span of contact, s; at the end, m/s; of a step, J */
@@ -26,7 +26,7 @@ typedef struct {
 #define WALL                                                                             \
   "wall -effect_wall_type contact -effect_wall_response projected -effect_wall_on xmin " \
   "-effect_wall_obstacle plane:1,0,0,0 "
-/* A bar that is `phase` steps before the wall at the start. */
+/* A bar that starts `phase` steps before the impact. */
 static PetscErrorCode fly(const char *more, PetscReal phase, PetscReal dt, PetscReal end, Impact *b)
 {
   Record r = {0};
@@ -81,7 +81,7 @@ static PetscErrorCode measure(const char *more, PetscReal dt, PetscReal end, Err
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whole: the first touch is found to a step. Cut: where it is, by one step more and a few solves for each of the impacts. */
+/* Undivided steps give the time of impact to within a step; divided ones give it accurately, with one more step and a few solves per impact. */
 static PetscErrorCode check(const char *response, PetscReal dt)
 {
   const PetscReal end = 0.24 + 12 * dt;
@@ -109,7 +109,7 @@ static PetscErrorCode check(const char *response, PetscReal dt)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Points that arrive near the ends of a step, and none that arrive: no cut. */
+/* Points that arrive near the ends of a step, and none that arrive: no division. */
 static PetscErrorCode check_bounds(void)
 {
   static const PetscReal phase[] = {3.02, 3.98, 1000};

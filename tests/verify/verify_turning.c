@@ -13,7 +13,7 @@ static PetscErrorCode check_beam(const char *what, PetscReal mu, PetscReal ux, P
   PetscFunctionBeginUser;
   for (int e = 0; e < 3; e++) {
     for (int law = 0; law < 2; law++) {
-      /* one mesh is enough for the laws' difference */
+      /* one mesh suffices for the difference of the materials */
       for (PetscInt n = 2; n <= (law ? 2 : 4); n += 2) {
         const PetscReal tolerance = n == 2 ? 0.08 : 0.015;
         PetscReal u[3];
@@ -27,7 +27,7 @@ static PetscErrorCode check_beam(const char *what, PetscReal mu, PetscReal ux, P
           PETSC_COMM_WORLD, "  %s %s %s n %d: %.4f %.3f mm (%.2f %%, %.2f %%), %d Newton\n", what,
           elements[e], law ? "corotated" : "stvk", (int)n, (double)(1e3 * u[0]), (double)(1e3 * u[1]),
           (double)(100. * (u[0] / ux - 1.)), (double)(100. * (u[1] / uy - 1.)), (int)cost.newton));
-        /* shortening goes with the square of the deflection */
+        /* shortening is proportional to the square of the deflection */
         SB_CHECK_NEAR(u[1], uy, tolerance * PetscAbsReal(uy), what);
         SB_CHECK_NEAR(u[0], ux, 2. * tolerance * PetscAbsReal(ux), what);
       }

@@ -89,7 +89,7 @@ int main(int argc, char **argv)
            (double)(coarse.mean / fine.mean));
   SB_CHECK(fine.error < 0.015 && fine.mean < 0.001 && fine.middle < 0.005, "errors of %g, %g and %g",
            (double)fine.error, (double)fine.mean, (double)fine.middle);
-  /* a front is no smooth solution: on half the cells P2 is no worse than P1, and no more */
+  /* a front is not smooth: on half as many cells P2 is no worse than P1, and no better */
   PetscCall(run_wave("p2", 50, &fine));
   SB_CHECK(fine.error < 1.2 * coarse.error && fine.mean < 1.2 * coarse.mean, "P2: errors of %g and %g",
            (double)fine.error, (double)fine.mean);
