@@ -55,7 +55,7 @@ static PetscErrorCode test_small(const char *law, PetscRandom random)
     const PetscReal expected =
       -m->ops.volumetric_modulus(m) * ((F[0][l] - 1.) + (F[4][l] - 1.) + (F[8][l] - 1.));
 
-    // the next order of the strain, and the rounding of 1 + 1e-6 in the laws that need F itself
+    // the next order of the strain, and the rounding of 1 + 1e-6 in the materials that need F itself
     SB_CHECK_NEAR(p[l], expected, m->ops.volumetric_modulus(m) * (20. * size * size + 1e-14), law);
   }
   PetscCall(deform(random, 0., F));

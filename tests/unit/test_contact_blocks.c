@@ -7,7 +7,7 @@
 #define NN 9 /* vertices; the nodes of the last one are only on other ranks */
 #define OWN 6
 #define EACH 3   /* nodes of a vertex */
-#define NPAIR 40 /* blocks given, some of them for the same two vertices, either way round */
+#define NPAIR 40 /* number of blocks; some are for the same two vertices, in either order */
 
 int main(int argc, char **argv)
 {
@@ -38,7 +38,7 @@ int main(int argc, char **argv)
   m.fixed = fixed;
   m.mine = mine;
 
-  /* twice, so that what is kept from one time to the next is seen */
+  /* two rounds, so that data kept from one round to the next are tested */
   for (int round = 0; round < 2; round++) {
     PetscCall(SbContactBlocksClear(&blocks));
     PetscCall(PetscArrayzero(&H[0][0], 9 * NV * NV));

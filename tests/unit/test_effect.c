@@ -21,7 +21,7 @@ static PetscErrorCode test_types(void)
   PetscBool same;
 
   PetscFunctionBeginUser;
-  // The name is the type unless the option says otherwise.
+  // The name is the type unless the option has another one.
   PetscCall(SbEffectCreate("gravity", &e));
   PetscCall(PetscStrcmp(e->type, "gravity", &same));
   SB_CHECK(same, "type %s", e->type);
@@ -48,7 +48,7 @@ static PetscErrorCode test_errors(void)
   PetscFunctionBeginUser;
   SB_CHECK_ERROR(SbEffectCreate("gravty", &e), PETSC_ERR_USER_INPUT, "gravity");
   PetscCall(SbEffectDestroy(&e));
-  // Nothing near: the whole list.
+  // No similar name: the message lists all.
   SB_CHECK_ERROR(SbEffectCreate("qqqqqqqqqqqq", &e), PETSC_ERR_USER_INPUT, "body_force");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(PetscOptionsInsertString(NULL, "-effect_lid_type tractoin"));
@@ -56,7 +56,7 @@ static PetscErrorCode test_errors(void)
   SB_CHECK_ERROR(SbEffectCreate("lid", &e), PETSC_ERR_USER_INPUT, "traction");
   PetscCall(SbEffectDestroy(&e));
 
-  // Neither a traction nor a total force; a load with a place where only time makes sense; what must be given.
+  // Neither a traction nor a total force; a position where only time is valid; a missing required option.
   PetscCall(PetscOptionsInsertString(NULL, "-effect_lid_type traction -effect_lid_on top"));
   SB_CHECK_ERROR(SbEffectCreate("lid", &e), PETSC_ERR_USER_INPUT, "-effect_lid_total");
   PetscCall(SbEffectDestroy(&e));

@@ -37,7 +37,7 @@ static PetscErrorCode check_power(const char *block, const char *other, PetscBoo
   for (int rigid = 0; rigid < 2; rigid++) {
     for (PetscInt i = 0; i < 3 * x.space->nnode; i++)
       v[i] = rigid ? 2 : PetscSinReal(2 * x.space->node_x[i] + (PetscReal)(i % 3) * x.u[i / 3 * 3]);
-    // Minus the elastic force, plus all: what is left is C v.
+    // Minus the elastic force, plus the total force: the difference is C v.
     PetscCall(PetscArrayzero(x.f, 3 * x.space->nnode));
     stage.v = NULL;
     PetscCall(SbSpaceAddInternalForce(x.space, &stage, x.f));

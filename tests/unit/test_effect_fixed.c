@@ -54,7 +54,7 @@ static PetscErrorCode check_element(const char *element, PetscReal low)
   for (PetscInt i = 0; i < 3 * x.space->nfixed; i++)
     SB_CHECK(x.space->fixed_value[i] == 0, "values of both supports");
 
-  // Residual of a body at rest under its weight: minus the load. Both supports together carry 1200 kg.
+  // Residual of a body in its reference state under its weight: minus the load. Both supports together carry 1200 kg.
   PetscCall(effect_create(&x, "gravity", "", &weight));
   PetscCall(effect_force(&x, weight, 0));
   for (PetscInt i = 0; i < 3 * x.space->nnode; i++) x.f[i] = -x.f[i];
@@ -76,7 +76,7 @@ int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   PetscCall(fixture_register());
-  // In a box cut like this one the lowest layer of vertices carries a quarter of the mass: half of the lower of two layers.
+  // In a box with this subdivision the lowest layer of vertices has a quarter of the mass: half of the lower of two layers.
   PetscCall(check_element("p1", 0.25));
   // Eight tets of 48 have a face at the bottom, which has a quarter of their mass.
   PetscCall(check_element("cr", 8.0 / 48 / 4));

@@ -77,7 +77,7 @@ static PetscErrorCode check_torque(Fixture *x, SbEffect e)
       for (int j = 0; j < 3; j++) expected += (0.5 * i - 1) * (0.5 * i - 1) + 0.25 * j * j;
     }
   } else {
-    // The eight triangles of the top: seen from its middle their centroids are at 1/6 and 1/3 along x and y, however the
+    // The eight triangles of the top: relative to its centre their centroids are at 1/6 and 1/3 along x and y, however the
     // diagonals run; so (x - 1)^2 and y^2 both sum to 4 (1/36 + 1/9) + 8/4.
     expected = 46.0 / 9;
   }
@@ -85,7 +85,7 @@ static PetscErrorCode check_torque(Fixture *x, SbEffect e)
   PetscCallMPI(MPI_Allreduce(mine, all, 4, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   SB_CHECK_NEAR(all[2], n, 1e-14, "reaction along the axis");
   SB_CHECK_NEAR(all[3], expected, 1e-13, "torque");
-  // Turned by 90 degrees the sum of forces has turned: r sums to n (-.5, .5), turned to n (-.5, -.5), k x r to n (.5, -.5).
+  // A rotation by 90 degrees rotates the sum of forces: r sums to n (-.5, .5), rotated to n (-.5, -.5), k x r to n (.5, -.5).
   SB_CHECK_NEAR(all[0], 0.5 * n, 1e-13, "reaction x");
   SB_CHECK_NEAR(all[1], -0.5 * n, 1e-13, "reaction y");
   PetscFunctionReturn(PETSC_SUCCESS);

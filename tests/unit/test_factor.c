@@ -127,7 +127,7 @@ static PetscErrorCode check_solve(const Problem *p, PetscRandom random, const ch
   SB_CHECK(error < 2e-4 * size, "%s: error %g of %g", name, (double)error, (double)size);
   PetscCall(SbFactorDestroy(&f));
 
-  /* kept as it is: to rounding, in its own order and in a given one, in place */
+  /* stored in full: exact up to rounding, with its own order and with a given one, in place */
   for (int given = 0; given < 2 && !m; given++) {
     PetscInt *order;
     PetscReal *z;

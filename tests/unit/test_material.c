@@ -1,5 +1,5 @@
 // @ranks 1 3
-/* Creation of laws by name and from options, what is refused and how, numbers derived from E, nu and density. */
+/* Creation of materials by name and from options, errors, and moduli derived from E, nu and density. */
 #include "../test.h"
 #include <sbmaterial.h>
 

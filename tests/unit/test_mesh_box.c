@@ -43,7 +43,7 @@ static PetscErrorCode test_box(const char *text, PetscInt nx, PetscInt ny, Petsc
   SB_CHECK(box.body.nfacet == nfacet, "%s: %d boundary facets instead of %d", text, (int)box.body.nfacet,
            (int)nfacet);
   SB_CHECK(box.body.npart == 1, "%s: %d parts", text, (int)box.body.npart);
-  SB_CHECK(!box.body.note[0], "%s: '%s'", text, box.body.note); /* nothing turned, lost or pinched */
+  SB_CHECK(!box.body.note[0], "%s: '%s'", text, box.body.note); /* no tet reoriented, removed or pinched */
   SB_CHECK(box.im.item[2].n == nfacet, "%s: %d triangles in the sides", text, (int)box.im.item[2].n);
   SB_CHECK_NEAR(box.body.volume, volume, 1e-13 * volume, text); /* rounding of some hundred sums */
   PetscCall(free_box(&box));

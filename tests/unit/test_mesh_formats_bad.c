@@ -28,7 +28,7 @@ static PetscErrorCode use_mesh(const char *name)
 }
 
 typedef struct {
-  const char *text, *words; /* words NULL: it is sound */
+  const char *text, *words; /* words NULL: valid */
 } Case;
 
 /* A list of cases that ends with a NULL text. */

@@ -42,7 +42,7 @@ int main(int argc, char **argv)
   PetscCall(bandwidth(im.nvert, im.item[3].n, im.item[3].vert, &width));
   SB_CHECK(width <= 3 * 9, "bandwidth %d of the upright bar", (int)width);
   PetscCall(SbImportDestroy(&im));
-  PetscCall(test_import("box:39,2,2:39,2,2", &im)); /* as given, the bandwidth is 161 */
+  PetscCall(test_import("box:39,2,2:39,2,2", &im)); /* with the original numbers the bandwidth is 161 */
   PetscCall(bandwidth(im.nvert, im.item[3].n, im.item[3].vert, &width));
   SB_CHECK(width <= 3 * 9, "bandwidth %d of the lying bar", (int)width);
   /* Vertices that are excluded: the far half of the bar. */

@@ -56,7 +56,7 @@ static PetscErrorCode test_values(void)
   SB_CHECK(value_of(text, "inverted", 1) == 7 && value_of(text, "newton", 1) == 2 &&
              value_of(text, "linear", 1) == 30,
            "counts");
-  // 2 x 3 held vertices, 0.5 N each
+  // 2 x 3 constrained vertices, 0.5 N each
   SB_CHECK_NEAR(value_of(text, "hold_reaction_y", 1), 3., 1e-14, "sum of the reactions");
   x[0] = 0.4, x[1] = 0.1, x[2] = 0.2;
   motion(x, 0.2, u, v, a);

@@ -332,7 +332,7 @@ int main(int argc, char **argv)
   PetscCall(test_renewal(SPREAD));
   PetscCall(test_spread());
   PetscCall(test_solution(BAR("box:0.4,0.1,0.1:5"), PETSC_FALSE, "bar"));
-  /* tets thirty times as long as thick: the incomplete factorisation breaks down, but not where three ranks cut it up */
+  /* tets thirty times as long as thick: the incomplete factorisation breaks down, except where three ranks partition them */
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(
     test_solution(BAR("box:0.4,0.1,0.1:8,4,60") "-body_bar_poisson 0.4", (PetscBool)(size < 3), "flat tets"));

@@ -56,8 +56,8 @@ static PetscErrorCode solve(KSP ksp, Mat A, KSPConvergedReason *reason, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A factorisation of a matrix that is not definite, of one that is, and of both again; then of zeros, which no package factors, and of what can be factored again. Only CHOLMOD fails
-   where a matrix is not definite, on all ranks alike. */
+/* Factorises an indefinite matrix, a definite one, and both again; then a zero matrix, which no package factorises, and a definite one. Only CHOLMOD fails
+   on indefinite matrices, on all ranks. */
 static PetscErrorCode check_indefinite(const char *package, KSPType type)
 {
   /* 1/s^2; the lowest natural frequency of the bar is about 40 rad/s */

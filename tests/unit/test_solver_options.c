@@ -239,8 +239,8 @@ static PetscErrorCode check_springs(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The system of surfaces that push each other is solved by what is asked for, with what goes with it: incomplete factors of blocks of CR are indefinite without a
-   shift. A solve at its limit says nothing of the tangent, and names the option. */
+/* Contact between surfaces is solved with the user's method and preconditioner, and with the settings that these need: incomplete factors of blocks of CR are indefinite without a
+   shift. A solve that reaches its limit does not show an indefinite tangent; the message names the option. */
 static PetscErrorCode check_barrier(void)
 {
   static const Case barrier = {
@@ -273,7 +273,7 @@ static PetscErrorCode check_barrier(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A package that is chosen by PETSc's option is the solver's name; options that only another preconditioner reads are not set; a linear load step whose
+/* A package that PETSc's option selects is the solver's name; options that only another preconditioner reads are not set; a linear load step whose
    solve fails is not halved. */
 static PetscErrorCode check_said(void)
 {

@@ -39,7 +39,7 @@ static PetscErrorCode storage(TestScene *t, SbMatrixKind kind, Vec U, Vec V, Vec
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* |F(u + h w) - F(u) - h J w| must fall with h^2; velocity and acceleration follow as the shifts say */
+/* |F(u + h w) - F(u) - h J w| must decrease as h^2; the shifts define the change of velocity and acceleration */
 static PetscErrorCode taylor(TestScene *t, int exact, Vec U, Vec V, Vec W)
 {
   const PetscReal shift_v = 10., shift_a = 100.;
@@ -86,7 +86,7 @@ static PetscErrorCode taylor(TestScene *t, int exact, Vec U, Vec V, Vec W)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* w . F(u) = dE/dh at u + h w, by central differences: their error falls with h^2, rounding grows with 1/h */
+/* w . F(u) = dE/dh at u + h w, by central differences: their error decreases as h^2, rounding grows as 1/h */
 static PetscErrorCode energy_slope(TestScene *t, const char *what, Vec U, Vec W)
 {
   const PetscReal h = 1e-5;

@@ -16,9 +16,9 @@ typedef struct {
   PetscReal L[3];     /* then, kg m^2/s */
   PetscReal missing;  /* largest change that implicit Euler does not explain, kg m^2/s */
   PetscReal torque;   /* largest torque of all contact forces about the origin, times the step */
-  PetscReal rest;     /* largest difference of the two */
-  PetscReal given[3]; /* what the first body got from the second so far */
-  PetscReal most;     /* the largest of it */
+  PetscReal rest;     /* largest difference between the two */
+  PetscReal given[3]; /* accumulated angular impulse of contact on the first body */
+  PetscReal most;     /* its largest value */
   PetscReal contacts, momentum;
 } Turn;
 

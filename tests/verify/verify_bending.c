@@ -9,7 +9,7 @@
 #define ELEMENTS 4
 static const char *const elements[ELEMENTS] = {"p1", "cr", "dg", "p2"};
 
-/* End displacement of the bar: n = 4 cells across, then 8 with CR alone where nu is large. */
+/* End displacement of the bar: n = 4 cells across, then 8 for CR only if nu is large. */
 static PetscErrorCode check_bar(PetscReal nu, PetscReal tip, PetscReal energy)
 {
   PetscReal value[2];

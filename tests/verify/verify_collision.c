@@ -93,7 +93,7 @@ static PetscErrorCode check_bars(const char *element)
                        "-ts_max_time 0.25 -ksp_rtol 1e-10",
     element, element, SPEED, -SPEED));
   record_span(&r, "meet_contacts", 0, &first, &last);
-  VERIFY_NEAR(first, 0.01, 0.003, "first touch, s"); /* the width of the barrier before */
+  VERIFY_NEAR(first, 0.01, 0.003, "first touch, s"); /* the barrier width is reached earlier */
   VERIFY_NEAR(last - first, 0.2, 0.01, "time of contact, s");
   VERIFY_NEAR(record_last(&r, "a_vx"), -SPEED, 0.1 * SPEED, "velocity of the first bar, m/s");
   VERIFY_NEAR(record_last(&r, "b_vx"), SPEED, 0.1 * SPEED, "velocity of the second bar, m/s");

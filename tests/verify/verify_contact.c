@@ -108,8 +108,7 @@ static PetscErrorCode check_incline(const char *element, const char *response, P
              "plane:0,0,1,0 -effect_floor_friction %g "
              "-effect_floor_response %s -time euler_implicit -ts_dt 0.01 -ts_max_time 0.6",
     element, (double)(0.5 * normal), (double)-normal, (double)mu, response));
-  for (PetscInt i = r.n - 1; i >= 0;
-       i--) { /* the first step that ends there or, when some were cut, behind it */
+  for (PetscInt i = r.n - 1; i >= 0; i--) { /* first step that ends there or, after a divided step, later */
     for (int k = 0; k < 2; k++) {
       if (record_at(&r, "t", i) < time[k] - 1e-9) continue;
       t[k] = record_at(&r, "t", i);

@@ -48,7 +48,7 @@ static PetscErrorCode solve(MPI_Comm comm, const char *element, Motion *motion)
 static PetscErrorCode check(const char *element, PetscReal tolerance)
 {
   static const char *const contacts[3] = {"floor_contacts", "ball_contacts", "meet_contacts"};
-  Motion m[2]; /* alone, together */
+  Motion m[2]; /* on one rank, on all ranks */
   PetscReal force[2][STEPS + 1] = {{0}};
 
   PetscFunctionBeginUser;

@@ -34,7 +34,7 @@ static PetscErrorCode check_momentum(SbRun run, const SbStep *step, Bounce *b)
   PetscFunctionBeginUser;
   PetscCall(contact_body_sums(m, b->A, PETSC_TRUE, a0));
   PetscCall(contact_body_sums(m, step->A, PETSC_TRUE, a1));
-  // To the stage: S0 + alpha (S1 - S0), in the place of S0.
+  // Interpolates to the stage, in place: S0 + alpha (S1 - S0).
   PetscCall(VecAXPBY(b->U, b->alpha_f, 1 - b->alpha_f, step->U));
   PetscCall(VecAXPBY(b->V, b->alpha_f, 1 - b->alpha_f, step->V));
   PetscCall(VecAXPBY(b->A, b->alpha_m, 1 - b->alpha_m, step->A));
@@ -88,7 +88,7 @@ static PetscErrorCode check_bounce(const char *time, PetscReal bound, PetscInt l
   const PetscReal rho = 0.5; /* generalized-alpha of Chung and Hulbert with this spectral radius */
   Bounce b = {.alpha_m = alpha ? (2 - rho) / (1 + rho) : 1, .alpha_f = alpha ? 1 / (1 + rho) : 1};
   Record r = {.g = G};
-  PetscReal fall, rise[RISES] = {0}; /* J; highest place of the centre after each landing, m */
+  PetscReal fall, rise[RISES] = {0}; /* J; largest height of the centre after each landing, m */
   PetscInt landed = 0;
   char path[512];
   TestScene t;

@@ -304,7 +304,7 @@ static PetscErrorCode check_pressure(int kind)
   PetscCall(verify_solve(&t, kinds[kind][0]));
   PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &e));
   for (int k = 0; k < 3; k++) SB_CHECK_NEAR(e.momentum[k], 0, 1e-10, kinds[kind][0]);
-  /* p / (3 K) = 2e4 * 3 (1 - 0.6) / (3 * 1e5) in each direction, still on the way and stretched by the spin */
+  /* p / (3 K) = 2e4 * 3 (1 - 0.6) / (3 * 1e5) in each direction, not yet reached, and with extension by the spin */
   SB_CHECK(e.volume < 0.95 * 2e-3 && e.volume > 0.6 * 2e-3, "%s: volume %g", kinds[kind][0],
            (double)e.volume);
   PetscCall(test_scene_close(&t));

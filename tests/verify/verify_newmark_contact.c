@@ -90,7 +90,7 @@ static PetscErrorCode collide(const char *time, const char *more, Left *left)
   record_span(&r, "meet_normal_force", TOUCH, &left->first, &left->last);
   change = PetscMax(record_max(&r, "momentum_x") - record_at(&r, "momentum_x", 0),
                     record_at(&r, "momentum_x", 0) - record_min(&r, "momentum_x"));
-  VERIFY_NEAR(left->first, 0.01, 0.003, "first touch, s"); /* the width of the barrier before */
+  VERIFY_NEAR(left->first, 0.01, 0.003, "first touch, s"); /* the barrier width is reached earlier */
   VERIFY_NEAR(left->last - left->first, 0.2, 0.01, "time of contact, s");
   /* tolerance of the gaps, 1e-7 of the size, times the force of the wave solution */
   VERIFY_LESS(left->gain, 2e-7 * 2.5, "largest gain of a step, J");

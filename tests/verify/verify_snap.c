@@ -51,7 +51,7 @@ static PetscReal toggle_load(PetscReal delta)
 
 static void member(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
 {
-  const PetscReal depth = DEPTH * PetscSqrtReal(1. + PetscSqr(RISE / SPAN)); /* of a vertical cut */
+  const PetscReal depth = DEPTH * PetscSqrtReal(1. + PetscSqr(RISE / SPAN)); /* of a vertical section */
 
   (void)at;
   (void)ctx;
@@ -66,7 +66,7 @@ typedef struct {
   PetscReal top;     /* largest load before it falls, lb */
   PetscReal bottom;  /* smallest one behind that, lb */
   PetscReal last[2]; /* delta, in, and load, lb */
-  PetscReal end[3];  /* point of the middle */
+  PetscReal end[3];  /* reference position of the centre */
 } Toggle;
 
 static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)

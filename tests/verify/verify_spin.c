@@ -122,7 +122,7 @@ static PetscErrorCode nearest_node(SbModel m, const PetscReal at[3], PetscReal p
 
 typedef struct {
   PetscReal left[3], right[3];      /* reference positions of two nodes */
-  PetscReal last[2], d, w0h, worst; /* direction from one to the other, turn expected next, largest error */
+  PetscReal last[2], d, w0h, worst; /* direction between them, next expected rotation, largest error */
 } Spin;
 
 static PetscErrorCode watch_spin(SbRun run, const SbStep *step, void *ctx)

@@ -22,7 +22,7 @@ typedef struct {
   PetscReal size[3]; /* m */
   PetscInt cells[3];
   PetscReal density;         /* kg/m^3 */
-  PetscReal turn, centre[2]; /* of the rough stack: degrees about z, and place, m */
+  PetscReal turn, centre[2]; /* of the rough stack: rotation about z, degrees; position, m */
 } Block;
 
 /* From below: masses of 0.58, 0.3, 3, 0.31 and 0.96 kg. */

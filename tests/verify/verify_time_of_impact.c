@@ -16,7 +16,7 @@
 
 typedef struct {
   PetscReal first, last, velocity, gain; /* span of contact, s; at the end, m/s; of a step, J */
-  PetscInt off, solves, steps;           /* off: steps that ended beside the grid of ts_dt */
+  PetscInt off, solves, steps;           /* off: number of steps that end off the grid of ts_dt */
 } Impact;
 
 #define BAR                                                                                               \

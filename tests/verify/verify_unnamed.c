@@ -20,7 +20,7 @@
 #define EVENTS 128 /* upper bound of the number of event names */
 
 typedef struct {
-  PetscBool bare; /* the space holds nothing of supports, contact and faces, nobody watches the run */
+  PetscBool bare; /* the space has no data of supports, contact and faces; the run has no monitor */
   PetscInt n;     /* unknowns: u[n], v[n] by original number */
   PetscReal *u, *v;
   PetscInt events[EVENTS]; /* number of times that each event began */

@@ -17,7 +17,7 @@ typedef struct {
   PetscReal c;           /* m/s */
   PetscReal top, top_t;  /* highest point of the end and its time, m, s */
   PetscReal error, mean; /* largest and mean error of the end over a period, of the amplitude */
-  PetscReal middle;      /* largest error of the middle until the wave comes back to it, of the amplitude */
+  PetscReal middle; /* largest error of the centre until the wave returns to it, relative to the amplitude */
   PetscInt n;
 } Wave;
 
