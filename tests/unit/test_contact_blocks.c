@@ -1,5 +1,5 @@
 // @ranks 1
-/* Second derivatives by pairs of surface vertices, spread over nodes: the same as S^T H S of dense matrices, each place once, nothing at prescribed components. */
+/* Second derivatives by pairs of surface vertices, distributed to nodes: equal to S^T H S of dense matrices, each entry once, none at prescribed components. */
 #include <sbbarrier.h>
 #include "pair_reference.h"
 

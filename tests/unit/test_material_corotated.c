@@ -1,5 +1,5 @@
 // @ranks 1
-/* Co-rotated law: published homogeneous states, what every law must satisfy, the three tangents, degenerate F. */
+/* Co-rotated material: published homogeneous states, requirements of every material, the three tangents, degenerate F. */
 #include "material_checks.h"
 
 static void test_states(SbMaterial m)

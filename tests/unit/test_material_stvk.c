@@ -1,5 +1,5 @@
 // @ranks 1
-/* St. Venant-Kirchhoff: published homogeneous states and what every law must satisfy. It does not undo an inversion. */
+/* St. Venant-Kirchhoff: published homogeneous states and requirements of every material. It does not recover from an inversion. */
 #include "material_checks.h"
 
 static void test_states(SbMaterial m)

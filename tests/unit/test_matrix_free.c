@@ -1,5 +1,5 @@
 // @ranks 1 2 3 4
-/* The operator without a matrix does what the assembled tangent does, whatever is constrained, damped, linear or turned. */
+/* The matrix-free operator equals the assembled tangent with constraints, damping, linear materials and rotations. */
 #include "../scene.h"
 
 static const char *const scene =

@@ -1,5 +1,5 @@
 // @ranks 1 3
-/* Rotations of nodes: exact for a body turned as a whole by any angle, the local turn in a bent bar, I for linear laws. */
+/* Rotations of nodes: exact for a rigid rotation by any angle, the local rotation in a bent bar, I for linear materials. */
 #include "../scene.h"
 
 static const char *const bar = "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:16,4,4 -body_bar_material %s "
