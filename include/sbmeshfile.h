@@ -76,8 +76,7 @@ typedef struct {
   PetscInt nduplicate; /* duplicate tets, removed; their groups are joined */
   PetscInt nturned;    /* inverted tets, reoriented */
   PetscInt nunused;    /* vertices that no tet uses, dropped */
-  PetscInt
-    nitem; /* triangles, lines, points of groups that are duplicate, collapsed or not part of tets, removed */
+  PetscInt nitem;      /* duplicate, collapsed or unused triangles, lines, points of groups, removed */
 } SbRepair;
 /*
   SbMeshFileRepair - makes a mesh that a run accepts, where dropping, turning and welding can do it.

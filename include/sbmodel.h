@@ -9,14 +9,13 @@ typedef struct {
   PetscReal kinetic; /* 1/2 v.M v, J */
   PetscReal strain;  /* J */
   PetscReal
-    load_work; /* work done by the loads since the start (constant loads: minus the change of their potential), J */
-  PetscReal prescribed_work; /* work done by moving supports since the start, J */
-  PetscReal damping_loss;    /* dissipated by Rayleigh damping since the start, J */
-  PetscReal remesh_loss;     /* energy lost by re-meshing since the start, J */
-  PetscReal remesh_mass;     /* change by re-meshings since the start, each as its absolute value, kg */
-  PetscReal remesh_momentum; /* likewise of the momentum, kg m/s */
-  PetscReal
-    integrator_loss; /* dissipated by the integrator: start + works - damping_loss - remesh_loss - now, J */
+    load_work; /* work of the loads since the start (constant: minus the change of their potential), J */
+  PetscReal prescribed_work;  /* work done by moving supports since the start, J */
+  PetscReal damping_loss;     /* dissipated by Rayleigh damping since the start, J */
+  PetscReal remesh_loss;      /* energy lost by re-meshing since the start, J */
+  PetscReal remesh_mass;      /* change by re-meshings since the start, each as its absolute value, kg */
+  PetscReal remesh_momentum;  /* likewise of the momentum, kg m/s */
+  PetscReal integrator_loss;  /* dissipated by the integrator: start + works - the other losses - now, J */
   PetscReal momentum[3];      /* kg m/s */
   PetscReal angular[3];       /* about the origin, kg m^2/s */
   PetscReal centre[3];        /* centre of mass, m */

@@ -115,9 +115,8 @@ struct _p_SbRun {
   SbSaddle saddle_used;
   char solver_choice[SB_NAME_MAX]; /* -solver: "auto" or a name */
   const struct _SbSolverPreset *solver_used;
-  char solver[SB_NAME_MAX]; /* preset chosen, "cg_gamg"; with -pc_type its methods, "cg, gamg" */
-  char
-    solver_parts[SB_NAME_MAX]; /* methods at the start, "cg, cholesky of mumps"; "" without linear systems */
+  char solver[SB_NAME_MAX];       /* preset chosen, "cg_gamg"; with -pc_type its methods, "cg, gamg" */
+  char solver_parts[SB_NAME_MAX]; /* methods at the start, "cg, cholesky of mumps"; "": no linear systems */
   char solver_reason[256];
   struct _p_SbSolverList *solver_list; /* fallbacks (solver_list.c); NULL without linear systems */
   PetscInt nmonitor;

@@ -31,9 +31,8 @@ typedef struct {
   const char *family, *name;
   const char *options; /* options that name the part; "": the scene does */
   const char *scene;   /* further options that it needs, also in the run without it; NULL: none */
-  const char
-    *events;       /* log events that it begins, separated by commas; NULL: the one of its family and name */
-  PetscBool apart; /* it can be restricted to one of two bodies, and works with explicit integrators */
+  const char *events;  /* log events that it begins, comma-separated; NULL: one of its family and name */
+  PetscBool apart;     /* it can be restricted to one of two bodies, and works with explicit integrators */
 } Part;
 
 static const Part parts[] = {

@@ -79,11 +79,9 @@ typedef struct {
   PetscReal least, shortest; /* smallest gap and shortest safe part of the run */
   PetscInt most;             /* largest number of active pairs of the run */
   SbPairs columns;
-  PetscReal
-    energy; /* barrier's energy at the start, then at the end of the step, J; this rank's, as all below */
-  PetscReal
-    obstacle_power;    /* work of the obstacle along its path in this step with the forces at its start, J */
-  PetscReal step_work; /* on the bodies in the last step, J */
+  PetscReal energy; /* barrier's energy at the start, then at the end of the step, J; this rank's, as below */
+  PetscReal obstacle_power;      /* work along the obstacle's path in this step, forces of its start, J */
+  PetscReal step_work;           /* on the bodies in the last step, J */
   PetscReal work, friction_loss; /* since the start, J */
 } Barrier;
 

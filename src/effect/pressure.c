@@ -52,10 +52,9 @@ typedef struct {
   SbFormula value;
   PetscBool follower;
   PetscInt nfacet, nedge;
-  SbFacet *facet; /* [nfacet] of owned and ghost cells */
-  RimEdge *rim;   /* [nedge] of P1 and P2, with an owned node */
-  PetscBool
-    *whole; /* [nbody] pressure acts on the whole body, by its volume: its facets are not in the list */
+  SbFacet *facet;   /* [nfacet] of owned and ghost cells */
+  RimEdge *rim;     /* [nedge] of P1 and P2, with an owned node */
+  PetscBool *whole; /* [nbody] pressure on the whole body, by its volume: its facets are not in the list */
 } Pressure;
 
 static const SbOption rows[] = {

@@ -53,15 +53,14 @@ typedef struct {
 /* The new mesh of the body; arrays owned, SbNewMeshDestroy(). */
 typedef struct {
   PetscInt nvert, ncell, nkept;
-  PetscReal *X, *x; /* [nvert][3] positions at rest; now, interpolated on the old mesh; m */
-  PetscInt *cell;   /* [ncell][4] vertices */
-  PetscInt *kept;   /* [nkept] old numbers of the first vertices, which have kept their positions */
-  PetscInt *within; /* [ncell] old tet that contains the centroid of the new one */
-  PetscReal
-    *edge_off;       /* [ncell][6][3] offsets of edge nodes from middles, at rest, m; NULL: no curved tets */
-  PetscReal *flat;   /* [nvert][3] rest positions for straight old tets, m; NULL: no curved tets */
-  PetscInt nmoved;   /* vertices moved for inverted or flat tets */
-  PetscReal quality; /* quality of the worst tet, now */
+  PetscReal *X, *x;    /* [nvert][3] positions at rest; now, interpolated on the old mesh; m */
+  PetscInt *cell;      /* [ncell][4] vertices */
+  PetscInt *kept;      /* [nkept] old numbers of the first vertices, which have kept their positions */
+  PetscInt *within;    /* [ncell] old tet that contains the centroid of the new one */
+  PetscReal *edge_off; /* [ncell][6][3] offsets of edge nodes from edge midpoints, m; NULL: no curved tets */
+  PetscReal *flat;     /* [nvert][3] rest positions for straight old tets, m; NULL: no curved tets */
+  PetscInt nmoved;     /* vertices moved for inverted or flat tets */
+  PetscReal quality;   /* quality of the worst tet, now */
 } SbNewMesh;
 /* Errors (PETSC_ERR_USER_INPUT): those of the mesher; tets that stay inverted at rest or now. */
 PetscErrorCode SbRemeshBody(const char *where, const SbOldMesh *old, const SbRemeshing *how, SbNewMesh *mesh);

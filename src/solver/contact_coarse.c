@@ -38,9 +38,8 @@ typedef enum { MEMBER, ITSELF, MEAN } Way;
 typedef struct {
   SbSpace space;
   const SbContactRows *rows;
-  PetscInt
-    *parent; /* [nnode][2] vertices of an edge node (SbSpaceEdgeParents()); NULL: P2 is aggregated, too */
-  uint8_t *vertex;      /* [nnode] the node is a vertex of a P2 body; NULL likewise */
+  PetscInt *parent; /* [nnode][2] end vertices of an edge node (SbSpaceEdgeParents()); NULL: P2 aggregated */
+  uint8_t *vertex;  /* [nnode] the node is a vertex of a P2 body; NULL likewise */
   PetscInt nagg, *body; /* number of aggregates; [n] aggregate of each own node, -1: fully prescribed */
   PetscBool stale[2];   /* the values, the pattern are out of date */
   PetscBool ok;

@@ -17,12 +17,11 @@ struct _p_SbLevels {
   Mat A[3];      /* matrices of the levels: BAIJ; the last one AIJ */
   SbElement *element[3];
   PetscReal shift_a, shift_v, shift_k; /* shifts of the last assembly */
-  PetscInt *mean;    /* [nnode] CR node (at[1]) of a DG node; NULL without DG, as the next three */
-  PetscInt *across;  /* [nnode] node on the other side of the face, -1: none */
-  PetscReal *weight; /* [nnode] own weight in the mean of the two sides */
-  PetscReal *jump;   /* [nnode_owned] inverse stiffness of the jump, m/N */
-  PetscInt
-    *corner; /* [nodes of at[n-2]][3] local vertices of the face; a P1 node has its vertex three times */
+  PetscInt *mean;       /* [nnode] CR node (at[1]) of a DG node; NULL without DG, as the next three */
+  PetscInt *across;     /* [nnode] node on the other side of the face, -1: none */
+  PetscReal *weight;    /* [nnode] own weight in the mean of the two sides */
+  PetscReal *jump;      /* [nnode_owned] inverse stiffness of the jump, m/N */
+  PetscInt *corner;     /* [nodes of at[n-2]][3] local vertices of the face; P1: its vertex three times */
   Vec r[3], z[3], g[3]; /* work vectors of each level, with ghosts */
   Vec t[3], w[3];       /* work vectors without ghosts; t[0] is the diagonal of A[0] with a DG body */
   PetscBool sprung;     /* this rank has had springs since the last assembly */

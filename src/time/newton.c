@@ -88,14 +88,13 @@ typedef struct {
 /* Data of a solve. */
 typedef struct {
   SbRun run;
-  Iterate from;    /* the last iterate */
-  PetscBool known; /* `from` is up to date, but for its slopes */
-  Iterate to;      /* a trial */
-  Iterate best;    /* barrier contact: the longest sufficient trial */
-  Vec rhs;         /* barrier contact: right-hand side of its quadratic model */
-  Vec start, step; /* iterate before the provisional steps; the first of them led to start - step */
-  PetscReal
-    least; /* rounding of the strain energy of a rotated body: eps times Young's modulus times volume, J */
+  Iterate from;           /* the last iterate */
+  PetscBool known;        /* `from` is up to date, but for its slopes */
+  Iterate to;             /* a trial */
+  Iterate best;           /* barrier contact: the longest sufficient trial */
+  Vec rhs;                /* barrier contact: right-hand side of its quadratic model */
+  Vec start, step;        /* iterate before the provisional steps; the first of them led to start - step */
+  PetscReal least;        /* rounding of the strain energy of a rotated body: eps E V, J */
   PetscInt provisional;   /* number of provisional steps */
   PetscReal slope;        /* slope of E at `start` along that step, J */
   PetscReal norm;         /* norm of the residual there, N */
@@ -107,12 +106,11 @@ typedef struct {
   PetscInt nblock;        /* number of its blocks, all ranks */
   PetscInt iterations;    /* iterations of the last linear solve */
   SbContactHessian kind;
-  PetscReal shift;    /* factor on the mass matrix added to the tangent of the last direction, 1/s^2 */
-  PetscBool unstable; /* an exact tangent of this solve was not positive definite */
-  PetscBool whole;    /* the last step was a full one */
-  PetscBool rounding; /* the last step changed nothing beyond rounding */
-  PetscInt
-    branch; /* static, forces without a potential: negative eigenvalues of the symmetric part at the start */
+  PetscReal shift;     /* factor on the mass matrix added to the tangent of the last direction, 1/s^2 */
+  PetscBool unstable;  /* an exact tangent of this solve was not positive definite */
+  PetscBool whole;     /* the last step was a full one */
+  PetscBool rounding;  /* the last step changed nothing beyond rounding */
+  PetscInt branch;     /* static, forces without a potential: negative eigenvalues at the start */
   PetscReal tolerance; /* absolute tolerance of the last solve, N */
   PetscReal initial;   /* norm of the first residual, N */
 } Newton;
