@@ -37,7 +37,6 @@ static PetscErrorCode setup_damping(SbEffect e, SbSpace space)
   PetscFunctionBeginUser;
   /* the bodies of these names; an error with the nearest ones where there is none */
   PetscCall(PetscCalloc1(mesh->nbody, &damped));
-  for (PetscInt b = 0; b < mesh->nbody; b++) damped[b] = (PetscBool)!e->on.n;
   for (PetscInt i = 0; i < e->on.n; i++) {
     PetscInt b = 0;
 
@@ -58,8 +57,9 @@ static PetscErrorCode setup_damping(SbEffect e, SbSpace space)
     damped[b] = PETSC_TRUE;
   }
   for (PetscInt b = 0; b < mesh->nbody; b++) {
-    space->alpha[b] += damped[b] ? d->alpha : 0.;
-    space->beta[b] += damped[b] ? d->beta : 0.;
+    if (e->on.n && !damped[b]) continue;
+    space->alpha[b] += d->alpha;
+    space->beta[b] += d->beta;
   }
   PetscCall(PetscFree(damped));
   PetscFunctionReturn(PETSC_SUCCESS);

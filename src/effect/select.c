@@ -13,8 +13,9 @@
 
 typedef enum { CELLS, FACETS, VERTICES } Kind;
 
-/* Numbers k[on->n] of the named sets; an error when one selects nothing of the kind. */
-static PetscErrorCode find_sets(SbSpace space, const SbEffectOn *on, Kind kind, PetscInt k[SB_SET_MAX])
+/* Numbers k[on->n] of the named sets and the union of their bits; an error when one selects nothing of the kind. */
+static PetscErrorCode find_sets(SbSpace space, const SbEffectOn *on, Kind kind, PetscInt k[SB_SET_MAX],
+                                uint64_t *mask)
 {
   const char *const need[] = {"tetrahedra", "boundary facets", "vertices"};
   const char *const hint[] = {
@@ -27,65 +28,59 @@ static PetscErrorCode find_sets(SbSpace space, const SbEffectOn *on, Kind kind, 
              "%s: name at least one set, see -sets", on->option);
   PetscCheck(on->n <= SB_SET_MAX, space->comm, PETSC_ERR_USER_INPUT,
              "%s names %" PetscInt_FMT " sets, at most %d can be used", on->option, on->n, SB_SET_MAX);
+  *mask = 0;
   for (PetscInt i = 0; i < on->n; i++) {
     const SbSet *set;
-    PetscInt count;
 
     PetscCall(SbSpaceFindSet(space, on->name[i], on->option, &k[i]));
     set = &space->mesh->set[k[i]];
-    count = kind == CELLS ? set->ncell : kind == FACETS ? set->nfacet : set->nvert;
-    PetscCheck(count, space->comm, PETSC_ERR_USER_INPUT,
+    PetscCheck(kind == CELLS    ? set->ncell
+               : kind == FACETS ? set->nfacet
+                                : set->nvert,
+               space->comm, PETSC_ERR_USER_INPUT,
                "%s: set %s selects no %s (%" PetscInt_FMT " vertices, %" PetscInt_FMT
                " boundary facets, %" PetscInt_FMT " tetrahedra): %s",
                on->option, set->name, need[kind], set->nvert, set->nfacet, set->ncell, hint[kind]);
+    *mask |= SB_SET_BIT(k[i]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbEffectFacets(SbSpace space, const SbEffectOn *on, PetscInt *n, SbFacet **facets)
 {
-  SbFacet *list = NULL;
-  uint64_t seen = 0;
-  PetscInt k[SB_SET_MAX];
+  PetscInt k[SB_SET_MAX], size = 0;
+  uint64_t seen = 0, mask;
 
   PetscFunctionBeginUser;
   *n = 0;
-  PetscCall(find_sets(space, on, FACETS, k));
+  *facets = NULL;
+  PetscCall(find_sets(space, on, FACETS, k, &mask));
   for (PetscInt i = 0; i < on->n; i++) {
     SbFacet *more;
     PetscInt nmore;
 
     PetscCall(SbSpaceGetSetFacets(space, k[i], &nmore, &more));
-    PetscCall(PetscRealloc((size_t)(*n + nmore + 1) * sizeof(*list), &list));
+    PetscCall(SbReserve(*n + nmore, sizeof(**facets), &size, facets));
     for (PetscInt j = 0; j < nmore; j++) {
-      if (!(space->mesh->face_set[4 * more[j].cell + more[j].face] & seen)) list[(*n)++] = more[j];
+      if (!(space->mesh->face_set[4 * more[j].cell + more[j].face] & seen)) (*facets)[(*n)++] = more[j];
     }
     PetscCall(PetscFree(more));
     seen |= SB_SET_BIT(k[i]);
   }
-  *facets = list;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Items with a bit of the mask, ascending. */
-static PetscErrorCode collect(PetscInt nitem, const uint64_t sets[], uint64_t mask, PetscInt *n,
-                              PetscInt **items)
+/* Items with a bit of the mask, ascending; all of them when no set is named. */
+static PetscErrorCode collect(const SbEffectOn *on, PetscInt nitem, const uint64_t sets[], uint64_t mask,
+                              PetscInt *n, PetscInt **items)
 {
   PetscFunctionBeginUser;
   *n = 0;
   PetscCall(PetscMalloc1(nitem, items));
   for (PetscInt i = 0; i < nitem; i++) {
-    if (sets[i] & mask) (*items)[(*n)++] = i;
+    if (!on->n || sets[i] & mask) (*items)[(*n)++] = i;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static uint64_t union_of(const SbEffectOn *on, const PetscInt k[])
-{
-  uint64_t mask = 0;
-
-  for (PetscInt i = 0; i < on->n; i++) mask |= SB_SET_BIT(k[i]);
-  return mask;
 }
 
 /* A body with nodes at faces that has vertices in the sets must have nodes there. Collective. */
@@ -120,37 +115,33 @@ static PetscErrorCode check_nodes(SbSpace space, const SbEffectOn *on, uint64_t 
 PetscErrorCode SbEffectNodes(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **nodes)
 {
   PetscInt k[SB_SET_MAX];
+  uint64_t mask;
 
   PetscFunctionBeginUser;
-  PetscCall(find_sets(space, on, VERTICES, k));
-  if (space->faces) PetscCall(check_nodes(space, on, union_of(on, k)));
-  PetscCall(collect(space->nnode, space->node_set, union_of(on, k), n, nodes));
+  PetscCall(find_sets(space, on, VERTICES, k, &mask));
+  if (space->faces) PetscCall(check_nodes(space, on, mask));
+  PetscCall(collect(on, space->nnode, space->node_set, mask, n, nodes));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbEffectVertices(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **vertices)
 {
   PetscInt k[SB_SET_MAX];
+  uint64_t mask;
 
   PetscFunctionBeginUser;
-  PetscCall(find_sets(space, on, VERTICES, k));
-  PetscCall(collect(space->mesh->nvert, space->mesh->vert_set, union_of(on, k), n, vertices));
+  PetscCall(find_sets(space, on, VERTICES, k, &mask));
+  PetscCall(collect(on, space->mesh->nvert, space->mesh->vert_set, mask, n, vertices));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbEffectCells(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **cells)
 {
-  const SbMesh mesh = space->mesh;
   PetscInt k[SB_SET_MAX];
+  uint64_t mask;
 
   PetscFunctionBeginUser;
-  PetscCall(find_sets(space, on, CELLS, k));
-  if (on->n) {
-    PetscCall(collect(mesh->ncell, mesh->cell_set, union_of(on, k), n, cells));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  *n = mesh->ncell;
-  PetscCall(PetscMalloc1(*n, cells));
-  for (PetscInt c = 0; c < *n; c++) (*cells)[c] = c;
+  PetscCall(find_sets(space, on, CELLS, k, &mask));
+  PetscCall(collect(on, space->mesh->ncell, space->mesh->cell_set, mask, n, cells));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
