@@ -1,196 +1,210 @@
 /*
-  deadload.c - a force per volume or area integrated against the basis functions.
+  deadload.c - the effects `body_force`, a force per rest volume, and `traction`, a force per rest area; of fixed direction (dead
+  loads), given as three formulas of time and rest position.
 
-  f_a = integral of psi_a q(X, t) over each cell (or facet), at the rest position. With the barycentric coordinates b_c
-  of the corners c one loop serves tetrahedra and triangles:
+  f_a = s(t) integral of phi_a q(X, t) over each tet (or facet), phi_a the basis of the element, X its map. A total force of a
+  traction is uniform over the rest area of its facets, and adds up with the formulas. Every rank integrates its owned and its ghost
+  cells, so rows of owned nodes are complete without communication.
 
-    l_c += |T| sum_k w_k b_kc q(sum_d b_kd X_d, t),   f_a = sum_c psi_a(X_c) l_c,
-
-  psi_a the basis of the element, of which b_c are the combinations (for P1 they are the same). P2's own basis b_c (2 b_c - 1), 4 b_c b_d is
-  integrated as it is, with one function for each corner and each edge between corners. Of a curved cell |T| is that of the tet (or
-  triangle) with the derivatives of its map at the point, and X that of the map.
-
-  Rules, both with positive weights, inner points and degree 5, hence exact for q of degree 4: SbRuleQuintic (Walkington, "Quadrature on simplices
-  of arbitrary dimension", 2000), SbRuleFacet (Radon 1948; Stroud, "Approximate calculation of multiple integrals", 1971, T2:5-1). Second-order
-  convergence of linear elements needs degree 2; the rest lowers the constant at no cost, because a load that
-  does not change is integrated once.
-
-  Sums are kept in a list of the nodes touched, not in a field over the whole body.
+  Rules, both with positive weights, inner points and degree 5, hence exact for q of degree 4: SbRuleQuintic (Walkington,
+  "Quadrature on simplices of arbitrary dimension", 2000), SbRuleFacet (Radon 1948; Stroud, "Approximate calculation of multiple
+  integrals", 1971, T2:5-1). Second-order convergence of linear elements needs degree 2; the rest lowers the constant at no cost,
+  because a load that does not change is integrated once.
 */
 #include "effect_impl.h"
 
-struct _p_SbDeadLoad {
-  PetscInt ncorner, nitem;
-  PetscInt *corner; /* [nitem][ncorner] 4 cell + vertex of the cell; NULL once a steady load was integrated */
-  PetscInt nslot;   /* nodes of a cell, at most: 4, or 10 with a P2 body */
-  PetscInt *slot;   /* [nitem][nslot] index into node of the cell's nodes, -1: not touched; NULL likewise */
-  SbSpace space;    /* borrowed */
-  PetscInt n, nowned;
-  PetscInt *node;       /* [n] local nodes, ascending, so owned ones first */
-  PetscReal *value;     /* [n][3] N */
-  PetscReal t;          /* s, of value */
-  SbFormula density[3]; /* borrowed */
+typedef struct {
+  SbFormula density[3];           /* N/m^3 or Pa */
+  PetscReal total[3], uniform[3]; /* traction: N, and the same per area, Pa */
+  PetscInt ncorner, nitem;        /* 4 for tets, 3 for facets */
+  PetscInt *corner;  /* [nitem][ncorner] 4 cell + vertex of it; NULL once a steady load was integrated */
+  PetscInt n, *node; /* [n] owned nodes of these cells */
+  PetscReal *value;  /* [nnode][3] load at time t, right on owned nodes, N */
+  PetscReal t;       /* s */
+} DeadLoad;
+
+static const SbOption body_force_rows[] = {
+  {"on", SB_OPTION_NAMES, 1, "", "", "", "sets on whose tets the force acts; default: all bodies"},
+  {"density", SB_OPTION_FORMULA, 3, "N/m^3", NULL, "",
+   "force per reference volume, three formulas of t and the reference position x, y, z"},
+  {"time", SB_OPTION_FORMULA, 1, "", "1", "", "amplitude: factor on the force, a formula of the time t"},
 };
 
-/* Volume of a tetrahedron or area of a triangle from its corners, m^3 or m^2. */
-static PetscReal simplex_measure(PetscInt ncorner, const PetscReal *const x[4])
-{
-  PetscReal e[3][3] = {{0}}, n[3];
+static const SbOption traction_rows[] = {
+  {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets on whose boundary facets the traction acts"},
+  {"vector", SB_OPTION_FORMULA, 3, "Pa", "0;0;0", "",
+   "force per reference area, three formulas of t and the reference position x, y, z"},
+  {"total", SB_OPTION_REALS, 3, "N", "0,0,0", "",
+   "total force, spread evenly over the reference area of the sets"},
+  {"time", SB_OPTION_FORMULA, 1, "", "1", "", "amplitude: factor on the traction, a formula of the time t"},
+};
 
-  for (PetscInt c = 1; c < ncorner; c++) {
-    for (int i = 0; i < 3; i++) e[c - 1][i] = x[c][i] - x[0][i];
-  }
-  n[0] = e[0][1] * e[1][2] - e[0][2] * e[1][1];
-  n[1] = e[0][2] * e[1][0] - e[0][0] * e[1][2];
-  n[2] = e[0][0] * e[1][1] - e[0][1] * e[1][0];
-  if (ncorner == 3) return 0.5 * PetscSqrtReal(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-  return PetscAbsReal(n[0] * e[2][0] + n[1] * e[2][1] + n[2] * e[2][2]) / 6;
+static PetscErrorCode options_body_force(SbEffect e, const SbScope *scope)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectFormulas(scope, "density", 3, PETSC_TRUE, ((DeadLoad *)e->data)->density, &e->steady));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode options_traction(SbEffect e, const SbScope *scope)
+{
+  DeadLoad *load = (DeadLoad *)e->data;
+  PetscBool vector, total;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionGiven(scope, "vector", &vector));
+  PetscCall(SbOptionGiven(scope, "total", &total));
+  PetscCheck(vector || total, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "effect %s: give -effect_%s_vector (Pa, three formulas) or -effect_%s_total (N, three numbers)",
+             e->name, e->name, e->name);
+  PetscCall(SbEffectFormulas(scope, "vector", 3, PETSC_TRUE, load->density, &e->steady));
+  PetscCall(SbOptionReals(scope, "total", load->total));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* value = the load at time t. */
-static void integrate(SbDeadLoad load, PetscReal t)
+static void integrate(DeadLoad *load, SbSpace space, PetscReal t)
 {
   const PetscInt nc = load->ncorner;
   const SbPointRule *rule = nc == 4 ? &SbRuleQuintic : &SbRuleFacet;
 
-  for (PetscInt i = 0; i < 3 * load->n; i++) load->value[i] = 0;
-  for (PetscInt item = 0; item < load->nitem; item++) {
-    const PetscInt *corner = &load->corner[nc * item];
-    const SbElement element = SbSpaceCellElement(load->space, corner[0] / 4);
-    const SbElementOps *e = &element->ops;
-    const SbMesh mesh = load->space->mesh;
-    const PetscBool quadratic = (PetscBool)(element->nodes_per[1] > 0),
-                    curved = (PetscBool)(mesh->cell_set[corner[0] / 4] & SB_CURVED);
-    PetscReal l[SB_CELL_NODES][3], nodes[SB_CELL_NODES][3], corners[4][3], measure;
-    const PetscReal *x[4];
-
-    /* l of one item: what its barycentric coordinates receive, [ncorner]; quadratic: its nodes of P2, [10], as the cell numbers them. */
-    for (int k = 0; k < 3 * SB_CELL_NODES; k++) l[k / 3][k % 3] = 0;
-    for (PetscInt c = 0; c < nc; c++) x[c] = &mesh->x[3 * mesh->cell[corner[c]]];
-    measure = simplex_measure(nc, x);
-    if (curved) SbSpaceCellPositions(load->space, corner[0] / 4, nodes);
-    for (int k = 0; k < rule->n; k++) {
-      const PetscReal *b = rule->L[k];
-      PetscReal p[3] = {0, 0, 0}, q[3], L[4] = {0, 0, 0, 0}, phi[SB_CELL_NODES];
-
-      for (PetscInt c = 0; c < nc; c++) L[corner[c] % 4] = b[c];
-      if (quadratic) SbQuadraticBasis(L, phi);
-      if (curved) {
-        SbQuadraticCorners(L, (const PetscReal(*)[3])nodes, corners);
-        for (PetscInt c = 0; c < nc; c++) x[c] = corners[corner[c] % 4];
-        measure = simplex_measure(nc, x);
-        for (int n = 0; n < 3 * SB_CELL_NODES; n++) p[n % 3] += phi[n / 3] * nodes[n / 3][n % 3];
-      }
-      for (PetscInt c = 0; c < nc && !curved; c++) {
-        for (int i = 0; i < 3; i++) p[i] += b[c] * x[c][i];
-      }
-      for (int i = 0; i < 3; i++) q[i] = measure * rule->weight[k] * SbFormulaEval(load->density[i], t, p);
-      for (PetscInt c = 0; c < nc && !quadratic; c++) {
-        for (int i = 0; i < 3; i++) l[c][i] += b[c] * q[i];
-      }
-      for (int n = 0; n < 3 * SB_CELL_NODES && quadratic; n++) l[n / 3][n % 3] += phi[n / 3] * q[n % 3];
-    }
-    for (PetscInt a = 0; a < load->nslot; a++) {
-      const PetscInt slot = load->slot[load->nslot * item + a];
-
-      for (int i = 0; quadratic && slot >= 0 && i < 3; i++) load->value[3 * slot + i] += l[a][i];
-      for (PetscInt c = 0; !quadratic && slot >= 0 && c < nc; c++) {
-        for (int i = 0; i < 3; i++) load->value[3 * slot + i] += e->vertex[corner[c] % 4][a] * l[c][i];
-      }
-    }
-  }
   load->t = t;
-}
+  for (PetscInt i = 0; i < 3 * space->nnode; i++) load->value[i] = 0;
+  for (PetscInt item = 0; item < load->nitem; item++) {
+    const PetscInt *corner = &load->corner[nc * item], cell = corner[0] / 4;
+    const PetscBool curved = (PetscBool)(space->mesh->cell_set[cell] & SB_CURVED);
+    PetscReal nodes[SB_CELL_NODES][3], x[4][3], e[3][3], normal[3];
 
-/* The nodes touched, ascending, and where each cell finds its own. */
-static PetscErrorCode find_nodes(SbDeadLoad load)
-{
-  const SbSpace space = load->space;
-  PetscInt *at;
+    if (curved) SbSpaceCellPositions(space, cell, nodes);
+    for (int k = 0; k < 12; k++)
+      x[k / 3][k % 3] = space->mesh->x[3 * space->mesh->cell[4 * cell + k / 3] + k % 3];
+    for (int k = 0; k < rule->n; k++) {
+      PetscReal L[4] = {0}, phi[SB_CELL_NODES], p[3] = {0}, q[3], measure;
+      PetscInt n;
 
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(space->nnode, &at));
-  load->nslot = space->edge_node ? SB_CELL_NODES : 4;
-  PetscCall(PetscMalloc1(load->nslot * load->nitem, &load->slot));
-  for (PetscInt k = 0; k < load->nslot * load->nitem; k++) {
-    const PetscInt *corner = &load->corner[load->ncorner * (k / load->nslot)], cell = corner[0] / 4,
-                   a = k % load->nslot;
-    const SbElement element = SbSpaceCellElement(space, cell);
-    int ends = 0;
+      for (PetscInt c = 0; c < nc; c++) L[corner[c] % 4] = rule->L[k][c];
+      n = SbCellBasis(SbSpaceCellElement(space, cell), L, phi);
+      for (PetscInt a = 0; a < 3 * n; a++)
+        p[a % 3] += phi[a / 3] * space->node_x[3 * SbSpaceCellNode(space, cell, a / 3) + a % 3];
 
-    load->slot[k] = -1;
-    for (PetscInt c = 0; c < load->ncorner; c++) {
-      if (a < 4 && element->ops.vertex[corner[c] % 4][a] != 0)
-        load->slot[k] = SbSpaceCellNode(space, cell, a);
-      if (a >= 4) ends += corner[c] % 4 == SbTetEdge[a - 4][0] || corner[c] % 4 == SbTetEdge[a - 4][1];
+      /* volume or area of the simplex with the derivatives of the map at the point */
+      if (curved) SbQuadraticCorners(L, (const PetscReal(*)[3])nodes, x);
+      for (PetscInt c = 1; c < nc; c++) SbSubtract(x[corner[c] % 4], x[corner[0] % 4], e[c - 1]);
+      SbCross(e[0], e[1], normal);
+      measure = nc == 3 ? PetscSqrtReal(SbDot3(normal, normal)) / 2 : PetscAbsReal(SbDot3(normal, e[2])) / 6;
+      for (int i = 0; i < 3; i++)
+        q[i] = measure * rule->weight[k] * (SbFormulaEval(load->density[i], t, p) + load->uniform[i]);
+      for (PetscInt a = 0; a < 3 * n; a++)
+        load->value[3 * SbSpaceCellNode(space, cell, a / 3) + a % 3] += phi[a / 3] * q[a % 3];
     }
-    if (ends == 2 && element->nodes_per[1]) load->slot[k] = SbSpaceCellNode(space, cell, a);
-    if (load->slot[k] >= 0) at[load->slot[k]] = 1;
   }
-  for (PetscInt i = 0; i < space->nnode; i++) load->n += at[i];
-  PetscCall(PetscMalloc2(load->n, &load->node, 3 * load->n, &load->value));
-  load->n = 0;
-  for (PetscInt i = 0; i < space->nnode; i++) {
-    if (!at[i]) continue;
-    at[i] = load->n;
-    load->node[load->n++] = i;
-    if (i < space->nnode_owned) load->nowned = load->n;
-  }
-  for (PetscInt k = 0; k < load->nslot * load->nitem; k++) {
-    if (load->slot[k] >= 0) load->slot[k] = at[load->slot[k]];
-  }
-  PetscCall(PetscFree(at));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbDeadLoadCreate(SbSpace space, PetscInt ncorner, PetscInt nitem, const PetscInt corner[],
-                                const SbFormula density[3], SbDeadLoad *deadload)
+/* Finds the nodes of the cells of load->corner[nitem][ncorner], and integrates once. */
+static PetscErrorCode set_up(DeadLoad *load, SbSpace space)
 {
-  SbDeadLoad load;
-  PetscBool steady = PETSC_TRUE;
+  PetscBool steady = PETSC_TRUE, *touched;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscNew(&load));
-  load->ncorner = ncorner;
-  load->nitem = nitem;
-  load->space = space;
-  for (int i = 0; i < 3; i++) {
-    load->density[i] = density[i];
-    if (SbFormulaUsesTime(density[i])) steady = PETSC_FALSE;
+  PetscCall(PetscCalloc1(space->nnode, &touched));
+  for (PetscInt item = 0; item < load->nitem; item++) {
+    const PetscInt cell = load->corner[load->ncorner * item] / 4;
+    const PetscInt n = SbSpaceCellElement(space, cell)->nodes_per[1] ? SB_CELL_NODES : 4;
+
+    for (PetscInt a = 0; a < n; a++) touched[SbSpaceCellNode(space, cell, a)] = PETSC_TRUE;
   }
-  PetscCall(PetscMalloc1(ncorner * nitem, &load->corner));
-  PetscCall(PetscArraycpy(load->corner, corner, ncorner * nitem));
-  PetscCall(find_nodes(load));
-  integrate(load, 0);
-  if (steady) {
-    load->nitem = 0;
-    PetscCall(PetscFree(load->corner));
-    PetscCall(PetscFree(load->slot));
+  PetscCall(PetscMalloc2(space->nnode_owned, &load->node, 3 * space->nnode, &load->value));
+  for (PetscInt i = 0; i < space->nnode_owned; i++) {
+    if (touched[i]) load->node[load->n++] = i;
   }
-  *deadload = load;
+  PetscCall(PetscFree(touched));
+  integrate(load, space, 0);
+  for (int i = 0; i < 3; i++) steady = (PetscBool)(steady && !SbFormulaUsesTime(load->density[i]));
+  if (steady) PetscCall(PetscFree(load->corner));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbDeadLoadAdd(SbDeadLoad load, PetscReal t, PetscReal factor, PetscReal f[])
+static PetscErrorCode setup_body_force(SbEffect e, SbSpace space)
 {
-  PetscFunctionBeginUser;
-  if (load->nitem && t != load->t) integrate(load, t);
-  for (PetscInt i = 0; i < load->nowned; i++) {
-    PetscReal *fi = &f[3 * load->node[i]];
+  DeadLoad *load = (DeadLoad *)e->data;
+  PetscInt *cells;
 
-    for (int c = 0; c < 3; c++) fi[c] += factor * load->value[3 * i + c];
-  }
-  PetscCall(PetscLogFlops(6.0 * (PetscLogDouble)load->nowned));
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectCells(space, &e->on, &load->nitem, &cells));
+  load->ncorner = 4;
+  PetscCall(PetscMalloc1(4 * load->nitem, &load->corner));
+  for (PetscInt i = 0; i < 4 * load->nitem; i++) load->corner[i] = 4 * cells[i / 4] + i % 4;
+  PetscCall(PetscFree(cells));
+  PetscCall(set_up(load, space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbDeadLoadDestroy(SbDeadLoad *load)
+static PetscErrorCode setup_traction(SbEffect e, SbSpace space)
 {
+  DeadLoad *load = (DeadLoad *)e->data;
+  PetscReal area = 0;
+  SbFacet *facets;
+
   PetscFunctionBeginUser;
-  if (!*load) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree((*load)->corner));
-  PetscCall(PetscFree((*load)->slot));
-  PetscCall(PetscFree2((*load)->node, (*load)->value));
-  PetscCall(PetscFree(*load));
+  PetscCall(SbEffectFacets(space, &e->on, &load->nitem, &facets));
+  load->ncorner = 3;
+  PetscCall(PetscMalloc1(3 * load->nitem, &load->corner));
+  for (PetscInt i = 0; i < load->nitem; i++) {
+    for (int a = 0; a < 3; a++) load->corner[3 * i + a] = 4 * facets[i].cell + facets[i].corner[a];
+    if (facets[i].cell < space->mesh->ncell_owned) area += facets[i].area;
+  }
+  PetscCall(PetscFree(facets));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &area, 1, MPIU_REAL, MPI_SUM, space->comm));
+  for (int i = 0; i < 3; i++) load->uniform[i] = load->total[i] / area;
+  PetscCall(set_up(load, space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+static PetscErrorCode force_deadload(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
+{
+  DeadLoad *load = (DeadLoad *)e->data;
+  const PetscReal s = SbFormulaEval(e->time, stage->t, NULL);
+
+  PetscFunctionBeginUser;
+  if (load->corner && stage->t != load->t) integrate(load, space, stage->t);
+  for (PetscInt i = 0; i < load->n; i++) {
+    const PetscInt node = 3 * load->node[i];
+
+    for (int c = 0; c < 3; c++) f[node + c] += s * load->value[node + c];
+  }
+  PetscCall(PetscLogFlops(6.0 * (PetscLogDouble)load->n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode destroy_deadload(SbEffect e)
+{
+  DeadLoad *load = (DeadLoad *)e->data;
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&load->density[i]));
+  PetscCall(PetscFree(load->corner));
+  PetscCall(PetscFree2(load->node, load->value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+const SbEffectType SbEffectBodyForce = {
+  .name = "body_force",
+  .size = sizeof(DeadLoad),
+  .nrow = PETSC_STATIC_ARRAY_LENGTH(body_force_rows),
+  .row = body_force_rows,
+  .ops = {.setfromoptions = options_body_force,
+          .setup = setup_body_force,
+          .force = force_deadload,
+          .destroy = destroy_deadload},
+};
+
+const SbEffectType SbEffectTraction = {
+  .name = "traction",
+  .size = sizeof(DeadLoad),
+  .nrow = PETSC_STATIC_ARRAY_LENGTH(traction_rows),
+  .row = traction_rows,
+  .ops = {.setfromoptions = options_traction,
+          .setup = setup_traction,
+          .force = force_deadload,
+          .destroy = destroy_deadload},
+};

@@ -165,3 +165,27 @@ PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt 
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbPathRead(const SbScope *scope, PetscBool position, SbPath *path, PetscBool *steady)
+{
+  PetscReal length;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectFormulas(scope, "displacement", 3, position, path->displacement, steady));
+  PetscCall(SbEffectFormulas(scope, "angle", 1, PETSC_FALSE, &path->angle, steady));
+  PetscCall(SbOptionReals(scope, "axis", path->axis));
+  PetscCall(SbOptionReals(scope, "axis_point", path->point));
+  length = PetscSqrtReal(SbDot3(path->axis, path->axis));
+  PetscCheck(length > 0, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "-effect_%s_axis: 0,0,0 is no direction",
+             scope->instance);
+  for (int i = 0; i < 3; i++) path->axis[i] /= length;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPathDestroy(SbPath *path)
+{
+  PetscFunctionBeginUser;
+  for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&path->displacement[i]));
+  PetscCall(SbFormulaDestroy(&path->angle));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

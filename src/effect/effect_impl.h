@@ -22,6 +22,15 @@
 PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt n, PetscBool position,
                                 SbFormula formulas[], PetscBool *steady);
 
+/* A path given by the options displacement, angle, axis and axis_point. Read: position, whether displacements may use x, y, z; steady as
+   for SbEffectFormulas(). Not collective. */
+typedef struct {
+  SbFormula displacement[3], angle; /* m, degrees; owned */
+  PetscReal axis[3], point[3];      /* unit vector; m */
+} SbPath;
+PetscErrorCode SbPathRead(const SbScope *scope, PetscBool position, SbPath *path, PetscBool *steady);
+PetscErrorCode SbPathDestroy(SbPath *path);
+
 /*
   Items of the named sets on this rank, each once even when it is in several of the sets. Collective; the caller
   releases the array with PetscFree(). Errors (PETSC_ERR_USER_INPUT, alike on all ranks): no such set; a set that selects
@@ -38,31 +47,19 @@ PetscErrorCode SbEffectNodes(SbSpace space, const SbEffectOn *on, PetscInt *n, P
 PetscErrorCode SbEffectVertices(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **vertices);
 PetscErrorCode SbEffectCells(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **cells);
 
-/*
-  SbDeadLoad - a force per volume or per area, given by three formulas of time and rest position, integrated against the
-  basis functions of its cells or facets (src/effect/deadload.c). It is stored as one force per node, which is
-  integrated again only when the formulas use t and t has changed.
-*/
-typedef struct _p_SbDeadLoad *SbDeadLoad;
-/*
-  SbDeadLoadCreate - collects nodes and integrates once.
-
-  Not collective.
-
-  Input:
-    space    - gives elements and rest positions; borrowed, must outlive the load
-    ncorner  - 4 for cells, 3 for facets
-    nitem    - cells or facets on this rank
-    corner   - [nitem][ncorner] 4 c + a for vertex a of local cell c; those of an item are of one cell
-    density  - three formulas, N/m^3 or Pa; borrowed, must outlive the load
-  Output:
-    load     - the caller destroys it
-*/
-PetscErrorCode SbDeadLoadCreate(SbSpace space, PetscInt ncorner, PetscInt nitem, const PetscInt corner[],
-                                const SbFormula density[3], SbDeadLoad *load);
-/* f[nnode][3] += factor times the load at time t on owned nodes, N. Not collective. */
-PetscErrorCode SbDeadLoadAdd(SbDeadLoad load, PetscReal t, PetscReal factor, PetscReal f[]);
-PetscErrorCode SbDeadLoadDestroy(SbDeadLoad *load);
+/* Basis functions of a cell at the barycentric coordinates L; returns their number. */
+static inline PetscInt SbCellBasis(SbElement e, const PetscReal L[4], PetscReal phi[SB_CELL_NODES])
+{
+  if (e->nodes_per[1]) {
+    SbQuadraticBasis(L, phi);
+    return SB_CELL_NODES;
+  }
+  for (int a = 0; a < 4; a++) {
+    phi[a] = 0;
+    for (int c = 0; c < 4; c++) phi[a] += L[c] * e->ops.vertex[c][a];
+  }
+  return 4;
+}
 
 /*
   SbPrescribed - unknowns that an effect prescribes. An unknown belongs to the first effect that asks for it, in the order of

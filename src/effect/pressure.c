@@ -1,38 +1,36 @@
 /*
   pressure.c - a pressure on part of the surface, positive in compression.
 
-  On a facet with current corners x0, x1, x2, counter-clockwise seen from outside, N = (x1 - x0) x (x2 - x0)
-  is twice the outward area vector, and each corner receives
+  The triangle with the derivatives of a facet's map at a point has the corners x0, x1, x2, counter-clockwise seen from outside: those
+  of the facet itself, but of P2, whose facets have six nodes and are curved once they move. With X = x1 - x0, Y = x2 - x0 as
+  derivatives along two barycentric coordinates, and phi_a the basis of the cell,
 
-    f_a = -p/6 N,   p = value(t) time(t).
+    f_a = -p int phi_a X x Y,   p = value(t) time(t).
 
   On a closed surface this is -p dV/dx_a, V the enclosed volume: total force and moment vanish and the work is
   -p times the change of volume.
 
-  Tangent: with the opposite edges c_b = x_{b+1} - x_{b+2} (indices modulo 3), dN/dx_b w = w x c_b, so
-  df_a/dx_b = p/6 [c_b]x, where [c]x w = c x w. It is not symmetric facet by facet; what the facets add to the
-  matrix here is the symmetric part, the blocks p/12 [c_b - c_a]x. On a closed surface, or one whose rim is
-  constrained, the other part cancels and the tangent is the exact derivative (Bufler, "Pressure loaded structures
-  under large deformations", 1984). What is left of it is an integral along the rim R, counter-clockwise,
+  Tangent: -df_a/dx_b is not symmetric facet by facet; what the facets add to the matrix here is the symmetric part, with [c]x w = c x w
+
+    p/2 int (phi_a phi_b,Y - phi_b phi_a,Y) [X]x - (phi_a phi_b,X - phi_b phi_a,X) [Y]x.
+
+  On a closed surface, or one whose rim is constrained, the other part cancels and the tangent is the exact derivative (Bufler,
+  "Pressure loaded structures under large deformations", 1984). What is left of it is an integral along the rim R, counter-clockwise,
 
     -df_a = -p/2 int_R phi_a dx x w.
 
   Where the rim is free the operator of the linear solver applies it, and the matrix is the preconditioner. Without it Newton's method
   converges linearly, and not at all for large rotations.
 
+  Integrals are exact: one point for linear elements, a rule of degree 5 for P2 (polynomials of degree 4).
+
   The facets of CR and DG bodies do not meet at their edges, so that forces facet by facet do not quite add up to
   zero. Where the pressure acts on the whole surface of such a body, it is taken as -p dV/du of the volume inside
   (src/fem/body_volume.c): at rest that is the same, and force and moment vanish for every displacement. On part of the
-  surface small gaps remain, which vanish with mesh refinement. There contributions of facets do not cancel: with CR the force acts at the facet's own
-  node, while N depends on the other three of the cell, so the derivative is far from symmetric.
-  Newton's method with its symmetric part stalls near p = mu. So the operator of the linear solver applies the derivative
-  exactly, facet by facet, dN = sum_b w_b x c_b, and the matrix, without it, is the preconditioner.
-
-  A facet of P2 has six nodes and is curved once it moves. With X, Y its derivatives along two of its barycentric coordinates, and phi_a its basis,
-
-    f_a = -p int phi_a X x Y,   symmetric part of -df_a/dx_b: p/2 int (phi_a phi_b,Y - phi_b phi_a,Y) [X]x - (phi_a phi_b,X - phi_b phi_a,X) [Y]x,
-
-  integrated by a rule of degree 5 (polynomials of degree 4).
+  surface small gaps remain, which vanish with mesh refinement. There contributions of facets do not cancel: with CR the force acts at
+  the facet's own node, while X and Y depend on the other three of the cell, so the derivative is far from symmetric. Newton's method
+  with its symmetric part stalls near p = mu. So the operator of the linear solver applies the derivative exactly, facet by facet, and
+  the matrix, without it, is the preconditioner.
 
   With follower = no the pressure acts on the rest area and normal, as small-strain theory has it; then there
   is no tangent.
@@ -74,44 +72,28 @@ static PetscErrorCode options_pressure(SbEffect e, const SbScope *scope)
   PetscFunctionBeginUser;
   PetscCall(SbEffectFormulas(scope, "value", 1, PETSC_FALSE, &p->value, &e->steady));
   PetscCall(SbOptionBool(scope, "follower", &p->follower));
-  if (p->follower)
-    e->linear = PETSC_FALSE;
-  else {
-    e->ops.tangent = NULL;
-    e->ops.nonsymmetric = NULL;
-  }
+  e->linear = (PetscBool)!p->follower;
+  if (p->follower) PetscFunctionReturn(PETSC_SUCCESS);
+  e->ops.tangent = NULL;
+  e->ops.nonsymmetric = NULL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static inline PetscBool quadratic(SbSpace space, const SbFacet *facet)
+/* Whether it does not share edges with other facets (CR, DG): its tangent is applied outside the matrix. */
+static inline PetscBool apart(SbSpace space, const SbFacet *facet)
 {
-  return (PetscBool)(SbSpaceCellElement(space, facet->cell)->nodes_per[1] > 0);
-}
-
-/* The nodes of a P2 facet in their cell. */
-static void facet_nodes(const SbFacet *facet, int node[6])
-{
-  for (int c = 0; c < 3; c++) {
-    const int a = (int)facet->corner[c], b = (int)facet->corner[(c + 1) % 3];
-
-    node[c] = a;
-    node[3 + c] = 4;
-    for (int e = 0; e < 6; e++) {
-      if (SbTetEdge[e][0] == PetscMin(a, b) && SbTetEdge[e][1] == PetscMax(a, b)) node[3 + c] = 4 + e;
-    }
-  }
+  return (PetscBool)!SbSpaceCellElement(space, facet->cell)->nodes_per[0];
 }
 
 /* Side c of a facet of P1 or P2. */
 static RimEdge side_of(SbSpace space, const SbFacet *facet, PetscInt c)
 {
-  RimEdge e = {{SbSpaceCellNode(space, facet->cell, facet->corner[c]),
-                SbSpaceCellNode(space, facet->cell, facet->corner[(c + 1) % 3]), -1}};
-  int node[6];
+  const PetscInt a = facet->corner[c], b = facet->corner[(c + 1) % 3];
+  RimEdge e = {{SbSpaceCellNode(space, facet->cell, a), SbSpaceCellNode(space, facet->cell, b), -1}};
 
-  if (quadratic(space, facet)) {
-    facet_nodes(facet, node);
-    e.node[2] = SbSpaceCellNode(space, facet->cell, node[3 + c]);
+  for (int k = 0; SbSpaceCellElement(space, facet->cell)->nodes_per[1] && k < 6; k++) {
+    if (SbTetEdge[k][0] == PetscMin(a, b) && SbTetEdge[k][1] == PetscMax(a, b))
+      e.node[2] = SbSpaceCellNode(space, facet->cell, 4 + k);
   }
   return e;
 }
@@ -119,24 +101,18 @@ static RimEdge side_of(SbSpace space, const SbFacet *facet, PetscInt c)
 /* Whether the tangent has a part along the edge, not eliminated by supports. */
 static PetscBool is_free(SbSpace space, const RimEdge *edge)
 {
-  const PetscInt n = edge->node[2] < 0 ? 2 : 3;
   PetscReal e[3], longest = 0;
+  int components = 0; /* free ones of some node */
 
   for (int i = 0; i < 3; i++) {
     e[i] = space->node_x[3 * edge->node[1] + i] - space->node_x[3 * edge->node[0] + i];
     longest = PetscMax(longest, PetscAbsReal(e[i]));
   }
-  for (PetscInt a = 0; a < n; a++) {
-    for (PetscInt b = 0; b < n; b++) {
-      for (int k = 0; k < 3; k++) {
-        const int i = (k + 1) % 3, j = (k + 2) % 3;
-        const uint8_t row = space->fixed[edge->node[a]], column = space->fixed[edge->node[b]];
-
-        /* e_k couples components i and j */
-        if (PetscAbsReal(e[k]) > STRAIGHT * longest && !(row >> i & 1) && !(column >> j & 1))
-          return PETSC_TRUE;
-      }
-    }
+  for (int a = 0; a < 3 && edge->node[a] >= 0; a++) components |= ~space->fixed[edge->node[a]];
+  /* e_k couples the other two components */
+  for (int k = 0; k < 3; k++) {
+    if (PetscAbsReal(e[k]) > STRAIGHT * longest && components >> (k + 1) % 3 & components >> (k + 2) % 3 & 1)
+      return PETSC_TRUE;
   }
   return PETSC_FALSE;
 }
@@ -152,7 +128,7 @@ static PetscErrorCode find_rim(Pressure *p, SbSpace space)
   for (PetscInt i = 0; i < 3 * p->nfacet; i++) {
     RimEdge e;
 
-    if (!SbSpaceCellElement(space, p->facet[i / 3].cell)->nodes_per[0]) continue;
+    if (apart(space, &p->facet[i / 3])) continue;
     e = side_of(space, &p->facet[i / 3], i % 3);
     edge[n++] = (SbKey){SbKeyOfPair(e.node[0], e.node[1]), i};
   }
@@ -185,9 +161,9 @@ static PetscErrorCode find_rim(Pressure *p, SbSpace space)
 static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
 {
   Pressure *p = (Pressure *)e->data;
-  PetscBool some = PETSC_FALSE;
   const SbMesh mesh = space->mesh;
   PetscInt *count, n = 0;
+  PetscBool some;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectFacets(space, &e->on, &p->nfacet, &p->facet));
@@ -208,138 +184,64 @@ static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
   if (p->follower && !(e->steady && SbFormulaEval(p->value, 0, NULL) == 0)) PetscCall(find_rim(p, space));
   /* the remainder of bodies with nodes at faces, and free rims */
   some = (PetscBool)(p->nedge > 0);
-  for (PetscInt k = 0; k < p->nfacet && !some; k++)
-    some = (PetscBool)!SbSpaceCellElement(space, p->facet[k].cell)->nodes_per[0];
+  for (PetscInt k = 0; k < p->nfacet && !some; k++) some = apart(space, &p->facet[k]);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &some, 1, SB_MPI_BOOL, MPI_LOR, space->comm));
   if (!some) e->ops.nonsymmetric = NULL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Corners of a facet, one per row, m: at rest when u is NULL, else where they are now. */
-static inline void corners(SbSpace space, const SbFacet *facet, const PetscReal u[], PetscReal x[3][3])
-{
-  const SbElementOps *e = &SbSpaceCellElement(space, facet->cell)->ops;
-  const PetscInt *node = space->cell_node + 4 * facet->cell;
-
-  for (int k = 0; k < 3; k++) {
-    for (int i = 0; i < 3; i++) x[k][i] = space->mesh->x[3 * facet->vertex[k] + i];
-    for (int a = 0; u && a < 4; a++) {
-      for (int i = 0; i < 3; i++) x[k][i] += e->vertex[facet->corner[k]][a] * u[3 * node[a] + i];
-    }
-  }
-}
-
-/* f += factor N at each corner. */
-static inline void add_to_corners(SbSpace space, const SbFacet *facet, PetscReal factor, const PetscReal N[3],
-                                  PetscReal f[])
-{
-  const SbElementOps *e = &SbSpaceCellElement(space, facet->cell)->ops;
-
-  for (int a = 0; a < 4; a++) {
-    const PetscInt node = space->cell_node[4 * facet->cell + a];
-    PetscReal share = 0;
-
-    for (int c = 0; c < 3; c++) share += e->vertex[facet->corner[c]][a];
-    for (int i = 0; i < 3; i++) f[3 * node + i] += share * factor * N[i];
-  }
-}
-
-/* SbRuleFacet: where a facet of P2 is integrated, with values and derivatives of its basis. */
-#define NPOINT 7
+/* A point of a facet: basis of the cell, and coefficients of its nodes in the corners x0, x1, x2 there. */
 typedef struct {
-  PetscReal weight;              /* times half, the area of the triangle of the coordinates */
-  PetscReal phi[6], along[2][6]; /* at the corners, then between corners 01, 12, 20 */
+  PetscInt n, node[SB_CELL_NODES]; /* nodes of the cell */
+  PetscReal weight; /* of the integral, times half, the area of the triangle of the coordinates */
+  PetscReal phi[SB_CELL_NODES];
+  PetscReal along[2][SB_CELL_NODES]; /* derivatives phi,X and phi,Y */
 } FacetPoint;
 
-static void facet_points(FacetPoint point[NPOINT])
+/* Points of a facet: the last one of SbRuleFacet, its centre, for linear elements, all of them for P2. */
+static inline int first_point(SbSpace space, const SbFacet *facet)
 {
-  for (int n = 0; n < NPOINT; n++) {
-    const PetscReal *L = SbRuleFacet.L[n];
-    FacetPoint *p = &point[n];
+  return SbSpaceCellElement(space, facet->cell)->nodes_per[1] ? 0 : SbRuleFacet.n - 1;
+}
 
-    p->weight = 0.5 * SbRuleFacet.weight[n];
+static void facet_point(SbSpace space, const SbFacet *facet, int q, FacetPoint *p)
+{
+  const SbElement e = SbSpaceCellElement(space, facet->cell);
+  const PetscInt *v = facet->corner;
+  PetscReal L[4] = {0}, corner[3][SB_CELL_NODES];
+
+  for (int c = 0; c < 3; c++) L[v[c]] = SbRuleFacet.L[q][c];
+  p->n = SbCellBasis(e, L, p->phi);
+  p->weight = p->n == 4 ? 0.5 : 0.5 * SbRuleFacet.weight[q];
+  for (int a = 0; a < p->n; a++) {
+    p->node[a] = SbSpaceCellNode(space, facet->cell, a);
     for (int c = 0; c < 3; c++) {
-      const int d = (c + 1) % 3;
-
-      p->phi[c] = L[c] * (2 * L[c] - 1);
-      p->phi[3 + c] = 4 * L[c] * L[d];
-      /* along the edges from corner 0 to 1, and to 2 */
-      for (int k = 0; k < 2; k++) {
-        const PetscReal dc = c == 0 ? -1 : c == k + 1, dd = d == 0 ? -1 : d == k + 1;
-
-        p->along[k][c] = (4 * L[c] - 1) * dc;
-        p->along[k][3 + c] = 4 * (L[c] * dd + L[d] * dc);
-      }
+      if (p->n == 4)
+        corner[c][a] = e->ops.vertex[v[c]][a];
+      else if (a < 4)
+        corner[c][a] = a == v[c] ? 4 * L[a] - 1 : 0;
+      else
+        corner[c][a] = 4 * ((SbTetEdge[a - 4][0] == v[c]) * L[SbTetEdge[a - 4][1]] +
+                            (SbTetEdge[a - 4][1] == v[c]) * L[SbTetEdge[a - 4][0]]);
     }
+    for (int k = 0; k < 2; k++) p->along[k][a] = corner[k + 1][a] - corner[0][a];
   }
 }
 
-/* The derivatives X, Y of a P2 facet at a point. */
-static void facet_sides(SbSpace space, const SbFacet *facet, const int node[6], const FacetPoint *point,
-                        const PetscReal u[], PetscReal side[2][3])
+/* side += the derivatives of a field w[nnode][3] there; NULL: none. */
+static void add_sides(const FacetPoint *p, const PetscReal w[], PetscReal side[2][3])
 {
-  for (int k = 0; k < 6; k++) side[k / 3][k % 3] = 0;
-  for (int a = 0; a < 6; a++) {
-    const PetscInt n = SbSpaceCellNode(space, facet->cell, node[a]);
-
-    for (int i = 0; i < 3; i++) {
-      const PetscReal x = space->node_x[3 * n + i] + (u ? u[3 * n + i] : 0);
-
-      side[0][i] += point->along[0][a] * x;
-      side[1][i] += point->along[1][a] * x;
-    }
+  for (int a = 0; w && a < p->n; a++) {
+    for (int k = 0; k < 6; k++) side[k / 3][k % 3] += p->along[k / 3][a] * w[3 * p->node[a] + k % 3];
   }
 }
 
-/* [c]x */
-static inline void cross_block(const PetscReal c[3], PetscReal block[9])
+/* f += factor times the weight and the basis at the point times N. */
+static void add_area(const FacetPoint *p, PetscReal factor, const PetscReal N[3], PetscReal f[])
 {
-  block[0] = block[4] = block[8] = 0;
-  block[1] = -c[2];
-  block[2] = c[1];
-  block[3] = c[2];
-  block[5] = -c[0];
-  block[6] = -c[1];
-  block[7] = c[0];
-}
-
-static PetscErrorCode add_quadratic_tangent(SbSpace space, const SbFacet *facet,
-                                            const FacetPoint point[NPOINT], const PetscReal u[], PetscReal p,
-                                            Mat A)
-{
-  PetscReal c[6][6][3] = {{{0}}}, block[9];
-  int node[6];
-
-  PetscFunctionBeginUser;
-  facet_nodes(facet, node);
-  for (int q = 0; q < NPOINT; q++) {
-    const FacetPoint *at = &point[q];
-    PetscReal side[2][3];
-
-    facet_sides(space, facet, node, at, u, side);
-    for (int a = 0; a < 6; a++) {
-      for (int b = 0; b < 6; b++) {
-        const PetscReal y = at->phi[a] * at->along[1][b] - at->phi[b] * at->along[1][a],
-                        x = at->phi[a] * at->along[0][b] - at->phi[b] * at->along[0][a];
-
-        for (int i = 0; i < 3; i++) c[a][b][i] += 0.5 * p * at->weight * (y * side[0][i] - x * side[1][i]);
-      }
-    }
+  for (int a = 0; a < p->n; a++) {
+    for (int i = 0; i < 3; i++) f[3 * p->node[a] + i] += factor * p->weight * p->phi[a] * N[i];
   }
-  for (int a = 0; a < 6; a++) {
-    for (int b = 0; b < 6; b++) {
-      if (a == b) continue;
-      cross_block(c[a][b], block);
-      PetscCall(SbSpaceAddCellBlock(space, A, facet->cell, node[a], node[b], block));
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Whether it does not share edges with other facets (CR, DG): its tangent is applied outside the matrix. */
-static inline PetscBool apart(SbSpace space, const SbFacet *facet)
-{
-  return (PetscBool)!SbSpaceCellElement(space, facet->cell)->nodes_per[0];
 }
 
 static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
@@ -347,42 +249,22 @@ static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *s
   const Pressure *load = (const Pressure *)e->data;
   const PetscReal p = SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(e->time, stage->t, NULL);
   const PetscReal *u = load->follower ? stage->u : NULL;
-  FacetPoint point[NPOINT];
 
   PetscFunctionBeginUser;
-  facet_points(point);
   for (PetscInt b = 0; b < space->mesh->nbody; b++) {
     if (load->whole[b]) SbSpaceAddVolumeForce(space, b, u, -p, f);
   }
   for (PetscInt k = 0; k < load->nfacet; k++) {
-    const SbFacet *facet = &load->facet[k];
-    PetscReal x[3][3], d[3], b[3], N[3];
+    for (int q = first_point(space, &load->facet[k]); q < SbRuleFacet.n; q++) {
+      PetscReal side[2][3] = {{0}}, N[3];
+      FacetPoint at;
 
-    if (quadratic(space, facet)) {
-      int node[6];
-
-      /* f -= p phi_a X x Y */
-      facet_nodes(facet, node);
-      for (int q = 0; q < NPOINT; q++) {
-        PetscReal side[2][3], area[3];
-
-        facet_sides(space, facet, node, &point[q], u, side);
-        SbCross(side[0], side[1], area);
-        for (int a = 0; a < 6; a++) {
-          const PetscInt n = SbSpaceCellNode(space, facet->cell, node[a]);
-
-          for (int i = 0; i < 3; i++) f[3 * n + i] -= p * point[q].weight * point[q].phi[a] * area[i];
-        }
-      }
-      continue;
+      facet_point(space, &load->facet[k], q, &at);
+      add_sides(&at, space->node_x, side);
+      add_sides(&at, u, side);
+      SbCross(side[0], side[1], N);
+      add_area(&at, -p, N, f);
     }
-    corners(space, facet, u, x);
-    for (int i = 0; i < 3; i++) {
-      d[i] = x[1][i] - x[0][i];
-      b[i] = x[2][i] - x[0][i];
-    }
-    SbCross(d, b, N);
-    add_to_corners(space, facet, -p / 6, N, f);
   }
   PetscCall(PetscLogFlops(45.0 * (PetscLogDouble)load->nfacet));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -393,49 +275,45 @@ static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage 
   const Pressure *load = (const Pressure *)e->data;
   const PetscReal p =
     stage->shift_k * SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(e->time, stage->t, NULL);
-  FacetPoint point[NPOINT];
 
   PetscFunctionBeginUser;
-  facet_points(point);
   if (p == 0) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt b = 0; b < space->mesh->nbody; b++) {
     if (load->whole[b]) PetscCall(SbSpaceAddVolumeTangent(space, b, stage->u, p, A));
   }
   for (PetscInt k = 0; k < load->nfacet; k++) {
-    const SbFacet *facet = &load->facet[k];
-    const SbElementOps *element = &SbSpaceCellElement(space, facet->cell)->ops;
-    PetscReal x[3][3], c[3][3], block[9];
+    PetscReal c[SB_CELL_NODES][SB_CELL_NODES][3] = {{{0}}};
+    FacetPoint at;
 
-    if (apart(space, facet)) continue;
-    if (quadratic(space, facet)) {
-      PetscCall(add_quadratic_tangent(space, facet, point, stage->u, p, A));
-      continue;
-    }
-    corners(space, facet, stage->u, x);
-    for (int b = 0; b < 3; b++) {
-      for (int i = 0; i < 3; i++) c[b][i] = x[(b + 1) % 3][i] - x[(b + 2) % 3][i];
-    }
-    /* minus the derivatives between corners, -p/12 [c_l - c_k]x, which the element spreads over its nodes */
-    for (int a = 0; a < 4; a++) {
-      for (int b = 0; b < 4; b++) {
-        PetscReal d[3] = {0, 0, 0};
+    if (apart(space, &load->facet[k])) continue;
+    for (int q = first_point(space, &load->facet[k]); q < SbRuleFacet.n; q++) {
+      PetscReal side[2][3] = {{0}};
 
-        for (int q = 0; q < 9; q++) {
-          const PetscReal weight =
-            element->vertex[facet->corner[q / 3]][a] * element->vertex[facet->corner[q % 3]][b];
+      facet_point(space, &load->facet[k], q, &at);
+      add_sides(&at, space->node_x, side);
+      add_sides(&at, stage->u, side);
+      for (int a = 0; a < at.n; a++) {
+        for (int b = 0; b < at.n; b++) {
+          const PetscReal y = at.phi[a] * at.along[1][b] - at.phi[b] * at.along[1][a],
+                          x = at.phi[a] * at.along[0][b] - at.phi[b] * at.along[0][a];
 
-          for (int i = 0; i < 3; i++) d[i] -= weight * p / 12 * (c[q % 3][i] - c[q / 3][i]);
+          for (int i = 0; i < 3; i++) c[a][b][i] += 0.5 * p * at.weight * (y * side[0][i] - x * side[1][i]);
         }
-        cross_block(d, block);
-        if (block[1] == 0 && block[2] == 0 && block[5] == 0) continue;
-        PetscCall(SbSpaceAddCellBlock(space, A, facet->cell, a, b, block));
+      }
+    }
+    for (int a = 0; a < at.n; a++) {
+      for (int b = 0; b < at.n; b++) {
+        const PetscReal *d = c[a][b], block[9] = {0, -d[2], d[1], d[2], 0, -d[0], -d[1], d[0], 0};
+
+        if (d[0] == 0 && d[1] == 0 && d[2] == 0) continue;
+        PetscCall(SbSpaceAddCellBlock(space, A, load->facet[k].cell, a, b, block));
       }
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y_a -= factor int phi_a dx x w along an edge of the rim, by Gauss' rule of three points: exact for curved ones. */
+/* y_a -= factor int phi_a dx x w along an edge of the rim, by Gauss' rule of three points, exact for curved ones. */
 static void add_rim(SbSpace space, const RimEdge *edge, PetscReal factor, const PetscReal u[],
                     const PetscReal w[], PetscReal y[])
 {
@@ -473,25 +351,18 @@ static PetscErrorCode unsymmetric_pressure(SbEffect e, SbSpace space, const SbSt
 
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < load->nfacet; k++) {
-    const SbFacet *facet = &load->facet[k];
-    const PetscInt *node = space->cell_node + 4 * facet->cell;
-    PetscReal z[3][3], w[3], c[3], turn[3], dN[3] = {0, 0, 0};
+    PetscReal side[2][3] = {{0}}, w[2][3] = {{0}}, one[3], two[3];
+    FacetPoint at;
 
-    if (!apart(space, facet)) continue;
-    /* dN = sum_b w_b x c_b, w_b the direction at corner b */
-    corners(space, facet, stage->u, z);
-    for (int b = 0; b < 3; b++) {
-      for (int i = 0; i < 3; i++) {
-        c[i] = z[(b + 1) % 3][i] - z[(b + 2) % 3][i];
-        w[i] = 0;
-        for (int a = 0; a < 4; a++)
-          w[i] +=
-            SbSpaceCellElement(space, facet->cell)->ops.vertex[facet->corner[b]][a] * x[3 * node[a] + i];
-      }
-      SbCross(w, c, turn);
-      for (int i = 0; i < 3; i++) dN[i] += turn[i];
-    }
-    add_to_corners(space, facet, p / 6, dN, y);
+    if (!apart(space, &load->facet[k])) continue;
+    facet_point(space, &load->facet[k], SbRuleFacet.n - 1, &at);
+    add_sides(&at, space->node_x, side);
+    add_sides(&at, stage->u, side);
+    add_sides(&at, x, w);
+    SbCross(w[0], side[1], one);
+    SbCross(side[0], w[1], two);
+    add_area(&at, p, one, y);
+    add_area(&at, p, two, y);
   }
   for (PetscInt k = 0; k < load->nedge; k++) add_rim(space, &load->rim[k], 0.5 * p, stage->u, x, y);
   PetscFunctionReturn(PETSC_SUCCESS);

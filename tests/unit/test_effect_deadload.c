@@ -7,7 +7,6 @@
   exactly: degree 4 of q on rules of degree 5.
 */
 // @ranks 1 3
-#include "../../src/effect/effect_impl.h"
 #include "effect_fixture.h"
 
 static const char *const sets[][2] = {{"top", "plane:0,0,1,1"}};
@@ -18,33 +17,13 @@ static PetscReal exact(PetscInt ncorner, const int p[3])
   return 1.0 / ((p[0] + 1) * (p[1] + 1) * (ncorner == 4 ? p[2] + 1 : 1));
 }
 
-/* Corners of the local cells, or of the local facets of the top. */
-static PetscErrorCode get_corners(Fixture *x, PetscInt ncorner, PetscInt *n, PetscInt **nodes)
-{
-  PetscFunctionBeginUser;
-  if (ncorner == 4) {
-    *n = x->mesh->ncell;
-    PetscCall(PetscMalloc1(4 * *n, nodes));
-    for (PetscInt i = 0; i < 4 * *n; i++) (*nodes)[i] = i;
-  } else {
-    SbFacet *facets;
-
-    PetscCall(SbSpaceGetSetFacets(x->space, 0, n, &facets));
-    PetscCall(PetscMalloc1(3 * *n, nodes));
-    for (PetscInt i = 0; i < 3 * *n; i++) (*nodes)[i] = 4 * facets[i / 3].cell + facets[i / 3].corner[i % 3];
-    PetscCall(PetscFree(facets));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Sums over the owned nodes of all ranks: f_x, and f_x x, f_x y, f_x z. */
-static PetscErrorCode moments(Fixture *x, SbDeadLoad load, PetscReal t, PetscReal factor, PetscReal all[4])
+static PetscErrorCode moments(Fixture *x, SbEffect load, PetscReal t, PetscReal all[4])
 {
   PetscReal sum[4] = {0};
 
   PetscFunctionBeginUser;
-  PetscCall(PetscArrayzero(x->f, 3 * x->space->nnode));
-  PetscCall(SbDeadLoadAdd(load, t, factor, x->f));
+  PetscCall(effect_force(x, load, t));
   for (PetscInt i = 0; i < x->space->nnode_owned; i++) {
     sum[0] += x->f[3 * i];
     for (int c = 0; c < 3; c++) sum[1 + c] += x->f[3 * i] * x->space->node_x[3 * i + c];
@@ -54,21 +33,18 @@ static PetscErrorCode moments(Fixture *x, SbDeadLoad load, PetscReal t, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_monomial(Fixture *x, PetscInt ncorner, PetscInt n, const PetscInt nodes[],
-                                     const int p[3])
+static PetscErrorCode check_monomial(Fixture *x, PetscInt ncorner, const int p[3])
 {
-  SbFormula q[3];
-  SbDeadLoad load;
-  char text[64];
+  SbEffect load;
+  char text[128];
   PetscReal sum[4];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), "x^%d*y^%d*z^%d", p[0], p[1], p[2]));
-  PetscCall(SbFormulaCreate(PETSC_COMM_SELF, text, "test", &q[0]));
-  PetscCall(SbFormulaCreate(PETSC_COMM_SELF, "0", "test", &q[1]));
-  PetscCall(SbFormulaCreate(PETSC_COMM_SELF, "0", "test", &q[2]));
-  PetscCall(SbDeadLoadCreate(x->space, ncorner, n, nodes, q, &load));
-  PetscCall(moments(x, load, 0, 1, sum));
+  PetscCall(PetscSNPrintf(text, sizeof(text), "-effect_%s x^%d*y^%d*z^%d;0;0",
+                          ncorner == 4 ? "body_force_density" : "traction_on top -effect_traction_vector",
+                          p[0], p[1], p[2]));
+  PetscCall(effect_create(x, ncorner == 4 ? "body_force" : "traction", text, &load));
+  PetscCall(moments(x, load, 0, sum));
   if (p[0] + p[1] + p[2] <= 4) {
     // The published points and weights have 20 digits; rounding of some hundred additions.
     SB_CHECK_NEAR(sum[0], exact(ncorner, p), 1e-14, text);
@@ -81,33 +57,27 @@ static PetscErrorCode check_monomial(Fixture *x, PetscInt ncorner, PetscInt n, c
   } else {
     SB_CHECK(PetscAbsReal(sum[0] - exact(ncorner, p)) > 1e-10, "%s is beyond the rule, yet exact", text);
   }
-  PetscCall(SbDeadLoadDestroy(&load));
-  for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&q[i]));
+  PetscCall(SbEffectDestroy(&load));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_time(Fixture *x, PetscInt n, const PetscInt nodes[])
+static PetscErrorCode check_time(Fixture *x)
 {
-  SbFormula q[3];
-  SbDeadLoad load;
+  SbEffect load;
   PetscReal sum[4];
 
   PetscFunctionBeginUser;
-  PetscCall(SbFormulaCreate(PETSC_COMM_SELF, "3*t*x", "test", &q[0]));
-  PetscCall(SbFormulaCreate(PETSC_COMM_SELF, "0", "test", &q[1]));
-  PetscCall(SbFormulaCreate(PETSC_COMM_SELF, "0", "test", &q[2]));
-  PetscCall(SbDeadLoadCreate(x->space, 4, n, nodes, q, &load));
+  PetscCall(effect_create(x, "body_force", "-effect_body_force_density 3*t*x;0;0 -effect_body_force_time 0.5",
+                          &load));
   for (int k = 0; k < 4; k++) {
     const PetscReal t = k < 2 ? 2.0 : (PetscReal)k - 3; // twice the same time, then back to earlier ones
 
-    PetscCall(moments(x, load, t, 0.5, sum));
+    PetscCall(moments(x, load, t, sum));
     SB_CHECK_NEAR(sum[0], 0.5 * 3 * t * 0.5, 1e-14, "force that grows with time");
     SB_CHECK_NEAR(sum[1], 0.5 * 3 * t / 3, 1e-14, "its moment");
   }
-  PetscCall(SbDeadLoadDestroy(&load));
-  SB_CHECK(!load, "destroy sets NULL");
-  PetscCall(SbDeadLoadDestroy(&load));
-  for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&q[i]));
+  PetscCall(SbEffectDestroy(&load));
+  PetscCall(PetscOptionsClearValue(NULL, "-effect_body_force_time"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -120,18 +90,14 @@ static PetscErrorCode check_element(const char *element)
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, sets, &x));
   for (PetscInt ncorner = 3; ncorner <= 4; ncorner++) {
     const int beyond[2][3] = {{6, 0, 0}, {0, 6, 0}};
-    PetscInt n, *nodes;
 
-    PetscCall(get_corners(&x, ncorner, &n, &nodes));
     for (int i = 0; i <= 4; i++) {
       for (int j = 0; i + j <= 4; j++) {
-        for (int k = 0; i + j + k <= 4; k++)
-          PetscCall(check_monomial(&x, ncorner, n, nodes, (const int[3]){i, j, k}));
+        for (int k = 0; i + j + k <= 4; k++) PetscCall(check_monomial(&x, ncorner, (const int[3]){i, j, k}));
       }
     }
-    for (int i = 0; i < 2; i++) PetscCall(check_monomial(&x, ncorner, n, nodes, beyond[i]));
-    if (ncorner == 4) PetscCall(check_time(&x, n, nodes));
-    PetscCall(PetscFree(nodes));
+    for (int i = 0; i < 2; i++) PetscCall(check_monomial(&x, ncorner, beyond[i]));
+    if (ncorner == 4) PetscCall(check_time(&x));
   }
   PetscCall(fixture_destroy(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
