@@ -1,9 +1,10 @@
 /*
-  sbbarrier.h - layer 5: barrier contact of surfaces. Vertices, edges and triangles of bodies and of an obstacle, contact pairs, continuous collision detection, the
-  barrier potential.
+  sbbarrier.h - layer 5: barrier contact of surfaces. Vertices, edges and triangles of bodies and of an
+  obstacle, contact pairs, continuous collision detection, the barrier potential.
 
-  Every rank holds the whole surface; a vertex of a body is a weighted mean of nodes, for every element. A rank
-  evaluates every pair that has one of its own nodes: forces on them are complete without communication, and summed in an order that no partition changes.
+  Every rank holds the whole surface; a vertex of a body is a weighted mean of nodes, for every element. A
+  rank evaluates every pair that has one of its own nodes: forces on them are complete without communication,
+  and summed in an order that no partition changes.
 */
 #pragma once
 #include "sbcontact.h"
@@ -15,12 +16,11 @@ struct _p_SbContactMesh {
   SbSpace space;                  /* borrowed */
   PetscInt nvertex, nbody_vertex; /* those of bodies come first, then those of the obstacle */
   PetscInt ntriangle, nbody_triangle, nedge;
-  PetscInt *start,
-    *gnode;          /* [nbody_vertex+1], [start[nbody_vertex]] nodes of a vertex, global numbers ascending */
-  PetscInt *node;    /* [start[nbody_vertex]] the same as local nodes, -1: not known here */
-  PetscReal *weight; /* [start[nbody_vertex]] */
-  uint8_t *
-    fixed; /* [start[nbody_vertex]] bit c: component c of the node is prescribed; SbContactMeshMarkDriven() */
+  PetscInt *start, *gnode; /* [nbody_vertex+1]; nodes of a vertex, [start[nbody_vertex]] as those below,
+                              global numbers ascending */
+  PetscInt *node;          /* the same as local nodes, -1: not known here */
+  PetscReal *weight;
+  uint8_t *fixed;     /* bit c: component c of the node is prescribed; SbContactMeshMarkDriven() */
   PetscInt *part;     /* [nvertex] body, nbody: the obstacle */
   PetscInt *id;       /* [nbody_vertex] number in the mesh that no partition changes */
   uint8_t *mine;      /* [nvertex] some node is owned here */
@@ -29,11 +29,11 @@ struct _p_SbContactMesh {
   PetscInt *triangle; /* [ntriangle][3] counter-clockwise seen from outside */
   PetscInt *edge;     /* [nedge][2] */
   PetscReal *X;       /* [nvertex][3] at rest, m; obstacle: its rest frame */
-  PetscReal *area, *edge_area; /* [nvertex], [nedge] a third of the triangles around, at rest, m^2 */
-  PetscReal radius;            /* of the obstacle's vertices and edges (sphere, capsule), m */
-  SbObstacleSide side;         /* half-space or bowl, whose vertices are described there */
-  PetscReal shortest;          /* shortest edge of the bodies at rest, m */
-  PetscReal size;              /* diagonal of the smallest body, m */
+  PetscReal *area, *edge_area;   /* [nvertex], [nedge] a third of the triangles around, at rest, m^2 */
+  PetscReal radius;              /* of the obstacle's vertices and edges (sphere, capsule), m */
+  SbObstacleSide side;           /* half-space or bowl, whose vertices are described there */
+  PetscReal shortest, mean_edge; /* shortest and mean edge of the bodies at rest, m */
+  PetscReal size;                /* diagonal of the smallest body, m */
   /* of SbContactMeshGetPositions() */
   PetscInt nlocal, *local;    /* own vertices of bodies */
   PetscMPIInt *count, *first; /* [ranks] */
@@ -41,26 +41,36 @@ struct _p_SbContactMesh {
   PetscReal *buffer;          /* [2][nbody_vertex][3] */
 };
 
-/*
-  SbContactMeshCreate - the surface of the facets of SbEffectFacets() and of an obstacle (NULL: none), which is set up.
-
-  Collective; the caller destroys it. Call SbContactMeshMarkDriven() once all effects are set up, to mark prescribed unknowns.
-*/
+/* The surface of the facets of SbEffectFacets() and of an obstacle that is set up (NULL: none). MarkDriven,
+   once all effects are set up: marks prescribed unknowns. Collective. */
 PetscErrorCode SbContactMeshCreate(SbSpace space, PetscInt n, const SbFacet facet[], SbObstacle obstacle,
                                    SbContactMesh *mesh);
 PetscErrorCode SbContactMeshDestroy(SbContactMesh *mesh);
 PetscErrorCode SbContactMeshMarkDriven(SbContactMesh mesh);
-/* x[nvertex][3] of vertices from local displacements u (ghosts up to date) and the obstacle's pose (NULL without one), m. Collective. */
-PetscErrorCode SbContactMeshGetPositions(SbContactMesh mesh, const PetscReal u[], const SbPose *pose,
-                                         PetscReal x[]);
+/* x[nvertex][3] of the bodies' vertices from local displacements u (ghosts up to date), m. Collective. */
+PetscErrorCode SbContactMeshGetPositions(SbContactMesh mesh, const PetscReal u[], PetscReal x[]);
+/* Outward normals of all vertices at x, of twice the area of the triangles around, m^2. Not collective. */
+void SbContactMeshNormals(SbContactMesh mesh, const PetscReal x[], PetscReal normal[]);
 
 /* Two features: vertex 0 and triangle 1 to 3; edges 0 1 and 2 3; or vertex 0 and the side of the obstacle. */
 typedef struct {
   PetscBool side;
-  SbPairKind kind; /* SB_PAIR_VERTEX_TRIANGLE or SB_PAIR_EDGE_EDGE */
+  SbPairKind kind; /* SB_PAIR_VERTEX_TRIANGLE or SB_PAIR_EDGE_EDGE; with a side SB_PAIR_VERTEX_VERTEX */
   PetscInt v[4];   /* vertices of the mesh */
   PetscReal area;  /* m^2 */
 } SbContactPair;
+
+/* Number of vertices on the first side. */
+static inline int SbContactPairSplit(const SbContactPair *pair)
+{
+  return pair->kind == SB_PAIR_EDGE_EDGE ? 2 : 1;
+}
+
+/* Radius of the obstacle if it is one of the sides, m. */
+static inline PetscReal SbContactPairRadius(SbContactMesh mesh, const SbContactPair *pair)
+{
+  return PetscMax(pair->v[0], pair->v[SbContactPairSplit(pair)]) >= mesh->nbody_vertex ? mesh->radius : 0.;
+}
 
 /* Search and its results; x0 and x1 below are arrays of SbContactMeshGetPositions(). */
 typedef struct _p_SbContactPairs *SbContactPairs;
@@ -73,8 +83,7 @@ struct _p_SbContactPairs {
   PetscReal *shorter; /* [nvertex][3] end of a motion that was halved */
   struct SbContactFeatures *features; /* [6] vertices, triangles and edges, each of this rank and of others */
   PetscBool known;
-  const uint8_t *
-    near; /* [nvertex] SbContactOverlap.near, borrowed; pairs of such features are excluded; NULL: none are */
+  const uint8_t *near; /* [nvertex] SbContactOverlap.near, borrowed: excludes such pairs; NULL: none */
   PetscInt n, size;
   SbContactPair *pair; /* [n] all that have nodes of this rank, in no order */
   PetscInt nsearch;
@@ -82,21 +91,20 @@ struct _p_SbContactPairs {
 PetscErrorCode SbContactPairsCreate(SbContactMesh mesh, PetscBool self, PetscBool others, PetscReal reach,
                                     SbContactPairs *pairs);
 PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs);
-/* Excludes pairs of an overlap from now on, by near[nvertex] = SbContactOverlap.near (borrowed); NULL: none. Not collective. */
-PetscErrorCode SbContactPairsIgnore(SbContactPairs pairs, const uint8_t near[]);
+/* Excludes pairs of an overlap, by SbContactOverlap.near (borrowed, NULL: none). Not collective. */
+void SbContactPairsIgnore(SbContactPairs pairs, const uint8_t near[]);
 /* All pairs that come within the reach on the linear motion from x0 to x1, and some more. Not collective. */
 PetscErrorCode SbContactPairsFind(SbContactPairs pairs, const PetscReal x0[], const PetscReal x1[]);
-/* The gap, m: the distance less the radius of a rounded obstacle; closest points and direction in `distance`. Not collective. */
+/* The gap, m: the distance less the radius; closest points and direction in `distance`. Not collective. */
 PetscReal SbContactPairGap(SbContactMesh mesh, const SbContactPair *pair, const PetscReal x[],
                            SbDistance *distance);
-/* Whether the boxes of both features swept from x0 to x1 are farther apart than `distance`, m; false for a half-space or bowl. */
+/* Whether the boxes of both features swept from x0 to x1 are farther apart than `distance`, m. */
 static inline PetscBool SbContactPairSweptApart(SbContactMesh mesh, const SbContactPair *pair,
                                                 const PetscReal x0[], const PetscReal x1[],
                                                 PetscReal distance)
 {
-  const int split = pair->kind == SB_PAIR_EDGE_EDGE ? 2 : 1;
-  const PetscReal reach =
-    distance + (pair->v[0] >= mesh->nbody_vertex || pair->v[2] >= mesh->nbody_vertex ? mesh->radius : 0.);
+  const int split = SbContactPairSplit(pair);
+  const PetscReal reach = distance + SbContactPairRadius(mesh, pair);
 
   for (int k = 0; k < 3 && !pair->side; k++) {
     PetscReal low[2] = {PETSC_MAX_REAL, PETSC_MAX_REAL}, high[2] = {PETSC_MIN_REAL, PETSC_MIN_REAL};
@@ -112,14 +120,15 @@ static inline PetscBool SbContactPairSweptApart(SbContactMesh mesh, const SbCont
   }
   return PETSC_FALSE;
 }
-/* Largest collision-free fraction, 0..1, of the motion from x0 to x1, over the pairs of this rank, by continuous collision detection; each pair keeps a tenth of its gap. Not collective. */
+/* Largest collision-free fraction, 0..1, of the motion from x0 to x1, for this rank's pairs; each keeps a
+   tenth of its gap. Not collective. */
 PetscErrorCode SbContactPairsMaxStep(SbContactPairs pairs, const PetscReal x0[], const PetscReal x1[],
-                                     PetscReal *part, PetscInt *worst);
-/* A penetrating vertex, or the midpoint of the penetrating part of an edge: `normal` is the separation direction, `depth` the penetration. */
+                                     PetscReal *part);
+/* A penetrating vertex, or the midpoint of the penetrating part of an edge. */
 typedef struct {
   PetscInt n, v[5];
   PetscReal weight[5]; /* sum 0, n . sum weight x = -depth; for a round obstacle less its radius */
-  PetscReal normal[3], depth, area;
+  PetscReal normal[3], depth, area; /* separation direction; m, m^2 */
 } SbPenetration;
 /* Of a vertex: adjacent to intersected ones; its edges or triangles intersect a surface; it is inside one. */
 enum { SB_OVERLAP_ADJACENT = 1, SB_OVERLAP_INTERSECTED, SB_OVERLAP_INSIDE };
@@ -132,24 +141,23 @@ typedef struct {
   SbPenetration *point; /* [n] with a separation direction */
   uint8_t *near;        /* [nvertex] SB_OVERLAP_ADJACENT, _INTERSECTED, _INSIDE or 0 */
 } SbContactOverlap;
-/* Penetration at x; `inside`: there is some, even if no edge intersects a triangle. Collective; release with SbContactOverlapFree(). */
+/* Penetration at x; `inside`: there is some, even if no edge intersects a triangle. Collective. */
 PetscErrorCode SbContactOverlapFind(SbContactMesh mesh, PetscBool self, const PetscReal x[], PetscBool inside,
                                     SbContactOverlap *overlap);
 PetscErrorCode SbContactOverlapFree(SbContactOverlap *overlap);
-/*
-  SbContactMeshIsInside - whether one body is wholly inside another, so that no edge intersects a triangle: the centroid of a tet of body[0] is within the surface of body[1] at x.
-
-  Collective. It takes every triangle for every body: for the start of a run.
-*/
+/* Whether one body is wholly inside another, so that no edge intersects a triangle: the centroid of a tet of
+   body[0] is within the surface of body[1] at x. Slow: for the start of a run. Collective. */
 PetscErrorCode SbContactMeshIsInside(SbContactMesh mesh, const PetscReal x[], PetscInt body[2],
                                      PetscBool *found);
 
-/* Energy of a gap d, J, and its first two derivatives by d: barrier of the width w (m), pressure k (Pa) and area (m^2); 0 from w on, infinite at 0. */
+/* Energy of a gap d, J, and its first two derivatives: barrier of the width w (m), pressure k (Pa) and area
+   (m^2); 0 from w on, infinite at 0. */
 void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal b[3]);
 /*
-  SbBarrierPair - energy, gradient and Hessian of the barrier of a pair at x, by the motion of its four vertices. Edges that are nearly parallel count less.
+  SbBarrierPair - energy, gradient and Hessian of a pair at x; edges that are nearly parallel count less.
 
-  Not collective. Input: gap > 0 and distance of SbContactPairGap(). Output: energy, J; gradient[12], N; H[12][12], row-major, with `clamp` its positive part, N/m (NULL: not wanted).
+  Not collective. Input: gap > 0 and distance of SbContactPairGap(). Output: energy, J; gradient[12], N;
+  H[12][12], row-major, with `clamp` its positive part, N/m (NULL: not wanted).
 */
 void SbBarrierPair(SbContactMesh mesh, const SbContactPair *pair, PetscReal gap, const SbDistance *distance,
                    const PetscReal x[], PetscReal width, PetscReal pressure, PetscReal *energy,
@@ -157,15 +165,19 @@ void SbBarrierPair(SbContactMesh mesh, const SbContactPair *pair, PetscReal gap,
 
 /* Second derivatives by the motion of pairs of surface vertices, a symmetric matrix; start with {0}. */
 typedef struct {
+  PetscInt v[2];  /* the lower number first */
+  PetscReal H[9]; /* row-major, N/m */
+} SbContactBlock;
+typedef struct {
   PetscInt n, size;
-  PetscInt (*v)[2];      /* [n] vertices, the lower number first */
-  PetscReal (*block)[9]; /* [n] row-major, N/m */
+  SbContactBlock *block; /* [n] */
   PetscInt nslot, *slot; /* [nslot] hash table of block numbers, -1: free; nslot: a power of two */
 } SbContactBlocks;
 PetscErrorCode SbContactBlocksClear(SbContactBlocks *blocks);
 PetscErrorCode SbContactBlocksFree(SbContactBlocks *blocks);
-/* Adds the 3x3 block of vertices v and w of bodies, whose rows are `ld` numbers apart, and its transpose for w and v. */
+/* Adds the 3x3 block of bodies' vertices v and w, rows `ld` numbers apart, and its transpose for w and v. */
 PetscErrorCode SbContactBlocksAdd(SbContactBlocks *blocks, PetscInt v, PetscInt w, const PetscReal H[],
                                   PetscInt ld);
-/* Adds the blocks to `nodes`: rows of own nodes, columns of all nodes of the vertices, zero at prescribed components, each pair of nodes once. Not collective. */
+/* Adds the blocks to `nodes`: rows of own nodes, columns of all nodes of the vertices, zero at prescribed
+   components, each pair of nodes once. Not collective. */
 PetscErrorCode SbContactBlocksToNodes(SbContactMesh mesh, const SbContactBlocks *blocks, SbBlocks *nodes);

@@ -22,7 +22,7 @@ PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle
 PetscErrorCode SbObstacleDestroy(SbObstacle *obstacle);
 PetscBool SbObstacleIsMesh(SbObstacle obstacle);
 /*
-  SbObstacleSetUp - reads the file of a mesh: obstacle; nothing with other shapes. Before SbObstacleDistance().
+  SbObstacleSetUp - reads the file of a mesh: obstacle, before SbObstacleDistance(); no other shape needs it.
 
   Collective. Every rank holds the whole obstacle.
 
@@ -32,20 +32,19 @@ PetscBool SbObstacleIsMesh(SbObstacle obstacle);
 */
 PetscErrorCode SbObstacleSetUp(SbObstacle obstacle, MPI_Comm comm, const char *option, PetscReal scale,
                                const PetscReal at[3], size_t size, char note[]);
-/*
-  SbObstacleDistance - signed distance of a point from the obstacle at rest, m, negative inside, and the unit outward normal
-  at the nearest point of its surface. Where the nearest point is not unique (centre of a sphere), one of them. Not
-  collective.
-*/
+/* Signed distance of a point from the obstacle at rest, m, negative inside, and the unit outward normal at
+   the nearest point of its surface, or one of several (centre of a sphere). Not collective. */
 PetscReal SbObstacleDistance(SbObstacle obstacle, const PetscReal x[3], PetscReal normal[3]);
 
-/* Obstacles that only vertices can touch: a half-space, stored as a point of its surface and the tip of the unit normal there; a bowl, as its centre. */
+/* Obstacles that only vertices can touch: a half-space, stored as a point of its surface and the tip of the
+   unit normal there; a bowl, as its centre. */
 typedef enum { SB_SIDE_NONE, SB_SIDE_PLANE, SB_SIDE_BOWL } SbObstacleSide;
 /* A rigid motion: x = c + R (X - c) + d; R turns by an angle (rad) about the unit axis. */
 typedef struct {
   PetscReal R[9], c[3], d[3], axis[3], angle;
 } SbPose;
-/* Tangent of the arc from pose `from` to pose `to` at the end `at`, for the point x there: way = d1 - d0 + (angle1 - angle0) axis x (x - c - d), m. Not collective. */
+/* Tangent of the arc from pose `from` to pose `to` at the end `at`, for the point x there: way = d1 - d0 +
+   (angle1 - angle0) axis x (x - c - d), m. Not collective. */
 void SbPoseWay(const SbPose *from, const SbPose *to, const SbPose *at, const PetscReal x[3],
                PetscReal way[3]);
 /* Rotation by an angle (rad) about the unit axis through c, then the translation d. */

@@ -1,14 +1,17 @@
 /*
   barrier.c - the barrier potential of a contact pair and its derivatives.
 
-  The energy of a gap d below the width w, s = d / w, per area (Li et al., "Incremental potential contact", ACM TOG 39(4), 2020, in the physical form
-  of ipc-toolkit):
+  The energy of a gap d below the width w, s = d / w, per area (Li et al., "Incremental potential contact",
+  ACM TOG 39(4), 2020, in the physical form of ipc-toolkit):
 
-    b = -k w (s - 1)^2 ln s,   b' = k (-2 (s - 1) ln s - (s - 1)^2 / s),   b'' = k/w (-2 ln s - 2 (s - 1)/s - (s^2 - 1)/s^2)
+    b = -k w (s - 1)^2 ln s,   b' = k (-2 (s - 1) ln s - (s - 1)^2 / s),
+    b'' = k/w (-2 ln s - 2 (s - 1)/s - (s^2 - 1)/s^2)
 
-  Nearly parallel edges a, b: the closest points are discontinuous. The energy of an edge pair is multiplied by (2 - y) y, y = c/e, c = |a x b|^2, where c < e (the same article, section 5);
-  vertex-triangle pairs supply the rest. There e = 1e-3 |a|^2 |b|^2 at rest; here also e <= 2 |a| |b| ((d + r)^2 - r^2), with the radius r of an obstacle: crossing edges have their ends
-  farther apart than the gap d, so vertex-triangle pairs are inactive; without this bound gaps fell to 1e-9 m, where Newton steps become tiny (docs/reports/contact.md).
+  Nearly parallel edges a, b: the closest points are discontinuous. The energy of an edge pair is multiplied
+  by (2 - y) y, y = c/e, c = |a x b|^2, where c < e (the same article, section 5); vertex-triangle pairs
+  supply the rest. There e = 1e-3 |a|^2 |b|^2 at rest; here also e <= 2 |a| |b| ((d + r)^2 - r^2), with the
+  radius r of an obstacle: crossing edges have their ends farther apart than the gap d, so vertex-triangle
+  pairs are inactive; without it gaps fell to 1e-9 m, with tiny Newton steps (docs/reports/contact.md).
 */
 #include "sbbarrier.h"
 
@@ -31,7 +34,8 @@ void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal 
 }
 
 /*
-  The factor p on the energy of edges with c, d, r as above and rest = |a|^2 |b|^2, and its derivatives: f = (p, p_d, p_c, p_dd, p_dc, p_cc). Unchanged where p = 1.
+  The factor p on the energy of edges with c, d, r as above and rest = |a|^2 |b|^2, and its derivatives: f =
+  (p, p_d, p_c, p_dd, p_dc, p_cc). Unchanged where p = 1.
 */
 static void mollify(PetscReal c, PetscReal rest, PetscReal d, PetscReal r, PetscReal f[6])
 {
@@ -89,7 +93,7 @@ void SbBarrierPair(SbContactMesh m, const SbContactPair *pair, PetscReal gap, co
   }
   *energy = f[0] * b[0];
 
-  /* second derivative of the energy E(d, c): E_dd dd dd + E_d d2d + E_cc dc dc + E_c d2c + E_dc (dd dc + dc dd), or its positive part */
+  /* E_dd dd dd + E_d d2d + E_cc dc dc + E_c d2c + E_dc (dd dc + dc dd) of E(d, c), or its positive part */
   if (H) {
     const PetscReal factor[2] = {f[0] * b[2] + 2. * f[1] * b[1] + f[3] * b[0], f[0] * b[1] + f[1] * b[0]};
 

@@ -1,19 +1,21 @@
 /*
-  contact_mesh.c - the surfaces of bodies and of an obstacle as vertices, edges and triangles, replicated on every rank.
+  contact_mesh.c - the surfaces of bodies and of an obstacle as vertices, edges and triangles, on every rank.
 
-  A vertex of a body moves by a weighted mean of nodes: with P1 its own node; with CR and DG, whose displacement is discontinuous, the mean over the cells
-  behind the facets around it, so that the surface is closed and linear fields are reproduced. A facet of P2 is four flat triangles over its six nodes: its corners and
-  the middles of its sides are vertices. The rank that owns the vertex in the
-  mesh knows all facets around it (the overlap), makes its list of nodes and moves it; positions are gathered by all ranks, 24 bytes per
-  vertex of the surface. Numbers follow the original ones of the mesh: nothing below depends on the partition.
+  A vertex of a body moves by a weighted mean of nodes: with P1 its own node; with CR and DG, whose
+  displacement is discontinuous, the mean over the cells behind the facets around it, so that the surface is
+  closed and linear fields are reproduced. A facet of P2 is four flat triangles over its six nodes: its
+  corners and the middles of its sides are vertices. The rank that owns the vertex in the mesh knows all
+  facets around it (the overlap), makes its list of nodes and moves it; positions are gathered by all ranks,
+  24 bytes per vertex of the surface. Numbers follow the original ones: nothing depends on the partition.
 
-  The obstacle: a sphere is a vertex, a capsule an edge, with a radius. Box, cylinder and mesh are triangles. A half-space and a bowl touch
-  vertices only; they are stored as two vertices, a point and the tip of the normal there, or as one, the centre.
+  The obstacle: a sphere is a vertex, a capsule an edge, with a radius. Box, cylinder and mesh are triangles.
+  A half-space and a bowl touch vertices only; they are stored as two vertices, a point and the tip of the
+  normal there, or as one, the centre.
 */
 #include "contact_mesh.h"
 #include "obstacle.h"
 
-/* Points of a facet: its three corners; with P2 the middles of its sides too, 3 + k between the corners k and k + 1. */
+/* Points of a facet: its three corners; with P2 the middles of its sides too, 3 + k behind corner k. */
 static inline PetscInt npoint_of(SbSpace s, const SbFacet *f)
 {
   return s->edge_node && s->edge_node[6 * f->cell] >= 0 ? 6 : 3;
@@ -40,14 +42,14 @@ static PetscInt own_point(SbSpace s, const SbFacet *f, PetscInt k)
   return node < s->nnode_owned ? s->mesh->nvert_owned + node : -1;
 }
 
-/* Nodes and weights of the own vertices, ascending; records of 3 + 2 count numbers: id, part, count, nodes, and weights apart. */
-static PetscErrorCode list_own(SbContactMesh m, PetscInt n, const SbFacet facet[], PetscInt *nnumber,
-                               PetscInt **number, PetscInt *nreal, PetscReal **real)
+/* Records of own vertices, of 7 + 2 count numbers: id, part, count, place, area, then nodes with weights. */
+static PetscErrorCode list_own(SbContactMesh m, PetscInt n, const SbFacet facet[], PetscInt *size,
+                               PetscReal **records)
 {
   const SbSpace s = m->space;
   const SbMesh mesh = s->mesh;
   const PetscInt npoint = mesh->nvert_owned + (s->edge_node ? s->nnode_owned : 0);
-  PetscInt *key, *start, *ring, nown = 0, *id, *at, size = 0;
+  PetscInt *key, *start, *ring, room = 0;
 
   PetscFunctionBeginUser;
   /* facets around each own point: number 6 facet + point */
@@ -56,81 +58,71 @@ static PetscErrorCode list_own(SbContactMesh m, PetscInt n, const SbFacet facet[
   PetscCall(SbBucketByKey(6 * n, key, npoint, &start, &ring));
   PetscCall(PetscFree(key));
 
-  /* in the order of their numbers */
-  PetscCall(PetscMalloc2(npoint, &id, npoint, &at));
+  *size = 0;
+  *records = NULL;
   for (PetscInt p = 0; p < npoint; p++) {
-    if (start[p] == start[p + 1]) continue;
-    id[nown] = p < mesh->nvert_owned ? mesh->vert_orig[p] : s->node_orig[p - mesh->nvert_owned];
-    at[nown++] = p;
-    size += 4 + 4 * (start[p + 1] - start[p]);
-  }
-  PetscCall(PetscSortIntWithArray(nown, id, at));
-  m->nlocal = nown;
-  PetscCall(PetscMalloc1(size, number));
-  PetscCall(PetscMalloc1(size, real));
-  *nnumber = *nreal = 0;
-  for (PetscInt k = 0; k < nown; k++) {
-    const PetscInt p = at[k], middle = p - mesh->nvert_owned, first = start[p], last = start[p + 1];
+    const PetscInt middle = p - mesh->nvert_owned, first = start[p], last = start[p + 1];
     const PetscReal *X = middle < 0 ? mesh->x + 3 * p : s->node_x + 3 * middle;
-    PetscInt *record = *number + *nnumber, *node = record + 3, nnode = 0;
-    PetscReal *weight = *real + *nreal, area = 0.;
+    PetscReal *record, *entry;
+    PetscInt nnode = 0;
 
-    record[0] = id[k];
-    record[1] = middle < 0 ? mesh->vert_body[p] : s->node_body[middle];
+    if (first == last) continue;
+    m->nlocal++;
+    PetscCall(SbReserve(*size + 7 + 8 * (last - first), sizeof(**records), &room, records));
+    record = *records + *size;
+    entry = record + 7;
+    record[0] = (PetscReal)(middle < 0 ? mesh->vert_orig[p] : s->node_orig[middle]);
+    record[1] = (PetscReal)(middle < 0 ? mesh->vert_body[p] : s->node_body[middle]);
+    for (int i = 0; i < 3; i++) record[3 + i] = X[i];
+    record[6] = 0.;
     for (PetscInt i = first; i < last; i++) {
       const SbFacet *f = &facet[ring[i] / 6];
       const PetscReal *w;
 
       /* a third of each triangle around: a facet is one, with P2 four */
-      area += f->area / (npoint_of(s, f) == 3 ? 3. : middle < 0 ? 12. : 4.);
+      record[6] += f->area / (npoint_of(s, f) == 3 ? 3. : middle < 0 ? 12. : 4.);
       if (middle >= 0) continue;
       w = SbSpaceCellElement(s, f->cell)->ops.vertex[f->corner[ring[i] % 6]];
       for (int a = 0; a < 4; a++) {
-        const PetscInt g = s->gnode[s->cell_node[4 * f->cell + a]];
+        const PetscReal g = (PetscReal)s->gnode[s->cell_node[4 * f->cell + a]];
         PetscInt j = 0;
 
         if (w[a] == 0.) continue;
-        while (j < nnode && node[j] != g) j++;
+        while (j < nnode && entry[2 * j] != g) j++;
         if (j == nnode) {
-          node[nnode] = g;
-          weight[4 + nnode++] = 0.;
+          entry[2 * nnode] = g;
+          entry[2 * nnode++ + 1] = 0.;
         }
-        weight[4 + j] += w[a] / (PetscReal)(last - first);
+        entry[2 * j + 1] += w[a] / (PetscReal)(last - first);
       }
     }
     if (middle >= 0) {
-      node[nnode] = s->gnode[middle];
-      weight[4 + nnode++] = 1.;
+      entry[0] = (PetscReal)s->gnode[middle];
+      entry[1] = 1.;
+      nnode = 1;
     }
-    record[2] = nnode;
-    PetscCall(PetscSortIntWithScalarArray(nnode, node, weight + 4));
-    for (int i = 0; i < 3; i++) weight[i] = X[i];
-    weight[3] = area;
-    *nnumber += 3 + nnode;
-    *nreal += 4 + nnode;
+    record[2] = (PetscReal)nnode;
+    *size += 7 + 2 * nnode;
   }
-  PetscCall(PetscFree2(id, at));
   PetscCall(PetscFree(ring));
   PetscCall(PetscFree(start));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Puts the vertices of all ranks in the order of their numbers; behind them there is room for `nobstacle` of the obstacle. */
+/* The vertices of all ranks in the order of their numbers, and room for `nobstacle` of the obstacle. */
 static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet facet[], PetscInt nobstacle)
 {
   const SbSpace s = m->space;
-  PetscInt nnumber = 0, nreal = 0, *number, *all, Nnumber, Nreal, nv = 0, *id, *arrival;
-  PetscReal *real, *values;
+  PetscInt nown = 0, nall, nv = 0, *id, *arrival;
+  PetscReal *own, *all;
   PetscMPIInt ranks, rank, nlocal;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(s->comm, &ranks));
   PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
-  PetscCall(list_own(m, n, facet, &nnumber, &number, &nreal, &real));
-  PetscCall(SbAllgatherv(s->comm, MPIU_INT, nnumber, number, &Nnumber, &all, NULL));
-  PetscCall(SbAllgatherv(s->comm, MPIU_REAL, nreal, real, &Nreal, &values, NULL));
-  PetscCall(PetscFree(number));
-  PetscCall(PetscFree(real));
+  PetscCall(list_own(m, n, facet, &nown, &own));
+  PetscCall(SbAllgatherv(s->comm, MPIU_REAL, nown, own, &nall, &all, NULL));
+  PetscCall(PetscFree(own));
 
   /* how many vertices each rank moves */
   PetscCall(PetscMPIIntCast(3 * m->nlocal, &nlocal));
@@ -140,12 +132,12 @@ static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet f
   for (PetscMPIInt r = 1; r < ranks; r++) m->first[r] = m->first[r - 1] + m->count[r - 1];
 
   /* the order of numbers: vertex order[k] arrives as number k */
-  for (PetscInt i = 0; i < Nnumber; i += 3 + all[i + 2]) nv++;
+  for (PetscInt i = 0; i < nall; i += 7 + 2 * (PetscInt)all[i + 2]) nv++;
   m->nbody_vertex = nv;
   m->nvertex = nv + nobstacle;
   PetscCall(PetscMalloc2(nv, &id, nv, &arrival));
-  for (PetscInt i = 0, k = 0; i < Nnumber; i += 3 + all[i + 2], k++) {
-    id[k] = all[i];
+  for (PetscInt i = 0, k = 0; i < nall; i += 7 + 2 * (PetscInt)all[i + 2], k++) {
+    id[k] = (PetscInt)all[i];
     arrival[k] = k;
   }
   PetscCall(PetscSortIntWithArray(nv, id, arrival));
@@ -155,27 +147,30 @@ static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet f
 
   /* their records in that order */
   PetscCall(PetscCalloc1(nv + 1, &m->start));
-  for (PetscInt i = 0, k = 0; i < Nnumber; i += 3 + all[i + 2], k++) m->start[m->order[k] + 1] = all[i + 2];
+  for (PetscInt i = 0, k = 0; i < nall; i += 7 + 2 * (PetscInt)all[i + 2], k++)
+    m->start[m->order[k] + 1] = (PetscInt)all[i + 2];
   for (PetscInt v = 0; v < nv; v++) m->start[v + 1] += m->start[v];
   PetscCall(PetscMalloc4(m->start[nv], &m->gnode, m->start[nv], &m->node, m->start[nv], &m->weight,
                          m->start[nv], &m->fixed));
   PetscCall(PetscMalloc4(m->nvertex, &m->part, nv, &m->id, 3 * m->nvertex, &m->X, m->nvertex, &m->area));
   PetscCall(PetscCalloc3(m->nvertex, &m->mine, m->nvertex, &m->own, m->nvertex, &m->driven));
-  for (PetscInt i = 0, j = 0, k = 0; i < Nnumber; i += 3 + all[i + 2], k++) {
-    const PetscInt v = m->order[k], count = all[i + 2];
+  for (PetscInt i = 0, k = 0; i < nall; i += 7 + 2 * (PetscInt)all[i + 2], k++) {
+    const PetscInt v = m->order[k], start = m->start[v], count = m->start[v + 1] - start;
 
-    m->id[v] = all[i];
-    m->part[v] = all[i + 1];
-    PetscCall(PetscArraycpy(m->gnode + m->start[v], all + i + 3, count));
-    PetscCall(PetscArraycpy(m->X + 3 * v, values + j, 3));
-    m->area[v] = values[j + 3];
-    PetscCall(PetscArraycpy(m->weight + m->start[v], values + j + 4, count));
-    j += 4 + count;
-    for (PetscInt e = m->start[v]; e < m->start[v + 1]; e++) {
-      const PetscInt own = m->gnode[e] - s->gnode_start;
+    m->id[v] = (PetscInt)all[i];
+    m->part[v] = (PetscInt)all[i + 1];
+    PetscCall(PetscArraycpy(m->X + 3 * v, all + i + 3, 3));
+    m->area[v] = all[i + 6];
+    for (PetscInt e = 0; e < count; e++) {
+      m->gnode[start + e] = (PetscInt)all[i + 7 + 2 * e];
+      m->weight[start + e] = all[i + 8 + 2 * e];
+    }
+    PetscCall(PetscSortIntWithScalarArray(count, m->gnode + start, m->weight + start));
+    for (PetscInt e = start; e < start + count; e++) {
+      const PetscInt node = m->gnode[e] - s->gnode_start;
 
-      if (own >= 0 && own < s->nnode_owned) {
-        m->node[e] = own;
+      if (node >= 0 && node < s->nnode_owned) {
+        m->node[e] = node;
         m->mine[v] = 1;
         continue;
       }
@@ -184,7 +179,6 @@ static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet f
     }
   }
   PetscCall(PetscFree(all));
-  PetscCall(PetscFree(values));
   PetscCall(PetscMalloc2(m->nlocal, &m->local, 6 * nv, &m->buffer));
   for (PetscInt k = 0; k < m->nlocal; k++) {
     m->local[k] = m->order[m->first[rank] / 3 + k];
@@ -194,8 +188,8 @@ static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet f
 }
 
 /*
-  The triangles of all ranks, in the order of numbers that no partition changes: a facet is one, with P2 four. Corners go by the number of the vertex, or, in the middle of a
-  side, by that of its node.
+  The triangles of all ranks, in the order of numbers that no partition changes: a facet is one, with P2 four.
+  Corners go by the number of the vertex, or, in the middle of a side, by that of its node.
 */
 static PetscErrorCode make_triangles(SbContactMesh m, PetscInt n, const SbFacet facet[], PetscInt nobstacle)
 {
@@ -249,7 +243,8 @@ static PetscErrorCode make_triangles(SbContactMesh m, PetscInt n, const SbFacet 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The edges of all triangles, each once, its area a third of that of the triangles around; `lone`: the obstacle is an edge of its own. */
+/* The edges of all triangles, each once, its area a third of that of the triangles around; `lone`: the
+   obstacle is an edge of its own. */
 static PetscErrorCode make_edges(SbContactMesh m, PetscBool lone)
 {
   PetscInt(*side)[3];
@@ -291,6 +286,7 @@ PetscErrorCode SbContactMeshCreate(SbSpace s, PetscInt n, const SbFacet facet[],
 {
   SbObstacleSurface o = {0};
   SbContactMesh m;
+  PetscInt nbody_edge = 0;
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
@@ -300,7 +296,7 @@ PetscErrorCode SbContactMeshCreate(SbSpace s, PetscInt n, const SbFacet facet[],
   PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
 
   /* vertices and triangles of the bodies, then of the obstacle, which belong to rank 0 */
-  if (obstacle) PetscCall(SbObstacleGetSurface(obstacle, &o));
+  if (obstacle) o = SbObstacleGetSurface(obstacle);
   m->side = o.side;
   m->radius = o.radius;
   PetscCall(make_vertices(m, n, facet, o.nvertex));
@@ -314,17 +310,19 @@ PetscErrorCode SbContactMeshCreate(SbSpace s, PetscInt n, const SbFacet facet[],
     m->own[v] = (uint8_t)!rank;
     m->driven[v] = 1;
   }
-  PetscCall(SbObstacleFreeSurface(&o));
   PetscCall(make_edges(m, (PetscBool)(o.radius > 0. && o.nvertex == 2)));
 
-  /* shortest edge of the bodies, size of the smallest one */
+  /* shortest and mean edge of the bodies, size of the smallest one */
   m->shortest = PETSC_MAX_REAL;
-  for (PetscInt e = 0; e < m->nedge && m->edge[2 * e] < m->nbody_vertex; e++) {
+  for (; nbody_edge < m->nedge && m->edge[2 * nbody_edge] < m->nbody_vertex; nbody_edge++) {
+    const PetscInt *e = m->edge + 2 * nbody_edge;
     PetscReal r[3];
 
-    for (int i = 0; i < 3; i++) r[i] = m->X[3 * m->edge[2 * e] + i] - m->X[3 * m->edge[2 * e + 1] + i];
+    SbSubtract(m->X + 3 * e[0], m->X + 3 * e[1], r);
     m->shortest = PetscMin(m->shortest, PetscSqrtReal(SbDot3(r, r)));
+    m->mean_edge += PetscSqrtReal(SbDot3(r, r));
   }
+  m->mean_edge /= (PetscReal)PetscMax(1, nbody_edge);
   m->size = SbBodySmallest(s->mesh->nbody, s->mesh->body);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -347,14 +345,11 @@ PetscErrorCode SbContactMeshMarkDriven(SbContactMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactMeshGetPositions(SbContactMesh m, const PetscReal u[], const SbPose *pose,
-                                         PetscReal x[])
+PetscErrorCode SbContactMeshGetPositions(SbContactMesh m, const PetscReal u[], PetscReal x[])
 {
   PetscReal *mine = m->buffer, *all = m->buffer + 3 * m->nlocal;
-  PetscMPIInt ranks;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(m->space->comm, &ranks));
   for (PetscInt k = 0; k < m->nlocal; k++) {
     const PetscInt v = m->local[k];
 
@@ -363,15 +358,11 @@ PetscErrorCode SbContactMeshGetPositions(SbContactMesh m, const PetscReal u[], c
       for (int i = 0; i < 3; i++) mine[3 * k + i] += m->weight[e] * u[3 * m->node[e] + i];
     }
   }
-  if (ranks == 1)
-    all = mine;
-  else
-    PetscCallMPI(MPI_Allgatherv(mine, (PetscMPIInt)(3 * m->nlocal), MPIU_REAL, all, m->count, m->first,
-                                MPIU_REAL, m->space->comm));
+  PetscCallMPI(MPI_Allgatherv(mine, (PetscMPIInt)(3 * m->nlocal), MPIU_REAL, all, m->count, m->first,
+                              MPIU_REAL, m->space->comm));
   for (PetscInt k = 0; k < m->nbody_vertex; k++) {
     for (int i = 0; i < 3; i++) x[3 * m->order[k] + i] = all[3 * k + i];
   }
-  for (PetscInt v = m->nbody_vertex; v < m->nvertex && pose; v++) SbPoseApply(pose, m->X + 3 * v, x + 3 * v);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

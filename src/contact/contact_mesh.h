@@ -18,9 +18,11 @@ static inline PetscReal SbContactTriangleArea(const PetscReal x[], const PetscIn
 }
 
 /*
-  SbContactMeshCrossings - edges that intersect triangles of another body, or of the same one (self), at x[nvertex][3], current positions, m.
+  SbContactMeshCrossings - edges that intersect triangles of another body, or of the same one (self), at
+                           x[nvertex][3], current positions, m.
 
-  Collective. Output, of all ranks on each: hit[n][2], edge and triangle, ascending; the caller frees it. Independent of the pair search.
+  Collective. Output, of all ranks on each: hit[n][2], edge and triangle, ascending; the caller frees it.
+  Independent of the pair search.
 */
 PetscErrorCode SbContactMeshCrossings(SbContactMesh mesh, PetscBool self, const PetscReal x[], PetscInt *n,
                                       PetscInt **hit);

@@ -1,12 +1,15 @@
 /*
-  contact_pairs.c - pairs of features (vertex-triangle, edge-edge) that may come into contact, their gaps, and the collision-free part of a motion.
+  contact_pairs.c - pairs of features (vertex-triangle, edge-edge) that may come into contact, their gaps, and
+  the collision-free part of a motion.
 
-  Search. Each vertex has a box around its motion, grown by a margin; those of edges and triangles enclose the boxes of their vertices. Trees of
-  boxes, which are refitted, give all pairs of a vertex and a triangle, and of two edges, whose boxes are within the reach. They stay valid while every vertex stays in its box: iterations that move
-  little, as most do, need no search. A motion with too many pairs is halved: the next iteration continues it.
+  Search. Each vertex has a box around its motion, grown by a margin; those of edges and triangles enclose the
+  boxes of their vertices. Trees of boxes, which are refitted, give all pairs of a vertex and a triangle, and
+  of two edges, whose boxes are within the reach. They stay valid while every vertex stays in its box:
+  iterations that move little, as most do, need no search. A motion with too many pairs is halved.
 
-  Safe part of a motion. Additive continuous collision detection (Li, Kaufman and Jiang, "Codimensional incremental potential contact", ACM TOG 40(4), 2021,
-  section 5; src/geometry/ccd.c) leaves a tenth of each gap. A half-space and a bowl have roots of quadratic polynomials.
+  Safe part of a motion. Additive continuous collision detection (Li, Kaufman and Jiang, "Codimensional
+  incremental potential contact", ACM TOG 40(4), 2021, section 5; src/geometry/ccd.c) leaves a tenth of each
+  gap. A half-space and a bowl have roots of quadratic polynomials.
 */
 #include "sbbarrier.h"
 #include "sbgeometry.h"
@@ -21,11 +24,6 @@ static inline void places(const SbContactPair *pair, const PetscReal x[], PetscR
   for (int k = 0; k < 12; k++) at[k] = x[3 * pair->v[k / 3] + k % 3];
 }
 
-static inline PetscReal radius_of(SbContactMesh m, const SbContactPair *pair)
-{
-  return pair->v[0] >= m->nbody_vertex || pair->v[2] >= m->nbody_vertex ? m->radius : 0.;
-}
-
 PetscReal SbContactPairGap(SbContactMesh m, const SbContactPair *pair, const PetscReal x[], SbDistance *g)
 {
   PetscReal at[12], r[3], length;
@@ -33,9 +31,9 @@ PetscReal SbContactPairGap(SbContactMesh m, const SbContactPair *pair, const Pet
   places(pair, x, at);
   if (!pair->side) {
     SbDistanceFind(pair->kind, at, g);
-    return g->d - radius_of(m, pair);
+    return g->d - SbContactPairRadius(m, pair);
   }
-  /* the obstacle's vertices 1 and 2: a point of the plane and the tip of the normal there, or the centre of the bowl */
+  /* the obstacle's vertices 1 and 2: a point of the plane and the tip of its normal; or 1, the centre */
   g->weight[0] = 1.;
   g->weight[1] = -1.;
   g->weight[2] = g->weight[3] = 0.;
@@ -58,6 +56,7 @@ PetscReal SbContactPairGap(SbContactMesh m, const SbContactPair *pair, const Pet
 
 /* Features of one kind, those with a node of this rank or the others, with a tree over their boxes. */
 enum { VERTEX, TRIANGLE, EDGE };
+static const int corners[] = {1, 3, 2};
 struct SbContactFeatures {
   PetscInt n, *item;   /* [n] numbers in the mesh */
   PetscReal (*box)[6]; /* [n] */
@@ -79,11 +78,11 @@ static PetscErrorCode add_pair(SbContactPairs p, const SbContactPair *pair)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the features of a pair stay farther apart than the reach for all positions of its vertices in their boxes: the distance at the centres
-   less the largest displacement of a vertex from there. */
+/* Whether the features of a pair stay farther apart than the reach for all positions of its vertices in their
+   boxes: the distance at the centres less the largest displacement of a vertex from there. */
 static PetscBool stays_apart(SbContactPairs p, const SbContactPair *pair)
 {
-  const int split = pair->kind == SB_PAIR_EDGE_EDGE ? 2 : 1;
+  const int split = SbContactPairSplit(pair);
   PetscReal at[12], far[2] = {0., 0.};
   SbDistance g;
 
@@ -98,11 +97,12 @@ static PetscBool stays_apart(SbContactPairs p, const SbContactPair *pair)
     far[k >= split] = PetscMax(far[k >= split], square);
   }
   SbDistanceFind(pair->kind, at, &g);
-  return (PetscBool)(g.d - radius_of(p->mesh, pair) >
+  return (PetscBool)(g.d - SbContactPairRadius(p->mesh, pair) >
                      p->reach + PetscSqrtReal(far[0]) + PetscSqrtReal(far[1]));
 }
 
-/* Whether features of the vertices a and b can be in contact at all: different bodies or self-contact, not both prescribed or of the obstacle. */
+/* Whether features of the vertices a and b can be in contact at all: different bodies or self-contact, not
+   both prescribed or of the obstacle. */
 static inline PetscBool wanted(SbContactPairs p, PetscInt a, PetscInt b)
 {
   const SbContactMesh m = p->mesh;
@@ -112,52 +112,42 @@ static inline PetscBool wanted(SbContactPairs p, PetscInt a, PetscInt b)
                                               : p->self && a < m->nbody_vertex);
 }
 
-/* Whether features with these vertices, the first `split` on one side, belong to an overlap (SbContactOverlap.near): such pairs are excluded. */
-static inline PetscBool overlaps(SbContactPairs p, const PetscInt v[4], int split)
+/* Whether the features belong to an overlap (SbContactOverlap.near): such pairs are excluded. */
+static inline PetscBool overlaps(SbContactPairs p, const SbContactPair *pair)
 {
+  const int split = SbContactPairSplit(pair);
   int near[2] = {0, 0};
 
-  if (!p->near) return PETSC_FALSE;
-  for (int k = 0; k < 4; k++) near[k >= split] = PetscMax(near[k >= split], p->near[v[k]]);
+  for (int k = 0; p->near && k < 4; k++) near[k >= split] = PetscMax(near[k >= split], p->near[pair->v[k]]);
   if (!near[0] || !near[1]) return PETSC_FALSE;
   return (PetscBool)(split == 1 ? near[0] == SB_OVERLAP_INSIDE
                                 : PetscMax(near[0], near[1]) >= SB_OVERLAP_INTERSECTED);
 }
 
-static PetscErrorCode add_vertex_triangle(SbContactPairs p, PetscInt v, PetscInt t)
+/* Adds the pair of a vertex i and a triangle j, or of two edges, if they may come into contact. */
+static PetscErrorCode add_features(SbContactPairs p, SbPairKind kind, PetscInt i, PetscInt j)
 {
   const SbContactMesh m = p->mesh;
-  const PetscInt *tri = m->triangle + 3 * t;
-  SbContactPair pair = {.kind = SB_PAIR_VERTEX_TRIANGLE, .v = {v, tri[0], tri[1], tri[2]}};
+  const PetscBool edges = (PetscBool)(kind == SB_PAIR_EDGE_EDGE);
+  const PetscInt low = PetscMin(i, j), high = PetscMax(i, j), *a = edges ? m->edge + 2 * low : &i,
+                 *b = edges ? m->edge + 2 * high : m->triangle + 3 * j;
+  SbContactPair pair = {.kind = kind,
+                        .v = {a[0], edges ? a[1] : b[0], edges ? b[0] : b[1], edges ? b[1] : b[2]}};
+  PetscBool driven = PETSC_TRUE;
 
   PetscFunctionBeginUser;
-  if (!wanted(p, v, tri[0]) || v == tri[0] || v == tri[1] || v == tri[2]) PetscFunctionReturn(PETSC_SUCCESS);
-  if (m->driven[v] && m->driven[tri[0]] && m->driven[tri[1]] && m->driven[tri[2]])
-    PetscFunctionReturn(PETSC_SUCCESS);
-  if (v < m->nbody_vertex)
-    pair.area = m->area[v];
+  if (!wanted(p, a[0], b[0])) PetscFunctionReturn(PETSC_SUCCESS);
+  for (int k = 0; k < 4; k++) {
+    driven = (PetscBool)(driven && m->driven[pair.v[k]]);
+    for (int l = SbContactPairSplit(&pair); k < SbContactPairSplit(&pair) && l < 4; l++)
+      if (pair.v[k] == pair.v[l]) PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (driven) PetscFunctionReturn(PETSC_SUCCESS);
+  if (edges)
+    pair.area = b[0] >= m->nbody_vertex ? m->edge_area[low] : 0.5 * (m->edge_area[low] + m->edge_area[high]);
   else
-    pair.area = (m->area[tri[0]] + m->area[tri[1]] + m->area[tri[2]]) / 3.;
-  if (!overlaps(p, pair.v, 1) && !stays_apart(p, &pair)) PetscCall(add_pair(p, &pair));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode add_edge_edge(SbContactPairs p, PetscInt e, PetscInt f)
-{
-  const SbContactMesh m = p->mesh;
-  const PetscInt low = PetscMin(e, f), high = PetscMax(e, f), *a = m->edge + 2 * low, *b = m->edge + 2 * high;
-  SbContactPair pair = {.kind = SB_PAIR_EDGE_EDGE, .v = {a[0], a[1], b[0], b[1]}};
-
-  PetscFunctionBeginUser;
-  if (!wanted(p, a[0], b[0]) || a[0] == b[0] || a[0] == b[1] || a[1] == b[0] || a[1] == b[1])
-    PetscFunctionReturn(PETSC_SUCCESS);
-  if (m->driven[a[0]] && m->driven[a[1]] && m->driven[b[0]] && m->driven[b[1]])
-    PetscFunctionReturn(PETSC_SUCCESS);
-  if (b[0] >= m->nbody_vertex)
-    pair.area = m->edge_area[low];
-  else
-    pair.area = 0.5 * (m->edge_area[low] + m->edge_area[high]);
-  if (!overlaps(p, pair.v, 2) && !stays_apart(p, &pair)) PetscCall(add_pair(p, &pair));
+    pair.area = i < m->nbody_vertex ? m->area[i] : (m->area[b[0]] + m->area[b[1]] + m->area[b[2]]) / 3.;
+  if (!overlaps(p, &pair) && !stays_apart(p, &pair)) PetscCall(add_pair(p, &pair));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -165,8 +155,6 @@ PetscErrorCode SbContactPairsCreate(SbContactMesh m, PetscBool self, PetscBool o
                                     SbContactPairs *pairs)
 {
   const PetscInt count[] = {m->side == SB_SIDE_NONE ? m->nvertex : m->nbody_vertex, m->ntriangle, m->nedge};
-  PetscReal length = 0.;
-  PetscInt n = 0;
   SbContactPairs p;
 
   PetscFunctionBeginUser;
@@ -176,13 +164,7 @@ PetscErrorCode SbContactPairsCreate(SbContactMesh m, PetscBool self, PetscBool o
   p->self = self;
   p->others = others;
   p->reach = reach;
-  for (; n < m->nedge && m->edge[2 * n] < m->nbody_vertex; n++) {
-    PetscReal r[3];
-
-    for (int i = 0; i < 3; i++) r[i] = m->X[3 * m->edge[2 * n] + i] - m->X[3 * m->edge[2 * n + 1] + i];
-    length += PetscSqrtReal(SbDot3(r, r));
-  }
-  p->margin = PetscMax(2. * reach, MARGIN * length / (PetscReal)PetscMax(1, n));
+  p->margin = PetscMax(2. * reach, MARGIN * m->mean_edge);
   PetscCall(PetscMalloc2(6 * m->nvertex, &p->box, 3 * m->nvertex, &p->shorter));
 
   /* features by kind, those of this rank first */
@@ -190,30 +172,24 @@ PetscErrorCode SbContactPairsCreate(SbContactMesh m, PetscBool self, PetscBool o
   for (int k = 0; k < 6; k++) {
     struct SbContactFeatures *f = &p->features[k];
 
-    for (int pass = 0; pass < 2; pass++) {
-      f->n = 0;
-      for (PetscInt i = 0; i < count[k / 2]; i++) {
-        PetscInt own, size = k / 2 == VERTEX ? 1 : k / 2 == TRIANGLE ? 3 : 2;
-        const PetscInt *v = vertices_of(m, k / 2, i, &own);
-        PetscBool mine = PETSC_FALSE;
+    PetscCall(PetscMalloc1(count[k / 2], &f->item));
+    for (PetscInt i = 0; i < count[k / 2]; i++) {
+      PetscInt own;
+      const PetscInt *v = vertices_of(m, k / 2, i, &own);
+      PetscBool mine = PETSC_FALSE;
 
-        for (PetscInt a = 0; a < size; a++) mine = (PetscBool)(mine || m->mine[v[a]]);
-        if (mine != (PetscBool)(k % 2 == 0)) continue;
-        if (pass) f->item[f->n] = i;
-        f->n++;
-      }
-      if (!pass) PetscCall(PetscMalloc2(f->n, &f->item, f->n, &f->box));
+      for (int a = 0; a < corners[k / 2]; a++) mine = (PetscBool)(mine || m->mine[v[a]]);
+      if (mine == (PetscBool)(k % 2 == 0)) f->item[f->n++] = i;
     }
+    PetscCall(PetscMalloc1(f->n, &f->box));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactPairsIgnore(SbContactPairs p, const uint8_t near[])
+void SbContactPairsIgnore(SbContactPairs p, const uint8_t near[])
 {
-  PetscFunctionBeginUser;
   if (p->near || near) p->known = PETSC_FALSE;
   p->near = near;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs)
@@ -224,7 +200,8 @@ PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs)
     struct SbContactFeatures *f = &(*pairs)->features[k];
 
     PetscCall(SbBoxTreeDestroy(&f->tree));
-    PetscCall(PetscFree2(f->item, f->box));
+    PetscCall(PetscFree(f->item));
+    PetscCall(PetscFree(f->box));
   }
   PetscCall(PetscFree((*pairs)->features));
   PetscCall(PetscFree2((*pairs)->box, (*pairs)->shorter));
@@ -252,7 +229,6 @@ static PetscErrorCode update_features(SbContactPairs p, int k)
 {
   const SbContactMesh m = p->mesh;
   struct SbContactFeatures *f = &p->features[k];
-  const PetscInt size = k / 2 == VERTEX ? 1 : k / 2 == TRIANGLE ? 3 : 2;
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < f->n; i++) {
@@ -261,7 +237,7 @@ static PetscErrorCode update_features(SbContactPairs p, int k)
     const PetscReal grown = 0.5 * p->reach + (v[0] < m->nbody_vertex ? 0. : m->radius);
 
     for (int c = 0; c < 6; c++) f->box[i][c] = p->box[6 * v[0] + c];
-    for (PetscInt a = 1; a < size; a++) SbBoxMerge(f->box[i], p->box + 6 * v[a]);
+    for (int a = 1; a < corners[k / 2]; a++) SbBoxMerge(f->box[i], p->box + 6 * v[a]);
     for (int c = 0; c < 3; c++) {
       f->box[i][c] -= grown;
       f->box[i][3 + c] += grown;
@@ -314,10 +290,7 @@ static PetscErrorCode find_pairs(SbContactPairs p, const PetscReal x0[], const P
       for (PetscInt k = 0; k < n; k++) {
         const PetscInt i = a->item[found[2 * k]], j = b->item[found[2 * k + 1]];
 
-        if (q < 3)
-          PetscCall(add_vertex_triangle(p, i, j));
-        else
-          PetscCall(add_edge_edge(p, i, j));
+        PetscCall(add_features(p, q < 3 ? SB_PAIR_VERTEX_TRIANGLE : SB_PAIR_EDGE_EDGE, i, j));
       }
       *full = (PetscBool)(p->n > most);
     }
@@ -361,7 +334,8 @@ static PetscReal first_root(PetscReal a, PetscReal b, PetscReal c)
   PetscReal t = 2.;
 
   if (disc < 0.) return t;
-  /* the root without cancellation; with c > 0 the smaller positive one is 2 c / (-b + root) where b < 0, and where a < 0 (-b - root) / 2 a */
+  /* the root without cancellation; with c > 0 the smaller positive one is 2 c / (-b + root) where b < 0, and
+     where a < 0 (-b - root) / 2 a */
   if (b < 0.)
     t = 2. * c / (-b + PetscSqrtReal(disc));
   else if (a < 0.)
@@ -379,7 +353,7 @@ static PetscReal safe_part(SbContactMesh m, const SbContactPair *pair, PetscReal
   places(pair, x0, a);
   places(pair, x1, b);
   if (!pair->side) {
-    const SbCCDLimits limits = {.radius = radius_of(m, pair), .keep = LEFT, .most = most};
+    const SbCCDLimits limits = {.radius = SbContactPairRadius(m, pair), .keep = LEFT, .most = most};
 
     (void)SbTimeOfImpact(pair->kind, a, b, &limits, &part);
     return part;
@@ -399,11 +373,11 @@ static PetscReal safe_part(SbContactMesh m, const SbContactPair *pair, PetscReal
 }
 
 PetscErrorCode SbContactPairsMaxStep(SbContactPairs p, const PetscReal x0[], const PetscReal x1[],
-                                     PetscReal *part, PetscInt *worst)
+                                     PetscReal *part)
 {
   const SbContactMesh m = p->mesh;
   const PetscInt most = PetscMin(CROWD * (PetscInt64)(m->nvertex + CROWD_LEAST), PETSC_MAX_INT / 2);
-  PetscReal whole = 1.;
+  PetscReal whole = 1., safe;
   PetscBool full;
 
   PetscFunctionBeginUser;
@@ -417,18 +391,13 @@ PetscErrorCode SbContactPairsMaxStep(SbContactPairs p, const PetscReal x0[], con
   }
 
   *part = 1.;
-  *worst = -1;
   for (PetscInt i = 0; i < p->n; i++) {
     const SbContactPair *pair = &p->pair[i];
-    PetscReal t;
 
     if (!m->own[pair->v[0]] && !(pair->v[0] >= m->nbody_vertex && m->own[pair->v[1]])) continue;
     if (SbContactPairSweptApart(m, pair, x0, x1, p->reach)) continue;
-    t = safe_part(m, pair, LEFT_MOST * p->reach, x0, x1);
-    if (t < *part) {
-      *part = t;
-      *worst = i;
-    }
+    safe = safe_part(m, pair, LEFT_MOST * p->reach, x0, x1);
+    *part = PetscMin(*part, safe); /* a macro: its arguments are evaluated twice */
   }
   *part *= whole;
   PetscFunctionReturn(PETSC_SUCCESS);

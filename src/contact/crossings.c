@@ -1,19 +1,14 @@
 /*
-  crossings.c - intersections of surfaces: edges that intersect triangles. It shares nothing with the search for pairs but the tree of boxes.
+  crossings.c - intersections of surfaces: edges that intersect triangles. It shares nothing with the search
+  for pairs but the tree of boxes.
 
-  An edge goes through a triangle where its ends are on different sides of the plane and the line passes the three sides in the same sense: signs of volumes of tets. A volume
-  within rounding, also that of the coordinates, counts as no intersection: bodies in contact do not intersect.
+  An edge goes through a triangle where its ends are on different sides of the plane and the line passes the
+  three sides in the same sense: signs of volumes of tets. A volume within rounding, also that of the
+  coordinates, counts as no intersection: bodies in contact do not intersect.
 */
 #include "contact_mesh.h"
 
 #define ROUNDING 64 /* rounding of a volume, in machine epsilons of its products */
-
-typedef struct {
-  SbContactMesh mesh;
-  const PetscReal *x;
-  PetscBool self;
-  PetscInt edge, n, size, *hit; /* [n][2] edge and triangle */
-} Search;
 
 /* Sign of the volume of a tet, 0 within rounding. */
 static int side_of(const PetscReal *a, const PetscReal *b, const PetscReal *c, const PetscReal *d)
@@ -36,18 +31,17 @@ static int side_of(const PetscReal *a, const PetscReal *b, const PetscReal *c, c
   return volume > 0. ? 1 : -1;
 }
 
-/* Whether the edge of the search intersects a triangle. */
-static PetscBool goes_through(const Search *s, PetscInt t)
+/* Whether an edge intersects a triangle. */
+static PetscBool goes_through(SbContactMesh m, PetscBool self, const PetscReal x[], PetscInt edge, PetscInt t)
 {
-  const SbContactMesh m = s->mesh;
-  const PetscInt *e = m->edge + 2 * s->edge, *v = m->triangle + 3 * t;
-  const PetscReal *a = s->x + 3 * e[0], *b = s->x + 3 * e[1], *p = s->x + 3 * v[0], *q = s->x + 3 * v[1],
-                  *r = s->x + 3 * v[2];
+  const PetscInt *e = m->edge + 2 * edge, *v = m->triangle + 3 * t;
+  const PetscReal *a = x + 3 * e[0], *b = x + 3 * e[1], *p = x + 3 * v[0], *q = x + 3 * v[1],
+                  *r = x + 3 * v[2];
   int around;
 
   /* with an obstacle, contact between bodies belongs to another effect */
   if (m->nvertex > m->nbody_vertex && e[0] < m->nbody_vertex && v[0] < m->nbody_vertex) return PETSC_FALSE;
-  if (m->part[e[0]] == m->part[v[0]] && (!s->self || e[0] >= m->nbody_vertex)) return PETSC_FALSE;
+  if (m->part[e[0]] == m->part[v[0]] && (!self || e[0] >= m->nbody_vertex)) return PETSC_FALSE;
   for (int k = 0; k < 6; k++) {
     if (e[k / 3] == v[k % 3]) return PETSC_FALSE;
   }
@@ -61,11 +55,10 @@ static PetscBool goes_through(const Search *s, PetscInt t)
 PetscErrorCode SbContactMeshCrossings(SbContactMesh m, PetscBool self, const PetscReal x[], PetscInt *n,
                                       PetscInt **hits)
 {
-  Search s = {.mesh = m, .x = x, .self = self};
+  PetscInt nmine = 0, size = 0, *mine = NULL, hit;
   PetscMPIInt rank, ranks;
   SbBoxQuery query;
   SbBoxTree tree;
-  PetscInt hit;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(m->space->comm, &rank));
@@ -74,21 +67,20 @@ PetscErrorCode SbContactMeshCrossings(SbContactMesh m, PetscBool self, const Pet
   for (PetscInt e = rank; e < m->nedge; e += ranks) {
     PetscReal around[6];
 
-    s.edge = e;
     SbBoxClear(around);
     for (int k = 0; k < 2; k++) SbBoxAdd(around, x + 3 * m->edge[2 * e + k]);
     for (SbBoxQueryBegin(&tree, around, &query); SbBoxQueryNext(&query, &hit);) {
-      if (!goes_through(&s, hit)) continue;
-      PetscCall(SbReserve(s.n + 1, 2 * sizeof(*s.hit), &s.size, &s.hit));
-      s.hit[2 * s.n] = e;
-      s.hit[2 * s.n++ + 1] = hit;
+      if (!goes_through(m, self, x, e, hit)) continue;
+      PetscCall(SbReserve(nmine + 2, sizeof(*mine), &size, &mine));
+      mine[nmine++] = e;
+      mine[nmine++] = hit;
     }
   }
   PetscCall(SbBoxTreeDestroy(&tree));
 
   /* those of all ranks */
-  PetscCall(SbAllgatherv(m->space->comm, MPIU_INT, 2 * s.n, s.hit, n, hits, NULL));
-  PetscCall(PetscFree(s.hit));
+  PetscCall(SbAllgatherv(m->space->comm, MPIU_INT, nmine, mine, n, hits, NULL));
+  PetscCall(PetscFree(mine));
   *n /= 2;
   PetscCall(SbSortByKeys(*n, 2 * sizeof(**hits), 2, *hits));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,9 +1,10 @@
 /*
   obstacle.c - rigid obstacles by their signed distance.
 
-  Each shape is a rounded primitive, a core with a radius: distance = |x - nearest point of the core| - r, the core being a point (sphere), a segment
-  (capsule), a solid box or a solid cylinder (r = 0; inside them the nearest side counts). A bowl is a sphere inverted.
-  What a closed mesh encloses is in src/geometry/signed_distance.c.
+  Each shape is a rounded primitive, a core with a radius: distance = |x - nearest point of the core| - r, the
+  core being a point (sphere), a segment (capsule), a solid box or a solid cylinder (r = 0; inside them the
+  nearest side counts). A bowl is a sphere inverted. What a closed mesh encloses is in
+  src/geometry/signed_distance.c.
 */
 #include "obstacle.h"
 #include "sbgeometry.h"
@@ -35,7 +36,28 @@ static const struct {
   {"mesh", "mesh:FILE", 0},
 };
 
-/* What is wrong with the numbers of a shape; NULL when nothing is. Makes the normal of a plane a unit vector. */
+/* Unit vector from v; `other` where v vanishes. Returns its length. */
+static PetscReal unit(const PetscReal v[3], const PetscReal other[3], PetscReal n[3])
+{
+  const PetscReal length = PetscSqrtReal(SbDot3(v, v));
+
+  for (int i = 0; i < 3; i++) n[i] = length > 0 ? v[i] / length : other[i];
+  return length;
+}
+
+/* Some unit vector at right angles to the unit vector a. */
+static void across(const PetscReal a[3], PetscReal n[3])
+{
+  const int i = PetscAbsReal(a[0]) < 0.6 ? 0 : 1;
+  PetscReal e[3] = {0, 0, 0}, c[3];
+
+  e[i] = 1;
+  SbCross(a, e, c);
+  (void)unit(c, c, n);
+}
+
+/* What is wrong with the numbers of a shape; NULL when nothing is. Makes the normal of a plane a unit vector.
+   */
 static const char *normalise(SbObstacle o)
 {
   const PetscReal length = PetscSqrtReal(SbDot3(o->p, o->p));
@@ -60,6 +82,55 @@ static const char *normalise(SbObstacle o)
     }
     return "its two ends are one point";
   }
+}
+
+/* Vertices and triangles of a shape: a plane has a point and the tip of its normal, a sphere the centre. */
+static PetscErrorCode make_surface(SbObstacle o)
+{
+  static const PetscInt box[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                                   2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+  SbTriangles *s = &o->surface;
+  const PetscReal *p = o->p;
+  PetscReal a[3], e[3], f[3];
+
+  PetscFunctionBeginUser;
+  s->nvert = o->shape == CYLINDER                       ? 2 * SIDES + 2
+             : o->shape == BOX                          ? 8
+             : o->shape == PLANE || o->shape == CAPSULE ? 2
+                                                        : 1;
+  s->ntri = o->shape == CYLINDER ? 4 * SIDES : o->shape == BOX ? 12 : 0;
+  PetscCall(PetscMalloc1(3 * s->nvert, &s->x));
+  PetscCall(PetscMalloc1(3 * s->ntri, &s->tri));
+  for (PetscInt k = 0; k < 3 * s->nvert && o->shape != CYLINDER; k++) {
+    const PetscInt v = k / 3, i = k % 3;
+
+    s->x[k] = o->shape == BOX     ? p[3 * ((v >> i) & 1) + i]
+              : o->shape == PLANE ? (p[3] + (PetscReal)v) * p[i]
+                                  : p[k];
+  }
+  if (o->shape == BOX) PetscCall(PetscArraycpy(s->tri, box, 36));
+  if (o->shape != CYLINDER) PetscFunctionReturn(PETSC_SUCCESS);
+
+  /* a closed cylinder: fans at both ends, a band between them; its vertices lie on it */
+  SbSubtract(p + 3, p, a);
+  (void)unit(a, a, a);
+  across(a, e);
+  SbCross(a, e, f);
+  for (PetscInt k = 0; k < 6 * SIDES; k++) {
+    const PetscReal angle = 2 * PETSC_PI * (PetscReal)(k / 3 % SIDES) / SIDES;
+
+    s->x[k] = p[3 * (k / (3 * SIDES)) + k % 3] +
+              p[6] * (PetscCosReal(angle) * e[k % 3] + PetscSinReal(angle) * f[k % 3]);
+  }
+  for (int i = 0; i < 6; i++) s->x[6 * SIDES + i] = p[i];
+  for (PetscInt k = 0; k < SIDES; k++) {
+    const PetscInt l = (k + 1) % SIDES;
+    const PetscInt t[12] = {k, l, SIDES + l,     k,         SIDES + l, SIDES + k, 2 * SIDES,
+                            l, k, 2 * SIDES + 1, SIDES + k, SIDES + l};
+
+    PetscCall(PetscArraycpy(s->tri + 12 * k, t, 12));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle *obstacle)
@@ -90,6 +161,7 @@ PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle
              "%s %s: write %s, lengths in m", option, text, shapes[k].form);
   problem = normalise(o);
   PetscCheck(!problem, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s %s: %s", option, text, problem);
+  PetscCall(make_surface(o));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -120,22 +192,12 @@ PetscErrorCode SbObstacleSetUp(SbObstacle o, MPI_Comm comm, const char *option, 
 PetscErrorCode SbObstacleDestroy(SbObstacle *obstacle)
 {
   PetscFunctionBeginUser;
-  if (*obstacle) {
-    PetscCall(PetscFree((*obstacle)->file));
-    PetscCall(SbSignedDistanceDestroy(&(*obstacle)->distance));
-    PetscCall(SbTrianglesDestroy(&(*obstacle)->surface));
-  }
+  if (!*obstacle) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree((*obstacle)->file));
+  PetscCall(SbSignedDistanceDestroy(&(*obstacle)->distance));
+  PetscCall(SbTrianglesDestroy(&(*obstacle)->surface));
   PetscCall(PetscFree(*obstacle));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Unit vector from v; `other` where v vanishes. Returns its length. */
-static PetscReal unit(const PetscReal v[3], const PetscReal other[3], PetscReal n[3])
-{
-  const PetscReal length = PetscSqrtReal(SbDot3(v, v));
-
-  for (int i = 0; i < 3; i++) n[i] = length > 0 ? v[i] / length : other[i];
-  return length;
 }
 
 static PetscReal from_box(const PetscReal p[6], const PetscReal x[3], PetscReal n[3])
@@ -159,26 +221,15 @@ static PetscReal from_box(const PetscReal p[6], const PetscReal x[3], PetscReal 
   return -depth;
 }
 
-/* Some unit vector at right angles to the unit vector a. */
-static void across(const PetscReal a[3], PetscReal n[3])
-{
-  const int i = PetscAbsReal(a[0]) < 0.6 ? 0 : 1;
-  PetscReal e[3] = {0, 0, 0}, c[3];
-
-  e[i] = 1;
-  SbCross(a, e, c);
-  (void)unit(c, c, n);
-}
-
-/* Coordinate s along the axis (m from the first end), distance from the axis, unit vectors along and away from it. */
+/* Coordinate s along the axis (m from the first end), distance, unit vectors along and away from it. */
 static PetscReal axial(const PetscReal p[6], const PetscReal x[3], PetscReal *s, PetscReal *length,
                        PetscReal a[3], PetscReal away[3])
 {
   PetscReal axis[3], v[3], other[3];
 
-  for (int i = 0; i < 3; i++) axis[i] = p[3 + i] - p[i];
+  SbSubtract(p + 3, p, axis);
   *length = unit(axis, axis, a);
-  for (int i = 0; i < 3; i++) v[i] = x[i] - p[i];
+  SbSubtract(x, p, v);
   *s = SbDot3(v, a);
   for (int i = 0; i < 3; i++) v[i] -= *s * a[i];
   across(a, other);
@@ -238,87 +289,20 @@ PetscReal SbObstacleDistance(SbObstacle o, const PetscReal x[3], PetscReal n[3])
   }
 }
 
-/* A closed cylinder as triangles: fans at both ends, a band between them. Its vertices lie on it. */
-static PetscErrorCode cylinder_surface(const PetscReal p[7], SbObstacleSurface *s)
+SbObstacleSurface SbObstacleGetSurface(SbObstacle o)
 {
-  PetscReal a[3], e[3], f[3];
-
-  PetscFunctionBeginUser;
-  for (int i = 0; i < 3; i++) a[i] = p[3 + i] - p[i];
-  (void)unit(a, a, a);
-  across(a, e);
-  SbCross(a, e, f);
-  s->nvertex = 2 * SIDES + 2;
-  s->ntriangle = 4 * SIDES;
-  PetscCall(PetscMalloc2(3 * s->nvertex, &s->x, 3 * s->ntriangle, &s->triangle));
-  for (PetscInt k = 0; k < 2 * SIDES; k++) {
-    const PetscReal angle = 2 * PETSC_PI * (PetscReal)(k % SIDES) / SIDES;
-
-    for (int i = 0; i < 3; i++)
-      s->x[3 * k + i] =
-        p[3 * (k / SIDES) + i] + p[6] * (PetscCosReal(angle) * e[i] + PetscSinReal(angle) * f[i]);
-  }
-  for (int i = 0; i < 6; i++) s->x[6 * SIDES + i] = p[i];
-  for (PetscInt k = 0; k < SIDES; k++) {
-    const PetscInt l = (k + 1) % SIDES;
-    const PetscInt t[12] = {k, l, SIDES + l,     k,         SIDES + l, SIDES + k, 2 * SIDES,
-                            l, k, 2 * SIDES + 1, SIDES + k, SIDES + l};
-
-    PetscCall(PetscArraycpy(s->triangle + 12 * k, t, 12));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbObstacleGetSurface(SbObstacle o, SbObstacleSurface *s)
-{
-  static const PetscInt box[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
-                                   2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
-  const SbTriangles *t;
-
-  PetscFunctionBeginUser;
-  *s = (SbObstacleSurface){0};
-  switch (o->shape) {
-  case CYLINDER:
-    PetscCall(cylinder_surface(o->p, s));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  case MESH:
-    t = &o->surface;
-    s->nvertex = t->nvert;
-    s->ntriangle = t->ntri;
-    PetscCall(PetscMalloc2(3 * t->nvert, &s->x, 3 * t->ntri, &s->triangle));
-    PetscCall(PetscArraycpy(s->x, t->x, 3 * t->nvert));
-    PetscCall(PetscArraycpy(s->triangle, t->tri, 3 * t->ntri));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  case BOX:
-    s->nvertex = 8;
-    s->ntriangle = 12;
-    break;
-  default:
-    s->nvertex = o->shape == PLANE || o->shape == CAPSULE ? 2 : 1;
-  }
-  PetscCall(PetscMalloc2(3 * s->nvertex, &s->x, 3 * s->ntriangle, &s->triangle));
-  PetscCall(PetscArraycpy(s->triangle, box, 3 * s->ntriangle));
-  for (PetscInt k = 0; k < 3 * s->nvertex; k++) {
-    const PetscInt v = k / 3, i = k % 3;
-
-    if (o->shape == BOX)
-      s->x[k] = o->p[3 * ((v >> i) & 1) + i];
-    else if (o->shape == PLANE)
-      s->x[k] = (o->p[3] + (PetscReal)v) * o->p[i];
-    else
-      s->x[k] = o->p[k];
-  }
-  if (o->shape == SPHERE || o->shape == BOWL) s->radius = o->p[3];
-  if (o->shape == CAPSULE) s->radius = o->p[6];
-  s->side = o->shape == PLANE ? SB_SIDE_PLANE : o->shape == BOWL ? SB_SIDE_BOWL : SB_SIDE_NONE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbObstacleFreeSurface(SbObstacleSurface *s)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree2(s->x, s->triangle));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return (SbObstacleSurface){
+    .side = o->shape == PLANE  ? SB_SIDE_PLANE
+            : o->shape == BOWL ? SB_SIDE_BOWL
+                               : SB_SIDE_NONE,
+    .radius = o->shape == SPHERE || o->shape == BOWL ? o->p[3]
+              : o->shape == CAPSULE                  ? o->p[6]
+                                                     : 0,
+    .nvertex = o->surface.nvert,
+    .ntriangle = o->surface.ntri,
+    .x = o->surface.x,
+    .triangle = o->surface.tri,
+  };
 }
 
 void SbPoseSet(const PetscReal axis[3], PetscReal angle, const PetscReal c[3], const PetscReal d[3],

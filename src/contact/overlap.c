@@ -1,13 +1,14 @@
 /*
   overlap.c - penetrations: where, how deep, and the separation direction.
 
-  Between triangulated surfaces, an edge that intersects a triangle (crossings.c) shows which of its ends is inside, and the normal there. From these vertices separation direction and depth are propagated along
-  edges that intersect nothing, so that neighbours separate to the same side (Heidelberger, Teschner, Keiser, Mueller and Gross, "Consistent penetration depth estimation for deformable
-  collision response", VMV 2004). Of an edge that enters and leaves a body only the midpoint of the inner part counts as inside. The depth is the distance to the surface along the direction.
+  Between triangulated surfaces, an edge that intersects a triangle (crossings.c) shows which of its ends is
+  inside, and the normal there. From these vertices separation direction and depth are propagated along edges
+  that intersect nothing, so that neighbours separate to the same side (Heidelberger, Teschner, Keiser,
+  Mueller and Gross, "Consistent penetration depth estimation for deformable collision response", VMV 2004).
+  Of an edge that enters and leaves a body only the midpoint of the inner part counts as inside. The depth is
+  the distance to the surface along the direction.
 
-  For a half-space, bowl, sphere and capsule, whose distance is analytic, penetration and direction follow from it.
-
-  All ranks compute all of it.
+  For a half-space, bowl, sphere and capsule, they follow from the distance. All ranks compute all of it.
 */
 #include "contact_mesh.h"
 #include "sbgeometry.h"
@@ -39,7 +40,8 @@ static PetscErrorCode add_point(SbContactOverlap *o, const SbPenetration *point)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the direction n out of `part`, of depth d, to the weighted sums of vertex v, unless its own outward normal points that way. Returns whether it did. */
+/* Adds the direction n out of `part`, of depth d, to the weighted sums of vertex v, unless its own outward
+   normal points that way. Returns whether it did. */
 static PetscBool suggest(Ways *w, PetscInt v, PetscInt part, PetscReal weight, const PetscReal n[3],
                          PetscReal d)
 {
@@ -51,7 +53,8 @@ static PetscBool suggest(Ways *w, PetscInt v, PetscInt part, PetscReal weight, c
   return PETSC_TRUE;
 }
 
-/* Intersection of edge e and triangle t, as a fraction of the edge; unit normal of the triangle; signed distance of the edge's first end, m. */
+/* Intersection of edge e and triangle t, as a fraction of the edge; unit normal of the triangle; signed
+   distance of the edge's first end, m. */
 static PetscReal pierce(SbContactMesh m, const PetscReal x[], PetscInt e, PetscInt t, PetscReal n[3],
                         PetscReal *first)
 {
@@ -61,16 +64,18 @@ static PetscReal pierce(SbContactMesh m, const PetscReal x[], PetscInt e, PetscI
 
   for (int i = 0; i < 3; i++) n[i] /= length;
   for (int k = 0; k < 2; k++) {
-    for (int i = 0; i < 3; i++) p[i] = x[3 * ends[k] + i] - x[3 * v[0] + i];
+    SbSubtract(x + 3 * ends[k], x + 3 * v[0], p);
     side[k] = SbDot3(n, p);
   }
   *first = side[0];
   return side[0] / (side[0] - side[1]);
 }
 
-/* The triangle of the penetrated body that the ray along the separation direction leaves through: the pair's other side. */
-static PetscErrorCode find_exit(SbContactMesh m, const PetscReal x[], const SbBoxTree *tree, PetscInt part,
-                                PetscReal depth, const PetscReal p[3], SbPenetration *point, PetscBool *found)
+/* Adds a point at p with its other side, the triangle of the penetrated body that the ray along the
+   separation direction leaves through, if there is any. */
+static PetscErrorCode add_inside(SbContactMesh m, const PetscReal x[], const SbBoxTree *tree, PetscInt part,
+                                 PetscReal depth, const PetscReal p[3], SbPenetration *point,
+                                 SbContactOverlap *o)
 {
   PetscReal box[6], goal[3], nearest = PETSC_MAX_REAL, best[3] = {0};
   PetscInt t, exit = -1;
@@ -99,12 +104,11 @@ static PetscErrorCode find_exit(SbContactMesh m, const PetscReal x[], const SbBo
   /* none: the point of the surface closest to the end of the ray */
   if (exit < 0) {
     SbBoxNearest near;
-    PetscReal point_box[6];
 
     for (int i = 0; i < 3; i++) goal[i] = p[i] + depth * point->normal[i];
-    SbBoxClear(point_box);
-    SbBoxAdd(point_box, goal);
-    for (SbBoxNearestBegin(tree, point_box, PETSC_MAX_REAL, &near); SbBoxNearestNext(&near, &t);) {
+    SbBoxClear(box);
+    SbBoxAdd(box, goal);
+    for (SbBoxNearestBegin(tree, box, PETSC_MAX_REAL, &near); SbBoxNearestNext(&near, &t);) {
       const PetscInt *v = m->triangle + 3 * t;
       const PetscReal *const at[3] = {x + 3 * v[0], x + 3 * v[1], x + 3 * v[2]};
       PetscReal weight[3], d2;
@@ -120,8 +124,7 @@ static PetscErrorCode find_exit(SbContactMesh m, const PetscReal x[], const SbBo
       PetscCall(PetscArraycpy(best, weight, 3));
     }
   }
-  *found = (PetscBool)(exit >= 0);
-  if (!*found) PetscFunctionReturn(PETSC_SUCCESS);
+  if (exit < 0) PetscFunctionReturn(PETSC_SUCCESS);
   if (nearest == PETSC_MAX_REAL) { /* directly towards it */
     PetscReal way[3], length;
 
@@ -130,8 +133,7 @@ static PetscErrorCode find_exit(SbContactMesh m, const PetscReal x[], const SbBo
       for (int k = 0; k < 3; k++) way[i] += best[k] * x[3 * m->triangle[3 * exit + k] + i];
     }
     length = PetscSqrtReal(SbDot3(way, way));
-    *found = (PetscBool)(length > TINY * m->size && SbDot3(way, point->normal) > 0.);
-    if (!*found) PetscFunctionReturn(PETSC_SUCCESS);
+    if (length <= TINY * m->size || SbDot3(way, point->normal) <= 0.) PetscFunctionReturn(PETSC_SUCCESS);
     for (int i = 0; i < 3; i++) point->normal[i] = way[i] / length;
   }
   point->depth = 0.;
@@ -144,13 +146,13 @@ static PetscErrorCode find_exit(SbContactMesh m, const PetscReal x[], const SbBo
     point->v[point->n] = v;
     point->weight[point->n++] = -best[k];
   }
-  *found = (PetscBool)(point->depth > 0.);
+  if (point->depth > 0.) PetscCall(add_point(o, point));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Outward normals of the vertices, weighted by area. */
-static void add_normals(SbContactMesh m, const PetscReal x[], PetscReal normal[])
+void SbContactMeshNormals(SbContactMesh m, const PetscReal x[], PetscReal normal[])
 {
+  for (PetscInt k = 0; k < 3 * m->nvertex; k++) normal[k] = 0.;
   for (PetscInt t = 0; t < m->ntriangle; t++) {
     const PetscInt *v = m->triangle + 3 * t;
     PetscReal n[3];
@@ -158,28 +160,11 @@ static void add_normals(SbContactMesh m, const PetscReal x[], PetscReal normal[]
     (void)SbContactTriangleArea(x, v, n);
     for (int k = 0; k < 9; k++) normal[3 * v[k / 3] + k % 3] += n[k % 3];
   }
-  for (PetscInt v = 0; v < m->nvertex; v++) {
-    const PetscReal length = PetscSqrtReal(SbDot3(normal + 3 * v, normal + 3 * v));
-
-    for (int i = 0; i < 3 && length > 0.; i++) normal[3 * v + i] /= length;
-  }
 }
 
-/* Whether a point's own outward normal opposes its separation direction. */
-static PetscBool leads(const PetscReal normal[], const SbPenetration *p)
+/* Propagates directions from the n vertices of list[], layer by layer along edges that intersect nothing. */
+static void spread_ways(SbContactMesh m, Ways *w, PetscInt n, PetscInt list[])
 {
-  PetscReal n[3] = {0.};
-
-  for (PetscInt k = 0; k < p->n && p->weight[k] > 0.; k++) {
-    for (int i = 0; i < 3; i++) n[i] += p->weight[k] * normal[3 * p->v[k] + i];
-  }
-  return (PetscBool)(SbDot3(n, p->normal) < -AGAINST * PetscSqrtReal(SbDot3(n, n)));
-}
-
-/* Propagates directions from the first layer, the n vertices of list[], layer by layer along edges that intersect nothing. */
-static PetscErrorCode spread_ways(SbContactMesh m, Ways *w, PetscInt n, PetscInt list[])
-{
-  PetscFunctionBeginUser;
   for (PetscInt first = 0, last = n, layer = 1; first < last; first = last, last = n, layer++) {
     /* means of the sums; a vertex whose directions cancel has none */
     for (PetscInt k = first; k < last; k++) {
@@ -207,10 +192,9 @@ static PetscErrorCode spread_ways(SbContactMesh m, Ways *w, PetscInt n, PetscInt
       }
     }
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Vertices joined to an inside one by an edge that intersects nothing are inside, too. list: work, [nvertex]. */
+/* Vertices joined to an inside one by an edge that intersects nothing are inside, too. list[]: work. */
 static void mark_inside(SbContactMesh m, const Ways *w, PetscInt list[], uint8_t near[])
 {
   PetscInt n = 0;
@@ -229,7 +213,7 @@ static void mark_inside(SbContactMesh m, const Ways *w, PetscInt list[], uint8_t
   }
 }
 
-/* Points inside triangulated surfaces, from the intersections hit[n][2] of edges and triangles, sorted by edges. */
+/* Points inside triangulated surfaces, from the intersections hit[n][2] of edges and triangles. */
 static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt n, const PetscInt hit[],
                                   SbContactOverlap *o)
 {
@@ -243,8 +227,13 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
   PetscCall(PetscCalloc5(3 * m->nvertex, &w.way, m->nvertex, &w.depth, m->nvertex, &w.sum, m->nvertex,
                          &w.layer, m->nedge, &w.through));
   PetscCall(PetscCalloc2(n, &paired, 3 * m->nvertex, &w.normal));
-  add_normals(m, x, w.normal);
-  for (PetscInt v = 0; v < m->nvertex; v++) w.in[v] = -1;
+  SbContactMeshNormals(m, x, w.normal);
+  for (PetscInt v = 0; v < m->nvertex; v++) {
+    const PetscReal length = PetscSqrtReal(SbDot3(w.normal + 3 * v, w.normal + 3 * v));
+
+    for (int i = 0; i < 3 && length > 0.; i++) w.normal[3 * v + i] /= length;
+    w.in[v] = -1;
+  }
   PetscCall(SbBucketByKey(2 * m->nedge, m->edge, m->nvertex, &w.start, &w.edge));
   for (PetscInt k = 0; k < 2 * m->nedge; k++) w.edge[k] /= 2;
   PetscCall(SbBoxTreeCreateTriangles(m->ntriangle, m->triangle, x, &tree));
@@ -256,9 +245,8 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
     PetscInt j = i + 1;
 
     w.through[e] = 1;
-    for (int k = 0; k < 2; k++) o->near[ends[k]] = PetscMax(o->near[ends[k]], SB_OVERLAP_INTERSECTED);
-    for (int k = 0; k < 3; k++) {
-      const PetscInt v = m->triangle[3 * hit[2 * i + 1] + k];
+    for (int k = 0; k < 5; k++) {
+      const PetscInt v = k < 2 ? ends[k] : m->triangle[3 * hit[2 * i + 1] + k - 2];
 
       o->near[v] = PetscMax(o->near[v], SB_OVERLAP_INTERSECTED);
     }
@@ -271,7 +259,6 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
       const PetscReal s2 = pierce(m, x, e, hit[2 * j + 1], other, &unused), at = 0.5 * (s + s2);
       SbPenetration point = {
         .n = 2, .v = {ends[0], ends[1]}, .weight = {1. - at, at}, .area = m->edge_area[e]};
-      PetscBool found;
 
       paired[j] = 1;
       for (int k = 0; k < 3; k++) {
@@ -282,8 +269,7 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
       length = PetscSqrtReal(SbDot3(point.normal, point.normal));
       if (length <= CANCEL) continue;
       for (int k = 0; k < 3; k++) point.normal[k] /= length;
-      PetscCall(find_exit(m, x, &tree, part, PetscSqrtReal(chord), p, &point, &found));
-      if (found) PetscCall(add_point(o, &point));
+      PetscCall(add_inside(m, x, &tree, part, PetscSqrtReal(chord), p, &point, o));
       continue;
     }
 
@@ -302,23 +288,26 @@ static PetscErrorCode find_inside(SbContactMesh m, const PetscReal x[], PetscInt
       o->near[v] = SB_OVERLAP_INSIDE;
     }
   }
-  PetscCall(spread_ways(m, &w, nlist, list));
+  spread_ways(m, &w, nlist, list);
 
   for (PetscInt v = 0; v < m->nvertex; v++) {
     SbPenetration point = {.n = 1, .v = {v}, .weight = {1.}, .area = m->area[v]};
-    PetscBool found;
 
-    if (!w.layer[v]) continue;
-    if (SbDot3(w.way + 3 * v, w.way + 3 * v) == 0. || w.depth[v] <= 0.) continue;
+    if (!w.layer[v] || SbDot3(w.way + 3 * v, w.way + 3 * v) == 0. || w.depth[v] <= 0.) continue;
     PetscCall(PetscArraycpy(point.normal, w.way + 3 * v, 3));
-    PetscCall(find_exit(m, x, &tree, w.in[v], w.depth[v], x + 3 * v, &point, &found));
-    if (found) PetscCall(add_point(o, &point));
+    PetscCall(add_inside(m, x, &tree, w.in[v], w.depth[v], x + 3 * v, &point, o));
   }
   mark_inside(m, &w, list, o->near);
 
-  /* keep those whose normal opposes the direction, if there are any */
+  /* keep those whose own outward normal opposes the direction, if there are any */
   for (PetscInt i = 0; i < o->n; i++) {
-    if (leads(w.normal, &o->point[i])) o->point[nleading++] = o->point[i];
+    const SbPenetration p = o->point[i];
+    PetscReal normal[3] = {0.};
+
+    for (PetscInt k = 0; k < p.n && p.weight[k] > 0.; k++) {
+      for (int j = 0; j < 3; j++) normal[j] += p.weight[k] * w.normal[3 * p.v[k] + j];
+    }
+    if (SbDot3(normal, p.normal) < -AGAINST * PetscSqrtReal(SbDot3(normal, normal))) o->point[nleading++] = p;
   }
   if (nleading) o->n = nleading;
 
@@ -394,7 +383,6 @@ PetscErrorCode SbContactOverlapFind(SbContactMesh m, PetscBool self, const Petsc
                                     SbContactOverlap *o)
 {
   PetscInt n, *hit;
-  uint8_t *around;
 
   PetscFunctionBeginUser;
   o->n = 0;
@@ -442,17 +430,13 @@ PetscErrorCode SbContactOverlapFind(SbContactMesh m, PetscBool self, const Petsc
   for (PetscInt i = 0; i < o->n; i++) o->deepest = PetscMax(o->deepest, o->point[i].depth);
 
   /* vertices next to the overlap may enter while it separates */
-  PetscCall(PetscMalloc1(m->nvertex, &around));
-  PetscCall(PetscArraycpy(around, o->near, m->nvertex));
   for (PetscInt e = 0; e < m->nedge; e++) {
     const PetscInt *v = m->edge + 2 * e;
 
     for (int k = 0; k < 2; k++) {
-      if (o->near[v[k]] && !o->near[v[1 - k]]) around[v[1 - k]] = SB_OVERLAP_ADJACENT;
+      if (o->near[v[k]] > SB_OVERLAP_ADJACENT && !o->near[v[1 - k]]) o->near[v[1 - k]] = SB_OVERLAP_ADJACENT;
     }
   }
-  PetscCall(PetscFree(o->near));
-  o->near = around;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

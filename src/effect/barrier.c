@@ -1,22 +1,26 @@
 /*
   barrier.c - contact by a barrier potential, with friction: surfaces never touch or pass through each other.
 
-  Below the width w pairs of features repel each other by the barrier of src/contact/barrier.c, an energy that is infinite at contact. It is part of the
-  potential that Newton's method minimises (src/time/newton.c), and every iteration is limited by continuous collision detection (src/contact/contact_pairs.c). So an accepted state can be reached
-  from the one before it without surfaces passing through each other.
+  Below the width w pairs of features repel each other by the barrier of src/contact/barrier.c, an energy that
+  is infinite at contact. It is part of the potential that Newton's method minimises (src/time/newton.c), and
+  every iteration is limited by continuous collision detection (src/contact/contact_pairs.c). So an accepted
+  state can be reached from the one before it without surfaces passing through each other.
 
-  Prescribed motions, such as an obstacle on its path, are linear within a step; `progress` is the fraction that is completed. Newton's method raises
-  it to one as fast as the surfaces allow.
+  Prescribed motions, such as an obstacle on its path, are linear within a step; `progress` is the fraction
+  that is completed. Newton's method raises it to one as fast as the surfaces allow.
 
-  Friction: Coulomb's law with the normal forces N and closest points of the pairs at the start of the step (Li et al., "Incremental potential contact",
-  ACM TOG 39(4), 2020, section 4): the energy mu N f0(|u_t|) of the slip u_t since then, whose slope rises from 0 to 1 within the slip e = dt times a small speed:
+  Friction: Coulomb's law with the normal forces N and closest points of the pairs at the start of the step
+  (Li et al., "Incremental potential contact", ACM TOG 39(4), 2020, section 4): the energy mu N f0(|u_t|) of
+  the slip u_t since then, whose slope rises from 0 to 1 within the slip e = dt times a small speed:
 
     f0 = u^2/e - u^3/(3 e^2) + e/3,   f0' = 2 u/e - u^2/e^2   for u < e;   f0 = u, f0' = 1   beyond.
 
-  In a static run, or with friction_solves, the step is solved again with the normal forces and closest points of the last solution until friction changes by less than a tolerance
-  (barrier_friction.c). The remaining change is reported.
+  In a static run, or with friction_solves, the step is solved again with the normal forces and closest points
+  of the last solution until friction changes by less than a tolerance (barrier_forces.c), and reported.
 
-  Initial contact. Bodies that touch when a run begins are moved apart rigidly (src/model/potential.c), by the width or, in a static run, half of it; where that fails, by their vertices. Bodies that intersect are separated by penalty springs (barrier_springs.c).
+  Initial contact. Bodies that touch when a run begins are moved apart rigidly (src/model/potential.c), by the
+  width or, in a static run, half of it; where that fails, by their vertices. Bodies that intersect are
+  separated by penalty springs (barrier_springs.c).
 */
 #include "barrier_impl.h"
 
@@ -35,37 +39,25 @@
 #define APART 0.5   /* initial gap over w where bodies cannot move apart by w, and in static runs */
 #define NEARBY 5.   /* search distance over w for gaps that moving apart may close */
 #define PASSES 200  /* sweeps over all pairs for that */
-#define WIDTH_LEAST \
-  1e-8 /* least w with -accuracy over the size of the smallest body and over coordinates, so that gaps of w/100 are far above rounding */
+#define WIDTH_LEAST 1e-8 /* least w with -accuracy over sizes and coordinates: w/100 is far above rounding */
 
 /* ------------------------------------------------------------------ set-up */
-
-/* Creates the surfaces at the first call. */
-static PetscErrorCode make_surfaces(SbEffect e, SbSpace s)
-{
-  Barrier *b = (Barrier *)e->data;
-  SbFacet *facet;
-  PetscInt n;
-
-  PetscFunctionBeginUser;
-  if (b->mesh) PetscFunctionReturn(PETSC_SUCCESS);
-  if (b->scene.setup_obstacle) PetscCall((*b->scene.setup_obstacle)(e, s, b->data));
-  PetscCall(SbEffectFacets(s, b->scene.on, &n, &facet));
-  PetscCall(SbContactMeshCreate(s, n, facet, b->scene.obstacle, &b->mesh));
-  PetscCall(PetscFree(facet));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
 {
   Barrier *b = (Barrier *)e->data;
   const PetscInt nbody = s->mesh->nbody;
   PetscReal cube = PETSC_MAX_REAL;
+  SbFacet *facet;
+  PetscInt n;
 
   PetscFunctionBeginUser;
-  PetscCall(make_surfaces(e, s));
+  if (b->contact->obstacle) PetscCall(SbContactSetUpObstacle(e, s, b->contact));
+  PetscCall(SbEffectFacets(s, &e->on, &n, &facet));
+  PetscCall(SbContactMeshCreate(s, n, facet, b->contact->obstacle, &b->mesh));
+  PetscCall(PetscFree(facet));
   s->coupled = PETSC_TRUE;
-  if (!b->scene.obstacle) {
+  if (!b->contact->obstacle) {
     PetscBool *takes_part;
     PetscInt nsurface = 0;
 
@@ -73,12 +65,11 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
     for (PetscInt v = 0; v < b->mesh->nbody_vertex; v++) takes_part[b->mesh->part[v]] = PETSC_TRUE;
     for (PetscInt i = 0; i < nbody; i++) nsurface += takes_part[i];
     PetscCheck(
-      nsurface > 1 || b->scene.self, s->comm, PETSC_ERR_USER_INPUT,
+      nsurface > 1 || b->contact->self, s->comm, PETSC_ERR_USER_INPUT,
       "The effect %s has only one body to examine: give -effect_%s_self yes for a body that may meet "
       "itself, more sets with -effect_%s_on, or -effect_%s_obstacle",
       e->name, e->name, e->name, e->name);
-    b->columns.wanted = b->scene.pairs;
-    PetscCall(SbPairsSetUp(e, s->mesh, takes_part, b->scene.self, &b->columns));
+    if (b->contact->pairs) PetscCall(SbPairsSetUp(e, s->mesh, takes_part, b->contact->self, &b->columns));
     PetscCall(PetscFree(takes_part));
   }
 
@@ -97,7 +88,8 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
              "-effect_%s_barrier_width %g m is larger than the shortest edge of the surface, %g m: take at "
              "most half of that",
              e->name, (double)b->width, (double)b->mesh->shortest);
-  PetscCall(SbContactPairsCreate(b->mesh, b->scene.self, (PetscBool)!b->scene.obstacle, b->w[0], &b->pairs));
+  PetscCall(
+    SbContactPairsCreate(b->mesh, b->contact->self, (PetscBool)!b->contact->obstacle, b->w[0], &b->pairs));
   PetscCall(PetscMalloc3(3 * b->mesh->nvertex, &b->x, 3 * b->mesh->nvertex, &b->start, 3 * b->mesh->nvertex,
                          &b->other));
   PetscCall(PetscMalloc3(3 * s->nnode_owned, &b->u, 3 * (b->mesh->nvertex - b->mesh->nbody_vertex), &b->from,
@@ -109,35 +101,14 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
 
 /* ------------------------------------------------------------------ a step */
 
-/* Unit outward normals of all vertices at x, weighted by area. */
-static PetscErrorCode vertex_normals(const Barrier *b, const PetscReal x[], PetscReal normal[])
-{
-  const SbContactMesh m = b->mesh;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscArrayzero(normal, 3 * m->nvertex));
-  for (PetscInt t = 0; t < m->ntriangle; t++) {
-    const PetscInt *v = m->triangle + 3 * t;
-    PetscReal p[3], q[3], n[3];
-
-    for (int i = 0; i < 3; i++) {
-      p[i] = x[3 * v[1] + i] - x[3 * v[0] + i];
-      q[i] = x[3 * v[2] + i] - x[3 * v[0] + i];
-    }
-    SbCross(p, q, n);
-    for (int k = 0; k < 9; k++) normal[3 * v[k / 3] + k % 3] += n[k % 3];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Positions of the obstacle's vertices at the start and the end of a step from t to t + dt. */
 static void find_path(Barrier *b, PetscReal t, PetscReal dt)
 {
   const SbContactMesh m = b->mesh;
 
-  if (!b->scene.obstacle) return;
-  (*b->scene.pose)(b->data, t, &b->pose[0]);
-  (*b->scene.pose)(b->data, t + dt, &b->pose[1]);
+  if (!b->contact->obstacle) return;
+  SbContactPose(b->contact, t, &b->pose[0]);
+  SbContactPose(b->contact, t + dt, &b->pose[1]);
   for (PetscInt v = m->nbody_vertex; v < m->nvertex; v++) {
     SbPoseApply(&b->pose[0], m->X + 3 * v, b->from + 3 * (v - m->nbody_vertex));
     SbPoseApply(&b->pose[1], m->X + 3 * v, b->to + 3 * (v - m->nbody_vertex));
@@ -145,7 +116,8 @@ static void find_path(Barrier *b, PetscReal t, PetscReal dt)
 }
 
 /*
-  The separation direction of a pair at distance zero: the normal of the triangle, or of both edges, where surfaces face each other. n: from the second side to the first; false: none.
+  The separation direction of a pair at distance zero: the normal of the triangle, or of both edges, where
+  surfaces face each other. n: from the second side to the first; false: none.
 */
 static PetscBool facing(const Barrier *b, const SbContactPair *pair, const PetscReal normal[], PetscReal n[3])
 {
@@ -161,11 +133,10 @@ static PetscBool facing(const Barrier *b, const SbContactPair *pair, const Petsc
   SbCross(p, q, n);
   length = PetscSqrtReal(SbDot3(n, n));
   if (length <= 1e-3 * PetscSqrtReal(SbDot3(p, p) * SbDot3(q, q))) return PETSC_FALSE;
-  for (int k = 0; k < 4; k++) outward[k >= (edges ? 2 : 1)] += SbDot3(n, normal + 3 * pair->v[k]) / length;
+  for (int k = 0; k < 4; k++) outward[k >= (edges ? 2 : 1)] += SbDot3(n, normal + 3 * pair->v[k]);
   if (edges && outward[1] < 0.) length = -length;
   for (int i = 0; i < 3; i++) n[i] /= length;
-  for (int k = 0; k < 2 && length < 0.; k++) outward[k] = -outward[k];
-  return (PetscBool)(outward[0] < 0. && outward[1] > 0.);
+  return (PetscBool)(outward[0] * length < 0. && outward[1] * length > 0.);
 }
 
 static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, PetscReal dt, const PetscReal u[],
@@ -181,17 +152,16 @@ static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, Petsc
   if (!*first) PetscFunctionReturn(PETSC_SUCCESS);
   find_path(b, t, dt);
   PetscCall(SbContactMeshMarkDriven(m));
-  PetscCall(SbContactMeshGetPositions(m, u, NULL, b->x));
-  SbBarrierPlaceObstacle(b, 0., b->x);
+  PetscCall(SbBarrierPlace(b, u, 0., b->x));
   PetscCall(SbBarrierSeparate(e, s, dt, (PetscBool)!b->searched));
   b->searched = PETSC_TRUE;
   PetscCall(PetscMalloc1(3 * m->nvertex, &normal));
-  PetscCall(vertex_normals(b, b->x, normal));
+  SbContactMeshNormals(m, b->x, normal);
   PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
-    const PetscInt one = m->part[pair->v[0]], two = m->part[pair->v[pair->kind == SB_PAIR_EDGE_EDGE ? 2 : 1]];
-    SbInitialContact touch = {.body = {one, two}, .to = (e->dynamic ? 1. : APART) * width_of(b, pair)};
+    const PetscInt one = m->part[pair->v[0]], two = m->part[pair->v[SbContactPairSplit(pair)]];
+    SbInitialContact touch = {.body = {one, two}, .to = (e->dynamic ? 1. : APART) * of_pair(b, b->w, pair)};
     SbDistance d;
 
     if (one == two || !counts(b, pair)) continue;
@@ -200,10 +170,7 @@ static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, Petsc
     if (touch.gap > NEARBY * touch.to) continue;
     for (int k = 0; k < 3; k++) touch.n[k] = d.n[k];
     if (!pair->side && d.d < tiny && !facing(b, pair, normal, touch.n)) continue;
-    if (list->n == list->size) {
-      list->size = PetscMax(256, 2 * list->size);
-      PetscCall(PetscRealloc((size_t)list->size * sizeof(*list->touch), &list->touch));
-    }
+    PetscCall(SbReserve(list->n + 1, sizeof(*list->touch), &list->size, &list->touch));
     list->touch[list->n++] = touch;
   }
   PetscCall(PetscFree(normal));
@@ -212,8 +179,8 @@ static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, Petsc
 }
 
 /*
-  Moves touching surfaces apart to the gap APART w: Jacobi iterations over all closer pairs. u: local displacements, changed.
-  Every rank treats its own pairs; displacements of vertices are summed over all.
+  Moves touching surfaces apart to the gap APART w: Jacobi iterations over all closer pairs. u: local
+  displacements, changed. Every rank treats its own pairs; displacements of vertices are summed over all.
 */
 static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscBool *moved)
 {
@@ -229,16 +196,15 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
   for (int pass = 0; pass < PASSES; pass++) {
     PetscInt n = 0;
 
-    PetscCall(SbContactMeshGetPositions(m, u, NULL, b->x));
-    SbBarrierPlaceObstacle(b, 0., b->x);
-    PetscCall(vertex_normals(b, b->x, normal));
+    PetscCall(SbBarrierPlace(b, u, 0., b->x));
+    SbContactMeshNormals(m, b->x, normal);
     PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
     PetscCall(PetscArrayzero(push, 3 * m->nvertex));
     PetscCall(PetscArrayzero(count, m->nvertex));
     for (PetscInt i = 0; i < b->pairs->n; i++) {
       const SbContactPair *pair = &b->pairs->pair[i];
-      const PetscReal goal = APART * width_of(b, pair);
-      PetscReal gap, sum = 0., direction[3], side = 0.;
+      const PetscReal goal = APART * of_pair(b, b->w, pair);
+      PetscReal gap, sum = 0., direction[3], length;
       SbDistance d;
 
       if (!counts(b, pair)) continue;
@@ -249,24 +215,23 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
         /* distance zero: along the outward normal of the second side */
         for (int k = 0; k < 3; k++) {
           direction[k] = 0.;
-          for (int v = pair->kind == SB_PAIR_EDGE_EDGE ? 2 : 1; v < 4; v++)
-            direction[k] += normal[3 * pair->v[v] + k];
+          for (int v = SbContactPairSplit(pair); v < 4; v++) direction[k] += normal[3 * pair->v[v] + k];
         }
-        side = PetscSqrtReal(SbDot3(direction, direction));
-        if (side <= 0.) continue;
-        for (int k = 0; k < 3; k++) direction[k] /= side;
+        length = PetscSqrtReal(SbDot3(direction, direction));
+        if (length <= 0.) continue;
+        for (int k = 0; k < 3; k++) direction[k] /= length;
       }
       for (int k = 0; k < 4; k++) {
         if (!m->driven[pair->v[k]]) sum += PetscSqr(d.weight[k]);
       }
       if (sum <= 0.) continue;
       n++;
-      for (int k = 0; k < 12; k++) {
-        const PetscInt v = pair->v[k / 3];
+      for (int k = 0; k < 4; k++) {
+        const PetscInt v = pair->v[k];
 
-        if (!m->driven[v] && d.weight[k / 3] != 0.)
-          push[3 * v + k % 3] += (goal - gap) * d.weight[k / 3] / sum * direction[k % 3];
-        if (!m->driven[v] && d.weight[k / 3] != 0. && k % 3 == 0) count[v]++;
+        if (m->driven[v] || d.weight[k] == 0.) continue;
+        for (int j = 0; j < 3; j++) push[3 * v + j] += (goal - gap) * d.weight[k] / sum * direction[j];
+        count[v]++;
       }
     }
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &n, 1, MPIU_INT, MPI_SUM, s->comm));
@@ -285,50 +250,44 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
     }
   }
   PetscCall(PetscFree3(push, normal, count));
-
   b->known = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /*
-  Work of the obstacle's forces along its path in this step, J, this rank's: of the barrier, with its forces at the start or the end, and of friction. Forces rotate with the
-  obstacle, so the barrier's are integrated along the arc: moment times angle.
+  Work of the obstacle's forces along its path in this step, J, this rank's: of the barrier, with its forces
+  at the start or the end, and of friction. Forces rotate with the obstacle, so the barrier's are integrated
+  along the arc: moment times angle.
 */
 static void obstacle_works(const Barrier *b, PetscBool end, PetscReal *gaps, PetscReal *slip_work)
 {
   const SbContactMesh m = b->mesh;
 
   *gaps = *slip_work = 0.;
-  for (PetscInt i = 0; b->scene.obstacle && i < b->nactive + b->nfriction; i++) {
-    const Active *a = i < b->nactive ? &b->active[i] : NULL;
-    const SbContactPair *pair = a ? &b->pairs->pair[a->pair] : &b->friction[i - b->nactive].pair;
-    PetscReal energy, gradient[12];
+  for (PetscInt i = 0; b->contact->obstacle && i < b->nactive + b->friction.n; i++) {
+    const PetscBool friction = (PetscBool)(i >= b->nactive);
+    Term t;
 
-    if (!counts(b, pair)) continue;
-    if (a)
-      (void)SbBarrierForce(b, a, &energy, gradient);
-    else
-      (void)SbBarrierFriction(b, &b->friction[i - b->nactive], gradient);
-    for (int k = 0; k < 4; k++) {
-      const PetscInt v = 3 * (pair->v[k] - m->nbody_vertex);
-      const PetscReal *g = gradient + 3 * k;
+    SbBarrierTerm(b, i, &t);
+    if (!t.counts) continue;
+    for (PetscInt k = 0; k < t.n; k++) {
+      const PetscInt v = 3 * (t.v[k] - m->nbody_vertex);
       PetscReal way[3];
 
       if (v < 0) continue;
-      if (a) {
+      if (friction)
+        SbSubtract(b->to + v, b->from + v, way);
+      else
         SbPoseWay(&b->pose[0], &b->pose[1], &b->pose[end], (end ? b->to : b->from) + v, way);
-        *gaps += SbDot3(g, way);
-      } else {
-        for (int j = 0; j < 3; j++) *slip_work += g[j] * (b->to[v + j] - b->from[v + j]);
-      }
+      *(friction ? slip_work : gaps) += SbDot3(t.gradient + 3 * k, way);
     }
     /* friction: rotation of the obstacle beyond the displacement of its vertices */
-    if (!a) {
-      const FrictionPair *friction = &b->friction[i - b->nactive];
+    if (friction) {
+      const FrictionPair *pair = &b->friction.pair[i - b->nactive];
       PetscReal u[3];
-      const PetscReal y = SbBarrierSlip(b, friction, u), slope = SbBarrierSlope(b, y);
+      const PetscReal slope = SbBarrierSlope(b, SbBarrierSlip(b, pair, u));
 
-      *slip_work -= friction->force * slope * SbDot3(u, friction->rotation);
+      *slip_work -= pair->force * slope * SbDot3(u, pair->rotation);
     }
   }
 }
@@ -336,12 +295,13 @@ static void obstacle_works(const Barrier *b, PetscBool end, PetscReal *gaps, Pet
 /* Energy of the barrier at the current positions, J; this rank's. */
 static PetscReal gap_energy(const Barrier *b)
 {
-  PetscReal sum = 0., energy, gradient[12];
+  PetscReal sum = 0.;
 
   for (PetscInt i = 0; i < b->nactive; i++) {
-    if (!counts(b, &b->pairs->pair[b->active[i].pair])) continue;
-    (void)SbBarrierForce(b, &b->active[i], &energy, gradient);
-    sum += energy;
+    Term t;
+
+    SbBarrierTerm(b, i, &t);
+    if (t.counts) sum += t.energy;
   }
   return sum;
 }
@@ -375,41 +335,21 @@ static PetscErrorCode scale_width_barrier(SbEffect e, PetscReal factor, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* At the start of a step, local displacements u: widens the barrier as far as its energy grows by at most `growth`. */
-static PetscErrorCode widen(SbEffect e, const PetscReal u[])
-{
-  Barrier *b = (Barrier *)e->data;
-  const PetscReal old = b->scale;
-  PetscReal energy[2];
-
-  PetscFunctionBeginUser;
-  PetscCall(SbBarrierUpdate(b, u));
-  energy[0] = gap_energy(b);
-  set_scale(e, PetscMin(1., b->wider * old));
-  PetscCall(SbBarrierUpdate(b, u));
-  energy[1] = gap_energy(b);
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 2, MPIU_REAL, MPI_SUM, b->mesh->space->comm));
-  if (energy[1] - energy[0] > b->growth) set_scale(e, old);
-  b->wider = 0.;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscReal dt, PetscReal speed,
                                     PetscReal u0[], PetscBool *moved)
 {
   Barrier *b = (Barrier *)e->data;
   const SbContactMesh m = b->mesh;
-  PetscReal least = PETSC_MAX_REAL, unused;
+  PetscReal least = PETSC_MAX_REAL, energy[2], unused;
 
   PetscFunctionBeginUser;
   *moved = PETSC_FALSE;
   find_path(b, t, dt);
   b->progress = 0.;
-  b->nfriction = b->nspring = b->nbounce = 0;
+  b->friction.n = b->nspring = b->nbounce = 0;
   if (!b->begun) PetscCall(SbContactMeshMarkDriven(m));
   if (!b->begun || b->overlapping || b->parted) {
-    PetscCall(SbContactMeshGetPositions(m, u0, NULL, b->x));
-    SbBarrierPlaceObstacle(b, 0., b->x);
+    PetscCall(SbBarrierPlace(b, u0, 0., b->x));
     PetscCall(SbBarrierSeparate(e, s, dt, (PetscBool)(!b->begun && !b->searched && t == 0.)));
   }
   if (!b->begun && t == 0.) { /* not when it goes on from a checkpoint */
@@ -417,8 +357,19 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
     if (*moved) PetscCall(SbBarrierSeparate(e, s, dt, PETSC_FALSE));
   }
   b->begun = PETSC_TRUE;
-  if (b->wider > 0.) PetscCall(widen(e, u0));
   PetscCall(SbBarrierUpdate(b, u0));
+  if (b->wider > 0.) { /* widens the barrier as far as its energy grows by at most `growth` */
+    const PetscReal old = b->scale;
+
+    energy[0] = gap_energy(b);
+    set_scale(e, PetscMin(1., b->wider * old));
+    PetscCall(SbBarrierUpdate(b, u0));
+    energy[1] = gap_energy(b);
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 2, MPIU_REAL, MPI_SUM, s->comm));
+    if (energy[1] - energy[0] > b->growth) set_scale(e, old);
+    b->wider = 0.;
+    PetscCall(SbBarrierUpdate(b, u0));
+  }
   PetscCall(PetscArraycpy(b->start, b->x, 3 * m->nvertex));
   for (PetscInt i = 0; i < b->nactive; i++) least = PetscMin(least, b->active[i].gap);
   PetscCheck(least > 0., PETSC_COMM_SELF, PETSC_ERR_PLIB,
@@ -436,7 +387,7 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After a solve: friction takes the normal forces and directions of this solution, while its lag is too large and iterations are left. */
+/* After a solve: friction takes the normal forces and directions of the solution, while its lag is large. */
 static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscBool solved,
                                   PetscBool *again)
 {
@@ -445,7 +396,7 @@ static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], Pe
 
   PetscFunctionBeginUser;
   *again = PETSC_FALSE;
-  if (b->scene.friction <= 0. && (e->dynamic || !b->overlapping)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (b->contact->friction.mu <= 0. && (e->dynamic || !b->overlapping)) PetscFunctionReturn(PETSC_SUCCESS);
   if (e->dynamic && !b->lags && !solved) PetscFunctionReturn(PETSC_SUCCESS);
   last = (PetscBool)(++b->nlag >= (b->lags ? b->lags : e->dynamic ? 2 : LAGS));
   if (last && (b->lags || e->dynamic)) PetscFunctionReturn(PETSC_SUCCESS);
@@ -481,16 +432,15 @@ static PetscErrorCode safe_barrier(SbEffect e, SbSpace s, const PetscReal u0[], 
                                    PetscReal progress, PetscReal *part, PetscInt *nactive)
 {
   Barrier *b = (Barrier *)e->data;
-  PetscInt worst, nsearch;
+  PetscInt nsearch;
 
   PetscFunctionBeginUser;
   (void)s;
   PetscCall(SbBarrierUpdate(b, u0));
   nsearch = b->pairs->nsearch;
   *nactive = b->nactive;
-  PetscCall(SbContactMeshGetPositions(b->mesh, u1, NULL, b->other));
-  SbBarrierPlaceObstacle(b, progress, b->other);
-  PetscCall(SbContactPairsMaxStep(b->pairs, b->x, b->other, part, &worst));
+  PetscCall(SbBarrierPlace(b, u1, progress, b->other));
+  PetscCall(SbContactPairsMaxStep(b->pairs, b->x, b->other, part));
   /* the pairs were searched for anew */
   if (b->pairs->nsearch != nsearch) b->known = PETSC_FALSE;
   b->shortest = PetscMin(b->shortest, *part);
@@ -518,37 +468,36 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   before = b->energy;
   b->energy = gap_energy(b);
   obstacle_works(b, PETSC_TRUE, &power, &slip_work);
-  for (PetscInt i = 0; i < b->nfriction; i++) {
+  for (PetscInt i = 0; i < b->friction.n; i++) {
     PetscReal u[3];
+    const PetscReal slip = SbBarrierSlip(b, &b->friction.pair[i], u);
 
-    if (!counts(b, &b->friction[i].pair)) continue;
-    lost += b->friction[i].force * PetscSqr(SbBarrierSlip(b, &b->friction[i], u)) *
-            SbBarrierSlope(b, SbBarrierSlip(b, &b->friction[i], u));
+    if (counts(b, &b->friction.pair[i].pair))
+      lost += b->friction.pair[i].force * PetscSqr(slip) * SbBarrierSlope(b, slip);
   }
   for (PetscInt i = 0; i < b->nspring; i++) {
     const Spring *spring = &b->spring[i];
-    PetscReal push[15];
-
     const PetscReal way = SbBarrierSpringPlace(b, spring) - spring->start;
+    PetscReal push[15];
 
     if (m->own[spring->v[0]]) pushed += SbBarrierSpring(b, spring, push) * way;
     if (i >= b->nspring - b->nbounce) continue;
     gained += PetscMin(way, spring->goal - spring->start);
     asked += spring->goal - spring->start;
   }
-  b->step_work = before - b->energy + 0.5 * (b->obstacle_power + power) + slip_work - lost + pushed;
-  b->work += b->step_work;
+  e->work = before - b->energy + 0.5 * (b->obstacle_power + power) + slip_work - lost + pushed;
+  b->work += e->work;
   b->friction_loss += lost;
   b->parted = PETSC_FALSE;
   if (asked > 0.) b->stiffer = gained < HALF * asked ? 2. * b->stiffer : PetscMax(1., 0.5 * b->stiffer);
 
-  if (b->scene.friction > 0.) PetscCall(SbBarrierLag(b));
+  if (b->contact->friction.mu > 0.) PetscCall(SbBarrierLag(b));
   b->most_lag = PetscMax(b->most_lag, b->lag);
 
   for (PetscInt i = 0; i < b->nactive; i++) b->least = PetscMin(b->least, b->active[i].gap);
   b->most = PetscMax(b->most, b->nactive);
   if (!b->verify || b->overlapping) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbContactOverlapFind(b->mesh, b->scene.self, b->x, PETSC_FALSE, &b->overlap));
+  PetscCall(SbContactOverlapFind(b->mesh, b->contact->self, b->x, PETSC_FALSE, &b->overlap));
   PetscCheck(!b->overlap.ncrossing, s->comm, PETSC_ERR_PLIB,
              "The effect %s: at t = %g s %" PetscInt_FMT " edges go through triangles, one at (%g, %g, %g) m",
              e->name, (double)stage->t, b->overlap.ncrossing, (double)b->overlap.place[0],
@@ -556,18 +505,10 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode work_barrier(SbEffect e, PetscReal *work)
-{
-  PetscFunctionBeginUser;
-  *work = ((const Barrier *)e->data)->step_work;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Forces follow from the positions: only accumulated sums are saved. */
 static PetscErrorCode save_barrier(SbEffect e, SbSpace s, PetscInt *n, PetscReal **records)
 {
   const Barrier *b = (const Barrier *)e->data;
-
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
@@ -585,35 +526,18 @@ static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const Pet
                                    const PetscReal records[])
 {
   Barrier *b = (Barrier *)e->data;
-  PetscReal scale = 0.;
+  PetscReal sum[4] = {0.};
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
   (void)t;
   (void)u;
   PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
-  b->work = b->friction_loss = b->stiffer = 0.;
-  for (PetscInt i = 0; i < n; i++) {
-    b->stiffer += records[4 * i + 2];
-    scale += records[4 * i + 3];
-    if (rank) continue;
-    b->work += records[4 * i];
-    b->friction_loss += records[4 * i + 1];
-  }
-  if (scale > 0. && b->width == 0.) set_scale(e, scale);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode rename_barrier(SbEffect e, PetscInt nnode, const PetscInt from[], const PetscInt to[],
-                                     PetscInt *n, PetscReal records[])
-{
-  PetscFunctionBeginUser;
-  (void)e;
-  (void)nnode;
-  (void)from;
-  (void)to;
-  (void)n;
-  (void)records;
+  for (PetscInt k = 0; k < 4 * n; k++) sum[k % 4] += records[k];
+  b->work = rank ? 0. : sum[0];
+  b->friction_loss = rank ? 0. : sum[1];
+  b->stiffer = sum[2];
+  if (sum[3] > 0. && b->width == 0.) set_scale(e, sum[3]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -627,20 +551,21 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   PetscCall(PetscFree2(b->w, b->k));
   PetscCall(PetscFree3(b->x, b->start, b->other));
   PetscCall(PetscFree3(b->u, b->from, b->to));
-  PetscCall(SbPairsFree(&b->columns));
+  PetscCall(PetscFree(b->columns.slot));
+  PetscCall(PetscFree3(b->columns.column, b->columns.text, b->columns.place));
   PetscCall(PetscFree(b->active));
-  PetscCall(PetscFree(b->friction));
-  PetscCall(PetscFree(b->next));
+  PetscCall(PetscFree(b->friction.pair));
+  PetscCall(PetscFree(b->next.pair));
   PetscCall(SbContactBlocksFree(&b->blocks));
   PetscCall(PetscFree(b->spring));
   PetscCall(SbContactOverlapFree(&b->overlap));
-  e->data = b->data;
-  if (b->destroy) PetscCall((*b->destroy)(e));
+  e->data = b->contact;
+  PetscCall(SbContactDestroy(e));
   PetscCall(PetscFree(b));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrierScene *scene)
+PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
 {
   static const char *const obstacle[] = {"force_x",  "force_y",  "force_z",       "torque_x",
                                          "torque_y", "torque_z", "contacts",      "penetration",
@@ -650,56 +575,45 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrier
                              "contacts",       "penetration",  "penetration_mean", "normal_force",
                              "friction_force", "work",         "friction_loss",    "gap",
                              "energy",         "friction_lag", "unguarded"};
-  PetscReal steps;
+  Contact *contact = (Contact *)e->data;
   Barrier *b;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&b));
-  b->scene = *scene;
-  b->bounce.e = scene->restitution;
-  b->data = e->data;
-  b->destroy = e->ops.destroy;
+  b->contact = contact;
   PetscCall(SbOptionReal(scope, "barrier_width", &b->width));
   PetscCall(SbOptionReal(scope, "barrier_pressure", &b->pressure));
   PetscCall(SbOptionBool(scope, "verify", &b->verify));
   PetscCall(SbOptionInt(scope, "friction_solves", &b->lags));
   PetscCall(SbOptionReal(scope, "friction_tolerance", &b->lag_tolerance));
-  PetscCall(SbOptionReal(scope, "separation_steps", &steps));
-  SbOverlapSet(&b->parting, steps);
   e->data = b;
-  e->ops =
-    (SbEffectOps){.setfromoptions = e->ops.setfromoptions,
-                  .setup = setup_barrier,
-                  .force = SbEffectForce_Barrier,
-                  .touching = touching_barrier,
-                  .begin_barrier = begin_barrier,
-                  .safe = safe_barrier,
-                  .advance = advance_barrier,
-                  .lag = lag_barrier,
-                  .nearest = SbEffectNearest_Barrier,
-                  .meet = scene->restitution > 0. ? SbEffectMeet_Barrier : NULL,
-                  .restitution = scene->restitution > 0. ? SbEffectRestitution_Barrier : NULL,
-                  .scale_restitution = scene->restitution > 0. ? SbEffectScaleRestitution_Barrier : NULL,
-                  .potential = SbEffectPotential_Barrier,
-                  .hessian = SbEffectHessian_Barrier,
-                  .gap_forces = SbEffectGapForces_Barrier,
-                  .scale_width = scale_width_barrier,
-                  .accept = accept_barrier,
-                  .work = work_barrier,
-                  .save = save_barrier,
-                  .load = load_barrier,
-                  .rename = rename_barrier,
-                  .contact_force = SbEffectContactForce_Barrier,
-                  .gap = SbEffectGap_Barrier,
-                  .contact_points = SbEffectContactPoints_Barrier,
-                  .history = SbEffectHistory_Barrier,
-                  .summary = SbEffectSummary_Barrier,
-                  .destroy = destroy_barrier};
-  e->linear = e->steady = PETSC_FALSE;
-  e->saddle = PETSC_FALSE;
-  e->springs = (PetscBool)(scene->friction > 0.);
+  e->ops = (SbEffectOps){.setup = setup_barrier,
+                         .force = SbEffectForce_Barrier,
+                         .touching = touching_barrier,
+                         .begin_barrier = begin_barrier,
+                         .safe = safe_barrier,
+                         .advance = advance_barrier,
+                         .lag = lag_barrier,
+                         .nearest = SbEffectNearest_Barrier,
+                         .meet = e->euler ? SbEffectMeet_Barrier : NULL,
+                         .restitution = e->euler ? SbEffectRestitution_Barrier : NULL,
+                         .scale_restitution = e->euler ? SbEffectScaleRestitution_Barrier : NULL,
+                         .potential = SbEffectPotential_Barrier,
+                         .hessian = SbEffectHessian_Barrier,
+                         .gap_forces = SbEffectGapForces_Barrier,
+                         .scale_width = scale_width_barrier,
+                         .accept = accept_barrier,
+                         .save = save_barrier,
+                         .load = load_barrier,
+                         .gap = SbEffectGap_Barrier,
+                         .contact_points = SbEffectContactPoints_Barrier,
+                         .history = SbEffectHistory_Barrier,
+                         .summary = SbEffectSummary_Barrier,
+                         .destroy = destroy_barrier};
+  e->linear = PETSC_FALSE;
+  e->springs = (PetscBool)(contact->friction.mu > 0.);
   e->nstate = 4;
-  e->column = scene->obstacle ? obstacle : bodies;
-  e->ncolumn = scene->obstacle ? PETSC_STATIC_ARRAY_LENGTH(obstacle) : PETSC_STATIC_ARRAY_LENGTH(bodies);
+  e->column = contact->obstacle ? obstacle : bodies;
+  e->ncolumn = contact->obstacle ? PETSC_STATIC_ARRAY_LENGTH(obstacle) : PETSC_STATIC_ARRAY_LENGTH(bodies);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

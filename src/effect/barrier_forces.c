@@ -1,18 +1,27 @@
 /*
-  barrier_forces.c - the pairs of the response `barrier` at an iterate, their energy and its derivatives, and those of friction. barrier.c describes them.
+  barrier_forces.c - the pairs of the response `barrier` at an iterate, their energy and its derivatives, and
+  those of friction, described in barrier.c; lagged friction.
+
+  Normal forces and slip directions of friction are those of an earlier state y: the start of the step, or the
+  solve before. A solution x has the friction F(x; y) instead of F(x; x). The lag is sum |F(x; x) - F(x; y)|
+  over the nodes, relative to the sum of mu N over the pairs: the change of normal forces, closest points and
+  slip directions. Fixed-point iterations, one solve each, end when it is small (Li et al. 2020, section 5.7).
+  They converge if a change of friction changes normal forces by less than itself.
 */
 #include "barrier_impl.h"
 
 /* ------------------------------------------------------------------ where things are */
 
-/* Positions of the obstacle's vertices after the fraction `progress` of its path. */
-void SbBarrierPlaceObstacle(const Barrier *b, PetscReal progress, PetscReal x[])
+PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal progress, PetscReal x[])
 {
   const PetscInt first = 3 * b->mesh->nbody_vertex;
 
+  PetscFunctionBeginUser;
+  PetscCall(SbContactMeshGetPositions(b->mesh, u, x));
   for (PetscInt k = first; k < 3 * b->mesh->nvertex; k++)
     x[k] = progress == 1. ? b->to[k - first]
                           : b->from[k - first] + progress * (b->to[k - first] - b->from[k - first]);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static int compare_active(const void *x, const void *y, void *ctx)
@@ -28,7 +37,6 @@ static int compare_active(const void *x, const void *y, void *ctx)
   return 0;
 }
 
-/* Positions at the local displacements u, and the pairs with gaps below the width, in the order of their numbers. Collective. */
 PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
 {
   const PetscInt n = 3 * b->mesh->space->nnode_owned;
@@ -42,8 +50,7 @@ PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
   PetscCall(PetscArraycpy(b->u, u, n));
   b->now = b->progress;
   b->known = PETSC_TRUE;
-  PetscCall(SbContactMeshGetPositions(b->mesh, u, NULL, b->x));
-  SbBarrierPlaceObstacle(b, b->progress, b->x);
+  PetscCall(SbBarrierPlace(b, u, b->progress, b->x));
   PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
   b->nactive = 0;
   for (PetscInt i = 0; i < b->pairs->n; i++) {
@@ -51,11 +58,8 @@ PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
 
     if (SbContactPairSweptApart(b->mesh, &b->pairs->pair[i], b->x, b->x, b->w[0])) continue;
     a.gap = SbContactPairGap(b->mesh, &b->pairs->pair[i], b->x, &a.at);
-    if (a.gap >= width_of(b, &b->pairs->pair[i])) continue;
-    if (b->nactive == b->size) {
-      b->size = PetscMax(64, 2 * b->size);
-      PetscCall(PetscRealloc((size_t)b->size * sizeof(*b->active), &b->active));
-    }
+    if (a.gap >= of_pair(b, b->w, &b->pairs->pair[i])) continue;
+    PetscCall(SbReserve(b->nactive + 1, sizeof(*b->active), &b->size, &b->active));
     b->active[b->nactive++] = a;
   }
   if (b->nactive > 1) PetscCall(PetscTimSort(b->nactive, b->active, sizeof(*b->active), compare_active, b));
@@ -64,7 +68,6 @@ PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
 
 /* ------------------------------------------------------------------ forces */
 
-/* The tangential slip of a pair since the step began, m. */
 PetscReal SbBarrierSlip(const Barrier *b, const FrictionPair *friction, PetscReal u[3])
 {
   PetscReal normal = 0.;
@@ -81,7 +84,7 @@ PetscReal SbBarrierSlip(const Barrier *b, const FrictionPair *friction, PetscRea
 }
 
 /* Energy of friction, J, its gradient by the pair's vertices, N. */
-PetscReal SbBarrierFriction(const Barrier *b, const FrictionPair *friction, PetscReal gradient[12])
+static PetscReal friction_energy(const Barrier *b, const FrictionPair *friction, PetscReal gradient[12])
 {
   PetscReal u[3];
   const PetscReal y = SbBarrierSlip(b, friction, u), e = b->slip, slope = SbBarrierSlope(b, y);
@@ -90,12 +93,13 @@ PetscReal SbBarrierFriction(const Barrier *b, const FrictionPair *friction, Pets
   return friction->force * (y < e ? y * y / e - y * y * y / (3. * e * e) + e / 3. : y);
 }
 
-PetscReal SbBarrierForce(const Barrier *b, const Active *a, PetscReal *energy, PetscReal gradient[12])
+/* Normal force of a pair, N, its energy, J, and the gradient of that by the pair's vertices, N. */
+static PetscReal normal_force(const Barrier *b, const Active *a, PetscReal *energy, PetscReal gradient[12])
 {
   const SbContactPair *pair = &b->pairs->pair[a->pair];
   PetscReal force = 0., w2 = 0.;
 
-  SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, width_of(b, pair), pressure_of(b, pair), energy,
+  SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, of_pair(b, b->w, pair), of_pair(b, b->k, pair), energy,
                 gradient, PETSC_FALSE, NULL);
   for (int k = 0; k < 4; k++) {
     force -= a->at.weight[k] * SbDot3(gradient + 3 * k, a->at.n);
@@ -122,8 +126,8 @@ static void spread(const Barrier *b, PetscInt n, const PetscInt vertex[], PetscR
 }
 
 /*
-  An equilibrium gap g is proportional to the width w, so the error of the state is w du/dw to first order: (K + H) w du/dw = sum b'' g n, H the Hessian of the barrier. Its sign
-  does not matter here.
+  An equilibrium gap g is proportional to the width w, so the error of the state is w du/dw to first order: (K
+  + H) w du/dw = sum b'' g n, H the Hessian of the barrier. Its sign does not matter here.
 */
 PetscErrorCode SbEffectGapForces_Barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscReal f[],
                                          PetscReal *bound)
@@ -138,9 +142,9 @@ PetscErrorCode SbEffectGapForces_Barrier(SbEffect e, SbSpace s, const PetscReal 
     const Active *a = &b->active[i];
     const SbContactPair *pair = &b->pairs->pair[a->pair];
     PetscReal d[3], energy, gradient[12];
-    const PetscReal force = SbBarrierForce(b, a, &energy, gradient);
+    const PetscReal force = normal_force(b, a, &energy, gradient);
 
-    SbBarrier(a->gap, width_of(b, pair), pressure_of(b, pair), pair->area, d);
+    SbBarrier(a->gap, of_pair(b, b->w, pair), of_pair(b, b->k, pair), pair->area, d);
     if (d[0] <= 0.) continue;
     if (counts(b, pair)) *bound += 0.5 * force * a->gap;
     for (int k = 0; k < 12; k++)
@@ -150,31 +154,48 @@ PetscErrorCode SbEffectGapForces_Barrier(SbEffect e, SbSpace s, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* f += sign times the gradient of all energies at the current positions, N; returns their sum over this rank's pairs, J. */
+void SbBarrierTerm(const Barrier *b, PetscInt i, Term *t)
+{
+  const PetscInt k = i - b->nactive;
+  const SbContactPair *pair;
+
+  if (k < b->friction.n) {
+    pair = k < 0 ? &b->pairs->pair[b->active[i].pair] : &b->friction.pair[k].pair;
+    t->n = 4;
+    t->nfirst = SbContactPairSplit(pair);
+    t->v = pair->v;
+    t->counts = counts(b, pair);
+    t->weight = k < 0 ? b->active[i].at.weight : b->friction.pair[k].weight;
+    t->normal = k < 0 ? b->active[i].at.n : b->friction.pair[k].n;
+    t->force = 0.;
+    if (k < 0)
+      t->force = normal_force(b, &b->active[i], &t->energy, t->gradient);
+    else
+      t->energy = friction_energy(b, &b->friction.pair[k], t->gradient);
+  } else {
+    const Spring *spring = &b->spring[k - b->friction.n];
+
+    t->n = spring->n;
+    for (t->nfirst = 0; t->nfirst < t->n && spring->weight[t->nfirst] > 0.; t->nfirst++) continue;
+    t->v = spring->v;
+    t->weight = spring->weight;
+    t->normal = spring->normal;
+    t->counts = (PetscBool)b->mesh->own[spring->v[0]];
+    t->force = SbBarrierSpring(b, spring, t->gradient);
+    t->energy = 0.5 * t->force * (spring->goal - SbBarrierSpringPlace(b, spring));
+  }
+}
+
 PetscReal SbBarrierGradient(const Barrier *b, PetscReal sign, PetscReal f[])
 {
-  PetscReal sum = 0., energy, gradient[12];
+  PetscReal sum = 0.;
 
-  for (PetscInt i = 0; i < b->nactive; i++) {
-    const Active *a = &b->active[i];
-    const SbContactPair *pair = &b->pairs->pair[a->pair];
+  for (PetscInt i = 0; i < nterm(b); i++) {
+    Term t;
 
-    (void)SbBarrierForce(b, a, &energy, gradient);
-    spread(b, pair->side ? 1 : 4, pair->v, sign, gradient, f);
-    if (counts(b, pair)) sum += energy;
-  }
-  for (PetscInt i = 0; i < b->nfriction; i++) {
-    energy = SbBarrierFriction(b, &b->friction[i], gradient);
-    spread(b, b->friction[i].pair.side ? 1 : 4, b->friction[i].pair.v, sign, gradient, f);
-    if (counts(b, &b->friction[i].pair)) sum += energy;
-  }
-  for (PetscInt i = 0; i < b->nspring; i++) {
-    const Spring *spring = &b->spring[i];
-    PetscReal push[15];
-    const PetscReal force = SbBarrierSpring(b, spring, push);
-
-    spread(b, spring->n, spring->v, sign, push, f);
-    if (b->mesh->own[spring->v[0]]) sum += 0.5 * force * (spring->goal - SbBarrierSpringPlace(b, spring));
+    SbBarrierTerm(b, i, &t);
+    spread(b, t.n, t.v, sign, t.gradient, f);
+    if (t.counts) sum += t.energy;
   }
   return sum;
 }
@@ -204,16 +225,17 @@ PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal 
   *energy = SbBarrierGradient(b, 1., f);
 
   /* pairs whose slip has reversed since the Hessian was evaluated */
-  for (PetscInt i = 0; i < b->nfriction; i++) {
+  for (PetscInt i = 0; i < b->friction.n; i++) {
     PetscReal slip[3];
 
-    (void)SbBarrierSlip(b, &b->friction[i], slip);
-    if (SbDot3(slip, b->friction[i].slip) < 0.) b->friction[i].turns = PETSC_TRUE;
+    (void)SbBarrierSlip(b, &b->friction.pair[i], slip);
+    if (SbDot3(slip, b->friction.pair[i].slip) < 0.) b->friction.pair[i].turns = PETSC_TRUE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the blocks of a pair's Hessian where one of both vertices has nodes here; H[144], or with `weight` H[9] with respect to the weighted sum of positions. */
+/* Adds the blocks of a pair's Hessian where one of both vertices has nodes here; H[144], or with `weight`
+   H[9] with respect to the weighted sum of positions. */
 static PetscErrorCode add_blocks(Barrier *b, const SbContactPair *pair, const PetscReal weight[4],
                                  const PetscReal H[])
 {
@@ -248,17 +270,19 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
     const Active *a = &b->active[i];
     const SbContactPair *pair = &b->pairs->pair[a->pair];
 
-    SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, width_of(b, pair), pressure_of(b, pair), &energy,
-                  gradient, (PetscBool)(kind != SB_HESSIAN_EXACT), H);
+    SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, of_pair(b, b->w, pair), of_pair(b, b->k, pair),
+                  &energy, gradient, (PetscBool)(kind != SB_HESSIAN_EXACT), H);
     PetscCall(add_blocks(b, pair, NULL, H));
   }
 
   /*
-  friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2); the parabola that bounds f0 from above has f0'/u instead of f0''. A sliding pair whose slip reversed in the last trial step
-    is treated as sticking: a spring with the force mu N at the slip e replaces mu N f0'. If a full step leaves it beyond e, it slides.
+  friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2); the parabola that bounds f0 from above has f0'/u
+  instead of f0''. A sliding pair whose slip reversed in the last trial step
+    is treated as sticking: a spring with the force mu N at the slip e replaces mu N f0'. If a full step
+    leaves it beyond e, it slides.
   */
-  for (PetscInt i = 0; i < b->nfriction; i++) {
-    FrictionPair *friction = &b->friction[i];
+  for (PetscInt i = 0; i < b->friction.n; i++) {
+    FrictionPair *friction = &b->friction.pair[i];
     PetscReal T[9];
     const PetscReal y = SbBarrierSlip(b, friction, friction->slip), w = b->slip;
     PetscReal slope = SbBarrierSlope(b, y), curve = y < w ? 2. / w - 2. * y / (w * w) : 0.;
@@ -302,5 +326,82 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
     }
   }
   PetscCall(SbContactBlocksToNodes(b->mesh, &b->blocks, blocks));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ lagged friction */
+
+/* Displacement in the step of the obstacle's contact point by rotation, beyond that of its vertices. */
+static void find_rotation(const Barrier *b, PetscBool end, const Active *a, FrictionPair *friction)
+{
+  const SbContactMesh m = b->mesh;
+  const PetscInt *v = b->pairs->pair[a->pair].v;
+  PetscReal X[3], at[3] = {0}, other[3], sign = 0.;
+
+  for (int k = 0; k < 4; k++) {
+    if (v[k] >= m->nbody_vertex || friction->weight[k] == 0.) continue;
+    sign = friction->weight[k] > 0. ? 1. : -1.;
+    for (int i = 0; i < 3; i++) at[i] += PetscAbsReal(friction->weight[k]) * b->x[3 * v[k] + i];
+  }
+  for (int i = 0; i < 3; i++) at[i] -= sign * a->gap * friction->n[i];
+  SbPoseInvert(&b->pose[end], at, X);
+  SbPoseApply(&b->pose[!end], X, other);
+  for (int i = 0; i < 3; i++) friction->rotation[i] = sign * (end ? at[i] - other[i] : other[i] - at[i]);
+  for (int k = 0; k < 4; k++) {
+    const PetscInt o = 3 * (v[k] - m->nbody_vertex);
+
+    for (int i = 0; i < 3 && o >= 0; i++)
+      friction->rotation[i] += friction->weight[k] * (b->to[o + i] - b->from[o + i]);
+  }
+}
+
+PetscErrorCode SbBarrierFindFriction(Barrier *b, PetscBool end)
+{
+  PetscFunctionBeginUser;
+  b->next.n = 0;
+  for (PetscInt i = 0; b->contact->friction.mu > 0. && i < b->nactive; i++) {
+    const Active *a = &b->active[i];
+    const SbContactPair *pair = &b->pairs->pair[a->pair];
+    PetscReal energy, gradient[12];
+    FrictionPair friction = {.pair = *pair};
+
+    friction.force = b->contact->friction.mu * normal_force(b, a, &energy, gradient);
+    PetscCall(PetscArraycpy(friction.weight, a->at.weight, 4));
+    PetscCall(PetscArraycpy(friction.n, a->at.n, 3));
+    if (b->contact->obstacle) find_rotation(b, end, a, &friction);
+    PetscCall(SbReserve(b->next.n + 1, sizeof(*b->next.pair), &b->next.size, &b->next.pair));
+    b->next.pair[b->next.n++] = friction;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbBarrierSwapFriction(Barrier *b)
+{
+  const FrictionPairs friction = b->friction;
+
+  b->friction = b->next;
+  b->next = friction;
+}
+
+PetscErrorCode SbBarrierLag(Barrier *b)
+{
+  const SbSpace s = b->mesh->space;
+  PetscReal *f, sum[2] = {0.};
+
+  PetscFunctionBeginUser;
+  PetscCall(SbBarrierFindFriction(b, PETSC_TRUE));
+
+  /* the normal forces cancel */
+  PetscCall(PetscCalloc1(3 * s->nnode, &f));
+  (void)SbBarrierGradient(b, 1., f);
+  SbBarrierSwapFriction(b);
+  (void)SbBarrierGradient(b, -1., f);
+  SbBarrierSwapFriction(b);
+  for (PetscInt i = 0; i < s->nnode_owned; i++) sum[0] += PetscSqrtReal(SbDot3(f + 3 * i, f + 3 * i));
+  for (PetscInt i = 0; i < b->next.n; i++)
+    sum[1] += counts(b, &b->next.pair[i].pair) ? b->next.pair[i].force : 0.;
+  PetscCall(PetscFree(f));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, s->comm));
+  b->lag = sum[1] > 0. ? sum[0] / sum[1] : 0.;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -2,9 +2,20 @@
   barrier_impl.h - the response `barrier`: shared by the files barrier*.c.
 */
 #pragma once
-#include "barrier.h"
-#include "overlap.h"
-#include "restitution.h"
+#include "contact.h"
+#include "sbbarrier.h"
+
+/* Columns of the history for each pair of bodies (barrier_output.c). */
+typedef struct {
+  PetscInt fixed, nsurface; /* columns of the effect before those of pairs; bodies whose surface takes part */
+  PetscInt *slot;           /* [nbody] number among these bodies, or -1 */
+  PetscInt *place;          /* [nsurface][nsurface] first column of a pair, the lower body first */
+  const char **column;      /* [ncolumn] all of the effect */
+  char (*text)[3 * SB_NAME_MAX]; /* names of the columns behind the fixed ones */
+} SbPairs;
+/* Appends the columns of pairs to those of e; takes_part[nbody]: the body's surface takes part. */
+PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh, const PetscBool takes_part[], PetscBool self,
+                            SbPairs *pairs);
 
 /* A pair with a gap below the width, at the current positions. */
 typedef struct {
@@ -17,11 +28,15 @@ typedef struct {
 typedef struct {
   SbContactPair pair;
   PetscReal weight[4], n[3], force; /* mu N, N */
-  PetscReal rotation
-    [3]; /* displacement of the obstacle's contact point by rotation, beyond that of its vertices, m; with the sign of its weights */
+  PetscReal rotation[3];   /* displacement of the obstacle's contact point by rotation, beyond that of its
+                              vertices, m; with the sign of its weights */
   PetscReal slip[3];       /* at the last Hessian, m */
   PetscBool turns, sticks; /* slip has reversed since: treated as sticking in the Hessian */
 } FrictionPair;
+typedef struct {
+  PetscInt n, size;
+  FrictionPair *pair; /* [n] */
+} FrictionPairs;
 
 /* A one-sided spring along a direction in this step: separates an overlap, or enforces restitution. */
 typedef struct {
@@ -34,17 +49,13 @@ typedef struct {
 } Spring;
 
 typedef struct {
-  SbBarrierScene scene;
-  void *data; /* data of the type contact */
-  PetscErrorCode (*destroy)(SbEffect e);
+  Contact *contact; /* owned */
   SbContactMesh mesh;
   SbContactPairs pairs;
   PetscReal width, pressure; /* as given; 0: by body */
-  PetscReal *w,
-    *k; /* [nbody+1] width, m, and stiffness, Pa, of each body; of the obstacle infinite, so that the body's apply */
-  PetscReal scale; /* w over its default, 0..1 (-accuracy) */
-  PetscReal wider,
-    growth; /* largest factor on it at the next step, 0: none; largest growth of the barrier's energy by it, J */
+  PetscReal *w, *k;          /* [nbody+1] width, m, and stiffness, Pa, of each body; obstacle: infinite */
+  PetscReal scale;           /* w over its default, 0..1 (-accuracy) */
+  PetscReal wider, growth;   /* largest factor on it at the next step, 0: none; growth of energy by it, J */
   PetscBool verify, begun, searched; /* option; the run has begun; overlaps were searched for */
   PetscReal *x, *u;        /* [nvertex][3] current positions, m; [nnode_owned][3] displacements of them, m */
   PetscReal *start;        /* [nvertex][3] at the start of the step, m */
@@ -54,11 +65,8 @@ typedef struct {
   PetscBool known;         /* x and active are up to date for u and progress */
   PetscInt nactive, size;
   Active *active;
-  PetscInt nfriction, friction_size;
-  FrictionPair *friction;
-  SbContactBlocks blocks;    /* of the last Hessian */
-  PetscInt nnext, next_size; /* the same with closest points and normal forces at the end of the step */
-  FrictionPair *next;
+  FrictionPairs friction, next; /* next: with closest points and normal forces at the end of the step */
+  SbContactBlocks blocks;       /* of the last Hessian */
   SbPose pose[2];               /* of the obstacle at the start and the end of the step */
   PetscInt lags, nlag;          /* lagged-friction iterations of a step: the most; of this step */
   PetscReal lag_tolerance, lag; /* tolerance of the lag; the lag, relative to mu N of all pairs */
@@ -70,33 +78,24 @@ typedef struct {
   PetscBool overlapping, announced; /* there is overlap; a warning was given */
   PetscBool parted;                 /* there was at the start of this load step */
   SbContactOverlap overlap;
-  SbOverlap parting;
   PetscReal stiffer;             /* factor on the stiffness of springs, by their success in the last steps */
   PetscInt nspring, spring_size; /* those of overlap, the same on every rank, */
   PetscInt nbounce;              /* then those of restitution, of this rank's pairs */
   Spring *spring;
-  SbRestitution bounce;
   PetscReal least, shortest; /* smallest gap and shortest safe part of the run */
   PetscInt most;             /* largest number of active pairs of the run */
   SbPairs columns;
   PetscReal energy; /* barrier's energy at the start, then at the end of the step, J; this rank's, as below */
   PetscReal obstacle_power;      /* work along the obstacle's path in this step, forces of its start, J */
-  PetscReal step_work;           /* on the bodies in the last step, J */
   PetscReal work, friction_loss; /* since the start, J */
 } Barrier;
 
-static inline PetscReal width_of(const Barrier *b, const SbContactPair *pair)
+/* The value of a pair from those of its sides: width or pressure. */
+static inline PetscReal of_pair(const Barrier *b, const PetscReal value[], const SbContactPair *pair)
 {
   const PetscInt *part = b->mesh->part;
 
-  return PetscMin(b->w[part[pair->v[0]]], b->w[part[pair->v[pair->side ? 1 : 2]]]);
-}
-
-static inline PetscReal pressure_of(const Barrier *b, const SbContactPair *pair)
-{
-  const PetscInt *part = b->mesh->part;
-
-  return PetscMin(b->k[part[pair->v[0]]], b->k[part[pair->v[pair->side ? 1 : 2]]]);
+  return PetscMin(value[part[pair->v[0]]], value[part[pair->v[SbContactPairSplit(pair)]]]);
 }
 
 /* Whether this rank counts the pair. */
@@ -105,10 +104,8 @@ static inline PetscBool counts(const Barrier *b, const SbContactPair *pair)
   return (PetscBool)b->mesh->own[pair->v[pair->v[0] < b->mesh->nbody_vertex ? 0 : 1]];
 }
 
-/* Positions at the local displacements u, and the pairs with gaps below the width, in the order of their numbers. Collective. */
+/* Positions at the local displacements u; pairs with gaps below the width, ordered by number. Collective. */
 PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[]);
-/* Normal force of a pair, N, its energy, J, and the gradient of that by the pair's vertices, N. */
-PetscReal SbBarrierForce(const Barrier *b, const Active *a, PetscReal *energy, PetscReal gradient[12]);
 /* Tangential slip u of a pair since the step began, m; its length. */
 PetscReal SbBarrierSlip(const Barrier *b, const FrictionPair *friction, PetscReal u[3]);
 /* f0'/y of the slip y, 1/m. */
@@ -116,15 +113,14 @@ static inline PetscReal SbBarrierSlope(const Barrier *b, PetscReal y)
 {
   return y < b->slip ? 2. / b->slip - y / PetscSqr(b->slip) : 1. / y;
 }
-/* Normal forces and directions at the current positions, at the end of the step (`end`) or its start, into `next`. */
+/* Into `next` normal forces and directions at the current positions, at the end of the step or its start. */
 PetscErrorCode SbBarrierFindFriction(Barrier *b, PetscBool end);
 /* Swaps `next` and the friction in use. */
 void SbBarrierSwapFriction(Barrier *b);
-/* Computes `lag` (barrier_friction.c), with the normal forces and directions at the end of the step in `next`. Collective. */
+/* Computes `lag` (barrier_forces.c), and `next` at the end of the step. Collective. */
 PetscErrorCode SbBarrierLag(Barrier *b);
-/* Energy of friction, J, its gradient by the pair's vertices, N. */
-PetscReal SbBarrierFriction(const Barrier *b, const FrictionPair *friction, PetscReal gradient[12]);
-/* Finds overlaps at the current positions, and the springs that separate them in a step of length dt, s; `first` of a run: errors where they cannot. Collective. */
+/* Finds overlaps at the current positions, and the springs that separate them in a step of length dt, s;
+   `first` of a run: errors where they cannot. Collective. */
 PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace space, PetscReal dt, PetscBool first);
 /* normal . sum weight x of a spring at the current positions, m. */
 static inline PetscReal SbBarrierSpringPlace(const Barrier *b, const Spring *spring)
@@ -144,14 +140,25 @@ static inline PetscReal SbBarrierSpring(const Barrier *b, const Spring *spring, 
   for (int k = 0; k < 15; k++) gradient[k] = -force * spring->weight[k / 3] * spring->normal[k % 3];
   return force;
 }
-/* f += sign times the gradient of all energies at the current positions, N; returns their sum over this rank's pairs, J. */
+/* A term of the potential at the current positions: active pairs, then those with friction, then springs. */
+typedef struct {
+  PetscInt n, nfirst; /* number of its vertices, and of those of the first side */
+  const PetscInt *v;
+  PetscBool counts;                 /* this rank counts it */
+  PetscReal energy, force;          /* J; normal force, 0 of friction, N */
+  PetscReal gradient[15];           /* of the energy by the vertices, N */
+  const PetscReal *weight, *normal; /* normal . sum weight x is the gap or its like */
+} Term;
+static inline PetscInt nterm(const Barrier *b)
+{
+  return b->nactive + b->friction.n + b->nspring;
+}
+void SbBarrierTerm(const Barrier *b, PetscInt i, Term *term);
+/* f += sign times the gradient of all energies at the current positions, N; returns this rank's sum, J. */
 PetscReal SbBarrierGradient(const Barrier *b, PetscReal sign, PetscReal f[]);
 
-/* Positions of the obstacle's vertices after the fraction `progress` of its path, into x[nvertex][3], m. */
-void SbBarrierPlaceObstacle(const Barrier *b, PetscReal progress, PetscReal x[]);
-
-/* Appends a spring of this step. Not collective. */
-PetscErrorCode SbBarrierAddSpring(Barrier *b, const Spring *spring);
+/* x[nvertex][3] = positions, m, at u and after the fraction `progress` of the obstacle's path. Collective. */
+PetscErrorCode SbBarrierPlace(const Barrier *b, const PetscReal u[], PetscReal progress, PetscReal x[]);
 
 /* Operations of the effect (sbeffect.h). */
 PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const PetscReal u0[],
@@ -165,7 +172,6 @@ PetscErrorCode SbEffectGapForces_Barrier(SbEffect e, SbSpace s, const PetscReal 
                                          PetscReal *bound);
 PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[], SbContactHessian kind,
                                        SbBlocks *blocks, PetscReal r[]);
-PetscErrorCode SbEffectContactForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal f[]);
 PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
                                        PetscReal values[]);
 PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStage *stage,

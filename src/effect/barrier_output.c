@@ -3,66 +3,111 @@
 */
 #include "barrier_impl.h"
 
-PetscErrorCode SbEffectContactForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal f[])
+#define PAIRS 200 /* most pairs of bodies with columns */
+
+/* ------------------------------------------------------------------ columns for each pair of bodies */
+
+static const char *const apart_names[] = {"force_x", "force_y", "force_z", "contacts"};
+static const char *const self_names[] = {"normal_force", "contacts"};
+#define APART 4 /* columns of two bodies */
+#define SELF 2  /* and of one with itself, whose net force is zero */
+
+/* The columns of two bodies, or of one with itself, behind the n that there are. */
+static PetscErrorCode name_columns(SbEffect e, SbPairs *p, const char a[], const char b[], PetscInt *n)
 {
-  Barrier *b = (Barrier *)e->data;
+  const PetscBool apart = (PetscBool)(a != b);
 
   PetscFunctionBeginUser;
-  (void)s;
-  if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbBarrierUpdate(b, stage->u));
-  (void)SbBarrierGradient(b, -1., f);
+  for (int k = 0; k < (apart ? APART : SELF); k++, (*n)++) {
+    char *name = p->text[*n - p->fixed];
+
+    PetscCall(
+      PetscSNPrintf(name, sizeof(p->text[0]), "%s_%s_%s", a, b, (apart ? apart_names : self_names)[k]));
+    for (PetscInt i = 0; i < *n; i++)
+      PetscCheck(strcmp(name, p->column[i]), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+                 "-effect_%s_pairs yes: history.csv would have two columns %s_%s: give a body another name",
+                 e->name, e->name, name);
+    p->column[*n] = name;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* values += force, N, and torque, N m, of the obstacle on the bodies, from the gradient of an energy with respect to n vertices. */
-static void add_force(const Barrier *b, const SbPose *pose, PetscInt n, const PetscInt v[],
-                      const PetscReal gradient[], PetscReal values[6])
+PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh, const PetscBool takes_part[], PetscBool self, SbPairs *p)
 {
-  for (PetscInt k = 0; k < n; k++) {
+  PetscInt64 npair;
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(mesh->nbody, &p->slot));
+  for (PetscInt b = 0; b < mesh->nbody; b++) p->slot[b] = takes_part[b] ? p->nsurface++ : -1;
+  npair = (PetscInt64)p->nsurface * (p->nsurface - 1) / 2 + (self ? p->nsurface : 0);
+  PetscCheck(npair <= PAIRS, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_pairs yes: the %" PetscInt_FMT " bodies of -effect_%s_on make %" PetscInt64_FMT
+             " pairs, more than the %d that history.csv may have columns for: name fewer sets, or use "
+             "-output_contacts yes",
+             e->name, p->nsurface, e->name, npair, PAIRS);
+  n = p->fixed = e->ncolumn;
+  PetscCall(PetscMalloc3(n + APART * (PetscInt)npair, &p->column, APART * npair, &p->text,
+                         p->nsurface * p->nsurface, &p->place));
+  PetscCall(PetscArraycpy(p->column, e->column, n));
+  for (PetscInt a = 0; a < mesh->nbody; a++) {
+    for (PetscInt b = a; b < mesh->nbody; b++) {
+      if (p->slot[a] < 0 || p->slot[b] < 0 || (a == b && !self)) continue;
+      p->place[p->nsurface * p->slot[a] + p->slot[b]] = n;
+      PetscCall(name_columns(e, p, mesh->body[a].name, mesh->body[b].name, &n));
+    }
+  }
+  e->column = p->column;
+  e->ncolumn = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds a contact pair of the bodies `first` and `second` to values[]: force on the first, N. */
+static void add_pair(const SbPairs *p, PetscInt first, PetscInt second, PetscReal normal_force,
+                     const PetscReal force[3], PetscReal values[])
+{
+  const PetscInt low = PetscMin(first, second), high = PetscMax(first, second);
+  PetscReal *at;
+
+  if (!p->column) return;
+  at = values + p->place[p->nsurface * p->slot[low] + p->slot[high]];
+  if (low == high) {
+    at[0] += normal_force;
+    at[1] += normal_force > 0.;
+    return;
+  }
+  for (int k = 0; k < 3; k++) at[k] += first == high ? force[k] : -force[k];
+  at[3] += normal_force > 0.;
+}
+
+/* ------------------------------------------------------------------ output */
+
+/* values += force, N, and torque, N m, of the obstacle on the bodies. */
+static void add_force(const Barrier *b, const SbPose *pose, const Term *t, PetscReal values[6])
+{
+  for (PetscInt k = 0; k < t->n; k++) {
     PetscReal arm[3], moment[3];
 
-    if (v[k] >= b->mesh->nbody_vertex) continue;
-    for (int j = 0; j < 3; j++) arm[j] = b->x[3 * v[k] + j] - b->scene.centre[j] - pose->d[j];
-    SbCross(arm, gradient + 3 * k, moment);
+    if (t->v[k] >= b->mesh->nbody_vertex) continue;
+    for (int j = 0; j < 3; j++) arm[j] = b->x[3 * t->v[k] + j] - b->contact->path.point[j] - pose->d[j];
+    SbCross(arm, t->gradient + 3 * k, moment);
     for (int j = 0; j < 3; j++) {
-      values[j] -= gradient[3 * k + j];
+      values[j] -= t->gradient[3 * k + j];
       values[3 + j] -= moment[j];
     }
   }
 }
 
-/* The bodies of a pair, and the force on the first one from the gradient of its energy, N. */
-static void force_between(const Barrier *b, const SbContactPair *pair, const PetscReal gradient[12],
-                          PetscInt body[2], PetscReal force[3])
-{
-  const int split = pair->kind == SB_PAIR_EDGE_EDGE ? 2 : 1;
-
-  body[0] = b->mesh->part[pair->v[0]];
-  body[1] = b->mesh->part[pair->v[2]];
-  for (int j = 0; j < 3; j++) {
-    force[j] = 0.;
-    for (int k = 0; k < split; k++) force[j] -= gradient[3 * k + j];
-  }
-}
-
-/* Largest current depth of the overlaps found at the start of the step, m. */
-static PetscReal deepest_of(const Barrier *b)
-{
-  PetscReal deepest = 0.;
-
-  for (PetscInt i = 0; i < b->nspring; i++)
-    deepest =
-      PetscMax(deepest, b->spring[i].depth + b->spring[i].start - SbBarrierSpringPlace(b, &b->spring[i]));
-  return deepest;
-}
-
+/* Force and torque of an obstacle, or forces between bodies; energy of the barrier; work and loss so far. */
 PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
                                        PetscReal values[])
 {
+  /* of bodies, and of an obstacle */
+  enum { CONTACTS, PENETRATION, GAP, ENERGY, LOSS, LAG, UNGUARDED };
+  static const int places[2][7] = {{0, 1, 7, 8, 6, 9, 10}, {6, 7, 8, 9, 10, 11, 12}};
   Barrier *b = (Barrier *)e->data;
-  PetscReal least = PETSC_MAX_REAL, gradient[12], push[15], energy, force[3], *v = values;
-  PetscInt body[2];
+  const int *at = places[b->contact->obstacle != NULL];
+  PetscReal least = PETSC_MAX_REAL;
   PetscMPIInt rank;
   SbPose pose;
 
@@ -73,199 +118,111 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
   PetscCall(SbBarrierUpdate(b, stage->u));
   for (PetscInt i = 0; i < b->nactive; i++) least = PetscMin(least, b->active[i].gap);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPIU_REAL, MPI_MIN, s->comm));
-  if (least == PETSC_MAX_REAL) least = 0.;
   PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
+  if (b->contact->obstacle) SbContactPose(b->contact, stage->t, &pose);
+  for (PetscInt i = 0; i < nterm(b); i++) {
+    PetscReal force[3] = {0.};
+    Term t;
 
-  /* an obstacle: force, torque, contacts, penetration, gap, energy, friction_loss, friction_lag, unguarded */
-  if (b->scene.obstacle) {
-    (*b->scene.pose)(b->data, stage->t, &pose);
-    for (PetscInt i = 0; i < b->nactive; i++) {
-      const SbContactPair *pair = &b->pairs->pair[b->active[i].pair];
-
-      if (!counts(b, pair)) continue;
-      (void)SbBarrierForce(b, &b->active[i], &energy, gradient);
-      add_force(b, &pose, pair->side ? 1 : 4, pair->v, gradient, v);
-      v[6]++;
-      v[9] += energy;
+    SbBarrierTerm(b, i, &t);
+    if (!t.counts) continue;
+    values[at[CONTACTS]] += i < b->nactive || t.force > 0.;
+    if (i < b->nactive) values[at[ENERGY]] += t.energy;
+    if (b->contact->obstacle) {
+      add_force(b, &pose, &t, values);
+      continue;
     }
-    for (PetscInt i = 0; i < b->nfriction; i++) {
-      const SbContactPair *pair = &b->friction[i].pair;
-
-      if (!counts(b, pair)) continue;
-      (void)SbBarrierFriction(b, &b->friction[i], gradient);
-      add_force(b, &pose, pair->side ? 1 : 4, pair->v, gradient, v);
-    }
-    for (PetscInt i = 0; i < b->nspring; i++) {
-      const Spring *spring = &b->spring[i];
-
-      if (!b->mesh->own[spring->v[0]]) continue;
-      v[6] += SbBarrierSpring(b, spring, push) > 0.;
-      add_force(b, &pose, spring->n, spring->v, push, v);
-    }
-    v[10] = b->friction_loss;
-    if (!rank) {
-      v[7] = deepest_of(b);
-      v[8] = least;
-      v[11] = b->lag;
-      v[12] = b->overlapping ? (PetscReal)b->overlap.ncrossing : 0.;
-    }
-    PetscFunctionReturn(PETSC_SUCCESS);
+    for (int k = 0; k < 3 * t.nfirst; k++) force[k % 3] -= t.gradient[k];
+    values[3] += t.force;
+    if (i >= b->nactive && i < b->nactive + b->friction.n) values[4] += PetscSqrtReal(SbDot3(force, force));
+    add_pair(&b->columns, b->mesh->part[t.v[0]], b->mesh->part[t.v[t.n - 1]], t.force, force, values);
   }
-
-  /* bodies: contacts, penetration, its mean, normal force, friction force, work, friction_loss, gap, energy, friction_lag, unguarded, pairs */
-  for (PetscInt i = 0; i < b->nactive; i++) {
-    const SbContactPair *pair = &b->pairs->pair[b->active[i].pair];
-    PetscReal normal;
-
-    if (!counts(b, pair)) continue;
-    normal = SbBarrierForce(b, &b->active[i], &energy, gradient);
-    v[0]++;
-    v[3] += normal;
-    v[8] += energy;
-    force_between(b, pair, gradient, body, force);
-    SbPairsAdd(&b->columns, body[0], body[1], normal, force, values);
-  }
-  for (PetscInt i = 0; i < b->nfriction; i++) {
-    if (!counts(b, &b->friction[i].pair)) continue;
-    (void)SbBarrierFriction(b, &b->friction[i], gradient);
-    force_between(b, &b->friction[i].pair, gradient, body, force);
-    v[4] += PetscSqrtReal(SbDot3(force, force));
-    SbPairsAdd(&b->columns, body[0], body[1], 0., force, values);
-  }
-  for (PetscInt i = 0; i < b->nspring; i++) {
-    const Spring *spring = &b->spring[i];
-    PetscReal normal;
-
-    if (!b->mesh->own[spring->v[0]]) continue;
-    normal = SbBarrierSpring(b, spring, push);
-    body[0] = b->mesh->part[spring->v[0]];
-    body[1] = b->mesh->part[spring->v[spring->n - 1]];
-    for (int j = 0; j < 3; j++) force[j] = normal * spring->normal[j];
-    v[0] += normal > 0.;
-    v[3] += normal;
-    SbPairsAdd(&b->columns, body[0], body[1], normal, force, values);
-  }
-  if (!rank) v[1] = deepest_of(b);
-  v[5] = b->work;
-  v[6] = b->friction_loss;
-  if (!rank) {
-    v[7] = least;
-    v[9] = b->lag;
-    v[10] = b->overlapping ? (PetscReal)b->overlap.ncrossing : 0.;
-  }
+  if (!b->contact->obstacle) values[5] = b->work;
+  values[at[LOSS]] = b->friction_loss;
+  if (rank) PetscFunctionReturn(PETSC_SUCCESS);
+  values[at[GAP]] = least == PETSC_MAX_REAL ? 0. : least;
+  values[at[LAG]] = b->lag;
+  values[at[UNGUARDED]] = b->overlapping ? (PetscReal)b->overlap.ncrossing : 0.;
+  for (PetscInt i = 0; i < b->nspring; i++) /* of the overlaps found at the start of the step */
+    values[at[PENETRATION]] = PetscMax(values[at[PENETRATION]], b->spring[i].depth + b->spring[i].start -
+                                                                  SbBarrierSpringPlace(b, &b->spring[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The contact point of a pair: its closest point on the body, normal and gap. */
-static SbContactPoint point_of(const Barrier *b, const SbContactPair *pair, const PetscReal weight[4],
-                               const PetscReal n[3], PetscReal gap)
+/* The contact point of a term: its place on the body, the force there; the gap is left to the caller. */
+static SbContactPoint point_of(const Barrier *b, const Term *t)
 {
-  const SbContactMesh m = b->mesh;
-  const PetscInt nbody = m->space->mesh->nbody, first = m->part[pair->v[0]],
-                 second = m->part[pair->v[pair->side ? 1 : 2]];
+  const PetscInt *part = b->mesh->part, nbody = b->mesh->space->mesh->nbody, first = part[t->v[0]],
+                 second = part[t->v[t->nfirst]];
   const PetscBool turned = (PetscBool)(first == nbody);
-  const int split = pair->kind == SB_PAIR_EDGE_EDGE && !pair->side ? 2 : 1;
-  SbContactPoint p = {.gap = gap};
+  SbContactPoint p = {
+    .id = {t->v[0], t->v[1], t->v[2]},
+    .body = {turned ? second : first, turned || second == nbody ? -1 : second},
+  };
+  PetscReal sum = 0.;
 
-  for (int k = 0; k < 3; k++) p.id[k] = pair->v[k];
-  p.body[0] = turned ? second : first;
-  p.body[1] = turned || second == nbody ? -1 : second;
-  for (int k = 0; k < 4; k++) {
-    for (int j = 0; j < 3 && (turned ? k >= split : k < split); j++)
-      p.x[j] += PetscAbsReal(weight[k]) * b->x[3 * pair->v[k] + j];
+  for (PetscInt k = turned ? t->nfirst : 0; k < (turned ? t->n : t->nfirst); k++) {
+    sum += PetscAbsReal(t->weight[k]);
+    for (int j = 0; j < 3; j++) {
+      p.x[j] += PetscAbsReal(t->weight[k]) * b->x[3 * t->v[k] + j];
+      p.force[j] -= t->gradient[3 * k + j];
+    }
   }
-  for (int j = 0; j < 3; j++) p.normal[j] = turned ? -n[j] : n[j];
+  for (int j = 0; j < 3; j++) {
+    p.x[j] /= sum;
+    p.normal[j] = turned ? -t->normal[j] : t->normal[j];
+  }
   return p;
-}
-
-/* p.force -= the gradient of an energy with respect to the vertices of the point's side. */
-static void push_point(const Barrier *b, const SbContactPair *pair, const PetscReal gradient[12],
-                       SbContactPoint *p)
-{
-  const PetscBool turned = (PetscBool)(pair->v[0] >= b->mesh->nbody_vertex);
-  const int split = pair->kind == SB_PAIR_EDGE_EDGE && !pair->side ? 2 : 1;
-
-  for (int k = 0; k < (pair->side ? 1 : 4); k++) {
-    for (int j = 0; j < 3 && (turned ? k >= split : k < split); j++) p->force[j] -= gradient[3 * k + j];
-  }
 }
 
 PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStage *stage,
                                              SbContactPoints *list)
 {
   Barrier *b = (Barrier *)e->data;
-  const SbContactMesh m = b->mesh;
-  PetscReal energy, gradient[12];
   PetscBool *told;
 
   PetscFunctionBeginUser;
+  (void)s;
   if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBarrierUpdate(b, stage->u));
-  PetscCall(PetscCalloc1(b->nfriction, &told));
-  for (PetscInt i = 0; i < b->nactive; i++) {
-    const Active *a = &b->active[i];
-    const SbContactPair *pair = &b->pairs->pair[a->pair];
-    SbContactPoint p;
+  PetscCall(PetscCalloc1(nterm(b), &told));
+  for (PetscInt i = 0; i < nterm(b); i++) {
+    const PetscInt spring = i - b->nactive - b->friction.n;
+    SbContactPoint p, other;
+    SbDistance d;
+    Term t;
 
-    if (!counts(b, pair)) continue;
-    p = point_of(b, pair, a->at.weight, a->at.n, a->gap);
-    (void)SbBarrierForce(b, a, &energy, gradient);
-    push_point(b, pair, gradient, &p);
+    SbBarrierTerm(b, i, &t);
+    if (told[i] || !t.counts) continue;
+    p = point_of(b, &t);
+    if (spring >= 0) { /* separates an overlap, or rebounds */
+      p.id[0] = -1 - spring;
+      p.id[1] = t.v[0];
+      p.id[2] = t.v[t.n - 1];
+      p.gap = SbBarrierSpringPlace(b, &b->spring[spring]);
+      if (spring < b->nspring - b->nbounce) p.gap -= b->spring[spring].start + b->spring[spring].depth;
+    } else if (i >= b->nactive) /* friction of a pair in contact only at the start of the step */
+      p.gap = SbContactPairGap(b->mesh, &b->friction.pair[i - b->nactive].pair, b->x, &d);
+    else
+      p.gap = b->active[i].gap;
 
     /* friction there */
-    for (PetscInt k = 0; k < b->nfriction; k++) {
-      const FrictionPair *friction = &b->friction[k];
+    for (PetscInt k = b->nactive; i < b->nactive && k < b->nactive + b->friction.n; k++) {
+      const SbContactPair *pair = &b->pairs->pair[b->active[i].pair],
+                          *with = &b->friction.pair[k - b->nactive].pair;
       PetscBool same;
 
-      PetscCall(PetscArraycmp(friction->pair.v, pair->v, 4, &same));
-      if (!same || friction->pair.kind != pair->kind || friction->pair.side != pair->side) continue;
-      (void)SbBarrierFriction(b, friction, gradient);
-      push_point(b, pair, gradient, &p);
+      PetscCall(PetscArraycmp(pair->v, with->v, 4, &same));
+      if (!same || pair->kind != with->kind || pair->side != with->side) continue;
+      SbBarrierTerm(b, k, &t);
+      other = point_of(b, &t);
+      for (int j = 0; j < 3; j++) p.force[j] += other.force[j];
       told[k] = PETSC_TRUE;
       break;
     }
     PetscCall(SbContactPointsAdd(list, &p));
   }
-
-  /* friction of pairs in contact only at the start of the step */
-  for (PetscInt k = 0; k < b->nfriction; k++) {
-    const FrictionPair *friction = &b->friction[k];
-    SbContactPoint p;
-    SbDistance d;
-
-    if (told[k] || !counts(b, &friction->pair)) continue;
-    p = point_of(b, &friction->pair, friction->weight, friction->n,
-                 SbContactPairGap(m, &friction->pair, b->x, &d));
-    (void)SbBarrierFriction(b, friction, gradient);
-    push_point(b, &friction->pair, gradient, &p);
-    PetscCall(SbContactPointsAdd(list, &p));
-  }
   PetscCall(PetscFree(told));
-
-  /* springs that separate overlaps */
-  for (PetscInt i = 0; i < b->nspring; i++) {
-    const Spring *spring = &b->spring[i];
-    const PetscInt first = m->part[spring->v[0]], second = m->part[spring->v[spring->n - 1]];
-    SbContactPoint p = {.id = {-1 - i, spring->v[0], spring->v[spring->n - 1]}};
-    PetscReal push[15], force, sum = 0.;
-
-    if (!m->own[spring->v[0]]) continue;
-    force = SbBarrierSpring(b, spring, push);
-    p.body[0] = first;
-    p.body[1] = second == s->mesh->nbody ? -1 : second;
-    p.gap = SbBarrierSpringPlace(b, spring);
-    if (i < b->nspring - b->nbounce) p.gap -= spring->start + spring->depth;
-    for (PetscInt k = 0; k < spring->n && spring->weight[k] > 0.; k++) {
-      sum += spring->weight[k];
-      for (int j = 0; j < 3; j++) p.x[j] += spring->weight[k] * b->x[3 * spring->v[k] + j];
-    }
-    for (int j = 0; j < 3; j++) {
-      p.x[j] /= sum;
-      p.normal[j] = spring->normal[j];
-      p.force[j] = force * spring->normal[j];
-    }
-    PetscCall(SbContactPointsAdd(list, &p));
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -280,10 +237,10 @@ PetscErrorCode SbEffectGap_Barrier(SbEffect e, SbSpace s, const SbStage *stage, 
   PetscCall(SbBarrierUpdate(b, stage->u));
   for (PetscInt i = 0; i < b->nactive; i++) {
     const Active *a = &b->active[i];
-    const SbContactPair *pair = &b->pairs->pair[a->pair];
+    const PetscInt *vertex = b->pairs->pair[a->pair].v;
 
-    for (int k = 0; k < (pair->side ? 1 : 4); k++) {
-      const PetscInt v = pair->v[k];
+    for (int k = 0; k < 4; k++) {
+      const PetscInt v = vertex[k];
 
       if (v >= m->nbody_vertex || a->at.weight[k] == 0.) continue;
       for (PetscInt j = m->start[v]; j < m->start[v + 1]; j++) {
@@ -309,7 +266,7 @@ PetscErrorCode SbEffectSummary_Barrier(SbEffect e, SbSpace s, size_t size, char 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, 2, MPIU_REAL, MPI_MIN, s->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_INT, MPI_MAX, s->comm));
-  if (b->scene.friction > 0.)
+  if (b->contact->friction.mu > 0.)
     (void)snprintf(note, sizeof(note), ", friction lagged behind normal forces by at most %.2g of itself",
                    (double)b->most_lag);
   if (most)
@@ -346,7 +303,7 @@ PetscErrorCode SbEffectNearest_Barrier(SbEffect e, SbSpace s, PetscReal *gap, si
   if (first.gap == PETSC_MAX_REAL) PetscFunctionReturn(PETSC_SUCCESS);
   if (rank == first.rank) {
     const SbContactPair *pair = &b->pairs->pair[least->pair];
-    const PetscInt part[2] = {b->mesh->part[pair->v[0]], b->mesh->part[pair->v[pair->side ? 1 : 2]]};
+    const PetscInt part[2] = {b->mesh->part[pair->v[0]], b->mesh->part[pair->v[SbContactPairSplit(pair)]]};
     const char *name[2];
 
     for (int k = 0; k < 2; k++)

@@ -1,24 +1,38 @@
 /*
-  barrier_springs.c - one-sided springs along fixed directions, which separate initial overlaps and enforce restitution.
+  barrier_springs.c - one-sided springs along fixed directions: they separate overlaps, enforce restitution.
 
-  A spring has the energy k/2 (g - goal)^2 while g = n . sum weight x is below its goal. Overlaps and springs are found anew in each step.
+  A spring has the energy k/2 (g - goal)^2 while g = n . sum weight x is below a goal; each step has new ones.
 
-  Overlap. Each penetrating point (src/contact/overlap.c) is moved out by a part of its depth in each step, so that the depth falls to 1/e in -effect_X_separation_steps steps; by the width
-  of the barrier at least, and in a static run at once. Springs that reach less than half of that get stiffer. Pairs of the overlap are excluded from barrier and collision detection until there is none left.
+  Overlap. Each penetrating point (src/contact/overlap.c) is moved out by a part of its depth in each step, so
+  that the depth falls to 1/e in -effect_X_separation_steps steps; by the width of the barrier at least, and
+  in a static run at once. Springs that reach less than half of that get stiffer. Pairs of the overlap are
+  excluded from barrier and collision detection until there is none left.
+
+  Restitution (its energy: src/model/restitution.c). At the start of a step the vertices are moved in free
+  flight. A pair whose gap falls to the barrier's width, or nearly, on this path has the direction n and the
+  weights of its closest points there, and the speed of approach v = -n . sum weight v. In this step a spring
+  holds it at or above
+
+      n . sum weight x = g0 + h e v,   g0 the same sum when the step begins,
+
+  which is stiff relative to the lighter body, as whole bodies collide. Pairs already within the width get
+  none, so that a body at rest stays at rest.
 */
 #include "barrier_impl.h"
 
 #define STIFF 10.     /* static run: stiffness over that of the barrier */
 #define SAME 1e-5     /* of the bodies' size: positions this close coincide */
 #define ROUNDING 1e-9 /* of that size: a smaller initial depth counts as touching */
+#define RIGID 1e5     /* restitution: stiffness over mass of the lighter body / dt^2 */
+#define EARLY 0.05    /* extension of the path over its length: near misses count as impacts */
+#define REST 0.999    /* of the width: a smaller gap is contact */
+#define KEEP 0.01     /* tolerance of the impact's position, over the gap above the width */
 
-PetscErrorCode SbBarrierAddSpring(Barrier *b, const Spring *spring)
+/* Appends a spring of this step. */
+static PetscErrorCode add_spring(Barrier *b, const Spring *spring)
 {
   PetscFunctionBeginUser;
-  if (b->nspring == b->spring_size) {
-    b->spring_size = PetscMax(64, 2 * b->spring_size);
-    PetscCall(PetscRealloc((size_t)b->spring_size * sizeof(*b->spring), &b->spring));
-  }
+  PetscCall(SbReserve(b->nspring + 1, sizeof(*b->spring), &b->spring_size, &b->spring));
   b->spring[b->nspring++] = *spring;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -40,7 +54,7 @@ static PetscErrorCode exempt_nearest(Barrier *b)
   }
   PetscCallMPI(
     MPI_Allreduce(MPI_IN_PLACE, near, (PetscMPIInt)m->nvertex, MPI_UINT8_T, MPI_MAX, m->space->comm));
-  PetscCall(SbContactPairsIgnore(b->pairs, near));
+  SbContactPairsIgnore(b->pairs, near);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -84,19 +98,19 @@ static PetscBool same_place(const Barrier *b, const PetscInt body[2])
 }
 
 /* Error if a body is wholly inside the obstacle: no separation direction exists. x: initial positions. */
-static PetscErrorCode check_obstacle(SbEffect e, SbSpace s, PetscReal t)
+static PetscErrorCode check_obstacle(SbEffect e, SbSpace s)
 {
   const Barrier *b = (const Barrier *)e->data;
   const SbContactMesh m = b->mesh;
   SbPose pose;
 
   PetscFunctionBeginUser;
-  (*b->scene.pose)(b->data, t, &pose);
+  SbContactPose(b->contact, 0., &pose);
   for (PetscInt v = 0; v < m->nbody_vertex; v++) {
     PetscReal X[3], n[3];
 
     SbPoseInvert(&pose, b->x + 3 * v, X);
-    PetscCheck(m->driven[v] || SbObstacleDistance(b->scene.obstacle, X, n) > -SAME * m->size, s->comm,
+    PetscCheck(m->driven[v] || SbObstacleDistance(b->contact->obstacle, X, n) > -SAME * m->size, s->comm,
                PETSC_ERR_USER_INPUT,
                "The effect %s: %s is inside the obstacle when the run begins, at (%g, %g, %g) m; move it by "
                "-body_%s_translate",
@@ -116,8 +130,8 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
 
   PetscFunctionBeginUser;
   b->nspring = 0;
-  if (first && !b->scene.obstacle) PetscCall(SbContactMeshIsInside(b->mesh, b->x, body, &inside));
-  PetscCall(SbContactOverlapFind(b->mesh, b->scene.self, b->x, inside, o));
+  if (first && !b->contact->obstacle) PetscCall(SbContactMeshIsInside(b->mesh, b->x, body, &inside));
+  PetscCall(SbContactOverlapFind(b->mesh, b->contact->self, b->x, inside, o));
   PetscCheck(
     !inside || (o->n && !same_place(b, body)), s->comm, PETSC_ERR_USER_INPUT,
     "The effect %s: body %s is inside body %s when the run begins, or in the same place; move one of them by "
@@ -125,15 +139,15 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
     e->name, s->mesh->body[body[0]].name, s->mesh->body[body[1]].name, s->mesh->body[body[0]].name);
   b->overlapping =
     (PetscBool)(o->ncrossing > 0 && (!first || !o->n || o->deepest > ROUNDING * b->mesh->size));
-  if (first && b->scene.obstacle && !b->overlapping) PetscCall(check_obstacle(e, s, 0.));
-  PetscCall(SbContactPairsIgnore(b->pairs, b->overlapping ? o->near : NULL));
+  if (first && b->contact->obstacle && !b->overlapping) PetscCall(check_obstacle(e, s));
+  SbContactPairsIgnore(b->pairs, b->overlapping ? o->near : NULL);
   b->known = PETSC_FALSE;
   if (!b->overlapping) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(exempt_nearest(b));
   if (!before && !b->announced) PetscCall(announce(e, s, o));
   b->announced = PETSC_TRUE;
 
-  if (e->dynamic) SbOverlapBegin(&b->parting, dt);
+  if (e->dynamic) SbOverlapBegin(&b->contact->overlap, dt);
   for (PetscInt i = 0; i < o->n; i++) {
     const SbPenetration *p = &o->point[i];
     const PetscInt one = b->mesh->part[p->v[0]], two = b->mesh->part[p->v[p->n - 1]];
@@ -148,8 +162,147 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
     spring.depth = p->depth;
     spring.start = SbBarrierSpringPlace(b, &spring);
     spring.goal =
-      spring.start + (e->dynamic ? PetscMin(all, PetscMax(w, all * (1. - b->parting.left))) : all);
-    PetscCall(SbBarrierAddSpring(b, &spring));
+      spring.start + (e->dynamic ? PetscMin(all, PetscMax(w, all * (1. - b->contact->overlap.left))) : all);
+    PetscCall(add_spring(b, &spring));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ restitution */
+
+/* Fraction of the motion from x0 to x1 at which the pair's gap falls to w; 2: none. */
+static PetscReal meets(const Barrier *b, const SbContactPair *pair, const PetscReal x0[],
+                       const PetscReal x1[], PetscReal w)
+{
+  const SbContactMesh m = b->mesh;
+  const SbCCDLimits limits = {.radius = SbContactPairRadius(m, pair), .separation = w, .keep = KEEP};
+  const PetscReal gap = SbContactPairGap(m, pair, x0, &(SbDistance){0});
+  PetscReal from[12], to[12], part;
+
+  if (gap < REST * w) return 2.;
+  if (pair->side) {
+    part = gap - SbContactPairGap(m, pair, x1, &(SbDistance){0});
+    return part > 0. && part * (1. + EARLY) >= gap - w ? PetscMin(1., (gap - w) / part) : 2.;
+  }
+  for (int k = 0; k < 12; k++) {
+    const PetscInt i = 3 * pair->v[k / 3] + k % 3;
+
+    from[k] = x0[i];
+    to[k] = x0[i] + (1. + EARLY) * (x1[i] - x0[i]);
+  }
+  if (!SbTimeOfImpact(pair->kind, from, to, &limits, &part)) return 2.;
+  return PetscMin(1., part * (1. + EARLY));
+}
+
+/* The spring of a pair at the positions x of its impact; false: it does not approach. Vertices with positive
+   weights come first, those of bodies before others. */
+static PetscBool find_spring(const Barrier *b, const SbContactPair *pair, const PetscReal x[], Spring *spring)
+{
+  const SbContactMesh m = b->mesh;
+  const PetscBool turned = (PetscBool)(pair->v[0] >= m->nbody_vertex);
+  SbDistance d;
+
+  (void)SbContactPairGap(m, pair, x, &d);
+  *spring = (Spring){0};
+  for (int pass = 0; pass < 2; pass++) {
+    for (int k = 0; k < (pair->side ? 2 : 4); k++) {
+      const PetscReal weight = turned ? -d.weight[k] : d.weight[k];
+
+      if (pass ? weight >= 0. : weight <= 0.) continue;
+      spring->v[spring->n] = pair->v[k];
+      spring->weight[spring->n++] = weight;
+    }
+  }
+  for (int i = 0; i < 3; i++) spring->normal[i] = turned ? -d.n[i] : d.n[i];
+  for (PetscInt k = 0; k < spring->n; k++) {
+    const PetscInt v = 3 * spring->v[k];
+
+    spring->start += spring->weight[k] * SbDot3(spring->normal, b->x + v);
+    spring->approach -= spring->weight[k] * SbDot3(spring->normal, b->other + v);
+  }
+  spring->approach = (spring->approach + spring->start) / b->contact->bounce.dt;
+  return (PetscBool)(spring->approach > 0.);
+}
+
+PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const PetscReal u0[],
+                                    const PetscReal v0[])
+{
+  Barrier *b = (Barrier *)e->data;
+  const SbContactMesh m = b->mesh;
+  PetscReal *u1, *x;
+
+  PetscFunctionBeginUser;
+  b->nbounce = 0;
+  SbRestitutionBegin(&b->contact->bounce, dt);
+
+  /* free flight */
+  PetscCall(PetscMalloc2(3 * s->nnode, &u1, 3 * m->nvertex, &x));
+  for (PetscInt i = 0; i < 3 * s->nnode; i++) u1[i] = u0[i] + dt * v0[i];
+  PetscCall(SbBarrierUpdate(b, u0));
+  PetscCall(SbBarrierPlace(b, u1, 1., b->other));
+  PetscCall(SbContactPairsFind(b->pairs, b->x, b->other));
+  b->known = PETSC_FALSE;
+
+  /* impacts on it */
+  for (PetscInt i = 0; i < b->pairs->n; i++) {
+    const SbContactPair *pair = &b->pairs->pair[i];
+    const PetscReal w = of_pair(b, b->w, pair);
+    const PetscInt part[2] = {m->part[pair->v[0]], m->part[pair->v[SbContactPairSplit(pair)]]};
+    PetscReal at, mass = PETSC_MAX_REAL;
+    Spring spring;
+
+    if (SbContactPairSweptApart(m, pair, b->x, b->other, w)) continue;
+    at = meets(b, pair, b->x, b->other, w);
+    if (at > 1.) continue;
+    for (int k = 0; k < (pair->side ? 3 : 4); k++) {
+      for (int j = 0; j < 3; j++) {
+        const PetscInt c = 3 * pair->v[k] + j;
+
+        x[c] = b->x[c] + at * (b->other[c] - b->x[c]);
+      }
+    }
+    if (!find_spring(b, pair, x, &spring)) continue;
+    for (int k = 0; k < 2; k++) {
+      if (part[k] < s->mesh->nbody)
+        mass = PetscMin(mass, s->material[part[k]]->density * s->mesh->body[part[k]].volume);
+    }
+    spring.stiffness = RIGID * mass / PetscSqr(dt);
+    spring.goal = spring.start + SbRestitutionGap(&b->contact->bounce, 0., spring.approach);
+    PetscCall(add_spring(b, &spring));
+    b->nbounce++;
+  }
+  PetscCall(PetscFree2(u1, x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectRestitution_Barrier(SbEffect e, PetscReal *work)
+{
+  const Barrier *b = (const Barrier *)e->data;
+  PetscReal push[15];
+
+  PetscFunctionBeginUser;
+  *work = 0.;
+  for (PetscInt i = b->nspring - b->nbounce; i < b->nspring; i++) {
+    const Spring *spring = &b->spring[i];
+
+    if (b->mesh->own[spring->v[0]])
+      *work += SbBarrierSpring(b, spring, push) * (SbBarrierSpringPlace(b, spring) - spring->start);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectScaleRestitution_Barrier(SbEffect e, PetscReal share)
+{
+  Barrier *b = (Barrier *)e->data;
+
+  PetscFunctionBeginUser;
+  b->contact->bounce.left = share;
+  for (PetscInt i = b->nspring - b->nbounce; i < b->nspring; i++) {
+    Spring *spring = &b->spring[i];
+
+    /* a goal lowered below the spring's deflection would release it: keep it active for the next iteration */
+    spring->held = (PetscBool)(SbBarrierSpringPlace(b, spring) < spring->goal);
+    spring->goal = spring->start + SbRestitutionGap(&b->contact->bounce, 0., spring->approach);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,14 +1,15 @@
 /*
   contact.c - the effect `contact`: its options, and which response a scene gets.
 
-  Without an obstacle: contact between the bodies of the sets, and self-contact on request, by `barrier`. With an obstacle: contact of the surfaces `on` with it,
-  by `barrier` or by responses of nodes (contact_node.c).
+  Without an obstacle: contact between the bodies of the sets, and self-contact on request, by `barrier`. With
+  an obstacle: contact of the surfaces `on` with it, by `barrier` or by responses of nodes (contact_node.c).
 
-  Response `auto` is the same for all effects of a scene, as Newton's method has one potential and one set of constraints: `barrier` with contact between bodies. `projected` is exact, and
-  safe for half-spaces and bowls, where the surface is outside whenever its vertices are. Other obstacles can penetrate edges and faces, or be passed within a step: there
-  it is `barrier`, unless the scene needs an option of the other responses.
+  Response `auto` is the same for all effects of a scene, as Newton's method has one potential and one set of
+  constraints: `barrier` with contact between bodies. `projected` is exact, and safe for half-spaces and
+  bowls, where the surface is outside whenever its vertices are. Other obstacles can penetrate edges and
+  faces, or be passed within a step: there it is `barrier`, unless the scene needs an option that it lacks.
 */
-#include "contact.h"
+#include "contact_node.h"
 
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", "boundary", "", "sets whose surfaces may be in contact"},
@@ -75,19 +76,19 @@ static const SbOption rows[] = {
 
 static const char *const names_of_responses[] = {"auto",      "projected", "multiplier",
                                                  "augmented", "penalty",   "barrier"};
-/* Options that contact between bodies does not have. */
-static const char *const obstacles_only[] = {"time_of_impact", "damping", "stiffness", "friction_kinetic"};
-/* Options that need another response than `barrier` against an obstacle. */
+/* Options that `barrier` lacks against obstacles; all but the first one are for obstacles only. */
 static const char *const exact_only[] = {"restitution", "time_of_impact", "damping", "stiffness",
                                          "friction_kinetic"};
 
-/* Criteria of the response of an effect, its option `response` among them. */
+/* Criteria of the response. */
 typedef struct {
-  SbResponse response;
-  PetscBool bodies, vertices,
-    others; /* contact between bodies; half-spaces and bowls only; options that `barrier` lacks */
+  SbResponse response; /* option of the last effect */
+  PetscBool bodies;    /* some effect is contact between bodies */
+  PetscBool vertices;  /* all obstacles are half-spaces and bowls */
+  PetscBool others;    /* some obstacle has an option that `barrier` lacks */
 } Needs;
 
+/* Adds those of an effect. */
 static PetscErrorCode examine(const char *name, Needs *needs)
 {
   SbScope scope;
@@ -95,13 +96,12 @@ static PetscErrorCode examine(const char *name, Needs *needs)
   char text[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
-  *needs = (Needs){0};
   PetscCall(SbScopeSet(&scope, "effect", "contact", name));
   PetscCall(SbOptionChoice(&scope, "response", &choice));
   needs->response = (SbResponse)choice;
   PetscCall(SbOptionString(&scope, "obstacle", sizeof(text), text));
-  needs->bodies = (PetscBool)!text[0];
-  needs->vertices = (PetscBool)(!strncmp(text, "plane", 5) || !strncmp(text, "bowl", 4));
+  needs->bodies = (PetscBool)(needs->bodies || !text[0]);
+  needs->vertices = (PetscBool)(needs->vertices && (!strncmp(text, "plane", 5) || !strncmp(text, "bowl", 4)));
   for (size_t k = 0; text[0] && k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
     PetscBool given;
 
@@ -119,7 +119,7 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
   char(*names)[SB_NAME_MAX] = NULL;
   SbResponse other = AUTO;
   SbScope scope;
-  Needs needs;
+  Needs needs = {.vertices = PETSC_TRUE};
 
   PetscFunctionBeginUser;
   PetscCall(examine(e->name, &needs));
@@ -141,16 +141,12 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
   if (SbOptionExists(&SbRunScope, "effects")) PetscCall(SbOptionNames(&SbRunScope, "effects", &n, &names));
   for (PetscInt i = 0; i < n; i++) {
     char type[SB_NAME_MAX];
-    Needs more;
 
     PetscCall(SbScopeSet(&scope, "effect", "", names[i]));
     PetscCall(SbOptionString(&scope, "type", sizeof(type), type));
     if (strcmp(type[0] ? type : names[i], "contact")) continue;
-    PetscCall(examine(names[i], &more));
-    if (more.response != AUTO) other = more.response;
-    needs.bodies = (PetscBool)(needs.bodies || more.bodies);
-    needs.vertices = (PetscBool)(needs.vertices && more.vertices);
-    needs.others = (PetscBool)(needs.others || more.others);
+    PetscCall(examine(names[i], &needs));
+    if (needs.response != AUTO) other = needs.response;
   }
   PetscCall(PetscFree(names));
 
@@ -170,82 +166,128 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_common(SbEffect e, const SbScope *scope, SbContactOptions *o)
+PetscErrorCode SbContactSetUpObstacle(SbEffect e, SbSpace space, Contact *c)
 {
-  PetscInt choice;
+  char option[3 * SB_NAME_MAX], note[192] = "";
 
   PetscFunctionBeginUser;
-  PetscCall(SbOptionReal(scope, "friction", &o->friction.mu));
-  o->friction.mu_kinetic = o->friction.mu;
-  PetscCall(SbOptionReal(scope, "restitution", &o->restitution));
-  if (o->response == BARRIER) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbOptionReal(scope, "friction_kinetic", &o->friction.mu_kinetic));
-  if (o->friction.mu_kinetic < 0) o->friction.mu_kinetic = o->friction.mu;
-  PetscCheck(o->friction.mu_kinetic <= o->friction.mu, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_friction_kinetic %g is above -effect_%s_friction %g: sliding would "
-             "start and stop in turn",
-             e->name, (double)o->friction.mu_kinetic, e->name, (double)o->friction.mu);
-  o->friction.exact = SbResponseIsExact(o->response);
-  PetscCall(SbOptionChoice(scope, "time_of_impact", &choice));
-  o->cut = (PetscBool)(choice == 1);
-  PetscCall(SbOptionReal(scope, "stiffness", &o->stiffness));
-  PetscCall(SbOptionReal(scope, "damping", &o->damping));
-  PetscCheck(o->damping <= 0 || o->response == PENALTY, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_damping %g s is for springs that give: it needs -effect_%s_response penalty",
-             e->name, (double)o->damping, e->name);
-  PetscCheck(o->restitution <= 0 || SbResponseIsExact(o->response), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_restitution %g needs -effect_%s_response projected, multiplier or barrier", e->name,
-             (double)o->restitution, e->name);
-  PetscCheck(o->restitution <= 0 || !o->cut, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_restitution %g and -effect_%s_time_of_impact yes do not go together: a step "
-             "that ends at the impact has no rebound; leave one of them out",
-             e->name, (double)o->restitution, e->name);
-  PetscCall(SbOptionReal(scope, "separation_steps", &o->separation_steps));
+  SbFormat(sizeof(option), option, "-effect_%s_obstacle", e->name);
+  PetscCall(SbObstacleSetUp(c->obstacle, space->comm, option, c->scale, c->at, sizeof(note), note));
+  if (note[0]) SbAppend(sizeof(e->note), e->note, "%s%s", e->note[0] ? "; " : "", note);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactDestroy(SbEffect e)
+{
+  Contact *c = (Contact *)e->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbObstacleDestroy(&c->obstacle));
+  PetscCall(SbPathDestroy(&c->path));
+  PetscCall(PetscFree(c->touch));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The obstacle and its path; without one: options of contact between bodies. */
+static PetscErrorCode read_obstacle(SbEffect e, const SbScope *scope, Contact *c)
+{
+  PetscBool given, steady;
+  char option[3 * SB_NAME_MAX], text[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionString(scope, "obstacle", sizeof(text), text));
+  if (!text[0]) {
+    for (size_t k = 1; k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
+      PetscCall(SbOptionGiven(scope, exact_only[k], &given));
+      PetscCheck(
+        !given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+        "-effect_%s_%s is for responses to obstacles: bodies meet each other by barrier; leave it out",
+        e->name, exact_only[k]);
+    }
+    PetscCall(SbOptionBool(scope, "self", &c->self));
+    PetscCall(SbOptionBool(scope, "pairs", &c->pairs));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(SbOptionName(scope, "obstacle", sizeof(option), option));
+  PetscCall(SbObstacleCreate(option, text, &c->obstacle));
+  c->facets = SbObstacleIsMesh(c->obstacle);
+  if (c->facets) {
+    PetscCall(SbOptionReal(scope, "obstacle_scale", &c->scale));
+    PetscCall(SbOptionReals(scope, "obstacle_at", c->at));
+  }
+  PetscCall(SbPathRead(scope, PETSC_FALSE, &c->path, &steady));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
 {
-  SbContactOptions o = {0};
+  static const char *const columns[] = {"force_x",  "force_y",  "force_z",  "torque_x",
+                                        "torque_y", "torque_z", "contacts", "penetration"};
+  Contact *c = (Contact *)e->data;
   const char *why = NULL;
-  char text[PETSC_MAX_PATH_LEN];
+  PetscReal steps;
+  PetscInt choice;
 
   PetscFunctionBeginUser;
-  PetscCall(choose(e, &o.response, &why));
-  PetscCall(SbOptionString(scope, "obstacle", sizeof(text), text));
-  PetscCall(read_common(e, scope, &o));
-  if (why) (void)snprintf(e->note, sizeof(e->note), "response %s: %s", names_of_responses[o.response], why);
-  e->linear = PETSC_TRUE;
-  e->steady = PETSC_FALSE; /* contact is not scaled by the load factor */
-  e->euler = (PetscBool)(o.restitution > 0);
-  if (!text[0]) { /* contact between bodies */
-    SbBarrierScene scene = {.on = &e->on, .friction = o.friction.mu, .restitution = o.restitution};
-
-    for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(obstacles_only); k++) {
-      PetscBool given;
-
-      PetscCall(SbOptionGiven(scope, obstacles_only[k], &given));
-      PetscCheck(
-        !given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-        "-effect_%s_%s is for responses to obstacles: bodies meet each other by barrier; leave it out",
-        e->name, obstacles_only[k]);
-    }
-    PetscCall(SbOptionBool(scope, "self", &scene.self));
-    PetscCall(SbOptionBool(scope, "pairs", &scene.pairs));
-    PetscCall(SbBarrierCreate(e, scope, &scene));
+  e->ops = SbContactNodeOps;
+  PetscCall(choose(e, &c->response, &why));
+  if (why) SbFormat(sizeof(e->note), e->note, "response %s: %s", names_of_responses[c->response], why);
+  PetscCall(read_obstacle(e, scope, c));
+  PetscCall(SbOptionReal(scope, "friction", &c->friction.mu));
+  PetscCall(SbOptionReal(scope, "restitution", &c->bounce.e));
+  PetscCall(SbOptionReal(scope, "separation_steps", &steps));
+  SbOverlapSet(&c->overlap, steps);
+  e->steady = PETSC_FALSE; /* a load factor does not make an obstacle softer */
+  e->euler = (PetscBool)(c->bounce.e > 0);
+  if (c->response == BARRIER) {
+    PetscCall(SbBarrierCreate(e, scope));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(SbContactCreate_Node(e));
-  e->saddle = (PetscBool)(o.response == MULTIPLIER);
-  e->springs = (PetscBool)(!SbResponseIsExact(o.response) || o.friction.mu > 0);
-  if (!o.cut) e->ops.time_of_impact = NULL;
+
+  PetscCall(SbOptionReal(scope, "friction_kinetic", &c->friction.mu_kinetic));
+  if (c->friction.mu_kinetic < 0) c->friction.mu_kinetic = c->friction.mu;
+  PetscCheck(c->friction.mu_kinetic <= c->friction.mu, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_friction_kinetic %g is above -effect_%s_friction %g: sliding would "
+             "start and stop in turn",
+             e->name, (double)c->friction.mu_kinetic, e->name, (double)c->friction.mu);
+  c->friction.exact = exact(c);
+  PetscCall(SbOptionChoice(scope, "time_of_impact", &choice));
+  c->cut = (PetscBool)(choice == 1);
+  PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
+  PetscCall(SbOptionReal(scope, "damping", &c->damping));
+  PetscCheck(c->damping <= 0 || c->response == PENALTY, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_damping %g s is for springs that give: it needs -effect_%s_response penalty",
+             e->name, (double)c->damping, e->name);
+  PetscCheck(!e->euler || exact(c), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_restitution %g needs -effect_%s_response projected, multiplier or barrier", e->name,
+             (double)c->bounce.e, e->name);
+  PetscCheck(!e->euler || !c->cut, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_restitution %g and -effect_%s_time_of_impact yes do not go together: a step "
+             "that ends at the impact has no rebound; leave one of them out",
+             e->name, (double)c->bounce.e, e->name);
+
+  e->nstate = SB_CONTACT_STATE;
+  e->column = columns;
+  e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);
+  e->saddle = (PetscBool)(c->response == MULTIPLIER);
+  e->springs = (PetscBool)(!exact(c) || c->friction.mu > 0);
+  if (!c->cut) e->ops.time_of_impact = NULL;
   if (!e->euler) e->ops.restitution = NULL;
-  PetscCall(SbContactOptions_Node(e, scope, &o));
+  c->held = (PetscBool)(exact(c) || c->friction.mu > 0);
+  if (c->held) {
+    e->ops.force = NULL; /* forces come from the constraints */
+    e->ops.tangent = NULL;
+  } else {
+    e->ops.assemble_constraints = NULL;
+    e->linear = PETSC_FALSE;
+    if (c->response == PENALTY && !c->cut) e->ops.update_active_set = NULL;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 const SbEffectType SbEffectContact = {
   .name = "contact",
+  .size = sizeof(Contact),
   .nrow = PETSC_STATIC_ARRAY_LENGTH(rows),
   .row = rows,
   .ops = {.setfromoptions = options_contact},

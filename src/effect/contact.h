@@ -1,18 +1,13 @@
 /*
-  contact.h - shared by all responses of the effect `contact` (contact.c).
+  contact.h - the effect `contact` (contact.c): shared by responses of nodes (contact_node.c) and of surfaces.
 */
 #pragma once
-#include "barrier.h"
+#include "effect_impl.h"
 #include "overlap.h"
 #include "restitution.h"
+#include "sbcontact.h"
 
 typedef enum { AUTO, PROJECTED, MULTIPLIER, AUGMENTED, PENALTY, BARRIER } SbResponse;
-
-/* Whether constraints are exact. */
-static inline PetscBool SbResponseIsExact(SbResponse response)
-{
-  return (PetscBool)(response == PROJECTED || response == MULTIPLIER);
-}
 
 /* Coefficients of friction of an effect, and convergence in a step (friction.c). */
 typedef struct {
@@ -21,17 +16,47 @@ typedef struct {
   int updates;     /* number of updates within the step */
   PetscReal error; /* largest error of friction after the last solve, relative to the largest friction */
   PetscBool said;  /* the warning that friction did not converge was given */
-  PetscReal loss;  /* dissipation since the start, this rank's, J */
 } SbFriction;
 
-/* Options of all responses. */
-typedef struct {
-  SbResponse response; /* not AUTO */
-  PetscBool cut;       /* steps end at the first time of impact */
-  SbFriction friction;
-  PetscReal stiffness, damping, restitution, separation_steps;
-} SbContactOptions;
+typedef struct _p_Touch Touch; /* contact_node.h */
 
-/* Nodes against an obstacle (contact_node.c): the table of operations, then the options of its own. Not collective. */
-PetscErrorCode SbContactCreate_Node(SbEffect e);
-PetscErrorCode SbContactOptions_Node(SbEffect e, const SbScope *scope, const SbContactOptions *o);
+typedef struct {
+  SbResponse response;    /* not AUTO */
+  SbObstacle obstacle;    /* NULL: contact between bodies */
+  PetscReal scale, at[3]; /* of the file of a mesh */
+  SbPath path;            /* of the obstacle; torques are about the point of its axis, which moves with it */
+  PetscBool self, pairs;  /* between bodies: self-contact; columns for each pair of bodies */
+  SbFriction friction;
+  SbOverlap overlap;
+  SbRestitution bounce;
+
+  /* nodes against an obstacle */
+  PetscReal stiffness, damping; /* s */
+  PetscBool held;               /* active nodes are constrained; else force() acts on them */
+  PetscBool facets;             /* the obstacle is a mesh */
+  PetscInt n;
+  Touch *touch;     /* [n] */
+  PetscReal size;   /* of the bodies, m */
+  PetscBool cut;    /* steps end at the first time of impact */
+  PetscBool first;  /* the step has not been solved yet */
+  PetscReal impact; /* fraction of the step at the first time of impact, 1: none */
+  SbPose to;        /* at the end of the step */
+} Contact;
+
+/* Whether active nodes are constrained exactly. */
+static inline PetscBool exact(const Contact *c)
+{
+  return (PetscBool)(c->response == PROJECTED || c->response == MULTIPLIER);
+}
+
+/* The obstacle's pose at time t. */
+void SbContactPose(const Contact *c, PetscReal t, SbPose *pose);
+/* Reads the obstacle's file, if it is a mesh, and adds to the effect's note. Collective. */
+PetscErrorCode SbContactSetUpObstacle(SbEffect e, SbSpace space, Contact *c);
+/* Destroys what e->data, a Contact, owns. */
+PetscErrorCode SbContactDestroy(SbEffect e);
+
+/* Operations of nodes against an obstacle. */
+extern const SbEffectOps SbContactNodeOps;
+/* Makes e an effect of the response `barrier`, which takes over its Contact. Not collective. */
+PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope);

@@ -1,12 +1,13 @@
 /*
   contact_facets.c - constrained nodes where facets of an obstacle's mesh meet.
 
-  There a node may alternate between facets with every update of the active set. At a concave edge ("valley") both act: constrained on one of them it penetrates the
-  other one. So it is constrained on both for a solve, which gives both forces. If neither is tensile, their resultant is the
-  normal in equilibrium, and the node is constrained along it until the end of the step; else the tensile one is released. On
-  two facets it slides along the edge, possibly behind a third one, which then replaces the one with the smaller force.
+  There a node may alternate between facets with every update of the active set. At a concave edge ("valley")
+  both act: constrained on one of them it penetrates the other one. So it is constrained on both for a solve,
+  which gives both forces. If neither is tensile, their resultant is the normal in equilibrium, and the node
+  is constrained along it until the end of the step; else the tensile one is released. On two facets it slides
+  along the edge, possibly behind a third one, which then replaces the one with the smaller force.
 
-  Elsewhere (convex edges, and with friction) normals are averaged over the searches, and after many of them kept.
+  Elsewhere (convex edges, and with friction) normals are averaged over searches, after many kept.
 */
 #include "contact_node.h"
 
@@ -22,7 +23,8 @@ static void set_plane(const PetscReal n[3], PetscReal value, PetscReal to[3], Pe
   *to_value = value;
 }
 
-/* Right-hand side n . u of the constraint on the plane with normal n at distance `gap` from a node at x, m. */
+/* Right-hand side n . u of the constraint on the plane with normal n at distance `gap` from a node at x, m.
+   */
 static PetscReal level_of(const PetscReal X[3], const PetscReal x[3], PetscReal gap, const PetscReal n[3],
                           const Touch *touch)
 {

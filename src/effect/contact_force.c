@@ -1,6 +1,6 @@
 /*
-  contact_force.c - pose of the obstacle, contact forces on nodes and their derivatives, the end of a step, history. The
-  method is described in contact.c.
+  contact_force.c - pose of the obstacle, contact forces on nodes and their derivatives, the end of a step,
+  history, checkpoints. The method is described in contact_node.c.
 */
 #include "contact_node.h"
 
@@ -10,8 +10,8 @@ void SbContactPose(const Contact *c, PetscReal t, SbPose *pose)
 {
   PetscReal d[3];
 
-  for (int i = 0; i < 3; i++) d[i] = SbFormulaEval(c->displacement[i], t, NULL);
-  SbPoseSet(c->axis, SbFormulaEval(c->angle, t, NULL) * PETSC_PI / 180, c->point, d, pose);
+  for (int i = 0; i < 3; i++) d[i] = SbFormulaEval(c->path.displacement[i], t, NULL);
+  SbPoseSet(c->path.axis, SbFormulaEval(c->path.angle, t, NULL) * PETSC_PI / 180, c->path.point, d, pose);
 }
 
 PetscReal SbContactGap(const Contact *c, const SbPose *pose, const PetscReal x[3], PetscReal n[3])
@@ -27,8 +27,8 @@ PetscReal SbContactGap(const Contact *c, const SbPose *pose, const PetscReal x[3
 /* ------------------------------------------------------------------ forces */
 
 /*
-  Normal force on a node at x, N; n: the normal. Springs follow the current normal; a constrained node keeps that of its constraint: at edges between
-  facets a current one would jump within Newton's method.
+  Normal force on a node at x, N; n: the normal. Springs follow the current normal; a constrained node keeps
+  that of its constraint: at edges between facets a current one would jump within Newton's method.
 */
 static PetscReal normal_force(const Contact *c, const SbPose *pose, const Touch *touch, const PetscReal x[3],
                               PetscReal n[3])
@@ -80,7 +80,8 @@ PetscErrorCode SbEffectTangent_Contact(SbEffect e, SbSpace space, const SbStage 
 
 /* ------------------------------------------------------------------ after a step */
 
-void SbContactStretch(const SbPose *pose, Touch *touch)
+/* Rotates the deflection of a node's springs with the obstacle. */
+static void rotate_stretch(const SbPose *pose, Touch *touch)
 {
   for (int k = 0; k < 3; k++) {
     touch->stretch[k] = 0;
@@ -105,7 +106,7 @@ PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *
     if (c->friction.mu > 0) { /* history variables */
       SbFrictionAccept(&c->friction, touch,
                        (PetscBool)(touch->on && touch->along >= 0 && SbContactForce(c, touch) > 0));
-      SbContactStretch(&pose, touch);
+      rotate_stretch(&pose, touch);
     }
     touch->was = (PetscBool)(touch->on && touch->rest <= 0);
     touch->kept = PetscMin(0, touch->rest);
@@ -113,16 +114,16 @@ PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Force of the obstacle on a node at x, N. */
-static void force_on(const Contact *c, const SbPose *pose, SbSpace space, const Touch *touch,
-                     const PetscReal x[3], PetscReal f[3])
+/* Force of the obstacle on a node at x, N; false: there is none. */
+static PetscBool force_on(const Contact *c, const SbPose *pose, SbSpace space, const Touch *touch,
+                          const PetscReal x[3], PetscReal f[3])
 {
   PetscReal n[3], normal = normal_force(c, pose, touch, x, n);
 
-  f[0] = f[1] = f[2] = 0;
-  if (normal <= 0) return;
+  if (normal <= 0) return PETSC_FALSE;
   if (c->held) normal = SbSpaceGetConstraint(space, touch->along)->force;
   for (int k = 0; k < 3; k++) f[k] = normal * n[k] + (c->friction.mu > 0 ? touch->friction.force[k] : 0);
+  return PETSC_TRUE;
 }
 
 PetscErrorCode SbEffectGap_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],
@@ -160,8 +161,7 @@ PetscErrorCode SbEffectContactPoints_Contact(SbEffect e, SbSpace space, const Sb
                         .id = {0, space->node_orig[touch->node], 0}};
 
     place(space, touch->node, stage->u, p.x);
-    if (normal_force(c, &pose, touch, p.x, p.normal) <= 0) continue;
-    force_on(c, &pose, space, touch, p.x, p.force);
+    if (!force_on(c, &pose, space, touch, p.x, p.force)) continue;
     p.gap = SbContactGap(c, &pose, p.x, p.normal);
     if (exact(c)) PetscCall(PetscArraycpy(p.normal, touch->n, 3)); /* the normal of the constraint */
     PetscCall(SbContactPointsAdd(list, &p));
@@ -188,9 +188,8 @@ PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage 
 
     place(space, touch->node, stage->u, x);
     deepest[0] = PetscMax(deepest[0], -SbContactGap(c, &pose, x, n));
-    if (normal_force(c, &pose, touch, x, n) <= 0) continue;
-    force_on(c, &pose, space, touch, x, f);
-    for (int k = 0; k < 3; k++) arm[k] = x[k] - c->point[k] - pose.d[k];
+    if (!force_on(c, &pose, space, touch, x, f)) continue;
+    for (int k = 0; k < 3; k++) arm[k] = x[k] - c->path.point[k] - pose.d[k];
     SbCross(arm, f, moment);
     for (int k = 0; k < 3; k++) {
       values[k] += f[k];
@@ -202,5 +201,119 @@ PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage 
   PetscCallMPI(MPI_Comm_rank(space->comm, &rank));
   /* smaller values are within the tolerance */
   if (!rank && deepest[1] > TOLERANCE * c->size) values[7] = deepest[1];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ checkpoints */
+
+/*
+  A record has the node's original number, whether it is and was active, right-hand side and normal of its
+  constraint, multiplier, gap, and friction state: enough to rebuild the constraints of the last solve, and to
+  continue as the uninterrupted run.
+*/
+PetscErrorCode SbEffectSave_Contact(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records)
+{
+  const Contact *c = (const Contact *)e->data;
+
+  PetscFunctionBeginUser;
+  *n = 0;
+  PetscCall(PetscMalloc1(SB_CONTACT_STATE * c->n, records));
+  for (PetscInt i = 0; i < c->n; i++) {
+    const Touch *touch = &c->touch[i];
+    const PetscReal head[8] = {(PetscReal)space->node_orig[touch->node],
+                               touch->on,
+                               touch->was,
+                               touch->rest,
+                               touch->kept,
+                               touch->lambda,
+                               touch->value,
+                               touch->gap};
+    PetscReal *r = *records + SB_CONTACT_STATE * *n;
+
+    if (!touch->on && !touch->was && touch->lambda == 0) continue;
+    PetscCall(PetscArraycpy(r, head, 8));
+    PetscCall(PetscArraycpy(r + 8, touch->n, 3));
+    PetscCall(PetscArraycpy(r + 11, touch->surface, 3));
+    r[14] = touch->friction.slid;
+    r[15] = touch->friction.crowded;
+    r[16] = touch->friction.turning;
+    PetscCall(PetscArraycpy(r + 17, touch->friction.tangent[0], 3));
+    PetscCall(PetscArraycpy(r + 20, touch->friction.stretch, 3));
+    (*n)++;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectLoad_Contact(SbEffect e, SbSpace space, PetscReal t, const PetscReal u[], PetscInt n,
+                                    const PetscReal records[])
+{
+  Contact *c = (Contact *)e->data;
+  PetscInt *number, *at;
+
+  PetscFunctionBeginUser;
+  SbContactPose(c, t, &c->to);
+  PetscCall(PetscMalloc2(c->n, &number, c->n, &at));
+  for (PetscInt i = 0; i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+
+    /* nodes without a record are inactive */
+    touch->on = touch->was = touch->idle = PETSC_FALSE;
+    touch->along = -1;
+    touch->rest = touch->kept = touch->lambda = touch->gap = touch->approach = 0;
+    touch->friction = (SbFrictionState){.slide = {-1, -1}};
+    for (int k = 0; k < 3; k++) {
+      touch->start[k] = touch->now[k] = u[3 * touch->node + k];
+      touch->stretch[k] = 0;
+    }
+    number[i] = space->node_orig[touch->node];
+    at[i] = i;
+  }
+  PetscCall(PetscSortIntWithArray(c->n, number, at));
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscReal *r = records + SB_CONTACT_STATE * i;
+    PetscInt place;
+    Touch *touch;
+
+    PetscCall(PetscFindInt((PetscInt)r[0], c->n, number, &place));
+    if (place < 0) continue; /* another rank's */
+    touch = &c->touch[at[place]];
+    touch->on = (PetscBool)(r[1] != 0);
+    touch->was = (PetscBool)(r[2] != 0);
+    touch->rest = r[3];
+    touch->kept = r[4];
+    touch->lambda = r[5];
+    touch->value = r[6];
+    touch->gap = r[7];
+    PetscCall(PetscArraycpy(touch->n, r + 8, 3));
+    PetscCall(PetscArraycpy(touch->surface, r + 11, 3));
+    touch->friction.slid = touch->friction.slides = (PetscBool)(r[14] != 0);
+    touch->friction.crowded = (PetscBool)(r[15] != 0);
+    touch->friction.turning = r[16];
+    PetscCall(PetscArraycpy(touch->friction.tangent[0], r + 17, 3));
+    PetscCall(PetscArraycpy(touch->friction.stretch, r + 20, 3));
+    rotate_stretch(&c->to, touch);
+  }
+  PetscCall(PetscFree2(number, at));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectRename_Contact(SbEffect e, PetscInt nnode, const PetscInt from[], const PetscInt to[],
+                                      PetscInt *n, PetscReal records[])
+{
+  PetscInt kept = 0;
+
+  PetscFunctionBeginUser;
+  (void)e;
+  for (PetscInt i = 0; i < *n; i++) {
+    PetscReal *r = records + SB_CONTACT_STATE * i;
+    PetscInt place;
+
+    PetscCall(PetscFindInt((PetscInt)r[0], nnode, from, &place));
+    if (place < 0) continue;
+    r[0] = (PetscReal)to[place];
+    PetscCall(PetscArraymove(records + SB_CONTACT_STATE * kept, r, SB_CONTACT_STATE));
+    kept++;
+  }
+  *n = kept;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,110 +1,42 @@
 /*
-  contact_node.c - nodes of the surface against a rigid obstacle, still or on a given path, with Coulomb friction.
+  contact_node.c - nodes of the surface against a rigid obstacle, with Coulomb friction.
 
-  A node at x has the gap g = signed distance from the obstacle in its current pose, and the normal n there. Nodes are
-  those of the surface: vertices of P1, centroids of boundary faces of CR and DG (there g is the mean gap of the face), vertices and edges of P2. A uniform
-  pressure acts on the edge nodes of P2 alone, as exact responses reproduce; springs have the areas of the four triangles over the six nodes of a facet.
+  A node at x has the gap g = signed distance from the obstacle in its current pose, and the normal n there.
+  Nodes are those of the surface: vertices of P1, centroids of boundary faces of CR and DG (there g is the
+  mean gap of the face), vertices and edges of P2. A uniform pressure acts on the edge nodes of P2 alone, as
+  exact responses reproduce; springs have the areas of the four triangles over the six nodes of a facet.
 
-  Response `projected`: active nodes are constrained to the obstacle (src/fem/constraint.c): n . u is prescribed, and the constraint
-  force is the multiplier lambda. Primal-dual active set: after each solve nodes in tension are released, penetrating nodes are added, the normal is updated on a
-  curved obstacle, and the solve is repeated until the set does not change (Kikuchi and Oden 1988; Hueeber and Wohlmuth 2005). A node that
-  has been released and added several times within a step stays active, so that the loop ends. `multiplier`: the same with the forces as
-  unknowns of the solves.
+  Response `projected`: active nodes are constrained to the obstacle (src/fem/constraint.c): n . u is
+  prescribed, and the constraint force is the multiplier lambda. Primal-dual active set: after each solve
+  nodes in tension are released, penetrating nodes are added, the normal is updated on a curved obstacle, and
+  the solve is repeated until the set does not change (Kikuchi and Oden 1988; Hueeber and Wohlmuth 2005). A
+  node that has been released and added several times within a step stays active, so that the loop ends.
+  `multiplier`: the same with the forces as unknowns of the solves.
 
-  Response `penalty`: springs, N = k <-g>, <x> = max(x, 0), with k from the stiffness of the cell behind, near incompressibility that of nu = 0.45: a surface deforms by shear, and
-  springs stiffer by orders make E so ill-conditioned that the line search takes tiny steps. `augmented`: the penalty with a multiplier,
-  N = <lambda - k g>, which is updated after each solve until the penetration is within the tolerance (Simo and Laursen 1992).
+  Response `penalty`: springs, N = k <-g>, <x> = max(x, 0), with k from the stiffness of the cell behind, near
+  incompressibility that of nu = 0.45: a surface deforms by shear, and springs stiffer by orders make E so
+  ill-conditioned that the line search takes tiny steps. `augmented`: the penalty with a multiplier, N =
+  <lambda - k g>, updated after each solve until penetration is within the tolerance (Simo and Laursen 1992).
 
-  Friction (friction.c) is solved together with N. With it all responses use constraints: `projected` exact ones, with solves in their
-  null space, `penalty` and `augmented` springs, linear while normals and the active set stay fixed, which are updated after each
-  solve. A sticking node keeps its initial position of the step on the moving obstacle.
+  Friction (friction.c) is solved together with N. With it all responses use constraints: `projected` exact
+  ones, with solves in their null space, `penalty` and `augmented` springs, linear while normals and the
+  active set stay fixed, that is, in each solve. A sticking node stays where it was on the moving obstacle.
 
-  Penetration at the start of a step is resolved gradually: its depth falls to 1/e in `separation_steps` steps. With springs that is the
-  depth beyond their deflection. A static run resolves it at once.
+  Penetration at the start of a step is resolved gradually: its depth falls to 1/e in `separation_steps`
+  steps. With springs that is the depth beyond their deflection. A static run resolves it at once.
 
-  Restitution: contact_restitution.c. Edges of an obstacle's mesh: contact_facets.c. Forces and output: contact_force.c.
+  Restitution: its law and energy are in src/model/restitution.c. Edges of an obstacle's mesh:
+  contact_facets.c. Forces and output: contact_force.c.
 */
 #include "contact_node.h"
 
 #define STIFFEST 11. /* of the shear modulus: lambda + 2 mu at nu = 0.45 */
 #define TOGGLES 3    /* activations of a node within a step after which it stays active */
 #define PULLING 1e-6 /* tension at which a node is released, over the largest contact force */
+#define INSTANT 1e-3 /* fraction of a step for the difference quotient of the obstacle's velocity */
 #define SETTLED 1e-4 /* tolerance of spring forces, over the largest contact force */
 
-static PetscErrorCode setup_obstacle(SbEffect e, SbSpace space, void *data)
-{
-  Contact *c = (Contact *)data;
-  char option[3 * SB_NAME_MAX], note[192] = "";
-  const size_t said = strlen(e->note);
-
-  PetscFunctionBeginUser;
-  (void)snprintf(option, sizeof(option), "-effect_%s_obstacle", e->name);
-  PetscCall(SbObstacleSetUp(c->obstacle, space->comm, option, c->scale, c->at, sizeof(note), note));
-  if (note[0]) (void)snprintf(e->note + said, sizeof(e->note) - said, "%s%s", said ? "; " : "", note);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static void pose_of(const void *data, PetscReal t, SbPose *pose)
-{
-  SbContactPose((const Contact *)data, t, pose);
-}
-
-PetscErrorCode SbContactOptions_Node(SbEffect e, const SbScope *scope, const SbContactOptions *o)
-{
-  Contact *c = (Contact *)e->data;
-  PetscBool steady = PETSC_TRUE;
-  PetscReal length;
-  char option[3 * SB_NAME_MAX], text[PETSC_MAX_PATH_LEN];
-
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionName(scope, "obstacle", sizeof(option), option));
-  PetscCall(SbOptionString(scope, "obstacle", sizeof(text), text));
-  PetscCall(SbObstacleCreate(option, text, &c->obstacle));
-  c->facets = SbObstacleIsMesh(c->obstacle);
-  if (c->facets) {
-    PetscCall(SbOptionReal(scope, "obstacle_scale", &c->scale));
-    PetscCall(SbOptionReals(scope, "obstacle_at", c->at));
-  }
-  PetscCall(SbEffectFormulas(scope, "displacement", 3, PETSC_FALSE, c->displacement, &steady));
-  PetscCall(SbEffectFormulas(scope, "angle", 1, PETSC_FALSE, &c->angle, &steady));
-  PetscCall(SbOptionReals(scope, "axis", c->axis));
-  PetscCall(SbOptionReals(scope, "axis_point", c->point));
-  length = PetscSqrtReal(SbDot3(c->axis, c->axis));
-  PetscCheck(length > 0, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "-effect_%s_axis: 0,0,0 is no direction",
-             e->name);
-  for (int i = 0; i < 3; i++) c->axis[i] /= length;
-  c->response = o->response;
-  c->friction = o->friction;
-  if (c->response == BARRIER) { /* implemented in barrier.c */
-    SbBarrierScene scene = {.on = &e->on,
-                            .obstacle = c->obstacle,
-                            .pose = pose_of,
-                            .friction = c->friction.mu,
-                            .restitution = o->restitution,
-                            .setup_obstacle = setup_obstacle};
-
-    PetscCall(PetscArraycpy(scene.centre, c->point, 3));
-    PetscCall(SbBarrierCreate(e, scope, &scene));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  c->cut = o->cut;
-  c->stiffness = o->stiffness;
-  c->damping = o->damping;
-  c->bounce.e = o->restitution;
-  SbOverlapSet(&c->overlap, o->separation_steps);
-  c->held = (PetscBool)(exact(c) || c->friction.mu > 0);
-  if (c->held) {
-    e->ops.force = e->ops.contact_force = NULL; /* forces come from the constraints */
-    e->ops.tangent = NULL;
-  } else {
-    e->ops.assemble_constraints = NULL;
-    e->linear = PETSC_FALSE;
-    if (c->response == PENALTY && !c->cut) e->ops.update_active_set = NULL;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Adds a facet's share of area and stiffness to one of its nodes; slot[]: index of owned nodes, -1: none yet. */
+/* Adds a facet's share of area and stiffness to one of its nodes; slot[]: its index, -1: none yet. */
 static void add_share(SbSpace space, const SbFacet *facet, PetscInt a, PetscReal share, PetscInt slot[],
                       Contact *c)
 {
@@ -131,7 +63,7 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
   PetscInt n, *slot;
 
   PetscFunctionBeginUser;
-  PetscCall(setup_obstacle(e, space, c));
+  PetscCall(SbContactSetUpObstacle(e, space, c));
   PetscCheck(c->damping <= 0 || e->dynamic, space->comm, PETSC_ERR_USER_INPUT,
              "-effect_%s_damping %g s: a static run has no speed to damp; leave it out", e->name,
              (double)c->damping);
@@ -169,7 +101,7 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
 
 /* ------------------------------------------------------------------ who touches */
 
-/* Gap of the node at x less the gap it is constrained to, with its normal and the right-hand side of n . u for that. */
+/* Gap of the node at x less the gap it is constrained to, with the normal n and right-hand side of n . u. */
 static PetscReal search(const Contact *c, SbSpace space, const PetscReal x[3], Touch *touch)
 {
   const PetscReal *X = space->node_x + 3 * touch->node;
@@ -191,26 +123,12 @@ static PetscReal search(const Contact *c, SbSpace space, const PetscReal x[3], T
   return gap - touch->rest;
 }
 
-/* Gap that a node is constrained to, from its position x0 at the start of the step. */
-static PetscReal rest_of(const Contact *c, const SbPose *from, const Touch *touch, const PetscReal x0[3])
+/* Changes the gap that the node is constrained to. */
+static void move_to(PetscReal rest, Touch *touch)
 {
-  PetscReal n[3];
-  /* with springs penetration includes their deflection; projected nodes are where they were constrained */
-  const PetscReal depth = touch->was && !exact(c) ? -touch->kept : -SbContactGap(c, from, x0, n);
-
-  return depth > TOLERANCE * c->size ? -c->overlap.left * depth : 0;
-}
-
-/* The damper of a step of implicit Euler is a stiffer spring and a constant force: k damping (g - g0) / dt, g0 < 0 the gap at its start. */
-static void set_damper(const Contact *c, const SbPose *from, PetscReal dt, const PetscReal x0[3],
-                       Touch *touch)
-{
-  PetscReal n[3];
-
-  touch->stiff = touch->k;
-  if (c->damping <= 0 || dt <= 0) return;
-  touch->stiff += touch->k * c->damping / dt;
-  touch->before = touch->k * c->damping / dt * PetscMin(0, SbContactGap(c, from, x0, n) - touch->rest);
+  touch->value += rest - touch->rest;
+  touch->gap -= rest - touch->rest;
+  touch->rest = rest;
 }
 
 /* Activates a penetrating node. */
@@ -218,7 +136,8 @@ static void enter(const Contact *c, Touch *touch)
 {
   if (!touch->on && c->friction.mu > 0) SbFrictionEnter(&c->friction, touch, -touch->gap);
   touch->on = PETSC_TRUE;
-  if (c->bounce.e > 0) SbContactHit(c, touch);
+  if (c->bounce.e > 0 && touch->approach > 0 && touch->rest == 0)
+    move_to(SbRestitutionGap(&c->bounce, touch->gap0, touch->approach), touch);
 }
 
 /* Time of impact of a node that was separated and penetrates now, in the motion without contact. */
@@ -236,28 +155,11 @@ static PetscErrorCode impact_contact(SbEffect e, PetscReal *part)
 
   PetscFunctionBeginUser;
   *part = c->impact;
-  for (PetscInt i = 0; c->impact < 1 && i < c->n;
-       i++) { /* springs of new contacts have acted for a whole step */
+  /* springs of new contacts have acted for a whole step */
+  for (PetscInt i = 0; c->impact < 1 && i < c->n; i++) {
     if (!c->touch[i].was) c->touch[i].lambda = 0;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The node's initial position x0, moved with the obstacle: where it would stick. A node that comes into contact in this
-   step sticks to its initial position. */
-static void start_friction(const Contact *c, SbSpace space, const SbPose *from, const PetscReal x0[3],
-                           Touch *touch)
-{
-  const PetscReal *X = space->node_x + 3 * touch->node;
-  PetscReal at[3], x1[3];
-
-  SbPoseInvert(from, x0, at);
-  SbPoseApply(&c->to, at, x1);
-  for (int k = 0; k < 3; k++) {
-    touch->start[k] = x1[k] - X[k];
-    touch->friction.stretch[k] = SbDot3(c->to.R + 3 * k, touch->stretch);
-  }
-  SbFrictionBegin(&touch->friction, touch->on);
 }
 
 static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, PetscReal dt,
@@ -276,8 +178,8 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
   SbOverlapBegin(&c->overlap, dt);
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
-    PetscReal x0[3], x[3], n[3];
-    PetscBool comes;
+    PetscReal x0[3], x[3], X0[3], x1[3], n[3], gap0, depth, v = 0;
+    PetscBool comes = PETSC_FALSE;
 
     touch->toggles = touch->flips = 0;
     touch->valley = PETSC_FALSE;
@@ -286,12 +188,38 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
     touch->idle = (PetscBool)(c->cut && !touch->was && !exact(c));
     place(space, touch->node, u, x);
     place(space, touch->node, u0, x0);
-    if (c->cut) touch->gap0 = SbContactGap(c, &from, x0, n);
-    touch->rest = rest_of(c, &from, touch, x0);
-    comes =
-      (PetscBool)(c->bounce.e > 0 && SbContactComes(c, &from, x0, v0 ? v0 + 3 * touch->node : NULL, touch));
-    if (c->friction.mu > 0) start_friction(c, space, &from, x0, touch);
-    set_damper(c, &from, dt, x0, touch);
+    gap0 = SbContactGap(c, &from, x0, n);
+    if (c->cut) touch->gap0 = gap0;
+
+    /* with springs penetration includes their deflection; projected nodes are where they were constrained */
+    depth = touch->was && !exact(c) ? -touch->kept : -gap0;
+    touch->rest = depth > TOLERANCE * c->size ? -c->overlap.left * depth : 0;
+
+    /* its initial position moved with the obstacle: it sticks there, also if contact begins in this step */
+    SbPoseInvert(&from, x0, X0);
+    SbPoseApply(&c->to, X0, x1);
+    for (int k = 0; c->friction.mu > 0 && k < 3; k++) {
+      touch->start[k] = x1[k] - space->node_x[3 * touch->node + k];
+      touch->friction.stretch[k] = SbDot3(c->to.R + 3 * k, touch->stretch);
+    }
+    if (c->friction.mu > 0) SbFrictionBegin(&touch->friction, touch->on);
+
+    /* restitution: whether it would penetrate at its speed of approach */
+    touch->approach = 0;
+    if (c->bounce.e > 0 && v0 && !touch->was && touch->rest >= 0) {
+      touch->gap0 = PetscMax(0, gap0);
+      for (int k = 0; k < 3; k++) v -= n[k] * (v0[3 * touch->node + k] - (x1[k] - x0[k]) / dt);
+      touch->approach = PetscMax(0, v);
+      comes = SbRestitutionApproaches(&c->bounce, touch->gap0, v);
+    }
+
+    /* the damper of a step of implicit Euler is a stiffer spring and a constant force: k damping (g - g0) /
+       dt, g0 < 0 the gap at its start */
+    touch->stiff = touch->k;
+    if (c->damping > 0 && dt > 0) {
+      touch->stiff += touch->k * c->damping / dt;
+      touch->before = touch->k * c->damping / dt * PetscMin(0, gap0 - touch->rest);
+    }
     touch->gap = search(c, space, x, touch);
     find_impact(c, touch);
     for (int k = 0; k < 3; k++) touch->now[k] = u[3 * touch->node + k];
@@ -337,40 +265,6 @@ static PetscErrorCode constrain_contact(SbEffect e, SbSpace space, PetscBool acr
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gap and multiplier of every node after a solve; the largest multiplier of all ranks. */
-static PetscErrorCode measure(const Contact *c, SbSpace space, const PetscReal u[], PetscReal *largest)
-{
-  PetscFunctionBeginUser;
-  *largest = 0;
-  for (PetscInt i = 0; i < c->n; i++) {
-    Touch *touch = &c->touch[i];
-    const PetscReal pushed = touch->along < 0 ? 0 : SbSpaceGetConstraint(space, touch->along)->force;
-    PetscReal x[3], wrong[3];
-
-    for (int k = 0; k < 3; k++) {
-      touch->now[k] = u[3 * touch->node + k];
-      wrong[k] = pushed * touch->n[k];
-    }
-    if (touch->along >= 0 && c->friction.mu > 0) SbFrictionRead(&c->friction, space, touch, pushed);
-    if (exact(c)) touch->lambda = touch->on ? pushed : 0;
-    if (touch->valley)
-      touch->other_lambda =
-        touch->other_along < 0 ? 0 : SbSpaceGetConstraint(space, touch->other_along)->force;
-    place(space, touch->node, u, x);
-    touch->gap = search(c, space, x, touch);
-    *largest = PetscMax(*largest, SbContactForce(c, touch));
-    if (!exact(c) && c->held) {
-      const PetscReal force =
-        touch->on && touch->toggles >= TOGGLES ? pull(touch, touch->gap) : SbContactForce(c, touch);
-
-      for (int k = 0; k < 3; k++) wrong[k] -= force * touch->n[k];
-      touch->wrong = PetscSqrtReal(SbDot3(wrong, wrong));
-    }
-  }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, largest, 1, MPIU_REAL, MPI_MAX, space->comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Whether the active set was right for this node; changes it if not. */
 static PetscBool update_constraint(const Contact *c, PetscReal largest, Touch *touch)
 {
@@ -391,8 +285,8 @@ static PetscBool update_constraint(const Contact *c, PetscReal largest, Touch *t
   return (PetscBool)(PetscAbsReal(touch->gap) <= TOLERANCE * c->size);
 }
 
-/* Whether a spring's force agrees with its position; for `augmented`, which updates the multiplier, also whether the penetration is within
-   the tolerance. */
+/* Whether a spring's force agrees with its position; for `augmented`, which updates the multiplier, also
+   whether the penetration is within the tolerance. */
 static PetscBool update_spring(const Contact *c, PetscReal largest, Touch *touch)
 {
   const PetscReal force = spring(touch, touch->gap);
@@ -415,11 +309,37 @@ static PetscBool update_spring(const Contact *c, PetscReal largest, Touch *touch
 static PetscErrorCode update_contact(SbEffect e, SbSpace space, const PetscReal u[], PetscBool *changed)
 {
   Contact *c = (Contact *)e->data;
-  PetscReal largest, worst = 0;
+  PetscReal largest = 0, worst = 0;
   PetscBool mine = PETSC_FALSE, wait;
 
   PetscFunctionBeginUser;
-  PetscCall(measure(c, space, u, &largest));
+  /* gap and multiplier of every node; the largest multiplier of all ranks */
+  for (PetscInt i = 0; i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+    const PetscReal pushed = touch->along < 0 ? 0 : SbSpaceGetConstraint(space, touch->along)->force;
+    PetscReal x[3], wrong[3];
+
+    for (int k = 0; k < 3; k++) {
+      touch->now[k] = u[3 * touch->node + k];
+      wrong[k] = pushed * touch->n[k];
+    }
+    if (touch->along >= 0 && c->friction.mu > 0) SbFrictionRead(&c->friction, space, touch, pushed);
+    if (exact(c)) touch->lambda = touch->on ? pushed : 0;
+    if (touch->valley)
+      touch->other_lambda =
+        touch->other_along < 0 ? 0 : SbSpaceGetConstraint(space, touch->other_along)->force;
+    place(space, touch->node, u, x);
+    touch->gap = search(c, space, x, touch);
+    largest = PetscMax(largest, SbContactForce(c, touch));
+    if (!exact(c) && c->held) {
+      const PetscReal force =
+        touch->on && touch->toggles >= TOGGLES ? pull(touch, touch->gap) : SbContactForce(c, touch);
+
+      for (int k = 0; k < 3; k++) wrong[k] -= force * touch->n[k];
+      touch->wrong = PetscSqrtReal(SbDot3(wrong, wrong));
+    }
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPIU_REAL, MPI_MAX, space->comm));
   /* after the first solve of a step: times of impact; from now on all springs act */
   for (PetscInt i = 0; c->first && c->cut && i < c->n; i++) {
     Touch *touch = &c->touch[i];
@@ -431,10 +351,9 @@ static PetscErrorCode update_contact(SbEffect e, SbSpace space, const PetscReal 
   c->first = PETSC_FALSE;
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
-    const PetscBool right =
-      exact(c) ? update_constraint(c, largest, touch) : update_spring(c, largest, touch);
 
-    if (!right) mine = PETSC_TRUE;
+    if (!(exact(c) ? update_constraint(c, largest, touch) : update_spring(c, largest, touch)))
+      mine = PETSC_TRUE;
   }
   /* update stick and slip */
   for (PetscInt i = 0; c->friction.mu > 0 && i < c->n; i++) {
@@ -462,49 +381,75 @@ static PetscErrorCode update_contact(SbEffect e, SbSpace space, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode destroy_contact(SbEffect e)
+/* ------------------------------------------------------------------ velocities at the obstacle */
+
+static PetscErrorCode restitution_contact(SbEffect e, PetscReal *work)
+{
+  const Contact *c = (const Contact *)e->data;
+
+  PetscFunctionBeginUser;
+  *work = 0;
+  for (PetscInt i = 0; i < c->n; i++) {
+    const Touch *touch = &c->touch[i];
+
+    if (touch->on && touch->rest > 0) *work += touch->lambda * (touch->rest - touch->gap0);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode scale_contact(SbEffect e, PetscReal share)
 {
   Contact *c = (Contact *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(SbObstacleDestroy(&c->obstacle));
-  for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&c->displacement[i]));
-  PetscCall(SbFormulaDestroy(&c->angle));
-  PetscCall(PetscFree(c->touch));
+  c->bounce.left = share;
+  for (PetscInt i = 0; i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+
+    if (touch->rest > 0) move_to(SbRestitutionGap(&c->bounce, touch->gap0, touch->approach), touch);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactCreate_Node(SbEffect e)
+/* Velocity of the obstacle at each active node. */
+static PetscErrorCode target_contact(SbEffect e, SbSpace space, const SbStage *stage)
 {
-  static const char *const columns[] = {"force_x",  "force_y",  "force_z",  "torque_x",
-                                        "torque_y", "torque_z", "contacts", "penetration"};
-  Contact *c;
+  const Contact *c = (const Contact *)e->data;
+  SbPose before, now;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscNew(&c));
-  e->data = c;
-  e->steady = PETSC_FALSE; /* a load factor does not make an obstacle softer */
-  e->ops.setup = setup_contact;
-  e->ops.begin_step = touch_contact;
-  e->ops.assemble_constraints = constrain_contact;
-  e->ops.update_active_set = update_contact;
-  e->ops.time_of_impact = impact_contact;
-  e->ops.restitution = SbEffectRestitution_Contact;
-  e->ops.scale_restitution = SbEffectScaleRestitution_Contact;
-  e->ops.target_velocity = SbEffectTargetVelocity_Contact;
-  e->ops.force = SbEffectForce_Contact;
-  e->ops.tangent = SbEffectTangent_Contact;
-  e->ops.accept = SbEffectAccept_Contact;
-  e->ops.contact_force = SbEffectForce_Contact;
-  e->ops.gap = SbEffectGap_Contact;
-  e->ops.contact_points = SbEffectContactPoints_Contact;
-  e->ops.history = SbEffectHistory_Contact;
-  e->ops.save = SbEffectSave_Contact;
-  e->ops.load = SbEffectLoad_Contact;
-  e->ops.rename = SbEffectRename_Contact;
-  e->nstate = SB_CONTACT_STATE;
-  e->ops.destroy = destroy_contact;
-  e->column = columns;
-  e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);
+  SbContactPose(c, stage->t, &now);
+  SbContactPose(c, stage->t - INSTANT * stage->dt, &before);
+  for (PetscInt i = 0; i < c->n; i++) {
+    const Touch *touch = &c->touch[i];
+    PetscReal x[3], X[3], from[3], to[3], v[3];
+
+    if (!touch->on || touch->along < 0) continue;
+    place(space, touch->node, stage->u, x);
+    SbPoseInvert(&now, x, X);
+    SbPoseApply(&before, X, from);
+    SbPoseApply(&now, X, to);
+    for (int k = 0; k < 3; k++) v[k] = (to[k] - from[k]) / (INSTANT * stage->dt);
+    SbSpaceGetConstraint(space, touch->along)->velocity = SbDot3(touch->n, v);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+const SbEffectOps SbContactNodeOps = {.setup = setup_contact,
+                                      .begin_step = touch_contact,
+                                      .assemble_constraints = constrain_contact,
+                                      .update_active_set = update_contact,
+                                      .time_of_impact = impact_contact,
+                                      .restitution = restitution_contact,
+                                      .scale_restitution = scale_contact,
+                                      .target_velocity = target_contact,
+                                      .force = SbEffectForce_Contact,
+                                      .tangent = SbEffectTangent_Contact,
+                                      .accept = SbEffectAccept_Contact,
+                                      .gap = SbEffectGap_Contact,
+                                      .contact_points = SbEffectContactPoints_Contact,
+                                      .history = SbEffectHistory_Contact,
+                                      .save = SbEffectSave_Contact,
+                                      .load = SbEffectLoad_Contact,
+                                      .rename = SbEffectRename_Contact,
+                                      .destroy = SbContactDestroy};

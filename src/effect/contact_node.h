@@ -1,9 +1,9 @@
 /*
-  contact_node.h - nodes against a rigid obstacle: shared by contact_node.c, contact_facets.c, contact_force.c, contact_restitution.c and friction.c.
+  contact_node.h - nodes against a rigid obstacle: shared by contact_node.c, contact_facets.c,
+  contact_force.c and friction.c.
 */
 #pragma once
 #include "contact.h"
-#include "sbcontact.h"
 
 #define TOLERANCE 1e-7 /* tolerance of penetration, over the size of the bodies */
 
@@ -22,7 +22,7 @@ typedef struct {
 } SbFrictionState;
 
 /* A node of the surface that this rank owns. */
-typedef struct {
+struct _p_Touch {
   PetscInt node, cell, a;          /* local node, a cell that has it, as its node a */
   PetscReal k;                     /* stiffness of the springs, N/m */
   PetscBool on;                    /* active; with springs: at the end of the last step */
@@ -52,37 +52,8 @@ typedef struct {
   PetscReal start[3];   /* displacement with which it would stick, m */
   PetscReal now[3];     /* that of the last solve, m */
   PetscReal stretch[3]; /* of springs that stick, in the obstacle's rest frame, after the last step, m */
-} Touch;
+};
 
-typedef struct {
-  SbObstacle obstacle;
-  SbResponse response;
-  PetscBool held;   /* active nodes are constrained; else force() acts on them */
-  PetscBool facets; /* the obstacle is a mesh */
-  SbFriction friction;
-  PetscReal stiffness, damping; /* s */
-  SbOverlap overlap;
-  PetscReal scale, at[3]; /* of the file of a mesh */
-  SbFormula displacement[3], angle;
-  PetscReal axis[3], point[3];
-  SbRestitution bounce;
-  PetscInt n;
-  Touch *touch;     /* [n] */
-  PetscReal size;   /* of the bodies, m */
-  PetscBool cut;    /* steps end at times of impact */
-  PetscBool first;  /* the step has not been solved yet */
-  PetscReal impact; /* fraction of the step at the first time of impact, 1: none */
-  SbPose to;        /* at the end of the step */
-} Contact;
-
-/* Whether active nodes are constrained exactly. */
-static inline PetscBool exact(const Contact *c)
-{
-  return SbResponseIsExact(c->response);
-}
-
-/* The obstacle's pose at time t. */
-void SbContactPose(const Contact *c, PetscReal t, SbPose *pose);
 /* Gap of a point, m, and the normal there. */
 PetscReal SbContactGap(const Contact *c, const SbPose *pose, const PetscReal x[3], PetscReal n[3]);
 
@@ -110,8 +81,9 @@ static inline PetscReal SbContactForce(const Contact *c, const Touch *touch)
 }
 
 /*
-  contact_facets.c: updates the planes of an active node after a solve, at x, X at rest, at the distance `gap` (m) from the facet with normal n.
-  Flip: it was constrained to one facet; returns whether to another one now. Valley: it was constrained to two. Not collective.
+  contact_facets.c: updates the planes of an active node after a solve, at x, X at rest, at the distance `gap`
+  (m) from the facet with normal n. Flip: it was constrained to one facet; returns whether to another one now.
+  Valley: it was constrained to two. Not collective.
 */
 PetscBool SbContactFlip(const Contact *c, const PetscReal X[3], const PetscReal x[3], PetscReal gap,
                         PetscReal n[3], Touch *touch);
@@ -121,42 +93,27 @@ void SbContactValley(const Contact *c, SbSpace space, const PetscReal x[3], Pets
 PetscBool SbContactKept(const Touch *touch);
 
 /*
-  Friction (friction.c). Not collective but for Warn. Begin: a step; touches: active at the end of the last one. Enter: activates it: it sticks or slides by its motion
-  without contact, which penetrates by `depth` (m). Direction: of the contact force. Constrain: adds its tangential
-  constraints. Read: their forces after a solve, N being the normal force.
+  Friction (friction.c). Not collective but for Warn. Begin: a step; touches: active at the end of the last
+  one. Enter: activates it: it sticks or slides by its motion without contact, which penetrates by `depth`
+  (m). Direction: of the contact force. Constrain: adds its tangential constraints. Read: their forces after a
+  solve, N being the normal force.
 */
 void SbFrictionBegin(SbFrictionState *friction, PetscBool touches);
 void SbFrictionEnter(const SbFriction *f, Touch *touch, PetscReal depth);
 void SbFrictionDirection(const SbFriction *f, const Touch *touch, PetscReal push[3]);
 PetscErrorCode SbFrictionConstrain(const SbFriction *f, SbSpace space, Touch *touch);
 void SbFrictionRead(const SbFriction *f, SbSpace space, Touch *touch, PetscReal N);
-/* Updates stick or slip of a node. Returns the error of its friction in the last solve, N. N: its normal force. */
+/* Updates stick or slip of a node with the normal force N; returns the error of its friction, N. */
 PetscReal SbFrictionUpdate(const SbFriction *f, Touch *touch, PetscReal N);
-/* After all nodes: worst of their errors on this rank and largest normal force of all ranks, N; changed: the solve was not right. */
+/* After all nodes: worst of these errors, largest normal force of all ranks, N; changed: too large. */
 void SbFrictionJudge(SbFriction *f, PetscReal worst, PetscReal largest, PetscBool *changed);
 /* Accepts a step for a node; presses: its normal force is positive. */
-void SbFrictionAccept(SbFriction *f, Touch *touch, PetscBool presses);
+void SbFrictionAccept(const SbFriction *f, Touch *touch, PetscBool presses);
 /* At the end of a step: warns once of friction that did not converge. Collective. */
 PetscErrorCode SbFrictionWarn(SbFriction *f, const char effect[], SbSpace space, PetscReal t);
-/* History variables, for checkpoints: state[SB_FRICTION_STATE]. */
-#define SB_FRICTION_STATE 9
-void SbFrictionSave(const SbFrictionState *friction, PetscReal state[]);
-void SbFrictionLoad(const PetscReal state[], SbFrictionState *friction);
-
-/*
-  Restitution (contact_restitution.c), of a node at x0 with the velocity v0 (m/s; NULL: not known) at the start of the step. Comes: it would
-  penetrate at that speed. Hit: activates it.
-*/
-PetscBool SbContactComes(const Contact *c, const SbPose *from, const PetscReal x0[3], const PetscReal v0[3],
-                         Touch *touch);
-void SbContactHit(const Contact *c, Touch *touch);
-
 /* Operations of the effect (sbeffect.h). */
 PetscErrorCode SbEffectForce_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[]);
 PetscErrorCode SbEffectTangent_Contact(SbEffect e, SbSpace space, const SbStage *stage, Mat A);
-PetscErrorCode SbEffectTargetVelocity_Contact(SbEffect e, SbSpace space, const SbStage *stage);
-PetscErrorCode SbEffectRestitution_Contact(SbEffect e, PetscReal *work);
-PetscErrorCode SbEffectScaleRestitution_Contact(SbEffect e, PetscReal share);
 PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *stage);
 PetscErrorCode SbEffectGap_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],
                                    PetscReal normal[]);
@@ -164,11 +121,9 @@ PetscErrorCode SbEffectContactPoints_Contact(SbEffect e, SbSpace space, const Sb
                                              SbContactPoints *list);
 PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage *stage,
                                        const PetscReal residual[], PetscReal values[]);
-#define SB_CONTACT_STATE (14 + SB_FRICTION_STATE) /* numbers in a record */
+#define SB_CONTACT_STATE 23 /* numbers in a record */
 PetscErrorCode SbEffectSave_Contact(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records);
 PetscErrorCode SbEffectLoad_Contact(SbEffect e, SbSpace space, PetscReal t, const PetscReal u[], PetscInt n,
                                     const PetscReal records[]);
 PetscErrorCode SbEffectRename_Contact(SbEffect e, PetscInt nnode, const PetscInt from[], const PetscInt to[],
                                       PetscInt *n, PetscReal records[]);
-/* Rotates the deflection of a node's springs with the obstacle. */
-void SbContactStretch(const SbPose *pose, Touch *touch);

@@ -1,15 +1,15 @@
 /*
-  deadload.c - the effects `body_force`, a force per rest volume, and `traction`, a force per rest area; of fixed direction (dead
-  loads), given as three formulas of time and rest position.
+  deadload.c - the effects `body_force`, a force per rest volume, and `traction`, a force per rest area; of
+  fixed direction (dead loads), given as three formulas of time and rest position.
 
-  f_a = s(t) integral of phi_a q(X, t) over each tet (or facet), phi_a the basis of the element, X its map. A total force of a
-  traction is uniform over the rest area of its facets, and adds up with the formulas. Every rank integrates its owned and its ghost
-  cells, so rows of owned nodes are complete without communication.
+  f_a = s(t) integral of phi_a q(X, t) over each tet (or facet), phi_a the basis of the element, X its map. A
+  total force of a traction is uniform over the rest area of its facets, and adds up with the formulas. Every
+  rank integrates its owned and its ghost cells, so rows of owned nodes are complete without communication.
 
-  Rules, both with positive weights, inner points and degree 5, hence exact for q of degree 4: SbRuleQuintic (Walkington,
-  "Quadrature on simplices of arbitrary dimension", 2000), SbRuleFacet (Radon 1948; Stroud, "Approximate calculation of multiple
-  integrals", 1971, T2:5-1). Second-order convergence of linear elements needs degree 2; the rest lowers the constant at no cost,
-  because a load that does not change is integrated once.
+  Rules, both with positive weights, inner points and degree 5, hence exact for q of degree 4: SbRuleQuintic
+  (Walkington, "Quadrature on simplices of arbitrary dimension", 2000), SbRuleFacet (Radon 1948; Stroud,
+  "Approximate calculation of multiple integrals", 1971, T2:5-1). Second-order convergence of linear elements
+  needs degree 2; the rest lowers the constant at no cost, because a steady load is integrated once.
 */
 #include "effect_impl.h"
 

@@ -1,8 +1,8 @@
 /*
   effect.c - the registry of effects, and their creation by name.
 
-  An effect gets the operations of its type and private data of zeros; then it reads its options. Everything that needs the
-  mesh waits for its setup operation.
+  An effect gets the operations of its type and private data of zeros; then it reads its options. Everything
+  that needs the mesh waits for its setup operation.
 */
 #include "effect_impl.h"
 #include "sblog.h"

@@ -1,5 +1,5 @@
 /*
-  effect_impl.h - shared by effects: formulas, selection by sets, dead loads, prescribed unknowns, contact points.
+  effect_impl.h - shared by effects: formulas, paths, selection by sets, contact points.
 */
 #pragma once
 #include "sbeffect.h"
@@ -12,7 +12,7 @@
   Input:
     scope, key - as for SbOptionFormulas(); the row of the key says how many formulas there are (n)
     n          - how many the caller expects, 1..3
-    position      - whether the formulas may use x, y, z
+    position   - whether the formulas may use x, y, z
   Output:
     formulas[n] - the caller destroys each
     steady      - cleared when a formula uses t, untouched otherwise
@@ -22,8 +22,8 @@
 PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt n, PetscBool position,
                                 SbFormula formulas[], PetscBool *steady);
 
-/* A path given by the options displacement, angle, axis and axis_point. Read: position, whether displacements may use x, y, z; steady as
-   for SbEffectFormulas(). Not collective. */
+/* A path given by the options displacement, angle, axis and axis_point. Read: position, whether displacements
+   may use x, y, z; steady as for SbEffectFormulas(). Not collective. */
 typedef struct {
   SbFormula displacement[3], angle; /* m, degrees; owned */
   PetscReal axis[3], point[3];      /* unit vector; m */
@@ -32,13 +32,13 @@ PetscErrorCode SbPathRead(const SbScope *scope, PetscBool position, SbPath *path
 PetscErrorCode SbPathDestroy(SbPath *path);
 
 /*
-  Items of the named sets on this rank, each once even when it is in several of the sets. Collective; the caller
-  releases the array with PetscFree(). Errors (PETSC_ERR_USER_INPUT, alike on all ranks): no such set; a set that selects
-  nothing of the kind, with what it does select.
+  Items of the named sets on this rank, each once even when it is in several of the sets. Collective; the
+  caller releases the array with PetscFree(). Errors (PETSC_ERR_USER_INPUT, alike on all ranks): no such set;
+  a set that selects nothing of the kind, with what it does select.
 
   SbEffectFacets - boundary facets of owned and ghost cells.
-  SbEffectNodes  - nodes that can be constrained, ascending, owned ones first. An error for a body with nodes at faces of which the
-                   sets hold vertices but no face.
+  SbEffectNodes  - nodes that can be constrained, ascending, owned ones first. An error for a body with nodes
+                   at faces of which the sets hold vertices but no face.
   SbEffectVertices - vertices of the mesh, ascending, owned ones first.
   SbEffectCells  - cells, ascending, owned ones first; every local cell when no set is named.
 */
@@ -60,33 +60,6 @@ static inline PetscInt SbCellBasis(SbElement e, const PetscReal L[4], PetscReal 
   }
   return 4;
 }
-
-/*
-  SbPrescribed - unknowns that an effect prescribes. An unknown belongs to the first effect that asks for it, in the order of
-  the scenario; so no two effects write one value, and no reaction is counted twice.
-*/
-typedef struct {
-  PetscInt n;
-  PetscInt *node;      /* [n] local nodes, ascending, owned ones first; owned by this struct */
-  uint8_t *components; /* [n] bit c: component c is constrained by this effect; owned by this struct */
-  PetscInt *row;       /* [n] index into space->fixed_node; filled by the first SbPrescribedSetValues() */
-  PetscBool have_rows;
-  PetscInt nowned;
-} SbPrescribed;
-/*
-  SbPrescribedSetUp - claims `components` (bits 0..2) of the nodes of the named sets. Collective; release with SbPrescribedFree().
-
-  Errors: PETSC_ERR_USER_INPUT when earlier effects have all of them already.
-*/
-PetscErrorCode SbPrescribedSetUp(SbPrescribed *p, SbSpace space, const SbEffectOn *on, int components);
-/* Writes value[n][3] (NULL: zero), m, into space->fixed_value. Not collective; after SbSpacePrescribeDone(). */
-PetscErrorCode SbPrescribedSetValues(SbPrescribed *p, SbSpace space, const PetscReal value[]);
-/* force[3] = sum over the owned prescribed unknowns of the residual: the reaction, acting on the body, N. Not collective. */
-void SbPrescribedReaction(const SbPrescribed *p, const PetscReal residual[], PetscReal force[3]);
-PetscErrorCode SbPrescribedFree(SbPrescribed *p);
-/* Bits of the choice "x|y|z|xy|yz|xz|xyz", by its position. */
-int SbPrescribedComponents(PetscInt choice);
-#define SB_COMPONENT_CHOICES "x|y|z|xy|yz|xz|xyz"
 
 /* Appends one. Not collective. */
 PetscErrorCode SbContactPointsAdd(SbContactPoints *list, const SbContactPoint *point);

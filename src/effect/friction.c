@@ -1,15 +1,15 @@
 /*
   friction.c - Coulomb friction of pairs in contact: |T| <= mu N, and T = -mu N along the slip if it slides.
 
-  A sticking pair has two exact tangential constraints, or two springs. A
-  sliding pair has its contact force along n - mu d, d the direction of the slip, so that friction uses N of the
-  same solve; a spring normal to d adapts the direction. After a solve a sticking pair with more than mu N slides,
-  and one that slid backwards sticks: a semismooth Newton method (Alart and Curnier 1991; Hueeber, Stadler, Wohlmuth 2008) as an
-  active-set method.
+  A sticking pair has two exact tangential constraints, or two springs. A sliding pair has its contact force
+  along n - mu d, d the direction of the slip, so that friction uses N of the same solve; a spring normal to d
+  adapts the direction. After a solve a sticking pair with more than mu N slides, and one that slid backwards
+  sticks: a semismooth Newton method (Alart and Curnier 1991; Hueeber, Stadler, Wohlmuth 2008).
 
   The slip is that of the step, as in implicit Euler, plus with springs their deflection at its start.
 
-  A node in the corner of two obstacles cannot stick to both by exact constraints: they would be redundant. Such a pair sticks by springs while in contact.
+  A node in the corner of two obstacles cannot stick to both by exact constraints: they would be redundant.
+  Such a pair sticks by springs while in contact.
 */
 #include "contact_node.h"
 
@@ -129,12 +129,7 @@ PetscErrorCode SbFrictionConstrain(const SbFriction *f, SbSpace space, Touch *to
       g->crowded = PETSC_TRUE; /* constraints of other effects hold it */
     }
     row.spring = PETSC_TRUE;
-    if (careful(g))
-      row.stiffness = g->turning;
-    else if (g->slides)
-      row.stiffness = q ? g->turning : 0;
-    else
-      row.stiffness = touch->k;
+    row.stiffness = !careful(g) && !g->slides ? touch->k : careful(g) || q ? g->turning : 0;
     PetscCall(SbSpaceAddConstraint(space, &row, &g->slide[q]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -153,7 +148,7 @@ void SbFrictionRead(const SbFriction *f, SbSpace space, Touch *touch, PetscReal 
   }
 }
 
-/* The same with springs for a pair that alternates; N is the mean of this solve and the last. */
+/* The same by springs for a pair that alternates (SbFrictionUpdate()); N is the mean of both solves. */
 static PetscReal update_by_secant(const SbFriction *f, PetscReal before, Touch *touch)
 {
   SbFrictionState *g = &touch->friction;
@@ -170,9 +165,9 @@ static PetscReal update_by_secant(const SbFriction *f, PetscReal before, Touch *
 }
 
 /*
-  Updates stick or slip of a pair; returns the error of its friction, N. With T the force opposing the slip s and a stiffness k, the trial force
-  is T + k s, or k s with springs. It slides where that is longer than mu N, with T = mu N along it; the derivative of that
-  direction is the stiffness across it.
+  Updates stick or slip of a pair; returns the error of its friction, N. With T the force opposing the slip s
+  and a stiffness k, the trial force is T + k s, or k s with springs. It slides where that is longer than mu
+  N, with T = mu N along it; the derivative of that direction is the stiffness across it.
 */
 static PetscReal update(const SbFriction *f, Touch *touch)
 {
@@ -223,7 +218,7 @@ void SbFrictionJudge(SbFriction *f, PetscReal worst, PetscReal largest, PetscBoo
   if (f->error > (f->updates > UPDATES ? LATE : SETTLED)) *changed = PETSC_TRUE;
 }
 
-void SbFrictionAccept(SbFriction *f, Touch *touch, PetscBool presses)
+void SbFrictionAccept(const SbFriction *f, Touch *touch, PetscBool presses)
 {
   SbFrictionState *g = &touch->friction;
 
@@ -233,10 +228,7 @@ void SbFrictionAccept(SbFriction *f, Touch *touch, PetscBool presses)
     return;
   }
   g->slid = g->slides;
-  for (int k = 0; k < 3; k++) {
-    f->loss -= g->force[k] * (touch->now[k] - touch->start[k]);
-    g->stretch[k] = springs(f, g) ? -g->force[k] / touch->k : 0;
-  }
+  for (int k = 0; k < 3; k++) g->stretch[k] = springs(f, g) ? -g->force[k] / touch->k : 0;
 }
 
 PetscErrorCode SbFrictionWarn(SbFriction *f, const char effect[], SbSpace space, PetscReal t)
@@ -253,26 +245,4 @@ PetscErrorCode SbFrictionWarn(SbFriction *f, const char effect[], SbSpace space,
                       "%g; said once: smaller steps make it more exact",
                       (double)t, effect, (double)most, SETTLED));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-void SbFrictionSave(const SbFrictionState *g, PetscReal state[])
-{
-  state[0] = g->slid;
-  state[1] = g->crowded;
-  state[2] = g->turning;
-  for (int k = 0; k < 3; k++) {
-    state[3 + k] = g->tangent[0][k];
-    state[6 + k] = g->stretch[k];
-  }
-}
-
-void SbFrictionLoad(const PetscReal state[], SbFrictionState *g)
-{
-  *g = (SbFrictionState){.slide = {-1, -1}, .turning = state[2]};
-  g->slid = g->slides = (PetscBool)(state[0] != 0);
-  g->crowded = (PetscBool)(state[1] != 0);
-  for (int k = 0; k < 3; k++) {
-    g->tangent[0][k] = state[3 + k];
-    g->stretch[k] = state[6 + k];
-  }
 }

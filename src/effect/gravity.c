@@ -1,8 +1,9 @@
 /*
   gravity.c - a uniform acceleration field on all bodies.
 
-  f_a = s(t) m_a g, with the mass matrix of the run, so that a body falls without strain. For linear elements a row of the consistent mass
-  matrix sums to the lumped mass m_a of the node. For P2 it does not: static runs, and those with the consistent mass, have its row sums.
+  f_a = s(t) m_a g, with the mass matrix of the run, so that a body falls without strain. For linear elements
+  a row of the consistent mass matrix sums to the lumped mass m_a of the node. For P2 it does not: static
+  runs, and those with the consistent mass, have its row sums.
 */
 #include "effect_impl.h"
 

@@ -1,13 +1,14 @@
 /*
   point_force.c - a total force shared equally by the vertices of the named sets.
 
-  Each of the n vertices, counted once over all ranks, has s(t) F(t) / n. With P1 that is the force on its node. With CR
-  and DG the displacement of vertex v is the mean over the cells c around it, weighted by their volumes w_c, and the force
-  goes the same way back: node a of cell c has w_c psi_a(v) / sum w of it, psi_a(v) being 1 or -2. Since both the mean and
-  the elements reproduce linear functions, total force and moment are those of the force on the vertices.
+  Each of the n vertices, counted once over all ranks, has s(t) F(t) / n. With P1 that is the force on its
+  node. With CR and DG the displacement of vertex v is the mean over the cells c around it, weighted by their
+  volumes w_c, and the force goes the same way back: node a of cell c has w_c psi_a(v) / sum w of it, psi_a(v)
+  being 1 or -2. Since both the mean and the elements reproduce linear functions, total force and moment are
+  those of the force on the vertices.
 
-  A force on a single vertex has no limit under mesh refinement (the displacement under it grows like 1/h); use a
-  traction where the area matters.
+  A force on a single vertex has no limit under mesh refinement (the displacement under it grows like 1/h);
+  use a traction where the area matters.
 */
 #include "effect_impl.h"
 

@@ -1,40 +1,47 @@
 /*
-  prescribed_displacement.c - the supports `fixed`, nodes with zero displacement, and `prescribed_displacement`, nodes moved along a
-  given path: a translation, a rotation about an axis, or both; in all directions or in some.
+  prescribed_displacement.c - the supports `fixed`, nodes with zero displacement, and
+  `prescribed_displacement`, nodes moved along a given path: a translation, a rotation about an axis, or both;
+  in all directions or in some.
 
   With r = X - c the rest position relative to a point c of the axis, k the unit direction and theta(t) the
   angle, the prescribed displacement is (Rodrigues 1840)
 
     u(X, t) = d(t, X) + sin(theta) k x r + 2 sin^2(theta/2) k x (k x r).
 
-  This form has no cancellation at small angles. Reaction: force of the effect on the body (prescribed.c has the sign); torque: moment
-  of that force about the axis at rest, taken with the current positions.
+  This form has no cancellation at small angles. Reaction: the unbalanced force M a + C v + f_int - f_ext of
+  the prescribed unknowns, which the support exerts on the body: one that hangs at rest is pulled up by +m g.
+  Torque: moment of that force about the axis at rest, taken with the current positions.
 
-  X is a vertex, or with CR and DG the centroid of a triangle: they are constrained at the triangles of their surface, in the mean; one
-  triangle alone, or two, leave rotations free. A DG face that is prescribed in all directions has a node of its own, to which its cell
-  is tied by a penalty (src/fem/layout.c; -body_X_dirichlet strong: the mean itself is prescribed). Single directions are constrained
-  in the mean itself. Of several effects that prescribe one unknown, the first in the scenario counts.
+  X is a vertex, or with CR and DG the centroid of a triangle: they are constrained at the triangles of their
+  surface, in the mean; one triangle alone, or two, leave rotations free. A DG face that is prescribed in all
+  directions has a node of its own, to which its cell is tied by a penalty (src/fem/layout.c;
+  -body_X_dirichlet strong: the mean itself is prescribed). Single directions are constrained in the mean
+  itself. Of several effects that prescribe one unknown, the first in the scenario counts.
 */
 #include "effect_impl.h"
 #include "sbcontact.h"
 
+#define COMPONENTS "x|y|z|xy|yz|xz|xyz"
+
 typedef struct {
   int components; /* bits 0..2 */
   SbPath path;    /* zero: fixed */
-  SbPrescribed prescribed;
-  PetscReal *value; /* [p.n][3] m */
+  PetscInt n, nowned,
+    *node;       /* [n] local nodes with unknowns that it prescribes, ascending, owned ones first */
+  uint8_t *bits; /* [n] bit c: component c is prescribed by this effect */
+  PetscInt *row; /* [n] index into space->fixed_node; NULL before the first prescribe_support() */
 } Support;
 
 static const SbOption fixed_rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", NULL, "",
    "sets whose nodes are fixed: vertices, p2 also edge midpoints, cr and dg the means over boundary faces"},
-  {"components", SB_OPTION_CHOICE, 1, "", "xyz", SB_COMPONENT_CHOICES, "directions that are fixed"},
+  {"components", SB_OPTION_CHOICE, 1, "", "xyz", COMPONENTS, "directions that are fixed"},
 };
 
 static const SbOption moved_rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", NULL, "",
    "sets whose nodes are moved: vertices, p2 also edge midpoints, cr and dg the means over boundary faces"},
-  {"components", SB_OPTION_CHOICE, 1, "", "xyz", SB_COMPONENT_CHOICES, "directions that are prescribed"},
+  {"components", SB_OPTION_CHOICE, 1, "", "xyz", COMPONENTS, "directions that are prescribed"},
   {"displacement", SB_OPTION_FORMULA, 3, "m", "0;0;0", "",
    "translation, three formulas of t and the reference position x, y, z; live: interactive, as the file "
    "live.txt says during the run"},
@@ -46,12 +53,13 @@ static const SbOption moved_rows[] = {
 
 static PetscErrorCode options_fixed(SbEffect e, const SbScope *scope)
 {
+  static const int bits[] = {1, 2, 4, 3, 6, 5, 7};
   Support *d = (Support *)e->data;
   PetscInt choice;
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionChoice(scope, "components", &choice));
-  d->components = SbPrescribedComponents(choice);
+  d->components = bits[choice];
   e->prescribed = (PetscBool)(d->components == 7);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -76,10 +84,26 @@ static PetscErrorCode options_moved(SbEffect e, const SbScope *scope)
 static PetscErrorCode setup_support(SbEffect e, SbSpace space)
 {
   Support *d = (Support *)e->data;
+  PetscInt n, owned;
 
   PetscFunctionBeginUser;
-  PetscCall(SbPrescribedSetUp(&d->prescribed, space, &e->on, d->components));
-  PetscCall(PetscCalloc1(3 * d->prescribed.n, &d->value));
+  PetscCall(SbEffectNodes(space, &e->on, &n, &d->node));
+  PetscCall(PetscMalloc1(n, &d->bits));
+  /* an earlier effect keeps what it has; all ranks see a node with the same bits, so they decide alike */
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt node = d->node[i];
+    const int free = d->components & ~(int)space->fixed[node];
+
+    if (!free) continue;
+    PetscCall(SbSpacePrescribe(space, node, free));
+    d->node[d->n] = node;
+    d->bits[d->n++] = (uint8_t)free;
+    if (node < space->nnode_owned) d->nowned = d->n;
+  }
+  PetscCallMPI(MPI_Allreduce(&d->nowned, &owned, 1, MPIU_INT, MPI_SUM, space->comm));
+  PetscCheck(owned, space->comm, PETSC_ERR_USER_INPUT,
+             "%s: every displacement of %s is already prescribed by an earlier effect: remove one of the two",
+             e->on.option, e->on.n == 1 ? e->on.name[0] : "these sets");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -90,23 +114,36 @@ static PetscErrorCode prescribe_support(SbEffect e, SbSpace space, PetscReal t)
                   half = PetscSinReal(theta / 2);
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; d->path.angle && i < d->prescribed.n; i++) {
-    const PetscReal *X = &space->node_x[3 * d->prescribed.node[i]];
+  /* rows exist only after every effect was set up */
+  if (!d->row) {
+    PetscCall(PetscMalloc1(d->n, &d->row));
+    for (PetscInt i = 0; i < d->n; i++) {
+      PetscCall(PetscFindInt(d->node[i], space->nfixed, space->fixed_node, &d->row[i]));
+      PetscCheck(d->row[i] >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+                 "Node %" PetscInt_FMT " is not marked as prescribed", d->node[i]);
+    }
+  }
+  for (PetscInt i = 0; i < d->n; i++) {
+    const PetscReal *X = &space->node_x[3 * d->node[i]];
     PetscReal r[3], kr[3], kkr[3];
 
     SbSubtract(X, d->path.point, r);
     SbCross(d->path.axis, r, kr);
     SbCross(d->path.axis, kr, kkr);
-    for (int c = 0; c < 3; c++)
-      d->value[3 * i + c] =
-        PetscSinReal(theta) * kr[c] + 2 * half * half * kkr[c] + SbFormulaEval(d->path.displacement[c], t, X);
+    for (int c = 0; c < 3; c++) {
+      PetscReal u = 0;
+
+      if (d->path.angle)
+        u = PetscSinReal(theta) * kr[c] + 2 * half * half * kkr[c] +
+            SbFormulaEval(d->path.displacement[c], t, X);
+      if (d->bits[i] & (1 << c)) space->fixed_value[3 * d->row[i] + c] = u;
+    }
   }
-  PetscCall(SbPrescribedSetValues(&d->prescribed, space, d->value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Forces rotate with the body, so their work is moment times angle; along the chord a constant moment would give only the factor
-   sin(angle). */
+/* Forces rotate with the body, so their work is moment times angle; along the chord a constant moment would
+   give only the factor sin(angle). */
 static PetscErrorCode turning_work_support(SbEffect e, SbSpace space, PetscReal t0, PetscReal t1,
                                            const PetscReal r0[], const PetscReal r1[], PetscReal *work)
 {
@@ -120,16 +157,15 @@ static PetscErrorCode turning_work_support(SbEffect e, SbSpace space, PetscReal 
   *work = 0;
   if (theta[0] == theta[1]) PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 2; k++) SbPoseSet(d->path.axis, theta[k], d->path.point, still, &pose[k]);
-  for (PetscInt i = 0; i < d->prescribed.nowned; i++) {
-    const PetscInt node = 3 * d->prescribed.node[i];
+  for (PetscInt i = 0; i < d->nowned; i++) {
+    const PetscInt node = 3 * d->node[i];
     PetscReal x[2][3], way[3];
 
     for (int k = 0; k < 2; k++) SbPoseApply(&pose[k], space->node_x + node, x[k]);
     for (int k = 0; k < 2; k++) {
       SbPoseWay(&pose[0], &pose[1], &pose[k], x[k], way);
       for (int c = 0; c < 3; c++) {
-        if (d->prescribed.components[i] & (1 << c))
-          *work += 0.5 * r[k][node + c] * (way[c] - (x[1][c] - x[0][c]));
+        if (d->bits[i] & (1 << c)) *work += 0.5 * r[k][node + c] * (way[c] - (x[1][c] - x[0][c]));
       }
     }
   }
@@ -142,17 +178,17 @@ static PetscErrorCode history_support(SbEffect e, SbSpace space, const SbStage *
   const Support *d = (const Support *)e->data;
 
   PetscFunctionBeginUser;
-  SbPrescribedReaction(&d->prescribed, residual, values);
-  if (!d->path.angle) PetscFunctionReturn(PETSC_SUCCESS);
-  values[3] = 0;
-  for (PetscInt i = 0; i < d->prescribed.nowned; i++) {
-    const PetscInt node = 3 * d->prescribed.node[i];
+  for (PetscInt k = 0; k < e->ncolumn; k++) values[k] = 0;
+  for (PetscInt i = 0; i < d->nowned; i++) {
+    const PetscInt node = 3 * d->node[i];
     PetscReal arm[3], force[3], moment[3];
 
     for (int c = 0; c < 3; c++) {
-      arm[c] = space->node_x[node + c] + stage->u[node + c] - d->path.point[c];
-      force[c] = d->prescribed.components[i] & (1 << c) ? residual[node + c] : 0;
+      force[c] = d->bits[i] & (1 << c) ? residual[node + c] : 0;
+      values[c] += force[c];
     }
+    if (!d->path.angle) continue;
+    for (int c = 0; c < 3; c++) arm[c] = space->node_x[node + c] + stage->u[node + c] - d->path.point[c];
     SbCross(arm, force, moment);
     values[3] += SbDot3(d->path.axis, moment);
   }
@@ -165,8 +201,9 @@ static PetscErrorCode destroy_support(SbEffect e)
 
   PetscFunctionBeginUser;
   PetscCall(SbPathDestroy(&d->path));
-  PetscCall(SbPrescribedFree(&d->prescribed));
-  PetscCall(PetscFree(d->value));
+  PetscCall(PetscFree(d->node));
+  PetscCall(PetscFree(d->bits));
+  PetscCall(PetscFree(d->row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

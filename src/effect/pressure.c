@@ -1,47 +1,47 @@
 /*
   pressure.c - a pressure on part of the surface, positive in compression.
 
-  The triangle with the derivatives of a facet's map at a point has the corners x0, x1, x2, counter-clockwise seen from outside: those
-  of the facet itself, but of P2, whose facets have six nodes and are curved once they move. With X = x1 - x0, Y = x2 - x0 as
-  derivatives along two barycentric coordinates, and phi_a the basis of the cell,
+  The triangle with the derivatives of a facet's map at a point has the corners x0, x1, x2, counter-clockwise
+  seen from outside: those of the facet itself, but of P2, whose facets have six nodes and are curved once
+  they move. With X = x1 - x0, Y = x2 - x0, derivatives along two coordinates, phi_a the basis of the cell,
 
     f_a = -p int phi_a X x Y,   p = value(t) time(t).
 
-  On a closed surface this is -p dV/dx_a, V the enclosed volume: total force and moment vanish and the work is
-  -p times the change of volume.
+  On a closed surface this is -p dV/dx_a, V the enclosed volume: force and moment vanish, the work is -p dV.
 
-  Tangent: -df_a/dx_b is not symmetric facet by facet; what the facets add to the matrix here is the symmetric part, with [c]x w = c x w
+  Tangent: -df_a/dx_b is not symmetric facet by facet; the matrix gets the symmetric part, with [c]x w = c x w
 
     p/2 int (phi_a phi_b,Y - phi_b phi_a,Y) [X]x - (phi_a phi_b,X - phi_b phi_a,X) [Y]x.
 
-  On a closed surface, or one whose rim is constrained, the other part cancels and the tangent is the exact derivative (Bufler,
-  "Pressure loaded structures under large deformations", 1984). What is left of it is an integral along the rim R, counter-clockwise,
+  On a closed surface, or one whose rim is constrained, the other part cancels and the tangent is the exact
+  derivative (Bufler, "Pressure loaded structures under large deformations", 1984). What is left of it is an
+  integral along the rim R, counter-clockwise,
 
     -df_a = -p/2 int_R phi_a dx x w.
 
-  Where the rim is free the operator of the linear solver applies it, and the matrix is the preconditioner. Without it Newton's method
-  converges linearly, and not at all for large rotations.
+  Where the rim is free the operator of the linear solver applies it, and the matrix is the preconditioner.
+  Without it Newton's method converges linearly, and not at all for large rotations.
 
   Integrals are exact: one point for linear elements, a rule of degree 5 for P2 (polynomials of degree 4).
 
-  The facets of CR and DG bodies do not meet at their edges, so that forces facet by facet do not quite add up to
-  zero. Where the pressure acts on the whole surface of such a body, it is taken as -p dV/du of the volume inside
-  (src/fem/body_volume.c): at rest that is the same, and force and moment vanish for every displacement. On part of the
-  surface small gaps remain, which vanish with mesh refinement. There contributions of facets do not cancel: with CR the force acts at
-  the facet's own node, while X and Y depend on the other three of the cell, so the derivative is far from symmetric. Newton's method
-  with its symmetric part stalls near p = mu. So the operator of the linear solver applies the derivative exactly, facet by facet, and
-  the matrix, without it, is the preconditioner.
+  The facets of CR and DG bodies do not meet at their edges, so that forces facet by facet do not quite add up
+  to zero. Where the pressure acts on the whole surface of such a body, it is taken as -p dV/du of the volume
+  inside (src/fem/body_volume.c): at rest that is the same, and force and moment vanish for every
+  displacement. On part of the surface small gaps remain, which vanish with mesh refinement. There
+  contributions of facets do not cancel: with CR the force acts at the facet's own node, while X and Y depend
+  on the other three of the cell, so the derivative is far from symmetric. Newton's method with its symmetric
+  part stalls near p = mu. So the operator of the linear solver applies the derivative exactly, facet by
+  facet, and the matrix, without it, is the preconditioner.
 
-  With follower = no the pressure acts on the rest area and normal, as small-strain theory has it; then there
-  is no tangent.
+  With follower = no the pressure acts on the rest area and normal, as small strains have it: no tangent.
 */
 #include "effect_impl.h"
 #include "sbgeometry.h"
 
 #define STRAIGHT 1e-9 /* relative: components of an edge below which it has none, as in a plane of symmetry */
 
-/* An edge of the free rim of the surface under pressure: nodes from, to, and between them (-1: none, it is straight). The
-   surface lies to the left, seen from outside. */
+/* An edge of the free rim of the surface under pressure: nodes from, to, and between them (-1: none, it is
+   straight). The surface lies to the left, seen from outside. */
 typedef struct {
   PetscInt node[3];
 } RimEdge;
@@ -313,7 +313,7 @@ static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y_a -= factor int phi_a dx x w along an edge of the rim, by Gauss' rule of three points, exact for curved ones. */
+/* y_a -= factor int phi_a dx x w along an edge of the rim, by Gauss' rule of 3 points, exact if curved. */
 static void add_rim(SbSpace space, const RimEdge *edge, PetscReal factor, const PetscReal u[],
                     const PetscReal w[], PetscReal y[])
 {

@@ -1,5 +1,5 @@
 /*
-  restitution.h - Newton's law of restitution for the impact of one point within a step (src/model/restitution.c).
+  restitution.h - Newton's law of restitution for the impact of a point (src/model/restitution.c).
 */
 #pragma once
 #include "sbbase.h"

@@ -1,19 +1,17 @@
 /*
-  select.c - the cells, boundary facets and nodes that the sets named by -effect_<name>_on select on this
-  rank.
+  select.c - the cells, boundary facets and nodes that the sets named by -effect_<name>_on select here.
 
-  The mesh carries one bit per set on vertices, cells and faces, the space on nodes. An item in several of the named
-  sets must act once: all are tested against the union of the bits, but a facet, which is taken with the first of its
-  sets.
+  The mesh carries one bit per set on vertices, cells and faces, the space on nodes. An item in several of the
+  named sets acts once: they are tested against the union of the bits, facets taken with their first set.
 
-  Nodes of P1 bodies are vertices; those of CR and DG lie at faces. A set that holds a corner or an edge of such a body
-  holds none of its nodes. Ignoring it would silently drop a constraint, so it is an error.
+  Nodes of P1 bodies are vertices; those of CR and DG lie at faces. A set that holds a corner or an edge of
+  such a body holds none of its nodes. Ignoring it would silently drop a constraint, so it is an error.
 */
 #include "effect_impl.h"
 
 typedef enum { CELLS, FACETS, VERTICES } Kind;
 
-/* Numbers k[on->n] of the named sets and the union of their bits; an error when one selects nothing of the kind. */
+/* Numbers k[on->n] of the named sets, and the union of their bits; an error when one selects nothing. */
 static PetscErrorCode find_sets(SbSpace space, const SbEffectOn *on, Kind kind, PetscInt k[SB_SET_MAX],
                                 uint64_t *mask)
 {

@@ -139,7 +139,8 @@ PetscErrorCode SbModelContactForce(SbModel m, PetscReal t, Vec U, Vec F)
   PetscCall(SbSpaceGetLocalWrite(m->space, F, &f));
   PetscCall(PetscArrayzero(f, 3 * m->space->nnode));
   for (PetscInt e = 0; e < m->neffect; e++) {
-    if (m->effect[e]->ops.contact_force) SbEffectCall(m->effect[e], contact_force, m->space, &stage, f);
+    if (m->effect[e]->ops.contact_points && m->effect[e]->ops.force)
+      SbEffectCall(m->effect[e], force, m->space, &stage, f);
   }
   if (m->space->constraints) SbConstraintsAddForces(m->space, f);
   PetscCall(SbSpaceRestoreLocalWrite(m->space, F, &f));

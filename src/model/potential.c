@@ -448,11 +448,6 @@ PetscErrorCode SbModelPotentialWork(SbModel m, Vec U, PetscReal *work, Vec F)
   PetscFunctionBeginUser;
   *work = 0.;
   PetscCall(SbModelPotentialGradient(m, U, 1., PETSC_FALSE, NULL, F));
-  for (PetscInt e = 0; e < m->npotential; e++) {
-    PetscReal mine;
-
-    CONTACT_CALL(m->potential[e], work, &mine);
-    *work += mine;
-  }
+  for (PetscInt e = 0; e < m->npotential; e++) *work += m->potential[e]->work;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,7 +1,7 @@
 /*
   Transfers history variables of effects (active contact, friction) to the new model, like a checkpoint with renumbered nodes.
 
-  Effects without the operation `rename` start from their initial state.
+  Records of effects without the operation `rename` name no nodes.
 */
 #include "remesh_impl.h"
 
@@ -17,13 +17,13 @@ PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed)
     PetscReal *records, *own;
     PetscInt n, nown, total;
 
-    if (!e->ops.save || !e->ops.rename) continue;
+    if (!e->ops.save) continue;
     // gather the records of all ranks on each rank
     SbEffectCall(e, save, a->space, &nown, &own);
     PetscCall(SbAllgatherv(a->space->comm, MPIU_REAL, nown * e->nstate, own, &total, &records, NULL));
     n = e->nstate ? total / e->nstate : 0;
     PetscCall(PetscFree(own));
-    PetscCall((*e->ops.rename)(e, renamed->n, renamed->from, renamed->to, &n, records));
+    if (e->ops.rename) PetscCall((*e->ops.rename)(e, renamed->n, renamed->from, renamed->to, &n, records));
     SbEffectCall(b->effect[k], load, b->space, from->t_now, u, n, records);
     PetscCall(PetscFree(records));
   }

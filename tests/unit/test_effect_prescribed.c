@@ -3,30 +3,19 @@
   effect without any is an error; every element; supports of DG faces.
 */
 // @ranks 1 3
-#include "../../src/effect/effect_impl.h"
 #include "effect_fixture.h"
 
 static const char *const sets[][2] = {
   {"bottom", "plane:0,0,1,0"}, {"west", "plane:1,0,0,0"}, {"edge", "box:-1,-1,-0.1,0.1,2,0.1"}};
 
-static PetscErrorCode make_on(const char *name, SbEffectOn *on)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscStrncpy(on->option, "-effect_test_on", sizeof(on->option)));
-  on->n = 1;
-  PetscCall(PetscCalloc1(1, &on->name));
-  PetscCall(PetscStrncpy(on->name[0], name, SB_NAME_MAX));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Number of prescribed unknowns over all ranks. */
-static PetscErrorCode count(const SbPrescribed *hold, PetscInt *all)
+static PetscErrorCode count(const Fixture *x, PetscInt *all)
 {
   PetscInt n = 0;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < hold->nowned; i++) {
-    for (int c = 0; c < 3; c++) n += (hold->components[i] >> c) & 1;
+  for (PetscInt i = 0; i < x->space->nnode_owned; i++) {
+    for (int c = 0; c < 3; c++) n += (x->space->fixed[i] >> c) & 1;
   }
   PetscCallMPI(MPI_Allreduce(&n, all, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -45,15 +34,15 @@ static void check_bits(const Fixture *x)
 }
 
 /* Values and reactions: bottom prescribes x and z of its nodes, west the remaining components of its own. */
-static PetscErrorCode check_values(Fixture *x, SbPrescribed *bottom, SbPrescribed *west)
+static PetscErrorCode check_values(Fixture *x, SbEffect bottom, SbEffect west)
 {
   const PetscInt side = x->space->faces ? 8 : 9, shared = x->space->faces ? 0 : 3; // nodes
-  PetscReal *residual, force[2][3], all[2][3];
+  const SbStage stage = {.u = x->u};
+  PetscReal *residual, force[8] = {0}, all[8];
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < 3 * bottom->n; i++) x->f[i] = 10;
-  PetscCall(SbPrescribedSetValues(bottom, x->space, x->f));
-  PetscCall(SbPrescribedSetValues(west, x->space, NULL));
+  PetscCall((*bottom->ops.prescribe)(bottom, x->space, 0.));
+  PetscCall((*west->ops.prescribe)(west, x->space, 0.));
   for (PetscInt k = 0; k < x->space->nfixed; k++) {
     const PetscBool low = x->space->node_x[3 * x->space->fixed_node[k] + 2] < 1e-9 ? PETSC_TRUE : PETSC_FALSE;
 
@@ -63,15 +52,15 @@ static PetscErrorCode check_values(Fixture *x, SbPrescribed *bottom, SbPrescribe
   }
   PetscCall(PetscMalloc1(3 * x->space->nnode, &residual));
   for (PetscInt i = 0; i < 3 * x->space->nnode; i++) residual[i] = 1 + (PetscReal)(i % 3);
-  SbPrescribedReaction(bottom, residual, force[0]);
-  SbPrescribedReaction(west, residual, force[1]);
-  PetscCallMPI(MPI_Allreduce(force, all, 6, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
-  SB_CHECK_NEAR(all[0][0], side, 0, "bottom, x");
-  SB_CHECK_NEAR(all[0][1], 0, 0, "bottom, y");
-  SB_CHECK_NEAR(all[0][2], side * 3, 0, "bottom, z");
-  SB_CHECK_NEAR(all[1][0], side - shared, 0, "west, x");
-  SB_CHECK_NEAR(all[1][1], side * 2, 0, "west, y");
-  SB_CHECK_NEAR(all[1][2], (side - shared) * 3, 0, "west, z");
+  PetscCall((*bottom->ops.history)(bottom, x->space, &stage, residual, force));
+  PetscCall((*west->ops.history)(west, x->space, &stage, residual, force + 4));
+  PetscCallMPI(MPI_Allreduce(force, all, 8, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
+  SB_CHECK_NEAR(all[0], side, 0, "bottom, x");
+  SB_CHECK_NEAR(all[1], 0, 0, "bottom, y");
+  SB_CHECK_NEAR(all[2], side * 3, 0, "bottom, z");
+  SB_CHECK_NEAR(all[4], side - shared, 0, "west, x");
+  SB_CHECK_NEAR(all[5], side * 2, 0, "west, y");
+  SB_CHECK_NEAR(all[6], (side - shared) * 3, 0, "west, z");
   PetscCall(PetscFree(residual));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -79,35 +68,33 @@ static PetscErrorCode check_values(Fixture *x, SbPrescribed *bottom, SbPrescribe
 static PetscErrorCode check_element(const char *element)
 {
   const PetscBool p1 = element[0] == 'p' ? PETSC_TRUE : PETSC_FALSE;
+  SbEffect bottom, west, edge;
   Fixture x;
-  SbEffectOn on[3];
-  SbPrescribed bottom = {0}, west = {0}, edge = {0};
   PetscInt n;
 
   PetscFunctionBeginUser;
   fixture_use(element, element, PETSC_FALSE);
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
-  for (int i = 0; i < 3; i++) PetscCall(make_on(sets[i][0], &on[i]));
-  SB_CHECK(SbPrescribedComponents(0) == 1 && SbPrescribedComponents(2) == 4 &&
-             SbPrescribedComponents(5) == 5 && SbPrescribedComponents(6) == 7,
-           "bits of the choices " SB_COMPONENT_CHOICES);
-
-  PetscCall(SbPrescribedSetUp(&bottom, x.space, &on[0], 5));
-  PetscCall(count(&bottom, &n));
+  PetscCall(
+    effect_create(&x, "prescribed_displacement",
+                  "-effect_prescribed_displacement_on bottom -effect_prescribed_displacement_components xz "
+                  "-effect_prescribed_displacement_displacement 10;10;10",
+                  &bottom));
+  PetscCall(count(&x, &n));
   SB_CHECK_NEAR(n, p1 ? 18 : 16, 0, "unknowns of the bottom");
-  PetscCall(SbPrescribedSetUp(&west, x.space, &on[1], 7));
-  PetscCall(count(&west, &n));
-  SB_CHECK_NEAR(n, p1 ? 9 * 3 - 3 * 2 : 8 * 3, 0, "unknowns of the west side without those of the bottom");
+  PetscCall(effect_create(&x, "fixed", "-effect_fixed_on west -effect_fixed_components xyz", &west));
+  PetscCall(count(&x, &n));
+  SB_CHECK_NEAR(n, p1 ? 18 + 9 * 3 - 3 * 2 : 16 + 8 * 3, 0, "unknowns of the west side without the bottom's");
   check_bits(&x);
-  SB_CHECK_ERROR(SbPrescribedSetUp(&edge, x.space, &on[2], 5), PETSC_ERR_USER_INPUT,
-                 p1 ? "-effect_test_on" : "body block");
+  SB_CHECK_ERROR(effect_create(&x, "edge",
+                               "-effect_edge_type fixed -effect_edge_on edge -effect_edge_components xz",
+                               &edge),
+                 PETSC_ERR_USER_INPUT, p1 ? "-effect_edge_on" : "body block");
   PetscCall(SbSpacePrescribeDone(x.space));
-  PetscCall(check_values(&x, &bottom, &west));
-
-  PetscCall(SbPrescribedFree(&bottom));
-  PetscCall(SbPrescribedFree(&west));
-  PetscCall(SbPrescribedFree(&edge));
-  for (int i = 0; i < 3; i++) PetscCall(PetscFree(on[i].name));
+  PetscCall(check_values(&x, bottom, west));
+  PetscCall(SbEffectDestroy(&bottom));
+  PetscCall(SbEffectDestroy(&west));
+  PetscCall(SbEffectDestroy(&edge));
   PetscCall(fixture_destroy(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -116,19 +103,18 @@ static PetscErrorCode check_element(const char *element)
 static PetscErrorCode check_supports(void)
 {
   Fixture x;
-  SbEffectOn on;
-  SbPrescribed hold[2] = {0};
+  SbEffect hold[2];
   PetscInt n[2], supports = 0;
 
   PetscFunctionBeginUser;
   fixture_use("dg", "dg", PETSC_TRUE);
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
-  PetscCall(make_on(sets[0][0], &on));
-  for (int i = 0; i < 2; i++) {
-    PetscCall(SbPrescribedSetUp(&hold[i], x.space, &on, i ? 7 : 4));
-    PetscCall(count(&hold[i], &n[i]));
-  }
-  SB_CHECK(n[0] == 8 && n[1] == 16, "z of the first, the rest of the second: %d, %d unknowns", (int)n[0],
+  PetscCall(effect_create(&x, "fixed", "-effect_fixed_on bottom -effect_fixed_components z", &hold[0]));
+  PetscCall(count(&x, &n[0]));
+  PetscCall(effect_create(
+    &x, "edge", "-effect_edge_type fixed -effect_edge_on bottom -effect_edge_components xyz", &hold[1]));
+  PetscCall(count(&x, &n[1]));
+  SB_CHECK(n[0] == 8 && n[1] == 24, "z of the first, the rest of the second: %d, %d unknowns", (int)n[0],
            (int)n[1]);
   for (PetscInt i = 0; i < 4 * x.mesh->ncell; i++) {
     const PetscInt own = x.space->cell_node[i], node = x.space->dirichlet_node[i];
@@ -142,8 +128,7 @@ static PetscErrorCode check_supports(void)
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &supports, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
   SB_CHECK(supports == 8 && x.space->Nnode == 4 * x.mesh->Ncell + 8, "%d supports", (int)supports);
   PetscCall(SbSpaceValidate(x.space));
-  for (int i = 0; i < 2; i++) PetscCall(SbPrescribedFree(&hold[i]));
-  PetscCall(PetscFree(on.name));
+  for (int i = 0; i < 2; i++) PetscCall(SbEffectDestroy(&hold[i]));
   PetscCall(fixture_destroy(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
