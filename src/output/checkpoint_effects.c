@@ -45,8 +45,7 @@ PetscErrorCode SbCheckpointWriteEffects(SbRun run, SbH5 *h, uint64_t *sum)
     SbFormat(sizeof(name), name, "state_%s", e->name);
     if (order.N) {
       PetscCall(SbH5PutInt(h, h->file, name, order.N));
-      PetscCall(
-        SbH5WriteSlice(h, h->file, name, "SI", &order, e->nstate, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, record));
+      PetscCall(SbH5WriteSlice(h, h->file, name, "SI", &order, e->nstate, H5T_IEEE_F64LE, record));
       *sum += all;
     }
     PetscCall(PetscFree(record));

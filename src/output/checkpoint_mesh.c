@@ -11,7 +11,7 @@
 typedef struct {
   const char *name;
   PetscInt n, ncomp; /* n of all ranks */
-  hid_t filetype, memtype;
+  hid_t type;        /* in the file */
   void *data;
 } Array;
 
@@ -19,14 +19,14 @@ typedef struct {
 #define NCOUNT 4
 static void arrays_of(SbMemoryMesh *g, const PetscInt count[NCOUNT], Array a[NARRAY])
 {
-  a[0] = (Array){"x", count[0], 3, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, g->x};
-  a[1] = (Array){"cells", count[1], 4, H5T_STD_I64LE, SB_H5_INT, g->cell};
-  a[2] = (Array){"triangles", count[2], 3, H5T_STD_I64LE, SB_H5_INT, g->tri};
-  a[3] = (Array){"vertex_sets", count[0], 1, H5T_STD_U64LE, H5T_NATIVE_UINT64, g->vert_set};
-  a[4] = (Array){"cell_sets", count[1], 1, H5T_STD_U64LE, H5T_NATIVE_UINT64, g->cell_set};
-  a[5] = (Array){"triangle_sets", count[2], 1, H5T_STD_U64LE, H5T_NATIVE_UINT64, g->tri_set};
-  a[6] = (Array){"curved_edges", count[3], 2, H5T_STD_I64LE, SB_H5_INT, g->edge};
-  a[7] = (Array){"edge_offsets", count[3], 3, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, g->edge_off};
+  a[0] = (Array){"x", count[0], 3, H5T_IEEE_F64LE, g->x};
+  a[1] = (Array){"cells", count[1], 4, H5T_STD_I64LE, g->cell};
+  a[2] = (Array){"triangles", count[2], 3, H5T_STD_I64LE, g->tri};
+  a[3] = (Array){"vertex_sets", count[0], 1, H5T_STD_U64LE, g->vert_set};
+  a[4] = (Array){"cell_sets", count[1], 1, H5T_STD_U64LE, g->cell_set};
+  a[5] = (Array){"triangle_sets", count[2], 1, H5T_STD_U64LE, g->tri_set};
+  a[6] = (Array){"curved_edges", count[3], 2, H5T_STD_I64LE, g->edge};
+  a[7] = (Array){"edge_offsets", count[3], 3, H5T_IEEE_F64LE, g->edge_off};
 }
 
 /* Sum of positions and values, so that damage is seen. */
@@ -48,18 +48,6 @@ static uint64_t sum_of(const SbMemoryMesh *g)
   return sum;
 }
 
-void SbCheckpointMeshBytes(SbRun run, PetscInt64 *bytes)
-{
-  *bytes = 0;
-  for (PetscInt b = 0; b < run->model->nbody; b++) {
-    const SbBody *body = &run->model->body[b];
-
-    if (body->in_memory && body->in_memory->step)
-      *bytes += (PetscInt64)body->nvert * 32 + (PetscInt64)body->ncell * 40 + (PetscInt64)body->nfacet * 32 +
-                65536 + (run->model->mesh->edge_off ? (PetscInt64)body->ncell * 2 * 40 : 0);
-  }
-}
-
 static const char *const counts[NCOUNT] = {"vertices", "tets", "faces", "curved"};
 
 static PetscErrorCode write_mesh(SbH5 *h, SbOutput out, const char *body, SbMemoryMesh *g, uint64_t *sum)
@@ -74,6 +62,8 @@ static PetscErrorCode write_mesh(SbH5 *h, SbOutput out, const char *body, SbMemo
   PetscCallMPI(MPI_Bcast(count, NCOUNT, MPIU_INT, 0, out->comm));
   PetscCallMPI(MPI_Bcast(&own, 1, MPI_UINT64_T, 0, out->comm));
   arrays_of(g, count, a);
+  PetscCall(
+    SbH5Reserve(h, 32 * ((PetscInt64)count[0] + count[2]) + 40 * ((PetscInt64)count[1] + count[3]) + 65536));
   PetscCall(PetscSNPrintf(name, sizeof(name), "mesh_%s", body));
   PetscCall(SbH5GroupCreate(h, NARRAY, 16, &group));
   PetscCall(SbH5PutInt(h, group, "step", g->step));
@@ -82,15 +72,10 @@ static PetscErrorCode write_mesh(SbH5 *h, SbOutput out, const char *body, SbMemo
   PetscCall(SbH5PutInt(h, group, "sum", (int64_t)own));
   for (int k = 0; k < NCOUNT; k++) PetscCall(SbH5PutInt(h, group, counts[k], count[k]));
   for (int k = 0; k < NARRAY; k++) {
-    const SbOrder order = {.comm = out->comm,
-                           .each = 1,
-                           .N = a[k].n,
-                           .n = out->rank ? 0 : a[k].n,
-                           .start = out->rank ? a[k].n : 0};
+    const PetscInt N = a[k].n, n = out->rank ? 0 : N;
+    const SbOrder order = {.comm = out->comm, .each = 1, .N = N, .n = n, .start = N - n};
 
-    if (!a[k].n) continue;
-    PetscCall(
-      SbH5WriteSlice(h, group, a[k].name, "SI", &order, a[k].ncomp, a[k].filetype, a[k].memtype, a[k].data));
+    if (N) PetscCall(SbH5WriteSlice(h, group, a[k].name, "SI", &order, a[k].ncomp, a[k].type, a[k].data));
   }
   PetscCall(SbH5GroupLink(h, group, h->file, name));
   (void)H5Gclose(group);
@@ -169,7 +154,7 @@ static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_
     (*in_memory)->bound = bound;
     arrays_of(*in_memory, count, a);
     for (int k = 0; k < NARRAY && *ok; k++)
-      if (a[k].n) *ok = SbH5Read(group, a[k].name, a[k].memtype, a[k].n, a[k].ncomp, a[k].data);
+      if (a[k].n) *ok = SbH5Read(group, a[k].name, a[k].type, a[k].n, a[k].ncomp, a[k].data);
     /* check before the mesh is compared: a damaged file is not one of another mesh */
     *ok = (PetscBool)(*ok && in_range(*in_memory) && (int64_t)sum_of(*in_memory) == sum);
     if (!*ok) PetscCall(SbMemoryMeshDestroy(in_memory));

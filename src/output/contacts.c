@@ -96,8 +96,8 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
 
 /* ------------------------------------------------------------------ files */
 
-/* One quantity of this rank's rows in the type of the file; returns the type in memory, and that of the file. */
-static hid_t fill_column(SbContacts c, int k, PetscBool precise, hid_t *filetype)
+/* One quantity of this rank's rows in the type of the file. */
+static void fill_column(SbContacts c, int k, PetscBool precise)
 {
   for (PetscInt i = 0; i < c->share.n * table[k].ncomp; i++) {
     const PetscInt row = i / table[k].ncomp, component = i % table[k].ncomp;
@@ -122,8 +122,6 @@ static hid_t fill_column(SbContacts c, int k, PetscBool precise, hid_t *filetype
     else
       ((float *)c->column)[i] = (float)value;
   }
-  *filetype = table[k].whole ? H5T_STD_I32LE : precise ? H5T_IEEE_F64LE : H5T_IEEE_F32LE;
-  return table[k].whole ? H5T_NATIVE_INT32 : precise ? H5T_NATIVE_DOUBLE : H5T_NATIVE_FLOAT;
 }
 
 PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame)
@@ -137,11 +135,12 @@ PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame)
   PetscCall(SbH5GroupCreate(h, (unsigned)NTABLE, 14, &group));
   PetscCall(SbH5PutInt(h, group, "count", c->share.N));
   for (int k = 0; k < NTABLE && c->share.N; k++) {
-    hid_t filetype;
-    const hid_t memtype = fill_column(c, k, out->precise, &filetype);
-
-    PetscCall(SbH5WriteSlice(h, group, table[k].name, table[k].unit, &c->share, table[k].ncomp, filetype,
-                             memtype, c->column));
+    fill_column(c, k, out->precise);
+    PetscCall(SbH5WriteSlice(h, group, table[k].name, table[k].unit, &c->share, table[k].ncomp,
+                             table[k].whole ? H5T_STD_I32LE
+                             : out->precise ? H5T_IEEE_F64LE
+                                            : H5T_IEEE_F32LE,
+                             c->column));
   }
   PetscCall(SbH5GroupLink(h, group, frame, "contacts"));
   (void)H5Gclose(group);

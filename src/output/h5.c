@@ -83,10 +83,7 @@ static PetscErrorCode agree(SbH5 *h)
 static PetscErrorCode begin(MPI_Comm comm, const char *path, SbH5 *h, hid_t *list)
 {
   PetscFunctionBeginUser;
-  h->comm = comm;
-  h->bytes = 0;
-  h->failed = PETSC_FALSE;
-  h->reason[0] = 0;
+  *h = (SbH5){.comm = comm};
   PetscCall(PetscStrncpy(h->path, path, sizeof(h->path)));
   *list = H5Pcreate(H5P_FILE_ACCESS);
   // Errors become one line of ours; HDF5 prints its whole stack otherwise.
@@ -111,20 +108,16 @@ PetscErrorCode SbH5Create(MPI_Comm comm, const char *path, SbH5 *h)
 
 PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH5 *h, PetscBool *ok)
 {
-  PetscMPIInt here, everywhere;
   hid_t list;
 
   PetscFunctionBeginUser;
   PetscCall(begin(comm, path, h, &list));
   h->file = H5Fopen(path, writable ? H5F_ACC_RDWR : H5F_ACC_RDONLY, list);
   (void)H5Pclose(list);
-  here = h->file >= 0;
-  PetscCallMPI(MPI_Allreduce(&here, &everywhere, 1, MPI_INT, MPI_MIN, comm));
-  *ok = everywhere ? PETSC_TRUE : PETSC_FALSE;
-  if (!everywhere) {
-    if (here) (void)H5Fclose(h->file);
-    h->file = -1;
-  }
+  *ok = (PetscBool)(h->file >= 0);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, comm));
+  if (!*ok && h->file >= 0) (void)H5Fclose(h->file);
+  if (!*ok) h->file = -1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -213,8 +206,17 @@ static hid_t collective_list(void)
   return list;
 }
 
+hid_t SbH5TypeInMemory(hid_t type)
+{
+  return type == H5T_STD_I64LE    ? (sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32)
+         : type == H5T_STD_I32LE  ? H5T_NATIVE_INT32
+         : type == H5T_STD_U64LE  ? H5T_NATIVE_UINT64
+         : type == H5T_IEEE_F64LE ? H5T_NATIVE_DOUBLE
+                                  : H5T_NATIVE_FLOAT;
+}
+
 PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char *unit, const SbOrder *order,
-                              PetscInt ncomp, hid_t filetype, hid_t memtype, const void *slice)
+                              PetscInt ncomp, hid_t type, const void *slice)
 {
   const hid_t create = H5Pcreate(H5P_DATASET_CREATE), transfer = collective_list();
   hid_t filespace, memspace, dataset;
@@ -224,10 +226,10 @@ PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char
   (void)H5Pset_alloc_time(create, H5D_ALLOC_TIME_EARLY);
   (void)H5Pset_obj_track_times(create, 0); // the same run writes the same bytes
   select_slice(order, ncomp, &filespace, &memspace);
-  dataset = H5Dcreate2(where, name, filetype, filespace, H5P_DEFAULT, create, H5P_DEFAULT);
+  dataset = H5Dcreate2(where, name, type, filespace, H5P_DEFAULT, create, H5P_DEFAULT);
   H5_CALL(h, dataset);
   PetscCall(SbH5PutText(h, dataset, "unit", unit));
-  note(h, (PetscBool)(H5Dwrite(dataset, memtype, memspace, filespace, transfer, slice) < 0));
+  note(h, (PetscBool)(H5Dwrite(dataset, SbH5TypeInMemory(type), memspace, filespace, transfer, slice) < 0));
   (void)H5Dclose(dataset);
   (void)H5Sclose(filespace);
   (void)H5Sclose(memspace);
@@ -279,7 +281,8 @@ PetscBool SbH5Read(hid_t where, const char *name, hid_t type, PetscInt rows, Pet
   const hid_t dataset = open_dataset(where, name, n);
   PetscBool ok = (PetscBool)(dataset >= 0 && n[0] == (hsize_t)rows && n[1] == (hsize_t)ncomp);
 
-  if (ok) ok = (PetscBool)(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0);
+  if (ok)
+    ok = (PetscBool)(H5Dread(dataset, SbH5TypeInMemory(type), H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0);
   if (dataset >= 0) (void)H5Dclose(dataset);
   return ok;
 }
@@ -289,24 +292,22 @@ PetscErrorCode SbH5ReadSlice(SbH5 *h, const char *name, const SbOrder *order, Pe
 {
   hsize_t n[2];
   const hid_t dataset = open_dataset(h->file, name, n);
-  PetscMPIInt here, everywhere;
 
   PetscFunctionBeginUser;
-  here = dataset >= 0 && n[0] == (hsize_t)order->N && n[1] == (hsize_t)ncomp;
-  PetscCallMPI(MPI_Allreduce(&here, &everywhere, 1, MPI_INT, MPI_MIN, h->comm));
-  if (everywhere) {
+  *ok = (PetscBool)(dataset >= 0 && n[0] == (hsize_t)order->N && n[1] == (hsize_t)ncomp);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, h->comm));
+  if (*ok) {
     const hid_t transfer = collective_list();
     hid_t filespace, memspace;
 
     select_slice(order, ncomp, &filespace, &memspace);
-    here = H5Dread(dataset, H5T_NATIVE_DOUBLE, memspace, filespace, transfer, slice) >= 0;
+    *ok = (PetscBool)(H5Dread(dataset, H5T_NATIVE_DOUBLE, memspace, filespace, transfer, slice) >= 0);
     (void)H5Sclose(filespace);
     (void)H5Sclose(memspace);
     (void)H5Pclose(transfer);
-    PetscCallMPI(MPI_Allreduce(&here, &everywhere, 1, MPI_INT, MPI_MIN, h->comm));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, h->comm));
   }
   if (dataset >= 0) (void)H5Dclose(dataset);
-  *ok = everywhere ? PETSC_TRUE : PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -402,7 +403,7 @@ PetscErrorCode SbH5WriteText(SbH5 *h, hid_t where, const char *name, const char 
 PetscErrorCode SbH5ReadText(SbH5 *h, const char *name, char **text, PetscBool *ok)
 {
   const hid_t dataset = H5Dopen2(h->file, name, H5P_DEFAULT);
-  PetscMPIInt here = 0, everywhere;
+  PetscBool good = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   *text = NULL;
@@ -411,15 +412,13 @@ PetscErrorCode SbH5ReadText(SbH5 *h, const char *name, char **text, PetscBool *o
 
     if (H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) <= 0) {
       PetscCall(PetscCalloc1(H5Tget_size(type) + 1, text));
-      here = H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, *text) >= 0;
+      good = (PetscBool)(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, *text) >= 0);
     }
     (void)H5Tclose(type);
     (void)H5Dclose(dataset);
   }
-  PetscCallMPI(MPI_Allreduce(&here, &everywhere, 1, MPI_INT, MPI_MIN, h->comm));
-  if (!everywhere) {
-    PetscCall(PetscFree(*text));
-    *ok = PETSC_FALSE;
-  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &good, 1, SB_MPI_BOOL, MPI_LAND, h->comm));
+  if (!good) PetscCall(PetscFree(*text));
+  if (!good) *ok = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

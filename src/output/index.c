@@ -114,14 +114,13 @@ static herr_t list_array(hid_t where, const char *name, const H5L_info_t *info, 
   return l->ierr ? -1 : 0;
 }
 
-PetscErrorCode SbIndexSetMesh(SbIndex x, hid_t file, const char *name)
+PetscErrorCode SbIndexSetMesh(SbIndex x, hid_t file, PetscInt step)
 {
-  const hid_t mesh = SbH5OpenGroup(file, name);
-  char group[64];
+  char group[SB_MESH_NAME + 1] = "/";
+  const hid_t mesh = SbH5OpenGroup(file, SbOutputMeshName(step, group + 1));
   List list = {.index = x, .group = group};
 
   PetscFunctionBeginUser;
-  SbFormat(sizeof(group), group, "/%s", name);
   x->corners =
     mesh >= 0 && H5Lexists(mesh, "cells10", H5P_DEFAULT) > 0 && H5Lexists(mesh, "parent", H5P_DEFAULT) <= 0
       ? 10

@@ -148,13 +148,11 @@ PetscErrorCode SbOutputCountNodes(SbSpace space, SbOutput out)
 PetscErrorCode SbOutputForgetMesh(SbOutput out)
 {
   PetscFunctionBeginUser;
-  if (out->ordered) {
-    PetscCall(SbOrderDestroy(&out->vertex));
-    PetscCall(SbOrderDestroy(&out->cell));
-    PetscCall(SbOrderDestroy(&out->node));
-    PetscCall(SbOrderDestroy(&out->point));
-    PetscCall(SbOrderDestroy(&out->tet));
-  }
+  PetscCall(SbOrderDestroy(&out->vertex));
+  PetscCall(SbOrderDestroy(&out->cell));
+  PetscCall(SbOrderDestroy(&out->node));
+  PetscCall(SbOrderDestroy(&out->point));
+  PetscCall(SbOrderDestroy(&out->tet));
   out->ordered = PETSC_FALSE;
   PetscCall(PetscFree(out->split));
   PetscCall(PetscFree(out->edge_number));
@@ -178,4 +176,11 @@ PetscInt SbOutputMeshStep(SbRun run)
     if (in_memory) step = PetscMax(step, in_memory->step);
   }
   return step;
+}
+
+const char *SbOutputMeshName(PetscInt step, char name[SB_MESH_NAME])
+{
+  SbFormat(SB_MESH_NAME, name, "mesh");
+  if (step) SbAppend(SB_MESH_NAME, name, "_%06" PetscInt_FMT, step);
+  return name;
 }

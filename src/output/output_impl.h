@@ -50,8 +50,8 @@ typedef struct {
   char path[PETSC_MAX_PATH_LEN];
 } SbH5;
 
-/* A PetscInt in memory. */
-#define SB_H5_INT (sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32)
+/* The type in memory of numbers of this type in a file: that of PetscInt for H5T_STD_I64LE. */
+hid_t SbH5TypeInMemory(hid_t type);
 /* Files are opened collectively for MPI-IO; names that exist are truncated by SbH5Create(). */
 PetscErrorCode SbH5Create(MPI_Comm comm, const char *path, SbH5 *h);
 PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH5 *h,
@@ -59,9 +59,9 @@ PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH
 PetscErrorCode SbH5Close(SbH5 *h);
 /* Flushes to disk on all ranks. A write that failed since the last flush ends the run here. Collective. */
 PetscErrorCode SbH5Flush(SbH5 *h);
-/* A dataset [order->N][ncomp] of `filetype` below `where` out of slices of `memtype`, with its unit. Collective. */
+/* A dataset [order->N][ncomp] of this type below `where` out of slices, with its unit. Collective. */
 PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char *unit, const SbOrder *order,
-                              PetscInt ncomp, hid_t filetype, hid_t memtype, const void *slice);
+                              PetscInt ncomp, hid_t type, const void *slice);
 /* The slice of such a dataset as doubles; ok is false when it is missing, has another shape or cannot be read. Collective. */
 PetscErrorCode SbH5ReadSlice(SbH5 *h, const char *name, const SbOrder *order, PetscInt ncomp,
                              PetscReal slice[], PetscBool *ok);
@@ -70,7 +70,8 @@ hid_t SbH5OpenGroup(hid_t where, const char *name);
 /* Rows of a dataset [n] or [n][m], and bytes of each of its numbers; 0 when it is not there or another one. Not collective. */
 PetscInt64 SbH5Rows(hid_t where, const char *name);
 PetscInt SbH5NumberBytes(hid_t where, const char *name);
-/* A whole dataset of the shape [n][ncomp], or [n], as numbers of this type in memory; false when it is not there, has another shape or cannot be read. */
+/* A whole dataset [n][ncomp], or [n], as numbers that such a file has in memory; false when it is not there, has another
+   shape or cannot be read. */
 PetscBool SbH5Read(hid_t where, const char *name, hid_t type, PetscInt n, PetscInt ncomp, void *values);
 PetscErrorCode SbH5PutReal(SbH5 *h, hid_t where, const char *name, PetscReal value);
 PetscErrorCode SbH5PutInt(SbH5 *h, hid_t where, const char *name, int64_t value);
@@ -208,6 +209,9 @@ PetscErrorCode SbOutputPath(SbOutput out, const char *name, size_t size, char pa
 PetscBool SbOutputDue(PetscReal every, PetscReal t, PetscReal dt);
 /* The step after which a body was re-meshed last, 0: none was. Not collective. */
 PetscInt SbOutputMeshStep(SbRun run);
+/* The group in fields.h5 of the mesh that bodies have behind this step, "mesh" or "mesh_000123"; returns name. */
+#define SB_MESH_NAME 32
+const char *SbOutputMeshName(PetscInt step, char name[SB_MESH_NAME]);
 /* Original orders and the mesh's hash; made once. Collective. */
 PetscErrorCode SbOutputOrder(SbRun run, SbOutput out);
 /* Frees what belongs to the mesh: orders, points, cell quantities, counts. */
@@ -295,8 +299,6 @@ uint64_t SbMixReal(uint64_t position, PetscReal value);
 PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum);
 /* Their checksum in an open file, 0 without any; ok turns false when they cannot be read. Collective. */
 PetscErrorCode SbCheckpointSumMeshes(SbRun run, SbH5 *h, uint64_t *sum, PetscBool *ok);
-/* Bytes that they take, for messages. Collective. */
-void SbCheckpointMeshBytes(SbRun run, PetscInt64 *bytes);
 /* Path of the checkpoint that -restart names; of `latest` the k-th newest one, "" when there is none. Collective. */
 PetscErrorCode SbCheckpointFind(SbOutput out, const char *file, int k, size_t size, char path[]);
 PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out);
@@ -311,8 +313,8 @@ PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char
 PetscErrorCode SbIndexCreate(SbOutput out, const char *name, const PetscReal *nowhere, SbIndex *index);
 PetscErrorCode SbIndexDestroy(SbIndex *index);
 void SbIndexRemove(SbIndex index); /* the files, if they are there */
-/* The mesh of SbIndexAdd() from now on: a group in fields.h5, open. */
-PetscErrorCode SbIndexSetMesh(SbIndex index, hid_t file, const char *name);
+/* The mesh of SbIndexAdd() from now on: that of a step, in fields.h5, which is open. */
+PetscErrorCode SbIndexSetMesh(SbIndex index, hid_t file, PetscInt step);
 /* Adds a frame: its group in fields.h5 and its fields. */
 PetscErrorCode SbIndexAdd(SbIndex index, PetscReal time, const char *group, PetscInt n,
                           const SbField *const field[], const PetscInt bytes[]);

@@ -24,15 +24,15 @@ typedef struct {
     *cell10; /* [ncell][10] with the nodes at the edges 01 12 02 03 13 23, -1: none; or NULL without P2 */
 } Other;
 
-/* A whole dataset as numbers of `type`, [n] or [n][ncomp]; NULL when it is not there. PetscFree. */
-static PetscErrorCode read_all(hid_t where, const char *name, hid_t type, size_t size, PetscInt ncomp,
-                               PetscInt *n, void *array)
+/* A whole dataset, [n] or [n][ncomp], of a type as in files; NULL when it is not there. PetscFree. */
+static PetscErrorCode read_all(hid_t where, const char *name, hid_t type, PetscInt ncomp, PetscInt *n,
+                               void *array)
 {
   PetscFunctionBeginUser;
   *(void **)array = NULL;
   *n = (PetscInt)SbH5Rows(where, name);
   if (!*n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc((size_t)*n * (size_t)ncomp * size, (void **)array));
+  PetscCall(PetscMalloc((size_t)*n * (size_t)ncomp * H5Tget_size(SbH5TypeInMemory(type)), (void **)array));
   if (!SbH5Read(where, name, type, *n, ncomp, *(void **)array)) PetscCall(PetscFree(*(void **)array));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -51,11 +51,11 @@ static PetscErrorCode read_tets(Other *o, PetscInt which, PetscBool *ok)
   PetscInt n = 0, nbody, nten, nparent, *body, *parent;
 
   PetscFunctionBeginUser;
-  PetscCall(read_all(o->mesh, "x", H5T_NATIVE_DOUBLE, sizeof(double), 3, &o->npoint, &o->x));
-  PetscCall(read_all(o->mesh, "cells", SB_H5_INT, sizeof(PetscInt), 4, &o->ncell, &o->cell));
-  PetscCall(read_all(o->mesh, "body", SB_H5_INT, sizeof(PetscInt), 1, &nbody, &body));
-  PetscCall(read_all(o->mesh, "cells10", SB_H5_INT, sizeof(PetscInt), 10, &nten, &o->cell10));
-  PetscCall(read_all(o->mesh, "parent", SB_H5_INT, sizeof(PetscInt), 1, &nparent, &parent));
+  PetscCall(read_all(o->mesh, "x", H5T_IEEE_F64LE, 3, &o->npoint, &o->x));
+  PetscCall(read_all(o->mesh, "cells", H5T_STD_I64LE, 4, &o->ncell, &o->cell));
+  PetscCall(read_all(o->mesh, "body", H5T_STD_I64LE, 1, &nbody, &body));
+  PetscCall(read_all(o->mesh, "cells10", H5T_STD_I64LE, 10, &nten, &o->cell10));
+  PetscCall(read_all(o->mesh, "parent", H5T_STD_I64LE, 1, &nparent, &parent));
   *ok = (PetscBool)(o->x && o->cell && (!nbody || (body && nbody == o->ncell)) && (!nten || o->cell10) &&
                     (nparent
                        ? parent && nparent == o->ncell && nten <= nparent && are_points(parent, nparent, nten)
@@ -85,7 +85,7 @@ static PetscErrorCode read_tets(Other *o, PetscInt which, PetscBool *ok)
 
 static PetscErrorCode read_other(const char *option, const char *text, const SbBody *body, Other *o)
 {
-  char name[32] = "mesh", *comma, *names, *rest;
+  char name[SB_MESH_NAME], *comma, *names, *rest;
   struct stat info;
   SbH5Frames frames = {.wanted = -1};
   PetscInt which = -1, n = 0, nu;
@@ -116,8 +116,7 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
 
   /* the mesh of that frame, which may be one of a re-meshing */
   if (H5Aexists(o->frame, "mesh") > 0) SbH5GetInt(o->frame, "mesh", &mesh, &ok);
-  if (mesh) (void)snprintf(name, sizeof(name), "mesh_%06ld", (long)mesh);
-  o->mesh = H5Gopen2(o->file, name, H5P_DEFAULT);
+  o->mesh = H5Gopen2(o->file, SbOutputMeshName((PetscInt)mesh, name), H5P_DEFAULT);
 
   /* number of the body of this name, or of the one that it is a copy of; the only body, if there is one */
   if (o->mesh >= 0) {
@@ -131,8 +130,8 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
   PetscCheck(which >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s has no body '%s'", option,
              text, o->path, body->name);
   PetscCall(read_tets(o, which, &ok));
-  PetscCall(read_all(o->frame, "displacement", H5T_NATIVE_DOUBLE, sizeof(double), 3, &nu, &o->u));
-  PetscCall(read_all(o->frame, "velocity", H5T_NATIVE_DOUBLE, sizeof(double), 3, &n, &o->v));
+  PetscCall(read_all(o->frame, "displacement", H5T_IEEE_F64LE, 3, &nu, &o->u));
+  PetscCall(read_all(o->frame, "velocity", H5T_IEEE_F64LE, 3, &n, &o->v));
   PetscCheck(
     ok && o->u && nu == o->npoint && (!o->v || n == nu), PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
     "%s %s: %s has no complete mesh with displacements; -output_fields displacement,velocity there, or "
