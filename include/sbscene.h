@@ -31,8 +31,6 @@ typedef struct {
     argc, argv - as from main(); words are taken out in place
 */
 PetscErrorCode SbCommandLine(int *argc, char *argv[], SbCommand *command);
-/* Reads -error_trace, which holds from then on. After SbRegisterAll(). */
-PetscErrorCode SbCommandSetErrorTrace(void);
 
 /* Registers every type and option row of the program, in one readable list. Not collective. */
 PetscErrorCode SbRegisterAll(void);

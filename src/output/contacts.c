@@ -22,7 +22,7 @@ static const struct {
   size_t from;
   PetscBool whole;
 } table[] = {
-  // SbIndexAddPoints() wants numbers and coordinates first
+  // the first one is the topology of the index
   {"point", "1", 1, ROW, PETSC_TRUE},
   {"x", "m", 3, AT(x), PETSC_FALSE},
   {"effect", "1", 1, AT(effect), PETSC_TRUE},
@@ -66,8 +66,6 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
   PetscFunctionBeginUser;
   *bytes = 0;
   if (!out->contact_points) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
-             "The residual was asked for but not given to the monitors");
   PetscCall(PetscLogEventBegin(out->event.contacts, 0, 0, 0, 0));
   c->list.n = 0;
   PetscCall(SbModelContactPoints(run->model, step->t, step->U, &c->list));
@@ -176,10 +174,12 @@ PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, P
   PetscFunctionBeginUser;
   if (!out->contact_index || n < 0) PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < NTABLE; k++)
-    values[k] =
-      (SbIndexValues){table[k].name, table[k].ncomp, table[k].whole ? 4 : (int)bytes, table[k].whole};
+    values[k] = (SbIndexValues){.name = table[k].name,
+                                .ncomp = table[k].ncomp,
+                                .bytes = table[k].whole ? 4 : (int)bytes,
+                                .whole = table[k].whole};
   (void)snprintf(group, sizeof(group), "%s/contacts", frame);
-  PetscCall(SbIndexAddPoints(out->contact_index, time, group, n, NTABLE, values));
+  PetscCall(SbIndexAdd(out->contact_index, time, group, n, NTABLE - 1, values + 1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -56,8 +56,6 @@ static PetscErrorCode contact_force(const SbField *f, SbRun run, const SbStep *s
 
   PetscFunctionBeginUser;
   (void)f;
-  PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
-             "The residual was asked for but not given to the monitors");
   PetscCall(VecDuplicate(step->U, &F));
   PetscCall(SbModelContactForce(run->model, step->t, step->U, F));
   PetscCall(SbPointsForces(run, (SbOutput)run->output, PETSC_FALSE, F, values));

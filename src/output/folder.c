@@ -5,7 +5,6 @@
   The lock is one of the file system (fcntl) on a file that names host and process: it is released with its process, however that ends, and works between hosts where the file
   system supports it. Else folders are not locked.
 */
-#include <ctype.h>
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -128,12 +127,10 @@ void SbFolderUnlock(SbOutput out)
 
 static int is_checkpoint(const struct dirent *entry)
 {
-  const char *digits = entry->d_name + strlen("checkpoint_");
-  size_t n = 0;
+  int end = 0;
 
-  if (strncmp(entry->d_name, "checkpoint_", strlen("checkpoint_"))) return 0;
-  while (isdigit((unsigned char)digits[n])) n++;
-  return n > 0 && !strcmp(digits + n, ".h5");
+  (void)sscanf(entry->d_name, "checkpoint_%*[0-9].h5%n", &end);
+  return end && !entry->d_name[end];
 }
 
 static int by_number(const struct dirent **a, const struct dirent **b)
@@ -220,10 +217,8 @@ static PetscErrorCode keep_earlier(SbOutput out)
   if (stat(path, &info)) info.st_mtime = time(NULL);
   (void)strftime(date, sizeof(date), "%Y-%m-%d_%H-%M-%S", localtime_r(&info.st_mtime, &local));
   for (int k = 1; k < 1000 && made; k++) {
-    if (k == 1)
-      SbFormat(sizeof(name), name, "before_%s", date);
-    else
-      SbFormat(sizeof(name), name, "before_%s_%d", date, k);
+    SbFormat(sizeof(name), name, "before_%s", date);
+    if (k > 1) SbAppend(sizeof(name), name, "_%d", k);
     PetscCall(SbOutputPath(out, name, sizeof(path), path));
     made = mkdir(path, 0777);
     if (made && errno != EEXIST) break;

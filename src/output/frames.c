@@ -18,11 +18,10 @@ typedef struct {
   PetscInt step; /* sorted by it */
   PetscReal time;
   char group[48];
-  PetscInt nfield;
-  const SbField *field[SB_FIELD_MAX];
-  PetscInt bytes[SB_FIELD_MAX];
-  PetscInt npoint, point_bytes; /* contact points, -1: not written; bytes of their numbers */
-  PetscInt mesh;                /* step after which its mesh was made, 0: the first one */
+  PetscInt n;
+  SbIndexValues values[SB_FIELD_MAX]; /* [n] */
+  PetscInt npoint, point_bytes;       /* contact points, -1: not written; bytes of their numbers */
+  PetscInt mesh;                      /* step after which its mesh was made, 0: the first one */
 } SbFrame;
 
 struct _p_SbFrames {
@@ -258,6 +257,11 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
 
 /* ------------------------------------------------------------------ a frame */
 
+static SbIndexValues values_of(const SbField *f, PetscInt bytes)
+{
+  return (SbIndexValues){f->name, (int)f->ncomp, (int)bytes, PETSC_FALSE, f->cell};
+}
+
 /* Writes the index files for viewers, with all frames so far. Rank 0. */
 static void write_indices(SbOutput out, PetscBool last, char message[SB_MESSAGE_MAX])
 {
@@ -268,9 +272,8 @@ static void write_indices(SbOutput out, PetscBool last, char message[SB_MESSAGE_
 static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
 {
   SbFrames fr = out->frames;
-  const SbOrder *order;
-  const SbField *field[SB_FIELD_MAX];
-  PetscInt bytes[SB_FIELD_MAX], n = 0;
+  SbIndexValues values[SB_FIELD_MAX];
+  PetscInt n = 0;
   PetscInt64 room;
   char path[48], message[SB_MESSAGE_MAX] = "", name[16], hundred[16];
   /* along an arc length the load factor may fall, while viewers expect times that rise: the step is the time */
@@ -297,20 +300,19 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   /* the fields, and the points of contact */
   out->state_valid = PETSC_FALSE;
   for (PetscInt i = 0; i < out->nfield; i++) {
-    if (out->field[i]->constant) continue;
-    field[n] = out->field[i];
-    bytes[n] = out->precise ? 8 : 4;
-    order = field[n]->cell ? &out->tet : &out->point;
+    const SbField *f = out->field[i];
+    const SbOrder *order = f->cell ? &out->tet : &out->point;
+
+    if (f->constant) continue;
+    values[n++] = values_of(f, out->precise ? 8 : 4);
     PetscCall(PetscLogEventBegin(out->field_event[i], 0, 0, 0, 0));
-    PetscCall(field[n]->compute(field[n], run, step, fr->owned));
-    PetscCall(gather(out, field[n]->cell, field[n]->ncomp));
-    for (PetscInt k = 0; !out->precise && k < order->n * field[n]->ncomp; k++)
-      fr->packed[k] = (float)fr->slice[k];
-    PetscCall(SbH5WriteSlice(&fr->h5, group, field[n]->name, field[n]->unit, order, field[n]->ncomp,
+    PetscCall(f->compute(f, run, step, fr->owned));
+    PetscCall(gather(out, f->cell, f->ncomp));
+    for (PetscInt k = 0; !out->precise && k < order->n * f->ncomp; k++) fr->packed[k] = (float)fr->slice[k];
+    PetscCall(SbH5WriteSlice(&fr->h5, group, f->name, f->unit, order, f->ncomp,
                              out->precise ? H5T_IEEE_F64LE : H5T_IEEE_F32LE,
                              out->precise ? (void *)fr->slice : fr->packed));
     PetscCall(PetscLogEventEnd(out->field_event[i], 0, 0, 0, 0));
-    n++;
   }
   PetscCall(SbContactsWrite(out, &fr->h5, group));
 
@@ -336,7 +338,7 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   (void)H5Gclose(group);
   fr->last_step = step->step;
   if (fr->index) {
-    PetscCall(SbIndexAdd(fr->index, time, path, n, field, bytes));
+    PetscCall(SbIndexAdd(fr->index, time, path, 0, n, values));
     PetscCall(SbContactsList(out, time, path, SbContactsCount(out), out->precise ? 8 : 4));
     write_indices(out, step->last, message);
   }
@@ -385,13 +387,11 @@ static PetscErrorCode read_frame(hid_t hundred, const char *name, SbFrame *frame
   SbH5GetInt(group, "mesh", &mesh, &other);
   frame->step = (PetscInt)step;
   frame->mesh = other ? (PetscInt)mesh : 0;
-  frame->nfield = 0;
+  frame->n = 0;
   for (PetscInt i = 0; i < n; i++) {
     const PetscInt bytes = SbH5NumberBytes(group, fields[i].name);
 
-    if (!bytes) continue;
-    frame->field[frame->nfield] = &fields[i];
-    frame->bytes[frame->nfield++] = bytes;
+    if (bytes) frame->values[frame->n++] = values_of(&fields[i], bytes);
   }
   SbContactsRead(group, &frame->npoint, &frame->point_bytes);
   (void)H5Gclose(group);
@@ -493,7 +493,7 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
     fr->last_step = f->step;
     if (!fr->index) continue;
     if (!n || f->mesh != f[-1].mesh) PetscCall(SbIndexSetMesh(fr->index, fr->h5.file, f->mesh));
-    PetscCall(SbIndexAdd(fr->index, f->time, f->group, f->nfield, f->field, f->bytes));
+    PetscCall(SbIndexAdd(fr->index, f->time, f->group, 0, f->n, f->values));
     PetscCall(SbContactsList(out, f->time, f->group, f->npoint, f->point_bytes));
   }
   if (fr->index) {

@@ -147,16 +147,12 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
 static PetscErrorCode effect_columns(SbRun run, const SbStep *step, PetscReal *values)
 {
   SbModel model = run->model;
-  SbStage stage;
+  SbStage stage = {.t = step->t, .dt = step->dt, .step = step->step};
   const PetscReal *residual;
 
   PetscFunctionBeginUser;
   PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
              "The residual was asked for but not given to the monitors");
-  PetscCall(PetscMemzero(&stage, sizeof(stage)));
-  stage.t = step->t;
-  stage.dt = step->dt;
-  stage.step = step->step;
   PetscCall(SbSpaceGetLocalRead(model->space, step->U, &stage.u));
   if (step->V) PetscCall(SbSpaceGetLocalRead(model->space, step->V, &stage.v));
   if (step->A) PetscCall(SbSpaceGetLocalRead(model->space, step->A, &stage.a));
@@ -191,13 +187,14 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
   SbOutput out = (SbOutput)ctx;
   SbHistory h = out->hist;
-  const PetscBool first = (PetscBool)(step->step == run->step0);
   const PetscInt nbody = out->history_bodies ? run->model->nbody : 0;
+  PetscReal *of_bodies = h->mine + h->nextra - nbody * SB_BODY_SUMS; /* behind effects and probes */
   PetscMPIInt n;
 
   PetscFunctionBeginUser;
-  if (!first && !step->last && step->step % out->history_every) PetscFunctionReturn(PETSC_SUCCESS);
-  if (h->last_step >= step->step) PetscFunctionReturn(PETSC_SUCCESS);
+  if (h->last_step >= step->step ||
+      (step->step != run->step0 && !step->last && step->step % out->history_every))
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
   PetscCall(PetscLogEventBegin(out->event.history, 0, 0, 0, 0));
 
@@ -206,12 +203,10 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   if (run->model->nhistory) PetscCall(effect_columns(run, step, h->mine));
   if (out->nprobe) {
     PetscCall(PetscLogEventBegin(out->event.probes, 0, 0, 0, 0));
-    PetscCall(SbProbesAdd(run, out, step, h->mine + h->nextra - nbody * SB_BODY_SUMS - h->nprobe));
+    PetscCall(SbProbesAdd(run, out, step, of_bodies - h->nprobe));
     PetscCall(PetscLogEventEnd(out->event.probes, 0, 0, 0, 0));
   }
-  if (nbody)
-    PetscCall(SbModelBodySums(run->model, step->U, step->V,
-                              (PetscReal(*)[SB_BODY_SUMS])(h->mine + h->nextra - nbody * SB_BODY_SUMS)));
+  if (nbody) PetscCall(SbModelBodySums(run->model, step->U, step->V, (PetscReal(*)[SB_BODY_SUMS])of_bodies));
 
   /* sums of all ranks; the run ends when the row before could not be written */
   h->mine[h->nextra] = h->message[0] ? 1. : 0.;
@@ -225,18 +220,18 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   h->last_step = step->step;
   if (h->fd >= 0) {
     const SbEnergies *e = &step->energies;
+    const PetscReal total = e->kinetic + e->strain - e->load_work - e->prescribed_work;
 
     rewind(h->text);
     for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(columns); k++) {
-      const char *value = (const char *)step + columns[k].from, *comma = k ? "," : "";
+      const void *value =
+        columns[k].kind == TOTAL ? (const char *)&total : (const char *)step + columns[k].from;
 
+      if (k) (void)fputc(',', h->text);
       if (columns[k].kind == COUNT)
-        (void)fprintf(h->text, "%s%" PetscInt_FMT, comma, *(const PetscInt *)value);
-      else if (columns[k].kind == REAL)
-        (void)fprintf(h->text, "%s%.17g", comma, (double)*(const PetscReal *)value);
+        (void)fprintf(h->text, "%" PetscInt_FMT, *(const PetscInt *)value);
       else
-        (void)fprintf(h->text, ",%.17g",
-                      (double)(e->kinetic + e->strain - e->load_work - e->prescribed_work));
+        (void)fprintf(h->text, "%.17g", (double)*(const PetscReal *)value);
     }
     for (PetscInt k = 0; k < h->nextra; k++) (void)fprintf(h->text, ",%.17g", (double)h->sum[k]);
     for (PetscInt k = 0; k < SbLiveCount(); k++)
@@ -267,7 +262,6 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE
   if (out->restarted) {
     char *text, *line, *end;
     size_t size;
-    SbChunk chunk;
 
     // rows up to step0 of a file with the same columns are kept; one without its end was cut off by a kill
     PetscCall(SbFileRead(h->path, &text, &size));
@@ -278,9 +272,7 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE
         if (step > run->step0) break;
         h->last_step = (PetscInt)step;
       }
-      chunk.text = text;
-      chunk.size = (size_t)(line - text);
-      SbFileReplace(h->path, 1, &chunk, message);
+      SbFileReplace(h->path, 1, &(SbChunk){text, (size_t)(line - text)}, message);
       kept = PETSC_TRUE;
     }
     PetscCall(PetscFree(text));
@@ -328,8 +320,8 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
 
   PetscFunctionBeginUser;
   if (!out->history) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscNew(&out->hist));
-  h = out->hist;
+  PetscCall(PetscNew(&h));
+  out->hist = h;
   h->fd = -1;
   h->last_step = -1;
   for (PetscInt e = 0; e < model->nhistory; e++) h->nextra += model->history[e]->ncolumn;

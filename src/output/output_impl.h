@@ -315,18 +315,15 @@ PetscErrorCode SbIndexDestroy(SbIndex *index);
 void SbIndexRemove(SbIndex index); /* the files, if they are there */
 /* The mesh of SbIndexAdd() from now on: that of a step, in fields.h5, which is open. */
 PetscErrorCode SbIndexSetMesh(SbIndex index, hid_t file, PetscInt step);
-/* Adds a frame: its group in fields.h5 and its fields. */
-PetscErrorCode SbIndexAdd(SbIndex index, PetscReal time, const char *group, PetscInt n,
-                          const SbField *const field[], const PetscInt bytes[]);
-/* Values at points: a dataset [n] or [n][3] of whole numbers, or of floating ones with so many bytes. */
+/* Values of a frame: a dataset [n] or [n][ncomp] of whole numbers, or of floating ones with so many bytes. */
 typedef struct {
   const char *name;
   int ncomp, bytes;
-  PetscBool whole;
+  PetscBool whole, cell; /* cell: per cell, else per point */
 } SbIndexValues;
-/* Adds a frame of n points: values[0] are their numbers, values[1] their positions, the others attributes. */
-PetscErrorCode SbIndexAddPoints(SbIndex index, PetscReal time, const char *group, PetscInt n,
-                                PetscInt nvalues, const SbIndexValues values[]);
+/* Adds a frame: its group in fields.h5 and its values. Contact points have their number, and their positions as `x`. */
+PetscErrorCode SbIndexAdd(SbIndex index, PetscReal time, const char *group, PetscInt npoint, PetscInt n,
+                          const SbIndexValues values[]);
 /* Replaces the files; `message` becomes the error, if any. The last ones of a run are written in any case. */
 void SbIndexWrite(SbIndex index, PetscBool last, char message[SB_MESSAGE_MAX]);
 

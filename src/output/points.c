@@ -24,28 +24,28 @@ struct _p_SbPoints {
 PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out)
 {
   const SbSpace s = run->model->space;
+  const SbMesh mesh = s->mesh;
+  SbPoints p;
   PetscInt *key;
 
   PetscFunctionBeginUser;
   if (out->points) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscNew(&out->points));
+  PetscCall(PetscNew(&p));
+  out->points = p;
   if (s->vertices) PetscFunctionReturn(PETSC_SUCCESS);
   // the cells around each owned vertex: all of them are local
-  PetscCall(SbBucketByKey(4 * s->mesh->ncell, s->mesh->cell, s->mesh->nvert_owned, &out->points->start,
-                          &out->points->corner));
-  PetscCall(PetscMalloc1(out->points->start[s->mesh->nvert_owned], &key));
-  for (PetscInt i = 0; i < out->points->start[s->mesh->nvert_owned]; i++)
-    key[i] = s->mesh->cell_orig[out->points->corner[i] / 4];
-  for (PetscInt v = 0; v < s->mesh->nvert_owned; v++)
-    PetscCall(PetscSortIntWithArray(out->points->start[v + 1] - out->points->start[v],
-                                    key + out->points->start[v],
-                                    out->points->corner + out->points->start[v]));
+  PetscCall(SbBucketByKey(4 * mesh->ncell, mesh->cell, mesh->nvert_owned, &p->start, &p->corner));
+  PetscCall(PetscMalloc1(p->start[mesh->nvert_owned], &key));
+  for (PetscInt i = 0; i < p->start[mesh->nvert_owned]; i++) key[i] = mesh->cell_orig[p->corner[i] / 4];
+  for (PetscInt v = 0; v < mesh->nvert_owned; v++)
+    PetscCall(
+      PetscSortIntWithArray(p->start[v + 1] - p->start[v], key + p->start[v], p->corner + p->start[v]));
   PetscCall(PetscFree(key));
 
   /* weights of the means over cells */
-  PetscCall(PetscMalloc1(s->mesh->ncell, &out->points->V));
+  PetscCall(PetscMalloc1(mesh->ncell, &p->V));
   for (PetscInt b = 0; b < s->nbatch; b++)
-    PetscCall(PetscArraycpy(out->points->V + s->batch_cell[b], s->batch_V[b], s->batch_n[b]));
+    PetscCall(PetscArraycpy(p->V + s->batch_cell[b], s->batch_V[b], s->batch_n[b]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

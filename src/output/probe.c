@@ -14,7 +14,11 @@
 #include "output_impl.h"
 #include "sbtet.h"
 
-#define NNUMBER 4 /* of a probe in a checkpoint: the position, the body */
+/* Numbers of a probe in a checkpoint: the position, the body. */
+#define NNUMBER 4
+static const char *const number_names[NNUMBER] = {"x", "y", "z", "body"};
+
+static const char *const keys[] = {"at", "on", "in"}; /* options that say where it is, by SbProbeKind */
 
 static const SbOption rows[] = {
   {"at", SB_OPTION_REALS, 3, "m", NULL, "(-inf, inf)",
@@ -42,27 +46,25 @@ PetscErrorCode SbProbesRegister(void)
 static PetscErrorCode read_probe(SbProbe *probe, PetscBool dynamic)
 {
   SbScope scope;
-  PetscBool given[3];
+  PetscBool given;
   char(*names)[SB_NAME_MAX], option[2 * SB_NAME_MAX];
-  PetscInt n;
+  PetscInt n = 0;
 
   PetscFunctionBeginUser;
   PetscCall(SbScopeSet(&scope, "probe", "", probe->name));
-  PetscCall(SbOptionGiven(&scope, "at", &given[SB_PROBE_POINT]));
-  PetscCall(SbOptionGiven(&scope, "on", &given[SB_PROBE_FACETS]));
-  PetscCall(SbOptionGiven(&scope, "in", &given[SB_PROBE_TETS]));
-  PetscCheck(given[0] + given[1] + given[2] == 1, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+  for (int k = 0; k < 3; k++) {
+    PetscCall(SbOptionGiven(&scope, keys[k], &given));
+    if (given) probe->kind = (SbProbeKind)k;
+    n += given;
+  }
+  PetscCheck(n == 1, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-probe_%s_at, _on, _in: give one of them, the position of a vertex, or a set over whose facets "
              "or tets the mean is taken",
              probe->name);
-  probe->kind = given[SB_PROBE_FACETS] ? SB_PROBE_FACETS
-                : given[SB_PROBE_TETS] ? SB_PROBE_TETS
-                                       : SB_PROBE_POINT;
   if (probe->kind == SB_PROBE_POINT)
     PetscCall(SbOptionReals(&scope, "at", probe->at));
   else
-    PetscCall(
-      SbOptionString(&scope, probe->kind == SB_PROBE_FACETS ? "on" : "in", sizeof(probe->set), probe->set));
+    PetscCall(SbOptionString(&scope, keys[probe->kind], sizeof(probe->set), probe->set));
 
   /* the fields */
   PetscCall(SbOptionName(&scope, "fields", sizeof(option), option));
@@ -105,7 +107,8 @@ static PetscErrorCode forget_sums(SbProbe *probe)
   PetscFunctionBeginUser;
   probe->nnode = probe->ncell = 0;
   PetscCall(PetscFree2(probe->node, probe->weight));
-  PetscCall(PetscFree2(probe->cell, probe->cell_weight));
+  PetscCall(PetscFree(probe->cell));
+  PetscCall(PetscFree(probe->cell_weight));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -162,33 +165,6 @@ static PetscInt first_edge(const SbSpace s)
   return s->mesh->Nvert + 8 * s->mesh->Ncell;
 }
 
-/*
-  The nearest vertex or node at an edge that this rank owns, of a body unless that is -1: squared distance, original number, local number: of a vertex, or nvert_owned behind that of a node (-1 when it
-  owns none).
-*/
-static void nearest_owned(const SbSpace s, PetscInt body, const PetscReal at[3], PetscReal *best,
-                          PetscInt *original, PetscInt *local)
-{
-  const SbMesh mesh = s->mesh;
-
-  *best = PETSC_MAX_REAL;
-  *local = *original = -1;
-  for (PetscInt i = 0; i < mesh->nvert_owned + (s->edge_node ? s->nnode_owned : 0); i++) {
-    const PetscInt node = i - mesh->nvert_owned;
-    const PetscInt number = node < 0 ? mesh->vert_orig[i] : s->node_orig[node];
-    const PetscReal *x = node < 0 ? mesh->x + 3 * i : s->node_x + 3 * node;
-    const PetscReal d2 = PetscSqr(x[0] - at[0]) + PetscSqr(x[1] - at[1]) + PetscSqr(x[2] - at[2]);
-
-    if (node >= 0 && number < first_edge(s)) continue;
-    if (body >= 0 && (node < 0 ? mesh->vert_body[i] : s->node_body[node]) != body) continue;
-    if (d2 < *best || (d2 == *best && number < *original)) {
-      *best = d2;
-      *original = number;
-      *local = i;
-    }
-  }
-}
-
 /* The nearest of all ranks, by the lowest number if equal: its local number on its rank, -1 on the others. */
 static PetscErrorCode agree(SbOutput out, PetscReal mine, PetscInt original, PetscInt *local,
                             PetscInt *winner, PetscReal *best)
@@ -200,6 +176,38 @@ static PetscErrorCode agree(SbOutput out, PetscReal mine, PetscInt original, Pet
   if (*local >= 0 && mine == *best) candidate = original;
   PetscCallMPI(MPI_Allreduce(&candidate, winner, 1, MPIU_INT, MPI_MIN, out->comm));
   if (candidate != *winner || *winner == PETSC_MAX_INT) *local = -1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  The vertex or node at an edge nearest to a place, of a body unless that is -1: squared distance, and into the probe
+  its original number and, on its owner, its local number: of a vertex, or nvert_owned behind that of a node.
+*/
+static PetscErrorCode find_nearest(const SbSpace s, SbOutput out, PetscInt body, const PetscReal at[3],
+                                   SbProbe *probe, PetscReal *best)
+{
+  const SbMesh mesh = s->mesh;
+  PetscReal mine = PETSC_MAX_REAL;
+  PetscInt original = -1;
+
+  PetscFunctionBeginUser;
+  probe->local = -1;
+  for (PetscInt i = 0; i < mesh->nvert_owned + (s->edge_node ? s->nnode_owned : 0); i++) {
+    const PetscInt node = i - mesh->nvert_owned;
+    const PetscInt number = node < 0 ? mesh->vert_orig[i] : s->node_orig[node];
+    PetscReal d[3], d2;
+
+    SbSubtract(node < 0 ? mesh->x + 3 * i : s->node_x + 3 * node, at, d);
+    d2 = SbDot3(d, d);
+    if (node >= 0 && number < first_edge(s)) continue;
+    if (body >= 0 && (node < 0 ? mesh->vert_body[i] : s->node_body[node]) != body) continue;
+    if (d2 < mine || (d2 == mine && number < original)) {
+      mine = d2;
+      original = number;
+      probe->local = i;
+    }
+  }
+  PetscCall(agree(out, mine, original, &probe->local, &probe->original, best));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -253,15 +261,15 @@ static PetscErrorCode sum_set(SbRun run, SbProbe *probe)
   char option[2 * SB_NAME_MAX];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(option, sizeof(option), "-probe_%s_%s", probe->name,
-                          probe->kind == SB_PROBE_FACETS ? "on" : "in"));
+  PetscCall(PetscSNPrintf(option, sizeof(option), "-probe_%s_%s", probe->name, keys[probe->kind]));
   PetscCall(SbSpaceFindSet(s, probe->set, option, &k));
   if (probe->kind == SB_PROBE_FACETS)
     PetscCall(SbSpaceGetSetFacets(s, k, &n, &facet));
   else
     n = mesh->ncell_owned;
   PetscCall(PetscMalloc2(SB_CELL_NODES * n, &probe->node, SB_CELL_NODES * n, &probe->weight));
-  PetscCall(PetscMalloc2(n, &probe->cell, n, &probe->cell_weight));
+  PetscCall(PetscMalloc1(n, &probe->cell));
+  PetscCall(PetscMalloc1(n, &probe->cell_weight));
   for (PetscInt i = 0; i < n; i++) {
     const PetscInt cell = facet ? facet[i].cell : i;
     PetscReal L[4] = {0., 0., 0., 0.}, Q[SB_CELL_NODES] = {0.}, measure = 0.;
@@ -300,11 +308,10 @@ static PetscErrorCode find_again(const SbSpace s, SbOutput out, SbProbe *probe)
 {
   const SbMesh mesh = s->mesh;
   PetscReal mine, best, L[4] = {0., 0., 0., 0.}, Q[SB_CELL_NODES];
-  PetscInt cell, tet, original;
+  PetscInt cell, tet;
 
   PetscFunctionBeginUser;
-  nearest_owned(s, probe->body, probe->x, &mine, &original, &probe->local);
-  PetscCall(agree(out, mine, original, &probe->local, &probe->original, &best));
+  PetscCall(find_nearest(s, out, probe->body, probe->x, probe, &best));
   if (best == 0.) PetscFunctionReturn(PETSC_SUCCESS);
   probe->local = probe->original = -1;
   mine = deepest_owned(mesh, probe, &cell, L);
@@ -317,7 +324,8 @@ static PetscErrorCode find_again(const SbSpace s, SbOutput out, SbProbe *probe)
 
   /* the basis functions there */
   PetscCall(PetscMalloc2(SB_CELL_NODES, &probe->node, SB_CELL_NODES, &probe->weight));
-  PetscCall(PetscMalloc2(1, &probe->cell, 1, &probe->cell_weight));
+  PetscCall(PetscMalloc1(1, &probe->cell));
+  PetscCall(PetscMalloc1(1, &probe->cell_weight));
   if (cell < 0) PetscFunctionReturn(PETSC_SUCCESS);
   for (int a = 0; a < 4; a++) Q[a] = L[a] * (2. * L[a] - 1.);
   for (int e = 0; e < 6; e++) Q[4 + e] = 4. * L[SbTetEdge[e][0]] * L[SbTetEdge[e][1]];
@@ -332,12 +340,11 @@ static PetscErrorCode find_again(const SbSpace s, SbOutput out, SbProbe *probe)
 static PetscErrorCode find_first(const SbSpace s, SbOutput out, SbProbe *probe)
 {
   const SbMesh mesh = s->mesh;
-  PetscReal mine, best, here[3] = {0., 0., 0.};
-  PetscInt body = -1, original;
+  PetscReal best, here[3] = {0., 0., 0.};
+  PetscInt body = -1;
 
   PetscFunctionBeginUser;
-  nearest_owned(s, -1, probe->at, &mine, &original, &probe->local);
-  PetscCall(agree(out, mine, original, &probe->local, &probe->original, &best));
+  PetscCall(find_nearest(s, out, -1, probe->at, probe, &best));
   if (probe->local >= 0) {
     const PetscInt node = probe->local - mesh->nvert_owned;
 
@@ -381,32 +388,25 @@ PetscErrorCode SbProbesFind(SbRun run, SbOutput out)
     }
     if (cells && probe->kind == SB_PROBE_POINT && probe->original >= 0) {
       const PetscInt per = probe->original < first_edge(s) ? 4 : 6;
-      PetscInt here = probe->nnode ? s->gnode[probe->node[0]] : -1, n = 0;
+      PetscInt here = probe->nnode ? s->gnode[probe->node[0]] : -1, size = 0;
       PetscReal total = 0.;
 
-      /* The tets around the vertex or node of a probe, by volume; the lowest numbers first. */
+      /* the tets around the vertex or node of a probe, by volume; the lowest numbers first */
       if (probe->local >= 0 && per == 4) here = s->mesh->gvert[probe->local];
       PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &here, 1, MPIU_INT, MPI_MAX, s->mesh->comm));
-      for (int pass = 0; pass < 2; pass++) {
-        for (PetscInt i = 0; i < per * s->mesh->ncell_owned; i++) {
-          const PetscInt *vert = s->mesh->cell + 4 * (i / per);
+      for (PetscInt i = 0; i < per * s->mesh->ncell_owned; i++) {
+        const PetscInt edge = per == 6 ? s->edge_node[i] : -1;
 
-          if ((per == 4              ? s->mesh->gvert[s->mesh->cell[i]]
-               : s->edge_node[i] < 0 ? -1
-                                     : s->gnode[s->edge_node[i]]) != here)
-            continue;
-          if (!pass) {
-            n++;
-            continue;
-          }
-          probe->cell[probe->ncell] = i / per;
-          probe->cell_weight[probe->ncell] = SbTetDeterminant(s->mesh->x, vert) / 6.;
-          total += probe->cell_weight[probe->ncell++];
-        }
-        if (!pass) PetscCall(PetscMalloc2(n, &probe->cell, n, &probe->cell_weight));
+        if ((per == 4 ? s->mesh->gvert[s->mesh->cell[i]] : edge < 0 ? -1 : s->gnode[edge]) != here) continue;
+        PetscCall(SbReserve(probe->ncell + 1, sizeof(PetscInt), &size, &probe->cell));
+        probe->cell[probe->ncell++] = i / per;
       }
+      PetscCall(PetscMalloc1(probe->ncell, &probe->cell_weight));
+      for (PetscInt i = 0; i < probe->ncell; i++)
+        total += probe->cell_weight[i] =
+          SbTetDeterminant(s->mesh->x, s->mesh->cell + 4 * probe->cell[i]) / 6.;
       PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_REAL, MPI_SUM, s->mesh->comm));
-      for (PetscInt i = 0; i < n; i++) probe->cell_weight[i] /= total;
+      for (PetscInt i = 0; i < probe->ncell; i++) probe->cell_weight[i] /= total;
     }
     if (probe->nnode) probe->local = -1;
   }
@@ -461,15 +461,6 @@ PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, PetscRea
 
 /* ------------------------------------------------------------------ in checkpoints */
 
-static PetscErrorCode number_name(const SbProbe *probe, int k, size_t size, char name[])
-{
-  static const char *const what[NNUMBER] = {"x", "y", "z", "body"};
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(name, size, "probe_%s_%s", probe->name, what[k]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbProbesWrite(SbRun run, SbOutput out, SbH5 *h)
 {
   char name[2 * SB_NAME_MAX];
@@ -480,7 +471,7 @@ PetscErrorCode SbProbesWrite(SbRun run, SbOutput out, SbH5 *h)
     const SbProbe *probe = &out->probe[p];
 
     for (int k = 0; k < NNUMBER && probe->found && probe->kind == SB_PROBE_POINT; k++) {
-      PetscCall(number_name(probe, k, sizeof(name), name));
+      PetscCall(PetscSNPrintf(name, sizeof(name), "probe_%s_%s", probe->name, number_names[k]));
       PetscCall(SbH5PutReal(h, h->file, name, k < 3 ? probe->x[k] : (PetscReal)probe->body));
     }
   }
@@ -498,7 +489,7 @@ PetscErrorCode SbProbesRead(SbRun run, SbOutput out, SbH5 *h)
     PetscBool there = PETSC_TRUE;
 
     for (int k = 0; k < NNUMBER; k++) {
-      PetscCall(number_name(probe, k, sizeof(name), name));
+      PetscCall(PetscSNPrintf(name, sizeof(name), "probe_%s_%s", probe->name, number_names[k]));
       SbH5GetReal(h->file, name, &number[k], &there);
     }
     if (!there || number[3] < 0. || number[3] >= (PetscReal)run->model->nbody) continue;

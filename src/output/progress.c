@@ -10,7 +10,6 @@
 #define WIDTH 79
 
 struct _p_SbProgress {
-  PetscLogEvent event; /* SbOut_progress */
   PetscBool terminal;
   PetscBool open; /* a line is being rewritten */
   PetscBool titled;
@@ -50,7 +49,8 @@ static void duration(PetscReal seconds, size_t size, char text[])
 /* On rank 0 only. */
 static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
-  SbProgress p = (SbProgress)ctx;
+  const SbOutput out = (SbOutput)ctx;
+  SbProgress p = out->line;
   const PetscReal wait = p->terminal ? .2 : 2.;
   char line[160], count[32], left[16] = "-", times[16] = "-";
   PetscReal done, speed;
@@ -70,7 +70,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     p->steps++;
     if (!step->last && step->wall - p->last < wait) PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(PetscLogEventBegin(p->event, 0, 0, 0, 0));
+  PetscCall(PetscLogEventBegin(out->event.progress, 0, 0, 0, 0));
   // the line: step, time, iterations, energies, speed, time left
   done = step->t - p->t_start;
   speed = step->wall > 0. ? done / step->wall : 0.;
@@ -91,7 +91,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   p->open = p->terminal;
   p->last = step->wall;
   p->newton = p->linear = p->steps = 0;
-  PetscCall(PetscLogEventEnd(p->event, 0, 0, 0, 0));
+  PetscCall(PetscLogEventEnd(out->event.progress, 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -150,11 +150,10 @@ PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
   if (!out->rank && !out->line) {
     PetscCall(PetscNew(&out->line));
     out->line->terminal = is_terminal();
-    out->line->event = out->event.progress;
   }
 
   /* monitors of the run on rank 0, and of its solvers on all: a solver with one computes norms that it does not without */
-  if (out->line) PetscCall(SbRunAddMonitor(run, monitor, out->line));
+  if (out->line) PetscCall(SbRunAddMonitor(run, monitor, out));
   if (!run->snes) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESGetKSP(run->snes, &ksp));
   PetscCall(SNESMonitorSet(run->snes, within_newton, run, NULL));

@@ -142,12 +142,9 @@ PetscErrorCode SbReportHeader(SbRun run)
   else if (!run->model->dynamic)
     PetscCall(entry("time", "%s, %" PetscInt_FMT " load step%s", name, run->static_steps,
                     run->static_steps == 1 ? "" : "s"));
-  else if (run->fixed_step)
-    PetscCall(entry("time", "%s, t = %g to %g s in steps of %g s", name, (double)run->t0, (double)run->t_end,
-                    (double)run->dt));
   else
-    PetscCall(entry("time", "%s, t = %g to %g s, adaptive steps, the first one %g s", name, (double)run->t0,
-                    (double)run->t_end, (double)run->dt));
+    PetscCall(entry("time", "%s, t = %g to %g s%s %g s", name, (double)run->t0, (double)run->t_end,
+                    run->fixed_step ? " in steps of" : ", adaptive steps, the first one", (double)run->dt));
   if (run->solver_parts[0] && strcmp(run->solver, run->solver_parts))
     PetscCall(entry("solver", "%s (%s): %s", run->solver, run->solver_parts, run->solver_reason));
   else
@@ -166,6 +163,7 @@ PetscErrorCode SbReportHeader(SbRun run)
   for (PetscInt p = 0; p < out->nprobe && out->history; p++) {
     const SbProbe *probe = &out->probe[p];
     char where[64] = "a tet";
+    PetscReal off[3];
 
     if (probe->kind != SB_PROBE_POINT) {
       PetscCall(entry("probe", "%s: mean over the %s of '%s'", probe->name,
@@ -176,11 +174,10 @@ PetscErrorCode SbReportHeader(SbRun run)
       (void)snprintf(where, sizeof(where), "the node of an edge");
     else if (probe->original >= 0)
       (void)snprintf(where, sizeof(where), "vertex %lld", (long long)probe->original);
+    SbSubtract(probe->x, probe->at, off);
     PetscCall(entry("probe", "%s at %s (%g, %g, %g) m, %.3g m from the given position", probe->name, where,
                     (double)probe->x[0], (double)probe->x[1], (double)probe->x[2],
-                    (double)PetscSqrtReal(PetscSqr(probe->x[0] - probe->at[0]) +
-                                          PetscSqr(probe->x[1] - probe->at[1]) +
-                                          PetscSqr(probe->x[2] - probe->at[2]))));
+                    (double)PetscSqrtReal(SbDot3(off, off))));
   }
   (void)fflush(PETSC_STDOUT);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -224,8 +221,7 @@ PetscErrorCode SbReportSummary(SbRun run)
   SbOutput out = (SbOutput)run->output;
   const PetscBool stopped = (PetscBool)(run->stop_reason[0] != 0);
   SbPhases phases;
-  char files[1024] = "", memory[32], sum[32], solver[SB_NAME_MAX];
-  char text[512];
+  char files[1024] = "", memory[32], sum[32], solver[SB_NAME_MAX], text[512];
   SbOutputFileSize *file;
   PetscInt nfile;
 

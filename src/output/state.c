@@ -274,14 +274,11 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
   PetscFunctionBeginUser;
   *is = (PetscBool)(!stat(path, &info) && S_ISREG(info.st_mode));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, is, 1, SB_MPI_BOOL, MPI_LAND, out->comm));
-  if (!*is) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbH5Open(out->comm, path, PETSC_FALSE, &h, is));
+  if (*is) PetscCall(SbH5Open(out->comm, path, PETSC_FALSE, &h, is));
   if (!*is) PetscFunctionReturn(PETSC_SUCCESS);
   *is = (PetscBool)(H5Lexists(h.file, "u", H5P_DEFAULT) > 0);
-  if (!*is) {
-    PetscCall(SbH5Close(&h));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
+  if (!*is) PetscCall(SbH5Close(&h));
+  if (!*is) PetscFunctionReturn(PETSC_SUCCESS);
 
   /* compare meshes and elements */
   PetscCall(SbOutputOrder(run, out));

@@ -242,23 +242,20 @@ static void write_file(SbIndex v, hid_t file, int64_t *work, PetscBool *ok)
 
 void SbVtkhdfWrite(SbIndex v, PetscBool last, char message[SB_MESSAGE_MAX])
 {
-  const hid_t list = H5Pcreate(H5P_FILE_ACCESS);
   size_t nwork = 4 * (size_t)v->nframe + (size_t)v->npart + 1;
   PetscBool ok = PETSC_TRUE;
   int64_t *work;
   SbChunk image = {NULL, 0};
   const double begun = MPI_Wtime();
   void *text = NULL;
-  hid_t file;
+  hid_t file, list;
 
-  if (v->nframe == v->nwritten || (!last && begun < v->next)) {
-    (void)H5Pclose(list);
-    return;
-  }
+  if (v->nframe == v->nwritten || (!last && begun < v->next)) return;
   for (PetscInt p = 0; p < v->npart; p++) nwork += (size_t)v->part[p].ncell + 1;
   work = (int64_t *)malloc(nwork * sizeof(*work));
 
   /* made in memory, then replaced in one step */
+  list = H5Pcreate(H5P_FILE_ACCESS);
   (void)H5Pset_fapl_core(list, 1 << 16, 0);
   file = work ? H5Fcreate(v->vtkhdf, H5F_ACC_TRUNC, H5P_DEFAULT, list) : -1;
   if (file >= 0) {
