@@ -226,21 +226,22 @@ PetscBool SbFieldIsProbed(const SbField *f)
                      f->compute == of_stress);
 }
 
-PetscErrorCode SbFieldAddCell(const SbField *f, SbRun run, const SbStep *step, PetscInt n,
-                              const PetscInt cell[], const PetscReal weight[], PetscReal value[])
+PetscErrorCode SbFieldAddCells(const SbField *f, SbRun run, const SbStep *step, const SbSum *cells,
+                               PetscReal value[])
 {
   const PetscReal *state = NULL;
 
   PetscFunctionBeginUser;
   PetscCall(cell_state(f, run, step, &state));
-  for (PetscInt i = 0; i < n; i++) {
+  for (PetscInt i = 0; i < cells->n; i++) {
+    const PetscInt cell = cells->item[i].number;
     PetscReal here[6] = {0.};
 
     if (f->of_stress)
-      (*f->of_stress)(state + 6 * cell[i], here);
+      (*f->of_stress)(state + 6 * cell, here);
     else
-      here[0] = state[cell[i]];
-    for (PetscInt k = 0; k < f->ncomp; k++) value[k] += weight[i] * here[k];
+      here[0] = state[cell];
+    for (PetscInt k = 0; k < f->ncomp; k++) value[k] += cells->item[i].weight * here[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

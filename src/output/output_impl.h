@@ -106,6 +106,14 @@ PetscErrorCode SbFileRead(const char *path, char **text, size_t *size);
 
 /* ------------------------------------------------------------------ state */
 
+/* A weighted sum over nodes or tets of this rank. */
+typedef struct {
+  PetscInt n, size;
+  struct {
+    PetscInt number;
+    PetscReal weight;
+  } * item; /* [n] */
+} SbSum;
 typedef enum { SB_PROBE_POINT, SB_PROBE_FACETS, SB_PROBE_TETS } SbProbeKind;
 typedef struct {
   char name[SB_NAME_MAX];
@@ -120,9 +128,7 @@ typedef struct {
   char set[SB_NAME_MAX]; /* set of a mean over facets or tets */
   PetscInt nfield;
   const SbField *field[SB_FIELD_MAX];
-  PetscInt nnode, ncell; /* this rank's nodes of a weighted sum (if there is no vertex at x), and tets */
-  PetscInt *node, *cell;
-  PetscReal *weight, *cell_weight;
+  SbSum nodes, cells; /* this rank's nodes, if there is no vertex at x, and tets */
 } SbProbe;
 
 typedef struct _p_SbFrames *SbFrames;     /* frames.c */
@@ -222,9 +228,9 @@ PetscErrorCode SbOutputCountNodes(SbSpace space, SbOutput out); /* collective */
 PetscErrorCode SbFieldFind(const char *option, const char *name, const SbField **field);
 PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out,
                               const SbField *field); /* storage for the quantities of cells that it needs */
-/* value[ncomp] += weight times the field in an owned cell; PetscErrorCode for fields of cells that are made of their state. Collective where state_valid is false. */
-PetscErrorCode SbFieldAddCell(const SbField *field, SbRun run, const SbStep *step, PetscInt n,
-                              const PetscInt cell[], const PetscReal weight[], PetscReal value[]);
+/* value[ncomp] += the sum of a field that is made of the cells' state. Collective where state_valid is false. */
+PetscErrorCode SbFieldAddCells(const SbField *field, SbRun run, const SbStep *step, const SbSum *cells,
+                               PetscReal value[]);
 /* Whether probes can show it: a vector of the step, or a quantity of the cells' state. */
 PetscBool SbFieldIsProbed(const SbField *field);
 

@@ -102,20 +102,13 @@ PetscErrorCode SbProbesSetFromOptions(SbOutput out, const SbScope *scope, PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode forget_sums(SbProbe *probe)
-{
-  PetscFunctionBeginUser;
-  probe->nnode = probe->ncell = 0;
-  PetscCall(PetscFree2(probe->node, probe->weight));
-  PetscCall(PetscFree(probe->cell));
-  PetscCall(PetscFree(probe->cell_weight));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbProbesDestroy(SbOutput out)
 {
   PetscFunctionBeginUser;
-  for (PetscInt p = 0; p < out->nprobe; p++) PetscCall(forget_sums(&out->probe[p]));
+  for (PetscInt p = 0; p < out->nprobe; p++) {
+    PetscCall(PetscFree(out->probe[p].nodes.item));
+    PetscCall(PetscFree(out->probe[p].cells.item));
+  }
   PetscCall(PetscFree(out->probe));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -234,42 +227,46 @@ static PetscReal deepest_owned(const SbMesh mesh, const SbProbe *probe, PetscInt
   return best;
 }
 
-/* Adds the nodes of a cell: L weights of its corners, Q those of the nodes of P2. */
-static void add_nodes(const SbSpace s, SbProbe *probe, PetscInt cell, const PetscReal L[4],
-                      const PetscReal Q[SB_CELL_NODES])
+static PetscErrorCode add(SbSum *sum, PetscInt number, PetscReal weight)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbReserve(sum->n + 1, sizeof(*sum->item), &sum->size, &sum->item));
+  sum->item[sum->n].number = number;
+  sum->item[sum->n++].weight = weight;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds a cell and its nodes: L weights of its corners, Q those of the nodes of P2. */
+static PetscErrorCode add_cell(const SbSpace s, SbProbe *probe, PetscInt cell, PetscReal weight,
+                               const PetscReal L[4], const PetscReal Q[SB_CELL_NODES])
 {
   const SbElement e = SbSpaceCellElement(s, cell);
   const PetscBool quadratic = (PetscBool)(e->nodes_per[1] > 0);
 
+  PetscFunctionBeginUser;
+  PetscCall(add(&probe->cells, cell, weight));
   for (PetscInt a = 0; a < (quadratic ? SB_CELL_NODES : 4); a++) {
     PetscReal w = quadratic ? Q[a] : 0.;
 
     for (int c = 0; c < 4 && !quadratic; c++) w += e->ops.vertex[c][a] * L[c];
-    probe->node[probe->nnode] = SbSpaceCellNode(s, cell, a);
-    probe->weight[probe->nnode++] = w;
+    PetscCall(add(&probe->nodes, SbSpaceCellNode(s, cell, a), w));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes, tets and weights of a mean over the facets or tets of a set; each tet on its owner. */
+/* Integrals over the facets or tets of a set; each tet on its owner. */
 static PetscErrorCode sum_set(SbRun run, SbProbe *probe)
 {
   const SbSpace s = run->model->space;
   const SbMesh mesh = s->mesh;
-  PetscReal total = 0.;
   SbFacet *facet = NULL;
-  PetscInt k, n = 0;
+  PetscInt k, n = mesh->ncell_owned;
   char option[2 * SB_NAME_MAX];
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(option, sizeof(option), "-probe_%s_%s", probe->name, keys[probe->kind]));
   PetscCall(SbSpaceFindSet(s, probe->set, option, &k));
-  if (probe->kind == SB_PROBE_FACETS)
-    PetscCall(SbSpaceGetSetFacets(s, k, &n, &facet));
-  else
-    n = mesh->ncell_owned;
-  PetscCall(PetscMalloc2(SB_CELL_NODES * n, &probe->node, SB_CELL_NODES * n, &probe->weight));
-  PetscCall(PetscMalloc1(n, &probe->cell));
-  PetscCall(PetscMalloc1(n, &probe->cell_weight));
+  if (probe->kind == SB_PROBE_FACETS) PetscCall(SbSpaceGetSetFacets(s, k, &n, &facet));
   for (PetscInt i = 0; i < n; i++) {
     const PetscInt cell = facet ? facet[i].cell : i;
     PetscReal L[4] = {0., 0., 0., 0.}, Q[SB_CELL_NODES] = {0.}, measure = 0.;
@@ -288,18 +285,9 @@ static PetscErrorCode sum_set(SbRun run, SbProbe *probe)
     }
     if (mesh->cell_set[cell] & SB_CURVED)
       measure = SbSpaceCurvedIntegrals(s, cell, facet ? &facet[i] : NULL, Q);
-    add_nodes(s, probe, cell, L, Q);
-    probe->cell[probe->ncell] = cell;
-    probe->cell_weight[probe->ncell++] = measure;
-    total += measure;
+    PetscCall(add_cell(s, probe, cell, measure, L, Q));
   }
   PetscCall(PetscFree(facet));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_REAL, MPI_SUM, s->comm));
-  PetscCheck(total > 0., s->comm, PETSC_ERR_USER_INPUT, "%s %s: the set has no %s", option, probe->set,
-             probe->kind == SB_PROBE_FACETS ? "boundary facets; a mean over tets is asked for by _in"
-                                            : "tetrahedra; a mean over facets is asked for by _on");
-  for (PetscInt i = 0; i < probe->nnode; i++) probe->weight[i] /= total;
-  for (PetscInt i = 0; i < probe->ncell; i++) probe->cell_weight[i] /= total;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -323,16 +311,10 @@ static PetscErrorCode find_again(const SbSpace s, SbOutput out, SbProbe *probe)
                         probe->name, (double)best));
 
   /* the basis functions there */
-  PetscCall(PetscMalloc2(SB_CELL_NODES, &probe->node, SB_CELL_NODES, &probe->weight));
-  PetscCall(PetscMalloc1(1, &probe->cell));
-  PetscCall(PetscMalloc1(1, &probe->cell_weight));
   if (cell < 0) PetscFunctionReturn(PETSC_SUCCESS);
   for (int a = 0; a < 4; a++) Q[a] = L[a] * (2. * L[a] - 1.);
   for (int e = 0; e < 6; e++) Q[4 + e] = 4. * L[SbTetEdge[e][0]] * L[SbTetEdge[e][1]];
-  add_nodes(s, probe, cell, L, Q);
-  probe->ncell = 1;
-  probe->cell[0] = cell;
-  probe->cell_weight[0] = 1.;
+  PetscCall(add_cell(s, probe, cell, 1., L, Q));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -360,14 +342,16 @@ static PetscErrorCode find_first(const SbSpace s, SbOutput out, SbProbe *probe)
 PetscErrorCode SbProbesFind(SbRun run, SbOutput out)
 {
   const SbSpace s = run->model->space;
+  const SbMesh mesh = s->mesh;
 
   PetscFunctionBeginUser;
   if (out->nprobe) PetscCall(SbPointsPrepare(run, out));
   for (PetscInt p = 0; p < out->nprobe; p++) {
     SbProbe *probe = &out->probe[p];
     PetscBool cells = PETSC_FALSE;
+    PetscReal total = 0.;
 
-    PetscCall(forget_sums(probe));
+    probe->nodes.n = probe->cells.n = 0;
     for (PetscInt i = 0; i < probe->nfield; i++) {
       PetscCall(SbFieldPrepare(run, out, probe->field[i]));
       cells = (PetscBool)(cells || probe->field[i]->cell);
@@ -379,36 +363,34 @@ PetscErrorCode SbProbesFind(SbRun run, SbOutput out)
       PetscCall(find_again(s, out, probe));
     else
       PetscCall(find_first(s, out, probe));
-    /* a node at an edge is one of a sum */
-    if (probe->local >= s->mesh->nvert_owned) {
-      PetscCall(PetscMalloc2(1, &probe->node, 1, &probe->weight));
-      probe->nnode = 1;
-      probe->node[0] = probe->local - s->mesh->nvert_owned;
-      probe->weight[0] = 1.;
-    }
+    /* the tets around a vertex or a node at an edge, by volume */
     if (cells && probe->kind == SB_PROBE_POINT && probe->original >= 0) {
-      const PetscInt per = probe->original < first_edge(s) ? 4 : 6;
-      PetscInt here = probe->nnode ? s->gnode[probe->node[0]] : -1, size = 0;
-      PetscReal total = 0.;
+      const PetscBool vertex = (PetscBool)(probe->original < first_edge(s));
+      const PetscInt local = probe->local, per = vertex ? 4 : 6;
+      PetscInt here = local < 0 ? -1 : vertex ? mesh->gvert[local] : s->gnode[local - mesh->nvert_owned];
 
-      /* the tets around the vertex or node of a probe, by volume; the lowest numbers first */
-      if (probe->local >= 0 && per == 4) here = s->mesh->gvert[probe->local];
-      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &here, 1, MPIU_INT, MPI_MAX, s->mesh->comm));
-      for (PetscInt i = 0; i < per * s->mesh->ncell_owned; i++) {
-        const PetscInt edge = per == 6 ? s->edge_node[i] : -1;
+      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &here, 1, MPIU_INT, MPI_MAX, out->comm));
+      for (PetscInt i = 0; i < per * mesh->ncell_owned; i++) {
+        const PetscInt edge = vertex ? -1 : s->edge_node[i];
 
-        if ((per == 4 ? s->mesh->gvert[s->mesh->cell[i]] : edge < 0 ? -1 : s->gnode[edge]) != here) continue;
-        PetscCall(SbReserve(probe->ncell + 1, sizeof(PetscInt), &size, &probe->cell));
-        probe->cell[probe->ncell++] = i / per;
+        if ((vertex ? mesh->gvert[mesh->cell[i]] : edge < 0 ? -1 : s->gnode[edge]) == here)
+          PetscCall(add(&probe->cells, i / per, SbTetDeterminant(mesh->x, mesh->cell + 4 * (i / per)) / 6.));
       }
-      PetscCall(PetscMalloc1(probe->ncell, &probe->cell_weight));
-      for (PetscInt i = 0; i < probe->ncell; i++)
-        total += probe->cell_weight[i] =
-          SbTetDeterminant(s->mesh->x, s->mesh->cell + 4 * probe->cell[i]) / 6.;
-      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_REAL, MPI_SUM, s->mesh->comm));
-      for (PetscInt i = 0; i < probe->ncell; i++) probe->cell_weight[i] /= total;
     }
-    if (probe->nnode) probe->local = -1;
+    /* integrals to means */
+    for (PetscInt i = 0; i < probe->cells.n; i++) total += probe->cells.item[i].weight;
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_REAL, MPI_SUM, out->comm));
+    PetscCheck(total > 0. || probe->kind == SB_PROBE_POINT, out->comm, PETSC_ERR_USER_INPUT,
+               "-probe_%s_%s %s: the set has no %s", probe->name, keys[probe->kind], probe->set,
+               probe->kind == SB_PROBE_FACETS ? "boundary facets; a mean over tets is asked for by _in"
+                                              : "tetrahedra; a mean over facets is asked for by _on");
+    for (PetscInt i = 0; i < probe->cells.n; i++) probe->cells.item[i].weight /= total;
+    for (PetscInt i = 0; i < probe->nodes.n; i++) probe->nodes.item[i].weight /= total;
+    /* a node at an edge is one of a sum */
+    if (probe->local >= mesh->nvert_owned) {
+      PetscCall(add(&probe->nodes, probe->local - mesh->nvert_owned, 1.));
+      probe->local = -1;
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -429,8 +411,7 @@ PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, PetscRea
 
     for (PetscInt i = 0; i < probe->nfield; c += probe->field[i++]->ncomp)
       if (probe->field[i]->cell)
-        PetscCall(SbFieldAddCell(probe->field[i], run, step, probe->ncell, probe->cell, probe->cell_weight,
-                                 values + c));
+        PetscCall(SbFieldAddCells(probe->field[i], run, step, &probe->cells, values + c));
   }
 
   /* vectors: at the vertex, or over the nodes; positions are displacements and where that is at rest */
@@ -448,9 +429,11 @@ PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, PetscRea
       if (probe->local >= 0) SbPointsVertex(run, out, probe->local, here, values);
       for (int k = 0; k < 3; k++) {
         if (position && probe->local >= 0) values[k] += probe->x[k];
-        for (PetscInt a = 0; a < probe->nnode; a++)
-          values[k] += probe->weight[a] *
-                       (here[3 * probe->node[a] + k] + (position ? s->node_x[3 * probe->node[a] + k] : 0.));
+        for (PetscInt a = 0; a < probe->nodes.n; a++) {
+          const PetscInt at = 3 * probe->nodes.item[a].number + k;
+
+          values[k] += probe->nodes.item[a].weight * (here[at] + (position ? s->node_x[at] : 0.));
+        }
       }
     }
   }
