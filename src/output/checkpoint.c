@@ -2,11 +2,11 @@
   Checkpoints: the state of a run in one HDF5 file, from which it goes on as if it had not stopped.
 
   Displacement, velocity and acceleration (the integrator's own) of all nodes in original order and double
-  precision, the step, its time, the next step's length, work and dissipation so far, and the history variables of
-  effects (checkpoint_effects.c). A file is written beside its target, flushed and renamed; the newest ones are kept.
-  It is accepted by a run with the same hash of the mesh (every coordinate and cell by its original number), and the
-  same text of the options that determine the mechanics. A checksum over the three vectors detects a file that was
-  damaged later (both sums: mesh.c).
+  precision, the step, its time, the next step's length, work and dissipation so far, and the history
+  variables of effects (checkpoint_effects.c). A file is written beside its target, flushed and renamed; the
+  newest ones are kept. It is accepted by a run with the same hash of the mesh (every coordinate and cell by
+  its original number), and the same text of the options that determine the mechanics. A checksum over the
+  three vectors detects a file that was damaged later (both sums: mesh.c).
 */
 #include <errno.h>
 #include <sys/stat.h>
@@ -17,7 +17,7 @@
 
 /* ------------------------------------------------------------------ what of a run is in the file */
 
-/* An array of the state. Those with a checksum of their own may be missing: runs that do not need them accept such files. */
+/* An array of the state. Those with a checksum of their own may be missing in a file. */
 typedef struct {
   const char *name, *unit, *sum; /* sum: name of its own checksum; NULL: part of the file's */
   const SbOrder *order;
@@ -150,7 +150,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscCall(PetscLogStagePush(SbLogStageOutput));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CHECKPOINT], 0, 0, 0, 0));
   PetscCall(PetscLogEventBegin(out->event.checkpoint, 0, 0, 0, 0));
-  /* a temporary file beside its target, its space reserved: a full disk is an error before anything is written */
+  /* a temporary file beside its target; a full disk is an error before anything is written */
   (void)snprintf(name, sizeof(name), "checkpoint_%06" PetscInt_FMT ".h5", step->step);
   PetscCall(SbOutputPath(out, name, sizeof(path), path));
   PetscCall(SbOutputPath(out, "checkpoint.tmp", sizeof(tmp), tmp));
@@ -205,7 +205,7 @@ PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out)
   const PetscBool asked = (PetscBool)(out->checkpoint_every > 0. || out->checkpoint_every_steps);
 
   PetscFunctionBeginUser;
-  // A run that may be asked to stop writes one, too: it needs work and dissipation, which are part of the state.
+  // a run that may be asked to stop writes one, too: work and dissipation are part of the state
   if (asked) {
     PetscCall(SbOutputOrder(run, out));
     run->want_energies = PETSC_TRUE;
@@ -281,7 +281,7 @@ static PetscErrorCode read_parts(SbRun run, SbOutput out, SbH5 *h, uint64_t *all
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Loads one file; ok is false when it is truncated, damaged or no checkpoint. One that does not fit the run is an error. */
+/* Loads one file; not ok: truncated, damaged or no checkpoint. One that does not fit the run is an error. */
 static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool *ok)
 {
   SbH5 h;

@@ -1,6 +1,7 @@
 /*
-  Meshes in checkpoints. A body that was re-meshed has no file any more: its mesh is in the checkpoint, as the group `mesh_<body>` with the arrays of
-  SbMemoryMesh, written by rank 0. A restart takes it from there before the scene is set up; the mesh of the other bodies comes from their files.
+  Meshes in checkpoints. A body that was re-meshed has no file any more: its mesh is in the checkpoint, as the
+  group `mesh_<body>` with the arrays of SbMemoryMesh, written by rank 0. A restart takes it from there before
+  the scene is set up; the mesh of the other bodies comes from their files.
 */
 #include <unistd.h>
 #include "output_impl.h"

@@ -1,11 +1,12 @@
 /*
   The active contact points, with normals, gaps and forces: -output_contacts.
 
-  Each frame of fields.h5 then has a group `contacts` with one dataset per quantity and one row per point, in an order that no partition
-  changes. Their number differs from frame to frame, so they have indices of their own, contacts.xmf and contacts.vtkhdf.
+  Each frame of fields.h5 then has a group `contacts` with one dataset per quantity and one row per point, in
+  an order that no partition changes. Their number differs from frame to frame, so they have their own
+  indices, contacts.xmf and contacts.vtkhdf.
 
-  A point is sent to the rank that has its share of the numbers of points and edges, and sorted there: by the number that it begins
-  with, then by effect, kind, and the number of the other side.
+  A point is sent to the rank that has its share of the numbers of points and edges, and sorted there: by the
+  number that it begins with, then by effect, kind, and the number of the other side.
 */
 #include <stddef.h>
 #include "output_impl.h"

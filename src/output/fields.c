@@ -1,15 +1,15 @@
 /*
   The fields that a run can write: one table, a name, a unit and a function each.
 
-  Vertex fields are interpolated from the vectors by points.c. Cell fields share one evaluation of the cells' state per frame.
+  Vertex fields are interpolated from the vectors by points.c. Cell fields share one evaluation per frame.
 
   von Mises stress:  sqrt(3/2 s:s), s the deviator of the Cauchy stress
   reaction:          residual without constraints at prescribed unknowns, the force of the support on the body
   contact force:     of obstacles and other bodies on the body
   contact gap:       along the normal: a vertex minus gap times normal is the point of contact
   mean pressure:     -tr(sigma)/3 of the Cauchy stress, positive in compression
-  pressure:          the law's -lambda theta with theta its measure of the change of volume (SbMaterialOps.pressure). The two
-                     pressures differ by 2/3 mu theta for small strains, little for nu near 0.5.
+  pressure:          the law's -lambda theta, theta: its measure of the change of volume (SbMaterialOps); they
+                     differ by 2/3 mu theta for small strains, little for nu near 0.5.
 */
 #include <stddef.h>
 #include "output_impl.h"
@@ -78,7 +78,7 @@ static PetscErrorCode contact_gap(const SbField *f, SbRun run, const SbStep *ste
 
 /* ------------------------------------------------------------------ per cell */
 
-/* A quantity of the cells' state, which is computed once per frame: six numbers per cell of stress, one of the others. */
+/* A quantity of the cells' state, which is computed once per frame: for stress six numbers, else one. */
 static PetscErrorCode cell_state(const SbField *f, SbRun run, const SbStep *step, const PetscReal **array)
 {
   SbOutput o = (SbOutput)run->output;

@@ -1,9 +1,9 @@
 /*
-  The folder of the results: created, write-tested and locked before anything is computed; an earlier run's results are moved aside when the run
-  starts, and files with other names are never touched. Checkpoints are found by the number in their names.
+  The folder of the results: created, write-tested and locked before anything is computed; an earlier run's
+  results are moved aside when the run starts, files with other names never. Checkpoints are found by number.
 
-  The lock is one of the file system (fcntl) on a file that names host and process: it is released with its process, however that ends, and works between hosts where the file
-  system supports it. Else folders are not locked.
+  The lock is one of the file system (fcntl) on a file that names host and process: it is released with its
+  process, however that ends, and works between hosts where the file system supports it; else there is none.
 */
 #include <dirent.h>
 #include <errno.h>
@@ -27,7 +27,7 @@ PetscErrorCode SbOutputPath(SbOutput out, const char *name, size_t size, char pa
 
 PetscBool SbOutputDue(PetscReal every, PetscReal t, PetscReal dt)
 {
-  // A step that ends at the multiple but for rounding counts as having reached it. A load factor may come back.
+  // A step that ends at the multiple but for rounding has reached it. A load factor may come back.
   const PetscReal ahead = 1e-6 * PetscAbsReal(dt);
 
   return (PetscBool)(PetscFloorReal((t + ahead) / every) != PetscFloorReal((t - dt + ahead) / every));
@@ -69,7 +69,7 @@ static void remove_lock(void)
   locked[0] = 0;
 }
 
-/* Opens and locks the lock file, or says why not; rank 0. Repeated if its owner removed the file meanwhile. */
+/* Opens and locks the lock file, or says why not; rank 0. Again if its owner removed the file meanwhile. */
 static PetscErrorCode lock_folder(SbOutput out, char message[SB_MESSAGE_MAX])
 {
   struct flock all = {.l_type = F_WRLCK, .l_whence = SEEK_SET};

@@ -1,14 +1,14 @@
 /*
   fields.h5: one group per frame, one dataset per field, written by all ranks together in original order.
 
-  Where a body is of P2, its nodes at edges are points behind the vertices, and each of its cells is cut into eight
-  linear tets: one at each corner, and the octahedron between them in four around one of its diagonals. With
-  -output_quadratic it is one tet of ten points. With -output_discontinuous each cell has points of its own, and
-  /mesh/vertices says which of them coincide.
+  Where a body is of P2, its nodes at edges are points behind the vertices, and each of its cells is cut into
+  eight linear tets: one at each corner, and the octahedron between them in four around one of its diagonals.
+  With -output_quadratic it is one tet of ten points. With -output_discontinuous each cell has points of its
+  own, and /mesh/vertices says which of them coincide.
 
-  A frame gets its name in the file when it is complete (h5.c), and is then listed in the indices fields.xmf and
-  fields.vtkhdf. After a restart in the same folder frames up to the restart stay, later ones are removed and their
-  space in the file is used again.
+  A frame gets its name in the file when it is complete (h5.c), and is then listed in the indices fields.xmf
+  and fields.vtkhdf. After a restart in the same folder frames up to the restart stay, later ones are removed
+  and their space in the file is used again.
 */
 #include <ctype.h>
 #include "output_impl.h"
@@ -38,10 +38,7 @@ struct _p_SbFrames {
 
 /* ------------------------------------------------------------------ the mesh */
 
-/*
-  Values of points or cells from fr->owned to rows of the file, in fr->slice: each of a cell's tets gets the cell's
-  values.
-*/
+/* Values of points or cells from fr->owned to rows of the file, fr->slice: tets get those of their cell. */
 static PetscErrorCode gather(SbOutput out, PetscBool cell, PetscInt ncomp)
 {
   SbFrames fr = out->frames;
@@ -75,7 +72,7 @@ static PetscErrorCode write_whole(SbOutput out, hid_t where, const char *name, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes of P2: of the tets at the corners of a cell; ends of each diagonal of the octahedron, and the other four. */
+/* Nodes of P2: of the tets at the corners; ends of each diagonal of the octahedron, and the other four. */
 static const int corner_tet[4][4] = {{0, 4, 5, 6}, {4, 1, 7, 8}, {5, 7, 2, 9}, {6, 8, 9, 3}};
 static const int around[3][6] = {{4, 9, 5, 6, 8, 7}, {5, 8, 7, 9, 6, 4}, {6, 7, 4, 5, 9, 8}};
 
@@ -86,7 +83,7 @@ static int child_corner(int diagonal, int k, int j)
   return j < 2 ? around[diagonal][j] : around[diagonal][2 + (k + j - 6) % 4];
 }
 
-/* The diagonal whose smallest tet has the largest volume over its length cubed, at rest; of straight cells the shortest. */
+/* The diagonal whose smallest tet has the largest volume over its length cubed; the shortest if straight. */
 static int best_diagonal(SbSpace s, PetscInt cell)
 {
   PetscReal x[SB_CELL_NODES][3], best = PETSC_MIN_REAL;
@@ -114,8 +111,8 @@ static int best_diagonal(SbSpace s, PetscInt cell)
 }
 
 /*
-  The tets by their points; with points per cell, also the vertex of each. With P2 the ten points of its cells in
-  the order of VTK (corners, then the edges 01 12 02 03 13 23), and the cell that each tet is part of.
+  The tets by their points; with points per cell, also the vertex of each. With P2 the ten points of its cells
+  in the order of VTK (corners, then the edges 01 12 02 03 13 23), and the cell that each tet is part of.
 */
 static PetscErrorCode write_cells(SbRun run, SbOutput out, hid_t group)
 {
@@ -276,7 +273,7 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   PetscInt n = 0;
   PetscInt64 room;
   char path[48], message[SB_MESSAGE_MAX] = "", name[16], hundred[16];
-  /* along an arc length the load factor may fall, while viewers expect times that rise: the step is the time */
+  /* along an arc length the load factor may fall, viewers expect times that rise: the step is the time */
   const PetscReal time = run->path ? (PetscReal)step->step : step->t;
   PetscBool full;
   hid_t group;

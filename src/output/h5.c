@@ -3,23 +3,23 @@
 
   HDF5 changes its metadata in place, and half-written metadata is unreadable. Here all metadata that leads to
   completed frames is changed by single writes:
-  - A frame is written as a group without a name: new objects at new positions, to which nothing points yet. It is flushed,
-    all ranks meet, and only then does it get its name in the group of its hundred.
-  - Such a group keeps its links in its own object header, in the old format (no checksum), with room for all of them from
-    the start: at most 4096 bytes, aligned to 4096 bytes. Naming a frame is one write within one page.
-  - The superblock (96 bytes) is one write within one page, too. It says where the file ends, and a file that ends earlier
-    counts as truncated: SbFileReserve() makes the file longer than a frame will need before the frame begins.
+  - A frame is written as a group without a name: new objects at new positions, to which nothing points yet.
+    It is flushed, all ranks meet, and only then does it get its name in the group of its hundred.
+  - Such a group keeps its links in its own object header, in the old format (no checksum), with room for all
+    of them from the start: at most 4096 bytes, aligned to 4096 bytes. Naming a frame is one write in a page.
+  - The superblock (96 bytes) is one write within one page, too. It says where the file ends, and a file that
+    ends earlier counts as truncated: SbFileReserve() makes it longer than a frame needs before the frame.
 
-  Reference: HDF5 File Format Specification Version 3.0, sections II.A (superblock version 0), IV.A.1.a (object header
-  version 1), IV.A.2.g (link message). The old format is asked for explicitly; newer ones would write checksums and flags
-  that mark the file as being in use.
+  Reference: HDF5 File Format Specification Version 3.0, sections II.A (superblock version 0), IV.A.1.a
+  (object header version 1), IV.A.2.g (link message). The old format is asked for explicitly; newer ones would
+  write checksums and flags that mark the file as being in use.
 */
 #include <unistd.h>
 #include "output_impl.h"
 
 /*
-  After a failed write HDF5 1.10 cannot be closed: it frees the file, keeps its identifier, and crashes when MPI_Finalize()
-  makes it end. The error has been reported by then; the remainder of the program's end is skipped.
+  After a failed write HDF5 1.10 cannot be closed: it frees the file, keeps its identifier, and crashes when
+  MPI_Finalize() makes it end. The error has been reported; the remainder of the program's end is skipped.
 */
 static int leave_at_once(MPI_Comm comm, int key, void *attribute, void *state)
 {
@@ -60,7 +60,7 @@ static PetscErrorCode agree(SbH5 *h)
   if (ierr) {
     int key;
 
-    // Skip HDF5's own cleanup at exit: attributes of MPI_COMM_SELF are deleted first by MPI_Finalize(), the newest before its own.
+    // skip HDF5's cleanup at exit: MPI_Finalize() first deletes attributes of MPI_COMM_SELF, the newest before
     if (!h->failed && !MPI_Comm_create_keyval(MPI_COMM_NULL_COPY_FN, leave_at_once, &key, NULL)) {
       h->failed = PETSC_TRUE;
       (void)MPI_Comm_set_attr(MPI_COMM_SELF, key, NULL);

@@ -1,12 +1,11 @@
 /*
   history.csv: one row of scalars per step, each written to the file at once and by one call.
 
-  First line: names. Second line: units behind a '#', so that pandas and numpy skip it with comment='#'. Numbers have 17
-  digits: what is read back is what was computed. `total` is kinetic + strain - load_work - prescribed_work, constant
-  as long as nothing is dissipated.
+  First line: names. Second line: units behind a '#', so that pandas and numpy skip it with comment='#'.
+  Numbers have 17 digits: what is read back is what was computed. `total` is kinetic + strain - load_work -
+  prescribed_work, constant as long as nothing is dissipated.
 
-  One reduction per row sums the values of effects, probes and bodies, and a flag that the row before could not be
-  written. Such a row is removed.
+  One reduction per row sums values of effects, probes and bodies, and a flag that the row before failed.
 */
 #include <errno.h>
 #include <fcntl.h>
@@ -248,7 +247,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ beginning, and going on after a restart */
+/* ------------------------------------------------------------------ beginning, and after a restart */
 
 static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE_MAX])
 {

@@ -1,6 +1,6 @@
 /*
-  The index files of fields.h5 for viewers: fields.xmf and fields.vtkhdf, or contacts.xmf and contacts.vtkhdf. Rank 0 keeps the list;
-  xdmf.c and vtkhdf.c make the files of it.
+  The index files of fields.h5 for viewers: fields.xmf and fields.vtkhdf, or contacts.xmf and contacts.vtkhdf.
+  Rank 0 keeps the list; xdmf.c and vtkhdf.c make the files of it.
 */
 #include <stdlib.h>
 #include <unistd.h>

@@ -1,6 +1,5 @@
 /*
-  Times of the phases for the closing table: the seconds of a phase are those of the slowest rank, the last phase is the remainder
-  of the wall time.
+  Times of the phases for the closing table: of the slowest rank; the last phase is the rest of the wall time.
 */
 #include <sys/resource.h>
 #include <time.h>

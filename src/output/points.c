@@ -1,14 +1,15 @@
 /*
   Values at output points for all elements: for vertex fields and probes.
 
-  P1 has the values at vertices as its unknowns. Of CR and DG the value at vertex v of a cell is sum_a vertex[v][a] u_a
-  (SbElementOps), another one in each cell around the vertex: a vertex field holds their mean, weighted with the volumes of
-  the cells and summed by the cells' original numbers, so that it does not depend on the partition. With -output_discontinuous
-  nothing is averaged: each cell has four points of its own.
+  P1 has the values at vertices as its unknowns. Of CR and DG the value at vertex v of a cell is sum_a
+  vertex[v][a] u_a (SbElementOps), another one in each cell around the vertex: a vertex field holds their
+  mean, weighted with the volumes of the cells and summed by the cells' original numbers, so that it does not
+  depend on the partition. With -output_discontinuous nothing is averaged.
 
-  A nodal force of CR or DG acts at the centroid of a face. One third of it goes to each vertex of the face, which keeps its
-  resultant and its moment. Where a node belongs to several cells and these have points of their own, each has an equal part.
-  What a DG cell does to the support of a face is a force of that face, too. P2 has points at its nodes, with the values there.
+  A nodal force of CR or DG acts at the centroid of a face. One third of it goes to each vertex of the face,
+  which keeps its resultant and its moment. Where a node belongs to several cells and these have points of
+  their own, each has an equal part. What a DG cell does to the support of a face is a force of that face,
+  too. P2 has points at its nodes, with the values there.
 */
 #include "output_impl.h"
 

@@ -1,13 +1,15 @@
 /*
-  Probes: what history.csv follows at a point, or as a mean over facets or tets. Each is a list of nodes with weights for vectors,
-  sum_i w_i x_i, and one of tets with weights for what tets have.
+  Probes: what history.csv follows at a point, or as a mean over facets or tets. Each is a list of nodes with
+  weights for vectors, sum_i w_i x_i, and one of tets with weights for what tets have.
 
-  At a point: the vertex, or node of P2, nearest to it in the rest state; of equally near ones that with the smallest original number. Vectors are what vertex fields show there: the
-  unknown of P1 and P2, the mean of the cells around it for CR and DG; quantities of tets are means over the tets around it, by volume. On a set: the mean over its boundary facets,
-  by area at rest; in a set: over its tets, by volume at rest. Both integrate the basis functions, so they are exact for each element; a facet has what its tet has.
+  At a point: the vertex, or node of P2, nearest to it in the rest state; of equally near ones that with the
+  smallest original number. Vectors are what vertex fields show there: the unknown of P1 and P2, the mean of
+  the cells around it for CR and DG; quantities of tets are means over the tets around it, by volume. On a
+  set: the mean over its boundary facets, by area at rest; in a set: over its tets, by volume at rest. Both
+  integrate the basis functions, so they are exact for each element; a facet has what its tet has.
 
-  A probe at a point follows the material that is there. When its body is re-meshed and the vertex is gone, it shows what the tet has that holds the position at
-  rest. Checkpoints carry the position (SbProbesWrite).
+  A probe at a point follows the material that is there. When its body is re-meshed and the vertex is gone, it
+  shows what the tet has that holds the position at rest. Checkpoints carry the position (SbProbesWrite).
 */
 #include <math.h>
 #include <stddef.h>
@@ -173,8 +175,9 @@ static PetscErrorCode agree(SbOutput out, PetscReal mine, PetscInt original, Pet
 }
 
 /*
-  The vertex or node at an edge nearest to a place, of a body unless that is -1: squared distance, and into the probe
-  its original number and, on its owner, its local number: of a vertex, or nvert_owned behind that of a node.
+  The vertex or node at an edge nearest to a place, of a body unless that is -1: squared distance, and into
+  the probe its original number and, on its owner, its local number: of a vertex, or nvert_owned behind that
+  of a node.
 */
 static PetscErrorCode find_nearest(const SbSpace s, SbOutput out, PetscInt body, const PetscReal at[3],
                                    SbProbe *probe, PetscReal *best)
@@ -204,7 +207,8 @@ static PetscErrorCode find_nearest(const SbSpace s, SbOutput out, PetscInt body,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The owned cell of the probe's body that contains its point, or the nearest one: distance outside (negative inside), and the weights. */
+/* The owned cell of the probe's body that contains its point, or the nearest one: distance outside (negative
+   inside), and the weights. */
 static PetscReal deepest_owned(const SbMesh mesh, const SbProbe *probe, PetscInt *cell, PetscReal weight[4])
 {
   PetscReal best = PETSC_MAX_REAL;

@@ -1,7 +1,8 @@
 /*
   The line of progress of a run: rewritten in place on a terminal, else a plain line now and then.
 
-  Open MPI gives its ranks a pseudo-terminal whatever its own output is, so under it the launcher's output decides.
+  Open MPI gives its ranks a pseudo-terminal whatever its own output is, so under it the launcher's output
+  decides.
 */
 #include <stdlib.h>
 #include <unistd.h>
@@ -95,7 +96,8 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A line within a step that takes long, by rank 0; linear: iteration of the solve within that of Newton's method, -1: none. Not collective. */
+/* A line within a step that takes long, by rank 0; linear: iteration of the solve within that of Newton's
+   method, -1: none. Not collective. */
 static PetscErrorCode say_within(SbRun run, PetscInt newton, PetscInt linear, PetscReal residual)
 {
   const SbOutput out = (SbOutput)run->output;
@@ -152,7 +154,8 @@ PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
     out->line->terminal = is_terminal();
   }
 
-  /* monitors of the run on rank 0, and of its solvers on all: a solver with one computes norms that it does not without */
+  /* of the run on rank 0, and of its solvers on all: a solver with a monitor computes norms that it else does
+     not */
   if (out->line) PetscCall(SbRunAddMonitor(run, monitor, out));
   if (!run->snes) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESGetKSP(run->snes, &ksp));

@@ -37,8 +37,8 @@ static PetscErrorCode entry(const char *title, const char *format, ...)
 /* ------------------------------------------------------------------ before the run */
 
 /*
-  "liver", or for the first of alike copies "50 x ball"; false for the others. mass[2]: the least and the largest of them, kg. Copies are alike in all that the tables say but the mass, as they may
-  differ in scale.
+  "liver", or for the first of alike copies "50 x ball"; false for the others. mass[2]: the least and the
+  largest of them, kg. Copies are alike in all that the tables say but the mass, as they may differ in scale.
 */
 static PetscBool line_of_body(SbModel m, SbOutput out, PetscInt b, size_t size, char name[],
                               PetscReal mass[2])

@@ -1,6 +1,6 @@
 /*
-  run.json: what ran, where, with which settings, how long and how it ended. Written when a run starts (status "running")
-  and replaced as a whole when it ends; a run that was killed leaves the first version.
+  run.json: what ran, where, with which settings, how long and how it ended. Written when a run starts (status
+  "running") and replaced as a whole when it ends; a run that was killed leaves the first version.
 */
 #include <time.h>
 #include <unistd.h>

@@ -1,9 +1,11 @@
 /*
   Initial state from another run: -body_<name>_state RUN[,STEP] or CHECKPOINT.
 
-  Displacement and velocity are those of a frame of that run's fields.h5, evaluated at the nodes of this run: u(X) = sum_a w_a u_a with the weights of the tet that contains X at rest
-  there, or of the nearest one; ten weights in a tet of P2. So element, mesh, material, effects and integrator may differ. Every rank reads the body's part of the file.
-  A checkpoint has no mesh, but all unknowns in full precision: for scenes with the same meshes and elements; other scenes take the frame of its step.
+  Displacement and velocity are those of a frame of that run's fields.h5, evaluated at the nodes of this run:
+  u(X) = sum_a w_a u_a with the weights of the tet that contains X at rest there, or of the nearest one; ten
+  weights in a tet of P2. So element, mesh, material, effects and integrator may differ. Every rank reads the
+  body's part of the file. A checkpoint has no mesh, but all unknowns in full precision: for scenes with the
+  same meshes and elements; other scenes take the frame of its step.
 */
 #include <sys/stat.h>
 #include <unistd.h>
@@ -20,8 +22,7 @@ typedef struct {
   PetscInt npoint, ncell;
   PetscReal *x, *u, *v; /* [npoint][3] at rest, m; displacement, m; velocity, m/s, NULL: the frame has none */
   PetscInt *cell;       /* [ncell][4] those of the body */
-  PetscInt
-    *cell10; /* [ncell][10] with the nodes at the edges 01 12 02 03 13 23, -1: none; or NULL without P2 */
+  PetscInt *cell10;     /* [ncell][10] with nodes at the edges 01 12 02 03 13 23, -1: none; NULL without P2 */
 } Other;
 
 /* A whole dataset, [n] or [n][ncomp], of a type as in files; NULL when it is not there. PetscFree. */
@@ -164,9 +165,7 @@ static PetscErrorCode tell_velocity(SbModel m, const char *option, PetscInt b, c
 static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other *o)
 {
   const SbSpace s = run->model->space;
-  const PetscReal *box = run->model->body[b].bbox;
-  const PetscReal size[3] = {box[3] - box[0], box[4] - box[1], box[5] - box[2]};
-  PetscReal far = 0., diagonal = PetscSqrtReal(PetscSqr(size[0]) + PetscSqr(size[1]) + PetscSqr(size[2]));
+  PetscReal far = 0.;
   static const int edge[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
   static const int place[6] = {0, 2, 3, 1, 4, 5}; /* in that order, of the edges 01 02 03 12 13 23 */
   SbLocator locator;
@@ -213,7 +212,7 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
   PetscCall(SbLocatorDestroy(&locator));
   PetscCall(PetscFree(off));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &far, 1, MPIU_REAL, MPI_MAX, run->model->comm));
-  if (far > OUTSIDE * diagonal)
+  if (far > OUTSIDE * SbBoxDiagonal(run->model->body[b].bbox))
     PetscCall(SbWarning(run->model->comm,
                         "%s: nodes are up to %g m outside of the body in %s, and take the values of the "
                         "nearest place: is it the same body, at the same place?",
@@ -223,8 +222,9 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
 }
 
 /*
-  row[nnode_owned]: the row of each owned node in a checkpoint with n nodes of the same meshes and elements. Supports of dg may differ: each of this run's takes the row of its
-  face's node. ok: the number of nodes agrees. Collective.
+  row[nnode_owned]: the row of each owned node in a checkpoint with n nodes of the same meshes and elements.
+  Supports of dg may differ: each of this run's takes the row of its face's node. ok: the number of nodes
+  agrees. Collective.
 */
 static PetscErrorCode find_rows(SbRun run, PetscInt n, PetscInt row[], PetscBool *ok)
 {
@@ -255,8 +255,8 @@ static PetscErrorCode find_rows(SbRun run, PetscInt n, PetscInt row[], PetscBool
 }
 
 /*
-  The unknowns of body b from a checkpoint; is: the file is one of the same bodies, meshes and elements. For another checkpoint frame[] names the frame of its step in its
-  run's folder. Collective.
+  The unknowns of body b from a checkpoint; is: the file is one of the same bodies, meshes and elements. For
+  another checkpoint frame[] names the frame of its step in its run's folder. Collective.
 */
 static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b, const char *path,
                                       size_t size, char frame[], PetscBool *is)
@@ -308,7 +308,8 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
   }
   PetscCall(PetscMalloc1(s->nnode_owned, &row));
 
-  /* displacement and velocity of its nodes; supports, which follow the faces' nodes in the file, may be other ones */
+  /* displacement and velocity of its nodes; supports, which follow the faces' nodes there, may be other ones
+     */
   PetscCall(find_rows(run, (PetscInt)SbH5Rows(h.file, "u"), row, &ok));
   if (ok) {
     SbOrder order;

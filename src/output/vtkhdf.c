@@ -1,15 +1,18 @@
 /*
-  fields.vtkhdf, and contacts.vtkhdf: an index of fields.h5 in VTK's own format, which ParaView, VTK and PyVista open without choosing a reader.
+  fields.vtkhdf, and contacts.vtkhdf: an index of fields.h5 in VTK's own format, which ParaView, VTK and
+  PyVista open without choosing a reader.
 
-  Every array is a virtual dataset: a list of places in fields.h5, so that nothing is stored twice. Bodies are an UnstructuredGrid with one part per
-  mesh (there are several in a run that was re-meshed); steps name the part that they show and where their values begin. Their points are the field
-  `position`, so that bodies move; frames without it show the rest shape. Contact points are PolyData, one part per frame.
+  Every array is a virtual dataset: a list of places in fields.h5, so that nothing is stored twice. Bodies are
+  an UnstructuredGrid with one part per mesh (there are several in a run that was re-meshed); steps name the
+  part that they show and where their values begin. Their points are the field `position`, so that bodies
+  move; frames without it show the rest shape. Contact points are PolyData, one part per frame.
 
-  The file is built in memory and replaced as a whole, in a time that grows with the number of frames. So it is rebuilt after BETWEEN times the seconds
-  of the last time, and at the end of the run: at most a twentieth of the run.
+  The file is built in memory and replaced as a whole, in a time that grows with the number of frames. So it
+  is rebuilt after BETWEEN times the seconds of the last time, and at the end of the run: at most a twentieth
+  of the run.
 
-  Reference: VTKHDF file format, version 2.0 (docs.vtk.org, "VTK File Formats"): Steps of UnstructuredGrid and PolyData. Symmetric tensors
-  have the order xx yy zz xy yz xz there.
+  Reference: VTKHDF file format, version 2.0 (docs.vtk.org, "VTK File Formats"): Steps of UnstructuredGrid and
+  PolyData. Symmetric tensors have the order xx yy zz xy yz xz there.
 */
 #include "index.h"
 
@@ -33,7 +36,7 @@ static PetscInt rows_of(SbIndex v, const SbArray *a, PetscInt block)
   return a->cell ? p->ncell : p->npoint;
 }
 
-/* The virtual dataset of an array as `name`: all frames or parts in sequence; corners of cells as one list. */
+/* The virtual dataset of an array: all frames or parts in sequence; corners of cells as one list. */
 static void write_array(SbIndex v, hid_t where, const char *name, const SbArray *a, PetscBool *ok)
 {
   static const hsize_t to_vtk[6] = {0, 3, 5, 1, 4, 2}; // column in fields.h5 of each of xx yy zz xy yz xz
@@ -80,7 +83,8 @@ static void write_array(SbIndex v, hid_t where, const char *name, const SbArray 
   (void)H5Pclose(list);
 }
 
-/* A dataset [n], or [n][m] when m > 0, of that type, from 64-bit numbers in memory; compressed when large. Of type uint8 all values are data[0]. */
+/* A dataset [n], or [n][m] when m > 0, of that type, from 64-bit numbers in memory; compressed when large. Of
+   type uint8 all values are data[0]. */
 static void write_numbers(hid_t where, const char *name, PetscInt n, PetscInt m, hid_t type,
                           const void *values, PetscBool *ok)
 {

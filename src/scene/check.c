@@ -1,8 +1,8 @@
 /*
   check.c - consistency checks of several options, before the computation.
 
-  A missing mesh file is an error here, before other bodies are read; the message suggests similar names in its
-  folder. A static run without prescribed displacements has a singular matrix.
+  A missing mesh file is an error here, before other bodies are read; the message suggests similar names in
+  its folder. A static run without prescribed displacements has a singular matrix.
 */
 #include <dirent.h>
 #include <errno.h>
@@ -59,7 +59,7 @@ static PetscErrorCode check_mesh_file(MPI_Comm comm, const SbBody *body)
   if (!rank && access(other, R_OK) && access(mesh, R_OK)) {
     error = errno;
 
-    /* what to do: make it, if there is a .geo file as for the meshes of the scenarios; a similar name; the folder */
+    /* advice: make it, if there is a .geo file as for meshes of the scenarios; a similar name; the folder */
     if (error == ENOENT && dot && !strcmp(dot, ".msh") && !strncmp(mesh, "meshes/", 7)) {
       SbFormat(sizeof(other), other, "%.*s.geo", (int)(dot - mesh), mesh);
       if (!access(other, R_OK)) SbFormat(sizeof(advice), advice, "; make %s makes it", mesh);

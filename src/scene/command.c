@@ -1,9 +1,9 @@
 /*
   command.c - the command line: options of the program itself, and errors that PETSc would ignore.
 
-  PETSc takes the word after an option as its value and ignores every other word; so `-translate 0, 0, 1` would
-  become `-translate 0,`. Such words are an error here. PETSc reads option files on rank 0 while the other ranks wait:
-  missing files are found before.
+  PETSc takes the word after an option as its value and ignores every other word; so `-translate 0, 0, 1`
+  would become `-translate 0,`. Such words are an error here. PETSc reads option files on rank 0 while the
+  other ranks wait: missing files are found before.
 */
 #include <errno.h>
 #include <sys/stat.h>
@@ -40,7 +40,7 @@ static PetscBool is_option(const char *word, const char *key)
   return (PetscBool)!strcasecmp(word + 1 + (word[1] == '-'), key);
 }
 
-/* Whether rank 0 can read an option file, whose name is then recorded; else sets command->problem. Collective. */
+/* Whether rank 0 can read an option file, which is then recorded; else sets command->problem. Collective. */
 static PetscBool readable(const char *file, SbCommand *command)
 {
   int error = 0;

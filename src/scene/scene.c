@@ -1,5 +1,6 @@
 /*
-  scene.c - builds the model from options: bodies with material and element, effects, sets. Nothing is computed here.
+  scene.c - builds the model from options: bodies with material and element, effects, sets. Nothing is
+  computed here.
 */
 #include "scene_impl.h"
 
@@ -138,7 +139,7 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads the n bodies of these names, with all copies; copy[i][ncopy[i]] is allocated here and freed by the caller. */
+/* Reads the n bodies of these names, with all copies; the caller frees copy[i][ncopy[i]]. */
 static PetscErrorCode read_named_bodies(SbModel model, PetscInt n, const char (*names)[SB_NAME_MAX],
                                         PetscInt ncopy[], SbPlacement *copy[])
 {

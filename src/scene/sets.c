@@ -1,9 +1,11 @@
 /*
-  sets.c - named sets of a scene: those defined by a shape in -sets, and those that effects, probes and bodies name directly.
+  sets.c - named sets of a scene: those defined by a shape in -sets, and those that effects, probes and bodies
+  name directly.
 
-  Sets are named by the options `on` of effects, `on` and `in` of probes, `inclusions` of bodies. A name that -sets does not define means, in this order: the body
-  of that name, `all` bodies, the whole `boundary`, the physical group of that name. All such names are collected before
-  the mesh is read, because its sets are marked while the bodies are read.
+  Sets are named by the options `on` of effects, `on` and `in` of probes, `inclusions` of bodies. A name that
+  -sets does not define means, in this order: the body of that name, `all` bodies, the whole `boundary`, the
+  physical group of that name. All such names are collected before the mesh is read, because its sets are
+  marked while the bodies are read.
 */
 #include "scene_impl.h"
 

@@ -1,15 +1,17 @@
 /*
-  info.c - supple-mesh info: contents and quality of a mesh, whether a run accepts it, and an estimate of the memory of a run.
+  info.c - supple-mesh info: contents and quality of a mesh, whether a run accepts it, and an estimate of the
+  memory of a run.
 
-  The estimate uses counts of the mesh. N nodes of the element: vertices (p1), faces (cr), four in every tet (dg), vertices and edges (p2). A row of the matrix has a block of
-  3 x 3 numbers for its node and for each node coupled with it; total number of blocks:
+  The estimate uses counts of the mesh. N nodes of the element: vertices (p1), faces (cr), four in every tet
+  (dg), vertices and edges (p2). A row of the matrix has a block of 3 x 3 numbers for its node and for each
+  node coupled with it; total number of blocks:
 
     p1  N + 2 edges
-    cr  N + 12 per tet (six pairs of faces, each pair in one tet only) + 18 per interior face, whose jump term couples the three other
-        faces of one side with those of the other
+    cr  N + 12 per tet (six pairs of faces, each pair in one tet only) + 18 per interior face, whose jump term
+        couples the three other faces of one side with those of the other
     dg  16 per tet + 32 per interior face
-    p2  N + 6 per edge + 12 per face + 6 per tet (the three edges of a triangle are coupled with each other and each with the opposite corner;
-        a tet has three pairs of opposite edges)
+    p2  N + 6 per edge + 12 per face + 6 per tet (the three edges of a triangle are coupled with each other
+        and each with the opposite corner; a tet has three pairs of opposite edges)
 
   The other constants were measured, see below. docs/reference/meshes.md gives the accuracy.
 */

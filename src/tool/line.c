@@ -1,8 +1,8 @@
 /*
   line.c - command line of supple-mesh: a command, one or two files, options in any order.
 
-  Options are rows of a table as in supple itself; each row lists the commands that read it. An option that the command does not
-  read is an error, as is a misspelt one.
+  Options are rows of a table as in supple itself; each row lists the commands that read it. An option that
+  the command does not read is an error, as is a misspelt one.
 */
 #include <strings.h>
 #include "tool.h"

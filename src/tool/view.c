@@ -1,8 +1,7 @@
 /*
   view.c - picture of a mesh, rendered by scripts/render from a file in supple's own format.
 
-  The script is searched for relative to the program: ../scripts of its folder or, if installed,
-  ../share/supple/scripts.
+  The script is in ../scripts of the program's folder or, if installed, in ../share/supple/scripts.
 */
 #include <errno.h>
 #include <spawn.h>
