@@ -289,7 +289,6 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   Number number[NNUMBER];
   int64_t step, mesh_hash, checksum = 0, format;
   uint64_t sum = 0;
-  SbRecords *records;
   PetscReal values[NNUMBER] = {0.};
 
   PetscFunctionBeginUser;
@@ -310,9 +309,8 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
 
   /* the identity, the state and its checksum */
   if (*ok) PetscCall(check_identity(run, out, &h, mesh_hash));
-  PetscCall(PetscCalloc1(run->model->neffect, &records));
   if (*ok) PetscCall(read_parts(run, out, &h, &sum, ok));
-  if (*ok) PetscCall(SbCheckpointReadEffects(run, &h, records, &sum, ok));
+  if (*ok) PetscCall(SbCheckpointReadEffects(run, &h, 0., &sum, ok));
   if (*ok) PetscCall(SbCheckpointSumMeshes(run, &h, &sum, ok));
   if (sum != (uint64_t)checksum) *ok = PETSC_FALSE;
 
@@ -340,12 +338,10 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
     SbH5GetReal(h.file, SbLiveColumn(i, NULL), &value, ok);
     if (*ok) SbLiveSet(i, times.t, value);
   }
-  PetscCall(SbH5Close(&h));
 
   /* history variables of effects; the run is at the file's step */
-  if (*ok) PetscCall(SbCheckpointLoadEffects(run, times.t, records));
-  for (PetscInt k = 0; k < run->model->neffect; k++) PetscCall(PetscFree(records[k].record));
-  PetscCall(PetscFree(records));
+  if (*ok) PetscCall(SbCheckpointReadEffects(run, &h, times.t, NULL, ok));
+  PetscCall(SbH5Close(&h));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
   run->after.dt = times.paused;
   run->step0 = (PetscInt)step;

@@ -249,6 +249,7 @@ PetscErrorCode SbFieldAddCells(const SbField *f, SbRun run, const SbStep *step, 
 PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out, const SbField *f)
 {
   const PetscInt n = run->model->mesh->ncell_owned;
+  const PetscBool forces = (PetscBool)(f->compute == reaction || f->compute == contact_force);
 
   PetscFunctionBeginUser;
   PetscCheck(f->compute != space_error || run->cell_error, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
@@ -260,10 +261,9 @@ PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out, const SbField *f)
     if (!*state) PetscCall(PetscMalloc1((f->compute == of_stress ? 6 * n : n), state));
   }
   /* weights of nodes at vertices; forces also need the residual of each step */
-  if (!f->cell) PetscCall(SbPointsPrepare(run, out));
-  if (f->compute == reaction || f->compute == contact_force) {
-    run->want_residual = PETSC_TRUE;
-    if (!run->model->space->vertices || out->discontinuous) PetscCall(SbPointsPrepareForces(run, out));
-  }
+  if (forces) run->want_residual = PETSC_TRUE;
+  if (!f->cell)
+    PetscCall(
+      SbPointsPrepare(run, out, (PetscBool)(forces && (!run->model->space->vertices || out->discontinuous))));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -225,8 +225,7 @@ static PetscErrorCode keep_earlier(SbOutput out)
   }
   PetscCheck(
     !made, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE,
-    "cannot make the folder %s for the results of an earlier run: %s; -output_overwrite yes replaces "
-    "them",
+    "cannot make the folder %s for the results of an earlier run: %s; -output_overwrite yes replaces them",
     path, strerror(errno));
   for (PetscInt i = 0; i < n; i++) {
     char from[PETSC_MAX_PATH_LEN], to[PETSC_MAX_PATH_LEN + SB_FILE_MAX];

@@ -33,14 +33,15 @@ struct _p_SbFrames {
   PetscInt mesh;            /* of frames that are written, as in SbFrame */
   SbIndex index;            /* rank 0 only */
   PetscReal *owned, *slice; /* work: three numbers per point, or those of a field per cell or tet */
-  float *packed;            /* slice in the type of the file, unless that is double */
 };
 
 /* ------------------------------------------------------------------ the mesh */
 
-/* Values of points or cells from fr->owned to rows of the file, fr->slice: tets get those of their cell. */
-static PetscErrorCode gather(SbOutput out, PetscBool cell, PetscInt ncomp)
+/* Writes values of points or cells, from fr->owned: each of a cell's tets gets the cell's values. */
+static PetscErrorCode put(SbOutput out, hid_t where, const char *name, const char *unit, PetscBool cell,
+                          PetscInt ncomp, hid_t type)
 {
+  const SbOrder *order = cell ? &out->tet : &out->point;
   SbFrames fr = out->frames;
   PetscInt n = out->tet.n;
 
@@ -53,22 +54,9 @@ static PetscErrorCode gather(SbOutput out, PetscBool cell, PetscInt ncomp)
       PetscCall(PetscArraymove(fr->slice + ncomp * n, fr->slice + ncomp * i, ncomp));
     }
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* A constant integer per point or cell. */
-static PetscErrorCode write_whole(SbOutput out, hid_t where, const char *name, PetscBool cell)
-{
-  const SbOrder *order = cell ? &out->tet : &out->point;
-  SbFrames fr = out->frames;
-  int32_t *whole;
-
-  PetscFunctionBeginUser;
-  PetscCall(gather(out, cell, 1));
-  PetscCall(PetscMalloc1(order->n, &whole));
-  for (PetscInt i = 0; i < order->n; i++) whole[i] = (int32_t)fr->slice[i];
-  PetscCall(SbH5WriteSlice(&fr->h5, where, name, "1", order, 1, H5T_STD_I32LE, whole));
-  PetscCall(PetscFree(whole));
+  (void)H5Tconvert(H5T_NATIVE_DOUBLE, SbH5TypeInMemory(type), (size_t)(ncomp * order->n), fr->slice, NULL,
+                   H5P_DEFAULT);
+  PetscCall(SbH5WriteSlice(&fr->h5, where, name, unit, order, ncomp, type, fr->slice));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -193,7 +181,7 @@ static PetscErrorCode write_set(SbRun run, SbOutput out, PetscInt k, hid_t group
 
       out->frames->owned[i] = (sets & SB_SET_BIT(k)) != 0;
     }
-    PetscCall(write_whole(out, group, name, (PetscBool)cell));
+    PetscCall(put(out, group, name, "1", (PetscBool)cell, 1, H5T_STD_I32LE));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -226,8 +214,7 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
   /* points at rest, and cells */
   for (PetscInt i = 0; i < out->point.nowned; i++)
     PetscCall(PetscArraycpy(fr->owned + 3 * i, SbPointsRest(run, out, i), 3));
-  PetscCall(gather(out, PETSC_FALSE, 3));
-  PetscCall(SbH5WriteSlice(&fr->h5, group, "x", "m", &out->point, 3, H5T_IEEE_F64LE, fr->slice));
+  PetscCall(put(out, group, "x", "m", PETSC_FALSE, 3, H5T_IEEE_F64LE));
   PetscCall(write_cells(run, out, group));
 
   /* fields that do not change in a run: numbers of bodies and ranks, sets */
@@ -236,7 +223,7 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
     PetscCall(PetscLogEventBegin(out->field_event[i], 0, 0, 0, 0));
     if (out->field[i]->compute) {
       PetscCall(out->field[i]->compute(out->field[i], run, NULL, fr->owned));
-      PetscCall(write_whole(out, group, out->field[i]->name, PETSC_TRUE));
+      PetscCall(put(out, group, out->field[i]->name, "1", PETSC_TRUE, 1, H5T_STD_I32LE));
     } else {
       /* sets: one array each */
       PetscCall(SbH5Reserve(&fr->h5, (PetscInt64)run->model->mesh->nset *
@@ -270,7 +257,7 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
 {
   SbFrames fr = out->frames;
   SbIndexValues values[SB_FIELD_MAX];
-  PetscInt n = 0;
+  PetscInt n = 0, npoint;
   PetscInt64 room;
   char path[48], message[SB_MESSAGE_MAX] = "", name[16], hundred[16];
   /* along an arc length the load factor may fall, viewers expect times that rise: the step is the time */
@@ -280,7 +267,7 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
 
   PetscFunctionBeginUser;
   /* reserve disk space for the frame and its metadata: a full disk is an error before anything is written */
-  PetscCall(SbContactsFind(run, out, step, &room));
+  PetscCall(SbContactsFind(run, out, step, &npoint, &room));
   room += 65536 + 8192 * out->nfield;
   for (PetscInt i = 0; i < out->nfield; i++)
     room += (PetscInt64)(out->field[i]->cell ? out->tet.N : out->point.N) * out->field[i]->ncomp *
@@ -298,17 +285,13 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   out->state_valid = PETSC_FALSE;
   for (PetscInt i = 0; i < out->nfield; i++) {
     const SbField *f = out->field[i];
-    const SbOrder *order = f->cell ? &out->tet : &out->point;
 
     if (f->constant) continue;
     values[n++] = values_of(f, out->precise ? 8 : 4);
     PetscCall(PetscLogEventBegin(out->field_event[i], 0, 0, 0, 0));
     PetscCall(f->compute(f, run, step, fr->owned));
-    PetscCall(gather(out, f->cell, f->ncomp));
-    for (PetscInt k = 0; !out->precise && k < order->n * f->ncomp; k++) fr->packed[k] = (float)fr->slice[k];
-    PetscCall(SbH5WriteSlice(&fr->h5, group, f->name, f->unit, order, f->ncomp,
-                             out->precise ? H5T_IEEE_F64LE : H5T_IEEE_F32LE,
-                             out->precise ? (void *)fr->slice : fr->packed));
+    PetscCall(
+      put(out, group, f->name, f->unit, f->cell, f->ncomp, out->precise ? H5T_IEEE_F64LE : H5T_IEEE_F32LE));
     PetscCall(PetscLogEventEnd(out->field_event[i], 0, 0, 0, 0));
   }
   PetscCall(SbContactsWrite(out, &fr->h5, group));
@@ -336,7 +319,7 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   fr->last_step = step->step;
   if (fr->index) {
     PetscCall(SbIndexAdd(fr->index, time, path, 0, n, values));
-    PetscCall(SbContactsList(out, time, path, SbContactsCount(out), out->precise ? 8 : 4));
+    PetscCall(SbContactsList(out, time, path, npoint, out->precise ? 8 : 4));
     write_indices(out, step->last, message);
   }
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
@@ -367,23 +350,36 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 
 /* ------------------------------------------------------------------ restart */
 
-/* Step, time and fields of the frame `name` in an open hundred; ok is false when it is not one of ours. */
-static PetscErrorCode read_frame(hid_t hundred, const char *name, SbFrame *frame, PetscBool *ok)
+typedef struct {
+  PetscInt n, size, nhundred;
+  SbFrame *frame; /* [n] */
+  PetscErrorCode ierr;
+} List;
+
+/* Adds a frame, with its fields: a group in that of a hundred. */
+static herr_t list_frame(hid_t top, const char *name, const H5L_info_t *info, void *ctx)
 {
-  const hid_t group = SbH5OpenGroup(hundred, name);
+  List *l = (List *)ctx;
+  const char *slash = strchr(name, '/');
+  const hid_t group = slash && !strchr(slash + 1, '/') ? H5Gopen2(top, name, H5P_DEFAULT) : -1;
   int64_t step = 0, mesh = 0;
-  PetscBool other = PETSC_TRUE;
+  PetscBool ok = PETSC_TRUE, other = PETSC_TRUE;
   PetscInt n;
   const SbField *fields = SbFieldGetAll(&n);
+  SbFrame *frame;
 
-  PetscFunctionBeginUser;
-  *ok = (PetscBool)(group >= 0);
-  if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
-  SbH5GetInt(group, "step", &step, ok);
-  SbH5GetReal(group, "time", &frame->time, ok);
+  (void)info;
+  l->nhundred += !slash;
+  if (group < 0) return 0;
+  l->ierr = SbReserve(l->n + 1, sizeof(*l->frame), &l->size, &l->frame);
+  if (l->ierr) return -1;
+  frame = &l->frame[l->n];
+  SbH5GetInt(group, "step", &step, &ok);
+  SbH5GetReal(group, "time", &frame->time, &ok);
   SbH5GetInt(group, "mesh", &mesh, &other);
+  SbFormat(sizeof(frame->group), frame->group, "/step/%s", name);
   frame->step = (PetscInt)step;
-  frame->mesh = other ? (PetscInt)mesh : 0;
+  frame->mesh = (PetscInt)mesh;
   frame->n = 0;
   for (PetscInt i = 0; i < n; i++) {
     const PetscInt bytes = SbH5NumberBytes(group, fields[i].name);
@@ -392,49 +388,8 @@ static PetscErrorCode read_frame(hid_t hundred, const char *name, SbFrame *frame
   }
   SbContactsRead(group, &frame->npoint, &frame->point_bytes);
   (void)H5Gclose(group);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscInt count_links(hid_t group)
-{
-  H5G_info_t info;
-
-  return H5Gget_info(group, &info) < 0 ? 0 : (PetscInt)info.nlinks;
-}
-
-static PetscBool link_name(hid_t group, PetscInt i, size_t size, char name[])
-{
-  return (PetscBool)(H5Lget_name_by_idx(group, ".", H5_INDEX_NAME, H5_ITER_INC, (hsize_t)i, name, size,
-                                        H5P_DEFAULT) > 0);
-}
-
-/* All frames of the file, by step. */
-static PetscErrorCode scan(SbFrames fr, PetscInt *nframe, SbFrame **frames)
-{
-  PetscInt size = 0;
-
-  PetscFunctionBeginUser;
-  fr->nnode = count_links(fr->top);
-  for (PetscInt h = 0; h < fr->nnode; h++) {
-    char name[16], frame[16];
-    const hid_t hundred =
-      link_name(fr->top, h, sizeof(name), name) ? H5Gopen2(fr->top, name, H5P_DEFAULT) : -1;
-
-    for (PetscInt i = 0; hundred >= 0 && i < count_links(hundred); i++) {
-      PetscBool ok;
-      SbFrame found;
-
-      if (!link_name(hundred, i, sizeof(frame), frame)) continue;
-      PetscCall(read_frame(hundred, frame, &found, &ok));
-      if (!ok) continue;
-      (void)snprintf(found.group, sizeof(found.group), "/step/%s/%s", name, frame);
-      PetscCall(SbReserve(*nframe + 1, sizeof(found), &size, frames));
-      (*frames)[(*nframe)++] = found;
-    }
-    if (hundred >= 0) (void)H5Gclose(hundred);
-  }
-  PetscCall(SbSortByKeys(*nframe, sizeof(**frames), 1, *frames));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  l->n += ok;
+  return 0;
 }
 
 /* Whether an open file of frames has this run's mesh as that of a step. */
@@ -466,8 +421,8 @@ static PetscInt find_mesh(SbRun run, SbOutput out, hid_t file, PetscBool *ok)
 static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBool *ok)
 {
   SbFrames fr = out->frames;
-  SbFrame *frames = NULL;
-  PetscInt nframe = 0, n = 0;
+  List list = {0};
+  PetscInt n = 0;
   char message[SB_MESSAGE_MAX] = "";
 
   PetscFunctionBeginUser;
@@ -483,9 +438,12 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
   }
 
   /* its frames; the index has those up to the restart, so that it never lists a frame that is removed */
-  PetscCall(scan(fr, &nframe, &frames));
-  for (; n < nframe && frames[n].step <= run->step0; n++) {
-    const SbFrame *f = &frames[n];
+  (void)H5Lvisit(fr->top, H5_INDEX_NAME, H5_ITER_INC, list_frame, &list);
+  PetscCall(list.ierr);
+  PetscCall(SbSortByKeys(list.n, sizeof(SbFrame), 1, list.frame));
+  fr->nnode = list.nhundred;
+  for (; n < list.n && list.frame[n].step <= run->step0; n++) {
+    const SbFrame *f = &list.frame[n];
 
     fr->last_step = f->step;
     if (!fr->index) continue;
@@ -494,14 +452,14 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
     PetscCall(SbContactsList(out, f->time, f->group, f->npoint, f->point_bytes));
   }
   if (fr->index) {
-    if (!n || frames[n - 1].mesh != fr->mesh) PetscCall(SbIndexSetMesh(fr->index, fr->h5.file, fr->mesh));
+    if (!n || list.frame[n - 1].mesh != fr->mesh) PetscCall(SbIndexSetMesh(fr->index, fr->h5.file, fr->mesh));
     write_indices(out, PETSC_TRUE, message);
   }
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
 
   /* then later frames are removed */
-  for (; n < nframe; n++) (void)H5Ldelete(fr->h5.file, frames[n].group, H5P_DEFAULT);
-  PetscCall(PetscFree(frames));
+  for (; n < list.n; n++) (void)H5Ldelete(fr->h5.file, list.frame[n].group, H5P_DEFAULT);
+  PetscCall(PetscFree(list.frame));
   PetscCall(SbH5Flush(&fr->h5));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -552,8 +510,8 @@ static PetscErrorCode allocate(SbRun run, SbOutput out)
   wide = PetscMax(wide, most);
   nowned = PetscMax(3 * out->point.nowned, wide * out->cell.nowned);
   nslice = PetscMax(PetscMax(3 * out->point.n, wide * out->cell.n), most * out->tet.n);
-  PetscCall(PetscFree3(fr->owned, fr->slice, fr->packed));
-  PetscCall(PetscMalloc3(nowned, &fr->owned, nslice, &fr->slice, out->precise ? 0 : nslice, &fr->packed));
+  PetscCall(PetscFree2(fr->owned, fr->slice));
+  PetscCall(PetscMalloc2(nowned, &fr->owned, nslice, &fr->slice));
   for (PetscInt i = 0; i < out->nfield; i++) PetscCall(SbFieldPrepare(run, out, out->field[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -561,51 +519,41 @@ static PetscErrorCode allocate(SbRun run, SbOutput out)
 PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
 {
   char path[PETSC_MAX_PATH_LEN];
-  PetscBool resumed = PETSC_FALSE;
-  SbFrames fr;
+  SbFrames fr = out->frames;
+  PetscBool has; /* the file has the mesh */
 
   PetscFunctionBeginUser;
   if (!out->nfield) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscNew(&fr));
-  *fr = (struct _p_SbFrames){.h5.file = -1, .top = -1, .node = -1, .last_step = -1};
-  out->frames = fr;
   PetscCall(SbOutputOrder(run, out));
-  PetscCall(allocate(run, out));
+  has = (PetscBool)(fr && has_mesh(out, fr->h5.file, fr->mesh));
+  if (fr && !has) fr->mesh = run->step0; /* beside the earlier ones */
 
-  /* the index for viewers, on rank 0 */
-  if (!out->rank) PetscCall(SbIndexCreate(out, "fields", NULL, &fr->index));
-  PetscCall(SbContactsCreate(run, out));
-  PetscCall(SbOutputPath(out, "fields.h5", sizeof(path), path));
-  if (out->restarted) PetscCall(resume(run, out, path, &resumed));
-
-  /* else a new file with the mesh, without an index until it has a frame */
-  if (!resumed) {
-    if (fr->index) SbIndexRemove(fr->index);
-    if (out->contact_index) SbIndexRemove(out->contact_index);
-    PetscCall(SbH5Create(out->comm, path, &fr->h5));
-    PetscCall(SbH5PutText(&fr->h5, fr->h5.file, "program", "supple " SB_VERSION));
-    PetscCall(write_mesh(run, out));
-    PetscCall(SbH5GroupCreate(&fr->h5, SB_H5_NODE_LINKS, 4, &fr->top));
-    PetscCall(SbH5GroupLink(&fr->h5, fr->top, fr->h5.file, "step"));
-    PetscCall(SbH5Flush(&fr->h5));
-    if (fr->index) PetscCall(SbIndexSetMesh(fr->index, fr->h5.file, fr->mesh));
+  /* the index, on rank 0; a file that is continued, or a new one without an index until it has a frame */
+  if (!fr) {
+    PetscCall(PetscNew(&fr));
+    *fr = (struct _p_SbFrames){.h5.file = -1, .top = -1, .node = -1, .last_step = -1};
+    out->frames = fr;
+    if (!out->rank) PetscCall(SbIndexCreate(out, "fields", NULL, &fr->index));
+    PetscCall(SbContactsCreate(run, out));
+    PetscCall(SbOutputPath(out, "fields.h5", sizeof(path), path));
+    if (out->restarted) PetscCall(resume(run, out, path, &has));
+    if (!has) {
+      if (fr->index) SbIndexRemove(fr->index);
+      if (out->contact_index) SbIndexRemove(out->contact_index);
+      PetscCall(SbH5Create(out->comm, path, &fr->h5));
+      PetscCall(SbH5PutText(&fr->h5, fr->h5.file, "program", "supple " SB_VERSION));
+    }
   }
-  PetscCall(SbRunAddMonitor(run, monitor, out));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
-PetscErrorCode SbFramesReattach(SbRun run, SbOutput out)
-{
-  SbFrames fr = out->frames;
-
-  PetscFunctionBeginUser;
-  if (!fr) PetscFunctionReturn(PETSC_SUCCESS);
-  /* work arrays and monitor for the new mesh, which is written beside the earlier ones */
+  /* work arrays and monitor for the mesh, which is written if it is new */
   PetscCall(allocate(run, out));
   if (out->contact_points) run->want_residual = PETSC_TRUE;
-  if (!has_mesh(out, fr->h5.file, fr->mesh)) {
-    fr->mesh = run->step0;
+  if (!has) {
     PetscCall(write_mesh(run, out));
+    if (fr->top < 0) {
+      PetscCall(SbH5GroupCreate(&fr->h5, SB_H5_NODE_LINKS, 4, &fr->top));
+      PetscCall(SbH5GroupLink(&fr->h5, fr->top, fr->h5.file, "step"));
+    }
     PetscCall(SbH5Flush(&fr->h5));
     if (fr->index) PetscCall(SbIndexSetMesh(fr->index, fr->h5.file, fr->mesh));
   }
@@ -632,7 +580,7 @@ PetscErrorCode SbFramesDestroy(SbOutput out)
   PetscCall(SbFramesClose(out));
   PetscCall(SbContactsDestroy(out));
   PetscCall(SbIndexDestroy(&out->frames->index));
-  PetscCall(PetscFree3(out->frames->owned, out->frames->slice, out->frames->packed));
+  PetscCall(PetscFree2(out->frames->owned, out->frames->slice));
   PetscCall(PetscFree(out->frames));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

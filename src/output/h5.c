@@ -60,7 +60,7 @@ static PetscErrorCode agree(SbH5 *h)
   if (ierr) {
     int key;
 
-    // skip HDF5's cleanup at exit: MPI_Finalize() first deletes attributes of MPI_COMM_SELF, the newest before
+    // skip HDF5's cleanup at exit: MPI_Finalize() first deletes attributes of MPI_COMM_SELF, new ones first
     if (!h->failed && !MPI_Comm_create_keyval(MPI_COMM_NULL_COPY_FN, leave_at_once, &key, NULL)) {
       h->failed = PETSC_TRUE;
       (void)MPI_Comm_set_attr(MPI_COMM_SELF, key, NULL);
@@ -79,41 +79,36 @@ static PetscErrorCode agree(SbH5 *h)
     }                      \
   } while (0)
 
-/* Initialises h and the access properties of a file. */
-static PetscErrorCode begin(MPI_Comm comm, const char *path, SbH5 *h, hid_t *list)
+/* Opens a file, or creates it; h->file is negative when that fails. */
+static PetscErrorCode open_file(MPI_Comm comm, const char *path, unsigned flags, SbH5 *h)
 {
+  const hid_t list = H5Pcreate(H5P_FILE_ACCESS);
+
   PetscFunctionBeginUser;
   *h = (SbH5){.comm = comm};
   PetscCall(PetscStrncpy(h->path, path, sizeof(h->path)));
-  *list = H5Pcreate(H5P_FILE_ACCESS);
   // Errors become one line of ours; HDF5 prints its whole stack otherwise.
   (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
-  (void)H5Pset_fapl_mpio(*list, comm, MPI_INFO_NULL);
-  (void)H5Pset_alignment(*list, 3000, 4096);
-  (void)H5Pset_libver_bounds(*list, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18);
+  (void)H5Pset_fapl_mpio(list, comm, MPI_INFO_NULL);
+  (void)H5Pset_alignment(list, 3000, 4096);
+  (void)H5Pset_libver_bounds(list, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18);
+  h->file = flags == H5F_ACC_TRUNC ? H5Fcreate(path, flags, H5P_DEFAULT, list) : H5Fopen(path, flags, list);
+  (void)H5Pclose(list);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbH5Create(MPI_Comm comm, const char *path, SbH5 *h)
 {
-  hid_t list;
-
   PetscFunctionBeginUser;
-  PetscCall(begin(comm, path, h, &list));
-  h->file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, list);
-  (void)H5Pclose(list);
+  PetscCall(open_file(comm, path, H5F_ACC_TRUNC, h));
   H5_CALL(h, h->file);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH5 *h, PetscBool *ok)
 {
-  hid_t list;
-
   PetscFunctionBeginUser;
-  PetscCall(begin(comm, path, h, &list));
-  h->file = H5Fopen(path, writable ? H5F_ACC_RDWR : H5F_ACC_RDONLY, list);
-  (void)H5Pclose(list);
+  PetscCall(open_file(comm, path, writable ? H5F_ACC_RDWR : H5F_ACC_RDONLY, h));
   *ok = (PetscBool)(h->file >= 0);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, comm));
   if (!*ok && h->file >= 0) (void)H5Fclose(h->file);

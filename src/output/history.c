@@ -22,11 +22,10 @@ struct _p_SbHistory {
   FILE *text; /* rank 0: in memory, a row or the header, row[size] */
   char *row;
   size_t size;
-  PetscInt last_step; /* of the last row in the file, or -1 */
-  PetscInt nprobe;    /* columns of probes */
-  PetscInt nextra;    /* columns of effects, probes and bodies */
-  PetscReal (
-    *mass)[4]; /* [nbody] centre at rest, m, and mass, kg, of each body; NULL without columns of bodies */
+  PetscInt last_step;    /* of the last row in the file, or -1 */
+  PetscInt nprobe;       /* columns of probes */
+  PetscInt nextra;       /* columns of effects, probes and bodies */
+  PetscReal (*mass)[4];  /* [nbody] centre at rest, m, and mass, kg, for columns of bodies */
   PetscReal *mine, *sum; /* [nextra + 1] values of this rank, sums of all; the last: the row before failed */
   char message[SB_MESSAGE_MAX]; /* why it failed; empty when it did not */
 };
@@ -295,43 +294,35 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From now on rows are those of this run. */
-PetscErrorCode SbHistoryReattach(SbRun run, SbOutput out)
-{
-  PetscFunctionBeginUser;
-  if (!out->hist) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbProbesFind(run, out));
-  if (out->history_bodies) {
-    if (!out->hist->mass) PetscCall(PetscMalloc1(run->model->nbody, &out->hist->mass));
-    PetscCall(SbModelCentres(run->model, NULL, out->hist->mass));
-  }
-  run->want_energies = PETSC_TRUE;
-  if (run->model->nhistory) run->want_residual = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(run, monitor, out));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
 {
   const SbModel model = run->model;
-  SbHistory h;
+  SbHistory h = out->hist;
   char message[SB_MESSAGE_MAX] = "";
 
   PetscFunctionBeginUser;
   if (!out->history) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscNew(&h));
-  out->hist = h;
-  h->fd = -1;
-  h->last_step = -1;
-  for (PetscInt e = 0; e < model->nhistory; e++) h->nextra += model->history[e]->ncolumn;
-  h->nprobe = SbProbesCount(out);
-  h->nextra += h->nprobe + (out->history_bodies ? SB_BODY_SUMS * model->nbody : 0);
-  PetscCall(PetscMalloc2(h->nextra + 1, &h->mine, h->nextra + 1, &h->sum));
-  PetscCall(SbOutputPath(out, "history.csv", sizeof(h->path), h->path));
-  if (!out->rank) PetscCall(open_file(run, out, message));
-  PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
-  PetscCallMPI(MPI_Bcast(&h->last_step, 1, MPIU_INT, 0, out->comm));
-  PetscCall(SbHistoryReattach(run, out));
+  if (!h) {
+    PetscCall(PetscNew(&h));
+    out->hist = h;
+    h->fd = -1;
+    h->last_step = -1;
+    for (PetscInt e = 0; e < model->nhistory; e++) h->nextra += model->history[e]->ncolumn;
+    h->nprobe = SbProbesCount(out);
+    h->nextra += h->nprobe + (out->history_bodies ? SB_BODY_SUMS * model->nbody : 0);
+    PetscCall(PetscMalloc3(h->nextra + 1, &h->mine, h->nextra + 1, &h->sum, model->nbody, &h->mass));
+    PetscCall(SbOutputPath(out, "history.csv", sizeof(h->path), h->path));
+    if (!out->rank) PetscCall(open_file(run, out, message));
+    PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
+    PetscCallMPI(MPI_Bcast(&h->last_step, 1, MPIU_INT, 0, out->comm));
+  }
+
+  /* from now on rows are those of this run */
+  PetscCall(SbProbesFind(run, out));
+  if (out->history_bodies) PetscCall(SbModelCentres(model, NULL, h->mass));
+  run->want_energies = PETSC_TRUE;
+  if (model->nhistory) run->want_residual = PETSC_TRUE;
+  PetscCall(SbRunAddMonitor(run, monitor, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -344,8 +335,7 @@ PetscErrorCode SbHistoryDestroy(SbOutput out)
   if (h->fd >= 0) (void)close(h->fd);
   if (h->text) (void)fclose(h->text);
   free(h->row);
-  PetscCall(PetscFree2(h->mine, h->sum));
-  PetscCall(PetscFree(h->mass));
+  PetscCall(PetscFree3(h->mine, h->sum, h->mass));
   PetscCall(PetscFree(out->hist));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -13,9 +13,8 @@ static const SbOption rows[] = {
    "before_DATE"},
   {"output_fields", SB_OPTION_NAMES, 1, "", "position,displacement,velocity,von_mises", "",
    "fields in fields.h5: position, displacement, velocity, acceleration, reaction, contact_force, "
-   "contact_gap, stress, "
-   "von_mises, pressure, mean_pressure, J, energy_density, space_error, rank; sets: where the sets and "
-   "groups are that the scenario names; none: no such file"},
+   "contact_gap, stress, von_mises, pressure, mean_pressure, J, energy_density, space_error, rank; sets: "
+   "where the sets and groups are that the scenario names; none: no such file"},
   {"output_every", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "simulated time between frames of fields.h5; 0: by output_every_steps"},
   {"output_every_steps", SB_OPTION_INT, 1, "", "1", "[1, inf)",
@@ -320,8 +319,8 @@ PetscErrorCode SbOutputReattach(SbRun from, SbRun to)
   PetscCall(SbOutputForgetMesh(out));
   PetscCall(SbOutputCountNodes(to->model->space, out));
   PetscCall(SbOutputOrder(to, out));
-  PetscCall(SbFramesReattach(to, out));
-  PetscCall(SbHistoryReattach(to, out));
+  PetscCall(SbFramesAttach(to, out));
+  PetscCall(SbHistoryAttach(to, out));
   PetscCall(SbCheckpointAttach(to, out));
   PetscCall(SbProgressAttach(to, out));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));

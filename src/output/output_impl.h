@@ -231,9 +231,8 @@ PetscErrorCode SbFieldAddCells(const SbField *field, SbRun run, const SbStep *st
 /* Whether probes can show it: a vector of the step, or a quantity of the cells' state. */
 PetscBool SbFieldIsProbed(const SbField *field);
 
-/* points.c: vectors at the points of vertex fields. The first two before the others. */
-PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out);       /* not collective */
-PetscErrorCode SbPointsPrepareForces(SbRun run, SbOutput out); /* for SbPointsForces(). Collective */
+/* points.c: vectors at points of vertex fields. This one first; forces: for SbPointsForces(). Collective. */
+PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out, PetscBool forces);
 PetscErrorCode SbPointsDestroy(SbOutput out);
 /* Where an owned point is: at a vertex, or at an edge of P2 (vertex -1), where there is a node; of a cell (4
    cell + a of the vertex), if it is that cell's alone. */
@@ -253,26 +252,23 @@ void SbPointsVertex(SbRun run, SbOutput out, PetscInt vertex, const PetscReal x[
 
 /* Before the folder is touched: refuses to go on with frames that have other points. Collective. */
 PetscErrorCode SbFramesCheck(SbRun run, SbOutput out);
+/* Begins the output, or continues it with the run of a new mesh; so do all ..Attach below. Collective. */
 PetscErrorCode SbFramesAttach(SbRun run, SbOutput out);
-/* Continues the output with the run of a new mesh; so do the functions ..Reattach below. Collective. */
-PetscErrorCode SbFramesReattach(SbRun run, SbOutput out);
 PetscErrorCode SbFramesClose(SbOutput out);
 PetscErrorCode SbFramesDestroy(SbOutput out);
 /* contacts.c. Without -output_contacts: after a restart keeps the entries of the index. */
 PetscErrorCode SbContactsCreate(SbRun run, SbOutput out);
 PetscErrorCode SbContactsDestroy(SbOutput out);
-/* The points of contact after a step, on the ranks that write them; bytes: of a frame. Collective. */
-PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt64 *bytes);
+/* The points of contact after a step, on the ranks that write them; n of all, -1 without the option; their
+   bytes. Collective. */
+PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt *n, PetscInt64 *bytes);
 /* Writes these points as a group of the frame. Collective. */
 PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame);
 /* How many points a frame has, -1: it was written without; bytes of their numbers. Not collective. */
 void SbContactsRead(hid_t frame, PetscInt *n, PetscInt *bytes);
-/* How many the last SbContactsFind() found on all ranks, -1 without the option. */
-PetscInt SbContactsCount(SbOutput out);
 /* Adds a frame of n points to the index, at the path of its group; rank 0. */
 PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, PetscInt n, PetscInt bytes);
 PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
-PetscErrorCode SbHistoryReattach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryDestroy(SbOutput out);
 PetscErrorCode SbProbesRegister(void);
 PetscErrorCode SbProbesSetFromOptions(SbOutput out, const SbScope *scope, PetscBool dynamic);
@@ -286,17 +282,10 @@ PetscErrorCode SbProbesWrite(SbRun run, SbOutput out, SbH5 *h);
 PetscErrorCode SbProbesRead(SbRun run, SbOutput out, SbH5 *h);
 /* values[SbProbesCount()] += this rank's part of the columns of all probes. Collective. */
 PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, PetscReal values[]);
-/* checkpoint_effects.c: records of an effect's state, of all ranks, as a file has them. */
-typedef struct {
-  PetscInt n;
-  PetscReal *record; /* [n][nstate] */
-} SbRecords;
-/* Writes the records of all effects; sum is raised by their checksum. Collective. */
+/* checkpoint_effects.c: writes the state of all effects; sum is raised by their checksum. Collective. */
 PetscErrorCode SbCheckpointWriteEffects(SbRun run, SbH5 *h, uint64_t *sum);
-/* Reads them into records[neffect], zeroed, on all ranks; ok turns false when unreadable. Collective. */
-PetscErrorCode SbCheckpointReadEffects(SbRun run, SbH5 *h, SbRecords records[], uint64_t *sum, PetscBool *ok);
-/* Hands them to the effects, for the state of the run at time t. Collective. */
-PetscErrorCode SbCheckpointLoadEffects(SbRun run, PetscReal t, const SbRecords records[]);
+/* Reads it: raises sum, or without it hands the state to the effects, at time t; not ok: unreadable. Collective. */
+PetscErrorCode SbCheckpointReadEffects(SbRun run, SbH5 *h, PetscReal t, uint64_t *sum, PetscBool *ok);
 /* Hash of a number at a position of an array. */
 uint64_t SbMixReal(uint64_t position, PetscReal value);
 
@@ -332,7 +321,7 @@ PetscErrorCode SbIndexAdd(SbIndex index, PetscReal time, const char *group, Pets
 /* Replaces the files; `message` becomes the error, if any. The last ones of a run are written in any case. */
 void SbIndexWrite(SbIndex index, PetscBool last, char message[SB_MESSAGE_MAX]);
 
-/* phases.c: times of the phases, from the log events. */
+/* report.c: times of the phases, from the log events. */
 typedef struct {
   struct {
     const char *name;

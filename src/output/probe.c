@@ -175,12 +175,10 @@ static PetscErrorCode agree(SbOutput out, PetscReal mine, PetscInt original, Pet
 }
 
 /*
-  The vertex or node at an edge nearest to a place, of a body unless that is -1: squared distance, and into
-  the probe its original number and, on its owner, its local number: of a vertex, or nvert_owned behind that
-  of a node.
+  The vertex or node at an edge nearest to a probe, of its body once that is known: squared distance, and into
+  the probe its original and, on its owner, its local number: of a vertex, or nvert_owned behind that of a node.
 */
-static PetscErrorCode find_nearest(const SbSpace s, SbOutput out, PetscInt body, const PetscReal at[3],
-                                   SbProbe *probe, PetscReal *best)
+static PetscErrorCode find_nearest(const SbSpace s, SbOutput out, SbProbe *probe, PetscReal *best)
 {
   const SbMesh mesh = s->mesh;
   PetscReal mine = PETSC_MAX_REAL;
@@ -193,10 +191,10 @@ static PetscErrorCode find_nearest(const SbSpace s, SbOutput out, PetscInt body,
     const PetscInt number = node < 0 ? mesh->vert_orig[i] : s->node_orig[node];
     PetscReal d[3], d2;
 
-    SbSubtract(node < 0 ? mesh->x + 3 * i : s->node_x + 3 * node, at, d);
+    SbSubtract(node < 0 ? mesh->x + 3 * i : s->node_x + 3 * node, probe->found ? probe->x : probe->at, d);
     d2 = SbDot3(d, d);
     if (node >= 0 && number < first_edge(s)) continue;
-    if (body >= 0 && (node < 0 ? mesh->vert_body[i] : s->node_body[node]) != body) continue;
+    if (probe->found && (node < 0 ? mesh->vert_body[i] : s->node_body[node]) != probe->body) continue;
     if (d2 < mine || (d2 == mine && number < original)) {
       mine = d2;
       original = number;
@@ -295,16 +293,30 @@ static PetscErrorCode sum_set(SbRun run, SbProbe *probe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On a new mesh: the vertex or node at the probe's reference position, or the tet that contains it. */
-static PetscErrorCode find_again(const SbSpace s, SbOutput out, SbProbe *probe)
+/* On the first mesh the nearest vertex or node; later that at the probe's rest position, or the tet there. */
+static PetscErrorCode find_point(const SbSpace s, SbOutput out, SbProbe *probe)
 {
   const SbMesh mesh = s->mesh;
-  PetscReal mine, best, L[4] = {0., 0., 0., 0.}, Q[SB_CELL_NODES];
-  PetscInt cell, tet;
+  PetscReal mine, best, here[3] = {0., 0., 0.}, L[4] = {0., 0., 0., 0.}, Q[SB_CELL_NODES];
+  PetscInt cell, tet, body = -1;
 
   PetscFunctionBeginUser;
-  PetscCall(find_nearest(s, out, probe->body, probe->x, probe, &best));
+  PetscCall(find_nearest(s, out, probe, &best));
+  if (!probe->found) {
+    if (probe->local >= 0) {
+      const PetscInt node = probe->local - mesh->nvert_owned;
+
+      PetscCall(PetscArraycpy(here, node < 0 ? mesh->x + 3 * probe->local : s->node_x + 3 * node, 3));
+      body = node < 0 ? mesh->vert_body[probe->local] : s->node_body[node];
+    }
+    PetscCallMPI(MPI_Allreduce(here, probe->x, 3, MPIU_REAL, MPI_SUM, out->comm));
+    PetscCallMPI(MPI_Allreduce(&body, &probe->body, 1, MPIU_INT, MPI_MAX, out->comm));
+    probe->found = PETSC_TRUE;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (best == 0.) PetscFunctionReturn(PETSC_SUCCESS);
+
+  /* the basis functions in the tet */
   probe->local = probe->original = -1;
   mine = deepest_owned(mesh, probe, &cell, L);
   PetscCall(agree(out, mine, cell < 0 ? 0 : mesh->cell_orig[cell], &cell, &tet, &best));
@@ -313,33 +325,10 @@ static PetscErrorCode find_again(const SbSpace s, SbOutput out, SbProbe *probe)
                         "probe '%s': no tet of the re-meshed body holds its position any more; it follows "
                         "the nearest one, from %.2g of its size outside",
                         probe->name, (double)best));
-
-  /* the basis functions there */
   if (cell < 0) PetscFunctionReturn(PETSC_SUCCESS);
   for (int a = 0; a < 4; a++) Q[a] = L[a] * (2. * L[a] - 1.);
   for (int e = 0; e < 6; e++) Q[4 + e] = 4. * L[SbTetEdge[e][0]] * L[SbTetEdge[e][1]];
   PetscCall(add_cell(s, probe, cell, 1., L, Q));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* On the first mesh: the nearest vertex or node. */
-static PetscErrorCode find_first(const SbSpace s, SbOutput out, SbProbe *probe)
-{
-  const SbMesh mesh = s->mesh;
-  PetscReal best, here[3] = {0., 0., 0.};
-  PetscInt body = -1;
-
-  PetscFunctionBeginUser;
-  PetscCall(find_nearest(s, out, -1, probe->at, probe, &best));
-  if (probe->local >= 0) {
-    const PetscInt node = probe->local - mesh->nvert_owned;
-
-    PetscCall(PetscArraycpy(here, node < 0 ? mesh->x + 3 * probe->local : s->node_x + 3 * node, 3));
-    body = node < 0 ? mesh->vert_body[probe->local] : s->node_body[node];
-  }
-  PetscCallMPI(MPI_Allreduce(here, probe->x, 3, MPIU_REAL, MPI_SUM, out->comm));
-  PetscCallMPI(MPI_Allreduce(&body, &probe->body, 1, MPIU_INT, MPI_MAX, out->comm));
-  probe->found = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -349,7 +338,7 @@ PetscErrorCode SbProbesFind(SbRun run, SbOutput out)
   const SbMesh mesh = s->mesh;
 
   PetscFunctionBeginUser;
-  if (out->nprobe) PetscCall(SbPointsPrepare(run, out));
+  if (out->nprobe) PetscCall(SbPointsPrepare(run, out, PETSC_FALSE));
   for (PetscInt p = 0; p < out->nprobe; p++) {
     SbProbe *probe = &out->probe[p];
     PetscBool cells = PETSC_FALSE;
@@ -363,10 +352,8 @@ PetscErrorCode SbProbesFind(SbRun run, SbOutput out)
     probe->local = -1;
     if (probe->kind != SB_PROBE_POINT)
       PetscCall(sum_set(run, probe));
-    else if (probe->found)
-      PetscCall(find_again(s, out, probe));
     else
-      PetscCall(find_first(s, out, probe));
+      PetscCall(find_point(s, out, probe));
     /* the tets around a vertex or a node at an edge, by volume */
     if (cells && probe->kind == SB_PROBE_POINT && probe->original >= 0) {
       const PetscBool vertex = (PetscBool)(probe->original < first_edge(s));

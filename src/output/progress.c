@@ -27,24 +27,12 @@ static PetscBool is_terminal(void)
   char link[64], target[64];
   ssize_t n;
 
-  if (!isatty(STDOUT_FILENO)) return PETSC_FALSE;
-  if (!getenv("OMPI_COMM_WORLD_SIZE")) return PETSC_TRUE;
+  if (!isatty(STDOUT_FILENO) || !getenv("OMPI_COMM_WORLD_SIZE")) return (PetscBool)isatty(STDOUT_FILENO);
   (void)snprintf(link, sizeof(link), "/proc/%ld/fd/1", (long)getppid());
   n = readlink(link, target, sizeof(target) - 1);
   if (n <= 0) return PETSC_FALSE;
   target[n] = 0;
   return (PetscBool)(!strncmp(target, "/dev/pts/", 9) || !strncmp(target, "/dev/tty", 8));
-}
-
-/* 75 s as "1:15", 2 h as "2:00:00". */
-static void duration(PetscReal seconds, size_t size, char text[])
-{
-  const long s = seconds < 359999. ? (long)(seconds + .5) : 359999;
-
-  if (s >= 3600)
-    SbFormat(size, text, "%ld:%02ld:%02ld", s / 3600, s / 60 % 60, s % 60);
-  else
-    SbFormat(size, text, "%ld:%02ld", s / 60, s % 60);
 }
 
 /* On rank 0 only. */
@@ -75,12 +63,16 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   // the line: step, time, iterations, energies, speed, time left
   done = step->t - p->t_start;
   speed = step->wall > 0. ? done / step->wall : 0.;
-  if (step->step_end > 0)
-    (void)snprintf(count, sizeof(count), "%" PetscInt_FMT "/%" PetscInt_FMT, step->step, step->step_end);
-  else
-    (void)snprintf(count, sizeof(count), "%" PetscInt_FMT, step->step);
+  SbFormat(sizeof(count), count, "%" PetscInt_FMT, step->step);
+  if (step->step_end > 0) SbAppend(sizeof(count), count, "/%" PetscInt_FMT, step->step_end);
   if (speed > 0.) {
-    duration(PetscMax(step->t_end - step->t, 0.) / speed, sizeof(left), left);
+    const long s = (long)PetscMin(PetscMax(step->t_end - step->t, 0.) / speed + .5, 359999.);
+
+    /* 75 s as "1:15", 2 h as "2:00:00" */
+    if (s >= 3600)
+      SbFormat(sizeof(left), left, "%ld:%02ld:%02ld", s / 3600, s / 60 % 60, s % 60);
+    else
+      SbFormat(sizeof(left), left, "%ld:%02ld", s / 60, s % 60);
     if (run->model->dynamic) (void)snprintf(times, sizeof(times), "%.3gx", (double)speed);
   }
   (void)snprintf(line, sizeof(line), "%13s %10.4g %6.1f %7.1f %10.3e %10.3e %8s %8s", count, (double)step->t,

@@ -133,11 +133,10 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
   PetscCall(read_tets(o, which, &ok));
   PetscCall(read_all(o->frame, "displacement", H5T_IEEE_F64LE, 3, &nu, &o->u));
   PetscCall(read_all(o->frame, "velocity", H5T_IEEE_F64LE, 3, &n, &o->v));
-  PetscCheck(
-    ok && o->u && nu == o->npoint && (!o->v || n == nu), PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-    "%s %s: %s has no complete mesh with displacements; -output_fields displacement,velocity there, or "
-    "it is damaged",
-    option, text, o->path);
+  PetscCheck(ok && o->u && nu == o->npoint && (!o->v || n == nu), PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s %s: %s has no complete mesh with displacements; -output_fields displacement,velocity there, "
+             "or it is damaged",
+             option, text, o->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

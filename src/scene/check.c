@@ -117,8 +117,7 @@ PetscErrorCode SbSceneCheckSizes(SbModel model)
     if (!given)
       PetscCall(SbWarning(model->comm,
                           "body '%s' is %.3g m long: if its file is in mm, give -body_%s_scale 0.001 (in cm: "
-                          "0.01); if it is in m, "
-                          "-body_%s_scale 1 says so",
+                          "0.01); if it is in m, -body_%s_scale 1 says so",
                           body->name, (double)length, scope.instance, scope.instance));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

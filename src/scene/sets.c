@@ -66,18 +66,15 @@ static PetscErrorCode use_name(SbModel model, const char *name)
   PetscFunctionBeginUser;
   if (find_set(model, name) >= 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscStrncpy(set->name, name, sizeof(set->name)));
-  if (find_body(model, name) >= 0) {
-    set->shape = SB_SET_BODY;
-    PetscCall(PetscStrncpy(set->group, name, sizeof(set->group)));
-  } else if (!strcmp(name, "all")) {
-    /* a half-space that contains every point */
-    set->shape = SB_SET_HALFSPACE;
+  set->shape = find_body(model, name) >= 0 ? SB_SET_BODY
+               : !strcmp(name, "all")      ? SB_SET_HALFSPACE
+               : !strcmp(name, "boundary") ? SB_SET_BOUNDARY
+                                           : SB_SET_GROUP;
+  if (set->shape == SB_SET_HALFSPACE) {
+    /* one that contains every point */
     set->p[2] = 1;
     set->p[3] = PETSC_MAX_REAL;
-  } else if (!strcmp(name, "boundary")) {
-    set->shape = SB_SET_BOUNDARY;
-  } else {
-    set->shape = SB_SET_GROUP;
+  } else if (set->shape != SB_SET_BOUNDARY) {
     PetscCall(PetscStrncpy(set->group, name, sizeof(set->group)));
   }
   model->nset++;
