@@ -19,7 +19,7 @@
                    with -output_discontinuous the corners, of p2 the ten nodes, of one tet after the other
     /mesh/cells    [ncell][4] int32, point numbers, positively oriented; a tet of p2 is eight, but for
                    -output_quadratic
-    /mesh/cells10  [ntet][10] int32, where a body is of p2: of each tet of the scene corners and nodes at edges
+    /mesh/cells10  [ntet][10] int32, where a body is of p2: of each tet of the scene corners, nodes at edges
                    01 12 02 03 13 23, -1 where its body is of another element
     /mesh/parent   [ncell] int32, its row there, or that of its tet; not with -output_quadratic
     /mesh/vertices [ncell][4] int32, vertex numbers, then nodes at edges; only with -output_discontinuous
