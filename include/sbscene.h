@@ -1,5 +1,5 @@
 /*
-  sbscene.h - layer 8: from the command line and an option file to a model; the names of everything a scenario may use.
+  sbscene.h - layer 8: from the command line and an option file to a model; names that a scenario may use.
 */
 #pragma once
 #include "sbledger.h"
@@ -19,45 +19,44 @@ typedef struct {
 } SbCommand;
 
 /*
-  SbCommandLine - takes what is for the program itself out of the command line. Collective; after MPI_Init(), before
-  PetscInitialize().
+  SbCommandLine - takes what is for the program itself out of the command line. Collective; after MPI_Init(),
+  before PetscInitialize().
 
-  Taken out: -help [TOPIC], -version, -scenario_view [FILE], -options_table FILE; `-help petsc` becomes PETSc's own -help. Nothing at
-  all is a request for help, and nothing to run. A first word that is no option names the scenario; it stays, for PetscGetArgs(), and PETSc passes over it. A word that
-  belongs to no option and an option file that cannot be read (rank 0 looks) are described in command->problem, because
-  PETSc cannot report an error before PetscInitialize(); an -options_file that cannot be read is taken out.
+  Taken out: -help [TOPIC], -version, -scenario_view [FILE], -options_table FILE; `-help petsc` becomes
+  PETSc's own -help. Nothing at all is a request for help, and nothing to run. A first word that is no option
+  names the scenario; it stays, for PetscGetArgs(), and PETSc passes over it. A word that belongs to no option
+  and an option file that cannot be read (rank 0 looks) are described in command->problem, because PETSc
+  cannot report an error before PetscInitialize(); an -options_file that cannot be read is taken out.
 
   Input and output:
     argc, argv - as from main(); words are taken out in place
 */
 PetscErrorCode SbCommandLine(int *argc, char *argv[], SbCommand *command);
-/* Reads -error_trace, which holds from then on. After SbRegisterAll(). */
-PetscErrorCode SbCommandSetErrorTrace(void);
 
 /* Registers every type and option row of the program, in one readable list. Not collective. */
 PetscErrorCode SbRegisterAll(void);
 
 /*
-  SbSceneCreate - the model as the scenario describes it: bodies, sets, materials, elements, effects. Nothing is computed.
+  SbSceneCreate - the model that the scenario describes: bodies, sets, materials, elements, effects.
   Collective. The caller destroys the model with SbModelDestroy().
 
-  Options read: -bodies and -body_<name>_..., -sets and -set_<name>_at, -effects and -effect_<name>_...; -mass and
-  -mesh_..., which are used later, so that their values are checked before anything is computed.
-  A set that an effect names in its option `on` and -sets does not define is, in this order: the body of that name, all
-  bodies ("all"), the whole boundary ("boundary"), the physical group of that name in the meshes.
+  Options read: -bodies and -body_<name>_..., -sets and -set_<name>_at, -effects and -effect_<name>_...; -mass
+  and -mesh_..., which are used later, so that their values are checked before anything is computed.
+  A set that an effect names in its option `on` and -sets does not define is, in this order: the body of that
+  name, all bodies ("all"), the whole boundary ("boundary"), the physical group of that name in the meshes.
   Errors: PETSC_ERR_USER for a missing or unknown name, doubled names, values out of range.
 */
 PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model);
 
 /*
-  SbSceneCheck - what no single option can know: mesh files exist, a static run is constrained by something. Collective; after
-  SbRunCreate(), which says whether the run is static.
+  SbSceneCheck - what no single option can know: mesh files exist, a static run is constrained by something.
+  Collective; after SbRunCreate(), which says whether the run is static.
 
   Errors: PETSC_ERR_USER with names that are near in the folder of a missing file.
 */
 PetscErrorCode SbSceneCheck(SbModel model);
 
-/* Warns of bodies from files that are so large that their files may be in mm. Collective; after SbModelSetUp(). */
+/* Warns of bodies so large that their files may be in mm. Collective; after SbModelSetUp(). */
 PetscErrorCode SbSceneCheckSizes(SbModel model);
-/* With -validate: the invariants of mesh and space (ordering, ranges, ownership, sums). Collective; after SbModelSetUp(). */
+/* With -validate: the invariants of mesh and space (ordering, ranges, ownership, sums). Collective. */
 PetscErrorCode SbSceneValidate(SbModel model);

@@ -65,7 +65,7 @@ static PetscErrorCode supple(int argc, char *argv[])
   static Scene scene; /* static: used by the failure handler */
   const PetscBool bare = (PetscBool)(argc < 2);
   PetscErrorCode ierr;
-  PetscBool left;
+  PetscBool left, trace;
   PetscInt unused;
   char petsc[256];
 
@@ -86,7 +86,8 @@ static PetscErrorCode supple(int argc, char *argv[])
   PetscCall(PetscOptionsHasName(NULL, NULL, "-options_left", &left));
   if (!left) PetscCall(PetscOptionsSetValue(NULL, "-options_left", "no")); /* SbOptionsUnused() does it */
   PetscCall(SbRegisterAll());
-  PetscCall(SbCommandSetErrorTrace());
+  PetscCall(SbOptionBool(&SbRunScope, "error_trace", &trace));
+  SbErrorSetTrace(trace);
   for (PetscInt i = 0; i < command.nfile; i++) PetscCall(SbOptionsFile(PETSC_COMM_WORLD, command.file[i]));
 
   if (bare)

@@ -1,10 +1,12 @@
 /*
   Checkpoints: the state of a run in one HDF5 file, from which it goes on as if it had not stopped.
 
-  Displacement, velocity and acceleration (the integrator's own) of all nodes in original order and double precision, the step, its time,
-  the next step's length, work and dissipation so far, and the history variables of effects (checkpoint_effects.c). A file is written beside its target, flushed and renamed; the newest ones
-  are kept. It is accepted by a run with the same hash of the mesh (every coordinate and cell by its original number), and the same text of
-  the options that determine the mechanics. A checksum over the three vectors detects a file that was damaged later (both sums: mesh.c).
+  Displacement, velocity and acceleration (the integrator's own) of all nodes in original order and double
+  precision, the step, its time, the next step's length, work and dissipation so far, and the history
+  variables of effects (checkpoint_effects.c). A file is written beside its target, flushed and renamed; the
+  newest ones are kept. It is accepted by a run with the same hash of the mesh (every coordinate and cell by
+  its original number), and the same text of the options that determine the mechanics. A checksum over the
+  three vectors detects a file that was damaged later (both sums: mesh.c).
 */
 #include <errno.h>
 #include <sys/stat.h>
@@ -15,19 +17,32 @@
 
 /* ------------------------------------------------------------------ what of a run is in the file */
 
+/* An array of the state. Those with a checksum of their own may be missing in a file. */
 typedef struct {
-  const char *name;
-  Vec vec;
+  const char *name, *unit, *sum; /* sum: name of its own checksum; NULL: part of the file's */
+  const SbOrder *order;
+  PetscInt ncomp;
+  uint64_t salt;
+  Vec vec; /* NULL: penalty data of faces */
 } Part;
 
-#define NPART 4
-#define PATH 3 /* arc length only, with its own checksum: runs without arc length accept such a file */
-static void parts_of(SbRun run, Part part[NPART])
+/* Those of a run: arc length has `path`; penalty data of faces are there where they are history variables. */
+#define NPART 5
+static PetscInt parts_of(SbRun run, SbOutput out, Part part[NPART])
 {
-  part[0] = (Part){"u", run->U};
-  part[1] = (Part){"v", run->V};
-  part[2] = (Part){"a", run->A};
-  part[PATH] = (Part){"path", run->path};
+  const SbModel m = run->model;
+  const PetscBool remember =
+    (PetscBool)(m->dynamic && run->J && run->preset != SB_TIME_ALPHA2 && m->space->jump && !m->space->linear);
+  const Part all[NPART] = {{"u", "SI", NULL, &out->node, 3, 0, run->U},
+                           {"v", "SI", NULL, &out->node, 3, 1, run->V},
+                           {"a", "SI", NULL, &out->node, 3, 2, run->A},
+                           {"path", "SI", "path_checksum", &out->node, 3, 3, run->path},
+                           {"jumps", "N/m, Pa", "jumps_checksum", &out->cell, 5, 0, NULL}};
+  PetscInt n = 0;
+
+  for (int k = 0; k < NPART; k++)
+    if (all[k].vec || (k == NPART - 1 && remember)) part[n++] = all[k];
+  return n;
 }
 
 /* Step and time of the file, and the next step's length. */
@@ -68,75 +83,47 @@ static void numbers_of(SbRun run, Times *times, Number number[NNUMBER])
   memcpy(number, all, sizeof(all));
 }
 
-static PetscErrorCode checksum_of(const SbOrder *order, PetscInt ncomp, uint64_t salt,
-                                  const PetscReal slice[], uint64_t *sum)
+static PetscErrorCode checksum_of(const Part *p, const PetscReal slice[], uint64_t *sum)
 {
   uint64_t mine = 0;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < ncomp * order->n; i++)
-    mine += SbMixReal((uint64_t)(ncomp * order->start + i) + (salt << 48), slice[i]);
-  PetscCallMPI(MPI_Allreduce(&mine, sum, 1, MPI_UINT64_T, MPI_SUM, order->comm));
+  for (PetscInt i = 0; i < p->ncomp * p->order->n; i++)
+    mine += SbMixReal((uint64_t)(p->ncomp * p->order->start + i) + (p->salt << 48), slice[i]);
+  PetscCallMPI(MPI_Allreduce(&mine, sum, 1, MPI_UINT64_T, MPI_SUM, p->order->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ writing */
 
-static PetscErrorCode write_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *checksum)
+static PetscErrorCode write_parts(SbRun run, SbOutput out, SbH5 *h, uint64_t *checksum)
 {
   Part part[NPART];
-  PetscReal *slice;
-  const PetscScalar *array;
+  const PetscInt n = parts_of(run, out, part);
+  PetscReal *slice, *jumps;
 
   PetscFunctionBeginUser;
   *checksum = 0;
-  parts_of(run, part);
-  PetscCall(PetscMalloc1(3 * out->node.n, &slice));
-  for (int k = 0; k < NPART; k++) {
+  PetscCall(PetscMalloc2(PetscMax(3 * out->node.n, 5 * out->cell.n), &slice, 5 * out->cell.nowned, &jumps));
+  for (const Part *p = part; p < part + n; p++) {
+    const PetscScalar *array = jumps;
     uint64_t sum;
 
-    if (!part[k].vec) continue;
-    PetscCall(VecGetArrayRead(part[k].vec, &array));
-    PetscCall(SbOrderGather(&out->node, 3, array, slice));
-    PetscCall(VecRestoreArrayRead(part[k].vec, &array));
-    PetscCall(SbH5WriteSlice(h, h->file, part[k].name, "SI", &out->node, 3, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE,
-                             slice));
-    PetscCall(checksum_of(&out->node, 3, (uint64_t)k, slice, &sum));
-    if (k == PATH) {
-      PetscCall(SbH5PutInt(h, h->file, "path_checksum", (int64_t)sum));
-      PetscCall(SbH5PutReal(h, h->file, "path_first", run->arc.first));
-    } else
+    if (p->vec)
+      PetscCall(VecGetArrayRead(p->vec, &array));
+    else
+      PetscCall(SbSpaceGetJumps(run->model->space, run->U, jumps));
+    PetscCall(SbOrderGather(p->order, p->ncomp, array, slice));
+    if (p->vec) PetscCall(VecRestoreArrayRead(p->vec, &array));
+    PetscCall(SbH5WriteSlice(h, h->file, p->name, p->unit, p->order, p->ncomp, H5T_IEEE_F64LE, slice));
+    PetscCall(checksum_of(p, slice, &sum));
+    if (p->sum)
+      PetscCall(SbH5PutInt(h, h->file, p->sum, (int64_t)sum));
+    else
       *checksum += sum;
   }
-  PetscCall(PetscFree(slice));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Whether the penalty data of faces are history variables, and so part of the state. */
-static PetscBool faces_remember(SbRun run)
-{
-  const SbModel m = run->model;
-
-  return (PetscBool)(m->dynamic && run->J && run->preset != SB_TIME_ALPHA2 && m->space->jump &&
-                     !m->space->linear);
-}
-
-/* Written like the arc-length data, with its own checksum. */
-static PetscErrorCode write_jumps(SbRun run, SbOutput out, SbH5 *h)
-{
-  PetscReal *slice, *own;
-  uint64_t sum;
-
-  PetscFunctionBeginUser;
-  if (!faces_remember(run)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc2(5 * out->cell.n, &slice, 5 * run->model->mesh->ncell_owned, &own));
-  PetscCall(SbSpaceGetJumps(run->model->space, run->U, own));
-  PetscCall(SbOrderGather(&out->cell, 5, own, slice));
-  PetscCall(
-    SbH5WriteSlice(h, h->file, "jumps", "N/m, Pa", &out->cell, 5, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, slice));
-  PetscCall(checksum_of(&out->cell, 5, 0, slice, &sum));
-  PetscCall(SbH5PutInt(h, h->file, "jumps_checksum", (int64_t)sum));
-  PetscCall(PetscFree2(slice, own));
+  if (run->path) PetscCall(SbH5PutReal(h, h->file, "path_first", run->arc.first));
+  PetscCall(PetscFree2(slice, jumps));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -144,39 +131,34 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
   SbOutput out = (SbOutput)ctx;
   const PetscBool asked = (PetscBool)(out->checkpoint_every > 0. || out->checkpoint_every_steps);
-  PetscBool due = (PetscBool)(run->stopped || (step->last && asked));
   SbH5 h;
   char name[SB_FILE_MAX], path[PETSC_MAX_PATH_LEN], tmp[PETSC_MAX_PATH_LEN], message[SB_MESSAGE_MAX] = "";
-  PetscInt64 mesh_bytes;
   uint64_t checksum;
   Times times = {step->t, run->dt, run->dt, run->t_end, run->paused ? run->after.dt : 0.};
   Number number[NNUMBER];
 
   PetscFunctionBeginUser;
   /* whether this step is to be written: by time, by number, as the last one, or because the run stops */
-  if (step->step == run->step0) PetscFunctionReturn(PETSC_SUCCESS);
-  if (out->checkpoint_every > 0.)
-    due = (PetscBool)(due || SbOutputDue(out->checkpoint_every, step->t, step->dt));
-  if (out->checkpoint_every_steps) due = (PetscBool)(due || step->step % out->checkpoint_every_steps == 0);
-  if (!due) PetscFunctionReturn(PETSC_SUCCESS);
+  if (step->step == run->step0 ||
+      !(run->stopped || (step->last && asked) ||
+        (out->checkpoint_every > 0. && SbOutputDue(out->checkpoint_every, step->t, step->dt)) ||
+        (out->checkpoint_every_steps && step->step % out->checkpoint_every_steps == 0)))
+    PetscFunctionReturn(PETSC_SUCCESS);
 
   PetscCall(SbOutputOrder(run, out));
   PetscCall(SbLogNamed("Out", "checkpoint", &out->event.checkpoint));
   PetscCall(PetscLogStagePush(SbLogStageOutput));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CHECKPOINT], 0, 0, 0, 0));
   PetscCall(PetscLogEventBegin(out->event.checkpoint, 0, 0, 0, 0));
-  /* a temporary file beside its target, its space reserved: a full disk is an error before anything is written */
+  /* a temporary file beside its target; a full disk is an error before anything is written */
   (void)snprintf(name, sizeof(name), "checkpoint_%06" PetscInt_FMT ".h5", step->step);
   PetscCall(SbOutputPath(out, name, sizeof(path), path));
   PetscCall(SbOutputPath(out, "checkpoint.tmp", sizeof(tmp), tmp));
   PetscCall(SbH5Create(out->comm, tmp, &h));
-  SbCheckpointMeshBytes(run, &mesh_bytes);
-  PetscCall(SbH5Reserve(&h, (PetscInt64)out->node.N * 3 * 32 + (PetscInt64)strlen(out->identity) + 65536 +
-                              mesh_bytes));
+  PetscCall(SbH5Reserve(&h, (PetscInt64)out->node.N * 3 * 32 + (PetscInt64)strlen(out->identity) + 65536));
 
   /* the state */
-  PetscCall(write_vectors(run, out, &h, &checksum));
-  PetscCall(write_jumps(run, out, &h));
+  PetscCall(write_parts(run, out, &h, &checksum));
   PetscCall(SbCheckpointWriteEffects(run, &h, &checksum));
   PetscCall(SbCheckpointWriteMeshes(run, &h, &checksum));
   /* time, work and dissipation so far */
@@ -223,13 +205,12 @@ PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out)
   const PetscBool asked = (PetscBool)(out->checkpoint_every > 0. || out->checkpoint_every_steps);
 
   PetscFunctionBeginUser;
-  // A run that may be asked to stop writes one, too: it needs work and dissipation, which are part of the state.
-  if (!asked && !run->stop.listens) PetscFunctionReturn(PETSC_SUCCESS);
+  // a run that may be asked to stop writes one, too: work and dissipation are part of the state
   if (asked) {
     PetscCall(SbOutputOrder(run, out));
     run->want_energies = PETSC_TRUE;
   }
-  PetscCall(SbRunAddMonitor(run, monitor, out));
+  if (asked || run->stop.listens) PetscCall(SbRunAddMonitor(run, monitor, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -267,62 +248,40 @@ static PetscErrorCode check_identity(SbRun run, SbOutput out, SbH5 *h, int64_t m
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The vectors of an open file, all raised by the checksum of the first three; ok is false when one cannot be read. */
-static PetscErrorCode read_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *all, PetscBool *ok)
+/* The arrays of an open file; all: raised by the checksums of those without one of their own. */
+static PetscErrorCode read_parts(SbRun run, SbOutput out, SbH5 *h, uint64_t *all, PetscBool *ok)
 {
   Part part[NPART];
-  PetscReal *slice;
-  PetscScalar *array;
+  const PetscInt n = parts_of(run, out, part);
+  PetscReal *slice, *jumps;
 
   PetscFunctionBeginUser;
-  parts_of(run, part);
-  PetscCall(PetscMalloc1(3 * out->node.n, &slice));
-  for (int k = 0; k < NPART && *ok; k++) {
+  PetscCall(PetscMalloc2(PetscMax(3 * out->node.n, 5 * out->cell.n), &slice, 5 * out->cell.nowned, &jumps));
+  for (const Part *p = part; p < part + n && *ok; p++) {
+    PetscScalar *array = jumps;
     uint64_t sum;
     int64_t own = 0;
 
-    if (!part[k].vec || (k == PATH && H5Lexists(h->file, part[k].name, H5P_DEFAULT) <= 0)) continue;
-    PetscCall(SbH5ReadSlice(h, part[k].name, &out->node, 3, slice, ok));
+    if (p->sum && H5Lexists(h->file, p->name, H5P_DEFAULT) <= 0) continue;
+    PetscCall(SbH5ReadSlice(h, p->name, p->order, p->ncomp, slice, ok));
+    if (p->sum) SbH5GetInt(h->file, p->sum, &own, ok);
+    if (*ok && p->vec && p->vec == run->path) SbH5GetReal(h->file, "path_first", &run->arc.first, ok);
     if (!*ok) break;
-    PetscCall(checksum_of(&out->node, 3, (uint64_t)k, slice, &sum));
-    if (k == PATH) {
-      SbH5GetInt(h->file, "path_checksum", &own, ok);
-      SbH5GetReal(h->file, "path_first", &run->arc.first, ok);
-      if (own != (int64_t)sum) *ok = PETSC_FALSE;
-    } else
-      *all += sum;
-    PetscCall(VecGetArray(part[k].vec, &array));
-    PetscCall(SbOrderScatter(&out->node, 3, slice, array));
-    PetscCall(VecRestoreArray(part[k].vec, &array));
+    PetscCall(checksum_of(p, slice, &sum));
+    *ok = (PetscBool)(!p->sum || own == (int64_t)sum);
+    if (!p->sum) *all += sum;
+    if (p->vec) PetscCall(VecGetArray(p->vec, &array));
+    PetscCall(SbOrderScatter(p->order, p->ncomp, slice, array));
+    if (p->vec)
+      PetscCall(VecRestoreArray(p->vec, &array));
+    else if (*ok)
+      PetscCall(SbSpaceSetJumps(run->model->space, jumps));
   }
-  PetscCall(PetscFree(slice));
+  PetscCall(PetscFree2(slice, jumps));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Files of explicit runs have none. */
-static PetscErrorCode read_jumps(SbRun run, SbOutput out, SbH5 *h, PetscBool *ok)
-{
-  PetscReal *slice, *owned;
-  uint64_t sum;
-  int64_t own = 0;
-
-  PetscFunctionBeginUser;
-  if (!faces_remember(run) || H5Lexists(h->file, "jumps", H5P_DEFAULT) <= 0)
-    PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc2(5 * out->cell.n, &slice, 5 * run->model->mesh->ncell_owned, &owned));
-  PetscCall(SbH5ReadSlice(h, "jumps", &out->cell, 5, slice, ok));
-  SbH5GetInt(h->file, "jumps_checksum", &own, ok);
-  if (*ok) {
-    PetscCall(checksum_of(&out->cell, 5, 0, slice, &sum));
-    if (own != (int64_t)sum) *ok = PETSC_FALSE;
-  }
-  if (*ok) PetscCall(SbOrderScatter(&out->cell, 5, slice, owned));
-  if (*ok) PetscCall(SbSpaceSetJumps(run->model->space, owned));
-  PetscCall(PetscFree2(slice, owned));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Loads one file; ok is false when it is truncated, damaged or no checkpoint. One that does not fit the run is an error. */
+/* Loads one file; not ok: truncated, damaged or no checkpoint. One that does not fit the run is an error. */
 static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool *ok)
 {
   SbH5 h;
@@ -330,7 +289,6 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   Number number[NNUMBER];
   int64_t step, mesh_hash, checksum = 0, format;
   uint64_t sum = 0;
-  SbRecords *records;
   PetscReal values[NNUMBER] = {0.};
 
   PetscFunctionBeginUser;
@@ -351,10 +309,8 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
 
   /* the identity, the state and its checksum */
   if (*ok) PetscCall(check_identity(run, out, &h, mesh_hash));
-  PetscCall(PetscCalloc1(run->model->neffect, &records));
-  if (*ok) PetscCall(read_vectors(run, out, &h, &sum, ok));
-  if (*ok) PetscCall(read_jumps(run, out, &h, ok));
-  if (*ok) PetscCall(SbCheckpointReadEffects(run, &h, records, &sum, ok));
+  if (*ok) PetscCall(read_parts(run, out, &h, &sum, ok));
+  if (*ok) PetscCall(SbCheckpointReadEffects(run, &h, 0., &sum, ok));
   if (*ok) PetscCall(SbCheckpointSumMeshes(run, &h, &sum, ok));
   if (sum != (uint64_t)checksum) *ok = PETSC_FALSE;
 
@@ -366,13 +322,11 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   /* accumulated error estimates: all or none, as a run without -ledger writes none */
   if (*ok && run->ncarried) {
     PetscBool all = PETSC_TRUE;
-    PetscReal *errors;
 
-    PetscCall(PetscMalloc1(run->ncarried, &errors));
+    for (PetscInt i = 0; i < run->ncarried; i++)
+      all = (PetscBool)(all && H5Aexists(h.file, run->carried[i].name) > 0);
     for (PetscInt i = 0; i < run->ncarried && all; i++)
-      SbH5GetReal(h.file, run->carried[i].name, &errors[i], &all);
-    for (PetscInt i = 0; i < run->ncarried && all; i++) *run->carried[i].value = errors[i];
-    PetscCall(PetscFree(errors));
+      SbH5GetReal(h.file, run->carried[i].name, run->carried[i].value, ok);
     if (!all)
       PetscCall(SbWarning(
         out->comm, "%s has no errors, as it was written without -ledger: they count from there", h.path));
@@ -384,12 +338,10 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
     SbH5GetReal(h.file, SbLiveColumn(i, NULL), &value, ok);
     if (*ok) SbLiveSet(i, times.t, value);
   }
-  PetscCall(SbH5Close(&h));
 
   /* history variables of effects; the run is at the file's step */
-  if (*ok) PetscCall(SbCheckpointLoadEffects(run, times.t, records));
-  for (PetscInt k = 0; k < run->model->neffect; k++) PetscCall(PetscFree(records[k].record));
-  PetscCall(PetscFree(records));
+  if (*ok) PetscCall(SbCheckpointReadEffects(run, &h, times.t, NULL, ok));
+  PetscCall(SbH5Close(&h));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
   run->after.dt = times.paused;
   run->step0 = (PetscInt)step;
@@ -416,11 +368,11 @@ PetscErrorCode SbCheckpointLoad(SbRun run, const char *file)
     PetscCheck(path[0], out->comm, PETSC_ERR_FILE_OPEN, "-restart latest: there is no %scheckpoint in %s",
                k ? "readable " : "", out->dir);
     PetscCall(load(run, out, path, &ok));
-    if (ok) break;
-    PetscCheck(latest, out->comm, PETSC_ERR_FILE_READ, "cannot restart from %s: %s", path,
+    PetscCheck(ok || latest, out->comm, PETSC_ERR_FILE_READ, "cannot restart from %s: %s", path,
                access(path, R_OK) ? "there is no such file, or it may not be read"
                                   : "it is truncated, damaged or not a checkpoint");
-    PetscCall(SbWarning(out->comm, "%s is truncated or damaged: trying the checkpoint before it", path));
+    if (!ok)
+      PetscCall(SbWarning(out->comm, "%s is truncated or damaged: trying the checkpoint before it", path));
   }
   out->restarted = PETSC_TRUE;
   if (!out->quiet)

@@ -1,7 +1,8 @@
 /*
-  History variables of effects in checkpoints: active contact constraints, friction states. Each effect gives records of numbers, whose entities
-  have numbers that no partition changes (SbEffectOps.save); they are one dataset per effect, `state_<name>`, in any order. Reading,
-  every rank gets all of them, and the effect takes those of its entities.
+  History variables of effects in checkpoints: active contact constraints, friction states. Each effect gives
+  records of numbers, whose entities have numbers that no partition changes (SbEffectOps.save); they are one
+  dataset per effect, `state_<name>`, in any order. Every rank reads all of them,
+  and the effect takes those of its entities.
 
   Without such a dataset (no contact, or an older file) the effects begin as at the start of a run.
 */
@@ -30,7 +31,7 @@ PetscErrorCode SbCheckpointWriteEffects(SbRun run, SbH5 *h, uint64_t *sum)
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < m->neffect; k++) {
     SbEffect e = m->effect[k];
-    SbOrder order = {.comm = m->comm, .each = 1};
+    SbOrder order = {.comm = m->comm};
     char name[2 * SB_NAME_MAX];
     PetscReal *record;
     uint64_t mine, all;
@@ -45,8 +46,7 @@ PetscErrorCode SbCheckpointWriteEffects(SbRun run, SbH5 *h, uint64_t *sum)
     SbFormat(sizeof(name), name, "state_%s", e->name);
     if (order.N) {
       PetscCall(SbH5PutInt(h, h->file, name, order.N));
-      PetscCall(
-        SbH5WriteSlice(h, h->file, name, "SI", &order, e->nstate, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, record));
+      PetscCall(SbH5WriteSlice(h, h->file, name, "SI", &order, e->nstate, H5T_IEEE_F64LE, record));
       *sum += all;
     }
     PetscCall(PetscFree(record));
@@ -54,16 +54,19 @@ PetscErrorCode SbCheckpointWriteEffects(SbRun run, SbH5 *h, uint64_t *sum)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbCheckpointReadEffects(SbRun run, SbH5 *h, SbRecords records[], uint64_t *sum, PetscBool *ok)
+PetscErrorCode SbCheckpointReadEffects(SbRun run, SbH5 *h, PetscReal t, uint64_t *sum, PetscBool *ok)
 {
   const SbModel m = run->model;
+  const PetscReal *u;
 
   PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetLocalRead(m->space, run->U, &u));
   for (PetscInt k = 0; k < m->neffect && *ok; k++) {
     SbEffect e = m->effect[k];
-    SbOrder order = {.comm = m->comm, .each = 1};
+    SbOrder order = {.comm = m->comm};
     char name[2 * SB_NAME_MAX];
     PetscBool there = PETSC_TRUE;
+    PetscReal *record;
     int64_t n = 0;
 
     if (!e->ops.load) continue;
@@ -71,28 +74,13 @@ PetscErrorCode SbCheckpointReadEffects(SbRun run, SbH5 *h, SbRecords records[], 
     SbH5GetInt(h->file, name, &n, &there);
     if (!there || n <= 0) continue;
     order.n = order.N = (PetscInt)n;
-    PetscCall(PetscMalloc1(e->nstate * order.n, &records[k].record));
-    PetscCall(SbH5ReadSlice(h, name, &order, e->nstate, records[k].record, ok));
-    if (!*ok) break;
-    records[k].n = order.n;
-    *sum += sum_of(order.n, e->nstate, records[k].record);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbCheckpointLoadEffects(SbRun run, PetscReal t, const SbRecords records[])
-{
-  const SbModel m = run->model;
-  const PetscReal *u;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbSpaceGetLocalRead(m->space, run->U, &u));
-  for (PetscInt k = 0; k < m->neffect; k++) {
-    SbEffect e = m->effect[k];
-
-    if (e->ops.load && records[k].n) SbEffectCall(e, load, m->space, t, u, records[k].n, records[k].record);
+    PetscCall(PetscMalloc1(e->nstate * order.n, &record));
+    PetscCall(SbH5ReadSlice(h, name, &order, e->nstate, record, ok));
+    if (*ok && sum) *sum += sum_of(order.n, e->nstate, record);
+    if (*ok && !sum) SbEffectCall(e, load, m->space, t, u, order.n, record);
+    PetscCall(PetscFree(record));
   }
   PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &u));
-  PetscCall(SbModelContactResume(m));
+  if (!sum) PetscCall(SbModelContactResume(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

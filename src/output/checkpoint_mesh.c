@@ -1,6 +1,7 @@
 /*
-  Meshes in checkpoints. A body that was re-meshed has no file any more: its mesh is in the checkpoint, as the group `mesh_<body>` with the arrays of
-  SbMemoryMesh, written by rank 0. A restart takes it from there before the scene is set up; the mesh of the other bodies comes from their files.
+  Meshes in checkpoints. A body that was re-meshed has no file any more: its mesh is in the checkpoint, as the
+  group `mesh_<body>` with the arrays of SbMemoryMesh, written by rank 0. A restart takes it from there before
+  the scene is set up; the mesh of the other bodies comes from their files.
 */
 #include <unistd.h>
 #include "output_impl.h"
@@ -11,7 +12,7 @@
 typedef struct {
   const char *name;
   PetscInt n, ncomp; /* n of all ranks */
-  hid_t filetype, memtype;
+  hid_t type;        /* in the file */
   void *data;
 } Array;
 
@@ -19,14 +20,14 @@ typedef struct {
 #define NCOUNT 4
 static void arrays_of(SbMemoryMesh *g, const PetscInt count[NCOUNT], Array a[NARRAY])
 {
-  a[0] = (Array){"x", count[0], 3, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, g->x};
-  a[1] = (Array){"cells", count[1], 4, H5T_STD_I64LE, SB_H5_INT, g->cell};
-  a[2] = (Array){"triangles", count[2], 3, H5T_STD_I64LE, SB_H5_INT, g->tri};
-  a[3] = (Array){"vertex_sets", count[0], 1, H5T_STD_U64LE, H5T_NATIVE_UINT64, g->vert_set};
-  a[4] = (Array){"cell_sets", count[1], 1, H5T_STD_U64LE, H5T_NATIVE_UINT64, g->cell_set};
-  a[5] = (Array){"triangle_sets", count[2], 1, H5T_STD_U64LE, H5T_NATIVE_UINT64, g->tri_set};
-  a[6] = (Array){"curved_edges", count[3], 2, H5T_STD_I64LE, SB_H5_INT, g->edge};
-  a[7] = (Array){"edge_offsets", count[3], 3, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, g->edge_off};
+  a[0] = (Array){"x", count[0], 3, H5T_IEEE_F64LE, g->x};
+  a[1] = (Array){"cells", count[1], 4, H5T_STD_I64LE, g->cell};
+  a[2] = (Array){"triangles", count[2], 3, H5T_STD_I64LE, g->tri};
+  a[3] = (Array){"vertex_sets", count[0], 1, H5T_STD_U64LE, g->vert_set};
+  a[4] = (Array){"cell_sets", count[1], 1, H5T_STD_U64LE, g->cell_set};
+  a[5] = (Array){"triangle_sets", count[2], 1, H5T_STD_U64LE, g->tri_set};
+  a[6] = (Array){"curved_edges", count[3], 2, H5T_STD_I64LE, g->edge};
+  a[7] = (Array){"edge_offsets", count[3], 3, H5T_IEEE_F64LE, g->edge_off};
 }
 
 /* Sum of positions and values, so that damage is seen. */
@@ -48,87 +49,50 @@ static uint64_t sum_of(const SbMemoryMesh *g)
   return sum;
 }
 
-void SbCheckpointMeshBytes(SbRun run, PetscInt64 *bytes)
-{
-  *bytes = 0;
-  for (PetscInt b = 0; b < run->model->nbody; b++) {
-    const SbBody *body = &run->model->body[b];
-
-    if (body->in_memory && body->in_memory->step)
-      *bytes += (PetscInt64)body->nvert * 32 + (PetscInt64)body->ncell * 40 + (PetscInt64)body->nfacet * 32 +
-                65536 + (run->model->mesh->edge_off ? (PetscInt64)body->ncell * 2 * 40 : 0);
-  }
-}
-
 static const char *const counts[NCOUNT] = {"vertices", "tets", "faces", "curved"};
-
-static PetscErrorCode write_mesh(SbH5 *h, SbOutput out, const char *body, SbMemoryMesh *g, uint64_t *sum)
-{
-  PetscInt count[NCOUNT] = {g->nvert, g->ncell, g->ntri, g->nedge};
-  uint64_t own = out->rank ? 0 : sum_of(g);
-  char name[2 * SB_NAME_MAX];
-  Array a[NARRAY];
-  hid_t group;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Bcast(count, NCOUNT, MPIU_INT, 0, out->comm));
-  PetscCallMPI(MPI_Bcast(&own, 1, MPI_UINT64_T, 0, out->comm));
-  arrays_of(g, count, a);
-  PetscCall(PetscSNPrintf(name, sizeof(name), "mesh_%s", body));
-  PetscCall(SbH5GroupCreate(h, NARRAY, 16, &group));
-  PetscCall(SbH5PutInt(h, group, "step", g->step));
-  PetscCall(SbH5PutReal(h, group, "mass", g->mass));
-  PetscCall(SbH5PutReal(h, group, "bound", g->bound));
-  PetscCall(SbH5PutInt(h, group, "sum", (int64_t)own));
-  for (int k = 0; k < NCOUNT; k++) PetscCall(SbH5PutInt(h, group, counts[k], count[k]));
-  for (int k = 0; k < NARRAY; k++) {
-    const SbOrder order = {.comm = out->comm,
-                           .each = 1,
-                           .N = a[k].n,
-                           .n = out->rank ? 0 : a[k].n,
-                           .start = out->rank ? a[k].n : 0};
-
-    if (!a[k].n) continue;
-    PetscCall(
-      SbH5WriteSlice(h, group, a[k].name, "SI", &order, a[k].ncomp, a[k].filetype, a[k].memtype, a[k].data));
-  }
-  PetscCall(SbH5GroupLink(h, group, h->file, name));
-  (void)H5Gclose(group);
-  if (!out->rank) *sum += own;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum)
 {
   SbOutput out = (SbOutput)run->output;
-  uint64_t all = 0;
 
   PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < run->model->nbody; b++) {
-    SbBody *body = &run->model->body[b];
+  for (const SbBody *body = run->model->body; body < run->model->body + run->model->nbody; body++) {
+    SbMemoryMesh *g = body->in_memory;
+    PetscInt count[NCOUNT];
+    uint64_t own = 0;
+    char name[2 * SB_NAME_MAX];
+    Array a[NARRAY];
+    hid_t group;
 
-    if (body->in_memory && body->in_memory->step)
-      PetscCall(write_mesh(h, out, body->name, body->in_memory, &all));
+    if (!g || !g->step) continue;
+    memcpy(count, (const PetscInt[NCOUNT]){g->nvert, g->ncell, g->ntri, g->nedge}, sizeof(count));
+    if (!out->rank) own = sum_of(g);
+    PetscCallMPI(MPI_Bcast(count, NCOUNT, MPIU_INT, 0, out->comm));
+    PetscCallMPI(MPI_Bcast(&own, 1, MPI_UINT64_T, 0, out->comm));
+    arrays_of(g, count, a);
+    PetscCall(SbH5Reserve(h, 32 * ((PetscInt64)count[0] + count[2]) + 40 * ((PetscInt64)count[1] + count[3]) +
+                               65536));
+    SbFormat(sizeof(name), name, "mesh_%s", body->name);
+    PetscCall(SbH5GroupCreate(h, NARRAY, 16, &group));
+    PetscCall(SbH5PutInt(h, group, "step", g->step));
+    PetscCall(SbH5PutReal(h, group, "mass", g->mass));
+    PetscCall(SbH5PutReal(h, group, "bound", g->bound));
+    PetscCall(SbH5PutInt(h, group, "sum", (int64_t)own));
+    for (int k = 0; k < NCOUNT; k++) PetscCall(SbH5PutInt(h, group, counts[k], count[k]));
+    for (int k = 0; k < NARRAY; k++) {
+      const PetscInt N = a[k].n, n = out->rank ? 0 : N;
+      const SbOrder order = {.comm = out->comm, .N = N, .n = n, .start = N - n};
+
+      if (N) PetscCall(SbH5WriteSlice(h, group, a[k].name, "SI", &order, a[k].ncomp, a[k].type, a[k].data));
+    }
+    PetscCall(SbH5GroupLink(h, group, h->file, name));
+    (void)H5Gclose(group);
+    *sum += own;
   }
-  PetscCallMPI(MPI_Bcast(&all, 1, MPI_UINT64_T, 0, out->comm));
-  *sum += all;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ reading; one rank */
-
-/* Whether all vertex numbers are in range. */
-static PetscBool in_range(const SbMemoryMesh *g)
-{
-  const PetscInt *const list[] = {g->cell, g->tri, g->edge};
-  const PetscInt n[] = {4 * g->ncell, 3 * g->ntri, 2 * g->nedge};
-
-  for (int k = 0; k < 3; k++) {
-    for (PetscInt i = 0; i < n[k]; i++)
-      if (list[k][i] < 0 || list[k][i] >= g->nvert) return PETSC_FALSE;
-  }
-  return PETSC_TRUE;
-}
 
 /* The mesh of a body in an open file; NULL when it has none. */
 static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_memory, PetscBool *ok)
@@ -136,7 +100,6 @@ static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_
   char name[2 * SB_NAME_MAX];
   int64_t n[NCOUNT] = {0}, step = 0, sum = 0;
   PetscInt count[NCOUNT];
-  PetscReal mass = 0., bound = 0.;
   Array a[NARRAY];
   hid_t group;
 
@@ -153,8 +116,6 @@ static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_
     *ok = (PetscBool)(*ok && n[k] >= 0 && n[k] < PETSC_MAX_INT / 8);
   }
   SbH5GetInt(group, "step", &step, ok);
-  SbH5GetReal(group, "mass", &mass, ok);
-  SbH5GetReal(group, "bound", &bound, ok);
   SbH5GetInt(group, "sum", &sum, ok);
   for (int k = 0; k < NCOUNT; k++) count[k] = *ok ? (PetscInt)n[k] : 0;
   /* counts must agree with the sizes of the datasets before anything is allocated */
@@ -165,13 +126,18 @@ static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_
     PetscCall(SbMemoryMeshCreate(count[0], count[1], count[2], in_memory));
     PetscCall(SbMemoryMeshCurve(*in_memory, count[3]));
     (*in_memory)->step = (PetscInt)step;
-    (*in_memory)->mass = mass;
-    (*in_memory)->bound = bound;
+    SbH5GetReal(group, "mass", &(*in_memory)->mass, ok);
+    SbH5GetReal(group, "bound", &(*in_memory)->bound, ok);
     arrays_of(*in_memory, count, a);
     for (int k = 0; k < NARRAY && *ok; k++)
-      if (a[k].n) *ok = SbH5Read(group, a[k].name, a[k].memtype, a[k].n, a[k].ncomp, a[k].data);
+      if (a[k].n) *ok = SbH5Read(group, a[k].name, a[k].type, a[k].n, a[k].ncomp, a[k].data);
     /* check before the mesh is compared: a damaged file is not one of another mesh */
-    *ok = (PetscBool)(*ok && in_range(*in_memory) && (int64_t)sum_of(*in_memory) == sum);
+    for (int k = 0; k < NARRAY; k++) {
+      if (a[k].type != H5T_STD_I64LE) continue;
+      for (PetscInt i = 0; i < a[k].n * a[k].ncomp && *ok; i++)
+        *ok = (PetscBool)(((PetscInt *)a[k].data)[i] >= 0 && ((PetscInt *)a[k].data)[i] < count[0]);
+    }
+    *ok = (PetscBool)(*ok && (int64_t)sum_of(*in_memory) == sum);
     if (!*ok) PetscCall(SbMemoryMeshDestroy(in_memory));
   }
   (void)H5Gclose(group);
@@ -207,12 +173,10 @@ PetscErrorCode SbOutputRestoreMeshes(SbRun run)
   const SbModel m = run->model;
   const PetscBool latest = (PetscBool)!strcmp(out->restart, "latest");
   char path[PETSC_MAX_PATH_LEN];
-  SbMemoryMesh **in_memory;
   PetscBool ok = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   if (!out->restart[0]) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscCalloc1(m->nbody, &in_memory));
   for (int k = 0; !ok && (latest || !k); k++) {
     PetscCall(SbCheckpointFind(out, out->restart, k, sizeof(path), path));
     if (!path[0]) break;
@@ -225,17 +189,13 @@ PetscErrorCode SbOutputRestoreMeshes(SbRun run)
       H5E_END_TRY
       ok = (PetscBool)(file >= 0);
       for (PetscInt b = 0; b < m->nbody && file >= 0; b++)
-        PetscCall(read_mesh(file, m->body[b].name, &in_memory[b], &ok));
+        PetscCall(read_mesh(file, m->body[b].name, &m->body[b].in_memory, &ok));
       if (file >= 0) (void)H5Fclose(file);
-      for (PetscInt b = 0; b < m->nbody && !ok; b++) PetscCall(SbMemoryMeshDestroy(&in_memory[b]));
+      for (PetscInt b = 0; b < m->nbody && !ok; b++) PetscCall(SbMemoryMeshDestroy(&m->body[b].in_memory));
     }
     PetscCallMPI(MPI_Bcast(&ok, 1, SB_MPI_BOOL, 0, out->comm));
   }
   // broadcast which bodies have their own mesh, and its sizes
-  for (PetscInt b = 0; b < m->nbody; b++) {
-    PetscCall(SbMemoryMeshShare(out->comm, &in_memory[b]));
-    if (in_memory[b]) m->body[b].in_memory = in_memory[b];
-  }
-  PetscCall(PetscFree(in_memory));
+  for (PetscInt b = 0; b < m->nbody; b++) PetscCall(SbMemoryMeshShare(out->comm, &m->body[b].in_memory));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

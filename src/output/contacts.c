@@ -1,11 +1,12 @@
 /*
   The active contact points, with normals, gaps and forces: -output_contacts.
 
-  Each frame of fields.h5 then has a group `contacts` with one dataset per quantity and one row per point, in an order that no partition
-  changes. Their number differs from frame to frame, so they have indices of their own, contacts.xmf and contacts.vtkhdf.
+  Each frame of fields.h5 then has a group `contacts` with one dataset per quantity and one row per point, in
+  an order that no partition changes. Their number differs from frame to frame, so they have their own
+  indices, contacts.xmf and contacts.vtkhdf.
 
-  A point is sent to the rank that has its share of the numbers of points and edges, and sorted there: by the number that it begins
-  with, then by effect, kind, and the number of the other side.
+  A point is sent to the rank that has its share of the numbers of points and edges, and sorted there: by the
+  number that it begins with, then by effect, kind, and the number of the other side.
 */
 #include <stddef.h>
 #include "output_impl.h"
@@ -22,7 +23,7 @@ static const struct {
   size_t from;
   PetscBool whole;
 } table[] = {
-  // SbIndexAddPoints() wants numbers and coordinates first
+  // the first one is the topology of the index
   {"point", "1", 1, ROW, PETSC_TRUE},
   {"x", "m", 3, AT(x), PETSC_FALSE},
   {"effect", "1", 1, AT(effect), PETSC_TRUE},
@@ -40,7 +41,7 @@ struct _p_SbContacts {
   SbContactPoints list;  /* of this rank */
   SbContactPoint *point; /* [share.n] of this rank's share, sorted */
   SbOrder share;         /* which rows are this rank's; it has no star forest */
-  void *column;          /* [share.n][3] of one quantity, as in the file */
+  PetscReal *column;     /* [share.n][3] of one quantity */
 };
 
 /* ------------------------------------------------------------------ to the ranks that write them */
@@ -56,7 +57,7 @@ static int by_keys(const void *a, const void *b)
   return 0;
 }
 
-PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt64 *bytes)
+PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt *n, PetscInt64 *bytes)
 {
   SbContacts c = out->contacts;
   PetscInt bound = 0;
@@ -64,10 +65,9 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
   SbRoute route;
 
   PetscFunctionBeginUser;
+  *n = -1;
   *bytes = 0;
   if (!out->contact_points) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
-             "The residual was asked for but not given to the monitors");
   PetscCall(PetscLogEventBegin(out->event.contacts, 0, 0, 0, 0));
   c->list.n = 0;
   PetscCall(SbModelContactPoints(run->model, step->t, step->U, &c->list));
@@ -85,46 +85,17 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
   PetscCall(PetscFree(dest));
   if (c->share.n) qsort(c->point, (size_t)c->share.n, sizeof(SbContactPoint), by_keys);
   PetscCall(PetscFree(c->column));
-  PetscCall(PetscMalloc(3 * sizeof(double) * (size_t)c->share.n, &c->column));
+  PetscCall(PetscMalloc1(3 * c->share.n, &c->column));
   PetscCallMPI(MPI_Scan(&c->share.n, &c->share.start, 1, MPIU_INT, MPI_SUM, out->comm));
   c->share.start -= c->share.n;
   PetscCallMPI(MPI_Allreduce(&c->share.n, &c->share.N, 1, MPIU_INT, MPI_SUM, out->comm));
+  *n = c->share.N;
   for (int k = 0; k < NTABLE; k++) *bytes += 8 * (PetscInt64)c->share.N * table[k].ncomp + 8192;
   PetscCall(PetscLogEventEnd(out->event.contacts, 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ files */
-
-/* One quantity of this rank's rows in the type of the file; returns the type in memory, and that of the file. */
-static hid_t fill_column(SbContacts c, int k, PetscBool precise, hid_t *filetype)
-{
-  for (PetscInt i = 0; i < c->share.n * table[k].ncomp; i++) {
-    const PetscInt row = i / table[k].ncomp, component = i % table[k].ncomp;
-    const SbContactPoint *p = c->point + row;
-    const PetscReal push = SbDot3(p->force, p->normal);
-    PetscReal value;
-
-    if (table[k].whole) {
-      ((int32_t *)c->column)[i] =
-        (int32_t)(table[k].from == ROW ? c->share.start + row
-                                       : *(const PetscInt *)((const char *)p + table[k].from));
-      continue;
-    }
-    if (table[k].from == NORMAL)
-      value = push;
-    else if (table[k].from == FRICTION)
-      value = p->force[component] - push * p->normal[component];
-    else
-      value = ((const PetscReal *)((const char *)p + table[k].from))[component];
-    if (precise)
-      ((double *)c->column)[i] = value;
-    else
-      ((float *)c->column)[i] = (float)value;
-  }
-  *filetype = table[k].whole ? H5T_STD_I32LE : precise ? H5T_IEEE_F64LE : H5T_IEEE_F32LE;
-  return table[k].whole ? H5T_NATIVE_INT32 : precise ? H5T_NATIVE_DOUBLE : H5T_NATIVE_FLOAT;
-}
 
 PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame)
 {
@@ -137,11 +108,28 @@ PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame)
   PetscCall(SbH5GroupCreate(h, (unsigned)NTABLE, 14, &group));
   PetscCall(SbH5PutInt(h, group, "count", c->share.N));
   for (int k = 0; k < NTABLE && c->share.N; k++) {
-    hid_t filetype;
-    const hid_t memtype = fill_column(c, k, out->precise, &filetype);
+    const int ncomp = table[k].ncomp;
+    const hid_t type = table[k].whole ? H5T_STD_I32LE : out->precise ? H5T_IEEE_F64LE : H5T_IEEE_F32LE;
 
-    PetscCall(SbH5WriteSlice(h, group, table[k].name, table[k].unit, &c->share, table[k].ncomp, filetype,
-                             memtype, c->column));
+    /* this rank's rows, as numbers of the file */
+    for (PetscInt i = 0; i < c->share.n * ncomp; i++) {
+      const SbContactPoint *p = c->point + i / ncomp;
+      const PetscReal push = SbDot3(p->force, p->normal);
+
+      if (table[k].from == ROW)
+        c->column[i] = (PetscReal)(c->share.start + i);
+      else if (table[k].from == NORMAL)
+        c->column[i] = push;
+      else if (table[k].from == FRICTION)
+        c->column[i] = p->force[i % ncomp] - push * p->normal[i % ncomp];
+      else if (table[k].whole)
+        c->column[i] = (PetscReal)(*(const PetscInt *)((const char *)p + table[k].from));
+      else
+        c->column[i] = ((const PetscReal *)((const char *)p + table[k].from))[i % ncomp];
+    }
+    (void)H5Tconvert(H5T_NATIVE_DOUBLE, SbH5TypeInMemory(type), (size_t)(c->share.n * ncomp), c->column, NULL,
+                     H5P_DEFAULT);
+    PetscCall(SbH5WriteSlice(h, group, table[k].name, table[k].unit, &c->share, ncomp, type, c->column));
   }
   PetscCall(SbH5GroupLink(h, group, frame, "contacts"));
   (void)H5Gclose(group);
@@ -164,11 +152,6 @@ void SbContactsRead(hid_t frame, PetscInt *n, PetscInt *bytes)
   (void)H5Gclose(group);
 }
 
-PetscInt SbContactsCount(SbOutput out)
-{
-  return out->contact_points ? out->contacts->share.N : -1;
-}
-
 PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, PetscInt n, PetscInt bytes)
 {
   SbIndexValues values[NTABLE];
@@ -177,10 +160,12 @@ PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, P
   PetscFunctionBeginUser;
   if (!out->contact_index || n < 0) PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < NTABLE; k++)
-    values[k] =
-      (SbIndexValues){table[k].name, table[k].ncomp, table[k].whole ? 4 : (int)bytes, table[k].whole};
+    values[k] = (SbIndexValues){.name = table[k].name,
+                                .ncomp = table[k].ncomp,
+                                .bytes = table[k].whole ? 4 : (int)bytes,
+                                .whole = table[k].whole};
   (void)snprintf(group, sizeof(group), "%s/contacts", frame);
-  PetscCall(SbIndexAddPoints(out->contact_index, time, group, n, NTABLE, values));
+  PetscCall(SbIndexAdd(out->contact_index, time, group, n, NTABLE - 1, values + 1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -197,9 +182,7 @@ PetscErrorCode SbContactsCreate(SbRun run, SbOutput out)
   if (!out->contact_points && !out->restarted) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&c));
   out->contacts = c;
-  if (out->contact_points) run->want_residual = PETSC_TRUE;
   c->share.comm = out->comm;
-  c->share.each = 1;
   if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 3 && mesh->nvert; k++) nowhere[k] = mesh->x[k];
   PetscCall(SbIndexCreate(out, "contacts", nowhere, &out->contact_index));

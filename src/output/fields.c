@@ -1,15 +1,15 @@
 /*
   The fields that a run can write: one table, a name, a unit and a function each.
 
-  Vertex fields are interpolated from the vectors by points.c. Cell fields share one evaluation of the cells' state per frame.
+  Vertex fields are interpolated from the vectors by points.c. Cell fields share one evaluation per frame.
 
   von Mises stress:  sqrt(3/2 s:s), s the deviator of the Cauchy stress
   reaction:          residual without constraints at prescribed unknowns, the force of the support on the body
   contact force:     of obstacles and other bodies on the body
   contact gap:       along the normal: a vertex minus gap times normal is the point of contact
   mean pressure:     -tr(sigma)/3 of the Cauchy stress, positive in compression
-  pressure:          the law's -lambda theta with theta its measure of the change of volume (SbMaterialOps.pressure). The two
-                     pressures differ by 2/3 mu theta for small strains, little for nu near 0.5.
+  pressure:          the law's -lambda theta, theta: its measure of the change of volume (SbMaterialOps); they
+                     differ by 2/3 mu theta for small strains, little for nu near 0.5.
 */
 #include <stddef.h>
 #include "output_impl.h"
@@ -56,8 +56,6 @@ static PetscErrorCode contact_force(const SbField *f, SbRun run, const SbStep *s
 
   PetscFunctionBeginUser;
   (void)f;
-  PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
-             "The residual was asked for but not given to the monitors");
   PetscCall(VecDuplicate(step->U, &F));
   PetscCall(SbModelContactForce(run->model, step->t, step->U, F));
   PetscCall(SbPointsForces(run, (SbOutput)run->output, PETSC_FALSE, F, values));
@@ -80,7 +78,7 @@ static PetscErrorCode contact_gap(const SbField *f, SbRun run, const SbStep *ste
 
 /* ------------------------------------------------------------------ per cell */
 
-/* A quantity of the cells' state, which is computed once per frame: six numbers per cell of stress, one of the others. */
+/* A quantity of the cells' state, which is computed once per frame: for stress six numbers, else one. */
 static PetscErrorCode cell_state(const SbField *f, SbRun run, const SbStep *step, const PetscReal **array)
 {
   SbOutput o = (SbOutput)run->output;
@@ -228,21 +226,22 @@ PetscBool SbFieldIsProbed(const SbField *f)
                      f->compute == of_stress);
 }
 
-PetscErrorCode SbFieldAddCell(const SbField *f, SbRun run, const SbStep *step, PetscInt n,
-                              const PetscInt cell[], const PetscReal weight[], PetscReal value[])
+PetscErrorCode SbFieldAddCells(const SbField *f, SbRun run, const SbStep *step, const SbSum *cells,
+                               PetscReal value[])
 {
   const PetscReal *state = NULL;
 
   PetscFunctionBeginUser;
   PetscCall(cell_state(f, run, step, &state));
-  for (PetscInt i = 0; i < n; i++) {
+  for (PetscInt i = 0; i < cells->n; i++) {
+    const PetscInt cell = cells->item[i].number;
     PetscReal here[6] = {0.};
 
     if (f->of_stress)
-      (*f->of_stress)(state + 6 * cell[i], here);
+      (*f->of_stress)(state + 6 * cell, here);
     else
-      here[0] = state[cell[i]];
-    for (PetscInt k = 0; k < f->ncomp; k++) value[k] += weight[i] * here[k];
+      here[0] = state[cell];
+    for (PetscInt k = 0; k < f->ncomp; k++) value[k] += cells->item[i].weight * here[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -250,6 +249,7 @@ PetscErrorCode SbFieldAddCell(const SbField *f, SbRun run, const SbStep *step, P
 PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out, const SbField *f)
 {
   const PetscInt n = run->model->mesh->ncell_owned;
+  const PetscBool forces = (PetscBool)(f->compute == reaction || f->compute == contact_force);
 
   PetscFunctionBeginUser;
   PetscCheck(f->compute != space_error || run->cell_error, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
@@ -261,10 +261,9 @@ PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out, const SbField *f)
     if (!*state) PetscCall(PetscMalloc1((f->compute == of_stress ? 6 * n : n), state));
   }
   /* weights of nodes at vertices; forces also need the residual of each step */
-  if (!f->cell) PetscCall(SbPointsPrepare(run, out));
-  if (f->compute == reaction || f->compute == contact_force) {
-    run->want_residual = PETSC_TRUE;
-    if (!run->model->space->vertices || out->discontinuous) PetscCall(SbPointsPrepareForces(run, out));
-  }
+  if (forces) run->want_residual = PETSC_TRUE;
+  if (!f->cell)
+    PetscCall(
+      SbPointsPrepare(run, out, (PetscBool)(forces && (!run->model->space->vertices || out->discontinuous))));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

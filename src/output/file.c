@@ -1,6 +1,6 @@
 /*
-  Plain files: written whole beside their target and renamed into it, so that a reader, or a kill, never meets half a file;
-  space reserved before a file is touched; failures of one rank reported by all.
+  Plain files: written whole beside their target and renamed into it, so that a reader, or a kill, never meets
+  half a file; space reserved before a file is touched; failures of one rank reported by all.
 */
 #include <errno.h>
 #include <fcntl.h>

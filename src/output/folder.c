@@ -1,11 +1,10 @@
 /*
-  The folder of the results: created, write-tested and locked before anything is computed; an earlier run's results are moved aside when the run
-  starts, and files with other names are never touched. Checkpoints are found by the number in their names.
+  The folder of the results: created, write-tested and locked before anything is computed; an earlier run's
+  results are moved aside when the run starts, files with other names never. Checkpoints are found by number.
 
-  The lock is one of the file system (fcntl) on a file that names host and process: it is released with its process, however that ends, and works between hosts where the file
-  system supports it. Else folders are not locked.
+  The lock is one of the file system (fcntl) on a file that names host and process: it is released with its
+  process, however that ends, and works between hosts where the file system supports it; else there is none.
 */
-#include <ctype.h>
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -28,7 +27,7 @@ PetscErrorCode SbOutputPath(SbOutput out, const char *name, size_t size, char pa
 
 PetscBool SbOutputDue(PetscReal every, PetscReal t, PetscReal dt)
 {
-  // A step that ends at the multiple but for rounding counts as having reached it. A load factor may come back.
+  // A step that ends at the multiple but for rounding has reached it. A load factor may come back.
   const PetscReal ahead = 1e-6 * PetscAbsReal(dt);
 
   return (PetscBool)(PetscFloorReal((t + ahead) / every) != PetscFloorReal((t - dt + ahead) / every));
@@ -70,7 +69,7 @@ static void remove_lock(void)
   locked[0] = 0;
 }
 
-/* Opens and locks the lock file, or says why not; rank 0. Repeated if its owner removed the file meanwhile. */
+/* Opens and locks the lock file, or says why not; rank 0. Again if its owner removed the file meanwhile. */
 static PetscErrorCode lock_folder(SbOutput out, char message[SB_MESSAGE_MAX])
 {
   struct flock all = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
@@ -128,12 +127,10 @@ void SbFolderUnlock(SbOutput out)
 
 static int is_checkpoint(const struct dirent *entry)
 {
-  const char *digits = entry->d_name + strlen("checkpoint_");
-  size_t n = 0;
+  int end = 0;
 
-  if (strncmp(entry->d_name, "checkpoint_", strlen("checkpoint_"))) return 0;
-  while (isdigit((unsigned char)digits[n])) n++;
-  return n > 0 && !strcmp(digits + n, ".h5");
+  (void)sscanf(entry->d_name, "checkpoint_%*[0-9].h5%n", &end);
+  return end && !entry->d_name[end];
 }
 
 static int by_number(const struct dirent **a, const struct dirent **b)
@@ -220,18 +217,15 @@ static PetscErrorCode keep_earlier(SbOutput out)
   if (stat(path, &info)) info.st_mtime = time(NULL);
   (void)strftime(date, sizeof(date), "%Y-%m-%d_%H-%M-%S", localtime_r(&info.st_mtime, &local));
   for (int k = 1; k < 1000 && made; k++) {
-    if (k == 1)
-      SbFormat(sizeof(name), name, "before_%s", date);
-    else
-      SbFormat(sizeof(name), name, "before_%s_%d", date, k);
+    SbFormat(sizeof(name), name, "before_%s", date);
+    if (k > 1) SbAppend(sizeof(name), name, "_%d", k);
     PetscCall(SbOutputPath(out, name, sizeof(path), path));
     made = mkdir(path, 0777);
     if (made && errno != EEXIST) break;
   }
   PetscCheck(
     !made, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE,
-    "cannot make the folder %s for the results of an earlier run: %s; -output_overwrite yes replaces "
-    "them",
+    "cannot make the folder %s for the results of an earlier run: %s; -output_overwrite yes replaces them",
     path, strerror(errno));
   for (PetscInt i = 0; i < n; i++) {
     char from[PETSC_MAX_PATH_LEN], to[PETSC_MAX_PATH_LEN + SB_FILE_MAX];

@@ -1,53 +1,47 @@
 /*
   fields.h5: one group per frame, one dataset per field, written by all ranks together in original order.
 
-  Where a body is of P2, its nodes at edges are points behind the vertices, and each of its cells is cut into eight linear tets: one at each corner, and the octahedron between them in four around one
-  of its diagonals. With -output_quadratic it is one tet of ten points. With -output_discontinuous each cell has points of its own, and /mesh/vertices says which of them coincide.
+  Where a body is of P2, its nodes at edges are points behind the vertices, and each of its cells is cut into
+  eight linear tets: one at each corner, and the octahedron between them in four around one of its diagonals.
+  With -output_quadratic it is one tet of ten points. With -output_discontinuous each cell has points of its
+  own, and /mesh/vertices says which of them coincide.
 
-  A frame gets its name in the file when it is complete (h5.c), and is then listed in the indices fields.xmf and fields.vtkhdf. After a restart in
-  the same folder frames up to the restart stay, later ones are removed and their space in the file is used again.
+  A frame gets its name in the file when it is complete (h5.c), and is then listed in the indices fields.xmf
+  and fields.vtkhdf. After a restart in the same folder frames up to the restart stay, later ones are removed
+  and their space in the file is used again.
 */
 #include <ctype.h>
 #include "output_impl.h"
 #include "sbgeometry.h"
 
 typedef struct {
+  PetscInt step; /* sorted by it */
   PetscReal time;
-  PetscInt step;
   char group[48];
-  PetscInt nfield;
-  const SbField *field[SB_FIELD_MAX];
-  PetscInt bytes[SB_FIELD_MAX];
-  PetscInt npoint, point_bytes; /* contact points, -1: not written; bytes of their numbers */
-  PetscInt mesh;                /* step after which its mesh was made, 0: the first one */
+  PetscInt n;
+  SbIndexValues values[SB_FIELD_MAX]; /* [n] */
+  PetscInt npoint, point_bytes;       /* contact points, -1: not written; bytes of their numbers */
+  PetscInt mesh;                      /* step after which its mesh was made, 0: the first one */
 } SbFrame;
 
 struct _p_SbFrames {
   SbH5 h5;
-  hid_t top;             /* /step */
-  hid_t node;            /* group of the current hundred frames; negative before the first frame */
-  PetscInt nnode, nlink; /* groups of a hundred frames so far; links in the current one */
-  PetscInt last_step;    /* of the last frame in the file, or -1 */
-  PetscInt nframe;
+  hid_t top;                /* /step */
+  hid_t node;               /* group of the current hundred frames; negative before the first frame */
+  PetscInt nnode, nlink;    /* groups of a hundred frames so far; links in the current one */
+  PetscInt last_step;       /* of the last frame in the file, or -1 */
   PetscInt mesh;            /* of frames that are written, as in SbFrame */
   SbIndex index;            /* rank 0 only */
   PetscReal *owned, *slice; /* work: three numbers per point, or those of a field per cell or tet */
-  void *packed;             /* slice in the type of the file; NULL when that is double */
 };
 
 /* ------------------------------------------------------------------ the mesh */
 
-static void mesh_name(PetscInt step, size_t size, char name[])
+/* Writes values of points or cells, from fr->owned: each of a cell's tets gets the cell's values. */
+static PetscErrorCode put(SbOutput out, hid_t where, const char *name, const char *unit, PetscBool cell,
+                          PetscInt ncomp, hid_t type)
 {
-  if (step)
-    SbFormat(size, name, "mesh_%06" PetscInt_FMT, step);
-  else
-    SbFormat(size, name, "mesh");
-}
-
-/* Values of points or cells from fr->owned to rows of the file, in fr->slice: each of a cell's tets gets the cell's values. */
-static PetscErrorCode gather(SbOutput out, PetscBool cell, PetscInt ncomp)
-{
+  const SbOrder *order = cell ? &out->tet : &out->point;
   SbFrames fr = out->frames;
   PetscInt n = out->tet.n;
 
@@ -60,26 +54,13 @@ static PetscErrorCode gather(SbOutput out, PetscBool cell, PetscInt ncomp)
       PetscCall(PetscArraymove(fr->slice + ncomp * n, fr->slice + ncomp * i, ncomp));
     }
   }
+  (void)H5Tconvert(H5T_NATIVE_DOUBLE, SbH5TypeInMemory(type), (size_t)(ncomp * order->n), fr->slice, NULL,
+                   H5P_DEFAULT);
+  PetscCall(SbH5WriteSlice(&fr->h5, where, name, unit, order, ncomp, type, fr->slice));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A constant integer per point or cell. */
-static PetscErrorCode write_whole(SbOutput out, hid_t where, const char *name, PetscBool cell)
-{
-  const SbOrder *order = cell ? &out->tet : &out->point;
-  SbFrames fr = out->frames;
-  int32_t *whole;
-
-  PetscFunctionBeginUser;
-  PetscCall(gather(out, cell, 1));
-  PetscCall(PetscMalloc1(order->n, &whole));
-  for (PetscInt i = 0; i < order->n; i++) whole[i] = (int32_t)fr->slice[i];
-  PetscCall(SbH5WriteSlice(&fr->h5, where, name, "1", order, 1, H5T_STD_I32LE, H5T_NATIVE_INT32, whole));
-  PetscCall(PetscFree(whole));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Nodes of P2: of the tets at the corners of a cell; the ends of each diagonal of the octahedron between them, and the other four. */
+/* Nodes of P2: of the tets at the corners; ends of each diagonal of the octahedron, and the other four. */
 static const int corner_tet[4][4] = {{0, 4, 5, 6}, {4, 1, 7, 8}, {5, 7, 2, 9}, {6, 8, 9, 3}};
 static const int around[3][6] = {{4, 9, 5, 6, 8, 7}, {5, 8, 7, 9, 6, 4}, {6, 7, 4, 5, 9, 8}};
 
@@ -90,7 +71,7 @@ static int child_corner(int diagonal, int k, int j)
   return j < 2 ? around[diagonal][j] : around[diagonal][2 + (k + j - 6) % 4];
 }
 
-/* The diagonal whose smallest tet has the largest volume over the diagonal's length, at rest. In straight cells volumes are equal: the shortest. */
+/* The diagonal whose smallest tet has the largest volume over its length cubed; the shortest if straight. */
 static int best_diagonal(SbSpace s, PetscInt cell)
 {
   PetscReal x[SB_CELL_NODES][3], best = PETSC_MIN_REAL;
@@ -98,11 +79,10 @@ static int best_diagonal(SbSpace s, PetscInt cell)
 
   SbSpaceCellPositions(s, cell, x);
   for (int d = 0; d < 3; d++) {
-    const PetscReal *p = x[around[d][0]], *q = x[around[d][1]];
-    const PetscReal length =
-      PetscSqrtReal(PetscSqr(p[0] - q[0]) + PetscSqr(p[1] - q[1]) + PetscSqr(p[2] - q[2]));
-    PetscReal worst = PETSC_MAX_REAL;
+    PetscReal along[3], length, worst = PETSC_MAX_REAL;
 
+    SbSubtract(x[around[d][0]], x[around[d][1]], along);
+    length = PetscSqrtReal(SbDot3(along, along));
     for (int k = 4; k < 8; k++) {
       PetscInt vert[4];
 
@@ -119,8 +99,8 @@ static int best_diagonal(SbSpace s, PetscInt cell)
 }
 
 /*
-  The tets by their points; with points per cell, also the vertex of each. With P2 the ten points of its cells in the order of VTK (corners, then the edges 01 12 02 03 13 23), and
-  the cell that each tet is part of.
+  The tets by their points; with points per cell, also the vertex of each. With P2 the ten points of its cells
+  in the order of VTK (corners, then the edges 01 12 02 03 13 23), and the cell that each tet is part of.
 */
 static PetscErrorCode write_cells(SbRun run, SbOutput out, hid_t group)
 {
@@ -169,81 +149,56 @@ static PetscErrorCode write_cells(SbRun run, SbOutput out, hid_t group)
     }
   }
   if (out->discontinuous)
-    PetscCall(
-      SbH5WriteSlice(&fr->h5, group, "vertices", "1", &out->tet, 4, H5T_STD_I32LE, H5T_NATIVE_INT32, vertex));
-  PetscCall(
-    SbH5WriteSlice(&fr->h5, group, "cells", "1", &out->tet, 4, H5T_STD_I32LE, H5T_NATIVE_INT32, corner));
+    PetscCall(SbH5WriteSlice(&fr->h5, group, "vertices", "1", &out->tet, 4, H5T_STD_I32LE, vertex));
+  PetscCall(SbH5WriteSlice(&fr->h5, group, "cells", "1", &out->tet, 4, H5T_STD_I32LE, corner));
   if (wide > 4)
-    PetscCall(SbH5WriteSlice(&fr->h5, group, "cells10", "1", &out->cell, SB_CELL_NODES, H5T_STD_I32LE,
-                             H5T_NATIVE_INT32, ten));
+    PetscCall(SbH5WriteSlice(&fr->h5, group, "cells10", "1", &out->cell, SB_CELL_NODES, H5T_STD_I32LE, ten));
   if (wide > 4 && !out->quadratic)
-    PetscCall(
-      SbH5WriteSlice(&fr->h5, group, "parent", "1", &out->tet, 1, H5T_STD_I32LE, H5T_NATIVE_INT32, parent));
+    PetscCall(SbH5WriteSlice(&fr->h5, group, "parent", "1", &out->tet, 1, H5T_STD_I32LE, parent));
   PetscCall(PetscFree4(corner, vertex, ten, parent));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Reference positions of the points. */
-static PetscErrorCode write_points(SbRun run, SbOutput out, hid_t group)
-{
-  SbFrames fr = out->frames;
-
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < out->point.nowned; i++)
-    PetscCall(PetscArraycpy(fr->owned + 3 * i, SbPointsRest(run, out, i), 3));
-  PetscCall(gather(out, PETSC_FALSE, 3));
-  PetscCall(
-    SbH5WriteSlice(&fr->h5, group, "x", "m", &out->point, 3, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, fr->slice));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* "set_fat_tissue": characters special in paths or XML become underscores. */
-static void array_of_set(const char *prefix, const char *set, size_t size, char name[])
-{
-  SbFormat(size, name, "%s_%s", prefix, set);
-  for (char *p = name; *p; p++)
-    if (!isalnum((unsigned char)*p) && !strchr("_-.", *p)) *p = '_';
 }
 
 /* Indicator, 0 or 1, of one set: at points, and of tets if it has any. */
 static PetscErrorCode write_set(SbRun run, SbOutput out, PetscInt k, hid_t group)
 {
-  SbFrames fr = out->frames;
   const SbMesh mesh = run->model->mesh;
   char name[SB_NAME_MAX + 8];
 
   PetscFunctionBeginUser;
-  array_of_set("set", mesh->set[k].name, sizeof(name), name);
-  if (H5Lexists(group, name, H5P_DEFAULT) > 0)
-    PetscFunctionReturn(PETSC_SUCCESS); /* another set has this name: "fat tissue" and "fat_tissue" */
-  for (PetscInt i = 0; i < out->point.nowned; i++) {
-    const SbPlace at = SbPointsPlace(run, out, i);
+  for (int cell = 0; cell < (mesh->set[k].ncell ? 2 : 1); cell++) {
+    /* "set_fat_tissue": characters special in paths or XML become underscores */
+    SbFormat(sizeof(name), name, "%s_%s", cell ? "tets" : "set", mesh->set[k].name);
+    for (char *p = name; *p; p++)
+      if (!isalnum((unsigned char)*p) && !strchr("_-.", *p)) *p = '_';
+    if (H5Lexists(group, name, H5P_DEFAULT) > 0)
+      PetscFunctionReturn(PETSC_SUCCESS); /* another set has this name: "fat tissue" and "fat_tissue" */
+    for (PetscInt i = 0; i < (cell ? mesh->ncell_owned : out->point.nowned); i++) {
+      const SbPlace at = cell ? (SbPlace){-1, -1, -1} : SbPointsPlace(run, out, i);
+      const uint64_t sets = cell           ? mesh->cell_set[i]
+                            : at.node >= 0 ? run->model->space->node_set[at.node]
+                                           : mesh->vert_set[at.vertex];
 
-    fr->owned[i] =
-      ((at.node < 0 ? mesh->vert_set[at.vertex] : run->model->space->node_set[at.node]) & SB_SET_BIT(k)) != 0;
+      out->frames->owned[i] = (sets & SB_SET_BIT(k)) != 0;
+    }
+    PetscCall(put(out, group, name, "1", (PetscBool)cell, 1, H5T_STD_I32LE));
   }
-  PetscCall(write_whole(out, group, name, PETSC_FALSE));
-  if (!mesh->set[k].ncell) PetscFunctionReturn(PETSC_SUCCESS);
-  array_of_set("tets", mesh->set[k].name, sizeof(name), name);
-  for (PetscInt c = 0; c < mesh->ncell_owned; c++) fr->owned[c] = (mesh->cell_set[c] & SB_SET_BIT(k)) != 0;
-  PetscCall(write_whole(out, group, name, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode write_mesh(SbRun run, SbOutput out)
 {
   SbFrames fr = out->frames;
-  char name[32];
+  char name[SB_MESH_NAME], *names;
   hid_t group;
-  char *names;
   const size_t size = (size_t)run->model->nbody * SB_NAME_MAX + 1;
 
   PetscFunctionBeginUser;
-  mesh_name(fr->mesh, sizeof(name), name);
+  SbOutputMeshName(fr->mesh, name);
   /* a run that was restarted before a re-meshing repeats it: its mesh is replaced */
   if (H5Lexists(fr->h5.file, name, H5P_DEFAULT) > 0) (void)H5Ldelete(fr->h5.file, name, H5P_DEFAULT);
 
-  /* reserve disk space, then write points and cells */
+  /* disk space for points and cells */
   PetscCall(SbH5Reserve(&fr->h5, (PetscInt64)out->point.N * 24 + (PetscInt64)out->tet.N * 40 +
                                    (out->place ? (PetscInt64)out->cell.N * 40 : 0) + 65536));
   PetscCall(SbH5GroupCreate(&fr->h5, 8, 8, &group));
@@ -255,7 +210,11 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
     SbAppend(size, names, "%s%s", b ? "," : "", run->model->body[b].name);
   PetscCall(SbH5PutText(&fr->h5, group, "bodies", names));
   PetscCall(PetscFree(names));
-  PetscCall(write_points(run, out, group));
+
+  /* points at rest, and cells */
+  for (PetscInt i = 0; i < out->point.nowned; i++)
+    PetscCall(PetscArraycpy(fr->owned + 3 * i, SbPointsRest(run, out, i), 3));
+  PetscCall(put(out, group, "x", "m", PETSC_FALSE, 3, H5T_IEEE_F64LE));
   PetscCall(write_cells(run, out, group));
 
   /* fields that do not change in a run: numbers of bodies and ranks, sets */
@@ -264,7 +223,7 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
     PetscCall(PetscLogEventBegin(out->field_event[i], 0, 0, 0, 0));
     if (out->field[i]->compute) {
       PetscCall(out->field[i]->compute(out->field[i], run, NULL, fr->owned));
-      PetscCall(write_whole(out, group, out->field[i]->name, PETSC_TRUE));
+      PetscCall(put(out, group, out->field[i]->name, "1", PETSC_TRUE, 1, H5T_STD_I32LE));
     } else {
       /* sets: one array each */
       PetscCall(SbH5Reserve(&fr->h5, (PetscInt64)run->model->mesh->nset *
@@ -282,27 +241,9 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
 
 /* ------------------------------------------------------------------ a frame */
 
-/* One field of the frame, in the order and precision of the file. */
-static PetscErrorCode write_field(SbRun run, SbOutput out, const SbStep *step, const SbField *f, hid_t group)
+static SbIndexValues values_of(const SbField *f, PetscInt bytes)
 {
-  SbFrames fr = out->frames;
-  const SbOrder *order = f->cell ? &out->tet : &out->point;
-  const PetscInt n = order->n * f->ncomp;
-
-  PetscFunctionBeginUser;
-  PetscCall(f->compute(f, run, step, fr->owned));
-  PetscCall(gather(out, f->cell, f->ncomp));
-  if (out->precise) {
-    PetscCall(SbH5WriteSlice(&fr->h5, group, f->name, f->unit, order, f->ncomp, H5T_IEEE_F64LE,
-                             H5T_NATIVE_DOUBLE, fr->slice));
-  } else {
-    float *packed = (float *)fr->packed;
-
-    for (PetscInt i = 0; i < n; i++) packed[i] = (float)fr->slice[i];
-    PetscCall(SbH5WriteSlice(&fr->h5, group, f->name, f->unit, order, f->ncomp, H5T_IEEE_F32LE,
-                             H5T_NATIVE_FLOAT, packed));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return (SbIndexValues){f->name, (int)f->ncomp, (int)bytes, PETSC_FALSE, f->cell};
 }
 
 /* Writes the index files for viewers, with all frames so far. Rank 0. */
@@ -315,17 +256,18 @@ static void write_indices(SbOutput out, PetscBool last, char message[SB_MESSAGE_
 static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
 {
   SbFrames fr = out->frames;
-  const SbField *field[SB_FIELD_MAX];
-  PetscInt bytes[SB_FIELD_MAX], n = 0;
+  SbIndexValues values[SB_FIELD_MAX];
+  PetscInt n = 0, npoint;
   PetscInt64 room;
   char path[48], message[SB_MESSAGE_MAX] = "", name[16], hundred[16];
-  /* along an arc length the load factor may fall, while viewers expect times that rise: the step is the time */
+  /* along an arc length the load factor may fall, viewers expect times that rise: the step is the time */
   const PetscReal time = run->path ? (PetscReal)step->step : step->t;
+  PetscBool full;
   hid_t group;
 
   PetscFunctionBeginUser;
   /* reserve disk space for the frame and its metadata: a full disk is an error before anything is written */
-  PetscCall(SbContactsFind(run, out, step, &room));
+  PetscCall(SbContactsFind(run, out, step, &npoint, &room));
   room += 65536 + 8192 * out->nfield;
   for (PetscInt i = 0; i < out->nfield; i++)
     room += (PetscInt64)(out->field[i]->cell ? out->tet.N : out->point.N) * out->field[i]->ncomp *
@@ -342,41 +284,42 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   /* the fields, and the points of contact */
   out->state_valid = PETSC_FALSE;
   for (PetscInt i = 0; i < out->nfield; i++) {
-    if (out->field[i]->constant) continue;
+    const SbField *f = out->field[i];
+
+    if (f->constant) continue;
+    values[n++] = values_of(f, out->precise ? 8 : 4);
     PetscCall(PetscLogEventBegin(out->field_event[i], 0, 0, 0, 0));
-    PetscCall(write_field(run, out, step, out->field[i], group));
+    PetscCall(f->compute(f, run, step, fr->owned));
+    PetscCall(
+      put(out, group, f->name, f->unit, f->cell, f->ncomp, out->precise ? H5T_IEEE_F64LE : H5T_IEEE_F32LE));
     PetscCall(PetscLogEventEnd(out->field_event[i], 0, 0, 0, 0));
-    bytes[n] = out->precise ? 8 : 4;
-    field[n++] = out->field[i];
   }
   PetscCall(SbContactsWrite(out, &fr->h5, group));
 
   /* the frame gets its name, and then its entry in the index */
   (void)snprintf(name, sizeof(name), "%06" PetscInt_FMT, step->step);
-  if (fr->node >= 0 && fr->nlink < SB_H5_NODE_LINKS) {
-    /* all data on disk before the link */
-    PetscCall(SbH5Flush(&fr->h5));
-    PetscCall(SbH5GroupLink(&fr->h5, group, fr->node, name));
-    (void)snprintf(hundred, sizeof(hundred), "%04" PetscInt_FMT, fr->nnode - 1);
-  } else {
+  full = (PetscBool)(fr->node < 0 || fr->nlink == SB_H5_NODE_LINKS);
+  if (full) {
     if (fr->node >= 0) (void)H5Gclose(fr->node);
     PetscCall(SbH5GroupCreate(&fr->h5, SB_H5_NODE_LINKS, 6, &fr->node));
     PetscCall(SbH5GroupLink(&fr->h5, group, fr->node, name));
-    PetscCall(SbH5Flush(&fr->h5));
-    (void)snprintf(hundred, sizeof(hundred), "%04" PetscInt_FMT, fr->nnode);
-    PetscCall(SbH5GroupLink(&fr->h5, fr->node, fr->top, hundred));
     fr->nnode++;
     fr->nlink = 0;
   }
+  (void)snprintf(hundred, sizeof(hundred), "%04" PetscInt_FMT, fr->nnode - 1);
+  PetscCall(SbH5Flush(&fr->h5)); /* all data on disk before the link */
+  if (full)
+    PetscCall(SbH5GroupLink(&fr->h5, fr->node, fr->top, hundred));
+  else
+    PetscCall(SbH5GroupLink(&fr->h5, group, fr->node, name));
   PetscCall(SbH5Flush(&fr->h5));
   fr->nlink++;
   (void)snprintf(path, sizeof(path), "/step/%s/%s", hundred, name);
   (void)H5Gclose(group);
   fr->last_step = step->step;
-  fr->nframe++;
   if (fr->index) {
-    PetscCall(SbIndexAdd(fr->index, time, path, n, field, bytes));
-    PetscCall(SbContactsList(out, time, path, SbContactsCount(out), out->precise ? 8 : 4));
+    PetscCall(SbIndexAdd(fr->index, time, path, 0, n, values));
+    PetscCall(SbContactsList(out, time, path, npoint, out->precise ? 8 : 4));
     write_indices(out, step->last, message);
   }
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
@@ -386,16 +329,12 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
 static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
   SbOutput out = (SbOutput)ctx;
-  const PetscBool first = (PetscBool)(step->step == run->step0);
-  PetscBool due;
 
   PetscFunctionBeginUser;
   /* frames at intervals of time or of steps, at the start and at the end */
-  if (out->every > 0.)
-    due = SbOutputDue(out->every, step->t, step->dt);
-  else
-    due = (PetscBool)(step->step % out->every_steps == 0);
-  if (!first && !due && !step->last) PetscFunctionReturn(PETSC_SUCCESS);
+  if (step->step != run->step0 && !step->last &&
+      (out->every > 0. ? !SbOutputDue(out->every, step->t, step->dt) : step->step % out->every_steps))
+    PetscFunctionReturn(PETSC_SUCCESS);
   /* after a restart the first frame may be in the file */
   if (out->frames->last_step >= step->step) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogStagePush(SbLogStageOutput));
@@ -411,88 +350,46 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 
 /* ------------------------------------------------------------------ restart */
 
-/* Step, time and fields of the frame `name` in an open hundred; ok is false when it is not one of ours. */
-static PetscErrorCode read_frame(hid_t hundred, const char *name, SbFrame *frame, PetscBool *ok)
+typedef struct {
+  PetscInt n, size, nhundred;
+  SbFrame *frame; /* [n] */
+  PetscErrorCode ierr;
+} List;
+
+/* Adds a frame, with its fields: a group in that of a hundred. */
+static herr_t list_frame(hid_t top, const char *name, const H5L_info_t *info, void *ctx)
 {
-  const hid_t group = SbH5OpenGroup(hundred, name);
+  List *l = (List *)ctx;
+  const char *slash = strchr(name, '/');
+  const hid_t group = slash && !strchr(slash + 1, '/') ? H5Gopen2(top, name, H5P_DEFAULT) : -1;
   int64_t step = 0, mesh = 0;
-  PetscBool other = PETSC_TRUE;
+  PetscBool ok = PETSC_TRUE, other = PETSC_TRUE;
   PetscInt n;
   const SbField *fields = SbFieldGetAll(&n);
+  SbFrame *frame;
 
-  PetscFunctionBeginUser;
-  *ok = (PetscBool)(group >= 0);
-  if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
-  SbH5GetInt(group, "step", &step, ok);
-  SbH5GetReal(group, "time", &frame->time, ok);
+  (void)info;
+  l->nhundred += !slash;
+  if (group < 0) return 0;
+  l->ierr = SbReserve(l->n + 1, sizeof(*l->frame), &l->size, &l->frame);
+  if (l->ierr) return -1;
+  frame = &l->frame[l->n];
+  SbH5GetInt(group, "step", &step, &ok);
+  SbH5GetReal(group, "time", &frame->time, &ok);
   SbH5GetInt(group, "mesh", &mesh, &other);
+  SbFormat(sizeof(frame->group), frame->group, "/step/%s", name);
   frame->step = (PetscInt)step;
-  frame->mesh = other ? (PetscInt)mesh : 0;
-  frame->nfield = 0;
+  frame->mesh = (PetscInt)mesh;
+  frame->n = 0;
   for (PetscInt i = 0; i < n; i++) {
     const PetscInt bytes = SbH5NumberBytes(group, fields[i].name);
 
-    if (!bytes) continue;
-    frame->field[frame->nfield] = &fields[i];
-    frame->bytes[frame->nfield++] = bytes;
+    if (bytes) frame->values[frame->n++] = values_of(&fields[i], bytes);
   }
   SbContactsRead(group, &frame->npoint, &frame->point_bytes);
   (void)H5Gclose(group);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscInt count_links(hid_t group)
-{
-  H5G_info_t info;
-
-  return H5Gget_info(group, &info) < 0 ? 0 : (PetscInt)info.nlinks;
-}
-
-static PetscBool link_name(hid_t group, PetscInt i, size_t size, char name[])
-{
-  return (PetscBool)(H5Lget_name_by_idx(group, ".", H5_INDEX_NAME, H5_ITER_INC, (hsize_t)i, name, size,
-                                        H5P_DEFAULT) > 0);
-}
-
-/* Visits every frame of the file: those up to step0 are counted and put into `frames`; without it later ones are removed. */
-static PetscErrorCode scan(SbFrames fr, PetscInt step0, SbFrame **frames)
-{
-  PetscInt size = 0;
-
-  PetscFunctionBeginUser;
-  fr->nframe = 0;
-  fr->nnode = count_links(fr->top);
-  for (PetscInt h = 0; h < fr->nnode; h++) {
-    char name[16], frame[16];
-    const hid_t hundred =
-      link_name(fr->top, h, sizeof(name), name) ? H5Gopen2(fr->top, name, H5P_DEFAULT) : -1;
-
-    /* backwards: removing a link moves those after it */
-    for (PetscInt i = hundred < 0 ? -1 : count_links(hundred) - 1; i >= 0; i--) {
-      PetscBool ok;
-      SbFrame found;
-
-      if (!link_name(hundred, i, sizeof(frame), frame)) continue;
-      PetscCall(read_frame(hundred, frame, &found, &ok));
-      if (ok && found.step <= step0) {
-        (void)snprintf(found.group, sizeof(found.group), "/step/%s/%s", name, frame);
-        if (frames) PetscCall(SbReserve(fr->nframe + 1, sizeof(found), &size, frames));
-        if (frames) (*frames)[fr->nframe] = found;
-        fr->nframe++;
-      } else if (ok && !frames) {
-        (void)H5Ldelete(hundred, frame, H5P_DEFAULT);
-      }
-    }
-    if (hundred >= 0) (void)H5Gclose(hundred);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static int by_step(const void *a, const void *b)
-{
-  const PetscInt p = ((const SbFrame *)a)->step, q = ((const SbFrame *)b)->step;
-
-  return (p > q) - (p < q);
+  l->n += ok;
+  return 0;
 }
 
 /* Whether an open file of frames has this run's mesh as that of a step. */
@@ -500,11 +397,9 @@ static PetscBool has_mesh(SbOutput out, hid_t file, PetscInt step)
 {
   PetscBool ok = PETSC_TRUE;
   int64_t hash = 0;
-  char name[32];
-  hid_t mesh;
+  char name[SB_MESH_NAME];
+  const hid_t mesh = SbH5OpenGroup(file, SbOutputMeshName(step, name));
 
-  mesh_name(step, sizeof(name), name);
-  mesh = SbH5OpenGroup(file, name);
   if (mesh < 0) return PETSC_FALSE;
   SbH5GetInt(mesh, "hash", &hash, &ok);
   (void)H5Gclose(mesh);
@@ -522,22 +417,12 @@ static PetscInt find_mesh(SbRun run, SbOutput out, hid_t file, PetscBool *ok)
   return 0;
 }
 
-/* Entries of the index that follow refer to this mesh of the file. Rank 0. */
-static PetscErrorCode index_mesh(SbFrames fr, PetscInt step)
-{
-  char name[32];
-
-  PetscFunctionBeginUser;
-  mesh_name(step, sizeof(name), name);
-  PetscCall(SbIndexSetMesh(fr->index, fr->h5.file, name));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Opens the file of the run that is continued; ok is false when there is none, or one of another mesh. */
 static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBool *ok)
 {
   SbFrames fr = out->frames;
-  SbFrame *frames = NULL;
+  List list = {0};
+  PetscInt n = 0;
   char message[SB_MESSAGE_MAX] = "";
 
   PetscFunctionBeginUser;
@@ -545,34 +430,36 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
   PetscCall(SbH5Open(out->comm, path, PETSC_TRUE, &fr->h5, ok));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
   fr->mesh = find_mesh(run, out, fr->h5.file, ok);
-  fr->top = SbH5OpenGroup(fr->h5.file, "step");
-  if (!*ok || fr->top < 0) {
-    *ok = PETSC_FALSE;
-    if (fr->top >= 0) (void)H5Gclose(fr->top);
+  if (*ok) fr->top = SbH5OpenGroup(fr->h5.file, "step");
+  *ok = (PetscBool)(fr->top >= 0);
+  if (!*ok) {
     PetscCall(SbH5Close(&fr->h5));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
-  /* its frames up to the restart, by step */
-  PetscCall(scan(fr, run->step0, &frames));
-  if (fr->nframe) qsort(frames, (size_t)fr->nframe, sizeof(*frames), by_step);
-  if (fr->nframe) fr->last_step = frames[fr->nframe - 1].step;
+  /* its frames; the index has those up to the restart, so that it never lists a frame that is removed */
+  (void)H5Lvisit(fr->top, H5_INDEX_NAME, H5_ITER_INC, list_frame, &list);
+  PetscCall(list.ierr);
+  PetscCall(SbSortByKeys(list.n, sizeof(SbFrame), 1, list.frame));
+  fr->nnode = list.nhundred;
+  for (; n < list.n && list.frame[n].step <= run->step0; n++) {
+    const SbFrame *f = &list.frame[n];
 
-  /* the index first, so that it never lists a frame that is removed */
-  for (PetscInt i = 0; fr->index && i < fr->nframe; i++) {
-    if (!i || frames[i].mesh != frames[i - 1].mesh) PetscCall(index_mesh(fr, frames[i].mesh));
-    PetscCall(SbIndexAdd(fr->index, frames[i].time, frames[i].group, frames[i].nfield, frames[i].field,
-                         frames[i].bytes));
-    PetscCall(SbContactsList(out, frames[i].time, frames[i].group, frames[i].npoint, frames[i].point_bytes));
+    fr->last_step = f->step;
+    if (!fr->index) continue;
+    if (!n || f->mesh != f[-1].mesh) PetscCall(SbIndexSetMesh(fr->index, fr->h5.file, f->mesh));
+    PetscCall(SbIndexAdd(fr->index, f->time, f->group, 0, f->n, f->values));
+    PetscCall(SbContactsList(out, f->time, f->group, f->npoint, f->point_bytes));
   }
-  if (fr->index && (!fr->nframe || frames[fr->nframe - 1].mesh != fr->mesh))
-    PetscCall(index_mesh(fr, fr->mesh));
-  if (fr->index) write_indices(out, PETSC_TRUE, message);
-  PetscCall(PetscFree(frames));
+  if (fr->index) {
+    if (!n || list.frame[n - 1].mesh != fr->mesh) PetscCall(SbIndexSetMesh(fr->index, fr->h5.file, fr->mesh));
+    write_indices(out, PETSC_TRUE, message);
+  }
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
 
   /* then later frames are removed */
-  PetscCall(scan(fr, run->step0, NULL));
+  for (; n < list.n; n++) (void)H5Ldelete(fr->h5.file, list.frame[n].group, H5P_DEFAULT);
+  PetscCall(PetscFree(list.frame));
   PetscCall(SbH5Flush(&fr->h5));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -623,74 +510,52 @@ static PetscErrorCode allocate(SbRun run, SbOutput out)
   wide = PetscMax(wide, most);
   nowned = PetscMax(3 * out->point.nowned, wide * out->cell.nowned);
   nslice = PetscMax(PetscMax(3 * out->point.n, wide * out->cell.n), most * out->tet.n);
-  PetscCall(PetscMalloc1(nowned, &fr->owned));
-  PetscCall(PetscMalloc1(nslice, &fr->slice));
-  if (!out->precise) PetscCall(PetscMalloc((size_t)nslice * sizeof(float), &fr->packed));
+  PetscCall(PetscFree2(fr->owned, fr->slice));
+  PetscCall(PetscMalloc2(nowned, &fr->owned, nslice, &fr->slice));
   for (PetscInt i = 0; i < out->nfield; i++) PetscCall(SbFieldPrepare(run, out, out->field[i]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode free_work(SbFrames fr)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree(fr->owned));
-  PetscCall(PetscFree(fr->slice));
-  PetscCall(PetscFree(fr->packed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
 {
   char path[PETSC_MAX_PATH_LEN];
-  PetscBool resumed = PETSC_FALSE;
+  SbFrames fr = out->frames;
+  PetscBool has; /* the file has the mesh */
 
   PetscFunctionBeginUser;
   if (!out->nfield) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscNew(&out->frames));
-  out->frames->h5.file = -1;
-  out->frames->top = -1;
-  out->frames->node = -1;
-  out->frames->last_step = -1;
   PetscCall(SbOutputOrder(run, out));
-  PetscCall(allocate(run, out));
+  has = (PetscBool)(fr && has_mesh(out, fr->h5.file, fr->mesh));
+  if (fr && !has) fr->mesh = run->step0; /* beside the earlier ones */
 
-  /* the index for viewers, on rank 0 */
-  if (!out->rank) PetscCall(SbIndexCreate(out, "fields", NULL, &out->frames->index));
-  PetscCall(SbContactsCreate(run, out));
-  PetscCall(SbOutputPath(out, "fields.h5", sizeof(path), path));
-  if (out->restarted) PetscCall(resume(run, out, path, &resumed));
-
-  /* else a new file with the mesh, without an index until it has a frame */
-  if (!resumed) {
-    SbFrames fr = out->frames;
-
-    if (fr->index) SbIndexRemove(fr->index);
-    if (out->contact_index) SbIndexRemove(out->contact_index);
-    PetscCall(SbH5Create(out->comm, path, &fr->h5));
-    PetscCall(SbH5PutText(&fr->h5, fr->h5.file, "program", "supple " SB_VERSION));
-    PetscCall(write_mesh(run, out));
-    PetscCall(SbH5GroupCreate(&fr->h5, SB_H5_NODE_LINKS, 4, &fr->top));
-    PetscCall(SbH5GroupLink(&fr->h5, fr->top, fr->h5.file, "step"));
-    PetscCall(SbH5Flush(&fr->h5));
-    if (fr->index) PetscCall(index_mesh(fr, fr->mesh));
+  /* the index, on rank 0; a file that is continued, or a new one without an index until it has a frame */
+  if (!fr) {
+    PetscCall(PetscNew(&fr));
+    *fr = (struct _p_SbFrames){.h5.file = -1, .top = -1, .node = -1, .last_step = -1};
+    out->frames = fr;
+    if (!out->rank) PetscCall(SbIndexCreate(out, "fields", NULL, &fr->index));
+    PetscCall(SbContactsCreate(run, out));
+    PetscCall(SbOutputPath(out, "fields.h5", sizeof(path), path));
+    if (out->restarted) PetscCall(resume(run, out, path, &has));
+    if (!has) {
+      if (fr->index) SbIndexRemove(fr->index);
+      if (out->contact_index) SbIndexRemove(out->contact_index);
+      PetscCall(SbH5Create(out->comm, path, &fr->h5));
+      PetscCall(SbH5PutText(&fr->h5, fr->h5.file, "program", "supple " SB_VERSION));
+    }
   }
-  PetscCall(SbRunAddMonitor(run, monitor, out));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
-PetscErrorCode SbFramesReattach(SbRun run, SbOutput out)
-{
-  PetscFunctionBeginUser;
-  if (!out->frames) PetscFunctionReturn(PETSC_SUCCESS);
-  /* work arrays and monitor for the new mesh, which is written beside the earlier ones */
-  PetscCall(free_work(out->frames));
+  /* work arrays and monitor for the mesh, which is written if it is new */
   PetscCall(allocate(run, out));
   if (out->contact_points) run->want_residual = PETSC_TRUE;
-  if (!has_mesh(out, out->frames->h5.file, out->frames->mesh)) {
-    out->frames->mesh = run->step0;
+  if (!has) {
     PetscCall(write_mesh(run, out));
-    PetscCall(SbH5Flush(&out->frames->h5));
-    if (out->frames->index) PetscCall(index_mesh(out->frames, out->frames->mesh));
+    if (fr->top < 0) {
+      PetscCall(SbH5GroupCreate(&fr->h5, SB_H5_NODE_LINKS, 4, &fr->top));
+      PetscCall(SbH5GroupLink(&fr->h5, fr->top, fr->h5.file, "step"));
+    }
+    PetscCall(SbH5Flush(&fr->h5));
+    if (fr->index) PetscCall(SbIndexSetMesh(fr->index, fr->h5.file, fr->mesh));
   }
   PetscCall(SbRunAddMonitor(run, monitor, out));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -715,7 +580,7 @@ PetscErrorCode SbFramesDestroy(SbOutput out)
   PetscCall(SbFramesClose(out));
   PetscCall(SbContactsDestroy(out));
   PetscCall(SbIndexDestroy(&out->frames->index));
-  PetscCall(free_work(out->frames));
+  PetscCall(PetscFree2(out->frames->owned, out->frames->slice));
   PetscCall(PetscFree(out->frames));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -3,23 +3,23 @@
 
   HDF5 changes its metadata in place, and half-written metadata is unreadable. Here all metadata that leads to
   completed frames is changed by single writes:
-  - A frame is written as a group without a name: new objects at new positions, to which nothing points yet. It is flushed,
-    all ranks meet, and only then does it get its name in the group of its hundred.
-  - Such a group keeps its links in its own object header, in the old format (no checksum), with room for all of them from
-    the start: at most 4096 bytes, aligned to 4096 bytes. Naming a frame is one write within one page.
-  - The superblock (96 bytes) is one write within one page, too. It says where the file ends, and a file that ends earlier
-    counts as truncated: SbFileReserve() makes the file longer than a frame will need before the frame begins.
+  - A frame is written as a group without a name: new objects at new positions, to which nothing points yet.
+    It is flushed, all ranks meet, and only then does it get its name in the group of its hundred.
+  - Such a group keeps its links in its own object header, in the old format (no checksum), with room for all
+    of them from the start: at most 4096 bytes, aligned to 4096 bytes. Naming a frame is one write in a page.
+  - The superblock (96 bytes) is one write within one page, too. It says where the file ends, and a file that
+    ends earlier counts as truncated: SbFileReserve() makes it longer than a frame needs before the frame.
 
-  Reference: HDF5 File Format Specification Version 3.0, sections II.A (superblock version 0), IV.A.1.a (object header
-  version 1), IV.A.2.g (link message). The old format is asked for explicitly; newer ones would write checksums and flags
-  that mark the file as being in use.
+  Reference: HDF5 File Format Specification Version 3.0, sections II.A (superblock version 0), IV.A.1.a
+  (object header version 1), IV.A.2.g (link message). The old format is asked for explicitly; newer ones would
+  write checksums and flags that mark the file as being in use.
 */
 #include <unistd.h>
 #include "output_impl.h"
 
 /*
-  After a failed write HDF5 1.10 cannot be closed: it frees the file, keeps its identifier, and crashes when MPI_Finalize()
-  makes it end. The error has been reported by then; the remainder of the program's end is skipped.
+  After a failed write HDF5 1.10 cannot be closed: it frees the file, keeps its identifier, and crashes when
+  MPI_Finalize() makes it end. The error has been reported; the remainder of the program's end is skipped.
 */
 static int leave_at_once(MPI_Comm comm, int key, void *attribute, void *state)
 {
@@ -60,7 +60,7 @@ static PetscErrorCode agree(SbH5 *h)
   if (ierr) {
     int key;
 
-    // Skip HDF5's own cleanup at exit: attributes of MPI_COMM_SELF are deleted first by MPI_Finalize(), the newest before its own.
+    // skip HDF5's cleanup at exit: MPI_Finalize() first deletes attributes of MPI_COMM_SELF, new ones first
     if (!h->failed && !MPI_Comm_create_keyval(MPI_COMM_NULL_COPY_FN, leave_at_once, &key, NULL)) {
       h->failed = PETSC_TRUE;
       (void)MPI_Comm_set_attr(MPI_COMM_SELF, key, NULL);
@@ -79,52 +79,40 @@ static PetscErrorCode agree(SbH5 *h)
     }                      \
   } while (0)
 
-/* Initialises h and the access properties of a file. */
-static PetscErrorCode begin(MPI_Comm comm, const char *path, SbH5 *h, hid_t *list)
+/* Opens a file, or creates it; h->file is negative when that fails. */
+static PetscErrorCode open_file(MPI_Comm comm, const char *path, unsigned flags, SbH5 *h)
 {
+  const hid_t list = H5Pcreate(H5P_FILE_ACCESS);
+
   PetscFunctionBeginUser;
-  h->comm = comm;
-  h->bytes = 0;
-  h->failed = PETSC_FALSE;
-  h->reason[0] = 0;
+  *h = (SbH5){.comm = comm};
   PetscCall(PetscStrncpy(h->path, path, sizeof(h->path)));
-  *list = H5Pcreate(H5P_FILE_ACCESS);
   // Errors become one line of ours; HDF5 prints its whole stack otherwise.
   (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
-  (void)H5Pset_fapl_mpio(*list, comm, MPI_INFO_NULL);
-  (void)H5Pset_alignment(*list, 3000, 4096);
-  (void)H5Pset_libver_bounds(*list, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18);
+  (void)H5Pset_fapl_mpio(list, comm, MPI_INFO_NULL);
+  (void)H5Pset_alignment(list, 3000, 4096);
+  (void)H5Pset_libver_bounds(list, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18);
+  h->file = flags == H5F_ACC_TRUNC ? H5Fcreate(path, flags, H5P_DEFAULT, list) : H5Fopen(path, flags, list);
+  (void)H5Pclose(list);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbH5Create(MPI_Comm comm, const char *path, SbH5 *h)
 {
-  hid_t list;
-
   PetscFunctionBeginUser;
-  PetscCall(begin(comm, path, h, &list));
-  h->file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, list);
-  (void)H5Pclose(list);
+  PetscCall(open_file(comm, path, H5F_ACC_TRUNC, h));
   H5_CALL(h, h->file);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH5 *h, PetscBool *ok)
 {
-  PetscMPIInt here, everywhere;
-  hid_t list;
-
   PetscFunctionBeginUser;
-  PetscCall(begin(comm, path, h, &list));
-  h->file = H5Fopen(path, writable ? H5F_ACC_RDWR : H5F_ACC_RDONLY, list);
-  (void)H5Pclose(list);
-  here = h->file >= 0;
-  PetscCallMPI(MPI_Allreduce(&here, &everywhere, 1, MPI_INT, MPI_MIN, comm));
-  *ok = everywhere ? PETSC_TRUE : PETSC_FALSE;
-  if (!everywhere) {
-    if (here) (void)H5Fclose(h->file);
-    h->file = -1;
-  }
+  PetscCall(open_file(comm, path, writable ? H5F_ACC_RDWR : H5F_ACC_RDONLY, h));
+  *ok = (PetscBool)(h->file >= 0);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, comm));
+  if (!*ok && h->file >= 0) (void)H5Fclose(h->file);
+  if (!*ok) h->file = -1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -213,8 +201,17 @@ static hid_t collective_list(void)
   return list;
 }
 
+hid_t SbH5TypeInMemory(hid_t type)
+{
+  return type == H5T_STD_I64LE    ? (sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32)
+         : type == H5T_STD_I32LE  ? H5T_NATIVE_INT32
+         : type == H5T_STD_U64LE  ? H5T_NATIVE_UINT64
+         : type == H5T_IEEE_F64LE ? H5T_NATIVE_DOUBLE
+                                  : H5T_NATIVE_FLOAT;
+}
+
 PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char *unit, const SbOrder *order,
-                              PetscInt ncomp, hid_t filetype, hid_t memtype, const void *slice)
+                              PetscInt ncomp, hid_t type, const void *slice)
 {
   const hid_t create = H5Pcreate(H5P_DATASET_CREATE), transfer = collective_list();
   hid_t filespace, memspace, dataset;
@@ -224,10 +221,10 @@ PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char
   (void)H5Pset_alloc_time(create, H5D_ALLOC_TIME_EARLY);
   (void)H5Pset_obj_track_times(create, 0); // the same run writes the same bytes
   select_slice(order, ncomp, &filespace, &memspace);
-  dataset = H5Dcreate2(where, name, filetype, filespace, H5P_DEFAULT, create, H5P_DEFAULT);
+  dataset = H5Dcreate2(where, name, type, filespace, H5P_DEFAULT, create, H5P_DEFAULT);
   H5_CALL(h, dataset);
   PetscCall(SbH5PutText(h, dataset, "unit", unit));
-  note(h, (PetscBool)(H5Dwrite(dataset, memtype, memspace, filespace, transfer, slice) < 0));
+  note(h, (PetscBool)(H5Dwrite(dataset, SbH5TypeInMemory(type), memspace, filespace, transfer, slice) < 0));
   (void)H5Dclose(dataset);
   (void)H5Sclose(filespace);
   (void)H5Sclose(memspace);
@@ -279,7 +276,8 @@ PetscBool SbH5Read(hid_t where, const char *name, hid_t type, PetscInt rows, Pet
   const hid_t dataset = open_dataset(where, name, n);
   PetscBool ok = (PetscBool)(dataset >= 0 && n[0] == (hsize_t)rows && n[1] == (hsize_t)ncomp);
 
-  if (ok) ok = (PetscBool)(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0);
+  if (ok)
+    ok = (PetscBool)(H5Dread(dataset, SbH5TypeInMemory(type), H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0);
   if (dataset >= 0) (void)H5Dclose(dataset);
   return ok;
 }
@@ -289,24 +287,22 @@ PetscErrorCode SbH5ReadSlice(SbH5 *h, const char *name, const SbOrder *order, Pe
 {
   hsize_t n[2];
   const hid_t dataset = open_dataset(h->file, name, n);
-  PetscMPIInt here, everywhere;
 
   PetscFunctionBeginUser;
-  here = dataset >= 0 && n[0] == (hsize_t)order->N && n[1] == (hsize_t)ncomp;
-  PetscCallMPI(MPI_Allreduce(&here, &everywhere, 1, MPI_INT, MPI_MIN, h->comm));
-  if (everywhere) {
+  *ok = (PetscBool)(dataset >= 0 && n[0] == (hsize_t)order->N && n[1] == (hsize_t)ncomp);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, h->comm));
+  if (*ok) {
     const hid_t transfer = collective_list();
     hid_t filespace, memspace;
 
     select_slice(order, ncomp, &filespace, &memspace);
-    here = H5Dread(dataset, H5T_NATIVE_DOUBLE, memspace, filespace, transfer, slice) >= 0;
+    *ok = (PetscBool)(H5Dread(dataset, H5T_NATIVE_DOUBLE, memspace, filespace, transfer, slice) >= 0);
     (void)H5Sclose(filespace);
     (void)H5Sclose(memspace);
     (void)H5Pclose(transfer);
-    PetscCallMPI(MPI_Allreduce(&here, &everywhere, 1, MPI_INT, MPI_MIN, h->comm));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, h->comm));
   }
   if (dataset >= 0) (void)H5Dclose(dataset);
-  *ok = everywhere ? PETSC_TRUE : PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -402,7 +398,7 @@ PetscErrorCode SbH5WriteText(SbH5 *h, hid_t where, const char *name, const char 
 PetscErrorCode SbH5ReadText(SbH5 *h, const char *name, char **text, PetscBool *ok)
 {
   const hid_t dataset = H5Dopen2(h->file, name, H5P_DEFAULT);
-  PetscMPIInt here = 0, everywhere;
+  PetscBool good = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   *text = NULL;
@@ -411,15 +407,13 @@ PetscErrorCode SbH5ReadText(SbH5 *h, const char *name, char **text, PetscBool *o
 
     if (H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) <= 0) {
       PetscCall(PetscCalloc1(H5Tget_size(type) + 1, text));
-      here = H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, *text) >= 0;
+      good = (PetscBool)(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, *text) >= 0);
     }
     (void)H5Tclose(type);
     (void)H5Dclose(dataset);
   }
-  PetscCallMPI(MPI_Allreduce(&here, &everywhere, 1, MPI_INT, MPI_MIN, h->comm));
-  if (!everywhere) {
-    PetscCall(PetscFree(*text));
-    *ok = PETSC_FALSE;
-  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &good, 1, SB_MPI_BOOL, MPI_LAND, h->comm));
+  if (!good) PetscCall(PetscFree(*text));
+  if (!good) *ok = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

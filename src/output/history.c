@@ -1,12 +1,11 @@
 /*
   history.csv: one row of scalars per step, each written to the file at once and by one call.
 
-  First line: names. Second line: units behind a '#', so that pandas and numpy skip it with comment='#'. Numbers have 17
-  digits: what is read back is what was computed. `total` is kinetic + strain - load_work - prescribed_work, constant
-  as long as nothing is dissipated.
+  First line: names. Second line: units behind a '#', so that pandas and numpy skip it with comment='#'.
+  Numbers have 17 digits: what is read back is what was computed. `total` is kinetic + strain - load_work -
+  prescribed_work, constant as long as nothing is dissipated.
 
-  One reduction per row sums the values of effects, probes and bodies, and a flag that the row before could not be
-  written. Such a row is removed.
+  One reduction per row sums values of effects, probes and bodies, and a flag that the row before failed.
 */
 #include <errno.h>
 #include <fcntl.h>
@@ -23,11 +22,10 @@ struct _p_SbHistory {
   FILE *text; /* rank 0: in memory, a row or the header, row[size] */
   char *row;
   size_t size;
-  PetscInt last_step; /* of the last row in the file, or -1 */
-  PetscInt nprobe;    /* columns of probes */
-  PetscInt nextra;    /* columns of effects, probes and bodies */
-  PetscReal (
-    *mass)[4]; /* [nbody] centre at rest, m, and mass, kg, of each body; NULL without columns of bodies */
+  PetscInt last_step;    /* of the last row in the file, or -1 */
+  PetscInt nprobe;       /* columns of probes */
+  PetscInt nextra;       /* columns of effects, probes and bodies */
+  PetscReal (*mass)[4];  /* [nbody] centre at rest, m, and mass, kg, for columns of bodies */
   PetscReal *mine, *sum; /* [nextra + 1] values of this rank, sums of all; the last: the row before failed */
   char message[SB_MESSAGE_MAX]; /* why it failed; empty when it did not */
 };
@@ -147,16 +145,12 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
 static PetscErrorCode effect_columns(SbRun run, const SbStep *step, PetscReal *values)
 {
   SbModel model = run->model;
-  SbStage stage;
+  SbStage stage = {.t = step->t, .dt = step->dt, .step = step->step};
   const PetscReal *residual;
 
   PetscFunctionBeginUser;
   PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
              "The residual was asked for but not given to the monitors");
-  PetscCall(PetscMemzero(&stage, sizeof(stage)));
-  stage.t = step->t;
-  stage.dt = step->dt;
-  stage.step = step->step;
   PetscCall(SbSpaceGetLocalRead(model->space, step->U, &stage.u));
   if (step->V) PetscCall(SbSpaceGetLocalRead(model->space, step->V, &stage.v));
   if (step->A) PetscCall(SbSpaceGetLocalRead(model->space, step->A, &stage.a));
@@ -191,13 +185,14 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
   SbOutput out = (SbOutput)ctx;
   SbHistory h = out->hist;
-  const PetscBool first = (PetscBool)(step->step == run->step0);
   const PetscInt nbody = out->history_bodies ? run->model->nbody : 0;
+  PetscReal *of_bodies = h->mine + h->nextra - nbody * SB_BODY_SUMS; /* behind effects and probes */
   PetscMPIInt n;
 
   PetscFunctionBeginUser;
-  if (!first && !step->last && step->step % out->history_every) PetscFunctionReturn(PETSC_SUCCESS);
-  if (h->last_step >= step->step) PetscFunctionReturn(PETSC_SUCCESS);
+  if (h->last_step >= step->step ||
+      (step->step != run->step0 && !step->last && step->step % out->history_every))
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
   PetscCall(PetscLogEventBegin(out->event.history, 0, 0, 0, 0));
 
@@ -206,12 +201,10 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   if (run->model->nhistory) PetscCall(effect_columns(run, step, h->mine));
   if (out->nprobe) {
     PetscCall(PetscLogEventBegin(out->event.probes, 0, 0, 0, 0));
-    PetscCall(SbProbesAdd(run, out, step, h->mine + h->nextra - nbody * SB_BODY_SUMS - h->nprobe));
+    PetscCall(SbProbesAdd(run, out, step, of_bodies - h->nprobe));
     PetscCall(PetscLogEventEnd(out->event.probes, 0, 0, 0, 0));
   }
-  if (nbody)
-    PetscCall(SbModelBodySums(run->model, step->U, step->V,
-                              (PetscReal(*)[SB_BODY_SUMS])(h->mine + h->nextra - nbody * SB_BODY_SUMS)));
+  if (nbody) PetscCall(SbModelBodySums(run->model, step->U, step->V, (PetscReal(*)[SB_BODY_SUMS])of_bodies));
 
   /* sums of all ranks; the run ends when the row before could not be written */
   h->mine[h->nextra] = h->message[0] ? 1. : 0.;
@@ -225,18 +218,18 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   h->last_step = step->step;
   if (h->fd >= 0) {
     const SbEnergies *e = &step->energies;
+    const PetscReal total = e->kinetic + e->strain - e->load_work - e->prescribed_work;
 
     rewind(h->text);
     for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(columns); k++) {
-      const char *value = (const char *)step + columns[k].from, *comma = k ? "," : "";
+      const void *value =
+        columns[k].kind == TOTAL ? (const char *)&total : (const char *)step + columns[k].from;
 
+      if (k) (void)fputc(',', h->text);
       if (columns[k].kind == COUNT)
-        (void)fprintf(h->text, "%s%" PetscInt_FMT, comma, *(const PetscInt *)value);
-      else if (columns[k].kind == REAL)
-        (void)fprintf(h->text, "%s%.17g", comma, (double)*(const PetscReal *)value);
+        (void)fprintf(h->text, "%" PetscInt_FMT, *(const PetscInt *)value);
       else
-        (void)fprintf(h->text, ",%.17g",
-                      (double)(e->kinetic + e->strain - e->load_work - e->prescribed_work));
+        (void)fprintf(h->text, "%.17g", (double)*(const PetscReal *)value);
     }
     for (PetscInt k = 0; k < h->nextra; k++) (void)fprintf(h->text, ",%.17g", (double)h->sum[k]);
     for (PetscInt k = 0; k < SbLiveCount(); k++)
@@ -253,7 +246,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ beginning, and going on after a restart */
+/* ------------------------------------------------------------------ beginning, and after a restart */
 
 static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE_MAX])
 {
@@ -267,7 +260,6 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE
   if (out->restarted) {
     char *text, *line, *end;
     size_t size;
-    SbChunk chunk;
 
     // rows up to step0 of a file with the same columns are kept; one without its end was cut off by a kill
     PetscCall(SbFileRead(h->path, &text, &size));
@@ -278,9 +270,7 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE
         if (step > run->step0) break;
         h->last_step = (PetscInt)step;
       }
-      chunk.text = text;
-      chunk.size = (size_t)(line - text);
-      SbFileReplace(h->path, 1, &chunk, message);
+      SbFileReplace(h->path, 1, &(SbChunk){text, (size_t)(line - text)}, message);
       kept = PETSC_TRUE;
     }
     PetscCall(PetscFree(text));
@@ -304,43 +294,35 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From now on rows are those of this run. */
-PetscErrorCode SbHistoryReattach(SbRun run, SbOutput out)
-{
-  PetscFunctionBeginUser;
-  if (!out->hist) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbProbesFind(run, out));
-  if (out->history_bodies) {
-    if (!out->hist->mass) PetscCall(PetscMalloc1(run->model->nbody, &out->hist->mass));
-    PetscCall(SbModelCentres(run->model, NULL, out->hist->mass));
-  }
-  run->want_energies = PETSC_TRUE;
-  if (run->model->nhistory) run->want_residual = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(run, monitor, out));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
 {
   const SbModel model = run->model;
-  SbHistory h;
+  SbHistory h = out->hist;
   char message[SB_MESSAGE_MAX] = "";
 
   PetscFunctionBeginUser;
   if (!out->history) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscNew(&out->hist));
-  h = out->hist;
-  h->fd = -1;
-  h->last_step = -1;
-  for (PetscInt e = 0; e < model->nhistory; e++) h->nextra += model->history[e]->ncolumn;
-  h->nprobe = SbProbesCount(out);
-  h->nextra += h->nprobe + (out->history_bodies ? SB_BODY_SUMS * model->nbody : 0);
-  PetscCall(PetscMalloc2(h->nextra + 1, &h->mine, h->nextra + 1, &h->sum));
-  PetscCall(SbOutputPath(out, "history.csv", sizeof(h->path), h->path));
-  if (!out->rank) PetscCall(open_file(run, out, message));
-  PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
-  PetscCallMPI(MPI_Bcast(&h->last_step, 1, MPIU_INT, 0, out->comm));
-  PetscCall(SbHistoryReattach(run, out));
+  if (!h) {
+    PetscCall(PetscNew(&h));
+    out->hist = h;
+    h->fd = -1;
+    h->last_step = -1;
+    for (PetscInt e = 0; e < model->nhistory; e++) h->nextra += model->history[e]->ncolumn;
+    h->nprobe = SbProbesCount(out);
+    h->nextra += h->nprobe + (out->history_bodies ? SB_BODY_SUMS * model->nbody : 0);
+    PetscCall(PetscMalloc3(h->nextra + 1, &h->mine, h->nextra + 1, &h->sum, model->nbody, &h->mass));
+    PetscCall(SbOutputPath(out, "history.csv", sizeof(h->path), h->path));
+    if (!out->rank) PetscCall(open_file(run, out, message));
+    PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
+    PetscCallMPI(MPI_Bcast(&h->last_step, 1, MPIU_INT, 0, out->comm));
+  }
+
+  /* from now on rows are those of this run */
+  PetscCall(SbProbesFind(run, out));
+  if (out->history_bodies) PetscCall(SbModelCentres(model, NULL, h->mass));
+  run->want_energies = PETSC_TRUE;
+  if (model->nhistory) run->want_residual = PETSC_TRUE;
+  PetscCall(SbRunAddMonitor(run, monitor, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -353,8 +335,7 @@ PetscErrorCode SbHistoryDestroy(SbOutput out)
   if (h->fd >= 0) (void)close(h->fd);
   if (h->text) (void)fclose(h->text);
   free(h->row);
-  PetscCall(PetscFree2(h->mine, h->sum));
-  PetscCall(PetscFree(h->mass));
+  PetscCall(PetscFree3(h->mine, h->sum, h->mass));
   PetscCall(PetscFree(out->hist));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,6 +1,6 @@
 /*
-  The index files of fields.h5 for viewers: fields.xmf and fields.vtkhdf, or contacts.xmf and contacts.vtkhdf. Rank 0 keeps the list;
-  xdmf.c and vtkhdf.c make the files of it.
+  The index files of fields.h5 for viewers: fields.xmf and fields.vtkhdf, or contacts.xmf and contacts.vtkhdf.
+  Rank 0 keeps the list; xdmf.c and vtkhdf.c make the files of it.
 */
 #include <stdlib.h>
 #include <unistd.h>
@@ -80,17 +80,6 @@ static PetscErrorCode add_part(SbIndex x, PetscInt npoint, PetscInt ncell, const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The last part at a time, with the pieces that were added for it. */
-static PetscErrorCode add_frame(SbIndex x, PetscReal time)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbReserve(x->nframe + 1, sizeof(*x->frame), &x->frame_size, &x->frame));
-  x->frame[x->nframe].time = time;
-  x->frame[x->nframe++].part = x->npart - 1;
-  SbXdmfAdd(x);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 typedef struct {
   SbIndex index;
   const char *group;
@@ -114,14 +103,13 @@ static herr_t list_array(hid_t where, const char *name, const H5L_info_t *info, 
   return l->ierr ? -1 : 0;
 }
 
-PetscErrorCode SbIndexSetMesh(SbIndex x, hid_t file, const char *name)
+PetscErrorCode SbIndexSetMesh(SbIndex x, hid_t file, PetscInt step)
 {
-  const hid_t mesh = SbH5OpenGroup(file, name);
-  char group[64];
+  char group[SB_MESH_NAME + 1] = "/";
+  const hid_t mesh = SbH5OpenGroup(file, SbOutputMeshName(step, group + 1));
   List list = {.index = x, .group = group};
 
   PetscFunctionBeginUser;
-  SbFormat(sizeof(group), group, "/%s", name);
   x->corners =
     mesh >= 0 && H5Lexists(mesh, "cells10", H5P_DEFAULT) > 0 && H5Lexists(mesh, "parent", H5P_DEFAULT) <= 0
       ? 10
@@ -133,42 +121,34 @@ PetscErrorCode SbIndexSetMesh(SbIndex x, hid_t file, const char *name)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbIndexAdd(SbIndex x, PetscReal time, const char *group, PetscInt n,
-                          const SbField *const field[], const PetscInt bytes[])
+PetscErrorCode SbIndexAdd(SbIndex x, PetscReal time, const char *group, PetscInt npoint, PetscInt n,
+                          const SbIndexValues values[])
 {
   SbArray points = {.name = "Points", .ncomp = 3, .bytes = 8};
-  PetscBool moved = PETSC_FALSE;
+  const char *where = NULL;
 
   PetscFunctionBeginUser;
+  if (x->points) PetscCall(add_part(x, npoint, npoint, group));
   for (PetscInt i = 0; i < n; i++) {
-    SbArray a = {.ncomp = (int)field[i]->ncomp, .bytes = (int)bytes[i], .cell = field[i]->cell};
+    SbArray a = {
+      .ncomp = values[i].ncomp, .bytes = values[i].bytes, .whole = values[i].whole, .cell = values[i].cell};
 
-    SbFormat(sizeof(a.name), a.name, "%s", field[i]->name);
-    if (!strcmp(a.name, "position")) {
-      points.bytes = (int)bytes[i];
-      moved = PETSC_TRUE;
+    SbFormat(sizeof(a.name), a.name, "%s", values[i].name);
+    if (!strcmp(a.name, x->points ? "x" : "position")) {
+      points.bytes = a.bytes;
+      where = values[i].name;
     } else {
       PetscCall(add_piece(x, &a, x->nframe, group, a.name));
     }
   }
   PetscCall(
-    add_piece(x, &points, x->nframe, moved ? group : x->part[x->npart - 1].group, moved ? "position" : "x"));
-  PetscCall(add_frame(x, time));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+    add_piece(x, &points, x->nframe, where ? group : x->part[x->npart - 1].group, where ? where : "x"));
 
-PetscErrorCode SbIndexAddPoints(SbIndex x, PetscReal time, const char *group, PetscInt n, PetscInt nvalues,
-                                const SbIndexValues values[])
-{
-  PetscFunctionBeginUser;
-  PetscCall(add_part(x, n, n, group));
-  for (PetscInt k = 1; k < nvalues; k++) {
-    SbArray a = {.ncomp = values[k].ncomp, .bytes = values[k].bytes, .whole = values[k].whole};
-
-    SbFormat(sizeof(a.name), a.name, "%s", k == 1 ? "Points" : values[k].name);
-    PetscCall(add_piece(x, &a, x->nframe, group, values[k].name));
-  }
-  PetscCall(add_frame(x, time));
+  /* the last part at a time, with the pieces that were added for it */
+  PetscCall(SbReserve(x->nframe + 1, sizeof(*x->frame), &x->frame_size, &x->frame));
+  x->frame[x->nframe].time = time;
+  x->frame[x->nframe++].part = x->npart - 1;
+  SbXdmfAdd(x);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,7 +1,8 @@
 /*
-  Mesh-dependent data of the output: original orders, numbers of nodes, and a hash of the mesh. They are rebuilt when a body is re-meshed.
+  What depends on the mesh, rebuilt after a re-meshing: original orders, numbers of nodes, a hash of the mesh.
 
-  The hash is a sum of mixed 64-bit words (the finaliser of splitmix64; Steele, Lea and Flood 2014), which does not depend on the order of its entities.
+  The hash is a sum of mixed 64-bit words (the finaliser of splitmix64; Steele, Lea and Flood 2014), which
+  does not depend on the order of its entities.
 */
 #include "output_impl.h"
 
@@ -23,7 +24,7 @@ uint64_t SbMixReal(uint64_t position, PetscReal value)
   return mix(position ^ mix(bits));
 }
 
-/* Points and tets where a body is of P2: edge nodes are points, too, and each cell is eight tets, unless -output_quadratic. */
+/* Points and tets of P2: nodes at edges are points, too; a cell is eight tets, unless -output_quadratic. */
 static PetscErrorCode order_quadratic(SbRun run, SbOutput out)
 {
   const SbMesh mesh = run->model->mesh;
@@ -148,13 +149,11 @@ PetscErrorCode SbOutputCountNodes(SbSpace space, SbOutput out)
 PetscErrorCode SbOutputForgetMesh(SbOutput out)
 {
   PetscFunctionBeginUser;
-  if (out->ordered) {
-    PetscCall(SbOrderDestroy(&out->vertex));
-    PetscCall(SbOrderDestroy(&out->cell));
-    PetscCall(SbOrderDestroy(&out->node));
-    PetscCall(SbOrderDestroy(&out->point));
-    PetscCall(SbOrderDestroy(&out->tet));
-  }
+  PetscCall(SbOrderDestroy(&out->vertex));
+  PetscCall(SbOrderDestroy(&out->cell));
+  PetscCall(SbOrderDestroy(&out->node));
+  PetscCall(SbOrderDestroy(&out->point));
+  PetscCall(SbOrderDestroy(&out->tet));
   out->ordered = PETSC_FALSE;
   PetscCall(PetscFree(out->split));
   PetscCall(PetscFree(out->edge_number));
@@ -178,4 +177,11 @@ PetscInt SbOutputMeshStep(SbRun run)
     if (in_memory) step = PetscMax(step, in_memory->step);
   }
   return step;
+}
+
+const char *SbOutputMeshName(PetscInt step, char name[SB_MESH_NAME])
+{
+  SbFormat(SB_MESH_NAME, name, "mesh");
+  if (step) SbAppend(SB_MESH_NAME, name, "_%06" PetscInt_FMT, step);
+  return name;
 }

@@ -1,11 +1,11 @@
 /*
   Original order: vertices, cells and nodes by their number in the scenario, whatever the partition.
 
-  Rank r of p holds the slice of numbers [N r / p, N (r + 1) / p) (PETSc's usual layout). A star forest connects each owned
-  entity (a leaf) with its position in a slice (a root); it is built once and moves any number of components at once.
+  Rank r of p holds the slice of numbers [N r / p, N (r + 1) / p) (PETSc's usual layout). A star forest
+  connects each owned entity (a leaf) with its position in a slice (a root); for any number of components.
 
-  Numbers of nodes at faces have gaps. They are closed once, when an order is made: every number that is taken marks its
-  position among all possible ones, and counting the marks from the lowest rank on gives the new numbers.
+  Numbers of nodes at faces have gaps. They are closed once, when an order is made: every number that is taken
+  marks its position among all possible ones; the count of marks from the lowest rank on is its new number.
 */
 #include "output_impl.h"
 

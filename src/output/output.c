@@ -13,9 +13,8 @@ static const SbOption rows[] = {
    "before_DATE"},
   {"output_fields", SB_OPTION_NAMES, 1, "", "position,displacement,velocity,von_mises", "",
    "fields in fields.h5: position, displacement, velocity, acceleration, reaction, contact_force, "
-   "contact_gap, stress, "
-   "von_mises, pressure, mean_pressure, J, energy_density, space_error, rank; sets: where the sets and "
-   "groups are that the scenario names; none: no such file"},
+   "contact_gap, stress, von_mises, pressure, mean_pressure, J, energy_density, space_error, rank; sets: "
+   "where the sets and groups are that the scenario names; none: no such file"},
   {"output_every", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "simulated time between frames of fields.h5; 0: by output_every_steps"},
   {"output_every_steps", SB_OPTION_INT, 1, "", "1", "[1, inf)",
@@ -68,30 +67,24 @@ PetscErrorCode SbOutputFile(SbRun run, const char *name, size_t size, char path[
 
 /* ------------------------------------------------------------------ options */
 
-static void add_field(SbOutput out, const SbField *f)
-{
-  for (PetscInt k = 0; k < out->nfield; k++)
-    if (out->field[k] == f) return;
-  out->field[out->nfield++] = f;
-}
-
 /* The fields of -output_fields, without those that a static run lacks; and body. */
-static PetscErrorCode read_fields(SbOutput out, const SbScope *scope, PetscBool dynamic)
+static PetscErrorCode read_fields(SbOutput out, PetscBool dynamic)
 {
   char(*names)[SB_NAME_MAX];
-  const SbField *f;
   PetscInt n;
 
   PetscFunctionBeginUser;
-  PetscCall(SbOptionNames(scope, "output_fields", &n, &names));
-  for (PetscInt i = 0; i < n; i++) {
-    if (n == 1 && !strcmp(names[i], "none")) break;
-    PetscCall(SbFieldFind("-output_fields", names[i], &f));
-    if (dynamic || !f->dynamic) add_field(out, f);
+  PetscCall(SbOptionNames(&SbRunScope, "output_fields", &n, &names));
+  if (n == 1 && !strcmp(names[0], "none")) n = 0;
+  for (PetscInt i = 0; i < n || (i == n && out->nfield); i++) {
+    const SbField *f;
+    PetscInt k = 0;
+
+    PetscCall(SbFieldFind("-output_fields", i < n ? names[i] : "body", &f));
+    while (k < out->nfield && out->field[k] != f) k++;
+    if (k == out->nfield && (dynamic || !f->dynamic)) out->field[out->nfield++] = f;
   }
   PetscCall(PetscFree(names));
-  PetscCall(SbFieldFind("-output_fields", "body", &f));
-  if (out->nfield) add_field(out, f);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -102,9 +95,7 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
   int n;
 
   PetscFunctionBeginUser;
-  /* the folder; without a name, out/<scenario without folder and ending> */
-  // the scenario file on the command line; empty without one
-  out->scenario[0] = 0;
+  /* the scenario file on the command line; empty without one */
   PetscCall(PetscGetArgs(&n, &args));
   for (int i = 1; i < n; i++) {
     const PetscBool named =
@@ -117,23 +108,20 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
       break;
     }
   }
+
+  /* the folder; without a name, out/<scenario without folder and ending> */
   PetscCall(SbOptionString(&SbRunScope, "output_dir", sizeof(out->dir), out->dir));
   if (!out->dir[0]) {
-    const char *base = strrchr(out->scenario, '/'), *dot;
+    const char *slash = strrchr(out->scenario, '/'), *base = slash ? slash + 1 : out->scenario;
+    const char *dot = strrchr(base, '.');
 
-    base = base ? base + 1 : out->scenario;
-    dot = strrchr(base, '.');
-    if (!base[0])
-      PetscCall(PetscStrncpy(out->dir, "out/run", sizeof(out->dir)));
-    else
-      (void)snprintf(out->dir, sizeof(out->dir), "out/%.*s",
-                     dot && dot > base ? (int)(dot - base) : (int)strlen(base), base);
+    SbFormat(sizeof(out->dir), out->dir, "out/%.*s",
+             dot && dot > base ? (int)(dot - base) : (int)sizeof(out->dir), base[0] ? base : "run");
   }
-
   PetscCall(SbOptionBool(&SbRunScope, "output_overwrite", &out->overwrite));
 
   /* contents and intervals */
-  PetscCall(read_fields(out, &SbRunScope, model->dynamic));
+  PetscCall(read_fields(out, model->dynamic));
   PetscCall(SbOptionReal(&SbRunScope, "output_every", &out->every));
   PetscCall(SbOptionInt(&SbRunScope, "output_every_steps", &out->every_steps));
   PetscCall(SbOptionChoice(&SbRunScope, "output_precision", &precision));
@@ -157,7 +145,6 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
   PetscCall(SbOptionInt(&SbRunScope, "checkpoint_every_steps", &out->checkpoint_every_steps));
   PetscCall(SbOptionInt(&SbRunScope, "checkpoint_keep", &out->checkpoint_keep));
   PetscCall(SbOptionString(&SbRunScope, "restart", sizeof(out->restart), out->restart));
-
   PetscCall(SbProbesSetFromOptions(out, &SbRunScope, model->dynamic));
 
   /* live.txt, which has the values of live formulas */
@@ -186,13 +173,13 @@ static PetscErrorCode keep_identity(SbRun run, SbOutput out, const char *text)
   static const char *const prefix[] = {"-bodies",  "-body_",   "-sets", "-set_",
                                        "-effects", "-effect_", "-mass"};
   size_t n = 0;
-  int length;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(strlen(text) + 32, &out->identity));
   n += (size_t)sprintf(out->identity, "-time %s\n", run->model->dynamic ? "dynamic" : "static");
   for (const char *line = text; *line; line += strcspn(line, "\n") + (line[strcspn(line, "\n")] == '\n')) {
-    length = (int)strcspn(line, "\n#");
+    int length = (int)strcspn(line, "\n#");
+
     while (length && line[length - 1] == ' ') length--;
     for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(prefix); i++) {
       if (strncmp(line, prefix[i], strlen(prefix[i]))) continue;
@@ -265,7 +252,6 @@ PetscErrorCode SbOutputAttach(SbRun run)
   SbOutput out = (SbOutput)run->output;
   char *scenario = NULL, path[PETSC_MAX_PATH_LEN], message[SB_MESSAGE_MAX] = "";
   size_t size = 0;
-  SbChunk chunk;
   PetscViewer viewer;
   FILE *memory;
   PetscMPIInt n = 0;
@@ -280,8 +266,6 @@ PetscErrorCode SbOutputAttach(SbRun run)
   if (out->contact_points) PetscCall(SbLogNamed("Out", "contacts", &out->event.contacts));
   if (out->history) PetscCall(SbLogNamed("Out", "history", &out->event.history));
   if (out->history && out->nprobe) PetscCall(SbLogNamed("Out", "probes", &out->event.probes));
-  if (out->checkpoint_every > 0. || out->checkpoint_every_steps)
-    PetscCall(SbLogNamed("Out", "checkpoint", &out->event.checkpoint));
   if (out->progress && !out->quiet) PetscCall(SbLogNamed("Out", "progress", &out->event.progress));
 
   /* load the checkpoint first: if it is refused, the folder stays unchanged */
@@ -305,13 +289,10 @@ PetscErrorCode SbOutputAttach(SbRun run)
   if (!out->rank) PetscCall(SbFolderClear(out, run->step0));
 
   /* scenario.opts and run.json */
-  chunk.text = scenario;
-  chunk.size = size;
   PetscCall(SbOutputPath(out, "scenario.opts", sizeof(path), path));
-  if (!out->rank) SbFileReplace(path, 1, &chunk, message);
+  if (!out->rank) SbFileReplace(path, 1, &(SbChunk){scenario, size}, message);
   free(scenario);
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
-
   PetscCall(SbRunJson(run, out, "running", ""));
   out->attached = PETSC_TRUE;
 
@@ -338,8 +319,8 @@ PetscErrorCode SbOutputReattach(SbRun from, SbRun to)
   PetscCall(SbOutputForgetMesh(out));
   PetscCall(SbOutputCountNodes(to->model->space, out));
   PetscCall(SbOutputOrder(to, out));
-  PetscCall(SbFramesReattach(to, out));
-  PetscCall(SbHistoryReattach(to, out));
+  PetscCall(SbFramesAttach(to, out));
+  PetscCall(SbHistoryAttach(to, out));
   PetscCall(SbCheckpointAttach(to, out));
   PetscCall(SbProgressAttach(to, out));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));

@@ -1,5 +1,5 @@
 /*
-  output_impl.h - shared by the files of src/output: the state of a run's output, original order, HDF5 and file helpers.
+  output_impl.h - shared by src/output: the state of a run's output, original order, HDF5 and file helpers.
 */
 #pragma once
 #include <hdf5.h>
@@ -12,8 +12,8 @@
 #define SB_FILE_MAX 64 /* longest name of a file inside the folder, with the terminating zero */
 
 /*
-  Original order of vertices, cells or nodes, cut into one contiguous slice per rank: how results are written, so that the
-  files do not depend on the partition.
+  Original order of vertices, cells or nodes, cut into one contiguous slice per rank: how results are written,
+  so that the files do not depend on the partition.
 */
 typedef struct {
   MPI_Comm comm;
@@ -50,8 +50,8 @@ typedef struct {
   char path[PETSC_MAX_PATH_LEN];
 } SbH5;
 
-/* A PetscInt in memory. */
-#define SB_H5_INT (sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32)
+/* The type in memory of numbers of this type in a file: that of PetscInt for H5T_STD_I64LE. */
+hid_t SbH5TypeInMemory(hid_t type);
 /* Files are opened collectively for MPI-IO; names that exist are truncated by SbH5Create(). */
 PetscErrorCode SbH5Create(MPI_Comm comm, const char *path, SbH5 *h);
 PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH5 *h,
@@ -59,29 +59,29 @@ PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH
 PetscErrorCode SbH5Close(SbH5 *h);
 /* Flushes to disk on all ranks. A write that failed since the last flush ends the run here. Collective. */
 PetscErrorCode SbH5Flush(SbH5 *h);
-/* A dataset [order->N][ncomp] of `filetype` below `where` out of slices of `memtype`, with its unit. Collective. */
+/* A dataset [order->N][ncomp] of this type below `where` out of slices, with its unit. Collective. */
 PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char *unit, const SbOrder *order,
-                              PetscInt ncomp, hid_t filetype, hid_t memtype, const void *slice);
-/* The slice of such a dataset as doubles; ok is false when it is missing, has another shape or cannot be read. Collective. */
+                              PetscInt ncomp, hid_t type, const void *slice);
+/* The slice of such a dataset as doubles; not ok: missing, of another shape or unreadable. Collective. */
 PetscErrorCode SbH5ReadSlice(SbH5 *h, const char *name, const SbOrder *order, PetscInt ncomp,
                              PetscReal slice[], PetscBool *ok);
 /* A group that may be missing: negative then. Not collective. */
 hid_t SbH5OpenGroup(hid_t where, const char *name);
-/* Rows of a dataset [n] or [n][m], and bytes of each of its numbers; 0 when it is not there or another one. Not collective. */
+/* Rows of a dataset [n] or [n][m], and bytes of each of its numbers; 0: there is none. Not collective. */
 PetscInt64 SbH5Rows(hid_t where, const char *name);
 PetscInt SbH5NumberBytes(hid_t where, const char *name);
-/* A whole dataset of the shape [n][ncomp], or [n], as numbers of this type in memory; false when it is not there, has another shape or cannot be read. */
+/* A whole dataset [n][ncomp], or [n], in memory; false: it is missing, of another shape or unreadable. */
 PetscBool SbH5Read(hid_t where, const char *name, hid_t type, PetscInt n, PetscInt ncomp, void *values);
 PetscErrorCode SbH5PutReal(SbH5 *h, hid_t where, const char *name, PetscReal value);
 PetscErrorCode SbH5PutInt(SbH5 *h, hid_t where, const char *name, int64_t value);
 PetscErrorCode SbH5PutText(SbH5 *h, hid_t where, const char *name, const char *text);
-/* ok turns false when the attribute is missing or of another kind, and is left alone otherwise. Not collective. */
+/* ok turns false when the attribute is missing or of another kind. Not collective. */
 void SbH5GetReal(hid_t where, const char *name, PetscReal *value, PetscBool *ok);
 void SbH5GetInt(hid_t where, const char *name, int64_t *value, PetscBool *ok);
 /* A text of any length as a dataset, the same on all ranks. Collective. Free what was read with PetscFree. */
 PetscErrorCode SbH5WriteText(SbH5 *h, hid_t where, const char *name, const char *text);
 PetscErrorCode SbH5ReadText(SbH5 *h, const char *name, char **text, PetscBool *ok);
-/* A group without a name, whose `links` links with names of up to `letters` letters lie in one block; see h5.c. */
+/* A group without a name, whose links, with names of up to `letters` letters, lie in one block; see h5.c. */
 PetscErrorCode SbH5GroupCreate(SbH5 *h, unsigned links, unsigned letters, hid_t *group);
 /* Gives it a name; the file shows it from the next flush on. Collective. */
 PetscErrorCode SbH5GroupLink(SbH5 *h, hid_t group, hid_t parent, const char *name);
@@ -91,7 +91,7 @@ PetscErrorCode SbH5GroupLink(SbH5 *h, hid_t group, hid_t parent, const char *nam
 PetscErrorCode SbH5Reserve(SbH5 *h, PetscInt64 bytes);
 /* Reserves `bytes` of disk space beyond the end of a file, without changing it. Collective. */
 PetscErrorCode SbFileReserve(MPI_Comm comm, const char *path, PetscInt64 bytes);
-/* Ends the run on all ranks when the message of any rank is not empty; the lowest rank's is reported. Collective. */
+/* Ends the run on all ranks when a rank has a message; the lowest rank's is reported. Collective. */
 #define SB_NO_ROOM "make room and go on with -restart auto, or give another -output_dir"
 PetscErrorCode SbAgree(MPI_Comm comm, PetscErrorCode code, const char *message);
 typedef struct {
@@ -105,12 +105,19 @@ PetscErrorCode SbFileRead(const char *path, char **text, size_t *size);
 
 /* ------------------------------------------------------------------ state */
 
+/* A weighted sum over nodes or tets of this rank. */
+typedef struct {
+  PetscInt n, size;
+  struct {
+    PetscInt number;
+    PetscReal weight;
+  } * item; /* [n] */
+} SbSum;
 typedef enum { SB_PROBE_POINT, SB_PROBE_FACETS, SB_PROBE_TETS } SbProbeKind;
 typedef struct {
   char name[SB_NAME_MAX];
-  PetscReal at[3]; /* requested position, m */
-  PetscReal x
-    [3]; /* the material point that it follows: the nearest vertex, or node of P2, of the first mesh, at rest, m */
+  PetscReal at[3];   /* requested position, m */
+  PetscReal x[3];    /* what it follows, at rest, m: the nearest vertex, or node of P2, of the first mesh */
   PetscBool found;   /* x and body are known */
   PetscInt body;     /* body of x */
   PetscInt original; /* original number of that vertex or node, -1: removed by re-meshing */
@@ -119,9 +126,7 @@ typedef struct {
   char set[SB_NAME_MAX]; /* set of a mean over facets or tets */
   PetscInt nfield;
   const SbField *field[SB_FIELD_MAX];
-  PetscInt nnode, ncell; /* this rank's nodes of a weighted sum (if there is no vertex at x), and tets */
-  PetscInt *node, *cell;
-  PetscReal *weight, *cell_weight;
+  SbSum nodes, cells; /* this rank's nodes, if there is no vertex at x, and tets */
 } SbProbe;
 
 typedef struct _p_SbFrames *SbFrames;     /* frames.c */
@@ -169,10 +174,9 @@ struct _p_SbOutput {
   SbOrder point;    /* of vertex fields: vertices and then P2's nodes at edges, or each cell's own points */
   SbOrder tet;      /* of the tets that points are the corners of: slices only, see split */
   PetscBool *split; /* [cell.n] cells of the slice that are eight of these; NULL: none */
+  PetscInt *edge_number; /* [nnode] point at a node at an edge, as if cells shared theirs; NULL without P2 */
   PetscInt
-    *edge_number; /* [nnode] the point at a node at an edge, as if cells shared theirs; NULL without P2 */
-  PetscInt *
-    place; /* [point.nowned] 10 cell + a with -output_discontinuous; else the node at an edge behind the vertices; NULL without P2 */
+    *place; /* [point.nowned] 10 cell + a with -output_discontinuous, else node of P2; NULL without P2 */
   PetscBool ordered;    /* the orders above exist */
   PetscBool attached;   /* run.json exists */
   PetscInt *body_nodes; /* [nbody] nodes of each body, supports of faces among them */
@@ -196,11 +200,11 @@ struct _p_SbOutput {
   SbRemeshed *remeshed; /* [nremeshed] for run.json */
 };
 
-/* folder.c: creates the folder with its parents, and tests that it is writable; message: the error, if any. Rank 0. */
+/* folder.c: creates the folder with its parents and tests writing; message: the error, if any. Rank 0. */
 PetscErrorCode SbFolderMake(SbOutput out, char message[SB_MESSAGE_MAX]);
 /* Releases the lock of SbOutputLock(), if there is one. */
 void SbFolderUnlock(SbOutput out);
-/* Moves an earlier run's results into a subfolder (overwrite: removes them); after a restart only removes checkpoints of later steps. Rank 0. */
+/* Moves or removes an earlier run's results; after a restart only checkpoints of later steps. Rank 0. */
 PetscErrorCode SbFolderClear(SbOutput out, PetscInt step0);
 /* Path of a file of the run's folder. */
 PetscErrorCode SbOutputPath(SbOutput out, const char *name, size_t size, char path[]);
@@ -208,6 +212,9 @@ PetscErrorCode SbOutputPath(SbOutput out, const char *name, size_t size, char pa
 PetscBool SbOutputDue(PetscReal every, PetscReal t, PetscReal dt);
 /* The step after which a body was re-meshed last, 0: none was. Not collective. */
 PetscInt SbOutputMeshStep(SbRun run);
+/* The group in fields.h5 of the mesh since this step, "mesh" or "mesh_000123"; returns name. */
+#define SB_MESH_NAME 32
+const char *SbOutputMeshName(PetscInt step, char name[SB_MESH_NAME]);
 /* Original orders and the mesh's hash; made once. Collective. */
 PetscErrorCode SbOutputOrder(SbRun run, SbOutput out);
 /* Frees what belongs to the mesh: orders, points, cell quantities, counts. */
@@ -218,52 +225,50 @@ PetscErrorCode SbOutputCountNodes(SbSpace space, SbOutput out); /* collective */
 PetscErrorCode SbFieldFind(const char *option, const char *name, const SbField **field);
 PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out,
                               const SbField *field); /* storage for the quantities of cells that it needs */
-/* value[ncomp] += weight times the field in an owned cell; PetscErrorCode for fields of cells that are made of their state. Collective where state_valid is false. */
-PetscErrorCode SbFieldAddCell(const SbField *field, SbRun run, const SbStep *step, PetscInt n,
-                              const PetscInt cell[], const PetscReal weight[], PetscReal value[]);
+/* value[ncomp] += the sum of a field made of the cells' state. Collective where state_valid is false. */
+PetscErrorCode SbFieldAddCells(const SbField *field, SbRun run, const SbStep *step, const SbSum *cells,
+                               PetscReal value[]);
 /* Whether probes can show it: a vector of the step, or a quantity of the cells' state. */
 PetscBool SbFieldIsProbed(const SbField *field);
 
-/* points.c: vectors at the points of vertex fields. The first two before the others. */
-PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out);       /* not collective */
-PetscErrorCode SbPointsPrepareForces(SbRun run, SbOutput out); /* for SbPointsForces(). Collective */
+/* points.c: vectors at points of vertex fields. This one first; forces: for SbPointsForces(). Collective. */
+PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out, PetscBool forces);
 PetscErrorCode SbPointsDestroy(SbOutput out);
-/* Where an owned point is: at a vertex, or at an edge of P2 (vertex -1), where there is a node; of a cell (4 cell + a of the vertex), if it is that cell's alone. */
+/* Where an owned point is: at a vertex, or at an edge of P2 (vertex -1), where there is a node; of a cell (4
+   cell + a of the vertex), if it is that cell's alone. */
 typedef struct {
   PetscInt vertex, node, corner;
 } SbPlace;
 SbPlace SbPointsPlace(SbRun run, SbOutput out, PetscInt point);
 /* Position at rest, m. */
 const PetscReal *SbPointsRest(SbRun run, SbOutput out, PetscInt point);
-/* values[out->point.nowned][3] of a vector of the space: nodal values of P1 and P2, means of the cells around, or each cell's own. Collective. */
+/* values[out->point.nowned][3] of a vector of the space: nodal values of P1 and P2, means of the cells
+   around, or each cell's own. Collective. */
 PetscErrorCode SbPointsValues(SbRun run, SbOutput out, Vec x, PetscReal values[]);
-/* The same for forces at nodes, or at their prescribed unknowns only: resultant and moment of the nodal forces are kept. Collective. */
+/* The same for forces at nodes, or prescribed unknowns only; keeps resultant and moment. Collective. */
 PetscErrorCode SbPointsForces(SbRun run, SbOutput out, PetscBool prescribed, Vec R, PetscReal values[]);
 /* The value at an owned vertex of a local array x[nnode][3] with ghosts, as vertex fields have it. */
 void SbPointsVertex(SbRun run, SbOutput out, PetscInt vertex, const PetscReal x[], PetscReal value[3]);
 
 /* Before the folder is touched: refuses to go on with frames that have other points. Collective. */
 PetscErrorCode SbFramesCheck(SbRun run, SbOutput out);
+/* Begins the output, or continues it with the run of a new mesh; so do all ..Attach below. Collective. */
 PetscErrorCode SbFramesAttach(SbRun run, SbOutput out);
-/* Continues the output with the run of a new mesh; so do the functions ..Reattach below. Collective. */
-PetscErrorCode SbFramesReattach(SbRun run, SbOutput out);
 PetscErrorCode SbFramesClose(SbOutput out);
 PetscErrorCode SbFramesDestroy(SbOutput out);
 /* contacts.c. Without -output_contacts: after a restart keeps the entries of the index. */
 PetscErrorCode SbContactsCreate(SbRun run, SbOutput out);
 PetscErrorCode SbContactsDestroy(SbOutput out);
-/* The points of contact after a step, on the ranks that write them; bytes: what they take in a frame. Collective. */
-PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt64 *bytes);
+/* The points of contact after a step, on the ranks that write them; n of all, -1 without the option; their
+   bytes. Collective. */
+PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt *n, PetscInt64 *bytes);
 /* Writes these points as a group of the frame. Collective. */
 PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame);
 /* How many points a frame has, -1: it was written without; bytes of their numbers. Not collective. */
 void SbContactsRead(hid_t frame, PetscInt *n, PetscInt *bytes);
-/* How many the last SbContactsFind() found on all ranks, -1 without the option. */
-PetscInt SbContactsCount(SbOutput out);
 /* Adds a frame of n points to the index, at the path of its group; rank 0. */
 PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, PetscInt n, PetscInt bytes);
 PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
-PetscErrorCode SbHistoryReattach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryDestroy(SbOutput out);
 PetscErrorCode SbProbesRegister(void);
 PetscErrorCode SbProbesSetFromOptions(SbOutput out, const SbScope *scope, PetscBool dynamic);
@@ -277,27 +282,18 @@ PetscErrorCode SbProbesWrite(SbRun run, SbOutput out, SbH5 *h);
 PetscErrorCode SbProbesRead(SbRun run, SbOutput out, SbH5 *h);
 /* values[SbProbesCount()] += this rank's part of the columns of all probes. Collective. */
 PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, PetscReal values[]);
-/* checkpoint_effects.c: records of an effect's state, of all ranks, as a file has them. */
-typedef struct {
-  PetscInt n;
-  PetscReal *record; /* [n][nstate] */
-} SbRecords;
-/* Writes the records of all effects; sum is raised by their checksum. Collective. */
+/* checkpoint_effects.c: writes the state of all effects; sum is raised by their checksum. Collective. */
 PetscErrorCode SbCheckpointWriteEffects(SbRun run, SbH5 *h, uint64_t *sum);
-/* Reads them into records[neffect], zeroed, on all ranks. ok turns false when they cannot be read. Free with the function below. Collective. */
-PetscErrorCode SbCheckpointReadEffects(SbRun run, SbH5 *h, SbRecords records[], uint64_t *sum, PetscBool *ok);
-/* Hands them to the effects, for the state of the run at time t. Collective. */
-PetscErrorCode SbCheckpointLoadEffects(SbRun run, PetscReal t, const SbRecords records[]);
+/* Reads it: raises sum, or without it hands the state to the effects, at t; not ok: unreadable. Collective. */
+PetscErrorCode SbCheckpointReadEffects(SbRun run, SbH5 *h, PetscReal t, uint64_t *sum, PetscBool *ok);
 /* Hash of a number at a position of an array. */
 uint64_t SbMixReal(uint64_t position, PetscReal value);
 
-/* checkpoint_mesh.c: the meshes of bodies that were re-meshed, as they are in memory. Writes them; sum is raised by their checksum. Collective. */
+/* checkpoint_mesh.c: writes meshes of re-meshed bodies; sum is raised by their checksum. Collective. */
 PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum);
 /* Their checksum in an open file, 0 without any; ok turns false when they cannot be read. Collective. */
 PetscErrorCode SbCheckpointSumMeshes(SbRun run, SbH5 *h, uint64_t *sum, PetscBool *ok);
-/* Bytes that they take, for messages. Collective. */
-void SbCheckpointMeshBytes(SbRun run, PetscInt64 *bytes);
-/* Path of the checkpoint that -restart names; of `latest` the k-th newest one, "" when there is none. Collective. */
+/* Path of the checkpoint that -restart names; of `latest` the k-th newest one, "": none. Collective. */
 PetscErrorCode SbCheckpointFind(SbOutput out, const char *file, int k, size_t size, char path[]);
 PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out);
 /* Removes those of steps after `step`, and all but the newest `keep` of the others. Rank 0. */
@@ -307,28 +303,25 @@ PetscErrorCode SbProgressEnd(SbOutput out); /* ends a line that is being rewritt
 PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char *reason); /* collective */
 
 /* index.c: the index files of fields.h5 for viewers, NAME.xmf and NAME.vtkhdf. Rank 0. */
-/* nowhere[3]: an index of contact points, with the dummy point of frames without any, m; NULL: an index of tets. */
+/* nowhere[3]: of contact points, with the dummy point of frames without any, m; NULL: of tets. */
 PetscErrorCode SbIndexCreate(SbOutput out, const char *name, const PetscReal *nowhere, SbIndex *index);
 PetscErrorCode SbIndexDestroy(SbIndex *index);
 void SbIndexRemove(SbIndex index); /* the files, if they are there */
-/* The mesh of SbIndexAdd() from now on: a group in fields.h5, open. */
-PetscErrorCode SbIndexSetMesh(SbIndex index, hid_t file, const char *name);
-/* Adds a frame: its group in fields.h5 and its fields. */
-PetscErrorCode SbIndexAdd(SbIndex index, PetscReal time, const char *group, PetscInt n,
-                          const SbField *const field[], const PetscInt bytes[]);
-/* Values at points: a dataset [n] or [n][3] of whole numbers, or of floating ones with so many bytes. */
+/* The mesh of SbIndexAdd() from now on: that of a step, in fields.h5, which is open. */
+PetscErrorCode SbIndexSetMesh(SbIndex index, hid_t file, PetscInt step);
+/* Values of a frame: a dataset [n] or [n][ncomp] of whole numbers, or of floating ones with so many bytes. */
 typedef struct {
   const char *name;
   int ncomp, bytes;
-  PetscBool whole;
+  PetscBool whole, cell; /* cell: per cell, else per point */
 } SbIndexValues;
-/* Adds a frame of n points: values[0] are their numbers, values[1] their positions, the others attributes. */
-PetscErrorCode SbIndexAddPoints(SbIndex index, PetscReal time, const char *group, PetscInt n,
-                                PetscInt nvalues, const SbIndexValues values[]);
+/* Adds a frame: its group in fields.h5 and its values. Contact points have positions `x` and their number. */
+PetscErrorCode SbIndexAdd(SbIndex index, PetscReal time, const char *group, PetscInt npoint, PetscInt n,
+                          const SbIndexValues values[]);
 /* Replaces the files; `message` becomes the error, if any. The last ones of a run are written in any case. */
 void SbIndexWrite(SbIndex index, PetscBool last, char message[SB_MESSAGE_MAX]);
 
-/* phases.c: times of the phases, from the log events. */
+/* report.c: times of the phases, from the log events. */
 typedef struct {
   struct {
     const char *name;
@@ -354,8 +347,8 @@ void SbPresetName(SbRun run, size_t size, char name[]);
   SbCheckpointLoad - state of a run from a file, on any number of ranks. Collective.
 
   Fills run->U, V, A, step0, t0, dt, the running totals in run->energies and run->energy_start.
-  Input: file - path, or "latest": the newest readable checkpoint of the run's folder (others are named in a warning).
-  Errors: PETSC_ERR_FILE_OPEN / _READ for a missing, truncated or foreign file; PETSC_ERR_USER_INPUT when its mesh, bodies
-  or effects are not those of this run (the message names the first option that differs).
+  Input: file - path, or "latest": the newest readable checkpoint of the folder (a warning names others).
+  Errors: PETSC_ERR_FILE_OPEN / _READ for a missing, truncated or foreign file; PETSC_ERR_USER_INPUT when its
+  mesh, bodies or effects are not those of this run (the message names the first option that differs).
 */
 PetscErrorCode SbCheckpointLoad(SbRun run, const char *file);

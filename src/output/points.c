@@ -1,14 +1,15 @@
 /*
   Values at output points for all elements: for vertex fields and probes.
 
-  P1 has the values at vertices as its unknowns. Of CR and DG the value at vertex v of a cell is sum_a vertex[v][a] u_a
-  (SbElementOps), another one in each cell around the vertex: a vertex field holds their mean, weighted with the volumes of
-  the cells and summed by the cells' original numbers, so that it does not depend on the partition. With -output_discontinuous
-  nothing is averaged: each cell has four points of its own.
+  P1 has the values at vertices as its unknowns. Of CR and DG the value at vertex v of a cell is sum_a
+  vertex[v][a] u_a (SbElementOps), another one in each cell around the vertex: a vertex field holds their
+  mean, weighted with the volumes of the cells and summed by the cells' original numbers, so that it does not
+  depend on the partition. With -output_discontinuous nothing is averaged.
 
-  A nodal force of CR or DG acts at the centroid of a face. One third of it goes to each vertex of the face, which keeps its
-  resultant and its moment. Where a node belongs to several cells and these have points of their own, each has an equal part.
-  What a DG cell does to the support of a face is a force of that face, too. P2 has points at its nodes, with the values there.
+  A nodal force of CR or DG acts at the centroid of a face. One third of it goes to each vertex of the face,
+  which keeps its resultant and its moment. Where a node belongs to several cells and these have points of
+  their own, each has an equal part. What a DG cell does to the support of a face is a force of that face,
+  too. P2 has points at its nodes, with the values there.
 */
 #include "output_impl.h"
 
@@ -21,50 +22,43 @@ struct _p_SbPoints {
 
 /* ------------------------------------------------------------------ set-up */
 
-PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out)
+PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out, PetscBool forces)
 {
   const SbSpace s = run->model->space;
+  const SbMesh mesh = s->mesh;
+  SbPoints p = out->points;
   PetscInt *key;
-
-  PetscFunctionBeginUser;
-  if (out->points) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscNew(&out->points));
-  if (s->vertices) PetscFunctionReturn(PETSC_SUCCESS);
-  // the cells around each owned vertex: all of them are local
-  PetscCall(SbBucketByKey(4 * s->mesh->ncell, s->mesh->cell, s->mesh->nvert_owned, &out->points->start,
-                          &out->points->corner));
-  PetscCall(PetscMalloc1(out->points->start[s->mesh->nvert_owned], &key));
-  for (PetscInt i = 0; i < out->points->start[s->mesh->nvert_owned]; i++)
-    key[i] = s->mesh->cell_orig[out->points->corner[i] / 4];
-  for (PetscInt v = 0; v < s->mesh->nvert_owned; v++)
-    PetscCall(PetscSortIntWithArray(out->points->start[v + 1] - out->points->start[v],
-                                    key + out->points->start[v],
-                                    out->points->corner + out->points->start[v]));
-  PetscCall(PetscFree(key));
-
-  /* weights of the means over cells */
-  PetscCall(PetscMalloc1(s->mesh->ncell, &out->points->V));
-  for (PetscInt b = 0; b < s->nbatch; b++)
-    PetscCall(PetscArraycpy(out->points->V + s->batch_cell[b], s->batch_V[b], s->batch_n[b]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Each rank has all cells of its own nodes; ghosts get the number from their owners. */
-PetscErrorCode SbPointsPrepareForces(SbRun run, SbOutput out)
-{
-  const SbSpace s = run->model->space;
   PetscReal *count;
 
   PetscFunctionBeginUser;
-  if (out->points->valence) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!p) PetscCall(PetscNew(&p));
+  out->points = p;
+  if (!s->vertices && !p->start) {
+    // the cells around each owned vertex: all of them are local
+    PetscCall(SbBucketByKey(4 * mesh->ncell, mesh->cell, mesh->nvert_owned, &p->start, &p->corner));
+    PetscCall(PetscMalloc1(p->start[mesh->nvert_owned], &key));
+    for (PetscInt i = 0; i < p->start[mesh->nvert_owned]; i++) key[i] = mesh->cell_orig[p->corner[i] / 4];
+    for (PetscInt v = 0; v < mesh->nvert_owned; v++)
+      PetscCall(
+        PetscSortIntWithArray(p->start[v + 1] - p->start[v], key + p->start[v], p->corner + p->start[v]));
+    PetscCall(PetscFree(key));
+
+    /* weights of the means over cells */
+    PetscCall(PetscMalloc1(mesh->ncell, &p->V));
+    for (PetscInt b = 0; b < s->nbatch; b++)
+      PetscCall(PetscArraycpy(p->V + s->batch_cell[b], s->batch_V[b], s->batch_n[b]));
+  }
+  if (!forces || p->valence) PetscFunctionReturn(PETSC_SUCCESS);
+
+  /* cells of each node: a rank has all those of its own nodes; ghosts get the number from their owners */
   PetscCall(PetscCalloc1(3 * s->nnode, &count));
-  for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) count[3 * s->cell_node[i]] += 1.;
-  for (PetscInt i = 0; s->edge_node && i < 6 * s->mesh->ncell; i++) {
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) count[3 * s->cell_node[i]] += 1.;
+  for (PetscInt i = 0; s->edge_node && i < 6 * mesh->ncell; i++) {
     if (s->edge_node[i] >= 0) count[3 * s->edge_node[i]] += 1.;
   }
   PetscCall(SbSpaceUpdateGhosts(s, count));
-  PetscCall(PetscMalloc1(s->nnode, &out->points->valence));
-  for (PetscInt i = 0; i < s->nnode; i++) out->points->valence[i] = count[3 * i];
+  PetscCall(PetscMalloc1(s->nnode, &p->valence));
+  for (PetscInt i = 0; i < s->nnode; i++) p->valence[i] = count[3 * i];
   PetscCall(PetscFree(count));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,20 +1,26 @@
 /*
-  Probes: what history.csv follows at a point, or as a mean over facets or tets. Each is a list of nodes with weights for vectors,
-  sum_i w_i x_i, and one of tets with weights for what tets have.
+  Probes: what history.csv follows at a point, or as a mean over facets or tets. Each is a list of nodes with
+  weights for vectors, sum_i w_i x_i, and one of tets with weights for what tets have.
 
-  At a point: the vertex, or node of P2, nearest to it in the rest state; of equally near ones that with the smallest original number. Vectors are what vertex fields show there: the
-  unknown of P1 and P2, the mean of the cells around it for CR and DG; quantities of tets are means over the tets around it, by volume. On a set: the mean over its boundary facets,
-  by area at rest; in a set: over its tets, by volume at rest. Both integrate the basis functions, so they are exact for each element; a facet has what its tet has.
+  At a point: the vertex, or node of P2, nearest to it in the rest state; of equally near ones that with the
+  smallest original number. Vectors are what vertex fields show there: the unknown of P1 and P2, the mean of
+  the cells around it for CR and DG; quantities of tets are means over the tets around it, by volume. On a
+  set: the mean over its boundary facets, by area at rest; in a set: over its tets, by volume at rest. Both
+  integrate the basis functions, so they are exact for each element; a facet has what its tet has.
 
-  A probe at a point follows the material that is there. When its body is re-meshed and the vertex is gone, it shows what the tet has that holds the position at
-  rest. Checkpoints carry the position (SbProbesWrite).
+  A probe at a point follows the material that is there. When its body is re-meshed and the vertex is gone, it
+  shows what the tet has that holds the position at rest. Checkpoints carry the position (SbProbesWrite).
 */
 #include <math.h>
 #include <stddef.h>
 #include "output_impl.h"
 #include "sbtet.h"
 
-#define NNUMBER 4 /* of a probe in a checkpoint: the position, the body */
+/* Numbers of a probe in a checkpoint: the position, the body. */
+#define NNUMBER 4
+static const char *const number_names[NNUMBER] = {"x", "y", "z", "body"};
+
+static const char *const keys[] = {"at", "on", "in"}; /* options that say where it is, by SbProbeKind */
 
 static const SbOption rows[] = {
   {"at", SB_OPTION_REALS, 3, "m", NULL, "(-inf, inf)",
@@ -42,27 +48,25 @@ PetscErrorCode SbProbesRegister(void)
 static PetscErrorCode read_probe(SbProbe *probe, PetscBool dynamic)
 {
   SbScope scope;
-  PetscBool given[3];
+  PetscBool given;
   char(*names)[SB_NAME_MAX], option[2 * SB_NAME_MAX];
-  PetscInt n;
+  PetscInt n = 0;
 
   PetscFunctionBeginUser;
   PetscCall(SbScopeSet(&scope, "probe", "", probe->name));
-  PetscCall(SbOptionGiven(&scope, "at", &given[SB_PROBE_POINT]));
-  PetscCall(SbOptionGiven(&scope, "on", &given[SB_PROBE_FACETS]));
-  PetscCall(SbOptionGiven(&scope, "in", &given[SB_PROBE_TETS]));
-  PetscCheck(given[0] + given[1] + given[2] == 1, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+  for (int k = 0; k < 3; k++) {
+    PetscCall(SbOptionGiven(&scope, keys[k], &given));
+    if (given) probe->kind = (SbProbeKind)k;
+    n += given;
+  }
+  PetscCheck(n == 1, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-probe_%s_at, _on, _in: give one of them, the position of a vertex, or a set over whose facets "
              "or tets the mean is taken",
              probe->name);
-  probe->kind = given[SB_PROBE_FACETS] ? SB_PROBE_FACETS
-                : given[SB_PROBE_TETS] ? SB_PROBE_TETS
-                                       : SB_PROBE_POINT;
   if (probe->kind == SB_PROBE_POINT)
     PetscCall(SbOptionReals(&scope, "at", probe->at));
   else
-    PetscCall(
-      SbOptionString(&scope, probe->kind == SB_PROBE_FACETS ? "on" : "in", sizeof(probe->set), probe->set));
+    PetscCall(SbOptionString(&scope, keys[probe->kind], sizeof(probe->set), probe->set));
 
   /* the fields */
   PetscCall(SbOptionName(&scope, "fields", sizeof(option), option));
@@ -100,19 +104,13 @@ PetscErrorCode SbProbesSetFromOptions(SbOutput out, const SbScope *scope, PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode forget_sums(SbProbe *probe)
-{
-  PetscFunctionBeginUser;
-  probe->nnode = probe->ncell = 0;
-  PetscCall(PetscFree2(probe->node, probe->weight));
-  PetscCall(PetscFree2(probe->cell, probe->cell_weight));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbProbesDestroy(SbOutput out)
 {
   PetscFunctionBeginUser;
-  for (PetscInt p = 0; p < out->nprobe; p++) PetscCall(forget_sums(&out->probe[p]));
+  for (PetscInt p = 0; p < out->nprobe; p++) {
+    PetscCall(PetscFree(out->probe[p].nodes.item));
+    PetscCall(PetscFree(out->probe[p].cells.item));
+  }
   PetscCall(PetscFree(out->probe));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -162,33 +160,6 @@ static PetscInt first_edge(const SbSpace s)
   return s->mesh->Nvert + 8 * s->mesh->Ncell;
 }
 
-/*
-  The nearest vertex or node at an edge that this rank owns, of a body unless that is -1: squared distance, original number, local number: of a vertex, or nvert_owned behind that of a node (-1 when it
-  owns none).
-*/
-static void nearest_owned(const SbSpace s, PetscInt body, const PetscReal at[3], PetscReal *best,
-                          PetscInt *original, PetscInt *local)
-{
-  const SbMesh mesh = s->mesh;
-
-  *best = PETSC_MAX_REAL;
-  *local = *original = -1;
-  for (PetscInt i = 0; i < mesh->nvert_owned + (s->edge_node ? s->nnode_owned : 0); i++) {
-    const PetscInt node = i - mesh->nvert_owned;
-    const PetscInt number = node < 0 ? mesh->vert_orig[i] : s->node_orig[node];
-    const PetscReal *x = node < 0 ? mesh->x + 3 * i : s->node_x + 3 * node;
-    const PetscReal d2 = PetscSqr(x[0] - at[0]) + PetscSqr(x[1] - at[1]) + PetscSqr(x[2] - at[2]);
-
-    if (node >= 0 && number < first_edge(s)) continue;
-    if (body >= 0 && (node < 0 ? mesh->vert_body[i] : s->node_body[node]) != body) continue;
-    if (d2 < *best || (d2 == *best && number < *original)) {
-      *best = d2;
-      *original = number;
-      *local = i;
-    }
-  }
-}
-
 /* The nearest of all ranks, by the lowest number if equal: its local number on its rank, -1 on the others. */
 static PetscErrorCode agree(SbOutput out, PetscReal mine, PetscInt original, PetscInt *local,
                             PetscInt *winner, PetscReal *best)
@@ -203,7 +174,39 @@ static PetscErrorCode agree(SbOutput out, PetscReal mine, PetscInt original, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The owned cell of the probe's body that contains its point, or the nearest one: distance outside (negative inside), and the weights. */
+/*
+  The vertex or node at an edge nearest to a probe, of its body once that is known: squared distance, and into
+  the probe its original and, on its owner, its local number: of a vertex, or nvert_owned behind a node's.
+*/
+static PetscErrorCode find_nearest(const SbSpace s, SbOutput out, SbProbe *probe, PetscReal *best)
+{
+  const SbMesh mesh = s->mesh;
+  PetscReal mine = PETSC_MAX_REAL;
+  PetscInt original = -1;
+
+  PetscFunctionBeginUser;
+  probe->local = -1;
+  for (PetscInt i = 0; i < mesh->nvert_owned + (s->edge_node ? s->nnode_owned : 0); i++) {
+    const PetscInt node = i - mesh->nvert_owned;
+    const PetscInt number = node < 0 ? mesh->vert_orig[i] : s->node_orig[node];
+    PetscReal d[3], d2;
+
+    SbSubtract(node < 0 ? mesh->x + 3 * i : s->node_x + 3 * node, probe->found ? probe->x : probe->at, d);
+    d2 = SbDot3(d, d);
+    if (node >= 0 && number < first_edge(s)) continue;
+    if (probe->found && (node < 0 ? mesh->vert_body[i] : s->node_body[node]) != probe->body) continue;
+    if (d2 < mine || (d2 == mine && number < original)) {
+      mine = d2;
+      original = number;
+      probe->local = i;
+    }
+  }
+  PetscCall(agree(out, mine, original, &probe->local, &probe->original, best));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The owned cell of the probe's body that contains its point, or the nearest one: distance outside (negative
+   inside), and the weights. */
 static PetscReal deepest_owned(const SbMesh mesh, const SbProbe *probe, PetscInt *cell, PetscReal weight[4])
 {
   PetscReal best = PETSC_MAX_REAL;
@@ -226,42 +229,46 @@ static PetscReal deepest_owned(const SbMesh mesh, const SbProbe *probe, PetscInt
   return best;
 }
 
-/* Adds the nodes of a cell: L weights of its corners, Q those of the nodes of P2. */
-static void add_nodes(const SbSpace s, SbProbe *probe, PetscInt cell, const PetscReal L[4],
-                      const PetscReal Q[SB_CELL_NODES])
+static PetscErrorCode add(SbSum *sum, PetscInt number, PetscReal weight)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbReserve(sum->n + 1, sizeof(*sum->item), &sum->size, &sum->item));
+  sum->item[sum->n].number = number;
+  sum->item[sum->n++].weight = weight;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds a cell and its nodes: L weights of its corners, Q those of the nodes of P2. */
+static PetscErrorCode add_cell(const SbSpace s, SbProbe *probe, PetscInt cell, PetscReal weight,
+                               const PetscReal L[4], const PetscReal Q[SB_CELL_NODES])
 {
   const SbElement e = SbSpaceCellElement(s, cell);
   const PetscBool quadratic = (PetscBool)(e->nodes_per[1] > 0);
 
+  PetscFunctionBeginUser;
+  PetscCall(add(&probe->cells, cell, weight));
   for (PetscInt a = 0; a < (quadratic ? SB_CELL_NODES : 4); a++) {
     PetscReal w = quadratic ? Q[a] : 0.;
 
     for (int c = 0; c < 4 && !quadratic; c++) w += e->ops.vertex[c][a] * L[c];
-    probe->node[probe->nnode] = SbSpaceCellNode(s, cell, a);
-    probe->weight[probe->nnode++] = w;
+    PetscCall(add(&probe->nodes, SbSpaceCellNode(s, cell, a), w));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes, tets and weights of a mean over the facets or tets of a set; each tet on its owner. */
+/* Integrals over the facets or tets of a set; each tet on its owner. */
 static PetscErrorCode sum_set(SbRun run, SbProbe *probe)
 {
   const SbSpace s = run->model->space;
   const SbMesh mesh = s->mesh;
-  PetscReal total = 0.;
   SbFacet *facet = NULL;
-  PetscInt k, n = 0;
+  PetscInt k, n = mesh->ncell_owned;
   char option[2 * SB_NAME_MAX];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(option, sizeof(option), "-probe_%s_%s", probe->name,
-                          probe->kind == SB_PROBE_FACETS ? "on" : "in"));
+  PetscCall(PetscSNPrintf(option, sizeof(option), "-probe_%s_%s", probe->name, keys[probe->kind]));
   PetscCall(SbSpaceFindSet(s, probe->set, option, &k));
-  if (probe->kind == SB_PROBE_FACETS)
-    PetscCall(SbSpaceGetSetFacets(s, k, &n, &facet));
-  else
-    n = mesh->ncell_owned;
-  PetscCall(PetscMalloc2(SB_CELL_NODES * n, &probe->node, SB_CELL_NODES * n, &probe->weight));
-  PetscCall(PetscMalloc2(n, &probe->cell, n, &probe->cell_weight));
+  if (probe->kind == SB_PROBE_FACETS) PetscCall(SbSpaceGetSetFacets(s, k, &n, &facet));
   for (PetscInt i = 0; i < n; i++) {
     const PetscInt cell = facet ? facet[i].cell : i;
     PetscReal L[4] = {0., 0., 0., 0.}, Q[SB_CELL_NODES] = {0.}, measure = 0.;
@@ -280,32 +287,36 @@ static PetscErrorCode sum_set(SbRun run, SbProbe *probe)
     }
     if (mesh->cell_set[cell] & SB_CURVED)
       measure = SbSpaceCurvedIntegrals(s, cell, facet ? &facet[i] : NULL, Q);
-    add_nodes(s, probe, cell, L, Q);
-    probe->cell[probe->ncell] = cell;
-    probe->cell_weight[probe->ncell++] = measure;
-    total += measure;
+    PetscCall(add_cell(s, probe, cell, measure, L, Q));
   }
   PetscCall(PetscFree(facet));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_REAL, MPI_SUM, s->comm));
-  PetscCheck(total > 0., s->comm, PETSC_ERR_USER_INPUT, "%s %s: the set has no %s", option, probe->set,
-             probe->kind == SB_PROBE_FACETS ? "boundary facets; a mean over tets is asked for by _in"
-                                            : "tetrahedra; a mean over facets is asked for by _on");
-  for (PetscInt i = 0; i < probe->nnode; i++) probe->weight[i] /= total;
-  for (PetscInt i = 0; i < probe->ncell; i++) probe->cell_weight[i] /= total;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On a new mesh: the vertex or node at the probe's reference position, or the tet that contains it. */
-static PetscErrorCode find_again(const SbSpace s, SbOutput out, SbProbe *probe)
+/* On the first mesh the nearest vertex or node; later that at the probe's rest position, or the tet there. */
+static PetscErrorCode find_point(const SbSpace s, SbOutput out, SbProbe *probe)
 {
   const SbMesh mesh = s->mesh;
-  PetscReal mine, best, L[4] = {0., 0., 0., 0.}, Q[SB_CELL_NODES];
-  PetscInt cell, tet, original;
+  PetscReal mine, best, here[3] = {0., 0., 0.}, L[4] = {0., 0., 0., 0.}, Q[SB_CELL_NODES];
+  PetscInt cell, tet, body = -1;
 
   PetscFunctionBeginUser;
-  nearest_owned(s, probe->body, probe->x, &mine, &original, &probe->local);
-  PetscCall(agree(out, mine, original, &probe->local, &probe->original, &best));
+  PetscCall(find_nearest(s, out, probe, &best));
+  if (!probe->found) {
+    if (probe->local >= 0) {
+      const PetscInt node = probe->local - mesh->nvert_owned;
+
+      PetscCall(PetscArraycpy(here, node < 0 ? mesh->x + 3 * probe->local : s->node_x + 3 * node, 3));
+      body = node < 0 ? mesh->vert_body[probe->local] : s->node_body[node];
+    }
+    PetscCallMPI(MPI_Allreduce(here, probe->x, 3, MPIU_REAL, MPI_SUM, out->comm));
+    PetscCallMPI(MPI_Allreduce(&body, &probe->body, 1, MPIU_INT, MPI_MAX, out->comm));
+    probe->found = PETSC_TRUE;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (best == 0.) PetscFunctionReturn(PETSC_SUCCESS);
+
+  /* the basis functions in the tet */
   probe->local = probe->original = -1;
   mine = deepest_owned(mesh, probe, &cell, L);
   PetscCall(agree(out, mine, cell < 0 ? 0 : mesh->cell_orig[cell], &cell, &tet, &best));
@@ -314,53 +325,26 @@ static PetscErrorCode find_again(const SbSpace s, SbOutput out, SbProbe *probe)
                         "probe '%s': no tet of the re-meshed body holds its position any more; it follows "
                         "the nearest one, from %.2g of its size outside",
                         probe->name, (double)best));
-
-  /* the basis functions there */
-  PetscCall(PetscMalloc2(SB_CELL_NODES, &probe->node, SB_CELL_NODES, &probe->weight));
-  PetscCall(PetscMalloc2(1, &probe->cell, 1, &probe->cell_weight));
   if (cell < 0) PetscFunctionReturn(PETSC_SUCCESS);
   for (int a = 0; a < 4; a++) Q[a] = L[a] * (2. * L[a] - 1.);
   for (int e = 0; e < 6; e++) Q[4 + e] = 4. * L[SbTetEdge[e][0]] * L[SbTetEdge[e][1]];
-  add_nodes(s, probe, cell, L, Q);
-  probe->ncell = 1;
-  probe->cell[0] = cell;
-  probe->cell_weight[0] = 1.;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* On the first mesh: the nearest vertex or node. */
-static PetscErrorCode find_first(const SbSpace s, SbOutput out, SbProbe *probe)
-{
-  const SbMesh mesh = s->mesh;
-  PetscReal mine, best, here[3] = {0., 0., 0.};
-  PetscInt body = -1, original;
-
-  PetscFunctionBeginUser;
-  nearest_owned(s, -1, probe->at, &mine, &original, &probe->local);
-  PetscCall(agree(out, mine, original, &probe->local, &probe->original, &best));
-  if (probe->local >= 0) {
-    const PetscInt node = probe->local - mesh->nvert_owned;
-
-    PetscCall(PetscArraycpy(here, node < 0 ? mesh->x + 3 * probe->local : s->node_x + 3 * node, 3));
-    body = node < 0 ? mesh->vert_body[probe->local] : s->node_body[node];
-  }
-  PetscCallMPI(MPI_Allreduce(here, probe->x, 3, MPIU_REAL, MPI_SUM, out->comm));
-  PetscCallMPI(MPI_Allreduce(&body, &probe->body, 1, MPIU_INT, MPI_MAX, out->comm));
-  probe->found = PETSC_TRUE;
+  PetscCall(add_cell(s, probe, cell, 1., L, Q));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbProbesFind(SbRun run, SbOutput out)
 {
   const SbSpace s = run->model->space;
+  const SbMesh mesh = s->mesh;
 
   PetscFunctionBeginUser;
-  if (out->nprobe) PetscCall(SbPointsPrepare(run, out));
+  if (out->nprobe) PetscCall(SbPointsPrepare(run, out, PETSC_FALSE));
   for (PetscInt p = 0; p < out->nprobe; p++) {
     SbProbe *probe = &out->probe[p];
     PetscBool cells = PETSC_FALSE;
+    PetscReal total = 0.;
 
-    PetscCall(forget_sums(probe));
+    probe->nodes.n = probe->cells.n = 0;
     for (PetscInt i = 0; i < probe->nfield; i++) {
       PetscCall(SbFieldPrepare(run, out, probe->field[i]));
       cells = (PetscBool)(cells || probe->field[i]->cell);
@@ -368,47 +352,36 @@ PetscErrorCode SbProbesFind(SbRun run, SbOutput out)
     probe->local = -1;
     if (probe->kind != SB_PROBE_POINT)
       PetscCall(sum_set(run, probe));
-    else if (probe->found)
-      PetscCall(find_again(s, out, probe));
     else
-      PetscCall(find_first(s, out, probe));
-    /* a node at an edge is one of a sum */
-    if (probe->local >= s->mesh->nvert_owned) {
-      PetscCall(PetscMalloc2(1, &probe->node, 1, &probe->weight));
-      probe->nnode = 1;
-      probe->node[0] = probe->local - s->mesh->nvert_owned;
-      probe->weight[0] = 1.;
-    }
+      PetscCall(find_point(s, out, probe));
+    /* the tets around a vertex or a node at an edge, by volume */
     if (cells && probe->kind == SB_PROBE_POINT && probe->original >= 0) {
-      const PetscInt per = probe->original < first_edge(s) ? 4 : 6;
-      PetscInt here = probe->nnode ? s->gnode[probe->node[0]] : -1, n = 0;
-      PetscReal total = 0.;
+      const PetscBool vertex = (PetscBool)(probe->original < first_edge(s));
+      const PetscInt local = probe->local, per = vertex ? 4 : 6;
+      PetscInt here = local < 0 ? -1 : vertex ? mesh->gvert[local] : s->gnode[local - mesh->nvert_owned];
 
-      /* The tets around the vertex or node of a probe, by volume; the lowest numbers first. */
-      if (probe->local >= 0 && per == 4) here = s->mesh->gvert[probe->local];
-      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &here, 1, MPIU_INT, MPI_MAX, s->mesh->comm));
-      for (int pass = 0; pass < 2; pass++) {
-        for (PetscInt i = 0; i < per * s->mesh->ncell_owned; i++) {
-          const PetscInt *vert = s->mesh->cell + 4 * (i / per);
+      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &here, 1, MPIU_INT, MPI_MAX, out->comm));
+      for (PetscInt i = 0; i < per * mesh->ncell_owned; i++) {
+        const PetscInt edge = vertex ? -1 : s->edge_node[i];
 
-          if ((per == 4              ? s->mesh->gvert[s->mesh->cell[i]]
-               : s->edge_node[i] < 0 ? -1
-                                     : s->gnode[s->edge_node[i]]) != here)
-            continue;
-          if (!pass) {
-            n++;
-            continue;
-          }
-          probe->cell[probe->ncell] = i / per;
-          probe->cell_weight[probe->ncell] = SbTetDeterminant(s->mesh->x, vert) / 6.;
-          total += probe->cell_weight[probe->ncell++];
-        }
-        if (!pass) PetscCall(PetscMalloc2(n, &probe->cell, n, &probe->cell_weight));
+        if ((vertex ? mesh->gvert[mesh->cell[i]] : edge < 0 ? -1 : s->gnode[edge]) == here)
+          PetscCall(add(&probe->cells, i / per, SbTetDeterminant(mesh->x, mesh->cell + 4 * (i / per)) / 6.));
       }
-      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_REAL, MPI_SUM, s->mesh->comm));
-      for (PetscInt i = 0; i < n; i++) probe->cell_weight[i] /= total;
     }
-    if (probe->nnode) probe->local = -1;
+    /* integrals to means */
+    for (PetscInt i = 0; i < probe->cells.n; i++) total += probe->cells.item[i].weight;
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_REAL, MPI_SUM, out->comm));
+    PetscCheck(total > 0. || probe->kind == SB_PROBE_POINT, out->comm, PETSC_ERR_USER_INPUT,
+               "-probe_%s_%s %s: the set has no %s", probe->name, keys[probe->kind], probe->set,
+               probe->kind == SB_PROBE_FACETS ? "boundary facets; a mean over tets is asked for by _in"
+                                              : "tetrahedra; a mean over facets is asked for by _on");
+    for (PetscInt i = 0; i < probe->cells.n; i++) probe->cells.item[i].weight /= total;
+    for (PetscInt i = 0; i < probe->nodes.n; i++) probe->nodes.item[i].weight /= total;
+    /* a node at an edge is one of a sum */
+    if (probe->local >= mesh->nvert_owned) {
+      PetscCall(add(&probe->nodes, probe->local - mesh->nvert_owned, 1.));
+      probe->local = -1;
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -429,8 +402,7 @@ PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, PetscRea
 
     for (PetscInt i = 0; i < probe->nfield; c += probe->field[i++]->ncomp)
       if (probe->field[i]->cell)
-        PetscCall(SbFieldAddCell(probe->field[i], run, step, probe->ncell, probe->cell, probe->cell_weight,
-                                 values + c));
+        PetscCall(SbFieldAddCells(probe->field[i], run, step, &probe->cells, values + c));
   }
 
   /* vectors: at the vertex, or over the nodes; positions are displacements and where that is at rest */
@@ -448,9 +420,11 @@ PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, PetscRea
       if (probe->local >= 0) SbPointsVertex(run, out, probe->local, here, values);
       for (int k = 0; k < 3; k++) {
         if (position && probe->local >= 0) values[k] += probe->x[k];
-        for (PetscInt a = 0; a < probe->nnode; a++)
-          values[k] += probe->weight[a] *
-                       (here[3 * probe->node[a] + k] + (position ? s->node_x[3 * probe->node[a] + k] : 0.));
+        for (PetscInt a = 0; a < probe->nodes.n; a++) {
+          const PetscInt at = 3 * probe->nodes.item[a].number + k;
+
+          values[k] += probe->nodes.item[a].weight * (here[at] + (position ? s->node_x[at] : 0.));
+        }
       }
     }
   }
@@ -460,15 +434,6 @@ PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, PetscRea
 }
 
 /* ------------------------------------------------------------------ in checkpoints */
-
-static PetscErrorCode number_name(const SbProbe *probe, int k, size_t size, char name[])
-{
-  static const char *const what[NNUMBER] = {"x", "y", "z", "body"};
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(name, size, "probe_%s_%s", probe->name, what[k]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 PetscErrorCode SbProbesWrite(SbRun run, SbOutput out, SbH5 *h)
 {
@@ -480,7 +445,7 @@ PetscErrorCode SbProbesWrite(SbRun run, SbOutput out, SbH5 *h)
     const SbProbe *probe = &out->probe[p];
 
     for (int k = 0; k < NNUMBER && probe->found && probe->kind == SB_PROBE_POINT; k++) {
-      PetscCall(number_name(probe, k, sizeof(name), name));
+      PetscCall(PetscSNPrintf(name, sizeof(name), "probe_%s_%s", probe->name, number_names[k]));
       PetscCall(SbH5PutReal(h, h->file, name, k < 3 ? probe->x[k] : (PetscReal)probe->body));
     }
   }
@@ -498,7 +463,7 @@ PetscErrorCode SbProbesRead(SbRun run, SbOutput out, SbH5 *h)
     PetscBool there = PETSC_TRUE;
 
     for (int k = 0; k < NNUMBER; k++) {
-      PetscCall(number_name(probe, k, sizeof(name), name));
+      PetscCall(PetscSNPrintf(name, sizeof(name), "probe_%s_%s", probe->name, number_names[k]));
       SbH5GetReal(h->file, name, &number[k], &there);
     }
     if (!there || number[3] < 0. || number[3] >= (PetscReal)run->model->nbody) continue;

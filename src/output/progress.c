@@ -1,7 +1,8 @@
 /*
   The line of progress of a run: rewritten in place on a terminal, else a plain line now and then.
 
-  Open MPI gives its ranks a pseudo-terminal whatever its own output is, so under it the launcher's output decides.
+  Open MPI gives its ranks a pseudo-terminal whatever its own output is, so under it the launcher's output
+  decides.
 */
 #include <stdlib.h>
 #include <unistd.h>
@@ -10,7 +11,6 @@
 #define WIDTH 79
 
 struct _p_SbProgress {
-  PetscLogEvent event; /* SbOut_progress */
   PetscBool terminal;
   PetscBool open; /* a line is being rewritten */
   PetscBool titled;
@@ -27,8 +27,7 @@ static PetscBool is_terminal(void)
   char link[64], target[64];
   ssize_t n;
 
-  if (!isatty(STDOUT_FILENO)) return PETSC_FALSE;
-  if (!getenv("OMPI_COMM_WORLD_SIZE")) return PETSC_TRUE;
+  if (!isatty(STDOUT_FILENO) || !getenv("OMPI_COMM_WORLD_SIZE")) return (PetscBool)isatty(STDOUT_FILENO);
   (void)snprintf(link, sizeof(link), "/proc/%ld/fd/1", (long)getppid());
   n = readlink(link, target, sizeof(target) - 1);
   if (n <= 0) return PETSC_FALSE;
@@ -36,21 +35,11 @@ static PetscBool is_terminal(void)
   return (PetscBool)(!strncmp(target, "/dev/pts/", 9) || !strncmp(target, "/dev/tty", 8));
 }
 
-/* 75 s as "1:15", 2 h as "2:00:00". */
-static void duration(PetscReal seconds, size_t size, char text[])
-{
-  const long s = seconds < 359999. ? (long)(seconds + .5) : 359999;
-
-  if (s >= 3600)
-    SbFormat(size, text, "%ld:%02ld:%02ld", s / 3600, s / 60 % 60, s % 60);
-  else
-    SbFormat(size, text, "%ld:%02ld", s / 60, s % 60);
-}
-
 /* On rank 0 only. */
 static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
-  SbProgress p = (SbProgress)ctx;
+  const SbOutput out = (SbOutput)ctx;
+  SbProgress p = out->line;
   const PetscReal wait = p->terminal ? .2 : 2.;
   char line[160], count[32], left[16] = "-", times[16] = "-";
   PetscReal done, speed;
@@ -70,16 +59,20 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     p->steps++;
     if (!step->last && step->wall - p->last < wait) PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(PetscLogEventBegin(p->event, 0, 0, 0, 0));
+  PetscCall(PetscLogEventBegin(out->event.progress, 0, 0, 0, 0));
   // the line: step, time, iterations, energies, speed, time left
   done = step->t - p->t_start;
   speed = step->wall > 0. ? done / step->wall : 0.;
-  if (step->step_end > 0)
-    (void)snprintf(count, sizeof(count), "%" PetscInt_FMT "/%" PetscInt_FMT, step->step, step->step_end);
-  else
-    (void)snprintf(count, sizeof(count), "%" PetscInt_FMT, step->step);
+  SbFormat(sizeof(count), count, "%" PetscInt_FMT, step->step);
+  if (step->step_end > 0) SbAppend(sizeof(count), count, "/%" PetscInt_FMT, step->step_end);
   if (speed > 0.) {
-    duration(PetscMax(step->t_end - step->t, 0.) / speed, sizeof(left), left);
+    const long s = (long)PetscMin(PetscMax(step->t_end - step->t, 0.) / speed + .5, 359999.);
+
+    /* 75 s as "1:15", 2 h as "2:00:00" */
+    if (s >= 3600)
+      SbFormat(sizeof(left), left, "%ld:%02ld:%02ld", s / 3600, s / 60 % 60, s % 60);
+    else
+      SbFormat(sizeof(left), left, "%ld:%02ld", s / 60, s % 60);
     if (run->model->dynamic) (void)snprintf(times, sizeof(times), "%.3gx", (double)speed);
   }
   (void)snprintf(line, sizeof(line), "%13s %10.4g %6.1f %7.1f %10.3e %10.3e %8s %8s", count, (double)step->t,
@@ -91,11 +84,12 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   p->open = p->terminal;
   p->last = step->wall;
   p->newton = p->linear = p->steps = 0;
-  PetscCall(PetscLogEventEnd(p->event, 0, 0, 0, 0));
+  PetscCall(PetscLogEventEnd(out->event.progress, 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A line within a step that takes long, by rank 0; linear: iteration of the solve within that of Newton's method, -1: none. Not collective. */
+/* A line within a step that takes long, by rank 0; linear: iteration of the solve within that of Newton's
+   method, -1: none. Not collective. */
 static PetscErrorCode say_within(SbRun run, PetscInt newton, PetscInt linear, PetscReal residual)
 {
   const SbOutput out = (SbOutput)run->output;
@@ -150,11 +144,11 @@ PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
   if (!out->rank && !out->line) {
     PetscCall(PetscNew(&out->line));
     out->line->terminal = is_terminal();
-    out->line->event = out->event.progress;
   }
 
-  /* monitors of the run on rank 0, and of its solvers on all: a solver with one computes norms that it does not without */
-  if (out->line) PetscCall(SbRunAddMonitor(run, monitor, out->line));
+  /* of the run on rank 0, and of its solvers on all: a solver with a monitor computes norms that it else does
+     not */
+  if (out->line) PetscCall(SbRunAddMonitor(run, monitor, out));
   if (!run->snes) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESGetKSP(run->snes, &ksp));
   PetscCall(SNESMonitorSet(run->snes, within_newton, run, NULL));

@@ -1,7 +1,10 @@
 /*
-  Console output: a header before the run, a table after it. Eighty columns.
+  Console output: a header before the run, a table after it. Eighty columns. Seconds of a phase are those of
+  the slowest rank; the last phase is the rest of the wall time.
 */
 #include <stdarg.h>
+#include <sys/resource.h>
+#include <time.h>
 #include "output_impl.h"
 #include "sbsolver.h"
 
@@ -37,8 +40,8 @@ static PetscErrorCode entry(const char *title, const char *format, ...)
 /* ------------------------------------------------------------------ before the run */
 
 /*
-  "liver", or for the first of alike copies "50 x ball"; false for the others. mass[2]: the least and the largest of them, kg. Copies are alike in all that the tables say but the mass, as they may
-  differ in scale.
+  "liver", or for the first of alike copies "50 x ball"; false for the others. mass[2]: the least and the
+  largest of them, kg. Copies are alike in all that the tables say but the mass, as they may differ in scale.
 */
 static PetscBool line_of_body(SbModel m, SbOutput out, PetscInt b, size_t size, char name[],
                               PetscReal mass[2])
@@ -142,12 +145,9 @@ PetscErrorCode SbReportHeader(SbRun run)
   else if (!run->model->dynamic)
     PetscCall(entry("time", "%s, %" PetscInt_FMT " load step%s", name, run->static_steps,
                     run->static_steps == 1 ? "" : "s"));
-  else if (run->fixed_step)
-    PetscCall(entry("time", "%s, t = %g to %g s in steps of %g s", name, (double)run->t0, (double)run->t_end,
-                    (double)run->dt));
   else
-    PetscCall(entry("time", "%s, t = %g to %g s, adaptive steps, the first one %g s", name, (double)run->t0,
-                    (double)run->t_end, (double)run->dt));
+    PetscCall(entry("time", "%s, t = %g to %g s%s %g s", name, (double)run->t0, (double)run->t_end,
+                    run->fixed_step ? " in steps of" : ", adaptive steps, the first one", (double)run->dt));
   if (run->solver_parts[0] && strcmp(run->solver, run->solver_parts))
     PetscCall(entry("solver", "%s (%s): %s", run->solver, run->solver_parts, run->solver_reason));
   else
@@ -166,6 +166,7 @@ PetscErrorCode SbReportHeader(SbRun run)
   for (PetscInt p = 0; p < out->nprobe && out->history; p++) {
     const SbProbe *probe = &out->probe[p];
     char where[64] = "a tet";
+    PetscReal off[3];
 
     if (probe->kind != SB_PROBE_POINT) {
       PetscCall(entry("probe", "%s: mean over the %s of '%s'", probe->name,
@@ -176,11 +177,10 @@ PetscErrorCode SbReportHeader(SbRun run)
       (void)snprintf(where, sizeof(where), "the node of an edge");
     else if (probe->original >= 0)
       (void)snprintf(where, sizeof(where), "vertex %lld", (long long)probe->original);
+    SbSubtract(probe->x, probe->at, off);
     PetscCall(entry("probe", "%s at %s (%g, %g, %g) m, %.3g m from the given position", probe->name, where,
                     (double)probe->x[0], (double)probe->x[1], (double)probe->x[2],
-                    (double)PetscSqrtReal(PetscSqr(probe->x[0] - probe->at[0]) +
-                                          PetscSqr(probe->x[1] - probe->at[1]) +
-                                          PetscSqr(probe->x[2] - probe->at[2]))));
+                    (double)PetscSqrtReal(SbDot3(off, off))));
   }
   (void)fflush(PETSC_STDOUT);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -210,6 +210,35 @@ PetscErrorCode SbReportRemeshed(SbRun run, const SbRemeshed *event)
 
 /* ------------------------------------------------------------------ after the run */
 
+PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *p)
+{
+  static const char *const names[SB_PHASE_COUNT] = {"mesh",         "set-up",  "residual",       "tangent",
+                                                    "linear solve", "contact", "contact search", "energies",
+                                                    "output",       "other"};
+  PetscReal mine[SB_PHASE_COUNT], most[SB_PHASE_COUNT], memory, cpu;
+  struct rusage usage;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbLogSeconds(mine));
+  PetscCall(PetscTime(&p->total));
+  p->total -= out->wall_start;
+  mine[SB_PHASE_OTHER] = p->total;
+  PetscCallMPI(MPI_Allreduce(mine, most, SB_PHASE_COUNT, MPIU_REAL, MPI_MAX, out->comm));
+  p->total = most[SB_PHASE_OTHER];
+  for (int i = 0; i < SB_PHASE_OTHER; i++) most[SB_PHASE_OTHER] -= most[i];
+  for (int i = 0; i < SB_PHASE_COUNT; i++) {
+    p->phase[i].name = names[i];
+    p->phase[i].seconds = PetscMax(most[i], 0.);
+  }
+  cpu = SB_CPU_SECONDS - out->cpu_start;
+  PetscCallMPI(MPI_Allreduce(&cpu, &p->cpu, 1, MPIU_REAL, MPI_MAX, out->comm));
+  (void)getrusage(RUSAGE_SELF, &usage);
+  memory = 1024. * (PetscReal)usage.ru_maxrss;
+  PetscCallMPI(MPI_Allreduce(&memory, &p->memory_max, 1, MPIU_REAL, MPI_MAX, out->comm));
+  PetscCallMPI(MPI_Allreduce(&memory, &p->memory_sum, 1, MPIU_REAL, MPI_SUM, out->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static void size_text(PetscReal bytes, size_t size, char text[])
 {
   static const char *const unit[] = {"B", "kB", "MB", "GB"};
@@ -224,8 +253,7 @@ PetscErrorCode SbReportSummary(SbRun run)
   SbOutput out = (SbOutput)run->output;
   const PetscBool stopped = (PetscBool)(run->stop_reason[0] != 0);
   SbPhases phases;
-  char files[1024] = "", memory[32], sum[32], solver[SB_NAME_MAX];
-  char text[512];
+  char files[1024] = "", memory[32], sum[32], solver[SB_NAME_MAX], text[512];
   SbOutputFileSize *file;
   PetscInt nfile;
 

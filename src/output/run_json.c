@@ -1,6 +1,6 @@
 /*
-  run.json: what ran, where, with which settings, how long and how it ended. Written when a run starts (status "running")
-  and replaced as a whole when it ends; a run that was killed leaves the first version.
+  run.json: what ran, where, with which settings, how long and how it ended. Written when a run starts (status
+  "running") and replaced as a whole when it ends; a run that was killed leaves the first version.
 */
 #include <time.h>
 #include <unistd.h>
@@ -86,7 +86,6 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
   char host[256] = "", path[PETSC_MAX_PATH_LEN], *text = NULL, mpi[MPI_MAX_LIBRARY_VERSION_STRING];
   size_t size = 0;
   FILE *f = open_memstream(&text, &size);
-  SbChunk chunk;
   int n;
 
   PetscFunctionBeginUser;
@@ -188,8 +187,7 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
   (void)fprintf(f, "  \"status\": \"%s\"\n}\n", status);
   (void)fclose(f);
   PetscCall(SbOutputPath(out, "run.json", sizeof(path), path));
-  chunk = (SbChunk){text, size};
-  SbFileReplace(path, 1, &chunk, message);
+  SbFileReplace(path, 1, &(SbChunk){text, size}, message);
   free(text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

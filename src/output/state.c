@@ -1,9 +1,11 @@
 /*
   Initial state from another run: -body_<name>_state RUN[,STEP] or CHECKPOINT.
 
-  Displacement and velocity are those of a frame of that run's fields.h5, evaluated at the nodes of this run: u(X) = sum_a w_a u_a with the weights of the tet that contains X at rest
-  there, or of the nearest one; ten weights in a tet of P2. So element, mesh, material, effects and integrator may differ. Every rank reads the body's part of the file.
-  A checkpoint has no mesh, but all unknowns in full precision: for scenes with the same meshes and elements; other scenes take the frame of its step.
+  Displacement and velocity are those of a frame of that run's fields.h5, evaluated at the nodes of this run:
+  u(X) = sum_a w_a u_a with the weights of the tet that contains X at rest there, or of the nearest one; ten
+  weights in a tet of P2. So element, mesh, material, effects and integrator may differ. Every rank reads the
+  body's part of the file. A checkpoint has no mesh, but all unknowns in full precision: for scenes with the
+  same meshes and elements; other scenes take the frame of its step.
 */
 #include <sys/stat.h>
 #include <unistd.h>
@@ -20,19 +22,18 @@ typedef struct {
   PetscInt npoint, ncell;
   PetscReal *x, *u, *v; /* [npoint][3] at rest, m; displacement, m; velocity, m/s, NULL: the frame has none */
   PetscInt *cell;       /* [ncell][4] those of the body */
-  PetscInt
-    *cell10; /* [ncell][10] with the nodes at the edges 01 12 02 03 13 23, -1: none; or NULL without P2 */
+  PetscInt *cell10;     /* [ncell][10] with nodes at the edges 01 12 02 03 13 23, -1: none; NULL without P2 */
 } Other;
 
-/* A whole dataset as numbers of `type`, [n] or [n][ncomp]; NULL when it is not there. PetscFree. */
-static PetscErrorCode read_all(hid_t where, const char *name, hid_t type, size_t size, PetscInt ncomp,
-                               PetscInt *n, void *array)
+/* A whole dataset, [n] or [n][ncomp], of a type as in files; NULL when it is not there. PetscFree. */
+static PetscErrorCode read_all(hid_t where, const char *name, hid_t type, PetscInt ncomp, PetscInt *n,
+                               void *array)
 {
   PetscFunctionBeginUser;
   *(void **)array = NULL;
   *n = (PetscInt)SbH5Rows(where, name);
   if (!*n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc((size_t)*n * (size_t)ncomp * size, (void **)array));
+  PetscCall(PetscMalloc((size_t)*n * (size_t)ncomp * H5Tget_size(SbH5TypeInMemory(type)), (void **)array));
   if (!SbH5Read(where, name, type, *n, ncomp, *(void **)array)) PetscCall(PetscFree(*(void **)array));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -51,11 +52,11 @@ static PetscErrorCode read_tets(Other *o, PetscInt which, PetscBool *ok)
   PetscInt n = 0, nbody, nten, nparent, *body, *parent;
 
   PetscFunctionBeginUser;
-  PetscCall(read_all(o->mesh, "x", H5T_NATIVE_DOUBLE, sizeof(double), 3, &o->npoint, &o->x));
-  PetscCall(read_all(o->mesh, "cells", SB_H5_INT, sizeof(PetscInt), 4, &o->ncell, &o->cell));
-  PetscCall(read_all(o->mesh, "body", SB_H5_INT, sizeof(PetscInt), 1, &nbody, &body));
-  PetscCall(read_all(o->mesh, "cells10", SB_H5_INT, sizeof(PetscInt), 10, &nten, &o->cell10));
-  PetscCall(read_all(o->mesh, "parent", SB_H5_INT, sizeof(PetscInt), 1, &nparent, &parent));
+  PetscCall(read_all(o->mesh, "x", H5T_IEEE_F64LE, 3, &o->npoint, &o->x));
+  PetscCall(read_all(o->mesh, "cells", H5T_STD_I64LE, 4, &o->ncell, &o->cell));
+  PetscCall(read_all(o->mesh, "body", H5T_STD_I64LE, 1, &nbody, &body));
+  PetscCall(read_all(o->mesh, "cells10", H5T_STD_I64LE, 10, &nten, &o->cell10));
+  PetscCall(read_all(o->mesh, "parent", H5T_STD_I64LE, 1, &nparent, &parent));
   *ok = (PetscBool)(o->x && o->cell && (!nbody || (body && nbody == o->ncell)) && (!nten || o->cell10) &&
                     (nparent
                        ? parent && nparent == o->ncell && nten <= nparent && are_points(parent, nparent, nten)
@@ -85,7 +86,7 @@ static PetscErrorCode read_tets(Other *o, PetscInt which, PetscBool *ok)
 
 static PetscErrorCode read_other(const char *option, const char *text, const SbBody *body, Other *o)
 {
-  char name[32] = "mesh", *comma, *names, *rest;
+  char name[SB_MESH_NAME], *comma, *names, *rest;
   struct stat info;
   SbH5Frames frames = {.wanted = -1};
   PetscInt which = -1, n = 0, nu;
@@ -116,8 +117,7 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
 
   /* the mesh of that frame, which may be one of a re-meshing */
   if (H5Aexists(o->frame, "mesh") > 0) SbH5GetInt(o->frame, "mesh", &mesh, &ok);
-  if (mesh) (void)snprintf(name, sizeof(name), "mesh_%06ld", (long)mesh);
-  o->mesh = H5Gopen2(o->file, name, H5P_DEFAULT);
+  o->mesh = H5Gopen2(o->file, SbOutputMeshName((PetscInt)mesh, name), H5P_DEFAULT);
 
   /* number of the body of this name, or of the one that it is a copy of; the only body, if there is one */
   if (o->mesh >= 0) {
@@ -131,13 +131,12 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
   PetscCheck(which >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s has no body '%s'", option,
              text, o->path, body->name);
   PetscCall(read_tets(o, which, &ok));
-  PetscCall(read_all(o->frame, "displacement", H5T_NATIVE_DOUBLE, sizeof(double), 3, &nu, &o->u));
-  PetscCall(read_all(o->frame, "velocity", H5T_NATIVE_DOUBLE, sizeof(double), 3, &n, &o->v));
-  PetscCheck(
-    ok && o->u && nu == o->npoint && (!o->v || n == nu), PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-    "%s %s: %s has no complete mesh with displacements; -output_fields displacement,velocity there, or "
-    "it is damaged",
-    option, text, o->path);
+  PetscCall(read_all(o->frame, "displacement", H5T_IEEE_F64LE, 3, &nu, &o->u));
+  PetscCall(read_all(o->frame, "velocity", H5T_IEEE_F64LE, 3, &n, &o->v));
+  PetscCheck(ok && o->u && nu == o->npoint && (!o->v || n == nu), PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s %s: %s has no complete mesh with displacements; -output_fields displacement,velocity there, "
+             "or it is damaged",
+             option, text, o->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -165,9 +164,7 @@ static PetscErrorCode tell_velocity(SbModel m, const char *option, PetscInt b, c
 static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other *o)
 {
   const SbSpace s = run->model->space;
-  const PetscReal *box = run->model->body[b].bbox;
-  const PetscReal size[3] = {box[3] - box[0], box[4] - box[1], box[5] - box[2]};
-  PetscReal far = 0., diagonal = PetscSqrtReal(PetscSqr(size[0]) + PetscSqr(size[1]) + PetscSqr(size[2]));
+  PetscReal far = 0.;
   static const int edge[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
   static const int place[6] = {0, 2, 3, 1, 4, 5}; /* in that order, of the edges 01 02 03 12 13 23 */
   SbLocator locator;
@@ -214,7 +211,7 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
   PetscCall(SbLocatorDestroy(&locator));
   PetscCall(PetscFree(off));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &far, 1, MPIU_REAL, MPI_MAX, run->model->comm));
-  if (far > OUTSIDE * diagonal)
+  if (far > OUTSIDE * SbBoxDiagonal(run->model->body[b].bbox))
     PetscCall(SbWarning(run->model->comm,
                         "%s: nodes are up to %g m outside of the body in %s, and take the values of the "
                         "nearest place: is it the same body, at the same place?",
@@ -224,8 +221,9 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
 }
 
 /*
-  row[nnode_owned]: the row of each owned node in a checkpoint with n nodes of the same meshes and elements. Supports of dg may differ: each of this run's takes the row of its
-  face's node. ok: the number of nodes agrees. Collective.
+  row[nnode_owned]: the row of each owned node in a checkpoint with n nodes of the same meshes and elements.
+  Supports of dg may differ: each of this run's takes the row of its face's node. ok: the number of nodes
+  agrees. Collective.
 */
 static PetscErrorCode find_rows(SbRun run, PetscInt n, PetscInt row[], PetscBool *ok)
 {
@@ -256,8 +254,8 @@ static PetscErrorCode find_rows(SbRun run, PetscInt n, PetscInt row[], PetscBool
 }
 
 /*
-  The unknowns of body b from a checkpoint; is: the file is one of the same bodies, meshes and elements. For another checkpoint frame[] names the frame of its step in its
-  run's folder. Collective.
+  The unknowns of body b from a checkpoint; is: the file is one of the same bodies, meshes and elements. For
+  another checkpoint frame[] names the frame of its step in its run's folder. Collective.
 */
 static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b, const char *path,
                                       size_t size, char frame[], PetscBool *is)
@@ -275,14 +273,11 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
   PetscFunctionBeginUser;
   *is = (PetscBool)(!stat(path, &info) && S_ISREG(info.st_mode));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, is, 1, SB_MPI_BOOL, MPI_LAND, out->comm));
-  if (!*is) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbH5Open(out->comm, path, PETSC_FALSE, &h, is));
+  if (*is) PetscCall(SbH5Open(out->comm, path, PETSC_FALSE, &h, is));
   if (!*is) PetscFunctionReturn(PETSC_SUCCESS);
   *is = (PetscBool)(H5Lexists(h.file, "u", H5P_DEFAULT) > 0);
-  if (!*is) {
-    PetscCall(SbH5Close(&h));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
+  if (!*is) PetscCall(SbH5Close(&h));
+  if (!*is) PetscFunctionReturn(PETSC_SUCCESS);
 
   /* compare meshes and elements */
   PetscCall(SbOutputOrder(run, out));
@@ -312,7 +307,8 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
   }
   PetscCall(PetscMalloc1(s->nnode_owned, &row));
 
-  /* displacement and velocity of its nodes; supports, which follow the faces' nodes in the file, may be other ones */
+  /* displacement and velocity of its nodes; supports, which follow the faces' nodes there, may be other ones
+     */
   PetscCall(find_rows(run, (PetscInt)SbH5Rows(h.file, "u"), row, &ok));
   if (ok) {
     SbOrder order;

@@ -1,15 +1,18 @@
 /*
-  fields.vtkhdf, and contacts.vtkhdf: an index of fields.h5 in VTK's own format, which ParaView, VTK and PyVista open without choosing a reader.
+  fields.vtkhdf, and contacts.vtkhdf: an index of fields.h5 in VTK's own format, which ParaView, VTK and
+  PyVista open without choosing a reader.
 
-  Every array is a virtual dataset: a list of places in fields.h5, so that nothing is stored twice. Bodies are an UnstructuredGrid with one part per
-  mesh (there are several in a run that was re-meshed); steps name the part that they show and where their values begin. Their points are the field
-  `position`, so that bodies move; frames without it show the rest shape. Contact points are PolyData, one part per frame.
+  Every array is a virtual dataset: a list of places in fields.h5, so that nothing is stored twice. Bodies are
+  an UnstructuredGrid with one part per mesh (there are several in a run that was re-meshed); steps name the
+  part that they show and where their values begin. Their points are the field `position`, so that bodies
+  move; frames without it show the rest shape. Contact points are PolyData, one part per frame.
 
-  The file is built in memory and replaced as a whole, in a time that grows with the number of frames. So it is rebuilt after BETWEEN times the seconds
-  of the last time, and at the end of the run: at most a twentieth of the run.
+  The file is built in memory and replaced as a whole, in a time that grows with the number of frames. So it
+  is rebuilt after BETWEEN times the seconds of the last time, and at the end of the run: at most a twentieth
+  of the run.
 
-  Reference: VTKHDF file format, version 2.0 (docs.vtk.org, "VTK File Formats"): Steps of UnstructuredGrid and PolyData. Symmetric tensors
-  have the order xx yy zz xy yz xz there.
+  Reference: VTKHDF file format, version 2.0 (docs.vtk.org, "VTK File Formats"): Steps of UnstructuredGrid and
+  PolyData. Symmetric tensors have the order xx yy zz xy yz xz there.
 */
 #include "index.h"
 
@@ -33,7 +36,7 @@ static PetscInt rows_of(SbIndex v, const SbArray *a, PetscInt block)
   return a->cell ? p->ncell : p->npoint;
 }
 
-/* The virtual dataset of an array as `name`: all frames or parts in sequence; corners of cells as one list. */
+/* The virtual dataset of an array: all frames or parts in sequence; corners of cells as one list. */
 static void write_array(SbIndex v, hid_t where, const char *name, const SbArray *a, PetscBool *ok)
 {
   static const hsize_t to_vtk[6] = {0, 3, 5, 1, 4, 2}; // column in fields.h5 of each of xx yy zz xy yz xz
@@ -80,7 +83,8 @@ static void write_array(SbIndex v, hid_t where, const char *name, const SbArray 
   (void)H5Pclose(list);
 }
 
-/* A dataset [n], or [n][m] when m > 0, of that type, from 64-bit numbers in memory; compressed when large. Of type uint8 all values are data[0]. */
+/* A dataset [n], or [n][m] when m > 0, of that type, from 64-bit numbers in memory; compressed when large. Of
+   type uint8 all values are data[0]. */
 static void write_numbers(hid_t where, const char *name, PetscInt n, PetscInt m, hid_t type,
                           const void *values, PetscBool *ok)
 {
@@ -242,23 +246,20 @@ static void write_file(SbIndex v, hid_t file, int64_t *work, PetscBool *ok)
 
 void SbVtkhdfWrite(SbIndex v, PetscBool last, char message[SB_MESSAGE_MAX])
 {
-  const hid_t list = H5Pcreate(H5P_FILE_ACCESS);
   size_t nwork = 4 * (size_t)v->nframe + (size_t)v->npart + 1;
   PetscBool ok = PETSC_TRUE;
   int64_t *work;
   SbChunk image = {NULL, 0};
   const double begun = MPI_Wtime();
   void *text = NULL;
-  hid_t file;
+  hid_t file, list;
 
-  if (v->nframe == v->nwritten || (!last && begun < v->next)) {
-    (void)H5Pclose(list);
-    return;
-  }
+  if (v->nframe == v->nwritten || (!last && begun < v->next)) return;
   for (PetscInt p = 0; p < v->npart; p++) nwork += (size_t)v->part[p].ncell + 1;
   work = (int64_t *)malloc(nwork * sizeof(*work));
 
   /* made in memory, then replaced in one step */
+  list = H5Pcreate(H5P_FILE_ACCESS);
   (void)H5Pset_fapl_core(list, 1 << 16, 0);
   file = work ? H5Fcreate(v->vtkhdf, H5F_ACC_TRUNC, H5P_DEFAULT, list) : -1;
   if (file >= 0) {

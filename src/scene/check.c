@@ -1,8 +1,8 @@
 /*
   check.c - consistency checks of several options, before the computation.
 
-  A missing mesh file is an error here, before other bodies are read; the message suggests similar names in its
-  folder. A static run without prescribed displacements has a singular matrix.
+  A missing mesh file is an error here, before other bodies are read; the message suggests similar names in
+  its folder. A static run without prescribed displacements has a singular matrix.
 */
 #include <dirent.h>
 #include <errno.h>
@@ -17,7 +17,7 @@
 static PetscErrorCode near_files(const char *path, size_t size, char text[])
 {
   const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
-  char folder[PETSC_MAX_PATH_LEN], found[PETSC_MAX_PATH_LEN];
+  char folder[PETSC_MAX_PATH_LEN];
   DIR *dir;
   struct dirent *entry;
   const char **list;
@@ -25,15 +25,20 @@ static PetscErrorCode near_files(const char *path, size_t size, char text[])
 
   PetscFunctionBeginUser;
   text[0] = 0;
-  (void)snprintf(folder, sizeof(folder), "%.*s", slash ? (int)(slash - path) + 1 : 1, slash ? path : ".");
-  dir = opendir(folder);
+  SbFormat(sizeof(folder), folder, "%.*s", (int)(name - path), path);
+  dir = opendir(slash ? folder : ".");
   if (!dir) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(NAMES_MAX, &list));
   while (n < NAMES_MAX && (entry = readdir(dir)))
     PetscCall(PetscStrallocpy(entry->d_name, (char **)&list[n++]));
   (void)closedir(dir);
-  PetscCall(SbSuggestNames(name, n, list, sizeof(found), found));
-  if (found[0]) PetscCall(PetscSNPrintf(text, size, "%s%s", slash ? folder : "", found));
+  PetscCall(SbSuggestNames(name, n, list, size, text));
+  if (text[0]) {
+    char found[PETSC_MAX_PATH_LEN];
+
+    SbFormat(sizeof(found), found, "%s%s", folder, text);
+    SbFormat(size, text, "%s", found);
+  }
   for (PetscInt i = 0; i < n; i++) PetscCall(PetscFree(list[i]));
   PetscCall(PetscFree(list));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -42,46 +47,36 @@ static PetscErrorCode near_files(const char *path, size_t size, char text[])
 /* Rank 0 checks that the mesh file exists; collective. */
 static PetscErrorCode check_mesh_file(MPI_Comm comm, const SbBody *body)
 {
-  char near[PETSC_MAX_PATH_LEN] = "", folder[PETSC_MAX_PATH_LEN], make[PETSC_MAX_PATH_LEN + 32] = "";
-  char node[PETSC_MAX_PATH_LEN + 8];
+  const char *mesh = body->mesh, *dot = strrchr(mesh, '.');
+  char near[PETSC_MAX_PATH_LEN] = "", other[PETSC_MAX_PATH_LEN + 8], advice[PETSC_MAX_PATH_LEN + 32] = "";
   int error = 0;
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   // the file, or the .node file of a TetGen mesh given by its stem
-  (void)snprintf(node, sizeof(node), "%s.node", body->mesh);
-  if (!rank && access(node, R_OK) && access(body->mesh, R_OK)) {
+  SbFormat(sizeof(other), other, "%s.node", mesh);
+  if (!rank && access(other, R_OK) && access(mesh, R_OK)) {
     error = errno;
 
-    /* advice "; make meshes/lobe.msh makes it", if there is a .geo file, as for the meshes of the scenarios */
-    if (error == ENOENT) {
-      const char *dot = strrchr(body->mesh, '.');
-      char geo[PETSC_MAX_PATH_LEN + 4];
-
-      if (dot && !strcmp(dot, ".msh") && !strncmp(body->mesh, "meshes/", 7)) {
-        (void)snprintf(geo, sizeof(geo), "%.*s.geo", (int)(dot - body->mesh), body->mesh);
-        if (!access(geo, R_OK)) (void)snprintf(make, sizeof(make), "; make %s makes it", body->mesh);
-      }
+    /* advice: make it, if there is a .geo file as for meshes of the scenarios; a similar name; the folder */
+    if (error == ENOENT && dot && !strcmp(dot, ".msh") && !strncmp(mesh, "meshes/", 7)) {
+      SbFormat(sizeof(other), other, "%.*s.geo", (int)(dot - mesh), mesh);
+      if (!access(other, R_OK)) SbFormat(sizeof(advice), advice, "; make %s makes it", mesh);
     }
-    if (error == ENOENT && !make[0]) PetscCall(near_files(body->mesh, sizeof(near), near));
+    if (error == ENOENT && !advice[0]) PetscCall(near_files(mesh, sizeof(near), near));
+    if (near[0]) {
+      SbFormat(sizeof(advice), advice, "; did you mean %s?", near);
+    } else if (!advice[0] && mesh[0] != '/') {
+      PetscCall(PetscGetWorkingDirectory(near, sizeof(near)));
+      SbFormat(sizeof(advice), advice, "; relative names begin in %s", near);
+    }
   }
   PetscCallMPI(MPI_Bcast(&error, 1, MPI_INT, 0, comm));
-  if (!error) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCallMPI(MPI_Bcast(near, sizeof(near), MPI_CHAR, 0, comm));
-  PetscCallMPI(MPI_Bcast(make, sizeof(make), MPI_CHAR, 0, comm));
-  PetscCheck(!make[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-body_%s_mesh %s: %s%s", body->name, body->mesh,
-             strerror(error), make);
-  PetscCall(PetscGetWorkingDirectory(folder, sizeof(folder)));
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "-body_%s_mesh %s: %s%s%s%s", body->name, body->mesh,
-          strerror(error),
-          near[0]                ? "; did you mean "
-          : body->mesh[0] == '/' ? ""
-                                 : "; relative names begin in ",
-          near[0]                ? near
-          : body->mesh[0] == '/' ? ""
-                                 : folder,
-          near[0] ? "?" : "");
+  PetscCallMPI(MPI_Bcast(advice, sizeof(advice), MPI_CHAR, 0, comm));
+  PetscCheck(!error, PETSC_COMM_SELF, PETSC_ERR_USER, "-body_%s_mesh %s: %s%s", body->name, mesh,
+             strerror(error), advice);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbSceneCheck(SbModel model)
@@ -122,8 +117,7 @@ PetscErrorCode SbSceneCheckSizes(SbModel model)
     if (!given)
       PetscCall(SbWarning(model->comm,
                           "body '%s' is %.3g m long: if its file is in mm, give -body_%s_scale 0.001 (in cm: "
-                          "0.01); if it is in m, "
-                          "-body_%s_scale 1 says so",
+                          "0.01); if it is in m, -body_%s_scale 1 says so",
                           body->name, (double)length, scope.instance, scope.instance));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,9 +1,9 @@
 /*
   command.c - the command line: options of the program itself, and errors that PETSc would ignore.
 
-  PETSc takes the word after an option as its value and ignores every other word; so `-translate 0, 0, 1` would
-  become `-translate 0,`. Such words are an error here. PETSc reads option files on rank 0 while the other ranks wait:
-  missing files are found before.
+  PETSc takes the word after an option as its value and ignores every other word; so `-translate 0, 0, 1`
+  would become `-translate 0,`. Such words are an error here. PETSc reads option files on rank 0 while the
+  other ranks wait: missing files are found before.
 */
 #include <errno.h>
 #include <sys/stat.h>
@@ -34,22 +34,13 @@ PetscErrorCode SbCommandRegister(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbCommandSetErrorTrace(void)
+/* Whether a word is this option, with one dash or two. */
+static PetscBool is_option(const char *word, const char *key)
 {
-  PetscBool trace;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionBool(&SbRunScope, "error_trace", &trace));
-  SbErrorSetTrace(trace);
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return (PetscBool)!strcasecmp(word + 1 + (word[1] == '-'), key);
 }
 
-static PetscBool is_one_of(const char *word, const char *a, const char *b)
-{
-  return (PetscBool)(!strcasecmp(word, a) || !strcasecmp(word, b));
-}
-
-/* Whether rank 0 can read an option file, whose name is then recorded; else sets command->problem. Collective. */
+/* Whether rank 0 can read an option file, which is then recorded; else sets command->problem. Collective. */
 static PetscBool readable(const char *file, SbCommand *command)
 {
   int error = 0;
@@ -74,26 +65,26 @@ static PetscBool readable(const char *file, SbCommand *command)
 /* Handles one option with its value (NULL: none); returns whether it remains on the command line. */
 static PetscBool take_option(const char *name, const char *value, SbCommand *command)
 {
-  if (is_one_of(name, "-help", "--help") || !strcmp(name, "-h")) {
+  if (is_option(name, "help") || !strcmp(name, "-h")) {
     if (value && !strcasecmp(value, "petsc")) return PETSC_TRUE;
     command->help = PETSC_TRUE;
     (void)snprintf(command->topic, sizeof(command->topic), "%s", value ? value : "");
     return PETSC_FALSE;
   }
-  if (is_one_of(name, "-version", "--version")) {
-    command->version = PETSC_TRUE;
-    return PETSC_FALSE;
-  }
-  if (is_one_of(name, "-scenario_view", "--scenario_view")) {
+  if (is_option(name, "scenario_view")) {
     command->view = PETSC_TRUE;
     (void)snprintf(command->view_file, sizeof(command->view_file), "%s", value ? value : "");
     return PETSC_FALSE;
   }
-  if (is_one_of(name, "-options_table", "--options_table")) {
+  if (is_option(name, "options_table")) {
     (void)snprintf(command->table, sizeof(command->table), "%s", value ? value : "-");
     return PETSC_FALSE;
   }
-  if (is_one_of(name, "-options_file", "-options_file_yaml") && value) {
+  if (is_option(name, "version")) {
+    command->version = PETSC_TRUE;
+    return PETSC_FALSE;
+  }
+  if (value && (!strcasecmp(name, "-options_file") || !strcasecmp(name, "-options_file_yaml"))) {
     SbErrorSetFile(value);
     return readable(value, command);
   }
@@ -107,17 +98,17 @@ PetscErrorCode SbCommandLine(int *argc, char *argv[], SbCommand *command)
   PetscFunctionBeginUser;
   memset(command, 0, sizeof(*command));
   for (int i = 1; i < *argc;) {
-    PetscBool is_option, next_is_option = PETSC_TRUE;
+    PetscBool option, next_is_option = PETSC_TRUE;
     int words;
 
-    PetscCall(PetscOptionsValidKey(argv[i], &is_option));
+    PetscCall(PetscOptionsValidKey(argv[i], &option));
     if (i + 1 < *argc) PetscCall(PetscOptionsValidKey(argv[i + 1], &next_is_option));
-    words = is_option && !next_is_option ? 2 : 1;
-    if (is_option) {
+    words = option && !next_is_option ? 2 : 1;
+    if (option) {
       const PetscBool stays = take_option(argv[i], words == 2 ? argv[i + 1] : NULL, command);
 
       if (stays) argv[kept++] = argv[i];
-      if (stays && words == 2 && !is_one_of(argv[i], "-help", "--help")) argv[kept++] = argv[i + 1];
+      if (stays && words == 2 && !is_option(argv[i], "help")) argv[kept++] = argv[i + 1];
     } else if (i == 1) {
       argv[kept++] = argv[1];
       SbErrorSetFile(argv[1]);

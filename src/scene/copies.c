@@ -1,15 +1,15 @@
 /*
   copies.c - copies of a body, placed as listed in a file or on a grid.
 
-  With scale s, rotation R and translation t of the body's own options and those of a copy (s', R', t'), a mesh point x is at R' R s' s x + t + t'. Rotations are composed as
-  quaternions: q' q.
+  With scale s, rotation R and translation t of the body's own options and those of a copy (s', R', t'), a
+  mesh point x is at R' R s' s x + t + t'. Rotations are composed as quaternions: q' q.
 */
 #include <errno.h>
 #include "scene_impl.h"
 
 #define NUMBERS 11 /* numbers on a line: x y z, axis, degrees, scale, velocity */
 
-/* Parses the placement on a line, numbers separated by blanks or commas; `found` is false for a blank line or a comment. */
+/* Parses the placement on a line, numbers with blanks or commas; not found: a blank line or a comment. */
 static PetscErrorCode read_line(const char *option, const char *file, int number, char *line,
                                 SbPlacement *place, PetscBool *found)
 {

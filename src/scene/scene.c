@@ -1,5 +1,6 @@
 /*
-  scene.c - builds the model from options: bodies with material and element, effects, sets. Nothing is computed here.
+  scene.c - builds the model from options: bodies with material and element, effects, sets. Nothing is
+  computed here.
 */
 #include "scene_impl.h"
 
@@ -99,6 +100,8 @@ static PetscErrorCode read_start(const SbScope *scope, const char *key, SbFormul
 static PetscErrorCode read_body(SbModel model, PetscInt i)
 {
   SbBody *body = &model->body[i];
+  char(*inclusions)[SB_NAME_MAX], law[SB_NAME_MAX];
+  PetscInt n;
   SbScope scope;
   PetscReal axis;
 
@@ -135,10 +138,26 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
              "-body_%s_state and -body_%s_displacement both say where the body begins: give one of them",
              body->name, body->name);
   PetscCall(SbOptionReals(&scope, "angular_velocity", body->angular_velocity));
+
+  /* append the materials of its inclusions */
+  PetscCall(SbOptionNames(&scope, "inclusions", &n, &inclusions));
+  PetscCheck(n <= SB_INCLUSION_MAX, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-body_%s_inclusions names %" PetscInt_FMT " sets; a body may have up to %d", body->name, n,
+             SB_INCLUSION_MAX);
+  PetscCall(PetscRealloc((size_t)(model->nmaterial + n) * sizeof(*model->material), &model->material));
+  PetscCall(PetscRealloc((size_t)(model->nmaterial + n - model->nbody + 1) * SB_NAME_MAX, &model->inclusion));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscCall(PetscStrncpy(model->inclusion[model->nmaterial - model->nbody], inclusions[k], SB_NAME_MAX));
+    PetscCall(SbScopeSet(&scope, "inclusion", "", inclusions[k]));
+    PetscCall(read_type(&scope, "material", SbMaterialList, law));
+    PetscCall(SbMaterialCreate(law, &scope, &model->material[model->nmaterial]));
+    body->inclusion[body->ninclusion++].material = model->nmaterial++;
+  }
+  PetscCall(PetscFree(inclusions));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads the n bodies of these names, with all copies; copy[i][ncopy[i]] is allocated here and freed by the caller. */
+/* Reads the n bodies of these names, with all copies; the caller frees copy[i][ncopy[i]]. */
 static PetscErrorCode read_named_bodies(SbModel model, PetscInt n, const char (*names)[SB_NAME_MAX],
                                         PetscInt ncopy[], SbPlacement *copy[])
 {
@@ -173,31 +192,6 @@ static PetscErrorCode read_named_bodies(SbModel model, PetscInt n, const char (*
       PetscCall(read_body(model, b));
       if (ncopy[i]) SbPlacementAdd(&copy[i][k], body);
     }
-  }
-  for (PetscInt i = 0; i < model->nbody; i++) {
-    SbBody *body = &model->body[i];
-    char(*inclusions)[SB_NAME_MAX], law[SB_NAME_MAX];
-    SbScope scope;
-    PetscInt ninclusion;
-
-    // append the materials of the inclusions of body i
-    PetscCall(SbScopeSet(&scope, "body", "", body->name));
-    PetscCall(SbOptionNames(&scope, "inclusions", &ninclusion, &inclusions));
-    PetscCheck(ninclusion <= SB_INCLUSION_MAX, PETSC_COMM_SELF, PETSC_ERR_USER,
-               "-body_%s_inclusions names %" PetscInt_FMT " sets; a body may have up to %d", body->name,
-               ninclusion, SB_INCLUSION_MAX);
-    PetscCall(
-      PetscRealloc((size_t)(model->nmaterial + ninclusion) * sizeof(*model->material), &model->material));
-    PetscCall(PetscRealloc((size_t)(model->nmaterial + ninclusion - model->nbody + 1) * SB_NAME_MAX,
-                           &model->inclusion));
-    for (PetscInt k = 0; k < ninclusion; k++) {
-      PetscCall(PetscStrncpy(model->inclusion[model->nmaterial - model->nbody], inclusions[k], SB_NAME_MAX));
-      PetscCall(SbScopeSet(&scope, "inclusion", "", inclusions[k]));
-      PetscCall(read_type(&scope, "material", SbMaterialList, law));
-      PetscCall(SbMaterialCreate(law, &scope, &model->material[model->nmaterial]));
-      body->inclusion[body->ninclusion++].material = model->nmaterial++;
-    }
-    PetscCall(PetscFree(inclusions));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,9 +1,11 @@
 /*
-  sets.c - named sets of a scene: those defined by a shape in -sets, and those that effects, probes and bodies name directly.
+  sets.c - named sets of a scene: those defined by a shape in -sets, and those that effects, probes and bodies
+  name directly.
 
-  Sets are named by the options `on` of effects, `on` and `in` of probes, `inclusions` of bodies. A name that -sets does not define means, in this order: the body
-  of that name, `all` bodies, the whole `boundary`, the physical group of that name. All such names are collected before
-  the mesh is read, because its sets are marked while the bodies are read.
+  Sets are named by the options `on` of effects, `on` and `in` of probes, `inclusions` of bodies. A name that
+  -sets does not define means, in this order: the body of that name, `all` bodies, the whole `boundary`, the
+  physical group of that name. All such names are collected before the mesh is read, because its sets are
+  marked while the bodies are read.
 */
 #include "scene_impl.h"
 
@@ -64,18 +66,15 @@ static PetscErrorCode use_name(SbModel model, const char *name)
   PetscFunctionBeginUser;
   if (find_set(model, name) >= 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscStrncpy(set->name, name, sizeof(set->name)));
-  if (find_body(model, name) >= 0) {
-    set->shape = SB_SET_BODY;
-    PetscCall(PetscStrncpy(set->group, name, sizeof(set->group)));
-  } else if (!strcmp(name, "all")) {
-    /* a half-space that contains every point */
-    set->shape = SB_SET_HALFSPACE;
+  set->shape = find_body(model, name) >= 0 ? SB_SET_BODY
+               : !strcmp(name, "all")      ? SB_SET_HALFSPACE
+               : !strcmp(name, "boundary") ? SB_SET_BOUNDARY
+                                           : SB_SET_GROUP;
+  if (set->shape == SB_SET_HALFSPACE) {
+    /* one that contains every point */
     set->p[2] = 1;
     set->p[3] = PETSC_MAX_REAL;
-  } else if (!strcmp(name, "boundary")) {
-    set->shape = SB_SET_BOUNDARY;
-  } else {
-    set->shape = SB_SET_GROUP;
+  } else if (set->shape != SB_SET_BOUNDARY) {
     PetscCall(PetscStrncpy(set->group, name, sizeof(set->group)));
   }
   model->nset++;

@@ -36,35 +36,33 @@ static PetscErrorCode refine(SbTool *tool, SbImport *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode say(const SbTool *tool, PetscInt n, const char *what)
-{
-  char number[32];
-
-  PetscFunctionBeginUser;
-  if (n && !tool->quiet) PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s\n", what, SbToolNumber(n, number)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode repair(SbTool *tool, SbImport *mesh)
 {
   SbRepair r;
-  char welded[96];
+  char welded[96], number[32];
+  PetscBool any = PETSC_FALSE;
+  const struct {
+    const PetscInt *n;
+    const char *what;
+  } done[] = {{&r.nwelded, welded},
+              {&r.ncollapsed, "tets that used a vertex twice, dropped"},
+              {&r.nduplicate, "tets given again, dropped"},
+              {&r.nflat, "flat tets dropped"},
+              {&r.nslit, "  of these inside the body, each left a slit without width there"},
+              {&r.nturned, "inverted tets turned"},
+              {&r.nunused, "unused vertices dropped"},
+              {&r.nitem, "triangles, lines and points of groups that are not of the tets, dropped"}};
 
   PetscFunctionBeginUser;
   SB_TOOL_PHASE(tool, "repairing", SbMeshFileRepair(mesh, tool->merge_tolerance, &r));
   (void)snprintf(welded, sizeof(welded), "vertices welded to others at most %.3g m away",
                  (double)r.merge_tolerance);
-  PetscCall(say(tool, r.nwelded, welded));
-  PetscCall(say(tool, r.ncollapsed, "tets that used a vertex twice, dropped"));
-  PetscCall(say(tool, r.nduplicate, "tets given again, dropped"));
-  PetscCall(say(tool, r.nflat, "flat tets dropped"));
-  PetscCall(say(tool, r.nslit, "  of these inside the body, each left a slit without width there"));
-  PetscCall(say(tool, r.nturned, "inverted tets turned"));
-  PetscCall(say(tool, r.nunused, "unused vertices dropped"));
-  PetscCall(say(tool, r.nitem, "triangles, lines and points of groups that are not of the tets, dropped"));
-  if (!tool->quiet && !r.nwelded && !r.ncollapsed && !r.nflat && !r.nduplicate && !r.nturned && !r.nunused &&
-      !r.nitem)
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, "nothing to repair\n"));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(done) && !tool->quiet; i++) {
+    if (!*done[i].n) continue;
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s\n", done[i].what, SbToolNumber(*done[i].n, number)));
+    any = PETSC_TRUE;
+  }
+  if (!any && !tool->quiet) PetscCall(PetscPrintf(PETSC_COMM_SELF, "nothing to repair\n"));
   PetscCall(write_mesh(tool, mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

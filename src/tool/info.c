@@ -1,15 +1,17 @@
 /*
-  info.c - supple-mesh info: contents and quality of a mesh, whether a run accepts it, and an estimate of the memory of a run.
+  info.c - supple-mesh info: contents and quality of a mesh, whether a run accepts it, and an estimate of the
+  memory of a run.
 
-  The estimate uses counts of the mesh. N nodes of the element: vertices (p1), faces (cr), four in every tet (dg), vertices and edges (p2). A row of the matrix has a block of
-  3 x 3 numbers for its node and for each node coupled with it; total number of blocks:
+  The estimate uses counts of the mesh. N nodes of the element: vertices (p1), faces (cr), four in every tet
+  (dg), vertices and edges (p2). A row of the matrix has a block of 3 x 3 numbers for its node and for each
+  node coupled with it; total number of blocks:
 
     p1  N + 2 edges
-    cr  N + 12 per tet (six pairs of faces, each pair in one tet only) + 18 per interior face, whose jump term couples the three other
-        faces of one side with those of the other
+    cr  N + 12 per tet (six pairs of faces, each pair in one tet only) + 18 per interior face, whose jump term
+        couples the three other faces of one side with those of the other
     dg  16 per tet + 32 per interior face
-    p2  N + 6 per edge + 12 per face + 6 per tet (the three edges of a triangle are coupled with each other and each with the opposite corner;
-        a tet has three pairs of opposite edges)
+    p2  N + 6 per edge + 12 per face + 6 per tet (the three edges of a triangle are coupled with each other
+        and each with the opposite corner; a tet has three pairs of opposite edges)
 
   The other constants were measured, see below. docs/reference/meshes.md gives the accuracy.
 */
@@ -89,25 +91,21 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
 {
   SbMeshStatistics facts;
   PetscInt nvert, n[4];
-  char number[32];
-  const PetscReal *b;
+  char number[32], label[32];
+  const PetscReal *b = facts.body.bbox;
   static const char *const elements[] = {"p1", "cr", "dg", "p2"};
+  static const char *const what[4] = {"points of groups", "lines of groups", "triangles of groups", "tets"};
   PetscInt64 most = 1;
-  char label[32];
 
   PetscFunctionBeginUser;
   SbMeshFileCount(mesh, &nvert, n);
-  (void)printf("%s\n", tool->in);
-  (void)printf("  %-26s %12s\n", "vertices", SbToolNumber(nvert, number));
-  (void)printf("  %-26s %12s\n", "tets", SbToolNumber(n[3], number));
-  if (n[2]) (void)printf("  %-26s %12s\n", "triangles of groups", SbToolNumber(n[2], number));
-  if (n[1]) (void)printf("  %-26s %12s\n", "lines of groups", SbToolNumber(n[1], number));
-  if (n[0]) (void)printf("  %-26s %12s\n", "points of groups", SbToolNumber(n[0], number));
+  (void)printf("%s\n  %-26s %12s\n", tool->in, "vertices", SbToolNumber(nvert, number));
+  for (int d = 3; d >= 0; d--)
+    if (d == 3 || n[d]) (void)printf("  %-26s %12s\n", what[d], SbToolNumber(n[d], number));
   PetscCall(groups(mesh));
   (void)fflush(stdout);
   SB_TOOL_PHASE(tool, "measuring", SbMeshFileMeasure(mesh, &facts));
   // dimensions and counts
-  b = facts.body.bbox;
   (void)printf("size (coordinates in m)\n");
   (void)printf("  from (%.6g, %.6g, %.6g) to (%.6g, %.6g, %.6g)\n", (double)b[0], (double)b[1], (double)b[2],
                (double)b[3], (double)b[4], (double)b[5]);

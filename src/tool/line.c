@@ -1,8 +1,8 @@
 /*
   line.c - command line of supple-mesh: a command, one or two files, options in any order.
 
-  Options are rows of a table as in supple itself; each row lists the commands that read it. An option that the command does not
-  read is an error, as is a misspelt one.
+  Options are rows of a table as in supple itself; each row lists the commands that read it. An option that
+  the command does not read is an error, as is a misspelt one.
 */
 #include <strings.h>
 #include "tool.h"
@@ -126,9 +126,8 @@ PetscErrorCode SbToolCommandLine(int *argc, char *argv[], SbToolLine *line)
 
 static PetscErrorCode check_option(const char *name, const char *command)
 {
-  const char *list[PETSC_STATIC_ARRAY_LENGTH(rows)];
   const SbOption *row = find_row(name);
-  const char *reader = row ? readers[row - rows] : "";
+  const char *list[PETSC_STATIC_ARRAY_LENGTH(rows)], *reader = row ? readers[row - rows] : "";
   char near[256];
 
   PetscFunctionBeginUser;
@@ -155,9 +154,7 @@ PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *li
   char all[256] = "";
   PetscInt n = 0;
   PetscMPIInt size;
-  int nfile;
-  PetscInt format;
-  PetscInt backend, surface;
+  PetscInt format, backend, surface;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(tool, sizeof(*tool)));
@@ -172,10 +169,9 @@ PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *li
   if (!command->name) PetscCall(SbSuggestName(line->word[0], n, list, sizeof(all), all));
   PetscCheck(command->name, PETSC_COMM_SELF, PETSC_ERR_USER, "'%s' is no command; the commands are %s",
              line->word[0], all);
-  nfile = line->nword - 1;
-  PetscCheck(nfile == command->nfile, PETSC_COMM_SELF, PETSC_ERR_USER,
+  PetscCheck(line->nword - 1 == command->nfile, PETSC_COMM_SELF, PETSC_ERR_USER,
              "%s takes %d file%s, not %d: supple-mesh %s %s", command->name, command->nfile,
-             command->nfile > 1 ? "s" : "", nfile, command->name, command->files);
+             command->nfile > 1 ? "s" : "", line->nword - 1, command->name, command->files);
   for (int i = 1; i < argc; i++) {
     PetscBool is_option;
 

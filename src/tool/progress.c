@@ -35,17 +35,14 @@ PetscErrorCode SbToolProgress(const char *what, PetscInt64 done, PetscInt64 tota
 {
   SbTool *tool = (SbTool *)ctx;
   const PetscLogDouble t = MPI_Wtime();
-  char line[PETSC_MAX_PATH_LEN], number[32];
+  char line[PETSC_MAX_PATH_LEN], number[32], share[16] = "";
 
   PetscFunctionBeginUser;
   if (tool->quiet || t < tool->last) PetscFunctionReturn(PETSC_SUCCESS);
   tool->last = t + (tool->terminal ? 0.2 : 5.0);
-  if (total > 0)
-    (void)snprintf(line, sizeof(line), "%s: %s %s, %d %%, %.0f s", tool->phase, SbToolNumber(done, number),
-                   what, (int)(100. * (double)done / (double)total), t - tool->start);
-  else
-    (void)snprintf(line, sizeof(line), "%s: %s %s, %.0f s", tool->phase, SbToolNumber(done, number), what,
-                   t - tool->start);
+  if (total > 0) SbFormat(sizeof(share), share, ", %d %%", (int)(100. * (double)done / (double)total));
+  SbFormat(sizeof(line), line, "%s: %s %s%s, %.0f s", tool->phase, SbToolNumber(done, number), what, share,
+           t - tool->start);
   (void)fprintf(stderr, tool->terminal ? "\r%-79.79s" : "%s\n", line);
   (void)fflush(stderr);
   tool->open = tool->terminal;

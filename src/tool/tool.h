@@ -8,8 +8,7 @@
 typedef struct {
   PetscBool help, version;
   int nword;
-  const char *word[4];              /* command, then files; further words are only counted */
-  char problem[PETSC_MAX_PATH_LEN]; /* error message; "" if there is none */
+  const char *word[4]; /* command, then files; further words are only counted */
 } SbToolLine;
 
 typedef struct _SbTool {

@@ -1,8 +1,7 @@
 /*
   view.c - picture of a mesh, rendered by scripts/render from a file in supple's own format.
 
-  The script is searched for relative to the program: ../scripts of its folder or, if installed,
-  ../share/supple/scripts.
+  The script is in ../scripts of the program's folder or, if installed, in ../share/supple/scripts.
 */
 #include <errno.h>
 #include <spawn.h>
@@ -12,26 +11,6 @@
 #include "tool.h"
 
 extern char **environ;
-
-static PetscErrorCode find_render(size_t size, char path[])
-{
-  static const char *const folders[] = {"../scripts/render", "../share/supple/scripts/render"};
-  char program[PETSC_MAX_PATH_LEN];
-  const ssize_t n = readlink("/proc/self/exe", program, sizeof(program) - 1);
-  char *slash;
-
-  PetscFunctionBeginUser;
-  program[n > 0 ? n : 0] = 0;
-  slash = strrchr(program, '/');
-  if (slash) *slash = 0;
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(folders); i++) {
-    (void)snprintf(path, size, "%s/%s", program, folders[i]);
-    if (!access(path, X_OK)) PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
-          "-view needs scripts/render of supple, which is in neither %s/%s nor %s/%s", program, folders[0],
-          program, folders[1]);
-}
 
 /* Runs the script; its output goes to standard error. */
 static PetscErrorCode draw(const char *render, const char *file, const char *picture, const char *caption)
@@ -57,15 +36,28 @@ static PetscErrorCode draw(const char *render, const char *file, const char *pic
 PetscErrorCode SbToolView(SbTool *tool, const SbImport *mesh)
 {
   const char *tmp = getenv("TMPDIR"), *name = tool->out ? tool->out : tool->in;
-  char render[2 * PETSC_MAX_PATH_LEN], folder[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN + 16],
-    index[PETSC_MAX_PATH_LEN + 16];
+  static const char *const places[] = {"../scripts/render", "../share/supple/scripts/render"};
+  char program[PETSC_MAX_PATH_LEN], render[2 * PETSC_MAX_PATH_LEN], folder[PETSC_MAX_PATH_LEN],
+    file[PETSC_MAX_PATH_LEN + 16], index[PETSC_MAX_PATH_LEN + 16];
   PetscErrorCode ierr;
   const char *dot = strrchr(tool->view, '.');
+  const ssize_t n = readlink("/proc/self/exe", program, sizeof(program) - 1);
+  char *slash;
 
   PetscFunctionBeginUser;
   PetscCheck(dot && !strcmp(dot, ".png"), PETSC_COMM_SELF, PETSC_ERR_USER,
              "-view %s: give a name that ends in .png", tool->view);
-  PetscCall(find_render(sizeof(render), render));
+  /* the script */
+  program[n > 0 ? n : 0] = 0;
+  slash = strrchr(program, '/');
+  if (slash) *slash = 0;
+  (void)snprintf(render, sizeof(render), "%s/%s", program, places[0]);
+  if (access(render, X_OK)) (void)snprintf(render, sizeof(render), "%s/%s", program, places[1]);
+  PetscCheck(!access(render, X_OK), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
+             "-view needs scripts/render of supple, which is in neither %s/%s nor %s/%s", program, places[0],
+             program, places[1]);
+
+  /* the mesh, drawn by it */
   (void)snprintf(folder, sizeof(folder), "%s/supple-mesh-XXXXXX", tmp && tmp[0] ? tmp : "/tmp");
   PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "cannot make a folder %s: %s", folder,
              strerror(errno));

@@ -87,7 +87,7 @@ static PetscErrorCode test_h5(void)
   PetscCall(SbOrderCreate(PETSC_COMM_WORLD, 2, rank ? 0 : 2, (const PetscInt[]){0, 1}, &order));
   for (PetscInt i = 0; i < 3 * order.n; i++) slice[i] = (PetscReal)(3 * order.start + i) / 3.;
   PetscCall(SbH5Create(PETSC_COMM_WORLD, path, &h));
-  PetscCall(SbH5WriteSlice(&h, h.file, "v", "m", &order, 3, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, slice));
+  PetscCall(SbH5WriteSlice(&h, h.file, "v", "m", &order, 3, H5T_IEEE_F64LE, slice));
   PetscCall(SbH5PutReal(&h, h.file, "time", 1. / 3.));
   PetscCall(SbH5PutInt(&h, h.file, "step", -((int64_t)1 << 60)));
   PetscCall(SbH5WriteText(&h, h.file, "text", "two\nlines"));
