@@ -340,9 +340,10 @@ static PetscErrorCode hash_groups(SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+const char *const SbGroupKinds[4] = {"point", "curve", "surface", "volume"};
+
 PetscErrorCode SbImportGroup(SbImport *im, PetscInt dim, int64_t tag, const char *name, PetscInt *group)
 {
-  static const char *const kind[4] = {"point", "curve", "surface", "volume"};
   PetscInt s, g;
 
   PetscFunctionBeginUser;
@@ -355,7 +356,7 @@ PetscErrorCode SbImportGroup(SbImport *im, PetscInt dim, int64_t tag, const char
     im->group[g].dim = dim;
     im->group[g].tag = tag;
     im->group[g].alone = -1;
-    (void)snprintf(im->group[g].name, SB_GROUP_MAX, "%s_%lld", kind[dim], (long long)tag);
+    (void)snprintf(im->group[g].name, SB_GROUP_MAX, "%s_%lld", SbGroupKinds[dim], (long long)tag);
     im->ngroup++;
   }
   if (name) PetscCall(PetscStrncpy(im->group[g].name, name, SB_GROUP_MAX));

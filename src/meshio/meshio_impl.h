@@ -10,8 +10,9 @@ PetscErrorCode SbImportForget(SbImport *import);
 PetscErrorCode SbImportNameGroup(SbImport *import, PetscInt dim, int64_t tag, const char *name);
 
 /* scan.c: reads an integer, as text or binary of 4 or 8 bytes; `what` describes it in error messages. */
-PetscErrorCode SbScanInt4(SbScan *scan, const char *what, int64_t *value);
-PetscErrorCode SbScanInt8(SbScan *scan, const char *what, int64_t *value);
+PetscErrorCode SbScanInt(SbScan *scan, int bytes, const char *what, int64_t *value);
+/* Reads the "number of <what>", in binary of 8 bytes; items of at least so many bytes each, see SbScanRoom(). */
+PetscErrorCode SbScanCount(SbScan *scan, const char *what, int text_bytes, int binary_bytes, int64_t *n);
 
 /* Reads a file, or a mesh description `text`: sets x, vert_number, items and groups. */
 typedef PetscErrorCode (*SbReader)(const char *text, SbImport *body);
@@ -39,6 +40,8 @@ typedef struct {
   int dim, nnode;
 } SbGmshType;
 extern const SbGmshType SbGmshTypes[SB_GMSH_NTYPES];
+extern const char
+  *const SbGroupKinds[4]; /* by dimension: "point", "curve", ...; a group without a name is "curve_12" */
 /* Whether the element is a simplex of first or second order. */
 static inline PetscBool SbGmshIsSimplex(int type)
 {
@@ -123,6 +126,7 @@ PetscErrorCode SbDeckFind(SbDeck *deck, PetscInt set);
 
 /* ------------------------------------------------------------------ write_gmsh.c, write_h5.c: write one file directly to `path` */
 
+extern const char *const SbH5Items[4]; /* "point", "line", ..., as in /mesh/points and /mesh/point_tags */
 PetscErrorCode SbWrite_Gmsh(const SbImport *import, const char *path, SbMeshFormat format);
 PetscErrorCode SbWrite_H5(const SbImport *import, const char *path);
 /* Closes a file; an error if errno has been set since it was 0. */

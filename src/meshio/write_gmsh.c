@@ -105,10 +105,10 @@ static void put_nodes(Out *out, int d, const PetscInt v[], void (*put)(Out *, in
 /* Whether the name of a group differs from the default for its number. */
 static PetscBool has_name(const Out *out, PetscInt g)
 {
-  static const char *const kind[4] = {"point", "curve", "surface", "volume"};
   char text[SB_GROUP_MAX];
 
-  (void)snprintf(text, sizeof(text), "%s_%lld", kind[out->im->group[g].dim], (long long)out->number[g]);
+  (void)snprintf(text, sizeof(text), "%s_%lld", SbGroupKinds[out->im->group[g].dim],
+                 (long long)out->number[g]);
   return (PetscBool)(strcmp(text, out->im->group[g].name) != 0);
 }
 

@@ -17,6 +17,8 @@
 #include <hdf5.h>
 #include "meshio_impl.h"
 
+const char *const SbH5Items[4] = {"point", "line", "triangle", "cell"};
+
 /* An open file; remembers the first failed call. */
 typedef struct {
   hid_t file;
@@ -60,7 +62,6 @@ static void make_group(H5 *h, const char *name)
 PetscErrorCode SbWrite_H5(const SbImport *im, const char *path)
 {
   H5 h = {-1, PETSC_FALSE};
-  static const char *const name[4] = {"point", "line", "triangle", "cell"};
   char array[64];
   const int version = im->nmiddle.n ? 2 : 1;
   hid_t space, mark;
@@ -93,9 +94,9 @@ PetscErrorCode SbWrite_H5(const SbImport *im, const char *path)
     const SbItems *item = &im->item[d];
 
     if (!item->n && d < 3) continue;
-    (void)snprintf(array, sizeof(array), "/mesh/%ss", name[d]);
+    (void)snprintf(array, sizeof(array), "/mesh/%ss", SbH5Items[d]);
     write_ints(&h, array, d + 1, (size_t)item->n, item->vert);
-    (void)snprintf(array, sizeof(array), "/mesh/%s_tags", name[d]);
+    (void)snprintf(array, sizeof(array), "/mesh/%s_tags", SbH5Items[d]);
     write_ints(&h, array, 1, (size_t)item->n, item->tags);
   }
   // curved edges
@@ -154,7 +155,6 @@ static void write_grid(FILE *file, const SbImport *im, int dim, const char *h5)
   static const char *const grid[4] = {"points", "lines", "surface", "tets"};
   static const char *const kind[4] = {"Polyvertex\" NodesPerElement=\"1", "Polyline\" NodesPerElement=\"2",
                                       "Triangle", "Tetrahedron"};
-  static const char *const name[4] = {"point", "line", "triangle", "cell"};
   const PetscInt n = im->item[dim].n;
 
   (void)fprintf(
@@ -162,11 +162,11 @@ static void write_grid(FILE *file, const SbImport *im, int dim, const char *h5)
     "<Grid Name=\"%s\" GridType=\"Uniform\">\n<Topology TopologyType=\"%s\" NumberOfElements=\"%" PetscInt_FMT
     "\">",
     grid[dim], kind[dim], n);
-  SbXdmfArray(file, n, dim + 1, "Int", 4, "%s:/mesh/%ss", h5, name[dim]);
+  SbXdmfArray(file, n, dim + 1, "Int", 4, "%s:/mesh/%ss", h5, SbH5Items[dim]);
   (void)fputs("</Topology>\n<Geometry GeometryType=\"XYZ\">", file);
   SbXdmfArray(file, im->nvert, 3, "Float", 8, "%s:/mesh/x", h5);
   (void)fputs("</Geometry>\n<Attribute Name=\"tag_set\" AttributeType=\"Scalar\" Center=\"Cell\">", file);
-  SbXdmfArray(file, n, 1, "Int", 4, "%s:/mesh/%s_tags", h5, name[dim]);
+  SbXdmfArray(file, n, 1, "Int", 4, "%s:/mesh/%s_tags", h5, SbH5Items[dim]);
   (void)fputs("</Attribute>\n</Grid>\n", file);
 }
 
