@@ -1,12 +1,13 @@
 /*
-  import_gmsh.c - reader of gmsh's .msh files: versions 1, 2 (2.0 to 2.2), 4.0 and 4.1, text and binary (gmsh reference manual, "File
-  formats" and "Legacy formats"). It reads every physical group of every entity, also where groups overlap.
+  import_gmsh.c - reader of gmsh's .msh files: versions 1, 2 (2.0 to 2.2), 4.0 and 4.1, text and binary (gmsh
+  reference manual, "File formats" and "Legacy formats"). Groups may overlap.
 
-  Version 4 assigns groups to entities of the geometry; an entity may have several. Versions 1 and 2 assign one group to each
-  element and repeat an element for each further group: repeated elements are merged and their groups joined.
+  Version 4 assigns groups to entities of the geometry, any number to each. Versions 1 and 2 assign one to
+  each element and repeat it for each further group: repeated elements are merged, their groups joined.
 
-  Kept: points, lines and triangles that belong to a group, and all tets; for a surface all triangles, and tets are optional.
-  Other sections are skipped. Errors: volume elements other than 4- and 10-node tets, partitioned files, other versions.
+  Kept: points, lines and triangles that belong to a group, and all tets; for a surface all triangles, and
+  tets are optional. Other sections are skipped. Errors: other volume elements than 4- and 10-node tets,
+  partitions.
 */
 #include "meshio_impl.h"
 
@@ -123,23 +124,9 @@ static PetscErrorCode read_entities(Gmsh *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ blocks of nodes and elements, in version 4 */
+/* ------------------------------------------------------------------ blocks of version 4 */
 
-/* Reads the totals of a section: number of blocks, number of nodes or elements; in 4.1 also lowest and highest tag. */
-static PetscErrorCode read_totals(Gmsh *g, int64_t *nblock, int64_t *n)
-{
-  SbScan *s = &g->im->scan;
-  int64_t bound;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanInt(s, 8, "number of blocks", nblock));
-  PetscCall(SbScanInt(s, 8, "number of nodes or elements", n));
-  for (int k = 0; k < 2 && g->version == 41; k++)
-    PetscCall(SbScanInt(s, 8, "lowest or highest number", &bound));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Reads the header of a block: entity, kind (nodes: parametric or not; elements: type), number of nodes or elements. */
+/* Reads the header of a block: entity, kind (nodes: parametric or not; elements: type), number. */
 static PetscErrorCode read_block(Gmsh *g, int64_t *dim, int64_t *tag, int64_t *kind, int64_t *n)
 {
   SbScan *s = &g->im->scan;
@@ -155,8 +142,8 @@ static PetscErrorCode read_block(Gmsh *g, int64_t *dim, int64_t *tag, int64_t *k
 
 /* ------------------------------------------------------------------ nodes */
 
-/* Reads tag and coordinates of each node; in version 4 in blocks, with up to three parametric coordinates; in 4.1 all
-   tags of a block come first. */
+/* Reads tag and coordinates of each node; in version 4 in blocks, perhaps with parametric coordinates; in 4.1
+   all tags of a block come first. */
 static PetscErrorCode read_nodes(Gmsh *g)
 {
   SbImport *im = g->im;
@@ -168,9 +155,11 @@ static PetscErrorCode read_nodes(Gmsh *g)
   PetscFunctionBeginUser;
   if (im->x) SB_SCAN_ERROR(s, "second section $Nodes");
   // before version 4 the number of nodes is text also in a binary file, and the nodes are one block
-  if (g->version > 2)
-    PetscCall(read_totals(g, &nblock, &n));
-  else {
+  if (g->version > 2) {
+    PetscCall(SbScanInt(s, 8, "number of blocks", &nblock));
+    PetscCall(SbScanInt(s, 8, "number of nodes", &n));
+    for (int k = 0; k < 2 && g->version == 41; k++) PetscCall(SbScanInt(s, 8, "bound of numbers", &tag));
+  } else {
     PetscCall(SbScanText(s, "number of nodes", &n));
     if (g->binary) SbScanEndOfLine(s);
   }
@@ -234,8 +223,8 @@ static PetscErrorCode read_element(Gmsh *g, int type, int64_t number, PetscInt t
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Versions 1 and 2: in text files each line has the type and the tags of its element; in binary files elements of one
-   type follow a header. */
+/* Versions 1 and 2: in text each line has type and tags of its element, in binary a header for elements of
+   one type. */
 static PetscErrorCode read_elements_2(Gmsh *g)
 {
   SbScan *s = &g->im->scan;
@@ -289,7 +278,9 @@ static PetscErrorCode read_elements_4(Gmsh *g)
   int64_t nblock, total, dim, tag, type, n, number, nread = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(read_totals(g, &nblock, &total));
+  PetscCall(SbScanInt(s, 8, "number of blocks", &nblock));
+  PetscCall(SbScanInt(s, 8, "number of elements", &total));
+  for (int k = 0; k < 2 && g->version == 41; k++) PetscCall(SbScanInt(s, 8, "bound of numbers", &tag));
   PetscCall(SbScanRoom(s, "elements", total, 4, 8));
   for (int64_t b = 0; b < nblock; b++, nread += n) {
     PetscInt tags = 0;

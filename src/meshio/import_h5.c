@@ -1,17 +1,19 @@
 /*
-  import_h5.c - reader of HDF5 meshes: supple's own mesh format (layout in write_h5.c) and the output of a run, fields.h5.
+  import_h5.c - reader of HDF5: supple's own meshes (layout in write_h5.c) and the output of a run, fields.h5.
 
-  Both have /mesh/x and /mesh/cells. A mesh file has groups; in the output of a run /mesh/body is the body number of each tet,
-  and each body becomes a group of tets. For P2 bodies /mesh/cells10 has the nodes of the tets, /mesh/cells has the linear tets into which
-  they are subdivided, and /mesh/parent the P2 tet of each. If each tet of the output has its own points (-output_discontinuous),
-  /mesh/vertices is the vertex of each point: positions are averaged there. For a given step, its displacement is added.
+  Both have /mesh/x and /mesh/cells. A mesh has groups; in the output of a run each body, /mesh/body, becomes
+  a group of tets. For P2 bodies /mesh/cells10 has the nodes of the tets, /mesh/cells has the linear tets into
+  which they are subdivided, and /mesh/parent the P2 tet of each. If each tet of the output has its own points
+  (-output_discontinuous), /mesh/vertices is the vertex of each point: positions are averaged there. For a
+  given step, its displacement is added.
 
   An .xmf file refers to the .h5 file of the mesh.
 
-  For a mesh file, only a block of rows of each array under /mesh may be read: in parallel import each rank reads one (mesh/slab.c).
+  Of a mesh file a block of rows of each array under /mesh may be read: in parallel one by each rank
+  (mesh/slab.c).
 
-  Files are not trusted: shape and type of every array and the range of every index are checked, and no array is
-  allocated that is larger than the file can hold (uncompressed, as written here, at most the file size;
+  Files are not trusted: shape and type of every array and the range of every index are checked, and no array
+  is allocated that is larger than the file can hold (uncompressed, as written here, at most the file size;
   compressed by others, at most a thousand times that).
 */
 #include <hdf5.h>
@@ -157,7 +159,7 @@ static PetscErrorCode read_values(const File *f, const Array *a, void *values)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Opens and reads an array into scratch memory of the reader. n: number of rows that it must have; -1: any, returned. */
+/* Opens and reads an array into scratch memory. n: number of rows that it must have; -1: any, returned. */
 static PetscErrorCode read_array(const File *f, Array *a, PetscInt *n, void *values)
 {
   PetscFunctionBeginUser;
@@ -377,8 +379,8 @@ static PetscErrorCode read_bodies(const File *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Replaces the linear tets of P2 bodies by the P2 tets, with edge nodes. at[f->nvert]: vertex of each point of the
-   file; NULL: identity. */
+/* Replaces the linear tets of P2 bodies by the P2 tets, with edge nodes. at[f->nvert]: vertex of each point
+   of the file; NULL: identity. */
 static PetscErrorCode read_quadratic(const File *f, const PetscInt at[])
 {
   SbItems *item = &f->im->item[3];

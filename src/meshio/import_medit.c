@@ -1,10 +1,11 @@
 /*
-  import_medit.c - reader of Medit's text files, .mesh ("MEDIT: an interactive mesh visualization software", P. Frey, INRIA RT-0253, 2001),
-  also written by mmg, CGAL and FreeFEM.
+  import_medit.c - reader of Medit's text files, .mesh ("MEDIT: an interactive mesh visualization software",
+  P. Frey, INRIA RT-0253, 2001), also written by mmg, CGAL and FreeFEM.
 
-  Each keyword is followed by a count and that many lines of numbers, the last of which is a reference: N gives the group volume_N, surface_N or
-  curve_N, and 0 gives none except for tets. A # begins a comment. Other keywords (Corners, Ridges, Normals, Required...) are skipped with
-  their numbers. Errors: binary files (.meshb), volume elements other than tets of 4 or 10 nodes.
+  A keyword is followed by a count and that many lines of numbers, the last one a reference: N gives the group
+  volume_N, surface_N or curve_N, 0 none except for tets. A # begins a comment. Other keywords (Corners,
+  Ridges, Normals, Required...) are skipped with their numbers. Errors: binary files (.meshb), volume elements
+  other than tets of 4 or 10 nodes.
 */
 #include <ctype.h>
 #include "meshio_impl.h"
@@ -62,9 +63,8 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
     SB_SCAN_ERROR(s, "expected 'MeshVersionFormatted', found '%s'; this is no text file of Medit", word);
   for (;;) {
     // skip other sections: go to the next word that is not a number
-    for (SbScanNext(s, '#'); s->at < s->end && !isalpha((unsigned char)*s->at); SbScanNext(s, '#')) {
+    for (SbScanNext(s, '#'); s->at < s->end && !isalpha((unsigned char)*s->at); SbScanNext(s, '#'))
       while (s->at < s->end && !isspace((unsigned char)*s->at)) s->at++;
-    }
     PetscCall(SbScanWord(s, sizeof(word), word));
     if (!word[0])
       SB_SCAN_ERROR(

@@ -1,16 +1,17 @@
 /*
-  import_netgen.c - reader of Netgen's meshes: .vol, and the neutral format (Netgen manual, "Export formats", and files written by Netgen
-  4 to 6).
+  import_netgen.c - reader of Netgen's meshes: .vol, and the neutral format (Netgen manual, "Export formats",
+  and files written by Netgen 4 to 6).
 
-  Neutral format: the number of points, their coordinates; the number of tets, each with its subdomain and four points; the number of
-  surface triangles, each with its boundary condition and three points. Points count from 1. A # begins a comment.
+  Neutral format: number of points, coordinates; number of tets, each with its subdomain and four points;
+  number of surface triangles, each with its boundary condition and three points. Points count from 1. A #
+  begins a comment.
 
-  .vol: sections, each a word on a line of its own, a count, and that many lines; "surfnr bcnr domin domout np p1 p2 p3" for a surface
-  element, "matnr np p1 p2 p3 p4" for a volume element. Sections are in any order, hence each is searched for.
+  .vol: sections in any order: a word on a line of its own, a count, and that many lines; "surfnr bcnr domin
+  domout np p1 p2 p3" for a surface element, "matnr np p1 p2 p3 p4" for a volume element.
 
-  Kept: subdomain or material N is volume_N, boundary condition N is surface_N; the sections materials and bcnames of .vol give
-  them names. Curves (edgesegments) are ignored. Second-order tets have 10 points and triangles 6, in both formats.
-  Errors: other elements.
+  Kept: subdomain or material N is volume_N, boundary condition N is surface_N; the sections materials and
+  bcnames of .vol give them names. Curves (edgesegments) are ignored. Second-order tets have 10 points and
+  triangles 6, in both formats. Errors: other elements.
 */
 #include <ctype.h>
 #include "meshio_impl.h"
@@ -33,7 +34,7 @@ static PetscErrorCode read_points(SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Format of an element line: numbers before the points, which are the group and, in .vol, the number of points. */
+/* An element line: numbers before the points, among them the group and, in .vol, the number of points. */
 typedef struct {
   int dim, room;   /* dimension; least number of bytes per line */
   int mark, nnode; /* positions of group and number of points; nnode -1: all other words are points */

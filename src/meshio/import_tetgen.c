@@ -2,12 +2,13 @@
   import_tetgen.c - reader of TetGen's meshes: NAME.node and NAME.ele, with optional NAME.face and NAME.edge
   (TetGen 1.5 manual, section 5.2).
 
-  Each file begins with a line of counts; each further line is one item: its number, then its values. Point numbers begin at 0 or
-  1, as in the first line of NAME.node. A # begins a comment. Values at the end of a line beyond the announced ones (neighbours of faces, by
-  tetgen -nn) are ignored; for tets they are an error.
+  Each file begins with a line of counts; each further line is one item: its number, then its values. Point
+  numbers begin at 0 or 1, as in the first line of NAME.node. A # begins a comment. Values at the end of a
+  line beyond the announced ones (neighbours of faces, by tetgen -nn) are ignored; for tets they are an error.
 
-  Kept: the first attribute of a tet is its region, volume_N; the nonzero marker of a face, an edge or a point is surface_N,
-  curve_N or point_N. Second-order meshes (tetgen -o2) have faces of 6 points and edges of 3. Errors: attributes that are not integers.
+  Kept: the first attribute of a tet is its region, volume_N; a marker of a face, edge or point, not 0, is
+  surface_N, curve_N or point_N. Second-order meshes (tetgen -o2) have faces of 6 points and edges of 3.
+  Attributes must be integers.
 */
 #include "meshio_impl.h"
 
@@ -30,8 +31,8 @@ static PetscErrorCode on_line(SbScan *s, const char *what)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads one file: the line of counts, then a line for each item: number, coordinates or points, attributes, marker. A
-   marker of 0 is a group for tets only. */
+/* Reads one file: the line of counts, then a line for each item: number, coordinates or points, attributes,
+   marker. A marker of 0 is a group for tets only. */
 static PetscErrorCode read_file(SbImport *im, int f)
 {
   static const int types[2][4] = {{SB_GMSH_POINT, SB_GMSH_LINE, SB_GMSH_TRIANGLE, SB_GMSH_TET},

@@ -1,10 +1,11 @@
 /*
-  import_unv.c - reader of universal files, .unv (SDRC I-DEAS; data set 15 or 2411: nodes, 2412: elements, 2429 to 2477: groups).
+  import_unv.c - universal files, .unv (SDRC I-DEAS; data set 15 or 2411: nodes, 2412: elements, 2429 to 2477:
+  groups).
 
-  A data set is enclosed by two lines of -1 and begins with its number. Read: nodes with their coordinates (units and
-  coordinate systems are ignored); tets, triangles, lines. An element belongs to the group volume_N, surface_N or curve_N of its
-  physical property N, and to the named groups that list it. Groups of nodes are kept too. Errors: volume elements
-  other than tets of 4 or 10 nodes.
+  A data set is enclosed by two lines of -1 and begins with its number. Read: nodes with their coordinates
+  (units and coordinate systems are ignored); tets, triangles, lines. An element belongs to the group
+  volume_N, surface_N or curve_N of its physical property N, and to the named groups that list it. Groups of
+  nodes are kept too. Errors: volume elements other than tets of 4 or 10 nodes.
 */
 #include <ctype.h>
 #include "meshio_impl.h"
@@ -74,7 +75,8 @@ static PetscErrorCode read_element(SbDeck *d)
 
 /* ------------------------------------------------------------------ groups */
 
-/* Reads one group. Each member has `nvalue` values: kind (7 a node, 8 an element), label, and since data set 2435 two more. */
+/* Reads a group. A member has `nvalue` values: kind (7 a node, 8 an element), label, since set 2435 two
+   more. */
 static PetscErrorCode read_group(SbDeck *d, int nvalue)
 {
   SbScan *s = &d->im->scan;

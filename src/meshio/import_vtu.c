@@ -1,9 +1,9 @@
 /*
   import_vtu.c - reader of VTK's XML files of unstructured grids, .vtu (VTK User's Guide, "XML file formats").
 
-  Arrays are in DataArray elements as text or base64, or after the mark _ of AppendedData as raw bytes or base64. A binary array
-  begins with its length or, if compressed by zlib, with the number and sizes of its blocks. Base64 may continue after a final =:
-  some writers encode lengths and data separately.
+  Arrays are in DataArray elements as text or base64, or after the mark _ of AppendedData as raw bytes or
+  base64. A binary array begins with its length or, if compressed by zlib, with the number and sizes of its
+  blocks. Base64 may continue after a final =: some writers encode lengths and data separately.
 
   Kept: tets, triangles, lines and points; cell arrays of integers become groups, see vtk_grid.h. Errors:
   several pieces, other compressors, volume cells other than 4- and 10-node tets.
@@ -98,7 +98,7 @@ typedef struct {
   int nheld, from;
 } Bytes;
 
-/* Decodes four base64 characters to at most three bytes; false at the end, or at a character that is not base64. */
+/* Decodes four base64 characters to at most three bytes; false at the end, or where it is no base64. */
 static PetscBool next_quad(Bytes *b)
 {
   static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -158,7 +158,8 @@ static PetscErrorCode take_length(Vtu *v, Bytes *b, const char *name, size_t *le
 
 /* ------------------------------------------------------------------ arrays */
 
-/* Decompresses an array: number of blocks, block size, size of a smaller last block, compressed size of each; then the blocks. */
+/* Decompresses an array: number and size of blocks, of a smaller last one, compressed sizes; then the
+   blocks. */
 static PetscErrorCode take_blocks(Vtu *v, Bytes *b, const char *name, size_t want, unsigned char out[])
 {
   size_t nblock, size, last, full, *packed = NULL, at = 0;

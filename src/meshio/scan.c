@@ -1,8 +1,8 @@
 /*
   scan.c - scanner: a file is read into memory in one piece, then parsed token by token, as text or binary.
 
-  Every read is checked against the end of the file. Line numbers are counted only when an
-  error occurs. A number of items announced in a file is compared with the number that the rest of the file can hold before
+  Every read is checked against the end of the file. Line numbers are counted only when an error occurs. A
+  number of items announced in a file is compared with the number that the rest of the file can hold before
   memory is allocated.
 */
 #include <ctype.h>
