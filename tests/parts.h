@@ -121,13 +121,17 @@ static const struct {
 };
 #define PART_NAMES 64 /* largest number of names in a family */
 
-/* Rows of the output in the option table: the block with output_dir. */
-static inline const SbOptionBlock *part_output_block(void)
+/* Rows of the output in the option table: the n rows registered with output_dir. */
+static inline const SbOptionRow *part_output_rows(PetscInt *n)
 {
-  for (PetscInt b = 0; b < SbTheOptions.nblock; b++) {
-    if (!strcmp(SbTheOptions.block[b].rows[0].key, "output_dir")) return &SbTheOptions.block[b];
+  const SbOptionRow *first = NULL;
+
+  *n = 0;
+  for (PetscInt i = 0; i < SbTheOptions.nrow; i++) {
+    if (strcmp(SbTheOptions.row[i].rows[0].key, "output_dir")) continue;
+    if (!(*n)++) first = &SbTheOptions.row[i];
   }
-  return NULL;
+  return first;
 }
 
 static inline PetscErrorCode part_names_list(PetscFunctionList list, PetscInt *n,

@@ -20,14 +20,12 @@ PetscErrorCode SbBucketByKey(PetscInt n, const PetscInt key[], PetscInt nkey, Pe
   PetscFunctionBeginUser;
   /* counts are offset by two, so that filling leaves first[k] at the first position of key k */
   PetscCall(PetscCalloc1((size_t)nkey + 2, &first));
-  for (PetscInt i = 0; i < n; i++) {
+  for (PetscInt i = 0; i < n; i++)
     if (key[i] >= 0 && key[i] < nkey) first[key[i] + 2]++;
-  }
   for (PetscInt k = 0; k < nkey; k++) first[k + 2] += first[k + 1];
   PetscCall(PetscMalloc1(first[nkey + 1], item));
-  for (PetscInt i = 0; i < n; i++) {
+  for (PetscInt i = 0; i < n; i++)
     if (key[i] >= 0 && key[i] < nkey) (*item)[first[key[i] + 1]++] = i;
-  }
   *start = first;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,11 +1,12 @@
 /*
-  error.c - error handling: an error reaches the user as one line, printed once, and every rank ends with a non-zero code.
+  error.c - error handling: an error reaches the user as one line, once, and every rank ends with a non-zero
+  code.
 
-  PETSc's own handler prints a trace on every rank, which hides the relevant message. A *user error* (a wrong option, an
-  unreadable file) needs no trace; its message is kept while the error code is returned up to main(), and SbErrorFinish()
-  prints it. There all ranks enter a non-blocking reduction, which selects the lowest rank with an error to
-  print. If other ranks are blocked in a collective call, a rank that failed alone cannot complete the reduction: after a grace
-  period it prints the message and aborts the run, to avoid a hang.
+  PETSc's own handler prints a trace on every rank, which hides the relevant message. A *user error* (a wrong
+  option, an unreadable file) needs no trace; its message is kept while the error code is returned up to
+  main(), and SbErrorFinish() prints it. There all ranks enter a non-blocking reduction, which selects the
+  lowest rank with an error to print. If others are blocked in a collective call, a rank that failed alone
+  cannot complete it: after a grace period it prints the message and aborts the run.
 
   Internal errors are printed with PETSc's trace immediately, and as one line at the end too.
 */
@@ -44,7 +45,8 @@ static PetscBool is_user_error(PetscErrorCode n, const char *function)
                                    !strcmp(function, "PetscParseLayerYAML"))));
 }
 
-/* Whether an error of PETSc's objects is due to types or tolerances set by the user; `given`: these options, "-ksp_type cg -pc_type bddc". */
+/* Whether an error of PETSc is due to types or tolerances set by the user; `given`: "-ksp_type cg -pc_type
+   bddc". */
 static PetscBool is_wrong_choice(PetscErrorCode n, const char *function, const char *file, size_t size,
                                  char given[])
 {
@@ -93,7 +95,7 @@ static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, con
     }
   }
   if (state.pending && !state.trace) return n;
-  /* PETSC_COMM_SELF: on a larger communicator PETSc's handler lets the other ranks sleep and exit with code 0 */
+  /* PETSC_COMM_SELF: on a larger one PETSc's handler lets the other ranks sleep and exit with code 0 */
   return PetscTraceBackErrorHandler(PETSC_COMM_SELF, line, function, file, n, p, mess, NULL);
 }
 
@@ -143,14 +145,13 @@ void SbErrorFindYamlLine(void)
 {
   char text[1 << 16], *end, message[sizeof(state.message)];
   const char *dot = strrchr(state.file, '.');
-  FILE *f = dot && (!strcmp(dot, ".yml") || !strcmp(dot, ".yaml")) ? fopen(state.file, "r") : NULL;
+  FILE *f = NULL;
   PetscInt n = 0;
   size_t size;
 
-  if (!f || !strstr(state.message, "YAML")) {
-    if (f) (void)fclose(f);
-    return;
-  }
+  if (strstr(state.message, "YAML") && dot && (!strcmp(dot, ".yml") || !strcmp(dot, ".yaml")))
+    f = fopen(state.file, "r");
+  if (!f) return;
   size = fread(text, 1, sizeof(text) - 1, f);
   text[size] = 0;
   (void)fclose(f);

@@ -1,5 +1,6 @@
 /*
-  formula.c - formulas of time and position: a recursive descent parser compiles them to postfix code for a stack machine.
+  formula.c - formulas of time and position: a recursive descent parser makes postfix code for a stack
+  machine.
 
     expression = term { (+|-) term }
     term       = unary { (*|/) unary }
@@ -7,8 +8,8 @@
     power      = primary [ ^ unary ]              so -2^2 = -4 and 2^3^2 = 2^9
     primary    = number | t | x | y | z | pi | function ( expression {, expression} ) | ( expression )
 
-  The code has no branches, so its stack depth is known when it is compiled; formulas that need a deeper stack are an error.
-  Not supported: comparisons (use step(a)), units, user-defined names.
+  The code has no branches, so its stack depth is known when it is compiled; formulas that need a deeper stack
+  are an error. Not supported: comparisons (use step(a)), units, user-defined names.
 */
 #include <ctype.h>
 #include "formula.h"
@@ -73,12 +74,8 @@ static PetscErrorCode complain(const Parser *p, const char *at, const char *what
 
 static PetscErrorCode emit(Parser *p, SbFormulaOp op, int index, PetscReal number, int change)
 {
-  SbFormulaStep *s = &p->formula->step[p->formula->nstep++];
-
   PetscFunctionBeginUser;
-  s->op = op;
-  s->index = index;
-  s->number = number;
+  p->formula->step[p->formula->nstep++] = (SbFormulaStep){op, index, number, change};
   p->depth += change;
   if (p->depth > SB_FORMULA_STACK) PetscCall(complain(p, p->next, "the formula is nested too deeply"));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -219,48 +216,40 @@ static PetscErrorCode expression(Parser *p)
 
 PetscReal SbFormulaEval(SbFormula f, PetscReal t, const PetscReal x[3])
 {
-  PetscReal stack[SB_FORMULA_STACK + 1];
-  int n = 0; /* number of values on the stack */
+  PetscReal stack[SB_FORMULA_STACK + 2], *a = stack; /* a: the last value; the first is at stack[1] */
 
   if (!f->step) return SbFormulaEvalTable(f, t);
   for (PetscInt i = 0; i < f->nstep; i++) {
     const SbFormulaStep *s = &f->step[i];
-    PetscReal *a;
 
     /* Operands are on top of the stack, the first one deepest; the result replaces the first. */
+    a += s->change;
     switch (s->op) {
     case SB_OP_NUMBER:
-      stack[n++] = s->number;
+      a[0] = s->number;
       break;
     case SB_OP_VARIABLE:
-      stack[n++] = s->index ? x[s->index - 1] : t;
+      a[0] = s->index ? x[s->index - 1] : t;
       break;
     case SB_OP_ADD:
-      n--;
-      stack[n - 1] += stack[n];
+      a[0] += a[1];
       break;
     case SB_OP_SUB:
-      n--;
-      stack[n - 1] -= stack[n];
+      a[0] -= a[1];
       break;
     case SB_OP_MUL:
-      n--;
-      stack[n - 1] *= stack[n];
+      a[0] *= a[1];
       break;
     case SB_OP_DIV:
-      n--;
-      stack[n - 1] /= stack[n];
+      a[0] /= a[1];
       break;
     case SB_OP_POW:
-      n--;
-      stack[n - 1] = pow(stack[n - 1], stack[n]);
+      a[0] = pow(a[0], a[1]);
       break;
     case SB_OP_NEG:
-      stack[n - 1] = -stack[n - 1];
+      a[0] = -a[0];
       break;
     case SB_OP_CALL:
-      n -= functions[s->index].narg - 1;
-      a = &stack[n - 1];
       if (functions[s->index].f1)
         a[0] = functions[s->index].f1(a[0]);
       else if (functions[s->index].f2)
@@ -270,7 +259,7 @@ PetscReal SbFormulaEval(SbFormula f, PetscReal t, const PetscReal x[3])
       break;
     }
   }
-  return stack[0];
+  return a[0];
 }
 
 PetscBool SbFormulaUsesTime(SbFormula f)
@@ -289,7 +278,7 @@ PetscErrorCode SbFormulaDestroy(SbFormula *formula)
   if (!*formula) PetscFunctionReturn(PETSC_SUCCESS);
   SbLiveForget(*formula);
   PetscCall(PetscFree((*formula)->step));
-  PetscCall(PetscFree2((*formula)->time, (*formula)->value));
+  PetscCall(PetscFree((*formula)->row));
   PetscCall(PetscFree(*formula));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -22,6 +22,7 @@ typedef struct {
   SbFormulaOp op;
   int index; /* SB_OP_VARIABLE: 0 to 3 for t, x, y, z; SB_OP_CALL: row of the table of functions */
   PetscReal number;
+  int change; /* of the number of values on the stack */
 } SbFormulaStep;
 
 struct _p_SbFormula {
@@ -29,13 +30,13 @@ struct _p_SbFormula {
   SbFormulaStep *step; /* [nstep] postfix code; NULL for a table */
   PetscBool uses_time, uses_position;
   PetscInt nrow;
-  PetscReal *time;  /* [nrow] s, ascending */
-  PetscReal *value; /* [nrow] */
+  PetscReal (*row)[2]; /* [nrow] time, s, ascending, and value */
 };
 
 /* Reads a two-column file on rank 0 and broadcasts it. Collective. Errors name option, file and line. */
 PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *where, SbFormula formula);
-/* Creates the row->count formulas of an option with the value `live` (live.c); where: name of the option. The caller destroys each. */
+/* Creates the row->count formulas of an option with the value `live` (live.c); where: name of the option. The
+   caller destroys each. */
 PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula formula[]);
 /* Removes a live formula that is being destroyed. */
 void SbLiveForget(SbFormula formula);

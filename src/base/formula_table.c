@@ -1,34 +1,18 @@
 /*
   formula_table.c - function of time given by a table in a text file with two columns.
 
-  Each line: time (s) and value, separated by blanks, a comma or a semicolon; `#` starts a comment; empty lines are
-  ignored. Times must ascend. Linear interpolation, constant outside. Only rank 0 reads the file, which scales to thousands of
-  ranks; an error is broadcast and raised on all ranks.
+  Each line: time (s) and value, separated by blanks, a comma or a semicolon; `#` starts a comment; empty
+  lines are ignored. Times must ascend. Linear interpolation, constant outside. Only rank 0 reads the file,
+  which scales to thousands of ranks; an error is broadcast and raised on all ranks.
 */
-#include <ctype.h>
 #include <errno.h>
 #include "formula.h"
 
-/* Parses one line: returns 1 for two numbers, 0 for a blank line, else -1. */
-static int read_line(char *line, PetscReal row[2])
-{
-  char *next = line, *end;
-
-  if (strchr(line, '#')) *strchr(line, '#') = 0;
-  for (int i = 0; i < 2; i++) {
-    while (isspace((unsigned char)*next) || (i && (*next == ',' || *next == ';'))) next++;
-    if (!*next && !i) return 0;
-    row[i] = strtod(next, &end);
-    if (end == next || !isfinite(row[i])) return -1;
-    next = end;
-  }
-  while (isspace((unsigned char)*next)) next++;
-  return *next ? -1 : 1;
-}
-
 /* Reads the complete file. Rank 0 only. */
-static PetscErrorCode read_rows(FILE *f, const char *file, const char *where, PetscInt *n, PetscReal **rows)
+static PetscErrorCode read_rows(FILE *f, const char *file, const char *where, PetscInt *n,
+                                PetscReal (**rows)[2])
 {
+  static const char blanks[] = " \t\n\v\f\r";
   char line[512];
   PetscInt room = 0;
 
@@ -36,22 +20,30 @@ static PetscErrorCode read_rows(FILE *f, const char *file, const char *where, Pe
   PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: cannot open %s: %s", where, file, strerror(errno));
   for (int number = 1; fgets(line, sizeof(line), f); number++) {
     PetscReal row[2];
-    const int found = read_line(line, row);
+    char *next = line, *end;
+    PetscBool valid = PETSC_TRUE;
 
-    PetscCheck(found >= 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+    // two numbers, or a blank line
+    line[strcspn(line, "#")] = 0;
+    next += strspn(next, blanks);
+    if (!*next) continue;
+    for (int i = 0; i < 2; i++) {
+      row[i] = strtod(next, &end);
+      valid = (PetscBool)(valid && end > next && isfinite(row[i]));
+      next = end + strspn(end, i ? blanks : " \t\n\v\f\r,;");
+    }
+    PetscCheck(valid && !*next, PETSC_COMM_SELF, PETSC_ERR_USER,
                "%s: %s, line %d: expected two numbers, time (s) and value", where, file, number);
-    if (!found) continue;
-    if (*n && row[0] <= (*rows)[2 * (*n - 1)]) {
+    if (*n && row[0] <= (*rows)[*n - 1][0]) {
       char times[64]; /* PetscSNPrintf() would write "2." */
 
       (void)snprintf(times, sizeof(times), "%g s does not come after %g s", (double)row[0],
-                     (double)(*rows)[2 * (*n - 1)]);
+                     (double)(*rows)[*n - 1][0]);
       SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s: %s, line %d: time %s; times must ascend", where, file,
               number, times);
     }
-    PetscCall(SbReserve(*n + 1, 2 * sizeof(PetscReal), &room, rows));
-    PetscCall(PetscArraycpy(*rows + 2 * *n, row, 2));
-    ++*n;
+    PetscCall(SbReserve(*n + 1, sizeof(**rows), &room, rows));
+    PetscCall(PetscArraycpy((*rows)[(*n)++], row, 2));
   }
   PetscCheck(!ferror(f), PETSC_COMM_SELF, PETSC_ERR_USER, "%s: cannot read %s", where, file);
   PetscCheck(*n, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: %s holds no numbers", where, file);
@@ -61,8 +53,6 @@ static PetscErrorCode read_rows(FILE *f, const char *file, const char *where, Pe
 PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *where, SbFormula formula)
 {
   PetscMPIInt rank;
-  PetscInt n = 0;
-  PetscReal *rows = NULL;
   SbCaughtError caught = {0, ""};
 
   PetscFunctionBeginUser;
@@ -70,39 +60,32 @@ PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *w
   if (!rank) {
     FILE *f = fopen(file, "r");
 
-    SB_CATCH(&caught, read_rows(f, file, where, &n, &rows));
+    SB_CATCH(&caught, read_rows(f, file, where, &formula->nrow, &formula->row));
     if (f) (void)fclose(f);
-    if (caught.code) PetscCall(PetscFree(rows));
   }
   PetscCall(SbCaughtRaise(comm, &caught));
-  PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, 0, comm));
-  if (rank) PetscCall(PetscMalloc1(2 * n, &rows));
-  PetscCallMPI(MPI_Bcast(rows, (PetscMPIInt)(2 * n), MPIU_REAL, 0, comm));
-  formula->nrow = n;
-  PetscCall(PetscMalloc2(n, &formula->time, n, &formula->value));
-  for (PetscInt i = 0; i < n; i++) {
-    formula->time[i] = rows[2 * i];
-    formula->value[i] = rows[2 * i + 1];
-  }
-  PetscCall(PetscFree(rows));
+  PetscCallMPI(MPI_Bcast(&formula->nrow, 1, MPIU_INT, 0, comm));
+  if (rank) PetscCall(PetscMalloc1(formula->nrow, &formula->row));
+  PetscCallMPI(MPI_Bcast(formula->row, (PetscMPIInt)(2 * formula->nrow), MPIU_REAL, 0, comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscReal SbFormulaEvalTable(const struct _p_SbFormula *f, PetscReal t)
 {
+  PetscReal(*const row)[2] = f->row;
   PetscInt lo = 0, hi = f->nrow - 1;
   PetscReal w;
 
-  if (t <= f->time[lo]) return f->value[lo];
-  if (t >= f->time[hi]) return f->value[hi];
+  if (t <= row[lo][0]) return row[lo][1];
+  if (t >= row[hi][0]) return row[hi][1];
   while (hi - lo > 1) {
     const PetscInt mid = (lo + hi) / 2;
 
-    if (f->time[mid] <= t)
+    if (row[mid][0] <= t)
       lo = mid;
     else
       hi = mid;
   }
-  w = (t - f->time[lo]) / (f->time[hi] - f->time[lo]);
-  return (1 - w) * f->value[lo] + w * f->value[hi];
+  w = (t - row[lo][0]) / (row[hi][0] - row[lo][0]);
+  return (1 - w) * row[lo][1] + w * row[hi][1];
 }

@@ -1,10 +1,14 @@
 /*
-  live.c - interactive control: formulas whose values are read from a file during the run; -effect_<name>_displacement live, and other formulas of effects.
+  live.c - interactive control: formulas whose values are read from a file during the run;
+  -effect_<name>_displacement live, and other formulas of effects.
 
-  The file, live.txt in the folder of the run, has a line `NAME x y z` (m) for each effect with a live displacement, and lines `NAME_angle a` (degrees), `NAME_vector x y z` (N), ... for other options of effects. Another program may rewrite it at any time, best by
-  renaming a new file. Rank 0 reads it after each accepted step. A displacement then moves from its current value towards the target in a straight line with the speed -live_speed, an angle with -live_angular_speed; other values
-  change at once. Each value is a table of two rows, so that a repeated step has the same values.
-  A run that is faster than -live_pace simulated seconds per second waits; a slower one does not catch up later.
+  The file, live.txt in the folder of the run, has a line `NAME x y z` (m) for each effect with a live
+  displacement, and lines `NAME_angle a` (degrees), `NAME_vector x y z` (N), ... for other options of effects.
+  Another program may rewrite it at any time, best by renaming a new file. Rank 0 reads it after each accepted
+  step. A displacement then moves towards the target in a straight line with the speed -live_speed, an angle
+  with -live_angular_speed; other values change at once. Each value is a table of two rows, so that a repeated
+  step has the same values. A run that is faster than -live_pace simulated seconds per second waits; a slower
+  one does not catch up.
 */
 #include "formula.h"
 
@@ -15,7 +19,7 @@ typedef struct {
   char column[3 * SB_NAME_MAX]; /* column of the history file: tool_live_x, tool_angle_live */
   const char *unit;
   const PetscReal *speed; /* unit/s; NULL: unlimited, the value changes at once */
-  int n, k; /* size of the vector option, component of this value; the components are consecutive */
+  int n;                  /* size of the vector option, whose components are consecutive */
   SbFormula formula;
 } Value;
 
@@ -31,10 +35,9 @@ static struct {
 /* Linear change from `from` at time t to `to` at t + duration. */
 static void set_rows(SbFormula f, PetscReal t, PetscReal from, PetscReal duration, PetscReal to)
 {
-  f->time[0] = t;
-  f->value[0] = from;
-  f->time[1] = t + duration;
-  f->value[1] = to;
+  const PetscReal row[2][2] = {{t, from}, {t + duration, to}};
+
+  memcpy(f->row, row, sizeof(row));
 }
 
 PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula formula[])
@@ -58,16 +61,14 @@ PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula fo
     v->unit = row->unit[0] ? row->unit : "1";
     v->speed = moved ? &live.speed : !strcmp(row->key, "angle") ? &live.angular_speed : NULL;
     v->n = n;
-    v->k = k;
 
     /* keep the value after re-meshing */
-    for (PetscInt i = 0; i < live.n; i++) {
-      if (!strcmp(live.value[i].column, v->column)) old = live.value[i].formula->value[0];
-    }
+    for (PetscInt i = 0; i < live.n; i++)
+      if (!strcmp(live.value[i].column, v->column)) old = live.value[i].formula->row[0][1];
     PetscCall(PetscNew(&formula[k]));
     formula[k]->uses_time = PETSC_TRUE;
     formula[k]->nrow = 2;
-    PetscCall(PetscMalloc2(2, &formula[k]->time, 2, &formula[k]->value));
+    PetscCall(PetscMalloc1(2, &formula[k]->row));
     set_rows(formula[k], 0., old, 1., old);
     v->formula = formula[k];
   }
@@ -117,7 +118,8 @@ void SbLiveSet(PetscInt i, PetscReal t, PetscReal value)
   set_rows(live.value[i].formula, t, value, 1., value);
 }
 
-/* Reads targets from the file; values without a valid line keep their target. Warns of the first invalid line. Rank 0. */
+/* Reads targets from the file; without a valid line a target stays. Warns of the first invalid line. Rank
+   0. */
 static PetscErrorCode read_targets(PetscReal target[])
 {
   FILE *f = fopen(live.file, "r");
@@ -161,11 +163,7 @@ PetscErrorCode SbLiveAdvance(MPI_Comm comm, PetscReal t)
 
   PetscFunctionBeginUser;
   /* wait if simulated time is ahead of wall time */
-  if (live.clock == 0.) {
-    live.clock = MPI_Wtime();
-    live.begun = t;
-  }
-  ahead = live.pace > 0. ? (t - live.begun) / live.pace - (MPI_Wtime() - live.clock) : 0.;
+  ahead = live.pace > 0. && live.clock > 0. ? (t - live.begun) / live.pace - (MPI_Wtime() - live.clock) : 0.;
   if (ahead > 0.)
     PetscCall(PetscSleep(ahead));
   else {
@@ -175,7 +173,7 @@ PetscErrorCode SbLiveAdvance(MPI_Comm comm, PetscReal t)
 
   /* from the current values to the targets */
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  for (PetscInt i = 0; i < live.n; i++) target[i] = live.value[i].formula->value[1];
+  for (PetscInt i = 0; i < live.n; i++) target[i] = live.value[i].formula->row[1][1];
   if (!rank) PetscCall(read_targets(target));
   PetscCallMPI(MPI_Bcast(target, (PetscMPIInt)live.n, MPIU_REAL, 0, comm));
   for (PetscInt first = 0; first < live.n; first += live.value[first].n) {

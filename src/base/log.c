@@ -1,9 +1,9 @@
 /*
-  log.c - PETSc log events: one per phase of at least about one percent of a run, three stages, and one event for each
-  effect, material, element and output of a scene.
+  log.c - PETSc log events: one per phase of at least about one percent of a run, three stages, and one event
+  for each effect, material, element and output of a scene.
 
-  The names are those printed by -log_view. Events belong to no class (PETSC_OBJECT_CLASSID), because they time phases, not
-  objects.
+  The names are those printed by -log_view. Events belong to no class (PETSC_OBJECT_CLASSID), because they
+  time phases, not objects.
 */
 #include "sbbase.h"
 #include "sblog.h"

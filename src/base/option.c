@@ -1,9 +1,9 @@
 /*
   option.c - registry of options: registered rows, values read so far, options given by the user.
 
-  PETSc's database has the texts; this table has their meaning. A row is found by class, type and key; the full name
-  is -<class>_<instance>_<key>. Two rows with the same full name (key b_c of body a, key c of body a_b) are an error when
-  the second one is read. Names are case-insensitive, as in PETSc.
+  PETSc's database has the texts; this table has their meaning. A row is found by class, type and key; the
+  full name is -<class>_<instance>_<key>. Two rows with the same full name (key b_c of body a, key c of body
+  a_b) are an error when the second one is read. Names are case-insensitive, as in PETSc.
 */
 #include "option.h"
 
@@ -26,7 +26,7 @@ static PetscErrorCode at_end(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Registers the destructor of the table once: PETSc allows 256 such functions, and a test may read options more often. */
+/* Registers the destructor of the table once: PETSc allows 256 of them, and a test may read more often. */
 static PetscErrorCode free_at_end(void)
 {
   PetscFunctionBeginUser;
@@ -37,24 +37,22 @@ static PetscErrorCode free_at_end(void)
 
 PetscErrorCode SbOptionsRegister(const char *klass, const char *type, PetscInt n, const SbOption rows[])
 {
-  SbOptionBlock *block;
-
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
-    block = &SbTheOptions.block[i];
-    if (block->rows == rows && !strcmp(block->klass, klass) && !strcmp(block->type, type))
+  for (const SbOptionRow *r = SbTheOptions.row; r < SbTheOptions.row + SbTheOptions.nrow; r++)
+    if (r->rows == rows && !strcmp(r->klass, klass) && !strcmp(r->type, type))
       PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  for (PetscInt i = 0; i < n; i++)
+  PetscCall(free_at_end());
+  for (PetscInt i = 0; i < n; i++) {
+    SbOptionRow *r;
+
     PetscCheck(rows[i].count <= SB_OPTION_COUNT_MAX, PETSC_COMM_SELF, PETSC_ERR_PLIB,
                "Option %s has more than %d values", rows[i].key, SB_OPTION_COUNT_MAX);
-  PetscCall(free_at_end());
-  PetscCall(grow(SbTheOptions.nblock, sizeof(*block), &SbTheOptions.block));
-  block = &SbTheOptions.block[SbTheOptions.nblock++];
-  PetscCall(PetscStrncpy(block->klass, klass, sizeof(block->klass)));
-  PetscCall(PetscStrncpy(block->type, type, sizeof(block->type)));
-  block->n = n;
-  block->rows = rows;
+    PetscCall(grow(SbTheOptions.nrow, sizeof(*r), &SbTheOptions.row));
+    r = &SbTheOptions.row[SbTheOptions.nrow++];
+    *r = (SbOptionRow){.row = &rows[i], .rows = rows};
+    PetscCall(PetscStrncpy(r->klass, klass, sizeof(r->klass)));
+    PetscCall(PetscStrncpy(r->type, type, sizeof(r->type)));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -69,14 +67,20 @@ PetscErrorCode SbScopeSet(SbScope *scope, const char *klass, const char *type, c
 
 const SbOption *SbOptionFind(const SbScope *scope, const char *key)
 {
-  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
-    const SbOptionBlock *block = &SbTheOptions.block[i];
-
-    if (strcmp(block->klass, scope->klass) || (block->type[0] && strcmp(block->type, scope->type))) continue;
-    for (PetscInt j = 0; j < block->n; j++)
-      if (!strcmp(block->rows[j].key, key)) return &block->rows[j];
-  }
+  for (const SbOptionRow *r = SbTheOptions.row; r < SbTheOptions.row + SbTheOptions.nrow; r++)
+    if (!strcmp(r->row->key, key) && !strcmp(r->klass, scope->klass) &&
+        (!r->type[0] || !strcmp(r->type, scope->type)))
+      return r->row;
   return NULL;
+}
+
+PetscErrorCode SbOptionNeed(const SbScope *scope, const char *key, const SbOption **row)
+{
+  PetscFunctionBeginUser;
+  *row = SbOptionFind(scope, key);
+  PetscCheck(*row, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No row for key '%s' of class '%s', type '%s'", key,
+             scope->klass, scope->type);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbOptionName(const SbScope *scope, const char *key, size_t size, char name[])
@@ -89,13 +93,13 @@ PetscErrorCode SbOptionName(const SbScope *scope, const char *key, size_t size, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbOptionManualName(const SbOptionBlock *block, const SbOption *row, size_t size, char name[])
+PetscErrorCode SbOptionManualName(const SbOptionRow *r, size_t size, char name[])
 {
   SbScope scope;
 
   PetscFunctionBeginUser;
-  PetscCall(SbScopeSet(&scope, block->klass, block->type, "<name>"));
-  PetscCall(SbOptionName(&scope, row->key, size, name));
+  PetscCall(SbScopeSet(&scope, r->klass, r->type, "<name>"));
+  PetscCall(SbOptionName(&scope, r->row->key, size, name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -117,10 +121,8 @@ PetscErrorCode SbOptionFindRecord(const SbScope *scope, const SbOption *row, SbO
   }
   PetscCall(grow(SbTheOptions.nrecord, sizeof(*r), &SbTheOptions.record));
   r = &SbTheOptions.record[SbTheOptions.nrecord++];
-  PetscCall(PetscMemzero(r, sizeof(*r)));
+  *r = (SbOptionRecord){.scope = *scope, .row = row};
   PetscCall(PetscStrncpy(r->name, name, sizeof(r->name)));
-  r->scope = *scope;
-  r->row = row;
   *record = r;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -179,16 +181,16 @@ PetscErrorCode SbOptionFindValue(const SbScope *scope, const char *key, SbScope 
 PetscErrorCode SbOptionGiven(const SbScope *scope, const char *key, PetscBool *given)
 {
   const char *value;
+  const SbOption *row;
   SbScope where;
 
   PetscFunctionBeginUser;
-  PetscCheck(SbOptionFind(scope, key), PETSC_COMM_SELF, PETSC_ERR_PLIB,
-             "No row for key '%s' of class '%s', type '%s'", key, scope->klass, scope->type);
+  PetscCall(SbOptionNeed(scope, key, &row));
   PetscCall(SbOptionFindValue(scope, key, &where, &value, given));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a token of PetscOptionsGetAll() is the name of an option that has been read, and not part of a value. */
+/* Whether a token of PetscOptionsGetAll() is the name of an option that has been read, no part of a value. */
 static PetscErrorCode is_read_name(const char *token, PetscBool *is)
 {
   PetscFunctionBeginUser;
@@ -283,19 +285,11 @@ PetscBool SbOptionIsRead(const char *name)
 /* Whether an option, without its dash, is a list of names: -effects, -body_liver_inclusions. */
 static PetscBool is_list(const char *name)
 {
-  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
-    const SbOptionBlock *block = &SbTheOptions.block[i];
-    const size_t length = strlen(name), prefix = strlen(block->klass);
+  for (const SbOptionRow *r = SbTheOptions.row; r < SbTheOptions.row + SbTheOptions.nrow; r++) {
+    const size_t length = strlen(name), prefix = strlen(r->klass), n = strlen(r->row->key);
 
-    for (PetscInt j = 0; j < block->n; j++) {
-      const size_t n = strlen(block->rows[j].key);
-
-      if (block->rows[j].kind != SB_OPTION_NAMES || length < n ||
-          strcasecmp(name + length - n, block->rows[j].key))
-        continue;
-      if (prefix ? length > n + prefix && !strncasecmp(name, block->klass, prefix) : length == n)
-        return PETSC_TRUE;
-    }
+    if (r->row->kind != SB_OPTION_NAMES || length < n || strcasecmp(name + length - n, r->row->key)) continue;
+    if (prefix ? length > n + prefix && !strncasecmp(name, r->klass, prefix) : length == n) return PETSC_TRUE;
   }
   return PETSC_FALSE;
 }
@@ -333,7 +327,7 @@ PetscErrorCode SbOptionsReset(void)
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) PetscCall(PetscFree(SbTheOptions.record[i].text));
   PetscCall(PetscFree(SbTheOptions.record));
-  PetscCall(PetscFree(SbTheOptions.block));
+  PetscCall(PetscFree(SbTheOptions.row));
   for (PetscInt i = 0; i < SbTheOptions.nlisted; i++) PetscCall(PetscFree(SbTheOptions.listed[i]));
   PetscCall(PetscFree(SbTheOptions.listed));
   PetscCall(PetscFree(SbTheOptions.inherit));

@@ -6,13 +6,11 @@
 
 #define SB_OPTION_NAME_MAX (3 * SB_NAME_MAX) /* "-" klass "_" instance "_" key, with the terminating zero */
 
-/* Rows registered by one call. */
+/* A registered row. */
 typedef struct {
-  char klass[SB_NAME_MAX];
-  char type[SB_NAME_MAX];
-  PetscInt n;
-  const SbOption *rows; /* [n] borrowed, static */
-} SbOptionBlock;
+  char klass[SB_NAME_MAX], type[SB_NAME_MAX];
+  const SbOption *row, *rows; /* borrowed, static; the first row of its SbOptionsRegister() */
+} SbOptionRow;
 
 /* A value that has been read. */
 typedef struct {
@@ -31,8 +29,8 @@ typedef struct {
 
 typedef struct {
   PetscBool at_end; /* the destructor is registered with PetscFinalize() */
-  PetscInt nblock, nrecord, nuser;
-  SbOptionBlock *block;   /* [nblock] in the order of registration */
+  PetscInt nrow, nrecord, nuser;
+  SbOptionRow *row;       /* [nrow] in the order of registration */
   SbOptionRecord *record; /* [nrecord] in the order of the first reading */
   PetscBool remembered;   /* SbOptionsRemember() has filled `user` */
   SbOptionUser *user;     /* [nuser] */
@@ -43,19 +41,21 @@ typedef struct {
 } SbOptionTable;
 extern SbOptionTable SbTheOptions; /* the registry of options */
 
-/* Row of a key in a scope; NULL if there is none. */
+/* Row of a key in a scope; NULL if there is none. SbOptionNeed(): an internal error if there is none. */
 const SbOption *SbOptionFind(const SbScope *scope, const char *key);
+PetscErrorCode SbOptionNeed(const SbScope *scope, const char *key, const SbOption **row);
 /* Whether the option of this full name, without its dash, has been read. */
 PetscBool SbOptionIsRead(const char *name);
-/* Value of an option, given for the instance or for one from which it inherits, and the scope in which it is recorded: its own, or that of the original of a copy. */
+/* Value of an option, given for the instance or for one from which it inherits, and the scope in which it is
+   recorded: its own, or that of the original of a copy. */
 PetscErrorCode SbOptionFindValue(const SbScope *scope, const char *key, SbScope *where, const char **value,
                                  PetscBool *given);
 /* Finds or creates the record of an option by its full name; borrowed. */
 PetscErrorCode SbOptionFindRecord(const SbScope *scope, const SbOption *row, SbOptionRecord **record);
-/* Raises the error of a missing required option; the message suggests a misspelt option of the user, if there is one. */
+/* Raises the error of a missing required option; the message suggests one that the user has misspelt. */
 PetscErrorCode SbOptionMissing(const SbOptionRecord *record);
 /* All names and values in the database at present. Free with SbOptionUsersFree(). */
 PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users);
 PetscErrorCode SbOptionUsersFree(PetscInt *n, SbOptionUser **users);
 /* Full name as in the manual: "-body_<name>_young", "-ts_dt". */
-PetscErrorCode SbOptionManualName(const SbOptionBlock *block, const SbOption *row, size_t size, char name[]);
+PetscErrorCode SbOptionManualName(const SbOptionRow *row, size_t size, char name[]);

@@ -1,13 +1,16 @@
 /*
-  option_check.c - checks options that have not been read: misspelt ones of supple, ones that do not apply to this run, and unused ones of PETSc.
+  option_check.c - checks options that have not been read: misspelt ones of supple, ones that do not apply to
+  this run, and unused ones of PETSc.
 
-  PETSc cannot distinguish a misspelt option from one that an object created later would read, so it reports nothing; here a misspelling of one of its most common
-  options is an error. All options of supple are read before the computation starts. A name belongs to supple if it begins with the prefix of one of its classes or the first word of a
-  program-wide key, or if it is a key or within two edits of one, and does not have a prefix of PETSc.
+  PETSc cannot tell a misspelt option from one that an object created later would read, so it reports nothing;
+  here a misspelling of one of its most common options is an error. All options of supple are read before the
+  computation starts. A name belongs to supple if it begins with the prefix of one of its classes or the first
+  word of a program-wide key, or is a key or within two edits of one, without a prefix of PETSc.
 
-  A misspelt option ends the run; a valid but unused one causes a warning with the reason: it is for another integrator, type or effect. An option of
-  an unread instance is valid if a list in the scenario file has that instance and the class has the key:
-  then the command line has removed it from the list. An instance that is in no list is an error.
+  A misspelt option ends the run; a valid but unused one causes a warning with the reason: it is for another
+  integrator, type or effect. An option of an unread instance is valid if a list in the scenario file has that
+  instance and the class has the key: then the command line has removed it from the list. An instance that is
+  in no list is an error.
 */
 #include "option.h"
 
@@ -16,12 +19,9 @@
 /* Row of a program-wide option, by its name without dash; NULL if there is none. */
 static const SbOption *program_row(const char *name)
 {
-  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
-    const SbOptionBlock *block = &SbTheOptions.block[i];
-
-    for (PetscInt j = 0; !block->klass[0] && j < block->n; j++)
-      if (!strcasecmp(block->rows[j].key, name)) return &block->rows[j];
-  }
+  for (PetscInt i = 0; i < SbTheOptions.nrow; i++)
+    if (!SbTheOptions.row[i].klass[0] && !strcasecmp(SbTheOptions.row[i].row->key, name))
+      return SbTheOptions.row[i].row;
   return NULL;
 }
 
@@ -57,8 +57,9 @@ static const char *const common[] = {
 };
 
 /*
-  Suggestion for a name that is not similar to any option: a key without its prefix, as -young; the end of a program-wide key, as -history_every; or the first word of
-  one, as -solver_type or -time_budget (-contact_ksp_type is PETSc's). "" if it does not belong to supple.
+  Suggestion for a name unlike any option: a key without its prefix, as -young; the end of a program-wide key,
+  as -history_every; its first word as -solver_type or -time_budget (-contact_ksp_type is PETSc's). "" if it
+  is not of supple.
 */
 static void guess(const char *name, size_t size, char text[])
 {
@@ -67,30 +68,26 @@ static void guess(const char *name, size_t size, char text[])
     (PetscBool)(!looks_like_petsc(name) && (!name[n] || (name[n + 1] && !looks_like_petsc(name + n + 1))));
 
   text[0] = 0;
-  for (PetscInt i = 0; i < SbTheOptions.nblock && !text[0]; i++) {
-    const SbOptionBlock *block = &SbTheOptions.block[i];
+  for (PetscInt i = 0; i < SbTheOptions.nrow && !text[0]; i++) {
+    const char *key = SbTheOptions.row[i].row->key, *klass = SbTheOptions.row[i].klass;
+    const size_t length = strlen(key), end = length > strlen(name) + 1 ? length - strlen(name) : 0;
 
-    for (PetscInt j = 0; j < block->n && !text[0]; j++) {
-      const char *key = block->rows[j].key;
-      const size_t length = strlen(key), end = length > strlen(name) + 1 ? length - strlen(name) : 0;
-
-      if (block->klass[0] && !strcasecmp(key, name))
-        SbFormat(size, text, "; did you mean -%s_NAME_%s?", block->klass, key);
-      else if (!block->klass[0] && more &&
-               ((length == n && !strncasecmp(key, name, n)) ||
-                (end && key[end - 1] == '_' && !strcasecmp(key + end, name))))
-        SbFormat(size, text, "; did you mean -%s?", key);
-      else if (!block->klass[0] && more && !strncasecmp(key, name, n) && key[n] == '_')
-        SbFormat(size, text, "; -help all lists them");
-    }
+    if (klass[0] && !strcasecmp(key, name))
+      SbFormat(size, text, "; did you mean -%s_NAME_%s?", klass, key);
+    else if (!klass[0] && more &&
+             ((length == n && !strncasecmp(key, name, n)) ||
+              (end && key[end - 1] == '_' && !strcasecmp(key + end, name))))
+      SbFormat(size, text, "; did you mean -%s?", key);
+    else if (!klass[0] && more && !strncasecmp(key, name, n) && key[n] == '_')
+      SbFormat(size, text, "; -help all lists them");
   }
 }
 
 /* Class whose prefix the name has; NULL if there is none. */
 static const char *class_of(const char *name)
 {
-  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
-    const char *klass = SbTheOptions.block[i].klass;
+  for (PetscInt i = 0; i < SbTheOptions.nrow; i++) {
+    const char *klass = SbTheOptions.row[i].klass;
     const size_t n = strlen(klass);
 
     if (n && !strncasecmp(name, klass, n) && name[n] == '_') return klass;
@@ -98,7 +95,8 @@ static const char *class_of(const char *name)
   return NULL;
 }
 
-/* Length of the instance in a name, "liver" in "body_liver_young": the longest known one; 0: none. read: options of it have been read, else it is only in a list of a file. */
+/* Length of the instance in a name, "liver" in "body_liver_young": the longest known one; 0: none. read:
+   options of it have been read, else it is only in a list of a file. */
 static size_t instance_of(const char *klass, const char *name, PetscBool *read)
 {
   const char *at = name + strlen(klass) + 1;
@@ -155,32 +153,29 @@ static PetscErrorCode verdict_of_class(const char *klass, const char *name, size
   if (!strcmp(klass, "body") &&
       !strncasecmp(instance, SB_OPTION_DEFAULT "_", strlen(SB_OPTION_DEFAULT "_"))) {
     key = instance + strlen(SB_OPTION_DEFAULT "_");
-    for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
-      for (PetscInt j = 0; !strcmp(SbTheOptions.block[i].klass, klass) && j < SbTheOptions.block[i].n; j++)
-        if (!strcasecmp(SbTheOptions.block[i].rows[j].key, key)) *verdict = UNUSED;
-    }
+    for (PetscInt i = 0; i < SbTheOptions.nrow; i++)
+      if (!strcmp(SbTheOptions.row[i].klass, klass) && !strcasecmp(SbTheOptions.row[i].row->key, key))
+        *verdict = UNUSED;
     PetscCall(
       PetscSNPrintf(text, size, "no body takes it, as each has one of its own or is of another type"));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   key = instance + n + 1;
-  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
-    const SbOptionBlock *block = &SbTheOptions.block[i];
-    const PetscBool own = (PetscBool)(!block->type[0] || has_type(klass, instance, n, block->type));
+  for (const SbOptionRow *r = SbTheOptions.row; r < SbTheOptions.row + SbTheOptions.nrow; r++) {
+    PetscBool own;
 
-    for (PetscInt j = 0; !strcmp(block->klass, klass) && j < block->n; j++) {
-      if (strcasecmp(block->rows[j].key, key)) continue;
-      *verdict = read ? UNUSED : LEFT_OUT;
-      if (!read)
-        PetscCall(PetscSNPrintf(text, size, "%s %.*s", klass, (int)n, instance));
-      else if (own)
-        PetscCall(PetscSNPrintf(text, size, "%s", block->rows[j].help));
-      else
-        PetscCall(PetscSNPrintf(text, size, "it is for type %s, and the %s %.*s has another one", block->type,
-                                klass, (int)n, instance));
-      if (own || !read) PetscFunctionReturn(PETSC_SUCCESS);
-    }
+    if (strcmp(r->klass, klass) || strcasecmp(r->row->key, key)) continue;
+    own = (PetscBool)(!r->type[0] || has_type(klass, instance, n, r->type));
+    *verdict = read ? UNUSED : LEFT_OUT;
+    if (!read)
+      SbFormat(size, text, "%s %.*s", klass, (int)n, instance);
+    else if (own)
+      SbFormat(size, text, "%s", r->row->help);
+    else
+      SbFormat(size, text, "it is for type %s, and the %s %.*s has another one", r->type, klass, (int)n,
+               instance);
+    if (own || !read) break;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -193,6 +188,7 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
   PetscInt n = 0, room = SbTheOptions.nrecord;
   const char **list;
   char(*names)[SB_OPTION_NAME_MAX];
+  SbScope scope;
 
   PetscFunctionBeginUser;
   text[0] = 0;
@@ -215,25 +211,20 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
     PetscCall(verdict_of_class(klass, name, size, text, verdict));
     if (*verdict != WRONG) PetscFunctionReturn(PETSC_SUCCESS);
   }
-  // similar full names: all options read so far, all program-wide options, and those of all instances named in scenario files; `near` is "" if there is none
-  for (PetscInt i = 0; i < SbTheOptions.nblock; i++)
-    room += SbTheOptions.block[i].n * (SbTheOptions.block[i].klass[0] ? SbTheOptions.nlisted + 1 : 1);
+  /* similar full names: all options read so far, all program-wide options, and those of all instances named
+     in scenario files and of `default` for all bodies; `near` is "" if there is none */
+  room += SbTheOptions.nrow * (SbTheOptions.nlisted + 1);
   PetscCall(PetscMalloc2(room, &list, room, &names));
   for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) list[n++] = SbTheOptions.record[i].name;
-  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
-    const SbOptionBlock *block = &SbTheOptions.block[i];
-    const PetscInt instances = block->klass[0] ? SbTheOptions.nlisted + !strcmp(block->klass, "body")
-                                               : 1; /* also the one for all bodies */
+  for (PetscInt i = 0; i < SbTheOptions.nrow; i++) {
+    const SbOptionRow *r = &SbTheOptions.row[i];
+    const PetscInt instances = r->klass[0] ? SbTheOptions.nlisted + !strcmp(r->klass, "body") : 1;
 
-    for (PetscInt j = 0; j < block->n * instances; j++) {
-      const char *key = block->rows[j % block->n].key;
+    for (PetscInt j = 0; j < instances; j++) {
+      const char *instance = j < SbTheOptions.nlisted ? SbTheOptions.listed[j] : SB_OPTION_DEFAULT;
 
-      if (block->klass[0])
-        PetscCall(PetscSNPrintf(
-          names[n], SB_OPTION_NAME_MAX, "-%s_%s_%s", block->klass,
-          j / block->n < SbTheOptions.nlisted ? SbTheOptions.listed[j / block->n] : SB_OPTION_DEFAULT, key));
-      else
-        PetscCall(PetscSNPrintf(names[n], SB_OPTION_NAME_MAX, "-%s", key));
+      PetscCall(SbScopeSet(&scope, r->klass, "", instance));
+      PetscCall(SbOptionName(&scope, r->row->key, sizeof(*names), names[n]));
       if (SbOptionIsRead(names[n] + 1)) continue;
       list[n] = names[n];
       n++;
@@ -249,33 +240,28 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
   else if (klass) {
     /* reason for an unread option with the prefix of a class, without a similar name */
     char keys[768] = "", instances[256] = "";
-    const SbOptionRecord *last = NULL;
+    const char *at = name + strlen(klass) + 1, *last = NULL;
 
-    // keys read for the instance of the name: "body liver has mesh, young"; "" if there are none
+    /* keys read for the instance of the name: "body liver has mesh, young"; instances of the class that have
+       been read: "liver, stone"; "" if there are none */
     for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
       const SbOptionRecord *r = &SbTheOptions.record[i];
-      const size_t length = strlen(r->scope.instance);
-      const char *at = name + strlen(klass) + 1;
-
-      if (strcmp(r->scope.klass, klass) || strncasecmp(at, r->scope.instance, length) || at[length] != '_')
-        continue;
-      if (!keys[0]) SbFormat(sizeof(keys), keys, "%s %s has ", klass, r->scope.instance);
-      SbAppend(sizeof(keys), keys, "%s%s", keys[strlen(keys) - 1] == ' ' ? "" : ", ", r->row->key);
-    }
-    /* instances of the class that have been read, "liver, stone"; "" if there are none */
-    for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
-      const SbOptionRecord *r = &SbTheOptions.record[i];
+      const char *instance = r->scope.instance;
+      const size_t length = strlen(instance);
 
       if (strcmp(r->scope.klass, klass)) continue;
-      if (last && !strcmp(last->scope.instance, r->scope.instance)) continue;
-      SbAppend(sizeof(instances), instances, "%s%s", last ? ", " : "", r->scope.instance);
-      last = r;
+      if (!last || strcmp(last, instance))
+        SbAppend(sizeof(instances), instances, "%s%s", last ? ", " : "", instance);
+      last = instance;
+      if (strncasecmp(at, instance, length) || at[length] != '_') continue;
+      if (!keys[0]) SbFormat(sizeof(keys), keys, "%s %s has ", klass, instance);
+      SbAppend(sizeof(keys), keys, "%s%s", keys[strlen(keys) - 1] == ' ' ? "" : ", ", r->row->key);
     }
     if (keys[0])
-      PetscCall(PetscSNPrintf(why, sizeof(why), " here; %s", keys));
+      SbFormat(sizeof(why), why, " here; %s", keys);
     else
-      PetscCall(PetscSNPrintf(why, sizeof(why), ": it names no %s of this scenario (%s)", klass,
-                              instances[0] ? instances : "there are none"));
+      SbFormat(sizeof(why), why, ": it names no %s of this scenario (%s)", klass,
+               instances[0] ? instances : "there are none");
   }
   PetscCall(PetscSNPrintf(text, size, "%s is not an option of supple%s", dashed, why));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -298,10 +284,9 @@ PetscErrorCode SbOptionMissing(const SbOptionRecord *r)
 
     if (strncasecmp(names[i], r->name + 1, before)) continue;
     key = names[i] + before;
-    if (before ? SbOptionFind(&r->scope, key) != NULL
-               : class_of(key) || looks_like_petsc(key) || program_row(key) != NULL)
-      continue;
-    list[n++] = names[i];
+    if (before ? !SbOptionFind(&r->scope, key)
+               : !class_of(key) && !looks_like_petsc(key) && !program_row(key))
+      list[n++] = names[i];
   }
   PetscCall(SbSuggestNames(r->name + 1, n, list, sizeof(near), near));
   PetscCall(PetscFree(list));

@@ -1,8 +1,10 @@
 /*
-  option_manual.c - reference manual generated from the table of options: for the terminal (-help TOPIC) and, for scripts/manual, as a table (-options_table).
+  option_manual.c - reference manual generated from the table of options: for the terminal (-help TOPIC) and,
+  for scripts/manual, as a table (-options_table).
 
-  Sections are ordered by class, the run and the bodies first: options of all instances of the class, then those of each type. A topic is a class (body), a
-  type (pressure), the first word of options (solver), or any word in their names and help texts.
+  Sections are ordered by class, the run and the bodies first: options of all instances of the class, then
+  those of each type. A topic is a class (body), a type (pressure), the first word of options (solver), or any
+  word in their names and help texts.
 */
 #include "option.h"
 
@@ -18,24 +20,25 @@ static const char *const first_options[][3] = {
   {"", "", "ts_max_time"}, {"", "", "solver"},      {"", "", "output_dir"},
 };
 
-static PetscErrorCode help_row(PetscViewer viewer, const SbOptionBlock *block, const SbOption *row)
+static PetscErrorCode help_row(PetscViewer viewer, const SbOptionRow *r)
 {
-  char name[SB_OPTION_NAME_MAX], value[64], number[16] = "";
   static const char *const kinds[] = {
     [SB_OPTION_BOOL] = "true or false", [SB_OPTION_INT] = "integer",
     [SB_OPTION_REAL] = "number",        [SB_OPTION_REALS] = "number",
     [SB_OPTION_STRING] = "text",        [SB_OPTION_NAMES] = "comma-separated names",
     [SB_OPTION_CHOICE] = "one of",      [SB_OPTION_FORMULA] = "formula"};
-  const char *with;
+  const SbOption *row = r->row;
+  char name[SB_OPTION_NAME_MAX], number[16] = "";
 
   PetscFunctionBeginUser;
-  PetscCall(SbOptionManualName(block, row, sizeof(name), name));
+  PetscCall(SbOptionManualName(r, sizeof(name), name));
   // description of the value: "3 numbers", "euler_implicit|newmark"
-  with = row->kind == SB_OPTION_REALS ? "comma-separated " : row->count > 1 ? "semicolon-separated " : "";
   if (row->count > 1) PetscCall(PetscSNPrintf(number, sizeof(number), "%" PetscInt_FMT " ", row->count));
-  PetscCall(PetscSNPrintf(value, sizeof(value), "%s%s%s%s", number, with, kinds[row->kind],
-                          row->count > 1 ? "s" : ""));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  %s: %s", name, value));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  %s: %s%s%s%s", name, number,
+                                   row->kind == SB_OPTION_REALS ? "comma-separated "
+                                   : row->count > 1             ? "semicolon-separated "
+                                                                : "",
+                                   kinds[row->kind], row->count > 1 ? "s" : ""));
   if (row->range[0])
     PetscCall(PetscViewerASCIIPrintf(viewer, "%s %s", strchr("[(", row->range[0]) ? " in" : "", row->range));
   if (row->unit[0]) PetscCall(PetscViewerASCIIPrintf(viewer, " %s", row->unit));
@@ -47,72 +50,70 @@ static PetscErrorCode help_row(PetscViewer viewer, const SbOptionBlock *block, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Relevance of an option to a topic: 3: its class or type, 2: its first word, 1: a word in its name or text, 0: none. */
-static PetscErrorCode answers(const SbOptionBlock *block, const SbOption *row, const char *topic, int *how)
+/* Relevance of an option to a topic: 3: class or type, 2: first word, 1: a word in name or text, 0: none. */
+static PetscErrorCode answers(const SbOptionRow *r, const char *topic, int *how)
 {
+  const SbOption *row = r->row;
   const size_t n = strlen(topic);
   char name[SB_OPTION_NAME_MAX];
 
   PetscFunctionBeginUser;
-  PetscCall(SbOptionManualName(block, row, sizeof(name), name));
+  PetscCall(SbOptionManualName(r, sizeof(name), name));
   *how = 0;
-  if (!strcasecmp(block->klass[0] ? block->klass : "run", topic) || !strcasecmp(block->type, topic))
+  if (!strcasecmp(r->klass[0] ? r->klass : "run", topic) || !strcasecmp(r->type, topic))
     *how = 3;
-  else if (!block->klass[0] && !strncasecmp(row->key, topic, n) && (!row->key[n] || row->key[n] == '_'))
+  else if (!r->klass[0] && !strncasecmp(row->key, topic, n) && (!row->key[n] || row->key[n] == '_'))
     *how = 2;
   else if (strcasestr(name, topic) || strcasestr(row->help, topic) || strcasestr(row->range, topic))
     *how = 1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Prints the options of a class and type with at least the relevance `least`, under one headline; adds their number to *n. */
-static PetscErrorCode print_type(PetscViewer viewer, const SbOptionBlock *first, const char *topic, int least,
+/* Prints the options of a class and type with at least the relevance `least`, under one headline; adds their
+   number to *n. */
+static PetscErrorCode print_type(PetscViewer viewer, const SbOptionRow *first, const char *topic, int least,
                                  PetscBool table, PetscInt *n)
 {
+  static const char *const kinds[] = {
+    [SB_OPTION_BOOL] = "bool",     [SB_OPTION_INT] = "int",        [SB_OPTION_REAL] = "real",
+    [SB_OPTION_REALS] = "real",    [SB_OPTION_STRING] = "text",    [SB_OPTION_NAMES] = "names",
+    [SB_OPTION_CHOICE] = "choice", [SB_OPTION_FORMULA] = "formula"};
+  char name[SB_OPTION_NAME_MAX];
   PetscInt printed = 0;
   int how = 0;
 
   PetscFunctionBeginUser;
-  for (const SbOptionBlock *b = first; b < SbTheOptions.block + SbTheOptions.nblock; b++) {
-    if (strcmp(b->klass, first->klass) || strcmp(b->type, first->type)) continue;
-    for (PetscInt i = 0; i < b->n; i++) {
-      PetscCall(answers(b, &b->rows[i], topic, &how));
-      if (how < least) continue;
-      // headline of a section: "The run", "Every body", "body: corotated"
-      if (!printed++ && !table) {
-        if (!first->klass[0])
-          PetscCall(PetscViewerASCIIPrintf(viewer, "\nThe run\n"));
-        else if (!first->type[0])
-          PetscCall(PetscViewerASCIIPrintf(viewer, "\nEvery %s\n", first->klass));
-        else
-          PetscCall(PetscViewerASCIIPrintf(viewer, "\n%s: %s\n", first->klass, first->type));
-      }
-      // one line of the table for scripts; its columns are those of SbOptionsTable()
-      if (table) {
-        static const char *const kinds[] = {
-          [SB_OPTION_BOOL] = "bool",     [SB_OPTION_INT] = "int",        [SB_OPTION_REAL] = "real",
-          [SB_OPTION_REALS] = "real",    [SB_OPTION_STRING] = "text",    [SB_OPTION_NAMES] = "names",
-          [SB_OPTION_CHOICE] = "choice", [SB_OPTION_FORMULA] = "formula"};
-        char name[SB_OPTION_NAME_MAX];
-
-        PetscCall(SbOptionManualName(b, &b->rows[i], sizeof(name), name));
-        PetscCall(PetscViewerASCIIPrintf(
-          viewer, "%s\t%s\t%s\t%s\t%" PetscInt_FMT "\t%s\t%s\t%s\t%s\t%s\n", b->klass, b->type, name,
-          kinds[b->rows[i].kind], b->rows[i].count, b->rows[i].unit, b->rows[i].preset ? "no" : "yes",
-          b->rows[i].preset ? b->rows[i].preset : "", b->rows[i].range, b->rows[i].help));
-      } else
-        PetscCall(help_row(viewer, b, &b->rows[i]));
+  for (const SbOptionRow *r = first; r < SbTheOptions.row + SbTheOptions.nrow; r++) {
+    if (strcmp(r->klass, first->klass) || strcmp(r->type, first->type)) continue;
+    PetscCall(answers(r, topic, &how));
+    if (how < least) continue;
+    // headline of a section: "The run", "Every body", "body: corotated"
+    if (!printed++ && !table) {
+      if (!r->klass[0])
+        PetscCall(PetscViewerASCIIPrintf(viewer, "\nThe run\n"));
+      else if (!r->type[0])
+        PetscCall(PetscViewerASCIIPrintf(viewer, "\nEvery %s\n", r->klass));
+      else
+        PetscCall(PetscViewerASCIIPrintf(viewer, "\n%s: %s\n", r->klass, r->type));
     }
+    // a line for the terminal, or one of the table for scripts, whose columns are those of SbOptionsTable()
+    PetscCall(SbOptionManualName(r, sizeof(name), name));
+    if (table)
+      PetscCall(PetscViewerASCIIPrintf(viewer, "%s\t%s\t%s\t%s\t%" PetscInt_FMT "\t%s\t%s\t%s\t%s\t%s\n",
+                                       r->klass, r->type, name, kinds[r->row->kind], r->row->count,
+                                       r->row->unit, r->row->preset ? "no" : "yes",
+                                       r->row->preset ? r->row->preset : "", r->row->range, r->row->help));
+    else
+      PetscCall(help_row(viewer, r));
   }
   *n += printed;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscBool is_first(PetscInt i, PetscBool by_type)
+/* Whether no row before it is of the same class, or class and type. */
+static PetscBool is_first(const SbOptionRow *a, PetscBool by_type)
 {
-  const SbOptionBlock *a = &SbTheOptions.block[i];
-
-  for (const SbOptionBlock *b = SbTheOptions.block; b < a; b++)
+  for (const SbOptionRow *b = SbTheOptions.row; b < a; b++)
     if (!strcmp(a->klass, b->klass) && (!by_type || !strcmp(a->type, b->type))) return PETSC_FALSE;
   return PETSC_TRUE;
 }
@@ -123,24 +124,20 @@ static PetscErrorCode print_manual(PetscViewer viewer, const char *topic, int le
 {
   static const char *const order[] = {"", "body", "effect"}; /* then as registered */
   const PetscInt nordered = PETSC_STATIC_ARRAY_LENGTH(order);
+  const SbOptionRow *rows = SbTheOptions.row, *end = rows + SbTheOptions.nrow;
 
   PetscFunctionBeginUser;
   *n = 0;
-  for (PetscInt i = -nordered; i < SbTheOptions.nblock; i++) {
-    const char *klass = i < 0 ? order[i + nordered] : SbTheOptions.block[i].klass;
-    PetscBool seen = PETSC_FALSE;
+  for (PetscInt i = -nordered; i < SbTheOptions.nrow; i++) {
+    const char *klass = i < 0 ? order[i + nordered] : rows[i].klass;
+    PetscBool seen = (PetscBool)(i >= 0 && !is_first(&rows[i], PETSC_FALSE));
 
     for (PetscInt k = 0; i >= 0 && k < nordered; k++) seen = (PetscBool)(seen || !strcmp(order[k], klass));
-    if (seen || (i >= 0 && !is_first(i, PETSC_FALSE))) continue;
     /* options of all instances first, then those of each type */
-    for (int typed = 0; typed < 2; typed++) {
-      for (PetscInt j = 0; j < SbTheOptions.nblock; j++) {
-        const SbOptionBlock *b = &SbTheOptions.block[j];
-
-        if (!strcmp(b->klass, klass) && (b->type[0] != 0) == typed && b->n && is_first(j, PETSC_TRUE))
-          PetscCall(print_type(viewer, b, topic, least, table, n));
-      }
-    }
+    for (int typed = 0; typed < 2 && !seen; typed++)
+      for (const SbOptionRow *r = rows; r < end; r++)
+        if (!strcmp(r->klass, klass) && (r->type[0] != 0) == typed && is_first(r, PETSC_TRUE))
+          PetscCall(print_type(viewer, r, topic, least, table, n));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -148,6 +145,7 @@ static PetscErrorCode print_manual(PetscViewer viewer, const char *topic, int le
 PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic)
 {
   const PetscBool all = (PetscBool)!strcasecmp(topic, "all");
+  const SbOptionRow *rows = SbTheOptions.row, *end = rows + SbTheOptions.nrow;
   PetscViewer viewer;
   PetscInt n = 0;
 
@@ -166,39 +164,26 @@ PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic)
     for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(first_options); k++) {
       const char *const *o = first_options[k];
 
-      for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
-        const SbOptionBlock *b = &SbTheOptions.block[i];
-        const SbOption *row = NULL;
-
-        if (strcmp(b->klass, o[0]) || strcmp(b->type, o[1])) continue;
-        for (PetscInt r = 0; r < b->n && !row; r++) row = strcmp(b->rows[r].key, o[2]) ? NULL : &b->rows[r];
-        if (row) PetscCall(help_row(viewer, b, row));
-      }
+      for (const SbOptionRow *r = rows; r < end; r++)
+        if (!strcmp(r->klass, o[0]) && !strcmp(r->type, o[1]) && !strcmp(r->row->key, o[2]))
+          PetscCall(help_row(viewer, r));
     }
     // topics with options: classes, their types, and first words that several options of the run share
     PetscCall(PetscViewerASCIIPrintf(viewer, "\nTopics of -help\n"));
-    for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
-      const SbOptionBlock *b = &SbTheOptions.block[i];
-
-      for (PetscInt k = 0; !b->klass[0] && k < b->n; k++) {
-        PetscCall(
-          PetscSNPrintf(word, sizeof(word), " %.*s ", (int)strcspn(b->rows[k].key, "_"), b->rows[k].key));
-        if (!strstr(words, word)) PetscCall(PetscStrlcat(words, word + 1, sizeof(words)));
-      }
+    for (const SbOptionRow *r = rows; r < end; r++) {
+      if (r->klass[0]) continue;
+      PetscCall(PetscSNPrintf(word, sizeof(word), " %.*s ", (int)strcspn(r->row->key, "_"), r->row->key));
+      if (!strstr(words, word)) PetscCall(PetscStrlcat(words, word + 1, sizeof(words)));
     }
     PetscCall(PetscViewerASCIIPrintf(viewer, "  of the run:%s", words));
-    for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
-      const SbOptionBlock *b = &SbTheOptions.block[i];
+    for (const SbOptionRow *r = rows; r < end; r++) {
       PetscInt types = 0;
 
-      if (!b->klass[0] || !is_first(i, PETSC_FALSE)) continue;
-      PetscCall(PetscViewerASCIIPrintf(viewer, "\n  %s", b->klass));
-      for (PetscInt j = i; j < SbTheOptions.nblock; j++) {
-        const SbOptionBlock *t = &SbTheOptions.block[j];
-
-        if (!strcmp(t->klass, b->klass) && t->type[0] && is_first(j, PETSC_TRUE))
+      if (!r->klass[0] || !is_first(r, PETSC_FALSE)) continue;
+      PetscCall(PetscViewerASCIIPrintf(viewer, "\n  %s", r->klass));
+      for (const SbOptionRow *t = r; t < end; t++)
+        if (!strcmp(t->klass, r->klass) && t->type[0] && is_first(t, PETSC_TRUE))
           PetscCall(PetscViewerASCIIPrintf(viewer, "%s %s", types++ ? "" : ":", t->type));
-      }
     }
     PetscCall(PetscViewerASCIIPrintf(viewer,
                                      "\n  any other word: the options whose name or text contains it\n"

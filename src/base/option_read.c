@@ -1,9 +1,9 @@
 /*
   option_read.c - conversion of option texts to checked values.
 
-  A number must be the whole text; it is compared with the interval of its row, "[a, b)", whose ends may be inf. NaN is in
-  no interval. The error message has the option, value, interval, unit and help text; advice about
-  an excluded end belongs to the help text of the row.
+  A number must be the whole text; it is compared with the interval of its row, "[a, b)", whose ends may be
+  inf. NaN is in no interval. The error message has the option, value, interval, unit and help text; advice
+  about an excluded end belongs to the help text of the row.
 */
 #include <ctype.h>
 #include "formula.h"
@@ -77,7 +77,7 @@ static PetscErrorCode check_range(const SbOptionRecord *r, PetscReal x)
   PetscReal lo, hi;
 
   PetscFunctionBeginUser;
-  /* whether x is in "[a, b)"; an empty range has every number except NaN; an invalid range is an internal error */
+  /* whether x is in "[a, b)"; an empty range has all numbers but NaN; an invalid one is an internal error */
   in = (PetscBool)(x == x);
   if (r->row->range[0]) {
     PetscCheck(sscanf(r->row->range, "%c%63[^,],%63[^])]%c", &open, lo_text, hi_text, &close) == 4 &&
@@ -99,7 +99,7 @@ static PetscErrorCode check_range(const SbOptionRecord *r, PetscReal x)
 static PetscErrorCode text_of(const SbScope *scope, const char *key, SbOptionKind kind,
                               const SbOptionRecord **record)
 {
-  const SbOption *row = SbOptionFind(scope, key);
+  const SbOption *row;
   SbOptionRecord *r = NULL;
   const char *value = NULL;
   SbScope where;
@@ -107,8 +107,7 @@ static PetscErrorCode text_of(const SbScope *scope, const char *key, SbOptionKin
   char want[SB_NAME_MAX];
 
   PetscFunctionBeginUser;
-  PetscCheck(row, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No row for key '%s' of class '%s', type '%s'", key,
-             scope->klass, scope->type);
+  PetscCall(SbOptionNeed(scope, key, &row));
   PetscCall(SbOptionFindValue(scope, key, &where, &value, &given));
   PetscCall(SbOptionFindRecord(&where, row, &r));
   PetscCheck(row->kind == kind, PETSC_COMM_SELF, PETSC_ERR_PLIB, "Option %s has kind %d, asked for as %d",
@@ -316,7 +315,7 @@ PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula
 
 PetscErrorCode SbOptionCheckEarly(const SbScope *scope, const char *key)
 {
-  const SbOption *row = SbOptionFind(scope, key);
+  const SbOption *row;
   PetscReal x[SB_OPTION_COUNT_MAX];
   PetscInt n;
   PetscBool b;
@@ -324,8 +323,7 @@ PetscErrorCode SbOptionCheckEarly(const SbScope *scope, const char *key)
   SbFormula f[SB_OPTION_COUNT_MAX] = {NULL};
 
   PetscFunctionBeginUser;
-  PetscCheck(row, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No row for key '%s' of class '%s', type '%s'", key,
-             scope->klass, scope->type);
+  PetscCall(SbOptionNeed(scope, key, &row));
   if (row->kind == SB_OPTION_BOOL) PetscCall(SbOptionBool(scope, key, &b));
   if (row->kind == SB_OPTION_INT) PetscCall(SbOptionInt(scope, key, &n));
   if (row->kind == SB_OPTION_REAL) PetscCall(SbOptionReal(scope, key, x));

@@ -1,10 +1,10 @@
 /*
   option_view.c - writes the complete scenario as an option file that can be run.
 
-  Every value read so far, as the user's or the default text, without loss of digits; then the user's
-  options for PETSc. PETSc's file format cuts a line at '#', removes quotes around a value and has no escapes: a value with a
-  blank is quoted; one that begins with a minus sign and a letter is preceded by a blank, or PETSc would take it for a name. A
-  value with '#' or a quote can only be given on the command line, and the file says so.
+  Every value read so far, as the user's or the default text, without loss of digits; then the user's options
+  for PETSc. PETSc's file format cuts a line at '#', removes quotes around a value and has no escapes: a value
+  with a blank is quoted; one that begins with a minus sign and a letter is preceded by a blank, as names
+  begin so. A value with '#' or a quote can only be given on the command line, and the file says so.
 */
 #include <ctype.h>
 #include <errno.h>
@@ -23,8 +23,7 @@ static PetscErrorCode print_value(PetscViewer viewer, const char *value, int wid
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(text, sizeof(text), "%s%s%s%s", quote, name_like ? " " : "", value, quote));
-  PetscCall(PetscViewerASCIIPrintf(viewer, " %s", text));
-  for (int n = (int)strlen(text); n < width; n++) PetscCall(PetscViewerASCIIPrintf(viewer, " "));
+  PetscCall(PetscViewerASCIIPrintf(viewer, " %-*s", width, text));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -56,77 +55,56 @@ static PetscBool same_instance(const SbOptionRecord *a, const SbOptionRecord *b)
                      !strcmp(a->scope.instance, b->scope.instance));
 }
 
-static PetscErrorCode print_petsc(PetscViewer viewer, PetscInt n, const SbOptionUser users[])
-{
-  PetscBool any = PETSC_FALSE;
-
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < n; i++) {
-    const char *value = users[i].value;
-
-    if (SbOptionIsRead(users[i].name)) continue;
-    if (!any) PetscCall(PetscViewerASCIIPrintf(viewer, "\n# for PETSc\n"));
-    any = PETSC_TRUE;
-    if (value && strpbrk(value, "#\"")) PetscCall(PetscViewerASCIIPrintf(viewer, "# "));
-    PetscCall(PetscViewerASCIIPrintf(viewer, "-%s", users[i].name));
-    if (value) PetscCall(print_value(viewer, value, 0));
-    PetscCall(PetscViewerASCIIPrintf(viewer, "\n"));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbOptionsView(PetscViewer viewer)
 {
   const PetscBool with_presets = (PetscBool)(SbTheOptions.nrecord < LINES_MAX);
+  const SbOptionRecord *records = SbTheOptions.record, *end = records + SbTheOptions.nrecord;
   char folder[PETSC_MAX_PATH_LEN];
-  PetscInt n;
-  SbOptionUser *users;
+  PetscInt n = SbTheOptions.nuser;
+  SbOptionUser *users = SbTheOptions.user;
+  PetscBool any = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   PetscCall(PetscGetWorkingDirectory(folder, sizeof(folder)));
-  PetscCall(PetscViewerASCIIPrintf(
-    viewer, "# The complete scenario, written by supple %s; it runs again with\n", SB_VERSION));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "#   supple THIS_FILE\n"));
-  PetscCall(
-    PetscViewerASCIIPrintf(viewer, "# from this folder, where relative file names begin: %s\n", folder));
+  PetscCall(PetscViewerASCIIPrintf(viewer,
+                                   "# The complete scenario, written by supple %s; it runs again with\n"
+                                   "#   supple THIS_FILE\n"
+                                   "# from this folder, where relative file names begin: %s\n",
+                                   SB_VERSION, folder));
   if (!with_presets)
     PetscCall(
       PetscViewerASCIIPrintf(viewer, "# Defaults are comments: PETSc 3.18 holds at most 512 options.\n"));
 
   /* program-wide records in the order of the manual, independent of the order of reading */
   PetscCall(PetscViewerASCIIPrintf(viewer, "\n# the run\n"));
-  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
-    const SbOptionBlock *block = &SbTheOptions.block[i];
-
-    for (PetscInt j = 0; j < SbTheOptions.nrecord; j++) {
-      const SbOptionRecord *r = &SbTheOptions.record[j];
-
-      if (!r->scope.klass[0] && r->row >= block->rows && r->row < block->rows + block->n)
+  for (PetscInt i = 0; i < SbTheOptions.nrow; i++)
+    for (const SbOptionRecord *r = records; r < end; r++)
+      if (!r->scope.klass[0] && r->row == SbTheOptions.row[i].row)
         PetscCall(print_record(viewer, r, with_presets));
-    }
-  }
-  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
-    PetscBool seen = (PetscBool)!SbTheOptions.record[i].scope.klass[0];
+  /* all records of one instance under one headline */
+  for (const SbOptionRecord *first = records; first < end; first++) {
+    PetscBool seen = (PetscBool)!first->scope.klass[0];
 
-    for (PetscInt j = 0; j < i && !seen; j++)
-      seen = same_instance(&SbTheOptions.record[i], &SbTheOptions.record[j]);
+    for (const SbOptionRecord *r = records; r < first && !seen; r++) seen = same_instance(first, r);
+    if (seen) continue;
+    PetscCall(PetscViewerASCIIPrintf(viewer, "\n# %s %s\n", first->scope.klass, first->scope.instance));
+    for (const SbOptionRecord *r = first; r < end; r++)
+      if (same_instance(r, first)) PetscCall(print_record(viewer, r, with_presets));
+  }
+  /* the user's options of PETSc */
+  if (!SbTheOptions.remembered) PetscCall(SbOptionUsersGet(&n, &users));
+  for (PetscInt i = 0; i < n; i++) {
+    const char *value = users[i].value;
 
-    /* all records of one instance under one headline */
-    if (!seen) {
-      PetscCall(PetscViewerASCIIPrintf(viewer, "\n# %s %s\n", SbTheOptions.record[i].scope.klass,
-                                       SbTheOptions.record[i].scope.instance));
-      for (const SbOptionRecord *r = &SbTheOptions.record[i]; r < SbTheOptions.record + SbTheOptions.nrecord;
-           r++)
-        if (same_instance(r, &SbTheOptions.record[i])) PetscCall(print_record(viewer, r, with_presets));
-    }
+    if (SbOptionIsRead(users[i].name)) continue;
+    if (!any) PetscCall(PetscViewerASCIIPrintf(viewer, "\n# for PETSc\n"));
+    any = PETSC_TRUE;
+    PetscCall(
+      PetscViewerASCIIPrintf(viewer, "%s-%s", value && strpbrk(value, "#\"") ? "# " : "", users[i].name));
+    if (value) PetscCall(print_value(viewer, value, 0));
+    PetscCall(PetscViewerASCIIPrintf(viewer, "\n"));
   }
-  if (SbTheOptions.remembered) {
-    PetscCall(print_petsc(viewer, SbTheOptions.nuser, SbTheOptions.user));
-  } else {
-    PetscCall(SbOptionUsersGet(&n, &users));
-    PetscCall(print_petsc(viewer, n, users));
-    PetscCall(SbOptionUsersFree(&n, &users));
-  }
+  if (!SbTheOptions.remembered) PetscCall(SbOptionUsersFree(&n, &users));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,10 +1,13 @@
 /*
-  quadratic_map.c - P2 tet with ten nodes: basis, map, and quadrature rules with positive weights on the tet and its facets.
+  quadratic_map.c - P2 tet with ten nodes: basis, map, quadrature rules with positive weights on tet and
+  facets.
 
-  A tet with curved edges is x = sum_a phi_a(l) x_a. The derivatives of this map at the barycentric coordinates l are those of the P1 tet with the corners
-  x_i' = (4 l_i - 1) x_i + sum_j 4 l_j x_ij, which thus has the gradients and the volume element (volume times weight) at that point. A constant stress is in equilibrium if
-  the rule integrates grad phi_a det dx/dl, a polynomial of degree 3, exactly; the mean of grad phi_a det F det dx/dl and the mass matrix of linear fields
-  require degree 5: 14 points with positive weights (Walkington 2000), which leave no zero-energy modes and no massless modes.
+  A tet with curved edges is x = sum_a phi_a(l) x_a. Its derivatives at the barycentric coordinates l are
+  those of the P1 tet with the corners x_i' = (4 l_i - 1) x_i + sum_j 4 l_j x_ij, which thus has the gradients
+  and the volume element (volume times weight) at that point. A constant stress is in equilibrium if the rule
+  integrates grad phi_a det dx/dl, a polynomial of degree 3, exactly; the mean of grad phi_a det F det dx/dl
+  and the mass matrix of linear fields require degree 5: 14 points with positive weights (Walkington 2000),
+  which leave no zero-energy modes and no massless modes.
 */
 #include "sbquadratic.h"
 

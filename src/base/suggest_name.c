@@ -1,8 +1,8 @@
 /*
   suggest_name.c - names similar to a misspelt one.
 
-  Distance between words: optimal string alignment (Levenshtein's distance, in which a transposition of neighbours is one edit;
-  Damerau, Communications of the ACM 7, 1964). Case-insensitive, as in PETSc.
+  Distance between words: optimal string alignment (Levenshtein's distance, in which a transposition of
+  neighbours is one edit; Damerau, Communications of the ACM 7, 1964). Case-insensitive, as in PETSc.
 */
 #include <ctype.h>
 #include <stdlib.h>

@@ -1,10 +1,10 @@
 /*
   thread.c - limits each rank to one thread: the program is parallel by MPI ranks only.
 
-  CHOLMOD's OpenMP regions use a number of threads fixed when it was compiled, whatever OMP_NUM_THREADS is, and idle
-  threads of GNU's OpenMP spin: two ranks on four cores then compete for them. With a maximum of 0 active levels every
-  region runs on its own thread. Threaded BLAS libraries are limited separately. The functions are looked up in the loaded
-  libraries, so that the build needs no OpenMP; a library without them has no threads.
+  CHOLMOD's OpenMP regions use a number of threads fixed when it was compiled, whatever OMP_NUM_THREADS is,
+  and idle threads of GNU's OpenMP spin: two ranks on four cores then compete for them. With a maximum of 0
+  active levels every region runs on its own thread. Threaded BLAS libraries are limited separately. Functions
+  are looked up in the loaded libraries: the build needs no OpenMP; a library without them has no threads.
 */
 #include <dlfcn.h>
 #include <link.h>

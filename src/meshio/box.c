@@ -1,35 +1,32 @@
 /*
-  box.c - structured tet mesh of a box from the origin to (lx, ly, lz): box:lx,ly,lz:n or box:lx,ly,lz:nx,ny,nz.
+  box.c - structured tet mesh of a box from the origin on: box:lx,ly,lz:n or box:lx,ly,lz:nx,ny,nz.
 
-  n is the number of cells along the shortest side; the numbers along the other sides make the cells nearest to cubes. Each cell is divided
-  into six tets around one of its diagonals (Kuhn, 1960), and adjacent cells are mirror images of each other. Without
-  mirroring all tets have the same shapes, but the mesh has a preferred direction: on a clamped bar of 32 x 8 x 8
-  cells under its weight it recovers 93.3 % of the strain energy at a Poisson ratio of 0.3 and 60 % at 0.49, the mirrored
-  one 95.6 % and 93 %, with the same number of unknowns and matrix entries; and a symmetric load on an even number of
-  cells gives a symmetric solution.
+  n is the number of cells along the shortest side; the numbers along the other sides make the cells nearest
+  to cubes. Each cell is divided into six tets around one of its diagonals (Kuhn, 1960), and adjacent cells
+  are mirror images of each other. Without mirroring all tets have the same shapes, but the mesh has a
+  preferred direction: on a clamped bar of 32 x 8 x 8 cells under its weight it recovers 93.3 % of the strain
+  energy at a Poisson ratio of 0.3 and 60 % at 0.49, the mirrored one 95.6 % and 93 %, with the same number of
+  unknowns and matrix entries; and a symmetric load on an even number of cells gives a symmetric solution.
 
   The sides are the groups xmin, xmax, ymin, ymax, zmin, zmax.
 */
 #include "meshio_impl.h"
 
-typedef struct {
-  PetscReal l[3]; /* side lengths, m */
-  PetscInt n[3];
-} Box;
-
 #define BOX_HELP \
   "write box:lx,ly,lz:n or box:lx,ly,lz:nx,ny,nz with lengths in m above 0 and numbers of cells from 1 on"
 
-static inline PetscInt vertex(const Box *box, PetscInt i, PetscInt j, PetscInt k)
+/* Vertex in a box of n[] cells; x fastest. */
+static inline PetscInt vertex(const PetscInt n[3], PetscInt i, PetscInt j, PetscInt k)
 {
-  return (k * (box->n[1] + 1) + j) * (box->n[0] + 1) + i;
+  return (k * (n[1] + 1) + j) * (n[0] + 1) + i;
 }
 
 /*
-  Six tets of a cell; corners as bits (1: far in x, 2: in y, 4: in z), each tet along one of the six edge paths from corner 0 to corner 7.
-  `mirror`: bits of the directions in which the cell is reflected. An odd permutation and an odd number of reflections each change the orientation of the tet.
+  Six tets of a cell; corners as bits (1: far in x, 2: in y, 4: in z), each tet along one of the six edge
+  paths from corner 0 to corner 7. `mirror`: bits of the directions in which the cell is reflected. An odd
+  permutation and an odd number of reflections each change the orientation of the tet.
 */
-static PetscErrorCode add_cell(const Box *box, const PetscInt at[3], SbImport *im)
+static PetscErrorCode add_cell(const PetscInt n[3], const PetscInt at[3], SbImport *im)
 {
   static const int ways[6][4] = {{0, 1, 3, 7}, {0, 2, 6, 7}, {0, 4, 5, 7},
                                  {0, 1, 5, 7}, {0, 2, 3, 7}, {0, 4, 6, 7}};
@@ -44,7 +41,7 @@ static PetscErrorCode add_cell(const Box *box, const PetscInt at[3], SbImport *i
       const int corner = ways[w][a] ^ mirror;
       const int position = odd ^ (w >= 3) && a >= 2 ? 5 - a : a; /* swap the last two vertices */
 
-      vert[position] = vertex(box, at[0] + (corner & 1), at[1] + (corner >> 1 & 1), at[2] + (corner >> 2));
+      vert[position] = vertex(n, at[0] + (corner & 1), at[1] + (corner >> 1 & 1), at[2] + (corner >> 2));
     }
     PetscCall(SbImportAddItem(im, 3, vert, 0, im->item[3].n + 1));
   }
@@ -53,54 +50,48 @@ static PetscErrorCode add_cell(const Box *box, const PetscInt at[3], SbImport *i
 
 PetscErrorCode SbImportRead_Box(const char *text, SbImport *im)
 {
-  Box box;
-  PetscInt at[3], v = 0;
+  PetscInt n[3], at[3], v = 0;
   const char *sides = text + strlen("box:"), *colon = strchr(sides, ':');
   char lengths[PETSC_MAX_PATH_LEN];
-  PetscReal l[3], n[3], total = 6;
+  PetscReal l[3], ncell[3], total = 6; /* side lengths, m */
   int count;
 
   PetscFunctionBeginUser;
   // side lengths and numbers of cells
   (void)snprintf(lengths, sizeof(lengths), "%.*s", (int)strcspn(sides, ":"), sides);
-  count = colon ? SbParseNumbers(colon + 1, 3, n) : 0;
+  count = colon ? SbParseNumbers(colon + 1, 3, ncell) : 0;
   PetscCheck((count == 1 || count == 3) && SbParseNumbers(lengths, 3, l) == 3, PETSC_COMM_SELF,
              PETSC_ERR_USER_INPUT, "%s: " BOX_HELP, im->where);
-  for (int i = 0; i < 3; i++) {
+  for (int i = 0; i < 3; i++)
     PetscCheck(l[i] > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s: length %g m; " BOX_HELP, im->where,
                l[i]);
-  }
   if (count == 1) {
-    const double n0 = n[0], shortest = PetscMin(PetscMin(l[0], l[1]), l[2]);
+    const double n0 = ncell[0], shortest = PetscMin(PetscMin(l[0], l[1]), l[2]);
 
     for (int i = 0; i < 3; i++)
-      n[i] = l[i] == shortest ? n0 : PetscMax(1., floor(l[i] / shortest * n0 + 0.5));
+      ncell[i] = l[i] == shortest ? n0 : PetscMax(1., floor(l[i] / shortest * n0 + 0.5));
   }
   for (int i = 0; i < 3; i++) {
-    PetscCheck(n[i] >= 1 && n[i] == floor(n[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "%s: %g cells; " BOX_HELP, im->where, n[i]);
-    total *= n[i];
+    PetscCheck(ncell[i] >= 1 && ncell[i] == floor(ncell[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s: %g cells; " BOX_HELP, im->where, ncell[i]);
+    total *= ncell[i];
     PetscCheck(total <= PETSC_MAX_INT / 8, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
                "%s: %g tets or more are more than this build can number; take fewer cells", im->where, total);
-    box.l[i] = l[i];
-    box.n[i] = (PetscInt)n[i];
+    n[i] = (PetscInt)ncell[i];
   }
-  // vertices, x fastest
-  PetscCall(SbImportSetVertices(im, (box.n[0] + 1) * (box.n[1] + 1) * (box.n[2] + 1)));
-  for (PetscInt k = 0; k <= box.n[2]; k++) {
-    for (PetscInt j = 0; j <= box.n[1]; j++) {
-      for (PetscInt i = 0; i <= box.n[0]; i++, v++) {
-        im->x[3 * v + 0] = box.l[0] * (PetscReal)i / (PetscReal)box.n[0];
-        im->x[3 * v + 1] = box.l[1] * (PetscReal)j / (PetscReal)box.n[1];
-        im->x[3 * v + 2] = box.l[2] * (PetscReal)k / (PetscReal)box.n[2];
+  // vertices, then tets
+  PetscCall(SbImportSetVertices(im, (n[0] + 1) * (n[1] + 1) * (n[2] + 1)));
+  for (at[2] = 0; at[2] <= n[2]; at[2]++) {
+    for (at[1] = 0; at[1] <= n[1]; at[1]++) {
+      for (at[0] = 0; at[0] <= n[0]; at[0]++, v++) {
+        for (int d = 0; d < 3; d++) im->x[3 * v + d] = l[d] * (PetscReal)at[d] / (PetscReal)n[d];
         im->vert_number[v] = v + 1;
       }
     }
   }
-  for (at[2] = 0; at[2] < box.n[2]; at[2]++) {
-    for (at[1] = 0; at[1] < box.n[1]; at[1]++) {
-      for (at[0] = 0; at[0] < box.n[0]; at[0]++) PetscCall(add_cell(&box, at, im));
-    }
+  for (at[2] = 0; at[2] < n[2]; at[2]++) {
+    for (at[1] = 0; at[1] < n[1]; at[1]++)
+      for (at[0] = 0; at[0] < n[0]; at[0]++) PetscCall(add_cell(n, at, im));
   }
   for (int side = 0; side < 6; side++) {
     static const char *const names[6] = {"xmin", "xmax", "ymin", "ymax", "zmin", "zmax"};
@@ -109,16 +100,16 @@ PetscErrorCode SbImportRead_Box(const char *text, SbImport *im)
 
     // two triangles for each cell on the side `side` of the box, with the diagonals of the tets
     PetscCall(SbImportTagsAlone(im, 2, side + 1, names[side], &tags));
-    at[d] = side % 2 ? box.n[d] : 0;
-    for (PetscInt i = 0; i < box.n[e]; i++) {
-      for (PetscInt j = 0; j < box.n[f]; j++) {
+    at[d] = side % 2 ? n[d] : 0;
+    for (PetscInt i = 0; i < n[e]; i++) {
+      for (PetscInt j = 0; j < n[f]; j++) {
         PetscInt c[4];
 
         /* corners by bits; the diagonals of adjacent mirrored cells alternate */
         for (int corner = 0; corner < 4; corner++) {
           at[e] = i + ((corner & 1) ^ (i & 1));
           at[f] = j + ((corner >> 1) ^ (j & 1));
-          c[corner] = vertex(&box, at[0], at[1], at[2]);
+          c[corner] = vertex(n, at[0], at[1], at[2]);
         }
         PetscCall(SbImportAddItem(im, 2, (PetscInt[3]){c[0], c[1], c[3]}, tags, im->item[2].n + 1));
         PetscCall(SbImportAddItem(im, 2, (PetscInt[3]){c[0], c[2], c[3]}, tags, im->item[2].n + 1));

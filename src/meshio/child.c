@@ -1,10 +1,11 @@
 /*
-  child.c - gmsh in a forked child process: if it crashes or hangs, the program continues with an error message.
+  child.c - gmsh in a forked child process: when it crashes or hangs, the program goes on with an error.
 
-  The child must not disturb inherited state: it never returns but ends by _exit() (no MPI, no flush of buffers, no
-  PetscFinalize()), resets all signal handlers (of PETSc and MPI), prints nothing, writes no core file, dies with its parent, and ends by a
-  timer after a time limit. It calls neither MPI nor HDF5. It writes its result to a memory file that both processes
-  have open: a header with counts and the error message, then the arrays in sequence.
+  The child must not disturb inherited state: it never returns but ends by _exit() (no MPI, no flush of
+  buffers, no PetscFinalize()), resets all signal handlers (of PETSc and MPI), prints nothing, writes no core
+  file, dies with its parent, and ends after a time limit. It calls neither MPI nor HDF5. Its result goes to a
+  memory file that both processes have open: a header with counts and the error message, then the arrays in
+  sequence.
 */
 #include <errno.h>
 #include <fcntl.h>
@@ -51,12 +52,10 @@ void SbChildIsolate(pid_t parent, PetscReal seconds)
   const PetscReal most = PetscMin(seconds, 1e9), whole = PetscFloorReal(most);
   const struct itimerval end = {.it_value = {(time_t)whole, 1 + (suseconds_t)(999998 * (most - whole))}};
   const struct rlimit no_core = {0, 0};
-  struct sigaction usual;
-  sigset_t none;
+  const struct sigaction usual = {.sa_handler = SIG_DFL};
   const int nothing = open("/dev/null", O_RDWR);
+  sigset_t none;
 
-  memset(&usual, 0, sizeof(usual));
-  usual.sa_handler = SIG_DFL;
   for (int s = 1; s < 32; s++) (void)sigaction(s, &usual, NULL);
   (void)sigemptyset(&none);
   (void)sigprocmask(SIG_SETMASK, &none, NULL);
@@ -70,12 +69,10 @@ void SbChildIsolate(pid_t parent, PetscReal seconds)
 /* Body of the child process; never returns. */
 static void child(FILE *file, const SbGmshJob *job)
 {
-  Header h;
-  SbImport im;
+  Header h = {.nvert = 0};
+  SbImport im = {.nvert = 0};
   Part part[NPART];
 
-  memset(&h, 0, sizeof(h));
-  memset(&im, 0, sizeof(im));
   (void)snprintf(im.where, sizeof(im.where), "%s", job->where);
   (void)PetscPushErrorHandler(SbCatchError, &h.caught);
   h.caught.code = (int)SbGmshCall(job, &im);
@@ -97,7 +94,7 @@ PetscErrorCode SbGmshRun(const SbGmshJob *job, SbImport *im)
   const pid_t self = getpid();
   const int memory = memfd_create("supple", MFD_CLOEXEC);
   FILE *file = memory < 0 ? NULL : fdopen(memory, "w+b");
-  int status = 0;
+  int status = 0, killer;
   pid_t pid;
   Header h;
   Part part[NPART];
@@ -132,19 +129,18 @@ PetscErrorCode SbGmshRun(const SbGmshJob *job, SbImport *im)
              strerror(errno));
 
   /* error messages for a child without a complete result */
-  PetscCheck(complete || !WIFSIGNALED(status) || WTERMSIG(status) != SIGALRM, PETSC_COMM_SELF,
-             PETSC_ERR_FILE_UNEXPECTED,
+  killer = !complete && WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+  PetscCheck(killer != SIGALRM, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
              "%s: gmsh was stopped: after %g s it had not %s; give a smaller or repaired input", im->where,
              (double)job->seconds, job->doing);
   PetscCheck(
-    complete || !WIFSIGNALED(status) || WTERMSIG(status) != SIGKILL, PETSC_COMM_SELF,
-    PETSC_ERR_FILE_UNEXPECTED,
+    killer != SIGKILL, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
     "%s: gmsh was killed from outside while it %s; most often memory ran out: give a smaller mesh or "
     "more memory",
     im->where, job->doing);
-  PetscCheck(complete || !WIFSIGNALED(status), PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+  PetscCheck(!killer, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
              "%s: gmsh crashed (%s) while it %s; the input is damaged, or of a kind it cannot take",
-             im->where, strsignal(WTERMSIG(status)), job->doing);
+             im->where, strsignal(killer), job->doing);
   PetscCheck(complete, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
              "%s: gmsh ended (exit code %d) while it %s", im->where, WEXITSTATUS(status), job->doing);
   PetscCheck(!h.caught.code, PETSC_COMM_SELF, (PetscErrorCode)h.caught.code, "%s", h.caught.text);

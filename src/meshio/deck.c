@@ -1,8 +1,9 @@
 /*
-  deck.c - builds a mesh from nodes, elements and sets that a file lists by labels in any order: everything is collected first, then converted.
+  deck.c - mesh from nodes, elements and sets listed by labels in any order: all are collected, then
+  converted.
 
-  Common part of the Abaqus, Nastran and universal file readers. A set may refer to nodes, elements and sets that are defined later, hence its members are
-  found after the whole file has been read.
+  Common part of the Abaqus, Nastran and universal file readers. A set may refer to nodes, elements and sets
+  that are defined later, hence its members are found after the whole file has been read.
 */
 #include "meshio_impl.h"
 

@@ -1,8 +1,8 @@
 /*
   edges.c - list of the unique edges of all tets, triangles and lines.
 
-  Counting sort: each edge goes into the bucket of its lower vertex; each bucket is sorted, and equal neighbours in it
-  are one edge. The number of an edge is its position in the list.
+  Counting sort: each edge goes into the bucket of its lower vertex; each bucket is sorted, and equal
+  neighbours in it are one edge. The number of an edge is its position in the list.
 */
 #include "meshio_impl.h"
 #include "sbquadratic.h"

@@ -1,8 +1,8 @@
 /*
   gmsh_library.c - loads the gmsh library at run time, in a child process.
 
-  The library is found by its versioned file name: the arguments of gmshInitialize() changed in 4.9. Its output is switched off; its
-  logger keeps the messages, and the last error (or warning) becomes part of our message.
+  The library is found by its versioned file name: the arguments of gmshInitialize() changed in 4.9. It prints
+  nothing; its logger keeps the messages, and the last error (or warning) becomes part of ours.
 */
 #include <dlfcn.h>
 #include <stddef.h>
@@ -10,7 +10,8 @@
 
 enum { OLDEST = 8, NEWEST = 30 }; /* minor versions: 4.8 to 4.30 */
 
-/* RTLD_DEEPBIND: a gmsh with its own METIS and other libraries must use those, not the ones of this program. The address sanitizer forbids it. */
+/* RTLD_DEEPBIND: a gmsh with its own METIS and other libraries must use those, not the ones of this program.
+   The address sanitizer forbids it. */
 #if defined(__has_feature)
   #if __has_feature(address_sanitizer)
     #define SANITIZED /* as clang tells it */
@@ -22,8 +23,6 @@ enum { OLDEST = 8, NEWEST = 30 }; /* minor versions: 4.8 to 4.30 */
   #define BIND (RTLD_NOW | RTLD_LOCAL | RTLD_DEEPBIND)
 #endif
 
-/* ------------------------------------------------------------------ loading */
-
 static const struct {
   const char *name;
   size_t offset;
@@ -32,29 +31,6 @@ static const struct {
                  SB_GMSH_FUNCTIONS(ROW)
 #undef ROW
 };
-
-/* Loads the newest installed version. */
-static PetscErrorCode load(const char *where, void **library, int *minor)
-{
-  char name[64], why[256] = "";
-
-  PetscFunctionBeginUser;
-  for (*minor = NEWEST; *minor >= OLDEST; (*minor)--) {
-    const char *error;
-
-    (void)snprintf(name, sizeof(name), "libgmsh.so.4.%d", *minor);
-    *library = dlopen(name, BIND);
-    if (*library) PetscFunctionReturn(PETSC_SUCCESS);
-    /* the error of an installed library with a missing dependency is more useful than "not found" */
-    error = dlerror();
-    if (error && !strstr(error, name)) (void)snprintf(why, sizeof(why), "; %s", error);
-  }
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-          "%s: needs the gmsh library (libgmsh.so.4.%d or later), which cannot be loaded; install the "
-          "package gmsh (Debian, Ubuntu), which brings it, or add its folder to LD_LIBRARY_PATH%s",
-          where, OLDEST, why);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* ------------------------------------------------------------------ messages */
 
@@ -68,15 +44,12 @@ static void last_line(const SbGmsh *g, const char *level, size_t size, char text
   text[0] = 0;
   g->LoggerGet(&log, &n, &error);
   for (size_t i = 0; !error && i < n; i++) {
-    if (!strncmp(log[i], level, strlen(level))) {
-      const char *line = log[i] + strlen(level);
+    const char *line = strncmp(log[i], level, strlen(level)) ? NULL : log[i] + strlen(level);
 
-      (void)snprintf(text, size, "%s", line + strspn(line, " :"));
-    }
+    if (line) (void)snprintf(text, size, "%s", line + strspn(line, " :"));
   }
-  for (char *p = text; *p; p++) {
+  for (char *p = text; *p; p++)
     if (*p == '\n') *p = ' ';
-  }
 }
 
 PetscErrorCode SbGmshError(const SbGmsh *g, const char *function)
@@ -95,16 +68,26 @@ PetscErrorCode SbGmshError(const SbGmsh *g, const char *function)
 
 PetscErrorCode SbGmshCall(const SbGmshJob *job, SbImport *im)
 {
-  SbGmsh g;
-  void *library, (*before_9)(int, char **, int, int *);
-  int minor, error = 1;
-  void (*from_9)(int, char **, int, int, int *);
-  void *start;
+  SbGmsh g = {.where = job->where};
+  void *library = NULL, *start, (*before_9)(int, char **, int, int *),
+       (*from_9)(int, char **, int, int, int *);
+  char name[64], why[256] = "";
+  const char *message;
+  int minor = NEWEST + 1, error = 1;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&g, sizeof(g)));
-  g.where = job->where;
-  PetscCall(load(g.where, &library, &minor));
+  // the newest installed version
+  while (!library && minor > OLDEST) {
+    (void)snprintf(name, sizeof(name), "libgmsh.so.4.%d", --minor);
+    library = dlopen(name, BIND);
+    /* the error of an installed library with a missing dependency is more useful than "not found" */
+    message = library ? NULL : dlerror();
+    if (message && !strstr(message, name)) (void)snprintf(why, sizeof(why), "; %s", message);
+  }
+  PetscCheck(library, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: needs the gmsh library (libgmsh.so.4.%d or later), which cannot be loaded; install the "
+             "package gmsh (Debian, Ubuntu), which brings it, or add its folder to LD_LIBRARY_PATH%s",
+             g.where, OLDEST, why);
   // look up the functions of the library by name
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(functions); i++) {
     void *address = dlsym(library, functions[i].name);

@@ -1,9 +1,9 @@
 /*
-  import.c - import of a body on rank 0: the reader is chosen by the mesh name; the body is placed after reading.
+  import.c - import of a body on rank 0: its reader is chosen by the mesh name; then it is placed.
 
   A new format needs one file with one SbReader and one row in the table below.
 
-  Placement: x <- R (s x) + t, with the rotation R by Rodrigues' formula about an axis through the origin of the file.
+  Placement: x <- R (s x) + t, with the rotation R by Rodrigues' formula about an axis through the origin.
 */
 #include <strings.h>
 #include "meshio_impl.h"
@@ -89,39 +89,14 @@ static SbReader reader_of(const char *mesh, size_t size, char known[])
   return NULL;
 }
 
-/* Finds the reader; the name may also be the common stem of TetGen's files. */
-static PetscErrorCode find_reader(const SbBody *body, SbReader *read)
-{
-  char known[256] = "", node[PETSC_MAX_PATH_LEN + 8];
-  PetscBool tetgen;
-
-  PetscFunctionBeginUser;
-  if (!strncmp(body->mesh, "box:", 4)) {
-    *read = SbImportRead_Box;
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  *read = reader_of(body->mesh, sizeof(known), known);
-  if (*read) PetscFunctionReturn(PETSC_SUCCESS);
-  (void)snprintf(node, sizeof(node), "%s.node", body->mesh);
-  PetscCall(PetscTestFile(node, 'r', &tetgen));
-  PetscCheck(tetgen, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%s%s%smesh '%s' is of no known kind; give a file that ends in %s (or the name of TetGen's "
-             "files without an ending), or box:lx,ly,lz:n",
-             body->name[0] ? "body '" : "", body->name, body->name[0] ? "': " : "", body->mesh, known);
-  *read = SbImportRead_TetGen;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Sets the inputs of a reader from the body. */
 static PetscErrorCode begin(const SbBody *body, SbImport *im)
 {
   PetscInt none;
 
   PetscFunctionBeginUser;
-  if (body->name[0])
-    (void)snprintf(im->where, sizeof(im->where), "body '%s': %s", body->name, body->mesh);
-  else
-    (void)snprintf(im->where, sizeof(im->where), "%s", body->mesh);
+  (void)snprintf(im->where, sizeof(im->where), "%s%s%s%s", body->name[0] ? "body '" : "", body->name,
+                 body->name[0] ? "': " : "", body->mesh);
   PetscCall(PetscStrncpy(im->body, body->name, sizeof(im->body)));
   im->step = body->mesh_step;
   PetscCall(SbImportTagSet(im, 0, NULL, &none));
@@ -133,14 +108,24 @@ static PetscErrorCode begin(const SbBody *body, SbImport *im)
 /* Reads the mesh of a body, without placing it. */
 static PetscErrorCode read_body(const SbBody *body, SbImport *im)
 {
-  SbReader read;
+  char known[256] = "", node[PETSC_MAX_PATH_LEN + 8];
+  const SbReader read =
+    strncmp(body->mesh, "box:", 4) ? reader_of(body->mesh, sizeof(known), known) : SbImportRead_Box;
+  PetscBool tetgen = PETSC_TRUE;
   PetscReal largest;
   PetscInt given;
 
   PetscFunctionBeginUser;
-  PetscCall(find_reader(body, &read));
   PetscCall(begin(body, im));
-  PetscCall(read(body->mesh, im));
+  // a name without a known ending may be what TetGen's files have in common
+  (void)snprintf(node, sizeof(node), "%s.node", body->mesh);
+  if (!read) PetscCall(PetscTestFile(node, 'r', &tetgen));
+  PetscCheck(tetgen, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: '%s' is a mesh of no known kind; give a file that ends in %s (or the name of TetGen's "
+             "files without an "
+             "ending), or box:lx,ly,lz:n",
+             im->where, body->mesh, known);
+  PetscCall((read ? read : SbImportRead_TetGen)(body->mesh, im));
   given = im->nmiddle.n;
   PetscCall(SbImportMiddles(im, NULL, &largest));
   SbImportNoteMiddles(im, im->nmiddle.n, largest);
@@ -160,16 +145,8 @@ static PetscErrorCode copy_import(const SbImport *from, SbImport *to)
     PetscCall(PetscMalloc1((size_t)(n), &to->array));      \
     PetscCall(PetscArraycpy(to->array, from->array, (n))); \
   } while (0)
-  char where[sizeof(to->where)], body[sizeof(to->body)];
-
   PetscFunctionBeginUser;
-  memcpy(where, to->where, sizeof(where));
-  memcpy(body, to->body, sizeof(body));
-  PetscCall(PetscFree(to->tags_start));
-  PetscCall(PetscFree(to->tags_group));
   *to = *from;
-  memcpy(to->where, where, sizeof(where));
-  memcpy(to->body, body, sizeof(body));
   COPY(x, 3 * from->nvert);
   COPY(vert_number, from->nvert);
   COPY(middle, from->nmiddle.n);
@@ -200,7 +177,8 @@ PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImpo
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
-  /* the first copy of a body reads the file and keeps the unplaced mesh for the next ones, until another file is read; SbBody is zero-initialised, so memcmp() may compare padding */
+  /* the first copy of a body keeps the unplaced mesh for the next ones; memcmp() may compare padding, which
+     is 0 */
   // NOLINTBEGIN(bugprone-suspicious-memory-comparison)
   if (!shared->x || !before || strcmp(before->copy_of, body->copy_of) || strcmp(before->mesh, body->mesh) ||
       before->mesh_step != body->mesh_step || memcmp(&before->tet, &body->tet, sizeof(body->tet)) ||
@@ -209,8 +187,9 @@ PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImpo
     PetscCall(SbImportDestroy(shared));
     PetscCall(read_body(body, shared));
   }
-  PetscCall(begin(body, im));
   PetscCall(copy_import(shared, im));
+  PetscCall(begin(body, im));
+  im->scale = shared->scale; /* 1 if its reader has scaled */
   PetscCall(transform_body(body, im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,11 +1,12 @@
 /*
-  import_abaqus.c - reader of Abaqus input files, .inp (Abaqus Analysis User's Guide, "Input syntax rules"; also written by CalculiX,
-  PrePoMax, Cubit, meshio and gmsh).
+  import_abaqus.c - reader of Abaqus input files, .inp (Abaqus Analysis User's Guide, "Input syntax rules";
+  also written by CalculiX, PrePoMax, Cubit, meshio and gmsh).
 
-  Lines that begin with * and a word are keywords with parameters between commas; two stars are a comment; the lines after a
-  keyword are its data. Read: *NODE, *ELEMENT (C3D4..., S3 and other triangles, two-node lines), *NSET, *ELSET (also GENERATE,
-  and sets by name), *SURFACE of elements with sides S1 to S4. The parameters ELSET of *ELEMENT and NSET of *NODE define sets too. Sets
-  become groups of the same names; undefined elements of a set are ignored. Only one part with one untransformed instance is supported.
+  Lines that begin with * and a word are keywords with parameters between commas; two stars are a comment; the
+  lines after a keyword are its data. Read: *NODE, *ELEMENT (C3D4..., S3 and other triangles, two-node lines),
+  *NSET, *ELSET (also GENERATE, and sets by name), *SURFACE of elements with sides S1 to S4. The parameters
+  ELSET of *ELEMENT and NSET of *NODE define sets too. Sets become groups of the same names; undefined
+  elements of a set are ignored. Only one part with one untransformed instance is supported.
 
   Everything is collected first and converted at the end, since sets may refer to later definitions.
 */
@@ -57,6 +58,13 @@ static void leave_line(Abaqus *a)
   a->scan->at = a->line_end < a->scan->end ? a->line_end + 1 : a->scan->end;
 }
 
+/* Goes to the next data line of the keyword; false at the next keyword and at the end of the file. */
+static PetscBool data_line(Abaqus *a)
+{
+  leave_line(a);
+  return (PetscBool)(next_line(a) && *a->scan->at != '*');
+}
+
 /* Next comma-separated value on this line, trimmed; false if there is none. */
 static PetscBool next_word(Abaqus *a, char word[WORD])
 {
@@ -66,9 +74,8 @@ static PetscBool next_word(Abaqus *a, char word[WORD])
   while (s->at < a->line_end && isspace((unsigned char)*s->at)) s->at++;
   s->token = s->at;
   if (s->at >= a->line_end) return PETSC_FALSE;
-  for (; s->at < a->line_end && *s->at != ','; s->at++) {
+  for (; s->at < a->line_end && *s->at != ','; s->at++)
     if (n + 1 < WORD && *s->at != '"') word[n++] = isprint((unsigned char)*s->at) ? *s->at : ' ';
-  }
   if (s->at < a->line_end) s->at++;
   while (n && word[n - 1] == ' ') n--;
   word[n] = 0;
@@ -103,9 +110,8 @@ static PetscBool parameter(Abaqus *a, const char *line, const char *name, char v
 
     if (equals) *equals = 0;
     for (end = word + strlen(word); end > word && end[-1] == ' ';) *--end = 0;
-    if (strcasecmp(word, name)) continue;
-    found = PETSC_TRUE;
-    (void)snprintf(value, WORD, "%s", equals ? equals + 1 + strspn(equals + 1, " ") : "");
+    found = (PetscBool)!strcasecmp(word, name);
+    if (found) (void)snprintf(value, WORD, "%s", equals ? equals + 1 + strspn(equals + 1, " ") : "");
   }
   s->at = keep;
   return found;
@@ -147,7 +153,7 @@ static PetscErrorCode read_set(Abaqus *a, const char *line, PetscBool of_nodes)
   PetscFunctionBeginUser;
   if (!parameter(a, line, of_nodes ? "NSET" : "ELSET", name)) SB_SCAN_ERROR(a->scan, "a set without a name");
   PetscCall(find_set(a, of_nodes, name, &set));
-  for (leave_line(a); next_line(a) && *a->scan->at != '*'; leave_line(a)) {
+  while (data_line(a)) {
     int64_t value[3] = {0, 0, 1};
 
     for (int i = 0; i < 3 && generated && next_word(a, word); i++)
@@ -179,7 +185,7 @@ static PetscErrorCode read_nodes(Abaqus *a, const char *line)
 
   PetscFunctionBeginUser;
   if (parameter(a, line, "NSET", word)) PetscCall(find_set(a, PETSC_TRUE, word, &set));
-  for (leave_line(a); next_line(a) && *a->scan->at != '*'; leave_line(a)) {
+  while (data_line(a)) {
     (void)next_word(a, word);
     PetscCall(number_of(a, word, "label of a node", &label));
     PetscCall(SbDeckAddNode(&a->deck, label, &x));
@@ -196,9 +202,9 @@ static PetscErrorCode read_nodes(Abaqus *a, const char *line)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* gmsh type of an Abaqus element type, by the prefix of its name, which must not be followed by a digit. */
-static int type_of(const char *name)
+static PetscErrorCode read_elements(Abaqus *a, const char *line)
 {
+  /* gmsh type of an Abaqus element type, by the prefix of its name, which must not be followed by a digit */
   static const struct {
     const char *name;
     int type;
@@ -210,23 +216,17 @@ static int type_of(const char *name)
                {"CPE4", 3},  {"M3D4", 3},   {"R3D4", 3},    {"SFM3D4", 3}, {"S8", 16},    {"CPS8", 16},
                {"T3D2", 1},  {"B31", 1},    {"T2D2", 1},    {"B21", 1},    {"T3D3", 8},   {"B32", 8}};
 
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(types); i++) {
-    const size_t n = strlen(types[i].name);
-
-    if (!strncasecmp(name, types[i].name, n) && !isdigit((unsigned char)name[n])) return types[i].type;
-  }
-  return 0;
-}
-
-static PetscErrorCode read_elements(Abaqus *a, const char *line)
-{
   char name[WORD] = "", word[WORD];
   PetscInt set = -1;
-  int type;
+  int type = 0;
 
   PetscFunctionBeginUser;
   (void)parameter(a, line, "TYPE", name);
-  type = type_of(name);
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(types) && !type; i++) {
+    const size_t n = strlen(types[i].name);
+
+    if (!strncasecmp(name, types[i].name, n) && !isdigit((unsigned char)name[n])) type = types[i].type;
+  }
   a->scan->token = line;
   if (!type)
     SB_SCAN_ERROR(a->scan,
@@ -234,7 +234,7 @@ static PetscErrorCode read_elements(Abaqus *a, const char *line)
                   "triangles and two-node lines for sets",
                   name);
   if (parameter(a, line, "ELSET", word)) PetscCall(find_set(a, PETSC_FALSE, word, &set));
-  for (leave_line(a); next_line(a) && *a->scan->at != '*'; leave_line(a)) {
+  while (data_line(a)) {
     SbDeckElement e = {.type = type, .property = -1, .at = a->scan->token};
     const int nnode = SbGmshTypes[type].nnode;
 
@@ -244,11 +244,8 @@ static PetscErrorCode read_elements(Abaqus *a, const char *line)
     for (int k = 0; k < nnode; k++) {
       int64_t node;
 
-      if (!next_word(a, word)) {
-        leave_line(a);
-        if (!next_line(a) || *a->scan->at == '*' || !next_word(a, word))
-          SB_SCAN_ERROR(a->scan, "element %lld ends after %d of %d nodes", (long long)e.label, k, nnode);
-      }
+      if (!next_word(a, word) && !(data_line(a) && next_word(a, word)))
+        SB_SCAN_ERROR(a->scan, "element %lld ends after %d of %d nodes", (long long)e.label, k, nnode);
       PetscCall(number_of(a, word, "node of an element", &node));
       if (k < 10) e.node[k] = node;
     }
@@ -266,12 +263,13 @@ static PetscErrorCode read_surface(Abaqus *a, const char *line)
 
   PetscFunctionBeginUser;
   if (!parameter(a, line, "NAME", name)) SB_SCAN_ERROR(a->scan, "a surface without a name");
-  leave_line(a);
-  if (parameter(a, line, "TYPE", kind) && strcasecmp(kind, "ELEMENT"))
+  if (parameter(a, line, "TYPE", kind) && strcasecmp(kind, "ELEMENT")) {
+    leave_line(a);
     PetscFunctionReturn(PETSC_SUCCESS); /* node-based or analytical surfaces have no facets */
+  }
   PetscCall(SbImportGrow(a->deck.im, &a->nsurface, sizeof(*a->surface), &a->surface));
   (void)snprintf(a->surface[a->nsurface.n - 1], SB_GROUP_MAX, "%s", name);
-  for (; next_line(a) && *a->scan->at != '*'; leave_line(a)) {
+  while (data_line(a)) {
     char side[WORD] = "";
     Side *one;
 

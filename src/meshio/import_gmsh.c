@@ -1,12 +1,13 @@
 /*
-  import_gmsh.c - reader of gmsh's .msh files: versions 1, 2 (2.0 to 2.2), 4.0 and 4.1, text and binary (gmsh reference manual, "File
-  formats" and "Legacy formats"). It reads every physical group of every entity, also where groups overlap.
+  import_gmsh.c - reader of gmsh's .msh files: versions 1, 2 (2.0 to 2.2), 4.0 and 4.1, text and binary (gmsh
+  reference manual, "File formats" and "Legacy formats"). Groups may overlap.
 
-  Version 4 assigns groups to entities of the geometry; an entity may have several. Versions 1 and 2 assign one group to each
-  element and repeat an element for each further group: repeated elements are merged and their groups joined.
+  Version 4 assigns groups to entities of the geometry, any number to each. Versions 1 and 2 assign one to
+  each element and repeat it for each further group: repeated elements are merged, their groups joined.
 
-  Kept: points, lines and triangles that belong to a group, and all tets; for a surface all triangles, and tets are optional.
-  Other sections are skipped. Errors: volume elements other than 4- and 10-node tets, partitioned files, other versions.
+  Kept: points, lines and triangles that belong to a group, and all tets; for a surface all triangles, and
+  tets are optional. Other sections are skipped. Errors: other volume elements than 4- and 10-node tets,
+  partitions.
 */
 #include "meshio_impl.h"
 
@@ -19,14 +20,10 @@ typedef struct {
 typedef struct {
   SbImport *im;
   int version; /* file version: 1, 2, 40 or 41 */
+  int width;   /* bytes of the number of a node or an element in a binary file */
   PetscBool binary;
   PetscInt nentity;
   Entity *entity; /* [nentity] */
-  struct {
-    int dim;
-    int64_t tag;
-    PetscInt tags;
-  } last; /* cache of the last group of a 2.2 file: usually that of the next element too */
 } Gmsh;
 
 /* ------------------------------------------------------------------ format, names, entities */
@@ -44,12 +41,12 @@ static PetscErrorCode read_format(Gmsh *g)
   PetscFunctionBeginUser;
   PetscCall(SbScanWord(s, sizeof(version), version));
   g->version = 0;
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(versions); i++) {
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(versions); i++)
     if (!strcmp(version, versions[i].name)) g->version = versions[i].version;
-  }
   if (!g->version)
     SB_SCAN_ERROR(s, "format version '%s'; supple reads 1 to 4.1 (gmsh FILE -save -format msh41 converts)",
                   version);
+  g->width = g->version == 41 ? 8 : 4;
   PetscCall(SbScanText(s, "file type 0 or 1", &kind));
   PetscCall(SbScanText(s, "data size", &size));
   if (kind != 0 && kind != 1)
@@ -59,12 +56,32 @@ static PetscErrorCode read_format(Gmsh *g)
   if (!g->binary) PetscFunctionReturn(PETSC_SUCCESS);
   SbScanEndOfLine(s);
   s->binary = s->bytes = PETSC_TRUE;
-  PetscCall(SbScanInt4(s, "number one in binary", &one));
-  if (one == 0x01000000)
-    s->swap = PETSC_TRUE;
-  else if (one != 1)
+  PetscCall(SbScanInt(s, 4, "number one in binary", &one));
+  s->swap = (PetscBool)(one == 0x01000000);
+  if (one != 1 && !s->swap)
     SB_SCAN_ERROR(s, "expected the number one in binary, found %lld; the file is damaged", (long long)one);
   s->binary = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Reads the names of groups, text also in binary files. */
+static PetscErrorCode read_names(Gmsh *g)
+{
+  SbScan *s = &g->im->scan;
+  int64_t n, dim, tag;
+  PetscInt group;
+  char name[SB_GROUP_MAX];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanCount(s, "physical names", 6, 6, &n));
+  for (int64_t i = 0; i < n; i++) {
+    PetscCall(SbScanText(s, "dimension of a physical name", &dim));
+    if (dim < 0 || dim > 3)
+      SB_SCAN_ERROR(s, "dimension %lld of a physical name; expected 0 to 3", (long long)dim);
+    PetscCall(SbScanText(s, "number of a physical name", &tag));
+    PetscCall(SbScanQuoted(s, "physical name in quotes", sizeof(name), name));
+    PetscCall(SbImportGroup(g->im, (PetscInt)dim, tag, name, &group));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -79,8 +96,7 @@ static PetscErrorCode read_entities(Gmsh *g)
   PetscFunctionBeginUser;
   if (g->entity) SB_SCAN_ERROR(s, "second section $Entities");
   for (int d = 0; d < 4; d++) {
-    PetscCall(SbScanInt8(s, "number of entities", &count[d]));
-    PetscCall(SbScanRoom(s, "entities", count[d], 10, 28));
+    PetscCall(SbScanCount(s, "entities", 10, 28, &count[d]));
     total += count[d];
   }
   PetscCall(SbImportScratch(g->im, (size_t)total * sizeof(*g->entity), &g->entity));
@@ -89,118 +105,86 @@ static PetscErrorCode read_entities(Gmsh *g)
       Entity *e = &g->entity[g->nentity++];
 
       e->dim = d;
-      PetscCall(SbScanInt4(s, "number of an entity", &e->tag));
+      PetscCall(SbScanInt(s, 4, "number of an entity", &e->tag));
       for (int k = 0; k < (d || g->version == 40 ? 6 : 3); k++)
         PetscCall(SbScanReal(s, "extent of an entity", 0, &box));
       // physical groups; the sign of a tag is the orientation, which is ignored
-      PetscCall(SbScanInt8(s, "number of physical groups of an entity", &n));
-      PetscCall(SbScanRoom(s, "physical groups", n, 2, 4));
+      PetscCall(SbScanCount(s, "physical groups of an entity", 2, 4, &n));
       if (n) PetscCall(SbImportScratch(g->im, (size_t)n * sizeof(*group), &group));
       for (int64_t k = 0; k < n; k++) {
-        PetscCall(SbScanInt4(s, "physical group of an entity", &tag));
+        PetscCall(SbScanInt(s, 4, "physical group of an entity", &tag));
         PetscCall(SbImportGroup(g->im, d, tag < 0 ? -tag : tag, NULL, &group[k]));
       }
       PetscCall(SbImportTagSet(g->im, (PetscInt)n, group, &e->tags));
       if (!d) continue;
-      PetscCall(SbScanInt8(s, "number of bounding entities", &n));
-      PetscCall(SbScanRoom(s, "bounding entities", n, 2, 4));
-      for (int64_t k = 0; k < n; k++) PetscCall(SbScanInt4(s, "bounding entity", &tag));
+      PetscCall(SbScanCount(s, "bounding entities", 2, 4, &n));
+      for (int64_t k = 0; k < n; k++) PetscCall(SbScanInt(s, 4, "bounding entity", &tag));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ blocks of nodes and elements, in version 4 */
+/* ------------------------------------------------------------------ blocks of version 4 */
 
-/* Reads the totals of a section: number of blocks, number of nodes or elements; in 4.1 also lowest and highest tag. */
-static PetscErrorCode read_totals(Gmsh *g, int64_t *nblock, int64_t *n)
-{
-  SbScan *s = &g->im->scan;
-  int64_t bound;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanInt8(s, "number of blocks", nblock));
-  PetscCall(SbScanInt8(s, "number of nodes or elements", n));
-  for (int k = 0; k < 2 && g->version == 41; k++)
-    PetscCall(SbScanInt8(s, "lowest or highest number", &bound));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Reads the header of a block: entity, kind (nodes: parametric or not; elements: type), number of nodes or elements. */
+/* Reads the header of a block: entity, kind (nodes: parametric or not; elements: type), number. */
 static PetscErrorCode read_block(Gmsh *g, int64_t *dim, int64_t *tag, int64_t *kind, int64_t *n)
 {
   SbScan *s = &g->im->scan;
 
   PetscFunctionBeginUser;
-  if (g->version == 40) PetscCall(SbScanInt4(s, "entity of a block", tag));
-  PetscCall(SbScanInt4(s, "dimension of a block", dim));
-  if (g->version == 41) PetscCall(SbScanInt4(s, "entity of a block", tag));
-  PetscCall(SbScanInt4(s, "mark of parametric nodes, or type of elements", kind));
-  PetscCall(SbScanInt8(s, "number of nodes or elements in a block", n));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Reads the tag of a node or element: 8 bytes in binary files of version 4.1. */
-static PetscErrorCode read_number(Gmsh *g, const char *what, int64_t *number)
-{
-  PetscFunctionBeginUser;
-  if (g->version == 41)
-    PetscCall(SbScanInt8(&g->im->scan, what, number));
-  else
-    PetscCall(SbScanInt4(&g->im->scan, what, number));
+  if (g->version == 40) PetscCall(SbScanInt(s, 4, "entity of a block", tag));
+  PetscCall(SbScanInt(s, 4, "dimension of a block", dim));
+  if (g->version == 41) PetscCall(SbScanInt(s, 4, "entity of a block", tag));
+  PetscCall(SbScanInt(s, 4, "mark of parametric nodes, or type of elements", kind));
+  PetscCall(SbScanInt(s, 8, "number of nodes or elements in a block", n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ nodes */
 
-/* Reads tag and coordinates of each node; in version 4 in blocks, with up to three parametric coordinates; in 4.1 all tags of a block come first. */
+/* Reads tag and coordinates of each node; in version 4 in blocks, perhaps with parametric coordinates; in 4.1
+   all tags of a block come first. */
 static PetscErrorCode read_nodes(Gmsh *g)
 {
   SbImport *im = g->im;
   SbScan *s = &im->scan;
-  int64_t nblock, n, dim, tag, parametric;
+  int64_t nblock = 1, n, dim = 0, tag, parametric = 0;
   PetscInt v = 0;
   PetscReal parameter;
 
   PetscFunctionBeginUser;
   if (im->x) SB_SCAN_ERROR(s, "second section $Nodes");
-  if (g->version <= 2) {
-    // the number of nodes is text also in binary files
-    s->binary = PETSC_FALSE;
+  // before version 4 the number of nodes is text also in a binary file, and the nodes are one block
+  if (g->version > 2) {
+    PetscCall(SbScanInt(s, 8, "number of blocks", &nblock));
+    PetscCall(SbScanInt(s, 8, "number of nodes", &n));
+    for (int k = 0; k < 2 && g->version == 41; k++) PetscCall(SbScanInt(s, 8, "bound of numbers", &tag));
+  } else {
     PetscCall(SbScanText(s, "number of nodes", &n));
     if (g->binary) SbScanEndOfLine(s);
-    s->binary = g->binary;
-    PetscCall(SbScanRoom(s, "nodes", n, 8, 28));
-    PetscCall(SbImportSetVertices(im, (PetscInt)n));
-    for (; v < n; v++) {
-      PetscCall(read_number(g, "number of a node", &im->vert_number[v]));
-      PetscCall(SbScanPoint(s, "coordinate", im->vert_number[v], im->x + 3 * v));
-    }
-  } else {
-    PetscCall(read_totals(g, &nblock, &n));
-    PetscCall(SbScanRoom(s, "nodes", n, 8, 28));
-    PetscCall(SbImportSetVertices(im, (PetscInt)n));
-    for (int64_t b = 0; b < nblock; b++) {
-      PetscCall(read_block(g, &dim, &tag, &parametric, &n));
-      if (dim < 0 || dim > 3)
-        SB_SCAN_ERROR(s, "dimension %lld of a block of nodes; expected 0 to 3", (long long)dim);
-      if (n < 0 || n > im->nvert - v)
-        SB_SCAN_ERROR(s, "block of %lld nodes; only %lld of those announced for the section are left",
-                      (long long)n, (long long)(im->nvert - v));
-      for (PetscInt i = v; i < v + n && g->version == 41; i++)
-        PetscCall(read_number(g, "number of a node", &im->vert_number[i]));
-      for (; n > 0; v++, n--) {
-        if (g->version == 40) PetscCall(read_number(g, "number of a node", &im->vert_number[v]));
-        PetscCall(SbScanPoint(s, "coordinate", im->vert_number[v], im->x + 3 * v));
-        for (int k = 0; parametric && k < dim; k++)
-          PetscCall(SbScanReal(s, "parameter", im->vert_number[v], &parameter));
-      }
-    }
-    // version 4.0 may announce more nodes than it has, when only some of the entities are saved
-    if (g->version == 40) im->nvert = v;
-    if (v < im->nvert)
-      SB_SCAN_ERROR(s, "%lld nodes are announced, the blocks hold %lld", (long long)im->nvert, (long long)v);
   }
+  PetscCall(SbScanRoom(s, "nodes", n, 8, 28));
+  PetscCall(SbImportSetVertices(im, (PetscInt)n));
+  for (int64_t b = 0; b < nblock; b++) {
+    if (g->version > 2) PetscCall(read_block(g, &dim, &tag, &parametric, &n));
+    if (dim < 0 || dim > 3)
+      SB_SCAN_ERROR(s, "dimension %lld of a block of nodes; expected 0 to 3", (long long)dim);
+    if (n < 0 || n > im->nvert - v)
+      SB_SCAN_ERROR(s, "block of %lld nodes; only %lld of those announced for the section are left",
+                    (long long)n, (long long)(im->nvert - v));
+    for (PetscInt i = v; i < v + n && g->version == 41; i++)
+      PetscCall(SbScanInt(s, 8, "number of a node", &im->vert_number[i]));
+    for (; n > 0; v++, n--) {
+      if (g->version != 41) PetscCall(SbScanInt(s, 4, "number of a node", &im->vert_number[v]));
+      PetscCall(SbScanPoint(s, "coordinate", im->vert_number[v], im->x + 3 * v));
+      for (int k = 0; parametric && k < dim; k++)
+        PetscCall(SbScanReal(s, "parameter", im->vert_number[v], &parameter));
+    }
+  }
+  // version 4.0 may announce more nodes than it has, when only some of the entities are saved
+  if (g->version == 40) im->nvert = v;
+  if (v < im->nvert)
+    SB_SCAN_ERROR(s, "%lld nodes are announced, the blocks hold %lld", (long long)im->nvert, (long long)v);
   PetscCall(SbNumbersCreate(im->nvert, im->vert_number, &im->nodes));
   if (im->nodes.repeated)
     SB_SCAN_ERROR(s, "node %lld is given twice; renumber the nodes", (long long)im->nodes.twice);
@@ -226,11 +210,10 @@ static PetscErrorCode read_element(Gmsh *g, int type, int64_t number, PetscInt t
   SbScan *s = &g->im->scan;
   int64_t node;
   PetscInt vert[64];
-  const int n = SbGmshTypes[type].nnode;
 
   PetscFunctionBeginUser;
-  for (int i = 0; i < n; i++) {
-    PetscCall(read_number(g, "node of an element", &node));
+  for (int i = 0; i < SbGmshTypes[type].nnode; i++) {
+    PetscCall(SbScanInt(s, g->width, "node of an element", &node));
     vert[i] = SbNumbersFind(&g->im->nodes, node);
     if (vert[i] < 0)
       SB_SCAN_ERROR(s, "element %lld uses node %lld, which $Nodes does not list", (long long)number,
@@ -240,51 +223,52 @@ static PetscErrorCode read_element(Gmsh *g, int type, int64_t number, PetscInt t
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads elements of one type: in text files one, whose line has the type and the number of tags; in binary files the number in the block header. */
-static PetscErrorCode read_elements_22_run(Gmsh *g, int64_t left, int64_t *nread)
+/* Versions 1 and 2: in text each line has type and tags of its element, in binary a header for elements of
+   one type. */
+static PetscErrorCode read_elements_2(Gmsh *g)
 {
   SbScan *s = &g->im->scan;
-  int64_t number = 0, type, ntag, n = 1;
-  PetscInt tags = 0;
+  int64_t total, number = 0, type, ntag = 2, n = 1, nnode, last_tag = 0;
+  PetscInt tags, last_tags = 0; /* of the last group: usually that of the next element too */
+  int dim, last_dim = -1;
 
   PetscFunctionBeginUser;
-  if (!s->binary) PetscCall(SbScanInt4(s, "number of an element", &number));
-  PetscCall(SbScanInt4(s, "type of an element", &type));
-  PetscCall(check_type(g, type));
-  if (s->binary) PetscCall(SbScanInt4(s, "number of elements in a block", &n));
-  if (g->version == 1)
-    ntag = 2;
-  else
-    PetscCall(SbScanInt4(s, "number of tags of an element", &ntag));
-  if (n < 1 || n > left)
-    SB_SCAN_ERROR(s, "block of %lld elements; only %lld of those announced for the section are left",
-                  (long long)n, (long long)left);
-  for (int64_t i = 0; i < n; i++) {
-    int64_t tag = 0, other;
+  PetscCall(SbScanText(s, "number of elements", &total)); /* text also in a binary file */
+  if (g->binary) SbScanEndOfLine(s);
+  PetscCall(SbScanRoom(s, "elements", total, 8, 8));
+  for (int64_t left = total; left > 0; left -= n) {
+    if (!s->binary) PetscCall(SbScanInt(s, 4, "number of an element", &number));
+    PetscCall(SbScanInt(s, 4, "type of an element", &type));
+    PetscCall(check_type(g, type));
+    dim = SbGmshTypes[type].dim;
+    if (s->binary) PetscCall(SbScanInt(s, 4, "number of elements in a block", &n));
+    if (g->version == 2) PetscCall(SbScanInt(s, 4, "number of tags of an element", &ntag));
+    if (n < 1 || n > left)
+      SB_SCAN_ERROR(s, "block of %lld elements; only %lld of those announced for the section are left",
+                    (long long)n, (long long)left);
+    for (int64_t i = 0; i < n; i++) {
+      int64_t tag = 0, other;
 
-    if (s->binary) PetscCall(SbScanInt4(s, "number of an element", &number));
-    // the first tag is the physical group, 0 for none; the others are ignored
-    PetscCall(SbScanRoom(&g->im->scan, "tags of an element", ntag, 2, 4));
-    for (int64_t k = 0; k < ntag; k++)
-      PetscCall(SbScanInt4(&g->im->scan, "tag of an element", k ? &other : &tag));
-    if (tag && (tag != g->last.tag || SbGmshTypes[type].dim != g->last.dim)) {
-      PetscCall(SbImportTagsAlone(g->im, SbGmshTypes[type].dim, tag < 0 ? -tag : tag, NULL, &g->last.tags));
-      g->last.dim = SbGmshTypes[type].dim;
-      g->last.tag = tag;
+      if (s->binary) PetscCall(SbScanInt(s, 4, "number of an element", &number));
+      // the first tag is the physical group, 0 for none; the others are ignored
+      PetscCall(SbScanRoom(s, "tags of an element", ntag, 2, 4));
+      for (int64_t k = 0; k < ntag; k++) PetscCall(SbScanInt(s, 4, "tag of an element", k ? &other : &tag));
+      if (tag && (tag != last_tag || dim != last_dim)) {
+        PetscCall(SbImportTagsAlone(g->im, dim, tag < 0 ? -tag : tag, NULL, &last_tags));
+        last_dim = dim;
+        last_tag = tag;
+      }
+      tags = tag ? last_tags : 0;
+      // in version 1 each element line has its number of nodes
+      if (g->version == 1) {
+        PetscCall(SbScanText(s, "number of nodes of an element", &nnode));
+        if (nnode != SbGmshTypes[type].nnode)
+          SB_SCAN_ERROR(s, "an element of type %d with %lld nodes; expected %d", (int)type, (long long)nnode,
+                        SbGmshTypes[type].nnode);
+      }
+      PetscCall(read_element(g, (int)type, number, tags));
     }
-    tags = tag ? g->last.tags : 0;
-    // in version 1 each element line has its number of nodes
-    if (g->version == 1) {
-      int64_t nnode;
-
-      PetscCall(SbScanText(&g->im->scan, "number of nodes of an element", &nnode));
-      if (nnode != SbGmshTypes[type].nnode)
-        SB_SCAN_ERROR(&g->im->scan, "an element of type %d with %lld nodes; expected %d", (int)type,
-                      (long long)nnode, SbGmshTypes[type].nnode);
-    }
-    PetscCall(read_element(g, (int)type, number, tags));
   }
-  *nread = n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -294,7 +278,9 @@ static PetscErrorCode read_elements_4(Gmsh *g)
   int64_t nblock, total, dim, tag, type, n, number, nread = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(read_totals(g, &nblock, &total));
+  PetscCall(SbScanInt(s, 8, "number of blocks", &nblock));
+  PetscCall(SbScanInt(s, 8, "number of elements", &total));
+  for (int k = 0; k < 2 && g->version == 41; k++) PetscCall(SbScanInt(s, 8, "bound of numbers", &tag));
   PetscCall(SbScanRoom(s, "elements", total, 4, 8));
   for (int64_t b = 0; b < nblock; b++, nread += n) {
     PetscInt tags = 0;
@@ -311,7 +297,7 @@ static PetscErrorCode read_elements_4(Gmsh *g)
       SB_SCAN_ERROR(s, "%s in a block of dimension %lld; the file is damaged", SbGmshTypes[type].name,
                     (long long)dim);
     for (int64_t i = 0; i < n; i++) {
-      PetscCall(read_number(g, "number of an element", &number));
+      PetscCall(SbScanInt(s, g->width, "number of an element", &number));
       PetscCall(read_element(g, (int)type, number, tags));
     }
   }
@@ -322,67 +308,14 @@ static PetscErrorCode read_elements_4(Gmsh *g)
 
 /* ------------------------------------------------------------------ the file */
 
-/* Reads one section; `known` is false for a section to be skipped. */
-static PetscErrorCode read_section(Gmsh *g, const char *name, PetscBool *known)
-{
-  SbScan *s = &g->im->scan;
-  const char *nodes = g->version == 1 ? "$NOD" : "$Nodes", *elements = g->version == 1 ? "$ELM" : "$Elements";
-
-  PetscFunctionBeginUser;
-  *known = PETSC_TRUE;
-  // names of groups, text also in binary files
-  if (!strcmp(name, "$PhysicalNames")) {
-    int64_t nname, dim, tag;
-    PetscInt group;
-    char text[SB_GROUP_MAX];
-
-    PetscCall(SbScanText(s, "number of physical names", &nname));
-    PetscCall(SbScanRoom(s, "physical names", nname, 6, 6));
-    for (int64_t i = 0; i < nname; i++) {
-      PetscCall(SbScanText(s, "dimension of a physical name", &dim));
-      if (dim < 0 || dim > 3)
-        SB_SCAN_ERROR(s, "dimension %lld of a physical name; expected 0 to 3", (long long)dim);
-      PetscCall(SbScanText(s, "number of a physical name", &tag));
-      PetscCall(SbScanQuoted(s, "physical name in quotes", sizeof(text), text));
-      PetscCall(SbImportGroup(g->im, (PetscInt)dim, tag, text, &group));
-    }
-  } else if (!strcmp(name, "$Entities") || !strcmp(name, nodes) || !strcmp(name, elements)) {
-    SbScanEndOfLine(s);
-    s->binary = g->binary;
-    if (!strcmp(name, nodes)) {
-      PetscCall(read_nodes(g));
-    } else if (!strcmp(name, elements)) {
-      if (!g->im->x)
-        SB_SCAN_ERROR(&g->im->scan, "section %s before the nodes", g->version == 1 ? "$ELM" : "$Elements");
-      if (g->version <= 2) {
-        int64_t n, nrun = 1;
-
-        s->binary = PETSC_FALSE;
-        PetscCall(SbScanText(s, "number of elements", &n));
-        if (g->binary) SbScanEndOfLine(s);
-        s->binary = g->binary;
-        PetscCall(SbScanRoom(s, "elements", n, 8, 8));
-        for (int64_t i = 0; i < n; i += nrun) PetscCall(read_elements_22_run(g, n - i, &nrun));
-      } else
-        PetscCall(read_elements_4(g));
-    } else
-      PetscCall(read_entities(g));
-    s->binary = PETSC_FALSE;
-  } else if (!strcmp(name, "$PartitionedEntities")) {
-    SB_SCAN_ERROR(s, "the mesh is cut into partitions; save it in one piece (gmsh: Mesh, Unpartition)");
-  } else
-    *known = PETSC_FALSE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
 {
-  Gmsh g = {.im = im};
-  SbScan *s = &g.im->scan;
-  char name[64];
+  Gmsh g = {.im = im, .width = 4};
+  SbScan *s = &im->scan;
+  char name[64], end[64], closing[72];
 
   PetscFunctionBeginUser;
-  PetscCall(SbScanOpen(im->where, path, &im->scan));
+  PetscCall(SbScanOpen(im->where, path, s));
   // version 1 begins with its nodes
   PetscCall(SbScanWord(s, sizeof(name), name));
   if (!strcmp(name, "$NOD"))
@@ -390,19 +323,31 @@ PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
   else if (strcmp(name, "$MeshFormat"))
     SB_SCAN_ERROR(s, "expected $MeshFormat; this is no gmsh mesh file");
   while (name[0]) {
-    char end[64], closing[72];
-    PetscBool known;
+    const PetscBool nodes = (PetscBool)!strcmp(name, g.version == 1 ? "$NOD" : "$Nodes");
+    const PetscBool elements = (PetscBool)!strcmp(name, g.version == 1 ? "$ELM" : "$Elements");
 
     // a section, read or skipped, then its end marker
     if (name[0] != '$')
       SB_SCAN_ERROR(s, "expected the beginning of a section, as $Nodes, found '%.20s'", name);
     (void)snprintf(closing, sizeof(closing), g.version == 1 ? "$END%s" : "$End%s", name + 1);
-    if (!strcmp(name, "$MeshFormat")) {
+    if (!strcmp(name, "$MeshFormat"))
       PetscCall(read_format(&g));
-      known = PETSC_TRUE;
-    } else
-      PetscCall(read_section(&g, name, &known));
-    if (!known && !SbScanFind(s, closing))
+    else if (!strcmp(name, "$PhysicalNames"))
+      PetscCall(read_names(&g));
+    else if (nodes || elements || !strcmp(name, "$Entities")) {
+      SbScanEndOfLine(s);
+      s->binary = g.binary;
+      if (elements && !im->x) SB_SCAN_ERROR(s, "section %s before the nodes", name);
+      if (nodes)
+        PetscCall(read_nodes(&g));
+      else if (elements)
+        PetscCall(g.version <= 2 ? read_elements_2(&g) : read_elements_4(&g));
+      else
+        PetscCall(read_entities(&g));
+      s->binary = PETSC_FALSE;
+    } else if (!strcmp(name, "$PartitionedEntities"))
+      SB_SCAN_ERROR(s, "the mesh is cut into partitions; save it in one piece (gmsh: Mesh, Unpartition)");
+    else if (!SbScanFind(s, closing))
       SB_SCAN_ERROR(s, "section %s has no end; the file is truncated, write or copy it again", name);
     PetscCall(SbScanWord(s, sizeof(end), end));
     if (!end[0])

@@ -1,17 +1,19 @@
 /*
-  import_h5.c - reader of HDF5 meshes: supple's own mesh format (layout in write_h5.c) and the output of a run, fields.h5.
+  import_h5.c - reader of HDF5: supple's own meshes (layout in write_h5.c) and the output of a run, fields.h5.
 
-  Both have /mesh/x and /mesh/cells. A mesh file has groups; in the output of a run /mesh/body is the body number of each tet,
-  and each body becomes a group of tets. For P2 bodies /mesh/cells10 has the nodes of the tets, /mesh/cells has the linear tets into which
-  they are subdivided, and /mesh/parent the P2 tet of each. If each tet of the output has its own points (-output_discontinuous),
-  /mesh/vertices is the vertex of each point: positions are averaged there. For a given step, its displacement is added.
+  Both have /mesh/x and /mesh/cells. A mesh has groups; in the output of a run each body, /mesh/body, becomes
+  a group of tets. For P2 bodies /mesh/cells10 has the nodes of the tets, /mesh/cells has the linear tets into
+  which they are subdivided, and /mesh/parent the P2 tet of each. If each tet of the output has its own points
+  (-output_discontinuous), /mesh/vertices is the vertex of each point: positions are averaged there. For a
+  given step, its displacement is added.
 
   An .xmf file refers to the .h5 file of the mesh.
 
-  For a mesh file, only a block of rows of each array under /mesh may be read: in parallel import each rank reads one (mesh/slab.c).
+  Of a mesh file a block of rows of each array under /mesh may be read: in parallel one by each rank
+  (mesh/slab.c).
 
-  Files are not trusted: shape and type of every array and the range of every index are checked, and no array is
-  allocated that is larger than the file can hold (uncompressed, as written here, at most the file size;
+  Files are not trusted: shape and type of every array and the range of every index are checked, and no array
+  is allocated that is larger than the file can hold (uncompressed, as written here, at most the file size;
   compressed by others, at most a thousand times that).
 */
 #include <hdf5.h>
@@ -157,11 +159,14 @@ static PetscErrorCode read_values(const File *f, const Array *a, void *values)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Opens and reads an array into scratch memory of the reader. */
+/* Opens and reads an array into scratch memory. n: number of rows that it must have; -1: any, returned. */
 static PetscErrorCode read_array(const File *f, Array *a, PetscInt *n, void *values)
 {
   PetscFunctionBeginUser;
   PetscCall(open_array(f, a));
+  if (*n >= 0 && *n != (PetscInt)a->n)
+    H5_ERROR(f, "%s has %lld rows; %lld are needed to fit /mesh/cells, /mesh/x or what else it describes",
+             a->name, (long long)a->n, (long long)*n);
   *n = (PetscInt)a->n;
   *(void **)values = NULL;
   PetscCall(SbImportScratch(f->im, (size_t)(a->n * a->ncomp) * PetscMax(a->width, 8), values));
@@ -169,9 +174,9 @@ static PetscErrorCode read_array(const File *f, Array *a, PetscInt *n, void *val
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads an array of integers in [0, bound). */
+/* Reads an array of integers in [0, bound), as PetscInt; bound -1: any, as int64_t. */
 static PetscErrorCode read_table(const File *f, const char *name, hsize_t ncomp, int64_t bound, PetscInt *n,
-                                 PetscInt **values)
+                                 void *values)
 {
   return read_array(f, &(Array){.name = name, .klass = H5T_INTEGER, .ncomp = ncomp, .bound = bound}, n,
                     values);
@@ -200,7 +205,7 @@ static PetscErrorCode read_curved(const File *f, int layout)
   Array edges = {
     .name = "/mesh/curved_edges", .klass = H5T_INTEGER, .ncomp = 2, .bound = f->nvert, .block = PETSC_TRUE};
   Array off = {.name = "/mesh/edge_offsets", .klass = H5T_FLOAT, .ncomp = 3, .block = PETSC_TRUE};
-  PetscInt n, noff, *end;
+  PetscInt n = -1, *end;
   PetscReal *x;
 
   PetscFunctionBeginUser;
@@ -213,10 +218,7 @@ static PetscErrorCode read_curved(const File *f, int layout)
   }
   if (layout == 1) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(read_array(f, &edges, &n, &end));
-  PetscCall(read_array(f, &off, &noff, &x));
-  if (n != noff || edges.rows.N != off.rows.N)
-    H5_ERROR(f, "%s has %lld rows for %lld edges; the file is damaged", off.name, (long long)off.rows.N,
-             (long long)edges.rows.N);
+  PetscCall(read_array(f, &off, &n, &x));
   PetscCall(PetscMalloc1(n, &im->middle));
   im->nmiddle = (SbCount){n, n};
   for (PetscInt i = 0; i < n; i++) {
@@ -236,9 +238,8 @@ static PetscErrorCode read_curved(const File *f, int layout)
 
 static PetscErrorCode read_own(const File *f)
 {
-  static const char *const names[4] = {"point", "line", "triangle", "cell"};
-  PetscInt nset = 0, n, *map = NULL, *set, ngroup, nmember, nstart, *group = NULL, *member, *start;
-  PetscInt ndim, nnumber, *dim;
+  PetscInt nset, *map = NULL, *set, ngroup = -1, nmember = -1, nstart = -1, *group = NULL, *member, *start,
+                 *dim;
   int64_t *number;
   char *title;
   Array text = {.name = "/groups/name", .klass = H5T_STRING, .ncomp = 1};
@@ -246,12 +247,8 @@ static PetscErrorCode read_own(const File *f)
   PetscFunctionBeginUser;
   // group[] and map[]: numbers of the file's groups and tag sets in the import
   PetscCall(read_array(f, &text, &ngroup, &title));
-  PetscCall(read_table(f, "/groups/dim", 1, 4, &ndim, &dim));
-  PetscCall(read_array(f, &(Array){.name = "/groups/number", .klass = H5T_INTEGER, .ncomp = 1, .bound = -1},
-                       &nnumber, &number));
-  if (ndim != ngroup || nnumber != ngroup)
-    H5_ERROR(f, "/groups has %lld names, %lld dimensions and %lld numbers; the file is damaged",
-             (long long)ngroup, (long long)ndim, (long long)nnumber);
+  PetscCall(read_table(f, "/groups/dim", 1, 4, &ngroup, &dim));
+  PetscCall(read_table(f, "/groups/number", 1, -1, &ngroup, &number));
   PetscCall(SbImportScratch(f->im, (size_t)ngroup * sizeof(*group), &group));
   for (PetscInt i = 0; i < ngroup; i++) {
     char name[SB_GROUP_MAX];
@@ -276,15 +273,12 @@ static PetscErrorCode read_own(const File *f)
     char items[32], tags[32];
     Array a = {.name = tags, .klass = H5T_INTEGER, .ncomp = 1, .bound = nset, .block = PETSC_TRUE};
 
-    (void)snprintf(items, sizeof(items), "/mesh/%ss", names[d]);
-    (void)snprintf(tags, sizeof(tags), "/mesh/%s_tags", names[d]);
+    (void)snprintf(items, sizeof(items), "/mesh/%ss", SbH5Items[d]);
+    (void)snprintf(tags, sizeof(tags), "/mesh/%s_tags", SbH5Items[d]);
     if (d < 3 && !is_there(f, items)) continue;
     if (d < 3) PetscCall(read_items(f, d, items));
-    PetscCall(read_array(f, &a, &n, &set));
-    if (n != item->n)
-      H5_ERROR(f, "%s has %lld rows for %lld simplices; the file is damaged", tags, (long long)n,
-               (long long)item->n);
-    for (PetscInt i = 0; i < n; i++) item->tags[i] = map[set[i]];
+    PetscCall(read_array(f, &a, &item->n, &set));
+    for (PetscInt i = 0; i < item->n; i++) item->tags[i] = map[set[i]];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -324,11 +318,27 @@ void SbH5FindFrame(hid_t file, SbH5Frames *frames)
                              H5P_DEFAULT);
 }
 
+/* Opens an attribute; negative if there is none. */
+static hid_t open_attribute(hid_t file, const char *object, const char *name)
+{
+  if (H5Aexists_by_name(file, object, name, H5P_DEFAULT) <= 0) return -1;
+  return H5Aopen_by_name(file, object, name, H5P_DEFAULT, H5P_DEFAULT);
+}
+
+/* Value of an integer attribute; 0 if there is none. */
+static int number_of(hid_t file, const char *object, const char *name)
+{
+  const hid_t attribute = open_attribute(file, object, name);
+  int value = 0;
+
+  if (attribute >= 0 && H5Aread(attribute, H5T_NATIVE_INT, &value) < 0) value = 0;
+  if (attribute >= 0) (void)H5Aclose(attribute);
+  return value;
+}
+
 PetscErrorCode SbH5BodyNames(hid_t file, const char *mesh, char **names)
 {
-  const hid_t attribute = H5Aexists_by_name(file, mesh, "bodies", H5P_DEFAULT) > 0
-                            ? H5Aopen_by_name(file, mesh, "bodies", H5P_DEFAULT, H5P_DEFAULT)
-                            : -1,
+  const hid_t attribute = open_attribute(file, mesh, "bodies"),
               type = attribute >= 0 ? H5Aget_type(attribute) : -1;
   const PetscBool text = (PetscBool)(type >= 0 && H5Tget_class(type) == H5T_STRING &&
                                      H5Tis_variable_str(type) <= 0 && H5Tget_size(type) < 1 << 24);
@@ -345,15 +355,13 @@ PetscErrorCode SbH5BodyNames(hid_t file, const char *mesh, char **names)
 static PetscErrorCode read_bodies(const File *f)
 {
   SbImport *im = f->im;
-  PetscInt n, *body, nbody = 0, *tags;
+  PetscInt *body, nbody = 0, *tags;
   char *names, *name, *rest;
 
   PetscFunctionBeginUser;
   if (!is_there(f, "/mesh/body")) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(read_table(f, "/mesh/body", 1, 1 << 16, &n, &body));
-  if (n != im->item[3].n)
-    H5_ERROR(f, "/mesh/body has %lld rows for %lld tets", (long long)n, (long long)im->item[3].n);
-  for (PetscInt c = 0; c < n; c++) nbody = PetscMax(nbody, body[c] + 1);
+  PetscCall(read_table(f, "/mesh/body", 1, 1 << 16, &im->item[3].n, &body));
+  for (PetscInt c = 0; c < im->item[3].n; c++) nbody = PetscMax(nbody, body[c] + 1);
   // names of the bodies; old files have none
   PetscCall(SbH5BodyNames(f->file, f->mesh, &names));
   rest = names;
@@ -365,26 +373,25 @@ static PetscErrorCode read_bodies(const File *f)
     (void)snprintf(plain, sizeof(plain), "body_%d", (int)b + 1);
     PetscCall(SbImportTagsAlone(im, 3, b + 1, name && name[0] ? name : plain, &tags[b]));
   }
-  for (PetscInt c = 0; c < n; c++) im->item[3].tags[c] = tags[body[c]];
+  for (PetscInt c = 0; c < im->item[3].n; c++) im->item[3].tags[c] = tags[body[c]];
   PetscCall(PetscFree(tags));
   PetscCall(PetscFree(names));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Replaces the linear tets of P2 bodies by the P2 tets, with edge nodes. at[f->nvert]: vertex of each point of the file; NULL: identity. */
+/* Replaces the linear tets of P2 bodies by the P2 tets, with edge nodes. at[f->nvert]: vertex of each point
+   of the file; NULL: identity. */
 static PetscErrorCode read_quadratic(const File *f, const PetscInt at[])
 {
   SbItems *item = &f->im->item[3];
-  PetscInt n, nparent, *parent, last = -1;
+  PetscInt n = -1, *parent, last = -1;
   int64_t *node;
 
   PetscFunctionBeginUser;
-  PetscCall(read_array(f, &(Array){.name = "/mesh/cells10", .klass = H5T_INTEGER, .ncomp = 10, .bound = -1},
-                       &n, &node));
+  PetscCall(read_table(f, "/mesh/cells10", 10, -1, &n, &node));
   if (is_there(f, "/mesh/parent")) {
-    PetscCall(read_table(f, "/mesh/parent", 1, n, &nparent, &parent));
-    if (nparent != item->n) H5_ERROR(f, "/mesh/parent does not fit /mesh/cells; the file is damaged");
-    for (PetscInt i = 0; i < nparent; i++) {
+    PetscCall(read_table(f, "/mesh/parent", 1, n, &item->n, &parent));
+    for (PetscInt i = 0; i < item->n; i++) {
       if (parent[i] != last && parent[i] != ++last)
         H5_ERROR(f, "/mesh/parent jumps in row %lld; the file is damaged", (long long)i + 1);
       SbItemsMove(item, 3, parent[i], i);
@@ -420,26 +427,22 @@ static PetscErrorCode read_output(const File *f)
   // positions at the wanted step
   if (f->frame[0]) {
     char name[96];
-    PetscInt n;
     PetscReal *u;
 
     (void)snprintf(name, sizeof(name), "%s/displacement", f->frame);
     if (!is_there(f, name))
       H5_ERROR(f, "has no displacement at the step; the run needs it among its -output_fields");
-    PetscCall(read_array(f, &(Array){.name = name, .klass = H5T_FLOAT, .ncomp = 3}, &n, &u));
-    if (n != im->nvert)
-      H5_ERROR(f, "%s has %lld rows for %lld points", name, (long long)n, (long long)im->nvert);
-    for (PetscInt i = 0; i < 3 * n; i++) im->x[i] += u[i];
+    PetscCall(read_array(f, &(Array){.name = name, .klass = H5T_FLOAT, .ncomp = 3}, &im->nvert, &u));
+    for (PetscInt i = 0; i < 3 * im->nvert; i++) im->x[i] += u[i];
   }
   if (is_there(f, "/mesh/vertices")) {
-    PetscInt n, *vertex, *share, nvert = 0;
+    const PetscInt n = im->item[3].n;
+    PetscInt *vertex, *share, nvert = 0;
     PetscReal *x;
 
     // merge the points of each vertex, at their mean position
-    PetscCall(read_table(f, "/mesh/vertices", 4, PETSC_MAX_INT / 8, &n, &vertex));
+    PetscCall(read_table(f, "/mesh/vertices", 4, im->nvert, &im->item[3].n, &vertex));
     for (PetscInt i = 0; i < 4 * n; i++) nvert = PetscMax(nvert, vertex[i] + 1);
-    if (n != im->item[3].n || nvert > im->nvert)
-      H5_ERROR(f, "/mesh/vertices does not fit /mesh/cells; the file is damaged");
     PetscCall(PetscCalloc2(3 * (size_t)nvert, &x, nvert, &share));
     PetscCall(SbImportScratch(im, (size_t)f->nvert * sizeof(*at), &at));
     PetscCall(PetscArrayzero(at, f->nvert));
@@ -473,40 +476,26 @@ static herr_t list_name(hid_t where, const char *name, const H5L_info_t *info, v
   return 0;
 }
 
-/* Layout version of a mesh file; 0 for the output of a run. */
-static PetscErrorCode check_layout(const File *f, int *layout)
-{
-  char content[256] = "";
-
-  PetscFunctionBeginUser;
-  *layout = 0;
-  if (H5Aexists(f->file, "supple_mesh") > 0) {
-    const hid_t a = H5Aopen(f->file, "supple_mesh", H5P_DEFAULT);
-
-    if (H5Aread(a, H5T_NATIVE_INT, layout) < 0) *layout = 0;
-    (void)H5Aclose(a);
-    if (*layout != 1 && *layout != 2)
-      H5_ERROR(f, "is a mesh of layout %d; this supple reads layouts 1 and 2", *layout);
-  }
-  if (is_there(f, "/mesh/x") && is_there(f, "/mesh/cells")) PetscFunctionReturn(PETSC_SUCCESS);
-  (void)H5Literate(f->file, H5_INDEX_NAME, H5_ITER_INC, NULL, list_name, content);
-  H5_ERROR(f,
-           "holds no mesh: /mesh/x and /mesh/cells are missing%s%s; give an .h5 mesh of supple-mesh, or the "
-           "fields.h5 of a run",
-           content[0] ? "; it holds " : "", content);
-}
-
 static PetscErrorCode read_mesh(File *f, SbSlabRows *rows)
 {
   SbImport *im = f->im;
-  int layout;
+  const int layout = number_of(f->file, "/", "supple_mesh"); /* version; 0 for the output of a run */
   Array x = {.name = "/mesh/x", .klass = H5T_FLOAT, .ncomp = 3, .block = PETSC_TRUE};
   SbH5Frames s = {.wanted = f->im->step};
-  int64_t number = 0;
-  hid_t frame;
+  char content[256] = "";
+  int number;
 
   PetscFunctionBeginUser;
-  PetscCall(check_layout(f, &layout));
+  if (H5Aexists(f->file, "supple_mesh") > 0 && layout != 1 && layout != 2)
+    H5_ERROR(f, "is a mesh of layout %d; this supple reads layouts 1 and 2", layout);
+  if (!is_there(f, "/mesh/x") || !is_there(f, "/mesh/cells")) {
+    (void)H5Literate(f->file, H5_INDEX_NAME, H5_ITER_INC, NULL, list_name, content);
+    H5_ERROR(
+      f,
+      "holds no mesh: /mesh/x and /mesh/cells are missing%s%s; give an .h5 mesh of supple-mesh, or the "
+      "fields.h5 of a run",
+      content[0] ? "; it holds " : "", content);
+  }
   // HDF5 group of the wanted step
   if (im->step) {
     if (!is_there(f, "/step"))
@@ -517,15 +506,8 @@ static PetscErrorCode read_mesh(File *f, SbSlabRows *rows)
       H5_ERROR(f, "has no step %lld; it has %lld of them, from %lld to %lld (-1: the last one)",
                (long long)s.wanted, (long long)s.n, (long long)s.first, (long long)s.last);
     (void)snprintf(f->frame, sizeof(f->frame), "%s", s.found);
-    frame = H5Gopen2(f->file, f->frame, H5P_DEFAULT);
-    if (H5Aexists(frame, "mesh") > 0) {
-      const hid_t a = H5Aopen(frame, "mesh", H5P_DEFAULT);
-
-      if (H5Aread(a, H5T_NATIVE_INT64, &number) < 0) number = 0;
-      (void)H5Aclose(a);
-    }
-    (void)H5Gclose(frame);
-    if (number) (void)snprintf(f->mesh, sizeof(f->mesh), "/mesh_%06lld", (long long)number);
+    number = number_of(f->file, f->frame, "mesh");
+    if (number) (void)snprintf(f->mesh, sizeof(f->mesh), "/mesh_%06d", number);
   }
   PetscCall(open_array(f, &x));
   PetscCall(SbImportSetVertices(im, (PetscInt)x.n));

@@ -1,8 +1,8 @@
 /*
-  import_items.c - construction of an import by a reader: vertices, simplices of each dimension, edge nodes, and physical groups.
+  import_items.c - what readers fill: vertices, simplices of each dimension, edge nodes, physical groups.
 
-  An entity of a file may belong to several physical groups. Each distinct set of groups is stored once (a "tag set"), and items
-  refer to it by number; set 0 is the empty set.
+  An entity of a file may belong to several physical groups. Each distinct set of groups is stored once (a
+  "tag set"), and items refer to it by number; set 0 is the empty set.
 */
 #include <stdlib.h>
 #include "meshio_impl.h"
@@ -73,19 +73,22 @@ PetscErrorCode SbImportSetVertices(SbImport *im, PetscInt n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode resize_items(SbItems *item, int dim, PetscInt n)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscRealloc((size_t)n * (size_t)(dim + 1) * sizeof(PetscInt), &item->vert));
+  PetscCall(PetscRealloc((size_t)n * sizeof(PetscInt), &item->tags));
+  PetscCall(PetscRealloc((size_t)n * sizeof(int64_t), &item->number));
+  item->capacity = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbImportAddItem(SbImport *im, int dim, const PetscInt vert[], PetscInt tags, int64_t number)
 {
   SbItems *item = &im->item[dim];
 
   PetscFunctionBeginUser;
-  if (item->n == item->capacity) {
-    const PetscInt grown = PetscMax(64, 2 * item->capacity);
-
-    PetscCall(PetscRealloc((size_t)grown * (size_t)(dim + 1) * sizeof(PetscInt), &item->vert));
-    PetscCall(PetscRealloc((size_t)grown * sizeof(PetscInt), &item->tags));
-    PetscCall(PetscRealloc((size_t)grown * sizeof(int64_t), &item->number));
-    item->capacity = grown;
-  }
+  if (item->n == item->capacity) PetscCall(resize_items(item, dim, PetscMax(64, 2 * item->capacity)));
   for (int i = 0; i <= dim; i++) item->vert[(dim + 1) * item->n + i] = vert[i];
   item->tags[item->n] = tags;
   item->number[item->n++] = number;
@@ -99,11 +102,9 @@ PetscErrorCode SbImportSetItems(SbImport *im, int dim, PetscInt n)
   SbItems *item = &im->item[dim];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1((size_t)n * (size_t)(dim + 1), &item->vert));
-  PetscCall(PetscMalloc1(n, &item->tags));
-  PetscCall(PetscMalloc1(n, &item->number));
+  PetscCall(resize_items(item, dim, n));
   for (PetscInt i = 0; i < n; i++) item->number[i] = i + 1;
-  item->n = item->capacity = n;
+  item->n = n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -210,7 +211,7 @@ PetscErrorCode SbImportLostMiddle(const SbImport *im, const SbMiddle *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Drops edge nodes of edges that no tet has. For a list of curved edges in a file this is an error, unless found[] returns it. */
+/* Drops nodes of edges that no tet has; when a file lists them an error, unless found[] returns it. */
 static PetscErrorCode drop_lost(SbImport *im, PetscBool found[])
 {
   SbMiddle lost = {.node = -1};
@@ -218,8 +219,7 @@ static PetscErrorCode drop_lost(SbImport *im, PetscBool found[])
   PetscBool *of_tet;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(im->nmiddle.n, &low));
-  PetscCall(PetscCalloc1(im->nmiddle.n, &of_tet));
+  PetscCall(PetscCalloc2(im->nmiddle.n, &low, im->nmiddle.n, &of_tet));
   for (PetscInt i = 0; i < im->nmiddle.n; i++) low[i] = im->middle[i].end[0];
   PetscCall(SbBucketByKey(im->nmiddle.n, low, im->nvert, &start, &at));
   // only few edges have the same lower vertex
@@ -238,8 +238,7 @@ static PetscErrorCode drop_lost(SbImport *im, PetscBool found[])
       lost = im->middle[i];
   }
   im->nmiddle.n = n;
-  PetscCall(PetscFree(low));
-  PetscCall(PetscFree(of_tet));
+  PetscCall(PetscFree2(low, of_tet));
   PetscCall(PetscFree(start));
   PetscCall(PetscFree(at));
   if (!found && lost.node < -1) PetscCall(SbImportLostMiddle(im, &lost));
@@ -340,9 +339,10 @@ static PetscErrorCode hash_groups(SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+const char *const SbGroupKinds[4] = {"point", "curve", "surface", "volume"};
+
 PetscErrorCode SbImportGroup(SbImport *im, PetscInt dim, int64_t tag, const char *name, PetscInt *group)
 {
-  static const char *const kind[4] = {"point", "curve", "surface", "volume"};
   PetscInt s, g;
 
   PetscFunctionBeginUser;
@@ -355,7 +355,7 @@ PetscErrorCode SbImportGroup(SbImport *im, PetscInt dim, int64_t tag, const char
     im->group[g].dim = dim;
     im->group[g].tag = tag;
     im->group[g].alone = -1;
-    (void)snprintf(im->group[g].name, SB_GROUP_MAX, "%s_%lld", kind[dim], (long long)tag);
+    (void)snprintf(im->group[g].name, SB_GROUP_MAX, "%s_%lld", SbGroupKinds[dim], (long long)tag);
     im->ngroup++;
   }
   if (name) PetscCall(PetscStrncpy(im->group[g].name, name, SB_GROUP_MAX));
@@ -400,8 +400,6 @@ PetscErrorCode SbImportTagsAlone(SbImport *im, PetscInt dim, int64_t tag, const 
 
 PetscErrorCode SbImportTagSet(SbImport *im, PetscInt n, PetscInt groups[], PetscInt *tags)
 {
-  PetscInt start;
-
   PetscFunctionBeginUser;
   PetscCall(PetscSortRemoveDupsInt(&n, groups));
   /* set 0 is created by the first call */
@@ -418,7 +416,8 @@ PetscErrorCode SbImportTagSet(SbImport *im, PetscInt n, PetscInt groups[], Petsc
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   for (*tags = 0; *tags < im->ntags; (*tags)++) {
-    start = im->tags_start[*tags];
+    const PetscInt start = im->tags_start[*tags];
+
     if (im->tags_start[*tags + 1] - start != n) continue;
     if (!n || !memcmp(groups, im->tags_group + start, (size_t)n * sizeof(PetscInt)))
       PetscFunctionReturn(PETSC_SUCCESS);
@@ -512,10 +511,10 @@ PetscErrorCode SbImportJoinRepeats(SbImport *im, int dim, PetscBool all, PetscIn
 
 const char *SbImportOption(const SbImport *im, const char *key, char name[SB_IMPORT_OPTION_MAX])
 {
-  if (im->body[0])
-    (void)snprintf(name, SB_IMPORT_OPTION_MAX, "-body_%s_%s", im->body, key);
-  else
-    (void)snprintf(name, SB_IMPORT_OPTION_MAX, "-%s", strncmp(key, "tet_", 4) ? key : key + 4);
+  const PetscBool alone = (PetscBool)!im->body[0];
+
+  (void)snprintf(name, SB_IMPORT_OPTION_MAX, alone ? "-%s%s" : "-body_%s_%s", im->body,
+                 alone && !strncmp(key, "tet_", 4) ? key + 4 : key);
   return name;
 }
 

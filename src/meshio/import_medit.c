@@ -1,10 +1,11 @@
 /*
-  import_medit.c - reader of Medit's text files, .mesh ("MEDIT: an interactive mesh visualization software", P. Frey, INRIA RT-0253, 2001),
-  also written by mmg, CGAL and FreeFEM.
+  import_medit.c - reader of Medit's text files, .mesh ("MEDIT: an interactive mesh visualization software",
+  P. Frey, INRIA RT-0253, 2001), also written by mmg, CGAL and FreeFEM.
 
-  Each keyword is followed by a count and that many lines of numbers, the last of which is a reference: N gives the group volume_N, surface_N or
-  curve_N, and 0 gives none except for tets. A # begins a comment. Other keywords (Corners, Ridges, Normals, Required...) are skipped with
-  their numbers. Errors: binary files (.meshb), volume elements other than tets of 4 or 10 nodes.
+  A keyword is followed by a count and that many lines of numbers, the last one a reference: N gives the group
+  volume_N, surface_N or curve_N, 0 none except for tets. A # begins a comment. Other keywords (Corners,
+  Ridges, Normals, Required...) are skipped with their numbers. Errors: binary files (.meshb), volume elements
+  other than tets of 4 or 10 nodes.
 */
 #include <ctype.h>
 #include "meshio_impl.h"
@@ -13,33 +14,24 @@
 static const struct {
   const char *word;
   int type;
-} elements[] = {
-  {"Tetrahedra", SB_GMSH_TET},
-  {"Triangles", SB_GMSH_TRIANGLE},
-  {"Edges", SB_GMSH_LINE},
-  {"Quadrilaterals", 3},
-  {"Hexahedra", 5},
-  {"Hexaedra", 5},
-  {"Prisms", 6},
-  {"Pyramids", 7},
-  {"TetrahedraP2", SB_GMSH_TET10},
-  {"TrianglesP2", SB_GMSH_TRIANGLE6},
-  {"EdgesP2", SB_GMSH_LINE3},
-};
+} elements[] = {{"Tetrahedra", 4},    {"Triangles", 2},   {"Edges", 1},  {"Quadrilaterals", 3},
+                {"Hexahedra", 5},     {"Hexaedra", 5},    {"Prisms", 6}, {"Pyramids", 7},
+                {"TetrahedraP2", 11}, {"TrianglesP2", 9}, {"EdgesP2", 8}};
 
 static PetscErrorCode read_elements(SbImport *im, int type)
 {
   SbScan *s = &im->scan;
   const int dim = SbGmshTypes[type].dim, nnode = SbGmshTypes[type].nnode;
   int64_t n, point, reference;
-  PetscInt vert[10], tags;
+  PetscInt vert[10];
 
   PetscFunctionBeginUser;
   if (!im->x) SB_SCAN_ERROR(s, "elements before the section Vertices");
   SbScanNext(s, '#');
-  PetscCall(SbScanText(s, "number of elements", &n));
-  PetscCall(SbScanRoom(s, SbGmshTypes[type].name, n, 2 * nnode, 2 * nnode));
+  PetscCall(SbScanCount(s, SbGmshTypes[type].name, 2 * nnode, 2 * nnode, &n));
   for (int64_t i = 0; i < n; i++) {
+    PetscInt tags = 0;
+
     SbScanNext(s, '#');
     for (int k = 0; k < nnode; k++) {
       PetscCall(SbScanText(s, "vertex of an element", &point));
@@ -49,7 +41,6 @@ static PetscErrorCode read_elements(SbImport *im, int type)
       if (k < 10) vert[SbGmshNode(k)] = (PetscInt)(point - 1);
     }
     PetscCall(SbScanText(s, "reference of an element", &reference));
-    tags = 0;
     if (SbGmshIsSimplex(type) && (reference || dim == 3))
       PetscCall(SbImportTagsAlone(im, dim, reference, NULL, &tags));
     PetscCall(SbImportAddElement(im, type, vert, tags, i + 1));
@@ -61,7 +52,8 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
 {
   SbScan *s = &im->scan;
   char word[32];
-  int64_t dimension;
+  int64_t n, dimension;
+  PetscReal reference;
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
@@ -71,9 +63,8 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
     SB_SCAN_ERROR(s, "expected 'MeshVersionFormatted', found '%s'; this is no text file of Medit", word);
   for (;;) {
     // skip other sections: go to the next word that is not a number
-    for (SbScanNext(s, '#'); s->at < s->end && !isalpha((unsigned char)*s->at); SbScanNext(s, '#')) {
+    for (SbScanNext(s, '#'); s->at < s->end && !isalpha((unsigned char)*s->at); SbScanNext(s, '#'))
       while (s->at < s->end && !isspace((unsigned char)*s->at)) s->at++;
-    }
     PetscCall(SbScanWord(s, sizeof(word), word));
     if (!word[0])
       SB_SCAN_ERROR(
@@ -81,13 +72,9 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
     if (!strcmp(word, "End")) break;
     // coordinates and a reference, which is ignored
     if (!strcmp(word, "Vertices")) {
-      int64_t n;
-      PetscReal reference;
-
       if (im->x) SB_SCAN_ERROR(s, "second section Vertices");
       SbScanNext(s, '#');
-      PetscCall(SbScanText(s, "number of vertices", &n));
-      PetscCall(SbScanRoom(s, "vertices", n, 8, 8));
+      PetscCall(SbScanCount(s, "vertices", 8, 8, &n));
       PetscCall(SbImportSetVertices(im, (PetscInt)n));
       for (PetscInt v = 0; v < n; v++) {
         im->vert_number[v] = v + 1;
@@ -101,9 +88,8 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
       PetscCall(SbScanText(s, "dimension", &dimension));
       if (dimension != 3) SB_SCAN_ERROR(s, "dimension %lld; expected 3", (long long)dimension);
     }
-    for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements); i++) {
+    for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements); i++)
       if (!strcmp(word, elements[i].word)) PetscCall(read_elements(im, elements[i].type));
-    }
   }
   PetscCall(SbImportCheckTypes(im));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,14 +1,15 @@
 /*
-  import_nastran.c - reader of Nastran bulk data, .bdf and .nas (MSC Nastran Quick Reference Guide, "Bulk Data Entries"; also written by NX,
-  HyperMesh, ANSA, Femap, Patran, gmsh, meshio and pyNastran).
+  import_nastran.c - reader of Nastran bulk data, .bdf and .nas (MSC Nastran Quick Reference Guide, "Bulk Data
+  Entries"; also written by NX, HyperMesh, ANSA, Femap, Patran, gmsh, meshio and pyNastran).
 
-  An entry has ten fields per line, the first one is its name. Fields have 8 columns, 16 if the name ends with a star, or are separated by commas; a line
-  whose first field is empty or begins with + or * continues the previous entry. Tabs advance to the next multiple
-  of 8 columns. Reals may omit the letter of the exponent (1.5-3).
+  An entry has ten fields per line, first its name. Fields have 8 columns, 16 if the name ends with a star, or
+  commas between them; a line whose first field is empty or begins with + or * continues the entry. Tabs
+  advance to the next multiple of 8 columns. Reals may omit the letter of the exponent (1.5-3).
 
-  Read: GRID, solid, shell and line elements with their property, SPC, SPC1 and SET1 as sets of nodes. Property N is the group volume_N,
-  surface_N or curve_N, or has the name given in a comment (ANSA, HyperMesh, Femap, Patran). Lines before BEGIN BULK and
-  after ENDDATA, and other entries, are skipped. Errors: points in a local coordinate system, INCLUDE.
+  Read: GRID, solid, shell and line elements with their property, SPC, SPC1 and SET1 as sets of nodes.
+  Property N is the group volume_N, surface_N or curve_N, or has its name from a comment (ANSA, HyperMesh,
+  Femap, Patran). Lines before BEGIN BULK and after ENDDATA, and other entries, are skipped. Errors: points in
+  a local coordinate system, INCLUDE.
 
   Elements may precede their points: everything is collected first and converted at the end.
 */
@@ -24,13 +25,19 @@ typedef struct {
   char name[SB_GROUP_MAX];
 } Name;
 
+/* A line, tabs expanded, without its comment. */
+typedef struct {
+  char text[LINE];
+  size_t length;
+  PetscBool commas;    /* fields are separated by commas */
+  int field, per_line; /* last field read; number of value fields on the line */
+} Line;
+
 typedef struct {
   SbDeck deck;
   SbScan *scan;
-  size_t length;         /* length of the line */
-  char line[LINE];       /* current line, tabs expanded, without its comment */
-  PetscBool commas, cut; /* fields are separated by commas; the line was longer than the buffer */
-  int field, per_line;   /* last field read; number of value fields on the line */
+  Line line;       /* the current one */
+  PetscBool ended; /* next_field() found no more field of the entry */
   SbCount nname;
   Name *name;                 /* [nname] names of properties */
   char pending[SB_GROUP_MAX]; /* name that a Patran comment gives to the next property */
@@ -38,7 +45,7 @@ typedef struct {
 
 /* ------------------------------------------------------------------ names in comments */
 
-/* Copies the text from `p` to a delimiter or the end of the line, trimmed; blanks in it become underscores. */
+/* Copies the text from `p` to a delimiter or the end, trimmed; blanks in it become underscores. */
 static void copy_name(const char *p, const char *end, char delimiter, char name[SB_GROUP_MAX])
 {
   size_t n = 0;
@@ -60,7 +67,8 @@ static PetscErrorCode add_name(Nastran *b, int64_t number, const char *name)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads the name of a property: $ANSA_NAME_COMMENT;12;PSOLID;liver;   $HMNAME PROP 12"liver"   $ Femap Property 12 : liver   $ ... Properties for region : liver */
+/* Reads the name of a property: $ANSA_NAME_COMMENT;12;PSOLID;liver;   $HMNAME PROP 12"liver"
+   $ Femap Property 12 : liver   $ ... Properties for region : liver */
 static PetscErrorCode read_comment(Nastran *b, const char *text, const char *end)
 {
   char line[LINE], name[SB_GROUP_MAX] = "", *p = line;
@@ -103,29 +111,29 @@ static void trim(const char *from, const char *to, char word[WORD])
 /* Field k of this line; field 0 is the name. */
 static void get_field(const Nastran *b, int k, char word[WORD])
 {
-  const size_t length = b->length, width = b->per_line == 4 ? 16 : 8;
-  size_t from = k ? 8 + (size_t)(k - 1) * width : 0, to = k ? from + width : 8;
-  const char *p = b->line;
+  const size_t length = b->line.length, width = b->line.per_line == 4 ? 16 : 8;
+  const size_t from = k ? 8 + (size_t)(k - 1) * width : 0, to = k ? from + width : 8;
+  const char *p = b->line.text;
 
-  if (b->commas) {
+  if (b->line.commas) {
     for (int i = 0; i < k && p; i++) p = (p = strchr(p, ',')) != NULL ? p + 1 : NULL;
     word[0] = 0;
     if (p) trim(p, p + strcspn(p, ","), word);
     return;
   }
-  from = PetscMin(from, length);
-  to = PetscMin(to, length);
-  trim(p + from, p + to, word);
+  trim(p + PetscMin(from, length), p + PetscMin(to, length), word);
 }
 
 /* Goes to the next line that is neither a comment nor empty; false at the end of the file. */
 static PetscErrorCode next_line(Nastran *b, PetscBool *there)
 {
   SbScan *s = b->scan;
+  Line *line = &b->line;
   char name[WORD];
+  PetscBool cut; /* the line was longer than the buffer */
 
   PetscFunctionBeginUser;
-  for (*there = PETSC_FALSE; s->at < s->end && !*there;) {
+  for (*there = cut = PETSC_FALSE; s->at < s->end && !*there;) {
     const char *end = (const char *)memchr(s->at, '\n', (size_t)(s->end - s->at)), *from;
     size_t n;
 
@@ -134,26 +142,26 @@ static PetscErrorCode next_line(Nastran *b, PetscBool *there)
     if (*s->at == '$') PetscCall(read_comment(b, s->at, end));
     // text without the comment; tabs become blanks up to the next multiple of 8 columns
     for (n = 0, from = s->at; from < end && *from != '$' && n + 1 < LINE; from++) {
-      do b->line[n++] = isprint((unsigned char)*from) ? *from : ' ';
+      do line->text[n++] = isprint((unsigned char)*from) ? *from : ' ';
       while (*from == '\t' && n % 8 && n + 1 < LINE);
     }
-    b->cut = (PetscBool)(from < end && *from != '$');
-    b->line[n] = 0;
-    b->length = n;
-    *there = (PetscBool)(b->line[strspn(b->line, " ")] != 0);
+    cut = (PetscBool)(from < end && *from != '$');
+    line->text[n] = 0;
+    line->length = n;
+    *there = (PetscBool)(line->text[strspn(line->text, " ")] != 0);
     s->at = end < s->end ? end + 1 : s->end;
   }
   if (!*there) PetscFunctionReturn(PETSC_SUCCESS);
-  b->commas = (PetscBool)(strchr(b->line, ',') != NULL);
-  if (b->commas && b->cut)
+  line->commas = (PetscBool)(strchr(line->text, ',') != NULL);
+  if (line->commas && cut)
     SB_SCAN_ERROR(s, "the line is longer than %d characters; go on with the entry on a next line", LINE - 1);
-  b->field = 0;
+  line->field = 0;
   get_field(b, 0, name);
-  b->per_line = strchr(name, '*') ? 4 : 8;
-  if (b->commas) get_field(b, b->per_line + 2, name);
-  if (b->commas && name[0])
+  line->per_line = strchr(name, '*') ? 4 : 8;
+  if (line->commas) get_field(b, line->per_line + 2, name);
+  if (line->commas && name[0])
     SB_SCAN_ERROR(s, "the line has more than %d fields; go on with the entry on a next line",
-                  b->per_line + 2);
+                  line->per_line + 2);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -165,63 +173,54 @@ static PetscBool continues(const Nastran *b)
   return (PetscBool)(!name[0] || name[0] == '+' || name[0] == '*');
 }
 
-/* Next field of the entry, on this line or on a continuation line; false at the end of the entry. */
-static PetscErrorCode next_field(Nastran *b, char word[WORD], PetscBool *there)
+/* Next field of the entry, on this line or on a continuation line; b->ended and "" at the end of the entry. */
+static PetscErrorCode next_field(Nastran *b, char word[WORD])
 {
   SbScan *s = b->scan;
-  const char *at = s->at, *token = s->token;
 
   PetscFunctionBeginUser;
   word[0] = 0;
-  *there = PETSC_FALSE;
-  if (b->field == b->per_line && s->at < s->end && isalpha((unsigned char)*s->at))
-    PetscFunctionReturn(PETSC_SUCCESS); /* fast path: another entry begins on the next line */
-  if (b->field == b->per_line) {
-    char line[LINE];
-    const size_t length = b->length;
-    const PetscBool commas = b->commas;
+  b->ended = PETSC_TRUE;
+  if (b->line.field == b->line.per_line) {
+    const char *at = s->at, *token = s->token;
+    const Line line = b->line;
+    PetscBool there;
 
-    PetscCall(PetscStrncpy(line, b->line, sizeof(line)));
-    PetscCall(next_line(b, there));
-    if (!*there || !continues(b)) {
+    if (at < s->end && isalpha((unsigned char)*at))
+      PetscFunctionReturn(PETSC_SUCCESS); /* fast path: another entry begins on the next line */
+    PetscCall(next_line(b, &there));
+    if (!there || !continues(b)) {
       /* the next line belongs to another entry: keep this one, at its end */
-      PetscCall(PetscStrncpy(b->line, line, sizeof(line)));
-      b->length = length;
-      b->commas = commas;
-      b->field = b->per_line = 8;
+      b->line = line;
       s->at = at;
       s->token = token;
-      *there = PETSC_FALSE;
       PetscFunctionReturn(PETSC_SUCCESS);
     }
   }
-  get_field(b, ++b->field, word);
-  *there = PETSC_TRUE;
+  get_field(b, ++b->line.field, word);
+  b->ended = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Parses an integer; `empty` is the value of an empty field. */
-static PetscErrorCode to_number(Nastran *b, const char *word, const char *what, int64_t empty, int64_t *value)
+/* Parses an integer; an empty field is 0. */
+static PetscErrorCode to_number(Nastran *b, const char *word, const char *what, int64_t *value)
 {
   char *end;
 
   PetscFunctionBeginUser;
-  *value = empty;
-  if (!word[0]) PetscFunctionReturn(PETSC_SUCCESS);
   *value = strtoll(word, &end, 10);
   if (*end || *value < 0 || *value > (int64_t)1 << 40)
     SB_SCAN_ERROR(b->scan, "expected the %s, found '%.24s'", what, word);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode next_number(Nastran *b, const char *what, int64_t empty, int64_t *value)
+static PetscErrorCode next_number(Nastran *b, const char *what, int64_t *value)
 {
   char word[WORD];
-  PetscBool there;
 
   PetscFunctionBeginUser;
-  PetscCall(next_field(b, word, &there));
-  PetscCall(to_number(b, word, what, empty, value));
+  PetscCall(next_field(b, word));
+  PetscCall(to_number(b, word, what, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -229,7 +228,7 @@ static PetscErrorCode next_number(Nastran *b, const char *what, int64_t empty, i
 static PetscErrorCode next_label(Nastran *b, const char *what, int64_t *value)
 {
   PetscFunctionBeginUser;
-  PetscCall(next_number(b, what, 0, value));
+  PetscCall(next_number(b, what, value));
   if (!*value) SB_SCAN_ERROR(b->scan, "the %s is missing", what);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -243,7 +242,7 @@ static PetscErrorCode read_grid(Nastran *b)
 
   PetscFunctionBeginUser;
   PetscCall(next_label(b, "number of a node", &label));
-  PetscCall(next_number(b, "coordinate system of a node", 0, &system));
+  PetscCall(next_number(b, "coordinate system of a node", &system));
   if (system)
     SB_SCAN_ERROR(b->scan,
                   "node %lld is given in coordinate system %lld; write all nodes in the basic one (field 3 "
@@ -254,9 +253,8 @@ static PetscErrorCode read_grid(Nastran *b)
   for (int i = 0; i < 3; i++) {
     char word[WORD], full[WORD + 1], *end;
     size_t n = 0;
-    PetscBool there;
 
-    PetscCall(next_field(b, word, &there));
+    PetscCall(next_field(b, word));
     for (const char *p = word; *p && n < WORD; p++) {
       if ((*p == '-' || *p == '+') && p > word && (isdigit((unsigned char)p[-1]) || p[-1] == '.'))
         full[n++] = 'E';
@@ -273,27 +271,23 @@ static PetscErrorCode read_grid(Nastran *b)
 /* Names of elements, and gmsh's types for corner nodes only and with edge nodes. */
 static const struct {
   const char *name;
-  int ncorner, linear, higher;
-  PetscBool property; /* the second field is a property */
+  int ncorner, linear, higher, property; /* property 1: the second field is one */
 } kinds[] = {
-  {"CTETRA", 4, 4, 11, PETSC_TRUE}, {"CHEXA", 8, 5, 17, PETSC_TRUE},  {"CPENTA", 6, 6, 18, PETSC_TRUE},
-  {"CPYRAM", 5, 7, 19, PETSC_TRUE}, {"CPYRA", 5, 7, 19, PETSC_TRUE},  {"CTRIA3", 3, 2, 2, PETSC_TRUE},
-  {"CTRIAR", 3, 2, 2, PETSC_TRUE},  {"CTRIA6", 3, 2, 9, PETSC_TRUE},  {"CQUAD4", 4, 3, 3, PETSC_TRUE},
-  {"CQUADR", 4, 3, 3, PETSC_TRUE},  {"CQUAD8", 4, 3, 16, PETSC_TRUE}, {"CBAR", 2, 1, 1, PETSC_TRUE},
-  {"CBEAM", 2, 1, 1, PETSC_TRUE},   {"CROD", 2, 1, 1, PETSC_TRUE},    {"CTUBE", 2, 1, 1, PETSC_TRUE},
-  {"CONROD", 2, 1, 1, PETSC_FALSE},
-};
+  {"CTETRA", 4, 4, 11, 1}, {"CHEXA", 8, 5, 17, 1}, {"CPENTA", 6, 6, 18, 1}, {"CPYRAM", 5, 7, 19, 1},
+  {"CPYRA", 5, 7, 19, 1},  {"CTRIA3", 3, 2, 2, 1}, {"CTRIAR", 3, 2, 2, 1},  {"CTRIA6", 3, 2, 9, 1},
+  {"CQUAD4", 4, 3, 3, 1},  {"CQUADR", 4, 3, 3, 1}, {"CQUAD8", 4, 3, 16, 1}, {"CBAR", 2, 1, 1, 1},
+  {"CBEAM", 2, 1, 1, 1},   {"CROD", 2, 1, 1, 1},   {"CTUBE", 2, 1, 1, 1},   {"CONROD", 2, 1, 1, 0}};
 
 static PetscErrorCode read_element(Nastran *b, int kind)
 {
   SbDeckElement e = {.property = 0, .at = b->scan->token};
   char word[WORD];
-  PetscBool there, more = PETSC_FALSE;
+  PetscBool more = PETSC_FALSE;
   int64_t node;
 
   PetscFunctionBeginUser;
   PetscCall(next_label(b, "number of an element", &e.label));
-  if (kinds[kind].property) PetscCall(next_number(b, "property of an element", 0, &e.property));
+  if (kinds[kind].property) PetscCall(next_number(b, "property of an element", &e.property));
   if (!e.property) e.property = -1;
   for (int k = 0; k < kinds[kind].ncorner; k++) {
     PetscCall(next_label(b, "node of an element", &node));
@@ -303,12 +297,12 @@ static PetscErrorCode read_element(Nastran *b, int kind)
   for (int k = 4;
        kinds[kind].linear != kinds[kind].higher && (!more || (kinds[kind].higher == SB_GMSH_TET10 && k < 10));
        k++) {
-    PetscCall(next_field(b, word, &there));
-    if (!there) break;
+    PetscCall(next_field(b, word));
+    if (b->ended) break;
     if (!word[0] || word[0] == '+' || strchr(word, '.')) continue;
     more = PETSC_TRUE;
     if (kinds[kind].higher == SB_GMSH_TET10)
-      PetscCall(to_number(b, word, "node of an element", 0, &e.node[PetscMin(k, 9)]));
+      PetscCall(to_number(b, word, "node of an element", &e.node[PetscMin(k, 9)]));
   }
   e.type = more ? kinds[kind].higher : kinds[kind].linear;
   PetscCall(SbDeckAddElement(&b->deck, &e));
@@ -332,19 +326,19 @@ static PetscErrorCode add_range(Nastran *b, const char *kind, int64_t number, in
 static PetscErrorCode read_list(Nastran *b, const char *kind, int nskip)
 {
   char word[WORD];
-  PetscBool there, thru = PETSC_FALSE;
+  PetscBool thru = PETSC_FALSE;
   int64_t number = 0, node, last = 0;
 
   PetscFunctionBeginUser;
   PetscCall(next_label(b, "number of a set", &number));
-  for (int i = 0; i < nskip; i++) PetscCall(next_field(b, word, &there));
+  for (int i = 0; i < nskip; i++) PetscCall(next_field(b, word));
   for (;;) {
-    PetscCall(next_field(b, word, &there));
-    if (!there) break;
+    PetscCall(next_field(b, word));
+    if (b->ended) break;
     if (!strcasecmp(word, "THRU")) {
       thru = PETSC_TRUE;
     } else if (word[0] && strcasecmp(word, "SKIN") != 0) {
-      PetscCall(to_number(b, word, "node of a set", 0, &node));
+      PetscCall(to_number(b, word, "node of a set", &node));
       PetscCall(add_range(b, kind, number, thru ? last : node, node));
       last = node;
       thru = PETSC_FALSE;
@@ -366,11 +360,10 @@ static PetscErrorCode read_entry(Nastran *b)
   // default coordinate system of points
   if (!strcasecmp(name, "GRDSET")) {
     char word[WORD];
-    PetscBool there;
     int64_t system;
 
-    PetscCall(next_field(b, word, &there));
-    PetscCall(next_number(b, "coordinate system of the nodes", 0, &system));
+    PetscCall(next_field(b, word));
+    PetscCall(next_number(b, "coordinate system of the nodes", &system));
     if (system)
       SB_SCAN_ERROR(b->scan, "GRDSET gives the nodes in coordinate system %lld; write them in the basic one",
                     (long long)system);
@@ -378,14 +371,13 @@ static PetscErrorCode read_entry(Nastran *b)
   // SPC: twice a node, its components and their displacement
   if (!strcasecmp(name, "SPC")) {
     char word[WORD];
-    PetscBool there;
     int64_t spc = 0, node;
 
     PetscCall(next_label(b, "spc of a set", &spc));
     for (int i = 0; i < 2; i++) {
-      PetscCall(next_number(b, "node of a set", 0, &node));
+      PetscCall(next_number(b, "node of a set", &node));
       if (node) PetscCall(add_range(b, "spc", spc, node, node));
-      for (int k = 0; k < 2; k++) PetscCall(next_field(b, word, &there));
+      for (int k = 0; k < 2; k++) PetscCall(next_field(b, word));
     }
   }
   if (!strcasecmp(name, "SPC1")) PetscCall(read_list(b, "spc", 1));
@@ -395,7 +387,7 @@ static PetscErrorCode read_entry(Nastran *b)
   for (int k = 0; k < (int)PETSC_STATIC_ARRAY_LENGTH(kinds); k++)
     if (!strcasecmp(name, kinds[k].name)) PetscCall(read_element(b, k));
   if (b->pending[0] && (name[0] == 'P' || name[0] == 'p')) {
-    PetscCall(next_number(b, "number of a property", 0, &number));
+    PetscCall(next_number(b, "number of a property", &number));
     PetscCall(add_name(b, number, b->pending));
     b->pending[0] = 0;
   }
@@ -422,7 +414,7 @@ PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *im)
   }
   for (;;) {
     PetscCall(next_line(&b, &there));
-    if (!there || !strncasecmp(b.line, "ENDDATA", 7)) break;
+    if (!there || !strncasecmp(b.line.text, "ENDDATA", 7)) break;
     PetscCall(read_entry(&b));
   }
   if (!b.deck.nnode.n) {

@@ -1,16 +1,17 @@
 /*
-  import_netgen.c - reader of Netgen's meshes: .vol, and the neutral format (Netgen manual, "Export formats", and files written by Netgen
-  4 to 6).
+  import_netgen.c - reader of Netgen's meshes: .vol, and the neutral format (Netgen manual, "Export formats",
+  and files written by Netgen 4 to 6).
 
-  Neutral format: the number of points, their coordinates; the number of tets, each with its subdomain and four points; the number of
-  surface triangles, each with its boundary condition and three points. Points count from 1. A # begins a comment.
+  Neutral format: number of points, coordinates; number of tets, each with its subdomain and four points;
+  number of surface triangles, each with its boundary condition and three points. Points count from 1. A #
+  begins a comment.
 
-  .vol: sections, each a word on a line of its own, a count, and that many lines; "surfnr bcnr domin domout np p1 p2 p3" for a surface
-  element, "matnr np p1 p2 p3 p4" for a volume element. Sections are in any order, hence each is searched for.
+  .vol: sections in any order: a word on a line of its own, a count, and that many lines; "surfnr bcnr domin
+  domout np p1 p2 p3" for a surface element, "matnr np p1 p2 p3 p4" for a volume element.
 
-  Kept: subdomain or material N is volume_N, boundary condition N is surface_N; the sections materials and bcnames of .vol give
-  them names. Curves (edgesegments) are ignored. Second-order tets have 10 points and triangles 6, in both formats.
-  Errors: other elements.
+  Kept: subdomain or material N is volume_N, boundary condition N is surface_N; the sections materials and
+  bcnames of .vol give them names. Curves (edgesegments) are ignored. Second-order tets have 10 points and
+  triangles 6, in both formats. Errors: other elements.
 */
 #include <ctype.h>
 #include "meshio_impl.h"
@@ -22,8 +23,7 @@ static PetscErrorCode read_points(SbImport *im)
 
   PetscFunctionBeginUser;
   SbScanNext(s, '#');
-  PetscCall(SbScanText(s, "number of points", &n));
-  PetscCall(SbScanRoom(s, "points", n, 6, 6));
+  PetscCall(SbScanCount(s, "points", 6, 6, &n));
   PetscCall(SbImportSetVertices(im, (PetscInt)n));
   for (PetscInt v = 0; v < n; v++) {
     im->vert_number[v] = v + 1;
@@ -34,29 +34,23 @@ static PetscErrorCode read_points(SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Format of an element line: numbers before the points, which are the group and, in .vol, the number of points. */
+/* An element line: numbers before the points, among them the group and, in .vol, the number of points. */
 typedef struct {
-  int dim, room; /* dimension; least number of bytes per line */
-  const char *before[5];
+  int dim, room;   /* dimension; least number of bytes per line */
   int mark, nnode; /* positions of group and number of points; nnode -1: all other words are points */
+  const char *before[5];
 } Layout;
 
-static const Layout neutral_volume = {
-  .dim = 3, .room = 10, .before = {"subdomain of an element"}, .mark = 0, .nnode = -1};
-static const Layout neutral_surface = {
-  .dim = 2, .room = 8, .before = {"boundary condition of an element"}, .mark = 0, .nnode = -1};
-static const Layout vol_volume = {.dim = 3,
-                                  .room = 12,
-                                  .before = {"material of an element", "number of points of an element"},
-                                  .mark = 0,
-                                  .nnode = 1};
+static const Layout neutral_volume = {3, 10, 0, -1, {"subdomain of an element"}};
+static const Layout neutral_surface = {2, 8, 0, -1, {"boundary condition of an element"}};
+static const Layout vol_volume = {3, 12, 0, 1, {"material of an element", "number of points of an element"}};
 static const Layout vol_surface = {
-  .dim = 2,
-  .room = 16,
-  .before = {"surface of an element", "boundary condition of an element", "domain on one side of an element",
-             "domain on the other side of an element", "number of points of an element"},
-  .mark = 1,
-  .nnode = 4};
+  2,
+  16,
+  1,
+  4,
+  {"surface of an element", "boundary condition of an element", "domain on one side of an element",
+   "domain on the other side of an element", "number of points of an element"}};
 
 static PetscErrorCode read_elements(SbImport *im, const Layout *l)
 {
@@ -64,15 +58,15 @@ static PetscErrorCode read_elements(SbImport *im, const Layout *l)
   /* positions of the nodes in gmsh's order; edges 01 02 03 12 13 23 */
   static const int place[10] = {0, 1, 2, 3, 4, 6, 7, 5, 9, 8};
   int64_t n, value[5], nnode, point;
-  PetscInt vert[10], tags;
+  PetscInt vert[10];
 
   PetscFunctionBeginUser;
   SbScanNext(s, '#');
-  PetscCall(SbScanText(s, l->dim == 3 ? "number of volume elements" : "number of surface elements", &n));
-  PetscCall(SbScanRoom(s, l->dim == 3 ? "volume elements" : "surface elements", n, l->room, l->room));
+  PetscCall(SbScanCount(s, l->dim == 3 ? "volume elements" : "surface elements", l->room, l->room, &n));
   for (int64_t i = 0; i < n; i++) {
     const char *at, *token;
     int type = SB_GMSH_LINE;
+    PetscInt tags = 0;
 
     SbScanNext(s, '#');
     for (int k = 0; k < 5 && l->before[k]; k++) PetscCall(SbScanText(s, l->before[k], &value[k]));
@@ -94,7 +88,6 @@ static PetscErrorCode read_elements(SbImport *im, const Layout *l)
                       (long long)im->nvert);
       if (k < 10) vert[place[k]] = (PetscInt)(point - 1);
     }
-    tags = 0;
     if (SbGmshIsSimplex(type)) PetscCall(SbImportTagsAlone(im, l->dim, value[l->mark], NULL, &tags));
     PetscCall(SbImportAddElement(im, type, vert, tags, i + 1));
     SbScanEndOfLine(s);
@@ -121,21 +114,16 @@ PetscErrorCode SbImportRead_NetgenNeutral(const char *path, SbImport *im)
 /* Goes behind the line that consists of this word; false if there is none. */
 static PetscBool find_section(SbScan *s, const char *name)
 {
+  const char *token = s->token;
   const size_t n = strlen(name);
-  const char *p = s->data;
 
-  while (p && p < s->end) {
-    const char *line = p;
-
-    while (p < s->end && (*p == ' ' || *p == '\t')) p++;
-    if ((size_t)(s->end - p) >= n && !strncmp(p, name, n) &&
-        (p + n == s->end || isspace((unsigned char)p[n]))) {
-      s->at = s->token = p + n;
-      return PETSC_TRUE;
-    }
-    p = (const char *)memchr(line, '\n', (size_t)(s->end - line));
-    if (p) p++;
+  for (s->at = s->data; s->at < s->end; SbScanEndOfLine(s)) {
+    (void)SbScanMore(s, '\n');
+    if (strncmp(s->at, name, n) || (s->at + n < s->end && !isspace((unsigned char)s->at[n]))) continue;
+    s->at = s->token = s->at + n;
+    return PETSC_TRUE;
   }
+  s->token = token;
   return PETSC_FALSE;
 }
 
@@ -148,8 +136,7 @@ static PetscErrorCode read_names(SbImport *im, const char *section, PetscInt dim
   PetscFunctionBeginUser;
   if (!find_section(s, section)) PetscFunctionReturn(PETSC_SUCCESS);
   SbScanNext(s, '#');
-  PetscCall(SbScanText(s, "number of names", &n));
-  PetscCall(SbScanRoom(s, "names", n, 2, 2));
+  PetscCall(SbScanCount(s, "names", 2, 2, &n));
   for (int64_t i = 0; i < n; i++) {
     char name[SB_GROUP_MAX];
 

@@ -2,12 +2,13 @@
   import_tetgen.c - reader of TetGen's meshes: NAME.node and NAME.ele, with optional NAME.face and NAME.edge
   (TetGen 1.5 manual, section 5.2).
 
-  Each file begins with a line of counts; each further line is one item: its number, then its values. Point numbers begin at 0 or
-  1, as in the first line of NAME.node. A # begins a comment. Values at the end of a line beyond the announced ones (neighbours of faces, by
-  tetgen -nn) are ignored; for tets they are an error.
+  Each file begins with a line of counts; each further line is one item: its number, then its values. Point
+  numbers begin at 0 or 1, as in the first line of NAME.node. A # begins a comment. Values at the end of a
+  line beyond the announced ones (neighbours of faces, by tetgen -nn) are ignored; for tets they are an error.
 
-  Kept: the first attribute of a tet is its region, volume_N; the nonzero marker of a face, an edge or a point is surface_N,
-  curve_N or point_N. Second-order meshes (tetgen -o2) have faces of 6 points and edges of 3. Errors: attributes that are not integers.
+  Kept: the first attribute of a tet is its region, volume_N; a marker of a face, edge or point, not 0, is
+  surface_N, curve_N or point_N. Second-order meshes (tetgen -o2) have faces of 6 points and edges of 3.
+  Attributes must be integers.
 */
 #include "meshio_impl.h"
 
@@ -30,7 +31,8 @@ static PetscErrorCode on_line(SbScan *s, const char *what)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads one file: the line of counts, then a line for each item: number, coordinates or points, attributes, marker. A marker of 0 is a group for tets only. */
+/* Reads one file: the line of counts, then a line for each item: number, coordinates or points, attributes,
+   marker. A marker of 0 is a group for tets only. */
 static PetscErrorCode read_file(SbImport *im, int f)
 {
   static const int types[2][4] = {{SB_GMSH_POINT, SB_GMSH_LINE, SB_GMSH_TRIANGLE, SB_GMSH_TET},
@@ -39,8 +41,8 @@ static PetscErrorCode read_file(SbImport *im, int f)
   static const int place[10] = {0, 1, 2, 3, 8, 7, 4, 5, 9, 6};
   SbScan *s = &im->scan;
   const int dim = files[f].dim;
-  int type = types[0][dim], npoint = dim + 1;
-  int64_t count[4] = {0, 0, 0, 0}, number, first, mark = 0;
+  int type, npoint;
+  int64_t count[4] = {0, 0, 0, 0}, number, first, point;
   PetscReal attribute;
 
   PetscFunctionBeginUser;
@@ -60,17 +62,13 @@ static PetscErrorCode read_file(SbImport *im, int f)
         s, "0 points; when they stand in a .poly or .smesh file, let TetGen write the mesh (tetgen -p)");
     PetscCall(SbImportSetVertices(im, (PetscInt)count[0]));
   }
-  if (dim == 3) {
-    if (count[1] != 0 && count[1] != 4 && count[1] != 10)
-      SB_SCAN_ERROR(s, "elements of %lld points; expected 4 or 10", (long long)count[1]);
-    if (count[1] == 10) type = SB_GMSH_TET10;
-  }
+  if (dim == 3 && count[1] != 0 && count[1] != 4 && count[1] != 10)
+    SB_SCAN_ERROR(s, "elements of %lld points; expected 4 or 10", (long long)count[1]);
   /* only the file of the tets has the order of the elements */
-  if (dim && im->count[SB_GMSH_TET10]) type = types[1][dim];
-  if (dim) npoint = SbGmshTypes[type].nnode;
-
+  type = types[dim == 3 ? count[1] == 10 : im->count[SB_GMSH_TET10] > 0][dim];
+  npoint = SbGmshTypes[type].nnode;
   for (PetscInt i = 0; i < count[0]; i++) {
-    PetscBool marked = (PetscBool)(count[dim == 0 ? 3 : files[f].ncount - 1] > 0);
+    const int64_t marks = count[files[f].ncount - 1];
     PetscInt vert[10] = {i}, tags = 0;
 
     SbScanNext(s, '#');
@@ -84,8 +82,6 @@ static PetscErrorCode read_file(SbImport *im, int f)
       SB_SCAN_ERROR(s, "point %lld follows point %lld; TetGen numbers them without gaps", (long long)number,
                     (long long)(first + i - 1));
     for (int k = 0; k < (dim ? npoint : 3); k++) {
-      int64_t point;
-
       PetscCall(on_line(s, dim ? "number of a point" : "coordinate"));
       if (dim == 0) {
         PetscCall(SbScanReal(s, "coordinate", number, &im->x[3 * i + k]));
@@ -104,20 +100,16 @@ static PetscErrorCode read_file(SbImport *im, int f)
       PetscCall(on_line(s, "attribute of a point"));
       PetscCall(SbScanReal(s, "attribute of a point", 0, &attribute));
     }
-    if (dim == 0) marked = (PetscBool)(count[3] && SbScanMore(s, '#'));
-    if (marked) {
-      const char *what;
-      PetscReal value = 0;
+    // the marker: an integer, written with or without decimals
+    if (dim ? marks > 0 : marks && SbScanMore(s, '#')) {
+      PetscReal mark;
 
-      // an integer, written with or without decimals
-      what = files[f].mark;
-      PetscCall(on_line(s, what));
-      PetscCall(SbScanReal(s, what, 0, &value));
-      if (!(PetscAbsReal(value) < 1e15) || value != PetscFloorReal(value))
+      PetscCall(on_line(s, files[f].mark));
+      PetscCall(SbScanReal(s, files[f].mark, 0, &mark));
+      if (!(PetscAbsReal(mark) < 1e15) || mark != PetscFloorReal(mark))
         SB_SCAN_ERROR(s, "the %s is %g; supple takes it for the number of a group, which is a whole one",
-                      what, (double)value);
-      mark = (int64_t)value;
-      if (mark || dim == 3) PetscCall(SbImportTagsAlone(im, dim, mark, NULL, &tags));
+                      files[f].mark, (double)mark);
+      if (mark != 0 || dim == 3) PetscCall(SbImportTagsAlone(im, dim, (int64_t)mark, NULL, &tags));
     }
     // more points than announced for a tet are an error
     for (int64_t k = 1; dim == 3 && k < count[2] && SbScanMore(s, '#'); k++)

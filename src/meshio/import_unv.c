@@ -1,9 +1,11 @@
 /*
-  import_unv.c - reader of universal files, .unv (SDRC I-DEAS; data set 15 or 2411: nodes, 2412: elements, 2429 to 2477: groups).
+  import_unv.c - universal files, .unv (SDRC I-DEAS; data set 15 or 2411: nodes, 2412: elements, 2429 to 2477:
+  groups).
 
-  A data set is enclosed by two lines of -1 and begins with its number. Read: nodes with their coordinates (units and
-  coordinate systems are ignored); tets, triangles, lines. An element belongs to the group volume_N, surface_N or curve_N of its
-  physical property N, and to the named groups that list it. Groups of nodes are kept too. Errors: volume elements other than tets of 4 or 10 nodes.
+  A data set is enclosed by two lines of -1 and begins with its number. Read: nodes with their coordinates
+  (units and coordinate systems are ignored); tets, triangles, lines. An element belongs to the group
+  volume_N, surface_N or curve_N of its physical property N, and to the named groups that list it. Groups of
+  nodes are kept too. Errors: volume elements other than tets of 4 or 10 nodes.
 */
 #include <ctype.h>
 #include "meshio_impl.h"
@@ -28,9 +30,8 @@ static PetscBool is_mark(const SbScan *s)
 
   while (p < s->end && (*p == ' ' || *p == '\t')) p++;
   if (s->end - p < 2 || p[0] != '-' || p[1] != '1') return PETSC_FALSE;
-  for (p += 2; p < s->end && *p != '\n'; p++) {
+  for (p += 2; p < s->end && *p != '\n'; p++)
     if (!isspace((unsigned char)*p)) return PETSC_FALSE;
-  }
   return PETSC_TRUE;
 }
 
@@ -41,10 +42,12 @@ static PetscErrorCode read_element(SbDeck *d)
   static const char *const what[6] = {
     "label of an element",    "kind of an element",   "physical property of an element",
     "material of an element", "colour of an element", "number of nodes of an element"};
+  /* quadratic simplices, by dimension: around the first face, corners and edge nodes in turn, then upwards */
+  static const int around[4][10] = {{0}, {0, 2, 1}, {0, 3, 1, 4, 2, 5}, {0, 4, 1, 5, 2, 6, 7, 8, 9, 3}};
   SbScan *s = &d->im->scan;
-  int64_t head[6], n, other, node;
-  static const int around[10] = {0, 4, 1, 5, 2, 6, 7, 9, 8, 3}; /* position of each node in gmsh's order */
+  int64_t head[6], n, other;
   SbDeckElement e = {.type = 0};
+  int dim;
 
   PetscFunctionBeginUser;
   for (int i = 0; i < 6; i++) PetscCall(SbScanText(s, what[i], &head[i]));
@@ -52,27 +55,19 @@ static PetscErrorCode read_element(SbDeck *d)
   e.property = head[2];
   n = head[5];
   PetscCall(SbScanRoom(s, "nodes of an element", n, 2, 2));
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(types); i++) {
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(types); i++)
     if (types[i].id == head[1]) e.type = types[i].type;
-  }
   if (e.type && SbGmshTypes[e.type].nnode != n)
     SB_SCAN_ERROR(s, "element %lld of kind %lld has %lld nodes; expected %d", (long long)e.label,
                   (long long)head[1], (long long)n, SbGmshTypes[e.type].nnode);
-  if (e.type == 1 || e.type == 8) { /* beams have an additional record */
-    for (int i = 0; i < 3; i++) PetscCall(SbScanText(s, "section of a beam", &other));
-  }
+  for (int i = 0; i < 3 && (e.type == 1 || e.type == 8); i++) /* beams have an additional record */
+    PetscCall(SbScanText(s, "section of a beam", &other));
+  dim = SbGmshTypes[e.type].dim;
   for (int64_t k = 0; k < n; k++) {
-    const int dim = SbGmshTypes[e.type].dim;
+    const PetscBool quadratic = (PetscBool)(SbGmshIsSimplex(e.type) && n > dim + 1);
 
-    PetscCall(SbScanText(s, "node of an element", &node));
+    PetscCall(SbScanText(s, "node of an element", k < 10 ? &e.node[quadratic ? around[dim][k] : k] : &other));
     if (!k) e.at = s->token;
-    // quadratic tets: around the first face, corners and edge nodes in turn, then upwards; of other quadratic simplices only the corners are kept
-    if (e.type == SB_GMSH_TET10)
-      e.node[SbGmshNode(around[k])] = node;
-    else if (e.type == SB_GMSH_LINE3 || e.type == SB_GMSH_TRIANGLE6) {
-      if (k % 2 == 0 && k / 2 <= dim) e.node[k / 2] = node;
-    } else if (k < 4)
-      e.node[k] = node;
   }
   if (e.type) PetscCall(SbDeckAddElement(d, &e));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -80,7 +75,8 @@ static PetscErrorCode read_element(SbDeck *d)
 
 /* ------------------------------------------------------------------ groups */
 
-/* Reads one group. Each member has `nvalue` values: kind (7 a node, 8 an element), label, and since data set 2435 two more. */
+/* Reads a group. A member has `nvalue` values: kind (7 a node, 8 an element), label, since set 2435 two
+   more. */
 static PetscErrorCode read_group(SbDeck *d, int nvalue)
 {
   SbScan *s = &d->im->scan;
@@ -118,11 +114,9 @@ PetscErrorCode SbImportRead_UNV(const char *path, SbImport *im)
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
-  for (;;) {
+  for (SbScanNext(s, 0); s->at < s->end; SbScanNext(s, 0)) {
     int64_t id;
 
-    SbScanNext(s, 0);
-    if (s->at >= s->end) break;
     while (s->at > s->data && s->at[-1] != '\n') s->at--; /* back to the beginning of the line */
     if (!is_mark(s)) SB_SCAN_ERROR(s, "expected a line of -1; this is no universal file, or it is damaged");
     SbScanEndOfLine(s);

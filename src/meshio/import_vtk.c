@@ -1,9 +1,9 @@
 /*
-  import_vtk.c - reader of VTK's legacy files of unstructured grids, text or binary (VTK User's Guide, "File formats"; version 5.1
-  is described in VTK's "VTK 5.1 legacy format"): cells with their counts, or as OFFSETS and CONNECTIVITY.
+  import_vtk.c - reader of VTK's legacy files of unstructured grids, text or binary (VTK User's Guide, "File
+  formats"; "VTK 5.1 legacy format"): cells with their counts, or as OFFSETS and CONNECTIVITY.
 
-  Kept: tets, triangles, lines and points; cell arrays of integers become groups, see vtk_grid.h. Point data is
-  skipped. Binary data is big-endian. Errors: other data sets, volume cells other than 4- and 10-node tets.
+  Kept: tets, triangles, lines and points; cell arrays of integers become groups, see vtk_grid.h. Point data
+  is skipped. Binary data is big-endian. Errors: other data sets, volume cells other than 4- and 10-node tets.
 */
 #include <strings.h>
 #include "vtk_grid.h"
@@ -24,23 +24,19 @@ static PetscErrorCode read_array(Vtk *v, const char *what, int64_t n, SbNumberTy
 {
   SbScan *s = v->scan;
   const size_t bytes = (size_t)n * (size_t)type.size;
+  const int least = v->binary ? type.size : 2;
+  PetscReal x;
 
   PetscFunctionBeginUser;
   // binary data begins after the end of the line
   if (v->binary) SbScanEndOfLine(s);
-  s->binary = v->binary;
-  PetscCall(SbScanRoom(s, what, n, 2, type.size));
-  s->binary = PETSC_FALSE;
+  PetscCall(SbScanRoom(s, what, n, least, least));
   if (value) PetscCall(SbImportScratch(v->im, (size_t)n * sizeof(**value), value));
-  if (!v->binary) {
-    for (int64_t i = 0; i < n; i++) {
-      PetscReal x;
-
-      PetscCall(SbScanReal(s, what, 0, &x));
-      if (value) (*value)[i] = x;
-    }
-    PetscFunctionReturn(PETSC_SUCCESS);
+  for (int64_t i = 0; i < n && !v->binary; i++) {
+    PetscCall(SbScanReal(s, what, 0, &x));
+    if (value) (*value)[i] = x;
   }
+  if (!v->binary) PetscFunctionReturn(PETSC_SUCCESS);
   s->token = s->at;
   if ((size_t)(s->end - s->at) < bytes)
     SB_SCAN_ERROR(s, "the file ends within the %s; it is truncated, write or copy it again", what);
@@ -56,7 +52,8 @@ static PetscErrorCode read_cells(Vtk *v)
   SbScan *s = v->scan;
   SbVtkGrid *grid = &v->grid;
   int64_t n, size, k0 = 0;
-  double *all = NULL;
+  double *all;
+  SbNumberType type;
   char word[32];
   const char *at;
 
@@ -64,22 +61,18 @@ static PetscErrorCode read_cells(Vtk *v)
   if (v->cells) SB_SCAN_ERROR(s, "second section CELLS");
   v->cells = PETSC_TRUE;
   v->cells_at = s->token;
-  PetscCall(SbScanText(s, "number of cells", &n));
-  PetscCall(SbScanText(s, "size of the list of cells", &size));
-  PetscCall(SbScanRoom(s, "cells", n, 1, 1));
-  PetscCall(SbScanRoom(s, "numbers in the list of cells", size, 1, 1));
+  PetscCall(SbScanCount(s, "cells", 1, 1, &n));
+  PetscCall(SbScanCount(s, "numbers in the list of cells", 1, 1, &size));
   at = s->at;
   PetscCall(SbScanWord(s, sizeof(word), word));
   if (!strcasecmp(word, "OFFSETS")) {
-    SbNumberType type;
-
     // since version 5: `n` offsets from 0 to the number of points, then the points
-    PetscCall(SbScanType(v->scan, &type));
+    PetscCall(SbScanType(s, &type));
     PetscCall(read_array(v, "offsets", n, type, &grid->end));
     for (int64_t c = 0; c + 1 < n; c++) grid->end[c] = grid->end[c + 1]; /* drop the first offset, 0 */
-    PetscCall(SbScanWord(v->scan, sizeof(word), word));
-    if (strcasecmp(word, "CONNECTIVITY")) SB_SCAN_ERROR(v->scan, "expected CONNECTIVITY, found '%s'", word);
-    PetscCall(SbScanType(v->scan, &type));
+    PetscCall(SbScanWord(s, sizeof(word), word));
+    if (strcasecmp(word, "CONNECTIVITY")) SB_SCAN_ERROR(s, "expected CONNECTIVITY, found '%s'", word);
+    PetscCall(SbScanType(s, &type));
     PetscCall(read_array(v, "points of cells", size, type, &grid->connect));
     grid->ncell = (PetscInt)PetscMax(n - 1, 0);
     grid->nconnect = size;
@@ -87,16 +80,15 @@ static PetscErrorCode read_cells(Vtk *v)
   }
   s->at = at;
   grid->ncell = (PetscInt)n;
-  PetscCall(read_array(v, "list of cells", size, (SbNumberType){'i', 4}, &all));
-  // before version 5: [n, p1 ... pn] for each cell
-  PetscCall(SbImportScratch(v->im, (size_t)size * sizeof(double), &grid->connect));
+  // before version 5: [n, p1 ... pn] for each cell; the points move together
+  PetscCall(read_array(v, "list of cells", size, (SbNumberType){'i', 4}, &grid->connect));
   PetscCall(SbImportScratch(v->im, (size_t)grid->ncell * sizeof(double), &grid->end));
+  all = grid->connect;
   for (PetscInt c = 0; c < grid->ncell; c++) {
     const double npoint = k0 < size ? all[k0] : 0;
 
     if (!(npoint >= 1 && npoint <= (double)(size - k0 - 1)) || npoint != PetscFloorReal(npoint))
-      SB_SCAN_ERROR(v->scan,
-                    "cell %lld of %lld has %g points, more than the section announces or less than one",
+      SB_SCAN_ERROR(s, "cell %lld of %lld has %g points, more than the section announces or less than one",
                     (long long)c, (long long)grid->ncell, npoint);
     for (int64_t k = 0; k < (int64_t)npoint; k++) grid->connect[grid->nconnect++] = all[k0 + 1 + k];
     k0 += 1 + (int64_t)npoint;
@@ -120,7 +112,6 @@ static PetscErrorCode read_data(Vtk *v, const char *name, int64_t ncomponent, in
   if (v->on_cells && ncomponent == 1 && ntuple == grid->ncell && grid->narray < SB_VTK_ARRAYS) {
     const int a = grid->narray++;
 
-    grid->array[a].value = NULL;
     PetscCall(PetscStrncpy(grid->array[a].name, name, sizeof(grid->array[a].name)));
     PetscCall(read_array(v, "data of cells", ntuple, type, &grid->array[a].value));
   } else
@@ -149,9 +140,8 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
   if (!strcasecmp(section, "POINTS")) {
     if (v->points) SB_SCAN_ERROR(s, "second section POINTS");
     v->points = PETSC_TRUE;
-    PetscCall(SbScanText(s, "number of points", &n));
-    PetscCall(SbScanType(v->scan, &type));
-    PetscCall(SbScanRoom(s, "points", n, 3, 3));
+    PetscCall(SbScanCount(s, "points", 3, 3, &n));
+    PetscCall(SbScanType(s, &type));
     PetscCall(read_array(v, "coordinates", 3 * n, type, &x));
     PetscCall(SbVtkSetPoints((PetscInt)n, x, v->im));
   } else if (!strcasecmp(section, "CELLS")) {
@@ -175,7 +165,7 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
     const char *at;
 
     PetscCall(SbScanWord(s, sizeof(name), name));
-    PetscCall(SbScanType(v->scan, &type));
+    PetscCall(SbScanType(s, &type));
     if (SbScanMore(s, '\n')) PetscCall(SbScanText(s, "number of components", &ncomponent));
     at = s->at;
     PetscCall(SbScanWord(s, sizeof(word), word));
@@ -187,8 +177,7 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
   } else if (!strcasecmp(section, "FIELD")) {
     // FIELD name n, then n times: name components tuples type / numbers
     PetscCall(SbScanWord(s, sizeof(word), word));
-    PetscCall(SbScanText(s, "number of arrays in a field", &n));
-    PetscCall(SbScanRoom(s, "arrays", n, 8, 8));
+    PetscCall(SbScanCount(s, "arrays in a field", 8, 8, &n));
     for (int64_t i = 0; i < n; i++) {
       PetscCall(SbScanWord(s, sizeof(name), name));
       if (!strcmp(name, "METADATA")) {
@@ -200,14 +189,13 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
       }
       PetscCall(SbScanText(s, "number of components", &ncomponent));
       PetscCall(SbScanText(s, "number of tuples", &ntuple));
-      PetscCall(SbScanType(v->scan, &type));
+      PetscCall(SbScanType(s, &type));
       PetscCall(read_data(v, name, ncomponent, ntuple, type));
     }
   } else if (!strcasecmp(section, "LOOKUP_TABLE")) {
     // 4 bytes or 4 numbers per entry
     PetscCall(SbScanWord(s, sizeof(name), name));
-    PetscCall(SbScanText(s, "number of colours", &n));
-    PetscCall(SbScanRoom(s, "colours", n, 1, 1));
+    PetscCall(SbScanCount(s, "colours", 1, 1, &n));
     PetscCall(read_array(v, "colours", 4 * n, (SbNumberType){'u', 1}, NULL));
   } else if (!strcasecmp(section, "METADATA")) {
     // a block of lines up to an empty line
@@ -215,7 +203,7 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
     while (SbScanMore(s, '\n'));
   } else if (k < PETSC_STATIC_ARRAY_LENGTH(tuples)) {
     PetscCall(SbScanWord(s, sizeof(name), name));
-    PetscCall(SbScanType(v->scan, &type));
+    PetscCall(SbScanType(s, &type));
     PetscCall(read_data(v, name, tuples[k].ncomponent, v->ntuple, type));
   } else
     SB_SCAN_ERROR(s, "expected a section, as POINTS or CELLS, found '%s'", section);

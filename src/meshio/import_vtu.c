@@ -1,9 +1,9 @@
 /*
   import_vtu.c - reader of VTK's XML files of unstructured grids, .vtu (VTK User's Guide, "XML file formats").
 
-  Arrays are in DataArray elements as text or base64, or after the mark _ of AppendedData as raw bytes or base64. A binary array
-  begins with its length or, if compressed by zlib, with the number and sizes of its blocks. Base64 may continue after a final =:
-  some writers encode lengths and data separately.
+  Arrays are in DataArray elements as text or base64, or after the mark _ of AppendedData as raw bytes or
+  base64. A binary array begins with its length or, if compressed by zlib, with the number and sizes of its
+  blocks. Base64 may continue after a final =: some writers encode lengths and data separately.
 
   Kept: tets, triangles, lines and points; cell arrays of integers become groups, see vtk_grid.h. Errors:
   several pieces, other compressors, volume cells other than 4- and 10-node tets.
@@ -30,9 +30,13 @@ typedef struct {
 
 /* ------------------------------------------------------------------ XML */
 
-/* Finds the next element of this name before `end`: `open` at its <, `close` after its >; false if there is none. */
-static PetscBool find_element(const char *from, const char *end, const char *name, const char **open,
-                              const char **close)
+/* A tag, from its < to behind its >. */
+typedef struct {
+  const char *open, *close;
+} Tag;
+
+/* Finds the next element of this name between `from` and `end`; false if there is none. */
+static PetscBool find_element(const char *from, const char *end, const char *name, Tag *tag)
 {
   const size_t n = strlen(name);
 
@@ -40,31 +44,30 @@ static PetscBool find_element(const char *from, const char *end, const char *nam
     p = (const char *)memchr(p, '<', (size_t)(end - p));
     if (!p || (size_t)(end - p) < n + 2) return PETSC_FALSE;
     if (strncmp(p + 1, name, n) || !strchr(" \t\r\n/>", p[n + 1]) || !p[n + 1]) continue;
-    *open = p;
-    *close = (const char *)memchr(p, '>', (size_t)(end - p));
-    if (!*close) return PETSC_FALSE;
-    (*close)++;
-    return PETSC_TRUE;
+    tag->open = p;
+    tag->close = (const char *)memchr(p, '>', (size_t)(end - p));
+    if (tag->close) tag->close++;
+    return (PetscBool)(tag->close != NULL);
   }
   return PETSC_FALSE;
 }
 
 /* Value of an attribute, "" if absent. */
-static void attribute(const char *open, const char *close, const char *name, size_t size, char value[])
+static void attribute(Tag tag, const char *name, size_t size, char value[])
 {
   const size_t n = strlen(name);
 
   value[0] = 0;
-  for (const char *p = open; p + n + 2 < close; p++) {
+  for (const char *p = tag.open; p + n + 2 < tag.close; p++) {
     const char *q = p + 1 + n, *quote;
     size_t length = 0;
 
     if (!isspace((unsigned char)*p) || strncmp(p + 1, name, n)) continue;
-    while (q < close && isspace((unsigned char)*q)) q++;
-    if (q >= close || *q++ != '=') continue;
-    while (q < close && isspace((unsigned char)*q)) q++;
-    if (q >= close || (*q != '"' && *q != '\'')) continue;
-    for (quote = q++; q < close && *q != *quote && length + 1 < size; q++)
+    while (q < tag.close && isspace((unsigned char)*q)) q++;
+    if (q >= tag.close || *q++ != '=') continue;
+    while (q < tag.close && isspace((unsigned char)*q)) q++;
+    if (q >= tag.close || (*q != '"' && *q != '\'')) continue;
+    for (quote = q++; q < tag.close && *q != *quote && length + 1 < size; q++)
       value[length++] = isprint((unsigned char)*q) ? *q : '?';
     value[length] = 0;
     return;
@@ -72,15 +75,14 @@ static void attribute(const char *open, const char *close, const char *name, siz
 }
 
 /* Integer value of an attribute. */
-static PetscErrorCode attribute_number(Vtu *v, const char *open, const char *close, const char *name,
-                                       int64_t *n)
+static PetscErrorCode attribute_number(Vtu *v, Tag tag, const char *name, int64_t *n)
 {
   char value[32], *end;
 
   PetscFunctionBeginUser;
-  attribute(open, close, name, sizeof(value), value);
+  attribute(tag, name, sizeof(value), value);
   *n = strtoll(value, &end, 10);
-  v->scan->token = open;
+  v->scan->token = tag.open;
   if (!value[0] || *end || *n < 0)
     SB_SCAN_ERROR(v->scan, "expected a number %s=\"...\", found '%s'", name, value);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -96,27 +98,22 @@ typedef struct {
   int nheld, from;
 } Bytes;
 
-/* Decodes four base64 characters to at most three bytes; false at the end, or at a character that is not base64. */
+/* Decodes four base64 characters to at most three bytes; false at the end, or where it is no base64. */
 static PetscBool next_quad(Bytes *b)
 {
   static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   uint32_t bits = 0;
   int n = 0, padding = 0;
 
-  while (n < 4) {
+  for (; n < 4; n++, b->at++) {
     const char *found;
-    int digit;
 
     while (b->at < b->end && isspace((unsigned char)*b->at)) b->at++;
     if (b->at >= b->end) return PETSC_FALSE;
     found = *b->at ? strchr(digits, *b->at) : NULL;
-    digit = found ? (int)(found - digits) : -1;
-    if (digit < 0 && !(*b->at == '=' && n >= 2)) return PETSC_FALSE;
-    padding += digit < 0;
-    if (digit >= 0 && padding) return PETSC_FALSE;
-    bits = bits << 6 | (uint32_t)PetscMax(digit, 0);
-    b->at++;
-    n++;
+    if (found ? padding > 0 : *b->at != '=' || n < 2) return PETSC_FALSE;
+    padding += !found;
+    bits = bits << 6 | (found ? (uint32_t)(found - digits) : 0);
   }
   for (int i = 0; i < 3; i++) b->held[i] = (unsigned char)(bits >> (16 - 8 * i));
   b->nheld = 3 - padding;
@@ -134,9 +131,8 @@ static PetscBool take_bytes(Bytes *b, size_t n, unsigned char out[])
     return PETSC_TRUE;
   }
   for (size_t i = 0; i < n; i++) {
-    while (b->from >= b->nheld) {
+    while (b->from >= b->nheld)
       if (!next_quad(b)) return PETSC_FALSE;
-    }
     out[i] = b->held[b->from++];
   }
   return PETSC_TRUE;
@@ -162,7 +158,8 @@ static PetscErrorCode take_length(Vtu *v, Bytes *b, const char *name, size_t *le
 
 /* ------------------------------------------------------------------ arrays */
 
-/* Decompresses an array: number of blocks, block size, size of a smaller last block, compressed size of each; then the blocks. */
+/* Decompresses an array: number and size of blocks, of a smaller last one, compressed sizes; then the
+   blocks. */
 static PetscErrorCode take_blocks(Vtu *v, Bytes *b, const char *name, size_t want, unsigned char out[])
 {
   size_t nblock, size, last, full, *packed = NULL, at = 0;
@@ -197,20 +194,20 @@ static PetscErrorCode take_blocks(Vtu *v, Bytes *b, const char *name, size_t wan
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads the n numbers of the array whose element is from open to close; *value is allocated. */
-static PetscErrorCode read_array(Vtu *v, const char *open, const char *close, int64_t n, double **value)
+/* Reads the n numbers of the array of this element; *value is allocated. */
+static PetscErrorCode read_array(Vtu *v, Tag tag, int64_t n, double **value)
 {
+  SbScan *s = v->scan, part;
   SbNumberType type;
-  Bytes b;
-  char format[16], name[64];
-  size_t room, want, length;
-  char kind[32];
-  unsigned char *raw;
-  int64_t offset;
+  Bytes b = {.at = tag.close, .end = s->end, .text = PETSC_TRUE};
+  char format[16], name[64], kind[32];
+  PetscBool text;
+  size_t want, length;
+  int64_t offset, room;
 
   PetscFunctionBeginUser;
-  v->scan->token = open;
-  attribute(open, close, "type", sizeof(kind), kind);
+  s->token = tag.open;
+  attribute(tag, "type", sizeof(kind), kind);
   type.kind = !strncmp(kind, "Int", 3)     ? 'i'
               : !strncmp(kind, "UInt", 4)  ? 'u'
               : !strncmp(kind, "Float", 5) ? 'f'
@@ -218,65 +215,49 @@ static PetscErrorCode read_array(Vtu *v, const char *open, const char *close, in
   type.size = atoi(kind + strcspn(kind, "0123456789")) / 8;
   if (!type.kind || (type.size != 1 && type.size != 2 && type.size != 4 && type.size != 8) ||
       (type.kind == 'f' && type.size < 4))
-    SB_SCAN_ERROR(v->scan, "an array of type '%s'; expected one as Float64 or Int32", kind);
-  attribute(open, close, "format", sizeof(format), format);
-  attribute(open, close, "Name", sizeof(name), name);
-  if (!strcmp(format, "ascii") || !format[0]) {
-    const char *end = (const char *)memchr(close, '<', (size_t)(v->scan->end - close));
-    SbScan s;
-
-    if (!end) SB_SCAN_ERROR(v->scan, "the array has no end; the file is truncated, write or copy it again");
-    if (n > (end - close) / 2 + 1)
-      SB_SCAN_ERROR(v->scan, "array '%s' should hold %lld numbers, which is more than stand there", name,
-                    (long long)n);
-    PetscCall(SbImportScratch(v->im, (size_t)n * sizeof(**value), value));
-    // text: numbers separated by blanks
-    s = *v->scan;
-    s.at = close;
-    s.end = end;
-    s.bytes = PETSC_FALSE;
-    for (size_t i = 0; i < (size_t)n; i++) {
-      PetscReal x;
-
-      PetscCall(SbScanReal(&s, "value of an array", 0, &x));
-      (*value)[i] = x;
-    }
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  // inline or appended binary data
-  b = (Bytes){close, v->scan->end, PETSC_TRUE, {0}, 0, 0};
+    SB_SCAN_ERROR(s, "an array of type '%s'; expected one as Float64 or Int32", kind);
+  attribute(tag, "format", sizeof(format), format);
+  attribute(tag, "Name", sizeof(name), name);
+  // where the numbers are: in the element, or in the appended data; how many there can be
   if (!strcmp(format, "appended")) {
-    PetscCall(attribute_number(v, open, close, "offset", &offset));
-    if (!v->appended || offset > v->scan->end - v->appended)
-      SB_SCAN_ERROR(v->scan, "the array lies at %lld of the appended data, which the file does not hold",
+    PetscCall(attribute_number(v, tag, "offset", &offset));
+    if (!v->appended || offset > s->end - v->appended)
+      SB_SCAN_ERROR(s, "the array lies at %lld of the appended data, which the file does not hold",
                     (long long)offset);
     b.at = v->appended + offset;
     b.text = v->appended_text;
-  } else if (!strcmp(format, "binary")) {
-    b.end = (const char *)memchr(close, '<', (size_t)(v->scan->end - close));
-    if (!b.end) SB_SCAN_ERROR(v->scan, "the array has no end; the file is truncated, write or copy it again");
+  } else if (!format[0] || !strcmp(format, "ascii") || !strcmp(format, "binary")) {
+    b.end = (const char *)memchr(tag.close, '<', (size_t)(s->end - tag.close));
+    if (!b.end) SB_SCAN_ERROR(s, "the array has no end; the file is truncated, write or copy it again");
   } else
-    SB_SCAN_ERROR(v->scan, "an array of format '%s'; expected ascii, binary or appended", format);
-  room = (size_t)(b.end - b.at) / (size_t)type.size;
-  if ((uint64_t)n > (v->zlib ? ZLIB_RATIO : 1) * (uint64_t)room)
-    SB_SCAN_ERROR(v->scan,
-                  "array '%s' should hold %lld numbers, which is more than the rest of the file can contain",
+    SB_SCAN_ERROR(s, "an array of format '%s'; expected ascii, binary or appended", format);
+  text = (PetscBool)(!format[0] || !strcmp(format, "ascii"));
+  room = text ? (b.end - b.at) / 2 + 1 : (b.end - b.at) / type.size * (v->zlib ? ZLIB_RATIO : 1);
+  if (n > room)
+    SB_SCAN_ERROR(s, "array '%s' should hold %lld numbers, which is more than the file can contain there",
                   name, (long long)n);
   PetscCall(SbImportScratch(v->im, (size_t)n * sizeof(**value), value));
+  // text: numbers separated by blanks
+  if (text) {
+    part = *s;
+    part.at = b.at;
+    part.end = b.end;
+    part.bytes = PETSC_FALSE;
+    for (int64_t i = 0; i < n; i++) PetscCall(SbScanReal(&part, "value of an array", 0, &(*value)[i]));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   // n binary numbers of this type
   want = (size_t)n * (size_t)type.size;
-  length = want;
   PetscCall(SbImportScratch(v->im, want, &v->raw));
-  raw = v->raw;
   if (v->zlib)
-    PetscCall(take_blocks(v, &b, name, want, raw));
+    PetscCall(take_blocks(v, &b, name, want, v->raw));
   else {
     PetscCall(take_length(v, &b, name, &length));
-    if (length != want || !take_bytes(&b, want, raw))
-      SB_SCAN_ERROR(v->scan, "array '%s' has %zu bytes; expected %zu, or it is truncated, or no base64", name,
+    if (length != want || !take_bytes(&b, want, v->raw))
+      SB_SCAN_ERROR(s, "array '%s' has %zu bytes; expected %zu, or it is truncated, or no base64", name,
                     length, want);
   }
-  SbNumbersConvert(type, v->big_endian, (size_t)n, raw, (*value));
+  SbNumbersConvert(type, v->big_endian, (size_t)n, v->raw, *value);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -285,32 +266,35 @@ static PetscErrorCode read_array(Vtu *v, const char *open, const char *close, in
 /* Content of an element, from after its > to the < of its end tag. */
 static PetscErrorCode content(Vtu *v, const char *name, const char **from, const char **end)
 {
-  const char *open, *close;
+  Tag begin, after;
   char closing[32];
 
   PetscFunctionBeginUser;
   (void)snprintf(closing, sizeof(closing), "/%s", name);
   v->scan->token = v->scan->data;
-  if (!find_element(v->scan->data, v->xml_end, name, &open, from) ||
-      !find_element(*from, v->xml_end, closing, end, &close))
+  if (!find_element(v->scan->data, v->xml_end, name, &begin) ||
+      !find_element(begin.close, v->xml_end, closing, &after))
     SB_SCAN_ERROR(v->scan, "there is no element %s, or it has no end; the file is truncated or damaged",
                   name);
+  *from = begin.close;
+  *end = after.open;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Reads the array of this name in the element Cells. */
 static PetscErrorCode read_cell_array(Vtu *v, const char *name, int64_t n, double **value)
 {
-  const char *from, *end, *open, *close;
+  const char *from, *end;
+  Tag tag;
   char found[64];
 
   PetscFunctionBeginUser;
   PetscCall(content(v, "Cells", &from, &end));
   v->cells_at = v->scan->token = from;
-  for (; find_element(from, end, "DataArray", &open, &close); from = close) {
-    attribute(open, close, "Name", sizeof(found), found);
+  for (; find_element(from, end, "DataArray", &tag); from = tag.close) {
+    attribute(tag, "Name", sizeof(found), found);
     if (strcmp(found, name)) continue;
-    PetscCall(read_array(v, open, close, n, value));
+    PetscCall(read_array(v, tag, n, value));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   SB_SCAN_ERROR(v->scan, "the element Cells has no array '%s'", name);
@@ -323,8 +307,8 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
 {
   SbScan *s = &im->scan;
   Vtu vtu = {.scan = s, .im = im}, *v = &vtu;
-  const char *open, *close, *open2, *close2, *from, *end;
-  char text[16];
+  Tag tag, second;
+  const char *from, *end;
   int64_t npoint, ncell, ncomponent = 3;
   double *x = NULL, last;
   SbVtkGrid *grid = &v->grid;
@@ -334,76 +318,72 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
   PetscCall(SbScanOpen(im->where, path, s));
   // end of the XML part, beginning of the appended data
   v->xml_end = s->end;
-  if (find_element(s->data, s->end, "AppendedData", &open, &close)) {
-    v->xml_end = s->token = open;
-    attribute(open, close, "encoding", sizeof(text), text);
-    v->appended_text = (PetscBool)!strcmp(text, "base64");
+  if (find_element(s->data, s->end, "AppendedData", &tag)) {
+    v->xml_end = s->token = tag.open;
+    attribute(tag, "encoding", sizeof(value), value);
+    v->appended_text = (PetscBool)!strcmp(value, "base64");
     s->bytes = (PetscBool)!v->appended_text;
-    v->appended = (const char *)memchr(close, '_', (size_t)(s->end - close));
+    v->appended = (const char *)memchr(tag.close, '_', (size_t)(s->end - tag.close));
     if (!v->appended) SB_SCAN_ERROR(s, "the appended data has no mark _ at its beginning");
     v->appended++;
   }
   // type, byte order and compression of the file
-  if (!find_element(s->data, v->xml_end, "VTKFile", &open, &close))
+  if (!find_element(s->data, v->xml_end, "VTKFile", &tag))
     SB_SCAN_ERROR(s, "expected an element VTKFile; this is no XML file of VTK");
-  s->token = open;
-  attribute(open, close, "type", sizeof(value), value);
+  s->token = tag.open;
+  attribute(tag, "type", sizeof(value), value);
   if (strcmp(value, "UnstructuredGrid"))
     SB_SCAN_ERROR(s, "a file of type '%s'; expected UnstructuredGrid with tetrahedra", value);
-  attribute(open, close, "byte_order", sizeof(value), value);
+  attribute(tag, "byte_order", sizeof(value), value);
   v->big_endian = (PetscBool)!strcmp(value, "BigEndian");
-  attribute(open, close, "header_type", sizeof(value), value);
+  attribute(tag, "header_type", sizeof(value), value);
   v->header = !strcmp(value, "UInt64") ? 8 : 4;
-  attribute(open, close, "compressor", sizeof(value), value);
+  attribute(tag, "compressor", sizeof(value), value);
   v->zlib = (PetscBool)(value[0] != 0);
   if (v->zlib && strcmp(value, "vtkZLibDataCompressor") != 0)
     SB_SCAN_ERROR(s,
                   "compressed by %s; supple knows vtkZLibDataCompressor and uncompressed files (ParaView: "
                   "Save Data, Compressor Type)",
                   value);
-  if (!find_element(s->data, v->xml_end, "Piece", &open, &close))
+  if (!find_element(s->data, v->xml_end, "Piece", &tag))
     SB_SCAN_ERROR(s, "there is no element Piece; the file is truncated or damaged");
-  s->token = close;
-  if (find_element(close, v->xml_end, "Piece", &open2, &close2))
+  s->token = tag.close;
+  if (find_element(tag.close, v->xml_end, "Piece", &second))
     SB_SCAN_ERROR(s, "the grid is in several pieces; save it in one (ParaView: Merge Blocks, Clean to Grid)");
-  PetscCall(attribute_number(v, open, close, "NumberOfPoints", &npoint));
-  PetscCall(attribute_number(v, open, close, "NumberOfCells", &ncell));
+  PetscCall(attribute_number(v, tag, "NumberOfPoints", &npoint));
+  PetscCall(attribute_number(v, tag, "NumberOfCells", &ncell));
   if (npoint > PETSC_MAX_INT / 8 || ncell > PETSC_MAX_INT / 8)
     SB_SCAN_ERROR(s, "%lld points and %lld cells are more than this build can number", (long long)npoint,
                   (long long)ncell);
   // the only array of the element Points
   PetscCall(content(v, "Points", &from, &end));
-  v->scan->token = from;
-  if (!find_element(from, end, "DataArray", &open, &close))
-    SB_SCAN_ERROR(v->scan, "the element Points has no array");
-  PetscCall(attribute_number(v, open, close, "NumberOfComponents", &ncomponent));
-  if (ncomponent != 3)
-    SB_SCAN_ERROR(v->scan, "points of %lld coordinates; expected 3", (long long)ncomponent);
-  PetscCall(read_array(v, open, close, 3 * npoint, &x));
-  PetscCall(SbVtkSetPoints((PetscInt)npoint, x, v->im));
+  s->token = from;
+  if (!find_element(from, end, "DataArray", &tag)) SB_SCAN_ERROR(s, "the element Points has no array");
+  PetscCall(attribute_number(v, tag, "NumberOfComponents", &ncomponent));
+  if (ncomponent != 3) SB_SCAN_ERROR(s, "points of %lld coordinates; expected 3", (long long)ncomponent);
+  PetscCall(read_array(v, tag, 3 * npoint, &x));
+  PetscCall(SbVtkSetPoints((PetscInt)npoint, x, im));
   // cell types, end offsets of cells, then the connectivity
   grid->ncell = (PetscInt)ncell;
   PetscCall(read_cell_array(v, "offsets", ncell, &grid->end));
   PetscCall(read_cell_array(v, "types", ncell, &grid->type));
   last = ncell ? grid->end[ncell - 1] : 0;
-  v->scan->token = v->cells_at;
+  s->token = v->cells_at;
   if (!(last >= 0 && last < 1e12) || last != PetscFloorReal(last))
-    SB_SCAN_ERROR(v->scan, "the last of the offsets is %g; expected the number of points of all cells", last);
+    SB_SCAN_ERROR(s, "the last of the offsets is %g; expected the number of points of all cells", last);
   grid->nconnect = (int64_t)last;
   PetscCall(read_cell_array(v, "connectivity", grid->nconnect, &grid->connect));
   // cell data with one number per cell; other arrays are skipped
-  if (find_element(s->data, v->xml_end, "CellData", &open, &from) && from[-2] != '/') {
+  if (find_element(s->data, v->xml_end, "CellData", &tag) && tag.close[-2] != '/') {
     PetscCall(content(v, "CellData", &from, &end));
-    for (; find_element(from, end, "DataArray", &open, &close) && grid->narray < SB_VTK_ARRAYS;
-         from = close) {
+    for (; find_element(from, end, "DataArray", &tag) && grid->narray < SB_VTK_ARRAYS; from = tag.close) {
       const int a = grid->narray;
 
-      attribute(open, close, "NumberOfComponents", sizeof(text), text);
-      if (text[0] && strcmp(text, "1") != 0) continue;
+      attribute(tag, "NumberOfComponents", sizeof(value), value);
+      if (value[0] && strcmp(value, "1") != 0) continue;
       grid->narray++;
-      grid->array[a].value = NULL;
-      attribute(open, close, "Name", sizeof(grid->array[a].name), grid->array[a].name);
-      PetscCall(read_array(v, open, close, grid->ncell, &grid->array[a].value));
+      attribute(tag, "Name", sizeof(grid->array[a].name), grid->array[a].name);
+      PetscCall(read_array(v, tag, grid->ncell, &grid->array[a].value));
     }
   }
   s->token = v->cells_at;

@@ -1,5 +1,6 @@
 /*
-  meshio_impl.h - shared declarations of src/meshio/: readers, writers, decks of labelled nodes and elements, gmsh in a child process.
+  meshio_impl.h - shared by src/meshio/: readers, writers, decks of labelled nodes and elements, gmsh as a
+  child.
 */
 #pragma once
 #include "sbgmsh.h"
@@ -10,8 +11,9 @@ PetscErrorCode SbImportForget(SbImport *import);
 PetscErrorCode SbImportNameGroup(SbImport *import, PetscInt dim, int64_t tag, const char *name);
 
 /* scan.c: reads an integer, as text or binary of 4 or 8 bytes; `what` describes it in error messages. */
-PetscErrorCode SbScanInt4(SbScan *scan, const char *what, int64_t *value);
-PetscErrorCode SbScanInt8(SbScan *scan, const char *what, int64_t *value);
+PetscErrorCode SbScanInt(SbScan *scan, int bytes, const char *what, int64_t *value);
+/* Reads the "number of <what>", in binary of 8 bytes; for the bytes of an item see SbScanRoom(). */
+PetscErrorCode SbScanCount(SbScan *scan, const char *what, int text_bytes, int binary_bytes, int64_t *n);
 
 /* Reads a file, or a mesh description `text`: sets x, vert_number, items and groups. */
 typedef PetscErrorCode (*SbReader)(const char *text, SbImport *body);
@@ -28,7 +30,8 @@ PetscErrorCode SbImportRead_UNV(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Box(const char *text, SbImport *body);
 PetscErrorCode SbImportRead_H5(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Xdmf(const char *path, SbImport *body);
-/* Reads block k of n of all arrays of an .h5 mesh file; SbImportSlabs_H5: its number of tets, 0 without error for other files. */
+/* Reads block k of n of all arrays of an .h5 mesh; SbImportSlabs_H5: its number of tets, 0 for other
+   files. */
 PetscErrorCode SbImportSlab_H5(const char *path, PetscInt k, PetscInt n, SbImport *body, SbSlabRows *rows);
 PetscErrorCode SbImportSlabs_H5(const char *path, PetscInt *ncell);
 
@@ -39,6 +42,8 @@ typedef struct {
   int dim, nnode;
 } SbGmshType;
 extern const SbGmshType SbGmshTypes[SB_GMSH_NTYPES];
+extern const char
+  *const SbGroupKinds[4]; /* by dimension: "point", "curve", ...; a group without a name is "curve_12" */
 /* Whether the element is a simplex of first or second order. */
 static inline PetscBool SbGmshIsSimplex(int type)
 {
@@ -46,18 +51,20 @@ static inline PetscBool SbGmshIsSimplex(int type)
                      type == SB_GMSH_TRIANGLE6 || type == SB_GMSH_LINE3);
 }
 
-/* Counts an element, and adds it if it is needed: a tet, a simplex in a group, or a triangle of a surface. Of second-order elements the corners are kept,
-   of a 10-node tet, vert[10] in gmsh's order, also the edge nodes. */
+/* Counts an element, and adds it if needed: a tet, a simplex in a group, a triangle of a surface. Of
+   second-order ones the corners are kept, of a 10-node tet, vert[10] in gmsh's order, also edge nodes. */
 PetscErrorCode SbImportAddElement(SbImport *import, int type, const PetscInt vert[], PetscInt tags,
                                   int64_t number);
 /*
-  SbImportCheckTypes - checks that all volume elements are tets of 4 or 10 nodes, and that there are tets (or triangles, for a surface).
+  SbImportCheckTypes - all volume elements must be tets of 4 or 10 nodes; there must be tets (surface: or
+  triangles).
 
   Not collective. Errors: PETSC_ERR_FILE_UNEXPECTED, whose message lists the elements.
 */
 PetscErrorCode SbImportCheckTypes(const SbImport *import);
 
-/* Position in gmsh's order of node k of a 10-node tet in the order of Abaqus, Nastran and VTK: the last two are exchanged. */
+/* Position in gmsh's order of node k of a 10-node tet of Abaqus, Nastran and VTK: the last two are
+   exchanged. */
 static inline int SbGmshNode(int k)
 {
   return k < 8 ? k : 17 - k;
@@ -90,7 +97,7 @@ typedef struct {
   SbCount nrange;
   SbDeckRange *range; /* [nrange] */
 } SbDeckSet;
-/* Contents of a file of labelled nodes and elements; zero-initialised except the first five members. Arrays are scratch memory of the reader, see SbImportScratch(). */
+/* A file of labelled nodes and elements; zero but for the first five members. Arrays: SbImportScratch(). */
 typedef struct {
   SbImport *im;
   int (*compare)(const char *, const char *); /* comparison of set names: strcmp() or strcasecmp() */
@@ -116,13 +123,15 @@ PetscErrorCode SbDeckFindSet(SbDeck *deck, PetscBool of_nodes, const char *name,
 PetscErrorCode SbDeckAddRange(SbDeck *deck, PetscInt set, int64_t first, int64_t last, int64_t step);
 /* Adds the members of the set `other` to a set. */
 PetscErrorCode SbDeckAddSet(SbDeck *deck, PetscInt set, PetscInt other);
-/* Converts the deck to vertices, items, and groups for SbImportJoinGroups(). Undefined members of sets are ignored, unless strict. */
+/* Converts the deck to vertices, items, and groups for SbImportJoinGroups(); undefined members: see
+   `strict`. */
 PetscErrorCode SbDeckBuild(SbDeck *deck);
-/* Finds the members of a set and of the sets that it contains, recursively, each set once; result in deck->found. */
+/* Finds the members of a set and of the sets in it, recursively, each once; result in deck->found. */
 PetscErrorCode SbDeckFind(SbDeck *deck, PetscInt set);
 
-/* ------------------------------------------------------------------ write_gmsh.c, write_h5.c: write one file directly to `path` */
+/* ------------------------------------------------------------------ write_gmsh.c, write_h5.c: one file */
 
+extern const char *const SbH5Items[4]; /* "point", "line", ..., as in /mesh/points and /mesh/point_tags */
 PetscErrorCode SbWrite_Gmsh(const SbImport *import, const char *path, SbMeshFormat format);
 PetscErrorCode SbWrite_H5(const SbImport *import, const char *path);
 /* Closes a file; an error if errno has been set since it was 0. */

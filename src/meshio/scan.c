@@ -1,8 +1,8 @@
 /*
   scan.c - scanner: a file is read into memory in one piece, then parsed token by token, as text or binary.
 
-  Every read is checked against the end of the file. Line numbers are counted only when an
-  error occurs. A number of items announced in a file is compared with the number that the rest of the file can hold before
+  Every read is checked against the end of the file. Line numbers are counted only when an error occurs. A
+  number of items announced in a file is compared with the number that the rest of the file can hold before
   memory is allocated.
 */
 #include <ctype.h>
@@ -66,14 +66,10 @@ PetscErrorCode SbScanClose(SbScan *s)
 
 const char *SbScanPosition(const SbScan *s, char position[64])
 {
-  size_t line = 1;
+  size_t n = 1;
 
-  if (s->bytes) {
-    (void)snprintf(position, 64, "byte %zu", (size_t)(s->token - s->data) + 1);
-    return position;
-  }
-  for (const char *p = s->data; p < s->token; p++) line += *p == '\n';
-  (void)snprintf(position, 64, "line %zu", line);
+  for (const char *p = s->data; p < s->token; p++) n += s->bytes || *p == '\n';
+  (void)snprintf(position, 64, "%s %zu", s->bytes ? "byte" : "line", n);
   return position;
 }
 
@@ -133,40 +129,35 @@ static inline PetscErrorCode take(SbScan *s, const char *what, size_t n, void *v
   if ((size_t)(s->end - s->at) < n)
     SB_SCAN_ERROR(s, "the file ends where the %s is expected; it is truncated, write or copy it again", what);
   memcpy(value, s->at, n);
-  if (s->swap) {
-    unsigned char *byte = (unsigned char *)value;
-
-    for (size_t i = 0; i < n / 2; i++) {
-      const unsigned char keep = byte[i];
-
-      byte[i] = byte[n - 1 - i];
-      byte[n - 1 - i] = keep;
-    }
-  }
+  for (size_t i = 0; s->swap && i < n; i++) ((char *)value)[i] = s->at[n - 1 - i];
   s->at += n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbScanInt4(SbScan *s, const char *what, int64_t *value)
+PetscErrorCode SbScanInt(SbScan *s, int bytes, const char *what, int64_t *value)
 {
   int32_t v = 0;
 
   PetscFunctionBeginUser;
-  if (s->binary) {
-    PetscCall(take(s, what, sizeof(v), &v));
-    *value = v;
-  } else
+  if (!s->binary)
     PetscCall(SbScanText(s, what, value));
+  else if (bytes == 8)
+    PetscCall(take(s, what, 8, value));
+  else {
+    PetscCall(take(s, what, 4, &v));
+    *value = v;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbScanInt8(SbScan *s, const char *what, int64_t *value)
+PetscErrorCode SbScanCount(SbScan *s, const char *what, int text_bytes, int binary_bytes, int64_t *n)
 {
+  char number[64];
+
   PetscFunctionBeginUser;
-  if (s->binary)
-    PetscCall(take(s, what, sizeof(*value), value));
-  else
-    PetscCall(SbScanText(s, what, value));
+  (void)snprintf(number, sizeof(number), "number of %s", what);
+  PetscCall(SbScanInt(s, 8, number, n));
+  PetscCall(SbScanRoom(s, what, *n, text_bytes, binary_bytes));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -279,22 +270,20 @@ PetscErrorCode SbScanType(SbScan *s, SbNumberType *type)
   static const struct {
     const char *name, *other;
     SbNumberType type;
-  } types[] = {
-    {"char", "int8", {'i', 1}},
-    {"uchar", "uint8", {'u', 1}},
-    {"short", "int16", {'i', 2}},
-    {"ushort", "uint16", {'u', 2}},
-    {"int", "int32", {'i', 4}},
-    {"uint", "uint32", {'u', 4}},
-    {"float", "float32", {'f', 4}},
-    {"double", "float64", {'f', 8}},
-    {"long", "vtktypeint64", {'i', 8}},
-    {"unsigned_char", "", {'u', 1}},
-    {"unsigned_short", "", {'u', 2}},
-    {"unsigned_int", "", {'u', 4}},
-    {"unsigned_long", "vtktypeuint64", {'u', 8}},
-    {"vtkidtype", "", {'i', 4}},
-  };
+  } types[] = {{"char", "int8", {'i', 1}},
+               {"uchar", "uint8", {'u', 1}},
+               {"short", "int16", {'i', 2}},
+               {"ushort", "uint16", {'u', 2}},
+               {"int", "int32", {'i', 4}},
+               {"uint", "uint32", {'u', 4}},
+               {"float", "float32", {'f', 4}},
+               {"double", "float64", {'f', 8}},
+               {"long", "vtktypeint64", {'i', 8}},
+               {"unsigned_char", "", {'u', 1}},
+               {"unsigned_short", "", {'u', 2}},
+               {"unsigned_int", "", {'u', 4}},
+               {"unsigned_long", "vtktypeuint64", {'u', 8}},
+               {"vtkidtype", "", {'i', 4}}};
   char word[32];
 
   PetscFunctionBeginUser;

@@ -9,29 +9,9 @@
 /* VTK's cell types, and gmsh's types. nnode 0: any number of nodes. */
 static const struct {
   int type, gmsh, nnode;
-} cells[] = {
-  {1, SB_GMSH_POINT, 1},
-  {2, SB_GMSH_POINT, 0},
-  {3, SB_GMSH_LINE, 2},
-  {4, SB_GMSH_LINE, 0},
-  {5, SB_GMSH_TRIANGLE, 3},
-  {8, 3, 4},
-  {9, 3, 4},
-  {10, SB_GMSH_TET, 4},
-  {11, 5, 8},
-  {12, 5, 8},
-  {13, 6, 6},
-  {14, 7, 5},
-  {21, 8, 3},
-  {22, 9, 6},
-  {23, 16, 8},
-  {24, 11, 10},
-  {25, 17, 20},
-  {26, 18, 15},
-  {27, 19, 13},
-  {28, 10, 9},
-  {29, 12, 27},
-};
+} cells[] = {{1, 15, 1},  {2, 15, 0},   {3, 1, 2},    {4, 1, 0},    {5, 2, 3},    {8, 3, 4},   {9, 3, 4},
+             {10, 4, 4},  {11, 5, 8},   {12, 5, 8},   {13, 6, 6},   {14, 7, 5},   {21, 8, 3},  {22, 9, 6},
+             {23, 16, 8}, {24, 11, 10}, {25, 17, 20}, {26, 18, 15}, {27, 19, 13}, {28, 10, 9}, {29, 12, 27}};
 
 /* Names of arrays that number regions, in order of preference. */
 static const char *const region_names[] = {
@@ -56,27 +36,6 @@ PetscErrorCode SbVtkSetPoints(PetscInt n, const double x[], SbImport *im)
 
 /* ------------------------------------------------------------------ cells */
 
-/* gmsh's type of a cell; an unknown type is an error. */
-static PetscErrorCode cell_type(SbScan *s, const SbVtkGrid *grid, PetscInt c, int64_t nnode, int *type)
-{
-  const double vtk = grid->type[c];
-
-  PetscFunctionBeginUser;
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cells); i++) {
-    if (vtk != cells[i].type) continue;
-    if (cells[i].nnode && nnode != cells[i].nnode)
-      SB_SCAN_ERROR(s, "cell %lld, of VTK's type %g, has %lld points; expected %d", (long long)c, vtk,
-                    (long long)nnode, cells[i].nnode);
-    *type = cells[i].gmsh;
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  SB_SCAN_ERROR(s,
-                "cell %lld is of VTK's type %g; supple simulates tetrahedra (type 10), with points, lines "
-                "and triangles for groups",
-                (long long)c, vtk);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
 {
   SbScan *s = &im->scan;
@@ -84,11 +43,10 @@ PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
   PetscBool use[SB_VTK_ARRAYS];
   PetscInt vert[10] = {0}, tags;
   double *sorted;
-  int regions, type, nuse = 0;
+  int regions = -1, type, nuse = 0;
 
   PetscFunctionBeginUser;
   // arrays that become groups, and the array of region numbers among them
-  regions = -1;
   PetscCall(PetscMalloc1(grid->ncell, &sorted));
   for (int a = 0; a < grid->narray; a++) {
     const double *value = grid->array[a].value;
@@ -106,23 +64,29 @@ PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
     nuse += use[a];
   }
   PetscCall(PetscFree(sorted));
-  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(region_names) && regions < 0; k++) {
-    for (int a = 0; a < grid->narray && regions < 0; a++) {
-      if (use[a] && !strcasecmp(grid->array[a].name, region_names[k])) regions = a;
-    }
-  }
-  for (int a = 0; a < grid->narray && nuse == 1; a++) {
-    if (use[a]) regions = a;
-  }
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(region_names) && regions < 0; k++)
+    for (int a = 0; a < grid->narray && regions < 0; a++)
+      if (use[a] && (nuse == 1 || !strcasecmp(grid->array[a].name, region_names[k]))) regions = a;
   for (PetscInt c = 0; c < grid->ncell; c++, begin = end) {
-    const double value = grid->end[c];
+    const double value = grid->end[c], vtk = grid->type[c];
+    size_t i = 0;
 
     // a cell has at least one point, and its end is in the list
     if (!(value > (double)begin && value <= (double)grid->nconnect) || value != PetscFloorReal(value))
       SB_SCAN_ERROR(s, "the points of cell %lld end at %g; expected a whole number above %lld, up to %lld",
                     (long long)c, value, (long long)begin, (long long)grid->nconnect);
     end = (int64_t)value;
-    PetscCall(cell_type(s, grid, c, end - begin, &type));
+    while (i < PETSC_STATIC_ARRAY_LENGTH(cells) && vtk != cells[i].type) i++;
+    if (i == PETSC_STATIC_ARRAY_LENGTH(cells))
+      SB_SCAN_ERROR(
+        s,
+        "cell %lld is of VTK's type %g; supple simulates tetrahedra (type 10), with points, lines "
+        "and triangles for groups",
+        (long long)c, vtk);
+    if (cells[i].nnode && end - begin != cells[i].nnode)
+      SB_SCAN_ERROR(s, "cell %lld, of VTK's type %g, has %lld points; expected %d", (long long)c, vtk,
+                    (long long)(end - begin), cells[i].nnode);
+    type = cells[i].gmsh;
     // points of the cell, checked
     for (int64_t k = 0; k < end - begin; k++) {
       const double point = grid->connect[begin + k];
@@ -135,21 +99,20 @@ PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
     // a simplex, but not a polyline or several points, gets a group from each array in use
     tags = 0;
     if (SbGmshIsSimplex(type) && end - begin == SbGmshTypes[type].nnode) {
-      int dim = SbGmshTypes[type].dim;
-      static const char *const kind[4] = {"point", "curve", "surface", "volume"};
+      const int dim = SbGmshTypes[type].dim;
       PetscInt group[SB_VTK_ARRAYS], n = 0;
 
       for (int a = 0; a < grid->narray; a++) {
         const PetscInt known = im->ngroup;
         const int64_t number = use[a] ? (int64_t)grid->array[a].value[c] : 0;
+        const PetscBool other = (PetscBool)(a != regions);
 
         if (!use[a]) continue;
         /* region numbers are unchanged; numbers of other arrays are shifted to be distinct */
-        PetscCall(
-          SbImportGroup(im, dim, a == regions ? number : number + ((int64_t)(a + 1) << 42), NULL, &group[n]));
+        PetscCall(SbImportGroup(im, dim, number + (other ? (int64_t)(a + 1) << 42 : 0), NULL, &group[n]));
         if (im->ngroup > known)
           (void)snprintf(im->group[group[n]].name, SB_GROUP_MAX, "%.40s%s%s_%lld",
-                         a == regions ? "" : grid->array[a].name, a == regions ? "" : "_", kind[dim],
+                         other ? grid->array[a].name : "", other ? "_" : "", SbGroupKinds[dim],
                          (long long)number);
         n++;
       }

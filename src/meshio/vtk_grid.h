@@ -7,7 +7,7 @@
 #define SB_VTK_ARRAYS 16    /* largest number of cell arrays that are examined */
 #define SB_VTK_REGIONS 1000 /* an array with more distinct values is not a region number */
 
-/* Cells of a grid. All numbers as double, exact for node indices. Arrays are scratch memory of the reader, see SbImportScratch(). */
+/* Cells of a grid. All numbers as double, exact for node indices. Arrays: SbImportScratch(). */
 typedef struct {
   PetscInt ncell;
   int64_t nconnect;
@@ -22,10 +22,10 @@ typedef struct {
 } SbVtkGrid;
 
 /*
-  SbVtkGridFill - adds the cells of a grid to a body that has its vertices; arrays of integers become groups. Not collective.
+  SbVtkGridFill - adds the cells of a grid to a body that has its vertices; arrays of integers become groups.
 
-  The array of region numbers (CellEntityIds, gmsh:physical, medit:ref, region, ...; or the only array) gives the groups volume_N, surface_N,
-  ...; each other array NAME_volume_N, ... Errors of a cell name the position import->scan.token.
+  The array of region numbers (CellEntityIds, gmsh:physical, medit:ref, ...; or the only array) gives the
+  groups volume_N, surface_N, ...; another one NAME_volume_N, ... Errors of a cell name import->scan.token.
 */
 PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im);
 /* Sets the vertices of the body from coordinates x[n][3]; an error names the index of an invalid one. */

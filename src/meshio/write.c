@@ -1,5 +1,5 @@
 /*
-  write.c - writes a mesh file in the format of its extension. A file is written under a temporary name and renamed when it is complete.
+  write.c - writes a mesh in the format of its extension, under a temporary name until it is complete.
 */
 #include <errno.h>
 #include <strings.h>
@@ -43,28 +43,27 @@ void SbMeshFileCount(const SbImport *im, PetscInt *nvert, PetscInt n[4])
 
 /* ------------------------------------------------------------------ writing */
 
-static PetscErrorCode move_to(const char *from, const char *to)
+/* Renames a file that has been written, or removes it after an error. */
+static PetscErrorCode finish(PetscErrorCode ierr, const char *part, const char *path)
 {
-  PetscFunctionBeginUser;
-  if (rename(from, to)) {
-    const int error = errno;
+  const int failed = !ierr && rename(part, path) ? errno : 0;
 
-    (void)unlink(from);
-    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", to, strerror(error));
-  }
+  PetscFunctionBeginUser;
+  if (ierr || failed) (void)unlink(part);
+  PetscCall(ierr);
+  PetscCheck(!failed, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path,
+             strerror(failed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbMeshFileWrite(const SbImport *im, const char *path, SbMeshFormat format)
 {
   char part[PETSC_MAX_PATH_LEN + 32], index[PETSC_MAX_PATH_LEN + 8];
-  PetscErrorCode ierr;
-  const char *dot;
+  const char *dot = strrchr(path, '.');
 
   PetscFunctionBeginUser;
   // format by the extension of the name
   if (format == SB_MESH_AUTO) {
-    dot = strrchr(path, '.');
     if (dot && !strcasecmp(dot, ".msh"))
       format = SB_MESH_MSH41;
     else if (dot && !strcasecmp(dot, ".h5"))
@@ -74,19 +73,12 @@ PetscErrorCode SbMeshFileWrite(const SbImport *im, const char *path, SbMeshForma
               path);
   }
   (void)snprintf(part, sizeof(part), "%s.part", path);
-  ierr = format == SB_MESH_H5 ? SbWrite_H5(im, part) : SbWrite_Gmsh(im, part, format);
-  if (ierr) (void)unlink(part);
-  PetscCall(ierr);
-  PetscCall(move_to(part, path));
+  PetscCall(finish(format == SB_MESH_H5 ? SbWrite_H5(im, part) : SbWrite_Gmsh(im, part, format), part, path));
   if (format != SB_MESH_H5) PetscFunctionReturn(PETSC_SUCCESS);
   // mesh.h5 -> mesh.xmf, for ParaView
-  dot = strrchr(path, '.');
   (void)snprintf(index, sizeof(index), "%.*s.xmf",
                  (int)(dot && !strchr(dot, '/') ? dot - path : (ptrdiff_t)strlen(path)), path);
   (void)snprintf(part, sizeof(part), "%s.part", index);
-  ierr = SbWrite_Xdmf(im, part, path);
-  if (ierr) (void)unlink(part);
-  PetscCall(ierr);
-  PetscCall(move_to(part, index));
+  PetscCall(finish(SbWrite_Xdmf(im, part, path), part, index));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

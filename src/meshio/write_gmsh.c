@@ -1,12 +1,13 @@
 /*
-  write_gmsh.c - writer of gmsh's .msh files, versions 4.1 and 2.2, text and binary (gmsh reference manual, "File formats").
+  write_gmsh.c - writer of gmsh's .msh files, versions 4.1 and 2.2, text and binary (gmsh manual, "File
+  formats").
 
-  Version 4.1 assigns groups to entities of the geometry: each tag set of a dimension becomes one entity, and all nodes
-  belong to the first entity of the highest dimension. Blocks follow the order of the items, and a new one begins where the tag set
-  changes: reading the file gives the same order. Version 2.2 has one group per element: an element of several groups is
-  written once for each; supple's reader merges them.
+  Version 4.1 assigns groups to entities of the geometry: each tag set of a dimension becomes one entity, and
+  all nodes belong to the first entity of the highest dimension. Blocks follow the order of the items, and a
+  new one begins where the tag set changes: reading the file gives the same order. Version 2.2 has one group
+  per element: an element of several groups is written once for each; supple's reader merges them.
 
-  A mesh with curved edges is written as a second-order mesh: every edge of an item has a node, numbered after the vertices.
+  A mesh with curved edges is written as one of second order: every edge has a node, after the vertices.
 
   Numbers count from 1. A double is written as text with 17 digits, so that it is read back exactly.
 */
@@ -36,35 +37,20 @@ static const int nedge_of[4] = {0, 1, 3, 6}, edge_of[6][2] = {{0, 1}, {1, 2}, {2
 
 /* ------------------------------------------------------------------ numbers */
 
-/* Writes a non-negative integer and a separator; fprintf() takes four times as long. */
-static void put_text(FILE *file, int64_t value, char after)
-{
-  char digits[24], *p = digits + sizeof(digits);
-
-  *--p = after;
-  do *--p = (char)('0' + value % 10);
-  while (value /= 10);
-  (void)fwrite(p, 1, (size_t)(digits + sizeof(digits) - p), file);
-}
-
-static void put_int(Out *out, int64_t value, char after)
+/* Writes an integer: text and a separator, or 4 or 8 bytes; fprintf() takes four times as long. */
+static void put(Out *out, int bytes, int64_t value, char after)
 {
   const int32_t small = (int32_t)value;
+  char digits[24], *p = digits + sizeof(digits);
 
   if (out->binary)
-    (void)fwrite(&small, 4, 1, out->file);
-  else if (value < 0)
-    (void)fprintf(out->file, "%lld%c", (long long)value, after);
-  else
-    put_text(out->file, value, after);
-}
-
-static void put_size(Out *out, int64_t value, char after)
-{
-  if (out->binary)
-    (void)fwrite(&value, 8, 1, out->file);
-  else
-    put_text(out->file, value, after);
+    (void)fwrite(bytes == 8 ? (const void *)&value : &small, (size_t)bytes, 1, out->file);
+  else {
+    *--p = after;
+    do *--p = (char)('0' + value % 10);
+    while (value /= 10);
+    (void)fwrite(p, 1, (size_t)(digits + sizeof(digits) - p), out->file);
+  }
 }
 
 static void put_real(Out *out, PetscReal value, char after)
@@ -88,15 +74,15 @@ static PetscErrorCode report_progress(Out *out)
 /* ------------------------------------------------------------------ nodes */
 
 /* Writes the nodes of an item of dimension d. */
-static void put_nodes(Out *out, int d, const PetscInt v[], void (*put)(Out *, int64_t, char))
+static void put_nodes(Out *out, int d, const PetscInt v[], int bytes)
 {
   const int nedge = out->edges.nedge ? nedge_of[d] : 0;
 
-  for (int a = 0; a <= d; a++) (*put)(out, v[a] + 1, a < d || nedge ? ' ' : '\n');
+  for (int a = 0; a <= d; a++) put(out, bytes, v[a] + 1, a < d || nedge ? ' ' : '\n');
   for (int e = 0; e < nedge; e++) {
     const PetscInt at = SbImportEdgesFind(&out->edges, v[edge_of[e][0]], v[edge_of[e][1]]);
 
-    (*put)(out, out->im->nvert + at + 1, e + 1 < nedge ? ' ' : '\n');
+    put(out, bytes, out->im->nvert + at + 1, e + 1 < nedge ? ' ' : '\n');
   }
 }
 
@@ -105,10 +91,10 @@ static void put_nodes(Out *out, int d, const PetscInt v[], void (*put)(Out *, in
 /* Whether the name of a group differs from the default for its number. */
 static PetscBool has_name(const Out *out, PetscInt g)
 {
-  static const char *const kind[4] = {"point", "curve", "surface", "volume"};
   char text[SB_GROUP_MAX];
 
-  (void)snprintf(text, sizeof(text), "%s_%lld", kind[out->im->group[g].dim], (long long)out->number[g]);
+  (void)snprintf(text, sizeof(text), "%s_%lld", SbGroupKinds[out->im->group[g].dim],
+                 (long long)out->number[g]);
   return (PetscBool)(strcmp(text, out->im->group[g].name) != 0);
 }
 
@@ -155,11 +141,11 @@ static void write_entity(Out *out, int dim, PetscInt tags)
   }
   for (int i = 0; i < 6; i++)
     if (box[i] == PETSC_MAX_REAL || box[i] == PETSC_MIN_REAL) box[i] = 0;
-  put_int(out, tags + 1, ' ');
+  put(out, 4, tags + 1, ' ');
   for (int i = 0; i < (dim ? 6 : 3); i++) put_real(out, box[i], ' ');
-  put_size(out, count_groups(im, tags, dim), ' ');
-  while ((g = next_group(im, tags, dim, &k)) >= 0) put_int(out, out->number[g], ' ');
-  if (dim) put_size(out, 0, ' ');
+  put(out, 8, count_groups(im, tags, dim), ' ');
+  while ((g = next_group(im, tags, dim, &k)) >= 0) put(out, 4, out->number[g], ' ');
+  if (dim) put(out, 8, 0, ' ');
   if (!out->binary) (void)fputc('\n', out->file);
 }
 
@@ -183,25 +169,25 @@ static PetscErrorCode write_elements_41(Out *out)
     for (PetscInt i = 0; i < item->n; i += run_length(item, i)) nrun++;
   }
   (void)fprintf(out->file, "$Elements\n");
-  put_size(out, nrun, ' ');
-  put_size(out, out->total, ' ');
-  put_size(out, 1, ' ');
-  put_size(out, out->total, '\n');
+  put(out, 8, nrun, ' ');
+  put(out, 8, out->total, ' ');
+  put(out, 8, 1, ' ');
+  put(out, 8, out->total, '\n');
   for (int d = 0; d < 4; d++) {
     const SbItems *item = &out->im->item[d];
 
     for (PetscInt i = 0, n; i < item->n; i += n) {
       n = run_length(item, i);
       // a block of items of one tag set
-      put_int(out, d, ' ');
-      put_int(out, item->tags[i] + 1, ' ');
-      put_int(out, gmsh_type[out->edges.nedge > 0][d], ' ');
-      put_size(out, n, '\n');
+      put(out, 4, d, ' ');
+      put(out, 4, item->tags[i] + 1, ' ');
+      put(out, 4, gmsh_type[out->edges.nedge > 0][d], ' ');
+      put(out, 8, n, '\n');
       for (PetscInt k = i; k < i + n; k++) {
         const PetscInt *v = item->vert + (size_t)(d + 1) * (size_t)k;
 
-        put_size(out, number++, ' ');
-        put_nodes(out, d, v, put_size);
+        put(out, 8, number++, ' ');
+        put_nodes(out, d, v, 8);
         PetscCall(report_progress(out));
       }
     }
@@ -226,26 +212,21 @@ static PetscErrorCode write_elements_22(Out *out)
   (void)fprintf(out->file, "$Elements\n%lld\n", (long long)n);
   for (int d = 0; d < 4; d++) {
     for (PetscInt i = 0; i < im->item[d].n; i++) {
-      const SbItems *item = &out->im->item[d];
-      const PetscInt *v;
-      PetscInt k, g;
+      const PetscInt *v = im->item[d].vert + (size_t)(d + 1) * (size_t)i, tags = im->item[d].tags[i];
+      PetscInt k = im->tags_start[tags], g = next_group(im, tags, d, &k);
 
-      /* an element, once for each of its groups; without groups once with group 0. In binary each element has a
-         header */
-      v = item->vert + (size_t)(d + 1) * (size_t)i;
-      k = out->im->tags_start[item->tags[i]];
-      g = next_group(out->im, item->tags[i], d, &k);
+      // an element, once for each of its groups, or once with group 0. In binary each has a header
       do {
-        if (!out->binary) put_int(out, number, ' ');
-        put_int(out, gmsh_type[out->edges.nedge > 0][d], ' ');
-        if (out->binary) put_int(out, 1, ' ');
-        put_int(out, 2, ' ');
-        if (out->binary) put_int(out, number, ' ');
-        put_int(out, g < 0 ? 0 : out->number[g], ' ');
-        put_int(out, item->tags[i] + 1, ' ');
-        put_nodes(out, d, v, put_int);
+        if (!out->binary) put(out, 4, number, ' ');
+        put(out, 4, gmsh_type[out->edges.nedge > 0][d], ' ');
+        if (out->binary) put(out, 4, 1, ' ');
+        put(out, 4, 2, ' ');
+        if (out->binary) put(out, 4, number, ' ');
+        put(out, 4, g < 0 ? 0 : out->number[g], ' ');
+        put(out, 4, tags + 1, ' ');
+        put_nodes(out, d, v, 4);
         number++;
-        g = g < 0 ? -1 : next_group(out->im, item->tags[i], d, &k);
+        g = g < 0 ? -1 : next_group(im, tags, d, &k);
       } while (g >= 0);
       PetscCall(report_progress(out));
     }
@@ -272,16 +253,15 @@ static PetscErrorCode write_all(Out *out, PetscBool version22)
   // names of the groups, except default names
   for (PetscInt g = 0; g < im->ngroup; g++) nname += has_name(out, g);
   if (nname) (void)fprintf(out->file, "$PhysicalNames\n%lld\n", (long long)nname);
-  for (PetscInt g = 0; g < im->ngroup; g++) {
+  for (PetscInt g = 0; g < im->ngroup; g++)
     if (has_name(out, g))
       (void)fprintf(out->file, "%d %lld \"%s\"\n", (int)im->group[g].dim, (long long)out->number[g],
                     im->group[g].name);
-  }
   if (nname) (void)fprintf(out->file, "$EndPhysicalNames\n");
   if (version22) {
     (void)fprintf(out->file, "$Nodes\n%lld\n", (long long)out->nnode);
     for (PetscInt v = 0; v < out->nnode; v++) {
-      put_int(out, v + 1, ' ');
+      put(out, 4, v + 1, ' ');
       for (int i = 0; i < 3; i++) put_real(out, out->x[3 * v + i], i < 2 ? ' ' : '\n');
     }
     (void)fprintf(out->file, "%s$EndNodes\n", out->binary ? "\n" : "");
@@ -293,22 +273,22 @@ static PetscErrorCode write_all(Out *out, PetscBool version22)
     for (int d = 0; d < 4; d++)
       for (PetscInt t = 0; t < im->ntags; t++) n[d] += out->used[d][t];
     (void)fprintf(out->file, "$Entities\n");
-    for (int d = 0; d < 4; d++) put_size(out, n[d], d < 3 ? ' ' : '\n');
+    for (int d = 0; d < 4; d++) put(out, 8, n[d], d < 3 ? ' ' : '\n');
     for (int d = 0; d < 4; d++)
       for (PetscInt t = 0; t < im->ntags; t++)
         if (out->used[d][t]) write_entity(out, d, t);
     (void)fprintf(out->file, "%s$EndEntities\n", out->binary ? "\n" : "");
     // one block of nodes: all numbers, then all coordinates
     (void)fprintf(out->file, "$Nodes\n");
-    put_size(out, 1, ' ');
-    put_size(out, out->nnode, ' ');
-    put_size(out, 1, ' ');
-    put_size(out, out->nnode, '\n');
-    put_int(out, out->home_dim, ' ');
-    put_int(out, out->home + 1, ' ');
-    put_int(out, 0, ' ');
-    put_size(out, out->nnode, '\n');
-    for (PetscInt v = 0; v < out->nnode; v++) put_size(out, v + 1, '\n');
+    put(out, 8, 1, ' ');
+    put(out, 8, out->nnode, ' ');
+    put(out, 8, 1, ' ');
+    put(out, 8, out->nnode, '\n');
+    put(out, 4, out->home_dim, ' ');
+    put(out, 4, out->home + 1, ' ');
+    put(out, 4, 0, ' ');
+    put(out, 8, out->nnode, '\n');
+    for (PetscInt v = 0; v < out->nnode; v++) put(out, 8, v + 1, '\n');
     for (PetscInt v = 0; v < out->nnode; v++)
       for (int i = 0; i < 3; i++) put_real(out, out->x[3 * v + i], i < 2 ? ' ' : '\n');
     (void)fprintf(out->file, "%s$EndNodes\n", out->binary ? "\n" : "");
@@ -332,27 +312,25 @@ PetscErrorCode SbWrite_Gmsh(const SbImport *im, const char *path, SbMeshFormat f
 {
   const PetscBool version22 = (PetscBool)(format == SB_MESH_MSH22 || format == SB_MESH_MSH22_BINARY);
   int64_t highest[4] = {0, 0, 0, 0};
-  Out out;
+  Out out = {.im = im,
+             .home_dim = 3,
+             .binary = (PetscBool)(format == SB_MESH_MSH41_BINARY || format == SB_MESH_MSH22_BINARY)};
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&out, sizeof(out)));
-  out.im = im;
-  out.binary = (PetscBool)(format == SB_MESH_MSH41_BINARY || format == SB_MESH_MSH22_BINARY);
   out.file = fopen(path, "wb");
   PetscCheck(out.file, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path,
              strerror(errno));
   (void)setvbuf(out.file, NULL, _IOFBF, 1 << 20);
   // tag sets of each dimension; nodes belong to the first entity of the highest dimension
-  out.home_dim = 3;
   for (int d = 0; d < 4; d++) {
-    PetscCall(PetscCalloc1(out.im->ntags, &out.used[d]));
-    for (PetscInt i = 0; i < out.im->item[d].n; i++) out.used[d][out.im->item[d].tags[i]] = PETSC_TRUE;
-    if (out.im->item[d].n) {
+    PetscCall(PetscCalloc1(im->ntags, &out.used[d]));
+    for (PetscInt i = 0; i < im->item[d].n; i++) out.used[d][im->item[d].tags[i]] = PETSC_TRUE;
+    if (im->item[d].n) {
       out.home_dim = d;
-      out.home = out.im->item[d].tags[0];
+      out.home = im->item[d].tags[0];
     }
-    out.total += out.im->item[d].n;
+    out.total += im->item[d].n;
   }
   // group numbers from 1 to INT32_MAX are kept; others are invalid in gmsh and get the next free numbers
   PetscCall(PetscMalloc1(im->ngroup, &out.number));

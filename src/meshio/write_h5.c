@@ -1,14 +1,13 @@
 /*
-  write_h5.c - writer of supple's own mesh file, HDF5, and its .xmf file for ParaView. The layout is described in docs/reference/meshes.md.
+  write_h5.c - writer of supple's own mesh, HDF5, and its .xmf for ParaView. Layout: docs/reference/meshes.md.
 
-    /                attribute supple_mesh: version of the layout, 1; 2 with curved edges
-    /mesh/x          [nvert][3]   double   coordinates
-    /mesh/cells      [ntet][4]    int32    vertices, from 0
-    /mesh/cell_tags  [ntet]       int32    tag set of each tet
-    /mesh/triangles  [n][3], /mesh/triangle_tags [n]; lines [n][2], line_tags; points [n][1], point_tags
-    /mesh/curved_edges [n][2] int32: vertices of curved edges; /mesh/edge_offsets [n][3] double: offset of the edge node from the midpoint
-    /groups/name     [ngroup] text, /groups/dim [ngroup] int32, /groups/number [ngroup] int64
-    /tag_sets/start  [nset + 1] int32, /tag_sets/group: groups of set k are group[start[k]] .. group[start[k + 1] - 1]
+    /                attribute supple_mesh: version of the layout, 1; 2 with curved edges /mesh/x
+    [nvert][3]   double   coordinates /mesh/cells      [ntet][4]    int32    vertices, from 0 /mesh/cell_tags
+    [ntet]       int32    tag set of each tet /mesh/triangles  [n][3], /mesh/triangle_tags [n]; lines [n][2],
+    line_tags; points [n][1], point_tags /mesh/curved_edges [n][2] int32: vertices of curved edges;
+    /mesh/edge_offsets [n][3] double: offset of the edge node from the midpoint /groups/name     [ngroup]
+    text, /groups/dim [ngroup] int32, /groups/number [ngroup] int64 /tag_sets/start  [nset + 1] int32,
+    /tag_sets/group: groups of set k are group[start[k]] .. group[start[k + 1] - 1]
 
   Written by one rank in one piece, without compression: reading is limited by the disk only.
 */
@@ -16,6 +15,8 @@
 #include <stdarg.h>
 #include <hdf5.h>
 #include "meshio_impl.h"
+
+const char *const SbH5Items[4] = {"point", "line", "triangle", "cell"};
 
 /* An open file; remembers the first failed call. */
 typedef struct {
@@ -50,17 +51,10 @@ static void write_ints(H5 *h, const char *name, int ncomp, size_t n, const Petsc
               data);
 }
 
-static void make_group(H5 *h, const char *name)
-{
-  const hid_t group = keep(h, H5Gcreate2(h->file, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
-
-  if (group >= 0) (void)H5Gclose(group);
-}
-
 PetscErrorCode SbWrite_H5(const SbImport *im, const char *path)
 {
+  static const char *const groups[3] = {"/mesh", "/groups", "/tag_sets"};
   H5 h = {-1, PETSC_FALSE};
-  static const char *const name[4] = {"point", "line", "triangle", "cell"};
   char array[64];
   const int version = im->nmiddle.n ? 2 : 1;
   hid_t space, mark;
@@ -84,18 +78,20 @@ PetscErrorCode SbWrite_H5(const SbImport *im, const char *path)
   (void)keep(&h, H5Awrite(mark, H5T_NATIVE_INT, &version));
   if (mark >= 0) (void)H5Aclose(mark);
   if (space >= 0) (void)H5Sclose(space);
-  make_group(&h, "/mesh");
-  make_group(&h, "/groups");
-  make_group(&h, "/tag_sets");
+  for (int k = 0; k < 3; k++) {
+    const hid_t group = keep(&h, H5Gcreate2(h.file, groups[k], H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+
+    if (group >= 0) (void)H5Gclose(group);
+  }
   write_array(&h, "/mesh/x", 3, (size_t)im->nvert, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, im->x);
   // simplices and their tag sets
   for (int d = 3; d >= 0; d--) {
     const SbItems *item = &im->item[d];
 
     if (!item->n && d < 3) continue;
-    (void)snprintf(array, sizeof(array), "/mesh/%ss", name[d]);
+    (void)snprintf(array, sizeof(array), "/mesh/%ss", SbH5Items[d]);
     write_ints(&h, array, d + 1, (size_t)item->n, item->vert);
-    (void)snprintf(array, sizeof(array), "/mesh/%s_tags", name[d]);
+    (void)snprintf(array, sizeof(array), "/mesh/%s_tags", SbH5Items[d]);
     write_ints(&h, array, 1, (size_t)item->n, item->tags);
   }
   // curved edges
@@ -154,7 +150,6 @@ static void write_grid(FILE *file, const SbImport *im, int dim, const char *h5)
   static const char *const grid[4] = {"points", "lines", "surface", "tets"};
   static const char *const kind[4] = {"Polyvertex\" NodesPerElement=\"1", "Polyline\" NodesPerElement=\"2",
                                       "Triangle", "Tetrahedron"};
-  static const char *const name[4] = {"point", "line", "triangle", "cell"};
   const PetscInt n = im->item[dim].n;
 
   (void)fprintf(
@@ -162,11 +157,11 @@ static void write_grid(FILE *file, const SbImport *im, int dim, const char *h5)
     "<Grid Name=\"%s\" GridType=\"Uniform\">\n<Topology TopologyType=\"%s\" NumberOfElements=\"%" PetscInt_FMT
     "\">",
     grid[dim], kind[dim], n);
-  SbXdmfArray(file, n, dim + 1, "Int", 4, "%s:/mesh/%ss", h5, name[dim]);
+  SbXdmfArray(file, n, dim + 1, "Int", 4, "%s:/mesh/%ss", h5, SbH5Items[dim]);
   (void)fputs("</Topology>\n<Geometry GeometryType=\"XYZ\">", file);
   SbXdmfArray(file, im->nvert, 3, "Float", 8, "%s:/mesh/x", h5);
   (void)fputs("</Geometry>\n<Attribute Name=\"tag_set\" AttributeType=\"Scalar\" Center=\"Cell\">", file);
-  SbXdmfArray(file, n, 1, "Int", 4, "%s:/mesh/%s_tags", h5, name[dim]);
+  SbXdmfArray(file, n, 1, "Int", 4, "%s:/mesh/%s_tags", h5, SbH5Items[dim]);
   (void)fputs("</Attribute>\n</Grid>\n", file);
 }
 
@@ -183,16 +178,9 @@ PetscErrorCode SbWrite_Xdmf(const SbImport *im, const char *path, const char *h5
   for (PetscInt t = 1; t < im->ntags; t++) {
     (void)fprintf(file, "<Information Name=\"tag_set %d\" Value=\"", (int)t);
     for (PetscInt k = im->tags_start[t]; k < im->tags_start[t + 1]; k++) {
-      const char *text;
-
       if (k > im->tags_start[t]) (void)fprintf(file, ", ");
-      text = im->group[im->tags_group[k]].name;
-      for (; *text; text++) {
-        if (strchr("<>&\"", *text))
-          (void)fprintf(file, "&#%d;", *text);
-        else
-          (void)fputc(*text, file);
-      }
+      for (const char *text = im->group[im->tags_group[k]].name; *text; text++)
+        (void)fprintf(file, strchr("<>&\"", *text) ? "&#%d;" : "%c", *text);
     }
     (void)fprintf(file, "\"/>\n");
   }

@@ -355,7 +355,7 @@ static PetscErrorCode test_damage(void)
   PetscCall(
     with_array(path, "/mesh/cell_tags", 1, tets, H5T_NATIVE_INT, tags, "/mesh/cell_tags|4711|row 48"));
   PetscCall(with_array(path, "/groups/dim", 1, groups, H5T_NATIVE_INT, high, "/groups/dim|4|row 5|0|3"));
-  PetscCall(with_array(path, "/groups/dim", 1, two, H5T_NATIVE_INT, high, "2 dimensions"));
+  PetscCall(with_array(path, "/groups/dim", 1, two, H5T_NATIVE_INT, high, "/groups/dim|2 rows"));
   PetscCall(with_array(path, "/tag_sets/start", 1, two, H5T_NATIVE_INT, falling, "/tag_sets/start|1|0"));
   PetscCall(with_array(path, "/groups/name", 0, NULL, 0, NULL, "/groups/name"));
   PetscCall(remove_all(path));
@@ -377,7 +377,7 @@ static PetscErrorCode test_curved_damage(void)
     {2, -1, -1, {{0}}, {{0}}, "layout 2|/mesh/curved_edges", NULL},
     {2, 1, -1, {{0, 7}}, {{0}}, "layout 2|/mesh/edge_offsets", NULL},
     {2, -1, 1, {{0}}, {{0.1}}, "layout 2|/mesh/curved_edges", NULL},
-    {2, 2, 3, {{0, 7}, {0, 1}}, {{0.1}, {0.1}, {0.1}}, "/mesh/edge_offsets|3 rows|2 edges", NULL},
+    {2, 2, 3, {{0, 7}, {0, 1}}, {{0.1}, {0.1}, {0.1}}, "/mesh/edge_offsets|3 rows|2 are", NULL},
     {2, 2, 2, {{0, 7}, {0, 10}}, {{0.1}, {0.1}}, "/mesh/curved_edges|holds 10|row 2|from 0 to 9", NULL},
     {2, 2, 2, {{-1, 7}, {0, 1}}, {{0.1}, {0.1}}, "/mesh/curved_edges|holds -1|row 1|from 0 to 9", NULL},
     {2, 3, 3, {{0, 7}, {0, 1}, {4, 4}}, {{0.1}, {0.1}, {0}}, "/mesh/curved_edges|holds 4 twice|row 3", NULL},

@@ -127,25 +127,25 @@ static PetscBool among(const char *name, const char *list)
 /* Every option of the output belongs to a part. */
 static PetscErrorCode check_output_rows(void)
 {
-  const SbOptionBlock *block = part_output_block();
+  PetscInt n, nrow;
+  const SbOptionRow *rows = part_output_rows(&nrow);
   static char names[PART_NAMES][SB_NAME_MAX];
-  PetscInt n;
 
   PetscFunctionBeginUser;
-  SB_CHECK(block, "the option table has no -output_dir");
+  SB_CHECK(rows, "the option table has no -output_dir");
   PetscCall(part_names("output", &n, names));
-  for (PetscInt i = 0; block && i < block->n; i++) {
-    const char *part = NULL;
+  for (PetscInt i = 0; i < nrow; i++) {
+    const char *key = rows[i].row->key, *part = NULL;
     PetscBool known = PETSC_FALSE;
 
     for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(part_options); k++) {
-      if (!strcmp(part_options[k].key, block->rows[i].key)) part = part_options[k].part;
+      if (!strcmp(part_options[k].key, key)) part = part_options[k].part;
     }
     SB_CHECK(part, "-%s has no row in part_options of tests/parts.h: say which output it names or changes",
-             block->rows[i].key);
+             key);
     for (PetscInt k = 0; part && k < n; k++) known = (PetscBool)(known || !strcmp(names[k], part));
-    SB_CHECK(!part || !part[0] || known, "-%s belongs to '%s', which has no row in tests/parts.h",
-             block->rows[i].key, part ? part : "");
+    SB_CHECK(!part || !part[0] || known, "-%s belongs to '%s', which has no row in tests/parts.h", key,
+             part ? part : "");
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
