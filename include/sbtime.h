@@ -166,9 +166,9 @@ struct _p_SbRun {
   PetscReal good_steps; /* dynamic: steps accepted since one was shortened, or they became longer again */
   PetscInt newton_before, linear_before; /* of the runs before a re-meshing */
   PetscReal wall_start, seconds_solve;
-  PetscReal dt, t_end; /* length of a step (the first one when adaptive) and end, s */
-  PetscInt newton_step, linear_step, rejected_step; /* iterations and rejections of the current step */
-  PetscInt rejected_seen;
+  PetscReal dt, t_end;               /* length of a step (the first one when adaptive) and end, s */
+  PetscInt newton_step, linear_step; /* iterations of the current step */
+  PetscInt rejected_seen;            /* rejections up to the last step */
   Vec loads, reaction,
     previous; /* f_ext, residual and displacement of the last step, for works; only with want_energies */
   PetscReal damping_power;                     /* at the last step, W */
@@ -194,8 +194,6 @@ SbRunSetUp(SbRun run); /* after SbModelSetUp(): vectors, matrix, solver, integra
 PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx);
 /* From now on SIGTERM, SIGINT and SIGUSR1 end the run after its step: SbRun.stopped. A second SIGINT ends the process. One run at a time. */
 PetscErrorCode SbRunCatchSignals(SbRun run);
-/* After SbRunSetUp(). */
-void SbRunSetPause(SbRun run, SbPauseFn fn, void *ctx);
 /*
   SbRunTransferState - continues the run `from` as the run `to` of a re-meshed model. Collective.
 

@@ -84,22 +84,6 @@ PetscBool SbTetCurvedBarycentric(const PetscReal x[], const PetscInt v[4], const
   return PETSC_FALSE;
 }
 
-/* Barycentric coordinates of a point in a curved tet near the closest one to p; returns the squared distance. */
-static PetscReal find_curved(SbLocator l, PetscInt cell, const PetscReal off[18], const PetscReal p[3],
-                             PetscReal w[4], PetscReal *depth)
-{
-  const PetscBool found = SbTetCurvedBarycentric(l->x, l->cell + 4 * cell, off, p, w);
-  PetscReal node[SB_CELL_NODES][3], r[3], sum = 0;
-
-  *depth = PetscMin(PetscMin(w[0], w[1]), PetscMin(w[2], w[3]));
-  if (found && *depth >= 0) return 0;
-  for (int a = 0; a < 4; a++) sum += w[a] = PetscIsInfOrNanReal(w[a]) ? 1 : PetscMax(w[a], 0);
-  for (int a = 0; a < 4; a++) w[a] /= sum;
-  SbTetNodes(l->x, l->cell + 4 * cell, off, node);
-  remainder_at((const PetscReal(*)[3])node, p, w, r);
-  return SbDot3(r, r);
-}
-
 PetscErrorCode SbLocatorCreate(PetscInt ncell, const PetscInt cell[], const PetscReal x[],
                                const PetscReal edge_off[], SbLocator *locator)
 {
@@ -166,22 +150,28 @@ PetscReal SbLocatorFind(SbLocator l, const PetscReal p[3], PetscInt *cell, Petsc
   for (int a = 0; a < 4; a++) weight[a] = 0;
   for (SbBoxNearestBegin(&l->tree, box, PETSC_MAX_REAL, &nearest); SbBoxNearestNext(&nearest, &c);) {
     const PetscReal *off = off_of(l, c);
-    PetscReal w[4], depth, sum = 0, d2 = 0;
+    const PetscInt *v = l->cell + 4 * c;
+    PetscReal w[4], node[SB_CELL_NODES][3], r[3], depth, sum = 0, d2 = 0;
+    PetscBool found = PETSC_TRUE;
 
-    // nearest tet: clip the coordinates of points outside
-    SbTetBarycentric(l->x, l->cell + 4 * c, p, w);
-    depth = PetscMin(PetscMin(w[0], w[1]), PetscMin(w[2], w[3]));
     if (off)
-      d2 = find_curved(l, c, off, p, w, &depth);
-    else if (depth < 0) {
-      for (int a = 0; a < 4; a++) sum += w[a] = PetscMax(w[a], 0);
+      found = SbTetCurvedBarycentric(l->x, v, off, p, w);
+    else
+      SbTetBarycentric(l->x, v, p, w);
+    depth = PetscMin(PetscMin(w[0], w[1]), PetscMin(w[2], w[3]));
+    if (!found || depth < 0) {
+      // outside: the place of the clipped coordinates, near the closest one
+      for (int a = 0; a < 4; a++) sum += w[a] = PetscIsInfOrNanReal(w[a]) ? 1 : PetscMax(w[a], 0);
       for (int a = 0; a < 4; a++) w[a] /= sum;
-      for (int k = 0; k < 3; k++) {
-        PetscReal r = p[k];
-
-        for (int a = 0; a < 4; a++) r -= w[a] * l->x[3 * l->cell[4 * c + a] + k];
-        d2 += r * r;
+      for (int k = 0; k < 3 && !off; k++) {
+        r[k] = p[k];
+        for (int a = 0; a < 4; a++) r[k] -= w[a] * l->x[3 * v[a] + k];
       }
+      if (off) {
+        SbTetNodes(l->x, v, off, node);
+        remainder_at((const PetscReal(*)[3])node, p, w, r);
+      }
+      d2 = SbDot3(r, r);
     }
     if (d2 > nearest.limit2) continue;
     if (*cell >= 0 && d2 == nearest.limit2 && (depth < deepest || (depth == deepest && c > *cell))) continue;

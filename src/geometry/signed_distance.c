@@ -40,9 +40,7 @@ PetscErrorCode SbSignedDistanceCreate(PetscInt nvert, const PetscReal x[], Petsc
   for (PetscInt f = 0; f < ntri; f++) {
     PetscReal e[3][3], c[3], length, *n = s->normal + 3 * f;
 
-    for (int k = 0; k < 3; k++) {
-      for (int i = 0; i < 3; i++) e[k][i] = x[3 * tri[3 * f + (k + 1) % 3] + i] - x[3 * tri[3 * f + k] + i];
-    }
+    for (int k = 0; k < 3; k++) SbSubtract(x + 3 * tri[3 * f + (k + 1) % 3], x + 3 * tri[3 * f + k], e[k]);
     SbCross(e[0], e[1], n);
     length = PetscSqrtReal(SbDot3(n, n));
     for (int i = 0; i < 3; i++) n[i] /= length;
@@ -97,10 +95,9 @@ PetscReal SbSignedDistanceEvaluate(SbSignedDistance s, const PetscReal x[3], Pet
   // closest point inside a face: signed height, smooth across the surface
   face = s->normal + 3 * nearest;
   if (feature == SB_FEATURE_FACE) {
-    const PetscReal *a = s->x + 3 * s->tri[3 * nearest], up[3] = {x[0] - a[0], x[1] - a[1], x[2] - a[2]};
-
+    SbSubtract(x, s->x + 3 * s->tri[3 * nearest], r);
     for (int i = 0; i < 3; i++) n[i] = face[i];
-    return SbDot3(face, up);
+    return SbDot3(face, r);
   }
 
   // closest point on an edge or corner: normal along the connection, or the pseudonormal at very small distances

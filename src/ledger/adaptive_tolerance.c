@@ -50,8 +50,6 @@ PetscErrorCode SbAdaptiveToleranceSetFromOptions(SbLedger l)
 PetscErrorCode SbAdaptiveToleranceSet(SbLedger l, PetscReal rtol)
 {
   const SNES snes = l->run->snes;
-  PetscReal atol, old, stol, linear, latol, dtol;
-  PetscInt max_it, max_f, linear_max;
   PetscBool single;
   KSP ksp;
 
@@ -59,12 +57,10 @@ PetscErrorCode SbAdaptiveToleranceSet(SbLedger l, PetscReal rtol)
   l->rtol = PetscMax(TIGHTEST, PetscMin(LOOSEST, rtol));
   PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &single));
   PetscCall(SNESGetKSP(snes, &ksp));
-  PetscCall(SNESGetTolerances(snes, &atol, &old, &stol, &max_it, &max_f));
-  PetscCall(KSPGetTolerances(ksp, &linear, &latol, &dtol, &linear_max));
   if (single)
-    PetscCall(KSPSetTolerances(ksp, l->rtol, latol, dtol, linear_max));
+    PetscCall(KSPSetTolerances(ksp, l->rtol, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
   else
-    PetscCall(SNESSetTolerances(snes, atol, l->rtol, stol, max_it, max_f));
+    PetscCall(SNESSetTolerances(snes, PETSC_DEFAULT, l->rtol, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -163,10 +159,7 @@ PetscErrorCode SbAdaptiveToleranceUpdate(SbLedger l, const SbSolvedStep *step, P
   if (!(left > 0.) || !(allowed > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
   if (left > allowed) {
     /* a small excess in one of many steps is compensated by the next */
-    if (l->rtol > TIGHTEST && left > (step->V ? 3. : 1.) * allowed) {
-      *again = PETSC_TRUE;
-      l->repeats++;
-    }
+    if (l->rtol > TIGHTEST && left > (step->V ? 3. : 1.) * allowed) *again = PETSC_TRUE;
     PetscCall(SbAdaptiveToleranceSet(l, l->rtol * PetscMax(1e-3, 0.3 * allowed / left)));
   } else if (left < 0.1 * allowed)
     PetscCall(SbAdaptiveToleranceSet(l, l->rtol * PetscMin(3., 0.3 * allowed / left)));

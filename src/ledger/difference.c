@@ -1,45 +1,103 @@
 /*
-  Helpers of the estimates: step lengths of finite differences of forces, and
-  solves with the last tangent.
+  The tangent of a run for the estimates: finite differences of forces, energies of displacements and velocities, solves with the last tangent.
 */
 #include "ledger_impl.h"
+#include "sbsolver.h"
 
 #define PROBE 1e-6 /* finite difference step over the bodies' size: above rounding, nearly linear */
 
-PetscErrorCode SbDifferenceLength(SbLedger l, Vec D, PetscReal *length)
+PetscErrorCode SbStiffnessTimes(SbLedger l, PetscReal t, Vec U, Vec D, PetscBool strain, Vec R)
 {
   const SbModel m = l->run->model;
-  PetscReal size, volume = 0.;
+  const Vec moved = l->w[1], other = l->w[2];
+  PetscReal size, volume = 0., length, energy;
+  PetscInt ninverted;
 
   PetscFunctionBeginUser;
+  /* the step moves bodies by at most a millionth of their size */
   PetscCall(VecNorm(D, NORM_INFINITY, &size));
   for (PetscInt b = 0; b < m->nbody; b++) volume = PetscMax(volume, m->body[b].volume);
-  *length = size > 0. ? PROBE * PetscPowReal(volume, 1. / 3.) / size : 0.;
+  length = size > 0. ? PROBE * PetscPowReal(volume, 1. / 3.) / size : 0.;
+  PetscCall(VecZeroEntries(R));
+  if (!(length > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
+  for (int side = 0; side < 2; side++) {
+    const Vec F = side ? R : other;
+
+    PetscCall(VecWAXPY(moved, side ? length : -length, D, U));
+    if (strain)
+      PetscCall(SbModelStrainEnergy(m, moved, F, &energy, &ninverted));
+    else
+      PetscCall(SbModelResidual(m, t, moved, NULL, NULL, PETSC_FALSE, F));
+  }
+  PetscCall(VecAXPBY(R, -0.5 / length, 0.5 / length, other));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMassForm(SbLedger l, Vec D, PetscReal *form)
+{
+  const SbSpace s = l->run->model->space;
+  const PetscScalar *d;
+  PetscReal sum = 0.;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArrayRead(D, &d));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) sum += s->node_mass[i / 3] * d[i] * d[i];
+  PetscCall(VecRestoreArrayRead(D, &d));
+  PetscCallMPI(MPI_Allreduce(&sum, form, 1, MPIU_REAL, MPI_SUM, s->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal *form)
+{
+  const SbRun run = l->run;
+  const Vec moved = l->w[1];
+  PetscReal mass;
+  Vec R;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(D, &R));
+  if (run->J && run->ts && run->shift_a > 0. && !run->damped && !run->solver_used->matrix_free &&
+      !run->model->space->consistent_mass) {
+    /* the last tangent of the step, where it is a matrix K + shift M of the free unknowns with the lumped mass */
+    PetscCall(VecCopy(D, moved));
+    PetscCall(SbSpaceZeroPrescribed(run->model->space, PETSC_TRUE, moved));
+    PetscCall(MatMult(run->J, moved, R));
+    PetscCall(VecDot(R, moved, form));
+    PetscCall(SbMassForm(l, moved, &mass));
+    *form = PetscMax(0., *form - run->shift_a * mass);
+    l->own_work += 1.;
+  } else {
+    l->residuals -= MPI_Wtime();
+    PetscCall(SbStiffnessTimes(l, t, U, D, PETSC_FALSE, R));
+    l->residuals += MPI_Wtime();
+    PetscCall(VecDot(R, D, form));
+    *form = PetscAbsReal(*form);
+    l->own_work += 2.;
+  }
+  PetscCall(VecDestroy(&R));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbProbeSolve(SbLedger l, PetscReal rtol, Vec B, Vec X, PetscInt *its)
 {
-  PetscReal own_rtol, atol, dtol;
-  PetscInt max_it, own_its;
+  PetscReal own_rtol, atol;
   PetscBool warm, solved;
   KSP ksp;
 
   PetscFunctionBeginUser;
   l->solving -= MPI_Wtime();
-  PetscCall(SbRunSolveTangent(l->run, B, X, its ? its : &own_its, &solved));
+  PetscCall(SbRunSolveTangent(l->run, B, X, its, &solved));
+  if (!solved) {
+    PetscCall(SNESGetKSP(l->run->snes, &ksp));
+    PetscCall(KSPGetTolerances(ksp, &own_rtol, &atol, NULL, NULL));
+    PetscCall(KSPGetInitialGuessNonzero(ksp, &warm));
+    PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_FALSE));
+    PetscCall(KSPSetTolerances(ksp, rtol, 0., PETSC_DEFAULT, PETSC_DEFAULT));
+    PetscCall(KSPSolve(ksp, B, X));
+    PetscCall(KSPGetIterationNumber(ksp, its));
+    PetscCall(KSPSetTolerances(ksp, own_rtol, atol, PETSC_DEFAULT, PETSC_DEFAULT));
+    PetscCall(KSPSetInitialGuessNonzero(ksp, warm));
+  }
   l->solving += MPI_Wtime();
-  if (solved) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SNESGetKSP(l->run->snes, &ksp));
-  PetscCall(KSPGetTolerances(ksp, &own_rtol, &atol, &dtol, &max_it));
-  PetscCall(KSPGetInitialGuessNonzero(ksp, &warm));
-  PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_FALSE));
-  PetscCall(KSPSetTolerances(ksp, rtol, 0., dtol, max_it));
-  l->solving -= MPI_Wtime();
-  PetscCall(KSPSolve(ksp, B, X));
-  l->solving += MPI_Wtime();
-  if (its) PetscCall(KSPGetIterationNumber(ksp, its));
-  PetscCall(KSPSetTolerances(ksp, own_rtol, atol, dtol, max_it));
-  PetscCall(KSPSetInitialGuessNonzero(ksp, warm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

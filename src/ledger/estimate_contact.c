@@ -16,36 +16,19 @@
 /* Elastic energy of the displacement of bodies in contact under the forces F. */
 static PetscErrorCode moved_energy(SbLedger l, Vec U, Vec F, PetscReal *energy)
 {
-  PetscReal length, work[2];
   PetscInt its = 0;
-  Vec D;
+  Vec D, R;
 
   PetscFunctionBeginUser;
-  *energy = 0.;
   PetscCall(VecDuplicate(U, &D));
+  PetscCall(VecDuplicate(U, &R));
   PetscCall(SbProbeSolve(l, CLOSELY, F, D, &its));
-  PetscCall(SbDifferenceLength(l, D, &length));
-  if (length > 0.) {
-    for (int side = 0; side < 2; side++) {
-      const SbSpace s = l->run->model->space;
-      SbStage stage = {.shift_k = 1.};
-      PetscReal *f;
-
-      /* D . f_int(U + length D) */
-      PetscCall(VecWAXPY(l->w[1], (side ? length : -length), D, U));
-      PetscCall(VecZeroEntries(l->w[2]));
-      PetscCall(SbSpaceGetLocalRead(s, l->w[1], &stage.u));
-      PetscCall(SbSpaceGetLocalWrite(s, l->w[2], &f));
-      PetscCall(PetscArrayzero(f, 3 * s->nnode));
-      PetscCall(SbSpaceAddInternalForce(s, &stage, f));
-      PetscCall(SbSpaceRestoreLocalWrite(s, l->w[2], &f));
-      PetscCall(SbSpaceRestoreLocalRead(s, l->w[1], &stage.u));
-      PetscCall(VecDot(l->w[2], D, &work[side]));
-    }
-    *energy = 0.5 * PetscAbsReal(work[1] - work[0]) / (2. * length);
-  }
+  PetscCall(SbStiffnessTimes(l, 0., U, D, PETSC_TRUE, R));
+  PetscCall(VecDot(R, D, energy));
+  *energy = 0.5 * PetscAbsReal(*energy);
   l->own_work += 2. + 2. * (PetscReal)its;
   PetscCall(VecDestroy(&D));
+  PetscCall(VecDestroy(&R));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

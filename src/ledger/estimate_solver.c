@@ -10,28 +10,13 @@
 
 #define ROUGHLY 0.1 /* relative tolerance of delta */
 
-/* Factor of the next step on an error like delta, from the fraction shift_a delta.M delta of inertia in its energy delta.J delta: on an oscillation of
-   frequency w implicit Euler has the factor 1 / (1 + (w h)^2)^(1/2), the root of this fraction. Other methods do not damp like this, but
-   the acceleration passes the remaining residual to their next solve. */
-static PetscErrorCode damp(SbLedger l, PetscReal energy)
-{
-  PetscReal mass;
-
-  PetscFunctionBeginUser;
-  l->kept_part = 1.;
-  if (!(energy > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbMassForm(l, l->delta, &mass));
-  l->kept_part = PetscMin(1., PetscSqrtReal(l->run->shift_a * mass / energy));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolvedStep *step)
 {
   const SNES snes = l->run->snes;
-  PetscReal energy;
+  const Vec F = l->w[0];
+  PetscReal energy, error, mass;
   PetscInt its;
   PetscBool single;
-  Vec F = l->w[0];
 
   PetscFunctionBeginUser;
   PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &single));
@@ -40,9 +25,18 @@ PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolvedStep *step)
   l->residuals += MPI_Wtime();
   PetscCall(SbProbeSolve(l, ROUGHLY, F, l->delta, &its));
   PetscCall(VecDot(l->delta, F, &energy));
-  l->step_linear = single ? PetscSqrtReal(0.5 * PetscAbsReal(energy)) : 0.;
-  l->step_nonlinear = single ? 0. : PetscSqrtReal(0.5 * PetscAbsReal(energy));
-  if (step->V) PetscCall(damp(l, PetscAbsReal(energy)));
+  energy = PetscAbsReal(energy);
+  error = PetscSqrtReal(0.5 * energy);
+  l->step_linear = single ? error : 0.;
+  l->step_nonlinear = single ? 0. : error;
+  if (step->V) l->kept_part = 1.;
+  if (step->V && energy > 0.) {
+    /* factor of the next step on an error like delta, from the fraction shift_a delta.M delta of inertia in its energy: on an oscillation of
+       frequency w implicit Euler has the factor 1 / (1 + (w h)^2)^(1/2), the root of this fraction. Other methods do not damp like this, but
+       the acceleration passes the remaining residual to their next solve. */
+    PetscCall(SbMassForm(l, l->delta, &mass));
+    l->kept_part = PetscMin(1., PetscSqrtReal(l->run->shift_a * mass / energy));
+  }
   l->own_work += 1. + 2. * (PetscReal)its;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

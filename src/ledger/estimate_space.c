@@ -44,7 +44,7 @@
 */
 #include "recovery.h"
 #include "sbestimate.h"
-#include "sbkernel.h"
+#include "sbgeometry.h"
 
 #define KEPT 0.25  /* largest fraction of the energy of an oscillating pressure that recovery keeps */
 #define FLOOR 1e-8 /* least smooth fraction of the energy */
@@ -73,26 +73,21 @@ static inline PetscBool is_stiff(SbModel model, PetscInt body)
 PetscErrorCode SbSpaceEstimateCreate(SbModel model, SbSpaceEstimate *estimate)
 {
   const PetscInt n = model->mesh->ncell_owned;
-  PetscBool stiff = PETSC_FALSE, any = PETSC_FALSE, *quadratic;
+  PetscBool stiff = PETSC_FALSE, quadratic = PETSC_FALSE;
   SbSpaceEstimate est;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&est));
   est->model = model;
-  PetscCall(PetscMalloc1(model->nbody, &quadratic));
-  for (PetscInt b = 0; b < model->nbody; b++) stiff = (PetscBool)(stiff || is_stiff(model, b));
   for (PetscInt b = 0; b < model->nbody; b++) {
-    quadratic[b] = (PetscBool)(model->element[b]->nodes_per[1] > 0);
-    any = (PetscBool)(any || quadratic[b]);
+    stiff = (PetscBool)(stiff || is_stiff(model, b));
+    quadratic = (PetscBool)(quadratic || model->element[b]->nodes_per[1]);
   }
-  PetscCall(SbRecoveryCreate(model->mesh, quadratic, &est->recovery));
-  PetscCall(PetscFree(quadratic));
-  if (any) PetscCall(PetscMalloc1(model->mesh->ncell, &est->stress));
-  PetscCall(PetscCalloc1(n, &est->cell2));
+  PetscCall(SbRecoveryCreate(model->mesh, model->element, &est->recovery));
+  if (quadratic) PetscCall(PetscMalloc1(model->mesh->ncell, &est->stress));
   PetscCall(PetscCalloc3(model->nbody, &est->body2, model->nbody, &est->strain, model->nbody, &est->factor));
-  PetscCall(PetscMalloc1(9 * (size_t)model->mesh->ncell, &est->P));
+  PetscCall(PetscCalloc3(n, &est->cell2, n, &est->psi, 9 * (size_t)model->mesh->ncell, &est->P));
   if (!model->space->linear) PetscCall(PetscMalloc1(9 * (size_t)n, &est->R));
-  PetscCall(PetscMalloc1(n, &est->psi));
   if (stiff) PetscCall(SbSpaceCreateVec(model->space, &est->residual));
   *estimate = est;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -105,12 +100,10 @@ PetscErrorCode SbSpaceEstimateDestroy(SbSpaceEstimate *estimate)
   PetscFunctionBeginUser;
   if (!est) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbRecoveryDestroy(&est->recovery));
-  PetscCall(PetscFree(est->cell2));
   PetscCall(PetscFree3(est->body2, est->strain, est->factor));
-  PetscCall(PetscFree(est->P));
+  PetscCall(PetscFree3(est->cell2, est->psi, est->P));
   PetscCall(PetscFree(est->stress));
   PetscCall(PetscFree(est->R));
-  PetscCall(PetscFree(est->psi));
   PetscCall(VecDestroy(&est->residual));
   PetscCall(PetscFree(*estimate));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -150,12 +143,7 @@ static inline PetscReal trace2(const PetscReal s[6])
 
 static PetscReal cell_volume(SbMesh mesh, PetscInt c)
 {
-  const PetscReal *x[4];
-  PetscReal e[9];
-
-  for (int a = 0; a < 4; a++) x[a] = mesh->x + 3 * mesh->cell[4 * c + a];
-  for (int k = 0; k < 9; k++) e[k] = x[1 + k / 3][k % 3] - x[0][k % 3];
-  return SbMatDet(e) / 6.;
+  return SbTetDeterminant(mesh->x, mesh->cell + 4 * c) / 6.;
 }
 
 /*
@@ -224,30 +212,6 @@ static PetscReal quadratic_off(SbSpaceEstimate est, PetscInt c, PetscReal G, Pet
   return V / (4. * G) * square + V / (2. * K) * PetscSqr(pressure - at->pressure);
 }
 
-/* Adds the terms of theta: the forces of supports and contact on each P1 body, and the displacements of its nodes there. */
-static PetscErrorCode add_reactions(SbSpaceEstimate est, PetscReal t, Vec U, Vec V, Vec A,
-                                    PetscReal (*sum)[NSUM])
-{
-  SbModel model = est->model;
-  const PetscReal *r, *u;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbModelResidual(model, t, U, V, A, PETSC_FALSE, est->residual));
-  PetscCall(VecGetArrayRead(est->residual, &r));
-  PetscCall(VecGetArrayRead(U, &u));
-  for (PetscInt i = 0; i < 3 * model->space->nnode_owned; i++) {
-    PetscReal *mine = sum[model->space->node_body[i / 3]];
-
-    mine[FORCE_SIZE + i % 3] += PetscAbsReal(r[i]);
-    mine[SHIFT + i % 3] += PetscAbsReal(r[i]) * u[i];
-    mine[FORCE + i % 3] += r[i];
-    mine[WORK + i % 3] += r[i] * u[i];
-  }
-  PetscCall(VecRestoreArrayRead(U, &u));
-  PetscCall(VecRestoreArrayRead(est->residual, &r));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* |e|^2 of a P1 body. */
 static PetscReal stiff_error(const PetscReal sum[NSUM])
 {
@@ -308,7 +272,24 @@ PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, V
       est->cell2[c] = add_cell(est, c, G[k], K[k], sum[body]);
   }
   PetscCall(PetscFree2(G, K));
-  if (est->residual) PetscCall(add_reactions(est, t, U, V, A, sum));
+  if (est->residual) {
+    const PetscReal *r;
+
+    /* the terms of theta: forces of supports and contact, and the displacements of nodes there */
+    PetscCall(SbModelResidual(model, t, U, V, A, PETSC_FALSE, est->residual));
+    PetscCall(VecGetArrayRead(est->residual, &r));
+    PetscCall(VecGetArrayRead(U, &u));
+    for (PetscInt i = 0; i < 3 * model->space->nnode_owned; i++) {
+      PetscReal *mine = sum[model->space->node_body[i / 3]];
+
+      mine[FORCE_SIZE + i % 3] += PetscAbsReal(r[i]);
+      mine[SHIFT + i % 3] += PetscAbsReal(r[i]) * u[i];
+      mine[FORCE + i % 3] += r[i];
+      mine[WORK + i % 3] += r[i] * u[i];
+    }
+    PetscCall(VecRestoreArrayRead(U, &u));
+    PetscCall(VecRestoreArrayRead(est->residual, &r));
+  }
   PetscCallMPI(
     MPI_Allreduce(MPI_IN_PLACE, sum, (PetscMPIInt)(NSUM * model->nbody), MPIU_REAL, MPI_SUM, model->comm));
 

@@ -12,56 +12,6 @@
   Derivatives are finite differences of the accelerations, which the integrators store (second_order.c).
 */
 #include "ledger_impl.h"
-#include "sbsolver.h"
-
-PetscErrorCode SbMassForm(SbLedger l, Vec D, PetscReal *form)
-{
-  const SbSpace s = l->run->model->space;
-  const PetscScalar *d;
-  PetscReal sum = 0.;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecGetArrayRead(D, &d));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) sum += s->node_mass[i / 3] * d[i] * d[i];
-  PetscCall(VecRestoreArrayRead(D, &d));
-  PetscCallMPI(MPI_Allreduce(&sum, form, 1, MPIU_REAL, MPI_SUM, s->comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal *form)
-{
-  const SbRun run = l->run;
-  PetscReal length, mass, at[2];
-  Vec moved = l->w[1], R = l->w[2];
-
-  PetscFunctionBeginUser;
-  *form = 0.;
-  PetscCall(SbDifferenceLength(l, D, &length));
-  if (!(length > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
-  /* use the last tangent of the step where it is a matrix K + shift M of the free unknowns with the lumped mass */
-  if (run->J && run->ts && run->shift_a > 0. && !run->damped && !run->solver_used->matrix_free &&
-      !run->model->space->consistent_mass) {
-    PetscCall(VecCopy(D, moved));
-    PetscCall(SbSpaceZeroPrescribed(run->model->space, PETSC_TRUE, moved));
-    PetscCall(MatMult(run->J, moved, R));
-    PetscCall(VecDot(R, moved, form));
-    PetscCall(SbMassForm(l, moved, &mass));
-    *form = PetscMax(0., *form - run->shift_a * mass);
-    l->own_work += 1.;
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  /* else a difference of forces */
-  l->residuals -= MPI_Wtime();
-  for (int side = 0; side < 2; side++) {
-    PetscCall(VecWAXPY(moved, side ? length : -length, D, U));
-    PetscCall(SbModelResidual(run->model, t, moved, NULL, NULL, PETSC_FALSE, R));
-    PetscCall(VecDot(R, D, &at[side]));
-  }
-  l->residuals += MPI_Wtime();
-  *form = PetscAbsReal(at[1] - at[0]) / (2. * length);
-  l->own_work += 2.;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* Energy of a derivative of the state, with displacement D and velocity rate. Collective. */
 static PetscErrorCode derivative_energy(SbLedger l, const SbSolvedStep *step, Vec D, Vec rate,

@@ -13,6 +13,9 @@
 #define SHARE 0.08    /* largest fraction of the work for estimates */
 #define SPACE_WORK 6. /* cost of the space estimate, in residual evaluations */
 
+const char *const SbErrorNames[SB_ERROR_COUNT] = {"space",  "time",    "nonlinear",
+                                                  "linear", "contact", "rounding"};
+
 static const SbOption rows[] = {
   {"ledger", SB_OPTION_BOOL, 1, "", "false", "",
    "estimate the error of the result by its sources (mesh, time step, iterations, contact), and print a "
@@ -62,7 +65,7 @@ PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger)
   l->accuracy = accuracy;
   l->budget = budget;
   PetscCall(SbOptionInt(&SbRunScope, "ledger_every", &l->every));
-  PetscCall(SbQuantitySetFromOptions(l, &SbRunScope));
+  PetscCall(SbQuantitySetFromOptions(l));
   PetscCall(SbAdaptiveToleranceSetFromOptions(l));
   *ledger = l;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -88,17 +91,15 @@ static PetscErrorCode examine_step(SbRun run, const SbSolvedStep *step, void *ct
 
   PetscFunctionBeginUser;
   /* keep the accelerations for third differences; a repeated step counts once */
-  if (step->A0 && l->order == 2) {
+  if (step->A0 && l->order == 2 && (!l->kept || step->t != l->kept_t)) {
     Vec spare = l->before;
 
-    if (!l->kept || step->t != l->kept_t) {
-      if (l->kept) l->before_dt = step->t - l->kept_t;
-      l->before = l->kept;
-      l->kept = spare;
-      if (!l->kept) PetscCall(VecDuplicate(step->A0, &l->kept));
-      PetscCall(VecCopy(step->A0, l->kept));
-      l->kept_t = step->t;
-    }
+    if (l->kept) l->before_dt = step->t - l->kept_t;
+    l->before = l->kept;
+    l->kept = spare;
+    if (!l->kept) PetscCall(VecDuplicate(step->A0, &l->kept));
+    PetscCall(VecCopy(step->A0, l->kept));
+    l->kept_t = step->t;
   }
   l->seen = (PetscBool)(!run->model->dynamic || l->own_work <= SHARE * l->work);
 
@@ -107,12 +108,12 @@ static PetscErrorCode examine_step(SbRun run, const SbSolvedStep *step, void *ct
     PetscBool single;
     KSP ksp;
 
-    PetscCall(PetscObjectTypeCompare((PetscObject)l->run->snes, SNESKSPONLY, &single));
-    PetscCall(SNESGetKSP(l->run->snes, &ksp));
+    PetscCall(PetscObjectTypeCompare((PetscObject)run->snes, SNESKSPONLY, &single));
+    PetscCall(SNESGetKSP(run->snes, &ksp));
     if (single)
       PetscCall(KSPGetResidualNorm(ksp, &l->residual));
     else
-      PetscCall(SNESGetFunctionNorm(l->run->snes, &l->residual));
+      PetscCall(SNESGetFunctionNorm(run->snes, &l->residual));
   }
   if (!l->seen && l->accuracy == 0.) PetscFunctionReturn(PETSC_SUCCESS);
   begin(l);
@@ -127,15 +128,6 @@ static PetscErrorCode examine_step(SbRun run, const SbSolvedStep *step, void *ct
 }
 
 /* ------------------------------------------------------------------ after an accepted step */
-
-/* Fraction of an error that remains after a step with damping: as for the motion, by the damping power over twice its energy. */
-static PetscReal damped_part(const SbRun run, const SbStep *step)
-{
-  const PetscReal energy = step->energies.kinetic + step->energies.strain;
-
-  if (!(run->damping_power > 0.) || !(energy > 0.)) return 1.;
-  return PetscExpReal(-0.5 * PetscMin(step->dt * run->damping_power / energy, 2.));
-}
 
 static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
@@ -156,10 +148,13 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     without an estimate are scaled by its last residual.
   */
   if (!first) {
-    const PetscReal left = step->V ? damped_part(run, step) : 0.;
     const PetscReal part = l->seen_residual > 0. ? l->residual / l->seen_residual : 1.;
     PetscReal *linear = &l->error[SB_ERROR_LINEAR], *nonlinear = &l->error[SB_ERROR_NONLINEAR];
+    PetscReal left = step->V ? 1. : 0.;
 
+    /* the fraction that damping leaves: as of the motion, by its power over twice the energy */
+    if (step->V && run->damping_power > 0. && energy > 0.)
+      left = PetscExpReal(-0.5 * PetscMin(step->dt * run->damping_power / energy, 2.));
     if (step->V) SbEstimateTimeAdd(l, step->dt, left);
     *linear = PetscSqrtReal(PetscSqr(left * l->kept_part * *linear) + PetscSqr(part * l->step_linear));
     *nonlinear = left * PetscSqrtReal(l->kept_part) * *nonlinear + part * l->step_nonlinear;
@@ -190,8 +185,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 
   /* relative to the stored energy */
   scale = l->stored > 0. ? 1. / PetscSqrtReal(l->stored) : 0.;
-  for (int i = 0; i < SB_ERROR_COUNT; i++) l->relative[i] = scale * l->error[i];
-  l->relative[SB_ERROR_TIME] += scale * l->offset;
+  for (int i = 0; i < SB_ERROR_COUNT; i++) l->relative[i] = scale * SbLedgerError(l, i);
   end(l);
   PetscCall(SbAdaptiveToleranceAccept(l, step));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -264,7 +258,6 @@ static PetscErrorCode carry(SbLedger l)
 PetscErrorCode SbLedgerAttach(SbLedger l)
 {
   SbRun run;
-  static const char *const names[] = {"space", "time", "nonlinear", "linear", "contact", "rounding"};
 
   PetscFunctionBeginUser;
   if (!l) PetscFunctionReturn(PETSC_SUCCESS);
@@ -281,7 +274,7 @@ PetscErrorCode SbLedgerAttach(SbLedger l)
   for (int i = 0; i < SB_ERROR_COUNT; i++) {
     SbColumn *c = &l->column[i];
 
-    PetscCall(PetscSNPrintf(c->name, sizeof(c->name), "error_%s", names[i]));
+    PetscCall(PetscSNPrintf(c->name, sizeof(c->name), "error_%s", SbErrorNames[i]));
     c->unit = "1";
     c->value = &l->relative[i];
   }
@@ -305,12 +298,9 @@ PetscErrorCode SbLedgerContinue(SbLedger from, SbLedger to)
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < from->run->ncarried; i++)
     *to->run->carried[i].value = *from->run->carried[i].value;
-  to->work = from->work;
-  to->own_work = from->own_work;
   to->seconds += from->seconds;
   to->solving += from->solving;
   to->residuals += from->residuals;
-  to->repeats = from->repeats;
   to->nstep = from->nstep;
   to->nkept = from->nkept;
   to->longest = from->longest;
@@ -324,7 +314,7 @@ PetscErrorCode SbLedgerContinue(SbLedger from, SbLedger to)
 PetscErrorCode SbLedgerGet(SbLedger l, SbErrorSource source, PetscReal *error, PetscReal *stored)
 {
   PetscFunctionBeginUser;
-  *error = l->error[source] + (source == SB_ERROR_TIME ? l->offset : 0.);
+  *error = SbLedgerError(l, source);
   *stored = l->stored;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

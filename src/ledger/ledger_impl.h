@@ -62,26 +62,31 @@ struct _p_SbLedger {
   /* adaptive_tolerance.c */
   PetscBool may_tune;                  /* the program chooses tolerances */
   PetscReal rtol;                      /* relative tolerance of solves */
-  PetscInt repeats;                    /* number of solves that were repeated for their accuracy */
   PetscInt narrowed;                   /* number of reductions of contact widths */
   PetscBool mesh_bounds, width_bounds; /* contact may exceed its share: mesh error is larger; width fixed */
   PetscInt nstep, nkept;               /* -step_time_budget: number of steps; of those within the budget */
   PetscReal wall, longest, total;      /* seconds at the last step; longest step; sum */
 };
 
-/* difference.c: step length for finite differences along D: moves bodies by at most a millionth of their size; 0 for D = 0. Collective. */
-PetscErrorCode SbDifferenceLength(SbLedger l, Vec D, PetscReal *length);
-/* X = J^-1 B with the solver and tangent of the last solve, relative tolerance rtol, initial guess zero; its: iterations, may be NULL. Collective. */
+/* Error of a source at the end of the run, J^(1/2). */
+static inline PetscReal SbLedgerError(SbLedger l, int source)
+{
+  return l->error[source] + (source == SB_ERROR_TIME ? l->offset : 0.);
+}
+
+/* difference.c: R = derivative along D, N, of the residual at U, or (strain) of the gradient of the strain energy. Not l->w[1], l->w[2]. Collective. */
+PetscErrorCode SbStiffnessTimes(SbLedger l, PetscReal t, Vec U, Vec D, PetscBool strain, Vec R);
+/* Twice the strain energy of a displacement D, by the tangent at U, J. Collective. */
+PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal *form);
+/* Sum of the lumped mass times the square of a vector, all ranks. Collective. */
+PetscErrorCode SbMassForm(SbLedger l, Vec D, PetscReal *form);
+/* X = J^-1 B with the solver and tangent of the last solve, relative tolerance rtol, initial guess zero; its: iterations. Collective. */
 PetscErrorCode SbProbeSolve(SbLedger l, PetscReal rtol, Vec B, Vec X, PetscInt *its);
 
 /* estimate_time.c: error of the step, into step_time and offset; `all`: also the bounds of the sum over steps. Collective. */
 PetscErrorCode SbEstimateTime(SbLedger l, const SbSolvedStep *step, PetscBool all);
 /* Adds the error of the step to that of the run, of which damping leaves the fraction `left`. Not collective. */
 void SbEstimateTimeAdd(SbLedger l, PetscReal dt, PetscReal left);
-/* Twice the strain energy of a displacement D, by the tangent at U, J. Collective. */
-PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal *form);
-/* Sum of the lumped mass times the square of a vector, all ranks. Collective. */
-PetscErrorCode SbMassForm(SbLedger l, Vec D, PetscReal *form);
 /* estimate_solver.c: errors of the solves of the step, into step_linear, step_nonlinear and delta. Collective. */
 PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolvedStep *step);
 /* Error from rounding of the displacements, J^(1/2). Collective. */
@@ -99,15 +104,11 @@ PetscErrorCode SbAdaptiveToleranceUpdate(SbLedger l, const SbSolvedStep *step, P
 PetscErrorCode SbAdaptiveToleranceAccept(SbLedger l, const SbStep *step);
 
 /* quantity.c */
-PetscErrorCode SbQuantitySetFromOptions(SbLedger l, const SbScope *scope);
+PetscErrorCode SbQuantitySetFromOptions(SbLedger l);
 PetscErrorCode SbQuantityAttach(SbLedger l);
 /* After re-meshing: warns if the node of the quantity has changed. Collective. */
 PetscErrorCode SbQuantityContinue(SbLedger from, SbLedger to);
 PetscErrorCode SbQuantityValue(SbLedger l, const SbStep *step);
 PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step);
 
-/* Seconds by source of error, and other seconds; maximum over the ranks. */
-typedef struct {
-  PetscReal source[SB_ERROR_COUNT], search, setup, output, estimates, total;
-} SbLedgerSeconds;
-PetscErrorCode SbLedgerGetSeconds(SbLedger l, SbLedgerSeconds *s);
+extern const char *const SbErrorNames[SB_ERROR_COUNT];

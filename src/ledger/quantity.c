@@ -12,23 +12,24 @@
 #define ADJOINT 1e-2 /* relative tolerance of the dual solve */
 #define MIX 1e-3     /* s above: size of s z over that of u, in the energy norm */
 
-PetscErrorCode SbQuantitySetFromOptions(SbLedger l, const SbScope *scope)
+PetscErrorCode SbQuantitySetFromOptions(SbLedger l)
 {
   SbQuantity *q = &l->quantity;
   PetscInt kind;
   PetscReal length;
 
   PetscFunctionBeginUser;
-  PetscCall(SbOptionChoice(scope, "ledger_quantity", &kind));
+  PetscCall(SbOptionChoice(&SbRunScope, "ledger_quantity", &kind));
   q->kind = (SbQuantityKind)kind;
   q->node = -1;
   q->least = PETSC_MAX_REAL;
   q->most = PETSC_MIN_REAL;
   if (!kind) PetscFunctionReturn(PETSC_SUCCESS);
-  if (q->kind == SB_QUANTITY_DISPLACEMENT) PetscCall(SbOptionReals(scope, "ledger_at", q->at));
-  if (q->kind == SB_QUANTITY_REACTION) PetscCall(SbOptionString(scope, "ledger_on", sizeof(q->on), q->on));
+  if (q->kind == SB_QUANTITY_DISPLACEMENT) PetscCall(SbOptionReals(&SbRunScope, "ledger_at", q->at));
+  if (q->kind == SB_QUANTITY_REACTION)
+    PetscCall(SbOptionString(&SbRunScope, "ledger_on", sizeof(q->on), q->on));
   if (q->kind == SB_QUANTITY_VOLUME) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbOptionReals(scope, "ledger_direction", q->direction));
+  PetscCall(SbOptionReals(&SbRunScope, "ledger_direction", q->direction));
   length = PetscSqrtReal(SbDot3(q->direction, q->direction));
   PetscCheck(length > 0., PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "-ledger_direction 0,0,0 is no direction");
   for (int k = 0; k < 3; k++) q->direction[k] /= length;
@@ -54,12 +55,12 @@ PetscErrorCode SbQuantityAttach(SbLedger l)
     /* The node nearest to the position, over all ranks; of equally near ones that with the lowest number, for any partition. */
     for (int pass = 0; pass < 2; pass++) {
       for (PetscInt k = 0; k < s->nnode_owned; k++) {
-        PetscReal r = 0.;
+        PetscReal r[3];
 
-        for (int j = 0; j < 3; j++) r += PetscSqr(s->node_x[3 * k + j] - q->at[j]);
+        SbSubtract(s->node_x + 3 * k, q->at, r);
         if (!pass)
-          least = PetscMin(least, r);
-        else if (r <= all * (1. + 1e-12) && s->node_orig[k] < first) {
+          least = PetscMin(least, SbDot3(r, r));
+        else if (SbDot3(r, r) <= all * (1. + 1e-12) && s->node_orig[k] < first) {
           first = s->node_orig[k];
           q->node = k;
         }
@@ -77,9 +78,9 @@ PetscErrorCode SbQuantityAttach(SbLedger l)
   PetscCall(VecGetArray(q->weight, &w));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     for (int k = 0; k < 3; k++) {
-      const PetscBool on = q->kind == SB_QUANTITY_REACTION
-                             ? (PetscBool)((s->node_set[i] & q->set) && (s->fixed[i] & (1 << k)))
-                             : (PetscBool)(i == q->node);
+      const PetscBool on = (PetscBool)(q->kind == SB_QUANTITY_DISPLACEMENT
+                                         ? i == q->node
+                                         : (s->node_set[i] & q->set) && (s->fixed[i] & (1 << k)));
 
       if (on) w[3 * i + k] = q->direction[k];
       nprescribed += on;
@@ -96,16 +97,17 @@ PetscErrorCode SbQuantityAttach(SbLedger l)
 
 PetscErrorCode SbQuantityContinue(SbLedger from, SbLedger to)
 {
-  const PetscReal *a = from->quantity.x, *b = to->quantity.x;
-  const PetscReal d = PetscSqrtReal(PetscSqr(a[0] - b[0]) + PetscSqr(a[1] - b[1]) + PetscSqr(a[2] - b[2]));
+  const PetscReal *a = from->quantity.x;
+  PetscReal d[3];
 
   PetscFunctionBeginUser;
-  if (to->quantity.kind == SB_QUANTITY_DISPLACEMENT && d > 0.)
+  SbSubtract(a, to->quantity.x, d);
+  if (to->quantity.kind == SB_QUANTITY_DISPLACEMENT && SbDot3(d, d) > 0.)
     PetscCall(
       SbWarning(to->run->model->comm,
                 "-ledger_at: the node at (%g, %g, %g) m is gone with a mesh; from now on the nearest one, "
                 "%.3g m from it, stands for it. Vertices of the surface stay: choose one of them",
-                (double)a[0], (double)a[1], (double)a[2], (double)d));
+                (double)a[0], (double)a[1], (double)a[2], (double)PetscSqrtReal(SbDot3(d, d))));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -123,46 +125,25 @@ PetscErrorCode SbQuantityValue(SbLedger l, const SbStep *step)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Change of the residual along a displacement D, N. */
-static PetscErrorCode stiffness_times(SbLedger l, PetscReal t, Vec U, Vec D, Vec R)
-{
-  const SbModel m = l->run->model;
-  PetscReal length;
-  Vec moved = l->w[1], other = l->w[2];
-
-  PetscFunctionBeginUser;
-  PetscCall(VecZeroEntries(R));
-  PetscCall(SbDifferenceLength(l, D, &length));
-  if (!(length > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecWAXPY(moved, length, D, U));
-  PetscCall(SbModelResidual(m, t, moved, NULL, NULL, PETSC_FALSE, R));
-  PetscCall(VecWAXPY(moved, -length, D, U));
-  PetscCall(SbModelResidual(m, t, moved, NULL, NULL, PETSC_FALSE, other));
-  PetscCall(VecAXPY(R, -1., other));
-  PetscCall(VecScale(R, 0.5 / length));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step)
 {
   SbQuantity *q = &l->quantity;
   const PetscReal scale = l->stored > 0. ? (q->most - q->least) / PetscSqrtReal(l->stored) : 0.;
 
   PetscFunctionBeginUser;
-  for (int i = 0; i < SB_ERROR_COUNT; i++)
-    q->error[i] = scale * (l->error[i] + (i == SB_ERROR_TIME ? l->offset : 0.));
+  for (int i = 0; i < SB_ERROR_COUNT; i++) q->error[i] = scale * SbLedgerError(l, i);
   if (!l->run->model->dynamic && q->kind != SB_QUANTITY_VOLUME) {
     const PetscReal both = PetscSqr(l->step_linear) + PetscSqr(l->step_nonlinear);
-    PetscReal left, energy;
-    Vec B, Z;
     const SbModel m = l->run->model;
-    PetscReal s, sums[2] = {0., 0.};
+    PetscReal left, energy, s, sums[2] = {0., 0.};
+    PetscInt its;
+    Vec B, Z;
 
     PetscCall(VecDuplicate(step->U, &B));
     PetscCall(VecDuplicate(step->U, &Z));
     // right-hand side: dQ/du at free unknowns
     if (q->kind == SB_QUANTITY_REACTION)
-      PetscCall(stiffness_times(l, step->t, step->U, q->weight, B));
+      PetscCall(SbStiffnessTimes(l, step->t, step->U, q->weight, PETSC_FALSE, B));
     else
       PetscCall(VecCopy(q->weight, B));
     PetscCall(SbSpaceZeroPrescribed(m->space, PETSC_TRUE, B));
@@ -170,7 +151,7 @@ PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step)
     left = PetscAbsReal(left) / PetscSqrtReal(PetscMax(both, PETSC_MIN_REAL));
     q->error[SB_ERROR_LINEAR] = left * l->step_linear;
     q->error[SB_ERROR_NONLINEAR] = left * l->step_nonlinear;
-    PetscCall(SbProbeSolve(l, ADJOINT, B, Z, NULL));
+    PetscCall(SbProbeSolve(l, ADJOINT, B, Z, &its));
     PetscCall(VecDot(B, Z, &energy));
     /* reaction: add the displacement of the support itself; Z is rigid without another support */
     if (q->kind == SB_QUANTITY_REACTION) PetscCall(VecAYPX(Z, -1., q->weight));

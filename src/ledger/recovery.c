@@ -17,7 +17,6 @@
   stress is quadratic in a cell, with p(X_v) at its vertices and, at the middle of an edge, the mean of the polynomials of its two ends.
 */
 #include "recovery.h"
-#include "sbelement.h"
 #include "sbkernel.h"
 #include <petscblaslapack.h>
 
@@ -28,13 +27,13 @@
 #define NVALUE 10         /* fitted values: nine of P, the pressure */
 
 struct _p_SbRecovery {
-  SbMesh mesh;       /* borrowed */
-  PetscInt nlayer;   /* largest number of materials around a vertex, all ranks */
+  SbMesh mesh;              /* borrowed */
+  const SbElement *element; /* [nbody] borrowed */
+  PetscInt nlayer;          /* largest number of materials around a vertex, all ranks */
   PetscInt *slot;    /* [ncell][4] index of the value of each corner of a cell: nlayer vertex + layer */
   PetscReal *weight; /* [ncell][4] weight of a cell's P in the value of a corner; 0: vertex not owned */
   PetscReal *value;  /* [nvert nlayer][9] recovered values */
   /* for P2; NULL without a P2 body */
-  PetscBool *quadratic;                /* [nbody] the body is P2 */
   PetscReal (*factor)[2][NFIT * NFIT]; /* [nvert_owned nlayer] Cholesky factors for P, pressure */
   struct Fit {
     PetscReal c[NVALUE][NFIT]; /* coefficients of the monomials of (X - X_v) / size */
@@ -42,43 +41,27 @@ struct _p_SbRecovery {
   } * fit;                     /* [nvert nlayer] */
 };
 
-/* Lists the materials of the cells around a vertex, ascending, in found[]; returns their number. */
-static PetscErrorCode list_materials(SbMesh mesh, PetscInt n, const PetscInt at[], PetscInt found[],
-                                     PetscInt *count)
-{
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < n; i++) found[i] = mesh->cell_material[at[i] / 4];
-  *count = n;
-  PetscCall(PetscSortRemoveDupsInt(count, found));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Lists the materials around each vertex on its owner, and finds the slot of each corner of each cell. */
 static PetscErrorCode create_slots(SbRecovery r)
 {
   SbMesh mesh = r->mesh;
-  PetscInt *start, *at, *found, *material, most = 1, longest = 0;
+  PetscInt *start, *at, *found, *count, *material, most = 1;
 
   PetscFunctionBeginUser;
-  /* corners 4 c + a of cells at each vertex: at[start[v]..start[v + 1]) */
+  /* corners 4 c + a of cells at each vertex, at[start[v]..start[v + 1]), and their materials, ascending, the first count[v] of found there */
   PetscCall(SbBucketByKey(4 * mesh->ncell, mesh->cell, mesh->nvert, &start, &at));
-  for (PetscInt v = 0; v < mesh->nvert_owned; v++) longest = PetscMax(longest, start[v + 1] - start[v]);
-  PetscCall(PetscMalloc1(longest, &found));
+  PetscCall(PetscMalloc2(4 * mesh->ncell, &found, mesh->nvert_owned, &count));
+  for (PetscInt i = 0; i < start[mesh->nvert_owned]; i++) found[i] = mesh->cell_material[at[i] / 4];
   for (PetscInt v = 0; v < mesh->nvert_owned; v++) {
-    PetscInt n;
-
-    PetscCall(list_materials(mesh, start[v + 1] - start[v], at + start[v], found, &n));
-    most = PetscMax(most, n);
+    count[v] = start[v + 1] - start[v];
+    PetscCall(PetscSortRemoveDupsInt(&count[v], found + start[v]));
+    most = PetscMax(most, count[v]);
   }
   PetscCallMPI(MPI_Allreduce(&most, &r->nlayer, 1, MPIU_INT, MPI_MAX, mesh->comm));
   PetscCall(PetscMalloc1(r->nlayer * (size_t)mesh->nvert, &material));
   for (PetscInt i = 0; i < r->nlayer * mesh->nvert; i++) material[i] = -1;
-  for (PetscInt v = 0; v < mesh->nvert_owned; v++) {
-    PetscInt n;
-
-    PetscCall(list_materials(mesh, start[v + 1] - start[v], at + start[v], found, &n));
-    PetscCall(PetscArraycpy(material + r->nlayer * v, found, n));
-  }
+  for (PetscInt v = 0; v < mesh->nvert_owned; v++)
+    PetscCall(PetscArraycpy(material + r->nlayer * v, found + start[v], count[v]));
   PetscCall(SbMeshBroadcastVertices(mesh, r->nlayer, MPIU_INT, material));
   PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &r->slot));
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
@@ -87,7 +70,7 @@ static PetscErrorCode create_slots(SbRecovery r)
       r->slot[i]++;
   }
   PetscCall(PetscFree(material));
-  PetscCall(PetscFree(found));
+  PetscCall(PetscFree2(found, count));
   PetscCall(PetscFree(start));
   PetscCall(PetscFree(at));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -128,8 +111,7 @@ static PetscErrorCode create_weights(SbRecovery r)
   PetscReal *moments, *row, p[4];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(10 * (size_t)n, &moments));
-  PetscCall(PetscMalloc1(4 * (size_t)n, &row));
+  PetscCall(PetscCalloc2(10 * (size_t)n, &moments, 4 * (size_t)n, &row));
   PetscCall(PetscCalloc1(4 * (size_t)mesh->ncell, &r->weight));
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
     PetscReal *sum = moments + 10 * r->slot[i];
@@ -148,8 +130,7 @@ static PetscErrorCode create_weights(SbRecovery r)
     monomials(mesh, i / 4, (int)(i % 4), p);
     for (int a = 0; a < 4; a++) r->weight[i] += row[4 * r->slot[i] + a] * p[a];
   }
-  PetscCall(PetscFree(moments));
-  PetscCall(PetscFree(row));
+  PetscCall(PetscFree2(moments, row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -157,7 +138,7 @@ static PetscErrorCode create_weights(SbRecovery r)
 
 static inline PetscBool is_quadratic(SbRecovery r, PetscInt cell)
 {
-  return r->quadratic[r->mesh->cell_body[cell]];
+  return (PetscBool)(r->element[r->mesh->cell_body[cell]]->nodes_per[1] > 0);
 }
 
 static void monomials_of(const PetscReal d[3], PetscReal size, PetscReal p[NFIT])
@@ -186,7 +167,7 @@ static void point_monomials(SbMesh mesh, PetscInt cell, int a, PetscReal size, P
   }
 }
 
-static PetscErrorCode create_quadratic(SbRecovery r, const PetscBool quadratic[])
+static PetscErrorCode create_quadratic(SbRecovery r)
 {
   SbMesh mesh = r->mesh;
   const PetscInt n = r->nlayer * mesh->nvert_owned;
@@ -195,10 +176,8 @@ static PetscErrorCode create_quadratic(SbRecovery r, const PetscBool quadratic[]
   PetscInt *ncell;
 
   PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < mesh->nbody; b++) any = (PetscBool)(any || quadratic[b]);
+  for (PetscInt b = 0; b < mesh->nbody; b++) any = (PetscBool)(any || r->element[b]->nodes_per[1]);
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(mesh->nbody, &r->quadratic));
-  PetscCall(PetscArraycpy(r->quadratic, quadratic, mesh->nbody));
   PetscCall(PetscCalloc1(r->nlayer * mesh->nvert, &r->fit));
   PetscCall(PetscCalloc1(n, &r->factor));
 
@@ -301,17 +280,18 @@ PetscReal SbRecoveryNode(SbRecovery r, PetscInt cell, int a, PetscReal P[9])
 
 /* ------------------------------------------------------------------ */
 
-PetscErrorCode SbRecoveryCreate(SbMesh mesh, const PetscBool quadratic[], SbRecovery *recovery)
+PetscErrorCode SbRecoveryCreate(SbMesh mesh, const SbElement element[], SbRecovery *recovery)
 {
   SbRecovery r;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&r));
   r->mesh = mesh;
+  r->element = element;
   PetscCall(create_slots(r));
   PetscCall(create_weights(r));
   PetscCall(PetscMalloc1(9 * (size_t)r->nlayer * mesh->nvert, &r->value));
-  PetscCall(create_quadratic(r, quadratic));
+  PetscCall(create_quadratic(r));
   *recovery = r;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -325,7 +305,6 @@ PetscErrorCode SbRecoveryDestroy(SbRecovery *recovery)
   PetscCall(PetscFree(r->slot));
   PetscCall(PetscFree(r->weight));
   PetscCall(PetscFree(r->value));
-  PetscCall(PetscFree(r->quadratic));
   PetscCall(PetscFree(r->factor));
   PetscCall(PetscFree(r->fit));
   PetscCall(PetscFree(*recovery));

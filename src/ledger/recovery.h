@@ -2,11 +2,12 @@
   recovery.h - a continuous stress field recovered from the stresses of the cells.
 */
 #pragma once
+#include "sbelement.h"
 #include "sbmesh.h"
 
 typedef struct _p_SbRecovery *SbRecovery;
-/* Collective. quadratic[nbody]: the body is P2. The mesh is borrowed; the caller destroys *recovery. */
-PetscErrorCode SbRecoveryCreate(SbMesh mesh, const PetscBool quadratic[], SbRecovery *recovery);
+/* Collective. Mesh and element[nbody] are borrowed; the caller destroys *recovery. */
+PetscErrorCode SbRecoveryCreate(SbMesh mesh, const SbElement element[], SbRecovery *recovery);
 /*
   SbRecoveryApply - values at the vertices from values in the cells.
 

@@ -6,28 +6,63 @@
   Solves: the iterations that halve the residual at the measured rate.
 */
 #include "ledger_impl.h"
+#include "sblog.h"
 
 #define WASTE 1e3 /* a source with an error smaller than the largest one by this factor is too accurate */
 #define WIDTH 79
 
-static const char *const names[SB_ERROR_COUNT] = {"space",  "time",    "nonlinear",
-                                                  "linear", "contact", "rounding"};
-
-/* ------------------------------------------------------------------ advice */
-
 #define ROOM 2048 /* length of the advice text */
 
-static PetscReal error_of(SbLedger l, int source)
+/* Seconds by source of error, and other seconds; on the slowest rank. */
+typedef struct {
+  PetscReal source[SB_ERROR_COUNT], setup, output, estimates, total;
+} Seconds;
+
+/*
+  space: residuals and tangents; linear: linear solves; nonlinear: both of these in Newton's iterations after the first of a step;
+  contact: search and active-set decisions; time: the remainder of the loop. Estimates are counted separately, including their
+  residuals and solves.
+*/
+static PetscErrorCode find_seconds(SbLedger l, Seconds *s)
 {
-  return l->error[source] + (source == SB_ERROR_TIME ? l->offset : 0.);
+  enum { ASSEMBLY, SOLVE, CONTACT, SEARCH, SETUP, OUTPUT, ESTIMATES, TOTAL, COUNT };
+  const SbRun run = l->run;
+  PetscReal phase[SB_PHASE_COUNT], t[COUNT], beyond;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbLogSeconds(phase));
+  t[ASSEMBLY] = phase[SB_PHASE_RESIDUAL] + phase[SB_PHASE_TANGENT] - l->residuals;
+  t[SOLVE] = phase[SB_PHASE_SOLVE] - l->solving;
+  t[CONTACT] = phase[SB_PHASE_CONTACT];
+  t[SEARCH] = phase[SB_PHASE_SEARCH];
+  t[SETUP] = phase[SB_PHASE_MESH] + phase[SB_PHASE_SETUP];
+  t[OUTPUT] = phase[SB_PHASE_OUTPUT];
+  t[ESTIMATES] = l->seconds;
+  t[TOTAL] = run->seconds_solve;
+  for (int i = 0; i < COUNT; i++) t[i] = PetscMax(t[i], 0.);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, t, COUNT, MPIU_REAL, MPI_MAX, run->model->comm));
+  beyond = run->newton_total > run->steps_total
+             ? 1. - (PetscReal)PetscMax(run->steps_total, 1) / (PetscReal)run->newton_total
+             : 0.;
+  *s = (Seconds){
+    .setup = t[SETUP], .output = t[OUTPUT], .estimates = t[ESTIMATES], .total = t[TOTAL] + t[SETUP]};
+  s->source[SB_ERROR_SPACE] = (1. - beyond) * t[ASSEMBLY];
+  s->source[SB_ERROR_LINEAR] = (1. - beyond) * t[SOLVE];
+  s->source[SB_ERROR_NONLINEAR] = beyond * (t[ASSEMBLY] + t[SOLVE]);
+  s->source[SB_ERROR_CONTACT] = t[CONTACT] + t[SEARCH];
+  s->source[SB_ERROR_TIME] =
+    PetscMax(0., t[TOTAL] - t[ASSEMBLY] - t[SOLVE] - t[CONTACT] - t[SEARCH] - t[OUTPUT] - t[ESTIMATES]);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+/* ------------------------------------------------------------------ advice */
 
 /* Root of the sum of squares: errors of different sources are independent. */
 static PetscReal together(SbLedger l)
 {
   PetscReal sum = 0.;
 
-  for (int i = 0; i < SB_ERROR_COUNT; i++) sum += PetscSqr(error_of(l, i));
+  for (int i = 0; i < SB_ERROR_COUNT; i++) sum += PetscSqr(SbLedgerError(l, i));
   return PetscSqrtReal(sum);
 }
 
@@ -36,7 +71,7 @@ static int largest(SbLedger l)
   int most = 0;
 
   for (int i = 1; i < SB_ERROR_COUNT; i++) {
-    if (error_of(l, i) > error_of(l, most)) most = i;
+    if (SbLedgerError(l, i) > SbLedgerError(l, most)) most = i;
   }
   return most;
 }
@@ -85,7 +120,7 @@ static PetscReal growth(SbRun run)
 }
 
 /* Cost of halving the error of a source, as a factor on the time of the run. */
-static PetscReal cost(SbLedger l, const SbLedgerSeconds *s, int source)
+static PetscReal cost(SbLedger l, const Seconds *s, int source)
 {
   const SbRun run = l->run;
   const PetscReal total = PetscMax(s->total, 1e-9), solving = s->source[SB_ERROR_LINEAR] / total;
@@ -133,7 +168,7 @@ static void say_quadratic(SbLedger l, PetscReal cost_of_half, char w[ROOM])
     m->body[body].name, (double)(1. / PetscSqrtReal(r)), (double)times);
 }
 
-static void say_largest(SbLedger l, const SbLedgerSeconds *s, char w[ROOM])
+static void say_largest(SbLedger l, const Seconds *s, char w[ROOM])
 {
   static const char *const what[SB_ERROR_COUNT] = {
     "the mesh is the largest source of error: halving it takes edges of %.3g times the length",
@@ -145,7 +180,7 @@ static void say_largest(SbLedger l, const SbLedgerSeconds *s, char w[ROOM])
   const int most = largest(l);
   const SbRun run = l->run;
 
-  if (!(error_of(l, most) > 0.)) {
+  if (!(SbLedgerError(l, most) > 0.)) {
     SbAppend(ROOM, w, "No error was found that could be distinguished from zero. ");
     return;
   }
@@ -165,7 +200,7 @@ static void say_largest(SbLedger l, const SbLedgerSeconds *s, char w[ROOM])
 }
 
 /* Settings that are more accurate than needed, and cost time. */
-static void say_wasted(SbLedger l, const SbLedgerSeconds *s, char w[ROOM])
+static void say_wasted(SbLedger l, const Seconds *s, char w[ROOM])
 {
   static const struct {
     int source;
@@ -173,11 +208,11 @@ static void say_wasted(SbLedger l, const SbLedgerSeconds *s, char w[ROOM])
   } of[] = {{SB_ERROR_LINEAR, "-ksp_rtol (with Newton's method -snes_rtol)"},
             {SB_ERROR_NONLINEAR, "-snes_rtol"},
             {SB_ERROR_TIME, "-ts_dt"}};
-  const PetscReal most = error_of(l, largest(l));
+  const PetscReal most = SbLedgerError(l, largest(l));
 
   if (l->may_tune) return; /* the adaptive tolerance sets them */
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
-    const PetscReal e = error_of(l, of[i].source);
+    const PetscReal e = SbLedgerError(l, of[i].source);
     const PetscReal spent = s->source[of[i].source] / PetscMax(s->total, 1e-9);
 
     if (!(e > 0.) || e * WASTE > most || (of[i].source != SB_ERROR_TIME && spent < 0.1)) continue;
@@ -232,7 +267,7 @@ static void report_accuracy(SbLedger l, char w[ROOM])
 
 /* ------------------------------------------------------------------ table */
 
-static PetscErrorCode write_table(SbLedger l, const SbLedgerSeconds *s, FILE *f)
+static PetscErrorCode write_table(SbLedger l, const Seconds *s, FILE *f)
 {
   const SbModel m = l->run->model;
   const PetscReal scale = l->stored > 0. ? 1. / PetscSqrtReal(l->stored) : 0.;
@@ -241,8 +276,8 @@ static PetscErrorCode write_table(SbLedger l, const SbLedgerSeconds *s, FILE *f)
   PetscCall(
     PetscFPrintf(PETSC_COMM_SELF, f, "source,body,error,relative,quantity,seconds\n#,,J^(1/2),1,SI,s\n"));
   for (int i = 0; i < SB_ERROR_COUNT; i++)
-    PetscCall(PetscFPrintf(PETSC_COMM_SELF, f, "%s,,%.17g,%.17g,%.17g,%.17g\n", names[i],
-                           (double)error_of(l, i), (double)(scale * error_of(l, i)),
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, f, "%s,,%.17g,%.17g,%.17g,%.17g\n", SbErrorNames[i],
+                           (double)SbLedgerError(l, i), (double)(scale * SbLedgerError(l, i)),
                            (double)l->quantity.error[i], (double)s->source[i]));
   for (PetscInt b = 0; b < m->nbody; b++)
     PetscCall(PetscFPrintf(PETSC_COMM_SELF, f, "space,%s,%.17g,%.17g,,\n", m->body[b].name,
@@ -283,7 +318,7 @@ PetscErrorCode SbLedgerReport(SbLedger l, const char *file, PetscBool quiet)
   static const char *const notes[SB_ERROR_COUNT] = {
     "residual, tangent", "steps", "iterations after the first", "linear solves", "contact, search", ""};
   static const char *const quantities[] = {"", "of u, m", "of F, N", "of V, m^3"};
-  SbLedgerSeconds s;
+  Seconds s;
   PetscMPIInt rank;
   char words[ROOM] = "";
   FILE *f;
@@ -294,7 +329,7 @@ PetscErrorCode SbLedgerReport(SbLedger l, const char *file, PetscBool quiet)
 
   PetscFunctionBeginUser;
   if (!l) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbLedgerGetSeconds(l, &s));
+  PetscCall(find_seconds(l, &s));
   PetscCallMPI(MPI_Comm_rank(l->run->model->comm, &rank));
   if (rank) PetscFunctionReturn(PETSC_SUCCESS);
   f = fopen(file, "w");
@@ -309,7 +344,7 @@ PetscErrorCode SbLedgerReport(SbLedger l, const char *file, PetscBool quiet)
                         "J^(1/2)", "relative", quantities[l->quantity.kind], "seconds", "",
                         (double)l->stored));
   for (int i = 0; i < SB_ERROR_COUNT; i++) {
-    PetscCall(print_line(names[i], error_of(l, i), scale * error_of(l, i), q ? &q[i] : NULL,
+    PetscCall(print_line(SbErrorNames[i], SbLedgerError(l, i), scale * SbLedgerError(l, i), q ? &q[i] : NULL,
                          i == SB_ERROR_ROUNDING ? -1. : s.source[i], s.total, notes[i]));
     for (PetscInt b = 0; i == SB_ERROR_SPACE && m->nbody > 1 && b < m->nbody; b++) {
       char name[16];

@@ -261,7 +261,8 @@ PetscErrorCode SbRemeshAttach(SbRemesh r, SbRun run)
 {
   PetscFunctionBeginUser;
   if (!r) PetscFunctionReturn(PETSC_SUCCESS);
-  SbRunSetPause(run, check_quality, r);
+  run->after.fn = check_quality;
+  run->after.ctx = r;
   if (!r->meshes) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(r->column));
   PetscCall(PetscMalloc1(run->ncolumn + 3, &r->column));
@@ -445,7 +446,6 @@ static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
     scene->run->t0 = scene->run->t_now;
     scene->run->newton_before = scene->run->newton_total;
     scene->run->linear_before = scene->run->linear_total;
-    scene->run->rejected_seen = 0;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -307,7 +307,6 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
              "-static_control arc_length does not know re-meshing: leave the options -remesh_ out");
   PetscCall(create(run, &p));
   PetscCall(SbRunStepAccepted(run, step, factor, 0., last));
-  run->newton_step = run->linear_step = run->rejected_step = 0;
   PetscCall(product(&p, run->path, run->path, &l));
   l = PetscSqrtReal(l);
   while (!last) {
@@ -338,7 +337,6 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
     /* a step along it, halved on failure */
     PetscCall(attempt(&p, factor, l, sign, &its, &ok));
     if (!ok) {
-      run->rejected_step++;
       run->rejected_total++;
       run->tangent_known = PETSC_FALSE;
       if (run->stopped) {
@@ -383,7 +381,6 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
     if (!last) PetscCall(SbRunStopAsked(run, step + 1, p.factor, PETSC_FALSE));
     last = (PetscBool)(last || run->stopped);
     PetscCall(SbRunStepAccepted(run, ++step, p.factor, p.factor - factor, last));
-    run->newton_step = run->linear_step = run->rejected_step = 0;
     factor = p.factor;
   }
   if (run->stop_reason[0] && !run->stopped) PetscCall(explain(run, factor, l));

@@ -5,21 +5,15 @@
 #include "sbsolver.h"
 #include "time_impl.h"
 
-/* Whether J is still the tangent for these shifts. */
-static PetscBool tangent_is_current(SbRun run, PetscReal shift_v, PetscReal shift_a)
-{
-  const PetscReal tiny = 1e-10;
-
-  return (PetscBool)(run->model->linear && run->tangent_known &&
-                     PetscAbsReal(run->shift_v - shift_v) <= tiny * shift_v &&
-                     PetscAbsReal(run->shift_a - shift_a) <= tiny * shift_a);
-}
+#define TINY 1e-10 /* relative difference of shifts that are the same */
 
 static PetscErrorCode form_tangent(SbRun run, PetscReal t, PetscReal shift_v, PetscReal shift_a, Vec U, Vec V,
                                    Mat P)
 {
   PetscFunctionBeginUser;
-  if (tangent_is_current(run, shift_v, shift_a)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (run->model->linear && run->tangent_known && PetscAbsReal(run->shift_v - shift_v) <= TINY * shift_v &&
+      PetscAbsReal(run->shift_a - shift_a) <= TINY * shift_a)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbModelTangent(run->model, t, shift_v, shift_a, 1., U, V, P));
   /* a rotated preconditioner needs the displacement of the matrix */
   if (run->solver_used->precondition)
@@ -51,26 +45,22 @@ static PetscErrorCode multiply(Mat A, Vec x, Vec y)
 
 PetscErrorCode SbFormCreateOperator(SbRun run)
 {
-  PetscInt m, n, M, N;
+  const PetscInt n = 3 * run->model->space->nnode_owned;
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceCreateVec(run->model->space, &run->nonsymmetric.U));
   PetscCall(SbSpaceCreateVec(run->model->space, &run->nonsymmetric.x));
   PetscCall(SbSpaceCreateVec(run->model->space, &run->nonsymmetric.y));
-  PetscCall(MatGetLocalSize(run->J, &m, &n));
-  PetscCall(MatGetSize(run->J, &M, &N));
-  PetscCall(MatCreateShell(run->model->comm, m, n, M, N, run, &run->operator));
+  PetscCall(MatCreateShell(run->model->comm, n, n, PETSC_DETERMINE, PETSC_DETERMINE, run, &run->operator));
   PetscCall(MatShellSetOperation(run->operator, MATOP_MULT, SB_OPERATION(multiply)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbFormI2Function(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *ctx)
 {
-  SbRun run = (SbRun)ctx;
-
   PetscFunctionBeginUser;
   (void)ts;
-  PetscCall(SbModelResidual(run->model, t, U, V, A, PETSC_TRUE, F));
+  PetscCall(SbModelResidual(((SbRun)ctx)->model, t, U, V, A, PETSC_TRUE, F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -113,18 +103,16 @@ PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A)
 {
   SbSpace s = run->model->space;
   PetscScalar *a;
-  Vec F;
 
   PetscFunctionBeginUser;
-  PetscCall(VecDuplicate(U, &F));
-  PetscCall(SbModelResidual(run->model, t, U, V, NULL, PETSC_TRUE, F));
+  PetscCall(SbModelResidual(run->model, t, U, V, NULL, PETSC_TRUE, A));
   if (s->consistent_mass) {
     Mat M;
     KSP ksp;
     PC pc;
 
     /* with the consistent mass the system is solved by CG to rounding; the lumped mass is a division */
-    PetscCall(SbSpaceCreateMatrix(run->model->space, SB_MATRIX_BAIJ, &M));
+    PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_BAIJ, &M));
     PetscCall(SbModelTangent(run->model, 0., 0., 1., 0., run->U, run->V, M));
     PetscCall(KSPCreate(run->model->comm, &ksp));
     PetscCall(KSPSetOptionsPrefix(ksp, "mass_"));
@@ -133,11 +121,10 @@ PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A)
     PetscCall(KSPGetPC(ksp, &pc));
     PetscCall(PCSetType(pc, PCJACOBI));
     PetscCall(KSPSetTolerances(ksp, 1e-14, PETSC_DEFAULT, PETSC_DEFAULT, 500));
-    PetscCall(KSPSolve(ksp, F, A));
+    PetscCall(KSPSolve(ksp, A, A));
     PetscCall(KSPDestroy(&ksp));
     PetscCall(MatDestroy(&M));
   } else {
-    PetscCall(VecCopy(F, A));
     PetscCall(VecGetArray(A, &a));
     /* supports have no mass, and are prescribed */
     for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
@@ -145,6 +132,5 @@ PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A)
     PetscCall(VecRestoreArray(A, &a));
   }
   PetscCall(VecScale(A, -1.));
-  PetscCall(VecDestroy(&F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

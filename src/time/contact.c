@@ -16,8 +16,7 @@
 
 /* Tolerances of the solvers as set by the user. */
 typedef struct {
-  PetscReal atol, rtol, stol, linear_rtol, linear_atol, dtol;
-  PetscInt max_it, max_f, linear_max;
+  PetscReal atol, rtol, linear_rtol, linear_atol;
   KSP ksp;
   PetscBool single; /* one linear solve per step instead of Newton's method */
 } Aim;
@@ -31,7 +30,7 @@ static PetscErrorCode set_aim(SNES snes, const Aim *aim, PetscReal size, PetscRe
   const PetscReal linear = (aim->single ? 1 : 0.1) * PetscMax(least, part * size);
 
   PetscFunctionBeginUser;
-  PetscCall(SNESSetTolerances(snes, atol, aim->rtol, aim->stol, aim->max_it, aim->max_f));
+  PetscCall(SNESSetTolerances(snes, atol, aim->rtol, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
   PetscCall(KSPSetTolerances(aim->ksp, PETSC_DEFAULT, PetscMax(aim->linear_atol, linear), PETSC_DEFAULT,
                              PETSC_DEFAULT));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -41,10 +40,9 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
 {
   const SbModel m = run->model;
   const SNES snes = run->snes;
-  const PetscReal t = step->t, dt = step->dt;
-  const Vec U0 = step->U0, U = step->U;
+  const Vec U = step->U;
   const PetscBool projected = (PetscBool)(m->space->constraints && !SbConstraintsSeparate(m->space));
-  PetscBool again = PETSC_TRUE, given_up, rough, constrained;
+  PetscBool again = PETSC_TRUE, rough, constrained;
   PetscReal size, least = 0;
   Aim aim;
 
@@ -54,12 +52,12 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
 
   /* tolerances as set by the user */
   PetscCall(SNESGetKSP(snes, &aim.ksp));
-  PetscCall(SNESGetTolerances(snes, &aim.atol, &aim.rtol, &aim.stol, &aim.max_it, &aim.max_f));
-  PetscCall(KSPGetTolerances(aim.ksp, &aim.linear_rtol, &aim.linear_atol, &aim.dtol, &aim.linear_max));
+  PetscCall(SNESGetTolerances(snes, &aim.atol, &aim.rtol, NULL, NULL, NULL));
+  PetscCall(KSPGetTolerances(aim.ksp, &aim.linear_rtol, &aim.linear_atol, NULL, NULL));
   PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &aim.single));
 
   /* the initial active set */
-  PetscCall(SbModelContactBeginStep(m, t, dt, U0, run->V, U));
+  PetscCall(SbModelContactBeginStep(m, step->t, step->dt, step->U0, run->V, U));
   constrained = SbSpaceIsConstrained(m->space);
   rough = (PetscBool)(constrained && m->dynamic);
   /* the matrix has the old constraints */
@@ -75,19 +73,20 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
   PetscCall(SNESComputeFunction(snes, U, run->R));
   PetscCall(VecNorm(run->R, NORM_2, &size));
   if (PetscIsInfOrNanReal(size)) size = 0;
-  if (constrained) PetscCall(set_aim(snes, &aim, size, least, rough)); /* else the user's tolerances */
-  PetscCall(SbSolverUpdateSymmetry(aim.ksp, m->space));
-  PetscCall((*step->solve)(step->ctx, U, reason));
 
-  /* repeat until the active set does not change */
-  for (PetscInt round = 1; *reason > 0; round++) {
+  /* solves until the active set does not change; the first one without contact has the user's tolerances */
+  for (PetscInt round = 1;; round++) {
+    if (constrained || round > 1) PetscCall(set_aim(snes, &aim, size, least, rough));
+    PetscCall(SbSolverUpdateSymmetry(aim.ksp, m->space));
+    PetscCall((*step->solve)(step->ctx, U, reason));
+    if (*reason <= 0) break;
     run->contact_round = round;
     PetscCall((*step->residual)(step->ctx, U, run->R));
     m->space->rough = rough;
-    PetscCall(SbModelContactUpdateActiveSet(m, t + dt, U, run->R, &again));
+    PetscCall(SbModelContactUpdateActiveSet(m, step->t + step->dt, U, run->R, &again));
     if (round == 1 && run->may_end_at_impact) {
       /* the first time of impact, if the step may end there */
-      PetscCall(SbModelContactTimeOfImpact(run->model, &run->time_of_impact));
+      PetscCall(SbModelContactTimeOfImpact(m, &run->time_of_impact));
       if (run->time_of_impact < SB_TIME_OF_IMPACT_LEAST || run->time_of_impact > 1. - SB_TIME_OF_IMPACT_LEAST)
         run->time_of_impact = 1.;
       if (run->time_of_impact < 1.) *reason = SNES_CONVERGED_ITERATING;
@@ -95,14 +94,11 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
     if ((!again && !rough) || !*reason) break;
     if (!again || round == ROUGH_ROUNDS) rough = PETSC_FALSE;
     if (projected || !m->dynamic) run->tangent_known = PETSC_FALSE;
-    PetscCall(SbRunGiveUp(run, &given_up));
-    if (given_up || round == SB_CONTACT_ROUNDS) {
+    PetscCall(SbRunStopAsked(run, run->step_now, run->t_now, PETSC_TRUE));
+    if (run->stopped || round == SB_CONTACT_ROUNDS) {
       *reason = SNES_DIVERGED_MAX_IT;
       break;
     }
-    PetscCall(set_aim(snes, &aim, size, least, rough));
-    PetscCall(SbSolverUpdateSymmetry(aim.ksp, m->space));
-    PetscCall((*step->solve)(step->ctx, U, reason));
   }
   PetscCall(set_aim(snes, &aim, 0, 0, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);

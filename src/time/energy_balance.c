@@ -28,26 +28,6 @@ PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Work of reactions along rotations beyond that of their mean along the chord, J; this rank's. */
-static PetscErrorCode turning_work(SbRun run, PetscReal t, PetscReal dt, Vec reaction, PetscReal *work)
-{
-  const SbModel m = run->model;
-  const PetscScalar *before, *now;
-  PetscReal one;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecGetArrayRead(run->reaction, &before));
-  PetscCall(VecGetArrayRead(reaction, &now));
-  for (PetscInt e = 0; e < m->nprescribe; e++) {
-    if (!m->prescribe[e]->ops.turning_work) continue;
-    SbEffectCall(m->prescribe[e], turning_work, m->space, t - dt, t, before, now, &one);
-    *work += one;
-  }
-  PetscCall(VecRestoreArrayRead(reaction, &now));
-  PetscCall(VecRestoreArrayRead(run->reaction, &before));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool first)
 {
   SbModel m = run->model;
@@ -64,6 +44,8 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   PetscCall(SbRunReactions(run, t, reaction));
   if (run->damped) PetscCall(SbModelDampingPower(m, run->U, run->V, &power));
   if (!first) {
+    const PetscScalar *before, *now;
+    PetscReal one;
     Vec moved;
 
     /* twice the work of the loads and of reactions: at prescribed unknowns, and where contact acts now or did a step ago */
@@ -75,7 +57,17 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
     PetscCall(VecDot(reaction, moved, &work[2]));
     PetscCall(VecDot(run->reaction, moved, &work[3]));
     PetscCall(VecDestroy(&moved));
-    PetscCall(turning_work(run, t, dt, reaction, &own[1]));
+
+    /* work of reactions along rotations beyond that of their mean along the chord */
+    PetscCall(VecGetArrayRead(run->reaction, &before));
+    PetscCall(VecGetArrayRead(reaction, &now));
+    for (PetscInt k = 0; k < m->nprescribe; k++) {
+      if (!m->prescribe[k]->ops.turning_work) continue;
+      SbEffectCall(m->prescribe[k], turning_work, m->space, t - dt, t, before, now, &one);
+      own[1] += one;
+    }
+    PetscCall(VecRestoreArrayRead(reaction, &now));
+    PetscCall(VecRestoreArrayRead(run->reaction, &before));
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, own, 2, MPIU_REAL, MPI_SUM, m->comm));
     e->load_work += 0.5 * (work[0] + work[1]) + own[0];
     e->prescribed_work += 0.5 * (work[2] + work[3]) + own[1];

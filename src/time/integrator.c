@@ -17,13 +17,11 @@
 #define FORCING 0.1         /* loosest relative tolerance of Newton's linear solves */
 #define FORCING_BESIDE 1e-6 /* the same where the matrix lacks a part of the tangent */
 
-const char *const SbIntegrators =
-  "euler_implicit|newmark|genalpha|euler_symplectic|euler_explicit|alpha2|static";
+#define NAMES "euler_implicit|newmark|genalpha|euler_symplectic|euler_explicit|alpha2|static"
+const char *const SbIntegrators = NAMES;
 
 static const SbOption rows[] = {
-  {"time", SB_OPTION_CHOICE, 1, "", "euler_implicit",
-   "euler_implicit|newmark|genalpha|euler_symplectic|euler_explicit|alpha2|static",
-   "time integrator, or static equilibrium"},
+  {"time", SB_OPTION_CHOICE, 1, "", "euler_implicit", NAMES, "time integrator, or static equilibrium"},
   {"ts_dt", SB_OPTION_REAL, 1, "s", "0.01", "(0, inf)",
    "length of a time step (the first one with -ts_adapt_type basic); explicit integrators take 0.9 of the "
    "stable step unless given"},
@@ -93,14 +91,14 @@ PetscErrorCode SbTimeRegister(void)
 }
 
 /* Options of the arc-length method, which needs exact tangents: `auto` becomes exact. */
-static PetscErrorCode read_arc_length(SbRun run, const SbScope *scope)
+static PetscErrorCode read_arc_length(SbRun run)
 {
   const SbModel m = run->model;
 
   PetscFunctionBeginUser;
-  PetscCall(SbOptionInt(scope, "static_max_steps", &run->arc.steps));
-  PetscCall(SbOptionReal(scope, "static_max_displacement", &run->arc.displacement));
-  PetscCall(SbOptionReal(scope, "static_longest_step", &run->arc.longest));
+  PetscCall(SbOptionInt(&SbRunScope, "static_max_steps", &run->arc.steps));
+  PetscCall(SbOptionReal(&SbRunScope, "static_max_displacement", &run->arc.displacement));
+  PetscCall(SbOptionReal(&SbRunScope, "static_longest_step", &run->arc.longest));
   for (PetscInt k = 0; k < m->nmaterial; k++) {
     char option[3 * SB_NAME_MAX];
     PetscBool given;
@@ -120,7 +118,6 @@ static PetscErrorCode read_arc_length(SbRun run, const SbScope *scope)
 PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
 {
   SbRun r;
-  SbScope scope;
   PetscInt preset, predictor, inverted, control;
   PetscBool barrier = PETSC_FALSE;
 
@@ -128,8 +125,7 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
   PetscCall(PetscNew(&r));
   r->barrier_weight = 1.;
   r->model = model;
-  PetscCall(SbScopeSet(&scope, "", "", ""));
-  PetscCall(SbOptionChoice(&scope, "time", &preset));
+  PetscCall(SbOptionChoice(&SbRunScope, "time", &preset));
   r->preset = (SbIntegrator)preset;
   model->dynamic = (PetscBool)(r->preset != SB_TIME_STATIC);
   if (model->dynamic) {
@@ -140,73 +136,69 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
     PetscCall(PetscOptionsHasName(NULL, NULL, "-ts_dt", &given));
     PetscCall(PetscOptionsGetString(NULL, NULL, "-ts_time_step", text, sizeof(text), &given_new));
     if (given_new && !given) PetscCall(PetscOptionsSetValue(NULL, "-ts_dt", text));
-    PetscCall(SbOptionReal(&scope, "ts_dt", &r->dt));
-    PetscCall(SbOptionGiven(&scope, "ts_dt", &r->dt_given));
-    PetscCall(SbOptionReal(&scope, "ts_max_time", &r->t_end));
-    PetscCall(SbOptionChoice(&scope, "time_predictor", &predictor));
+    PetscCall(SbOptionReal(&SbRunScope, "ts_dt", &r->dt));
+    PetscCall(SbOptionGiven(&SbRunScope, "ts_dt", &r->dt_given));
+    PetscCall(SbOptionReal(&SbRunScope, "ts_max_time", &r->t_end));
+    PetscCall(SbOptionChoice(&SbRunScope, "time_predictor", &predictor));
     r->velocity_predictor = (PetscBool)(predictor == 1);
   } else {
-    PetscCall(SbOptionInt(&scope, "static_steps", &r->static_steps));
-    PetscCall(SbOptionReal(&scope, "static_min_increment", &r->min_increment));
-    PetscCall(SbOptionChoice(&scope, "static_control", &control));
+    PetscCall(SbOptionInt(&SbRunScope, "static_steps", &r->static_steps));
+    PetscCall(SbOptionReal(&SbRunScope, "static_min_increment", &r->min_increment));
+    PetscCall(SbOptionChoice(&SbRunScope, "static_control", &control));
     r->arc.on = (PetscBool)(control == 1);
     r->t_end = 1.;
     r->dt = 1. / (PetscReal)r->static_steps;
   }
   if (r->preset == SB_TIME_GENALPHA || r->preset == SB_TIME_ALPHA2)
-    PetscCall(SbOptionReal(&scope, "time_spectral_radius", &r->spectral_radius));
+    PetscCall(SbOptionReal(&SbRunScope, "time_spectral_radius", &r->spectral_radius));
   if (r->preset == SB_TIME_NEWMARK) {
-    PetscCall(SbOptionReal(&scope, "time_newmark_beta", &r->newmark[0]));
-    PetscCall(SbOptionReal(&scope, "time_newmark_gamma", &r->newmark[1]));
+    PetscCall(SbOptionReal(&SbRunScope, "time_newmark_beta", &r->newmark[0]));
+    PetscCall(SbOptionReal(&SbRunScope, "time_newmark_gamma", &r->newmark[1]));
   }
-  PetscCall(SbRunReadStop(r, &scope));
-  PetscCall(SbOptionInt(&scope, "time_max_halvings", &r->max_halvings));
-  PetscCall(SbOptionChoice(&scope, "time_inverted", &inverted));
+  PetscCall(SbRunReadStop(r));
+  PetscCall(SbOptionInt(&SbRunScope, "time_max_halvings", &r->max_halvings));
+  PetscCall(SbOptionChoice(&SbRunScope, "time_inverted", &inverted));
   r->reject_inverted = (PetscBool)(inverted == 2);
   for (PetscInt k = 0; k < model->nmaterial && !inverted && !model->dynamic && !r->arc.on; k++)
     r->reject_inverted = (PetscBool)(r->reject_inverted || model->material[k]->softens);
   PetscCheck(
     !r->reject_inverted || r->preset != SB_TIME_ALPHA2, PETSC_COMM_SELF, PETSC_ERR_USER,
     "-time_inverted reject: -time alpha2 cannot reject steps; take genalpha, which is the same method");
-  for (PetscInt e = 0; e < model->neffect; e++)
+  for (PetscInt e = 0; e < model->neffect; e++) {
     r->saddle = (PetscBool)(r->saddle || model->effect[e]->saddle);
-  if (r->saddle) PetscCall(SbOptionChoice(&scope, "saddle_solver", &r->saddle_choice));
-  for (PetscInt e = 0; e < model->neffect; e++)
     barrier = (PetscBool)(barrier || model->effect[e]->ops.hessian);
-  if (barrier) PetscCall(SbOptionChoice(&scope, "contact_solver", &r->contact_choice));
+  }
+  if (r->saddle) PetscCall(SbOptionChoice(&SbRunScope, "saddle_solver", &r->saddle_choice));
+  if (barrier) PetscCall(SbOptionChoice(&SbRunScope, "contact_solver", &r->contact_choice));
   PetscCall(SbSolverSetFromOptions(r->solver_choice, sizeof(r->solver_choice)));
-  if (r->arc.on) PetscCall(read_arc_length(r, &scope));
+  if (r->arc.on) PetscCall(read_arc_length(r));
   *run = r;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fills the parameters of a preset's method. */
-static void method_settings(SbRun run, SbMethodSettings *set)
+/* The parameters of a preset's method. */
+static SbMethodSettings method_settings(SbRun run)
 {
-  *set =
-    (SbMethodSettings){.method = SB_METHOD_EULER_IMPLICIT,
-                       .alpha_m = 1.,
-                       .alpha_f = 1.,
-                       .beta = 0.25,
-                       .gamma = 0.5,
-                       .impulses = (PetscBool)(run->preset == SB_TIME_NEWMARK && run->model->nbegin_step),
-                       .separate = (PetscBool)(run->preset == SB_TIME_NEWMARK && run->model->npotential)};
-  if (run->preset == SB_TIME_NEWMARK) {
-    set->method = SB_METHOD_GENERALIZED_ALPHA;
-    set->beta = run->newmark[0];
-    set->gamma = run->newmark[1];
-  } else if (run->preset == SB_TIME_GENALPHA) {
-    const PetscReal r = run->spectral_radius;
+  const PetscReal r = run->spectral_radius, m = (2. - r) / (1. + r), f = 1. / (1. + r);
 
-    set->method = SB_METHOD_GENERALIZED_ALPHA;
-    set->alpha_m = (2. - r) / (1. + r);
-    set->alpha_f = 1. / (1. + r);
-    set->gamma = 0.5 + set->alpha_m - set->alpha_f;
-    set->beta = 0.25 * PetscSqr(1. + set->alpha_m - set->alpha_f);
-  } else if (run->preset == SB_TIME_EULER_EXPLICIT) {
-    set->method = SB_METHOD_EULER_EXPLICIT;
-  } else if (run->preset == SB_TIME_EULER_SYMPLECTIC) {
-    set->method = SB_METHOD_EULER_SYMPLECTIC;
+  switch (run->preset) {
+  case SB_TIME_NEWMARK:
+    return (SbMethodSettings){.method = SB_METHOD_GENERALIZED_ALPHA,
+                              .alpha_m = 1.,
+                              .alpha_f = 1.,
+                              .beta = run->newmark[0],
+                              .gamma = run->newmark[1],
+                              .impulses = (PetscBool)(run->model->nbegin_step > 0),
+                              .separate = (PetscBool)(run->model->npotential > 0)};
+  case SB_TIME_GENALPHA:
+    return (SbMethodSettings){
+      SB_METHOD_GENERALIZED_ALPHA, m, f, 0.25 * PetscSqr(1. + m - f), 0.5 + m - f, PETSC_FALSE, PETSC_FALSE};
+  default:
+    return (SbMethodSettings){.method = run->preset == SB_TIME_EULER_EXPLICIT     ? SB_METHOD_EULER_EXPLICIT
+                                        : run->preset == SB_TIME_EULER_SYMPLECTIC ? SB_METHOD_EULER_SYMPLECTIC
+                                                                                  : SB_METHOD_EULER_IMPLICIT,
+                              .alpha_m = 1.,
+                              .alpha_f = 1.};
   }
 }
 
@@ -231,11 +223,10 @@ static double complex alpha_eigenvalue(const SbMethodSettings *s, double w)
 
 void SbRunLocalError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead)
 {
+  const SbMethodSettings s = method_settings(run);
   const double w = 0.03;
-  SbMethodSettings s;
   double complex z;
 
-  method_settings(run, &s);
   *ahead = 0;
   *order = 1;
   switch (s.method) {
@@ -257,12 +248,21 @@ void SbRunLocalError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead)
   *c = (PetscReal)(cabs(z - cexp(I * w)) / pow(w, (double)*order + 1));
 }
 
-/* SNES: Newton for nonlinear models, one linear solve for linear ones; tolerances independent of units. */
+/*
+  SNES: Newton for nonlinear models, one linear solve for linear ones; tolerances independent of units. PETSc's own options override all
+  settings so far, those of the TS as well.
+
+  Tolerance of Newton's linear solves by its progress (Eisenstat and Walker), unless the user sets a tolerance. In a static run where the
+  matrix lacks a part of the tangent (the free rim of a follower pressure), a factorisation is no exact solve, and changes of volume dominate
+  the residual over bending: with loose solves Newton's method converges only linearly near nu = 1/2.
+*/
 static PetscErrorCode set_up_snes(SbRun run)
 {
-  SbModel m = run->model;
+  const SbModel m = run->model;
+  const SNES snes = run->snes;
+  const PetscReal most = !m->dynamic && m->nnonsymmetric ? FORCING_BESIDE : FORCING;
   PetscReal force = 0.;
-  PetscBool asked;
+  PetscBool asked, newton, rtol;
 
   PetscFunctionBeginUser;
   /* rounding of the internal forces: residuals below 1e-13 of (stress modulus) x (area of the body) are meaningless; near
@@ -274,28 +274,22 @@ static PetscErrorCode set_up_snes(SbRun run)
   }
   /* PETSc's line searches need PETSc's Newton loop, and TSALPHA2 has its own stages */
   PetscCall(PetscOptionsHasName(NULL, NULL, "-snes_linesearch_type", &asked));
-  PetscCall(SNESSetType(run->snes, m->linear                                ? SNESKSPONLY
-                                   : asked || run->preset == SB_TIME_ALPHA2 ? SNESNEWTONLS
-                                                                            : SB_SNES_NEWTON));
-  PetscCall(SNESSetDivergenceTolerance(run->snes, SB_UNLIMITED_REAL));
-  PetscCall(SNESSetTolerances(run->snes, 1e-13 * force, m->dynamic ? 1e-6 : 1e-8, 0., SB_NEWTON_ITERATIONS,
-                              SB_UNLIMITED));
-  PetscCall(SNESSetErrorIfNotConverged(run->snes, PETSC_FALSE));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+  PetscCall(SNESSetType(snes, m->linear                                ? SNESKSPONLY
+                              : asked || run->preset == SB_TIME_ALPHA2 ? SNESNEWTONLS
+                                                                       : SB_SNES_NEWTON));
+  PetscCall(SNESSetDivergenceTolerance(snes, SB_UNLIMITED_REAL));
+  PetscCall(
+    SNESSetTolerances(snes, 1e-13 * force, m->dynamic ? 1e-6 : 1e-8, 0., SB_NEWTON_ITERATIONS, SB_UNLIMITED));
+  PetscCall(SNESSetErrorIfNotConverged(snes, PETSC_FALSE));
+  PetscCall(SbSolverSetUp(snes, m->space, run->solver_used));
+  if (run->ts)
+    PetscCall(TSSetFromOptions(run->ts));
+  else
+    PetscCall(SNESSetFromOptions(snes));
+  PetscCall(SbSolverFinish(snes, m->space, run->solver_used, run->J));
+  PetscCall(SbNewtonSetRun(snes, run));
 
-/*
-  Tolerance of Newton's linear solves by its progress (Eisenstat and Walker), unless the user sets a tolerance.
-
-  In a static run where the matrix lacks a part of the tangent (the free rim of a follower pressure), a factorisation is no exact solve, and
-  changes of volume dominate the residual over bending: with loose solves Newton's method converges only linearly near nu = 1/2.
-*/
-static PetscErrorCode forcing_terms(SNES snes, SbModel m)
-{
-  const PetscReal most = !m->dynamic && m->nnonsymmetric ? FORCING_BESIDE : FORCING;
-  PetscBool newton, asked, rtol;
-
-  PetscFunctionBeginUser;
+  /* forcing terms */
   PetscCall(PetscObjectTypeCompareAny((PetscObject)snes, &newton, SB_SNES_NEWTON, SNESNEWTONLS, ""));
   PetscCall(PetscOptionsHasName(NULL, NULL, "-snes_ksp_ew", &asked));
   PetscCall(PetscOptionsHasName(NULL, NULL, "-ksp_rtol", &rtol));
@@ -310,7 +304,7 @@ static PetscErrorCode step_accepted(TS ts, PetscInt step, PetscReal t, Vec U, vo
 {
   SbRun run = (SbRun)ctx;
   TSConvergedReason reason;
-  PetscInt newton, linear, rejected;
+  PetscInt newton, linear;
   PetscReal previous;
 
   PetscFunctionBeginUser;
@@ -319,46 +313,22 @@ static PetscErrorCode step_accepted(TS ts, PetscInt step, PetscReal t, Vec U, vo
   if (step < 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(TSGetSNESIterations(ts, &newton));
   PetscCall(TSGetKSPIterations(ts, &linear));
-  PetscCall(TSGetStepRejections(ts, &rejected));
   PetscCall(TSGetPrevTime(ts, &previous));
   PetscCall(TSGetConvergedReason(ts, &reason));
   run->newton_step = newton + run->newton_before - run->newton_total;
   run->linear_step = linear + run->linear_before - run->linear_total;
-  run->rejected_step = rejected - run->rejected_seen;
-  run->rejected_seen = rejected;
   PetscCall(SbRunStepAccepted(run, step, t, step == run->step0 ? 0. : t - previous,
                               (PetscBool)((reason > 0 && !run->paused) || t >= run->t_end * (1. - 1e-12))));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Twice the largest distance of a node from the centre of its body, m: a size independent of orientation. */
-static PetscErrorCode largest_body(SbModel m, PetscReal *size)
-{
-  SbSpace s = m->space;
-  PetscReal(*middle)[4], far = 0.;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(m->nbody, &middle));
-  PetscCall(SbModelCentres(m, NULL, middle));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    const PetscReal *c = middle[m->space->node_body[i]];
-    PetscReal square = 0.;
-
-    for (PetscInt k = 0; k < 3; k++) square += PetscSqr(s->node_x[3 * i + k] - c[k]);
-    far = PetscMax(far, square);
-  }
-  PetscCall(PetscFree(middle));
-  PetscCallMPI(MPI_Allreduce(&far, size, 1, MPIU_REAL, MPI_MAX, m->comm));
-  *size = 2. * PetscSqrtReal(*size);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode set_up_ts(SbRun run)
 {
-  SbModel m = run->model;
-  SbMethodSettings settings;
+  const SbModel m = run->model;
+  const SbSpace s = m->space;
+  const SbMethodSettings settings = method_settings(run);
+  PetscReal(*middle)[4], size = 0.;
   TSAdapt adapt;
-  PetscReal size = 0.;
   Vec F;
 
   PetscFunctionBeginUser;
@@ -366,7 +336,7 @@ static PetscErrorCode set_up_ts(SbRun run)
     /* the stable step of explicit integrators */
     PetscReal stable;
 
-    PetscCall(SbSpaceStableStep(run->model->space, &stable));
+    PetscCall(SbSpaceStableStep(s, &stable));
     if (!run->dt_given)
       run->dt = 0.9 * stable;
     else if (run->dt > stable)
@@ -377,7 +347,7 @@ static PetscErrorCode set_up_ts(SbRun run)
   }
 
   /* the equation of motion and its integrator */
-  PetscCall(SbSpaceCreateVec(m->space, &F));
+  PetscCall(SbSpaceCreateVec(s, &F));
   PetscCall(TSCreate(m->comm, &run->ts));
   PetscCall(TSSetProblemType(run->ts, TS_NONLINEAR));
   PetscCall(TS2SetSolution(run->ts, run->U, run->V));
@@ -390,25 +360,29 @@ static PetscErrorCode set_up_ts(SbRun run)
   } else
     PetscCall(TSSetType(run->ts, SB_TS_SECOND_ORDER));
 
-  /* allowed displacement error per step of adaptive runs, over the size of the bodies: independent of units */
+  /* allowed displacement error per step of adaptive runs, over the size of the largest body, independent of units and orientation: twice
+     the largest distance of a node from the centre of its body */
+  PetscCall(PetscMalloc1(m->nbody, &middle));
+  PetscCall(SbModelCentres(m, NULL, middle));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    PetscReal r[3];
+
+    SbSubtract(s->node_x + 3 * i, middle[s->node_body[i]], r);
+    size = PetscMax(size, SbDot3(r, r));
+  }
+  PetscCall(PetscFree(middle));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &size, 1, MPIU_REAL, MPI_MAX, m->comm));
+  PetscCall(TSSetTolerances(run->ts, 2e-4 * PetscSqrtReal(size), NULL, 0., NULL));
   PetscCall(TSGetAdapt(run->ts, &adapt));
   PetscCall(TSAdaptSetType(adapt, TSADAPTNONE));
-  PetscCall(largest_body(m, &size));
-  PetscCall(TSSetTolerances(run->ts, 1e-4 * size, NULL, 0., NULL));
   PetscCall(TSSetMaxSteps(run->ts, PETSC_MAX_INT));
   PetscCall(TSSetExactFinalTime(run->ts, TS_EXACTFINALTIME_MATCHSTEP));
   PetscCall(TSSetErrorIfStepFails(run->ts, PETSC_FALSE));
 
-  /* solvers; PETSc's own options override all settings so far */
+  /* solvers; -ts_dt has been read, and is set below */
+  if (SB_TS_DT_RENAMED) PetscCall(PetscOptionsClearValue(NULL, "-ts_dt"));
   PetscCall(TSGetSNES(run->ts, &run->snes));
   PetscCall(set_up_snes(run));
-  PetscCall(SbSolverSetUp(run->snes, m->space, run->solver_used));
-  /* it has been read, and is set below */
-  if (SB_TS_DT_RENAMED) PetscCall(PetscOptionsClearValue(NULL, "-ts_dt"));
-  PetscCall(TSSetFromOptions(run->ts));
-  PetscCall(SbSolverFinish(run->snes, m->space, run->solver_used, run->J));
-  PetscCall(SbNewtonSetRun(run->snes, run));
-  PetscCall(forcing_terms(run->snes, run->model));
 
   /* end time and step length; monitors */
   PetscCall(TSSetMaxTime(run->ts, run->t_end));
@@ -418,44 +392,19 @@ static PetscErrorCode set_up_ts(SbRun run)
   PetscCall(TSSetPostStep(run->ts, SbRunAfterStep));
   PetscCall(TSGetAdapt(run->ts, &adapt));
   PetscCall(PetscObjectTypeCompare((PetscObject)adapt, TSADAPTNONE, &run->fixed_step));
-  method_settings(run, &settings);
-  run->model->barrier_apart = (PetscBool)(m->npotential && run->preset != SB_TIME_EULER_IMPLICIT);
-  if (run->model->barrier_apart)
-    run->barrier_weight = settings.separate ? 0.5 / settings.beta : 1. / settings.alpha_f;
+  m->barrier_apart = (PetscBool)(m->npotential && run->preset != SB_TIME_EULER_IMPLICIT);
+  if (m->barrier_apart) run->barrier_weight = settings.separate ? 0.5 / settings.beta : 1. / settings.alpha_f;
   if (run->preset != SB_TIME_ALPHA2) SbSecondOrderSet(run->ts, run, &settings);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Errors unless barrier contact has its potential, SB_SNES_NEWTON, and no contact with another response beside it. */
-static PetscErrorCode check_barrier(SbRun run)
-{
-  const SbModel m = run->model;
-  const char *name = m->potential[0]->name;
-
-  PetscFunctionBeginUser;
-  PetscCheck(run->preset == SB_TIME_EULER_IMPLICIT || run->preset == SB_TIME_STATIC ||
-               run->preset == SB_TIME_NEWMARK || run->preset == SB_TIME_GENALPHA,
-             m->comm, PETSC_ERR_USER_INPUT,
-             "-effect_%s_response barrier needs -time euler_implicit, newmark, genalpha or static", name);
-  PetscCheck(run->preset == SB_TIME_EULER_IMPLICIT || run->preset == SB_TIME_STATIC ||
-               !m->space->consistent_mass,
-             m->comm, PETSC_ERR_USER_INPUT,
-             "-effect_%s_response barrier with -time newmark or genalpha needs -mass lumped", name);
-  PetscCheck(!m->nbegin_step, m->comm, PETSC_ERR_USER_INPUT,
-             "-effect_%s_response barrier and -effect_%s_response of another kind do not go together: give "
-             "both the same",
-             name, m->begin_step[0]->name);
-  PetscCheck(!run->solver_used->matrix_free && strcmp(run->solver, "pressure"), m->comm, PETSC_ERR_USER_INPUT,
-             "-solver %s has no complete matrix, to which the effect %s could add: use -solver auto or "
-             "cg_two_level",
-             run->solver, name);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Errors unless contact has several solves per step and, where needed, a matrix that can be projected. */
+/* Errors unless barrier contact has its potential, SB_SNES_NEWTON, and no contact with another response beside it; and other contact has
+   several solves per step and, where needed, a matrix that can be projected. */
 static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
 {
   const SbModel m = run->model;
+  const PetscBool implicit = (PetscBool)(!explicit && run->preset != SB_TIME_ALPHA2);
+  const PetscBool matrix = (PetscBool)(!run->solver_used->matrix_free && strcmp(run->solver, "pressure"));
   const char *name;
 
   PetscFunctionBeginUser;
@@ -463,11 +412,26 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
     PetscCheck(!m->effect[e]->euler || run->preset == SB_TIME_EULER_IMPLICIT, m->comm, PETSC_ERR_USER_INPUT,
                "-effect_%s_restitution needs -time euler_implicit, whose velocities are those of a step",
                m->effect[e]->name);
-  if (m->npotential) PetscCall(check_barrier(run));
+  if (m->npotential) {
+    name = m->potential[0]->name;
+    PetscCheck(implicit, m->comm, PETSC_ERR_USER_INPUT,
+               "-effect_%s_response barrier needs -time euler_implicit, newmark, genalpha or static", name);
+    PetscCheck(run->preset == SB_TIME_EULER_IMPLICIT || !m->dynamic || !m->space->consistent_mass, m->comm,
+               PETSC_ERR_USER_INPUT,
+               "-effect_%s_response barrier with -time newmark or genalpha needs -mass lumped", name);
+    PetscCheck(!m->nbegin_step, m->comm, PETSC_ERR_USER_INPUT,
+               "-effect_%s_response barrier and -effect_%s_response of another kind do not go together: give "
+               "both the same",
+               name, m->begin_step[0]->name);
+    PetscCheck(matrix, m->comm, PETSC_ERR_USER_INPUT,
+               "-solver %s has no complete matrix, to which the effect %s could add: use -solver auto or "
+               "cg_two_level",
+               run->solver, name);
+  }
   if (!m->nbegin_step) PetscFunctionReturn(PETSC_SUCCESS);
   name = m->begin_step[0]->name;
   PetscCheck(
-    !explicit && run->preset != SB_TIME_ALPHA2, m->comm, PETSC_ERR_USER_INPUT,
+    implicit, m->comm, PETSC_ERR_USER_INPUT,
     "The effect %s needs several solves in a step: use -time euler_implicit, newmark, genalpha or static",
     name);
   if (run->preset == SB_TIME_NEWMARK) {
@@ -475,11 +439,11 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
     PetscCheck(run->newmark[0] == 0.25 && run->newmark[1] == 0.5, m->comm, PETSC_ERR_USER_INPUT,
                "-time newmark with the effect %s needs -time_newmark_beta 0.25 and -time_newmark_gamma 0.5, "
                "not %g and %g: else impacts may gain energy",
-               m->begin_step[0]->name, (double)run->newmark[0], (double)run->newmark[1]);
+               name, (double)run->newmark[0], (double)run->newmark[1]);
     PetscCheck(!m->space->consistent_mass, m->comm, PETSC_ERR_USER_INPUT,
                "-time newmark with the effect %s needs -mass lumped: velocities of contact are corrected "
                "node by node",
-               m->begin_step[0]->name);
+               name);
     for (PetscInt e = 0; e < m->nbegin_step; e++)
       PetscCheck(
         !m->begin_step[e]->springs, m->comm, PETSC_ERR_USER_INPUT,
@@ -490,13 +454,13 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
   PetscCheck(m->dynamic || !m->ntime_of_impact, m->comm, PETSC_ERR_USER_INPUT,
              "-effect_%s_time_of_impact yes is about the length of time steps, and -time static has none: "
              "leave it out",
-             m->ntime_of_impact ? m->time_of_impact[0]->name : name);
+             m->ntime_of_impact ? m->time_of_impact[0]->name : "");
   PetscCheck(run->preset != SB_TIME_GENALPHA || !m->ntime_of_impact, m->comm, PETSC_ERR_USER_INPUT,
              "-time genalpha gains energy with -effect_%s_time_of_impact yes: it takes the acceleration of a "
              "short step, in which nodes are stopped, into a long one; use euler_implicit",
-             m->ntime_of_impact ? m->time_of_impact[0]->name : name);
-  PetscCheck(!run->solver_used->matrix_free && (strcmp(run->solver, "pressure") || !m->nassemble_constraints),
-             m->comm, PETSC_ERR_USER_INPUT,
+             m->ntime_of_impact ? m->time_of_impact[0]->name : "");
+  PetscCheck(matrix || (!run->solver_used->matrix_free && !m->nassemble_constraints), m->comm,
+             PETSC_ERR_USER_INPUT,
              "-solver %s has no complete matrix, in which the effect %s could constrain nodes: use -solver "
              "rotated or cg_two_level",
              run->solver, name);
@@ -505,19 +469,20 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
 
 PetscErrorCode SbRunSetUp(SbRun run)
 {
-  SbModel m = run->model;
+  const SbModel m = run->model;
   const PetscBool explicit = SbRunIsExplicit(run);
   const SbSpace s = m->space;
   PetscBool single, warped = PETSC_FALSE;
   char reason[128];
+
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < m->nbody; b++) {
-    if (m->space->alpha[b] != 0. || m->space->beta[b] != 0.) run->damped = m->dynamic;
+    if (s->alpha[b] != 0. || s->beta[b] != 0.) run->damped = m->dynamic;
   }
-  PetscCall(SbSpaceCreateVec(m->space, &run->U));
+  PetscCall(SbSpaceCreateVec(s, &run->U));
   if (m->dynamic) {
-    PetscCall(SbSpaceCreateVec(m->space, &run->V));
-    if (run->preset != SB_TIME_ALPHA2) PetscCall(SbSpaceCreateVec(m->space, &run->A));
+    PetscCall(SbSpaceCreateVec(s, &run->V));
+    if (run->preset != SB_TIME_ALPHA2) PetscCall(SbSpaceCreateVec(s, &run->A));
   }
   PetscCheck(m->dynamic || !SbLiveCount(), m->comm, PETSC_ERR_USER_INPUT,
              "-effect_<name>_... live: interactive values need a time, and -time static has "
@@ -525,10 +490,10 @@ PetscErrorCode SbRunSetUp(SbRun run)
   if (!m->dynamic) m->load = run->t0; /* a static run starts with load factor t0 */
   PetscCall(SbModelInitialState(m, run->U, run->V));
   if (run->arc.on) {
-    PetscCall(SbSpaceCreateVec(m->space, &run->path));
+    PetscCall(SbSpaceCreateVec(s, &run->path));
     PetscCall(SbSolverChooseIndefinite(m->comm, sizeof(run->solver_choice), run->solver_choice));
   }
-  PetscCall(SbSolverChoose(m->space, m->dynamic, m->linear, explicit, run->solver_choice, &run->solver_used,
+  PetscCall(SbSolverChoose(s, m->dynamic, m->linear, explicit, run->solver_choice, &run->solver_used,
                            run->solver_reason, sizeof(run->solver_reason)));
   PetscCall(PetscStrncpy(run->solver, run->solver_used->name, sizeof(run->solver)));
   PetscCall(check_contact(run, explicit));
@@ -539,24 +504,23 @@ PetscErrorCode SbRunSetUp(SbRun run)
     SbAppend(sizeof(run->solver_reason), run->solver_reason, "; %s", reason);
   }
   if (run->saddle) {
-    PetscCall(
-      SbSaddleChoose(s, run->model->dynamic, run->saddle_choice, &run->saddle_used, reason, sizeof(reason)));
+    PetscCall(SbSaddleChoose(s, m->dynamic, run->saddle_choice, &run->saddle_used, reason, sizeof(reason)));
     SbAppend(sizeof(run->solver_reason), run->solver_reason, "; %s", reason);
   }
 
   /* the matrix, and the operator for constraints outside of it */
   if (!explicit) {
-    PetscCall(SbSolverCreateOperator(m->space, run->solver_used, &run->J));
+    PetscCall(SbSolverCreateOperator(s, run->solver_used, &run->J));
     if (m->nnonsymmetric)
       PetscCall(SbFormCreateOperator(run));
     else {
       PetscCall(PetscObjectReference((PetscObject)run->J));
       run->operator= run->J;
     }
-    if (SbConstraintsSeparate(m->space)) {
+    if (SbConstraintsSeparate(s)) {
       run->whole = run->operator;
-      PetscCall(SbConstraintsCreateOperator(m->space, run->J, run->whole, (PetscBool)!m->dynamic,
-                                            run->saddle_used, &run->operator));
+      PetscCall(SbConstraintsCreateOperator(s, run->J, run->whole, (PetscBool)!m->dynamic, run->saddle_used,
+                                            &run->operator));
     }
   }
   PetscCheck(!run->solver_used->matrix_free || !m->ntangent, m->comm, PETSC_ERR_USER,
@@ -568,30 +532,25 @@ PetscErrorCode SbRunSetUp(SbRun run)
     Vec F;
 
     run->fixed_step = (PetscBool)!run->arc.on;
-    PetscCall(SbSpaceCreateVec(run->model->space, &F));
-    PetscCall(SNESCreate(run->model->comm, &run->snes));
+    PetscCall(SbSpaceCreateVec(s, &F));
+    PetscCall(SNESCreate(m->comm, &run->snes));
     PetscCall(SNESSetFunction(run->snes, F, SbFormStaticFunction, run));
     PetscCall(SNESSetJacobian(run->snes, run->operator, run->J, SbFormStaticJacobian, run));
     PetscCall(VecDestroy(&F));
     PetscCall(set_up_snes(run));
-    PetscCall(SbSolverSetUp(run->snes, run->model->space, run->solver_used));
-    PetscCall(SNESSetFromOptions(run->snes));
-    PetscCall(SbSolverFinish(run->snes, run->model->space, run->solver_used, run->J));
-    PetscCall(SbNewtonSetRun(run->snes, run));
-    PetscCall(forcing_terms(run->snes, run->model));
     if (run->arc.on) PetscCall(SbArcLengthCheck(run));
   }
   PetscCall(SbSolverListCreate(run));
   /* PETSc's options may have changed the preset */
   if (!explicit) {
-    PetscCall(SbSolverDescribe(run->snes, m->space, sizeof(run->solver_parts), run->solver_parts));
+    PetscCall(SbSolverDescribe(run->snes, s, sizeof(run->solver_parts), run->solver_parts));
     if (!run->solver_used->help ||
         (run->solver_used->direct && !strstr(run->solver_parts, run->solver_used->package)))
       PetscCall(PetscStrncpy(run->solver, run->solver_parts, sizeof(run->solver)));
   }
 
   /* one solve per step from the velocity predictor, with a tangent that may be too soft: no bound on the energy (docs/reference/theory.md) */
-  if (run->velocity_predictor && !run->model->linear && run->snes) {
+  if (run->velocity_predictor && !m->linear && run->snes) {
     PetscCall(PetscObjectTypeCompare((PetscObject)run->snes, SNESKSPONLY, &single));
     for (PetscInt r = 0; r < s->nregion; r++)
       warped = (PetscBool)(warped || s->region[r].material->tangent == SB_TANGENT_WARPED);
@@ -610,67 +569,52 @@ PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx)
   PetscCheck(run->nmonitor < (PetscInt)PETSC_STATIC_ARRAY_LENGTH(run->monitor), PETSC_COMM_SELF,
              PETSC_ERR_PLIB, "More than %d monitors", (int)PETSC_STATIC_ARRAY_LENGTH(run->monitor));
   run->monitor[run->nmonitor].fn = fn;
-  run->monitor[run->nmonitor].ctx = ctx;
-  run->nmonitor++;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Sets the reason of a failure of PETSc's own integrators, which give none. */
-static PetscErrorCode explain_failure(SbRun run)
-{
-  TSConvergedReason reason;
-  PetscInt step;
-  PetscReal t, dt;
-
-  PetscFunctionBeginUser;
-  PetscCall(TSGetConvergedReason(run->ts, &reason));
-  if (reason >= 0 || run->stop_reason[0] || run->stopped) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(TSGetStepNumber(run->ts, &step));
-  PetscCall(TSGetTime(run->ts, &t));
-  PetscCall(TSGetTimeStep(run->ts, &dt));
-  PetscCall(
-    SbRunFail(run,
-              "step %" PetscInt_FMT
-              " at t = %g s with a length of %g s: %s; try a shorter -ts_dt, or -time genalpha, which "
-              "tries shorter ones by itself (docs/guides/when_it_fails.md, R1)",
-              step + 1, (double)t, (double)dt, TSConvergedReasons[reason]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Warns of effects that act only before or after the run. */
-static PetscErrorCode warn_of_idle_effects(SbRun run)
-{
-  const char *unit = run->model->dynamic ? " s" : "";
-
-  PetscFunctionBeginUser;
-  for (PetscInt k = 0; k < run->model->neffect && !run->arc.on; k++) {
-    const SbEffect e = run->model->effect[k];
-    const PetscBool before = (PetscBool)(e->until <= 0.);
-
-    if (!before && e->from < run->t_end) continue;
-    PetscCall(SbWarning(run->model->comm,
-                        "the effect %s never acts: -effect_%s_%s %g%s, and the run goes from 0 to %g%s",
-                        e->name, e->name, before ? "until" : "from", (double)(before ? e->until : e->from),
-                        unit, (double)run->t_end, unit));
-  }
+  run->monitor[run->nmonitor++].ctx = ctx;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbRunSolve(SbRun run)
 {
+  const SbModel m = run->model;
+  const char *unit = m->dynamic ? " s" : "";
+
   PetscFunctionBeginUser;
-  if (run->wall_start == 0.) {
-    run->wall_start = MPI_Wtime();
-    PetscCall(warn_of_idle_effects(run));
+  /* effects that act only before or after the run */
+  for (PetscInt k = 0; k < m->neffect && !run->arc.on && run->wall_start == 0.; k++) {
+    const SbEffect e = m->effect[k];
+    const PetscBool before = (PetscBool)(e->until <= 0.);
+
+    if (before || e->from >= run->t_end)
+      PetscCall(SbWarning(m->comm,
+                          "the effect %s never acts: -effect_%s_%s %g%s, and the run goes from 0 to %g%s",
+                          e->name, e->name, before ? "until" : "from", (double)(before ? e->until : e->from),
+                          unit, (double)run->t_end, unit));
   }
+  if (run->wall_start == 0.) run->wall_start = MPI_Wtime();
   run->paused = PETSC_FALSE;
   run->seen.U = NULL;
-  if (run->model->npotential) PetscCall(SbModelPotentialStart(run->model, run->t0, run->dt, run->U));
+  if (m->npotential) PetscCall(SbModelPotentialStart(m, run->t0, run->dt, run->U));
   if (run->ts) {
+    TSConvergedReason reason;
+    PetscInt step;
+    PetscReal t, dt;
+
     PetscCall(TSSetStepNumber(run->ts, run->step0));
     PetscCall(TSSetTime(run->ts, run->t0));
     PetscCall(TSSolve(run->ts, run->U));
-    PetscCall(explain_failure(run));
+
+    /* PETSc's own integrators give no reason of a failure */
+    PetscCall(TSGetConvergedReason(run->ts, &reason));
+    PetscCall(TSGetStepNumber(run->ts, &step));
+    PetscCall(TSGetTime(run->ts, &t));
+    PetscCall(TSGetTimeStep(run->ts, &dt));
+    if (reason < 0 && !run->stop_reason[0] && !run->stopped)
+      PetscCall(
+        SbRunFail(run,
+                  "step %" PetscInt_FMT
+                  " at t = %g s with a length of %g s: %s; try a shorter -ts_dt, or -time genalpha, which "
+                  "tries shorter ones by itself (docs/guides/when_it_fails.md, R1)",
+                  step + 1, (double)t, (double)dt, TSConvergedReasons[reason]));
   } else if (run->arc.on)
     PetscCall(SbArcLengthSolve(run));
   else

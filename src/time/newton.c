@@ -39,32 +39,29 @@
 #include "sbsolver.h"
 #include "time_impl.h"
 
-#define DECREASE 1e-4   /* Armijo's constant, c above */
-#define SHORTEST 1e-7   /* shortest fraction of a step that the line search tries */
-#define ROUNDING 1e-11  /* relative rounding of the terms of E */
-#define CREEP 0.05      /* fraction of a step that counts as stagnation */
-#define CREEPS 5        /* such steps in a row after which a load step is halved */
-#define NOTHING 1e-6    /* relative to E's rounding: predicted decrease that counts as none */
-#define ACCURATE 1e-6   /* relative tolerance of an accurate linear solve */
-#define APPROACHES 50   /* iterations in which prescribed motions have to be completed */
-#define UNAVOIDABLE 0.2 /* a step there shorter than this may invert tets */
-#define DIFFERENCE 1e-7 /* fraction of a prescribed motion, for finite differences by it */
-#define SETTLED \
-  1e-4 /* barrier contact: tolerance of the last iteration's step, over the speed of the time step (src/model/potential.c) times dt */
+#define DECREASE 1e-4       /* Armijo's constant, c above */
+#define SHORTEST 1e-7       /* shortest fraction of a step that the line search tries */
+#define ROUNDING 1e-11      /* relative rounding of the terms of E */
+#define CREEP 0.05          /* fraction of a step that counts as stagnation */
+#define CREEPS 5            /* such steps in a row after which a load step is halved */
+#define NOTHING 1e-6        /* relative to E's rounding: predicted decrease that counts as none */
+#define ACCURATE 1e-6       /* relative tolerance of an accurate linear solve */
+#define APPROACHES 50       /* iterations in which prescribed motions have to be completed */
+#define UNAVOIDABLE 0.2     /* a step there shorter than this may invert tets */
+#define DIFFERENCE 1e-7     /* fraction of a prescribed motion, for finite differences by it */
+#define SETTLED 1e-4        /* barrier contact: largest last step, over SbModel.barrier_speed times dt */
 #define STICKING 1e-2       /* factor on it with friction, whose forces depend on such small slips */
 #define SETTLED_STATIC 1e-7 /* the same tolerance in a static run, over the size of the smallest body */
 #define SETTLED_LEAST 1e-8  /* least tolerance in time steps of full length, over that size */
 #define SETTLED_GAP 1e-2    /* largest change of gaps in the last iteration, over the barrier's width */
 #define PATIENCE 50         /* barrier contact: iterations between checks of progress */
-#define WORTH \
-  0.01 /* least further decrease of E in these, beyond SB_NEWTON_ITERATIONS, over the decrease before */
+#define WORTH 0.01       /* least decrease of E in these, over all before, to exceed SB_NEWTON_ITERATIONS */
 #define EARLY 10         /* iterations in which friction is not lagged: normal forces are updated in each */
 #define SHIFT 0.1        /* least shift of an indefinite tangent, over that of inertia */
 #define SHIFT_STIFF 1e-4 /* the same, relative to the mean ratio of stiffness and mass */
 #define SHIFTS 8         /* tries, each with a shift SHIFT_MORE times as large, before cells are projected */
 #define SHIFT_MORE 4.
-#define WOLFE \
-  0.5 /* curvature condition: where the slope of E stays above this fraction of the first one, a longer step is tried */
+#define WOLFE 0.5     /* where more than this fraction of the slope of E is left, a longer step is tried */
 #define FARTHER 4.    /* factor on a whole step, the first longer one */
 #define TRIES 5       /* longer steps, at most */
 #define STEEP 0.01    /* of the slope of the quadratic model: least slope of E along a direction */
@@ -143,14 +140,6 @@ static PetscErrorCode evaluate(Newton *n, Iterate *at)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Static runs: sets the pressures of the next tangent, linearised at X after the fraction s of -Y; Y NULL: at X (src/fem/quadratic.c). */
-static PetscErrorCode linearise_pressure(const SbRun run, Vec X, Vec Y, PetscReal s)
-{
-  PetscFunctionBeginUser;
-  if (!run->model->dynamic) PetscCall(SbSpaceLinearisePressure(run->model->space, X, Y, -1., s));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Slopes at an iterate along -Y. */
 static PetscErrorCode find_slopes(Newton *n, Vec Y, Iterate *at)
 {
@@ -196,34 +185,24 @@ static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The least shift of the tangent, 1/s^2. */
-static PetscErrorCode least_shift(SNES snes, PetscReal *shift)
+/* Adds the mass times the shift, 1/s^2, to the tangent: none for a first shift below the least one, which is found where it is 0. */
+static PetscErrorCode add_shift(SNES snes, PetscBool first, PetscReal *least, PetscReal *shift)
 {
   Newton *n = (Newton *)snes->data;
-  const SbSpace s = n->run->model->space;
-  PetscScalar stiff;
-  PetscReal mass = 0.;
+  const SbModel m = n->run->model;
+  PetscScalar stiff, *d;
 
   PetscFunctionBeginUser;
-  PetscCall(MatGetDiagonal(snes->jacobian_pre, n->to.r));
-  PetscCall(VecSum(n->to.r, &stiff));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) mass += 3. * s->node_mass[i];
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &mass, 1, MPIU_REAL, MPI_SUM, s->comm));
-  *shift = SHIFT_STIFF * PetscRealPart(stiff) / mass;
-  if (n->run->model->dynamic) *shift = PetscMax(*shift, SHIFT / PetscSqr(n->run->barrier_dt));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Adds the mass times the shift to the tangent. */
-static PetscErrorCode add_shift(SNES snes, PetscReal shift)
-{
-  Newton *n = (Newton *)snes->data;
-  const SbSpace s = n->run->model->space;
-  PetscScalar *d;
-
-  PetscFunctionBeginUser;
+  if (*least == 0.) {
+    PetscCall(MatGetDiagonal(snes->jacobian_pre, n->to.r));
+    PetscCall(VecSum(n->to.r, &stiff));
+    *least = SHIFT_STIFF * PetscRealPart(stiff) / (3. * m->mass);
+    if (m->dynamic) *least = PetscMax(*least, SHIFT / PetscSqr(n->run->barrier_dt));
+  }
+  if (*shift < *least) *shift = first ? 0. : *least;
+  if (*shift == 0.) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecGetArray(n->to.r, &d));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) d[i] = shift * s->node_mass[i / 3];
+  for (PetscInt i = 0; i < 3 * m->space->nnode_owned; i++) d[i] = *shift * m->space->node_mass[i / 3];
   PetscCall(VecRestoreArray(n->to.r, &d));
   PetscCall(MatDiagonalSet(snes->jacobian_pre, n->to.r, ADD_VALUES));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -247,11 +226,7 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
     PetscCall(SbModelProjectTangent(m, *filtered));
     if (keep) m->space->tentative = PETSC_FALSE;
     PetscCall(SNESComputeJacobian(snes, X, snes->jacobian, snes->jacobian_pre));
-    if (shift > 0.) {
-      if (least == 0.) PetscCall(least_shift(snes, &least));
-      if (shift < least) shift = shifts ? least : 0.;
-      if (shift > 0.) PetscCall(add_shift(snes, shift));
-    }
+    if (shift > 0.) PetscCall(add_shift(snes, (PetscBool)!shifts, &least, &shift));
     PetscCall(solve_linear(snes, &reason));
     PetscCall(VecDot(F, Y, slope));
     *slope = -*slope;
@@ -442,7 +417,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
     if (n->provisional) {
       PetscCall(VecCopy(n->start, X));
       PetscCall(VecCopy(n->step, Y));
-      PetscCall(linearise_pressure(n->run, X, NULL, 1.));
+      if (!m->dynamic) PetscCall(SbSpaceLinearisePressure(m->space, X, NULL, -1., 1.));
       PetscCall(SNESComputeFunction(snes, X, F));
       PetscCall(evaluate(n, from));
       PetscCall(find_slopes(n, Y, from));
@@ -473,7 +448,8 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
   }
   n->rise += change;
   n->change = change - undone;
-  PetscCall(linearise_pressure(n->run, X, Y, *s));
+  /* static: the pressures of the next tangent, linearised at the old X after this step (src/fem/quadratic.c) */
+  if (!m->dynamic) PetscCall(SbSpaceLinearisePressure(m->space, X, Y, -1., *s));
   PetscCall(VecCopy(to->x, X));
   PetscCall(VecCopy(to->r, F));
   snes->norm = to->norm;
@@ -568,6 +544,7 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
   const SbModel m = run->model;
   const PetscReal size = SbBodySmallest(m->nbody, m->body);
   PetscReal longest, width = PETSC_MAX_REAL, enough;
+  PetscBool springs = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   if (!n->nblock) {
@@ -578,12 +555,10 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
   }
   enough = m->dynamic ? SETTLED * m->barrier_speed * run->barrier_dt : SETTLED_STATIC * size;
   for (PetscInt e = 0; e < m->npotential; e++) {
-    if (m->potential[e]->springs) {
-      enough *= STICKING;
-      break;
-    }
+    springs = (PetscBool)(springs || m->potential[e]->springs);
+    width = PetscMin(width, m->potential[e]->width);
   }
-  for (PetscInt e = 0; e < m->npotential; e++) width = PetscMin(width, m->potential[e]->width);
+  if (springs) enough *= STICKING;
   if (m->dynamic) enough = PetscMax(enough, SETTLED_LEAST * size * run->barrier_dt / run->dt);
   enough = PetscMin(enough, SETTLED_GAP * width);
   PetscCall(VecNorm(snes->vec_sol_update, NORM_INFINITY, &longest));
@@ -598,26 +573,23 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
 {
   Newton *n = (Newton *)snes->data;
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
-  const PetscBool barrier = (PetscBool)(n->run->model->npotential > 0);
+  const SbModel m = n->run->model;
+  const PetscBool barrier = (PetscBool)(m->npotential > 0);
   PetscBool filtered = PETSC_FALSE;
-  PetscReal slope = 0., s = 1., fall = 0.,
-            fall_before = 0.; /* decrease of E in this solve, and until the last check of progress, J */
+  PetscReal slope = 0., s = 1.;
+  PetscReal fall = 0., fall_before = 0.; /* of E in this solve, and until the last check of progress, J */
   PetscInt nactive, first = 0, creeps = 0;
 
   PetscFunctionBeginUser;
   /* where it begins */
   snes->reason = SNES_CONVERGED_ITERATING;
-  snes->iter = 0;
-  n->provisional = 0;
-  n->nblock = 0;
-  n->known = PETSC_FALSE;
+  snes->iter = n->provisional = n->nblock = n->branch = 0;
+  n->known = n->whole = n->unstable = PETSC_FALSE;
   n->kind = SB_HESSIAN_PROJECTED;
   n->shift = 0.;
-  n->branch = 0;
-  n->whole = n->unstable = PETSC_FALSE;
   if (barrier) PetscCall(approach(snes));
   if (snes->reason) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(linearise_pressure(n->run, X, NULL, 1.));
+  if (!m->dynamic) PetscCall(SbSpaceLinearisePressure(m->space, X, NULL, -1., 1.));
   PetscCall(SNESComputeFunction(snes, X, F));
   PetscCall(VecNorm(F, NORM_2, &snes->norm));
   n->initial = snes->norm;
@@ -628,10 +600,9 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
 
   while (!snes->reason) {
     const PetscInt linear = snes->linear_its;
-    PetscBool given_up;
 
-    PetscCall(SbRunGiveUp(n->run, &given_up));
-    if (given_up) {
+    PetscCall(SbRunStopAsked(n->run, n->run->step_now, n->run->t_now, PETSC_TRUE));
+    if (n->run->stopped) {
       snes->reason = SNES_DIVERGED_MAX_IT;
       break;
     }
@@ -639,7 +610,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     /* direction, and largest step */
     PetscCall(find_direction(snes, &filtered, &slope));
     s = 1.;
-    if (barrier && !snes->reason) PetscCall(SbModelPotentialMaxStep(n->run->model, X, Y, 1., &s, &nactive));
+    if (barrier && !snes->reason) PetscCall(SbModelPotentialMaxStep(m, X, Y, 1., &s, &nactive));
     if (!snes->reason) PetscCall(search(snes, slope, &s));
     if (snes->reason) break;
     n->whole = (PetscBool)(s >= 1.);
@@ -661,14 +632,14 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
          ((snes->iter - first) % PATIENCE == 0 && fall - fall_before <= WORTH * PetscAbsReal(fall))))
       snes->reason = SNES_DIVERGED_MAX_IT;
     if ((snes->iter - first) % PATIENCE == 0) fall_before = fall;
-    if (!barrier && !n->run->model->dynamic && !n->provisional) creeps = s < CREEP ? creeps + 1 : 0;
+    if (!barrier && !m->dynamic && !n->provisional) creeps = s < CREEP ? creeps + 1 : 0;
     if (!snes->reason && creeps == CREEPS) snes->reason = SNES_DIVERGED_LINE_SEARCH;
 
     /* lagged friction takes the normal forces of this iterate: in the first iterations each time, then after convergence */
     if (barrier && (snes->reason > 0 || (!snes->reason && snes->iter <= EARLY))) {
       PetscBool again;
 
-      PetscCall(SbModelPotentialUpdateFriction(n->run->model, X, (PetscBool)(snes->reason > 0), &again));
+      PetscCall(SbModelPotentialUpdateFriction(m, X, (PetscBool)(snes->reason > 0), &again));
       if (!again) continue;
       snes->reason = SNES_CONVERGED_ITERATING;
       first = snes->iter;
@@ -677,7 +648,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
       PetscCall(VecNorm(F, NORM_2, &snes->norm));
     }
   }
-  PetscCall(SbSpaceLinearisePressure(n->run->model->space, NULL, NULL, 0., 0.));
+  PetscCall(SbSpaceLinearisePressure(m->space, NULL, NULL, 0., 0.));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -688,9 +659,8 @@ PetscErrorCode SbRunSolveTangent(SbRun run, Vec B, Vec X, PetscInt *iterations, 
 
   PetscFunctionBeginUser;
   PetscCall(PetscObjectTypeCompare((PetscObject)run->snes, SB_SNES_NEWTON, solved));
-  if (!*solved) PetscFunctionReturn(PETSC_SUCCESS);
   n = (Newton *)run->snes->data;
-  *solved = (PetscBool)(n->nblock > 0);
+  *solved = (PetscBool)(*solved && n->nblock > 0);
   if (!*solved) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbContactSystemSolve(n->system, run->snes->jacobian_pre, &n->blocks, PETSC_FALSE, B, X, &reason,
                                  iterations));
@@ -702,18 +672,21 @@ static PetscErrorCode SNESSetUp_Newton(SNES snes)
 {
   Newton *n = (Newton *)snes->data;
   const PetscBool barrier = (PetscBool)(n->run->model->npotential > 0);
-  Iterate *const of[3] = {&n->from, &n->to, &n->best};
+  Vec *w;
 
   PetscFunctionBeginUser;
   PetscCall(SNESSetUpMatrices(snes));
-  PetscCall(VecDuplicate(snes->vec_sol, &n->start));
-  PetscCall(VecDuplicate(snes->vec_sol, &n->step));
-  if (barrier) PetscCall(VecDuplicate(snes->vec_sol, &n->rhs));
-  for (int k = 0; k < (barrier ? 3 : 2); k++) {
-    if (k) PetscCall(VecDuplicate(snes->vec_sol, &of[k]->x));
-    if (k) PetscCall(VecDuplicate(snes->vec_sol, &of[k]->r));
-    PetscCall(VecDuplicate(snes->vec_sol, &of[k]->elastic));
-    if (barrier) PetscCall(VecDuplicate(snes->vec_sol, &of[k]->contact));
+  PetscCall(SNESSetWorkVecs(snes, barrier ? 13 : 6));
+  w = snes->work;
+  n->start = w[0];
+  n->step = w[1];
+  n->from.elastic = w[2];
+  n->to = (Iterate){.x = w[3], .r = w[4], .elastic = w[5]};
+  if (barrier) {
+    n->rhs = w[6];
+    n->from.contact = w[7];
+    n->to.contact = w[8];
+    n->best = (Iterate){.x = w[9], .r = w[10], .elastic = w[11], .contact = w[12]};
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -721,18 +694,8 @@ static PetscErrorCode SNESSetUp_Newton(SNES snes)
 static PetscErrorCode SNESReset_Newton(SNES snes)
 {
   Newton *n = (Newton *)snes->data;
-  Iterate *const of[3] = {&n->from, &n->to, &n->best};
 
   PetscFunctionBeginUser;
-  for (int k = 0; k < 3; k++) {
-    if (k) PetscCall(VecDestroy(&of[k]->x));
-    if (k) PetscCall(VecDestroy(&of[k]->r));
-    PetscCall(VecDestroy(&of[k]->elastic));
-    PetscCall(VecDestroy(&of[k]->contact));
-  }
-  PetscCall(VecDestroy(&n->start));
-  PetscCall(VecDestroy(&n->step));
-  PetscCall(VecDestroy(&n->rhs));
   PetscCall(SbContactSystemDestroy(&n->system));
   PetscCall(SbBlocksFree(&n->blocks));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -77,22 +77,6 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The labels of all parts, ascending, the same on all ranks. The caller frees them. */
-static PetscErrorCode list_parts(SbSpace s, const PetscInt label[], PetscInt *npart, PetscInt **part)
-{
-  PetscInt *own, mine = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(s->nnode_owned, &own));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    if (label[i] == s->gnode[i]) own[mine++] = label[i];
-  }
-  PetscCall(SbAllgatherv(s->comm, MPIU_INT, mine, own, npart, part, NULL));
-  PetscCall(PetscSortInt(*npart, *part));
-  PetscCall(PetscFree(own));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ rigid motions */
 
 /* A part of a body and its free motions. */
@@ -150,22 +134,6 @@ static PetscErrorCode eigen(PetscInt n, PetscReal E[36], PetscReal M[36], PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Admissible motions of a part (problem 1): their number *n, coefficients of the six motions in the columns of x. Z becomes Z - P Z. */
-static PetscErrorCode find_admissible(Vec Z[6], Vec z[6], PetscInt *n, PetscReal x[36])
-{
-  PetscReal M[36], value[6];
-  PetscBool ok;
-
-  PetscFunctionBeginUser;
-  for (int j = 0; j < 6; j++) PetscCall(VecMDot(Z[j], j + 1, Z, M + 6 * j));
-  for (int k = 0; k < 6; k++) PetscCall(VecAXPY(Z[k], -1., z[k]));
-  for (int j = 0; j < 6; j++) PetscCall(VecMDot(Z[j], j + 1, Z, x + 6 * j));
-  PetscCall(eigen(6, x, M, value, &ok));
-  for (*n = 0; ok && *n < 6 && value[*n] <= ALLOWED; ++*n) {
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Of several free motions the message describes the first one along or about an axis, if any. lost: Z - P Z. */
 static PetscErrorCode choose_axis(SbRun run, Vec d, Vec lost[6], Vec z[6], Part *part)
 {
@@ -193,8 +161,11 @@ static PetscErrorCode choose_axis(SbRun run, Vec d, Vec lost[6], Vec z[6], Part 
 /* Finds the free motions of a part; along: displacements of one of them (may be NULL). */
 static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *part, Vec along)
 {
-  PetscReal x[36];
+  const SbSpace s = run->model->space;
+  const PetscScalar *u;
+  PetscReal x[36], E[36], M[36], value[6];
   PetscInt n = 0;
+  PetscBool ok;
   Vec *Z, *z;
 
   PetscFunctionBeginUser;
@@ -202,14 +173,12 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
   PetscCall(measure(run, label, part));
   PetscCall(VecDuplicateVecs(d, 6, &Z));
   PetscCall(VecDuplicateVecs(d, 6, &z));
+  PetscCall(VecGetArrayRead(run->U, &u));
   for (PetscInt k = 0; k < 6; k++) {
-    SbSpace s = run->model->space;
-    const PetscScalar *u;
     PetscScalar *to;
 
     /* motion k = 0..2: translation along an axis, 3..5: rotation about one through the centre; z: its admissible part */
     PetscCall(VecZeroEntries(Z[k]));
-    PetscCall(VecGetArrayRead(run->U, &u));
     PetscCall(VecGetArray(Z[k], &to));
     for (PetscInt i = 0; i < s->nnode_owned; i++) {
       PetscReal r[3];
@@ -224,17 +193,21 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
       }
     }
     PetscCall(VecRestoreArray(Z[k], &to));
-    PetscCall(VecRestoreArrayRead(run->U, &u));
     PetscCall(VecCopy(Z[k], z[k]));
     PetscCall(SbSpaceProjectAdmissible(s, z[k]));
   }
-  PetscCall(find_admissible(Z, z, &n, x));
+  PetscCall(VecRestoreArrayRead(run->U, &u));
+
+  /* n admissible motions (problem 1), their coefficients of the six motions in the columns of x; Z becomes Z - P Z */
+  for (int j = 0; j < 6; j++) PetscCall(VecMDot(Z[j], j + 1, Z, M + 6 * j));
+  for (int k = 0; k < 6; k++) PetscCall(VecAXPY(Z[k], -1., z[k]));
+  for (int j = 0; j < 6; j++) PetscCall(VecMDot(Z[j], j + 1, Z, x + 6 * j));
+  PetscCall(eigen(6, x, M, value, &ok));
+  while (ok && n < 6 && value[n] <= ALLOWED) n++;
   if (n) {
-    PetscReal E[36], M[36], value[6];
-    PetscBool ok;
     Vec *y, w;
 
-    /* free ones among the n admissible motions x (problem 2): y = P Z x */
+    /* free ones among them (problem 2): y = P Z x */
     PetscCall(VecDuplicate(d, &w));
     PetscCall(VecDuplicateVecs(d, n, &y));
     for (PetscInt j = 0; j < n; j++) {
@@ -250,8 +223,7 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
       PetscCall(VecMDot(w, j + 1, y, E + 6 * j));
     }
     PetscCall(eigen(n, E, M, value, &ok));
-    for (part->nfree = 0; ok && part->nfree < n && PetscAbsReal(value[part->nfree]) <= FREE; part->nfree++) {
-    }
+    while (ok && part->nfree < n && PetscAbsReal(value[part->nfree]) <= FREE) part->nfree++;
     PetscCall(PetscInfo(NULL,
                         "part of body %s: softest of %" PetscInt_FMT " motions %g of the cells' stiffness\n",
                         run->model->body[part->body].name, n, ok ? (double)value[0] : -1.));
@@ -279,7 +251,7 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
 /* e: the direction of v with its largest component positive, small ones zero. */
 static void direction(const PetscReal v[3], PetscReal e[3])
 {
-  const PetscReal length = PetscSqrtReal(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+  const PetscReal length = PetscSqrtReal(SbDot3(v, v));
   int largest = 0;
 
   for (int c = 1; c < 3; c++)
@@ -290,65 +262,53 @@ static void direction(const PetscReal v[3], PetscReal e[3])
   }
 }
 
-/* "moving along (1, 0, 0)", or "turning about the axis along (0, 0, 1) through (x, y, z)". */
-static PetscErrorCode describe_motion(const Part *part, size_t size, char text[])
+/* "moving along (1, 0, 0)", or "turning about the axis along (0, 0, 1) through (x, y, z)"; the number of further free motions, which of
+   several parts it is, and a hint for elements with nodes at centroids of facets. */
+static PetscErrorCode describe(SbRun run, const PetscInt label[], const Part *part, PetscInt nbrother,
+                               size_t size, char text[])
 {
-  const PetscReal *t = part->motion, *w = part->motion + 3, w2 = w[0] * w[0] + w[1] * w[1] + w[2] * w[2],
-                  t2 = t[0] * t[0] + t[1] * t[1] + t[2] * t[2];
+  const SbSpace s = run->model->space;
+  const PetscReal *t = part->motion, *w = part->motion + 3, w2 = SbDot3(w, w);
+  PetscInt nfixed = 0;
   PetscReal e[3], p[3];
 
   PetscFunctionBeginUser;
-  if (w2 <= 1e-10 * t2) {
+  if (w2 <= 1e-10 * SbDot3(t, t)) {
     direction(t, e);
-    PetscCall(
-      PetscSNPrintf(text, size, "moving along (%.2f, %.2f, %.2f)", (double)e[0], (double)e[1], (double)e[2]));
-    PetscFunctionReturn(PETSC_SUCCESS);
+    SbFormat(size, text, "moving along (%.2f, %.2f, %.2f)", (double)e[0], (double)e[1], (double)e[2]);
+  } else {
+    /* point where t + w / size x (p - centre) has no component normal to w */
+    direction(w, e);
+    SbCross(w, t, p);
+    for (int c = 0; c < 3; c++) {
+      p[c] = part->centre[c] + part->size * p[c] / w2;
+      if (PetscAbsReal(p[c]) < 1e-9 * part->size) p[c] = 0.;
+    }
+    SbFormat(size, text, "turning about the axis along (%.2f, %.2f, %.2f) through (%.4g, %.4g, %.4g) m",
+             (double)e[0], (double)e[1], (double)e[2], (double)p[0], (double)p[1], (double)p[2]);
   }
-  direction(w, e);
-  /* point where t + w / size x (p - centre) has no component normal to w */
-  for (int c = 0; c < 3; c++) {
-    p[c] =
-      part->centre[c] + part->size * (w[(c + 1) % 3] * t[(c + 2) % 3] - w[(c + 2) % 3] * t[(c + 1) % 3]) / w2;
-    if (PetscAbsReal(p[c]) < 1e-9 * part->size) p[c] = 0.;
-  }
-  PetscCall(
-    PetscSNPrintf(text, size, "turning about the axis along (%.2f, %.2f, %.2f) through (%.4g, %.4g, %.4g) m",
-                  (double)e[0], (double)e[1], (double)e[2], (double)p[0], (double)p[1], (double)p[2]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Appends the number of further free motions, which of several parts it is, and a hint for elements with nodes at centroids of facets. */
-static PetscErrorCode describe_part(SbRun run, const PetscInt label[], const Part *part, PetscInt nbrother,
-                                    size_t size, char text[])
-{
-  SbSpace s = run->model->space;
-  PetscInt nfixed[2] = {0, 0};
-
-  PetscFunctionBeginUser;
-  if (part->nfree > 1) {
+  if (part->nfree > 1)
     SbAppend(size, text, " and %" PetscInt_FMT " more motion%s", part->nfree - 1, part->nfree > 2 ? "s" : "");
-  }
-  if (nbrother > 1) {
+  if (nbrother > 1)
     SbAppend(size, text, " (one of its %" PetscInt_FMT " parts, around (%.4g, %.4g, %.4g) m)", nbrother,
              (double)part->centre[0], (double)part->centre[1], (double)part->centre[2]);
-  }
+
   /* one or two constrained facets of CR or DG leave rotations free */
-  for (PetscInt k = 0; k < s->nfixed; k++) {
-    if (s->fixed_node[k] < s->nnode_owned && label[s->fixed_node[k]] == part->label) nfixed[0]++;
-  }
-  PetscCallMPI(MPI_Allreduce(&nfixed[0], &nfixed[1], 1, MPIU_INT, MPI_SUM, s->comm));
-  if (nfixed[1] && nfixed[1] <= 2 && !s->element[part->body]->nodes_per[0]) {
+  for (PetscInt k = 0; k < s->nfixed; k++)
+    nfixed += s->fixed_node[k] < s->nnode_owned && label[s->fixed_node[k]] == part->label;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nfixed, 1, MPIU_INT, MPI_SUM, s->comm));
+  if (nfixed && nfixed <= 2 && !s->element[part->body]->nodes_per[0])
     SbAppend(size, text,
              "; %s is constrained at the centres of facets, here of %" PetscInt_FMT
              ": three that are not in line hold it",
-             s->element[part->body]->name, nfixed[1]);
-  }
+             s->element[part->body]->name, nfixed);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion[], Vec along)
 {
-  PetscInt *label, *list, npart = 0, nbrother = 0;
+  const SbSpace s = run->model->space;
+  PetscInt *label, *own, *list, mine = 0, npart = 0, nbrother = 0;
   PetscBool diagonal;
   Part part;
   Vec d;
@@ -358,12 +318,17 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
   PetscCall(MatHasOperation(run->J, MATOP_GET_DIAGONAL, &diagonal));
   if (!diagonal) PetscFunctionReturn(PETSC_SUCCESS); /* realtime is for dynamic runs */
 
-  /* the first part with a free motion */
-  PetscCall(SbSpaceCreateVec(run->model->space, &d));
+  /* the first part with a free motion; the labels of all parts are sorted, the same on all ranks */
+  PetscCall(SbSpaceCreateVec(s, &d));
   PetscCall(MatGetDiagonal(run->J, d));
   PetscCall(VecAbs(d));
-  PetscCall(label_parts(run->model->space, &label));
-  PetscCall(list_parts(run->model->space, label, &npart, &list));
+  PetscCall(label_parts(s, &label));
+  PetscCall(PetscMalloc1(s->nnode_owned, &own));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    if (label[i] == s->gnode[i]) own[mine++] = label[i];
+  }
+  PetscCall(SbAllgatherv(s->comm, MPIU_INT, mine, own, &npart, &list, NULL));
+  PetscCall(PetscSortInt(npart, list));
   for (PetscInt k = 0; k < npart && *body < 0; k++) {
     part.label = list[k];
     PetscCall(examine(run, label, d, &part, along));
@@ -378,10 +343,10 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
       PetscCall(measure(run, label, &other));
       nbrother += other.body == *body;
     }
-    PetscCall(describe_motion(&part, size, motion));
-    PetscCall(describe_part(run, label, &part, nbrother, size, motion));
+    PetscCall(describe(run, label, &part, nbrother, size, motion));
   }
   PetscCall(PetscFree(label));
+  PetscCall(PetscFree(own));
   PetscCall(PetscFree(list));
   PetscCall(VecDestroy(&d));
   PetscFunctionReturn(PETSC_SUCCESS);

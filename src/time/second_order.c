@@ -34,6 +34,7 @@ typedef struct {
   Vec X0, V0, X1, V1, A1; /* state at the start of the step; state at its end */
   Vec own0, own1; /* Newmark with contact: accelerations without contact at start and end; else NULL */
   Vec Xa, Va, Aa; /* stage of generalized-alpha; NULL when the stage is the end */
+  Vec U, V, A;    /* where the equation is evaluated; borrowed */
   Vec work;
   PetscReal rest;    /* length of the remainder of a step after a time of impact, s; 0: none */
   PetscReal whole;   /* length of the step before its division, s: the remainder ends at the original time */
@@ -65,17 +66,17 @@ static PetscErrorCode end_state(TS ts, Vec X)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Borrows the three vectors at which the equation is evaluated. */
-static PetscErrorCode stage_state(TS ts, Vec X, PetscReal *t, Vec *U, Vec *V, Vec *A)
+/* Sets U, V and A, where the equation is evaluated, and its time. */
+static PetscErrorCode stage_state(TS ts, Vec X, PetscReal *t)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
 
   PetscFunctionBeginUser;
   PetscCall(end_state(ts, X));
   *t = ts->ptime + so->set.alpha_f * ts->time_step;
-  *U = X;
-  *V = so->V1;
-  *A = so->A1;
+  so->U = so->Xa ? so->Xa : X;
+  so->V = so->Xa ? so->Va : so->V1;
+  so->A = so->Xa ? so->Aa : so->A1;
   if (so->Xa) {
     PetscCall(VecWAXPY(so->Xa, -1., so->X0, X));
     PetscCall(VecAYPX(so->Xa, so->set.alpha_f, so->X0));
@@ -83,9 +84,6 @@ static PetscErrorCode stage_state(TS ts, Vec X, PetscReal *t, Vec *U, Vec *V, Ve
     PetscCall(VecAYPX(so->Va, so->set.alpha_f, so->V0));
     PetscCall(VecWAXPY(so->Aa, -1., so->run->A, so->A1));
     PetscCall(VecAYPX(so->Aa, so->set.alpha_m, so->run->A));
-    *U = so->Xa;
-    *V = so->Va;
-    *A = so->Aa;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -95,12 +93,11 @@ static PetscErrorCode SNESTSFormFunction_SecondOrder(SNES snes, Vec X, Vec F, TS
 {
   SecondOrder *so = (SecondOrder *)ts->data;
   PetscReal t = 0.;
-  Vec U = NULL, V = NULL, A = NULL;
 
   PetscFunctionBeginUser;
   (void)snes;
-  PetscCall(stage_state(ts, X, &t, &U, &V, &A));
-  PetscCall(TSComputeI2Function(ts, t, U, V, A, F));
+  PetscCall(stage_state(ts, X, &t));
+  PetscCall(TSComputeI2Function(ts, t, so->U, so->V, so->A, F));
   if (so->set.alpha_f != 1.) PetscCall(VecScale(F, 1. / so->set.alpha_f));
   if (so->run->model->barrier_apart)
     PetscCall(SbModelPotentialGradient(so->run->model, X, so->run->barrier_weight, PETSC_TRUE, NULL, F));
@@ -112,16 +109,15 @@ static PetscErrorCode SNESTSFormJacobian_SecondOrder(SNES snes, Vec X, Mat J, Ma
   SecondOrder *so = (SecondOrder *)ts->data;
   const PetscReal h = ts->time_step;
   PetscReal t = 0., shift_v = 1. / h, shift_a = 1. / (h * h);
-  Vec U = NULL, V = NULL, A = NULL;
 
   PetscFunctionBeginUser;
   (void)snes;
-  PetscCall(stage_state(ts, X, &t, &U, &V, &A));
+  PetscCall(stage_state(ts, X, &t));
   if (so->set.method == SB_METHOD_GENERALIZED_ALPHA) {
     shift_v = so->set.separate ? 2. / h : so->set.gamma / (so->set.beta * h);
     shift_a = so->set.alpha_m / (so->set.alpha_f * so->set.beta * h * h);
   }
-  PetscCall(TSComputeI2Jacobian(ts, t, U, V, A, shift_v, shift_a, J, P));
+  PetscCall(TSComputeI2Jacobian(ts, t, so->U, so->V, so->A, shift_v, shift_a, J, P));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -134,6 +130,7 @@ static PetscErrorCode predict(void *ctx)
   KSP ksp;
 
   PetscFunctionBeginUser;
+  if (!ts->usessnes) PetscFunctionReturn(PETSC_SUCCESS); /* explicit */
   PetscCall(VecCopy(so->X0, so->X1));
   if (so->run->velocity_predictor) PetscCall(VecAXPY(so->X1, ts->time_step, so->V0));
   PetscCall(SbModelPrescribe(so->run->model, ts->ptime + ts->time_step, so->X1));
@@ -145,25 +142,28 @@ static PetscErrorCode predict(void *ctx)
     Vec Y;
 
     PetscCall(SNESGetSolutionUpdate(ts->snes, &Y));
-    if (Y && so->run->velocity_predictor)
-      PetscCall(VecZeroEntries(Y));
-    else if (Y) {
-      PetscCall(VecCopy(so->V0, Y));
-      PetscCall(VecScale(Y, -ts->time_step));
-    }
+    if (Y) PetscCall(VecAXPBY(Y, so->run->velocity_predictor ? 0. : -ts->time_step, 0., so->V0));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves for the end displacement X, which holds the initial guess. */
+/* Solves for the end displacement X, which holds the initial guess; the explicit methods need no solver. */
 static PetscErrorCode solve(void *ctx, Vec X, SNESConvergedReason *reason)
 {
   const TS ts = (TS)ctx;
   SecondOrder *so = (SecondOrder *)ts->data;
+  const PetscReal h = ts->time_step;
   PetscInt newton, linear;
 
   PetscFunctionBeginUser;
-  PetscCall(TSPreStage(ts, ts->ptime + so->set.alpha_f * ts->time_step));
+  if (!ts->usessnes) {
+    PetscCall(VecWAXPY(so->V1, h, so->run->A, so->V0));
+    PetscCall(VecWAXPY(X, h, so->set.method == SB_METHOD_EULER_EXPLICIT ? so->V0 : so->V1, so->X0));
+    PetscCall(SbModelPrescribe(so->run->model, ts->ptime + h, X));
+    PetscCall(SbFormAcceleration(so->run, ts->ptime + h, X, so->V1, so->A1));
+    *reason = SNES_CONVERGED_ITS;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(SNESSolve(ts->snes, NULL, X));
   PetscCall(SNESGetConvergedReason(ts->snes, reason));
   PetscCall(SNESGetIterationNumber(ts->snes, &newton));
@@ -178,11 +178,10 @@ static PetscErrorCode contact_residual(void *ts, Vec X, Vec R)
 {
   SecondOrder *so = (SecondOrder *)((TS)ts)->data;
   PetscReal t = 0.;
-  Vec U = NULL, V = NULL, A = NULL;
 
   PetscFunctionBeginUser;
-  PetscCall(stage_state((TS)ts, X, &t, &U, &V, &A));
-  PetscCall(SbModelResidual(so->run->model, t, U, V, A, PETSC_FALSE, R));
+  PetscCall(stage_state((TS)ts, X, &t));
+  PetscCall(SbModelResidual(so->run->model, t, so->U, so->V, so->A, PETSC_FALSE, R));
   /* Newmark multiplies the contact force at the end by two, that at the start by zero */
   PetscCall(VecScale(R, so->set.impulses ? 0.5 : 1. / so->set.alpha_f));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -190,33 +189,9 @@ static PetscErrorCode contact_residual(void *ts, Vec X, Vec R)
 
 static SbSolvedStep solved_step(TS ts)
 {
-  SecondOrder *so = (SecondOrder *)ts->data;
+  const SecondOrder *s = (SecondOrder *)ts->data;
 
-  return (SbSolvedStep){ts->ptime, ts->time_step, so->X0,
-                        so->V0,    so->run->A,    so->X1,
-                        so->V1,    so->A1,        (PetscBool)!SbRunIsExplicit(so->run)};
-}
-
-/* Barrier contact: adds its impulse to the velocity, and removes it from the acceleration. */
-static PetscErrorCode separate_contact(TS ts)
-{
-  SecondOrder *so = (SecondOrder *)ts->data;
-  const SbSpace s = so->run->model->space;
-  const PetscReal h = ts->time_step;
-  PetscScalar *push;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecZeroEntries(so->work));
-  PetscCall(SbModelPotentialGradient(so->run->model, so->X1, -1., PETSC_TRUE, NULL, so->work));
-  PetscCall(VecGetArray(so->work, &push));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
-    push[i] = s->node_mass[i / 3] > 0. ? push[i] / s->node_mass[i / 3] : 0.;
-  PetscCall(VecRestoreArray(so->work, &push));
-  PetscCall(VecAXPY(so->A1, -0.5 / so->set.beta, so->work));
-  PetscCall(VecWAXPY(so->V1, h, so->work, so->V0));
-  PetscCall(VecAXPY(so->V1, h * (1. - so->set.gamma), so->run->A));
-  PetscCall(VecAXPY(so->V1, h * so->set.gamma, so->A1));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return (SbSolvedStep){ts->ptime, ts->time_step, s->X0, s->V0, s->run->A, s->X1, s->V1, s->A1, ts->usessnes};
 }
 
 /* Computes velocity and acceleration at the end. */
@@ -224,112 +199,104 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
 {
   const TS ts = (TS)ctx;
   SecondOrder *so = (SecondOrder *)ts->data;
+  const SbRun run = so->run;
+  const SbSpace s = run->model->space;
+  const PetscReal h = ts->time_step;
   PetscReal size;
 
   PetscFunctionBeginUser;
-  if (!SbRunIsExplicit(so->run)) PetscCall(end_state(ts, so->X1));
-  PetscCall(VecNorm(SbRunIsExplicit(so->run) ? so->A1 : so->V1, NORM_INFINITY, &size));
+  if (ts->usessnes) PetscCall(end_state(ts, so->X1));
+  PetscCall(VecNorm(ts->usessnes ? so->V1 : so->A1, NORM_INFINITY, &size));
   *ok = (PetscBool)(reason > 0 && !PetscIsInfOrNanReal(size));
-  if (*ok && so->set.separate) PetscCall(separate_contact(ts));
+  if (*ok && so->set.separate) {
+    PetscScalar *push;
+
+    /* barrier contact: adds its impulse to the velocity, and removes it from the acceleration */
+    PetscCall(VecZeroEntries(so->work));
+    PetscCall(SbModelPotentialGradient(run->model, so->X1, -1., PETSC_TRUE, NULL, so->work));
+    PetscCall(VecGetArray(so->work, &push));
+    for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
+      push[i] = s->node_mass[i / 3] > 0. ? push[i] / s->node_mass[i / 3] : 0.;
+    PetscCall(VecRestoreArray(so->work, &push));
+    PetscCall(VecAXPY(so->A1, -0.5 / so->set.beta, so->work));
+    PetscCall(VecWAXPY(so->V1, h, so->work, so->V0));
+    PetscCall(VecAXPY(so->V1, h * (1. - so->set.gamma), run->A));
+    PetscCall(VecAXPY(so->V1, h * so->set.gamma, so->A1));
+  }
   if (*ok && so->set.impulses)
-    PetscCall(
-      SbNewmarkContact(so->run, ts->ptime + ts->time_step, ts->time_step, so->X1, so->V1, so->A1, so->own1));
+    PetscCall(SbNewmarkContact(run, ts->ptime + h, h, so->X1, so->V1, so->A1, so->own1));
   *step = solved_step(ts);
-  if (!*ok && SbRunIsExplicit(so->run))
-    PetscCall(SbRunFail(so->run,
+  if (!*ok && !ts->usessnes)
+    PetscCall(SbRunFail(run,
                         "step %" PetscInt_FMT " at t = %g s: the explicit solution is not finite; its step "
                         "of %g s is beyond the stable one (see the header)",
-                        ts->steps + 1, (double)ts->ptime, (double)ts->time_step));
+                        ts->steps + 1, (double)ts->ptime, (double)h));
   else if (!*ok && reason != SNES_CONVERGED_ITERATING) {
     char why[512] = "";
 
     if (reason == SNES_DIVERGED_LINEAR_SOLVE)
-      PetscCall(SbSolverListExplain(so->run, sizeof(why), why));
+      PetscCall(SbSolverListExplain(run, sizeof(why), why));
     else
-      PetscCall(SbModelPotentialNearest(so->run->model, sizeof(why), why));
-    PetscCall(SbRunFail(so->run, "step %" PetscInt_FMT " at t = %g s with a length of %g s: %s%s%s",
-                        ts->steps + 1, (double)ts->ptime, (double)ts->time_step,
+      PetscCall(SbModelPotentialNearest(run->model, sizeof(why), why));
+    PetscCall(SbRunFail(run, "step %" PetscInt_FMT " at t = %g s with a length of %g s: %s%s%s",
+                        ts->steps + 1, (double)ts->ptime, (double)h,
                         reason > 0 ? "the solution is not finite" : SNESConvergedReasons[reason],
                         why[0] ? "; " : "", why));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The explicit methods need no solver. */
-static PetscErrorCode step_explicitly(void *ctx, Vec X, SNESConvergedReason *reason)
-{
-  const TS ts = (TS)ctx;
-  SecondOrder *so = (SecondOrder *)ts->data;
-  const PetscReal h = ts->time_step;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecWAXPY(so->V1, h, so->run->A, so->V0));
-  PetscCall(VecWAXPY(X, h, so->set.method == SB_METHOD_EULER_EXPLICIT ? so->V0 : so->V1, so->X0));
-  PetscCall(SbModelPrescribe(so->run->model, ts->ptime + h, X));
-  PetscCall(SbFormAcceleration(so->run, ts->ptime + h, X, so->V1, so->A1));
-  *reason = SNES_CONVERGED_ITS;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode TSStep_SecondOrder(TS ts)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
-  const PetscBool explicit = SbRunIsExplicit(so->run);
-  SbAttempt attempt = {.U0 = so->X0,
-                       .U = so->X1,
-                       .predict = explicit ? NULL : predict,
-                       .solve = explicit ? step_explicitly : solve,
-                       .residual = contact_residual,
-                       .complete = complete,
-                       .ctx = ts};
+  const PetscBool explicit = (PetscBool)!ts->usessnes;
+  const SbRun run = so->run;
   PetscInt cuts = 0;
   PetscBool jumps;
 
   PetscFunctionBeginUser;
-
   /* a restarted run has its acceleration: that of generalized-alpha does not follow from the other state */
-  if (!so->started && so->run->step0 == 0 && so->set.method != SB_METHOD_EULER_IMPLICIT)
-    PetscCall(SbFormAcceleration(so->run, ts->ptime, ts->vec_sol, ts->vec_dot, so->run->A));
+  if (!so->started && run->step0 == 0 && so->set.method != SB_METHOD_EULER_IMPLICIT)
+    PetscCall(SbFormAcceleration(run, ts->ptime, ts->vec_sol, ts->vec_dot, run->A));
 
   /* the penalty on jumps of CR and DG for this step */
-  PetscCall(SbRunFollowJumps(so->run, &jumps));
+  PetscCall(SbRunFollowJumps(run, &jumps));
   if (so->own0 && (!so->started || jumps))
-    PetscCall(SbNewmarkOwn(so->run, ts->ptime, ts->vec_sol, ts->vec_dot, so->run->A, so->own0));
+    PetscCall(SbNewmarkOwn(run, ts->ptime, ts->vec_sol, ts->vec_dot, run->A, so->own0));
   so->started = PETSC_TRUE;
 
   /* copy the initial state, to which a rejected step returns */
   PetscCall(VecCopy(ts->vec_sol, so->X0));
   PetscCall(VecCopy(ts->vec_dot, so->V0));
-  so->run->stage = so->Xa;
-  so->run->stage_start = so->X0;
-  so->run->stage_part = so->set.alpha_f;
+  run->stage = so->Xa;
+  run->stage_start = so->X0;
+  run->stage_part = so->set.alpha_f;
   for (;;) {
-    PetscBool ok = PETSC_FALSE, accept = PETSC_FALSE;
-    PetscBool fixed;
+    const SbAttempt attempt = {ts->ptime, ts->time_step,    so->X0,   so->X1, predict,
+                               solve,     contact_residual, complete, ts};
+    PetscBool ok = PETSC_FALSE, accept = PETSC_FALSE, fixed;
     PetscReal next, h;
 
     /* one attempt */
-    so->run->may_end_at_impact = (PetscBool)(so->run->model->ntime_of_impact && !cuts && so->whole == 0.);
-    so->run->time_of_impact = 1.;
-    attempt.t = ts->ptime;
-    attempt.dt = ts->time_step;
-    PetscCall(SbRunAttempt(so->run, &attempt, &ok));
+    run->may_end_at_impact = (PetscBool)(run->model->ntime_of_impact && !cuts && so->whole == 0.);
+    run->time_of_impact = 1.;
+    PetscCall(SbRunAttempt(run, &attempt, &ok));
     if (ok) {
       PetscCall(VecCopy(so->X1, ts->vec_sol));
       PetscCall(VecCopy(so->V1, ts->vec_dot));
 
       /* return to the nominal length: double it after four steps without halving */
       PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &fixed));
-      h = fixed && so->run->good_steps >= 3 ? PetscMin(2. * ts->time_step, so->run->dt) : ts->time_step;
+      h = fixed && run->good_steps >= 3 ? PetscMin(2. * ts->time_step, run->dt) : ts->time_step;
       if (fixed && so->whole > 0.) h = so->rest > 0. ? so->rest : so->whole;
       PetscCall(TSAdaptChoose(ts->adapt, ts, h, NULL, &next, &accept));
       if (accept) {
-        PetscCall(VecCopy(so->A1, so->run->A));
+        PetscCall(VecCopy(so->A1, run->A));
         if (so->own0) PetscCall(VecCopy(so->own1, so->own0));
         ts->ptime += ts->time_step;
-        so->run->good_steps = next > ts->time_step ? 0 : so->run->good_steps + 1;
+        run->good_steps = next > ts->time_step ? 0 : run->good_steps + 1;
         ts->time_step = next;
-        so->run->stop_reason[0] = 0;
+        run->stop_reason[0] = 0;
 
         /* a step up to an impact, or its remainder, was accepted */
         if (so->rest > 0.)
@@ -338,9 +305,9 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
           so->whole = 0.;
         break;
       }
-    } else if (!so->run->rejected_inverted && so->run->time_of_impact < 1.) {
+    } else if (!run->rejected_inverted && run->time_of_impact < 1.) {
       /* repeat the step up to the time of impact; the next one is the remainder */
-      next = so->run->time_of_impact * ts->time_step;
+      next = run->time_of_impact * ts->time_step;
       so->whole = ts->time_step;
       so->rest = ts->time_step - next;
       cuts--;
@@ -353,17 +320,17 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     PetscCall(VecCopy(so->X0, ts->vec_sol));
     PetscCall(VecCopy(so->V0, ts->vec_dot));
     ts->reject++;
-    so->run->rejected_total++;
-    so->run->good_steps = 0;
+    run->rejected_total++;
+    run->good_steps = 0;
     // bounds the number of halvings, also when steps in between succeed
-    if (SbRunIsExplicit(so->run) || so->run->stopped || ++cuts > so->run->max_halvings ||
-        next < SHORTEST * so->run->dt || SbRunTooShort(so->run, next)) {
+    if (explicit || run->stopped || ++cuts > run->max_halvings || next < SHORTEST * run->dt ||
+        SbRunTooShort(run, next)) {
       ts->reason = TS_DIVERGED_STEP_REJECTED;
-      if (!SbRunIsExplicit(so->run) && !so->run->stopped && so->run->stop_reason[0]) {
-        char why[sizeof(so->run->stop_reason)];
+      if (!explicit && !run->stopped && run->stop_reason[0]) {
+        char why[sizeof(run->stop_reason)];
 
-        PetscCall(PetscStrncpy(why, so->run->stop_reason, sizeof(why)));
-        PetscCall(SbRunFail(so->run,
+        PetscCall(PetscStrncpy(why, run->stop_reason, sizeof(why)));
+        PetscCall(SbRunFail(run,
                             "%s; try a shorter -ts_dt, or loads and motions that begin gently "
                             "(docs/guides/when_it_fails.md, R1)",
                             why));
@@ -408,11 +375,8 @@ static PetscErrorCode TSInterpolate_SecondOrder(TS ts, PetscReal t, Vec X)
   const PetscReal h = ts->ptime - ts->ptime_prev, s = (t - ts->ptime_prev) / h;
 
   PetscFunctionBeginUser;
-  PetscCall(VecCopy(so->X0, X));
-  PetscCall(VecScale(X, 1. - s * s * (3. - 2. * s)));
-  PetscCall(VecAXPY(X, s * s * (3. - 2. * s), ts->vec_sol));
-  PetscCall(VecAXPY(X, h * s * (1. - s) * (1. - s), so->V0));
-  PetscCall(VecAXPY(X, -h * s * s * (1. - s), ts->vec_dot));
+  PetscCall(VecAXPBYPCZ(X, 1. - s * s * (3. - 2. * s), s * s * (3. - 2. * s), 0., so->X0, ts->vec_sol));
+  PetscCall(VecAXPBYPCZ(X, h * s * (1. - s) * (1. - s), -h * s * s * (1. - s), 1., so->V0, ts->vec_dot));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -421,7 +385,6 @@ static PetscErrorCode TSSetUp_SecondOrder(TS ts)
   SecondOrder *so = (SecondOrder *)ts->data;
   Vec *const ends[] = {&so->X0, &so->V0, &so->X1, &so->V1, &so->A1}, *const stage[] = {&so->Xa, &so->Va,
                                                                                        &so->Aa};
-  SNES snes;
 
   PetscFunctionBeginUser;
   for (int k = 0; k < 5; k++) PetscCall(VecDuplicate(ts->vec_sol, ends[k]));
@@ -429,12 +392,11 @@ static PetscErrorCode TSSetUp_SecondOrder(TS ts)
     PetscCall(VecDuplicate(ts->vec_sol, stage[k]));
   PetscCall(TSGetAdapt(ts, &ts->adapt));
   PetscCall(TSAdaptCandidatesClear(ts->adapt));
-  if (!SbRunIsExplicit(so->run)) PetscCall(VecDuplicate(ts->vec_sol, &so->work));
+  if (ts->usessnes) PetscCall(VecDuplicate(ts->vec_sol, &so->work));
   if (so->set.impulses) {
     PetscCall(VecDuplicate(ts->vec_sol, &so->own0));
     PetscCall(VecDuplicate(ts->vec_sol, &so->own1));
   }
-  PetscCall(TSGetSNES(ts, &snes));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -463,7 +425,7 @@ void SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings)
 
   so->run = run;
   so->set = *settings;
-  ts->usessnes = (PetscBool)!SbRunIsExplicit(so->run);
+  ts->usessnes = (PetscBool)!SbRunIsExplicit(run);
 }
 
 static PetscErrorCode TSCreate_SecondOrder(TS ts)

@@ -76,42 +76,15 @@ static PetscErrorCode describe_failure(SbSolverList l, KSP ksp, Vec b, Vec x, ch
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* *is: the solver may be replaced, and another one can succeed. */
-static PetscErrorCode may_replace(SbSolverList l, KSP ksp, Vec b, PetscBool *is)
-{
-  SbRun run = l->run;
-  PetscBool newton, factored;
-  PetscReal size;
-  PetscInt body = -1;
-  char motion[256];
-  Vec X;
-
-  PetscFunctionBeginUser;
-  *is = PETSC_FALSE;
-  /* conditions: a preset, in Newton's method, with a finite right-hand side */
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)run->snes, &newton, SB_SNES_NEWTON, SNESNEWTONLS,
-                                      SNESKSPONLY, ""));
-  PetscCall(SNESGetSolution(run->snes, &X));
-  PetscCall(SbPCConstrainedIsFactored(ksp->pc, &factored));
-  if (!l->own || !newton || !X || factored) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecNorm(b, NORM_2, &size));
-  if (PetscIsInfOrNanReal(size)) PetscFunctionReturn(PETSC_SUCCESS);
-
-  /* a static system with a free motion is singular for every solver */
-  if (!run->model->dynamic) PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
-  *is = (PetscBool)(body < 0);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Changes the run's KSP to the solver `next`, with the tangent at Newton's iterate. */
 static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *next)
 {
-  PetscErrorCode (*jacobian)(SNES, Vec, Mat, Mat, void *);
-  SbRun run = l->run;
+  const SbRun run = l->run;
+  const SbSpace s = run->model->space;
   const SbSolverPreset *old = run->solver_used;
   const char *prefix;
   PetscReal rtol, atol;
-  void *ctx, *test;
+  void *test;
   Vec X;
   PC pc;
 
@@ -131,8 +104,6 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
 
   /* another operator if `next` needs another matrix type */
   if (old->create || next->create || old->matrix != next->matrix) {
-    SbSpace s = run->model->space;
-
     PetscCall(MatDestroy(&run->J));
     PetscCall(SbSolverCreateOperator(s, next, &run->J));
     /* the nonsymmetric operator multiplies by run->J anyway */
@@ -153,19 +124,18 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
   /* the options of the new solver, set up as at the start of a run */
   run->solver_used = next;
   PetscCall(PetscStrncpy(run->solver, next->name, sizeof(run->solver)));
-  PetscCall(SbSolverSetUp(run->snes, run->model->space, next));
+  PetscCall(SbSolverSetUp(run->snes, s, next));
   PetscCall(KSPSetFromOptions(ksp));
-  PetscCall(SbSolverFinish(run->snes, run->model->space, next, run->J));
+  PetscCall(SbSolverFinish(run->snes, s, next, run->J));
   PetscCall(KSPSetTolerances(ksp, rtol, atol, PETSC_DEFAULT, PETSC_DEFAULT));
   PetscCall(attach(l, ksp));
 
   /* the tangent at Newton's iterate, in the new matrix */
   run->tangent_known = PETSC_FALSE;
   PetscCall(SNESGetSolution(run->snes, &X));
-  PetscCall(SNESGetJacobian(run->snes, NULL, NULL, &jacobian, &ctx));
-  PetscCall((*jacobian)(run->snes, X, run->operator, run->J, ctx));
+  PetscCall(SNESComputeJacobian(run->snes, X, run->operator, run->J));
   PetscCall(KSPSetOperators(ksp, run->operator, run->J));
-  PetscCall(SbSolverUpdateSymmetry(ksp, run->model->space));
+  PetscCall(SbSolverUpdateSymmetry(ksp, s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -194,10 +164,13 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
   SbSolverList l = (SbSolverList)ctx;
   SbRun run = l->run;
   const SbSolverPreset *next = run->solver_used;
-  PetscBool may = PETSC_FALSE, memory, simpler = PETSC_FALSE, minres;
+  PetscBool memory, simpler = PETSC_FALSE, minres, newton, factored;
   KSPConvergedReason reason;
-  char text[192];
+  char text[192], motion[256];
+  PetscInt body = -1;
+  PetscReal size;
   PC pc;
+  Vec X;
 
   PetscFunctionBeginUser;
   /* the previous callback may set the solve to failed */
@@ -223,9 +196,16 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
-  /* then the next solver of the list, with a warning */
-  PetscCall(may_replace(l, ksp, b, &may));
-  if (!may) PetscFunctionReturn(PETSC_SUCCESS);
+  /* then the next solver of the list, with a warning: of a preset, in Newton's method, with a finite right-hand side */
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)run->snes, &newton, SB_SNES_NEWTON, SNESNEWTONLS,
+                                      SNESKSPONLY, ""));
+  PetscCall(SNESGetSolution(run->snes, &X));
+  PetscCall(SbPCConstrainedIsFactored(ksp->pc, &factored));
+  PetscCall(VecNorm(b, NORM_2, &size));
+  if (!l->own || !newton || !X || factored || PetscIsInfOrNanReal(size)) PetscFunctionReturn(PETSC_SUCCESS);
+  /* a static system with a free motion is singular for every solver */
+  if (!run->model->dynamic) PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
+  if (body >= 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbSolverNextFallback(run->model->space, ksp->reason, memory, &l->tried, &next));
   if (!next) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbWarning(run->model->comm, "linear solver: %s; from here on -solver %s", text, next->name));
@@ -237,7 +217,7 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
 
 PetscErrorCode SbSolverListCreate(SbRun run)
 {
-  PetscBool given;
+  PetscBool type, pc;
   SbSolverList l;
   KSP ksp;
 
@@ -245,11 +225,10 @@ PetscErrorCode SbSolverListCreate(SbRun run)
   if (!run->J) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&l));
   l->run = run;
-  PetscCall(PetscOptionsHasName(NULL, NULL, "-ksp_type", &given));
-  l->own = (PetscBool)!given;
-  PetscCall(PetscOptionsHasName(NULL, NULL, "-pc_type", &given));
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-ksp_type", &type));
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-pc_type", &pc));
   l->own =
-    (PetscBool)(l->own && !given && !run->arc.on); /* arc length needs the inertia from its factorisation */
+    (PetscBool)(!type && !pc && !run->arc.on); /* arc length needs the inertia from its factorisation */
   PetscCall(SNESGetKSP(run->snes, &ksp));
   PetscCall(attach(l, ksp));
   run->solver_list = l;
@@ -294,18 +273,14 @@ PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[])
     nsliver += m->body[b].nsliver;
     ntet += m->body[b].ncell;
   }
-  if (nsliver) {
+  if (nsliver)
     SbAppend(sizeof(causes), causes,
              "; %" PetscInt_FMT " of %" PetscInt_FMT " tets have an angle below %g degrees: repair the mesh",
              nsliver, ntet, SB_SLIVER);
-  }
-  if (stiff > RATIO * soft) {
+  if (stiff > RATIO * soft)
     SbAppend(sizeof(causes), causes, "; the stiffest material has %.2g times Young's modulus of the softest",
              (double)(stiff / soft));
-  }
-  if (nu > NU_HARD) {
-    SbAppend(sizeof(causes), causes, "; nu is up to %g", (double)nu);
-  }
+  if (nu > NU_HARD) SbAppend(sizeof(causes), causes, "; nu is up to %g", (double)nu);
   if (l->own)
     PetscCall(PetscSNPrintf(text, size, "linear solver: %s%s", l->failures, causes));
   else {

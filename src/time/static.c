@@ -18,6 +18,7 @@ typedef struct {
   SbRun run;
   PetscReal factor, length; /* load factor at the end of the step, and its increment */
   Vec X;                    /* displacement at its end, m */
+  PetscBool contact;        /* with contact of any response */
 } LoadStep;
 
 /* Newton's method from the displacement in X. */
@@ -65,8 +66,7 @@ static PetscErrorCode predict(void *ctx)
 static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
 {
   const SbModel m = l->run->model;
-  PetscReal psi[2];
-  PetscScalar work[2];
+  PetscReal psi[2], work[2];
   Vec forces, way;
   PetscInt n;
 
@@ -81,8 +81,8 @@ static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
     PetscCall(VecDot(forces, way, &work[k]));
   }
   PetscCall(PetscInfo(l->run->snes, "strain energy %g -> %g J, work of the forces at both ends %g J\n",
-                      (double)psi[0], (double)psi[1], (double)PetscRealPart(work[0] + work[1])));
-  *is = (PetscBool)((1. - EXCESS) * psi[1] > psi[0] + PetscMax(0., PetscRealPart(work[0] + work[1])));
+                      (double)psi[0], (double)psi[1], (double)(work[0] + work[1])));
+  *is = (PetscBool)((1. - EXCESS) * psi[1] > psi[0] + PetscMax(0., work[0] + work[1]));
   PetscCall(VecDestroy(&way));
   PetscCall(VecDestroy(&forces));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -99,14 +99,13 @@ typedef enum {
 static PetscErrorCode find_free_body(const LoadStep *l, When when, PetscBool *found)
 {
   const SbRun run = l->run;
-  const PetscBool apart = (PetscBool)(!run->model->nbegin_step && !run->model->npotential);
   PetscInt body = -1;
   char motion[256];
   const char *loads = "";
 
   PetscFunctionBeginUser;
   if (when != BEFORE) PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
-  run->free_body = (PetscBool)(body >= 0 && apart);
+  run->free_body = (PetscBool)(body >= 0 && !l->contact);
   /* stress and loads may resist a free rotation, but not at the start of the step. A stabilising load, as the weight of a hanging body, makes shorter steps
      succeed; a load that drives the motion has no equilibrium nearby */
   if (body < 0 && when != SOLVED && !run->model->linear) {
@@ -119,7 +118,7 @@ static PetscErrorCode find_free_body(const LoadStep *l, When when, PetscBool *fo
     PetscCall(SNESComputeJacobian(run->snes, run->U, run->operator, run->J));
     PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, along));
     run->model->load = l->factor;
-    if (body >= 0 && apart) {
+    if (body >= 0 && !l->contact) {
       PetscCall(contact_residual((void *)l, run->U, F));
       PetscCall(SbSpaceProjectAdmissible(run->model->space, F));
       PetscCall(VecDot(F, along, &work));
@@ -133,10 +132,9 @@ static PetscErrorCode find_free_body(const LoadStep *l, When when, PetscBool *fo
   }
   *found = (PetscBool)(body >= 0);
   if (*found)
-    PetscCall(SbRunFail(
-      run, "load factor %g: nothing%s holds the body %s against %s; hold it by a support%s",
-      (double)l->factor, loads, run->model->body[body].name, motion,
-      run->model->nbegin_step || run->model->npotential ? ", or let it come to rest in a dynamic run" : ""));
+    PetscCall(SbRunFail(run, "load factor %g: nothing%s holds the body %s against %s; hold it by a support%s",
+                        (double)l->factor, loads, run->model->body[body].name, motion,
+                        l->contact ? ", or let it come to rest in a dynamic run" : ""));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -173,10 +171,9 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
   }
 
   /* with balanced loads a singular system has solutions, up to any rigid motion */
-  if (*ok && !l->run->steps_total && !l->run->model->nbegin_step && !l->run->model->npotential &&
-      l->run->newton_step) {
+  if (*ok && !l->run->steps_total && !l->contact && l->run->newton_step) {
     PetscCall(find_free_body(l, SOLVED, &found));
-    if (found) *ok = PETSC_FALSE;
+    *ok = (PetscBool)!found;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -186,30 +183,22 @@ PetscErrorCode SbStaticSolve(SbRun run)
   const PetscReal nominal = 1. / (PetscReal)run->static_steps, least = run->min_increment * nominal;
   PetscReal factor = run->t0, length = nominal, rate, slowest = 0.;
   PetscInt step = run->step0, cuts = 0;
-  LoadStep load;
-  SbAttempt attempt = {.U0 = run->U,
-                       .predict = predict,
-                       .solve = solve,
-                       .residual = contact_residual,
-                       .complete = complete,
-                       .ctx = &load};
+  const PetscBool contact = (PetscBool)(run->model->nbegin_step || run->model->npotential);
   Vec X;
 
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(run->U, &X));
-  attempt.U = X;
   run->model->load = factor;
   PetscCall(SbRunStepAccepted(run, step, factor, 0., PETSC_FALSE));
-  run->newton_step = run->linear_step = run->rejected_step = 0;
   while (factor < 1.) {
     const PetscReal next = factor + length > 1. - 1e-9 ? 1. : factor + length;
+    LoadStep load = {run, next, next - factor, X, contact};
+    const SbAttempt attempt = {factor, next - factor,    run->U,   X,    predict,
+                               solve,  contact_residual, complete, &load};
     PetscBool ok = PETSC_FALSE, found;
 
-    load = (LoadStep){run, next, next - factor, X};
-    attempt.t = factor;
-    attempt.dt = next - factor;
     /* check at the start: follower loads stiffen a mechanism in later iterations, and a late failure takes long */
-    if (run->nonsymmetric.U && !run->steps_total && !run->model->nbegin_step && !run->model->npotential)
+    if (run->nonsymmetric.U && !run->steps_total && !contact)
       PetscCall(find_free_body(&load, BEFORE, &found));
     if (!run->free_body) PetscCall(SbRunAttempt(run, &attempt, &ok));
 
@@ -218,14 +207,13 @@ PetscErrorCode SbStaticSolve(SbRun run)
       char why[sizeof(run->stop_reason)];
       PetscBool unstable;
 
-      run->rejected_step++;
       run->rejected_total++;
       length *= 0.5;
       run->tangent_known = PETSC_FALSE;
       if (run->stopped) PetscCall(SbRunStepAccepted(run, step, factor, 0., PETSC_TRUE));
       if (run->free_body || run->stopped) break;
       /* halving does not help in a linear problem, unless contact is active */
-      if (run->model->linear && !run->model->nbegin_step && !run->model->npotential) cuts = run->max_halvings;
+      if (run->model->linear && !contact) cuts = run->max_halvings;
       if (++cuts <= run->max_halvings && length >= least && !SbRunTooShort(run, length)) continue;
 
       /* steps are too short: report the load reached, and the likely cause */
@@ -237,7 +225,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
                             "on: a limit load is likely, as displacements grow %.0f times as fast with the "
                             "load as before; -static_control arc_length goes past it",
                             (double)factor, (double)(2. * length), (double)run->softening));
-      else if (factor > 0. && unstable && !run->model->nbegin_step && !run->model->npotential)
+      else if (factor > 0. && unstable && !contact)
         PetscCall(SbRunFail(run,
                             "the load factor reached %.7g of 1, and no equilibrium was found %.1e further "
                             "on, where the tangent is not positive definite: a limit load is likely, or a "
@@ -263,9 +251,8 @@ PetscErrorCode SbStaticSolve(SbRun run)
     if (run->after.fn && next < 1.)
       PetscCall((*run->after.fn)(run, step + 1, next, next - factor, run->after.ctx, &run->paused));
     if (next < 1.) PetscCall(SbRunStopAsked(run, step + 1, next, PETSC_FALSE));
-    PetscCall(SbRunStepAccepted(run, ++step, next, next - factor, (PetscBool)(next >= 1.)));
     if (run->newton_step) cuts = 0;
-    run->newton_step = run->linear_step = run->rejected_step = 0;
+    PetscCall(SbRunStepAccepted(run, ++step, next, next - factor, (PetscBool)(next >= 1.)));
     if (run->paused || run->stopped) break;
 
     /* lengthen the next step */

@@ -45,7 +45,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
     }
 
     /* the predictor, and the solution from there; with contact by active-set iterations */
-    if (a->predict && !run->goes_on) PetscCall((*a->predict)(a->ctx));
+    if (!run->goes_on) PetscCall((*a->predict)(a->ctx));
     if (run->model->nbegin_step)
       PetscCall(SbRunSolveContact(run, a, &reason));
     else
@@ -102,7 +102,6 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
   now.last = (PetscBool)(last || run->stopped);
   if (!first)
     run->stop.longest_step = PetscMax(SB_FORGET * run->stop.longest_step, begun - run->stop.step_begun);
-
   if (dt > 0.9 * run->dt) run->shortened = PETSC_FALSE;
 
   /* effects save their history */
@@ -129,11 +128,13 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
   now.step_end = run->fixed_step ? step + (PetscInt)PetscCeilReal((run->t_end - t) / run->dt - 1e-6) : -1;
   now.newton = run->newton_step;
   now.linear = run->linear_step;
-  now.rejected = run->rejected_step;
+  now.rejected = run->rejected_total - run->rejected_seen;
   now.wall = MPI_Wtime() - run->wall_start;
   run->newton_total += now.newton;
   run->linear_total += now.linear;
   run->steps_total += !first;
+  run->rejected_seen = run->rejected_total;
+  run->newton_step = run->linear_step = 0;
   for (PetscInt k = 0; k < run->nmonitor; k++) PetscCall(run->monitor[k].fn(run, &now, run->monitor[k].ctx));
   run->seen = now;
   if (SbLiveCount()) PetscCall(SbLiveAdvance(m->comm, t));

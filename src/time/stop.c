@@ -113,14 +113,14 @@ static PetscReal duration(const char *text)
   return 86400. * day + 3600. * hour + 60. * minute + second;
 }
 
-PetscErrorCode SbRunReadStop(SbRun run, const SbScope *scope)
+PetscErrorCode SbRunReadStop(SbRun run)
 {
   char text[SB_NAME_MAX];
 
   PetscFunctionBeginUser;
   run->stop.begun = MPI_Wtime();
-  PetscCall(SbOptionReal(scope, "stop_grace", &run->stop.grace));
-  PetscCall(SbOptionString(scope, "wall_time", sizeof(text), text));
+  PetscCall(SbOptionReal(&SbRunScope, "stop_grace", &run->stop.grace));
+  PetscCall(SbOptionString(&SbRunScope, "wall_time", sizeof(text), text));
   if (!text[0]) PetscFunctionReturn(PETSC_SUCCESS);
   run->stop.wall_time = duration(text);
   run->stop.listens = PETSC_TRUE;
@@ -133,44 +133,26 @@ PetscErrorCode SbRunReadStop(SbRun run, const SbScope *scope)
 
 /* ------------------------------------------------------------------ decisions */
 
-/* The signal or WALL_TIME that ends the run, the same on all ranks; 0: none. within: a step is being solved. */
-static PetscErrorCode find_reason(SbRun run, PetscBool within, int *reason)
+PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool within)
 {
   const double now = MPI_Wtime();
-  PetscMPIInt rank, size;
+  PetscMPIInt rank;
+  int reason;
 
   PetscFunctionBeginUser;
+  if (!run->stop.listens || run->stopped) PetscFunctionReturn(PETSC_SUCCESS);
+  /* the signal or WALL_TIME that ends the run, the same on all ranks; 0: none */
   PetscCallMPI(MPI_Comm_rank(run->model->comm, &rank));
-  PetscCallMPI(MPI_Comm_size(run->model->comm, &size));
-  *reason = asked.signal && (!within || seconds() > asked.since + run->stop.grace) ? asked.signal : 0;
+  reason = asked.signal && (!within || seconds() > asked.since + run->stop.grace) ? asked.signal : 0;
   if (run->stop.wall_time > 0. && !rank) {
     const PetscReal reserve =
       PetscMin(RESERVE_LONGEST, RESERVE_PART * run->stop.wall_time) + 2. * run->stop.longest_output;
     const PetscReal next = within ? 0. : STEP_FACTOR * run->stop.longest_step;
 
-    if (now - run->stop.begun + reserve + next >= run->stop.wall_time) *reason = WALL_TIME;
+    if (now - run->stop.begun + reserve + next >= run->stop.wall_time) reason = WALL_TIME;
   }
-  if (size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, reason, 1, MPI_INT, MPI_MAX, run->model->comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool within)
-{
-  const char *who = "the end of -wall_time is near";
-  char signal_name[32];
-  int reason;
-
-  PetscFunctionBeginUser;
-  if (!run->stop.listens || run->stopped) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(find_reason(run, within, &reason));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &reason, 1, MPI_INT, MPI_MAX, run->model->comm));
   if (!reason) PetscFunctionReturn(PETSC_SUCCESS);
-  if (reason != WALL_TIME) {
-    PetscCall(PetscSNPrintf(signal_name, sizeof(signal_name), "SIG%s",
-                            reason == SIGTERM  ? "TERM"
-                            : reason == SIGINT ? "INT"
-                                               : "USR1"));
-    who = signal_name;
-  }
   /* no step fits into -wall_time: an error, else a requeued job would repeat this forever */
   PetscCheck(
     reason != WALL_TIME || step > run->step0, run->model->comm, PETSC_ERR_USER_INPUT,
@@ -179,17 +161,13 @@ PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool w
   run->stopped = PETSC_TRUE;
   run->paused = PETSC_FALSE;
   run->stop_reason[0] = 0;
-  PetscCall(SbRunFail(run, "%s%s, after step %" PetscInt_FMT " at %s %g%s; it goes on with -restart %s", who,
+  PetscCall(SbRunFail(run, "%s%s, after step %" PetscInt_FMT " at %s %g%s; it goes on with -restart %s",
+                      reason == WALL_TIME ? "the end of -wall_time is near"
+                      : reason == SIGTERM ? "SIGTERM"
+                      : reason == SIGINT  ? "SIGINT"
+                                          : "SIGUSR1",
                       within ? ", and the next step is given up" : "", step,
                       run->model->dynamic ? "t =" : "load factor", (double)t, run->model->dynamic ? " s" : "",
                       step > run->step0 ? "latest" : "auto"));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbRunGiveUp(SbRun run, PetscBool *given_up)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbRunStopAsked(run, run->step_now, run->t_now, PETSC_TRUE));
-  *given_up = run->stopped;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -38,10 +38,9 @@ void SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings);
 /* step.c: one step. */
 /* Data and functions of a step from t to t + dt; vectors and ctx are borrowed. Static runs: t is the load factor. */
 typedef struct {
-  PetscReal t, dt; /* start and length, s */
-  Vec U0, U;       /* displacements at the start; at the end, once solved, m */
-  PetscErrorCode (*predict)(
-    void *ctx); /* sets U to an initial guess with the prescribed values; NULL: none */
+  PetscReal t, dt;                      /* start and length, s */
+  Vec U0, U;                            /* displacements at the start; at the end, once solved, m */
+  PetscErrorCode (*predict)(void *ctx); /* sets U to an initial guess with the prescribed values */
   PetscErrorCode (*solve)(void *ctx, Vec U, SNESConvergedReason *reason); /* solves from the guess in U */
   PetscErrorCode (*residual)(void *ctx, Vec U, Vec R); /* residual without constraints, N; for contact */
   /* computes the end state from U, in `step`; if not ok run->stop_reason is the reason */
@@ -67,11 +66,9 @@ PetscErrorCode SbNewtonUnstable(SNES snes, PetscBool *is);
 
 /* stop.c: early end of runs. */
 /* Options -wall_time and -stop_grace. */
-PetscErrorCode SbRunReadStop(SbRun run, const SbScope *scope);
+PetscErrorCode SbRunReadStop(SbRun run);
 /* After a step that ended at t (within: during the solve of the next one): sets run->stopped if the run is to end. Collective. */
 PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool within);
-/* During the solve of a step: whether to abandon it. Collective. */
-PetscErrorCode SbRunGiveUp(SbRun run, PetscBool *given_up);
 PetscErrorCode SbRunFail(SbRun run, const char *format, ...) __attribute__((format(printf, 2, 3)));
 /* After a rejected step of length dt, s: warns if dt is much less than the requested length, once until steps have that length again. */
 PetscErrorCode SbRunWarnShorter(SbRun run, PetscReal dt);

@@ -27,12 +27,6 @@ PetscErrorCode SbRunAfterStep(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbRunSetPause(SbRun run, SbPauseFn fn, void *ctx)
-{
-  run->after.fn = fn;
-  run->after.ctx = ctx;
-}
-
 PetscErrorCode SbRunTransferState(SbRun from, SbRun to)
 {
   PetscReal dt;
@@ -47,7 +41,7 @@ PetscErrorCode SbRunTransferState(SbRun from, SbRun to)
   to->gain_said = from->gain_said;
   to->newton_total = to->newton_before = from->newton_total;
   to->linear_total = to->linear_before = from->linear_total;
-  to->rejected_total = from->rejected_total;
+  to->rejected_total = to->rejected_seen = from->rejected_total;
   to->steps_total = from->steps_total;
   to->wall_start = from->wall_start;
   to->stop = from->stop;
@@ -65,9 +59,6 @@ PetscErrorCode SbRunTransferState(SbRun from, SbRun to)
 
 PetscErrorCode SbRunRestartAcceleration(SbRun run)
 {
-  const SbSpace s = run->model->space;
-  const PetscScalar *residual;
-  PetscScalar *a;
   Vec own;
 
   PetscFunctionBeginUser;
@@ -75,13 +66,8 @@ PetscErrorCode SbRunRestartAcceleration(SbRun run)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(run->A, &own));
   PetscCall(SbFormAcceleration(run, run->t_now, run->U, run->V, own));
-  PetscCall(VecGetArrayRead(own, &residual));
-  PetscCall(VecGetArray(run->A, &a));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
-    if (!(s->fixed[i / 3] & (1 << i % 3))) a[i] = residual[i];
-  }
-  PetscCall(VecRestoreArray(run->A, &a));
-  PetscCall(VecRestoreArrayRead(own, &residual));
+  PetscCall(SbSpaceZeroPrescribed(run->model->space, PETSC_FALSE, run->A));
+  PetscCall(VecAXPY(run->A, 1., own));
   PetscCall(VecDestroy(&own));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
