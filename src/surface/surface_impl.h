@@ -7,10 +7,11 @@
 #include "triangles.h"
 
 /*
-  SbSurfaceRead - reads a surface, repairs and checks it, and finds its regions; sets groups and im->note of the body `im`. Not collective.
+  SbSurfaceRead - reads a surface, repairs and checks it, and finds its regions; sets groups and im->note of the body
+  `im`. Not collective.
 
   Input: path; im->where, im->scale (1 afterwards: the surface is in metres), im->tet (merge_tolerance and untangle).
-  Errors: PETSC_ERR_FILE_*, PETSC_ERR_USER_INPUT, one line that names the triangles and a remedy; no surface is returned.
+  Errors: PETSC_ERR_FILE_*, PETSC_ERR_USER_INPUT, one line that names the triangles and a remedy; no surface is left.
 */
 PetscErrorCode SbSurfaceRead(const char *path, SbImport *im, SbSurface *body_surface);
 
