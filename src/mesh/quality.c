@@ -38,12 +38,11 @@ void SbTetShape(const PetscReal x[], const PetscInt v[4], PetscReal *V, PetscRea
   *ratio = PetscSqrtReal(SbDot3(to_centre, to_centre)) / (2 * det) * sum / (3 * det);
 }
 
-PetscReal SbTetQuality(const PetscReal x[4][3])
+PetscReal SbTetQuality(const PetscReal x[], const PetscInt v[4])
 {
-  static const PetscInt corner[4] = {0, 1, 2, 3};
   PetscReal V, cosine[6], ratio;
 
-  SbTetShape(&x[0][0], corner, &V, cosine, &ratio);
+  SbTetShape(x, v, &V, cosine, &ratio);
   if (!(PetscAbsReal(V) > 0) || PetscIsInfOrNanReal(ratio)) return 0;
   return (V > 0 ? 1 : -1) / ratio;
 }

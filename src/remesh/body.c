@@ -1,21 +1,22 @@
 /*
   body.c - a new mesh of a body in its current state, on rank 0.
 
-  The hull is kept: all triangles of the surface and of interfaces between regions, with their vertices. Its interior is tetrahedralised
-  again, in the current or the reference configuration. A new vertex y in the current configuration lies in a tet of the old mesh with barycentric coordinates w,
-  y = sum w_a x_a; its rest position is X = sum w_a X_a, that of the same material point. So the volume at rest is the same,
-  and the old motion from X to x is interpolated at other points.
+  The hull is kept: all triangles of the surface and of interfaces between regions, with their vertices. Its interior is
+  tetrahedralised again, in the current or the reference configuration. A new vertex y in the current configuration lies in
+  a tet of the old mesh with barycentric coordinates w, y = sum w_a x_a; its rest position is X = sum w_a X_a, that of the
+  same material point. So the volume at rest is the same, and the old motion from X to x is interpolated at other points.
 
-  The motion is not linear between these points, so a new tet may be inverted at rest but not in the current configuration. Inverted and flat tets
-  are repaired by moving their inner vertices through the material towards the mean of their neighbours: of a few positions on the
-  way the one with the best worst tet is chosen, until all are good or nothing helps. A tet with four vertices on a face that was plane at rest and bulges
-  now has no volume at rest, and no inner vertex: one of its inner edges is split at the middle, with all tets around, and the new vertex
-  moves inwards.
+  The motion is not linear between these points, so a new tet may be inverted at rest but not in the current configuration.
+  Inverted and flat tets are repaired by moving their inner vertices through the material towards the mean of their
+  neighbours: of a few positions on the way the one with the best worst tet is chosen, until all are good or nothing helps.
+  A tet with four vertices on a face that was plane at rest and bulges now has no volume at rest, and no inner vertex: one
+  of its inner edges is split at the middle, with all tets around, and the new vertex moves inwards.
 
-  In a body with curved tets the triangles of the hull keep their curved edges, so its shape is the same. The flat triangles enclose the tetrahedralised volume. The old tets define a map
-  from it, at rest, to the body: from the point with barycentric coordinates w in a straight tet to that with l = w in the curved tet. New vertices, and nodes at
-  the middles of new edges, are mapped, so that inner edges follow the curvature of the surface. A new tet may still have a negative Jacobian, and is repaired like a
-  flat one.
+  In a body with curved tets the triangles of the hull keep their curved edges, so its shape is the same. The flat
+  triangles enclose the tetrahedralised volume. The old tets define a map from it, at rest, to the body: from the point
+  with barycentric coordinates w in a straight tet to that with l = w in the curved tet. New vertices, and nodes at the
+  middles of new edges, are mapped, so that inner edges follow the curvature of the surface. A new tet may still have a
+  negative Jacobian, and is repaired like a flat one.
 */
 #include "remesh_impl.h"
 
@@ -30,8 +31,7 @@ typedef struct {
   const SbOldMesh *old;
   SbLocator rest, flat; /* locator at rest; among straight tets, for a body with curved ones, else NULL */
   PetscInt ncurved;
-  SbKey *
-    curved; /* [ncurved] curved edges between kept vertices: SbKeyOfPair() of new numbers; slot 6 cell + edge in the old mesh */
+  SbKey *curved; /* [ncurved] curved edges between kept vertices, by new numbers; old slots 6 cell + edge */
 } Material;
 
 /* ------------------------------------------------------------------ the hull */
@@ -110,13 +110,12 @@ static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, 
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(3 * (size_t)m->nvert, &m->X));
+  if (old->edge_off) PetscCall(PetscMalloc1(3 * (size_t)m->nvert, &m->flat));
   for (PetscInt v = 0; v < m->nkept; v++) {
     PetscCall(PetscArraycpy(m->X + 3 * v, old->X + 3 * m->kept[v], 3));
     PetscCall(PetscArraycpy(m->x + 3 * v, old->x + 3 * m->kept[v], 3));
+    if (m->flat) PetscCall(PetscArraycpy(m->flat + 3 * v, m->X + 3 * v, 3));
   }
-  if (old->edge_off) PetscCall(PetscMalloc1(3 * (size_t)m->nvert, &m->flat));
-  for (PetscInt v = 0; old->edge_off && v < m->nkept; v++)
-    PetscCall(PetscArraycpy(m->flat + 3 * v, m->X + 3 * v, 3));
   if (!how->rest) PetscCall(SbLocatorCreate(old->ncell, old->cell, old->x, NULL, &now));
   for (PetscInt v = m->nkept; v < m->nvert; v++) {
     PetscInt cell;
@@ -138,20 +137,10 @@ static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, 
 
 /* ------------------------------------------------------------------ repair of inverted and flat tets */
 
-static PetscReal shape_at(const SbNewMesh *m, const PetscReal at[], PetscInt cell)
-{
-  PetscReal x[4][3];
-
-  for (int a = 0; a < 4; a++) {
-    for (int k = 0; k < 3; k++) x[a][k] = at[3 * m->cell[4 * cell + a] + k];
-  }
-  return SbTetQuality((const PetscReal(*)[3])x);
-}
-
 /* Quality of a tet at rest; for a curved one the worse of this and its least relative Jacobian. */
 static PetscReal shape_at_rest(const SbNewMesh *m, PetscInt cell)
 {
-  const PetscReal shape = shape_at(m, m->X, cell),
+  const PetscReal shape = SbTetQuality(m->X, m->cell + 4 * cell),
                   *off = m->edge_off ? m->edge_off + 18 * (size_t)cell : NULL;
   PetscBool curved = PETSC_FALSE;
   PetscReal least;
@@ -165,7 +154,7 @@ static PetscReal shape_at_rest(const SbNewMesh *m, PetscInt cell)
 /* The worse of its qualities at rest and now. */
 static PetscReal worse(const SbNewMesh *m, PetscInt cell)
 {
-  const PetscReal rest = shape_at_rest(m, cell), now = shape_at(m, m->x, cell);
+  const PetscReal rest = shape_at_rest(m, cell), now = SbTetQuality(m->x, m->cell + 4 * cell);
 
   return PetscMin(rest, now);
 }
@@ -190,18 +179,17 @@ static PetscReal worst_around(const SbNewMesh *m, const Stars *s, PetscInt v)
 /* Tries positions on the way to the mean of the neighbours at rest; returns whether one was better. */
 static PetscBool move_vertex(const Material *at, const Stars *s, PetscInt v, SbNewMesh *m)
 {
-  PetscReal middle[3] = {0, 0, 0}, X[3], best_X[3], best_x[3], best_flat[3], best = worst_around(m, s, v),
-            part = 1;
+  PetscReal *const place[3] = {m->X + 3 * v, m->x + 3 * v, m->flat ? m->flat + 3 * v : NULL};
+  const int nplace = m->flat ? 3 : 2;
+  PetscReal middle[3] = {0, 0, 0}, X[3], kept[3][3], best = worst_around(m, s, v), part = 1;
   const PetscReal n = 4 * (PetscReal)(s->start[v + 1] - s->start[v]);
   PetscBool better = PETSC_FALSE;
 
+  for (int k = 0; k < nplace; k++) memcpy(kept[k], place[k], sizeof(kept[k]));
   for (int k = 0; k < 3; k++) {
-    X[k] = best_X[k] = m->X[3 * v + k];
-    best_x[k] = m->x[3 * v + k];
-    if (m->flat) best_flat[k] = m->flat[3 * v + k];
-    for (PetscInt i = s->start[v]; i < s->start[v + 1]; i++) {
+    X[k] = m->X[3 * v + k];
+    for (PetscInt i = s->start[v]; i < s->start[v + 1]; i++)
       for (int a = 0; a < 4; a++) middle[k] += m->X[3 * m->cell[4 * s->cells[i] + a] + k] / n;
-    }
   }
   for (int i = 0; i < PLACES; i++, part /= 2) {
     PetscReal now;
@@ -213,17 +201,9 @@ static PetscBool move_vertex(const Material *at, const Stars *s, PetscInt v, SbN
     if (!(now > best)) continue;
     best = now;
     better = PETSC_TRUE;
-    for (int k = 0; k < 3; k++) {
-      best_X[k] = m->X[3 * v + k];
-      best_x[k] = m->x[3 * v + k];
-      if (m->flat) best_flat[k] = m->flat[3 * v + k];
-    }
+    for (int k = 0; k < nplace; k++) memcpy(kept[k], place[k], sizeof(kept[k]));
   }
-  for (int k = 0; k < 3; k++) {
-    m->X[3 * v + k] = best_X[k];
-    m->x[3 * v + k] = best_x[k];
-    if (m->flat) m->flat[3 * v + k] = best_flat[k];
-  }
+  for (int k = 0; k < nplace; k++) memcpy(place[k], kept[k], sizeof(kept[k]));
   for (PetscInt j = s->start[v]; j < s->start[v + 1]; j++) bend(at, m, s->cells[j], v);
   return better;
 }
@@ -352,7 +332,7 @@ static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how
   // quality of the new tets, at rest and now
   m->quality = 1;
   for (PetscInt c = 0; c < m->ncell; c++) {
-    const PetscReal quality = shape_at(m, m->x, c);
+    const PetscReal quality = SbTetQuality(m->x, m->cell + 4 * c);
 
     at_rest += !(shape_at_rest(m, c) > 1e-6);
     now += !(quality > 0);
@@ -360,10 +340,8 @@ static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how
   }
   // quality of the old tets now
   for (PetscInt c = 0; c < old->ncell; c++) {
-    PetscReal x[4][3], quality;
+    const PetscReal quality = SbTetQuality(old->x, old->cell + 4 * c);
 
-    for (int i = 0; i < 12; i++) x[i / 3][i % 3] = old->x[3 * old->cell[4 * c + i / 3] + i % 3];
-    quality = SbTetQuality((const PetscReal(*)[3])x);
     before += !(quality > 0);
     worst = PetscMin(worst, quality);
   }
