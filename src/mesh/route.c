@@ -1,7 +1,6 @@
 /*
-  route.c - sparse communication of fixed-size records: one all-to-all exchange of counts, then one of the records; replies return by the reverse route.
-
-  Records to the own rank take the same route, so that callers need no special case.
+  route.c - sparse communication of fixed-size records: one all-to-all exchange of counts, then one of the records; replies
+  return by the reverse route. Records to the own rank take the same route, so that callers need no special case.
 */
 #include "mesh_impl.h"
 
@@ -25,12 +24,8 @@ static PetscErrorCode first_of_each(PetscMPIInt size, const PetscMPIInt count[],
 
 PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, const PetscMPIInt dest[], SbRoute *route)
 {
-  PetscMPIInt *next;
-
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(route, sizeof(*route)));
-  route->comm = comm;
-  route->nsend = n;
+  *route = (SbRoute){.comm = comm, .nsend = n};
   PetscCallMPI(MPI_Comm_size(comm, &route->size));
   PetscCall(PetscCalloc5(route->size, &route->scount, route->size, &route->sfirst, route->size,
                          &route->rcount, route->size, &route->rfirst, n, &route->position));
@@ -38,10 +33,8 @@ PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, const PetscMPIInt dest[]
   PetscCallMPI(MPI_Alltoall(route->scount, 1, MPI_INT, route->rcount, 1, MPI_INT, comm));
   PetscCall(first_of_each(route->size, route->scount, route->sfirst, &n));
   PetscCall(first_of_each(route->size, route->rcount, route->rfirst, &route->nrecv));
-  PetscCall(PetscMalloc1(route->size, &next));
-  PetscCall(PetscArraycpy(next, route->sfirst, route->size));
-  for (PetscInt i = 0; i < n; i++) route->position[i] = next[dest[i]]++;
-  PetscCall(PetscFree(next));
+  for (PetscInt i = 0; i < n; i++) route->position[i] = route->sfirst[dest[i]]++;
+  for (PetscMPIInt r = 0; r < route->size; r++) route->sfirst[r] -= route->scount[r];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -67,18 +60,27 @@ static PetscErrorCode exchange(const SbRoute *route, size_t unit, PetscBool back
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRouteSend(const SbRoute *route, size_t unit, const void *record, void *received)
+PetscErrorCode SbRouteSendSome(const SbRoute *route, size_t unit, const PetscInt which[], const void *record,
+                               void *received)
 {
   char *out, *in;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc(unit * (size_t)route->nsend, &out));
   for (PetscInt i = 0; i < route->nsend; i++)
-    memcpy(out + unit * (size_t)route->position[i], (const char *)record + unit * (size_t)i, unit);
+    memcpy(out + unit * (size_t)route->position[i],
+           (const char *)record + unit * (size_t)(which ? which[i] : i), unit);
   PetscCall(PetscMalloc(unit * (size_t)route->nrecv, &in));
   PetscCall(exchange(route, unit, PETSC_FALSE, out, in));
   PetscCall(PetscFree(out));
   *(void **)received = in;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRouteSend(const SbRoute *route, size_t unit, const void *record, void *received)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbRouteSendSome(route, unit, NULL, record, received));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
