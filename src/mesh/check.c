@@ -2,12 +2,13 @@
   check.c - validity checks of a body's mesh, before anything is computed on it.
 
   Repaired and counted: unused vertices are removed; tets with negative orientation have two vertices swapped.
-  Errors: a tet of zero volume, a duplicate tet, a face of three tets; each would make the mass or the stiffness matrix
-  wrong. Counted: group triangles that are not a face of any tet; surface edges with more than two facets, which connect
-  parts of the body like hinges.
+  Errors: a tet of zero volume, a duplicate tet, a face of three tets; each would make the mass or the
+  stiffness matrix wrong. Counted: group triangles that are not a face of any tet; surface edges with more
+  than two facets, which connect parts of the body like hinges.
 
-  A tet is flat when its height over the longest edge L is below 1e-12 L, or below the rounding of its coordinates:
-  |det| <= (1e-12 L + 8 eps max|x|) L^2. The thinnest slivers worth simulating are nine orders above the first term.
+  A tet is flat when its height over the longest edge L is below 1e-12 L, or below the rounding of its
+  coordinates: |det| <= (1e-12 L + 8 eps max|x|) L^2. The thinnest slivers worth simulating are nine orders
+  above the first term.
 */
 #include "sbkernel.h"
 #include "mesh_impl.h"
@@ -122,7 +123,7 @@ PetscErrorCode SbImportCheckCells(SbImport *im, PetscReal largest, SbFaces *face
   PetscFunctionBeginUser;
   PetscCall(orient(im, largest));
   PetscCall(SbFacesCreate(im->nvert, im->item[3].n, im->item[3].vert, faces));
-  /* two cells with equal vertices share all four faces; with a third cell at one of them it is a face of three */
+  /* cells with equal vertices share all four faces; with a third cell at one of them it is a face of three */
   if (faces->nshared) {
     const PetscInt *s = faces->shared;
 

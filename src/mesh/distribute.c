@@ -1,12 +1,13 @@
 /*
-  distribute.c - distribution of the merged mesh: each rank gets its cells, their vertices, and copies of cells of other
-  ranks (ghosts).
+  distribute.c - distribution of the merged mesh: each rank gets its cells, their vertices, and copies of
+  cells of other ranks (ghosts).
 
-  Cells are sent directly to their owners, with their vertices: a vertex is sent once to each rank that needs it. A
-  distributed directory tells which ranks have a vertex: rank r keeps the r-th block of original vertex numbers. Vertices
-  that are shared by the same set of ranks are sorted along the longest axis of their bounding box and divided among these
-  ranks in equal contiguous parts: all of them compute the same owners, the load is balanced, and the parts are compact, so
-  that there are few ghosts. Then each rank sends copies of its cells to the owners of their vertices.
+  Cells are sent directly to their owners, with their vertices: a vertex is sent once to each rank that needs
+  it. A distributed directory tells which ranks have a vertex: rank r keeps the r-th block of original vertex
+  numbers. Vertices that are shared by the same set of ranks are sorted along the longest axis of their
+  bounding box and divided among these ranks in equal contiguous parts: all of them compute the same owners,
+  the load is balanced, and the parts are compact, so that there are few ghosts. Then each rank sends copies
+  of its cells to the owners of their vertices.
 */
 #include <stdlib.h>
 #include "mesh_impl.h"
@@ -25,7 +26,7 @@ PetscErrorCode SbLocalMeshDestroy(SbLocalMesh *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sends cells which[] (NULL: all) to ranks dest[] of the route; `owned`: the vertices have owners, which are sent too. */
+/* Sends cells which[] (NULL: all) to ranks dest[] of the route; `owned`: their vertices have owners. */
 static PetscErrorCode send_cells(const SbLocalMesh *from, PetscBool owned, const SbRoute *route,
                                  const PetscInt which[], const PetscMPIInt dest[], SbLocalMesh *to)
 {
@@ -35,7 +36,7 @@ static PetscErrorCode send_cells(const SbLocalMesh *from, PetscBool owned, const
 
   PetscFunctionBeginUser;
   *to = (SbLocalMesh){0};
-  // for each rank the vertices to send, in the order of the cells; at[][4]: positions of a cell's vertices among them
+  // vertices to send to each rank, in the order of the cells; at[][4]: where the vertices of a cell are there
   PetscCall(PetscMalloc1(4 * (size_t)route->nsend, &at));
   PetscCall(
     PetscMalloc4(route->nsend, &order, from->nvert, &position, route->size, &count, from->nvert, &mark));
@@ -77,7 +78,7 @@ static PetscErrorCode send_cells(const SbLocalMesh *from, PetscBool owned, const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Original numbers of n records, which begin with them, and the permutation that sorts these in ascending order. */
+/* Original numbers with which n records begin, and the permutation that sorts these in ascending order. */
 static PetscErrorCode ascending(PetscInt n, size_t unit, const void *record, PetscInt number[],
                                 PetscInt order[])
 {
@@ -242,13 +243,7 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
                             SbLocalMesh *local)
 {
   const PetscInt Nvert = w->Nvert;
-  const SbLocalMesh whole = {.ncell_owned = w->ncell,
-                             .ncell = w->ncell,
-                             .nvert = w->nvert,
-                             .nvert_cells = w->nvert,
-                             .cell = w->cell,
-                             .data = w->data,
-                             .vertex = w->vertex};
+  SbLocalMesh whole = {.cell = w->cell, .data = w->data, .vertex = w->vertex};
   PetscMPIInt size, rank, *dest;
   PetscInt *orig, *number, *order, *position, n = 0;
   SbRoute route;
@@ -258,6 +253,8 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  whole.ncell = whole.ncell_owned = w->ncell;
+  whole.nvert = whole.nvert_cells = w->nvert;
   // on one rank the arrays are taken over without a copy
   if (size == 1) {
     *local = whole;
@@ -278,7 +275,7 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
   PetscCall(SbRouteDestroy(&route));
   PetscCall(PetscFree(dest));
   PetscCall(SbMergedMeshDestroy(w));
-  // sort owned cells and their vertices by original number; merge the copies of a vertex received from several ranks
+  // sort owned cells and their vertices by original number; a vertex may have come from several ranks
   *local = (SbLocalMesh){.ncell = owned.ncell, .ncell_owned = owned.ncell};
   PetscCall(PetscMalloc3(PetscMax(owned.nvert, owned.ncell), &number, PetscMax(owned.nvert, owned.ncell),
                          &order, owned.nvert, &position));

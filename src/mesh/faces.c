@@ -1,9 +1,10 @@
 /*
   faces.c - face connectivity of a tet mesh: which cells share a face.
 
-  Counting sort: the four faces of every cell go into the bucket of their lowest vertex. Each bucket, of about twenty
-  faces, is sorted by the other two vertices; adjacent equal entries are one face. No hash table, no comparison of triples.
-  O(n) in the number of cells for meshes of bounded vertex degree, O(n log n) for all others.
+  Counting sort: the four faces of every cell go into the bucket of their lowest vertex. Each bucket, of about
+  twenty faces, is sorted by the other two vertices; adjacent equal entries are one face. No hash table, no
+  comparison of triples. O(n) in the number of cells for meshes of bounded vertex degree, O(n log n) for all
+  others.
 */
 #include "mesh_impl.h"
 

@@ -1,13 +1,15 @@
 /*
-  merge.c - merges all bodies into one mesh: reads, places and checks each body, marks its sets, numbers bodies one after
-  the other.
+  merge.c - merges all bodies into one mesh: reads, places and checks each body, marks its sets, numbers
+  bodies one after the other.
 
-  Rank 0 reads a body alone, unless its file format can be read in slabs: then each rank reads one slab (slab.c). An error
-  on one rank is caught, sent to all ranks and raised by all of them, so that no rank waits for one that has failed.
+  Rank 0 reads a body alone, unless its file format can be read in slabs: then each rank reads one slab
+  (slab.c). An error on one rank is caught, sent to all ranks and raised by all of them, so that no rank waits
+  for one that has failed.
 
   Peak memory of a run is reached while a mesh is read: arrays are freed before the next ones are allocated.
 
-  Original numbers are assigned here: bodies in the order of the scenario, vertices and cells in the order of their files.
+  Original numbers are assigned here: bodies in the order of the scenario, vertices and cells in the order of
+  their files.
 */
 #include "mesh_impl.h"
 

@@ -1,9 +1,10 @@
 /*
   number.c - local and global numbering of the distributed mesh.
 
-  Vertices: owned ones first, in reverse Cuthill-McKee order, then ghosts by global number. Global numbers count the owned
-  vertices of rank 0, then those of rank 1 and so on. Cells: owned ones first, then ghosts; each sorted by body, inclusion,
-  curved or straight, and lowest local vertex, so that a loop over cells accesses vertices nearly in order.
+  Vertices: owned ones first, in reverse Cuthill-McKee order, then ghosts by global number. Global numbers
+  count the owned vertices of rank 0, then those of rank 1 and so on. Cells: owned ones first, then ghosts;
+  each sorted by body, inclusion, curved or straight, and lowest local vertex, so that a loop over cells
+  accesses vertices nearly in order.
 */
 #include "mesh_impl.h"
 

@@ -1,15 +1,16 @@
 /*
   partition.c - mesh partitioning: the owner rank of each tet.
 
-  METIS partitions the dual graph of the tets on rank 0: few faces are cut, but the whole graph is on one rank while the
-  others wait. Recursive coordinate bisection runs in parallel: it halves the set of tet centres at the median along the
-  longest axis of their bounding box, recursively. Medians are those of a sample that all ranks have, selected by a hash of
-  the original numbers, hence independent of the number of ranks. Then each tet at an interface moves to the part of most
-  of its neighbours. Bisection cuts 1.0 (bars) to 1.8 times (1,240,000 tets of a bunny) as many faces as METIS, in a tenth
-  of the time.
+  METIS partitions the dual graph of the tets on rank 0: few faces are cut, but the whole graph is on one rank
+  while the others wait. Recursive coordinate bisection runs in parallel: it halves the set of tet centres at
+  the median along the longest axis of their bounding box, recursively. Medians are those of a sample that all
+  ranks have, selected by a hash of the original numbers, hence independent of the number of ranks. Then each
+  tet at an interface moves to the part of most of its neighbours. Bisection cuts 1.0 (bars) to 1.8 times
+  (1,240,000 tets of a bunny) as many faces as METIS, in a tenth of the time.
 
-  References: Karypis and Kumar, "A fast and high quality multilevel scheme for partitioning irregular graphs", 1998;
-  Berger and Bokhari, "A partitioning strategy for nonuniform problems on multiprocessors", 1987.
+  References: Karypis and Kumar, "A fast and high quality multilevel scheme for partitioning irregular
+  graphs", 1998; Berger and Bokhari, "A partitioning strategy for nonuniform problems on multiprocessors",
+  1987.
 */
 #include <metis.h>
 #include "mesh_impl.h"
@@ -83,7 +84,7 @@ static PetscErrorCode split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3],
 
 /* ------------------------------------------------------------------ METIS */
 
-/* Gathers the graph on rank 0, by original numbers: the partition is independent of the distribution of cells. */
+/* Gathers the graph on rank 0, by original numbers: the result is alike for any distribution of cells. */
 static PetscErrorCode cut_graph(MPI_Comm comm, const SbMergedMesh *w, PetscSF sf, PetscMPIInt part[])
 {
   PetscInt *orig, *remote, *across, *all_orig, *all_across;

@@ -1,16 +1,16 @@
 /*
   refine.c - regular refinement: each edge is bisected, each tet is divided into eight.
 
-  Four children are at the corners. The remaining octahedron is cut into four tets around the shortest of its three
-  diagonals, which keeps the shape quality of repeated refinement bounded (Zhang, "Successive subdivisions of tetrahedra
-  and multigrid methods on tetrahedral meshes", 1995). Diagonals are inside a tet, so the refined mesh is conforming for
-  any choice. Children have the orientation of their parent.
+  Four children are at the corners. The remaining octahedron is cut into four tets around the shortest of its
+  three diagonals, which keeps the shape quality of repeated refinement bounded (Zhang, "Successive
+  subdivisions of tetrahedra and multigrid methods on tetrahedral meshes", 1995). Diagonals are inside a tet,
+  so the refined mesh is conforming for any choice. Children have the orientation of their parent.
 
-  New vertices on the boundary are at the middle of straight edges; the original geometry is unknown. A curved tet keeps
-  its shape: the P2 map, restricted to a child, has the following offsets of edge nodes from the midpoint: o/4 on both
-  halves of an edge with offset o; o/4 of the opposite edge of the triangle, on an edge between two midpoints; on the
-  diagonal a quarter of the sum of the offsets of the four edges that it does not connect, less a quarter of those of the
-  two edges that it connects.
+  New vertices on the boundary are at the middle of straight edges; the original geometry is unknown. A curved
+  tet keeps its shape: the P2 map, restricted to a child, has the following offsets of edge nodes from the
+  midpoint: o/4 on both halves of an edge with offset o; o/4 of the opposite edge of the triangle, on an edge
+  between two midpoints; on the diagonal a quarter of the sum of the offsets of the four edges that it does
+  not connect, less a quarter of those of the two edges that it connects.
 */
 #include "sbkernel.h"
 #include "mesh_impl.h"
@@ -27,8 +27,8 @@ static const int corners[4][16] = {
   {0, M01, M02, M03, M01, 1, M12, M13, M02, M12, 2, M23, M03, M13, M23, 3},
 };
 
-/* Three diagonals of the octahedron: their ends, and the four midpoints around each and the first one again, such that
-   (from, to, ring[i], ring[i + 1]) is positively oriented. */
+/* Three diagonals of the octahedron: their ends, and the four midpoints around each and the first one
+   again, such that (from, to, ring[i], ring[i + 1]) is positively oriented. */
 static const int diagonals[3][7] = {
   {M01, M23, M02, M03, M13, M12, M02},
   {M02, M13, M03, M01, M12, M23, M03},
@@ -72,7 +72,7 @@ static PetscErrorCode add_middle(SbImport *im, PetscInt a, PetscInt b, const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Curved edges of the children of a tet; off[][3]: offsets of the parent edges, by midpoint vertex - nvert. */
+/* Curved edges of the children of a tet; off[][3]: offsets of parent edges, by midpoint vertex - nvert. */
 static PetscErrorCode curve_children(SbImport *im, const PetscInt v[4], PetscInt nvert, const PetscReal off[],
                                      const PetscInt child[8][4])
 {

@@ -1,11 +1,13 @@
 /*
-  repair.c - repair of a mesh file by merging vertices, dropping and reorienting tets, until a run accepts it, if possible.
+  repair.c - repair of a mesh file by merging vertices, dropping and reorienting tets, until a run accepts it,
+  if possible.
 
-  In this order: vertices within a tolerance are merged into the first of them; tets that then use a vertex twice are
-  dropped (they have collapsed and leave no gap); duplicate tets are dropped, and their groups go to the first one; flat
-  tets are dropped and counted, and each one with a neighbour at every face leaves a slit of zero width, counted too;
-  inverted tets are reoriented; group triangles and lines that have collapsed, are duplicates or are no face of a tet are
-  dropped, and so are unused vertices. Overlapping tets cannot be repaired: the check of a run reports them.
+  In this order: vertices within a tolerance are merged into the first of them; tets that then use a vertex
+  twice are dropped (they have collapsed and leave no gap); duplicate tets are dropped, and their groups go to
+  the first one; flat tets are dropped and counted, and each one with a neighbour at every face leaves a slit
+  of zero width, counted too; inverted tets are reoriented; group triangles and lines that have collapsed, are
+  duplicates or are no face of a tet are dropped, and so are unused vertices. Overlapping tets cannot be
+  repaired: the check of a run reports them.
 */
 #include "sbgeometry.h"
 #include "mesh_impl.h"
@@ -59,7 +61,7 @@ static void drop_collapsed(SbImport *im, int dim, PetscInt *ndropped)
   item->n = kept;
 }
 
-/* ------------------------------------------------------------------ flat tets, and triangles that are no face */
+/* ------------------------------------------------------------------ the whole mesh */
 
 PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *done)
 {

@@ -1,6 +1,7 @@
 /*
-  route.c - sparse communication of fixed-size records: one all-to-all exchange of counts, then one of the records; replies
-  return by the reverse route. Records to the own rank take the same route, so that callers need no special case.
+  route.c - sparse communication of fixed-size records: one all-to-all exchange of counts, then one of the
+  records; replies return by the reverse route. Records to the own rank take the same route, so that callers
+  need no special case.
 */
 #include "mesh_impl.h"
 

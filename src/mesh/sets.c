@@ -1,11 +1,12 @@
 /*
   sets.c - named sets: their definition, and their members (vertices, facets, cells) as bit masks.
 
-  A shape contains the vertices inside it, the boundary facets with all three vertices inside, and the tets with all four.
-  The tolerance is 1e-6 times the diagonal of the body's bounding box, so that a plane contains the nodes of a curved or
-  rotated side. A group of points or curves contains vertices; a group of surfaces contains its triangles (interior ones as
-  faces of both tets) and their vertices; a group of volumes contains its tets, their vertices and their boundary facets.
-  Groups with equal names and different dimensions are one set.
+  A shape contains the vertices inside it, the boundary facets with all three vertices inside, and the tets
+  with all four. The tolerance is 1e-6 times the diagonal of the body's bounding box, so that a plane contains
+  the nodes of a curved or rotated side. A group of points or curves contains vertices; a group of surfaces
+  contains its triangles (interior ones as faces of both tets) and their vertices; a group of volumes contains
+  its tets, their vertices and their boundary facets. Groups with equal names and different dimensions are one
+  set.
 */
 #include <stdlib.h>
 #include "sbkernel.h"

@@ -1,9 +1,9 @@
 /*
   validate.c - checks of the guarantees of SbMesh: index ranges, order, ownership, sums over the ranks.
 
-  Every cell with an owned vertex is local if and only if the number of pairs (owned vertex, local cell that has it), summed over all
-  ranks, is four times the global number of cells. Original numbers are a permutation if each occurs once; this is checked
-  by the sums of the numbers and of their hashes.
+  Every cell with an owned vertex is local if and only if the number of pairs (owned vertex, local cell that
+  has it), summed over all ranks, is four times the global number of cells. Original numbers are a permutation
+  if each occurs once; this is checked by the sums of the numbers and of their hashes.
 */
 #include "mesh_impl.h"
 

@@ -1,12 +1,12 @@
 /*
   On rank 0: new meshes for some bodies of a scene, and the state on these.
 
-  The vectors are functions of the position at rest, linear in each tet, quadratic in those of P2: a new node gets the
-  value at its rest position (body.c). A node on a kept vertex, edge or triangle of the surface gets the old value bitwise.
-  A DG cell takes the value from its own side of a face.
+  The vectors are functions of the position at rest, linear in each tet, quadratic in those of P2: a new node
+  gets the value at its rest position (body.c). A node on a kept vertex, edge or triangle of the surface gets
+  the old value bitwise. A DG cell takes the value from its own side of a face.
 
-  A new tet is in the file's groups of the old tet around its centroid; on the surface groups keep their triangles and
-  vertices.
+  A new tet is in the file's groups of the old tet around its centroid; on the surface groups keep their
+  triangles and vertices.
 */
 #include "remesh_impl.h"
 

@@ -1,22 +1,24 @@
 /*
   body.c - a new mesh of a body in its current state, on rank 0.
 
-  The hull is kept: all triangles of the surface and of interfaces between regions, with their vertices. Its interior is
-  tetrahedralised again, in the current or the reference configuration. A new vertex y in the current configuration lies in
-  a tet of the old mesh with barycentric coordinates w, y = sum w_a x_a; its rest position is X = sum w_a X_a, that of the
-  same material point. So the volume at rest is the same, and the old motion from X to x is interpolated at other points.
+  The hull is kept: all triangles of the surface and of interfaces between regions, with their vertices. Its
+  interior is tetrahedralised again, in the current or the reference configuration. A new vertex y in the
+  current configuration lies in a tet of the old mesh with barycentric coordinates w, y = sum w_a x_a; its
+  rest position is X = sum w_a X_a, that of the same material point. So the volume at rest is the same, and
+  the old motion from X to x is interpolated at other points.
 
-  The motion is not linear between these points, so a new tet may be inverted at rest but not in the current configuration.
-  Inverted and flat tets are repaired by moving their inner vertices through the material towards the mean of their
-  neighbours: of a few positions on the way the one with the best worst tet is chosen, until all are good or nothing helps.
-  A tet with four vertices on a face that was plane at rest and bulges now has no volume at rest, and no inner vertex: one
-  of its inner edges is split at the middle, with all tets around, and the new vertex moves inwards.
+  The motion is not linear between these points, so a new tet may be inverted at rest but not in the current
+  configuration. Inverted and flat tets are repaired by moving their inner vertices through the material
+  towards the mean of their neighbours: of a few positions on the way the one with the best worst tet is
+  chosen, until all are good or nothing helps. A tet with four vertices on a face that was plane at rest and
+  bulges now has no volume at rest, and no inner vertex: one of its inner edges is split at the middle, with
+  all tets around, and the new vertex moves inwards.
 
-  In a body with curved tets the triangles of the hull keep their curved edges, so its shape is the same. The flat
-  triangles enclose the tetrahedralised volume. The old tets define a map from it, at rest, to the body: from the point
-  with barycentric coordinates w in a straight tet to that with l = w in the curved tet. New vertices, and nodes at the
-  middles of new edges, are mapped, so that inner edges follow the curvature of the surface. A new tet may still have a
-  negative Jacobian, and is repaired like a flat one.
+  In a body with curved tets the triangles of the hull keep their curved edges, so its shape is the same. The
+  flat triangles enclose the tetrahedralised volume. The old tets define a map from it, at rest, to the body:
+  from the point with barycentric coordinates w in a straight tet to that with l = w in the curved tet. New
+  vertices, and nodes at the middles of new edges, are mapped, so that inner edges follow the curvature of the
+  surface. A new tet may still have a negative Jacobian, and is repaired like a flat one.
 */
 #include "remesh_impl.h"
 
@@ -101,7 +103,7 @@ static void bend(const Material *at, SbNewMesh *m, PetscInt c, PetscInt vertex)
   }
 }
 
-/* Rest positions of vertices created in the current configuration, and their current positions by the old mesh. */
+/* Rest positions of vertices created in the current configuration; their current ones by the old mesh. */
 static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, SbNewMesh *m)
 {
   const SbOldMesh *old = at->old;
@@ -270,7 +272,7 @@ static PetscErrorCode split_edge(const Material *at_old, const PetscInt ends[2],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Moves vertices, and splits edges of tets without movable vertices, until all tets are good enough or nothing helps. */
+/* Moves vertices, splits edges of tets without movable ones, until all are good enough or nothing helps. */
 static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, const SbSurface *hull,
                                   SbNewMesh *m)
 {
@@ -322,7 +324,7 @@ static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Error if a bad tet remains; inverted tets in the current configuration are allowed if the old mesh has some. */
+/* Error if a bad tet remains; inverted tets now are allowed if the old mesh has some. */
 static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how, SbNewMesh *m)
 {
   PetscInt at_rest = 0, now = 0, before = 0;
@@ -363,29 +365,6 @@ static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how
 }
 
 /* ------------------------------------------------------------------ re-meshing of a body */
-
-static PetscErrorCode prepare(const SbOldMesh *old, const SbNewMesh *m, Material *at)
-{
-  PetscInt n = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbLocatorCreate(old->ncell, old->cell, old->X, old->edge_off, &at->rest));
-  if (!old->edge_off) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbLocatorCreate(old->ncell, old->cell, old->X, NULL, &at->flat));
-  PetscCall(PetscMalloc1(6 * (size_t)old->ncell, &at->curved));
-  for (PetscInt i = 0; i < 6 * old->ncell; i++) {
-    const PetscReal *off = old->edge_off + 3 * (size_t)i;
-    PetscInt v[2];
-
-    if (off[0] == 0 && off[1] == 0 && off[2] == 0) continue;
-    for (int k = 0; k < 2; k++)
-      PetscCall(PetscFindInt(old->cell[4 * (i / 6) + SbTetEdge[i % 6][k]], m->nkept, m->kept, &v[k]));
-    if (v[0] >= 0 && v[1] >= 0) at->curved[n++] = (SbKey){SbKeyOfPair(v[0], v[1]), i};
-  }
-  SbKeysSort(n, at->curved);
-  at->ncurved = n;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRemeshing *how, SbSurface *hull,
                              Material *at, SbNewMesh *m)
@@ -439,7 +418,22 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
   PetscCall(PetscFree(used));
   PetscCheck(all, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "the mesher left out vertices of the surface, or made some of no tetrahedron");
-  PetscCall(prepare(old, m, at));
+  // locators in the old mesh; its curved edges between kept vertices
+  PetscCall(SbLocatorCreate(old->ncell, old->cell, old->X, old->edge_off, &at->rest));
+  if (old->edge_off) {
+    PetscCall(SbLocatorCreate(old->ncell, old->cell, old->X, NULL, &at->flat));
+    PetscCall(PetscMalloc1(6 * (size_t)old->ncell, &at->curved));
+    for (PetscInt i = 0; i < 6 * old->ncell; i++) {
+      const PetscReal *off = old->edge_off + 3 * (size_t)i;
+      PetscInt v[2];
+
+      if (off[0] == 0 && off[1] == 0 && off[2] == 0) continue;
+      for (int k = 0; k < 2; k++)
+        PetscCall(PetscFindInt(old->cell[4 * (i / 6) + SbTetEdge[i % 6][k]], m->nkept, m->kept, &v[k]));
+      if (v[0] >= 0 && v[1] >= 0) at->curved[at->ncurved++] = (SbKey){SbKeyOfPair(v[0], v[1]), i};
+    }
+    SbKeysSort(at->ncurved, at->curved);
+  }
   PetscCall(find_material(at, how, m));
   if (m->flat) PetscCall(PetscMalloc1(18 * (size_t)m->ncell, &m->edge_off));
   for (PetscInt c = 0; c < m->ncell; c++) bend(at, m, c, -1);

@@ -1,6 +1,6 @@
 /*
-  Transfers history variables of effects (active contact, friction) to the new model, like a checkpoint with renumbered
-  nodes. Effects without the operation `rename` start from their initial state.
+  Transfers history variables of effects (active contact, friction) to the new model, like a checkpoint with
+  renumbered nodes. Effects without the operation `rename` start from their initial state.
 */
 #include "remesh_impl.h"
 

@@ -1,9 +1,9 @@
 /*
   Gathers a scene and its state on rank 0, and scatters vectors back.
 
-  A star forest connects the cells of each rank (leaves) with their positions on rank 0 (roots), by their original numbers.
-  Each cell is sent with its vertices, its sets, and the values of the vectors at its nodes: the same for every element; a
-  node of several cells is sent with each of them.
+  A star forest connects the cells of each rank (leaves) with their positions on rank 0 (roots), by their
+  original numbers. Each cell is sent with its vertices, its sets, and the values of the vectors at its nodes:
+  the same for every element; a node of several cells is sent with each of them.
 */
 #include "remesh_impl.h"
 

@@ -1,16 +1,17 @@
 /*
-  Re-meshing during a run: a body is re-meshed when the quality of its tets is too low, or at given times, and the run
-  continues.
+  Re-meshing during a run: a body is re-meshed when the quality of its tets is too low, or at given times, and
+  the run continues.
 
-  After each step a callback decides whether the time loop returns (SbRun.after). Then the state is gathered on rank 0
-  (gather.c), bodies are re-meshed and the state is interpolated (bodies.c), the scene is set up again from its options
-  with these meshes in memory, and the state is transferred: vectors, history variables of effects (effects.c), totals,
-  output, ledger. Scaled densities conserve mass (SbMemoryMesh.mass), a rigid motion added to the velocities conserves
-  momenta (check.c). The change of kinetic and strain energy is remesh_loss in the energy balance.
+  After each step a callback decides whether the time loop returns (SbRun.after). Then the state is gathered
+  on rank 0 (gather.c), bodies are re-meshed and the state is interpolated (bodies.c), the scene is set up
+  again from its options with these meshes in memory, and the state is transferred: vectors, history variables
+  of effects (effects.c), totals, output, ledger. Scaled densities conserve mass (SbMemoryMesh.mass), a rigid
+  motion added to the velocities conserves momenta (check.c). The change of kinetic and strain energy is
+  remesh_loss in the energy balance.
 
-  If re-meshing fails the body keeps its mesh, and the run continues with a warning; the next try is when its quality has
-  halved, but at the earliest after 1, 2, 4, ... steps. The same bound holds after a mesh that is hardly better: no body is
-  re-meshed in every step.
+  If re-meshing fails the body keeps its mesh, and the run continues with a warning; the next try is when its
+  quality has halved, but at the earliest after 1, 2, 4, ... steps. The same bound holds after a mesh that is
+  hardly better: no body is re-meshed in every step.
 */
 #include "remesh_impl.h"
 #include "sbscene.h"
@@ -278,7 +279,7 @@ static PetscReal distance(const PetscReal a[3], const PetscReal b[3])
   return PetscSqrtReal(PetscSqr(a[0] - b[0]) + PetscSqr(a[1] - b[1]) + PetscSqr(a[2] - b[2]));
 }
 
-/* Sets up the new scene and transfers the state; on an error the message is kept, and the old scene continues. */
+/* Sets up the new scene and transfers the state. */
 static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
 {
   Scene s = {NULL, NULL, NULL};

@@ -23,7 +23,7 @@ typedef struct {
 } SbGathered;
 PetscErrorCode SbGather(SbRun run, SbGathered *g); /* collective; SbGatheredDestroy() */
 PetscErrorCode SbGatheredDestroy(SbGathered *g);
-/* Sets the vectors of a run from value, width and nfield of g, for the cells of the run's mesh. Collective. */
+/* Sets the vectors of a run from value, width and nfield of g, for cells of the run's mesh. Collective. */
 PetscErrorCode SbScatter(const SbGathered *g, SbRun run);
 
 /* Renumbered surface nodes by original numbers, ascending in `from`, on all ranks; PetscFree2(from, to). */
@@ -91,7 +91,7 @@ PetscErrorCode SbRemeshBodies(SbModel model, const SbGathered *g, const PetscBoo
                               const SbRemeshing *how, SbRemeshResult *result);
 
 /* check.c: qualities and momenta */
-/* Current positions of the vertices of owned cells, x[nvert][3], m; CR and DG: means over cells. Collective. */
+/* Current positions of vertices of owned cells, x[nvert][3], m; CR and DG: means over cells. Collective. */
 PetscErrorCode SbCornerPositions(SbSpace space, Vec U, PetscReal x[]);
 /* worst[nbody]: quality of the worst tet of each named body, else 1. Collective. */
 PetscErrorCode SbBodyQualities(SbModel model, Vec U, const PetscBool named[], PetscReal worst[]);

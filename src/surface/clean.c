@@ -1,11 +1,12 @@
 /*
-  clean.c - repair of small defects of a surface: nearly coincident vertices, duplicate and degenerate triangles;
-  detection of open edges.
+  clean.c - repair of small defects of a surface: nearly coincident vertices, duplicate and degenerate
+  triangles; detection of open edges.
 
-  Repaired, counted and reported: vertices within a tolerance are merged, transitively, at the position of the first one;
-  triangles that thereby collapse, and duplicates, are removed. Two coincident triangles with opposite orientation become
-  one wall between two regions. For a triangle with collinear corners, the neighbour at its longest edge is divided at
-  the opposite corner, so that the shape is unchanged. Open edges are an error.
+  Repaired, counted and reported: vertices within a tolerance are merged, transitively, at the position of the
+  first one; triangles that thereby collapse, and duplicates, are removed. Two coincident triangles with
+  opposite orientation become one wall between two regions. For a triangle with collinear corners, the
+  neighbour at its longest edge is divided at the opposite corner, so that the shape is unchanged. Open edges
+  are an error.
 */
 #include "sbkernel.h"
 #include "surface_impl.h"
@@ -21,7 +22,7 @@ static PetscReal distance2(const SbTriangles *t, PetscInt v, PetscInt w)
   return SbDot3(d, d);
 }
 
-/* ------------------------------------------------------------------ coincident vertices, duplicate triangles */
+/* ------------------------------------------------------------------ duplicates */
 
 typedef struct {
   PetscInt vert[3]; /* ascending */
@@ -128,8 +129,8 @@ static PetscErrorCode cut_flat(SbTriangleFile *f, SbKey edge[], PetscInt *ncut, 
       PetscInt middle, a, b, c;
 
       if (!flat[mine] || touched[mine] || touched[other] || slot % 3 != longest_edge(t, mine)) continue;
-      /* neighbour (a, b, c) at the longest edge (a, b), on which the third corner of the flat triangle lies: the two
-         become (a, middle, c) and (middle, b, c) */
+      /* neighbour (a, b, c) at the longest edge (a, b), on which the third corner of the flat triangle
+         lies: the two become (a, middle, c) and (middle, b, c) */
       middle = t->tri[SbSlotNext(SbSlotNext(slot))];
       a = t->tri[across];
       b = t->tri[SbSlotNext(across)];
@@ -148,7 +149,7 @@ static PetscErrorCode cut_flat(SbTriangleFile *f, SbKey edge[], PetscInt *ncut, 
 
 /* ------------------------------------------------------------------ open edges */
 
-/* Smallest tolerance with which each open edge coincides with another one; 0 if it is too large for rounding. */
+/* Smallest tolerance with which each open edge has a partner; 0 if it is too large for rounding. */
 static PetscReal partner_distance(const SbTriangles *t, PetscInt n, const PetscInt slot[])
 {
   PetscReal need = 0, edge = 0;

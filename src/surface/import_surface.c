@@ -1,9 +1,9 @@
 /*
-  import_surface.c - import of a body or a rigid obstacle from a closed surface: read, repaired, checked, divided into
-  regions; a body is tetrahedralized.
+  import_surface.c - import of a body or a rigid obstacle from a closed surface: read, repaired, checked,
+  divided into regions; a body is tetrahedralized.
 
-  Each step with its repairs and errors is described in triangles*.c (readers), clean.c, self_intersection.c, region.c and
-  tetrahedralize.c. The surface is scaled to metres right after it is read.
+  Each step with its repairs and errors is described in triangles*.c (readers), clean.c, self_intersection.c,
+  region.c and tetrahedralize.c. The surface is scaled to metres right after it is read.
 */
 #include "surface_impl.h"
 

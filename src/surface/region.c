@@ -1,22 +1,23 @@
 /*
-  region.c - regions: the parts of space that are bounded by closed surfaces, including non-manifold ones, in which more
-  than two triangles share an edge.
+  region.c - regions: the parts of space that are bounded by closed surfaces, including non-manifold ones, in
+  which more than two triangles share an edge.
 
-  Steps: orient the triangles of each surface consistently; join sides of triangles that face each other to shells;
-  compute shell volumes; find the nesting of surfaces by winding numbers; mark cavities and holes as empty; number and
-  name the remaining regions.
+  Steps: orient the triangles of each surface consistently; join sides of triangles that face each other to
+  shells; compute shell volumes; find the nesting of surfaces by winding numbers; mark cavities and holes as
+  empty; number and name the remaining regions.
 
-  Every triangle f has two sides, 2 f in front and 2 f + 1 behind. Around an edge triangles are sorted by angle; the two
-  sides that face each other between consecutive triangles bound the same region and are joined. A connected set of sides
-  is a shell: one with a positive volume is the outer boundary of a region, one with a negative volume is a surface seen
-  from the region around it. That region is bounded by the smallest positive shell with a nonzero winding number there
-  (sum of solid angles, van Oosterom and Strackee 1983).
+  Every triangle f has two sides, 2 f in front and 2 f + 1 behind. Around an edge triangles are sorted by
+  angle; the two sides that face each other between consecutive triangles bound the same region and are
+  joined. A connected set of sides is a shell: one with a positive volume is the outer boundary of a region,
+  one with a negative volume is a surface seen from the region around it. That region is bounded by the
+  smallest positive shell with a nonzero winding number there (sum of solid angles, van Oosterom and Strackee
+  1983).
 
-  Material. In formats with oriented triangles (.stl, .obj, .off, .ply) the triangles of a surface are first oriented
-  consistently, by majority. A surface with outward normals encloses material, also inside another one (then a separate
-  region); one with inward normals inside material is a cavity; an outermost one with inward normals is reversed. For
-  non-manifold surfaces, and in formats without orientation (.poly, .smesh), every region is material except the holes
-  given in the file.
+  Material. In formats with oriented triangles (.stl, .obj, .off, .ply) the triangles of a surface are first
+  oriented consistently, by majority. A surface with outward normals encloses material, also inside another
+  one (then a separate region); one with inward normals inside material is a cavity; an outermost one with
+  inward normals is reversed. For non-manifold surfaces, and in formats without orientation (.poly, .smesh),
+  every region is material except the holes given in the file.
 */
 #include <stdlib.h>
 #include "sbkernel.h"
@@ -176,37 +177,29 @@ static PetscErrorCode join_at_edge(const SbTriangles *t, PetscInt n, const SbKey
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Shells: connected facing sides. Surfaces: triangles connected by edges. */
+/* Shells: connected facing sides; their volumes, areas and boxes. Surfaces: triangles connected by edges. */
 static PetscErrorCode find_shells(Arrangement *s)
 {
-  const PetscInt n = 3 * s->t->ntri;
+  const SbTriangles *t = s->t;
+  const PetscInt n = 3 * t->ntri;
 
   PetscFunctionBeginUser;
   // union-find over sides and over triangles, edge by edge
-  for (PetscInt i = 0; i < 2 * s->t->ntri; i++) s->shell[i] = i;
-  for (PetscInt f = 0; f < s->t->ntri; f++) s->surface[f] = f;
+  for (PetscInt i = 0; i < 2 * t->ntri; i++) s->shell[i] = i;
+  for (PetscInt f = 0; f < t->ntri; f++) s->surface[f] = f;
   for (PetscInt i = 0, m; i < n; i += m) {
     m = SbKeysAlike(n, s->edge, i);
-    PetscCall(join_at_edge(s->t, m, s->edge + i, s->shell));
+    PetscCall(join_at_edge(t, m, s->edge + i, s->shell));
     for (PetscInt k = 1; k < m; k++)
       (void)SbUnionJoin(s->surface, s->edge[i].slot / 3, s->edge[i + k].slot / 3);
   }
   // numbers from 0
-  s->nshell = SbUnionLabel(2 * s->t->ntri, s->shell);
-  s->nsurface = SbUnionLabel(s->t->ntri, s->surface);
+  s->nshell = SbUnionLabel(2 * t->ntri, s->shell);
+  s->nsurface = SbUnionLabel(t->ntri, s->surface);
   PetscCheck(s->nsurface <= PARTS_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: the surface consists of %" PetscInt_FMT
              " parts; supple takes up to %d: remove the specks around it (meshlab: remove isolated pieces)",
              s->f->where, s->nsurface, PARTS_MAX);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Volume, area and bounding box of every shell. */
-static PetscErrorCode measure_shells(Arrangement *s)
-{
-  const SbTriangles *t = s->t;
-
-  PetscFunctionBeginUser;
   // sums over the sides; volumes relative to a vertex of the shell, to avoid cancellation far from the origin
   PetscCall(PetscCalloc1(s->nshell, &s->shells));
   PetscCall(PetscCalloc1(s->nsurface, &s->surfaces));
@@ -228,8 +221,8 @@ static PetscErrorCode measure_shells(Arrangement *s)
     if (s->surfaces[s->surface[i / 2]].first < 0) s->surfaces[s->surface[i / 2]].first = i / 2;
   }
   // non-manifold surfaces
-  for (PetscInt i = 0, m; i < 3 * t->ntri; i += m) {
-    m = SbKeysAlike(3 * t->ntri, s->edge, i);
+  for (PetscInt i = 0, m; i < n; i += m) {
+    m = SbKeysAlike(n, s->edge, i);
     if (m > 2) s->surfaces[s->surface[s->edge[i].slot / 3]].branched = PETSC_TRUE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -237,7 +230,7 @@ static PetscErrorCode measure_shells(Arrangement *s)
 
 /* ------------------------------------------------------------------ nesting */
 
-/* Smallest positive shell around a point, other than those of the surface `except`; OUTSIDE if there is none. */
+/* Smallest positive shell around a point, but for those of the surface `except`; OUTSIDE if there is none. */
 static PetscInt shell_around(const Arrangement *s, const PetscReal o[3], PetscInt except)
 {
   PetscInt best = OUTSIDE;
@@ -263,28 +256,19 @@ static PetscBool turned_outwards(const Arrangement *s, PetscInt k)
   return (PetscBool)(s->shell[2 * s->surfaces[k].first] == s->surfaces[k].outer);
 }
 
-/* Number of surfaces around a surface. */
-static PetscInt depth_of(const Arrangement *s, PetscInt k)
-{
-  PetscInt depth = 0;
-
-  for (; s->surfaces[k].parent != OUTSIDE; depth++) k = s->shells[s->surfaces[k].parent].surface;
-  return depth;
-}
-
-/* Marks cavities, for formats with orientation. If an outermost surface has inward normals, it and all surfaces inside
-   it are taken as reversed. */
+/* Marks cavities, for formats with orientation. If an outermost surface has inward normals, it and all
+   surfaces inside it are taken as reversed. */
 static void empty_cavities(Arrangement *s)
 {
   /* from outside to inside, so that it is known whether the region around a surface is material */
   for (PetscInt depth = 0; depth < s->nsurface; depth++) {
     for (PetscInt k = 0; k < s->nsurface; k++) {
-      PetscInt top = k;
+      PetscInt top = k, naround = 0;
       PetscBool outwards, cavity;
 
       // cavity: normals inward relative to the outermost surface around it, inside material
-      if (depth_of(s, k) != depth || s->surfaces[k].branched) continue;
-      while (s->surfaces[top].parent != OUTSIDE) top = s->shells[s->surfaces[top].parent].surface;
+      for (; s->surfaces[top].parent != OUTSIDE; naround++) top = s->shells[s->surfaces[top].parent].surface;
+      if (naround != depth || s->surfaces[k].branched) continue;
       outwards = (PetscBool)(turned_outwards(s, k) == (turned_outwards(s, top) || s->surfaces[top].branched));
       cavity = (PetscBool)(depth > 0 && !outwards && !s->shells[s->surfaces[k].parent].empty);
       // note reversed surfaces, count cavities
@@ -328,8 +312,7 @@ static PetscErrorCode groups_of_shell(const Arrangement *s, PetscInt shell, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Group names of each region: region_1, ...; NAME_region if its outer boundary is in the group NAME; its name in the
-   file. */
+/* Groups of each region: region_1, ...; NAME_region if its boundary is in the group NAME; as in the file. */
 static PetscErrorCode name_regions(const Arrangement *s, SbSurface *out)
 {
   SbImport *im = s->f->im;
@@ -370,7 +353,6 @@ static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
   SbTrianglesEdges(s->t, s->edge);
   if (!s->f->sheets) PetscCall(orient_alike(s));
   PetscCall(find_shells(s));
-  PetscCall(measure_shells(s));
   // each shell must enclose a volume, and each surface must have exactly one shell of negative volume
   for (PetscInt k = 0; k < s->nshell; k++) {
     const Shell *p = &s->shells[k];

@@ -1,6 +1,6 @@
 /*
-  self_intersection.c - detects intersections of the triangles of a surface beyond shared corners, and removes small ones
-  by smoothing.
+  self_intersection.c - detects intersections of the triangles of a surface beyond shared corners, and removes
+  small ones by smoothing.
 
   Candidate pairs by a bounding volume hierarchy, exact test in src/geometry/intersection.c.
 */
@@ -46,7 +46,7 @@ static PetscErrorCode find_pairs(const SbTriangles *t, Search *s)
 
 /* ------------------------------------------------------------------ removal by smoothing */
 
-/* Laplacian smoothing: active vertices move halfway to the mean of their neighbours; sum[nvert][4] is work space. */
+/* Laplacian smoothing: active vertices move halfway to the mean of their neighbours. Work space: sum. */
 static void smooth(SbTriangles *t, const PetscBool active[], PetscReal (*sum)[4])
 {
   for (PetscInt v = 0; v < t->nvert; v++) sum[v][0] = sum[v][1] = sum[v][2] = sum[v][3] = 0;
@@ -66,8 +66,8 @@ static void smooth(SbTriangles *t, const PetscBool active[], PetscReal (*sum)[4]
   }
 }
 
-/* Smooths around intersecting triangles until there are none, with displacements up to `reach`, m; else restores
-   positions. s: pairs before, then remaining pairs. */
+/* Smooths around intersecting triangles until there are none, with displacements up to `reach`, m; else
+   restores positions. s: pairs before, then remaining pairs. */
 static PetscErrorCode untangle(SbTriangles *t, PetscReal reach, Search *s, SbSurfaceRepairs *m)
 {
   PetscBool *active, *before;

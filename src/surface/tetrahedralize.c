@@ -1,9 +1,11 @@
 /*
-  tetrahedralize.c - tetrahedralization of a surface with regions by gmsh or else tetgen, and checks of the result.
+  tetrahedralize.c - tetrahedralization of a surface with regions by gmsh or else tetgen, and checks of the
+  result.
 
-  A backend returns vertices, tets with region numbers, and triangles with the number of the surface triangle at their
-  position. Both are checked here (every region exists and has its volume: up to rounding if the surface was kept, else
-  within ten percent), groups are assigned to tets and triangles, and slivers are counted.
+  A backend returns vertices, tets with region numbers, and triangles with the number of the surface triangle
+  at their position. Both are checked here (every region exists and has its volume: up to rounding if the
+  surface was kept, else within ten percent), groups are assigned to tets and triangles, and slivers are
+  counted.
 */
 #include "sbkernel.h"
 #include "sbtet.h"
@@ -90,52 +92,42 @@ static PetscErrorCode run_checked(int backend, const SbTetJob *job, SbImport *te
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Runs one backend; an error about the input becomes a reason, other errors are raised. */
-static PetscErrorCode try_backend(int backend, const SbTetJob *job, SbImport *tets, PetscBool *done,
-                                  size_t size, char reasons[])
-{
-  const size_t n = strlen(job->where);
-  SbCaughtError caught = {0, ""};
-  const char *why = caught.text;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(tets, sizeof(*tets)));
-  (void)snprintf(tets->where, sizeof(tets->where), "%s", job->where);
-  SB_CATCH(&caught, run_checked(backend, job, tets));
-  *done = (PetscBool)!caught.code;
-  if (*done) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbImportDestroy(tets));
-  PetscCheck(caught.code == PETSC_ERR_USER_INPUT || caught.code == PETSC_ERR_FILE_OPEN ||
-               caught.code == PETSC_ERR_FILE_READ || caught.code == PETSC_ERR_FILE_UNEXPECTED,
-             PETSC_COMM_SELF, (PetscErrorCode)caught.code, "%s: %s", job->where, caught.text);
-  // remove the prefix that our message has too
-  if (!strncmp(why, job->where, n)) why += n + strspn(why + n, ": ");
-  SbAppend(size, reasons, "%s%s: %s", reasons[0] ? "; " : "", backends[backend].name, why);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 void SbTetDefaults(SbTetOptions *o)
 {
   *o = (SbTetOptions){.merge_tolerance = -1, .untangle = -1, .angle = 40, .seconds = 600};
 }
 
-/* Runs the first backend that works; its mesh becomes that of the body. */
+/* Runs the first backend that works; the body gets its mesh. An error about the input becomes a reason. */
 static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscBool *done, size_t size,
                                    char reasons[], SbImport *body)
 {
+  const size_t n = strlen(job->where);
   SbImport tets;
 
   PetscFunctionBeginUser;
   for (int backend = 0; backend < 2 && !*done; backend++) {
+    SbCaughtError caught = {0, ""};
     SbItems *tri = &body->item[2];
-    PetscInt n = 0;
-    const char *surface;
+    PetscInt kept = 0;
+    const char *surface, *why = caught.text;
     SbShape shape;
     char slivers[96] = "";
 
     if (job->options.backend != SB_TET_AUTO && (int)job->options.backend != backend + 1) continue;
-    PetscCall(try_backend(backend, job, &tets, done, size, reasons));
-    if (!*done) continue;
+    PetscCall(PetscMemzero(&tets, sizeof(tets)));
+    (void)snprintf(tets.where, sizeof(tets.where), "%s", job->where);
+    SB_CATCH(&caught, run_checked(backend, job, &tets));
+    *done = (PetscBool)!caught.code;
+    if (caught.code) {
+      PetscCall(SbImportDestroy(&tets));
+      PetscCheck(caught.code == PETSC_ERR_USER_INPUT || caught.code == PETSC_ERR_FILE_OPEN ||
+                   caught.code == PETSC_ERR_FILE_READ || caught.code == PETSC_ERR_FILE_UNEXPECTED,
+                 PETSC_COMM_SELF, (PetscErrorCode)caught.code, "%s: %s", job->where, caught.text);
+      // remove the prefix that our message has too
+      if (!strncmp(why, job->where, n)) why += n + strspn(why + n, ": ");
+      SbAppend(size, reasons, "%s%s: %s", reasons[0] ? "; " : "", backends[backend].name, why);
+      continue;
+    }
     // the body keeps its groups and tag sets
     PetscCall(PetscFree(body->x));
     PetscCall(PetscFree(body->vert_number));
@@ -161,11 +153,11 @@ static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscB
       const PetscInt f = tri->tags[i];
 
       if (!job->surface->tags[f]) continue;
-      PetscCall(PetscArraymove(tri->vert + 3 * n, tri->vert + 3 * i, 3));
-      tri->tags[n] = job->surface->tags[f];
-      tri->number[n++] = job->surface->number[f];
+      PetscCall(PetscArraymove(tri->vert + 3 * kept, tri->vert + 3 * i, 3));
+      tri->tags[kept] = job->surface->tags[f];
+      tri->number[kept++] = job->surface->number[f];
     }
-    tri->n = n;
+    tri->n = kept;
     // note which program made the tets
     surface = job->remesh ? "remeshed" : "kept";
     if (job->remesh && backend + 1 == SB_TET_TETGEN) surface = job->size < job->edge ? "split" : "kept";
@@ -191,7 +183,7 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *s, const SbT
   char reasons[640] = "", size_option[SB_IMPORT_OPTION_MAX], surface_option[SB_IMPORT_OPTION_MAX];
   int exponent;
   PetscErrorCode ierr;
-  PetscReal *volume, edge, all = 0, wrong = 0;
+  PetscReal *volume, edge, expected, all = 0, wrong = 0;
   PetscInt region = -1;
 
   PetscFunctionBeginUser;
@@ -220,15 +212,15 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *s, const SbT
     (PetscBool)(o->surface == SB_TET_REMESH ||
                 (o->surface == SB_TET_SURFACE_AUTO && (job.size > NEAR * edge || edge > NEAR * job.size)));
   /* a regular tet of edge h has the volume h^3 / (6 sqrt(2)) */
-  job.expected = 6 * PETSC_SQRT2 * all / (job.size * job.size * job.size);
-  PetscCheck(job.expected < SB_TET_MOST, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+  expected = 6 * PETSC_SQRT2 * all / (job.size * job.size * job.size);
+  PetscCheck(expected < SB_TET_MOST, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: a size of %g m makes about %.2g tets out of %.4g m^3; give a size of at least %.3g m (%s)",
-             where, (double)job.size, (double)job.expected, (double)all,
-             (double)(job.size * PetscPowReal(job.expected / SB_TET_MOST, 1. / 3)),
+             where, (double)job.size, (double)expected, (double)all,
+             (double)(job.size * PetscPowReal(expected / SB_TET_MOST, 1. / 3)),
              SbImportOption(body, "tet_size", size_option));
   (void)frexp(job.size, &exponent);
   factor = ldexp(1, 1 - exponent);
-  // lengths are scaled by a power of two, which is exact, to a size between 1 and 2: backends have absolute tolerances
+  // backends have absolute tolerances: scaling by a power of two, which is exact, to a size from 1 to 2
   scaled = *s;
   PetscCall(PetscMalloc1(3 * (size_t)s->nvert, &scaled.x));
   for (PetscInt i = 0; i < 3 * s->nvert; i++) scaled.x[i] = factor * s->x[i];

@@ -1,5 +1,6 @@
 /*
-  triangles.h - triangles read from a surface file, before they become a body or a rigid obstacle. Rank 0 only.
+  triangles.h - triangles read from a surface file, before they become a body or a rigid obstacle. Rank 0
+  only.
 */
 #pragma once
 #include "sbgeometry.h"
@@ -43,14 +44,14 @@ PetscErrorCode SbTrianglesRead_Poly(SbScan *scan, SbTriangleFile *file); /* .pol
 /* Add a vertex, or a triangle of existing vertices. */
 PetscErrorCode SbTrianglesAddVertex(SbTriangleFile *file, const PetscReal x[3]);
 PetscErrorCode SbTrianglesAdd(SbTriangleFile *file, PetscInt a, PetscInt b, PetscInt c, int64_t number);
-/* Add corner v, from 0, to the face `number` being read; add the face after its last corner. Errors: a missing
-   vertex; fewer than three corners. */
+/* Add corner v, from 0, to the face `number` being read; add the face after its last corner. Errors: a
+   missing vertex; fewer than three corners. */
 PetscErrorCode SbTrianglesAddCorner(SbScan *scan, int64_t number, int64_t v, SbTriangleFile *file);
 PetscErrorCode SbTrianglesAddFace(SbScan *scan, int64_t number, SbTriangleFile *file);
 /*
-  Triangulates nested polygons, convex or not, without new vertices: vert[start[k]] to vert[start[k + 1] - 1] is polygon k
-  of nloop; the areas with a point of hole[nhole][3] are left empty, all other enclosed areas are filled. An error names
-  the last scanned token.
+  Triangulates nested polygons, convex or not, without new vertices: vert[start[k]] to vert[start[k + 1] - 1]
+  is polygon k of nloop; the areas with a point of hole[nhole][3] are left empty, all other enclosed areas are
+  filled. An error names the last scanned token.
 */
 PetscErrorCode SbTrianglesAddLoops(SbScan *scan, PetscInt nloop, const PetscInt start[],
                                    const PetscInt vert[], PetscInt nhole, const PetscReal hole[],

@@ -1,11 +1,12 @@
 /*
-  triangles_add.c - adds vertices, triangles and polygons of a file to a surface; polygons are triangulated without new
-  vertices: as a fan if possible, else by ear clipping.
+  triangles_add.c - adds vertices, triangles and polygons of a file to a surface; polygons are triangulated
+  without new vertices: as a fan if possible, else by ear clipping.
 
-  Areas are projected along the polygon's normal (Newell's sum over its edges, valid for slightly non-planar polygons). An
-  ear is a convex corner whose triangle contains no other corner; the ear with the best ratio of area to longest edge
-  squared is cut first, so that collinear corners do not end as flat triangles (Meisters, "Polygons have ears", 1975).
-  Polygons inside a polygon are connected to it by bridges: pairs of coincident edges of opposite directions.
+  Areas are projected along the polygon's normal (Newell's sum over its edges, valid for slightly non-planar
+  polygons). An ear is a convex corner whose triangle contains no other corner; the ear with the best ratio of
+  area to longest edge squared is cut first, so that collinear corners do not end as flat triangles (Meisters,
+  "Polygons have ears", 1975). Polygons inside a polygon are connected to it by bridges: pairs of coincident
+  edges of opposite directions.
 */
 #include <ctype.h>
 #include "sbkernel.h"
@@ -121,7 +122,7 @@ static PetscReal ear_quality(const Polygon *p, PetscInt n, const PetscInt vert[]
   return area / longest2;
 }
 
-/* Ear clipping, removes corners from left[]; a self-intersecting polygon gets any triangulation: later checks report it. */
+/* Ear clipping, removes corners from left[]; later checks refuse the result of a self-intersecting one. */
 static PetscErrorCode cut_ears(const Polygon *p, PetscInt n, PetscInt left[], int64_t number,
                                SbTriangleFile *f)
 {
@@ -336,8 +337,7 @@ PetscErrorCode SbTrianglesAddLoops(SbScan *s, PetscInt nloop, const PetscInt sta
   PetscBool empty[LOOPS_MAX] = {PETSC_FALSE};
 
   PetscFunctionBeginUser;
-  if (nloop == 1 && !nhole) PetscCall(add_polygon(s, start[1], vert, number, f));
-  if (nloop == 0 || (nloop == 1 && !nhole)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!nloop) PetscFunctionReturn(PETSC_SUCCESS);
   if (nloop > LOOPS_MAX)
     SB_SCAN_ERROR(s, "facet %lld has %lld polygons; supple takes up to %d, cut it into parts",
                   (long long)number, (long long)nloop, LOOPS_MAX);

@@ -1,8 +1,10 @@
 /*
-  triangles_ply.c - reader of .ply surfaces (Stanford polygon format 1.0): text, and binary in both byte orders.
+  triangles_ply.c - reader of .ply surfaces (Stanford polygon format 1.0): text, and binary in both byte
+  orders.
 
-  The header lists the properties of each element with their order and types. Read: x, y and z of `vertex`, the list
-  vertex_indices (or vertex_index) of `face`; everything else is skipped. Triangle strips are an error.
+  The header lists the properties of each element with their order and types. Read: x, y and z of `vertex`,
+  the list vertex_indices (or vertex_index) of `face`; everything else is skipped. Triangle strips are an
+  error.
 */
 #include "triangles.h"
 
@@ -127,19 +129,6 @@ static PetscErrorCode read_value(Ply *p, SbNumberType type, const char *what, do
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_count(Ply *p, const Property *q, int64_t *n)
-{
-  double value;
-
-  PetscFunctionBeginUser;
-  PetscCall(read_value(p, q->count, "length of a list", &value));
-  if (!(value >= 0 && value <= 4294967295. && value == floor(value)))
-    SB_SCAN_ERROR(p->s, "a list has %g entries; the file is damaged", value);
-  *n = (int64_t)value;
-  PetscCall(SbScanRoom(p->s, "entries of a list", *n, 2, q->type.size));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbTrianglesRead_PLY(SbScan *s, SbTriangleFile *f)
 {
   Ply ply = {.s = s, .f = f}, *p = &ply;
@@ -169,7 +158,13 @@ PetscErrorCode SbTrianglesRead_PLY(SbScan *s, SbTriangleFile *f)
         int64_t n = 1;
         double value = 0;
 
-        if (q->count.size) PetscCall(read_count(p, q, &n));
+        if (q->count.size) {
+          PetscCall(read_value(p, q->count, "length of a list", &value));
+          if (!(value >= 0 && value <= 4294967295. && value == floor(value)))
+            SB_SCAN_ERROR(s, "a list has %g entries; the file is damaged", value);
+          n = (int64_t)value;
+          PetscCall(SbScanRoom(s, "entries of a list", n, 2, q->type.size));
+        }
         for (int64_t c = 0; c < n; c++) {
           PetscCall(read_value(p, q->type, what, &value));
           if (q->axis != 3) continue;

@@ -1,13 +1,13 @@
 /*
   triangles_poly.c - reader of TetGen's .poly and .smesh surfaces (TetGen 1.5 manual, section 5.2).
 
-  Four parts: points (if their number is 0, they are in NAME.node), facets, holes, regions. A facet of .smesh is one
-  polygon; one of .poly may have several nested polygons, and hole points. A # begins a comment. Point numbers begin at 0
-  or 1, as the first one.
+  Four parts: points (if their number is 0, they are in NAME.node), facets, holes, regions. A facet of .smesh
+  is one polygon; one of .poly may have several nested polygons, and hole points. A # begins a comment. Point
+  numbers begin at 0 or 1, as the first one.
 
-  Kept: a nonzero facet marker N is the group surface_N; a hole is a cavity; the attribute N of a region gives its tets
-  the group volume_N (its largest volume is ignored: sizes are set by -body_<name>_tet_size). Errors: polygons of one or
-  two corners, which mark points and edges of a facet.
+  Kept: a nonzero facet marker N is the group surface_N; a hole is a cavity; the attribute N of a region gives
+  its tets the group volume_N (its largest volume is ignored: sizes are set by -body_<name>_tet_size). Errors:
+  polygons of one or two corners, which mark points and edges of a facet.
 */
 #include <strings.h>
 #include "triangles.h"

@@ -1,15 +1,15 @@
 /*
   triangles_read.c - readers of .stl (text and binary), .obj and .off surfaces.
 
-  Groups of bodies: the solids of a text STL file (solid_1, ... without a name), the objects (o) and groups (g) of an OBJ
-  file.
+  Groups of bodies: the solids of a text STL file (solid_1, ... without a name), the objects (o) and groups
+  (g) of an OBJ file.
 
-  STL lists the three corners of each triangle; equal corners are merged later (clean.c). Normals in the file are ignored:
-  the order of corners is the orientation. A file is binary if its size matches its number of triangles (80 bytes, the
-  count, 50 bytes per triangle), whatever its first word is, or if it is larger and has a zero byte near its beginning;
-  bytes after the triangles are then ignored with a warning. Keywords in text may be upper case, and `end solid` may be two
-  words. OBJ: the lines v, f, o and g. OFF: the basic format. Faces with more than three corners are triangulated, see
-  triangles_add.c.
+  STL lists the three corners of each triangle; equal corners are merged later (clean.c). Normals in the file
+  are ignored: the order of corners is the orientation. A file is binary if its size matches its number of
+  triangles (80 bytes, the count, 50 bytes per triangle), whatever its first word is, or if it is larger and
+  has a zero byte near its beginning; bytes after the triangles are then ignored with a warning. Keywords in
+  text may be upper case, and `end solid` may be two words. OBJ: the lines v, f, o and g. OFF: the basic
+  format. Faces with more than three corners are triangulated, see triangles_add.c.
 */
 #include <ctype.h>
 #include <stdlib.h>
@@ -142,8 +142,8 @@ PetscErrorCode SbTrianglesRead_OBJ(SbScan *s, SbTriangleFile *f)
     PetscCall(SbScanWord(s, sizeof(word), word));
     if (!word[0]) break;
     if (!strcmp(word, "v")) PetscCall(add_vertex(s, f));
-    /* the rest of a line f: vertex numbers from 1, or negative ones counted back from the last vertex; indices
-       after a slash are ignored */
+    /* the rest of a line f: vertex numbers from 1, or negative ones counted back from the last vertex;
+       indices after a slash are ignored */
     if (!strcmp(word, "f")) {
       nface++;
       while (SbScanMore(s, '#')) {
