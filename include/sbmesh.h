@@ -197,9 +197,8 @@ PetscErrorCode SbMeshRegister(void);        /* rows of the option table, the MET
 void SbTetDefaults(SbTetOptions *options);
 PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOptions *options);
 /* Allocates a mesh in memory, zeroed. Not collective. */
-PetscErrorCode SbMemoryMeshCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri, SbMemoryMesh **in_memory);
-/* Allocates curved edges. Not collective. */
-PetscErrorCode SbMemoryMeshCurve(SbMemoryMesh *in_memory, PetscInt nedge);
+PetscErrorCode SbMemoryMeshCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri, PetscInt nedge,
+                                  SbMemoryMesh **in_memory);
 PetscErrorCode SbMemoryMeshDestroy(SbMemoryMesh **in_memory);
 /* Sends step, mass and bound of the mesh on rank 0 to empty ones on all; NULL there: NULL on all.
    Collective. */
@@ -227,5 +226,7 @@ typedef struct {
 /* Prepares n records to go to ranks dest[n]; their order among those for one rank stays. Collective. */
 PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, const PetscMPIInt dest[], SbRoute *route);
 PetscErrorCode SbRouteDestroy(SbRoute *route);
-/* Sends records of `unit` bytes, record[nsend]; received[nrecv] by rank, PetscFree(). Collective. */
-PetscErrorCode SbRouteSend(const SbRoute *route, size_t unit, const void *record, void *received);
+/* Sends records of `unit` bytes, of which record[which[i]] (NULL: record[i]) goes to dest[i];
+   received[nrecv] by rank, PetscFree(). Collective. */
+PetscErrorCode SbRouteSend(const SbRoute *route, size_t unit, const PetscInt which[], const void *record,
+                           void *received);

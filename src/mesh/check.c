@@ -72,11 +72,10 @@ static PetscErrorCode orient(SbImport *im, PetscReal largest)
     // a flat tet, perhaps because it has the same node twice
     if (SbTetFlat(im->x, v, largest, &det)) {
       for (int i = 0; i < 4; i++) {
-        for (int j = 0; j < i; j++) {
+        for (int j = 0; j < i; j++)
           PetscCheck(v[i] != v[j], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
                      "%s: tetrahedron %lld uses node %lld twice; remove it", im->where,
                      (long long)im->item[3].number[c], (long long)im->vert_number[v[i]]);
-        }
       }
       SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
               "%s: tetrahedron %lld is flat (volume %.3g m^3 with an edge of %.3g m); repair the mesh (gmsh: "

@@ -63,16 +63,16 @@ static PetscErrorCode send_cells(const SbLocalMesh *from, PetscBool owned, const
   }
   PetscCall(PetscFree4(order, position, count, mark));
   PetscCall(SbRouteCreate(route->comm, nlist, list_dest, &vertices));
-  PetscCall(SbRouteSend(route, 4 * sizeof(PetscInt), at, &to->cell));
+  PetscCall(SbRouteSend(route, 4 * sizeof(PetscInt), NULL, at, &to->cell));
   PetscCall(PetscFree(at));
   to->ncell = route->nrecv;
   to->nvert = vertices.nrecv;
   for (PetscMPIInt r = 0; r < route->size; r++)
     for (PetscInt i = 4 * route->rfirst[r]; i < 4 * (route->rfirst[r] + route->rcount[r]); i++)
       to->cell[i] += vertices.rfirst[r];
-  PetscCall(SbRouteSendSome(route, sizeof(SbCellData), which, from->data, &to->data));
-  PetscCall(SbRouteSendSome(&vertices, sizeof(SbVertexData), list, from->vertex, &to->vertex));
-  if (owned) PetscCall(SbRouteSendSome(&vertices, sizeof(PetscMPIInt), list, from->owner, &to->owner));
+  PetscCall(SbRouteSend(route, sizeof(SbCellData), which, from->data, &to->data));
+  PetscCall(SbRouteSend(&vertices, sizeof(SbVertexData), list, from->vertex, &to->vertex));
+  if (owned) PetscCall(SbRouteSend(&vertices, sizeof(PetscMPIInt), list, from->owner, &to->owner));
   PetscCall(SbRouteDestroy(&vertices));
   PetscCall(PetscFree2(list, list_dest));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -123,7 +123,7 @@ static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbLocal
     dest[v] = (PetscMPIInt)(orig[v] / block);
   }
   PetscCall(SbRouteCreate(comm, n, dest, &there));
-  PetscCall(SbRouteSend(&there, sizeof(PetscInt), orig, &got));
+  PetscCall(SbRouteSend(&there, sizeof(PetscInt), NULL, orig, &got));
   PetscCall(PetscFree2(orig, dest));
   /* ranks that have each vertex of this rank's block, ascending */
   for (PetscInt i = 0; i < there.nrecv; i++) got[i] -= first;
@@ -152,19 +152,18 @@ static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbLocal
   PetscCall(PetscFree(start));
   PetscCall(PetscFree(holder));
   PetscCall(SbRouteCreate(comm, npair, pair_dest, &back));
-  PetscCall(SbRouteSend(&back, 2 * sizeof(PetscInt), pair, &border->pair));
+  PetscCall(SbRouteSend(&back, 2 * sizeof(PetscInt), NULL, pair, &border->pair));
   PetscCall(PetscFree2(pair, pair_dest));
   /* received from blocks of ascending ranks, so original numbers ascend */
   border->n = 0;
-  for (PetscInt i = 0; i < back.nrecv; i++) border->n += !i || border->pair[2 * i] != border->pair[2 * i - 2];
-  PetscCall(PetscMalloc1(border->n, &border->vert));
-  for (PetscInt i = 0, k = -1, v = 0; i < back.nrecv; i++) {
+  PetscCall(PetscMalloc1(back.nrecv / 2, &border->vert)); /* at least two ranks have each */
+  for (PetscInt i = 0, v = 0; i < back.nrecv; i++) {
     if (i && border->pair[2 * i] == border->pair[2 * i - 2]) {
-      border->vert[k].n++;
+      border->vert[border->n - 1].n++;
       continue;
     }
     while (local->vertex[v].orig != border->pair[2 * i]) v++;
-    border->vert[++k] = (Shared){v, border->pair[2 * i], 1, border->pair + 2 * i + 1, 0};
+    border->vert[border->n++] = (Shared){v, border->pair[2 * i], 1, border->pair + 2 * i + 1, 0};
   }
   PetscCall(SbRouteDestroy(&back));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -7,26 +7,18 @@
 */
 #include "mesh_impl.h"
 
-PetscErrorCode SbMemoryMeshCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri, SbMemoryMesh **in_memory)
+PetscErrorCode SbMemoryMeshCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri, PetscInt nedge,
+                                  SbMemoryMesh **in_memory)
 {
   SbMemoryMesh *g;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&g));
-  g->nvert = nvert;
-  g->ncell = ncell;
-  g->ntri = ntri;
+  *g = (SbMemoryMesh){.nvert = nvert, .ncell = ncell, .ntri = ntri, .nedge = nedge};
   PetscCall(PetscCalloc6(3 * (size_t)nvert, &g->x, 4 * (size_t)ncell, &g->cell, 3 * (size_t)ntri, &g->tri,
                          nvert, &g->vert_set, ntri, &g->tri_set, ncell, &g->cell_set));
-  *in_memory = g;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbMemoryMeshCurve(SbMemoryMesh *g, PetscInt nedge)
-{
-  PetscFunctionBeginUser;
-  g->nedge = nedge;
   PetscCall(PetscCalloc2(2 * (size_t)nedge, &g->edge, 3 * (size_t)nedge, &g->edge_off));
+  *in_memory = g;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -50,7 +42,7 @@ PetscErrorCode SbMemoryMeshShare(MPI_Comm comm, SbMemoryMesh **in_memory)
   if (*in_memory) head = **in_memory;
   PetscCallMPI(MPI_Bcast(&head, (int)sizeof(head), MPI_BYTE, 0, comm));
   if (head.nvert < 0) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!*in_memory) PetscCall(SbMemoryMeshCreate(0, 0, 0, in_memory));
+  if (!*in_memory) PetscCall(SbMemoryMeshCreate(0, 0, 0, 0, in_memory));
   (*in_memory)->mass = head.mass;
   (*in_memory)->bound = head.bound;
   (*in_memory)->step = head.step;

@@ -86,9 +86,6 @@ PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport i
 
 /* ------------------------------------------------------------------ route.c: see sbmesh.h */
 
-/* As SbRouteSend(); record which[i] (NULL: i) is the one for dest[i]. Collective. */
-PetscErrorCode SbRouteSendSome(const SbRoute *route, size_t unit, const PetscInt which[], const void *record,
-                               void *received);
 /* Returns answer[nrecv] to the senders of the records: result[nsend], allocated by the caller. Collective. */
 PetscErrorCode SbRouteReply(const SbRoute *route, size_t unit, const void *answer, void *result);
 /* Rank that sent the received record i. */

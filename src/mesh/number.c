@@ -71,7 +71,7 @@ static PetscErrorCode number_ghosts(Work *w, SbMesh mesh)
   }
   for (PetscInt v = 0; v < p->nvert_cells; v++) orig[v] = p->vertex[v].orig;
   PetscCall(SbRouteCreate(mesh->comm, n, dest, &route));
-  PetscCall(SbRouteSend(&route, sizeof(PetscInt), key, &got));
+  PetscCall(SbRouteSend(&route, sizeof(PetscInt), NULL, key, &got));
   for (PetscInt i = 0; i < route.nrecv; i++) {
     PetscInt v;
 
@@ -137,7 +137,7 @@ static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
   if (w->size > 1) {
     PetscCall(PetscMalloc1(p->ncell, &number));
     for (PetscInt c = 0; c < p->ncell; c++) number[order[c]] = c;
-    PetscCall(SbRouteSendSome(&p->ghost, sizeof(PetscInt), p->copied, number, &got));
+    PetscCall(SbRouteSend(&p->ghost, sizeof(PetscInt), p->copied, number, &got));
     PetscCall(PetscMalloc1(nghost, &leaf));
     PetscCall(PetscMalloc1(nghost, &remote));
     for (PetscInt g = 0; g < nghost; g++) {

@@ -108,8 +108,8 @@ static PetscErrorCode cut_graph(MPI_Comm comm, const SbMergedMesh *w, PetscSF sf
     across[s] = n < 0 ? -1 : n < w->ncell ? orig[n] : remote[n - w->ncell];
   }
   PetscCall(SbRouteCreate(comm, w->ncell, dest, &route));
-  PetscCall(SbRouteSend(&route, sizeof(PetscInt), orig, &all_orig));
-  PetscCall(SbRouteSend(&route, 4 * sizeof(PetscInt), across, &all_across));
+  PetscCall(SbRouteSend(&route, sizeof(PetscInt), NULL, orig, &all_orig));
+  PetscCall(SbRouteSend(&route, 4 * sizeof(PetscInt), NULL, across, &all_across));
   PetscCall(PetscMalloc1(route.nrecv, &all_part));
   if (!rank) {
     idx_t n = (idx_t)w->Ncell, ncon = 1, np = (idx_t)size, cut, options[METIS_NOPTIONS], k = 0;

@@ -5,24 +5,6 @@
 */
 #include "mesh_impl.h"
 
-/* Offsets of the records of each rank: prefix sums of the counts. */
-static PetscErrorCode first_of_each(PetscMPIInt size, const PetscMPIInt count[], PetscMPIInt first[],
-                                    PetscInt *total)
-{
-  PetscInt64 n = 0;
-
-  PetscFunctionBeginUser;
-  for (PetscMPIInt r = 0; r < size; r++) {
-    PetscCall(PetscMPIIntCast((PetscInt)PetscMin(n, PETSC_MAX_INT), &first[r]));
-    n += count[r];
-  }
-  PetscCheck(n <= PETSC_MPI_INT_MAX, PETSC_COMM_SELF, PETSC_ERR_SUP,
-             "One rank would send or get %lld records of the mesh, MPI counts to %d; take more ranks",
-             (long long)n, PETSC_MPI_INT_MAX);
-  *total = (PetscInt)n;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, const PetscMPIInt dest[], SbRoute *route)
 {
   PetscFunctionBeginUser;
@@ -32,8 +14,21 @@ PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, const PetscMPIInt dest[]
                          &route->rcount, route->size, &route->rfirst, n, &route->position));
   for (PetscInt i = 0; i < n; i++) route->scount[dest[i]]++;
   PetscCallMPI(MPI_Alltoall(route->scount, 1, MPI_INT, route->rcount, 1, MPI_INT, comm));
-  PetscCall(first_of_each(route->size, route->scount, route->sfirst, &n));
-  PetscCall(first_of_each(route->size, route->rcount, route->rfirst, &route->nrecv));
+  // offsets of the records of each rank: sums of the counts before it
+  for (int k = 0; k < 2; k++) {
+    const PetscMPIInt *count = k ? route->rcount : route->scount;
+    PetscMPIInt *first = k ? route->rfirst : route->sfirst;
+    PetscInt64 total = 0;
+
+    for (PetscMPIInt r = 0; r < route->size; r++) {
+      PetscCall(PetscMPIIntCast((PetscInt)PetscMin(total, PETSC_MAX_INT), &first[r]));
+      total += count[r];
+    }
+    PetscCheck(total <= PETSC_MPI_INT_MAX, PETSC_COMM_SELF, PETSC_ERR_SUP,
+               "One rank would send or get %lld records of the mesh, MPI counts to %d; take more ranks",
+               (long long)total, PETSC_MPI_INT_MAX);
+    route->nrecv = (PetscInt)total;
+  }
   for (PetscInt i = 0; i < n; i++) route->position[i] = route->sfirst[dest[i]]++;
   for (PetscMPIInt r = 0; r < route->size; r++) route->sfirst[r] -= route->scount[r];
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -61,8 +56,8 @@ static PetscErrorCode exchange(const SbRoute *route, size_t unit, PetscBool back
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRouteSendSome(const SbRoute *route, size_t unit, const PetscInt which[], const void *record,
-                               void *received)
+PetscErrorCode SbRouteSend(const SbRoute *route, size_t unit, const PetscInt which[], const void *record,
+                           void *received)
 {
   char *out, *in;
 
@@ -75,13 +70,6 @@ PetscErrorCode SbRouteSendSome(const SbRoute *route, size_t unit, const PetscInt
   PetscCall(exchange(route, unit, PETSC_FALSE, out, in));
   PetscCall(PetscFree(out));
   *(void **)received = in;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbRouteSend(const SbRoute *route, size_t unit, const void *record, void *received)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbRouteSendSome(route, unit, NULL, record, received));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

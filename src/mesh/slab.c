@@ -63,7 +63,7 @@ static PetscErrorCode send_home(const Slab *s, PetscInt n, size_t unit, const vo
   PetscCall(PetscMalloc1(n, &dest));
   for (PetscInt i = 0; i < n; i++) dest[i] = home(s, first_vertex(record, unit, i));
   PetscCall(SbRouteCreate(s->comm, n, dest, route));
-  PetscCall(SbRouteSend(route, unit, record, received));
+  PetscCall(SbRouteSend(route, unit, NULL, record, received));
   PetscCall(PetscFree(dest));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -251,7 +251,7 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
   first -= n;
   for (PetscInt v = 0; v < im->nvert; v++) part[v] = part[v] == v ? first++ : part[part[v]];
   /* pairs of parts that share a vertex, each pair once */
-  PetscCall(SbRouteSend(&s->vert, sizeof(PetscInt), part, &got));
+  PetscCall(SbRouteSend(&s->vert, sizeof(PetscInt), NULL, part, &got));
   PetscCall(PetscFree(part));
   PetscCall(PetscMalloc2(s->vert.nrecv, &user, s->vert.nrecv, &pair));
   for (PetscInt v = 0; v < s->nkept; v++)
@@ -269,7 +269,7 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
   // rank 0 joins the parts of all ranks by union-find
   PetscCall(PetscCalloc1(kept, &dest));
   PetscCall(SbRouteCreate(s->comm, kept, dest, &route));
-  PetscCall(SbRouteSend(&route, sizeof(*pair), pair, &all));
+  PetscCall(SbRouteSend(&route, sizeof(*pair), NULL, pair, &all));
   PetscCall(PetscFree(dest));
   *npart = total;
   PetscCall(PetscMalloc1(s->rank ? 0 : total, &parent));
@@ -320,7 +320,7 @@ static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
     if (d < 2) im->item[d].n = 0;
   }
   // combine the marks of all ranks at the home ranks
-  PetscCall(SbRouteSend(&route, sizeof(uint64_t), mark, &got_mark));
+  PetscCall(SbRouteSend(&route, sizeof(uint64_t), NULL, mark, &got_mark));
   for (PetscInt i = 0; i < route.nrecv; i++) s->mask[got[i] - s->rows.first] |= got_mark[i];
   PetscCall(PetscFree(got));
   PetscCall(PetscFree(got_mark));
@@ -358,7 +358,7 @@ static PetscErrorCode send_to_users(Slab *s, PetscInt n, size_t unit, const void
     }
   }
   PetscCall(SbRouteCreate(s->comm, n, dest, on));
-  PetscCall(SbRouteSendSome(on, unit, *from, got, in));
+  PetscCall(SbRouteSend(on, unit, *from, got, in));
   PetscCall(PetscFree(dest));
   PetscCall(PetscFree(got));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -485,7 +485,7 @@ static PetscErrorCode mark(Slab *s, PetscInt nbody, const SbBody body[], PetscIn
   PetscCall(find_triangles(s));
   PetscCall(SbSetsMark(im, &s->part->faces, nbody, body, b, nset, set, m));
   // combine the set bits of shared vertices over all ranks
-  PetscCall(SbRouteSend(&s->vert, sizeof(uint64_t), m->vert, &got));
+  PetscCall(SbRouteSend(&s->vert, sizeof(uint64_t), NULL, m->vert, &got));
   for (PetscInt i = 0; i < s->vert.nrecv; i++) s->mask[s->asked[i]] |= got[i];
   for (PetscInt i = 0; i < s->vert.nrecv; i++) got[i] = s->mask[s->asked[i]];
   PetscCall(SbRouteReply(&s->vert, sizeof(uint64_t), got, m->vert));
@@ -566,7 +566,7 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   SbBoundaryEdges(im, &s->part->faces, s->used, edge);
   for (PetscInt i = 0; i < n; i++) dest[i] = home(s, (PetscInt)(edge[i] >> 32));
   PetscCall(SbRouteCreate(s->comm, n, dest, &route));
-  PetscCall(SbRouteSend(&route, sizeof(*edge), edge, &got));
+  PetscCall(SbRouteSend(&route, sizeof(*edge), NULL, edge, &got));
   PetscCall(PetscFree2(edge, dest));
   PetscCall(SbCountPinched(route.nrecv, got, &im->npinched));
   PetscCall(PetscFree(got));

@@ -87,11 +87,10 @@ PetscErrorCode SbMeshValidate(SbMesh mesh)
           "Original vertex number %" PetscInt_FMT " out of range", mesh->vert_orig[v]);
     CHECK(0 <= body && body < mesh->nbody, "Vertex %" PetscInt_FMT " in body %" PetscInt_FMT, v, body);
     CHECK(!(mesh->vert_set[v] & SB_ON_BOUNDARY), "Vertex %" PetscInt_FMT " carries the bit of faces", v);
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++)
       CHECK(mesh->body[body].bbox[i] <= mesh->x[3 * v + i] &&
               mesh->x[3 * v + i] <= mesh->body[body].bbox[3 + i],
             "Vertex %" PetscInt_FMT " outside its body", v);
-    }
   }
   all = PETSC_FALSE;
   for (PetscInt b = 0; b < mesh->nbody; b++) all = (PetscBool)(all || mesh->body[b].other_nodes);

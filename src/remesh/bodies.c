@@ -283,34 +283,6 @@ static PetscErrorCode rename_surface(const Work *w, const SbGathered *next, SbRe
 
 /* ------------------------------------------------------------------ all bodies */
 
-/* Lists the curved edges of the next mesh. */
-static PetscErrorCode list_curved(const Work *w, SbMemoryMesh *p)
-{
-  PetscInt nedge, n = 0;
-  SbKey *edge;
-
-  PetscFunctionBeginUser;
-  if (!w->mesh.edge_off) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(list_edges(w->mesh.ncell, w->mesh.cell, &nedge, &edge));
-  for (int pass = 0; pass < 2; pass++) {
-    if (pass) PetscCall(SbMemoryMeshCurve(p, n));
-    n = 0;
-    for (PetscInt i = 0; i < nedge; i++) {
-      const PetscReal *off = w->mesh.edge_off + 3 * (size_t)edge[i].slot;
-
-      if (off[0] == 0. && off[1] == 0. && off[2] == 0.) continue;
-      if (pass) {
-        p->edge[2 * n] = (PetscInt)(edge[i].key >> 32);
-        p->edge[2 * n + 1] = (PetscInt)(edge[i].key & 0xffffffff);
-        PetscCall(PetscArraycpy(p->edge_off + 3 * n, off, 3));
-      }
-      n++;
-    }
-  }
-  PetscCall(PetscFree(edge));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Mesh, values and renumbered nodes of one body. */
 static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *result)
 {
@@ -321,14 +293,28 @@ static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *
   PetscReal *value = next->value + each * (size_t)next->cell0[w->body];
   const SbGathered *g = w->g;
   const SbNewMesh *m = &w->mesh;
+  PetscInt nedge = 0, ncurved = 0;
+  SbKey *edge = NULL;
 
   PetscFunctionBeginUser;
-  PetscCall(SbMemoryMeshCreate(m->nvert, m->ncell, list_triangles(w, NULL), &p));
+  // curved edges of the next mesh
+  if (m->edge_off) PetscCall(list_edges(m->ncell, m->cell, &nedge, &edge));
+  for (PetscInt i = 0; i < nedge; i++) {
+    const PetscReal *off = m->edge_off + 3 * (size_t)edge[i].slot;
+
+    if (off[0] != 0. || off[1] != 0. || off[2] != 0.) edge[ncurved++] = edge[i];
+  }
+  PetscCall(SbMemoryMeshCreate(m->nvert, m->ncell, list_triangles(w, NULL), ncurved, &p));
   result->in_memory[w->body] = p;
   PetscCall(PetscArraycpy(p->x, m->X, 3 * (size_t)m->nvert));
   PetscCall(PetscArraycpy(p->cell, m->cell, 4 * (size_t)m->ncell));
   (void)list_triangles(w, p);
-  PetscCall(list_curved(w, p));
+  for (PetscInt i = 0; i < ncurved; i++) {
+    p->edge[2 * i] = (PetscInt)(edge[i].key >> 32);
+    p->edge[2 * i + 1] = (PetscInt)(edge[i].key & 0xffffffff);
+    PetscCall(PetscArraycpy(p->edge_off + 3 * i, m->edge_off + 3 * (size_t)edge[i].slot, 3));
+  }
+  PetscCall(PetscFree(edge));
   for (PetscInt v = 0; v < m->nkept; v++) p->vert_set[v] = g->vert_set[w->vert0 + m->kept[v]] & w->groups;
   for (PetscInt c = 0; c < m->ncell; c++) {
     p->cell_set[c] = g->cell_set[5 * (w->cell0 + m->within[c])] & (w->groups | w->inclusions);

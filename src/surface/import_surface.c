@@ -165,7 +165,6 @@ static PetscErrorCode take_boundary(const SbTriangleFile *f, const SbSurface *s,
   PetscCall(SbDropUnusedPoints(&t->nvert, t->x, 3 * t->ntri, t->tri));
   t->volume = 0;
   for (PetscInt i = 0; i < t->ntri; i++) t->volume += SbTetVolumeTo(t, i, t->x);
-  t->edge = SbTrianglesMeanEdge(t);
   // neighbour across each edge; an edge of more than two triangles is an error
   PetscCall(PetscMalloc1(3 * (size_t)t->ntri, &t->across));
   PetscCall(PetscMalloc1(3 * (size_t)t->ntri, &edge));

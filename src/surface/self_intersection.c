@@ -60,10 +60,9 @@ static void smooth(SbTriangles *t, const PetscBool active[], PetscReal (*sum)[4]
     sum[a][3]++;
     sum[b][3]++;
   }
-  for (PetscInt v = 0; v < t->nvert; v++) {
+  for (PetscInt v = 0; v < t->nvert; v++)
     for (int k = 0; active[v] && k < 3; k++)
       t->x[3 * v + k] = 0.5 * t->x[3 * v + k] + 0.5 * sum[v][k] / sum[v][3];
-  }
 }
 
 /* Smooths around intersecting triangles until there are none, with displacements up to `reach`, m; else
