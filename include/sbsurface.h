@@ -30,10 +30,10 @@ PetscReal SbSurfaceMeasure(const SbSurface *surface, PetscReal volume[]);
     surface - closed; no two triangles cut each other; lengths in any unit
     options - size in that unit, mesher, whether the triangles are kept
   Output:
-    body - zeroed or with groups and tag sets alone: gets x, vert_number, item[3] with the tags of its region, item[2]
-           with every triangle whose tag set is not empty, and note. With SB_TET_KEEP the first surface->nvert vertices
-           are those of the surface, bit by bit and in order, and its triangles are the facets of the tets, inner ones
-           too.
+    body - zeroed or with groups and tag sets alone: gets x, vert_number, item[3] with the tags of its region,
+           item[2] with every triangle whose tag set is not empty, and note. With SB_TET_KEEP the first
+           surface->nvert vertices are those of the surface, bit by bit and in order, and its triangles are
+           the facets of the tets, inner ones too.
 
   Errors: PETSC_ERR_USER_INPUT, one line with the messages of gmsh and tetgen and a remedy; then body has no
   mesh.
