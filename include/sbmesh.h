@@ -1,6 +1,6 @@
 /*
-  sbmesh.h - layer 2: bodies read from files or made as boxes, placed, checked, merged, partitioned with the help of METIS,
-  and held as plain arrays with one layer of overlap.
+  sbmesh.h - layer 2: bodies read from files or made as boxes, placed, checked, merged, partitioned with the
+  help of METIS, and held as plain arrays with one layer of overlap.
 */
 #pragma once
 #include "sbbase.h"
@@ -28,16 +28,15 @@ typedef enum {
 typedef struct {
   PetscReal size;            /* wanted edge; 0: the mean edge of the surface */
   PetscReal merge_tolerance; /* closer vertices are merged; negative: 1e-7 of the diagonal */
-  PetscReal
-    untangle; /* largest displacement of vertices that removes self-intersections; negative: half the mean edge */
-  PetscReal angle;   /* degrees; edges with sharper turns are kept when the surface is remeshed */
-  PetscReal seconds; /* time limit of gmsh, and of tetgen, s */
+  PetscReal untangle; /* by how much self-intersections may be smoothed; negative: half the mean edge */
+  PetscReal angle;    /* degrees; edges with sharper turns are kept when the surface is remeshed */
+  PetscReal seconds;  /* time limit of gmsh, and of tetgen, s */
   SbTetBackend backend;
   SbTetSurface surface;
 } SbTetOptions;
 /*
-  A mesh in memory, instead of a body's file. The arrays are on rank 0, NULL elsewhere; the rest is alike on all ranks.
-  Groups of the file are there as the bits of the sets that they mean.
+  A mesh in memory, instead of a body's file. The arrays are on rank 0, NULL elsewhere; the rest is alike on
+  all ranks. Groups of the file are there as the bits of the sets that they mean.
 */
 typedef struct {
   PetscInt step;   /* step after which it was made; 0: the mesh of the file */
@@ -58,14 +57,14 @@ typedef struct {
 typedef struct {
   char name[SB_NAME_MAX];
   char copy_of[SB_NAME_MAX]; /* body of the scenario that it is a copy of (-body_<name>_copies); else "" */
-  char mesh
-    [PETSC_MAX_PATH_LEN]; /* file, or box:lx,ly,lz:n or box:lx,ly,lz:nx,ny,nz, from the origin to (lx, ly, lz);
-                                         n cells along the shortest side; groups xmin xmax ymin ymax zmin zmax */
+  /* file, or box:lx,ly,lz:n or box:lx,ly,lz:nx,ny,nz, from the origin to (lx, ly, lz), n cells along the
+     shortest side; groups xmin xmax ymin ymax zmin zmax */
+  char mesh[PETSC_MAX_PATH_LEN];
   PetscInt mesh_step;     /* of the file of a run: the step whose positions it has; 0 at rest, -1 the last */
   PetscReal scale;        /* factor on the file's coordinates, first */
   PetscReal rotate[4];    /* axis (need not be normed) and angle in degrees, second */
-  PetscReal translate[3];    /* m, third */
-  SbTetOptions tet;          /* for a mesh that is a surface; m */
+  PetscReal translate[3]; /* m, third */
+  SbTetOptions tet;       /* for a mesh that is a surface; m */
   char element[SB_NAME_MAX]; /* p1, p2, cr, dg */
   PetscBool other_nodes;     /* nodes at faces or edges: needs the full overlap */
   PetscBool edge_nodes; /* nodes at edges, where a mesh of second order has them; else tets are straight */
@@ -92,11 +91,12 @@ typedef struct {
 PetscReal SbBodySmallest(PetscInt nbody, const SbBody body[]);
 
 /*
-  A named set of the scenario: where loads and supports act. From a gmsh physical group of that name (of any body, or
-  of one when written body.group; a group without a name is called surface_12, volume_3, ...), or a shape in the placed
-  rest frame. A shape holds the vertices inside it, the boundary facets with three and the tets with four of these, with
-  a slack of 1e-6 of the body's diagonal. A group of surfaces holds its triangles (inner ones too) and their vertices; a
-  group of volumes its tets, their vertices and boundary facets.
+  A named set of the scenario: where loads and supports act. From a gmsh physical group of that name (of any
+  body, or of one when written body.group; a group without a name is called surface_12, volume_3, ...), or a
+  shape in the placed rest frame. A shape holds the vertices inside it, the boundary facets with three and the
+  tets with four of these, with a slack of 1e-6 of the body's diagonal. A group of surfaces holds its
+  triangles (inner ones too) and their vertices; a group of volumes its tets, their vertices and boundary
+  facets.
 */
 typedef enum {
   SB_SET_GROUP,
@@ -111,17 +111,18 @@ typedef struct {
   char name[SB_NAME_MAX];
   SbSetShape shape;
   char group[2 * SB_NAME_MAX]; /* SB_SET_GROUP: group or body.group; SB_SET_BODY: body */
-  PetscReal p[8]; /* box: xmin ymin zmin xmax ymax zmax; plane: nx ny nz d tol (|n.x - d| <= tol);
-                                        sphere: cx cy cz r; halfspace: nx ny nz d (n.x <= d); n has length 1 here, d is scaled likewise */
-  PetscInt nvert, nfacet,
-    ncell; /* global counts, by SbMeshCreate(); nfacet: boundary facets; all zero is an error there */
-  PetscBool prescribed; /* an effect prescribes every displacement there */
+  /* box: xmin ymin zmin xmax ymax zmax; plane: nx ny nz d tol (|n.x - d| <= tol); sphere: cx cy cz r;
+     halfspace: nx ny nz d (n.x <= d); n has length 1 here, d is scaled likewise */
+  PetscReal p[8];
+  PetscInt nvert, nfacet, ncell; /* by SbMeshCreate(), of all ranks; nfacet: boundary facets */
+  PetscBool prescribed;          /* an effect prescribes every displacement there */
 } SbSet;
 
 /*
-  SbMesh - this rank's part of the mesh. Own numbering: vertices and cells owned by this rank first, then the ghosts
-  that touch them: every cell with an owned vertex is here. With nodes at faces or edges every cell that shares a vertex with an owned
-  cell is here; else no ghost cell without an owned vertex. Constant after creation.
+  SbMesh - this rank's part of the mesh. Own numbering: vertices and cells owned by this rank first, then the
+  ghosts that touch them: every cell with an owned vertex is here. With nodes at faces or edges every cell
+  that shares a vertex with an owned cell is here; else no ghost cell without an owned vertex. Constant after
+  creation.
 */
 typedef struct _p_SbMesh *SbMesh;
 struct _p_SbMesh {
@@ -137,17 +138,15 @@ struct _p_SbMesh {
   PetscInt nvert_owned, nvert;
   PetscInt gvert_start; /* global number of this rank's first owned vertex; owned ones follow each other */
   PetscInt *gvert;      /* [nvert] global vertex number (depends on the partition); ghosts ascending */
-  PetscInt
-    *vert_orig; /* [nvert] original number: bodies as the scenario, used vertices as the file has them */
-  PetscInt *vert_body; /* [nvert] */
-  PetscReal *x;        /* [nvert][3] rest position, placed, m */
-  uint64_t *vert_set;  /* [nvert] SB_SET_BIT(k) when in set k */
+  PetscInt *vert_orig;  /* [nvert] original number: in the order of bodies, then of used vertices in files */
+  PetscInt *vert_body;  /* [nvert] */
+  PetscReal *x;         /* [nvert][3] rest position, placed, m */
+  uint64_t *vert_set;   /* [nvert] SB_SET_BIT(k) when in set k */
 
   PetscInt ncell_owned, ncell;
   PetscInt *cell;      /* [ncell][4] local vertices, positively oriented: det(x1-x0, x2-x0, x3-x0) > 0 */
   PetscInt *cell_orig; /* [ncell] original number, as for vertices */
-  PetscInt
-    *cell_body; /* [ncell]; owned and ghost cells each by body, inclusion, curved or not, lowest vertex */
+  PetscInt *cell_body; /* [ncell]; owned and ghost cells by body, inclusion, curved or not, lowest vertex */
   PetscInt *cell_material; /* [ncell] number of the body, or material of its first inclusion with the cell */
   uint64_t *cell_set;      /* [ncell] SB_SET_BIT(k), SB_CURVED */
   PetscReal *edge_off; /* [ncell][6][3] of nodes at edges from their middles, m; NULL without curved cells */
@@ -157,12 +156,14 @@ struct _p_SbMesh {
 /*
   SbMeshCreate - reads, checks, transforms, merges, partitions and distributes the bodies. Collective.
 
-  Input: comm; bodies and sets as the scenario gives them (their "found" fields are filled; both must outlive the mesh).
+  Input: comm; bodies and sets as the scenario gives them (their "found" fields are filled; both must outlive
+  the mesh).
   Options read: -mesh_partitioner, -mesh_report (one line of checks and quality per body on rank 0).
-  Errors: PETSC_ERR_USER_INPUT / PETSC_ERR_FILE_* with one line that names body, file, line or cell, and what to do. Fatal:
-  unreadable or truncated file, no tets, other volume cells, 2D mesh, NaN or infinite coordinate, degenerate tet, duplicate
-  tet, face shared by three tets, set that selects nothing. Repaired and reported: unused vertices, negative orientation.
-  Reported: several connected parts, non-manifold surface edges.
+  Errors: PETSC_ERR_USER_INPUT / PETSC_ERR_FILE_* with one line that names body, file, line or cell, and what
+  to do. Fatal: unreadable or truncated file, no tets, other volume cells, 2D mesh, NaN or infinite
+  coordinate, degenerate tet, duplicate tet, face shared by three tets, set that selects nothing. Repaired and
+  reported: unused vertices, negative orientation. Reported: several connected parts, non-manifold surface
+  edges.
 */
 PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[],
                             SbMesh *mesh);
@@ -170,16 +171,18 @@ PetscErrorCode SbMeshDestroy(SbMesh *mesh);
 /*
   SbMeshNeighbours - local cell across each face.
 
-  Not collective. Output: neighbour[ncell][4], -1 on the boundary and where the other cell is not on this rank; PetscFree().
+  Not collective. Output: neighbour[ncell][4], -1 on the boundary and where the other cell is not on this
+  rank; PetscFree().
 */
 PetscErrorCode SbMeshNeighbours(SbMesh mesh, PetscInt **neighbour);
 /*
   SbMeshEdges - edges of the local cells, each once.
 
-  Not collective. Output: nedge; edge[ncell][6] number of each edge of a cell, between vertices 01 02 03 12 13 23; PetscFree().
+  Not collective. Output: nedge; edge[ncell][6] number of each edge of a cell, between vertices 01 02 03 12 13
+  23; PetscFree().
 */
 PetscErrorCode SbMeshEdges(SbMesh mesh, PetscInt *nedge, PetscInt **edge);
-/* The leaves 0, 1, ... n - 1 of as many of N roots on rank 0, of which root[n] are theirs. Collective; the caller destroys it. */
+/* The leaves 0, 1, ... n - 1 of the roots root[n] of N on rank 0. Collective; the caller destroys it. */
 PetscErrorCode SbForestOnRank0(MPI_Comm comm, PetscInt N, PetscInt n, const PetscInt root[], PetscSF *forest);
 /* Brings n numbers of each root to its leaves, or those of each leaf to its root. Collective. */
 PetscErrorCode SbForestBroadcast(PetscSF forest, PetscInt n, MPI_Datatype type, const void *root, void *leaf);
@@ -194,17 +197,18 @@ PetscErrorCode SbMeshRegister(void);        /* rows of the option table, the MET
 void SbTetDefaults(SbTetOptions *options);
 PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOptions *options);
 /* Allocates a mesh in memory, zeroed. Not collective. */
-PetscErrorCode SbMemoryMeshCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri, SbMemoryMesh **in_memory);
-/* Allocates curved edges. Not collective. */
-PetscErrorCode SbMemoryMeshCurve(SbMemoryMesh *in_memory, PetscInt nedge);
+PetscErrorCode SbMemoryMeshCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri, PetscInt nedge,
+                                  SbMemoryMesh **in_memory);
 PetscErrorCode SbMemoryMeshDestroy(SbMemoryMesh **in_memory);
-/* From rank 0, whose mesh it is, its step, mass and bound to all ranks, which get an empty one; NULL there: NULL on all. Collective. */
+/* Sends step, mass and bound of the mesh on rank 0 to empty ones on all; NULL there: NULL on all.
+   Collective. */
 PetscErrorCode SbMemoryMeshShare(MPI_Comm comm, SbMemoryMesh **in_memory);
 /*
   SbSetParse - reads the description of a set. Not collective.
 
-  Input: option - full name, for messages; text - group:NAME, group:BODY.NAME, box:xmin,ymin,zmin,xmax,ymax,zmax,
-  plane:nx,ny,nz,d[,tolerance], sphere:cx,cy,cz,r, halfspace:nx,ny,nz,d, body:NAME or boundary (lengths in m).
+  Input: option - full name, for messages; text - group:NAME, group:BODY.NAME,
+  box:xmin,ymin,zmin,xmax,ymax,zmax, plane:nx,ny,nz,d[,tolerance], sphere:cx,cy,cz,r, halfspace:nx,ny,nz,d,
+  body:NAME or boundary (lengths in m).
   Output: shape, group, p of set; its name is left alone.
   Errors: PETSC_ERR_USER_INPUT, one line that names option, text and the right form.
 */
@@ -222,5 +226,7 @@ typedef struct {
 /* Prepares n records to go to ranks dest[n]; their order among those for one rank stays. Collective. */
 PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, const PetscMPIInt dest[], SbRoute *route);
 PetscErrorCode SbRouteDestroy(SbRoute *route);
-/* Sends records of `unit` bytes, record[nsend]; received[nrecv] by rank, PetscFree(). Collective. */
-PetscErrorCode SbRouteSend(const SbRoute *route, size_t unit, const void *record, void *received);
+/* Sends records of `unit` bytes, of which record[which[i]] (NULL: record[i]) goes to dest[i];
+   received[nrecv] by rank, PetscFree(). Collective. */
+PetscErrorCode SbRouteSend(const SbRoute *route, size_t unit, const PetscInt which[], const void *record,
+                           void *received);

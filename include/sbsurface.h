@@ -1,12 +1,11 @@
-/*
-  sbsurface.h - layer 2: closed surfaces of triangles and the tets that fill them. Rank 0 only.
-*/
+/* sbsurface.h - layer 2: closed surfaces of triangles and the tets that fill them. Rank 0 only. */
 #pragma once
 #include "sbmeshio.h"
 
 /*
-  Surfaces that cut space into regions; every triangle knows the region on each of its sides. Arrays are owned, SbSurfaceDestroy().
-  A body without inner surfaces has one region: side is {-1, 0} for triangles seen counter-clockwise from outside.
+  Surfaces that cut space into regions; every triangle knows the region on each of its sides.
+  SbSurfaceDestroy(). A body without inner surfaces has one region: side is {-1, 0} for triangles seen
+  counter-clockwise from outside.
 */
 typedef struct {
   PetscInt nvert, ntri, nregion;
@@ -31,11 +30,13 @@ PetscReal SbSurfaceMeasure(const SbSurface *surface, PetscReal volume[]);
     surface - closed; no two triangles cut each other; lengths in any unit
     options - size in that unit, mesher, whether the triangles are kept
   Output:
-    body - zeroed or with groups and tag sets alone: gets x, vert_number, item[3] with the tags of its region, item[2] with every
-           triangle whose tag set is not empty, and note. With SB_TET_KEEP the first surface->nvert vertices are those of the surface,
-           bit by bit and in order, and its triangles are the facets of the tets, inner ones too.
+    body - zeroed or with groups and tag sets alone: gets x, vert_number, item[3] with the tags of its region,
+           item[2] with every triangle whose tag set is not empty, and note. With SB_TET_KEEP the first
+           surface->nvert vertices are those of the surface, bit by bit and in order, and its triangles are
+           the facets of the tets, inner ones too.
 
-  Errors: PETSC_ERR_USER_INPUT, one line with the messages of gmsh and tetgen and a remedy; then body has no mesh.
+  Errors: PETSC_ERR_USER_INPUT, one line with the messages of gmsh and tetgen and a remedy; then body has no
+  mesh.
 */
 PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *surface, const SbTetOptions *options,
                                 SbImport *body);

@@ -13,7 +13,6 @@ typedef struct {
   PetscInt *tri;    /* [ntri][3] vertices, counter-clockwise seen from outside */
   PetscInt *across; /* [ntri][3] triangle beyond edge k, which runs from corner k to the next */
   PetscReal volume; /* enclosed, m^3 */
-  PetscReal edge;   /* mean edge, m */
   PetscBool turned; /* it was inverted in the file */
 } SbTriangles;
 /*

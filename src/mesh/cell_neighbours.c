@@ -1,6 +1,6 @@
 /*
-  cell_neighbours.c - mesh connectivity for elements with nodes at faces or edges: neighbours of a cell across its faces, cells around an edge,
-  global numbers of ghost cells; star forests for the exchange of cell and face data.
+  cell_neighbours.c - mesh connectivity for elements with nodes at faces or edges; star forests for the
+  exchange of cell and face data.
 */
 #include "mesh_impl.h"
 
@@ -16,7 +16,7 @@ PetscErrorCode SbMeshNeighbours(SbMesh mesh, PetscInt **neighbour)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Counting sort: each edge goes into the bucket of its lower vertex; equal higher vertices within a bucket are one edge. */
+/* Counting sort: each edge is in the bucket of its lower vertex, where equal higher vertices are one edge. */
 PetscErrorCode SbMeshEdges(SbMesh mesh, PetscInt *nedge, PetscInt **edge)
 {
   const PetscInt n = 6 * mesh->ncell;

@@ -2,13 +2,15 @@
   check.c - validity checks of a body's mesh, before anything is computed on it.
 
   Repaired and counted: unused vertices are removed; tets with negative orientation have two vertices swapped.
-  Errors: a tet of zero volume, a duplicate tet, a face of three tets; each would make the mass or the stiffness matrix
-  wrong. Counted: group triangles that are not a face of any tet; surface edges with more than two facets, which
-  connect parts of the body like hinges.
+  Errors: a tet of zero volume, a duplicate tet, a face of three tets; each would make the mass or the
+  stiffness matrix wrong. Counted: group triangles that are not a face of any tet; surface edges with more
+  than two facets, which connect parts of the body like hinges.
 
-  A tet is flat when its height over the longest edge L is below 1e-12 L, or below the rounding of its coordinates:
-  |det| <= (1e-12 L + 8 eps max|x|) L^2. The thinnest slivers worth simulating are nine orders above the first term.
+  A tet is flat when its height over the longest edge L is below 1e-12 L, or below the rounding of its
+  coordinates: |det| <= (1e-12 L + 8 eps max|x|) L^2. The thinnest slivers worth simulating are nine orders
+  above the first term.
 */
+#include "sbkernel.h"
 #include "mesh_impl.h"
 
 /* ------------------------------------------------------------------ unused vertices */
@@ -33,13 +35,11 @@ static inline PetscReal longest_edge2(const PetscReal x[], const PetscInt v[4])
 {
   PetscReal L2 = 0;
 
-  for (int i = 0; i < 4; i++) {
-    for (int j = 0; j < i; j++) {
-      const PetscReal *p = x + 3 * v[i], *q = x + 3 * v[j], d[3] = {p[0] - q[0], p[1] - q[1], p[2] - q[2]};
-      const PetscReal l2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+  for (int e = 0; e < 6; e++) {
+    PetscReal d[3];
 
-      L2 = PetscMax(L2, l2);
-    }
+    SbSubtract(x + 3 * v[SbTetEdge[e][0]], x + 3 * v[SbTetEdge[e][1]], d);
+    L2 = PetscMax(L2, SbDot3(d, d));
   }
   return L2;
 }
@@ -60,7 +60,8 @@ PetscReal SbImportLargest(const SbImport *im)
   return largest;
 }
 
-PetscErrorCode SbImportOrient(SbImport *im, PetscReal largest)
+/* Swaps two vertices of inverted tets; a flat tet is an error. */
+static PetscErrorCode orient(SbImport *im, PetscReal largest)
 {
   PetscReal det;
 
@@ -71,11 +72,10 @@ PetscErrorCode SbImportOrient(SbImport *im, PetscReal largest)
     // a flat tet, perhaps because it has the same node twice
     if (SbTetFlat(im->x, v, largest, &det)) {
       for (int i = 0; i < 4; i++) {
-        for (int j = 0; j < i; j++) {
+        for (int j = 0; j < i; j++)
           PetscCheck(v[i] != v[j], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
                      "%s: tetrahedron %lld uses node %lld twice; remove it", im->where,
                      (long long)im->item[3].number[c], (long long)im->vert_number[v[i]]);
-        }
       }
       SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
               "%s: tetrahedron %lld is flat (volume %.3g m^3 with an edge of %.3g m); repair the mesh (gmsh: "
@@ -115,25 +115,26 @@ PetscErrorCode SbImportOverlap(const SbImport *im, const int64_t number[3], Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Two cells with equal vertices share all four faces; with a third cell at one of them the face counts as shared by three. */
-PetscErrorCode SbImportCheckFaces(const SbImport *im, const SbFaces *faces)
+PetscErrorCode SbImportCheckCells(SbImport *im, PetscReal largest, SbFaces *faces)
 {
   const int64_t *number = im->item[3].number;
 
   PetscFunctionBeginUser;
+  PetscCall(orient(im, largest));
+  PetscCall(SbFacesCreate(im->nvert, im->item[3].n, im->item[3].vert, faces));
+  /* cells with equal vertices share all four faces; with a third cell at one of them it is a face of three */
   if (faces->nshared) {
     const PetscInt *s = faces->shared;
 
     for (int i = 0; i < 3; i++) {
-      PetscInt a[4], b[4];
-      PetscBool same;
+      PetscInt vert[2][4];
 
-      PetscCall(PetscArraycpy(a, im->item[3].vert + 4 * s[i], 4));
-      PetscCall(PetscArraycpy(b, im->item[3].vert + 4 * s[(i + 1) % 3], 4));
-      PetscCall(PetscSortInt(4, a));
-      PetscCall(PetscSortInt(4, b));
-      PetscCall(PetscArraycmp(a, b, 4, &same));
-      if (same) PetscCall(SbImportTwice(im, number[s[i]], number[s[(i + 1) % 3]]));
+      for (int k = 0; k < 2; k++) {
+        PetscCall(PetscArraycpy(vert[k], im->item[3].vert + 4 * s[(i + k) % 3], 4));
+        PetscCall(PetscSortInt(4, vert[k]));
+      }
+      if (!memcmp(vert[0], vert[1], sizeof(vert[0])))
+        PetscCall(SbImportTwice(im, number[s[i]], number[s[(i + 1) % 3]]));
     }
     PetscCall(
       SbImportOverlap(im, (const int64_t[3]){number[s[0]], number[s[1]], number[s[2]]}, faces->nshared));
@@ -178,9 +179,7 @@ PetscErrorCode SbImportCheck(SbImport *im, SbFaces *faces)
 
   PetscFunctionBeginUser;
   PetscCall(SbImportDropUnused(im));
-  PetscCall(SbImportOrient(im, SbImportLargest(im)));
-  PetscCall(SbFacesCreate(im->nvert, im->item[3].n, im->item[3].vert, faces));
-  PetscCall(SbImportCheckFaces(im, faces));
+  PetscCall(SbImportCheckCells(im, SbImportLargest(im), faces));
   // group triangles that are not a face of any tet
   for (PetscInt t = 0; t < im->item[2].n; t++)
     im->nlost += !SbFacesFind(faces, im->item[2].vert + 3 * t, slots);

@@ -1,4 +1,4 @@
-/* create.c - the distributed mesh of a scenario, from the mesh files to the numbered local meshes of all ranks. */
+/* create.c - the mesh of a scenario, from the mesh files to the numbered local meshes of all ranks. */
 #include "mesh_impl.h"
 #include "sbsurface.h"
 #include "sblog.h"

@@ -1,8 +1,9 @@
 /*
   curve.c - tets with curved edges: cells of a second-order mesh whose edge nodes are not at the midpoints.
 
-  x(l) = sum_a phi_a(l) x_a with the P2 basis (src/base/quadratic_map.c). The Jacobian of the map must be positive: it is checked at the
-  quadrature points and at the ten nodes. The volume is the integral of the Jacobian, a cubic polynomial.
+  x(l) = sum_a phi_a(l) x_a with the P2 basis (src/base/quadratic_map.c). The Jacobian of the map must be
+  positive: it is checked at the quadrature points and at the ten nodes. The volume is the integral of the
+  Jacobian, a cubic polynomial.
 */
 #include "mesh_impl.h"
 #include "sbkernel.h"
@@ -15,7 +16,7 @@ static int compare(const void *a, const void *b)
   return (p[1] > q[1]) - (p[1] < q[1]);
 }
 
-/* Jacobian of the map at the barycentric coordinates L: six times the volume of the P1 tet with the same gradients. */
+/* Jacobian of the map at the place L: six times the volume of the P1 tet with the same gradients. */
 static PetscReal jacobian(const PetscReal x[SB_CELL_NODES][3], const PetscReal L[4])
 {
   static const PetscInt own[4] = {0, 1, 2, 3};

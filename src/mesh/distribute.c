@@ -1,49 +1,42 @@
 /*
-  distribute.c - distribution of the merged mesh: each rank gets its cells, their vertices, and copies of cells of other ranks (ghosts).
+  distribute.c - distribution of the merged mesh: each rank gets its cells, their vertices, and copies of
+  cells of other ranks (ghosts).
 
-  Cells are sent directly to their owners, with their vertices: a vertex is sent once to each rank that needs it. A distributed directory
-  tells which ranks have a vertex: rank r keeps the r-th block of original vertex numbers. Vertices that are shared by the same set of
-  ranks are sorted along the longest axis of their bounding box and divided among these ranks in equal contiguous parts: all of them compute the same
-  owners, the load is balanced, and the parts are compact, so that there are few ghosts. Then each rank sends copies of its cells to the owners of their vertices.
+  Cells are sent directly to their owners, with their vertices: a vertex is sent once to each rank that needs
+  it. A distributed directory tells which ranks have a vertex: rank r keeps the r-th block of original vertex
+  numbers. Vertices that are shared by the same set of ranks are sorted along the longest axis of their
+  bounding box and divided among these ranks in equal contiguous parts: all of them compute the same owners,
+  the load is balanced, and the parts are compact, so that there are few ghosts. Then each rank sends copies
+  of its cells to the owners of their vertices.
 */
 #include <stdlib.h>
 #include "mesh_impl.h"
 
 /* ------------------------------------------------------------------ sending cells */
 
-/* Cells with their vertices, and the owners of the vertices once they are assigned. */
-typedef struct {
-  PetscBool owned; /* owner[] is assigned; equal on all ranks, also on those without cells */
-  PetscInt ncell, nvert;
-  PetscInt *cell;       /* [ncell][4] positions in vertex[] */
-  SbCellData *data;     /* [ncell] */
-  SbVertexData *vertex; /* [nvert] */
-  PetscMPIInt *owner;   /* [nvert] */
-} Cells;
-
-static PetscErrorCode cells_destroy(Cells *c)
+PetscErrorCode SbLocalMeshDestroy(SbLocalMesh *c)
 {
   PetscFunctionBeginUser;
   PetscCall(PetscFree(c->cell));
   PetscCall(PetscFree(c->data));
   PetscCall(PetscFree(c->vertex));
   PetscCall(PetscFree(c->owner));
+  PetscCall(PetscFree(c->copied));
+  if (c->ghost.scount) PetscCall(SbRouteDestroy(&c->ghost));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sends the cells which[] (NULL: all cells) to ranks dest[] of the route. */
-static PetscErrorCode send_cells(const Cells *from, const SbRoute *route, const PetscInt which[],
-                                 const PetscMPIInt dest[], Cells *to)
+/* Sends cells which[] (NULL: all) to ranks dest[] of the route; `owned`: their vertices have owners. */
+static PetscErrorCode send_cells(const SbLocalMesh *from, PetscBool owned, const SbRoute *route,
+                                 const PetscInt which[], const PetscMPIInt dest[], SbLocalMesh *to)
 {
   PetscInt *at, *list, nlist = 0, *order, *position, *count;
-  PetscMPIInt *list_dest, *owner = NULL, *mark;
+  PetscMPIInt *list_dest, *mark;
   SbRoute vertices;
-  SbVertexData *vertex;
-  SbCellData *data = NULL;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(to, sizeof(*to)));
-  // for each rank the list of vertices to send, in the order of the cells; at[][4]: positions of a cell's vertices in the list of its rank
+  *to = (SbLocalMesh){0};
+  // vertices to send to each rank, in the order of the cells; at[][4]: where the vertices of a cell are there
   PetscCall(PetscMalloc1(4 * (size_t)route->nsend, &at));
   PetscCall(
     PetscMalloc4(route->nsend, &order, from->nvert, &position, route->size, &count, from->nvert, &mark));
@@ -57,13 +50,11 @@ static PetscErrorCode send_cells(const Cells *from, const SbRoute *route, const 
 
       for (int a = 0; a < 4; a++) {
         if (mark[v[a]] != dest[i]) {
+          if (pass) list[nlist] = v[a];
+          if (pass) list_dest[nlist] = dest[i];
+          nlist++;
           mark[v[a]] = dest[i];
           position[v[a]] = count[dest[i]]++;
-          if (pass) {
-            list[nlist] = v[a];
-            list_dest[nlist] = dest[i];
-          }
-          nlist++;
         }
         at[4 * (size_t)i + a] = position[v[a]];
       }
@@ -72,42 +63,30 @@ static PetscErrorCode send_cells(const Cells *from, const SbRoute *route, const 
   }
   PetscCall(PetscFree4(order, position, count, mark));
   PetscCall(SbRouteCreate(route->comm, nlist, list_dest, &vertices));
-  PetscCall(SbRouteSend(route, 4 * sizeof(PetscInt), at, &to->cell));
+  PetscCall(SbRouteSend(route, 4 * sizeof(PetscInt), NULL, at, &to->cell));
   PetscCall(PetscFree(at));
   to->ncell = route->nrecv;
   to->nvert = vertices.nrecv;
-  for (PetscMPIInt r = 0; r < route->size; r++) {
+  for (PetscMPIInt r = 0; r < route->size; r++)
     for (PetscInt i = 4 * route->rfirst[r]; i < 4 * (route->rfirst[r] + route->rcount[r]); i++)
       to->cell[i] += vertices.rfirst[r];
-  }
-  /* cell data */
-  if (which) {
-    PetscCall(PetscMalloc1(route->nsend, &data));
-    for (PetscInt i = 0; i < route->nsend; i++) data[i] = from->data[which[i]];
-  }
-  PetscCall(SbRouteSend(route, sizeof(SbCellData), which ? data : from->data, &to->data));
-  PetscCall(PetscFree(data));
-  /* vertex data */
-  PetscCall(PetscMalloc1(nlist, &vertex));
-  for (PetscInt i = 0; i < nlist; i++) vertex[i] = from->vertex[list[i]];
-  PetscCall(SbRouteSend(&vertices, sizeof(SbVertexData), vertex, &to->vertex));
-  PetscCall(PetscFree(vertex));
-  if (from->owned) {
-    PetscCall(PetscMalloc1(nlist, &owner));
-    for (PetscInt i = 0; i < nlist; i++) owner[i] = from->owner[list[i]];
-    PetscCall(SbRouteSend(&vertices, sizeof(PetscMPIInt), owner, &to->owner));
-    PetscCall(PetscFree(owner));
-  }
+  PetscCall(SbRouteSend(route, sizeof(SbCellData), which, from->data, &to->data));
+  PetscCall(SbRouteSend(&vertices, sizeof(SbVertexData), list, from->vertex, &to->vertex));
+  if (owned) PetscCall(SbRouteSend(&vertices, sizeof(PetscMPIInt), list, from->owner, &to->owner));
   PetscCall(SbRouteDestroy(&vertices));
   PetscCall(PetscFree2(list, list_dest));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Permutation that sorts the numbers in ascending order: order[n]. */
-static PetscErrorCode ascending(PetscInt n, const PetscInt number[], PetscInt order[])
+/* Original numbers with which n records begin, and the permutation that sorts these in ascending order. */
+static PetscErrorCode ascending(PetscInt n, size_t unit, const void *record, PetscInt number[],
+                                PetscInt order[])
 {
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < n; i++) order[i] = i;
+  for (PetscInt i = 0; i < n; i++) {
+    number[i] = *(const PetscInt *)(const void *)((const char *)record + unit * (size_t)i);
+    order[i] = i;
+  }
   PetscCall(PetscSortIntWithPermutation(n, number, order));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -144,7 +123,7 @@ static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbLocal
     dest[v] = (PetscMPIInt)(orig[v] / block);
   }
   PetscCall(SbRouteCreate(comm, n, dest, &there));
-  PetscCall(SbRouteSend(&there, sizeof(PetscInt), orig, &got));
+  PetscCall(SbRouteSend(&there, sizeof(PetscInt), NULL, orig, &got));
   PetscCall(PetscFree2(orig, dest));
   /* ranks that have each vertex of this rank's block, ascending */
   for (PetscInt i = 0; i < there.nrecv; i++) got[i] -= first;
@@ -173,19 +152,18 @@ static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbLocal
   PetscCall(PetscFree(start));
   PetscCall(PetscFree(holder));
   PetscCall(SbRouteCreate(comm, npair, pair_dest, &back));
-  PetscCall(SbRouteSend(&back, 2 * sizeof(PetscInt), pair, &border->pair));
+  PetscCall(SbRouteSend(&back, 2 * sizeof(PetscInt), NULL, pair, &border->pair));
   PetscCall(PetscFree2(pair, pair_dest));
   /* received from blocks of ascending ranks, so original numbers ascend */
   border->n = 0;
-  for (PetscInt i = 0; i < back.nrecv; i++) border->n += !i || border->pair[2 * i] != border->pair[2 * i - 2];
-  PetscCall(PetscMalloc1(border->n, &border->vert));
-  for (PetscInt i = 0, k = -1, v = 0; i < back.nrecv; i++) {
+  PetscCall(PetscMalloc1(back.nrecv / 2, &border->vert)); /* at least two ranks have each */
+  for (PetscInt i = 0, v = 0; i < back.nrecv; i++) {
     if (i && border->pair[2 * i] == border->pair[2 * i - 2]) {
-      border->vert[k].n++;
+      border->vert[border->n - 1].n++;
       continue;
     }
     while (local->vertex[v].orig != border->pair[2 * i]) v++;
-    border->vert[++k] = (Shared){v, border->pair[2 * i], 1, border->pair + 2 * i + 1, 0};
+    border->vert[border->n++] = (Shared){v, border->pair[2 * i], 1, border->pair + 2 * i + 1, 0};
   }
   PetscCall(SbRouteDestroy(&back));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -264,133 +242,113 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
                             SbLocalMesh *local)
 {
   const PetscInt Nvert = w->Nvert;
-  PetscMPIInt size, *part;
+  SbLocalMesh whole = {.cell = w->cell, .data = w->data, .vertex = w->vertex};
+  PetscMPIInt size, rank, *dest;
+  PetscInt *orig, *number, *order, *position, n = 0;
   SbRoute route;
-  Cells from, owned;
+  SbLocalMesh owned, ghost;
+  Border border;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(local, sizeof(*local)));
   PetscCallMPI(MPI_Comm_size(comm, &size));
-  from = (Cells){PETSC_FALSE, w->ncell, w->nvert, w->cell, w->data, w->vertex, NULL};
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  whole.ncell = whole.ncell_owned = w->ncell;
+  whole.nvert = whole.nvert_cells = w->nvert;
   // on one rank the arrays are taken over without a copy
   if (size == 1) {
+    *local = whole;
     w->cell = NULL;
     w->data = NULL;
     w->vertex = NULL;
-    *local = (SbLocalMesh){.ncell_owned = from.ncell,
-                           .ncell = from.ncell,
-                           .nvert = from.nvert,
-                           .nvert_cells = from.nvert,
-                           .cell = from.cell,
-                           .data = from.data,
-                           .vertex = from.vertex};
-  } else {
-    // several ranks: partition the mesh, send each cell to its owner
-    PetscCall(PetscMalloc1(w->ncell, &part));
-    PetscCall(SbPartition(comm, type, w, part));
-    PetscCall(PetscFree(w->neighbour));
-    PetscCall(PetscFree(w->remote));
-    PetscCall(SbRouteCreate(comm, w->ncell, part, &route));
-    PetscCall(send_cells(&from, &route, NULL, part, &owned));
-    PetscCall(SbRouteDestroy(&route));
-    PetscCall(PetscFree(part));
+    PetscCall(SbMergedMeshDestroy(w));
+    PetscCall(PetscCalloc1(local->nvert, &local->owner));
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
-  // convert the received cells, assign vertex owners, add a layer of ghosts
+  // partition the mesh, send each cell to its owner
+  PetscCall(PetscMalloc1(w->ncell, &dest));
+  PetscCall(SbPartition(comm, type, w, dest));
+  PetscCall(PetscFree(w->neighbour));
+  PetscCall(PetscFree(w->remote));
+  PetscCall(SbRouteCreate(comm, w->ncell, dest, &route));
+  PetscCall(send_cells(&whole, PETSC_FALSE, &route, NULL, dest, &owned));
+  PetscCall(SbRouteDestroy(&route));
+  PetscCall(PetscFree(dest));
   PetscCall(SbMergedMeshDestroy(w));
-  if (size > 1) {
-    PetscInt *number, *order, *position, n = 0;
-
-    // sort owned cells and their vertices by original number; merge the copies of a vertex received from several ranks
-    PetscCall(PetscMalloc3(PetscMax(owned.nvert, owned.ncell), &number, PetscMax(owned.nvert, owned.ncell),
-                           &order, owned.nvert, &position));
-    for (PetscInt v = 0; v < owned.nvert; v++) number[v] = owned.vertex[v].orig;
-    PetscCall(ascending(owned.nvert, number, order));
-    PetscCall(PetscMalloc1(owned.nvert, &local->vertex));
-    for (PetscInt i = 0; i < owned.nvert; i++) {
-      const SbVertexData *v = &owned.vertex[order[i]];
-
-      if (!n || local->vertex[n - 1].orig != v->orig) local->vertex[n++] = *v;
-      position[order[i]] = n - 1;
-    }
-    local->nvert = local->nvert_cells = n;
-    PetscCall(PetscFree(owned.vertex));
-    for (PetscInt k = 0; k < owned.ncell; k++) number[k] = owned.data[k].orig;
-    PetscCall(ascending(owned.ncell, number, order));
-    PetscCall(PetscMalloc1(4 * (size_t)owned.ncell, &local->cell));
-    PetscCall(PetscMalloc1(owned.ncell, &local->data));
-    for (PetscInt k = 0; k < owned.ncell; k++) {
-      local->data[k] = owned.data[order[k]];
-      for (int a = 0; a < 4; a++)
-        local->cell[4 * (size_t)k + a] = position[owned.cell[4 * (size_t)order[k] + a]];
-    }
-    local->ncell = local->ncell_owned = owned.ncell;
-    PetscCall(PetscFree3(number, order, position));
-    PetscCall(cells_destroy(&owned));
+  // sort owned cells and their vertices by original number; a vertex may have come from several ranks
+  *local = (SbLocalMesh){.ncell = owned.ncell, .ncell_owned = owned.ncell};
+  PetscCall(PetscMalloc3(PetscMax(owned.nvert, owned.ncell), &number, PetscMax(owned.nvert, owned.ncell),
+                         &order, owned.nvert, &position));
+  PetscCall(ascending(owned.nvert, sizeof(*owned.vertex), owned.vertex, number, order));
+  PetscCall(PetscMalloc1(owned.nvert, &local->vertex));
+  for (PetscInt i = 0; i < owned.nvert; i++) {
+    if (!n || local->vertex[n - 1].orig != number[order[i]]) local->vertex[n++] = owned.vertex[order[i]];
+    position[order[i]] = n - 1;
   }
+  local->nvert = local->nvert_cells = n;
+  PetscCall(PetscFree(owned.vertex));
+  PetscCall(ascending(owned.ncell, sizeof(*owned.data), owned.data, number, order));
+  PetscCall(PetscMalloc1(4 * (size_t)owned.ncell, &local->cell));
+  PetscCall(PetscMalloc1(owned.ncell, &local->data));
+  for (PetscInt k = 0; k < owned.ncell; k++) {
+    local->data[k] = owned.data[order[k]];
+    for (int a = 0; a < 4; a++)
+      local->cell[4 * (size_t)k + a] = position[owned.cell[4 * (size_t)order[k] + a]];
+  }
+  PetscCall(PetscFree3(number, order, position));
+  PetscCall(SbLocalMeshDestroy(&owned));
+  // owners of the shared vertices
   PetscCall(PetscCalloc1(local->nvert, &local->owner));
-  // ghosts: owners of the shared vertices, then the cells to send
-  if (size > 1) {
-    PetscMPIInt rank, *dest;
-    PetscInt *orig, *number, *order, *position, n = 0;
-    Border border;
-    Cells own, ghost;
+  PetscCall(border_create(comm, Nvert, local, &border));
+  // the vertices of each set of ranks, in equal parts along the longest axis of their bounding box
+  for (PetscInt v = 0; v < local->nvert_cells; v++) local->owner[v] = rank;
+  if (border.n) qsort(border.vert, (size_t)border.n, sizeof(Shared), compare_shared);
+  for (PetscInt i = 0; i < border.n; i += n) {
+    Shared *s = border.vert + i;
+    PetscReal box[6];
+    int axis;
 
-    PetscCallMPI(MPI_Comm_rank(comm, &rank));
-    PetscCall(border_create(comm, Nvert, local, &border));
-    // the vertices of each set of ranks, in equal parts along the longest axis of their bounding box
-    for (PetscInt v = 0; v < local->nvert_cells; v++) local->owner[v] = rank;
-    if (border.n) qsort(border.vert, (size_t)border.n, sizeof(Shared), compare_shared);
-    for (PetscInt i = 0; i < border.n; i += n) {
-      Shared *s = border.vert + i;
-      PetscReal box[6];
-      int axis;
-
-      for (n = 1; i + n < border.n && !compare_ranks(s, s + n);) n++;
-      SbBoxClear(box);
-      for (PetscInt k = 0; k < n; k++) SbBoxAdd(box, local->vertex[s[k].vert].x);
-      axis = SbBoxLongest(box);
-      for (PetscInt k = 0; k < n; k++) s[k].along = local->vertex[s[k].vert].x[axis];
-      qsort(s, (size_t)n, sizeof(Shared), compare_shared);
-      for (PetscInt k = 0; k < n; k++)
-        local->owner[s[k].vert] = (PetscMPIInt)s[k].rank[2 * ((PetscInt64)k * s[k].n / n)];
-    }
-    PetscCall(list_copies(local, &border, all, rank, size, &n, &local->copied, &dest));
-    PetscCall(PetscFree(border.vert));
-    PetscCall(PetscFree(border.pair));
-    PetscCall(SbRouteCreate(comm, n, dest, &local->ghost));
-    own =
-      (Cells){PETSC_TRUE, local->ncell, local->nvert, local->cell, local->data, local->vertex, local->owner};
-    PetscCall(send_cells(&own, &local->ghost, local->copied, dest, &ghost));
-    PetscCall(PetscFree(dest));
-    // append the ghost cells, and those of their vertices that this rank does not have
-    n = local->nvert;
-    PetscCall(PetscMalloc4(local->nvert_cells, &orig, ghost.nvert, &number, ghost.nvert, &order, ghost.nvert,
-                           &position));
-    for (PetscInt v = 0; v < local->nvert_cells; v++) orig[v] = local->vertex[v].orig;
-    for (PetscInt v = 0; v < ghost.nvert; v++) number[v] = ghost.vertex[v].orig;
-    PetscCall(ascending(ghost.nvert, number, order));
-    PetscCall(PetscRealloc((size_t)(n + ghost.nvert) * sizeof(SbVertexData), &local->vertex));
-    PetscCall(PetscRealloc((size_t)(n + ghost.nvert) * sizeof(PetscMPIInt), &local->owner));
-    for (PetscInt i = 0; i < ghost.nvert; i++) {
-      const PetscInt v = order[i];
-
-      PetscCall(PetscFindInt(number[v], local->nvert_cells, orig, &position[v]));
-      if (position[v] >= 0) continue;
-      if (n == local->nvert_cells || local->vertex[n - 1].orig != number[v]) {
-        local->vertex[n] = ghost.vertex[v];
-        local->owner[n++] = ghost.owner[v];
-      }
-      position[v] = n - 1;
-    }
-    local->nvert = n;
-    n = local->ncell;
-    local->ncell += ghost.ncell;
-    PetscCall(PetscRealloc(4 * (size_t)local->ncell * sizeof(PetscInt), &local->cell));
-    PetscCall(PetscRealloc((size_t)local->ncell * sizeof(SbCellData), &local->data));
-    PetscCall(PetscArraycpy(local->data + n, ghost.data, ghost.ncell));
-    for (PetscInt i = 0; i < 4 * ghost.ncell; i++) local->cell[4 * (size_t)n + i] = position[ghost.cell[i]];
-    PetscCall(PetscFree4(orig, number, order, position));
-    PetscCall(cells_destroy(&ghost));
+    for (n = 1; i + n < border.n && !compare_ranks(s, s + n);) n++;
+    SbBoxClear(box);
+    for (PetscInt k = 0; k < n; k++) SbBoxAdd(box, local->vertex[s[k].vert].x);
+    axis = SbBoxLongest(box);
+    for (PetscInt k = 0; k < n; k++) s[k].along = local->vertex[s[k].vert].x[axis];
+    qsort(s, (size_t)n, sizeof(Shared), compare_shared);
+    for (PetscInt k = 0; k < n; k++)
+      local->owner[s[k].vert] = (PetscMPIInt)s[k].rank[2 * ((PetscInt64)k * s[k].n / n)];
   }
+  PetscCall(list_copies(local, &border, all, rank, size, &n, &local->copied, &dest));
+  PetscCall(PetscFree(border.vert));
+  PetscCall(PetscFree(border.pair));
+  PetscCall(SbRouteCreate(comm, n, dest, &local->ghost));
+  PetscCall(send_cells(local, PETSC_TRUE, &local->ghost, local->copied, dest, &ghost));
+  PetscCall(PetscFree(dest));
+  // append the ghost cells, and those of their vertices that this rank does not have
+  n = local->nvert;
+  PetscCall(PetscMalloc4(local->nvert_cells, &orig, ghost.nvert, &number, ghost.nvert, &order, ghost.nvert,
+                         &position));
+  for (PetscInt v = 0; v < local->nvert_cells; v++) orig[v] = local->vertex[v].orig;
+  PetscCall(ascending(ghost.nvert, sizeof(*ghost.vertex), ghost.vertex, number, order));
+  PetscCall(PetscRealloc((size_t)(n + ghost.nvert) * sizeof(SbVertexData), &local->vertex));
+  PetscCall(PetscRealloc((size_t)(n + ghost.nvert) * sizeof(PetscMPIInt), &local->owner));
+  for (PetscInt i = 0; i < ghost.nvert; i++) {
+    const PetscInt v = order[i];
+
+    PetscCall(PetscFindInt(number[v], local->nvert_cells, orig, &position[v]));
+    if (position[v] >= 0) continue;
+    if (n == local->nvert_cells || local->vertex[n - 1].orig != number[v]) {
+      local->vertex[n] = ghost.vertex[v];
+      local->owner[n++] = ghost.owner[v];
+    }
+    position[v] = n - 1;
+  }
+  local->nvert = n;
+  n = local->ncell;
+  local->ncell += ghost.ncell;
+  PetscCall(PetscRealloc(4 * (size_t)local->ncell * sizeof(PetscInt), &local->cell));
+  PetscCall(PetscRealloc((size_t)local->ncell * sizeof(SbCellData), &local->data));
+  PetscCall(PetscArraycpy(local->data + n, ghost.data, ghost.ncell));
+  for (PetscInt i = 0; i < 4 * ghost.ncell; i++) local->cell[4 * (size_t)n + i] = position[ghost.cell[i]];
+  PetscCall(PetscFree4(orig, number, order, position));
+  PetscCall(SbLocalMeshDestroy(&ghost));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,9 +1,10 @@
 /*
   faces.c - face connectivity of a tet mesh: which cells share a face.
 
-  Counting sort: the four faces of every cell go into the bucket of their lowest vertex. Each bucket, of about twenty
-  faces, is sorted by the other two vertices; adjacent equal entries are one face. No hash table, no comparison of
-  triples. O(n) in the number of cells for meshes of bounded vertex degree, O(n log n) for all others.
+  Counting sort: the four faces of every cell go into the bucket of their lowest vertex. Each bucket, of about
+  twenty faces, is sorted by the other two vertices; adjacent equal entries are one face. No hash table, no
+  comparison of triples. O(n) in the number of cells for meshes of bounded vertex degree, O(n log n) for all
+  others.
 */
 #include "mesh_impl.h"
 
@@ -19,6 +20,15 @@ static inline PetscInt face_key(PetscInt a, PetscInt b, PetscInt c, uint64_t *ke
   return lo;
 }
 
+/* The same of face `slot` = 4 cell + face. */
+static inline PetscInt slot_key(const PetscInt cell[], PetscInt slot, uint64_t *key)
+{
+  const PetscInt *v = cell + 4 * (slot / 4);
+  const int *f = SbFaceVertex[slot % 4];
+
+  return face_key(v[f[0]], v[f[1]], v[f[2]], key);
+}
+
 PetscErrorCode SbFacesCreate(PetscInt nvert, PetscInt ncell, const PetscInt cell[], SbFaces *faces)
 {
   PetscInt *next;
@@ -31,24 +41,14 @@ PetscErrorCode SbFacesCreate(PetscInt nvert, PetscInt ncell, const PetscInt cell
   // buckets of the faces by lowest vertex
   PetscCall(PetscCalloc1(nvert + 1, &faces->start));
   PetscCall(PetscMalloc1(4 * (size_t)ncell, &faces->face));
-  for (PetscInt c = 0; c < ncell; c++) {
-    const PetscInt *v = cell + 4 * c;
-
-    for (int f = 0; f < 4; f++)
-      faces->start[face_key(v[SbFaceVertex[f][0]], v[SbFaceVertex[f][1]], v[SbFaceVertex[f][2]], &key) + 1]++;
-  }
+  for (PetscInt s = 0; s < 4 * ncell; s++) faces->start[slot_key(cell, s, &key) + 1]++;
   for (PetscInt v = 0; v < nvert; v++) faces->start[v + 1] += faces->start[v];
   PetscCall(PetscMalloc1(nvert, &next));
   PetscCall(PetscArraycpy(next, faces->start, nvert));
-  for (PetscInt c = 0; c < ncell; c++) {
-    const PetscInt *v = cell + 4 * c;
+  for (PetscInt s = 0; s < 4 * ncell; s++) {
+    const PetscInt at = next[slot_key(cell, s, &key)]++;
 
-    for (int f = 0; f < 4; f++) {
-      const PetscInt lo = face_key(v[SbFaceVertex[f][0]], v[SbFaceVertex[f][1]], v[SbFaceVertex[f][2]], &key);
-
-      faces->face[next[lo]].key = key;
-      faces->face[next[lo]++].slot = 4 * c + f;
-    }
+    faces->face[at] = (SbKey){key, s};
   }
   PetscCall(PetscFree(next));
   // neighbours: sort each bucket

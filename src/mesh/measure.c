@@ -21,7 +21,7 @@ static PetscReal straight(const PetscReal x[], int dim, const PetscInt v[])
   return PetscSqrtReal(SbDot3(n, n)) / 2;
 }
 
-/* Length, area or volume of a simplex with curved edges: the integral of the Jacobian of its map by Gauss quadrature. */
+/* Length, area or volume of a simplex with curved edges: the integral of the Jacobian by Gauss quadrature. */
 static PetscReal measure(const SbImport *im, int dim, const PetscInt v[])
 {
   static const SbPointRule line = {
@@ -52,11 +52,8 @@ PetscErrorCode SbMeshFileGroup(const SbImport *im, PetscInt i, SbMeshGroup *grou
   if (!*found) PetscFunctionReturn(PETSC_SUCCESS);
   dim = (int)im->group[i].dim;
   item = &im->item[dim];
+  *group = (SbMeshGroup){.dim = dim, .tag = im->group[i].tag};
   PetscCall(PetscStrncpy(group->name, im->group[i].name, sizeof(group->name)));
-  group->dim = dim;
-  group->tag = im->group[i].tag;
-  group->n = 0;
-  group->size = 0;
   PetscCall(PetscCalloc1(im->ntags, &in));
   for (PetscInt t = 0; t < im->ntags; t++)
     for (PetscInt k = im->tags_start[t]; k < im->tags_start[t + 1]; k++)
@@ -103,7 +100,6 @@ PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshStatistics *facts)
   PetscCall(SbImportEdgesCreate(&tets, &edges));
   facts->nedge = edges.nedge;
   facts->edge[0] = PETSC_MAX_REAL;
-  facts->edge[2] = 0;
   for (PetscInt a = 0; a < edges.nvert; a++) {
     for (PetscInt e = edges.start[a]; e < edges.start[a + 1]; e++) {
       const PetscReal length = measure(im, 1, (const PetscInt[2]){a, edges.high[e]});

@@ -1,31 +1,24 @@
 /*
   memory_mesh.c - import of a mesh in memory, which is on rank 0: after re-meshing, or from a checkpoint.
 
-  Such a mesh has no groups: members of sets that are groups are stored as bits. Sets that are shapes are evaluated again on the new mesh, except the
-  tets of inclusions, which keep their material even where a new tet crosses the shape.
+  Such a mesh has no groups: members of sets that are groups are stored as bits. Sets that are shapes are
+  evaluated again on the new mesh, except the tets of inclusions, which keep their material even where a new
+  tet crosses the shape.
 */
 #include "mesh_impl.h"
 
-PetscErrorCode SbMemoryMeshCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri, SbMemoryMesh **in_memory)
+PetscErrorCode SbMemoryMeshCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri, PetscInt nedge,
+                                  SbMemoryMesh **in_memory)
 {
   SbMemoryMesh *g;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&g));
-  g->nvert = nvert;
-  g->ncell = ncell;
-  g->ntri = ntri;
+  *g = (SbMemoryMesh){.nvert = nvert, .ncell = ncell, .ntri = ntri, .nedge = nedge};
   PetscCall(PetscCalloc6(3 * (size_t)nvert, &g->x, 4 * (size_t)ncell, &g->cell, 3 * (size_t)ntri, &g->tri,
                          nvert, &g->vert_set, ntri, &g->tri_set, ncell, &g->cell_set));
-  *in_memory = g;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbMemoryMeshCurve(SbMemoryMesh *g, PetscInt nedge)
-{
-  PetscFunctionBeginUser;
-  g->nedge = nedge;
   PetscCall(PetscCalloc2(2 * (size_t)nedge, &g->edge, 3 * (size_t)nedge, &g->edge_off));
+  *in_memory = g;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -43,18 +36,16 @@ PetscErrorCode SbMemoryMeshDestroy(SbMemoryMesh **in_memory)
 
 PetscErrorCode SbMemoryMeshShare(MPI_Comm comm, SbMemoryMesh **in_memory)
 {
-  SbMemoryMesh *g = *in_memory;
-  PetscReal numbers[2] = {g ? g->mass : 0, g ? g->bound : 0};
-  PetscInt whole[2] = {g != NULL, g ? g->step : 0};
+  SbMemoryMesh head = {.nvert = -1};
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Bcast(numbers, 2, MPIU_REAL, 0, comm));
-  PetscCallMPI(MPI_Bcast(whole, 2, MPIU_INT, 0, comm));
-  if (!whole[0]) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!g) PetscCall(SbMemoryMeshCreate(0, 0, 0, in_memory));
-  (*in_memory)->mass = numbers[0];
-  (*in_memory)->bound = numbers[1];
-  (*in_memory)->step = whole[1];
+  if (*in_memory) head = **in_memory;
+  PetscCallMPI(MPI_Bcast(&head, (int)sizeof(head), MPI_BYTE, 0, comm));
+  if (head.nvert < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!*in_memory) PetscCall(SbMemoryMeshCreate(0, 0, 0, 0, in_memory));
+  (*in_memory)->mass = head.mass;
+  (*in_memory)->bound = head.bound;
+  (*in_memory)->step = head.step;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,12 +1,15 @@
 /*
-  merge.c - merges all bodies into one mesh: reads, places and checks each body, marks its sets, numbers bodies one after the other.
+  merge.c - merges all bodies into one mesh: reads, places and checks each body, marks its sets, numbers
+  bodies one after the other.
 
-  Rank 0 reads a body alone, unless its file format can be read in slabs: then each rank reads one slab (slab.c). An error on one rank is caught, sent to
-  all ranks and raised by all of them, so that no rank waits for one that has failed.
+  Rank 0 reads a body alone, unless its file format can be read in slabs: then each rank reads one slab
+  (slab.c). An error on one rank is caught, sent to all ranks and raised by all of them, so that no rank waits
+  for one that has failed.
 
   Peak memory of a run is reached while a mesh is read: arrays are freed before the next ones are allocated.
 
-  Original numbers are assigned here: bodies in the order of the scenario, vertices and cells in the order of their files.
+  Original numbers are assigned here: bodies in the order of the scenario, vertices and cells in the order of
+  their files.
 */
 #include "mesh_impl.h"
 
@@ -35,12 +38,12 @@ typedef struct {
   PetscInt orig_vert, orig_cell, vert, cell, remote;
 } Begin;
 
-static void next_body(const SbBody *body, const SbImport *im, PetscInt ncell, const SbPart *part, Begin *at)
+static void next_body(const SbBody *body, const SbImport *im, const SbPart *part, Begin *at)
 {
   at->orig_vert += body->nvert;
   at->orig_cell += body->ncell;
   at->vert += im->nvert;
-  at->cell += ncell;
+  at->cell += im->item[3].n;
   at->remote += part->nremote;
 }
 
@@ -68,7 +71,7 @@ static PetscErrorCode merge(PetscInt nbody, const SbBody body[], SbImport im[], 
     PetscCall(SbFacesDestroy(&part[b].faces));
     for (int d = 0; d < 4; d++) PetscCall(SbItemsFree(&im[b].item[d]));
     im[b].item[3].n = ncell; /* the count is used below */
-    next_body(&body[b], &im[b], ncell, &part[b], &at);
+    next_body(&body[b], &im[b], &part[b], &at);
   }
   PetscCall(PetscMalloc1(w->ncell, &w->data));
   PetscCall(PetscMalloc1(w->nvert, &w->vertex));
@@ -85,24 +88,20 @@ static PetscErrorCode merge(PetscInt nbody, const SbBody body[], SbImport im[], 
     for (PetscInt c = 0; c < im[b].item[3].n; c++) {
       SbCellData *p = &w->data[at.cell + c];
 
-      p->orig = at.orig_cell + part[b].first + c;
-      p->body = b;
-      p->set = part[b].masks.cell[c];
-      for (int f = 0; f < 4; f++) p->face[f] = part[b].masks.face[4 * c + f];
+      *p = (SbCellData){.orig = at.orig_cell + part[b].first + c, .body = b, .set = part[b].masks.cell[c]};
+      PetscCall(PetscArraycpy(p->face, part[b].masks.face + 4 * c, 4));
       if (p->set & SB_CURVED) w->curved[w->ncurved + ncurved++] = p->orig;
     }
     PetscCall(PetscArraycpy(w->edge_off + 18 * (size_t)w->ncurved, part[b].edge_off, 18 * (size_t)ncurved));
     PetscCall(PetscFree(part[b].edge_off));
     w->ncurved += ncurved;
     for (PetscInt v = 0; v < im[b].nvert; v++) {
-      SbVertexData *p = &w->vertex[at.vert + v];
+      const PetscReal *x = im[b].x + 3 * v;
 
-      p->orig = at.orig_vert + (part[b].orig ? part[b].orig[v] : v);
-      p->body = b;
-      p->set = part[b].masks.vert[v];
-      for (int i = 0; i < 3; i++) p->x[i] = im[b].x[3 * v + i];
+      w->vertex[at.vert + v] = (SbVertexData){
+        at.orig_vert + (part[b].orig ? part[b].orig[v] : v), b, part[b].masks.vert[v], {x[0], x[1], x[2]}};
     }
-    next_body(&body[b], &im[b], im[b].item[3].n, &part[b], &at);
+    next_body(&body[b], &im[b], &part[b], &at);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -181,7 +180,6 @@ PetscErrorCode SbMergedMeshCreate(MPI_Comm comm, SbReading reading, PetscInt nbo
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   PetscCallMPI(MPI_Comm_size(comm, &size));
   for (PetscInt b = 0; b < nbody; b++) {
-    slabs[b] = PETSC_FALSE;
     if (size == 1 || rank || reading == SB_READING_RANK0) continue;
     PetscCall(SbImportSlabs(&body[b], &ncell));
     slabs[b] = (PetscBool)(ncell > (reading == SB_READING_SLABS ? 0 : FEW));

@@ -1,7 +1,7 @@
 /*
-  mesh_impl.h - shared declarations of src/mesh/: import of a body, edges and shape of its cells, its sets, the merged mesh of all bodies.
-
-  A body is on rank 0, or in slabs on all ranks, until distribute.c sends the cells to their owners.
+  mesh_impl.h - shared declarations of src/mesh/: import of a body, edges and shape of its cells, its sets,
+  the merged mesh of all bodies. A body is on rank 0, or in slabs on all ranks, until distribute.c sends the
+  cells to their owners.
 */
 #pragma once
 #include <petscsf.h>
@@ -25,14 +25,13 @@ PetscErrorCode SbImportMemoryMesh(const SbBody *body, SbImport *import);
 
 /* Largest absolute coordinate, m. */
 PetscReal SbImportLargest(const SbImport *import);
-/* Swaps two vertices of inverted tets; a flat tet is an error. `largest`: largest absolute coordinate, m. */
-PetscErrorCode SbImportOrient(SbImport *import, PetscReal largest);
-/* Errors: duplicate tets, faces of three tets. */
-PetscErrorCode SbImportCheckFaces(const SbImport *import, const SbFaces *faces);
+/* Orients cells, builds faces; `largest`: coordinate, m. Errors: flat, duplicate tets, faces of three. */
+PetscErrorCode SbImportCheckCells(SbImport *import, PetscReal largest, SbFaces *faces);
 /* Raise these two errors: file numbers of the tets, number of faces with more than two tets. */
 PetscErrorCode SbImportTwice(const SbImport *import, int64_t a, int64_t b);
 PetscErrorCode SbImportOverlap(const SbImport *import, const int64_t number[3], PetscInt nshared);
-/* Edges of the boundary facets, edge[3 nboundary], each a key of two vertices or of their numbers (SbKeyOfPair); counts the edges with more than two facets. */
+/* Edges of the boundary facets, edge[3 nboundary], each a key of two vertices or of their numbers
+   (SbKeyOfPair); counts the edges with more than two facets. */
 void SbBoundaryEdges(const SbImport *import, const SbFaces *faces, const PetscInt number[],
                      PetscInt64 edge[]);
 PetscErrorCode SbCountPinched(PetscInt n, PetscInt64 edge[], PetscInt *npinched);
@@ -66,17 +65,18 @@ PetscErrorCode SbSetsBits(const SbImport *import, PetscInt nbody, const SbBody b
 PetscErrorCode SbSetsCount(MPI_Comm comm, PetscInt nvert, PetscInt ncell, const SbMasks *masks, PetscInt nset,
                            SbSet set[]);
 /*
-  curve.c: marks cells with curved edges if the body's element has edge nodes, and corrects the body's volume; other elements get a note.
-  The cells are those of all ranks of comm. Collective.
+  curve.c: marks cells with curved edges if the body's element has edge nodes, and corrects the body's volume;
+  other elements get a note. The cells are those of all ranks of comm. Collective.
 
-  Output: edge_off[][6][3] of the marked cells, NULL if there are none. Error: a cell whose Jacobian is not positive; with cell NULL such cells are counted
-  in the note of the body.
+  Output: edge_off[][6][3] of the marked cells, NULL if there are none. Error: a cell whose Jacobian is not
+  positive; with cell NULL such cells are counted in the note of the body.
 */
 PetscErrorCode SbImportCurve(MPI_Comm comm, const SbImport *import, SbBody *body, uint64_t cell[],
                              PetscReal **edge_off);
-/* Offsets of the edge nodes from the midpoints, edges 01 02 03 12 13 23 of a simplex of dim + 1 vertices; zero for straight and missing edges. Returns whether one is curved. Not collective. */
+/* Offsets of the edge nodes from the midpoints, edges 01 02 03 12 13 23 of a simplex of dim + 1 vertices;
+   zero for straight and missing edges. Returns whether one is curved. Not collective. */
 PetscBool SbImportOffsets(const SbImport *import, int dim, const PetscInt vert[], PetscReal off[18]);
-/* Distributes off[n][6][3] of the cells orig[n] (original numbers) to the ranks that have the cells. Collective. */
+/* Brings off[n][6][3] of the cells orig[n] (original numbers) to the ranks that have them. Collective. */
 PetscErrorCode SbMeshCurve(SbMesh mesh, PetscInt n, const PetscInt orig[], const PetscReal off[]);
 /* Adds the members of sets that are groups, for a mesh in memory. */
 void SbMemoryMeshMark(const SbBody *body, const SbFaces *faces, SbMasks *masks);
@@ -91,7 +91,7 @@ PetscErrorCode SbRouteReply(const SbRoute *route, size_t unit, const void *answe
 /* Rank that sent the received record i. */
 PetscMPIInt SbRouteSource(const SbRoute *route, PetscInt i);
 
-/* ------------------------------------------------------------------ merge.c, partition.c, distribute.c, order.c, number.c */
+/* --------------------------------------- merge.c, partition.c, distribute.c, order.c, number.c */
 
 /* Data sent with a vertex and with a cell. */
 typedef struct {
@@ -105,8 +105,8 @@ typedef struct {
 } SbCellData;
 
 /*
-  Merged mesh of all bodies before it is distributed: some cells on each rank, with all their vertices. A vertex of cells on several ranks is stored on
-  each of them with the same data.
+  Merged mesh of all bodies before it is distributed: some cells on each rank, with all their vertices. A
+  vertex of cells on several ranks is stored on each of them with the same data.
 */
 typedef struct {
   PetscInt Nvert, Ncell; /* global counts */
@@ -127,7 +127,7 @@ typedef enum {
   SB_READING_RANK0, /* rank 0 reads everything */
   SB_READING_SLABS  /* each rank reads a slab, if the format supports it */
 } SbReading;
-/* Reads, checks and merges all bodies; sets their "found" fields and those of the sets, equal on all ranks. Collective. */
+/* Reads, checks and merges all bodies; sets their "found" fields and those of the sets. Collective. */
 PetscErrorCode SbMergedMeshCreate(MPI_Comm comm, SbReading reading, PetscInt nbody, SbBody body[],
                                   PetscInt nset, SbSet set[], SbMergedMesh *merged);
 
@@ -141,7 +141,7 @@ typedef struct {
   PetscInt nremote;
   PetscSFNode *remote; /* [nremote] cells of other ranks; indices count from the first body of that rank */
 } SbPart;
-/* slab.c: reads and prepares body b of `body` in slabs; `before`: number of cells of earlier bodies on this rank. Collective. */
+/* slab.c: reads and prepares body b in slabs; `before`: cells of earlier bodies on this rank. Collective. */
 PetscErrorCode SbSlabPrepare(MPI_Comm comm, PetscInt before, PetscInt nbody, SbBody body[], PetscInt b,
                              PetscInt nset, SbSet set[], SbImport *import, SbPart *part);
 PetscErrorCode SbMergedMeshDestroy(SbMergedMesh *merged);
@@ -154,7 +154,7 @@ typedef enum {
 /* Owner rank of each cell: part[ncell]. Collective. */
 PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh *merged, PetscMPIInt part[]);
 
-/* Local mesh before renumbering: owned cells, then ghost cells; vertices of owned cells, then others; each sorted by original number. */
+/* Mesh before renumbering: owned cells, then ghosts; their vertices, then others; by original number. */
 typedef struct {
   PetscInt ncell_owned, ncell, nvert;
   PetscInt *cell;       /* [ncell][4] positions in vertex[] */
@@ -166,10 +166,12 @@ typedef struct {
   PetscInt nvert_cells; /* number of vertices of owned cells */
 } SbLocalMesh;
 
-/* Distributes the merged mesh and destroys it. `all`: ghosts are all cells that share a vertex with an owned cell, else those with an owned vertex. Collective. */
+PetscErrorCode SbLocalMeshDestroy(SbLocalMesh *local);
+/* Distributes the merged mesh and destroys it. `all`: ghosts are all cells that share a vertex with an
+   owned cell, else those with an owned vertex. Collective. */
 PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, SbMergedMesh *merged,
                             SbLocalMesh *local);
 /* Local numbering: fills the arrays and counts of the mesh and frees the local mesh. Collective. */
 PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *local);
-/* Reverse Cuthill-McKee order: order[i] is the vertex with the new number i. Cell vertices of -1 are ignored. */
+/* Reverse Cuthill-McKee order: order[i] is the vertex with new number i. Cell vertices of -1 are ignored. */
 PetscErrorCode SbOrderRCM(PetscInt nvert, PetscInt ncell, const PetscInt cell[], PetscInt order[]);

@@ -1,9 +1,10 @@
 /*
   number.c - local and global numbering of the distributed mesh.
 
-  Vertices: owned ones first, in reverse Cuthill-McKee order, then ghosts by global number. Global numbers count the owned vertices
-  of rank 0, then those of rank 1 and so on. Cells: owned ones first, then ghosts; each sorted by body, inclusion, curved or straight, and
-  lowest local vertex, so that a loop over cells accesses vertices nearly in order.
+  Vertices: owned ones first, in reverse Cuthill-McKee order, then ghosts by global number. Global numbers
+  count the owned vertices of rank 0, then those of rank 1 and so on. Cells: owned ones first, then ghosts;
+  each sorted by body, inclusion, curved or straight, and lowest local vertex, so that a loop over cells
+  accesses vertices nearly in order.
 */
 #include "mesh_impl.h"
 
@@ -70,7 +71,7 @@ static PetscErrorCode number_ghosts(Work *w, SbMesh mesh)
   }
   for (PetscInt v = 0; v < p->nvert_cells; v++) orig[v] = p->vertex[v].orig;
   PetscCall(SbRouteCreate(mesh->comm, n, dest, &route));
-  PetscCall(SbRouteSend(&route, sizeof(PetscInt), key, &got));
+  PetscCall(SbRouteSend(&route, sizeof(PetscInt), NULL, key, &got));
   for (PetscInt i = 0; i < route.nrecv; i++) {
     PetscInt v;
 
@@ -96,9 +97,8 @@ static PetscInt inclusion_of(SbMesh mesh, const SbCellData *cell)
 {
   const SbBody *body = &mesh->body[cell->body];
 
-  for (PetscInt k = 0; k < body->ninclusion; k++) {
+  for (PetscInt k = 0; k < body->ninclusion; k++)
     if (cell->set & SB_SET_BIT(body->inclusion[k].set)) return k + 1;
-  }
   return 0;
 }
 
@@ -106,12 +106,12 @@ static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
 {
   const SbLocalMesh *p = w->p;
   const PetscInt nghost = p->ncell - p->ncell_owned;
-  PetscInt *order, *key, *some, *at, *start, *number, *sent, *got, *leaf;
+  PetscInt *order, *key, *some, *at, *start, *number, *got, *leaf;
   PetscSFNode *remote;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(mesh->ncell, &order));
   // order of the cells: two bucket sorts, by lowest vertex, then by body, inclusion and curved or straight
+  PetscCall(PetscMalloc1(p->ncell, &order));
   PetscCall(PetscMalloc1(p->ncell, &key));
   for (PetscInt c = 0; c < p->ncell; c++) {
     const PetscInt *v = p->cell + 4 * (size_t)c;
@@ -135,24 +135,22 @@ static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
   PetscCall(PetscFree(start));
   // star forest from owned cells to their ghost copies
   if (w->size > 1) {
-    PetscCall(PetscMalloc2(p->ncell, &number, p->ghost.nsend, &sent));
+    PetscCall(PetscMalloc1(p->ncell, &number));
     for (PetscInt c = 0; c < p->ncell; c++) number[order[c]] = c;
-    for (PetscInt i = 0; i < p->ghost.nsend; i++) sent[i] = number[p->copied[i]];
-    PetscCall(SbRouteSend(&p->ghost, sizeof(PetscInt), sent, &got));
+    PetscCall(SbRouteSend(&p->ghost, sizeof(PetscInt), p->copied, number, &got));
     PetscCall(PetscMalloc1(nghost, &leaf));
     PetscCall(PetscMalloc1(nghost, &remote));
     for (PetscInt g = 0; g < nghost; g++) {
       const PetscInt came = order[p->ncell_owned + g] - p->ncell_owned; /* position as received */
 
       leaf[g] = p->ncell_owned + g;
-      remote[g].rank = SbRouteSource(&p->ghost, came);
-      remote[g].index = got[came];
+      remote[g] = (PetscSFNode){SbRouteSource(&p->ghost, came), got[came]};
     }
     PetscCall(PetscSFCreate(mesh->comm, &mesh->cell_sf));
     PetscCall(PetscSFSetGraph(mesh->cell_sf, p->ncell_owned, nghost, leaf, PETSC_OWN_POINTER, remote,
                               PETSC_OWN_POINTER));
     PetscCall(PetscFree(got));
-    PetscCall(PetscFree2(number, sent));
+    PetscCall(PetscFree(number));
   }
   PetscCall(PetscMalloc6(4 * (size_t)mesh->ncell, &mesh->cell, mesh->ncell, &mesh->cell_orig, mesh->ncell,
                          &mesh->cell_body, mesh->ncell, &mesh->cell_material, mesh->ncell, &mesh->cell_set,
@@ -163,9 +161,9 @@ static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
 
     mesh->cell_orig[c] = data->orig;
     mesh->cell_body[c] = data->body;
+    mesh->cell_set[c] = data->set;
     mesh->cell_material[c] =
       inclusion ? mesh->body[data->body].inclusion[inclusion - 1].material : data->body;
-    mesh->cell_set[c] = data->set;
     for (int a = 0; a < 4; a++) {
       mesh->cell[4 * (size_t)c + a] = w->local[p->cell[4 * (size_t)order[c] + a]];
       mesh->face_set[4 * (size_t)c + a] = data->face[a];
@@ -201,10 +199,6 @@ PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *local)
   PetscCall(PetscFree(local->vertex));
   PetscCall(fill_cells(&w, mesh));
   PetscCall(PetscFree2(w.local, w.global));
-  PetscCall(PetscFree(local->cell));
-  PetscCall(PetscFree(local->data));
-  PetscCall(PetscFree(local->owner));
-  PetscCall(PetscFree(local->copied));
-  if (w.size > 1) PetscCall(SbRouteDestroy(&local->ghost));
+  PetscCall(SbLocalMeshDestroy(local));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,10 +1,11 @@
 /*
-  order.c - reverse Cuthill-McKee order of the vertices of this rank (Cuthill and McKee, 1969; George and Liu, 1979).
+  order.c - reverse Cuthill-McKee order of the vertices of this rank (Cuthill and McKee, 1969; George and Liu,
+  1979).
 
-  Two vertices are adjacent when a cell has both: the search visits the cells of a vertex, each cell once, and then
-  their vertices; the vertex graph is never formed. Each connected component starts at a peripheral vertex, which one search
-  from an arbitrary vertex finds (further searches did not reduce the bandwidth of real meshes). Components are numbered one after
-  the other, in the order of their first vertex.
+  Two vertices are adjacent when a cell has both: the search visits the cells of a vertex, each cell once, and
+  then their vertices; the vertex graph is never formed. Each connected component starts at a peripheral
+  vertex, which one search from an arbitrary vertex finds (further searches did not reduce the bandwidth of
+  real meshes). Components are numbered one after the other, in the order of their first vertex.
 */
 #include "mesh_impl.h"
 
@@ -22,7 +23,7 @@ static inline PetscInt degree(const Graph *g, PetscInt v)
   return g->start[v + 1] - g->start[v];
 }
 
-/* Breadth-first search from a vertex: returns the number of vertices reached; `last`: position of the first vertex of the last level. */
+/* Breadth-first search from a vertex: number of those reached; `last`: where the last level begins. */
 static PetscInt search(Graph *g, PetscInt root, PetscInt queue[], PetscInt *last)
 {
   PetscInt n = 1, level_end = 1, begin;
@@ -69,12 +70,11 @@ PetscErrorCode SbOrderRCM(PetscInt nvert, PetscInt ncell, const PetscInt cell[],
     PetscInt n, last, root;
 
     if (g.vert_mark[v]) continue; /* in an earlier component */
-    // Cuthill-McKee order of the component of v, from a vertex of lowest degree in the last level; then reversed
+    // order of the component of v, from a vertex of lowest degree in the last level; then reversed
     n = search(&g, v, order + done, &last);
     root = order[done + last];
-    for (PetscInt k = last; k < n; k++) {
+    for (PetscInt k = last; k < n; k++)
       if (degree(&g, order[done + k]) < degree(&g, root)) root = order[done + k];
-    }
     n = search(&g, root, order + done, &last);
     for (PetscInt i = 0; i < n / 2; i++) {
       const PetscInt keep = order[done + i];

@@ -1,13 +1,16 @@
 /*
   partition.c - mesh partitioning: the owner rank of each tet.
 
-  METIS partitions the dual graph of the tets on rank 0: few faces are cut, but the whole graph is on one rank while the others wait. Recursive coordinate bisection
-  runs in parallel: it halves the set of tet centres at the median along the longest axis of their bounding box, recursively. Medians are those of a sample that
-  all ranks have, selected by a hash of the original numbers, hence independent of the number of ranks. Then each tet at an interface moves to the part
-  of most of its neighbours. Bisection cuts 1.0 (bars) to 1.8 times (1,240,000 tets of a bunny) as many faces as METIS, in a tenth of the time.
+  METIS partitions the dual graph of the tets on rank 0: few faces are cut, but the whole graph is on one rank
+  while the others wait. Recursive coordinate bisection runs in parallel: it halves the set of tet centres at
+  the median along the longest axis of their bounding box, recursively. Medians are those of a sample that all
+  ranks have, selected by a hash of the original numbers, hence independent of the number of ranks. Then each
+  tet at an interface moves to the part of most of its neighbours. Bisection cuts 1.0 (bars) to 1.8 times
+  (1,240,000 tets of a bunny) as many faces as METIS, in a tenth of the time.
 
-  References: Karypis and Kumar, "A fast and high quality multilevel scheme for partitioning irregular graphs", 1998; Berger and Bokhari, "A partitioning
-  strategy for nonuniform problems on multiprocessors", 1987.
+  References: Karypis and Kumar, "A fast and high quality multilevel scheme for partitioning irregular
+  graphs", 1998; Berger and Bokhari, "A partitioning strategy for nonuniform problems on multiprocessors",
+  1987.
 */
 #include <metis.h>
 #include "mesh_impl.h"
@@ -61,7 +64,7 @@ static PetscErrorCode split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3],
     if (along[i] > cut) next = PetscMin(next, along[i]);
   if (!(along[0] < cut)) cut = next;
   PetscCall(PetscFree(along));
-  // partition the samples: below the cut first; equality counts as above, as for tets, independent of the order of samples
+  // samples below the cut first; equality counts as above, as for tets, independent of the order of samples
   for (PetscInt i = 0; i < n; i++) {
     if (x[i][axis] >= cut) continue;
     for (int d = 0; d < 3; d++) {
@@ -81,11 +84,11 @@ static PetscErrorCode split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3],
 
 /* ------------------------------------------------------------------ METIS */
 
-/* Gathers the graph on rank 0, ordered by original numbers, so that the partition is independent of the distribution of cells. */
-static PetscErrorCode cut_graph(MPI_Comm comm, const SbMergedMesh *w, PetscSF sf, PetscInt part[])
+/* Gathers the graph on rank 0, by original numbers: the result is alike for any distribution of cells. */
+static PetscErrorCode cut_graph(MPI_Comm comm, const SbMergedMesh *w, PetscSF sf, PetscMPIInt part[])
 {
-  PetscInt *orig, *remote, *across, *all_orig, *all_across, *all_part;
-  PetscMPIInt rank, size, *dest;
+  PetscInt *orig, *remote, *across, *all_orig, *all_across;
+  PetscMPIInt rank, size, *dest, *all_part;
   SbRoute route;
 
   PetscFunctionBeginUser;
@@ -105,8 +108,8 @@ static PetscErrorCode cut_graph(MPI_Comm comm, const SbMergedMesh *w, PetscSF sf
     across[s] = n < 0 ? -1 : n < w->ncell ? orig[n] : remote[n - w->ncell];
   }
   PetscCall(SbRouteCreate(comm, w->ncell, dest, &route));
-  PetscCall(SbRouteSend(&route, sizeof(PetscInt), orig, &all_orig));
-  PetscCall(SbRouteSend(&route, 4 * sizeof(PetscInt), across, &all_across));
+  PetscCall(SbRouteSend(&route, sizeof(PetscInt), NULL, orig, &all_orig));
+  PetscCall(SbRouteSend(&route, 4 * sizeof(PetscInt), NULL, across, &all_across));
   PetscCall(PetscMalloc1(route.nrecv, &all_part));
   if (!rank) {
     idx_t n = (idx_t)w->Ncell, ncon = 1, np = (idx_t)size, cut, options[METIS_NOPTIONS], k = 0;
@@ -130,12 +133,12 @@ static PetscErrorCode cut_graph(MPI_Comm comm, const SbMergedMesh *w, PetscSF sf
     options[METIS_OPTION_UFACTOR] = 10; /* the largest part is at most 1 % above the mean */
     status =
       METIS_PartGraphKway(&n, &ncon, start, adj, NULL, NULL, NULL, &np, NULL, NULL, options, &cut, result);
-    for (PetscInt c = 0; c < w->Ncell; c++) all_part[c] = (PetscInt)result[all_orig[c]];
+    for (PetscInt c = 0; c < w->Ncell; c++) all_part[c] = (PetscMPIInt)result[all_orig[c]];
     PetscCall(PetscFree4(start, adj, result, position));
     PetscCheck(status == METIS_OK, PETSC_COMM_SELF, PETSC_ERR_LIB, "METIS_PartGraphKway() failed with %d",
                status);
   }
-  PetscCall(SbRouteReply(&route, sizeof(PetscInt), all_part, part));
+  PetscCall(SbRouteReply(&route, sizeof(PetscMPIInt), all_part, part));
   PetscCall(PetscFree(all_orig));
   PetscCall(PetscFree(all_across));
   PetscCall(PetscFree(all_part));
@@ -148,10 +151,9 @@ static PetscErrorCode cut_graph(MPI_Comm comm, const SbMergedMesh *w, PetscSF sf
 
 PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh *w, PetscMPIInt part[])
 {
-  PetscInt *to;
   PetscMPIInt size;
   PetscSF sf;
-  Tree tree;
+  Tree tree = {.nnode = 1};
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(comm, &size));
@@ -162,19 +164,17 @@ PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh
   }
   PetscCall(PetscSFCreate(comm, &sf));
   PetscCall(PetscSFSetGraph(sf, w->ncell, w->nremote, NULL, PETSC_USE_POINTER, w->remote, PETSC_USE_POINTER));
-  PetscCall(PetscMalloc1(w->ncell, &to));
   if (type == SB_PARTITION_METIS || (type == SB_PARTITION_AUTO && w->Ncell <= MOST)) {
-    PetscCall(cut_graph(comm, w, sf, to));
+    PetscCall(cut_graph(comm, w, sf, part));
   } else {
-    PetscInt64 wanted;
-    uint64_t bound;
-    PetscReal(*mine)[3];
-    PetscReal(*all)[3];
-    PetscInt n = 0, total, *now, *across;
+    const PetscInt64 wanted = PetscMax((PetscInt64)SAMPLE * size, SAMPLES);
+    const uint64_t bound =
+      wanted >= w->Ncell ? UINT64_MAX : UINT64_MAX / (uint64_t)w->Ncell * (uint64_t)wanted;
+    PetscReal(*mine)[3], (*all)[3];
+    PetscInt n = 0, total;
+    PetscMPIInt *now, *across;
 
     // bisection tree with a leaf for each rank, from a sample of the tets
-    wanted = PetscMax((PetscInt64)SAMPLE * size, SAMPLES);
-    bound = wanted >= w->Ncell ? UINT64_MAX : UINT64_MAX / (uint64_t)w->Ncell * (uint64_t)wanted;
     for (PetscInt c = 0; c < w->ncell; c++) n += SbMix(w->data[c].orig) <= bound;
     PetscCall(PetscMalloc1(n, &mine));
     n = 0;
@@ -183,8 +183,6 @@ PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh
     PetscCall(SbAllgatherv(comm, MPIU_REAL, 3 * n, mine, &total, &all, NULL));
     PetscCall(PetscFree(mine));
     PetscCall(PetscMalloc1(2 * (size_t)size, &tree.node));
-    tree.nnode = 1;
-    tree.nleaf = 0;
     PetscCall(split(&tree, 0, total / 3, all, size));
     PetscCall(PetscFree(all));
     // leaf that contains each cell centre
@@ -194,17 +192,18 @@ PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh
 
       centre(w, c, x);
       while (node->axis >= 0) node = tree.node + node->next + (x[node->axis] >= node->cut);
-      to[c] = node->next;
+      part[c] = (PetscMPIInt)node->next;
     }
     PetscCall(PetscFree(tree.node));
     // move a cell to the part of most of its neighbours, if that cuts fewer faces
     PetscCall(PetscMalloc2(w->ncell, &now, w->nremote, &across));
     for (int sweep = 0; sweep < SWEEPS; sweep++) {
-      PetscCall(PetscSFBcastBegin(sf, MPIU_INT, to, across, MPI_REPLACE));
-      PetscCall(PetscSFBcastEnd(sf, MPIU_INT, to, across, MPI_REPLACE));
-      PetscCall(PetscArraycpy(now, to, w->ncell));
+      PetscCall(PetscSFBcastBegin(sf, MPI_INT, part, across, MPI_REPLACE));
+      PetscCall(PetscSFBcastEnd(sf, MPI_INT, part, across, MPI_REPLACE));
+      PetscCall(PetscArraycpy(now, part, w->ncell));
       for (PetscInt c = 0; c < w->ncell; c++) {
-        PetscInt other[4], nother = 0, own = 0;
+        PetscMPIInt other[4];
+        PetscInt nother = 0, own = 0;
 
         for (PetscInt s = 4 * c; s < 4 * c + 4; s++) {
           const PetscInt k = w->neighbour[s];
@@ -217,14 +216,12 @@ PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh
           PetscInt there = 0;
 
           for (PetscInt j = 0; j < nother; j++) there += other[j] == other[i];
-          if (there > own + 1) to[c] = other[i];
+          if (there > own + 1) part[c] = other[i];
         }
       }
     }
     PetscCall(PetscFree2(now, across));
   }
-  for (PetscInt c = 0; c < w->ncell; c++) part[c] = (PetscMPIInt)to[c];
-  PetscCall(PetscFree(to));
   PetscCall(PetscSFDestroy(&sf));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,10 +1,10 @@
 /*
   quality.c - size and shape quality of a body's mesh.
 
-  With outward area vectors n_i of the faces opposite vertex i, the dihedral angle at the edge that faces i and j share is
-  acos(-n_i . n_j / (|n_i| |n_j|)). The radius ratio is R / (3 r), 1 for the regular tet: r = 3 V / sum |n_i| and
-  R = | |a|^2 b x c + |b|^2 c x a + |c|^2 a x b | / (12 V) with the edges a, b, c from vertex 0 (Shewchuk, "What is a good
-  linear finite element?", 2002).
+  With outward area vectors n_i of the faces opposite vertex i, the dihedral angle at the edge that faces i
+  and j share is acos(-n_i . n_j / (|n_i| |n_j|)). The radius ratio is R / (3 r), 1 for the regular tet: r = 3
+  V / sum |n_i| and R = | |a|^2 b x c + |b|^2 c x a + |c|^2 a x b | / (12 V) with the edges a, b, c from
+  vertex 0 (Shewchuk, "What is a good linear finite element?", 2002).
 */
 #include "sbkernel.h"
 #include "mesh_impl.h"
@@ -14,11 +14,9 @@ void SbTetShape(const PetscReal x[], const PetscInt v[4], PetscReal *V, PetscRea
   PetscReal a[3], b[3], c[3], n[4][3], area[4], to_centre[3], sum = 0, det;
   int edge = 0;
 
-  for (int i = 0; i < 3; i++) {
-    a[i] = x[3 * v[1] + i] - x[3 * v[0] + i];
-    b[i] = x[3 * v[2] + i] - x[3 * v[0] + i];
-    c[i] = x[3 * v[3] + i] - x[3 * v[0] + i];
-  }
+  SbSubtract(x + 3 * v[1], x + 3 * v[0], a);
+  SbSubtract(x + 3 * v[2], x + 3 * v[0], b);
+  SbSubtract(x + 3 * v[3], x + 3 * v[0], c);
   /* twice the area vectors; their sum is zero */
   SbCross(c, b, n[1]);
   SbCross(a, c, n[2]);
@@ -29,21 +27,19 @@ void SbTetShape(const PetscReal x[], const PetscInt v[4], PetscReal *V, PetscRea
     area[i] = PetscSqrtReal(SbDot3(n[i], n[i]));
     sum += area[i];
   }
-  for (int i = 0; i < 4; i++) {
+  for (int i = 0; i < 4; i++)
     for (int j = 0; j < i; j++) cosine[edge++] = -SbDot3(n[i], n[j]) / (area[i] * area[j]);
-  }
   for (int i = 0; i < 3; i++)
     to_centre[i] = SbDot3(a, a) * n[1][i] + SbDot3(b, b) * n[2][i] + SbDot3(c, c) * n[3][i];
   *V = det / 6;
   *ratio = PetscSqrtReal(SbDot3(to_centre, to_centre)) / (2 * det) * sum / (3 * det);
 }
 
-PetscReal SbTetQuality(const PetscReal x[4][3])
+PetscReal SbTetQuality(const PetscReal x[], const PetscInt v[4])
 {
-  static const PetscInt corner[4] = {0, 1, 2, 3};
   PetscReal V, cosine[6], ratio;
 
-  SbTetShape(&x[0][0], corner, &V, cosine, &ratio);
+  SbTetShape(x, v, &V, cosine, &ratio);
   if (!(PetscAbsReal(V) > 0) || PetscIsInfOrNanReal(ratio)) return 0;
   return (V > 0 ? 1 : -1) / ratio;
 }

@@ -1,55 +1,64 @@
 /*
   refine.c - regular refinement: each edge is bisected, each tet is divided into eight.
 
-  Four children are at the corners. The remaining octahedron is cut into four tets around the shortest of its three diagonals,
-  which keeps the shape quality of repeated refinement bounded (Zhang, "Successive subdivisions of tetrahedra and multigrid methods on
-  tetrahedral meshes", 1995). Diagonals are inside a tet, so the refined mesh is conforming for any choice. Children have the
-  orientation of their parent.
+  Four children are at the corners. The remaining octahedron is cut into four tets around the shortest of its
+  three diagonals, which keeps the shape quality of repeated refinement bounded (Zhang, "Successive
+  subdivisions of tetrahedra and multigrid methods on tetrahedral meshes", 1995). Diagonals are inside a tet,
+  so the refined mesh is conforming for any choice. Children have the orientation of their parent.
 
-  New vertices on the boundary are at the middle of straight edges; the original geometry is unknown. A curved tet keeps its shape: the P2 map, restricted to a child, has
-  the following offsets of edge nodes from the midpoint: o/4 on both halves of an edge with offset o; o/4 of the opposite edge of the triangle, on an edge between two midpoints; on
-  the diagonal a quarter of the sum of the offsets of the four edges that it does not connect, less a quarter of those of the two edges that it connects.
+  New vertices on the boundary are at the middle of straight edges; the original geometry is unknown. A curved
+  tet keeps its shape: the P2 map, restricted to a child, has the following offsets of edge nodes from the
+  midpoint: o/4 on both halves of an edge with offset o; o/4 of the opposite edge of the triangle, on an edge
+  between two midpoints; on the diagonal a quarter of the sum of the offsets of the four edges that it does
+  not connect, less a quarter of those of the two edges that it connects.
 */
 #include "sbkernel.h"
 #include "mesh_impl.h"
 
-enum { M01, M02, M03, M12, M13, M23 }; /* midpoints of the edges of a tet, in the order of SbTetEdge */
+/* Nodes of an item: corners 0 to 3, then the midpoints of its edges in the order of SbTetEdge. */
+enum { M01 = 4, M02, M03, M12, M13, M23, NODES };
 
-/* Three diagonals of the octahedron, and the four midpoints around each, such that (from, to, ring[i], ring[i + 1]) is positively oriented. */
-static const struct {
-  int from, to, ring[4];
-} diagonals[3] = {
-  {M01, M23, {M02, M03, M13, M12}},
-  {M02, M13, {M03, M01, M12, M23}},
-  {M03, M12, {M01, M02, M23, M13}},
+/* Children at the corners of a line, a triangle (then the one in the middle) and a tet. */
+static const int ncorner[4] = {0, 4, 12, 16};
+static const int corners[4][16] = {
+  {0},
+  {0, M01, M01, 1},
+  {0, M01, M02, M01, 1, M12, M02, M12, 2, M01, M12, M02},
+  {0, M01, M02, M03, M01, 1, M12, M13, M02, M12, 2, M23, M03, M13, M23, 3},
 };
 
-/* Vertices of the eight children of the tet v with the edge midpoints m. */
-static void split_tet(const PetscReal x[], const PetscInt v[4], const PetscInt m[6], PetscInt child[8][4])
+/* Three diagonals of the octahedron: their ends, and the four midpoints around each and the first one
+   again, such that (from, to, ring[i], ring[i + 1]) is positively oriented. */
+static const int diagonals[3][7] = {
+  {M01, M23, M02, M03, M13, M12, M02},
+  {M02, M13, M03, M01, M12, M23, M03},
+  {M03, M12, M01, M02, M23, M13, M01},
+};
+
+/* Vertices of the children of one item, [2^dim][dim + 1]. */
+static void split(const SbImport *im, int dim, const PetscInt v[], const SbImportEdges *edges,
+                  PetscInt child[])
 {
-  const PetscInt corner[4][4] = {{v[0], m[M01], m[M02], m[M03]},
-                                 {m[M01], v[1], m[M12], m[M13]},
-                                 {m[M02], m[M12], v[2], m[M23]},
-                                 {m[M03], m[M13], m[M23], v[3]}};
+  PetscInt node[NODES];
   PetscReal shortest = PETSC_MAX_REAL;
-  int best = 0;
+  const int *best = diagonals[0];
 
-  memcpy(child, corner, sizeof(corner));
+  for (int k = 0; k <= dim; k++) node[k] = v[k];
+  for (int e = 0; e < 6; e++)
+    if (SbTetEdge[e][1] <= dim)
+      node[M01 + e] = edges->nvert + SbImportEdgesFind(edges, v[SbTetEdge[e][0]], v[SbTetEdge[e][1]]);
+  for (int i = 0; i < ncorner[dim]; i++) child[i] = node[corners[dim][i]];
+  if (dim < 3) return;
   for (int d = 0; d < 3; d++) {
-    PetscReal r[3], length;
+    PetscReal r[3];
 
-    SbSubtract(x + 3 * m[diagonals[d].from], x + 3 * m[diagonals[d].to], r);
-    length = SbDot3(r, r);
-
+    SbSubtract(im->x + 3 * node[diagonals[d][0]], im->x + 3 * node[diagonals[d][1]], r);
     /* tolerance: among equal diagonals the first one is taken, independent of rounding */
-    if (length < shortest * (1 - 1e-12)) shortest = length, best = d;
+    if (!(SbDot3(r, r) < shortest * (1 - 1e-12))) continue;
+    shortest = SbDot3(r, r);
+    best = diagonals[d];
   }
-  for (int k = 0; k < 4; k++) {
-    child[4 + k][0] = m[diagonals[best].from];
-    child[4 + k][1] = m[diagonals[best].to];
-    child[4 + k][2] = m[diagonals[best].ring[k]];
-    child[4 + k][3] = m[diagonals[best].ring[(k + 1) % 4]];
-  }
+  for (int i = 0; i < 16; i++) child[16 + i] = node[best[i % 4 < 2 ? i % 4 : i / 4 + i % 4]];
 }
 
 /* Adds a curved edge, if its offset is not zero. */
@@ -63,7 +72,7 @@ static PetscErrorCode add_middle(SbImport *im, PetscInt a, PetscInt b, const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Curved edges of the children of a tet; off[][3]: offsets of the parent edges, indexed by midpoint vertex - nvert. */
+/* Curved edges of the children of a tet; off[][3]: offsets of parent edges, by midpoint vertex - nvert. */
 static PetscErrorCode curve_children(SbImport *im, const PetscInt v[4], PetscInt nvert, const PetscReal off[],
                                      const PetscInt child[8][4])
 {
@@ -92,31 +101,6 @@ static PetscErrorCode curve_children(SbImport *im, const PetscInt v[4], PetscInt
           PetscCall(add_middle(im, m[edge_at[i][j]], m[edge_at[i][k]], quarter[edge_at[j][k]]));
   PetscCall(add_middle(im, from, to, inner));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Vertices of the children of one item, [2^dim][dim + 1]. */
-static void split(const SbImport *im, int dim, const PetscInt v[], const SbImportEdges *edges,
-                  PetscInt child[])
-{
-  PetscInt m[6];
-
-  for (int e = 0; e < 6; e++) {
-    const int *p = SbTetEdge[e];
-
-    if (p[1] <= dim) m[e] = edges->nvert + SbImportEdgesFind(edges, v[p[0]], v[p[1]]);
-  }
-  if (dim == 3) {
-    split_tet(im->x, v, m, (PetscInt(*)[4])child);
-  } else if (dim == 2) {
-    const PetscInt four[12] = {v[0],   m[M01], m[M02], m[M01], v[1],   m[M12],
-                               m[M02], m[M12], v[2],   m[M01], m[M12], m[M02]};
-
-    memcpy(child, four, sizeof(four));
-  } else {
-    const PetscInt two[4] = {v[0], m[M01], m[M01], v[1]};
-
-    memcpy(child, two, sizeof(two));
-  }
 }
 
 PetscErrorCode SbMeshFileRefine(SbImport *im)
@@ -152,7 +136,7 @@ PetscErrorCode SbMeshFileRefine(SbImport *im)
     SbItems parent = im->item[d], *item = &im->item[d];
     const PetscInt nchild = 1 << d;
 
-    PetscCall(PetscMemzero(item, sizeof(*item)));
+    *item = (SbItems){0};
     PetscCall(SbImportSetItems(im, d, nchild * parent.n));
     for (PetscInt i = 0; i < parent.n; i++) {
       const PetscInt *v = parent.vert + (size_t)(d + 1) * (size_t)i;

@@ -1,11 +1,13 @@
 /*
-  repair.c - repair of a mesh file by merging vertices, dropping and reorienting tets, until a run accepts it, if possible.
+  repair.c - repair of a mesh file by merging vertices, dropping and reorienting tets, until a run accepts it,
+  if possible.
 
-  In this order: vertices within a tolerance are merged into the first of them; tets that then use a vertex twice are dropped (they have collapsed and leave
-  no gap); duplicate tets are dropped, and their groups go to the first one; flat tets are dropped and counted, and each one with a neighbour
-  at every face leaves a slit of zero width, counted too; inverted tets are reoriented; group triangles and lines that have
-  collapsed, are duplicates or are no face of a tet are dropped, and so are unused vertices. Overlapping tets cannot be repaired: the check of a run
-  reports them.
+  In this order: vertices within a tolerance are merged into the first of them; tets that then use a vertex
+  twice are dropped (they have collapsed and leave no gap); duplicate tets are dropped, and their groups go to
+  the first one; flat tets are dropped and counted, and each one with a neighbour at every face leaves a slit
+  of zero width, counted too; inverted tets are reoriented; group triangles and lines that have collapsed, are
+  duplicates or are no face of a tet are dropped, and so are unused vertices. Overlapping tets cannot be
+  repaired: the check of a run reports them.
 */
 #include "sbgeometry.h"
 #include "mesh_impl.h"
@@ -42,46 +44,32 @@ static PetscErrorCode weld(SbImport *im, PetscReal tolerance, SbRepair *done)
 
 /* ------------------------------------------------------------------ single items */
 
-/* Removes the marked items and counts them. */
-static void drop_marked(SbItems *item, int dim, const PetscBool drop[], PetscInt *ndropped)
+static void drop_collapsed(SbImport *im, int dim, PetscInt *ndropped)
 {
+  SbItems *item = &im->item[dim];
   PetscInt kept = 0;
 
   for (PetscInt i = 0; i < item->n; i++) {
-    if (drop[i]) continue;
-    SbItemsMove(item, dim, kept++, i);
+    const PetscInt *v = item->vert + (dim + 1) * (size_t)i;
+    PetscBool twice = PETSC_FALSE;
+
+    for (int a = 1; a <= dim; a++)
+      for (int b = 0; b < a; b++) twice = (PetscBool)(twice || v[a] == v[b]);
+    if (!twice) SbItemsMove(item, dim, kept++, i);
   }
   *ndropped += item->n - kept;
   item->n = kept;
 }
 
-static PetscErrorCode drop_collapsed(SbImport *im, int dim, PetscInt *ndropped)
-{
-  SbItems *item = &im->item[dim];
-  PetscBool *drop;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(item->n, &drop));
-  for (PetscInt i = 0; i < item->n; i++) {
-    const PetscInt *v = item->vert + (dim + 1) * (size_t)i;
-
-    for (int a = 1; a <= dim; a++)
-      for (int b = 0; b < a; b++) drop[i] = (PetscBool)(drop[i] || v[a] == v[b]);
-  }
-  drop_marked(item, dim, drop, ndropped);
-  PetscCall(PetscFree(drop));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* ------------------------------------------------------------------ flat tets, and triangles that are no face */
+/* ------------------------------------------------------------------ the whole mesh */
 
 PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *done)
 {
   SbFaces faces;
   PetscErrorCode ierr;
-  PetscInt turned, nitem = im->item[0].n + im->item[1].n + im->item[2].n, ndropped = 0, slots[2];
-  PetscBool *drop, any = PETSC_FALSE;
-  SbItems *item = &im->item[3];
+  PetscInt turned, nitem = im->item[0].n + im->item[1].n + im->item[2].n, ndropped = 0, slots[2], kept = 0;
+  PetscBool *flat;
+  SbItems *item = &im->item[3], *tri = &im->item[2];
   const PetscReal largest = SbImportLargest(im);
   PetscReal det, off;
 
@@ -89,29 +77,30 @@ PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *don
   PetscCall(PetscMemzero(done, sizeof(*done)));
   PetscCall(PetscMemzero(&faces, sizeof(faces)));
   PetscCall(weld(im, tolerance, done));
-  PetscCall(drop_collapsed(im, 3, &done->ncollapsed));
+  drop_collapsed(im, 3, &done->ncollapsed);
   PetscCall(SbImportJoinRepeats(im, 3, PETSC_TRUE, &done->nduplicate));
   for (int d = 0; d < 3; d++) {
-    PetscCall(drop_collapsed(im, d, &ndropped));
+    drop_collapsed(im, d, &ndropped);
     PetscCall(SbImportJoinRepeats(im, d, PETSC_TRUE, &ndropped));
   }
   // flat tets; one with a neighbour at every face leaves a slit
-  PetscCall(PetscCalloc1(item->n, &drop));
+  PetscCall(PetscMalloc1(item->n, &flat));
   for (PetscInt c = 0; c < item->n; c++) {
-    drop[c] = SbTetFlat(im->x, item->vert + 4 * c, largest, &det);
-    any = (PetscBool)(any || drop[c]);
+    flat[c] = SbTetFlat(im->x, item->vert + 4 * c, largest, &det);
+    done->nflat += flat[c];
   }
-  if (any) {
+  if (done->nflat) {
     PetscCall(SbFacesCreate(im->nvert, item->n, item->vert, &faces));
     for (PetscInt c = 0; c < item->n; c++) {
       const PetscInt *n = faces.neighbour + 4 * c;
 
-      done->nslit += drop[c] && n[0] >= 0 && n[1] >= 0 && n[2] >= 0 && n[3] >= 0;
+      done->nslit += flat[c] && n[0] >= 0 && n[1] >= 0 && n[2] >= 0 && n[3] >= 0;
+      if (!flat[c]) SbItemsMove(item, 3, kept++, c);
     }
+    item->n = kept;
     PetscCall(SbFacesDestroy(&faces));
-    drop_marked(item, 3, drop, &done->nflat);
   }
-  PetscCall(PetscFree(drop));
+  PetscCall(PetscFree(flat));
   PetscCheck(im->item[3].n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: nothing is left: every tetrahedron is flat or uses a vertex twice; check -merge_tolerance "
              "and the scale of the file",
@@ -121,11 +110,10 @@ PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *don
   done->nturned = im->nreoriented - turned;
   done->nunused = im->nunused - done->nwelded;
   // triangles that are not a face of any tet
-  PetscCall(PetscCalloc1(im->item[2].n, &drop));
-  for (PetscInt i = 0; i < im->item[2].n && !ierr; i++)
-    drop[i] = (PetscBool)!SbFacesFind(&faces, im->item[2].vert + 3 * i, slots);
-  if (!ierr) drop_marked(&im->item[2], 2, drop, &ndropped);
-  PetscCall(PetscFree(drop));
+  kept = 0;
+  for (PetscInt i = 0; i < tri->n && !ierr; i++)
+    if (SbFacesFind(&faces, tri->vert + 3 * i, slots)) SbItemsMove(tri, 2, kept++, i);
+  if (!ierr) tri->n = kept;
   PetscCall(SbFacesDestroy(&faces));
   PetscCall(ierr);
   PetscCall(SbImportMiddles(im, NULL, &off)); /* curved edges of the remaining tets */

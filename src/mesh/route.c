@@ -1,47 +1,36 @@
 /*
-  route.c - sparse communication of fixed-size records: one all-to-all exchange of counts, then one of the records; replies return by the reverse route.
-
-  Records to the own rank take the same route, so that callers need no special case.
+  route.c - sparse communication of fixed-size records: one all-to-all exchange of counts, then one of the
+  records; replies return by the reverse route. Records to the own rank take the same route, so that callers
+  need no special case.
 */
 #include "mesh_impl.h"
 
-/* Offsets of the records of each rank: prefix sums of the counts. */
-static PetscErrorCode first_of_each(PetscMPIInt size, const PetscMPIInt count[], PetscMPIInt first[],
-                                    PetscInt *total)
-{
-  PetscInt64 n = 0;
-
-  PetscFunctionBeginUser;
-  for (PetscMPIInt r = 0; r < size; r++) {
-    PetscCall(PetscMPIIntCast((PetscInt)PetscMin(n, PETSC_MAX_INT), &first[r]));
-    n += count[r];
-  }
-  PetscCheck(n <= PETSC_MPI_INT_MAX, PETSC_COMM_SELF, PETSC_ERR_SUP,
-             "One rank would send or get %lld records of the mesh, MPI counts to %d; take more ranks",
-             (long long)n, PETSC_MPI_INT_MAX);
-  *total = (PetscInt)n;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, const PetscMPIInt dest[], SbRoute *route)
 {
-  PetscMPIInt *next;
-
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(route, sizeof(*route)));
-  route->comm = comm;
-  route->nsend = n;
+  *route = (SbRoute){.comm = comm, .nsend = n};
   PetscCallMPI(MPI_Comm_size(comm, &route->size));
   PetscCall(PetscCalloc5(route->size, &route->scount, route->size, &route->sfirst, route->size,
                          &route->rcount, route->size, &route->rfirst, n, &route->position));
   for (PetscInt i = 0; i < n; i++) route->scount[dest[i]]++;
   PetscCallMPI(MPI_Alltoall(route->scount, 1, MPI_INT, route->rcount, 1, MPI_INT, comm));
-  PetscCall(first_of_each(route->size, route->scount, route->sfirst, &n));
-  PetscCall(first_of_each(route->size, route->rcount, route->rfirst, &route->nrecv));
-  PetscCall(PetscMalloc1(route->size, &next));
-  PetscCall(PetscArraycpy(next, route->sfirst, route->size));
-  for (PetscInt i = 0; i < n; i++) route->position[i] = next[dest[i]]++;
-  PetscCall(PetscFree(next));
+  // offsets of the records of each rank: sums of the counts before it
+  for (int k = 0; k < 2; k++) {
+    const PetscMPIInt *count = k ? route->rcount : route->scount;
+    PetscMPIInt *first = k ? route->rfirst : route->sfirst;
+    PetscInt64 total = 0;
+
+    for (PetscMPIInt r = 0; r < route->size; r++) {
+      PetscCall(PetscMPIIntCast((PetscInt)PetscMin(total, PETSC_MAX_INT), &first[r]));
+      total += count[r];
+    }
+    PetscCheck(total <= PETSC_MPI_INT_MAX, PETSC_COMM_SELF, PETSC_ERR_SUP,
+               "One rank would send or get %lld records of the mesh, MPI counts to %d; take more ranks",
+               (long long)total, PETSC_MPI_INT_MAX);
+    route->nrecv = (PetscInt)total;
+  }
+  for (PetscInt i = 0; i < n; i++) route->position[i] = route->sfirst[dest[i]]++;
+  for (PetscMPIInt r = 0; r < route->size; r++) route->sfirst[r] -= route->scount[r];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -67,14 +56,16 @@ static PetscErrorCode exchange(const SbRoute *route, size_t unit, PetscBool back
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRouteSend(const SbRoute *route, size_t unit, const void *record, void *received)
+PetscErrorCode SbRouteSend(const SbRoute *route, size_t unit, const PetscInt which[], const void *record,
+                           void *received)
 {
   char *out, *in;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc(unit * (size_t)route->nsend, &out));
   for (PetscInt i = 0; i < route->nsend; i++)
-    memcpy(out + unit * (size_t)route->position[i], (const char *)record + unit * (size_t)i, unit);
+    memcpy(out + unit * (size_t)route->position[i],
+           (const char *)record + unit * (size_t)(which ? which[i] : i), unit);
   PetscCall(PetscMalloc(unit * (size_t)route->nrecv, &in));
   PetscCall(exchange(route, unit, PETSC_FALSE, out, in));
   PetscCall(PetscFree(out));

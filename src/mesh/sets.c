@@ -1,13 +1,15 @@
 /*
   sets.c - named sets: their definition, and their members (vertices, facets, cells) as bit masks.
 
-  A shape contains the vertices inside it, the boundary facets with all three vertices inside, and the tets with all four.
-  The tolerance is 1e-6 times the diagonal of the body's bounding box, so that a plane contains the nodes of a curved or rotated
-  side. A group of points or curves contains vertices; a group of surfaces contains its triangles (interior ones as faces of both
-  tets) and their vertices; a group of volumes contains its tets, their vertices and their boundary facets. Groups with equal
-  names and different dimensions are one set.
+  A shape contains the vertices inside it, the boundary facets with all three vertices inside, and the tets
+  with all four. The tolerance is 1e-6 times the diagonal of the body's bounding box, so that a plane contains
+  the nodes of a curved or rotated side. A group of points or curves contains vertices; a group of surfaces
+  contains its triangles (interior ones as faces of both tets) and their vertices; a group of volumes contains
+  its tets, their vertices and their boundary facets. Groups with equal names and different dimensions are one
+  set.
 */
 #include <stdlib.h>
+#include "sbkernel.h"
 #include "mesh_impl.h"
 
 /* ------------------------------------------------------------------ parsing */
@@ -30,54 +32,48 @@ enum { NSHAPE = (int)PETSC_STATIC_ARRAY_LENGTH(shapes) };
 PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set)
 {
   const char *colon = strchr(text, ':');
-  size_t n = colon ? (size_t)(colon - text) : strlen(text);
+  const size_t n = strcspn(text, ":");
+  PetscReal *p = set->p;
+  PetscBool good;
   int i;
 
   PetscFunctionBeginUser;
-  for (i = 0; i < NSHAPE; i++) {
+  for (i = 0; i < NSHAPE; i++)
     if (strlen(shapes[i].name) == n && !strncmp(shapes[i].name, text, n)) break;
-  }
   if (i == NSHAPE) {
     const char *names[NSHAPE];
     char all[512], word[64];
 
     for (int k = 0; k < NSHAPE; k++) names[k] = shapes[k].name;
-    (void)snprintf(word, sizeof(word), "%.*s", (int)strcspn(text, ":"), text);
+    (void)snprintf(word, sizeof(word), "%.*s", (int)n, text);
     PetscCall(SbSuggestName(word, NSHAPE, names, sizeof(all), all));
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': a set begins with one of %s", option, text, all);
   }
   set->shape = shapes[i].shape;
   set->group[0] = 0;
-  PetscCall(PetscArrayzero(set->p, 8));
-  if (shapes[i].least < 0) {
-    PetscCheck(!colon, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': write %s", option, text,
-               shapes[i].form);
-  } else if (shapes[i].least == 0) {
-    PetscCheck(colon && colon[1] && strlen(colon + 1) < sizeof(set->group), PETSC_COMM_SELF,
-               PETSC_ERR_USER_INPUT, "%s '%s': write %s", option, text, shapes[i].form);
-    PetscCall(PetscStrncpy(set->group, colon + 1, sizeof(set->group)));
-  } else {
-    PetscReal *p;
+  PetscCall(PetscArrayzero(p, 8));
+  if (shapes[i].least < 0)
+    good = (PetscBool)!colon;
+  else if (shapes[i].least == 0)
+    good = (PetscBool)(colon && colon[1] && strlen(colon + 1) < sizeof(set->group));
+  else
+    good = (PetscBool)(colon && SbParseNumbers(colon + 1, shapes[i].most, p) >= shapes[i].least);
+  PetscCheck(good, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': write %s", option, text, shapes[i].form);
+  if (shapes[i].least == 0) PetscCall(PetscStrncpy(set->group, colon + 1, sizeof(set->group)));
+  // normalise plane normals (and distances); an empty shape is an error
+  PetscCheck(set->shape != SB_SET_BOX || (p[0] <= p[3] && p[1] <= p[4] && p[2] <= p[5]), PETSC_COMM_SELF,
+             PETSC_ERR_USER_INPUT, "%s '%s': the first corner must lie below the second in x, y and z",
+             option, text);
+  PetscCheck(set->shape != SB_SET_SPHERE || p[3] > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s '%s': the radius must be above 0 m", option, text);
+  if (set->shape == SB_SET_PLANE || set->shape == SB_SET_HALFSPACE) {
+    const PetscReal length = PetscSqrtReal(SbDot3(p, p));
 
-    PetscCheck(colon && SbParseNumbers(colon + 1, shapes[i].most, set->p) >= shapes[i].least, PETSC_COMM_SELF,
-               PETSC_ERR_USER_INPUT, "%s '%s': write %s", option, text, shapes[i].form);
-    // normalise plane normals (and distances); an empty shape is an error
-    p = set->p;
-    if (set->shape == SB_SET_BOX) {
-      PetscCheck(p[0] <= p[3] && p[1] <= p[4] && p[2] <= p[5], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-                 "%s '%s': the first corner must lie below the second in x, y and z", option, text);
-    } else if (set->shape == SB_SET_SPHERE) {
-      PetscCheck(p[3] > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': the radius must be above 0 m",
-                 option, text);
-    } else if (set->shape == SB_SET_PLANE || set->shape == SB_SET_HALFSPACE) {
-      const PetscReal length = PetscSqrtReal(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
-
-      PetscCheck(length > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-                 "%s '%s': the normal must have a length above 0", option, text);
-      PetscCheck(set->shape == SB_SET_HALFSPACE || p[4] >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-                 "%s '%s': the tolerance must not be below 0 m", option, text);
-      for (int k = 0; k < 4; k++) p[k] /= length;
-    }
+    PetscCheck(length > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s '%s': the normal must have a length above 0", option, text);
+    PetscCheck(set->shape == SB_SET_HALFSPACE || p[4] >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s '%s': the tolerance must not be below 0 m", option, text);
+    for (int k = 0; k < 4; k++) p[k] /= length;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -87,22 +83,20 @@ PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set)
 static PetscBool inside(const SbSet *set, const PetscReal x[3], PetscReal slack)
 {
   const PetscReal *p = set->p;
+  PetscReal d[3];
 
+  SbSubtract(x, p, d);
   switch (set->shape) {
   case SB_SET_BOX:
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++)
       if (x[i] < p[i] - slack || x[i] > p[3 + i] + slack) return PETSC_FALSE;
-    }
     return PETSC_TRUE;
   case SB_SET_PLANE:
-    return (PetscBool)(PetscAbsReal(p[0] * x[0] + p[1] * x[1] + p[2] * x[2] - p[3]) <= PetscMax(p[4], slack));
-  case SB_SET_SPHERE: {
-    const PetscReal d[3] = {x[0] - p[0], x[1] - p[1], x[2] - p[2]};
-
-    return (PetscBool)(PetscSqrtReal(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) <= p[3] + slack);
-  }
+    return (PetscBool)(PetscAbsReal(SbDot3(p, x) - p[3]) <= PetscMax(p[4], slack));
+  case SB_SET_SPHERE:
+    return (PetscBool)(PetscSqrtReal(SbDot3(d, d)) <= p[3] + slack);
   case SB_SET_HALFSPACE:
-    return (PetscBool)(p[0] * x[0] + p[1] * x[1] + p[2] * x[2] <= p[3] + slack);
+    return (PetscBool)(SbDot3(p, x) <= p[3] + slack);
   default:
     return PETSC_FALSE;
   }
@@ -137,11 +131,9 @@ PetscErrorCode SbSetsBits(const SbImport *im, PetscInt nbody, const SbBody body[
   for (PetscInt k = 0; k < nset; k++) {
     const char *name = set[k].shape == SB_SET_GROUP ? group_in_body(&set[k], nbody, body, b) : NULL;
 
-    for (PetscInt t = 0; name && t < im->ntags; t++) {
-      for (PetscInt i = im->tags_start[t]; i < im->tags_start[t + 1]; i++) {
+    for (PetscInt t = 0; name && t < im->ntags; t++)
+      for (PetscInt i = im->tags_start[t]; i < im->tags_start[t + 1]; i++)
         if (is_named(&im->group[im->tags_group[i]], name)) bits[t] |= SB_SET_BIT(k);
-      }
-    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -162,7 +154,7 @@ PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbo
   PetscCall(PetscCalloc1(im->nvert, &m->vert));
   PetscCall(PetscCalloc1(im->item[3].n, &m->cell));
   PetscCall(PetscCalloc1(4 * (size_t)im->item[3].n, &m->face));
-  // shapes, bodies, the boundary: `all` has the bits of sets that contain the whole body, `hull` of those that contain its boundary
+  // shapes, bodies, the boundary; `all`: bits of sets that contain the whole body, `hull`: its boundary
   for (PetscInt k = 0; k < nset; k++) {
     if (set[k].shape == SB_SET_BODY && (!strcmp(set[k].group, body[b].name) ||
                                         (body[b].copy_of[0] && !strcmp(set[k].group, body[b].copy_of))))
@@ -227,9 +219,8 @@ PetscErrorCode SbSetsCount(MPI_Comm comm, PetscInt nvert, PetscInt ncell, const 
   PetscCall(PetscCalloc1(3 * nset, &count));
   for (PetscInt v = 0; v < nvert; v++) count_bits(m->vert[v], nset, count);
   for (PetscInt c = 0; c < ncell; c++) count_bits(m->cell[c], nset, count + 2);
-  for (PetscInt s = 0; s < 4 * ncell; s++) {
+  for (PetscInt s = 0; s < 4 * ncell; s++)
     if (m->face[s] & SB_ON_BOUNDARY) count_bits(m->face[s] & ~SB_ON_BOUNDARY, nset, count + 1);
-  }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)(3 * nset), MPIU_INT, MPI_SUM, comm));
   for (PetscInt k = 0; k < nset; k++) {
     set[k].nvert += count[3 * k];
@@ -308,9 +299,8 @@ PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport i
               set[k].group, near[0] ? "; did you mean " : "", near, near[0] ? "?" : "");
     }
     // a shape outside the bodies
-    for (int i = 0; i < NSHAPE; i++) {
+    for (int i = 0; i < NSHAPE; i++)
       if (shapes[i].shape == set[k].shape) name = shapes[i].name;
-    }
     SbBoxClear(box);
     for (PetscInt b = 0; b < nbody; b++) SbBoxMerge(box, body[b].bbox);
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,

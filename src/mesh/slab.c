@@ -1,14 +1,18 @@
 /*
-  slab.c - parallel import of one body: each rank reads a slab, that is a block of the file's tets and a block of its vertices.
+  slab.c - parallel import of one body: each rank reads a slab, that is a block of the file's tets and one of
+  its vertices.
 
-  Rendezvous algorithm: vertices are assigned to home ranks by blocks of their numbers. The home rank of a vertex has its position and knows the ranks whose tets
-  use it; there unused vertices are found and vertex data of several ranks is combined. A face between tets of two ranks is matched at the home rank of its lowest
-  vertex; so are the edges of the surface. A group triangle or a curved edge goes to the home rank of its lowest vertex and from there to all ranks that use
-  this vertex, one of which has the tet. Each rank finds its connected parts; rank 0 joins them by their shared vertices.
+  Rendezvous algorithm: vertices are assigned to home ranks by blocks of their numbers. The home rank of a
+  vertex has its position and knows the ranks whose tets use it; there unused vertices are found and vertex
+  data of several ranks is combined. A face between tets of two ranks is matched at the home rank of its
+  lowest vertex; so are the edges of the surface. A group triangle or a curved edge goes to the home rank of
+  its lowest vertex and from there to all ranks that use this vertex, one of which has the tet. Each rank
+  finds its connected parts; rank 0 joins them by their shared vertices.
 
-  Memory per rank is proportional to the size of its slab, apart from the pairs of parts that rank 0 joins (few, unless the tets of the file are in random order) and 4 bytes
-  for each vertex number between the lowest and the highest one of its tets.
-  The result is the same as that of a serial import (merge.c) on any number of ranks; volumes may differ by rounding.
+  Memory per rank is proportional to the size of its slab, apart from the pairs of parts that rank 0 joins
+  (few, unless the tets of the file are in random order) and 4 bytes for each vertex number between the lowest
+  and the highest one of its tets. The result is the same as that of a serial import (merge.c) on any number
+  of ranks; volumes may differ by rounding.
 */
 #include <stdlib.h>
 #include "mesh_impl.h"
@@ -43,6 +47,27 @@ static PetscErrorCode sum(const Slab *s, PetscInt n, PetscInt value[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Record i begins with a vertex. */
+static inline PetscInt first_vertex(const void *record, size_t unit, PetscInt i)
+{
+  return *(const PetscInt *)(const void *)((const char *)record + unit * (size_t)i);
+}
+
+/* Sends records of `unit` bytes to the home ranks of the vertices with which they begin. */
+static PetscErrorCode send_home(const Slab *s, PetscInt n, size_t unit, const void *record, SbRoute *route,
+                                void *received)
+{
+  PetscMPIInt *dest;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(n, &dest));
+  for (PetscInt i = 0; i < n; i++) dest[i] = home(s, first_vertex(record, unit, i));
+  PetscCall(SbRouteCreate(s->comm, n, dest, route));
+  PetscCall(SbRouteSend(route, unit, NULL, record, received));
+  PetscCall(PetscFree(dest));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* ------------------------------------------------------------------ vertices */
 
 /* Positions and original numbers of the vertices of this rank's tets. */
@@ -53,17 +78,11 @@ static PetscErrorCode ask_home_ranks(Slab *s)
     PetscInt number, nuser;
   } Answer;
   SbImport *im = s->im;
-  PetscMPIInt *dest;
   Answer *answer, *result;
   PetscInt n = 0, before;
 
   PetscFunctionBeginUser;
-  // send vertex numbers to the home ranks
-  PetscCall(PetscMalloc1(im->nvert, &dest));
-  for (PetscInt v = 0; v < im->nvert; v++) dest[v] = home(s, s->used[v]);
-  PetscCall(SbRouteCreate(s->comm, im->nvert, dest, &s->vert));
-  PetscCall(PetscFree(dest));
-  PetscCall(SbRouteSend(&s->vert, sizeof(PetscInt), s->used, &s->asked));
+  PetscCall(send_home(s, im->nvert, sizeof(PetscInt), s->used, &s->vert, &s->asked));
   // ranks that use each vertex of the block; original numbers of used vertices
   for (PetscInt i = 0; i < s->vert.nrecv; i++) s->asked[i] -= s->rows.first;
   PetscCall(SbBucketByKey(s->vert.nrecv, s->asked, s->nkept, &s->start, &s->user));
@@ -79,9 +98,8 @@ static PetscErrorCode ask_home_ranks(Slab *s)
   for (PetscInt i = 0; i < s->vert.nrecv; i++) {
     const PetscInt v = s->asked[i];
 
-    for (int k = 0; k < 3; k++) answer[i].x[k] = s->x[3 * v + k];
-    answer[i].number = s->number[v];
-    answer[i].nuser = s->start[v + 1] - s->start[v];
+    answer[i] = (Answer){{0}, s->number[v], s->start[v + 1] - s->start[v]};
+    PetscCall(PetscArraycpy(answer[i].x, s->x + 3 * v, 3));
   }
   PetscCall(SbRouteReply(&s->vert, sizeof(Answer), answer, result));
   PetscCall(PetscFree(s->x));
@@ -90,7 +108,7 @@ static PetscErrorCode ask_home_ranks(Slab *s)
   PetscCall(PetscMalloc1(im->nvert, &s->part->orig));
   PetscCall(PetscMalloc1(im->nvert, &s->shared));
   for (PetscInt v = 0; v < im->nvert; v++) {
-    for (int k = 0; k < 3; k++) im->x[3 * v + k] = result[v].x[k];
+    PetscCall(PetscArraycpy(im->x + 3 * v, result[v].x, 3));
     im->vert_number[v] = s->used[v] + 1;
     s->part->orig[v] = result[v].number;
     s->shared[v] = (PetscBool)(result[v].nuser > 1);
@@ -139,7 +157,7 @@ static PetscErrorCode match_faces(const Slab *s, const SbRoute *route, Face face
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Makes cells of other ranks neighbours; one that is the neighbour across all four faces is a duplicate tet. */
+/* Makes cells of other ranks neighbours; one that is across all four faces is a duplicate tet. */
 static PetscErrorCode link_faces(Slab *s, PetscInt nsend, const PetscInt slot[], const Across across[])
 {
   SbFaces *faces = &s->part->faces;
@@ -165,13 +183,12 @@ static PetscErrorCode link_faces(Slab *s, PetscInt nsend, const PetscInt slot[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Matches all faces whose three vertices are shared by ranks, including those with two local tets, in order to find a third one. */
+/* Matches all faces with three shared vertices, also those of two local tets, to find a third one. */
 static PetscErrorCode join_faces(Slab *s, PetscInt before)
 {
   const SbItems *tets = &s->im->item[3];
   SbCaughtError caught = {0, ""};
   PetscInt n = 0, *slot;
-  PetscMPIInt *dest;
   SbRoute route;
   Face *face, *got;
   Across *across, *result;
@@ -179,7 +196,7 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
   PetscFunctionBeginUser;
   // count, then list: faces with three shared vertices, sent to the home rank of the lowest one
   for (int pass = 0; pass < 2; pass++) {
-    if (pass) PetscCall(PetscMalloc3(n, &face, n, &slot, n, &dest));
+    if (pass) PetscCall(PetscMalloc2(n, &face, n, &slot));
     n = 0;
     for (PetscInt i = 0; i < 4 * tets->n; i++) {
       PetscInt v[3];
@@ -192,19 +209,15 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
       if (!all) continue;
       if (pass) {
         PetscCall(PetscSortInt(3, v));
-        PetscCall(PetscMemzero(&face[n], sizeof(*face)));
-        for (int k = 0; k < 3; k++) face[n].vert[k] = s->used[v[k]];
-        face[n].cell = before + i / 4;
-        face[n].number = tets->number[i / 4];
+        face[n] =
+          (Face){{s->used[v[0]], s->used[v[1]], s->used[v[2]]}, 0, before + i / 4, tets->number[i / 4]};
         slot[n] = i;
-        dest[n] = home(s, face[n].vert[0]);
       }
       n++;
     }
   }
   // home ranks match the faces and reply with the cell across
-  PetscCall(SbRouteCreate(s->comm, n, dest, &route));
-  PetscCall(SbRouteSend(&route, sizeof(Face), face, &got));
+  PetscCall(send_home(s, n, sizeof(Face), face, &route, &got));
   PetscCall(PetscMalloc2(route.nrecv, &across, n, &result));
   SB_CATCH(&caught, match_faces(s, &route, got, across));
   PetscCall(SbRouteReply(&route, sizeof(Across), across, result));
@@ -212,30 +225,9 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
   // an error of one rank is raised on all ranks
   PetscCall(PetscFree(got));
   PetscCall(PetscFree2(across, result));
-  PetscCall(PetscFree3(face, slot, dest));
+  PetscCall(PetscFree2(face, slot));
   PetscCall(SbRouteDestroy(&route));
   PetscCall(SbCaughtRaise(s->comm, &caught));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Counts surface edges with more than two facets; the home rank of the lower vertex has all facets of an edge. */
-static PetscErrorCode count_pinched(Slab *s)
-{
-  const PetscInt n = 3 * s->part->faces.nboundary;
-  PetscInt64 *edge, *got;
-  PetscMPIInt *dest;
-  SbRoute route;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(n, &edge, n, &dest));
-  SbBoundaryEdges(s->im, &s->part->faces, s->used, edge);
-  for (PetscInt i = 0; i < n; i++) dest[i] = home(s, (PetscInt)(edge[i] >> 32));
-  PetscCall(SbRouteCreate(s->comm, n, dest, &route));
-  PetscCall(SbRouteSend(&route, sizeof(*edge), edge, &got));
-  PetscCall(PetscFree2(edge, dest));
-  PetscCall(SbCountPinched(route.nrecv, got, &s->im->npinched));
-  PetscCall(PetscFree(got));
-  PetscCall(SbRouteDestroy(&route));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -259,7 +251,7 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
   first -= n;
   for (PetscInt v = 0; v < im->nvert; v++) part[v] = part[v] == v ? first++ : part[part[v]];
   /* pairs of parts that share a vertex, each pair once */
-  PetscCall(SbRouteSend(&s->vert, sizeof(PetscInt), part, &got));
+  PetscCall(SbRouteSend(&s->vert, sizeof(PetscInt), NULL, part, &got));
   PetscCall(PetscFree(part));
   PetscCall(PetscMalloc2(s->vert.nrecv, &user, s->vert.nrecv, &pair));
   for (PetscInt v = 0; v < s->nkept; v++)
@@ -277,7 +269,7 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
   // rank 0 joins the parts of all ranks by union-find
   PetscCall(PetscCalloc1(kept, &dest));
   PetscCall(SbRouteCreate(s->comm, kept, dest, &route));
-  PetscCall(SbRouteSend(&route, sizeof(*pair), pair, &all));
+  PetscCall(SbRouteSend(&route, sizeof(*pair), NULL, pair, &all));
   PetscCall(PetscFree(dest));
   *npart = total;
   PetscCall(PetscMalloc1(s->rank ? 0 : total, &parent));
@@ -294,31 +286,24 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
 
 /* ------------------------------------------------------------------ points, lines and triangles of groups */
 
-/* Adds the set bits of items to the masks of their vertices at the home ranks, unless one of the item's vertices is unused. */
+/* Adds set bits of items to the masks of their vertices at the home ranks, unless one of these is unused. */
 static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
 {
   SbImport *im = s->im;
   SbRoute route;
   uint64_t *mark, *got_mark;
   PetscInt n = 0, *vert, *got;
-  PetscMPIInt *dest;
   PetscBool *there, *is;
 
   PetscFunctionBeginUser;
-  // vertices of all items, and their home ranks
+  // vertices of all items
   for (int d = 0; d < 3; d++) n += (d + 1) * im->item[d].n;
-  PetscCall(PetscMalloc4(n, &vert, n, &dest, n, &mark, n, &there));
+  PetscCall(PetscMalloc3(n, &vert, n, &mark, n, &there));
   n = 0;
-  for (int d = 0; d < 3; d++) {
-    for (PetscInt i = 0; i < (d + 1) * im->item[d].n; i++) {
-      vert[n] = im->item[d].vert[i];
-      dest[n] = home(s, vert[n]);
-      n++;
-    }
-  }
+  for (int d = 0; d < 3; d++)
+    for (PetscInt i = 0; i < (d + 1) * im->item[d].n; i++) vert[n++] = im->item[d].vert[i];
   // home ranks reply whether a tet uses each vertex
-  PetscCall(SbRouteCreate(s->comm, n, dest, &route));
-  PetscCall(SbRouteSend(&route, sizeof(PetscInt), vert, &got));
+  PetscCall(send_home(s, n, sizeof(PetscInt), vert, &route, &got));
   PetscCall(PetscMalloc1(route.nrecv, &is));
   for (PetscInt i = 0; i < route.nrecv; i++) is[i] = (PetscBool)(s->number[got[i] - s->rows.first] >= 0);
   PetscCall(SbRouteReply(&route, sizeof(PetscBool), is, there));
@@ -335,62 +320,51 @@ static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
     if (d < 2) im->item[d].n = 0;
   }
   // combine the marks of all ranks at the home ranks
-  PetscCall(SbRouteSend(&route, sizeof(uint64_t), mark, &got_mark));
+  PetscCall(SbRouteSend(&route, sizeof(uint64_t), NULL, mark, &got_mark));
   for (PetscInt i = 0; i < route.nrecv; i++) s->mask[got[i] - s->rows.first] |= got_mark[i];
   PetscCall(PetscFree(got));
   PetscCall(PetscFree(got_mark));
-  PetscCall(PetscFree4(vert, dest, mark, there));
+  PetscCall(PetscFree3(vert, mark, there));
   PetscCall(SbRouteDestroy(&route));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /*
-  Sends records of `unit` bytes, whose first entry is a vertex, by its home rank to all ranks that use the vertex.
+  Sends records of `unit` bytes, whose first entry is a vertex, by its home rank to all ranks that use the
+  vertex.
 
-  Output: `there`, the route to the home ranks; `on`, the route to the users, with from[on.nsend], the position of each record at the home rank; in[on.nrecv], received records. The caller frees from and in.
+  Output: `there`, the route to the home ranks; `on`, the route to the users, with from[on.nsend], the
+  position of each record at the home rank; in[on.nrecv], received records. The caller frees from and in.
 */
 static PetscErrorCode send_to_users(Slab *s, PetscInt n, size_t unit, const void *record, SbRoute *there,
                                     SbRoute *on, PetscInt **from, void *in)
 {
-  const char *at = (const char *)record;
-  char *got, *out;
+  char *got;
   PetscMPIInt *dest;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(n, &dest));
-  for (PetscInt i = 0; i < n; i++)
-    dest[i] = home(s, *(const PetscInt *)(const void *)(at + unit * (size_t)i));
-  PetscCall(SbRouteCreate(s->comm, n, dest, there));
-  PetscCall(SbRouteSend(there, unit, record, &got));
-  PetscCall(PetscFree(dest));
+  PetscCall(send_home(s, n, unit, record, there, &got));
   for (int pass = 0; pass < 2; pass++) {
-    if (pass) {
-      PetscCall(PetscMalloc2(unit * (size_t)n, &out, n, &dest));
-      PetscCall(PetscMalloc1(n, from));
-    }
+    if (pass) PetscCall(PetscMalloc1(n, &dest));
+    if (pass) PetscCall(PetscMalloc1(n, from));
     n = 0;
     for (PetscInt i = 0; i < there->nrecv; i++) {
-      const char *p = got + unit * (size_t)i;
-      const PetscInt v = *(const PetscInt *)(const void *)p - s->rows.first;
+      const PetscInt v = first_vertex(got, unit, i) - s->rows.first;
 
-      for (PetscInt k = s->start[v]; k < s->start[v + 1]; k++) {
-        if (pass) {
-          memcpy(out + unit * (size_t)n, p, unit);
-          (*from)[n] = i;
-          dest[n] = (PetscMPIInt)s->user[k];
-        }
-        n++;
+      for (PetscInt k = s->start[v]; k < s->start[v + 1]; k++, n++) {
+        if (pass) (*from)[n] = i;
+        if (pass) dest[n] = (PetscMPIInt)s->user[k];
       }
     }
   }
   PetscCall(SbRouteCreate(s->comm, n, dest, on));
-  PetscCall(SbRouteSend(on, unit, out, in));
-  PetscCall(PetscFree2(out, dest));
+  PetscCall(SbRouteSend(on, unit, *from, got, in));
+  PetscCall(PetscFree(dest));
   PetscCall(PetscFree(got));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Ends the exchange of send_to_users(): anywhere[there->nsend] tells whether any rank has found a record, from found[on->nrecv] of all ranks. */
+/* Ends the exchange of send_to_users(): anywhere[there->nsend], whether some rank has found the record. */
 static PetscErrorCode end_search(SbRoute *there, SbRoute *on, PetscInt *from, const PetscBool found[],
                                  PetscBool anywhere[])
 {
@@ -499,7 +473,7 @@ static PetscErrorCode mark(Slab *s, PetscInt nbody, const SbBody body[], PetscIn
                            SbSet set[])
 {
   SbImport *im = s->im;
-  SbMasks *m = &s->part->masks, kept;
+  SbMasks *m = &s->part->masks;
   uint64_t *bits, *got;
 
   PetscFunctionBeginUser;
@@ -507,34 +481,21 @@ static PetscErrorCode mark(Slab *s, PetscInt nbody, const SbBody body[], PetscIn
   PetscCall(PetscCalloc1(s->nkept, &s->mask));
   PetscCall(SbSetsBits(im, nbody, body, b, nset, set, bits));
   PetscCall(mark_items(s, bits));
+  PetscCall(PetscFree(bits));
   PetscCall(find_triangles(s));
   PetscCall(SbSetsMark(im, &s->part->faces, nbody, body, b, nset, set, m));
   // combine the set bits of shared vertices over all ranks
-  PetscCall(SbRouteSend(&s->vert, sizeof(uint64_t), s->part->masks.vert, &got));
+  PetscCall(SbRouteSend(&s->vert, sizeof(uint64_t), NULL, m->vert, &got));
   for (PetscInt i = 0; i < s->vert.nrecv; i++) s->mask[s->asked[i]] |= got[i];
   for (PetscInt i = 0; i < s->vert.nrecv; i++) got[i] = s->mask[s->asked[i]];
-  PetscCall(SbRouteReply(&s->vert, sizeof(uint64_t), got, s->part->masks.vert));
+  PetscCall(SbRouteReply(&s->vert, sizeof(uint64_t), got, m->vert));
   PetscCall(PetscFree(got));
   /* count vertices at their home ranks */
-  kept = *m;
-  kept.vert = s->mask;
-  PetscCall(SbSetsCount(s->comm, s->nkept, im->item[3].n, &kept, nset, set));
-  PetscCall(PetscFree(bits));
+  PetscCall(SbSetsCount(s->comm, s->nkept, im->item[3].n, &(SbMasks){s->mask, m->cell, m->face}, nset, set));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ import */
-
-static PetscErrorCode check_cells(Slab *s, PetscReal largest)
-{
-  SbImport *im = s->im;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbImportOrient(im, largest));
-  PetscCall(SbFacesCreate(im->nvert, im->item[3].n, im->item[3].vert, &s->part->faces));
-  PetscCall(SbImportCheckFaces(im, &s->part->faces));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody body[], PetscInt b,
                               PetscInt nset, SbSet set[])
@@ -545,11 +506,14 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   SbShape shape;
   SbItems *tets = &im->item[3];
   PetscInt low = PETSC_MAX_INT, high = -1, n = 0, *map;
+  PetscInt64 *edge, *got;
+  PetscMPIInt *dest;
+  SbRoute route;
 
   PetscFunctionBeginUser;
   SB_CATCH(&caught, SbImportSlab(&body[b], s->rank, s->size, im, &s->rows));
   PetscCall(SbCaughtRaise(s->comm, &caught));
-  s->part->first = im->item[3].n ? (PetscInt)im->item[3].number[0] - 1 : 0;
+  s->part->first = tets->n ? (PetscInt)tets->number[0] - 1 : 0;
   // vertices used by this rank's tets, ascending; renumber the tets
   for (PetscInt i = 0; i < 4 * tets->n; i++) {
     low = PetscMin(low, tets->vert[i]);
@@ -579,7 +543,7 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   PetscCall(find_edges(s));
   largest = SbImportLargest(im);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPIU_REAL, MPI_MAX, s->comm));
-  SB_CATCH(&caught, check_cells(s, largest));
+  SB_CATCH(&caught, SbImportCheckCells(im, largest, &s->part->faces));
   PetscCall(SbCaughtRaise(s->comm, &caught));
   PetscCall(join_faces(s, before));
   PetscCall(sum(s, 1, &im->nunused));
@@ -590,13 +554,23 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &shape.volume, 1, MPIU_REAL, MPI_SUM, s->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, shape.most, 8, MPIU_REAL, MPI_MAX, s->comm));
   SbShapeKeep(&shape, &body[b]);
-  body[b].ncell = s->im->item[3].n;
+  body[b].ncell = tets->n;
   body[b].nfacet = s->part->faces.nboundary;
   PetscCall(sum(s, 1, &body[b].ncell));
   PetscCall(sum(s, 1, &body[b].nfacet));
-  body[b].nvert = s->rows.N - s->im->nunused;
+  body[b].nvert = s->rows.N - im->nunused;
   PetscCall(count_parts(s, &body[b].npart));
-  PetscCall(count_pinched(s));
+  // surface edges with more than two facets; the home rank of the lower vertex has all facets of an edge
+  n = 3 * s->part->faces.nboundary;
+  PetscCall(PetscMalloc2(n, &edge, n, &dest));
+  SbBoundaryEdges(im, &s->part->faces, s->used, edge);
+  for (PetscInt i = 0; i < n; i++) dest[i] = home(s, (PetscInt)(edge[i] >> 32));
+  PetscCall(SbRouteCreate(s->comm, n, dest, &route));
+  PetscCall(SbRouteSend(&route, sizeof(*edge), NULL, edge, &got));
+  PetscCall(PetscFree2(edge, dest));
+  PetscCall(SbCountPinched(route.nrecv, got, &im->npinched));
+  PetscCall(PetscFree(got));
+  PetscCall(SbRouteDestroy(&route));
   PetscCall(mark(s, nbody, body, b, nset, set));
   PetscCall(sum(s, 1, &im->npinched));
   PetscCall(sum(s, 1, &im->nlost));

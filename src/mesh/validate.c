@@ -1,9 +1,9 @@
 /*
   validate.c - checks of the guarantees of SbMesh: index ranges, order, ownership, sums over the ranks.
 
-  Every cell with an owned vertex is local if and only if the number of pairs (owned vertex, local cell that has it), summed over all
-  ranks, is four times the global number of cells. Original numbers are a permutation if each occurs once; this is checked
-  by the sums of the numbers and of their hashes.
+  Every cell with an owned vertex is local if and only if the number of pairs (owned vertex, local cell that
+  has it), summed over all ranks, is four times the global number of cells. Original numbers are a permutation
+  if each occurs once; this is checked by the sums of the numbers and of their hashes.
 */
 #include "mesh_impl.h"
 
@@ -87,11 +87,10 @@ PetscErrorCode SbMeshValidate(SbMesh mesh)
           "Original vertex number %" PetscInt_FMT " out of range", mesh->vert_orig[v]);
     CHECK(0 <= body && body < mesh->nbody, "Vertex %" PetscInt_FMT " in body %" PetscInt_FMT, v, body);
     CHECK(!(mesh->vert_set[v] & SB_ON_BOUNDARY), "Vertex %" PetscInt_FMT " carries the bit of faces", v);
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++)
       CHECK(mesh->body[body].bbox[i] <= mesh->x[3 * v + i] &&
               mesh->x[3 * v + i] <= mesh->body[body].bbox[3 + i],
             "Vertex %" PetscInt_FMT " outside its body", v);
-    }
   }
   all = PETSC_FALSE;
   for (PetscInt b = 0; b < mesh->nbody; b++) all = (PetscBool)(all || mesh->body[b].other_nodes);

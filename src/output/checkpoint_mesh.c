@@ -123,8 +123,7 @@ static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_
                     (!n[2] || SbH5Rows(group, "triangles") == n[2]) &&
                     (!n[3] || SbH5Rows(group, "curved_edges") == n[3]));
   if (*ok) {
-    PetscCall(SbMemoryMeshCreate(count[0], count[1], count[2], in_memory));
-    PetscCall(SbMemoryMeshCurve(*in_memory, count[3]));
+    PetscCall(SbMemoryMeshCreate(count[0], count[1], count[2], count[3], in_memory));
     (*in_memory)->step = (PetscInt)step;
     SbH5GetReal(group, "mass", &(*in_memory)->mass, ok);
     SbH5GetReal(group, "bound", &(*in_memory)->bound, ok);

@@ -79,7 +79,7 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
     dest[i] = (PetscMPIInt)((PetscInt64)c->list.point[i].id[1] * out->size / ((PetscInt64)bound + 1));
   PetscCall(PetscFree(c->point));
   PetscCall(SbRouteCreate(c->share.comm, c->list.n, dest, &route));
-  PetscCall(SbRouteSend(&route, sizeof(SbContactPoint), c->list.point, &c->point));
+  PetscCall(SbRouteSend(&route, sizeof(SbContactPoint), NULL, c->list.point, &c->point));
   c->share.n = route.nrecv;
   PetscCall(SbRouteDestroy(&route));
   PetscCall(PetscFree(dest));

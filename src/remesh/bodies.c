@@ -1,12 +1,12 @@
 /*
   On rank 0: new meshes for some bodies of a scene, and the state on these.
 
-  The vectors are functions of the position at rest, linear in each tet, quadratic in those of P2: a new node gets the value at its rest position (body.c). A node
-  on a kept vertex, edge or triangle of the surface gets the old value bitwise. A DG cell takes the value from its own
-  side of a face.
+  The vectors are functions of the position at rest, linear in each tet, quadratic in those of P2: a new node
+  gets the value at its rest position (body.c). A node on a kept vertex, edge or triangle of the surface gets
+  the old value bitwise. A DG cell takes the value from its own side of a face.
 
-  A new tet is in the file's groups of the old tet around its centroid; on the surface groups keep their triangles
-  and vertices.
+  A new tet is in the file's groups of the old tet around its centroid; on the surface groups keep their
+  triangles and vertices.
 */
 #include "remesh_impl.h"
 
@@ -28,9 +28,8 @@ static PetscErrorCode list_edges(PetscInt ncell, const PetscInt cell[], PetscInt
   for (PetscInt i = 0; i < all; i++) (*edge)[i] = edge_of(cell + 4 * (i / 6), i);
   SbKeysSort(all, *edge);
   *n = 0;
-  for (PetscInt i = 0; i < all; i++) {
+  for (PetscInt i = 0; i < all; i++)
     if (!i || (*edge)[i].key != (*edge)[*n - 1].key) (*edge)[(*n)++] = (*edge)[i];
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -38,7 +37,7 @@ static PetscErrorCode list_edges(PetscInt ncell, const PetscInt cell[], PetscInt
 typedef struct {
   SbModel model;
   const SbGathered *g;
-  PetscInt body, vert0, cell0, ncell;
+  PetscInt body, vert0, cell0, nvert, ncell;
   SbElement element;
   PetscInt each;  /* numbers per node: 3 nfield */
   PetscInt *cell; /* [ncell][4] old tets */
@@ -48,7 +47,9 @@ typedef struct {
   PetscInt nedge;
   SbLocator rest;
   PetscBool done; /* the body has a new mesh */
-  SbNewMesh mesh;
+  SbNewMesh mesh; /* the new mesh, or the old one: then its arrays are borrowed */
+  PetscInt
+    *own; /* [max(nvert, ncell)] 0, 1, ...: vertices and tets of the old mesh, as its `kept` and `within` */
   uint64_t groups;     /* bits of the sets that are groups */
   uint64_t inclusions; /* bits of those groups that are inclusions of the body */
 } Work;
@@ -71,7 +72,6 @@ static PetscInt old_slot(const Work *w, PetscInt slot)
   const PetscInt *v = w->mesh.cell + 4 * (slot / 4);
   PetscInt vert[3], slots[2];
 
-  if (!w->done) return face_set(w, slot) & SB_ON_BOUNDARY ? slot : -1;
   for (int k = 0; k < 3; k++) {
     vert[k] = v[SbFaceVertex[slot % 4][k]];
     if (vert[k] >= w->mesh.nkept) return -1;
@@ -88,7 +88,7 @@ static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
   char where[3 * SB_NAME_MAX];
   PetscErrorCode ierr;
   PetscInt *region, nkind = 0;
-  SbOldMesh old = {.nvert = g->vert0[w->body + 1] - w->vert0,
+  SbOldMesh old = {.nvert = w->nvert,
                    .ncell = w->ncell,
                    .X = g->X + 3 * w->vert0,
                    .x = g->x + 3 * w->vert0,
@@ -103,11 +103,9 @@ static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
   PetscCall(PetscCalloc2(old.nvert, &volume, old.nvert, &surface));
   for (PetscInt i = 0; i < 4 * w->ncell; i++) {
     volume[w->cell[i]] |= g->cell_set[5 * (w->cell0 + i / 4)];
-    if (!(face_set(w, i) & SB_ON_BOUNDARY)) {
-      lost |= face_set(w, i) & w->groups;
-    } else {
-      for (int k = 1; k < 4; k++) surface[w->cell[4 * (i / 4) + (i % 4 + k) % 4]] = PETSC_TRUE;
-    }
+    if (!(face_set(w, i) & SB_ON_BOUNDARY)) lost |= face_set(w, i) & w->groups;
+    for (int k = 1; k < 4 && face_set(w, i) & SB_ON_BOUNDARY; k++)
+      surface[w->cell[4 * (i / 4) + (i % 4 + k) % 4]] = PETSC_TRUE;
   }
   for (PetscInt v = 0; v < old.nvert; v++)
     lost |= surface[v] ? 0 : g->vert_set[w->vert0 + v] & w->groups & ~volume[v];
@@ -118,8 +116,8 @@ static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
                "shape (-sets) or a group of the surface or of volumes",
                w->model->set[k].group);
   PetscCall(PetscSNPrintf(where, sizeof(where), "body '%s', re-meshed", w->model->body[w->body].name));
-  PetscCall(PetscMalloc1(w->ncell, &region));
   // tets of different materials or groups must be separated by faces
+  PetscCall(PetscMalloc1(w->ncell, &region));
   PetscCall(PetscMalloc1(w->ncell, &kind));
   for (PetscInt c = 0; c < w->ncell; c++) {
     const uint64_t material = (uint64_t)g->cell_material[w->cell0 + c],
@@ -142,17 +140,17 @@ static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
 }
 
 /* Counts triangles in groups, or writes them; for an old mesh also inner ones. */
-static PetscInt list_triangles(const Work *w, PetscInt ncell, const PetscInt cell[], SbMemoryMesh *in_memory)
+static PetscInt list_triangles(const Work *w, SbMemoryMesh *in_memory)
 {
   PetscInt n = 0;
 
-  for (PetscInt i = 0; i < 4 * ncell; i++) {
+  for (PetscInt i = 0; i < 4 * w->mesh.ncell; i++) {
     const PetscInt slot = w->done ? old_slot(w, i) : i;
     const uint64_t bits = slot < 0 ? 0 : face_set(w, slot) & w->groups;
 
     if (!bits) continue;
     if (in_memory) {
-      for (int k = 0; k < 3; k++) in_memory->tri[3 * n + k] = cell[4 * (i / 4) + (i % 4 + 1 + k) % 4];
+      for (int k = 0; k < 3; k++) in_memory->tri[3 * n + k] = w->mesh.cell[4 * (i / 4) + (i % 4 + 1 + k) % 4];
       in_memory->tri_set[n] = bits;
     }
     n++;
@@ -173,8 +171,8 @@ static PetscInt old_edge(const Work *w, uint64_t key)
   const PetscInt low = (PetscInt)(key >> 32), high = (PetscInt)(key & 0xffffffff);
   PetscInt at;
 
-  if (w->done && high >= w->mesh.nkept) return -1;
-  if (w->done) key = SbKeyOfPair(w->mesh.kept[low], w->mesh.kept[high]);
+  if (high >= w->mesh.nkept) return -1;
+  key = SbKeyOfPair(w->mesh.kept[low], w->mesh.kept[high]);
   at = SbKeysFind(w->nedge, w->edge, key);
   return at < w->nedge && w->edge[at].key == key ? w->edge[at].slot : -1;
 }
@@ -207,15 +205,13 @@ static void new_values(const Work *w, PetscInt c, PetscReal value[])
     PetscReal *to = value + a * w->each, *support = value + (4 + a) * w->each, X[3], inside[3];
     const PetscReal *from = NULL;
 
-    if (w->element->nodes_per[0]) {
-      const PetscInt corner = v < w->mesh.nkept ? w->at[w->mesh.kept[v]] : -1;
-
-      if (corner >= 0) from = old_value(w, corner / 4, corner % 4);
-    } else if (slot >= 0)
-      from = old_value(w, slot / 4, slot % 4);
-    if (!from && w->element->nodes_per[0])
+    if (w->element->nodes_per[0] && v < w->mesh.nkept)
+      from = old_value(w, w->at[w->mesh.kept[v]] / 4, w->at[w->mesh.kept[v]] % 4);
+    else if (w->element->nodes_per[0])
       for (int k = 0; k < 3; k++) X[k] = w->mesh.X[3 * v + k];
-    else if (!from) {
+    else if (slot >= 0)
+      from = old_value(w, slot / 4, slot % 4);
+    else {
       const PetscReal *at = w->mesh.X, *apex = at + 3 * v;
       PetscInt face[3];
 
@@ -255,17 +251,16 @@ static void rename_node(SbRenamed *r, PetscInt from, PetscInt to)
   r->to[r->n++] = to;
 }
 
-/* Renumbers the nodes of the body's surface: vertices and old edges (P2), or faces and their supports. vert1, cell1: first ones of the body in the next scene. */
-static PetscErrorCode rename_surface(const Work *w, PetscInt vert1, PetscInt cell1, const SbGathered *next,
-                                     SbRenamed *r)
+/* Renumbers the nodes of the body's surface: vertices and old edges (P2), or faces and their supports. */
+static PetscErrorCode rename_surface(const Work *w, const SbGathered *next, SbRenamed *r)
 {
   const PetscInt N = w->g->nvert, C = w->g->ncell, N1 = next->nvert, C1 = next->ncell;
-  const PetscInt ncell = w->done ? w->mesh.ncell : w->ncell;
+  const PetscInt vert1 = next->vert0[w->body], cell1 = next->cell0[w->body];
   PetscInt nedge = 0;
   SbKey *edge = NULL;
 
   PetscFunctionBeginUser;
-  if (w->edge) PetscCall(list_edges(ncell, w->done ? w->mesh.cell : w->cell, &nedge, &edge));
+  if (w->edge) PetscCall(list_edges(w->mesh.ncell, w->mesh.cell, &nedge, &edge));
   for (PetscInt i = 0; i < nedge; i++) {
     const PetscInt at = old_edge(w, edge[i].key);
 
@@ -273,12 +268,10 @@ static PetscErrorCode rename_surface(const Work *w, PetscInt vert1, PetscInt cel
   }
   PetscCall(PetscFree(edge));
   if (w->element->nodes_per[0]) {
-    const PetscInt n = w->done ? w->mesh.nkept : w->g->vert0[w->body + 1] - w->vert0;
-
-    for (PetscInt v = 0; v < n; v++) rename_node(r, w->vert0 + (w->done ? w->mesh.kept[v] : v), vert1 + v);
+    for (PetscInt v = 0; v < w->mesh.nkept; v++) rename_node(r, w->vert0 + w->mesh.kept[v], vert1 + v);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  for (PetscInt i = 0; i < 4 * ncell; i++) {
+  for (PetscInt i = 0; i < 4 * w->mesh.ncell; i++) {
     const PetscInt slot = old_slot(w, i);
 
     if (slot < 0) continue;
@@ -290,80 +283,57 @@ static PetscErrorCode rename_surface(const Work *w, PetscInt vert1, PetscInt cel
 
 /* ------------------------------------------------------------------ all bodies */
 
-/* Lists the curved edges of the next mesh. */
-static PetscErrorCode list_curved(const Work *w, PetscInt ncell, const PetscInt cell[], SbMemoryMesh *p)
-{
-  PetscInt nedge, n = 0;
-  SbKey *edge;
-
-  PetscFunctionBeginUser;
-  if (!off_of(w, 0)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(list_edges(ncell, cell, &nedge, &edge));
-  for (int pass = 0; pass < 2; pass++) {
-    if (pass) PetscCall(SbMemoryMeshCurve(p, n));
-    n = 0;
-    for (PetscInt i = 0; i < nedge; i++) {
-      const PetscReal *off = (w->done ? w->mesh.edge_off : off_of(w, 0)) + 3 * (size_t)edge[i].slot;
-
-      if (off[0] == 0. && off[1] == 0. && off[2] == 0.) continue;
-      if (pass) {
-        p->edge[2 * n] = (PetscInt)(edge[i].key >> 32);
-        p->edge[2 * n + 1] = (PetscInt)(edge[i].key & 0xffffffff);
-        PetscCall(PetscArraycpy(p->edge_off + 3 * n, off, 3));
-      }
-      n++;
-    }
-  }
-  PetscCall(PetscFree(edge));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Mesh, values and renumbered nodes of one body. */
 static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *result)
 {
   SbGathered *next = &result->next;
-  SbMemoryMesh **in_memory = &result->in_memory[w->body], *p;
-  const SbBody *body = &w->model->body[w->body];
+  const SbMemoryMesh *before = w->model->body[w->body].in_memory;
+  SbMemoryMesh *p;
   const size_t each = (size_t)next->width * (size_t)w->each;
   PetscReal *value = next->value + each * (size_t)next->cell0[w->body];
   const SbGathered *g = w->g;
   const SbNewMesh *m = &w->mesh;
-  PetscInt nold, ncell, nvert;
-  const PetscInt *cell;
+  PetscInt nedge = 0, ncurved = 0;
+  SbKey *edge = NULL;
 
   PetscFunctionBeginUser;
-  // the new mesh, or the unchanged old one
-  nold = g->vert0[w->body + 1] - w->vert0;
-  ncell = w->done ? m->ncell : w->ncell;
-  nvert = w->done ? m->nvert : nold;
-  cell = w->done ? m->cell : w->cell;
-  PetscCall(SbMemoryMeshCreate(nvert, ncell, list_triangles(w, ncell, cell, NULL), in_memory));
-  p = *in_memory;
-  PetscCall(PetscArraycpy(p->x, w->done ? m->X : g->X + 3 * w->vert0, 3 * (size_t)nvert));
-  PetscCall(PetscArraycpy(p->cell, cell, 4 * (size_t)ncell));
-  (void)list_triangles(w, ncell, cell, p);
-  PetscCall(list_curved(w, ncell, cell, p));
-  for (PetscInt v = 0; v < (w->done ? m->nkept : nold); v++)
-    p->vert_set[v] = g->vert_set[w->vert0 + (w->done ? m->kept[v] : v)] & w->groups;
-  for (PetscInt c = 0; c < ncell; c++) {
-    p->cell_set[c] = g->cell_set[5 * (w->cell0 + (w->done ? m->within[c] : c))] & (w->groups | w->inclusions);
-    for (int a = 0; a < 4; a++) p->vert_set[cell[4 * c + a]] |= p->cell_set[c] & w->groups;
+  // curved edges of the next mesh
+  if (m->edge_off) PetscCall(list_edges(m->ncell, m->cell, &nedge, &edge));
+  for (PetscInt i = 0; i < nedge; i++) {
+    const PetscReal *off = m->edge_off + 3 * (size_t)edge[i].slot;
+
+    if (off[0] != 0. || off[1] != 0. || off[2] != 0.) edge[ncurved++] = edge[i];
+  }
+  PetscCall(SbMemoryMeshCreate(m->nvert, m->ncell, list_triangles(w, NULL), ncurved, &p));
+  result->in_memory[w->body] = p;
+  PetscCall(PetscArraycpy(p->x, m->X, 3 * (size_t)m->nvert));
+  PetscCall(PetscArraycpy(p->cell, m->cell, 4 * (size_t)m->ncell));
+  (void)list_triangles(w, p);
+  for (PetscInt i = 0; i < ncurved; i++) {
+    p->edge[2 * i] = (PetscInt)(edge[i].key >> 32);
+    p->edge[2 * i + 1] = (PetscInt)(edge[i].key & 0xffffffff);
+    PetscCall(PetscArraycpy(p->edge_off + 3 * i, m->edge_off + 3 * (size_t)edge[i].slot, 3));
+  }
+  PetscCall(PetscFree(edge));
+  for (PetscInt v = 0; v < m->nkept; v++) p->vert_set[v] = g->vert_set[w->vert0 + m->kept[v]] & w->groups;
+  for (PetscInt c = 0; c < m->ncell; c++) {
+    p->cell_set[c] = g->cell_set[5 * (w->cell0 + m->within[c])] & (w->groups | w->inclusions);
+    for (int a = 0; a < 4; a++) p->vert_set[m->cell[4 * c + a]] |= p->cell_set[c] & w->groups;
   }
   if (w->done) {
-    for (PetscInt c = 0; c < w->mesh.ncell; c++) new_values(w, c, value + each * (size_t)c);
-    (*in_memory)->step = step;
-    (*in_memory)->mass = w->g->mass[w->body];
-    (*in_memory)->bound =
-      w->mesh.quality; /* quality of the worst tet; the caller derives the bound for re-meshing */
+    for (PetscInt c = 0; c < m->ncell; c++) new_values(w, c, value + each * (size_t)c);
+    p->step = step;
+    p->mass = g->mass[w->body];
+    p->bound = m->quality; /* quality of the worst tet; the caller derives the bound for re-meshing */
   } else {
-    PetscCall(PetscArraycpy(value, w->g->value + each * (size_t)w->cell0, each * (size_t)w->ncell));
-    if (body->in_memory) {
-      (*in_memory)->step = body->in_memory->step;
-      (*in_memory)->mass = body->in_memory->mass;
-      (*in_memory)->bound = body->in_memory->bound;
+    PetscCall(PetscArraycpy(value, g->value + each * (size_t)w->cell0, each * (size_t)w->ncell));
+    if (before) {
+      p->step = before->step;
+      p->mass = before->mass;
+      p->bound = before->bound;
     }
   }
-  PetscCall(rename_surface(w, next->vert0[w->body], next->cell0[w->body], next, &result->renamed));
+  PetscCall(rename_surface(w, next, &result->renamed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -393,51 +363,53 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
   Work *work;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(m->nbody, &work));
+  PetscCall(PetscMalloc1(m->nbody, &work));
   for (PetscInt b = 0; b < m->nbody; b++) {
-    const PetscInt nvert = g->vert0[b + 1] - g->vert0[b];
+    Work *w = &work[b];
+    SbCaughtError caught = {0, ""};
 
-    work[b].model = m;
-    work[b].g = g;
-    work[b].body = b;
-    work[b].vert0 = g->vert0[b];
-    work[b].cell0 = g->cell0[b];
-    work[b].ncell = g->cell0[b + 1] - g->cell0[b];
-    work[b].element = m->element[b];
-    work[b].each = 3 * g->nfield;
-    for (PetscInt k = 0; k < m->nset; k++)
-      work[b].groups |= m->set[k].shape == SB_SET_GROUP ? SB_SET_BIT(k) : 0;
+    *w = (Work){.model = m,
+                .g = g,
+                .body = b,
+                .vert0 = g->vert0[b],
+                .cell0 = g->cell0[b],
+                .nvert = g->vert0[b + 1] - g->vert0[b],
+                .ncell = g->cell0[b + 1] - g->cell0[b],
+                .element = m->element[b],
+                .each = 3 * g->nfield};
+    for (PetscInt k = 0; k < m->nset; k++) w->groups |= m->set[k].shape == SB_SET_GROUP ? SB_SET_BIT(k) : 0;
     for (PetscInt k = 0; k < m->body[b].ninclusion; k++)
-      work[b].inclusions |= SB_SET_BIT(m->body[b].inclusion[k].set);
-    PetscCall(PetscMalloc1(4 * (size_t)work[b].ncell, &work[b].cell));
-    PetscCall(PetscMalloc1(nvert, &work[b].at));
-    for (PetscInt i = 0; i < 4 * work[b].ncell; i++) {
-      work[b].cell[i] = g->cell[4 * work[b].cell0 + i] - work[b].vert0;
-      work[b].at[work[b].cell[i]] = i;
+      w->inclusions |= SB_SET_BIT(m->body[b].inclusion[k].set);
+    PetscCall(
+      PetscMalloc3(4 * (size_t)w->ncell, &w->cell, w->nvert, &w->at, PetscMax(w->nvert, w->ncell), &w->own));
+    for (PetscInt i = 0; i < 4 * w->ncell; i++) {
+      w->cell[i] = g->cell[4 * w->cell0 + i] - w->vert0;
+      w->at[w->cell[i]] = i;
     }
-    if (work[b].element->nodes_per[1])
-      PetscCall(list_edges(work[b].ncell, work[b].cell, &work[b].nedge, &work[b].edge));
-    PetscCall(SbFacesCreate(nvert, work[b].ncell, work[b].cell, &work[b].faces));
-    PetscCall(SbLocatorCreate(work[b].ncell, work[b].cell, g->X + 3 * work[b].vert0, off_of(&work[b], 0),
-                              &work[b].rest));
-    r->outcome[b] = (SbRemeshOutcome){{nvert, nvert}, {work[b].ncell, work[b].ncell}, 0, 0., ""};
+    for (PetscInt i = 0; i < PetscMax(w->nvert, w->ncell); i++) w->own[i] = i;
+    if (w->element->nodes_per[1]) PetscCall(list_edges(w->ncell, w->cell, &w->nedge, &w->edge));
+    PetscCall(SbFacesCreate(w->nvert, w->ncell, w->cell, &w->faces));
+    PetscCall(SbLocatorCreate(w->ncell, w->cell, g->X + 3 * w->vert0, off_of(w, 0), &w->rest));
     // re-mesh the body; an error becomes the message
     if (due[b]) {
-      SbCaughtError caught = {0, ""};
-
-      SB_CATCH(&caught, make_mesh(&work[b], how));
-      (void)snprintf(r->outcome[b].message, sizeof(r->outcome[b].message), "%.511s", caught.text);
-      work[b].done = (PetscBool)!caught.code;
-      if (caught.code) PetscCall(SbNewMeshDestroy(&work[b].mesh));
-      if (work[b].done) {
-        r->outcome[b].nvert[1] = work[b].mesh.nvert;
-        r->outcome[b].ncell[1] = work[b].mesh.ncell;
-      }
-      r->outcome[b].nmoved = work[b].mesh.nmoved;
-      r->outcome[b].quality = work[b].mesh.quality;
+      SB_CATCH(&caught, make_mesh(w, how));
+      w->done = (PetscBool)!caught.code;
+      if (caught.code) PetscCall(SbNewMeshDestroy(&w->mesh));
     }
-    r->done[b] = work[b].done;
-    room += nvert + 2 * work[b].faces.nboundary + work[b].nedge;
+    if (!w->done)
+      w->mesh = (SbNewMesh){.nvert = w->nvert,
+                            .ncell = w->ncell,
+                            .nkept = w->nvert,
+                            .X = g->X + 3 * w->vert0,
+                            .cell = w->cell,
+                            .kept = w->own,
+                            .within = w->own,
+                            .edge_off = (PetscReal *)off_of(w, 0)};
+    r->outcome[b] = (SbRemeshOutcome){
+      {w->nvert, w->mesh.nvert}, {w->ncell, w->mesh.ncell}, w->mesh.nmoved, w->mesh.quality, ""};
+    (void)snprintf(r->outcome[b].message, sizeof(r->outcome[b].message), "%.511s", caught.text);
+    r->done[b] = w->done;
+    room += w->nvert + 2 * w->faces.nboundary + w->nedge;
   }
   // counts of the next meshes, and arrays for their values
   r->next.nbody = g->nbody;
@@ -455,10 +427,9 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
   PetscCall(PetscMalloc2(room, &r->renamed.from, room, &r->renamed.to));
   for (PetscInt b = 0; b < m->nbody; b++) {
     PetscCall(finish_body(&work[b], step, r));
-    PetscCall(SbNewMeshDestroy(&work[b].mesh));
+    if (work[b].done) PetscCall(SbNewMeshDestroy(&work[b].mesh));
     PetscCall(SbLocatorDestroy(&work[b].rest));
-    PetscCall(PetscFree(work[b].cell));
-    PetscCall(PetscFree(work[b].at));
+    PetscCall(PetscFree3(work[b].cell, work[b].at, work[b].own));
     PetscCall(PetscFree(work[b].edge));
     PetscCall(SbFacesDestroy(&work[b].faces));
   }

@@ -1,21 +1,24 @@
 /*
   body.c - a new mesh of a body in its current state, on rank 0.
 
-  The hull is kept: all triangles of the surface and of interfaces between regions, with their vertices. Its interior is tetrahedralised
-  again, in the current or the reference configuration. A new vertex y in the current configuration lies in a tet of the old mesh with barycentric coordinates w,
-  y = sum w_a x_a; its rest position is X = sum w_a X_a, that of the same material point. So the volume at rest is the same,
-  and the old motion from X to x is interpolated at other points.
+  The hull is kept: all triangles of the surface and of interfaces between regions, with their vertices. Its
+  interior is tetrahedralised again, in the current or the reference configuration. A new vertex y in the
+  current configuration lies in a tet of the old mesh with barycentric coordinates w, y = sum w_a x_a; its
+  rest position is X = sum w_a X_a, that of the same material point. So the volume at rest is the same, and
+  the old motion from X to x is interpolated at other points.
 
-  The motion is not linear between these points, so a new tet may be inverted at rest but not in the current configuration. Inverted and flat tets
-  are repaired by moving their inner vertices through the material towards the mean of their neighbours: of a few positions on the
-  way the one with the best worst tet is chosen, until all are good or nothing helps. A tet with four vertices on a face that was plane at rest and bulges
-  now has no volume at rest, and no inner vertex: one of its inner edges is split at the middle, with all tets around, and the new vertex
-  moves inwards.
+  The motion is not linear between these points, so a new tet may be inverted at rest but not in the current
+  configuration. Inverted and flat tets are repaired by moving their inner vertices through the material
+  towards the mean of their neighbours: of a few positions on the way the one with the best worst tet is
+  chosen, until all are good or nothing helps. A tet with four vertices on a face that was plane at rest and
+  bulges now has no volume at rest, and no inner vertex: one of its inner edges is split at the middle, with
+  all tets around, and the new vertex moves inwards.
 
-  In a body with curved tets the triangles of the hull keep their curved edges, so its shape is the same. The flat triangles enclose the tetrahedralised volume. The old tets define a map
-  from it, at rest, to the body: from the point with barycentric coordinates w in a straight tet to that with l = w in the curved tet. New vertices, and nodes at
-  the middles of new edges, are mapped, so that inner edges follow the curvature of the surface. A new tet may still have a negative Jacobian, and is repaired like a
-  flat one.
+  In a body with curved tets the triangles of the hull keep their curved edges, so its shape is the same. The
+  flat triangles enclose the tetrahedralised volume. The old tets define a map from it, at rest, to the body:
+  from the point with barycentric coordinates w in a straight tet to that with l = w in the curved tet. New
+  vertices, and nodes at the middles of new edges, are mapped, so that inner edges follow the curvature of the
+  surface. A new tet may still have a negative Jacobian, and is repaired like a flat one.
 */
 #include "remesh_impl.h"
 
@@ -30,8 +33,7 @@ typedef struct {
   const SbOldMesh *old;
   SbLocator rest, flat; /* locator at rest; among straight tets, for a body with curved ones, else NULL */
   PetscInt ncurved;
-  SbKey *
-    curved; /* [ncurved] curved edges between kept vertices: SbKeyOfPair() of new numbers; slot 6 cell + edge in the old mesh */
+  SbKey *curved; /* [ncurved] curved edges between kept vertices, by new numbers; old slots 6 cell + edge */
 } Material;
 
 /* ------------------------------------------------------------------ the hull */
@@ -101,7 +103,7 @@ static void bend(const Material *at, SbNewMesh *m, PetscInt c, PetscInt vertex)
   }
 }
 
-/* Rest positions of vertices created in the current configuration, and their current positions by the old mesh. */
+/* Rest positions of vertices created in the current configuration; their current ones by the old mesh. */
 static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, SbNewMesh *m)
 {
   const SbOldMesh *old = at->old;
@@ -110,13 +112,12 @@ static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, 
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(3 * (size_t)m->nvert, &m->X));
+  if (old->edge_off) PetscCall(PetscMalloc1(3 * (size_t)m->nvert, &m->flat));
   for (PetscInt v = 0; v < m->nkept; v++) {
     PetscCall(PetscArraycpy(m->X + 3 * v, old->X + 3 * m->kept[v], 3));
     PetscCall(PetscArraycpy(m->x + 3 * v, old->x + 3 * m->kept[v], 3));
+    if (m->flat) PetscCall(PetscArraycpy(m->flat + 3 * v, m->X + 3 * v, 3));
   }
-  if (old->edge_off) PetscCall(PetscMalloc1(3 * (size_t)m->nvert, &m->flat));
-  for (PetscInt v = 0; old->edge_off && v < m->nkept; v++)
-    PetscCall(PetscArraycpy(m->flat + 3 * v, m->X + 3 * v, 3));
   if (!how->rest) PetscCall(SbLocatorCreate(old->ncell, old->cell, old->x, NULL, &now));
   for (PetscInt v = m->nkept; v < m->nvert; v++) {
     PetscInt cell;
@@ -138,20 +139,10 @@ static PetscErrorCode find_material(const Material *at, const SbRemeshing *how, 
 
 /* ------------------------------------------------------------------ repair of inverted and flat tets */
 
-static PetscReal shape_at(const SbNewMesh *m, const PetscReal at[], PetscInt cell)
-{
-  PetscReal x[4][3];
-
-  for (int a = 0; a < 4; a++) {
-    for (int k = 0; k < 3; k++) x[a][k] = at[3 * m->cell[4 * cell + a] + k];
-  }
-  return SbTetQuality((const PetscReal(*)[3])x);
-}
-
 /* Quality of a tet at rest; for a curved one the worse of this and its least relative Jacobian. */
 static PetscReal shape_at_rest(const SbNewMesh *m, PetscInt cell)
 {
-  const PetscReal shape = shape_at(m, m->X, cell),
+  const PetscReal shape = SbTetQuality(m->X, m->cell + 4 * cell),
                   *off = m->edge_off ? m->edge_off + 18 * (size_t)cell : NULL;
   PetscBool curved = PETSC_FALSE;
   PetscReal least;
@@ -165,7 +156,7 @@ static PetscReal shape_at_rest(const SbNewMesh *m, PetscInt cell)
 /* The worse of its qualities at rest and now. */
 static PetscReal worse(const SbNewMesh *m, PetscInt cell)
 {
-  const PetscReal rest = shape_at_rest(m, cell), now = shape_at(m, m->x, cell);
+  const PetscReal rest = shape_at_rest(m, cell), now = SbTetQuality(m->x, m->cell + 4 * cell);
 
   return PetscMin(rest, now);
 }
@@ -190,18 +181,17 @@ static PetscReal worst_around(const SbNewMesh *m, const Stars *s, PetscInt v)
 /* Tries positions on the way to the mean of the neighbours at rest; returns whether one was better. */
 static PetscBool move_vertex(const Material *at, const Stars *s, PetscInt v, SbNewMesh *m)
 {
-  PetscReal middle[3] = {0, 0, 0}, X[3], best_X[3], best_x[3], best_flat[3], best = worst_around(m, s, v),
-            part = 1;
+  PetscReal *const place[3] = {m->X + 3 * v, m->x + 3 * v, m->flat ? m->flat + 3 * v : NULL};
+  const int nplace = m->flat ? 3 : 2;
+  PetscReal middle[3] = {0, 0, 0}, X[3], kept[3][3], best = worst_around(m, s, v), part = 1;
   const PetscReal n = 4 * (PetscReal)(s->start[v + 1] - s->start[v]);
   PetscBool better = PETSC_FALSE;
 
+  for (int k = 0; k < nplace; k++) memcpy(kept[k], place[k], sizeof(kept[k]));
   for (int k = 0; k < 3; k++) {
-    X[k] = best_X[k] = m->X[3 * v + k];
-    best_x[k] = m->x[3 * v + k];
-    if (m->flat) best_flat[k] = m->flat[3 * v + k];
-    for (PetscInt i = s->start[v]; i < s->start[v + 1]; i++) {
+    X[k] = m->X[3 * v + k];
+    for (PetscInt i = s->start[v]; i < s->start[v + 1]; i++)
       for (int a = 0; a < 4; a++) middle[k] += m->X[3 * m->cell[4 * s->cells[i] + a] + k] / n;
-    }
   }
   for (int i = 0; i < PLACES; i++, part /= 2) {
     PetscReal now;
@@ -213,17 +203,9 @@ static PetscBool move_vertex(const Material *at, const Stars *s, PetscInt v, SbN
     if (!(now > best)) continue;
     best = now;
     better = PETSC_TRUE;
-    for (int k = 0; k < 3; k++) {
-      best_X[k] = m->X[3 * v + k];
-      best_x[k] = m->x[3 * v + k];
-      if (m->flat) best_flat[k] = m->flat[3 * v + k];
-    }
+    for (int k = 0; k < nplace; k++) memcpy(kept[k], place[k], sizeof(kept[k]));
   }
-  for (int k = 0; k < 3; k++) {
-    m->X[3 * v + k] = best_X[k];
-    m->x[3 * v + k] = best_x[k];
-    if (m->flat) m->flat[3 * v + k] = best_flat[k];
-  }
+  for (int k = 0; k < nplace; k++) memcpy(place[k], kept[k], sizeof(kept[k]));
   for (PetscInt j = s->start[v]; j < s->start[v + 1]; j++) bend(at, m, s->cells[j], v);
   return better;
 }
@@ -290,7 +272,7 @@ static PetscErrorCode split_edge(const Material *at_old, const PetscInt ends[2],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Moves vertices, and splits edges of tets without movable vertices, until all tets are good enough or nothing helps. */
+/* Moves vertices, splits edges of tets without movable ones, until all are good enough or nothing helps. */
 static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, const SbSurface *hull,
                                   SbNewMesh *m)
 {
@@ -342,7 +324,7 @@ static PetscErrorCode repair_tets(const Material *at, const SbRemeshing *how, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Error if a bad tet remains; inverted tets in the current configuration are allowed if the old mesh has some. */
+/* Error if a bad tet remains; inverted tets now are allowed if the old mesh has some. */
 static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how, SbNewMesh *m)
 {
   PetscInt at_rest = 0, now = 0, before = 0;
@@ -352,7 +334,7 @@ static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how
   // quality of the new tets, at rest and now
   m->quality = 1;
   for (PetscInt c = 0; c < m->ncell; c++) {
-    const PetscReal quality = shape_at(m, m->x, c);
+    const PetscReal quality = SbTetQuality(m->x, m->cell + 4 * c);
 
     at_rest += !(shape_at_rest(m, c) > 1e-6);
     now += !(quality > 0);
@@ -360,10 +342,8 @@ static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how
   }
   // quality of the old tets now
   for (PetscInt c = 0; c < old->ncell; c++) {
-    PetscReal x[4][3], quality;
+    const PetscReal quality = SbTetQuality(old->x, old->cell + 4 * c);
 
-    for (int i = 0; i < 12; i++) x[i / 3][i % 3] = old->x[3 * old->cell[4 * c + i / 3] + i % 3];
-    quality = SbTetQuality((const PetscReal(*)[3])x);
     before += !(quality > 0);
     worst = PetscMin(worst, quality);
   }
@@ -385,29 +365,6 @@ static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how
 }
 
 /* ------------------------------------------------------------------ re-meshing of a body */
-
-static PetscErrorCode prepare(const SbOldMesh *old, const SbNewMesh *m, Material *at)
-{
-  PetscInt n = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbLocatorCreate(old->ncell, old->cell, old->X, old->edge_off, &at->rest));
-  if (!old->edge_off) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbLocatorCreate(old->ncell, old->cell, old->X, NULL, &at->flat));
-  PetscCall(PetscMalloc1(6 * (size_t)old->ncell, &at->curved));
-  for (PetscInt i = 0; i < 6 * old->ncell; i++) {
-    const PetscReal *off = old->edge_off + 3 * (size_t)i;
-    PetscInt v[2];
-
-    if (off[0] == 0 && off[1] == 0 && off[2] == 0) continue;
-    for (int k = 0; k < 2; k++)
-      PetscCall(PetscFindInt(old->cell[4 * (i / 6) + SbTetEdge[i % 6][k]], m->nkept, m->kept, &v[k]));
-    if (v[0] >= 0 && v[1] >= 0) at->curved[n++] = (SbKey){SbKeyOfPair(v[0], v[1]), i};
-  }
-  SbKeysSort(n, at->curved);
-  at->ncurved = n;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRemeshing *how, SbSurface *hull,
                              Material *at, SbNewMesh *m)
@@ -461,7 +418,22 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
   PetscCall(PetscFree(used));
   PetscCheck(all, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "the mesher left out vertices of the surface, or made some of no tetrahedron");
-  PetscCall(prepare(old, m, at));
+  // locators in the old mesh; its curved edges between kept vertices
+  PetscCall(SbLocatorCreate(old->ncell, old->cell, old->X, old->edge_off, &at->rest));
+  if (old->edge_off) {
+    PetscCall(SbLocatorCreate(old->ncell, old->cell, old->X, NULL, &at->flat));
+    PetscCall(PetscMalloc1(6 * (size_t)old->ncell, &at->curved));
+    for (PetscInt i = 0; i < 6 * old->ncell; i++) {
+      const PetscReal *off = old->edge_off + 3 * (size_t)i;
+      PetscInt v[2];
+
+      if (off[0] == 0 && off[1] == 0 && off[2] == 0) continue;
+      for (int k = 0; k < 2; k++)
+        PetscCall(PetscFindInt(old->cell[4 * (i / 6) + SbTetEdge[i % 6][k]], m->nkept, m->kept, &v[k]));
+      if (v[0] >= 0 && v[1] >= 0) at->curved[at->ncurved++] = (SbKey){SbKeyOfPair(v[0], v[1]), i};
+    }
+    SbKeysSort(at->ncurved, at->curved);
+  }
   PetscCall(find_material(at, how, m));
   if (m->flat) PetscCall(PetscMalloc1(18 * (size_t)m->ncell, &m->edge_off));
   for (PetscInt c = 0; c < m->ncell; c++) bend(at, m, c, -1);

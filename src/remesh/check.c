@@ -1,15 +1,18 @@
 /*
   Quality of the tets of a body in the current configuration, and conservation of its momenta.
 
-  The corners of a tet are at their current positions; for CR and DG these are means over the cells around, as in vertex fields.
+  The corners of a tet are at their current positions; for CR and DG these are means over the cells around, as
+  in vertex fields.
 
-  Interpolation to another mesh changes momenta by a discretisation error. With p = M v, the six rigid velocities w_k (three translations,
-  three rotations about the origin in the current configuration) and D, which is zero on prescribed unknowns, the momenta are w_k . p, and v + sum_l c_l D w_l
-  has the wanted ones if
+  Interpolation to another mesh changes momenta by a discretisation error. With p = M v, the six rigid
+  velocities w_k (three translations, three rotations about the origin in the current configuration) and D,
+  which is zero on prescribed unknowns, the momenta are w_k . p, and v + sum_l c_l D w_l has the wanted ones
+  if
 
     sum_l (w_k . M D w_l) c_l = wanted_k - w_k . M v.
 
-  Rotations are taken about the centre of the body and lengths relative to its size, so that this small system is well conditioned; one refinement step follows.
+  Rotations are taken about the centre of the body and lengths relative to its size, so that this small system
+  is well conditioned; one refinement step follows.
 */
 #include "remesh_impl.h"
 #include "sbkernel.h"
@@ -61,11 +64,8 @@ PetscErrorCode SbBodyQualities(SbModel m, Vec U, const PetscBool named[], PetscR
   PetscCall(SbCornerPositions(m->space, U, at));
   for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
     const PetscInt body = mesh->cell_body[c];
-    PetscReal x[4][3], quality;
+    const PetscReal quality = named[body] ? SbTetQuality(at, mesh->cell + 4 * c) : 1.;
 
-    if (!named[body]) continue;
-    for (int i = 0; i < 12; i++) x[i / 3][i % 3] = at[3 * mesh->cell[4 * c + i / 3] + i % 3];
-    quality = SbTetQuality((const PetscReal(*)[3])x);
     worst[body] = PetscMin(worst[body], quality);
   }
   PetscCall(PetscFree(at));
@@ -84,12 +84,11 @@ static PetscErrorCode momenta_about(SbModel m, Vec U, const PetscReal v[], const
   const SbSpace s = m->space;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(3 * m->space->nnode, &p));
   // p = M v
-  PetscCall(PetscArrayzero(p, 3 * m->space->nnode));
-  SbSpaceAddInertia(m->space, &stage, p);
+  PetscCall(PetscCalloc1(3 * s->nnode, &p));
+  SbSpaceAddInertia(s, &stage, p);
   PetscCall(PetscArrayzero(&momenta[0][0], 6 * m->nbody));
-  PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
+  PetscCall(SbSpaceGetLocalRead(s, U, &u));
   // momenta of this rank's part of each body
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     const PetscInt b = s->node_body[i];
@@ -102,7 +101,7 @@ static PetscErrorCode momenta_about(SbModel m, Vec U, const PetscReal v[], const
       momenta[b][3 + k] += L[k];
     }
   }
-  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
   PetscCallMPI(
     MPI_Allreduce(MPI_IN_PLACE, &momenta[0][0], (PetscMPIInt)(6 * m->nbody), MPIU_REAL, MPI_SUM, m->comm));
   PetscCall(PetscFree(p));
@@ -120,7 +119,8 @@ PetscErrorCode SbBodyMomenta(SbModel m, Vec U, Vec V, PetscReal momenta[][6])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* v[nnode][3] += sum_l c[b][l] D w_l; rotations about the centres, lengths over the sizes. Returns the largest speed added on this rank. */
+/* v[nnode][3] += sum_l c[b][l] D w_l; rotations about the centres, lengths over the sizes. Returns the
+   largest speed added on this rank. */
 static PetscReal add_rigid(SbModel m, const PetscReal u[], const PetscReal middle[][4],
                            const PetscReal size[], const PetscReal c[][6], PetscReal v[])
 {
@@ -163,9 +163,8 @@ static PetscErrorCode correct(SbModel m, Vec U, const PetscBool named[], const P
     for (PetscInt b = 0; b < m->nbody; b++) c[b][l] = 1.;
     (void)add_rigid(m, u, middle, size, (const PetscReal(*)[6])c, w);
     PetscCall(momenta_about(m, U, w, middle, now));
-    for (PetscInt b = 0; b < m->nbody; b++) {
+    for (PetscInt b = 0; b < m->nbody; b++)
       for (int k = 0; k < 6; k++) G[b][l][k] = now[b][k] / (k < 3 ? 1. : size[b]);
-    }
   }
   PetscCall(momenta_about(m, U, v, middle, now));
   for (PetscInt b = 0; b < m->nbody; b++) {

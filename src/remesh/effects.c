@@ -1,5 +1,6 @@
 /*
-  Transfers history variables of effects (active contact, friction) to the new model, like a checkpoint with renumbered nodes.
+  Transfers history variables of effects (active contact, friction) to the new model, like a checkpoint with
+  renumbered nodes.
 
   Records of effects without the operation `rename` name no nodes.
 */

@@ -1,9 +1,9 @@
 /*
   Gathers a scene and its state on rank 0, and scatters vectors back.
 
-  A star forest connects the cells of each rank (leaves) with their positions on rank 0 (roots), by their original numbers. Each cell is sent with its vertices, its
-  sets, and the values of the vectors at its nodes: the same for every element; a node of several cells
-  is sent with each of them.
+  A star forest connects the cells of each rank (leaves) with their positions on rank 0 (roots), by their
+  original numbers. Each cell is sent with its vertices, its sets, and the values of the vectors at its nodes:
+  the same for every element; a node of several cells is sent with each of them.
 */
 #include "remesh_impl.h"
 
@@ -29,14 +29,14 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
 {
   const SbModel m = run->model;
   const SbMesh mesh = m->mesh;
-  PetscMPIInt rank, supports = m->space->dirichlet_node ? 1 : 0;
+  const SbSpace s = m->space;
+  PetscMPIInt rank, supports = s->dirichlet_node ? 1 : 0;
   PetscReal(*centre)[4], *now;
   Vec vec[3];
   PetscSF sf;
   const PetscInt n = mesh->ncell_owned;
   PetscInt *cell, each;
   uint64_t *set;
-  const SbSpace s = m->space;
   const PetscReal *array;
   PetscReal *value;
 
@@ -48,7 +48,7 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   g->nvert = mesh->Nvert;
   g->ncell = mesh->Ncell;
   g->nfield = vectors_of(run, vec);
-  g->width = m->space->edge_node ? SB_EDGES + 6 : supports ? 8 : 4;
+  g->width = s->edge_node ? SB_EDGES + 6 : supports ? 8 : 4;
   PetscCall(PetscCalloc2(m->nbody + 1, &g->vert0, m->nbody + 1, &g->cell0));
   PetscCall(PetscCalloc1(m->nbody, &g->mass));
   for (PetscInt b = 0; b < m->nbody; b++) {
@@ -61,12 +61,11 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   for (PetscInt b = 0; b < m->nbody; b++) g->mass[b] = centre[b][3];
   PetscCall(PetscFree(centre));
   // vertices and their sets to rank 0
-  if (!rank) {
+  if (!rank)
     PetscCall(PetscMalloc3(3 * (size_t)g->nvert, &g->X, 3 * (size_t)g->nvert, &g->x, g->nvert, &g->vert_set));
-  }
   PetscCall(SbForestOnRank0(mesh->comm, mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &sf));
   PetscCall(PetscMalloc1(3 * (size_t)mesh->nvert, &now));
-  PetscCall(SbCornerPositions(m->space, run->U, now));
+  PetscCall(SbCornerPositions(s, run->U, now));
   PetscCall(SbForestReduce(sf, 3, MPIU_REAL, mesh->x, g->X));
   PetscCall(SbForestReduce(sf, 3, MPIU_REAL, now, g->x));
   PetscCall(PetscFree(now));
@@ -74,10 +73,9 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   PetscCall(PetscSFDestroy(&sf));
   PetscCall(SbForestOnRank0(m->comm, mesh->Ncell, mesh->ncell_owned, mesh->cell_orig, &sf));
   // cells with their vertices, materials and sets
-  if (!rank) {
+  if (!rank)
     PetscCall(PetscMalloc3(4 * (size_t)g->ncell, &g->cell, g->ncell, &g->cell_material, 5 * (size_t)g->ncell,
                            &g->cell_set));
-  }
   PetscCall(PetscMalloc2(4 * (size_t)n, &cell, 5 * (size_t)n, &set));
   for (PetscInt c = 0; c < n; c++) {
     for (int a = 0; a < 4; a++) {

@@ -1,9 +1,10 @@
 /*
   mesher.c - tetrahedralisation of the hull by SbTetrahedralize(), which keeps its triangles.
 
-  The tets depend on the last bits of the coordinates, and these on the number of ranks, because solvers sum in different orders. So coordinates are
-  rounded to a thousandth of an edge, and the same body gets the same tets on any number of ranks. Where this fails for the rounded
-  surface, as where it nearly touches itself, exact coordinates are used. The vertices of the hull keep their positions in either case.
+  The tets depend on the last bits of the coordinates, and these on the number of ranks, because solvers sum
+  in different orders. So coordinates are rounded to a thousandth of an edge, and the same body gets the same
+  tets on any number of ranks. Where this fails for the rounded surface, as where it nearly touches itself,
+  exact coordinates are used. The vertices of the hull keep their positions in either case.
 */
 #include "sbremesh.h"
 #include "sbsurface.h"

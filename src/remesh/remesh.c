@@ -1,14 +1,17 @@
 /*
-  Re-meshing during a run: a body is re-meshed when the quality of its tets is too low, or at given times, and the run continues.
+  Re-meshing during a run: a body is re-meshed when the quality of its tets is too low, or at given times, and
+  the run continues.
 
-  After each step a callback decides whether the time loop returns (SbRun.after). Then the state is gathered on rank 0 (gather.c), bodies are
-  re-meshed and the state is interpolated (bodies.c), the scene is set up again from its options with these meshes in memory, and the
-  state is transferred: vectors, history variables of effects (effects.c), totals, output, ledger. Scaled densities conserve mass (SbMemoryMesh.mass),
-  a rigid motion added to the velocities conserves momenta (check.c). The change of kinetic and strain energy is remesh_loss in the
-  energy balance.
+  After each step a callback decides whether the time loop returns (SbRun.after). Then the state is gathered
+  on rank 0 (gather.c), bodies are re-meshed and the state is interpolated (bodies.c), the scene is set up
+  again from its options with these meshes in memory, and the state is transferred: vectors, history variables
+  of effects (effects.c), totals, output, ledger. Scaled densities conserve mass (SbMemoryMesh.mass), a rigid
+  motion added to the velocities conserves momenta (check.c). The change of kinetic and strain energy is
+  remesh_loss in the energy balance.
 
-  If re-meshing fails the body keeps its mesh, and the run continues with a warning; the next try is when its quality has halved, but at the earliest after 1, 2, 4, ...
-  steps. The same bound holds after a mesh that is hardly better: no body is re-meshed in every step.
+  If re-meshing fails the body keeps its mesh, and the run continues with a warning; the next try is when its
+  quality has halved, but at the earliest after 1, 2, 4, ... steps. The same bound holds after a mesh that is
+  hardly better: no body is re-meshed in every step.
 */
 #include "remesh_impl.h"
 #include "sbscene.h"
@@ -70,26 +73,22 @@ PetscErrorCode SbRemeshRegister(void)
 
 PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
 {
-  PetscBool named, any = PETSC_FALSE, comes = PETSC_FALSE, given;
+  PetscBool named = PETSC_FALSE, any = PETSC_FALSE, comes = PETSC_FALSE, given;
   PetscInt from, n;
+  SbScope own;
   SbRemesh r;
-  char(*words)[SB_NAME_MAX];
-  char(*names)[SB_NAME_MAX];
-  char wrong[SB_NAME_MAX] = "";
+  char(*words)[SB_NAME_MAX], wrong[SB_NAME_MAX] = "";
   PetscReal all;
   static const char *const keys[] = {"remesh_quality", "remesh_times", "remesh_failed"};
 
   PetscFunctionBeginUser;
   *remesh = NULL;
   // whether the scenario asks for re-meshing, by any option but the settings
-  named = PETSC_FALSE;
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(keys); k++) {
     PetscCall(SbOptionGiven(&SbRunScope, keys[k], &given));
     named = (PetscBool)(named || given);
   }
   for (PetscInt b = 0; b < m->nbody; b++) {
-    SbScope own;
-
     PetscCall(SbScopeSet(&own, "body", "", m->body[b].name));
     PetscCall(SbOptionGiven(&own, "remesh_quality", &given));
     named = (PetscBool)(named || given);
@@ -116,25 +115,23 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
   }
   if (!named) PetscFunctionReturn(PETSC_SUCCESS);
   // the named bodies; all if none is named
-  PetscCall(SbOptionNames(&SbRunScope, "remesh_bodies", &n, &names));
+  PetscCall(SbOptionNames(&SbRunScope, "remesh_bodies", &n, &words));
   for (PetscInt b = 0; b < m->nbody; b++) r->named[b] = (PetscBool)!n;
   for (PetscInt i = 0; i < n; i++) {
     PetscInt b = 0;
 
-    while (b < m->nbody && strcmp(names[i], m->body[b].name)) b++;
+    while (b < m->nbody && strcmp(words[i], m->body[b].name)) b++;
     if (b < m->nbody)
       r->named[b] = PETSC_TRUE;
     else
-      PetscCall(PetscStrncpy(wrong, names[i], sizeof(wrong)));
+      PetscCall(PetscStrncpy(wrong, words[i], sizeof(wrong)));
   }
-  PetscCall(PetscFree(names));
+  PetscCall(PetscFree(words));
   PetscCheck(!wrong[0], PETSC_COMM_SELF, PETSC_ERR_USER,
              "-remesh_bodies: the scenario has no body '%s'; give names of -bodies", wrong);
   // their quality bounds
   PetscCall(SbOptionReal(&SbRunScope, "remesh_quality", &all));
   for (PetscInt b = 0; b < m->nbody; b++) {
-    SbScope own;
-
     if (!r->named[b]) continue;
     r->asked[b] = all;
     PetscCall(SbScopeSet(&own, "body", "", m->body[b].name));
@@ -147,20 +144,14 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
   PetscCall(PetscMalloc1(r->ntime, &r->time));
   for (PetscInt i = 0; i < r->ntime; i++) {
     char *end;
-    PetscBool good;
 
     r->time[i] = strtod(words[i], &end);
-    good = (PetscBool)(!*end && r->time[i] > 0. && !PetscIsInfOrNanReal(r->time[i]));
-    if (!good) {
-      char word[SB_NAME_MAX];
-
-      PetscCall(PetscStrncpy(word, words[i], sizeof(word)));
-      PetscCall(PetscFree(words));
-      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER,
-              "-remesh_times: '%s' is no time above 0 s; give numbers with commas between them", word);
-    }
+    if (!wrong[0] && (*end || !(r->time[i] > 0.) || PetscIsInfOrNanReal(r->time[i])))
+      PetscCall(PetscStrncpy(wrong, words[i], sizeof(wrong)));
   }
   PetscCall(PetscFree(words));
+  PetscCheck(!wrong[0], PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-remesh_times: '%s' is no time above 0 s; give numbers with commas between them", wrong);
   PetscCall(SbOptionBool(&SbRunScope, "remesh_failed", &r->failed));
   PetscCall(SbOptionChoice(&SbRunScope, "remesh_from", &from));
   PetscCall(SbOptionReal(&SbRunScope, "remesh_size", &r->how.size));
@@ -205,20 +196,15 @@ static PetscErrorCode check_quality(SbRun run, PetscInt step, PetscReal t, Petsc
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(r->event, 0, 0, 0, 0));
-  *pause = PETSC_FALSE;
   for (PetscInt i = 0; i < r->ntime; i++)
     time = (PetscBool)(time || (r->time[i] > t - dt + ahead && r->time[i] <= t + ahead));
   r->changes = PETSC_FALSE;
   for (PetscInt i = 0; i < r->nchange; i++)
     r->changes = (PetscBool)(r->changes || (r->change[i] > t - dt + ahead && r->change[i] <= t + ahead));
   *pause = r->changes;
-  if (!r->meshes) {
-    PetscCall(PetscLogEventEnd(r->event, 0, 0, 0, 0));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
   r->how.better = (PetscBool)!time;
-  PetscCall(SbBodyQualities(run->model, run->U, r->named, r->worst));
-  for (PetscInt b = 0; b < r->nbody; b++) {
+  if (r->meshes) PetscCall(SbBodyQualities(run->model, run->U, r->named, r->worst));
+  for (PetscInt b = 0; b < r->nbody && r->meshes; b++) {
     const PetscBool bad = (PetscBool)(r->asked[b] > 0. && r->worst[b] < r->bound[b] && step >= r->from[b]);
 
     r->due[b] = (PetscBool)(r->named[b] && (time || bad));
@@ -294,89 +280,80 @@ static PetscReal distance(const PetscReal a[3], const PetscReal b[3])
   return PetscSqrtReal(PetscSqr(a[0] - b[0]) + PetscSqr(a[1] - b[1]) + PetscSqr(a[2] - b[2]));
 }
 
-/* ------------------------------------------------------------------ re-meshing */
-
-/* Sets up the new scene and transfers the state; on an error the message is kept, and the old scene continues. */
+/* Sets up the new scene and transfers the state. */
 static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
 {
   Scene s = {NULL, NULL, NULL};
-  SbEnergies e[2];
-  PetscReal speed = 0.;
+  SbEnergies e[2] = {{0}};
+  PetscReal speed[2] = {0.}; /* largest speed, and acceleration, added to conserve momenta and their rates */
   SbRun run;
   const SbRun before = old->run;
-  PetscReal(*momenta)[6], rate;
-  const SbRemeshOutcome *outcome = result->outcome;
+  PetscReal(*momenta)[6];
 
   PetscFunctionBeginUser;
   // set up the scene from its options, on the new meshes; the solver is the one chosen before
   PetscCall(SbSceneCreate(old->model->comm, &s.model));
-  PetscCall(SbRunCreate(s.model, &s.run));
-  PetscCall(PetscStrncpy(s.run->solver_choice, old->run->solver, sizeof(s.run->solver_choice)));
-  PetscCall(SbLedgerSetFromOptions(s.run, &s.ledger));
+  PetscCall(SbRunCreate(s.model, &run));
+  s.run = run;
+  PetscCall(PetscStrncpy(run->solver_choice, before->solver, sizeof(run->solver_choice)));
+  PetscCall(SbLedgerSetFromOptions(run, &s.ledger));
   // the bodies' meshes, on rank 0; the model owns them from now on
   for (PetscInt b = 0; b < s.model->nbody; b++) {
     PetscCall(SbMemoryMeshShare(s.model->comm, &result->in_memory[b]));
     s.model->body[b].in_memory = result->in_memory[b];
     result->in_memory[b] = NULL;
   }
-  s.model->t_begin = old->run->t_now;
+  s.model->t_begin = before->t_now;
   PetscCall(SbModelSetUp(s.model));
   PetscCall(SbSceneValidate(s.model));
-  PetscCall(SbRunSetUp(s.run));
-  PetscCall(PetscStrncpy(s.run->solver_reason, old->run->solver_reason, sizeof(s.run->solver_reason)));
+  PetscCall(SbRunSetUp(run));
+  PetscCall(PetscStrncpy(run->solver_reason, before->solver_reason, sizeof(run->solver_reason)));
   // transfer the state
-  run = s.run;
-  PetscCall(SbRunTransferState(old->run, run));
+  PetscCall(SbRunTransferState(before, run));
   PetscCall(SbScatter(&result->next, run));
   PetscCall(SbModelPrescribe(s.model, run->t_now, run->U));
   // conserve the bodies' momenta, and their rates where the integrator stores accelerations
-  if (run->V) {
-    PetscCall(PetscCalloc1(old->model->nbody, &momenta));
-    PetscCall(SbBodyMomenta(old->model, before->U, before->V, momenta));
-    PetscCall(
-      SbBodySetMomenta(run->model, run->U, run->V, result->done, (const PetscReal(*)[6])momenta, &speed));
-    if (run->A) {
-      PetscCall(SbBodyMomenta(old->model, before->U, before->A, momenta));
-      PetscCall(
-        SbBodySetMomenta(run->model, run->U, run->A, result->done, (const PetscReal(*)[6])momenta, &rate));
-    }
-    PetscCall(PetscFree(momenta));
+  PetscCall(PetscCalloc1(old->model->nbody, &momenta));
+  for (int i = 0; i < 2; i++) {
+    const Vec from = i ? before->A : before->V, to = i ? run->A : run->V;
+
+    if (!to) continue;
+    PetscCall(SbBodyMomenta(old->model, before->U, from, momenta));
+    PetscCall(SbBodySetMomenta(s.model, run->U, to, result->done, (const PetscReal(*)[6])momenta, &speed[i]));
   }
-  PetscCall(SbEffectsHandOver(old->run, run, &result->renamed));
+  PetscCall(PetscFree(momenta));
+  PetscCall(SbEffectsHandOver(before, run, &result->renamed));
   // penalty of CR and DG for the new state, before accelerations and energies are computed
-  if (run->J && run->model->dynamic && run->preset != SB_TIME_ALPHA2)
-    PetscCall(SbSpaceFollowJumps(run->model->space, run->U,
-                                 run->preset == SB_TIME_NEWMARK ? SB_STEPS_UNDAMPED : SB_STEPS_IN_TIME,
-                                 NULL));
+  if (run->J && s.model->dynamic && run->preset != SB_TIME_ALPHA2)
+    PetscCall(SbSpaceFollowJumps(
+      s.model->space, run->U, run->preset == SB_TIME_NEWMARK ? SB_STEPS_UNDAMPED : SB_STEPS_IN_TIME, NULL));
   PetscCall(SbRunRestartAcceleration(run));
   // energy, mass and momentum of both states; the difference of energy is remesh_loss
-  PetscCall(PetscMemzero(e, 2 * sizeof(*e)));
-  PetscCall(SbModelEnergies(old->model, old->run->U, old->run->V, &e[0]));
-  PetscCall(SbModelEnergies(s.model, s.run->U, s.run->V, &e[1]));
-  s.run->energies.remesh_loss += e[0].kinetic + e[0].strain - e[1].kinetic - e[1].strain;
-  s.run->energies.remesh_mass += PetscAbsReal(s.model->mass - old->model->mass);
-  s.run->energies.remesh_momentum += distance(e[0].momentum, e[1].momentum);
+  PetscCall(SbModelEnergies(old->model, before->U, before->V, &e[0]));
+  PetscCall(SbModelEnergies(s.model, run->U, run->V, &e[1]));
+  run->energies.remesh_loss += e[0].kinetic + e[0].strain - e[1].kinetic - e[1].strain;
+  run->energies.remesh_mass += PetscAbsReal(s.model->mass - old->model->mass);
+  run->energies.remesh_momentum += distance(e[0].momentum, e[1].momentum);
   PetscCall(SbLedgerAttach(s.ledger));
   if (s.ledger) PetscCall(SbLedgerContinue(old->ledger, s.ledger));
-  PetscCall(SbRemeshAttach(r, s.run));
-  if (old->run->output) PetscCall(SbOutputReattach(old->run, s.run));
+  PetscCall(SbRemeshAttach(r, run));
+  if (before->output) PetscCall(SbOutputReattach(before, run));
   // one line for each body that was re-meshed
   for (PetscInt b = 0; b < r->nbody; b++) {
-    SbRemeshed entry = {.step = s.run->step_now, .t = s.run->t_now};
+    const SbRemeshOutcome *o = &result->outcome[b];
+    SbRemeshed entry = {.step = run->step_now,
+                        .t = run->t_now,
+                        .tets = {o->ncell[0], o->ncell[1]},
+                        .vertices = {o->nvert[0], o->nvert[1]},
+                        .energy = {e[0].kinetic + e[0].strain, e[1].kinetic + e[1].strain},
+                        .quality = {r->worst[b], o->quality},
+                        .moved = o->nmoved,
+                        .speed = speed[0],
+                        .shift = distance(e[0].centre, e[1].centre)};
 
     if (!result->done[b]) continue;
     PetscCall(PetscStrncpy(entry.body, s.model->body[b].name, sizeof(entry.body)));
-    for (int i = 0; i < 2; i++) {
-      entry.tets[i] = outcome[b].ncell[i];
-      entry.vertices[i] = outcome[b].nvert[i];
-      entry.energy[i] = e[i].kinetic + e[i].strain;
-    }
-    entry.quality[0] = r->worst[b];
-    entry.quality[1] = outcome[b].quality;
-    entry.moved = outcome[b].nmoved;
-    entry.speed = speed;
-    entry.shift = distance(e[0].centre, e[1].centre);
-    PetscCall(SbReportRemeshed(s.run, &entry));
+    PetscCall(SbReportRemeshed(run, &entry));
   }
   PetscCall(SbLedgerDestroy(&old->ledger));
   PetscCall(SbRunDestroy(&old->run));
@@ -389,9 +366,8 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
 static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
 {
   SbRemeshResult result;
-  const SbRemeshOutcome *outcome;
-  const PetscBool *done;
-  const SbModel m = scene->run->model;
+  SbRun run = scene->run;
+  const SbModel m = scene->model;
   SbRenamed *renamed = &result.renamed;
   SbGathered g;
   PetscMPIInt rank;
@@ -399,11 +375,11 @@ static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
   PetscFunctionBeginUser;
   PetscCall(PetscLogStagePush(SbLogStageSetup));
   PetscCall(PetscLogEventBegin(r->event, 0, 0, 0, 0));
-  PetscCall(SbRemeshResultCreate(scene->model->nbody, &result));
+  PetscCall(SbRemeshResultCreate(m->nbody, &result));
   // new meshes on rank 0; messages, counts and names are sent to all ranks
   PetscCallMPI(MPI_Comm_rank(m->comm, &rank));
-  PetscCall(SbGather(scene->run, &g));
-  if (!rank) PetscCall(SbRemeshBodies(m, &g, r->due, scene->run->step_now, &r->how, &result));
+  PetscCall(SbGather(run, &g));
+  if (!rank) PetscCall(SbRemeshBodies(m, &g, r->due, run->step_now, &r->how, &result));
   result.next.nbody = g.nbody;
   result.next.nfield = g.nfield;
   result.next.width = g.width;
@@ -415,37 +391,33 @@ static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
   if (rank) PetscCall(PetscMalloc2(renamed->n, &renamed->from, renamed->n, &renamed->to));
   PetscCallMPI(MPI_Bcast(renamed->from, (PetscMPIInt)renamed->n, MPIU_INT, 0, m->comm));
   PetscCallMPI(MPI_Bcast(renamed->to, (PetscMPIInt)renamed->n, MPIU_INT, 0, m->comm));
-  *any = PETSC_FALSE;
-  for (PetscInt b = 0; b < m->nbody; b++) {
-    *any = (PetscBool)(*any || result.done[b]);
-    if (r->due[b] && !result.done[b])
-      PetscCall(SbWarning(m->comm, "body '%s' keeps its mesh after step %" PetscInt_FMT ": %s",
-                          m->body[b].name, scene->run->step_now, result.outcome[b].message));
-  }
-  // quality and step from which a body may be re-meshed again
-  outcome = result.outcome;
-  done = result.done;
-  for (PetscInt b = 0; b < r->nbody; b++) {
-    const PetscReal reached = done[b] ? outcome[b].quality : r->worst[b];
-
-    if (!r->due[b]) continue;
-    if (reached > 0.) r->bound[b] = PetscMin(r->asked[b], AGAIN * reached);
-    r->rest[b] = done[b] && reached > 0. ? 0 : PetscMax(1, 2 * r->rest[b]);
-    r->from[b] = scene->run->step_now + r->rest[b];
-    if (result.in_memory[b] && done[b]) result.in_memory[b]->bound = r->bound[b];
-  }
-  *any = (PetscBool)(*any || r->changes);
+  *any = r->changes;
   r->changes = PETSC_FALSE;
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    const PetscBool done = result.done[b];
+    const PetscReal reached = done ? result.outcome[b].quality : r->worst[b];
+
+    *any = (PetscBool)(*any || done);
+    if (!r->due[b]) continue;
+    if (!done)
+      PetscCall(SbWarning(m->comm, "body '%s' keeps its mesh after step %" PetscInt_FMT ": %s",
+                          m->body[b].name, run->step_now, result.outcome[b].message));
+    // quality and step from which the body may be re-meshed again
+    if (reached > 0.) r->bound[b] = PetscMin(r->asked[b], AGAIN * reached);
+    r->rest[b] = done && reached > 0. ? 0 : PetscMax(1, 2 * r->rest[b]);
+    r->from[b] = run->step_now + r->rest[b];
+    if (result.in_memory[b] && done) result.in_memory[b]->bound = r->bound[b];
+  }
   if (*any) PetscCall(replace(r, scene, &result));
   PetscCall(SbRemeshResultDestroy(&result));
   PetscCall(PetscLogEventEnd(r->event, 0, 0, 0, 0));
   PetscCall(PetscLogStagePop());
   // without a new mesh the time loop resumes at the current step
   if (!*any) {
-    scene->run->step0 = scene->run->step_now;
-    scene->run->t0 = scene->run->t_now;
-    scene->run->newton_before = scene->run->newton_total;
-    scene->run->linear_before = scene->run->linear_total;
+    run->step0 = run->step_now;
+    run->t0 = run->t_now;
+    run->newton_before = run->newton_total;
+    run->linear_before = run->linear_total;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -453,32 +425,30 @@ static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
 PetscErrorCode SbRemeshSolve(SbRemesh r, SbModel *model, SbRun *run, SbLedger *ledger)
 {
   Scene scene = {*model, *run, ledger ? *ledger : NULL};
-  PetscBool again = PETSC_FALSE, failed = PETSC_FALSE, any = PETSC_FALSE;
-  SbRun first;
+  SbRun first = scene.run;
+  PetscBool again, any;
 
   PetscFunctionBeginUser;
   // a checkpoint before a due re-meshing contains the old meshes: a restart re-meshes first
-  first = scene.run;
-  if (r && first->step0 && first->after.dt > 0.) {
+  if (r && first->step0 && (first->after.dt > 0. || r->nchange)) {
+    const PetscBool initial = (PetscBool) !(first->after.dt > 0.);
+
     first->step_now = first->step0;
     first->t_now = first->t0;
-    PetscCall(check_quality(first, first->step0, first->t0, first->after.dt, r, &again));
-    if (again) PetscCall(apply(r, &scene, &any));
-  } else if (r && first->step0 && r->nchange) {
-    // the new scene is in its initial state, as at the start of the first run
-    first->step_now = first->step0;
-    first->t_now = first->t0;
-    PetscCall(check_quality(first, first->step0, first->t0, first->t0, r, &again));
-    for (PetscInt b = 0; b < r->nbody; b++) r->due[b] = PETSC_FALSE;
-    if (r->changes) PetscCall(apply(r, &scene, &any));
+    PetscCall(
+      check_quality(first, first->step0, first->t0, initial ? first->t0 : first->after.dt, r, &again));
+    // the new scene is in its initial state, as at the start of the first run: only supports come and go
+    for (PetscInt b = 0; b < r->nbody && initial; b++) r->due[b] = PETSC_FALSE;
+    if (initial ? r->changes : again) PetscCall(apply(r, &scene, &any));
   }
   do {
+    PetscBool failed = PETSC_FALSE;
+
     PetscCall(SbRunSolve(scene.run));
     again = scene.run->paused;
     if (r && !again) PetscCall(check_after_failure(r, scene.run, &failed));
     if (again || failed) PetscCall(apply(r, &scene, &any));
     if (failed) again = any;
-    failed = PETSC_FALSE;
     *model = scene.model;
     *run = scene.run;
     if (ledger) *ledger = scene.ledger;

@@ -5,7 +5,7 @@
 #include "sbremesh.h"
 #include "sbtet.h"
 
-/* All bodies in original order, and up to three vectors of the run. Arrays are on rank 0 only, NULL elsewhere. */
+/* All bodies in original order, and up to three vectors of the run. Arrays are on rank 0, NULL elsewhere. */
 typedef struct {
   PetscInt nbody, nvert, ncell;
   PetscInt nfield;         /* number of vectors: U, then V, A if the run has them */
@@ -23,15 +23,15 @@ typedef struct {
 } SbGathered;
 PetscErrorCode SbGather(SbRun run, SbGathered *g); /* collective; SbGatheredDestroy() */
 PetscErrorCode SbGatheredDestroy(SbGathered *g);
-/* Sets the vectors of a run from value, width and nfield of g, whose cells are those of the run's mesh. Collective. */
+/* Sets the vectors of a run from value, width and nfield of g, for cells of the run's mesh. Collective. */
 PetscErrorCode SbScatter(const SbGathered *g, SbRun run);
 
-/* Renumbering of surface nodes by original numbers, ascending in `from`, on all ranks; PetscFree2(from, to). */
+/* Renumbered surface nodes by original numbers, ascending in `from`, on all ranks; PetscFree2(from, to). */
 typedef struct {
   PetscInt n, *from, *to;
 } SbRenamed;
 
-/* ------------------------------------------------------------------ body.c: new mesh of one body, on rank 0; not collective */
+/* ---------------------------------------------- body.c: new mesh of one body, on rank 0; not collective */
 
 typedef struct {
   SbMesher mesher;
@@ -84,17 +84,14 @@ typedef struct {
   PetscBool *done;          /* [nbody] the body has a new mesh */
   SbGathered next;          /* next scene with its state; X, vert_set and so on are not set */
   SbRenamed renamed;        /* renumbered nodes of the surfaces of all bodies */
-} SbRemeshResult;
-PetscErrorCode SbRemeshResultCreate(PetscInt nbody,
-                                    SbRemeshResult *result); /* initially {0}; SbRemeshResultDestroy() */
+} SbRemeshResult;           /* SbRemeshResultDestroy() */
+PetscErrorCode SbRemeshResultCreate(PetscInt nbody, SbRemeshResult *result);
 PetscErrorCode SbRemeshResultDestroy(SbRemeshResult *result);
 PetscErrorCode SbRemeshBodies(SbModel model, const SbGathered *g, const PetscBool due[], PetscInt step,
                               const SbRemeshing *how, SbRemeshResult *result);
 
-/*
-  check.c - qualities and momenta.
-*/
-/* Current positions of the vertices of owned cells, x[nvert][3], m; for CR and DG means over the cells around. Collective. */
+/* check.c: qualities and momenta */
+/* Current positions of vertices of owned cells, x[nvert][3], m; CR and DG: means over cells. Collective. */
 PetscErrorCode SbCornerPositions(SbSpace space, Vec U, PetscReal x[]);
 /* worst[nbody]: quality of the worst tet of each named body, else 1. Collective. */
 PetscErrorCode SbBodyQualities(SbModel model, Vec U, const PetscBool named[], PetscReal worst[]);

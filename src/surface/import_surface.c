@@ -1,5 +1,6 @@
 /*
-  import_surface.c - import of a body or a rigid obstacle from a closed surface: read, repaired, checked, divided into regions; a body is tetrahedralized.
+  import_surface.c - import of a body or a rigid obstacle from a closed surface: read, repaired, checked,
+  divided into regions; a body is tetrahedralized.
 
   Each step with its repairs and errors is described in triangles*.c (readers), clean.c, self_intersection.c,
   region.c and tetrahedralize.c. The surface is scaled to metres right after it is read.
@@ -93,37 +94,14 @@ static void write_repairs(const SbTriangles *t, const SbSurfaceRepairs *m, size_
 
 /* ------------------------------------------------------------------ from file to tets */
 
-/* Merge tolerance, which must be far below the mean edge length; mean edge length. */
-static PetscErrorCode weld_tolerance(const SbTriangleFile *f, PetscReal given, PetscReal *tolerance,
-                                     PetscReal *edge)
-{
-  const SbTriangles *t = f->t;
-  PetscReal box[6], around, longest2, sum = 0;
-  char option[SB_IMPORT_OPTION_MAX];
-
-  PetscFunctionBeginUser;
-  SbBoxClear(box);
-  for (PetscInt v = 0; v < t->nvert; v++) SbBoxAdd(box, t->x + 3 * v);
-  for (PetscInt i = 0; i < t->ntri; i++) {
-    (void)SbTriangleMeasure(t, i, &longest2, &around);
-    sum += around / (3 * (PetscReal)t->ntri);
-  }
-  *edge = sum;
-  *tolerance = given >= 0 ? given : WELD * SbBoxDiagonal(box);
-  PetscCheck(
-    given < 0.5 * sum, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-    "%s: %s %g m would join corners of one triangle: the mean edge is %.3g m; give less than half of it",
-    f->where, SbImportOption(f->im, "merge_tolerance", option), (double)given, (double)sum);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Surface of a body, or of an obstacle translated to `at`, with its regions; the repairs become a note. */
 static PetscErrorCode make_surface(const char *path, const PetscReal at[3], SbTriangleFile *f, SbSurface *s,
                                    SbSurfaceRepairs *repairs)
 {
   const SbImport *im = f->im;
   SbTriangles *t = f->t;
-  PetscReal tolerance, edge;
+  const PetscReal given = im->tet.merge_tolerance;
+  PetscReal box[6], tolerance, edge;
   char option[SB_IMPORT_OPTION_MAX];
 
   PetscFunctionBeginUser;
@@ -140,8 +118,16 @@ static PetscErrorCode make_surface(const char *path, const PetscReal at[3], SbTr
   for (PetscInt i = 0; i < 3 * f->nhole; i++) f->hole[i / 3].x[i % 3] *= im->scale;
   for (PetscInt i = 0; i < 3 * f->nregion; i++) f->region[i / 3].x[i % 3] *= im->scale;
   PetscCall(SbDropUnusedPoints(&t->nvert, t->x, 3 * t->ntri, t->tri));
+  // the merge tolerance must be far below the mean edge length
+  SbBoxClear(box);
+  for (PetscInt v = 0; v < t->nvert; v++) SbBoxAdd(box, t->x + 3 * v);
+  tolerance = given >= 0 ? given : WELD * SbBoxDiagonal(box);
+  edge = SbTrianglesMeanEdge(t);
+  PetscCheck(
+    given < 0.5 * edge, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+    "%s: %s %g m would join corners of one triangle: the mean edge is %.3g m; give less than half of it",
+    f->where, SbImportOption(im, "merge_tolerance", option), (double)given, (double)edge);
   // repair; triangles of an obstacle may intersect each other away from their edges
-  PetscCall(weld_tolerance(f, im->tet.merge_tolerance, &tolerance, &edge));
   PetscCall(SbSurfaceMergeVertices(f, tolerance, repairs));
   PetscCheck(t->ntri, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: no triangle is left when vertices within %g m are one; %s%s, or check the scale", f->where,
@@ -159,14 +145,12 @@ static PetscErrorCode take_boundary(const SbTriangleFile *f, const SbSurface *s,
 {
   SbTriangles *t = f->t;
   SbKey *edge;
-  PetscReal longest2, around;
 
   PetscFunctionBeginUser;
   // triangles with material on both sides are walls, which an obstacle does not need
   PetscCall(PetscArraycpy(t->x, s->x, 3 * (size_t)s->nvert));
   t->nvert = s->nvert;
   t->ntri = 0;
-  t->volume = t->edge = 0;
   for (PetscInt i = 0; i < s->ntri; i++) {
     const PetscBool front = (PetscBool)(s->side[2 * i] >= 0), back = (PetscBool)(s->side[2 * i + 1] >= 0);
     PetscInt *v = t->tri + 3 * t->ntri;
@@ -179,19 +163,15 @@ static PetscErrorCode take_boundary(const SbTriangleFile *f, const SbSurface *s,
     f->number[t->ntri++] = s->number[i];
   }
   PetscCall(SbDropUnusedPoints(&t->nvert, t->x, 3 * t->ntri, t->tri));
-  // volume and mean edge length
-  for (PetscInt i = 0; i < t->ntri; i++) {
-    t->volume += SbTetVolumeTo(t, i, t->x);
-    (void)SbTriangleMeasure(t, i, &longest2, &around);
-    t->edge += around / (3 * (PetscReal)t->ntri);
-  }
+  t->volume = 0;
+  for (PetscInt i = 0; i < t->ntri; i++) t->volume += SbTetVolumeTo(t, i, t->x);
   // neighbour across each edge; an edge of more than two triangles is an error
   PetscCall(PetscMalloc1(3 * (size_t)t->ntri, &t->across));
   PetscCall(PetscMalloc1(3 * (size_t)t->ntri, &edge));
   SbTrianglesEdges(t, edge);
   for (PetscInt i = 0; i < 3 * t->ntri; i += 2) {
     const PetscInt n = SbKeysAlike(3 * t->ntri, edge, i), a = edge[i].slot;
-    const PetscReal *p = t->x + 3 * t->tri[a], *q = t->x + 3 * t->tri[a % 3 == 2 ? a - 2 : a + 1];
+    const PetscReal *p = t->x + 3 * t->tri[a], *q = t->x + 3 * t->tri[SbSlotNext(a)];
 
     if (n != 2) {
       PetscCall(PetscFree(edge));
@@ -234,7 +214,6 @@ PetscErrorCode SbTrianglesRead(MPI_Comm comm, const char *option, const char *pa
 {
   SbImport im = {.scale = scale, .tet.merge_tolerance = -1};
   SbCaughtError caught = {0, ""};
-  SbTriangles head;
   PetscMPIInt rank, n[2];
   PetscInt none;
   char note[sizeof(im.note)]; /* rank 0 prints warnings only */
@@ -255,12 +234,8 @@ PetscErrorCode SbTrianglesRead(MPI_Comm comm, const char *option, const char *pa
   PetscCall(SbImportDestroy(&im));
   PetscCall(SbCaughtRaise(comm, &caught));
   // broadcast the surface
-  head = *t;
-  PetscCallMPI(MPI_Bcast(&head, (int)sizeof(head), MPI_BYTE, 0, comm));
+  PetscCallMPI(MPI_Bcast(t, (int)sizeof(*t), MPI_BYTE, 0, comm));
   if (rank) {
-    *t = head;
-    t->x = NULL;
-    t->tri = t->across = NULL;
     PetscCall(PetscMalloc1(3 * (size_t)t->nvert, &t->x));
     PetscCall(PetscMalloc1(3 * (size_t)t->ntri, &t->tri));
     PetscCall(PetscMalloc1(3 * (size_t)t->ntri, &t->across));

@@ -1,18 +1,23 @@
 /*
-  region.c - regions: the parts of space that are bounded by closed surfaces, including non-manifold ones, in which more than two triangles share an edge.
+  region.c - regions: the parts of space that are bounded by closed surfaces, including non-manifold ones, in
+  which more than two triangles share an edge.
 
-  Steps: orient the triangles of each surface consistently; join sides of triangles that face each other to shells; compute shell volumes; find
-  the nesting of surfaces by winding numbers; mark cavities and holes as empty; number and name the remaining regions.
+  Steps: orient the triangles of each surface consistently; join sides of triangles that face each other to
+  shells; compute shell volumes; find the nesting of surfaces by winding numbers; mark cavities and holes as
+  empty; number and name the remaining regions.
 
-  Every triangle f has two sides, 2 f in front and 2 f + 1 behind. Around an edge triangles are sorted by angle; the two sides that face each
-  other between consecutive triangles bound the same region and are joined. A connected set of sides is a shell: one with a positive volume is the
-  outer boundary of a region, one with a negative volume is a surface seen from the region around it. That region is bounded by the smallest
-  positive shell with a nonzero winding number there (sum of solid angles, van Oosterom and Strackee 1983).
+  Every triangle f has two sides, 2 f in front and 2 f + 1 behind. Around an edge triangles are sorted by
+  angle; the two sides that face each other between consecutive triangles bound the same region and are
+  joined. A connected set of sides is a shell: one with a positive volume is the outer boundary of a region,
+  one with a negative volume is a surface seen from the region around it. That region is bounded by the
+  smallest positive shell with a nonzero winding number there (sum of solid angles, van Oosterom and Strackee
+  1983).
 
-  Material. In formats with oriented triangles (.stl, .obj, .off, .ply) the triangles of a surface are first oriented consistently, by
-  majority. A surface with outward normals encloses material, also inside another one (then a separate region); one with inward normals inside
-  material is a cavity; an outermost one with inward normals is reversed. For non-manifold surfaces, and in formats without
-  orientation (.poly, .smesh), every region is material except the holes given in the file.
+  Material. In formats with oriented triangles (.stl, .obj, .off, .ply) the triangles of a surface are first
+  oriented consistently, by majority. A surface with outward normals encloses material, also inside another
+  one (then a separate region); one with inward normals inside material is a cavity; an outermost one with
+  inward normals is reversed. For non-manifold surfaces, and in formats without orientation (.poly, .smesh),
+  every region is material except the holes given in the file.
 */
 #include <stdlib.h>
 #include "sbkernel.h"
@@ -45,6 +50,9 @@ typedef struct {
   SbKey *edge;       /* [3 ntri] edges, sorted */
   PetscInt *shell;   /* [2 ntri] shell of each side */
   PetscInt *surface; /* [ntri] surface of each triangle */
+  PetscInt *across;  /* [3 ntri] slot on the other side of an edge; -1: more than two triangles share it */
+  PetscInt *stack;   /* [ntri] */
+  int *sense; /* [ntri] 1: oriented as the first triangle that the search for its surface reached, else -1 */
   PetscInt nshell, nsurface;
   Shell *shells;
   Surface *surfaces;
@@ -52,79 +60,61 @@ typedef struct {
 
 /* ------------------------------------------------------------------ orientation */
 
-/* Reverses the minority orientation in each set of triangles connected by manifold edges. */
-static PetscErrorCode reverse_minority(Arrangement *s, const PetscInt across[], int sense[], PetscInt stack[])
+/* Orients the triangles of each set connected by manifold edges consistently: the minority is reversed. */
+static PetscErrorCode orient_alike(Arrangement *s)
 {
-  PetscFunctionBeginUser;
-  for (PetscInt f = 0; f < s->t->ntri; f++) {
-    PetscInt n, nother = 0;
-    int wrong;
-    const SbTriangles *t = s->t;
-    PetscInt done = 0;
+  SbTriangles *t = s->t;
+  const PetscInt n = 3 * t->ntri;
 
-    if (sense[f]) continue;
-    // breadth-first search from this triangle: stack[0 .. n) is reached, sense is 1 for the same orientation, else -1
-    n = 0;
-    stack[n++] = f;
-    sense[f] = 1;
-    while (done < n) {
-      const PetscInt old = stack[done++];
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0, m; i < n; i += m) {
+    m = SbKeysAlike(n, s->edge, i);
+    for (PetscInt k = 0; k < m; k++) s->across[s->edge[i + k].slot] = m == 2 ? s->edge[i + 1 - k].slot : -1;
+  }
+  PetscCall(PetscArrayzero(s->sense, t->ntri));
+  for (PetscInt f = 0; f < t->ntri; f++) {
+    PetscInt nfound = 0, nother = 0;
+    int wrong;
+
+    if (s->sense[f]) continue;
+    // breadth-first search from this triangle
+    s->stack[nfound++] = f;
+    s->sense[f] = 1;
+    for (PetscInt done = 0; done < nfound; done++) {
+      const PetscInt old = s->stack[done];
 
       for (PetscInt k = 3 * old; k < 3 * old + 3; k++) {
-        const PetscInt g = across[k] < 0 ? -1 : across[k] / 3;
-        int same;
+        const PetscInt other = s->across[k], g = other / 3;
+        int expected;
 
-        if (g < 0) continue;
+        if (other < 0) continue;
         // consistently oriented neighbours traverse their edge in opposite directions
-        same = t->tri[across[k]] != t->tri[k] ? 1 : -1;
-        if (!sense[g]) {
-          sense[g] = same * sense[old];
-          stack[n++] = g;
-        } else if (sense[g] != same * sense[old]) {
-          SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-                  "%s: the surface has one side only (a Moebius strip or Klein bottle) around triangles %lld "
-                  "and %lld; it encloses nothing, cut it there",
-                  s->f->where, (long long)s->f->number[old], (long long)s->f->number[g]);
+        expected = t->tri[other] != t->tri[k] ? s->sense[old] : -s->sense[old];
+        if (!s->sense[g]) {
+          s->sense[g] = expected;
+          s->stack[nfound++] = g;
         }
+        PetscCheck(
+          s->sense[g] == expected, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+          "%s: the surface has one side only (a Moebius strip or Klein bottle) around triangles %lld "
+          "and %lld; it encloses nothing, cut it there",
+          s->f->where, (long long)s->f->number[old], (long long)s->f->number[g]);
       }
     }
     // reverse the smaller number of triangles
-    for (PetscInt i = 0; i < n; i++) nother += sense[stack[i]] < 0;
-    wrong = 2 * nother > n ? 1 : -1;
-    for (PetscInt i = 0; i < n; i++) {
-      PetscInt keep;
+    for (PetscInt i = 0; i < nfound; i++) nother += s->sense[s->stack[i]] < 0;
+    wrong = 2 * nother > nfound ? 1 : -1;
+    for (PetscInt i = 0; i < nfound; i++) {
+      PetscInt *v = t->tri + 3 * s->stack[i];
+      const PetscInt keep = v[1];
 
-      if (sense[stack[i]] != wrong) continue;
-      keep = s->t->tri[3 * stack[i] + 1];
-      s->t->tri[3 * stack[i] + 1] = s->t->tri[3 * stack[i] + 2];
-      s->t->tri[3 * stack[i] + 2] = keep;
+      if (s->sense[s->stack[i]] != wrong) continue;
+      v[1] = v[2];
+      v[2] = keep;
       s->m->nturned++;
     }
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Orients the triangles of each surface consistently, for formats with orientation. */
-static PetscErrorCode orient_alike(Arrangement *s)
-{
-  PetscInt *across, *stack;
-  int *sense;
-  PetscErrorCode ierr;
-  const PetscInt n = 3 * s->t->ntri;
-
-  PetscFunctionBeginUser;
-  if (s->f->sheets) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc3(3 * (size_t)s->t->ntri, &across, s->t->ntri, &stack, s->t->ntri, &sense));
-  PetscCall(PetscArrayzero(sense, s->t->ntri));
-  // slot on the other side of each manifold edge; -1 for edges of more than two triangles
-  for (PetscInt i = 0, m; i < n; i += m) {
-    m = SbKeysAlike(n, s->edge, i);
-    for (PetscInt k = 0; k < m; k++) across[s->edge[i + k].slot] = m == 2 ? s->edge[i + 1 - k].slot : -1;
-  }
-  ierr = reverse_minority(s, across, sense, stack);
-  PetscCall(PetscFree3(across, stack, sense));
-  PetscCall(ierr);
-  SbTrianglesEdges(s->t, s->edge); /* the order of corners has changed */
+  SbTrianglesEdges(t, s->edge); /* the order of corners has changed */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -159,31 +149,26 @@ static PetscErrorCode join_at_edge(const SbTriangles *t, PetscInt n, const SbKey
   Spoke few[8], *spoke = few;
 
   PetscFunctionBeginUser;
-  // triangles sorted by angle
   if (n > 8) PetscCall(PetscMalloc1(n, &spoke));
+  for (PetscInt i = 0; i < n; i++) spoke[i] = (Spoke){0, edge[i].slot};
   // angles of triangles about the edge from p to q, relative to the first one
   if (n > 2) {
-    const PetscReal *a = t->x + 3 * p, *b = t->x + 3 * q;
-    PetscReal axis[3], u[3], v[3], length;
+    PetscReal axis[3], u[3] = {0}, v[3] = {0}, w[3], length;
 
-    for (int k = 0; k < 3; k++) axis[k] = b[k] - a[k];
+    SbSubtract(t->x + 3 * q, t->x + 3 * p, axis);
     length = PetscSqrtReal(SbDot3(axis, axis));
     for (PetscInt i = 0; i < n; i++) {
-      const PetscInt slot = edge[i].slot;
-      const PetscReal *c = t->x + 3 * t->tri[3 * (slot / 3) + (slot % 3 + 2) % 3];
-      const PetscReal w[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-
+      SbSubtract(t->x + 3 * t->tri[SbSlotNext(SbSlotNext(edge[i].slot))], t->x + 3 * p, w);
       if (!i) { /* v = axis x w is normal to the first triangle, u = v x axis lies in it */
         SbCross(axis, w, v);
         SbCross(v, axis, u);
         for (int k = 0; k < 3; k++) u[k] /= length;
       }
-      spoke[i] = (Spoke){i ? atan2(SbDot3(v, w), SbDot3(u, w)) : 0, slot};
+      spoke[i].angle = i ? atan2(SbDot3(v, w), SbDot3(u, w)) : 0;
       if (spoke[i].angle < 0) spoke[i].angle += 2 * PETSC_PI;
     }
     qsort(spoke, (size_t)n, sizeof(*spoke), compare_spokes);
-  } else
-    for (PetscInt i = 0; i < n; i++) spoke[i].slot = edge[i].slot;
+  }
   // join facing sides of consecutive triangles
   for (PetscInt i = 0; i < n; i++)
     (void)SbUnionJoin(up, facing(t, spoke[i].slot, p, PETSC_TRUE),
@@ -192,38 +177,29 @@ static PetscErrorCode join_at_edge(const SbTriangles *t, PetscInt n, const SbKey
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Shells: connected facing sides. Surfaces: triangles connected by edges. */
+/* Shells: connected facing sides; their volumes, areas and boxes. Surfaces: triangles connected by edges. */
 static PetscErrorCode find_shells(Arrangement *s)
 {
-  const PetscInt n = 3 * s->t->ntri;
+  const SbTriangles *t = s->t;
+  const PetscInt n = 3 * t->ntri;
 
   PetscFunctionBeginUser;
   // union-find over sides and over triangles, edge by edge
-  for (PetscInt i = 0; i < 2 * s->t->ntri; i++) s->shell[i] = i;
-  for (PetscInt f = 0; f < s->t->ntri; f++) s->surface[f] = f;
+  for (PetscInt i = 0; i < 2 * t->ntri; i++) s->shell[i] = i;
+  for (PetscInt f = 0; f < t->ntri; f++) s->surface[f] = f;
   for (PetscInt i = 0, m; i < n; i += m) {
     m = SbKeysAlike(n, s->edge, i);
-    PetscCall(join_at_edge(s->t, m, s->edge + i, s->shell));
+    PetscCall(join_at_edge(t, m, s->edge + i, s->shell));
     for (PetscInt k = 1; k < m; k++)
       (void)SbUnionJoin(s->surface, s->edge[i].slot / 3, s->edge[i + k].slot / 3);
   }
   // numbers from 0
-  s->nshell = SbUnionLabel(2 * s->t->ntri, s->shell);
-  s->nsurface = SbUnionLabel(s->t->ntri, s->surface);
+  s->nshell = SbUnionLabel(2 * t->ntri, s->shell);
+  s->nsurface = SbUnionLabel(t->ntri, s->surface);
   PetscCheck(s->nsurface <= PARTS_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: the surface consists of %" PetscInt_FMT
              " parts; supple takes up to %d: remove the specks around it (meshlab: remove isolated pieces)",
              s->f->where, s->nsurface, PARTS_MAX);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Volume, area and bounding box of every shell. */
-static PetscErrorCode measure_shells(Arrangement *s)
-{
-  const SbTriangles *t = s->t;
-  PetscReal longest2, around;
-
-  PetscFunctionBeginUser;
   // sums over the sides; volumes relative to a vertex of the shell, to avoid cancellation far from the origin
   PetscCall(PetscCalloc1(s->nshell, &s->shells));
   PetscCall(PetscCalloc1(s->nsurface, &s->surfaces));
@@ -241,12 +217,12 @@ static PetscErrorCode measure_shells(Arrangement *s)
     SbBoxMerge(p->box, box);
     p->surface = s->surface[i / 2];
     p->volume += (i % 2 ? 1 : -1) * SbTetVolumeTo(t, i / 2, t->x + 3 * t->tri[3 * p->first]);
-    p->area += 0.5 * SbTriangleMeasure(t, i / 2, &longest2, &around);
+    p->area += SbTriangleArea(t, i / 2, NULL);
     if (s->surfaces[s->surface[i / 2]].first < 0) s->surfaces[s->surface[i / 2]].first = i / 2;
   }
   // non-manifold surfaces
-  for (PetscInt i = 0, m; i < 3 * t->ntri; i += m) {
-    m = SbKeysAlike(3 * t->ntri, s->edge, i);
+  for (PetscInt i = 0, m; i < n; i += m) {
+    m = SbKeysAlike(n, s->edge, i);
     if (m > 2) s->surfaces[s->surface[s->edge[i].slot / 3]].branched = PETSC_TRUE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -254,7 +230,7 @@ static PetscErrorCode measure_shells(Arrangement *s)
 
 /* ------------------------------------------------------------------ nesting */
 
-/* Smallest positive shell around a point, other than those of the surface `except`; OUTSIDE if there is none. */
+/* Smallest positive shell around a point, but for those of the surface `except`; OUTSIDE if there is none. */
 static PetscInt shell_around(const Arrangement *s, const PetscReal o[3], PetscInt except)
 {
   PetscInt best = OUTSIDE;
@@ -267,9 +243,8 @@ static PetscInt shell_around(const Arrangement *s, const PetscReal o[3], PetscIn
     // test the bounding box, then the winding number
     for (int i = 0; i < 3; i++) within = (PetscBool)(within && o[i] >= p->box[i] && o[i] <= p->box[3 + i]);
     if (!within || (best >= 0 && s->shells[best].volume <= p->volume)) continue;
-    for (PetscInt i = 0; i < 2 * s->t->ntri; i++) {
+    for (PetscInt i = 0; i < 2 * s->t->ntri; i++)
       if (s->shell[i] == k) around += (i % 2 ? 1 : -1) * SbTriangleSolidAngle(s->t, i / 2, o);
-    }
     if (around > 2 * PETSC_PI) best = k;
   }
   return best;
@@ -281,43 +256,28 @@ static PetscBool turned_outwards(const Arrangement *s, PetscInt k)
   return (PetscBool)(s->shell[2 * s->surfaces[k].first] == s->surfaces[k].outer);
 }
 
-/* Number of surfaces around a surface. */
-static PetscInt depth_of(const Arrangement *s, PetscInt k)
+/* Marks cavities, for formats with orientation. If an outermost surface has inward normals, it and all
+   surfaces inside it are taken as reversed. */
+static void empty_cavities(Arrangement *s)
 {
-  PetscInt depth = 0;
-
-  for (; s->surfaces[k].parent != OUTSIDE; depth++) k = s->shells[s->surfaces[k].parent].surface;
-  return depth;
-}
-
-/* Marks cavities, for formats with orientation. If an outermost surface has inward normals, it and all surfaces inside it are taken as reversed. */
-static PetscErrorCode empty_cavities(Arrangement *s)
-{
-  PetscInt deepest = 0;
-
-  PetscFunctionBeginUser;
-  if (s->f->sheets) PetscFunctionReturn(PETSC_SUCCESS);
   /* from outside to inside, so that it is known whether the region around a surface is material */
-  for (PetscInt k = 0; k < s->nsurface; k++) deepest = PetscMax(deepest, depth_of(s, k));
-  for (PetscInt depth = 0; depth <= deepest; depth++) {
+  for (PetscInt depth = 0; depth < s->nsurface; depth++) {
     for (PetscInt k = 0; k < s->nsurface; k++) {
-      PetscInt top = k;
+      PetscInt top = k, naround = 0;
       PetscBool outwards, cavity;
 
       // cavity: normals inward relative to the outermost surface around it, inside material
-      if (depth_of(s, k) != depth || s->surfaces[k].branched) continue;
-      while (s->surfaces[top].parent != OUTSIDE) top = s->shells[s->surfaces[top].parent].surface;
+      for (; s->surfaces[top].parent != OUTSIDE; naround++) top = s->shells[s->surfaces[top].parent].surface;
+      if (naround != depth || s->surfaces[k].branched) continue;
       outwards = (PetscBool)(turned_outwards(s, k) == (turned_outwards(s, top) || s->surfaces[top].branched));
       cavity = (PetscBool)(depth > 0 && !outwards && !s->shells[s->surfaces[k].parent].empty);
       // note reversed surfaces, count cavities
       s->t->turned = (PetscBool)(s->t->turned || (!turned_outwards(s, k) && !cavity));
       s->m->ncavity += cavity;
-      for (PetscInt i = 0; cavity && i < s->nshell; i++) {
+      for (PetscInt i = 0; cavity && i < s->nshell; i++)
         if (s->shells[i].surface == k && s->shells[i].volume > 0) s->shells[i].empty = PETSC_TRUE;
-      }
     }
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ output */
@@ -352,7 +312,7 @@ static PetscErrorCode groups_of_shell(const Arrangement *s, PetscInt shell, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Group names of each region: region_1, ...; NAME_region if its outer boundary is in the group NAME; its name in the file. */
+/* Groups of each region: region_1, ...; NAME_region if its boundary is in the group NAME; as in the file. */
 static PetscErrorCode name_regions(const Arrangement *s, SbSurface *out)
 {
   SbImport *im = s->f->im;
@@ -385,15 +345,14 @@ static PetscErrorCode name_regions(const Arrangement *s, SbSurface *out)
 /* Finds the regions in the steps of the file header. */
 static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
 {
-  PetscInt n, kept = 0;
+  PetscInt n = 0, kept = 0;
   const SbTriangles *t = s->t;
 
   PetscFunctionBeginUser;
   /* orientation, shells and their volumes */
   SbTrianglesEdges(s->t, s->edge);
-  PetscCall(orient_alike(s));
+  if (!s->f->sheets) PetscCall(orient_alike(s));
   PetscCall(find_shells(s));
-  PetscCall(measure_shells(s));
   // each shell must enclose a volume, and each surface must have exactly one shell of negative volume
   for (PetscInt k = 0; k < s->nshell; k++) {
     const Shell *p = &s->shells[k];
@@ -415,15 +374,15 @@ static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
                (long long)s->f->number[s->surfaces[k].first]);
   // shell around each surface, found from the centre of one of its triangles
   for (PetscInt k = 0; k < s->nsurface; k++) {
-    const PetscInt *v = s->t->tri + 3 * s->surfaces[k].first;
+    const PetscInt *v = t->tri + 3 * s->surfaces[k].first;
     PetscReal middle[3];
 
     for (int i = 0; i < 3; i++)
-      middle[i] = (s->t->x[3 * v[0] + i] + s->t->x[3 * v[1] + i] + s->t->x[3 * v[2] + i]) / 3;
+      middle[i] = (t->x[3 * v[0] + i] + t->x[3 * v[1] + i] + t->x[3 * v[2] + i]) / 3;
     s->surfaces[k].parent = s->nsurface > 1 ? shell_around(s, middle, k) : OUTSIDE;
     s->shells[s->surfaces[k].outer].parent = s->surfaces[k].parent;
   }
-  PetscCall(empty_cavities(s));
+  if (!s->f->sheets) empty_cavities(s);
   // regions of the hole points in the file are empty
   for (PetscInt i = 0; i < s->f->nhole; i++) {
     const SbSeed *h = &s->f->hole[i];
@@ -446,17 +405,10 @@ static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
       s->f->where, (long long)r->number, (double)r->x[0], (double)r->x[1], (double)r->x[2]);
   }
   // number the positive shells with material; a negative shell has the number of the region around it
-  n = 0;
-  for (PetscInt k = 0; k < s->nshell; k++) {
-    Shell *p = &s->shells[k];
-
+  for (Shell *p = s->shells; p < s->shells + s->nshell; p++)
     p->region = p->volume > 0 && !p->empty ? n++ : OUTSIDE;
-  }
-  for (PetscInt k = 0; k < s->nshell; k++) {
-    Shell *p = &s->shells[k];
-
+  for (Shell *p = s->shells; p < s->shells + s->nshell; p++)
     if (p->volume < 0 && p->parent != OUTSIDE) p->region = s->shells[p->parent].region;
-  }
   PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: no region is left beside its holes; remove one of them", s->f->where);
   // output triangles with material on at least one side, and their vertices
@@ -484,14 +436,15 @@ static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
 PetscErrorCode SbSurfaceFindRegions(SbTriangleFile *f, SbSurfaceRepairs *m, SbSurface *out)
 {
   Arrangement s = {.f = f, .t = f->t, .m = m};
+  const size_t n = (size_t)f->t->ntri;
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
   PetscCall(
-    PetscMalloc3(3 * (size_t)f->t->ntri, &s.edge, 2 * (size_t)f->t->ntri, &s.shell, f->t->ntri, &s.surface));
+    PetscMalloc6(3 * n, &s.edge, 2 * n, &s.shell, n, &s.surface, 3 * n, &s.across, n, &s.stack, n, &s.sense));
   ierr = find_regions(&s, out);
   PetscCall(PetscFree(s.shells));
   PetscCall(PetscFree(s.surfaces));
-  PetscCall(PetscFree3(s.edge, s.shell, s.surface));
+  PetscCall(PetscFree6(s.edge, s.shell, s.surface, s.across, s.stack, s.sense));
   PetscFunctionReturn(ierr);
 }

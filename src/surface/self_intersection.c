@@ -1,8 +1,10 @@
 /*
-  self_intersection.c - detects intersections of the triangles of a surface beyond shared corners, and removes small ones by smoothing.
+  self_intersection.c - detects intersections of the triangles of a surface beyond shared corners, and removes
+  small ones by smoothing.
 
   Candidate pairs by a bounding volume hierarchy, exact test in src/geometry/intersection.c.
 */
+#include "sbkernel.h"
 #include "surface_impl.h"
 
 #define NAMED 3   /* largest number of pairs in a message */
@@ -33,10 +35,7 @@ static PetscErrorCode find_pairs(const SbTriangles *t, Search *s)
     SbTriangleBox(t->x, t->tri + 3 * i, box);
     for (SbBoxQueryBegin(&tree, box, &query); SbBoxQueryNext(&query, &other);) {
       if (other <= i || !SbTrianglesCross(t->x, t->tri + 3 * i, t->tri + 3 * other)) continue;
-      if (s->n < NAMED) {
-        s->pair[s->n][0] = i;
-        s->pair[s->n][1] = other;
-      }
+      if (s->n < NAMED) PetscCall(PetscArraycpy(s->pair[s->n], ((const PetscInt[2]){i, other}), 2));
       s->crossing[i] = s->crossing[other] = PETSC_TRUE;
       s->n++;
     }
@@ -47,12 +46,12 @@ static PetscErrorCode find_pairs(const SbTriangles *t, Search *s)
 
 /* ------------------------------------------------------------------ removal by smoothing */
 
-/* Laplacian smoothing: active vertices move halfway to the mean of their neighbours; sum[nvert][4] is work space. */
+/* Laplacian smoothing: active vertices move halfway to the mean of their neighbours. Work space: sum. */
 static void smooth(SbTriangles *t, const PetscBool active[], PetscReal (*sum)[4])
 {
   for (PetscInt v = 0; v < t->nvert; v++) sum[v][0] = sum[v][1] = sum[v][2] = sum[v][3] = 0;
   for (PetscInt i = 0; i < 3 * t->ntri; i++) {
-    const PetscInt a = t->tri[i], b = t->tri[i % 3 == 2 ? i - 2 : i + 1];
+    const PetscInt a = t->tri[i], b = t->tri[SbSlotNext(i)];
 
     for (int k = 0; k < 3; k++) {
       sum[a][k] += t->x[3 * b + k];
@@ -61,54 +60,48 @@ static void smooth(SbTriangles *t, const PetscBool active[], PetscReal (*sum)[4]
     sum[a][3]++;
     sum[b][3]++;
   }
-  for (PetscInt v = 0; v < t->nvert; v++) {
+  for (PetscInt v = 0; v < t->nvert; v++)
     for (int k = 0; active[v] && k < 3; k++)
       t->x[3 * v + k] = 0.5 * t->x[3 * v + k] + 0.5 * sum[v][k] / sum[v][3];
-  }
 }
 
-/* Smooths around intersecting triangles until there are none, with displacements up to `reach`, m; else restores positions. s: pairs before, then remaining pairs. */
+/* Smooths around intersecting triangles until there are none, with displacements up to `reach`, m; else
+   restores positions. s: pairs before, then remaining pairs. */
 static PetscErrorCode untangle(SbTriangles *t, PetscReal reach, Search *s, SbSurfaceRepairs *m)
 {
-  PetscBool *active;
+  PetscBool *active, *before;
   PetscReal *x0, (*sum)[4];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc3(t->nvert, &active, 3 * (size_t)t->nvert, &x0, t->nvert, &sum));
-  PetscCall(PetscArrayzero(active, t->nvert));
+  PetscCall(PetscCalloc4(t->nvert, &active, t->nvert, &before, 3 * (size_t)t->nvert, &x0, t->nvert, &sum));
   PetscCall(PetscArraycpy(x0, t->x, 3 * (size_t)t->nvert));
   for (int pass = 0; pass < PASSES && s->n && m->untangled <= reach; pass++) {
     PetscReal most = 0;
-    PetscBool *before;
 
     // activate the vertices of intersecting triangles; in every fourth pass also adjacent vertices
     for (PetscInt i = 0; i < 3 * t->ntri; i++)
       active[t->tri[i]] = (PetscBool)(active[t->tri[i]] || s->crossing[i / 3]);
-    PetscCall(PetscMalloc1(t->nvert, &before));
-    for (int r = 0; r < (pass % 4 == 3); r++) {
-      PetscCall(PetscArraycpy(before, active, t->nvert));
-      for (PetscInt f = 0; f < t->ntri; f++) {
-        const PetscInt *v = t->tri + 3 * f;
+    PetscCall(PetscArraycpy(before, active, t->nvert));
+    for (PetscInt f = 0; f < t->ntri && pass % 4 == 3; f++) {
+      const PetscInt *v = t->tri + 3 * f;
 
-        if (before[v[0]] || before[v[1]] || before[v[2]])
-          active[v[0]] = active[v[1]] = active[v[2]] = PETSC_TRUE;
-      }
+      if (before[v[0]] || before[v[1]] || before[v[2]])
+        active[v[0]] = active[v[1]] = active[v[2]] = PETSC_TRUE;
     }
-    PetscCall(PetscFree(before));
     smooth(t, active, sum);
     m->nuntangled = 0;
     for (PetscInt v = 0; v < t->nvert; v++) {
-      const PetscReal *a = t->x + 3 * v, *b = x0 + 3 * v, d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-      const PetscReal d2 = SbDot3(d, d);
+      PetscReal d[3];
 
-      m->nuntangled += d2 > 0;
-      most = PetscMax(most, d2);
+      SbSubtract(t->x + 3 * v, x0 + 3 * v, d);
+      m->nuntangled += SbDot3(d, d) > 0;
+      most = PetscMax(most, SbDot3(d, d));
     }
     m->untangled = PetscSqrtReal(most);
     PetscCall(find_pairs(t, s));
   }
   if (s->n || m->untangled > reach) PetscCall(PetscArraycpy(t->x, x0, 3 * (size_t)t->nvert));
-  PetscCall(PetscFree3(active, x0, sum));
+  PetscCall(PetscFree4(active, before, x0, sum));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -7,10 +7,13 @@
 #include "triangles.h"
 
 /*
-  SbSurfaceRead - reads a surface, repairs and checks it, and finds its regions; sets groups and im->note of the body `im`. Not collective.
+  SbSurfaceRead - reads a surface, repairs and checks it, and finds its regions; sets groups and im->note of
+  the body `im`. Not collective.
 
-  Input: path; im->where, im->scale (1 afterwards: the surface is in metres), im->tet (merge_tolerance and untangle).
-  Errors: PETSC_ERR_FILE_*, PETSC_ERR_USER_INPUT, one line that names the triangles and a remedy; no surface is returned.
+  Input: path; im->where, im->scale (1 afterwards: the surface is in metres), im->tet (merge_tolerance and
+  untangle).
+  Errors: PETSC_ERR_FILE_*, PETSC_ERR_USER_INPUT, one line that names the triangles and a remedy; no surface
+  is left.
 */
 PetscErrorCode SbSurfaceRead(const char *path, SbImport *im, SbSurface *body_surface);
 
@@ -34,7 +37,7 @@ typedef struct {
 PetscErrorCode SbSurfaceMergeVertices(SbTriangleFile *file, PetscReal tolerance, SbSurfaceRepairs *repairs);
 /* Merges flat triangles into their neighbours. Errors: remaining flat triangles, open edges. */
 PetscErrorCode SbSurfaceRepairTriangles(SbTriangleFile *file, SbSurfaceRepairs *repairs);
-/* Removes small self-intersections by moving vertices at most by `reach`, m. Error: remaining self-intersections. */
+/* Removes small self-intersections by moving vertices at most by `reach`, m. Error: some remain. */
 PetscErrorCode SbSurfaceUntangle(SbTriangleFile *file, PetscReal reach, SbSurfaceRepairs *repairs);
-/* Finds the regions: sets the sides of each triangle; regions get the groups region_1, ... and those that the file names. */
+/* Finds the regions: the sides of each triangle; they get the groups region_1, ... and those of the file. */
 PetscErrorCode SbSurfaceFindRegions(SbTriangleFile *file, SbSurfaceRepairs *repairs, SbSurface *surface);

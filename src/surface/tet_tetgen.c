@@ -1,11 +1,14 @@
 /*
-  tet_tetgen.c - tetrahedralization by the program tetgen (Hang Si 2015), as a child process in a temporary folder.
+  tet_tetgen.c - tetrahedralization by the program tetgen (Hang Si 2015), as a child process in a temporary
+  folder.
 
-  Each triangle of the surface is a facet with its number as marker. The output has facets, and tets with a number for each part of space
-  bounded by facets (-A). The region of a part follows from its tets at facets: they are in the region on that side of the triangle. Parts
-  without a region, cavities, are dropped. Hence neither hole points nor region points are needed.
+  Each triangle of the surface is a facet with its number as marker. The output has facets, and tets with a
+  number for each part of space bounded by facets (-A). The region of a part follows from its tets at facets:
+  they are in the region on that side of the triangle. Parts without a region, cavities, are dropped. Hence
+  neither hole points nor region points are needed.
 
-  If the surface is kept, tetgen does not split it (-Y). Else it may split triangles to reach the target size; it cannot coarsen the surface.
+  If the surface is kept, tetgen does not split it (-Y). Else it may split triangles to reach the target size;
+  it cannot coarsen the surface.
 */
 #include <dirent.h>
 #include <errno.h>
@@ -15,7 +18,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 #include <fcntl.h>
-#include "sbkernel.h"
 #include "sbtet.h"
 #include "tet_backends.h"
 
@@ -50,25 +52,14 @@ static PetscErrorCode check_end(const char *folder, int status)
 
 /* ------------------------------------------------------------------ regions */
 
-/* Whether the point is in front of a triangle of the surface (0) or behind it (1). */
-static int side_of(const SbSurface *s, PetscInt f, const PetscReal x[3])
-{
-  const PetscInt *v = s->tri + 3 * f;
-  PetscReal e[2][3], w[3], n[3];
-
-  for (int k = 0; k < 2; k++) SbSubtract(s->x + 3 * v[k + 1], s->x + 3 * v[0], e[k]);
-  SbSubtract(x, s->x + 3 * v[0], w);
-  SbCross(e[0], e[1], n);
-  return SbDot3(n, w) < 0;
-}
-
-/* Finds the region of each tag set of tets from the tets at facets; tags of facets become the number of their triangle. */
+/* The region of each tag set of tets, from the tets at facets; tags of facets become numbers of triangles. */
 static PetscErrorCode match_regions(const SbSurface *s, const SbFaces *faces, SbImport *im, PetscInt region[])
 {
+  const SbTriangles t = {.x = s->x, .tri = s->tri};
   SbItems *tri = &im->item[2];
 
   PetscFunctionBeginUser;
-  for (PetscInt t = 0; t < im->ntags; t++) region[t] = UNKNOWN;
+  for (PetscInt k = 0; k < im->ntags; k++) region[k] = UNKNOWN;
   for (PetscInt i = 0; i < tri->n; i++) {
     // facet marker of TetGen: number of the surface triangle, from 1
     const PetscInt f = (PetscInt)im->group[im->tags_group[im->tags_start[tri->tags[i]]]].tag - 1;
@@ -80,7 +71,9 @@ static PetscErrorCode match_regions(const SbSurface *s, const SbFaces *faces, Sb
     tri->tags[i] = f;
     for (PetscInt k = 0; k < n; k++) {
       PetscInt *known = &region[im->item[3].tags[slots[k] / 4]];
-      const PetscInt side = s->side[2 * f + side_of(s, f, im->x + 3 * im->item[3].vert[slots[k]])];
+      const PetscReal *x =
+        im->x + 3 * im->item[3].vert[slots[k]]; /* in front of the triangle, or behind it */
+      const PetscInt side = s->side[2 * f + (SbTetVolumeTo(&t, f, x) > 0)];
 
       PetscCheck(*known == UNKNOWN || *known == side, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
                  "a part between facets lies in two regions");
@@ -110,15 +103,14 @@ static PetscErrorCode work_in(const char *folder, const SbTetJob *job, SbImport 
   (void)snprintf(path, sizeof(path), "%s/s.smesh", folder);
   f = fopen(path, "w");
   PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s (%s)", path, strerror(errno));
-  fprintf(f, "%" PetscInt_FMT " 3 0 0\n", job->surface->nvert);
-  for (PetscInt v = 0; v < job->surface->nvert; v++)
-    fprintf(f, "%" PetscInt_FMT " %.17g %.17g %.17g\n", v + 1, (double)job->surface->x[3 * v],
-            (double)job->surface->x[3 * v + 1], (double)job->surface->x[3 * v + 2]);
-  fprintf(f, "%" PetscInt_FMT " 1\n", job->surface->ntri);
-  for (PetscInt t = 0; t < job->surface->ntri; t++)
+  fprintf(f, "%" PetscInt_FMT " 3 0 0\n", s->nvert);
+  for (PetscInt v = 0; v < s->nvert; v++)
+    fprintf(f, "%" PetscInt_FMT " %.17g %.17g %.17g\n", v + 1, (double)s->x[3 * v], (double)s->x[3 * v + 1],
+            (double)s->x[3 * v + 2]);
+  fprintf(f, "%" PetscInt_FMT " 1\n", s->ntri);
+  for (PetscInt t = 0; t < s->ntri; t++)
     fprintf(f, "3 %" PetscInt_FMT " %" PetscInt_FMT " %" PetscInt_FMT " %" PetscInt_FMT "\n",
-            job->surface->tri[3 * t] + 1, job->surface->tri[3 * t + 1] + 1, job->surface->tri[3 * t + 2] + 1,
-            t + 1);
+            s->tri[3 * t] + 1, s->tri[3 * t + 1] + 1, s->tri[3 * t + 2] + 1, t + 1);
   fprintf(f, "0\n0\n");
   PetscCheck(!fclose(f), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s (%s); is the disk full?",
              path, strerror(errno));
@@ -163,7 +155,7 @@ static PetscErrorCode work_in(const char *folder, const SbTetJob *job, SbImport 
   // tags of tets become region numbers; tets of cavities are dropped
   PetscCall(SbFacesCreate(im->nvert, tet->n, tet->vert, &faces));
   PetscCall(PetscMalloc1(im->ntags, &region));
-  ierr = match_regions(job->surface, &faces, im, region);
+  ierr = match_regions(s, &faces, im, region);
   for (PetscInt c = 0; !ierr && c < tet->n; c++) {
     if (region[tet->tags[c]] < 0) continue;
     PetscCall(PetscArraymove(tet->vert + 4 * n, tet->vert + 4 * c, 4));

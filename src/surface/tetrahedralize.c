@@ -1,9 +1,11 @@
 /*
-  tetrahedralize.c - tetrahedralization of a surface with regions by gmsh or else tetgen, and checks of the result.
+  tetrahedralize.c - tetrahedralization of a surface with regions by gmsh or else tetgen, and checks of the
+  result.
 
-  A backend returns vertices, tets with region numbers, and triangles with the number of the surface triangle at their position.
-  Both are checked here (every region exists and has its volume: up to rounding if the surface was kept, else within ten
-  percent), groups are assigned to tets and triangles, and slivers are counted.
+  A backend returns vertices, tets with region numbers, and triangles with the number of the surface triangle
+  at their position. Both are checked here (every region exists and has its volume: up to rounding if the
+  surface was kept, else within ten percent), groups are assigned to tets and triangles, and slivers are
+  counted.
 */
 #include "sbkernel.h"
 #include "sbtet.h"
@@ -39,18 +41,15 @@ PetscErrorCode SbSurfaceDestroy(SbSurface *s)
 PetscReal SbSurfaceMeasure(const SbSurface *s, PetscReal volume[])
 {
   const SbTriangles t = {.nvert = s->nvert, .ntri = s->ntri, .x = s->x, .tri = s->tri};
-  PetscReal sum = 0, longest2, around;
 
   for (PetscInt r = 0; volume && r < s->nregion; r++) volume[r] = 0;
-  for (PetscInt f = 0; f < s->ntri; f++) {
+  for (PetscInt f = 0; volume && f < s->ntri; f++) {
     const PetscReal cone = SbTetVolumeTo(&t, f, s->x);
 
-    if (volume && s->side[2 * f] >= 0) volume[s->side[2 * f]] -= cone;
-    if (volume && s->side[2 * f + 1] >= 0) volume[s->side[2 * f + 1]] += cone;
-    (void)SbTriangleMeasure(&t, f, &longest2, &around);
-    sum += around;
+    if (s->side[2 * f] >= 0) volume[s->side[2 * f]] -= cone;
+    if (s->side[2 * f + 1] >= 0) volume[s->side[2 * f + 1]] += cone;
   }
-  return s->ntri ? sum / (3 * (PetscReal)s->ntri) : 0;
+  return SbTrianglesMeanEdge(&t);
 }
 
 /* ------------------------------------------------------------------ backends */
@@ -93,61 +92,42 @@ static PetscErrorCode run_checked(int backend, const SbTetJob *job, SbImport *te
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Runs one backend; an error about the input becomes a reason, other errors are raised. */
-static PetscErrorCode try_backend(int backend, const SbTetJob *job, SbImport *tets, PetscBool *done,
-                                  size_t size, char reasons[])
-{
-  const size_t n = strlen(job->where);
-  SbCaughtError caught = {0, ""};
-  const char *why = caught.text;
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(tets, sizeof(*tets)));
-  (void)snprintf(tets->where, sizeof(tets->where), "%s", job->where);
-  PetscCall(PetscPushErrorHandler(SbCatchError, &caught));
-  ierr = run_checked(backend, job, tets);
-  PetscCall(PetscPopErrorHandler());
-  *done = (PetscBool)!ierr;
-  if (!ierr) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbImportDestroy(tets));
-  PetscCheck(ierr == PETSC_ERR_USER_INPUT || ierr == PETSC_ERR_FILE_OPEN || ierr == PETSC_ERR_FILE_READ ||
-               ierr == PETSC_ERR_FILE_UNEXPECTED,
-             PETSC_COMM_SELF, ierr, "%s: %s", job->where, caught.text);
-  // remove the prefix that our message has too
-  if (!strncmp(why, job->where, n)) why += n + strspn(why + n, ": ");
-  SbAppend(size, reasons, "%s%s: %s", reasons[0] ? "; " : "", backends[backend].name, why);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 void SbTetDefaults(SbTetOptions *o)
 {
-  *o = (SbTetOptions){.size = 0,
-                      .merge_tolerance = -1,
-                      .untangle = -1,
-                      .angle = 40,
-                      .seconds = 600,
-                      .backend = SB_TET_AUTO,
-                      .surface = SB_TET_SURFACE_AUTO};
+  *o = (SbTetOptions){.merge_tolerance = -1, .untangle = -1, .angle = 40, .seconds = 600};
 }
 
-/* Runs the first backend that works; its mesh becomes that of the body. */
+/* Runs the first backend that works; the body gets its mesh. An error about the input becomes a reason. */
 static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscBool *done, size_t size,
                                    char reasons[], SbImport *body)
 {
+  const size_t n = strlen(job->where);
   SbImport tets;
 
   PetscFunctionBeginUser;
   for (int backend = 0; backend < 2 && !*done; backend++) {
+    SbCaughtError caught = {0, ""};
     SbItems *tri = &body->item[2];
-    PetscInt n = 0;
-    const char *surface;
+    PetscInt kept = 0;
+    const char *surface, *why = caught.text;
     SbShape shape;
     char slivers[96] = "";
 
     if (job->options.backend != SB_TET_AUTO && (int)job->options.backend != backend + 1) continue;
-    PetscCall(try_backend(backend, job, &tets, done, size, reasons));
-    if (!*done) continue;
+    PetscCall(PetscMemzero(&tets, sizeof(tets)));
+    (void)snprintf(tets.where, sizeof(tets.where), "%s", job->where);
+    SB_CATCH(&caught, run_checked(backend, job, &tets));
+    *done = (PetscBool)!caught.code;
+    if (caught.code) {
+      PetscCall(SbImportDestroy(&tets));
+      PetscCheck(caught.code == PETSC_ERR_USER_INPUT || caught.code == PETSC_ERR_FILE_OPEN ||
+                   caught.code == PETSC_ERR_FILE_READ || caught.code == PETSC_ERR_FILE_UNEXPECTED,
+                 PETSC_COMM_SELF, (PetscErrorCode)caught.code, "%s: %s", job->where, caught.text);
+      // remove the prefix that our message has too
+      if (!strncmp(why, job->where, n)) why += n + strspn(why + n, ": ");
+      SbAppend(size, reasons, "%s%s: %s", reasons[0] ? "; " : "", backends[backend].name, why);
+      continue;
+    }
     // the body keeps its groups and tag sets
     PetscCall(PetscFree(body->x));
     PetscCall(PetscFree(body->vert_number));
@@ -159,24 +139,25 @@ static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscB
     for (int d = 0; d < 4; d++) {
       PetscCall(SbItemsFree(&body->item[d]));
       body->item[d] = tets.item[d];
-      PetscCall(PetscMemzero(&tets.item[d], sizeof(tets.item[d])));
+      tets.item[d] = (SbItems){0};
     }
+    PetscCall(SbImportDestroy(&tets));
     for (PetscInt i = 0; i < 3 * body->nvert; i++) body->x[i] *= (1 / factor);
     for (PetscInt v = 0; v < body->nvert; v++) body->vert_number[v] = v + 1;
-    for (PetscInt c = 0; c < body->item[3].n; c++) body->item[3].number[c] = c + 1;
-    PetscCall(SbImportDestroy(&tets));
     // region and triangle numbers become tag sets; triangles without groups are dropped
-    for (PetscInt c = 0; c < body->item[3].n; c++)
+    for (PetscInt c = 0; c < body->item[3].n; c++) {
+      body->item[3].number[c] = c + 1;
       body->item[3].tags[c] = job->surface->region_tags[body->item[3].tags[c]];
+    }
     for (PetscInt i = 0; i < tri->n; i++) {
       const PetscInt f = tri->tags[i];
 
       if (!job->surface->tags[f]) continue;
-      PetscCall(PetscArraymove(tri->vert + 3 * n, tri->vert + 3 * i, 3));
-      tri->tags[n] = job->surface->tags[f];
-      tri->number[n++] = job->surface->number[f];
+      PetscCall(PetscArraymove(tri->vert + 3 * kept, tri->vert + 3 * i, 3));
+      tri->tags[kept] = job->surface->tags[f];
+      tri->number[kept++] = job->surface->number[f];
     }
-    tri->n = n;
+    tri->n = kept;
     // note which program made the tets
     surface = job->remesh ? "remeshed" : "kept";
     if (job->remesh && backend + 1 == SB_TET_TETGEN) surface = job->size < job->edge ? "split" : "kept";
@@ -202,8 +183,8 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *s, const SbT
   char reasons[640] = "", size_option[SB_IMPORT_OPTION_MAX], surface_option[SB_IMPORT_OPTION_MAX];
   int exponent;
   PetscErrorCode ierr;
-  PetscReal *volume, edge, all = 0;
-  char option[SB_IMPORT_OPTION_MAX];
+  PetscReal *volume, edge, expected, all = 0, wrong = 0;
+  PetscInt region = -1;
 
   PetscFunctionBeginUser;
   // target size, whether the surface is kept, expected number of tets
@@ -213,38 +194,33 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *s, const SbT
   PetscCall(PetscCalloc1(s->nregion, &volume));
   edge = SbSurfaceMeasure(s, volume);
   for (PetscInt r = 0; r < s->nregion; r++) {
-    const PetscReal v = volume[r];
-
-    if (!(v > 0)) {
-      PetscCall(PetscFree(volume));
-      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-              "%s: region %" PetscInt_FMT " has the volume %g; its triangles are turned, or not closed",
-              where, r + 1, (double)v);
+    if (region < 0 && !(volume[r] > 0)) {
+      region = r;
+      wrong = volume[r];
     }
-    all += v;
+    all += volume[r];
   }
   PetscCall(PetscFree(volume));
-  job = (SbTetJob){.where = where,
-                   .body = body,
-                   .surface = s,
-                   .size = o->size > 0 ? o->size : edge,
-                   .options = *o,
-                   .edge = edge};
+  PetscCheck(region < 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: region %" PetscInt_FMT " has the volume %g; its triangles are turned, or not closed", where,
+             region + 1, (double)wrong);
+  job = (SbTetJob){.where = where, .body = body, .surface = s, .options = *o, .edge = edge};
+  job.size = o->size > 0 ? o->size : edge;
   if (!(job.options.seconds > 0)) job.options.seconds = 600;
   if (!(job.options.angle > 0)) job.options.angle = 40;
   job.remesh =
     (PetscBool)(o->surface == SB_TET_REMESH ||
                 (o->surface == SB_TET_SURFACE_AUTO && (job.size > NEAR * edge || edge > NEAR * job.size)));
   /* a regular tet of edge h has the volume h^3 / (6 sqrt(2)) */
-  job.expected = 6 * PETSC_SQRT2 * all / (job.size * job.size * job.size);
-  PetscCheck(job.expected < SB_TET_MOST, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+  expected = 6 * PETSC_SQRT2 * all / (job.size * job.size * job.size);
+  PetscCheck(expected < SB_TET_MOST, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: a size of %g m makes about %.2g tets out of %.4g m^3; give a size of at least %.3g m (%s)",
-             where, (double)job.size, (double)job.expected, (double)all,
-             (double)(job.size * PetscPowReal(job.expected / SB_TET_MOST, 1. / 3)),
-             SbImportOption(body, "tet_size", option));
+             where, (double)job.size, (double)expected, (double)all,
+             (double)(job.size * PetscPowReal(expected / SB_TET_MOST, 1. / 3)),
+             SbImportOption(body, "tet_size", size_option));
   (void)frexp(job.size, &exponent);
   factor = ldexp(1, 1 - exponent);
-  // scale lengths by a power of two, which is exact, to a target size between 1 and 2, for absolute tolerances in the backends
+  // backends have absolute tolerances: scaling by a power of two, which is exact, to a size from 1 to 2
   scaled = *s;
   PetscCall(PetscMalloc1(3 * (size_t)s->nvert, &scaled.x));
   for (PetscInt i = 0; i < 3 * s->nvert; i++) scaled.x[i] = factor * s->x[i];

@@ -7,30 +7,6 @@
 #include "sbtet.h"
 #include "triangles.h"
 
-/* ------------------------------------------------------------------ gmsh */
-
-/* Adds the boundary faces of the tets; their number in the file is 0. */
-static PetscErrorCode add_boundary(SbImport *im, SbTriangleFile *f)
-{
-  SbFaces faces;
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&faces, sizeof(faces)));
-  ierr = SbImportCheck(im, &faces);
-  for (PetscInt s = 0; !ierr && s < 4 * im->item[3].n; s++) {
-    const PetscInt *v = im->item[3].vert + 4 * (s / 4);
-    const int *a = SbFaceVertex[s % 4];
-
-    if (faces.neighbour[s] >= 0) continue;
-    ierr = SbTrianglesAdd(f, v[a[0]], v[a[1]], v[a[2]], f->t->ntri + 1);
-  }
-  PetscCall(SbFacesDestroy(&faces));
-  PetscFunctionReturn(ierr);
-}
-
-/* ------------------------------------------------------------------ files */
-
 const SbTriangleFormat *SbTrianglesFormat(const char *path)
 {
   static const SbTriangleFormat formats[] = {
@@ -44,9 +20,8 @@ const SbTriangleFormat *SbTrianglesFormat(const char *path)
   };
   const char *dot = strrchr(path, '.');
 
-  for (size_t i = 0; dot && i < PETSC_STATIC_ARRAY_LENGTH(formats); i++) {
+  for (size_t i = 0; dot && i < PETSC_STATIC_ARRAY_LENGTH(formats); i++)
     if (!strcasecmp(dot, formats[i].extension)) return &formats[i];
-  }
   return NULL;
 }
 
@@ -55,6 +30,8 @@ PetscErrorCode SbTrianglesReadFile(const char *path, SbTriangleFile *f)
   const SbTriangleFormat *format = SbTrianglesFormat(path);
   SbImport *im = f->im;
   const SbItems *tri = &im->item[2];
+  SbFaces faces = {0};
+  PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBeginUser;
   f->path = path;
@@ -66,7 +43,16 @@ PetscErrorCode SbTrianglesReadFile(const char *path, SbTriangleFile *f)
     // gmsh: boundary of the tets, else the triangles
     im->surface = PETSC_TRUE;
     PetscCall(SbImportRead_Gmsh(path, im));
-    if (im->item[3].n) PetscCall(add_boundary(im, f));
+    if (im->item[3].n) ierr = SbImportCheck(im, &faces);
+    for (PetscInt s = 0; !ierr && s < 4 * faces.ncell; s++) {
+      const PetscInt *v = im->item[3].vert + 4 * (s / 4);
+      const int *a = SbFaceVertex[s % 4];
+
+      if (faces.neighbour[s] >= 0) continue;
+      ierr = SbTrianglesAdd(f, v[a[0]], v[a[1]], v[a[2]], f->t->ntri + 1);
+    }
+    PetscCall(SbFacesDestroy(&faces));
+    PetscCall(ierr);
     for (PetscInt i = 0; !im->item[3].n && i < tri->n; i++)
       PetscCall(
         SbTrianglesAdd(f, tri->vert[3 * i], tri->vert[3 * i + 1], tri->vert[3 * i + 2], tri->number[i]));

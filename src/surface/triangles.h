@@ -1,5 +1,6 @@
 /*
-  triangles.h - triangles read from a surface file, before they become a body or a rigid obstacle: shared by triangles*.c. Rank 0 only.
+  triangles.h - triangles read from a surface file, before they become a body or a rigid obstacle. Rank 0
+  only.
 */
 #pragma once
 #include "sbgeometry.h"
@@ -43,15 +44,14 @@ PetscErrorCode SbTrianglesRead_Poly(SbScan *scan, SbTriangleFile *file); /* .pol
 /* Add a vertex, or a triangle of existing vertices. */
 PetscErrorCode SbTrianglesAddVertex(SbTriangleFile *file, const PetscReal x[3]);
 PetscErrorCode SbTrianglesAdd(SbTriangleFile *file, PetscInt a, PetscInt b, PetscInt c, int64_t number);
-/* Add corner v, from 0, to the face `number` being read; add the face after its last corner. Errors: a missing vertex; fewer than three corners. */
+/* Add corner v, from 0, to the face `number` being read; add the face after its last corner. Errors: a
+   missing vertex; fewer than three corners. */
 PetscErrorCode SbTrianglesAddCorner(SbScan *scan, int64_t number, int64_t v, SbTriangleFile *file);
 PetscErrorCode SbTrianglesAddFace(SbScan *scan, int64_t number, SbTriangleFile *file);
-/* Triangulates a polygon, convex or not, without new vertices; vert[n] from 0. An error names the last scanned token. */
-PetscErrorCode SbTrianglesAddPolygon(SbScan *scan, PetscInt n, const PetscInt vert[], int64_t number,
-                                     SbTriangleFile *file);
 /*
-  Triangulates nested polygons: vert[start[k]] to vert[start[k + 1] - 1] is polygon k of nloop; the areas with a point of
-  hole[nhole][3] are left empty, all other enclosed areas are filled.
+  Triangulates nested polygons, convex or not, without new vertices: vert[start[k]] to vert[start[k + 1] - 1]
+  is polygon k of nloop; the areas with a point of hole[nhole][3] are left empty, all other enclosed areas are
+  filled. An error names the last scanned token.
 */
 PetscErrorCode SbTrianglesAddLoops(SbScan *scan, PetscInt nloop, const PetscInt start[],
                                    const PetscInt vert[], PetscInt nhole, const PetscReal hole[],
@@ -70,10 +70,17 @@ PetscErrorCode SbTrianglesReadFile(const char *path, SbTriangleFile *file);
 
 /* ------------------------------------------------------------------ triangles_measure.c */
 
-/* edge[3 ntri], sorted: slots with equal keys are one edge. Slot: 3 triangle + k; edge k is from corner k to the next. */
+/* Corner k of triangle f has the slot 3 f + k, as its edge to the next corner, whose slot this is. */
+static inline PetscInt SbSlotNext(PetscInt slot)
+{
+  return slot % 3 == 2 ? slot - 2 : slot + 1;
+}
+/* edge[3 ntri], sorted: slots with equal keys are one edge. */
 void SbTrianglesEdges(const SbTriangles *triangles, SbKey edge[]);
-/* Returns twice the area of a triangle, m^2; its longest edge squared, m^2, and its perimeter, m. */
-PetscReal SbTriangleMeasure(const SbTriangles *triangles, PetscInt f, PetscReal *longest2, PetscReal *around);
+/* Area of a triangle, m^2; flat: whether it has none (SB_TRIANGLE_FLAT), NULL: not wanted. */
+PetscReal SbTriangleArea(const SbTriangles *triangles, PetscInt f, PetscBool *flat);
+/* Mean length of the edges, m. */
+PetscReal SbTrianglesMeanEdge(const SbTriangles *triangles);
 /* Signed volume of the tet between a triangle and the point o, m^3, positive if o is behind it. */
 PetscReal SbTetVolumeTo(const SbTriangles *triangles, PetscInt f, const PetscReal o[3]);
 /* Solid angle of a triangle seen from o, positive if o is behind it. */

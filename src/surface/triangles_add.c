@@ -1,11 +1,12 @@
 /*
-  triangles_add.c - adds vertices, triangles and polygons of a file to a surface; polygons are triangulated without new vertices: as a fan
-  if possible, else by ear clipping.
+  triangles_add.c - adds vertices, triangles and polygons of a file to a surface; polygons are triangulated
+  without new vertices: as a fan if possible, else by ear clipping.
 
-  Areas are projected along the polygon's normal (Newell's sum over its edges, valid for slightly non-planar polygons). An
-  ear is a convex corner whose triangle contains no other corner; the ear with the best ratio of area to longest edge squared is cut
-  first, so that collinear corners do not end as flat triangles (Meisters, "Polygons have ears", 1975). Polygons inside
-  a polygon are connected to it by bridges: pairs of coincident edges of opposite directions.
+  Areas are projected along the polygon's normal (Newell's sum over its edges, valid for slightly non-planar
+  polygons). An ear is a convex corner whose triangle contains no other corner; the ear with the best ratio of
+  area to longest edge squared is cut first, so that collinear corners do not end as flat triangles (Meisters,
+  "Polygons have ears", 1975). Polygons inside a polygon are connected to it by bridges: pairs of coincident
+  edges of opposite directions.
 */
 #include <ctype.h>
 #include "sbkernel.h"
@@ -23,7 +24,7 @@ PetscErrorCode SbTrianglesAddVertex(SbTriangleFile *f, const PetscReal x[3])
 
   PetscFunctionBeginUser;
   PetscCall(SbReserve(t->nvert + 1, 3 * sizeof(PetscReal), &f->vert_size, &t->x));
-  for (int i = 0; i < 3; i++) t->x[3 * t->nvert + i] = x[i];
+  PetscCall(PetscArraycpy(t->x + 3 * t->nvert, x, 3));
   t->nvert++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -31,7 +32,6 @@ PetscErrorCode SbTrianglesAddVertex(SbTriangleFile *f, const PetscReal x[3])
 PetscErrorCode SbTrianglesAdd(SbTriangleFile *f, PetscInt a, PetscInt b, PetscInt c, int64_t number)
 {
   SbTriangles *t = f->t;
-  PetscInt *v;
 
   PetscFunctionBeginUser;
   if (t->ntri == f->tri_size) {
@@ -40,11 +40,8 @@ PetscErrorCode SbTrianglesAdd(SbTriangleFile *f, PetscInt a, PetscInt b, PetscIn
     PetscCall(SbImportScratch(f->im, (size_t)f->tri_size * sizeof(int64_t), &f->number));
     PetscCall(SbImportScratch(f->im, (size_t)f->tri_size * sizeof(PetscInt), &f->tags));
   }
+  PetscCall(PetscArraycpy(t->tri + 3 * t->ntri, ((const PetscInt[3]){a, b, c}), 3));
   f->tags[t->ntri] = f->now;
-  v = t->tri + 3 * t->ntri;
-  v[0] = a;
-  v[1] = b;
-  v[2] = c;
   f->number[t->ntri++] = number;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -107,19 +104,6 @@ static PetscReal seen_area(const Polygon *p, PetscInt a, PetscInt b, PetscInt c,
   return SbDot3(n, p->normal);
 }
 
-/* Whether all triangles of the fan at corner o have a positive projected area. */
-static PetscBool is_fan(const Polygon *p, PetscInt n, const PetscInt vert[], PetscInt o, PetscReal length)
-{
-  PetscReal longest2;
-
-  for (PetscInt i = 1; i + 1 < n; i++) {
-    const PetscReal area = seen_area(p, vert[o], vert[(o + i) % n], vert[(o + i + 1) % n], &longest2);
-
-    if (!(area > THIN * longest2 * length)) return PETSC_FALSE;
-  }
-  return PETSC_TRUE;
-}
-
 /* Quality of the ear at corner i: area over longest edge squared; -1 if it is not an ear. */
 static PetscReal ear_quality(const Polygon *p, PetscInt n, const PetscInt vert[], PetscInt i)
 {
@@ -131,15 +115,14 @@ static PetscReal ear_quality(const Polygon *p, PetscInt n, const PetscInt vert[]
   for (PetscInt k = 0; k < n; k++) {
     const PetscInt d = vert[k];
 
-    if (d == a || d == b || d == c) continue;
-    if (seen_area(p, a, b, d, NULL) >= 0 && seen_area(p, b, c, d, NULL) >= 0 &&
+    if (d != a && d != b && d != c && seen_area(p, a, b, d, NULL) >= 0 && seen_area(p, b, c, d, NULL) >= 0 &&
         seen_area(p, c, a, d, NULL) >= 0)
       return -1;
   }
   return area / longest2;
 }
 
-/* Ear clipping, removes corners from left[]; of a self-intersecting polygon any triangulation results, which later checks report. */
+/* Ear clipping, removes corners from left[]; later checks refuse the result of a self-intersecting one. */
 static PetscErrorCode cut_ears(const Polygon *p, PetscInt n, PetscInt left[], int64_t number,
                                SbTriangleFile *f)
 {
@@ -172,38 +155,39 @@ static PetscErrorCode too_many(SbScan *s, PetscInt n, int64_t number)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbTrianglesAddPolygon(SbScan *s, PetscInt n, const PetscInt vert[], int64_t number,
-                                     SbTriangleFile *f)
+/* Triangulates a polygon, convex or not, without new vertices. */
+static PetscErrorCode add_polygon(SbScan *s, PetscInt n, const PetscInt vert[], int64_t number,
+                                  SbTriangleFile *f)
 {
   Polygon p = {.x = f->t->x};
-  PetscInt left[CORNERS_MAX];
+  PetscInt left[CORNERS_MAX], o = 0;
   PetscBool fan = PETSC_TRUE;
-  PetscInt o = 0;
 
   PetscFunctionBeginUser;
   if (n > 3) {
-    PetscInt first = 0;
-
-    // start at the lexicographically smallest corner: the triangulation is independent of the first corner
+    // the fan at the lexicographically smallest corner: the triangulation is independent of the first corner
     for (PetscInt i = 1; i < n; i++) {
-      const PetscReal *a = p.x + 3 * vert[i], *b = p.x + 3 * vert[first];
+      const PetscReal *a = p.x + 3 * vert[i], *b = p.x + 3 * vert[o];
       int k = 0;
 
       while (k < 2 && a[k] == b[k]) k++;
-      if (a[k] < b[k]) first = i;
+      if (a[k] < b[k]) o = i;
     }
-    o = first;
     find_normal(n, vert, &p);
-    fan = is_fan(&p, n, vert, o, PetscSqrtReal(SbDot3(p.normal, p.normal)));
+    // all its triangles must have a positive projected area
+    for (PetscInt i = 1; i + 1 < n && fan; i++) {
+      PetscReal longest2;
+      const PetscReal area = seen_area(&p, vert[o], vert[(o + i) % n], vert[(o + i + 1) % n], &longest2);
+
+      fan = (PetscBool)(area > THIN * longest2 * PetscSqrtReal(SbDot3(p.normal, p.normal)));
+    }
   }
-  if (!fan) {
-    if (n > CORNERS_MAX) PetscCall(too_many(s, n, number));
-    PetscCall(PetscArraycpy(left, vert, n));
-    PetscCall(cut_ears(&p, n, left, number, f));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  for (PetscInt i = 1; i + 1 < n; i++)
+  for (PetscInt i = 1; i + 1 < n && fan; i++)
     PetscCall(SbTrianglesAdd(f, vert[o], vert[(o + i) % n], vert[(o + i + 1) % n], number));
+  if (fan) PetscFunctionReturn(PETSC_SUCCESS);
+  if (n > CORNERS_MAX) PetscCall(too_many(s, n, number));
+  PetscCall(PetscArraycpy(left, vert, n));
+  PetscCall(cut_ears(&p, n, left, number, f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -225,7 +209,7 @@ PetscErrorCode SbTrianglesAddFace(SbScan *s, int64_t number, SbTriangleFile *f)
   PetscFunctionBeginUser;
   f->ncorner.n = 0;
   if (n < 3) SB_SCAN_ERROR(s, "face %lld has %lld corners; it needs three", (long long)number, (long long)n);
-  PetscCall(SbTrianglesAddPolygon(s, n, f->corner, number, f));
+  PetscCall(add_polygon(s, n, f->corner, number, f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -305,7 +289,7 @@ static PetscErrorCode add_between(SbScan *s, const Loops *l, PetscInt k, const P
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < l->n; i++) alone = (PetscBool)(alone && parent[i] != k);
   if (alone) {
-    PetscCall(SbTrianglesAddPolygon(s, m, loop, number, f));
+    PetscCall(add_polygon(s, m, loop, number, f));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (m > CORNERS_MAX) PetscCall(too_many(s, m, number));
@@ -318,18 +302,17 @@ static PetscErrorCode add_between(SbScan *s, const Loops *l, PetscInt k, const P
 
     if (parent[inner] != k) continue;
     if (n + ninner + 2 > CORNERS_MAX) PetscCall(too_many(s, n + ninner + 2, number));
-    // shortest bridge from a corner of the outer polygon (position i) to one of the inner one (position j) that intersects no edge
+    // shortest bridge from corner i of the outer polygon to corner j of the inner one that intersects no edge
     for (PetscInt a = 0; a < n; a++) {
       for (PetscInt b = 0; b < ninner; b++) {
         const PetscReal *x = l->p.x + 3 * left[a], *y = l->p.x + 3 * other[b],
-                        d[3] = {y[0] - x[0], y[1] - x[1], y[2] - x[2]};
-        PetscBool blocked =
-          (PetscBool)(SbDot3(d, d) >= best || meets_edge(&l->p, left[a], other[b], n, left));
+                        d[3] = {y[0] - x[0], y[1] - x[1], y[2] - x[2]}, d2 = SbDot3(d, d);
+        PetscBool blocked = (PetscBool)(d2 >= best || meets_edge(&l->p, left[a], other[b], n, left));
 
         for (PetscInt c = 0; c < l->n && !blocked; c++)
           blocked = meets_edge(&l->p, left[a], other[b], corners_of(l, c), l->vert + l->start[c]);
         if (blocked) continue;
-        best = SbDot3(d, d);
+        best = d2;
         i = a;
         j = b;
       }
@@ -351,11 +334,10 @@ PetscErrorCode SbTrianglesAddLoops(SbScan *s, PetscInt nloop, const PetscInt sta
 {
   Loops l = {{.x = f->t->x}, nloop, start, vert};
   PetscInt parent[LOOPS_MAX], largest = 0;
-  PetscBool empty[LOOPS_MAX];
+  PetscBool empty[LOOPS_MAX] = {PETSC_FALSE};
 
   PetscFunctionBeginUser;
-  if (nloop == 1 && !nhole) PetscCall(SbTrianglesAddPolygon(s, start[1], vert, number, f));
-  if (nloop == 0 || (nloop == 1 && !nhole)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!nloop) PetscFunctionReturn(PETSC_SUCCESS);
   if (nloop > LOOPS_MAX)
     SB_SCAN_ERROR(s, "facet %lld has %lld polygons; supple takes up to %d, cut it into parts",
                   (long long)number, (long long)nloop, LOOPS_MAX);
@@ -367,10 +349,8 @@ PetscErrorCode SbTrianglesAddLoops(SbScan *s, PetscInt nloop, const PetscInt sta
     PetscCall(PetscArraycpy(l.p.normal, one.normal, 3));
     largest = k;
   }
-  for (PetscInt k = 0; k < nloop; k++) {
+  for (PetscInt k = 0; k < nloop; k++)
     parent[k] = k == largest ? -1 : loop_around(&l, l.p.x + 3 * vert[start[k]], k);
-    empty[k] = PETSC_FALSE;
-  }
   for (PetscInt h = 0; h < nhole; h++) {
     const PetscInt k = loop_around(&l, hole + 3 * h, -1);
 
@@ -379,8 +359,7 @@ PetscErrorCode SbTrianglesAddLoops(SbScan *s, PetscInt nloop, const PetscInt sta
                     (long long)number);
     empty[k] = PETSC_TRUE;
   }
-  for (PetscInt k = 0; k < nloop; k++) {
+  for (PetscInt k = 0; k < nloop; k++)
     if (!empty[k]) PetscCall(add_between(s, &l, k, parent, number, f));
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,5 +1,5 @@
 /*
-  triangles_measure.c - areas, volumes and solid angles (van Oosterom and Strackee 1983) of surface triangles; sorted edges of a surface.
+  triangles_measure.c - areas, edges, volumes and solid angles (van Oosterom and Strackee 1983) of triangles.
 */
 #include "sbkernel.h"
 #include "triangles.h"
@@ -9,29 +9,40 @@ static const PetscReal *corner(const SbTriangles *t, PetscInt f, int k)
   return t->x + 3 * t->tri[3 * f + k];
 }
 
-PetscReal SbTriangleMeasure(const SbTriangles *t, PetscInt f, PetscReal *longest2, PetscReal *around)
+PetscReal SbTriangleArea(const SbTriangles *t, PetscInt f, PetscBool *flat)
 {
-  PetscReal e[3][3], n[3];
+  PetscReal e[3][3], n[3], longest2 = 0, twice;
 
-  *longest2 = *around = 0;
   for (int k = 0; k < 3; k++) {
-    PetscReal l2;
-
     SbSubtract(corner(t, f, (k + 1) % 3), corner(t, f, k), e[k]);
-    l2 = SbDot3(e[k], e[k]);
-    *longest2 = PetscMax(*longest2, l2);
-    *around += PetscSqrtReal(l2);
+    longest2 = PetscMax(longest2, SbDot3(e[k], e[k]));
   }
   SbCross(e[0], e[1], n);
-  return PetscSqrtReal(SbDot3(n, n));
+  twice = PetscSqrtReal(SbDot3(n, n));
+  if (flat) *flat = (PetscBool) !(twice > SB_TRIANGLE_FLAT * longest2);
+  return 0.5 * twice;
 }
 
-/* ------------------------------------------------------------------ edges */
+PetscReal SbTrianglesMeanEdge(const SbTriangles *t)
+{
+  PetscReal sum = 0;
+
+  for (PetscInt f = 0; f < t->ntri; f++) {
+    PetscReal e[3], around = 0;
+
+    for (int k = 0; k < 3; k++) {
+      SbSubtract(corner(t, f, (k + 1) % 3), corner(t, f, k), e);
+      around += PetscSqrtReal(SbDot3(e, e));
+    }
+    sum += around;
+  }
+  return t->ntri ? sum / (3 * (PetscReal)t->ntri) : 0;
+}
 
 void SbTrianglesEdges(const SbTriangles *t, SbKey edge[])
 {
   for (PetscInt i = 0; i < 3 * t->ntri; i++)
-    edge[i] = (SbKey){SbKeyOfPair(t->tri[i], t->tri[i % 3 == 2 ? i - 2 : i + 1]), i};
+    edge[i] = (SbKey){SbKeyOfPair(t->tri[i], t->tri[SbSlotNext(i)]), i};
   SbKeysSort(3 * t->ntri, edge);
 }
 

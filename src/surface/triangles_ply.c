@@ -1,8 +1,10 @@
 /*
-  triangles_ply.c - reader of .ply surfaces (Stanford polygon format 1.0): text, and binary in both byte orders.
+  triangles_ply.c - reader of .ply surfaces (Stanford polygon format 1.0): text, and binary in both byte
+  orders.
 
-  The header lists the properties of each element with their order and types. Read: x, y and z of `vertex`, the
-  list vertex_indices (or vertex_index) of `face`; everything else is skipped. Triangle strips are an error.
+  The header lists the properties of each element with their order and types. Read: x, y and z of `vertex`,
+  the list vertex_indices (or vertex_index) of `face`; everything else is skipped. Triangle strips are an
+  error.
 */
 #include "triangles.h"
 
@@ -32,7 +34,6 @@ typedef struct {
 
 static PetscErrorCode read_property(Ply *p)
 {
-  static const char *const coordinates[3] = {"x", "y", "z"};
   Element *e;
   Property *q;
   char word[32];
@@ -53,9 +54,8 @@ static PetscErrorCode read_property(Ply *p)
     p->s->at = before;
   PetscCall(SbScanType(p->s, &q->type));
   PetscCall(SbScanWord(p->s, sizeof(word), word));
-  for (int k = 0; k < 3; k++) {
-    if (!strcmp(e->name, "vertex") && !strcmp(word, coordinates[k]) && !q->count.size) q->axis = k;
-  }
+  if (!strcmp(e->name, "vertex") && word[0] >= 'x' && word[0] <= 'z' && !word[1] && !q->count.size)
+    q->axis = word[0] - 'x';
   if (!strcmp(e->name, "face") && (!strcmp(word, "vertex_indices") || !strcmp(word, "vertex_index")) &&
       q->count.size)
     q->axis = 3;
@@ -129,77 +129,56 @@ static PetscErrorCode read_value(Ply *p, SbNumberType type, const char *what, do
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_count(Ply *p, const Property *q, int64_t *n)
-{
-  double value;
-
-  PetscFunctionBeginUser;
-  PetscCall(read_value(p, q->count, "length of a list", &value));
-  if (!(value >= 0 && value <= 4294967295. && value == floor(value)))
-    SB_SCAN_ERROR(p->s, "a list has %g entries; the file is damaged", value);
-  *n = (int64_t)value;
-  PetscCall(SbScanRoom(p->s, "entries of a list", *n, 2, q->type.size));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbTrianglesRead_PLY(SbScan *s, SbTriangleFile *f)
 {
-  Ply *p = NULL;
+  Ply ply = {.s = s, .f = f}, *p = &ply;
 
   PetscFunctionBeginUser;
-  PetscCall(SbImportScratch(f->im, sizeof(*p), &p));
-  PetscCall(PetscMemzero(p, sizeof(*p)));
-  p->s = s;
-  p->f = f;
   PetscCall(read_header(p));
-  for (int k = 0; k < p->nelement; k++) {
+  for (const Element *e = p->element; e < p->element + p->nelement; e++) {
     int64_t bytes = 0;
     int axes = 0;
 
     // coordinates are required; check the number of items against the file size
-    for (int i = 0; i < p->element[k].nproperty; i++) {
-      const Property *q = &p->element[k].property[i];
-
+    for (const Property *q = e->property; q < e->property + e->nproperty; q++) {
       bytes += q->count.size ? q->count.size : q->type.size;
       axes |= q->axis >= 0 ? 1 << q->axis : 0;
     }
-    if (!strcmp(p->element[k].name, "vertex") && axes != 7)
-      SB_SCAN_ERROR(p->s, "the vertices have no properties x, y and z");
-    if (!strcmp(p->element[k].name, "face") && axes != 8)
-      SB_SCAN_ERROR(p->s, "the faces have no list vertex_indices");
-    if (!bytes && p->element[k].n)
-      SB_SCAN_ERROR(p->s, "the element '%s' has no properties", p->element[k].name);
-    PetscCall(SbScanRoom(p->s, p->element[k].name, p->element[k].n, PetscMax(1, 2 * p->element[k].nproperty),
-                         PetscMax(1, bytes)));
+    if (!strcmp(e->name, "vertex") && axes != 7)
+      SB_SCAN_ERROR(s, "the vertices have no properties x, y and z");
+    if (!strcmp(e->name, "face") && axes != 8) SB_SCAN_ERROR(s, "the faces have no list vertex_indices");
+    if (!bytes && e->n) SB_SCAN_ERROR(s, "the element '%s' has no properties", e->name);
+    PetscCall(SbScanRoom(s, e->name, e->n, PetscMax(1, 2 * e->nproperty), PetscMax(1, bytes)));
     // all properties of one vertex, face or other item
-    for (int64_t i = 0; i < p->element[k].n; i++) {
+    for (int64_t i = 0; i < e->n; i++) {
       PetscReal x[3] = {0, 0, 0};
-      double value;
 
-      for (int j = 0; j < p->element[k].nproperty; j++) {
-        const Property *q = &p->element[k].property[j];
+      for (const Property *q = e->property; q < e->property + e->nproperty; q++) {
+        const char *what = q->axis == 3 ? "vertex of a face" : "value of a property";
         int64_t n = 1;
+        double value = 0;
 
-        if (q->axis == 3) {
-          // corners of a face
-          PetscCall(read_count(p, q, &n));
-          for (int64_t c = 0; c < n; c++) {
-            PetscCall(read_value(p, q->type, "vertex of a face", &value));
-            if (!(value >= 0 && value < (double)p->f->t->nvert))
-              SB_SCAN_ERROR(p->s, "face %lld uses a vertex that is not there (%g, from 0, of %lld)",
-                            (long long)i + 1, value, (long long)p->f->t->nvert);
-            PetscCall(SbTrianglesAddCorner(p->s, i + 1, (int64_t)value, p->f));
-          }
-          PetscCall(SbTrianglesAddFace(p->s, i + 1, p->f));
-          continue;
+        if (q->count.size) {
+          PetscCall(read_value(p, q->count, "length of a list", &value));
+          if (!(value >= 0 && value <= 4294967295. && value == floor(value)))
+            SB_SCAN_ERROR(s, "a list has %g entries; the file is damaged", value);
+          n = (int64_t)value;
+          PetscCall(SbScanRoom(s, "entries of a list", n, 2, q->type.size));
         }
-        if (q->count.size) PetscCall(read_count(p, q, &n));
-        for (int64_t c = 0; c < n; c++) PetscCall(read_value(p, q->type, "value of a property", &value));
-        if (q->axis < 0) continue;
-        if (!isfinite(value)) SB_SCAN_ERROR(p->s, "the coordinate is not a finite number; repair the file");
+        for (int64_t c = 0; c < n; c++) {
+          PetscCall(read_value(p, q->type, what, &value));
+          if (q->axis != 3) continue;
+          if (!(value >= 0 && value < (double)f->t->nvert))
+            SB_SCAN_ERROR(s, "face %lld uses a vertex that is not there (%g, from 0, of %lld)",
+                          (long long)i + 1, value, (long long)f->t->nvert);
+          PetscCall(SbTrianglesAddCorner(s, i + 1, (int64_t)value, f));
+        }
+        if (q->axis == 3) PetscCall(SbTrianglesAddFace(s, i + 1, f));
+        if (q->axis < 0 || q->axis == 3) continue;
+        if (!isfinite(value)) SB_SCAN_ERROR(s, "the coordinate is not a finite number; repair the file");
         x[q->axis] = value;
       }
-      if (!strcmp(p->element[k].name, "vertex")) PetscCall(SbTrianglesAddVertex(p->f, x));
+      if (!strcmp(e->name, "vertex")) PetscCall(SbTrianglesAddVertex(f, x));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,13 +1,13 @@
 /*
   triangles_poly.c - reader of TetGen's .poly and .smesh surfaces (TetGen 1.5 manual, section 5.2).
 
-  Four parts: points (if their number is 0, they are in NAME.node), facets, holes, regions. A facet of .smesh is one polygon; one of
-  .poly may have several nested polygons, and hole points. A # begins a comment. Point numbers begin
-  at 0 or 1, as the first one.
+  Four parts: points (if their number is 0, they are in NAME.node), facets, holes, regions. A facet of .smesh
+  is one polygon; one of .poly may have several nested polygons, and hole points. A # begins a comment. Point
+  numbers begin at 0 or 1, as the first one.
 
-  Kept: a nonzero facet marker N is the group surface_N; a hole is a cavity; the attribute N of a region gives its tets the group volume_N (its
-  largest volume is ignored: sizes are set by -body_<name>_tet_size). Errors: polygons of one or two corners, which
-  mark points and edges of a facet.
+  Kept: a nonzero facet marker N is the group surface_N; a hole is a cavity; the attribute N of a region gives
+  its tets the group volume_N (its largest volume is ignored: sizes are set by -body_<name>_tet_size). Errors:
+  polygons of one or two corners, which mark points and edges of a facet.
 */
 #include <strings.h>
 #include "triangles.h"
@@ -15,11 +15,9 @@
 typedef struct {
   SbScan *s;
   SbTriangleFile *f;
-  /* polygons of one facet */
-  PetscInt nloop, nvert, nhole;
-  PetscInt *start; /* [nloop + 1] first corner of each polygon */
+  PetscInt nloop, nvert; /* polygons of one facet */
+  PetscInt *start;       /* [nloop + 1] first corner of each polygon */
   PetscInt *vert;
-  PetscReal *hole; /* [nhole][3] hole points of the facet */
 } Poly;
 
 /* Reads the counts at the beginning of a part; omitted ones are 0. */
@@ -83,12 +81,14 @@ static PetscErrorCode read_node_file(Poly *p)
 
 /* ------------------------------------------------------------------ facets */
 
-/* Reads n corners, on one or more lines. */
-static PetscErrorCode read_polygon(Poly *p, int64_t n, int64_t facet)
+/* Reads a polygon of a facet: the number of corners, and these, on one or more lines. */
+static PetscErrorCode read_polygon(Poly *p, const char *what, int64_t facet)
 {
-  int64_t number;
+  int64_t n, number;
 
   PetscFunctionBeginUser;
+  SbScanNext(p->s, '#');
+  PetscCall(SbScanText(p->s, what, &n));
   if (n < 3)
     SB_SCAN_ERROR(p->s,
                   "facet %lld has a polygon of %lld corners; it needs three: supple takes no points or edges "
@@ -102,25 +102,11 @@ static PetscErrorCode read_polygon(Poly *p, int64_t n, int64_t facet)
     SbScanNext(p->s, '#');
     PetscCall(SbScanText(p->s, "corner of a polygon", &number));
     p->vert[p->nvert] = SbNumbersFind(&p->f->im->nodes, number);
-    if (p->vert[p->nvert] < 0)
+    if (p->vert[p->nvert++] < 0)
       SB_SCAN_ERROR(p->s, "facet %lld uses the point %lld, which is not there", (long long)facet,
                     (long long)number);
-    p->nvert++;
   }
   p->start[++p->nloop] = p->nvert;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Adds the triangles of the facet, in the group of its marker. */
-static PetscErrorCode end_facet(Poly *p, int64_t marker, int64_t facet)
-{
-  PetscInt group;
-
-  PetscFunctionBeginUser;
-  if (marker) PetscCall(SbImportGroup(p->f->im, 2, marker, NULL, &group));
-  PetscCall(SbImportTagSet(p->f->im, marker != 0, &group, &p->f->now));
-  PetscCall(SbTrianglesAddLoops(p->s, p->nloop, p->start, p->vert, p->nhole, p->hole, facet, p->f));
-  p->nloop = p->nvert = p->nhole = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -157,53 +143,46 @@ static PetscErrorCode read_seeds(Poly *p, const char *what, PetscBool attribute,
 PetscErrorCode SbTrianglesRead_Poly(SbScan *s, SbTriangleFile *f)
 {
   const PetscBool smesh = (PetscBool)!strcasecmp(strrchr(f->path, '.'), ".smesh");
+  const char *corners = smesh ? "number of corners of a facet" : "number of corners of a polygon";
   Poly poly = {.s = s, .f = f}, *p = &poly;
   int64_t count[4];
+  PetscReal *hole = NULL; /* [][3] hole points of a facet */
 
   PetscFunctionBeginUser;
-  PetscCall(read_counts(p->s, "number of points", 4, count));
+  PetscCall(read_counts(s, "number of points", 4, count));
   if (count[0] && count[1] != 3)
-    SB_SCAN_ERROR(p->s, "points of %lld dimensions; expected 3", (long long)count[1]);
+    SB_SCAN_ERROR(s, "points of %lld dimensions; expected 3", (long long)count[1]);
   if (count[0])
     PetscCall(read_points(p, count[0]));
   else
     PetscCall(read_node_file(p));
-  PetscCall(read_counts(p->s, "number of facets", 2, count));
+  PetscCall(read_counts(s, "number of facets", 2, count));
   for (int64_t i = 1; i <= count[0]; i++) {
-    if (smesh) {
-      int64_t n, marker = 0;
+    int64_t facet[3] = {1, 0, 0}, number;
+    PetscInt group;
 
-      // number of corners, corners, marker
-      SbScanNext(p->s, '#');
-      PetscCall(SbScanText(p->s, "number of corners of a facet", &n));
-      PetscCall(read_polygon(p, n, i));
-      if (count[1] && SbScanMore(p->s, '#')) PetscCall(SbScanText(p->s, "marker of a facet", &marker));
-      SbScanEndOfLine(p->s);
-      PetscCall(end_facet(p, marker, i));
-    } else {
-      int64_t facet[3], n, number;
-
-      // one facet of .poly: numbers of polygons and holes, marker; then the polygons and holes
-      PetscCall(read_counts(p->s, "number of polygons of a facet", 3, facet));
-      for (int64_t k = 0; k < facet[0]; k++) {
-        SbScanNext(p->s, '#');
-        PetscCall(SbScanText(p->s, "number of corners of a polygon", &n));
-        PetscCall(read_polygon(p, n, i));
-        SbScanEndOfLine(p->s);
-      }
-      PetscCall(SbScanRoom(p->s, "holes of a facet", facet[1], 4, 4));
-      for (int64_t k = 0; k < facet[1]; k++) {
-        SbScanNext(p->s, '#');
-        PetscCall(SbScanText(p->s, "number of a hole", &number));
-        PetscCall(SbImportScratch(p->f->im, 3 * (size_t)(p->nhole + 1) * sizeof(*p->hole), &p->hole));
-        PetscCall(SbScanPoint(p->s, "coordinate of a hole", 0, p->hole + 3 * p->nhole));
-        p->nhole++;
-        SbScanEndOfLine(p->s);
-      }
-      PetscCall(end_facet(p, facet[2], i));
+    // numbers of polygons and holes, and marker; one of .smesh is a single polygon with the marker behind it
+    if (!smesh) PetscCall(read_counts(s, "number of polygons of a facet", 3, facet));
+    p->nloop = p->nvert = 0;
+    for (int64_t k = 0; k < facet[0]; k++) {
+      PetscCall(read_polygon(p, corners, i));
+      if (smesh && count[1] && SbScanMore(s, '#')) PetscCall(SbScanText(s, "marker of a facet", &facet[2]));
+      SbScanEndOfLine(s);
     }
+    PetscCall(SbScanRoom(s, "holes of a facet", facet[1], 4, 4));
+    PetscCall(SbImportScratch(f->im, 3 * (size_t)facet[1] * sizeof(*hole), &hole));
+    for (int64_t k = 0; k < facet[1]; k++) {
+      SbScanNext(s, '#');
+      PetscCall(SbScanText(s, "number of a hole", &number));
+      PetscCall(SbScanPoint(s, "coordinate of a hole", 0, hole + 3 * k));
+      SbScanEndOfLine(s);
+    }
+    // the triangles of the facet, in the group of its marker
+    if (facet[2]) PetscCall(SbImportGroup(f->im, 2, facet[2], NULL, &group));
+    PetscCall(SbImportTagSet(f->im, facet[2] != 0, &group, &f->now));
+    PetscCall(SbTrianglesAddLoops(s, p->nloop, p->start, p->vert, (PetscInt)facet[1], hole, i, f));
   }
-  PetscCall(read_seeds(p, "hole", PETSC_FALSE, &p->f->nhole, &p->f->hole));
-  PetscCall(read_seeds(p, "region", PETSC_TRUE, &p->f->nregion, &p->f->region));
+  PetscCall(read_seeds(p, "hole", PETSC_FALSE, &f->nhole, &f->hole));
+  PetscCall(read_seeds(p, "region", PETSC_TRUE, &f->nregion, &f->region));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

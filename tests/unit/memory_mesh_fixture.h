@@ -28,7 +28,7 @@ static inline PetscErrorCode fixture_given(SbMemoryMesh **in_memory)
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCall(SbMemoryMeshCreate(rank ? 0 : 5, rank ? 0 : 2, rank ? 0 : 1, in_memory));
+  PetscCall(SbMemoryMeshCreate(rank ? 0 : 5, rank ? 0 : 2, rank ? 0 : 1, 0, in_memory));
   g = *in_memory;
   g->step = GIVEN_STEP;
   g->mass = GIVEN_MASS;

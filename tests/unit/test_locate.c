@@ -180,11 +180,12 @@ static void check_quality(void)
   const PetscReal turned[4][3] = {{0, 0, 0}, {0, 1, 0}, {1, 0, 0}, {0, 0, 1}};
   const PetscReal flat[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
   const PetscReal r = 1 / (3 + PetscSqrtReal(3)), R = PetscSqrtReal(3) / 2;
+  const PetscInt own[4] = {0, 1, 2, 3};
 
-  SB_CHECK_NEAR(PetscAbsReal(SbTetQuality(regular)), 1, 1e-14, "quality of the regular tet");
-  SB_CHECK_NEAR(SbTetQuality(corner), 3 * r / R, 1e-14, "quality of the corner of a cube");
-  SB_CHECK_NEAR(SbTetQuality(turned), -3 * r / R, 1e-14, "quality of a tet inverted");
-  SB_CHECK_NEAR(SbTetQuality(flat), 0, 0, "quality of a flat tet");
+  SB_CHECK_NEAR(PetscAbsReal(SbTetQuality(regular[0], own)), 1, 1e-14, "quality of the regular tet");
+  SB_CHECK_NEAR(SbTetQuality(corner[0], own), 3 * r / R, 1e-14, "quality of the corner of a cube");
+  SB_CHECK_NEAR(SbTetQuality(turned[0], own), -3 * r / R, 1e-14, "quality of a tet inverted");
+  SB_CHECK_NEAR(SbTetQuality(flat[0], own), 0, 0, "quality of a flat tet");
 }
 
 int main(int argc, char **argv)

@@ -44,7 +44,7 @@ static PetscErrorCode check_empty(void)
   SbMemoryMesh *g;
 
   PetscFunctionBeginUser;
-  PetscCall(SbMemoryMeshCreate(0, 0, 0, &g));
+  PetscCall(SbMemoryMeshCreate(0, 0, 0, 0, &g));
   SB_CHECK(!g->step && g->mass == 0. && g->bound == 0., "numbers of an empty mesh");
   PetscCall(SbMemoryMeshDestroy(&g));
   SB_CHECK(!g, "it is gone");

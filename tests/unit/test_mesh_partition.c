@@ -87,7 +87,7 @@ static PetscErrorCode test_route(void)
     dest[i] = (rank + i) % size;
   }
   PetscCall(SbRouteCreate(PETSC_COMM_WORLD, rank + 3, dest, &route));
-  PetscCall(SbRouteSend(&route, sizeof(PetscInt), number, &got));
+  PetscCall(SbRouteSend(&route, sizeof(PetscInt), NULL, number, &got));
   for (PetscInt k = 0; k < route.nrecv; k++) {
     const PetscMPIInt from = SbRouteSource(&route, k);
 

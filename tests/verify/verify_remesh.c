@@ -70,7 +70,7 @@ static PetscErrorCode make_second(Pair *p, SbMesher mesher)
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &p->b.model));
   PetscCall(SbRunCreate(p->b.model, &p->b.run));
   for (int b = 0; b < 2; b++) {
-    if (rank) PetscCall(SbMemoryMeshCreate(0, 0, 0, &result.in_memory[b]));
+    if (rank) PetscCall(SbMemoryMeshCreate(0, 0, 0, 0, &result.in_memory[b]));
     if (rank && b == 0) result.in_memory[b]->mass = g.mass[0];
     p->b.model->body[b].in_memory = result.in_memory[b];
     result.in_memory[b] = NULL;

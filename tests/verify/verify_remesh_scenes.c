@@ -94,7 +94,7 @@ static PetscErrorCode hand_over(TestScene *a, TestScene *b, SbRemeshResult *resu
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &b->model));
   PetscCall(SbRunCreate(b->model, &b->run));
   for (PetscInt k = 0; k < a->model->nbody; k++) {
-    if (rank) PetscCall(SbMemoryMeshCreate(0, 0, 0, &result->in_memory[k]));
+    if (rank) PetscCall(SbMemoryMeshCreate(0, 0, 0, 0, &result->in_memory[k]));
     if (rank && !k) result->in_memory[0]->mass = g.mass[0];
     b->model->body[k].in_memory = result->in_memory[k];
     result->in_memory[k] = NULL;
