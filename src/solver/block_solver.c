@@ -1,8 +1,10 @@
 /*
-  Direct solver for a distributed matrix of 3x3 blocks: rank 0 gathers and factors it (factor.c), gathers right-hand sides and scatters solutions.
+  Direct solver for a distributed matrix of 3x3 blocks: rank 0 gathers and factors it (factor.c), gathers
+  right-hand sides and scatters solutions.
 
-  The order of elimination is kept while the pattern grows little, as in contact from iteration to iteration: METIS computes
-  a new one only when the factor has more than WORSE times the entries of the one that METIS ordered last.
+  The order of elimination is kept while the pattern grows little, as in contact from iteration to iteration:
+  METIS computes a new one only when the factor has more than WORSE times the entries of the one that METIS
+  ordered last.
 */
 #include "block_solver.h"
 

@@ -1,5 +1,6 @@
 /*
-  block_solver.h - direct solver for a symmetric positive definite matrix of 3x3 blocks, distributed by rows and factored on one rank.
+  block_solver.h - direct solver for a symmetric positive definite matrix of 3x3 blocks, distributed by rows
+  and factored on one rank.
 */
 #pragma once
 #include "factor.h"
@@ -13,12 +14,14 @@ PetscErrorCode SbBlockSolverAnalyze(SbBlockSolver solver, PetscInt n, const Pets
 /*
   SbBlockSolverSetUp - factors the matrix.
 
-  Collective. Input: n own block rows; ia[n+1], ja: their columns, global, each once; block[ia[n]][9], row-major; changed: ia and ja differ
-  from the last call on some rank. Output: ok, PETSC_FALSE on all ranks if the matrix is not positive definite.
+  Collective. Input: n own block rows; ia[n+1], ja: their columns, global, each once; block[ia[n]][9],
+  row-major; changed: ia and ja differ from the last call on some rank. Output: ok, PETSC_FALSE on all ranks
+  if the matrix is not positive definite.
 */
 PetscErrorCode SbBlockSolverSetUp(SbBlockSolver solver, PetscInt n, const PetscInt ia[], const PetscInt ja[],
                                   const PetscReal block[], PetscBool changed, PetscBool *ok);
-/* Floating-point operations of a factorisation, and number of entries of the factor. Collective; after SbBlockSolverAnalyze(). */
+/* Floating-point operations of a factorisation, and number of entries of the factor. Collective; after
+   SbBlockSolverAnalyze(). */
 PetscErrorCode SbBlockSolverCost(SbBlockSolver solver, PetscReal *flops, PetscReal *entries);
 /* x = A^-1 b; b and x [n][3], own rows; may be the same array. Collective. */
 PetscErrorCode SbBlockSolverSolve(SbBlockSolver solver, const PetscReal b[], PetscReal x[]);

@@ -1,149 +1,51 @@
 /*
-  The coarse space of the two-level preconditioner: modes of the aggregates, their distribution over ranks, restriction and
-  prolongation.
+  The coarse space of two-level preconditioners: units by which nodes move, restriction and prolongation.
 
-  Modes that vanish, as the rotations of an aggregate of one node, are the eigenvectors of the Gram matrix sum Z_i^T Z_i
-  with eigenvalues near zero. Only they can make E = Z^T A Z singular (coarse_operator.c).
+  Modes that vanish, as the rotations of an aggregate of one node, are the eigenvectors of the Gram matrix sum
+  Z_i^T Z_i with eigenvalues near zero. Only they can make E = Z^T A Z singular (coarse_operator.c).
 */
 #include "coarse.h"
 #include <petscblaslapack.h>
 
-#define SB_VANISHING 1e-8 /* squared size of a mode, over the largest of its aggregate, that counts as zero */
+#define VANISHING 1e-8 /* squared size of a mode, over the largest of its aggregate, that counts as zero */
 
-/* ------------------------------------------------------------------ set-up, once */
-
-/* Positions relative to the aggregate's centre, over its radius. */
-static void find_positions(SbCoarse c)
+PetscErrorCode SbCoarseCreate(SbSpace s, PetscInt wanted, PetscBool vertices, SbCoarse *coarse)
 {
-  SbSpace s = c->space;
-
-  for (PetscInt a = 0; a < c->n; a++) {
-    const PetscInt n = c->member_start[a + 1] - c->member_start[a], *node = c->member + c->member_start[a];
-    PetscReal x0[3] = {0., 0., 0.}, r2 = 0.;
-
-    for (PetscInt k = 0; k < 3 * n; k++) x0[k % 3] += s->node_x[3 * node[k / 3] + k % 3] / (PetscReal)n;
-    for (PetscInt k = 0; k < 3 * n; k++) {
-      const PetscReal d = s->node_x[3 * node[k / 3] + k % 3] - x0[k % 3];
-
-      c->d[3 * node[k / 3] + k % 3] = d;
-      r2 += d * d / (PetscReal)n;
-    }
-    for (PetscInt k = 0; k < 3 * n && n > 1; k++) c->d[3 * node[k / 3] + k % 3] /= PetscSqrtReal(r2);
-    for (PetscInt q = 0; q < 3; q++) c->centre[4 * a + q] = x0[q];
-    c->centre[4 * a + 3] = n > 1 ? PetscSqrtReal(r2) : 0.;
-  }
-}
-
-/* Projector onto the vanishing modes of one aggregate: eigenvectors of the Gram matrix. */
-static PetscErrorCode find_vanishing(SbCoarse c, PetscInt a, PetscReal projector[36])
-{
-  SbSpace s = c->space;
-  PetscReal gram[36] = {0.}, eigen[6], work[64];
-  PetscBLASInt n = 6, nwork = 64, info;
-
-  PetscFunctionBeginUser;
-  for (PetscInt k = c->member_start[a]; k < c->member_start[a + 1]; k++) {
-    const PetscInt i = c->member[k];
-
-    for (int m = 0; m < 6; m++) {
-      PetscReal unit[6] = {0.}, u[3];
-
-      unit[m] = 1.;
-      SbCoarseMotion(c->d + 3 * i, unit, u);
-      for (int q = 0; q < 3; q++) u[q] = s->fixed[i] & (1 << q) ? 0. : u[q];
-      SbCoarseAddMoments(c->d + 3 * i, u, gram + 6 * m);
-    }
-  }
-  PetscCallBLAS("LAPACKsyev", LAPACKsyev_("V", "U", &n, gram, &n, eigen, work, &nwork, &info));
-  PetscCheck(!info, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev failed with %d", (int)info);
-  PetscCall(PetscArrayzero(projector, 36));
-  for (int v = 0; v < 6 && eigen[v] <= SB_VANISHING * eigen[5]; v++) {
-    for (int e = 0; e < 36; e++) projector[e] += gram[6 * v + e / 6] * gram[6 * v + e % 6];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Adjacency of aggregates: the aggregate itself, then those of the neighbours of its nodes. */
-static PetscErrorCode find_pattern(SbCoarse c)
-{
-  SbPlan p = c->space->plan;
-  PetscInt lowest = c->N, highest = c->first + c->n, *mark, nz = 0;
-
-  PetscFunctionBeginUser;
-  /* marks for the range of aggregates that this rank knows */
-  for (PetscInt i = 0; i < c->space->nnode; i++) {
-    if (c->agg[i] >= 0) lowest = PetscMin(lowest, c->agg[i]);
-    highest = PetscMax(highest, c->agg[i] + 1);
-  }
-  PetscCall(PetscMalloc1(PetscMax(0, highest - lowest), &mark));
-  PetscCall(PetscMalloc1(c->n + 1, &c->start));
-  for (PetscInt pass = 0; pass < 2; pass++) {
-    for (PetscInt b = lowest; b < highest; b++) mark[b - lowest] = -1;
-    nz = 0;
-    for (PetscInt a = 0; a < c->n; a++) {
-      c->start[a] = nz;
-      mark[c->first + a - lowest] = a;
-      if (pass) c->column[nz] = c->first + a;
-      nz++;
-      for (PetscInt k = c->member_start[a]; k < c->member_start[a + 1]; k++) {
-        const PetscInt i = c->member[k], nd = p->di[i + 1] - p->di[i], no = p->oi[i + 1] - p->oi[i];
-
-        for (PetscInt e = 0; e < nd + no; e++) {
-          const PetscInt b = c->agg[e < nd ? p->dj[p->di[i] + e] : p->oj[p->oi[i] + e - nd]];
-
-          if (b < 0 || mark[b - lowest] == a) continue;
-          mark[b - lowest] = a;
-          if (pass) c->column[nz] = b;
-          nz++;
-        }
-      }
-      if (pass) PetscCall(PetscSortInt(nz - c->start[a] - 1, c->column + c->start[a] + 1));
-    }
-    if (!pass) PetscCall(PetscMalloc1(nz, &c->column));
-  }
-  c->start[c->n] = nz;
-  PetscCall(PetscCalloc1(36 * nz, &c->value));
-  PetscCall(PetscFree(mark));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbCoarseCreate(SbSpace s, PetscInt wanted, PetscBool spread, SbCoarse *coarse)
-{
-  PetscInt nfree = 0, total;
-  PetscReal *number;
   SbCoarse c;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&c));
-  c->space = s;
-  c->spread = spread;
-  PetscCall(PetscMalloc1(s->nnode, &c->agg));
-  PetscCall(PetscCalloc1(3 * s->nnode, &c->d));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) nfree += s->fixed[i] != 7;
-  PetscCallMPI(MPI_Allreduce(&nfree, &total, 1, MPIU_INT, MPI_SUM, s->comm));
-  wanted = (PetscInt)(0.5 + (PetscReal)wanted * (PetscReal)nfree / (PetscReal)PetscMax(1, total));
-  PetscCall(SbAggregate(s, wanted, &c->n, c->agg));
-  PetscCallMPI(MPI_Allreduce(&c->n, &c->N, 1, MPIU_INT, MPI_SUM, s->comm));
-  PetscCallMPI(MPI_Scan(&c->n, &c->first, 1, MPIU_INT, MPI_SUM, s->comm));
-  c->first -= c->n;
-  /* own nodes by aggregate: agg is still numbered from 0 on this rank */
-  PetscCall(SbBucketByKey(s->nnode_owned, c->agg, c->n, &c->member_start, &c->member));
-  PetscCall(PetscMalloc1(4 * c->n, &c->centre));
-  find_positions(c);
-  PetscCall(PetscMalloc1(36 * c->n, &c->null));
-  for (PetscInt a = 0; a < c->n; a++) PetscCall(find_vanishing(c, a, c->null + 36 * a));
-
-  /* aggregates and positions of the nodes on every rank that has them */
-  PetscCall(PetscCalloc1(3 * s->nnode, &number));
-  for (PetscInt i = 0; i < s->nnode_owned; i++)
-    number[3 * i] = c->agg[i] < 0 ? -1. : (PetscReal)(c->first + c->agg[i]);
-  PetscCall(SbSpaceUpdateGhosts(s, number));
-  PetscCall(SbSpaceUpdateGhosts(s, c->d));
-  for (PetscInt i = 0; i < s->nnode; i++) c->agg[i] = (PetscInt)number[3 * i];
-  PetscCall(PetscFree(number));
-  PetscCall(find_pattern(c));
-  if (c->N) PetscCall(SbCoarseCreateSolver(c));
   *coarse = c;
+  c->space = s;
+  c->aggregated = (PetscBool)(wanted >= 0);
+  PetscCall(PetscMalloc1(s->nnode_owned, &c->agg));
+  if (c->aggregated) PetscCall(SbAggregate(s, wanted, &c->nagg, c->agg));
+  if (!vertices || !s->edge_node) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(2 * s->nnode, &c->parent));
+  PetscCall(PetscCalloc1(s->nnode, &c->vertex));
+  for (PetscInt k = 0; k < 2 * s->nnode; k++) c->parent[k] = k / 2;
+  for (PetscInt k = 0; k < 12 * s->mesh->ncell; k++) {
+    const PetscInt edge = k / 2, i = s->edge_node[edge];
+
+    if (i < 0) continue;
+    c->parent[2 * i + k % 2] = s->cell_node[4 * (edge / 6) + SbTetEdge[edge % 6][k % 2]];
+    c->vertex[c->parent[2 * i + k % 2]] = 1;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode free_pattern(SbCoarse c)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree4(c->way, c->moved, c->unit, c->d));
+  PetscCall(PetscFree3(c->centre, c->null, c->row_of));
+  PetscCall(PetscFree2(c->weight, c->ia));
+  PetscCall(PetscFree(c->other));
+  PetscCall(PetscFree2(c->ja, c->value));
+  PetscCall(VecDestroy(&c->c));
+  PetscCall(VecDestroy(&c->y));
+  PetscCall(VecDestroy(&c->wide));
+  PetscCall(VecScatterDestroy(&c->scatter));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -153,20 +55,344 @@ PetscErrorCode SbCoarseDestroy(SbCoarse *coarse)
 
   PetscFunctionBeginUser;
   if (!c) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(free_pattern(c));
+  PetscCall(SbBlockSolverDestroy(&c->direct));
   PetscCall(PCDestroy(&c->solver));
   PetscCall(MatDestroy(&c->E));
-  PetscCall(VecDestroy(&c->c));
-  PetscCall(VecDestroy(&c->y));
-  PetscCall(PetscFree(c->value));
-  PetscCall(PetscFree(c->column));
-  PetscCall(PetscFree(c->start));
-  PetscCall(PetscFree(c->member_start));
-  PetscCall(PetscFree(c->member));
-  PetscCall(PetscFree(c->null));
-  PetscCall(PetscFree(c->centre));
-  PetscCall(PetscFree(c->d));
+  PetscCall(VecDestroy(&c->s));
+  PetscCall(VecDestroy(&c->t));
+  PetscCall(VecDestroy(&c->w));
   PetscCall(PetscFree(c->agg));
+  PetscCall(PetscFree(c->parent));
+  PetscCall(PetscFree(c->vertex));
   PetscCall(PetscFree(*coarse));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ units */
+
+/* c += Z_i^T f for one node: force and torque. */
+SB_INLINE void add_moments(const PetscReal d[3], const PetscReal f[3], PetscReal m[6])
+{
+  for (int k = 0; k < 3; k++) m[k] += f[k];
+  m[3] += d[1] * f[2] - d[2] * f[1];
+  m[4] += d[2] * f[0] - d[0] * f[2];
+  m[5] += d[0] * f[1] - d[1] * f[0];
+}
+
+/* u = Z_i m for one node. */
+SB_INLINE void motion(const PetscReal d[3], const PetscReal m[6], PetscReal u[3])
+{
+  u[0] = m[0] + m[4] * d[2] - m[5] * d[1];
+  u[1] = m[1] + m[5] * d[0] - m[3] * d[2];
+  u[2] = m[2] + m[3] * d[1] - m[4] * d[0];
+}
+
+static SbWay way_of(SbCoarse c, PetscInt i, const uint8_t contact[])
+{
+  const PetscInt *v = c->parent ? c->parent + 2 * i : NULL, n = c->space->nnode_owned;
+
+  if ((contact && contact[i]) || (c->aggregated && c->agg[i] < 0)) return SB_ITSELF;
+  if (v && v[0] != v[1]) return !c->aggregated || (v[0] < n && v[1] < n) ? SB_MEAN : SB_ITSELF;
+  return c->aggregated && !(v && c->vertex[i]) ? SB_MEMBER : SB_ITSELF;
+}
+
+/* The units of own nodes, by their numbers over all ranks; the nodes' relative positions. */
+static PetscErrorCode find_units(SbCoarse c, const uint8_t contact[])
+{
+  const SbSpace s = c->space;
+  const PetscInt n = s->nnode_owned;
+  PetscReal *number;
+  PetscInt *count;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc4(c->nall, &c->way, c->nall, &c->moved, 2 * c->nall, &c->unit, 3 * c->nall, &c->d));
+  PetscCall(PetscCalloc3(4 * c->nagg, &c->centre, 36 * c->nagg, &c->null, c->nagg, &c->row_of));
+  PetscCall(PetscCalloc2(c->nagg, &count, 3 * s->nnode, &number));
+
+  /* centre and radius of each aggregate, without its nodes in contact */
+  for (PetscInt i = 0; i < n; i++) {
+    c->way[i] = (uint8_t)way_of(c, i, contact);
+    if (c->way[i] != SB_MEMBER) continue;
+    for (int k = 0; k < 3; k++) c->centre[4 * c->agg[i] + k] += s->node_x[3 * i + k];
+    count[c->agg[i]]++;
+  }
+  for (PetscInt k = 0; k < 3 * c->nagg; k++)
+    c->centre[4 * (k / 3) + k % 3] /= (PetscReal)PetscMax(1, count[k / 3]);
+  for (PetscInt k = 0; k < 3 * n; k++) {
+    c->d[k] = 0.;
+    if (c->way[k / 3] != SB_MEMBER) continue;
+    c->d[k] = s->node_x[k] - c->centre[4 * c->agg[k / 3] + k % 3];
+    c->centre[4 * c->agg[k / 3] + 3] += PetscSqr(c->d[k]) / (PetscReal)count[c->agg[k / 3]];
+  }
+  for (PetscInt a = 0; a < c->nagg; a++)
+    c->centre[4 * a + 3] = count[a] > 1 ? PetscSqrtReal(c->centre[4 * a + 3]) : 0.;
+
+  /* block rows: of nodes that move by themselves, then of aggregates */
+  c->n = 0;
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscBool free = (PetscBool)((contact && contact[i]) || !c->aggregated || c->agg[i] >= 0);
+
+    c->unit[2 * i] = c->way[i] == SB_ITSELF && free ? c->n++ : -1;
+    c->unit[2 * i + 1] = -1;
+  }
+  for (PetscInt a = 0; a < c->nagg; a++) {
+    c->row_of[a] = count[a] ? c->n : -1;
+    if (count[a]) c->n += 2;
+  }
+  PetscCallMPI(MPI_Scan(&c->n, &c->first, 1, MPIU_INT, MPI_SUM, s->comm));
+  PetscCallMPI(MPI_Allreduce(&c->n, &c->N, 1, MPIU_INT, MPI_SUM, s->comm));
+  c->first -= c->n;
+  PetscCall(PetscMalloc2(c->n, &c->weight, c->n + 1, &c->ia));
+  for (PetscInt k = 0; k < c->n; k++) c->weight[k] = 1.;
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt a = c->agg[i];
+
+    if (c->way[i] == SB_MEMBER) {
+      c->unit[2 * i] = c->row_of[a];
+      c->weight[c->row_of[a]] = c->weight[c->row_of[a] + 1] = 1. / (PetscReal)count[a];
+      for (int k = 0; k < 3; k++)
+        c->d[3 * i + k] = count[a] > 1 ? c->d[3 * i + k] / c->centre[4 * a + 3] : 0.;
+    }
+    if (c->unit[2 * i] >= 0) c->unit[2 * i] += c->first;
+    number[3 * i] = (PetscReal)c->unit[2 * i];
+  }
+
+  /* edge nodes have those of their vertices */
+  if (c->parent) PetscCall(SbSpaceUpdateGhosts(s, number));
+  for (PetscInt i = 0; i < n; i++) {
+    c->moved[i] = 0;
+    for (int q = 0; q < 2 && c->way[i] == SB_MEAN; q++) {
+      const PetscInt v = c->parent[2 * i + q];
+
+      c->unit[2 * i + q] = (PetscInt)number[3 * v];
+      c->moved[i] |= (uint8_t)((7 & ~(s->fixed[i] | s->fixed[v])) << (3 * q));
+    }
+  }
+  PetscCall(PetscFree2(count, number));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Modes that vanish: eigenvectors of the aggregates' Gram matrices. */
+static PetscErrorCode find_vanishing(SbCoarse c)
+{
+  const SbSpace s = c->space;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    for (int m = 0; m < 6 && c->way[i] == SB_MEMBER; m++) {
+      PetscReal unit[6] = {0.}, u[3];
+
+      unit[m] = 1.;
+      motion(c->d + 3 * i, unit, u);
+      for (int q = 0; q < 3; q++) u[q] = s->fixed[i] & (1 << q) ? 0. : u[q];
+      add_moments(c->d + 3 * i, u, c->null + 36 * c->agg[i] + 6 * m);
+    }
+  }
+  for (PetscInt a = 0; a < c->nagg; a++) {
+    PetscReal gram[36], eigen[6], work[64], *projector = c->null + 36 * a;
+    PetscBLASInt six = 6, nwork = 64, info;
+
+    PetscCall(PetscArraycpy(gram, projector, 36));
+    PetscCall(PetscArrayzero(projector, 36));
+    PetscCallBLAS("LAPACKsyev", LAPACKsyev_("V", "U", &six, gram, &six, eigen, work, &nwork, &info));
+    PetscCheck(!info, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev failed with %d", (int)info);
+    for (int v = 0; v < 6 && eigen[v] <= VANISHING * eigen[5]; v++) {
+      for (int e = 0; e < 36; e++) projector[e] += gram[6 * v + e / 6] * gram[6 * v + e % 6];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The units of the ghosts in the rows of A, from their owners; then units are renumbered, own ones first. */
+static PetscErrorCode find_ghosts(SbCoarse c, const PetscInt ghost[])
+{
+  const PetscInt n = c->space->nnode_owned, nghost = c->nall - n;
+  PetscInt *other, m = 0;
+  PetscReal *share;
+  VecScatter scatter = NULL;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(3 * c->nall, &share));
+  for (PetscInt i = 0; i < n; i++) {
+    share[3 * i] = (PetscReal)c->unit[2 * i];
+    share[3 * i + 1] = (PetscReal)c->unit[2 * i + 1];
+    share[3 * i + 2] = (PetscReal)(64 * c->way[i] + c->moved[i]);
+  }
+  for (int k = 0; k < 2 && ghost; k++) {
+    PetscReal *x = k ? c->d : share;
+    Vec own, far;
+    IS is;
+
+    PetscCall(VecCreateMPIWithArray(c->space->comm, 3, 3 * n, PETSC_DECIDE, x, &own));
+    PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 3, 3 * nghost, x + 3 * n, &far));
+    if (!k) {
+      PetscCall(ISCreateBlock(PETSC_COMM_SELF, 3, nghost, ghost, PETSC_USE_POINTER, &is));
+      PetscCall(VecScatterCreate(own, is, far, NULL, &scatter));
+      PetscCall(ISDestroy(&is));
+    }
+    PetscCall(VecScatterBegin(scatter, own, far, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(VecScatterEnd(scatter, own, far, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(VecDestroy(&own));
+    PetscCall(VecDestroy(&far));
+  }
+  PetscCall(VecScatterDestroy(&scatter));
+  for (PetscInt i = n; i < c->nall; i++) {
+    for (int q = 0; q < 2; q++) c->unit[2 * i + q] = (PetscInt)share[3 * i + q];
+    c->way[i] = (uint8_t)((PetscInt)share[3 * i + 2] / 64);
+    c->moved[i] = (uint8_t)((PetscInt)share[3 * i + 2] % 64);
+  }
+  PetscCall(PetscFree(share));
+
+  /* block rows of other ranks, ascending */
+  PetscCall(PetscMalloc1(2 * c->nall, &other));
+  for (PetscInt k = 0; k < 2 * c->nall; k++) {
+    const PetscInt u = c->unit[k];
+
+    if (u >= 0 && (u < c->first || u >= c->first + c->n)) other[m++] = u;
+  }
+  PetscCall(PetscSortRemoveDupsInt(&m, other));
+  c->nother = m;
+  PetscCall(PetscMalloc1(m, &c->other));
+  PetscCall(PetscArraycpy(c->other, other, m));
+  PetscCall(PetscFree(other));
+  for (PetscInt k = 0; k < 2 * c->nall; k++) {
+    if (c->unit[k] >= c->first && c->unit[k] < c->first + c->n)
+      c->unit[k] -= c->first;
+    else if (c->unit[k] >= 0) {
+      PetscCall(PetscFindInt(c->unit[k], m, c->other, &c->unit[k]));
+      c->unit[k] += c->n;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the pattern of E */
+
+PetscErrorCode SbSpaceGetGraph(SbSpace s, PetscInt **ia, PetscInt **ja)
+{
+  PetscInt *node;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(s->nnode_owned, &node));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) node[i] = i;
+  PetscCall(PetscMalloc1(s->nnode_owned + 1, ia));
+  PetscCall(SbSpaceGetRows(s, NULL, s->nnode_owned, node, *ia, NULL, NULL));
+  PetscCall(PetscMalloc1((*ia)[s->nnode_owned], ja));
+  PetscCall(SbSpaceGetRows(s, NULL, s->nnode_owned, node, *ia, *ja, NULL));
+  for (PetscInt k = 0; k < (*ia)[s->nnode_owned]; k++) (*ja)[k] = s->gnode[(*ja)[k]];
+  PetscCall(PetscFree(node));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The rows of a unit have the units of its nodes' neighbours; ia, column: rows of A, own nodes and ghosts. */
+static PetscErrorCode find_pattern(SbCoarse c, const PetscInt ia[], const PetscInt column[])
+{
+  PetscInt *start, *member, *mark, nz = 0;
+
+  PetscFunctionBeginUser;
+  /* nodes by unit; each is listed for each of its units */
+  PetscCall(SbBucketByKey(2 * c->space->nnode_owned, c->unit, c->n, &start, &member));
+  PetscCall(PetscCalloc1(c->n + c->nother, &mark));
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    nz = 0;
+    for (PetscInt u = 0; u < c->n; u++) {
+      const PetscInt stamp = 1 + u + pass * c->n;
+
+      c->ia[u] = nz;
+      for (PetscInt m = start[u]; m < start[u + 1]; m++) {
+        for (PetscInt k = ia[member[m] / 2]; k < ia[member[m] / 2 + 1]; k++) {
+          for (PetscInt v = 2 * column[k]; v < 2 * column[k] + 2; v++) {
+            const PetscInt b = c->unit[v];
+
+            if (b < 0 || mark[b] == stamp) continue;
+            mark[b] = stamp;
+            for (int q = 0; q < (c->way[v / 2] == SB_MEMBER ? 2 : 1); q++, nz++) {
+              if (pass) c->ja[nz] = (b < c->n ? c->first + b : c->other[b - c->n]) + q;
+            }
+          }
+        }
+      }
+      if (pass) PetscCall(PetscSortInt(nz - c->ia[u], c->ja + c->ia[u]));
+      /* the rotation of an aggregate has the members of its translation */
+      if (start[u + 1] > start[u] && c->way[member[start[u]] / 2] == SB_MEMBER) {
+        const PetscInt length = nz - c->ia[u];
+
+        if (pass) PetscCall(PetscArraycpy(c->ja + nz, c->ja + nz - length, length));
+        c->ia[++u] = nz;
+        nz += length;
+      }
+    }
+    c->ia[c->n] = nz;
+    if (!pass) PetscCall(PetscMalloc2(nz, &c->ja, 9 * (size_t)nz, &c->value));
+  }
+  PetscCall(PetscFree(mark));
+  PetscCall(PetscFree(member));
+  PetscCall(PetscFree(start));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCoarseSetPattern(SbCoarse c, Mat A, const PetscInt ia[], const PetscInt ja[],
+                                  const uint8_t contact[])
+{
+  const SbSpace s = c->space;
+  const PetscInt n = s->nnode_owned, *ghost = NULL;
+  PetscInt *own_ia = NULL, *own_ja = NULL, *column, nghost = 0;
+  PetscBool parallel;
+  Mat far;
+  IS is;
+
+  PetscFunctionBeginUser;
+  PetscCall(free_pattern(c));
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
+  if (parallel) {
+    PetscCall(MatMPIBAIJGetSeqBAIJ(A, NULL, &far, &ghost));
+    PetscCall(MatGetLocalSize(far, NULL, &nghost));
+  }
+  c->nall = n + nghost / 3;
+  PetscCall(find_units(c, contact));
+  PetscCall(find_vanishing(c));
+  PetscCall(find_ghosts(c, parallel ? ghost : NULL));
+
+  /* the rows of A with columns of own nodes and ghosts */
+  if (!ia) {
+    PetscCall(SbSpaceGetGraph(s, &own_ia, &own_ja));
+    ia = own_ia;
+    ja = own_ja;
+  }
+  PetscCall(PetscMalloc1(ia[n], &column));
+  for (PetscInt k = 0; k < ia[n]; k++) {
+    column[k] = ja[k] - s->gnode_start;
+    if (column[k] >= 0 && column[k] < n) continue;
+    PetscCall(PetscFindInt(ja[k], nghost / 3, ghost, &column[k]));
+    column[k] += n;
+  }
+  c->widest = 1;
+  for (PetscInt i = 0; i < n; i++) c->widest = PetscMax(c->widest, 2 * (ia[i + 1] - ia[i]));
+  PetscCall(find_pattern(c, ia, column));
+  PetscCall(PetscFree(column));
+  PetscCall(PetscFree(own_ia));
+  PetscCall(PetscFree(own_ja));
+  c->changed = PETSC_TRUE;
+
+  /* vectors */
+  PetscCall(VecCreate(s->comm, &c->c));
+  PetscCall(VecSetSizes(c->c, 3 * c->n, PETSC_DECIDE));
+  PetscCall(VecSetType(c->c, VECSTANDARD));
+  PetscCall(VecDuplicate(c->c, &c->y));
+  if (!c->aggregated && parallel) {
+    PetscCall(PetscMalloc1(c->n + c->nother, &column));
+    for (PetscInt u = 0; u < c->n; u++) column[u] = c->first + u;
+    PetscCall(PetscArraycpy(column + c->n, c->other, c->nother));
+    PetscCall(VecCreateSeq(PETSC_COMM_SELF, 3 * (c->n + c->nother), &c->wide));
+    PetscCall(ISCreateBlock(PETSC_COMM_SELF, 3, c->n + c->nother, column, PETSC_USE_POINTER, &is));
+    PetscCall(VecScatterCreate(c->c, is, c->wide, NULL, &c->scatter));
+    PetscCall(ISDestroy(&is));
+    PetscCall(PetscFree(column));
+  }
+  if (c->s) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatCreateVecs(A, &c->s, &c->t));
+  PetscCall(VecDuplicate(c->s, &c->w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -174,34 +400,40 @@ PetscErrorCode SbCoarseDestroy(SbCoarse *coarse)
 
 PetscErrorCode SbCoarseRestrict(SbCoarse c, Vec R, PetscReal *share)
 {
-  SbSpace s = c->space;
-  PetscReal norm2[2] = {0., 0.}; /* squared norm of c, weighted; of r on the aggregates */
+  const SbSpace s = c->space;
+  PetscReal norm2[2] = {0., 0.}; /* squared norm of c, weighted; of r on the units */
+  Vec to = c->wide ? c->wide : c->c;
   const PetscScalar *r;
   PetscScalar *m;
 
   PetscFunctionBeginUser;
-  *share = c->N ? 1. : 0.;
-  if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecZeroEntries(c->c));
-  PetscCall(VecGetArray(c->c, &m));
+  PetscCall(VecZeroEntries(to));
+  PetscCall(VecGetArray(to, &m));
   PetscCall(VecGetArrayRead(R, &r));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    PetscReal f[3];
+    const PetscInt *unit = c->unit + 2 * i;
+    PetscReal f[3], moment[6] = {0.};
 
-    if (c->agg[i] < 0) continue;
+    for (int e = 0; e < 6 && c->way[i] == SB_MEAN; e++) {
+      if (unit[e / 3] >= 0 && c->moved[i] & (1 << e)) m[3 * unit[e / 3] + e % 3] += 0.5 * r[3 * i + e % 3];
+    }
+    if (unit[0] < 0 || c->way[i] == SB_MEAN) continue;
     for (int q = 0; q < 3; q++) {
-      f[q] = s->fixed[i] & (1 << q) ? 0. : r[3 * i + q];
+      f[q] = c->way[i] == SB_MEMBER && s->fixed[i] & (1 << q) ? 0. : r[3 * i + q];
       norm2[1] += f[q] * f[q];
     }
-    SbCoarseAddMoments(c->d + 3 * i, f, m + 6 * (c->agg[i] - c->first));
+    add_moments(c->d + 3 * i, f, moment);
+    for (int q = 0; q < (c->way[i] == SB_MEMBER ? 6 : 3); q++) m[3 * unit[0] + q] += moment[q];
   }
-  for (PetscInt a = 0; a < c->n; a++) {
-    for (int q = 0; q < 6; q++)
-      norm2[0] += PetscSqr(m[6 * a + q]) / (PetscReal)(c->member_start[a + 1] - c->member_start[a]);
-  }
+  for (PetscInt k = 0; k < 3 * c->n; k++) norm2[0] += PetscSqr(m[k]) * c->weight[k / 3];
   PetscCall(VecRestoreArrayRead(R, &r));
-  PetscCall(VecRestoreArray(c->c, &m));
-  if (c->spread) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecRestoreArray(to, &m));
+  if (c->wide) {
+    PetscCall(VecZeroEntries(c->c));
+    PetscCall(VecScatterBegin(c->scatter, c->wide, c->c, ADD_VALUES, SCATTER_REVERSE));
+    PetscCall(VecScatterEnd(c->scatter, c->wide, c->c, ADD_VALUES, SCATTER_REVERSE));
+  }
+  if (!share) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, norm2, 2, MPIU_REAL, MPI_SUM, s->comm));
   *share = norm2[1] > 0. ? PetscSqrtReal(norm2[0] / norm2[1]) : 0.;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -209,23 +441,49 @@ PetscErrorCode SbCoarseRestrict(SbCoarse c, Vec R, PetscReal *share)
 
 PetscErrorCode SbCoarseAdd(SbCoarse c, Vec Z)
 {
-  SbSpace s = c->space;
-  const PetscScalar *y;
-  PetscScalar *z;
+  const SbSpace s = c->space;
+  const PetscScalar *x;
+  PetscScalar *y, *z;
 
   PetscFunctionBeginUser;
   if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PCApply(c->solver, c->c, c->y));
-  PetscCall(VecGetArrayRead(c->y, &y));
+  if (c->direct) {
+    PetscCall(VecGetArrayRead(c->c, &x));
+    PetscCall(VecGetArray(c->y, &y));
+    PetscCall(SbBlockSolverSolve(c->direct, x, y));
+    PetscCall(VecRestoreArray(c->y, &y));
+    PetscCall(VecRestoreArrayRead(c->c, &x));
+  } else
+    PetscCall(PCApply(c->solver, c->c, c->y));
+  if (c->wide) {
+    PetscCall(VecScatterBegin(c->scatter, c->y, c->wide, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(VecScatterEnd(c->scatter, c->y, c->wide, INSERT_VALUES, SCATTER_FORWARD));
+  }
+  PetscCall(VecGetArrayRead(c->wide ? c->wide : c->y, &x));
   PetscCall(VecGetArray(Z, &z));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    const PetscInt *unit = c->unit + 2 * i;
     PetscReal u[3];
 
-    if (c->agg[i] < 0) continue;
-    SbCoarseMotion(c->d + 3 * i, y + 6 * (c->agg[i] - c->first), u);
+    for (int e = 0; e < 6 && c->way[i] == SB_MEAN; e++) {
+      if (unit[e / 3] >= 0 && c->moved[i] & (1 << e)) z[3 * i + e % 3] += 0.5 * x[3 * unit[e / 3] + e % 3];
+    }
+    for (int q = 0; q < 3 && unit[0] >= 0 && c->way[i] == SB_ITSELF; q++) z[3 * i + q] += x[3 * unit[0] + q];
+    if (c->way[i] != SB_MEMBER) continue;
+    motion(c->d + 3 * i, x + 3 * unit[0], u);
     for (int q = 0; q < 3; q++) z[3 * i + q] += s->fixed[i] & (1 << q) ? 0. : u[q];
   }
   PetscCall(VecRestoreArray(Z, &z));
-  PetscCall(VecRestoreArrayRead(c->y, &y));
+  PetscCall(VecRestoreArrayRead(c->wide ? c->wide : c->y, &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCoarseCorrect(SbCoarse c, Mat A, Vec b, Vec x)
+{
+  PetscFunctionBeginUser;
+  PetscCall(MatMult(A, x, c->t));
+  PetscCall(VecAYPX(c->t, -1., b));
+  PetscCall(SbCoarseRestrict(c, c->t, NULL));
+  PetscCall(SbCoarseAdd(c, x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

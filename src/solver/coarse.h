@@ -1,69 +1,91 @@
 /*
-  coarse.h - aggregates of nodes, their rigid-body modes, and the coarse operator of pc_coarse.c.
+  coarse.h - coarse spaces: aggregates of nodes, single nodes, vertices of P2; their operator and its solver.
+  Used by pc_coarse.c.
 */
 #pragma once
+#include "block_solver.h"
 #include "sbassembly.h"
 
 /*
   SbAggregate - partitions the free nodes of this rank into connected, round aggregates of about equal size.
 
-  Not collective. Input: space with its plan; wanted, approximate number of aggregates. Output: n, their number; agg[nnode_owned], the
-  aggregate of each node, -1 for fully prescribed nodes. An aggregate has nodes of one body only.
+  Not collective. Input: space with its plan; wanted, approximate number of aggregates. Output: n, their
+  number; agg[nnode_owned], the aggregate of each node, -1 for fully prescribed nodes. An aggregate has nodes
+  of one body only.
 */
 PetscErrorCode SbAggregate(SbSpace space, PetscInt wanted, PetscInt *n, PetscInt agg[]);
 
 /*
-  The coarse space: columns Z of six modes per aggregate, u(x) = t + w x d with d the position relative to the aggregate's centre
-  over its radius; zero on prescribed unknowns. E = Z^T A Z is distributed by rows; one rank factors it,
-  or a multigrid cycle approximates E^-1.
+  Motion of a node by the coarse space: with its aggregate, t + w x d, zero on prescribed unknowns; by
+  unknowns of its own; of P2's edge nodes by the mean of two vertices.
+*/
+typedef enum { SB_MEMBER, SB_ITSELF, SB_MEAN } SbWay;
+
+/*
+  The coarse space, columns Z, and E = Z^T A Z, which consists of 3x3 blocks: one block row for a node that
+  moves by itself, two for an aggregate, translation t and rotation w. They are distributed over the ranks as
+  the nodes are.
 */
 typedef struct _p_SbCoarse *SbCoarse;
 struct _p_SbCoarse {
   SbSpace space;
-  PetscInt n, first, N;   /* number of own aggregates, of the first one, of all */
-  PetscInt *agg;          /* [nnode] global number of the aggregate, -1 for fully prescribed nodes */
-  PetscReal *d;           /* [nnode][3] position relative to the aggregate's centre, over its radius */
-  PetscReal *centre;      /* [n][4] centre, m, and radius, m; 0 for a single node */
-  PetscBool spread;       /* multigrid approximates E^-1, else one rank factors E */
-  PetscReal *null;        /* [n][36] projector onto the modes that vanish (single nodes, nodes on a line) */
-  PetscInt *member_start; /* [n+1] offsets into member */
-  PetscInt *member;       /* own nodes by aggregate */
-  PetscInt *start,
-    *column; /* [n+1] offsets; block columns of own rows: the aggregate itself, then the others ascending */
-  PetscReal *value; /* [start[n]][36] blocks, row-major, N/m */
-  Mat E;            /* coarse matrix, rows of own aggregates */
-  PC solver;        /* factorisation of E, or multigrid */
-  Vec c, y;
+  PetscBool aggregated; /* nodes are aggregated; else all are themselves or means */
+  PetscInt nagg, *agg;  /* number of own aggregates; [nnode_owned] that of each node, -1: fully prescribed */
+  PetscInt *parent;     /* [nnode][2] vertices of an edge node of P2, else the node twice; NULL: not in use */
+  uint8_t *vertex;      /* [nnode] the node is a vertex of a P2 body; NULL likewise */
+  /* of own nodes, then those of other ranks in the rows of A, ascending: */
+  PetscInt nall;
+  uint8_t *way;      /* [nall] SbWay */
+  uint8_t *moved;    /* [nall] SB_MEAN: bits of the components that move by the first, by the second vertex */
+  PetscInt *unit;    /* [nall][2] block rows of E by which the node moves, own ones first, -1: none */
+  PetscReal *d;      /* [nall][3] position relative to the aggregate's centre, over its radius */
+  PetscReal *centre; /* [nagg][4] centre, m, and radius, m, 0 for a single node */
+  PetscReal *null;   /* [nagg][36] projector onto the modes that vanish (single nodes, nodes on a line) */
+  PetscInt *row_of;  /* [nagg] its first own block row, -1: it has no nodes */
+  PetscInt n, first, N;    /* number of own block rows, number of the first one, of those of all ranks */
+  PetscInt nother, *other; /* [nother] numbers of block rows of other ranks, ascending: units n, n + 1, ... */
+  PetscReal *weight;       /* [n] 1 / number of nodes of the row's aggregate */
+  PetscInt *ia, *ja;       /* pattern of the own rows: [n+1]; [ia[n]] numbers of columns, ascending */
+  PetscInt widest;         /* largest number of units in a row of A Z */
+  PetscReal *value;        /* [ia[n]][9] blocks, row-major, N/m */
+  PetscBool changed;       /* the pattern is new to the solver */
   PetscBool ok;
+  /* the solver: block_solver.c; or a factorisation, or multigrid, of E */
+  SbBlockSolver direct;
+  PetscBool spread; /* multigrid approximates E^-1 */
+  Mat E;
+  PC solver;
+  Vec c, y;           /* restricted residual, correction */
+  VecScatter scatter; /* from c to wide; NULL if nodes move by own units only */
+  Vec wide;           /* [n+nother][3] */
+  Vec s, t, w;        /* work vectors of the nodes */
 };
 
-/* Collective. wanted: approximate number of aggregates, all ranks; spread: E is not gathered. Options read: -pc_coarse_ (multigrid). */
-PetscErrorCode SbCoarseCreate(SbSpace space, PetscInt wanted, PetscBool spread, SbCoarse *coarse);
+/* Collective. wanted: number of aggregates on this rank, negative: no node is aggregated; vertices: edge
+   nodes of P2 move by the mean of their vertices, in the presence of aggregates only if both are this
+   rank's. */
+PetscErrorCode SbCoarseCreate(SbSpace space, PetscInt wanted, PetscBool vertices, SbCoarse *coarse);
 PetscErrorCode SbCoarseDestroy(SbCoarse *coarse);
-/* Computes E = Z^T A Z for a BAIJ or SBAIJ matrix of the space, and sets up its solver. coarse->ok is false if E was found not to be positive
+/* Finds the units and the pattern of E. A: BAIJ or SBAIJ; ia[nnode_owned+1], ja: its rows, global nodes,
+   NULL: those of the space; contact[nnode_owned]: the node moves by itself; NULL: none. Collective. */
+PetscErrorCode SbCoarseSetPattern(SbCoarse coarse, Mat A, const PetscInt ia[], const PetscInt ja[],
+                                  const uint8_t contact[]);
+/* A solver with PETSc's options -pc_coarse_: a factorisation, or multigrid. After SbCoarseSetPattern().
+   Collective. */
+PetscErrorCode SbCoarseCreateSolver(SbCoarse coarse, PetscBool factored);
+/* Computes E = Z^T A Z, and sets up its solver. coarse->ok is false if E was found not to be positive
    definite: with a factorisation always, with multigrid perhaps not. Collective. */
 PetscErrorCode SbCoarseSetUp(SbCoarse coarse, Mat A);
-/* c = Z^T r; share: a weighted norm of c over |r|, about 1 for r in the span of Z; 1 when spread. Collective. */
-PetscErrorCode SbCoarseRestrict(SbCoarse coarse, Vec r, PetscReal *share);
-/* z += Z E^-1 c, E = Z^T A Z, with the c of the last SbCoarseRestrict(). Collective. */
-PetscErrorCode SbCoarseAdd(SbCoarse coarse, Vec z);
-/* Creates E without values, and its solver, once (coarse_solver.c). Collective. */
-PetscErrorCode SbCoarseCreateSolver(SbCoarse coarse);
-/* Copies the blocks of coarse->value into E, and sets up the solver. Collective. */
+/* The second half of SbCoarseSetUp(), after coarse->value. Collective. */
 PetscErrorCode SbCoarseSetUpSolver(SbCoarse coarse);
+/* c = Z^T r; share: a weighted norm of c over |r|, about 1 for r in the span of Z; NULL: not needed.
+   Collective. */
+PetscErrorCode SbCoarseRestrict(SbCoarse coarse, Vec r, PetscReal *share);
+/* z += Z E^-1 c with the c of the last SbCoarseRestrict(). Collective. */
+PetscErrorCode SbCoarseAdd(SbCoarse coarse, Vec z);
+/* x += Z E^-1 Z^T (b - A x). Collective. */
+PetscErrorCode SbCoarseCorrect(SbCoarse coarse, Mat A, Vec b, Vec x);
 
-/* c += Z_i^T f for one node: force and torque. */
-SB_INLINE void SbCoarseAddMoments(const PetscReal d[3], const PetscReal f[3], PetscReal m[6])
-{
-  for (int c = 0; c < 3; c++) m[c] += f[c];
-  m[3] += d[1] * f[2] - d[2] * f[1];
-  m[4] += d[2] * f[0] - d[0] * f[2];
-  m[5] += d[0] * f[1] - d[1] * f[0];
-}
-
-SB_INLINE void SbCoarseMotion(const PetscReal d[3], const PetscReal m[6], PetscReal u[3])
-{
-  u[0] = m[0] + m[4] * d[2] - m[5] * d[1];
-  u[1] = m[1] + m[5] * d[0] - m[3] * d[2];
-  u[2] = m[2] + m[3] * d[1] - m[4] * d[0];
-}
+/* ia[nnode_owned+1], ja: rows of the operators of a space, global nodes; the caller frees both. Not
+   collective. */
+PetscErrorCode SbSpaceGetGraph(SbSpace space, PetscInt **ia, PetscInt **ja);

@@ -1,10 +1,10 @@
 /*
   Aggregates of nodes for the coarse space: breadth-first balls, improved by Lloyd's iteration.
 
-  Balls of equal numbers of nodes are grown breadth first over the graph, each from the first free neighbour of the
-  balls before it; balls of less than half the size are dropped. Then, a few times, each node is
-  assigned to the nearest seed, counted in edges, and the seeds are moved to the centres
-  of their aggregates: Lloyd's iteration on a graph, Bell (2008), Algebraic multigrid for discontinuous and anisotropic problems,
+  Balls of equal numbers of nodes are grown breadth first over the graph, each from the first free neighbour
+  of the balls before it; balls of less than half the size are dropped. Then, a few times, each node is
+  assigned to the nearest seed, counted in edges, and the seeds are moved to the centres of their aggregates:
+  Lloyd's iteration on a graph, Bell (2008), Algebraic multigrid for discontinuous and anisotropic problems,
   section 4. The cost is linear in the number of edges: about 20 ms for 200,000 tets.
 */
 #include "coarse.h"
@@ -40,7 +40,8 @@ static PetscInt free_neighbour(SbPlan p, const PetscInt agg[], const PetscInt fr
   return -1;
 }
 
-/* Grows balls over all free nodes; returns the seeds of those kept. agg: -2 on prescribed nodes, -1 on others; overwritten. */
+/* Grows balls over all free nodes; returns the seeds of those kept. agg: -2 on prescribed nodes, -1 on
+   others; overwritten. */
 static void find_seeds(SbPlan p, PetscInt nnode, PetscInt size, PetscInt agg[], PetscInt queue[],
                        PetscInt front[], PetscInt *nseed, PetscInt seed[])
 {

@@ -1,140 +1,185 @@
 /*
   The coarse operator E = Z^T A Z, by loops over the block rows of A.
 
-  For a node i and an aggregate b among its neighbours, W_ib = sum_j A_ij Z_j over the neighbours in b, 3x6; then
-  E_ab += Z_i^T W_ib with a the aggregate of i. Each rank computes the rows of its own aggregates; where A has
-  only the upper triangle, blocks of E below the diagonal are transposes.
+  For a node i and a unit b of its neighbours, W_ib = sum_j A_ij Z_j over the neighbours that move by b; then
+  E_ab += Z_i^T W_ib with the units a of i. Where A has only the upper triangle U, with half of the diagonal
+  blocks, E is the sum of Z^T U Z and its transpose. Each rank computes the rows of its own units; PETSc sends
+  what edge nodes of P2 add to those of other ranks.
 
-  Vanishing modes have zero rows and columns in E: their diagonal is set to the mean diagonal of their block, and right-hand sides are zero there.
+  Vanishing modes have zero rows and columns in E: their diagonal is set to the mean diagonal of their
+  aggregate, and right-hand sides are zero there.
 */
 #include "coarse.h"
-#include "sbassembly.h"
 
-/* W[3][6] += factor K Z_j; K column-major. */
-static inline void add_column(const PetscScalar K[9], PetscReal factor, const PetscReal d[3], PetscReal W[18])
-{
-  for (int r = 0; r < 3; r++) {
-    const PetscReal k0 = factor * K[r], k1 = factor * K[3 + r], k2 = factor * K[6 + r];
-
-    W[6 * r] += k0;
-    W[6 * r + 1] += k1;
-    W[6 * r + 2] += k2;
-    W[6 * r + 3] += d[1] * k2 - d[2] * k1;
-    W[6 * r + 4] += d[2] * k0 - d[0] * k2;
-    W[6 * r + 5] += d[0] * k1 - d[1] * k0;
-  }
-}
-
-/* The sums W of one row, by aggregate. */
+/* The sums W of one row, by units. */
 typedef struct {
-  PetscInt n;
-  PetscInt *b;  /* number of aggregates; [n] aggregates */
-  PetscReal *W; /* [n][18] */
+  PetscInt n, *unit;  /* number of units; [n] units */
+  PetscInt *slot;     /* [number of units] index of a unit in the row, -1: not in it */
+  uint8_t *tall;      /* [n] the unit is an aggregate: translation and rotation */
+  PetscReal (*W)[18]; /* [n] one or two blocks, row-major */
+  PetscInt *column;   /* [n] and [n][9]: a row for other ranks */
+  PetscScalar *block;
 } RowSums;
 
-static inline PetscReal *sum_of(RowSums *row, PetscInt b)
+/* W += weight K Z_j; K column-major. */
+static inline void add_column(SbCoarse c, const PetscScalar K[9], PetscReal weight, PetscInt j, RowSums *row)
 {
-  PetscInt k = 0;
+  const PetscReal *d = c->d + 3 * j;
 
-  while (k < row->n && row->b[k] != b) k++;
-  if (k == row->n) {
-    row->b[row->n++] = b;
-    for (int e = 0; e < 18; e++) row->W[18 * k + e] = 0.;
+  for (int v = 0; v < (c->way[j] == SB_MEAN ? 2 : 1); v++) {
+    const PetscInt u = c->unit[2 * j + v], moved = c->moved[j] >> (3 * v);
+    PetscReal *W;
+
+    if (u < 0) continue;
+    if (row->slot[u] < 0) {
+      row->slot[u] = row->n;
+      row->unit[row->n] = u;
+      row->tall[row->n] = c->way[j] == SB_MEMBER;
+      for (int e = 0; e < 18; e++) row->W[row->n][e] = 0.;
+      row->n++;
+    }
+    W = row->W[row->slot[u]];
+    for (int r = 0; r < 3; r++) {
+      const PetscReal k0 = weight * K[r], k1 = weight * K[3 + r], k2 = weight * K[6 + r];
+
+      if (c->way[j] == SB_MEAN) {
+        W[3 * r] += moved & 1 ? 0.5 * k0 : 0.;
+        W[3 * r + 1] += moved & 2 ? 0.5 * k1 : 0.;
+        W[3 * r + 2] += moved & 4 ? 0.5 * k2 : 0.;
+        continue;
+      }
+      W[3 * r] += k0;
+      W[3 * r + 1] += k1;
+      W[3 * r + 2] += k2;
+      if (c->way[j] == SB_ITSELF) continue;
+      W[9 + 3 * r] += d[1] * k2 - d[2] * k1;
+      W[9 + 3 * r + 1] += d[2] * k0 - d[0] * k2;
+      W[9 + 3 * r + 2] += d[0] * k1 - d[1] * k0;
+    }
   }
-  return row->W + 18 * k;
 }
 
-/* W of row i. Prescribed components are left out: their rows and columns have only the diagonal. */
-static void sum_row(SbCoarse c, const SbMatBlocks *x, PetscInt i, RowSums *row)
+/* The block of an own row in a column, by its number over all ranks. */
+static inline PetscReal *block_of(SbCoarse c, PetscInt row, PetscInt column)
 {
-  const SbPlan p = c->space->plan;
-  const PetscInt first = x->symmetric ? p->diagonal[i] : p->di[i];
-  const PetscScalar *K = x->value[0] + 9 * (size_t)(x->symmetric ? p->ui[i] : p->di[i]);
+  PetscInt low = c->ia[row], high = c->ia[row + 1] - 1;
 
-  row->n = 0;
-  for (PetscInt k = first; k < p->di[i + 1]; k++, K += 9) {
-    const PetscInt j = p->dj[k], b = c->agg[j];
+  while (low < high) {
+    const PetscInt middle = (low + high) / 2;
 
-    if (b < 0) continue;
-    if (j == i) {
-      PetscScalar D[9];
-
-      for (int e = 0; e < 9; e++) D[e] = c->space->fixed[i] & (1 << (e / 3)) ? 0. : K[e];
-      add_column(D, x->symmetric ? 0.5 : 1., c->d + 3 * j, sum_of(row, b));
-    } else
-      add_column(K, 1., c->d + 3 * j, sum_of(row, b));
+    if (c->ja[middle] < column)
+      low = middle + 1;
+    else
+      high = middle;
   }
-  for (PetscInt k = p->oi[i]; k < p->oi[i + 1]; k++) {
-    const PetscInt j = p->oj[k], b = c->agg[j];
-
-    if (b >= 0) add_column(x->value[1] + 9 * (size_t)k, 1., c->d + 3 * j, sum_of(row, b));
-  }
+  return c->value + 9 * (size_t)low;
 }
 
-/* Pointer to block (a, b) of E, a own. */
-static inline PetscReal *block_of(SbCoarse c, PetscInt a, PetscInt b)
+/* E += Z_i^T W for row i. */
+static PetscErrorCode add_row(SbCoarse c, PetscInt i, RowSums *row)
 {
-  PetscInt k = c->start[a - c->first];
+  const PetscReal *x = c->d + 3 * i;
 
-  while (c->column[k] != b) k++;
-  return c->value + 36 * k;
+  PetscFunctionBeginUser;
+  for (int v = 0; v < (c->way[i] == SB_MEAN ? 2 : 1); v++) {
+    const PetscInt a = c->unit[2 * i + v], moved = c->moved[i] >> (3 * v);
+
+    for (PetscInt k = 0; k < row->n && a >= 0; k++) {
+      const PetscInt b = row->unit[k], column = b < c->n ? c->first + b : c->other[b - c->n];
+
+      row->column[k] = column;
+      for (int half = 0; half <= row->tall[k]; half++) {
+        const PetscReal *B = row->W[k] + 9 * half;
+        PetscReal *E = a < c->n ? block_of(c, a, column) + 9 * half : NULL, *rotation;
+
+        for (int e = 0; e < 9; e++) {
+          const PetscReal y = c->way[i] != SB_MEAN ? B[e] : moved & (1 << (e / 3)) ? 0.5 * B[e] : 0.;
+
+          if (a < c->n)
+            E[e] += y;
+          else
+            row->block[3 * row->n * (e / 3) + 3 * k + e % 3] = y;
+        }
+        if (c->way[i] != SB_MEMBER) continue;
+        /* the next row has the same columns */
+        rotation = E + 9 * (size_t)(c->ia[a + 1] - c->ia[a]);
+        for (int e = 0; e < 3; e++) {
+          rotation[e] += x[1] * B[6 + e] - x[2] * B[3 + e];
+          rotation[3 + e] += x[2] * B[e] - x[0] * B[6 + e];
+          rotation[6 + e] += x[0] * B[3 + e] - x[1] * B[e];
+        }
+      }
+    }
+    if (a >= c->n)
+      PetscCall(
+        MatSetValuesBlocked(c->E, 1, &c->other[a - c->n], row->n, row->column, row->block, ADD_VALUES));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbCoarseSetUp(SbCoarse c, Mat A)
 {
-  SbPlan p;
-  PetscInt widest = 1;
+  const PetscInt *start[2], *column[2], n = c->space->nnode_owned, w = c->widest;
+  PetscInt nrow;
   SbMatBlocks x;
   RowSums row;
 
   PetscFunctionBeginUser;
   c->ok = PETSC_TRUE;
   if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
-  p = c->space->plan;
-  for (PetscInt i = 0; i < c->space->nnode_owned; i++)
-    widest = PetscMax(widest, p->di[i + 1] - p->di[i] + p->oi[i + 1] - p->oi[i]);
-  PetscCall(PetscMalloc2(widest, &row.b, 18 * widest, &row.W));
-  PetscCall(PetscArrayzero(c->value, 36 * c->start[c->n]));
   PetscCall(SbMatGetBlocks(A, &x));
-  for (PetscInt i = 0; i < c->space->nnode_owned; i++) {
-    PetscInt a;
+  for (int q = 0; q < 2 && x.part[q]; q++)
+    PetscCall(SbMatGetPattern(x.part[q], &nrow, &start[q], &column[q]));
+  PetscCall(PetscMalloc6(w, &row.unit, c->n + c->nother, &row.slot, w, &row.tall, w, &row.W, w, &row.column,
+                         9 * w, &row.block));
+  for (PetscInt u = 0; u < c->n + c->nother; u++) row.slot[u] = -1;
+  PetscCall(PetscArrayzero(c->value, 9 * (size_t)c->ia[c->n]));
+  if (c->E) PetscCall(MatZeroEntries(c->E));
+  for (PetscInt i = 0; i < n; i++) {
+    if (c->unit[2 * i] < 0 && c->unit[2 * i + 1] < 0) continue;
+    row.n = 0;
+    for (int q = 0; q < 2 && x.part[q]; q++) {
+      for (PetscInt k = start[q][i]; k < start[q][i + 1]; k++) {
+        const PetscInt j = column[q][k] + (q ? n : 0);
+        const PetscScalar *K = x.value[q] + 9 * (size_t)k;
+        PetscScalar D[9];
 
-    if (c->agg[i] < 0) continue;
-    sum_row(c, &x, i, &row);
-    /* E_ab += Z_i^T W_ib for the aggregates b around node i. With symmetric storage blocks below the diagonal are transposed. */
-    a = c->agg[i];
-    for (PetscInt k = 0; k < row.n; k++) {
-      const PetscInt b = row.b[k];
-      const PetscBool below = (PetscBool)(x.symmetric && b < a);
-      PetscReal *E = below ? block_of(c, b, a) : block_of(c, a, b);
+        /* rows of prescribed unknowns contain only their diagonal, which counts where the node moves by
+           itself */
+        for (int e = 0; j == i && e < 9; e++)
+          D[e] = c->way[i] != SB_ITSELF && c->space->fixed[i] & (1 << (e / 3)) ? 0. : K[e];
+        add_column(c, j == i ? D : K, x.symmetric && j == i ? 0.5 : 1., j, &row);
+      }
+    }
+    PetscCall(add_row(c, i, &row));
+    for (PetscInt k = 0; k < row.n; k++) row.slot[row.unit[k]] = -1;
+  }
+  PetscCall(SbMatRestoreBlocks(&x));
+  PetscCall(PetscFree6(row.unit, row.slot, row.tall, row.W, row.column, row.block));
 
-      for (int q = 0; q < 6; q++) {
-        const PetscReal f[3] = {row.W[18 * k + q], row.W[18 * k + 6 + q], row.W[18 * k + 12 + q]};
-        PetscReal m[6] = {0.};
+  /* with half of A its transpose is added */
+  for (PetscInt u = 0; u < c->n && x.symmetric; u++) {
+    for (PetscInt k = c->ia[u]; k < c->ia[u + 1]; k++) {
+      PetscReal *above = c->value + 9 * (size_t)k, *below = block_of(c, c->ja[k], u);
 
-        SbCoarseAddMoments(c->d + 3 * i, f, m);
-        for (int e = 0; e < 6; e++) E[below ? 6 * q + e : 6 * e + q] += m[e];
+      for (int e = 0; e < 9 && c->ja[k] >= u; e++) {
+        const int t = 3 * (e % 3) + e / 3;
+
+        if (c->ja[k] > u || e <= t) above[e] = below[t] = above[e] + below[t];
       }
     }
   }
-  PetscCall(SbMatRestoreBlocks(&x));
-  /* Diagonal blocks: made symmetric, vanishing modes filled. With symmetric storage, blocks below them are copied from above. */
-  for (PetscInt a = 0; a < c->n; a++) {
-    PetscReal *E = c->value + 36 * c->start[a], trace = 0.;
+  /* modes that vanish: the mean diagonal */
+  for (PetscInt a = 0; a < c->nagg; a++) {
+    const PetscInt u = c->row_of[a];
+    PetscReal trace = 0.;
 
-    for (int i = 0; i < 6; i++) {
-      for (int j = 0; j <= i; j++)
-        E[6 * i + j] = E[6 * j + i] = (x.symmetric ? 1. : 0.5) * (E[6 * i + j] + E[6 * j + i]);
-      trace += E[7 * i];
-    }
-    for (int e = 0; e < 36; e++) E[e] += trace / 6. * c->null[36 * a + e];
-    for (PetscInt k = c->start[a] + 1; x.symmetric && k < c->start[a + 1] && c->column[k] < a; k++) {
-      const PetscReal *above = block_of(c, c->column[k], a);
-
-      for (int e = 0; e < 36; e++) c->value[36 * k + e] = above[6 * (e % 6) + e / 6];
-    }
+    if (u < 0) continue;
+    for (int m = 0; m < 6; m++) trace += block_of(c, u + m / 3, c->first + u + m / 3)[4 * (m % 3)];
+    for (int e = 0; e < 36; e++)
+      block_of(c, u + e / 18, c->first + u + e % 6 / 3)[3 * (e / 6 % 3) + e % 3] +=
+        trace / 6. * c->null[36 * a + e];
   }
-  PetscCall(PetscFree2(row.b, row.W));
   PetscCall(SbCoarseSetUpSolver(c));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,87 +1,129 @@
 /*
-  Solver for the coarse operator, which is distributed by rows like its aggregates.
+  Solver for the coarse operator E, which is distributed by rows like its units.
 
-  A few hundred aggregates: one rank gathers and factors E for all (pc_direct.c). Many: a V-cycle of PETSc's algebraic multigrid
-  approximates E^-1, so that a rank's work for it is bounded by its own aggregates.
+  While E is small, one rank gathers and factors it for all (pc_direct.c; block_solver.c where its pattern
+  changes often). Otherwise a V-cycle of PETSc's algebraic multigrid approximates E^-1, so that a rank's work
+  for it is bounded by its own units.
 
-  E is a matrix of blocks of six whose near null space is known exactly: on an aggregate with centre x_a and radius r,
-  a rigid-body mode t + w x (x - x_b) has the six coefficients t + w x (x_a - x_b) and r w. Smoothed aggregation coarsens further (Vanek, Mandel, Brezina 1996,
-  Algebraic multigrid by smoothed aggregation); it agglomerates small levels on fewer ranks; one rank factors the coarsest one. The smoother
-  is Chebyshev with 6x6 diagonal blocks, independent of the number of ranks. The cycle is symmetric and
-  positive definite.
+  The near null space of E is known exactly: a rigid-body mode t + w x (x - x_b) is itself at a node; on an
+  aggregate with centre x_a and radius r it has the six coefficients t + w x (x_a - x_b) and r w. Smoothed
+  aggregation coarsens further (Vanek, Mandel, Brezina 1996, Algebraic multigrid by smoothed aggregation); it
+  agglomerates small levels on fewer ranks; one rank factors the coarsest one. On aggregates the smoother is
+  Chebyshev with 6x6 diagonal blocks, independent of the number of ranks. The cycle is symmetric and positive
+  definite.
 */
 #include "coarse.h"
 #include "solver_impl.h"
 
 /*
-  Unknowns of the coarsest level, which one rank factors, and least unknowns per rank on finer levels. Bar of 332,000 tets on 64 ranks: 35 iterations
-  with 114 messages of a rank each; with PETSc's defaults 50 and 50: 43 and 290. Coarsening by the square of the graph, PETSc's default on the
-  first level, takes 50 iterations instead of 38 on 16 ranks.
+  Unknowns of the coarsest level, which one rank factors, and least unknowns per rank on finer levels. Bar of
+  332,000 tets on 64 ranks, aggregates: 35 iterations with 114 messages of a rank each; with PETSc's defaults
+  50 and 50: 43 and 290. Bar of CR, nu 0.49, 53,000 tets on 64 ranks: 333 messages of a rank per iteration;
+  with PETSc's 556.
 */
 #define LAST_LEVEL 600
 #define PER_RANK 300
 
-/* Fills v with rigid-body mode m of a body, by the modes of its aggregates. */
+PetscErrorCode SbPCMultigridSet(PC pc, PetscReal threshold)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PCSetType(pc, PCGAMG));
+  PetscCall(PCGAMGSetReuseInterpolation(pc, PETSC_TRUE));
+  PetscCall(PCGAMGSetThreshold(pc, &threshold, 1));
+  PetscCall(PCGAMGSetCoarseEqLim(pc, LAST_LEVEL));
+  PetscCall(PCGAMGSetProcEqLim(pc, PER_RANK));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fills v with rigid-body mode m of the bodies; zero at prescribed unknowns of nodes. */
 static PetscErrorCode fill_mode(PetscInt m, PetscScalar v[], const void *ctx)
 {
   const struct _p_SbCoarse *c = ctx;
   const SbSpace s = c->space;
 
   PetscFunctionBeginUser;
-  for (PetscInt a = 0; a < c->n; a++) {
-    const PetscReal *box = s->mesh->body[s->node_body[c->member[c->member_start[a]]]].bbox,
-                    *x = c->centre + 4 * a, r = x[3];
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    const PetscReal *box = s->mesh->body[s->node_body[i]].bbox;
+    PetscScalar *at;
 
-    SbRigidMode(m, x, box, v + 6 * a);
-    for (PetscInt q = 0; q < 3; q++) v[6 * a + 3 + q] = 0.;
-    if (m >= 3) v[6 * a + m] = r / SbRigidSize(box);
+    if (c->unit[2 * i] < 0 || c->way[i] == SB_MEAN) continue;
+    at = v + 3 * c->unit[2 * i];
+    if (c->way[i] == SB_ITSELF) {
+      SbRigidMode(m, s->node_x + 3 * i, box, at);
+      for (PetscInt q = 0; q < 3; q++) at[q] = s->fixed[i] & (1 << q) ? 0. : at[q];
+    } else {
+      SbRigidMode(m, c->centre + 4 * c->agg[i], box, at);
+      for (PetscInt q = 3; q < 6; q++) at[q] = q == m ? c->centre[4 * c->agg[i] + 3] / SbRigidSize(box) : 0.;
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbCoarseCreateSolver(SbCoarse c)
+PetscErrorCode SbCoarseCreateSolver(SbCoarse c, PetscBool factored)
 {
+  const PetscInt width = c->aggregated ? 6 : 3;
   PetscInt *own, *foreign;
   const char *package;
 
   PetscFunctionBeginUser;
   // entries of each row in columns of this rank and of others
-  PetscCall(PetscCalloc2(6 * c->n, &own, 6 * c->n, &foreign));
-  for (PetscInt a = 0; a < c->n; a++) {
-    for (PetscInt k = c->start[a]; k < c->start[a + 1]; k++) {
-      const PetscBool here = (PetscBool)(c->column[k] >= c->first && c->column[k] < c->first + c->n);
-
-      for (PetscInt row = 6 * a; row < 6 * a + 6; row++) (here ? own : foreign)[row] += 6;
-    }
+  PetscCall(PetscCalloc2(3 * c->n, &own, 3 * c->n, &foreign));
+  for (PetscInt row = 0; row < 3 * c->n; row++) {
+    for (PetscInt k = c->ia[row / 3]; k < c->ia[row / 3 + 1]; k++)
+      (c->ja[k] >= c->first && c->ja[k] < c->first + c->n ? own : foreign)[row] += 3;
   }
-  // the matrix E, of 6x6 blocks
+  // the matrix E, of 6x6 blocks for aggregates
   PetscCall(MatCreate(c->space->comm, &c->E));
-  PetscCall(MatSetSizes(c->E, 6 * c->n, 6 * c->n, PETSC_DETERMINE, PETSC_DETERMINE));
-  PetscCall(MatSetBlockSize(c->E, 6));
+  PetscCall(MatSetSizes(c->E, 3 * c->n, 3 * c->n, PETSC_DETERMINE, PETSC_DETERMINE));
+  PetscCall(MatSetBlockSize(c->E, width));
   PetscCall(MatSetType(c->E, MATAIJ));
   PetscCall(MatSeqAIJSetPreallocation(c->E, 0, own));
   PetscCall(MatMPIAIJSetPreallocation(c->E, 0, own, 0, foreign));
   PetscCall(PetscFree2(own, foreign));
   PetscCall(MatSetOption(c->E, MAT_SPD, PETSC_TRUE));
-  PetscCall(MatCreateVecs(c->E, &c->c, &c->y));
   // its solver: a factorisation if one rank factors E, else algebraic multigrid with rigid-body modes
   PetscCall(PCCreate(c->space->comm, &c->solver));
   PetscCall(PCSetOptionsPrefix(c->solver, "pc_coarse_"));
-  PetscCall(SbDirectPackage(c->space->comm, 6 * c->N, PETSC_TRUE, &package));
-  if (!package) c->spread = PETSC_TRUE;
+  PetscCall(SbDirectPackage(c->space->comm, 3 * c->N, PETSC_TRUE, &package));
+  c->spread = (PetscBool)(!factored || !package);
   if (!c->spread)
     PetscCall(SbPCDirectSet(c->solver, package, PETSC_TRUE));
   else {
     PetscCall(SbAttachModes(c->E, fill_mode, c));
-    PetscCall(PCSetType(c->solver, PCGAMG));
-    PetscCall(PCGAMGSetReuseInterpolation(c->solver, PETSC_TRUE));
-    PetscCall(PCGAMGSetCoarseEqLim(c->solver, LAST_LEVEL));
-    PetscCall(PCGAMGSetProcEqLim(c->solver, PER_RANK));
-    PetscCall(SbSolverSetDefault("pc_coarse_", "pc_gamg_aggressive_coarsening", "0"));
-    PetscCall(SbSolverSetDefault("pc_coarse_", "mg_levels_pc_type", "pbjacobi"));
+    PetscCall(SbPCMultigridSet(c->solver, c->aggregated ? -1. : 0.));
+    /* coarsening by the square of the graph, PETSc's default on the first level: 50 iterations instead of 38
+       on 16 ranks */
+    if (c->aggregated) {
+      PetscCall(SbSolverSetDefault("pc_coarse_", "pc_gamg_aggressive_coarsening", "0"));
+      PetscCall(SbSolverSetDefault("pc_coarse_", "mg_levels_pc_type", "pbjacobi"));
+    }
   }
   PetscCall(PCSetFromOptions(c->solver));
   PetscCall(SbPCCheckPivots(c->solver));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Copies the blocks of coarse->value into E. */
+static PetscErrorCode fill_matrix(SbCoarse c)
+{
+  PetscInt widest = 0, *columns;
+  PetscScalar *values;
+
+  PetscFunctionBeginUser;
+  for (PetscInt u = 0; u < c->n; u++) widest = PetscMax(widest, 3 * (c->ia[u + 1] - c->ia[u]));
+  PetscCall(PetscMalloc2(widest, &columns, 3 * widest, &values));
+  for (PetscInt u = 0; u < c->n; u++) {
+    const PetscInt n = 3 * (c->ia[u + 1] - c->ia[u]), row = 3 * (c->first + u);
+    const PetscReal *block = c->value + 9 * (size_t)c->ia[u];
+
+    for (PetscInt k = 0; k < n; k++) columns[k] = 3 * c->ja[c->ia[u] + k / 3] + k % 3;
+    for (PetscInt e = 0; e < 3 * n; e++) values[n * (e % 9 / 3) + e / 9 * 3 + e % 3] = block[e];
+    PetscCall(
+      MatSetValues(c->E, 3, (const PetscInt[]){row, row + 1, row + 2}, n, columns, values, ADD_VALUES));
+  }
+  PetscCall(PetscFree2(columns, values));
+  PetscCall(MatAssemblyBegin(c->E, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(c->E, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -89,27 +131,26 @@ PetscErrorCode SbCoarseSetUpSolver(SbCoarse c)
 {
   PCFailedReason reason;
   PetscInt negative;
-  PetscReal least = PETSC_MAX_REAL;
 
   PetscFunctionBeginUser;
-  for (PetscInt a = 0; a < c->n; a++) {
-    const PetscInt row = c->first + a;
+  if (c->direct) {
+    PetscCall(SbBlockSolverSetUp(c->direct, c->n, c->ia, c->ja, c->value, c->changed, &c->ok));
+    c->changed = PETSC_FALSE;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(fill_matrix(c));
+  /* a diagonal that is not positive, unless parts of it are on other ranks; not a number */
+  for (PetscInt u = 0; u < c->n && !c->wide; u++) {
+    for (PetscInt k = c->ia[u]; k < c->ia[u + 1]; k++) {
+      for (int e = 0; e < 9; e++) {
+        const PetscReal x = c->value[9 * (size_t)k + (size_t)e];
 
-    for (PetscInt k = c->start[a]; k < c->start[a + 1]; k++) {
-      const PetscReal *block = c->value + 36 * k;
-
-      PetscCall(MatSetValuesBlocked(c->E, 1, &row, 1, c->column + k, block, INSERT_VALUES));
-      /* also false for NaN */
-      for (PetscInt e = 0; e < 36; e++) {
-        if (k == c->start[a] && e % 7 == 0 && !(block[e] >= least)) least = block[e];
-        if (PetscIsInfOrNanReal(block[e])) least = -1.;
+        if (PetscIsInfOrNanReal(x) || (c->ja[k] == c->first + u && e % 4 == 0 && x <= 0.))
+          c->ok = PETSC_FALSE;
       }
     }
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPIU_REAL, MPI_MIN, c->space->comm));
-  c->ok = (PetscBool)(least > 0.);
-  PetscCall(MatAssemblyBegin(c->E, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(c->E, MAT_FINAL_ASSEMBLY));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &c->ok, 1, SB_MPI_BOOL, MPI_LAND, c->space->comm));
   if (!c->ok) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PCSetOperators(c->solver, c->E, c->E));
   PetscCall(PCSetUp(c->solver));

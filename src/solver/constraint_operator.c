@@ -1,9 +1,10 @@
 /*
-  Solves with constraints outside the matrix K (src/fem/constraint.c): the operator A = P (K + F^T k G) P, and M_A^-1 = P M^-1 P around
-  any preconditioner M. If K lacks a part of the tangent, A has the complete one, and K is the preconditioner's matrix.
+  Solves with constraints outside the matrix K (src/fem/constraint.c): the operator A = P (K + F^T k G) P, and
+  M_A^-1 = P M^-1 P around any preconditioner M. If K lacks a part of the tangent, A has the complete one, and
+  K is the preconditioner's matrix.
 
-  With SB_SADDLE_DIRECT a factorisation of the projected matrix replaces M. It is the inverse of A in the null space, so that one
-  iteration is enough, up to rounding. Without active constraints M itself is used.
+  With SB_SADDLE_DIRECT a factorisation of the projected matrix replaces M. It is the inverse of A in the null
+  space, so that one iteration is enough, up to rounding. Without active constraints M itself is used.
 */
 #include "solver_impl.h"
 #include "sbsolver.h"

@@ -1,16 +1,23 @@
 /*
-  contact_system.c - linear systems of bodies in contact: the sparse tangent plus contact blocks, which couple nodes without a common cell.
+  contact_system.c - linear systems of bodies in contact: the sparse tangent plus contact blocks, which couple
+  nodes without a common cell.
 
-  Their sum is one matrix of 3x3 blocks, whose pattern grows as contact needs; blocks that contact has not used for KEEP solves are dropped at the next
-  growth. So most Newton iterations change values only, and the symbolic factorisation and the coarse space are reused.
+  Their sum is one matrix of 3x3 blocks, whose pattern grows as contact needs; blocks that contact has not
+  used for KEEP solves are dropped at the next growth. So most Newton iterations change values only, and the
+  symbolic factorisation and the coarse space are reused.
 
-  Systems are solved by CG with the coarse space of contact_coarse.c, to a tolerance of FORCING in the norm of the preconditioner, or factored on one rank (block_solver.c). The limit of CG's
-  iterations costs as much as the factorisation: the operations of both factorisations follow from the symbolic ones, the work of an iteration from the numbers of blocks of the matrix and of the coarse factor. Unused
-  iterations are credited to later solves. A system that needs more is factored, and so are those of the next PAUSE solves, twice as many each time that CG fails again at once. So thin bodies, those with much contact,
-  and some near nu = 1/2 are factored. A solve with a matrix that is not
-  positive definite fails: by a pivot of the factor, or by a direction of negative curvature in CG. With -pc_type or -contact_pc_type, PETSc's preconditioner of that name replaces
-  both; -ksp_type and -contact_ksp_type replace CG. Options that go with -pc_type (-ksp_max_it, -sub_pc_type) apply here, too.
+  Systems are solved by CG with the coarse space of pc_coarse.c, to a tolerance of FORCING in the norm of the
+  preconditioner, or factored on one rank (block_solver.c). The limit of CG's iterations costs as much as the
+  factorisation: the operations of both factorisations follow from the symbolic ones, the work of an iteration
+  from the numbers of blocks of the matrix and of the coarse factor. Unused iterations are credited to later
+  solves. A system that needs more is factored, and so are those of the next PAUSE solves, twice as many each
+  time that CG fails again at once. So thin bodies, those with much contact, and some near nu = 1/2 are
+  factored. A solve with a matrix that is not positive definite fails: by a pivot of the factor, or by a
+  direction of negative curvature in CG. With -pc_type or -contact_pc_type, PETSc's preconditioner of that
+  name replaces both; -ksp_type and -contact_ksp_type replace CG. Options that go with -pc_type (-ksp_max_it,
+  -sub_pc_type) apply here, too.
 */
+#include "coarse.h"
 #include "contact_coarse.h"
 #include "sblog.h"
 #include "sbsolver.h"
@@ -24,7 +31,8 @@
 #define PAUSE 20     /* solves that are factored after CG was slower */
 #define LARGE 100000 /* number of unknowns above which the cost of a factorisation is not computed */
 #define MOST 300     /* limit of iterations in any case */
-/* Relative tolerance with a preconditioner of the user: no factorisation follows, and its errors are in soft modes, which make a step look short. */
+/* Relative tolerance with a preconditioner of the user: no factorisation follows, and its errors are in soft
+   modes, which make a step look short. */
 #define FORCING_USER 1e-4
 #define MOST_USER 5000
 
@@ -92,16 +100,14 @@ PetscErrorCode SbContactSystemCreate(SbSpace s, PetscInt choice, SbContactSystem
   c->space = s;
   c->choice = choice;
   c->rows.n = n;
-  PetscCall(PetscMalloc3(n, &c->all, n + 1, &c->ka, n, &c->last));
+  PetscCall(PetscMalloc2(n, &c->all, n, &c->last));
   PetscCall(PetscCalloc1(s->Nnode, &c->where));
   for (PetscInt i = 0; i < n; i++) {
     c->all[i] = i;
     c->last[i] = -1;
   }
-  PetscCall(SbSpaceGetRows(s, NULL, n, c->all, c->ka, NULL, NULL));
-  PetscCall(PetscMalloc3(c->ka[n], &c->kj, c->ka[n], &c->place, 9 * (size_t)c->ka[n], &c->tangent));
-  PetscCall(SbSpaceGetRows(s, NULL, n, c->all, c->ka, c->kj, NULL));
-  for (PetscInt k = 0; k < c->ka[n]; k++) c->kj[k] = s->gnode[c->kj[k]];
+  PetscCall(SbSpaceGetGraph(s, &c->ka, &c->kj));
+  PetscCall(PetscMalloc2(c->ka[n], &c->place, 9 * (size_t)c->ka[n], &c->tangent));
   PetscCall(PetscCalloc2(n + 1, &c->rows.ia, n, &c->rows.contact));
   PetscCall(user_types(c->method, c->type));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -162,7 +168,8 @@ static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
   for (PetscInt r = 0; r < n; r++)
     most = PetscMax(most, c->ka[r + 1] - c->ka[r] + first[r + 1] - first[r] + old.ia[r + 1] - old.ia[r]);
 
-  /* each row: columns of the tangent, those of the old pattern that are still in use, those of the contact blocks */
+  /* each row: columns of the tangent, those of the old pattern that are still in use, those of the contact
+     blocks */
   PetscCall(PetscMalloc2(most, &column, most, &stamp));
   PetscCall(PetscMalloc1(n + 1, &ia));
   PetscCall(PetscMalloc2(c->ka[n] + b->n + old.ia[n], &ja, c->ka[n] + b->n + old.ia[n], &used));
@@ -267,7 +274,8 @@ static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Copies the rows into the parts of PETSc's matrix, which stores blocks column-major; SBAIJ only those on and above the diagonal. */
+/* Copies the rows into the parts of PETSc's matrix, which stores blocks column-major; SBAIJ only those on and
+   above the diagonal. */
 static PetscErrorCode fill_matrix(SbContactSystem c)
 {
   const SbContactRows *rows = &c->rows;
@@ -329,10 +337,9 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
     PetscCall(
       KSPSetTolerances(c->ksp, own ? FORCING : FORCING_USER, PETSC_DEFAULT, 1e10, own ? MOST : MOST_USER));
     PetscCall(KSPGetPC(c->ksp, &pc));
-    if (own) {
+    if (own)
       PetscCall(SbPCContactCreate(s, rows, pc));
-      PetscCall(KSPSetInitialGuessNonzero(c->ksp, PETSC_TRUE));
-    } else
+    else
       PetscCall(PCSetType(pc, c->type));
     PetscCall(KSPSetFromOptions(c->ksp));
     PetscCall(KSPSetType(c->ksp, c->method[0] ? c->method : KSPCG));
@@ -345,8 +352,6 @@ static PetscErrorCode set_up_iteration(SbContactSystem c)
   }
   PetscCall(KSPSetOperators(c->ksp, P, P));
   if (!own) PetscCall(MatDestroy(&P));
-  PetscCall(KSPGetPC(c->ksp, &pc));
-  if (own) PetscCall(SbPCContactUpdate(pc, c->foreign[0]));
   c->foreign[0] = c->fresh[0] = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -394,7 +399,6 @@ static PetscErrorCode iterate(SbContactSystem c, Vec F, Vec Y, KSPConvergedReaso
     c->budget = PetscMin(c->budget + c->most, SAVED * c->most);
     PetscCall(
       KSPSetTolerances(c->ksp, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT, PetscMin(c->limit, c->budget)));
-    PetscCall(SbPCContactGuess(pc, F, Y));
     PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   }
   if (!c->type[0] && !c->budget) PetscFunctionReturn(PETSC_SUCCESS);
@@ -402,7 +406,6 @@ static PetscErrorCode iterate(SbContactSystem c, Vec F, Vec Y, KSPConvergedReaso
   PetscCall(KSPGetConvergedReason(c->ksp, reason));
   PetscCall(KSPGetIterationNumber(c->ksp, iterations));
   c->budget -= *iterations;
-  if (!c->type[0] && *reason > 0) PetscCall(SbPCContactCorrect(pc, F, Y));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -469,9 +472,11 @@ PetscErrorCode SbContactSystemDestroy(SbContactSystem *system)
   PetscCall(KSPDestroy(&c->ksp));
   PetscCall(MatDestroy(&c->A));
   PetscCall(SbBlockSolverDestroy(&c->factor));
-  PetscCall(PetscFree3(c->all, c->ka, c->last));
+  PetscCall(PetscFree2(c->all, c->last));
+  PetscCall(PetscFree(c->ka));
+  PetscCall(PetscFree(c->kj));
   PetscCall(PetscFree(c->where));
-  PetscCall(PetscFree3(c->kj, c->place, c->tangent));
+  PetscCall(PetscFree2(c->place, c->tangent));
   PetscCall(PetscFree2(c->rows.ia, c->rows.contact));
   PetscCall(PetscFree2(c->rows.ja, c->used));
   PetscCall(PetscFree(c->rows.value));

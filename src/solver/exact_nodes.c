@@ -1,8 +1,8 @@
 /*
   Nodes that are solved exactly within the rotated preconditioner (method: rotated.h).
 
-  A bar of 32,000 tets swinging freely: 75 such nodes in the mean, 176 at most, all in the crease at the support;
-  iterations per step 7.6 in the mean and 11 at most; without exact nodes 18 and 65.
+  A bar of 32,000 tets swinging freely: 75 such nodes in the mean, 176 at most, all in the crease at the
+  support; iterations per step 7.6 in the mean and 11 at most; without exact nodes 18 and 65.
 
   Only nodes whose neighbours are all owned are chosen: no communication here.
 */

@@ -1,15 +1,17 @@
 /*
-  Multifrontal Cholesky factorisation of a matrix of 3x3 blocks (Duff and Reid 1983; Liu, "The multifrontal method for
-  sparse matrix solution", 1992), with triangular solves that read as little memory as possible.
+  Multifrontal Cholesky factorisation of a matrix of 3x3 blocks (Duff and Reid 1983; Liu, "The multifrontal
+  method for sparse matrix solution", 1992), with triangular solves that read as little memory as possible.
 
-  Each supernode, a group of columns with one pattern (factor_order.c), has a dense front: its entries of A and the updates of its children. LAPACK factors
-  the leading block, BLAS forms the update for the parent. Some nodes may be kept, that is, not eliminated: the updates (contribution blocks) of the roots sum to the Schur complement on them. An exact factor has L in double precision.
+  Each supernode, a group of columns with one pattern (factor_order.c), has a dense front: its entries of A
+  and the updates of its children. LAPACK factors the leading block, BLAS forms the update for the parent.
+  Some nodes may be kept, that is, not eliminated: the updates (contribution blocks) of the roots sum to the
+  Schur complement on them. An exact factor has L in double precision.
 
-  A solve reads every entry of L twice, and memory bandwidth limits its speed. Entries are therefore
-  stored as 16-bit integers times a scale per column: the rounding, 1.5e-5 of the largest entry of a column, does not change
-  the iterations of a preconditioned solver, and 2 bytes instead of 8 per entry make it three to four times faster. Two
-  entries share a 32-bit word; quantized.h describes the format.
-  The columns of a supernode are divided into panels of at most PANEL nodes, whose diagonal block is stored inverted; the rows below lie
+  A solve reads every entry of L twice, and memory bandwidth limits its speed. Entries are therefore stored as
+  16-bit integers times a scale per column: the rounding, 1.5e-5 of the largest entry of a column, does not
+  change the iterations of a preconditioned solver, and 2 bytes instead of 8 per entry make it three to four
+  times faster. Two entries share a 32-bit word; quantized.h describes the format. The columns of a supernode
+  are divided into panels of at most PANEL nodes, whose diagonal block is stored inverted; the rows below lie
   in blocks of ROWS, each [column][row], so that both substitutions read memory in order.
 
   Not handled: indefinite matrices (ok = PETSC_FALSE), iterative refinement.
@@ -233,7 +235,8 @@ static PetscErrorCode eliminate(SbFactor f, PetscInt g, const PetscInt ia[], con
   for (PetscInt k = 0; k < nall; k++) work->position[list[k]] = k;
   for (size_t j = 0, n = 3 * (size_t)nall; j < n; j++)
     PetscCall(PetscArrayzero(work->front + n * j + j / 3 * 3, n - j / 3 * 3));
-  /* Adds the entries of A in the columns of supernode g to its front. Row-major block (node, neighbour) is column-major block (neighbour, node). */
+  /* Adds the entries of A in the columns of supernode g to its front. Row-major block (node, neighbour) is
+     column-major block (neighbour, node). */
   for (PetscInt j = e->first[g]; j < e->first[g + 1]; j++) {
     const PetscInt node = e->order[j], column = 3 * (j - e->first[g]);
 

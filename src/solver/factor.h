@@ -1,5 +1,6 @@
 /*
-  factor.h - sparse Cholesky factor of a matrix of 3x3 blocks, in 16-bit integers for preconditioners, or exact, in double precision.
+  factor.h - sparse Cholesky factor of a matrix of 3x3 blocks, in 16-bit integers for preconditioners, or
+  exact, in double precision.
 
   The last `nkeep` nodes are not eliminated: their Schur complement is returned, which couples the factors of
   several ranks (pc_rotated.c).
@@ -24,9 +25,9 @@ typedef struct {
 /*
   SbEliminationCreate - nested dissection by METIS, elimination tree, supernodes.
 
-  Not collective. Input: n nodes; nkeep; ia[n-nkeep+1], ja: columns of the rows of the eliminated nodes (a symmetric graph;
-  with or without the diagonal); order[n-nkeep], a given order of elimination, NULL: by METIS. Output: owned by the
-  caller, freed by SbEliminationDestroy().
+  Not collective. Input: n nodes; nkeep; ia[n-nkeep+1], ja: columns of the rows of the eliminated nodes (a
+  symmetric graph; with or without the diagonal); order[n-nkeep], a given order of elimination, NULL: by
+  METIS. Output: owned by the caller, freed by SbEliminationDestroy().
 */
 PetscErrorCode SbEliminationCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], const PetscInt ja[],
                                    const PetscInt order[], SbElimination *e);
@@ -35,7 +36,8 @@ PetscErrorCode SbEliminationDestroy(SbElimination *e);
 /* SbFactorCreate - symbolic factorisation (arguments as above). Not collective. */
 PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], const PetscInt ja[],
                               SbFactor *f);
-/* The same with nkeep = 0 for an exact factor, in double precision: SbFactorSolve(). order: as above. Not collective. */
+/* The same with nkeep = 0 for an exact factor, in double precision: SbFactorSolve(). order: as above. Not
+   collective. */
 PetscErrorCode SbFactorCreateExact(PetscInt n, const PetscInt ia[], const PetscInt ja[],
                                    const PetscInt order[], SbFactor *f);
 /* The order of elimination, borrowed: [n] node at each position. */
@@ -43,19 +45,19 @@ const PetscInt *SbFactorOrder(SbFactor f);
 /*
   SbFactorNumeric - numeric factorisation.
 
-  Not collective. Input: ia, ja as given to SbFactorCreate(); block[ia[n-nkeep]][9], row-major 3x3 blocks A_ij of the rows of
-  the eliminated nodes, N/m. In and out: schur[(3 nkeep)^2], column-major, from which A_ki A_ii^-1 A_ik is subtracted (lower
-  triangle only); NULL when nkeep = 0. Output: ok, PETSC_FALSE if the matrix is not positive definite: the factor is
-  then invalid until the next success.
+  Not collective. Input: ia, ja as given to SbFactorCreate(); block[ia[n-nkeep]][9], row-major 3x3 blocks A_ij
+  of the rows of the eliminated nodes, N/m. In and out: schur[(3 nkeep)^2], column-major, from which A_ki
+  A_ii^-1 A_ik is subtracted (lower triangle only); NULL when nkeep = 0. Output: ok, PETSC_FALSE if the matrix
+  is not positive definite: the factor is then invalid until the next success.
 */
 PetscErrorCode SbFactorNumeric(SbFactor f, const PetscInt ia[], const PetscInt ja[], const PetscReal block[],
                                PetscReal schur[], PetscBool *ok);
 /*
   SbFactorForward, SbFactorBackward - the two halves of a solve; Backward continues the last Forward.
 
-  Not collective. Forward, input: b[n][3] in the numbering of the caller; output: kept[nkeep][3] = b_k - A_ki A_ii^-1 b_i.
-  Backward, input: kept, the solution at the kept nodes; output: x[n][3]. With nkeep = 0 both solve A x = b, with a relative error of
-  about 1e-5 times the root of the condition number.
+  Not collective. Forward, input: b[n][3] in the numbering of the caller; output: kept[nkeep][3] = b_k - A_ki
+  A_ii^-1 b_i. Backward, input: kept, the solution at the kept nodes; output: x[n][3]. With nkeep = 0 both
+  solve A x = b, with a relative error of about 1e-5 times the root of the condition number.
 */
 void SbFactorForward(SbFactor f, const float b[], float kept[]);
 void SbFactorBackward(SbFactor f, const float kept[], float x[]);

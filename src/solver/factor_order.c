@@ -141,8 +141,8 @@ static PetscErrorCode merge_groups(PetscInt *ngroup, Group group[])
 }
 
 /*
-  Structure of column j without j, sorted: own entries and the rows of the groups whose first row is j, which are
-  linked by child[] (first group of column j) and sibling[]. nrows[j]: its length.
+  Structure of column j without j, sorted: own entries and the rows of the groups whose first row is j, which
+  are linked by child[] (first group of column j) and sibling[]. nrows[j]: its length.
 */
 static PetscErrorCode column_structure(const SbElimination *e, PetscInt j, const PetscInt ia[],
                                        const PetscInt ja[], const PetscInt child[], const PetscInt sibling[],
@@ -177,7 +177,8 @@ static PetscErrorCode column_structure(const SbElimination *e, PetscInt j, const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Finds the groups of columns and their rows. rows[j], nrows[j]: structure of column j, kept until its parent has used it. */
+/* Finds the groups of columns and their rows. rows[j], nrows[j]: structure of column j, kept until its parent
+   has used it. */
 static PetscErrorCode find_groups(SbElimination *e, const PetscInt ia[], const PetscInt ja[],
                                   const PetscInt parent[], PetscInt *ngroup, Group group[])
 {

@@ -1,17 +1,19 @@
 /*
   Gauss-Seidel sweeps that read the upper triangle only, and return the residual; block Jacobi between ranks.
 
-  With A = L + D + L^T by 3x3 blocks, for the rows and columns of this rank, and A_o the columns of other ranks,
+  With A = L + D + L^T by 3x3 blocks, for the rows and columns of this rank, and A_o the columns of other
+  ranks,
     down   z = (D + L^T)^-1 r, from the last row on: z_i = D_i^-1 (r_i - sum_{j > i} A_ij z_j). The residual, -L z - A_o z, needs
            the same blocks: t_j -= A_ij^T z_i for j > i, while they are in the cache;
     up     z + (D + L)^-1 (r - A z), from the first row on: z_i = D_i^-1 (b_i - sum_{j > i} A_ij z_j) with the old z_j, then
            b_j -= A_ij^T z_i for j > i; b = r - A_o z at first.
-  So a sweep with its residual reads the stored half of the matrix once, as a product does. The two sweeps are adjoint: with a symmetric correction
-  between them the preconditioner is symmetric.
+  So a sweep with its residual reads the stored half of the matrix once, as a product does. The two sweeps are
+  adjoint: with a symmetric correction between them the preconditioner is symmetric.
 
-  Block Jacobi between ranks may increase the energy norm of the error, and does near nu = 1/2. With D' = D + E for D it converges; E is diagonal, half the sum of the
-  magnitudes in the columns of other ranks (Baker, Falgout, Kolev, Yang 2011, Multigrid smoothers for ultraparallel computing, SIAM J. Sci. Comput. 33). t then starts
-  from E z, and D_i^-1 (b_i - ..) becomes D'_i^-1 (b_i + E_i z_i - ..).
+  Block Jacobi between ranks may increase the energy norm of the error, and does near nu = 1/2. With D' = D +
+  E for D it converges; E is diagonal, half the sum of the magnitudes in the columns of other ranks (Baker,
+  Falgout, Kolev, Yang 2011, Multigrid smoothers for ultraparallel computing, SIAM J. Sci. Comput. 33). t then
+  starts from E z, and D_i^-1 (b_i - ..) becomes D'_i^-1 (b_i + E_i z_i - ..).
 */
 #include "sbfour.h"
 #include "sbassembly.h"
@@ -95,7 +97,8 @@ SB_KERNEL static void up(PetscInt nrow, const PetscInt start[restrict], const Pe
   }
 }
 
-/* l1-Gauss-Seidel (Baker et al. 2011): half the sums of the magnitudes of each row in the off-diagonal part of a parallel matrix. */
+/* l1-Gauss-Seidel (Baker et al. 2011): half the sums of the magnitudes of each row in the off-diagonal part
+   of a parallel matrix. */
 static PetscErrorCode sum_magnitudes(Mat A, PetscInt n, PetscReal extra[])
 {
   const PetscInt *start, *column;

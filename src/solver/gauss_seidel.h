@@ -5,8 +5,9 @@
 #include "sbassembly.h"
 #include "sbkernel.h"
 
-/* inverse[n][9]: inverse diagonal blocks of a matrix with the fast product, n own nodes. extra[n][3] (output; NULL: none): l1 terms, added to the diagonal, with which
-   sweeps converge on several ranks. Zero and *positive = false where a determinant is not positive on this rank. Not collective. */
+/* inverse[n][9]: inverse diagonal blocks of a matrix with the fast product, n own nodes. extra[n][3] (output;
+   NULL: none): l1 terms, added to the diagonal, with which sweeps converge on several ranks. Zero and
+   *positive = false where a determinant is not positive on this rank. Not collective. */
 PetscErrorCode SbGaussSeidelSetUp(Mat A, PetscReal inverse[], PetscReal extra[], PetscBool *positive);
 /* z = (D + L^T)^-1 r, D and L of this rank's part, and t = r - A z. r differs from z and t. Collective. */
 PetscErrorCode SbGaussSeidelDown(Mat A, const PetscReal inverse[], const PetscReal extra[], Vec r, Vec z,

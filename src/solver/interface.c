@@ -1,13 +1,13 @@
 /*
   The Schur complement on the interface between ranks, for substructuring.
 
-  The interface nodes (interface_nodes.c) separate the ranks, so each rank eliminates its interior. The remaining matrix on the interface is a
-  dense S, the sum of the ranks' Schur complements. The factorisation S = L L^T works on block columns,
-  distributed cyclically, and S^-1 = W^T W with W = L^-1. Each rank has some rows W_r of the triangle W and adds
-  W_r^T (W_r b): symmetric and positive definite for any rounding of W, unlike a rounded inverse. Hence W is stored in 16-bit integers
-  (quantized.h); a block of rows is used twice while it is in the cache, so memory is read once: a quarter of the bytes of
-  the inverse in single precision. An application sums two short vectors over the ranks. Ranks with less work in their interior have
-  more rows.
+  The interface nodes (interface_nodes.c) separate the ranks, so each rank eliminates its interior. The
+  remaining matrix on the interface is a dense S, the sum of the ranks' Schur complements. The factorisation S
+  = L L^T works on block columns, distributed cyclically, and S^-1 = W^T W with W = L^-1. Each rank has some
+  rows W_r of the triangle W and adds W_r^T (W_r b): symmetric and positive definite for any rounding of W,
+  unlike a rounded inverse. Hence W is stored in 16-bit integers (quantized.h); a block of rows is used twice
+  while it is in the cache, so memory is read once: a quarter of the bytes of the inverse in single precision.
+  An application sums two short vectors over the ranks. Ranks with less work in their interior have more rows.
 
   Not handled: zeros of W between parts of the interface that are not connected.
 */
@@ -103,7 +103,8 @@ static inline PetscInt block_of(PetscInt n, PetscInt k, PetscInt *first)
   return PetscMin(BLOCK, n - *first);
 }
 
-/* S = L L^T in place, S a lower triangle [n][n], column-major; at the end each rank has all of L. Block column k belongs to rank k modulo the number of ranks. */
+/* S = L L^T in place, S a lower triangle [n][n], column-major; at the end each rank has all of L. Block
+   column k belongs to rank k modulo the number of ranks. */
 static PetscErrorCode factor_columns(MPI_Comm comm, PetscInt n, PetscInt nblock, PetscReal S[], PetscBool *ok)
 {
   const PetscScalar one = 1., minus = -1.;

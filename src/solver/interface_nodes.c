@@ -1,8 +1,9 @@
 /*
   Chooses the interface nodes between ranks (interface.c), as few as possible.
 
-  They are a vertex cover of the graph's edges between nodes of different ranks. The greedy cover repeatedly takes the node with the most uncovered
-  edges. A minimum cover, from matchings, has 2 to 5 % fewer nodes (docs/reports/decisions.md).
+  They are a vertex cover of the graph's edges between nodes of different ranks. The greedy cover repeatedly
+  takes the node with the most uncovered edges. A minimum cover, from matchings, has 2 to 5 % fewer nodes
+  (docs/reports/decisions.md).
 
   These edges are few: each rank gathers all of them and chooses the same nodes.
 */
@@ -18,7 +19,8 @@ PetscErrorCode SbInterfaceChooseNodes(SbSpace s, PetscInt index[], PetscInt *nmi
   *nmine = *n = 0;
   if (!s->ghosted) PetscFunctionReturn(PETSC_SUCCESS);
 
-  /* global numbers of the ends of edges between free own nodes and those of lower ranks; gathered from all ranks */
+  /* global numbers of the ends of edges between free own nodes and those of lower ranks; gathered from all
+     ranks */
   PetscCall(PetscMalloc1(2 * p->oi[s->nnode_owned], &mine));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     for (PetscInt k = p->oi[i]; k < p->oi[i + 1] && s->fixed[i] != 7; k++) {

@@ -1,7 +1,8 @@
 /*
   CHOLMOD through PETSc raises an error with a trace at a non-positive pivot: a body without supports, or a
-  tangent that is indefinite in compression. Here it is a failed factorisation, as with other packages: the solve fails, and the
-  step is halved or the run stops with one line. If the matrix is gathered on one rank (pc_direct.c), all ranks get the failure. MUMPS can factor again after a failure.
+  tangent that is indefinite in compression. Here it is a failed factorisation, as with other packages: the
+  solve fails, and the step is halved or the run stops with one line. If the matrix is gathered on one rank
+  (pc_direct.c), all ranks get the failure. MUMPS can factor again after a failure.
 
   petsc/private/pcimpl.h: the operations of a PC that PETSc implements have no public setter.
 */
@@ -12,8 +13,9 @@
 #define ORIGINAL_APPLY "SbPCApplyOriginal_C"
 
 /*
-  PETSc's error path leaks the arrays that wrap the matrix for CHOLMOD (MatWrapCholmod_seqaij: as large as the matrix, at each failed
-  factorisation). A wrapper of PetscTrMalloc records them during the factorisation, and they are freed after a failure.
+  PETSc's error path leaks the arrays that wrap the matrix for CHOLMOD (MatWrapCholmod_seqaij: as large as the
+  matrix, at each failed factorisation). A wrapper of PetscTrMalloc records them during the factorisation, and
+  they are freed after a failure.
 */
 static struct {
   PetscErrorCode (*allocate)(size_t, PetscBool, int, const char[], const char[], void **);
@@ -114,7 +116,8 @@ static PetscErrorCode gathered_setup(PC pc)
 
     /* idle ranks have no inner KSP */
     PetscCall(KSPGetPC(ksp, &inner));
-    /* Wraps the factorisation on the rank that has the matrix; called at the first set-up, before which the telescope is empty. */
+    /* Wraps the factorisation on the rank that has the matrix; called at the first set-up, before which the
+       telescope is empty. */
     PetscCall(PCGetApplicationContext(pc, &package));
     if (package && !inner->setupcalled) {
       PetscCall(PetscStrcmp(package, MATSOLVERCHOLMOD, &cholmod));

@@ -1,37 +1,64 @@
 /*
-  Two-level preconditioner for CG: an incomplete factorisation and a coarse correction, combined as in balancing,
+  Two-level preconditioners for CG: a smoother on the nodes, and a coarse correction (coarse.c).
+
+  "two-level" and "two-level with contact" combine them as in balancing,
 
       P^-1 = Q + (1 - Q A) M (1 - A Q),   Q = Z E^-1 Z^T,   E = Z^T A Z
 
-  with M the preconditioner of the fine level, Z six rigid-body modes for each of some hundred or thousand aggregates of nodes. It is symmetric and positive
-  definite when M and A are. Mandel (1993), Balancing domain decomposition; Tang, Nabben, Vuik, Erlangga (2009),
-  Comparison of two-level preconditioners derived from deflation, domain decomposition and multigrid methods, J. Sci. Comput. 39.
+  with M the smoother, Z six rigid-body modes for each of some hundred or thousand aggregates of nodes. It is
+  symmetric and positive definite when M and A are. Mandel (1993), Balancing domain decomposition; Tang,
+  Nabben, Vuik, Erlangga (2009), Comparison of two-level preconditioners derived from deflation, domain
+  decomposition and multigrid methods, J. Sci. Comput. 39.
 
-  PCPreSolve corrects the initial guess so that Z^T r = 0. All residuals keep this property, the factor 1 - A Q is left out, and P is
-  A-DEF2 there, with one product by A and one coarse solve per application. Each application tests this; a
-  residual with a part in the span of Z gets the complete P^-1.
+  PCPreSolve corrects the initial guess so that Z^T r = 0. All residuals keep this property, the factor 1 - A
+  Q is left out, and P is A-DEF2 there, with one product by A and one coarse solve per application. Each
+  application tests this; a residual with a part in the span of Z gets the complete P^-1.
 
-  While E is small compared with a rank's part of A, one rank factors it for all, and few aggregates are best. On many ranks that would be most
-  of the work, and the incomplete factorisation, which is block diagonal by ranks, is weaker. Then E stays distributed, a
-  multigrid cycle C approximates E^-1 (coarse_solver.c), and there are more aggregates, of NODES_PER_SPREAD nodes each. Q = Z C Z^T is no
-  exact coarse solve, so that the complete form is used, with two coarse corrections:
+  While E is small compared with a rank's part of A, one rank factors it for all, and few aggregates are best.
+  On many ranks that would be most of the work, and the incomplete factorisation, which is block diagonal by
+  ranks, is weaker. Then E stays distributed, a multigrid cycle C approximates E^-1 (coarse_solver.c), and
+  there are more aggregates, of NODES_PER_SPREAD nodes each. Q = Z C Z^T is no exact coarse solve, so that the
+  complete form is used, with two coarse corrections:
 
       P^-1 = 2 Q - Q A Q + (1 - Q A) M (1 - A Q),   symmetric, and positive definite if the eigenvalues of C E are below 2.
 
   docs/reports/many_ranks.md lists the iterations, messages and memory.
 
-  Fine level: ICC(0) of the diagonal block of each rank, from the SBAIJ matrix of the fast product (product.h):
-  for BAIJ PETSc would first convert. Where ICC(0) is not positive definite (at Poisson's ratio 0.45, not yet at 0.4;
-  very flat tets), the diagonal: twice the iterations, each at half the cost. Bar of 192,000 tets, one rank, residual 1e-8, iterations
-  and CPU s: at nu 0.3 ICC 39, 0.37 and diagonal 84, 0.48; at 0.45 diagonal 143, 0.70.
+  Smoother without contact: ICC(0) of the diagonal block of each rank, from the SBAIJ matrix of the fast
+  product (product.h): for BAIJ PETSc would first convert. Where ICC(0) is not positive definite (at Poisson's
+  ratio 0.45, not yet at 0.4; very flat tets), the diagonal: twice the iterations, each at half the cost. Bar
+  of 192,000 tets, one rank, residual 1e-8, iterations and CPU s: at nu 0.3 ICC 39, 0.37 and diagonal 84,
+  0.48; at 0.45 diagonal 143, 0.70. PETSc's PCDEFLATION on the same aggregates takes AIJ only: 0.64 s on one
+  rank, 0.83 on two (this: 0.37,
+  0.54). On a bar sixty times as long as thick CG with PCDEFLATION stopped with an indefinite preconditioner after
+  41 iterations (cause unknown; its fine level was ICC of AIJ); this one converges in 49.
 
-  PETSc's PCDEFLATION on the same aggregates takes AIJ only: 0.64 s on one rank, 0.83 on two (this: 0.37, 0.54). On a bar
-  sixty times as long as thick CG with PCDEFLATION stopped with an indefinite preconditioner after 41 iterations (cause unknown; its
-  fine level was ICC of AIJ); this one converges in 49.
+  Contact: A = K + C, the tangent of the bodies and the contact stiffness, which may be a million times
+  larger. Z also contains the unknowns of the nodes in contact: one coarse space holds the stiff contact modes
+  and the slow modes. A coarse space of only one kind takes five to twenty times the iterations. M is the
+  Chebyshev iteration of degree DEGREE with the block diagonal D of A, on the nodes without contact, where A
+  is K. There the eigenvalues of D^-1 A are at most four, the number of nodes of a cell (Wathen, "Realistic
+  eigenvalue bounds for the Galerkin mass matrix", 1987, whose argument holds for sums of any semi-definite
+  matrices; for the face terms, c [P, -P; -P, P] with P = 1 - 1/3 (1, 1, 1) (1, 1, 1)^T for jumps and c [1,
+  -1; -1, 1] for their mean, the bounds are three and two), so no eigenvalue is estimated, and M depends
+  neither on the number of ranks nor on the contact stiffness.
+
+  P2: aggregates are too coarse a space, and D^-1 A has eigenvalues above four near nu = 1/2. "p-multigrid"
+  has P1 on the vertices as coarse level, edge nodes moving by the mean of their two vertices (coarse.h), and
+  other bodies' nodes unchanged on it: a backward Gauss-Seidel sweep, the coarse correction, a forward sweep
+  (gauss_seidel.c); between ranks block Jacobi. So does "two-level with contact" for P2 bodies of up to
+  VERTICES vertices, with edge nodes in contact, or of vertices of other ranks, in Z themselves. A sweep takes
+  half the time of a product with A; any initial guess is allowed. E of p-multigrid is factored by the fastest
+  package up to FACTORED unknowns; beyond that one cycle of algebraic multigrid approximates E^-1. Symmetric,
+  and positive definite when A is. The number of iterations does not depend on the mesh size. It grows towards
+  nu = 1/2, where the sweeps do not reduce errors with a change of volume of cells (docs/reports/solvers.md).
+  Ronquist and Patera (1987), Spectral element multigrid I, J. Sci. Comput. 2; Helenbrook, Mavriplis, Atkins
+  (2003), Analysis of p-multigrid.
 */
 #include "coarse.h"
-#include "sbassembly.h"
-#include "sbsolver.h"
+#include "contact_coarse.h"
+#include "gauss_seidel.h"
+#include "solver_impl.h"
 #include "sblog.h"
 
 #define NAME "two-level"
@@ -44,17 +71,34 @@
 #define MOST_FACTORED 1000
 #define NODES_PER_SPREAD 16 /* nodes per aggregate; 12, 16, 24: 37, 37, 38 iterations (80,000 tets) */
 
+/* With contact: */
+#define NODES 60        /* nodes per aggregate */
+#define NODES_FACES 15  /* the same for nodes at faces: two per tet, P1 has a fifth */
+#define AGGREGATES 1500 /* largest number of aggregates, unless each has NODES nodes: one rank factors E */
+#define LARGEST 4.      /* upper bound of the eigenvalues of D^-1 A */
+#define RANGE 8.        /* ratio of the largest to the smallest eigenvalue that the smoother reduces */
+#define DEGREE 2        /* degree of the smoother's polynomial */
+#define VERTICES 16000  /* largest number of P2 vertices in Z: larger systems were not measured */
+
+#define FACTORED 200000 /* p-multigrid: largest number of unknowns of E that is factored */
+
 typedef struct {
   SbSpace space;
   SbCoarse coarse;
-  PetscInt wanted;  /* number of aggregates, 0: by the number of nodes */
-  PetscInt limit;   /* largest number of aggregates for one rank to factor, -1: by size */
-  PC fine;          /* fine level on this rank, unless it is the diagonal */
-  PetscBool simple; /* the fine level is the diagonal */
-  Vec s, w, t;
-  Vec own_in, own_out; /* owned rows; they borrow their arrays */
   PetscInt nsetup;
   PetscBool guess_given;
+  /* two-level */
+  PetscInt wanted;     /* number of aggregates, 0: by the number of nodes */
+  PetscInt limit;      /* largest number of aggregates for one rank to factor, -1: by size */
+  PC fine;             /* fine level on this rank, unless it is the diagonal */
+  PetscBool simple;    /* the fine level is the diagonal */
+  Vec own_in, own_out; /* owned rows; they borrow their arrays */
+  /* contact and p-multigrid */
+  const SbContactRows *rows; /* NULL without contact */
+  PetscObjectId pattern;     /* the matrix whose pattern E has, 0: none */
+  PetscReal *inverse; /* [n][9] inverse diagonal blocks of A; of Chebyshev's zero at nodes in contact */
+  PetscReal *extra;   /* [n][3] diagonal added in the sweeps (gauss_seidel.c); NULL: Chebyshev */
+  Vec p;              /* last step of Chebyshev's iteration */
 } TwoLevel;
 
 /* ------------------------------------------------------------------ set-up */
@@ -126,27 +170,31 @@ static PetscErrorCode PCSetUp_Coarse(PC pc)
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
   if (!p->coarse) {
     const SbSpace s = p->space;
-    PetscInt wanted = p->wanted, limit = p->limit;
+    PetscInt wanted = p->wanted, limit = p->limit, nfree = 0, total;
     PetscReal nu = 0.;
     PetscBool spread;
     PetscMPIInt size;
 
     PetscCallMPI(MPI_Comm_size(s->comm, &size));
-    /* 300 was best for 36,000 nodes (192,000 tets); the cost of the factor grows faster than the number of aggregates */
+    /* 300 was best for 36,000 nodes (192,000 tets); the cost of the factor grows faster than the number of
+       aggregates */
     if (!wanted)
       wanted = PetscMax(1, (PetscInt)(300. * PetscPowReal((PetscReal)s->Nnode / 36000., 0.7) + 0.5));
     if (limit < 0)
       limit = PetscMax(LEAST_FACTORED, PetscMin(MOST_FACTORED, s->Nnode / (size * NODES_PER_FACTORED)));
     spread = (PetscBool)(size > 1 && wanted > limit);
     if (spread && !p->wanted) wanted = s->Nnode / NODES_PER_SPREAD;
-    PetscCall(SbCoarseCreate(s, wanted, spread, &p->coarse));
+    for (PetscInt i = 0; i < s->nnode_owned; i++) nfree += s->fixed[i] != 7;
+    PetscCallMPI(MPI_Allreduce(&nfree, &total, 1, MPIU_INT, MPI_SUM, s->comm));
+    wanted = (PetscInt)(0.5 + (PetscReal)wanted * (PetscReal)nfree / (PetscReal)PetscMax(1, total));
+    PetscCall(SbCoarseCreate(s, wanted, PETSC_FALSE, &p->coarse));
+    PetscCall(SbCoarseSetPattern(p->coarse, A, NULL, NULL, NULL));
+    if (p->coarse->N) PetscCall(SbCoarseCreateSolver(p->coarse, (PetscBool)!spread));
     for (PetscInt r = 0; r < s->nregion; r++) nu = PetscMax(nu, s->region[r].material->nu);
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nu, 1, MPIU_REAL, MPI_MAX, s->comm));
     p->simple = (PetscBool)(nu > NU_ICC);
-    PetscCall(MatCreateVecs(A, &p->s, &p->w));
-    PetscCall(VecDuplicate(p->s, &p->t));
-    PetscCall(VecCreateLocalVector(p->s, &p->own_in));
-    PetscCall(VecCreateLocalVector(p->s, &p->own_out));
+    PetscCall(VecCreateLocalVector(p->coarse->s, &p->own_in));
+    PetscCall(VecCreateLocalVector(p->coarse->s, &p->own_out));
   }
   PetscCall(set_up_fine(p, pc, A, &ok));
   if (!ok && !p->simple && !p->space->tentative) {
@@ -155,7 +203,7 @@ static PetscErrorCode PCSetUp_Coarse(PC pc)
   }
   PetscCall(SbCoarseSetUp(p->coarse, A));
   p->nsetup++;
-  PetscCall(PetscInfo(pc, "%" PetscInt_FMT " aggregates, %s%s\n", p->coarse->N,
+  PetscCall(PetscInfo(pc, "%" PetscInt_FMT " aggregates, %s%s\n", p->coarse->N / 2,
                       p->coarse->spread ? "spread over the ranks" : "factored by one of them",
                       p->coarse->ok ? "" : ": the coarse operator is not positive definite"));
   PetscCall(PCSetFailedReason(pc, ok && p->coarse->ok ? PC_NOERROR : PC_FACTOR_NUMERIC_ZEROPIVOT));
@@ -163,53 +211,161 @@ static PetscErrorCode PCSetUp_Coarse(PC pc)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* With contact, and p-multigrid: both have the inverse diagonal blocks of A. */
+static PetscErrorCode PCSetUp_Blocks(PC pc)
+{
+  PetscBool ok;
+  PetscObjectId id;
+  TwoLevel *p;
+  SbCoarse c;
+  Mat A;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  PetscCall(PCGetOperators(pc, NULL, &A));
+  PetscCall(PetscObjectGetId((PetscObject)A, &id));
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
+  c = p->coarse;
+  if (!p->pattern) {
+    PetscCall(PetscMalloc2(9 * (size_t)p->space->nnode_owned, &p->inverse,
+                           c->parent ? 3 * p->space->nnode_owned : 0, &p->extra));
+    PetscCall(MatCreateVecs(A, &p->p, NULL));
+  }
+  /* another matrix of contact has another pattern */
+  if (p->rows && id != p->pattern)
+    PetscCall(SbCoarseSetPattern(c, A, p->rows->ia, p->rows->ja, p->rows->contact));
+  if (!p->rows && !p->pattern) {
+    char type[SB_NAME_MAX] = "";
+
+    PetscCall(SbCoarseSetPattern(c, A, NULL, NULL, NULL));
+    PetscCall(PetscOptionsGetString(NULL, "pc_coarse_", "-pc_type", type, sizeof(type), NULL));
+    PetscCall(SbCoarseCreateSolver(c, (PetscBool)(3 * c->N <= FACTORED && strcmp(type, PCGAMG))));
+  }
+  p->pattern = id;
+  PetscCall(SbGaussSeidelSetUp(A, p->inverse, c->parent ? p->extra : NULL, &ok));
+  /* Chebyshev: positive definite where it smooths */
+  if (!c->parent) ok = PETSC_TRUE;
+  for (PetscInt i = 0; i < p->space->nnode_owned && !c->parent; i++) {
+    PetscReal *B = p->inverse + 9 * (size_t)i;
+
+    if (c->way[i] == SB_ITSELF)
+      PetscCall(PetscArrayzero(B, 9));
+    else if (!(B[0] > 0. && B[0] * B[4] > B[1] * B[3]))
+      ok = PETSC_FALSE;
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &ok, 1, SB_MPI_BOOL, MPI_LAND, p->space->comm));
+  if (ok) PetscCall(SbCoarseSetUp(c, A));
+  c->ok = (PetscBool)(ok && c->ok);
+  PetscCall(PCSetFailedReason(pc, c->ok ? PC_NOERROR : PC_FACTOR_NUMERIC_ZEROPIVOT));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* ------------------------------------------------------------------ application */
 
-static PetscErrorCode PCApply_Coarse(PC pc, Vec r, Vec z)
+/* One Chebyshev step: p = factor p + other D^-1 (r - t), z = z + p; t NULL: first step, z = 0. */
+static PetscErrorCode advance(TwoLevel *p, PetscReal factor, PetscReal other, Vec R, Vec T, Vec Z)
 {
-  PetscReal share;
+  const PetscScalar *r, *t = NULL;
+  PetscScalar *q, *z;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArrayRead(R, &r));
+  if (T) PetscCall(VecGetArrayRead(T, &t));
+  PetscCall(VecGetArray(p->p, &q));
+  PetscCall(VecGetArray(Z, &z));
+  for (PetscInt i = 0; i < p->space->nnode_owned; i++) {
+    const PetscReal *B = p->inverse + 9 * i;
+    PetscReal f[3];
+
+    for (int k = 0; k < 3; k++) f[k] = t ? r[3 * i + k] - t[3 * i + k] : r[3 * i + k];
+    for (int k = 0; k < 3; k++) {
+      const PetscReal step = B[3 * k] * f[0] + B[3 * k + 1] * f[1] + B[3 * k + 2] * f[2];
+
+      q[3 * i + k] = t ? factor * q[3 * i + k] + other * step : other * step;
+      z[3 * i + k] = t ? z[3 * i + k] + q[3 * i + k] : q[3 * i + k];
+    }
+  }
+  PetscCall(VecRestoreArray(Z, &z));
+  PetscCall(VecRestoreArray(p->p, &q));
+  if (T) PetscCall(VecRestoreArrayRead(T, &t));
+  PetscCall(VecRestoreArrayRead(R, &r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* z = M r: Chebyshev (Saad, Iterative Methods for Sparse Linear Systems, 2003, algorithm 12.1), or the fine
+   level. */
+static PetscErrorCode smooth(TwoLevel *p, Mat A, Vec r, Vec z)
+{
+  const PetscReal middle = 0.5 * LARGEST * (1. + 1. / RANGE), half = 0.5 * LARGEST * (1. - 1. / RANGE);
+  PetscReal rho = half / middle;
+
+  PetscFunctionBeginUser;
+  if (p->simple) {
+    PetscCall(PCApply(p->fine, r, z));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (p->fine) {
+    PetscCall(VecGetLocalVectorRead(r, p->own_in));
+    PetscCall(VecGetLocalVector(z, p->own_out));
+    PetscCall(PCApply(p->fine, p->own_in, p->own_out));
+    PetscCall(VecRestoreLocalVector(z, p->own_out));
+    PetscCall(VecRestoreLocalVectorRead(r, p->own_in));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(advance(p, 0., 1. / middle, r, NULL, z));
+  for (int k = 1; k < DEGREE; k++) {
+    const PetscReal next = 1. / (2. * middle / half - rho);
+
+    PetscCall(MatMult(A, z, p->coarse->t));
+    PetscCall(advance(p, next * rho, 2. * next / half, r, p->coarse->t, z));
+    rho = next;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PCApply_TwoLevel(PC pc, Vec r, Vec z)
+{
+  PetscReal share = 1.;
   PetscBool whole;
   TwoLevel *p;
+  SbCoarse c;
   Vec s = r;
   Mat A;
 
   PetscFunctionBeginUser;
   PetscCall(PCShellGetContext(pc, &p));
   PetscCall(PCGetOperators(pc, NULL, &A));
-  PetscCall(SbCoarseRestrict(p->coarse, r, &share));
+  c = p->coarse;
+  if (c->parent) {
+    PetscCall(SbGaussSeidelDown(A, p->inverse, p->extra, r, z, c->t));
+    PetscCall(SbCoarseRestrict(c, c->t, NULL));
+    PetscCall(SbCoarseAdd(c, z));
+    PetscCall(SbGaussSeidelUp(A, p->inverse, p->extra, r, z, c->t));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(SbCoarseRestrict(c, r, c->spread ? NULL : &share));
   whole = (PetscBool)(share > IN_SPAN);
   if (whole) { /* z = Q r, s = r - A z */
-    s = p->s;
-    PetscCall(VecSet(z, 0.));
-    PetscCall(SbCoarseAdd(p->coarse, z));
+    s = c->s;
+    PetscCall(VecZeroEntries(z));
+    PetscCall(SbCoarseAdd(c, z));
     PetscCall(MatMult(A, z, s));
     PetscCall(VecAYPX(s, -1., r));
   }
   /* w = M s + Q (s - A M s) */
-  if (p->simple)
-    PetscCall(PCApply(p->fine, s, p->w));
-  else {
-    PetscCall(VecGetLocalVectorRead(s, p->own_in));
-    PetscCall(VecGetLocalVector(p->w, p->own_out));
-    PetscCall(PCApply(p->fine, p->own_in, p->own_out));
-    PetscCall(VecRestoreLocalVector(p->w, p->own_out));
-    PetscCall(VecRestoreLocalVectorRead(s, p->own_in));
-  }
-  PetscCall(MatMult(A, p->w, p->t));
-  PetscCall(VecAYPX(p->t, -1., s));
-  PetscCall(SbCoarseRestrict(p->coarse, p->t, &share));
-  PetscCall(SbCoarseAdd(p->coarse, p->w));
+  PetscCall(smooth(p, A, s, c->w));
+  PetscCall(SbCoarseCorrect(c, A, s, c->w));
   if (whole)
-    PetscCall(VecAXPY(z, 1., p->w));
+    PetscCall(VecAXPY(z, 1., c->w));
   else
-    PetscCall(VecCopy(p->w, z));
+    PetscCall(VecCopy(c->w, z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Corrects the initial guess, so that its residual has no part in the span of Z. */
-static PetscErrorCode PCPreSolve_Coarse(PC pc, KSP ksp, Vec b, Vec x)
+static PetscErrorCode PCPreSolve_TwoLevel(PC pc, KSP ksp, Vec b, Vec x)
 {
-  PetscReal share;
   TwoLevel *p;
   Mat A;
 
@@ -218,54 +374,74 @@ static PetscErrorCode PCPreSolve_Coarse(PC pc, KSP ksp, Vec b, Vec x)
   PetscCall(PCGetOperators(pc, &A, NULL));
   PetscCall(KSPGetInitialGuessNonzero(ksp, &p->guess_given));
   if (!p->coarse->ok) PetscFunctionReturn(PETSC_SUCCESS);
-  if (p->guess_given) {
-    PetscCall(MatMult(A, x, p->s));
-    PetscCall(VecAYPX(p->s, -1., b));
-  } else
-    PetscCall(VecSet(x, 0.));
-  PetscCall(SbCoarseRestrict(p->coarse, p->guess_given ? p->s : b, &share));
-  PetscCall(SbCoarseAdd(p->coarse, x));
+  if (p->guess_given)
+    PetscCall(SbCoarseCorrect(p->coarse, A, b, x));
+  else {
+    PetscCall(VecZeroEntries(x));
+    PetscCall(SbCoarseRestrict(p->coarse, b, NULL));
+    PetscCall(SbCoarseAdd(p->coarse, x));
+  }
   PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode PCPostSolve_Coarse(PC pc, KSP ksp, Vec b, Vec x)
+/* With contact no net force on a body remains in the residual, so that momentum is as exact as with a
+   factorisation. */
+static PetscErrorCode PCPostSolve_TwoLevel(PC pc, KSP ksp, Vec b, Vec x)
 {
+  KSPConvergedReason reason;
   TwoLevel *p;
+  Mat A;
 
   PetscFunctionBeginUser;
-  (void)b;
-  (void)x;
   PetscCall(PCShellGetContext(pc, &p));
+  PetscCall(PCGetOperators(pc, &A, NULL));
   PetscCall(KSPSetInitialGuessNonzero(ksp, p->guess_given));
+  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  if (p->rows && reason > 0) PetscCall(SbCoarseCorrect(p->coarse, A, b, x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ create and destroy */
 
-static PetscErrorCode PCView_Coarse(PC pc, PetscViewer viewer)
+static PetscErrorCode PCView_TwoLevel(PC pc, PetscViewer viewer)
 {
-  PetscMPIInt rank;
+  PetscInt count[2] = {0, 0};
   PetscViewer own;
   TwoLevel *p;
+  SbCoarse c;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PetscObjectComm((PetscObject)pc), &rank));
   PetscCall(PCShellGetContext(pc, &p));
-  if (p->coarse)
+  c = p->coarse;
+  if (c && !c->aggregated) {
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  Gauss-Seidel on P2; P1 on the vertices by:\n"));
+    if (c->solver) PetscCall(PCView(c->solver, viewer));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (c && c->parent)
     PetscCall(PetscViewerASCIIPrintf(
-      viewer, "  %" PetscInt_FMT " aggregates with six rigid-body modes each, %s; fine level:\n",
-      p->coarse->N, p->coarse->spread ? "spread over the ranks" : "factored by one of them"));
+      viewer, "  Gauss-Seidel, and the vertices of P2 bodies in the place of their aggregates\n"));
+  count[0] = c ? c->nagg : 0;
+  for (PetscInt i = 0; p->rows && i < p->rows->n; i++) count[1] += p->rows->contact[i];
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 2, MPIU_INT, MPI_SUM, p->space->comm));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  %" PetscInt_FMT " aggregates with six rigid-body modes each",
+                                   count[0]));
+  if (p->rows)
+    PetscCall(PetscViewerASCIIPrintf(viewer, ", and %" PetscInt_FMT " nodes of contact\n", count[1]));
+  else
+    PetscCall(PetscViewerASCIIPrintf(viewer, ", %s; fine level:\n",
+                                     c && c->spread ? "spread over the ranks" : "factored by one of them"));
   if (p->fine && p->simple) PetscCall(PCView(p->fine, viewer));
   if (p->fine && !p->simple) {
     PetscCall(PetscViewerGetSubViewer(viewer, PETSC_COMM_SELF, &own));
-    if (!rank) PetscCall(PCView(p->fine, own));
+    if (own) PetscCall(PCView(p->fine, own));
     PetscCall(PetscViewerRestoreSubViewer(viewer, PETSC_COMM_SELF, &own));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode PCDestroy_Coarse(PC pc)
+static PetscErrorCode PCDestroy_TwoLevel(PC pc)
 {
   TwoLevel *p;
 
@@ -273,12 +449,26 @@ static PetscErrorCode PCDestroy_Coarse(PC pc)
   PetscCall(PCShellGetContext(pc, &p));
   PetscCall(SbCoarseDestroy(&p->coarse));
   PetscCall(PCDestroy(&p->fine));
-  PetscCall(VecDestroy(&p->s));
-  PetscCall(VecDestroy(&p->w));
-  PetscCall(VecDestroy(&p->t));
   PetscCall(VecDestroy(&p->own_in));
   PetscCall(VecDestroy(&p->own_out));
+  PetscCall(VecDestroy(&p->p));
+  PetscCall(PetscFree2(p->inverse, p->extra));
   PetscCall(PetscFree(p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode create(SbSpace s, PC pc, const char *name, PetscErrorCode (*setup)(PC), TwoLevel **p)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(p));
+  (*p)->space = s;
+  PetscCall(PCSetType(pc, PCSHELL));
+  PetscCall(PCShellSetContext(pc, *p));
+  PetscCall(PCShellSetName(pc, name));
+  PetscCall(PCShellSetSetUp(pc, setup));
+  PetscCall(PCShellSetApply(pc, PCApply_TwoLevel));
+  PetscCall(PCShellSetView(pc, PCView_TwoLevel));
+  PetscCall(PCShellSetDestroy(pc, PCDestroy_TwoLevel));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -288,8 +478,9 @@ PetscErrorCode SbPCCoarseCreate(SbSpace s, PC pc)
   TwoLevel *p;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscNew(&p));
-  p->space = s;
+  PetscCall(create(s, pc, NAME, PCSetUp_Coarse, &p));
+  PetscCall(PCShellSetPreSolve(pc, PCPreSolve_TwoLevel));
+  PetscCall(PCShellSetPostSolve(pc, PCPostSolve_TwoLevel));
   PetscCall(PCGetOptionsPrefix(pc, &prefix));
   p->limit = -1;
   PetscCall(PetscOptionsGetInt(NULL, prefix, "-pc_coarse_aggregates", &p->wanted, NULL));
@@ -302,15 +493,49 @@ PetscErrorCode SbPCCoarseCreate(SbSpace s, PC pc)
              "-pc_coarse_gathered %" PetscInt_FMT " is below -1: give the largest number of aggregates that "
              "one rank factors, 0 for none, or -1 to choose by size",
              p->limit);
-  PetscCall(PCSetType(pc, PCSHELL));
-  PetscCall(PCShellSetContext(pc, p));
-  PetscCall(PCShellSetName(pc, NAME));
-  PetscCall(PCShellSetSetUp(pc, PCSetUp_Coarse));
-  PetscCall(PCShellSetApply(pc, PCApply_Coarse));
-  PetscCall(PCShellSetPreSolve(pc, PCPreSolve_Coarse));
-  PetscCall(PCShellSetPostSolve(pc, PCPostSolve_Coarse));
-  PetscCall(PCShellSetView(pc, PCView_Coarse));
-  PetscCall(PCShellSetDestroy(pc, PCDestroy_Coarse));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCPMultigridCreate(SbSpace s, PC pc)
+{
+  TwoLevel *p;
+
+  PetscFunctionBeginUser;
+  PetscCheck(s->edge_node, s->comm, PETSC_ERR_USER,
+             "-solver cg_p_multigrid is for runs with a body of -body_<name>_element p2: choose auto, or "
+             "cg_two_level");
+  PetscCall(create(s, pc, "p-multigrid", PCSetUp_Blocks, &p));
+  PetscCall(SbCoarseCreate(s, -1, PETSC_TRUE, &p->coarse));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCContactCreate(SbSpace s, const SbContactRows *rows, PC pc)
+{
+  PetscInt nodes = NODES, nvertex = 0;
+  TwoLevel *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(create(s, pc, "two-level with contact", PCSetUp_Blocks, &p));
+  PetscCall(PCShellSetPreSolve(pc, PCPreSolve_TwoLevel));
+  PetscCall(PCShellSetPostSolve(pc, PCPostSolve_TwoLevel));
+  p->rows = rows;
+  if (s->plan->face_term[0]) nodes = PetscClipInterval(s->Nnode / AGGREGATES, NODES_FACES, NODES);
+  PetscCall(SbCoarseCreate(s, (s->nnode_owned + nodes - 1) / nodes, PETSC_TRUE, &p->coarse));
+  PetscCall(SbBlockSolverCreate(s->comm, &p->coarse->direct));
+  /* P2: the vertices are the coarse space while there are few */
+  for (PetscInt i = 0; p->coarse->vertex && i < s->nnode_owned; i++) nvertex += p->coarse->vertex[i];
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nvertex, 1, MPIU_INT, MPI_SUM, s->comm));
+  if (nvertex > VERTICES) PetscCall(PetscFree(p->coarse->parent));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCContactCost(PC pc, PetscReal *flops, PetscReal *entries)
+{
+  TwoLevel *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  PetscCall(SbBlockSolverCost(p->coarse->direct, flops, entries));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -358,8 +583,8 @@ PetscErrorCode SbPCCoarseGetStats(PC pc, PetscInt *naggregate, PetscInt *nsolved
   PetscCall(context_of(pc, &p));
   PetscCheck(p, PetscObjectComm((PetscObject)pc), PETSC_ERR_ARG_WRONG, "Not a two-level preconditioner");
   PetscCallMPI(MPI_Comm_rank(p->space->comm, &rank));
-  if (naggregate) *naggregate = p->coarse ? p->coarse->N : 0;
-  if (nsolved) *nsolved = !p->coarse ? 0 : p->coarse->spread ? p->coarse->n : rank ? 0 : p->coarse->N;
+  if (naggregate) *naggregate = p->coarse ? p->coarse->N / 2 : 0;
+  if (nsolved) *nsolved = !p->coarse ? 0 : p->coarse->spread ? p->coarse->nagg : rank ? 0 : p->coarse->N / 2;
   if (nsetup) *nsetup = p->nsetup;
   if (simple) *simple = p->simple;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,9 +1,10 @@
 /*
   Direct solvers by MUMPS or SuiteSparse, on any number of ranks.
 
-  MUMPS factors a distributed matrix. CHOLMOD (positive definite matrices) and UMFPACK (any), both of SuiteSparse, work on one rank: on several,
-  PCTELESCOPE gathers the matrix and each right-hand side there, and the others wait: cheaper than to factor the matrix on every
-  rank (PCREDUNDANT), and up to SB_DIRECT_SMALL unknowns cheaper than MUMPS (docs/reports/gathered.md).
+  MUMPS factors a distributed matrix. CHOLMOD (positive definite matrices) and UMFPACK (any), both of
+  SuiteSparse, work on one rank: on several, PCTELESCOPE gathers the matrix and each right-hand side there,
+  and the others wait: cheaper than to factor the matrix on every rank (PCREDUNDANT), and up to
+  SB_DIRECT_SMALL unknowns cheaper than MUMPS (docs/reports/gathered.md).
 */
 #include "solver_impl.h"
 #include "sbsolver.h"
@@ -78,7 +79,8 @@ PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric)
   if (mumps) PetscCall(SbSolverSetDefault(prefix, "mat_mumps_icntl_13", "1"));
   if (mumps) PetscCall(SbSolverSetDefault(prefix, "mat_mumps_icntl_14", "100"));
   if (umfpack) PetscCall(SbSolverSetDefault(prefix, "mat_umfpack_ordering", "METIS"));
-  /* for small matrices CHOLMOD would choose L D L^T, which factors indefinite ones; a failed L L^T appears as the solver's reason */
+  /* for small matrices CHOLMOD would choose L D L^T, which factors indefinite ones; a failed L L^T appears as
+     the solver's reason */
   if (!mumps && !umfpack) {
     PetscCall(SbSolverSetDefault(prefix, "mat_cholmod_factor", "supernodal"));
     PetscCall(SbSolverSetDefault(prefix, "mat_cholmod_print", "0"));

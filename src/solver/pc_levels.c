@@ -1,33 +1,33 @@
 /*
-  A fixed symmetric approximation of A^-1, A the tangent of CR and DG elements without its volumetric part: without the bulk stiffness
-  P1 elements do not lock, and serve as a coarse space for CR.
+  A fixed symmetric approximation of A^-1, A the tangent of CR and DG elements without its volumetric part:
+  without the bulk stiffness P1 elements do not lock, and serve as a coarse space for CR.
 
-  DG: with the mean m and the jump d of the two nodes of a face, u = m + (1 - w) d on one side, the cells' energy depends on m
-  only, as the energy of CR does, and d has the stiffness of the face terms. Only the penalty of jumps couples m and d, and it is no larger
-  than either stiffness: the cycle for CR approximates the inverse for m, a diagonal that for d.
+  DG: with the mean m and the jump d of the two nodes of a face, u = m + (1 - w) d on one side, the cells'
+  energy depends on m only, as the energy of CR does, and d has the stiffness of the face terms. Only the
+  penalty of jumps couples m and d, and it is no larger than either stiffness: the cycle for CR approximates
+  the inverse for m, a diagonal that for d.
 
-  CR: a backward Gauss-Seidel sweep, a correction by P1, a forward sweep (between ranks: block Jacobi). A P1 function has at the
-  centroid of a face the mean of its values at the three vertices; its jumps vanish and its strains are the same, so the Galerkin
-  product is the P1 matrix, which is assembled by the same kernels. The vertices of a face with a prescribed unknown are prescribed.
-  A DG cell that shares only a vertex with this rank's cells may have neighbours unknown here; its strain is then that of its own
-  nodes, so that in a strained body the P1 matrix is slightly nonsymmetric at interfaces between ranks, which GMRES allows.
+  CR: a backward Gauss-Seidel sweep, a correction by P1, a forward sweep (between ranks: block Jacobi). A P1
+  function has at the centroid of a face the mean of its values at the three vertices; its jumps vanish and
+  its strains are the same, so the Galerkin product is the P1 matrix, which is assembled by the same kernels.
+  The vertices of a face with a prescribed unknown are prescribed. A DG cell that shares only a vertex with
+  this rank's cells may have neighbours unknown here; its strain is then that of its own nodes, so that in a
+  strained body the P1 matrix is slightly nonsymmetric at interfaces between ranks, which GMRES allows.
   Springs of effects are added to the P1 matrix by the Galerkin product: they may be a body's only support.
-  The P1 matrix is inverted by one cycle of algebraic multigrid. With a P2 body: pc_p_multigrid.c. Hiptmair and Xu (2007), Nodal auxiliary space preconditioning; Brenner (2003), Poincare-Friedrichs
-  inequalities for piecewise H1 functions.
+  The P1 matrix is inverted by one cycle of algebraic multigrid. With a P2 body: pc_coarse.c. Hiptmair and Xu
+  (2007), Nodal auxiliary space preconditioning; Brenner (2003), Poincare-Friedrichs inequalities for
+  piecewise H1 functions.
 */
 #include "pressure.h"
 #include "gauss_seidel.h"
-#include "sbsolver.h"
+#include "solver_impl.h"
 
 /*
-  Threshold of multigrid's coarsening: zero couplings of P1, of which boxes have many, are ignored. Bar of CR, nu 0.49, 53,000 tets: 59 iterations on 1, 2, 3 and
-  4 ranks; with PETSc's default -1, which keeps all, 59, 81, 59 and 79, depending on the partition.
+  Threshold of multigrid's coarsening: zero couplings of P1, of which boxes have many, are ignored. Bar of CR,
+  nu 0.49, 53,000 tets: 59 iterations on 1, 2, 3 and 4 ranks; with PETSc's default -1, which keeps all, 59,
+  81, 59 and 79, depending on the partition.
 */
 #define WEAK 0.
-/* Unknowns of the coarsest level, and least unknowns per rank on finer levels: that bar on 64 ranks needs 333 messages of a rank per iteration; with PETSc's 50 and 50, 556. */
-#define LAST_LEVEL 600
-#define PER_RANK 300
-
 /* ------------------------------------------------------------------ spaces */
 
 /* Elements of a level: P1 everywhere, or CR instead of DG. */
@@ -44,7 +44,8 @@ static PetscErrorCode create_elements(SbSpace s, PetscBool p1, SbElement **eleme
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Prescribes in `to` the components prescribed in `from`: at the same node, or at every vertex of the face. */
+/* Prescribes in `to` the components prescribed in `from`: at the same node, or at every vertex of the
+   face. */
 static PetscErrorCode fix_like(SbSpace from, SbSpace to)
 {
   uint8_t *mark;
@@ -285,7 +286,8 @@ PetscErrorCode SbLevelsAddSpring(SbLevels v, PetscInt node, PetscReal factor, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the springs of all ranks in shared[nodes of at[n-2]][9], ghosts included, one row of the blocks at a time. */
+/* Adds the springs of all ranks in shared[nodes of at[n-2]][9], ghosts included, one row of the blocks at a
+   time. */
 static PetscErrorCode gather_springs(SbLevels v)
 {
   const SbSpace s = v->space;
@@ -371,7 +373,8 @@ PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
     const SbPlan p = s->plan;
     const PetscReal *own;
 
-    /* Inverse stiffness of the jumps: (1-w)^2 A_ii - 2 w (1-w) A_ij + w^2 A_jj , A the face terms and the mass matrix. */
+    /* Inverse stiffness of the jumps: (1-w)^2 A_ii - 2 w (1-w) A_ij + w^2 A_jj , A the face terms and the
+       mass matrix. */
     PetscCall(MatGetDiagonal(v->A[0], v->t[0]));
     PetscCall(loose_diagonal(v, v->r[0]));
     PetscCall(load(s, v->r[0], v->r[0], &own));
@@ -403,7 +406,6 @@ PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
 PetscErrorCode SbLevelsCreate(SbSpace s, SbLevels *levels)
 {
   SbLevels v;
-  PetscReal weak = WEAK;
   PC pc;
   SbSpace upper, lower;
 
@@ -444,11 +446,7 @@ PetscErrorCode SbLevelsCreate(SbSpace s, SbLevels *levels)
   PetscCall(KSPSetOptionsPrefix(v->coarse, "pressure_coarse_"));
   PetscCall(KSPSetType(v->coarse, KSPPREONLY));
   PetscCall(KSPGetPC(v->coarse, &pc));
-  PetscCall(PCSetType(pc, PCGAMG));
-  PetscCall(PCGAMGSetReuseInterpolation(pc, PETSC_TRUE));
-  PetscCall(PCGAMGSetThreshold(pc, &weak, 1));
-  PetscCall(PCGAMGSetCoarseEqLim(pc, LAST_LEVEL));
-  PetscCall(PCGAMGSetProcEqLim(pc, PER_RANK));
+  PetscCall(SbPCMultigridSet(pc, WEAK));
   PetscCall(KSPSetFromOptions(v->coarse));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,21 +1,24 @@
 /*
   Nearly incompressible CR and DG: the pressures of the cells as unknowns of the iteration.
 
-  The condition number of K = A + B^T C^-1 B (pc_pressure_operator.c) grows with lambda. K u = r is equivalent to
+  The condition number of K = A + B^T C^-1 B (pc_pressure_operator.c) grows with lambda. K u = r is equivalent
+  to
 
     [ A  B^T ] [u]   [r]
     [ B  -C  ] [p] = [0],      C = V / lambda,
 
-  which stays well conditioned up to lambda = infinity: with one pressure per cell, CR satisfies the inf-sup condition on every
-  mesh (Crouzeix and Raviart 1973), so that the diagonal S = C + 1.5 V / (2 mu) approximates C + B A^-1 B^T. GMRES with the
-  upper triangular preconditioner of A^ (pc_levels.c) and -S on its right takes a number of iterations that depends neither on
-  lambda nor on the mesh. Benzi, Golub and Liesen (2005), Numerical solution of saddle point problems, sections 10 and 8.
+  which stays well conditioned up to lambda = infinity: with one pressure per cell, CR satisfies the inf-sup
+  condition on every mesh (Crouzeix and Raviart 1973), so that the diagonal S = C + 1.5 V / (2 mu)
+  approximates C + B A^-1 B^T. GMRES with the upper triangular preconditioner of A^ (pc_levels.c) and -S on
+  its right takes a number of iterations that depends neither on lambda nor on the mesh. Benzi, Golub and
+  Liesen (2005), Numerical solution of saddle point problems, sections 10 and 8.
 
-  The outer iteration is iterative refinement: the residual f - K u is computed again and is the next right-hand side. -ksp_rtol
-  applies to it; the iterations reported are those of GMRES. f - K u = r_u - B^T C^-1 r_p contains
-  the residual of the cells times lambda, and GMRES minimises a norm with these weights, up to lambda = 1e4 mu. Beyond that
-  double precision is the limit: at nu = 0.499999 the rounding error of K u is eps |B^T| C^-1 |B| |u| for any solver. A residual below four times
-  this is accepted, with a line of -info, unless it is so large that the matrix must be singular.
+  The outer iteration is iterative refinement: the residual f - K u is computed again and is the next
+  right-hand side. -ksp_rtol applies to it; the iterations reported are those of GMRES. f - K u = r_u - B^T
+  C^-1 r_p contains the residual of the cells times lambda, and GMRES minimises a norm with these weights, up
+  to lambda = 1e4 mu. Beyond that double precision is the limit: at nu = 0.499999 the rounding error of K u is
+  eps |B^T| C^-1 |B| |u| for any solver. A residual below four times this is accepted, with a line of -info,
+  unless it is so large that the matrix must be singular.
 
   Not handled: inertia in S; time steps far below the time in which a shear wave crosses a cell take more
   iterations.

@@ -1,16 +1,19 @@
 /*
   A preconditioner that rarely factors: P^-1 = Q A0^-1 Q^T.
 
-  The tangent A of a rotated body is nearly the rotated old tangent A0: with Q block diagonal, one rotation per node
-  since the factorisation, P = Q A0 Q^T differs from A only as far as rotations vary across a cell. Small variations hardly
-  change the number of iterations; nodes with large ones are solved exactly (exact_nodes.c). So one factorisation serves a
-  whole run, and a step of a swinging bar takes six to ten iterations to 1e-4.
+  The tangent A of a rotated body is nearly the rotated old tangent A0: with Q block diagonal, one rotation
+  per node since the factorisation, P = Q A0 Q^T differs from A only as far as rotations vary across a cell.
+  Small variations hardly change the number of iterations; nodes with large ones are solved exactly
+  (exact_nodes.c). So one factorisation serves a whole run, and a step of a swinging bar takes six to ten
+  iterations to 1e-4.
 
-  A0^-1 is applied by a factor in 16-bit integers (factor.c). On several ranks each eliminates its interior nodes, and all ranks together
-  solve the Schur complement on the interface nodes (interface.c): up to rounding the same preconditioner as on one rank.
+  A0^-1 is applied by a factor in 16-bit integers (factor.c). On several ranks each eliminates its interior
+  nodes, and all ranks together solve the Schur complement on the interface nodes (interface.c): up to
+  rounding the same preconditioner as on one rank.
 
-  Prescribed unknowns: fully prescribed nodes are left out and divided by their diagonal; nodes with one or two are not
-  rotated. Renewal of the factor: see SbPCRotatedCreate(); by iteration counts only, so that runs are repeatable.
+  Prescribed unknowns: fully prescribed nodes are left out and divided by their diagonal; nodes with one or
+  two are not rotated. Renewal of the factor: see SbPCRotatedCreate(); by iteration counts only, so that runs
+  are repeatable.
 */
 #include "sbsolver.h"
 #include "rotated.h"
@@ -116,7 +119,8 @@ static PetscErrorCode find_cells(Rotated *p, Mat A, const SbPack **cells)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the rows of own interface nodes to the Schur complement, and stores the diagonals of prescribed nodes. */
+/* Adds the rows of own interface nodes to the Schur complement, and stores the diagonals of prescribed
+   nodes. */
 static PetscErrorCode add_other_rows(Rotated *p, Mat A, PetscReal schur[])
 {
   SbSpace s = p->space;

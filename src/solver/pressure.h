@@ -1,13 +1,14 @@
 /*
-  pressure.h - the solver for nearly incompressible bodies (pc_pressure.c): the mixed operator, with the pressures of the cells as unknowns,
-  and the preconditioner of its displacement block.
+  pressure.h - the solver for nearly incompressible bodies (pc_pressure.c): the mixed operator, with the
+  pressures of the cells as unknowns, and the preconditioner of its displacement block.
 */
 #pragma once
 #include "sbassembly.h"
 
 /*
-  Up to three spaces on one mesh: the space itself; if some body is DG, the same with CR for DG; P1 for every body.
-  The tangent without its volumetric part is assembled in each. With a P2 body only the space itself, with pc_p_multigrid.c.
+  Up to three spaces on one mesh: the space itself; if some body is DG, the same with CR for DG; P1 for every
+  body. The tangent without its volumetric part is assembled in each. With a P2 body only the space itself,
+  with pc_coarse.c.
 */
 typedef struct _p_SbLevels *SbLevels;
 struct _p_SbLevels {
@@ -36,17 +37,20 @@ PetscErrorCode SbLevelsCreate(SbSpace space, SbLevels *levels);
 PetscErrorCode SbLevelsDestroy(SbLevels *levels);
 /* Assembles the matrices without, and `out` with, the volumetric part. Not collective. */
 PetscErrorCode SbLevelsAssemble(SbLevels levels, const SbStage *stage, const SbVolumetric *out);
-/* Adds factor times a block at an owned node, which A[0] contains already, to the other levels; a node of another rank is ignored. Not collective. */
+/* Adds factor times a block at an owned node, which A[0] contains already, to the other levels; a node of
+   another rank is ignored. Not collective. */
 PetscErrorCode SbLevelsAddSpring(SbLevels levels, PetscInt node, PetscReal factor, const PetscReal block[9]);
 /* Adds the springs of all ranks to the other matrices, before their final assembly. Collective. */
 PetscErrorCode SbLevelsShareSprings(SbLevels levels);
-/* After the final assembly. *positive = false: a diagonal block is not positive definite, and SbLevelsApply() must not be called. Collective. */
+/* After the final assembly. *positive = false: a diagonal block is not positive definite, and SbLevelsApply()
+   must not be called. Collective. */
 PetscErrorCode SbLevelsSetUp(SbLevels levels, PetscBool *positive);
 /* z = a symmetric approximation of A[0]^-1, applied to r. Collective. */
 PetscErrorCode SbLevelsApply(SbLevels levels, Vec r, Vec z);
 
 /*
-  The tangent as K = A + B^T C^-1 B: A has no volumetric part, B u is the change of volume of the cells, C = V / lambda.
+  The tangent as K = A + B^T C^-1 B: A has no volumetric part, B u is the change of volume of the cells, C = V
+  / lambda.
 */
 typedef struct _p_SbPressureOperator *SbPressureOperator;
 struct _p_SbPressureOperator {

@@ -1,10 +1,12 @@
 /*
-  quantized.h - dense panels in 16-bit integers, for triangular solves limited by memory bandwidth: factor.c, interface.c.
+  quantized.h - dense panels in 16-bit integers, for triangular solves limited by memory bandwidth: factor.c,
+  interface.c.
 
-  Entries are 16-bit integers times a scale per column. Two entries share a 32-bit word, so that reading them costs little more than
-  a conversion: the word shifted up is the lower entry; the unshifted word is HALF times the upper entry, with the lower entry as a fraction that
-  rounding has accounted for. A panel has at most 3 PANEL columns; its rows lie in blocks of ROWS, each [column][row], so that
-  both products read memory in order.
+  Entries are 16-bit integers times a scale per column. Two entries share a 32-bit word, so that reading them
+  costs little more than a conversion: the word shifted up is the lower entry; the unshifted word is HALF
+  times the upper entry, with the lower entry as a fraction that rounding has accounted for. A panel has at
+  most 3 PANEL columns; its rows lie in blocks of ROWS, each [column][row], so that both products read memory
+  in order.
 */
 #pragma once
 #if defined(__linux__)

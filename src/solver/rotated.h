@@ -1,5 +1,6 @@
 /*
-  rotated.h - the real-time solver: rotations of cells, rows of an operator, interface nodes, exactly solved nodes.
+  rotated.h - the real-time solver: rotations of cells, rows of an operator, interface nodes, exactly solved
+  nodes.
 */
 #pragma once
 #include "sbassembly.h"
@@ -11,8 +12,9 @@
 /*
   SbInterfaceChooseNodes - few nodes that separate the ranks' interiors.
 
-  Collective; the space has a plan. Fully prescribed nodes are left out. Output: index[nnode], number of a local node in the interface, -1 for
-  others; those of a rank are consecutive. nmine: number owned by this rank; n: by all ranks.
+  Collective; the space has a plan. Fully prescribed nodes are left out. Output: index[nnode], number of a
+  local node in the interface, -1 for others; those of a rank are consecutive. nmine: number owned by this
+  rank; n: by all ranks.
 */
 PetscErrorCode SbInterfaceChooseNodes(SbSpace space, PetscInt index[], PetscInt *nmine, PetscInt *n);
 
@@ -34,9 +36,9 @@ PetscErrorCode SbInterfaceDestroy(SbInterface *face);
 /*
   SbInterfaceFactorise - factors the sum over ranks of their Schur complements.
 
-  Collective. Input: work, bytes that this rank reads for its interior in each application, for load balance. In and out:
-  schur[(3 n)^2], column-major, lower triangle: this rank's contribution; overwritten. Output: ok, PETSC_FALSE on all ranks if the
-  sum is not positive definite.
+  Collective. Input: work, bytes that this rank reads for its interior in each application, for load balance.
+  In and out: schur[(3 n)^2], column-major, lower triangle: this rank's contribution; overwritten. Output: ok,
+  PETSC_FALSE on all ranks if the sum is not positive definite.
 */
 PetscErrorCode SbInterfaceFactorise(SbInterface face, PetscInt64 work, PetscReal schur[], PetscBool *ok);
 /* x[3 n] <- inverse times the sum of x over ranks. Collective. */
@@ -47,9 +49,9 @@ PetscInt64 SbInterfaceBytes(SbInterface face);
 /* ------------------------------------------------------------------ nodes solved exactly */
 
 /*
-  Where the rotations of the cells around a node differ much (creases, inverted cells) no rotation of the node fits, and a few
-  such nodes dominate the number of iterations. They are solved exactly: with B = A_BB^-1 on them the preconditioner is
-  B + (1 - B A) P (1 - A B), symmetric and positive definite for any P that is.
+  Where the rotations of the cells around a node differ much (creases, inverted cells) no rotation of the node
+  fits, and a few such nodes dominate the number of iterations. They are solved exactly: with B = A_BB^-1 on
+  them the preconditioner is B + (1 - B A) P (1 - A B), symmetric and positive definite for any P that is.
 */
 typedef struct {
   PetscInt n;         /* number of nodes */
@@ -66,7 +68,8 @@ typedef struct {
 
 PetscErrorCode SbExactNodesCreate(SbSpace space, SbExactNodes *e);
 PetscErrorCode SbExactNodesDestroy(SbExactNodes *e);
-/* Chooses the free nodes with a spread above `limit` (raised while there are too many) and all neighbours owned, and factors. */
+/* Chooses the free nodes with a spread above `limit` (raised while there are too many) and all neighbours
+   owned, and factors. */
 PetscErrorCode SbExactNodesSetUp(SbExactNodes *e, SbSpace space, Mat A, const PetscReal spread[],
                                  PetscReal limit);
 /* y = B r on the nodes, r -= A y, in place on r[nnode_owned][3]; to be called before P. */

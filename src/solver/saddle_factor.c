@@ -4,13 +4,14 @@
     [ K + F^T k G   F^T ] [ z ]   [ r ]
     [ G             0   ] [ m ] = [ 0 ]
 
-  Each constraint acts on one node, so that its multiplier m is eliminated there (src/fem/constraint.c): with projectors P and Q of the nodes, s the sizes of
-  their blocks and r = P r
+  Each constraint acts on one node, so that its multiplier m is eliminated there (src/fem/constraint.c): with
+  projectors P and Q of the nodes, s the sizes of their blocks and r = P r
 
     (P (K + F^T k G) P + s Q) z = r.
 
-  This is regular even for a singular K, of a body that only constraints support. It is symmetric without friction: LDL^T or LU of
-  MUMPS, or LU of UMFPACK on one rank (pc_direct.c). It is factored again only when K or the constraints have changed.
+  This is regular even for a singular K, of a body that only constraints support. It is symmetric without
+  friction: LDL^T or LU of MUMPS, or LU of UMFPACK on one rank (pc_direct.c). It is factored again only when K
+  or the constraints have changed.
 */
 #include "solver_impl.h"
 #include "rotated.h"
@@ -76,7 +77,8 @@ PetscErrorCode SbSaddleFactorSolve(SbSpace s, Vec r, Vec z, PCFailedReason *fail
 
     PetscCall(PCDestroy(&f->pc));
     PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, PETSC_FALSE, &package));
-    /* The projected matrix as AIJ. MatConvert() would need parts of a parallel block matrix that are held elsewhere. */
+    /* The projected matrix as AIJ. MatConvert() would need parts of a parallel block matrix that are held
+       elsewhere. */
     n = s->nnode_owned;
     /* K, block by block */
     PetscCall(PetscMalloc4(n, &node, n + 1, &ia, 3 * n, &near, 3 * n, &far));

@@ -1,14 +1,18 @@
 /*
-  Linear solvers by name. Each is a table row with PETSc options, set in the options database unless the user set them, so that
-  everything stays adjustable by PETSc's own options, and the matrix type that its preconditioner needs.
+  Linear solvers by name. Each is a table row with PETSc options, set in the options database unless the user
+  set them, so that everything stays adjustable by PETSc's own options, and the matrix type that its
+  preconditioner needs.
 
-  A -pc_type of the user other than the row's replaces the row: `by_type` gives the matrix type. The Krylov method is then
-  CG, or that of -ksp_type. SbSolverFinish() reports unsupported combinations as errors before anything is computed.
+  A -pc_type of the user other than the row's replaces the row: `by_type` gives the matrix type. The Krylov
+  method is then CG, or that of -ksp_type. SbSolverFinish() reports unsupported combinations as errors before
+  anything is computed.
 
-  The convergence test uses the true residual wherever the method computes it: the preconditioned norm can be off by orders of magnitude for nearly
-  incompressible bodies. Gauss-Seidel and SOR are wrapped in a PCCOMPOSITE with one member: a bare
-  PCSOR takes over Richardson's loop and does the maximum number of sweeps without testing the residual. A solve that does not reach its tolerance fails; the
-  next solver of a list is then tried on the same system (time/solver_list.c), and only if all fail is the step halved or the run stopped.
+  The convergence test uses the true residual wherever the method computes it: the preconditioned norm can be
+  off by orders of magnitude for nearly incompressible bodies. Gauss-Seidel and SOR are wrapped in a
+  PCCOMPOSITE with one member: a bare PCSOR takes over Richardson's loop and does the maximum number of sweeps
+  without testing the residual. A solve that does not reach its tolerance fails; the next solver of a list is
+  then tried on the same system (time/solver_list.c), and only if all fail is the step halved or the run
+  stopped.
 */
 #include "solver_impl.h"
 #include "sbconstraint.h"
@@ -153,8 +157,8 @@ static const SbSolverPreset *find_preset(const char *name)
   return NULL;
 }
 
-/* Whether some law always uses its exact tangent, which is indefinite in compression, so that CHOLMOD fails. Where Newton's method chooses the tangent (auto), such a
-   failure makes it project the cells' tangents. */
+/* Whether some law always uses its exact tangent, which is indefinite in compression, so that CHOLMOD fails.
+   Where Newton's method chooses the tangent (auto), such a failure makes it project the cells' tangents. */
 static PetscErrorCode may_be_indefinite(SbSpace s, PetscBool *maybe)
 {
   PetscFunctionBeginUser;
@@ -168,7 +172,8 @@ static PetscErrorCode may_be_indefinite(SbSpace s, PetscBool *maybe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Value of an option in a preset's option string, "cholesky" for a direct preset's -pc_type; "" if it has none. */
+/* Value of an option in a preset's option string, "cholesky" for a direct preset's -pc_type; "" if it has
+   none. */
 static PetscErrorCode preset_value(const SbSolverPreset *preset, const char *name, size_t size, char value[])
 {
   const char *at = strstr(preset->options, name);
@@ -216,8 +221,9 @@ static PetscErrorCode find_hardness(SbSpace s, Hardness *h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Finds the preset for a PETSc option of the user, *option. -pc_type: that of -solver if it has this type, else one of by_type. -pc_factor_mat_solver_type, if
-   -solver is auto or direct: that of the package. NULL: the user set neither. */
+/* Finds the preset for a PETSc option of the user, *option. -pc_type: that of -solver if it has this type,
+   else one of by_type. -pc_factor_mat_solver_type, if -solver is auto or direct: that of the package. NULL:
+   the user set neither. */
 static PetscErrorCode find_type(const char *choice, const SbSolverPreset **preset, const char **option)
 {
   const SbSolverPreset *base = find_preset(choice);
@@ -298,9 +304,10 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   } else if (strcmp(choice, "auto")) {
     PetscCall(PetscSNPrintf(reason, size, "chosen by -solver"));
   } else if (turns) {
-    /* 51k unknowns of CR, 36k of DG, nu 0.4: ms per step of rotated and cg_two_level 22 and 89, 22 and 94 on two ranks, 12 and 50, 16
-       and 76 on four (docs/reports/realtime_ranks.md). Ten steps of 1.3k to 2.3k unknowns, linear iterations of rotated and pressure,
-       DG: 1150 and 1478 at nu 0.4999, 14521 and 1652 at 0.49999, 634312 and 4348 at 0.499999 */
+    /* 51k unknowns of CR, 36k of DG, nu 0.4: ms per step of rotated and cg_two_level 22 and 89, 22 and 94 on
+       two ranks, 12 and 50, 16 and 76 on four (docs/reports/realtime_ranks.md). Ten steps of 1.3k to 2.3k
+       unknowns, linear iterations of rotated and pressure, DG: 1150 and 1478 at nu 0.4999, 14521 and 1652 at
+       0.49999, 634312 and 4348 at 0.499999 */
     name = "rotated";
     PetscCall(PetscSNPrintf(reason, size,
                             "dynamic, %" PetscInt_FMT
@@ -316,7 +323,8 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
       "grow with the mesh",
       dynamic ? "dynamic" : "static", unknowns, (double)hard.nu));
   } else if (unknowns <= SB_DIRECT_SMALL && package && !(nface > most && hard.nu <= NU_PRESSURE)) {
-    /* 28k unknowns of P1 on 16 ranks, dynamic, ms per step of mumps and cg_two_level: 300 to 450 and 50 (docs/reports/realtime_ranks.md) */
+    /* 28k unknowns of P1 on 16 ranks, dynamic, ms per step of mumps and cg_two_level: 300 to 450 and 50
+       (docs/reports/realtime_ranks.md) */
     name = package;
     PetscCall(PetscSNPrintf(
       reason, size, "%" PetscInt_FMT " unknowns: a factorisation is fast and works at any Poisson's ratio%s",
@@ -337,7 +345,8 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
              (s->edge_node
                 ? !s->faces && hard.nu > NU_SLIVERS
                 : s->faces && (hard.face_nu > NU_PRESSURE || (!hard.slivers && (!dynamic || hard.dg))))) {
-    /* docs/reports/solver_choice.md; 24k tets of CR, dynamic, CPU s of pressure and cg_two_level at nu 0.3 12 and 7, at 0.45 15 and 11, at 0.49 17 and 17 */
+    /* docs/reports/solver_choice.md; 24k tets of CR, dynamic, CPU s of pressure and cg_two_level at nu 0.3 12
+       and 7, at 0.45 15 and 11, at 0.49 17 and 17 */
     name = "pressure";
     PetscCall(PetscSNPrintf(
       reason, size,
@@ -346,7 +355,8 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
       dynamic ? "dynamic" : "static", unknowns, s->edge_node ? "p2" : "cr or dg",
       (double)(s->edge_node ? hard.nu : hard.face_nu)));
   } else {
-    /* 192k tets, CPU s of cg_two_level on one rank. Static: 0.36 (cg_gamg 1.7, cg_icc 1.4), at nu 0.45 0.7 (2.3), at 0.499 4.2 (18); dynamic, h = 0.01 s: 0.22 (1.7, 0.40) */
+    /* 192k tets, CPU s of cg_two_level on one rank. Static: 0.36 (cg_gamg 1.7, cg_icc 1.4), at nu 0.45 0.7
+       (2.3), at 0.499 4.2 (18); dynamic, h = 0.01 s: 0.22 (1.7, 0.40) */
     name = s->edge_node && !s->faces ? "cg_p_multigrid" : "cg_two_level";
     PetscCall(
       PetscSNPrintf(reason, size,
@@ -372,7 +382,8 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fallback solvers in the order of trial, and their largest numbers of unknowns: a factorisation fails rarely but costs most. */
+/* Fallback solvers in the order of trial, and their largest numbers of unknowns: a factorisation fails rarely
+   but costs most. */
 static const struct {
   const char *name;
   PetscInt most;
@@ -393,7 +404,8 @@ PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscB
   PetscCall(find_hardness(s, &hard));
   if (find_preset(failed->name) == failed) *tried |= 1U << (failed - presets);
   PetscCall(may_be_indefinite(s, &indefinite));
-  /* where the tangent itself may be indefinite, Newton's method changes the tangent; no other solver is tried */
+  /* where the tangent itself may be indefinite, Newton's method changes the tangent; no other solver is
+     tried */
   if (indefinite && reason == KSP_DIVERGED_INDEFINITE_MAT) PetscFunctionReturn(PETSC_SUCCESS);
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(others) && !*preset; k++) {
     const PetscBool direct = (PetscBool)!strcmp(others[k].name, "direct");
@@ -405,7 +417,8 @@ PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscB
     if (failed->direct && !memory && !direct) continue;
     /* The first listed fallback of a name that has not failed yet and supports this space; NULL: none. */
     *preset = direct ? NULL : find_preset(others[k].name);
-    /* factorisation: one for definite matrices, then one for indefinite ones, which stress or rounding may cause */
+    /* factorisation: one for definite matrices, then one for indefinite ones, which stress or rounding may
+       cause */
     for (int j = indefinite; direct && j < 2 && !*preset; j++) {
       const char *package;
 
@@ -420,8 +433,8 @@ PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscB
 }
 
 /*
-  Adds a preset's options to PETSc's database unless the user set them, or (clear) removes those whose values are still the preset's. Types are set by calls,
-  so that types in the database are always the user's.
+  Adds a preset's options to PETSc's database unless the user set them, or (clear) removes those whose values
+  are still the preset's. Types are set by calls, so that types in the database are always the user's.
 */
 static PetscErrorCode set_options(const char *text, PetscBool clear)
 {
@@ -459,8 +472,8 @@ PetscErrorCode SbSolverCreateOperator(SbSpace s, const SbSolverPreset *preset, M
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(s->comm, &nrank));
-  /* PETSc's block ICC has no shift, and breaks down for CR and DG with any tangent; P1 needs no shift, and its block ICC takes
-     two fifths less time than the scalar one */
+  /* PETSc's block ICC has no shift, and breaks down for CR and DG with any tangent; P1 needs no shift, and
+     its block ICC takes two fifths less time than the scalar one */
   if (kind == SB_MATRIX_SBAIJ && !preset->precondition && s->faces) kind = SB_MATRIX_AIJ;
   if (kind == SB_MATRIX_SBAIJ && nrank > 1) kind = SB_MATRIX_BAIJ;
   if (preset->create)
@@ -470,7 +483,8 @@ PetscErrorCode SbSolverCreateOperator(SbSpace s, const SbSolverPreset *preset, M
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The factorisation package where the user names neither one nor -solver: PETSc's default depends on neither size nor number of ranks. */
+/* The factorisation package where the user names neither one nor -solver: PETSc's default depends on neither
+   size nor number of ranks. */
 static PetscErrorCode choose_package(SbSpace s, PC pc, const char *type)
 {
   const PetscBool lu = (PetscBool)!strcmp(type, PCLU);
@@ -547,7 +561,8 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   if (symmetric && !strcmp(type, PCASM)) PetscCall(set_options("-pc_asm_type basic", PETSC_FALSE));
   if (symmetric && !strcmp(type, PCCOMPOSITE))
     PetscCall(set_options("-sub_0_pc_sor_local_symmetric", PETSC_FALSE));
-  /* PETSc keeps the eigenvalue estimate of the first matrix with the interpolation; it is too small once contact stiffness is added */
+  /* PETSc keeps the eigenvalue estimate of the first matrix with the interpolation; it is too small once
+     contact stiffness is added */
   PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &given));
   if (!given && !strcmp(type, PCGAMG)) PetscCall(set_options("-pc_gamg_use_sa_esteig no", PETSC_FALSE));
   PetscCall(set_options(preset->options, PETSC_FALSE));
@@ -622,7 +637,8 @@ static PetscErrorCode check_factor(PC pc, Mat A)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Errors for a single application of a preconditioner that is no solver, and for MINRES with a preconditioner that is symmetric to single precision only. */
+/* Errors for a single application of a preconditioner that is no solver, and for MINRES with a preconditioner
+   that is symmetric to single precision only. */
 static PetscErrorCode check_method(SbSpace s, KSP ksp, PC pc, const SbSolverPreset *preset, PetscBool *direct)
 {
   PetscBool single, parts, minres;

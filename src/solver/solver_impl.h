@@ -4,62 +4,74 @@
 #pragma once
 #include "sbsolver.h"
 
-/* PETSC_ERR_USER if the type of ksp does not support its norm and side. After KSPSetFromOptions(). Not collective. */
+/* PETSC_ERR_USER if the type of ksp does not support its norm and side. After KSPSetFromOptions(). Not
+   collective. */
 PetscErrorCode SbKSPCheckNorm(KSP ksp);
 
 /*
-  SbKSPCheckTrueResidual - makes solves with a true residual far above the tolerance fail (KSP_DIVERGED_BREAKDOWN).
+  SbKSPCheckTrueResidual - makes solves with a true residual far above the tolerance fail
+  (KSP_DIVERGED_BREAKDOWN).
 
-  Not collective; after KSPSetFromOptions(). Input: direct, the preconditioner is a factorisation; alone, no Newton step tests the residual afterwards.
-  No check is added to an iteration that tests the true residual or no norm, nor to one that tests another norm inside Newton's method.
+  Not collective; after KSPSetFromOptions(). Input: direct, the preconditioner is a factorisation; alone, no
+  Newton step tests the residual afterwards. No check is added to an iteration that tests the true residual or
+  no norm, nor to one that tests another norm inside Newton's method.
 */
 PetscErrorCode SbKSPCheckTrueResidual(KSP ksp, PetscBool direct, PetscBool alone);
 
-/* Makes ksp test the true residual, unless the user chose a norm or side, or the method does not compute it. After KSPSetType(). Not collective. */
+/* Makes ksp test the true residual, unless the user chose a norm or side, or the method does not compute it.
+   After KSPSetType(). Not collective. */
 PetscErrorCode SbKSPPreferTrueResidual(KSP ksp);
 
 /*
-  SbKSPSetForceTolerance - makes the absolute tolerance of ksp apply to the true residual, N, for any norm in the convergence test.
+  SbKSPSetForceTolerance - makes the absolute tolerance of ksp apply to the true residual, N, for any norm in
+  the convergence test.
 
-  Not collective; after KSPSetFromOptions(). Another norm has to decrease by the factor by which the true residual has to.
-  Without effect on a method that tests the true residual, or with -ksp_convergence_test of the user.
+  Not collective; after KSPSetFromOptions(). Another norm has to decrease by the factor by which the true
+  residual has to. Without effect on a method that tests the true residual, or with -ksp_convergence_test of
+  the user.
 */
 PetscErrorCode SbKSPSetForceTolerance(KSP ksp);
 
 /*
-  SbPCConstrainedCreate - for a space with constraints outside the matrix: makes pc a preconditioner in the null space of the exact constraints, P M^-1 P.
+  SbPCConstrainedCreate - for a space with constraints outside the matrix: makes pc a preconditioner in the
+  null space of the exact constraints, P M^-1 P.
 
   Collective. Output: inner, M; borrowed. inner gets the options prefix of pc. inner is pc itself for a space
   without such constraints.
 */
 PetscErrorCode SbPCConstrainedCreate(SbSpace space, PC pc, PC *inner);
 
-/* negative: number of negative pivots of a finished factorisation, -1: unknown; only MUMPS' L D L^T counts them. Collective. */
+/* negative: number of negative pivots of a finished factorisation, -1: unknown; only MUMPS' L D L^T counts
+   them. Collective. */
 PetscErrorCode SbPCDirectCountNegative(PC pc, PetscInt *negative);
 
-/* parent[nnode][2], freed by the caller: local nodes, the vertices of a P2 edge node, else the node itself twice. Not collective. */
-PetscErrorCode SbSpaceEdgeParents(SbSpace space, PetscInt **parent);
+/* Makes pc algebraic multigrid that needs few messages. threshold of strong couplings: 0, zero couplings, of
+   which P1 on boxes has many, are ignored; -1, all are kept. Not collective. */
+PetscErrorCode SbPCMultigridSet(PC pc, PetscReal threshold);
 
 /* The package of a factorisation that is gathered on one rank, NULL for any other pc. Not collective. */
 PetscErrorCode SbPCDirectGathered(PC pc, const char **package);
 
 /*
-  SbPCPressureCreate - makes pc the solver for a SbPressureOperator: GMRES for displacements and pressures. Use it in KSPRICHARDSON with
-  the unpreconditioned norm, which refines until -ksp_rtol holds for the true residual, or the residual is one of rounding.
+  SbPCPressureCreate - makes pc the solver for a SbPressureOperator: GMRES for displacements and pressures.
+  Use it in KSPRICHARDSON with the unpreconditioned norm, which refines until -ksp_rtol holds for the true
+  residual, or the residual is one of rounding.
 
-  Collective. The space is borrowed. -ksp_max_it limits the iterations of GMRES, and they are what the KSP reports. A residual
-  that two corrections no longer halve fails the solve (KSP_DIVERGED_BREAKDOWN).
-  Options read: -pressure_ksp_ (GMRES), -pressure_coarse_ (P1).
+  Collective. The space is borrowed. -ksp_max_it limits the iterations of GMRES, and they are what the KSP
+  reports. A residual that two corrections no longer halve fails the solve (KSP_DIVERGED_BREAKDOWN). Options
+  read: -pressure_ksp_ (GMRES), -pressure_coarse_ (P1).
 */
 PetscErrorCode SbPCPressureCreate(SbSpace space, PC pc);
 
 /*
-  Solves [K + F^T k G, F^T; G, 0] [z; m] = [r; 0] for z by a factorisation, renewed when K or the constraints have changed; r must be projected. Collective.
+  Solves [K + F^T k G, F^T; G, 0] [z; m] = [r; 0] for z by a factorisation, renewed when K or the constraints
+  have changed; r must be projected. Collective.
 
   Output: failed, the reason of a failed factorisation; z is NaN then.
 */
 PetscErrorCode SbSaddleFactorSolve(SbSpace space, Vec r, Vec z, PCFailedReason *failed);
-/* Number of negative eigenvalues of K + F^T k G in the null space of the constraints, from that factorisation; -1: unknown. Collective. */
+/* Number of negative eigenvalues of K + F^T k G in the null space of the constraints, from that
+   factorisation; -1: unknown. Collective. */
 PetscErrorCode SbSaddleFactorCountNegative(SbSpace space, PetscInt *negative);
 
 /* Sets -<prefix><key> in PETSc's database unless the user has. Not collective. */

@@ -1,19 +1,21 @@
 /*
   The norm in the convergence test of linear solves, and checks of their solutions.
 
-  The unpreconditioned (true) residual is used wherever the method computes it and the user does not choose a norm; else (minres) the method's default.
+  The unpreconditioned (true) residual is used wherever the method computes it and the user does not choose a
+  norm; else (minres) the method's default.
 
   After a direct solve |b - A x| is computed once.
 
-  Threshold pivoting factors a singular matrix (a body that can still rotate) without an error;
-  FGMRES, which tests its recurrence, then reports convergence with a true residual larger than the
-  right-hand side. Such a solve fails here. Residuals of rounding are far below the bound: near nu = 1/2, with lambda / mu a
-  million, 1e-5 of the right-hand side.
+  Threshold pivoting factors a singular matrix (a body that can still rotate) without an error; FGMRES, which
+  tests its recurrence, then reports convergence with a true residual larger than the right-hand side. Such a
+  solve fails here. Residuals of rounding are far below the bound: near nu = 1/2, with lambda / mu a million,
+  1e-5 of the right-hand side.
 
-  The same check follows a solve with another norm where no Newton step tests the residual, and one that ends early by the absolute tolerance, as CG does when
-  the preconditioner maps its residual to zero.
+  The same check follows a solve with another norm where no Newton step tests the residual, and one that ends
+  early by the absolute tolerance, as CG does when the preconditioner maps its residual to zero.
 
-  petsc/private/kspimpl.h: the converged reason has no public setter, the supported norms of a method no public getter.
+  petsc/private/kspimpl.h: the converged reason has no public setter, the supported norms of a method no
+  public getter.
 */
 #include "solver_impl.h"
 #include "sbsolver.h"
