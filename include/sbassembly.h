@@ -206,12 +206,13 @@ PetscErrorCode SbProductSubtractOffDiagonal(Mat A, Vec x, Vec y);
   in each iteration if one reads the values in its set-up.
 */
 PetscErrorCode SbMatRestoreRead(Mat A, PetscErrorCode (*restore)(Mat, PetscScalar *[]), PetscScalar *value[]);
-/* The values of a block matrix, to be read: of BAIJ those of the diagonal part and of the one with ghost columns, of SBAIJ the upper triangle. */
+/* The values of a matrix: of BAIJ those of the diagonal part and of the one with ghost columns, of SBAIJ the upper triangle. */
 typedef struct {
+  SbMatrixKind kind;
   PetscBool symmetric; /* SBAIJ */
   Mat part[2];         /* the second one NULL on one rank */
   PetscScalar *value[2];
 } SbMatBlocks;
-/* Not collective. Error: PETSC_ERR_SUP for a matrix of another kind. */
+/* To read a block matrix, BAIJ or SBAIJ. Not collective. Error: PETSC_ERR_SUP for a matrix of another kind. */
 PetscErrorCode SbMatGetBlocks(Mat A, SbMatBlocks *blocks);
 PetscErrorCode SbMatRestoreBlocks(SbMatBlocks *blocks);

@@ -67,12 +67,21 @@ PetscErrorCode SbSpaceAddConstraint(SbSpace space, const SbConstraint *constrain
 /* After the last SbSpaceAddConstraint(): builds Q and the global counts. Collective. */
 PetscErrorCode SbSpaceAssembleConstraints(SbSpace space);
 /* Whether there is one on any rank. Not collective, alike on all ranks. */
-PetscBool SbSpaceIsConstrained(SbSpace space);
+static inline PetscBool SbSpaceIsConstrained(SbSpace space)
+{
+  return (PetscBool)(space->constraints && space->constraints->ntotal);
+}
 /* Lends constraint `number` of this rank till the next one is added. */
-SbConstraint *SbSpaceGetConstraint(SbSpace space, PetscInt number);
+static inline SbConstraint *SbSpaceGetConstraint(SbSpace space, PetscInt number)
+{
+  return &space->constraints->constraint[number];
+}
 
-/* Not collective, on owned nodes [nnode_owned][3]: u <- the closest one that satisfies exact constraints; x <- x - Q x: projected residual or direction. */
-void SbConstraintsPrescribe(SbSpace space, PetscReal u[]);
+/*
+  Not collective, on owned nodes [nnode_owned][3]: x <- the closest displacement, m, that satisfies exact constraints, or velocity, m/s, of
+  which n . x is theirs (not for push other than n); x <- x - Q x: projected residual or direction.
+*/
+void SbConstraintsPrescribe(SbSpace space, PetscBool velocities, PetscReal x[]);
 void SbConstraintsProject(SbSpace space, PetscReal x[]);
 /* z <- its projection onto directions admissible for prescribed unknowns and exact constraints. Not collective. */
 PetscErrorCode SbSpaceProjectAdmissible(SbSpace space, Vec z);
@@ -87,7 +96,5 @@ void SbConstraintsComputeForces(SbSpace space, const PetscReal u[], const PetscR
 void SbConstraintsAddForces(SbSpace space, PetscReal f[]);
 /* After it: turns that residual r into reactions: of supports at prescribed unknowns, of constraints elsewhere, N. */
 void SbConstraintsReactions(SbSpace space, PetscReal r[]);
-/* v <- the closest velocity with n . v = velocity of all exact constraints, m/s. Not for push other than n. */
-void SbConstraintsVelocity(SbSpace space, PetscReal v[]);
 /* Block B of a matrix between local nodes i and j: B <- P_i B P_j, P = I - Q, on the diagonal plus |B| Q_i; strides rs of rows, cs of columns. */
 void SbConstraintsProjectBlock(SbSpace space, PetscInt i, PetscInt j, size_t rs, size_t cs, PetscScalar *v);

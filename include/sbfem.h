@@ -94,13 +94,12 @@ struct _p_SbSpace {
   PetscReal *fixed_value; /* [nfixed][3] prescribed displacement at the last evaluation, m */
   PetscBool ghosted; /* more than one rank: vectors carry ghosts, also where a rank happens to have none */
   Vec template_vec;  /* ghosted (more than one rank) or sequential; block size 3 */
-  struct _p_SbPlan *plan; /* cell blocks -> matrix values; NULL before SbSpaceCreateMatrix() */
-  PetscReal block_scale;  /* on blocks of SbSpaceAddCellBlock(): the load factor of a static run, or 1 */
-  PetscBool rough;        /* the last solve had a loose tolerance: its contact forces are inaccurate */
-  PetscBool linear;       /* every region's law is linear */
-  SbPack
-    *linear_pressure; /* [nbatch] SbSpaceLinearisePressure(); NULL: tangents have the pressures of states */
-  void *pressure_memory; /* memory of linear_pressure */
+  struct _p_SbPlan *plan;    /* cell blocks -> matrix values; NULL before SbSpaceCreateMatrix() */
+  PetscReal block_scale;     /* on blocks of SbSpaceAddCellBlock(): the load factor of a static run, or 1 */
+  PetscBool rough;           /* the last solve had a loose tolerance: its contact forces are inaccurate */
+  PetscBool linear;          /* every region's law is linear */
+  SbPack *pressure;          /* [nbatch] of SbSpaceLinearisePressure(), NULL before it, */
+  PetscBool linear_pressure; /* and whether tangents have them instead of the pressures of states */
 };
 
 /* Collective. Borrowed: materials by the numbers in the mesh (one per body, then those of inclusions), elements one per body. Options

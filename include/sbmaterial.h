@@ -24,16 +24,6 @@ typedef struct {
   PetscErrorCode (*setfromoptions)(SbMaterial m, const SbScope *scope);
   /* checks that the law has this tangent and sets `tangent` and `frame` below; NULL when there is one tangent only */
   PetscErrorCode (*settangent)(SbMaterial m, SbTangentKind kind);
-  /*
-    Stiffness at rest, from the parameters of the material alone, for scaling; called once per
-    region, face or facet, never per cell. Laws that are Hooke's with E and nu at rest share their answers.
-  */
-  PetscReal (*shear_modulus)(const struct _p_SbMaterial *m); /* G = mu, Pa */
-  PetscReal (*bulk_modulus)(const struct _p_SbMaterial *m);  /* K = lambda + 2/3 mu, Pa */
-  PetscReal (*volumetric_modulus)(
-    const struct _p_SbMaterial *m); /* lambda of pressure and volumetric, below, Pa */
-  PetscReal (*wave_speed)(
-    const struct _p_SbMaterial *m); /* of the fastest wave, sqrt((lambda + 2 mu) / rho), m/s */
   /* psi = energy per rest volume, J/m^3; zero at rest */
   void (*energy)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack psi);
   /* Every law is psi = psi_mu(F) + lambda/2 theta(F)^2 with theta the law's measure of the change of volume: tr(eps) (linear),
@@ -42,7 +32,7 @@ typedef struct {
   void (*pressure)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack p);
   /* P = dPsi/dF, Pa */
   void (*stress)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack P[9]);
-  /* The tangent is the isotropic Hooke tensor of volumetric_modulus and shear_modulus, turned by R: fills R. NULL when the law needs the full tangent.
+  /* The tangent is the isotropic Hooke tensor of lambda and mu, turned by R: fills R. NULL when the law needs the full tangent.
      Co-rotated has it with the warped tangent, linear always (R = I). */
   void (*frame)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack R[9]);
   /* The tangent is dP = 2 mu dF + lambda (R : dF) R + R [W y]x with y = axial(R^T dF - dF^T R), as for a law of R^T F:
@@ -64,16 +54,16 @@ struct _p_SbMaterial {
   char law[SB_NAME_MAX];
   PetscLogEvent event; /* SbMat_<law>, around the loops over its cells for forces and assembled tangents */
   SbMaterialOps ops;
-  PetscReal E, nu;     /* Young's modulus, Pa; Poisson's ratio, (-1, 0.5): as given */
-  PetscReal density;   /* kg/m^3 */
-  PetscBool linear;    /* stress is linear in F: K is constant */
-  PetscBool symmetric; /* always true for hyperelastic laws */
-  PetscBool adaptive;  /* -body_NAME_tangent auto: the solver of a step chooses between the two exact ones */
-  PetscBool softens;   /* stress has a maximum in compression, beyond which cells invert */
-  PetscBool jacobian;  /* theta is J - 1, cubic in the displacement; of other laws at most quadratic */
+  PetscReal E, nu; /* Young's modulus, Pa; Poisson's ratio, (-1, 0.5): as given */
+  PetscReal lambda,
+    mu; /* Lame parameters at rest, Pa: from E and nu, unless the constructor of the law changes them */
+  PetscReal density;  /* kg/m^3 */
+  PetscBool linear;   /* stress is linear in F: K is constant */
+  PetscBool adaptive; /* -body_NAME_tangent auto: the solver of a step chooses between the two exact ones */
+  PetscBool softens;  /* stress has a maximum in compression, beyond which cells invert */
+  PetscBool jacobian; /* theta is J - 1, cubic in the displacement; of other laws at most quadratic */
   SbTangentKind tangent; /* tangent of ops.frame or ops.tangent */
   SbMaterial shear;      /* SbMaterialGetShear(); NULL until it is asked for; owned */
-  void *data;
 };
 
 extern PetscFunctionList SbMaterialList;
@@ -102,13 +92,17 @@ PetscErrorCode SbMaterialSetTangent(SbMaterial m, SbTangentKind kind);
    collective. */
 PetscErrorCode SbMaterialGetShear(SbMaterial m, SbMaterial *shear);
 PetscErrorCode SbMaterialDestroy(SbMaterial *m);
-/* Modulus of the fastest wave at rest, rho c^2 = lambda + 2 mu, Pa: the stiffest answer to a change of one length. */
+/* At rest: modulus of the fastest wave, rho c^2, the stiffest answer to a change of one length; and of compression. Pa */
 SB_INLINE PetscReal SbMaterialWaveModulus(const struct _p_SbMaterial *m)
 {
-  const PetscReal c = m->ops.wave_speed(m);
-
-  return m->density * c * c;
+  return m->lambda + 2. * m->mu;
 }
+SB_INLINE PetscReal SbMaterialBulkModulus(const struct _p_SbMaterial *m)
+{
+  return m->lambda + 2. * m->mu / 3.;
+}
+/* C += p d(cof F)/dF, C as in SbMaterialOps.tangent. Not collective. */
+void SbAddCofactorTangent(const SbPack F[9], const SbPack p, SbPack C[81]);
 /* The rotation in F; I for the linear law. Not collective. */
 SB_INLINE void SbMaterialRotation(const struct _p_SbMaterial *m, const SbPack F[9], SbPack R[9])
 {

@@ -15,7 +15,7 @@
   Mass / (density V): the consistent one is the integral of phi_a phi_b; lumped (Hinton, Rock and Zienkiewicz 1976) is its diagonal, scaled
   to the mass of the tet: row sums at vertices would be negative, -1/20.
 */
-#include "element_impl.h"
+#include <sbelement.h>
 
 #define NEAR 0.58541019662496845 /* (5 + 3 sqrt 5) / 20 */
 #define FAR 0.13819660112501052  /* (5 - sqrt 5) / 20 */
@@ -193,16 +193,4 @@ PetscReal SbQuadraticMass(int a, int b)
   const int *d = SbTetEdge[low - 4];
   const int shared = (d[0] == e[0]) + (d[0] == e[1]) + (d[1] == e[0]) + (d[1] == e[1]);
   return shared == 2 ? 8. / 105 : shared ? 4. / 105 : 2. / 105;
-}
-
-PetscErrorCode SbElementCreate_P2(SbElement e)
-{
-  PetscFunctionBeginUser;
-  e->nodes_per[0] = e->nodes_per[1] = 1;
-  e->mean_volume = PETSC_TRUE;
-  e->ops.tabulate = SbTabulateP1;
-  e->ops.mass_lumped = 1. / 36;
-  e->ops.mass_lumped_edge = 4. / 27;
-  for (int a = 0; a < 4; a++) e->ops.vertex[a][a] = 1.;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }

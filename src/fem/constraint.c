@@ -135,24 +135,11 @@ PetscErrorCode SbSpaceAddConstraint(SbSpace s, const SbConstraint *constraint, P
     for (int k = 0; k < 3 * n; k++) g[k % 3] -= x[k / 3] * G[k];
     if (SbDot3(g, g) < SAID * full) PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (c->n == c->size) {
-    c->size = PetscMax(64, 2 * c->size);
-    PetscCall(PetscRealloc((size_t)c->size * sizeof(*c->constraint), &c->constraint));
-  }
+  PetscCall(SbReserve(c->n + 1, sizeof(*c->constraint), &c->size, &c->constraint));
   c->constraint[c->n] = *constraint;
   c->constraint[c->n].next = c->first[node];
   c->first[node] = *number = c->n++;
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-SbConstraint *SbSpaceGetConstraint(SbSpace s, PetscInt number)
-{
-  return &s->constraints->constraint[number];
-}
-
-PetscBool SbSpaceIsConstrained(SbSpace s)
-{
-  return (PetscBool)(s->constraints && s->constraints->ntotal);
 }
 
 PetscErrorCode SbSpaceAssembleConstraints(SbSpace s)
@@ -211,12 +198,6 @@ PetscErrorCode SbSpaceAssembleConstraints(SbSpace s)
 
 /* ------------------------------------------------------------------ displacements, residuals, velocities */
 
-/* y = Q x of a node. */
-static inline void taken(const PetscReal Q[9], const PetscReal x[3], PetscReal y[3])
-{
-  for (int k = 0; k < 3; k++) y[k] = SbDot3(Q + 3 * k, x);
-}
-
 void SbConstraintsProject(SbSpace s, PetscReal x[])
 {
   const SbConstraints c = s->constraints;
@@ -226,7 +207,7 @@ void SbConstraintsProject(SbSpace s, PetscReal x[])
     PetscReal y[3];
 
     if (c->first[node] != i) continue;
-    taken(c->Q + 9 * node, x + 3 * node, y);
+    for (int k = 0; k < 3; k++) y[k] = SbDot3(c->Q + 9 * node + 3 * k, x + 3 * node);
     for (int k = 0; k < 3; k++) x[3 * node + k] -= y[k];
   }
 }
@@ -243,8 +224,7 @@ PetscErrorCode SbSpaceProjectAdmissible(SbSpace s, Vec z)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Projects x onto the exact constraints, with their values or velocities as right-hand sides. */
-static void move(SbSpace s, PetscBool velocities, PetscReal x[])
+void SbConstraintsPrescribe(SbSpace s, PetscBool velocities, PetscReal x[])
 {
   const SbConstraints c = s->constraints;
 
@@ -264,16 +244,6 @@ static void move(SbSpace s, PetscBool velocities, PetscReal x[])
     solve_forces(n, G, F, b, step);
     for (int k = 0; k < 3 * n; k++) x[3 * node + k % 3] += step[k / 3] * F[k];
   }
-}
-
-void SbConstraintsPrescribe(SbSpace s, PetscReal u[])
-{
-  move(s, PETSC_FALSE, u);
-}
-
-void SbConstraintsVelocity(SbSpace s, PetscReal v[])
-{
-  move(s, PETSC_TRUE, v);
 }
 
 /* Force of a spring at the displacement u of its node, N. */
@@ -387,7 +357,7 @@ void SbConstraintsProjectBlock(SbSpace s, PetscInt i, PetscInt j, size_t rs, siz
   If only constraints support a body K is singular. In a static run s_i times the squared components of
   the constraint directions are added to its diagonal, s_i the size of the node's block; the operator subtracts them again, so that only M contains them.
 */
-static void anchor(SbSpace s, const SbValues *x)
+static void anchor(SbSpace s, const SbMatBlocks *x)
 {
   const SbConstraints c = s->constraints;
 
@@ -414,7 +384,7 @@ static void anchor(SbSpace s, const SbValues *x)
   }
 }
 
-void SbConstraintsFinishTangent(SbSpace s, const SbValues *x)
+void SbConstraintsFinishTangent(SbSpace s, const SbMatBlocks *x)
 {
   const SbConstraints c = s->constraints;
   const SbPlan p = s->plan;
@@ -425,7 +395,7 @@ void SbConstraintsFinishTangent(SbSpace s, const SbValues *x)
     for (int q = 0; q < (x->value[1] ? 2 : 1); q++) {
       const PetscInt *ptr = q ? p->oi : p->di, *col = q ? p->oj : p->dj;
 
-      for (PetscInt k = x->kind == SB_MATRIX_SBAIJ ? p->diagonal[i] : ptr[i]; k < ptr[i + 1]; k++) {
+      for (PetscInt k = x->symmetric ? p->diagonal[i] : ptr[i]; k < ptr[i + 1]; k++) {
         size_t rs, cs;
         PetscScalar *v = sb_block(x, p, i, q ? ~k : k, &rs, &cs);
 

@@ -19,8 +19,7 @@ PetscErrorCode SbSpacePrescribeDone(SbSpace s)
   PetscFunctionBeginUser;
   s->nfixed = 0;
   for (PetscInt i = 0; i < s->nnode; i++) s->nfixed += s->fixed[i] != 0;
-  PetscCall(PetscMalloc1(s->nfixed, &s->fixed_node));
-  PetscCall(PetscCalloc1(3 * s->nfixed, &s->fixed_value));
+  PetscCall(PetscCalloc2(s->nfixed, &s->fixed_node, 3 * s->nfixed, &s->fixed_value));
   s->nfixed = 0;
   for (PetscInt i = 0; i < s->nnode; i++) {
     if (s->fixed[i]) s->fixed_node[s->nfixed++] = i;

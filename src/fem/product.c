@@ -111,48 +111,6 @@ static PetscErrorCode product_of(Mat A, Product **p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMatRestoreRead(Mat A, PetscErrorCode (*restore)(Mat, PetscScalar *[]), PetscScalar *value[])
-{
-  PetscObjectState state;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscObjectStateGet((PetscObject)A, &state));
-  PetscCall((*restore)(A, value));
-  PetscCall(PetscObjectStateSet((PetscObject)A, state));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbMatGetBlocks(Mat A, SbMatBlocks *b)
-{
-  PetscBool parallel, sequential;
-  MatType type;
-
-  PetscFunctionBeginUser;
-  *b = (SbMatBlocks){.part = {A, NULL}};
-  PetscCall(MatGetType(A, &type));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &b->symmetric));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQBAIJ, &sequential));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
-  PetscCheck(b->symmetric || sequential || parallel, PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
-             "This preconditioner takes BAIJ and SBAIJ matrices, and this one is %s: leave -mat_type alone",
-             type);
-  if (parallel) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &b->part[0], &b->part[1], NULL));
-  if (b->symmetric) PetscCall(MatSeqSBAIJGetArray(A, &b->value[0]));
-  for (int q = 0; q < 2 && !b->symmetric; q++)
-    if (b->part[q]) PetscCall(MatSeqBAIJGetArray(b->part[q], &b->value[q]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbMatRestoreBlocks(SbMatBlocks *b)
-{
-  PetscFunctionBeginUser;
-  for (int q = 0; q < 2; q++)
-    if (b->part[q])
-      PetscCall(SbMatRestoreRead(b->part[q], b->symmetric ? MatSeqSBAIJRestoreArray : MatSeqBAIJRestoreArray,
-                                 &b->value[q]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbProductGetSymmetric(Mat A, Mat *local)
 {
   Product *p;
@@ -215,49 +173,21 @@ static PetscErrorCode destroy_product(void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creates a SBAIJ matrix without values, with the symmetric graph of the diagonal part. */
-static PetscErrorCode create_symmetric(Product *p)
-{
-  const PetscInt *all, *columns;
-  PetscInt n, *start, *column;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbMatGetPattern(p->diagonal, &n, &all, &columns));
-  PetscCall(PetscMalloc2(n + 1, &start, (all[n] + n) / 2, &column));
-  start[0] = 0;
-  for (PetscInt i = 0; i < n; i++) {
-    start[i + 1] = start[i];
-    for (PetscInt k = all[i]; k < all[i + 1]; k++) {
-      if (columns[k] >= i) column[start[i + 1]++] = columns[k];
-    }
-  }
-  PetscCall(MatCreate(PETSC_COMM_SELF, &p->symmetric));
-  PetscCall(MatSetSizes(p->symmetric, 3 * n, 3 * n, 3 * n, 3 * n));
-  PetscCall(MatSetType(p->symmetric, MATSEQSBAIJ));
-  PetscCall(MatSeqSBAIJSetPreallocationCSR(p->symmetric, 3, start, column, NULL));
-  PetscCall(MatSetOption(p->symmetric, MAT_SYMMETRIC, PETSC_TRUE));
-  PetscCall(MatSetOption(p->symmetric, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
-  PetscCall(PetscFree2(start, column));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The value arrays keep their addresses for the life of the matrix: its pattern is fixed. */
-static PetscErrorCode find_parts(Mat A, Product *p)
+PetscErrorCode SbProductAttach(Mat A)
 {
   const PetscInt *columns;
   PetscBool parallel, symmetric;
+  PetscContainer container;
   PetscInt n;
+  Product *p;
   Vec x;
   IS from;
 
   PetscFunctionBeginUser;
-  p->diagonal = A;
+  PetscCall(PetscNew(&p));
+  p->copied = -1;
+  p->diagonal = p->symmetric = A;
   PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &symmetric));
-  if (symmetric) {
-    p->symmetric = A;
-    PetscCall(MatSeqSBAIJGetArray(A, &p->upper));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
   PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
   if (parallel) {
     PetscCall(MatMPIBAIJGetSeqBAIJ(A, &p->diagonal, &p->other, &columns));
@@ -270,21 +200,15 @@ static PetscErrorCode find_parts(Mat A, Product *p)
     PetscCall(ISDestroy(&from));
     PetscCall(VecDestroy(&x));
   }
-  PetscCall(MatSeqBAIJGetArray(p->diagonal, &p->full));
-  PetscCall(create_symmetric(p));
+  /* the value arrays keep their addresses for the life of the matrix: its pattern is fixed */
+  if (!symmetric) {
+    PetscCall(MatSeqBAIJGetArray(p->diagonal, &p->full));
+    PetscCall(MatSetOption(p->diagonal, MAT_SYMMETRIC, PETSC_TRUE));
+    PetscCall(MatConvert(p->diagonal, MATSEQSBAIJ, MAT_INITIAL_MATRIX, &p->symmetric));
+    PetscCall(MatSetOption(p->symmetric, MAT_SYMMETRIC, PETSC_TRUE));
+    PetscCall(MatSetOption(p->symmetric, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
+  }
   PetscCall(MatSeqSBAIJGetArray(p->symmetric, &p->upper));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbProductAttach(Mat A)
-{
-  PetscContainer container;
-  Product *p;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscNew(&p));
-  p->copied = -1;
-  PetscCall(find_parts(A, p));
   PetscCall(PetscContainerCreate(PetscObjectComm((PetscObject)A), &container));
   PetscCall(PetscContainerSetPointer(container, p));
   PetscCall(SbContainerSetDestroy(container, destroy_product));

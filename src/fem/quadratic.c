@@ -77,7 +77,7 @@ void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const 
   const PetscBool cubic =
     (PetscBool)(m->jacobian && !at->step); /* det F is cubic: more points than the law's */
   const SbPointRule *rule = cubic ? &SbRuleCubic : at->rule;
-  const PetscReal lambda = m->ops.volumetric_modulus(m);
+  const PetscReal lambda = m->lambda;
 
   for (int l = 0; l < SB_BATCH; l++) pressure[l] = 0.;
   if (b) memset(b, 0, 30 * sizeof(SbPack));
@@ -113,6 +113,32 @@ void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const 
   }
 }
 
+void SbBatchMass(SbSpace s, const SbRegion *region, PetscInt b, SbPack mass[SB_PAIRS])
+{
+  const SbPoints at = SbBatchPoints(s, region, b);
+  const int npair = region->quadratic ? SB_PAIRS : 10;
+
+  for (int k = 0; k < npair; k++) {
+    const int i = SbPairA[k], j = SbPairB[k];
+    const SbElementOps *e = &region->element->ops;
+    const PetscReal straight = region->quadratic ? SbQuadraticMass(i, j)
+                               : i == j          ? e->mass_diagonal
+                                                 : e->mass_coupling;
+
+    for (int l = 0; l < SB_BATCH; l++) mass[k][l] = at.step ? 0. : straight * (*at.V)[l];
+  }
+  for (int q = 0; at.step && q < at.n; q++) {
+    PetscReal phi[SB_CELL_NODES];
+    SbPack W;
+
+    SbQuadraticBasis(at.rule->L[q], phi);
+    SbPointVolume(&at, q, W);
+    for (int k = 0; k < npair; k++) {
+      for (int l = 0; l < SB_BATCH; l++) mass[k][l] += phi[SbPairA[k]] * phi[SbPairB[k]] * W[l];
+    }
+  }
+}
+
 void SbBatchState(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS][9],
                   SbPack P[SB_POINTS][9], SbPack psi[SB_POINTS], SbPack pressure[SB_POINTS])
 {
@@ -129,7 +155,7 @@ void SbBatchState(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal
   if (m == region->material) return;
 
   /* contribution of the mean theta */
-  const PetscReal lambda = region->material->ops.volumetric_modulus(region->material);
+  const PetscReal lambda = region->material->lambda;
 
   SbQuadraticVolume(region->material, &at, (const SbPack *)U, (const SbPack(*)[9])F, p, NULL);
   for (int q = 0; q < at.n; q++) {
@@ -156,17 +182,15 @@ PetscErrorCode SbSpaceLinearisePressure(SbSpace s, Vec U, Vec step, PetscReal al
   const PetscReal *u, *du = NULL;
 
   PetscFunctionBeginUser;
-  if (!U) s->linear_pressure = NULL;
-  if (!U || s->linear) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!s->pressure_memory)
-    PetscCall(PetscCalloc((size_t)s->nbatch * sizeof(SbPack) + 64, &s->pressure_memory));
-  s->linear_pressure = (SbPack *)(((uintptr_t)s->pressure_memory + 63) & ~(uintptr_t)63);
+  s->linear_pressure = (PetscBool)(U && !s->linear);
+  if (!s->linear_pressure) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!s->pressure) PetscCall(PetscCalloc1(s->nbatch, &s->pressure));
   PetscCall(SbSpaceGetLocalRead(s, U, &u));
   if (step) PetscCall(SbSpaceGetLocalRead(s, step, &du));
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
     const SbMaterial m = region->material;
-    const PetscReal lambda = m->ops.volumetric_modulus(m);
+    const PetscReal lambda = m->lambda;
 
     /* regions whose tangents use these pressures */
     if (region->quadratic ? region->pointwise == m : !m->ops.curvature) continue;
@@ -189,10 +213,10 @@ PetscErrorCode SbSpaceLinearisePressure(SbSpace s, Vec U, Vec step, PetscReal al
         for (int l = 0; l < SB_BATCH; l++) change[l] += D[k][l] * way[l];
       }
       for (int l = 0; l < SB_BATCH; l++) {
-        const PetscReal V = region->quadratic ? (*at.V)[l] : 1., old = step ? s->linear_pressure[b][l] : 0.;
+        const PetscReal V = region->quadratic ? (*at.V)[l] : 1., old = step ? s->pressure[b][l] : 0.;
         const PetscReal goal = p[l] + (V > 0. ? along * lambda / V * change[l] : 0.);
 
-        s->linear_pressure[b][l] = step ? old + part * (goal - old) : goal;
+        s->pressure[b][l] = step ? old + part * (goal - old) : goal;
       }
     }
   }

@@ -30,8 +30,7 @@ PetscErrorCode SbMatrixSetAssembly(Mat A, const SbAssembly *assembly)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Assembly data of a matrix; NULL for a matrix of blocks. */
-static PetscErrorCode get_assembly(Mat A, const SbAssembly **assembly)
+PetscErrorCode SbMatrixGetAssembly(Mat A, const SbAssembly **assembly)
 {
   PetscObject container;
 
@@ -42,50 +41,69 @@ static PetscErrorCode get_assembly(Mat A, const SbAssembly **assembly)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbValuesBegin(Mat A, SbValues *x)
+PetscErrorCode SbValuesBegin(Mat A, SbMatBlocks *x)
 {
+  static const char *const types[5] = {MATSEQAIJ, MATMPIAIJ, MATSEQBAIJ, MATMPIBAIJ, MATSEQSBAIJ};
+  static PetscErrorCode (*const get[3])(Mat, PetscScalar **) = {MatSeqAIJGetArray, MatSeqBAIJGetArray,
+                                                                MatSeqSBAIJGetArray};
   const SbAssembly *own;
-  PetscBool is[5];
+  PetscInt type = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(get_assembly(A, &own));
+  PetscCall(SbMatrixGetAssembly(A, &own));
   if (own && own->stored) A = own->stored;
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQAIJ, &is[0]));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIAIJ, &is[1]));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQBAIJ, &is[2]));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &is[3]));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &is[4]));
-  x->part[0] = A;
-  x->part[1] = NULL;
-  if (is[1]) PetscCall(MatMPIAIJGetSeqAIJ(A, &x->part[0], &x->part[1], NULL));
-  if (is[3]) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &x->part[0], &x->part[1], NULL));
-  x->kind = is[4] ? SB_MATRIX_SBAIJ : is[2] || is[3] ? SB_MATRIX_BAIJ : SB_MATRIX_AIJ;
-  x->value[1] = NULL;
-  x->face_term = NULL;
-  PetscCheck(is[0] || is[1] || is[2] || is[3] || is[4], PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
-             "No direct access to a matrix of type %s", ((PetscObject)A)->type_name);
-  for (int q = 0; q < 2 && x->part[q]; q++) {
-    if (x->kind == SB_MATRIX_AIJ)
-      PetscCall(MatSeqAIJGetArray(x->part[q], &x->value[q]));
-    else if (x->kind == SB_MATRIX_BAIJ)
-      PetscCall(MatSeqBAIJGetArray(x->part[q], &x->value[q]));
-    else
-      PetscCall(MatSeqSBAIJGetArray(x->part[q], &x->value[q]));
+  for (PetscBool same = PETSC_FALSE; type < 5; type++) {
+    PetscCall(PetscObjectTypeCompare((PetscObject)A, types[type], &same));
+    if (same) break;
   }
+  PetscCheck(type < 5, PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
+             "No direct access to a matrix of type %s", ((PetscObject)A)->type_name);
+  *x = (SbMatBlocks){(SbMatrixKind)(type / 2), (PetscBool)(type == 4), {A, NULL}, {NULL, NULL}};
+  if (type == 1) PetscCall(MatMPIAIJGetSeqAIJ(A, &x->part[0], &x->part[1], NULL));
+  if (type == 3) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &x->part[0], &x->part[1], NULL));
+  for (int q = 0; q < 2 && x->part[q]; q++) PetscCall(get[x->kind](x->part[q], &x->value[q]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbValuesEnd(SbValues *x)
+static PetscErrorCode (*const restore_array[3])(Mat, PetscScalar **) = {
+  MatSeqAIJRestoreArray, MatSeqBAIJRestoreArray, MatSeqSBAIJRestoreArray};
+
+PetscErrorCode SbValuesEnd(SbMatBlocks *x)
 {
   PetscFunctionBeginUser;
-  for (int q = 0; q < 2 && x->part[q]; q++) {
-    if (x->kind == SB_MATRIX_AIJ)
-      PetscCall(MatSeqAIJRestoreArray(x->part[q], &x->value[q]));
-    else if (x->kind == SB_MATRIX_BAIJ)
-      PetscCall(MatSeqBAIJRestoreArray(x->part[q], &x->value[q]));
-    else
-      PetscCall(MatSeqSBAIJRestoreArray(x->part[q], &x->value[q]));
-  }
+  for (int q = 0; q < 2 && x->part[q]; q++) PetscCall(restore_array[x->kind](x->part[q], &x->value[q]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMatRestoreRead(Mat A, PetscErrorCode (*restore)(Mat, PetscScalar *[]), PetscScalar *value[])
+{
+  PetscObjectState state;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectStateGet((PetscObject)A, &state));
+  PetscCall((*restore)(A, value));
+  PetscCall(PetscObjectStateSet((PetscObject)A, state));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMatGetBlocks(Mat A, SbMatBlocks *b)
+{
+  PetscBool blocks;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &blocks, MATSEQBAIJ, MATMPIBAIJ, MATSEQSBAIJ, ""));
+  PetscCheck(blocks, PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
+             "This preconditioner takes BAIJ and SBAIJ matrices, and this one is %s: leave -mat_type alone",
+             ((PetscObject)A)->type_name);
+  PetscCall(SbValuesBegin(A, b));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMatRestoreBlocks(SbMatBlocks *b)
+{
+  PetscFunctionBeginUser;
+  for (int q = 0; q < 2 && b->part[q]; q++)
+    PetscCall(SbMatRestoreRead(b->part[q], restore_array[b->kind], &b->value[q]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -236,7 +254,7 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
   SbBatchGradients(s, region, batch, m->linear ? NULL : displacement, PETSC_FALSE, U, F);
   if (mean) {
     SbQuadraticVolume(m, &points, (const SbPack *)U, (const SbPack(*)[9])F, p, b);
-    if (s->linear_pressure) memcpy(p, s->linear_pressure[batch], sizeof(p));
+    if (s->linear_pressure) memcpy(p, s->pressure[batch], sizeof(p));
     at.lambda = 0.;
     at.pressure = m->jacobian ? NULL : &p; /* the second derivative of the exact mean is added below */
   }
@@ -311,8 +329,9 @@ static void keep_volumetric(SbSpace s, const Factors *x, PetscInt batch, const S
 /* A matrix to assemble. */
 typedef struct {
   SbSpace space;
-  SbValues x;
-  PetscReal *face_term;
+  SbMatBlocks x;
+  const SbStage *faces;  /* its rows start from the face terms with the factors of this stage, or NULL, */
+  const PetscReal *beta; /* and with the damping [nbody], s */
 } Fill;
 
 /* Adds the blocks of a batch, ten or SB_PAIRS per cell, and its consistent mass; K is work space. */
@@ -322,36 +341,21 @@ static void fill_batch(const Fill *fill, PetscInt r, PetscInt b, PetscReal inert
   const SbRegion *region = &s->region[r];
   const int npair = region->quadratic ? SB_PAIRS : 10;
 
-  SbInsertClear(s, &fill->x, b);
+  SbInsertClear(s, &fill->x, b, fill->faces, fill->beta);
   if (region->broken) {
-    SbInsertBroken(s, &fill->x, b, (const SbPack(*)[9])K);
+    SbInsertBatch(s, &fill->x, b, npair, PETSC_TRUE, (const SbPack(*)[9])K);
     if (inertia == 0.) return;
     memset(K, 0, 90 * sizeof(SbPack));
   }
-  if (inertia != 0. && region->curve_g) {
-    const SbPoints at = SbBatchPoints(s, region, b);
+  if (inertia != 0.) {
+    SbPack mass[SB_PAIRS];
 
-    /* K_ab += inertia int phi_a phi_b */
-    for (int q = 0; q < at.n; q++) {
-      PetscReal phi[SB_CELL_NODES];
-      SbPack W;
-
-      SbQuadraticBasis(at.rule->L[q], phi);
-      SbPointVolume(&at, q, W);
-      for (int k = 0; k < 3 * npair; k++) {
-        const PetscReal share = inertia * phi[SbPairA[k / 3]] * phi[SbPairB[k / 3]];
-
-        for (int l = 0; l < SB_BATCH; l++) K[k / 3][4 * (k % 3)][l] += share * W[l];
-      }
-    }
-  } else if (inertia != 0.) {
+    SbBatchMass(s, region, b, mass);
     for (int k = 0; k < 3 * npair; k++) {
-      const PetscReal share = inertia * SbCellMass(region, SbPairA[k / 3], SbPairB[k / 3]);
-
-      for (int l = 0; l < SB_BATCH; l++) K[k / 3][4 * (k % 3)][l] += share * s->batch_V[b][l];
+      for (int l = 0; l < SB_BATCH; l++) K[k / 3][4 * (k % 3)][l] += inertia * mass[k / 3][l];
     }
   }
-  SbInsertBatch(s, &fill->x, b, npair, (const SbPack(*)[9])K);
+  SbInsertBatch(s, &fill->x, b, npair, PETSC_FALSE, (const SbPack(*)[9])K);
 }
 
 /* Assembles region r into several matrices; fill[0] is that of the space itself. */
@@ -364,8 +368,8 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
   const Factors factors = {.stiffness = stage->shift_k,
                            .damping = stage->shift_v * s->beta[region->body],
                            .inertia = s->consistent_mass ? inertia : 0.,
-                           .lambda = m->ops.volumetric_modulus(m),
-                           .mu = m->ops.shear_modulus(m)};
+                           .lambda = m->lambda,
+                           .mu = m->mu};
   const PetscBool faces = (PetscBool)!region->element->nodes_per[0];
   Split kept, *split = out && faces && factors.lambda > 0. ? &kept : NULL;
 
@@ -382,7 +386,7 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
       if (!m->linear) SbBatchGradients(s, region, b, stage->u, PETSC_FALSE, U, F);
       if (s->linear_pressure && m->ops.curvature && m->tangent == SB_TANGENT_EXACT) {
         m->ops.pressure(m, (const SbPack *)F[0], p);
-        for (int l = 0; l < SB_BATCH; l++) p[l] += s->linear_pressure[b][l];
+        for (int l = 0; l < SB_BATCH; l++) p[l] += s->pressure[b][l];
         at.pressure = &p;
       }
       law_blocks(m, s->batch_g + 9 * b, s->batch_V[b], &at, (const SbPack *)F[0], split, K);
@@ -401,29 +405,16 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
   }
 }
 
-static inline void add_to_diagonal(SbSpace s, const SbValues *x, PetscInt node, PetscReal value)
-{
-  size_t rs, cs;
-  PetscScalar *v = sb_block(x, s->plan, node, s->plan->diagonal[node], &rs, &cs);
-
-  for (size_t i = 0; i < 3; i++) v[i * (rs + cs)] += value;
-}
-
 PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n, const SbSpace space[],
                                     const Mat A[], const SbVolumetric *out)
 {
+  const PetscBool lumped = (PetscBool)(!s->consistent_mass && (stage->shift_a != 0. || stage->shift_v != 0.));
   Fill fill[3];
 
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < n; k++) {
-    fill[k].space = space[k];
+    fill[k] = (Fill){.space = space[k], .faces = space[k]->jump ? stage : NULL, .beta = s->beta};
     PetscCall(SbValuesBegin(A[k], &fill[k].x));
-    fill[k].face_term = NULL;
-    /* initial values of each body's rows: its face terms, as stiffness and damping */
-    if (space[k]->jump) PetscCall(PetscMalloc1(s->mesh->nbody, &fill[k].face_term));
-    for (PetscInt b = 0; space[k]->jump && b < s->mesh->nbody; b++)
-      fill[k].face_term[b] = stage->shift_k + stage->shift_v * s->beta[b];
-    fill[k].x.face_term = fill[k].face_term;
   }
   for (PetscInt r = 0; r < s->nregion; r++) {
     PetscCall(PetscLogEventBegin(s->region[r].material->event, 0, 0, 0, 0));
@@ -431,15 +422,17 @@ PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n,
     PetscCall(PetscLogEventEnd(s->region[r].material->event, 0, 0, 0, 0));
   }
   for (PetscInt k = 0; k < n; k++) {
+    const SbSpace to = space[k];
+
     /* the lumped mass matrix, and its damping */
-    for (PetscInt i = 0;
-         !s->consistent_mass && (stage->shift_a != 0. || stage->shift_v != 0.) && i < space[k]->nnode_owned;
-         i++)
-      add_to_diagonal(space[k], &fill[k].x, i,
-                      (stage->shift_a + stage->shift_v * s->alpha[space[k]->node_body[i]]) *
-                        space[k]->node_mass[i]);
+    for (PetscInt i = 0; lumped && i < to->nnode_owned; i++) {
+      size_t rs, cs;
+      PetscScalar *v = sb_block(&fill[k].x, to->plan, i, to->plan->diagonal[i], &rs, &cs);
+
+      for (size_t c = 0; c < 3; c++)
+        v[c * (rs + cs)] += (stage->shift_a + stage->shift_v * s->alpha[to->node_body[i]]) * to->node_mass[i];
+    }
     PetscCall(SbValuesEnd(&fill[k].x));
-    PetscCall(PetscFree(fill[k].face_term));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -450,7 +443,7 @@ PetscErrorCode SbSpaceAssembleTangent(SbSpace s, const SbStage *stage, Mat A)
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
-  PetscCall(get_assembly(A, &own));
+  PetscCall(SbMatrixGetAssembly(A, &own));
   if (own)
     PetscCall((own->assemble)(A, stage));
   else
@@ -462,21 +455,14 @@ PetscErrorCode SbSpaceAssembleTangent(SbSpace s, const SbStage *stage, Mat A)
 PetscErrorCode SbSpaceAddCellBlock(SbSpace s, Mat A, PetscInt cell, PetscInt a, PetscInt b,
                                    const PetscReal block[9])
 {
-  const PetscInt row = SbSpaceCellNode(s, cell, a), column = SbSpaceCellNode(s, cell, b),
+  const PetscInt node[2] = {SbSpaceCellNode(s, cell, a), SbSpaceCellNode(s, cell, b)},
                  k = s->plan->offset[SbPlanCellOffset(s, cell) + (size_t)(SB_BATCH * (s->width * a + b))];
-  SbValues x;
-  size_t rs, cs;
-  PetscScalar *v;
+  SbMatBlocks x;
 
   PetscFunctionBeginUser;
   if (k == SB_NOT_OWNED) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbValuesBegin(A, &x));
-  if (x.kind != SB_MATRIX_SBAIJ || row <= column) {
-    v = sb_block(&x, s->plan, row, k, &rs, &cs);
-    for (size_t i = 0; i < 3; i++) {
-      for (size_t j = 0; j < 3; j++) v[i * rs + j * cs] += s->block_scale * block[3 * i + j];
-    }
-  }
+  SbInsertBlock(s, &x, node, k, s->block_scale, PETSC_FALSE, block);
   PetscCall(SbValuesEnd(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -487,14 +473,14 @@ PetscErrorCode SbSpaceAddSpring(SbSpace s, Mat A, PetscInt cell, PetscInt a, con
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceAddCellBlock(s, A, cell, a, a, block));
-  PetscCall(get_assembly(A, &own));
+  PetscCall(SbMatrixGetAssembly(A, &own));
   if (own && own->add_spring)
     PetscCall((own->add_spring)(A, SbSpaceCellNode(s, cell, a), s->block_scale, block));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Clears rows and columns of prescribed unknowns, keeping the magnitude on the diagonal. */
-static void clear_fixed(SbSpace s, const SbValues *x)
+static void clear_fixed(SbSpace s, const SbMatBlocks *x)
 {
   SbPlan p = s->plan;
 
@@ -503,7 +489,7 @@ static void clear_fixed(SbSpace s, const SbValues *x)
     size_t rs, cs;
     PetscScalar *v;
 
-    if (x->kind == SB_MATRIX_SBAIJ && p->fix_block[n] < p->diagonal[p->fix_row[n]]) continue;
+    if (x->symmetric && p->fix_block[n] < p->diagonal[p->fix_row[n]]) continue;
     v = sb_block(x, p, p->fix_row[n], p->fix_block[n], &rs, &cs);
     for (int i = 0; i < 3; i++) {
       for (int j = 0; j < 3; j++) {
@@ -522,10 +508,10 @@ static void clear_fixed(SbSpace s, const SbValues *x)
 PetscErrorCode SbSpaceFinishTangent(SbSpace s, Mat A)
 {
   const SbAssembly *own;
-  SbValues x;
+  SbMatBlocks x;
 
   PetscFunctionBeginUser;
-  PetscCall(get_assembly(A, &own));
+  PetscCall(SbMatrixGetAssembly(A, &own));
   if (own) {
     if (own->finish) PetscCall((own->finish)(A));
     PetscFunctionReturn(PETSC_SUCCESS);

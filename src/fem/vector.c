@@ -59,18 +59,12 @@ PetscErrorCode SbSpaceRestoreLocalWrite(SbSpace s, Vec v, PetscReal **array)
 PetscErrorCode SbSpaceUpdateGhosts(SbSpace s, PetscReal x[])
 {
   const PetscReal *all;
-  PetscScalar *own;
-  Vec v;
 
   PetscFunctionBeginUser;
   if (!s->ghosted) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbSpaceCreateVec(s, &v));
-  PetscCall(VecGetArrayWrite(v, &own));
-  PetscCall(PetscArraycpy(own, x, 3 * s->nnode_owned));
-  PetscCall(VecRestoreArrayWrite(v, &own));
-  PetscCall(SbSpaceGetLocalRead(s, v, &all));
-  PetscCall(PetscArraycpy(x, all, 3 * s->nnode));
-  PetscCall(SbSpaceRestoreLocalRead(s, v, &all));
-  PetscCall(VecDestroy(&v));
+  PetscCall(VecPlaceArray(s->template_vec, x));
+  PetscCall(SbSpaceGetLocalRead(s, s->template_vec, &all));
+  PetscCall(SbSpaceRestoreLocalRead(s, s->template_vec, &all));
+  PetscCall(VecResetArray(s->template_vec));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,7 +1,7 @@
 /*
-  Creation of material laws by name, and functions shared by several laws: Hooke's stiffness at rest, two exact tangents, damping.
+  Creation of material laws by name, and functions shared by several laws: tangents, damping.
 
-  Lame parameters: mu = E / (2 (1 + nu)), lambda = E nu / ((1 + nu) (1 - 2 nu)).
+  Lame parameters at rest: mu = E / (2 (1 + nu)), lambda = E nu / ((1 + nu) (1 - 2 nu)).
 */
 #include "material_impl.h"
 #include "sblog.h"
@@ -51,6 +51,8 @@ static PetscErrorCode create_law(const char *law, PetscReal E, PetscReal nu, Pet
   PetscCall(SbLogNamed("Mat", law, &m->event));
   m->E = E;
   m->nu = nu;
+  m->mu = E / (2 * (1 + nu));
+  m->lambda = E * nu / ((1 + nu) * (1 - 2 * nu));
   m->density = density;
   PetscCall((*create)(m));
   *material = m;
@@ -87,7 +89,6 @@ PetscErrorCode SbMaterialDestroy(SbMaterial *m)
   PetscFunctionBeginUser;
   if (!*m) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbMaterialDestroy(&(*m)->shear));
-  PetscCall(PetscFree((*m)->data));
   PetscCall(PetscFree(*m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -96,7 +97,7 @@ PetscErrorCode SbMaterialGetShear(SbMaterial m, SbMaterial *shear)
 {
   PetscFunctionBeginUser;
   if (!m->shear) {
-    PetscCall(SbMaterialCreateElastic(m->law, 2 * m->ops.shear_modulus(m), 0., m->density, &m->shear));
+    PetscCall(SbMaterialCreateElastic(m->law, 2 * m->mu, 0., m->density, &m->shear));
     PetscCall(SbMaterialSetTangent(m->shear, m->tangent));
   }
   *shear = m->shear;
@@ -125,50 +126,16 @@ PetscErrorCode SbMaterialSetTangent_Exact(SbMaterial m, SbTangentKind kind)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMaterialSetFromOptions_Exact(SbMaterial m, const SbScope *scope)
+PetscErrorCode SbMaterialSetFromOptions_Tangent(SbMaterial m, const SbScope *scope)
 {
+  const PetscInt first = m->tangent == SB_TANGENT_WARPED ? SB_TANGENT_WARPED : SB_TANGENT_EXACT;
   PetscInt choice;
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionChoice(scope, "tangent", &choice));
   m->adaptive = (PetscBool)(choice == 0);
-  PetscCall(SbMaterialSetTangent(m, choice == 1 ? SB_TANGENT_EXACT : SB_TANGENT_EXACT_SPD));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscReal shear_modulus_hooke(const struct _p_SbMaterial *m)
-{
-  return sb_lame(m)->mu;
-}
-
-static PetscReal bulk_modulus_hooke(const struct _p_SbMaterial *m)
-{
-  return sb_lame(m)->lambda + 2 * sb_lame(m)->mu / 3;
-}
-
-static PetscReal volumetric_modulus_hooke(const struct _p_SbMaterial *m)
-{
-  return sb_lame(m)->lambda;
-}
-
-static PetscReal wave_speed_hooke(const struct _p_SbMaterial *m)
-{
-  return sqrt((sb_lame(m)->lambda + 2 * sb_lame(m)->mu) / m->density);
-}
-
-PetscErrorCode SbMaterialSetHooke(SbMaterial m)
-{
-  SbLame *lame;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscNew(&lame));
-  lame->mu = m->E / (2 * (1 + m->nu));
-  lame->lambda = m->E * m->nu / ((1 + m->nu) * (1 - 2 * m->nu));
-  m->data = lame;
-  m->ops.shear_modulus = shear_modulus_hooke;
-  m->ops.bulk_modulus = bulk_modulus_hooke;
-  m->ops.volumetric_modulus = volumetric_modulus_hooke;
-  m->ops.wave_speed = wave_speed_hooke;
+  PetscCall(
+    SbMaterialSetTangent(m, m->adaptive ? SB_TANGENT_EXACT_SPD : (SbTangentKind)(first + choice - 1)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -194,5 +161,5 @@ void SbMaterialDampingStress(const struct _p_SbMaterial *m, const SbPack F[9], c
   SbPack R[9];
 
   SbMaterialRotation(m, F, R);
-  turned_hooke(m->ops.volumetric_modulus(m), m->ops.shear_modulus(m), (const SbPack *)R, H, dP);
+  turned_hooke(m->lambda, m->mu, (const SbPack *)R, H, dP);
 }

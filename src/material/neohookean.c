@@ -25,7 +25,7 @@
 */
 SB_KERNEL static void energy_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack psi)
 {
-  const PetscReal a = 4 * sb_lame(m)->mu / 3, b = sb_lame(m)->lambda + 5 * sb_lame(m)->mu / 6;
+  const PetscReal a = 4 * m->mu / 3, b = m->lambda + 5 * m->mu / 6;
   SbPack x;
 
   for (int l = 0; l < SB_BATCH; l++) {
@@ -47,7 +47,7 @@ SB_KERNEL static void energy_neohookean(const struct _p_SbMaterial *m, const SbP
 SB_KERNEL static void stress_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                         SbPack P[restrict 9])
 {
-  const PetscReal a = 4 * sb_lame(m)->mu / 3, b = sb_lame(m)->lambda + 5 * sb_lame(m)->mu / 6;
+  const PetscReal a = 4 * m->mu / 3, b = m->lambda + 5 * m->mu / 6;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], c[9];
@@ -70,14 +70,14 @@ SB_KERNEL static void pressure_neohookean(const struct _p_SbMaterial *m, const S
     h[4] -= 1;
     h[8] -= 1;
     SbMatCofactor(h, c);
-    p[l] = -sb_lame(m)->lambda * (h[0] + h[4] + h[8] + c[0] + c[4] + c[8] + SbDot3(h, c));
+    p[l] = -m->lambda * (h[0] + h[4] + h[8] + c[0] + c[4] + c[8] + SbDot3(h, c));
   }
 }
 
 SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                     SbPack C[restrict 81])
 {
-  const PetscReal a = 4 * sb_lame(m)->mu / 3, b = sb_lame(m)->lambda + 5 * sb_lame(m)->mu / 6;
+  const PetscReal a = 4 * m->mu / 3, b = m->lambda + 5 * m->mu / 6;
   SbPack cof[9], pF[9], shear, stretch;
 
   for (int l = 0; l < SB_BATCH; l++) {
@@ -110,7 +110,7 @@ SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbPack 
 SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                   SbPack C[restrict 81])
 {
-  const PetscReal a = 4 * sb_lame(m)->mu / 3, b = sb_lame(m)->lambda + 5 * sb_lame(m)->mu / 6;
+  const PetscReal a = 4 * m->mu / 3, b = m->lambda + 5 * m->mu / 6;
   SbPack U[9], V[9], s[3], hessian[6], flip[3], twist[3];
 
   SbStretches(F, U, s, V);
@@ -154,10 +154,8 @@ SB_KERNEL static void volumetric_neohookean(const struct _p_SbMaterial *m, const
   }
 }
 
-SB_KERNEL static void curvature_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
-                                           const SbPack p, SbPack C[restrict 81])
+SB_KERNEL void SbAddCofactorTangent(const SbPack F[restrict 9], const SbPack p, SbPack C[restrict 81])
 {
-  (void)m;
   for (int ij = 0; ij < 9; ij++) {
     for (int kl = 0; kl < 9; kl++) {
       const int row = (kl / 3 - ij / 3 + 3) % 3, column = (kl % 3 - ij % 3 + 3) % 3;
@@ -169,11 +167,17 @@ SB_KERNEL static void curvature_neohookean(const struct _p_SbMaterial *m, const 
   }
 }
 
+static void curvature_neohookean(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack p,
+                                 SbPack C[81])
+{
+  (void)m;
+  SbAddCofactorTangent(F, p, C);
+}
+
 PetscErrorCode SbMaterialCreate_NeoHookean(SbMaterial m)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbMaterialSetHooke(m));
-  m->ops.setfromoptions = SbMaterialSetFromOptions_Exact;
+  m->ops.setfromoptions = SbMaterialSetFromOptions_Tangent;
   m->ops.settangent = SbMaterialSetTangent_Exact;
   m->ops.energy = energy_neohookean;
   m->ops.stress = stress_neohookean;
@@ -182,7 +186,6 @@ PetscErrorCode SbMaterialCreate_NeoHookean(SbMaterial m)
   m->ops.volumetric = volumetric_neohookean;
   m->ops.curvature = curvature_neohookean;
   m->jacobian = PETSC_TRUE;
-  m->symmetric = PETSC_TRUE;
   m->tangent = SB_TANGENT_EXACT;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

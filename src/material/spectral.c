@@ -110,17 +110,9 @@ SB_KERNEL void SbStretches(const SbPack F[restrict 9], SbPack U[restrict 9], SbP
 
   SbPolar(F, R);
   for (int l = 0; l < SB_BATCH; l++) {
-    PetscReal f[9], r[9], a[9];
+    PetscReal r[9];
 
-    SbPackGet(9, F, l, f);
-    SbPackGet(9, R, l, r);
-    SbMatTransposeMul(r, f, a);
-    S[0][l] = a[0];
-    S[1][l] = (a[1] + a[3]) / 2;
-    S[2][l] = (a[2] + a[6]) / 2;
-    S[3][l] = a[4];
-    S[4][l] = (a[5] + a[7]) / 2;
-    S[5][l] = a[8];
+    SbStretchTensor(F, (const SbPack *)R, l, r, S);
   }
   SbSymEig((const SbPack *)S, s, V);
   for (int l = 0; l < SB_BATCH; l++) {

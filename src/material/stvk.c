@@ -19,7 +19,7 @@ SB_INLINE void green_strain(const SbPack F[9], int l, PetscReal f[9], PetscReal 
 
 SB_KERNEL static void energy_stvk(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack psi)
 {
-  const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
+  const PetscReal mu = m->mu, lambda = m->lambda;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], e[9];
@@ -33,7 +33,7 @@ SB_KERNEL static void energy_stvk(const struct _p_SbMaterial *m, const SbPack F[
 SB_KERNEL static void stress_stvk(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                   SbPack P[restrict 9])
 {
-  const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
+  const PetscReal mu = m->mu, lambda = m->lambda;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], e[9], p[9];
@@ -52,14 +52,14 @@ SB_KERNEL static void pressure_stvk(const struct _p_SbMaterial *m, const SbPack 
     PetscReal f[9], e[9];
 
     green_strain(F, l, f, e);
-    p[l] = -sb_lame(m)->lambda * (e[0] + e[4] + e[8]);
+    p[l] = -m->lambda * (e[0] + e[4] + e[8]);
   }
 }
 
 SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                     SbPack C[restrict 81])
 {
-  const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
+  const PetscReal mu = m->mu, lambda = m->lambda;
   SbPack S[9], B[9]; /* B = mu F F^T */
 
   for (int l = 0; l < SB_BATCH; l++) {
@@ -91,7 +91,7 @@ SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbPack 
 SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                   SbPack C[restrict 81])
 {
-  const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
+  const PetscReal mu = m->mu, lambda = m->lambda;
   SbPack U[9], V[9], s[3], hessian[6], flip[3], twist[3];
 
   SbStretches(F, U, s, V);
@@ -144,8 +144,7 @@ static void curvature_stvk(const struct _p_SbMaterial *m, const SbPack F[9], con
 PetscErrorCode SbMaterialCreate_StVK(SbMaterial m)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbMaterialSetHooke(m));
-  m->ops.setfromoptions = SbMaterialSetFromOptions_Exact;
+  m->ops.setfromoptions = SbMaterialSetFromOptions_Tangent;
   m->ops.settangent = SbMaterialSetTangent_Exact;
   m->ops.energy = energy_stvk;
   m->ops.stress = stress_stvk;
@@ -153,7 +152,7 @@ PetscErrorCode SbMaterialCreate_StVK(SbMaterial m)
   m->ops.tangent = tangent_stvk;
   m->ops.volumetric = volumetric_stvk;
   m->ops.curvature = curvature_stvk;
-  m->symmetric = m->softens = PETSC_TRUE;
+  m->softens = PETSC_TRUE;
   m->tangent = SB_TANGENT_EXACT;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
