@@ -1,16 +1,16 @@
 /*
   Cell kernels: tets with four nodes and constant basis gradients, vectorised over the lanes.
 
-  F = I + sum_a u_a g_a^T and f_a = V P g_a. With Hooke's tensor rotated by R, C_(ij)(kl) = R_ip R_kq (lambda d_pj d_ql +
-  mu d_pq d_jl + mu d_pl d_jq), contracting with g_a,j and g_b,l and writing h = R g gives the block
+  F = I + sum_a u_a g_a^T and f_a = V P g_a. With Hooke's tensor rotated by R, C_(ij)(kl) = R_ip R_kq (lambda
+  d_pj d_ql + mu d_pq d_jl + mu d_pl d_jq), contracting with g_a,j and g_b,l, and h = R g, the block is
 
     K_ab = V (lambda h_a h_b^T + mu h_b h_a^T + mu (h_a . h_b) I),
 
-  which needs no triple product. The derivative of the rotation, dP = R [W y]x with y = axial(R^T dF - dF^T R), adds
-  V [h_a]x R W R^T [h_b]x^T; since [a]x [b]x^T = (a . b) I - b a^T, W = -mu I turns 2 mu dF into Hooke's mu terms.
+  which needs no triple product. The derivative of the rotation, dP = R [W y]x, y = axial(R^T dF - dF^T R),
+  adds V [h_a]x R W R^T [h_b]x^T; as [a]x [b]x^T = (a . b) I - b a^T, W = -mu I turns 2 mu dF into Hooke's mu.
 
-  g_0 = -(g_1 + g_2 + g_3): only nodes 1..3 are computed, and since K_ba = K_ab^T only six blocks of them; the blocks of
-  node 0 are minus sums. So a translation of the cell gives zero force, up to rounding.
+  g_0 = -(g_1 + g_2 + g_3): only nodes 1..3 are computed, and since K_ba = K_ab^T only six blocks of them; the
+  blocks of node 0 are minus sums. So a translation of the cell gives zero force, up to rounding.
 */
 #include <sbelement.h>
 
@@ -60,7 +60,7 @@ SB_KERNEL void SbCellForce(const SbPack g[restrict 9], const PetscReal V[restric
   }
 }
 
-/* Block of two rotated gradients, lv = lambda V, mv = mu V, in the form of a diagonal one (bitwise symmetric). */
+/* Block of two rotated gradients, lv = lambda V, mv = mu V, as a diagonal one (bitwise symmetric). */
 SB_INLINE void diagonal_block(PetscReal lv, PetscReal mv, const PetscReal h[3], PetscReal K[9])
 {
   const PetscReal d = mv * SbDot3(h, h), c = lv + mv;
@@ -122,20 +122,11 @@ SB_KERNEL void SbCellBlocksIsotropic(const SbPack g[restrict 9], const PetscReal
                                      PetscReal lambda, PetscReal mu, const SbPack R[restrict 9],
                                      SbPack K[restrict 10][9])
 {
-  SbPack identity[9];
-  const SbPack *Q = R;
-
-  if (!R) {
-    for (int k = 0; k < 9; k++) {
-      for (int l = 0; l < SB_BATCH; l++) identity[k][l] = k % 4 == 0;
-    }
-    Q = (const SbPack *)identity;
-  }
   for (int l = 0; l < SB_BATCH; l++) {
     const PetscReal lv = lambda * V[l], mv = mu * V[l];
     PetscReal r[9], e[9], h[9], B[6][9];
 
-    SbPackGet(9, Q, l, r);
+    SbPackGet(9, R, l, r);
     SbPackGet(9, g, l, e);
     SbMatMulTranspose(e, r, h); /* row a = R g_a */
     diagonal_block(lv, mv, h, B[0]);
@@ -158,7 +149,7 @@ SB_INLINE void cross_columns(const PetscReal h[3], const PetscReal W[9], PetscRe
   }
 }
 
-/* K = 2 mu (ha . hb) I + lambda ha hb^T + T [hb]x^T with T = [ha]x W; lv = lambda V, mv = mu V; T is already multiplied by V. */
+/* K = 2 mu (ha . hb) I + lambda ha hb^T + T [hb]x^T with T = [ha]x W; lv = lambda V, mv = mu V, T times V. */
 SB_INLINE void spin_block(PetscReal lv, PetscReal mv, const PetscReal ha[3], const PetscReal T[9],
                           const PetscReal hb[3], PetscReal K[9])
 {
@@ -213,8 +204,8 @@ SB_KERNEL void SbCellBlocksCorotated(const SbPack g[restrict 9], const PetscReal
 }
 
 /*
-  For each pair (i, k) of components the slice M_jl = C_(ij)(kl) gives G M G^T with the gradients as rows of G: its entry
-  (a, b) is K_ab,ik, and since C_(kj)(il) = M_lj also K_ba,ki. Six slices suffice.
+  For each pair (i, k) of components the slice M_jl = C_(ij)(kl) gives G M G^T with the gradients as rows of
+  G: its entry (a, b) is K_ab,ik, and since C_(kj)(il) = M_lj also K_ba,ki. Six slices suffice.
 */
 SB_KERNEL void SbCellBlocksGeneral(const SbPack g[restrict 9], const PetscReal V[restrict SB_BATCH],
                                    const SbPack C[restrict 81], SbPack K[restrict 10][9])

@@ -1,18 +1,18 @@
 /*
-  The elements with four nodes, creation of all by name, and their options. With edges e_a = x_a - x_0 and d = e_1 . (e_2 x e_3):
+  Elements with four nodes; creation of all by name. With e_a = x_a - x_0 and d = e_1 . (e_2 x e_3):
 
   P1 and P2 at vertices (P2: p2.c): grad phi_1 = e_2 x e_3 / d, and cyclic; V = d / 6;
     mass / (density V): consistent M_aa = 1/10, M_ab = 1/20; lumped (row sums) 1/4.
 
-  Crouzeix-Raviart, and piecewise linear DG in the same basis, have their nodes at the centroids of the faces. With the barycentric
-  coordinates l_a the basis is psi_a = 1 - 3 l_a, node a on the face opposite vertex a: one at the centroid of its face, zero at the
-  three others. Hence
+  Crouzeix-Raviart, and piecewise linear DG in the same basis, have their nodes at the centroids of the faces.
+  With the barycentric coordinates l_a the basis is psi_a = 1 - 3 l_a, node a on the face opposite vertex a:
+  one at the centroid of its face, zero at the three others. Hence
 
     grad psi_a = -3 grad l_a;   psi_a(vertex v) = 1 - 3 delta_av;
     mass / (density V): consistent M_aa = 2/5, M_ab = -1/20; lumped (row sums) 1/4.
 
-  The mean of a function over a face is its value at the node there, so the mean jump is a difference of two nodes.
-  (Crouzeix and Raviart 1973; Hansbo and Larson 2003.)
+  The mean of a function over a face is its value at the node there, so the mean jump is a difference of two
+  nodes. (Crouzeix and Raviart 1973; Hansbo and Larson 2003.)
 */
 #include <sbelement.h>
 #include "sblog.h"

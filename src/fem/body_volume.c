@@ -1,10 +1,9 @@
 /*
-  The current volume of a body, V = sum |T| det F over its cells, and its derivatives, for a pressure on the
-  whole surface.
+  The current volume of a body, V = sum |T| det F over its cells, and derivatives, for pressure all around.
 
-  For P1 dV/du acts on surface nodes only. For CR and DG, whose surface has gaps at its edges, the sum of the facets'
-  forces does not vanish, but V depends on strains only and is invariant under translations and rotations: resultant force and moment vanish
-  to rounding, and the tangent is exact and symmetric.
+  For P1 dV/du acts on surface nodes only. For CR and DG, whose surface has gaps at its edges, the sum of the
+  facets' forces does not vanish, but V depends on strains only and is invariant under translations and
+  rotations: resultant force and moment vanish to rounding, and the tangent is exact and symmetric.
 
     dV/dF = |T| cof F,   d cof F_ij / dF_kl = eps_ikm eps_jln F_mn.
 */

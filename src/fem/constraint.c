@@ -1,14 +1,14 @@
 /*
   Constraints of single nodes, for contact with rigid obstacles: n . u = c exactly, or by a spring (penalty).
 
-  A node has up to three exact constraints, the rows of G, with the values c, and constraint forces along the rows of F: F = G unless the
-  node slides with friction mu, with a row n - mu d, d the direction of the slip. Node by node, with
+  A node has up to three exact constraints, the rows of G, with the values c, and constraint forces along the
+  rows of F: F = G unless the node slides with friction mu, with a row n - mu d, d along the slip. With
 
     Q = F^T (G F^T)^-1 G,   P = I - Q
 
   lambda = (G F^T)^-1 G r are the multipliers for a residual r, P r is the projected residual, G P x = 0, and
-  u + F^T (G F^T)^-1 (c - G u) satisfies the constraints. Prescribed components are removed from G and F. The solution is projected onto the
-  constraints before a solve, which then stays in their null space. Redundant constraints of a node are removed.
+  u + F^T (G F^T)^-1 (c - G u) satisfies the constraints. Prescribed components are removed from G and F. The
+  solution is projected onto the constraints before a solve, which stays there. Redundant ones are removed.
 
   Linear solves treat them in one of two ways.
 
@@ -16,16 +16,16 @@
 
     A_ij <- P_i A_ij P_j,   A_ii += s_i Q_i
 
-  Outside the matrix K, with springs F^T k G and where F is not G (Gould, Hribar, Nocedal 2001, On the solution of equality constrained
-  quadratic programming problems arising in optimization): A = P (K + F^T k G) P, M_A^-1 = P M^-1 P. Any preconditioner M of K can be used, and neither K nor M changes with the
-  active set. (src/solver/constraint_operator.c; by a factorisation: saddle_factor.c.)
+  Outside the matrix K, with springs F^T k G and where F is not G (Gould, Hribar, Nocedal 2001, On the
+  solution of equality constrained quadratic programming problems arising in optimization): A = P (K + F^T k
+  G) P, M_A^-1 = P M^-1 P. Any preconditioner M of K can be used, and neither K nor M changes with the active
+  set. (src/solver/constraint_operator.c; by a factorisation: saddle_factor.c.)
 */
 #include "fem_impl.h"
 #include "sbconstraint.h"
 #include "sbkernel.h"
 
-#define SAID \
-  1e-6 /* squared distance from the span of the node's other constraints below which one is redundant */
+#define SAID 1e-6    /* squared distance from the span of the node's others below which one is redundant */
 #define NO_SAY 1e-12 /* squared length of the free part of a direction that counts as zero */
 
 PetscErrorCode SbSpaceCreateConstraints(SbSpace s, PetscBool beside, PetscBool nonsymmetric)
@@ -81,7 +81,7 @@ static void free_part(SbSpace s, PetscInt node, const PetscReal v[3], PetscReal 
   for (int k = 0; k < 3; k++) part[k] = s->fixed[node] & (1 << k) ? 0. : v[k];
 }
 
-/* The exact constraints of a node: their numbers and the free parts of their directions (NULL: not wanted). Returns their number, 0..3. */
+/* The exact constraints of a node: numbers and free parts of their directions. Returns 0..3. */
 static int exact_constraints(SbSpace s, PetscInt node, PetscInt number[3], PetscReal G[9], PetscReal F[9])
 {
   const SbConstraints c = s->constraints;
@@ -217,9 +217,10 @@ PetscErrorCode SbSpaceProjectAdmissible(SbSpace s, Vec z)
   PetscScalar *x;
 
   PetscFunctionBeginUser;
+  PetscCall(SbSpaceZeroPrescribed(s, PETSC_TRUE, z));
+  if (!s->constraints) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecGetArray(z, &x));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) free_part(s, i, x + 3 * i, x + 3 * i);
-  if (s->constraints) SbConstraintsProject(s, x);
+  SbConstraintsProject(s, x);
   PetscCall(VecRestoreArray(z, &x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -354,8 +355,9 @@ void SbConstraintsProjectBlock(SbSpace s, PetscInt i, PetscInt j, size_t rs, siz
 }
 
 /*
-  If only constraints support a body K is singular. In a static run s_i times the squared components of
-  the constraint directions are added to its diagonal, s_i the size of the node's block; the operator subtracts them again, so that only M contains them.
+  If only constraints support a body K is singular. In a static run s_i times the squared components of the
+  constraint directions are added to its diagonal, s_i the size of the node's block; the operator subtracts
+  them again, so that only M contains them.
 */
 static void anchor(SbSpace s, const SbMatBlocks *x)
 {

@@ -4,7 +4,7 @@
 #pragma once
 #include "sbassembly.h"
 
-/* layout.c: creates the nodes of the space. After the batches: the nodes that each cell's stress acts on. Collective. */
+/* layout.c: creates the nodes of the space. After the batches: the nodes of each stress. Collective. */
 PetscErrorCode SbLayoutNodes(SbSpace space);
 PetscErrorCode SbLayoutCliques(SbSpace space);
 PetscErrorCode SbLayoutDestroy(SbSpace space);
@@ -13,7 +13,7 @@ PetscErrorCode SbLayoutDestroy(SbSpace space);
 typedef enum { SB_JUMP_STIFFNESS, SB_JUMP_DAMPING } SbJumpFactor;
 PetscErrorCode SbJumpCreate(SbSpace space, SbJump *jump);
 PetscErrorCode SbJumpDestroy(SbJump *jump);
-/* f[nnode][3] += (factor) K_F x; the jumps of displacements x are reduced by the offsets r; complete on owned nodes. x[nnode][3] with ghosts. */
+/* f[nnode][3] += (factor) K_F x; the jumps of displacements x less the offsets r; x[nnode][3]. */
 void SbJumpAdd(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal f[]);
 /* The energy 1/2 x . (factor) K_F x of the face terms, this rank's part, J. */
 PetscReal SbJumpEnergy(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal body[]);
@@ -22,15 +22,13 @@ PetscInt SbJumpCliques(SbSpace space, const PetscInt **node);
 /* The matrix of the face in lane l of batch b, to be multiplied by the 3x3 identity; zero in padding. */
 void SbJumpMatrix(SbSpace space, PetscInt b, PetscInt l, PetscReal K[8][8]);
 
-/* plan.c. Position of a cell in SbPlan.offset; block (a, b) follows at SB_BATCH (width a + b). */
-size_t SbPlanCellOffset(SbSpace space, PetscInt cell);
-/* Sums the current face terms for the matrix. */
+/* plan.c: sums the current face terms for the matrix. */
 void SbPlanSumFaceTerms(SbSpace space);
 PetscErrorCode SbPlanDestroy(SbPlan *plan);
 
 /* tangent.c: the table of SbMatrixSetAssembly(), NULL for a matrix of blocks. */
 PetscErrorCode SbMatrixGetAssembly(Mat A, const SbAssembly **assembly);
-/* Borrows the values of a matrix of any kind; its state increases in SbSpaceFinishTangent(). Not collective. */
+/* Borrows the values of any matrix; its state increases in SbSpaceFinishTangent(). Not collective. */
 PetscErrorCode SbValuesBegin(Mat A, SbMatBlocks *x);
 PetscErrorCode SbValuesEnd(SbMatBlocks *x);
 
@@ -54,12 +52,12 @@ static inline PetscScalar *sb_block(const SbMatBlocks *x, SbPlan p, PetscInt row
 }
 
 /*
-  For every batch b in order, before its SbInsertBatch(): clears the rows that it adds to first, or sets them to the face terms
-  with the factors of a stage and beta[nbody], s, the damping in them. NULL: without face terms.
+  For every batch b in order, before its SbInsertBatch(): clears the rows that it adds to first, or sets them
+  to the face terms with the factors of a stage and beta[nbody], s, damping. NULL: without face terms.
 */
 void SbInsertClear(SbSpace space, const SbMatBlocks *x, PetscInt b, const SbStage *faces,
                    const PetscReal beta[]);
-/* quadratic.c: points of a batch. P1, CR and DG have one; P2 cells four, curved ones those of SbRuleQuintic. Not collective. */
+/* quadratic.c: points of a batch. P1, CR and DG have one; P2 four, curved cells those of SbRuleQuintic. */
 typedef struct {
   int n, step;             /* number of points; gradients of point q: g + step q */
   const SbPointRule *rule; /* rule of P2 */
@@ -72,14 +70,14 @@ SB_INLINE void SbPointVolume(const SbPoints *at, int q, SbPack W)
 {
   for (int l = 0; l < SB_BATCH; l++) W[l] = at->weight[q][l] * (*at->V)[l];
 }
-/* Gathers U[3 nnode] as sb_gather_strain() for x (NULL: zero), and F at the points (rate: without the identity). */
+/* Gathers U[3 nnode] as sb_gather_strain() for x (NULL: zero), and F at the points (rate: less I). */
 void SbBatchGradients(SbSpace space, const SbRegion *region, PetscInt b, const PetscReal x[], PetscBool rate,
                       SbPack U[30], SbPack F[SB_POINTS][9]);
-/* Forces of a stress P at point q on the values of sb_gather_strain(): added for P2, set for others, which have one point. */
+/* Forces of a stress P at point q on the values of sb_gather_strain(): added for P2, else set (one point). */
 void SbPointForce(const SbPoints *at, int q, const SbPack P[9], SbPack f[30]);
 /*
-  The volumetric part of the energy, V lambda/2 (mean of theta)^2: pressure = lambda times the mean (Pa, tension), b[30] = V d mean/du (m^2; NULL: not
-  wanted). F: at the points.
+  The volumetric part of the energy, V lambda/2 (mean of theta)^2: pressure = lambda times the mean (Pa,
+  tension), b[30] = V d mean/du (m^2; NULL: not wanted). F: at the points.
 */
 void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const SbPack U[30],
                        const SbPack F[SB_POINTS][9], SbPack pressure, SbPack b[30]);
@@ -92,13 +90,13 @@ SB_INLINE const SbPointRule *SbVolumeRule(const SbPoints *at)
 void SbBatchState(SbSpace space, const SbRegion *region, PetscInt b, const PetscReal x[],
                   SbPack F[SB_POINTS][9], SbPack P[SB_POINTS][9], SbPack psi[SB_POINTS],
                   SbPack pressure[SB_POINTS]);
-/* residual.c: f += elastic forces of a region (if `elastic`) and forces of damping by beta, s, at the u (NULL: rest) and v of stage. */
+/* residual.c: f += elastic forces of a region (if `elastic`) and of damping by beta, s; u NULL: rest. */
 void SbRegionForces(SbSpace space, const SbRegion *region, PetscBool elastic, PetscReal beta,
                     const SbStage *stage, PetscReal f[]);
 /* The consistent mass of each cell, over its density: the integral of phi_a phi_b for each pair, m^3. */
 void SbBatchMass(SbSpace space, const SbRegion *region, PetscInt b, SbPack mass[SB_PAIRS]);
 
-/* Adds the blocks of each cell of batch b, ten or, for P2, SB_PAIRS; broken: of DG, between means at faces. K is 32-byte aligned. */
+/* Adds the blocks of each cell of batch b, ten or, for P2, SB_PAIRS; broken: DG, between means. */
 void SbInsertBatch(SbSpace space, const SbMatBlocks *x, PetscInt b, int npair, PetscBool broken,
                    const SbPack K[][9]);
 /* Adds factor k, or its transpose (turn), at its position in the row of node[0] and the column of node[1]. */
@@ -109,6 +107,6 @@ void SbInsertBlock(SbSpace space, const SbMatBlocks *x, const PetscInt node[2], 
 void SbConstraintsFinishTangent(SbSpace space, const SbMatBlocks *x);
 PetscErrorCode SbConstraintsDestroy(SbConstraints *constraints);
 
-/* The same projection for rows of a matrix-free operator. */
+/* matrix_free.c: adds the rows of SbSpaceGetRows() of the operator. Not collective. */
 PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],
                                    PetscReal block[]);

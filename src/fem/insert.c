@@ -1,13 +1,13 @@
 /*
-  Insertion of the blocks of a batch of cells, ten or, for P2, 55 per cell, at their positions in the matrix's value arrays.
+  Insertion of the blocks of a batch of cells, ten or, for P2, 55 per cell, into the matrix's value arrays.
 
   The kernel returns interleaved blocks, K[pair][entry][lane]; BAIJ and SBAIJ store the nine entries of a
-  block together, column-major. So the entries of four lanes are transposed in registers, and each block is added as two
-  vectors of four and a last number: in cache 20 ns per tet for SBAIJ, entry by entry 52.
-  Lanes are added sequentially: neighbouring cells of a batch share blocks.
+  block together, column-major. So the entries of four lanes are transposed in registers, and each block is
+  added as two vectors of four and a last number: in cache 20 ns per tet for SBAIJ, entry by entry 52. Lanes
+  are added sequentially: neighbouring cells of a batch share blocks.
 
-  A row of the matrix is cleared by the first batch that adds to it (listed in the plan): it is in the cache then,
-  and main memory is accessed once instead of twice. Measured at 200,000 tets, SBAIJ: 33 ns per tet instead of 49.
+  A row of the matrix is cleared by the first batch that adds to it (listed in the plan): it is in the cache
+  then, and memory is accessed once, not twice. Measured at 200,000 tets, SBAIJ: 33 ns per tet instead of 49.
 
   AIJ does not store blocks contiguously: they are added entry by entry.
 */
@@ -49,8 +49,8 @@ void SbInsertBlock(SbSpace s, const SbMatBlocks *x, const PetscInt node[2], Pets
 }
 
 /*
-  Any storage, any rank: adds the cell in lane l of batch b, block by block. DG (broken): each block between means is distributed
-  to the own nodes and those across the faces.
+  Any storage, any rank: adds the cell in lane l of batch b, block by block. DG (broken): each block between
+  means is distributed to the own nodes and those across the faces.
 */
 static void insert_cell(SbSpace s, const SbMatBlocks *x, PetscInt b, int l, int npair, PetscBool broken,
                         const SbPack K[][9])
@@ -100,8 +100,8 @@ SB_INLINE void transpose(const Four in[4], Four out[4])
 }
 
 /*
-  Adds one block in each of four lanes: k[e] its entries, column-major, position[l] its position. With `edge` the position may be in the
-  off-diagonal part, or on another rank.
+  Adds one block in each of four lanes: k[e] its entries, column-major, position[l] its position. With `edge`
+  the position may be in the off-diagonal part, or on another rank.
 */
 SB_INLINE void add_blocks(const Four k[9], const PetscInt position[4], PetscBool edge,
                           PetscScalar *const value[2])

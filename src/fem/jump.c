@@ -7,32 +7,34 @@
     kappa1 = gamma1 H(2 mu |F| / V),   kappa0 = gamma0 H((2 mu + lambda) |F| / V)  (DG only),
 
   H(k) = 2 k+ k- / (k+ + k-) the harmonic mean of the two sides; for one material H(mu |F| / V) = mu / h with
-  h = (V+ + V-) / (2 |F|) (Hansbo and Larson 2002). The terms act on displacements, are isotropic and constant within a step: they are invariant under
-  rotations, and rigid motions have no jumps.
+  h = (V+ + V-) / (2 |F|) (Hansbo and Larson 2002). The terms act on displacements, are isotropic and constant
+  within a step: they are invariant under rotations, and rigid motions have no jumps.
 
-  A cell's function at vertex v is S - 3 u_v, S the sum of its four nodes and u_v the one opposite v. So the jump at the three
-  vertices i of the face is J_i = (S+ - 3 u+_i) - (S- - 3 u-_i), and since J is linear there
+  A cell's function at vertex v is S - 3 u_v, S the sum of its four nodes and u_v the one opposite v. So the
+  jump at the three vertices i of the face is J_i = (S+ - 3 u+_i) - (S- - 3 u-_i), and since J is linear there
 
     int_F |[u]|^2 = |F| / 12 (sum |J_i|^2 + |sum J_i|^2),   [u]_0 = sum J_i / 3.
 
-  dW/dJ_i = c1 J_i + (c1 + c0) sum J,  c1 = kappa1 |F| / 12,  c0 = kappa0 |F| / 9, is distributed to the eight nodes by the transpose of
-  this map. For CR both sides share the node of the face, whose contributions cancel.
+  dW/dJ_i = c1 J_i + (c1 + c0) sum J,  c1 = kappa1 |F| / 12,  c0 = kappa0 |F| / 9, is distributed to the eight
+  nodes by the transpose of this map. For CR both sides share the face's node, whose parts cancel.
 
-  Under compression kappa1 with mu is too small. A law whose energy depends on det F, or on another non-convex function of F, has twist modes
-  with a negative stiffness (P_i + P_j) / (s_i + s_j), P_i and s_i principal values of the first Piola stress and of F: under a hydrostatic pressure p it is mu - p. For
-  continuous displacements the sum over the cells vanishes but for the boundary; for discontinuous ones the penalty has to balance it. So
+  Under compression kappa1 with mu is too small. A law whose energy depends on det F, or on another non-convex
+  function of F, has twist modes with a negative stiffness (P_i + P_j) / (s_i + s_j), P_i and s_i principal
+  values of the first Piola stress and of F: under a hydrostatic pressure p it is mu - p. For continuous
+  displacements the sum over the cells vanishes but for the boundary; here the penalty balances it. So
 
     kappa1 = gamma1 H(2 m |F| / V),   m = max(mu, FOLLOW max_ij -(P_i + P_j) / (s_i + s_j)),
 
-  evaluated at the start of the step, so that the terms are constant within it and their energy is quadratic. A dependence on the current state
-  would have to be differentiated: the energy of jumps would add a spurious pressure, proportional to lambda.
+  evaluated at the start of the step, so that the terms are constant within it and their energy is quadratic.
+  A dependence on the current state would have to be differentiated: jumps would add a pressure.
 
-  In time steps kappa1 is twice as large, and acts on [u] - r, with an offset r of the jump that keeps the energy of a face when kappa1 changes
-  at the start of a step. With r = 0 every change of kappa1 would add 1/2 (kappa1' - kappa1) int |[u]|^2, and pressure waves would pump
-  energy. [u] - r is parallel to [u], so that a body at rest has no force, with a factor between (kappa1 with m = mu / kappa1)^2
-  and one. The upper bound dissipates, the lower one adds little. Load steps, which may be long, have r = 0, so that their result depends on the loads alone; so has the start of a
-  dynamic run from a given state. With Newmark, without damping, m never decreases: near nu = 1/2 it
-  would change a hundredfold with each wave.
+  In time steps kappa1 is twice as large, and acts on [u] - r, with an offset r of the jump that keeps the
+  energy of a face when kappa1 changes at the start of a step. With r = 0 every change of kappa1 would add 1/2
+  (kappa1' - kappa1) int |[u]|^2, and pressure waves would pump energy. [u] - r is parallel to [u], so that a
+  body at rest has no force, with a factor between (kappa1 with m = mu / kappa1)^2 and one. The upper bound
+  dissipates, the lower one adds little. Load steps, which may be long, have r = 0, so that their result
+  depends on the loads alone; so has the start of a dynamic run from a given state. With Newmark, without
+  damping, m never decreases: near nu = 1/2 it would change a hundredfold with each wave.
 
   A boundary face with a support node (layout.c): the other side is rigid and has the displacement of that
   node. H(k) is 2 k then; kappa1 = 0, because the support prescribes the mean only.
@@ -40,10 +42,9 @@
 #include "fem_impl.h"
 #include "sbkernel.h"
 
-#define FOLLOW 4. /* factor on the negative stiffness in load steps; docs/reference/theory.md */
-#define RATE \
-  2. /* further factor in time steps: the secant stiffness of a growing penalty is about half its tangent */
-#define LEAST 1e-3   /* sum of two stretches below which a cell counts as degenerate: no twist stiffness */
+#define FOLLOW 4.  /* factor on the negative stiffness in load steps; docs/reference/theory.md */
+#define RATE 2.    /* further one in time steps: the secant of a growing penalty is about half its tangent */
+#define LEAST 1e-3 /* sum of two stretches below which a cell counts as degenerate: no twist stiffness */
 #define RENEWED 0.01 /* relative change of a penalty that is reported */
 #define SAME 1e-12   /* relative change that is rounding */
 
@@ -68,7 +69,7 @@ struct _p_SbJump {
   SbPack *share;   /* [nbatch] fraction of a face's energy that this rank counts: 1, or 1/2 between ranks */
 };
 
-/* Nodes of a face: for each side the one on the face, then those opposite the three vertices, in the same order. */
+/* Nodes of a face: for each side that on the face, then those opposite its vertices, in the same order. */
 static void face_nodes(SbSpace s, const Face *face, PetscInt node[8])
 {
   const PetscInt plus = 4 * face->cell[0], minus = 4 * face->cell[1];
@@ -180,41 +181,22 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Raises the moduli of n cells to `factor` times the negative stiffness of twist modes, at F, with the first Piola stress P. */
-static void follow_twists(PetscInt n, const SbPack F[9], const SbPack P[9], PetscReal factor,
-                          PetscReal modulus[])
-{
-  SbPack U[9], stretch[3], V[9];
-
-  SbStretches(F, U, stretch, V);
-  for (PetscInt l = 0; l < n; l++) {
-    PetscReal principal[3] = {0.}; /* principal stresses in the axes of F */
-
-    for (int k = 0; k < 27; k++)
-      principal[k % 3] += U[3 * (k / 9) + k % 3][l] * P[k / 3][l] * V[3 * (k / 3 % 3) + k % 3][l];
-    for (int k = 0; k < 3; k++) {
-      const PetscReal sum = stretch[k][l] + stretch[(k + 1) % 3][l],
-                      twist = sum > LEAST ? (principal[k] + principal[(k + 1) % 3]) / sum : 0.;
-
-      modulus[l] = PetscMax(modulus[l], -factor * twist);
-    }
-  }
-}
-
-/* Updates the modulus m of each cell of a batch from x; keep: m may not decrease. Returns whether some m changed. */
+/*
+  Updates the modulus m of each cell of a batch from x: at least `factor` times the negative stiffness of
+  twist modes; keep: m may not decrease. Returns whether some m changed.
+*/
 static PetscBool follow_batch(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[],
                               PetscReal factor, PetscBool keep)
 {
   const SbMaterial m = region->material;
-  const PetscReal mu = m->mu;
   const PetscInt n = s->batch_n[b];
   PetscReal *modulus = s->jump->modulus + s->batch_cell[b], before[SB_BATCH], largest = 0.;
   PetscBool changed = PETSC_FALSE;
-  SbPack u[30], F[9], P[9];
+  SbPack u[30], F[9], P[9], U[9], stretch[3], V[9];
 
   for (PetscInt l = 0; l < n; l++) {
     before[l] = modulus[l];
-    if (!keep) modulus[l] = mu;
+    if (!keep) modulus[l] = m->mu;
   }
   sb_gather_strain(s, region, b, x, u);
   SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, F);
@@ -227,8 +209,19 @@ static PetscBool follow_batch(SbSpace s, const SbRegion *region, PetscInt b, con
     for (int k = 0; k < 9; k++) square += P[k][l] * P[k][l];
     largest = PetscMax(largest, square);
   }
-  if (largest >= 0.5 * PetscSqr(mu / factor))
-    follow_twists(n, (const SbPack *)F, (const SbPack *)P, factor, modulus);
+  if (largest >= 0.5 * PetscSqr(m->mu / factor)) SbStretches((const SbPack *)F, U, stretch, V);
+  for (PetscInt l = 0; l < n && largest >= 0.5 * PetscSqr(m->mu / factor); l++) {
+    PetscReal principal[3] = {0.}; /* principal stresses in the axes of F */
+
+    for (int k = 0; k < 27; k++)
+      principal[k % 3] += U[3 * (k / 9) + k % 3][l] * P[k / 3][l] * V[3 * (k / 3 % 3) + k % 3][l];
+    for (int k = 0; k < 3; k++) {
+      const PetscReal sum = stretch[k][l] + stretch[(k + 1) % 3][l],
+                      twist = sum > LEAST ? (principal[k] + principal[(k + 1) % 3]) / sum : 0.;
+
+      modulus[l] = PetscMax(modulus[l], -factor * twist);
+    }
+  }
   for (PetscInt l = 0; l < n; l++) changed = (PetscBool)(changed || modulus[l] != before[l]);
   return changed;
 }
@@ -255,7 +248,7 @@ SB_INLINE void gather_jumps(const PetscInt node[8 * SB_BATCH], const PetscReal x
   }
 }
 
-/* Projection coefficient of J - r on the jumps J of a face at x, in the inner product of the energy with c1; not negative, 1 for J = 0. */
+/* Projection coefficient of J - r on the jumps J of a face at x, by the energy; >= 0, 1 for J = 0. */
 static PetscReal held_part(SbJump j, PetscInt b, PetscInt l, const PetscReal x[], PetscReal J[9])
 {
   static const SbPack zero[9];
@@ -281,8 +274,8 @@ static PetscReal held_part(SbJump j, PetscInt b, PetscInt l, const PetscReal x[]
 }
 
 /*
-  Updates the penalties. With x the faces' energies are kept or, first, their forces; NULL: r = 0. changed: set if one changed on
-  this rank by a percent or more.
+  Updates the penalties. With x the faces' energies are kept or, first, their forces; NULL: r = 0. changed:
+  set if one changed on this rank by a percent or more.
 */
 static PetscErrorCode renew(SbSpace s, const PetscReal x[], PetscBool first, PetscBool *changed)
 {
@@ -360,7 +353,7 @@ PetscErrorCode SbSpaceSetJumps(SbSpace s, const PetscReal own[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Updates the moduli m of the penalty from x. Returns whether one changed on this rank, or faces have offsets r, which rotate. */
+/* Updates the moduli m of the penalty from x. Returns whether one changed, or faces have offsets r. */
 static PetscBool follow(SbSpace s, const PetscReal x[], SbStepsOf steps)
 {
   const PetscReal factor = steps == SB_STEPS_OF_LOAD ? FOLLOW : RATE * FOLLOW;
@@ -492,7 +485,7 @@ PetscInt SbJumpCliques(SbSpace s, const PetscInt **node)
   return s->jump->nbatch;
 }
 
-/* Entry (a, b) of the 8x8 matrix of a face, equal for the three components: sum_i d_ia d_ib c1 + (c1 + c0) D_a D_b. */
+/* Entry (a, b) of the 8x8 matrix of a face, sum_i d_ia d_ib c1 + (c1 + c0) D_a D_b. */
 void SbJumpMatrix(SbSpace s, PetscInt b, PetscInt l, PetscReal K[8][8])
 {
   static const PetscReal d[3][4] = {{1, -2, 1, 1}, {1, 1, -2, 1}, {1, 1, 1, -2}}, D[4] = {3, 0, 0, 0};

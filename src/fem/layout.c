@@ -1,18 +1,19 @@
 /*
   The nodes of a space, their owners, and the four nodes of each cell.
 
-  P1 has its nodes at the vertices: when every body is P1, nodes are the mesh's vertices, and its arrays are borrowed. P2 also has nodes at the
-  edges; one of the cells around an edge decides the owner, and all ranks with a cell there make the same choice. CR has one
-  node per face, DG four per cell, on its faces; node a of a cell lies opposite vertex a. A rank owns all nodes of its DG cells
-  and, of the CR faces between it and another rank, about every second one.
+  P1 has its nodes at the vertices: when every body is P1, nodes are the mesh's vertices, and its arrays are
+  borrowed. P2 also has nodes at the edges; one of the cells around an edge decides the owner, and all ranks
+  with a cell there make the same choice. CR has one node per face, DG four per cell, on its faces; node a of
+  a cell lies opposite vertex a. A rank owns all nodes of its DG cells and, of the CR faces between it and
+  another rank, about every second one.
 
-  A boundary face of a DG cell that an effect prescribes in all directions has an additional node, the support node, which the effect
-  prescribes. It acts as a rigid neighbour: the mean of the two sides is the support's
-  displacement, and the face terms (jump.c) connect the cell to it. The force of the cell on it is the reaction.
+  A boundary face of a DG cell that an effect prescribes in all directions has an additional node, the support
+  node, which the effect prescribes. It acts as a rigid neighbour: the mean of the two sides is the support's
+  displacement, and the face terms (jump.c) connect the cell to it. The cell's force on it is the reaction.
 
   Owned nodes are numbered in the order of the cells. Each rank numbers its own nodes; two broadcasts over the
-  cells distribute the numbers: the first gives a cell the numbers owned by the rank of its neighbour, the second sends
-  complete cells to the ghosts, including faces whose other side is not on this rank.
+  cells distribute the numbers: the first gives a cell the numbers owned by the rank of its neighbour, the
+  second sends complete cells to the ghosts, including faces whose other side is not on this rank.
 */
 #include "fem_impl.h"
 
@@ -27,24 +28,6 @@ static inline PetscInt face_towards(SbSpace s, PetscInt other, PetscInt cell)
   return f;
 }
 
-/* Whether this rank numbers the CR node between an owned cell and a ghost; both ranks get consistent answers. */
-static inline PetscBool takes_face(SbMesh mesh, PetscInt owned, PetscInt ghost)
-{
-  const PetscInt a = mesh->cell_orig[owned], b = mesh->cell_orig[ghost];
-
-  return (PetscBool)((a < b) == ((a + b) % 2 != 0));
-}
-
-/* Number of a CR node of an owned cell, UNKNOWN if another rank owns it. */
-static PetscInt number_face(SbSpace s, const PetscInt node[], PetscInt cell, PetscInt face, PetscInt *n)
-{
-  const PetscInt other = s->neighbour[4 * cell + face];
-
-  if (other >= 0 && other < cell) return node[4 * other + face_towards(s, other, cell)];
-  if (other >= s->mesh->ncell_owned && !takes_face(s->mesh, cell, other)) return UNKNOWN;
-  return (*n)++;
-}
-
 /* Edges of the local cells, and numbers of nodes at vertices and edges. */
 typedef struct {
   PetscInt n, *edge;     /* number of edges; [ncell][6] edges of each cell */
@@ -52,7 +35,7 @@ typedef struct {
   PetscInt *at, *vertex; /* [n], [nvert] number of its node, UNKNOWN: not yet */
 } Edges;
 
-/* Finds the edges; every second one belongs to the rank of its lowest P2 cell, the others to that of the highest. */
+/* Finds the edges; every second one belongs to the rank of its lowest cell, others to that of the highest. */
 static PetscErrorCode find_edges(SbSpace s, Edges *edges)
 {
   SbMesh mesh = s->mesh;
@@ -83,7 +66,8 @@ static PetscErrorCode find_edges(SbSpace s, Edges *edges)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The numbers of nodes, and how many per cell: s->cell_node, s->edge_node and s->dirichlet_node, the last two may be NULL. */
+/* The numbers of nodes, and how many per cell: s->cell_node, s->edge_node or NULL, s->dirichlet_node or NULL.
+   */
 static const PetscInt per_cell[3] = {4, 6, 4};
 static PetscInt *numbers(SbSpace s, int table)
 {
@@ -112,7 +96,14 @@ static void number_owned(SbSpace s, uint64_t prescribed, Edges *edges)
         if (SbSpaceCellElement(s, c)->weak && (sets & SB_ON_BOUNDARY) && (sets & prescribed))
           s->dirichlet_node[4 * c + a] = n++;
       } else if (per[2]) {
-        node[4 * c + a] = number_face(s, node, c, a, &n);
+        const PetscInt other = s->neighbour[4 * c + a], orig = mesh->cell_orig[c],
+                       its = other < mesh->ncell_owned ? 0 : mesh->cell_orig[other];
+
+        /* of the faces between an owned cell and a ghost every second one: both ranks agree */
+        if (other >= 0 && other < c)
+          node[4 * c + a] = node[4 * other + face_towards(s, other, c)];
+        else if (other < mesh->ncell_owned || (orig < its) == ((orig + its) % 2 != 0))
+          node[4 * c + a] = n++;
       } else if (v < mesh->nvert_owned) {
         if (edges->vertex[v] == UNKNOWN) edges->vertex[v] = n++;
         node[4 * c + a] = edges->vertex[v];
@@ -200,25 +191,10 @@ static PetscErrorCode localise(SbSpace s)
 }
 
 /*
-  Sets of a node at a face. On the boundary those of the face. Inside: sets that contain the triangle or its three vertices;
-  the result is the same from either cell, on any rank.
-*/
-static uint64_t face_sets(SbMesh mesh, PetscInt cell, PetscInt face)
-{
-  const uint64_t own = mesh->face_set[4 * cell + face];
-  uint64_t common = ~(uint64_t)0;
-
-  if (own & SB_ON_BOUNDARY) return own & ~SB_ON_BOUNDARY;
-  for (PetscInt a = 0; a < 4; a++) {
-    if (a != face) common &= mesh->vert_set[mesh->cell[4 * cell + a]];
-  }
-  return own | common;
-}
-
-/*
-  Position, body and sets of the nodes at edges. A geometric set, or a group without triangles and tets, contains an edge if it contains both
-  vertices; other groups contain the edges of their triangles and tets, so that no edge through a thin body is in the group of its surface. Owners
-  have all cells around their edges, and send the result to the ghosts.
+  Position, body and sets of the nodes at edges. A geometric set, or a group without triangles and tets,
+  contains an edge if it contains both vertices; other groups contain the edges of their triangles and tets,
+  so that no edge through a thin body is in the group of its surface. Owners have all cells around their
+  edges, and send the result to the ghosts.
 */
 static PetscErrorCode describe_edges(SbSpace s, const Edges *edges)
 {
@@ -283,14 +259,17 @@ static PetscErrorCode describe_nodes(SbSpace s, const Edges *edges)
       for (int k = 0; k < 3; k++) x[k] = mesh->x[3 * v[face] + k];
     } else {
       const PetscInt a = v[(face + 1) % 4], b = v[(face + 2) % 4], c = v[(face + 3) % 4];
+      const uint64_t own = mesh->face_set[i],
+                     common = mesh->vert_set[a] & mesh->vert_set[b] & mesh->vert_set[c];
 
-      s->node_set[node] = face_sets(mesh, i / 4, face);
+      /* on the boundary the sets of the face; inside those of the triangle or its three vertices */
+      s->node_set[node] = own & SB_ON_BOUNDARY ? own & ~SB_ON_BOUNDARY : own | common;
       s->node_orig[node] = PetscMin(s->node_orig[node], mesh->Nvert + 4 * mesh->cell_orig[i / 4] + face);
       for (int k = 0; k < 3; k++) x[k] = (mesh->x[3 * a + k] + mesh->x[3 * b + k] + mesh->x[3 * c + k]) / 3.;
     }
   }
   if (s->edge_node) PetscCall(describe_edges(s, edges));
-  /* a support node has the position and the sets of the node of its face: an effect that prescribes the face prescribes it */
+  /* a support node has position and sets of the face's node: effects that prescribe the face act on it */
   for (PetscInt i = 0; s->dirichlet_node && i < 4 * mesh->ncell; i++) {
     const PetscInt own = s->cell_node[i], node = s->dirichlet_node[i];
 
@@ -378,8 +357,9 @@ PetscErrorCode SbLayoutDestroy(SbSpace s)
 }
 
 /*
-  Opposite nodes across the faces of DG cells, and the weights of both sides. The mean of the two sides of a face is weighted by (2 mu + lambda) / |T|: then the
-  constant in the bound of the lifting does not depend on the volumes and moduli on the two sides (docs/reference/theory.md).
+  Opposite nodes across the faces of DG cells, and the weights of both sides. The mean of the two sides of a
+  face is weighted by (2 mu + lambda) / |T|: then the constant in the bound of the lifting does not depend on
+  the volumes and moduli on the two sides (docs/reference/theory.md).
 */
 PetscErrorCode SbLayoutCliques(SbSpace s)
 {

@@ -3,17 +3,17 @@
 
   With rotated gradients h_a = R grad phi_a the product A p of a cell is
     H = sum_a p_a h_a^T,  T = 2 mu sym(H) + lambda tr(H) I,  q_a = V T h_a,
-  linear elasticity in the rotated frame; R enters only h. A new state costs a rotation and nine products per cell,
-  an application about as much as a product with a stored matrix, and no blocks are formed: with few iterations per
-  step this is several times cheaper than assembly.
+  linear elasticity in the rotated frame; R enters only h. A new state costs a rotation and nine products per
+  cell, an application about as much as a product with a stored matrix, and no blocks are formed: with few
+  iterations per step this is several times cheaper than assembly.
 
-  A cell of P2 has the rotated gradients of its four points, and lambda acts on the mean of tr(H) over them (quadratic.c). With
-  far and near the two barycentric coordinates of the points, point q sees a linear cell whose vertices i move by
+  A cell of P2 has the rotated gradients of its four points, and lambda acts on the mean of tr(H) over them
+  (quadratic.c). With far and near the two coordinates of the points, point q sees a linear cell; i moves by
     (4 far - 1) p_i + 4 far sum_j p_ij + 4 (near - far) p_iq,   p_ii = p_i:
   all terms but the last are the same at the four points.
 
-  Vectors are copied to four doubles per node, so that a node is one vector load or store. Eight cells are evaluated at
-  a time: 4x4 transposes turn eight loads of a node into lanes.
+  Vectors are copied to four doubles per node, so that a node is one vector load or store. Eight cells are
+  evaluated at a time: 4x4 transposes turn eight loads of a node into lanes.
 
   Prescribed unknowns: p is zero there, and their rows are a multiple of the identity.
   Not handled: the consistent mass, tangents of effects.
@@ -102,7 +102,7 @@ SB_INLINE void forces(const Eight H[9], const Eight h[9], const Eight *V, PetscR
   for (int i = 0; i < 3; i++) f[0][i] = -(f[1][i] + f[2][i] + f[3][i]);
 }
 
-/* q += A p for the batches of one region, whose gradients are `stride` apart. Padding lanes have volume zero. */
+/* q += A p for the batches of one region, gradients `stride` apart. Padding lanes have volume zero. */
 SB_KERNEL static void apply_region(PetscInt nbatch, const PetscInt *node, PetscInt stride,
                                    const SbPack *gradients, const SbPack *volume, PetscReal lambda,
                                    PetscReal mu, const PetscReal *p, PetscReal *q)
@@ -375,33 +375,34 @@ PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], con
 
     for (PetscInt b = region->bstart; b < region->bend; b++) {
       const PetscInt *corner = s->batch_clique + s->width * SB_BATCH * b;
+      const SbPoints points = SbBatchPoints(s, region, b);
       PetscBool any = PETSC_FALSE;
-      SbPack K[SB_PAIRS][9] __attribute__((aligned(64)));
+      SbPack K[SB_PAIRS][9] __attribute__((aligned(64))), B[4][10][9] __attribute__((aligned(64)));
+      SbPack factor, volume[30] = {{0}};
 
       for (PetscInt l = 0; l < region->nnode * SB_BATCH; l++)
         any = (PetscBool)(any || wanted[corner[l]] >= 0);
       if (!any) continue;
-      if (region->quadratic) {
-        const SbPack *h = (const SbPack *)o->h + 9 * sb_rotation_points(s) * b;
-        SbPack B[4][10][9] __attribute__((aligned(64))), V, one[9], factor, force[12], volume[30] = {{0}};
+      // the points, and for P2 lambda/V b b^T with b = sum_q V_q h_q (quadratic.c)
+      for (int q = 0; q < points.n; q++) {
+        const SbPack *R = (const SbPack *)o->R + 9 * (sb_rotation_points(s) * b + q);
+        SbPack V;
 
-        // the points in the rotated frame, and lambda/V b b^T with b = sum_q V_q h_q (quadratic.c)
-        for (PetscInt l = 0; l < SB_BATCH; l++) {
-          V[l] = 0.25 * s->batch_V[b][l];
-          factor[l] = mean && V[l] > 0. ? o->lambda[r] / (4. * V[l]) : 0.;
-          for (int e = 0; e < 9; e++) one[e][l] = e % 4 == 0;
-        }
-        for (int q = 0; q < 4; q++) {
-          SbCellBlocksIsotropic(h + 9 * q, V, mean ? 0. : o->lambda[r], o->mu[r], NULL, B[q]);
-          SbCellForce(h + 9 * q, V, (const SbPack *)one, force);
-          SbQuadraticAdd(SbRuleQuadratic.L[q], (const SbPack *)force, volume);
-        }
-        SbQuadraticBlocks((const SbPack(*)[10][9])B, factor, (const SbPack *)volume, K);
-      } else
-        SbCellBlocksIsotropic(s->batch_g + 9 * b, s->batch_V[b], o->lambda[r], o->mu[r],
-                              (const SbPack *)o->R + 9 * sb_rotation_points(s) * b, K);
+        SbPointVolume(&points, q, V);
+        SbCellBlocksIsotropic(points.g, V, mean ? 0. : o->lambda[r], o->mu[r], R, B[q]);
+        if (region->quadratic) SbPointForce(&points, q, R, volume);
+      }
+      for (PetscInt l = 0; l < SB_BATCH; l++) {
+        const PetscReal V = s->batch_V[b][l];
+
+        factor[l] = mean && V > 0. ? o->lambda[r] / V : 0.;
+      }
+      if (region->quadratic)
+        SbQuadraticBlocks(points.rule, (const SbPack(*)[10][9])B, factor, (const SbPack *)volume, K);
+      else
+        memcpy(K, B[0], sizeof(B[0]));
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        const size_t start = SbPlanCellOffset(s, s->batch_cell[b] + l);
+        const size_t start = (size_t)(b * s->width * s->width * SB_BATCH + l);
 
         for (PetscInt turn = 0; turn < 2 * npair; turn++) {
           const PetscInt pair = turn / 2, a = turn % 2 ? SbPairB[pair] : SbPairA[pair],

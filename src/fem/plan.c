@@ -1,17 +1,17 @@
 /*
   The assembly plan: the graph of node blocks and, for each cell, the positions of its blocks in the matrix.
 
-  Built in one loop over nodes: the cells (and with CR and DG the faces) around an owned node give the columns of its row;
-  at the same time the positions of the blocks of that row are stored for the cells, without a search. The face terms are constant within a step:
-  they are summed here, and every assembly starts from them. Measured at 200k tets this
-  takes a small fraction of the time of DMCreateMatrix for the same graph (`make bench`, row matrix_setup).
+  Built in one loop over nodes: the cells (and with CR and DG the faces) around an owned node give the columns
+  of its row; at the same time the positions of the blocks of that row are stored for the cells, without a
+  search. The face terms are constant within a step: they are summed here, and every assembly starts from
+  them. At 200k tets this takes a small fraction of the time of DMCreateMatrix (`make bench`).
 */
 #include "fem_impl.h"
 #include "sblog.h"
 
 /*
-  Cliques of coupled nodes in lanes: those of the cells (width nodes each) or of the faces (eight). The slot of node a, lane l,
-  batch b is SB_BATCH (nodes b + a) + l. A padding lane counts as the group that it repeats, and gets its positions.
+  Cliques of coupled nodes in lanes: those of the cells (width nodes each) or of the faces (eight). The slot
+  of node a, lane l, batch b is SB_BATCH (nodes b + a) + l. Padding lanes count as the group that they repeat.
 */
 typedef struct {
   const PetscInt *node;
@@ -23,27 +23,6 @@ typedef struct {
 static inline const PetscInt *slot_group(const Groups *g, PetscInt slot)
 {
   return g->node + slot / (g->nodes * SB_BATCH) * (g->nodes * SB_BATCH) + slot % SB_BATCH;
-}
-
-/* Binary search for the cell's region: regions are ranges of cells and of batches. */
-size_t SbPlanCellOffset(SbSpace s, PetscInt cell)
-{
-  PetscInt low = 0, high = s->nregion - 1, lane;
-  const SbRegion *region;
-
-  while (low < high) {
-    const PetscInt middle = (low + high + 1) / 2;
-
-    if (s->region[middle].cstart <= cell)
-      low = middle;
-    else
-      high = middle - 1;
-  }
-  region = &s->region[low];
-  lane = (cell - region->cstart) % SB_BATCH;
-  return (size_t)(region->bstart + (cell - region->cstart) / SB_BATCH) * (size_t)(s->width * s->width) *
-           SB_BATCH +
-         (size_t)lane;
 }
 
 void SbPlanSumFaceTerms(SbSpace s)
@@ -192,7 +171,7 @@ PetscErrorCode SbPlanDestroy(SbPlan *plan)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* SBAIJ on one rank: the first upper block of each row, and the positions of each cell's blocks in the upper triangle. */
+/* SBAIJ on one rank: the first upper block of each row, and of each cell's blocks in the upper triangle. */
 static PetscErrorCode plan_upper(SbSpace s, SbPlan p)
 {
   const PetscInt nrow = s->nnode_owned;
@@ -227,9 +206,9 @@ static PetscErrorCode plan_upper(SbSpace s, SbPlan p)
 }
 
 /*
-  Pattern of a matrix: zero blocks are inserted row by row, and the matrix is assembled. The diagonal part of AIJ is set three
-  scalar rows at a time: with MAT_SORTED_FULL (sorted, complete rows) PETSc copies them unchanged, six times faster at
-  200,000 tets than block by block.
+  Pattern of a matrix: zero blocks are inserted row by row, and the matrix is assembled. The diagonal part of
+  AIJ is set three scalar rows at a time: with MAT_SORTED_FULL (sorted, complete rows) PETSc copies them
+  unchanged, six times faster at 200,000 tets than block by block.
 */
 static PetscErrorCode fill_pattern(SbSpace s, SbPlan p, Mat A, SbMatrixKind kind)
 {
@@ -267,7 +246,7 @@ static PetscErrorCode fill_pattern(SbSpace s, SbPlan p, Mat A, SbMatrixKind kind
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lists the blocks that have a prescribed unknown in their row or column, to be cleared after each assembly. */
+/* Lists the blocks with a prescribed unknown in their row or column, to be cleared after each assembly. */
 static PetscErrorCode plan_fixed(SbSpace s, SbPlan p)
 {
   PetscFunctionBeginUser;

@@ -1,30 +1,26 @@
 /*
   Cells of P2: strains at the four points of SbRuleQuadratic, and the volumetric energy.
 
-  A law is psi = psi_mu(F) + lambda/2 theta(F)^2 (SbMaterialOps.pressure). With theta at each of the points all of them would be constrained
-  near nu = 1/2, and the element would lock. Here the energy of a cell is
+  A law is psi = psi_mu(F) + lambda/2 theta(F)^2 (SbMaterialOps.pressure). With theta at each of the points
+  all of them would be constrained near nu = 1/2, and the element would lock. Here the energy of a cell is
 
     W = sum_q w_q V psi_mu(F_q) + V lambda/2 m^2,   m = (1/V) int theta dV:
 
-  one constraint and one constant pressure per cell (P2/P0; Simo, Taylor and Pister 1985 for J - 1). Force, tangent and stress follow from
-  W. Where theta is J - 1, m is the exact change of the volume of the cell: det F is cubic. Otherwise m is that of the four points,
-  which is exact for the linear law and St. Venant's and Kirchhoff's.
+  one constraint and one constant pressure per cell (P2/P0; Simo, Taylor and Pister 1985 for J - 1). Force,
+  tangent and stress follow from W. Where theta is J - 1, m is the exact change of the volume of the cell: det
+  F is cubic. Otherwise m is that of the four points, exact for linear and stvk.
 
-  Pressures of single cells may oscillate on coarse meshes with supports on the whole boundary; means over the cells around a vertex do not.
+  Pressures of single cells may oscillate on coarse meshes supported all around; means at vertices do not.
 
-  Cells that are curved at rest form separate regions, with gradients and a fraction of the volume at each of the points of SbRuleQuintic,
-  whose degree suffices: a constant stress and a constant pressure are in equilibrium.
+  Cells that are curved at rest form separate regions, with gradients and a fraction of the volume at each of
+  the points of SbRuleQuintic, whose degree suffices: constant stress and pressure are in equilibrium.
 */
 #include "fem_impl.h"
 
 SbPoints SbBatchPoints(SbSpace s, const SbRegion *region, PetscInt b)
 {
-#define SAME(x)            \
-  {                        \
-    x, x, x, x, x, x, x, x \
-  }
-  static const SbPack one[1] = {SAME(1.)}, quarter[4] = {SAME(0.25), SAME(0.25), SAME(0.25), SAME(0.25)};
-#undef SAME
+  static const SbPack one[1] = {{[0 ... SB_BATCH - 1] = 1.}},
+                      quarter[4] = {[0 ... 3] = {[0 ... SB_BATCH - 1] = 0.25}};
   const PetscInt k = SB_POINTS * (b - region->bstart);
   SbPoints at = {1, 0, NULL, (const SbPack *)s->batch_g + 9 * b, (const SbPack *)s->batch_V + b, one};
 
@@ -173,9 +169,12 @@ void SbBatchState(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal
 }
 
 /*
-  Pressures of a linearisation. A step du of Newton's method satisfies the linearised theta + D : dF, D = dtheta/dF, but theta(u + du) has an error of
-  second order: in bending and rotation p(u + du) is lambda times this error, orders of magnitude above any stress, and makes the geometric stiffness useless. With the pressure as an unknown and p = -lambda theta as a second equation, the tangent after the step has p(u) + dp/dF : dF; after its elimination the right-hand side
-  is still the residual of u (Magisano, Leonetti and Garcea, Int. J. Numer. Methods Eng. 109, 2017: all stresses). Both formulations have the same solution.
+  Pressures of a linearisation. A step du of Newton's method satisfies the linearised theta + D : dF, D =
+  dtheta/dF, but theta(u + du) has an error of second order: in bending and rotation p(u + du) is lambda times
+  this error, orders of magnitude above any stress, and makes the geometric stiffness useless. With the
+  pressure as an unknown and p = -lambda theta as a second equation, the tangent after the step has p(u) +
+  dp/dF : dF; after its elimination the right-hand side is still the residual of u (Magisano, Leonetti and
+  Garcea, Int. J. Numer. Methods Eng. 109, 2017: all stresses). Both formulations have the same solution.
 */
 PetscErrorCode SbSpaceLinearisePressure(SbSpace s, Vec U, Vec step, PetscReal along, PetscReal part)
 {

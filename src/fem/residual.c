@@ -1,21 +1,21 @@
 /*
   Internal forces, inertial forces, and stresses and strains of cells.
 
-  f_a = V P grad phi_a with P from the law, and beta (dP/dF : H) for stiffness-proportional damping, H = grad v. Ghost cells are
-  evaluated, too, so that forces on owned nodes are complete. Energies sum over owned cells only.
+  f_a = V P grad phi_a with P from the law, and beta (dP/dF : H) for stiffness-proportional damping, H = grad
+  v. Ghost cells are evaluated, too, so that forces on owned nodes are complete. Energies are of owned ones.
 
-  The volumetric pressure is p = -lambda theta(F), theta the law's measure of the change of volume: for a Poisson's ratio near 0.5
-  lambda is large and theta small. P1 has fewer displacements than volume constraints of cells: it locks, and p alternates
-  between neighbours. CR and DG satisfy the constraints in the mean of each cell and p converges (Crouzeix and Raviart 1973; Hansbo and
-  Larson 2002).
+  The volumetric pressure is p = -lambda theta(F), theta the law's measure of the change of volume: for a
+  Poisson's ratio near 0.5 lambda is large and theta small. P1 has fewer displacements than volume constraints
+  of cells: it locks, and p alternates between neighbours. CR and DG satisfy the constraints in the mean of
+  each cell and p converges (Crouzeix and Raviart 1973; Hansbo and Larson 2002).
 */
 #include "fem_impl.h"
 #include "sbkernel.h"
 #include "sblog.h"
 
 /*
-  P2: each point with its fraction of the volume; the volumetric part by the mean of the cell. Damping likewise:
-  mu (H + R H^T R) at the points, lambda times the mean of R : H.
+  P2: each point with its fraction of the volume; the volumetric part by the mean of the cell. Damping
+  likewise: mu (H + R H^T R) at the points, lambda times the mean of R : H.
 */
 void SbRegionForces(SbSpace s, const SbRegion *region, PetscBool elastic, PetscReal beta,
                     const SbStage *stage, PetscReal f[])

@@ -1,13 +1,13 @@
 /*
   The finite element space: nodes, regions of cells with one material law, and the cells' geometry in batches.
 
-  Nodes are numbered on each rank with the owned ones first and the ghosts after them, which is the storage order of a
-  ghosted PETSc vector: the global vector and the local array that the kernels read are the same memory, and an update
-  moves ghost values only. With one layer of overlap every cell with an owned node is local, so a residual or a
-  matrix row is complete without communication.
+  Nodes are numbered on each rank with the owned ones first and the ghosts after them, which is the storage
+  order of a ghosted PETSc vector: the global vector and the local array that the kernels read are the same
+  memory, and an update moves ghost values only. With one layer of overlap every cell with an owned node is
+  local, so a residual or a matrix row is complete without communication.
 
-  Cells are grouped in regions (one body, one law, owned or ghost), each divided into batches of SB_BATCH cells with
-  interleaved gradients and volumes. layout.c numbers the nodes; jump.c has the face terms of CR and DG.
+  Cells are grouped in regions (one body, one law, owned or ghost), each divided into batches of SB_BATCH
+  cells with interleaved gradients and volumes. layout.c numbers the nodes; jump.c: face terms of CR and DG.
 */
 #include "fem_impl.h"
 #include "sblog.h"
@@ -31,7 +31,7 @@ static PetscBool is_curved(SbSpace s, PetscInt cell)
   return (PetscBool)(s->edge_node && s->mesh->edge_off && (s->mesh->cell_set[cell] & SB_CURVED));
 }
 
-/* Finds the regions: owned and ghost cells are each sorted by body, inclusion and curved edges, so that a region is a range of cells. */
+/* Finds the regions: owned and ghost cells are sorted by body, inclusion, curved edges. */
 static PetscErrorCode find_regions(SbSpace s, const SbMaterial material[], const SbElement element[])
 {
   SbMesh mesh = s->mesh;
@@ -67,7 +67,7 @@ static PetscErrorCode find_regions(SbSpace s, const SbMaterial material[], const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A curved P2 cell: gradients and volume at each point, as of a P1 tet with the map's derivatives there; fills lane l of batch b. */
+/* A curved P2 cell: at each point those of a P1 tet; fills lane l of batch b. */
 static void tabulate_curved(SbSpace s, SbRegion *region, PetscInt b, PetscInt cell, PetscInt l)
 {
   const PetscInt k = b - region->bstart;

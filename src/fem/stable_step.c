@@ -1,17 +1,18 @@
 /*
   Critical time step of explicit integration.
 
-  An undamped oscillator of frequency w is stable up to h w = 2; with the damping ratio zeta = (alpha/w + beta w)/2, whose
-  force uses the old velocity, up to h w = 2 (sqrt(1 + zeta^2) - zeta). Stiffness-proportional damping can reduce
-  this step many times.
+  An undamped oscillator of frequency w is stable up to h w = 2; with the damping ratio zeta = (alpha/w + beta
+  w)/2, whose force uses the old velocity, up to h w = 2 (sqrt(1 + zeta^2) - zeta). Stiffness-proportional
+  damping can reduce this step many times.
 
-  The highest frequency of the mesh at rest comes from the power method on M^-1 K: the growth of y = M^-1 K x in the norm of M converges to w^2
-  from below. After n steps from a random start the relative error is about ln(unknowns) / (2 n):
-  a few percent of w, which callers cover by a safety factor. Each step costs one evaluation of forces. The
-  start rotates with the body, so that the result does not depend on its orientation, nor on the number of ranks.
+  The highest frequency of the mesh at rest comes from the power method on M^-1 K: the growth of y = M^-1 K x
+  in the norm of M converges to w^2 from below. After n steps from a random start the relative error is about
+  ln(unknowns) / (2 n): a few percent of w, which callers cover by a safety factor. Each step costs one
+  evaluation of forces. The start rotates with the body, so that the result does not depend on its
+  orientation, nor on the number of ranks.
 
-  The consistent mass matrix of a tet is at least 1/5 of its lumped one for P1, 9/70 for P2, and 1 for CR and DG, which
-  bounds w for a consistent mass.
+  The consistent mass matrix of a tet is at least 1/5 of its lumped one for P1, 9/70 for P2, and 1 for CR and
+  DG, which bounds w for a consistent mass.
 
   Not handled: frequencies that increase where a body is compressed.
 */
@@ -20,7 +21,7 @@
 
 #define POWER_STEPS 100
 
-/* Lower bound of the highest angular frequency of K x = w^2 M x with the lumped mass; 0 if nothing can move. */
+/* Lower bound of the highest angular frequency of K x = w^2 M x, M lumped; 0 if nothing can move. */
 static PetscErrorCode highest_frequency(SbSpace s, PetscReal *w)
 {
   const PetscInt n = 3 * s->nnode_owned;

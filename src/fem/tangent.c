@@ -1,12 +1,12 @@
 /*
   The tangent A = shift_a M + shift_v C + shift_k K(u), written directly to the value arrays of the matrix.
 
-  K is summed from the cells' blocks (sbelement.h) at the positions of the assembly plan (plan.c); C = alpha M + beta K per
-  region; the lumped M is added to the diagonal blocks. Cells are evaluated in batches: the kernel is vectorised over the lanes, and the
-  blocks of all lanes are added to the matrix (insert.c), which clears each row before its first block.
+  K is summed from the cells' blocks (sbelement.h) at the positions of the assembly plan (plan.c); C = alpha M
+  + beta K per region; the lumped M is added to the diagonal blocks. Cells are evaluated in batches: the
+  kernel is vectorised over the lanes, and the blocks of all lanes are added to the matrix (insert.c), which
+  clears each row before its first block.
 
-  petsc/private/petscimpl.h: there is no public call to increase the state of a parallel matrix after writing to its
-  sequential parts.
+  petsc/private/petscimpl.h: no public call increases the state of a parallel matrix.
 
   Prescribed unknowns: their rows and columns are zero except for the diagonal entry, which keeps its
   magnitude, so that the scaling of the matrix is unchanged.
@@ -122,7 +122,7 @@ static void scaled_volumes(const SbPack V, PetscReal factor, SbPack W)
   for (int l = 0; l < SB_BATCH; l++) W[l] = factor * V[l];
 }
 
-/* Volumetric part left out of a cell's blocks: D (SbMaterialOps.volumetric), and the factor on lambda and mu. */
+/* Volumetric part left out of a cell's blocks: D (SbMaterialOps.volumetric), and the factor on its moduli. */
 typedef struct {
   SbPack D[9];
   PetscReal factor;
@@ -138,80 +138,57 @@ SB_KERNEL static void remove_volumetric(PetscReal lambda, const SbPack D[restric
   }
 }
 
-/* Blocks of a law with a full tangent dP/dF; damping is added; the volumetric part cannot be split off. */
-static void general_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
-                           const SbPack F[9], Split *split, SbPack K[10][9])
+/* Blocks of a law at F, without mass; `split` NULL: with the volumetric part. */
+static void law_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
+                       const SbPack F[9], Split *split, SbPack K[10][9])
 {
-  SbPack C[81], W;
+  const PetscReal both = x->stiffness + x->damping, lambda = split ? 0. : x->lambda;
+  SbPack R[9], T[9], C[81], D[10][9], W;
 
-  m->ops.tangent(m, F, C);
-  if (split) {
-    m->ops.volumetric(m, F, split->D);
-    split->factor = x->stiffness;
-    remove_volumetric(x->lambda, (const SbPack *)split->D, C);
-  }
-  if (x->pressure && m->ops.curvature) m->ops.curvature(m, F, *x->pressure, C);
-  scaled_volumes(V, x->stiffness, W);
-  SbCellBlocksGeneral(g, W, (const SbPack *)C, K);
-  if (x->damping != 0.) {
-    SbPack R[9], D[10][9];
+  scaled_volumes(V, both, W);
+  if (m->linear || m->ops.frame) {
+    /* Hooke's tensor rotated by R, with its damping */
+    m->ops.frame(m, F, R);
+    SbCellBlocksIsotropic(g, W, lambda, x->mu, (const SbPack *)R, K);
+  } else if (m->ops.spin && x->stiffness != 0.) {
+    /* the same plus a tensor T on the spins (sbelement.h); damping has this form, T = -mu I */
+    m->ops.spin(m, F, R, T);
+    /* T is proportional to pressure - 2 mu; a filtered tangent clips it to be semi-definite */
+    for (int l = 0; x->pressure && l < SB_BATCH; l++) {
+      const PetscReal p =
+        m->tangent == SB_TANGENT_EXACT_SPD ? PetscMax(0., (*x->pressure)[l]) : (*x->pressure)[l];
 
+      for (int k = 0; k < 9; k++) T[k][l] *= 1. - p / (2. * x->mu);
+    }
+    for (int k = 0; x->damping != 0. && k < 9; k++) {
+      const PetscReal rest = k % 4 ? 0. : x->damping * x->mu;
+
+      for (int l = 0; l < SB_BATCH; l++) T[k][l] = (x->stiffness * T[k][l] - rest) / both;
+    }
+    SbCellBlocksCorotated(g, W, lambda, x->mu, (const SbPack *)R, (const SbPack *)T, K);
+  } else {
+    /* the full tangent dP/dF, without its volumetric part; damping is added */
+    m->ops.tangent(m, F, C);
+    if (split) {
+      m->ops.volumetric(m, F, split->D);
+      split->factor = x->stiffness;
+      remove_volumetric(x->lambda, (const SbPack *)split->D, C);
+    }
+    if (x->pressure && m->ops.curvature) m->ops.curvature(m, F, *x->pressure, C);
+    scaled_volumes(V, x->stiffness, W);
+    SbCellBlocksGeneral(g, W, (const SbPack *)C, K);
+    if (x->damping == 0.) return;
     SbPolar(F, R);
     scaled_volumes(V, x->damping, W);
     SbCellBlocksIsotropic(g, W, x->lambda, x->mu, (const SbPack *)R, D);
     for (int k = 0; k < 90; k++) {
       for (int l = 0; l < SB_BATCH; l++) K[k / 9][k % 9][l] += D[k / 9][k % 9][l];
     }
+    return;
   }
-}
-
-/* Blocks of a law with Hooke's tensor rotated by R plus a tensor T on the spins (sbelement.h) as tangent; damping has the same form, T = -mu I. */
-static void spin_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
-                        const SbPack F[9], Split *split, SbPack K[10][9])
-{
-  const PetscReal both = x->stiffness + x->damping, lambda = split ? 0. : x->lambda;
-  SbPack R[9], T[9], W;
-
-  m->ops.spin(m, F, R, T);
-  /* T is proportional to pressure - 2 mu; a filtered tangent clips it to be semi-definite */
-  for (int l = 0; x->pressure && l < SB_BATCH; l++) {
-    const PetscReal p =
-      m->tangent == SB_TANGENT_EXACT_SPD ? PetscMax(0., (*x->pressure)[l]) : (*x->pressure)[l];
-
-    for (int k = 0; k < 9; k++) T[k][l] *= 1. - p / (2. * x->mu);
-  }
-  for (int k = 0; x->damping != 0. && k < 9; k++) {
-    const PetscReal rest = k % 4 ? 0. : x->damping * x->mu;
-
-    for (int l = 0; l < SB_BATCH; l++) T[k][l] = (x->stiffness * T[k][l] - rest) / both;
-  }
-  scaled_volumes(V, both, W);
-  SbCellBlocksCorotated(g, W, lambda, x->mu, (const SbPack *)R, (const SbPack *)T, K);
-  if (split) {
-    memcpy(split->D, R, sizeof(R));
-    split->factor = both;
-  }
-}
-
-/* Blocks of a law at F, without mass; `split` NULL: with the volumetric part. */
-static void law_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
-                       const SbPack F[9], Split *split, SbPack K[10][9])
-{
-  const PetscReal both = x->stiffness + x->damping;
-  SbPack R[9], W;
-
-  if (m->linear || m->ops.frame) {
-    /* Hooke's tensor rotated by R, with its damping */
-    m->ops.frame(m, F, R);
-    scaled_volumes(V, both, W);
-    SbCellBlocksIsotropic(g, W, split ? 0. : x->lambda, x->mu, m->linear ? NULL : (const SbPack *)R, K);
-    if (!split) return;
-    memcpy(split->D, R, sizeof(split->D));
-    split->factor = both;
-  } else if (m->ops.spin && x->stiffness != 0.)
-    spin_blocks(m, g, V, x, F, split, K);
-  else
-    general_blocks(m, g, V, x, F, split, K);
+  if (!split) return;
+  memcpy(split->D, R, sizeof(split->D));
+  split->factor = both;
 }
 
 /* K_ab += factor b_a b_b^T */
@@ -228,16 +205,18 @@ SB_KERNEL static void add_dyad(const SbPack factor, const SbPack b[restrict 30],
 }
 
 /*
-  Volumetric modulus of a P2 cell that stays in the matrix when the volumetric part is split off. With one pressure per cell the inf-sup constant of P2 is small on some meshes; the remaining modulus stiffens the modes that the
-  pressures hardly constrain. Iterations of -solver pressure, bar at nu 0.4999, 3, 6, 8, 12 cells across: 93, 168, 212, - without; 54, 62, 77, 102 with 10; 92, 105, 111, 118 with 30.
+  Volumetric modulus of a P2 cell that stays in the matrix when the volumetric part is split off. With one
+  pressure per cell the inf-sup constant of P2 is small on some meshes; the remaining modulus stiffens the
+  modes that the pressures hardly constrain. Iterations of -solver pressure, bar at nu 0.4999, 3, 6, 8, 12
+  cells across: 93, 168, 212, - without; 54, 62, 77, 102 with 10; 92, 105, 111, 118 with 30.
 */
 #define KEPT 10.      /* times mu, */
 #define KEPT_MOST 0.9 /* but at most this fraction of lambda */
 
 /*
-  Blocks of a P2 batch (quadratic.c): the law at the points, with the second derivative of theta times the mean pressure; lambda/V b b^T, b = V dm/du; and,
-  for theta = J - 1, V lambda m d^2 m/du^2, which a filtered tangent omits. For damping R replaces D in b. With `out`, b is stored
-  there and lambda/V b b^T is not added.
+  Blocks of a P2 batch (quadratic.c): the law at the points, with the second derivative of theta times the
+  mean pressure; lambda/V b b^T, b = V dm/du; and, for theta = J - 1, V lambda m d^2 m/du^2, which a filtered
+  tangent omits. For damping R replaces D in b. With `out`, b is stored there and lambda/V b b^T is not added.
 */
 static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal displacement[],
                              const Factors *x, PetscInt batch, const SbVolumetric *out, SbPack K[SB_PAIRS][9])
@@ -272,10 +251,7 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
   }
   if (out) memset(out->b + out->stride * batch, 0, sizeof(b));
   if (split) memcpy(out->b + out->stride * batch, b, sizeof(b));
-  if (points.step)
-    SbCurvedBlocks((const SbPack(*)[10][9])B, factor, (const SbPack *)b, K);
-  else
-    SbQuadraticBlocks((const SbPack(*)[10][9])B, factor, (const SbPack *)b, K);
+  SbQuadraticBlocks(points.rule, (const SbPack(*)[10][9])B, factor, (const SbPack *)b, K);
   if (!mean) return;
   if (m->jacobian && law->tangent != SB_TANGENT_EXACT_SPD) {
     const SbPointRule *rule = SbVolumeRule(&points);
@@ -301,29 +277,6 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
   }
   for (int l = 0; l < SB_BATCH; l++) factor[l] = (*V)[l] > 0. ? x->lambda * x->damping / (*V)[l] : 0.;
   add_dyad(factor, (const SbPack *)b, K);
-}
-
-/* Stores b_a = V D grad psi_a and the moduli of a batch. */
-static void keep_volumetric(SbSpace s, const Factors *x, PetscInt batch, const Split *split,
-                            const SbVolumetric *out)
-{
-  const SbPack *g = s->batch_g + 9 * batch;
-  SbPack *b = out->b + out->stride * batch;
-
-  for (int l = 0; l < SB_BATCH; l++) {
-    out->modulus[batch][l] = split ? split->factor * x->lambda : 0.;
-    out->shear[batch][l] = split ? split->factor * x->mu : 0.;
-    for (int i = 0; i < 3; i++) {
-      b[i][l] = 0.;
-      for (int a = 0; a < 3; a++) {
-        PetscReal sum = 0.;
-
-        for (int j = 0; j < 3 && split; j++) sum += split->D[3 * i + j][l] * g[3 * a + j][l];
-        b[3 * a + 3 + i][l] = s->batch_V[batch][l] * sum;
-        b[i][l] -= b[3 * a + 3 + i][l];
-      }
-    }
-  }
 }
 
 /* A matrix to assemble. */
@@ -390,7 +343,14 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
         at.pressure = &p;
       }
       law_blocks(m, s->batch_g + 9 * b, s->batch_V[b], &at, (const SbPack *)F[0], split, K);
-      if (out) keep_volumetric(s, &factors, b, split, out);
+      /* b_a = V D grad psi_a, as the force of a stress D */
+      for (int l = 0; out && l < SB_BATCH; l++) {
+        out->modulus[b][l] = split ? split->factor * factors.lambda : 0.;
+        out->shear[b][l] = split ? split->factor * factors.mu : 0.;
+      }
+      if (out) memset(out->b + out->stride * b, 0, 12 * sizeof(SbPack));
+      if (split)
+        SbCellForce(s->batch_g + 9 * b, s->batch_V[b], (const SbPack *)split->D, out->b + out->stride * b);
     }
     /* the same cells in another space: the gradients of P1 are -1/3 times those of CR */
     for (PetscInt n = nfill - 1; n > 0 && !region->quadratic; n--) {
@@ -455,14 +415,18 @@ PetscErrorCode SbSpaceAssembleTangent(SbSpace s, const SbStage *stage, Mat A)
 PetscErrorCode SbSpaceAddCellBlock(SbSpace s, Mat A, PetscInt cell, PetscInt a, PetscInt b,
                                    const PetscReal block[9])
 {
-  const PetscInt node[2] = {SbSpaceCellNode(s, cell, a), SbSpaceCellNode(s, cell, b)},
-                 k = s->plan->offset[SbPlanCellOffset(s, cell) + (size_t)(SB_BATCH * (s->width * a + b))];
+  const PetscInt node[2] = {SbSpaceCellNode(s, cell, a), SbSpaceCellNode(s, cell, b)}, w = s->width;
+  PetscInt batch;
   SbMatBlocks x;
 
   PetscFunctionBeginUser;
-  if (k == SB_NOT_OWNED) PetscFunctionReturn(PETSC_SUCCESS);
+  if (node[0] >= s->nnode_owned) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFindInt(cell, s->nbatch, s->batch_cell, &batch));
+  if (batch < 0) batch = -batch - 2; /* not the first cell of its batch */
   PetscCall(SbValuesBegin(A, &x));
-  SbInsertBlock(s, &x, node, k, s->block_scale, PETSC_FALSE, block);
+  SbInsertBlock(s, &x, node,
+                s->plan->offset[(size_t)(batch * w * w + w * a + b) * SB_BATCH + cell - s->batch_cell[batch]],
+                s->block_scale, PETSC_FALSE, block);
   PetscCall(SbValuesEnd(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -479,18 +443,27 @@ PetscErrorCode SbSpaceAddSpring(SbSpace s, Mat A, PetscInt cell, PetscInt a, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Clears rows and columns of prescribed unknowns, keeping the magnitude on the diagonal. */
-static void clear_fixed(SbSpace s, const SbMatBlocks *x)
+PetscErrorCode SbSpaceFinishTangent(SbSpace s, Mat A)
 {
-  SbPlan p = s->plan;
+  const SbPlan p = s->plan;
+  const SbAssembly *own;
+  SbMatBlocks x;
 
+  PetscFunctionBeginUser;
+  PetscCall(SbMatrixGetAssembly(A, &own));
+  if (own) {
+    if (own->finish) PetscCall((own->finish)(A));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(SbValuesBegin(A, &x));
+  /* clear rows and columns of prescribed unknowns, keeping the magnitude on the diagonal */
   for (PetscInt n = 0; n < p->nfix; n++) {
     const int rows = p->fix_mask[n] & 7, columns = (p->fix_mask[n] >> 3) & 7, diagonal = p->fix_mask[n] & 64;
     size_t rs, cs;
     PetscScalar *v;
 
-    if (x->symmetric && p->fix_block[n] < p->diagonal[p->fix_row[n]]) continue;
-    v = sb_block(x, p, p->fix_row[n], p->fix_block[n], &rs, &cs);
+    if (x.symmetric && p->fix_block[n] < p->diagonal[p->fix_row[n]]) continue;
+    v = sb_block(&x, p, p->fix_row[n], p->fix_block[n], &rs, &cs);
     for (int i = 0; i < 3; i++) {
       for (int j = 0; j < 3; j++) {
         PetscScalar *e = v + (size_t)i * rs + (size_t)j * cs;
@@ -503,24 +476,9 @@ static void clear_fixed(SbSpace s, const SbMatBlocks *x)
       }
     }
   }
-}
-
-PetscErrorCode SbSpaceFinishTangent(SbSpace s, Mat A)
-{
-  const SbAssembly *own;
-  SbMatBlocks x;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbMatrixGetAssembly(A, &own));
-  if (own) {
-    if (own->finish) PetscCall((own->finish)(A));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(SbValuesBegin(A, &x));
-  clear_fixed(s, &x);
   if (s->constraints) SbConstraintsFinishTangent(s, &x);
   PetscCall(SbValuesEnd(&x));
-  /* local assembly of the parts invalidates their cached diagonals; of the parallel matrix only the state is increased */
+  /* assembly of the parts invalidates their cached diagonals; of the parallel one the state is enough */
   for (int q = 0; q < 2 && x.part[q]; q++) {
     PetscCall(MatAssemblyBegin(x.part[q], MAT_FINAL_ASSEMBLY));
     PetscCall(MatAssemblyEnd(x.part[q], MAT_FINAL_ASSEMBLY));

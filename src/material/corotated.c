@@ -1,15 +1,15 @@
 /*
-  Co-rotated elasticity: F = R S with the rotation R of SbPolar(), psi = mu |F - R|^2 + lambda/2 (R : F - 3)^2.
+  Co-rotated: F = R S with the rotation R of SbPolar(), psi = mu |F - R|^2 + lambda/2 (R : F - 3)^2.
 
-  P = 2 mu (F - R) + lambda tr(S - I) R is its exact gradient: R is stationary for R : F, so dR drops out of dpsi.
+  P = 2 mu (F - R) + lambda tr(S - I) R is its gradient: R is stationary for R : F, so dR drops out of dpsi.
 
   Tangents. With q = tr(S), kappa = lambda (q - 3) - 2 mu,
     dP = 2 mu dF + lambda (R : dF) R + kappa dR,   dR = R [w]x,   (q I - S) w = axial(R^T dF - dF^T R),
-  which follows from R^T F staying symmetric. This is `exact`. The eigenvalues of dP/dF are 2 mu, 2 mu + 3 lambda and, for
-  the twist about the principal axis k, 2 mu + 2 kappa / (q - s_k) with q - s_k = s_i + s_j >= 0 (Smith, de Goes, Kim,
-  "Analytic eigensystems for isotropic distortion energies", 2019, section 4.1): only the twists can be negative, and
-  `exact_spd` raises those to zero by limiting kappa / (s_i + s_j) to -mu. `warped` leaves out kappa dR and replaces the
-  identity by its symmetric part in the rotated frame: Hooke's tensor rotated by R.
+  which follows from R^T F staying symmetric. This is `exact`. The eigenvalues of dP/dF are 2 mu, 2 mu + 3
+  lambda and, for the twist about the principal axis k, 2 mu + 2 kappa / (q - s_k) with q - s_k = s_i + s_j >=
+  0 (Smith, de Goes, Kim, "Analytic eigensystems for isotropic distortion energies", 2019, section 4.1): only
+  the twists can be negative, and `exact_spd` raises those to zero by limiting kappa / (s_i + s_j) to -mu.
+  `warped` leaves out kappa dR, and takes the symmetric part of the identity in this frame: Hooke's tensor.
 
   Where s_i + s_j = 0 the rotation and the force are discontinuous: `exact` bounds the determinant of
   (q I - S) from below, `exact_spd` each s_i + s_j.
@@ -131,8 +131,8 @@ SB_KERNEL static void twist_spd(PetscReal mu, const SbPack S[restrict 6], const 
 }
 
 /*
-  C = 2 mu identity + lambda R R + Z W Z^T with the columns R [e_n]x of Z: in row (i, j) only columns j+1 and j+2 (cyclic)
-  are nonzero, -R_i,j+2 and R_i,j+1.
+  C = 2 mu identity + lambda R R + Z W Z^T with the columns R [e_n]x of Z: in row (i, j) only columns j+1 and
+  j+2 (cyclic) are nonzero, -R_i,j+2 and R_i,j+1.
 */
 SB_KERNEL static void add_modes(const struct _p_SbMaterial *m, const SbPack R[restrict 9],
                                 const SbPack W[restrict 9], SbPack C[restrict 81])

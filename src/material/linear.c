@@ -1,7 +1,7 @@
 /*
-  Linear elasticity: sigma = 2 mu eps + lambda tr(eps) I with eps = sym(F) - I, psi = mu eps : eps + lambda/2 tr(eps)^2.
+  Linear: sigma = 2 mu eps + lambda tr(eps) I with eps = sym(F) - I, psi = mu eps : eps + lambda/2 tr(eps)^2.
 
-  For small strains and small rotations only: a rotation by t has the spurious strain cos(t) - 1. The tangent is constant.
+  For small strains and small rotations only: a rotation by t has a strain cos(t) - 1. Constant tangent.
 */
 #include "material_impl.h"
 

@@ -1,5 +1,5 @@
 /*
-  Creation of material laws by name, and functions shared by several laws: tangents, damping.
+  Creation of material laws by name, their options, and functions shared by several laws: tangents, damping.
 
   Lame parameters at rest: mu = E / (2 (1 + nu)), lambda = E nu / ((1 + nu) (1 - 2 nu)).
 */
@@ -7,6 +7,23 @@
 #include "sblog.h"
 
 PetscFunctionList SbMaterialList = NULL;
+
+static const SbOption body_rows[] = {
+  {"young", SB_OPTION_REAL, 1, "Pa", NULL, "(0, inf)", "Young's modulus"},
+  {"poisson", SB_OPTION_REAL, 1, "", NULL, "(-1, 0.5)",
+   "Poisson's ratio; soft tissue is near 0.5, where p1 elements lock"},
+  {"density", SB_OPTION_REAL, 1, "kg/m^3", "1000", "(0, inf)",
+   "mass per volume in the reference configuration"},
+};
+static const SbOption corotated_rows[] = {
+  {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|warped|exact|exact_spd",
+   "tangent stiffness: warped, Hooke's tensor rotated with the cell (stiffness warping, positive definite); "
+   "exact; exact_spd, exact with each cell projected to positive semi-definite"},
+};
+static const SbOption exact_rows[] = {
+  {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|exact|exact_spd",
+   "tangent stiffness: exact; exact_spd, exact with each cell projected to positive semi-definite, for CG"},
+};
 
 static PetscErrorCode destroy_list(void)
 {
@@ -23,6 +40,18 @@ PetscErrorCode SbMaterialRegister(const char *law, PetscErrorCode (*create)(SbMa
   PetscCall(PetscFunctionListAdd(&SbMaterialList, law, create));
   if (nrows) PetscCall(SbOptionsRegister("body", law, nrows, rows));
   if (nrows) PetscCall(SbOptionsRegister("inclusion", law, nrows, rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMaterialRegisterAll(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
+  PetscCall(SbOptionsRegister("inclusion", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
+  PetscCall(SbMaterialRegister("linear", SbMaterialCreate_Linear, 0, NULL));
+  PetscCall(SbMaterialRegister("corotated", SbMaterialCreate_Corotated, 1, corotated_rows));
+  PetscCall(SbMaterialRegister("stvk", SbMaterialCreate_StVK, 1, exact_rows));
+  PetscCall(SbMaterialRegister("neohookean", SbMaterialCreate_NeoHookean, 1, exact_rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -139,27 +168,21 @@ PetscErrorCode SbMaterialSetFromOptions_Tangent(SbMaterial m, const SbScope *sco
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* dP = mu (H + R H^T R) + lambda (R : H) R */
-SB_KERNEL static void turned_hooke(PetscReal lambda, PetscReal mu, const SbPack R[restrict 9],
-                                   const SbPack H[restrict 9], SbPack dP[restrict 9])
+SB_KERNEL void SbMaterialDampingStress(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                       const SbPack H[restrict 9], SbPack dP[restrict 9])
 {
+  const PetscReal lambda = m->lambda, mu = m->mu;
+  SbPack R[9];
+
+  SbMaterialRotation(m, F, R);
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal r[9], h[9], b[9], t[9];
 
-    SbPackGet(9, R, l, r);
+    SbPackGet(9, (const SbPack *)R, l, r);
     SbPackGet(9, H, l, h);
     SbMatTransposeMul(h, r, b);
     SbMatMul(r, b, t);
     const PetscReal p = lambda * (b[0] + b[4] + b[8]);
     for (int k = 0; k < 9; k++) dP[k][l] = mu * (h[k] + t[k]) + p * r[k];
   }
-}
-
-void SbMaterialDampingStress(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack H[9],
-                             SbPack dP[9])
-{
-  SbPack R[9];
-
-  SbMaterialRotation(m, F, R);
-  turned_hooke(m->lambda, m->mu, (const SbPack *)R, H, dP);
 }

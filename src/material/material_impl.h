@@ -9,7 +9,7 @@ PetscErrorCode SbMaterialCreate_Corotated(SbMaterial m);
 PetscErrorCode SbMaterialCreate_StVK(SbMaterial m);
 PetscErrorCode SbMaterialCreate_NeoHookean(SbMaterial m);
 
-/* Reads `tangent`: auto, then the tangents of the law, all or, where it does not begin with the warped one, the two exact ones. */
+/* Reads `tangent`: auto, then the tangents of the law, all or, without a warped one, the two exact ones. */
 PetscErrorCode SbMaterialSetFromOptions_Tangent(SbMaterial m, const SbScope *scope);
 PetscErrorCode SbMaterialSetTangent_Exact(SbMaterial m, SbTangentKind kind);
 
@@ -30,7 +30,7 @@ SB_INLINE void SbStretchTensor(const SbPack F[9], const SbPack R[9], int l, Pets
 }
 
 /*
-  SbSpectralTangent - tangent C[81] of an isotropic energy psi(s0, s1, s2), with negative eigenvalues set to zero.
+  SbSpectralTangent - tangent C[81] of an isotropic energy psi(s0, s1, s2), negative eigenvalues set to zero.
 
   Input, Pa, with (i, j, k) cyclic: hessian[6] = d^2 psi / ds_i ds_j as 00 01 02 11 12 22;
     flip[k]  = (psi_i - psi_j) / (s_i - s_j), eigenvalue of the symmetric shear of the axes i and j;

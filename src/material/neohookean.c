@@ -1,27 +1,27 @@
 /*
-  Stable neo-Hookean material of Smith, de Goes and Kim ("Stable neo-Hookean flesh simulation", 2018, equation 14, with the
-  logarithmic term that makes F = 0 no stationary point). With I1 = |F|^2, J = det F:
+  Stable neo-Hookean material of Smith, de Goes and Kim ("Stable neo-Hookean flesh simulation", 2018, equation
+  14, with the logarithmic term that makes F = 0 no stationary point). With I1 = |F|^2, J = det F:
 
     psi = a/2 (I1 - 3) - a/2 log((I1 + 1)/4) + b/2 (J - 1)^2 - 3a/4 (J - 1)
     P   = a (1 - 1/(I1 + 1)) F + (b (J - 1) - 3a/4) cof F
 
-  which is their energy with alpha = 1 + 3a/(4b), less a constant. F = I is stress-free, and psi is finite for every F,
-  including inverted ones, which it drives back. Linearised at F = I, dP = 3a/4 (H + H^T) + (b - 5a/8) tr(H) I, so that
+  which is their energy with alpha = 1 + 3a/(4b), less a constant. F = I is stress-free, and psi is finite for
+  every F, also an inverted one. Linearised at F = I, dP = 3a/4 (H + H^T) + (b - 5a/8) tr(H) I, so that
 
     a = 4/3 mu,   b = lambda + 5/6 mu
 
-  make the small-strain limit exactly Hooke's law with (E, nu), for every nu in (-1, 0.5) (b > 0 there). This b is for psi with
-  the log term; without it the constants differ.
+  make the small-strain limit exactly Hooke's law with (E, nu), for every nu in (-1, 0.5) (b > 0 there). This
+  b is for psi with the log term; without it the constants differ.
 
   Tangent, exact: with g = 1/(I1 + 1), p = b (J - 1) - 3a/4, c = cof F
-    dP/dF = a (1 - g) identity + 2 a g^2 F F + b c c + p d(cof F)/dF,   d(cof F)_ij/dF_kl = eps_ikm eps_jln F_mn.
+    dP/dF = a (1 - g) identity + 2 a g^2 F F + b c c + p d(cof F)/dF (SbAddCofactorTangent()).
   In signed stretches: flips a (1 - g) - p s_k, twists a (1 - g) + p s_k (section 4 of the paper).
 */
 #include "material_impl.h"
 
 /*
   Energy from H = F - I, whose first-order terms cancel: with x = (I1 - 3)/4, I1 - 3 = 2 tr H + |H|^2 and
-  J - 1 = tr H + h2 + det H (h2: sum of the principal 2x2 minors) inserted, there is no cancellation at small strains.
+  J - 1 = tr H + h2 + det H (h2: sum of the principal 2x2 minors) inserted, nothing cancels at small strains.
 */
 SB_KERNEL static void energy_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack psi)
 {

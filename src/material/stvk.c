@@ -1,11 +1,10 @@
 /*
   St. Venant-Kirchhoff: E = (F^T F - I)/2, psi = mu E : E + lambda/2 tr(E)^2, P = F (2 mu E + lambda tr(E) I).
 
-  Tangent: dP_ij = dF_il S_lj + mu (F F^T)_ik dF_kj + mu F_il dF_kl F_kj + lambda F_ij F_kl dF_kl, S = 2 mu E + lambda tr(E) I.
-  In signed stretches psi_i = s_i (lambda tr(E) + mu (s_i^2 - 1)), which gives the closed forms used for exact_spd.
+  Tangent: dP_ij = dF_il S_lj + mu (F F^T)_ik dF_kj + mu F_il dF_kl F_kj + lambda F_ij F_kl dF_kl, with
+  S = 2 mu E + lambda tr(E) I. In signed stretches psi_i = s_i (lambda tr(E) + mu (s_i^2 - 1)), for exact_spd.
 
-  The law softens in compression and has no resistance to inversion (P = 0 at s = 0): use it for large rotations with
-  moderate strains.
+  The law softens in compression and does not resist inversion (P = 0 at s = 0): for moderate strains only.
 */
 #include "material_impl.h"
 

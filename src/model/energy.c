@@ -1,9 +1,9 @@
 /*
-  Energies and momenta of a state: 1/2 v.M v, the strain energy of the laws, sum m v, sum x cross m v with the current
-  positions x = X + u, the centre of mass, and extremes of speed, displacement and det F. One reduction for the sums, one
-  for the extremes.
+  Energies and momenta of a state: 1/2 v.M v, the strain energy of the laws, sum m v, sum x cross m v with the
+  current positions x = X + u, the centre of mass, and extremes of speed, displacement and det F. One
+  reduction for the sums, one for the extremes.
 
-  With the consistent mass matrix the kinetic energy and the momenta use it, too; the centre of mass is the same for both.
+  With the consistent mass matrix kinetic energy and momenta use it, too; not the centre of mass.
 */
 #include "model_impl.h"
 #include "sblog.h"
@@ -126,7 +126,7 @@ PetscErrorCode SbModelCentres(SbModel m, Vec U, PetscReal centre[][4])
 }
 
 /*
-  Power dissipated by Rayleigh damping, v . C v, J/s: alpha v.M v + beta v.K(u) v per region. Owned cells, summed over ranks.
+  Power dissipated by Rayleigh damping, v . C v, J/s: alpha v.M v + beta v.K(u) v, of all ranks.
 */
 PetscErrorCode SbModelDampingPower(SbModel m, Vec U, Vec V, PetscReal *power)
 {

@@ -86,7 +86,7 @@ static PetscErrorCode match_mass(SbModel m, PetscInt b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lists of the effects that have an operation, in scenario order, one after the other in m->lists; number of lists. */
+/* Lists of the effects that have an operation, in scenario order, one after the other in m->lists. */
 #define NLIST 12
 #define SORT_INTO_LIST(m, op)                                               \
   do {                                                                      \
@@ -184,8 +184,8 @@ PetscErrorCode SbEvaluationEnd(SbModel m, SbEvaluation *e)
 }
 
 /*
-  Factor on an effect: in a static run the load factor, except for formulas of t, which is the load factor there: they
-  prescribe the load path themselves.
+  Factor on an effect: in a static run the load factor, except for formulas of t, which is the load factor
+  there: they prescribe the load path themselves.
 */
 static inline PetscReal load_factor(SbModel m, SbEffect e)
 {
@@ -219,7 +219,7 @@ PetscErrorCode SbModelExternalForces(SbModel m, const SbStage *stage, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets the residual at prescribed unknowns to zero: every initial guess has the prescribed values, and no solve changes them. */
+/* Sets the residual at prescribed unknowns to zero: guesses have the prescribed values. */
 static void constrain_residual(SbSpace s, PetscReal f[])
 {
   for (PetscInt k = 0; k < 3 * s->nfixed; k++) {

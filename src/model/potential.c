@@ -28,7 +28,7 @@ static int by_value(const void *a, const void *b)
   return 0;
 }
 
-/* Gathers the initial contacts of all ranks, in an order independent of the partition: bodies, direction, gap, target gap. */
+/* Gathers the initial contacts of all ranks, ordered: bodies, direction, gap, target gap. */
 static PetscErrorCode gather_touches(MPI_Comm comm, const SbInitialContacts *mine, PetscInt *n,
                                      PetscReal (**all)[7])
 {
@@ -59,7 +59,7 @@ static PetscReal gap_after(const PetscReal touch[7], const PetscReal way[])
   return touch[5] + SbDot3(touch + 2, one) - SbDot3(touch + 2, two);
 }
 
-/* Gauss-Seidel: each contact in turn moves its bodies along its direction, except fixed components; way[nbody + 1][3]: displacements, m. */
+/* Gauss-Seidel: each contact moves its bodies along it, except fixed components; way[nbody + 1][3], m. */
 static void sweep_touches(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, const uint8_t fixed[],
                           PetscReal way[])
 {
@@ -88,9 +88,10 @@ static void sweep_touches(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, con
 }
 
 /*
-  Finds displacements of bodies that open all contacts to their target gaps, as far as prescribed components allow. Bodies enclosed by others without enough
-  space are fixed. Displacements are limited to a few gaps, the distance within which contacts were searched. fixed[nbody + 1]: bit c, component c is prescribed or was fixed here;
-  way[nbody + 1][3], m; moved: some body moves.
+  Finds displacements of bodies that open all contacts to their target gaps, as far as prescribed components
+  allow. Bodies enclosed by others without enough space are fixed. Displacements are limited to a few gaps,
+  the distance within which contacts were searched. fixed[nbody + 1]: bit c, component c is prescribed or was
+  fixed here; way[nbody + 1][3], m; moved: some body moves.
 */
 static void find_ways(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, uint8_t fixed[], PetscReal way[],
                       PetscBool *moved)
@@ -146,8 +147,8 @@ static PetscErrorCode open_state(SbModel m, Vec U, PetscReal **u)
 }
 
 /*
-  Separates bodies in initial contact by rigid displacements, in a dynamic run until the barrier is inactive. Effects move the
-  vertices of remaining contacts.
+  Separates bodies in initial contact by rigid displacements, in a dynamic run until the barrier is inactive.
+  Effects move the vertices of remaining contacts.
 */
 PetscErrorCode SbModelPotentialStart(SbModel m, PetscReal t, PetscReal dt, Vec U)
 {
@@ -191,8 +192,9 @@ PetscErrorCode SbModelPotentialStart(SbModel m, PetscReal t, PetscReal dt, Vec U
 }
 
 /*
-  The speed V of a step from t to t + dt, m/s, the scale of tolerances of barrier contact: m V^2 / 2 is the kinetic and strain energy of the bodies, of mass m, at its start,
-  plus half of the work of all loads and support forces along the size of the smallest body.
+  The speed V of a step from t to t + dt, m/s, the scale of tolerances of barrier contact: m V^2 / 2 is the
+  kinetic and strain energy of the bodies, of mass m, at its start, plus half of the work of all loads and
+  support forces along the size of the smallest body.
 */
 static PetscErrorCode step_speed(SbModel m, PetscReal t, PetscReal dt, Vec U, Vec V, PetscReal *speed)
 {

@@ -61,7 +61,7 @@ static void bare_kernel(Case *c, const PetscReal u[])
       m->ops.frame(m, (const SbPack *)F, R);
       SbCellBlocksIsotropic(g, W, m->lambda, m->mu, (const SbPack *)R, B[q]);
     }
-    SbQuadraticBlocks((const SbPack(*)[10][9])B, W, (const SbPack *)none, K);
+    SbQuadraticBlocks(&SbRuleQuadratic, (const SbPack(*)[10][9])B, W, (const SbPack *)none, K);
   }
 }
 

@@ -210,7 +210,10 @@ static PetscErrorCode test_blocks(SbElement e, SbMaterial m, SbTangentKind kind)
       }
     }
     if (m->linear) {
-      SbCellBlocksIsotropic((const SbPack *)c.g, c.V, m->lambda, m->mu, NULL, J);
+      SbPack R[9];
+
+      m->ops.frame(m, (const SbPack *)F, R);
+      SbCellBlocksIsotropic((const SbPack *)c.g, c.V, m->lambda, m->mu, (const SbPack *)R, J);
       check_block_sums((const SbPack(*)[9])J, (m->E + m->lambda) * size);
       for (int p = 0; p < 10; p++) {
         SB_CHECK(lane_difference(9, (const SbPack *)J[p], (const SbPack *)K[p]) <
