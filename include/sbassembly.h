@@ -91,7 +91,8 @@ SB_INLINE PetscReal SbRigidSize(const PetscReal box[6])
 void SbRigidMode(PetscInt mode, const PetscReal x[3], const PetscReal box[6], PetscReal value[3]);
 /*
   SbAttachModes - the near null space of A: the six rigid-body modes, which algebraic multigrid must
-  reproduce, made orthonormal. Six serve any number of bodies: no aggregate spans two.
+  reproduce, made orthonormal. Six serve any number of bodies: no aggregate spans two, and
+  each body turns about its own centre.
 
   Collective. fill(mode, v, ctx) writes this rank's part of a mode; one that vanishes is left out.
 */
@@ -165,7 +166,7 @@ static inline PetscInt sb_rotation_points(SbSpace s)
   return s->edge_node ? 4 : 1;
 }
 /*
-  SbSpaceCellRotations - R[nbatch][sb_rotation_points()][9]: the frames of laws, or polar rotations.
+  SbSpaceCellRotations - R[nbatch][sb_rotation_points()][9]: the frames of laws, or polar rotations of F.
 
   Not collective. Input: u[nnode][3] with ghosts, m; NULL: at rest.
 */
@@ -207,14 +208,13 @@ PetscErrorCode SbProductGetSymmetric(Mat A, Mat *local);
 /* y -= the columns of other ranks of A times x. Collective. */
 PetscErrorCode SbProductSubtractOffDiagonal(Mat A, Vec x, Vec y);
 /*
-  SbMatRestoreRead - gives back values that were only read, say by MatSeqSBAIJRestoreArray.
+  SbMatRestoreRead - gives back values only read, by the matrix's own function, say MatSeqSBAIJRestoreArray.
 
   Not collective. Since 3.25 PETSc takes these functions for a change of the matrix, after which fast products
   and preconditioners are set up again, in each iteration if one reads the values in its set-up.
 */
 PetscErrorCode SbMatRestoreRead(Mat A, PetscErrorCode (*restore)(Mat, PetscScalar *[]), PetscScalar *value[]);
-/* The values of a matrix: of the diagonal part and of that with ghost columns; of SBAIJ the upper triangle.
-   */
+/* The values of a matrix: diagonal part, and the one with ghost columns; of SBAIJ the upper triangle. */
 typedef struct {
   SbMatrixKind kind;
   PetscBool symmetric; /* SBAIJ */

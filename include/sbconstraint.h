@@ -9,7 +9,7 @@
 #pragma once
 #include "sbfem.h"
 
-/* Treatment of exact constraints outside K: in their null space, or condensed multipliers. */
+/* Treatment of exact constraints outside K: iterations in their null space, or a factorisation. */
 typedef enum { SB_SADDLE_NONE, SB_SADDLE_DIRECT } SbSaddle;
 
 typedef struct {
@@ -80,7 +80,7 @@ static inline SbConstraint *SbSpaceGetConstraint(SbSpace space, PetscInt number)
 
 /*
   Not collective, on owned nodes [nnode_owned][3]: x <- the closest displacement, m, that satisfies exact
-  constraints, or velocity, m/s, of which n . x is theirs (if push is n); x <- x - Q x.
+  constraints, or velocity, m/s, of which n . x is theirs (if push is n); x <- x - Q x: projected residual.
 */
 void SbConstraintsPrescribe(SbSpace space, PetscBool velocities, PetscReal x[]);
 void SbConstraintsProject(SbSpace space, PetscReal x[]);
@@ -88,10 +88,11 @@ void SbConstraintsProject(SbSpace space, PetscReal x[]);
 PetscErrorCode SbSpaceProjectAdmissible(SbSpace space, Vec z);
 /* f[nnode_owned][3], N, less springs' forces; projected by exact constraints if `constrain`. */
 void SbConstraintsResidual(SbSpace space, const PetscReal u[], PetscBool constrain, PetscReal f[]);
-/* y <- y + (F^T k G - added) x, F, G, k: push, n, k of springs; the same added to a block. */
+/* y <- y + (F^T k G - added) x, F, G, k: push, n and stiffness of springs; the same added to the
+   diagonal block of a node. */
 void SbConstraintsAddTangent(SbSpace space, const PetscReal x[], PetscReal y[]);
 void SbConstraintsAddSprings(SbSpace space, PetscInt node, PetscReal block[9]);
-/* Computes `force` and `sum` , for u[nnode_owned][3], m, and its residual r without
+/* Computes `force` and `sum` of all, for u[nnode_owned][3], m, and its residual r without
    constraints (but with springs), N. */
 void SbConstraintsComputeForces(SbSpace space, const PetscReal u[], const PetscReal r[]);
 /* After it: adds the forces of all constraints to f[nnode_owned][3], N. */

@@ -2,7 +2,8 @@
   sbelement.h - layer 2: kernels on batches of SB_BATCH tets with four nodes and constant basis gradients.
 
   The kernels take arrays and return arrays: no MPI, no allocation, no mesh. Lanes as in sbmaterial.h; inputs
-  and outputs never overlap. Gradients sum to zero: g holds those of nodes 1..3.
+  and outputs never overlap. Gradients sum to zero: g holds those of nodes 1..3, everything about node 0
+  follows from them.
 */
 #pragma once
 #include "sbmaterial.h"
@@ -66,9 +67,9 @@ void SbCellGradientRate(const SbPack g[9], const SbPack v[12], SbPack H[9]);
 /* f[3*a+i] = V P_ij grad phi_a,j: internal force of the cell on its nodes, N. The four forces sum to zero. */
 void SbCellForce(const SbPack g[9], const SbPack V, const SbPack P[9], SbPack f[12]);
 /*
-  Ten upper blocks of the cell matrix for Hooke's tensor turned by R: K[p][3*i+k] for p =
-  0..9 as SbPairA/B, K_ab = V (lambda h_a h_b^T + mu h_b h_a^T + mu (h_a . h_b) I), h = R grad phi. N/m.
-  Diagonal blocks are symmetric to the last bit; the blocks (a, 0..3) sum to zero, (b, a) = (a, b)^T.
+  Ten upper blocks of the cell matrix for Hooke's tensor turned by R: K[p][3*i+k] for p = 0..9 as SbPairA/B,
+  K_ab = V (lambda h_a h_b^T + mu h_b h_a^T + mu (h_a . h_b) I), h = R grad phi. N/m. Diagonal blocks are
+  symmetric to the last bit; the blocks (a, 0..3) sum to zero, (b, a) = (a, b)^T.
 */
 void SbCellBlocksIsotropic(const SbPack g[9], const SbPack V, PetscReal lambda, PetscReal mu,
                            const SbPack R[9], SbPack K[10][9]);

@@ -110,7 +110,8 @@ PetscErrorCode SbSpaceRegister(void);
 
 /* A zeroed vector with the layout of the unknowns (3 per node, with ghosts). Collective. Caller destroys. */
 PetscErrorCode SbSpaceCreateVec(SbSpace space, Vec *v);
-/* Brings ghosts up to date and lends the local array [nnode][3] of `v`. Collective. */
+/* Brings ghosts up to date and lends the local array [nnode][3] of `v`. Collective; restore in the same
+   function. */
 PetscErrorCode SbSpaceGetLocalRead(SbSpace space, Vec v, const PetscReal **array);
 static inline PetscErrorCode SbSpaceRestoreLocalRead(SbSpace space, Vec v, const PetscReal **array)
 {
@@ -163,11 +164,13 @@ PetscErrorCode SbSpaceCreateMatrix(SbSpace space, SbMatrixKind kind, Mat *A);
 PetscErrorCode SbSpaceAssembleTangent(SbSpace space, const SbStage *stage, Mat A);
 /* Replaces rows and columns of prescribed unknowns by a scaled identity and closes the assembly. */
 PetscErrorCode SbSpaceFinishTangent(SbSpace space, Mat A);
-/* Between the two: A += a 3x3 block (row-major, N/m) for nodes a, b of a cell (SbSpaceCellNode()). */
+/* Between the two: A += a 3x3 block (row-major, N/m) for nodes a, b of a local cell, as SbSpaceCellNode()
+   numbers them. Not collective. */
 PetscErrorCode SbSpaceAddCellBlock(SbSpace space, Mat A, PetscInt cell, PetscInt a, PetscInt b,
                                    const PetscReal block[9]);
 /* The same for a spring from node a to a rigid support, possibly the only one of a body: it is also added to
-   the coarse spaces of -solver pressure. The block is positive semi-definite; the owner calls. */
+   the coarse spaces of -solver pressure. The block is positive semi-definite; the node's owner must be among
+   the callers. */
 PetscErrorCode SbSpaceAddSpring(SbSpace space, Mat A, PetscInt cell, PetscInt a, const PetscReal block[9]);
 
 /* f[nnode][3] += factor dV/du, V the volume of a body (m^3) at u. Right on owned nodes. Not collective. */

@@ -128,7 +128,8 @@ void SbPolar(const SbPack F[9], SbPack R[9]);
   SbSymEig - eigenvalues s[3] and eigenvectors V (columns, det V = +1) of symmetric S[6] = 00 01 02 11 12 22.
 
   Not collective. Right to rounding of the largest entry; no order among the eigenvalues. With R from
-  SbPolar() and S = R^T F this is the singular value decomposition F = (R V) diag(s) V^T, two rotations.
+  SbPolar() and S = R^T F this is the singular value decomposition F = (R V) diag(s) V^T with two rotations,
+  the sign of det F being in s.
 */
 void SbSymEig(const SbPack S[6], SbPack s[3], SbPack V[9]);
 

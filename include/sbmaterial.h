@@ -23,13 +23,15 @@ typedef enum {
 typedef struct {
   /* reads -body_<name>_...; scope = {"body", <law>, <name>} */
   PetscErrorCode (*setfromoptions)(SbMaterial m, const SbScope *scope);
-  /* checks that the law has this tangent and sets `tangent` and `frame`; NULL: has one only */
+  /* checks that the law has this tangent and sets `tangent` and `frame`; NULL when there is one tangent only
+     */
   PetscErrorCode (*settangent)(SbMaterial m, SbTangentKind kind);
   /* psi = energy per rest volume, J/m^3; zero at rest */
   void (*energy)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack psi);
   /* Every law is psi = psi_mu(F) + lambda/2 theta(F)^2 with theta the law's measure of the change of volume:
      tr(eps) (linear), tr(S - I) (corotated), tr(E) (stvk), J - 1 (neohookean). p = -lambda theta, Pa,
-     positive in compression:  resists the change of volume, and oscillates from cell to cell in locking. */
+     positive in compression: resists the change of volume, and oscillates from cell to cell where an element
+     locks. */
   void (*pressure)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack p);
   /* P = dPsi/dF, Pa */
   void (*stress)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack P[9]);
@@ -38,7 +40,8 @@ typedef struct {
   void (*frame)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack R[9]);
   /* The tangent is dP = 2 mu dF + lambda (R : dF) R + R [W y]x with y = axial(R^T dF - dF^T R), as for a law
      of R^T F: fills R and the symmetric W (Pa), for SbCellBlocksCorotated(), which is cheaper than the full
-     tangent. W = -mu I is Hooke's tensor turned by R. NULL: no. Co-rotated has it if exact. */
+     tangent. W = -mu I is Hooke's tensor turned by R. NULL when the law is not of this kind. Co-rotated has
+     it with its exact tangents. */
   void (*spin)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack R[9], SbPack W[9]);
   /* C[9*(3*i+j) + 3*k+l] = dP_ij/dF_kl, Pa; symmetric in the pairs to the last bit */
   void (*tangent)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack C[81]);
@@ -55,14 +58,13 @@ struct _p_SbMaterial {
   char law[SB_NAME_MAX];
   PetscLogEvent event; /* SbMat_<law>, around the loops over its cells for forces and assembled tangents */
   SbMaterialOps ops;
-  PetscReal E, nu; /* Young's modulus, Pa; Poisson's ratio, (-1, 0.5): as given */
-  PetscReal lambda,
-    mu; /* Lame parameters at rest, Pa: from E and nu, unless the constructor of the law changes them */
-  PetscReal density;  /* kg/m^3 */
-  PetscBool linear;   /* stress is linear in F: K is constant */
-  PetscBool adaptive; /* -body_NAME_tangent auto: the solver of a step chooses between the two exact ones */
-  PetscBool softens;  /* stress has a maximum in compression, beyond which cells invert */
-  PetscBool jacobian; /* theta is J - 1, cubic in the displacement; of other laws at most quadratic */
+  PetscReal E, nu;      /* Young's modulus, Pa; Poisson's ratio, (-1, 0.5): as given */
+  PetscReal lambda, mu; /* Lame parameters at rest, Pa: from E and nu, or set by the law's constructor */
+  PetscReal density;    /* kg/m^3 */
+  PetscBool linear;     /* stress is linear in F: K is constant */
+  PetscBool adaptive;   /* -body_NAME_tangent auto: the solver of a step chooses between the two exact ones */
+  PetscBool softens;    /* stress has a maximum in compression, beyond which cells invert */
+  PetscBool jacobian;   /* theta is J - 1, cubic in the displacement; of other laws at most quadratic */
   SbTangentKind tangent; /* tangent of ops.frame or ops.tangent */
   SbMaterial shear;      /* SbMaterialGetShear(); NULL until it is asked for; owned */
 };
@@ -71,7 +73,8 @@ extern PetscFunctionList SbMaterialList;
 /*
   SbMaterialRegister - adds a law and the rows of its options (classes "body" and "inclusion", type = law).
 
-  Not collective, same on all ranks. create() fills the table, `tangent` and its flags, numbers being set.
+  Not collective, same on all ranks. create() fills the table, `tangent` and the flags of a material whose
+  numbers are set.
 */
 PetscErrorCode SbMaterialRegister(const char *law, PetscErrorCode (*create)(SbMaterial), PetscInt nrows,
                                   const SbOption rows[]);
@@ -117,7 +120,8 @@ SB_INLINE void SbMaterialRotation(const struct _p_SbMaterial *m, const SbPack F[
   SbMaterialDampingStress - dP = R hooke(sym(R^T H)) = mu (H + R H^T R) + lambda (R : H) R, R the rotation in
   F: the stress of stiffness-proportional damping, per second of beta; R = I for the linear law. One rule for
   every other law and every tangent: it never feeds energy in (H : dP >= 0), and where the cell is unstrained
-  (F = R) it is the law's tangent and vanishes for a spin. In a strained cell a spin is damped in proportion.
+  (F = R) it is the law's tangent and vanishes for a spin. In a strained cell a spin is damped in proportion
+  to the strain.
 
   Not collective. Input: F; H, gradient of the velocity, 1/s. Output: dP, Pa/s.
 */

@@ -73,11 +73,12 @@ struct _p_SbModel {
 PetscErrorCode SbModelDestroy(SbModel *model);
 /* After bodies, sets, materials, elements and effects: mesh, space, set-up, lists. Collective. */
 PetscErrorCode SbModelSetUp(SbModel model);
-/* F = M a + C v + f_int(u) - f_ext(t, u, v); where prescribed 0 or (not constrain) reactions. Collective. */
+/* F = M a + C v + f_int(u) - f_ext(t, u, v); zero where prescribed if constrain, else the reaction.
+   V, A may be NULL. Collective. */
 PetscErrorCode SbModelResidual(SbModel model, PetscReal t, Vec U, Vec V, Vec A, PetscBool constrain, Vec F);
 /* F = f_ext, N. Collective. */
 PetscErrorCode SbModelLoads(SbModel model, PetscReal t, Vec U, Vec V, Vec F);
-/* A = shift_a M + shift_v C + shift_k K(u) and the effects' part, without what is prescribed. Collective. */
+/* A = shift_a M + shift_v C + shift_k K(u) and the effects' part, prescribed ones replaced. Collective. */
 PetscErrorCode SbModelTangent(SbModel model, PetscReal t, PetscReal shift_v, PetscReal shift_a,
                               PetscReal shift_k, Vec U, Vec V, Mat A);
 /*
@@ -132,7 +133,8 @@ PetscErrorCode SbModelPotentialNearest(SbModel model, size_t size, char text[]);
 PetscErrorCode SbModelPotentialUpdateFriction(SbModel model, Vec X, PetscBool solved, PetscBool *again);
 /* Work of contact on the bodies in the last accepted step, J; F, N, of SbModelLoads(), less contact. */
 PetscErrorCode SbModelPotentialWork(SbModel model, Vec U, PetscReal *work, Vec F);
-/* F += scale times the gradient of the energy at U, N; free_only: not where prescribed. energy or NULL. */
+/* F += scale times the gradient of the energy at U, N; free_only: not where prescribed. energy of all ranks,
+   J (NULL: not wanted). */
 PetscErrorCode SbModelPotentialGradient(SbModel model, Vec U, PetscReal scale, PetscBool free_only,
                                         PetscReal *energy, Vec F);
 PetscErrorCode SbModelPotentialHessian(SbModel model, Vec U, SbContactHessian kind, SbBlocks *blocks, Vec R);

@@ -128,7 +128,8 @@ SB_KERNEL void SbQuadraticBlocks(const SbPointRule *rule, const SbPack B[restric
   }
 }
 
-/* With barycentric gradients g the derivative of det F along u at a, v at b is (u x v) . F (g_a x g_b). */
+/* With gradients g of barycentric coordinates the second derivative of det F along u at a, v at b is (u x v)
+   . F (g_a x g_b). */
 SB_KERNEL void SbQuadraticAddJacobian(const PetscReal L[4], const SbPack g[restrict 9],
                                       const SbPack F[restrict 9], const PetscReal weight[restrict SB_BATCH],
                                       SbPack K[restrict SB_PAIRS][9])

@@ -2,13 +2,15 @@
   Constraints of single nodes, for contact with rigid obstacles: n . u = c exactly, or by a spring (penalty).
 
   A node has up to three exact constraints, the rows of G, with the values c, and constraint forces along the
-  rows of F: F = G unless the node slides with friction mu, with a row n - mu d, d along the slip. With
+  rows of F: F = G unless the node slides with friction mu, with a row n - mu d, d along the slip. Node by
+  node, with
 
     Q = F^T (G F^T)^-1 G,   P = I - Q
 
   lambda = (G F^T)^-1 G r are the multipliers for a residual r, P r is the projected residual, G P x = 0, and
   u + F^T (G F^T)^-1 (c - G u) satisfies the constraints. Prescribed components are removed from G and F. The
-  solution is projected onto the constraints before a solve, which stays there. Redundant ones are removed.
+  solution is projected onto the constraints before a solve, which then stays in their null space. Redundant
+  ones are removed.
 
   Linear solves treat them in one of two ways.
 

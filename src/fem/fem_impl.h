@@ -13,7 +13,8 @@ PetscErrorCode SbLayoutDestroy(SbSpace space);
 typedef enum { SB_JUMP_STIFFNESS, SB_JUMP_DAMPING } SbJumpFactor;
 PetscErrorCode SbJumpCreate(SbSpace space, SbJump *jump);
 PetscErrorCode SbJumpDestroy(SbJump *jump);
-/* f[nnode][3] += (factor) K_F x; the jumps of displacements x less the offsets r; x[nnode][3]. */
+/* f[nnode][3] += (factor) K_F x; the jumps of displacements x less the offsets r; complete on owned nodes.
+   x[nnode][3] with ghosts. */
 void SbJumpAdd(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal f[]);
 /* The energy 1/2 x . (factor) K_F x of the face terms, this rank's part, J. */
 PetscReal SbJumpEnergy(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal body[]);
@@ -96,7 +97,8 @@ void SbRegionForces(SbSpace space, const SbRegion *region, PetscBool elastic, Pe
 /* The consistent mass of each cell, over its density: the integral of phi_a phi_b for each pair, m^3. */
 void SbBatchMass(SbSpace space, const SbRegion *region, PetscInt b, SbPack mass[SB_PAIRS]);
 
-/* Adds the blocks of each cell of batch b, ten or, for P2, SB_PAIRS; broken: DG, between means. */
+/* Adds the blocks of each cell of batch b, ten or, for P2, SB_PAIRS; broken: DG, between means at faces. K is
+   32-byte aligned. */
 void SbInsertBatch(SbSpace space, const SbMatBlocks *x, PetscInt b, int npair, PetscBool broken,
                    const SbPack K[][9]);
 /* Adds factor k, or its transpose (turn), at its position in the row of node[0] and the column of node[1]. */

@@ -26,7 +26,7 @@
     kappa1 = gamma1 H(2 m |F| / V),   m = max(mu, FOLLOW max_ij -(P_i + P_j) / (s_i + s_j)),
 
   evaluated at the start of the step, so that the terms are constant within it and their energy is quadratic.
-  A dependence on the current state would have to be differentiated: jumps would add a pressure.
+  A dependence on the current state would have to be differentiated: jumps would add a spurious pressure.
 
   In time steps kappa1 is twice as large, and acts on [u] - r, with an offset r of the jump that keeps the
   energy of a face when kappa1 changes at the start of a step. With r = 0 every change of kappa1 would add 1/2

@@ -66,8 +66,7 @@ static PetscErrorCode find_edges(SbSpace s, Edges *edges)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The numbers of nodes, and how many per cell: s->cell_node, s->edge_node or NULL, s->dirichlet_node or NULL.
-   */
+/* The numbers of nodes, and how many per cell; those at edges and of supports may be NULL. */
 static const PetscInt per_cell[3] = {4, 6, 4};
 static PetscInt *numbers(SbSpace s, int table)
 {

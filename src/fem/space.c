@@ -31,7 +31,8 @@ static PetscBool is_curved(SbSpace s, PetscInt cell)
   return (PetscBool)(s->edge_node && s->mesh->edge_off && (s->mesh->cell_set[cell] & SB_CURVED));
 }
 
-/* Finds the regions: owned and ghost cells are sorted by body, inclusion, curved edges. */
+/* Finds the regions: owned and ghost cells are sorted by body, inclusion and curved edges, so that a region
+   is a range of cells. */
 static PetscErrorCode find_regions(SbSpace s, const SbMaterial material[], const SbElement element[])
 {
   SbMesh mesh = s->mesh;
