@@ -1,14 +1,15 @@
 /*
-  sbconstraint.h - layer 3: constraints of single nodes, n . u = value, exactly or by springs, for contact with rigid obstacles (method:
-  src/fem/constraint.c).
+  sbconstraint.h - layer 3: constraints of single nodes, n . u = value, exactly or by springs, for contact
+  with rigid obstacles (method: src/fem/constraint.c).
 
-  SbSpaceCreateConstraints() during set-up of an effect that may need them. Then, as often as they change: SbSpaceClearConstraints(),
-  SbSpaceAddConstraint() by the owners of the nodes, SbSpaceAssembleConstraints(). SbModelPrescribe(), residuals, tangents and solves follow.
+  SbSpaceCreateConstraints() during set-up of an effect that may need them. Then, as often as they change:
+  SbSpaceClearConstraints(), SbSpaceAddConstraint() by the owners of the nodes, SbSpaceAssembleConstraints().
+  SbModelPrescribe(), residuals, tangents and solves follow.
 */
 #pragma once
 #include "sbfem.h"
 
-/* Treatment of exact constraints outside K: iterations in their null space, or a factorisation with the multipliers condensed. */
+/* Treatment of exact constraints outside K: iterations in their null space, or a factorisation. */
 typedef enum { SB_SADDLE_NONE, SB_SADDLE_DIRECT } SbSaddle;
 
 typedef struct {
@@ -57,37 +58,46 @@ static inline SbConstraints SbConstraintsSeparate(SbSpace space)
   return space->constraints && space->constraints->beside ? space->constraints : NULL;
 }
 
-/* beside: solves treat the constraints outside K; nonsymmetric: push may differ from n, which needs `beside`. Flags of several calls are
-   joined by or. Alike on all ranks. Not collective. */
+/* beside: solves treat the constraints outside K; nonsymmetric: push may differ from n, which needs `beside`.
+   Flags of several calls are joined by or. Alike on all ranks. Not collective. */
 PetscErrorCode SbSpaceCreateConstraints(SbSpace space, PetscBool beside, PetscBool nonsymmetric);
 void SbSpaceClearConstraints(SbSpace space);
-/* Output: number of the constraint on this rank; -1: redundant, as it follows from earlier exact ones and supports of the node, and not added.
-   Not collective. */
+/* Output: number of the constraint on this rank; -1: redundant, as it follows from earlier exact ones and
+   supports of the node, and not added. Not collective. */
 PetscErrorCode SbSpaceAddConstraint(SbSpace space, const SbConstraint *constraint, PetscInt *number);
 /* After the last SbSpaceAddConstraint(): builds Q and the global counts. Collective. */
 PetscErrorCode SbSpaceAssembleConstraints(SbSpace space);
 /* Whether there is one on any rank. Not collective, alike on all ranks. */
-PetscBool SbSpaceIsConstrained(SbSpace space);
+static inline PetscBool SbSpaceIsConstrained(SbSpace space)
+{
+  return (PetscBool)(space->constraints && space->constraints->ntotal);
+}
 /* Lends constraint `number` of this rank till the next one is added. */
-SbConstraint *SbSpaceGetConstraint(SbSpace space, PetscInt number);
+static inline SbConstraint *SbSpaceGetConstraint(SbSpace space, PetscInt number)
+{
+  return &space->constraints->constraint[number];
+}
 
-/* Not collective, on owned nodes [nnode_owned][3]: u <- the closest one that satisfies exact constraints; x <- x - Q x: projected residual or direction. */
-void SbConstraintsPrescribe(SbSpace space, PetscReal u[]);
+/*
+  Not collective, on owned nodes [nnode_owned][3]: x <- the closest displacement, m, that satisfies exact
+  constraints, or velocity, m/s, of which n . x is theirs (if push is n); x <- x - Q x: projected residual.
+*/
+void SbConstraintsPrescribe(SbSpace space, PetscBool velocities, PetscReal x[]);
 void SbConstraintsProject(SbSpace space, PetscReal x[]);
-/* z <- its projection onto directions admissible for prescribed unknowns and exact constraints. Not collective. */
+/* z <- its projection onto directions that supports and exact constraints admit. Not collective. */
 PetscErrorCode SbSpaceProjectAdmissible(SbSpace space, Vec z);
-/* f[nnode_owned][3], N, less the springs' forces; projected by exact constraints when `constrain`. Not collective. */
+/* f[nnode_owned][3], N, less springs' forces; projected by exact constraints if `constrain`. */
 void SbConstraintsResidual(SbSpace space, const PetscReal u[], PetscBool constrain, PetscReal f[]);
-/* y <- y + (F^T k G - added) x, F, G, k: push, n and stiffness of springs; the same added to the diagonal block of a node. Not collective. */
+/* y <- y + (F^T k G - added) x, F, G, k: push, n and stiffness of springs; the same added to the
+   diagonal block of a node. */
 void SbConstraintsAddTangent(SbSpace space, const PetscReal x[], PetscReal y[]);
 void SbConstraintsAddSprings(SbSpace space, PetscInt node, PetscReal block[9]);
-/* Computes `force` and `sum` of all constraints, for u[nnode_owned][3], m, and its residual r without constraints (but with springs), N. */
+/* Computes `force` and `sum` of all, for u[nnode_owned][3], m, and its residual r without
+   constraints (but with springs), N. */
 void SbConstraintsComputeForces(SbSpace space, const PetscReal u[], const PetscReal r[]);
 /* After it: adds the forces of all constraints to f[nnode_owned][3], N. */
 void SbConstraintsAddForces(SbSpace space, PetscReal f[]);
-/* After it: turns that residual r into reactions: of supports at prescribed unknowns, of constraints elsewhere, N. */
+/* After it: turns this residual r into reactions: of supports, elsewhere constraints, N. */
 void SbConstraintsReactions(SbSpace space, PetscReal r[]);
-/* v <- the closest velocity with n . v = velocity of all exact constraints, m/s. Not for push other than n. */
-void SbConstraintsVelocity(SbSpace space, PetscReal v[]);
-/* Block B of a matrix between local nodes i and j: B <- P_i B P_j, P = I - Q, on the diagonal plus |B| Q_i; strides rs of rows, cs of columns. */
+/* Block of local nodes i, j: B <- P_i B P_j (P = I - Q), if i = j plus |B| Q_i; strides of rows, columns. */
 void SbConstraintsProjectBlock(SbSpace space, PetscInt i, PetscInt j, size_t rs, size_t cs, PetscScalar *v);

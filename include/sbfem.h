@@ -1,11 +1,11 @@
 /*
-  sbfem.h - layer 3: nodes and unknowns, batches of cells, assembly by precomputed offsets, constraints, solver set-up.
+  sbfem.h - layer 3: nodes and unknowns, batches of cells, assembly, constraints, solver set-up.
 */
 #pragma once
 #include "sbelement.h"
 #include "sbmesh.h"
 
-/* The arguments of an evaluation of forces and tangent. Arrays are local (owned nodes, then ghosts), [nnode][3]. */
+/* The arguments of an evaluation of forces and tangent. Arrays: owned nodes, then ghosts, [nnode][3]. */
 typedef struct {
   PetscReal t;  /* s */
   PetscReal dt; /* length of the step being taken, s; 0 in a static run */
@@ -28,17 +28,16 @@ typedef struct {
   PetscBool owned;
   PetscBool broken;    /* DG: strains come from the means of the two sides of each face */
   PetscBool quadratic; /* P2: strains at the points of SbRuleQuadratic, or SbRuleQuintic where curved */
-  /* P2 cells that are curved at rest; NULL: straight. Gradients, parts of the volume at the points [batch][SB_POINTS]([9]), lumped mass / (density V)
-     [batch][10]; their memory is the space's */
+  /* P2 cells that are curved at rest; NULL: straight. Gradients, parts of the volume at the points
+     [batch][SB_POINTS]([9]), lumped mass / (density V) [batch][10]; their memory is the space's */
   SbPack *curve_g, *curve_weight, *curve_mass;
-  SbMaterial
-    pointwise;    /* the law at the points, without volumetric part where that is of the mean; borrowed */
-  PetscInt nnode; /* of a cell: 4, of P2 SB_CELL_NODES */
+  SbMaterial pointwise; /* the law at the points, less its volumetric part where that is of the mean */
+  PetscInt nnode;       /* of a cell: 4, of P2 SB_CELL_NODES */
 } SbRegion;
 
 /*
-  The face terms of CR and DG (src/fem/jump.c), in batches of SB_BATCH faces between two cells of one body, all with a node
-  that this rank owns.
+  The face terms of CR and DG (src/fem/jump.c), in batches of SB_BATCH faces between two cells of one body,
+  all with a node that this rank owns.
 */
 typedef struct _p_SbJump *SbJump;
 typedef struct _p_SbConstraints *SbConstraints; /* sbconstraint.h */
@@ -53,17 +52,16 @@ struct _p_SbSpace {
   PetscInt *cell_node; /* [ncell][4] local nodes; of P2 those at the vertices */
   PetscInt *edge_node; /* [ncell][6] local nodes at edges of P2 cells, -1: none; NULL without a P2 body */
   PetscReal *node_x;   /* [nnode][3] rest position of each node, m */
-  PetscInt *
-    node_orig; /* [nnode] number that no partition changes, right on owned nodes: vert_orig of a vertex, Nvert +
-                          4 cell_orig + a of node a of a cell, the lower of the two that share it; 4 Ncell more for its support; Nvert + 8 Ncell + 6 cell_orig
-                          + e of edge e, the lowest of those that share it */
-  PetscInt *node_body; /* [nnode] */
-  uint64_t *node_set;  /* [nnode] SB_SET_BIT(k) when constrained with set k; of a face its support */
-  PetscBool faces;     /* some body has its nodes at faces */
-  PetscBool vertices;  /* all have them at vertices only: nodes are the mesh's vertices */
-  PetscInt *neighbour; /* [ncell][4] local cell across each face, -1: none; NULL without face nodes */
-  PetscInt
-    *dirichlet_node; /* [ncell][4] massless node that a prescribed DG face is tied to, -1: none; or NULL */
+  /* [nnode] number that no partition changes, right on owned nodes: vert_orig of a vertex; Nvert + 4
+     cell_orig + a of node a of a cell, the lower of two that share it, 4 Ncell more for its support; Nvert +
+     8 Ncell + 6 cell_orig + e of edge e, the lowest of those that share it */
+  PetscInt *node_orig;
+  PetscInt *node_body;        /* [nnode] */
+  uint64_t *node_set;         /* [nnode] SB_SET_BIT(k) when constrained with set k; of a face its support */
+  PetscBool faces;            /* some body has its nodes at faces */
+  PetscBool vertices;         /* all have them at vertices only: nodes are the mesh's vertices */
+  PetscInt *neighbour;        /* [ncell][4] local cell across each face, -1: none; NULL without face nodes */
+  PetscInt *dirichlet_node;   /* [ncell][4] massless node that a DG face is tied to, -1: none; or NULL */
   const SbElement *element;   /* [nbody] borrowed */
   const SbMaterial *material; /* by SbMesh.cell_material; borrowed */
   PetscInt nregion;
@@ -73,9 +71,9 @@ struct _p_SbSpace {
   PetscInt *batch_n;    /* [nbatch] cells in it, 1..SB_BATCH */
   PetscInt *batch_node; /* [nbatch][4][SB_BATCH] local nodes (padding repeats the first cell) */
   PetscInt width;       /* nodes that the stress of a cell acts on at most: 4, 8 with DG, 10 with P2 */
-  PetscInt *
-    batch_clique; /* [nbatch][width][SB_BATCH] these nodes: the four of batch_node, then those across the faces, or those of P2
-                                at the edges (again its own where there is no other); batch_node itself when width is 4 */
+  /* [nbatch][width][SB_BATCH] these nodes: the four of batch_node, then those across the faces, or those of
+     P2 at the edges (again its own where there is no other); batch_node itself when width is 4 */
+  PetscInt *batch_clique;
   SbPack *batch_weight;      /* [nbatch][4] of a cell's own node in the mean of the two; NULL without DG */
   SbJump jump;               /* NULL without face nodes */
   SbConstraints constraints; /* NULL unless an effect may constrain nodes along directions of their own */
@@ -94,31 +92,39 @@ struct _p_SbSpace {
   PetscReal *fixed_value; /* [nfixed][3] prescribed displacement at the last evaluation, m */
   PetscBool ghosted; /* more than one rank: vectors carry ghosts, also where a rank happens to have none */
   Vec template_vec;  /* ghosted (more than one rank) or sequential; block size 3 */
-  struct _p_SbPlan *plan; /* cell blocks -> matrix values; NULL before SbSpaceCreateMatrix() */
-  PetscReal block_scale;  /* on blocks of SbSpaceAddCellBlock(): the load factor of a static run, or 1 */
-  PetscBool rough;        /* the last solve had a loose tolerance: its contact forces are inaccurate */
-  PetscBool linear;       /* every region's law is linear */
-  SbPack
-    *linear_pressure; /* [nbatch] SbSpaceLinearisePressure(); NULL: tangents have the pressures of states */
-  void *pressure_memory; /* memory of linear_pressure */
+  struct _p_SbPlan *plan;    /* cell blocks -> matrix values; NULL before SbSpaceCreateMatrix() */
+  PetscReal block_scale;     /* on blocks of SbSpaceAddCellBlock(): the load factor of a static run, or 1 */
+  PetscBool rough;           /* the last solve had a loose tolerance: its contact forces are inaccurate */
+  PetscBool linear;          /* every region's law is linear */
+  SbPack *pressure;          /* [nbatch] of SbSpaceLinearisePressure(), NULL before it, */
+  PetscBool linear_pressure; /* and whether tangents have them instead of the pressures of states */
 };
 
-/* Collective. Borrowed: materials by the numbers in the mesh (one per body, then those of inclusions), elements one per body. Options
-   read: -mass. */
+/* Collective. Borrowed: materials by the numbers in the mesh (one per body, then those of inclusions),
+   elements one per body. Options read: -mass. */
 PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbElement element[],
                              SbSpace *space);
 PetscErrorCode SbSpaceDestroy(SbSpace *space);
 PetscErrorCode SbSpaceValidate(SbSpace space);
 PetscErrorCode SbSpaceRegister(void);
 
-/* A zeroed vector with the layout of the unknowns (3 per node, ghosted in parallel). Collective. Caller destroys. */
+/* A zeroed vector with the layout of the unknowns (3 per node, with ghosts). Collective. Caller destroys. */
 PetscErrorCode SbSpaceCreateVec(SbSpace space, Vec *v);
-/* Brings ghosts up to date and lends the local array [nnode][3] of `v`. Collective; restore in the same function. */
+/* Brings ghosts up to date and lends the local array [nnode][3] of `v`. Collective; restore in the same
+   function. */
 PetscErrorCode SbSpaceGetLocalRead(SbSpace space, Vec v, const PetscReal **array);
-PetscErrorCode SbSpaceRestoreLocalRead(SbSpace space, Vec v, const PetscReal **array);
-/* Lends the local array of `v` for writing; values in ghost entries are ignored afterwards. Not collective. */
+static inline PetscErrorCode SbSpaceRestoreLocalRead(SbSpace space, Vec v, const PetscReal **array)
+{
+  (void)space;
+  return VecRestoreArrayRead(v, array);
+}
+/* Lends the local array of `v` for writing; values of ghosts are ignored afterwards. Not collective. */
 PetscErrorCode SbSpaceGetLocalWrite(SbSpace space, Vec v, PetscReal **array);
-PetscErrorCode SbSpaceRestoreLocalWrite(SbSpace space, Vec v, PetscReal **array);
+static inline PetscErrorCode SbSpaceRestoreLocalWrite(SbSpace space, Vec v, PetscReal **array)
+{
+  (void)space;
+  return VecRestoreArray(v, array);
+}
 /* Brings x[nnode][3] of owned nodes to the ghosts of other ranks. Collective. */
 PetscErrorCode SbSpaceUpdateGhosts(SbSpace space, PetscReal x[]);
 
@@ -130,20 +136,23 @@ void SbSpaceAddInertia(SbSpace space, const SbStage *stage, PetscReal f[]);
 /*
   SbSpaceLinearisePressure - sets the cell pressures of tangents to linearised ones (src/fem/quadratic.c).
 
-  Collective. Input: U, m; step, m; along: factor on it; part: p = p(U) + part dp/dU . along step. step NULL: p(U). U NULL: tangents have the
-  pressures of their states again.
+  Collective. Input: U, m; step, m; along: factor on it; part: p = p(U) + part dp/dU . along step. step NULL:
+  p(U). U NULL: tangents have the pressures of their states again.
 */
 PetscErrorCode SbSpaceLinearisePressure(SbSpace space, Vec U, Vec step, PetscReal along, PetscReal part);
 
 /*
   SbSpaceFollowJumps - adapts the penalty on jumps of CR and DG to the state (src/fem/jump.c).
 
-  Collective. Input: U, m; steps: load steps, with the energies of full jumps; time steps, where the energy of each face at U is kept within bounds; time steps without damping, where no penalty falls. Output: changed (or NULL):
-  some penalty did, for load steps by a percent or more. Until the next call the face terms are constant; at first they are those of the rest state.
+  Collective. Input: U, m; steps: load steps, with the energies of full jumps; time steps, where the energy of
+  each face at U is kept within bounds; time steps without damping, where no penalty falls. Output: changed
+  (or NULL): some penalty did, for load steps by a percent or more. Until the next call the face terms are
+  constant; at first they are those of the rest state.
 */
 typedef enum { SB_STEPS_OF_LOAD, SB_STEPS_IN_TIME, SB_STEPS_UNDAMPED } SbStepsOf;
 PetscErrorCode SbSpaceFollowJumps(SbSpace space, Vec U, SbStepsOf steps, PetscBool *changed);
-/* For checkpoints and re-meshing, k[5 ncell_owned]: for each of a cell's four faces the stiffness of the full jump at U that has the face's energy, N/m, 0: no such face; and the stress that the penalty depends on, Pa.
+/* For checkpoints and re-meshing, k[5 ncell_owned]: for each of a cell's four faces the stiffness of the full
+   jump at U that has the face's energy, N/m, 0: no such face; and the stress that the penalty depends on, Pa.
    Set: the same, before SbSpaceFollowJumps(). Collective. */
 PetscErrorCode SbSpaceGetJumps(SbSpace space, Vec U, PetscReal k[]);
 PetscErrorCode SbSpaceSetJumps(SbSpace space, const PetscReal k[]);
@@ -155,43 +164,47 @@ PetscErrorCode SbSpaceCreateMatrix(SbSpace space, SbMatrixKind kind, Mat *A);
 PetscErrorCode SbSpaceAssembleTangent(SbSpace space, const SbStage *stage, Mat A);
 /* Replaces rows and columns of prescribed unknowns by a scaled identity and closes the assembly. */
 PetscErrorCode SbSpaceFinishTangent(SbSpace space, Mat A);
-/* Between the two: A += a 3x3 block (row-major, N/m) for two nodes a, b of a local cell, as SbSpaceCellNode() numbers them. Not collective. */
+/* Between the two: A += a 3x3 block (row-major, N/m) for nodes a, b of a local cell, as SbSpaceCellNode()
+   numbers them. Not collective. */
 PetscErrorCode SbSpaceAddCellBlock(SbSpace space, Mat A, PetscInt cell, PetscInt a, PetscInt b,
                                    const PetscReal block[9]);
-/* The same for a spring from node a to a rigid support, possibly the only one of a body: it is also added to the coarse spaces of
-   -solver pressure. The block is positive semi-definite; the node's owner must be among the callers. */
+/* The same for a spring from node a to a rigid support, possibly the only one of a body: it is also added to
+   the coarse spaces of -solver pressure. The block is positive semi-definite; the node's owner must be among
+   the callers. */
 PetscErrorCode SbSpaceAddSpring(SbSpace space, Mat A, PetscInt cell, PetscInt a, const PetscReal block[9]);
 
-/* f[nnode][3] += factor dV/du, V the current volume of a body (m^3) at displacement u. Right on owned nodes. Not collective. */
+/* f[nnode][3] += factor dV/du, V the volume of a body (m^3) at u. Right on owned nodes. Not collective. */
 void SbSpaceAddVolumeForce(SbSpace space, PetscInt body, const PetscReal u[], PetscReal factor,
                            PetscReal f[]);
 /* A += factor d^2V/du^2 times block_scale, as SbSpaceAddCellBlock() does. Not collective. */
 PetscErrorCode SbSpaceAddVolumeTangent(SbSpace space, PetscInt body, const PetscReal u[], PetscReal factor,
                                        Mat A);
 
-/* Marks components (bits 0..2) of a local node as prescribed; set-up only. All ranks that know the node must do it. */
+/* Marks components (bits 0..2) of a local node as prescribed; set-up only. All ranks with the node do it. */
 PetscErrorCode SbSpacePrescribe(SbSpace space, PetscInt node, int components);
 /* After all effects were set up: builds fixed_node. */
 PetscErrorCode SbSpacePrescribeDone(SbSpace space);
 /* Zeroes the prescribed components of a vector, or all others. Not collective. */
 PetscErrorCode SbSpaceZeroPrescribed(SbSpace space, PetscBool prescribed, Vec X);
 
-/* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest), the law's pressure -lambda theta, Pa
-   (SbMaterialOps.pressure). Outputs may be NULL. Not collective. */
+/* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest), the law's
+   pressure -lambda theta, Pa (SbMaterialOps.pressure). Outputs may be NULL. Not collective. */
 void SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[], PetscReal psi[],
                       PetscReal pressure[]);
-/* Per owned cell: first Piola-Kirchhoff stress P[9] (Pa), rotation R[9] in F (the identity for the linear law; may be NULL), energy
-   density psi (J/m^3, rest); of P2, whose stresses are means over the points of SbRuleQuadratic, P there as well, point[ncell][4][9]
-   (may be NULL); of a curved cell the linear function nearest to P is taken there. Not collective. */
+/* Per owned cell: first Piola-Kirchhoff stress P[9] (Pa), rotation R[9] in F (the identity for the linear
+   law; may be NULL), energy density psi (J/m^3, rest); of P2, whose stresses are means over the points of
+   SbRuleQuadratic, P there as well, point[ncell][4][9] (may be NULL); of a curved cell the linear function
+   nearest to P is taken there. Not collective. */
 void SbSpaceCellPiola(SbSpace space, const PetscReal u[], PetscReal P[], PetscReal R[], PetscReal psi[],
                       PetscReal point[]);
-/* Owned cells: strain energy (J; added to body[nbody] by bodies, too, unless that is NULL), smallest det F, number with det F <= 0, current volume (m^3). Local: reduce them. */
+/* Owned cells: strain energy (J; added to body[nbody] by bodies, too, unless that is NULL), smallest det F,
+   number with det F <= 0, current volume (m^3). Local: reduce them. */
 void SbSpaceStrainEnergy(SbSpace space, const PetscReal u[], PetscReal body[], PetscReal *energy,
                          PetscReal *minJ, PetscInt *ninverted, PetscReal *volume);
 /* v . C v of owned cells, W. Local: reduce it. */
 PetscErrorCode SbSpaceDampingPower(SbSpace space, const PetscReal u[], const PetscReal v[], PetscReal *power);
-/* Largest stable step of an explicit run at rest, with its damping, s; a few percent too large at most. Collective, after
-   SbSpacePrescribeDone(). */
+/* Largest stable step of an explicit run at rest, with its damping, s; a few percent too large at most.
+   Collective, after SbSpacePrescribeDone(). */
 PetscErrorCode SbSpaceStableStep(SbSpace space, PetscReal *dt);
 
 /*
@@ -208,7 +221,8 @@ typedef struct {
 } SbFacet;
 /* Positions of the ten nodes of a P2 cell at rest. */
 void SbSpaceCellPositions(SbSpace space, PetscInt cell, PetscReal x[SB_CELL_NODES][3]);
-/* Integrals of the basis functions over a curved P2 cell, or over a facet of it unless that is NULL. Returns their sum, its volume (m^3) or area (m^2). */
+/* Integrals of the basis functions over a curved P2 cell, or over a facet of it unless that is NULL. Returns
+   their sum, its volume (m^3) or area (m^2). */
 PetscReal SbSpaceCurvedIntegrals(SbSpace space, PetscInt cell, const SbFacet *facet,
                                  PetscReal integral[SB_CELL_NODES]);
 /* The element of a local cell. */
@@ -223,28 +237,20 @@ static inline PetscInt SbSpaceCellNode(SbSpace space, PetscInt cell, PetscInt a)
 }
 /* All local boundary facets (of owned and ghost cells) in set k of the mesh. Allocated here; PetscFree. */
 PetscErrorCode SbSpaceGetSetFacets(SbSpace space, PetscInt k, PetscInt *n, SbFacet **facets);
-/* Index of a set by name; -1 and an error with the nearest names when there is none (where = option, for the message). */
+/* Index of a set by name; -1 and an error if there is none (where = option, for the message). */
 PetscErrorCode SbSpaceFindSet(SbSpace space, const char *name, const char *where, PetscInt *k);
 
-/* ------------------------------------------------------------------ real time: many similar systems, solved fast */
+/* --------------------------------- real time: many similar systems, solved fast */
 
 /*
-  SbSpaceCreateMatrixFree - the tangent without a matrix: A = shift_a M + shift_v C + shift_k sum_T R_T K_T R_T^T, applied cell
-  by cell from the cells' rotated gradients.
+  SbSpaceCreateMatrixFree - the tangent without a matrix: A = shift_a M + shift_v C + shift_k sum_T R_T K_T
+  R_T^T, applied cell by cell from the cells' rotated gradients.
 
-  Collective. For laws whose tangent is Hooke's tensor turned by a rotation (linear; co-rotated with the warped tangent), lumped
-  mass, and elements without face terms (P1, P2). A is a MATSHELL owned by the caller; the space is borrowed. Its state is set by SbSpaceAssembleTangent(), as for
-  any matrix. Prescribed unknowns have a scaled identity. Errors: PETSC_ERR_SUP for what it is not for.
+  Collective. For laws whose tangent is Hooke's tensor turned by a rotation (linear; co-rotated with the
+  warped tangent), lumped mass, and elements without face terms (P1, P2). A is a MATSHELL owned by the caller;
+  the space is borrowed. Its state is set by SbSpaceAssembleTangent(), as for any matrix. Prescribed unknowns
+  have a scaled identity. Errors: PETSC_ERR_SUP for what it is not for.
 */
 PetscErrorCode SbSpaceCreateMatrixFree(SbSpace space, Mat *A);
-/* PETSC_TRUE when the space's laws, elements and mass allow a matrix-free operator. Not collective, same on all ranks. */
+/* Whether the space's laws, elements and mass allow a matrix-free operator. Collective, same on all ranks. */
 PetscErrorCode SbSpaceAllowsMatrixFree(SbSpace space, PetscBool *has);
-
-/*
-  SbSpaceNodeRotations - rotation of the material around each owned node: the proper rotation closest to the volume-weighted
-  mean of the rotations of the cells around it.
-
-  Not collective. Input: u[nnode][3] with ghosts, m. Output: R[nnode_owned][9], row-major; spread[nnode_owned] (may be NULL), the
-  largest |R_cell - R|_F^2 among the cells around, 8 sin^2(angle / 2).
-*/
-PetscErrorCode SbSpaceNodeRotations(SbSpace space, const PetscReal u[], PetscReal R[], PetscReal spread[]);

@@ -1,12 +1,13 @@
 /*
-  sbkernel.h - layer 0: what the batch kernels are made of: lanes, function multiversioning, 3x3 algebra, polar rotation.
+  sbkernel.h - layer 0: what batch kernels are made of: lanes, versions for processors, 3x3 algebra.
 
-  A kernel works on SB_BATCH tets side by side. Every quantity is an array over lanes, and a kernel is a loop over lanes
-  around straight-line code, so that the compiler turns each scalar of the text into one vector register. The functions
-  below are that straight-line code: matrices are row-major, A[3*i+j] is A_ij, on plain doubles of one lane.
+  A kernel works on SB_BATCH tets side by side. Every quantity is an array over lanes, and a kernel is a loop
+  over lanes around straight-line code, so that the compiler turns each scalar of the text into one vector
+  register. The functions below are that code on one lane; matrices are row-major, A[3*i+j] is A_ij.
 
-  A batch is 8 wide: one AVX-512 register of doubles, two of AVX2. Measured on Zen 4, co-rotated cell with gradient, rotation,
-  ten blocks, stress and force: 0.071 us per tet with 4, 0.043 with 8, 0.042 with 16, where the general tangent gets slower.
+  A batch is 8 wide: one AVX-512 register of doubles, two of AVX2. Measured on Zen 4, co-rotated cell with
+  gradient, rotation, ten blocks, stress and force: 0.071 us per tet with 4, 0.043 with 8, 0.042 with 16,
+  where the general tangent gets slower.
 */
 #pragma once
 #include <petscsys.h>
@@ -16,10 +17,10 @@
 typedef PetscReal SbPack[SB_BATCH]; /* 64-byte aligned where the program allocates it */
 
 /*
-  SB_KERNEL in front of a function compiles it for AVX-512, for AVX2 and for the baseline; the loader picks one when the
-  program starts. All three give the same bits: -std=c11 keeps multiplications and additions apart (fusing them was measured
-  to gain 5 %, and would make results depend on the processor). Off where it cannot work or is in the way: other compilers
-  and processors, debug and sanitizer builds.
+  SB_KERNEL in front of a function compiles it for AVX-512, for AVX2 and for the baseline; the loader picks
+  one when the program starts. All three give the same bits: -std=c11 keeps multiplications and additions
+  apart (fusing them was measured to gain 5 %, and would make results depend on the processor). Off where it
+  cannot work or is in the way: other compilers and processors, debug and sanitizer builds.
 */
 #if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__gnu_linux__) && \
   !defined(SB_DEBUG) && !defined(SB_SANITIZE) && !defined(__SANITIZE_ADDRESS__) &&               \
@@ -28,7 +29,7 @@ typedef PetscReal SbPack[SB_BATCH]; /* 64-byte aligned where the program allocat
 #else
   #define SB_KERNEL
 #endif
-/* The helpers must end up inside the kernel that calls them, whatever their size, or nothing is vectorised. */
+/* The helpers must end up inside the kernel that calls them, or nothing is vectorised. */
 #if defined(__GNUC__) && !defined(SB_DEBUG)
   #define SB_INLINE static inline __attribute__((always_inline))
 #else
@@ -115,18 +116,20 @@ SB_INLINE PetscReal SbMatDet(const PetscReal A[9])
 /*
   SbPolar - the proper rotation R next to F: det R = +1, the maximiser of R : F, for every F.
 
-  Not collective. Input: F, deformation gradients. Output: R, rotations; R^T F is symmetric. Where the maximiser is not
-  unique (rank one, F = 0, reflections with equal stretches) some maximiser is returned, I for F = 0. A lane that is not
-  finite gives NaN. Error of R about 5 eps |F| / (s2 + s3), s2 + s3 being the sum of the two smaller signed stretches:
-  that is rounding of F seen through the condition number of the problem. A lane's result does not depend on the others.
+  Not collective. Input: F, deformation gradients. Output: R, rotations; R^T F is symmetric. Where the
+  maximiser is not unique (rank one, F = 0, reflections with equal stretches) some maximiser is returned, I
+  for F = 0. A lane that is not finite gives NaN. Error of R about 5 eps |F| / (s2 + s3), s2 + s3 being the
+  sum of the two smaller signed stretches: that is rounding of F seen through the condition number of the
+  problem. A lane's result does not depend on the others.
 */
 void SbPolar(const SbPack F[9], SbPack R[9]);
 
 /*
-  SbSymEig - eigenvalues s[3] and eigenvectors V (columns, det V = +1) of symmetric matrices S[6] = 00 01 02 11 12 22.
+  SbSymEig - eigenvalues s[3] and eigenvectors V (columns, det V = +1) of symmetric S[6] = 00 01 02 11 12 22.
 
-  Not collective. Right to rounding of the largest entry; no order among the eigenvalues. With R from SbPolar() and S = R^T F this
-  is the singular value decomposition F = (R V) diag(s) V^T with two rotations, the sign of det F being in s.
+  Not collective. Right to rounding of the largest entry; no order among the eigenvalues. With R from
+  SbPolar() and S = R^T F this is the singular value decomposition F = (R V) diag(s) V^T with two rotations,
+  the sign of det F being in s.
 */
 void SbSymEig(const SbPack S[6], SbPack s[3], SbPack V[9]);
 

@@ -1,5 +1,5 @@
 /*
-  sbquadratic.h - layer 0: tets with ten nodes, four at the corners and six at the edges: basis, map, rules of integration. Not collective.
+  sbquadratic.h - layer 0: tets with ten nodes, at corners and edges: basis, map, rules. Not collective.
 */
 #pragma once
 #include "sbbase.h"

@@ -1,5 +1,5 @@
 /*
-  sbtet.h - layer 2: tets as plain arrays on one rank: their faces, their shape, checks. Not collective throughout.
+  sbtet.h - layer 2: tets as arrays on one rank: faces, shape, checks. Not collective throughout.
 */
 #pragma once
 #include "sbmeshio.h"
@@ -17,8 +17,8 @@ typedef struct {
   PetscInt shared[3]; /* three cells at the first one of these */
 } SbFaces;
 
-extern const int
-  SbFaceVertex[4][3]; /* of face f, counter-clockwise seen from outside a positively oriented tet */
+/* of face f, counter-clockwise seen from outside a positively oriented tet */
+extern const int SbFaceVertex[4][3];
 
 PetscErrorCode SbFacesCreate(PetscInt nvert, PetscInt ncell, const PetscInt cell[], SbFaces *faces);
 PetscErrorCode SbFacesDestroy(SbFaces *faces);
@@ -40,10 +40,11 @@ typedef struct {
 void SbImportShape(const SbImport *import, PetscReal degrees, SbShape *shape);
 
 /*
-  SbTetQuality - shape of a tet, positions in m: 3 r / R with the radii of the spheres in it and around it, 1 for the regular
-  one, 0 for a flat one, negative when it is inverted. Not collective.
+  SbTetQuality - shape of a tet, positions in m: 3 r / R with the radii of the spheres in it and around it, 1 for
+  the regular one, 0 for a flat one, negative when it is inverted. Not collective.
 */
 PetscReal SbTetQuality(const PetscReal x[], const PetscInt vert[4]);
-/* curve.c: of a tet with its edges off their middles by off[6][3], its volume, and the least Jacobian, where P2 uses it and at its nodes, over that of the straight tet. */
+/* curve.c: of a tet with its edges off their middles by off[6][3], its volume, and the least Jacobian, where
+   P2 uses it and at its nodes, over that of the straight tet. */
 PetscReal SbTetCurvedVolume(const PetscReal x[], const PetscInt vert[4], const PetscReal off[18]);
 PetscReal SbTetCurvedLeast(const PetscReal x[], const PetscInt vert[4], const PetscReal off[18]);

@@ -44,7 +44,8 @@ static inline PetscErrorCode contact_problem_open(PetscInt cells, const char *el
   PetscCall(SbSpaceCreateMatrix(s, size == 1 ? SB_MATRIX_SBAIJ : SB_MATRIX_BAIJ, &p->K));
   PetscCall(SbSpaceCreateVec(s, &zero));
   PetscCall(SbModelPotentialBegin(p->scene.model, 0., h, zero, NULL));
-  PetscCall(SbModelPotentialHessian(p->scene.model, zero, SB_HESSIAN_PROJECTED, &p->blocks, NULL));
+  PetscCall(SbSpaceCreateVec(s, &p->F));
+  PetscCall(SbModelPotentialHessian(p->scene.model, zero, SB_HESSIAN_PROJECTED, &p->blocks, p->F));
   PetscCall(SbSpaceGetLocalRead(s, zero, &u));
   stage.u = u;
   PetscCall(SbSpaceAssembleTangent(s, &stage, p->K));
@@ -54,7 +55,6 @@ static inline PetscErrorCode contact_problem_open(PetscInt cells, const char *el
   PetscCallMPI(MPI_Allreduce(&p->blocks.n, &p->npair, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
 
   /* a load that varies from node to node */
-  PetscCall(SbSpaceCreateVec(s, &p->F));
   PetscCall(VecDuplicate(p->F, &p->Y));
   PetscCall(VecGetArray(p->F, &f));
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {

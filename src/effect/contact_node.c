@@ -50,8 +50,7 @@ static void add_share(SbSpace space, const SbFacet *facet, PetscInt a, PetscReal
     c->touch[slot[node]] = (Touch){.node = node, .cell = facet->cell, .a = a, .along = -1};
   }
   touch = &c->touch[slot[node]];
-  touch->k += c->stiffness * PetscMin(SbMaterialWaveModulus(m), STIFFEST * m->ops.shear_modulus(m)) * share /
-              facet->height;
+  touch->k += c->stiffness * PetscMin(SbMaterialWaveModulus(m), STIFFEST * m->mu) * share / facet->height;
   touch->stiff = touch->k;
 }
 

@@ -1,16 +1,16 @@
 /*
   Cell kernels: tets with four nodes and constant basis gradients, vectorised over the lanes.
 
-  F = I + sum_a u_a g_a^T and f_a = V P g_a. With Hooke's tensor rotated by R, C_(ij)(kl) = R_ip R_kq (lambda d_pj d_ql +
-  mu d_pq d_jl + mu d_pl d_jq), contracting with g_a,j and g_b,l and writing h = R g gives the block
+  F = I + sum_a u_a g_a^T and f_a = V P g_a. With Hooke's tensor rotated by R, C_(ij)(kl) = R_ip R_kq (lambda
+  d_pj d_ql + mu d_pq d_jl + mu d_pl d_jq), contracting with g_a,j and g_b,l, and h = R g, the block is
 
     K_ab = V (lambda h_a h_b^T + mu h_b h_a^T + mu (h_a . h_b) I),
 
-  which needs no triple product. The derivative of the rotation, dP = R [W y]x with y = axial(R^T dF - dF^T R), adds
-  V [h_a]x R W R^T [h_b]x^T; since [a]x [b]x^T = (a . b) I - b a^T, W = -mu I turns 2 mu dF into Hooke's mu terms.
+  which needs no triple product. The derivative of the rotation, dP = R [W y]x, y = axial(R^T dF - dF^T R),
+  adds V [h_a]x R W R^T [h_b]x^T; as [a]x [b]x^T = (a . b) I - b a^T, W = -mu I turns 2 mu dF into Hooke's mu.
 
-  g_0 = -(g_1 + g_2 + g_3): only nodes 1..3 are computed, and since K_ba = K_ab^T only six blocks of them; the blocks of
-  node 0 are minus sums. So a translation of the cell gives zero force, up to rounding.
+  g_0 = -(g_1 + g_2 + g_3): only nodes 1..3 are computed, and since K_ba = K_ab^T only six blocks of them; the
+  blocks of node 0 are minus sums. So a translation of the cell gives zero force, up to rounding.
 */
 #include <sbelement.h>
 
@@ -60,7 +60,7 @@ SB_KERNEL void SbCellForce(const SbPack g[restrict 9], const PetscReal V[restric
   }
 }
 
-/* Block of two rotated gradients, lv = lambda V, mv = mu V, in the form of a diagonal one (bitwise symmetric). */
+/* Block of two rotated gradients, lv = lambda V, mv = mu V, as a diagonal one (bitwise symmetric). */
 SB_INLINE void diagonal_block(PetscReal lv, PetscReal mv, const PetscReal h[3], PetscReal K[9])
 {
   const PetscReal d = mv * SbDot3(h, h), c = lv + mv;
@@ -86,20 +86,24 @@ SB_INLINE void coupling_block(PetscReal lv, PetscReal mv, const PetscReal ha[3],
   }
 }
 
-/* Blocks of node 0 of lane l from those of nodes 1..3. */
-SB_INLINE void node0_blocks(const PetscReal K11[9], const PetscReal K12[9], const PetscReal K13[9],
-                            const PetscReal K22[9], const PetscReal K23[9], const PetscReal K33[9], int l,
-                            SbPack K[10][9])
+/* Blocks of lane l from those of nodes 1..3, B = 11 12 13 22 23 33: these, and those of node 0. */
+SB_INLINE void put_blocks(const PetscReal B[6][9], int l, SbPack K[10][9])
 {
   PetscReal K01[9], K02[9], K03[9];
 
+  SbPackPut(9, B[0], l, K[4]);
+  SbPackPut(9, B[1], l, K[5]);
+  SbPackPut(9, B[2], l, K[6]);
+  SbPackPut(9, B[3], l, K[7]);
+  SbPackPut(9, B[4], l, K[8]);
+  SbPackPut(9, B[5], l, K[9]);
   for (int i = 0; i < 3; i++) {
     for (int k = 0; k < 3; k++) {
       const int ik = 3 * i + k, ki = 3 * k + i;
 
-      K01[ik] = -(K11[ik] + K12[ki] + K13[ki]);
-      K02[ik] = -(K12[ik] + K22[ik] + K23[ki]);
-      K03[ik] = -(K13[ik] + K23[ik] + K33[ik]);
+      K01[ik] = -(B[0][ik] + B[1][ki] + B[2][ki]);
+      K02[ik] = -(B[1][ik] + B[3][ik] + B[4][ki]);
+      K03[ik] = -(B[2][ik] + B[4][ik] + B[5][ik]);
     }
   }
   SbPackPut(9, K01, l, K[1]);
@@ -118,35 +122,20 @@ SB_KERNEL void SbCellBlocksIsotropic(const SbPack g[restrict 9], const PetscReal
                                      PetscReal lambda, PetscReal mu, const SbPack R[restrict 9],
                                      SbPack K[restrict 10][9])
 {
-  SbPack identity[9];
-  const SbPack *Q = R;
-
-  if (!R) {
-    for (int k = 0; k < 9; k++) {
-      for (int l = 0; l < SB_BATCH; l++) identity[k][l] = k % 4 == 0;
-    }
-    Q = (const SbPack *)identity;
-  }
   for (int l = 0; l < SB_BATCH; l++) {
     const PetscReal lv = lambda * V[l], mv = mu * V[l];
-    PetscReal r[9], e[9], h[9], K11[9], K12[9], K13[9], K22[9], K23[9], K33[9];
+    PetscReal r[9], e[9], h[9], B[6][9];
 
-    SbPackGet(9, Q, l, r);
+    SbPackGet(9, R, l, r);
     SbPackGet(9, g, l, e);
     SbMatMulTranspose(e, r, h); /* row a = R g_a */
-    diagonal_block(lv, mv, h, K11);
-    coupling_block(lv, mv, h, h + 3, K12);
-    coupling_block(lv, mv, h, h + 6, K13);
-    diagonal_block(lv, mv, h + 3, K22);
-    coupling_block(lv, mv, h + 3, h + 6, K23);
-    diagonal_block(lv, mv, h + 6, K33);
-    SbPackPut(9, K11, l, K[4]);
-    SbPackPut(9, K12, l, K[5]);
-    SbPackPut(9, K13, l, K[6]);
-    SbPackPut(9, K22, l, K[7]);
-    SbPackPut(9, K23, l, K[8]);
-    SbPackPut(9, K33, l, K[9]);
-    node0_blocks(K11, K12, K13, K22, K23, K33, l, K);
+    diagonal_block(lv, mv, h, B[0]);
+    coupling_block(lv, mv, h, h + 3, B[1]);
+    coupling_block(lv, mv, h, h + 6, B[2]);
+    diagonal_block(lv, mv, h + 3, B[3]);
+    coupling_block(lv, mv, h + 3, h + 6, B[4]);
+    diagonal_block(lv, mv, h + 6, B[5]);
+    put_blocks((const PetscReal(*)[9])B, l, K);
   }
 }
 
@@ -160,7 +149,7 @@ SB_INLINE void cross_columns(const PetscReal h[3], const PetscReal W[9], PetscRe
   }
 }
 
-/* K = 2 mu (ha . hb) I + lambda ha hb^T + T [hb]x^T with T = [ha]x W; lv = lambda V, mv = mu V; T is already multiplied by V. */
+/* K = 2 mu (ha . hb) I + lambda ha hb^T + T [hb]x^T with T = [ha]x W; lv = lambda V, mv = mu V, T times V. */
 SB_INLINE void spin_block(PetscReal lv, PetscReal mv, const PetscReal ha[3], const PetscReal T[9],
                           const PetscReal hb[3], PetscReal K[9])
 {
@@ -189,8 +178,7 @@ SB_KERNEL void SbCellBlocksCorotated(const SbPack g[restrict 9], const PetscReal
 {
   for (int l = 0; l < SB_BATCH; l++) {
     const PetscReal lv = lambda * V[l], mv = mu * V[l];
-    PetscReal r[9], e[9], h[9], w[9], x[9], T1[9], T2[9], T3[9], K11[9], K12[9], K13[9], K22[9], K23[9],
-      K33[9];
+    PetscReal r[9], e[9], h[9], w[9], x[9], T1[9], T2[9], T3[9], B[6][9];
 
     SbPackGet(9, R, l, r);
     SbPackGet(9, g, l, e);
@@ -202,28 +190,22 @@ SB_KERNEL void SbCellBlocksCorotated(const SbPack g[restrict 9], const PetscReal
     cross_columns(h, w, T1);
     cross_columns(h + 3, w, T2);
     cross_columns(h + 6, w, T3);
-    spin_block(lv, mv, h, T1, h, K11);
-    spin_block(lv, mv, h, T1, h + 3, K12);
-    spin_block(lv, mv, h, T1, h + 6, K13);
-    spin_block(lv, mv, h + 3, T2, h + 3, K22);
-    spin_block(lv, mv, h + 3, T2, h + 6, K23);
-    spin_block(lv, mv, h + 6, T3, h + 6, K33);
-    copy_upper(K11);
-    copy_upper(K22);
-    copy_upper(K33);
-    SbPackPut(9, K11, l, K[4]);
-    SbPackPut(9, K12, l, K[5]);
-    SbPackPut(9, K13, l, K[6]);
-    SbPackPut(9, K22, l, K[7]);
-    SbPackPut(9, K23, l, K[8]);
-    SbPackPut(9, K33, l, K[9]);
-    node0_blocks(K11, K12, K13, K22, K23, K33, l, K);
+    spin_block(lv, mv, h, T1, h, B[0]);
+    spin_block(lv, mv, h, T1, h + 3, B[1]);
+    spin_block(lv, mv, h, T1, h + 6, B[2]);
+    spin_block(lv, mv, h + 3, T2, h + 3, B[3]);
+    spin_block(lv, mv, h + 3, T2, h + 6, B[4]);
+    spin_block(lv, mv, h + 6, T3, h + 6, B[5]);
+    copy_upper(B[0]);
+    copy_upper(B[3]);
+    copy_upper(B[5]);
+    put_blocks((const PetscReal(*)[9])B, l, K);
   }
 }
 
 /*
-  For each pair (i, k) of components the slice M_jl = C_(ij)(kl) gives G M G^T with the gradients as rows of G: its entry
-  (a, b) is K_ab,ik, and since C_(kj)(il) = M_lj also K_ba,ki. Six slices suffice.
+  For each pair (i, k) of components the slice M_jl = C_(ij)(kl) gives G M G^T with the gradients as rows of
+  G: its entry (a, b) is K_ab,ik, and since C_(kj)(il) = M_lj also K_ba,ki. Six slices suffice.
 */
 SB_KERNEL void SbCellBlocksGeneral(const SbPack g[restrict 9], const PetscReal V[restrict SB_BATCH],
                                    const SbPack C[restrict 81], SbPack K[restrict 10][9])
@@ -256,14 +238,9 @@ SB_KERNEL void SbCellBlocksGeneral(const SbPack g[restrict 9], const PetscReal V
     }
   }
   for (int l = 0; l < SB_BATCH; l++) {
-    PetscReal K11[9], K12[9], K13[9], K22[9], K23[9], K33[9];
+    PetscReal B[6][9];
 
-    SbPackGet(9, (const SbPack *)K[4], l, K11);
-    SbPackGet(9, (const SbPack *)K[5], l, K12);
-    SbPackGet(9, (const SbPack *)K[6], l, K13);
-    SbPackGet(9, (const SbPack *)K[7], l, K22);
-    SbPackGet(9, (const SbPack *)K[8], l, K23);
-    SbPackGet(9, (const SbPack *)K[9], l, K33);
-    node0_blocks(K11, K12, K13, K22, K23, K33, l, K);
+    for (int p = 0; p < 6; p++) SbPackGet(9, (const SbPack *)K[4 + p], l, B[p]);
+    put_blocks((const PetscReal(*)[9])B, l, K);
   }
 }

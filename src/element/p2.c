@@ -4,18 +4,18 @@
     phi_i = l_i (2 l_i - 1) at vertex i,   phi_ij = 4 l_i l_j at the middle of edge ij,
     grad phi_i = (4 l_i - 1) grad l_i,     grad phi_ij = 4 (l_j grad l_i + l_i grad l_j).
 
-  So at a point the gradient is that of a P1 tet with the vertex displacements u_i' = (4 l_i - 1) u_i + sum_j 4 l_j u_ij,
-  and the results of P1's kernels are mapped back by the transpose: this file has both maps.
+  So at a point the gradient is that of a P1 tet with the vertex displacements u_i' = (4 l_i - 1) u_i + sum_j
+  4 l_j u_ij, and the results of P1's kernels are mapped back by the transpose: this file has both maps.
 
-  Stresses are evaluated at the four points of the rule of degree 2 (Keast 1986), each with a quarter of the volume. Cubic functions, as the
-  determinant of a linear deformation gradient, are integrated by the rule of degree 3 with five points.
+  Stresses are evaluated at the four points of the rule of degree 2 (Keast 1986), each with a quarter of the
+  volume. Cubic functions, as det F of a linear F, by the rule of degree 3 with five.
 
-  Tets with curved edges are P1 tets with different corners at each of the points of SbRuleQuintic (src/base/quadratic_map.c).
+  Tets with curved edges are P1 tets with other corners at each point of SbRuleQuintic (quadratic_map.c).
 
-  Mass / (density V): the consistent one is the integral of phi_a phi_b; lumped (Hinton, Rock and Zienkiewicz 1976) is its diagonal, scaled
-  to the mass of the tet: row sums at vertices would be negative, -1/20.
+  Mass / (density V): the consistent one is the integral of phi_a phi_b; lumped (Hinton, Rock and Zienkiewicz
+  1976) is its diagonal, scaled to the mass of the tet: row sums at vertices would be negative, -1/20.
 */
-#include "element_impl.h"
+#include <sbelement.h>
 
 #define NEAR 0.58541019662496845 /* (5 + 3 sqrt 5) / 20 */
 #define FAR 0.13819660112501052  /* (5 - sqrt 5) / 20 */
@@ -81,8 +81,9 @@ SB_INLINE int gradient_of(int a, const PetscReal L[4], int vertex[2], PetscReal 
   return 2;
 }
 
-SB_INLINE void blocks(const SbPointRule *rule, const int npoint, const SbPack (*B)[10][9],
-                      const PetscReal *factor, const SbPack *b, SbPack (*K)[9])
+SB_KERNEL void SbQuadraticBlocks(const SbPointRule *rule, const SbPack B[restrict][10][9],
+                                 const SbPack factor, const SbPack b[restrict 30],
+                                 SbPack K[restrict SB_PAIRS][9])
 {
   static const int pair[4][4] = {{0, 1, 2, 3}, {1, 4, 5, 6}, {2, 5, 7, 8}, {3, 6, 8, 9}};
   SbPack scaled[30];
@@ -97,7 +98,7 @@ SB_INLINE void blocks(const SbPointRule *rule, const int npoint, const SbPack (*
     int turned[4 * SB_POINTS], n = 0;
 
     // sum over the points of the P1 blocks that contribute
-    for (int q = 0; q < npoint; q++) {
+    for (int q = 0; q < rule->n; q++) {
       PetscReal fa[2], fb[2];
       int va[2], vb[2];
       const int na = gradient_of(SbPairA[p], rule->L[q], va, fa),
@@ -127,19 +128,8 @@ SB_INLINE void blocks(const SbPointRule *rule, const int npoint, const SbPack (*
   }
 }
 
-SB_KERNEL void SbQuadraticBlocks(const SbPack B[restrict 4][10][9], const SbPack factor,
-                                 const SbPack b[restrict 30], SbPack K[restrict SB_PAIRS][9])
-{
-  blocks(&SbRuleQuadratic, 4, B, factor, b, K);
-}
-
-SB_KERNEL void SbCurvedBlocks(const SbPack B[restrict SB_POINTS][10][9], const SbPack factor,
-                              const SbPack b[restrict 30], SbPack K[restrict SB_PAIRS][9])
-{
-  blocks(&SbRuleQuintic, SB_POINTS, B, factor, b, K);
-}
-
-/* With x_i x_j = F g_i x g_j of the barycentric coordinates the second derivative of det F along u at a and v at b is (u x v) . F (g_a x g_b). */
+/* With gradients g of barycentric coordinates the second derivative of det F along u at a, v at b is (u x v)
+   . F (g_a x g_b). */
 SB_KERNEL void SbQuadraticAddJacobian(const PetscReal L[4], const SbPack g[restrict 9],
                                       const SbPack F[restrict 9], const PetscReal weight[restrict SB_BATCH],
                                       SbPack K[restrict SB_PAIRS][9])
@@ -193,16 +183,4 @@ PetscReal SbQuadraticMass(int a, int b)
   const int *d = SbTetEdge[low - 4];
   const int shared = (d[0] == e[0]) + (d[0] == e[1]) + (d[1] == e[0]) + (d[1] == e[1]);
   return shared == 2 ? 8. / 105 : shared ? 4. / 105 : 2. / 105;
-}
-
-PetscErrorCode SbElementCreate_P2(SbElement e)
-{
-  PetscFunctionBeginUser;
-  e->nodes_per[0] = e->nodes_per[1] = 1;
-  e->mean_volume = PETSC_TRUE;
-  e->ops.tabulate = SbTabulateP1;
-  e->ops.mass_lumped = 1. / 36;
-  e->ops.mass_lumped_edge = 4. / 27;
-  for (int a = 0; a < 4; a++) e->ops.vertex[a][a] = 1.;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,8 +1,8 @@
 /*
   Rows of an operator as 3x3 blocks with local columns, for a matrix-free operator, AIJ, BAIJ or SBAIJ.
 
-  BAIJ and SBAIJ are read in place, by the assembly plan (both store a block column-major; SBAIJ
-  only the upper triangle). AIJ is read by MatGetRow(), three times slower.
+  BAIJ and SBAIJ are read in place, by the assembly plan (both store a block column-major; SBAIJ only the
+  upper triangle), AIJ by MatGetValues(), several times slower.
 */
 #include "fem_impl.h"
 
@@ -18,6 +18,7 @@ PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[
   const SbPlan p = s->plan;
   const SbPack *R;
   PetscBool blocks;
+  PetscInt widest = 0;
 
   PetscFunctionBeginUser;
   ia[0] = 0;
@@ -25,6 +26,7 @@ PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[
     const PetscInt i = node[k], nd = p->di[i + 1] - p->di[i], no = p->oi[i + 1] - p->oi[i];
 
     ia[k + 1] = ia[k] + nd + no;
+    widest = PetscMax(widest, nd + no);
     if (!ja) continue;
     PetscCall(PetscArraycpy(ja + ia[k], p->dj + p->di[i], nd));
     PetscCall(PetscArraycpy(ja + ia[k] + nd, p->oj + p->oi[i], no));
@@ -61,33 +63,21 @@ PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[
     }
     PetscCall(SbMatRestoreBlocks(&b));
   } else {
+    PetscInt *column;
+    PetscScalar *value;
+
+    PetscCall(PetscMalloc2(3 * widest, &column, 9 * widest, &value));
     for (PetscInt k = 0; k < n; k++) {
-      const PetscInt i = node[k], nd = p->di[i + 1] - p->di[i], no = p->oi[i + 1] - p->oi[i];
+      const PetscInt i = node[k], nd = p->di[i + 1] - p->di[i], ncol = 3 * (ia[k + 1] - ia[k]);
+      const PetscInt first = 3 * (s->gnode_start + i), row[3] = {first, first + 1, first + 2};
 
-      for (PetscInt c = 0; c < 3; c++) {
-        const PetscInt row = 3 * (s->gnode_start + i) + c, *column;
-        const PetscScalar *value;
-        PetscInt ncol, at = -1;
-
-        PetscCall(MatGetRow(A, row, &ncol, &column, &value));
-        for (PetscInt e = 0; e < ncol; e++) {
-          const PetscInt own = column[e] / 3 - s->gnode_start;
-          PetscInt ghost;
-
-          /* index of its block, own columns first; not all columns are in the graph */
-          if (own >= 0 && own < s->nnode_owned)
-            PetscCall(PetscFindInt(own, nd, p->dj + p->di[i], &at));
-          else {
-            PetscCall(
-              PetscFindInt(column[e] / 3, s->nnode - s->nnode_owned, s->gnode + s->nnode_owned, &ghost));
-            PetscCall(PetscFindInt(s->nnode_owned + ghost, no, p->oj + p->oi[i], &at));
-            if (at >= 0) at += nd;
-          }
-          if (at >= 0) block[9 * (ia[k] + at) + 3 * c + column[e] % 3] = value[e];
-        }
-        PetscCall(MatRestoreRow(A, row, &ncol, &column, &value));
-      }
+      for (PetscInt e = 0; e < ncol; e++)
+        column[e] = 3 * s->gnode[e / 3 < nd ? p->dj[p->di[i] + e / 3] : p->oj[p->oi[i] + e / 3 - nd]] + e % 3;
+      PetscCall(MatGetValues(A, 3, row, ncol, column, value));
+      for (PetscInt e = 0; e < 3 * ncol; e++)
+        block[9 * (ia[k] + e % ncol / 3) + 3 * (e / ncol) + e % 3] = value[e];
     }
+    PetscCall(PetscFree2(column, value));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,10 +1,9 @@
 /*
-  The current volume of a body, V = sum |T| det F over its cells, and its derivatives, for a pressure on the
-  whole surface.
+  The current volume of a body, V = sum |T| det F over its cells, and derivatives, for pressure all around.
 
-  For P1 dV/du acts on surface nodes only. For CR and DG, whose surface has gaps at its edges, the sum of the facets'
-  forces does not vanish, but V depends on strains only and is invariant under translations and rotations: resultant force and moment vanish
-  to rounding, and the tangent is exact and symmetric.
+  For P1 dV/du acts on surface nodes only. For CR and DG, whose surface has gaps at its edges, the sum of the
+  facets' forces does not vanish, but V depends on strains only and is invariant under translations and
+  rotations: resultant force and moment vanish to rounding, and the tangent is exact and symmetric.
 
     dV/dF = |T| cof F,   d cof F_ij / dF_kl = eps_ikm eps_jln F_mn.
 */
@@ -35,7 +34,7 @@ void SbSpaceAddVolumeForce(SbSpace s, PetscInt body, const PetscReal x[], PetscR
 
 PetscErrorCode SbSpaceAddVolumeTangent(SbSpace s, PetscInt body, const PetscReal x[], PetscReal factor, Mat A)
 {
-  SbValues values;
+  SbMatBlocks values;
 
   PetscFunctionBeginUser;
   PetscCall(SbValuesBegin(A, &values));
@@ -43,23 +42,13 @@ PetscErrorCode SbSpaceAddVolumeTangent(SbSpace s, PetscInt body, const PetscReal
     const SbRegion *region = &s->region[r];
 
     for (PetscInt b = region->bstart; region->body == body && b < region->bend; b++) {
-      SbPack U[30], F[SB_POINTS][9], C[81], K[10][9] __attribute__((aligned(64)));
+      SbPack U[30], F[SB_POINTS][9], C[81] = {{0}}, scale, K[10][9] __attribute__((aligned(64)));
 
       SbBatchGradients(s, region, b, x, PETSC_FALSE, U, F);
-      /* C = factor d cof F / dF: one term for each of the two remaining indices j of i and k. */
-      for (int c = 0; c < 81; c++) {
-        const int i = c / 27, j = c / 9 % 3, k = c / 3 % 3, n = c % 3;
-        const PetscReal sign = ((k + 3 - i) % 3 == 1 ? 1. : -1.) * ((n + 3 - j) % 3 == 1 ? 1. : -1.);
-        const PetscReal scale = i == k || j == n ? 0. : sign * s->block_scale * factor;
-
-        for (int l = 0; l < SB_BATCH; l++)
-          C[c][l] = scale == 0. ? 0. : scale * F[0][3 * (3 - i - k) + 3 - j - n][l];
-      }
+      for (int l = 0; l < SB_BATCH; l++) scale[l] = s->block_scale * factor;
+      SbAddCofactorTangent((const SbPack *)F[0], scale, C);
       SbCellBlocksGeneral(s->batch_g + 9 * b, s->batch_V[b], (const SbPack *)C, K);
-      if (region->broken)
-        SbInsertBroken(s, &values, b, (const SbPack(*)[9])K);
-      else
-        SbInsertBatch(s, &values, b, 10, (const SbPack(*)[9])K);
+      SbInsertBatch(s, &values, b, 10, region->broken, (const SbPack(*)[9])K);
     }
   }
   PetscCall(SbValuesEnd(&values));

@@ -5,25 +5,6 @@
 #include "fem_impl.h"
 #include "sbkernel.h"
 
-/*
-  For a curved cell: the linear function of l next to P (L2 projection on the straight tet), at the points of SbRuleQuadratic. With b_i = sum_q w_q l_i P_q it has 20 b_i -
-  4 sum_j b_j at corner i.
-*/
-static void linear_at_points(const SbPoints *at, const SbPack P[SB_POINTS][9], PetscInt n, PetscReal point[])
-{
-  for (PetscInt i = 0; i < 36 * n; i++) {
-    const PetscInt l = i / 36, to = i / 9 % 4, k = i % 9;
-
-    point[i] = 0.;
-    for (int q = 0; q < at->n; q++) {
-      PetscReal value = -4.;
-
-      for (int c = 0; c < 4; c++) value += 20. * SbRuleQuadratic.L[to][c] * at->rule->L[q][c];
-      point[i] += at->rule->weight[q] * value * P[q][k][l];
-    }
-  }
-}
-
 void SbSpaceCellPiola(SbSpace s, const PetscReal x[], PetscReal P[], PetscReal R[], PetscReal psi[],
                       PetscReal point[])
 {
@@ -37,8 +18,19 @@ void SbSpaceCellPiola(SbSpace s, const PetscReal x[], PetscReal P[], PetscReal R
       SbBatchState(s, region, b, x, F, stress, energy, NULL);
       for (PetscInt i = 0; point && region->quadratic && !at.step && i < 4 * s->batch_n[b]; i++)
         SbPackGet(9, (const SbPack *)stress[i % 4], (int)(i / 4), point + 9 * (4 * s->batch_cell[b] + i));
-      if (point && at.step)
-        linear_at_points(&at, (const SbPack(*)[9])stress, s->batch_n[b], point + 36 * s->batch_cell[b]);
+      /* a curved cell: the linear function of l next to P (L2 projection on the straight tet) at the points
+         of SbRuleQuadratic; with b_i = sum_q w_q l_i P_q it has 20 b_i - 4 sum_j b_j at corner i */
+      for (PetscInt i = 0; point && at.step && i < 36 * s->batch_n[b]; i++) {
+        PetscReal *to = point + 36 * s->batch_cell[b] + i;
+
+        *to = 0.;
+        for (int q = 0; q < at.n; q++) {
+          PetscReal value = -4.;
+
+          for (int c = 0; c < 4; c++) value += 20. * SbRuleQuadratic.L[i / 9 % 4][c] * at.rule->L[q][c];
+          *to += at.rule->weight[q] * value * stress[q][i % 9][i / 36];
+        }
+      }
 
       /* means over the points */
       for (int l = 0; l < SB_BATCH; l++) all[l] = at.weight[0][l];

@@ -1,14 +1,16 @@
 /*
   Constraints of single nodes, for contact with rigid obstacles: n . u = c exactly, or by a spring (penalty).
 
-  A node has up to three exact constraints, the rows of G, with the values c, and constraint forces along the rows of F: F = G unless the
-  node slides with friction mu, with a row n - mu d, d the direction of the slip. Node by node, with
+  A node has up to three exact constraints, the rows of G, with the values c, and constraint forces along the
+  rows of F: F = G unless the node slides with friction mu, with a row n - mu d, d along the slip. Node by
+  node, with
 
     Q = F^T (G F^T)^-1 G,   P = I - Q
 
   lambda = (G F^T)^-1 G r are the multipliers for a residual r, P r is the projected residual, G P x = 0, and
-  u + F^T (G F^T)^-1 (c - G u) satisfies the constraints. Prescribed components are removed from G and F. The solution is projected onto the
-  constraints before a solve, which then stays in their null space. Redundant constraints of a node are removed.
+  u + F^T (G F^T)^-1 (c - G u) satisfies the constraints. Prescribed components are removed from G and F. The
+  solution is projected onto the constraints before a solve, which then stays in their null space. Redundant
+  ones are removed.
 
   Linear solves treat them in one of two ways.
 
@@ -16,16 +18,16 @@
 
     A_ij <- P_i A_ij P_j,   A_ii += s_i Q_i
 
-  Outside the matrix K, with springs F^T k G and where F is not G (Gould, Hribar, Nocedal 2001, On the solution of equality constrained
-  quadratic programming problems arising in optimization): A = P (K + F^T k G) P, M_A^-1 = P M^-1 P. Any preconditioner M of K can be used, and neither K nor M changes with the
-  active set. (src/solver/constraint_operator.c; by a factorisation: saddle_factor.c.)
+  Outside the matrix K, with springs F^T k G and where F is not G (Gould, Hribar, Nocedal 2001, On the
+  solution of equality constrained quadratic programming problems arising in optimization): A = P (K + F^T k
+  G) P, M_A^-1 = P M^-1 P. Any preconditioner M of K can be used, and neither K nor M changes with the active
+  set. (src/solver/constraint_operator.c; by a factorisation: saddle_factor.c.)
 */
 #include "fem_impl.h"
 #include "sbconstraint.h"
 #include "sbkernel.h"
 
-#define SAID \
-  1e-6 /* squared distance from the span of the node's other constraints below which one is redundant */
+#define SAID 1e-6    /* squared distance from the span of the node's others below which one is redundant */
 #define NO_SAY 1e-12 /* squared length of the free part of a direction that counts as zero */
 
 PetscErrorCode SbSpaceCreateConstraints(SbSpace s, PetscBool beside, PetscBool nonsymmetric)
@@ -81,7 +83,7 @@ static void free_part(SbSpace s, PetscInt node, const PetscReal v[3], PetscReal 
   for (int k = 0; k < 3; k++) part[k] = s->fixed[node] & (1 << k) ? 0. : v[k];
 }
 
-/* The exact constraints of a node: their numbers and the free parts of their directions (NULL: not wanted). Returns their number, 0..3. */
+/* The exact constraints of a node: numbers and free parts of their directions. Returns 0..3. */
 static int exact_constraints(SbSpace s, PetscInt node, PetscInt number[3], PetscReal G[9], PetscReal F[9])
 {
   const SbConstraints c = s->constraints;
@@ -135,24 +137,11 @@ PetscErrorCode SbSpaceAddConstraint(SbSpace s, const SbConstraint *constraint, P
     for (int k = 0; k < 3 * n; k++) g[k % 3] -= x[k / 3] * G[k];
     if (SbDot3(g, g) < SAID * full) PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (c->n == c->size) {
-    c->size = PetscMax(64, 2 * c->size);
-    PetscCall(PetscRealloc((size_t)c->size * sizeof(*c->constraint), &c->constraint));
-  }
+  PetscCall(SbReserve(c->n + 1, sizeof(*c->constraint), &c->size, &c->constraint));
   c->constraint[c->n] = *constraint;
   c->constraint[c->n].next = c->first[node];
   c->first[node] = *number = c->n++;
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-SbConstraint *SbSpaceGetConstraint(SbSpace s, PetscInt number)
-{
-  return &s->constraints->constraint[number];
-}
-
-PetscBool SbSpaceIsConstrained(SbSpace s)
-{
-  return (PetscBool)(s->constraints && s->constraints->ntotal);
 }
 
 PetscErrorCode SbSpaceAssembleConstraints(SbSpace s)
@@ -211,12 +200,6 @@ PetscErrorCode SbSpaceAssembleConstraints(SbSpace s)
 
 /* ------------------------------------------------------------------ displacements, residuals, velocities */
 
-/* y = Q x of a node. */
-static inline void taken(const PetscReal Q[9], const PetscReal x[3], PetscReal y[3])
-{
-  for (int k = 0; k < 3; k++) y[k] = SbDot3(Q + 3 * k, x);
-}
-
 void SbConstraintsProject(SbSpace s, PetscReal x[])
 {
   const SbConstraints c = s->constraints;
@@ -226,7 +209,7 @@ void SbConstraintsProject(SbSpace s, PetscReal x[])
     PetscReal y[3];
 
     if (c->first[node] != i) continue;
-    taken(c->Q + 9 * node, x + 3 * node, y);
+    for (int k = 0; k < 3; k++) y[k] = SbDot3(c->Q + 9 * node + 3 * k, x + 3 * node);
     for (int k = 0; k < 3; k++) x[3 * node + k] -= y[k];
   }
 }
@@ -236,15 +219,15 @@ PetscErrorCode SbSpaceProjectAdmissible(SbSpace s, Vec z)
   PetscScalar *x;
 
   PetscFunctionBeginUser;
+  PetscCall(SbSpaceZeroPrescribed(s, PETSC_TRUE, z));
+  if (!s->constraints) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecGetArray(z, &x));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) free_part(s, i, x + 3 * i, x + 3 * i);
-  if (s->constraints) SbConstraintsProject(s, x);
+  SbConstraintsProject(s, x);
   PetscCall(VecRestoreArray(z, &x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Projects x onto the exact constraints, with their values or velocities as right-hand sides. */
-static void move(SbSpace s, PetscBool velocities, PetscReal x[])
+void SbConstraintsPrescribe(SbSpace s, PetscBool velocities, PetscReal x[])
 {
   const SbConstraints c = s->constraints;
 
@@ -264,16 +247,6 @@ static void move(SbSpace s, PetscBool velocities, PetscReal x[])
     solve_forces(n, G, F, b, step);
     for (int k = 0; k < 3 * n; k++) x[3 * node + k % 3] += step[k / 3] * F[k];
   }
-}
-
-void SbConstraintsPrescribe(SbSpace s, PetscReal u[])
-{
-  move(s, PETSC_FALSE, u);
-}
-
-void SbConstraintsVelocity(SbSpace s, PetscReal v[])
-{
-  move(s, PETSC_TRUE, v);
 }
 
 /* Force of a spring at the displacement u of its node, N. */
@@ -384,10 +357,11 @@ void SbConstraintsProjectBlock(SbSpace s, PetscInt i, PetscInt j, size_t rs, siz
 }
 
 /*
-  If only constraints support a body K is singular. In a static run s_i times the squared components of
-  the constraint directions are added to its diagonal, s_i the size of the node's block; the operator subtracts them again, so that only M contains them.
+  If only constraints support a body K is singular. In a static run s_i times the squared components of the
+  constraint directions are added to its diagonal, s_i the size of the node's block; the operator subtracts
+  them again, so that only M contains them.
 */
-static void anchor(SbSpace s, const SbValues *x)
+static void anchor(SbSpace s, const SbMatBlocks *x)
 {
   const SbConstraints c = s->constraints;
 
@@ -414,7 +388,7 @@ static void anchor(SbSpace s, const SbValues *x)
   }
 }
 
-void SbConstraintsFinishTangent(SbSpace s, const SbValues *x)
+void SbConstraintsFinishTangent(SbSpace s, const SbMatBlocks *x)
 {
   const SbConstraints c = s->constraints;
   const SbPlan p = s->plan;
@@ -425,7 +399,7 @@ void SbConstraintsFinishTangent(SbSpace s, const SbValues *x)
     for (int q = 0; q < (x->value[1] ? 2 : 1); q++) {
       const PetscInt *ptr = q ? p->oi : p->di, *col = q ? p->oj : p->dj;
 
-      for (PetscInt k = x->kind == SB_MATRIX_SBAIJ ? p->diagonal[i] : ptr[i]; k < ptr[i + 1]; k++) {
+      for (PetscInt k = x->symmetric ? p->diagonal[i] : ptr[i]; k < ptr[i + 1]; k++) {
         size_t rs, cs;
         PetscScalar *v = sb_block(x, p, i, q ? ~k : k, &rs, &cs);
 

@@ -4,7 +4,7 @@
 #pragma once
 #include "sbassembly.h"
 
-/* layout.c: creates the nodes of the space. After the batches: the nodes that each cell's stress acts on. Collective. */
+/* layout.c: creates the nodes of the space. After the batches: the nodes of each stress. Collective. */
 PetscErrorCode SbLayoutNodes(SbSpace space);
 PetscErrorCode SbLayoutCliques(SbSpace space);
 PetscErrorCode SbLayoutDestroy(SbSpace space);
@@ -13,43 +13,29 @@ PetscErrorCode SbLayoutDestroy(SbSpace space);
 typedef enum { SB_JUMP_STIFFNESS, SB_JUMP_DAMPING } SbJumpFactor;
 PetscErrorCode SbJumpCreate(SbSpace space, SbJump *jump);
 PetscErrorCode SbJumpDestroy(SbJump *jump);
-/* f[nnode][3] += (factor) K_F x; the jumps of displacements x are reduced by the offsets r; complete on owned nodes. x[nnode][3] with ghosts. */
+/* f[nnode][3] += (factor) K_F x; the jumps of displacements x less the offsets r; complete on owned nodes.
+   x[nnode][3] with ghosts. */
 void SbJumpAdd(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal f[]);
 /* The energy 1/2 x . (factor) K_F x of the face terms, this rank's part, J. */
 PetscReal SbJumpEnergy(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal body[]);
 /* node[nbatch][8][SB_BATCH] of the faces, borrowed; returns nbatch. */
 PetscInt SbJumpCliques(SbSpace space, const PetscInt **node);
-/* Updates the moduli m of the penalty from x. Returns whether one changed on this rank, or faces have offsets r, which rotate. */
-PetscBool SbJumpFollow(SbSpace space, const PetscReal x[], SbStepsOf steps);
-/* Whether this is the first call, without SbJumpSetStiffness() before. */
-PetscBool SbJumpBegin(SbSpace space);
-/* Updates the penalties. With x the faces' energies are kept or, first, their forces; NULL: r = 0. changed: set if one changed on this rank by a percent or more. */
-PetscErrorCode SbJumpRenew(SbSpace space, const PetscReal x[], PetscBool first, PetscBool *changed);
-/* SbSpaceGetJumps() for local x; SbJumpSetStiffness() restores k[5 ncell], with ghosts, before SbJumpRenew(). */
-void SbJumpStiffness(SbSpace space, const PetscReal x[], PetscReal k[]);
-void SbJumpSetStiffness(SbSpace space, const PetscReal k[]);
 /* The matrix of the face in lane l of batch b, to be multiplied by the 3x3 identity; zero in padding. */
 void SbJumpMatrix(SbSpace space, PetscInt b, PetscInt l, PetscReal K[8][8]);
 
-/* plan.c. Position of a cell in SbPlan.offset; block (a, b) follows at SB_BATCH (width a + b). */
-size_t SbPlanCellOffset(SbSpace space, PetscInt cell);
+/* plan.c: sums the current face terms for the matrix. */
+void SbPlanSumFaceTerms(SbSpace space);
 PetscErrorCode SbPlanDestroy(SbPlan *plan);
 
-/* The value arrays of a matrix, and their block layout. */
-typedef struct {
-  SbMatrixKind kind;
-  Mat part[2]; /* diagonal and off-diagonal part; the second is NULL on one rank */
-  PetscScalar *value[2];
-  const PetscReal *face_term; /* [nbody] factor on the face terms from which its rows start, or NULL */
-} SbValues;
-
-/* tangent.c: borrows the value arrays of a matrix; its state increases in SbSpaceFinishTangent(). Not collective. */
-PetscErrorCode SbValuesBegin(Mat A, SbValues *x);
-PetscErrorCode SbValuesEnd(SbValues *x);
+/* tangent.c: the table of SbMatrixSetAssembly(), NULL for a matrix of blocks. */
+PetscErrorCode SbMatrixGetAssembly(Mat A, const SbAssembly **assembly);
+/* Borrows the values of any matrix; its state increases in SbSpaceFinishTangent(). Not collective. */
+PetscErrorCode SbValuesBegin(Mat A, SbMatBlocks *x);
+PetscErrorCode SbValuesEnd(SbMatBlocks *x);
 
 /* Address of block k (as in SbPlan.offset) of a row, and the distances between its rows and columns. */
-static inline PetscScalar *sb_block(const SbValues *x, SbPlan p, PetscInt row, PetscInt k, size_t *row_stride,
-                                    size_t *column_stride)
+static inline PetscScalar *sb_block(const SbMatBlocks *x, SbPlan p, PetscInt row, PetscInt k,
+                                    size_t *row_stride, size_t *column_stride)
 {
   const int q = k < 0;
   const PetscInt *ptr = q ? p->oi : p->di;
@@ -62,13 +48,17 @@ static inline PetscScalar *sb_block(const SbValues *x, SbPlan p, PetscInt row, P
   }
   *row_stride = 1;
   *column_stride = 3;
-  if (x->kind == SB_MATRIX_SBAIJ) k = p->ui[row] + k - p->diagonal[row];
+  if (x->symmetric) k = p->ui[row] + k - p->diagonal[row];
   return x->value[q] + 9 * (size_t)k;
 }
 
-/* Clears the rows that batch b adds to first, or sets them to the face terms; for every batch in order, before its SbInsertBatch(). */
-void SbInsertClear(SbSpace space, const SbValues *x, PetscInt b);
-/* quadratic.c: points of a batch. P1, CR and DG have one; P2 cells four, curved ones those of SbRuleQuintic. Not collective. */
+/*
+  For every batch b in order, before its SbInsertBatch(): clears the rows that it adds to first, or sets them
+  to the face terms with the factors of a stage and beta[nbody], s, damping. NULL: without face terms.
+*/
+void SbInsertClear(SbSpace space, const SbMatBlocks *x, PetscInt b, const SbStage *faces,
+                   const PetscReal beta[]);
+/* quadratic.c: points of a batch. P1, CR and DG have one; P2 four, curved cells those of SbRuleQuintic. */
 typedef struct {
   int n, step;             /* number of points; gradients of point q: g + step q */
   const SbPointRule *rule; /* rule of P2 */
@@ -81,14 +71,14 @@ SB_INLINE void SbPointVolume(const SbPoints *at, int q, SbPack W)
 {
   for (int l = 0; l < SB_BATCH; l++) W[l] = at->weight[q][l] * (*at->V)[l];
 }
-/* Gathers U[3 nnode] as sb_gather_strain() for x (NULL: zero), and F at the points (rate: without the identity). */
+/* Gathers U[3 nnode] as sb_gather_strain() for x (NULL: zero), and F at the points (rate: less I). */
 void SbBatchGradients(SbSpace space, const SbRegion *region, PetscInt b, const PetscReal x[], PetscBool rate,
                       SbPack U[30], SbPack F[SB_POINTS][9]);
-/* Forces of a stress P at point q on the values of sb_gather_strain(): added for P2, set for others, which have one point. */
+/* Forces of a stress P at point q on the values of sb_gather_strain(): added for P2, else set (one point). */
 void SbPointForce(const SbPoints *at, int q, const SbPack P[9], SbPack f[30]);
 /*
-  The volumetric part of the energy, V lambda/2 (mean of theta)^2: pressure = lambda times the mean (Pa, tension), b[30] = V d mean/du (m^2; NULL: not
-  wanted). F: at the points.
+  The volumetric part of the energy, V lambda/2 (mean of theta)^2: pressure = lambda times the mean (Pa,
+  tension), b[30] = V d mean/du (m^2; NULL: not wanted). F: at the points.
 */
 void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const SbPack U[30],
                        const SbPack F[SB_POINTS][9], SbPack pressure, SbPack b[30]);
@@ -101,22 +91,24 @@ SB_INLINE const SbPointRule *SbVolumeRule(const SbPoints *at)
 void SbBatchState(SbSpace space, const SbRegion *region, PetscInt b, const PetscReal x[],
                   SbPack F[SB_POINTS][9], SbPack P[SB_POINTS][9], SbPack psi[SB_POINTS],
                   SbPack pressure[SB_POINTS]);
-/* Entry (a, b) of the consistent mass of a straight cell, over density V. */
-SB_INLINE PetscReal SbCellMass(const SbRegion *region, int a, int b)
-{
-  if (region->quadratic) return SbQuadraticMass(a, b);
-  return a == b ? region->element->ops.mass_diagonal : region->element->ops.mass_coupling;
-}
+/* residual.c: f += elastic forces of a region (if `elastic`) and of damping by beta, s; u NULL: rest. */
+void SbRegionForces(SbSpace space, const SbRegion *region, PetscBool elastic, PetscReal beta,
+                    const SbStage *stage, PetscReal f[]);
+/* The consistent mass of each cell, over its density: the integral of phi_a phi_b for each pair, m^3. */
+void SbBatchMass(SbSpace space, const SbRegion *region, PetscInt b, SbPack mass[SB_PAIRS]);
 
-/* Adds the blocks of each cell of batch b, ten or, for P2, SB_PAIRS; K is 32-byte aligned. */
-void SbInsertBatch(SbSpace space, const SbValues *x, PetscInt b, int npair, const SbPack K[][9]);
-/* The same for DG cells, whose blocks couple the means at their faces. */
-void SbInsertBroken(SbSpace space, const SbValues *x, PetscInt b, const SbPack K[10][9]);
+/* Adds the blocks of each cell of batch b, ten or, for P2, SB_PAIRS; broken: DG, between means at faces. K is
+   32-byte aligned. */
+void SbInsertBatch(SbSpace space, const SbMatBlocks *x, PetscInt b, int npair, PetscBool broken,
+                   const SbPack K[][9]);
+/* Adds factor k, or its transpose (turn), at its position in the row of node[0] and the column of node[1]. */
+void SbInsertBlock(SbSpace space, const SbMatBlocks *x, const PetscInt node[2], PetscInt position,
+                   PetscReal factor, PetscBool turn, const PetscReal k[9]);
 
 /* constraint.c: projects an assembled matrix, or regularises it. Not collective. */
-void SbConstraintsFinishTangent(SbSpace space, const SbValues *x);
+void SbConstraintsFinishTangent(SbSpace space, const SbMatBlocks *x);
 PetscErrorCode SbConstraintsDestroy(SbConstraints *constraints);
 
-/* The same projection for rows of a matrix-free operator. */
+/* matrix_free.c: adds the rows of SbSpaceGetRows() of the operator. Not collective. */
 PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],
                                    PetscReal block[]);

@@ -1,85 +1,83 @@
 /*
-  Insertion of the blocks of a batch of cells, ten or, for P2, 55 per cell, at their positions in the matrix's value arrays.
+  Insertion of the blocks of a batch of cells, ten or, for P2, 55 per cell, into the matrix's value arrays.
 
   The kernel returns interleaved blocks, K[pair][entry][lane]; BAIJ and SBAIJ store the nine entries of a
-  block together, column-major. So the entries of four lanes are transposed in registers, and each block is added as two
-  vectors of four and a last number: in cache 20 ns per tet for SBAIJ, entry by entry 52.
-  Lanes are added sequentially: neighbouring cells of a batch share blocks.
+  block together, column-major. So the entries of four lanes are transposed in registers, and each block is
+  added as two vectors of four and a last number: in cache 20 ns per tet for SBAIJ, entry by entry 52. Lanes
+  are added sequentially: neighbouring cells of a batch share blocks.
 
-  A row of the matrix is cleared by the first batch that adds to it (listed in the plan): it is in the cache then,
-  and main memory is accessed once instead of twice. Measured at 200,000 tets, SBAIJ: 33 ns per tet instead of 49.
+  A row of the matrix is cleared by the first batch that adds to it (listed in the plan): it is in the cache
+  then, and memory is accessed once, not twice. Measured at 200,000 tets, SBAIJ: 33 ns per tet instead of 49.
 
   AIJ does not store blocks contiguously: they are added entry by entry.
 */
 #include "fem_impl.h"
 #include "sbfour.h"
 
-/* Initialises part q of row i with the face terms, a multiple of the identity in each block; one pass where blocks are contiguous. */
-static void begin_with_face_terms(SbSpace s, const SbValues *x, PetscInt i, int q)
+void SbInsertClear(SbSpace s, const SbMatBlocks *x, PetscInt b, const SbStage *faces, const PetscReal beta[])
 {
   const SbPlan p = s->plan;
-  const PetscInt *ptr = q ? p->oi : p->di, first = x->kind == SB_MATRIX_SBAIJ ? p->diagonal[i] : ptr[i];
-  const PetscReal factor = x->face_term[s->node_body[i]];
-  size_t rs, cs;
 
-  for (PetscInt k = first; k < ptr[i + 1]; k++) {
-    const PetscReal face_term = factor * p->face_term[q][k];
-    PetscScalar *v = sb_block(x, p, i, q ? ~k : k, &rs, &cs);
+  for (PetscInt n = 2 * p->fresh_start[b]; n < 2 * p->fresh_start[b + 1]; n++) {
+    const PetscInt i = p->fresh[n / 2], q = n % 2, *ptr = q ? p->oi : p->di;
+    const PetscInt first = x->symmetric ? p->diagonal[i] : ptr[i];
+    const PetscReal factor = faces ? faces->shift_k + faces->shift_v * beta[s->node_body[i]] : 0.;
+    size_t rs, cs;
 
-    if (x->kind == SB_MATRIX_AIJ) {
-      for (size_t c = 0; c < 3; c++) v[c * (rs + cs)] = face_term;
-    } else {
-      for (int e = 0; e < 9; e++) v[e] = e % 4 == 0 ? face_term : 0.;
+    if (!x->value[q]) continue;
+    memset(x->value[q] + 9 * (size_t)(x->symmetric ? p->ui[i] : first), 0, 72 * (size_t)(ptr[i + 1] - first));
+    /* the face terms are a multiple of the identity in each block */
+    for (PetscInt k = first; faces && k < ptr[i + 1]; k++) {
+      PetscScalar *v = sb_block(x, p, i, q ? ~k : k, &rs, &cs);
+
+      for (size_t c = 0; c < 3; c++) v[c * (rs + cs)] = factor * p->face_term[q][k];
     }
   }
 }
 
-void SbInsertClear(SbSpace s, const SbValues *x, PetscInt b)
-{
-  const SbPlan p = s->plan;
-
-  for (PetscInt k = p->fresh_start[b]; k < p->fresh_start[b + 1]; k++) {
-    for (int q = 0; q < (x->value[1] ? 2 : 1); q++) {
-      if (!x->face_term || x->kind == SB_MATRIX_AIJ) {
-        const PetscInt *ptr = q ? p->oi : x->kind == SB_MATRIX_SBAIJ ? p->ui : p->di;
-
-        memset(x->value[q] + 9 * (size_t)ptr[p->fresh[k]], 0,
-               72 * (size_t)(ptr[p->fresh[k] + 1] - ptr[p->fresh[k]]));
-      }
-      if (x->face_term) begin_with_face_terms(s, x, p->fresh[k], q);
-    }
-  }
-}
-
-/* Adds a block, or its transpose, times a factor, at its position in an owned row. */
-static inline void add_block(SbSpace s, const SbValues *x, PetscInt row, PetscInt column, PetscInt position,
-                             PetscReal factor, PetscBool turn, const PetscReal k[9])
+void SbInsertBlock(SbSpace s, const SbMatBlocks *x, const PetscInt node[2], PetscInt position,
+                   PetscReal factor, PetscBool turn, const PetscReal k[9])
 {
   size_t rs, cs;
   PetscScalar *v;
 
-  if (position == SB_NOT_OWNED || (x->kind == SB_MATRIX_SBAIJ && row > column)) return;
-  v = sb_block(x, s->plan, row, position, &rs, &cs);
+  if (position == SB_NOT_OWNED || (x->symmetric && node[0] > node[1])) return;
+  v = sb_block(x, s->plan, node[0], position, &rs, &cs);
   for (size_t i = 0; i < 3; i++) {
     for (size_t j = 0; j < 3; j++) v[i * rs + j * cs] += factor * (turn ? k[3 * j + i] : k[3 * i + j]);
   }
 }
 
-/* Any storage, any rank: adds the cell in lane l of batch b, block by block. */
-static void insert_cell(SbSpace s, const SbValues *x, PetscInt b, PetscInt l, int npair, const SbPack K[][9])
+/*
+  Any storage, any rank: adds the cell in lane l of batch b, block by block. DG (broken): each block between
+  means is distributed to the own nodes and those across the faces.
+*/
+static void insert_cell(SbSpace s, const SbMatBlocks *x, PetscInt b, int l, int npair, PetscBool broken,
+                        const SbPack K[][9])
 {
   const PetscInt w = s->width, *node = s->batch_clique + (size_t)(b * w) * SB_BATCH + l;
   const PetscInt *offset = s->plan->offset + (size_t)(b * w * w) * SB_BATCH + l;
+  const int sides = broken ? 4 : 1;
+  PetscReal weight[8];
 
+  for (int a = 0; a < 4 && broken; a++) {
+    weight[a] = s->batch_weight[4 * b + a][l];
+    weight[4 + a] = 1. - weight[a];
+  }
   for (int p = 0; p < npair; p++) {
+    const int turns = SbPairA[p] == SbPairB[p] ? 1 : 2;
     PetscReal k[9];
 
-    SbPackGet(9, K[p], (int)l, k);
-    for (int turn = 0; turn < (SbPairA[p] == SbPairB[p] ? 1 : 2); turn++) {
-      const int row = turn ? SbPairB[p] : SbPairA[p], column = turn ? SbPairA[p] : SbPairB[p];
+    SbPackGet(9, K[p], l, k);
+    for (int n = 0; n < sides * turns; n++) {
+      const int turn = n / sides, side = n % sides;
+      const int row = (turn ? SbPairB[p] : SbPairA[p]) + 4 * (side & 1),
+                column = (turn ? SbPairA[p] : SbPairB[p]) + 2 * (side & 2);
+      const PetscInt nodes[2] = {node[SB_BATCH * row], node[SB_BATCH * column]};
+      const PetscReal factor = broken ? weight[row] * weight[column] : 1.;
 
-      add_block(s, x, node[SB_BATCH * row], node[SB_BATCH * column], offset[SB_BATCH * (w * row + column)],
-                1., (PetscBool)turn, k);
+      if (factor != 0.)
+        SbInsertBlock(s, x, nodes, offset[SB_BATCH * (w * row + column)], factor, (PetscBool)turn, k);
     }
   }
 }
@@ -102,8 +100,8 @@ SB_INLINE void transpose(const Four in[4], Four out[4])
 }
 
 /*
-  Adds one block in each of four lanes: k[e] its entries, column-major, position[l] its position. With `edge` the position may be in the
-  off-diagonal part, or on another rank.
+  Adds one block in each of four lanes: k[e] its entries, column-major, position[l] its position. With `edge`
+  the position may be in the off-diagonal part, or on another rank.
 */
 SB_INLINE void add_blocks(const Four k[9], const PetscInt position[4], PetscBool edge,
                           PetscScalar *const value[2])
@@ -143,23 +141,16 @@ SB_INLINE void insert_both(int npair, const SbPack K[][9], const PetscInt offset
   }
 }
 
-SB_KERNEL static void insert_baij(const SbPack K[restrict 10][9], const PetscInt offset[restrict],
-                                  PetscInt width, PetscScalar *const value[2])
+/* edge: the batch has nodes of another rank. Both loops have a constant length. */
+SB_KERNEL static void insert_baij(int npair, const SbPack K[restrict][9], const PetscInt offset[restrict],
+                                  PetscInt width, PetscBool edge, PetscScalar *const value[2])
 {
-  insert_both(10, K, offset, width, PETSC_FALSE, value);
-}
-
-/* Batches with nodes of another rank. */
-SB_KERNEL static void insert_baij_edge(const SbPack K[restrict 10][9], const PetscInt offset[restrict],
-                                       PetscInt width, PetscScalar *const value[2])
-{
-  insert_both(10, K, offset, width, PETSC_TRUE, value);
-}
-
-SB_KERNEL static void insert_baij_quadratic(const SbPack K[restrict SB_PAIRS][9],
-                                            const PetscInt offset[restrict], PetscScalar *const value[2])
-{
-  insert_both(SB_PAIRS, K, offset, SB_CELL_NODES, PETSC_TRUE, value);
+  if (npair == SB_PAIRS)
+    insert_both(SB_PAIRS, K, offset, SB_CELL_NODES, PETSC_TRUE, value);
+  else if (edge)
+    insert_both(10, K, offset, width, PETSC_TRUE, value);
+  else
+    insert_both(10, K, offset, width, PETSC_FALSE, value);
 }
 
 /* The stored block is K_ab, or K_ba = K_ab^T when that lies in the row of the lower node. */
@@ -188,71 +179,28 @@ SB_INLINE void insert_upper(int npair, const SbPack K[restrict][9], const PetscI
   }
 }
 
-SB_KERNEL static void insert_sbaij(const SbPack K[restrict 10][9], const PetscInt upper[restrict],
+SB_KERNEL static void insert_sbaij(int npair, const SbPack K[restrict][9], const PetscInt upper[restrict],
                                    PetscScalar *const value[2])
 {
-  insert_upper(10, K, upper, value);
+  if (npair == SB_PAIRS)
+    insert_upper(SB_PAIRS, K, upper, value);
+  else
+    insert_upper(10, K, upper, value);
 }
 
-SB_KERNEL static void insert_sbaij_quadratic(const SbPack K[restrict SB_PAIRS][9],
-                                             const PetscInt upper[restrict], PetscScalar *const value[2])
-{
-  insert_upper(SB_PAIRS, K, upper, value);
-}
-
-void SbInsertBatch(SbSpace s, const SbValues *x, PetscInt b, int npair, const SbPack K[][9])
+void SbInsertBatch(SbSpace s, const SbMatBlocks *x, PetscInt b, int npair, PetscBool broken,
+                   const SbPack K[][9])
 {
   const PetscInt *offset = s->plan->offset + (size_t)(b * s->width * s->width) * SB_BATCH,
                  *node = s->batch_node + 4 * SB_BATCH * b;
+  PetscInt last = 0;
 
-  if (x->kind == SB_MATRIX_AIJ)
-    for (PetscInt l = 0; l < s->batch_n[b]; l++) insert_cell(s, x, b, l, npair, K);
-  else if (x->kind == SB_MATRIX_SBAIJ) {
-    const PetscInt *upper = s->plan->upper + (size_t)(b * s->plan->npair) * SB_BATCH;
-
-    if (npair == SB_PAIRS)
-      insert_sbaij_quadratic(K, upper, x->value);
-    else
-      insert_sbaij(K, upper, x->value);
-  } else if (npair == SB_PAIRS)
-    insert_baij_quadratic(K, offset, x->value);
+  if (broken || x->kind == SB_MATRIX_AIJ)
+    for (int l = 0; l < s->batch_n[b]; l++) insert_cell(s, x, b, l, npair, broken, K);
+  else if (x->symmetric)
+    insert_sbaij(npair, K, s->plan->upper + (size_t)(b * s->plan->npair) * SB_BATCH, x->value);
   else {
-    PetscInt last = 0;
-
     for (int k = 0; k < 4 * SB_BATCH; k++) last = PetscMax(last, node[k]);
-    if (last < s->nnode_owned)
-      insert_baij(K, offset, s->width, x->value);
-    else
-      insert_baij_edge(K, offset, s->width, x->value);
-  }
-}
-
-/* DG: each block between means is distributed to the own nodes and those across the faces. */
-void SbInsertBroken(SbSpace s, const SbValues *x, PetscInt b, const SbPack K[10][9])
-{
-  for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-    const PetscInt w = s->width, *node = s->batch_clique + (size_t)(b * w) * SB_BATCH + l;
-    const PetscInt *offset = s->plan->offset + (size_t)(b * w * w) * SB_BATCH + l;
-    PetscReal weight[8];
-
-    for (int a = 0; a < 4; a++) {
-      weight[a] = s->batch_weight[4 * b + a][l];
-      weight[4 + a] = 1. - weight[a];
-    }
-    for (int p = 0; p < 10; p++) {
-      const int twice = SbPairA[p] == SbPairB[p] ? 1 : 2;
-      PetscReal k[9];
-
-      SbPackGet(9, K[p], (int)l, k);
-      for (int n = 0; n < 4 * twice; n++) {
-        const int turn = n / 4, row = (turn ? SbPairB[p] : SbPairA[p]) + 4 * (n & 1),
-                  column = (turn ? SbPairA[p] : SbPairB[p]) + 2 * (n & 2);
-        const PetscReal factor = weight[row] * weight[column];
-
-        if (factor != 0.)
-          add_block(s, x, node[SB_BATCH * row], node[SB_BATCH * column],
-                    offset[SB_BATCH * (w * row + column)], factor, (PetscBool)turn, k);
-      }
-    }
+    insert_baij(npair, K, offset, s->width, (PetscBool)(last >= s->nnode_owned), x->value);
   }
 }

@@ -7,32 +7,34 @@
     kappa1 = gamma1 H(2 mu |F| / V),   kappa0 = gamma0 H((2 mu + lambda) |F| / V)  (DG only),
 
   H(k) = 2 k+ k- / (k+ + k-) the harmonic mean of the two sides; for one material H(mu |F| / V) = mu / h with
-  h = (V+ + V-) / (2 |F|) (Hansbo and Larson 2002). The terms act on displacements, are isotropic and constant within a step: they are invariant under
-  rotations, and rigid motions have no jumps.
+  h = (V+ + V-) / (2 |F|) (Hansbo and Larson 2002). The terms act on displacements, are isotropic and constant
+  within a step: they are invariant under rotations, and rigid motions have no jumps.
 
-  A cell's function at vertex v is S - 3 u_v, S the sum of its four nodes and u_v the one opposite v. So the jump at the three
-  vertices i of the face is J_i = (S+ - 3 u+_i) - (S- - 3 u-_i), and since J is linear there
+  A cell's function at vertex v is S - 3 u_v, S the sum of its four nodes and u_v the one opposite v. So the
+  jump at the three vertices i of the face is J_i = (S+ - 3 u+_i) - (S- - 3 u-_i), and since J is linear there
 
     int_F |[u]|^2 = |F| / 12 (sum |J_i|^2 + |sum J_i|^2),   [u]_0 = sum J_i / 3.
 
-  dW/dJ_i = c1 J_i + (c1 + c0) sum J,  c1 = kappa1 |F| / 12,  c0 = kappa0 |F| / 9, is distributed to the eight nodes by the transpose of
-  this map. For CR both sides share the node of the face, whose contributions cancel.
+  dW/dJ_i = c1 J_i + (c1 + c0) sum J,  c1 = kappa1 |F| / 12,  c0 = kappa0 |F| / 9, is distributed to the eight
+  nodes by the transpose of this map. For CR both sides share the face's node, whose parts cancel.
 
-  Under compression kappa1 with mu is too small. A law whose energy depends on det F, or on another non-convex function of F, has twist modes
-  with a negative stiffness (P_i + P_j) / (s_i + s_j), P_i and s_i principal values of the first Piola stress and of F: under a hydrostatic pressure p it is mu - p. For
-  continuous displacements the sum over the cells vanishes but for the boundary; for discontinuous ones the penalty has to balance it. So
+  Under compression kappa1 with mu is too small. A law whose energy depends on det F, or on another non-convex
+  function of F, has twist modes with a negative stiffness (P_i + P_j) / (s_i + s_j), P_i and s_i principal
+  values of the first Piola stress and of F: under a hydrostatic pressure p it is mu - p. For continuous
+  displacements the sum over the cells vanishes but for the boundary; here the penalty balances it. So
 
     kappa1 = gamma1 H(2 m |F| / V),   m = max(mu, FOLLOW max_ij -(P_i + P_j) / (s_i + s_j)),
 
-  evaluated at the start of the step, so that the terms are constant within it and their energy is quadratic. A dependence on the current state
-  would have to be differentiated: the energy of jumps would add a spurious pressure, proportional to lambda.
+  evaluated at the start of the step, so that the terms are constant within it and their energy is quadratic.
+  A dependence on the current state would have to be differentiated: jumps would add a spurious pressure.
 
-  In time steps kappa1 is twice as large, and acts on [u] - r, with an offset r of the jump that keeps the energy of a face when kappa1 changes
-  at the start of a step. With r = 0 every change of kappa1 would add 1/2 (kappa1' - kappa1) int |[u]|^2, and pressure waves would pump
-  energy. [u] - r is parallel to [u], so that a body at rest has no force, with a factor between (kappa1 with m = mu / kappa1)^2
-  and one. The upper bound dissipates, the lower one adds little. Load steps, which may be long, have r = 0, so that their result depends on the loads alone; so has the start of a
-  dynamic run from a given state. With Newmark, without damping, m never decreases: near nu = 1/2 it
-  would change a hundredfold with each wave.
+  In time steps kappa1 is twice as large, and acts on [u] - r, with an offset r of the jump that keeps the
+  energy of a face when kappa1 changes at the start of a step. With r = 0 every change of kappa1 would add 1/2
+  (kappa1' - kappa1) int |[u]|^2, and pressure waves would pump energy. [u] - r is parallel to [u], so that a
+  body at rest has no force, with a factor between (kappa1 with m = mu / kappa1)^2 and one. The upper bound
+  dissipates, the lower one adds little. Load steps, which may be long, have r = 0, so that their result
+  depends on the loads alone; so has the start of a dynamic run from a given state. With Newmark, without
+  damping, m never decreases: near nu = 1/2 it would change a hundredfold with each wave.
 
   A boundary face with a support node (layout.c): the other side is rigid and has the displacement of that
   node. H(k) is 2 k then; kappa1 = 0, because the support prescribes the mean only.
@@ -40,36 +42,34 @@
 #include "fem_impl.h"
 #include "sbkernel.h"
 
-#define FOLLOW 4. /* factor on the negative stiffness in load steps; docs/reference/theory.md */
-#define RATE \
-  2. /* further factor in time steps: the secant stiffness of a growing penalty is about half its tangent */
-#define LEAST 1e-3   /* sum of two stretches below which a cell counts as degenerate: no twist stiffness */
+#define FOLLOW 4.  /* factor on the negative stiffness in load steps; docs/reference/theory.md */
+#define RATE 2.    /* further one in time steps: the secant of a growing penalty is about half its tangent */
+#define LEAST 1e-3 /* sum of two stretches below which a cell counts as degenerate: no twist stiffness */
 #define RENEWED 0.01 /* relative change of a penalty that is reported */
 #define SAME 1e-12   /* relative change that is rounding */
 
 /* A face between two local cells; cell[1] = SUPPORT: between a cell and a support node. */
 typedef struct {
-  PetscInt cell[2], face[2], region;
+  PetscInt cell[2], face[2];
 } Face;
 #define SUPPORT (-1)
 
 struct _p_SbJump {
-  Face *face;          /* faces in the order of batches and lanes */
-  PetscInt *region_of; /* [ncell] region of each cell */
-  PetscReal *V;        /* [ncell] rest volume, m^3 */
-  PetscReal *modulus;  /* [ncell] modulus m above, Pa */
+  Face *face;         /* faces in the order of batches and lanes */
+  PetscReal *V;       /* [ncell] rest volume, m^3 */
+  PetscReal *modulus; /* [ncell] modulus m above, Pa */
   PetscInt nbatch;
-  PetscInt *region; /* [nbatch] region of the first side: its body's beta is used */
-  PetscInt *n;      /* [nbatch] number of faces in the batch */
-  PetscInt *node;   /* [nbatch][8][SB_BATCH] nodes; padding lanes repeat the first face */
-  SbPack *c0, *c1;  /* [nbatch] factors above, N/m; zero in padding */
-  SbPack *r;        /* [nbatch][9] offsets of the jumps, m; NULL before kappa1 changes in a dynamic run */
-  PetscBool began;  /* the run has made time steps, or its checkpoint has */
-  PetscBool renew;  /* penalties restored from a checkpoint differ from those of the rest state */
-  SbPack *share;    /* [nbatch] fraction of a face's energy that this rank counts: 1, or 1/2 between ranks */
+  PetscInt *body;  /* [nbatch] */
+  PetscInt *n;     /* [nbatch] number of faces in the batch */
+  PetscInt *node;  /* [nbatch][8][SB_BATCH] nodes; padding lanes repeat the first face */
+  SbPack *c0, *c1; /* [nbatch] factors above, N/m; zero in padding */
+  SbPack *r;       /* [nbatch][9] offsets of the jumps, m; NULL before kappa1 changes in a dynamic run */
+  PetscBool began; /* the run has made time steps, or its checkpoint has */
+  PetscBool renew; /* penalties restored from a checkpoint differ from those of the rest state */
+  SbPack *share;   /* [nbatch] fraction of a face's energy that this rank counts: 1, or 1/2 between ranks */
 };
 
-/* Nodes of a face: for each side the one on the face, then those opposite the three vertices, in the same order. */
+/* Nodes of a face: for each side that on the face, then those opposite its vertices, in the same order. */
 static void face_nodes(SbSpace s, const Face *face, PetscInt node[8])
 {
   const PetscInt plus = 4 * face->cell[0], minus = 4 * face->cell[1];
@@ -99,7 +99,7 @@ static void face_factors(SbSpace s, SbJump j, const Face *face, PetscBool rest, 
 {
   const PetscInt *v = s->mesh->cell + 4 * face->cell[0], f = face->face[0];
   const PetscReal *x = s->mesh->x, *corner = x + 3 * v[(f + 1) % 4];
-  const SbElement e = s->region[face->region].element;
+  const SbElement e = SbSpaceCellElement(s, face->cell[0]);
   PetscReal k0[2], k1[2], p[3], q[3], n[3], area;
 
   SbSubtract(x + 3 * v[(f + 2) % 4], corner, p);
@@ -108,9 +108,9 @@ static void face_factors(SbSpace s, SbJump j, const Face *face, PetscBool rest, 
   area = 0.5 * PetscSqrtReal(SbDot3(n, n));
   for (int side = 0; side < (face->cell[1] == SUPPORT ? 1 : 2); side++) {
     const PetscInt cell = face->cell[side];
-    const SbMaterial law = s->region[j->region_of[cell]].material;
+    const SbMaterial law = s->material[s->mesh->cell_material[cell]];
 
-    k1[side] = 2. * (rest ? law->ops.shear_modulus(law) : j->modulus[cell]) * area / j->V[cell];
+    k1[side] = 2. * (rest ? law->mu : j->modulus[cell]) * area / j->V[cell];
     k0[side] = SbMaterialWaveModulus(law) * area / j->V[cell];
   }
   if (face->cell[1] == SUPPORT) {
@@ -122,63 +122,48 @@ static void face_factors(SbSpace s, SbJump j, const Face *face, PetscBool rest, 
   }
 }
 
-/* Lists the faces with an owned node, sorted by body. */
-static PetscErrorCode find_faces(SbSpace s, const PetscInt region_of[], PetscInt *nface, Face **faces)
-{
-  PetscInt n = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(4 * s->mesh->ncell, faces));
-  for (PetscInt b = 0; b < s->mesh->nbody; b++) {
-    if (s->element[b]->nodes_per[0]) continue;
-    for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
-      Face *face = &(*faces)[n];
-      const PetscBool supported = (PetscBool)(s->dirichlet_node && s->dirichlet_node[i] >= 0);
-      PetscInt node[8], f = 0;
-      PetscBool owned = PETSC_FALSE;
-
-      if (s->mesh->cell_body[i / 4] != b || (!supported && s->neighbour[i] < i / 4)) continue;
-      while (!supported && f < 3 && s->neighbour[4 * s->neighbour[i] + f] != i / 4) f++;
-      *face = (Face){{i / 4, supported ? SUPPORT : s->neighbour[i]}, {i % 4, f}, region_of[i / 4]};
-      face_nodes(s, face, node);
-      for (int k = 0; k < 8; k++) owned = (PetscBool)(owned || node[k] < s->nnode_owned);
-      n += owned;
-    }
-  }
-  *nface = n;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
 {
+  const SbMesh mesh = s->mesh;
   PetscInt nface = 0, b = -1;
   SbJump j;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&j));
-  PetscCall(PetscMalloc3(s->mesh->ncell, &j->region_of, s->mesh->ncell, &j->V, s->mesh->ncell, &j->modulus));
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
+  PetscCall(PetscMalloc3(mesh->ncell, &j->V, mesh->ncell, &j->modulus, 4 * mesh->ncell, &j->face));
+  for (PetscInt k = 0; k < s->nbatch; k++) {
+    for (PetscInt l = 0; l < s->batch_n[k]; l++) j->V[s->batch_cell[k] + l] = s->batch_V[k][l];
+  }
+  for (PetscInt c = 0; c < mesh->ncell; c++) j->modulus[c] = s->material[mesh->cell_material[c]]->mu;
 
-    for (PetscInt c = region->cstart; c < region->cend; c++) {
-      const PetscInt k = c - region->cstart;
+  /* list the faces with an owned node, sorted by body */
+  for (PetscInt body = 0; body < mesh->nbody; body++) {
+    for (PetscInt i = 0; i < 4 * mesh->ncell && !s->element[body]->nodes_per[0]; i++) {
+      Face *face = &j->face[nface];
+      const PetscBool supported = (PetscBool)(s->dirichlet_node && s->dirichlet_node[i] >= 0);
+      PetscInt node[8], f = 0;
+      PetscBool owned = PETSC_FALSE;
 
-      j->region_of[c] = r;
-      j->V[c] = s->batch_V[region->bstart + k / SB_BATCH][k % SB_BATCH];
-      j->modulus[c] = region->material->ops.shear_modulus(region->material);
+      if (mesh->cell_body[i / 4] != body || (!supported && s->neighbour[i] < i / 4)) continue;
+      while (!supported && f < 3 && s->neighbour[4 * s->neighbour[i] + f] != i / 4) f++;
+      *face = (Face){{i / 4, supported ? SUPPORT : s->neighbour[i]}, {i % 4, f}};
+      face_nodes(s, face, node);
+      for (int k = 0; k < 8; k++) owned = (PetscBool)(owned || node[k] < s->nnode_owned);
+      nface += owned;
     }
   }
-  PetscCall(find_faces(s, j->region_of, &nface, &j->face));
+
   /* a batch has faces of one body: at most one more batch per body */
-  j->nbatch = nface / SB_BATCH + s->mesh->nbody;
-  PetscCall(PetscMalloc3(j->nbatch, &j->region, j->nbatch, &j->n, j->nbatch * 8 * SB_BATCH, &j->node));
+  j->nbatch = nface / SB_BATCH + mesh->nbody;
+  PetscCall(PetscMalloc3(j->nbatch, &j->body, j->nbatch, &j->n, j->nbatch * 8 * SB_BATCH, &j->node));
   PetscCall(PetscCalloc3(j->nbatch, &j->c0, j->nbatch, &j->c1, j->nbatch, &j->share));
   for (PetscInt i = 0; i < nface; i++) {
     const Face *face = &j->face[i];
+    const PetscInt body = mesh->cell_body[face->cell[0]];
     PetscInt node[8], l;
 
-    if (i == 0 || j->n[b] == SB_BATCH || s->region[face->region].body != s->region[j->region[b]].body) {
-      j->region[++b] = face->region;
+    if (i == 0 || j->n[b] == SB_BATCH || body != j->body[b]) {
+      j->body[++b] = body;
       j->n[b] = 0;
     }
     l = j->n[b]++;
@@ -188,54 +173,30 @@ PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
         j->node[(8 * b + k) * SB_BATCH + lane] = node[k];
     }
     face_factors(s, j, face, PETSC_TRUE, &j->c0[b][l], &j->c1[b][l]);
-    for (int side = 0; side < 2; side++) {
-      const PetscInt cell = face->cell[face->cell[1] == SUPPORT ? 0 : side];
-
-      j->share[b][l] += cell < s->mesh->ncell_owned ? 0.5 : 0.;
-    }
+    for (int side = 0; side < 2; side++)
+      j->share[b][l] += face->cell[face->cell[1] == SUPPORT ? 0 : side] < mesh->ncell_owned ? 0.5 : 0.;
   }
-  j->nbatch = 0;
-  for (PetscInt i = 0; i < nface; i += j->n[j->nbatch++]) {
-  }
+  j->nbatch = b + 1;
   *jump = j;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Raises the moduli of n cells to `factor` times the negative stiffness of twist modes, at F, with the first Piola stress P. */
-static void follow_twists(PetscInt n, const SbPack F[9], const SbPack P[9], PetscReal factor,
-                          PetscReal modulus[])
-{
-  SbPack U[9], stretch[3], V[9];
-
-  SbStretches(F, U, stretch, V);
-  for (PetscInt l = 0; l < n; l++) {
-    PetscReal principal[3] = {0.}; /* principal stresses in the axes of F */
-
-    for (int k = 0; k < 27; k++)
-      principal[k % 3] += U[3 * (k / 9) + k % 3][l] * P[k / 3][l] * V[3 * (k / 3 % 3) + k % 3][l];
-    for (int k = 0; k < 3; k++) {
-      const PetscReal sum = stretch[k][l] + stretch[(k + 1) % 3][l],
-                      twist = sum > LEAST ? (principal[k] + principal[(k + 1) % 3]) / sum : 0.;
-
-      modulus[l] = PetscMax(modulus[l], -factor * twist);
-    }
-  }
-}
-
-/* Updates the modulus m of each cell of a batch from x; keep: m may not decrease. Returns whether some m changed. */
+/*
+  Updates the modulus m of each cell of a batch from x: at least `factor` times the negative stiffness of
+  twist modes; keep: m may not decrease. Returns whether some m changed.
+*/
 static PetscBool follow_batch(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[],
                               PetscReal factor, PetscBool keep)
 {
   const SbMaterial m = region->material;
-  const PetscReal mu = m->ops.shear_modulus(m);
   const PetscInt n = s->batch_n[b];
   PetscReal *modulus = s->jump->modulus + s->batch_cell[b], before[SB_BATCH], largest = 0.;
   PetscBool changed = PETSC_FALSE;
-  SbPack u[30], F[9], P[9];
+  SbPack u[30], F[9], P[9], U[9], stretch[3], V[9];
 
   for (PetscInt l = 0; l < n; l++) {
     before[l] = modulus[l];
-    if (!keep) modulus[l] = mu;
+    if (!keep) modulus[l] = m->mu;
   }
   sb_gather_strain(s, region, b, x, u);
   SbCellGradient(s->batch_g + 9 * b, (const SbPack *)u, F);
@@ -248,38 +209,59 @@ static PetscBool follow_batch(SbSpace s, const SbRegion *region, PetscInt b, con
     for (int k = 0; k < 9; k++) square += P[k][l] * P[k][l];
     largest = PetscMax(largest, square);
   }
-  if (largest >= 0.5 * PetscSqr(mu / factor))
-    follow_twists(n, (const SbPack *)F, (const SbPack *)P, factor, modulus);
+  if (largest >= 0.5 * PetscSqr(m->mu / factor)) SbStretches((const SbPack *)F, U, stretch, V);
+  for (PetscInt l = 0; l < n && largest >= 0.5 * PetscSqr(m->mu / factor); l++) {
+    PetscReal principal[3] = {0.}; /* principal stresses in the axes of F */
+
+    for (int k = 0; k < 27; k++)
+      principal[k % 3] += U[3 * (k / 9) + k % 3][l] * P[k / 3][l] * V[3 * (k / 3 % 3) + k % 3][l];
+    for (int k = 0; k < 3; k++) {
+      const PetscReal sum = stretch[k][l] + stretch[(k + 1) % 3][l],
+                      twist = sum > LEAST ? (principal[k] + principal[(k + 1) % 3]) / sum : 0.;
+
+      modulus[l] = PetscMax(modulus[l], -factor * twist);
+    }
+  }
   for (PetscInt l = 0; l < n; l++) changed = (PetscBool)(changed || modulus[l] != before[l]);
   return changed;
 }
 
-/* Jumps at the three vertices, J[3 i + c], and their sum. */
-SB_INLINE void gather_jumps(const PetscInt node[8 * SB_BATCH], const PetscReal x[], int l, PetscReal J[9],
-                            PetscReal sum[3])
+/* The offsets r of a batch; zero for damping, which acts on velocities. */
+static const SbPack *left_out(SbJump j, PetscInt b, SbJumpFactor factor)
+{
+  static const SbPack nothing[9];
+
+  return factor == SB_JUMP_STIFFNESS && j->r ? (const SbPack *)(j->r + 9 * b) : nothing;
+}
+
+/* Jumps at the three vertices less offsets r, J[3 i + c], and the sum of the jumps. */
+SB_INLINE void gather_jumps(const PetscInt node[8 * SB_BATCH], const PetscReal x[], const SbPack r[9], int l,
+                            PetscReal J[9], PetscReal sum[3])
 {
   for (int c = 0; c < 3; c++) {
     PetscReal u[8], S;
 
     for (int k = 0; k < 8; k++) u[k] = x[3 * node[k * SB_BATCH + l] + c];
     S = (u[0] - u[4]) + (u[1] - u[5]) + (u[2] - u[6]) + (u[3] - u[7]);
-    for (int i = 0; i < 3; i++) J[3 * i + c] = S - 3. * (u[1 + i] - u[5 + i]);
+    for (int i = 0; i < 3; i++) J[3 * i + c] = S - 3. * (u[1 + i] - u[5 + i]) - r[3 * i + c][l];
     sum[c] = 3. * (u[0] - u[4]);
   }
 }
 
-/* Projection coefficient of J - r on the jumps J of a face at x, in the inner product of the energy with c1; not negative, 1 for J = 0. */
+/* Projection coefficient of J - r on the jumps J of a face at x, by the energy; >= 0, 1 for J = 0. */
 static PetscReal held_part(SbJump j, PetscInt b, PetscInt l, const PetscReal x[], PetscReal J[9])
 {
+  static const SbPack zero[9];
+  const SbPack *r = left_out(j, b, SB_JUMP_STIFFNESS);
   PetscReal sum[3], square = 0., along = 0.;
 
-  gather_jumps(j->node + 8 * SB_BATCH * b, x, l, J, sum);
+  gather_jumps(j->node + 8 * SB_BATCH * b, x, zero, (int)l, J, sum);
   for (int c = 0; c < 3; c++) {
     PetscReal held = 0.;
 
     sum[c] = J[c] + J[3 + c] + J[6 + c];
     for (int k = c; k < 9; k += 3) {
-      const PetscReal here = J[k] - (j->r ? j->r[9 * b + k][l] : 0.);
+      const PetscReal here = J[k] - r[k][l];
 
       square += J[k] * J[k];
       along += here * J[k];
@@ -291,15 +273,11 @@ static PetscReal held_part(SbJump j, PetscInt b, PetscInt l, const PetscReal x[]
   return square > 0. ? PetscMax(along / square, 0.) : 1.;
 }
 
-PetscBool SbJumpBegin(SbSpace s)
-{
-  const PetscBool first = (PetscBool)!s->jump->began;
-
-  s->jump->began = PETSC_TRUE;
-  return first;
-}
-
-PetscErrorCode SbJumpRenew(SbSpace s, const PetscReal x[], PetscBool first, PetscBool *changed)
+/*
+  Updates the penalties. With x the faces' energies are kept or, first, their forces; NULL: r = 0. changed:
+  set if one changed on this rank by a percent or more.
+*/
+static PetscErrorCode renew(SbSpace s, const PetscReal x[], PetscBool first, PetscBool *changed)
 {
   const SbJump j = s->jump;
   PetscReal J[9];
@@ -326,11 +304,14 @@ PetscErrorCode SbJumpRenew(SbSpace s, const PetscReal x[], PetscBool first, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbJumpStiffness(SbSpace s, const PetscReal x[], PetscReal k[])
+PetscErrorCode SbSpaceGetJumps(SbSpace s, Vec U, PetscReal k[])
 {
   const SbJump j = s->jump;
+  const PetscReal *x;
   PetscReal J[9];
 
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetLocalRead(s, U, &x));
   for (PetscInt i = 0; i < 5 * s->mesh->ncell_owned; i++) k[i] = i % 5 == 4 ? j->modulus[i / 5] : 0.;
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
@@ -342,12 +323,19 @@ void SbJumpStiffness(SbSpace s, const PetscReal x[], PetscReal k[])
       }
     }
   }
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbJumpSetStiffness(SbSpace s, const PetscReal k[])
+PetscErrorCode SbSpaceSetJumps(SbSpace s, const PetscReal own[])
 {
   const SbJump j = s->jump;
+  PetscReal *k;
 
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(5 * s->mesh->ncell, &k));
+  PetscCall(PetscArraycpy(k, own, 5 * s->mesh->ncell_owned));
+  PetscCall(SbMeshBroadcastCells(s->mesh, 5, MPIU_REAL, k));
   for (PetscInt b = 0, i = 0; b < j->nbatch; b++) {
     for (PetscInt l = 0; l < j->n[b]; l++, i++) {
       const Face *face = &j->face[i];
@@ -361,9 +349,12 @@ void SbJumpSetStiffness(SbSpace s, const PetscReal k[])
   }
   for (PetscInt c = 0; c < s->mesh->ncell; c++) j->modulus[c] = k[5 * c + 4];
   j->began = PETSC_TRUE;
+  PetscCall(PetscFree(k));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscBool SbJumpFollow(SbSpace s, const PetscReal x[], SbStepsOf steps)
+/* Updates the moduli m of the penalty from x. Returns whether one changed, or faces have offsets r. */
+static PetscBool follow(SbSpace s, const PetscReal x[], SbStepsOf steps)
 {
   const PetscReal factor = steps == SB_STEPS_OF_LOAD ? FOLLOW : RATE * FOLLOW;
   PetscBool any = (PetscBool)(s->jump->renew || (steps != SB_STEPS_OF_LOAD && s->jump->r));
@@ -380,15 +371,37 @@ PetscBool SbJumpFollow(SbSpace s, const PetscReal x[], SbStepsOf steps)
   return any;
 }
 
+PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, SbStepsOf steps, PetscBool *changed)
+{
+  const PetscBool in_time = (PetscBool)(steps != SB_STEPS_OF_LOAD);
+  const PetscReal *x;
+  PetscBool any, first, mine = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  if (changed) *changed = PETSC_FALSE;
+  if (!s->jump || s->linear) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbSpaceGetLocalRead(s, U, &x));
+  /* the initial state of a dynamic run has the forces of a load step */
+  first = (PetscBool)(in_time && !s->jump->began);
+  if (in_time) s->jump->began = PETSC_TRUE;
+  if (first && follow(s, x, SB_STEPS_OF_LOAD)) PetscCall(renew(s, NULL, PETSC_FALSE, &mine));
+  any = follow(s, x, steps);
+  if (any) PetscCall(renew(s, in_time ? x : NULL, first, &mine));
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
+  if (in_time) mine = any;
+  if (changed) PetscCallMPI(MPI_Allreduce(&mine, changed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
+  if (s->plan && any) SbPlanSumFaceTerms(s);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbJumpDestroy(SbJump *jump)
 {
   SbJump j = *jump;
 
   PetscFunctionBeginUser;
   if (!j) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree3(j->region_of, j->V, j->modulus));
-  PetscCall(PetscFree(j->face));
-  PetscCall(PetscFree3(j->region, j->n, j->node));
+  PetscCall(PetscFree3(j->V, j->modulus, j->face));
+  PetscCall(PetscFree3(j->body, j->n, j->node));
   PetscCall(PetscFree3(j->c0, j->c1, j->share));
   PetscCall(PetscFree(j->r));
   PetscCall(PetscFree(*jump));
@@ -404,8 +417,7 @@ SB_KERNEL static void jump_forces(const PetscInt node[restrict 8 * SB_BATCH],
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal J[9], sum[3];
 
-    gather_jumps(node, x, l, J, sum);
-    for (int k = 0; k < 9; k++) J[k] -= r[k][l];
+    gather_jumps(node, x, r, l, J, sum);
     for (int c = 0; c < 3; c++) {
       const PetscReal common = c1[l] * (J[c] + J[3 + c] + J[6 + c]) + c0[l] * sum[c];
       const PetscReal t0 = c1[l] * J[c] + common, t1 = c1[l] * J[3 + c] + common,
@@ -419,21 +431,13 @@ SB_KERNEL static void jump_forces(const PetscInt node[restrict 8 * SB_BATCH],
   }
 }
 
-/* The offsets r of a batch; zero for damping, which acts on velocities. */
-static const SbPack *left_out(SbJump j, PetscInt b, SbJumpFactor factor)
-{
-  static const SbPack nothing[9];
-
-  return factor == SB_JUMP_STIFFNESS && j->r ? (const SbPack *)(j->r + 9 * b) : nothing;
-}
-
 void SbJumpAdd(SbSpace s, const PetscReal x[], SbJumpFactor factor, PetscReal f[])
 {
   const SbJump j = s->jump;
 
   for (PetscInt b = 0; b < j->nbatch; b++) {
     const PetscInt *node = j->node + 8 * SB_BATCH * b;
-    const PetscReal scale = factor == SB_JUMP_STIFFNESS ? 1. : s->beta[s->region[j->region[b]].body];
+    const PetscReal scale = factor == SB_JUMP_STIFFNESS ? 1. : s->beta[j->body[b]];
     SbPack t[12];
 
     if (scale == 0.) continue;
@@ -457,20 +461,18 @@ PetscReal SbJumpEnergy(SbSpace s, const PetscReal x[], SbJumpFactor factor, Pets
   PetscReal energy = 0.;
 
   for (PetscInt b = 0; b < j->nbatch; b++) {
-    const PetscReal scale = factor == SB_JUMP_STIFFNESS ? 1. : s->beta[s->region[j->region[b]].body],
-                    before = energy;
+    const PetscReal scale = factor == SB_JUMP_STIFFNESS ? 1. : s->beta[j->body[b]], before = energy;
     const SbPack *r = left_out(j, b, factor);
 
     for (int l = 0; l < j->n[b] && scale != 0.; l++) {
       PetscReal J[9], sum[3], squares = 0.;
 
-      gather_jumps(j->node + 8 * SB_BATCH * b, x, l, J, sum);
-      for (int k = 0; k < 9; k++) J[k] -= r[k][l];
+      gather_jumps(j->node + 8 * SB_BATCH * b, x, r, l, J, sum);
       for (int k = 0; k < 9; k++) squares += J[k] * J[k];
       for (int k = 0; k < 3; k++) squares += PetscSqr(J[k] + J[3 + k] + J[6 + k]);
       energy += 0.5 * scale * j->share[b][l] * (j->c1[b][l] * squares + j->c0[b][l] * SbDot3(sum, sum));
     }
-    if (body) body[s->region[j->region[b]].body] += energy - before;
+    if (body) body[j->body[b]] += energy - before;
   }
   return energy;
 }
@@ -483,7 +485,7 @@ PetscInt SbJumpCliques(SbSpace s, const PetscInt **node)
   return s->jump->nbatch;
 }
 
-/* Entry (a, b) of the 8x8 matrix of a face, equal for the three components: sum_i d_ia d_ib c1 + (c1 + c0) D_a D_b. */
+/* Entry (a, b) of the 8x8 matrix of a face, sum_i d_ia d_ib c1 + (c1 + c0) D_a D_b. */
 void SbJumpMatrix(SbSpace s, PetscInt b, PetscInt l, PetscReal K[8][8])
 {
   static const PetscReal d[3][4] = {{1, -2, 1, 1}, {1, 1, -2, 1}, {1, 1, 1, -2}}, D[4] = {3, 0, 0, 0};

@@ -1,18 +1,19 @@
 /*
   The nodes of a space, their owners, and the four nodes of each cell.
 
-  P1 has its nodes at the vertices: when every body is P1, nodes are the mesh's vertices and nothing is done here. P2 also has nodes at the
-  edges; one of the cells around an edge decides the owner, and all ranks with a cell there make the same choice. CR has one
-  node per face, DG four per cell, on its faces; node a of a cell lies opposite vertex a. A rank owns all nodes of its DG cells
-  and, of the CR faces between it and another rank, about every second one.
+  P1 has its nodes at the vertices: when every body is P1, nodes are the mesh's vertices, and its arrays are
+  borrowed. P2 also has nodes at the edges; one of the cells around an edge decides the owner, and all ranks
+  with a cell there make the same choice. CR has one node per face, DG four per cell, on its faces; node a of
+  a cell lies opposite vertex a. A rank owns all nodes of its DG cells and, of the CR faces between it and
+  another rank, about every second one.
 
-  A boundary face of a DG cell that an effect prescribes in all directions has an additional node, the support node, which the effect
-  prescribes. It acts as a rigid neighbour: the mean of the two sides is the support's
-  displacement, and the face terms (jump.c) connect the cell to it. The force of the cell on it is the reaction.
+  A boundary face of a DG cell that an effect prescribes in all directions has an additional node, the support
+  node, which the effect prescribes. It acts as a rigid neighbour: the mean of the two sides is the support's
+  displacement, and the face terms (jump.c) connect the cell to it. The cell's force on it is the reaction.
 
   Owned nodes are numbered in the order of the cells. Each rank numbers its own nodes; two broadcasts over the
-  cells distribute the numbers: the first gives a cell the numbers owned by the rank of its neighbour, the second sends
-  complete cells to the ghosts, including faces whose other side is not on this rank.
+  cells distribute the numbers: the first gives a cell the numbers owned by the rank of its neighbour, the
+  second sends complete cells to the ghosts, including faces whose other side is not on this rank.
 */
 #include "fem_impl.h"
 
@@ -27,74 +28,60 @@ static inline PetscInt face_towards(SbSpace s, PetscInt other, PetscInt cell)
   return f;
 }
 
-/* Whether this rank numbers the CR node between an owned cell and a ghost; both ranks get consistent answers. */
-static inline PetscBool takes_face(SbMesh mesh, PetscInt owned, PetscInt ghost)
-{
-  const PetscInt a = mesh->cell_orig[owned], b = mesh->cell_orig[ghost];
-
-  return (PetscBool)((a < b) == ((a + b) % 2 != 0));
-}
-
-/* Number of a CR node of an owned cell, UNKNOWN if another rank owns it. */
-static PetscInt number_face(SbSpace s, const PetscInt node[], PetscInt cell, PetscInt face, PetscInt *n)
-{
-  const PetscInt other = s->neighbour[4 * cell + face];
-
-  if (other >= 0 && other < cell) return node[4 * other + face_towards(s, other, cell)];
-  if (other >= s->mesh->ncell_owned && !takes_face(s->mesh, cell, other)) return UNKNOWN;
-  return (*n)++;
-}
-
-/* Edges of the local cells, and their owners. */
+/* Edges of the local cells, and numbers of nodes at vertices and edges. */
 typedef struct {
-  PetscInt n, *edge; /* number of edges; [ncell][6] edges of each cell */
-  PetscInt *first;   /* [n] lowest original number of the P2 cells around it */
-  PetscBool *own;    /* [n] this rank numbers its node */
-  PetscInt *at;      /* [n] number of its node, UNKNOWN: not yet */
+  PetscInt n, *edge;     /* number of edges; [ncell][6] edges of each cell */
+  PetscBool *own;        /* [n] this rank numbers its node */
+  PetscInt *at, *vertex; /* [n], [nvert] number of its node, UNKNOWN: not yet */
 } Edges;
 
-/* Finds the edges; every second one belongs to the rank of its lowest P2 cell, the others to that of the highest. */
+/* Finds the edges; every second one belongs to the rank of its lowest cell, others to that of the highest. */
 static PetscErrorCode find_edges(SbSpace s, Edges *edges)
 {
   SbMesh mesh = s->mesh;
-  PetscInt *last;
+  PetscInt *first, *last;
 
   PetscFunctionBeginUser;
-  PetscCall(SbMeshEdges(mesh, &edges->n, &edges->edge));
-  PetscCall(PetscMalloc3(edges->n, &edges->first, edges->n, &edges->own, edges->n, &edges->at));
-  PetscCall(PetscMalloc1(edges->n, &last));
+  if (s->edge_node) PetscCall(SbMeshEdges(mesh, &edges->n, &edges->edge));
+  PetscCall(PetscMalloc3(edges->n, &edges->own, edges->n, &edges->at, mesh->nvert, &edges->vertex));
+  PetscCall(PetscMalloc2(edges->n, &first, edges->n, &last));
+  for (PetscInt v = 0; v < mesh->nvert; v++) edges->vertex[v] = UNKNOWN;
   for (PetscInt e = 0; e < edges->n; e++) {
     edges->at[e] = last[e] = UNKNOWN;
-    edges->first[e] = PETSC_MAX_INT;
+    first[e] = PETSC_MAX_INT;
     edges->own[e] = PETSC_FALSE;
   }
-  for (PetscInt i = 0; i < 6 * mesh->ncell; i++) {
+  for (PetscInt i = 0; s->edge_node && i < 6 * mesh->ncell; i++) {
     const PetscInt e = edges->edge[i], orig = mesh->cell_orig[i / 6];
 
-    edges->first[e] = PetscMin(edges->first[e], orig);
+    first[e] = PetscMin(first[e], orig);
     last[e] = PetscMax(last[e], orig);
   }
-  for (PetscInt i = 0; i < 6 * mesh->ncell_owned; i++) {
+  for (PetscInt i = 0; s->edge_node && i < 6 * mesh->ncell_owned; i++) {
     const PetscInt e = edges->edge[i];
 
-    if (mesh->cell_orig[i / 6] == ((edges->first[e] + last[e]) % 2 ? edges->first[e] : last[e]))
-      edges->own[e] = PETSC_TRUE;
+    if (mesh->cell_orig[i / 6] == ((first[e] + last[e]) % 2 ? first[e] : last[e])) edges->own[e] = PETSC_TRUE;
   }
-  PetscCall(PetscFree(last));
+  PetscCall(PetscFree2(first, last));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Numbers the owned nodes from zero: node[ncell][4] and, for faces in these sets, s->support[ncell][4]; UNKNOWN elsewhere. */
-static PetscErrorCode number_owned(SbSpace s, uint64_t prescribed, Edges *edges, PetscInt node[])
+/* The numbers of nodes, and how many per cell; those at edges and of supports may be NULL. */
+static const PetscInt per_cell[3] = {4, 6, 4};
+static PetscInt *numbers(SbSpace s, int table)
+{
+  return table == 0 ? s->cell_node : table == 1 ? s->edge_node : s->dirichlet_node;
+}
+
+/* Numbers the owned nodes from zero, a support node for faces in these sets; UNKNOWN elsewhere. */
+static void number_owned(SbSpace s, uint64_t prescribed, Edges *edges)
 {
   SbMesh mesh = s->mesh;
-  PetscInt *at, n = 0;
+  PetscInt *node = s->cell_node, n = 0;
 
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(mesh->nvert, &at));
-  for (PetscInt v = 0; v < mesh->nvert; v++) at[v] = UNKNOWN;
-  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) node[i] = UNKNOWN;
-  for (PetscInt i = 0; s->edge_node && i < 6 * mesh->ncell; i++) s->edge_node[i] = UNKNOWN;
+  for (int k = 0; k < 3; k++) {
+    for (PetscInt i = 0; numbers(s, k) && i < per_cell[k] * mesh->ncell; i++) numbers(s, k)[i] = UNKNOWN;
+  }
   for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
     const PetscInt *per = SbSpaceCellElement(s, c)->nodes_per;
 
@@ -108,10 +95,17 @@ static PetscErrorCode number_owned(SbSpace s, uint64_t prescribed, Edges *edges,
         if (SbSpaceCellElement(s, c)->weak && (sets & SB_ON_BOUNDARY) && (sets & prescribed))
           s->dirichlet_node[4 * c + a] = n++;
       } else if (per[2]) {
-        node[4 * c + a] = number_face(s, node, c, a, &n);
+        const PetscInt other = s->neighbour[4 * c + a], orig = mesh->cell_orig[c],
+                       its = other < mesh->ncell_owned ? 0 : mesh->cell_orig[other];
+
+        /* of the faces between an owned cell and a ghost every second one: both ranks agree */
+        if (other >= 0 && other < c)
+          node[4 * c + a] = node[4 * other + face_towards(s, other, c)];
+        else if (other < mesh->ncell_owned || (orig < its) == ((orig + its) % 2 != 0))
+          node[4 * c + a] = n++;
       } else if (v < mesh->nvert_owned) {
-        if (at[v] == UNKNOWN) at[v] = n++;
-        node[4 * c + a] = at[v];
+        if (edges->vertex[v] == UNKNOWN) edges->vertex[v] = n++;
+        node[4 * c + a] = edges->vertex[v];
       }
     }
     for (PetscInt i = 6 * c; per[1] && i < 6 * (c + 1); i++) {
@@ -122,35 +116,30 @@ static PetscErrorCode number_owned(SbSpace s, uint64_t prescribed, Edges *edges,
     }
   }
   s->nnode_owned = n;
-  PetscCall(PetscFree(at));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* After the first broadcast: owned cells get the numbers that their ghost neighbours have. */
-static PetscErrorCode complete_owned(SbSpace s, Edges *edges, PetscInt node[])
+static PetscErrorCode complete_owned(SbSpace s, Edges *edges)
 {
   SbMesh mesh = s->mesh;
-  PetscInt *at;
+  PetscInt *node = s->cell_node;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(mesh->nvert, &at));
-  for (PetscInt v = 0; v < mesh->nvert; v++) at[v] = UNKNOWN;
   for (PetscInt i = 4 * mesh->ncell_owned; i < 4 * mesh->ncell; i++) {
-    if (SbSpaceCellElement(s, i / 4)->nodes_per[0] && node[i] != UNKNOWN) at[mesh->cell[i]] = node[i];
+    if (SbSpaceCellElement(s, i / 4)->nodes_per[0] && node[i] != UNKNOWN)
+      edges->vertex[mesh->cell[i]] = node[i];
   }
   for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++) {
-    if (node[i] != UNKNOWN) continue;
-    if (SbSpaceCellElement(s, i / 4)->nodes_per[0]) {
-      node[i] = at[mesh->cell[i]];
-    } else {
-      const PetscInt other = s->neighbour[i];
+    const PetscInt other = s->neighbour ? s->neighbour[i] : -1;
 
+    if (node[i] != UNKNOWN) continue;
+    if (SbSpaceCellElement(s, i / 4)->nodes_per[0])
+      node[i] = edges->vertex[mesh->cell[i]];
+    else
       node[i] = node[4 * other + face_towards(s, other, i / 4)];
-    }
     PetscCheck(node[i] != UNKNOWN, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No rank has numbered node %d of cell %d",
                (int)(i % 4), (int)(i / 4));
   }
-  PetscCall(PetscFree(at));
   for (PetscInt i = 0; s->edge_node && i < 6 * mesh->ncell; i++) {
     if (s->edge_node[i] != UNKNOWN) edges->at[edges->edge[i]] = s->edge_node[i];
   }
@@ -163,78 +152,48 @@ static PetscErrorCode complete_owned(SbSpace s, Edges *edges, PetscInt node[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the numbers owned by other ranks to a list. */
-static void add_ghosts(SbSpace s, PetscInt n, const PetscInt number[], PetscInt *nghost, PetscInt ghost[])
-{
-  for (PetscInt i = 0; i < n; i++) {
-    const PetscInt own = number[i] - s->gnode_start;
-
-    if (number[i] != UNKNOWN && (own < 0 || own >= s->nnode_owned)) ghost[(*nghost)++] = number[i];
-  }
-}
-
-/* Converts global numbers to local ones: owned nodes, then ghosts by global number. */
-static PetscErrorCode make_local(SbSpace s, PetscInt n, PetscInt number[])
-{
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < n; i++) {
-    const PetscInt own = number[i] - s->gnode_start;
-    PetscInt at;
-
-    if (number[i] == UNKNOWN) continue;
-    if (own >= 0 && own < s->nnode_owned) {
-      number[i] = own;
-    } else {
-      PetscCall(PetscFindInt(number[i], s->nnode - s->nnode_owned, s->gnode + s->nnode_owned, &at));
-      number[i] = s->nnode_owned + at;
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Finds the ghosts, and the local numbers in s->cell_node, s->edge_node and s->dirichlet_node. */
+/* Finds the ghosts, by global number behind the owned nodes, and converts global numbers to local ones. */
 static PetscErrorCode localise(SbSpace s)
 {
-  const PetscInt four = 4 * s->mesh->ncell, six = 6 * s->mesh->ncell;
   PetscInt *ghost, nghost = 0;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(14 * (size_t)s->mesh->ncell, &ghost));
-  add_ghosts(s, four, s->cell_node, &nghost, ghost);
-  if (s->edge_node) add_ghosts(s, six, s->edge_node, &nghost, ghost);
-  if (s->dirichlet_node) add_ghosts(s, four, s->dirichlet_node, &nghost, ghost);
+  for (int k = 0; k < 3; k++) {
+    const PetscInt *number = numbers(s, k);
+
+    for (PetscInt i = 0; number && i < per_cell[k] * s->mesh->ncell; i++) {
+      const PetscInt own = number[i] - s->gnode_start;
+
+      if (number[i] != UNKNOWN && (own < 0 || own >= s->nnode_owned)) ghost[nghost++] = number[i];
+    }
+  }
   PetscCall(PetscSortRemoveDupsInt(&nghost, ghost));
   s->nnode = s->nnode_owned + nghost;
   PetscCall(PetscMalloc1(s->nnode, &s->gnode));
   for (PetscInt i = 0; i < s->nnode_owned; i++) s->gnode[i] = s->gnode_start + i;
   PetscCall(PetscArraycpy(s->gnode + s->nnode_owned, ghost, nghost));
+  for (int k = 0; k < 3; k++) {
+    PetscInt *number = numbers(s, k);
+
+    for (PetscInt i = 0; number && i < per_cell[k] * s->mesh->ncell; i++) {
+      const PetscInt own = number[i] - s->gnode_start;
+      PetscInt at;
+
+      if (number[i] == UNKNOWN) continue;
+      PetscCall(PetscFindInt(number[i], nghost, ghost, &at));
+      number[i] = at < 0 ? own : s->nnode_owned + at;
+    }
+  }
   PetscCall(PetscFree(ghost));
-  PetscCall(make_local(s, four, s->cell_node));
-  if (s->edge_node) PetscCall(make_local(s, six, s->edge_node));
-  if (s->dirichlet_node) PetscCall(make_local(s, four, s->dirichlet_node));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /*
-  Sets of a node at a face. On the boundary those of the face. Inside: sets that contain the triangle or its three vertices;
-  the result is the same from either cell, on any rank.
-*/
-static uint64_t face_sets(SbMesh mesh, PetscInt cell, PetscInt face)
-{
-  const uint64_t own = mesh->face_set[4 * cell + face];
-  uint64_t common = ~(uint64_t)0;
-
-  if (own & SB_ON_BOUNDARY) return own & ~SB_ON_BOUNDARY;
-  for (PetscInt a = 0; a < 4; a++) {
-    if (a != face) common &= mesh->vert_set[mesh->cell[4 * cell + a]];
-  }
-  return own | common;
-}
-
-/*
-  Position, body and sets of the nodes at edges. A geometric set, or a group without triangles and tets, contains an edge if it contains both
-  vertices; other groups contain the edges of their triangles and tets, so that no edge through a thin body is in the group of its surface. Owners
-  have all cells around their edges, and send the result to the ghosts.
+  Position, body and sets of the nodes at edges. A geometric set, or a group without triangles and tets,
+  contains an edge if it contains both vertices; other groups contain the edges of their triangles and tets,
+  so that no edge through a thin body is in the group of its surface. Owners have all cells around their
+  edges, and send the result to the ghosts.
 */
 static PetscErrorCode describe_edges(SbSpace s, const Edges *edges)
 {
@@ -285,8 +244,8 @@ static PetscErrorCode describe_nodes(SbSpace s, const Edges *edges)
   SbMesh mesh = s->mesh;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(3 * (size_t)s->nnode, &s->node_x));
-  PetscCall(PetscMalloc3(s->nnode, &s->node_body, s->nnode, &s->node_set, s->nnode, &s->node_orig));
+  PetscCall(PetscMalloc4(3 * (size_t)s->nnode, &s->node_x, s->nnode, &s->node_body, s->nnode, &s->node_set,
+                         s->nnode, &s->node_orig));
   for (PetscInt i = 0; i < s->nnode; i++) s->node_orig[i] = PETSC_MAX_INT;
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
     const PetscInt *v = mesh->cell + 4 * (i / 4), node = s->cell_node[i], face = i % 4;
@@ -299,14 +258,17 @@ static PetscErrorCode describe_nodes(SbSpace s, const Edges *edges)
       for (int k = 0; k < 3; k++) x[k] = mesh->x[3 * v[face] + k];
     } else {
       const PetscInt a = v[(face + 1) % 4], b = v[(face + 2) % 4], c = v[(face + 3) % 4];
+      const uint64_t own = mesh->face_set[i],
+                     common = mesh->vert_set[a] & mesh->vert_set[b] & mesh->vert_set[c];
 
-      s->node_set[node] = face_sets(mesh, i / 4, face);
+      /* on the boundary the sets of the face; inside those of the triangle or its three vertices */
+      s->node_set[node] = own & SB_ON_BOUNDARY ? own & ~SB_ON_BOUNDARY : own | common;
       s->node_orig[node] = PetscMin(s->node_orig[node], mesh->Nvert + 4 * mesh->cell_orig[i / 4] + face);
       for (int k = 0; k < 3; k++) x[k] = (mesh->x[3 * a + k] + mesh->x[3 * b + k] + mesh->x[3 * c + k]) / 3.;
     }
   }
   if (s->edge_node) PetscCall(describe_edges(s, edges));
-  /* a support node has the position and the sets of the node of its face: an effect that prescribes the face prescribes it */
+  /* a support node has position and sets of the face's node: effects that prescribe the face act on it */
   for (PetscInt i = 0; s->dirichlet_node && i < 4 * mesh->ncell; i++) {
     const PetscInt own = s->cell_node[i], node = s->dirichlet_node[i];
 
@@ -320,42 +282,29 @@ static PetscErrorCode describe_nodes(SbSpace s, const Edges *edges)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes are the mesh's vertices. */
-static PetscErrorCode layout_vertices(SbSpace s)
-{
-  SbMesh mesh = s->mesh;
-
-  PetscFunctionBeginUser;
-  s->Nnode = mesh->Nvert;
-  s->nnode_owned = mesh->nvert_owned;
-  s->nnode = mesh->nvert;
-  s->gnode_start = mesh->gvert_start;
-  PetscCall(PetscMalloc1(s->nnode, &s->gnode));
-  PetscCall(PetscMalloc1(3 * s->nnode, &s->node_x));
-  PetscCall(PetscMalloc1(4 * mesh->ncell, &s->cell_node));
-  PetscCall(PetscArraycpy(s->gnode, mesh->gvert, s->nnode));
-  PetscCall(PetscArraycpy(s->node_x, mesh->x, 3 * s->nnode));
-  PetscCall(PetscArraycpy(s->cell_node, mesh->cell, 4 * mesh->ncell));
-  s->node_body = mesh->vert_body;
-  s->node_set = mesh->vert_set;
-  s->node_orig = mesh->vert_orig;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbLayoutNodes(SbSpace s)
 {
+  const SbMesh mesh = s->mesh;
   PetscBool quadratic = PETSC_FALSE;
 
   PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < s->mesh->nbody; b++) {
+  for (PetscInt b = 0; b < mesh->nbody; b++) {
     if (!s->element[b]->nodes_per[0]) s->faces = PETSC_TRUE;
     if (s->element[b]->nodes_per[1]) quadratic = PETSC_TRUE;
   }
   s->vertices = (PetscBool)(!s->faces && !quadratic);
-  if (s->vertices)
-    PetscCall(layout_vertices(s));
-  else {
-    SbMesh mesh = s->mesh;
+  if (s->vertices) {
+    s->Nnode = mesh->Nvert;
+    s->nnode_owned = mesh->nvert_owned;
+    s->nnode = mesh->nvert;
+    s->gnode_start = mesh->gvert_start;
+    s->gnode = mesh->gvert;
+    s->cell_node = mesh->cell;
+    s->node_x = mesh->x;
+    s->node_body = mesh->vert_body;
+    s->node_set = mesh->vert_set;
+    s->node_orig = mesh->vert_orig;
+  } else {
     uint64_t prescribed = 0; /* sets that an effect prescribes; none if no body has support nodes */
     Edges edges = {0};
 
@@ -364,36 +313,28 @@ PetscErrorCode SbLayoutNodes(SbSpace s)
         prescribed |= SB_SET_BIT(k / mesh->nbody);
     }
     if (s->faces) PetscCall(SbMeshNeighbours(mesh, &s->neighbour));
-    if (quadratic) {
-      PetscCall(find_edges(s, &edges));
-      PetscCall(PetscMalloc1(6 * (size_t)mesh->ncell, &s->edge_node));
-    }
     PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->cell_node));
-    if (prescribed) {
-      PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->dirichlet_node));
-      for (PetscInt i = 0; i < 4 * mesh->ncell; i++) s->dirichlet_node[i] = UNKNOWN;
-    }
-    PetscCall(number_owned(s, prescribed, &edges, s->cell_node));
+    if (quadratic) PetscCall(PetscMalloc1(6 * (size_t)mesh->ncell, &s->edge_node));
+    if (prescribed) PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->dirichlet_node));
+    PetscCall(find_edges(s, &edges));
+    number_owned(s, prescribed, &edges);
     PetscCallMPI(MPI_Scan(&s->nnode_owned, &s->gnode_start, 1, MPIU_INT, MPI_SUM, s->comm));
     PetscCallMPI(MPI_Allreduce(&s->nnode_owned, &s->Nnode, 1, MPIU_INT, MPI_SUM, s->comm));
     s->gnode_start -= s->nnode_owned;
-    for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++) {
-      if (s->cell_node[i] != UNKNOWN) s->cell_node[i] += s->gnode_start;
-      if (s->dirichlet_node && s->dirichlet_node[i] != UNKNOWN) s->dirichlet_node[i] += s->gnode_start;
-    }
-    for (PetscInt i = 0; quadratic && i < 6 * mesh->ncell_owned; i++) {
-      if (s->edge_node[i] != UNKNOWN) s->edge_node[i] += s->gnode_start;
-    }
     for (int round = 0; round < 2; round++) {
-      if (round) PetscCall(complete_owned(s, &edges, s->cell_node));
-      PetscCall(SbMeshBroadcastCells(mesh, 4, MPIU_INT, s->cell_node));
-      if (quadratic) PetscCall(SbMeshBroadcastCells(mesh, 6, MPIU_INT, s->edge_node));
+      if (round) PetscCall(complete_owned(s, &edges));
+      for (int k = 0; k < 3; k++) {
+        PetscInt *number = numbers(s, k);
+
+        for (PetscInt i = 0; !round && number && i < per_cell[k] * mesh->ncell_owned; i++)
+          if (number[i] != UNKNOWN) number[i] += s->gnode_start;
+        if (number) PetscCall(SbMeshBroadcastCells(mesh, per_cell[k], MPIU_INT, number));
+      }
     }
-    if (s->dirichlet_node) PetscCall(SbMeshBroadcastCells(mesh, 4, MPIU_INT, s->dirichlet_node));
     PetscCall(localise(s));
     PetscCall(describe_nodes(s, &edges));
     PetscCall(PetscFree(edges.edge));
-    PetscCall(PetscFree3(edges.first, edges.own, edges.at));
+    PetscCall(PetscFree3(edges.own, edges.at, edges.vertex));
   }
   PetscCall(PetscCalloc1(s->nnode, &s->fixed));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -402,11 +343,12 @@ PetscErrorCode SbLayoutNodes(SbSpace s)
 PetscErrorCode SbLayoutDestroy(SbSpace s)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscFree(s->gnode));
-  PetscCall(PetscFree(s->cell_node));
-  PetscCall(PetscFree(s->node_x));
+  if (!s->vertices) {
+    PetscCall(PetscFree(s->gnode));
+    PetscCall(PetscFree(s->cell_node));
+    PetscCall(PetscFree4(s->node_x, s->node_body, s->node_set, s->node_orig));
+  }
   PetscCall(PetscFree(s->edge_node));
-  if (!s->vertices) PetscCall(PetscFree3(s->node_body, s->node_set, s->node_orig));
   PetscCall(PetscFree(s->neighbour));
   PetscCall(PetscFree(s->dirichlet_node));
   PetscCall(PetscFree(s->fixed));
@@ -414,8 +356,9 @@ PetscErrorCode SbLayoutDestroy(SbSpace s)
 }
 
 /*
-  Opposite nodes across the faces of DG cells, and the weights of both sides. The mean of the two sides of a face is weighted by (2 mu + lambda) / |T|: then the
-  constant in the bound of the lifting does not depend on the volumes and moduli on the two sides (docs/reference/theory.md).
+  Opposite nodes across the faces of DG cells, and the weights of both sides. The mean of the two sides of a
+  face is weighted by (2 mu + lambda) / |T|: then the constant in the bound of the lifting does not depend on
+  the volumes and moduli on the two sides (docs/reference/theory.md).
 */
 PetscErrorCode SbLayoutCliques(SbSpace s)
 {
@@ -442,14 +385,9 @@ PetscErrorCode SbLayoutCliques(SbSpace s)
   }
   if (!broken) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(s->mesh->ncell, &stiffness));
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
-    const PetscReal modulus = SbMaterialWaveModulus(region->material);
-
-    for (PetscInt b = region->bstart; b < region->bend; b++) {
-      for (PetscInt l = 0; l < s->batch_n[b]; l++)
-        stiffness[s->batch_cell[b] + l] = modulus / s->batch_V[b][l];
-    }
+  for (PetscInt b = 0; b < s->nbatch; b++) {
+    for (PetscInt l = 0, c = s->batch_cell[b]; l < s->batch_n[b]; l++, c++)
+      stiffness[c] = SbMaterialWaveModulus(s->material[s->mesh->cell_material[c]]) / s->batch_V[b][l];
   }
   PetscCall(PetscMalloc1(s->nbatch * 4, &s->batch_weight));
   for (PetscInt k = 0; k < 4 * SB_BATCH * s->nbatch; k++) {

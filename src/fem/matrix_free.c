@@ -3,24 +3,22 @@
 
   With rotated gradients h_a = R grad phi_a the product A p of a cell is
     H = sum_a p_a h_a^T,  T = 2 mu sym(H) + lambda tr(H) I,  q_a = V T h_a,
-  linear elasticity in the rotated frame; R enters only h. A new state costs a rotation and nine products per cell,
-  an application about as much as a product with a stored matrix, and no blocks are formed: with few iterations per
-  step this is several times cheaper than assembly.
+  linear elasticity in the rotated frame; R enters only h. A new state costs a rotation and nine products per
+  cell, an application about as much as a product with a stored matrix, and no blocks are formed: with few
+  iterations per step this is several times cheaper than assembly.
 
-  A cell of P2 has the rotated gradients of its four points, and lambda acts on the mean of tr(H) over them (quadratic.c). With
-  far and near the two barycentric coordinates of the points, point q sees a linear cell whose vertices i move by
+  A cell of P2 has the rotated gradients of its four points, and lambda acts on the mean of tr(H) over them
+  (quadratic.c). With far and near the two coordinates of the points, point q sees a linear cell; i moves by
     (4 far - 1) p_i + 4 far sum_j p_ij + 4 (near - far) p_iq,   p_ii = p_i:
   all terms but the last are the same at the four points.
 
-  Vectors are copied to four doubles per node, so that a node is one vector load or store. Eight cells are evaluated at
-  a time: 4x4 transposes turn eight loads of a node into lanes.
+  Vectors are copied to four doubles per node, so that a node is one vector load or store. Eight cells are
+  evaluated at a time: 4x4 transposes turn eight loads of a node into lanes.
 
   Prescribed unknowns: p is zero there, and their rows are a multiple of the identity.
   Not handled: the consistent mass, tangents of effects.
 */
 #include "fem_impl.h"
-
-#define FRAME_OPERATOR "SbFrameOperator"
 
 typedef struct {
   SbSpace space;
@@ -75,47 +73,62 @@ SB_INLINE void scatter_add(const Eight lanes[3], const PetscInt node[SB_BATCH], 
   }
 }
 
-/* q += A p for the batches of one region, whose gradients are `stride` apart. Padding lanes have volume zero. */
+/* H = sum_a u_a h_a^T */
+SB_INLINE void gradient(const Eight u[4][3], const Eight h[9], Eight H[9])
+{
+  for (int i = 0; i < 3; i++) {
+    const Eight d1 = u[1][i] - u[0][i], d2 = u[2][i] - u[0][i], d3 = u[3][i] - u[0][i];
+
+    for (int j = 0; j < 3; j++) H[3 * i + j] = d1 * h[j] + d2 * h[3 + j] + d3 * h[6 + j];
+  }
+}
+
+/* Forces of T = 2 mu sym(H) + lambda tr(H) I + p I on the vertices; pv = p V or NULL. */
+SB_INLINE void forces(const Eight H[9], const Eight h[9], const Eight *V, PetscReal lambda, PetscReal mu,
+                      const Eight *pv, Eight f[4][3])
+{
+  const Eight mv = mu * *V, m2 = mv + mv, sum = lambda * *V * (H[0] + H[4] + H[8]);
+  const Eight pressure = pv ? sum + *pv : sum;
+  const Eight xx = m2 * H[0] + pressure, yy = m2 * H[4] + pressure, zz = m2 * H[8] + pressure;
+  const Eight xy = mv * (H[1] + H[3]), xz = mv * (H[2] + H[6]), yz = mv * (H[5] + H[7]);
+
+  for (int a = 0; a < 3; a++) {
+    const Eight *g = h + 3 * a;
+
+    f[a + 1][0] = xx * g[0] + xy * g[1] + xz * g[2];
+    f[a + 1][1] = xy * g[0] + yy * g[1] + yz * g[2];
+    f[a + 1][2] = xz * g[0] + yz * g[1] + zz * g[2];
+  }
+  for (int i = 0; i < 3; i++) f[0][i] = -(f[1][i] + f[2][i] + f[3][i]);
+}
+
+/* q += A p for the batches of one region, gradients `stride` apart. Padding lanes have volume zero. */
 SB_KERNEL static void apply_region(PetscInt nbatch, const PetscInt *node, PetscInt stride,
-                                   const SbPack *gradient, const SbPack *volume, PetscReal lambda,
+                                   const SbPack *gradients, const SbPack *volume, PetscReal lambda,
                                    PetscReal mu, const PetscReal *p, PetscReal *q)
 {
   for (PetscInt b = 0; b < nbatch; b++, node += 4 * SB_BATCH) {
-    const Eight *h = (const Eight *)(gradient + stride * b), V = *(const Eight *)(volume + b);
+    const Eight *h = (const Eight *)(gradients + stride * b), *V = (const Eight *)(volume + b);
     Eight u[4][3], H[9], f[4][3];
 
     for (int a = 0; a < 4; a++) gather(p, node + a * SB_BATCH, u[a]);
-    for (int i = 0; i < 3; i++) {
-      const Eight d1 = u[1][i] - u[0][i], d2 = u[2][i] - u[0][i], d3 = u[3][i] - u[0][i];
-
-      for (int j = 0; j < 3; j++) H[3 * i + j] = d1 * h[j] + d2 * h[3 + j] + d3 * h[6 + j];
-    }
-    const Eight mv = mu * V, m2 = mv + mv, pressure = lambda * V * (H[0] + H[4] + H[8]);
-    const Eight xx = m2 * H[0] + pressure, yy = m2 * H[4] + pressure, zz = m2 * H[8] + pressure;
-    const Eight xy = mv * (H[1] + H[3]), xz = mv * (H[2] + H[6]), yz = mv * (H[5] + H[7]);
-    for (int a = 0; a < 3; a++) {
-      const Eight *g = h + 3 * a;
-
-      f[a + 1][0] = xx * g[0] + xy * g[1] + xz * g[2];
-      f[a + 1][1] = xy * g[0] + yy * g[1] + yz * g[2];
-      f[a + 1][2] = xz * g[0] + yz * g[1] + zz * g[2];
-    }
-    for (int i = 0; i < 3; i++) f[0][i] = -(f[1][i] + f[2][i] + f[3][i]);
+    gradient((const Eight(*)[3])u, h, H);
+    forces(H, h, V, lambda, mu, NULL, f);
     for (int a = 0; a < 4; a++) scatter_add(f[a], node + a * SB_BATCH, q);
   }
 }
 
 /* The same for P2. lambda[2]: at the points, and for their mean. */
 SB_KERNEL static void apply_quadratic(PetscInt nbatch, PetscInt width, const PetscInt *node,
-                                      const SbPack *gradient, const SbPack *volume, const PetscReal lambda[2],
-                                      PetscReal mu, const PetscReal *p, PetscReal *q)
+                                      const SbPack *gradients, const SbPack *volume,
+                                      const PetscReal lambda[2], PetscReal mu, const PetscReal *p,
+                                      PetscReal *q)
 {
   static const int between[4][4] = {{0, 4, 5, 6}, {4, 1, 7, 8}, {5, 7, 2, 9}, {6, 8, 9, 3}};
   const PetscReal far4 = 4. * SbRuleQuadratic.L[0][1], step = 4. * SbRuleQuadratic.L[0][0] - far4;
 
   for (PetscInt b = 0; b < nbatch; b++, node += width * SB_BATCH) {
-    const Eight *h = (const Eight *)(gradient + 36 * b), V = 0.25 * *(const Eight *)(volume + b);
-    const Eight mv = mu * V, m2 = mv + mv;
+    const Eight *h = (const Eight *)(gradients + 36 * b), V = 0.25 * *(const Eight *)(volume + b);
     Eight u[10][3], same[4][3], H[4][9], f[4][4][3], mean = {0};
 
     for (int a = 0; a < 10; a++) gather(p, node + a * SB_BATCH, u[a]);
@@ -129,33 +142,17 @@ SB_KERNEL static void apply_quadratic(PetscInt nbatch, PetscInt width, const Pet
       }
     }
     for (int k = 0; k < 4; k++) {
-      for (int i = 0; i < 3; i++) {
-        const Eight u0 = same[0][i] + step * u[between[0][k]][i];
-        const Eight d1 = same[1][i] + step * u[between[1][k]][i] - u0;
-        const Eight d2 = same[2][i] + step * u[between[2][k]][i] - u0;
-        const Eight d3 = same[3][i] + step * u[between[3][k]][i] - u0;
+      Eight here[4][3];
 
-        for (int j = 0; j < 3; j++)
-          H[k][3 * i + j] = d1 * h[9 * k + j] + d2 * h[9 * k + 3 + j] + d3 * h[9 * k + 6 + j];
+      for (int i = 0; i < 3; i++) {
+        for (int a = 0; a < 4; a++) here[a][i] = same[a][i] + step * u[between[a][k]][i];
       }
+      gradient((const Eight(*)[3])here, h + 9 * k, H[k]);
       mean += H[k][0] + H[k][4] + H[k][8];
     }
     mean *= 0.25 * lambda[1] * V;
     // forces of the points on the vertices
-    for (int k = 0; k < 4; k++) {
-      const Eight *G = H[k], pressure = lambda[0] * V * (G[0] + G[4] + G[8]) + mean;
-      const Eight xx = m2 * G[0] + pressure, yy = m2 * G[4] + pressure, zz = m2 * G[8] + pressure;
-      const Eight xy = mv * (G[1] + G[3]), xz = mv * (G[2] + G[6]), yz = mv * (G[5] + G[7]);
-
-      for (int a = 0; a < 3; a++) {
-        const Eight *g = h + 9 * k + 3 * a;
-
-        f[k][a + 1][0] = xx * g[0] + xy * g[1] + xz * g[2];
-        f[k][a + 1][1] = xy * g[0] + yy * g[1] + yz * g[2];
-        f[k][a + 1][2] = xz * g[0] + yz * g[1] + zz * g[2];
-      }
-      for (int i = 0; i < 3; i++) f[k][0][i] = -(f[k][1][i] + f[k][2][i] + f[k][3][i]);
-    }
+    for (int k = 0; k < 4; k++) forces(H[k], h + 9 * k, &V, lambda[0], mu, &mean, f[k]);
     // adjoint of the above: back to vertices and edge nodes
     for (int i = 0; i < 3; i++) {
       for (int a = 0; a < 4; a++) same[a][i] = f[0][a][i] + f[1][a][i] + f[2][a][i] + f[3][a][i];
@@ -169,13 +166,18 @@ SB_KERNEL static void apply_quadratic(PetscInt nbatch, PetscInt width, const Pet
   }
 }
 
-static PetscErrorCode load_vector(Operator *o, Vec X)
+static PetscErrorCode MatMult_Frames(Mat A, Vec X, Vec Y)
 {
-  SbSpace s = o->space;
-  const PetscReal *x;
+  Operator *o;
+  SbSpace s;
+  const PetscScalar *x;
+  PetscScalar *y;
   Vec from = X;
 
   PetscFunctionBeginUser;
+  PetscCall(MatShellGetContext(A, &o));
+  s = o->space;
+  /* p: X with ghosts, zero at prescribed unknowns */
   if (o->ghosted) {
     PetscCall(VecCopy(X, o->ghosted));
     from = o->ghosted;
@@ -185,25 +187,11 @@ static PetscErrorCode load_vector(Operator *o, Vec X)
     for (PetscInt c = 0; c < 3; c++) o->p[4 * i + c] = x[3 * i + c];
   }
   PetscCall(SbSpaceRestoreLocalRead(s, from, &x));
-  for (PetscInt k = 0; k < s->nfixed; k++) {
-    for (PetscInt c = 0; c < 3; c++) {
-      if (s->fixed[s->fixed_node[k]] & (1 << c)) o->p[4 * s->fixed_node[k] + c] = 0.;
-    }
+  for (PetscInt k = 0; k < 3 * s->nfixed; k++) {
+    const PetscInt i = s->fixed_node[k / 3];
+
+    if (s->fixed[i] & (1 << k % 3)) o->p[4 * i + k % 3] = 0.;
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode MatMult_Frames(Mat A, Vec X, Vec Y)
-{
-  Operator *o;
-  SbSpace s;
-  const PetscScalar *x;
-  PetscScalar *y;
-
-  PetscFunctionBeginUser;
-  PetscCall(MatShellGetContext(A, &o));
-  s = o->space;
-  PetscCall(load_vector(o, X));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     for (PetscInt c = 0; c < 4; c++) o->q[4 * i + c] = o->inertia[i] * o->p[4 * i + c];
   }
@@ -227,12 +215,10 @@ static PetscErrorCode MatMult_Frames(Mat A, Vec X, Vec Y)
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     for (PetscInt c = 0; c < 3; c++) y[3 * i + c] = o->q[4 * i + c];
   }
-  for (PetscInt k = 0; k < s->nfixed && s->fixed_node[k] < s->nnode_owned; k++) {
-    const PetscInt i = s->fixed_node[k];
+  for (PetscInt k = 0; k < 3 * s->nfixed && s->fixed_node[k / 3] < s->nnode_owned; k++) {
+    const PetscInt i = 3 * s->fixed_node[k / 3] + k % 3;
 
-    for (PetscInt c = 0; c < 3; c++) {
-      if (s->fixed[i] & (1 << c)) y[3 * i + c] = o->prescribed_diagonal * x[3 * i + c];
-    }
+    if (s->fixed[i / 3] & (1 << k % 3)) y[i] = o->prescribed_diagonal * x[i];
   }
   PetscCall(VecRestoreArray(Y, &y));
   PetscCall(VecRestoreArrayRead(X, &x));
@@ -285,8 +271,8 @@ static PetscErrorCode assemble(Mat A, const SbStage *stage)
     const SbMaterial m = region->material;
     const PetscReal factor = stage->shift_k + stage->shift_v * s->beta[region->body];
 
-    o->lambda[r] = factor * m->ops.volumetric_modulus(m);
-    o->mu[r] = factor * m->ops.shear_modulus(m);
+    o->lambda[r] = factor * m->lambda;
+    o->mu[r] = factor * m->mu;
     stiffest = PetscMax(stiffest, factor * m->E);
     for (PetscInt b = region->bstart; b < region->bend; b++) {
       for (int q = 0; q < (region->quadratic ? 4 : 1); q++) {
@@ -345,29 +331,21 @@ PetscErrorCode SbSpaceCreateMatrixFree(SbSpace s, Mat *A)
   PetscCall(MatSetOption(*A, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(MatSetOption(*A, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
   PetscCall(MatSetUp(*A));
-  PetscCall(PetscObjectComposeFunction((PetscObject)*A, FRAME_OPERATOR, MatMult_Frames));
   PetscCall(SbMatrixSetAssembly(*A, &assembly));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode get_operator(Mat A, Operator **o)
-{
-  void (*mark)(void) = NULL;
-
-  PetscFunctionBeginUser;
-  *o = NULL;
-  PetscCall(PetscObjectQueryFunction((PetscObject)A, FRAME_OPERATOR, &mark));
-  if (mark) PetscCall(MatShellGetContext(A, o));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbMatrixFreeGetRotations(Mat A, const SbPack **R)
 {
+  const SbAssembly *own;
   Operator *o;
 
   PetscFunctionBeginUser;
-  PetscCall(get_operator(A, &o));
-  *R = o ? (const SbPack *)o->R : NULL;
+  *R = NULL;
+  PetscCall(SbMatrixGetAssembly(A, &own));
+  if (!own || own->assemble != assemble) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatShellGetContext(A, &o));
+  *R = (const SbPack *)o->R;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -380,7 +358,7 @@ PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], con
   PetscInt *wanted;
 
   PetscFunctionBeginUser;
-  PetscCall(get_operator(A, &o));
+  PetscCall(MatShellGetContext(A, &o));
   s = o->space;
   p = s->plan;
   PetscCall(PetscMalloc1(s->nnode, &wanted));
@@ -397,33 +375,34 @@ PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], con
 
     for (PetscInt b = region->bstart; b < region->bend; b++) {
       const PetscInt *corner = s->batch_clique + s->width * SB_BATCH * b;
+      const SbPoints points = SbBatchPoints(s, region, b);
       PetscBool any = PETSC_FALSE;
-      SbPack K[SB_PAIRS][9] __attribute__((aligned(64)));
+      SbPack K[SB_PAIRS][9] __attribute__((aligned(64))), B[4][10][9] __attribute__((aligned(64)));
+      SbPack factor, volume[30] = {{0}};
 
       for (PetscInt l = 0; l < region->nnode * SB_BATCH; l++)
         any = (PetscBool)(any || wanted[corner[l]] >= 0);
       if (!any) continue;
-      if (region->quadratic) {
-        const SbPack *h = (const SbPack *)o->h + 9 * sb_rotation_points(s) * b;
-        SbPack B[4][10][9] __attribute__((aligned(64))), V, one[9], factor, force[12], volume[30] = {{0}};
+      // the points, and for P2 lambda/V b b^T with b = sum_q V_q h_q (quadratic.c)
+      for (int q = 0; q < points.n; q++) {
+        const SbPack *R = (const SbPack *)o->R + 9 * (sb_rotation_points(s) * b + q);
+        SbPack V;
 
-        // the points in the rotated frame, and lambda/V b b^T with b = sum_q V_q h_q (quadratic.c)
-        for (PetscInt l = 0; l < SB_BATCH; l++) {
-          V[l] = 0.25 * s->batch_V[b][l];
-          factor[l] = mean && V[l] > 0. ? o->lambda[r] / (4. * V[l]) : 0.;
-          for (int e = 0; e < 9; e++) one[e][l] = e % 4 == 0;
-        }
-        for (int q = 0; q < 4; q++) {
-          SbCellBlocksIsotropic(h + 9 * q, V, mean ? 0. : o->lambda[r], o->mu[r], NULL, B[q]);
-          SbCellForce(h + 9 * q, V, (const SbPack *)one, force);
-          SbQuadraticAdd(SbRuleQuadratic.L[q], (const SbPack *)force, volume);
-        }
-        SbQuadraticBlocks((const SbPack(*)[10][9])B, factor, (const SbPack *)volume, K);
-      } else
-        SbCellBlocksIsotropic(s->batch_g + 9 * b, s->batch_V[b], o->lambda[r], o->mu[r],
-                              (const SbPack *)o->R + 9 * sb_rotation_points(s) * b, K);
+        SbPointVolume(&points, q, V);
+        SbCellBlocksIsotropic(points.g, V, mean ? 0. : o->lambda[r], o->mu[r], R, B[q]);
+        if (region->quadratic) SbPointForce(&points, q, R, volume);
+      }
+      for (PetscInt l = 0; l < SB_BATCH; l++) {
+        const PetscReal V = s->batch_V[b][l];
+
+        factor[l] = mean && V > 0. ? o->lambda[r] / V : 0.;
+      }
+      if (region->quadratic)
+        SbQuadraticBlocks(points.rule, (const SbPack(*)[10][9])B, factor, (const SbPack *)volume, K);
+      else
+        memcpy(K, B[0], sizeof(B[0]));
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        const size_t start = SbPlanCellOffset(s, s->batch_cell[b] + l);
+        const size_t start = (size_t)(b * s->width * s->width * SB_BATCH + l);
 
         for (PetscInt turn = 0; turn < 2 * npair; turn++) {
           const PetscInt pair = turn / 2, a = turn % 2 ? SbPairB[pair] : SbPairA[pair],

@@ -1,11 +1,12 @@
 /*
   Rotations of cells and of nodes.
 
-  A node's rotation is the proper rotation nearest to sum_T V_T R_T over the cells around it (Markley 2007, "Averaging
-  quaternions": the same maximiser of sum_T V_T R : R_T). All cells of an owned node are local, so owned nodes
-  need no communication. R_T of a P2 cell is the mean over its points: compared with other averages it
-  takes the fewest iterations of -solver realtime (8.0 per step for a bar of 1,536 tets; with the linear function through the points 10, with the
-  rotation of the four vertices 11.7). Where rotations cancel (relative rotation pi) the result is an arbitrary rotation.
+  A node's rotation is the proper rotation nearest to sum_T V_T R_T over the cells around it (Markley 2007,
+  "Averaging quaternions": the same maximiser of sum_T V_T R : R_T). All cells of an owned node are local, so
+  owned nodes need no communication. R_T of a P2 cell is the mean over its points: compared with other
+  averages it takes the fewest iterations of -solver realtime (8.0 per step for a bar of 1,536 tets; with the
+  linear function through the points 10, with the rotation of the four vertices 11.7). Where rotations cancel
+  (relative rotation pi) the result is an arbitrary rotation.
 */
 #include "fem_impl.h"
 
@@ -91,17 +92,5 @@ PetscErrorCode SbSpaceAverageRotations(SbSpace s, const SbPack R[], PetscReal no
     }
   }
   PetscCall(PetscFree(sum));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbSpaceNodeRotations(SbSpace s, const PetscReal u[], PetscReal R[], PetscReal spread[])
-{
-  SbPack *cells;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(9 * sb_rotation_points(s) * s->nbatch, &cells));
-  SbSpaceCellRotations(s, u, cells);
-  PetscCall(SbSpaceAverageRotations(s, (const SbPack *)cells, R, spread));
-  PetscCall(PetscFree(cells));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

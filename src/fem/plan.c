@@ -1,24 +1,22 @@
 /*
   The assembly plan: the graph of node blocks and, for each cell, the positions of its blocks in the matrix.
 
-  Built in one loop over nodes: the cells (and with CR and DG the faces) around an owned node give the columns of its row;
-  at the same time the positions of the blocks of that row are stored for the cells, without a search. The face terms are constant within a step:
-  they are summed here, and every assembly starts from them. Measured at 200k tets this
-  takes a small fraction of the time of DMCreateMatrix for the same graph (`make bench`, row matrix_setup).
+  Built in one loop over nodes: the cells (and with CR and DG the faces) around an owned node give the columns
+  of its row; at the same time the positions of the blocks of that row are stored for the cells, without a
+  search. The face terms are constant within a step: they are summed here, and every assembly starts from
+  them. At 200k tets this takes a small fraction of the time of DMCreateMatrix (`make bench`).
 */
 #include "fem_impl.h"
 #include "sblog.h"
 
 /*
-  Cliques of coupled nodes in lanes: those of the cells (width nodes each) or of the faces (eight). The slot of node a, lane l,
-  batch b is SB_BATCH (nodes b + a) + l.
+  Cliques of coupled nodes in lanes: those of the cells (width nodes each) or of the faces (eight). The slot
+  of node a, lane l, batch b is SB_BATCH (nodes b + a) + l. Padding lanes count as the group that they repeat.
 */
 typedef struct {
   const PetscInt *node;
-  PetscInt nodes; /* number of nodes in a group */
-  PetscInt nbatch;
+  PetscInt nodes;         /* number of nodes in a group */
   PetscInt *start, *slot; /* [nnode_owned+1] offsets; slots of each owned node, one per group around it */
-  PetscInt *offset;       /* [nbatch][nodes^2][SB_BATCH] positions of the blocks, output; NULL: not wanted */
 } Groups;
 
 /* Node 0 of the group of a slot; node b of the group is at SB_BATCH b. */
@@ -27,54 +25,9 @@ static inline const PetscInt *slot_group(const Groups *g, PetscInt slot)
   return g->node + slot / (g->nodes * SB_BATCH) * (g->nodes * SB_BATCH) + slot % SB_BATCH;
 }
 
-/* Binary search for the cell's region: regions are ranges of cells and of batches. */
-size_t SbPlanCellOffset(SbSpace s, PetscInt cell)
+void SbPlanSumFaceTerms(SbSpace s)
 {
-  PetscInt low = 0, high = s->nregion - 1, lane;
-  const SbRegion *region;
-
-  while (low < high) {
-    const PetscInt middle = (low + high + 1) / 2;
-
-    if (s->region[middle].cstart <= cell)
-      low = middle;
-    else
-      high = middle - 1;
-  }
-  region = &s->region[low];
-  lane = (cell - region->cstart) % SB_BATCH;
-  return (size_t)(region->bstart + (cell - region->cstart) / SB_BATCH) * (size_t)(s->width * s->width) *
-           SB_BATCH +
-         (size_t)lane;
-}
-
-/* Lists the rows in the order in which the batches add to them first. */
-static PetscErrorCode plan_fresh(SbSpace s, SbPlan p)
-{
-  PetscBool *seen;
-  PetscInt n = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(s->nbatch + 1, &p->fresh_start, s->nnode_owned, &p->fresh));
-  PetscCall(PetscCalloc1(s->nnode_owned, &seen));
-  for (PetscInt b = 0; b < s->nbatch; b++) {
-    p->fresh_start[b] = n;
-    for (PetscInt k = s->width * SB_BATCH * b; k < s->width * SB_BATCH * (b + 1); k++) {
-      const PetscInt row = s->batch_clique[k];
-
-      if (row >= s->nnode_owned || seen[row]) continue;
-      seen[row] = PETSC_TRUE;
-      p->fresh[n++] = row;
-    }
-  }
-  p->fresh_start[s->nbatch] = n;
-  PetscCall(PetscFree(seen));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Sums the current face terms for the matrix. */
-static void sum_face_terms(SbSpace s, SbPlan p)
-{
+  const SbPlan p = s->plan;
   const PetscInt *nodes, nbatch = SbJumpCliques(s, &nodes);
 
   for (int q = 0; q < 2; q++) {
@@ -104,39 +57,23 @@ static void sum_face_terms(SbSpace s, SbPlan p)
   }
 }
 
-static PetscErrorCode create_groups(SbSpace s, const PetscInt node[], PetscInt nodes, PetscInt nbatch,
-                                    PetscBool places, Groups *g)
-{
-  const size_t npoint = (size_t)nbatch * (size_t)(nodes * nodes) * SB_BATCH;
-
-  PetscFunctionBeginUser;
-  g->node = node;
-  g->nodes = nodes;
-  g->nbatch = nbatch;
-  /* padding lanes count as the group that they repeat: its columns are marked again, and they get its positions */
-  PetscCall(SbBucketByKey(nodes * SB_BATCH * nbatch, node, s->nnode_owned, &g->start, &g->slot));
-  g->offset = NULL;
-  if (!places) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(npoint, &g->offset));
-  for (size_t k = 0; k < npoint; k++) g->offset[k] = SB_NOT_OWNED;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
 {
-  const PetscInt nrow = s->nnode_owned, ngroup = s->jump ? 2 : 1;
-  PetscInt *seen, *position, *column, widest = 1, capacity = nrow;
-  Groups group[2];
+  const PetscInt nrow = s->nnode_owned, ngroup = s->jump ? 2 : 1, w = s->width;
+  const size_t npoint = (size_t)s->nbatch * (size_t)(w * w) * SB_BATCH;
+  PetscInt *seen, *position, *column, widest = 1, capacity = nrow, nfresh = 0;
+  Groups group[2] = {{.node = s->batch_clique, .nodes = w}, {.nodes = 8}};
   SbPlan p;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscNew(&p));
+  PetscCall(PetscNew(plan));
+  p = *plan;
   // for each owned node: the cells around it, and the faces with a penalty on jumps
-  PetscCall(create_groups(s, s->batch_clique, s->width, s->nbatch, PETSC_TRUE, &group[0]));
-  if (s->jump) {
-    const PetscInt *node, nbatch = SbJumpCliques(s, &node);
+  for (PetscInt k = 0; k < ngroup; k++) {
+    const PetscInt nbatch = k ? SbJumpCliques(s, &group[k].node) : s->nbatch;
+    Groups *g = &group[k];
 
-    PetscCall(create_groups(s, node, 8, nbatch, PETSC_FALSE, &group[1]));
+    PetscCall(SbBucketByKey(g->nodes * SB_BATCH * nbatch, g->node, nrow, &g->start, &g->slot));
   }
   // upper bound for the graph: a node shares each group with all its other nodes
   for (PetscInt i = 0; i < nrow; i++) {
@@ -149,7 +86,8 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
   }
   PetscCall(PetscMalloc3(s->nnode, &seen, s->nnode, &position, widest, &column));
   PetscCall(PetscMalloc4(nrow + 1, &p->di, capacity, &p->dj, nrow + 1, &p->oi, capacity, &p->oj));
-  PetscCall(PetscMalloc1(nrow, &p->diagonal));
+  PetscCall(PetscMalloc2(nrow, &p->diagonal, npoint, &p->offset));
+  for (size_t k = 0; k < npoint; k++) p->offset[k] = SB_NOT_OWNED;
   for (PetscInt i = 0; i < s->nnode; i++) seen[i] = -1;
   p->di[0] = p->oi[0] = 0;
   for (PetscInt i = 0; i < nrow; i++) {
@@ -186,72 +124,34 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
     p->oi[i + 1] = no;
     // store the positions of the row's blocks for the cells around the node
     for (PetscInt at = group[0].start[i]; at < group[0].start[i + 1]; at++) {
-      const Groups *g = &group[0];
-      const PetscInt *node = slot_group(g, g->slot[at]), lane = g->slot[at] % SB_BATCH;
-      PetscInt *offset = g->offset + g->nodes * (size_t)(g->slot[at] - lane) + lane;
+      const PetscInt slot = group[0].slot[at], lane = slot % SB_BATCH, *node = slot_group(&group[0], slot);
+      PetscInt *offset = p->offset + w * (size_t)(slot - lane) + lane;
 
-      for (PetscInt b = 0; b < g->nodes * SB_BATCH; b += SB_BATCH) offset[b] = position[node[b]];
+      for (PetscInt b = 0; b < w * SB_BATCH; b += SB_BATCH) offset[b] = position[node[b]];
     }
   }
-  p->offset = group[0].offset;
   if (s->jump) {
     PetscCall(PetscMalloc2(p->di[nrow], &p->face_term[0], p->oi[nrow], &p->face_term[1]));
-    sum_face_terms(s, p);
+    SbPlanSumFaceTerms(s);
   }
+  // the rows in the order in which the batches add to them first: the first batch clears a row in the cache
+  PetscCall(PetscMalloc2(s->nbatch + 1, &p->fresh_start, nrow, &p->fresh));
+  for (PetscInt b = 0; b < s->nbatch; b++) {
+    p->fresh_start[b] = nfresh;
+    for (PetscInt k = w * SB_BATCH * b; k < w * SB_BATCH * (b + 1); k++) {
+      const PetscInt row = s->batch_clique[k];
+
+      if (row >= nrow || seen[row] == nrow) continue;
+      seen[row] = nrow;
+      p->fresh[nfresh++] = row;
+    }
+  }
+  p->fresh_start[s->nbatch] = nfresh;
   for (PetscInt k = 0; k < ngroup; k++) {
     PetscCall(PetscFree(group[k].start));
     PetscCall(PetscFree(group[k].slot));
   }
   PetscCall(PetscFree3(seen, position, column));
-  // the first batch of each row, which clears it while it is in the cache
-  PetscCall(plan_fresh(s, p));
-  *plan = p;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, SbStepsOf steps, PetscBool *changed)
-{
-  const PetscBool in_time = (PetscBool)(steps != SB_STEPS_OF_LOAD);
-  const PetscReal *x;
-  PetscBool any, first, mine = PETSC_FALSE;
-
-  PetscFunctionBeginUser;
-  if (changed) *changed = PETSC_FALSE;
-  if (!s->jump || s->linear) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbSpaceGetLocalRead(s, U, &x));
-  /* the initial state of a dynamic run has the forces of a load step */
-  first = (PetscBool)(in_time && SbJumpBegin(s));
-  if (first && SbJumpFollow(s, x, SB_STEPS_OF_LOAD)) PetscCall(SbJumpRenew(s, NULL, PETSC_FALSE, &mine));
-  any = SbJumpFollow(s, x, steps);
-  if (any) PetscCall(SbJumpRenew(s, in_time ? x : NULL, first, &mine));
-  PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
-  if (in_time) mine = any;
-  if (changed) PetscCallMPI(MPI_Allreduce(&mine, changed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
-  if (s->plan && any) sum_face_terms(s, s->plan);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbSpaceGetJumps(SbSpace s, Vec U, PetscReal k[])
-{
-  const PetscReal *x;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbSpaceGetLocalRead(s, U, &x));
-  SbJumpStiffness(s, x, k);
-  PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbSpaceSetJumps(SbSpace s, const PetscReal k[])
-{
-  PetscReal *all;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(5 * s->mesh->ncell, &all));
-  PetscCall(PetscArraycpy(all, k, 5 * s->mesh->ncell_owned));
-  PetscCall(SbMeshBroadcastCells(s->mesh, 5, MPIU_REAL, all));
-  SbJumpSetStiffness(s, all);
-  PetscCall(PetscFree(all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -262,10 +162,8 @@ PetscErrorCode SbPlanDestroy(SbPlan *plan)
   PetscFunctionBeginUser;
   if (!p) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree4(p->di, p->dj, p->oi, p->oj));
-  PetscCall(PetscFree(p->diagonal));
-  PetscCall(PetscFree(p->offset));
-  PetscCall(PetscFree(p->ui));
-  PetscCall(PetscFree(p->upper));
+  PetscCall(PetscFree2(p->diagonal, p->offset));
+  PetscCall(PetscFree2(p->ui, p->upper));
   PetscCall(PetscFree2(p->face_term[0], p->face_term[1]));
   PetscCall(PetscFree2(p->fresh_start, p->fresh));
   PetscCall(PetscFree3(p->fix_block, p->fix_row, p->fix_mask));
@@ -273,16 +171,15 @@ PetscErrorCode SbPlanDestroy(SbPlan *plan)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* SBAIJ on one rank: the first upper block of each row, and the positions of each cell's blocks in the upper triangle. */
+/* SBAIJ on one rank: the first upper block of each row, and of each cell's blocks in the upper triangle. */
 static PetscErrorCode plan_upper(SbSpace s, SbPlan p)
 {
   const PetscInt nrow = s->nnode_owned;
 
   PetscFunctionBeginUser;
   if (p->upper) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(nrow + 1, &p->ui));
   p->npair = s->edge_node ? SB_PAIRS : 10;
-  PetscCall(PetscMalloc1((size_t)s->nbatch * (size_t)p->npair * SB_BATCH, &p->upper));
+  PetscCall(PetscMalloc2(nrow + 1, &p->ui, (size_t)(s->nbatch * p->npair) * SB_BATCH, &p->upper));
 
   /* a row consists of the blocks from its diagonal on */
   p->ui[0] = 0;
@@ -296,72 +193,44 @@ static PetscErrorCode plan_upper(SbSpace s, SbPlan p)
 
     for (PetscInt q = 0; q < p->npair; q++) {
       for (PetscInt l = 0; l < SB_BATCH; l++) {
-        const PetscInt na = node[SB_BATCH * SbPairA[q] + l], nb = node[SB_BATCH * SbPairB[q] + l],
-                       row = PetscMin(na, nb);
-        const PetscInt k = offset[SB_BATCH * (na <= nb ? s->width * SbPairA[q] + SbPairB[q]
-                                                       : s->width * SbPairB[q] + SbPairA[q]) +
-                                  l];
-        const PetscInt u = p->ui[row] + k - p->diagonal[row];
+        const PetscInt a = SbPairA[q], c = SbPairB[q], na = node[SB_BATCH * a + l],
+                       nc = node[SB_BATCH * c + l];
+        const PetscInt row = PetscMin(na, nc), u = p->ui[row] - p->diagonal[row];
+        const PetscInt k = offset[SB_BATCH * (na <= nc ? s->width * a + c : s->width * c + a) + l];
 
-        upper[SB_BATCH * q + l] = na <= nb ? u : ~u;
+        upper[SB_BATCH * q + l] = na <= nc ? u + k : ~(u + k);
       }
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscInt widest_row(SbSpace s, SbPlan p)
-{
-  PetscInt widest = 0;
-
-  for (PetscInt i = 0; i < s->nnode_owned; i++)
-    widest = PetscMax(widest, p->di[i + 1] - p->di[i] + p->oi[i + 1] - p->oi[i]);
-  return widest;
-}
-
 /*
-  Pattern of the diagonal part of AIJ, three scalar rows at a time. With MAT_SORTED_FULL (sorted, complete rows) PETSc copies
-  them unchanged: six times faster at 200,000 tets than block by block.
+  Pattern of a matrix: zero blocks are inserted row by row, and the matrix is assembled. The diagonal part of
+  AIJ is set three scalar rows at a time: with MAT_SORTED_FULL (sorted, complete rows) PETSc copies them
+  unchanged, six times faster at 200,000 tets than block by block.
 */
-static PetscErrorCode fill_diagonal_aij(SbSpace s, SbPlan p, Mat A)
+static PetscErrorCode fill_pattern(SbSpace s, SbPlan p, Mat A, SbMatrixKind kind)
 {
-  const PetscInt widest = 3 * widest_row(s, p);
-  PetscInt *column;
+  const PetscInt *first = kind == SB_MATRIX_AIJ ? p->di + 1 : kind == SB_MATRIX_SBAIJ ? p->diagonal : p->di;
+  PetscInt *column, widest = 0;
   PetscScalar *zeros;
-  PetscBool parallel;
   Mat part = A;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIAIJ, &parallel));
-  if (parallel) PetscCall(MatMPIAIJGetSeqAIJ(A, &part, NULL, NULL));
-  PetscCall(MatSetOption(part, MAT_SORTED_FULL, PETSC_TRUE));
-  PetscCall(PetscMalloc1(widest, &column));
-  PetscCall(PetscCalloc1(3 * widest, &zeros));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
+    widest = PetscMax(widest, p->di[i + 1] - p->di[i] + p->oi[i + 1] - p->oi[i]);
+  PetscCall(PetscMalloc1(3 * widest, &column));
+  PetscCall(PetscCalloc1(9 * widest, &zeros));
+  if (kind == SB_MATRIX_AIJ && s->ghosted) PetscCall(MatMPIAIJGetSeqAIJ(A, &part, NULL, NULL));
+  if (kind == SB_MATRIX_AIJ) PetscCall(MatSetOption(part, MAT_SORTED_FULL, PETSC_TRUE));
+  for (PetscInt i = 0; kind == SB_MATRIX_AIJ && i < s->nnode_owned; i++) {
     const PetscInt rows[3] = {3 * i, 3 * i + 1, 3 * i + 2}, n = 3 * (p->di[i + 1] - p->di[i]);
 
     for (PetscInt k = 0; k < n; k++) column[k] = 3 * p->dj[p->di[i] + k / 3] + k % 3;
     PetscCall(MatSetValues(part, 3, rows, n, column, zeros, INSERT_VALUES));
   }
-  PetscCall(MatSetOption(part, MAT_SORTED_FULL, PETSC_FALSE));
-  PetscCall(PetscFree(column));
-  PetscCall(PetscFree(zeros));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Pattern of a matrix: zero blocks are inserted row by row, and the matrix is assembled. */
-static PetscErrorCode fill_pattern(SbSpace s, SbPlan p, Mat A, SbMatrixKind kind)
-{
-  const PetscInt *first = kind == SB_MATRIX_AIJ ? p->di + 1 : kind == SB_MATRIX_SBAIJ ? p->diagonal : p->di;
-  const PetscInt widest = widest_row(s, p);
-  PetscInt *column;
-  PetscScalar *zeros;
-
-  PetscFunctionBeginUser;
-  /* the diagonal part of AIJ is set by scalar rows; the blocks inserted below are those of its off-diagonal part */
-  if (kind == SB_MATRIX_AIJ) PetscCall(fill_diagonal_aij(s, p, A));
-  PetscCall(PetscMalloc1(widest, &column));
-  PetscCall(PetscCalloc1(9 * widest, &zeros));
+  if (kind == SB_MATRIX_AIJ) PetscCall(MatSetOption(part, MAT_SORTED_FULL, PETSC_FALSE));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     const PetscInt grow = s->gnode_start + i;
     PetscInt n = 0;
@@ -377,17 +246,15 @@ static PetscErrorCode fill_pattern(SbSpace s, SbPlan p, Mat A, SbMatrixKind kind
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lists the blocks that have a prescribed unknown in their row or column, to be cleared after each assembly. */
+/* Lists the blocks with a prescribed unknown in their row or column, to be cleared after each assembly. */
 static PetscErrorCode plan_fixed(SbSpace s, SbPlan p)
 {
-  PetscInt n = 0;
-
   PetscFunctionBeginUser;
   PetscCall(PetscFree3(p->fix_block, p->fix_row, p->fix_mask));
-  p->nfix = 0;
   /* counted in the first pass, listed in the second */
   for (PetscInt pass = 0; pass < 2; pass++) {
-    n = 0;
+    PetscInt n = 0;
+
     for (PetscInt i = 0; i < s->nnode_owned; i++) {
       for (PetscInt part = 0; part < 2; part++) {
         const PetscInt *ptr = part ? p->oi : p->di, *col = part ? p->oj : p->dj;
@@ -406,8 +273,8 @@ static PetscErrorCode plan_fixed(SbSpace s, SbPlan p)
       }
     }
     if (!pass) PetscCall(PetscMalloc3(n, &p->fix_block, n, &p->fix_row, n, &p->fix_mask));
+    p->nfix = n;
   }
-  p->nfix = n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -482,13 +349,11 @@ PetscErrorCode SbSpaceCreateMatrix(SbSpace s, SbMatrixKind kind, Mat *A)
 {
   static const MatType types[] = {MATAIJ, MATBAIJ, MATSBAIJ};
   PetscInt *dnnz, *onnz, *unnz;
-  PetscMPIInt size;
   SbPlan p;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MATRIX_SETUP], 0, 0, 0, 0));
-  PetscCallMPI(MPI_Comm_size(s->comm, &size));
-  PetscCheck(kind != SB_MATRIX_SBAIJ || size == 1, s->comm, PETSC_ERR_SUP,
+  PetscCheck(kind != SB_MATRIX_SBAIJ || !s->ghosted, s->comm, PETSC_ERR_SUP,
              "Symmetric block storage is for one rank: there is no public access to its parallel parts");
 
   /* parts of the plan for this storage and these prescribed unknowns */

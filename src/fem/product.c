@@ -1,12 +1,12 @@
 /*
   Products with symmetric block matrices that read the upper triangle of the diagonal part only.
 
-  Memory bandwidth limits a product. BAIJ stores both triangles and reads twice as much as SBAIJ; PETSc's SBAIJ product
-  is not vectorised, and the parallel one not accessible. Here a row i computes y_i += A_ij x_j and y_j += A_ij^T x_i block by block,
-  four numbers at a time. The upper blocks of BAIJ are copied when the values have changed, at the cost of about two
-  products; reading them in place would leave gaps, which defeat the prefetcher (measured: three times
-  slower than reading both triangles). PETSc adds the columns of other ranks. The copy is a SBAIJ matrix, which
-  an incomplete factorisation can use, too (SbProductGetSymmetric).
+  Memory bandwidth limits a product. BAIJ stores both triangles and reads twice as much as SBAIJ; PETSc's
+  SBAIJ product is not vectorised, and the parallel one not accessible. Here a row i computes y_i += A_ij x_j
+  and y_j += A_ij^T x_i block by block, four numbers at a time. The upper blocks of BAIJ are copied when the
+  values have changed, at the cost of about two products; reading them in place would leave gaps, which defeat
+  the prefetcher (measured: three times slower than reading both triangles). PETSc adds the columns of other
+  ranks. The copy is a SBAIJ matrix, which an incomplete factorisation can use, too (SbProductGetSymmetric).
 
   petsc/private/petscimpl.h: there is no public call that tells whether a matrix has changed.
 
@@ -27,40 +27,34 @@ typedef struct {
 } Product;
 
 /*
-  Row i: y_i += A_ii x_i, and for each block right of the diagonal y_i += A_ij x_j and y_j += A_ij^T x_i. a: the row's blocks by
-  columns; column: their n columns, i first.
+  y += A x. Row i has the columns column[start[i]..start[i+1]), i first: y_i += A_ii x_i, and for each block
+  right of the diagonal y_i += A_ij x_j and y_j += A_ij^T x_i.
 */
-SB_INLINE void row_product(const PetscScalar *a, PetscInt n, const PetscInt column[], const PetscScalar x[],
-                           PetscScalar y[])
-{
-  const PetscScalar *u = x + 3 * (size_t)column[0];
-  PetscScalar *w = y + 3 * (size_t)column[0];
-  const Four xi = {u[0], u[1], u[2], 0.}, last = {a[6], a[7], a[8], 0.};
-  Four sum = *(const Four *)a * u[0] + *(const Four *)(a + 3) * u[1] + last * u[2];
-
-  for (PetscInt k = 1; k < n; k++) {
-    /* the columns of the block; the fourth lane is multiplied by the zero of xi, and not added to y_i */
-    const PetscScalar *b = a + 9 * k, *xj = x + 3 * (size_t)column[k];
-    PetscScalar *yj = y + 3 * (size_t)column[k];
-    const Four c0 = *(const Four *)b, c1 = *(const Four *)(b + 3), c5 = *(const Four *)(b + 5);
-    const Four c2 = SHUFFLE(c5, c5, 1, 2, 3, 0), p0 = c0 * xi, p1 = c1 * xi, p2 = c2 * xi;
-    const Four s = SHUFFLE(p0, p1, 0, 4, 2, 6) + SHUFFLE(p0, p1, 1, 5, 3, 7);
-    const Two low = {s[0], s[1]}, high = {s[2], s[3]};
-
-    sum += c0 * xj[0] + c1 * xj[1] + c2 * xj[2];
-    *(Two *)yj += low + high;
-    yj[2] += (p2[0] + p2[2]) + (p2[1] + p2[3]);
-  }
-  for (int k = 0; k < 3; k++) w[k] += sum[k];
-}
-
-/* y += A x; row i has the columns column[start[i]..start[i+1]), the diagonal first. */
 SB_KERNEL static void multiply(PetscInt nrow, const PetscInt start[restrict], const PetscInt column[restrict],
-                               const PetscScalar a[restrict], const PetscScalar x[restrict],
+                               const PetscScalar value[restrict], const PetscScalar x[restrict],
                                PetscScalar y[restrict])
 {
-  for (PetscInt i = 0; i < nrow; i++)
-    row_product(a + 9 * (size_t)start[i], start[i + 1] - start[i], column + start[i], x, y);
+  for (PetscInt i = 0; i < nrow; i++) {
+    const PetscScalar *a = value + 9 * (size_t)start[i], *u = x + 3 * (size_t)column[start[i]];
+    PetscScalar *w = y + 3 * (size_t)column[start[i]];
+    const Four xi = {u[0], u[1], u[2], 0.}, last = {a[6], a[7], a[8], 0.};
+    Four sum = *(const Four *)a * u[0] + *(const Four *)(a + 3) * u[1] + last * u[2];
+
+    for (PetscInt k = 1; k < start[i + 1] - start[i]; k++) {
+      /* the columns of the block; the fourth lane is multiplied by the zero of xi, and not added to y_i */
+      const PetscScalar *b = a + 9 * k, *xj = x + 3 * (size_t)column[start[i] + k];
+      PetscScalar *yj = y + 3 * (size_t)column[start[i] + k];
+      const Four c0 = *(const Four *)b, c1 = *(const Four *)(b + 3), c5 = *(const Four *)(b + 5);
+      const Four c2 = SHUFFLE(c5, c5, 1, 2, 3, 0), p0 = c0 * xi, p1 = c1 * xi, p2 = c2 * xi;
+      const Four s = SHUFFLE(p0, p1, 0, 4, 2, 6) + SHUFFLE(p0, p1, 1, 5, 3, 7);
+      const Two low = {s[0], s[1]}, high = {s[2], s[3]};
+
+      sum += c0 * xj[0] + c1 * xj[1] + c2 * xj[2];
+      *(Two *)yj += low + high;
+      yj[2] += (p2[0] + p2[2]) + (p2[1] + p2[3]);
+    }
+    for (int k = 0; k < 3; k++) w[k] += sum[k];
+  }
 }
 
 /* Borrows the block pattern of a sequential BAIJ or SBAIJ matrix. */
@@ -74,14 +68,21 @@ PetscErrorCode SbMatGetPattern(Mat A, PetscInt *n, const PetscInt *start[], cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Updates the copy of BAIJ's upper blocks. */
-static PetscErrorCode copy_upper(Product *p)
+/* The data of A, with an updated copy of BAIJ's upper blocks. */
+static PetscErrorCode product_of(Mat A, Product **product)
 {
   const PetscInt *all, *start, *column;
   PetscObjectState state;
+  PetscObject container;
   PetscInt n;
+  Product *p;
 
   PetscFunctionBeginUser;
+  PetscCall(PetscObjectQuery((PetscObject)A, "sb_product", &container));
+  PetscCheck(container, PetscObjectComm((PetscObject)A), PETSC_ERR_ARG_WRONG,
+             "Not a block matrix of a space");
+  PetscCall(PetscContainerGetPointer((PetscContainer)container, (void **)product));
+  p = *product;
   PetscCall(PetscObjectStateGet((PetscObject)p->diagonal, &state));
   if (!p->full || state == p->copied) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbMatGetPattern(p->diagonal, &n, &all, &column));
@@ -94,62 +95,6 @@ static PetscErrorCode copy_upper(Product *p)
   }
   p->copied = state;
   PetscCall(PetscObjectStateIncrease((PetscObject)p->symmetric));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The data of A, with an updated copy. */
-static PetscErrorCode product_of(Mat A, Product **p)
-{
-  PetscObject container;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscObjectQuery((PetscObject)A, "sb_product", &container));
-  PetscCheck(container, PetscObjectComm((PetscObject)A), PETSC_ERR_ARG_WRONG,
-             "Not a block matrix of a space");
-  PetscCall(PetscContainerGetPointer((PetscContainer)container, (void **)p));
-  PetscCall(copy_upper(*p));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbMatRestoreRead(Mat A, PetscErrorCode (*restore)(Mat, PetscScalar *[]), PetscScalar *value[])
-{
-  PetscObjectState state;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscObjectStateGet((PetscObject)A, &state));
-  PetscCall((*restore)(A, value));
-  PetscCall(PetscObjectStateSet((PetscObject)A, state));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbMatGetBlocks(Mat A, SbMatBlocks *b)
-{
-  PetscBool parallel, sequential;
-  MatType type;
-
-  PetscFunctionBeginUser;
-  *b = (SbMatBlocks){.part = {A, NULL}};
-  PetscCall(MatGetType(A, &type));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &b->symmetric));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQBAIJ, &sequential));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
-  PetscCheck(b->symmetric || sequential || parallel, PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
-             "This preconditioner takes BAIJ and SBAIJ matrices, and this one is %s: leave -mat_type alone",
-             type);
-  if (parallel) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &b->part[0], &b->part[1], NULL));
-  if (b->symmetric) PetscCall(MatSeqSBAIJGetArray(A, &b->value[0]));
-  for (int q = 0; q < 2 && !b->symmetric; q++)
-    if (b->part[q]) PetscCall(MatSeqBAIJGetArray(b->part[q], &b->value[q]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbMatRestoreBlocks(SbMatBlocks *b)
-{
-  PetscFunctionBeginUser;
-  for (int q = 0; q < 2; q++)
-    if (b->part[q])
-      PetscCall(SbMatRestoreRead(b->part[q], b->symmetric ? MatSeqSBAIJRestoreArray : MatSeqBAIJRestoreArray,
-                                 &b->value[q]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -215,49 +160,21 @@ static PetscErrorCode destroy_product(void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creates a SBAIJ matrix without values, with the symmetric graph of the diagonal part. */
-static PetscErrorCode create_symmetric(Product *p)
-{
-  const PetscInt *all, *columns;
-  PetscInt n, *start, *column;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbMatGetPattern(p->diagonal, &n, &all, &columns));
-  PetscCall(PetscMalloc2(n + 1, &start, (all[n] + n) / 2, &column));
-  start[0] = 0;
-  for (PetscInt i = 0; i < n; i++) {
-    start[i + 1] = start[i];
-    for (PetscInt k = all[i]; k < all[i + 1]; k++) {
-      if (columns[k] >= i) column[start[i + 1]++] = columns[k];
-    }
-  }
-  PetscCall(MatCreate(PETSC_COMM_SELF, &p->symmetric));
-  PetscCall(MatSetSizes(p->symmetric, 3 * n, 3 * n, 3 * n, 3 * n));
-  PetscCall(MatSetType(p->symmetric, MATSEQSBAIJ));
-  PetscCall(MatSeqSBAIJSetPreallocationCSR(p->symmetric, 3, start, column, NULL));
-  PetscCall(MatSetOption(p->symmetric, MAT_SYMMETRIC, PETSC_TRUE));
-  PetscCall(MatSetOption(p->symmetric, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
-  PetscCall(PetscFree2(start, column));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The value arrays keep their addresses for the life of the matrix: its pattern is fixed. */
-static PetscErrorCode find_parts(Mat A, Product *p)
+PetscErrorCode SbProductAttach(Mat A)
 {
   const PetscInt *columns;
   PetscBool parallel, symmetric;
+  PetscContainer container;
   PetscInt n;
+  Product *p;
   Vec x;
   IS from;
 
   PetscFunctionBeginUser;
-  p->diagonal = A;
+  PetscCall(PetscNew(&p));
+  p->copied = -1;
+  p->diagonal = p->symmetric = A;
   PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &symmetric));
-  if (symmetric) {
-    p->symmetric = A;
-    PetscCall(MatSeqSBAIJGetArray(A, &p->upper));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
   PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
   if (parallel) {
     PetscCall(MatMPIBAIJGetSeqBAIJ(A, &p->diagonal, &p->other, &columns));
@@ -270,21 +187,15 @@ static PetscErrorCode find_parts(Mat A, Product *p)
     PetscCall(ISDestroy(&from));
     PetscCall(VecDestroy(&x));
   }
-  PetscCall(MatSeqBAIJGetArray(p->diagonal, &p->full));
-  PetscCall(create_symmetric(p));
+  /* the value arrays keep their addresses for the life of the matrix: its pattern is fixed */
+  if (!symmetric) {
+    PetscCall(MatSeqBAIJGetArray(p->diagonal, &p->full));
+    PetscCall(MatSetOption(p->diagonal, MAT_SYMMETRIC, PETSC_TRUE));
+    PetscCall(MatConvert(p->diagonal, MATSEQSBAIJ, MAT_INITIAL_MATRIX, &p->symmetric));
+    PetscCall(MatSetOption(p->symmetric, MAT_SYMMETRIC, PETSC_TRUE));
+    PetscCall(MatSetOption(p->symmetric, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
+  }
   PetscCall(MatSeqSBAIJGetArray(p->symmetric, &p->upper));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbProductAttach(Mat A)
-{
-  PetscContainer container;
-  Product *p;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscNew(&p));
-  p->copied = -1;
-  PetscCall(find_parts(A, p));
   PetscCall(PetscContainerCreate(PetscObjectComm((PetscObject)A), &container));
   PetscCall(PetscContainerSetPointer(container, p));
   PetscCall(SbContainerSetDestroy(container, destroy_product));

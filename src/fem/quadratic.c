@@ -1,30 +1,26 @@
 /*
   Cells of P2: strains at the four points of SbRuleQuadratic, and the volumetric energy.
 
-  A law is psi = psi_mu(F) + lambda/2 theta(F)^2 (SbMaterialOps.pressure). With theta at each of the points all of them would be constrained
-  near nu = 1/2, and the element would lock. Here the energy of a cell is
+  A law is psi = psi_mu(F) + lambda/2 theta(F)^2 (SbMaterialOps.pressure). With theta at each of the points
+  all of them would be constrained near nu = 1/2, and the element would lock. Here the energy of a cell is
 
     W = sum_q w_q V psi_mu(F_q) + V lambda/2 m^2,   m = (1/V) int theta dV:
 
-  one constraint and one constant pressure per cell (P2/P0; Simo, Taylor and Pister 1985 for J - 1). Force, tangent and stress follow from
-  W. Where theta is J - 1, m is the exact change of the volume of the cell: det F is cubic. Otherwise m is that of the four points,
-  which is exact for the linear law and St. Venant's and Kirchhoff's.
+  one constraint and one constant pressure per cell (P2/P0; Simo, Taylor and Pister 1985 for J - 1). Force,
+  tangent and stress follow from W. Where theta is J - 1, m is the exact change of the volume of the cell: det
+  F is cubic. Otherwise m is that of the four points, exact for linear and stvk.
 
-  Pressures of single cells may oscillate on coarse meshes with supports on the whole boundary; means over the cells around a vertex do not.
+  Pressures of single cells may oscillate on coarse meshes supported all around; means at vertices do not.
 
-  Cells that are curved at rest form separate regions, with gradients and a fraction of the volume at each of the points of SbRuleQuintic,
-  whose degree suffices: a constant stress and a constant pressure are in equilibrium.
+  Cells that are curved at rest form separate regions, with gradients and a fraction of the volume at each of
+  the points of SbRuleQuintic, whose degree suffices: constant stress and pressure are in equilibrium.
 */
 #include "fem_impl.h"
 
 SbPoints SbBatchPoints(SbSpace s, const SbRegion *region, PetscInt b)
 {
-#define SAME(x)            \
-  {                        \
-    x, x, x, x, x, x, x, x \
-  }
-  static const SbPack one[1] = {SAME(1.)}, quarter[4] = {SAME(0.25), SAME(0.25), SAME(0.25), SAME(0.25)};
-#undef SAME
+  static const SbPack one[1] = {{[0 ... SB_BATCH - 1] = 1.}},
+                      quarter[4] = {[0 ... 3] = {[0 ... SB_BATCH - 1] = 0.25}};
   const PetscInt k = SB_POINTS * (b - region->bstart);
   SbPoints at = {1, 0, NULL, (const SbPack *)s->batch_g + 9 * b, (const SbPack *)s->batch_V + b, one};
 
@@ -77,7 +73,7 @@ void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const 
   const PetscBool cubic =
     (PetscBool)(m->jacobian && !at->step); /* det F is cubic: more points than the law's */
   const SbPointRule *rule = cubic ? &SbRuleCubic : at->rule;
-  const PetscReal lambda = m->ops.volumetric_modulus(m);
+  const PetscReal lambda = m->lambda;
 
   for (int l = 0; l < SB_BATCH; l++) pressure[l] = 0.;
   if (b) memset(b, 0, 30 * sizeof(SbPack));
@@ -113,6 +109,32 @@ void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbPoints *at, const 
   }
 }
 
+void SbBatchMass(SbSpace s, const SbRegion *region, PetscInt b, SbPack mass[SB_PAIRS])
+{
+  const SbPoints at = SbBatchPoints(s, region, b);
+  const int npair = region->quadratic ? SB_PAIRS : 10;
+
+  for (int k = 0; k < npair; k++) {
+    const int i = SbPairA[k], j = SbPairB[k];
+    const SbElementOps *e = &region->element->ops;
+    const PetscReal straight = region->quadratic ? SbQuadraticMass(i, j)
+                               : i == j          ? e->mass_diagonal
+                                                 : e->mass_coupling;
+
+    for (int l = 0; l < SB_BATCH; l++) mass[k][l] = at.step ? 0. : straight * (*at.V)[l];
+  }
+  for (int q = 0; at.step && q < at.n; q++) {
+    PetscReal phi[SB_CELL_NODES];
+    SbPack W;
+
+    SbQuadraticBasis(at.rule->L[q], phi);
+    SbPointVolume(&at, q, W);
+    for (int k = 0; k < npair; k++) {
+      for (int l = 0; l < SB_BATCH; l++) mass[k][l] += phi[SbPairA[k]] * phi[SbPairB[k]] * W[l];
+    }
+  }
+}
+
 void SbBatchState(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[], SbPack F[SB_POINTS][9],
                   SbPack P[SB_POINTS][9], SbPack psi[SB_POINTS], SbPack pressure[SB_POINTS])
 {
@@ -129,7 +151,7 @@ void SbBatchState(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal
   if (m == region->material) return;
 
   /* contribution of the mean theta */
-  const PetscReal lambda = region->material->ops.volumetric_modulus(region->material);
+  const PetscReal lambda = region->material->lambda;
 
   SbQuadraticVolume(region->material, &at, (const SbPack *)U, (const SbPack(*)[9])F, p, NULL);
   for (int q = 0; q < at.n; q++) {
@@ -147,26 +169,27 @@ void SbBatchState(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal
 }
 
 /*
-  Pressures of a linearisation. A step du of Newton's method satisfies the linearised theta + D : dF, D = dtheta/dF, but theta(u + du) has an error of
-  second order: in bending and rotation p(u + du) is lambda times this error, orders of magnitude above any stress, and makes the geometric stiffness useless. With the pressure as an unknown and p = -lambda theta as a second equation, the tangent after the step has p(u) + dp/dF : dF; after its elimination the right-hand side
-  is still the residual of u (Magisano, Leonetti and Garcea, Int. J. Numer. Methods Eng. 109, 2017: all stresses). Both formulations have the same solution.
+  Pressures of a linearisation. A step du of Newton's method satisfies the linearised theta + D : dF, D =
+  dtheta/dF, but theta(u + du) has an error of second order: in bending and rotation p(u + du) is lambda times
+  this error, orders of magnitude above any stress, and makes the geometric stiffness useless. With the
+  pressure as an unknown and p = -lambda theta as a second equation, the tangent after the step has p(u) +
+  dp/dF : dF; after its elimination the right-hand side is still the residual of u (Magisano, Leonetti and
+  Garcea, Int. J. Numer. Methods Eng. 109, 2017: all stresses). Both formulations have the same solution.
 */
 PetscErrorCode SbSpaceLinearisePressure(SbSpace s, Vec U, Vec step, PetscReal along, PetscReal part)
 {
   const PetscReal *u, *du = NULL;
 
   PetscFunctionBeginUser;
-  if (!U) s->linear_pressure = NULL;
-  if (!U || s->linear) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!s->pressure_memory)
-    PetscCall(PetscCalloc((size_t)s->nbatch * sizeof(SbPack) + 64, &s->pressure_memory));
-  s->linear_pressure = (SbPack *)(((uintptr_t)s->pressure_memory + 63) & ~(uintptr_t)63);
+  s->linear_pressure = (PetscBool)(U && !s->linear);
+  if (!s->linear_pressure) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!s->pressure) PetscCall(PetscCalloc1(s->nbatch, &s->pressure));
   PetscCall(SbSpaceGetLocalRead(s, U, &u));
   if (step) PetscCall(SbSpaceGetLocalRead(s, step, &du));
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
     const SbMaterial m = region->material;
-    const PetscReal lambda = m->ops.volumetric_modulus(m);
+    const PetscReal lambda = m->lambda;
 
     /* regions whose tangents use these pressures */
     if (region->quadratic ? region->pointwise == m : !m->ops.curvature) continue;
@@ -189,10 +212,10 @@ PetscErrorCode SbSpaceLinearisePressure(SbSpace s, Vec U, Vec step, PetscReal al
         for (int l = 0; l < SB_BATCH; l++) change[l] += D[k][l] * way[l];
       }
       for (int l = 0; l < SB_BATCH; l++) {
-        const PetscReal V = region->quadratic ? (*at.V)[l] : 1., old = step ? s->linear_pressure[b][l] : 0.;
+        const PetscReal V = region->quadratic ? (*at.V)[l] : 1., old = step ? s->pressure[b][l] : 0.;
         const PetscReal goal = p[l] + (V > 0. ? along * lambda / V * change[l] : 0.);
 
-        s->linear_pressure[b][l] = step ? old + part * (goal - old) : goal;
+        s->pressure[b][l] = step ? old + part * (goal - old) : goal;
       }
     }
   }

@@ -1,28 +1,27 @@
 /*
   Internal forces, inertial forces, and stresses and strains of cells.
 
-  f_a = V P grad phi_a with P from the law, and beta (dP/dF : H) for stiffness-proportional damping, H = grad v. Ghost cells are
-  evaluated, too, so that forces on owned nodes are complete. Energies sum over owned cells only.
+  f_a = V P grad phi_a with P from the law, and beta (dP/dF : H) for stiffness-proportional damping, H = grad
+  v. Ghost cells are evaluated, too, so that forces on owned nodes are complete. Energies are of owned ones.
 
-  The volumetric pressure is p = -lambda theta(F), theta the law's measure of the change of volume: for a Poisson's ratio near 0.5
-  lambda is large and theta small. P1 has fewer displacements than volume constraints of cells: it locks, and p alternates
-  between neighbours. CR and DG satisfy the constraints in the mean of each cell and p converges (Crouzeix and Raviart 1973; Hansbo and
-  Larson 2002).
+  The volumetric pressure is p = -lambda theta(F), theta the law's measure of the change of volume: for a
+  Poisson's ratio near 0.5 lambda is large and theta small. P1 has fewer displacements than volume constraints
+  of cells: it locks, and p alternates between neighbours. CR and DG satisfy the constraints in the mean of
+  each cell and p converges (Crouzeix and Raviart 1973; Hansbo and Larson 2002).
 */
 #include "fem_impl.h"
 #include "sbkernel.h"
 #include "sblog.h"
 
 /*
-  Elastic forces (if `elastic`) and damping forces of a region. P2: each point with its fraction of the volume; the volumetric part by the mean of the cell. Damping
+  P2: each point with its fraction of the volume; the volumetric part by the mean of the cell. Damping
   likewise: mu (H + R H^T R) at the points, lambda times the mean of R : H.
 */
-static void add_forces(SbSpace s, const SbRegion *region, PetscBool elastic, const SbStage *stage,
-                       PetscReal f[])
+void SbRegionForces(SbSpace s, const SbRegion *region, PetscBool elastic, PetscReal beta,
+                    const SbStage *stage, PetscReal f[])
 {
   const SbMaterial m = region->pointwise;
-  const PetscReal beta = stage->v ? s->beta[region->body] : 0.,
-                  lambda = region->material->ops.volumetric_modulus(region->material);
+  const PetscReal lambda = region->material->lambda;
   const PetscBool mean = (PetscBool)(m != region->material);
 
   for (PetscInt b = region->bstart; b < region->bend; b++) {
@@ -71,7 +70,7 @@ PetscErrorCode SbSpaceAddInternalForce(SbSpace s, const SbStage *stage, PetscRea
     const SbRegion *region = &s->region[r];
 
     PetscCall(PetscLogEventBegin(region->material->event, 0, 0, 0, 0));
-    add_forces(s, region, PETSC_TRUE, stage, f);
+    SbRegionForces(s, region, PETSC_TRUE, stage->v ? s->beta[region->body] : 0., stage, f);
     PetscCall(PetscLogEventEnd(region->material->event, 0, 0, 0, 0));
   }
   if (s->jump) {
@@ -86,40 +85,24 @@ PetscErrorCode SbSpaceAddInternalForce(SbSpace s, const SbStage *stage, PetscRea
 static void add_consistent_inertia(SbSpace s, const SbRegion *region, const SbStage *stage, PetscReal f[])
 {
   const PetscReal alpha = stage->v ? s->alpha[region->body] : 0., density = region->material->density;
-  const int n = (int)region->nnode;
-  PetscReal mass[SB_CELL_NODES * SB_CELL_NODES];
+  const int n = (int)region->nnode, npair = region->quadratic ? SB_PAIRS : 10;
 
-  for (int k = 0; k < n * n; k++) mass[k] = density * SbCellMass(region, k / n, k % n);
   for (PetscInt b = region->bstart; b < region->bend; b++) {
     const PetscInt *node = sb_batch_nodes(s, b);
-    SbPack w[30] = {{0}}, v[30], fe[30] = {{0}};
+    SbPack w[30] = {{0}}, v[30], fe[30] = {{0}}, mass[SB_PAIRS];
 
     if (stage->a) sb_gather_nodes(n, node, stage->a, w);
     if (alpha != 0.) sb_gather_nodes(n, node, stage->v, v);
     for (int k = 0; alpha != 0. && k < 3 * n; k++) {
       for (int l = 0; l < SB_BATCH; l++) w[k][l] += alpha * v[k][l];
     }
-    for (int q = 0; region->curve_g && q < SB_POINTS; q++) {
-      const SbPoints at = SbBatchPoints(s, region, b);
-      PetscReal phi[SB_CELL_NODES];
-      SbPack here[3] = {{0}}, W;
+    SbBatchMass(s, region, b, mass);
+    for (int k = 0; k < 3 * npair; k++) {
+      const int p = k / 3, i = 3 * SbPairA[p] + k % 3, j = 3 * SbPairB[p] + k % 3;
 
-      SbQuadraticBasis(at.rule->L[q], phi);
-      SbPointVolume(&at, q, W);
-      for (int k = 0; k < 30; k++) {
-        for (int l = 0; l < SB_BATCH; l++) here[k % 3][l] += phi[k / 3] * w[k][l];
-      }
-      for (int k = 0; k < 30; k++) {
-        for (int l = 0; l < SB_BATCH; l++) fe[k][l] += density * W[l] * phi[k / 3] * here[k % 3][l];
-      }
-    }
-    for (int a = 0; !region->curve_g && a < n; a++) {
-      for (int k = 0; k < 3 * n; k += 3) {
-        const PetscReal share = mass[n * a + k / 3];
-
-        for (int i = 0; i < 3; i++) {
-          for (int l = 0; l < SB_BATCH; l++) fe[3 * a + i][l] += share * s->batch_V[b][l] * w[k + i][l];
-        }
+      for (int l = 0; l < SB_BATCH; l++) {
+        fe[i][l] += density * mass[p][l] * w[j][l];
+        fe[j][l] += i == j ? 0. : density * mass[p][l] * w[i][l];
       }
     }
     sb_scatter_nodes(n, node, s->batch_n[b], (const SbPack *)fe, f);
@@ -128,16 +111,12 @@ static void add_consistent_inertia(SbSpace s, const SbRegion *region, const SbSt
 
 void SbSpaceAddInertia(SbSpace s, const SbStage *stage, PetscReal f[])
 {
-  PetscBool damped = PETSC_FALSE;
-
-  if (s->consistent_mass) {
-    for (PetscInt r = 0; r < s->nregion; r++) add_consistent_inertia(s, &s->region[r], stage, f);
-    return;
+  for (PetscInt r = 0; s->consistent_mass && r < s->nregion; r++)
+    add_consistent_inertia(s, &s->region[r], stage, f);
+  for (PetscInt i = 0; !s->consistent_mass && i < 3 * s->nnode_owned; i++) {
+    if (stage->a) f[i] += s->node_mass[i / 3] * stage->a[i];
+    if (stage->v) f[i] += s->alpha[s->node_body[i / 3]] * s->node_mass[i / 3] * stage->v[i];
   }
-  for (PetscInt b = 0; stage->v && b < s->mesh->nbody; b++) damped = (PetscBool)(damped || s->alpha[b] != 0.);
-  for (PetscInt i = 0; stage->a && i < 3 * s->nnode_owned; i++) f[i] += s->node_mass[i / 3] * stage->a[i];
-  for (PetscInt i = 0; damped && i < 3 * s->nnode_owned; i++)
-    f[i] += s->alpha[s->node_body[i / 3]] * s->node_mass[i / 3] * stage->v[i];
 }
 
 static PetscReal lane_det(const SbPack F[9], PetscInt l)
@@ -256,8 +235,9 @@ PetscErrorCode SbSpaceDampingPower(SbSpace s, const PetscReal x[], const PetscRe
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(3 * s->nnode, &f));
   for (PetscInt r = 0; r < s->nregion; r++) {
-    if (s->region[r].owned && s->beta[s->region[r].body] != 0.)
-      add_forces(s, &s->region[r], PETSC_FALSE, &stage, f);
+    const PetscReal beta = s->beta[s->region[r].body];
+
+    if (s->region[r].owned && beta != 0.) SbRegionForces(s, &s->region[r], PETSC_FALSE, beta, &stage, f);
   }
   *power = s->jump ? 2. * SbJumpEnergy(s, v, SB_JUMP_DAMPING, NULL) : 0.;
   for (PetscInt i = 0; i < 3 * s->nnode; i++) *power += v[i] * f[i];

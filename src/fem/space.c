@@ -1,17 +1,17 @@
 /*
   The finite element space: nodes, regions of cells with one material law, and the cells' geometry in batches.
 
-  Nodes are numbered on each rank with the owned ones first and the ghosts after them, which is the storage order of a
-  ghosted PETSc vector: the global vector and the local array that the kernels read are the same memory, and an update
-  moves ghost values only. With one layer of overlap every cell with an owned node is local, so a residual or a
-  matrix row is complete without communication.
+  Nodes are numbered on each rank with the owned ones first and the ghosts after them, which is the storage
+  order of a ghosted PETSc vector: the global vector and the local array that the kernels read are the same
+  memory, and an update moves ghost values only. With one layer of overlap every cell with an owned node is
+  local, so a residual or a matrix row is complete without communication.
 
-  Cells are grouped in regions (one body, one law, owned or ghost), each divided into batches of SB_BATCH cells with
-  interleaved gradients and volumes. layout.c numbers the nodes; jump.c has the face terms of CR and DG.
+  Cells are grouped in regions (one body, one law, owned or ghost), each divided into batches of SB_BATCH
+  cells with interleaved gradients and volumes. layout.c numbers the nodes; jump.c: face terms of CR and DG.
 */
-#include "sbfem.h"
 #include "fem_impl.h"
 #include "sblog.h"
+#include "sbtet.h"
 
 static const SbOption rows[] = {
   {"mass", SB_OPTION_CHOICE, 1, "", "lumped", "lumped|consistent",
@@ -31,21 +31,18 @@ static PetscBool is_curved(SbSpace s, PetscInt cell)
   return (PetscBool)(s->edge_node && s->mesh->edge_off && (s->mesh->cell_set[cell] & SB_CURVED));
 }
 
-/* Finds the regions: owned and ghost cells are each sorted by body, inclusion and curved edges, so that a region is a range of cells. */
+/* Finds the regions: owned and ghost cells are sorted by body, inclusion and curved edges, so that a region
+   is a range of cells. */
 static PetscErrorCode find_regions(SbSpace s, const SbMaterial material[], const SbElement element[])
 {
   SbMesh mesh = s->mesh;
-  PetscInt most = 0;
+  PetscInt nmaterial = mesh->nbody;
 
   PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < mesh->nbody; b++) nmaterial += mesh->body[b].ninclusion;
   s->linear = PETSC_TRUE;
-  for (PetscInt b = 0; b < mesh->nbody; b++) {
-    s->linear = (PetscBool)(s->linear && material[b]->linear);
-    for (PetscInt k = 0; k < mesh->body[b].ninclusion; k++)
-      s->linear = (PetscBool)(s->linear && material[mesh->body[b].inclusion[k].material]->linear);
-    most += 4 * (1 + mesh->body[b].ninclusion);
-  }
-  PetscCall(PetscCalloc1(most, &s->region));
+  for (PetscInt k = 0; k < nmaterial; k++) s->linear = (PetscBool)(s->linear && material[k]->linear);
+  PetscCall(PetscCalloc1(4 * nmaterial, &s->region));
   for (PetscInt c = 0; c < mesh->ncell; c++) {
     const PetscInt body = mesh->cell_body[c], m = mesh->cell_material[c];
 
@@ -53,19 +50,16 @@ static PetscErrorCode find_regions(SbSpace s, const SbMaterial material[], const
         m != mesh->cell_material[c - 1] || is_curved(s, c) != is_curved(s, c - 1)) {
       SbRegion *r = &s->region[s->nregion++];
 
-      r->body = body;
-      r->material = material[m];
+      *r = (SbRegion){.body = body, .material = material[m], .pointwise = material[m]};
       r->element = element[body];
       r->cstart = c;
-      r->owned = (PetscBool)(c < mesh->ncell_owned);
-      r->broken = (PetscBool)(element[body]->nodes_per[3] > 0);
-      r->quadratic = (PetscBool)(element[body]->nodes_per[1] > 0);
-      r->nnode = r->quadratic ? SB_CELL_NODES : 4;
-      r->pointwise = material[m];
-      if (r->quadratic && element[body]->mean_volume &&
-          material[m]->ops.volumetric_modulus(material[m]) != 0.)
-        PetscCall(SbMaterialGetShear(material[m], &r->pointwise));
       r->bstart = s->nbatch;
+      r->owned = (PetscBool)(c < mesh->ncell_owned);
+      r->broken = (PetscBool)(r->element->nodes_per[3] > 0);
+      r->quadratic = (PetscBool)(r->element->nodes_per[1] > 0);
+      r->nnode = r->quadratic ? SB_CELL_NODES : 4;
+      if (r->quadratic && r->element->mean_volume && material[m]->lambda != 0.)
+        PetscCall(SbMaterialGetShear(material[m], &r->pointwise));
     }
     s->region[s->nregion - 1].cend = c + 1;
     if ((c - s->region[s->nregion - 1].cstart) % SB_BATCH == 0) s->nbatch++;
@@ -74,7 +68,7 @@ static PetscErrorCode find_regions(SbSpace s, const SbMaterial material[], const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A curved P2 cell: gradients and volume at each point, as of a P1 tet with the map's derivatives there; fills lane l of batch b. */
+/* A curved P2 cell: at each point those of a P1 tet; fills lane l of batch b. */
 static void tabulate_curved(SbSpace s, SbRegion *region, PetscInt b, PetscInt cell, PetscInt l)
 {
   const PetscInt k = b - region->bstart;
@@ -113,9 +107,8 @@ static PetscErrorCode tabulate_batches(SbSpace s)
     if (is_curved(s, s->region[r].cstart))
       bytes += each * (size_t)(s->region[r].bend - s->region[r].bstart) * sizeof(SbPack);
   }
-  PetscCall(PetscMalloc1(s->nbatch, &s->batch_cell));
-  PetscCall(PetscMalloc1(s->nbatch, &s->batch_n));
-  PetscCall(PetscMalloc1(s->nbatch * 4 * SB_BATCH, &s->batch_node));
+  PetscCall(PetscMalloc3(s->nbatch, &s->batch_cell, s->nbatch, &s->batch_n, s->nbatch * 4 * SB_BATCH,
+                         &s->batch_node));
   PetscCall(PetscMalloc(bytes + 64, &s->batch_memory));
   s->batch_g = (SbPack *)(((uintptr_t)s->batch_memory + 63) & ~(uintptr_t)63);
   s->batch_V = s->batch_g + (size_t)s->nbatch * 9;
@@ -237,15 +230,12 @@ PetscErrorCode SbSpaceDestroy(SbSpace *space)
   if (s->width > 4) PetscCall(PetscFree(s->batch_clique));
   PetscCall(PetscFree(s->batch_weight));
   PetscCall(PetscFree(s->region));
-  PetscCall(PetscFree(s->batch_cell));
-  PetscCall(PetscFree(s->batch_n));
-  PetscCall(PetscFree(s->batch_node));
+  PetscCall(PetscFree3(s->batch_cell, s->batch_n, s->batch_node));
   PetscCall(PetscFree(s->batch_memory));
-  PetscCall(PetscFree(s->pressure_memory));
+  PetscCall(PetscFree(s->pressure));
   if (s->node_share != s->node_mass) PetscCall(PetscFree(s->node_share));
   PetscCall(PetscFree3(s->node_mass, s->alpha, s->beta));
-  PetscCall(PetscFree(s->fixed_node));
-  PetscCall(PetscFree(s->fixed_value));
+  PetscCall(PetscFree2(s->fixed_node, s->fixed_value));
   PetscCall(PetscFree(*space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -331,44 +321,36 @@ PetscErrorCode SbSpaceFindSet(SbSpace s, const char *name, const char *where, Pe
           near[0] ? "; nearest: " : "", near);
 }
 
-/* Corners of face f of a positively oriented tet, counter-clockwise seen from outside. */
-static const PetscInt face_corner[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
-
 PetscErrorCode SbSpaceGetSetFacets(SbSpace s, PetscInt k, PetscInt *n, SbFacet **facets)
 {
   const uint64_t want = SB_SET_BIT(k) | SB_ON_BOUNDARY;
+  const SbMesh mesh = s->mesh;
   PetscInt count = 0;
 
   PetscFunctionBeginUser;
-  for (PetscInt f = 0; f < 4 * s->mesh->ncell; f++) count += (s->mesh->face_set[f] & want) == want;
+  for (PetscInt f = 0; f < 4 * mesh->ncell; f++) count += (mesh->face_set[f] & want) == want;
   PetscCall(PetscCalloc1(count, facets));
   *n = 0;
-  for (PetscInt f = 0; f < 4 * s->mesh->ncell; f++) {
+  for (PetscInt f = 0; f < 4 * mesh->ncell; f++) {
+    const PetscInt cell = f / 4, face = f % 4;
+    PetscReal x[3][3], up[3], normal[3], length, integral[SB_CELL_NODES];
     SbFacet *facet;
-    PetscReal e1[3], e2[3], normal[3], length, integral[SB_CELL_NODES];
 
-    if ((s->mesh->face_set[f] & want) != want) continue;
+    if ((mesh->face_set[f] & want) != want) continue;
     facet = &(*facets)[(*n)++];
-    facet->cell = f / 4;
-    facet->face = f % 4;
+    *facet = (SbFacet){.cell = cell, .face = face};
     for (PetscInt a = 0; a < 3; a++) {
-      facet->corner[a] = face_corner[facet->face][a];
-      facet->vertex[a] = s->mesh->cell[4 * facet->cell + facet->corner[a]];
+      facet->corner[a] = SbFaceVertex[face][a];
+      facet->vertex[a] = mesh->cell[4 * cell + facet->corner[a]];
     }
-    for (PetscInt i = 0; i < 3; i++) {
-      e1[i] = s->mesh->x[3 * facet->vertex[1] + i] - s->mesh->x[3 * facet->vertex[0] + i];
-      e2[i] = s->mesh->x[3 * facet->vertex[2] + i] - s->mesh->x[3 * facet->vertex[0] + i];
-    }
-    SbCross(e1, e2, normal);
+    for (PetscInt a = 0; a < 3; a++)
+      SbSubtract(mesh->x + 3 * facet->vertex[a], mesh->x + 3 * facet->vertex[0], x[a]);
+    SbSubtract(mesh->x + 3 * facet->vertex[0], mesh->x + 3 * mesh->cell[f], up);
+    SbCross(x[1], x[2], normal);
     length = PetscSqrtReal(SbDot3(normal, normal));
-    facet->area = 0.5 * length;
-    if (is_curved(s, facet->cell)) facet->area = SbSpaceCurvedIntegrals(s, facet->cell, facet, integral);
-    facet->height = 0;
-    for (PetscInt i = 0; i < 3; i++) {
-      facet->normal[i] = normal[i] / length;
-      facet->height += facet->normal[i] * (s->mesh->x[3 * facet->vertex[0] + i] -
-                                           s->mesh->x[3 * s->mesh->cell[4 * facet->cell + facet->face] + i]);
-    }
+    facet->area = is_curved(s, cell) ? SbSpaceCurvedIntegrals(s, cell, facet, integral) : 0.5 * length;
+    for (PetscInt i = 0; i < 3; i++) facet->normal[i] = normal[i] / length;
+    facet->height = SbDot3(facet->normal, up);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

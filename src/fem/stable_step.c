@@ -1,17 +1,18 @@
 /*
   Critical time step of explicit integration.
 
-  An undamped oscillator of frequency w is stable up to h w = 2; with the damping ratio zeta = (alpha/w + beta w)/2, whose
-  force uses the old velocity, up to h w = 2 (sqrt(1 + zeta^2) - zeta). Stiffness-proportional damping can reduce
-  this step many times.
+  An undamped oscillator of frequency w is stable up to h w = 2; with the damping ratio zeta = (alpha/w + beta
+  w)/2, whose force uses the old velocity, up to h w = 2 (sqrt(1 + zeta^2) - zeta). Stiffness-proportional
+  damping can reduce this step many times.
 
-  The highest frequency of the mesh at rest comes from the power method on M^-1 K: the growth of y = M^-1 K x in the norm of M converges to w^2
-  from below. After n steps from a random start the relative error is about ln(unknowns) / (2 n):
-  a few percent of w, which callers cover by a safety factor. Each step costs one evaluation of forces. The
-  start rotates with the body, so that the result does not depend on its orientation, nor on the number of ranks.
+  The highest frequency of the mesh at rest comes from the power method on M^-1 K: the growth of y = M^-1 K x
+  in the norm of M converges to w^2 from below. After n steps from a random start the relative error is about
+  ln(unknowns) / (2 n): a few percent of w, which callers cover by a safety factor. Each step costs one
+  evaluation of forces. The start rotates with the body, so that the result does not depend on its
+  orientation, nor on the number of ranks.
 
-  The consistent mass matrix of a tet is at least 1/5 of its lumped one for P1, 9/70 for P2, and 1 for CR and DG, which
-  bounds w for a consistent mass.
+  The consistent mass matrix of a tet is at least 1/5 of its lumped one for P1, 9/70 for P2, and 1 for CR and
+  DG, which bounds w for a consistent mass.
 
   Not handled: frequencies that increase where a body is compressed.
 */
@@ -20,46 +21,13 @@
 
 #define POWER_STEPS 100
 
-/* f = K x at rest, with Hooke's tensor of every law. */
-static void multiply_stiffness(SbSpace s, const PetscReal x[], PetscReal f[])
-{
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
-    const SbMaterial m = region->material;
-    const PetscReal mu = m->ops.shear_modulus(m), lambda = m->ops.volumetric_modulus(m);
-
-    for (PetscInt b = region->bstart; b < region->bend; b++) {
-      const SbPoints at = SbBatchPoints(s, region, b);
-      SbPack U[30], H[SB_POINTS][9], P[9], mean = {0}, fe[30] = {{0}};
-
-      SbBatchGradients(s, region, b, x, PETSC_TRUE, U, H);
-      for (int l = 0; l < SB_BATCH; l++) {
-        for (int q = 0; q < at.n; q++)
-          mean[l] += at.weight[q][l] * lambda * (H[q][0][l] + H[q][4][l] + H[q][8][l]);
-      }
-      for (int q = 0; q < at.n; q++) {
-        for (int l = 0; l < SB_BATCH; l++) {
-          const PetscReal trace = H[q][0][l] + H[q][4][l] + H[q][8][l],
-                          pressure = region->pointwise == m ? lambda * trace : mean[l];
-
-          for (int k = 0; k < 9; k++)
-            P[k][l] = mu * (H[q][k][l] + H[q][3 * (k % 3) + k / 3][l]) + (k % 4 == 0 ? pressure : 0.);
-        }
-        SbPointForce(&at, q, (const SbPack *)P, fe);
-      }
-      sb_scatter_strain(s, region, b, fe, f);
-    }
-  }
-  if (s->jump) SbJumpAdd(s, x, SB_JUMP_STIFFNESS, f);
-}
-
-/* Lower bound of the highest angular frequency of K x = w^2 M x with the lumped mass; 0 if nothing can move. */
+/* Lower bound of the highest angular frequency of K x = w^2 M x, M lumped; 0 if nothing can move. */
 static PetscErrorCode highest_frequency(SbSpace s, PetscReal *w)
 {
   const PetscInt n = 3 * s->nnode_owned;
   Vec X;
   PetscReal *x, *f, square, centre[4] = {0., 0., 0., 0.};
-  const PetscReal *local;
+  SbStage stage = {0};
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceCreateVec(s, &X));
@@ -89,9 +57,11 @@ static PetscErrorCode highest_frequency(SbSpace s, PetscReal *w)
     for (PetscInt i = 0; i < n; i++) x[i] = f[i] / PetscSqrtReal(square);
     PetscCall(VecRestoreArray(X, &x));
     PetscCall(PetscArrayzero(f, 3 * s->nnode));
-    PetscCall(SbSpaceGetLocalRead(s, X, &local));
-    multiply_stiffness(s, local, f);
-    PetscCall(SbSpaceRestoreLocalRead(s, X, &local));
+    /* f = K x at rest, with Hooke's tensor of every law: the force of damping with beta = 1 */
+    PetscCall(SbSpaceGetLocalRead(s, X, &stage.v));
+    for (PetscInt r = 0; r < s->nregion; r++) SbRegionForces(s, &s->region[r], PETSC_FALSE, 1., &stage, f);
+    if (s->jump) SbJumpAdd(s, stage.v, SB_JUMP_STIFFNESS, f);
+    PetscCall(SbSpaceRestoreLocalRead(s, X, &stage.v));
     /* supports have no mass, and do not move */
     for (PetscInt i = 0; i < n; i++) f[i] = s->node_mass[i / 3] > 0. ? f[i] / s->node_mass[i / 3] : 0.;
   }

@@ -1,12 +1,12 @@
 /*
   The tangent A = shift_a M + shift_v C + shift_k K(u), written directly to the value arrays of the matrix.
 
-  K is summed from the cells' blocks (sbelement.h) at the positions of the assembly plan (plan.c); C = alpha M + beta K per
-  region; the lumped M is added to the diagonal blocks. Cells are evaluated in batches: the kernel is vectorised over the lanes, and the
-  blocks of all lanes are added to the matrix (insert.c), which clears each row before its first block.
+  K is summed from the cells' blocks (sbelement.h) at the positions of the assembly plan (plan.c); C = alpha M
+  + beta K per region; the lumped M is added to the diagonal blocks. Cells are evaluated in batches: the
+  kernel is vectorised over the lanes, and the blocks of all lanes are added to the matrix (insert.c), which
+  clears each row before its first block.
 
-  petsc/private/petscimpl.h: there is no public call to increase the state of a parallel matrix after writing to its
-  sequential parts.
+  petsc/private/petscimpl.h: no public call increases the state of a parallel matrix.
 
   Prescribed unknowns: their rows and columns are zero except for the diagonal entry, which keeps its
   magnitude, so that the scaling of the matrix is unchanged.
@@ -30,8 +30,7 @@ PetscErrorCode SbMatrixSetAssembly(Mat A, const SbAssembly *assembly)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Assembly data of a matrix; NULL for a matrix of blocks. */
-static PetscErrorCode get_assembly(Mat A, const SbAssembly **assembly)
+PetscErrorCode SbMatrixGetAssembly(Mat A, const SbAssembly **assembly)
 {
   PetscObject container;
 
@@ -42,50 +41,69 @@ static PetscErrorCode get_assembly(Mat A, const SbAssembly **assembly)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbValuesBegin(Mat A, SbValues *x)
+PetscErrorCode SbValuesBegin(Mat A, SbMatBlocks *x)
 {
+  static const char *const types[5] = {MATSEQAIJ, MATMPIAIJ, MATSEQBAIJ, MATMPIBAIJ, MATSEQSBAIJ};
+  static PetscErrorCode (*const get[3])(Mat, PetscScalar **) = {MatSeqAIJGetArray, MatSeqBAIJGetArray,
+                                                                MatSeqSBAIJGetArray};
   const SbAssembly *own;
-  PetscBool is[5];
+  PetscInt type = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(get_assembly(A, &own));
+  PetscCall(SbMatrixGetAssembly(A, &own));
   if (own && own->stored) A = own->stored;
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQAIJ, &is[0]));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIAIJ, &is[1]));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQBAIJ, &is[2]));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &is[3]));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &is[4]));
-  x->part[0] = A;
-  x->part[1] = NULL;
-  if (is[1]) PetscCall(MatMPIAIJGetSeqAIJ(A, &x->part[0], &x->part[1], NULL));
-  if (is[3]) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &x->part[0], &x->part[1], NULL));
-  x->kind = is[4] ? SB_MATRIX_SBAIJ : is[2] || is[3] ? SB_MATRIX_BAIJ : SB_MATRIX_AIJ;
-  x->value[1] = NULL;
-  x->face_term = NULL;
-  PetscCheck(is[0] || is[1] || is[2] || is[3] || is[4], PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
-             "No direct access to a matrix of type %s", ((PetscObject)A)->type_name);
-  for (int q = 0; q < 2 && x->part[q]; q++) {
-    if (x->kind == SB_MATRIX_AIJ)
-      PetscCall(MatSeqAIJGetArray(x->part[q], &x->value[q]));
-    else if (x->kind == SB_MATRIX_BAIJ)
-      PetscCall(MatSeqBAIJGetArray(x->part[q], &x->value[q]));
-    else
-      PetscCall(MatSeqSBAIJGetArray(x->part[q], &x->value[q]));
+  for (PetscBool same = PETSC_FALSE; type < 5; type++) {
+    PetscCall(PetscObjectTypeCompare((PetscObject)A, types[type], &same));
+    if (same) break;
   }
+  PetscCheck(type < 5, PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
+             "No direct access to a matrix of type %s", ((PetscObject)A)->type_name);
+  *x = (SbMatBlocks){(SbMatrixKind)(type / 2), (PetscBool)(type == 4), {A, NULL}, {NULL, NULL}};
+  if (type == 1) PetscCall(MatMPIAIJGetSeqAIJ(A, &x->part[0], &x->part[1], NULL));
+  if (type == 3) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &x->part[0], &x->part[1], NULL));
+  for (int q = 0; q < 2 && x->part[q]; q++) PetscCall(get[x->kind](x->part[q], &x->value[q]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbValuesEnd(SbValues *x)
+static PetscErrorCode (*const restore_array[3])(Mat, PetscScalar **) = {
+  MatSeqAIJRestoreArray, MatSeqBAIJRestoreArray, MatSeqSBAIJRestoreArray};
+
+PetscErrorCode SbValuesEnd(SbMatBlocks *x)
 {
   PetscFunctionBeginUser;
-  for (int q = 0; q < 2 && x->part[q]; q++) {
-    if (x->kind == SB_MATRIX_AIJ)
-      PetscCall(MatSeqAIJRestoreArray(x->part[q], &x->value[q]));
-    else if (x->kind == SB_MATRIX_BAIJ)
-      PetscCall(MatSeqBAIJRestoreArray(x->part[q], &x->value[q]));
-    else
-      PetscCall(MatSeqSBAIJRestoreArray(x->part[q], &x->value[q]));
-  }
+  for (int q = 0; q < 2 && x->part[q]; q++) PetscCall(restore_array[x->kind](x->part[q], &x->value[q]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMatRestoreRead(Mat A, PetscErrorCode (*restore)(Mat, PetscScalar *[]), PetscScalar *value[])
+{
+  PetscObjectState state;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectStateGet((PetscObject)A, &state));
+  PetscCall((*restore)(A, value));
+  PetscCall(PetscObjectStateSet((PetscObject)A, state));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMatGetBlocks(Mat A, SbMatBlocks *b)
+{
+  PetscBool blocks;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &blocks, MATSEQBAIJ, MATMPIBAIJ, MATSEQSBAIJ, ""));
+  PetscCheck(blocks, PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
+             "This preconditioner takes BAIJ and SBAIJ matrices, and this one is %s: leave -mat_type alone",
+             ((PetscObject)A)->type_name);
+  PetscCall(SbValuesBegin(A, b));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMatRestoreBlocks(SbMatBlocks *b)
+{
+  PetscFunctionBeginUser;
+  for (int q = 0; q < 2 && b->part[q]; q++)
+    PetscCall(SbMatRestoreRead(b->part[q], restore_array[b->kind], &b->value[q]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -104,7 +122,7 @@ static void scaled_volumes(const SbPack V, PetscReal factor, SbPack W)
   for (int l = 0; l < SB_BATCH; l++) W[l] = factor * V[l];
 }
 
-/* Volumetric part left out of a cell's blocks: D (SbMaterialOps.volumetric), and the factor on lambda and mu. */
+/* Volumetric part left out of a cell's blocks: D (SbMaterialOps.volumetric), and the factor on its moduli. */
 typedef struct {
   SbPack D[9];
   PetscReal factor;
@@ -120,80 +138,57 @@ SB_KERNEL static void remove_volumetric(PetscReal lambda, const SbPack D[restric
   }
 }
 
-/* Blocks of a law with a full tangent dP/dF; damping is added; the volumetric part cannot be split off. */
-static void general_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
-                           const SbPack F[9], Split *split, SbPack K[10][9])
+/* Blocks of a law at F, without mass; `split` NULL: with the volumetric part. */
+static void law_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
+                       const SbPack F[9], Split *split, SbPack K[10][9])
 {
-  SbPack C[81], W;
+  const PetscReal both = x->stiffness + x->damping, lambda = split ? 0. : x->lambda;
+  SbPack R[9], T[9], C[81], D[10][9], W;
 
-  m->ops.tangent(m, F, C);
-  if (split) {
-    m->ops.volumetric(m, F, split->D);
-    split->factor = x->stiffness;
-    remove_volumetric(x->lambda, (const SbPack *)split->D, C);
-  }
-  if (x->pressure && m->ops.curvature) m->ops.curvature(m, F, *x->pressure, C);
-  scaled_volumes(V, x->stiffness, W);
-  SbCellBlocksGeneral(g, W, (const SbPack *)C, K);
-  if (x->damping != 0.) {
-    SbPack R[9], D[10][9];
+  scaled_volumes(V, both, W);
+  if (m->linear || m->ops.frame) {
+    /* Hooke's tensor rotated by R, with its damping */
+    m->ops.frame(m, F, R);
+    SbCellBlocksIsotropic(g, W, lambda, x->mu, (const SbPack *)R, K);
+  } else if (m->ops.spin && x->stiffness != 0.) {
+    /* the same plus a tensor T on the spins (sbelement.h); damping has this form, T = -mu I */
+    m->ops.spin(m, F, R, T);
+    /* T is proportional to pressure - 2 mu; a filtered tangent clips it to be semi-definite */
+    for (int l = 0; x->pressure && l < SB_BATCH; l++) {
+      const PetscReal p =
+        m->tangent == SB_TANGENT_EXACT_SPD ? PetscMax(0., (*x->pressure)[l]) : (*x->pressure)[l];
 
+      for (int k = 0; k < 9; k++) T[k][l] *= 1. - p / (2. * x->mu);
+    }
+    for (int k = 0; x->damping != 0. && k < 9; k++) {
+      const PetscReal rest = k % 4 ? 0. : x->damping * x->mu;
+
+      for (int l = 0; l < SB_BATCH; l++) T[k][l] = (x->stiffness * T[k][l] - rest) / both;
+    }
+    SbCellBlocksCorotated(g, W, lambda, x->mu, (const SbPack *)R, (const SbPack *)T, K);
+  } else {
+    /* the full tangent dP/dF, without its volumetric part; damping is added */
+    m->ops.tangent(m, F, C);
+    if (split) {
+      m->ops.volumetric(m, F, split->D);
+      split->factor = x->stiffness;
+      remove_volumetric(x->lambda, (const SbPack *)split->D, C);
+    }
+    if (x->pressure && m->ops.curvature) m->ops.curvature(m, F, *x->pressure, C);
+    scaled_volumes(V, x->stiffness, W);
+    SbCellBlocksGeneral(g, W, (const SbPack *)C, K);
+    if (x->damping == 0.) return;
     SbPolar(F, R);
     scaled_volumes(V, x->damping, W);
     SbCellBlocksIsotropic(g, W, x->lambda, x->mu, (const SbPack *)R, D);
     for (int k = 0; k < 90; k++) {
       for (int l = 0; l < SB_BATCH; l++) K[k / 9][k % 9][l] += D[k / 9][k % 9][l];
     }
+    return;
   }
-}
-
-/* Blocks of a law with Hooke's tensor rotated by R plus a tensor T on the spins (sbelement.h) as tangent; damping has the same form, T = -mu I. */
-static void spin_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
-                        const SbPack F[9], Split *split, SbPack K[10][9])
-{
-  const PetscReal both = x->stiffness + x->damping, lambda = split ? 0. : x->lambda;
-  SbPack R[9], T[9], W;
-
-  m->ops.spin(m, F, R, T);
-  /* T is proportional to pressure - 2 mu; a filtered tangent clips it to be semi-definite */
-  for (int l = 0; x->pressure && l < SB_BATCH; l++) {
-    const PetscReal p =
-      m->tangent == SB_TANGENT_EXACT_SPD ? PetscMax(0., (*x->pressure)[l]) : (*x->pressure)[l];
-
-    for (int k = 0; k < 9; k++) T[k][l] *= 1. - p / (2. * x->mu);
-  }
-  for (int k = 0; x->damping != 0. && k < 9; k++) {
-    const PetscReal rest = k % 4 ? 0. : x->damping * x->mu;
-
-    for (int l = 0; l < SB_BATCH; l++) T[k][l] = (x->stiffness * T[k][l] - rest) / both;
-  }
-  scaled_volumes(V, both, W);
-  SbCellBlocksCorotated(g, W, lambda, x->mu, (const SbPack *)R, (const SbPack *)T, K);
-  if (split) {
-    memcpy(split->D, R, sizeof(R));
-    split->factor = both;
-  }
-}
-
-/* Blocks of a law at F, without mass; `split` NULL: with the volumetric part. */
-static void law_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
-                       const SbPack F[9], Split *split, SbPack K[10][9])
-{
-  const PetscReal both = x->stiffness + x->damping;
-  SbPack R[9], W;
-
-  if (m->linear || m->ops.frame) {
-    /* Hooke's tensor rotated by R, with its damping */
-    m->ops.frame(m, F, R);
-    scaled_volumes(V, both, W);
-    SbCellBlocksIsotropic(g, W, split ? 0. : x->lambda, x->mu, m->linear ? NULL : (const SbPack *)R, K);
-    if (!split) return;
-    memcpy(split->D, R, sizeof(split->D));
-    split->factor = both;
-  } else if (m->ops.spin && x->stiffness != 0.)
-    spin_blocks(m, g, V, x, F, split, K);
-  else
-    general_blocks(m, g, V, x, F, split, K);
+  if (!split) return;
+  memcpy(split->D, R, sizeof(split->D));
+  split->factor = both;
 }
 
 /* K_ab += factor b_a b_b^T */
@@ -210,16 +205,18 @@ SB_KERNEL static void add_dyad(const SbPack factor, const SbPack b[restrict 30],
 }
 
 /*
-  Volumetric modulus of a P2 cell that stays in the matrix when the volumetric part is split off. With one pressure per cell the inf-sup constant of P2 is small on some meshes; the remaining modulus stiffens the modes that the
-  pressures hardly constrain. Iterations of -solver pressure, bar at nu 0.4999, 3, 6, 8, 12 cells across: 93, 168, 212, - without; 54, 62, 77, 102 with 10; 92, 105, 111, 118 with 30.
+  Volumetric modulus of a P2 cell that stays in the matrix when the volumetric part is split off. With one
+  pressure per cell the inf-sup constant of P2 is small on some meshes; the remaining modulus stiffens the
+  modes that the pressures hardly constrain. Iterations of -solver pressure, bar at nu 0.4999, 3, 6, 8, 12
+  cells across: 93, 168, 212, - without; 54, 62, 77, 102 with 10; 92, 105, 111, 118 with 30.
 */
 #define KEPT 10.      /* times mu, */
 #define KEPT_MOST 0.9 /* but at most this fraction of lambda */
 
 /*
-  Blocks of a P2 batch (quadratic.c): the law at the points, with the second derivative of theta times the mean pressure; lambda/V b b^T, b = V dm/du; and,
-  for theta = J - 1, V lambda m d^2 m/du^2, which a filtered tangent omits. For damping R replaces D in b. With `out`, b is stored
-  there and lambda/V b b^T is not added.
+  Blocks of a P2 batch (quadratic.c): the law at the points, with the second derivative of theta times the
+  mean pressure; lambda/V b b^T, b = V dm/du; and, for theta = J - 1, V lambda m d^2 m/du^2, which a filtered
+  tangent omits. For damping R replaces D in b. With `out`, b is stored there and lambda/V b b^T is not added.
 */
 static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal displacement[],
                              const Factors *x, PetscInt batch, const SbVolumetric *out, SbPack K[SB_PAIRS][9])
@@ -236,7 +233,7 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
   SbBatchGradients(s, region, batch, m->linear ? NULL : displacement, PETSC_FALSE, U, F);
   if (mean) {
     SbQuadraticVolume(m, &points, (const SbPack *)U, (const SbPack(*)[9])F, p, b);
-    if (s->linear_pressure) memcpy(p, s->linear_pressure[batch], sizeof(p));
+    if (s->linear_pressure) memcpy(p, s->pressure[batch], sizeof(p));
     at.lambda = 0.;
     at.pressure = m->jacobian ? NULL : &p; /* the second derivative of the exact mean is added below */
   }
@@ -254,10 +251,7 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
   }
   if (out) memset(out->b + out->stride * batch, 0, sizeof(b));
   if (split) memcpy(out->b + out->stride * batch, b, sizeof(b));
-  if (points.step)
-    SbCurvedBlocks((const SbPack(*)[10][9])B, factor, (const SbPack *)b, K);
-  else
-    SbQuadraticBlocks((const SbPack(*)[10][9])B, factor, (const SbPack *)b, K);
+  SbQuadraticBlocks(points.rule, (const SbPack(*)[10][9])B, factor, (const SbPack *)b, K);
   if (!mean) return;
   if (m->jacobian && law->tangent != SB_TANGENT_EXACT_SPD) {
     const SbPointRule *rule = SbVolumeRule(&points);
@@ -285,34 +279,12 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
   add_dyad(factor, (const SbPack *)b, K);
 }
 
-/* Stores b_a = V D grad psi_a and the moduli of a batch. */
-static void keep_volumetric(SbSpace s, const Factors *x, PetscInt batch, const Split *split,
-                            const SbVolumetric *out)
-{
-  const SbPack *g = s->batch_g + 9 * batch;
-  SbPack *b = out->b + out->stride * batch;
-
-  for (int l = 0; l < SB_BATCH; l++) {
-    out->modulus[batch][l] = split ? split->factor * x->lambda : 0.;
-    out->shear[batch][l] = split ? split->factor * x->mu : 0.;
-    for (int i = 0; i < 3; i++) {
-      b[i][l] = 0.;
-      for (int a = 0; a < 3; a++) {
-        PetscReal sum = 0.;
-
-        for (int j = 0; j < 3 && split; j++) sum += split->D[3 * i + j][l] * g[3 * a + j][l];
-        b[3 * a + 3 + i][l] = s->batch_V[batch][l] * sum;
-        b[i][l] -= b[3 * a + 3 + i][l];
-      }
-    }
-  }
-}
-
 /* A matrix to assemble. */
 typedef struct {
   SbSpace space;
-  SbValues x;
-  PetscReal *face_term;
+  SbMatBlocks x;
+  const SbStage *faces;  /* its rows start from the face terms with the factors of this stage, or NULL, */
+  const PetscReal *beta; /* and with the damping [nbody], s */
 } Fill;
 
 /* Adds the blocks of a batch, ten or SB_PAIRS per cell, and its consistent mass; K is work space. */
@@ -322,36 +294,21 @@ static void fill_batch(const Fill *fill, PetscInt r, PetscInt b, PetscReal inert
   const SbRegion *region = &s->region[r];
   const int npair = region->quadratic ? SB_PAIRS : 10;
 
-  SbInsertClear(s, &fill->x, b);
+  SbInsertClear(s, &fill->x, b, fill->faces, fill->beta);
   if (region->broken) {
-    SbInsertBroken(s, &fill->x, b, (const SbPack(*)[9])K);
+    SbInsertBatch(s, &fill->x, b, npair, PETSC_TRUE, (const SbPack(*)[9])K);
     if (inertia == 0.) return;
     memset(K, 0, 90 * sizeof(SbPack));
   }
-  if (inertia != 0. && region->curve_g) {
-    const SbPoints at = SbBatchPoints(s, region, b);
+  if (inertia != 0.) {
+    SbPack mass[SB_PAIRS];
 
-    /* K_ab += inertia int phi_a phi_b */
-    for (int q = 0; q < at.n; q++) {
-      PetscReal phi[SB_CELL_NODES];
-      SbPack W;
-
-      SbQuadraticBasis(at.rule->L[q], phi);
-      SbPointVolume(&at, q, W);
-      for (int k = 0; k < 3 * npair; k++) {
-        const PetscReal share = inertia * phi[SbPairA[k / 3]] * phi[SbPairB[k / 3]];
-
-        for (int l = 0; l < SB_BATCH; l++) K[k / 3][4 * (k % 3)][l] += share * W[l];
-      }
-    }
-  } else if (inertia != 0.) {
+    SbBatchMass(s, region, b, mass);
     for (int k = 0; k < 3 * npair; k++) {
-      const PetscReal share = inertia * SbCellMass(region, SbPairA[k / 3], SbPairB[k / 3]);
-
-      for (int l = 0; l < SB_BATCH; l++) K[k / 3][4 * (k % 3)][l] += share * s->batch_V[b][l];
+      for (int l = 0; l < SB_BATCH; l++) K[k / 3][4 * (k % 3)][l] += inertia * mass[k / 3][l];
     }
   }
-  SbInsertBatch(s, &fill->x, b, npair, (const SbPack(*)[9])K);
+  SbInsertBatch(s, &fill->x, b, npair, PETSC_FALSE, (const SbPack(*)[9])K);
 }
 
 /* Assembles region r into several matrices; fill[0] is that of the space itself. */
@@ -364,8 +321,8 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
   const Factors factors = {.stiffness = stage->shift_k,
                            .damping = stage->shift_v * s->beta[region->body],
                            .inertia = s->consistent_mass ? inertia : 0.,
-                           .lambda = m->ops.volumetric_modulus(m),
-                           .mu = m->ops.shear_modulus(m)};
+                           .lambda = m->lambda,
+                           .mu = m->mu};
   const PetscBool faces = (PetscBool)!region->element->nodes_per[0];
   Split kept, *split = out && faces && factors.lambda > 0. ? &kept : NULL;
 
@@ -382,11 +339,18 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
       if (!m->linear) SbBatchGradients(s, region, b, stage->u, PETSC_FALSE, U, F);
       if (s->linear_pressure && m->ops.curvature && m->tangent == SB_TANGENT_EXACT) {
         m->ops.pressure(m, (const SbPack *)F[0], p);
-        for (int l = 0; l < SB_BATCH; l++) p[l] += s->linear_pressure[b][l];
+        for (int l = 0; l < SB_BATCH; l++) p[l] += s->pressure[b][l];
         at.pressure = &p;
       }
       law_blocks(m, s->batch_g + 9 * b, s->batch_V[b], &at, (const SbPack *)F[0], split, K);
-      if (out) keep_volumetric(s, &factors, b, split, out);
+      /* b_a = V D grad psi_a, as the force of a stress D */
+      for (int l = 0; out && l < SB_BATCH; l++) {
+        out->modulus[b][l] = split ? split->factor * factors.lambda : 0.;
+        out->shear[b][l] = split ? split->factor * factors.mu : 0.;
+      }
+      if (out) memset(out->b + out->stride * b, 0, 12 * sizeof(SbPack));
+      if (split)
+        SbCellForce(s->batch_g + 9 * b, s->batch_V[b], (const SbPack *)split->D, out->b + out->stride * b);
     }
     /* the same cells in another space: the gradients of P1 are -1/3 times those of CR */
     for (PetscInt n = nfill - 1; n > 0 && !region->quadratic; n--) {
@@ -401,29 +365,16 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
   }
 }
 
-static inline void add_to_diagonal(SbSpace s, const SbValues *x, PetscInt node, PetscReal value)
-{
-  size_t rs, cs;
-  PetscScalar *v = sb_block(x, s->plan, node, s->plan->diagonal[node], &rs, &cs);
-
-  for (size_t i = 0; i < 3; i++) v[i * (rs + cs)] += value;
-}
-
 PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n, const SbSpace space[],
                                     const Mat A[], const SbVolumetric *out)
 {
+  const PetscBool lumped = (PetscBool)(!s->consistent_mass && (stage->shift_a != 0. || stage->shift_v != 0.));
   Fill fill[3];
 
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < n; k++) {
-    fill[k].space = space[k];
+    fill[k] = (Fill){.space = space[k], .faces = space[k]->jump ? stage : NULL, .beta = s->beta};
     PetscCall(SbValuesBegin(A[k], &fill[k].x));
-    fill[k].face_term = NULL;
-    /* initial values of each body's rows: its face terms, as stiffness and damping */
-    if (space[k]->jump) PetscCall(PetscMalloc1(s->mesh->nbody, &fill[k].face_term));
-    for (PetscInt b = 0; space[k]->jump && b < s->mesh->nbody; b++)
-      fill[k].face_term[b] = stage->shift_k + stage->shift_v * s->beta[b];
-    fill[k].x.face_term = fill[k].face_term;
   }
   for (PetscInt r = 0; r < s->nregion; r++) {
     PetscCall(PetscLogEventBegin(s->region[r].material->event, 0, 0, 0, 0));
@@ -431,15 +382,17 @@ PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n,
     PetscCall(PetscLogEventEnd(s->region[r].material->event, 0, 0, 0, 0));
   }
   for (PetscInt k = 0; k < n; k++) {
+    const SbSpace to = space[k];
+
     /* the lumped mass matrix, and its damping */
-    for (PetscInt i = 0;
-         !s->consistent_mass && (stage->shift_a != 0. || stage->shift_v != 0.) && i < space[k]->nnode_owned;
-         i++)
-      add_to_diagonal(space[k], &fill[k].x, i,
-                      (stage->shift_a + stage->shift_v * s->alpha[space[k]->node_body[i]]) *
-                        space[k]->node_mass[i]);
+    for (PetscInt i = 0; lumped && i < to->nnode_owned; i++) {
+      size_t rs, cs;
+      PetscScalar *v = sb_block(&fill[k].x, to->plan, i, to->plan->diagonal[i], &rs, &cs);
+
+      for (size_t c = 0; c < 3; c++)
+        v[c * (rs + cs)] += (stage->shift_a + stage->shift_v * s->alpha[to->node_body[i]]) * to->node_mass[i];
+    }
     PetscCall(SbValuesEnd(&fill[k].x));
-    PetscCall(PetscFree(fill[k].face_term));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -450,7 +403,7 @@ PetscErrorCode SbSpaceAssembleTangent(SbSpace s, const SbStage *stage, Mat A)
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
-  PetscCall(get_assembly(A, &own));
+  PetscCall(SbMatrixGetAssembly(A, &own));
   if (own)
     PetscCall((own->assemble)(A, stage));
   else
@@ -462,21 +415,18 @@ PetscErrorCode SbSpaceAssembleTangent(SbSpace s, const SbStage *stage, Mat A)
 PetscErrorCode SbSpaceAddCellBlock(SbSpace s, Mat A, PetscInt cell, PetscInt a, PetscInt b,
                                    const PetscReal block[9])
 {
-  const PetscInt row = SbSpaceCellNode(s, cell, a), column = SbSpaceCellNode(s, cell, b),
-                 k = s->plan->offset[SbPlanCellOffset(s, cell) + (size_t)(SB_BATCH * (s->width * a + b))];
-  SbValues x;
-  size_t rs, cs;
-  PetscScalar *v;
+  const PetscInt node[2] = {SbSpaceCellNode(s, cell, a), SbSpaceCellNode(s, cell, b)}, w = s->width;
+  PetscInt batch;
+  SbMatBlocks x;
 
   PetscFunctionBeginUser;
-  if (k == SB_NOT_OWNED) PetscFunctionReturn(PETSC_SUCCESS);
+  if (node[0] >= s->nnode_owned) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFindInt(cell, s->nbatch, s->batch_cell, &batch));
+  if (batch < 0) batch = -batch - 2; /* not the first cell of its batch */
   PetscCall(SbValuesBegin(A, &x));
-  if (x.kind != SB_MATRIX_SBAIJ || row <= column) {
-    v = sb_block(&x, s->plan, row, k, &rs, &cs);
-    for (size_t i = 0; i < 3; i++) {
-      for (size_t j = 0; j < 3; j++) v[i * rs + j * cs] += s->block_scale * block[3 * i + j];
-    }
-  }
+  SbInsertBlock(s, &x, node,
+                s->plan->offset[(size_t)(batch * w * w + w * a + b) * SB_BATCH + cell - s->batch_cell[batch]],
+                s->block_scale, PETSC_FALSE, block);
   PetscCall(SbValuesEnd(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -487,24 +437,33 @@ PetscErrorCode SbSpaceAddSpring(SbSpace s, Mat A, PetscInt cell, PetscInt a, con
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceAddCellBlock(s, A, cell, a, a, block));
-  PetscCall(get_assembly(A, &own));
+  PetscCall(SbMatrixGetAssembly(A, &own));
   if (own && own->add_spring)
     PetscCall((own->add_spring)(A, SbSpaceCellNode(s, cell, a), s->block_scale, block));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Clears rows and columns of prescribed unknowns, keeping the magnitude on the diagonal. */
-static void clear_fixed(SbSpace s, const SbValues *x)
+PetscErrorCode SbSpaceFinishTangent(SbSpace s, Mat A)
 {
-  SbPlan p = s->plan;
+  const SbPlan p = s->plan;
+  const SbAssembly *own;
+  SbMatBlocks x;
 
+  PetscFunctionBeginUser;
+  PetscCall(SbMatrixGetAssembly(A, &own));
+  if (own) {
+    if (own->finish) PetscCall((own->finish)(A));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(SbValuesBegin(A, &x));
+  /* clear rows and columns of prescribed unknowns, keeping the magnitude on the diagonal */
   for (PetscInt n = 0; n < p->nfix; n++) {
     const int rows = p->fix_mask[n] & 7, columns = (p->fix_mask[n] >> 3) & 7, diagonal = p->fix_mask[n] & 64;
     size_t rs, cs;
     PetscScalar *v;
 
-    if (x->kind == SB_MATRIX_SBAIJ && p->fix_block[n] < p->diagonal[p->fix_row[n]]) continue;
-    v = sb_block(x, p, p->fix_row[n], p->fix_block[n], &rs, &cs);
+    if (x.symmetric && p->fix_block[n] < p->diagonal[p->fix_row[n]]) continue;
+    v = sb_block(&x, p, p->fix_row[n], p->fix_block[n], &rs, &cs);
     for (int i = 0; i < 3; i++) {
       for (int j = 0; j < 3; j++) {
         PetscScalar *e = v + (size_t)i * rs + (size_t)j * cs;
@@ -517,24 +476,9 @@ static void clear_fixed(SbSpace s, const SbValues *x)
       }
     }
   }
-}
-
-PetscErrorCode SbSpaceFinishTangent(SbSpace s, Mat A)
-{
-  const SbAssembly *own;
-  SbValues x;
-
-  PetscFunctionBeginUser;
-  PetscCall(get_assembly(A, &own));
-  if (own) {
-    if (own->finish) PetscCall((own->finish)(A));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(SbValuesBegin(A, &x));
-  clear_fixed(s, &x);
   if (s->constraints) SbConstraintsFinishTangent(s, &x);
   PetscCall(SbValuesEnd(&x));
-  /* local assembly of the parts invalidates their cached diagonals; of the parallel matrix only the state is increased */
+  /* assembly of the parts invalidates their cached diagonals; of the parallel one the state is enough */
   for (int q = 0; q < 2 && x.part[q]; q++) {
     PetscCall(MatAssemblyBegin(x.part[q], MAT_FINAL_ASSEMBLY));
     PetscCall(MatAssemblyEnd(x.part[q], MAT_FINAL_ASSEMBLY));

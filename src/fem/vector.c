@@ -1,7 +1,10 @@
 /*
-  Vectors of a space: the storage of a ghosted PETSc vector is the local array that the kernels read, owned nodes first.
+  Vectors of a space: the storage of a ghosted vector is the local array of the kernels, owned nodes first.
+  Reading updates the ghosts; writing does not communicate. On one rank vectors are plain sequential ones.
 
-  Reading updates the ghosts; writing does not communicate. On one rank there are no ghosts, and vectors are plain sequential ones.
+  Prescribed unknowns stay in the system, so that the block size is three everywhere: their rows are u =
+  prescribed (see tangent.c for the matrix). The initial guess of every solve has the prescribed values, so
+  that their residual is zero and their effect on free unknowns is in the right-hand side.
 */
 #include "fem_impl.h"
 
@@ -25,14 +28,6 @@ PetscErrorCode SbSpaceGetLocalRead(SbSpace s, Vec v, const PetscReal **array)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSpaceRestoreLocalRead(SbSpace s, Vec v, const PetscReal **array)
-{
-  PetscFunctionBeginUser;
-  (void)s;
-  PetscCall(VecRestoreArrayRead(v, array));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbSpaceGetLocalWrite(SbSpace s, Vec v, PetscReal **array)
 {
   PetscFunctionBeginUser;
@@ -48,29 +43,49 @@ PetscErrorCode SbSpaceGetLocalWrite(SbSpace s, Vec v, PetscReal **array)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSpaceRestoreLocalWrite(SbSpace s, Vec v, PetscReal **array)
-{
-  PetscFunctionBeginUser;
-  (void)s;
-  PetscCall(VecRestoreArray(v, array));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbSpaceUpdateGhosts(SbSpace s, PetscReal x[])
 {
   const PetscReal *all;
-  PetscScalar *own;
-  Vec v;
 
   PetscFunctionBeginUser;
   if (!s->ghosted) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbSpaceCreateVec(s, &v));
-  PetscCall(VecGetArrayWrite(v, &own));
-  PetscCall(PetscArraycpy(own, x, 3 * s->nnode_owned));
-  PetscCall(VecRestoreArrayWrite(v, &own));
-  PetscCall(SbSpaceGetLocalRead(s, v, &all));
-  PetscCall(PetscArraycpy(x, all, 3 * s->nnode));
-  PetscCall(SbSpaceRestoreLocalRead(s, v, &all));
-  PetscCall(VecDestroy(&v));
+  PetscCall(VecPlaceArray(s->template_vec, x));
+  PetscCall(SbSpaceGetLocalRead(s, s->template_vec, &all));
+  PetscCall(SbSpaceRestoreLocalRead(s, s->template_vec, &all));
+  PetscCall(VecResetArray(s->template_vec));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpacePrescribe(SbSpace s, PetscInt node, int components)
+{
+  PetscFunctionBeginUser;
+  PetscCheck(!s->fixed_node, PETSC_COMM_SELF, PETSC_ERR_ORDER,
+             "Unknowns can be prescribed during set-up only");
+  s->fixed[node] |= (uint8_t)(components & 7);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpacePrescribeDone(SbSpace s)
+{
+  PetscFunctionBeginUser;
+  s->nfixed = 0;
+  for (PetscInt i = 0; i < s->nnode; i++) s->nfixed += s->fixed[i] != 0;
+  PetscCall(PetscCalloc2(s->nfixed, &s->fixed_node, 3 * s->nfixed, &s->fixed_value));
+  s->nfixed = 0;
+  for (PetscInt i = 0; i < s->nnode; i++) {
+    if (s->fixed[i]) s->fixed_node[s->nfixed++] = i;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceZeroPrescribed(SbSpace s, PetscBool prescribed, Vec X)
+{
+  PetscScalar *x;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArray(X, &x));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
+    if (prescribed == ((s->fixed[i / 3] >> i % 3) & 1)) x[i] = 0.;
+  PetscCall(VecRestoreArray(X, &x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -258,8 +258,8 @@ PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, V
   PetscCall(PetscCalloc1(model->nbody, &sum));
   PetscCall(PetscMalloc2(model->nmaterial, &G, model->nmaterial, &K));
   for (PetscInt k = 0; k < model->nmaterial; k++) {
-    G[k] = model->material[k]->ops.shear_modulus(model->material[k]);
-    K[k] = model->material[k]->ops.bulk_modulus(model->material[k]);
+    G[k] = model->material[k]->mu;
+    K[k] = SbMaterialBulkModulus(model->material[k]);
   }
   for (PetscInt c = 0; c < model->mesh->ncell_owned; c++) {
     const PetscInt k = model->mesh->cell_material[c], body = model->mesh->cell_body[c];

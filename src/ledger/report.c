@@ -153,7 +153,7 @@ static void say_quadratic(SbLedger l, PetscReal cost_of_half, char w[ROOM])
   /* not for P2 itself, nor for explicit runs, whose steps the smallest distance of nodes bounds */
   if (nodes[1] || !l->run->J) return;
   /* nu > 0.45: P1 locks, its errors do not decrease with the mesh size */
-  if (nodes[0] && law->ops.bulk_modulus(law) > 9.7 * law->ops.shear_modulus(law)) {
+  if (nodes[0] && SbMaterialBulkModulus(law) > 9.7 * law->mu) {
     SbAppend(ROOM, w,
              "At this Poisson's ratio P1 locks, finer meshes help little: -body_%s_element %s does not. ",
              m->body[body].name, m->nbegin_step || m->npotential ? "cr" : "p2 (or cr)");

@@ -1,15 +1,15 @@
 /*
-  Co-rotated elasticity: F = R S with the rotation R of SbPolar(), psi = mu |F - R|^2 + lambda/2 (R : F - 3)^2.
+  Co-rotated: F = R S with the rotation R of SbPolar(), psi = mu |F - R|^2 + lambda/2 (R : F - 3)^2.
 
-  P = 2 mu (F - R) + lambda tr(S - I) R is its exact gradient: R is stationary for R : F, so dR drops out of dpsi.
+  P = 2 mu (F - R) + lambda tr(S - I) R is its gradient: R is stationary for R : F, so dR drops out of dpsi.
 
   Tangents. With q = tr(S), kappa = lambda (q - 3) - 2 mu,
     dP = 2 mu dF + lambda (R : dF) R + kappa dR,   dR = R [w]x,   (q I - S) w = axial(R^T dF - dF^T R),
-  which follows from R^T F staying symmetric. This is `exact`. The eigenvalues of dP/dF are 2 mu, 2 mu + 3 lambda and, for
-  the twist about the principal axis k, 2 mu + 2 kappa / (q - s_k) with q - s_k = s_i + s_j >= 0 (Smith, de Goes, Kim,
-  "Analytic eigensystems for isotropic distortion energies", 2019, section 4.1): only the twists can be negative, and
-  `exact_spd` raises those to zero by limiting kappa / (s_i + s_j) to -mu. `warped` leaves out kappa dR and replaces the
-  identity by its symmetric part in the rotated frame: Hooke's tensor rotated by R.
+  which follows from R^T F staying symmetric. This is `exact`. The eigenvalues of dP/dF are 2 mu, 2 mu + 3
+  lambda and, for the twist about the principal axis k, 2 mu + 2 kappa / (q - s_k) with q - s_k = s_i + s_j >=
+  0 (Smith, de Goes, Kim, "Analytic eigensystems for isotropic distortion energies", 2019, section 4.1): only
+  the twists can be negative, and `exact_spd` raises those to zero by limiting kappa / (s_i + s_j) to -mu.
+  `warped` leaves out kappa dR, and takes the symmetric part of the identity in this frame: Hooke's tensor.
 
   Where s_i + s_j = 0 the rotation and the force are discontinuous: `exact` bounds the determinant of
   (q I - S) from below, `exact_spd` each s_i + s_j.
@@ -21,7 +21,7 @@
 
 SB_KERNEL static void energy_corotated(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack psi)
 {
-  const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
+  const PetscReal mu = m->mu, lambda = m->lambda;
   SbPack R[9];
 
   SbPolar(F, R);
@@ -39,7 +39,7 @@ SB_KERNEL static void energy_corotated(const struct _p_SbMaterial *m, const SbPa
 SB_KERNEL static void stress_corotated(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                        SbPack P[restrict 9])
 {
-  const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
+  const PetscReal mu = m->mu, lambda = m->lambda;
   SbPack R[9];
 
   SbPolar(F, R);
@@ -63,7 +63,7 @@ SB_KERNEL static void pressure_corotated(const struct _p_SbMaterial *m, const Sb
 
     SbPackGet(9, F, l, f);
     SbPackGet(9, R, l, r);
-    p[l] = -sb_lame(m)->lambda * (SbDot9(r, f) - 3);
+    p[l] = -m->lambda * (SbDot9(r, f) - 3);
   }
 }
 
@@ -74,24 +74,14 @@ static void frame_corotated(const struct _p_SbMaterial *m, const SbPack F[9], Sb
 }
 
 /* S = sym(R^T F) as 00 01 02 11 12 22, kappa. */
-SB_KERNEL static void stretch(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+SB_KERNEL static void stretch(PetscReal lambda, PetscReal mu, const SbPack F[restrict 9],
                               const SbPack R[restrict 9], SbPack S[restrict 6], SbPack kappa)
 {
-  const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
-
   for (int l = 0; l < SB_BATCH; l++) {
-    PetscReal f[9], r[9], s[9];
+    PetscReal r[9];
 
-    SbPackGet(9, F, l, f);
-    SbPackGet(9, R, l, r);
-    SbMatTransposeMul(r, f, s);
-    S[0][l] = s[0];
-    S[1][l] = (s[1] + s[3]) / 2;
-    S[2][l] = (s[2] + s[6]) / 2;
-    S[3][l] = s[4];
-    S[4][l] = (s[5] + s[7]) / 2;
-    S[5][l] = s[8];
-    kappa[l] = lambda * (s[0] + s[4] + s[8] - 3) - 2 * mu;
+    SbStretchTensor(F, R, l, r, S);
+    kappa[l] = lambda * (S[0][l] + S[3][l] + S[5][l] - 3) - 2 * mu;
   }
 }
 
@@ -141,13 +131,13 @@ SB_KERNEL static void twist_spd(PetscReal mu, const SbPack S[restrict 6], const 
 }
 
 /*
-  C = 2 mu identity + lambda R R + Z W Z^T with the columns R [e_n]x of Z: in row (i, j) only columns j+1 and j+2 (cyclic)
-  are nonzero, -R_i,j+2 and R_i,j+1.
+  C = 2 mu identity + lambda R R + Z W Z^T with the columns R [e_n]x of Z: in row (i, j) only columns j+1 and
+  j+2 (cyclic) are nonzero, -R_i,j+2 and R_i,j+1.
 */
 SB_KERNEL static void add_modes(const struct _p_SbMaterial *m, const SbPack R[restrict 9],
                                 const SbPack W[restrict 9], SbPack C[restrict 81])
 {
-  const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
+  const PetscReal mu = m->mu, lambda = m->lambda;
   SbPack ZW[27];
 
   for (int l = 0; l < SB_BATCH; l++) {
@@ -182,9 +172,9 @@ static void spin_corotated(const struct _p_SbMaterial *m, const SbPack F[9], SbP
   SbPack S[6], kappa;
 
   SbPolar(F, R);
-  stretch(m, F, (const SbPack *)R, S, kappa);
+  stretch(m->lambda, m->mu, F, (const SbPack *)R, S, kappa);
   if (m->tangent == SB_TANGENT_EXACT_SPD)
-    twist_spd(sb_lame(m)->mu, (const SbPack *)S, kappa, W);
+    twist_spd(m->mu, (const SbPack *)S, kappa, W);
   else
     twist_exact((const SbPack *)S, kappa, W);
 }
@@ -206,22 +196,10 @@ static PetscErrorCode settangent_corotated(SbMaterial m, SbTangentKind kind)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode setfromoptions_corotated(SbMaterial m, const SbScope *scope)
-{
-  PetscInt kind;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionChoice(scope, "tangent", &kind));
-  m->adaptive = (PetscBool)(kind == 0);
-  PetscCall(SbMaterialSetTangent(m, m->adaptive ? SB_TANGENT_EXACT_SPD : (SbTangentKind)(kind - 1)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbMaterialCreate_Corotated(SbMaterial m)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbMaterialSetHooke(m));
-  m->ops.setfromoptions = setfromoptions_corotated;
+  m->ops.setfromoptions = SbMaterialSetFromOptions_Tangent;
   m->ops.settangent = settangent_corotated;
   m->ops.energy = energy_corotated;
   m->ops.stress = stress_corotated;
@@ -229,7 +207,6 @@ PetscErrorCode SbMaterialCreate_Corotated(SbMaterial m)
   m->ops.frame = frame_corotated;
   m->ops.tangent = tangent_corotated;
   m->ops.volumetric = frame_corotated;
-  m->symmetric = PETSC_TRUE;
   m->tangent = SB_TANGENT_WARPED;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

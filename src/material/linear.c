@@ -1,7 +1,7 @@
 /*
-  Linear elasticity: sigma = 2 mu eps + lambda tr(eps) I with eps = sym(F) - I, psi = mu eps : eps + lambda/2 tr(eps)^2.
+  Linear: sigma = 2 mu eps + lambda tr(eps) I with eps = sym(F) - I, psi = mu eps : eps + lambda/2 tr(eps)^2.
 
-  For small strains and small rotations only: a rotation by t has the spurious strain cos(t) - 1. The tangent is constant.
+  For small strains and small rotations only: a rotation by t has a strain cos(t) - 1. Constant tangent.
 */
 #include "material_impl.h"
 
@@ -18,7 +18,7 @@ SB_INLINE void strain(const SbPack F[9], int l, PetscReal e[9])
 
 SB_KERNEL static void energy_linear(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack psi)
 {
-  const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
+  const PetscReal mu = m->mu, lambda = m->lambda;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal e[9];
@@ -32,7 +32,7 @@ SB_KERNEL static void energy_linear(const struct _p_SbMaterial *m, const SbPack 
 SB_KERNEL static void stress_linear(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                     SbPack P[restrict 9])
 {
-  const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
+  const PetscReal mu = m->mu, lambda = m->lambda;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal e[9];
@@ -45,8 +45,7 @@ SB_KERNEL static void stress_linear(const struct _p_SbMaterial *m, const SbPack 
 
 SB_KERNEL static void pressure_linear(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack p)
 {
-  for (int l = 0; l < SB_BATCH; l++)
-    p[l] = -sb_lame(m)->lambda * ((F[0][l] - 1) + (F[4][l] - 1) + (F[8][l] - 1));
+  for (int l = 0; l < SB_BATCH; l++) p[l] = -m->lambda * ((F[0][l] - 1) + (F[4][l] - 1) + (F[8][l] - 1));
 }
 
 static void frame_linear(const struct _p_SbMaterial *m, const SbPack F[9], SbPack R[9])
@@ -64,8 +63,7 @@ static void tangent_linear(const struct _p_SbMaterial *m, const SbPack F[9], SbP
   for (int i = 0; i < 9; i++) {
     for (int k = 0; k < 9; k++) {
       const int turned = 3 * (k % 3) + k / 3;
-      const PetscReal c =
-        sb_lame(m)->mu * ((i == k) + (i == turned)) + sb_lame(m)->lambda * (i % 4 == 0 && k % 4 == 0);
+      const PetscReal c = m->mu * ((i == k) + (i == turned)) + m->lambda * (i % 4 == 0 && k % 4 == 0);
 
       for (int l = 0; l < SB_BATCH; l++) C[9 * i + k][l] = c;
     }
@@ -75,7 +73,6 @@ static void tangent_linear(const struct _p_SbMaterial *m, const SbPack F[9], SbP
 PetscErrorCode SbMaterialCreate_Linear(SbMaterial m)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbMaterialSetHooke(m));
   m->ops.energy = energy_linear;
   m->ops.stress = stress_linear;
   m->ops.pressure = pressure_linear;
@@ -83,7 +80,6 @@ PetscErrorCode SbMaterialCreate_Linear(SbMaterial m)
   m->ops.tangent = tangent_linear;
   m->ops.volumetric = frame_linear;
   m->linear = PETSC_TRUE;
-  m->symmetric = PETSC_TRUE;
   m->tangent = SB_TANGENT_EXACT;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,12 +1,29 @@
 /*
-  Creation of material laws by name, and functions shared by several laws: Hooke's stiffness at rest, two exact tangents, damping.
+  Creation of material laws by name, their options, and functions shared by several laws: tangents, damping.
 
-  Lame parameters: mu = E / (2 (1 + nu)), lambda = E nu / ((1 + nu) (1 - 2 nu)).
+  Lame parameters at rest: mu = E / (2 (1 + nu)), lambda = E nu / ((1 + nu) (1 - 2 nu)).
 */
 #include "material_impl.h"
 #include "sblog.h"
 
 PetscFunctionList SbMaterialList = NULL;
+
+static const SbOption body_rows[] = {
+  {"young", SB_OPTION_REAL, 1, "Pa", NULL, "(0, inf)", "Young's modulus"},
+  {"poisson", SB_OPTION_REAL, 1, "", NULL, "(-1, 0.5)",
+   "Poisson's ratio; soft tissue is near 0.5, where p1 elements lock"},
+  {"density", SB_OPTION_REAL, 1, "kg/m^3", "1000", "(0, inf)",
+   "mass per volume in the reference configuration"},
+};
+static const SbOption corotated_rows[] = {
+  {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|warped|exact|exact_spd",
+   "tangent stiffness: warped, Hooke's tensor rotated with the cell (stiffness warping, positive definite); "
+   "exact; exact_spd, exact with each cell projected to positive semi-definite"},
+};
+static const SbOption exact_rows[] = {
+  {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|exact|exact_spd",
+   "tangent stiffness: exact; exact_spd, exact with each cell projected to positive semi-definite, for CG"},
+};
 
 static PetscErrorCode destroy_list(void)
 {
@@ -23,6 +40,18 @@ PetscErrorCode SbMaterialRegister(const char *law, PetscErrorCode (*create)(SbMa
   PetscCall(PetscFunctionListAdd(&SbMaterialList, law, create));
   if (nrows) PetscCall(SbOptionsRegister("body", law, nrows, rows));
   if (nrows) PetscCall(SbOptionsRegister("inclusion", law, nrows, rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMaterialRegisterAll(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
+  PetscCall(SbOptionsRegister("inclusion", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
+  PetscCall(SbMaterialRegister("linear", SbMaterialCreate_Linear, 0, NULL));
+  PetscCall(SbMaterialRegister("corotated", SbMaterialCreate_Corotated, 1, corotated_rows));
+  PetscCall(SbMaterialRegister("stvk", SbMaterialCreate_StVK, 1, exact_rows));
+  PetscCall(SbMaterialRegister("neohookean", SbMaterialCreate_NeoHookean, 1, exact_rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -51,6 +80,8 @@ static PetscErrorCode create_law(const char *law, PetscReal E, PetscReal nu, Pet
   PetscCall(SbLogNamed("Mat", law, &m->event));
   m->E = E;
   m->nu = nu;
+  m->mu = E / (2 * (1 + nu));
+  m->lambda = E * nu / ((1 + nu) * (1 - 2 * nu));
   m->density = density;
   PetscCall((*create)(m));
   *material = m;
@@ -87,7 +118,6 @@ PetscErrorCode SbMaterialDestroy(SbMaterial *m)
   PetscFunctionBeginUser;
   if (!*m) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbMaterialDestroy(&(*m)->shear));
-  PetscCall(PetscFree((*m)->data));
   PetscCall(PetscFree(*m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -96,7 +126,7 @@ PetscErrorCode SbMaterialGetShear(SbMaterial m, SbMaterial *shear)
 {
   PetscFunctionBeginUser;
   if (!m->shear) {
-    PetscCall(SbMaterialCreateElastic(m->law, 2 * m->ops.shear_modulus(m), 0., m->density, &m->shear));
+    PetscCall(SbMaterialCreateElastic(m->law, 2 * m->mu, 0., m->density, &m->shear));
     PetscCall(SbMaterialSetTangent(m->shear, m->tangent));
   }
   *shear = m->shear;
@@ -125,74 +155,34 @@ PetscErrorCode SbMaterialSetTangent_Exact(SbMaterial m, SbTangentKind kind)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMaterialSetFromOptions_Exact(SbMaterial m, const SbScope *scope)
+PetscErrorCode SbMaterialSetFromOptions_Tangent(SbMaterial m, const SbScope *scope)
 {
+  const PetscInt first = m->tangent == SB_TANGENT_WARPED ? SB_TANGENT_WARPED : SB_TANGENT_EXACT;
   PetscInt choice;
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionChoice(scope, "tangent", &choice));
   m->adaptive = (PetscBool)(choice == 0);
-  PetscCall(SbMaterialSetTangent(m, choice == 1 ? SB_TANGENT_EXACT : SB_TANGENT_EXACT_SPD));
+  PetscCall(
+    SbMaterialSetTangent(m, m->adaptive ? SB_TANGENT_EXACT_SPD : (SbTangentKind)(first + choice - 1)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscReal shear_modulus_hooke(const struct _p_SbMaterial *m)
+SB_KERNEL void SbMaterialDampingStress(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
+                                       const SbPack H[restrict 9], SbPack dP[restrict 9])
 {
-  return sb_lame(m)->mu;
-}
+  const PetscReal lambda = m->lambda, mu = m->mu;
+  SbPack R[9];
 
-static PetscReal bulk_modulus_hooke(const struct _p_SbMaterial *m)
-{
-  return sb_lame(m)->lambda + 2 * sb_lame(m)->mu / 3;
-}
-
-static PetscReal volumetric_modulus_hooke(const struct _p_SbMaterial *m)
-{
-  return sb_lame(m)->lambda;
-}
-
-static PetscReal wave_speed_hooke(const struct _p_SbMaterial *m)
-{
-  return sqrt((sb_lame(m)->lambda + 2 * sb_lame(m)->mu) / m->density);
-}
-
-PetscErrorCode SbMaterialSetHooke(SbMaterial m)
-{
-  SbLame *lame;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscNew(&lame));
-  lame->mu = m->E / (2 * (1 + m->nu));
-  lame->lambda = m->E * m->nu / ((1 + m->nu) * (1 - 2 * m->nu));
-  m->data = lame;
-  m->ops.shear_modulus = shear_modulus_hooke;
-  m->ops.bulk_modulus = bulk_modulus_hooke;
-  m->ops.volumetric_modulus = volumetric_modulus_hooke;
-  m->ops.wave_speed = wave_speed_hooke;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* dP = mu (H + R H^T R) + lambda (R : H) R */
-SB_KERNEL static void turned_hooke(PetscReal lambda, PetscReal mu, const SbPack R[restrict 9],
-                                   const SbPack H[restrict 9], SbPack dP[restrict 9])
-{
+  SbMaterialRotation(m, F, R);
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal r[9], h[9], b[9], t[9];
 
-    SbPackGet(9, R, l, r);
+    SbPackGet(9, (const SbPack *)R, l, r);
     SbPackGet(9, H, l, h);
     SbMatTransposeMul(h, r, b);
     SbMatMul(r, b, t);
     const PetscReal p = lambda * (b[0] + b[4] + b[8]);
     for (int k = 0; k < 9; k++) dP[k][l] = mu * (h[k] + t[k]) + p * r[k];
   }
-}
-
-void SbMaterialDampingStress(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack H[9],
-                             SbPack dP[9])
-{
-  SbPack R[9];
-
-  SbMaterialRotation(m, F, R);
-  turned_hooke(m->ops.volumetric_modulus(m), m->ops.shear_modulus(m), (const SbPack *)R, H, dP);
 }

@@ -1,5 +1,5 @@
 /*
-  material_impl.h - shared by the laws: constructors, Hooke's stiffness at rest, projection of an isotropic tangent.
+  material_impl.h - shared by the laws: constructors, options, projection of an isotropic tangent.
 */
 #pragma once
 #include <sbmaterial.h>
@@ -9,30 +9,28 @@ PetscErrorCode SbMaterialCreate_Corotated(SbMaterial m);
 PetscErrorCode SbMaterialCreate_StVK(SbMaterial m);
 PetscErrorCode SbMaterialCreate_NeoHookean(SbMaterial m);
 
-/* Lame parameters, Pa. */
-typedef struct {
-  PetscReal lambda, mu;
-} SbLame;
-
-/*
-  SbMaterialSetHooke - sets m->data to an SbLame from E and nu, and the law's operations for its stiffness.
-
-  Not collective. Sets shear_modulus, bulk_modulus, volumetric_modulus and wave_speed of the table. For laws with Hooke's tensor as tangent
-  at rest; other laws set their own operations.
-*/
-PetscErrorCode SbMaterialSetHooke(SbMaterial m);
-/* Lame parameters of a law that called SbMaterialSetHooke(). */
-SB_INLINE const SbLame *sb_lame(const struct _p_SbMaterial *m)
-{
-  return (const SbLame *)m->data;
-}
-
-/* Options of laws with the tangents exact and exact_spd: reads and checks `tangent`. */
-PetscErrorCode SbMaterialSetFromOptions_Exact(SbMaterial m, const SbScope *scope);
+/* Reads `tangent`: auto, then the tangents of the law, all or, without a warped one, the two exact ones. */
+PetscErrorCode SbMaterialSetFromOptions_Tangent(SbMaterial m, const SbScope *scope);
 PetscErrorCode SbMaterialSetTangent_Exact(SbMaterial m, SbTangentKind kind);
 
+/* r = R of a lane, S = sym(R^T F) as 00 01 02 11 12 22. */
+SB_INLINE void SbStretchTensor(const SbPack F[9], const SbPack R[9], int l, PetscReal r[9], SbPack S[6])
+{
+  PetscReal f[9], s[9];
+
+  SbPackGet(9, F, l, f);
+  SbPackGet(9, R, l, r);
+  SbMatTransposeMul(r, f, s);
+  S[0][l] = s[0];
+  S[1][l] = (s[1] + s[3]) / 2;
+  S[2][l] = (s[2] + s[6]) / 2;
+  S[3][l] = s[4];
+  S[4][l] = (s[5] + s[7]) / 2;
+  S[5][l] = s[8];
+}
+
 /*
-  SbSpectralTangent - tangent C[81] of an isotropic energy psi(s0, s1, s2), with negative eigenvalues set to zero.
+  SbSpectralTangent - tangent C[81] of an isotropic energy psi(s0, s1, s2), negative eigenvalues set to zero.
 
   Input, Pa, with (i, j, k) cyclic: hessian[6] = d^2 psi / ds_i ds_j as 00 01 02 11 12 22;
     flip[k]  = (psi_i - psi_j) / (s_i - s_j), eigenvalue of the symmetric shear of the axes i and j;

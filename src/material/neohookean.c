@@ -1,31 +1,31 @@
 /*
-  Stable neo-Hookean material of Smith, de Goes and Kim ("Stable neo-Hookean flesh simulation", 2018, equation 14, with the
-  logarithmic term that makes F = 0 no stationary point). With I1 = |F|^2, J = det F:
+  Stable neo-Hookean material of Smith, de Goes and Kim ("Stable neo-Hookean flesh simulation", 2018, equation
+  14, with the logarithmic term that makes F = 0 no stationary point). With I1 = |F|^2, J = det F:
 
     psi = a/2 (I1 - 3) - a/2 log((I1 + 1)/4) + b/2 (J - 1)^2 - 3a/4 (J - 1)
     P   = a (1 - 1/(I1 + 1)) F + (b (J - 1) - 3a/4) cof F
 
-  which is their energy with alpha = 1 + 3a/(4b), less a constant. F = I is stress-free, and psi is finite for every F,
-  including inverted ones, which it drives back. Linearised at F = I, dP = 3a/4 (H + H^T) + (b - 5a/8) tr(H) I, so that
+  which is their energy with alpha = 1 + 3a/(4b), less a constant. F = I is stress-free, and psi is finite for
+  every F, also an inverted one. Linearised at F = I, dP = 3a/4 (H + H^T) + (b - 5a/8) tr(H) I, so that
 
     a = 4/3 mu,   b = lambda + 5/6 mu
 
-  make the small-strain limit exactly Hooke's law with (E, nu), for every nu in (-1, 0.5) (b > 0 there). This b is for psi with
-  the log term; without it the constants differ.
+  make the small-strain limit exactly Hooke's law with (E, nu), for every nu in (-1, 0.5) (b > 0 there). This
+  b is for psi with the log term; without it the constants differ.
 
   Tangent, exact: with g = 1/(I1 + 1), p = b (J - 1) - 3a/4, c = cof F
-    dP/dF = a (1 - g) identity + 2 a g^2 F F + b c c + p d(cof F)/dF,   d(cof F)_ij/dF_kl = eps_ikm eps_jln F_mn.
+    dP/dF = a (1 - g) identity + 2 a g^2 F F + b c c + p d(cof F)/dF (SbAddCofactorTangent()).
   In signed stretches: flips a (1 - g) - p s_k, twists a (1 - g) + p s_k (section 4 of the paper).
 */
 #include "material_impl.h"
 
 /*
   Energy from H = F - I, whose first-order terms cancel: with x = (I1 - 3)/4, I1 - 3 = 2 tr H + |H|^2 and
-  J - 1 = tr H + h2 + det H (h2: sum of the principal 2x2 minors) inserted, there is no cancellation at small strains.
+  J - 1 = tr H + h2 + det H (h2: sum of the principal 2x2 minors) inserted, nothing cancels at small strains.
 */
 SB_KERNEL static void energy_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack psi)
 {
-  const PetscReal a = 4 * sb_lame(m)->mu / 3, b = sb_lame(m)->lambda + 5 * sb_lame(m)->mu / 6;
+  const PetscReal a = 4 * m->mu / 3, b = m->lambda + 5 * m->mu / 6;
   SbPack x;
 
   for (int l = 0; l < SB_BATCH; l++) {
@@ -47,7 +47,7 @@ SB_KERNEL static void energy_neohookean(const struct _p_SbMaterial *m, const SbP
 SB_KERNEL static void stress_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                         SbPack P[restrict 9])
 {
-  const PetscReal a = 4 * sb_lame(m)->mu / 3, b = sb_lame(m)->lambda + 5 * sb_lame(m)->mu / 6;
+  const PetscReal a = 4 * m->mu / 3, b = m->lambda + 5 * m->mu / 6;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], c[9];
@@ -70,14 +70,14 @@ SB_KERNEL static void pressure_neohookean(const struct _p_SbMaterial *m, const S
     h[4] -= 1;
     h[8] -= 1;
     SbMatCofactor(h, c);
-    p[l] = -sb_lame(m)->lambda * (h[0] + h[4] + h[8] + c[0] + c[4] + c[8] + SbDot3(h, c));
+    p[l] = -m->lambda * (h[0] + h[4] + h[8] + c[0] + c[4] + c[8] + SbDot3(h, c));
   }
 }
 
 SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                     SbPack C[restrict 81])
 {
-  const PetscReal a = 4 * sb_lame(m)->mu / 3, b = sb_lame(m)->lambda + 5 * sb_lame(m)->mu / 6;
+  const PetscReal a = 4 * m->mu / 3, b = m->lambda + 5 * m->mu / 6;
   SbPack cof[9], pF[9], shear, stretch;
 
   for (int l = 0; l < SB_BATCH; l++) {
@@ -110,7 +110,7 @@ SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbPack 
 SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                   SbPack C[restrict 81])
 {
-  const PetscReal a = 4 * sb_lame(m)->mu / 3, b = sb_lame(m)->lambda + 5 * sb_lame(m)->mu / 6;
+  const PetscReal a = 4 * m->mu / 3, b = m->lambda + 5 * m->mu / 6;
   SbPack U[9], V[9], s[3], hessian[6], flip[3], twist[3];
 
   SbStretches(F, U, s, V);
@@ -154,10 +154,8 @@ SB_KERNEL static void volumetric_neohookean(const struct _p_SbMaterial *m, const
   }
 }
 
-SB_KERNEL static void curvature_neohookean(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
-                                           const SbPack p, SbPack C[restrict 81])
+SB_KERNEL void SbAddCofactorTangent(const SbPack F[restrict 9], const SbPack p, SbPack C[restrict 81])
 {
-  (void)m;
   for (int ij = 0; ij < 9; ij++) {
     for (int kl = 0; kl < 9; kl++) {
       const int row = (kl / 3 - ij / 3 + 3) % 3, column = (kl % 3 - ij % 3 + 3) % 3;
@@ -169,11 +167,17 @@ SB_KERNEL static void curvature_neohookean(const struct _p_SbMaterial *m, const 
   }
 }
 
+static void curvature_neohookean(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack p,
+                                 SbPack C[81])
+{
+  (void)m;
+  SbAddCofactorTangent(F, p, C);
+}
+
 PetscErrorCode SbMaterialCreate_NeoHookean(SbMaterial m)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbMaterialSetHooke(m));
-  m->ops.setfromoptions = SbMaterialSetFromOptions_Exact;
+  m->ops.setfromoptions = SbMaterialSetFromOptions_Tangent;
   m->ops.settangent = SbMaterialSetTangent_Exact;
   m->ops.energy = energy_neohookean;
   m->ops.stress = stress_neohookean;
@@ -182,7 +186,6 @@ PetscErrorCode SbMaterialCreate_NeoHookean(SbMaterial m)
   m->ops.volumetric = volumetric_neohookean;
   m->ops.curvature = curvature_neohookean;
   m->jacobian = PETSC_TRUE;
-  m->symmetric = PETSC_TRUE;
   m->tangent = SB_TANGENT_EXACT;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

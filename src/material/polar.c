@@ -1,22 +1,23 @@
 /*
   Polar rotation of 3x3 matrices.
 
-  R maximises R : F over all rotations. With R written as a unit quaternion q this is q^T N q with a symmetric traceless
-  4x4 matrix N linear in F (Davenport's q-method; Horn, "Closed-form solution of absolute orientation using unit
-  quaternions", 1987), so q is the eigenvector of the largest eigenvalue. In terms of the signed stretches s1 >= s2 >= |s3|
-  that eigenvalue is lambda = s1 + s2 + s3 = tr(R^T F), and the gap to the next one is 2 (s2 + s3). Reflections, singular F
-  and rotations by any angle need no special case; only a small gap is difficult, where R itself is ill-conditioned.
+  R maximises R : F over all rotations. With R written as a unit quaternion q this is q^T N q with a symmetric
+  traceless 4x4 matrix N linear in F (Davenport's q-method; Horn, "Closed-form solution of absolute
+  orientation using unit quaternions", 1987), so q is the eigenvector of the largest eigenvalue. In terms of
+  the signed stretches s1 >= s2 >= |s3| that eigenvalue is lambda = s1 + s2 + s3 = tr(R^T F), and the gap to
+  the next one is 2 (s2 + s3). Reflections, singular F and rotations by any angle need no special case; only a
+  small gap is difficult, where R itself is ill-conditioned.
 
-  Fast path, vectorised over the lanes and without branches, after Higham and Noferini ("An algorithm to compute the polar
-  decomposition of a 3x3 matrix", 2016), with the adjugate instead of a factorisation:
-    1. lambda is the largest root of  p(x) = x^4 - 2 a x^2 - 8 d x + a^2 - 4 b,  a = |F|^2, d = det F, b = |cof F|^2. All
-       four roots are real: Laguerre's method converges to it monotonically from the upper bound sqrt(3 a), with
-       order three. For F = I the bound is the root.
-    2. adj(lambda I - N) is q q^T times p'(lambda) up to the error of lambda: its column with the largest diagonal entry
+  Fast path, vectorised over the lanes and without branches, after Higham and Noferini ("An algorithm to
+  compute the polar decomposition of a 3x3 matrix", 2016), with the adjugate instead of a factorisation:
+    1. lambda is the largest root of p(x) = x^4 - 2 a x^2 - 8 d x + a^2 - 4 b, a = |F|^2, d = det F,
+       b = |cof F|^2. All four roots are real: Laguerre's method converges to it monotonically from the
+       upper bound sqrt(3 a), with order three. For F = I the bound is the root.
+    2. adj(lambda I - N) is q q^T times p'(lambda) up to the error of lambda: its column of the largest entry
        is the result of one inverse iteration; multiplying this column by the adjugate is a second one.
-  A lane is accepted if the gap is not small (p' = 8 (s1+s2)(s2+s3)(s3+s1) relative to lambda^3) and the last Laguerre step
-  was so short that the error is below rounding. Other lanes are computed one by one by the robust path:
-  Jacobi's method on N, which is accurate to rounding for any symmetric matrix.
+  A lane is accepted if the gap is not small (p' = 8 (s1+s2)(s2+s3)(s3+s1) relative to lambda^3) and the last
+  Laguerre step was so short that the error is below rounding. Other lanes are computed one by one by the
+  robust path: Jacobi's method on N, which is accurate to rounding for any symmetric matrix.
 */
 #include <sbkernel.h>
 
@@ -56,7 +57,7 @@ SB_INLINE void quaternion_rotation(const PetscReal q[4], PetscReal R[9])
   R[8] = 1 - (sx * x + sy * y);
 }
 
-/* Adjugate of a symmetric 4x4 matrix, both as 00 01 02 03 11 12 13 22 23 33, by 2x2 minors of two pairs of rows. */
+/* Adjugate of a symmetric 4x4 matrix, both as 00 01 02 03 11 12 13 22 23 33, by minors of pairs of rows. */
 SB_INLINE void adjugate4(const PetscReal M[10], PetscReal A[10])
 {
   /* rows 0 and 1: column pairs 01 02 03 12 13 23; rows 2 and 3: 02 03 12 13 23 (01 equals t5) */
@@ -80,7 +81,7 @@ SB_INLINE void adjugate4(const PetscReal M[10], PetscReal A[10])
   A[9] = M[2] * t3 - M[5] * t1 + M[7] * t0;
 }
 
-/* The column of a positive semi-definite A (00 01 02 03 11 12 13 22 23 33) with the largest diagonal entry. */
+/* The column of a positive semi-definite A (00 01 02 03 11 12 13 22 23 33) with the largest entry. */
 SB_INLINE void largest_column(const PetscReal A[10], PetscReal q[4])
 {
   const PetscReal c1[4] = {A[1], A[4], A[5], A[6]}, c2[4] = {A[2], A[5], A[7], A[8]},

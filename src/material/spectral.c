@@ -1,30 +1,22 @@
 /*
-  Vectorised eigenvalues: symmetric 3x3 matrices, signed stretches of F, tangents with negative eigenvalues set to zero.
+  Vectorised eigenvalues: symmetric 3x3 matrices, stretches of F, tangents without negative ones.
 
-  SbSymEig: in closed form except for three Newton steps, without iterated rotations (similar to
-  Eberly, "A robust eigensolver for 3x3 symmetric matrices", 2014). With m = tr(S)/3, A = (S - m I)/p, 6 p^2 = |S - m I|^2,
-  the eigenvalues of A are the roots of y^3 - 3 y = det A. The one with the sign of det A has |y| in [sqrt(3), 2] and lies
-  at least sqrt(3) from the others: Newton's method converges quadratically from the start, and the largest column of
-  adj(A - y I) is the eigenvector without loss of accuracy. A 2x2 problem in the plane normal to it remains: one rotation.
+  SbSymEig: in closed form except for three Newton steps, without iterated rotations (similar to Eberly, "A
+  robust eigensolver for 3x3 symmetric matrices", 2014). With m = tr(S)/3, A = (S - m I)/p and 6 p^2 = |S - m
+  I|^2 the eigenvalues of A are the roots of y^3 - 3 y = det A. The one with the sign of det A has |y| in
+  [sqrt(3), 2] and lies at least sqrt(3) from the others: Newton's method converges quadratically from the
+  start, and the largest column of adj(A - y I) is the eigenvector without loss of accuracy. A 2x2 problem in
+  the plane normal to it remains: one rotation.
 
-  SbSpectralTangent: the tangent of an isotropic energy has known eigenmatrices (Smith, de Goes, Kim, "Analytic
-  eigensystems for isotropic distortion energies", 2019, sections 4 and 5). With F = U diag(s) V^T, columns u_i and v_i:
-  three twists (u_i v_j^T - u_j v_i^T) / sqrt(2), three flips (u_i v_j^T + u_j v_i^T) / sqrt(2), and three stretches
-  sum_i q_i u_i v_i^T with the eigenvectors q of the Hessian of psi(s). C is the sum of the outer products of these
-  matrices, each scaled by the root of its eigenvalue or zero: positive semi-definite by construction.
+  SbSpectralTangent: the tangent of an isotropic energy has known eigenmatrices (Smith, de Goes, Kim,
+  "Analytic eigensystems for isotropic distortion energies", 2019, sections 4 and 5). With F = U diag(s) V^T,
+  columns u_i and v_i: three twists (u_i v_j^T - u_j v_i^T) / sqrt(2), three flips (u_i v_j^T + u_j v_i^T) /
+  sqrt(2), and three stretches sum_i q_i u_i v_i^T with the eigenvectors q of the Hessian of psi(s). C is the
+  sum of the outer products of these matrices, times the root of its eigenvalue or zero.
 */
 #include "material_impl.h"
 
-/* y >= sqrt(3) with y^3 - 3 y = 2 t for t in [0, 1]. The initial parabola has an error of 0.003, which a Newton step squares times 0.75. */
-SB_INLINE PetscReal isolated_root(PetscReal t)
-{
-  PetscReal y = 1.7320508 + t * (0.3333333 - 0.0653841 * t);
-
-  for (int step = 0; step < 3; step++) y = 2 * (y * y * y + t) / (3 * (y * y - 1));
-  return y;
-}
-
-/* Unit eigenvector of A = 00 01 02 11 12 22 for its isolated eigenvalue y: the largest column of adj(A - y I). */
+/* Unit eigenvector of A = 00 01 02 11 12 22 for the isolated eigenvalue y: largest column of adj(A - y I). */
 SB_INLINE void isolated_vector(const PetscReal A[6], PetscReal y, PetscReal v[3])
 {
   const PetscReal a = A[0] - y, b = A[3] - y, c = A[5] - y, d = A[1], e = A[2], f = A[4];
@@ -39,7 +31,7 @@ SB_INLINE void isolated_vector(const PetscReal A[6], PetscReal y, PetscReal v[3]
   for (int k = 0; k < 3; k++) v[k] *= n;
 }
 
-/* Unit vectors u, w with (u, w, v) right-handed (Duff and others, "Building an orthonormal basis, revisited", 2017). */
+/* Unit vectors u, w with (u, w, v) right-handed (Duff and others, "Building an orthonormal basis", 2017). */
 SB_INLINE void plane_of(const PetscReal v[3], PetscReal u[3], PetscReal w[3])
 {
   const PetscReal sign = v[2] < 0 ? -1 : 1, a = -1 / (sign + v[2]), b = v[0] * v[1] * a;
@@ -71,7 +63,11 @@ SB_INLINE void sym_eig(const PetscReal S[6], PetscReal s[3], PetscReal V[9])
   for (int k = 0; k < 6; k++) A[k] *= inverse;
   const PetscReal det = A[0] * (A[3] * A[5] - A[4] * A[4]) - A[1] * (A[1] * A[5] - A[4] * A[2]) +
                         A[2] * (A[1] * A[4] - A[3] * A[2]);
-  const PetscReal t = fabs(det) < 2 ? fabs(det) / 2 : 1, root = isolated_root(t), y = det < 0 ? -root : root;
+  /* root >= sqrt(3) with root^3 - 3 root = 2 t, t in [0, 1]: a parabola (error 0.003), Newton steps */
+  const PetscReal t = fabs(det) < 2 ? fabs(det) / 2 : 1;
+  PetscReal root = 1.7320508 + t * (0.3333333 - 0.0653841 * t);
+  for (int step = 0; step < 3; step++) root = 2 * (root * root * root + t) / (3 * (root * root - 1));
+  const PetscReal y = det < 0 ? -root : root;
   isolated_vector(A, y, v);
 
   /* the 2x2 problem in the plane: a rotation by the smaller angle of tan = +-h / (|d| + sqrt(d^2 + h^2)) */
@@ -110,17 +106,9 @@ SB_KERNEL void SbStretches(const SbPack F[restrict 9], SbPack U[restrict 9], SbP
 
   SbPolar(F, R);
   for (int l = 0; l < SB_BATCH; l++) {
-    PetscReal f[9], r[9], a[9];
+    PetscReal r[9];
 
-    SbPackGet(9, F, l, f);
-    SbPackGet(9, R, l, r);
-    SbMatTransposeMul(r, f, a);
-    S[0][l] = a[0];
-    S[1][l] = (a[1] + a[3]) / 2;
-    S[2][l] = (a[2] + a[6]) / 2;
-    S[3][l] = a[4];
-    S[4][l] = (a[5] + a[7]) / 2;
-    S[5][l] = a[8];
+    SbStretchTensor(F, (const SbPack *)R, l, r, S);
   }
   SbSymEig((const SbPack *)S, s, V);
   for (int l = 0; l < SB_BATCH; l++) {

@@ -1,11 +1,10 @@
 /*
   St. Venant-Kirchhoff: E = (F^T F - I)/2, psi = mu E : E + lambda/2 tr(E)^2, P = F (2 mu E + lambda tr(E) I).
 
-  Tangent: dP_ij = dF_il S_lj + mu (F F^T)_ik dF_kj + mu F_il dF_kl F_kj + lambda F_ij F_kl dF_kl, S = 2 mu E + lambda tr(E) I.
-  In signed stretches psi_i = s_i (lambda tr(E) + mu (s_i^2 - 1)), which gives the closed forms used for exact_spd.
+  Tangent: dP_ij = dF_il S_lj + mu (F F^T)_ik dF_kj + mu F_il dF_kl F_kj + lambda F_ij F_kl dF_kl, with
+  S = 2 mu E + lambda tr(E) I. In signed stretches psi_i = s_i (lambda tr(E) + mu (s_i^2 - 1)), for exact_spd.
 
-  The law softens in compression and has no resistance to inversion (P = 0 at s = 0): use it for large rotations with
-  moderate strains.
+  The law softens in compression and does not resist inversion (P = 0 at s = 0): for moderate strains only.
 */
 #include "material_impl.h"
 
@@ -19,7 +18,7 @@ SB_INLINE void green_strain(const SbPack F[9], int l, PetscReal f[9], PetscReal 
 
 SB_KERNEL static void energy_stvk(const struct _p_SbMaterial *m, const SbPack F[restrict 9], SbPack psi)
 {
-  const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
+  const PetscReal mu = m->mu, lambda = m->lambda;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], e[9];
@@ -33,7 +32,7 @@ SB_KERNEL static void energy_stvk(const struct _p_SbMaterial *m, const SbPack F[
 SB_KERNEL static void stress_stvk(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                   SbPack P[restrict 9])
 {
-  const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
+  const PetscReal mu = m->mu, lambda = m->lambda;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], e[9], p[9];
@@ -52,14 +51,14 @@ SB_KERNEL static void pressure_stvk(const struct _p_SbMaterial *m, const SbPack 
     PetscReal f[9], e[9];
 
     green_strain(F, l, f, e);
-    p[l] = -sb_lame(m)->lambda * (e[0] + e[4] + e[8]);
+    p[l] = -m->lambda * (e[0] + e[4] + e[8]);
   }
 }
 
 SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                     SbPack C[restrict 81])
 {
-  const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
+  const PetscReal mu = m->mu, lambda = m->lambda;
   SbPack S[9], B[9]; /* B = mu F F^T */
 
   for (int l = 0; l < SB_BATCH; l++) {
@@ -91,7 +90,7 @@ SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbPack 
 SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbPack F[restrict 9],
                                   SbPack C[restrict 81])
 {
-  const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
+  const PetscReal mu = m->mu, lambda = m->lambda;
   SbPack U[9], V[9], s[3], hessian[6], flip[3], twist[3];
 
   SbStretches(F, U, s, V);
@@ -144,8 +143,7 @@ static void curvature_stvk(const struct _p_SbMaterial *m, const SbPack F[9], con
 PetscErrorCode SbMaterialCreate_StVK(SbMaterial m)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbMaterialSetHooke(m));
-  m->ops.setfromoptions = SbMaterialSetFromOptions_Exact;
+  m->ops.setfromoptions = SbMaterialSetFromOptions_Tangent;
   m->ops.settangent = SbMaterialSetTangent_Exact;
   m->ops.energy = energy_stvk;
   m->ops.stress = stress_stvk;
@@ -153,7 +151,7 @@ PetscErrorCode SbMaterialCreate_StVK(SbMaterial m)
   m->ops.tangent = tangent_stvk;
   m->ops.volumetric = volumetric_stvk;
   m->ops.curvature = curvature_stvk;
-  m->symmetric = m->softens = PETSC_TRUE;
+  m->softens = PETSC_TRUE;
   m->tangent = SB_TANGENT_EXACT;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -90,77 +90,70 @@ PetscErrorCode SbModelContactTimeOfImpact(SbModel m, PetscReal *part)
 
 PetscErrorCode SbModelContactVelocity(SbModel m, PetscReal t, PetscReal dt, Vec U, Vec V)
 {
-  SbStage stage = {.t = t, .dt = dt, .shift_k = 1.};
+  SbEvaluation e = {.U = U};
   PetscScalar *v;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceGetLocalRead(m->space, U, &stage.u));
-  for (PetscInt e = 0; e < m->nbegin_step; e++) {
-    if (m->begin_step[e]->ops.target_velocity)
-      SbEffectCall(m->begin_step[e], target_velocity, m->space, &stage);
+  PetscCall(SbEvaluationBegin(m, t, &e));
+  e.stage.dt = dt;
+  for (PetscInt k = 0; k < m->nbegin_step; k++) {
+    if (m->begin_step[k]->ops.target_velocity)
+      SbEffectCall(m->begin_step[k], target_velocity, m->space, &e.stage);
   }
-  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &stage.u));
+  PetscCall(SbEvaluationEnd(m, &e));
   PetscCall(VecGetArray(V, &v));
-  SbConstraintsVelocity(m->space, v);
+  SbConstraintsPrescribe(m->space, PETSC_TRUE, v);
   PetscCall(VecRestoreArray(V, &v));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbModelContactGap(SbModel m, PetscReal t, Vec U, Vec G)
 {
-  SbStage stage = {.t = t, .shift_k = 1.};
-  PetscReal *gap, *normal;
+  SbEvaluation e = {.U = U, .F = G};
+  PetscReal *gap;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(m->space->nnode, &gap));
-  PetscCall(SbSpaceGetLocalRead(m->space, U, &stage.u));
-  PetscCall(SbSpaceGetLocalWrite(m->space, G, &normal));
-  PetscCall(PetscArrayzero(normal, 3 * m->space->nnode));
+  PetscCall(SbEvaluationBegin(m, t, &e));
   for (PetscInt i = 0; i < m->space->nnode; i++) gap[i] = PETSC_MAX_REAL;
-  for (PetscInt e = 0; e < m->neffect; e++) {
-    if (m->effect[e]->ops.gap) SbEffectCall(m->effect[e], gap, m->space, &stage, gap, normal);
+  for (PetscInt k = 0; k < m->neffect; k++) {
+    if (m->effect[k]->ops.gap) SbEffectCall(m->effect[k], gap, m->space, &e.stage, gap, e.f);
   }
-  for (PetscInt i = 0; i < m->space->nnode; i++) {
-    for (PetscInt k = 0; k < 3 && gap[i] < PETSC_MAX_REAL; k++) normal[3 * i + k] *= gap[i];
-  }
-  PetscCall(SbSpaceRestoreLocalWrite(m->space, G, &normal));
-  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &stage.u));
+  for (PetscInt i = 0; i < 3 * m->space->nnode; i++)
+    if (gap[i / 3] < PETSC_MAX_REAL) e.f[i] *= gap[i / 3];
+  PetscCall(SbEvaluationEnd(m, &e));
   PetscCall(PetscFree(gap));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbModelContactForce(SbModel m, PetscReal t, Vec U, Vec F)
 {
-  SbStage stage = {.t = t, .shift_k = 1.};
-  PetscReal *f;
+  SbEvaluation e = {.U = U, .F = F};
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceGetLocalRead(m->space, U, &stage.u));
-  PetscCall(SbSpaceGetLocalWrite(m->space, F, &f));
-  PetscCall(PetscArrayzero(f, 3 * m->space->nnode));
-  for (PetscInt e = 0; e < m->neffect; e++) {
-    if (m->effect[e]->ops.contact_points && m->effect[e]->ops.force)
-      SbEffectCall(m->effect[e], force, m->space, &stage, f);
+  PetscCall(SbEvaluationBegin(m, t, &e));
+  for (PetscInt k = 0; k < m->neffect; k++) {
+    if (m->effect[k]->ops.contact_points && m->effect[k]->ops.force)
+      SbEffectCall(m->effect[k], force, m->space, &e.stage, e.f);
   }
-  if (m->space->constraints) SbConstraintsAddForces(m->space, f);
-  PetscCall(SbSpaceRestoreLocalWrite(m->space, F, &f));
-  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &stage.u));
+  if (m->space->constraints) SbConstraintsAddForces(m->space, e.f);
+  PetscCall(SbEvaluationEnd(m, &e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbModelContactPoints(SbModel m, PetscReal t, Vec U, SbContactPoints *list)
 {
-  SbStage stage = {.t = t, .shift_k = 1.};
+  SbEvaluation e = {.U = U};
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceGetLocalRead(m->space, U, &stage.u));
-  for (PetscInt e = 0; e < m->neffect; e++) {
+  PetscCall(SbEvaluationBegin(m, t, &e));
+  for (PetscInt k = 0; k < m->neffect; k++) {
     const PetscInt before = list->n;
 
-    if (!m->effect[e]->ops.contact_points) continue;
-    SbEffectCall(m->effect[e], contact_points, m->space, &stage, list);
-    for (PetscInt i = before; i < list->n; i++) list->point[i].effect = e;
+    if (!m->effect[k]->ops.contact_points) continue;
+    SbEffectCall(m->effect[k], contact_points, m->space, &e.stage, list);
+    for (PetscInt i = before; i < list->n; i++) list->point[i].effect = k;
   }
-  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &stage.u));
+  PetscCall(SbEvaluationEnd(m, &e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,11 +1,11 @@
 /*
-  Energies and momenta of a state: 1/2 v.M v, the strain energy of the laws, sum m v, sum x cross m v with the current
-  positions x = X + u, the centre of mass, and extremes of speed, displacement and det F. One reduction for the sums, one
-  for the extremes.
+  Energies and momenta of a state: 1/2 v.M v, the strain energy of the laws, sum m v, sum x cross m v with the
+  current positions x = X + u, the centre of mass, and extremes of speed, displacement and det F. One
+  reduction for the sums, one for the extremes.
 
-  With the consistent mass matrix the kinetic energy and the momenta use it, too; the centre of mass is the same for both.
+  With the consistent mass matrix kinetic energy and momenta use it, too; not the centre of mass.
 */
-#include "sbmodel.h"
+#include "model_impl.h"
 #include "sblog.h"
 
 typedef enum {
@@ -19,38 +19,25 @@ typedef enum {
   NSUM = CENTRE + 3
 } Sum;
 
-/* M v with the run's mass matrix, [nnode][3], complete on owned nodes; v with ghosts. The caller frees it. */
-static PetscErrorCode nodal_momenta(SbSpace s, const PetscReal v[], PetscReal **p)
-{
-  const SbStage stage = {.a = v}; /* no velocity: inertia only, without mass-proportional damping */
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(3 * s->nnode, p));
-  if (s->consistent_mass)
-    SbSpaceAddInertia(s, &stage, *p);
-  else
-    for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) (*p)[i] = s->node_mass[i / 3] * v[i];
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
 {
   SbSpace s = m->space;
-  const PetscReal *u, *v = NULL;
-  PetscReal sum[NSUM] = {0.}, extreme[3] = {0., 0., 0.},
-            *p = NULL; /* extremes: speed^2, displacement^2, -min J */
+  SbEvaluation at = {.U = U, .V = V};
+  const PetscReal *u, *v;
+  PetscReal sum[NSUM] = {0.}, extreme[3] = {0.}, *p; /* extremes: speed^2, displacement^2, -min J */
   PetscInt ninverted;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_ENERGY], 0, 0, 0, 0));
-  PetscCall(SbSpaceGetLocalRead(s, U, &u));
+  PetscCall(SbEvaluationBegin(m, 0., &at));
+  u = at.stage.u;
+  v = at.stage.v;
   SbSpaceStrainEnergy(s, u, NULL, &sum[STRAIN], &extreme[2], &ninverted, &sum[VOLUME]);
   sum[INVERTED] = (PetscReal)ninverted;
   extreme[2] = -extreme[2];
-  if (V) {
-    PetscCall(SbSpaceGetLocalRead(s, V, &v));
-    PetscCall(nodal_momenta(s, v, &p));
-  }
+  /* p = M v */
+  PetscCall(PetscCalloc1(3 * s->nnode, &p));
+  if (V) SbSpaceAddInertia(s, &(SbStage){.a = v}, p);
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     PetscReal x[3], v2 = 0., u2 = 0.;
 
@@ -70,8 +57,7 @@ PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
     }
     extreme[0] = PetscMax(extreme[0], v2);
   }
-  if (V) PetscCall(SbSpaceRestoreLocalRead(s, V, &v));
-  PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
+  PetscCall(SbEvaluationEnd(m, &at));
   PetscCall(PetscFree(p));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, NSUM, MPIU_REAL, MPI_SUM, m->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, extreme, 3, MPIU_REAL, MPI_MAX, m->comm));
@@ -94,28 +80,25 @@ PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
 PetscErrorCode SbModelBodySums(SbModel m, Vec U, Vec V, PetscReal sum[][SB_BODY_SUMS])
 {
   const SbSpace s = m->space;
-  const PetscReal *u, *v;
+  SbEvaluation at = {.U = U, .V = V};
   PetscReal *p, *strain, unused[3];
   PetscInt n;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceGetLocalRead(s, U, &u));
-  PetscCall(PetscCalloc1(m->nbody, &strain));
-  SbSpaceStrainEnergy(s, u, strain, &unused[0], &unused[1], &n, &unused[2]);
+  PetscCall(SbEvaluationBegin(m, 0., &at));
+  PetscCall(PetscCalloc2(m->nbody, &strain, 3 * s->nnode, &p));
+  SbSpaceStrainEnergy(s, at.stage.u, strain, &unused[0], &unused[1], &n, &unused[2]);
   for (PetscInt b = 0; b < m->nbody; b++) sum[b][1] += strain[b];
-  PetscCall(PetscFree(strain));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
-    sum[s->node_body[i / 3]][5 + i % 3] += s->node_mass[i / 3] * (s->node_x[i] + u[i]);
-  PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
-  if (!V) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbSpaceGetLocalRead(s, V, &v));
-  PetscCall(nodal_momenta(s, v, &p));
+  if (V) SbSpaceAddInertia(s, &(SbStage){.a = at.stage.v}, p);
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
-    sum[s->node_body[i / 3]][0] += 0.5 * v[i] * p[i];
-    sum[s->node_body[i / 3]][2 + i % 3] += p[i];
+    PetscReal *mine = sum[s->node_body[i / 3]];
+
+    if (V) mine[0] += 0.5 * at.stage.v[i] * p[i];
+    mine[2 + i % 3] += p[i];
+    mine[5 + i % 3] += s->node_mass[i / 3] * (s->node_x[i] + at.stage.u[i]);
   }
-  PetscCall(SbSpaceRestoreLocalRead(s, V, &v));
-  PetscCall(PetscFree(p));
+  PetscCall(PetscFree2(strain, p));
+  PetscCall(SbEvaluationEnd(m, &at));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -143,41 +126,31 @@ PetscErrorCode SbModelCentres(SbModel m, Vec U, PetscReal centre[][4])
 }
 
 /*
-  Power dissipated by Rayleigh damping, v . C v, J/s: alpha v.M v + beta v.K(u) v per region. Owned cells, summed over ranks.
+  Power dissipated by Rayleigh damping, v . C v, J/s: alpha v.M v + beta v.K(u) v, of all ranks.
 */
 PetscErrorCode SbModelDampingPower(SbModel m, Vec U, Vec V, PetscReal *power)
 {
-  const PetscReal *u, *v;
-  PetscReal mine = 0.;
+  SbEvaluation at = {.U = U, .V = V};
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
-  PetscCall(SbSpaceGetLocalRead(m->space, V, &v));
-  PetscCall(SbSpaceDampingPower(m->space, u, v, &mine));
-  PetscCall(SbSpaceRestoreLocalRead(m->space, V, &v));
-  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
-  PetscCallMPI(MPI_Allreduce(&mine, power, 1, MPIU_REAL, MPI_SUM, m->comm));
+  PetscCall(SbEvaluationBegin(m, 0., &at));
+  PetscCall(SbSpaceDampingPower(m->space, at.stage.u, at.stage.v, power));
+  PetscCall(SbEvaluationEnd(m, &at));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, power, 1, MPIU_REAL, MPI_SUM, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbModelStrainEnergy(SbModel m, Vec U, Vec F, PetscReal *psi, PetscInt *ninverted)
 {
-  SbSpace s = m->space;
-  SbStage stage = {.shift_k = 1.};
-  PetscReal sum[2], minJ, volume, *f;
-  PetscInt n;
+  SbEvaluation at = {.U = U, .F = F};
+  PetscReal sum[2], unused[2];
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceGetLocalRead(s, U, &stage.u));
-  SbSpaceStrainEnergy(s, stage.u, NULL, &sum[0], &minJ, &n, &volume);
-  if (F) {
-    PetscCall(SbSpaceGetLocalWrite(s, F, &f));
-    PetscCall(PetscArrayzero(f, 3 * s->nnode));
-    PetscCall(SbSpaceAddInternalForce(s, &stage, f));
-    PetscCall(SbSpaceRestoreLocalWrite(s, F, &f));
-  }
-  PetscCall(SbSpaceRestoreLocalRead(s, U, &stage.u));
-  sum[1] = (PetscReal)n;
+  PetscCall(SbEvaluationBegin(m, 0., &at));
+  SbSpaceStrainEnergy(m->space, at.stage.u, NULL, &sum[0], &unused[0], ninverted, &unused[1]);
+  if (F) PetscCall(SbSpaceAddInternalForce(m->space, &at.stage, at.f));
+  PetscCall(SbEvaluationEnd(m, &at));
+  sum[1] = (PetscReal)*ninverted;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, m->comm));
   *psi = sum[0];
   *ninverted = (PetscInt)sum[1];

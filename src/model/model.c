@@ -86,7 +86,7 @@ static PetscErrorCode match_mass(SbModel m, PetscInt b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lists of the effects that have an operation, in scenario order, one after the other in m->lists; number of lists. */
+/* Lists of the effects that have an operation, in scenario order, one after the other in m->lists. */
 #define NLIST 12
 #define SORT_INTO_LIST(m, op)                                               \
   do {                                                                      \
@@ -161,31 +161,31 @@ PetscErrorCode SbModelSetUp(SbModel m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Borrows the arrays of an evaluation. Ghosts of v and a are updated only if needed. */
-static PetscErrorCode stage_begin(SbModel m, PetscReal t, Vec U, Vec V, Vec A, SbStage *stage)
+PetscErrorCode SbEvaluationBegin(SbModel m, PetscReal t, SbEvaluation *e)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(stage, sizeof(*stage)));
-  stage->t = t;
-  stage->shift_k = 1.;
-  PetscCall(SbSpaceGetLocalRead(m->space, U, &stage->u));
-  if (V) PetscCall(SbSpaceGetLocalRead(m->space, V, &stage->v));
-  if (A) PetscCall(SbSpaceGetLocalRead(m->space, A, &stage->a));
+  e->stage = (SbStage){.t = t, .shift_k = 1.};
+  PetscCall(SbSpaceGetLocalRead(m->space, e->U, &e->stage.u));
+  if (e->V) PetscCall(SbSpaceGetLocalRead(m->space, e->V, &e->stage.v));
+  if (e->A) PetscCall(SbSpaceGetLocalRead(m->space, e->A, &e->stage.a));
+  if (e->F) PetscCall(SbSpaceGetLocalWrite(m->space, e->F, &e->f));
+  if (e->F) PetscCall(PetscArrayzero(e->f, 3 * m->space->nnode));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode stage_end(SbModel m, Vec U, Vec V, Vec A, SbStage *stage)
+PetscErrorCode SbEvaluationEnd(SbModel m, SbEvaluation *e)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &stage->u));
-  if (V) PetscCall(SbSpaceRestoreLocalRead(m->space, V, &stage->v));
-  if (A) PetscCall(SbSpaceRestoreLocalRead(m->space, A, &stage->a));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, e->U, &e->stage.u));
+  if (e->V) PetscCall(SbSpaceRestoreLocalRead(m->space, e->V, &e->stage.v));
+  if (e->A) PetscCall(SbSpaceRestoreLocalRead(m->space, e->A, &e->stage.a));
+  if (e->F) PetscCall(SbSpaceRestoreLocalWrite(m->space, e->F, &e->f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /*
-  Factor on an effect: in a static run the load factor, except for formulas of t, which is the load factor there: they
-  prescribe the load path themselves.
+  Factor on an effect: in a static run the load factor, except for formulas of t, which is the load factor
+  there: they prescribe the load path themselves.
 */
 static inline PetscReal load_factor(SbModel m, SbEffect e)
 {
@@ -198,7 +198,6 @@ PetscErrorCode SbModelExternalForces(SbModel m, const SbStage *stage, PetscBool 
   const PetscInt n = 3 * m->space->nnode;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscArrayzero(f, n));
   if (!m->nforce) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_EFFECTS], 0, 0, 0, 0));
   /* constant ones first: they have a common factor */
@@ -220,92 +219,80 @@ PetscErrorCode SbModelExternalForces(SbModel m, const SbStage *stage, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets the residual at prescribed unknowns to zero: every initial guess has the prescribed values, and no solve changes them. */
+/* Sets the residual at prescribed unknowns to zero: guesses have the prescribed values. */
 static void constrain_residual(SbSpace s, PetscReal f[])
 {
-  for (PetscInt k = 0; k < s->nfixed; k++) {
-    const PetscInt node = s->fixed_node[k];
+  for (PetscInt k = 0; k < 3 * s->nfixed; k++) {
+    const PetscInt node = s->fixed_node[k / 3];
 
-    for (PetscInt c = 0; c < 3; c++) {
-      if (s->fixed[node] & (1 << c)) f[3 * node + c] = 0.;
-    }
+    if (s->fixed[node] & (1 << k % 3)) f[3 * node + k % 3] = 0.;
   }
 }
 
 PetscErrorCode SbModelResidual(SbModel m, PetscReal t, Vec U, Vec V, Vec A, PetscBool constrain, Vec F)
 {
-  SbStage stage;
-  PetscReal *f;
+  SbEvaluation e = {.U = U, .V = V, .A = A, .F = F};
 
   PetscFunctionBeginUser;
-  PetscCall(stage_begin(m, t, U, V, A, &stage));
-  PetscCall(SbSpaceGetLocalWrite(m->space, F, &f));
-  PetscCall(SbModelExternalForces(m, &stage, (PetscBool)(constrain && m->barrier_apart), -1., f));
-  PetscCall(SbSpaceAddInternalForce(m->space, &stage, f));
-  if (A || V) SbSpaceAddInertia(m->space, &stage, f);
-  if (constrain) constrain_residual(m->space, f);
-  if (m->space->constraints) SbConstraintsResidual(m->space, stage.u, constrain, f);
-  PetscCall(SbSpaceRestoreLocalWrite(m->space, F, &f));
-  PetscCall(stage_end(m, U, V, A, &stage));
+  PetscCall(SbEvaluationBegin(m, t, &e));
+  PetscCall(SbModelExternalForces(m, &e.stage, (PetscBool)(constrain && m->barrier_apart), -1., e.f));
+  PetscCall(SbSpaceAddInternalForce(m->space, &e.stage, e.f));
+  if (A || V) SbSpaceAddInertia(m->space, &e.stage, e.f);
+  if (constrain) constrain_residual(m->space, e.f);
+  if (m->space->constraints) SbConstraintsResidual(m->space, e.stage.u, constrain, e.f);
+  PetscCall(SbEvaluationEnd(m, &e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbModelLoads(SbModel m, PetscReal t, Vec U, Vec V, Vec F)
 {
-  SbStage stage;
-  PetscReal *f;
+  SbEvaluation e = {.U = U, .V = V, .F = F};
 
   PetscFunctionBeginUser;
-  PetscCall(stage_begin(m, t, U, V, NULL, &stage));
-  PetscCall(SbSpaceGetLocalWrite(m->space, F, &f));
-  PetscCall(SbModelExternalForces(m, &stage, PETSC_FALSE, 1., f));
-  PetscCall(SbSpaceRestoreLocalWrite(m->space, F, &f));
-  PetscCall(stage_end(m, U, V, NULL, &stage));
+  PetscCall(SbEvaluationBegin(m, t, &e));
+  PetscCall(SbModelExternalForces(m, &e.stage, PETSC_FALSE, 1., e.f));
+  PetscCall(SbEvaluationEnd(m, &e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbModelTangent(SbModel m, PetscReal t, PetscReal shift_v, PetscReal shift_a, PetscReal shift_k,
                               Vec U, Vec V, Mat A)
 {
-  SbStage stage;
+  SbEvaluation e = {.U = U, .V = V};
 
   PetscFunctionBeginUser;
-  PetscCall(stage_begin(m, t, U, V, NULL, &stage));
-  stage.shift_a = shift_a;
-  stage.shift_v = shift_v;
-  stage.shift_k = shift_k;
-  PetscCall(SbSpaceAssembleTangent(m->space, &stage, A));
-  for (PetscInt e = 0; e < m->ntangent; e++) {
-    if (!SbEffectActs(m->tangent[e], t)) continue;
-    m->space->block_scale = load_factor(m, m->tangent[e]);
-    SbEffectCall(m->tangent[e], tangent, m->space, &stage, A);
+  PetscCall(SbEvaluationBegin(m, t, &e));
+  e.stage.shift_a = shift_a;
+  e.stage.shift_v = shift_v;
+  e.stage.shift_k = shift_k;
+  PetscCall(SbSpaceAssembleTangent(m->space, &e.stage, A));
+  for (PetscInt k = 0; k < m->ntangent; k++) {
+    if (!SbEffectActs(m->tangent[k], t)) continue;
+    m->space->block_scale = load_factor(m, m->tangent[k]);
+    SbEffectCall(m->tangent[k], tangent, m->space, &e.stage, A);
   }
   PetscCall(SbSpaceFinishTangent(m->space, A));
-  PetscCall(stage_end(m, U, V, NULL, &stage));
+  PetscCall(SbEvaluationEnd(m, &e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbModelNonsymmetric(SbModel m, PetscReal t, Vec U, Vec X, Vec Y)
 {
+  SbEvaluation e = {.U = U, .F = Y};
   const PetscReal *x;
-  SbStage stage;
-  PetscReal *y;
 
   PetscFunctionBeginUser;
-  PetscCall(stage_begin(m, t, U, NULL, NULL, &stage));
+  PetscCall(SbEvaluationBegin(m, t, &e));
   PetscCall(SbSpaceGetLocalRead(m->space, X, &x));
-  PetscCall(SbSpaceGetLocalWrite(m->space, Y, &y));
-  PetscCall(PetscArrayzero(y, 3 * m->space->nnode));
-  for (PetscInt e = 0; e < m->nnonsymmetric; e++) {
-    if (!SbEffectActs(m->nonsymmetric[e], t)) continue;
-    stage.shift_k = load_factor(m, m->nonsymmetric[e]);
-    SbEffectCall(m->nonsymmetric[e], nonsymmetric, m->space, &stage, x, y);
+  for (PetscInt k = 0; k < m->nnonsymmetric; k++) {
+    if (!SbEffectActs(m->nonsymmetric[k], t)) continue;
+    e.stage.shift_k = load_factor(m, m->nonsymmetric[k]);
+    SbEffectCall(m->nonsymmetric[k], nonsymmetric, m->space, &e.stage, x, e.f);
   }
-  constrain_residual(m->space, y);
-  if (m->space->constraints) SbConstraintsProject(m->space, y);
-  PetscCall(SbSpaceRestoreLocalWrite(m->space, Y, &y));
+  constrain_residual(m->space, e.f);
+  if (m->space->constraints) SbConstraintsProject(m->space, e.f);
   PetscCall(SbSpaceRestoreLocalRead(m->space, X, &x));
-  PetscCall(stage_end(m, U, NULL, NULL, &stage));
+  PetscCall(SbEvaluationEnd(m, &e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -335,14 +322,12 @@ PetscErrorCode SbModelPrescribe(SbModel m, PetscReal t, Vec U)
     if (!m->prescribe[e]->steady) SbEffectCall(m->prescribe[e], prescribe, s, t);
   }
   PetscCall(VecGetArray(U, &u));
-  for (PetscInt k = 0; k < s->nfixed && s->fixed_node[k] < s->nnode_owned; k++) {
-    const PetscInt node = s->fixed_node[k];
+  for (PetscInt k = 0; k < 3 * s->nfixed && s->fixed_node[k / 3] < s->nnode_owned; k++) {
+    const PetscInt node = s->fixed_node[k / 3];
 
-    for (PetscInt c = 0; c < 3; c++) {
-      if (s->fixed[node] & (1 << c)) u[3 * node + c] = s->fixed_value[3 * k + c];
-    }
+    if (s->fixed[node] & (1 << k % 3)) u[3 * node + k % 3] = s->fixed_value[k];
   }
-  if (s->constraints) SbConstraintsPrescribe(s, u);
+  if (s->constraints) SbConstraintsPrescribe(s, PETSC_FALSE, u);
   PetscCall(VecRestoreArray(U, &u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -369,12 +354,12 @@ PetscErrorCode SbModelInitialState(SbModel m, Vec U, Vec V)
   PetscCall(SbModelCentres(m, NULL, centre));
   PetscCall(VecGetArray(V, &v));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    const SbBody *body = &m->body[m->space->node_body[i]];
+    const SbBody *body = &m->body[s->node_body[i]];
     const SbStart *start = m->start ? &m->start[s->node_body[i]] : NULL;
     const PetscReal *w = body->angular_velocity;
     PetscReal r[3];
 
-    for (PetscInt k = 0; k < 3; k++) r[k] = s->node_x[3 * i + k] - centre[m->space->node_body[i]][k];
+    SbSubtract(s->node_x + 3 * i, centre[s->node_body[i]], r);
     for (PetscInt k = 0; k < 3; k++) {
       const PetscInt k1 = (k + 1) % 3, k2 = (k + 2) % 3;
 

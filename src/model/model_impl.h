@@ -4,10 +4,21 @@
 #pragma once
 #include "sbmodel.h"
 
-/* restitution.c, for SbModelContactBeginStep() and SbModelContactUpdateActiveSet(): Begin: at the start of an attempted step; Update: energy check once the active set has converged; `again` if
-   coefficients were reduced. Collective. */
+/* restitution.c, for SbModelContactBeginStep() and SbModelContactUpdateActiveSet(): Begin: at the start of an
+   attempted step; Update: energy check of a converged active set; `again`: they were reduced. Collective. */
 void SbModelRestitutionBegin(SbModel model, PetscReal dt, Vec U0, Vec V0);
 PetscErrorCode SbModelRestitutionUpdate(SbModel model, Vec U, PetscBool *again);
-/* model.c: f[nnode][3] = sign * f_ext, N; apart: without barrier contact. Not collective. */
+/*
+  model.c: an evaluation at t. Begin lends stage, with the arrays of U, V and A and shift_k = 1, and
+  f[nnode][3], zero, of F; V, A and F may be NULL. Collective.
+*/
+typedef struct {
+  Vec U, V, A, F;
+  SbStage stage;
+  PetscReal *f;
+} SbEvaluation;
+PetscErrorCode SbEvaluationBegin(SbModel model, PetscReal t, SbEvaluation *e);
+PetscErrorCode SbEvaluationEnd(SbModel model, SbEvaluation *e);
+/* f[nnode][3], zero before, = sign * f_ext, N; apart: without barrier contact. Not collective. */
 PetscErrorCode SbModelExternalForces(SbModel model, const SbStage *stage, PetscBool apart, PetscReal sign,
                                      PetscReal f[]);

@@ -28,7 +28,7 @@ static int by_value(const void *a, const void *b)
   return 0;
 }
 
-/* Gathers the initial contacts of all ranks, in an order independent of the partition: bodies, direction, gap, target gap. */
+/* Gathers the initial contacts of all ranks, ordered: bodies, direction, gap, target gap. */
 static PetscErrorCode gather_touches(MPI_Comm comm, const SbInitialContacts *mine, PetscInt *n,
                                      PetscReal (**all)[7])
 {
@@ -59,7 +59,7 @@ static PetscReal gap_after(const PetscReal touch[7], const PetscReal way[])
   return touch[5] + SbDot3(touch + 2, one) - SbDot3(touch + 2, two);
 }
 
-/* Gauss-Seidel: each contact in turn moves its bodies along its direction, except fixed components; way[nbody + 1][3]: displacements, m. */
+/* Gauss-Seidel: each contact moves its bodies along it, except fixed components; way[nbody + 1][3], m. */
 static void sweep_touches(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, const uint8_t fixed[],
                           PetscReal way[])
 {
@@ -88,9 +88,10 @@ static void sweep_touches(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, con
 }
 
 /*
-  Finds displacements of bodies that open all contacts to their target gaps, as far as prescribed components allow. Bodies enclosed by others without enough
-  space are fixed. Displacements are limited to a few gaps, the distance within which contacts were searched. fixed[nbody + 1]: bit c, component c is prescribed or was fixed here;
-  way[nbody + 1][3], m; moved: some body moves.
+  Finds displacements of bodies that open all contacts to their target gaps, as far as prescribed components
+  allow. Bodies enclosed by others without enough space are fixed. Displacements are limited to a few gaps,
+  the distance within which contacts were searched. fixed[nbody + 1]: bit c, component c is prescribed or was
+  fixed here; way[nbody + 1][3], m; moved: some body moves.
 */
 static void find_ways(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, uint8_t fixed[], PetscReal way[],
                       PetscBool *moved)
@@ -133,19 +134,32 @@ static void find_ways(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, uint8_t
   for (PetscInt k = 0; k < 3 * (nbody + 1); k++) way[k] *= scale;
 }
 
+/* Lends the local displacements U, with ghosts, for changes. */
+static PetscErrorCode open_state(SbModel m, Vec U, PetscReal **u)
+{
+  const PetscReal *now;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetLocalRead(m->space, U, &now));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &now));
+  PetscCall(SbSpaceGetLocalWrite(m->space, U, u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /*
-  Separates bodies in initial contact by rigid displacements, in a dynamic run until the barrier is inactive. Effects move the vertices of remaining contacts.
-  u: local displacements, in and out.
+  Separates bodies in initial contact by rigid displacements, in a dynamic run until the barrier is inactive.
+  Effects move the vertices of remaining contacts.
 */
-static PetscErrorCode move_apart(SbModel m, PetscReal t, PetscReal dt, PetscReal u[], PetscBool *moved)
+PetscErrorCode SbModelPotentialStart(SbModel m, PetscReal t, PetscReal dt, Vec U)
 {
   const SbSpace s = m->space;
   const PetscInt nbody = s->mesh->nbody;
   uint8_t *fixed;
-  PetscReal *way;
+  PetscReal *way, *u;
   PetscBool go_on = PETSC_TRUE;
 
   PetscFunctionBeginUser;
+  PetscCall(open_state(m, U, &u));
   PetscCall(PetscCalloc2(nbody + 1, &fixed, 3 * (nbody + 1), &way));
   for (int round = 0; go_on && round < ROUNDS; round++) {
     SbInitialContacts list = {0};
@@ -171,79 +185,40 @@ static PetscErrorCode move_apart(SbModel m, PetscReal t, PetscReal dt, PetscReal
     find_ways(n, touch, nbody, fixed, way, &go_on);
     PetscCall(PetscFree(touch));
     for (PetscInt i = 0; go_on && i < 3 * s->nnode; i++) u[i] += way[3 * s->node_body[i / 3] + i % 3];
-    *moved = (PetscBool)(*moved || go_on);
   }
   PetscCall(PetscFree2(fixed, way));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Copies U to a writable vector with ghosts; close_state() copies it back. */
-static PetscErrorCode open_state(SbModel m, Vec U, Vec *local, PetscReal **u)
-{
-  PetscFunctionBeginUser;
-  PetscCall(VecDuplicate(U, local));
-  PetscCall(VecCopy(U, *local));
-  PetscCall(SbSpaceGetLocalRead(m->space, *local, (const PetscReal **)u));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode close_state(SbModel m, Vec U, PetscBool moved, Vec *local, PetscReal **u)
-{
-  PetscScalar *own;
-
-  PetscFunctionBeginUser;
-  if (moved) {
-    PetscCall(VecGetArray(U, &own));
-    PetscCall(PetscArraycpy(own, *u, 3 * m->space->nnode_owned));
-    PetscCall(VecRestoreArray(U, &own));
-  }
-  PetscCall(SbSpaceRestoreLocalRead(m->space, *local, (const PetscReal **)u));
-  PetscCall(VecDestroy(local));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbModelPotentialStart(SbModel m, PetscReal t, PetscReal dt, Vec U)
-{
-  PetscBool moved = PETSC_FALSE;
-  PetscReal *u;
-  Vec local;
-
-  PetscFunctionBeginUser;
-  PetscCall(open_state(m, U, &local, &u));
-  PetscCall(move_apart(m, t, dt, u, &moved));
-  PetscCall(close_state(m, U, moved, &local, &u));
+  PetscCall(SbSpaceRestoreLocalWrite(s, U, &u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /*
-  The speed V of a step from t to t + dt, m/s, the scale of tolerances of barrier contact: m V^2 / 2 is the kinetic and strain energy of the bodies, of mass m, at its start,
-  plus half of the work of all loads and support forces along the size of the smallest body.
+  The speed V of a step from t to t + dt, m/s, the scale of tolerances of barrier contact: m V^2 / 2 is the
+  kinetic and strain energy of the bodies, of mass m, at its start, plus half of the work of all loads and
+  support forces along the size of the smallest body.
 */
 static PetscErrorCode step_speed(SbModel m, PetscReal t, PetscReal dt, Vec U, Vec V, PetscReal *speed)
 {
   const SbSpace s = m->space;
-  SbStage stage = {.t = t + dt, .shift_k = 1.};
+  SbEvaluation at = {.U = U, .V = V};
   PetscReal load = 0., *f;
   SbEnergies energies;
 
   PetscFunctionBeginUser;
   PetscCall(SbModelEnergies(m, U, V, &energies));
   if (PetscIsInfOrNanReal(energies.strain)) energies.strain = 0.;
-  PetscCall(PetscMalloc1(3 * s->nnode, &f));
-  PetscCall(SbSpaceGetLocalRead(s, U, &stage.u));
-  PetscCall(SbSpaceGetLocalRead(s, V, &stage.v));
-  PetscCall(SbModelExternalForces(m, &stage, PETSC_TRUE, 1., f));
+  PetscCall(PetscCalloc1(3 * s->nnode, &f));
+  PetscCall(SbEvaluationBegin(m, t + dt, &at));
+  PetscCall(SbModelExternalForces(m, &at.stage, PETSC_TRUE, 1., f));
   for (PetscInt i = 0; i < s->nnode_owned; i++) load += PetscSqrtReal(SbDot3(f + 3 * i, f + 3 * i));
 
   /* support forces: internal forces at prescribed nodes */
   if (m->nprescribe) {
     PetscCall(PetscArrayzero(f, 3 * s->nnode));
-    PetscCall(SbSpaceAddInternalForce(s, &stage, f));
+    PetscCall(SbSpaceAddInternalForce(s, &at.stage, f));
     for (PetscInt i = 0; i < s->nnode_owned; i++)
       if (s->fixed[i]) load += PetscSqrtReal(SbDot3(f + 3 * i, f + 3 * i));
   }
-  PetscCall(SbSpaceRestoreLocalRead(s, V, &stage.v));
-  PetscCall(SbSpaceRestoreLocalRead(s, U, &stage.u));
+  PetscCall(SbEvaluationEnd(m, &at));
   PetscCall(PetscFree(f));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &load, 1, MPIU_REAL, MPI_SUM, m->comm));
   *speed = PetscSqrtReal(
@@ -253,35 +228,26 @@ static PetscErrorCode step_speed(SbModel m, PetscReal t, PetscReal dt, Vec U, Ve
 
 PetscErrorCode SbModelPotentialBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0, Vec V0)
 {
-  PetscBool moved = PETSC_FALSE;
+  SbEvaluation at = {.U = U0, .V = V0};
+  PetscBool moved;
   PetscReal *u;
-  Vec local;
 
   PetscFunctionBeginUser;
   m->barrier_speed = 0.;
   if (V0) PetscCall(step_speed(m, t, dt, U0, V0, &m->barrier_speed));
-  PetscCall(open_state(m, U0, &local, &u));
-  for (PetscInt e = 0; e < m->npotential; e++) {
-    PetscBool mine;
-
-    CONTACT_CALL(m->potential[e], begin_barrier, m->space, t, dt, m->barrier_speed, u, &mine);
-    moved = (PetscBool)(moved || mine);
-  }
-  PetscCall(close_state(m, U0, moved, &local, &u));
+  PetscCall(open_state(m, U0, &u));
+  for (PetscInt e = 0; e < m->npotential; e++)
+    CONTACT_CALL(m->potential[e], begin_barrier, m->space, t, dt, m->barrier_speed, u, &moved);
+  PetscCall(SbSpaceRestoreLocalWrite(m->space, U0, &u));
 
   /* impact velocities of this step */
-  if (m->nrestitution && V0) {
-    const PetscReal *u0, *v0;
-
-    SbModelRestitutionBegin(m, dt, U0, V0);
-    PetscCall(SbSpaceGetLocalRead(m->space, U0, &u0));
-    PetscCall(SbSpaceGetLocalRead(m->space, V0, &v0));
-    for (PetscInt e = 0; e < m->npotential; e++) {
-      if (m->potential[e]->ops.meet) CONTACT_CALL(m->potential[e], meet, m->space, dt, u0, v0);
-    }
-    PetscCall(SbSpaceRestoreLocalRead(m->space, V0, &v0));
-    PetscCall(SbSpaceRestoreLocalRead(m->space, U0, &u0));
+  if (!m->nrestitution || !V0) PetscFunctionReturn(PETSC_SUCCESS);
+  SbModelRestitutionBegin(m, dt, U0, V0);
+  PetscCall(SbEvaluationBegin(m, t, &at));
+  for (PetscInt e = 0; e < m->npotential; e++) {
+    if (m->potential[e]->ops.meet) CONTACT_CALL(m->potential[e], meet, m->space, dt, at.stage.u, at.stage.v);
   }
+  PetscCall(SbEvaluationEnd(m, &at));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -359,22 +325,14 @@ PetscErrorCode SbModelPotentialUpdateFriction(SbModel m, Vec X, PetscBool solved
 
 PetscErrorCode SbModelPotentialHessian(SbModel m, Vec U, SbContactHessian kind, SbBlocks *blocks, Vec R)
 {
-  const SbSpace s = m->space;
-  const PetscReal *u;
-  PetscScalar *out;
-  PetscReal *r;
+  SbEvaluation at = {.U = U, .F = R};
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(3 * s->nnode, &r));
-  PetscCall(SbSpaceGetLocalRead(s, U, &u));
-  for (PetscInt e = 0; e < m->npotential; e++) CONTACT_CALL(m->potential[e], hessian, s, u, kind, blocks, r);
-  PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
-  if (R) {
-    PetscCall(VecGetArray(R, &out));
-    for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) out[i] = s->fixed[i / 3] & (1 << (i % 3)) ? 0. : r[i];
-    PetscCall(VecRestoreArray(R, &out));
-  }
-  PetscCall(PetscFree(r));
+  PetscCall(SbEvaluationBegin(m, 0., &at));
+  for (PetscInt e = 0; e < m->npotential; e++)
+    CONTACT_CALL(m->potential[e], hessian, m->space, at.stage.u, kind, blocks, at.f);
+  PetscCall(SbEvaluationEnd(m, &at));
+  PetscCall(SbSpaceZeroPrescribed(m->space, PETSC_TRUE, R));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -408,24 +366,19 @@ PetscErrorCode SbModelPotentialGradient(SbModel m, Vec U, PetscReal scale, Petsc
 
 PetscErrorCode SbModelGapForces(SbModel m, Vec U, Vec F, PetscReal *bound)
 {
-  const SbSpace s = m->space;
-  PetscReal *f;
-  const PetscReal *u;
+  SbEvaluation at = {.U = U, .F = F};
 
   PetscFunctionBeginUser;
   *bound = 0.;
-  PetscCall(SbSpaceGetLocalWrite(s, F, &f));
-  PetscCall(PetscArrayzero(f, 3 * s->nnode));
-  PetscCall(SbSpaceGetLocalRead(s, U, &u));
+  PetscCall(SbEvaluationBegin(m, 0., &at));
   for (PetscInt e = 0; e < m->npotential; e++) {
     PetscReal mine;
 
-    CONTACT_CALL(m->potential[e], gap_forces, s, u, f, &mine);
+    CONTACT_CALL(m->potential[e], gap_forces, m->space, at.stage.u, at.f, &mine);
     *bound += mine;
   }
-  PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
-  PetscCall(SbSpaceRestoreLocalWrite(s, F, &f));
-  PetscCall(SbSpaceZeroPrescribed(s, PETSC_TRUE, F));
+  PetscCall(SbEvaluationEnd(m, &at));
+  PetscCall(SbSpaceZeroPrescribed(m->space, PETSC_TRUE, F));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, bound, 1, MPIU_REAL, MPI_SUM, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,21 +1,24 @@
 /*
-  Restitution: the relative speed after an impact within a step, and a limit on it so that no step gains energy.
+  The relative speed after an impact within a step, and a limit on it so that no step gains energy.
 
-  Newton's law in Moreau's form (Moreau 1988; Jean, "The non-smooth contact dynamics method", CMAME 177, 1999) for the normal velocity of
-  a point of a body relative to an obstacle or to its position on another body: v+ + e v- >= 0, force >= 0, and one of them zero, for pairs that would
-  penetrate at the end of the step, by extrapolation with v- or in a solve. v- is the velocity at the start of the step.
-  Implicit Euler has v+ = (gap1 - gap0) / h: the pair is constrained at
+  Newton's law in Moreau's form (Moreau 1988; Jean, "The non-smooth contact dynamics method", CMAME 177, 1999)
+  for the normal velocity of a point of a body relative to an obstacle or to its position on another body: v+
+  + e v- >= 0, force >= 0, and one of them zero, for pairs that would penetrate at the end of the step, by
+  extrapolation with v- or in a solve. v- is the velocity at the start of the step. Implicit Euler has v+ =
+  (gap1 - gap0) / h: the pair is constrained at
 
       gap1 = gap0 + h e |v-|,
 
-  or released if that needs a tensile force; in the next step it is not constrained. Contact forces and deformation are solved together, so
-  the whole body bounces if it is stiff relative to its inertia, sqrt(k/m) h >> 1. In a soft one e acts only on the neighbourhood of the point, and the body rebounds by its elasticity (Doyen, Ern, Piperno, SIAM J. Sci.
-  Comput. 33, 2011). Implemented by the effects (src/effect/restitution.h, barrier_restitution.c).
+  or released if that needs a tensile force; in the next step it is not constrained. Contact forces and
+  deformation are solved together, so the whole body bounces if it is stiff relative to its inertia, sqrt(k/m)
+  h >> 1. In a soft one e acts only on the neighbourhood of the point, and the body rebounds by its elasticity
+  (Doyen, Ern, Piperno, SIAM J. Sci. Comput. 33, 2011). (src/effect/restitution.h, barrier_restitution.c)
 
-  Energy. With W = sum h N v+ over these pairs, D = 1/2 |v1 - v0|^2 in the mass norm and S the strain energy, a step of implicit
-  Euler gains W - D + C plus the work of the loads, C = S(u1) - S(u0) - f_int(u1) . (u1 - u0); friction and persistent pairs only dissipate. C <= 0
-  where S is convex (except for rotations under stress), and is then neglected. After each solve W + C <= D is checked, W of
-  all effects, in the frame of the obstacle: if this is violated, all e are reduced and the step is solved again. For two unstressed stiff
+  Energy. With W = sum h N v+ over these pairs, D = 1/2 |v1 - v0|^2 in the mass norm and S the strain energy,
+  a step of implicit Euler gains W - D + C plus the work of the loads, C = S(u1) - S(u0) - f_int(u1) . (u1 -
+  u0); friction and persistent pairs only dissipate. C <= 0 where S is convex (except for rotations under
+  stress), and is then neglected. After each solve W + C <= D is checked, W of all effects, in the frame of
+  the obstacle: if this is violated, all e are reduced and the step is solved again. For two unstressed stiff
   bodies, or a body and an obstacle, W / D = 2 e / (1 + e) <= 1, so e is not reduced.
 */
 #include "model_impl.h"
@@ -34,64 +37,34 @@ void SbModelRestitutionBegin(SbModel m, PetscReal dt, Vec U0, Vec V0)
   m->bounce.reductions = 0;
 }
 
-/* C of the step that ends at U, J. */
-static PetscErrorCode convexity(SbModel m, Vec U, PetscReal *C)
+PetscErrorCode SbModelRestitutionUpdate(SbModel m, Vec U, PetscBool *again)
 {
-  const SbSpace s = m->space;
-  SbStage stage = {.dt = m->bounce.dt, .shift_k = 1.};
-  PetscReal strain[2], unused[2], work = 0., *f;
-  const PetscReal *u0;
+  PetscReal W = 0., before, after, work, most;
   PetscInt inverted;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(3 * s->nnode, &f));
-  PetscCall(SbSpaceGetLocalRead(s, m->bounce.U0, &u0));
-  PetscCall(SbSpaceGetLocalRead(s, U, &stage.u));
-  SbSpaceStrainEnergy(s, u0, NULL, &strain[0], &unused[0], &inverted, &unused[1]);
-  SbSpaceStrainEnergy(s, stage.u, NULL, &strain[1], &unused[0], &inverted, &unused[1]);
-  PetscCall(SbSpaceAddInternalForce(s, &stage, f));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) work += f[i] * (stage.u[i] - u0[i]);
-  PetscCall(SbSpaceRestoreLocalRead(s, U, &stage.u));
-  PetscCall(SbSpaceRestoreLocalRead(s, m->bounce.U0, &u0));
-  PetscCall(PetscFree(f));
-  *C = strain[1] - strain[0] - work;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, C, 1, MPIU_REAL, MPI_SUM, m->comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* W, and D less the positive part of C, of the step that ends at U, J, all ranks. */
-static PetscErrorCode measure(SbModel m, Vec U, PetscReal *W, PetscReal *most)
-{
-  PetscReal C;
   SbEnergies e;
-  Vec change;
+  Vec change, F;
 
   PetscFunctionBeginUser;
-  *W = *most = 0.;
   for (PetscInt k = 0; k < m->nrestitution; k++) {
-    PetscReal work = 0.;
-
+    work = 0.;
     SbEffectCall(m->restitution[k], restitution, &work);
-    *W += work;
+    W += work;
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, W, 1, MPIU_REAL, MPI_SUM, m->comm));
-  if (*W <= 0.) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &W, 1, MPIU_REAL, MPI_SUM, m->comm));
+  if (W <= 0.) PetscFunctionReturn(PETSC_SUCCESS);
+
+  /* C, and D less its positive part */
+  PetscCall(VecDuplicate(U, &F));
   PetscCall(VecDuplicate(U, &change));
   PetscCall(VecWAXPY(change, -1., m->bounce.U0, U));
+  PetscCall(SbModelStrainEnergy(m, m->bounce.U0, NULL, &before, &inverted));
+  PetscCall(SbModelStrainEnergy(m, U, F, &after, &inverted));
+  PetscCall(VecDot(F, change, &work));
   PetscCall(VecAXPBY(change, -1., 1. / m->bounce.dt, m->bounce.V0));
   PetscCall(SbModelEnergies(m, U, change, &e));
   PetscCall(VecDestroy(&change));
-  PetscCall(convexity(m, U, &C));
-  *most = PetscMax(0., e.kinetic - PetscMax(0., C));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbModelRestitutionUpdate(SbModel m, Vec U, PetscBool *again)
-{
-  PetscReal W, most;
-
-  PetscFunctionBeginUser;
-  PetscCall(measure(m, U, &W, &most));
+  PetscCall(VecDestroy(&F));
+  most = PetscMax(0., e.kinetic - PetscMax(0., after - before - work));
   if (W <= most * (1. + ROUND)) PetscFunctionReturn(PETSC_SUCCESS);
   m->bounce.left *=
     ++m->bounce.reductions < REDUCTIONS ? PetscMax(SAFE * most / W, 1. - STEEP * (1. - most / W)) : 0.;

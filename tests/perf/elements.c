@@ -59,10 +59,9 @@ static void bare_kernel(Case *c, const PetscReal u[])
       SbQuadraticAt(SbRuleQuadratic.L[q], (const SbPack *)U, at);
       SbCellGradient(g, (const SbPack *)at, F);
       m->ops.frame(m, (const SbPack *)F, R);
-      SbCellBlocksIsotropic(g, W, m->ops.volumetric_modulus(m), m->ops.shear_modulus(m), (const SbPack *)R,
-                            B[q]);
+      SbCellBlocksIsotropic(g, W, m->lambda, m->mu, (const SbPack *)R, B[q]);
     }
-    SbQuadraticBlocks((const SbPack(*)[10][9])B, W, (const SbPack *)none, K);
+    SbQuadraticBlocks(&SbRuleQuadratic, (const SbPack(*)[10][9])B, W, (const SbPack *)none, K);
   }
 }
 

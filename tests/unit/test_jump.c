@@ -111,9 +111,7 @@ static PetscReal face_energy(SbModel m, PetscInt i, const PetscReal u[])
     }
   }
   return 0.5 * area / h *
-         (e->gamma1 * 2. * law->ops.shear_modulus(law) * square +
-          e->gamma0 * (2. * law->ops.shear_modulus(law) + law->ops.volumetric_modulus(law)) *
-            SbDot3(mean, mean));
+         (e->gamma1 * 2. * law->mu * square + e->gamma0 * (2. * law->mu + law->lambda) * SbDot3(mean, mean));
 }
 
 /* Energy of a constrained DG face: its mean against that of the rigid support. */
@@ -122,8 +120,7 @@ static PetscReal support_energy(SbModel m, PetscInt i, const PetscReal u[])
   const SbSpace s = m->space;
   const SbMaterial law = m->material[s->mesh->cell_body[i / 4]];
   const PetscReal *corner[3], area = face_corners(s->mesh, i, corner),
-                              k = (2. * law->ops.shear_modulus(law) + law->ops.volumetric_modulus(law)) *
-                                  area / cell_volume(s->mesh, i / 4);
+                              k = (2. * law->mu + law->lambda) * area / cell_volume(s->mesh, i / 4);
   PetscReal square = 0.;
 
   for (int c = 0; c < 3; c++)

@@ -4,8 +4,7 @@
 
 static void test_states(SbMaterial m)
 {
-  const PetscReal stretches[4] = {0.5, 0.8, 1.2, 2}, l = m->ops.volumetric_modulus(m),
-                  mu = m->ops.shear_modulus(m);
+  const PetscReal stretches[4] = {0.5, 0.8, 1.2, 2}, l = m->lambda, mu = m->mu;
 
   for (int k = 0; k < 4; k++) {
     const PetscReal a = stretches[k], g = a - 0.3, c = cos(a), s = sin(a);
@@ -33,7 +32,7 @@ int main(int argc, char **argv)
   PetscCall(SbMaterialRegisterAll());
   for (int k = 0; k < 3; k++) {
     PetscCall(SbMaterialCreateElastic("linear", 5e3, k == 0 ? 0.3 : k == 1 ? 0.4999 : -0.4, 1000, &m));
-    SB_CHECK(m->linear && m->symmetric, "flags");
+    SB_CHECK(m->linear, "flags");
     check_rest(m);
     check_lanes(m);
     test_states(m);
@@ -44,14 +43,14 @@ int main(int argc, char **argv)
       tangent_of(m, F, C);
       contract(C, H, CH);
       damping_of(m, F, H, dP);
-      SB_CHECK(difference(9, CH, dP) < 1e-13 * (m->E + m->ops.volumetric_modulus(m)),
-               "damping is %g from C : H", difference(9, CH, dP));
+      SB_CHECK(difference(9, CH, dP) < 1e-13 * (m->E + m->lambda), "damping is %g from C : H",
+               difference(9, CH, dP));
       /* the damping stress of F - I is the stress */
       for (int i = 0; i < 9; i++) H[i] = F[i] - (i % 4 == 0);
       stress_of(m, F, P);
       damping_of(m, F, H, dP);
-      SB_CHECK(difference(9, P, dP) < 1e-13 * (m->E + m->ops.volumetric_modulus(m)),
-               "damping is %g from the stress", difference(9, P, dP));
+      SB_CHECK(difference(9, P, dP) < 1e-13 * (m->E + m->lambda), "damping is %g from the stress",
+               difference(9, P, dP));
     }
     batch(F, f);
     m->ops.frame(m, (const SbPack *)f, r);

@@ -1,6 +1,7 @@
 // @ranks 1 3
 /* Rotations of nodes: exact for a rigid rotation by any angle, the local rotation in a bent bar, I for linear materials. */
 #include "../scene.h"
+#include "sbassembly.h"
 
 static const char *const bar = "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:16,4,4 -body_bar_material %s "
                                "-body_bar_young 5e4 -body_bar_poisson 0.4 -body_bar_density 1000";
@@ -32,6 +33,7 @@ static PetscErrorCode measure(const char *law, PetscBool bend, PetscReal *error,
   char text[1024];
   const PetscReal *u;
   PetscReal *R, *found;
+  SbPack *cells;
   SbSpace s;
   Vec U;
 
@@ -43,7 +45,10 @@ static PetscErrorCode measure(const char *law, PetscBool bend, PetscReal *error,
   PetscCall(test_fill(t.model, bend ? bent : turned, U));
   PetscCall(PetscMalloc2(9 * s->nnode_owned, &R, s->nnode_owned, &found));
   PetscCall(SbSpaceGetLocalRead(s, U, &u));
-  PetscCall(SbSpaceNodeRotations(s, u, R, found));
+  PetscCall(PetscMalloc1(9 * sb_rotation_points(s) * s->nbatch, &cells));
+  SbSpaceCellRotations(s, u, cells);
+  PetscCall(SbSpaceAverageRotations(s, (const SbPack *)cells, R, found));
+  PetscCall(PetscFree(cells));
   PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
   *error = *spread = 0.;
   for (PetscInt i = 0; i < s->nnode_owned; i++) {

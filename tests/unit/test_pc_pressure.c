@@ -25,7 +25,7 @@ static PetscReal volume_measure(SbMaterial m, const PetscReal f[9], PetscReal sc
     for (int l = 0; l < SB_BATCH; l++) F[k][l] = scale * f[k];
   }
   m->ops.pressure(m, (const SbPack *)F, p);
-  return -p[0] / m->ops.volumetric_modulus(m);
+  return -p[0] / m->lambda;
 }
 
 /* dP/dF - lambda D D^T at a state with theta = 0, divided by mu. */
@@ -49,8 +49,7 @@ static PetscErrorCode rest_of_tangent(const char *law, PetscReal nu, const Petsc
   }
   m->ops.tangent(m, (const SbPack *)F, C);
   m->ops.volumetric(m, (const SbPack *)F, D);
-  for (int k = 0; k < 81; k++)
-    rest[k] = (C[k][1] - m->ops.volumetric_modulus(m) * D[k / 9][1] * D[k % 9][1]) / mu;
+  for (int k = 0; k < 81; k++) rest[k] = (C[k][1] - m->lambda * D[k / 9][1] * D[k % 9][1]) / mu;
   PetscCall(SbMaterialDestroy(&m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

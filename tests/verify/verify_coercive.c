@@ -180,7 +180,7 @@ static PetscErrorCode pressed(const char *element, const char *law, PetscReal ra
                           element, law));
   PetscCall(test_scene_open(text, &t));
   m = t.model->material[0];
-  eps = ratio * m->ops.shear_modulus(m) / (3. * m->ops.bulk_modulus(m));
+  eps = ratio * m->mu / (3. * SbMaterialBulkModulus(m));
   PetscCall(VecGetArray(t.run->U, &u));
   for (PetscInt i = 0; i < 3 * t.model->space->nnode_owned; i++) u[i] = -eps * t.model->space->node_x[i];
   PetscCall(VecRestoreArray(t.run->U, &u));

@@ -66,7 +66,7 @@ static PetscReal energy(SbMaterial m, const PetscReal R[9], const PetscReal T[9]
     memcpy(s, T, sizeof(s));
   for (int k = 0; k < 9; k++) square += PetscSqr(0.5 * (s[k] + s[3 * (k % 3) + k / 3]));
   *trace = s[0] + s[4] + s[8];
-  return (square - *trace * *trace / 3.) / (4. * m->ops.shear_modulus(m));
+  return (square - *trace * *trace / 3.) / (4. * m->mu);
 }
 
 /* Stresses of a solved run, linear in each cell; for P2 the deviator is linear and the pressure is constant. */
@@ -155,7 +155,7 @@ static void add_difference(SbModel m, const Stress *s, const PetscReal R[9], Pet
   sum->error2 += w * energy(law, R, S, &trace);
   sum->weight[cell] += w;
   if (s->npoint == 1)
-    sum->error2 += w * trace * trace / (18. * law->ops.bulk_modulus(law));
+    sum->error2 += w * trace * trace / (18. * SbMaterialBulkModulus(law));
   else
     sum->trace[cell] += w * trace;
 }
@@ -166,7 +166,7 @@ static PetscReal sum_end(SbModel m, const Stress *s, Sum *sum)
     const SbMaterial law = m->material[s->material[c]];
 
     if (sum->weight[c] > 0.)
-      sum->error2 += PetscSqr(sum->trace[c]) / (18. * law->ops.bulk_modulus(law) * sum->weight[c]);
+      sum->error2 += PetscSqr(sum->trace[c]) / (18. * SbMaterialBulkModulus(law) * sum->weight[c]);
   }
   return sum->error2;
 }
@@ -278,7 +278,7 @@ static PetscErrorCode jump_estimate(SbModel m, Vec U, PetscReal *eta2)
     SbCross(p, q, N);
     for (int k = 0; k < 3; k++)
       jump += PetscSqr(SbDot3(s.P[c][0] + 3 * k, N) - SbDot3(s.P[other][0] + 3 * k, N));
-    *eta2 += 0.5 * (s.V[c] + s.V[other]) * jump / SbDot3(N, N) / law->ops.shear_modulus(law);
+    *eta2 += 0.5 * (s.V[c] + s.V[other]) * jump / SbDot3(N, N) / law->mu;
   }
   PetscCall(PetscFree(neighbour));
   PetscCall(stress_free(&s));

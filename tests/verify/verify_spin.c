@@ -45,7 +45,7 @@ static PetscErrorCode linear_stress(TestScene *t, PetscReal angle, PetscReal *er
 {
   SbSpace s = t->model->space;
   const SbMaterial m = t->model->material[0];
-  const PetscReal modulus = 2. * (m->ops.shear_modulus(m) + m->ops.volumetric_modulus(m));
+  const PetscReal modulus = 2. * (m->mu + m->lambda);
   const PetscReal *u;
   PetscReal *sigma;
 
