@@ -5,6 +5,8 @@
 #include <sb.h>
 #include "test.h"
 
+#define TEST_TEXT 4096 /* longest scenario of a test, characters */
+
 typedef struct {
   SbModel model;
   SbRun run;
@@ -50,17 +52,31 @@ static inline PetscErrorCode test_scene_open_on(MPI_Comm comm, const char *dir, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static inline PetscErrorCode test_scene_open_in(const char *dir, const char *options, TestScene *scene)
+#define test_scene_open_in(dir, options, scene) test_scene_open_on(PETSC_COMM_WORLD, dir, options, scene)
+#define test_scene_open(options, scene) test_scene_open_in(NULL, options, scene)
+
+/* test_scene_open() of options in printf format. */
+static inline PetscErrorCode test_vopen(TestScene *scene, const char *format, va_list args)
 {
+  char text[TEST_TEXT];
+  size_t length;
+
   PetscFunctionBeginUser;
-  PetscCall(test_scene_open_on(PETSC_COMM_WORLD, dir, options, scene));
+  PetscCall(PetscVSNPrintf(text, sizeof(text), format, &length, args));
+  PetscCheck(length <= sizeof(text), PETSC_COMM_SELF, PETSC_ERR_PLIB, "%d characters, room for %d",
+             (int)length, TEST_TEXT);
+  PetscCall(test_scene_open(text, scene));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static inline PetscErrorCode test_scene_open(const char *options, TestScene *scene)
+static inline PetscErrorCode PETSC_ATTRIBUTE_FORMAT(2, 3) test_open(TestScene *scene, const char *format, ...)
 {
+  va_list args;
+
   PetscFunctionBeginUser;
-  PetscCall(test_scene_open_in(NULL, options, scene));
+  va_start(args, format);
+  PetscCall(test_vopen(scene, format, args));
+  va_end(args);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

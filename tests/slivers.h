@@ -105,7 +105,7 @@ static inline void slivers_place(const PetscInt n[3], const PetscInt at[3], Pets
   for (int k = 0; k < 3; k++) x[k] = all[3 * verify_vertex(n, at) + k];
 }
 
-/* Writes the mesh; remove it with test_file_remove(). Collective. Output: made, number of slivers among 6 n[0] n[1] n[2] tets. */
+/* Writes the mesh. Collective. Output: made, number of slivers among 6 n[0] n[1] n[2] tets. */
 static inline PetscErrorCode slivers_write(const Slivers *s, char path[512], PetscInt *made)
 {
   const PetscInt nvert = (s->n[0] + 1) * (s->n[1] + 1) * (s->n[2] + 1);

@@ -129,10 +129,9 @@ static inline PetscErrorCode effect_create(Fixture *x, const char *name, const c
 /* x->f = force of the effect at time t and displacement x->u. */
 static inline PetscErrorCode effect_force(Fixture *x, SbEffect e, PetscReal t)
 {
-  SbStage stage;
+  SbStage stage = {0};
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&stage, sizeof(stage)));
   stage.t = t;
   stage.shift_k = 1;
   stage.u = x->u;

@@ -10,9 +10,8 @@
 /* A body of this name and mesh, neither scaled nor moved. */
 static inline SbBody test_body(const char *name, const char *mesh)
 {
-  SbBody body;
+  SbBody body = {0};
 
-  memset(&body, 0, sizeof(body));
   (void)snprintf(body.name, sizeof(body.name), "%s", name);
   (void)snprintf(body.mesh, sizeof(body.mesh), "%s", mesh);
   body.scale = 1;

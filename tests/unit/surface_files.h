@@ -158,7 +158,7 @@ static inline void write_stl(FILE *f, const TestSurface *s)
     for (int k = 0; k < 3; k++) {
       const PetscReal *x = s->x[s->tri[t][k]];
 
-      fprintf(f, "  vertex %.17g %.17g %.17g\n", (double)x[0], (double)x[1], (double)x[2]);
+      fprintf(f, "  vertex %.17g %.17g %.17g\n", x[0], x[1], x[2]);
     }
     fprintf(f, " endloop\nendfacet\n");
   }
@@ -194,7 +194,7 @@ static inline void write_obj(FILE *f, const TestSurface *s)
 {
   fprintf(f, "# a comment\no thing\n");
   for (PetscInt v = 0; v < s->nvert; v++)
-    fprintf(f, "v %.17g %.17g %.17g\n", (double)s->x[v][0], (double)s->x[v][1], (double)s->x[v][2]);
+    fprintf(f, "v %.17g %.17g %.17g\n", s->x[v][0], s->x[v][1], s->x[v][2]);
   fprintf(f, "vn 0 0 1\n\n");
   for (PetscInt t = 0; t < s->ntri; t++) {
     const PetscInt *v = s->tri[t];
@@ -210,7 +210,7 @@ static inline void write_off(FILE *f, const TestSurface *s)
 {
   fprintf(f, "OFF\n# a comment\n%d %d 0\n", (int)s->nvert, (int)s->ntri);
   for (PetscInt v = 0; v < s->nvert; v++)
-    fprintf(f, "%.17g %.17g %.17g\n", (double)s->x[v][0], (double)s->x[v][1], (double)s->x[v][2]);
+    fprintf(f, "%.17g %.17g %.17g\n", s->x[v][0], s->x[v][1], s->x[v][2]);
   for (PetscInt t = 0; t < s->ntri; t++)
     fprintf(f, "3 %d %d %d 255 0 0\n", (int)s->tri[t][0], (int)s->tri[t][1], (int)s->tri[t][2]);
 }
@@ -219,8 +219,7 @@ static inline void write_msh(FILE *f, const TestSurface *s)
 {
   fprintf(f, "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n%d\n", (int)s->nvert);
   for (PetscInt v = 0; v < s->nvert; v++)
-    fprintf(f, "%d %.17g %.17g %.17g\n", (int)v + 1, (double)s->x[v][0], (double)s->x[v][1],
-            (double)s->x[v][2]);
+    fprintf(f, "%d %.17g %.17g %.17g\n", (int)v + 1, s->x[v][0], s->x[v][1], s->x[v][2]);
   fprintf(f, "$EndNodes\n$Elements\n%d\n", (int)s->ntri);
   for (PetscInt t = 0; t < s->ntri; t++)
     fprintf(f, "%d 2 0 %d %d %d\n", (int)t + 1, (int)s->tri[t][0] + 1, (int)s->tri[t][1] + 1,
@@ -230,7 +229,7 @@ static inline void write_msh(FILE *f, const TestSurface *s)
 
 /*
   A file of this kind with the surface (s), or with the text when s is NULL, in the folder for temporary files. Collective: rank 0 writes,
-  the path is the same on all ranks. Remove it with test_file_remove().
+  the path is the same on all ranks.
 */
 static inline PetscErrorCode test_file_write(const char *extension, PetscBool binary, const TestSurface *s,
                                              const char *text, char path[512])

@@ -85,7 +85,7 @@ static void check_nearest(const SbBoxTree *tree, PetscInt n, const PetscReal (*b
     }
   }
   SB_CHECK(nearest.limit2 == best && (found >= 0) == (best < limit2), "the nearest box is %g away, not %g",
-           (double)best, (double)nearest.limit2);
+           best, nearest.limit2);
   /* if the limit is not reduced, all boxes within it are returned */
   for (SbBoxNearestBegin(tree, b, 0.01, &nearest); SbBoxNearestNext(&nearest, &i);) given++;
   for (i = 0; i < n; i++) within += distance2(box[i], b) <= 0.01;

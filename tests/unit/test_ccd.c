@@ -249,11 +249,10 @@ static PetscErrorCode check_random(void)
   SB_CHECK(loose < NRANDOM / 100000, "%d impacts are early", (int)loose);
   /* in a straight passage 0.1 to 0.09 of the path remains */
   SB_CHECK(ratio[(through[0] + through[1]) / 2] >= 0.9,
-           "median of the time of impact over that of the passage %g",
-           (double)ratio[(through[0] + through[1]) / 2]);
+           "median of the time of impact over that of the passage %g", ratio[(through[0] + through[1]) / 2]);
   printf("time of impact over that of the passage: 1 %% %.3f, 10 %% %.3f, median %.3f, largest %.6f\n",
-         (double)ratio[(through[0] + through[1]) / 100], (double)ratio[(through[0] + through[1]) / 10],
-         (double)ratio[(through[0] + through[1]) / 2], (double)ratio[through[0] + through[1] - 1]);
+         ratio[(through[0] + through[1]) / 100], ratio[(through[0] + through[1]) / 10],
+         ratio[(through[0] + through[1]) / 2], ratio[through[0] + through[1] - 1]);
   PetscCall(PetscFree(ratio));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -284,7 +283,7 @@ static void check_levels(void)
     impact = SbTimeOfImpact(kind, x0, x1, &limits, &t);
     if (gap <= 0) {
       inside++;
-      SB_CHECK(impact && t == 0, "a pair in each other goes on by %g", (double)t);
+      SB_CHECK(impact && t == 0, "a pair in each other goes on by %g", t);
       continue;
     }
     least = fminl(limits.separation, gap / 2);
@@ -295,10 +294,10 @@ static void check_levels(void)
     impacts += impact;
     seen[kind] += impact;
     if (impact) {
-      SB_CHECK(t >= from - 2e-6L && t <= to + 2e-6L, "motion %d: time %g, should be in [%g, %g]", i,
-               (double)t, (double)from, (double)to);
+      SB_CHECK(t >= from - 2e-6L && t <= to + 2e-6L, "motion %d: time %g, should be in [%Lg, %Lg]", i, t, from,
+               to);
     } else
-      SB_CHECK(t == 1 && to > 1, "motion %d: an impact at %g is missed", i, (double)to);
+      SB_CHECK(t == 1 && to > 1, "motion %d: an impact at %Lg is missed", i, to);
   }
   SB_CHECK(impacts > 2000 && inside > 100, "%d impacts, %d in each other", (int)impacts, (int)inside);
   for (int k = 0; k < 4; k++) SB_CHECK(seen[k] > 200, "impacts of kind %d: %d", k, (int)seen[k]);
@@ -487,7 +486,7 @@ static void check_named(void)
     PetscReal t;
     const PetscBool impact = SbTimeOfImpact(c->kind, c->x0, c->x1, &limits, &t);
 
-    SB_CHECK(impact == (c->time >= 0), "%s: impact %d at %g", c->name, impact, (double)t);
+    SB_CHECK(impact == (c->time >= 0), "%s: impact %d at %g", c->name, impact, t);
     if (impact && c->time >= 0) SB_CHECK_NEAR(t, c->time, 2e-4, c->name);
   }
 }
@@ -509,7 +508,7 @@ static void check_limits(void)
       b[k] = PetscPowReal(2, e) * x[k];
     }
     SB_CHECK(SbTimeOfImpact(SB_PAIR_VERTEX_TRIANGLE, a, b, &usual, &t) && t == first,
-             "in units of 2^%d the time is %.17g, not %.17g", e, (double)t, (double)first);
+             "in units of 2^%d the time is %.17g, not %.17g", e, t, first);
   }
   SB_CHECK(!SbTimeOfImpact(SB_PAIR_VERTEX_TRIANGLE, above, above, &usual, &t) && t == 1, "a pair at rest");
   for (int k = 0; k < 12; k++) x[k] = above[k] + 1e6;
@@ -519,10 +518,8 @@ static void check_limits(void)
     const PetscReal v = PetscPowReal(10, e);
 
     for (int k = 0; k < 12; k++) x[k] = above[k] - (k == 2 ? v : 0);
-    SB_CHECK(SbTimeOfImpact(SB_PAIR_VERTEX_TRIANGLE, above, x, &usual, &t) == (v > 0.46), "moves by %g",
-             (double)v);
-    if (v > 0.46)
-      SB_CHECK(t >= 0.9 * 0.5 / v && t <= 0.911 * 0.5 / v, "moves by %g: %g", (double)v, (double)t);
+    SB_CHECK(SbTimeOfImpact(SB_PAIR_VERTEX_TRIANGLE, above, x, &usual, &t) == (v > 0.46), "moves by %g", v);
+    if (v > 0.46) SB_CHECK(t >= 0.9 * 0.5 / v && t <= 0.911 * 0.5 / v, "moves by %g: %g", v, t);
   }
 
   /* gaps below the rounding error of the coordinates */
@@ -533,19 +530,18 @@ static void check_limits(void)
 
     for (int k = 0; k < 12; k++) a[k] = b[k] = far + (k == 2 ? gap : k % 3 == 2 ? 0 : above[k]);
     b[2] -= 2 * gap;
-    SB_CHECK(SbTimeOfImpact(SB_PAIR_VERTEX_TRIANGLE, a, b, &usual, &t), "no impact at %g m", (double)far);
+    SB_CHECK(SbTimeOfImpact(SB_PAIR_VERTEX_TRIANGLE, a, b, &usual, &t), "no impact at %g m", far);
     if (far >= gap / (SB_CCD_ROUNDING * PETSC_MACHINE_EPSILON))
-      SB_CHECK(t == 0, "a gap of rounding is let go by %g", (double)t);
+      SB_CHECK(t == 0, "a gap of rounding is let go by %g", t);
     else
-      SB_CHECK(t > 0 && t <= 0.46, "at %g m the time is %g", (double)far, (double)t);
+      SB_CHECK(t > 0 && t <= 0.46, "at %g m the time is %g", far, t);
   }
 
   /* gap below the separation: half of it is kept; a receding or sliding pair moves freely */
   limits.separation = 2;
   for (int k = 0; k < 12; k++) x[k] = above[k] - (k == 2 ? 1 : 0);
   SB_CHECK(SbTimeOfImpact(SB_PAIR_VERTEX_TRIANGLE, above, x, &limits, &t), "no impact");
-  SB_CHECK(t >= 0.2249 && t <= 0.2275, "half the gap and a tenth of the rest are not kept: time %g",
-           (double)t);
+  SB_CHECK(t >= 0.2249 && t <= 0.2275, "half the gap and a tenth of the rest are not kept: time %g", t);
   x[0] = 0.1;
   x[2] = above[2];
   SB_CHECK(!SbTimeOfImpact(SB_PAIR_VERTEX_TRIANGLE, above, x, &limits, &t) && t == 1, "a pair that slides");
@@ -562,7 +558,7 @@ static void check_limits(void)
     a[k / 12][k % 12] = k % 5 ? NAN : INFINITY;
     for (int kind = SB_PAIR_VERTEX_TRIANGLE; kind <= SB_PAIR_EDGE_EDGE; kind++)
       SB_CHECK(SbTimeOfImpact((SbPairKind)kind, a[0], a[1], &usual, &t) && t == 0, "goes to no number by %g",
-               (double)t);
+               t);
   }
 }
 

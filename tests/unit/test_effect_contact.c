@@ -144,7 +144,7 @@ static PetscErrorCode force_beside(Fixture *x, SbEffect e, PetscReal h, Vec F)
 static PetscErrorCode check_tangent(const char *element, const char *options)
 {
   const PetscReal h = 1e-6;
-  SbStage stage;
+  SbStage stage = {0};
   Fixture x;
   SbEffect e;
   PetscReal difference, size;
@@ -158,7 +158,6 @@ static PetscErrorCode check_tangent(const char *element, const char *options)
   PetscCall(SbSpacePrescribeDone(x.space));
   PetscCall(SbSpaceCreateMatrix(x.space, SB_MATRIX_AIJ, &A));
   PetscCall(press(&x, e));
-  PetscCall(PetscMemzero(&stage, sizeof(stage)));
   stage.t = 0.1;
   stage.shift_k = 1;
   stage.u = x.u;
@@ -186,7 +185,7 @@ static PetscErrorCode check_tangent(const char *element, const char *options)
   PetscCall(VecAXPY(less, 1, more));
   PetscCall(VecNorm(less, NORM_2, &difference));
   SB_CHECK(size > 1 && difference < 1e-6 * size, "%s, %s: tangent and differences are %g of %g apart",
-           element, options, (double)difference, (double)size);
+           element, options, difference, size);
   PetscCall(VecDestroy(&w));
   PetscCall(VecDestroy(&more));
   PetscCall(VecDestroy(&less));
@@ -246,7 +245,7 @@ static PetscErrorCode check_friction(const char *element)
       SB_CHECK(t == 0 && x.space->node_x[3 * i + 2] > 1e-9, "a node off the floor feels nothing");
       continue;
     }
-    SB_CHECK(t <= 0.4 * f[2] * (1 + 1e-12), "friction %g at a normal force of %g", (double)t, (double)f[2]);
+    SB_CHECK(t <= 0.4 * f[2] * (1 + 1e-12), "friction %g at a normal force of %g", t, f[2]);
     SB_CHECK(f[0] * u[0] + f[1] * u[1] <= -0.999999 * s * t, "friction pulls back");
     if (t > 0.4 * f[2] * (1 - 1e-12))
       slip++;

@@ -9,11 +9,10 @@ static const char *const sets[][2] = {{"bottom", "plane:0,0,1,0"}, {"all", "box:
 
 static PetscErrorCode history(Fixture *x, SbEffect e, PetscReal all[3])
 {
-  SbStage stage;
+  SbStage stage = {0};
   PetscReal mine[3];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&stage, sizeof(stage)));
   stage.u = x->u;
   PetscCall((*e->ops.history)(e, x->space, &stage, x->f, mine));
   PetscCallMPI(MPI_Allreduce(mine, all, 3, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));

@@ -39,8 +39,8 @@ static void check_bits(const Fixture *x)
     const PetscReal *X = &x->space->node_x[3 * i];
     const int expected = (X[2] < 1e-9 ? 5 : 0) | (X[0] < 1e-9 ? 7 : 0);
 
-    SB_CHECK(x->space->fixed[i] == expected, "bits %d at (%g, %g, %g), expected %d", x->space->fixed[i],
-             (double)X[0], (double)X[1], (double)X[2], expected);
+    SB_CHECK(x->space->fixed[i] == expected, "bits %d at (%g, %g, %g), expected %d", x->space->fixed[i], X[0],
+             X[1], X[2], expected);
   }
 }
 

@@ -88,7 +88,7 @@ static PetscErrorCode check_closed(Fixture *x, Fixture *serial)
   PetscCall(dot(x, x->f, w, &work));
   SB_CHECK_NEAR(work, -P * (8 * (V[0] - V[1]) - (V[2] - V[3])) / (12 * h), 1e-12 * P / h,
                 "virtual work is -p dV");
-  SB_CHECK(PetscAbsReal(work) > 1, "virtual work %g J shows nothing", (double)work);
+  SB_CHECK(PetscAbsReal(work) > 1, "virtual work %g J shows nothing", work);
   PetscCall(PetscFree2(w, v));
   PetscCall(SbEffectDestroy(&e));
   PetscCall(SbEffectDestroy(&es));
@@ -134,10 +134,9 @@ static PetscErrorCode check_face(Fixture *x)
 /* A = contribution of the effect to the tangent at x->u. */
 static PetscErrorCode tangent(Fixture *x, SbEffect e, PetscReal shift_k, Mat A)
 {
-  SbStage stage;
+  SbStage stage = {0};
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&stage, sizeof(stage)));
   // No mass, no stiffness: the matrix starts from zero.
   stage.t = 2;
   stage.u = x->u;
@@ -211,7 +210,7 @@ static PetscErrorCode check_taylor(Fixture *x, SbEffect e, Mat A, PetscBool rim)
     PetscCall(dot(x, x->f, x->f, &remainder[k]));
     remainder[k] = PetscSqrtReal(remainder[k]);
   }
-  SB_CHECK(remainder[0] > 1e-6, "remainder %g shows nothing", (double)remainder[0]);
+  SB_CHECK(remainder[0] > 1e-6, "remainder %g shows nothing", remainder[0]);
   SB_CHECK_NEAR(remainder[0] / remainder[1], 100, 1e-3,
                 "Taylor remainder of the pressure, quotient of two steps");
   PetscCall(PetscFree4(w, u, f, Aw));
@@ -249,7 +248,7 @@ static PetscErrorCode check_tangent(Fixture *x)
   PetscCall(apply(x, A, v, y));
   PetscCall(dot(x, w, y, &b));
   SB_CHECK_NEAR(a, b, 1e-13 * P, "v A w = w A v");
-  SB_CHECK(x->space->faces || PetscAbsReal(a) > 1e-3 * P, "v A w = %g shows nothing", (double)a);
+  SB_CHECK(x->space->faces || PetscAbsReal(a) > 1e-3 * P, "v A w = %g shows nothing", a);
   PetscCall(tangent(x, open, 0, A));
   PetscCall(MatNorm(A, NORM_FROBENIUS, &a));
   SB_CHECK_NEAR(a, 0, 0, "tangent of a pure mass matrix");

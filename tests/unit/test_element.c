@@ -117,7 +117,7 @@ static PetscErrorCode test_one(const char *name, const PetscInt per[4], PetscRan
   PetscCall(SbElementCreate(name, NULL, &e));
   for (int d = 0; d < 4; d++) SB_CHECK(e->nodes_per[d] == per[d], "%s: nodes per entity %d", name, d);
   SB_CHECK((e->gamma0 > 0) == (per[3] > 0) && (e->gamma1 > 0) == !per[0], "%s: gamma0 %g, gamma1 %g", name,
-           (double)e->gamma0, (double)e->gamma1);
+           e->gamma0, e->gamma1);
   test_tabulate(e, random);
   test_orientation(e);
   test_mass(e);
@@ -164,8 +164,7 @@ static PetscErrorCode test_options(void)
   PetscCall(SbScopeSet(&body, "body", "", "a"));
   PetscCall(PetscOptionsInsertString(NULL, "-body_a_gamma0 7 -body_a_gamma1 0.25"));
   PetscCall(SbElementCreate("dg", &body, &e));
-  SB_CHECK(e->gamma0 == 7 && e->gamma1 == 0.25, "gamma0 %g and gamma1 %g were read", (double)e->gamma0,
-           (double)e->gamma1);
+  SB_CHECK(e->gamma0 == 7 && e->gamma1 == 0.25, "gamma0 %g and gamma1 %g were read", e->gamma0, e->gamma1);
   PetscCall(SbElementDestroy(&e));
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(refused); k++) {
     PetscCall(PetscOptionsClear(NULL));

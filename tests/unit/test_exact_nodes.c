@@ -79,7 +79,7 @@ int main(int argc, char **argv)
       worst = PetscMax(worst, PetscAbsReal(sum));
     }
   }
-  SB_CHECK(worst < 1e-3, "residual %g on nodes that are solved exactly", (double)worst);
+  SB_CHECK(worst < 1e-3, "residual %g on nodes that are solved exactly", worst);
   for (PetscInt i = 0; i < n; i++) {
     products[0] += z[i] * r2[i];
     products[1] += z2[i] * r[i];

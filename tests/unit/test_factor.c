@@ -124,7 +124,7 @@ static PetscErrorCode check_solve(const Problem *p, PetscRandom random, const ch
     error = PetscMax(error, PetscAbsReal(y[i] - x[i]));
     size = PetscMax(size, PetscAbsReal(x[i]));
   }
-  SB_CHECK(error < 2e-4 * size, "%s: error %g of %g", name, (double)error, (double)size);
+  SB_CHECK(error < 2e-4 * size, "%s: error %g of %g", name, error, size);
   PetscCall(SbFactorDestroy(&f));
 
   /* stored in full: exact up to rounding, with its own order and with a given one, in place */
@@ -176,7 +176,7 @@ static PetscErrorCode check_schur(const Problem *p)
     for (PetscInt i = j; i < m; i++)
       error = PetscMax(error, PetscAbsReal(mine[j * m + i] - p->dense[(free + i) * n + free + j]));
   }
-  SB_CHECK(error < 1e-11, "Schur complement is off by %g", (double)error);
+  SB_CHECK(error < 1e-11, "Schur complement is off by %g", error);
   PetscCall(PetscFree(mine));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -51,10 +51,9 @@ static PetscErrorCode test_all_pairs(const char *what, PetscInt nvert, PetscInt 
 static PetscErrorCode test_box(void)
 {
   const SbBody body = test_body("b", "box:1,1,1:3");
-  SbImport im;
+  SbImport im = {0};
 
   PetscFunctionBeginUser;
-  memset(&im, 0, sizeof(im));
   PetscCall(SbImportRead(&body, &im));
   PetscCall(test_all_pairs("box", im.nvert, im.item[3].n, im.item[3].vert));
   PetscCall(SbImportDestroy(&im));

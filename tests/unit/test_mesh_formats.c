@@ -497,7 +497,7 @@ static PetscErrorCode test_netgen(void)
 
     for (int k = 0; k < 4; k++) middle += vol.x[3 * vol.item[3].vert[4 * i + k]] / 4;
     SB_CHECK(test_in_group(&vol, vol.item[3].tags[i], middle < 1 ? "left" : "right"), "tet %d at %g", (int)i,
-             (double)middle);
+             middle);
   }
   SB_CHECK(neu.nvert == 12 && neu.item[3].n == 12, "%d vertices, %d tets", (int)neu.nvert,
            (int)neu.item[3].n);
@@ -589,7 +589,7 @@ static PetscErrorCode test_second_order(const char *folder)
 
       for (int k = 0; k < 3; k++) off = PetscMax(off, PetscAbsReal(e->off[k] - expected[i].off[k]));
       SB_CHECK(e->end[0] == expected[i].end[0] && e->end[1] == expected[i].end[1] && off < 1e-14,
-               "%s: edge %d-%d off by %g", file[f].name, (int)e->end[0], (int)e->end[1], (double)off);
+               "%s: edge %d-%d off by %g", file[f].name, (int)e->end[0], (int)e->end[1], off);
     }
     PetscCall(SbImportDestroy(&m.im));
   }

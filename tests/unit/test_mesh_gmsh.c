@@ -32,7 +32,7 @@ static PetscErrorCode test_variant(const char *path)
   }
   for (PetscInt i = 0; i < 3 * im.nvert && im.nvert == reference.nvert; i++)
     difference = PetscMax(difference, PetscAbsReal(im.x[i] - reference.x[i]));
-  SB_CHECK(difference == 0, "%s: coordinates differ by %g", path, (double)difference);
+  SB_CHECK(difference == 0, "%s: coordinates differ by %g", path, difference);
   SB_CHECK(im.item[3].n == reference.item[3].n &&
              !memcmp(im.item[3].vert, reference.item[3].vert, 4 * 48 * sizeof(PetscInt)),
            "%s: other tets", path);
@@ -79,7 +79,7 @@ static PetscErrorCode test_other_byte_order(void)
   PetscCall(test_import(path, &im));
   (void)unlink(path);
   SB_CHECK(im.nvert == 4 && im.item[3].n == 1, "%d vertices, %d tets", (int)im.nvert, (int)im.item[3].n);
-  SB_CHECK(im.x[3] == 1 && im.x[11] == 1, "coordinates %g %g", (double)im.x[3], (double)im.x[11]);
+  SB_CHECK(im.x[3] == 1 && im.x[11] == 1, "coordinates %g %g", im.x[3], im.x[11]);
   PetscCall(SbImportDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -19,12 +19,10 @@ static PetscErrorCode shared_path(const char *name, size_t size, char path[])
 static PetscErrorCode remove_all(const char *path)
 {
   char index[256];
-  PetscMPIInt rank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) {
+  if (!test_rank) {
     (void)unlink(path);
     (void)snprintf(index, sizeof(index), "%.*s.xmf", (int)(strrchr(path, '.') - path), path);
     (void)unlink(index);
@@ -65,13 +63,11 @@ static PetscErrorCode test_distributed(void)
   PetscReal gmsh[4], own[4], indexed[4];
   char path[256], index[256];
   SbImport *im;
-  PetscMPIInt rank;
 
   PetscFunctionBeginUser;
   PetscCall(shared_path("cubes.h5", sizeof(path), path));
   PetscCall(shared_path("cubes.xmf", sizeof(index), index));
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) {
+  if (!test_rank) {
     PetscCall(test_read(DATA "two_cubes_41.msh", 0, &im));
     PetscCall(SbMeshFileWrite(im, path, SB_MESH_AUTO));
     PetscCall(SbMeshFileDestroy(&im));
@@ -157,7 +153,7 @@ static PetscErrorCode test_output(void)
     PetscCall(test_read(path, cases[i].step, &im));
     SB_CHECK(im->nvert == 4 && im->item[3].n == 1, "%d vertices", (int)im->nvert);
     SB_CHECK(im->x[0] == cases[i].shift && im->x[3] == 1 + cases[i].shift, "step %d: x = %g",
-             (int)cases[i].step, (double)im->x[0]);
+             (int)cases[i].step, im->x[0]);
     test_groups_of(im, 3, 0, sizeof(text), text);
     SB_CHECK(!strcmp(text, "3 2 liver"), "the tet is of '%s'", text);
     PetscCall(SbMeshFileDestroy(&im));
@@ -190,7 +186,7 @@ static PetscErrorCode test_discontinuous(void)
   PetscCall(test_read(path, 1, &im));
   SB_CHECK(im->nvert == 5 && im->item[3].n == 2, "%d vertices", (int)im->nvert);
   SB_CHECK(im->item[3].vert[4] == 1 && im->item[3].vert[7] == 4, "vertices of the second tet");
-  SB_CHECK(im->x[3] == 1.25 && im->x[4] == 0, "x = %g", (double)im->x[3]);
+  SB_CHECK(im->x[3] == 1.25 && im->x[4] == 0, "x = %g", im->x[3]);
   PetscCall(SbMeshFileDestroy(&im));
   (void)unlink(path);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -320,11 +316,8 @@ static void replace(const char *path, const char *name, int ndim, const hsize_t 
 static PetscErrorCode with_array(const char *path, const char *name, int ndim, const hsize_t size[],
                                  hid_t type, const void *data, const char *words)
 {
-  PetscMPIInt rank;
-
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) {
+  if (!test_rank) {
     PetscCall(write_mesh(DATA "two_cubes_41.msh", path));
     replace(path, name, ndim, size, type, data);
   }
@@ -397,17 +390,15 @@ static PetscErrorCode test_curved_damage(void)
   static const double x[30] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 0, 1,
                                1, 0, 1, 0, 1, 1, 1, 1, 1, 3, 0, 0, 4, 0, 0};
   const hsize_t vertices[2] = {10, 3};
-  PetscMPIInt rank;
   char path[256];
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(shared_path("curved.h5", sizeof(path), path));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
     const hsize_t edges[2] = {(hsize_t)PetscMax(cases[i].nedge, 0), 2},
                   offs[2] = {(hsize_t)PetscMax(cases[i].noff, 0), 3};
 
-    if (!rank) {
+    if (!test_rank) {
       hid_t file, a;
 
       PetscCall(write_mesh("box:1,1,1:1", path));

@@ -132,7 +132,7 @@ static PetscErrorCode measure_cylinder(PetscInt n, PetscBool curved, PetscReal e
   for (int k = 0; k < 7; k++) {
     error[k] = PetscAbsReal(value[k] / exact[k] - 1);
     PetscCall(PetscPrintf(PETSC_COMM_SELF, "  %d cells, %s, %s: %.6g, error %.2e\n", (int)n,
-                          curved ? "curved" : "straight", names[k], (double)value[k], (double)error[k]));
+                          curved ? "curved" : "straight", names[k], value[k], error[k]));
   }
   PetscCall(SbMeshFileDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -147,10 +147,9 @@ static PetscErrorCode test_curved(void)
   for (int curved = 0; curved < 2; curved++)
     for (int k = 0; k < 2; k++) PetscCall(measure_cylinder(k ? 8 : 4, (PetscBool)curved, error[curved][k]));
   for (int k = 0; k < 7; k++) {
-    SB_CHECK(error[1][0][k] < 0.02 * error[0][0][k], "%d: error %g, %g straight", k, (double)error[1][0][k],
-             (double)error[0][0][k]);
-    SB_CHECK(error[1][0][k] > 14 * error[1][1][k], "%d: errors %g, %g", k, (double)error[1][0][k],
-             (double)error[1][1][k]);
+    SB_CHECK(error[1][0][k] < 0.02 * error[0][0][k], "%d: error %g, %g straight", k, error[1][0][k],
+             error[0][0][k]);
+    SB_CHECK(error[1][0][k] > 14 * error[1][1][k], "%d: errors %g, %g", k, error[1][0][k], error[1][1][k]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

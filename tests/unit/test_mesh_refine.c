@@ -73,8 +73,8 @@ static PetscErrorCode test_children(const char *path)
     worst = PetscMax(worst, PetscAbsReal(sum / det - 1));
     least = PetscMin(least, 8 * smallest / det);
   }
-  SB_CHECK(worst < 1e-13, "%s: volumes differ by %g", path, (double)worst);
-  SB_CHECK(least > 1 - 1e-12, "%s: a child has %g of its share", path, (double)least);
+  SB_CHECK(worst < 1e-13, "%s: volumes differ by %g", path, worst);
+  SB_CHECK(least > 1 - 1e-12, "%s: a child has %g of its share", path, least);
   PetscCall(SbMeshFileDestroy(&im));
   PetscCall(SbMeshFileDestroy(&fine));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -115,8 +115,8 @@ static PetscErrorCode test_shapes(void)
     if (!k) first = facts.body.max_radius_ratio;
   }
   SB_CHECK(im->item[3].n == 32768, "%d tets", (int)im->item[3].n);
-  SB_CHECK(facts.body.max_radius_ratio < 1.5 * first, "radius ratio %g after %g",
-           (double)facts.body.max_radius_ratio, (double)first);
+  SB_CHECK(facts.body.max_radius_ratio < 1.5 * first, "radius ratio %g after %g", facts.body.max_radius_ratio,
+           first);
   PetscCall(SbMeshFileDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -144,7 +144,7 @@ static PetscErrorCode test_curved(const char *path)
     nedge = im->nmiddle.n;
   }
   SB_CHECK(PetscAbsReal(volume - straight) > 1e-4 * straight, "%s: volume %g with edges as with none", path,
-           (double)volume);
+           volume);
   PetscCall(SbMeshFileDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -118,13 +118,12 @@ static PetscErrorCode test_all_at_once(void)
 static PetscErrorCode test_flat(void)
 {
   static const PetscInt ring[5] = {0, 1, 2, 3, 0};
-  SbImport im;
+  SbImport im = {0};
   SbRepair r;
   SbMeshStatistics facts;
   PetscInt v[4];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&im, sizeof(im)));
   (void)snprintf(im.where, sizeof(im.where), "flat");
   PetscCall(SbImportTagSet(&im, 0, NULL, &v[0]));
   /* a square 0 1 2 3 that is itself a flat tet, with a pyramid above and one below, divided along the two diagonals */

@@ -21,11 +21,11 @@ static PetscErrorCode test_parse(void)
   PetscFunctionBeginUser;
   PetscCall(test_set("s", "plane:0,0,2,0.4", &set));
   SB_CHECK(set.shape == SB_SET_PLANE && set.p[2] == 1 && set.p[3] == 0.2 && set.p[4] == 0, "plane %g %g %g",
-           (double)set.p[2], (double)set.p[3], (double)set.p[4]);
+           set.p[2], set.p[3], set.p[4]);
   PetscCall(test_set("s", "plane:3,0,4,5,0.1", &set));
   SB_CHECK_NEAR(set.p[0], 0.6, 1e-15, "norm");
   SB_CHECK_NEAR(set.p[3], 1, 1e-15, "distance");
-  SB_CHECK(set.p[4] == 0.1, "tolerance %g", (double)set.p[4]);
+  SB_CHECK(set.p[4] == 0.1, "tolerance %g", set.p[4]);
   PetscCall(test_set("s", "box:-1,-2,-3,1,2,3", &set));
   SB_CHECK(set.shape == SB_SET_BOX && set.p[0] == -1 && set.p[5] == 3, "box");
   PetscCall(test_set("s", "sphere:1,2,3,0.5", &set));

@@ -126,15 +126,13 @@ static PetscErrorCode test_same_mesh(PetscBool random, const char *partitioner)
   SbBody body[2][3];
   SbSet set[2][NSET];
   SbMesh a, b;
-  PetscMPIInt rank;
   int id = (int)getpid();
   char path[256];
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCallMPI(MPI_Bcast(&id, 1, MPI_INT, 0, PETSC_COMM_WORLD));
   (void)snprintf(path, sizeof(path), "/tmp/sbmesh_slab_%d.h5", id);
-  if (!rank) PetscCall(make_mesh(path, random));
+  if (!test_rank) PetscCall(make_mesh(path, random));
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
   PetscCall(PetscOptionsSetValue(NULL, "-mesh_partitioner", partitioner));
   PetscCall(create(path, "rank0", body[0], set[0], &a));
@@ -180,7 +178,7 @@ static PetscErrorCode test_same_mesh(PetscBool random, const char *partitioner)
   PetscCall(SbMeshDestroy(&b));
   PetscCall(PetscOptionsClearValue(NULL, "-mesh_partitioner"));
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  if (!rank) (void)unlink(path);
+  if (!test_rank) (void)unlink(path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -191,15 +189,13 @@ static PetscErrorCode test_refused(PetscInt ncell, const PetscInt vert[4], Petsc
 {
   SbBody body;
   SbMergedMesh whole;
-  PetscMPIInt rank;
   int id = (int)getpid();
   char path[256];
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCallMPI(MPI_Bcast(&id, 1, MPI_INT, 0, PETSC_COMM_WORLD));
   (void)snprintf(path, sizeof(path), "/tmp/sbmesh_slab_bad_%d.h5", id);
-  if (!rank) {
+  if (!test_rank) {
     SbImport *im;
 
     PetscCall(test_read("box:1,1,1:2", 0, &im));
@@ -217,7 +213,7 @@ static PetscErrorCode test_refused(PetscInt ncell, const PetscInt vert[4], Petsc
                    (isfinite(x) ? PETSC_ERR_USER_INPUT : PETSC_ERR_FILE_UNEXPECTED), words);
   }
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  if (!rank) (void)unlink(path);
+  if (!test_rank) (void)unlink(path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

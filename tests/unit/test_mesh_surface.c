@@ -4,8 +4,6 @@
 #include "mesh_test.h"
 #include "surface_files.h"
 
-static PetscMPIInt rank;
-
 /* Writes a surface or a text to a file and reads it as a measured body on rank 0, where *here is true. */
 static PetscErrorCode import(const char *extension, PetscBool binary, const TestSurface *s, const char *text,
                              const SbTetOptions *options, SbImport *im, SbBody *body, PetscBool *here)
@@ -15,8 +13,8 @@ static PetscErrorCode import(const char *extension, PetscBool binary, const Test
 
   PetscFunctionBeginUser;
   PetscCall(test_file_write(extension, binary, s, text, path));
-  *here = (PetscBool)!rank;
-  if (!rank) {
+  *here = (PetscBool)!test_rank;
+  if (!test_rank) {
     *body = test_body("b", path);
     memset(im, 0, sizeof(*im));
     if (options)
@@ -28,7 +26,6 @@ static PetscErrorCode import(const char *extension, PetscBool binary, const Test
     *body = facts.body;
   }
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -43,7 +40,7 @@ static PetscErrorCode refuse(const char *extension, const TestSurface *s, const 
 
   PetscFunctionBeginUser;
   PetscCall(test_file_write(extension, PETSC_FALSE, s, text, path));
-  if (!rank) {
+  if (!test_rank) {
     body = test_body("b", path);
     memset(&im, 0, sizeof(im));
     if (options)
@@ -54,7 +51,6 @@ static PetscErrorCode refuse(const char *extension, const TestSurface *s, const 
     PetscCall(SbImportDestroy(&im));
   }
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -127,7 +123,7 @@ static void append_solid(const TestSurface *s, PetscInt first, PetscInt last, co
     for (int k = 0; k < 3; k++) {
       const PetscReal *x = s->x[s->tri[f][k]];
 
-      grown += sprintf(grown, "vertex %.17g %.17g %.17g\n", (double)x[0], (double)x[1], (double)x[2]);
+      grown += sprintf(grown, "vertex %.17g %.17g %.17g\n", x[0], x[1], x[2]);
     }
     grown += sprintf(grown, "endloop\nendfacet\n");
   }
@@ -137,7 +133,7 @@ static void append_solid(const TestSurface *s, PetscInt first, PetscInt last, co
 /* Sphere in a sphere: solids of an STL text name surfaces and regions; a region's volume is that between the surfaces. */
 static PetscErrorCode check_nested(void)
 {
-  TestSurface s, outer;
+  TestSurface s = {0}, outer;
   SbImport im;
   SbBody body;
   PetscBool here;
@@ -145,7 +141,6 @@ static PetscErrorCode check_nested(void)
   char *text = (char *)calloc(1, 1);
 
   PetscFunctionBeginUser;
-  memset(&s, 0, sizeof(s));
   memset(&outer, 0, sizeof(outer));
   test_surface_sphere(2, &s);
   test_surface_sphere(2, &outer);
@@ -162,7 +157,7 @@ static PetscErrorCode check_nested(void)
     SB_CHECK_NEAR(of_group(&im, 3, "bone_region"), all / 8, 1e-12, "inner region");
     SB_CHECK_NEAR(of_group(&im, 3, "region_1") + of_group(&im, 3, "region_2"), all, 1e-12, "regions");
     SB_CHECK(of_group(&im, 2, "skin_of_it") == (PetscReal)n && of_group(&im, 2, "bone") == (PetscReal)n,
-             "%g and %g triangles", (double)of_group(&im, 2, "skin_of_it"), (double)of_group(&im, 2, "bone"));
+             "%g and %g triangles", of_group(&im, 2, "skin_of_it"), of_group(&im, 2, "bone"));
     SB_CHECK(body.nfacet == n && body.npart == 1, "%d facets, %d parts", (int)body.nfacet, (int)body.npart);
     PetscCall(SbImportDestroy(&im));
   }
@@ -192,9 +187,9 @@ static PetscErrorCode check_wall(void)
   if (!here) PetscFunctionReturn(PETSC_SUCCESS);
   SB_CHECK_NEAR(of_group(&im, 3, "low_region"), 1, 1e-12, "low");
   SB_CHECK_NEAR(of_group(&im, 3, "high_region"), 2, 1e-12, "high");
-  SB_CHECK(of_group(&im, 2, "bottom") == 2, "bottom: %g", (double)of_group(&im, 2, "bottom"));
+  SB_CHECK(of_group(&im, 2, "bottom") == 2, "bottom: %g", of_group(&im, 2, "bottom"));
   SB_CHECK(of_group(&im, 2, "low") == 12 && of_group(&im, 2, "high") == 12, "sides: %g, %g",
-           (double)of_group(&im, 2, "low"), (double)of_group(&im, 2, "high"));
+           of_group(&im, 2, "low"), of_group(&im, 2, "high"));
   SB_CHECK(body.nfacet == 20, "%d facets", (int)body.nfacet);
   SB_CHECK(strstr(body.note, "triangles back to back kept once as a wall: 2"), "'%s'", body.note);
   PetscCall(SbImportDestroy(&im));
@@ -204,13 +199,12 @@ static PetscErrorCode check_wall(void)
 /* Box with a cavity that contains a box; turned: all orientations inverted. */
 static PetscErrorCode check_cavity(PetscBool turned)
 {
-  TestSurface s;
+  TestSurface s = {0};
   SbImport im;
   SbBody body;
   PetscBool here;
 
   PetscFunctionBeginUser;
-  memset(&s, 0, sizeof(s));
   cube_at(0, 3, turned, &s);
   cube_at(1, 1, (PetscBool)!turned, &s);
   cube_at(1.25, 0.5, turned, &s);
@@ -367,15 +361,14 @@ static PetscErrorCode check_ply(void)
     FILE *f;
 
     PetscCall(test_file_write(".ply", PETSC_FALSE, NULL, "", path));
-    f = rank ? NULL : fopen(path, "wb");
+    f = test_rank ? NULL : fopen(path, "wb");
     if (f) (void)fwrite(text, 1, n, f);
     if (f) (void)fclose(f);
     PetscCall(SbTrianglesRead(PETSC_COMM_WORLD, "-o", path, 1, (PetscReal[3]){0, 0, 0}, &t));
     SB_CHECK(t.ntri == 12 && t.nvert == 8, "kind %d: %d triangles", kind, (int)t.ntri);
     SB_CHECK_NEAR(t.volume, 1, 1e-14, "cube");
-    SB_CHECK(t.x[2] == -2, "z = %g", (double)t.x[2]);
+    SB_CHECK(t.x[2] == -2, "z = %g", t.x[2]);
     PetscCall(SbTrianglesDestroy(&t));
-    PetscCall(test_file_remove(path));
   }
   (void)write_ply(0, text);
   PetscCall(refuse(".ply", NULL, "stl\n", NULL, "line 1|'ply'|'stl'"));
@@ -419,10 +412,9 @@ static PetscErrorCode mend(TestSurface *s, const SbTetOptions *options, PetscRea
 static PetscErrorCode check_mended(void)
 {
   SbTetOptions options;
-  TestSurface s;
+  TestSurface s = {0};
 
   PetscFunctionBeginUser;
-  memset(&s, 0, sizeof(s));
   SbTetDefaults(&options);
   cube_at(0, 1, PETSC_FALSE, &s); /* a duplicate corner, displaced by 1e-6 */
   test_surface_grow(&s, 1, 0);
@@ -493,17 +485,16 @@ static void one_sided(TestSurface *s)
 static PetscErrorCode check_refused(void)
 {
   SbTetOptions options;
-  TestSurface s;
+  TestSurface s = {0};
   SbTriangles t;
   int64_t number[1000];
   PetscInt tags[1000] = {0};
   SbImport im = {.where = "test"};
   SbTriangleFile file = {.im = &im, .where = im.where, .t = &t, .number = number, .tags = tags};
-  SbSurfaceRepairs mended;
-  SbSurface body_surface;
+  SbSurfaceRepairs mended = {0};
+  SbSurface body_surface = {0};
 
   PetscFunctionBeginUser;
-  memset(&s, 0, sizeof(s));
   cube_at(0, 1, PETSC_FALSE, &s);
   s.ntri = 11;
   PetscCall(refuse(".off", &s, NULL, NULL, "body 'b'|3 edges"));
@@ -528,14 +519,12 @@ static PetscErrorCode check_refused(void)
   PetscCall(refuse(".obj", NULL, "v 0 0 0\nv 1 0 0\n", NULL, "body 'b'"));
   /* one side only: the surface also intersects itself, so only the search for regions is called */
   one_sided(&s);
-  memset(&mended, 0, sizeof(mended));
   memset(&t, 0, sizeof(t));
   t.nvert = s.nvert;
   t.ntri = s.ntri;
   t.x = &s.x[0][0];
   t.tri = &s.tri[0][0];
   for (int i = 0; i < 1000; i++) number[i] = i + 1;
-  memset(&body_surface, 0, sizeof(body_surface));
   SB_CHECK_ERROR(SbSurfaceFindRegions(&file, &mended, &body_surface), PETSC_ERR_USER_INPUT, "test");
   clear(&s);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -545,12 +534,11 @@ static PetscErrorCode check_refused(void)
 static PetscErrorCode check_fold(void)
 {
   SbTetOptions options;
-  TestSurface s;
+  TestSurface s = {0};
   PetscReal volume;
   PetscInt v;
 
   PetscFunctionBeginUser;
-  memset(&s, 0, sizeof(s));
   SbTetDefaults(&options);
   test_surface_sphere(4, &s);
   volume = volume_of(&s);
@@ -583,7 +571,6 @@ static PetscErrorCode check_fold(void)
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(check_nested());
   PetscCall(check_wall());
   PetscCall(check_cavity(PETSC_FALSE));

@@ -47,10 +47,9 @@ static PetscErrorCode check_cube(const char *extension, PetscBool binary, PetscB
   SB_CHECK_NEAR(t.edge, 2 * (2 + PETSC_SQRT2) / 3, 1e-14, "mean edge");
   SB_CHECK(t.turned == inwards, "%s: turned %d", extension, (int)t.turned);
   for (PetscInt i = 0; i < 3 * t.nvert; i++)
-    SB_CHECK(t.x[i] == at[i % 3] || t.x[i] == at[i % 3] + 2, "%s: coordinate %g", extension, (double)t.x[i]);
+    SB_CHECK(t.x[i] == at[i % 3] || t.x[i] == at[i % 3] + 2, "%s: coordinate %g", extension, t.x[i]);
   check_across(&t);
   PetscCall(SbTrianglesDestroy(&t));
-  PetscCall(test_file_remove(path));
   test_surface_free(&s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -87,7 +86,6 @@ static PetscErrorCode check_more(void)
   SB_CHECK(t.ntri == 12, "%d triangles of six squares", (int)t.ntri);
   SB_CHECK_NEAR(t.volume, 1, 1e-14, "squares");
   PetscCall(SbTrianglesDestroy(&t));
-  PetscCall(test_file_remove(path));
   cube(PETSC_FALSE, &s);
   test_surface_box(lo, hi, PETSC_TRUE, &s);
   test_surface_box(far, out, PETSC_FALSE, &s);
@@ -96,7 +94,6 @@ static PetscErrorCode check_more(void)
   SB_CHECK_NEAR(t.volume, 2 - 0.125, 1e-14, "a hollow cube and another one");
   SB_CHECK(!t.turned, "nothing to turn");
   PetscCall(SbTrianglesDestroy(&t));
-  PetscCall(test_file_remove(path));
   test_surface_free(&s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -131,7 +128,6 @@ static PetscErrorCode check_stl(const char *first, const char *last, PetscBool c
            (int)t.nvert);
   SB_CHECK_NEAR(t.volume, 1. / 6, 1e-14, last);
   PetscCall(SbTrianglesDestroy(&t));
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -166,7 +162,6 @@ static PetscErrorCode check_stl_variants(void)
   SB_CHECK(t.ntri == 12, "%d triangles", (int)t.ntri);
   SB_CHECK_NEAR(t.volume, 1, 1e-14, "bytes behind the triangles");
   PetscCall(SbTrianglesDestroy(&t));
-  PetscCall(test_file_remove(path));
   test_surface_free(&s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -189,7 +184,6 @@ static PetscErrorCode refuse_text(const char *extension, const char *text, const
   PetscFunctionBeginUser;
   PetscCall(test_file_write(extension, PETSC_FALSE, NULL, text, path));
   PetscCall(refuse_file(path, PETSC_ERR_FILE_UNEXPECTED, words));
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -200,7 +194,6 @@ static PetscErrorCode refuse(TestSurface *s, const char *words)
   PetscFunctionBeginUser;
   PetscCall(test_file_write(".off", PETSC_FALSE, s, NULL, path));
   PetscCall(refuse_file(path, PETSC_ERR_USER_INPUT, words));
-  PetscCall(test_file_remove(path));
   test_surface_free(s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -218,7 +211,6 @@ static PetscErrorCode accept(TestSurface *s, PetscInt ntri, PetscReal volume, co
   SB_CHECK_NEAR(t.volume, volume, 1e-14, what);
   check_across(&t);
   PetscCall(SbTrianglesDestroy(&t));
-  PetscCall(test_file_remove(path));
   test_surface_free(s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -296,7 +288,6 @@ static PetscErrorCode check_files(void)
   s.ntri = 11;
   PetscCall(test_file_write(".stl", PETSC_TRUE, &s, "lost", path));
   PetscCall(refuse_file(path, PETSC_ERR_FILE_UNEXPECTED, "'solid'"));
-  PetscCall(test_file_remove(path));
   test_surface_free(&s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -107,9 +107,9 @@ static PetscErrorCode test_ends(void)
   PetscFunctionBeginUser;
   PetscCall(begin("-body_liver_closed 1 -body_liver_poisson 0 -repeat 1", &database));
   PetscCall(SbOptionReal(&body_scope, "closed", &x));
-  SB_CHECK(x == 1, "closed is %g", (double)x);
+  SB_CHECK(x == 1, "closed is %g", x);
   PetscCall(SbOptionReal(&body_scope, "poisson", &x));
-  SB_CHECK(x == 0, "poisson is %g", (double)x);
+  SB_CHECK(x == 0, "poisson is %g", x);
   PetscCall(SbOptionInt(&run_scope, "repeat", &n));
   SB_CHECK(n == 1, "repeat is %d", (int)n);
   PetscCall(end(&database));
@@ -166,35 +166,33 @@ static PetscErrorCode read_all(PetscBool given)
   PetscCall(SbOptionChoice(&run_scope, "integrator", &choice));
   SB_CHECK(choice == (given ? 2 : 0), "integrator is %d", (int)choice);
   PetscCall(SbOptionReal(&run_scope, "limit", &limit));
-  SB_CHECK(limit == (given ? 0.1 : 77), "limit is %g", (double)limit);
+  SB_CHECK(limit == (given ? 0.1 : 77), "limit is %g", limit);
   PetscCall(SbOptionString(&body_scope, "mesh", sizeof(text), text));
   SB_CHECK(!strcmp(text, "my meshes/liver.msh"), "mesh is '%s'", text);
   PetscCall(SbOptionReal(&body_scope, "scale", &x[0]));
-  SB_CHECK(x[0] == (given ? 0.10000000000000002 : 1), "scale is %.17g", (double)x[0]);
+  SB_CHECK(x[0] == (given ? 0.10000000000000002 : 1), "scale is %.17g", x[0]);
   PetscCall(SbOptionReals(&body_scope, "translate", x));
   SB_CHECK(x[0] == (given ? -1 : 0) && x[1] == (given ? 2.5 : 0) && x[2] == (given ? 1e-300 : 0),
            "translate");
   PetscCall(SbOptionReal(&body_scope, "young", &x[0]));
-  SB_CHECK(x[0] == 5e3, "young is %g", (double)x[0]);
+  SB_CHECK(x[0] == 5e3, "young is %g", x[0]);
   PetscCall(SbOptionNames(&body_scope, "tags", &n, &names));
   SB_CHECK(n == (given ? 1 : 0), "%d tags", (int)n);
   PetscCall(PetscFree(names));
   PetscCall(SbOptionFormulas(&body_scope, "pull", f));
   x[0] = 7, x[1] = 8, x[2] = 9;
-  SB_CHECK(SbFormulaEval(f[0], 3, x) == (given ? -7 : 0), "pull 0 is %g", (double)SbFormulaEval(f[0], 3, x));
-  SB_CHECK(SbFormulaEval(f[2], 3, x) == (given ? 10 : 6), "pull 2 is %g", (double)SbFormulaEval(f[2], 3, x));
+  SB_CHECK(SbFormulaEval(f[0], 3, x) == (given ? -7 : 0), "pull 0 is %g", SbFormulaEval(f[0], 3, x));
+  SB_CHECK(SbFormulaEval(f[2], 3, x) == (given ? 10 : 6), "pull 2 is %g", SbFormulaEval(f[2], 3, x));
   for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&f[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode write_file(const char *name, const char *text)
 {
-  PetscMPIInt rank;
   FILE *f;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) {
+  if (!test_rank) {
     f = fopen(name, "w");
     PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s", name);
     (void)fputs(text, f);
@@ -291,7 +289,6 @@ static PetscErrorCode test_view_text(const char *folder)
   PetscOptions database;
   PetscViewer viewer;
   PetscReal x;
-  PetscMPIInt rank;
   PetscBool preset = PETSC_FALSE;
   int given = 0;
 
@@ -304,8 +301,7 @@ static PetscErrorCode test_view_text(const char *folder)
   PetscCall(SbOptionsView(viewer));
   PetscCall(PetscViewerDestroy(&viewer));
   PetscCall(end(&database));
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) {
+  if (!test_rank) {
     FILE *f = fopen(view, "r");
 
     while (f && fgets(line, sizeof(line), f)) {
@@ -452,7 +448,7 @@ static PetscErrorCode test_underscores(void)
   PetscCall(SbOptionsRegister("body", "", 1, long_rows));
   PetscCall(SbScopeSet(&other, "body", "corotated", "liver_mesh"));
   PetscCall(SbOptionReal(&other, "scale", &x));
-  SB_CHECK(x == 3, "scale of liver_mesh is %g", (double)x);
+  SB_CHECK(x == 3, "scale of liver_mesh is %g", x);
   SB_CHECK_ERROR(SbOptionReal(&body_scope, "mesh_scale", &x), PETSC_ERR_USER,
                  "-body_liver_mesh_scale|body 'liver_mesh'|body 'liver'");
   PetscCall(end(&database));
@@ -483,15 +479,13 @@ static PetscErrorCode test_manual(const char *folder)
 {
   char file[PETSC_MAX_PATH_LEN], line[1024];
   PetscOptions database;
-  PetscMPIInt rank;
   int rows = 0, required = 0, tabs = 0;
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(file, sizeof(file), "%s/options.tsv", folder));
   PetscCall(begin("", &database));
   PetscCall(SbOptionsTable(PETSC_COMM_WORLD, file));
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) {
+  if (!test_rank) {
     FILE *f = fopen(file, "r");
 
     while (f && fgets(line, sizeof(line), f)) {
@@ -513,11 +507,9 @@ static PetscErrorCode test_manual(const char *folder)
 static PetscErrorCode run_tests(void)
 {
   char folder[PETSC_MAX_PATH_LEN] = "/tmp/sb_test_option_XXXXXX", command[PETSC_MAX_PATH_LEN + 16];
-  PetscMPIInt rank;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot make a folder");
+  if (!test_rank) PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot make a folder");
   PetscCallMPI(MPI_Bcast(folder, sizeof(folder), MPI_CHAR, 0, PETSC_COMM_WORLD));
   PetscCall(test_refused_numbers());
   PetscCall(test_ends());
@@ -533,7 +525,7 @@ static PetscErrorCode run_tests(void)
   PetscCall(test_manual(folder));
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
   PetscCall(PetscSNPrintf(command, sizeof(command), "rm -rf %s", folder));
-  if (!rank) PetscCheck(!system(command), PETSC_COMM_SELF, PETSC_ERR_SYS, "cannot remove %s", folder);
+  if (!test_rank) PetscCheck(!system(command), PETSC_COMM_SELF, PETSC_ERR_SYS, "cannot remove %s", folder);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

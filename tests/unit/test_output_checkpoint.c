@@ -45,12 +45,12 @@ static PetscErrorCode test_round_trip(void)
   SbFormat(sizeof(options), options, HELD EULER "-output_fields none -restart %s/checkpoint_000005.h5", dir);
   PetscCall(test_scene_open_in(dir, options, &scene));
   SB_CHECK(scene.run->step0 == 5 && scene.run->t0 == 5 * 0.1, "restart at step %d, t = %.17g",
-           (int)scene.run->step0, (double)scene.run->t0);
-  SB_CHECK(difference(&scene, 0.5) == 0., "the state differs by %g", (double)difference(&scene, 0.5));
+           (int)scene.run->step0, scene.run->t0);
+  SB_CHECK(difference(&scene, 0.5) == 0., "the state differs by %g", difference(&scene, 0.5));
   SB_CHECK(scene.run->energy_start == 1. / 7. && scene.run->energies.load_work == 305. &&
              scene.run->energies.prescribed_work == 400.,
-           "running totals: %.17g %g %g", (double)scene.run->energy_start,
-           (double)scene.run->energies.load_work, (double)scene.run->energies.prescribed_work);
+           "running totals: %.17g %g %g", scene.run->energy_start, scene.run->energies.load_work,
+           scene.run->energies.prescribed_work);
   SB_CHECK(!fixture_exists(dir, "checkpoint_000008.h5"),
            "a checkpoint of what is computed again is still there");
   PetscCall(test_scene_close(&scene));
@@ -82,7 +82,7 @@ static PetscErrorCode test_elements(void)
              i >= 3 ? more : "-output_fields none", elements[i]);
     PetscCall(test_scene_open_in(dir, options, &scene));
     SB_CHECK(difference(&scene, 0.1) == 0., "'%s': the state differs by %g", elements[i],
-             (double)difference(&scene, 0.1));
+             difference(&scene, 0.1));
     PetscCall(test_scene_close(&scene));
     SbFormat(sizeof(options), options, HELD EULER "%s %s -body_a_element %s -restart latest",
              i >= 3 ? more : "-output_fields none", elements[i], i == 0 || i == 2 ? "cr" : "dg");
@@ -114,8 +114,7 @@ static PetscErrorCode test_next_step(void)
     SbFormat(sizeof(options), options, BOX EULER "-output_fields none -restart latest%s", cases[i].more);
     PetscCall(test_scene_open_in(dir, options, &scene));
     PetscCall(TSGetTimeStep(scene.run->ts, &dt));
-    SB_CHECK(dt == cases[i].dt, "'%s': next step %g, expected %g", cases[i].more, (double)dt,
-             (double)cases[i].dt);
+    SB_CHECK(dt == cases[i].dt, "'%s': next step %g, expected %g", cases[i].more, dt, cases[i].dt);
     PetscCall(test_scene_close(&scene));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

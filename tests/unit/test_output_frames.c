@@ -100,11 +100,11 @@ static PetscErrorCode check_mesh(SbOutput out, SbH5 *h, PetscReal volume)
     least = PetscMin(least, det);
     // bodies in scenario order: the cells of the first one come first
     SB_CHECK(body[c] == (PetscReal)(out->cell.start + c >= 48), "cell %d is in body %g",
-             (int)(out->cell.start + c), (double)body[c]);
+             (int)(out->cell.start + c), body[c]);
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   SB_CHECK_NEAR(sum, volume, 1e-13, "volume of the cells of the file"); // rounding of 48 volumes near 1e-4
-  SB_CHECK(least > 0., "a cell of the file is negatively oriented: %g", (double)least);
+  SB_CHECK(least > 0., "a cell of the file is negatively oriented: %g", least);
   PetscCall(PetscFree3(x, cell, body));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -201,7 +201,7 @@ static PetscErrorCode check_sets(const char *more)
   SB_CHECK(fine, "points of the sets%s", more);
   for (PetscInt c = 0; c < out->cell.n; c++) volume += tets[c];
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &volume, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
-  SB_CHECK(2 * volume == out->cell.N, "%g of %d tets in one half", (double)volume, (int)out->cell.N);
+  SB_CHECK(2 * volume == out->cell.N, "%g of %d tets in one half", volume, (int)out->cell.N);
   PetscCall(PetscFree4(x, left, half, tets));
   PetscCall(SbH5Close(&h));
   PetscCall(test_scene_close(&scene));

@@ -144,7 +144,7 @@ static PetscErrorCode test_mean(PetscBool discontinuous)
   }
   SB_CHECK_NEAR(worst, 0., 1e-14, "vertex values"); // roundings of numbers below 1
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &jump, 1, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD));
-  SB_CHECK(!discontinuous || jump > 1e-3, "nothing has jumps: %g", (double)jump);
+  SB_CHECK(!discontinuous || jump > 1e-3, "nothing has jumps: %g", jump);
   PetscCall(PetscFree(value));
   PetscCall(test_scene_close(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -187,10 +187,10 @@ static PetscErrorCode test_reactions(const char *more)
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sums, 14, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   SB_CHECK(sums[7] == 0.5 * (6 + 8 + 8), "%g N at the nodes",
-           (double)sums[7]); // vertices, faces, supports of faces
+           sums[7]); // vertices, faces, supports of faces
   for (int k = 0; k < 6; k++)
     SB_CHECK_NEAR(sums[k], sums[7 + k], 1e-13, "resultant or moment of the reactions");
-  SB_CHECK(away == 0., "a reaction away from the support: %g", (double)away);
+  SB_CHECK(away == 0., "a reaction away from the support: %g", away);
   PetscCall(PetscFree(r));
   PetscCall(test_scene_close(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -73,7 +73,7 @@ static PetscErrorCode test_laws(void)
     }
     /* lambda / mu is 5e5: the difference and theta = 0 lose as many digits */
     SB_CHECK(difference < 1e-8 && largest > 0.5 && largest < 10., "%s: %g differ, largest %g", laws[n],
-             (double)difference, (double)largest);
+             difference, largest);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -144,8 +144,8 @@ static PetscErrorCode test_operator(const char *options, PetscReal amplitude, co
   PetscCall(VecNorm(Ax, NORM_2, &norm));
   PetscCall(VecAXPY(Kx, -1., Ax));
   PetscCall(VecNorm(Kx, NORM_2, &error));
-  SB_CHECK(norm > 0. && error < 1e-12 * norm, "%s: operator and matrix differ by %g of %g", options,
-           (double)error, (double)norm);
+  SB_CHECK(norm > 0. && error < 1e-12 * norm, "%s: operator and matrix differ by %g of %g", options, error,
+           norm);
   PetscCall(SbPressureOperatorGet(K, &op));
   PetscCall(SbLevelsSetUp(op->levels, &positive));
   SB_CHECK(positive, "a diagonal block is not positive");
@@ -158,7 +158,7 @@ static PetscErrorCode test_operator(const char *options, PetscReal amplitude, co
   PetscCallMPI(MPI_Comm_size(s->comm, &size));
   if (size > 1 && s->width > 4 && amplitude > 0.) tolerance = 1e-3;
   SB_CHECK(xMx > 0. && PetscAbsReal(xMy - yMx) < tolerance * xMx, "%s: x M x = %g, x M y = %g, y M x = %g",
-           options, (double)xMx, (double)xMy, (double)yMx);
+           options, xMx, xMy, yMx);
   PetscCall(MatDestroy(&A));
   PetscCall(MatDestroy(&K));
   PetscCall(PetscRandomDestroy(&random));
@@ -212,16 +212,14 @@ typedef struct {
 /* Runs a scene; result->U is a copy of the displacement. */
 static PetscErrorCode run_scene(const char *options, const char *solver, Result *result)
 {
-  char text[2048];
   TestScene scene;
   KSP ksp;
   PC pc;
 
   PetscFunctionBeginUser;
   /* a method that the user has chosen is not replaced when it fails */
-  PetscCall(PetscSNPrintf(text, sizeof(text), "%s -solver %s%s", options, solver,
-                          strcmp(solver, "pressure") ? "" : " -ksp_type richardson"));
-  PetscCall(test_scene_open(text, &scene));
+  PetscCall(test_open(&scene, "%s -solver %s%s", options, solver,
+                      strcmp(solver, "pressure") ? "" : " -ksp_type richardson"));
   PetscCall(SbRunSolve(scene.run));
   result->ok = (PetscBool)!scene.run->stop_reason[0];
   result->its = 0;
@@ -249,8 +247,8 @@ static PetscErrorCode test_solution(const char *options, PetscInt bound, PetscRe
   SB_CHECK(iterative.ok && direct.ok, "%s: a run has failed", options);
   SB_CHECK(iterative.its > 0 && iterative.its <= bound, "%s: %d iterations, at most %d expected", options,
            (int)iterative.its, (int)bound);
-  SB_CHECK(norm > 0. && error < tolerance * norm, "%s: displacements differ by %g of %g", options,
-           (double)error, (double)norm);
+  SB_CHECK(norm > 0. && error < tolerance * norm, "%s: displacements differ by %g of %g", options, error,
+           norm);
   PetscCall(VecDestroy(&iterative.U));
   PetscCall(VecDestroy(&direct.U));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -106,11 +106,9 @@ static PetscErrorCode test_model(const char *folder)
   char view[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN];
   PetscOptions database;
   PetscViewer viewer;
-  PetscMPIInt rank;
   SbModel model;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(PetscSNPrintf(view, sizeof(view), "%s/view.opts", folder));
   PetscCall(PetscSNPrintf(file, sizeof(file), "%s/scene.yml", folder));
 
@@ -125,7 +123,7 @@ static PetscErrorCode test_model(const char *folder)
   PetscCall(PetscViewerDestroy(&viewer));
   PetscCall(end(&database, &model));
 
-  if (!rank) {
+  if (!test_rank) {
     FILE *f = fopen(file, "w");
 
     PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s", file);
@@ -212,12 +210,10 @@ static PetscErrorCode test_check(const char *folder)
   char options[2 * PETSC_MAX_PATH_LEN], message[2 * PETSC_MAX_PATH_LEN];
   PetscOptions database;
   SbModel model;
-  PetscMPIInt rank;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(PetscSNPrintf(options, sizeof(options), "%s/liver.msh", folder));
-  if (!rank) {
+  if (!test_rank) {
     FILE *f = fopen(options, "w");
 
     if (f) (void)fclose(f);
@@ -283,11 +279,9 @@ static PetscErrorCode test_command(void)
 static PetscErrorCode run_tests(void)
 {
   char folder[PETSC_MAX_PATH_LEN] = "/tmp/sb_test_scene_XXXXXX", command[PETSC_MAX_PATH_LEN + 16];
-  PetscMPIInt rank;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot make a folder");
+  if (!test_rank) PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot make a folder");
   PetscCallMPI(MPI_Bcast(folder, sizeof(folder), MPI_CHAR, 0, PETSC_COMM_WORLD));
   PetscCall(test_model(folder));
   PetscCall(test_names());
@@ -297,7 +291,7 @@ static PetscErrorCode run_tests(void)
   PetscCall(test_command());
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
   PetscCall(PetscSNPrintf(command, sizeof(command), "rm -rf %s", folder));
-  if (!rank) PetscCheck(!system(command), PETSC_COMM_SELF, PETSC_ERR_SYS, "cannot remove %s", folder);
+  if (!test_rank) PetscCheck(!system(command), PETSC_COMM_SELF, PETSC_ERR_SYS, "cannot remove %s", folder);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -27,7 +27,6 @@ static PetscErrorCode make(const TestSurface *s, SbObstacle *o, size_t size, cha
   PetscCall(PetscSNPrintf(text, sizeof(text), "mesh:%s", path));
   PetscCall(SbObstacleCreate("-o", text, o));
   PetscCall(SbObstacleSetUp(*o, PETSC_COMM_WORLD, "-o", 1, zero, size, note));
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -37,7 +36,7 @@ static PetscErrorCode make(const TestSurface *s, SbObstacle *o, size_t size, cha
 static PetscErrorCode check_cube(void)
 {
   const PetscReal lo[3] = {-0.5, -0.4, -0.3}, hi[3] = {0.6, 0.5, 0.7};
-  TestSurface s;
+  TestSurface s = {0};
   SbObstacle o, box;
   PetscInt inside = 0;
   PetscReal off = 0, turned = 0;
@@ -45,7 +44,6 @@ static PetscErrorCode check_cube(void)
   char note[256] = "";
 
   PetscFunctionBeginUser;
-  memset(&s, 0, sizeof(s));
   test_surface_box(lo, hi, PETSC_FALSE, &s);
   PetscCall(make(&s, &o, sizeof(note), note));
   PetscCall(SbObstacleCreate("-o", "box:-0.5,-0.4,-0.3,0.6,0.5,0.7", &box));
@@ -60,8 +58,8 @@ static PetscErrorCode check_cube(void)
     if (PetscAbsReal(exact) > 1e-3) turned = PetscMax(turned, 1 - SbDot3(n, m));
   }
   SB_CHECK(inside > 200, "%d inside", (int)inside);
-  SB_CHECK(off < 1e-14, "distances from the cube are off by %g", (double)off);
-  SB_CHECK(turned < 1e-12, "normals of the cube are turned: 1 - cos = %g", (double)turned);
+  SB_CHECK(off < 1e-14, "distances from the cube are off by %g", off);
+  SB_CHECK(turned < 1e-12, "normals of the cube are turned: 1 - cos = %g", turned);
   SB_CHECK(strstr(note, "12 triangles around 0.99 m^3"), "note: %s", note);
   PetscCall(SbObstacleDestroy(&o));
   PetscCall(SbObstacleDestroy(&box));
@@ -74,12 +72,11 @@ static PetscErrorCode check_on(void)
 {
   static const PetscReal at[4][3] = {{1, 1, 1}, {1, 1, 0.3}, {1, 0.2, 0.3}, {1 - 1e-13, 0.2, 0.3}};
   const PetscReal unit[3] = {1, 1, 1};
-  TestSurface s;
+  TestSurface s = {0};
   SbObstacle o;
   char note[256];
 
   PetscFunctionBeginUser;
-  memset(&s, 0, sizeof(s));
   test_surface_box(zero, unit, PETSC_FALSE, &s);
   PetscCall(make(&s, &o, sizeof(note), note));
   for (int i = 0; i < 4; i++) {
@@ -173,8 +170,8 @@ static PetscErrorCode check_surface(const TestSurface *s, PetscReal box, const c
     foot = PetscMax(foot, PetscAbsReal(SbObstacleDistance(o, y, m)));
   }
   SB_CHECK(inside > 50 && !wrong, "%s: %d inside, %d on the wrong side", what, (int)inside, (int)wrong);
-  SB_CHECK(off < 1e-13, "%s: distances are off by %g", what, (double)off);
-  SB_CHECK(foot < 1e-13, "%s: the nearest point is off the surface by %g", what, (double)foot);
+  SB_CHECK(off < 1e-13, "%s: distances are off by %g", what, off);
+  SB_CHECK(foot < 1e-13, "%s: the nearest point is off the surface by %g", what, foot);
   PetscCall(SbObstacleDestroy(&o));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -182,10 +179,9 @@ static PetscErrorCode check_surface(const TestSurface *s, PetscReal box, const c
 static PetscErrorCode check_torus(void)
 {
   const PetscInt n[2] = {24, 12};
-  TestSurface s;
+  TestSurface s = {0};
 
   PetscFunctionBeginUser;
-  memset(&s, 0, sizeof(s));
   test_surface_torus(1, 0.4, n, &s);
   PetscCall(check_surface(&s, 1.5, "torus"));
   test_surface_free(&s);
@@ -198,10 +194,9 @@ static PetscErrorCode check_parts(void)
   const PetscReal a[3] = {-0.5, -0.5, -0.5}, b[3] = {0.5, 0.5, 0.5}, c[3] = {-0.3, -0.3, -0.3},
                   d[3] = {0.4, 0.4, 0.4};
   const PetscReal p[3] = {-0.8, -0.8, 0.7}, q[3] = {0.8, 0.8, 0.72};
-  TestSurface s;
+  TestSurface s = {0};
 
   PetscFunctionBeginUser;
-  memset(&s, 0, sizeof(s));
   test_surface_box(a, b, PETSC_FALSE, &s);
   test_surface_box(c, d, PETSC_TRUE, &s);
   test_surface_box(p, q, PETSC_FALSE, &s);
@@ -226,7 +221,7 @@ static PetscReal longest_edge(const TestSurface *s)
 /* A triangle in the unit sphere with edges up to h is at most h^2 / 6 away from it, and its normal deviates by less than h. */
 static PetscErrorCode check_sphere(int split)
 {
-  TestSurface s;
+  TestSurface s = {0};
   SbObstacle o;
   PetscReal off = 0, turned = 0, h;
   PetscInt near = 0, inside = 0;
@@ -234,7 +229,6 @@ static PetscErrorCode check_sphere(int split)
   char note[256];
 
   PetscFunctionBeginUser;
-  memset(&s, 0, sizeof(s));
   test_surface_sphere(split, &s);
   h = longest_edge(&s);
   PetscCall(make(&s, &o, sizeof(note), note));
@@ -251,8 +245,8 @@ static PetscErrorCode check_sphere(int split)
     turned = PetscMax(turned, PetscSqrtReal(PetscMax(0, 2 - 2 * SbDot3(n, x) / r)));
   }
   SB_CHECK(near > 500 && inside > 200, "%d near the sphere", (int)near);
-  SB_CHECK(off < h * h / 6 * (1 + h), "sphere of edges %g: distances are off by %g", (double)h, (double)off);
-  SB_CHECK(turned < h, "sphere of edges %g: normals are off by %g", (double)h, (double)turned);
+  SB_CHECK(off < h * h / 6 * (1 + h), "sphere of edges %g: distances are off by %g", h, off);
+  SB_CHECK(turned < h, "sphere of edges %g: normals are off by %g", h, turned);
   PetscCall(SbObstacleDestroy(&o));
   test_surface_free(&s);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -278,7 +272,7 @@ static PetscErrorCode check_errors(void)
 /* Time of building the tree and of a query, for information: nothing is checked. */
 static PetscErrorCode measure(void)
 {
-  TestSurface s;
+  TestSurface s = {0};
   SbObstacle o;
   PetscLogDouble t0, t1, t2;
   PetscReal sum = 0;
@@ -286,7 +280,6 @@ static PetscErrorCode measure(void)
   char note[256];
 
   PetscFunctionBeginUser;
-  memset(&s, 0, sizeof(s));
   test_surface_sphere(5, &s);
   PetscCall(PetscTime(&t0));
   PetscCall(make(&s, &o, sizeof(note), note));
@@ -300,8 +293,8 @@ static PetscErrorCode measure(void)
     sum += SbObstacleDistance(o, x, n);
   }
   PetscCall(PetscTime(&t2));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s: made in %.3f s, %.2f us per distance (mean %.3f)\n", note,
-                        t1 - t0, (t2 - t1) / 200000 * 1e6, (double)sum / 200000));
+  test_print("  %s: made in %.3f s, %.2f us per distance (mean %.3f)\n", note, t1 - t0,
+             (t2 - t1) / 200000 * 1e6, sum / 200000);
   PetscCall(SbObstacleDestroy(&o));
   test_surface_free(&s);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -111,7 +111,7 @@ static inline void verify_move_vertex(const PetscInt n[3], const PetscInt at[3],
   }
 }
 
-/* Writes such a box to a file; the same for equal n on any number of ranks. Remove it with test_file_remove(). Collective. */
+/* Writes such a box to a file; the same for equal n on any number of ranks. Collective. */
 static inline PetscErrorCode verify_distorted_box(const PetscInt n[3], const PetscReal size[3],
                                                   char path[512])
 {

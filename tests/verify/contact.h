@@ -326,7 +326,7 @@ static inline PetscErrorCode record_run(Record *r, const char *format, ...)
 
   PetscFunctionBeginUser;
   va_start(args, format);
-  PetscCall(verify_vopen(&t, format, args));
+  PetscCall(test_vopen(&t, format, args));
   va_end(args);
   PetscCall(record_solve(&t, r));
   PetscCall(test_scene_close(&t));
@@ -354,7 +354,7 @@ static inline void contact_ball(const PetscInt n[3], const PetscInt at[3], Petsc
   for (int k = 0; k < 3; k++) x[k] *= length > 0 ? b->radius * layer / length : 0;
 }
 
-/* Writes a ball of n layers of cells across; remove the file with test_file_remove(). */
+/* Writes a ball of n layers of cells across. */
 static inline PetscErrorCode contact_ball_write(PetscInt n, PetscReal radius, char path[512])
 {
   ContactBall ball = {.radius = radius};

@@ -78,10 +78,10 @@ static inline PetscErrorCode boussinesq(PetscReal P, PetscReal E, PetscReal side
   char sideways[256];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(sideways, sizeof(sideways), "%.15g*(abs(z)/%s^3-%.15g/(%s*(%s+abs(z))))", (double)c,
-                          r, (double)(1 - 2 * POISSON), r, r));
-  PetscCall(PetscSNPrintf(text, size, "x*%s;y*%s;%.15g+%.15g*(%.15g/%s+z^2/%s^3)", sideways, sideways,
-                          (double)shift, (double)(side * c), (double)(2 * (1 - POISSON)), r, r));
+  PetscCall(PetscSNPrintf(sideways, sizeof(sideways), "%.15g*(abs(z)/%s^3-%.15g/(%s*(%s+abs(z))))", c, r,
+                          1 - 2 * POISSON, r, r));
+  PetscCall(PetscSNPrintf(text, size, "x*%s;y*%s;%.15g+%.15g*(%.15g/%s+z^2/%s^3)", sideways, sideways, shift,
+                          side * c, 2 * (1 - POISSON), r, r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -92,13 +92,13 @@ static inline PetscErrorCode boussinesq(PetscReal P, PetscReal E, PetscReal side
 static inline PetscErrorCode open_pair(const Pair *p, const Case *c, PetscReal d, PetscReal P,
                                        char path[2][512], TestScene *t)
 {
-  char text[VERIFY_TEXT], far[2][VERIFY_TEXT / 4];
+  char far[2][VERIFY_TEXT / 4];
 
   PetscFunctionBeginUser;
   PetscCall(boussinesq(P, p->young[0], -1, 0, sizeof(far[0]), far[0]));
   PetscCall(boussinesq(P, p->young[1], 1, -d, sizeof(far[1]), far[1]));
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
+  PetscCall(test_open(
+    t,
     "-bodies a,b -body_a_mesh %s -body_b_mesh %s -body_a_element %s -body_b_element %s "
     "-body_a_material linear -body_b_material linear -body_a_young %g -body_b_young %g -body_a_poisson %g "
     "-body_b_poisson %g -sets x0,y0,meet,ax,ay,az,bx,by,bz -set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 "
@@ -110,9 +110,8 @@ static inline PetscErrorCode open_pair(const Pair *p, const Case *c, PetscReal d
     "-effect_low_displacement %s -effect_high_type prescribed_displacement -effect_high_on bx,by,bz "
     "-effect_high_displacement %s -effect_meet_type contact -effect_meet_on meet -effect_meet_barrier_width "
     "%.9g ",
-    path[0], path[1], c->element, c->element, (double)p->young[0], (double)p->young[1], POISSON, POISSON,
-    (double)(3 * d), far[0], far[1], (double)(0.01 * d)));
-  PetscCall(test_scene_open(text, t));
+    path[0], path[1], c->element, c->element, p->young[0], p->young[1], POISSON, POISSON, 3 * d, far[0],
+    far[1], 0.01 * d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -162,16 +161,13 @@ static inline PetscErrorCode hertz(const Pair *p, const Case *c, PetscReal *forc
   PetscCall(verify_solve(&t, p->name));
   PetscCall(read_forces(t.run, values, &reaction));
   *force = -4 * reaction / P;
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  %s, %s, %d^3 cells, d = %.3e m: %g points touch, force %.4f "
-                        "(history %.4f) of the formula's, penetration %.1e d, %d solves\n",
-                        p->name, c->element, (int)c->cells, (double)d, (double)values[CONTACTS],
-                        (double)*force, (double)(4 * values[NORMAL] / P), (double)(values[DEEPEST] / d),
-                        (int)t.run->newton_total));
+  test_print("  %s, %s, %d^3 cells, d = %.3e m: %g points touch, force %.4f "
+             "(history %.4f) of the formula's, penetration %.1e d, %d solves\n",
+             p->name, c->element, (int)c->cells, d, values[CONTACTS], *force, 4 * values[NORMAL] / P,
+             values[DEEPEST] / d, (int)t.run->newton_total);
   SB_CHECK_NEAR(4 * values[NORMAL] / P, *force, c->honest * *force,
                 "force in the history against the one that acts");
-  SB_CHECK(values[DEEPEST] < 0.01 * d, "penetration %g m of %g m", (double)values[DEEPEST], (double)d);
+  SB_CHECK(values[DEEPEST] < 0.01 * d, "penetration %g m of %g m", values[DEEPEST], d);
   PetscCall(test_scene_close(&t));
-  for (int k = 0; k < 2; k++) PetscCall(test_file_remove(path[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

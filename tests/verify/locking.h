@@ -60,7 +60,6 @@ static inline PetscErrorCode locking_cube(PetscInt n, const char *file, PetscRea
   PetscCall(locking_run(scene, text, &t, cost));
   PetscCall(manufactured_errors(t.model, t.run->U, error));
   PetscCall(test_scene_close(&t));
-  if (!file[0]) PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -85,14 +84,13 @@ static inline PetscErrorCode locking_bar(PetscInt n, PetscReal nu, const char *m
     "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 5e4 -body_a_poisson %.17g "
     "-body_a_density 1000 -sets root -set_root_at plane:1,0,0,0 -effects clamp,gravity "
     "-effect_clamp_type fixed -effect_clamp_on root -effect_gravity_vector 0,0,-9.81 -time static",
-    mesh, (double)nu));
+    mesh, nu));
   PetscCall(locking_run(scene, more, &t, cost));
   PetscCall(verify_value_at(t.model, t.run->U, end, u));
   PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &e));
   value[0] = u[2];
   value[1] = e.strain;
   PetscCall(test_scene_close(&t));
-  PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -112,7 +110,7 @@ static inline PetscErrorCode locking_cook(const char *mesh, PetscReal nu, const 
     "-body_a_density 1 -effects hold,plane,pull -effect_hold_type fixed -effect_hold_on left "
     "-effect_plane_type fixed -effect_plane_on all -effect_plane_components z -effect_pull_type traction "
     "-effect_pull_on right -effect_pull_vector 0;1/16;0 -time static",
-    mesh, (double)nu));
+    mesh, nu));
   PetscCall(locking_run(scene, more, &t, cost));
   for (int k = 0; k < 2; k++) {
     PetscReal u[3];
@@ -218,7 +216,7 @@ static inline PetscErrorCode locking_shell(const char *mesh, PetscReal nu, const
                   "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y "
                   "-effect_z_type fixed -effect_z_on z0 -effect_z_components z -effect_push_type pressure "
                   "-effect_push_on inside -effect_push_value 1 -effect_push_follower no -time static",
-                  mesh, (double)nu));
+                  mesh, nu));
   PetscCall(locking_run(scene, more, &t, cost));
   PetscCall(locking_shell_errors(t.model, t.run->U, nu, e));
   PetscCall(test_scene_close(&t));
@@ -255,11 +253,10 @@ static inline PetscErrorCode locking_beam(PetscInt n, PetscReal mu, const char *
     "-body_a_density 1000 -sets arc -set_arc_at sphere:0.2,0.2,%.17g,%.17g -effects root,plane,gravity "
     "-effect_root_type fixed -effect_root_on arc -effect_plane_type fixed -effect_plane_on all "
     "-effect_plane_components z -effect_gravity_vector 0,-2,0 -time static",
-    mesh, (double)(2.8 * mu), half, (double)PetscSqrtReal(0.0025 + half * half)));
+    mesh, 2.8 * mu, half, PetscSqrtReal(0.0025 + half * half)));
   PetscCall(locking_run(scene, more, &t, cost));
   PetscCall(verify_value_at(t.model, t.run->U, tip, u));
   PetscCall(test_scene_close(&t));
-  PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -279,7 +276,7 @@ static inline PetscErrorCode locking_swing(PetscInt n, PetscReal nu, const char 
     "-body_a_poisson %.17g -body_a_density 1000 -effects gravity,clamp -effect_gravity_vector 0,0,-9.81 "
     "-effect_clamp_type fixed -effect_clamp_on xmin -time genalpha -time_spectral_radius 0.8 -ts_dt 0.01 "
     "-ts_max_time 0.3",
-    (int)n, (double)nu));
+    (int)n, nu));
   PetscCall(locking_run(scene, more, &t, cost));
   PetscCall(verify_value_at(t.model, t.run->U, end, value));
   PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &e));
@@ -306,7 +303,7 @@ static inline PetscErrorCode locking_twist(PetscInt n, PetscReal nu, const char 
                   "-effect_held_on xmin -effect_turned_type prescribed_displacement -effect_turned_on xmax "
                   "-effect_turned_axis 1,0,0 -effect_turned_axis_point 0,0.05,0.05 -effect_turned_angle 90*t "
                   "-time static -static_steps 16 -ksp_max_it 20",
-                  (int)n, (double)nu));
+                  (int)n, nu));
   PetscCall(locking_run(scene, more, &t, cost));
   PetscCall(verify_value_at(t.model, t.run->U, edge, value));
   PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &e));
@@ -334,14 +331,13 @@ static inline PetscErrorCode locking_hang(PetscInt n, PetscReal nu, const char *
                   "-bodies a -body_a_mesh %s -body_a_poisson %.17g -body_a_density 1000 -sets top "
                   "-set_top_at plane:0,0,1,0.2 -effects clamp,gravity -effect_clamp_type fixed "
                   "-effect_clamp_on top -effect_gravity_vector 0,0,-9.81 -time static -static_steps 4",
-                  mesh, (double)nu));
+                  mesh, nu));
   PetscCall(locking_run(scene, more, &t, cost));
   PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &e));
   value[0] = e.max_displacement;
   value[1] = (e.volume - t.model->body[0].volume) / t.model->body[0].volume;
   value[2] = e.min_J;
   PetscCall(test_scene_close(&t));
-  PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -355,23 +351,21 @@ static inline PetscErrorCode locking_modes(PetscInt n, PetscReal nu, const char 
   PetscReal w2[MODES_BLOCK];
   PetscInt zero = 0;
   TestScene t;
-  char text[LOCKING_TEXT], mesh[512];
+  char mesh[512];
 
   PetscFunctionBeginUser;
   PetscCall(
     verify_distorted_box((const PetscInt[3]){n, n, 2 * n}, (const PetscReal[3]){0.1, 0.1, 0.2}, mesh));
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 5e3 "
-                          "-body_a_poisson %.17g -body_a_density 1000 -time newmark %s",
-                          mesh, (double)nu, more));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 5e3 "
+                      "-body_a_poisson %.17g -body_a_density 1000 -time newmark %s",
+                      mesh, nu, more));
   PetscCall(modes_lowest(t.model, unit, w2));
   while (zero < MODES_BLOCK - 2 && w2[zero] < 1e-6 * unit) zero++;
   value[0] = (PetscReal)zero;
   value[1] = w2[zero] / unit;
   value[2] = w2[zero + 1] / unit;
   PetscCall(test_scene_close(&t));
-  PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -402,18 +396,16 @@ static inline PetscErrorCode locking_check_pair(const char *what, LockingProblem
 
     PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_element %s %s", element, options));
     PetscCall(solve(e == 2 ? fine : 2, 0.499, more, value[e], &cost));
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s %s n %d: %.5f %.5f %.5f m, %.5f J\n", what, element,
-                          (int)(e == 2 ? fine : 2), (double)value[e][0], (double)value[e][1],
-                          (double)value[e][2], (double)value[e][3]));
+    test_print("  %s %s n %d: %.5f %.5f %.5f m, %.5f J\n", what, element, (int)(e == 2 ? fine : 2),
+               value[e][0], value[e][1], value[e][2], value[e][3]);
   }
   locking_difference(value[1], value[0], between);
   locking_difference(value[0], value[2], finer);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  %s: DG - CR %.1e m, %.1e of the energy; n 2 - finer %.1e m, %.1e\n", what,
-                        (double)between[0], (double)between[1], (double)finer[0], (double)finer[1]));
+  test_print("  %s: DG - CR %.1e m, %.1e of the energy; n 2 - finer %.1e m, %.1e\n", what, between[0],
+             between[1], finer[0], finer[1]);
   SB_CHECK(between[0] < limit[0] * size && between[1] < limit[0], "%s: CR and DG differ by %g m", what,
-           (double)between[0]);
+           between[0]);
   SB_CHECK(finer[0] < limit[1] * size && finer[1] < limit[1], "%s: CR changes by %g m, %g of the energy",
-           what, (double)finer[0], (double)finer[1]);
+           what, finer[0], finer[1]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -48,10 +48,9 @@ static inline PetscErrorCode pour_bodies(PetscInt n, size_t size, char text[])
       one, sizeof(one),
       " -body_b%d_mesh box:%g,%g,%g:1 -body_b%d_rotate %g,%g,%g,%g -body_b%d_translate %g,%g,%g "
       "-body_b%d_material corotated -body_b%d_young 3e4 -body_b%d_poisson 0.3 -body_b%d_density 1000",
-      (int)k, (double)(0.05 + 0.01 * pour_noise(k, 1)), (double)(0.05 + 0.01 * pour_noise(k, 2)), 0.04,
-      (int)k, (double)pour_noise(k, 3), (double)pour_noise(k, 4), 0.5, (double)(25 * pour_noise(k, 5)),
-      (int)k, (double)(place[0] - 0.025), (double)(place[1] - 0.025), (double)(place[2] - 0.02), (int)k,
-      (int)k, (int)k, (int)k));
+      (int)k, 0.05 + 0.01 * pour_noise(k, 1), 0.05 + 0.01 * pour_noise(k, 2), 0.04, (int)k, pour_noise(k, 3),
+      pour_noise(k, 4), 0.5, 25 * pour_noise(k, 5), (int)k, place[0] - 0.025, place[1] - 0.025,
+      place[2] - 0.02, (int)k, (int)k, (int)k, (int)k));
     PetscCall(PetscStrlcat(text, one, size));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -162,7 +161,7 @@ static inline PetscErrorCode pour(PetscInt n, PetscReal end, PetscReal radius, P
                           " -effects gravity,bowl,meet -effect_bowl_type contact "
                           "-effect_bowl_obstacle bowl:0,0,%g,%g -effect_meet_type contact "
                           "-time euler_implicit -ts_dt 0.004 -ts_max_time %g -snes_rtol 1e-9 -ksp_rtol 1e-8",
-                          (double)bowl[2], (double)radius, (double)end));
+                          bowl[2], radius, end));
   PetscCall(PetscStrlcat(text, effects, size));
   PetscCall(test_scene_open(text, &t));
   PetscCall(PetscFree(text));

@@ -6,7 +6,7 @@
 #include "../file.h"
 #include "../scene.h"
 
-#define VERIFY_TEXT 4096 /* longest scenario of a test, characters */
+#define VERIFY_TEXT TEST_TEXT
 
 /* Map of the vertex at[3] = 0..n of a box with n[3] cells; x is the point of the unit cube on entry. */
 typedef void (*VerifyMap)(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx);
@@ -51,7 +51,7 @@ static inline void verify_write_cells(FILE *f, const PetscInt n[3])
 
 /*
   A box of n[0] x n[1] x n[2] cells with its vertices where `map` puts them, as a gmsh file in the folder for temporary
-  files. Collective; the path is the same on all ranks, rank 0 writes. Remove it with test_file_remove().
+  files. Collective; the path is the same on all ranks, rank 0 writes.
 */
 static inline PetscErrorCode verify_mesh_write(const PetscInt n[3], VerifyMap map, void *ctx, char path[512])
 {
@@ -70,8 +70,7 @@ static inline PetscErrorCode verify_mesh_write(const PetscInt n[3], VerifyMap ma
 
           for (int k = 0; k < 3; k++) x[k] = (PetscReal)at[k] / (PetscReal)n[k];
           map(n, at, x, ctx);
-          fprintf(f, "%d %.17g %.17g %.17g\n", (int)verify_vertex(n, at) + 1, (double)x[0], (double)x[1],
-                  (double)x[2]);
+          fprintf(f, "%d %.17g %.17g %.17g\n", (int)verify_vertex(n, at) + 1, x[0], x[1], x[2]);
         }
       }
     }
@@ -158,31 +157,6 @@ static inline PetscReal verify_aitken(const PetscReal v[3])
   return v[2] - PetscSqr(v[2] - v[1]) / ((v[2] - v[1]) - (v[1] - v[0]));
 }
 
-/* test_scene_open() of options in printf format. */
-static inline PetscErrorCode verify_vopen(TestScene *t, const char *format, va_list args)
-{
-  char text[VERIFY_TEXT];
-  size_t length;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscVSNPrintf(text, sizeof(text), format, &length, args));
-  PetscCheck(length <= sizeof(text), PETSC_COMM_SELF, PETSC_ERR_PLIB, "%d characters, room for %d",
-             (int)length, VERIFY_TEXT);
-  PetscCall(test_scene_open(text, t));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static inline PetscErrorCode verify_open(TestScene *t, const char *format, ...)
-{
-  va_list args;
-
-  PetscFunctionBeginUser;
-  va_start(args, format);
-  PetscCall(verify_vopen(t, format, args));
-  va_end(args);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Checks that a run reaches its planned end. */
 static inline PetscErrorCode verify_solve(TestScene *t, const char *what)
 {
@@ -202,34 +176,33 @@ static inline void verify_case(const char *format, ...)
   va_start(args, format);
   (void)vsnprintf(verify_title, sizeof(verify_title), format, args);
   va_end(args);
-  (void)PetscPrintf(PETSC_COMM_WORLD, "  %s\n", verify_title);
+  test_print("  %s\n", verify_title);
 }
 
 /* Prints a number that a report quotes. */
 static inline void verify_show(const char *what, PetscReal value)
 {
-  (void)PetscPrintf(PETSC_COMM_WORLD, "    %s: %.5g\n", what, (double)value);
+  test_print("    %s: %.5g\n", what, value);
 }
 
 /* Checks that print the compared values, also if they pass. */
 #define VERIFY_NEAR(value, expected, tolerance, what)                                                       \
   do {                                                                                                      \
     const double verify_v = (double)(value), verify_e = (double)(expected), verify_t = (double)(tolerance); \
-    (void)PetscPrintf(PETSC_COMM_WORLD, "    %s: %.7g (%.7g within %.2g)\n", what, verify_v, verify_e,      \
-                      verify_t);                                                                            \
+    test_print("    %s: %.7g (%.7g within %.2g)\n", what, verify_v, verify_e, verify_t);                    \
     SB_CHECK(fabs(verify_v - verify_e) <= verify_t, "%s: %s: %.15g, expected %.15g within %.3g",            \
              verify_title, what, verify_v, verify_e, verify_t);                                             \
   } while (0)
 #define VERIFY_LESS(value, bound, what)                                                                      \
   do {                                                                                                       \
     const double verify_v = (double)(value), verify_b = (double)(bound);                                     \
-    (void)PetscPrintf(PETSC_COMM_WORLD, "    %s: %.5g (below %.3g)\n", what, verify_v, verify_b);            \
+    test_print("    %s: %.5g (below %.3g)\n", what, verify_v, verify_b);                                     \
     SB_CHECK(verify_v < verify_b, "%s: %s: %.15g, not below %.15g", verify_title, what, verify_v, verify_b); \
   } while (0)
 #define VERIFY_MORE(value, bound, what)                                                                      \
   do {                                                                                                       \
     const double verify_v = (double)(value), verify_b = (double)(bound);                                     \
-    (void)PetscPrintf(PETSC_COMM_WORLD, "    %s: %.5g (above %.3g)\n", what, verify_v, verify_b);            \
+    test_print("    %s: %.5g (above %.3g)\n", what, verify_v, verify_b);                                     \
     SB_CHECK(verify_v > verify_b, "%s: %s: %.15g, not above %.15g", verify_title, what, verify_v, verify_b); \
   } while (0)
 

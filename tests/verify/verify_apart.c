@@ -76,7 +76,7 @@ static PetscErrorCode check_named(const char *element, const char *time, const c
       VERIFY_LESS(off, tolerance, "change of the motion");
     else
       SB_CHECK(!memcmp(value[0], value[k], (size_t)(2 * n) * sizeof(PetscReal)),
-               "%s: the motion differs by %g", verify_title, (double)off);
+               "%s: the motion differs by %g", verify_title, off);
   }
   for (int k = 0; k < 4; k++) PetscCall(PetscFree(value[k]));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -126,14 +126,12 @@ static PetscErrorCode check_case(Shape shape, const char *path, const Case *c, P
   TestScene t;
   PetscInt n, zeros = 0, soft = 0;
   PetscReal *w;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material %s "
-                          "-body_a_young 1e5 -body_a_poisson %.17g -body_a_density 1 -solver cg_jacobi %s",
-                          path, c->element, c->law, (double)c->nu, c->gammas));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material %s "
+                      "-body_a_young 1e5 -body_a_poisson %.17g -body_a_density 1 -solver cg_jacobi %s",
+                      path, c->element, c->law, c->nu, c->gammas));
   PetscCall(turn(&t, c->angle));
   PetscCall(spectrum(&t, &n, &w));
   for (PetscInt i = 0; i < n; i++) {
@@ -143,16 +141,15 @@ static PetscErrorCode check_case(Shape shape, const char *path, const Case *c, P
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD,
     "  %s %-10s %-7s nu %-8g %s: %4d unknowns, eigenvalues %9.1e .. %8.1e | %.3e .. %.2f, %d zero\n",
-    c->element, c->law, shapes[shape], (double)c->nu, c->gammas, (int)n, (double)w[0], (double)w[5],
-    (double)w[6], (double)w[n - 1], (int)zeros));
+    c->element, c->law, shapes[shape], c->nu, c->gammas, (int)n, w[0], w[5], w[6], w[n - 1], (int)zeros));
   if (shape == SLIVERS)
     SB_CHECK(t.model->body[0].min_dihedral < 1., "the flattest tet has %g degrees",
-             (double)t.model->body[0].min_dihedral);
+             t.model->body[0].min_dihedral);
   if (sound) {
-    SB_CHECK(w[0] > -ROUNDING * w[n - 1], "%s, %s, nu %g %s: eigenvalue %g", c->element, shapes[shape],
-             (double)c->nu, c->gammas, (double)w[0]);
-    SB_CHECK(zeros == 6, "%s, %s, nu %g %s: %d motions without energy", c->element, shapes[shape],
-             (double)c->nu, c->gammas, (int)zeros);
+    SB_CHECK(w[0] > -ROUNDING * w[n - 1], "%s, %s, nu %g %s: eigenvalue %g", c->element, shapes[shape], c->nu,
+             c->gammas, w[0]);
+    SB_CHECK(zeros == 6, "%s, %s, nu %g %s: %d motions without energy", c->element, shapes[shape], c->nu,
+             c->gammas, (int)zeros);
   } else {
     SB_CHECK(soft > 30, "%s, %s %s: %d soft motions, which the test should see", c->element, shapes[shape],
              c->gammas, (int)soft);
@@ -170,15 +167,13 @@ static PetscErrorCode pressed(const char *element, const char *law, PetscReal ra
   SbMaterial m;
   PetscReal *w, eps;
   PetscScalar *u;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh box:1,1,1:2 -body_a_element %s -body_a_material %s "
-                          "-body_a_tangent exact -body_a_young 1e5 -body_a_poisson 0.499 -body_a_density 1 "
-                          "-solver cg_jacobi -effects hold -effect_hold_type fixed -effect_hold_on boundary",
-                          element, law));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh box:1,1,1:2 -body_a_element %s -body_a_material %s "
+                      "-body_a_tangent exact -body_a_young 1e5 -body_a_poisson 0.499 -body_a_density 1 "
+                      "-solver cg_jacobi -effects hold -effect_hold_type fixed -effect_hold_on boundary",
+                      element, law));
   m = t.model->material[0];
   eps = ratio * m->ops.shear_modulus(m) / (3. * m->ops.bulk_modulus(m));
   PetscCall(VecGetArray(t.run->U, &u));
@@ -205,9 +200,8 @@ static PetscErrorCode check_pressed(const char *element, const char *law)
       reached[stretched] = ratios[k];
     }
   }
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  %s %-10s squeezed: positive up to %g mu; stretched: up to %g mu\n", element, law,
-                        (double)reached[0], (double)reached[1]));
+  test_print("  %s %-10s squeezed: positive up to %g mu; stretched: up to %g mu\n", element, law, reached[0],
+             reached[1]);
   /* the energy of the mean volume, summed over the body, is that of its boundary */
   if (!strcmp(element, "p2") && !strcmp(law, "neohookean"))
     SB_CHECK(reached[0] == 50. && reached[1] == 50., "P2 is not stable under even pressures");
@@ -242,7 +236,6 @@ static PetscErrorCode check_mesh(Shape shape)
     PetscCall(check_case(shape, path, &(Case){"dg", laws[law], "", 0.4999, 2.}, PETSC_TRUE));
     PetscCall(check_case(shape, path, &(Case){"p2", laws[law], "", 0.4999, 2.}, PETSC_TRUE));
   }
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -43,7 +43,7 @@ static PetscErrorCode check_stack(const char *element, int upper, PetscReal tole
 
   PetscFunctionBeginUser;
   verify_case("stack, %s, %d on 2", element, upper);
-  PetscCall(verify_open(
+  PetscCall(test_open(
     &t,
     BLOCK("a", "box:0.1,0.1,0.05:2") BLOCK(
       "b",
@@ -110,7 +110,7 @@ static PetscErrorCode check_momentum(const char *element, PetscReal friction)
   PetscReal first, last;
 
   PetscFunctionBeginUser;
-  verify_case("momentum, %s, friction %g", element, (double)friction);
+  verify_case("momentum, %s, friction %g", element, friction);
   PetscCall(record_run(
     &r,
     VERIFY_BODY("a", "box:0.1,0.1,0.1:2", "corotated", "2e4", "0.3") VERIFY_BODY(
@@ -140,7 +140,7 @@ static PetscErrorCode check_slope(PetscReal mu, PetscReal tolerance)
   Record r = {0};
 
   PetscFunctionBeginUser;
-  verify_case("slope of 0.5, friction %g", (double)mu);
+  verify_case("slope of 0.5, friction %g", mu);
   PetscCall(record_run(&r,
                        VERIFY_BODY("a", "box:0.3,0.1,0.05:1", "linear", "1e7", "0.3") VERIFY_BODY(
                          "b", "box:0.06,0.06,0.03:1", "linear", "1e7",
@@ -156,10 +156,7 @@ static PetscErrorCode check_slope(PetscReal mu, PetscReal tolerance)
 
 int main(int argc, char **argv)
 {
-  PetscMPIInt size;
-
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   /* stress of single tets: areas of pairs at edges and corners differ from those of a uniform pressure; errors of 11 to 19 % */
   PetscCall(check_stack("p1", 3, 0.2));
   PetscCall(check_stack("cr", 2, 0.25));
@@ -168,7 +165,7 @@ int main(int argc, char **argv)
   PetscCall(check_momentum("dg", 0));
   PetscCall(check_momentum("p2", 0.3));
   PetscCall(check_momentum("p1", 0.3));
-  if (size > 1) SB_TEST_END(); /* many solves of a small system: on one rank only */
+  if (test_size > 1) SB_TEST_END(); /* many solves of a small system: on one rank only */
   PetscCall(check_stack("p1", 2, 0.2));
   PetscCall(check_bars("cr"));
   PetscCall(check_bars("p2"));

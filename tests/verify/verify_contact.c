@@ -30,7 +30,7 @@ static PetscErrorCode check_press(const char *element, const char *response, Pet
 
   PetscFunctionBeginUser;
   verify_case("press, %s, %s", element, response);
-  PetscCall(verify_open(
+  PetscCall(test_open(
     &t,
     VERIFY_BODY(
       "a", "box:0.1,0.1,0.05:4", "linear", "1e5",
@@ -98,7 +98,7 @@ static PetscErrorCode check_incline(const char *element, const char *response, P
   Record r = {0};
 
   PetscFunctionBeginUser;
-  verify_case("incline, %s, %s, friction %g", element, response, (double)mu);
+  verify_case("incline, %s, %s, friction %g", element, response, mu);
   PetscCall(record_run(
     &r,
     VERIFY_BODY(
@@ -331,13 +331,13 @@ static PetscErrorCode check_bounds(void)
 
   PetscFunctionBeginUser;
   verify_case("bounds");
-  PetscCall(verify_open(&t,
-                        BEAM "-effects gravity,clamp,floor -effect_floor_type contact -effect_floor_response "
-                             "projected -effect_floor_obstacle plane:0,0,1,%g",
-                        (double)floor));
+  PetscCall(test_open(&t,
+                      BEAM "-effects gravity,clamp,floor -effect_floor_type contact -effect_floor_response "
+                           "projected -effect_floor_obstacle plane:0,0,1,%g",
+                      floor));
   PetscCall(record_solve(&t, &r));
   PetscCall(
-    verify_open(&free, BEAM "-effects gravity,clamp -solver sor" /* scalar storage, which SNESVI needs */));
+    test_open(&free, BEAM "-effects gravity,clamp -solver sor" /* scalar storage, which SNESVI needs */));
   free.model->load = 1;
   PetscCall(VecDuplicate(free.run->U, &U));
   PetscCall(solve_bounded(free.model, free.run->J, floor, U));
@@ -393,7 +393,7 @@ static PetscErrorCode check_hertz(const char *element, PetscInt cells, PetscReal
   PetscCall(PetscSNPrintf(r, sizeof(r), "sqrt(x^2+y^2+z^2)"));
   /* radial displacement over the distance from the axis; the depth is -z */
   PetscCall(PetscSNPrintf(sideways, sizeof(sideways), "%.15g*(-z/%s^3-%.15g/(%s*(%s-z)))",
-                          (double)(P * (1 + nu) / (2 * PETSC_PI * E)), r, (double)(1 - 2 * nu), r, r));
+                          P * (1 + nu) / (2 * PETSC_PI * E), r, 1 - 2 * nu, r, r));
   PetscCall(record_run(
     &record,
     "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material linear -body_a_young %g -body_a_poisson "
@@ -406,21 +406,16 @@ static PetscErrorCode check_hertz(const char *element, PetscInt cells, PetscReal
     "x1,y1,z1 -effect_far_displacement x*%s;y*%s;%.15g*(%.15g/%s+z^2/%s^3) -effect_ball_type contact "
     "-effect_ball_response projected "
     "-effect_ball_on top -effect_ball_obstacle sphere:0,0,%.15g,1",
-    path, element, (double)E, (double)nu, sideways, sideways, (double)(-P * (1 + nu) / (2 * PETSC_PI * E)),
-    (double)(2 * (1 - nu)), r, r, (double)(1 - d)));
+    path, element, E, nu, sideways, sideways, -P * (1 + nu) / (2 * PETSC_PI * E), 2 * (1 - nu), r, r, 1 - d));
   verify_show("nodes that touch", record_last(&record, "ball_contacts"));
   VERIFY_NEAR(-4 * record_last(&record, "ball_force_z") / P, 1, tolerance, "force against that of Hertz");
   PetscCall(record_free(&record));
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int main(int argc, char **argv)
 {
-  PetscMPIInt size;
-
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(check_press("p1", "projected", 20, 1e-10));
   PetscCall(check_press("cr", "projected", 20, 1e-10));
   PetscCall(check_press("dg", "projected", 20, 1e-10));
@@ -443,7 +438,7 @@ int main(int argc, char **argv)
   PetscCall(check_hertz("p1", 8, 0.3));
   PetscCall(check_hertz("p2", 6, 0.02));
   PetscCall(check_incline("p2", "projected", 0.49));
-  if (size == 1) { /* agreement of ranks is tested by the scenarios drop and indent */
+  if (test_size == 1) { /* agreement of ranks is tested by the scenarios drop and indent */
     PetscCall(check_fall("cr", "projected"));
     PetscCall(check_fall("dg", "projected"));
     PetscCall(check_fall("p2", "projected"));

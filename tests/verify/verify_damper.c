@@ -34,7 +34,7 @@ static PetscErrorCode check(const char *what, const char *scene, PetscReal tau, 
   PetscReal speed;
 
   PetscFunctionBeginUser;
-  verify_case("%s, damping %g s", what, (double)tau);
+  verify_case("%s, damping %g s", what, tau);
   PetscCall(record_run(
     &r,
     VERIFY_BODY("a", "box:0.05,0.05,0.05:1", "linear", "%g",

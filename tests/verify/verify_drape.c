@@ -57,12 +57,12 @@ static PetscErrorCode check_drape(PetscBool rigid, PetscInt cells, PetscInt thic
                     "-set_foot_at halfspace:0,0,1,%g -effects gravity,foot,meet -effect_foot_type fixed "
                     "-effect_foot_on foot -effect_meet_type contact",
                     path, -RADIUS, -1.6 * RADIUS));
-  PetscCall(verify_open(&t,
-                        "%s -body_cloth_mesh box:%g,%g,%g:%d,%d,%d -body_cloth_translate %g,%g,%g "
-                        "-body_cloth_material corotated -body_cloth_young 5e3 -body_cloth_poisson 0.3 "
-                        "-time euler_implicit -ts_dt 0.004 -ts_max_time 0.4 -snes_rtol 1e-9 -ksp_rtol 1e-8",
-                        how, SIDE, SIDE, THICK, (int)cells, (int)cells, (int)thick, -0.5 * SIDE, -0.5 * SIDE,
-                        DROP));
+  PetscCall(test_open(&t,
+                      "%s -body_cloth_mesh box:%g,%g,%g:%d,%d,%d -body_cloth_translate %g,%g,%g "
+                      "-body_cloth_material corotated -body_cloth_young 5e3 -body_cloth_poisson 0.3 "
+                      "-time euler_implicit -ts_dt 0.004 -ts_max_time 0.4 -snes_rtol 1e-9 -ksp_rtol 1e-8",
+                      how, SIDE, SIDE, THICK, (int)cells, (int)cells, (int)thick, -0.5 * SIDE, -0.5 * SIDE,
+                      DROP));
   if (!rigid) PetscCall(SbRunAddMonitor(t.run, pour_watch, &inside));
   PetscCall(record_solve(&t, &r));
   PetscCall(lowered(&t, depth));
@@ -78,18 +78,14 @@ static PetscErrorCode check_drape(PetscBool rigid, PetscInt cells, PetscInt thic
   VERIFY_LESS(record_gain(&r, "energy"), 1e-6 * weight * SIDE, "largest gain of a step, J");
   if (rigid) VERIFY_LESS(record_max(&r, "missing"), 1e-5, "momentum that no force explains, kg m/s");
   PetscCall(record_free(&r));
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int main(int argc, char **argv)
 {
-  PetscMPIInt size;
-
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(check_drape(PETSC_TRUE, 16, 1));
-  if (size == 1)
+  if (test_size == 1)
     PetscCall(check_drape(PETSC_FALSE, 16, 1)); /* many solves of a small system: on one rank only */
   SB_TEST_END();
 }

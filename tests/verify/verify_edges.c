@@ -258,25 +258,22 @@ static PetscErrorCode check_bars(const char *more, PetscReal tolerance)
   const PetscReal weight = 0.21 * 0.03 * 0.03 * 1000 * 9.81;
   PetscReal values[NVALUE], alone[NVALUE], u[3], v[3];
   Seen seen, other;
-  PetscMPIInt size;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(lay_bars(PETSC_COMM_WORLD, more, &seen, values, u));
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD,
     "  bars%s: %d contacts, force %.6f of the weight, depth %.1e m (history %.1e), moving with %.1e J\n",
-    more, (int)values[CONTACTS], (double)(values[NORMAL] / weight), (double)seen.depth, (double)seen.deepest,
-    (double)seen.kinetic));
+    more, (int)values[CONTACTS], values[NORMAL] / weight, seen.depth, seen.deepest, seen.kinetic));
   SB_CHECK(values[CONTACTS] >= 1, "the bars do not touch");
   SB_CHECK_NEAR(values[NORMAL], weight, tolerance * weight, "the lower bar carries the upper one");
   SB_CHECK(seen.depth < 1e-6 * 0.21 && seen.deepest < 1e-6 * 0.21,
-           "the bars are %g m in each other, they say %g", (double)seen.depth, (double)seen.deepest);
-  SB_CHECK(seen.kinetic < 1e-8, "the bars still move with %g J", (double)seen.kinetic);
-  if (size > 1) {
+           "the bars are %g m in each other, they say %g", seen.depth, seen.deepest);
+  SB_CHECK(seen.kinetic < 1e-8, "the bars still move with %g J", seen.kinetic);
+  if (test_size > 1) {
     PetscCall(lay_bars(PETSC_COMM_SELF, more, &other, alone, v));
-    SB_CHECK(alone[CONTACTS] == values[CONTACTS], "%g contacts, on one rank %g", (double)values[CONTACTS],
-             (double)alone[CONTACTS]);
+    SB_CHECK(alone[CONTACTS] == values[CONTACTS], "%g contacts, on one rank %g", values[CONTACTS],
+             alone[CONTACTS]);
     SB_CHECK_NEAR(values[NORMAL], alone[NORMAL], 1e-6 * weight, "force on one rank");
     for (int k = 0; k < 3; k++) SB_CHECK_NEAR(u[k], v[k], 1e-8, "displacement on one rank");
   }
@@ -297,14 +294,12 @@ static PetscErrorCode check_fast(void)
                     "euler_implicit -ts_dt 0.004 -ts_max_time 0.04 " LAWS("1e7") ENDS));
   PetscCall(SbRunAddMonitor(t.run, watch, &seen));
   PetscCall(verify_solve(&t, "fast bars"));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  fast bars: in touch in %d of %d steps, force up to %.3g N, depth %.1e m (history "
-                        "%.1e), middle at least %.4f m over the other\n",
-                        (int)seen.touching, (int)seen.steps, (double)seen.force, (double)seen.depth,
-                        (double)seen.deepest, (double)seen.above));
+  test_print("  fast bars: in touch in %d of %d steps, force up to %.3g N, depth %.1e m (history "
+             "%.1e), middle at least %.4f m over the other\n",
+             (int)seen.touching, (int)seen.steps, seen.force, seen.depth, seen.deepest, seen.above);
   SB_CHECK(seen.touching > 0 && seen.force > 0.1, "the bars do not meet");
-  SB_CHECK(seen.depth < 1e-5, "the bars are %g m in each other", (double)seen.depth);
-  SB_CHECK(seen.above > 0, "the bars went through each other by %g m", (double)-seen.above);
+  SB_CHECK(seen.depth < 1e-5, "the bars are %g m in each other", seen.depth);
+  SB_CHECK(seen.above > 0, "the bars went through each other by %g m", -seen.above);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -331,16 +326,14 @@ static PetscErrorCode check_box(const char *what, const char *turn, PetscReal mo
     turn));
   PetscCall(SbRunAddMonitor(t.run, watch, &seen));
   PetscCall(verify_solve(&t, what));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  box, %s: in touch in %d of %d steps, force up to %.3g N, depth %.1e m (history "
-                        "%.1e), middle at least %.3f m over the plate\n",
-                        what, (int)seen.touching, (int)seen.steps, (double)seen.force, (double)seen.depth,
-                        (double)seen.deepest, (double)seen.above));
+  test_print("  box, %s: in touch in %d of %d steps, force up to %.3g N, depth %.1e m (history "
+             "%.1e), middle at least %.3f m over the plate\n",
+             what, (int)seen.touching, (int)seen.steps, seen.force, seen.depth, seen.deepest, seen.above);
   SB_CHECK(seen.touching > 3 && seen.force > 1, "%s: the box does not hit the plate", what);
-  SB_CHECK(seen.depth < most, "%s: the box is %g m in the plate", what, (double)seen.depth);
+  SB_CHECK(seen.depth < most, "%s: the box is %g m in the plate", what, seen.depth);
   SB_CHECK_NEAR(seen.deepest, seen.depth, 1e-4, "the depth that the history says");
   SB_CHECK(seen.above > 0.01, "%s: the box went through the plate: its middle is %g m over it", what,
-           (double)seen.above);
+           seen.above);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -369,8 +362,8 @@ static PetscErrorCode write_ring(char path[512])
       const int section = i / 4;
       const PetscReal angle = 2 * PETSC_PI * (section - 0.5) / SEGMENTS, r = RADIUS + corner[i % 4][0];
 
-      fprintf(f, "%d %.17g %.17g %.17g\n", i + 1, (double)(r * PetscCosReal(angle)),
-              (double)(r * PetscSinReal(angle)), (double)corner[i % 4][1]);
+      fprintf(f, "%d %.17g %.17g %.17g\n", i + 1, r * PetscCosReal(angle), r * PetscSinReal(angle),
+              corner[i % 4][1]);
     }
     fprintf(f, "$EndNodes\n$Elements\n%d\n", 6 * SEGMENTS);
     for (int i = 0; i < 6 * SEGMENTS; i++) {
@@ -467,32 +460,27 @@ static PetscErrorCode check_rings(PetscReal most)
             "-effect_pull_type prescribed_displacement -effect_pull_on end -effect_pull_displacement "
             "0.08*ramp(t/0.4);0;0 -effect_meet_type contact -time "
             "euler_implicit -ts_dt 0.01 -ts_max_time 0.5" LAWS("1e5"),
-            path, path, (double)away, (double)(-away - 0.09)));
+            path, path, away, -away - 0.09));
   PetscCall(SbRunAddMonitor(t.run, watch_rings, &seen));
   PetscCall(verify_solve(&t, "rings"));
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD,
     "  rings: linked in %d of %d steps, in touch in %d, force up to %.3g N, depth %.1e m (history %.1e)\n",
-    seen.linked, (int)seen.steps, (int)seen.touching, (double)seen.force, (double)seen.depth,
-    (double)seen.deepest));
+    seen.linked, (int)seen.steps, (int)seen.touching, seen.force, seen.depth, seen.deepest));
   SB_CHECK(seen.linked == seen.steps, "the rings are linked in %d of %d steps only", seen.linked,
            (int)seen.steps);
   SB_CHECK(seen.touching > seen.steps / 2 && seen.force > 0.5, "the rings do not pull");
   SB_CHECK(seen.depth < most && seen.deepest < most, "the rings are %g m in each other, they say %g",
-           (double)seen.depth, (double)seen.deepest);
+           seen.depth, seen.deepest);
   PetscCall(test_scene_close(&t));
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int main(int argc, char **argv)
 {
-  PetscMPIInt size;
-
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(check_bars("", 1e-3));
-  if (size == 1) {
+  if (test_size == 1) {
     PetscCall(check_bars(" -effect_meet_friction 0.3", 1e-3));
     PetscCall(check_bars(" -body_a_element cr -body_b_element dg -ts_max_time 2", 1e-2));
   }

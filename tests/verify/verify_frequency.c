@@ -81,8 +81,7 @@ static PetscErrorCode lowest_mode(TestScene *t, Vec X, PetscReal *w)
     PetscCall(VecCopy(Z, X));
     PetscCall(VecScale(X, 1. / size));
   }
-  SB_CHECK(PetscAbsReal(*w - last) <= 1e-13 * *w, "inverse iteration ends at %g and %g", (double)last,
-           (double)*w);
+  SB_CHECK(PetscAbsReal(*w - last) <= 1e-13 * *w, "inverse iteration ends at %g and %g", last, *w);
   PetscCall(VecDestroy(&Y));
   PetscCall(VecDestroy(&Z));
   PetscCall(KSPDestroy(&ksp));
@@ -97,13 +96,10 @@ static PetscErrorCode check_release(const char *element, PetscInt n, PetscReal *
   const PetscInt steps = 73;
   PetscReal w = 0., angle, u0[3], u[3], error;
   TestScene t;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          BAR "-body_a_element %s -effects clamp -time newmark -ts_dt %g -ts_max_time %g",
-                          (int)n, element, (double)h, (double)(h * (PetscReal)steps)));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t, BAR "-body_a_element %s -effects clamp -time newmark -ts_dt %g -ts_max_time %g",
+                      (int)n, element, h, h * (PetscReal)steps));
   PetscCall(lowest_mode(&t, t.run->U, &w));
   *frequency = w / (2. * PETSC_PI);
   PetscCall(test_value_at(t.model, t.run->U, end, u0));
@@ -111,11 +107,10 @@ static PetscErrorCode check_release(const char *element, PetscInt n, PetscReal *
   PetscCall(test_value_at(t.model, t.run->U, end, u));
   angle = 2. * PetscAtanReal(0.5 * w * h) * (PetscReal)steps;
   error = PetscAbsReal(u[2] - u0[2] * PetscCosReal(angle)) / PetscAbsReal(u0[2]);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "    %s n %2d: %.6f Hz; after %d steps of Newmark %.1e from its exact swing\n",
-                        element, (int)n, (double)*frequency, (int)steps, (double)error));
+  test_print("    %s n %2d: %.6f Hz; after %d steps of Newmark %.1e from its exact swing\n", element, (int)n,
+             *frequency, (int)steps, error);
   /* tolerance of the linear solver times the number of steps; on the odd mesh two modes are nearly degenerate */
-  SB_CHECK(n % 2 || error < 1e-8, "the released mode is off by %g after %d steps", (double)error, (int)steps);
+  SB_CHECK(n % 2 || error < 1e-8, "the released mode is off by %g after %d steps", error, (int)steps);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -152,18 +147,14 @@ static PetscErrorCode sudden_gravity(const char *element, PetscInt n, PetscReal 
 {
   Minimum m = {.min_u = 0.};
   TestScene t;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
   PetscCall(
-    PetscSNPrintf(text, sizeof(text),
-                  BAR "-body_a_element %s -effects clamp,gravity -time newmark -ts_dt 0.01 -ts_max_time 0.9",
-                  (int)n, element));
-  PetscCall(test_scene_open(text, &t));
+    test_open(&t, BAR "-body_a_element %s -effects clamp,gravity -time newmark -ts_dt 0.01 -ts_max_time 0.9",
+              (int)n, element));
   PetscCall(SbRunAddMonitor(t.run, watch, &m));
   PetscCall(verify_solve(&t, "sudden gravity"));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "    %s n %2d: first minimum %.5f m at %.5f s\n", element, (int)n,
-                        (double)m.min_u, (double)m.min_t));
+  test_print("    %s n %2d: first minimum %.5f m at %.5f s\n", element, (int)n, m.min_u, m.min_t);
   *u = m.min_u;
   *at = m.min_t;
   PetscCall(test_scene_close(&t));
@@ -180,10 +171,9 @@ int main(int argc, char **argv)
   limit[0] = verify_aitken(f);
   limit[1] = verify_aitken(u);
   limit[2] = verify_aitken(at);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  lowest frequency, extrapolated %.5f Hz (reference 0.68846)\n  sudden gravity, "
-                        "extrapolated %.4f m at %.4f s (reference -1.5696 m at 0.7203 s)\n",
-                        (double)limit[0], (double)limit[1], (double)limit[2]));
+  test_print("  lowest frequency, extrapolated %.5f Hz (reference 0.68846)\n  sudden gravity, "
+             "extrapolated %.4f m at %.4f s (reference -1.5696 m at 0.7203 s)\n",
+             limit[0], limit[1], limit[2]);
   SB_CHECK_NEAR(limit[0], 0.68846, 3e-3 * 0.68846, "extrapolated frequency");
   /* the minimum is flat: small high-frequency waves, which depend on the mesh, determine its position */
   SB_CHECK_NEAR(limit[1], -1.5696, 1e-2 * 1.5696, "extrapolated first minimum");

@@ -36,7 +36,7 @@ static PetscErrorCode scenario(const char *element, const Inclusion *in, size_t 
     "-effect_pull_on xmax -effect_pull_vector %g;0;0 -effect_x_type fixed -effect_x_on xmin "
     "-effect_x_components x -effect_y_type fixed -effect_y_on ymin,ymax -effect_y_components y "
     "-effect_z_type fixed -effect_z_on zmin,zmax -effect_z_components z -time static",
-    element, BULK_E, BULK_NU, (double)in->E, (double)in->nu, SIGMA));
+    element, BULK_E, BULK_NU, in->E, in->nu, SIGMA));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -65,9 +65,8 @@ static PetscErrorCode check(const char *element, const Inclusion *in)
   }
   PetscCall(VecRestoreArrayRead(t.run->U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPIU_REAL, MPI_MAX, t.model->comm));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "%s, %s: error %.1e of the largest displacement\n", element,
-                        in->name, (double)(worst / largest)));
-  SB_CHECK(worst <= 1e-6 * largest, "%s, %s: error %g m", element, in->name, (double)worst);
+  test_print("%s, %s: error %.1e of the largest displacement\n", element, in->name, worst / largest);
+  SB_CHECK(worst <= 1e-6 * largest, "%s, %s: error %g m", element, in->name, worst);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -31,18 +31,15 @@ static PetscErrorCode check_end(PetscReal load, int steps, const char *more)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    verify_open(&t, CUBE DEAD "-time_inverted reject -static_steps %d %s", (double)-load, steps, more));
+  PetscCall(test_open(&t, CUBE DEAD "-time_inverted reject -static_steps %d %s", (double)-load, steps, more));
   PetscCall(SbRunSolve(t.run));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %g E in %d steps %s: %.9g in %d steps, softening %g\n    %s\n",
-                        (double)load, steps, more, (double)t.run->t_now, (int)t.run->steps_total,
-                        (double)t.run->softening, t.run->stop_reason));
-  SB_CHECK(reached == 1. || t.run->t_now < reached + 1e-9, "load factor %g beyond the limit",
-           (double)t.run->t_now);
+  test_print("  %g E in %d steps %s: %.9g in %d steps, softening %g\n    %s\n", load, steps, more,
+             t.run->t_now, (int)t.run->steps_total, t.run->softening, t.run->stop_reason);
+  SB_CHECK(reached == 1. || t.run->t_now < reached + 1e-9, "load factor %g beyond the limit", t.run->t_now);
   SB_CHECK_NEAR(t.run->t_now, reached, 1e-3 / steps, "load factor reached");
   SB_CHECK(t.run->steps_total <= steps + 60, "%d steps", (int)t.run->steps_total);
   SB_CHECK((t.run->stop_reason[0] == 0) == (reached == 1.), "%s", t.run->stop_reason);
-  SB_CHECK(reached == 1. || t.run->softening > 30., "softening %g", (double)t.run->softening);
+  SB_CHECK(reached == 1. || t.run->softening > 30., "softening %g", t.run->softening);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -54,17 +51,16 @@ static PetscErrorCode check_follower_end(const char *element)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(verify_open(&t,
-                        CUBE "-static_steps 5 -effect_press_type pressure -effect_press_value %g "
-                             "-body_a_element %s",
-                        (double)load, element));
+  PetscCall(test_open(&t,
+                      CUBE "-static_steps 5 -effect_press_type pressure -effect_press_value %g "
+                           "-body_a_element %s",
+                      load, element));
   PetscCall(SbRunSolve(t.run));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  follower %g E, %s: %.9g in %d steps, %d iterations\n    %s\n",
-                        (double)load, element, (double)t.run->t_now, (int)t.run->steps_total,
-                        (int)t.run->newton_total, t.run->stop_reason));
+  test_print("  follower %g E, %s: %.9g in %d steps, %d iterations\n    %s\n", load, element, t.run->t_now,
+             (int)t.run->steps_total, (int)t.run->newton_total, t.run->stop_reason);
   /* below the limit by the least increment; the iterations are bounded by twice those of the slowest element */
   SB_CHECK_NEAR(t.run->t_now, reached, 1e-3, "load factor");
-  SB_CHECK(t.run->softening > 10., "%s: softening %g", element, (double)t.run->softening);
+  SB_CHECK(t.run->softening > 10., "%s: softening %g", element, t.run->softening);
   SB_CHECK(t.run->newton_total < 280, "%s: %d iterations", element, (int)t.run->newton_total);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -76,20 +72,18 @@ static PetscErrorCode check_curl(const char *element, PetscReal nu, PetscReal pr
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    verify_open(&t,
-                "-bodies a -body_a_mesh box:1,0.1,0.1:10,2,2 -body_a_material neohookean -body_a_young "
-                "1e6 -body_a_poisson %g -body_a_density 1000 -effects hold,press -effect_hold_type "
-                "fixed -effect_hold_on xmin -effect_press_type pressure -effect_press_on zmax "
-                "-effect_press_value %g -time static -static_steps 10 -body_a_element %s",
-                (double)nu, (double)pressure, element));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh box:1,0.1,0.1:10,2,2 -body_a_material neohookean -body_a_young "
+                      "1e6 -body_a_poisson %g -body_a_density 1000 -effects hold,press -effect_hold_type "
+                      "fixed -effect_hold_on xmin -effect_press_type pressure -effect_press_on zmax "
+                      "-effect_press_value %g -time static -static_steps 10 -body_a_element %s",
+                      nu, pressure, element));
   PetscCall(verify_solve(&t, "curl"));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  curl, %s, nu %g, %g Pa: %d Newton and %d linear iterations, %d rejected\n",
-                        element, (double)nu, (double)pressure, (int)t.run->newton_total,
-                        (int)t.run->linear_total, (int)t.run->rejected_total));
+  PetscCall(PetscPrintf(
+    PETSC_COMM_WORLD, "  curl, %s, nu %g, %g Pa: %d Newton and %d linear iterations, %d rejected\n", element,
+    nu, pressure, (int)t.run->newton_total, (int)t.run->linear_total, (int)t.run->rejected_total));
   SB_CHECK(t.run->t_now == 1. && !t.run->rejected_total, "%s: load factor %g, %d rejected", element,
-           (double)t.run->t_now, (int)t.run->rejected_total);
+           t.run->t_now, (int)t.run->rejected_total);
   SB_CHECK(t.run->newton_total <= iterations, "%s: %d Newton iterations", element, (int)t.run->newton_total);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -105,20 +99,20 @@ static PetscErrorCode check_pull(const char *element, PetscReal nu)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(verify_open(&t,
-                        "-bodies a -body_a_mesh box:0.2,0.04,0.01:10,2,1 -body_a_material neohookean "
-                        "-body_a_young 1e4 -body_a_poisson %g -body_a_density 1000 -effects hold,pull "
-                        "-effect_hold_type fixed -effect_hold_on xmin -effect_pull_type pressure "
-                        "-effect_pull_on xmax -effect_pull_value -2000*t -time static -static_steps 20 "
-                        "-body_a_element %s",
-                        (double)nu, element));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh box:0.2,0.04,0.01:10,2,1 -body_a_material neohookean "
+                      "-body_a_young 1e4 -body_a_poisson %g -body_a_density 1000 -effects hold,pull "
+                      "-effect_hold_type fixed -effect_hold_on xmin -effect_pull_type pressure "
+                      "-effect_pull_on xmax -effect_pull_value -2000*t -time static -static_steps 20 "
+                      "-body_a_element %s",
+                      nu, element));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(verify_solve(&t, "pull"));
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD, "  pull, %s, nu %g: %d Newton iterations, %d rejected, strain energy %.5e J\n", element,
-    (double)nu, (int)t.run->newton_total, (int)t.run->rejected_total, (double)t.run->energies.strain));
+    nu, (int)t.run->newton_total, (int)t.run->rejected_total, t.run->energies.strain));
   SB_CHECK(t.run->t_now == 1. && !t.run->rejected_total, "%s: load factor %g, %d rejected", element,
-           (double)t.run->t_now, (int)t.run->rejected_total);
+           t.run->t_now, (int)t.run->rejected_total);
   /* 1.5 times the measured number */
   SB_CHECK(t.run->newton_total < 250, "%s: %d Newton iterations", element, (int)t.run->newton_total);
   /* P1 is too stiff by 6 % */
@@ -173,14 +167,13 @@ static PetscErrorCode check_branch(PetscBool follower, const char *more)
   PetscFunctionBeginUser;
   PetscCall(open_branch(NULL, follower, more, &b, &t));
   PetscCall(verify_solve(&t, "branch"));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD, "  arc length%s: %d steps, %d rejected, top %.6f, s %.9f at the end, error %.1e E\n",
-    more, (int)t.run->steps_total, (int)t.run->rejected_total, (double)b.top, (double)b.s, (double)b.error));
+  test_print("  arc length%s: %d steps, %d rejected, top %.6f, s %.9f at the end, error %.1e E\n", more,
+             (int)t.run->steps_total, (int)t.run->rejected_total, b.top, b.s, b.error);
   /* tolerance of the residual: 1e-8 of the load */
-  SB_CHECK(b.error < 1e-7 * b.load, "%s: %g E off the branch", more, (double)b.error);
-  SB_CHECK((t.run->t_now == 1.) == !follower, "%s: the path ended at %.17g", more, (double)t.run->t_now);
-  SB_CHECK(follower ? b.s < 0.55 && b.s > 0.4 : b.s < -1., "%s: stretch %g at the end", more, (double)b.s);
-  SB_CHECK(b.top <= (follower ? limit / b.load + 1e-7 : 1.), "%s: load factor %g", more, (double)b.top);
+  SB_CHECK(b.error < 1e-7 * b.load, "%s: %g E off the branch", more, b.error);
+  SB_CHECK((t.run->t_now == 1.) == !follower, "%s: the path ended at %.17g", more, t.run->t_now);
+  SB_CHECK(follower ? b.s < 0.55 && b.s > 0.4 : b.s < -1., "%s: stretch %g at the end", more, b.s);
+  SB_CHECK(b.top <= (follower ? limit / b.load + 1e-7 : 1.), "%s: load factor %g", more, b.top);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -192,16 +185,16 @@ static PetscErrorCode check_drive(void)
   Branch b = {.load = 0.};
 
   PetscFunctionBeginUser;
-  PetscCall(verify_open(
+  PetscCall(test_open(
     &t, CUBE ARC
     "-static_steps 10 -effect_press_type prescribed_displacement -effect_press_displacement 0;0;-0.5"));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch, &b));
   PetscCall(verify_solve(&t, "prescribed_displacement"));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  drive: %d steps, %d Newton iterations, s %.12f\n",
-                        (int)t.run->steps_total, (int)t.run->newton_total, (double)b.s));
-  SB_CHECK(t.run->t_now == 1. && PetscAbsReal(b.s - 0.5) < 1e-9, "s %.12f at the load factor %g", (double)b.s,
-           (double)t.run->t_now);
+  test_print("  drive: %d steps, %d Newton iterations, s %.12f\n", (int)t.run->steps_total,
+             (int)t.run->newton_total, b.s);
+  SB_CHECK(t.run->t_now == 1. && PetscAbsReal(b.s - 0.5) < 1e-9, "s %.12f at the load factor %g", b.s,
+           t.run->t_now);
   SB_CHECK(t.run->rejected_total == 0 && t.run->newton_total <= 5 * t.run->steps_total,
            "%d Newton iterations in %d steps", (int)t.run->newton_total, (int)t.run->steps_total);
   PetscCall(test_scene_close(&t));
@@ -228,11 +221,11 @@ static PetscErrorCode check_restart(const char *first, const char *checkpoint, P
                           checkpoint));
   PetscCall(open_branch(dir, PETSC_FALSE, more, &b, &t));
   PetscCall(SbRunSolve(t.run));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  restart of '%s' at %s: s %.12f and %.12f, error %.1e E\n", first,
-                        checkpoint, (double)whole.s, (double)b.s, (double)b.error));
-  SB_CHECK(t.run->steps_total > 1 && b.error < 1e-8 * b.load, "%g E off the branch", (double)b.error);
-  SB_CHECK(b.s < 0.02 && b.s > -0.3, "stretch %g at the end", (double)b.s);
-  SB_CHECK(PetscAbsReal(b.s - whole.s) < tolerance, "restart: %g and %g", (double)b.s, (double)whole.s);
+  test_print("  restart of '%s' at %s: s %.12f and %.12f, error %.1e E\n", first, checkpoint, whole.s, b.s,
+             b.error);
+  SB_CHECK(t.run->steps_total > 1 && b.error < 1e-8 * b.load, "%g E off the branch", b.error);
+  SB_CHECK(b.s < 0.02 && b.s > -0.3, "stretch %g at the end", b.s);
+  SB_CHECK(PetscAbsReal(b.s - whole.s) < tolerance, "restart: %g and %g", b.s, whole.s);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

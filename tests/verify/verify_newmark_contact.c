@@ -27,7 +27,7 @@ static PetscErrorCode check_wall(const char *time, const char *more, PetscReal d
   Record r = {0};
 
   PetscFunctionBeginUser;
-  verify_case("wall, %s, dt = %g %s", time, (double)dt, more);
+  verify_case("wall, %s, dt = %g %s", time, dt, more);
   PetscCall(record_run(
     &r,
     BAR("a") "-bodies a -body_a_velocity %g,0,0 -body_a_translate %.15g,0,0 -effects wall -effect_wall_type "
@@ -135,7 +135,6 @@ static PetscErrorCode check_ball(const char *material, PetscReal tolerance)
   VERIFY_LESS(record_gain(&r, "energy"), tolerance * record_at(&r, "energy", 0), "largest gain of a step, J");
   VERIFY_LESS(record_max(&r, "missing"), 1e-9, "momentum that no force explains, kg m/s");
   PetscCall(record_free(&r));
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -218,15 +217,12 @@ static PetscErrorCode check_push(const char *response)
 
 int main(int argc, char **argv)
 {
-  PetscMPIInt size;
-
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(check_rest());
-  if (size == 1) PetscCall(check_push("projected"));
+  if (test_size == 1) PetscCall(check_push("projected"));
   PetscCall(check_push("multiplier"));
   PetscCall(check_smooth());
-  if (size > 1) SB_TEST_END(); /* many steps of small systems: on one rank only */
+  if (test_size > 1) SB_TEST_END(); /* many steps of small systems: on one rank only */
   PetscCall(check_ball("linear", 1e-9));
   PetscCall(check_ball("corotated", 1e-4));
   PetscCall(check_walls());

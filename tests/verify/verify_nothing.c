@@ -160,11 +160,9 @@ static PetscErrorCode check_idle(const char *effects, const char *options)
   PetscCall(run(text, PETSC_FALSE, &with));
   SB_CHECK(!memcmp(plain.u, with.u, sizeof(PetscReal) * 3 * (size_t)plain.n) &&
              !memcmp(plain.v, with.v, sizeof(PetscReal) * 3 * (size_t)plain.n),
-           "%s changes the trajectory by %g", effects,
-           (double)verify_difference(3 * plain.n, plain.u, with.u));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  idle %-8s: trajectory the same to the last bit; effects begun %d times\n", effects,
-                        (int)with.events[SB_EVENT_EFFECTS]));
+           "%s changes the trajectory by %g", effects, verify_difference(3 * plain.n, plain.u, with.u));
+  test_print("  idle %-8s: trajectory the same to the last bit; effects begun %d times\n", effects,
+             (int)with.events[SB_EVENT_EFFECTS]);
   PetscCall(destroy(&plain));
   PetscCall(destroy(&with));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -245,10 +243,9 @@ static PetscErrorCode check_elements(const char *law, const char *other)
                           "-body_b_young 1e3 -body_b_poisson 0.3 -body_b_density 1000 -body_b_element %s",
                           law, other));
   PetscCall(run(text, PETSC_FALSE, &beside));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  %-10s beside %s: the p1 body moves as alone, but for %.1e and %.1e\n", law, other,
-                        (double)verify_difference(3 * plain.n, plain.u, beside.u),
-                        (double)verify_difference(3 * plain.n, plain.v, beside.v)));
+  PetscCall(PetscPrintf(
+    PETSC_COMM_WORLD, "  %-10s beside %s: the p1 body moves as alone, but for %.1e and %.1e\n", law, other,
+    verify_difference(3 * plain.n, plain.u, beside.u), verify_difference(3 * plain.n, plain.v, beside.v)));
   SB_CHECK(verify_difference(3 * plain.n, plain.u, beside.u) < 1e-12 &&
              verify_difference(3 * plain.n, plain.v, beside.v) < 1e-12,
            "%s: a body of %s changes the trajectory of one of p1", law, other);

@@ -31,7 +31,7 @@ static PetscErrorCode fall_on(const char *obstacle, PetscReal *u[], PetscInt *n,
 
   PetscFunctionBeginUser;
   verify_case("fall on %.20s", obstacle);
-  PetscCall(verify_open(
+  PetscCall(test_open(
     &t,
     VERIFY_BODY(
       "a", "box:0.1,0.1,0.05:2", "corotated", "2e4",
@@ -66,7 +66,6 @@ static PetscErrorCode check_mesh(void)
     PetscCall(PetscFree(u[k]));
     PetscCall(record_free(&r[k]));
   }
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -124,7 +123,6 @@ static PetscErrorCode check_facets(void)
   VERIFY_LESS(force[0][3 * DRAG_STEPS + 2], -0.5, "pressed by, N");
   VERIFY_LESS(verify_difference(3 * (DOWN_STEPS + 1), force[0], force[1]), 0.035,
               "difference of facets and sphere");
-  PetscCall(test_file_remove(path));
   test_surface_free(&s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -170,7 +168,6 @@ static PetscErrorCode check_groove(void)
   PetscCall(lie("mesh", text, &strain[1], &weight[1]));
   VERIFY_NEAR(weight[1], 9.81, 0.01 * 9.81, "weight in the groove, N");
   VERIFY_NEAR(strain[1], strain[0], 0.02 * strain[0], "strain energy in the groove, J");
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -224,7 +221,6 @@ static PetscErrorCode check_overlap_mesh(void)
   PetscCall(verify_mesh_write(n, table, NULL, path));
   PetscCall(PetscSNPrintf(text, sizeof(text), "mesh:%s", path));
   PetscCall(check_overlap("p1", "projected", text));
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -248,15 +244,12 @@ static PetscErrorCode check_at_once(void)
 
 int main(int argc, char **argv)
 {
-  PetscMPIInt size;
-
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(check_mesh());
   PetscCall(check_groove());
   PetscCall(check_overlap("p1", "projected", "plane:0,0,1,0"));
   PetscCall(check_at_once());
-  if (size == 1) {
+  if (test_size == 1) {
     PetscCall(check_overlap("cr", "projected", "plane:0,0,1,0"));
     PetscCall(check_overlap("p2", "projected", "plane:0,0,1,0"));
     PetscCall(check_overlap("p1", "augmented", "plane:0,0,1,0"));

@@ -112,26 +112,24 @@ static PetscErrorCode check_heap(const char *more)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(verify_open(&t, HEAP "%s", more));
+  PetscCall(test_open(&t, HEAP "%s", more));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch_heap, &w));
   PetscCall(verify_solve(&t, more));
   counts[0] = w.places;
   counts[1] = w.edges;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, counts, 2, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  heap%s: net force up to %g N; columns %.1e, places %.1e, obstacles %.1e of it; %d "
-                        "places in %d steps, %d of edges\n",
-                        more, (double)w.largest, (double)(w.worst[0] / w.largest),
-                        (double)(w.worst[1] / w.largest), (double)(w.worst[2] / w.largest), (int)counts[0],
-                        (int)w.steps, (int)counts[1]));
-  SB_CHECK(w.largest > 1 && counts[0] > 30, "%s: the bodies did not meet: %g N, %d places", more,
-           (double)w.largest, (int)counts[0]);
+  test_print("  heap%s: net force up to %g N; columns %.1e, places %.1e, obstacles %.1e of it; %d "
+             "places in %d steps, %d of edges\n",
+             more, w.largest, w.worst[0] / w.largest, w.worst[1] / w.largest, w.worst[2] / w.largest,
+             (int)counts[0], (int)w.steps, (int)counts[1]);
+  SB_CHECK(w.largest > 1 && counts[0] > 30, "%s: the bodies did not meet: %g N, %d places", more, w.largest,
+           (int)counts[0]);
   SB_CHECK(w.met[1] && w.met[BODIES + 2], "%s: two neighbours have not met", more);
   for (int k = 0; k < 3; k++)
-    SB_CHECK(w.worst[k] < 1e-10 * w.largest, "%s: sum %d differs by %g of %g N", more, k, (double)w.worst[k],
-             (double)w.largest);
-  SB_CHECK(w.worst[3] == 0, "%s: %g contacts are not told of", more, (double)w.worst[3]);
+    SB_CHECK(w.worst[k] < 1e-10 * w.largest, "%s: sum %d differs by %g of %g N", more, k, w.worst[k],
+             w.largest);
+  SB_CHECK(w.worst[3] == 0, "%s: %g contacts are not told of", more, w.worst[3]);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -179,7 +177,7 @@ static PetscErrorCode check_fold(void)
 
   PetscFunctionBeginUser;
   PetscCall(verify_mesh_write(n, hairpin, NULL, path));
-  PetscCall(verify_open(
+  PetscCall(test_open(
     &t,
     "-bodies a -body_a_mesh %s" LAW(
       "a") "-sets low,high -set_low_at box:-1,-1,-1,0.03,1,0.01 -set_high_at box:-1,-1,0.043,0.002,1,1 "
@@ -192,12 +190,9 @@ static PetscErrorCode check_fold(void)
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch_fold, most));
   PetscCall(verify_solve(&t, "fold"));
-  PetscCall(
-    PetscPrintf(PETSC_COMM_WORLD, "  fold: up to %d contacts with %g N\n", (int)most[0], (double)most[1]));
-  SB_CHECK(most[0] > 1 && most[1] > 0.01, "the legs did not meet: %g contacts, %g N", (double)most[0],
-           (double)most[1]);
+  test_print("  fold: up to %d contacts with %g N\n", (int)most[0], most[1]);
+  SB_CHECK(most[0] > 1 && most[1] > 0.01, "the legs did not meet: %g contacts, %g N", most[0], most[1]);
   PetscCall(test_scene_close(&t));
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -179,12 +179,11 @@ static PetscErrorCode load_options(PetscBool pulled, const PetscReal F[9], const
   char more[512];
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscSNPrintf(text, size,
-                  " -effect_move_type prescribed_displacement -effect_move_on %s -effect_move_displacement "
-                  "(%.17g)*x+(%.17g)*y+(%.17g)*z;(%.17g)*x+(%.17g)*y+(%.17g)*z;(%.17g)*x+(%.17g)*y+(%.17g)*z",
-                  pulled ? "side0" : "boundary", (double)F[0] - 1., (double)F[1], (double)F[2], (double)F[3],
-                  (double)F[4] - 1., (double)F[5], (double)F[6], (double)F[7], (double)F[8] - 1.));
+  PetscCall(PetscSNPrintf(
+    text, size,
+    " -effect_move_type prescribed_displacement -effect_move_on %s -effect_move_displacement "
+    "(%.17g)*x+(%.17g)*y+(%.17g)*z;(%.17g)*x+(%.17g)*y+(%.17g)*z;(%.17g)*x+(%.17g)*y+(%.17g)*z",
+    pulled ? "side0" : "boundary", F[0] - 1., F[1], F[2], F[3], F[4] - 1., F[5], F[6], F[7], F[8] - 1.));
   PetscCall(
     PetscStrlcat(text, pulled ? " -effects move,pull1,pull2,pull3,pull4,pull5" : " -effects move", size));
   PetscCall(PetscStrlcat(text, pulled ? " -sets side0,side1,side2,side3,side4,side5" : " -sets side0", size));
@@ -198,8 +197,8 @@ static PetscErrorCode load_options(PetscBool pulled, const PetscReal F[9], const
     PetscCall(PetscSNPrintf(
       more, sizeof(more),
       " -effect_pull%d_type traction -effect_pull%d_on side%d -effect_pull%d_vector %.17g;%.17g;%.17g", side,
-      side, side, side, (double)P[d] * (side % 2 ? 1. : -1.), (double)P[3 + d] * (side % 2 ? 1. : -1.),
-      (double)P[6 + d] * (side % 2 ? 1. : -1.)));
+      side, side, side, P[d] * (side % 2 ? 1. : -1.), P[3 + d] * (side % 2 ? 1. : -1.),
+      P[6 + d] * (side % 2 ? 1. : -1.)));
     PetscCall(PetscStrlcat(text, more, size));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -219,7 +218,7 @@ static PetscErrorCode check_patch(const Patch *p, const char *law, PetscReal nu,
   const PetscReal E = 1e6, stiff = PetscMax(1., nu / (1. - 2. * nu));
   TestScene t;
   PetscReal P[9], sigma[6], error[2];
-  char text[VERIFY_TEXT], loads[VERIFY_TEXT];
+  char loads[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
   exact_stress(law, E, nu, F, P);
@@ -227,29 +226,24 @@ static PetscErrorCode check_patch(const Patch *p, const char *law, PetscReal nu,
   for (int k = 0; k < 6 && known; k++)
     SB_CHECK_NEAR(sigma[k], k < 3 ? known[0] : known[1], 1e-9 * known[0], "stress of the paper");
   PetscCall(load_options(pulled, F, P, loads, sizeof(loads)));
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
+  PetscCall(test_open(
+    &t,
     "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material %s -body_a_young %g -body_a_poisson %g "
     "-body_a_density 1 -time static -ksp_rtol 1e-13 -snes_rtol 1e-13 -snes_atol 0 -snes_stol 1e-13 %s %s %s",
-    p->path, p->element, law, (double)E, (double)nu, !strcmp(law, "corotated") ? "-body_a_tangent exact" : "",
+    p->path, p->element, law, E, nu, !strcmp(law, "corotated") ? "-body_a_tangent exact" : "",
     !strcmp(p->element, "p1") ? "" : "-solver direct", loads));
-  PetscCall(test_scene_open(text, &t));
   PetscCall(verify_solve(&t, law));
   PetscCall(errors(&t, F, sigma, error));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  %s %-10s %-10s nu %-6g %-9s smallest angle %7.3f deg: u %.1e, stress %.1e, Newton %d\n", p->element,
-    shapes[p->shape], law, (double)nu, pulled ? "tractions" : "moved", (double)t.model->body[0].min_dihedral,
-    (double)error[0], (double)error[1], (int)t.run->newton_total));
+  test_print("  %s %-10s %-10s nu %-6g %-9s smallest angle %7.3f deg: u %.1e, stress %.1e, Newton %d\n",
+             p->element, shapes[p->shape], law, nu, pulled ? "tractions" : "moved",
+             t.model->body[0].min_dihedral, error[0], error[1], (int)t.run->newton_total);
   SB_CHECK(error[0] <= (nu > 0.4 && strcmp(p->element, "p1") ? 1e-9 : 1e-10),
-           "%s, %s, %s, nu %g: displacement off by %g", p->element, shapes[p->shape], law, (double)nu,
-           (double)error[0]);
+           "%s, %s, %s, nu %g: displacement off by %g", p->element, shapes[p->shape], law, nu, error[0]);
   SB_CHECK(error[1] <= 1e-9 * stiff, "%s, %s, %s, nu %g: stress off by %g", p->element, shapes[p->shape], law,
-           (double)nu, (double)error[1]);
+           nu, error[1]);
   if (p->shape == SLIVERS) {
     SB_CHECK(t.model->body[0].min_dihedral > 0.05 && t.model->body[0].min_dihedral < 1.,
-             "smallest dihedral angle of the mesh of slivers is %g degrees",
-             (double)t.model->body[0].min_dihedral);
+             "smallest dihedral angle of the mesh of slivers is %g degrees", t.model->body[0].min_dihedral);
   }
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -294,7 +288,6 @@ int main(int argc, char **argv)
       p.element = elements[e];
       PetscCall(check_mesh(&p));
     }
-    PetscCall(test_file_remove(p.path));
   }
   SB_TEST_END();
 }

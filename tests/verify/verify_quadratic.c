@@ -47,17 +47,15 @@ static PetscErrorCode evaluate(TestScene *t, Vec U, Vec D, PetscReal e, PetscRea
 static PetscErrorCode check_derivatives(const char *mesh, const char *law, const char *volume)
 {
   TestScene t;
-  char text[VERIFY_TEXT];
   PetscReal energy[3], off[2][2], size[2], slope;
   Vec U, D, F[3], AD;
   Mat A;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh %s" BODY
-                          "-body_a_element p2 -body_a_volume %s %s -time euler_implicit -ts_dt 0.1",
-                          mesh, law, volume, strcmp(law, "linear") ? "-body_a_tangent exact" : ""));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh %s" BODY
+                      "-body_a_element p2 -body_a_volume %s %s -time euler_implicit -ts_dt 0.1",
+                      mesh, law, volume, strcmp(law, "linear") ? "-body_a_tangent exact" : ""));
   PetscCall(VecDuplicate(t.run->U, &U));
   PetscCall(VecDuplicate(U, &D));
   PetscCall(VecDuplicate(U, &AD));
@@ -81,16 +79,15 @@ static PetscErrorCode check_derivatives(const char *mesh, const char *law, const
     PetscCall(VecNorm(F[1], NORM_2, &size[0]));
     off[k][1] = size[0] / (e * size[1]);
   }
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  %-10s %-9s: slope of the energy off by %.1e, %.1e; tangent by %.1e, %.1e\n", law,
-                        volume, (double)off[0][0], (double)off[1][0], (double)off[0][1], (double)off[1][1]));
+  test_print("  %-10s %-9s: slope of the energy off by %.1e, %.1e; tangent by %.1e, %.1e\n", law, volume,
+             off[0][0], off[1][0], off[0][1], off[1][1]);
   if (!strcmp(law, "linear")) {
-    SB_CHECK(off[1][0] < 1e-9 && off[1][1] < 1e-10, "linear: %g, %g", (double)off[1][0], (double)off[1][1]);
+    SB_CHECK(off[1][0] < 1e-9 && off[1][1] < 1e-10, "linear: %g, %g", off[1][0], off[1][1]);
   } else {
     SB_CHECK(off[0][0] < 1e-3 && off[1][0] < 0.3 * off[0][0] + 1e-9, "%s %s: energy and force: %g, %g", law,
-             volume, (double)off[0][0], (double)off[1][0]);
+             volume, off[0][0], off[1][0]);
     SB_CHECK(off[0][1] < 0.1 && off[1][1] < 0.55 * off[0][1], "%s %s: force and tangent: %g, %g", law, volume,
-             (double)off[0][1], (double)off[1][1]);
+             off[0][1], off[1][1]);
   }
   for (int k = 0; k < 3; k++) PetscCall(VecDestroy(&F[k]));
   PetscCall(VecDestroy(&U));
@@ -118,10 +115,8 @@ static PetscErrorCode solve(PetscInt n, PetscReal nu, const char *volume, PetscR
   PetscCall(test_scene_open(text, &t));
   PetscCall(verify_solve(&t, "manufactured solution"));
   PetscCall(manufactured_errors(t.model, t.run->U, error));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %-9s nu %-6g n %2d: L2 %.5f  H1 %.4f\n", volume, (double)nu,
-                        (int)n, (double)error[0], (double)error[1]));
+  test_print("  %-9s nu %-6g n %2d: L2 %.5f  H1 %.4f\n", volume, nu, (int)n, error[0], error[1]);
   PetscCall(test_scene_close(&t));
-  PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -140,11 +135,10 @@ static PetscErrorCode check_orders(void)
   SB_CHECK_NEAR(log(fine[1] / finest[1]) / log(1.5), 2., 0.3, "order in H1");
   for (int k = 0; k < 2; k++) {
     SB_CHECK(near[k] < 2.5 * fine[k] && nearer[k] < 2.5 * fine[k],
-             "errors at nu 0.3, 0.49, 0.4999: %g, %g, %g", (double)fine[k], (double)near[k],
-             (double)nearer[k]);
+             "errors at nu 0.3, 0.49, 0.4999: %g, %g, %g", fine[k], near[k], nearer[k]);
   }
   SB_CHECK(locked[0] > 1.5 * nearer[0], "with the volumetric part at the points it does not lock: %g",
-           (double)locked[0]);
+           locked[0]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -159,7 +153,6 @@ int main(int argc, char **argv)
   for (int k = 0; k < 16; k++)
     PetscCall(
       check_derivatives(k < 8 ? "box:0.4,0.3,0.5:2" : curved, laws[k / 2 % 4], k % 2 ? "pointwise" : "mean"));
-  PetscCall(test_file_remove(curved));
   PetscCall(check_orders());
   SB_TEST_END();
 }

@@ -17,7 +17,7 @@ static PetscErrorCode press(const char *element, PetscInt cells, PetscReal *forc
 
   PetscFunctionBeginUser;
   verify_case("press, %s", element);
-  PetscCall(verify_open(
+  PetscCall(test_open(
     &t,
     "-bodies low,high -body_low_mesh box:0.2,0.2,0.1:%d -body_high_mesh box:0.1,0.1,0.1:%d "
     "-body_high_translate "
@@ -52,7 +52,7 @@ static PetscErrorCode patch(void)
 
   PetscFunctionBeginUser;
   verify_case("patch");
-  PetscCall(verify_open(
+  PetscCall(test_open(
     &t,
     "-bodies low,high -body_low_mesh box:0.1,0.1,0.1:3 -body_high_mesh box:0.1,0.1,0.1:2 "
     "-body_high_translate "
@@ -95,16 +95,14 @@ int main(int argc, char **argv)
   static const Pair pairs[] = {{"sphere on a half-space", {1e5, 3e5}, {0, RADIUS}},
                                {"two spheres", {1e5, 1e5}, {2 * RADIUS, 2 * RADIUS}}};
   PetscReal force[2];
-  PetscMPIInt size;
 
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(press("p2", 1, &force[0]));
   PetscCall(press("p1", 2, &force[1]));
   /* P1 is too stiff on these meshes */
   VERIFY_NEAR(force[0] / force[1], 0.97, 0.02, "force of p2, of that of P1");
   PetscCall(patch());
-  for (int i = 0; i < 2 && size == 1; i++) {
+  for (int i = 0; i < 2 && test_size == 1; i++) {
     const Case c = {i ? 8 : 5, 0.12, 0.1, "p2"};
 
     PetscCall(hertz(&pairs[i], &c, &force[0]));

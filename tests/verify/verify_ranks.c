@@ -76,14 +76,13 @@ static PetscErrorCode check(const char *what, PetscReal tolerance, const char *o
   du = verify_difference(3 * alone.n, alone.u, together.u);
   if (alone.v) dv = verify_difference(3 * alone.n, alone.v, together.v);
   de = scalars(&alone.e, &together.e);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  %-28s %3d steps: displacement %.1e, velocity %.1e, scalars %.1e\n", what,
-                        (int)alone.steps, (double)du, (double)dv, (double)de));
+  test_print("  %-28s %3d steps: displacement %.1e, velocity %.1e, scalars %.1e\n", what, (int)alone.steps,
+             du, dv, de);
   SB_CHECK(alone.n == together.n && alone.steps == together.steps,
            "%s: %d numbers of nodes and %d steps, %d and %d alone", what, (int)together.n,
            (int)together.steps, (int)alone.n, (int)alone.steps);
   SB_CHECK(du <= tolerance && dv <= tolerance && de <= tolerance,
-           "%s: displacement %g, velocity %g, scalars %g", what, (double)du, (double)dv, (double)de);
+           "%s: displacement %g, velocity %g, scalars %g", what, du, dv, de);
   PetscCall(destroy(&alone));
   PetscCall(destroy(&together));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -35,7 +35,7 @@ static PetscErrorCode check_pair(const char *what, const char *bodies, PetscReal
   PetscReal before, after;
 
   PetscFunctionBeginUser;
-  verify_case("%s, e = %g", what, (double)e);
+  verify_case("%s, e = %g", what, e);
   PetscCall(record_run(&r,
                        TIGHT STIFF("a", "box:0.1,0.1,0.1:2") STIFF(
                          "b", "box:0.1,0.1,0.1:2") "-bodies a,b -body_a_velocity 1,0,0 -body_b_translate "
@@ -62,7 +62,6 @@ static PetscErrorCode check_balls(void)
   PetscCall(PetscSNPrintf(bodies, sizeof(bodies), "-body_a_mesh %s -body_b_mesh %s -body_b_density 2000",
                           path[0], path[1]));
   PetscCall(check_pair("balls", bodies, 0.6));
-  for (int k = 0; k < 2; k++) PetscCall(test_file_remove(path[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -92,7 +91,7 @@ static PetscErrorCode check_oblique(PetscReal friction, PetscReal e)
   Record r = {.forces = PETSC_TRUE};
 
   PetscFunctionBeginUser;
-  verify_case("oblique, friction %g, e = %g", (double)friction, (double)e);
+  verify_case("oblique, friction %g, e = %g", friction, e);
   PetscCall(record_run(
     &r,
     TIGHT STIFF("a", "box:0.1,0.1,0.1:2") STIFF(
@@ -115,7 +114,7 @@ static PetscErrorCode check_soft(PetscReal young, PetscReal dt, PetscReal e)
   char path[512];
 
   PetscFunctionBeginUser;
-  verify_case("soft, E = %g, dt = %g, e = %g", (double)young, (double)dt, (double)e);
+  verify_case("soft, E = %g, dt = %g, e = %g", young, dt, e);
   PetscCall(contact_ball_write(4, 0.05, path));
   PetscCall(
     record_run(&r,
@@ -128,7 +127,6 @@ static PetscErrorCode check_soft(PetscReal young, PetscReal dt, PetscReal e)
   /* the energy of rotating co-rotated tets is not exactly convex, even without contact */
   check_meeting(&r, record_at(&r, "energy", 0), 1e-5, 1e-8);
   PetscCall(record_free(&r));
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -164,17 +162,14 @@ static PetscErrorCode check_self(void)
   check_meeting(&r, record_last(&r, "energy"), 1e-9, 0);
   VERIFY_LESS(record_size(&r, "momentum", PETSC_TRUE), 1e-12, "largest change of momentum, kg m/s");
   PetscCall(record_free(&r));
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int main(int argc, char **argv)
 {
   static const PetscReal soft[][3] = {{1e5, 0.001, 1}, {1e6, 0.001, 0.5}, {1e7, 0.001, 1}, {1e4, 0.005, 1}};
-  PetscMPIInt size;
 
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(check_pair("blocks", "-body_b_mesh box:0.1,0.1,0.1:3", 0.6));
   PetscCall(check_pair("blocks, heavy", "-body_b_mesh box:0.1,0.1,0.1:3 -body_b_density 5000", 0.6));
   PetscCall(check_pair("blocks, equal", "", 1));
@@ -184,7 +179,7 @@ int main(int argc, char **argv)
   PetscCall(check_tower());
   PetscCall(check_oblique(0, 1));
   PetscCall(check_oblique(0.3, 0.7));
-  if (size > 1) SB_TEST_END(); /* many solves of small systems: on one rank only */
+  if (test_size > 1) SB_TEST_END(); /* many solves of small systems: on one rank only */
   for (int k = 0; k < 4; k++) PetscCall(check_soft(soft[k][0], soft[k][1], soft[k][2]));
   PetscCall(check_self());
   SB_TEST_END();

@@ -14,19 +14,16 @@
 
 static PetscErrorCode solve(const char *scene, const char *more, PetscReal **u, PetscInt *n, SbEnergies *e)
 {
-  char text[VERIFY_TEXT];
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), "%s %s", scene, more));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t, "%s %s", scene, more));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(verify_solve(&t, more));
   *n = 3 * verify_numbers(t.model);
   PetscCall(verify_gather(t.model, t.run->U, u));
   *e = t.run->energies;
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s: %d solves, %d iterations\n", more, (int)t.run->newton_total,
-                        (int)t.run->linear_total));
+  test_print("  %s: %d solves, %d iterations\n", more, (int)t.run->newton_total, (int)t.run->linear_total);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -40,7 +37,7 @@ static PetscErrorCode compare(const char *name, const char *scene, PetscInt n, c
   SbEnergies e0, e;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s\n", name));
+  test_print("  %s\n", name);
   PetscCall(solve(scene, more[0], &exact, &size, &e0));
   for (PetscInt k = 1; k < n; k++) {
     PetscReal off, work;
@@ -49,12 +46,10 @@ static PetscErrorCode compare(const char *name, const char *scene, PetscInt n, c
     off = verify_difference(size, exact, u);
     work = PetscAbsReal(e.prescribed_work - e0.prescribed_work) +
            PetscAbsReal(e.load_work - e0.load_work); /* relative to the elastic energy */
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "    differs by %.1e, works by %.1e of %.3g J\n", (double)off,
-                          (double)work, (double)e0.strain));
-    SB_CHECK(off < tolerance, "%s, %s: differs from projected by %g", name, more[k], (double)off);
+    test_print("    differs by %.1e, works by %.1e of %.3g J\n", off, work, e0.strain);
+    SB_CHECK(off < tolerance, "%s, %s: differs from projected by %g", name, more[k], off);
     SB_CHECK(work < 1e-4 * e0.strain, "%s, %s: works %g and %g J, projected %g and %g", name, more[k],
-             (double)e.prescribed_work, (double)e.load_work, (double)e0.prescribed_work,
-             (double)e0.load_work);
+             e.prescribed_work, e.load_work, e0.prescribed_work, e0.load_work);
     PetscCall(PetscFree(u));
   }
   PetscCall(PetscFree(exact));
@@ -170,18 +165,15 @@ static PetscErrorCode check_limit(void)
 
 static PetscErrorCode bend(const char *more, PetscReal *strain, PetscInt *newton)
 {
-  char text[VERIFY_TEXT];
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), BENT "%s", more));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t, BENT "%s", more));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(verify_solve(&t, more));
   *strain = t.run->energies.strain;
   *newton = t.run->newton_total;
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  bent, %s: %.9g J, %d iterations\n", more, (double)*strain,
-                        (int)*newton));
+  test_print("  bent, %s: %.9g J, %d iterations\n", more, *strain, (int)*newton);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -198,8 +190,8 @@ static PetscErrorCode check_bent(void)
   PetscCall(bend("-effect_load_value 4000 -effect_floor_response multiplier -saddle_solver iterative",
                  &strain[2], &newton[2]));
   for (int k = 1; k < 3; k++) {
-    SB_CHECK(PetscAbsReal(strain[k] - strain[0]) < 1e-6 * strain[0], "%g J, projected %g J",
-             (double)strain[k], (double)strain[0]);
+    SB_CHECK(PetscAbsReal(strain[k] - strain[0]) < 1e-6 * strain[0], "%g J, projected %g J", strain[k],
+             strain[0]);
     /* the same Newton's method, with directions that differ by the tolerance; without the boundary term 110 and 201 iterations instead of 83 */
     SB_CHECK(newton[k] < 1.2 * newton[0], "%d iterations, projected %d", (int)newton[k], (int)newton[0]);
   }
@@ -208,22 +200,19 @@ static PetscErrorCode check_bent(void)
                  &strain[0], &newton[0]));
   PetscCall(
     bend("-effect_load_value 1200 -effect_load_follower no -body_a_element cr", &strain[1], &newton[1]));
-  SB_CHECK(PetscAbsReal(strain[1] - strain[0]) < 1e-6 * strain[0], "%g J, in four steps %g J",
-           (double)strain[1], (double)strain[0]);
+  SB_CHECK(PetscAbsReal(strain[1] - strain[0]) < 1e-6 * strain[0], "%g J, in four steps %g J", strain[1],
+           strain[0]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int main(int argc, char **argv)
 {
-  PetscMPIInt size;
-
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   /* many solves of small systems: on several ranks only the cases that differ there */
-  PetscCall(check_pressed(size > 1 ? 4 : 6));
+  PetscCall(check_pressed(test_size > 1 ? 4 : 6));
   PetscCall(check_corner());
   PetscCall(check_limit());
-  if (size == 1) PetscCall(check_drive());
-  if (size < 3) PetscCall(check_bent());
+  if (test_size == 1) PetscCall(check_drive());
+  if (test_size < 3) PetscCall(check_bent());
   SB_TEST_END();
 }

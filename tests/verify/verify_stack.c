@@ -53,9 +53,8 @@ static PetscErrorCode write_blocks(PetscBool rough, size_t size, char text[])
       one, sizeof(one),
       " -body_b%d_mesh box:%g,%g,%g:%d,%d,%d -body_b%d_rotate 0,0,1,%g -body_b%d_translate %.15g,%.15g,%g "
       "-body_b%d_material corotated -body_b%d_young 1e6 -body_b%d_poisson 0.3 -body_b%d_density %g",
-      k, (double)b->size[0], (double)b->size[1], (double)b->size[2], (int)b->cells[0], (int)b->cells[1],
-      (int)b->cells[2], k, (double)(rough ? b->turn : 0), k, (double)x, (double)y, (double)z, k, k, k, k,
-      (double)b->density));
+      k, b->size[0], b->size[1], b->size[2], (int)b->cells[0], (int)b->cells[1], (int)b->cells[2], k,
+      rough ? b->turn : 0, k, x, y, z, k, k, k, k, b->density));
     PetscCall(PetscStrlcat(text, one, size));
     z += b->size[2];
   }
@@ -112,16 +111,15 @@ static PetscErrorCode check_stack(PetscReal friction, PetscReal slow)
   TestScene t;
 
   PetscFunctionBeginUser;
-  verify_case("stack, friction %g", (double)friction);
+  verify_case("stack, friction %g", friction);
   PetscCall(write_blocks((PetscBool)(friction > 0), sizeof(bodies), bodies));
   PetscCall(
-    verify_open(&t,
-                "%s %s -effect_floor_type contact -effect_floor_on b0 "
-                "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction %g -effect_meet_type contact "
-                "-effect_meet_friction %g "
-                "-time euler_implicit -ts_dt 0.01 -ts_max_time %g -snes_rtol 1e-10 -ksp_rtol 1e-9",
-                bodies, friction > 0 ? "-effects gravity,floor,meet" : GUIDED, (double)friction,
-                (double)friction, (double)end));
+    test_open(&t,
+              "%s %s -effect_floor_type contact -effect_floor_on b0 "
+              "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction %g -effect_meet_type contact "
+              "-effect_meet_friction %g "
+              "-time euler_implicit -ts_dt 0.01 -ts_max_time %g -snes_rtol 1e-10 -ksp_rtol 1e-9",
+              bodies, friction > 0 ? "-effects gravity,floor,meet" : GUIDED, friction, friction, end));
   PetscCall(SbRunAddMonitor(t.run, keep, &at));
   PetscCall(record_solve(&t, &r));
   PetscCall(VecAXPY(at.U, -1, t.run->U));
@@ -152,12 +150,9 @@ static PetscErrorCode check_stack(PetscReal friction, PetscReal slow)
 
 int main(int argc, char **argv)
 {
-  PetscMPIInt size;
-
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(check_stack(0, 5e-4));
-  if (size > 1) SB_TEST_END(); /* many solves of a small system: on one rank only */
+  if (test_size > 1) SB_TEST_END(); /* many solves of a small system: on one rank only */
   PetscCall(check_stack(0.5, 1e-4));
   SB_TEST_END();
 }

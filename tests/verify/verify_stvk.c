@@ -39,20 +39,18 @@ static PetscErrorCode solve(const char *what, const PetscInt n[3], VerifyMap map
                             const PetscReal at[3], PetscReal u[3])
 {
   TestScene t;
-  char text[VERIFY_TEXT], mesh[512];
+  char mesh[512];
 
   PetscFunctionBeginUser;
   PetscCall(verify_mesh_write(n, map, NULL, mesh));
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh %s -time static -effect_plane_type fixed "
-                          "-effect_plane_on all -effect_plane_components z %s",
-                          mesh, options));
-  PetscCall(test_scene_open(text, &t));
-  PetscCall(test_file_remove(mesh));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh %s -time static -effect_plane_type fixed "
+                      "-effect_plane_on all -effect_plane_components z %s",
+                      mesh, options));
   PetscCall(verify_solve(&t, what));
   PetscCall(test_value_at(t.model, t.run->U, at, u));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "    %s, %d x %d cells: %.6g %.6g, %d Newton iterations\n", what,
-                        (int)n[0], (int)n[1], (double)u[0], (double)u[1], (int)t.run->newton_total));
+  test_print("    %s, %d x %d cells: %.6g %.6g, %d Newton iterations\n", what, (int)n[0], (int)n[1], u[0],
+             u[1], (int)t.run->newton_total);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -74,13 +72,12 @@ static PetscErrorCode check_csm(const char *what, PetscReal mu, PetscReal ux, Pe
                     "-body_a_density 1000 -sets front,back -set_front_at sphere:0.2,0.2,0,0.05 "
                     "-set_back_at sphere:0.2,0.2,%.17g,0.05 -effects root,plane,gravity "
                     "-effect_root_type fixed -effect_root_on front,back -effect_gravity_vector 0,-2,0  ",
-                    (double)(2.8 * mu), thickness));
+                    2.8 * mu, thickness));
     PetscCall(solve(what, n, beam, text, tip, u[k]));
   }
   for (int k = 0; k < 2; k++) limit[k] = verify_extrapolate(u[0][k], u[1][k], 2.);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s: extrapolated %.6f %.6f mm (reference %.6f %.6f)\n", what,
-                        (double)(1e3 * limit[0]), (double)(1e3 * limit[1]), (double)(1e3 * ux),
-                        (double)(1e3 * uy)));
+  test_print("  %s: extrapolated %.6f %.6f mm (reference %.6f %.6f)\n", what, 1e3 * limit[0], 1e3 * limit[1],
+             1e3 * ux, 1e3 * uy);
   /* the finer mesh has an error of 1 %, its extrapolation must be at least ten times better */
   SB_CHECK_NEAR(u[1][1], uy, 0.015 * PetscAbsReal(uy), what);
   SB_CHECK_NEAR(limit[0], ux, 3e-3 * PetscAbsReal(ux), what);
@@ -104,13 +101,12 @@ static PetscErrorCode check_cook(PetscReal nu, PetscReal uy)
                             "-sets left,right -set_left_at plane:1,0,0,0 -set_right_at plane:1,0,0,48 "
                             "-effects hold,plane,pull -effect_hold_type fixed -effect_hold_on left "
                             "-effect_pull_type traction -effect_pull_on right -effect_pull_vector 0;1/16;0",
-                            (double)nu));
+                            nu));
     PetscCall(solve("Cook", n, membrane, text, corner, u[k]));
     v[k] = u[k][1];
   }
   limit = verify_aitken(v);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  Cook's membrane, nu %g: extrapolated %.4f m (reference %.4f)\n",
-                        (double)nu, (double)limit, (double)uy));
+  test_print("  Cook's membrane, nu %g: extrapolated %.4f m (reference %.4f)\n", nu, limit, uy);
   SB_CHECK_NEAR(limit, uy, 5e-3 * uy, "corner of Cook's membrane");
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -123,24 +123,24 @@ static PetscErrorCode check(const char *element, const char *law, const char *ti
   PetscInt n, first_steps = 0, steps;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s %s, %s:", element, law, time));
+  test_print("  %s %s, %s:", element, law, time);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(units); i++) {
     PetscCall(solve(element, law, time, seconds, &units[i], &n, &u, &steps));
     if (!first) {
       first = u;
       first_steps = steps;
-      PetscCall(PetscPrintf(PETSC_COMM_WORLD, " %d steps", (int)steps));
+      test_print(" %d steps", (int)steps);
       continue;
     }
     const PetscReal difference = verify_difference(3 * n, first, u);
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "; %s %.1e", units[i].what, (double)difference));
+    test_print("; %s %.1e", units[i].what, difference);
     SB_CHECK(steps == first_steps, "%s, %s, %s, %s: %d steps instead of %d", element, law, time,
              units[i].what, (int)steps, (int)first_steps);
     SB_CHECK(difference <= units[i].tolerance, "%s, %s, %s, %s: %g", element, law, time, units[i].what,
-             (double)difference);
+             difference);
     PetscCall(PetscFree(u));
   }
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "\n"));
+  test_print("\n");
   PetscCall(PetscFree(first));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -158,7 +158,7 @@ static PetscErrorCode contact(const char *what, PetscReal speed, PetscReal frict
   PetscInt newton = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s:", what));
+  test_print("  %s:", what);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(units); i++) {
     const Units *q = &units[i];
     const double m = q->m, s = q->s, pa = q->kg / (m * s * s), rho = q->kg / (m * m * m);
@@ -182,7 +182,7 @@ static PetscErrorCode contact(const char *what, PetscReal speed, PetscReal frict
                   "-effect_gravity_vector 0,0,%.17g -effect_floor_type contact -effect_meet_type contact "
                   "-effect_floor_response barrier -effect_floor_obstacle plane:0,0,1,0 "
                   "-effect_floor_friction %g -effect_meet_friction %g -ts_dt %.17g -ts_max_time %.17g",
-                  -9.81 * m / (s * s), (double)friction, (double)friction, 0.005 * s, seconds * s));
+                  -9.81 * m / (s * s), friction, friction, 0.005 * s, seconds * s));
     PetscCall(test_scene_open(text, &t));
     PetscCall(verify_solve(&t, q->what));
     n = 3 * verify_numbers(t.model);
@@ -190,19 +190,18 @@ static PetscErrorCode contact(const char *what, PetscReal speed, PetscReal frict
     for (PetscInt k = 0; k < n; k++) u[k] /= q->m;
     difference = first ? verify_difference(n, first, u) : 0.;
     if (!first) newton = t.run->newton_total;
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "%s %s %d iterations, %.1e", first ? ";" : "", q->what,
-                          (int)t.run->newton_total, (double)difference));
+    test_print("%s %s %d iterations, %.1e", first ? ";" : "", q->what, (int)t.run->newton_total, difference);
     SB_CHECK(t.run->newton_total == newton && t.run->rejected_total == 0,
              "%s, %s: %d iterations, not %d; %d rejected steps", what, q->what, (int)t.run->newton_total,
              (int)newton, (int)t.run->rejected_total);
-    SB_CHECK(difference <= CONTACT, "%s, %s: displacements differ by %g", what, q->what, (double)difference);
+    SB_CHECK(difference <= CONTACT, "%s, %s: displacements differ by %g", what, q->what, difference);
     if (first)
       PetscCall(PetscFree(u));
     else
       first = u;
     PetscCall(test_scene_close(&t));
   }
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "\n"));
+  test_print("\n");
   PetscCall(PetscFree(first));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
