@@ -49,10 +49,7 @@ static inline PetscErrorCode fixture_open_given(const char *dir, const char *opt
 {
   PetscFunctionBeginUser;
   *scene = (TestScene){NULL, NULL, NULL, NULL};
-  PetscCall(PetscOptionsClear(NULL));
-  PetscCall(SbOptionsReset());
-  PetscCall(SbRegisterAll());
-  PetscCall(PetscOptionsInsertString(NULL, options));
+  PetscCall(test_options(options));
   PetscCall(PetscOptionsSetValue(NULL, "-output_dir", dir));
   PetscCall(PetscOptionsSetValue(NULL, "-output_overwrite", "yes"));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene->model));

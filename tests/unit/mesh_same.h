@@ -8,10 +8,28 @@
 /* A file of its own for each rank that tests something alone; the caller removes it. */
 static inline void test_path(const char *name, size_t size, char path[])
 {
-  PetscMPIInt rank;
+  (void)snprintf(path, size, "/tmp/sbmesh_%d_%d_%s", (int)getpid(), (int)test_rank, name);
+}
 
-  (void)MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
-  (void)snprintf(path, size, "/tmp/sbmesh_%d_%d_%s", (int)getpid(), (int)rank, name);
+/* The same path on all ranks. */
+static inline PetscErrorCode test_path_of_all(const char *name, size_t size, char path[])
+{
+  int id = (int)getpid();
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Bcast(&id, 1, MPI_INT, 0, PETSC_COMM_WORLD));
+  (void)snprintf(path, size, "/tmp/sbmesh_all_%d_%s", id, name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Removes a file, and the .xmf of an .h5. */
+static inline void test_unlink(const char *path)
+{
+  char index[256];
+
+  (void)snprintf(index, sizeof(index), "%.*s.xmf", (int)(strrchr(path, '.') - path), path);
+  (void)unlink(path);
+  (void)unlink(index);
 }
 
 static inline PetscErrorCode test_read(const char *path, PetscInt step, SbImport **im)
@@ -28,15 +46,13 @@ static inline PetscErrorCode test_read(const char *path, PetscInt step, SbImport
 static inline PetscErrorCode test_round(const SbImport *im, const char *name, SbMeshFormat format,
                                         SbImport **again)
 {
-  char path[256], index[256];
+  char path[256];
 
   PetscFunctionBeginUser;
   test_path(name, sizeof(path), path);
   PetscCall(SbMeshFileWrite(im, path, format));
   PetscCall(test_read(path, 0, again));
-  (void)unlink(path);
-  (void)snprintf(index, sizeof(index), "%.*s.xmf", (int)(strrchr(path, '.') - path), path);
-  (void)unlink(index);
+  test_unlink(path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -23,12 +23,14 @@ static inline void test_surface_grow(TestSurface *s, PetscInt nvert, PetscInt nt
   s->tri = (PetscInt(*)[3])realloc(s->tri, (size_t)(s->ntri + ntri) * sizeof(*s->tri));
 }
 
+/* Corners of the sides of a box, counter-clockwise seen from outside; bit k of a number: the high end along axis k. */
+static const int test_box_side[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
+                                        {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+
 /* The box between two corners, two triangles a side; inwards: seen from outside its triangles are clockwise. */
 static inline void test_surface_box(const PetscReal lo[3], const PetscReal hi[3], PetscBool inwards,
                                     TestSurface *s)
 {
-  static const int side[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
-                                 {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
   const PetscInt first = s->nvert;
 
   test_surface_grow(s, 8, 12);
@@ -37,7 +39,7 @@ static inline void test_surface_box(const PetscReal lo[3], const PetscReal hi[3]
     s->nvert++;
   }
   for (int f = 0; f < 12; f++) {
-    const int *q = side[f / 2];
+    const int *q = test_box_side[f / 2];
     PetscInt *t = s->tri[s->ntri++];
 
     t[0] = first + q[0];

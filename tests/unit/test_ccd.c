@@ -294,8 +294,8 @@ static void check_levels(void)
     impacts += impact;
     seen[kind] += impact;
     if (impact) {
-      SB_CHECK(t >= from - 2e-6L && t <= to + 2e-6L, "motion %d: time %g, should be in [%Lg, %Lg]", i, t, from,
-               to);
+      SB_CHECK(t >= from - 2e-6L && t <= to + 2e-6L, "motion %d: time %g, should be in [%Lg, %Lg]", i, t,
+               from, to);
     } else
       SB_CHECK(t == 1 && to > 1, "motion %d: an impact at %Lg is missed", i, to);
   }

@@ -27,10 +27,7 @@ static PetscErrorCode open_scene(const char *options, const char *element, const
   PetscCall(
     PetscSNPrintf(text, sizeof(text), SCENE "%s -body_a_element %s -solver %s", options, element, solver));
   *t = (TestScene){0};
-  PetscCall(PetscOptionsClear(NULL));
-  PetscCall(SbOptionsReset());
-  PetscCall(SbRegisterAll());
-  PetscCall(PetscOptionsInsertString(NULL, text));
+  PetscCall(test_options(text));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &t->model));
   PetscCall(test_scene_run(t));
   t->run->saddle = (PetscBool)(how == FACTORED);

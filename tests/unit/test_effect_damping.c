@@ -57,7 +57,6 @@ static PetscErrorCode check_power(const char *block, const char *other, PetscBoo
   PetscCall(PetscFree(v));
   for (int i = 0; i < 2; i++) PetscCall(SbEffectDestroy(&e[i]));
   PetscCall(fixture_destroy(&x));
-  PetscCall(PetscOptionsClear(NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -9,11 +9,10 @@ static const char *const sets[][2] = {{"bottom", "plane:0,0,1,0"}, {"all", "box:
 
 static PetscErrorCode history(Fixture *x, SbEffect e, PetscReal all[3])
 {
-  SbStage stage = {0};
+  const SbStage stage = {.u = x->u};
   PetscReal mine[3];
 
   PetscFunctionBeginUser;
-  stage.u = x->u;
   PetscCall((*e->ops.history)(e, x->space, &stage, x->f, mine));
   PetscCallMPI(MPI_Allreduce(mine, all, 3, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -67,7 +66,6 @@ static PetscErrorCode check_element(const char *element, PetscReal low)
   PetscCall(SbEffectDestroy(&roll));
   PetscCall(SbEffectDestroy(&rest));
   PetscCall(fixture_destroy(&x));
-  PetscCall(PetscOptionsClear(NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -9,14 +9,14 @@
 static const char *const sets[][2] = {
   {"bottom", "plane:0,0,1,0"}, {"west", "plane:1,0,0,0"}, {"edge", "box:-1,-1,-0.1,0.1,2,0.1"}};
 
-static PetscErrorCode make_on(const char *name, SbEffectOn *on)
+/* Option with one of the sets, valid until the next call. */
+static const SbEffectOn *on_set(int k)
 {
-  PetscFunctionBeginUser;
-  PetscCall(PetscStrncpy(on->option, "-effect_test_on", sizeof(on->option)));
-  on->n = 1;
-  PetscCall(PetscCalloc1(1, &on->name));
-  PetscCall(PetscStrncpy(on->name[0], name, SB_NAME_MAX));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  static char name[1][SB_NAME_MAX];
+  static const SbEffectOn on = {.option = "-effect_test_on", .n = 1, .name = name};
+
+  (void)snprintf(name[0], SB_NAME_MAX, "%s", sets[k][0]);
+  return &on;
 }
 
 /* Number of prescribed unknowns over all ranks. */
@@ -80,26 +80,24 @@ static PetscErrorCode check_element(const char *element)
 {
   const PetscBool p1 = element[0] == 'p' ? PETSC_TRUE : PETSC_FALSE;
   Fixture x;
-  SbEffectOn on[3];
   SbPrescribed bottom = {0}, west = {0}, edge = {0};
   PetscInt n;
 
   PetscFunctionBeginUser;
   fixture_use(element, element, PETSC_FALSE);
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
-  for (int i = 0; i < 3; i++) PetscCall(make_on(sets[i][0], &on[i]));
   SB_CHECK(SbPrescribedComponents(0) == 1 && SbPrescribedComponents(2) == 4 &&
              SbPrescribedComponents(5) == 5 && SbPrescribedComponents(6) == 7,
            "bits of the choices " SB_COMPONENT_CHOICES);
 
-  PetscCall(SbPrescribedSetUp(&bottom, x.space, &on[0], 5));
+  PetscCall(SbPrescribedSetUp(&bottom, x.space, on_set(0), 5));
   PetscCall(count(&bottom, &n));
   SB_CHECK_NEAR(n, p1 ? 18 : 16, 0, "unknowns of the bottom");
-  PetscCall(SbPrescribedSetUp(&west, x.space, &on[1], 7));
+  PetscCall(SbPrescribedSetUp(&west, x.space, on_set(1), 7));
   PetscCall(count(&west, &n));
   SB_CHECK_NEAR(n, p1 ? 9 * 3 - 3 * 2 : 8 * 3, 0, "unknowns of the west side without those of the bottom");
   check_bits(&x);
-  SB_CHECK_ERROR(SbPrescribedSetUp(&edge, x.space, &on[2], 5), PETSC_ERR_USER_INPUT,
+  SB_CHECK_ERROR(SbPrescribedSetUp(&edge, x.space, on_set(2), 5), PETSC_ERR_USER_INPUT,
                  p1 ? "-effect_test_on" : "body block");
   PetscCall(SbSpacePrescribeDone(x.space));
   PetscCall(check_values(&x, &bottom, &west));
@@ -107,7 +105,6 @@ static PetscErrorCode check_element(const char *element)
   PetscCall(SbPrescribedFree(&bottom));
   PetscCall(SbPrescribedFree(&west));
   PetscCall(SbPrescribedFree(&edge));
-  for (int i = 0; i < 3; i++) PetscCall(PetscFree(on[i].name));
   PetscCall(fixture_destroy(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -116,16 +113,14 @@ static PetscErrorCode check_element(const char *element)
 static PetscErrorCode check_supports(void)
 {
   Fixture x;
-  SbEffectOn on;
   SbPrescribed hold[2] = {0};
   PetscInt n[2], supports = 0;
 
   PetscFunctionBeginUser;
   fixture_use("dg", "dg", PETSC_TRUE);
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
-  PetscCall(make_on(sets[0][0], &on));
   for (int i = 0; i < 2; i++) {
-    PetscCall(SbPrescribedSetUp(&hold[i], x.space, &on, i ? 7 : 4));
+    PetscCall(SbPrescribedSetUp(&hold[i], x.space, on_set(0), i ? 7 : 4));
     PetscCall(count(&hold[i], &n[i]));
   }
   SB_CHECK(n[0] == 8 && n[1] == 16, "z of the first, the rest of the second: %d, %d unknowns", (int)n[0],
@@ -143,7 +138,6 @@ static PetscErrorCode check_supports(void)
   SB_CHECK(supports == 8 && x.space->Nnode == 4 * x.mesh->Ncell + 8, "%d supports", (int)supports);
   PetscCall(SbSpaceValidate(x.space));
   for (int i = 0; i < 2; i++) PetscCall(SbPrescribedFree(&hold[i]));
-  PetscCall(PetscFree(on.name));
   PetscCall(fixture_destroy(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -58,10 +58,9 @@ static PetscErrorCode check_torque(Fixture *x, SbEffect e)
 {
   const PetscReal n = x->space->faces ? 8 : 9; // nodes of the top
   PetscReal mine[4], all[4], expected = 0;
-  SbStage stage = {0};
+  const SbStage stage = {.u = x->u};
 
   PetscFunctionBeginUser;
-  stage.u = x->u;
   for (PetscInt i = 0; i < x->space->nnode; i++) {
     const PetscReal *X = &x->space->node_x[3 * i];
 
@@ -124,7 +123,6 @@ static PetscErrorCode check_element(const char *element, PetscBool held)
   PetscCall(SbEffectDestroy(&twist));
   PetscCall(SbEffectDestroy(&pull));
   PetscCall(fixture_destroy(&x));
-  PetscCall(PetscOptionsClear(NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

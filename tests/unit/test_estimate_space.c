@@ -15,10 +15,7 @@ static PetscErrorCode open_scene(MPI_Comm comm, const char *options, SbModel *m)
   SbRun run;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscOptionsClear(NULL));
-  PetscCall(SbOptionsReset());
-  PetscCall(SbRegisterAll());
-  PetscCall(PetscOptionsInsertString(NULL, options));
+  PetscCall(test_options(options));
   PetscCall(SbSceneCreate(comm, m));
   PetscCall(SbRunCreate(*m, &run));
   PetscCall(SbModelSetUp(*m));

@@ -26,10 +26,7 @@ static const char *const scenes[] = {
 static PetscErrorCode open_on(MPI_Comm comm, const char *options, SbModel *m)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscOptionsClear(NULL));
-  PetscCall(SbOptionsReset());
-  PetscCall(SbRegisterAll());
-  PetscCall(PetscOptionsInsertString(NULL, options));
+  PetscCall(test_options(options));
   PetscCall(SbSceneCreate(comm, m));
   PetscCall(SbModelSetUp(*m));
   PetscCall(SbMeshValidate((*m)->mesh));

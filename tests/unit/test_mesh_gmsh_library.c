@@ -163,11 +163,11 @@ static PetscErrorCode test_not_loaded(void)
 
 int main(int argc, char **argv)
 {
-  PetscMPIInt rank;
+  int rank;
 
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) {
+  rank = test_rank;
+  if (!test_rank) {
     PetscCall(test_cube());
     PetscCall(test_failures());
     PetscCall(test_not_loaded());

@@ -5,28 +5,23 @@
 
 #define DATA "tests/data/"
 
-/* Path that is the same on all ranks, from the process id of rank 0. */
-static PetscErrorCode shared_path(const char *name, size_t size, char path[])
+static PetscErrorCode remove_all(const char *path)
 {
-  int id = (int)getpid();
-
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Bcast(&id, 1, MPI_INT, 0, PETSC_COMM_WORLD));
-  (void)snprintf(path, size, "/tmp/sbmesh_all_%d_%s", id, name);
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  if (!test_rank) test_unlink(path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode remove_all(const char *path)
+/* Writes a mesh in the program's own format. */
+static PetscErrorCode write_mesh(const char *mesh, const char *path)
 {
-  char index[256];
+  SbImport *im;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  if (!test_rank) {
-    (void)unlink(path);
-    (void)snprintf(index, sizeof(index), "%.*s.xmf", (int)(strrchr(path, '.') - path), path);
-    (void)unlink(index);
-  }
+  PetscCall(test_read(mesh, 0, &im));
+  PetscCall(SbMeshFileWrite(im, path, SB_MESH_AUTO));
+  PetscCall(SbMeshFileDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -36,9 +31,9 @@ static PetscErrorCode fingerprint(const char *mesh_path, PetscReal sum[4])
   SbBody body = test_body("b", mesh_path);
   SbSet set[2];
   SbMesh mesh;
-  PetscReal mine[4] = {0, 0, 0, 0};
 
   PetscFunctionBeginUser;
+  PetscCall(PetscArrayzero(sum, 4));
   PetscCall(test_set("w", "group:wall", &set[0]));
   PetscCall(test_set("l", "group:left", &set[1]));
   PetscCall(SbMeshCreate(PETSC_COMM_WORLD, 1, &body, 2, set, &mesh));
@@ -46,13 +41,13 @@ static PetscErrorCode fingerprint(const char *mesh_path, PetscReal sum[4])
   for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
     const PetscInt *v = mesh->cell + 4 * c;
 
-    mine[0] += SbTetDeterminant(mesh->x, v) / 6;
+    sum[0] += SbTetDeterminant(mesh->x, v) / 6;
     for (int a = 0; a < 4; a++)
-      mine[1] += (PetscReal)(mesh->cell_orig[c] + 1) * (a + 1) * (PetscReal)(mesh->vert_orig[v[a]] + 1);
-    mine[2] += (mesh->cell_set[c] & SB_SET_BIT(1)) != 0;
-    for (int f = 0; f < 4; f++) mine[3] += (mesh->face_set[4 * c + f] & SB_SET_BIT(0)) != 0;
+      sum[1] += (PetscReal)(mesh->cell_orig[c] + 1) * (a + 1) * (PetscReal)(mesh->vert_orig[v[a]] + 1);
+    sum[2] += (mesh->cell_set[c] & SB_SET_BIT(1)) != 0;
+    for (int f = 0; f < 4; f++) sum[3] += (mesh->face_set[4 * c + f] & SB_SET_BIT(0)) != 0;
   }
-  PetscCallMPI(MPI_Allreduce(mine, sum, 4, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 4, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   PetscCall(SbMeshDestroy(&mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -62,16 +57,11 @@ static PetscErrorCode test_distributed(void)
 {
   PetscReal gmsh[4], own[4], indexed[4];
   char path[256], index[256];
-  SbImport *im;
 
   PetscFunctionBeginUser;
-  PetscCall(shared_path("cubes.h5", sizeof(path), path));
-  PetscCall(shared_path("cubes.xmf", sizeof(index), index));
-  if (!test_rank) {
-    PetscCall(test_read(DATA "two_cubes_41.msh", 0, &im));
-    PetscCall(SbMeshFileWrite(im, path, SB_MESH_AUTO));
-    PetscCall(SbMeshFileDestroy(&im));
-  }
+  PetscCall(test_path_of_all("cubes.h5", sizeof(path), path));
+  PetscCall(test_path_of_all("cubes.xmf", sizeof(index), index));
+  if (!test_rank) PetscCall(write_mesh(DATA "two_cubes_41.msh", path));
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
   PetscCall(fingerprint(DATA "two_cubes_41.msh", gmsh));
   PetscCall(fingerprint(path, own));
@@ -290,18 +280,6 @@ static PetscErrorCode refuse(const char *path, PetscErrorCode code, const char *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0: writes a mesh in the program's own format. */
-static PetscErrorCode write_mesh(const char *mesh, const char *path)
-{
-  SbImport *im;
-
-  PetscFunctionBeginUser;
-  PetscCall(test_read(mesh, 0, &im));
-  PetscCall(SbMeshFileWrite(im, path, SB_MESH_AUTO));
-  PetscCall(SbMeshFileDestroy(&im));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Replaces one array of a file; ndim 0 removes it. */
 static void replace(const char *path, const char *name, int ndim, const hsize_t size[], hid_t type,
                     const void *data)
@@ -335,7 +313,7 @@ static PetscErrorCode test_damage(void)
   char path[256];
 
   PetscFunctionBeginUser;
-  PetscCall(shared_path("bad.h5", sizeof(path), path));
+  PetscCall(test_path_of_all("bad.h5", sizeof(path), path));
   PetscCall(with_array(path, "/mesh/x", 0, NULL, 0, NULL, "/mesh/x|/mesh/cells"));
   PetscCall(with_array(path, "/mesh/x", 2, vertices, H5T_NATIVE_DOUBLE, reals, "/mesh/x|row 23"));
   PetscCall(with_array(path, "/mesh/x", 2, pair, H5T_NATIVE_DOUBLE, bad, "/mesh/x|2 dimensions|2 columns|3"));
@@ -393,7 +371,7 @@ static PetscErrorCode test_curved_damage(void)
   char path[256];
 
   PetscFunctionBeginUser;
-  PetscCall(shared_path("curved.h5", sizeof(path), path));
+  PetscCall(test_path_of_all("curved.h5", sizeof(path), path));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
     const hsize_t edges[2] = {(hsize_t)PetscMax(cases[i].nedge, 0), 2},
                   offs[2] = {(hsize_t)PetscMax(cases[i].noff, 0), 3};
@@ -421,7 +399,7 @@ static PetscErrorCode test_curved_damage(void)
 /* A truncated file is refused: no read past its end, no partial mesh. */
 static PetscErrorCode test_truncated(void)
 {
-  char path[256], cut[256], index[256], *bytes;
+  char path[256], cut[256], *bytes;
   size_t size;
   FILE *file;
   SbImport *im;
@@ -429,9 +407,7 @@ static PetscErrorCode test_truncated(void)
   PetscFunctionBeginUser;
   test_path("whole.h5", sizeof(path), path);
   test_path("cut.h5", sizeof(cut), cut);
-  PetscCall(test_read(DATA "two_cubes_41.msh", 0, &im));
-  PetscCall(SbMeshFileWrite(im, path, SB_MESH_AUTO));
-  PetscCall(SbMeshFileDestroy(&im));
+  PetscCall(write_mesh(DATA "two_cubes_41.msh", path));
   file = fopen(path, "rb");
   (void)fseek(file, 0, SEEK_END);
   size = (size_t)ftell(file);
@@ -448,9 +424,7 @@ static PetscErrorCode test_truncated(void)
   }
   PetscCall(PetscFree(bytes));
   (void)unlink(cut);
-  (void)unlink(path);
-  (void)snprintf(index, sizeof(index), "%.*s.xmf", (int)(strlen(path) - 3), path);
-  (void)unlink(index);
+  test_unlink(path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -460,6 +434,7 @@ static PetscErrorCode test_foreign(void)
   char path[256];
   SbImport *im;
   hid_t file, space, a;
+  FILE *text;
 
   PetscFunctionBeginUser;
   SB_CHECK_ERROR(test_read("tests/data/none.h5", 0, &im), PETSC_ERR_FILE_OPEN, "body 'b'|tests/data/none.h5");
@@ -478,12 +453,9 @@ static PetscErrorCode test_foreign(void)
   SB_CHECK_ERROR(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED, "layout 3|layouts 1 and 2");
   (void)unlink(path);
   test_path("none.xmf", sizeof(path), path);
-  {
-    FILE *text = fopen(path, "w");
-
-    (void)fprintf(text, "<Xdmf/>\n");
-    (void)fclose(text);
-  }
+  text = fopen(path, "w");
+  (void)fprintf(text, "<Xdmf/>\n");
+  (void)fclose(text);
   SB_CHECK_ERROR(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED, "body 'b'|line 1");
   (void)unlink(path);
   PetscFunctionReturn(PETSC_SUCCESS);

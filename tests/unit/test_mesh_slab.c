@@ -126,12 +126,10 @@ static PetscErrorCode test_same_mesh(PetscBool random, const char *partitioner)
   SbBody body[2][3];
   SbSet set[2][NSET];
   SbMesh a, b;
-  int id = (int)getpid();
   char path[256];
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Bcast(&id, 1, MPI_INT, 0, PETSC_COMM_WORLD));
-  (void)snprintf(path, sizeof(path), "/tmp/sbmesh_slab_%d.h5", id);
+  PetscCall(test_path_of_all("slab.h5", sizeof(path), path));
   if (!test_rank) PetscCall(make_mesh(path, random));
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
   PetscCall(PetscOptionsSetValue(NULL, "-mesh_partitioner", partitioner));
@@ -189,12 +187,10 @@ static PetscErrorCode test_refused(PetscInt ncell, const PetscInt vert[4], Petsc
 {
   SbBody body;
   SbMergedMesh whole;
-  int id = (int)getpid();
   char path[256];
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Bcast(&id, 1, MPI_INT, 0, PETSC_COMM_WORLD));
-  (void)snprintf(path, sizeof(path), "/tmp/sbmesh_slab_bad_%d.h5", id);
+  PetscCall(test_path_of_all("slab_bad.h5", sizeof(path), path));
   if (!test_rank) {
     SbImport *im;
 

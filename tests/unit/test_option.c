@@ -2,8 +2,8 @@
   test_option.c - table of options: readers, ranges, messages, unread options, the printed scenario, the manual.
 */
 // @ranks 1 3
+#include "file.h"
 #include "test.h"
-#include <unistd.h>
 
 static const SbOption body_rows[] = {
   {"mesh", SB_OPTION_STRING, 1, "", NULL, "", "mesh file"},
@@ -187,21 +187,6 @@ static PetscErrorCode read_all(PetscBool given)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode write_file(const char *name, const char *text)
-{
-  FILE *f;
-
-  PetscFunctionBeginUser;
-  if (!test_rank) {
-    f = fopen(name, "w");
-    PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s", name);
-    (void)fputs(text, f);
-    (void)fclose(f);
-  }
-  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static const char as_opts[] = "# a comment\n"
                               "-bodies liver,stone   # another\n"
                               "-verbose\n"
@@ -247,7 +232,7 @@ static PetscErrorCode test_files(const char *folder)
   PetscCall(PetscSNPrintf(file[1], sizeof(file[1]), "%s/a.yml", folder));
   PetscCall(PetscSNPrintf(view, sizeof(view), "%s/view.opts", folder));
   for (int i = 0; i < 2; i++) {
-    PetscCall(write_file(file[i], source[i]));
+    PetscCall(test_file_put(file[i], source[i]));
     PetscCall(begin("", &database));
     PetscCall(PetscOptionsInsertFile(PETSC_COMM_WORLD, NULL, file[i], PETSC_TRUE));
     PetscCall(SbOptionsRemember());
@@ -373,7 +358,7 @@ static PetscErrorCode test_left_out(const char *folder)
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(file, sizeof(file), "%s/lists.opts", folder));
-  PetscCall(write_file(file, "-bodies liver,spleen\n-body_spleen_mesh b.msh\n"));
+  PetscCall(test_file_put(file, "-bodies liver,spleen\n-body_spleen_mesh b.msh\n"));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
     PetscCall(
       begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3", &database));
@@ -504,13 +489,12 @@ static PetscErrorCode test_manual(const char *folder)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode run_tests(void)
+int main(int argc, char **argv)
 {
-  char folder[PETSC_MAX_PATH_LEN] = "/tmp/sb_test_option_XXXXXX", command[PETSC_MAX_PATH_LEN + 16];
+  char folder[512];
 
-  PetscFunctionBeginUser;
-  if (!test_rank) PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot make a folder");
-  PetscCallMPI(MPI_Bcast(folder, sizeof(folder), MPI_CHAR, 0, PETSC_COMM_WORLD));
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(test_file_folder(folder));
   PetscCall(test_refused_numbers());
   PetscCall(test_ends());
   PetscCall(test_refused_words());
@@ -523,15 +507,5 @@ static PetscErrorCode run_tests(void)
   PetscCall(test_underscores());
   PetscCall(test_nearest());
   PetscCall(test_manual(folder));
-  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  PetscCall(PetscSNPrintf(command, sizeof(command), "rm -rf %s", folder));
-  if (!test_rank) PetscCheck(!system(command), PETSC_COMM_SELF, PETSC_ERR_SYS, "cannot remove %s", folder);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-int main(int argc, char **argv)
-{
-  SB_TEST_BEGIN(argc, argv);
-  PetscCall(run_tests());
   SB_TEST_END();
 }

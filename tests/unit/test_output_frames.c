@@ -3,7 +3,7 @@
 // @ranks 1 2 3 4
 #include "output_fixture.h"
 
-static char dir[PETSC_MAX_PATH_LEN];
+static char dir[512];
 
 /* Opens the fields.h5 of the run; the caller closes it. */
 static PetscErrorCode open_fields(SbH5 *h)
@@ -124,11 +124,10 @@ static PetscErrorCode test_values(const char *precision, PetscReal tolerance)
 {
   TestScene scene;
   SbH5 h;
-  char options[2048], *xmf;
+  char *xmf;
 
   PetscFunctionBeginUser;
-  SbFormat(sizeof(options), options, HELD EULER ALL " -output_precision %s", precision);
-  PetscCall(test_scene_open_in(dir, options, &scene));
+  PetscCall(test_open_in(dir, &scene, HELD EULER ALL " -output_precision %s", precision));
   for (PetscInt k = 0; k <= 3; k++) PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 3)));
   PetscCall(open_fields(&h));
   PetscCall(check_values((SbOutput)scene.run->output, &h, "/step/0000/000002", 0.2, tolerance));
@@ -180,12 +179,12 @@ static PetscErrorCode check_sets(const char *more)
   SbH5 h;
   PetscReal *x, *left, *half, *tets, volume = 0.;
   PetscBool ok[4], fine = PETSC_TRUE;
-  char options[2048], *xmf;
+  char *xmf;
 
   PetscFunctionBeginUser;
-  SbFormat(sizeof(options), options,
-           HELD EULER " -sets left,half -set_half_at halfspace:1,0,0,0.2 -output_fields sets %s", more);
-  PetscCall(test_scene_open_in(dir, options, &scene));
+  PetscCall(test_open_in(
+    dir, &scene, HELD EULER " -sets left,half -set_half_at halfspace:1,0,0,0.2 -output_fields sets %s",
+    more));
   out = (SbOutput)scene.run->output;
   PetscCall(fixture_step(&scene, 0, 0.1, PETSC_TRUE));
   PetscCall(open_fields(&h));
@@ -245,11 +244,10 @@ static PetscErrorCode test_two_bodies(void)
 static PetscErrorCode frames_of(const char *more, PetscInt n, PetscReal dt, char frames[])
 {
   TestScene scene;
-  char options[2048], *xmf, name[64];
+  char *xmf, name[64];
 
   PetscFunctionBeginUser;
-  SbFormat(sizeof(options), options, BOX EULER "-output_fields displacement %s", more);
-  PetscCall(test_scene_open_in(dir, options, &scene));
+  PetscCall(test_open_in(dir, &scene, BOX EULER "-output_fields displacement %s", more));
   for (PetscInt k = 0; k <= n; k++) PetscCall(fixture_step(&scene, k, dt, (PetscBool)(k == n)));
   PetscCall(fixture_read(dir, "fields.xmf", &xmf));
   for (PetscInt k = 0; k <= n; k++) {
@@ -349,14 +347,13 @@ static PetscErrorCode test_restart(void)
 {
   TestScene scene;
   SbH5 h;
-  char *xmf, restart[PETSC_MAX_PATH_LEN + 256];
+  char *xmf;
 
   PetscFunctionBeginUser;
   PetscCall(test_scene_open_in(dir, HELD EULER ALL " -checkpoint_every_steps 4", &scene));
   for (PetscInt k = 0; k <= 6; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
   PetscCall(test_scene_close(&scene));
-  SbFormat(sizeof(restart), restart, HELD EULER ALL " -restart %s/checkpoint_000004.h5", dir);
-  PetscCall(test_scene_open_in(dir, restart, &scene));
+  PetscCall(test_open_in(dir, &scene, HELD EULER ALL " -restart %s/checkpoint_000004.h5", dir));
   SB_CHECK(scene.run->step0 == 4, "restart at step %d", (int)scene.run->step0);
   PetscCall(fixture_read(dir, "fields.xmf", &xmf));
   SB_CHECK(count(xmf, "<Time ") == 5 && !strstr(xmf, "/000005/"), "after a restart at 4: %d frames",
@@ -395,7 +392,7 @@ static PetscErrorCode test_nothing(void)
 int main(int argc, char *argv[])
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_folder(sizeof(dir), dir));
+  PetscCall(test_file_folder(dir));
   PetscCall(test_values("double", 1e-13)); // rounding of a few operations
   PetscCall(test_values("float", 1.2e-7)); // half a unit in the last place of a float, twice
   PetscCall(test_reaction());
@@ -405,7 +402,6 @@ int main(int argc, char *argv[])
   PetscCall(test_hundreds());
   PetscCall(test_restart());
   PetscCall(test_nothing());
-  PetscCall(fixture_remove(dir));
   PetscCall(SbOptionsReset());
   SB_TEST_END();
 }

@@ -2,7 +2,7 @@
 // restart.
 #include "output_fixture.h"
 
-static char dir[PETSC_MAX_PATH_LEN];
+static char dir[512];
 
 /* Column `name` of row `row` (0 is the first row of numbers) of the file; NAN if it is absent. */
 static PetscReal value_of(const char *text, const char *name, int row)
@@ -125,7 +125,7 @@ static PetscErrorCode test_every(void)
 static PetscErrorCode test_restart(void)
 {
   TestScene scene;
-  char *text, options[PETSC_MAX_PATH_LEN], path[PETSC_MAX_PATH_LEN];
+  char *text, path[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
   PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields none -checkpoint_every_steps 4", &scene));
@@ -151,9 +151,9 @@ static PetscErrorCode test_restart(void)
   PetscCall(PetscFree(text));
   PetscCall(test_scene_close(&scene));
   // with other columns the old file is kept under another name
-  SbFormat(sizeof(options), options,
-           BOX EULER "-output_fields none -restart %s/checkpoint_000004.h5 -probes p -probe_p_at 0,0,0", dir);
-  PetscCall(test_scene_open_in(dir, options, &scene));
+  PetscCall(test_open_in(
+    dir, &scene, BOX EULER "-output_fields none -restart %s/checkpoint_000004.h5 -probes p -probe_p_at 0,0,0",
+    dir));
   PetscCall(fixture_step(&scene, 4, 0.1, PETSC_TRUE));
   SB_CHECK(fixture_exists(dir, "history_before_000004.csv"), "the history with other columns is gone");
   PetscCall(fixture_read(dir, "history.csv", &text));
@@ -167,12 +167,11 @@ static PetscErrorCode test_restart(void)
 int main(int argc, char *argv[])
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_folder(sizeof(dir), dir));
+  PetscCall(test_file_folder(dir));
   PetscCall(test_values());
   PetscCall(test_tie());
   PetscCall(test_every());
   PetscCall(test_restart());
-  PetscCall(fixture_remove(dir));
   PetscCall(SbOptionsReset());
   SB_TEST_END();
 }

@@ -3,7 +3,7 @@
 // @ranks 1 2 4
 #include "output_fixture.h"
 
-static char dir[PETSC_MAX_PATH_LEN];
+static char dir[512];
 
 /* Numbers dealt cyclically to the ranks, in descending order. */
 static PetscErrorCode test_order(void)
@@ -183,13 +183,12 @@ static PetscErrorCode test_agree(void)
 int main(int argc, char *argv[])
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_folder(sizeof(dir), dir));
+  PetscCall(test_file_folder(dir));
   PetscCall(test_order());
   PetscCall(test_order_with_gaps());
   PetscCall(test_h5());
   PetscCall(test_open_failure());
   PetscCall(test_files());
   PetscCall(test_agree());
-  PetscCall(fixture_remove(dir));
   SB_TEST_END();
 }

@@ -13,7 +13,7 @@
 #define FIELDS \
   " -output_fields displacement,velocity,acceleration,reaction,J,pressure -output_precision double"
 
-static char dir[PETSC_MAX_PATH_LEN];
+static char dir[512];
 
 static PetscErrorCode open_fields(SbH5 *h)
 {
@@ -36,11 +36,10 @@ static PetscErrorCode test_affine(const char *more)
   SbH5 h;
   PetscReal *x, *field;
   PetscBool ok;
-  char options[2048], name[64];
+  char name[64];
 
   PetscFunctionBeginUser;
-  SbFormat(sizeof(options), options, BODIES EULER FIELDS "%s", more);
-  PetscCall(test_scene_open_in(dir, options, &scene));
+  PetscCall(test_open_in(dir, &scene, BODIES EULER FIELDS "%s", more));
   for (PetscInt k = 0; k <= 2; k++) PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 2)));
   out = (SbOutput)scene.run->output;
   SB_CHECK(out->point.N == (more[0] ? 4 * (48 + 72 + 48) : 30 + 36 + 27), "%d points", (int)out->point.N);
@@ -157,11 +156,9 @@ static PetscErrorCode test_reactions(const char *more)
   SbSpace s;
   SbOutput out;
   PetscReal *r, sums[14] = {0.}, away = 0.;
-  char options[2048];
 
   PetscFunctionBeginUser;
-  SbFormat(sizeof(options), options, BODIES EULER FIELDS "%s", more);
-  PetscCall(test_scene_open_in(dir, options, &scene));
+  PetscCall(test_open_in(dir, &scene, BODIES EULER FIELDS "%s", more));
   PetscCall(fixture_step(&scene, 0, 0.1, PETSC_FALSE));
   s = scene.model->space;
   out = (SbOutput)scene.run->output;
@@ -202,15 +199,15 @@ static PetscErrorCode test_probes(const char *fields)
   static const PetscReal at[3][3] = {{0.4, 0.1, 0.2}, {0.3, 0.3, 0.1}, {0.1, 0.6, 0.1}};
   TestScene scene;
   SbOutput out;
-  char options[2048], *text, *row;
+  char *text, *row;
   PetscReal u[3], v[3], a[3];
 
   PetscFunctionBeginUser;
-  SbFormat(sizeof(options), options,
-           BODIES EULER
-           "-probes p,q,r -probe_p_at 0.4,0.1,0.2 -probe_q_at 0.31,0.29,0.11 -probe_r_at 0.1,0.6,0.1 %s",
-           fields);
-  PetscCall(test_scene_open_in(dir, options, &scene));
+  PetscCall(test_open_in(
+    dir, &scene,
+    BODIES EULER
+    "-probes p,q,r -probe_p_at 0.4,0.1,0.2 -probe_q_at 0.31,0.29,0.11 -probe_r_at 0.1,0.6,0.1 %s",
+    fields));
   out = (SbOutput)scene.run->output;
   for (PetscInt k = 0; k <= 1; k++) PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 1)));
   PetscCall(fixture_read(dir, "history.csv", &text));
@@ -232,25 +229,23 @@ static PetscErrorCode test_probes(const char *fields)
 static PetscErrorCode test_restart(void)
 {
   TestScene scene;
-  char options[2048], *xmf;
+  char *xmf;
 
   PetscFunctionBeginUser;
   for (int other = 0; other < 2; other++) {
     const char *first = other ? "" : " -output_discontinuous",
                *second = other ? " -output_discontinuous" : "";
 
-    SbFormat(sizeof(options), options, BODIES EULER FIELDS " -checkpoint_every_steps 1%s", first);
-    PetscCall(test_scene_open_in(dir, options, &scene));
+    PetscCall(test_open_in(dir, &scene, BODIES EULER FIELDS " -checkpoint_every_steps 1%s", first));
     for (PetscInt k = 0; k <= 2; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
     PetscCall(test_scene_close(&scene));
-    SbFormat(sizeof(options), options, BODIES EULER FIELDS " -restart %s/checkpoint_000001.h5%s", dir,
-             second);
-    SB_CHECK_ERROR(test_scene_open_in(dir, options, &scene), PETSC_ERR_USER_INPUT,
-                   "-output_discontinuous|-output_dir");
+    SB_CHECK_ERROR(
+      test_open_in(dir, &scene, BODIES EULER FIELDS " -restart %s/checkpoint_000001.h5%s", dir, second),
+      PETSC_ERR_USER_INPUT, "-output_discontinuous|-output_dir");
     PetscCall(test_scene_close(&scene));
     SB_CHECK(fixture_exists(dir, "checkpoint_000002.h5"), "refused, but the folder was cleared");
-    SbFormat(sizeof(options), options, BODIES EULER FIELDS " -restart %s/checkpoint_000001.h5%s", dir, first);
-    PetscCall(test_scene_open_in(dir, options, &scene));
+    PetscCall(
+      test_open_in(dir, &scene, BODIES EULER FIELDS " -restart %s/checkpoint_000001.h5%s", dir, first));
     for (PetscInt k = 1; k <= 3; k++) PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 3)));
     PetscCall(test_scene_close(&scene));
     PetscCall(fixture_read(dir, "fields.xmf", &xmf));
@@ -281,7 +276,7 @@ static PetscErrorCode test_nothing(void)
 int main(int argc, char *argv[])
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_folder(sizeof(dir), dir));
+  PetscCall(test_file_folder(dir));
   PetscCall(test_affine(""));
   PetscCall(test_affine(" -output_discontinuous"));
   PetscCall(test_mean(PETSC_FALSE));
@@ -293,7 +288,6 @@ int main(int argc, char *argv[])
   PetscCall(test_probes("-output_fields none"));
   PetscCall(test_restart());
   PetscCall(test_nothing());
-  PetscCall(fixture_remove(dir));
   PetscCall(SbOptionsReset());
   SB_TEST_END();
 }

@@ -1,7 +1,7 @@
 // Printed report: header, progress, final table within 80 columns; run.json at the start, at the end, after a failure.
 #include "output_fixture.h"
 
-static char dir[PETSC_MAX_PATH_LEN];
+static char dir[512];
 
 /* Runs `call` and stores PETSc's output in a text. */
 #define CAPTURE(text, call)                         \
@@ -98,14 +98,13 @@ static PetscErrorCode test_elements(void)
     {"dg", "dg            48       192       576", "\"nodes\": 192, \"unknowns\": 576,"},
   };
   TestScene scene;
-  char options[1024], *header, *json;
+  char *header, *json;
 
   PetscFunctionBeginUser;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
-    SbFormat(sizeof(options), options,
-             BOX " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -progress false -body_a_element %s",
-             cases[i].element);
-    PetscCall(test_scene_open_in(dir, options, &scene));
+    PetscCall(test_open_in(
+      dir, &scene, BOX " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -progress false -body_a_element %s",
+      cases[i].element));
     CAPTURE(header, PetscCall(SbReportHeader(scene.run)));
     SB_CHECK(test_rank || strstr(header, cases[i].in_header), "no '%s' in the header:\n%s",
              cases[i].in_header, header);
@@ -168,12 +167,11 @@ static PetscErrorCode test_quiet(void)
 int main(int argc, char *argv[])
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_folder(sizeof(dir), dir));
+  PetscCall(test_file_folder(dir));
   PetscCall(test_report());
   PetscCall(test_elements());
   PetscCall(test_early_end());
   PetscCall(test_quiet());
-  PetscCall(fixture_remove(dir));
   PetscCall(SbOptionsReset());
   SB_TEST_END();
 }

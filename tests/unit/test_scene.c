@@ -2,9 +2,9 @@
   test_scene.c - from options to a model; errors before anything is computed.
 */
 // @ranks 1 3
+#include "file.h"
 #include "test.h"
 #include "sbscene.h"
-#include <unistd.h>
 
 #define LAW " -body_liver_material corotated -body_liver_young 5e3 -body_liver_poisson 0.45"
 #define LIVER "-bodies liver -body_liver_mesh box:1,1,1:2" LAW
@@ -123,14 +123,7 @@ static PetscErrorCode test_model(const char *folder)
   PetscCall(PetscViewerDestroy(&viewer));
   PetscCall(end(&database, &model));
 
-  if (!test_rank) {
-    FILE *f = fopen(file, "w");
-
-    PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s", file);
-    (void)fputs(yaml, f);
-    (void)fclose(f);
-  }
-  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  PetscCall(test_file_put(file, yaml));
   for (int i = 0; i < 2; i++) {
     PetscCall(begin("", &database));
     PetscCall(PetscOptionsInsertFile(PETSC_COMM_WORLD, NULL, i ? file : view, PETSC_TRUE));
@@ -276,28 +269,17 @@ static PetscErrorCode test_command(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode run_tests(void)
+int main(int argc, char **argv)
 {
-  char folder[PETSC_MAX_PATH_LEN] = "/tmp/sb_test_scene_XXXXXX", command[PETSC_MAX_PATH_LEN + 16];
+  char folder[512];
 
-  PetscFunctionBeginUser;
-  if (!test_rank) PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot make a folder");
-  PetscCallMPI(MPI_Bcast(folder, sizeof(folder), MPI_CHAR, 0, PETSC_COMM_WORLD));
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(test_file_folder(folder));
   PetscCall(test_model(folder));
   PetscCall(test_names());
   PetscCall(test_values());
   PetscCall(test_check(folder));
   PetscCall(test_many_sets());
   PetscCall(test_command());
-  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  PetscCall(PetscSNPrintf(command, sizeof(command), "rm -rf %s", folder));
-  if (!test_rank) PetscCheck(!system(command), PETSC_COMM_SELF, PETSC_ERR_SYS, "cannot remove %s", folder);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-int main(int argc, char **argv)
-{
-  SB_TEST_BEGIN(argc, argv);
-  PetscCall(run_tests());
   SB_TEST_END();
 }

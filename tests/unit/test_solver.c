@@ -178,16 +178,15 @@ static PetscErrorCode check_realtime(const char *element)
 /* The factor does not contain the face terms of these elements. */
 static PetscErrorCode check_faces(const char *element)
 {
-  char text[512];
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies bar -body_bar_mesh box:1,1,1:1 -body_bar_material linear -body_bar_young "
-                          "1e3 -body_bar_poisson 0.3 -body_bar_density 1 -body_bar_element %s "
-                          "-ts_dt 0.1 -solver realtime",
-                          element));
-  SB_CHECK_ERROR(test_scene_open(text, &t), PETSC_ERR_USER, "-solver realtime");
+  SB_CHECK_ERROR(test_open(&t,
+                           "-bodies bar -body_bar_mesh box:1,1,1:1 -body_bar_material linear -body_bar_young "
+                           "1e3 -body_bar_poisson 0.3 -body_bar_density 1 -body_bar_element %s "
+                           "-ts_dt 0.1 -solver realtime",
+                           element),
+                 PETSC_ERR_USER, "-solver realtime");
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

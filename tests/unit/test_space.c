@@ -184,8 +184,7 @@ static PetscErrorCode one_scene(const char *law, const char *mass, const char *e
   PetscReal norm, diff;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), scene_text, law, law, mass, extra));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t, scene_text, law, law, mass, extra));
   PetscCall(SbSpaceCreateVec(t.model->space, &U));
   PetscCall(SbSpaceCreateVec(t.model->space, &V));
   PetscCall(SbSpaceCreateVec(t.model->space, &W));

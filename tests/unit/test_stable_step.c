@@ -59,11 +59,10 @@ static PetscErrorCode energy_ratio(const char *body, PetscReal factor, PetscReal
   char text[1024];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a %s -body_a_material linear -body_a_young 1e5 -body_a_density 1000 "
-                          "-body_a_velocity 1,2,3 -body_a_angular_velocity 1,2,3 -time euler_symplectic",
-                          body));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      "-bodies a %s -body_a_material linear -body_a_young 1e5 -body_a_density 1000 "
+                      "-body_a_velocity 1,2,3 -body_a_angular_velocity 1,2,3 -time euler_symplectic",
+                      body));
   PetscCall(SbSpaceStableStep(t.model->space, &dt));
   PetscCall(test_scene_close(&t));
   PetscCall(PetscOptionsClear(NULL));

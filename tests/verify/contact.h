@@ -319,14 +319,14 @@ static inline PetscErrorCode record_solve(TestScene *t, Record *r)
 }
 
 /* Solves and closes the scene of these options; the caller frees the record with record_free(). */
-static inline PetscErrorCode record_run(Record *r, const char *format, ...)
+static inline PetscErrorCode PETSC_ATTRIBUTE_FORMAT(2, 3) record_run(Record *r, const char *format, ...)
 {
   TestScene t;
   va_list args;
 
   PetscFunctionBeginUser;
   va_start(args, format);
-  PetscCall(test_vopen(&t, format, args));
+  PetscCall(test_vopen(PETSC_COMM_WORLD, NULL, &t, format, args));
   va_end(args);
   PetscCall(record_solve(&t, r));
   PetscCall(test_scene_close(&t));

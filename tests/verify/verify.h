@@ -169,7 +169,7 @@ static inline PetscErrorCode verify_solve(TestScene *t, const char *what)
 /* Title of the checks that follow. */
 static char verify_title[256];
 
-static inline void verify_case(const char *format, ...)
+static inline void PETSC_ATTRIBUTE_FORMAT(1, 2) verify_case(const char *format, ...)
 {
   va_list args;
 

@@ -24,14 +24,13 @@ static PetscErrorCode check_ball(const char *element, PetscReal e)
   PetscFunctionBeginUser;
   verify_case("ball, %s, e = %g", element, e);
   PetscCall(contact_ball_write(4, RADIUS, path));
-  PetscCall(
-    record_run(&r,
-               VERIFY_BODY("a", "%s", "corotated", "1e11",
-                           "0.3") "-bodies a -body_a_element %s -body_a_translate 0,0,%g -effects "
-                                  "gravity,floor -effect_floor_type contact -effect_floor_response projected "
-                                  "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_restitution %g "
-                                  "-time euler_implicit -ts_dt %g -ts_max_time %g -snes_rtol 1e-10",
-               path, element, 0.2 + RADIUS, (double)e, STEP, e > 0.6 ? 0.9 : 0.65));
+  PetscCall(record_run(
+    &r,
+    "-bodies a -body_a_element %s -body_a_translate 0,0,%g -effects gravity,floor -effect_floor_type contact "
+    "-effect_floor_response projected -effect_floor_obstacle plane:0,0,1,0 -effect_floor_restitution %g "
+    "-time euler_implicit -ts_dt %g -ts_max_time %g -snes_rtol 1e-10" VERIFY_BODY("a", "%s", "corotated",
+                                                                                  "1e11", "0.3"),
+    element, 0.2 + RADIUS, e, STEP, e > 0.6 ? 0.9 : 0.65, path));
   for (PetscInt i = 0; i < r.n; i++) {
     const PetscReal height = record_at(&r, "centre_z", i) - (record_at(&r, "centre_z", 0) - r.lowest);
 
@@ -57,10 +56,9 @@ static PetscErrorCode check_block(const char *what, const char *obstacle, const 
   verify_case("%s", what);
   PetscCall(record_run(
     &r,
-    VERIFY_BODY("a", "box:0.1,0.1,0.1:3", "corotated", "1e11",
-                "0.3") "-bodies a -effects floor -effect_floor_type contact -effect_floor_response projected "
-                       "-effect_floor_obstacle %s -effect_floor_restitution 0.6 -time euler_implicit "
-                       "-ts_dt 0.001 -ts_max_time 0.05 -snes_rtol 1e-10 %s",
+    "-bodies a -effects floor -effect_floor_type contact -effect_floor_response projected "
+    "-effect_floor_obstacle %s -effect_floor_restitution 0.6 -time euler_implicit -ts_dt 0.001 -ts_max_time "
+    "0.05 -snes_rtol 1e-10 %s" VERIFY_BODY("a", "box:0.1,0.1,0.1:3", "corotated", "1e11", "0.3"),
     obstacle, more));
   VERIFY_NEAR(record_last(&r, "a_vz"), expected, 2e-3 * expected, "speed with which it leaves, m/s");
   PetscCall(record_free(&r));
@@ -75,14 +73,13 @@ static PetscErrorCode check_soft(PetscReal young, PetscReal dt, PetscReal e)
   PetscFunctionBeginUser;
   verify_case("soft, E = %g, dt = %g, e = %g", young, dt, e);
   PetscCall(contact_ball_write(4, RADIUS, path));
-  PetscCall(record_run(
-    &r,
-    VERIFY_BODY("a", "%s", "corotated", "%g",
-                "0.3") "-bodies a -body_a_translate 0,0,%g -body_a_angular_velocity 3,5,7 -effects "
-                       "gravity,floor -effect_floor_type contact -effect_floor_response projected "
-                       "-effect_floor_obstacle plane:0,0.1,1,0 -effect_floor_restitution %g "
-                       "-time euler_implicit -ts_dt %g -ts_max_time 0.4 -snes_rtol 1e-8",
-    path, (double)young, 0.05 + RADIUS, (double)e, (double)dt));
+  PetscCall(
+    record_run(&r,
+               "-bodies a -body_a_translate 0,0,%g -body_a_angular_velocity 3,5,7 -effects gravity,floor "
+               "-effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle "
+               "plane:0,0.1,1,0 -effect_floor_restitution %g -time euler_implicit -ts_dt %g -ts_max_time 0.4 "
+               "-snes_rtol 1e-8" VERIFY_BODY("a", "%s", "corotated", "%g", "0.3"),
+               0.05 + RADIUS, e, dt, path, young));
   /* of 0.5 J; the energy of rotating co-rotated tets is not exactly convex */
   VERIFY_LESS(record_gain(&r, "energy"), 1e-6, "largest gain of a step, J");
   PetscCall(record_free(&r));

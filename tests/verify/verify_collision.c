@@ -45,17 +45,14 @@ static PetscErrorCode check_stack(const char *element, int upper, PetscReal tole
   verify_case("stack, %s, %d on 2", element, upper);
   PetscCall(test_open(
     &t,
-    BLOCK("a", "box:0.1,0.1,0.05:2") BLOCK(
-      "b",
-      "box:0.1,0.1,0.05:%d") "-bodies a,b -body_b_translate 0,0,0.05 -body_a_element %s -body_b_element %s "
-                             "-sets x0,y0,bottom,top -set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 "
-                             "-set_bottom_at plane:0,0,1,0 -set_top_at plane:0,0,1,0.1 -time static "
-                             "-ksp_rtol 1e-12 -snes_rtol 1e-12 -effects x,y,z,load,meet -effect_x_type fixed "
-                             "-effect_x_on x0 -effect_x_components x -effect_y_type fixed -effect_y_on y0 "
-                             "-effect_y_components y -effect_z_type fixed -effect_z_on bottom "
-                             "-effect_z_components z -effect_load_type traction -effect_load_on top "
-                             "-effect_load_vector 0;0;%g -effect_meet_type contact",
-    upper, element, element, -LOAD));
+    "-bodies a,b -body_b_translate 0,0,0.05 -body_a_element %s -body_b_element %s -sets x0,y0,bottom,top "
+    "-set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 -set_bottom_at plane:0,0,1,0 -set_top_at "
+    "plane:0,0,1,0.1 -time static -ksp_rtol 1e-12 -snes_rtol 1e-12 -effects x,y,z,load,meet -effect_x_type "
+    "fixed -effect_x_on x0 -effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components "
+    "y -effect_z_type fixed -effect_z_on bottom -effect_z_components z -effect_load_type traction "
+    "-effect_load_on top -effect_load_vector 0;0;%g -effect_meet_type contact" BLOCK(
+      "a", "box:0.1,0.1,0.05:2") BLOCK("b", "box:0.1,0.1,0.05:%d"),
+    element, element, -LOAD, upper));
   PetscCall(record_solve(&t, &r));
   PetscCall(stress_error(&t, &worst));
   PetscCall(contact_body_forces(t.run, 1, force));
@@ -85,12 +82,10 @@ static PetscErrorCode check_bars(const char *element)
   verify_case("bars, %s", element);
   PetscCall(record_run(
     &r,
-    VERIFY_BODY("a", "box:1,0.05,0.05:1", "linear", "1e5", "0")
-      VERIFY_BODY("b", "box:1,0.05,0.05:1", "linear", "1e5",
-                  "0") "-bodies a,b -body_b_translate 1.002,0,0 -body_a_element %s -body_b_element %s "
-                       "-body_a_velocity %g,0,0 -body_b_velocity %g,0,0 -effects meet -effect_meet_type "
-                       "contact -time euler_implicit -ts_dt 0.0005 "
-                       "-ts_max_time 0.25 -ksp_rtol 1e-10",
+    "-bodies a,b -body_b_translate 1.002,0,0 -body_a_element %s -body_b_element %s -body_a_velocity %g,0,0 "
+    "-body_b_velocity %g,0,0 -effects meet -effect_meet_type contact -time euler_implicit -ts_dt 0.0005 "
+    "-ts_max_time 0.25 -ksp_rtol 1e-10" VERIFY_BODY("a", "box:1,0.05,0.05:1", "linear", "1e5", "0")
+      VERIFY_BODY("b", "box:1,0.05,0.05:1", "linear", "1e5", "0"),
     element, element, SPEED, -SPEED));
   record_span(&r, "meet_contacts", 0, &first, &last);
   VERIFY_NEAR(first, 0.01, 0.003, "first touch, s"); /* the barrier width is reached earlier */
@@ -113,13 +108,12 @@ static PetscErrorCode check_momentum(const char *element, PetscReal friction)
   verify_case("momentum, %s, friction %g", element, friction);
   PetscCall(record_run(
     &r,
-    VERIFY_BODY("a", "box:0.1,0.1,0.1:2", "corotated", "2e4", "0.3") VERIFY_BODY(
-      "b", "box:0.1,0.08,0.1:3", "corotated", "2e4",
-      "0.3") "-bodies a,b -body_b_translate 0.11,0.03,0.02 -body_b_rotate 1,2,3,20 -body_a_element %s "
-             "-body_b_element %s -body_a_velocity 0.8,0,0 -body_b_velocity -1,0,0 -effects meet "
-             "-effect_meet_type contact -effect_meet_friction %g -time "
-             "euler_implicit -ts_dt 0.001 -ts_max_time 0.1 -ksp_rtol 1e-11 -snes_rtol 1e-11",
-    element, element, (double)friction));
+    "-bodies a,b -body_b_translate 0.11,0.03,0.02 -body_b_rotate 1,2,3,20 -body_a_element %s -body_b_element "
+    "%s -body_a_velocity 0.8,0,0 -body_b_velocity -1,0,0 -effects meet -effect_meet_type contact "
+    "-effect_meet_friction %g -time euler_implicit -ts_dt 0.001 -ts_max_time 0.1 -ksp_rtol 1e-11 -snes_rtol "
+    "1e-11" VERIFY_BODY("a", "box:0.1,0.1,0.1:2", "corotated", "2e4", "0.3")
+      VERIFY_BODY("b", "box:0.1,0.08,0.1:3", "corotated", "2e4", "0.3"),
+    element, element, friction));
   record_span(&r, "meet_contacts", 0, &first, &last);
   VERIFY_MORE(last - first, 0.005, "time of contact, s");
   VERIFY_MORE(record_last(&r, "b_vx") - record_last(&r, "a_vx"), 0, "speed at which they part, m/s");
@@ -141,14 +135,14 @@ static PetscErrorCode check_slope(PetscReal mu, PetscReal tolerance)
 
   PetscFunctionBeginUser;
   verify_case("slope of 0.5, friction %g", mu);
-  PetscCall(record_run(&r,
-                       VERIFY_BODY("a", "box:0.3,0.1,0.05:1", "linear", "1e7", "0.3") VERIFY_BODY(
-                         "b", "box:0.06,0.06,0.03:1", "linear", "1e7",
-                         "0.3") "-bodies a,b -body_b_translate 0.02,0.021,0.05 -sets bottom -set_bottom_at "
-                                "plane:0,0,1,0 -time euler_implicit -ts_dt 0.002 -ts_max_time %g -effects "
-                                "gravity,hold,meet -effect_gravity_vector %g,0,%g -effect_hold_type fixed "
-                                "-effect_hold_on bottom -effect_meet_type contact -effect_meet_friction %g",
-                       (double)end, (double)(0.5 * c), (double)-c, (double)mu));
+  PetscCall(record_run(
+    &r,
+    "-bodies a,b -body_b_translate 0.02,0.021,0.05 -sets bottom -set_bottom_at plane:0,0,1,0 -time "
+    "euler_implicit -ts_dt 0.002 -ts_max_time %g -effects gravity,hold,meet -effect_gravity_vector %g,0,%g "
+    "-effect_hold_type fixed -effect_hold_on bottom -effect_meet_type contact -effect_meet_friction "
+    "%g" VERIFY_BODY("a", "box:0.3,0.1,0.05:1", "linear", "1e7", "0.3")
+      VERIFY_BODY("b", "box:0.06,0.06,0.03:1", "linear", "1e7", "0.3"),
+    end, 0.5 * c, -c, mu));
   VERIFY_NEAR(record_last(&r, "b_vx"), rigid, tolerance, "speed, m/s");
   PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -30,17 +30,15 @@ static PetscErrorCode check_press(const char *element, const char *response, Pet
 
   PetscFunctionBeginUser;
   verify_case("press, %s, %s", element, response);
-  PetscCall(test_open(
-    &t,
-    VERIFY_BODY(
-      "a", "box:0.1,0.1,0.05:4", "linear", "1e5",
-      "0.3") "-bodies a -body_a_element %s -time static -ksp_rtol 1e-12 -snes_rtol 1e-12 -effects "
-             "x,y,load,floor -effect_x_type fixed -effect_x_on xmin -effect_x_components x -effect_y_type "
-             "fixed -effect_y_on ymin -effect_y_components y -effect_load_type traction -effect_load_on zmax "
-             "-effect_load_vector 0;0;%g -effect_floor_type contact -effect_floor_response projected "
-             "-effect_floor_on zmin "
-             "-effect_floor_obstacle plane:0,0,1,0.001 -effect_floor_response %s -effect_floor_stiffness %g",
-    element, -LOAD, response, (double)stiffness));
+  PetscCall(
+    test_open(&t,
+              "-bodies a -body_a_element %s -time static -ksp_rtol 1e-12 -snes_rtol 1e-12 -effects "
+              "x,y,load,floor -effect_x_type fixed -effect_x_on xmin -effect_x_components x -effect_y_type "
+              "fixed -effect_y_on ymin -effect_y_components y -effect_load_type traction -effect_load_on "
+              "zmax -effect_load_vector 0;0;%g -effect_floor_type contact -effect_floor_response projected "
+              "-effect_floor_on zmin -effect_floor_obstacle plane:0,0,1,0.001 -effect_floor_response %s "
+              "-effect_floor_stiffness %g" VERIFY_BODY("a", "box:0.1,0.1,0.05:4", "linear", "1e5", "0.3"),
+              element, -LOAD, response, stiffness));
   PetscCall(record_solve(&t, &r));
   s = t.model->space;
   PetscCall(PetscMalloc1(6 * s->mesh->ncell_owned, &sigma));
@@ -69,15 +67,14 @@ static PetscErrorCode check_fall(const char *element, const char *response)
 
   PetscFunctionBeginUser;
   verify_case("fall, %s, %s", element, response);
-  PetscCall(record_run(
-    &r,
-    VERIFY_BODY("a", "box:0.1,0.1,0.1:2", "corotated", "1e4",
-                "0.3") "-bodies a -body_a_rotate 1,2,0,20 -body_a_translate 0,0,0.05 -body_a_velocity "
-                       "0,0,-0.5 -body_a_element %s -effects gravity,floor -effect_floor_type contact "
-                       "-effect_floor_response projected "
-                       "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_response %s -time euler_implicit "
-                       "-ts_dt 0.005 -ts_max_time 0.25 -snes_rtol 1e-11 -ksp_rtol 1e-10",
-    element, response));
+  PetscCall(
+    record_run(&r,
+               "-bodies a -body_a_rotate 1,2,0,20 -body_a_translate 0,0,0.05 -body_a_velocity 0,0,-0.5 "
+               "-body_a_element %s -effects gravity,floor -effect_floor_type contact -effect_floor_response "
+               "projected -effect_floor_obstacle plane:0,0,1,0 -effect_floor_response %s -time "
+               "euler_implicit -ts_dt 0.005 -ts_max_time 0.25 -snes_rtol 1e-11 -ksp_rtol 1e-10" VERIFY_BODY(
+                 "a", "box:0.1,0.1,0.1:2", "corotated", "1e4", "0.3"),
+               element, response));
   /* kinetic and potential energy 0.5 J at the start; momentum 0.7 kg m/s at impact */
   VERIFY_LESS(record_gain(&r, "energy"), 1e-7, "largest gain of a step, J");
   VERIFY_LESS(record_max(&r, "missing"), 1e-7, "momentum that no force explains, kg m/s");
@@ -101,13 +98,11 @@ static PetscErrorCode check_incline(const char *element, const char *response, P
   verify_case("incline, %s, %s, friction %g", element, response, mu);
   PetscCall(record_run(
     &r,
-    VERIFY_BODY(
-      "a", "box:0.1,0.1,0.05:3", "corotated", "1e6",
-      "0.3") "-bodies a -body_a_element %s -effects gravity,floor -effect_gravity_vector %.15g,0,%.15g "
-             "-effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle "
-             "plane:0,0,1,0 -effect_floor_friction %g "
-             "-effect_floor_response %s -time euler_implicit -ts_dt 0.01 -ts_max_time 0.6",
-    element, (double)(0.5 * normal), (double)-normal, (double)mu, response));
+    "-bodies a -body_a_element %s -effects gravity,floor -effect_gravity_vector %.15g,0,%.15g "
+    "-effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle plane:0,0,1,0 "
+    "-effect_floor_friction %g -effect_floor_response %s -time euler_implicit -ts_dt 0.01 -ts_max_time "
+    "0.6" VERIFY_BODY("a", "box:0.1,0.1,0.05:3", "corotated", "1e6", "0.3"),
+    element, 0.5 * normal, -normal, mu, response));
   for (PetscInt i = r.n - 1; i >= 0; i--) { /* first step that ends there or, after a divided step, later */
     for (int k = 0; k < 2; k++) {
       if (record_at(&r, "t", i) < time[k] - 1e-9) continue;
@@ -143,13 +138,11 @@ static PetscErrorCode check_held(const char *response)
   verify_case("held, %s", response);
   PetscCall(record_run(
     &r,
-    VERIFY_BODY(
-      "a", "box:0.1,0.1,0.05:2", "linear", "1e5",
-      "0.3") "-bodies a -effects gravity,side,load,floor -effect_side_type fixed -effect_side_on xmin "
-             "-effect_side_components y -effect_load_type traction -effect_load_on xmax -effect_load_vector "
-             "100;0;0 -effect_floor_type contact -effect_floor_response projected -effect_floor_on zmin "
-             "-effect_floor_obstacle "
-             "plane:0,0,1,1e-5 -effect_floor_friction 0.3 -effect_floor_response %s -time static",
+    "-bodies a -effects gravity,side,load,floor -effect_side_type fixed -effect_side_on xmin "
+    "-effect_side_components y -effect_load_type traction -effect_load_on xmax -effect_load_vector 100;0;0 "
+    "-effect_floor_type contact -effect_floor_response projected -effect_floor_on zmin "
+    "-effect_floor_obstacle plane:0,0,1,1e-5 -effect_floor_friction 0.3 -effect_floor_response %s -time "
+    "static" VERIFY_BODY("a", "box:0.1,0.1,0.05:2", "linear", "1e5", "0.3"),
     response));
   VERIFY_NEAR(record_last(&r, "floor_force_x"), -load, 1e-5 * load, "friction against the load, N");
   VERIFY_NEAR(record_last(&r, "floor_force_z"), 0.5 * 9.81, 1e-5 * 0.5 * 9.81, "weight, N");
@@ -169,15 +162,12 @@ static PetscErrorCode check_corner(const char *response)
   verify_case("corner, %s", response);
   PetscCall(record_run(
     &r,
-    VERIFY_BODY(
-      "a", "box:0.1,0.1,0.1:2", "corotated", "1e5",
-      "0.3") "-bodies a -effects gravity,floor,wall -effect_gravity_vector %g,%g,%g -effect_floor_type "
-             "contact -effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction %g -effect_floor_response "
-             "%s -effect_wall_type contact -effect_wall_response projected -effect_wall_obstacle "
-             "plane:1,0,0,0 -effect_wall_friction %g "
-             "-effect_wall_response %s -time euler_implicit -ts_dt 0.01 -ts_max_time %g",
-    (double)push[0], (double)push[1], (double)push[2], (double)mu, response, (double)mu, response,
-    (double)end));
+    "-bodies a -effects gravity,floor,wall -effect_gravity_vector %g,%g,%g -effect_floor_type contact "
+    "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction %g -effect_floor_response %s "
+    "-effect_wall_type contact -effect_wall_response projected -effect_wall_obstacle plane:1,0,0,0 "
+    "-effect_wall_friction %g -effect_wall_response %s -time euler_implicit -ts_dt 0.01 -ts_max_time "
+    "%g" VERIFY_BODY("a", "box:0.1,0.1,0.1:2", "corotated", "1e5", "0.3"),
+    push[0], push[1], push[2], mu, response, mu, response, end));
   VERIFY_NEAR(record_last(&r, "momentum_y"), a * end, 0.01 * a * end, "momentum along both, kg m/s");
   VERIFY_NEAR(record_last(&r, "floor_force_z"), -push[2], 1e-3 * -push[2], "force of the floor, N");
   VERIFY_NEAR(record_last(&r, "floor_force_y"), mu * push[2], 2e-3 * mu * -push[2],
@@ -201,16 +191,15 @@ static PetscErrorCode indent(const char *response, const char *more, PetscInt mo
 
   PetscFunctionBeginUser;
   verify_case("indent, %s %s", response, more);
-  PetscCall(record_run(
-    &r,
-    VERIFY_BODY("a", "box:0.1,0.06,0.04:4", "corotated", "2e4",
-                "0.4") "-bodies a -effects bed,tool -effect_bed_type fixed -effect_bed_on zmin "
-                       "-effect_tool_type contact -effect_tool_response projected -effect_tool_on zmax "
-                       "-effect_tool_obstacle "
-                       "capsule:0.05,0.031,0.055,0.05,0.031,0.155,0.015 -effect_tool_displacement "
-                       "0.02*ramp(t/0.2-1);0;-0.01*ramp(t/0.2) -effect_tool_response %s "
-                       "-effect_tool_friction 0.3 -time euler_implicit -ts_dt %g -ts_max_time 0.4 %s",
-    response, INDENT_DT, more));
+  PetscCall(
+    record_run(&r,
+               "-bodies a -effects bed,tool -effect_bed_type fixed -effect_bed_on zmin -effect_tool_type "
+               "contact -effect_tool_response projected -effect_tool_on zmax -effect_tool_obstacle "
+               "capsule:0.05,0.031,0.055,0.05,0.031,0.155,0.015 -effect_tool_displacement "
+               "0.02*ramp(t/0.2-1);0;-0.01*ramp(t/0.2) -effect_tool_response %s -effect_tool_friction 0.3 "
+               "-time euler_implicit -ts_dt %g -ts_max_time 0.4 %s" VERIFY_BODY("a", "box:0.1,0.06,0.04:4",
+                                                                                "corotated", "2e4", "0.4"),
+               response, INDENT_DT, more));
   /* solves that take N from the previous solve needed 1700 to 2400 */
   VERIFY_LESS(r.newton, most, "solves");
   PetscCall(PetscArrayzero(force[0], 3 * (INDENT_STEPS + 1)));

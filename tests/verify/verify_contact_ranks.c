@@ -20,12 +20,11 @@ typedef struct {
 static PetscErrorCode solve(MPI_Comm comm, const char *element, Motion *motion)
 {
   TestScene t;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(motion, sizeof(*motion)));
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
+  PetscCall(test_open_on(
+    comm, NULL, &t,
     "-bodies low,high -body_low_mesh box:0.1,0.1,0.05:3 -body_low_material corotated -body_low_young 2e4 "
     "-body_low_poisson 0.3 -body_low_translate 0,0,0.005 -body_low_rotate 0,1,0,4 "
     "-body_high_mesh box:0.08,0.08,0.06:2 -body_high_material corotated -body_high_young 3e4 "
@@ -36,7 +35,6 @@ static PetscErrorCode solve(MPI_Comm comm, const char *element, Motion *motion)
     "-effect_meet_type contact -time euler_implicit "
     "-ts_dt 0.003 -ts_max_time %g -snes_rtol 1e-11 -ksp_rtol 1e-10 -body_high_element %s",
     0.003 * STEPS, element));
-  PetscCall(test_scene_open_on(comm, NULL, text, &t));
   PetscCall(record_solve(&t, &motion->r));
   motion->n = verify_numbers(t.model);
   PetscCall(verify_gather(t.model, t.run->U, &motion->u));

@@ -51,16 +51,13 @@ static PetscErrorCode check_patch(const char *mesh, const char *law, const char 
   PetscReal error;
 
   PetscFunctionBeginUser;
-  PetscCall(test_open(
-    &t,
-    "-bodies a" VERIFY_BODY(
-      "a", "%s", "%s", "1e3",
-      "0.45") "-body_a_element p2 -body_a_volume %s %s -sets skin -set_skin_at boundary -effects d "
+  PetscCall(
+    test_open(&t,
+              "-bodies a -body_a_element p2 -body_a_volume %s %s -sets skin -set_skin_at boundary -effects d "
               "-effect_d_type prescribed_displacement -effect_d_on skin -effect_d_displacement "
               "0.02*x+0.03*y-0.01*z;0.015*x-0.02*y+0.02*z;-0.02*x+0.01*y+0.01*z -time static -solver direct "
-              "-snes_rtol 1e-13 "
-              "-snes_atol 0 -snes_stol 1e-13",
-    mesh, law, volume, strcmp(law, "linear") ? "-body_a_tangent exact" : ""));
+              "-snes_rtol 1e-13 -snes_atol 0 -snes_stol 1e-13" VERIFY_BODY("a", "%s", "%s", "1e3", "0.45"),
+              volume, strcmp(law, "linear") ? "-body_a_tangent exact" : "", mesh, law));
   PetscCall(verify_solve(&t, "patch test"));
   PetscCall(affine_error(&t, A, &error));
   test_print("  patch test, %s, %s: %.1e\n", law, volume, error);
@@ -113,14 +110,12 @@ static PetscErrorCode check_equilibrium(const char *mesh)
 
   PetscFunctionBeginUser;
   /* K = E / (3 (1 - 2 nu)); the volumetric strain 3 (-1e-3) gives the pressure 3 K 1e-3 */
-  PetscCall(
-    test_open(&t,
-              "-bodies a" VERIFY_BODY(
-                "a", "%s", "linear", "1e3",
-                "0.45") "-body_a_element p2 -sets skin -set_skin_at boundary -effects p -effect_p_type "
-                        "pressure -effect_p_on skin -effect_p_value 10 -effect_p_follower no -time "
-                        "euler_implicit -ts_dt 0.1",
-              mesh));
+  PetscCall(test_open(
+    &t,
+    "-bodies a -body_a_element p2 -sets skin -set_skin_at boundary -effects p -effect_p_type pressure "
+    "-effect_p_on skin -effect_p_value 10 -effect_p_follower no -time euler_implicit -ts_dt 0.1" VERIFY_BODY(
+      "a", "%s", "linear", "1e3", "0.45"),
+    mesh));
   PetscCall(VecDuplicate(t.run->U, &U));
   PetscCall(residual(&t, U, &size));
   PetscCall(test_fill(t.model, shrink, U));
@@ -131,7 +126,7 @@ static PetscErrorCode check_equilibrium(const char *mesh)
   PetscCall(test_scene_close(&t));
   for (int law = 1; law < 4; law++) {
     PetscCall(
-      test_open(&t, "-bodies a" VERIFY_BODY("a", "%s", "%s", "1e3", "0.45") "-body_a_element p2 -time static",
+      test_open(&t, "-bodies a -body_a_element p2 -time static" VERIFY_BODY("a", "%s", "%s", "1e3", "0.45"),
                 mesh, laws[law]));
     PetscCall(VecDuplicate(t.run->U, &U));
     PetscCall(residual(&t, U, &still));
@@ -158,11 +153,10 @@ static PetscErrorCode check_sums(const char *mesh, const char *mass)
   PetscFunctionBeginUser;
   PetscCall(test_open(
     &t,
-    "-bodies a" VERIFY_BODY(
-      "a", "%s", "linear", "1e3",
-      "0.3") "-body_a_element p2 -mass %s -sets skin -set_skin_at boundary -effects q -effect_q_type "
-             "traction -effect_q_on skin -effect_q_total 3,0,0 -time euler_implicit -ts_dt 0.1",
-    mesh, mass));
+    "-bodies a -body_a_element p2 -mass %s -sets skin -set_skin_at boundary -effects q -effect_q_type "
+    "traction -effect_q_on skin -effect_q_total 3,0,0 -time euler_implicit -ts_dt 0.1" VERIFY_BODY(
+      "a", "%s", "linear", "1e3", "0.3"),
+    mass, mesh));
   PetscCall(VecDuplicate(t.run->U, &U));
   PetscCall(VecDuplicate(U, &V));
   PetscCall(VecDuplicate(U, &F));
@@ -311,20 +305,18 @@ static PetscErrorCode check_ranks(void)
     /* all ranks, one test_rank, all ranks in slabs */
     for (int r = 0; r < 3; r++) {
       TestScene t;
-      char text[VERIFY_TEXT];
 
       PetscCall(
-        PetscSNPrintf(text, sizeof(text),
-                      "-bodies a" VERIFY_BODY(
-                        "a", "%s", "neohookean", "1e6",
-                        "0.45") "-body_a_element p2 -sets foot -set_foot_at plane:0,0,1,0 -effects f,g "
-                                "-effect_f_type fixed "
-                                "-effect_f_on foot -effect_g_type gravity -effect_g_vector 3,-5,-9.81 -time "
-                                "newmark -mass %s "
-                                "-ts_dt 0.02 -ts_max_time 0.06 -solver %s -ksp_rtol 1e-12 -snes_rtol 1e-12%s",
-                      r == 2 ? h5 : mesh, k ? "consistent" : "lumped", solver[k],
-                      r == 2 && test_size > 1 ? " -mesh_reading slabs" : ""));
-      PetscCall(test_scene_open_on(r == 1 ? PETSC_COMM_SELF : PETSC_COMM_WORLD, NULL, text, &t));
+        test_open_on(r == 1 ? PETSC_COMM_SELF : PETSC_COMM_WORLD, NULL, &t,
+                     "-bodies a" VERIFY_BODY(
+                       "a", "%s", "neohookean", "1e6",
+                       "0.45") "-body_a_element p2 -sets foot -set_foot_at plane:0,0,1,0 -effects f,g "
+                               "-effect_f_type fixed "
+                               "-effect_f_on foot -effect_g_type gravity -effect_g_vector 3,-5,-9.81 -time "
+                               "newmark -mass %s "
+                               "-ts_dt 0.02 -ts_max_time 0.06 -solver %s -ksp_rtol 1e-12 -snes_rtol 1e-12%s",
+                     r == 2 ? h5 : mesh, k ? "consistent" : "lumped", solver[k],
+                     r == 2 && test_size > 1 ? " -mesh_reading slabs" : ""));
       volume[r] = t.model->body[0].volume;
       PetscCall(verify_solve(&t, "ranks"));
       n = verify_numbers(t.model);
@@ -359,13 +351,13 @@ static PetscErrorCode check_refused(void)
   PetscCall(curved_mesh_write(1, 1, fold, PETSC_TRUE, mesh));
   PetscCall(PetscSNPrintf(words, sizeof(words), "body 'a'|%s|tetrahedron 3|Jacobian", mesh));
   SB_CHECK_ERROR(
-    test_open(&t, "-bodies a" VERIFY_BODY("a", "%s", "linear", "1", "0.3") "-body_a_element p2 -time static",
+    test_open(&t, "-bodies a -body_a_element p2 -time static" VERIFY_BODY("a", "%s", "linear", "1", "0.3"),
               mesh),
     PETSC_ERR_USER_INPUT, words);
   PetscCall(test_scene_close(&t));
   /* other elements use the straight tet */
   PetscCall(test_open(
-    &t, "-bodies a" VERIFY_BODY("a", "%s", "linear", "1", "0.3") "-body_a_element p1 -time static", mesh));
+    &t, "-bodies a -body_a_element p1 -time static" VERIFY_BODY("a", "%s", "linear", "1", "0.3"), mesh));
   SB_CHECK_NEAR(t.model->body[0].volume, 0.5, 1e-14, "volume of the straight tets");
   SB_CHECK(strstr(t.model->body[0].note, "straight: 1") != NULL, "note '%s'", t.model->body[0].note);
   PetscCall(test_scene_close(&t));

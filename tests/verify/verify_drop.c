@@ -99,12 +99,10 @@ static PetscErrorCode check_bounce(const char *time, PetscReal bound, PetscInt l
   PetscCall(contact_ball_write(4, RADIUS, path));
   PetscCall(test_open(
     &t,
-    VERIFY_BODY("a", "%s", "corotated", "5e4",
-                "0.3") "-bodies a -body_a_rotate 1,2,3,20 -body_a_translate 0,0,%g -effects gravity,floor "
-                       "-effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle "
-                       "plane:0,0,1,0 -time %s -ts_dt "
-                       "0.002 -ts_max_time 0.8 -snes_rtol 1e-10 -ksp_rtol 1e-9",
-    path, RADIUS + HEIGHT, time));
+    "-bodies a -body_a_rotate 1,2,3,20 -body_a_translate 0,0,%g -effects gravity,floor -effect_floor_type "
+    "contact -effect_floor_response projected -effect_floor_obstacle plane:0,0,1,0 -time %s -ts_dt 0.002 "
+    "-ts_max_time 0.8 -snes_rtol 1e-10 -ksp_rtol 1e-9" VERIFY_BODY("a", "%s", "corotated", "5e4", "0.3"),
+    RADIUS + HEIGHT, time, path));
   PetscCall(SbRunAddMonitor(t.run, watch, &b));
   PetscCall(record_solve(&t, &r));
   PetscCall(test_scene_close(&t));

@@ -17,19 +17,6 @@
 enum { CONTACTS, DEEPEST, MEAN, NORMAL, FRICTION, WORK, LOSS, GAP, ENERGY, LAG, UNGUARDED, NVALUE };
 enum { ROW = 10, SAMPLES = 6 }; /* a facet's row: part and corners; sample points per edge */
 
-static PetscErrorCode open_on(MPI_Comm comm, TestScene *t, const char *format, ...)
-{
-  char text[VERIFY_TEXT];
-  va_list args;
-
-  PetscFunctionBeginUser;
-  va_start(args, format);
-  PetscCall(PetscVSNPrintf(text, sizeof(text), format, NULL, args));
-  va_end(args);
-  PetscCall(test_scene_open_on(comm, NULL, text, t));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* History columns of the contact effect, on every rank. */
 static PetscErrorCode contact_values(SbRun run, PetscReal values[NVALUE])
 {
@@ -243,7 +230,7 @@ static PetscErrorCode lay_bars(MPI_Comm comm, const char *more, Seen *seen, Pets
 
   PetscFunctionBeginUser;
   *seen = (Seen){.above = PETSC_MAX_REAL, .at = {0.09, 0, 0.0424264}};
-  PetscCall(open_on(comm, &t, BARS "%s", more));
+  PetscCall(test_open_on(comm, NULL, &t, BARS "%s", more));
   PetscCall(SbRunAddMonitor(t.run, watch, seen));
   PetscCall(verify_solve(&t, "bars"));
   PetscCall(contact_values(t.run, values));
@@ -287,11 +274,11 @@ static PetscErrorCode check_fast(void)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(open_on(PETSC_COMM_WORLD, &t,
-                    "-bodies a,b -body_a_mesh box:0.21,0.006,0.006:7,1,1 -body_a_rotate 1,0,0,45 "
-                    "-body_b_mesh box:0.006,0.21,0.006:1,7,1 -body_b_rotate 0,1,0,-45 -body_b_translate "
-                    "0.105,-0.105,0.0105 -body_b_velocity 0,0,-5 -effects a0,a1,b0,b1,meet -time "
-                    "euler_implicit -ts_dt 0.004 -ts_max_time 0.04 " LAWS("1e7") ENDS));
+  PetscCall(test_open(&t,
+                      "-bodies a,b -body_a_mesh box:0.21,0.006,0.006:7,1,1 -body_a_rotate 1,0,0,45 "
+                      "-body_b_mesh box:0.006,0.21,0.006:1,7,1 -body_b_rotate 0,1,0,-45 -body_b_translate "
+                      "0.105,-0.105,0.0105 -body_b_velocity 0,0,-5 -effects a0,a1,b0,b1,meet -time "
+                      "euler_implicit -ts_dt 0.004 -ts_max_time 0.04 " LAWS("1e7") ENDS));
   PetscCall(SbRunAddMonitor(t.run, watch, &seen));
   PetscCall(verify_solve(&t, "fast bars"));
   test_print("  fast bars: in touch in %d of %d steps, force up to %.3g N, depth %.1e m (history "
@@ -312,8 +299,8 @@ static PetscErrorCode check_box(const char *what, const char *turn, PetscReal mo
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(open_on(
-    PETSC_COMM_WORLD, &t,
+  PetscCall(test_open(
+    &t,
     "-bodies plate,cube -body_plate_mesh box:0.2,0.2,0.006:10,10,1 -body_plate_material corotated "
     "-body_plate_young 1e6 -body_plate_poisson 0.3 -body_plate_density 1000 "
     "-body_cube_mesh box:0.04,0.04,0.04:2 -body_cube_material corotated -body_cube_young 1e6 "
@@ -452,15 +439,15 @@ static PetscErrorCode check_rings(PetscReal most)
 
   PetscFunctionBeginUser;
   PetscCall(write_ring(path));
-  PetscCall(
-    open_on(PETSC_COMM_WORLD, &t,
-            "-bodies a,b -body_a_mesh %s -body_b_mesh %s -body_b_rotate 1,0,0,90 -body_b_translate %.15g,0,0 "
-            "-sets skin,far,end -set_skin_at boundary -set_far_at halfspace:1,0,0,-0.09 -set_end_at "
-            "halfspace:-1,0,0,%.15g -effects hold,pull,meet -effect_hold_type fixed -effect_hold_on far "
-            "-effect_pull_type prescribed_displacement -effect_pull_on end -effect_pull_displacement "
-            "0.08*ramp(t/0.4);0;0 -effect_meet_type contact -time "
-            "euler_implicit -ts_dt 0.01 -ts_max_time 0.5" LAWS("1e5"),
-            path, path, away, -away - 0.09));
+  PetscCall(test_open(
+    &t,
+    "-bodies a,b -body_a_mesh %s -body_b_mesh %s -body_b_rotate 1,0,0,90 -body_b_translate %.15g,0,0 "
+    "-sets skin,far,end -set_skin_at boundary -set_far_at halfspace:1,0,0,-0.09 -set_end_at "
+    "halfspace:-1,0,0,%.15g -effects hold,pull,meet -effect_hold_type fixed -effect_hold_on far "
+    "-effect_pull_type prescribed_displacement -effect_pull_on end -effect_pull_displacement "
+    "0.08*ramp(t/0.4);0;0 -effect_meet_type contact -time "
+    "euler_implicit -ts_dt 0.01 -ts_max_time 0.5" LAWS("1e5"),
+    path, path, away, -away - 0.09));
   PetscCall(SbRunAddMonitor(t.run, watch_rings, &seen));
   PetscCall(verify_solve(&t, "rings"));
   PetscCall(PetscPrintf(

@@ -144,14 +144,13 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
 static PetscErrorCode open_branch(const char *dir, PetscBool follower, const char *more, Branch *b,
                                   TestScene *t)
 {
-  char text[VERIFY_TEXT], load[128];
+  char load[128];
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(load, sizeof(load),
                           follower ? "-effect_press_type pressure -effect_press_value %.17g" : DEAD,
                           follower ? 0.2 : -0.2));
-  PetscCall(PetscSNPrintf(text, sizeof(text), CUBE "-static_steps 10 %s %s", load, more));
-  PetscCall(test_scene_open_in(dir, text, t));
+  PetscCall(test_open_in(dir, t, CUBE "-static_steps 10 %s %s", load, more));
   t->run->want_energies = PETSC_TRUE;
   *b = (Branch){.load = 0.2};
   PetscCall(SbRunAddMonitor(t->run, watch, b));

@@ -28,12 +28,12 @@ static PetscErrorCode check_wall(const char *time, const char *more, PetscReal d
 
   PetscFunctionBeginUser;
   verify_case("wall, %s, dt = %g %s", time, dt, more);
-  PetscCall(record_run(
-    &r,
-    BAR("a") "-bodies a -body_a_velocity %g,0,0 -body_a_translate %.15g,0,0 -effects wall -effect_wall_type "
-             "contact -effect_wall_response projected -effect_wall_on xmin "
-             "-effect_wall_obstacle plane:1,0,0,0 -time %s -ts_dt %g -ts_max_time %g %s" EXACT,
-    (double)-SPEED, (double)(SPEED * 10.3 * dt), time, (double)dt, (double)(0.24 + 12 * dt), more));
+  PetscCall(
+    record_run(&r,
+               "-bodies a -body_a_velocity %g,0,0 -body_a_translate %.15g,0,0 -effects wall "
+               "-effect_wall_type contact -effect_wall_response projected -effect_wall_on xmin "
+               "-effect_wall_obstacle plane:1,0,0,0 -time %s -ts_dt %g -ts_max_time %g %s" EXACT BAR("a"),
+               -SPEED, SPEED * 10.3 * dt, time, dt, 0.24 + 12 * dt, more));
   *left = (Left){.speed = record_last(&r, "a_vx") / SPEED, .energy = record_last(&r, "energy") / ENERGY};
   record_span(&r, "wall_force_x", TOUCH, &left->first, &left->last);
   VERIFY_NEAR(left->last - left->first, 0.2, 0.02, "time at the wall, s");
@@ -80,10 +80,9 @@ static PetscErrorCode collide(const char *time, const char *more, Left *left)
   verify_case("bars, %s %s", time, more);
   PetscCall(record_run(
     &r,
-    BAR("a") BAR("b") "-bodies a,b -body_a_velocity %g,0,0 -body_b_velocity %g,0,0 -body_b_translate "
-                      "1.002,0,0 -effects meet -effect_meet_type contact "
-                      "-time %s -ts_dt 0.0005 -ts_max_time 0.25 %s" EXACT,
-    (double)SPEED, (double)-SPEED, time, more));
+    "-bodies a,b -body_a_velocity %g,0,0 -body_b_velocity %g,0,0 -body_b_translate 1.002,0,0 -effects meet "
+    "-effect_meet_type contact -time %s -ts_dt 0.0005 -ts_max_time 0.25 %s" EXACT BAR("a") BAR("b"),
+    SPEED, -SPEED, time, more));
   left->speed = (record_last(&r, "b_vx") - record_last(&r, "a_vx")) / (2 * SPEED);
   left->energy = record_last(&r, "energy") / (2 * ENERGY);
   left->gain = record_gain(&r, "energy");
@@ -124,13 +123,12 @@ static PetscErrorCode check_ball(const char *material, PetscReal tolerance)
   PetscFunctionBeginUser;
   verify_case("ball, %s", material);
   PetscCall(contact_ball_write(4, 0.05, path));
-  PetscCall(record_run(
-    &r,
-    VERIFY_BODY("a", "%s", "%s", "5e4",
-                "0.3") "-bodies a -body_a_translate 0,0,0.1 -effects gravity,floor -effect_floor_type "
-                       "contact -effect_floor_response projected -effect_floor_obstacle plane:0,0,1,0 "
-                       "-time newmark -ts_dt 0.001 -ts_max_time 0.6" EXACT,
-    path, material));
+  PetscCall(
+    record_run(&r,
+               "-bodies a -body_a_translate 0,0,0.1 -effects gravity,floor -effect_floor_type contact "
+               "-effect_floor_response projected -effect_floor_obstacle plane:0,0,1,0 -time newmark -ts_dt "
+               "0.001 -ts_max_time 0.6" EXACT VERIFY_BODY("a", "%s", "%s", "5e4", "0.3"),
+               path, material));
   VERIFY_MORE(record_starts(&r, "floor_contacts"), 2, "landings");
   VERIFY_LESS(record_gain(&r, "energy"), tolerance * record_at(&r, "energy", 0), "largest gain of a step, J");
   VERIFY_LESS(record_max(&r, "missing"), 1e-9, "momentum that no force explains, kg m/s");
@@ -160,12 +158,10 @@ static PetscErrorCode check_rest(void)
   PetscFunctionBeginUser;
   verify_case("rest");
   PetscCall(record_run(
-    &r, BLOCK("a", "0.3")
-          BLOCK("b", "0.3") "-bodies a,b -body_b_translate 0,0,0.1 -effects gravity,damp,floor,meet "
-                            "-effect_damp_type damping -effect_damp_alpha 30 -effect_damp_beta 1e-3 "
-                            "-effect_floor_type contact -effect_floor_obstacle plane:0,0,1,0 "
-                            "-effect_meet_type contact -time newmark -ts_dt 0.004 "
-                            "-ts_max_time 0.85" EXACT));
+    &r, "-bodies a,b -body_b_translate 0,0,0.1 -effects gravity,damp,floor,meet -effect_damp_type damping "
+        "-effect_damp_alpha 30 -effect_damp_beta 1e-3 -effect_floor_type contact -effect_floor_obstacle "
+        "plane:0,0,1,0 -effect_meet_type contact -time newmark -ts_dt 0.004 -ts_max_time 0.85" EXACT BLOCK(
+          "a", "0.3") BLOCK("b", "0.3")));
   /* normal forces of pairs at edges are slightly inclined */
   for (int k = 0; k < 2; k++) {
     VERIFY_NEAR(record_min(&r, force[k]), k ? 9.81 : 19.62, k ? 0.1 : 1e-3, "smallest force, N");
@@ -184,10 +180,11 @@ static PetscErrorCode check_smooth(void)
   PetscFunctionBeginUser;
   verify_case("smooth");
   PetscCall(record_run(
-    &r, BLOCK("a", "0") "-bodies a -effects weight,floor -effect_floor_type contact -effect_floor_response "
-                        "projected -effect_floor_on zmin -effect_floor_obstacle plane:0,0,1,0 "
-                        "-effect_weight_type body_force -effect_weight_density 0;0;-9810*ramp(t/0.2) "
-                        "-time newmark -ts_dt 0.0005 -ts_max_time 0.3" EXACT));
+    &r,
+    "-bodies a -effects weight,floor -effect_floor_type contact -effect_floor_response projected "
+    "-effect_floor_on zmin -effect_floor_obstacle plane:0,0,1,0 -effect_weight_type body_force "
+    "-effect_weight_density 0;0;-9810*ramp(t/0.2) -time newmark -ts_dt 0.0005 -ts_max_time 0.3" EXACT BLOCK(
+      "a", "0")));
   VERIFY_NEAR(record_max(&r, "floor_force_z"), 10, 1, "largest force, N");
   VERIFY_LESS(roughness(&r, "floor_force_z"), 0.02, "change to and fro, N");
   PetscCall(record_free(&r));
@@ -201,13 +198,12 @@ static PetscErrorCode check_push(const char *response)
 
   PetscFunctionBeginUser;
   verify_case("push, %s", response);
-  PetscCall(record_run(
-    &r,
-    BLOCK("a", "0.3") "-bodies a -effects damp,floor -effect_damp_type damping -effect_damp_beta 2e-3 "
-                      "-effect_floor_type contact -effect_floor_response projected "
-                      "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_displacement 0;0;5*t*t "
-                      "-effect_floor_response %s -time newmark -ts_dt 0.001 -ts_max_time 0.2" EXACT,
-    response));
+  PetscCall(record_run(&r,
+                       "-bodies a -effects damp,floor -effect_damp_type damping -effect_damp_beta 2e-3 "
+                       "-effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle "
+                       "plane:0,0,1,0 -effect_floor_displacement 0;0;5*t*t -effect_floor_response %s -time "
+                       "newmark -ts_dt 0.001 -ts_max_time 0.2" EXACT BLOCK("a", "0.3"),
+                       response));
   VERIFY_NEAR(record_last(&r, "a_vz"), 2, 0.02, "speed of the block, m/s");
   VERIFY_LESS(record_max(&r, "missing"), 1e-3, "momentum that no force explains, kg m/s");
   VERIFY_NEAR(record_max(&r, "floor_penetration"), 0, 0, "penetration, m");

@@ -33,12 +33,10 @@ static PetscErrorCode fall_on(const char *obstacle, PetscReal *u[], PetscInt *n,
   verify_case("fall on %.20s", obstacle);
   PetscCall(test_open(
     &t,
-    VERIFY_BODY(
-      "a", "box:0.1,0.1,0.05:2", "corotated", "2e4",
-      "0.3") "-bodies a -body_a_rotate 1,2,0,15 -body_a_translate -0.02,-0.047,0.03 -body_a_velocity "
-             "0.5,0,-0.5 -effects gravity,floor -effect_floor_type contact -effect_floor_response projected "
-             "-effect_floor_obstacle %s -effect_floor_friction 0.2 -time euler_implicit -ts_dt 0.005 "
-             "-ts_max_time 0.15 -snes_rtol 1e-12 -ksp_rtol 1e-11",
+    "-bodies a -body_a_rotate 1,2,0,15 -body_a_translate -0.02,-0.047,0.03 -body_a_velocity 0.5,0,-0.5 "
+    "-effects gravity,floor -effect_floor_type contact -effect_floor_response projected "
+    "-effect_floor_obstacle %s -effect_floor_friction 0.2 -time euler_implicit -ts_dt 0.005 -ts_max_time "
+    "0.15 -snes_rtol 1e-12 -ksp_rtol 1e-11" VERIFY_BODY("a", "box:0.1,0.1,0.05:2", "corotated", "2e4", "0.3"),
     obstacle));
   PetscCall(record_solve(&t, r));
   *n = 3 * verify_numbers(t.model);
@@ -85,12 +83,10 @@ static PetscErrorCode drag(const char *obstacle, PetscReal force[])
   verify_case("facets: %.6s", obstacle);
   PetscCall(record_run(
     &r,
-    VERIFY_BODY(
-      "a", "box:0.1,0.06,0.04:4", "corotated", "2e4",
-      "0.4") "-bodies a -effects bed,tool -effect_bed_type fixed -effect_bed_on zmin -effect_tool_type "
-             "contact -effect_tool_response projected -effect_tool_on zmax -effect_tool_obstacle %s "
-             "-effect_tool_friction 0.3 -effect_tool_displacement 0.02*ramp(t/0.2-1);0;-0.01*ramp(t/0.2) "
-             "-time euler_implicit -ts_dt %g -ts_max_time %g",
+    "-bodies a -effects bed,tool -effect_bed_type fixed -effect_bed_on zmin -effect_tool_type contact "
+    "-effect_tool_response projected -effect_tool_on zmax -effect_tool_obstacle %s -effect_tool_friction 0.3 "
+    "-effect_tool_displacement 0.02*ramp(t/0.2-1);0;-0.01*ramp(t/0.2) -time euler_implicit -ts_dt %g "
+    "-ts_max_time %g" VERIFY_BODY("a", "box:0.1,0.06,0.04:4", "corotated", "2e4", "0.4"),
     obstacle, DRAG_DT, DRAG_DT * DRAG_STEPS));
   VERIFY_NEAR(r.rejected, 0, 0, "steps that failed");
   for (PetscInt i = 0; i < r.n && i <= DRAG_STEPS; i++) {
@@ -137,10 +133,9 @@ static PetscErrorCode lie(const char *what, const char *obstacles, PetscReal *st
   verify_case("groove, %s", what);
   PetscCall(record_run(
     &r,
-    VERIFY_BODY(
-      "a", "box:0.1,0.1,0.1:3", "corotated", "2e4",
-      "0.3") "-bodies a -body_a_rotate 0,1,0,-45 -body_a_translate 0.001,-0.05,0.005 -time euler_implicit "
-             "-ts_dt 0.01 -ts_max_time 1.2 -effect_l_type contact -effect_l_response projected %s",
+    "-bodies a -body_a_rotate 0,1,0,-45 -body_a_translate 0.001,-0.05,0.005 -time euler_implicit -ts_dt 0.01 "
+    "-ts_max_time 1.2 -effect_l_type contact -effect_l_response projected %s" VERIFY_BODY(
+      "a", "box:0.1,0.1,0.1:3", "corotated", "2e4", "0.3"),
     obstacles));
   *strain = record_last(&r, "strain");
   *weight = record_last(&r, "l_force_z") + (strstr(obstacles, "l,r") ? record_last(&r, "r_force_z") : 0);
@@ -192,12 +187,10 @@ static PetscErrorCode check_overlap(const char *element, const char *response, c
   verify_case("overlap, %s, %s, %.5s", element, response, obstacle);
   PetscCall(record_run(
     &r,
-    VERIFY_BODY("a", "box:0.1,0.1,0.1:3", "corotated", "5e4",
-                "0.3") "-bodies a -body_a_translate -0.05,-0.05,%g -body_a_element %s -effects gravity,floor "
-                       "-effect_floor_type contact -effect_floor_response projected "
-                       "-effect_floor_obstacle %s -effect_floor_response %s "
-                       "-effect_floor_separation_steps %d -time euler_implicit -ts_dt %g -ts_max_time %g "
-                       "-snes_rtol 1e-8",
+    "-bodies a -body_a_translate -0.05,-0.05,%g -body_a_element %s -effects gravity,floor -effect_floor_type "
+    "contact -effect_floor_response projected -effect_floor_obstacle %s -effect_floor_response %s "
+    "-effect_floor_separation_steps %d -time euler_implicit -ts_dt %g -ts_max_time %g -snes_rtol "
+    "1e-8" VERIFY_BODY("a", "box:0.1,0.1,0.1:3", "corotated", "5e4", "0.3"),
     -DEPTH, element, obstacle, response, RECOVERY, STEP, (5 * RECOVERY + 3) * STEP));
   VERIFY_LESS(record_max(&r, "speed"), 2 * v, "fastest node, m/s");
   VERIFY_LESS(record_max(&r, "energy"), MASS * v * v + 1e-3, "energy of the block, J");
@@ -230,11 +223,10 @@ static PetscErrorCode check_at_once(void)
 
   PetscFunctionBeginUser;
   verify_case("at once");
-  PetscCall(
-    record_run(&r, VERIFY_BODY("a", "box:0.1,0.1,0.1:3", "corotated", "5e4",
-                               "0.3") "-bodies a -effects top,floor -effect_top_type fixed -effect_top_on "
-                                      "zmax -effect_floor_type contact -effect_floor_response projected "
-                                      "-effect_floor_obstacle plane:0,0,1,0.02 -time static"));
+  PetscCall(record_run(
+    &r, "-bodies a -effects top,floor -effect_top_type fixed -effect_top_on zmax -effect_floor_type contact "
+        "-effect_floor_response projected -effect_floor_obstacle plane:0,0,1,0.02 -time static" VERIFY_BODY(
+          "a", "box:0.1,0.1,0.1:3", "corotated", "5e4", "0.3")));
   VERIFY_LESS(record_last(&r, "floor_penetration"), 1e-7, "depth, m");
   /* E = 5e4 Pa, strain 0.2, area 0.01 m^2: about 100 N */
   VERIFY_MORE(record_last(&r, "floor_force_z"), 90, "force, N");

@@ -57,8 +57,8 @@ static PetscErrorCode check_apart(void)
   PetscFunctionBeginUser;
   verify_case("apart");
   PetscCall(record_run(&r,
-                       MEET STEPPING "-bodies a,b " SOFT("a", "box:0.1,0.1,0.1:3")
-                         SOFT("b", "box:0.1,0.1,0.1:2") "-body_b_translate 0.101,0,0",
+                       MEET STEPPING "-bodies a,b -body_b_translate 0.101,0,0" SOFT("a", "box:0.1,0.1,0.1:3")
+                         SOFT("b", "box:0.1,0.1,0.1:2"),
                        STEP, 0.04));
   VERIFY_LESS(record_max(&r, "kinetic") + record_max(&r, "strain"), 1e-20, "energy, J");
   VERIFY_NEAR(record_max(&r, "meet_unguarded"), 0, 0, "edges through triangles");
@@ -74,8 +74,8 @@ static PetscErrorCode check_aligned(void)
   PetscFunctionBeginUser;
   verify_case("aligned");
   PetscCall(record_run(&r,
-                       MEET STEPPING "-bodies a,b " SOFT("a", "box:0.1,0.1,0.1:3")
-                         SOFT("b", "box:0.1,0.1,0.1:2") "-body_b_translate 0.05,0,0",
+                       MEET STEPPING "-bodies a,b -body_b_translate 0.05,0,0" SOFT("a", "box:0.1,0.1,0.1:3")
+                         SOFT("b", "box:0.1,0.1,0.1:2"),
                        STEP, 0.4));
   VERIFY_NEAR(record_last(&r, "meet_unguarded"), 0, 0, "edges through triangles at the end");
   VERIFY_LESS(record_max(&r, "kinetic"), 2 * parting_energy(2, DEPTH), "kinetic energy, J");
@@ -94,10 +94,9 @@ static PetscErrorCode check_obstacle(const char *obstacle)
   verify_case("in %s", obstacle);
   PetscCall(record_run(
     &r,
-    STEPPING "-bodies a " SOFT("a", "box:0.1,0.1,0.1:3") "-body_a_translate 0,0,-0.01 -effects gravity,floor "
-                                                         "-effect_floor_type contact -effect_floor_response "
-                                                         "barrier -effect_floor_verify yes "
-                                                         "-effect_floor_obstacle %s",
+    STEPPING "-bodies a -body_a_translate 0,0,-0.01 -effects gravity,floor -effect_floor_type contact "
+             "-effect_floor_response barrier -effect_floor_verify yes -effect_floor_obstacle %s" SOFT(
+               "a", "box:0.1,0.1,0.1:3"),
     STEP, 0.6, obstacle));
   VERIFY_NEAR(record_at(&r, "floor_penetration", 1), 0.01, 0.1, "depth after a step, m");
   VERIFY_NEAR(record_last(&r, "floor_penetration"), 0, 0, "depth at the end, m");
@@ -122,8 +121,8 @@ static PetscErrorCode check_ring(const char *element)
   PetscFunctionBeginUser;
   verify_case("ring, %s", element);
   PetscCall(test_open(&t,
-                      "-bodies a " SOFT("a", "box:2,0.2,0.1:40,4,2") "-body_a_element %s " MEET
-                                                                     "-effect_meet_self yes -ts_dt 1e-3",
+                      "-bodies a -body_a_element %s " MEET
+                      "-effect_meet_self yes -ts_dt 1e-3" SOFT("a", "box:2,0.2,0.1:40,4,2"),
                       element));
   s = t.run->model->space;
   PetscCall(SbSpaceFindSet(s, "boundary", "the test", &set));

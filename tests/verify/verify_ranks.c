@@ -19,16 +19,7 @@ static PetscErrorCode solve(MPI_Comm comm, const char *options, State *state)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscOptionsClear(NULL));
-  PetscCall(SbOptionsReset());
-  PetscCall(SbRegisterAll());
-  PetscCall(PetscOptionsInsertString(NULL, options));
-  PetscCall(SbSceneCreate(comm, &t.model));
-  PetscCall(test_scene_run(&t));
-  PetscCall(SbModelSetUp(t.model));
-  PetscCall(SbRunSetUp(t.run));
-  PetscCall(SbMeshValidate(t.model->mesh));
-  PetscCall(SbSpaceValidate(t.model->space));
+  PetscCall(test_scene_open_on(comm, NULL, options, &t));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(verify_solve(&t, options));
   *state = (State){.n = verify_numbers(t.model), .steps = t.run->steps_total, .e = t.run->energies};

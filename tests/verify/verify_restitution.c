@@ -37,10 +37,10 @@ static PetscErrorCode check_pair(const char *what, const char *bodies, PetscReal
   PetscFunctionBeginUser;
   verify_case("%s, e = %g", what, e);
   PetscCall(record_run(&r,
-                       TIGHT STIFF("a", "box:0.1,0.1,0.1:2") STIFF(
-                         "b", "box:0.1,0.1,0.1:2") "-bodies a,b -body_a_velocity 1,0,0 -body_b_translate "
-                                                   "0.1207,0,0 -body_b_velocity -1,0,0 -effects meet " MEET
-                                                   "-ts_dt 0.01 -ts_max_time 0.04 %s",
+                       TIGHT "-bodies a,b -body_a_velocity 1,0,0 -body_b_translate 0.1207,0,0 "
+                             "-body_b_velocity -1,0,0 -effects meet " MEET
+                             "-ts_dt 0.01 -ts_max_time 0.04 %s" STIFF("a", "box:0.1,0.1,0.1:2")
+                               STIFF("b", "box:0.1,0.1,0.1:2"),
                        (double)e, bodies));
   before = record_at(&r, "a_vx", 0) - record_at(&r, "b_vx", 0);
   after = record_last(&r, "b_vx") - record_last(&r, "a_vx");
@@ -73,12 +73,11 @@ static PetscErrorCode check_tower(void)
   verify_case("tower");
   PetscCall(record_run(
     &r,
-    TIGHT STIFF("a", "box:0.1,0.1,0.1:2") STIFF(
-      "b", "box:0.08,0.08,0.08:2") "-bodies a,b -body_a_translate 0,0,0.0021 -body_a_velocity 0,0,-1 "
-                                   "-body_b_translate 0.01,0.01,0.1024 -body_b_velocity 0,0,-1 -effects "
-                                   "gravity,floor,meet -effect_floor_type contact -effect_floor_response "
-                                   "barrier -effect_floor_obstacle plane:0,0,1,0 -effect_floor_restitution "
-                                   "1 " MEET "-ts_dt 0.001 -ts_max_time 0.03",
+    TIGHT
+    "-bodies a,b -body_a_translate 0,0,0.0021 -body_a_velocity 0,0,-1 -body_b_translate 0.01,0.01,0.1024 "
+    "-body_b_velocity 0,0,-1 -effects gravity,floor,meet -effect_floor_type contact -effect_floor_response "
+    "barrier -effect_floor_obstacle plane:0,0,1,0 -effect_floor_restitution 1 " MEET
+    "-ts_dt 0.001 -ts_max_time 0.03" STIFF("a", "box:0.1,0.1,0.1:2") STIFF("b", "box:0.08,0.08,0.08:2"),
     1.));
   VERIFY_MORE(record_last(&r, "b_vz"), 0.5, "speed of the upper block, m/s");
   check_meeting(&r, record_at(&r, "kinetic", 0), 1e-9, 0);
@@ -92,14 +91,12 @@ static PetscErrorCode check_oblique(PetscReal friction, PetscReal e)
 
   PetscFunctionBeginUser;
   verify_case("oblique, friction %g, e = %g", friction, e);
-  PetscCall(record_run(
-    &r,
-    TIGHT STIFF("a", "box:0.1,0.1,0.1:2") STIFF(
-      "b", "box:0.1,0.08,0.1:3") "-bodies a,b -body_b_translate 0.13,0.03,0.02 -body_b_rotate 1,2,3,20 "
-                                 "-body_a_velocity 0.8,0,0 -body_b_velocity -1,0.2,0 -effects meet " MEET
-                                 "-effect_meet_friction %g -ts_dt 0.001 "
-                                 "-ts_max_time 0.05",
-    (double)e, (double)friction));
+  PetscCall(record_run(&r,
+                       TIGHT "-bodies a,b -body_b_translate 0.13,0.03,0.02 -body_b_rotate 1,2,3,20 "
+                             "-body_a_velocity 0.8,0,0 -body_b_velocity -1,0.2,0 -effects meet " MEET
+                             "-effect_meet_friction %g -ts_dt 0.001 -ts_max_time 0.05" STIFF(
+                               "a", "box:0.1,0.1,0.1:2") STIFF("b", "box:0.1,0.08,0.1:3"),
+                       e, friction));
   VERIFY_MORE(record_last(&r, "b_vx") - record_last(&r, "a_vx"), 0, "speed at which they part, m/s");
   VERIFY_LESS(record_max(&r, "net"), 1e-13 * record_max(&r, "push"), "forces of contact in all, N");
   verify_show("energy that is left, of that before", record_last(&r, "energy") / record_at(&r, "energy", 0));
@@ -123,7 +120,7 @@ static PetscErrorCode check_soft(PetscReal young, PetscReal dt, PetscReal e)
                  "0.3") "-bodies a,b -body_a_velocity 0.5,0,0 -body_a_angular_velocity 3,5,7 -body_b_density "
                         "2000 -body_b_translate 0.11,0.02,0 -body_b_velocity -0.5,0,0 -effects meet " MEET
                         "-time euler_implicit -ts_dt %g -ts_max_time 0.1 -snes_rtol 1e-8",
-               path, (double)young, path, (double)(2 * young), (double)e, (double)dt));
+               path, young, path, 2 * young, e, dt));
   /* the energy of rotating co-rotated tets is not exactly convex, even without contact */
   check_meeting(&r, record_at(&r, "energy", 0), 1e-5, 1e-8);
   PetscCall(record_free(&r));
@@ -153,12 +150,11 @@ static PetscErrorCode check_self(void)
   PetscCall(verify_mesh_write((const PetscInt[3]){24, 2, 2}, horseshoe, NULL, path));
   PetscCall(record_run(
     &r,
-    VERIFY_BODY(
-      "a", "%s", "linear", "1e5",
-      "0.3") "-bodies a -effects close,meet -effect_close_type body_force -effect_close_density "
-             "0;-4e4*y*step(0.0499-t);0 " MEET
-             "-effect_meet_self yes -time euler_implicit -ts_dt 0.001 -ts_max_time 0.2 -snes_rtol 1e-8",
-    path, 1.));
+    "-bodies a -effects close,meet -effect_close_type body_force -effect_close_density "
+    "0;-4e4*y*step(0.0499-t);0 " MEET
+    "-effect_meet_self yes -time euler_implicit -ts_dt 0.001 -ts_max_time 0.2 -snes_rtol 1e-8" VERIFY_BODY(
+      "a", "%s", "linear", "1e5", "0.3"),
+    1., path));
   check_meeting(&r, record_last(&r, "energy"), 1e-9, 0);
   VERIFY_LESS(record_size(&r, "momentum", PETSC_TRUE), 1e-12, "largest change of momentum, kg m/s");
   PetscCall(record_free(&r));

@@ -13,7 +13,6 @@
              motion of the other: bitwise for effects and materials, up to rounding for elements, which change the order of sums
     rows     an effect, element, material or output option without a row in tests/parts.h fails here
 */
-#include <dirent.h>
 #include "../parts.h"
 #include "verify.h"
 
@@ -31,7 +30,7 @@ typedef struct {
 
 static char event_name[EVENTS][2 * SB_NAME_MAX];
 static PetscInt nevent;
-static char folder[PETSC_MAX_PATH_LEN];
+static char folder[512];
 
 static PetscErrorCode name_events(void)
 {
@@ -296,28 +295,8 @@ static PetscErrorCode check_first(const Trace *trace)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Removes the folder of the output with its files. */
-static PetscErrorCode remove_folder(void)
-{
-  struct dirent *entry;
-  DIR *d;
-  char path[2 * PETSC_MAX_PATH_LEN];
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  if (test_rank || !(d = opendir(folder))) PetscFunctionReturn(PETSC_SUCCESS);
-  while ((entry = readdir(d))) {
-    PetscCall(PetscSNPrintf(path, sizeof(path), "%s/%s", folder, entry->d_name));
-    (void)unlink(path);
-  }
-  (void)closedir(d);
-  (void)rmdir(folder);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 int main(int argc, char **argv)
 {
-  const char *tmp = getenv("TMPDIR");
   Trace first, reference, last;
   char base[PART_TEXT];
 
@@ -325,9 +304,7 @@ int main(int argc, char **argv)
   (void)setenv("PETSC_OPTIONS", "-malloc_dump", 1);
   SB_TEST_BEGIN(argc, argv);
   PetscCall(PetscLogDefaultBegin());
-  PetscCall(PetscSNPrintf(folder, sizeof(folder), "%s/supple-unnamed-XXXXXX", tmp && tmp[0] ? tmp : "/tmp"));
-  if (!test_rank) PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "No folder %s", folder);
-  PetscCallMPI(MPI_Bcast(folder, (PetscMPIInt)sizeof(folder), MPI_CHAR, 0, PETSC_COMM_WORLD));
+  PetscCall(test_file_folder(folder));
   part_watch();
   PetscCall(SbRegisterAll());
   PetscCall(name_events());
@@ -349,7 +326,6 @@ int main(int argc, char **argv)
   PetscCall(destroy(&first));
   PetscCall(destroy(&reference));
   PetscCall(destroy(&last));
-  PetscCall(remove_folder());
   part_unwatch();
   SB_TEST_END();
 }
