@@ -98,11 +98,11 @@ static inline PetscInt slivers_move(const Slivers *s, PetscRandom random, const 
   return count;
 }
 
-static inline void slivers_place(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static inline void slivers_place(const VerifyPlace *place, PetscReal x[3])
 {
-  const PetscReal *all = (const PetscReal *)ctx;
+  const PetscReal *all = (const PetscReal *)place->ctx;
 
-  for (int k = 0; k < 3; k++) x[k] = all[3 * verify_vertex(n, at) + k];
+  for (int k = 0; k < 3; k++) x[k] = all[3 * verify_vertex(place->n, place->at) + k];
 }
 
 /* Writes the mesh. Collective. Output: made, number of slivers among 6 n[0] n[1] n[2] tets. */

@@ -230,8 +230,7 @@ static PetscErrorCode test_two_bodies(void)
   PetscCall(test_scene_open_in(
     dir,
     "-bodies a,b -body_a_mesh box:0.4,0.1,0.2:4,1,2 -body_b_mesh box:0.4,0.1,0.2:4,1,2 -body_b_translate "
-    "0,0,1"
-    " -body_b_material linear -body_b_young 1 -body_b_poisson 0 -body_b_density 1" MATERIAL EULER,
+    "0,0,1 -body_b_material linear -body_b_young 1 -body_b_poisson 0 -body_b_density 1" MATERIAL EULER,
     &scene));
   PetscCall(open_fields(&h));
   PetscCall(check_mesh((SbOutput)scene.run->output, &h, 0.016));

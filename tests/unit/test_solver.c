@@ -144,14 +144,13 @@ static PetscErrorCode swing(const char *element, const char *options, PetscReal 
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(test_open(&t,
-                      "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:2 -body_bar_material corotated "
-                      "-body_bar_tangent warped -body_bar_young 2e4 "
-                      "-body_bar_poisson 0.4 -body_bar_density 1000 -body_bar_element %s -effects "
-                      "gravity,clamp -effect_clamp_type fixed "
-                      "-effect_clamp_on xmin -time newmark -ts_dt 0.04 -ts_max_time 0.24 -snes_rtol "
-                      "1e-11 -snes_max_it 200 -time_max_halvings 0 %s",
-                      element, options));
+  PetscCall(
+    test_open(&t,
+              "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:2 -body_bar_material corotated -body_bar_tangent "
+              "warped -body_bar_young 2e4 -body_bar_poisson 0.4 -body_bar_density 1000 -body_bar_element %s "
+              "-effects gravity,clamp -effect_clamp_type fixed -effect_clamp_on xmin -time newmark -ts_dt "
+              "0.04 -ts_max_time 0.24 -snes_rtol 1e-11 -snes_max_it 200 -time_max_halvings 0 %s",
+              element, options));
   PetscCall(SbRunSolve(t.run));
   SB_CHECK(!t.run->stop_reason[0], "%s, %s: %s", element, options, t.run->stop_reason);
   PetscCall(test_value_at(t.model, t.run->U, at, x));

@@ -97,17 +97,17 @@ typedef struct {
 } VerifyBox;
 
 /* Random displacement of interior vertices by up to 0.2 cells. */
-static inline void verify_move_vertex(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static inline void verify_move_vertex(const VerifyPlace *place, PetscReal x[3])
 {
-  const VerifyBox *box = (const VerifyBox *)ctx;
+  const VerifyBox *box = (const VerifyBox *)place->ctx;
   PetscBool inner = PETSC_TRUE;
 
-  for (int k = 0; k < 3; k++) inner = (PetscBool)(inner && at[k] > 0 && at[k] < n[k]);
+  for (int k = 0; k < 3; k++) inner = (PetscBool)(inner && place->at[k] > 0 && place->at[k] < place->n[k]);
   for (int k = 0; k < 3; k++) {
     PetscReal r = 0.5;
 
     if (inner) (void)PetscRandomGetValueReal(box->random, &r);
-    x[k] = (x[k] + (0.4 * r - 0.2) / (PetscReal)n[k]) * box->size[k];
+    x[k] = (x[k] + (0.4 * r - 0.2) / (PetscReal)place->n[k]) * box->size[k];
   }
 }
 

@@ -15,20 +15,20 @@ static inline SbEffect contact_effect(SbModel m, const char *name)
   return NULL;
 }
 
-/* History columns of an effect for the residual R (N, without constraints), on every rank: value[ncolumn]. */
+/* History columns of an effect for the residual R (N, without constraints; NULL: none), on every rank: value[ncolumn]. */
 static inline PetscErrorCode contact_columns(SbRun run, PetscReal t, Vec R, SbEffect e, PetscReal value[])
 {
   SbModel m = run->model;
   SbStage stage = {.t = t, .shift_k = 1};
-  const PetscReal *r;
+  const PetscReal *r = NULL;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceGetLocalRead(m->space, R, &r));
+  if (R) PetscCall(SbSpaceGetLocalRead(m->space, R, &r));
   PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
-  if (m->space->constraints) SbConstraintsComputeForces(m->space, stage.u, r);
+  if (R && m->space->constraints) SbConstraintsComputeForces(m->space, stage.u, r);
   PetscCall((*e->ops.history)(e, m->space, &stage, r, value));
   PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
-  PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
+  if (R) PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, (PetscMPIInt)e->ncolumn, MPIU_REAL, MPI_SUM, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -82,6 +82,26 @@ static inline PetscErrorCode contact_body_masses(SbModel m, PetscReal mass[])
   PetscCall(PetscArrayzero(mass, m->nbody));
   for (PetscInt i = 0; i < m->space->nnode_owned; i++) mass[m->space->node_body[i]] += m->space->node_mass[i];
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, mass, (PetscMPIInt)m->nbody, MPIU_REAL, MPI_SUM, m->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Largest deviation of the stress from a uniaxial pressure along z (Pa), relative to it. */
+static inline PetscErrorCode contact_stress_error(TestScene *t, PetscReal pressure, PetscReal *worst)
+{
+  SbSpace s = t->model->space;
+  PetscReal *sigma;
+  const PetscReal *u;
+
+  PetscFunctionBeginUser;
+  *worst = 0;
+  PetscCall(PetscMalloc1(6 * s->mesh->ncell_owned, &sigma));
+  PetscCall(SbSpaceGetLocalRead(s, t->run->U, &u));
+  SbSpaceCellState(s, u, sigma, NULL, NULL, NULL);
+  PetscCall(SbSpaceRestoreLocalRead(s, t->run->U, &u));
+  for (PetscInt c = 0; c < 6 * s->mesh->ncell_owned; c++)
+    *worst = PetscMax(*worst, PetscAbsReal(sigma[c] + (c % 6 == 2 ? pressure : 0)) / pressure);
+  PetscCall(PetscFree(sigma));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, worst, 1, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -339,13 +359,11 @@ typedef struct {
   PetscBool quarter;
 } ContactBall;
 
-static inline void contact_ball(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static inline void contact_ball(const VerifyPlace *place, PetscReal x[3])
 {
-  const ContactBall *b = (const ContactBall *)ctx;
+  const ContactBall *b = (const ContactBall *)place->ctx;
   PetscReal layer = 0, length;
 
-  (void)n;
-  (void)at;
   for (int k = 0; k < 3; k++) {
     if (!b->quarter || k == 2) x[k] = 2 * x[k] - 1;
     layer = PetscMax(layer, PetscAbsReal(x[k]));

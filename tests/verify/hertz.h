@@ -29,13 +29,11 @@ typedef struct {
   PetscReal fine, side, radius;
 } Block;
 
-static inline void bend(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static inline void bend(const VerifyPlace *place, PetscReal x[3])
 {
-  const Block *b = (const Block *)ctx;
+  const Block *b = (const Block *)place->ctx;
   PetscReal depth, cap = 0;
 
-  (void)n;
-  (void)at;
   if (b->side < 0) x[2] = 1 - x[2];
   for (int k = 0; k < 3; k++) x[k] = SIZE * (b->fine * x[k] + (1 - b->fine) * PetscPowRealInt(x[k], 6));
   depth = x[2];

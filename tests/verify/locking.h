@@ -224,15 +224,13 @@ static inline PetscErrorCode locking_shell(const char *mesh, PetscReal nu, const
 }
 
 /* Maps a box to the beam of Turek and Hron, its left side to the circle (0.2, 0.2) of radius 0.05 m; one layer in z. */
-static inline void locking_beam_map(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static inline void locking_beam_map(const VerifyPlace *place, PetscReal x[3])
 {
   const PetscReal y = 0.19 + 0.02 * x[1], root = 0.2 + PetscSqrtReal(0.0025 - PetscSqr(y - 0.2));
 
-  (void)at;
-  (void)ctx;
   x[0] = root + x[0] * (0.6 - root);
   x[1] = y;
-  x[2] *= 0.35 / (PetscReal)n[0];
+  x[2] *= 0.35 / (PetscReal)place->n[0];
 }
 
 /* Turek and Hron's CSM1 (mu 0.5e6 Pa) and CSM2 (2e6 Pa), n cells through the thickness: displacement of (0.6, 0.2). */

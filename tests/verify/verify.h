@@ -8,8 +8,12 @@
 
 #define VERIFY_TEXT TEST_TEXT
 
-/* Map of the vertex at[3] = 0..n of a box with n[3] cells; x is the point of the unit cube on entry. */
-typedef void (*VerifyMap)(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx);
+/* Vertex at[3] = 0..n of a box with n[3] cells, and its map; x is the point of the unit cube on entry. */
+typedef struct {
+  PetscInt n[3], at[3];
+  void *ctx;
+} VerifyPlace;
+typedef void (*VerifyMap)(const VerifyPlace *place, PetscReal x[3]);
 
 static inline PetscInt verify_vertex(const PetscInt n[3], const PetscInt at[3])
 {
@@ -55,7 +59,8 @@ static inline void verify_write_cells(FILE *f, const PetscInt n[3])
 */
 static inline PetscErrorCode verify_mesh_write(const PetscInt n[3], VerifyMap map, void *ctx, char path[512])
 {
-  PetscInt at[3];
+  VerifyPlace p = {.n = {n[0], n[1], n[2]}, .ctx = ctx};
+  PetscInt *at = p.at;
   FILE *f;
 
   PetscFunctionBeginUser;
@@ -69,7 +74,7 @@ static inline PetscErrorCode verify_mesh_write(const PetscInt n[3], VerifyMap ma
           PetscReal x[3];
 
           for (int k = 0; k < 3; k++) x[k] = (PetscReal)at[k] / (PetscReal)n[k];
-          map(n, at, x, ctx);
+          map(&p, x);
           fprintf(f, "%d %.17g %.17g %.17g\n", (int)verify_vertex(n, at) + 1, x[0], x[1], x[2]);
         }
       }

@@ -60,8 +60,7 @@ static PetscErrorCode hanging_error(PetscInt n, const char *more, PetscReal *err
   PetscCall(test_open(&t,
                       "-bodies a -time static -body_a_mesh box:0.3,0.3,1:%d -body_a_translate -0.1,-0.2,0 "
                       "-body_a_material linear -body_a_young %g -body_a_poisson %g -body_a_density 1000 %s "
-                      "-effects gravity,top "
-                      "-effect_top_type prescribed_displacement -effect_top_on zmax "
+                      "-effects gravity,top -effect_top_type prescribed_displacement -effect_top_on zmax "
                       "-effect_top_displacement %.17g*x;%.17g*y;%.17g*(x^2+y^2)",
                       (int)n, HANG_E, HANG_NU, more, -HANG_NU * HANG_W / HANG_E, -HANG_NU * HANG_W / HANG_E,
                       0.5 * HANG_NU * HANG_W / HANG_E));

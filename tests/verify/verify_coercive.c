@@ -28,14 +28,14 @@ typedef struct {
   PetscRandom random;
 } MeshContext;
 
-static void place_vertex(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void place_vertex(const VerifyPlace *place, PetscReal x[3])
 {
-  const MeshContext *m = (const MeshContext *)ctx;
+  const MeshContext *m = (const MeshContext *)place->ctx;
   PetscReal r[3];
 
   for (int k = 0; k < 3; k++) (void)PetscRandomGetValueReal(m->random, &r[k]);
   if (m->shape == MOVED) {
-    for (int k = 0; k < 3; k++) x[k] += (0.5 * r[k] - 0.25) / (PetscReal)n[k];
+    for (int k = 0; k < 3; k++) x[k] += (0.5 * r[k] - 0.25) / (PetscReal)place->n[k];
   } else if (m->shape == GRADED) {
     /* a cone truncated at a thousandth of its length */
     const PetscReal size = PetscPowReal(10., 3. * (x[0] - 1.));
@@ -43,12 +43,12 @@ static void place_vertex(const PetscInt n[3], const PetscInt at[3], PetscReal x[
     x[0] = size;
     x[1] *= size * (1. + 0.1 * r[1]);
     x[2] *= size * (1. + 0.1 * r[2]);
-  } else if (at[0] == 1 && at[1] == 0) {
+  } else if (place->at[0] == 1 && place->at[1] == 0) {
     /* a line of vertices moved to within a thousandth of the plane of faces */
     const PetscReal part = 0.499 * (1. - 0.002 * r[0]);
 
-    x[0] -= part / (PetscReal)n[0];
-    x[1] += part / (PetscReal)n[1];
+    x[0] -= part / (PetscReal)place->n[0];
+    x[1] += part / (PetscReal)place->n[1];
   }
 }
 

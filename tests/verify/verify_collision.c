@@ -15,26 +15,6 @@
 #define LOAD 500.0 /* Pa */
 #define BLOCK(b, mesh) VERIFY_BODY(b, mesh, "linear", "1e5", "0.3")
 
-/* Largest deviation of the stress from uniaxial pressure, relative to it. */
-static PetscErrorCode stress_error(TestScene *t, PetscReal *worst)
-{
-  SbSpace s = t->model->space;
-  PetscReal *sigma;
-  const PetscReal *u;
-
-  PetscFunctionBeginUser;
-  *worst = 0;
-  PetscCall(PetscMalloc1(6 * s->mesh->ncell_owned, &sigma));
-  PetscCall(SbSpaceGetLocalRead(s, t->run->U, &u));
-  SbSpaceCellState(s, u, sigma, NULL, NULL, NULL);
-  PetscCall(SbSpaceRestoreLocalRead(s, t->run->U, &u));
-  for (PetscInt c = 0; c < 6 * s->mesh->ncell_owned; c++)
-    *worst = PetscMax(*worst, PetscAbsReal(sigma[c] + (c % 6 == 2 ? LOAD : 0)) / LOAD);
-  PetscCall(PetscFree(sigma));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, worst, 1, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode check_stack(const char *element, int upper, PetscReal tolerance)
 {
   PetscReal worst, force[6];
@@ -54,7 +34,7 @@ static PetscErrorCode check_stack(const char *element, int upper, PetscReal tole
       "a", "box:0.1,0.1,0.05:2") BLOCK("b", "box:0.1,0.1,0.05:%d"),
     element, element, -LOAD, upper));
   PetscCall(record_solve(&t, &r));
-  PetscCall(stress_error(&t, &worst));
+  PetscCall(contact_stress_error(&t, LOAD, &worst));
   PetscCall(contact_body_forces(t.run, 1, force));
   PetscCall(test_scene_close(&t));
   VERIFY_LESS(worst, tolerance, "stress from uniform, of the load");

@@ -24,9 +24,7 @@ static PetscErrorCode check_press(const char *element, const char *response, Pet
 {
   Record r = {0};
   TestScene t;
-  PetscReal worst = 0, *sigma;
-  const PetscReal *u;
-  SbSpace s;
+  PetscReal worst;
 
   PetscFunctionBeginUser;
   verify_case("press, %s, %s", element, response);
@@ -40,16 +38,8 @@ static PetscErrorCode check_press(const char *element, const char *response, Pet
               "-effect_floor_stiffness %g" VERIFY_BODY("a", "box:0.1,0.1,0.05:4", "linear", "1e5", "0.3"),
               element, -LOAD, response, stiffness));
   PetscCall(record_solve(&t, &r));
-  s = t.model->space;
-  PetscCall(PetscMalloc1(6 * s->mesh->ncell_owned, &sigma));
-  PetscCall(SbSpaceGetLocalRead(s, t.run->U, &u));
-  SbSpaceCellState(s, u, sigma, NULL, NULL, NULL);
-  PetscCall(SbSpaceRestoreLocalRead(s, t.run->U, &u));
-  for (PetscInt c = 0; c < 6 * s->mesh->ncell_owned; c++)
-    worst = PetscMax(worst, PetscAbsReal(sigma[c] + (c % 6 == 2 ? LOAD : 0)) / LOAD);
-  PetscCall(PetscFree(sigma));
+  PetscCall(contact_stress_error(&t, LOAD, &worst));
   PetscCall(test_scene_close(&t));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD));
   VERIFY_LESS(worst, 1e-6, "stress from uniform, of the load");
   VERIFY_NEAR(record_last(&r, "floor_force_z"), LOAD * 0.01, 1e-6 * LOAD * 0.01, "force of the floor, N");
   VERIFY_NEAR(record_last(&r, "floor_penetration"), 0, tolerance, "penetration, m");
@@ -348,13 +338,11 @@ static PetscErrorCode check_bounds(void)
 #define HERTZ_SIZE 1.0
 
 /* Quarter of a block; cells grow with the distance from the corner under the sphere. */
-static void hertz_map(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void hertz_map(const VerifyPlace *place, PetscReal x[3])
 {
   const PetscReal g = 3.5;
 
-  (void)n;
-  (void)at;
-  (void)ctx;
+  (void)place;
   for (int k = 0; k < 3; k++) {
     const PetscReal from = k == 2 ? 1 - x[k] : x[k];
 
@@ -386,14 +374,12 @@ static PetscErrorCode check_hertz(const char *element, PetscInt cells, PetscReal
   PetscCall(record_run(
     &record,
     "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material linear -body_a_young %g -body_a_poisson "
-    "%g "
-    "-body_a_density 1 -sets x0,y0,x1,y1,z1,top -set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 -set_x1_at "
-    "plane:1,0,0,1 "
-    "-set_y1_at plane:0,1,0,1 -set_z1_at plane:0,0,1,-1 -set_top_at plane:0,0,1,0 -time static -ksp_rtol "
-    "1e-10 -effects x,y,far,ball -effect_x_type fixed -effect_x_on x0 -effect_x_components x -effect_y_type "
-    "fixed -effect_y_on y0 -effect_y_components y -effect_far_type prescribed_displacement -effect_far_on "
-    "x1,y1,z1 -effect_far_displacement x*%s;y*%s;%.15g*(%.15g/%s+z^2/%s^3) -effect_ball_type contact "
-    "-effect_ball_response projected "
+    "%g -body_a_density 1 -sets x0,y0,x1,y1,z1,top -set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 "
+    "-set_x1_at plane:1,0,0,1 -set_y1_at plane:0,1,0,1 -set_z1_at plane:0,0,1,-1 -set_top_at plane:0,0,1,0 "
+    "-time static -ksp_rtol 1e-10 -effects x,y,far,ball -effect_x_type fixed -effect_x_on x0 "
+    "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y -effect_far_type "
+    "prescribed_displacement -effect_far_on x1,y1,z1 -effect_far_displacement "
+    "x*%s;y*%s;%.15g*(%.15g/%s+z^2/%s^3) -effect_ball_type contact -effect_ball_response projected "
     "-effect_ball_on top -effect_ball_obstacle sphere:0,0,%.15g,1",
     path, element, E, nu, sideways, sideways, -P * (1 + nu) / (2 * PETSC_PI * E), 2 * (1 - nu), r, r, 1 - d));
   verify_show("nodes that touch", record_last(&record, "ball_contacts"));

@@ -9,15 +9,13 @@
 */
 #include "verify.h"
 
-static void beam(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void beam(const VerifyPlace *place, PetscReal x[3])
 {
   const PetscReal y = 0.19 + 0.02 * x[1], root = 0.2 + PetscSqrtReal(0.0025 - PetscSqr(y - 0.2));
 
-  (void)at;
-  (void)ctx;
   x[0] = root + x[0] * (0.6 - root);
   x[1] = y;
-  x[2] *= 0.35 / (PetscReal)n[0];
+  x[2] *= 0.35 / (PetscReal)place->n[0];
 }
 
 typedef struct {

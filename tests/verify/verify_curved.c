@@ -306,17 +306,15 @@ static PetscErrorCode check_ranks(void)
     for (int r = 0; r < 3; r++) {
       TestScene t;
 
-      PetscCall(
-        test_open_on(r == 1 ? PETSC_COMM_SELF : PETSC_COMM_WORLD, NULL, &t,
-                     "-bodies a" VERIFY_BODY(
-                       "a", "%s", "neohookean", "1e6",
-                       "0.45") "-body_a_element p2 -sets foot -set_foot_at plane:0,0,1,0 -effects f,g "
-                               "-effect_f_type fixed "
-                               "-effect_f_on foot -effect_g_type gravity -effect_g_vector 3,-5,-9.81 -time "
-                               "newmark -mass %s "
-                               "-ts_dt 0.02 -ts_max_time 0.06 -solver %s -ksp_rtol 1e-12 -snes_rtol 1e-12%s",
-                     r == 2 ? h5 : mesh, k ? "consistent" : "lumped", solver[k],
-                     r == 2 && test_size > 1 ? " -mesh_reading slabs" : ""));
+      PetscCall(test_open_on(
+        r == 1 ? PETSC_COMM_SELF : PETSC_COMM_WORLD, NULL, &t,
+        "-bodies a" VERIFY_BODY(
+          "a", "%s", "neohookean", "1e6",
+          "0.45") "-body_a_element p2 -sets foot -set_foot_at plane:0,0,1,0 -effects f,g -effect_f_type "
+                  "fixed -effect_f_on foot -effect_g_type gravity -effect_g_vector 3,-5,-9.81 -time newmark "
+                  "-mass %s -ts_dt 0.02 -ts_max_time 0.06 -solver %s -ksp_rtol 1e-12 -snes_rtol 1e-12%s",
+        r == 2 ? h5 : mesh, k ? "consistent" : "lumped", solver[k],
+        r == 2 && test_size > 1 ? " -mesh_reading slabs" : ""));
       volume[r] = t.model->body[0].volume;
       PetscCall(verify_solve(&t, "ranks"));
       n = verify_numbers(t.model);

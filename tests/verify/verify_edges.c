@@ -12,7 +12,7 @@
   the other one, by its solid angle, the distance from it.
 */
 #include <sbgeometry.h>
-#include "verify.h"
+#include "contact.h"
 
 enum { CONTACTS, DEEPEST, MEAN, NORMAL, FRICTION, WORK, LOSS, GAP, ENERGY, LAG, UNGUARDED, NVALUE };
 enum { ROW = 10, SAMPLES = 6 }; /* a facet's row: part and corners; sample points per edge */
@@ -20,17 +20,9 @@ enum { ROW = 10, SAMPLES = 6 }; /* a facet's row: part and corners; sample point
 /* History columns of the contact effect, on every rank. */
 static PetscErrorCode contact_values(SbRun run, PetscReal values[NVALUE])
 {
-  SbModel m = run->model;
-  SbStage stage = {.shift_k = 1};
-  SbEffect e = NULL;
-
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < m->neffect && !e; i++) e = m->effect[i]->ops.begin_barrier ? m->effect[i] : NULL;
   PetscCall(PetscArrayzero(values, NVALUE));
-  PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
-  PetscCall((*e->ops.history)(e, m->space, &stage, NULL, values));
-  PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, values, NVALUE, MPIU_REAL, MPI_SUM, m->comm));
+  PetscCall(contact_columns(run, 0, NULL, contact_effect(run->model, "meet"), values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -302,14 +294,13 @@ static PetscErrorCode check_box(const char *what, const char *turn, PetscReal mo
   PetscCall(test_open(
     &t,
     "-bodies plate,cube -body_plate_mesh box:0.2,0.2,0.006:10,10,1 -body_plate_material corotated "
-    "-body_plate_young 1e6 -body_plate_poisson 0.3 -body_plate_density 1000 "
-    "-body_cube_mesh box:0.04,0.04,0.04:2 -body_cube_material corotated -body_cube_young 1e6 "
-    "-body_cube_poisson 0.3 -body_cube_density 1000 %s -body_cube_velocity 0,0,-5 -sets skin,x0,x1,y0,y1 "
-    "-set_skin_at boundary -set_x0_at plane:1,0,0,0 -set_x1_at plane:1,0,0,0.2 -set_y0_at plane:0,1,0,0 "
-    "-set_y1_at plane:0,1,0,0.2 -effects x0,x1,y0,y1,meet -effect_x0_type fixed -effect_x0_on x0 "
-    "-effect_x1_type fixed -effect_x1_on x1 -effect_y0_type fixed -effect_y0_on y0 -effect_y1_type fixed "
-    "-effect_y1_on y1 -effect_meet_type contact -time euler_implicit "
-    "-ts_dt 0.001 -ts_max_time 0.03",
+    "-body_plate_young 1e6 -body_plate_poisson 0.3 -body_plate_density 1000 -body_cube_mesh "
+    "box:0.04,0.04,0.04:2 -body_cube_material corotated -body_cube_young 1e6 -body_cube_poisson 0.3 "
+    "-body_cube_density 1000 %s -body_cube_velocity 0,0,-5 -sets skin,x0,x1,y0,y1 -set_skin_at boundary "
+    "-set_x0_at plane:1,0,0,0 -set_x1_at plane:1,0,0,0.2 -set_y0_at plane:0,1,0,0 -set_y1_at plane:0,1,0,0.2 "
+    "-effects x0,x1,y0,y1,meet -effect_x0_type fixed -effect_x0_on x0 -effect_x1_type fixed -effect_x1_on x1 "
+    "-effect_y0_type fixed -effect_y0_on y0 -effect_y1_type fixed -effect_y1_on y1 -effect_meet_type contact "
+    "-time euler_implicit -ts_dt 0.001 -ts_max_time 0.03",
     turn));
   PetscCall(SbRunAddMonitor(t.run, watch, &seen));
   PetscCall(verify_solve(&t, what));
@@ -441,12 +432,11 @@ static PetscErrorCode check_rings(PetscReal most)
   PetscCall(write_ring(path));
   PetscCall(test_open(
     &t,
-    "-bodies a,b -body_a_mesh %s -body_b_mesh %s -body_b_rotate 1,0,0,90 -body_b_translate %.15g,0,0 "
-    "-sets skin,far,end -set_skin_at boundary -set_far_at halfspace:1,0,0,-0.09 -set_end_at "
-    "halfspace:-1,0,0,%.15g -effects hold,pull,meet -effect_hold_type fixed -effect_hold_on far "
-    "-effect_pull_type prescribed_displacement -effect_pull_on end -effect_pull_displacement "
-    "0.08*ramp(t/0.4);0;0 -effect_meet_type contact -time "
-    "euler_implicit -ts_dt 0.01 -ts_max_time 0.5" LAWS("1e5"),
+    "-bodies a,b -body_a_mesh %s -body_b_mesh %s -body_b_rotate 1,0,0,90 -body_b_translate %.15g,0,0 -sets "
+    "skin,far,end -set_skin_at boundary -set_far_at halfspace:1,0,0,-0.09 -set_end_at halfspace:-1,0,0,%.15g "
+    "-effects hold,pull,meet -effect_hold_type fixed -effect_hold_on far -effect_pull_type "
+    "prescribed_displacement -effect_pull_on end -effect_pull_displacement 0.08*ramp(t/0.4);0;0 "
+    "-effect_meet_type contact -time euler_implicit -ts_dt 0.01 -ts_max_time 0.5" LAWS("1e5"),
     path, path, away, -away - 0.09));
   PetscCall(SbRunAddMonitor(t.run, watch_rings, &seen));
   PetscCall(verify_solve(&t, "rings"));

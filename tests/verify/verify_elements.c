@@ -161,12 +161,11 @@ static PetscErrorCode check_mixed(void)
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(
     text, sizeof(text),
-    "-bodies a,b,c,d -body_a_mesh box:0.2,0.1,0.1:2 -body_b_mesh box:0.1,0.2,0.1:2 "
-    "-body_c_mesh box:0.1,0.1,0.2:2 -body_d_mesh box:0.2,0.1,0.1:1 -body_d_material stvk -body_d_element p2 "
+    "-bodies a,b,c,d -body_a_mesh box:0.2,0.1,0.1:2 -body_b_mesh box:0.1,0.2,0.1:2 -body_c_mesh "
+    "box:0.1,0.1,0.2:2 -body_d_mesh box:0.2,0.1,0.1:1 -body_d_material stvk -body_d_element p2 "
     "-body_d_translate 0,2,0 -body_d_young 1e5 -body_d_poisson 0.4 -body_d_density 200 -body_a_material "
-    "linear -body_b_material corotated "
-    "-body_c_material neohookean -body_b_element cr -body_c_element dg -body_b_translate 1,0,0 "
-    "-body_c_translate 2,0,0" BODY
+    "linear -body_b_material corotated -body_c_material neohookean -body_b_element cr -body_c_element dg "
+    "-body_b_translate 1,0,0 -body_c_translate 2,0,0" BODY
     "-body_b_young 2e5 -body_c_young 1e5 -body_b_poisson 0.3 -body_c_poisson 0.45 -body_b_density 500 "
     "-body_c_density 250 -sets low,tip -set_low_at plane:0,0,1,0 -effects gravity,stand,poke "
     "-effect_stand_type fixed -effect_stand_on low -effect_poke_type point_force -effect_poke_on tip "

@@ -438,21 +438,17 @@ static PetscErrorCode check_finer(const Problem *p, PetscReal nu, Case fine, con
 }
 
 /* Map of a regular box. */
-static void straight_map(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void straight_map(const VerifyPlace *place, PetscReal x[3])
 {
-  const PetscReal *size = (const PetscReal *)ctx;
+  const PetscReal *size = (const PetscReal *)place->ctx;
 
-  (void)n;
-  (void)at;
   for (int k = 0; k < 3; k++) x[k] *= size[k];
 }
 
 /* Map of a graded mesh: cells grow with the distance from the corner (0, 0, 0) in the top face. */
-static void sphere_map(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void sphere_map(const VerifyPlace *place, PetscReal x[3])
 {
-  (void)n;
-  (void)at;
-  (void)ctx;
+  (void)place;
   for (int k = 0; k < 3; k++) {
     const PetscReal from = k == 2 ? 1. - x[k] : x[k];
 
@@ -492,13 +488,11 @@ static PetscErrorCode check_bars(void)
 }
 
 /* Map of Cook's membrane, plane strain. */
-static void cook_map(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void cook_map(const VerifyPlace *place, PetscReal x[3])
 {
   const PetscReal low = 44. * x[0], high = 44. + 16. * x[0];
 
-  (void)n;
-  (void)at;
-  (void)ctx;
+  (void)place;
   x[1] = low + (high - low) * x[1];
   x[0] *= 48.;
   x[2] *= 12.;

@@ -9,28 +9,13 @@
 
   Sudden gravity, undamped: the first minimum of the end face is -1.5696 m at 0.7203 s.
 */
-#include "sbsolver.h"
-#include "verify.h"
+#include "modes.h"
 
 #define BAR                                                                                                  \
   "-bodies a -body_a_mesh box:0.4,0.1,0.1:%d -body_a_material linear -body_a_young 5e4 -body_a_poisson 0.3 " \
   "-body_a_density 1000 -effect_clamp_type fixed -effect_clamp_on xmin -ksp_rtol 1e-12 "
 
 static const PetscReal end[3] = {0.4, 0.05, 0.05};
-
-/* Y = M X with the lumped mass; zero at prescribed unknowns. */
-static PetscErrorCode times_mass(SbSpace s, Vec X, Vec Y)
-{
-  PetscScalar *y;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecCopy(X, Y));
-  PetscCall(VecGetArray(Y, &y));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
-    y[i] *= s->fixed[i / 3] & (1 << i % 3) ? 0. : s->node_mass[i / 3];
-  PetscCall(VecRestoreArray(Y, &y));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 static void bend(const PetscReal x[3], PetscReal v[3])
 {
@@ -43,24 +28,11 @@ static PetscErrorCode lowest_mode(TestScene *t, Vec X, PetscReal *w)
 {
   SbModel m = t->model;
   PetscReal last = 0., size;
-  const char *package;
   Vec Y, Z;
-  Mat K;
   KSP ksp;
-  PC pc;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceCreateMatrix(m->space, SB_MATRIX_AIJ, &K));
-  PetscCall(SbModelTangent(m, 0., 0., 0., 1., t->run->U, NULL, K));
-  PetscCall(KSPCreate(PETSC_COMM_WORLD, &ksp));
-  PetscCall(KSPSetOperators(ksp, K, K));
-  PetscCall(KSPSetType(ksp, KSPPREONLY));
-  PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(SbDirectPackage(PETSC_COMM_WORLD, 3 * m->space->Nnode, PETSC_TRUE, &package));
-  PetscCheck(package, PETSC_COMM_WORLD, PETSC_ERR_SUP, "This PETSc has neither SuiteSparse nor MUMPS");
-  PetscCall(SbPCDirectSet(pc, package, PETSC_TRUE));
-  PetscCall(PCSetFromOptions(pc));
-  PetscCall(SbPCCheckPivots(pc));
+  PetscCall(modes_factor(m, 0., t->run->U, &ksp));
   PetscCall(VecDuplicate(X, &Y));
   PetscCall(VecDuplicate(X, &Z));
   PetscCall(test_fill(m, bend, X));
@@ -69,11 +41,11 @@ static PetscErrorCode lowest_mode(TestScene *t, Vec X, PetscReal *w)
   for (int k = 0; k < 3000 && (k < 2 || PetscAbsReal(*w - last) > 1e-14 * *w); k++) {
     PetscReal kinetic, strain;
 
-    PetscCall(times_mass(m->space, X, Y));
+    PetscCall(modes_times_mass(m->space, X, Y));
     PetscCall(KSPSolve(ksp, Y, Z));
     /* Rayleigh quotient of z: z K z = z M x */
     PetscCall(VecDot(Z, Y, &strain));
-    PetscCall(times_mass(m->space, Z, Y));
+    PetscCall(modes_times_mass(m->space, Z, Y));
     PetscCall(VecDot(Z, Y, &kinetic));
     last = *w;
     *w = PetscSqrtReal(strain / kinetic);
@@ -85,7 +57,6 @@ static PetscErrorCode lowest_mode(TestScene *t, Vec X, PetscReal *w)
   PetscCall(VecDestroy(&Y));
   PetscCall(VecDestroy(&Z));
   PetscCall(KSPDestroy(&ksp));
-  PetscCall(MatDestroy(&K));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

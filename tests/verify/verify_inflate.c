@@ -139,12 +139,11 @@ static PetscErrorCode write_sphere(PetscInt n, PetscInt nlayer, char path[512])
 }
 
 /* Map of a quarter of a ring, one layer in z. */
-static void ring(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void ring(const VerifyPlace *place, PetscReal x[3])
 {
-  const PetscReal r = radius(at[0], n[0]), angle = 0.5 * PETSC_PI * x[1];
+  const PetscReal r = radius(place->at[0], place->n[0]), angle = 0.5 * PETSC_PI * x[1];
 
-  (void)ctx;
-  x[0] = at[1] == n[1] ? 0. : r * PetscCosReal(angle);
+  x[0] = place->at[1] == place->n[1] ? 0. : r * PetscCosReal(angle);
   x[1] = r * PetscSinReal(angle);
   x[2] *= 0.1;
 }

@@ -19,12 +19,10 @@
 #define AT 24.
 
 /* Map of a bar along the frame, mitred at the corner: x[0] along the centre line, x[1] across it, from the outside. */
-static void frame(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void frame(const VerifyPlace *place, PetscReal x[3])
 {
   const PetscReal across = DEPTH * (0.5 - x[1]), s = 2. * x[0];
 
-  (void)at;
-  (void)ctx;
   if (s <= 1.) {
     x[0] = -across;
     x[1] = s * (LENGTH + across);
@@ -32,7 +30,7 @@ static void frame(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], voi
     x[0] = LENGTH - (2. - s) * (LENGTH + across);
     x[1] = LENGTH + across;
   }
-  x[2] *= DEPTH / (PetscReal)n[1];
+  x[2] *= DEPTH / (PetscReal)place->n[1];
 }
 
 #define MOST 400 /* steps of a path */

@@ -15,11 +15,9 @@
 /* ------------------------------------------------------------------ mesh */
 
 /* The box of the obstacle, 0.3 x 0.2 x 0.1 m, below z = 0. */
-static void table(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void table(const VerifyPlace *place, PetscReal x[3])
 {
-  (void)n;
-  (void)at;
-  (void)ctx;
+  (void)place;
   x[0] = 0.3 * x[0] - 0.2;
   x[1] = 0.2 * x[1] - 0.1;
   x[2] = 0.1 * x[2] - 0.1;

@@ -137,15 +137,13 @@ static PetscErrorCode check_heap(const char *more)
 /* ------------------------------------------------------------------ self-contact */
 
 /* Strip of 8 mm that is straight, bends around a half circle, and returns. */
-static void hairpin(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void hairpin(const VerifyPlace *place, PetscReal x[3])
 {
   const PetscReal leg = 0.08, radius = 0.02, way = 2 * leg + PETSC_PI * radius;
   const PetscReal s = x[0] * way, out = 0.008 * (x[2] - 0.5), y = 0.02 * x[1];
   const PetscReal angle = PetscMin(PetscMax((s - leg) / radius, 0), PETSC_PI);
 
-  (void)n;
-  (void)at;
-  (void)ctx;
+  (void)place;
   x[0] = leg - PetscMax(0, leg - s) - PetscMax(0, s - leg - PETSC_PI * radius) +
          (radius - out) * PetscSinReal(angle);
   x[1] = y;
@@ -177,16 +175,15 @@ static PetscErrorCode check_fold(void)
 
   PetscFunctionBeginUser;
   PetscCall(verify_mesh_write(n, hairpin, NULL, path));
-  PetscCall(test_open(
-    &t,
-    "-bodies a -body_a_mesh %s" LAW(
-      "a") "-sets low,high -set_low_at box:-1,-1,-1,0.03,1,0.01 -set_high_at box:-1,-1,0.043,0.002,1,1 "
-           "-effects hold,press,meet -effect_hold_type fixed -effect_hold_on low "
-           "-effect_press_type prescribed_displacement -effect_press_on high "
-           "-effect_press_displacement 0;0;-0.4*t -effect_meet_type contact "
-           "-effect_meet_self yes -effect_meet_pairs yes -time euler_implicit -ts_dt 0.005 -ts_max_time "
-           "0.085",
-    path));
+  PetscCall(
+    test_open(&t,
+              "-bodies a -body_a_mesh %s" LAW(
+                "a") "-sets low,high -set_low_at box:-1,-1,-1,0.03,1,0.01 -set_high_at "
+                     "box:-1,-1,0.043,0.002,1,1 -effects hold,press,meet -effect_hold_type fixed "
+                     "-effect_hold_on low -effect_press_type prescribed_displacement -effect_press_on high "
+                     "-effect_press_displacement 0;0;-0.4*t -effect_meet_type contact -effect_meet_self yes "
+                     "-effect_meet_pairs yes -time euler_implicit -ts_dt 0.005 -ts_max_time 0.085",
+              path));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch_fold, most));
   PetscCall(verify_solve(&t, "fold"));

@@ -25,22 +25,23 @@ typedef struct {
   Interior vertices of the unit cube: moved at random by up to 0.3 cells; or a line of them moved to within a thousandth of the
   plane of faces, which leaves flat tets.
 */
-static void move_vertex(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void move_vertex(const VerifyPlace *place, PetscReal x[3])
 {
-  const MeshContext *m = (const MeshContext *)ctx;
+  const MeshContext *m = (const MeshContext *)place->ctx;
   PetscReal r[3];
 
   for (int k = 0; k < 3; k++) (void)PetscRandomGetValueReal(m->random, &r[k]);
   for (int k = 0; k < 3; k++) {
-    if (at[k] == 0 || at[k] == n[k]) return;
+    if (place->at[k] == 0 || place->at[k] == place->n[k]) return;
   }
   if (m->shape == DISTORTED) {
-    for (int k = 0; k < 3; k++) x[k] += (0.6 * r[k] - 0.3) / (PetscReal)n[k];
-  } else if (m->shape == SLIVERS && at[0] == 3 && at[1] == 2 && at[2] > 1 && at[2] < n[2] - 1) {
+    for (int k = 0; k < 3; k++) x[k] += (0.6 * r[k] - 0.3) / (PetscReal)place->n[k];
+  } else if (m->shape == SLIVERS && place->at[0] == 3 && place->at[1] == 2 && place->at[2] > 1 &&
+             place->at[2] < place->n[2] - 1) {
     const PetscReal part = 0.499 * (1. - 0.002 * r[0]);
 
-    x[0] -= part / (PetscReal)n[0];
-    x[1] += part / (PetscReal)n[1];
+    x[0] -= part / (PetscReal)place->n[0];
+    x[1] += part / (PetscReal)place->n[1];
   }
 }
 

@@ -20,14 +20,12 @@ static PetscErrorCode press(const char *element, PetscInt cells, PetscReal *forc
   PetscCall(test_open(
     &t,
     "-bodies low,high -body_low_mesh box:0.2,0.2,0.1:%d -body_high_mesh box:0.1,0.1,0.1:%d "
-    "-body_high_translate "
-    "0.053,0.047,0.101 -body_low_element %s -body_high_element %s -body_low_material neohookean "
-    "-body_high_material neohookean -body_low_young 1e5 -body_high_young 1e5 -body_low_poisson 0.3 "
-    "-body_high_poisson 0.3 -sets floor,top -set_floor_at plane:0,0,1,0 -set_top_at plane:0,0,-1,-0.201 "
+    "-body_high_translate 0.053,0.047,0.101 -body_low_element %s -body_high_element %s -body_low_material "
+    "neohookean -body_high_material neohookean -body_low_young 1e5 -body_high_young 1e5 -body_low_poisson "
+    "0.3 -body_high_poisson 0.3 -sets floor,top -set_floor_at plane:0,0,1,0 -set_top_at plane:0,0,-1,-0.201 "
     "-effects stand,press,meet -effect_stand_type fixed -effect_stand_on floor -effect_press_type "
     "prescribed_displacement -effect_press_on top -effect_press_displacement 0;0;-0.02*t -effect_meet_type "
-    "contact "
-    "-effect_meet_response barrier -effect_meet_verify true -time static -static_steps 4",
+    "contact -effect_meet_response barrier -effect_meet_verify true -time static -static_steps 4",
     (int)(4 * cells), (int)(3 * cells), element, element));
   PetscCall(record_solve(&t, &r));
   *force = record_last(&r, "meet_normal_force");
@@ -55,16 +53,13 @@ static PetscErrorCode patch(void)
   PetscCall(test_open(
     &t,
     "-bodies low,high -body_low_mesh box:0.1,0.1,0.1:3 -body_high_mesh box:0.1,0.1,0.1:2 "
-    "-body_high_translate "
-    "0,0,0.10001 -body_low_element p2 -body_high_element p2 -body_low_material linear "
+    "-body_high_translate 0,0,0.10001 -body_low_element p2 -body_high_element p2 -body_low_material linear "
     "-body_high_material linear -body_low_young 1e5 -body_high_young 1e5 -body_low_poisson 0 "
     "-body_high_poisson 0 -sets floor,top,meet -set_floor_at plane:0,0,1,0 -set_top_at plane:0,0,-1,-0.20001 "
-    "-set_meet_at box:-1,-1,0.09999,1,1,0.10002 "
-    "-effects stand,press,meet -effect_stand_type fixed -effect_stand_on floor "
-    "-effect_press_type prescribed_displacement -effect_press_on top -effect_press_displacement 0;0;-1e-4*t "
-    "-effect_meet_type contact "
-    "-effect_meet_response barrier -effect_meet_verify true -effect_meet_on meet -effect_meet_barrier_width "
-    "1e-5 -time static"));
+    "-set_meet_at box:-1,-1,0.09999,1,1,0.10002 -effects stand,press,meet -effect_stand_type fixed "
+    "-effect_stand_on floor -effect_press_type prescribed_displacement -effect_press_on top "
+    "-effect_press_displacement 0;0;-1e-4*t -effect_meet_type contact -effect_meet_response barrier "
+    "-effect_meet_verify true -effect_meet_on meet -effect_meet_barrier_width 1e-5 -time static"));
   PetscCall(verify_solve(&t, "patch"));
   s = t.model->space;
   PetscCall(PetscMalloc1(6 * s->mesh->ncell_owned, &sigma));

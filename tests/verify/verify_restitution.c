@@ -128,13 +128,11 @@ static PetscErrorCode check_soft(PetscReal young, PetscReal dt, PetscReal e)
 }
 
 /* Map of a ring with a gap of 4 % of its circumference. */
-static void horseshoe(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void horseshoe(const VerifyPlace *place, PetscReal x[3])
 {
   const PetscReal angle = (0.02 + 0.96 * x[0]) * 2 * PETSC_PI, r = 0.09 - 0.03 * x[1];
 
-  (void)n;
-  (void)at;
-  (void)ctx;
+  (void)place;
   x[0] = r * PetscCosReal(angle);
   x[1] = r * PetscSinReal(angle);
   x[2] *= 0.03;

@@ -74,19 +74,12 @@ static PetscErrorCode compare(const char *name, const char *scene, PetscInt n, c
          "-effect_roof_obstacle sphere:0.05,0.04,0.148,0.1 "
 #define BOTH(response) "-effect_floor_response " response " -effect_roof_response " response " "
 
-static PetscErrorCode check_pressed(PetscInt n)
-{
-  static const char *const more[] = {BOTH("projected"),
-                                     BOTH("multiplier") "-saddle_solver direct",
-                                     BOTH("multiplier") "-saddle_solver direct -solver cg_icc",
-                                     BOTH("multiplier") "-saddle_solver iterative",
-                                     BOTH("multiplier") "-saddle_solver iterative -solver cg_icc",
-                                     "-effect_floor_response multiplier -effect_roof_response projected"};
-
-  PetscFunctionBeginUser;
-  PetscCall(compare("pressed", PRESSED EXACT, n, more, 1e-5));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+static const char *const pressed[] = {BOTH("projected"),
+                                      BOTH("multiplier") "-saddle_solver direct",
+                                      BOTH("multiplier") "-saddle_solver direct -solver cg_icc",
+                                      BOTH("multiplier") "-saddle_solver iterative",
+                                      BOTH("multiplier") "-saddle_solver iterative -solver cg_icc",
+                                      "-effect_floor_response multiplier -effect_roof_response projected"};
 
 /* A wedge of two planes at a small angle under the same nodes, the same plane twice, and a wall at supported nodes. */
 #define CORNER                                                                                            \
@@ -105,15 +98,8 @@ static PetscErrorCode check_pressed(PetscInt n)
   "-effect_floor_response " response " -effect_again_response " response \
   " -effect_tilted_response " response " -effect_wall_response " response " "
 
-static PetscErrorCode check_corner(void)
-{
-  static const char *const more[] = {FOUR("projected"), FOUR("multiplier") "-saddle_solver direct",
+static const char *const corner[] = {FOUR("projected"), FOUR("multiplier") "-saddle_solver direct",
                                      FOUR("multiplier") "-saddle_solver iterative -solver cg_icc"};
-
-  PetscFunctionBeginUser;
-  PetscCall(compare("corner", CORNER EXACT, 3, more, 1e-8));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* A ball that indents a clamped block and is dragged along it, without friction. */
 #define DRIVE                                                                                              \
@@ -123,19 +109,11 @@ static PetscErrorCode check_corner(void)
   "-effect_tool_obstacle sphere:0.05,0.031,0.07,0.03 "                                                     \
   "-effect_tool_displacement 0.01*ramp(t/0.1-1);0;-0.008*ramp(t/0.1) -ts_dt 0.02 -ts_max_time 0.16 "
 
-static PetscErrorCode check_drive(void)
-{
-  static const char *const more[] = {"-effect_tool_response projected -time euler_implicit",
-                                     "-effect_tool_response multiplier -saddle_solver direct",
-                                     "-effect_tool_response multiplier -saddle_solver iterative"};
-  static const char *const alpha[] = {"-effect_tool_response projected -time genalpha",
-                                      "-effect_tool_response multiplier -time genalpha"};
-
-  PetscFunctionBeginUser;
-  PetscCall(compare("prescribed_displacement", DRIVE EXACT, 3, more, 10 * SETTLED));
-  PetscCall(compare("prescribed_displacement", DRIVE EXACT, 2, alpha, 10 * SETTLED));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+static const char *const drive[] = {"-effect_tool_response projected -time euler_implicit",
+                                    "-effect_tool_response multiplier -saddle_solver direct",
+                                    "-effect_tool_response multiplier -saddle_solver iterative"};
+static const char *const alpha[] = {"-effect_tool_response projected -time genalpha",
+                                    "-effect_tool_response multiplier -time genalpha"};
 
 /* ------------------------------------------------------------------ limit */
 
@@ -209,10 +187,13 @@ int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   /* many solves of small systems: on several ranks only the cases that differ there */
-  PetscCall(check_pressed(test_size > 1 ? 4 : 6));
-  PetscCall(check_corner());
+  PetscCall(compare("pressed", PRESSED EXACT, test_size > 1 ? 4 : 6, pressed, 1e-5));
+  PetscCall(compare("corner", CORNER EXACT, 3, corner, 1e-8));
   PetscCall(check_limit());
-  if (test_size == 1) PetscCall(check_drive());
+  if (test_size == 1) {
+    PetscCall(compare("prescribed_displacement", DRIVE EXACT, 3, drive, 10 * SETTLED));
+    PetscCall(compare("prescribed_displacement", DRIVE EXACT, 2, alpha, 10 * SETTLED));
+  }
   if (test_size < 3) PetscCall(check_bent());
   SB_TEST_END();
 }

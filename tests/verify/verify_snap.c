@@ -49,15 +49,13 @@ static PetscReal toggle_load(PetscReal delta)
   return P;
 }
 
-static void member(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void member(const VerifyPlace *place, PetscReal x[3])
 {
   const PetscReal depth = DEPTH * PetscSqrtReal(1. + PetscSqr(RISE / SPAN)); /* of a vertical section */
 
-  (void)at;
-  (void)ctx;
   x[1] = RISE * x[0] + depth * (x[1] - 0.5);
   x[0] *= SPAN;
-  x[2] *= SPAN / (PetscReal)n[0];
+  x[2] *= SPAN / (PetscReal)place->n[0];
 }
 
 typedef struct {

@@ -115,10 +115,9 @@ static PetscErrorCode check_stack(PetscReal friction, PetscReal slow)
   PetscCall(write_blocks((PetscBool)(friction > 0), sizeof(bodies), bodies));
   PetscCall(
     test_open(&t,
-              "%s %s -effect_floor_type contact -effect_floor_on b0 "
-              "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction %g -effect_meet_type contact "
-              "-effect_meet_friction %g "
-              "-time euler_implicit -ts_dt 0.01 -ts_max_time %g -snes_rtol 1e-10 -ksp_rtol 1e-9",
+              "%s %s -effect_floor_type contact -effect_floor_on b0 -effect_floor_obstacle plane:0,0,1,0 "
+              "-effect_floor_friction %g -effect_meet_type contact -effect_meet_friction %g -time "
+              "euler_implicit -ts_dt 0.01 -ts_max_time %g -snes_rtol 1e-10 -ksp_rtol 1e-9",
               bodies, friction > 0 ? "-effects gravity,floor,meet" : GUIDED, friction, friction, end));
   PetscCall(SbRunAddMonitor(t.run, keep, &at));
   PetscCall(record_solve(&t, &r));

@@ -12,26 +12,22 @@
 */
 #include "verify.h"
 
-static void beam(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void beam(const VerifyPlace *place, PetscReal x[3])
 {
   const PetscReal y = 0.19 + 0.02 * x[1], root = 0.2 + PetscSqrtReal(0.0025 - PetscSqr(y - 0.2));
 
-  (void)at;
-  (void)ctx;
   x[0] = root + x[0] * (0.6 - root);
   x[1] = y;
-  x[2] *= 0.35 / (PetscReal)n[0];
+  x[2] *= 0.35 / (PetscReal)place->n[0];
 }
 
-static void membrane(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void membrane(const VerifyPlace *place, PetscReal x[3])
 {
   const PetscReal bottom = 44. * x[0], top = 44. + 16. * x[0];
 
-  (void)at;
-  (void)ctx;
   x[0] *= 48.;
   x[1] = bottom + x[1] * (top - bottom);
-  x[2] *= 48. / (PetscReal)n[0];
+  x[2] *= 48. / (PetscReal)place->n[0];
 }
 
 /* Displacement at a point of the plane z = 0. */

@@ -51,14 +51,13 @@ static PetscErrorCode run_wave(const char *element, int cells, Wave *w)
 
   PetscFunctionBeginUser;
   *w = (Wave){.c = PetscSqrtReal(E / rho)};
-  PetscCall(test_open(
-    &t,
-    "-bodies a -body_a_mesh box:1,0.02,0.02:%d,2,2 -body_a_element %s -body_a_material linear -body_a_young "
-    "%g "
-    "-body_a_poisson 0 -body_a_density %g -effects wall,pull -effect_wall_type fixed -effect_wall_on "
-    "xmin -effect_pull_type traction -effect_pull_on xmax -effect_pull_vector %g;0;0 -time newmark "
-    "-ts_dt %.17g -ts_max_time %.17g",
-    cells, element, E, rho, N, 0.5 * L / (cells * w->c), 4. * L / w->c));
+  PetscCall(
+    test_open(&t,
+              "-bodies a -body_a_mesh box:1,0.02,0.02:%d,2,2 -body_a_element %s -body_a_material linear "
+              "-body_a_young %g -body_a_poisson 0 -body_a_density %g -effects wall,pull -effect_wall_type "
+              "fixed -effect_wall_on xmin -effect_pull_type traction -effect_pull_on xmax "
+              "-effect_pull_vector %g;0;0 -time newmark -ts_dt %.17g -ts_max_time %.17g",
+              cells, element, E, rho, N, 0.5 * L / (cells * w->c), 4. * L / w->c));
   PetscCall(SbRunAddMonitor(t.run, watch, w));
   PetscCall(verify_solve(&t, "wave"));
   w->mean /= (PetscReal)w->n;
