@@ -11,7 +11,7 @@
 #include <math.h>
 
 static int sb_test_passed, sb_test_failed;
-static PetscMPIInt test_rank, test_size; /* of PETSC_COMM_WORLD */
+static PETSC_UNUSED PetscMPIInt test_rank, test_size; /* of PETSC_COMM_WORLD */
 
 static inline void PETSC_ATTRIBUTE_FORMAT(4, 5)
   sb_test_record(PetscBool ok, const char *file, int line, const char *format, ...)

@@ -1,6 +1,5 @@
 // Refinement: eight children that fill their parent, groups, orientation, bounded shape quality; unique edges.
 // @ranks 1
-#include "../../src/mesh/mesh_impl.h"
 #include "mesh_same.h"
 
 /* Vertices, edges, faces and cells of a ball: v - e + f - c = 1. */

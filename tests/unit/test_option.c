@@ -34,12 +34,14 @@ static const SbOption run_rows[] = {
 
 static SbScope run_scope, body_scope;
 
+static PetscOptions database;
+
 /* Creates a database with `options` and registers the option tables. */
-static PetscErrorCode begin(const char *options, PetscOptions *database)
+static PetscErrorCode begin(const char *options)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscOptionsCreate(database));
-  PetscCall(PetscOptionsPush(*database));
+  PetscCall(PetscOptionsCreate(&database));
+  PetscCall(PetscOptionsPush(database));
   PetscCall(PetscOptionsInsertString(NULL, options));
   PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(run_rows), run_rows));
   PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
@@ -50,28 +52,27 @@ static PetscErrorCode begin(const char *options, PetscOptions *database)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode end(PetscOptions *database)
+static PetscErrorCode end(void)
 {
   PetscFunctionBeginUser;
   PetscCall(SbOptionsReset());
   PetscCall(PetscOptionsPop());
-  PetscCall(PetscOptionsDestroy(database));
+  PetscCall(PetscOptionsDestroy(&database));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Reading one option must fail with this message. */
 static PetscErrorCode refused_real(const char *options, const char *key, const char *message)
 {
-  PetscOptions database;
   PetscReal x[3];
 
   PetscFunctionBeginUser;
-  PetscCall(begin(options, &database));
+  PetscCall(begin(options));
   if (!strcmp(key, "translate"))
     SB_CHECK_ERROR(SbOptionReals(&body_scope, key, x), PETSC_ERR_USER, message);
   else
     SB_CHECK_ERROR(SbOptionReal(&body_scope, key, x), PETSC_ERR_USER, message);
-  PetscCall(end(&database));
+  PetscCall(end());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -100,25 +101,23 @@ static PetscErrorCode test_refused_numbers(void)
 /* Values at the ends of intervals. */
 static PetscErrorCode test_ends(void)
 {
-  PetscOptions database;
   PetscReal x;
   PetscInt n;
 
   PetscFunctionBeginUser;
-  PetscCall(begin("-body_liver_closed 1 -body_liver_poisson 0 -repeat 1", &database));
+  PetscCall(begin("-body_liver_closed 1 -body_liver_poisson 0 -repeat 1"));
   PetscCall(SbOptionReal(&body_scope, "closed", &x));
   SB_CHECK(x == 1, "closed is %g", x);
   PetscCall(SbOptionReal(&body_scope, "poisson", &x));
   SB_CHECK(x == 0, "poisson is %g", x);
   PetscCall(SbOptionInt(&run_scope, "repeat", &n));
   SB_CHECK(n == 1, "repeat is %d", (int)n);
-  PetscCall(end(&database));
+  PetscCall(end());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode test_refused_words(void)
 {
-  PetscOptions database;
   PetscBool b;
   PetscInt n;
   char(*names)[SB_NAME_MAX], text[8];
@@ -126,8 +125,7 @@ static PetscErrorCode test_refused_words(void)
 
   PetscFunctionBeginUser;
   PetscCall(begin("-verbose perhaps -repeat 2.5 -integrator newmrk -body_liver_tags a,,b "
-                  "-body_liver_pull 1;2 -bodies -body_liver_mesh long_name.msh",
-                  &database));
+                  "-body_liver_pull 1;2 -bodies -body_liver_mesh long_name.msh"));
   SB_CHECK_ERROR(SbOptionBool(&run_scope, "verbose", &b), PETSC_ERR_USER, "-verbose perhaps");
   SB_CHECK_ERROR(SbOptionInt(&run_scope, "repeat", &n), PETSC_ERR_USER, "-repeat 2.5");
   SB_CHECK_ERROR(SbOptionChoice(&run_scope, "integrator", &n), PETSC_ERR_USER, "-integrator newmrk|newmark");
@@ -138,11 +136,11 @@ static PetscErrorCode test_refused_words(void)
   SB_CHECK_ERROR(SbOptionNames(&run_scope, "bodies", &n, &names), PETSC_ERR_USER, "-bodies");
   SB_CHECK_ERROR(SbOptionString(&body_scope, "mesh", sizeof(text), text), PETSC_ERR_USER,
                  "-body_liver_mesh|7 characters");
-  PetscCall(end(&database));
-  PetscCall(begin("-repeat 0", &database));
+  PetscCall(end());
+  PetscCall(begin("-repeat 0"));
   SB_CHECK_ERROR(SbOptionInt(&run_scope, "repeat", &n), PETSC_ERR_USER, "-repeat 0|[1, inf)");
   SB_CHECK_ERROR(SbOptionReal(&run_scope, "nonesuch", NULL), PETSC_ERR_PLIB, "'nonesuch'");
-  PetscCall(end(&database));
+  PetscCall(end());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -221,7 +219,6 @@ static PetscErrorCode test_files(const char *folder)
 {
   const char *const source[2] = {as_opts, as_yaml};
   char file[2][PETSC_MAX_PATH_LEN], view[PETSC_MAX_PATH_LEN];
-  PetscOptions database;
   PetscViewer viewer;
   PetscInt unused;
   const char *value;
@@ -233,7 +230,7 @@ static PetscErrorCode test_files(const char *folder)
   PetscCall(PetscSNPrintf(view, sizeof(view), "%s/view.opts", folder));
   for (int i = 0; i < 2; i++) {
     PetscCall(test_file_put(file[i], source[i]));
-    PetscCall(begin("", &database));
+    PetscCall(begin(""));
     PetscCall(PetscOptionsInsertFile(PETSC_COMM_WORLD, NULL, file[i], PETSC_TRUE));
     PetscCall(SbOptionsRemember());
     PetscCall(PetscOptionsSetValue(NULL, "-pc_type", "jacobi"));
@@ -244,9 +241,9 @@ static PetscErrorCode test_files(const char *folder)
     PetscCall(SbViewerOpen(PETSC_COMM_WORLD, view, &viewer));
     PetscCall(SbOptionsView(viewer));
     PetscCall(PetscViewerDestroy(&viewer));
-    PetscCall(end(&database));
+    PetscCall(end());
 
-    PetscCall(begin("", &database));
+    PetscCall(begin(""));
     PetscCall(PetscOptionsInsertFile(PETSC_COMM_WORLD, NULL, view, PETSC_TRUE));
     PetscCall(SbOptionsRemember());
     PetscCall(read_all(PETSC_TRUE));
@@ -257,13 +254,12 @@ static PetscErrorCode test_files(const char *folder)
     SB_CHECK(set && value && !strcmp(value, "1e-7"), "-ksp_nothing was lost");
     PetscCall(PetscOptionsFindPair(NULL, NULL, "-pc_type", &value, &set));
     SB_CHECK(!set, "a preset of the program was printed as the user's");
-    PetscCall(end(&database));
+    PetscCall(end());
   }
-  PetscCall(
-    begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3", &database));
+  PetscCall(begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3"));
   PetscCall(read_all(PETSC_FALSE));
   PetscCall(SbOptionsCheck());
-  PetscCall(end(&database));
+  PetscCall(end());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -271,7 +267,6 @@ static PetscErrorCode test_files(const char *folder)
 static PetscErrorCode test_view_text(const char *folder)
 {
   char view[PETSC_MAX_PATH_LEN], line[512];
-  PetscOptions database;
   PetscViewer viewer;
   PetscReal x;
   PetscBool preset = PETSC_FALSE;
@@ -279,13 +274,13 @@ static PetscErrorCode test_view_text(const char *folder)
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(view, sizeof(view), "%s/text.opts", folder));
-  PetscCall(begin("-body_liver_scale 0.123456789012345678", &database));
+  PetscCall(begin("-body_liver_scale 0.123456789012345678"));
   PetscCall(SbOptionReal(&body_scope, "poisson", &x));
   PetscCall(SbOptionReal(&body_scope, "scale", &x));
   PetscCall(SbViewerOpen(PETSC_COMM_WORLD, view, &viewer));
   PetscCall(SbOptionsView(viewer));
   PetscCall(PetscViewerDestroy(&viewer));
-  PetscCall(end(&database));
+  PetscCall(end());
   if (!test_rank) {
     FILE *f = fopen(view, "r");
 
@@ -304,18 +299,15 @@ static PetscErrorCode test_view_text(const char *folder)
 /* Checks `options` beside two valid ones; all but "other" are read; the check fails with `message` (NULL: it succeeds). */
 static PetscErrorCode unread(const char *options, const char *message)
 {
-  PetscOptions database;
-
   PetscFunctionBeginUser;
-  PetscCall(
-    begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3", &database));
+  PetscCall(begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3"));
   PetscCall(PetscOptionsInsertString(NULL, options));
   PetscCall(read_all(PETSC_FALSE));
   if (message)
     SB_CHECK_ERROR(SbOptionsCheck(), PETSC_ERR_USER, message);
   else
     PetscCall(SbOptionsCheck());
-  PetscCall(end(&database));
+  PetscCall(end());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -354,14 +346,12 @@ static PetscErrorCode test_left_out(const char *folder)
     {"-body_kidney_young 3", "-body_kidney_young"},
   };
   char file[PETSC_MAX_PATH_LEN];
-  PetscOptions database;
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(file, sizeof(file), "%s/lists.opts", folder));
   PetscCall(test_file_put(file, "-bodies liver,spleen\n-body_spleen_mesh b.msh\n"));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
-    PetscCall(
-      begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3", &database));
+    PetscCall(begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3"));
     PetscCall(SbOptionsFile(PETSC_COMM_WORLD, file));
     PetscCall(PetscOptionsInsertString(NULL, of[i].options));
     PetscCall(read_all(PETSC_FALSE));
@@ -369,7 +359,7 @@ static PetscErrorCode test_left_out(const char *folder)
       SB_CHECK_ERROR(SbOptionsCheck(), PETSC_ERR_USER, of[i].message);
     else
       PetscCall(SbOptionsCheck());
-    PetscCall(end(&database));
+    PetscCall(end());
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -377,21 +367,20 @@ static PetscErrorCode test_left_out(const char *folder)
 /* A required option is missing and a misspelling of it is in the database: the message names the misspelling. */
 static PetscErrorCode test_missing(void)
 {
-  PetscOptions database;
   PetscReal x;
   PetscInt n;
   char(*names)[SB_NAME_MAX];
 
   PetscFunctionBeginUser;
-  PetscCall(begin("-body_liver_yuong 3 -bodis liver", &database));
+  PetscCall(begin("-body_liver_yuong 3 -bodis liver"));
   SB_CHECK_ERROR(SbOptionReal(&body_scope, "young", &x), PETSC_ERR_USER,
                  "-body_liver_yuong|-body_liver_young");
   SB_CHECK_ERROR(SbOptionNames(&run_scope, "bodies", &n, &names), PETSC_ERR_USER, "-bodis|-bodies");
-  PetscCall(end(&database));
+  PetscCall(end());
   /* the same key of another instance is not a misspelling */
-  PetscCall(begin("-body_livre_young 3", &database));
+  PetscCall(begin("-body_livre_young 3"));
   SB_CHECK_ERROR(SbOptionReal(&body_scope, "young", &x), PETSC_ERR_USER, "-body_liver_young|(0, inf)");
-  PetscCall(end(&database));
+  PetscCall(end());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -399,12 +388,11 @@ static PetscErrorCode test_missing(void)
 static PetscErrorCode test_ahead(void)
 {
   static const char *const keys[] = {"scale", "translate", "tags", "pull", "mesh"};
-  PetscOptions database;
   SbScope linear;
 
   PetscFunctionBeginUser;
-  PetscCall(begin("-body_liver_translate 1,2,3 -body_liver_mesh a.msh -verbose -repeat 2 -integrator static",
-                  &database));
+  PetscCall(
+    begin("-body_liver_translate 1,2,3 -body_liver_mesh a.msh -verbose -repeat 2 -integrator static"));
   for (int i = 0; i < 5; i++) PetscCall(SbOptionCheckEarly(&body_scope, keys[i]));
   for (int i = 1; i < 4; i++) PetscCall(SbOptionCheckEarly(&run_scope, run_rows[i].key));
   PetscCall(SbOptionsCheck());
@@ -412,10 +400,10 @@ static PetscErrorCode test_ahead(void)
   SB_CHECK(!SbOptionExists(&run_scope, "young"), "a run has no young");
   PetscCall(SbScopeSet(&linear, "body", "linear", "liver"));
   SB_CHECK(!SbOptionExists(&linear, "young"), "young belongs to another type");
-  PetscCall(end(&database));
-  PetscCall(begin("-body_liver_scale -1", &database));
+  PetscCall(end());
+  PetscCall(begin("-body_liver_scale -1"));
   SB_CHECK_ERROR(SbOptionCheckEarly(&body_scope, "scale"), PETSC_ERR_USER, "-body_liver_scale -1|(0, inf)");
-  PetscCall(end(&database));
+  PetscCall(end());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -424,19 +412,18 @@ static PetscErrorCode test_underscores(void)
 {
   static const SbOption long_rows[] = {
     {"mesh_scale", SB_OPTION_REAL, 1, "", "1", "", "a key with an underscore"}};
-  PetscOptions database;
   SbScope other;
   PetscReal x;
 
   PetscFunctionBeginUser;
-  PetscCall(begin("-body_liver_mesh_scale 3", &database));
+  PetscCall(begin("-body_liver_mesh_scale 3"));
   PetscCall(SbOptionsRegister("body", "", 1, long_rows));
   PetscCall(SbScopeSet(&other, "body", "corotated", "liver_mesh"));
   PetscCall(SbOptionReal(&other, "scale", &x));
   SB_CHECK(x == 3, "scale of liver_mesh is %g", x);
   SB_CHECK_ERROR(SbOptionReal(&body_scope, "mesh_scale", &x), PETSC_ERR_USER,
                  "-body_liver_mesh_scale|body 'liver_mesh'|body 'liver'");
-  PetscCall(end(&database));
+  PetscCall(end());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -463,12 +450,11 @@ static PetscErrorCode test_nearest(void)
 static PetscErrorCode test_manual(const char *folder)
 {
   char file[PETSC_MAX_PATH_LEN], line[1024];
-  PetscOptions database;
   int rows = 0, required = 0, tabs = 0;
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(file, sizeof(file), "%s/options.tsv", folder));
-  PetscCall(begin("", &database));
+  PetscCall(begin(""));
   PetscCall(SbOptionsTable(PETSC_COMM_WORLD, file));
   if (!test_rank) {
     FILE *f = fopen(file, "r");
@@ -485,7 +471,7 @@ static PetscErrorCode test_manual(const char *folder)
   }
   SB_CHECK_ERROR(SbOptionsTable(PETSC_COMM_WORLD, "/nonexistent/folder/options.tsv"), PETSC_ERR_FILE_OPEN,
                  "/nonexistent/folder/options.tsv");
-  PetscCall(end(&database));
+  PetscCall(end());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -3,57 +3,13 @@
   Polar rotations against an independent reference: singular values by one-sided Jacobi in long double,
   itself checked by the definition (R orthogonal, R^T F symmetric, every sum of two signed stretches >= 0).
 */
-#include "../test.h"
-#include <sbkernel.h>
-#include <string.h>
+#include "material_checks.h"
 
 typedef long double Long;
 static const PetscReal eps = 2.2204460492503131e-16;
 
 /* Error of the reference, and tolerance of the comparison; both larger where long double has no more digits than double. */
 static PetscReal fault = 5e-17, rounding = 8 * 2.2204460492503131e-16;
-
-static PetscRandom the_random;
-
-/* Uniform in [-1, 1). */
-static PetscReal uniform(void)
-{
-  PetscReal x = 0;
-
-  (void)PetscRandomGetValueReal(the_random, &x);
-  return 2 * x - 1;
-}
-
-/* Maximum of two numbers; unlike fmax() it keeps a NaN, so that no check passes on one. */
-static PetscReal larger(PetscReal a, PetscReal b)
-{
-  return b > a || isnan(b) ? b : a;
-}
-
-static void random_rotation(PetscReal angle_scale, PetscReal R[9])
-{
-  PetscReal q[4], n = 0;
-
-  for (int k = 0; k < 4; k++) q[k] = uniform() * (k ? angle_scale : 1);
-  for (int k = 0; k < 4; k++) n += q[k] * q[k];
-  const PetscReal s = 2 / n, w = q[0], x = q[1], y = q[2], z = q[3];
-  const PetscReal r[9] = {1 - s * (y * y + z * z), s * (x * y - z * w),     s * (x * z + y * w),
-                          s * (x * y + z * w),     1 - s * (x * x + z * z), s * (y * z - x * w),
-                          s * (x * z - y * w),     s * (y * z + x * w),     1 - s * (x * x + y * y)};
-  memcpy(R, r, sizeof(r));
-}
-
-/* F = A diag(s) B^T with random rotations. */
-static void with_stretches(PetscReal s0, PetscReal s1, PetscReal s2, PetscReal F[9])
-{
-  const PetscReal s[3] = {s0, s1, s2};
-  PetscReal A[9], B[9];
-
-  random_rotation(1, A);
-  random_rotation(1, B);
-  for (int k = 0; k < 9; k++) A[k] *= s[k % 3];
-  SbMatMulTranspose(A, B, F);
-}
 
 static void polar_one(const PetscReal F[9], PetscReal R[9])
 {

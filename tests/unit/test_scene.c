@@ -19,23 +19,25 @@ static const char two_bodies[] =
   "-effect_hold_on left,big_stone,liver.xmin -effect_press_type pressure -effect_press_on boundary,left,zmax "
   "-effect_press_value 100*t -effect_damp_type damping -effect_damp_on all -effect_damp_alpha 0.1";
 
-static PetscErrorCode begin(const char *options, PetscOptions *database)
+static PetscOptions database;
+
+static PetscErrorCode begin(const char *options)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscOptionsCreate(database));
-  PetscCall(PetscOptionsPush(*database));
+  PetscCall(PetscOptionsCreate(&database));
+  PetscCall(PetscOptionsPush(database));
   PetscCall(PetscOptionsInsertString(NULL, options));
   PetscCall(SbRegisterAll());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode end(PetscOptions *database, SbModel *model)
+static PetscErrorCode end(SbModel *model)
 {
   PetscFunctionBeginUser;
   PetscCall(SbModelDestroy(model));
   PetscCall(SbOptionsReset());
   PetscCall(PetscOptionsPop());
-  PetscCall(PetscOptionsDestroy(database));
+  PetscCall(PetscOptionsDestroy(&database));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -104,7 +106,6 @@ static PetscErrorCode test_model(const char *folder)
                              "  press: {type: pressure, on: [boundary, left, zmax], value: 100*t}\n"
                              "  damp: {type: damping, on: all, alpha: 0.1}\n";
   char view[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN];
-  PetscOptions database;
   PetscViewer viewer;
   SbModel model;
 
@@ -112,7 +113,7 @@ static PetscErrorCode test_model(const char *folder)
   PetscCall(PetscSNPrintf(view, sizeof(view), "%s/view.opts", folder));
   PetscCall(PetscSNPrintf(file, sizeof(file), "%s/scene.yml", folder));
 
-  PetscCall(begin(two_bodies, &database));
+  PetscCall(begin(two_bodies));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &model));
   check_two_bodies(model, "options");
   model->dynamic = PETSC_TRUE;
@@ -121,16 +122,16 @@ static PetscErrorCode test_model(const char *folder)
   PetscCall(SbViewerOpen(PETSC_COMM_WORLD, view, &viewer));
   PetscCall(SbOptionsView(viewer));
   PetscCall(PetscViewerDestroy(&viewer));
-  PetscCall(end(&database, &model));
+  PetscCall(end(&model));
 
   PetscCall(test_file_put(file, yaml));
   for (int i = 0; i < 2; i++) {
-    PetscCall(begin("", &database));
+    PetscCall(begin(""));
     PetscCall(PetscOptionsInsertFile(PETSC_COMM_WORLD, NULL, i ? file : view, PETSC_TRUE));
     PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &model));
     check_two_bodies(model, i ? "YAML" : "printed scenario");
     PetscCall(SbOptionsCheck());
-    PetscCall(end(&database, &model));
+    PetscCall(end(&model));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -147,13 +148,12 @@ static PetscErrorCode create_and_check(SbModel *model)
 /* Creation, or the check after it, must fail with a message that contains these names. */
 static PetscErrorCode refused(const char *options, const char *names)
 {
-  PetscOptions database;
   SbModel model = NULL;
 
   PetscFunctionBeginUser;
-  PetscCall(begin(options, &database));
+  PetscCall(begin(options));
   SB_CHECK_ERROR(create_and_check(&model), PETSC_ERR_USER, names);
-  PetscCall(end(&database, &model));
+  PetscCall(end(&model));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -201,7 +201,6 @@ static PetscErrorCode test_values(void)
 static PetscErrorCode test_check(const char *folder)
 {
   char options[2 * PETSC_MAX_PATH_LEN], message[2 * PETSC_MAX_PATH_LEN];
-  PetscOptions database;
   SbModel model;
 
   PetscFunctionBeginUser;
@@ -220,11 +219,11 @@ static PetscErrorCode test_check(const char *folder)
   PetscCall(refused("-bodies liver -body_liver_mesh nowhere.msh" LAW, "-body_liver_mesh nowhere.msh"));
   /* a static run of a body without supports */
   PetscCall(refused(LIVER " -effects gravity", "-time static"));
-  PetscCall(begin(LIVER " -effects hold -effect_hold_type fixed -effect_hold_on xmin", &database));
+  PetscCall(begin(LIVER " -effects hold -effect_hold_type fixed -effect_hold_on xmin"));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &model));
   PetscCall(SbSceneCheck(model));
   SB_CHECK(model->nset == 1 && model->set[0].shape == SB_SET_GROUP, "the set of the support");
-  PetscCall(end(&database, &model));
+  PetscCall(end(&model));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -59,16 +59,14 @@ static PetscErrorCode energy_ratio(const char *body, PetscReal factor, PetscReal
   char text[1024];
 
   PetscFunctionBeginUser;
-  PetscCall(test_open(&t,
-                      "-bodies a %s -body_a_material linear -body_a_young 1e5 -body_a_density 1000 "
-                      "-body_a_velocity 1,2,3 -body_a_angular_velocity 1,2,3 -time euler_symplectic",
-                      body));
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          "-bodies a %s -body_a_material linear -body_a_young 1e5 -body_a_density 1000 "
+                          "-body_a_velocity 1,2,3 -body_a_angular_velocity 1,2,3 -time euler_symplectic",
+                          body));
+  PetscCall(test_scene_open(text, &t));
   PetscCall(SbSpaceStableStep(t.model->space, &dt));
   PetscCall(test_scene_close(&t));
-  PetscCall(PetscOptionsClear(NULL));
-  PetscCall(PetscSNPrintf(text + strlen(text), sizeof(text) - strlen(text),
-                          " -ts_dt %.17g -ts_max_time %.17g", factor * dt, 400.001 * factor * dt));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t, "%s -ts_dt %.17g -ts_max_time %.17g", text, factor * dt, 400.001 * factor * dt));
   PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &before));
   PetscCall(SbRunSolve(t.run));
   PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &after));
