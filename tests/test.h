@@ -92,6 +92,13 @@ static inline PetscBool sb_test_names(const char *text, const char *names)
     SB_CHECK(!strchr(sb_test_text, '\n'), "more than one line: '%s'", sb_test_text);              \
   } while (0)
 
+/* Reproducible numbers in -1..1. */
+static inline PetscReal test_random(unsigned *state)
+{
+  *state = *state * 1664525u + 1013904223u;
+  return (PetscReal)(*state >> 8) / (1 << 23) - 1;
+}
+
 #define SB_TEST_BEGIN(argc, argv)                              \
   do {                                                         \
     PetscFunctionBeginUser;                                    \

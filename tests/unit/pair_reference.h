@@ -10,8 +10,7 @@ static unsigned pair_state = 1;
 /* Uniform in [-1, 1]. */
 static inline PetscReal pair_random(void)
 {
-  pair_state = pair_state * 1664525u + 1013904223u;
-  return (PetscReal)(pair_state >> 8) / 8388608. - 1;
+  return test_random(&pair_state);
 }
 
 static inline int pair_vertices(SbPairKind kind)

@@ -67,10 +67,7 @@ static PetscErrorCode fill(Vec x, unsigned state)
   PetscFunctionBeginUser;
   PetscCall(VecGetLocalSize(x, &n));
   PetscCall(VecGetArray(x, &v));
-  for (PetscInt i = 0; i < n; i++) {
-    state = state * 1664525u + 1013904223u;
-    v[i] = (PetscScalar)(state >> 8) / (1 << 24) - 0.5;
-  }
+  for (PetscInt i = 0; i < n; i++) v[i] = 0.5 * test_random(&state);
   PetscCall(VecRestoreArray(x, &v));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

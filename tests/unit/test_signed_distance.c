@@ -10,13 +10,6 @@
 
 static const PetscReal zero[3] = {0, 0, 0};
 
-/* Reproducible numbers in -1..1. */
-static PetscReal number(unsigned *state)
-{
-  *state = *state * 1664525u + 1013904223u;
-  return (PetscReal)(*state >> 8) / (1 << 23) - 1;
-}
-
 /* Creates the obstacle mesh:FILE of a surface. */
 static PetscErrorCode make(const TestSurface *s, SbObstacle *o, size_t size, char note[])
 {
@@ -50,7 +43,7 @@ static PetscErrorCode check_cube(void)
   for (int i = 0; i < 20000; i++) {
     PetscReal x[3], n[3], m[3], d, exact;
 
-    for (int k = 0; k < 3; k++) x[k] = 1.5 * number(&state);
+    for (int k = 0; k < 3; k++) x[k] = 1.5 * test_random(&state);
     d = SbObstacleDistance(o, x, n);
     exact = SbObstacleDistance(box, x, m);
     inside += exact < 0;
@@ -157,7 +150,7 @@ static PetscErrorCode check_surface(const TestSurface *s, PetscReal box, const c
   for (int i = 0; i < 1500; i++) {
     PetscReal x[3], n[3], y[3], m[3], d, exact = PETSC_MAX_REAL, around = 0;
 
-    for (int k = 0; k < 3; k++) x[k] = box * number(&state);
+    for (int k = 0; k < 3; k++) x[k] = box * test_random(&state);
     d = SbObstacleDistance(o, x, n);
     for (PetscInt f = 0; f < s->ntri; f++) {
       exact = PetscMin(exact, from_triangle(s, f, x));
@@ -235,7 +228,7 @@ static PetscErrorCode check_sphere(int split)
   for (int i = 0; i < 20000; i++) {
     PetscReal x[3], n[3], d, r;
 
-    for (int k = 0; k < 3; k++) x[k] = 1.2 * number(&state);
+    for (int k = 0; k < 3; k++) x[k] = 1.2 * test_random(&state);
     r = PetscSqrtReal(SbDot3(x, x));
     if (PetscAbsReal(r - 1) > 0.7 * h) continue;
     d = SbObstacleDistance(o, x, n);
@@ -287,8 +280,8 @@ static PetscErrorCode measure(void)
   for (int i = 0; i < 200000; i++) {
     PetscReal x[3], n[3], r;
 
-    for (int k = 0; k < 3; k++) x[k] = number(&state);
-    r = PetscSqrtReal(SbDot3(x, x)) / (1 + 0.05 * number(&state));
+    for (int k = 0; k < 3; k++) x[k] = test_random(&state);
+    r = PetscSqrtReal(SbDot3(x, x)) / (1 + 0.05 * test_random(&state));
     for (int k = 0; k < 3; k++) x[k] /= r;
     sum += SbObstacleDistance(o, x, n);
   }
