@@ -32,18 +32,6 @@ static PetscErrorCode count(const SbPrescribed *hold, PetscInt *all)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All local nodes, ghosts included, have the bits of their position. */
-static void check_bits(const Fixture *x)
-{
-  for (PetscInt i = 0; i < x->space->nnode; i++) {
-    const PetscReal *X = &x->space->node_x[3 * i];
-    const int expected = (X[2] < 1e-9 ? 5 : 0) | (X[0] < 1e-9 ? 7 : 0);
-
-    SB_CHECK(x->space->fixed[i] == expected, "bits %d at (%g, %g, %g), expected %d", x->space->fixed[i], X[0],
-             X[1], X[2], expected);
-  }
-}
-
 /* Values and reactions: bottom prescribes x and z of its nodes, west the remaining components of its own. */
 static PetscErrorCode check_values(Fixture *x, SbPrescribed *bottom, SbPrescribed *west)
 {
@@ -96,7 +84,14 @@ static PetscErrorCode check_element(const char *element)
   PetscCall(SbPrescribedSetUp(&west, x.space, on_set(1), 7));
   PetscCall(count(&west, &n));
   SB_CHECK_NEAR(n, p1 ? 9 * 3 - 3 * 2 : 8 * 3, 0, "unknowns of the west side without those of the bottom");
-  check_bits(&x);
+  for (PetscInt i = 0; i < x.space->nnode;
+       i++) { /* all local nodes, ghosts included, have the bits of their position */
+    const PetscReal *X = &x.space->node_x[3 * i];
+    const int expected = (X[2] < 1e-9 ? 5 : 0) | (X[0] < 1e-9 ? 7 : 0);
+
+    SB_CHECK(x.space->fixed[i] == expected, "bits %d at (%g, %g, %g), expected %d", x.space->fixed[i], X[0],
+             X[1], X[2], expected);
+  }
   SB_CHECK_ERROR(SbPrescribedSetUp(&edge, x.space, on_set(2), 5), PETSC_ERR_USER_INPUT,
                  p1 ? "-effect_test_on" : "body block");
   PetscCall(SbSpacePrescribeDone(x.space));

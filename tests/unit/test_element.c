@@ -3,23 +3,19 @@
 #include "../test.h"
 #include <sbelement.h>
 
-/* Nodes of P1 are the vertices, of CR and DG the centroids of the faces opposite to them. */
-static void node_positions(SbElement e, const PetscReal x[4][3], PetscReal node[4][3])
-{
-  for (int a = 0; a < 4; a++) {
-    for (int i = 0; i < 3; i++)
-      node[a][i] = e->nodes_per[0] ? x[a][i] : (x[0][i] + x[1][i] + x[2][i] + x[3][i] - x[a][i]) / 3;
-  }
-}
-
 /* phi_a is 1 at its node and 0 at the others: any linear function is reproduced, its gradient and its values at vertices. */
 static void check_linear(SbElement e, const PetscReal x[4][3], const PetscReal g[4][3], const PetscReal c[4],
                          PetscReal size)
 {
-  PetscReal node[4][3], value[4];
+  PetscReal value[4];
 
-  node_positions(e, x, node);
-  for (int a = 0; a < 4; a++) value[a] = c[0] + SbDot3(c + 1, node[a]);
+  for (int a = 0; a < 4; a++) {
+    PetscReal node[3]; /* of P1: a vertex; of CR and DG: the centroid of the face opposite to it */
+
+    for (int i = 0; i < 3; i++)
+      node[i] = e->nodes_per[0] ? x[a][i] : (x[0][i] + x[1][i] + x[2][i] + x[3][i] - x[a][i]) / 3;
+    value[a] = c[0] + SbDot3(c + 1, node);
+  }
   for (int j = 0; j < 3; j++) {
     PetscReal sum = 0;
 

@@ -1,8 +1,7 @@
 // One mesh in every format gives the same tets, regions and surfaces. Files of tests/data are from gmsh 4.8 (two_cubes.*), VTK 9.7
 // (two_cubes_*.vtu, _51.vtk), TetGen 1.5 and Netgen 6; the other files are written here.
 // @ranks 1
-#include <stdlib.h>
-#include <unistd.h>
+#include "../file.h"
 #include "mesh_test.h"
 
 #define DATA "tests/data/"
@@ -370,24 +369,6 @@ static void write_nastran(const char *path, const SbImport *im)
   fclose(file);
 }
 
-static PetscErrorCode test_nastran(const SbImport *reference, const char *folder)
-{
-  static const Same deck[] = {{3, "the_left_one", "left"}, {2, "wall", "wall"},    {2, "inner", "inner"},
-                              {1, "curve_78", "edge"},     {0, "spc_3", "corner"}, {0, "spc_4", "corner"},
-                              {0, "set_5", "corner"},      {0, NULL, NULL}};
-  char path[256];
-  SbImport im;
-
-  PetscFunctionBeginUser;
-  (void)snprintf(path, sizeof(path), "%s/deck.Bdf", folder);
-  write_nastran(path, reference);
-  PetscCall(test_file(path, reference, deck));
-  PetscCall(test_import(path, &im));
-  SB_CHECK(im.item[0].n == 1, "%d points for three sets of one node", (int)im.item[0].n);
-  PetscCall(SbImportDestroy(&im));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode test_written(const SbImport *reference, const char *folder)
 {
   static const Same marks[] = {
@@ -399,7 +380,11 @@ static PetscErrorCode test_written(const SbImport *reference, const char *folder
                                {0, NULL, NULL}};
   static const Same sets[] = {{3, "Left", "left"}, {3, "Whole", NULL},   {2, "Wall", "wall"},
                               {2, "Sides", NULL},  {0, "Tip", "corner"}, {0, NULL, NULL}};
+  static const Same deck[] = {{3, "the_left_one", "left"}, {2, "wall", "wall"},    {2, "inner", "inner"},
+                              {1, "curve_78", "edge"},     {0, "spc_3", "corner"}, {0, "spc_4", "corner"},
+                              {0, "set_5", "corner"},      {0, NULL, NULL}};
   char path[256], stem[200];
+  SbImport im;
 
   PetscFunctionBeginUser;
   for (int first = 0; first < 2; first++) {
@@ -420,6 +405,12 @@ static PetscErrorCode test_written(const SbImport *reference, const char *folder
   (void)snprintf(path, sizeof(path), "%s/sets.inp", folder);
   write_abaqus(path, reference);
   PetscCall(test_file(path, reference, sets));
+  (void)snprintf(path, sizeof(path), "%s/deck.Bdf", folder);
+  write_nastran(path, reference);
+  PetscCall(test_file(path, reference, deck));
+  PetscCall(test_import(path, &im));
+  SB_CHECK(im.item[0].n == 1, "%d points for three sets of one node", (int)im.item[0].n);
+  PetscCall(SbImportDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -537,12 +528,9 @@ static PetscErrorCode test_second_order(const char *folder)
   for (size_t f = 0; f < PETSC_STATIC_ARRAY_LENGTH(file); f++) {
     char path[128];
     TestMesh m;
-    FILE *out;
 
     (void)snprintf(path, sizeof(path), "%s/%s", folder, file[f].name);
-    out = fopen(path, "w");
-    if (out) (void)fputs(file[f].text, out);
-    if (out) (void)fclose(out);
+    PetscCall(test_file_put(path, file[f].text));
     /* TetGen's mesh is read by the last of its files */
     if (strstr(file[f].name, ".node") || strstr(file[f].name, ".face") || strstr(file[f].name, ".edge"))
       continue;
@@ -582,7 +570,6 @@ int main(int argc, char **argv)
   PetscCall(test_import(DATA "two_cubes_41.msh", &reference));
   PetscCall(test_foreign(&reference));
   PetscCall(test_written(&reference, folder));
-  PetscCall(test_nastran(&reference, folder));
   PetscCall(test_second_order(folder));
   PetscCall(test_numbers());
   PetscCall(SbImportDestroy(&reference));

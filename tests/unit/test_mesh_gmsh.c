@@ -1,7 +1,6 @@
 // Reader of gmsh files: the four variants of one mesh give the same result, each kind of damage has its message.
 // @ranks 1
-#include <stdlib.h>
-#include <unistd.h>
+#include "../file.h"
 #include "mesh_test.h"
 
 #define DATA "tests/data/"
@@ -45,15 +44,14 @@ static PetscErrorCode test_variant(const char *path)
 static PetscErrorCode test_other_byte_order(void)
 {
   static const unsigned char one[4] = {0, 0, 0, 1};
-  char path[] = "/tmp/sbmesh_XXXXXX.msh";
+  char path[512];
   FILE *file;
   SbImport im;
-  const int fd = mkstemps(path, 4);
   double x[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   uint32_t numbers[3 + 1 + 4] = {4, 1, 0, 1, 1, 2, 3, 4};
 
   PetscFunctionBeginUser;
-  file = fdopen(fd, "wb");
+  PetscCall(test_file_open(".msh", path, &file));
   fprintf(file, "$MeshFormat\n2.2 1 8\n");
   fwrite(one, 1, 4, file);
   fprintf(file, "\n$EndMeshFormat\n$Nodes\n4\n");
@@ -75,9 +73,8 @@ static PetscErrorCode test_other_byte_order(void)
     fwrite(&numbers[i], 4, 1, file);
   }
   fprintf(file, "\n$EndElements\n");
-  fclose(file);
+  PetscCall(test_file_close(file));
   PetscCall(test_import(path, &im));
-  (void)unlink(path);
   SB_CHECK(im.nvert == 4 && im.item[3].n == 1, "%d vertices, %d tets", (int)im.nvert, (int)im.item[3].n);
   SB_CHECK(im.x[3] == 1 && im.x[11] == 1, "coordinates %g %g", im.x[3], im.x[11]);
   PetscCall(SbImportDestroy(&im));
@@ -140,20 +137,19 @@ static PetscErrorCode test_damage(void)
 /* Any truncation of each variant gives an error, never a crash or a mesh. */
 static PetscErrorCode test_cut(const char *whole_path, size_t step)
 {
-  char path[] = "/tmp/sbmesh_XXXXXX.msh", *data;
-  FILE *file = fopen(whole_path, "rb");
-  size_t size, needed;
+  char path[512], data[20000];
+  FILE *file;
+  size_t size;
   PetscErrorCode ierr;
-  const int fd = mkstemps(path, 4);
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(20000, &data));
-  size = fread(data, 1, 20000, file);
-  needed = size - 1; /* the last line end is dispensable */
+  PetscCall(test_file_open(".msh", path, &file));
+  PetscCall(test_file_close(file));
+  file = fopen(whole_path, "rb");
+  size = fread(data, 1, sizeof(data), file);
   fclose(file);
-  close(fd);
   PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
-  for (size_t n = 0; n < needed; n += step) {
+  for (size_t n = 0; n < size - 1; n += step) { /* the last line end is dispensable */
     file = fopen(path, "wb");
     fwrite(data, 1, n, file);
     fclose(file);
@@ -161,8 +157,6 @@ static PetscErrorCode test_cut(const char *whole_path, size_t step)
     SB_CHECK(ierr, "%s cut to %zu of %zu bytes was accepted", whole_path, n, size);
   }
   PetscCall(PetscPopErrorHandler());
-  (void)unlink(path);
-  PetscCall(PetscFree(data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -5,14 +5,6 @@
 
 #define DATA "tests/data/"
 
-static PetscErrorCode remove_all(const char *path)
-{
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  if (!test_rank) test_unlink(path);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Writes a mesh in the program's own format. */
 static PetscErrorCode write_mesh(const char *mesh, const char *path)
 {
@@ -56,11 +48,11 @@ static PetscErrorCode fingerprint(const char *mesh_path, PetscReal sum[4])
 static PetscErrorCode test_distributed(void)
 {
   PetscReal gmsh[4], own[4], indexed[4];
-  char path[256], index[256];
+  char path[512], index[512];
 
   PetscFunctionBeginUser;
-  PetscCall(test_path_of_all("cubes.h5", sizeof(path), path));
-  PetscCall(test_path_of_all("cubes.xmf", sizeof(index), index));
+  PetscCall(test_path_of_all("cubes.h5", path));
+  PetscCall(test_path_of_all("cubes.xmf", index));
   if (!test_rank) PetscCall(write_mesh(DATA "two_cubes_41.msh", path));
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
   PetscCall(fingerprint(DATA "two_cubes_41.msh", gmsh));
@@ -72,7 +64,6 @@ static PetscErrorCode test_distributed(void)
     SB_CHECK_NEAR(own[k], gmsh[k], 1e-12 * gmsh[k], "of the .h5");
     SB_CHECK_NEAR(indexed[k], gmsh[k], 1e-12 * gmsh[k], "of the .xmf");
   }
-  PetscCall(remove_all(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -133,11 +124,11 @@ static PetscErrorCode test_output(void)
     PetscInt step;
     PetscReal shift;
   } cases[] = {{0, 0}, {3, 0.5}, {120, 2}, {-1, 2}};
-  char path[256], text[256];
+  char path[512], text[256];
   SbImport *im;
 
   PetscFunctionBeginUser;
-  test_path("fields.h5", sizeof(path), path);
+  PetscCall(test_path("fields.h5", path));
   write_output(path);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
     PetscCall(test_read(path, cases[i].step, &im));
@@ -149,7 +140,6 @@ static PetscErrorCode test_output(void)
     PetscCall(SbMeshFileDestroy(&im));
   }
   SB_CHECK_ERROR(test_read(path, 7, &im), PETSC_ERR_FILE_UNEXPECTED, "step 7|3|120|-1");
-  (void)unlink(path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -160,12 +150,12 @@ static PetscErrorCode test_discontinuous(void)
   const int cells[8] = {0, 1, 2, 3, 4, 5, 6, 7}, vertices[8] = {0, 1, 2, 3, 1, 2, 3, 4};
   const hsize_t points[2] = {8, 3}, tets[2] = {2, 4};
   double u[24] = {0};
-  char path[256];
+  char path[512];
   SbImport *im;
   hid_t file;
 
   PetscFunctionBeginUser;
-  test_path("split.h5", sizeof(path), path);
+  PetscCall(test_path("split.h5", path));
   file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
   put_array(file, "/mesh/x", 2, points, H5T_NATIVE_DOUBLE, x);
   put_array(file, "/mesh/cells", 2, tets, H5T_NATIVE_INT, cells);
@@ -178,7 +168,6 @@ static PetscErrorCode test_discontinuous(void)
   SB_CHECK(im->item[3].vert[4] == 1 && im->item[3].vert[7] == 4, "vertices of the second tet");
   SB_CHECK(im->x[3] == 1.25 && im->x[4] == 0, "x = %g", im->x[3]);
   PetscCall(SbMeshFileDestroy(&im));
-  (void)unlink(path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -207,11 +196,11 @@ static PetscErrorCode test_cut(void)
   const int cells[36] = {0,  1, 2, 3,  4,  8,  10, 11, 8,  5,  9, 12, 10, 9, 6, 13, 11, 12,
                          13, 7, 8, 13, 10, 11, 8,  13, 11, 12, 8, 13, 12, 9, 8, 13, 9,  10};
   const hsize_t points[2] = {14, 3}, tets[2] = {9, 4};
-  char path[256];
+  char path[512];
   SbImport *im;
 
   PetscFunctionBeginUser;
-  test_path("cut.h5", sizeof(path), path);
+  PetscCall(test_path("cut.h5", path));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
     const hid_t file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
     int body[9] = {0, 1, 1, 1, 1, 1, 1, 1, 1}, parent[9] = {0, 1, 1, 1, 1, 1, 1, 1, 1};
@@ -239,7 +228,6 @@ static PetscErrorCode test_cut(void)
     SB_CHECK(im->item[3].vert[4] == 4 && im->item[3].number[1] == 2, "the tet of ten nodes");
     PetscCall(SbMeshFileDestroy(&im));
   }
-  (void)unlink(path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -291,18 +279,6 @@ static void replace(const char *path, const char *name, int ndim, const hsize_t 
   (void)H5Fclose(file);
 }
 
-static PetscErrorCode with_array(const char *path, const char *name, int ndim, const hsize_t size[],
-                                 hid_t type, const void *data, const char *words)
-{
-  PetscFunctionBeginUser;
-  if (!test_rank) {
-    PetscCall(write_mesh(DATA "two_cubes_41.msh", path));
-    replace(path, name, ndim, size, type, data);
-  }
-  PetscCall(refuse(path, PETSC_ERR_FILE_UNEXPECTED, words, NULL));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode test_damage(void)
 {
   const hsize_t lie[2] = {100000000, 4}, few[1] = {3}, pair[2] = {2, 2}, groups[1] = {8}, two[1] = {2},
@@ -310,26 +286,39 @@ static PetscErrorCode test_damage(void)
   const double bad[4] = {0}, reals[69] = {[68] = NAN};
   const int wild[4] = {0, 1, 2, 4711}, below[4] = {0, -1, 2, 3}, high[8] = {0, 1, 2, 3, 4, 3, 3, 3},
             falling[2] = {1, 0}, tags[48] = {[47] = 4711};
-  char path[256];
+  const struct {
+    const char *name;
+    int ndim; /* 0: the array is removed */
+    const hsize_t *size;
+    hid_t type;
+    const void *data;
+    const char *words;
+  } cases[] = {
+    {"/mesh/x", 0, NULL, 0, NULL, "/mesh/x|/mesh/cells"},
+    {"/mesh/x", 2, vertices, H5T_NATIVE_DOUBLE, reals, "/mesh/x|row 23"},
+    {"/mesh/x", 2, pair, H5T_NATIVE_DOUBLE, bad, "/mesh/x|2 dimensions|2 columns|3"},
+    {"/mesh/cells", 2, one_by_four, H5T_NATIVE_DOUBLE, bad, "/mesh/cells"},
+    {"/mesh/cells", 2, one_by_four, H5T_NATIVE_INT, wild, "/mesh/cells|4711|row 1|0|22"},
+    {"/mesh/cells", 2, one_by_four, H5T_NATIVE_INT, below, "/mesh/cells|-1|row 1"},
+    {"/mesh/cells", 2, lie, H5T_NATIVE_INT, NULL, "/mesh/cells|100000000|4 numbers"},
+    {"/mesh/cell_tags", 1, few, H5T_NATIVE_INT, tet, "/mesh/cell_tags|rows"},
+    {"/mesh/cell_tags", 1, tets, H5T_NATIVE_INT, tags, "/mesh/cell_tags|4711|row 48"},
+    {"/groups/dim", 1, groups, H5T_NATIVE_INT, high, "/groups/dim|4|row 5|0|3"},
+    {"/groups/dim", 1, two, H5T_NATIVE_INT, high, "2 dimensions"},
+    {"/tag_sets/start", 1, two, H5T_NATIVE_INT, falling, "/tag_sets/start|1|0"},
+    {"/groups/name", 0, NULL, 0, NULL, "/groups/name"},
+  };
+  char path[512];
 
   PetscFunctionBeginUser;
-  PetscCall(test_path_of_all("bad.h5", sizeof(path), path));
-  PetscCall(with_array(path, "/mesh/x", 0, NULL, 0, NULL, "/mesh/x|/mesh/cells"));
-  PetscCall(with_array(path, "/mesh/x", 2, vertices, H5T_NATIVE_DOUBLE, reals, "/mesh/x|row 23"));
-  PetscCall(with_array(path, "/mesh/x", 2, pair, H5T_NATIVE_DOUBLE, bad, "/mesh/x|2 dimensions|2 columns|3"));
-  PetscCall(with_array(path, "/mesh/cells", 2, one_by_four, H5T_NATIVE_DOUBLE, bad, "/mesh/cells"));
-  PetscCall(
-    with_array(path, "/mesh/cells", 2, one_by_four, H5T_NATIVE_INT, wild, "/mesh/cells|4711|row 1|0|22"));
-  PetscCall(with_array(path, "/mesh/cells", 2, one_by_four, H5T_NATIVE_INT, below, "/mesh/cells|-1|row 1"));
-  PetscCall(with_array(path, "/mesh/cells", 2, lie, H5T_NATIVE_INT, NULL, "/mesh/cells|100000000|4 numbers"));
-  PetscCall(with_array(path, "/mesh/cell_tags", 1, few, H5T_NATIVE_INT, tet, "/mesh/cell_tags|rows"));
-  PetscCall(
-    with_array(path, "/mesh/cell_tags", 1, tets, H5T_NATIVE_INT, tags, "/mesh/cell_tags|4711|row 48"));
-  PetscCall(with_array(path, "/groups/dim", 1, groups, H5T_NATIVE_INT, high, "/groups/dim|4|row 5|0|3"));
-  PetscCall(with_array(path, "/groups/dim", 1, two, H5T_NATIVE_INT, high, "2 dimensions"));
-  PetscCall(with_array(path, "/tag_sets/start", 1, two, H5T_NATIVE_INT, falling, "/tag_sets/start|1|0"));
-  PetscCall(with_array(path, "/groups/name", 0, NULL, 0, NULL, "/groups/name"));
-  PetscCall(remove_all(path));
+  PetscCall(test_path_of_all("bad.h5", path));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
+    if (!test_rank) {
+      PetscCall(write_mesh(DATA "two_cubes_41.msh", path));
+      replace(path, cases[i].name, cases[i].ndim, cases[i].size, cases[i].type, cases[i].data);
+    }
+    PetscCall(refuse(path, PETSC_ERR_FILE_UNEXPECTED, cases[i].words, NULL));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -368,10 +357,10 @@ static PetscErrorCode test_curved_damage(void)
   static const double x[30] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 0, 1,
                                1, 0, 1, 0, 1, 1, 1, 1, 1, 3, 0, 0, 4, 0, 0};
   const hsize_t vertices[2] = {10, 3};
-  char path[256];
+  char path[512];
 
   PetscFunctionBeginUser;
-  PetscCall(test_path_of_all("curved.h5", sizeof(path), path));
+  PetscCall(test_path_of_all("curved.h5", path));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
     const hsize_t edges[2] = {(hsize_t)PetscMax(cases[i].nedge, 0), 2},
                   offs[2] = {(hsize_t)PetscMax(cases[i].noff, 0), 3};
@@ -392,21 +381,20 @@ static PetscErrorCode test_curved_damage(void)
     PetscCall(refuse(path, cases[i].note ? PETSC_ERR_USER_INPUT : PETSC_ERR_FILE_UNEXPECTED, cases[i].words,
                      cases[i].note));
   }
-  PetscCall(remove_all(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* A truncated file is refused: no read past its end, no partial mesh. */
 static PetscErrorCode test_truncated(void)
 {
-  char path[256], cut[256], *bytes;
+  char path[512], cut[512], *bytes;
   size_t size;
   FILE *file;
   SbImport *im;
 
   PetscFunctionBeginUser;
-  test_path("whole.h5", sizeof(path), path);
-  test_path("cut.h5", sizeof(cut), cut);
+  PetscCall(test_path("whole.h5", path));
+  PetscCall(test_path("cut.h5", cut));
   PetscCall(write_mesh(DATA "two_cubes_41.msh", path));
   file = fopen(path, "rb");
   (void)fseek(file, 0, SEEK_END);
@@ -423,22 +411,20 @@ static PetscErrorCode test_truncated(void)
                    n < 8 ? "HDF5|0 bytes" : "body 'b'|HDF5");
   }
   PetscCall(PetscFree(bytes));
-  (void)unlink(cut);
-  test_unlink(path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode test_foreign(void)
 {
   const int three = 3;
-  char path[256];
+  char path[512];
   SbImport *im;
   hid_t file, space, a;
   FILE *text;
 
   PetscFunctionBeginUser;
   SB_CHECK_ERROR(test_read("tests/data/none.h5", 0, &im), PETSC_ERR_FILE_OPEN, "body 'b'|tests/data/none.h5");
-  test_path("foreign.h5", sizeof(path), path);
+  PetscCall(test_path("foreign.h5", path));
   file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
   put_array(file, "/weather/rain", 2, one_by_four, H5T_NATIVE_INT, tet);
   (void)H5Fclose(file);
@@ -451,13 +437,11 @@ static PetscErrorCode test_foreign(void)
   (void)H5Sclose(space);
   (void)H5Fclose(file);
   SB_CHECK_ERROR(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED, "layout 3|layouts 1 and 2");
-  (void)unlink(path);
-  test_path("none.xmf", sizeof(path), path);
+  PetscCall(test_path("none.xmf", path));
   text = fopen(path, "w");
   (void)fprintf(text, "<Xdmf/>\n");
   (void)fclose(text);
   SB_CHECK_ERROR(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED, "body 'b'|line 1");
-  (void)unlink(path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

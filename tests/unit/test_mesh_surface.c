@@ -95,14 +95,6 @@ static void cube_at(PetscReal at, PetscReal side, PetscBool inwards, TestSurface
   test_surface_box(lo, hi, inwards, s);
 }
 
-static void turn(TestSurface *s, PetscInt f)
-{
-  const PetscInt keep = s->tri[f][0];
-
-  s->tri[f][0] = s->tri[f][1];
-  s->tri[f][1] = keep;
-}
-
 /* ------------------------------------------------------------------ regions and groups */
 
 /* Appends the triangles first..last-1 of a surface to an STL text as a solid. */
@@ -197,12 +189,15 @@ static PetscErrorCode check_cavity(PetscBool turned)
   TestSurface s = {0};
   TestMesh m;
   PetscBool here;
+  PetscInt keep;
 
   PetscFunctionBeginUser;
   cube_at(0, 3, turned, &s);
   cube_at(1, 1, (PetscBool)!turned, &s);
   cube_at(1.25, 0.5, turned, &s);
-  turn(&s, 2);
+  keep = s.tri[2][0];
+  s.tri[2][0] = s.tri[2][1];
+  s.tri[2][1] = keep;
   PetscCall(import(".off", &s, NULL, NULL, NULL, &m, &here));
   if (here) {
     SB_CHECK_NEAR(m.facts.body.volume, 27 - 1 + 0.125, 1e-12, "with a cavity");

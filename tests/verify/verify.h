@@ -150,6 +150,25 @@ static inline void verify_apply(const PetscReal A[9], const PetscReal x[3], Pets
   for (int i = 0; i < 3; i++) y[i] = A[3 * i] * x[0] + A[3 * i + 1] * x[1] + A[3 * i + 2] * x[2];
 }
 
+/* Sets the displacement of a rigid rotation and translation. */
+static inline PetscErrorCode verify_turn(TestScene *t, const PetscReal axis[3], PetscReal angle,
+                                         const PetscReal moved[3])
+{
+  const SbSpace s = t->model->space;
+  PetscReal R[9];
+  PetscScalar *u;
+
+  PetscFunctionBeginUser;
+  verify_rotation(axis, angle, R);
+  PetscCall(VecGetArray(t->run->U, &u));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    verify_apply(R, s->node_x + 3 * i, u + 3 * i);
+    for (int k = 0; k < 3; k++) u[3 * i + k] += moved[k] - s->node_x[3 * i + k];
+  }
+  PetscCall(VecRestoreArray(t->run->U, &u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Richardson extrapolation of two values, the second with half the mesh size, error of the given order. */
 static inline PetscReal verify_extrapolate(PetscReal coarse, PetscReal fine, PetscReal order)
 {
@@ -168,6 +187,31 @@ static inline PetscErrorCode verify_solve(TestScene *t, const char *what)
   PetscFunctionBeginUser;
   PetscCall(SbRunSolve(t->run));
   SB_CHECK(!t->run->stop_reason[0], "%s: %s", what, t->run->stop_reason);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  Order of Newton's method: errors after one iteration from the solution with a perturbation of `size`, and of a tenth of
+  it; `ripple` is any displacement.
+*/
+static inline PetscErrorCode verify_newton(TestScene *t, void (*ripple)(const PetscReal x[3], PetscReal v[3]),
+                                           PetscReal size, PetscReal error[2], PetscReal *order)
+{
+  Vec X;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(t->run->U, &X));
+  PetscCall(SNESSetTolerances(t->run->snes, 0., 0., 0., 1, SB_UNLIMITED));
+  for (int k = 0; k < 2; k++) {
+    PetscCall(test_fill(t->model, ripple, X));
+    PetscCall(VecAYPX(X, k ? 0.1 * size : size, t->run->U));
+    PetscCall(SbModelPrescribe(t->model, 1., X));
+    PetscCall(SNESSolve(t->run->snes, NULL, X));
+    PetscCall(VecAXPY(X, -1., t->run->U));
+    PetscCall(VecNorm(X, NORM_INFINITY, &error[k]));
+  }
+  *order = PetscLog10Real(error[0] / error[1]);
+  PetscCall(VecDestroy(&X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -52,39 +52,6 @@ static void place_vertex(const VerifyPlace *place, PetscReal x[3])
   }
 }
 
-static PetscErrorCode write_mesh(Shape shape, char path[512])
-{
-  static const PetscInt cells[][3] = {{2, 2, 2}, {6, 1, 1}, {2, 2, 2}};
-  MeshContext m = {.shape = shape};
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscRandomCreate(PETSC_COMM_SELF, &m.random));
-  PetscCall(PetscRandomSetSeed(m.random, 7));
-  PetscCall(PetscRandomSeed(m.random));
-  PetscCall(verify_mesh_write(cells[shape], place_vertex, &m, path));
-  PetscCall(PetscRandomDestroy(&m.random));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Rigid rotation of the body about (1, 2, 3). */
-static PetscErrorCode turn(TestScene *t, PetscReal angle)
-{
-  const PetscReal axis[3] = {1., 2., 3.};
-  const SbSpace s = t->model->space;
-  PetscReal R[9];
-  PetscScalar *u;
-
-  PetscFunctionBeginUser;
-  verify_rotation(axis, angle, R);
-  PetscCall(VecGetArray(t->run->U, &u));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    verify_apply(R, s->node_x + 3 * i, u + 3 * i);
-    for (int k = 0; k < 3; k++) u[3 * i + k] -= s->node_x[3 * i + k];
-  }
-  PetscCall(VecRestoreArray(t->run->U, &u));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Eigenvalues of the scaled tangent, ascending; the caller frees them. */
 static PetscErrorCode spectrum(TestScene *t, PetscInt *count, PetscReal **w)
 {
@@ -132,7 +99,7 @@ static PetscErrorCode check_case(Shape shape, const char *path, const Case *c, P
                       "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material %s "
                       "-body_a_young 1e5 -body_a_poisson %.17g -body_a_density 1 -solver cg_jacobi %s",
                       path, c->element, c->law, c->nu, c->gammas));
-  PetscCall(turn(&t, c->angle));
+  PetscCall(verify_turn(&t, (const PetscReal[3]){1., 2., 3.}, c->angle, (const PetscReal[3]){0., 0., 0.}));
   PetscCall(spectrum(&t, &n, &w));
   for (PetscInt i = 0; i < n; i++) {
     zeros += w[i] <= ROUNDING * w[n - 1];
@@ -218,11 +185,17 @@ static PetscErrorCode check_mesh(Shape shape)
   static const PetscReal nus[] = {0.3, 0.4999, 0.499999};
   static const char *const laws[] = {"corotated -body_a_tangent warped", "corotated -body_a_tangent exact",
                                      "stvk", "neohookean"};
+  static const PetscInt cells[][3] = {{2, 2, 2}, {6, 1, 1}, {2, 2, 2}};
   static const char *const little = "-body_a_gamma0 0.01 -body_a_gamma1 0.01";
+  MeshContext m = {.shape = shape};
   char path[512];
 
   PetscFunctionBeginUser;
-  PetscCall(write_mesh(shape, path));
+  PetscCall(PetscRandomCreate(PETSC_COMM_SELF, &m.random));
+  PetscCall(PetscRandomSetSeed(m.random, 7));
+  PetscCall(PetscRandomSeed(m.random));
+  PetscCall(verify_mesh_write(cells[shape], place_vertex, &m, path));
+  PetscCall(PetscRandomDestroy(&m.random));
   for (int k = 0; k < 3; k++) {
     PetscCall(check_case(shape, path, &(Case){"cr", "linear", "", nus[k], 0.}, PETSC_TRUE));
     PetscCall(check_case(shape, path, &(Case){"dg", "linear", "", nus[k], 0.}, PETSC_TRUE));

@@ -15,28 +15,13 @@
 #define THICK 0.004 /* m */
 #define DROP 0.01   /* m */
 
-/* Minimum depth of the plate's centre, of the centres of its sides, and of its corners below the start, m. */
-static PetscErrorCode lowered(TestScene *t, PetscReal depth[3])
-{
-  static const PetscInt at[9][3] = {{0, 0, 0}, {1, 0, 1},  {-1, 0, 1}, {0, 1, 1},  {0, -1, 1},
-                                    {1, 1, 2}, {1, -1, 2}, {-1, 1, 2}, {-1, -1, 2}};
-
-  PetscFunctionBeginUser;
-  depth[0] = depth[1] = depth[2] = PETSC_MAX_REAL;
-  for (int k = 0; k < 9; k++) {
-    const PetscReal x[3] = {0.5 * SIDE * (PetscReal)at[k][0], 0.5 * SIDE * (PetscReal)at[k][1], DROP};
-    PetscReal u[3];
-
-    PetscCall(test_value_at(t->model, t->run->U, x, u));
-    depth[at[k][2]] = PetscMin(depth[at[k][2]], -u[2]);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode check_drape(PetscBool rigid, PetscInt cells, PetscInt thick)
 {
+  /* the plate's centre, the centres of its sides and its corners, each with its place in the minimum depths below the start, m */
+  static const PetscInt at[9][3] = {{0, 0, 0}, {1, 0, 1},  {-1, 0, 1}, {0, 1, 1},  {0, -1, 1},
+                                    {1, 1, 2}, {1, -1, 2}, {-1, 1, 2}, {-1, -1, 2}};
   Record r = {.g = G};
-  PetscReal depth[3], weight, behind, inside = 0;
+  PetscReal depth[3] = {PETSC_MAX_REAL, PETSC_MAX_REAL, PETSC_MAX_REAL}, weight, behind, inside = 0;
   char path[512], how[VERIFY_TEXT / 4];
   TestScene t;
 
@@ -65,7 +50,13 @@ static PetscErrorCode check_drape(PetscBool rigid, PetscInt cells, PetscInt thic
                       DROP));
   if (!rigid) PetscCall(SbRunAddMonitor(t.run, pour_watch, &inside));
   PetscCall(record_solve(&t, &r));
-  PetscCall(lowered(&t, depth));
+  for (int k = 0; k < 9; k++) {
+    const PetscReal x[3] = {0.5 * SIDE * (PetscReal)at[k][0], 0.5 * SIDE * (PetscReal)at[k][1], DROP};
+    PetscReal u[3];
+
+    PetscCall(test_value_at(t.model, t.run->U, x, u));
+    depth[at[k][2]] = PetscMin(depth[at[k][2]], -u[2]);
+  }
   PetscCall(test_scene_close(&t));
   weight = G * 1000 * SIDE * SIDE * THICK;
   behind = rigid ? record_max(&r, "ball_penetration") : inside;

@@ -49,21 +49,10 @@ static PetscErrorCode check_momentum(SbRun run, const SbStep *step, Bounce *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Initial acceleration of the integrator, which computes it after the monitors have the initial state. */
-static PetscErrorCode fall_freely(SbModel m, Vec A)
-{
-  PetscScalar *a;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecGetArray(A, &a));
-  for (PetscInt i = 0; i < m->space->nnode_owned; i++) a[3 * i + 2] = -G;
-  PetscCall(VecRestoreArray(A, &a));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
 {
   Bounce *b = (Bounce *)ctx;
+  PetscScalar *a;
 
   PetscFunctionBeginUser;
   if (step->step > 0)
@@ -76,7 +65,12 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
   PetscCall(VecCopy(step->U, b->U));
   PetscCall(VecCopy(step->V, b->V));
   PetscCall(VecCopy(step->A, b->A));
-  if (step->step == 0) PetscCall(fall_freely(run->model, b->A));
+  if (step->step ==
+      0) { /* the integrator computes its initial acceleration after the monitors have the state */
+    PetscCall(VecGetArray(b->A, &a));
+    for (PetscInt i = 0; i < run->model->space->nnode_owned; i++) a[3 * i + 2] = -G;
+    PetscCall(VecRestoreArray(b->A, &a));
+  }
   b->before = step->energies.momentum[2];
   PetscFunctionReturn(PETSC_SUCCESS);
 }

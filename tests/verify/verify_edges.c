@@ -97,14 +97,6 @@ static PetscReal depth_at(const PetscReal p[3], PetscReal part, PetscInt n, cons
   return PetscAbsReal(angle) > 2 * PETSC_PI ? PetscSqrtReal(nearest) : 0;
 }
 
-static inline void box_of(const PetscReal x[9], PetscReal box[6])
-{
-  for (int k = 0; k < 3; k++) {
-    box[k] = PetscMin(x[k], PetscMin(x[3 + k], x[6 + k]));
-    box[3 + k] = PetscMax(x[k], PetscMax(x[3 + k], x[6 + k]));
-  }
-}
-
 /* Largest penetration depth of the sample points on the facet edges of two bodies in the other body, m. */
 static PetscErrorCode depth_of(SbModel m, Vec U, PetscReal *depth)
 {
@@ -115,12 +107,11 @@ static PetscErrorCode depth_of(SbModel m, Vec U, PetscReal *depth)
   PetscCall(gather_skin(m, U, &n, &row));
   for (int k = 0; k < 12; k++) body[k / 6][k % 6] = k % 6 < 3 ? PETSC_MAX_REAL : -PETSC_MAX_REAL;
   for (PetscInt i = 0; i < n; i++) {
-    PetscReal box[6], *all = body[(int)row[ROW * i]];
+    PetscReal *all = body[(int)row[ROW * i]];
 
-    box_of(row + ROW * i + 1, box);
-    for (int k = 0; k < 3; k++) {
-      all[k] = PetscMin(all[k], box[k]);
-      all[3 + k] = PetscMax(all[3 + k], box[3 + k]);
+    for (int k = 0; k < 9; k++) {
+      all[k % 3] = PetscMin(all[k % 3], row[ROW * i + 1 + k]);
+      all[3 + k % 3] = PetscMax(all[3 + k % 3], row[ROW * i + 1 + k]);
     }
   }
   *depth = 0;

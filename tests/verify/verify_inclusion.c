@@ -24,11 +24,18 @@ static PetscReal modulus(PetscReal E, PetscReal nu)
   return E * (1. - nu) / ((1. + nu) * (1. - 2. * nu)); /* lambda + 2 mu */
 }
 
-static PetscErrorCode scenario(const char *element, const Inclusion *in, size_t size, char text[])
+static PetscErrorCode check(const char *element, const Inclusion *in)
 {
+  const PetscReal near = SIGMA / modulus(BULK_E, BULK_NU), far = SIGMA / modulus(in->E, in->nu);
+  TestScene t;
+  SbSpace s;
+  const PetscScalar *u;
+  const PetscReal largest = 0.5 * PetscMax(near, far);
+  PetscReal worst = 0.;
+
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, size,
+  PetscCall(test_open(
+    &t,
     "-bodies cube -body_cube_mesh box:1,1,1:4 -body_cube_element %s -body_cube_material linear "
     "-body_cube_young %g -body_cube_poisson %g -body_cube_density 1000 -body_cube_inclusions far "
     "-sets far -set_far_at box:0.5,0,0,1,1,1 -inclusion_far_material linear -inclusion_far_young %g "
@@ -37,22 +44,6 @@ static PetscErrorCode scenario(const char *element, const Inclusion *in, size_t 
     "-effect_x_components x -effect_y_type fixed -effect_y_on ymin,ymax -effect_y_components y "
     "-effect_z_type fixed -effect_z_on zmin,zmax -effect_z_components z -time static",
     element, BULK_E, BULK_NU, in->E, in->nu, SIGMA));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode check(const char *element, const Inclusion *in)
-{
-  const PetscReal near = SIGMA / modulus(BULK_E, BULK_NU), far = SIGMA / modulus(in->E, in->nu);
-  char text[VERIFY_TEXT];
-  TestScene t;
-  SbSpace s;
-  const PetscScalar *u;
-  const PetscReal largest = 0.5 * PetscMax(near, far);
-  PetscReal worst = 0.;
-
-  PetscFunctionBeginUser;
-  PetscCall(scenario(element, in, sizeof(text), text));
-  PetscCall(test_scene_open(text, &t));
   PetscCall(verify_solve(&t, in->name));
   s = t.model->space;
   SB_CHECK_NEAR(t.model->mass, 2000., 2000. * 1e-13, "mass of both halves");

@@ -185,24 +185,6 @@ static void ripple(const PetscReal x[3], PetscReal v[3])
   v[2] = x[2] * PetscSinReal(2. * x[0] + 1.);
 }
 
-/* Error after one iteration from a perturbation of the solution. */
-static PetscErrorCode one_step(TestScene *t, PetscReal size, PetscReal *error)
-{
-  Vec X;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecDuplicate(t->run->U, &X));
-  PetscCall(test_fill(t->model, ripple, X));
-  PetscCall(VecAYPX(X, size, t->run->U));
-  PetscCall(SbModelPrescribe(t->model, 1., X));
-  PetscCall(SNESSetTolerances(t->run->snes, 0., 0., 0., 1, SB_UNLIMITED));
-  PetscCall(SNESSolve(t->run->snes, NULL, X));
-  PetscCall(VecAXPY(X, -1., t->run->U));
-  PetscCall(VecNorm(X, NORM_INFINITY, error));
-  PetscCall(VecDestroy(&X));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode check(PetscInt k, const char *mesh, const char *more, const char *solver,
                             PetscReal *wrong)
 {
@@ -222,8 +204,7 @@ static PetscErrorCode check(PetscInt k, const char *mesh, const char *more, cons
     mesh, 2. * (1. + NU), NU, more, p, solver));
   PetscCall(verify_solve(&t, name));
   PetscCall(inner_stretch(&t, k, &stretch));
-  for (int i = 0; i < 2; i++) PetscCall(one_step(&t, i ? 1e-5 : 1e-4, &error[i]));
-  order = PetscLog10Real(error[0] / error[1]);
+  PetscCall(verify_newton(&t, ripple, 1e-4, error, &order));
   test_print("  %s, %s: %d load steps, %d Newton and %d linear iterations; stretch %.4f, there p %.5f "
              "(classical %.5f), applied %.5f: %+.2f %%; order %.2f\n",
              name, solver, (int)t.run->steps_total, (int)t.run->newton_total, (int)t.run->linear_total,

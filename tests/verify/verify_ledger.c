@@ -44,22 +44,11 @@ static PetscErrorCode distance(SbModel m, Vec U, Vec V, Vec U1, Vec V1, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static void judge(const char *what, const char *source, PetscReal estimate, PetscReal error, PetscReal stored,
-                  PetscReal low, PetscReal high)
-{
-  const PetscReal ratio = estimate / error;
-
-  (void)PetscPrintf(PETSC_COMM_WORLD, "  | %s | %s | %.2e | %.2e | %.2f |\n", what, source, error / stored,
-                    estimate / stored, ratio);
-  SB_CHECK(ratio >= low && ratio <= high, "%s, %s: estimate / error %g is not in [%g, %g]", what, source,
-           ratio, low, high);
-}
-
 /* Error of `source` in a run against a reference run. */
 static PetscErrorCode compare(const char *what, const char *name, SbErrorSource source, const char *scene,
                               const char *coarse, const char *fine, PetscReal low, PetscReal high)
 {
-  PetscReal error = 0., estimate, stored, linear = 0.;
+  PetscReal error = 0., estimate, stored, linear = 0., ratio;
   TestScene t, reference;
 
   PetscFunctionBeginUser;
@@ -72,7 +61,11 @@ static PetscErrorCode compare(const char *what, const char *name, SbErrorSource 
   /* the remainder of Newton's method is partly that of its linear solves */
   if (source == SB_ERROR_NONLINEAR) PetscCall(SbLedgerGet(t.ledger, SB_ERROR_LINEAR, &linear, &stored));
   estimate = PetscSqrtReal(PetscSqr(estimate) + PetscSqr(linear));
-  judge(what, name, estimate, error, PetscSqrtReal(stored), low, high);
+  ratio = estimate / error;
+  stored = PetscSqrtReal(stored);
+  test_print("  | %s | %s | %.2e | %.2e | %.2f |\n", what, name, error / stored, estimate / stored, ratio);
+  SB_CHECK(ratio >= low && ratio <= high, "%s, %s: estimate / error %g is not in [%g, %g]", what, name, ratio,
+           low, high);
   PetscCall(test_scene_close(&t));
   PetscCall(test_scene_close(&reference));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -30,23 +30,6 @@ static void ripple(const PetscReal x[3], PetscReal v[3])
   v[2] = x[0] * PetscSinReal(9. * x[0] + 1.);
 }
 
-/* Error after one step of Newton's method from a perturbation of the solution U. */
-static PetscErrorCode one_step(TestScene *t, Vec U, PetscReal size, PetscReal *error)
-{
-  Vec X;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecDuplicate(U, &X));
-  PetscCall(test_fill(t->model, ripple, X));
-  PetscCall(VecAYPX(X, size, U));
-  PetscCall(SNESSetTolerances(t->run->snes, 0., 0., 0., 1, SB_UNLIMITED));
-  PetscCall(SNESSolve(t->run->snes, NULL, X));
-  PetscCall(VecAXPY(X, -1., U));
-  PetscCall(VecNorm(X, NORM_INFINITY, error));
-  PetscCall(VecDestroy(&X));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode check_order(const char *element, const char *law, const char *tangent,
                                   PetscReal expected, PetscReal at[3])
 {
@@ -62,8 +45,7 @@ static PetscErrorCode check_order(const char *element, const char *law, const ch
     element, law, tangent, strcmp(element, "p1") ? "-effect_air_follower false -body_a_young 1e6" : ""));
   PetscCall(verify_solve(&t, law));
   PetscCall(test_value_at(t.model, t.run->U, end, at));
-  for (int k = 0; k < 2; k++) PetscCall(one_step(&t, t.run->U, k ? 1e-4 : 1e-3, &error[k]));
-  order = PetscLog10Real(error[0] / error[1]);
+  PetscCall(verify_newton(&t, ripple, 1e-3, error, &order));
   test_print("  %s %-10s %-9s: %2d iterations to the answer; a disturbance of 1e-3, 1e-4 becomes "
              "%.1e, %.1e: order %.2f\n",
              element, law, tangent, (int)t.run->newton_total, error[0], error[1], order);

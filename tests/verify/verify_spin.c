@@ -22,24 +22,6 @@ static const double complex unit = 1.0i;
 
 /* ------------------------------------------------------------------ turned */
 
-static PetscErrorCode turn(TestScene *t, const PetscReal axis[3], PetscReal angle)
-{
-  const PetscReal moved[3] = {0.7, -1.3, 0.4};
-  SbSpace s = t->model->space;
-  PetscReal R[9];
-  PetscScalar *u;
-
-  PetscFunctionBeginUser;
-  verify_rotation(axis, angle, R);
-  PetscCall(VecGetArray(t->run->U, &u));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    verify_apply(R, s->node_x + 3 * i, u + 3 * i);
-    for (int k = 0; k < 3; k++) u[3 * i + k] += moved[k] - s->node_x[3 * i + k];
-  }
-  PetscCall(VecRestoreArray(t->run->U, &u));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Largest error of sigma_xx over the cells, relative to 2 (mu + lambda). */
 static PetscErrorCode linear_stress(TestScene *t, PetscReal angle, PetscReal *error)
 {
@@ -81,7 +63,7 @@ static PetscErrorCode check_turned(const char *element, const char *law)
     const PetscReal angle = k * PETSC_PI / 12.;
     PetscReal size;
 
-    PetscCall(turn(&t, linear ? z : askew, angle));
+    PetscCall(verify_turn(&t, linear ? z : askew, angle, (const PetscReal[3]){0.7, -1.3, 0.4}));
     if (linear) {
       PetscCall(linear_stress(&t, angle, &size));
     } else {

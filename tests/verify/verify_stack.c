@@ -79,34 +79,14 @@ static PetscErrorCode keep(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Compares net contact forces with weights, interface by interface from above; returns the largest error relative to the weight there. */
-static PetscErrorCode check_forces(SbRun run, PetscReal t, PetscReal *vertical, PetscReal *sideways,
-                                   PetscReal *sum)
-{
-  PetscReal force[3 * BLOCKS], mass[BLOCKS], carried = 0, weight = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(contact_body_forces(run, t, force));
-  PetscCall(contact_body_masses(run->model, mass));
-  *vertical = *sideways = *sum = 0;
-  for (int k = BLOCKS - 1; k >= 0; k--) {
-    carried += force[3 * k + 2];
-    weight += G * mass[k];
-    if (k > 0) *sum += weight; /* the floor is another effect */
-    *vertical = PetscMax(*vertical, PetscAbsReal(carried / weight - 1));
-    for (int i = 0; i < 2; i++)
-      *sideways = PetscMax(*sideways, PetscAbsReal(force[3 * k + i]) / (G * mass[k]));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* slow: bound of the speed at the end, m/s. */
 static PetscErrorCode check_stack(PetscReal friction, PetscReal slow)
 {
   const PetscReal end = friction > 0 ? 0.8 : 1, size = 0.12;
   Since at = {.since = 0.8 * end};
   Record r = {.g = G};
-  PetscReal drift, vertical = 0, sideways = 0, sum = 0, weight;
+  PetscReal force[3 * BLOCKS], mass[BLOCKS], drift, vertical = 0, sideways = 0, sum = 0, carried = 0,
+                                                    weight = 0;
   char bodies[VERIFY_TEXT / 2];
   TestScene t;
 
@@ -124,7 +104,16 @@ static PetscErrorCode check_stack(PetscReal friction, PetscReal slow)
   PetscCall(VecAXPY(at.U, -1, t.run->U));
   PetscCall(VecNorm(at.U, NORM_INFINITY, &drift));
   PetscCall(VecDestroy(&at.U));
-  PetscCall(check_forces(t.run, end, &vertical, &sideways, &sum));
+  /* net contact forces against weights, interface by interface from above, relative to the weight there */
+  PetscCall(contact_body_forces(t.run, end, force));
+  PetscCall(contact_body_masses(t.model, mass));
+  for (int k = BLOCKS - 1; k >= 0; k--) {
+    carried += force[3 * k + 2];
+    weight += G * mass[k];
+    if (k > 0) sum += weight; /* the floor is another effect */
+    vertical = PetscMax(vertical, PetscAbsReal(carried / weight - 1));
+    for (int i = 0; i < 2; i++) sideways = PetscMax(sideways, PetscAbsReal(force[3 * k + i]) / (G * mass[k]));
+  }
   PetscCall(test_scene_close(&t));
   weight = G * r.mass;
   VERIFY_LESS(vertical, 1e-3, "force of an interface against the weight above, off by");

@@ -82,32 +82,6 @@ static PetscErrorCode scenario(const char *element, const char *law, const char 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Displacements in m, rotated back. */
-static PetscErrorCode solve(const char *element, const char *law, const char *time, PetscReal seconds,
-                            const Units *q, PetscInt *n, PetscReal **u, PetscInt *steps)
-{
-  TestScene t;
-  PetscReal R[9];
-  char text[VERIFY_TEXT];
-
-  PetscFunctionBeginUser;
-  PetscCall(scenario(element, law, time, seconds, q, text));
-  PetscCall(test_scene_open(text, &t));
-  PetscCall(verify_solve(&t, q->what));
-  *steps = t.run->steps_total;
-  *n = verify_numbers(t.model);
-  PetscCall(verify_gather(t.model, t.run->U, u));
-  verify_rotation(axis, -q->angle, R);
-  for (PetscInt i = 0; i < *n; i++) {
-    PetscReal x[3];
-
-    verify_apply(R, *u + 3 * i, x);
-    for (int k = 0; k < 3; k++) (*u)[3 * i + k] = x[k] / q->m;
-  }
-  PetscCall(test_scene_close(&t));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode check(const char *element, const char *law, const char *time, PetscReal seconds)
 {
   static const Units units[] = {
@@ -119,13 +93,29 @@ static PetscErrorCode check(const char *element, const char *law, const char *ti
     {"mass 1e9", 1., 1e9, 1., 0., 1e-8},
     {"turned", 1., 1., 1., 37. * PETSC_PI / 180., 1e-9},
   };
-  PetscReal *first = NULL, *u;
+  TestScene t;
+  PetscReal *first = NULL, *u, R[9];
   PetscInt n, first_steps = 0, steps;
+  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
   test_print("  %s %s, %s:", element, law, time);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(units); i++) {
-    PetscCall(solve(element, law, time, seconds, &units[i], &n, &u, &steps));
+    PetscCall(scenario(element, law, time, seconds, &units[i], text));
+    PetscCall(test_scene_open(text, &t));
+    PetscCall(verify_solve(&t, units[i].what));
+    steps = t.run->steps_total;
+    n = verify_numbers(t.model);
+    PetscCall(verify_gather(t.model, t.run->U, &u));
+    PetscCall(test_scene_close(&t));
+    /* displacements in m, rotated back */
+    verify_rotation(axis, -units[i].angle, R);
+    for (PetscInt j = 0; j < n; j++) {
+      PetscReal x[3];
+
+      verify_apply(R, u + 3 * j, x);
+      for (int k = 0; k < 3; k++) u[3 * j + k] = x[k] / units[i].m;
+    }
     if (!first) {
       first = u;
       first_steps = steps;
