@@ -84,8 +84,8 @@ static PetscErrorCode check_element(const char *element)
   PetscCall(SbPrescribedSetUp(&west, x.space, on_set(1), 7));
   PetscCall(count(&west, &n));
   SB_CHECK_NEAR(n, p1 ? 9 * 3 - 3 * 2 : 8 * 3, 0, "unknowns of the west side without those of the bottom");
-  for (PetscInt i = 0; i < x.space->nnode;
-       i++) { /* all local nodes, ghosts included, have the bits of their position */
+  /* all local nodes, ghosts included, have the bits of their position */
+  for (PetscInt i = 0; i < x.space->nnode; i++) {
     const PetscReal *X = &x.space->node_x[3 * i];
     const int expected = (X[2] < 1e-9 ? 5 : 0) | (X[0] < 1e-9 ? 7 : 0);
 

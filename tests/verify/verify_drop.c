@@ -65,8 +65,8 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
   PetscCall(VecCopy(step->U, b->U));
   PetscCall(VecCopy(step->V, b->V));
   PetscCall(VecCopy(step->A, b->A));
-  if (step->step ==
-      0) { /* the integrator computes its initial acceleration after the monitors have the state */
+  /* the integrator computes its initial acceleration after the monitors have the initial state */
+  if (step->step == 0) {
     PetscCall(VecGetArray(b->A, &a));
     for (PetscInt i = 0; i < run->model->space->nnode_owned; i++) a[3 * i + 2] = -G;
     PetscCall(VecRestoreArray(b->A, &a));

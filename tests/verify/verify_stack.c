@@ -85,8 +85,8 @@ static PetscErrorCode check_stack(PetscReal friction, PetscReal slow)
   const PetscReal end = friction > 0 ? 0.8 : 1, size = 0.12;
   Since at = {.since = 0.8 * end};
   Record r = {.g = G};
-  PetscReal force[3 * BLOCKS], mass[BLOCKS], drift, vertical = 0, sideways = 0, sum = 0, carried = 0,
-                                                    weight = 0;
+  PetscReal force[3 * BLOCKS], mass[BLOCKS], carried = 0, weight = 0, sum = 0;
+  PetscReal drift, vertical = 0, sideways = 0;
   char bodies[VERIFY_TEXT / 2];
   TestScene t;
 
