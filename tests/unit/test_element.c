@@ -134,20 +134,6 @@ static PetscErrorCode create_light(SbElement e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An element that a program adds is created by its name, with what its constructor filled in. */
-static PetscErrorCode test_register(void)
-{
-  SbElement e;
-
-  PetscFunctionBeginUser;
-  SB_CHECK_ERROR(SbElementCreate("light", NULL, &e), PETSC_ERR_USER, "light");
-  PetscCall(SbElementRegister("light", create_light, 0, NULL));
-  PetscCall(SbElementCreate("light", NULL, &e));
-  SB_CHECK_NEAR(e->ops.mass_lumped, 1. / 8, 1e-16, "lumped mass of the added element");
-  PetscCall(SbElementDestroy(&e));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* gamma0 and gamma1 of a body, and that what makes the form indefinite is refused. */
 static PetscErrorCode test_options(void)
 {
@@ -186,7 +172,12 @@ int main(int argc, char **argv)
   PetscCall(test_one("p1", (const PetscInt[]){1, 0, 0, 0}, random));
   PetscCall(test_one("cr", (const PetscInt[]){0, 0, 1, 0}, random));
   PetscCall(test_one("dg", (const PetscInt[]){0, 0, 0, 4}, random));
-  PetscCall(test_register());
+  /* an element that a program adds is created by its name, with what its constructor filled in */
+  SB_CHECK_ERROR(SbElementCreate("light", NULL, &e), PETSC_ERR_USER, "light");
+  PetscCall(SbElementRegister("light", create_light, 0, NULL));
+  PetscCall(SbElementCreate("light", NULL, &e));
+  SB_CHECK_NEAR(e->ops.mass_lumped, 1. / 8, 1e-16, "lumped mass of the added element");
+  PetscCall(SbElementDestroy(&e));
   PetscCall(test_options());
   PetscCall(PetscRandomDestroy(&random));
   SB_TEST_END();

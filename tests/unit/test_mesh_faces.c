@@ -60,23 +60,6 @@ static PetscErrorCode test_box(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A ring of tets around the edge from vertex 0 to 1: hundreds of faces with the same lowest vertex. */
-static PetscErrorCode test_ring(void)
-{
-  enum { N = 90 };
-  PetscInt cell[4 * N];
-
-  PetscFunctionBeginUser;
-  for (PetscInt c = 0; c < N; c++) {
-    cell[4 * c] = 1;
-    cell[4 * c + 1] = 2 + (c + 1) % N;
-    cell[4 * c + 2] = 0;
-    cell[4 * c + 3] = 2 + c;
-  }
-  PetscCall(test_all_pairs("ring", N + 2, N, cell));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Three tets at the face 1 2 3; a face that does not exist. */
 static PetscErrorCode test_shared(void)
 {
@@ -98,9 +81,19 @@ static PetscErrorCode test_shared(void)
 
 int main(int argc, char **argv)
 {
+  enum { N = 90 };
+  PetscInt cell[4 * N];
+
   SB_TEST_BEGIN(argc, argv);
   PetscCall(test_box());
-  PetscCall(test_ring());
+  /* a ring of tets around the edge from vertex 0 to 1: hundreds of faces with the same lowest vertex */
+  for (PetscInt c = 0; c < N; c++) {
+    cell[4 * c] = 1;
+    cell[4 * c + 1] = 2 + (c + 1) % N;
+    cell[4 * c + 2] = 0;
+    cell[4 * c + 3] = 2 + c;
+  }
+  PetscCall(test_all_pairs("ring", N + 2, N, cell));
   PetscCall(test_shared());
   SB_TEST_END();
 }

@@ -138,12 +138,16 @@ static PetscErrorCode measure_cylinder(PetscInt n, PetscBool curved, PetscReal e
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sizes of curved bodies, their regions, surfaces and curves converge with order 4, those of straight ones with order 2. */
-static PetscErrorCode test_curved(void)
+int main(int argc, char **argv)
 {
   PetscReal error[2][2][7];
+  SbImport *im;
+  SbMeshStatistics f;
 
-  PetscFunctionBeginUser;
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(test_box());
+  PetscCall(test_groups());
+  /* sizes of curved bodies, their regions, surfaces and curves converge with order 4, those of straight ones with order 2 */
   for (int curved = 0; curved < 2; curved++)
     for (int k = 0; k < 2; k++) PetscCall(measure_cylinder(k ? 8 : 4, (PetscBool)curved, error[curved][k]));
   for (int k = 0; k < 7; k++) {
@@ -151,28 +155,9 @@ static PetscErrorCode test_curved(void)
              error[0][0][k]);
     SB_CHECK(error[1][0][k] > 14 * error[1][1][k], "%d: errors %g, %g", k, error[1][0][k], error[1][1][k]);
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Errors of a run are errors here too. */
-static PetscErrorCode test_refused(void)
-{
-  SbImport *im;
-  SbMeshStatistics f;
-
-  PetscFunctionBeginUser;
+  /* errors of a run are errors here too */
   PetscCall(test_read("tests/data/bad_twice.msh", 0, &im));
   SB_CHECK_ERROR(SbMeshFileMeasure(im, &f), PETSC_ERR_USER_INPUT, "body 'b'|tests/data/bad_twice.msh|1");
   PetscCall(SbMeshFileDestroy(&im));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-int main(int argc, char **argv)
-{
-  SB_TEST_BEGIN(argc, argv);
-  PetscCall(test_box());
-  PetscCall(test_groups());
-  PetscCall(test_curved());
-  PetscCall(test_refused());
   SB_TEST_END();
 }

@@ -98,24 +98,6 @@ static PetscErrorCode test_refused_numbers(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Values at the ends of intervals. */
-static PetscErrorCode test_ends(void)
-{
-  PetscReal x;
-  PetscInt n;
-
-  PetscFunctionBeginUser;
-  PetscCall(begin("-body_liver_closed 1 -body_liver_poisson 0 -repeat 1"));
-  PetscCall(SbOptionReal(&body_scope, "closed", &x));
-  SB_CHECK(x == 1, "closed is %g", x);
-  PetscCall(SbOptionReal(&body_scope, "poisson", &x));
-  SB_CHECK(x == 0, "poisson is %g", x);
-  PetscCall(SbOptionInt(&run_scope, "repeat", &n));
-  SB_CHECK(n == 1, "repeat is %d", (int)n);
-  PetscCall(end());
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode test_refused_words(void)
 {
   PetscBool b;
@@ -478,11 +460,21 @@ static PetscErrorCode test_manual(const char *folder)
 int main(int argc, char **argv)
 {
   char folder[512];
+  PetscReal x;
+  PetscInt n;
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(test_file_folder(folder));
   PetscCall(test_refused_numbers());
-  PetscCall(test_ends());
+  /* values at the ends of intervals */
+  PetscCall(begin("-body_liver_closed 1 -body_liver_poisson 0 -repeat 1"));
+  PetscCall(SbOptionReal(&body_scope, "closed", &x));
+  SB_CHECK(x == 1, "closed is %g", x);
+  PetscCall(SbOptionReal(&body_scope, "poisson", &x));
+  SB_CHECK(x == 0, "poisson is %g", x);
+  PetscCall(SbOptionInt(&run_scope, "repeat", &n));
+  SB_CHECK(n == 1, "repeat is %d", (int)n);
+  PetscCall(end());
   PetscCall(test_refused_words());
   PetscCall(test_files(folder));
   PetscCall(test_view_text(folder));

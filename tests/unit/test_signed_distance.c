@@ -169,18 +169,6 @@ static PetscErrorCode check_surface(const TestSurface *s, PetscReal box, const c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_torus(void)
-{
-  const PetscInt n[2] = {24, 12};
-  TestSurface s = {0};
-
-  PetscFunctionBeginUser;
-  test_surface_torus(1, 0.4, n, &s);
-  PetscCall(check_surface(&s, 1.5, "torus"));
-  test_surface_free(&s);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* A cube with a cavity and a separate thin plate. */
 static PetscErrorCode check_parts(void)
 {
@@ -247,21 +235,6 @@ static PetscErrorCode check_sphere(int split)
 
 /* ------------------------------------------------------------------ errors, cost */
 
-static PetscErrorCode check_errors(void)
-{
-  SbObstacle o = NULL;
-  char note[256];
-
-  PetscFunctionBeginUser;
-  SB_CHECK_ERROR(SbObstacleCreate("-o", "mesh:", &o), PETSC_ERR_USER_INPUT, "mesh:FILE");
-  PetscCall(SbObstacleDestroy(&o));
-  PetscCall(SbObstacleCreate("-o", "mesh:no,such.stl", &o));
-  SB_CHECK_ERROR(SbObstacleSetUp(o, PETSC_COMM_WORLD, "-o", 1, zero, sizeof(note), note), PETSC_ERR_FILE_OPEN,
-                 "-o|no,such.stl");
-  PetscCall(SbObstacleDestroy(&o));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Time of building the tree and of a query, for information: nothing is checked. */
 static PetscErrorCode measure(void)
 {
@@ -295,14 +268,26 @@ static PetscErrorCode measure(void)
 
 int main(int argc, char **argv)
 {
+  const PetscInt n[2] = {24, 12};
+  TestSurface s = {0};
+  SbObstacle o = NULL;
+  char note[256];
+
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_cube());
   PetscCall(check_on());
-  PetscCall(check_torus());
+  test_surface_torus(1, 0.4, n, &s);
+  PetscCall(check_surface(&s, 1.5, "torus"));
+  test_surface_free(&s);
   PetscCall(check_parts());
   PetscCall(check_sphere(3));
   PetscCall(check_sphere(4));
-  PetscCall(check_errors());
+  SB_CHECK_ERROR(SbObstacleCreate("-o", "mesh:", &o), PETSC_ERR_USER_INPUT, "mesh:FILE");
+  PetscCall(SbObstacleDestroy(&o));
+  PetscCall(SbObstacleCreate("-o", "mesh:no,such.stl", &o));
+  SB_CHECK_ERROR(SbObstacleSetUp(o, PETSC_COMM_WORLD, "-o", 1, zero, sizeof(note), note), PETSC_ERR_FILE_OPEN,
+                 "-o|no,such.stl");
+  PetscCall(SbObstacleDestroy(&o));
   PetscCall(measure());
   SB_TEST_END();
 }

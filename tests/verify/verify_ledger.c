@@ -228,17 +228,6 @@ static PetscErrorCode dial(PetscReal accuracy, PetscInt *steps)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode dials(void)
-{
-  PetscInt few, many;
-
-  PetscFunctionBeginUser;
-  PetscCall(dial(0.1, &few));
-  PetscCall(dial(0.01, &many));
-  SB_CHECK(many > few, "-accuracy 0.01 takes %d steps, 0.1 %d", (int)many, (int)few);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /*
   A block between rollers and a plate that is displaced onto it by a hundredth of the height: uniform strain; the gaps are the only error, and their share of the displacement is that of force and state. And
   a ball that indents a block against the same with a tiny width: the error is the requested one, or a tenth of that of the mesh.
@@ -298,6 +287,8 @@ static PetscErrorCode gaps(void)
 
 int main(int argc, char **argv)
 {
+  PetscInt few, many;
+
   SB_TEST_BEGIN(argc, argv);
   PetscCall(steps());
   PetscCall(solves());
@@ -306,7 +297,9 @@ int main(int argc, char **argv)
   PetscCall(spectator("-body_bar_material linear -time static -solver cg_icc"));
   PetscCall(spectator("-body_bar_material corotated -ts_dt 0.01 -ts_max_time 0.1"));
   PetscCall(spectator("-body_bar_material corotated -time genalpha -ts_dt 0.01 -ts_max_time 0.1"));
-  PetscCall(dials());
+  PetscCall(dial(0.1, &few));
+  PetscCall(dial(0.01, &many));
+  SB_CHECK(many > few, "-accuracy 0.01 takes %d steps, 0.1 %d", (int)many, (int)few);
   PetscCall(gaps());
   SB_TEST_END();
 }

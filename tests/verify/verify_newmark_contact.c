@@ -54,23 +54,6 @@ static void check_better(const Left *left, const Left *euler, PetscBool energy)
   VERIFY_MORE(left->speed, euler->speed + 0.02, "speed that is left, with implicit Euler less");
 }
 
-static PetscErrorCode check_walls(void)
-{
-  Left euler, left, other;
-
-  PetscFunctionBeginUser;
-  PetscCall(check_wall("euler_implicit", "", 0.0005, &euler));
-  PetscCall(check_wall("newmark", "", 0.0005, &left));
-  check_better(&left, &euler, PETSC_TRUE);
-  PetscCall(check_wall("newmark", "-effect_wall_time_of_impact yes", 0.0005, &other));
-  VERIFY_NEAR(other.energy, left.energy, 0.01, "energy with steps cut at the arrival");
-  PetscCall(check_wall("newmark", "", 0.002, &left));
-  PetscCall(check_wall("newmark", "-effect_wall_response multiplier", 0.002, &other));
-  VERIFY_NEAR(other.speed, left.speed, 1e-6, "speed with multipliers");
-  VERIFY_NEAR(other.energy, left.energy, 1e-6, "energy with multipliers");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode collide(const char *time, const char *more, Left *left)
 {
   Record r = {0};
@@ -213,6 +196,8 @@ static PetscErrorCode check_push(const char *response)
 
 int main(int argc, char **argv)
 {
+  Left euler, left, other;
+
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_rest());
   if (test_size == 1) PetscCall(check_push("projected"));
@@ -221,7 +206,15 @@ int main(int argc, char **argv)
   if (test_size > 1) SB_TEST_END(); /* many steps of small systems: on one rank only */
   PetscCall(check_ball("linear", 1e-9));
   PetscCall(check_ball("corotated", 1e-4));
-  PetscCall(check_walls());
+  PetscCall(check_wall("euler_implicit", "", 0.0005, &euler));
+  PetscCall(check_wall("newmark", "", 0.0005, &left));
+  check_better(&left, &euler, PETSC_TRUE);
+  PetscCall(check_wall("newmark", "-effect_wall_time_of_impact yes", 0.0005, &other));
+  VERIFY_NEAR(other.energy, left.energy, 0.01, "energy with steps cut at the arrival");
+  PetscCall(check_wall("newmark", "", 0.002, &left));
+  PetscCall(check_wall("newmark", "-effect_wall_response multiplier", 0.002, &other));
+  VERIFY_NEAR(other.speed, left.speed, 1e-6, "speed with multipliers");
+  VERIFY_NEAR(other.energy, left.energy, 1e-6, "energy with multipliers");
   PetscCall(check_bars());
   SB_TEST_END();
 }

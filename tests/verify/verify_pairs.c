@@ -224,28 +224,21 @@ static PetscErrorCode try_bodies(int n, const char *const name[], const char *mo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_refused(void)
+int main(int argc, char **argv)
 {
   static const char *const many[] = {"a", "b", "c", "d", "e", "f", "g", "h", "i", "j", "k",
                                      "l", "m", "n", "o", "p", "q", "r", "s", "t", "u"};
   static const char *const alike[] = {"a", "b_c", "a_b", "c"};
 
-  PetscFunctionBeginUser;
-  PetscCall(try_bodies(21, many, "", NULL));
-  PetscCall(try_bodies(20, many, "-effect_meet_pairs yes", NULL));
-  PetscCall(try_bodies(21, many, "-effect_meet_pairs yes", "21 bodies|-effect_meet_on|210 pairs|200"));
-  PetscCall(try_bodies(20, many, "-effect_meet_pairs yes -effect_meet_self yes", "210 pairs"));
-  PetscCall(try_bodies(4, alike, "-effect_meet_pairs yes", "meet_a_b_c_force_x"));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-int main(int argc, char **argv)
-{
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_heap(" -effect_meet_friction 0.3"));
   PetscCall(check_heap(""));
   PetscCall(check_heap(" -body_left_element cr"));
   PetscCall(check_fold());
-  PetscCall(check_refused());
+  PetscCall(try_bodies(21, many, "", NULL));
+  PetscCall(try_bodies(20, many, "-effect_meet_pairs yes", NULL));
+  PetscCall(try_bodies(21, many, "-effect_meet_pairs yes", "21 bodies|-effect_meet_on|210 pairs|200"));
+  PetscCall(try_bodies(20, many, "-effect_meet_pairs yes -effect_meet_self yes", "210 pairs"));
+  PetscCall(try_bodies(4, alike, "-effect_meet_pairs yes", "meet_a_b_c_force_x"));
   SB_TEST_END();
 }

@@ -332,18 +332,6 @@ static PetscErrorCode refused_run(SbMesher mesher, const char *more, PetscReal *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_refused(void)
-{
-  PetscReal with, without;
-
-  PetscFunctionBeginUser;
-  PetscCall(refused_run(fixture_refuse, "", &without));
-  PetscCall(refused_run(fixture_refuse, "-remesh_times 0.02", &with));
-  SB_CHECK(with == without, "a run that could not be re-meshed moves otherwise: %.17g, without %.17g", with,
-           without);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ sets */
 
 static PetscErrorCode check_sets(void)
@@ -385,6 +373,7 @@ static PetscErrorCode check_sets(void)
 int main(int argc, char **argv)
 {
   char mesh[512], more[600];
+  PetscReal with, without;
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_linear("p1", NULL));
@@ -420,7 +409,10 @@ int main(int argc, char **argv)
   PetscCall(check_run("-time newmark -ts_dt 0.01 -ts_max_time 0.05", "p1", PETSC_FALSE));
   PetscCall(check_run("-time genalpha -ts_dt 0.01 -ts_max_time 0.05", "p1", PETSC_FALSE));
   PetscCall(check_run("-time euler_symplectic -ts_max_time 0.05", "p1", PETSC_TRUE));
-  PetscCall(check_refused());
+  PetscCall(refused_run(fixture_refuse, "", &without));
+  PetscCall(refused_run(fixture_refuse, "-remesh_times 0.02", &with));
+  SB_CHECK(with == without, "a run that could not be re-meshed moves otherwise: %.17g, without %.17g", with,
+           without);
   PetscCall(check_sets());
   SB_TEST_END();
 }
