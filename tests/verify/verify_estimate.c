@@ -311,14 +311,12 @@ static PetscErrorCode report(const Case *c, TestScene *t, PetscReal error2)
 
 static PetscErrorCode check_exact(const Case *c, const char *scene, const char *mesh, Exact exact)
 {
-  char more[1024];
   PetscReal error2 = 0.;
-  LockingCost cost;
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_mesh %s -body_a_element %s", mesh, c->element));
-  PetscCall(locking_run(scene, more, &t, &cost));
+  PetscCall(test_open(&t, "%s -body_a_mesh %s -body_a_element %s", scene, mesh, c->element));
+  PetscCall(verify_solve(&t, c->problem));
   PetscCall(exact_error(t.model, t.run->U, c->nu, exact, &error2));
   PetscCall(report(c, &t, error2));
   PetscCall(test_scene_close(&t));
@@ -393,17 +391,16 @@ typedef struct {
 static PetscErrorCode open_problem(const Problem *p, const Case *c, TestScene *t)
 {
   const PetscInt n[3] = {p->shape[0] * c->n, p->shape[1] * c->n, p->shape[2] * c->n};
-  char mesh[512], more[1024];
-  LockingCost cost;
+  char mesh[512];
 
   PetscFunctionBeginUser;
   if (p->map)
     PetscCall(verify_mesh_write(n, p->map, (void *)(uintptr_t)p->size, mesh));
   else
     PetscCall(verify_distorted_box(n, p->size, mesh));
-  PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_mesh %s -body_a_element %s -body_a_poisson %.17g",
-                          mesh, c->element, c->nu));
-  PetscCall(locking_run(p->options, more, t, &cost));
+  PetscCall(test_open(t, "%s -body_a_mesh %s -body_a_element %s -body_a_poisson %.17g", p->options, mesh,
+                      c->element, c->nu));
+  PetscCall(verify_solve(t, p->name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -461,17 +458,6 @@ static void sphere_map(const VerifyPlace *place, PetscReal x[3])
   x[2] = -x[2];
 }
 
-/* Map of Cook's membrane, plane strain. */
-static void cook_map(const VerifyPlace *place, PetscReal x[3])
-{
-  const PetscReal low = 44. * x[0], high = 44. + 16. * x[0];
-
-  (void)place;
-  x[1] = low + (high - low) * x[1];
-  x[0] *= 48.;
-  x[2] *= 12.;
-}
-
 static const Problem bar = {
   "bar", BAR WEIGHT "-body_a_material linear -solver direct", {4, 1, 1}, {0.4, 0.1, 0.1}, NULL};
 static const Problem two = {
@@ -491,7 +477,7 @@ static const Problem cook = {
   "-solver direct",
   {4, 4, 1},
   {1., 1., 1.},
-  cook_map};
+  locking_cook_map};
 static const Problem squeeze = {
   "squeeze",
   "-bodies a -body_a_material linear -body_a_young 5e4 -body_a_density 1000 -sets low,high "

@@ -10,66 +10,18 @@
 
   P1 is too stiff in bending on coarse meshes, with errors of order h^2: two meshes are extrapolated (Richardson).
 */
-#include "verify.h"
-
-static void beam(const VerifyPlace *place, PetscReal x[3])
-{
-  const PetscReal y = 0.19 + 0.02 * x[1], root = 0.2 + PetscSqrtReal(0.0025 - PetscSqr(y - 0.2));
-
-  x[0] = root + x[0] * (0.6 - root);
-  x[1] = y;
-  x[2] *= 0.35 / (PetscReal)place->n[0];
-}
-
-static void membrane(const VerifyPlace *place, PetscReal x[3])
-{
-  const PetscReal bottom = 44. * x[0], top = 44. + 16. * x[0];
-
-  x[0] *= 48.;
-  x[1] = bottom + x[1] * (top - bottom);
-  x[2] *= 48. / (PetscReal)place->n[0];
-}
-
-/* Displacement at a point of the plane z = 0. */
-static PetscErrorCode solve(const char *what, const PetscInt n[3], VerifyMap map, const char *options,
-                            const PetscReal at[3], PetscReal u[3])
-{
-  TestScene t;
-  char mesh[512];
-
-  PetscFunctionBeginUser;
-  PetscCall(verify_mesh_write(n, map, NULL, mesh));
-  PetscCall(test_open(&t,
-                      "-bodies a -body_a_mesh %s -time static -effect_plane_type fixed "
-                      "-effect_plane_on all -effect_plane_components z %s",
-                      mesh, options));
-  PetscCall(verify_solve(&t, what));
-  PetscCall(test_value_at(t.model, t.run->U, at, u));
-  test_print("    %s, %d x %d cells: %.6g %.6g, %d Newton iterations\n", what, (int)n[0], (int)n[1], u[0],
-             u[1], (int)t.run->newton_total);
-  PetscCall(test_scene_close(&t));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+#include "locking.h"
 
 static PetscErrorCode check_csm(const char *what, PetscReal mu, PetscReal ux, PetscReal uy)
 {
-  const PetscReal tip[3] = {0.6, 0.2, 0.};
   PetscReal u[2][3], limit[2];
-  char text[VERIFY_TEXT];
+  LockingCost cost;
 
   PetscFunctionBeginUser;
   for (int k = 0; k < 2; k++) {
-    const PetscInt n[3] = {140 << k, 8 << k, 1};
-    const double thickness = 0.35 / (double)n[0];
-
-    PetscCall(
-      PetscSNPrintf(text, sizeof(text),
-                    "-body_a_material stvk -body_a_tangent exact -body_a_young %.17g -body_a_poisson 0.4 "
-                    "-body_a_density 1000 -sets front,back -set_front_at sphere:0.2,0.2,0,0.05 "
-                    "-set_back_at sphere:0.2,0.2,%.17g,0.05 -effects root,plane,gravity "
-                    "-effect_root_type fixed -effect_root_on front,back -effect_gravity_vector 0,-2,0  ",
-                    2.8 * mu, thickness));
-    PetscCall(solve(what, n, beam, text, tip, u[k]));
+    PetscCall(locking_beam(8 << k, mu, "-body_a_material stvk", u[k], &cost));
+    test_print("    %s, %d cells across: %.6g %.6g, %d Newton iterations\n", what, 8 << k, u[k][0], u[k][1],
+               (int)cost.newton);
   }
   for (int k = 0; k < 2; k++) limit[k] = verify_extrapolate(u[0][k], u[1][k], 2.);
   test_print("  %s: extrapolated %.6f %.6f mm (reference %.6f %.6f)\n", what, 1e3 * limit[0], 1e3 * limit[1],
@@ -85,21 +37,29 @@ static PetscErrorCode check_csm(const char *what, PetscReal mu, PetscReal ux, Pe
 static PetscErrorCode check_cook(PetscReal nu, PetscReal uy)
 {
   const PetscReal corner[3] = {48., 60., 0.};
-  PetscReal u[3][3], v[3], limit;
-  char text[VERIFY_TEXT];
+  PetscReal u[3], v[3], limit;
+  TestScene t;
+  char mesh[512];
 
   PetscFunctionBeginUser;
   for (int k = 0; k < 3; k++) {
     const PetscInt n[3] = {16 << k, 16 << k, 1};
 
-    PetscCall(PetscSNPrintf(text, sizeof(text),
-                            "-body_a_material linear -body_a_young 1 -body_a_poisson %.17g -body_a_density 1 "
-                            "-sets left,right -set_left_at plane:1,0,0,0 -set_right_at plane:1,0,0,48 "
-                            "-effects hold,plane,pull -effect_hold_type fixed -effect_hold_on left "
-                            "-effect_pull_type traction -effect_pull_on right -effect_pull_vector 0;1/16;0",
-                            nu));
-    PetscCall(solve("Cook", n, membrane, text, corner, u[k]));
-    v[k] = u[k][1];
+    PetscCall(verify_mesh_write(n, locking_cook_map, NULL, mesh));
+    PetscCall(
+      test_open(&t,
+                "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 1 -body_a_poisson %.17g "
+                "-body_a_density 1 "
+                "-sets left,right -set_left_at plane:1,0,0,0 -set_right_at plane:1,0,0,48 "
+                "-effects hold,plane,pull -effect_hold_type fixed -effect_hold_on left "
+                "-effect_plane_type fixed -effect_plane_on all -effect_plane_components z -effect_pull_type "
+                "traction -effect_pull_on right -effect_pull_vector 0;1/16;0 -time static",
+                mesh, nu));
+    PetscCall(verify_solve(&t, "Cook"));
+    PetscCall(test_value_at(t.model, t.run->U, corner, u));
+    test_print("    Cook, %d x %d cells: %.6g %.6g\n", (int)n[0], (int)n[1], u[0], u[1]);
+    PetscCall(test_scene_close(&t));
+    v[k] = u[1];
   }
   limit = verify_aitken(v);
   test_print("  Cook's membrane, nu %g: extrapolated %.4f m (reference %.4f)\n", nu, limit, uy);
