@@ -35,6 +35,19 @@ static inline void motion(const PetscReal x[3], PetscReal t, PetscReal u[3], Pet
   }
 }
 
+/* Opens the fields.h5 of the run; the caller closes it. */
+static inline PetscErrorCode fixture_fields(const char *dir, SbH5 *h)
+{
+  char path[PETSC_MAX_PATH_LEN];
+  PetscBool ok;
+
+  PetscFunctionBeginUser;
+  SbFormat(sizeof(path), path, "%s/fields.h5", dir);
+  PetscCall(SbH5Open(PETSC_COMM_WORLD, path, PETSC_FALSE, h, &ok));
+  SB_CHECK(ok, "fields.h5 cannot be opened");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* What the time loop does at a step: state, then monitors. Energies are numbers that tell their column. */
 static inline PetscErrorCode fixture_step(TestScene *scene, PetscInt k, PetscReal dt, PetscBool last)
 {

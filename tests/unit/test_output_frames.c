@@ -5,19 +5,6 @@
 
 static char dir[512];
 
-/* Opens the fields.h5 of the run; the caller closes it. */
-static PetscErrorCode open_fields(SbH5 *h)
-{
-  char path[PETSC_MAX_PATH_LEN];
-  PetscBool ok;
-
-  PetscFunctionBeginUser;
-  SbFormat(sizeof(path), path, "%s/fields.h5", dir);
-  PetscCall(SbH5Open(PETSC_COMM_WORLD, path, PETSC_FALSE, h, &ok));
-  SB_CHECK(ok, "fields.h5 cannot be opened");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Vertex fields against the formula at the reference positions in the file; cell fields against the constant state. */
 static PetscErrorCode check_values(SbOutput out, SbH5 *h, const char *group, PetscReal t, PetscReal tolerance)
 {
@@ -129,7 +116,7 @@ static PetscErrorCode test_values(const char *precision, PetscReal tolerance)
   PetscFunctionBeginUser;
   PetscCall(test_open_in(dir, &scene, HELD EULER ALL " -output_precision %s", precision));
   for (PetscInt k = 0; k <= 3; k++) PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 3)));
-  PetscCall(open_fields(&h));
+  PetscCall(fixture_fields(dir, &h));
   PetscCall(check_values((SbOutput)scene.run->output, &h, "/step/0000/000002", 0.2, tolerance));
   PetscCall(check_values((SbOutput)scene.run->output, &h, "/step/0000/000003", 0.3, tolerance));
   PetscCall(SbH5Close(&h));
@@ -157,7 +144,7 @@ static PetscErrorCode test_reaction(void)
   out = (SbOutput)scene.run->output;
   SB_CHECK(scene.run->want_residual, "the residual is not asked for");
   PetscCall(fixture_step(&scene, 0, 0.1, PETSC_TRUE));
-  PetscCall(open_fields(&h));
+  PetscCall(fixture_fields(dir, &h));
   PetscCall(PetscMalloc2(3 * out->vertex.n, &x, 3 * out->vertex.n, &r));
   PetscCall(SbH5ReadSlice(&h, "/mesh/x", &out->vertex, 3, x, &ok));
   PetscCall(SbH5ReadSlice(&h, "/step/0000/000000/reaction", &out->vertex, 3, r, &ok));
@@ -187,7 +174,7 @@ static PetscErrorCode check_sets(const char *more)
     more));
   out = (SbOutput)scene.run->output;
   PetscCall(fixture_step(&scene, 0, 0.1, PETSC_TRUE));
-  PetscCall(open_fields(&h));
+  PetscCall(fixture_fields(dir, &h));
   PetscCall(PetscMalloc4(3 * out->point.n, &x, out->point.n, &left, out->point.n, &half, out->cell.n, &tets));
   PetscCall(SbH5ReadSlice(&h, "/mesh/x", &out->point, 3, x, &ok[0]));
   PetscCall(SbH5ReadSlice(&h, "/mesh/set_left", &out->point, 1, left, &ok[1]));
@@ -232,7 +219,7 @@ static PetscErrorCode test_two_bodies(void)
     "-bodies a,b -body_a_mesh box:0.4,0.1,0.2:4,1,2 -body_b_mesh box:0.4,0.1,0.2:4,1,2 -body_b_translate "
     "0,0,1 -body_b_material linear -body_b_young 1 -body_b_poisson 0 -body_b_density 1" MATERIAL EULER,
     &scene));
-  PetscCall(open_fields(&h));
+  PetscCall(fixture_fields(dir, &h));
   PetscCall(check_mesh((SbOutput)scene.run->output, &h, 0.016));
   PetscCall(SbH5Close(&h));
   PetscCall(test_scene_close(&scene));
@@ -320,7 +307,7 @@ static PetscErrorCode test_hundreds(void)
   PetscFunctionBeginUser;
   PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields J", &scene));
   for (PetscInt k = 0; k <= 230; k++) PetscCall(fixture_step(&scene, k, 0.001, (PetscBool)(k == 230)));
-  PetscCall(open_fields(&h));
+  PetscCall(fixture_fields(dir, &h));
   for (int i = 0; i < 3; i++) {
     char name[32];
 
@@ -364,7 +351,7 @@ static PetscErrorCode test_restart(void)
   SB_CHECK(count(xmf, "\"set_left\"") == 7 && count(xmf, "\"rank\"") == 7, "arrays of the mesh in the index");
   SB_CHECK(strstr(xmf, "/step/0001/000006/"), "the frames after the restart begin a new hundred");
   PetscCall(PetscFree(xmf));
-  PetscCall(open_fields(&h));
+  PetscCall(fixture_fields(dir, &h));
   SB_CHECK(H5Lexists(h.file, "/step/0000/000005", H5P_DEFAULT) <= 0, "the old step 5 is still there");
   PetscCall(check_values((SbOutput)scene.run->output, &h, "/step/0000/000003", 0.3, 1e-6));
   PetscCall(check_values((SbOutput)scene.run->output, &h, "/step/0001/000005", 0.5, 1e-6));

@@ -15,18 +15,6 @@
 
 static char dir[512];
 
-static PetscErrorCode open_fields(SbH5 *h)
-{
-  char path[PETSC_MAX_PATH_LEN];
-  PetscBool ok;
-
-  PetscFunctionBeginUser;
-  SbFormat(sizeof(path), path, "%s/fields.h5", dir);
-  PetscCall(SbH5Open(PETSC_COMM_WORLD, path, PETSC_FALSE, h, &ok));
-  SB_CHECK(ok, "fields.h5 cannot be opened");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Every point of every body has the motion, which all elements represent exactly. */
 static PetscErrorCode test_affine(const char *more)
 {
@@ -43,7 +31,7 @@ static PetscErrorCode test_affine(const char *more)
   for (PetscInt k = 0; k <= 2; k++) PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 2)));
   out = (SbOutput)scene.run->output;
   SB_CHECK(out->point.N == (more[0] ? 4 * (48 + 72 + 48) : 30 + 36 + 27), "%d points", (int)out->point.N);
-  PetscCall(open_fields(&h));
+  PetscCall(fixture_fields(dir, &h));
   PetscCall(PetscMalloc2(3 * out->point.n, &x, PetscMax(3 * out->point.n, out->cell.n), &field));
   PetscCall(SbH5ReadSlice(&h, "/mesh/x", &out->point, 3, x, &ok));
   SB_CHECK(ok, "no /mesh/x");

@@ -12,7 +12,7 @@
     bounds     a beam that sags on a plane: the same displacement as by PETSc's solver of variational inequalities
     hertz      a rigid sphere on a half-space: force against approach
 */
-#include "contact.h"
+#include "hertz.h"
 
 /* ------------------------------------------------------------------ press */
 
@@ -335,7 +335,6 @@ static PetscErrorCode check_bounds(void)
 /* ------------------------------------------------------------------ hertz */
 
 #define HERTZ_A 0.05 /* contact radius, m; the sphere has radius 1 */
-#define HERTZ_SIZE 1.0
 
 /* Quarter of a block; cells grow with the distance from the corner under the sphere. */
 static void hertz_map(const VerifyPlace *place, PetscReal x[3])
@@ -346,7 +345,7 @@ static void hertz_map(const VerifyPlace *place, PetscReal x[3])
   for (int k = 0; k < 3; k++) {
     const PetscReal from = k == 2 ? 1 - x[k] : x[k];
 
-    x[k] = HERTZ_SIZE * (PetscExpReal(g * from) - 1) / (PetscExpReal(g) - 1);
+    x[k] = (PetscExpReal(g * from) - 1) / (PetscExpReal(g) - 1);
   }
   x[2] = -x[2];
 }
@@ -358,19 +357,16 @@ static void hertz_map(const VerifyPlace *place, PetscReal x[3])
 */
 static PetscErrorCode check_hertz(const char *element, PetscInt cells, PetscReal tolerance)
 {
-  const PetscReal d = HERTZ_A * HERTZ_A, E = 1e5, nu = 0.3;
-  const PetscReal P = 4. / 3 * E / (1 - nu * nu) * PetscPowReal(d, 1.5);
+  const PetscReal d = HERTZ_A * HERTZ_A, E = 1e5;
+  const PetscReal P = 4. / 3 * E / (1 - POISSON * POISSON) * PetscPowReal(d, 1.5);
   const PetscInt n[3] = {cells, cells, cells};
   Record record = {0};
-  char path[512], r[64], sideways[256];
+  char path[512], far[VERIFY_TEXT / 4];
 
   PetscFunctionBeginUser;
   verify_case("hertz, %s, %d^3 cells", element, (int)cells);
   PetscCall(verify_mesh_write(n, hertz_map, NULL, path));
-  PetscCall(PetscSNPrintf(r, sizeof(r), "sqrt(x^2+y^2+z^2)"));
-  /* radial displacement over the distance from the axis; the depth is -z */
-  PetscCall(PetscSNPrintf(sideways, sizeof(sideways), "%.15g*(-z/%s^3-%.15g/(%s*(%s-z)))",
-                          P * (1 + nu) / (2 * PETSC_PI * E), r, 1 - 2 * nu, r, r));
+  PetscCall(boussinesq(P, E, -1, 0, sizeof(far), far));
   PetscCall(record_run(
     &record,
     "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material linear -body_a_young %g -body_a_poisson "
@@ -378,10 +374,10 @@ static PetscErrorCode check_hertz(const char *element, PetscInt cells, PetscReal
     "-set_x1_at plane:1,0,0,1 -set_y1_at plane:0,1,0,1 -set_z1_at plane:0,0,1,-1 -set_top_at plane:0,0,1,0 "
     "-time static -ksp_rtol 1e-10 -effects x,y,far,ball -effect_x_type fixed -effect_x_on x0 "
     "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y -effect_far_type "
-    "prescribed_displacement -effect_far_on x1,y1,z1 -effect_far_displacement "
-    "x*%s;y*%s;%.15g*(%.15g/%s+z^2/%s^3) -effect_ball_type contact -effect_ball_response projected "
+    "prescribed_displacement -effect_far_on x1,y1,z1 -effect_far_displacement %s "
+    "-effect_ball_type contact -effect_ball_response projected "
     "-effect_ball_on top -effect_ball_obstacle sphere:0,0,%.15g,1",
-    path, element, E, nu, sideways, sideways, -P * (1 + nu) / (2 * PETSC_PI * E), 2 * (1 - nu), r, r, 1 - d));
+    path, element, E, POISSON, far, 1 - d));
   verify_show("nodes that touch", record_last(&record, "ball_contacts"));
   VERIFY_NEAR(-4 * record_last(&record, "ball_force_z") / P, 1, tolerance, "force against that of Hertz");
   PetscCall(record_free(&record));
