@@ -192,7 +192,7 @@ static void test_angles(void)
   }
 }
 
-static void test_random(void)
+static void test_uniform(void)
 {
   PetscReal F[9];
 
@@ -308,7 +308,7 @@ int main(int argc, char **argv)
   measure_long();
   test_rest();
   test_angles();
-  test_random();
+  test_uniform();
   test_singular();
   test_range();
   test_lanes();

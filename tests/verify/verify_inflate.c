@@ -190,7 +190,7 @@ static PetscErrorCode check(PetscInt k, const char *mesh, const char *more, cons
 {
   const char *name = k == 3 ? "sphere" : "cylinder";
   const PetscReal p = closed_form(k, PETSC_FALSE, STRETCH);
-  PetscReal stretch = 0., error[2], order;
+  PetscReal stretch = 0., error[2], order = 0.;
   TestScene t;
 
   PetscFunctionBeginUser;

@@ -33,7 +33,7 @@ static void ripple(const PetscReal x[3], PetscReal v[3])
 static PetscErrorCode check_order(const char *element, const char *law, const char *tangent,
                                   PetscReal expected, PetscReal at[3])
 {
-  PetscReal error[2], order;
+  PetscReal error[2], order = 0.;
   TestScene t;
 
   PetscFunctionBeginUser;
