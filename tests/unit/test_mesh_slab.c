@@ -3,7 +3,6 @@
 #include "../../src/mesh/mesh_impl.h"
 #include "mesh_same.h"
 
-#define DATA "tests/data/"
 enum { NSET = 8 };
 
 /* Shuffles the tets. */

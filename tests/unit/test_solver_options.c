@@ -23,7 +23,6 @@
     LAW("b") "-sets bottom,top -set_bottom_at plane:0,0,1,0 -set_top_at plane:0,0,1,0.1 -effects "   \
              "hold,push,meet -effect_hold_type fixed -effect_hold_on bottom "                        \
              "-effect_push_type prescribed_displacement -effect_push_on top -effect_meet_type contact "
-#define PRESS "-time static -effect_push_displacement 0.0005*t;0.0001*t;-0.002*t "
 #define DRAG STEPS "-effect_push_displacement 0.1*t;0;-0.1*t "
 
 typedef struct {
