@@ -433,25 +433,6 @@ static void check_one(SbPairKind kind, const Named *c)
   if (impact && c->time >= 0) SB_CHECK_NEAR(t, c->time, 2e-4, c->name);
 }
 
-static void check_named(void)
-{
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(passages); i++) {
-    Named c = {.name = passages[i].name,
-               .time = passages[i].time,
-               .x0 = {[6] = 1, [10] = 1},
-               .x1 = {[6] = 1, [10] = 1}};
-
-    for (int k = 0; k < 3; k++) {
-      c.x0[k] = passages[i].from[k];
-      c.x1[k] = passages[i].to[k];
-    }
-    check_one(SB_PAIR_VERTEX_TRIANGLE, &c);
-  }
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(triangles); i++)
-    check_one(SB_PAIR_VERTEX_TRIANGLE, &triangles[i]);
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(edges); i++) check_one(SB_PAIR_EDGE_EDGE, &edges[i]);
-}
-
 /* Units, distant positions, unbounded and zero motions, and values that are not finite. */
 static void check_limits(void)
 {
@@ -528,7 +509,21 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_random());
   check_levels();
-  check_named();
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(passages); i++) {
+    Named c = {.name = passages[i].name,
+               .time = passages[i].time,
+               .x0 = {[6] = 1, [10] = 1},
+               .x1 = {[6] = 1, [10] = 1}};
+
+    for (int k = 0; k < 3; k++) {
+      c.x0[k] = passages[i].from[k];
+      c.x1[k] = passages[i].to[k];
+    }
+    check_one(SB_PAIR_VERTEX_TRIANGLE, &c);
+  }
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(triangles); i++)
+    check_one(SB_PAIR_VERTEX_TRIANGLE, &triangles[i]);
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(edges); i++) check_one(SB_PAIR_EDGE_EDGE, &edges[i]);
   check_limits();
   SB_TEST_END();
 }

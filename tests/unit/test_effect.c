@@ -74,11 +74,15 @@ static PetscErrorCode test_errors(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode test_registration(void)
+int main(int argc, char **argv)
 {
   SbEffect e;
 
-  PetscFunctionBeginUser;
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(fixture_register());
+  PetscCall(test_types());
+  PetscCall(test_errors());
+  /* a type that a program adds */
   PetscCall(SbEffectRegister(&bare));
   PetscCall(SbEffectCreate("bare", &e));
   SB_CHECK(e->ops.setup == no_space, "operations of a new type");
@@ -91,15 +95,5 @@ static PetscErrorCode test_registration(void)
   PetscCall(SbEffectCreate("gravity", &e));
   SB_CHECK(e != NULL, "after a reset");
   PetscCall(SbEffectDestroy(&e));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-int main(int argc, char **argv)
-{
-  SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_register());
-  PetscCall(test_types());
-  PetscCall(test_errors());
-  PetscCall(test_registration());
   SB_TEST_END();
 }

@@ -44,29 +44,6 @@ static PetscErrorCode fingerprint(const char *mesh_path, PetscReal sum[4])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The .h5 file and its .xmf give every rank the same sums as the .msh. */
-static PetscErrorCode test_distributed(void)
-{
-  PetscReal gmsh[4], own[4], indexed[4];
-  char path[512], index[512];
-
-  PetscFunctionBeginUser;
-  PetscCall(test_path_of_all("cubes.h5", path));
-  PetscCall(test_path_of_all("cubes.xmf", index));
-  if (!test_rank) PetscCall(write_mesh(DATA "two_cubes_41.msh", path));
-  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  PetscCall(fingerprint(DATA "two_cubes_41.msh", gmsh));
-  PetscCall(fingerprint(path, own));
-  PetscCall(fingerprint(index, indexed));
-  SB_CHECK_NEAR(gmsh[2], 24, 0, "tets in the region");
-  SB_CHECK_NEAR(gmsh[3], 4, 0, "facets in the wall");
-  for (int k = 0; k < 4; k++) {
-    SB_CHECK_NEAR(own[k], gmsh[k], 1e-12 * gmsh[k], "of the .h5");
-    SB_CHECK_NEAR(indexed[k], gmsh[k], 1e-12 * gmsh[k], "of the .xmf");
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ files written by the test */
 
 static void put_array(hid_t file, const char *name, int ndim, const hsize_t size[], hid_t type,
@@ -447,10 +424,26 @@ static PetscErrorCode test_foreign(void)
 
 int main(int argc, char **argv)
 {
+  PetscReal gmsh[4], own[4], indexed[4];
+  char path[512], index[512];
+
   SB_TEST_BEGIN(argc, argv);
   PetscCall(SbMeshRegister());
   (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
-  PetscCall(test_distributed());
+  /* the .h5 file and its .xmf give every rank the same sums as the .msh */
+  PetscCall(test_path_of_all("cubes.h5", path));
+  PetscCall(test_path_of_all("cubes.xmf", index));
+  if (!test_rank) PetscCall(write_mesh(DATA "two_cubes_41.msh", path));
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  PetscCall(fingerprint(DATA "two_cubes_41.msh", gmsh));
+  PetscCall(fingerprint(path, own));
+  PetscCall(fingerprint(index, indexed));
+  SB_CHECK_NEAR(gmsh[2], 24, 0, "tets in the region");
+  SB_CHECK_NEAR(gmsh[3], 4, 0, "facets in the wall");
+  for (int k = 0; k < 4; k++) {
+    SB_CHECK_NEAR(own[k], gmsh[k], 1e-12 * gmsh[k], "of the .h5");
+    SB_CHECK_NEAR(indexed[k], gmsh[k], 1e-12 * gmsh[k], "of the .xmf");
+  }
   PetscCall(test_output());
   PetscCall(test_discontinuous());
   PetscCall(test_cut());

@@ -27,26 +27,6 @@ static PetscErrorCode test_find(PetscInt n, const int64_t number[], PetscBool ta
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode test_numbers(void)
-{
-  const int64_t dense[] = {7, 3, -2, 5, 4}, far[] = {INT64_MAX, 1, INT64_MIN, 1000000000000, -5},
-                twice[] = {3, 9, 3}, far_twice[] = {1, INT64_MAX, 5, INT64_MAX};
-  SbNumbers index = {0};
-
-  PetscFunctionBeginUser;
-  PetscCall(test_find(5, dense, PETSC_TRUE));
-  PetscCall(test_find(5, far, PETSC_FALSE));
-  SB_CHECK(SbNumbersFind(&index, 0) == -1, "found in nothing");
-  PetscCall(SbNumbersCreate(0, NULL, &index));
-  SB_CHECK(SbNumbersFind(&index, 0) == -1, "found among none");
-  PetscCall(SbNumbersCreate(3, twice, &index));
-  SB_CHECK(index.repeated && index.twice == 3, "%d %lld", index.repeated, (long long)index.twice);
-  PetscCall(SbNumbersCreate(4, far_twice, &index));
-  SB_CHECK(index.repeated && index.twice == INT64_MAX, "%d %lld", index.repeated, (long long)index.twice);
-  PetscCall(SbNumbersDestroy(&index));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscBool has_group(const SbImport *im, int dim, PetscInt item, PetscInt group)
 {
   const PetscInt tags = im->item[dim].tags[item];
@@ -122,8 +102,21 @@ static PetscErrorCode test_many_groups(void)
 
 int main(int argc, char **argv)
 {
+  const int64_t dense[] = {7, 3, -2, 5, 4}, far[] = {INT64_MAX, 1, INT64_MIN, 1000000000000, -5},
+                twice[] = {3, 9, 3}, far_twice[] = {1, INT64_MAX, 5, INT64_MAX};
+  SbNumbers index = {0};
+
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(test_numbers());
+  PetscCall(test_find(5, dense, PETSC_TRUE));
+  PetscCall(test_find(5, far, PETSC_FALSE));
+  SB_CHECK(SbNumbersFind(&index, 0) == -1, "found in nothing");
+  PetscCall(SbNumbersCreate(0, NULL, &index));
+  SB_CHECK(SbNumbersFind(&index, 0) == -1, "found among none");
+  PetscCall(SbNumbersCreate(3, twice, &index));
+  SB_CHECK(index.repeated && index.twice == 3, "%d %lld", index.repeated, (long long)index.twice);
+  PetscCall(SbNumbersCreate(4, far_twice, &index));
+  SB_CHECK(index.repeated && index.twice == INT64_MAX, "%d %lld", index.repeated, (long long)index.twice);
+  PetscCall(SbNumbersDestroy(&index));
   PetscCall(test_members());
   PetscCall(test_many_groups());
   SB_TEST_END();

@@ -79,26 +79,6 @@ static PetscErrorCode test_children(const char *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A refined mesh is valid, its triangles are faces, and the boundary has four facets for each of the old ones. */
-static PetscErrorCode test_sound(void)
-{
-  SbImport *im;
-  SbMeshStatistics coarse, fine;
-
-  PetscFunctionBeginUser;
-  PetscCall(test_read("tests/data/two_cubes_41.msh", 0, &im));
-  PetscCall(SbMeshFileMeasure(im, &coarse));
-  PetscCall(SbMeshFileRefine(im));
-  PetscCall(SbMeshFileMeasure(im, &fine));
-  SB_CHECK(im->nlost == 0, "%d triangles are no faces", (int)im->nlost);
-  SB_CHECK(fine.body.nfacet == 4 * coarse.body.nfacet, "%d facets", (int)fine.body.nfacet);
-  SB_CHECK(fine.body.nvert == coarse.body.nvert + coarse.nedge, "%d vertices", (int)fine.body.nvert);
-  SB_CHECK_NEAR(fine.body.volume, coarse.body.volume, 1e-13, "volume");
-  SB_CHECK_NEAR(fine.area, coarse.area, 1e-12, "area");
-  PetscCall(SbMeshFileDestroy(&im));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* After five refinements the shapes are worse than after the first one only within the bound of the method. */
 static PetscErrorCode test_shapes(void)
 {
@@ -150,11 +130,24 @@ static PetscErrorCode test_curved(const char *path)
 
 int main(int argc, char **argv)
 {
+  SbImport *im;
+  SbMeshStatistics coarse, fine;
+
   SB_TEST_BEGIN(argc, argv);
   PetscCall(test_edges());
   PetscCall(test_children("tests/data/two_cubes_41.msh"));
   PetscCall(test_children("box:1,2,3:2"));
-  PetscCall(test_sound());
+  /* a refined mesh is valid, its triangles are faces, and the boundary has four facets for each of the old ones */
+  PetscCall(test_read("tests/data/two_cubes_41.msh", 0, &im));
+  PetscCall(SbMeshFileMeasure(im, &coarse));
+  PetscCall(SbMeshFileRefine(im));
+  PetscCall(SbMeshFileMeasure(im, &fine));
+  SB_CHECK(im->nlost == 0, "%d triangles are no faces", (int)im->nlost);
+  SB_CHECK(fine.body.nfacet == 4 * coarse.body.nfacet, "%d facets", (int)fine.body.nfacet);
+  SB_CHECK(fine.body.nvert == coarse.body.nvert + coarse.nedge, "%d vertices", (int)fine.body.nvert);
+  SB_CHECK_NEAR(fine.body.volume, coarse.body.volume, 1e-13, "volume");
+  SB_CHECK_NEAR(fine.area, coarse.area, 1e-12, "area");
+  PetscCall(SbMeshFileDestroy(&im));
   PetscCall(test_shapes());
   PetscCall(test_curved("tests/data/two_cubes_41.msh"));
   PetscCall(test_curved("box:1,2,3:2"));

@@ -151,22 +151,6 @@ static void check_against_reference(const PetscReal F[9], const char *what)
            (PetscReal)(s[0] + s[1] + s[2] - trace));
 }
 
-static void test_rest(void)
-{
-  const PetscReal F[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-  PetscReal R[9];
-
-  polar_one(F, R);
-  SB_CHECK(!memcmp(F, R, sizeof(R)), "the rotation of F = I is not exactly I");
-  for (int t = 0; t < 2000; t++) {
-    const PetscReal size = pow(10, -1 - 14 * (t / 2000.));
-    PetscReal G[9];
-
-    for (int k = 0; k < 9; k++) G[k] = F[k] + size * uniform();
-    check_against_reference(G, "near rest");
-  }
-}
-
 /* Pure rotations, and rotated stretches 1.1, 1, 0.9, at angles through a full turn; exact half turns too. */
 static void test_angles(void)
 {
@@ -301,12 +285,24 @@ static void measure_long(void)
 
 int main(int argc, char **argv)
 {
+  const PetscReal F[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  PetscReal R[9];
+
   SB_TEST_BEGIN(argc, argv);
   PetscCall(PetscRandomCreate(PETSC_COMM_SELF, &the_random));
   PetscCall(PetscRandomSetSeed(the_random, 20240517));
   PetscCall(PetscRandomSeed(the_random));
   measure_long();
-  test_rest();
+  /* at rest, and near it */
+  polar_one(F, R);
+  SB_CHECK(!memcmp(F, R, sizeof(R)), "the rotation of F = I is not exactly I");
+  for (int t = 0; t < 2000; t++) {
+    const PetscReal size = pow(10, -1 - 14 * (t / 2000.));
+    PetscReal G[9];
+
+    for (int k = 0; k < 9; k++) G[k] = F[k] + size * uniform();
+    check_against_reference(G, "near rest");
+  }
   test_angles();
   test_uniform();
   test_singular();
