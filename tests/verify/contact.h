@@ -131,9 +131,26 @@ typedef struct {
   PetscReal mass, lowest;           /* kg; lowest node at rest, z, m */
   PetscInt newton, steps, rejected; /* totals of the run */
   PetscInt n, ncolumn, room, at;    /* numbers of rows and columns, allocated values, next column to be set */
+  size_t kept;                      /* place in record_kept, from 1 */
   char (*name)[2 * SB_NAME_MAX];    /* [ncolumn] */
   PetscReal *value;                 /* [n][ncolumn] */
 } Record;
+
+/* Arrays of all records, which are freed when the program ends. */
+static struct {
+  void *name, *value;
+} record_kept[256];
+static size_t record_count;
+
+static inline PetscErrorCode record_free_all(void)
+{
+  PetscFunctionBeginUser;
+  for (size_t k = 0; k < record_count; k++) {
+    PetscCall(PetscFree(record_kept[k].name));
+    PetscCall(PetscFree(record_kept[k].value));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* Column values in every row: [n], with a stride of ncolumn. */
 static inline const PetscReal *record_column(const Record *r, const char *name)
@@ -226,6 +243,12 @@ static inline PetscErrorCode record_put(Record *r, const char *first, const char
                                         PetscReal value)
 {
   PetscFunctionBeginUser;
+  if (!r->kept) {
+    PetscCheck(record_count < PETSC_STATIC_ARRAY_LENGTH(record_kept), PETSC_COMM_SELF, PETSC_ERR_PLIB,
+               "more records");
+    if (!record_count) PetscCall(PetscRegisterFinalize(record_free_all));
+    r->kept = ++record_count;
+  }
   if (r->n == 0) {
     PetscCall(PetscRealloc((size_t)(r->ncolumn + 1) * sizeof(*r->name), &r->name));
     PetscCall(PetscSNPrintf(r->name[r->ncolumn++], sizeof(*r->name), "%s%s%s", first, second, third));
@@ -235,6 +258,8 @@ static inline PetscErrorCode record_put(Record *r, const char *first, const char
     PetscCall(PetscRealloc((size_t)r->room * sizeof(PetscReal), &r->value));
   }
   r->value[r->n * r->ncolumn + r->at++] = value;
+  record_kept[r->kept - 1].name = r->name;
+  record_kept[r->kept - 1].value = r->value;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -318,14 +343,6 @@ static inline PetscErrorCode record_add(TestScene *t, Record *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static inline PetscErrorCode record_free(Record *r)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree(r->name));
-  PetscCall(PetscFree(r->value));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Solves an open scene and records it; the scene stays open. */
 static inline PetscErrorCode record_solve(TestScene *t, Record *r)
 {
@@ -338,7 +355,7 @@ static inline PetscErrorCode record_solve(TestScene *t, Record *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves and closes the scene of these options; the caller frees the record with record_free(). */
+/* Solves and closes the scene of these options. */
 static inline PetscErrorCode PETSC_ATTRIBUTE_FORMAT(2, 3) record_run(Record *r, const char *format, ...)
 {
   TestScene t;

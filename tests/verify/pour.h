@@ -187,6 +187,5 @@ static inline PetscErrorCode pour(PetscInt n, PetscReal end, PetscReal radius, P
   VERIFY_MORE(record_max(&r, "bowl_force_z"), weight, "largest force of the bowl, N");
   VERIFY_MORE(lost, 0.1 * weight * radius, "energy lost in the fall, J");
   VERIFY_MORE(record_min(&r, "min_J"), 0, "least det F");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -107,7 +107,6 @@ static PetscErrorCode check_beside(const char *solver, PetscReal tolerance)
   VERIFY_MORE(record_max(&r, "meet_contacts"), 3, "pairs of the others");
   VERIFY_LESS(verify_difference(n, alone, beside), tolerance, "change of the displacement");
   VERIFY_LESS(verify_difference(n, alone + n, beside + all), tolerance, "change of the velocity");
-  PetscCall(record_free(&r));
   PetscCall(PetscFree(alone));
   PetscCall(PetscFree(beside));
   PetscFunctionReturn(PETSC_SUCCESS);

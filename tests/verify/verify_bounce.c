@@ -43,7 +43,6 @@ static PetscErrorCode check_ball(const char *element, PetscReal e)
                 "part of the height after a bounce");
   /* accuracy of nodes on the obstacle, 1e-7 of the size, times the weight: when the ball comes to rest */
   VERIFY_LESS(record_gain(&r, "energy"), 1e-7 * 4 * RADIUS * r.mass * GRAVITY, "largest gain of a step, J");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -61,7 +60,6 @@ static PetscErrorCode check_block(const char *what, const char *obstacle, const 
     "0.05 -snes_rtol 1e-10 %s" VERIFY_BODY("a", "box:0.1,0.1,0.1:3", "corotated", "1e11", "0.3"),
     obstacle, more));
   VERIFY_NEAR(record_last(&r, "a_vz"), expected, 2e-3 * expected, "speed with which it leaves, m/s");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -82,7 +80,6 @@ static PetscErrorCode check_soft(PetscReal young, PetscReal dt, PetscReal e)
                0.05 + RADIUS, e, dt, path, young));
   /* of 0.5 J; the energy of rotating co-rotated tets is not exactly convex */
   VERIFY_LESS(record_gain(&r, "energy"), 1e-6, "largest gain of a step, J");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

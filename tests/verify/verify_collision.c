@@ -44,7 +44,6 @@ static PetscErrorCode check_stack(const char *element, int upper, PetscReal tole
   VERIFY_NEAR(record_last(&r, "meet_penetration"), 0, 1e-7 * 0.2, "penetration, m");
   VERIFY_NEAR(force[5], LOAD * 0.01, 1e-6 * LOAD * 0.01, "contact force on the upper block, N");
   VERIFY_NEAR(force[2] + force[5], 0, 1e-9 * LOAD * 0.01, "contact forces of both blocks, N");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -73,7 +72,6 @@ static PetscErrorCode check_bars(const char *element)
   VERIFY_NEAR(record_last(&r, "a_vx"), -SPEED, 0.1 * SPEED, "velocity of the first bar, m/s");
   VERIFY_NEAR(record_last(&r, "b_vx"), SPEED, 0.1 * SPEED, "velocity of the second bar, m/s");
   VERIFY_LESS(record_size(&r, "momentum", PETSC_FALSE), 1e-8 * 2.5 * SPEED, "momentum, kg m/s");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -101,7 +99,6 @@ static PetscErrorCode check_momentum(const char *element, PetscReal friction)
   verify_show("angular momentum, kg m^2/s", record_size(&r, "angular", PETSC_FALSE));
   verify_show("largest gain of a step, J", record_gain(&r, "energy"));
   verify_show("taken by friction, J", record_last(&r, "meet_friction_loss"));
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -124,7 +121,6 @@ static PetscErrorCode check_slope(PetscReal mu, PetscReal tolerance)
       VERIFY_BODY("b", "box:0.06,0.06,0.03:1", "linear", "1e7", "0.3"),
     end, 0.5 * c, -c, mu));
   VERIFY_NEAR(record_last(&r, "b_vx"), rigid, tolerance, "speed, m/s");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

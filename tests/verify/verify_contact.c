@@ -44,7 +44,6 @@ static PetscErrorCode check_press(const char *element, const char *response, Pet
   VERIFY_NEAR(record_last(&r, "floor_force_z"), LOAD * 0.01, 1e-6 * LOAD * 0.01, "force of the floor, N");
   VERIFY_NEAR(record_last(&r, "floor_penetration"), 0, tolerance, "penetration, m");
   VERIFY_MORE(record_last(&r, "floor_contacts"), 20, "contacts");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -71,7 +70,6 @@ static PetscErrorCode check_fall(const char *element, const char *response)
   VERIFY_MORE(record_impulse(&r, "floor_force_z"), 1, "impulse of the floor, N s");
   VERIFY_MORE(record_max(&r, "floor_force_z"), 3 * r.mass * 9.81, "largest force of the floor, N");
   if (exact) VERIFY_LESS(record_max(&r, "floor_penetration"), 1e-6 * 0.17, "penetration, m");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -113,7 +111,6 @@ static PetscErrorCode check_incline(const char *element, const char *response, P
     VERIFY_NEAR((v[1] - v[0]) / h, a, 0.01 * a + 1e-6, "acceleration, m/s^2");
     VERIFY_NEAR(way - v[0] * h, 0.5 * a * h * (h + 0.01), 0.01 * 0.5 * a * h * h + 1e-8, "distance, m");
   }
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -136,7 +133,6 @@ static PetscErrorCode check_held(const char *response)
     response));
   VERIFY_NEAR(record_last(&r, "floor_force_x"), -load, 1e-5 * load, "friction against the load, N");
   VERIFY_NEAR(record_last(&r, "floor_force_z"), 0.5 * 9.81, 1e-5 * 0.5 * 9.81, "weight, N");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -164,7 +160,6 @@ static PetscErrorCode check_corner(const char *response)
               "friction of the floor, N");
   VERIFY_NEAR(record_last(&r, "floor_force_x"), 0, 1e-2 * mu * -push[2], "friction across the motion, N");
   VERIFY_LESS(r.newton, 15 * 30, "solves for 30 steps");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -200,7 +195,6 @@ static PetscErrorCode indent(const char *response, const char *more, PetscInt mo
     if (PetscAbsReal(step - (PetscReal)at) > 1e-7) continue; /* a substep */
     for (int k = 0; k < 3; k++) force[at][k] = record_at(&r, columns[k], i);
   }
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -325,7 +319,6 @@ static PetscErrorCode check_bounds(void)
   PetscCall(VecNorm(U, NORM_INFINITY, &difference));
   VERIFY_MORE(record_last(&r, "floor_contacts"), 2, "nodes that touch");
   VERIFY_LESS(difference, 1e-6 * size, "difference from SNESVI, m");
-  PetscCall(record_free(&r));
   PetscCall(VecDestroy(&U));
   PetscCall(test_scene_close(&free));
   PetscCall(test_scene_close(&t));
@@ -380,7 +373,6 @@ static PetscErrorCode check_hertz(const char *element, PetscInt cells, PetscReal
     path, element, E, POISSON, far, 1 - d));
   verify_show("nodes that touch", record_last(&record, "ball_contacts"));
   VERIFY_NEAR(-4 * record_last(&record, "ball_force_z") / P, 1, tolerance, "force against that of Hertz");
-  PetscCall(record_free(&record));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -69,7 +69,6 @@ static PetscErrorCode check(const char *element, PetscReal tolerance)
   for (int k = 0; k < 2; k++) {
     PetscCall(PetscFree(m[k].u));
     PetscCall(PetscFree(m[k].v));
-    PetscCall(record_free(&m[k].r));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

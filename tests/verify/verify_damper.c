@@ -47,7 +47,6 @@ static PetscErrorCode check(const char *what, const char *scene, PetscReal tau, 
   VERIFY_NEAR(speed, leaving(*k, tau), 0.02 * SPEED, "speed after the impact, m/s");
   /* the springs return a part of the kinetic energy */
   VERIFY_LESS(speed, SPEED * (1 + PETSC_SMALL), "speed after the impact, m/s");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -68,7 +68,6 @@ static PetscErrorCode check_drape(PetscBool rigid, PetscInt cells, PetscInt thic
   VERIFY_MORE(record_min(&r, "min_J"), 0, "least det F");
   VERIFY_LESS(record_gain(&r, "energy"), 1e-6 * weight * SIDE, "largest gain of a step, J");
   if (rigid) VERIFY_LESS(record_max(&r, "missing"), 1e-5, "momentum that no force explains, kg m/s");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -125,7 +125,6 @@ static PetscErrorCode check_bounce(const char *time, PetscReal bound, PetscInt l
   verify_show("largest gain of a step, of the fall", record_gain(&r, "energy") / fall);
   verify_show("lost at the end, of the fall",
               (record_at(&r, "energy", 0) - record_last(&r, "energy")) / fall);
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -41,7 +41,6 @@ static PetscErrorCode check_wall(const char *time, const char *more, PetscReal d
   verify_show("largest force, N", record_max(&r, "wall_force_x"));
   verify_show("part of the speed that is left", left->speed);
   verify_show("part of the energy that is left", left->energy);
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -79,7 +78,6 @@ static PetscErrorCode collide(const char *time, const char *more, Left *left)
   VERIFY_LESS(change, 1e-10 * 2.5 * SPEED, "change of momentum, kg m/s");
   verify_show("part of the velocities that is exchanged", left->speed);
   verify_show("part of the energy that is left", left->energy);
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -115,7 +113,6 @@ static PetscErrorCode check_ball(const char *material, PetscReal tolerance)
   VERIFY_MORE(record_starts(&r, "floor_contacts"), 2, "landings");
   VERIFY_LESS(record_gain(&r, "energy"), tolerance * record_at(&r, "energy", 0), "largest gain of a step, J");
   VERIFY_LESS(record_max(&r, "missing"), 1e-9, "momentum that no force explains, kg m/s");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -151,7 +148,6 @@ static PetscErrorCode check_rest(void)
     VERIFY_NEAR(record_max(&r, force[k]), k ? 9.81 : 19.62, k ? 0.1 : 1e-3, "largest force, N");
   }
   VERIFY_LESS(PetscMax(roughness(&r, force[0]), roughness(&r, force[1])), 2e-3, "change to and fro, N");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -170,7 +166,6 @@ static PetscErrorCode check_smooth(void)
       "a", "0")));
   VERIFY_NEAR(record_max(&r, "floor_force_z"), 10, 1, "largest force, N");
   VERIFY_LESS(roughness(&r, "floor_force_z"), 0.02, "change to and fro, N");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -190,7 +185,6 @@ static PetscErrorCode check_push(const char *response)
   VERIFY_NEAR(record_last(&r, "a_vz"), 2, 0.02, "speed of the block, m/s");
   VERIFY_LESS(record_max(&r, "missing"), 1e-3, "momentum that no force explains, kg m/s");
   VERIFY_NEAR(record_max(&r, "floor_penetration"), 0, 0, "penetration, m");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

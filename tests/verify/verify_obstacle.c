@@ -60,7 +60,6 @@ static PetscErrorCode check_mesh(void)
   VERIFY_LESS(verify_difference(length, u[0], u[1]), 1e-6, "difference of displacements on box and mesh");
   for (int k = 0; k < 2; k++) {
     PetscCall(PetscFree(u[k]));
-    PetscCall(record_free(&r[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -90,7 +89,6 @@ static PetscErrorCode drag(const char *obstacle, PetscReal force[])
   for (PetscInt i = 0; i < r.n && i <= DRAG_STEPS; i++) {
     for (int k = 0; k < 3; k++) force[3 * i + k] = record_at(&r, columns[k], i);
   }
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -137,7 +135,6 @@ static PetscErrorCode lie(const char *what, const char *obstacles, PetscReal *st
     obstacles));
   *strain = record_last(&r, "strain");
   *weight = record_last(&r, "l_force_z") + (strstr(obstacles, "l,r") ? record_last(&r, "r_force_z") : 0);
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -196,7 +193,6 @@ static PetscErrorCode check_overlap(const char *element, const char *response, c
   for (int k = 1; k <= 5; k += 4)
     VERIFY_NEAR(record_at(&r, "floor_penetration", k * RECOVERY) / DEPTH, PetscExpReal(-k),
                 springs ? 2e-3 : 1e-4, "depth after the recovery, once and five times");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -231,7 +227,6 @@ int main(int argc, char **argv)
   VERIFY_LESS(record_last(&r, "floor_penetration"), 1e-7, "depth, m");
   /* E = 5e4 Pa, strain 0.2, area 0.01 m^2: about 100 N */
   VERIFY_MORE(record_last(&r, "floor_force_z"), 90, "force, N");
-  PetscCall(record_free(&r));
   if (test_size == 1) {
     PetscCall(check_overlap("cr", "projected", "plane:0,0,1,0"));
     PetscCall(check_overlap("p2", "projected", "plane:0,0,1,0"));

@@ -45,7 +45,6 @@ static PetscErrorCode check_bodies(const char *what, const char *bodies, PetscRe
               1e-4 * PetscSqrtReal(mass * record_last(&r, "kinetic")), "momentum, kg m/s");
   VERIFY_LESS(record_size(&r, "angular", PETSC_FALSE),
               1e-2 * 0.1 * PetscSqrtReal(mass * record_last(&r, "kinetic")), "angular momentum, kg m^2/s");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -63,7 +62,6 @@ static PetscErrorCode check_aligned(void)
   VERIFY_NEAR(record_last(&r, "meet_unguarded"), 0, 0, "edges through triangles at the end");
   VERIFY_LESS(record_max(&r, "kinetic"), 2 * parting_energy(2, DEPTH), "kinetic energy, J");
   VERIFY_MORE(record_last(&r, "b_vx") - record_last(&r, "a_vx"), 0.1, "speed of parting, m/s");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -86,7 +84,6 @@ static PetscErrorCode check_obstacle(const char *obstacle)
   VERIFY_NEAR(record_last(&r, "floor_unguarded"), 0, 0, "what is behind at the end");
   VERIFY_NEAR(record_last(&r, "floor_force_z"), weight, 1e-3, "force at the end, N");
   VERIFY_LESS(record_last(&r, "kinetic"), 1e-5, "kinetic energy at the end, J");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -179,7 +176,6 @@ int main(int argc, char **argv)
                        STEP, 0.04));
   VERIFY_LESS(record_max(&r, "kinetic") + record_max(&r, "strain"), 1e-20, "energy, J");
   VERIFY_NEAR(record_max(&r, "meet_unguarded"), 0, 0, "edges through triangles");
-  PetscCall(record_free(&r));
   PetscCall(check_obstacle("plane:0,0,1,0"));
   PetscCall(check_obstacle("box:-0.1,-0.1,-0.05,0.2,0.2,0"));
   PetscCall(check_ring("p1"));

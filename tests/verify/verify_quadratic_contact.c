@@ -34,7 +34,6 @@ static PetscErrorCode press(const char *element, PetscInt cells, PetscReal *forc
   PetscCall(test_scene_close(&t));
   VERIFY_LESS(PetscAbsReal(pushed + stood), 1e-5 * *force, "sum of what holds both, N");
   VERIFY_MORE(record_min(&r, "min_J"), 0, "least det F");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

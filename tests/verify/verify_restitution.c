@@ -48,7 +48,6 @@ static PetscErrorCode check_pair(const char *what, const char *bodies, PetscReal
   VERIFY_LESS(record_max(&r, "net"), 1e-13 * record_max(&r, "push"), "forces of contact in all, N");
   /* stiff bodies: the tolerance of the solves is 1e-11 of the forces */
   check_meeting(&r, record_at(&r, "energy", 0), 1e-9, 2e-10);
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -68,7 +67,6 @@ static PetscErrorCode check_tower(void)
     1.));
   VERIFY_MORE(record_last(&r, "b_vz"), 0.5, "speed of the upper block, m/s");
   check_meeting(&r, record_at(&r, "kinetic", 0), 1e-9, 0);
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -88,7 +86,6 @@ static PetscErrorCode check_oblique(PetscReal friction, PetscReal e)
   VERIFY_LESS(record_max(&r, "net"), 1e-13 * record_max(&r, "push"), "forces of contact in all, N");
   verify_show("energy that is left, of that before", record_last(&r, "energy") / record_at(&r, "energy", 0));
   check_meeting(&r, record_at(&r, "energy", 0), 1e-6, 1e-10);
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -110,7 +107,6 @@ static PetscErrorCode check_soft(PetscReal young, PetscReal dt, PetscReal e)
                path, young, path, 2 * young, e, dt));
   /* the energy of rotating co-rotated tets is not exactly convex, even without contact */
   check_meeting(&r, record_at(&r, "energy", 0), 1e-5, 1e-8);
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -142,7 +138,6 @@ static PetscErrorCode check_self(void)
     1., path));
   check_meeting(&r, record_last(&r, "energy"), 1e-9, 0);
   VERIFY_LESS(record_size(&r, "momentum", PETSC_TRUE), 1e-12, "largest change of momentum, kg m/s");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -97,7 +97,6 @@ static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscRe
   /* the height is now RADIUS */
   if (!strcmp(element, "p1"))
     VERIFY_NEAR(-force * RADIUS / trace, 1, 1e-6, "height times force against the trace of the stress");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -120,7 +119,6 @@ static PetscErrorCode check_springs(const char *element)
   /* `projected` gives 3.430 N (P2); the penetration of the springs, 0.5 % of the stress over the shear modulus, is below the error of the mesh */
   if (!strcmp(element, "p2"))
     VERIFY_NEAR(record_last(&r, "floor_force_z") / 3.430, 1, 0.01, "force, of that without springs");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -149,7 +147,6 @@ static PetscErrorCode check_thrown(const char *element, PetscReal dt, PetscReal 
   VERIFY_LESS(record_gain(&r, "energy"), 1e-6 * record_at(&r, "energy", 0), "energy gained in a step, J");
   /* that of P2 on the same mesh; a constant penalty gives some 0.03 m less */
   VERIFY_NEAR(record_last(&r, "centre_z"), height, 0.003, "height of the centre, m");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -172,7 +169,6 @@ static PetscErrorCode check_released(const char *element)
   VERIFY_LESS(record_gain(&r, "energy"), 0.1, "energy gained in a step, J");
   VERIFY_LESS(record_last(&r, "energy"), 0.1, "energy at the end, J");
   VERIFY_NEAR(record_last(&r, "centre_z"), 0.025, 0.002, "height of the centre, m");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -196,7 +192,6 @@ static PetscErrorCode check_waves(const char *element)
   PetscCall(record_solve(&t, &r));
   VERIFY_LESS(-t.run->energies.integrator_loss, 0.06, "energy given, J, of 0.25 J when pressed");
   PetscCall(test_scene_close(&t));
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

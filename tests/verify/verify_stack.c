@@ -132,7 +132,6 @@ static PetscErrorCode check_stack(PetscReal friction, PetscReal slow)
   if (friction > 0) /* the guides of the other one push, too */
     VERIFY_LESS(record_max(&r, "missing"), 1e-4, "momentum that no force explains, kg m/s");
   VERIFY_LESS(record_gain(&r, "energy"), 1e-6, "largest gain of a step, J");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

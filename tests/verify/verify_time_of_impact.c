@@ -44,7 +44,6 @@ static PetscErrorCode fly(const char *more, PetscReal phase, PetscReal dt, Petsc
 
     b->off += PetscAbsReal(step - PetscFloorReal(step + 0.5)) > 1e-6;
   }
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
