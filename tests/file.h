@@ -1,6 +1,6 @@
 /*
-  file.h - temporary files of one test run: written by rank 0, read by any rank, with names unique to the run, removed
-  when the program ends.
+  file.h - temporary files of one test run: written by rank 0, read by any rank, with names unique to the run,
+  removed when the program ends.
 */
 #pragma once
 #include <ftw.h>
@@ -44,8 +44,8 @@ static inline PetscErrorCode test_file_keep(char path[512])
 
 /*
   A new file in the folder for temporary files, under a name that no other run has and that ends with `ending`
-  (".msh"). Collective; the name is the same on all ranks, `file` is open for writing on rank 0 and NULL on the
-  others. Close it with test_file_close().
+  (".msh"). Collective; the name is the same on all ranks, `file` is open for writing on rank 0 and NULL on
+  the others. Close it with test_file_close().
 */
 static inline PetscErrorCode test_file_open(const char ending[], char path[512], FILE **file)
 {

@@ -1,5 +1,6 @@
 /*
-  scene.h - builds a scene from an option string in a test program. Each call begins with an empty option database.
+  scene.h - builds a scene from an option string in a test program. Each call begins with an empty option
+  database.
 */
 #pragma once
 #include <sb.h>
@@ -36,8 +37,8 @@ static inline PetscErrorCode test_options(const char *options)
 }
 
 /*
-  Creates model and run on the ranks of `comm`, as the program does, ready for SbRunSolve(); with output to the folder
-  `dir` unless it is NULL.
+  Creates model and run on the ranks of `comm`, as the program does, ready for SbRunSolve(); with output to
+  the folder `dir` unless it is NULL.
 */
 static inline PetscErrorCode test_scene_open_on(MPI_Comm comm, const char *dir, const char *options,
                                                 TestScene *scene)

@@ -1,8 +1,8 @@
 /*
   slivers.h - a box of tets with a given fraction of slivers of a given smallest dihedral angle.
 
-  Interior vertices without common tets are moved, each in a random direction, until the first of its tets has the angle;
-  vertices are taken in random order until the fraction is reached. No tet is inverted.
+  Interior vertices without common tets are moved, each in a random direction, until the first of its tets has
+  the angle; vertices are taken in random order until the fraction is reached. No tet is inverted.
 */
 #pragma once
 #include "verify/verify.h"

@@ -1,9 +1,10 @@
 /*
-  test.h - framework of test programs: checks are counted and continue after a failure; the verdict is the same on every rank.
+  test.h - framework of test programs: checks are counted and continue after a failure; the verdict is the
+  same on every rank.
 
-  A test is `SB_TEST_BEGIN(argc, argv); ... SB_CHECK(...); ... SB_TEST_END();` inside main(). A failed check prints its
-  position and values; the last line is "N passed, N failed", and the exit code is 1 if a check failed on any rank.
-  SB_TEST_BEGIN sets test_rank and test_size.
+  A test is `SB_TEST_BEGIN(argc, argv); ... SB_CHECK(...); ... SB_TEST_END();` inside main(). A failed check
+  prints its position and values; the last line is "N passed, N failed", and the exit code is 1 if a check
+  failed on any rank. SB_TEST_BEGIN sets test_rank and test_size.
 */
 #pragma once
 #include <sbbase.h>
@@ -76,8 +77,8 @@ static inline PetscBool sb_test_names(const char *text, const char *names)
 }
 
 /*
-  The call must fail with the code `expected`, in one line that names all of `names`: option, file, line, value, with | between
-  them. How the sentence reads is not checked.
+  The call must fail with the code `expected`, in one line that names all of `names`: option, file, line,
+  value, with | between them. How the sentence reads is not checked.
 */
 #define SB_CHECK_ERROR(call, expected, names)                                                     \
   do {                                                                                            \

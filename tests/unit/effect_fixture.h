@@ -2,11 +2,11 @@
   effect_fixture.h - a small scene for the tests of effects: boxes, sets, the space; and comparison functions.
 
   The unit box "block" is box:1,1,1:2, or a mesh given by the test. Materials come from the options
-  -body_<name>_young and so on, which fixture_create() sets. The same scene can be created on PETSC_COMM_SELF next to the
-  parallel one: their fields are compared by original node number.
+  -body_<name>_young and so on, which fixture_create() sets. The same scene can be created on PETSC_COMM_SELF
+  next to the parallel one: their fields are compared by original node number.
 
-  fixture_use() sets the element of the next scenes, and whether their first set is constrained: then DG faces in it
-  have supports.
+  fixture_use() sets the element of the next scenes, and whether their first set is constrained: then DG faces
+  in it have supports.
 */
 #pragma once
 #include "test.h"

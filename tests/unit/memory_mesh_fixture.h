@@ -1,5 +1,6 @@
 /*
-  memory_mesh_fixture.h - a body of two tets in memory, with a triangle in a group and a tet in an inclusion that differs from its shape.
+  memory_mesh_fixture.h - a body of two tets in memory, with a triangle in a group and a tet in an inclusion
+  that differs from its shape.
 */
 #pragma once
 #include "output_fixture.h"

@@ -1,5 +1,6 @@
 /*
-  mesh_test.h - common functions of the tests of the mesh layer: bodies and sets in one line, meshes read and checked as in a run.
+  mesh_test.h - common functions of the tests of the mesh layer: bodies and sets in one line, meshes read and
+  checked as in a run.
 */
 #pragma once
 #include <sbmeshfile.h>

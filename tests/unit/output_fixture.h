@@ -1,8 +1,8 @@
 /*
   output_fixture.h - a scene with prescribed motion, for the tests of the output: no solve, exact numbers.
 
-  The vectors of the run are set by formulas of rest position and time, and the monitors are called in the order of the time
-  loop. Output goes to a temporary folder.
+  The vectors of the run are set by formulas of rest position and time, and the monitors are called in the
+  order of the time loop. Output goes to a temporary folder.
 */
 #pragma once
 #include <fcntl.h>

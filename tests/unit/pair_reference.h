@@ -1,5 +1,6 @@
 /*
-  pair_reference.h - reference distances of vertices, edges and triangles by enumeration of all features, in extended precision; random pairs.
+  pair_reference.h - reference distances of vertices, edges and triangles by enumeration of all features, in
+  extended precision; random pairs.
 */
 #pragma once
 #include <sbgeometry.h>

@@ -230,8 +230,8 @@ static inline void write_msh(FILE *f, const TestSurface *s)
 }
 
 /*
-  A file of this kind with the surface (s), or with the text when s is NULL, in the folder for temporary files. Collective: rank 0 writes,
-  the path is the same on all ranks.
+  A file of this kind with the surface (s), or with the text when s is NULL, in the folder for temporary
+  files. Collective: rank 0 writes, the path is the same on all ranks.
 */
 static inline PetscErrorCode test_file_write(const char *extension, PetscBool binary, const TestSurface *s,
                                              const char *text, char path[512])

@@ -1,7 +1,7 @@
 // @ranks 1
 /*
-  Box tree against all boxes one by one: boxes that overlap one, pairs of two trees and within one, the nearest; initially and after motion
-  of the boxes. Merging of points against all pairs of points.
+  Box tree against all boxes one by one: boxes that overlap one, pairs of two trees and within one, the
+  nearest; initially and after motion of the boxes. Merging of points against all pairs of points.
 */
 #include <sbgeometry.h>
 #include <math.h>

@@ -1,7 +1,8 @@
 // @ranks 1
 /*
-  Time of impact: never later than the true one, and its accuracy, on random and degenerate motions; against roots of the cubic, the
-  smallest distance over the step in extended precision, and times from another library.
+  Time of impact: never later than the true one, and its accuracy, on random and degenerate motions; against
+  roots of the cubic, the smallest distance over the step in extended precision, and times from another
+  library.
 */
 #include "pair_reference.h"
 
@@ -306,8 +307,9 @@ static void check_levels(void)
 /* ------------------------------------------------------------------ named motions */
 
 /*
-  Times of Tight Inclusion CCD (Wang et al., "A large-scale benchmark and an inclusion-based algorithm for continuous collision detection", 2021), ipc-toolkit
-  1.6.1, tolerance 1e-9, kept gap a ten-thousandth; -1: no impact. The time of the degenerate triangle is computed by hand.
+  Times of Tight Inclusion CCD (Wang et al., "A large-scale benchmark and an inclusion-based algorithm for
+  continuous collision detection", 2021), ipc-toolkit 1.6.1, tolerance 1e-9, kept gap a ten-thousandth; -1: no
+  impact. The time of the degenerate triangle is computed by hand.
 */
 typedef struct {
   const char *name;

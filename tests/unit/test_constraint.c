@@ -1,8 +1,9 @@
 // @ranks 1 2 3 4
 /*
-  Constraints of single nodes, projected in the matrix and outside it: a solve preserves n . u, the constraint force is the residual along
-  the normals, directions act like supports, a body on constraints or stiff springs only equals the body on a support, with every
-  solver and by a factorisation, which also counts negative eigenvalues.
+  Constraints of single nodes, projected in the matrix and outside it: a solve preserves n . u, the constraint
+  force is the residual along the normals, directions act like supports, a body on constraints or stiff
+  springs only equals the body on a support, with every solver and by a factorisation, which also counts
+  negative eigenvalues.
 */
 #include <sbsolver.h>
 #include "../scene.h"

@@ -1,7 +1,8 @@
 // @ranks 1 2 3 4
 /*
-  Linear systems of contact: iteration counts bounded for all stiffnesses, meshes and numbers of ranks; agreement with a factorisation; changing sparsity
-  patterns; detection of negative curvature; PETSc's methods instead of supple's.
+  Linear systems of contact: iteration counts bounded for all stiffnesses, meshes and numbers of ranks;
+  agreement with a factorisation; changing sparsity patterns; detection of negative curvature; PETSc's methods
+  instead of supple's.
 */
 #include "../contact_problem.h"
 

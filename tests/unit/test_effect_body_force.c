@@ -1,6 +1,6 @@
 /*
-  Body force: force and moment of quadratic densities on all cells and on a part; time in the density and as a factor;
-  independence of the number of ranks; every element.
+  Body force: force and moment of quadratic densities on all cells and on a part; time in the density and as a
+  factor; independence of the number of ranks; every element.
 */
 // @ranks 1 3
 #include "effect_fixture.h"

@@ -1,6 +1,6 @@
 /*
-  Contact effect: options and their errors, incompatible settings, a scene without contact, the tangent of contact springs against finite
-  differences of the force, and Coulomb's law in the friction constraints.
+  Contact effect: options and their errors, incompatible settings, a scene without contact, the tangent of
+  contact springs against finite differences of the force, and Coulomb's law in the friction constraints.
 */
 // @ranks 1 3
 #include "../scene.h"

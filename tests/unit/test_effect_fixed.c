@@ -1,6 +1,6 @@
 /*
-  Fixed support: constrained unknowns, their value zero, and the reaction: the residual of a body under its weight, so that
-  the support carries the weight at its nodes; every element.
+  Fixed support: constrained unknowns, their value zero, and the reaction: the residual of a body under its
+  weight, so that the support carries the weight at its nodes; every element.
 */
 // @ranks 1 3
 #include "effect_fixture.h"

@@ -1,6 +1,6 @@
 /*
-  Prescribed displacement: translation by formulas and by a table, rotation about an axis off the origin, both at once, single components;
-  reaction and torque; every element, and supports of DG faces.
+  Prescribed displacement: translation by formulas and by a table, rotation about an axis off the origin, both
+  at once, single components; reaction and torque; every element, and supports of DG faces.
 */
 // @ranks 1 3
 #include "effect_fixture.h"

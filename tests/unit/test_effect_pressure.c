@@ -1,7 +1,8 @@
 /*
-  Pressure: no resultant and the work -p dV on a closed deformed surface; force on one face; the tangent by Taylor
-  remainders on a closed surface and on an open one, with free and fixed boundary; symmetry of the matrix; boundaries that are supported,
-  or in symmetry planes, need no boundary term; rest normals if requested; every element.
+  Pressure: no resultant and the work -p dV on a closed deformed surface; force on one face; the tangent by
+  Taylor remainders on a closed surface and on an open one, with free and fixed boundary; symmetry of the
+  matrix; boundaries that are supported, or in symmetry planes, need no boundary term; rest normals if
+  requested; every element.
 */
 // @ranks 1 3
 #include "effect_fixture.h"
@@ -165,8 +166,8 @@ static PetscErrorCode apply(Fixture *x, Mat A, const PetscReal w[], PetscReal y[
 }
 
 /*
-  |f(u + h w) - f(u) + h A w| must decrease as h^2: it is -p times a quadratic in h w on facets, so the ratio of two
-  steps is 100 up to rounding. Without the tangent it is 10.
+  |f(u + h w) - f(u) + h A w| must decrease as h^2: it is -p times a quadratic in h w on facets, so the ratio
+  of two steps is 100 up to rounding. Without the tangent it is 10.
 */
 static PetscErrorCode check_taylor(Fixture *x, SbEffect e, Mat A, PetscBool rim)
 {

@@ -1,6 +1,6 @@
 /*
-  Selection of cells, facets and nodes by named sets on a unit cube: exact counts and areas over all ranks, each item once
-  if sets overlap, and error messages for invalid sets.
+  Selection of cells, facets and nodes by named sets on a unit cube: exact counts and areas over all ranks,
+  each item once if sets overlap, and error messages for invalid sets.
 */
 // @ranks 1 3
 #include "../../src/effect/effect_impl.h"

@@ -1,6 +1,7 @@
 /*
-  Traction: force and moment of polynomial densities on faces, counted once in overlapping sets; a total force; a dead load does
-  not follow the deformation; time; independence of the number of ranks; every element.
+  Traction: force and moment of polynomial densities on faces, counted once in overlapping sets; a total
+  force; a dead load does not follow the deformation; time; independence of the number of ranks; every
+  element.
 */
 // @ranks 1 3
 #include "effect_fixture.h"

@@ -1,10 +1,11 @@
 // @ranks 1 2 3 4
 /*
   Spatial error estimate: zero for solutions that the element represents exactly and for rigid motions, zero
-  across materials with different constant stresses, invariant under rotation of the body, additive, and independent of the
-  number of ranks.
+  across materials with different constant stresses, invariant under rotation of the body, additive, and
+  independent of the number of ranks.
 
-  Tolerances. Rounding of the strains, 1e-16 over the relative cell size, is squared in the energies: 1e-24 of them.
+  Tolerances. Rounding of the strains, 1e-16 over the relative cell size, is squared in the energies: 1e-24 of
+  them.
 */
 #include "../scene.h"
 

@@ -1,7 +1,8 @@
 // @ranks 1 3
 /*
-  Nodes solved exactly: for any preconditioner of the rest, the residual at these nodes vanishes afterwards (to the 1e-4 of
-  the 16-bit factor); the correction is symmetric; constrained nodes and nodes with non-local rows are never chosen.
+  Nodes solved exactly: for any preconditioner of the rest, the residual at these nodes vanishes afterwards
+  (to the 1e-4 of the 16-bit factor); the correction is symmetric; constrained nodes and nodes with non-local
+  rows are never chosen.
 */
 #include "../../src/solver/rotated.h"
 #include "../scene.h"

@@ -1,8 +1,8 @@
 // @ranks 1
 /*
-  The factor in 16-bit integers against dense linear algebra: solves, Schur complement of kept nodes, disconnected parts,
-  a matrix that is not positive definite. Rounding the columns to 1.5e-5 of their largest entry gives errors of
-  that size times the condition number of the factor, here about 3: 2e-4 is allowed.
+  The factor in 16-bit integers against dense linear algebra: solves, Schur complement of kept nodes,
+  disconnected parts, a matrix that is not positive definite. Rounding the columns to 1.5e-5 of their largest
+  entry gives errors of that size times the condition number of the factor, here about 3: 2e-4 is allowed.
 */
 #include "../../src/solver/factor.h"
 #include <test.h>

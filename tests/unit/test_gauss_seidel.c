@@ -1,6 +1,7 @@
 /*
-  Gauss-Seidel with the upper triangle: the sweeps solve with D + L^T and, from an initial guess, D + L of the rank's diagonal block, compared with PETSc's
-  MatSOR() on the same matrix, for P1, P2 and CR, with prescribed nodes; the residual returned by the first one equals that of a product.
+  Gauss-Seidel with the upper triangle: the sweeps solve with D + L^T and, from an initial guess, D + L of the
+  rank's diagonal block, compared with PETSc's MatSOR() on the same matrix, for P1, P2 and CR, with prescribed
+  nodes; the residual returned by the first one equals that of a product.
 */
 // @ranks 1 3
 #include "../../src/solver/gauss_seidel.h"

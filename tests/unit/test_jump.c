@@ -1,8 +1,8 @@
 // @ranks 1 3
 /*
-  Face terms of CR and DG against their formula: for each face the jump at three points of a quadrature rule that is exact for squares,
-  from the functions of the two cells at these positions, without the face nodes used in jump.c. Constrained DG faces
-  add the difference of the mean to that of their support.
+  Face terms of CR and DG against their formula: for each face the jump at three points of a quadrature rule
+  that is exact for squares, from the functions of the two cells at these positions, without the face nodes
+  used in jump.c. Constrained DG faces add the difference of the mean to that of their support.
 */
 #include "../../src/fem/fem_impl.h"
 #include "../scene.h"

@@ -1,7 +1,8 @@
 // @ranks 1 2 3 4
 /*
-  Nodes of a space: P1 at vertices, P2 at vertices and edges, CR one per face, DG four per cell and one for each constrained face, also mixed in
-  one space. Their number, positions and sharing by cells and ranks, equal on one rank and on several.
+  Nodes of a space: P1 at vertices, P2 at vertices and edges, CR one per face, DG four per cell and one for
+  each constrained face, also mixed in one space. Their number, positions and sharing by cells and ranks,
+  equal on one rank and on several.
 */
 #include "../scene.h"
 

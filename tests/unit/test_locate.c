@@ -1,6 +1,7 @@
 // @ranks 1
 /*
-  Point location in tets: against a search over all tets, at corners, outside, next to inverted tets, in curved ones. Shape quality of tets.
+  Point location in tets: against a search over all tets, at corners, outside, next to inverted tets, in
+  curved ones. Shape quality of tets.
 */
 #include "../../src/meshio/meshio_impl.h"
 #include "../test.h"

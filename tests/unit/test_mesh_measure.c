@@ -72,8 +72,9 @@ static void cylinder(PetscReal x[3])
 }
 
 /*
-  As a mesh of n x n x n cells, vertices and nodes of edges in their places, with the region of radii below 1.5 and the curve of radius 1 at the bottom.
-  What is measured over the exact value, less 1: volume, region, whole surface, outside, inside, bottom, curve.
+  As a mesh of n x n x n cells, vertices and nodes of edges in their places, with the region of radii below
+  1.5 and the curve of radius 1 at the bottom. What is measured over the exact value, less 1: volume, region,
+  whole surface, outside, inside, bottom, curve.
 */
 static PetscErrorCode measure_cylinder(PetscInt n, PetscBool curved, PetscReal error[7])
 {

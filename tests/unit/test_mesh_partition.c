@@ -38,8 +38,9 @@ static PetscErrorCode cut(const char *mesh, SbPartitioner type, PetscInt *most, 
 }
 
 /*
-  A bar of 24 x 6 x 6 cells of 6 tets: cut across into as many pieces as there are ranks, each border has 72 faces. METIS promises parts of at most 1 %
-  above the mean, bisection is rougher. No border may be longer than twice the shortest possible one.
+  A bar of 24 x 6 x 6 cells of 6 tets: cut across into as many pieces as there are ranks, each border has 72
+  faces. METIS promises parts of at most 1 % above the mean, bisection is rougher. No border may be longer
+  than twice the shortest possible one.
 */
 static PetscErrorCode test_bar(SbPartitioner type, PetscReal slack)
 {

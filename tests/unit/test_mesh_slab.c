@@ -45,8 +45,9 @@ static PetscErrorCode add_group(SbImport *im, int dim, const char *name, PetscIn
 }
 
 /*
-  Two separate boxes with some curved edges, the second one with its first tets inverted; unused vertices between them; an interior triangle and one that is no face; a line, a point;
-  lines and triangles at unused vertices.
+  Two separate boxes with some curved edges, the second one with its first tets inverted; unused vertices
+  between them; an interior triangle and one that is no face; a line, a point; lines and triangles at unused
+  vertices.
 */
 static PetscErrorCode make_mesh(const char *path, PetscBool random)
 {

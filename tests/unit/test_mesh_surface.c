@@ -5,8 +5,8 @@
 #include "surface_files.h"
 
 /*
-  Writes a surface or a text to a file, and reads it on rank 0 as a measured body; with `words` reading must fail with
-  this message. Returns whether there is a mesh, which SbImportDestroy() frees.
+  Writes a surface or a text to a file, and reads it on rank 0 as a measured body; with `words` reading must
+  fail with this message. Returns whether there is a mesh, which SbImportDestroy() frees.
 */
 static PetscErrorCode import(const char *extension, const TestSurface *s, const char *text,
                              const SbTetOptions *options, const char *words, TestMesh *m, PetscBool *here)

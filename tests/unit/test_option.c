@@ -1,5 +1,6 @@
 /*
-  test_option.c - table of options: readers, ranges, messages, unread options, the printed scenario, the manual.
+  test_option.c - table of options: readers, ranges, messages, unread options, the printed scenario, the
+  manual.
 */
 // @ranks 1 3
 #include "file.h"

@@ -1,7 +1,8 @@
 // @ranks 1 2 3
 /*
-  Two-level preconditioner: symmetric and positive definite; iteration counts nearly independent of the mesh, also on a slender
-  bar where incomplete Cholesky alone fails; agreement with a factorisation, with several and supported bodies; reported failures.
+  Two-level preconditioner: symmetric and positive definite; iteration counts nearly independent of the mesh,
+  also on a slender bar where incomplete Cholesky alone fails; agreement with a factorisation, with several
+  and supported bodies; reported failures.
 */
 #include "../scene.h"
 #include <sbsolver.h>

@@ -1,8 +1,9 @@
 // @ranks 1 2 4
 /*
-  P2 preconditioned by P1: the preconditioner is symmetric and positive definite, on any number of ranks and near nu = 1/2; iterations do not grow with
-  the mesh, by a third at most from one rank to four, and are bounded as in docs/reports/solvers.md up to nu 0.49; agreement with a factorisation, with
-  supports in single directions, with springs and with bodies of other elements; an error for runs without p2.
+  P2 preconditioned by P1: the preconditioner is symmetric and positive definite, on any number of ranks and
+  near nu = 1/2; iterations do not grow with the mesh, by a third at most from one rank to four, and are
+  bounded as in docs/reports/solvers.md up to nu 0.49; agreement with a factorisation, with supports in single
+  directions, with springs and with bodies of other elements; an error for runs without p2.
 */
 #include "../scene.h"
 #include <sbsolver.h>

@@ -1,8 +1,8 @@
 // @ranks 1 2 3
 /*
-  Solver with separate cell pressures: its operator is the tangent, for every material and element; the entries of its
-  matrix do not grow with lambda; the preconditioner is symmetric and positive; agreement with a factorisation;
-  iterations stay bounded as nu approaches 1/2 and the mesh is refined; reported failures.
+  Solver with separate cell pressures: its operator is the tangent, for every material and element; the
+  entries of its matrix do not grow with lambda; the preconditioner is symmetric and positive; agreement with
+  a factorisation; iterations stay bounded as nu approaches 1/2 and the mesh is refined; reported failures.
 */
 #include "../../src/solver/pressure.h"
 #include "../scene.h"

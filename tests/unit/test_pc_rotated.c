@@ -1,7 +1,7 @@
 // @ranks 1 2 3 4
 /*
-  Rotated factor: exact (up to its 16-bit rounding) for the original operator and for the one
-  of the rigidly rotated body; few iterations in a bent body; independence of the number of ranks; every kind of operator.
+  Rotated factor: exact (up to its 16-bit rounding) for the original operator and for the one of the rigidly
+  rotated body; few iterations in a bent body; independence of the number of ranks; every kind of operator.
 */
 #include "sbsolver.h"
 #include "../scene.h"

@@ -124,8 +124,9 @@ static PetscReal orthogonality(const PetscReal R[9])
 }
 
 /*
-  R is a rotation up to rounding, and within `rounding` |F| / (s2 + s3) of the reference: the rounding of F and of the
-  intermediate sums times the condition number. Where that exceeds 1e-3 only the maximum itself is compared.
+  R is a rotation up to rounding, and within `rounding` |F| / (s2 + s3) of the reference: the rounding of F
+  and of the intermediate sums times the condition number. Where that exceeds 1e-3 only the maximum itself is
+  compared.
 */
 static void check_against_reference(const PetscReal F[9], const char *what)
 {

@@ -1,6 +1,6 @@
 /*
-  Products with block matrices: agreement with AIJ, after changes of the values, and after a copy of the matrix. The
-  same for the symmetric diagonal block of this rank.
+  Products with block matrices: agreement with AIJ, after changes of the values, and after a copy of the
+  matrix. The same for the symmetric diagonal block of this rank.
 */
 #include "../scene.h"
 #include "sbassembly.h"

@@ -1,6 +1,6 @@
 /*
-  Obstacles from meshes: distance, normal and side of a cube against the box: obstacle, of a fine sphere against the exact ones, of non-convex
-  shapes against all triangles and the winding number; the note; errors.
+  Obstacles from meshes: distance, normal and side of a cube against the box: obstacle, of a fine sphere
+  against the exact ones, of non-convex shapes against all triangles and the winding number; the note; errors.
 */
 // @ranks 1 3
 #include "mesh_test.h"

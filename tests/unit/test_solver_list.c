@@ -1,7 +1,8 @@
 // @ranks 1 2
 /*
-  If a solver fails, the next one of the list solves the same system: no step is rejected, the solution agrees with a factorisation, and the run continues
-  with it. A method chosen by the user is not replaced, nor is any if a body is free.
+  If a solver fails, the next one of the list solves the same system: no step is rejected, the solution agrees
+  with a factorisation, and the run continues with it. A method chosen by the user is not replaced, nor is any
+  if a body is free.
 */
 #include <sbsolver.h>
 #include "../slivers.h"

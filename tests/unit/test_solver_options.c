@@ -1,11 +1,12 @@
 // @ranks 1 2
 /*
-  PETSc's -ksp_type, -pc_type and -ksp_norm_type combined with every preset of -solver, for all elements, static and dynamic, with and without
-  contact: each run gives the solution of the default solver, or ends before the computation with one line that names the option.
-  Expected errors are a table here, so an unexpected one fails the test too.
+  PETSc's -ksp_type, -pc_type and -ksp_norm_type combined with every preset of -solver, for all elements,
+  static and dynamic, with and without contact: each run gives the solution of the default solver, or ends
+  before the computation with one line that names the option. Expected errors are a table here, so an
+  unexpected one fails the test too.
 
-  Every method with every preconditioner is run in each case. With presets all combinations are run where `whole` is set, or with the argument "all"; elsewhere the methods that
-  differ most.
+  Every method with every preconditioner is run in each case. With presets all combinations are run where
+  `whole` is set, or with the argument "all"; elsewhere the methods that differ most.
 */
 #include "../scene.h"
 

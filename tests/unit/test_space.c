@@ -1,7 +1,8 @@
 // @ranks 1 2 3 4
 /*
-  Residual, tangent and matrices of a space, for every element and material: the three storage formats agree, the tangent is symmetric and
-  the derivative of the residual, which is that of the energy; forces balance, mass is complete.
+  Residual, tangent and matrices of a space, for every element and material: the three storage formats agree,
+  the tangent is symmetric and the derivative of the residual, which is that of the energy; forces balance,
+  mass is complete.
 */
 #include "../scene.h"
 

@@ -1,6 +1,6 @@
 /*
-  test_thread.c - a factorisation creates no threads: the threads of the process are counted before and after it, and no library reports that it
-  would use more than one.
+  test_thread.c - a factorisation creates no threads: the threads of the process are counted before and after
+  it, and no library reports that it would use more than one.
 */
 #include <sbbase.h>
 #include <stdio.h>

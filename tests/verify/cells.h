@@ -1,5 +1,6 @@
 /*
-  cells.h - displacement function of any element in a cell and at a vertex; boxes with perturbed interior vertices.
+  cells.h - displacement function of any element in a cell and at a vertex; boxes with perturbed interior
+  vertices.
 */
 #pragma once
 #include "verify.h"

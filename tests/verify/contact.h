@@ -1,6 +1,6 @@
 /*
-  contact.h - common functions of the verification of contact: history columns by name, sums over each body, the history as a
-  table, balls made of boxes.
+  contact.h - common functions of the verification of contact: history columns by name, sums over each body,
+  the history as a table, balls made of boxes.
 */
 #pragma once
 #include "verify.h"
@@ -119,10 +119,11 @@ static inline PetscErrorCode contact_body_forces(SbRun run, PetscReal t, PetscRe
 }
 
 /*
-  History of a run: a row per step, initial state included, with named columns: t, dt, kinetic, strain, energy (total with the
-  potential of gravity g along -z and the barrier energy), momentum_x, angular_x, centre_x, volume, min_J, speed, BODY_vx (of its centre), EFFECT_COLUMN of the
-  contact effects, missing (largest component of the change of momentum in the step less that by weight and obstacle forces,
-  kg m/s), and, if requested, net (likewise of the sum of contact forces on all bodies) and push (on the first body), N.
+  History of a run: a row per step, initial state included, with named columns: t, dt, kinetic, strain, energy
+  (total with the potential of gravity g along -z and the barrier energy), momentum_x, angular_x, centre_x,
+  volume, min_J, speed, BODY_vx (of its centre), EFFECT_COLUMN of the contact effects, missing (largest
+  component of the change of momentum in the step less that by weight and obstacle forces, kg m/s), and, if
+  requested, net (likewise of the sum of contact forces on all bodies) and push (on the first body), N.
 */
 typedef struct {
   PetscReal g;                      /* set before the run, m/s^2 */

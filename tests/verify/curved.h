@@ -1,6 +1,6 @@
 /*
-  curved.h - second-order meshes: a triangular prism, n cells along its sides, m layers, three tets per cell, mapped at all ten nodes of each tet
-  (curved) or at the four vertices only (straight).
+  curved.h - second-order meshes: a triangular prism, n cells along its sides, m layers, three tets per cell,
+  mapped at all ten nodes of each tet (curved) or at the four vertices only (straight).
 */
 #pragma once
 #include "verify.h"

@@ -3,13 +3,14 @@
 
     F = 4/3 E* sqrt(R) d^(3/2),   1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2,   1/R = 1/R1 + 1/R2,   a = sqrt(R d),
 
-  for a sphere on a half-space of another material, and for two equal spheres; d is the approach of distant points, a the contact
-  radius. Quarters of both bodies, non-matching meshes, graded towards the contact point. The materials are linear and a is at most
-  R/80, so that the discretisation error dominates.
+  for a sphere on a half-space of another material, and for two equal spheres; d is the approach of distant
+  points, a the contact radius. Quarters of both bodies, non-matching meshes, graded towards the contact
+  point. The materials are linear and a is at most R/80, so that the discretisation error dominates.
 
-  The blocks are finite: their far faces have the displacement of half-spaces under a point force F (Boussinesq), whose relative error is of order
-  (a/r)^2, r > 8 a. F is taken from the formula. This cannot hide an error of the contact force: the displacement there is at most a tenth of d,
-  so an error of 5 % in F changes the approach by 0.5 % of d.
+  The blocks are finite: their far faces have the displacement of half-spaces under a point force F
+  (Boussinesq), whose relative error is of order (a/r)^2, r > 8 a. F is taken from the formula. This cannot
+  hide an error of the contact force: the displacement there is at most a tenth of d, so an error of 5 % in F
+  changes the approach by 0.5 % of d.
 */
 #pragma once
 #include "contact.h"
@@ -22,8 +23,8 @@ enum { CONTACTS, DEEPEST, MEAN, NORMAL, FRICTION, WORK, LOSS, NVALUE = 16 };
 #define CELLS 20    /* cells along an edge of the finest mesh */
 
 /*
-  One body above (side 1) or below (side -1) the plane z = 0: cells at the contact are `fine` times those of a uniform mesh; the surface
-  has the radius `radius` (0: flat).
+  One body above (side 1) or below (side -1) the plane z = 0: cells at the contact are `fine` times those of a
+  uniform mesh; the surface has the radius `radius` (0: flat).
 */
 typedef struct {
   PetscReal fine, side, radius;
@@ -84,8 +85,8 @@ static inline PetscErrorCode boussinesq(PetscReal P, PetscReal E, PetscReal side
 }
 
 /*
-  Both bodies between the symmetry planes x = 0 and y = 0. The contact surface is the part within a few d of z = 0: up to
-  a few a, without the sides, whose first layer of cells is thicker.
+  Both bodies between the symmetry planes x = 0 and y = 0. The contact surface is the part within a few d of z
+  = 0: up to a few a, without the sides, whose first layer of cells is thicker.
 */
 static inline PetscErrorCode open_pair(const Pair *p, const Case *c, PetscReal d, PetscReal P,
                                        char path[2][512], TestScene *t)
@@ -141,8 +142,8 @@ static inline PetscErrorCode read_forces(SbRun run, PetscReal values[NVALUE], Pe
 }
 
 /*
-  Force of a case on the far face of the upper body, over that of the formula. The force in the history is a sum over pairs, those of
-  edges being slightly inclined; it must be equal within the tolerance.
+  Force of a case on the far face of the upper body, over that of the formula. The force in the history is a
+  sum over pairs, those of edges being slightly inclined; it must be equal within the tolerance.
 */
 static inline PetscErrorCode hertz(const Pair *p, const Case *c, PetscReal *force)
 {

@@ -1,6 +1,7 @@
 /*
-  locking.h - problems for the comparison of elements near nu = 1/2: each is a function of the mesh, Poisson's ratio and
-  further options (element, penalties, solver). Results are evaluated from the element's own functions.
+  locking.h - problems for the comparison of elements near nu = 1/2: each is a function of the mesh, Poisson's
+  ratio and further options (element, penalties, solver). Results are evaluated from the element's own
+  functions.
 */
 #pragma once
 #include <time.h>
@@ -68,8 +69,8 @@ static inline PetscErrorCode locking_cube(PetscInt n, const char *file, PetscRea
 }
 
 /*
-  Bar of 0.4 x 0.1 x 0.1 m, x = 0 clamped, under its weight, small strains, n perturbed cells across: u_z at the centre of the
-  end face, strain energy.
+  Bar of 0.4 x 0.1 x 0.1 m, x = 0 clamped, under its weight, small strains, n perturbed cells across: u_z at
+  the centre of the end face, strain energy.
 */
 static inline PetscErrorCode locking_bar(PetscInt n, PetscReal nu, const char *more, PetscReal value[2],
                                          LockingCost *cost)
@@ -130,8 +131,8 @@ static inline PetscReal locking_shell_displacement(PetscReal nu, PetscReal r)
 }
 
 /*
-  Adds the squares of one cell: radial and hoop stress, error and exact value, sum[0..3]; displacement at the centroid, error and
-  exact value, sum[4..5]; sum[6] is the volume.
+  Adds the squares of one cell: radial and hoop stress, error and exact value, sum[0..3]; displacement at the
+  centroid, error and exact value, sum[4..5]; sum[6] is the volume.
 */
 static inline void locking_shell_cell(const VerifyCell *cell, const PetscReal sigma[6], PetscReal nu,
                                       PetscReal sum[7])
@@ -315,8 +316,8 @@ static inline PetscErrorCode locking_twist(PetscInt n, PetscReal nu, const char 
 }
 
 /*
-  A soft block, 0.1 x 0.1 x 0.2 m, hangs from its top under gravity, n perturbed cells across; `more` has the material and
-  Young's modulus: largest displacement (m), relative change of volume, smallest J.
+  A soft block, 0.1 x 0.1 x 0.2 m, hangs from its top under gravity, n perturbed cells across; `more` has the
+  material and Young's modulus: largest displacement (m), relative change of volume, smallest J.
 */
 static inline PetscErrorCode locking_hang(PetscInt n, PetscReal nu, const char *more, PetscReal value[3],
                                           LockingCost *cost)

@@ -3,12 +3,12 @@
 
     u = (phi_y - phi_z, phi_z - phi_x, phi_x - phi_y),   u = 0 on the boundary,   f = -mu Lap u,   E = 3.
 
-  The force does not depend on lambda, so the exact solution is the same for every Poisson's ratio, and any dependence on it is
-  due to the element. Locking shows on meshes with perturbed interior vertices: on the mirrored cells of a box linear tets
-  have enough divergence-free displacements.
+  The force does not depend on lambda, so the exact solution is the same for every Poisson's ratio, and any
+  dependence on it is due to the element. Locking shows on meshes with perturbed interior vertices: on the
+  mirrored cells of a box linear tets have enough divergence-free displacements.
 
-  Errors are those of the element's own function in each cell, by a quadrature rule of degree 5 (Walkington 2000), relative to
-  the norm of u.
+  Errors are those of the element's own function in each cell, by a quadrature rule of degree 5 (Walkington
+  2000), relative to the norm of u.
 */
 #pragma once
 #include "cells.h"

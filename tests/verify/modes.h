@@ -1,6 +1,6 @@
 /*
-  modes.h - lowest eigenvalues w^2 of K x = w^2 M x by subspace iteration with the program's stiffness and mass matrices, also for
-  free bodies: the factorised matrix is K + shift M.
+  modes.h - lowest eigenvalues w^2 of K x = w^2 M x by subspace iteration with the program's stiffness and
+  mass matrices, also for free bodies: the factorised matrix is K + shift M.
 */
 #pragma once
 #include "verify.h"

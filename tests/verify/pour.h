@@ -1,9 +1,10 @@
 /*
   pour.h - small bodies poured into a bowl: common part of the short and the long test.
 
-  Boxes of a few tets with various orientations fall in layers. Checks: the energy including gravity never exceeds the initial one;
-  the momentum changes by weight and the force of the bowl; no surface vertex is behind the bowl at the end of a step, or deep inside another
-  body; body centres end inside the bowl, and resting bodies are supported.
+  Boxes of a few tets with various orientations fall in layers. Checks: the energy including gravity never
+  exceeds the initial one; the momentum changes by weight and the force of the bowl; no surface vertex is
+  behind the bowl at the end of a step, or deep inside another body; body centres end inside the bowl, and
+  resting bodies are supported.
 */
 #pragma once
 #include "../../src/effect/barrier_impl.h"
@@ -102,8 +103,8 @@ static inline PetscReal pour_depth(const Barrier *s, const PetscInt from[], Pets
 }
 
 /*
-  How deep bodies are in each other without asking for pairs: places along all edges of all facets against the facets of every other
-  body, which is convex but for its strain. On one rank.
+  How deep bodies are in each other without asking for pairs: places along all edges of all facets against the
+  facets of every other body, which is convex but for its strain. On one rank.
 */
 static inline PetscErrorCode pour_inside(SbModel m, PetscReal *inside)
 {

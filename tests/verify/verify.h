@@ -1,6 +1,6 @@
 /*
-  verify.h - common functions of the verification programs: scenes, boxes with perturbed vertices, 3x3 algebra, Richardson
-  extrapolation.
+  verify.h - common functions of the verification programs: scenes, boxes with perturbed vertices, 3x3
+  algebra, Richardson extrapolation.
 */
 #pragma once
 #include "../file.h"
@@ -54,8 +54,8 @@ static inline void verify_write_cells(FILE *f, const PetscInt n[3])
 }
 
 /*
-  A box of n[0] x n[1] x n[2] cells with its vertices where `map` puts them, as a gmsh file in the folder for temporary
-  files. Collective; the path is the same on all ranks, rank 0 writes.
+  A box of n[0] x n[1] x n[2] cells with its vertices where `map` puts them, as a gmsh file in the folder for
+  temporary files. Collective; the path is the same on all ranks, rank 0 writes.
 */
 static inline PetscErrorCode verify_mesh_write(const PetscInt n[3], VerifyMap map, void *ctx, char path[512])
 {
@@ -94,8 +94,8 @@ static inline PetscInt verify_numbers(SbModel m)
 }
 
 /*
-  A vector of the run by the number of each node that no partition changes, on every rank: [verify_numbers()][3], zero at
-  numbers without a node; the caller frees it with PetscFree().
+  A vector of the run by the number of each node that no partition changes, on every rank:
+  [verify_numbers()][3], zero at numbers without a node; the caller frees it with PetscFree().
 */
 static inline PetscErrorCode verify_gather(SbModel m, Vec U, PetscReal **value)
 {
@@ -191,8 +191,8 @@ static inline PetscErrorCode verify_solve(TestScene *t, const char *what)
 }
 
 /*
-  Order of Newton's method: errors after one iteration from the solution with a perturbation of `size`, and of a tenth of
-  it; `ripple` is any displacement.
+  Order of Newton's method: errors after one iteration from the solution with a perturbation of `size`, and of
+  a tenth of it; `ripple` is any displacement.
 */
 static inline PetscErrorCode verify_newton(TestScene *t, void (*ripple)(const PetscReal x[3], PetscReal v[3]),
                                            PetscReal size, PetscReal error[2], PetscReal *order)

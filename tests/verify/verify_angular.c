@@ -6,8 +6,8 @@
 
       L1 - L0 = h sum x1 x f + h sum m v1 x v0,
 
-  where the internal forces have no torque. The difference to the last sum is the torque of the contact forces: it is zero
-  because the contact energy of a pair is invariant under rotation of both bodies.
+  where the internal forces have no torque. The difference to the last sum is the torque of the contact
+  forces: it is zero because the contact energy of a pair is invariant under rotation of both bodies.
 */
 #include "contact.h"
 

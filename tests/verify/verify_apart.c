@@ -40,8 +40,9 @@ static PetscErrorCode motion(const char *options, Record *r, PetscInt *n, PetscR
 }
 
 /*
-  The preconditioners of `rotated` and `two_level` keep something from solve to solve and are renewed when the operator is a new one, as the
-  one that contact constraints wrap: with a `tolerance` scenes with them may differ by what solves leave.
+  The preconditioners of `rotated` and `two_level` keep something from solve to solve and are renewed when the
+  operator is a new one, as the one that contact constraints wrap: with a `tolerance` scenes with them may
+  differ by what solves leave.
 */
 static PetscErrorCode check_named(const char *element, const char *time, const char *solver,
                                   PetscReal tolerance)

@@ -8,9 +8,9 @@
               6.38808 J, computed with graded hexahedra of high order
     elastica  slender bar with an end load of fixed direction, alpha = P L^2/(E I) (Bisshopp and Drucker 1945)
 
-  P1 is too stiff in bending: errors decrease as h^2 but are large, so results on several meshes are extrapolated to h = 0
-  (Richardson). With nu = 0 plane bending does not depend on the width: one layer of cells between two symmetry planes
-  is enough.
+  P1 is too stiff in bending: errors decrease as h^2 but are large, so results on several meshes are
+  extrapolated to h = 0 (Richardson). With nu = 0 plane bending does not depend on the width: one layer of
+  cells between two symmetry planes is enough.
 */
 #include "verify.h"
 

@@ -1,8 +1,8 @@
 // @ranks 1
 /*
-  Bending near nu = 1/2 with CR, DG and P2, compared with P1: the clamped bar under its weight and Cook's membrane
-  (references: high-order elements, mixed near nu = 1/2). The penalty gamma1 is a compromise between both problems and
-  verify_locking.c; docs/reports/locking.md has finer meshes.
+  Bending near nu = 1/2 with CR, DG and P2, compared with P1: the clamped bar under its weight and Cook's
+  membrane (references: high-order elements, mixed near nu = 1/2). The penalty gamma1 is a compromise between
+  both problems and verify_locking.c; docs/reports/locking.md has finer meshes.
 */
 #include "locking.h"
 

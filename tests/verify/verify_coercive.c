@@ -1,8 +1,9 @@
 // @ranks 1
 /*
-  Positive semi-definiteness of the stiffness of CR, DG and P2 for all meshes, Poisson ratios and penalties. All eigenvalues of
-  D^-1/2 K D^-1/2, D the diagonal of K, of free bodies on small meshes by LAPACK: exactly six are zero, the rigid modes,
-  none is negative. The scaling removes mesh size: the largest eigenvalue is between 1 and the number of entries of a row.
+  Positive semi-definiteness of the stiffness of CR, DG and P2 for all meshes, Poisson ratios and penalties.
+  All eigenvalues of D^-1/2 K D^-1/2, D the diagonal of K, of free bodies on small meshes by LAPACK: exactly
+  six are zero, the rigid modes, none is negative. The scaling removes mesh size: the largest eigenvalue is
+  between 1 and the number of entries of a row.
 
     meshes    random perturbations of vertices; size ratios of tets of 1000 to 1; tets with angles of 0.06 degrees
     gammas    CR and DG with default penalties, and DG with both gammas at 0.01: positive for every positive gamma
@@ -12,7 +13,8 @@
               the solid is stable, as neo-Hookean P2; the limits are printed
     not so    with gamma1 = 1e-12 CR has many zero-energy modes (Falk 1991): the test detects them
 
-  Rounding: matrix entries are accurate to 1e-15 of the largest one, so eigenvalues to about 1e-14 of the largest one.
+  Rounding: matrix entries are accurate to 1e-15 of the largest one, so eigenvalues to about 1e-14 of the
+  largest one.
 */
 #include "verify.h"
 

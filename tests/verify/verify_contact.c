@@ -344,9 +344,9 @@ static void hertz_map(const VerifyPlace *place, PetscReal x[3])
 }
 
 /*
-  Hertz: a rigid sphere of radius R with approach d to a half-space has the contact radius a = sqrt(R d) and the force
-  4/3 E / (1 - nu^2) sqrt(R) d^(3/2). The far faces have the displacement of a half-space under that point force (Boussinesq); at
-  their distance of 20 a the difference is of the order (a/r)^2 of it.
+  Hertz: a rigid sphere of radius R with approach d to a half-space has the contact radius a = sqrt(R d) and
+  the force 4/3 E / (1 - nu^2) sqrt(R) d^(3/2). The far faces have the displacement of a half-space under that
+  point force (Boussinesq); at their distance of 20 a the difference is of the order (a/r)^2 of it.
 */
 static PetscErrorCode check_hertz(const char *element, PetscInt cells, PetscReal tolerance)
 {

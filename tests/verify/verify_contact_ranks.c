@@ -1,11 +1,12 @@
 // @ranks 2 3 4
 /*
-  Contact on any number of ranks gives the same motion: two blocks fall on a floor and onto each other, next to a rigid ball that the
-  upper one hits too, without friction. Every rank runs the scene alone, then all ranks run it together.
+  Contact on any number of ranks gives the same motion: two blocks fall on a floor and onto each other, next
+  to a rigid ball that the upper one hits too, without friction. Every rank runs the scene alone, then all
+  ranks run it together.
 
-  The active set is discrete: the number of contacts of every step must be equal. Displacements, velocities and forces may differ by solver
-  tolerances, which depend on the number of ranks: Newton's method stops at 1e-11 of the first residual of a step, and an impact
-  amplifies earlier differences.
+  The active set is discrete: the number of contacts of every step must be equal. Displacements, velocities
+  and forces may differ by solver tolerances, which depend on the number of ranks: Newton's method stops at
+  1e-11 of the first residual of a step, and an impact amplifies earlier differences.
 */
 #include "contact.h"
 

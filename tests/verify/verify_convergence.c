@@ -1,10 +1,11 @@
 // @ranks 1 2
 /*
-  Convergence of P1 on a divergence-free manufactured solution (manufactured.h): order 2 in L2 and 1 in H1. P1 locks near nu = 1/2:
-  not on the mirrored cells of a box, which have enough divergence-free displacements, but on perturbed
-  meshes. verify_locking.c tests the elements that do not lock.
+  Convergence of P1 on a divergence-free manufactured solution (manufactured.h): order 2 in L2 and 1 in H1. P1
+  locks near nu = 1/2: not on the mirrored cells of a box, which have enough divergence-free displacements,
+  but on perturbed meshes. verify_locking.c tests the elements that do not lock.
 
-  Orders from n = 8 to 16 are slightly below the limit, because a period of u has only n cells: the tolerance is 0.1.
+  Orders from n = 8 to 16 are slightly below the limit, because a period of u has only n cells: the tolerance
+  is 0.1.
 */
 #include "manufactured.h"
 

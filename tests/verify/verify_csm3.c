@@ -1,11 +1,12 @@
 // @ranks 1
 /*
-  Structural benchmark CSM3 of Turek and Hron (2006): the beam of verify_stvk.c under sudden gravity, from rest. The tip
-  oscillates with u_y = -63.6e-3 +- 65.2e-3 m, u_x = -14.3e-3 +- 14.3e-3 m, at 1.0995 Hz.
+  Structural benchmark CSM3 of Turek and Hron (2006): the beam of verify_stvk.c under sudden gravity, from
+  rest. The tip oscillates with u_y = -63.6e-3 +- 65.2e-3 m, u_x = -14.3e-3 +- 14.3e-3 m, at 1.0995 Hz.
 
-  Newmark (1/4, 1/2). P1 with 4 and 8 cells across the beam: amplitudes are too small and the frequency too high, with errors of order h^2;
-  both are extrapolated (Richardson). P2 uses 2 cells. The trapezoidal rule does not control the energy of a nonlinear body: one code became unstable
-  after 3.2 s with steps of 0.02 s. Here the energy must be bounded for ten seconds of such steps.
+  Newmark (1/4, 1/2). P1 with 4 and 8 cells across the beam: amplitudes are too small and the frequency too
+  high, with errors of order h^2; both are extrapolated (Richardson). P2 uses 2 cells. The trapezoidal rule
+  does not control the energy of a nonlinear body: one code became unstable after 3.2 s with steps of 0.02 s.
+  Here the energy must be bounded for ten seconds of such steps.
 */
 #include "locking.h"
 

@@ -1,7 +1,7 @@
 // @ranks 1 2
 /*
-  Contact springs with dampers: a stiff block hits a plane, with response `penalty`.
-  It is a mass on a spring k and a dashpot k tau without tension: the rebound speed is that of this oscillator.
+  Contact springs with dampers: a stiff block hits a plane, with response `penalty`. It is a mass on a spring
+  k and a dashpot k tau without tension: the rebound speed is that of this oscillator.
 */
 #include "contact.h"
 

@@ -1,11 +1,12 @@
 // @ranks 1 2
 /*
-  A cloth-like plate, one cell thick, falls on a ball and drapes over it. The ball is a rigid obstacle, with friction, or a body fixed
-  at its lower end, without.
+  A cloth-like plate, one cell thick, falls on a ball and drapes over it. The ball is a rigid obstacle, with
+  friction, or a body fixed at its lower end, without.
 
-  No vertex of the plate is inside the rigid ball at the end of a step; in the deformable one the penetration is below 0.4 of the plate's thickness (redundant
-  constraints are not corrected); no cell is inverted, no step gains energy, the momentum changes by weight and
-  the force of the ball, and at the end the plate hangs down on all sides.
+  No vertex of the plate is inside the rigid ball at the end of a step; in the deformable one the penetration
+  is below 0.4 of the plate's thickness (redundant constraints are not corrected); no cell is inverted, no
+  step gains energy, the momentum changes by weight and the force of the ball, and at the end the plate hangs
+  down on all sides.
 */
 #include "pour.h"
 

@@ -2,9 +2,10 @@
 /*
   A ball bounces on a plane, with implicit Euler and with generalized-alpha.
 
-  The energy including gravity never exceeds the initial one: exactly for implicit Euler, within the stated fraction of the fall
-  energy for generalized-alpha. In every step the momentum changes by weight and the force of the plane. For generalized-alpha these act at
-  the stage, where M a = force - weight with a = a0 + alpha_m (a1 - a0), and so
+  The energy including gravity never exceeds the initial one: exactly for implicit Euler, within the stated
+  fraction of the fall energy for generalized-alpha. In every step the momentum changes by weight and the
+  force of the plane. For generalized-alpha these act at the stage, where M a = force - weight with a = a0 +
+  alpha_m (a1 - a0), and so
 
       p1 - p0 = h (force - weight) + h (gamma - alpha_m) M (a1 - a0).
 

@@ -8,8 +8,8 @@
     box      a box falls on a thin plate at 5 m/s, corner first and edge first: no penetration in any step
     rings    two linked coarse rings with interior edges are pulled apart: they stay linked
 
-  Penetration is measured independently of the detector: many sample points on all edges of one surface; for those inside
-  the other one, by its solid angle, the distance from it.
+  Penetration is measured independently of the detector: many sample points on all edges of one surface; for
+  those inside the other one, by its solid angle, the distance from it.
 */
 #include <sbgeometry.h>
 #include "contact.h"

@@ -1,7 +1,7 @@
 // @ranks 1
 /*
-  Effectivity of the spatial error estimate: estimate over true error in the energy norm (sbestimate.h), for P1, CR, DG and P2, on
-  problems with known stress, or with a reference on a mesh at least twice as fine.
+  Effectivity of the spatial error estimate: estimate over true error in the energy norm (sbestimate.h), for
+  P1, CR, DG and P2, on problems with known stress, or with a reference on a mesh at least twice as fine.
 
     cube      manufactured.h, n perturbed cells along an edge; at nu = 0.49999 P1 has a thousandth of the exact displacement
     shell     Lame's hollow sphere (locking.h), edge length 0.3
@@ -14,9 +14,10 @@
     sphere    a rigid sphere that indents a quarter of a block
     wave      axial vibration of a rod: half of its load is inertia
 
-  Each ratio must be between 0.6 and 1.3 (measured: 0.65 to 1.26). The last two columns are other estimators on P1: recovery
-  only (Zienkiewicz and Zhu 1992), which does not detect locking; and traction jumps (Verfuerth 1996), eta^2 = c sum_F h |F| |[P N]|^2 / mu with c
-  calibrated for the cube, n = 16 and nu = 0.3, which exceed the error if the pressure oscillates.
+  Each ratio must be between 0.6 and 1.3 (measured: 0.65 to 1.26). The last two columns are other estimators
+  on P1: recovery only (Zienkiewicz and Zhu 1992), which does not detect locking; and traction jumps
+  (Verfuerth 1996), eta^2 = c sum_F h |F| |[P N]|^2 / mu with c calibrated for the cube, n = 16 and nu = 0.3,
+  which exceed the error if the pressure oscillates.
 */
 #include "locking.h"
 

@@ -2,10 +2,11 @@
 /*
   The bar 0.4 x 0.1 x 0.1 m, clamped, E = 5e4, nu = 0.3, rho = 1000, small strains.
 
-  Lowest natural frequency, 0.68846 Hz in the continuum (computed with high-order elements): the discrete one is found by
-  inverse iteration with the program's stiffness and mass, K y = M x, and converges from above;
-  three meshes are extrapolated (Aitken). CR and DG are close to it already on coarse meshes. Released in this mode the bar must oscillate with this
-  frequency: Newmark lengthens the period by (w h/2)/atan(w h/2), to 1e-8.
+  Lowest natural frequency, 0.68846 Hz in the continuum (computed with high-order elements): the discrete one
+  is found by inverse iteration with the program's stiffness and mass, K y = M x, and converges from above;
+  three meshes are extrapolated (Aitken). CR and DG are close to it already on coarse meshes. Released in this
+  mode the bar must oscillate with this frequency: Newmark lengthens the period by (w h/2)/atan(w h/2), to
+  1e-8.
 
   Sudden gravity, undamped: the first minimum of the end face is -1.5696 m at 0.7203 s.
 */

@@ -1,12 +1,12 @@
 // @ranks 1 2 3
 /*
-  A body of two materials. A cube whose far half is an inclusion is pulled along x between smooth walls: the stress is
-  sigma everywhere, and each half has the strain sigma / (lambda + 2 mu). The exact displacement is linear in each half, so
-  that every element must reproduce it on any mesh, for any ratio of moduli: here one million, once in the
-  stiffness and once in lambda only.
+  A body of two materials. A cube whose far half is an inclusion is pulled along x between smooth walls: the
+  stress is sigma everywhere, and each half has the strain sigma / (lambda + 2 mu). The exact displacement is
+  linear in each half, so that every element must reproduce it on any mesh, for any ratio of moduli: here one
+  million, once in the stiffness and once in lambda only.
 
-  Tolerance: 1e-6 of the largest displacement: rounding times the condition number, which grows with the contrast. The mass includes both
-  densities.
+  Tolerance: 1e-6 of the largest displacement: rounding times the condition number, which grows with the
+  contrast. The mass includes both densities.
 */
 #include "verify.h"
 

@@ -1,25 +1,30 @@
 // @ranks 1 2
 /*
-  Inflation of a thick sphere and a thick cylinder (plane strain), radii A = 1 and B = 2, by a follower pressure on the inner wall, to 1.5 times its
-  radius: CR, stable neo-Hookean material, mu = 1, nu = 0.499, between symmetry planes. The pressure acts on part of the surface, whose facets are
-  discontinuous at their edges.
+  Inflation of a thick sphere and a thick cylinder (plane strain), radii A = 1 and B = 2, by a follower
+  pressure on the inner wall, to 1.5 times its radius: CR, stable neo-Hookean material, mu = 1, nu = 0.499,
+  between symmetry planes. The pressure acts on part of the surface, whose facets are discontinuous at their
+  edges.
 
-  Without change of volume the hoop stretch decreases from la = a/A inside to lb, lb^k = 1 + (la^k - 1) (A/B)^k, and radial equilibrium gives
+  Without change of volume the hoop stretch decreases from la = a/A inside to lb, lb^k = 1 + (la^k - 1)
+  (A/B)^k, and radial equilibrium gives
 
     p = int_lb^la dW/dl / (l^k - 1) dl,   k = 3 for the sphere, 2 for the cylinder, W(l) the energy at that stretch.
 
-  W = mu/2 (I1 - 3) gives mu/2 [(4/lb + lb^-4) - (4/la + la^-4)] for the sphere, mu [ln(la/lb) + (lb^-2 - la^-2)/2] for the cylinder. The material of this program is
+  W = mu/2 (I1 - 3) gives mu/2 [(4/lb + lb^-4) - (4/la + la^-4)] for the sphere, mu [ln(la/lb) + (lb^-2 -
+  la^-2)/2] for the cylinder. The material of this program is
 
     W = 2/3 mu [(I1 - 3) - log((I1 + 1)/4)],   dW/dI1 = 2/3 mu I1/(I1 + 1):
 
-  mu/2 at rest, and up to a third stiffer when stretched. Both are computed: the quadrature is checked with the classical energy.
+  mu/2 at rest, and up to a third stiffer when stretched. Both are computed: the quadrature is checked with
+  the classical energy.
 
     pressure   of the closed form at the computed stretch, against the applied one: within 1 % on one mesh of 1,920 tets, and
                converging
 
-  A facet of CR has the area at the centre of its tet, h/4 behind the wall, where the hoop stretch is less than at the wall: the force of a follower
-  pressure is too small by about h/2 dln(l)/dR, 4 % for h = A/11 and l = 1.5. Layers are therefore graded towards the inner wall, by GROWTH
-  each on the fine mesh; the coarse one has half as many.
+  A facet of CR has the area at the centre of its tet, h/4 behind the wall, where the hoop stretch is less
+  than at the wall: the force of a follower pressure is too small by about h/2 dln(l)/dR, 4 % for h = A/11 and
+  l = 1.5. Layers are therefore graded towards the inner wall, by GROWTH each on the fine mesh; the coarse one
+  has half as many.
     iterations are bounded, with CHOLMOD, which fails if the tangent is indefinite, and with MUMPS, which only counts negative pivots
     order      the error of a perturbed solution is squared by one iteration of Newton's method
 */
@@ -78,8 +83,8 @@ static PetscReal radius(PetscInt layer, PetscInt nlayer)
 }
 
 /*
-  An eighth of the sphere: nlayer layers, each with the n^2 triangles of an octahedron's face, whose prisms are cut into three tets along the diagonals to the
-  vertex with the higher number. Collective.
+  An eighth of the sphere: nlayer layers, each with the n^2 triangles of an octahedron's face, whose prisms
+  are cut into three tets along the diagonals to the vertex with the higher number. Collective.
 */
 static PetscErrorCode write_sphere(PetscInt n, PetscInt nlayer, char path[512])
 {

@@ -1,7 +1,8 @@
 // @ranks 1 2
 /*
-  Lame's thick-walled sphere, radii 1 and 2, pressure 1 inside, E = 1, nu = 0.49999, one eighth of it between symmetry planes
-  (supports of one component), edge length 0.3: displacement, radial and hoop stress of the cells against
+  Lame's thick-walled sphere, radii 1 and 2, pressure 1 inside, E = 1, nu = 0.49999, one eighth of it between
+  symmetry planes (supports of one component), edge length 0.3: displacement, radial and hoop stress of the
+  cells against
 
     u = (1/7) ((1 - 2 nu) r + 4 (1 + nu) / r^2),   sigma_rr = (1 - 8 / r^3) / 7,   sigma_tt = (1 + 4 / r^3) / 7.
 

@@ -1,10 +1,11 @@
 // @ranks 1 2
 /*
-  Effectivity of the error estimates of the ledger, estimate over true error in the energy norm: of time steps on an oscillating bar, for every
-  integrator and with damping; of linear and Newton solves with loose tolerances; of contact springs and barrier gaps. And: the ledger changes no result, its
-  estimates are the same on any number of ranks, and -accuracy is reached, also if contact is the largest error.
-  The true error of the time step is relative to the same run with 32 times shorter steps by Newmark's method, that of a solve relative to a
-  solution up to rounding.
+  Effectivity of the error estimates of the ledger, estimate over true error in the energy norm: of time steps
+  on an oscillating bar, for every integrator and with damping; of linear and Newton solves with loose
+  tolerances; of contact springs and barrier gaps. And: the ledger changes no result, its estimates are the
+  same on any number of ranks, and -accuracy is reached, also if contact is the largest error. The true error
+  of the time step is relative to the same run with 32 times shorter steps by Newmark's method, that of a
+  solve relative to a solution up to rounding.
 */
 #include "verify.h"
 
@@ -229,8 +230,10 @@ static PetscErrorCode dial(PetscReal accuracy, PetscInt *steps)
 }
 
 /*
-  A block between rollers and a plate that is displaced onto it by a hundredth of the height: uniform strain; the gaps are the only error, and their share of the displacement is that of force and state. And
-  a ball that indents a block against the same with a tiny width: the error is the requested one, or a tenth of that of the mesh.
+  A block between rollers and a plate that is displaced onto it by a hundredth of the height: uniform strain;
+  the gaps are the only error, and their share of the displacement is that of force and state. And a ball that
+  indents a block against the same with a tiny width: the error is the requested one, or a tenth of that of
+  the mesh.
 */
 static PetscErrorCode gaps(void)
 {

@@ -2,13 +2,16 @@
 // @long
 // @cpu 900
 /*
-  The frame of Lee, Manuel and Rossow ("Large deflections and stability of elastic frames", J. Eng. Mech. Div. ASCE 94, 1968) as a slender solid: a column and a
-  beam of the length L = 120 each, section 2 deep and 3 wide, E = 720, joined rigidly at a right angle and hinged at both ends, with a load on the beam at L/5 from the
-  corner: snap-through and snap-back. Published are the largest load, 18.552 EI/L^2, and the curve of Simo and Vu-Quoc ("A three-dimensional finite-strain
-  rod model, part II", Comput. Methods Appl. Mech. Eng. 58, 1986), here as points read off its graph, which is to about 1 % of its height.
+  The frame of Lee, Manuel and Rossow ("Large deflections and stability of elastic frames", J. Eng. Mech. Div.
+  ASCE 94, 1968) as a slender solid: a column and a beam of the length L = 120 each, section 2 deep and 3
+  wide, E = 720, joined rigidly at a right angle and hinged at both ends, with a load on the beam at L/5 from
+  the corner: snap-through and snap-back. Published are the largest load, 18.552 EI/L^2, and the curve of Simo
+  and Vu-Quoc ("A three-dimensional finite-strain rod model, part II", Comput. Methods Appl. Mech. Eng. 58,
+  1986), here as points read off its graph, which is to about 1 % of its height.
 
-  The mesh is one layer of CR tets in plane stress, with an odd number of cells through the depth: a hinge is one triangle in the middle of an end, whose mean is
-  constrained while it turns. It is a depth / 18 n off the middle, and the load is shared by two vertices beside it. Bending is extrapolated from two meshes (order 2).
+  The mesh is one layer of CR tets in plane stress, with an odd number of cells through the depth: a hinge is
+  one triangle in the middle of an end, whose mean is constrained while it turns. It is a depth / 18 n off the
+  middle, and the load is shared by two vertices beside it. Bending is extrapolated from two meshes (order 2).
   P2 on two cells is as near as that limit.
 */
 #include "verify.h"

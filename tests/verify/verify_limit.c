@@ -1,15 +1,17 @@
 // @ranks 1,2
 /*
-  Limit loads. A cube of St. Venant-Kirchhoff material with Poisson's ratio 0, compressed along one axis to the stretch s, has the nominal
-  stress P = E/2 (s^3 - s), which is largest at s = 1/sqrt 3: 0.19245 E.
+  Limit loads. A cube of St. Venant-Kirchhoff material with Poisson's ratio 0, compressed along one axis to
+  the stretch s, has the nominal stress P = E/2 (s^3 - s), which is largest at s = 1/sqrt 3: 0.19245 E.
 
-  A load path to 0.2 E ends there in few steps, reports the load reached, and that displacements grow without bound with the load. A path to a lower load
-  reaches its end. With arc length control each equilibrium satisfies the formula, past the maximum, through s = 0, where the height is zero, to the
-  inverted branch, which carries 0.2 E; with dead and follower loads, and with all elements. A restart continues the same path, also from the
-  end of a load path.
+  A load path to 0.2 E ends there in few steps, reports the load reached, and that displacements grow without
+  bound with the load. A path to a lower load reaches its end. With arc length control each equilibrium
+  satisfies the formula, past the maximum, through s = 0, where the height is zero, to the inverted branch,
+  which carries 0.2 E; with dead and follower loads, and with all elements. A restart continues the same path,
+  also from the end of a load path.
 
-  Follower pressure on part of a surface has no potential. Its load path ends at the limit too; for a cantilever curled up by it the number of
-  Newton iterations is bounded, although symmetric parts of the tangent are indefinite on the way; likewise for a strip that it pulls by its end.
+  Follower pressure on part of a surface has no potential. Its load path ends at the limit too; for a
+  cantilever curled up by it the number of Newton iterations is bounded, although symmetric parts of the
+  tangent are indefinite on the way; likewise for a strip that it pulls by its end.
 */
 #include "verify.h"
 
@@ -90,8 +92,10 @@ static PetscErrorCode check_curl(const char *element, PetscReal nu, PetscReal pr
 }
 
 /*
-  Clamped strip under a follower pressure that pulls its end. It stays nearly straight, and the more it is pulled the less stiff it is in bending: the lowest eigenvalue of the
-  tangent decreases as exp(-k length), k^2 = load / (EI); that of its symmetric part is negative from the first load step on. Full Newton steps increase the residual, and the next ones reduce it.
+  Clamped strip under a follower pressure that pulls its end. It stays nearly straight, and the more it is
+  pulled the less stiff it is in bending: the lowest eigenvalue of the tangent decreases as exp(-k length),
+  k^2 = load / (EI); that of its symmetric part is negative from the first load step on. Full Newton steps
+  increase the residual, and the next ones reduce it.
 */
 static PetscErrorCode check_pull(const char *element, PetscReal nu)
 {

@@ -1,8 +1,8 @@
 // @ranks 1 2
 /*
-  CR and DG do not lock: a divergence-free solution (manufactured.h) at nu = 0.3, 0.49, 0.4999, 0.499999, meshes with perturbed
-  vertices. Orders 2 in L2 and 1 in H1 at every nu, and nearly equal errors. P1 locks on these meshes: its solution is nearly
-  zero. verify_locking_fine.c has finer meshes.
+  CR and DG do not lock: a divergence-free solution (manufactured.h) at nu = 0.3, 0.49, 0.4999, 0.499999,
+  meshes with perturbed vertices. Orders 2 in L2 and 1 in H1 at every nu, and nearly equal errors. P1 locks on
+  these meshes: its solution is nearly zero. verify_locking_fine.c has finer meshes.
 */
 #include "locking.h"
 

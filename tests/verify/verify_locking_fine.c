@@ -2,8 +2,8 @@
 // @ranks 1
 // @cpu 1500
 /*
-  The last refinement of the convergence that verify_locking.c begins, n = 8 and 16, at the smallest and the largest Poisson's
-  ratio: 152,064 unknowns with CR, 294,912 with DG.
+  The last refinement of the convergence that verify_locking.c begins, n = 8 and 16, at the smallest and the
+  largest Poisson's ratio: 152,064 unknowns with CR, 294,912 with DG.
 */
 #include "locking.h"
 

@@ -1,10 +1,12 @@
 // @ranks 1 2
 /*
-  Newton's method where undamped full steps would fail: a bar of CR that bends under its weight in one load step, near nu = 1/2.
+  Newton's method where undamped full steps would fail: a bar of CR that bends under its weight in one load
+  step, near nu = 1/2.
 
-  It converges in one load step, without a rejected one, and takes at most twice the iterations of the best of 2, 4 and 8 equal load steps, all with the same final
-  state. An indefinite tangent is projected: with the exact one only the same load takes more iterations, and with the projected one
-  only the last iterations are not quadratic. Loose linear solves do not prevent the recovery from a provisional step.
+  It converges in one load step, without a rejected one, and takes at most twice the iterations of the best of
+  2, 4 and 8 equal load steps, all with the same final state. An indefinite tangent is projected: with the
+  exact one only the same load takes more iterations, and with the projected one only the last iterations are
+  not quadratic. Loose linear solves do not prevent the recovery from a provisional step.
 */
 #include "verify.h"
 

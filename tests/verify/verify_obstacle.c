@@ -93,9 +93,10 @@ static PetscErrorCode drag(const char *obstacle, PetscReal force[])
 }
 
 /*
-  Edges of 3 to 5 mm with their vertices on the sphere, one vertex pointing down and ridges along the vertex rows of the block.
-  Facet centroids are 0.2 mm inside the sphere: at an indentation of 10 mm that is 2 % of it and 3 % of the force. Then nodes
-  come into contact and leave one by one, at other times than with the sphere; no step fails.
+  Edges of 3 to 5 mm with their vertices on the sphere, one vertex pointing down and ridges along the vertex
+  rows of the block. Facet centroids are 0.2 mm inside the sphere: at an indentation of 10 mm that is 2 % of
+  it and 3 % of the force. Then nodes come into contact and leave one by one, at other times than with the
+  sphere; no step fails.
 */
 static PetscErrorCode check_facets(void)
 {
@@ -169,8 +170,9 @@ static PetscErrorCode check_groove(void)
 #define RECOVERY 30
 
 /*
-  The initial speed of the lowest nodes is v = depth / recovery, 0.2 m/s. If one end of a bar is moved with v, the other end moves with 2 v when the
-  wave arrives there; the bar then has the energy M v^2, half kinetic and half strain energy. That of its weight is 1e-3 J.
+  The initial speed of the lowest nodes is v = depth / recovery, 0.2 m/s. If one end of a bar is moved with v,
+  the other end moves with 2 v when the wave arrives there; the bar then has the energy M v^2, half kinetic
+  and half strain energy. That of its weight is 1e-3 J.
 */
 static PetscErrorCode check_overlap(const char *element, const char *response, const char *obstacle)
 {

@@ -1,9 +1,11 @@
 // @ranks 1 2
 /*
-  Initially overlapping bodies are separated: cubes that overlap by half, rotated ones, crossed bars without a vertex inside the other, a finger deep inside a block, bodies in rigid
-  obstacles. The penetration is removed in the number of steps of the option, with at most twice the energy M v^2 of a bar pushed with that speed v; momentum is conserved. At the end
-  there are no intersections and all pairs are included in the barrier; -effect_NAME_verify checks the rest. A neighbouring body is not affected. A self-intersecting bent bar
-  has separation directions.
+  Initially overlapping bodies are separated: cubes that overlap by half, rotated ones, crossed bars without a
+  vertex inside the other, a finger deep inside a block, bodies in rigid obstacles. The penetration is removed
+  in the number of steps of the option, with at most twice the energy M v^2 of a bar pushed with that speed v;
+  momentum is conserved. At the end there are no intersections and all pairs are included in the barrier;
+  -effect_NAME_verify checks the rest. A neighbouring body is not affected. A self-intersecting bent bar has
+  separation directions.
 */
 #include "contact.h"
 #include "sbbarrier.h"

@@ -1,14 +1,15 @@
 // @ranks 1 2
 /*
-  Patch test (MacNeal and Harder, "A proposed standard set of problems to test finite element accuracy", 1985): if the boundary
-  displacements or tractions of a body are those of a homogeneous deformation x = F X, the interior must have it too, on
-  any mesh. Small strains with the displacement of that paper, and a large strain with every material: the stress is compared
-  with the formula of the material, implemented here independently. The linear system is solved directly. The same for P2, CR and DG:
-  boundary nodes are prescribed or loaded, and the interior ones, with all jumps, must follow.
+  Patch test (MacNeal and Harder, "A proposed standard set of problems to test finite element accuracy",
+  1985): if the boundary displacements or tractions of a body are those of a homogeneous deformation x = F X,
+  the interior must have it too, on any mesh. Small strains with the displacement of that paper, and a large
+  strain with every material: the stress is compared with the formula of the material, implemented here
+  independently. The linear system is solved directly. The same for P2, CR and DG: boundary nodes are
+  prescribed or loaded, and the interior ones, with all jumps, must follow.
 
-  Tolerances: displacements 1e-10 of the largest; 1e-9 with CR and DG at nu = 0.4999, because of the condition number. Stresses 1e-9 of the
-  largest times the condition number of the material: rounding of
-  the strain is multiplied by lambda / mu.
+  Tolerances: displacements 1e-10 of the largest; 1e-9 with CR and DG at nu = 0.4999, because of the condition
+  number. Stresses 1e-9 of the largest times the condition number of the material: rounding of the strain is
+  multiplied by lambda / mu.
 */
 #include "verify.h"
 
@@ -22,8 +23,8 @@ typedef struct {
 } MeshContext;
 
 /*
-  Interior vertices of the unit cube: moved at random by up to 0.3 cells; or a line of them moved to within a thousandth of the
-  plane of faces, which leaves flat tets.
+  Interior vertices of the unit cube: moved at random by up to 0.3 cells; or a line of them moved to within a
+  thousandth of the plane of faces, which leaves flat tets.
 */
 static void move_vertex(const VerifyPlace *place, PetscReal x[3])
 {

@@ -3,8 +3,9 @@
   The same scene on one rank and on all: every rank runs it alone, then all run it together. Displacements,
   velocities (by original node number) and scalars of the last state must agree.
 
-  Tolerances, relative to the largest value: 1e-10 if the linear system is solved directly or not at all; 1e-8 if Newton's method stops at
-  1e-9 of its first residual, the difference between solvers on different numbers of ranks.
+  Tolerances, relative to the largest value: 1e-10 if the linear system is solved directly or not at all; 1e-8
+  if Newton's method stops at 1e-9 of its first residual, the difference between solvers on different numbers
+  of ranks.
 */
 #include "verify.h"
 

@@ -1,7 +1,7 @@
 // @ranks 1 2 3
 /*
-  Response `multiplier` against `projected`: the same nonlinear problem with another linear solver, hence the same converged
-  solution.
+  Response `multiplier` against `projected`: the same nonlinear problem with another linear solver, hence the
+  same converged solution.
 
     pressed    a body supported by contact only, between two fixed obstacles: its matrix alone is singular
     corner     one and two obstacles at a node, next to a symmetry plane: linearly dependent constraints

@@ -1,15 +1,18 @@
 // @ranks 1 2
 /*
-  Snap-through of Williams' toggle ("An approach to the non-linear behaviour of the members of a rigid jointed plane framework with finite
-  deflections", Q. J. Mech. Appl. Math. 17, 1964): two straight members of span l = 12.943 in each, clamped at the far ends and rigidly connected in the middle, at
-  a height of H = 0.386 in; section 0.753 in x 0.243 in, E = 1.03e7 lb/in^2. The load in the middle has a maximum, decreases, and increases
-  again. The published maximum by Williams' theory is 34.0392 lb. Here one half is a solid, with Poisson's ratio 0 as for beams.
+  Snap-through of Williams' toggle ("An approach to the non-linear behaviour of the members of a rigid jointed
+  plane framework with finite deflections", Q. J. Mech. Appl. Math. 17, 1964): two straight members of span l
+  = 12.943 in each, clamped at the far ends and rigidly connected in the middle, at a height of H = 0.386 in;
+  section 0.753 in x 0.243 in, E = 1.03e7 lb/in^2. The load in the middle has a maximum, decreases, and
+  increases again. The published maximum by Williams' theory is 34.0392 lb. Here one half is a solid, with
+  Poisson's ratio 0 as for beams.
 
   With the compression N = k^2 E I, slope a = H/l and the deflection delta of the middle, a shallow beam has
 
     P = 2 N (a + B),   B = -delta / (l - 2/k tan(k l/2)),   N l / E A = a delta - 1/2 int w'^2 dx,   w' = B (1 - cos k x - tan(k l/2) sin k x),
 
-  from which N follows for each delta. Neglected are terms of a^2, the shear of the members and finite strains: about 0.1 % each.
+  from which N follows for each delta. Neglected are terms of a^2, the shear of the members and finite
+  strains: about 0.1 % each.
 */
 #include "verify.h"
 

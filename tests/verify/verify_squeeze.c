@@ -1,12 +1,13 @@
 // @ranks 1
 /*
-  A cushion compressed to half its height between two moving plates; a quarter of it, symmetry planes x = 0 and y = 0, no friction.
+  A cushion compressed to half its height between two moving plates; a quarter of it, symmetry planes x = 0
+  and y = 0, no friction.
 
-  Both plates have the same force, which increases in every step, no cell is inverted, and the midplane does not move. The work of
-  the plates is the energy of the cushion. With Poisson's ratio 0.49 the volume is nearly constant, and CR and P2 give the same force
-  (with a jump penalty that does not follow the state CR gives less than half of it).
-  With P1, x itself is an
-  admissible test function: the integral of the trace of the stress is the sum of x . f, which is minus the height times the force.
+  Both plates have the same force, which increases in every step, no cell is inverted, and the midplane does
+  not move. The work of the plates is the energy of the cushion. With Poisson's ratio 0.49 the volume is
+  nearly constant, and CR and P2 give the same force (with a jump penalty that does not follow the state CR
+  gives less than half of it). With P1, x itself is an admissible test function: the integral of the trace of
+  the stress is the sum of x . f, which is minus the height times the force.
 */
 #include "contact.h"
 #include <sbtet.h>

@@ -2,8 +2,9 @@
 /*
   Five blocks of very different masses and meshes fall onto each other and come to rest.
 
-  At rest each interface carries the weight above it, as given by the field of contact forces (on each body), by the history
-  of the floor and by that of the bodies (the sum over all interfaces). There is no motion and no penetration.
+  At rest each interface carries the weight above it, as given by the field of contact forces (on each body),
+  by the history of the floor and by that of the bodies (the sum over all interfaces). There is no motion and
+  no penetration.
 
     smooth   without friction, a quarter of the stack between its symmetry planes: a free one would slide apart at the
              smallest perturbation, as a real one would

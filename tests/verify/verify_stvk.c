@@ -1,14 +1,16 @@
 // @ranks 1
 /*
-  Structural benchmarks CSM1 and CSM2 of Turek and Hron ("Proposal for numerical benchmarking of fluid-structure
-  interaction between an elastic object and laminar incompressible flow", 2006): a St. Venant-Kirchhoff beam, plane strain,
-  0.02 m thick, from the circle (0.2, 0.2) of radius 0.05 m to x = 0.6 m, bends under gravity. Displacement of (0.6, 0.2).
+  Structural benchmarks CSM1 and CSM2 of Turek and Hron ("Proposal for numerical benchmarking of
+  fluid-structure interaction between an elastic object and laminar incompressible flow", 2006): a St.
+  Venant-Kirchhoff beam, plane strain, 0.02 m thick, from the circle (0.2, 0.2) of radius 0.05 m to x = 0.6 m,
+  bends under gravity. Displacement of (0.6, 0.2).
 
-  The mesh is a box whose left side is mapped to the arc, one layer of cells between two planes with u_z = 0. Cook's
-  membrane, (0,0) (48,44) (48,60) (0,44), left side fixed, uniform shear 1/16 on the right one, small strains, plane strain
-  too, is the second mapped box.
+  The mesh is a box whose left side is mapped to the arc, one layer of cells between two planes with u_z = 0.
+  Cook's membrane, (0,0) (48,44) (48,60) (0,44), left side fixed, uniform shear 1/16 on the right one, small
+  strains, plane strain too, is the second mapped box.
 
-  P1 is too stiff in bending on coarse meshes, with errors of order h^2: two meshes are extrapolated (Richardson).
+  P1 is too stiff in bending on coarse meshes, with errors of order h^2: two meshes are extrapolated
+  (Richardson).
 */
 #include "locking.h"
 

@@ -1,10 +1,11 @@
 // @ranks 1 3
 /*
-  Integrators against exact solutions of their recurrences. One linear tet fixed at its base is an oscillator: its apex moves
-  along z with w^2 = V (lambda + 2 mu) / (H^2 m), m = rho V / 4. With q = v + i w u an undamped step multiplies q by
+  Integrators against exact solutions of their recurrences. One linear tet fixed at its base is an oscillator:
+  its apex moves along z with w^2 = V (lambda + 2 mu) / (H^2 m), m = rho V / 4. With q = v + i w u an undamped
+  step multiplies q by
     implicit Euler 1 / (1 - i w h), explicit Euler 1 + i w h, Newmark (1/4, 1/2) (1 + i w h / 2) / (1 - i w h / 2),
-  from which the usual formulas of amplitude factor and period elongation follow. With CR and DG, whose tet has more
-  than one mode: the order from steps of h, h/2 and h/4 of a small bar, and free fall.
+  from which the usual formulas of amplitude factor and period elongation follow. With CR and DG, whose tet
+  has more than one mode: the order from steps of h, h/2 and h/4 of a small bar, and free fall.
 */
 #include <complex.h>
 #undef I

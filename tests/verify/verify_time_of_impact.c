@@ -1,8 +1,8 @@
 // @ranks 1 2
 /*
-  Time of impact within a step (-effect_<name>_time_of_impact). An elastic bar hits a wall: in the wave solution the contact lasts
-  for the time 2 L / c from the impact, and the rebound speed is the initial one. Runs begin at several distances from
-  the wall, so that the impact is at different times within a step.
+  Time of impact within a step (-effect_<name>_time_of_impact). An elastic bar hits a wall: in the wave
+  solution the contact lasts for the time 2 L / c from the impact, and the rebound speed is the initial one.
+  Runs begin at several distances from the wall, so that the impact is at different times within a step.
 
     wall        a rigid wall: time of first contact, duration and rebound speed, without and with steps divided at the impact, with every response; a divided
                 step and its remainder end at the time of the undivided one

@@ -1,8 +1,8 @@
 // @ranks 1
 /*
-  Large rotations with CR, DG and P2: Turek and Hron's CSM1 and CSM2 (St. Venant-Kirchhoff, and co-rotated, which is equal for
-  small strains), and the swinging bar at nu = 0.499: CR and DG agree, and converge to a finer mesh. verify_twist.c has a
-  twisted bar.
+  Large rotations with CR, DG and P2: Turek and Hron's CSM1 and CSM2 (St. Venant-Kirchhoff, and co-rotated,
+  which is equal for small strains), and the swinging bar at nu = 0.499: CR and DG agree, and converge to a
+  finer mesh. verify_twist.c has a twisted bar.
 */
 #include "locking.h"
 

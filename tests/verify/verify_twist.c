@@ -4,14 +4,15 @@
 /*
   A neo-Hookean bar at nu = 0.499, its end turned by 90 degrees, in eight static steps.
 
-  CR and DG agree on two cells across. CR converges: an error of order h^2 through two and four cells tells what three cells
-  give. The energy there is 1.6 % away from it, because an odd number of cells has another pattern of diagonals (DG has the
-  same energy to 3e-5).
+  CR and DG agree on two cells across. CR converges: an error of order h^2 through two and four cells tells
+  what three cells give. The energy there is 1.6 % away from it, because an odd number of cells has another
+  pattern of diagonals (DG has the same energy to 3e-5).
 
-  The limit of the energy is near that of St. Venant's torsion. For a neo-Hookean solid of nu = 1/2 that cannot change its
-  length, torsion without warping stores mu theta^2 J / (2 L) at any angle (Rivlin, "Large elastic deformations of
-  isotropic materials IV", 1948); warping lowers J of a square of side a from a^4 / 6 to 0.14058 a^4 (Timoshenko and Goodier,
-  "Theory of elasticity", section 109). Ends that are constrained plane raise it again by some per cent.
+  The limit of the energy is near that of St. Venant's torsion. For a neo-Hookean solid of nu = 1/2 that
+  cannot change its length, torsion without warping stores mu theta^2 J / (2 L) at any angle (Rivlin, "Large
+  elastic deformations of isotropic materials IV", 1948); warping lowers J of a square of side a from a^4 / 6
+  to 0.14058 a^4 (Timoshenko and Goodier, "Theory of elasticity", section 109). Ends that are constrained
+  plane raise it again by some per cent.
 */
 #include "locking.h"
 

@@ -1,13 +1,15 @@
 // @ranks 1 2
 /*
-  Independence of units and of the directions of the axes: a scene in m, kg, s is run again in mm, g, ms, with all
-  lengths times 1e-6 and times 1e3 (density and stiffness kept, so times scale with lengths), with stiffness and density times
-  1e-9 and 1e9, and rotated by 37 degrees about (1,2,3). The displacements, in the units of the first, agree to 1e-8 of the
-  largest (rotated: 1e-9). Tolerances, initial guesses, step control and the choice of the explicit step have
-  default values: none of them may depend on units or directions, nor may the face terms of CR and DG. Only Newton's tolerance is smaller: the preconditioner
-  is in single precision, and its effect on the solution depends on the direction.
+  Independence of units and of the directions of the axes: a scene in m, kg, s is run again in mm, g, ms, with
+  all lengths times 1e-6 and times 1e3 (density and stiffness kept, so times scale with lengths), with
+  stiffness and density times 1e-9 and 1e9, and rotated by 37 degrees about (1,2,3). The displacements, in the
+  units of the first, agree to 1e-8 of the largest (rotated: 1e-9). Tolerances, initial guesses, step control
+  and the choice of the explicit step have default values: none of them may depend on units or directions, nor
+  may the face terms of CR and DG. Only Newton's tolerance is smaller: the preconditioner is in single
+  precision, and its effect on the solution depends on the direction.
 
-  Barrier contact, a block that slides to rest with friction and two that collide in flight: as many iterations in m kg s, mm t s, m kg ms and cm g us, and the same displacements to CONTACT.
+  Barrier contact, a block that slides to rest with friction and two that collide in flight: as many
+  iterations in m kg s, mm t s, m kg ms and cm g us, and the same displacements to CONTACT.
 */
 #include "verify.h"
 

@@ -1,7 +1,8 @@
 // @ranks 1 2
 /*
-  Every effect, element, material, field and other output (tests/parts.h lists them from the registries): if a scene names one, its log
-  events occur; if not, none occur, nothing is allocated and the motion is bitwise the same.
+  Every effect, element, material, field and other output (tests/parts.h lists them from the registries): if a
+  scene names one, its log events occur; if not, none occur, nothing is allocated and the motion is bitwise
+  the same.
 
     first    a process that has run only the base scene has no log event of anything else, and has allocated nothing in files of effects,
              contact and output

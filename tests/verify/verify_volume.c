@@ -1,16 +1,17 @@
 // @ranks 1
 /*
-  A block of soft tissue, nu = 0.4999, hangs from its top under gravity: its volume changes by less than 0.1 %.
+  A block of soft tissue, nu = 0.4999, hangs from its top under gravity: its volume changes by less than 0.1
+  %.
 
-  Neo-Hookean, E = 5 kPa: stretched by a quarter. Co-rotated material preserves tr S, not det F: at a stretch of 1 + e it loses
-  3/4 e^2 of its volume, with any element; so it is measured at E = 50 kPa, stretches of 4 % at the top. No cell is
-  inverted.
+  Neo-Hookean, E = 5 kPa: stretched by a quarter. Co-rotated material preserves tr S, not det F: at a stretch
+  of 1 + e it loses 3/4 e^2 of its volume, with any element; so it is measured at E = 50 kPa, stretches of 4 %
+  at the top. No cell is inverted.
 */
 #include "locking.h"
 
 /*
-  Many small load steps on a stiffer block: their residuals begin near what lambda leaves of 16 digits, and Newton's method must
-  know that it cannot do better.
+  Many small load steps on a stiffer block: their residuals begin near what lambda leaves of 16 digits, and
+  Newton's method must know that it cannot do better.
 */
 static PetscErrorCode check_small_steps(void)
 {

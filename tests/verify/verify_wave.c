@@ -1,13 +1,14 @@
 // @ranks 1 2
 /*
-  Wave in a bar (nu = 0, one-dimensional), fixed at x = 0, with a force N suddenly applied to its free end. A velocity front
-  runs to the fixed end and back, c = sqrt(E / rho), and the displacement of the end is a triangle wave,
+  Wave in a bar (nu = 0, one-dimensional), fixed at x = 0, with a force N suddenly applied to its free end. A
+  velocity front runs to the fixed end and back, c = sqrt(E / rho), and the displacement of the end is a
+  triangle wave,
 
     u(t) = N c t / (E A) up to 2 N L / (E A) at t = 2 L / c and back to 0 at 4 L / c.
 
-  The middle is at rest until L / (2 c) and then moves as u = N (c t - L/2) / (E A) until the wave returns. Newmark, half a
-  cell per step. The mesh smooths the corners: a front spreads over cells^(1/3) cells, so the largest error decreases as
-  cells^(-2/3) only, the mean one faster.
+  The middle is at rest until L / (2 c) and then moves as u = N (c t - L/2) / (E A) until the wave returns.
+  Newmark, half a cell per step. The mesh smooths the corners: a front spreads over cells^(1/3) cells, so the
+  largest error decreases as cells^(-2/3) only, the mean one faster.
 */
 #include "verify.h"
 
