@@ -258,15 +258,13 @@ static PetscErrorCode check_affine(SbModel m, const PetscReal u[])
 static PetscErrorCode check_scene(const char *first, const char *second)
 {
   TestScene t;
-  char text[1024], what[64];
+  char what[64];
   const PetscReal *u, *w;
   Vec U, W;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscSNPrintf(text, sizeof(text), scene, first, strcmp(first, "dg") ? "" : "-body_a_gamma0 3", second));
   PetscCall(PetscSNPrintf(what, sizeof(what), "%s and %s", first, second));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t, scene, first, strcmp(first, "dg") ? "" : "-body_a_gamma0 3", second));
   PetscCall(SbSpaceCreateVec(t.model->space, &U));
   PetscCall(SbSpaceCreateVec(t.model->space, &W));
   PetscCall(test_fill(t.model, affine, U));

@@ -155,12 +155,10 @@ static PetscErrorCode check_drive(int kind)
 static PetscErrorCode check_mixed(void)
 {
   const char *element[] = {"p1", "cr", "dg", "p2"};
-  char text[VERIFY_TEXT];
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
+  PetscCall(test_scene_open(
     "-bodies a,b,c,d -body_a_mesh box:0.2,0.1,0.1:2 -body_b_mesh box:0.1,0.2,0.1:2 -body_c_mesh "
     "box:0.1,0.1,0.2:2 -body_d_mesh box:0.2,0.1,0.1:1 -body_d_material stvk -body_d_element p2 "
     "-body_d_translate 0,2,0 -body_d_young 1e5 -body_d_poisson 0.4 -body_d_density 200 -body_a_material "
@@ -169,9 +167,9 @@ static PetscErrorCode check_mixed(void)
     "-body_b_young 2e5 -body_c_young 1e5 -body_b_poisson 0.3 -body_c_poisson 0.45 -body_b_density 500 "
     "-body_c_density 250 -sets low,tip -set_low_at plane:0,0,1,0 -effects gravity,stand,poke "
     "-effect_stand_type fixed -effect_stand_on low -effect_poke_type point_force -effect_poke_on tip "
-    "-effect_poke_vector 0.01;0.02;0.03 -time static -solver direct" EXACT));
-  PetscCall(PetscStrlcat(text, " -set_tip_at box:-1,-1,0.09,3,1,1", sizeof(text)));
-  PetscCall(test_scene_open(text, &t));
+    "-effect_poke_vector 0.01;0.02;0.03 -time static -solver direct "
+    "-set_tip_at box:-1,-1,0.09,3,1,1" EXACT,
+    &t));
   PetscCall(verify_solve(&t, "four bodies"));
   for (PetscInt b = 0; b < 4; b++) {
     const PetscReal density[] = {1000, 500, 250, 200};
