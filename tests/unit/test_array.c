@@ -43,7 +43,7 @@ int main(int argc, char **argv)
   }
   PetscCall(SbSortByKeys(0, sizeof(*triple), 2, NULL));
 
-  /* test_rank r has r % 3 numbers */
+  /* rank r has r % 3 numbers */
   for (PetscInt i = 0; i < test_rank % 3; i++) mine[i] = 10 * test_rank + i;
   PetscCall(SbAllgatherv(PETSC_COMM_WORLD, MPIU_INT, test_rank % 3, mine, &total, &all, &before));
   at = 0;

@@ -112,7 +112,7 @@ int main(int argc, char **argv)
            sum, n);
   SB_CHECK(n < 48 * test_size || (PetscReal)most <= 1.5 * (PetscReal)sum / test_size,
            "%" PetscInt64_FMT " of %" PetscInt64_FMT " bytes on one rank", most, sum);
-  /* a test_rank with much other work gets no share */
+  /* a rank with much other work gets no share */
   fill(test_rank, test_size, n, schur);
   PetscCall(SbInterfaceFactorise(f, test_rank == 0 ? 1000000000 : 0, schur, &ok));
   SB_CHECK(ok && (test_rank || !SbInterfaceBytes(f)), "%" PetscInt64_FMT " bytes on the busy rank",

@@ -18,7 +18,7 @@ static PetscErrorCode cut(const char *mesh, SbPartitioner type, PetscInt *most, 
   PetscCall(PetscMalloc1(whole.ncell, &part));
   PetscCall(SbPartition(PETSC_COMM_WORLD, type, &whole, part));
   for (PetscInt c = 0; c < whole.ncell; c++) {
-    SB_CHECK(part[c] >= 0 && part[c] < test_size, "cell %d goes to test_rank %d", (int)c, (int)part[c]);
+    SB_CHECK(part[c] >= 0 && part[c] < test_size, "cell %d goes to rank %d", (int)c, (int)part[c]);
     count[part[c]]++;
     n[1]++;
     for (int f = 0; f < 4; f++) {
@@ -75,7 +75,7 @@ static PetscErrorCode test_route(void)
   for (PetscInt k = 0; k < route.nrecv; k++) {
     const PetscMPIInt from = SbRouteSource(&route, k);
 
-    SB_CHECK((from + got[k]) % test_size == test_rank, "%d of test_rank %d", (int)got[k], (int)from);
+    SB_CHECK((from + got[k]) % test_size == test_rank, "%d of rank %d", (int)got[k], (int)from);
     SB_CHECK(k == route.rfirst[from] || got[k] > last, "%d follows %d", (int)got[k], (int)last);
     last = got[k];
     got[k] += 100 * from;

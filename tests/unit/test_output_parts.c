@@ -174,9 +174,9 @@ static PetscErrorCode test_agree(void)
 {
   PetscFunctionBeginUser;
   PetscCall(SbAgree(PETSC_COMM_WORLD, PETSC_ERR_FILE_WRITE, ""));
-  SB_CHECK_ERROR(SbAgree(PETSC_COMM_WORLD, PETSC_ERR_FILE_WRITE,
-                         test_rank == test_size - 1 ? "the last test_rank failed" : ""),
-                 PETSC_ERR_FILE_WRITE, "the last test_rank failed");
+  SB_CHECK_ERROR(
+    SbAgree(PETSC_COMM_WORLD, PETSC_ERR_FILE_WRITE, test_rank == test_size - 1 ? "the last rank failed" : ""),
+    PETSC_ERR_FILE_WRITE, "the last rank failed");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

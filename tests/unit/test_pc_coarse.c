@@ -237,7 +237,7 @@ static PetscErrorCode test_spread(void)
     PetscCall(SbPCCoarseGetStats(y.pc, &naggregate, &nsolved, NULL, NULL));
     PetscCallMPI(MPI_Allreduce(&nsolved, &sum, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
     SB_CHECK(naggregate > 50 && sum == naggregate && (k || nsolved == (test_rank ? 0 : naggregate)),
-             "%s: %d of %d aggregates are solved for by this test_rank, %d by all", more[k], (int)nsolved,
+             "%s: %d of %d aggregates are solved for by this rank, %d by all", more[k], (int)nsolved,
              (int)naggregate, (int)sum);
     PetscCall(system_close(&y));
   }
@@ -300,7 +300,7 @@ int main(int argc, char **argv)
   PetscCall(iterations(BAR("box:0.4,0.1,0.1:6") STATIC, &coarse));
   PetscCall(iterations(BAR("box:0.4,0.1,0.1:12") STATIC, &fine));
   test_print("5k and 41k tets: %d and %d iterations\n", (int)coarse, (int)fine);
-  /* incomplete Cholesky alone doubles the iterations; the aggregates grow by 2^(0.3), and the iterations with their test_size */
+  /* incomplete Cholesky alone doubles the iterations; the aggregates grow by 2^(0.3), and the iterations with their size */
   SB_CHECK(fine <= 1.6 * coarse, "iterations grow from %d to %d", (int)coarse, (int)fine);
   PetscCall(iterations(BAR("box:6,0.1,0.1:4") STATIC, &slender));
   test_print("slender bar: %d iterations\n", (int)slender);

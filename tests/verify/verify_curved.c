@@ -302,7 +302,7 @@ static PetscErrorCode check_ranks(void)
     PetscReal *value[3], volume[3];
     PetscInt n = 0;
 
-    /* all ranks, one test_rank, all ranks in slabs */
+    /* all ranks, one rank, all ranks in slabs */
     for (int r = 0; r < 3; r++) {
       TestScene t;
 
@@ -321,9 +321,9 @@ static PetscErrorCode check_ranks(void)
       PetscCall(verify_gather(t.model, t.run->U, &value[r]));
       PetscCall(test_scene_close(&t));
     }
-    test_print("  %s: one test_rank and all differ by %.1e\n", solver[k],
+    test_print("  %s: one rank and all differ by %.1e\n", solver[k],
                verify_difference(3 * n, value[0], value[1]));
-    SB_CHECK(verify_difference(3 * n, value[0], value[1]) < 1e-8, "%s: one test_rank and all differ by %g",
+    SB_CHECK(verify_difference(3 * n, value[0], value[1]) < 1e-8, "%s: one rank and all differ by %g",
              solver[k], verify_difference(3 * n, value[0], value[1]));
     SB_CHECK(verify_difference(3 * n, value[0], value[2]) < 1e-12, "%s: the .h5 differs by %g", solver[k],
              verify_difference(3 * n, value[0], value[2]));
