@@ -11,7 +11,7 @@
 */
 #include "contact.h"
 
-#define TIGHT "-time euler_implicit -snes_rtol 1e-11 -ksp_rtol 1e-11"
+#define TIGHT "-time euler_implicit -snes_rtol 1e-11 -ksp_rtol 1e-11 "
 #define STIFF(b, mesh) VERIFY_BODY(b, mesh, "corotated", "1e9", "0.3")
 #define MEET "-effect_meet_type contact -effect_meet_restitution %g "
 
