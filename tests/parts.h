@@ -1,9 +1,10 @@
 /*
-  parts.h - test scenes, one for each effect, element, material, integrator, field, other output and estimator of the program.
+  parts.h - test scenes, one for each effect, element, material, integrator, field, other output and estimator
+  of the program.
 
-  The lists come from the program's registries; the table below has the options that name each one in the scene. The test of unused
-  features (tests/verify/verify_unnamed.c) and the cost table (tests/perf/effect_cost.c) loop over both, so that a
-  new type fails the test until it has a row here.
+  The lists come from the program's registries; the table below has the options that name each one in the
+  scene. The test of unused features (tests/verify/verify_unnamed.c) and the cost table
+  (tests/perf/effect_cost.c) loop over both, so that a new type fails the test until it has a row here.
 */
 #pragma once
 #include "../src/base/option.h"
@@ -151,8 +152,8 @@ static inline PetscErrorCode part_names_list(PetscFunctionList list, PetscInt *n
 }
 
 /*
-  part_names - all names of a family, from the registry of the program; those of "output" from the rows above. Not collective; after
-  SbRegisterAll().
+  part_names - all names of a family, from the registry of the program; those of "output" from the rows above.
+  Not collective; after SbRegisterAll().
 */
 static inline PetscErrorCode part_names(const char *family, PetscInt *n, char names[PART_NAMES][SB_NAME_MAX])
 {

@@ -1,9 +1,12 @@
 /*
-  scene.h - builds a scene from an option string in a test program. Each call begins with an empty option database.
+  scene.h - builds a scene from an option string in a test program. Each call begins with an empty option
+  database.
 */
 #pragma once
 #include <sb.h>
 #include "test.h"
+
+#define TEST_TEXT 4096 /* longest scenario of a test, characters */
 
 typedef struct {
   SbModel model;
@@ -22,16 +25,27 @@ static inline PetscErrorCode test_scene_run(TestScene *scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creates model and run on the ranks of `comm`, as the program does, ready for SbRunSolve(); with output to the folder `dir` unless it is NULL. */
+/* Replaces all options by these, with every type registered again. */
+static inline PetscErrorCode test_options(const char *options)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsClear(NULL));
+  PetscCall(SbOptionsReset());
+  PetscCall(SbRegisterAll());
+  PetscCall(PetscOptionsInsertString(NULL, options));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  Creates model and run on the ranks of `comm`, as the program does, ready for SbRunSolve(); with output to
+  the folder `dir` unless it is NULL.
+*/
 static inline PetscErrorCode test_scene_open_on(MPI_Comm comm, const char *dir, const char *options,
                                                 TestScene *scene)
 {
   PetscFunctionBeginUser;
   *scene = (TestScene){NULL, NULL, NULL, NULL}; /* so that the scene can be closed after an error */
-  PetscCall(PetscOptionsClear(NULL));
-  PetscCall(SbOptionsReset());
-  PetscCall(SbRegisterAll());
-  PetscCall(PetscOptionsInsertString(NULL, options));
+  PetscCall(test_options(options));
   if (dir) {
     PetscCall(PetscOptionsSetValue(NULL, "-output_dir", dir));
     PetscCall(PetscOptionsSetValue(NULL, "-output_overwrite", "yes"));
@@ -49,20 +63,37 @@ static inline PetscErrorCode test_scene_open_on(MPI_Comm comm, const char *dir, 
   PetscCall(SbSpaceValidate(scene->model->space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+#define test_scene_open_in(dir, options, scene) test_scene_open_on(PETSC_COMM_WORLD, dir, options, scene)
+#define test_scene_open(options, scene) test_scene_open_in(NULL, options, scene)
 
-static inline PetscErrorCode test_scene_open_in(const char *dir, const char *options, TestScene *scene)
+/* The same of options in printf format. */
+static inline PetscErrorCode test_vopen(MPI_Comm comm, const char *dir, TestScene *scene, const char *format,
+                                        va_list args)
 {
+  char text[TEST_TEXT];
+  size_t length;
+
   PetscFunctionBeginUser;
-  PetscCall(test_scene_open_on(PETSC_COMM_WORLD, dir, options, scene));
+  PetscCall(PetscVSNPrintf(text, sizeof(text), format, &length, args));
+  PetscCheck(length <= sizeof(text), PETSC_COMM_SELF, PETSC_ERR_PLIB, "%d characters, room for %d",
+             (int)length, TEST_TEXT);
+  PetscCall(test_scene_open_on(comm, dir, text, scene));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static inline PetscErrorCode test_scene_open(const char *options, TestScene *scene)
+static inline PetscErrorCode PETSC_ATTRIBUTE_FORMAT(4, 5)
+  test_open_on(MPI_Comm comm, const char *dir, TestScene *scene, const char *format, ...)
 {
+  va_list args;
+
   PetscFunctionBeginUser;
-  PetscCall(test_scene_open_in(NULL, options, scene));
+  va_start(args, format);
+  PetscCall(test_vopen(comm, dir, scene, format, args));
+  va_end(args);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+#define test_open_in(dir, scene, ...) test_open_on(PETSC_COMM_WORLD, dir, scene, __VA_ARGS__)
+#define test_open(scene, ...) test_open_in(NULL, scene, __VA_ARGS__)
 
 /* Time loop, with re-meshing if requested by the options, which replaces model, run and ledger. */
 static inline PetscErrorCode test_scene_solve(TestScene *scene)

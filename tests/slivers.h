@@ -1,8 +1,8 @@
 /*
   slivers.h - a box of tets with a given fraction of slivers of a given smallest dihedral angle.
 
-  Interior vertices without common tets are moved, each in a random direction, until the first of its tets has the angle;
-  vertices are taken in random order until the fraction is reached. No tet is inverted.
+  Interior vertices without common tets are moved, each in a random direction, until the first of its tets has
+  the angle; vertices are taken in random order until the fraction is reached. No tet is inverted.
 */
 #pragma once
 #include "verify/verify.h"
@@ -98,14 +98,14 @@ static inline PetscInt slivers_move(const Slivers *s, PetscRandom random, const 
   return count;
 }
 
-static inline void slivers_place(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static inline void slivers_place(const VerifyPlace *place, PetscReal x[3])
 {
-  const PetscReal *all = (const PetscReal *)ctx;
+  const PetscReal *all = (const PetscReal *)place->ctx;
 
-  for (int k = 0; k < 3; k++) x[k] = all[3 * verify_vertex(n, at) + k];
+  for (int k = 0; k < 3; k++) x[k] = all[3 * verify_vertex(place->n, place->at) + k];
 }
 
-/* Writes the mesh; remove it with test_file_remove(). Collective. Output: made, number of slivers among 6 n[0] n[1] n[2] tets. */
+/* Writes the mesh. Collective. Output: made, number of slivers among 6 n[0] n[1] n[2] tets. */
 static inline PetscErrorCode slivers_write(const Slivers *s, char path[512], PetscInt *made)
 {
   const PetscInt nvert = (s->n[0] + 1) * (s->n[1] + 1) * (s->n[2] + 1);

@@ -1,8 +1,10 @@
 /*
-  test.h - framework of test programs: checks are counted and continue after a failure; the verdict is the same on every rank.
+  test.h - framework of test programs: checks are counted and continue after a failure; the verdict is the
+  same on every rank.
 
-  A test is `SB_TEST_BEGIN(argc, argv); ... SB_CHECK(...); ... SB_TEST_END();` inside main(). A failed check prints its
-  position and values; the last line is "N passed, N failed", and the exit code is 1 if a check failed on any rank.
+  A test is `SB_TEST_BEGIN(argc, argv); ... SB_CHECK(...); ... SB_TEST_END();` inside main(). A failed check
+  prints its position and values; the last line is "N passed, N failed", and the exit code is 1 if a check
+  failed on any rank. SB_TEST_BEGIN sets test_rank and test_size.
 */
 #pragma once
 #include <sbbase.h>
@@ -10,19 +12,19 @@
 #include <math.h>
 
 static int sb_test_passed, sb_test_failed;
+static PETSC_UNUSED PetscMPIInt test_rank, test_size; /* of PETSC_COMM_WORLD */
 
-static inline void sb_test_record(PetscBool ok, const char *file, int line, const char *format, ...)
+static inline void PETSC_ATTRIBUTE_FORMAT(4, 5)
+  sb_test_record(PetscBool ok, const char *file, int line, const char *format, ...)
 {
   va_list args;
-  PetscMPIInt rank = 0;
 
   if (ok) {
     sb_test_passed++;
     return;
   }
   sb_test_failed++;
-  (void)MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
-  printf("%s:%d: [%d] failed: ", file, line, (int)rank);
+  printf("%s:%d: [%d] failed: ", file, line, (int)test_rank);
   va_start(args, format);
   vprintf(format, args);
   va_end(args);
@@ -37,6 +39,9 @@ static inline void sb_test_record(PetscBool ok, const char *file, int line, cons
     sb_test_record(fabs(sb_v - sb_e) <= sb_t ? PETSC_TRUE : PETSC_FALSE, __FILE__, __LINE__,    \
                    "%s is %.15g, expected %.15g within %.3g", what, sb_v, sb_e, sb_t);          \
   } while (0)
+
+/* Prints once for all ranks. */
+#define test_print(...) (void)PetscPrintf(PETSC_COMM_WORLD, __VA_ARGS__)
 
 /* Text of the last error. */
 static char sb_test_text[2048];
@@ -72,8 +77,8 @@ static inline PetscBool sb_test_names(const char *text, const char *names)
 }
 
 /*
-  The call must fail with the code `expected`, in one line that names all of `names`: option, file, line, value, with | between
-  them. How the sentence reads is not checked.
+  The call must fail with the code `expected`, in one line that names all of `names`: option, file, line,
+  value, with | between them. How the sentence reads is not checked.
 */
 #define SB_CHECK_ERROR(call, expected, names)                                                     \
   do {                                                                                            \
@@ -88,21 +93,28 @@ static inline PetscBool sb_test_names(const char *text, const char *names)
     SB_CHECK(!strchr(sb_test_text, '\n'), "more than one line: '%s'", sb_test_text);              \
   } while (0)
 
-#define SB_TEST_BEGIN(argc, argv)                             \
-  do {                                                        \
-    PetscFunctionBeginUser;                                   \
-    PetscCall(PetscInitialize(&(argc), &(argv), NULL, NULL)); \
-    (void)SbThreadsSetOne();                                  \
+/* Reproducible numbers in -1..1. */
+static inline PetscReal test_random(unsigned *state)
+{
+  *state = *state * 1664525u + 1013904223u;
+  return (PetscReal)(*state >> 8) / (1 << 23) - 1;
+}
+
+#define SB_TEST_BEGIN(argc, argv)                              \
+  do {                                                         \
+    PetscFunctionBeginUser;                                    \
+    PetscCall(PetscInitialize(&(argc), &(argv), NULL, NULL));  \
+    PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &test_rank)); \
+    PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &test_size)); \
+    (void)SbThreadsSetOne();                                   \
   } while (0)
 
 static inline int sb_test_end(void)
 {
   int sums[2] = {0, 0}, mine[2] = {sb_test_passed, sb_test_failed};
-  PetscMPIInt rank = 0;
 
   (void)MPI_Allreduce(mine, sums, 2, MPI_INT, MPI_SUM, PETSC_COMM_WORLD);
-  (void)MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
-  if (!rank) printf("%d passed, %d failed\n", sums[0], sums[1]);
+  test_print("%d passed, %d failed\n", sums[0], sums[1]);
   (void)PetscFinalize();
   return sums[1] ? 1 : 0;
 }

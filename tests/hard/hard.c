@@ -158,7 +158,6 @@ static PetscErrorCode run_case(const HardCase *c, int runs, const char *more, Pe
                               l->name ? l->name : HardQuantityName(l->quantity), (double)now));
     }
   }
-  if (c->mesh) PetscCall(test_file_remove(path));
   PetscCall(report(c, runs, worst));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

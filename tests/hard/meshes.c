@@ -12,11 +12,9 @@
 #define GRADED_CELLS 6
 #define GRADED_RATIO 1e4
 
-static void needle(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void needle(const VerifyPlace *place, PetscReal x[3])
 {
-  (void)n;
-  (void)at;
-  (void)ctx;
+  (void)place;
   x[0] *= 0.02;
   x[1] *= 0.02;
 }
@@ -31,14 +29,12 @@ PetscErrorCode HardMeshNeedle(char path[512])
 }
 
 /* Grading by cubic shells around the corner at the origin, with sizes in geometric progression: x times r(s) / s, s = max x. */
-static void graded(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void graded(const VerifyPlace *place, PetscReal x[3])
 {
   const PetscReal s = PetscMax(x[0], PetscMax(x[1], x[2]));
   const PetscReal inner =
-    (1. - s) * (PetscReal)n[0] / (PetscReal)(n[0] - 1); /* 0 outside, 1 at the smallest shell */
+    (1. - s) * (PetscReal)place->n[0] / (PetscReal)(place->n[0] - 1); /* 0 outside, 1 at the smallest shell */
 
-  (void)at;
-  (void)ctx;
   for (int k = 0; k < 3 && s > 0.; k++) x[k] *= PetscPowReal(GRADED_RATIO, -inner) / s;
 }
 

@@ -79,7 +79,6 @@ int main(int argc, char **argv)
     path, element, (double)nu, with));
   PetscCall(perf_read(text, &scene));
   PetscCall(SbModelSetUp(scene.model));
-  PetscCall(test_file_remove(path));
   start = perf_start();
   PetscCall(SbRunSetUp(scene.run));
   PetscCall(SbRunSolve(scene.run));

@@ -2,11 +2,11 @@
   effect_fixture.h - a small scene for the tests of effects: boxes, sets, the space; and comparison functions.
 
   The unit box "block" is box:1,1,1:2, or a mesh given by the test. Materials come from the options
-  -body_<name>_young and so on, which fixture_create() sets. The same scene can be created on PETSC_COMM_SELF next to the
-  parallel one: their fields are compared by original node number.
+  -body_<name>_young and so on, which fixture_create() sets. The same scene can be created on PETSC_COMM_SELF
+  next to the parallel one: their fields are compared by original node number.
 
-  fixture_use() sets the element of the next scenes, and whether their first set is constrained: then DG faces in it
-  have supports.
+  fixture_use() sets the element of the next scenes, and whether their first set is constrained: then DG faces
+  in it have supports.
 */
 #pragma once
 #include "test.h"
@@ -101,6 +101,7 @@ static inline PetscErrorCode fixture_create(MPI_Comm comm, PetscInt nbody, const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Destroys the scene, and clears the options of it and of its effects. */
 static inline PetscErrorCode fixture_destroy(Fixture *x)
 {
   PetscFunctionBeginUser;
@@ -113,6 +114,7 @@ static inline PetscErrorCode fixture_destroy(Fixture *x)
   }
   PetscCall(PetscFree(x->body));
   PetscCall(PetscFree(x->set));
+  PetscCall(PetscOptionsClear(NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -129,13 +131,9 @@ static inline PetscErrorCode effect_create(Fixture *x, const char *name, const c
 /* x->f = force of the effect at time t and displacement x->u. */
 static inline PetscErrorCode effect_force(Fixture *x, SbEffect e, PetscReal t)
 {
-  SbStage stage;
+  const SbStage stage = {.t = t, .shift_k = 1, .u = x->u};
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&stage, sizeof(stage)));
-  stage.t = t;
-  stage.shift_k = 1;
-  stage.u = x->u;
   PetscCall(PetscArrayzero(x->f, 3 * x->space->nnode));
   PetscCall((*e->ops.force)(e, x->space, &stage, x->f));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -144,7 +142,7 @@ static inline PetscErrorCode effect_force(Fixture *x, SbEffect e, PetscReal t)
 /* Total force F, N, and moment M about the origin at the current positions, N m: owned nodes of all ranks. */
 static inline PetscErrorCode resultant(const Fixture *x, PetscReal F[3], PetscReal M[3])
 {
-  PetscReal sum[6] = {0}, all[6];
+  PetscReal sum[6] = {0};
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < x->space->nnode_owned; i++) {
@@ -156,11 +154,8 @@ static inline PetscErrorCode resultant(const Fixture *x, PetscReal F[3], PetscRe
       sum[3 + c] += p[(c + 1) % 3] * f[(c + 2) % 3] - p[(c + 2) % 3] * f[(c + 1) % 3];
     }
   }
-  PetscCallMPI(MPI_Allreduce(sum, all, 6, MPIU_REAL, MPI_SUM, x->space->comm));
-  for (int c = 0; c < 3; c++) {
-    F[c] = all[c];
-    M[c] = all[3 + c];
-  }
+  PetscCallMPI(MPI_Allreduce(sum, F, 3, MPIU_REAL, MPI_SUM, x->space->comm));
+  PetscCallMPI(MPI_Allreduce(sum + 3, M, 3, MPIU_REAL, MPI_SUM, x->space->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -230,7 +225,6 @@ static inline PetscErrorCode fixture_pair_destroy(FixturePair *p)
   PetscFunctionBeginUser;
   PetscCall(fixture_destroy(&p->all));
   PetscCall(fixture_destroy(&p->alone));
-  PetscCall(PetscOptionsClear(NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

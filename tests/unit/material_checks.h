@@ -1,8 +1,10 @@
 /*
-  material_checks.h - checks for every material: stress is the derivative of the energy and the tangent that of the stress,
-  frame invariance, independence of SIMD lanes, projected tangents are the projections of the exact ones.
+  material_checks.h - checks for every material: stress is the derivative of the energy and the tangent that
+  of the stress, frame invariance, independence of SIMD lanes, projected tangents are the projections of the
+  exact ones.
 
-  Deformation gradients are evaluated one at a time in each lane of a batch whose other lanes have different ones.
+  Deformation gradients are evaluated one at a time in each lane of a batch whose other lanes have different
+  ones.
 */
 #pragma once
 #include "../test.h"
@@ -143,9 +145,10 @@ static inline PetscReal difference(int n, const PetscReal a[], const PetscReal b
 }
 
 /*
-  Taylor: psi(F + t H) - psi(F) - t P : H and P(F + t H) - P(F) - t C : H are of order two: halving t divides a remainder
-  by four up to terms of third order. Summed over six directions H, so that no leading term vanishes by chance; at t about
-  1/3000 the remainders are above 1e-8 E and their third order below a few percent.
+  Taylor: psi(F + t H) - psi(F) - t P : H and P(F + t H) - P(F) - t C : H are of order two: halving t divides
+  a remainder by four up to terms of third order. Summed over six directions H, so that no leading term
+  vanishes by chance; at t about 1/3000 the remainders are above 1e-8 E and their third order below a few
+  percent.
 */
 static inline void check_derivatives(SbMaterial m, const PetscReal F[9], const char *what)
 {
@@ -408,8 +411,8 @@ static inline void check_lanes(SbMaterial m)
 }
 
 /*
-  The damping stress takes energy out at any F; in an unstrained, turned cell it is the exact tangent, which vanishes for
-  a spin.
+  The damping stress takes energy out at any F; in an unstrained, turned cell it is the exact tangent, which
+  vanishes for a spin.
 */
 static inline void check_damping(SbMaterial m, const PetscReal F[9])
 {

@@ -1,5 +1,6 @@
 /*
-  memory_mesh_fixture.h - a body of two tets in memory, with a triangle in a group and a tet in an inclusion that differs from its shape.
+  memory_mesh_fixture.h - a body of two tets in memory, with a triangle in a group and a tet in an inclusion
+  that differs from its shape.
 */
 #pragma once
 #include "output_fixture.h"
@@ -49,10 +50,7 @@ static inline PetscErrorCode fixture_open_given(const char *dir, const char *opt
 {
   PetscFunctionBeginUser;
   *scene = (TestScene){NULL, NULL, NULL, NULL};
-  PetscCall(PetscOptionsClear(NULL));
-  PetscCall(SbOptionsReset());
-  PetscCall(SbRegisterAll());
-  PetscCall(PetscOptionsInsertString(NULL, options));
+  PetscCall(test_options(options));
   PetscCall(PetscOptionsSetValue(NULL, "-output_dir", dir));
   PetscCall(PetscOptionsSetValue(NULL, "-output_overwrite", "yes"));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene->model));

@@ -2,16 +2,29 @@
   mesh_same.h - comparison of two meshes in memory: vertices, simplices of every dimension, and their groups.
 */
 #pragma once
-#include <unistd.h>
+#include "../file.h"
 #include "mesh_test.h"
 
-/* A file of its own for each rank that tests something alone; the caller removes it. */
-static inline void test_path(const char *name, size_t size, char path[])
-{
-  PetscMPIInt rank;
+static char test_folder[512];
 
-  (void)MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
-  (void)snprintf(path, size, "/tmp/sbmesh_%d_%d_%s", (int)getpid(), (int)rank, name);
+/* Path of a file of all ranks in a folder that is removed when the program ends. Collective. */
+static inline PetscErrorCode test_path_of_all(const char *name, char path[512])
+{
+  PetscFunctionBeginUser;
+  if (!test_folder[0]) PetscCall(test_file_folder(test_folder));
+  PetscCall(PetscSNPrintf(path, 512, "%s/%s", test_folder, name));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same for a file of its own for each rank that tests something alone. */
+static inline PetscErrorCode test_path(const char *name, char path[512])
+{
+  char own[64];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(own, sizeof(own), "%d_%s", (int)test_rank, name));
+  PetscCall(test_path_of_all(own, path));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static inline PetscErrorCode test_read(const char *path, PetscInt step, SbImport **im)
@@ -24,19 +37,16 @@ static inline PetscErrorCode test_read(const char *path, PetscInt step, SbImport
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Writes, reads again and removes. */
+/* Writes and reads again. */
 static inline PetscErrorCode test_round(const SbImport *im, const char *name, SbMeshFormat format,
                                         SbImport **again)
 {
-  char path[256], index[256];
+  char path[512];
 
   PetscFunctionBeginUser;
-  test_path(name, sizeof(path), path);
+  PetscCall(test_path(name, path));
   PetscCall(SbMeshFileWrite(im, path, format));
   PetscCall(test_read(path, 0, again));
-  (void)unlink(path);
-  (void)snprintf(index, sizeof(index), "%.*s.xmf", (int)(strrchr(path, '.') - path), path);
-  (void)unlink(index);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,5 +1,6 @@
 /*
-  mesh_test.h - common functions of the tests of the mesh layer: bodies and sets in one line, meshes read and checked as in a run.
+  mesh_test.h - common functions of the tests of the mesh layer: bodies and sets in one line, meshes read and
+  checked as in a run.
 */
 #pragma once
 #include <sbmeshfile.h>
@@ -10,9 +11,8 @@
 /* A body of this name and mesh, neither scaled nor moved. */
 static inline SbBody test_body(const char *name, const char *mesh)
 {
-  SbBody body;
+  SbBody body = {0};
 
-  memset(&body, 0, sizeof(body));
   (void)snprintf(body.name, sizeof(body.name), "%s", name);
   (void)snprintf(body.mesh, sizeof(body.mesh), "%s", mesh);
   body.scale = 1;

@@ -1,16 +1,15 @@
 /*
   output_fixture.h - a scene with prescribed motion, for the tests of the output: no solve, exact numbers.
 
-  The vectors of the run are set by formulas of rest position and time, and the monitors are called in the order of the time
-  loop. Output goes to a temporary folder, which is removed at the end.
+  The vectors of the run are set by formulas of rest position and time, and the monitors are called in the
+  order of the time loop. Output goes to a temporary folder.
 */
 #pragma once
-#include <dirent.h>
-#include <errno.h>
 #include <fcntl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include "../file.h"
 #include "../scene.h"
 #include "../../src/output/output_impl.h"
 
@@ -19,46 +18,6 @@
 #define HELD \
   BOX " -sets left -set_left_at plane:1,0,0,0 -effects hold -effect_hold_type fixed -effect_hold_on left"
 #define EULER " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -quiet "
-
-/* A folder that does not exist yet, below the system's one for temporary files; the same on all ranks. */
-static inline PetscErrorCode fixture_folder(size_t size, char dir[])
-{
-  PetscMPIInt rank;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) {
-    const char *tmp = getenv("TMPDIR");
-
-    (void)snprintf(dir, size, "%s/supple-test-XXXXXX", tmp && tmp[0] ? tmp : "/tmp");
-    PetscCheck(mkdtemp(dir), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "No temporary folder %s", dir);
-  }
-  PetscCallMPI(MPI_Bcast(dir, (PetscMPIInt)size, MPI_CHAR, 0, PETSC_COMM_WORLD));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Removes a folder of files. */
-static inline PetscErrorCode fixture_remove(const char *dir)
-{
-  PetscMPIInt rank;
-  DIR *d;
-  struct dirent *entry;
-  char path[PETSC_MAX_PATH_LEN];
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank && (d = opendir(dir))) {
-    while ((entry = readdir(d))) {
-      SbFormat(sizeof(path), path, "%s/%s", dir, entry->d_name);
-      (void)unlink(path);
-    }
-    (void)closedir(d);
-    (void)rmdir(dir);
-  }
-  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD)); /* what is gone is gone for all ranks */
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* The motion: u = t G x with a constant gradient, so that stresses are known; v = G x; a another affine function,
    so that CR and DG hold it exactly, too. */
@@ -74,6 +33,19 @@ static inline void motion(const PetscReal x[3], PetscReal t, PetscReal u[3], Pet
     u[c] = t * v[c];
     a[c] = 0.1 * x[c] + 0.01;
   }
+}
+
+/* Opens the fields.h5 of the run; the caller closes it. */
+static inline PetscErrorCode fixture_fields(const char *dir, SbH5 *h)
+{
+  char path[PETSC_MAX_PATH_LEN];
+  PetscBool ok;
+
+  PetscFunctionBeginUser;
+  SbFormat(sizeof(path), path, "%s/fields.h5", dir);
+  PetscCall(SbH5Open(PETSC_COMM_WORLD, path, PETSC_FALSE, h, &ok));
+  SB_CHECK(ok, "fields.h5 cannot be opened");
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* What the time loop does at a step: state, then monitors. Energies are numbers that tell their column. */

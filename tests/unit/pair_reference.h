@@ -1,5 +1,6 @@
 /*
-  pair_reference.h - reference distances of vertices, edges and triangles by enumeration of all features, in extended precision; random pairs.
+  pair_reference.h - reference distances of vertices, edges and triangles by enumeration of all features, in
+  extended precision; random pairs.
 */
 #pragma once
 #include <sbgeometry.h>
@@ -10,8 +11,7 @@ static unsigned pair_state = 1;
 /* Uniform in [-1, 1]. */
 static inline PetscReal pair_random(void)
 {
-  pair_state = pair_state * 1664525u + 1013904223u;
-  return (PetscReal)(pair_state >> 8) / 8388608. - 1;
+  return test_random(&pair_state);
 }
 
 static inline int pair_vertices(SbPairKind kind)

@@ -23,12 +23,14 @@ static inline void test_surface_grow(TestSurface *s, PetscInt nvert, PetscInt nt
   s->tri = (PetscInt(*)[3])realloc(s->tri, (size_t)(s->ntri + ntri) * sizeof(*s->tri));
 }
 
+/* Corners of the sides of a box, counter-clockwise seen from outside; bit k of a number: the high end along axis k. */
+static const int test_box_side[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
+                                        {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+
 /* The box between two corners, two triangles a side; inwards: seen from outside its triangles are clockwise. */
 static inline void test_surface_box(const PetscReal lo[3], const PetscReal hi[3], PetscBool inwards,
                                     TestSurface *s)
 {
-  static const int side[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
-                                 {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
   const PetscInt first = s->nvert;
 
   test_surface_grow(s, 8, 12);
@@ -37,7 +39,7 @@ static inline void test_surface_box(const PetscReal lo[3], const PetscReal hi[3]
     s->nvert++;
   }
   for (int f = 0; f < 12; f++) {
-    const int *q = side[f / 2];
+    const int *q = test_box_side[f / 2];
     PetscInt *t = s->tri[s->ntri++];
 
     t[0] = first + q[0];
@@ -158,7 +160,7 @@ static inline void write_stl(FILE *f, const TestSurface *s)
     for (int k = 0; k < 3; k++) {
       const PetscReal *x = s->x[s->tri[t][k]];
 
-      fprintf(f, "  vertex %.17g %.17g %.17g\n", (double)x[0], (double)x[1], (double)x[2]);
+      fprintf(f, "  vertex %.17g %.17g %.17g\n", x[0], x[1], x[2]);
     }
     fprintf(f, " endloop\nendfacet\n");
   }
@@ -194,7 +196,7 @@ static inline void write_obj(FILE *f, const TestSurface *s)
 {
   fprintf(f, "# a comment\no thing\n");
   for (PetscInt v = 0; v < s->nvert; v++)
-    fprintf(f, "v %.17g %.17g %.17g\n", (double)s->x[v][0], (double)s->x[v][1], (double)s->x[v][2]);
+    fprintf(f, "v %.17g %.17g %.17g\n", s->x[v][0], s->x[v][1], s->x[v][2]);
   fprintf(f, "vn 0 0 1\n\n");
   for (PetscInt t = 0; t < s->ntri; t++) {
     const PetscInt *v = s->tri[t];
@@ -210,7 +212,7 @@ static inline void write_off(FILE *f, const TestSurface *s)
 {
   fprintf(f, "OFF\n# a comment\n%d %d 0\n", (int)s->nvert, (int)s->ntri);
   for (PetscInt v = 0; v < s->nvert; v++)
-    fprintf(f, "%.17g %.17g %.17g\n", (double)s->x[v][0], (double)s->x[v][1], (double)s->x[v][2]);
+    fprintf(f, "%.17g %.17g %.17g\n", s->x[v][0], s->x[v][1], s->x[v][2]);
   for (PetscInt t = 0; t < s->ntri; t++)
     fprintf(f, "3 %d %d %d 255 0 0\n", (int)s->tri[t][0], (int)s->tri[t][1], (int)s->tri[t][2]);
 }
@@ -219,8 +221,7 @@ static inline void write_msh(FILE *f, const TestSurface *s)
 {
   fprintf(f, "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n%d\n", (int)s->nvert);
   for (PetscInt v = 0; v < s->nvert; v++)
-    fprintf(f, "%d %.17g %.17g %.17g\n", (int)v + 1, (double)s->x[v][0], (double)s->x[v][1],
-            (double)s->x[v][2]);
+    fprintf(f, "%d %.17g %.17g %.17g\n", (int)v + 1, s->x[v][0], s->x[v][1], s->x[v][2]);
   fprintf(f, "$EndNodes\n$Elements\n%d\n", (int)s->ntri);
   for (PetscInt t = 0; t < s->ntri; t++)
     fprintf(f, "%d 2 0 %d %d %d\n", (int)t + 1, (int)s->tri[t][0] + 1, (int)s->tri[t][1] + 1,
@@ -229,8 +230,8 @@ static inline void write_msh(FILE *f, const TestSurface *s)
 }
 
 /*
-  A file of this kind with the surface (s), or with the text when s is NULL, in the folder for temporary files. Collective: rank 0 writes,
-  the path is the same on all ranks. Remove it with test_file_remove().
+  A file of this kind with the surface (s), or with the text when s is NULL, in the folder for temporary
+  files. Collective: rank 0 writes, the path is the same on all ranks.
 */
 static inline PetscErrorCode test_file_write(const char *extension, PetscBool binary, const TestSurface *s,
                                              const char *text, char path[512])

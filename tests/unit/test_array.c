@@ -6,11 +6,8 @@ int main(int argc, char **argv)
 {
   enum { N = 50, NKEY = 7 };
   PetscInt key[N], triple[N][3], *start, *item, mine[3], total, *all, before, at = 0;
-  PetscMPIInt rank, size;
 
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
 
   /* keys from -1 to NKEY: the lowest and the highest are ignored, key 3 has no items */
   for (PetscInt i = 0; i < N; i++) key[i] = i * i % 9 == 4 ? 4 : i * i % 9 - 1;
@@ -47,11 +44,11 @@ int main(int argc, char **argv)
   PetscCall(SbSortByKeys(0, sizeof(*triple), 2, NULL));
 
   /* rank r has r % 3 numbers */
-  for (PetscInt i = 0; i < rank % 3; i++) mine[i] = 10 * rank + i;
-  PetscCall(SbAllgatherv(PETSC_COMM_WORLD, MPIU_INT, rank % 3, mine, &total, &all, &before));
+  for (PetscInt i = 0; i < test_rank % 3; i++) mine[i] = 10 * test_rank + i;
+  PetscCall(SbAllgatherv(PETSC_COMM_WORLD, MPIU_INT, test_rank % 3, mine, &total, &all, &before));
   at = 0;
-  for (PetscMPIInt r = 0; r < size; r++) {
-    if (r == rank) SB_CHECK(before == at, "%d entries before", (int)before);
+  for (PetscMPIInt r = 0; r < test_size; r++) {
+    if (r == test_rank) SB_CHECK(before == at, "%d entries before", (int)before);
     for (PetscInt i = 0; i < r % 3; i++, at++)
       SB_CHECK(all[at] == 10 * r + i, "entry %d is %d", (int)at, (int)all[at]);
   }

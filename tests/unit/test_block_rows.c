@@ -97,11 +97,9 @@ static PetscErrorCode against_product(SbSpace s, Mat A, const Rows *r, Vec X, Pe
 static PetscErrorCode check_element(const char *element)
 {
   static const char *const names[4] = {"AIJ", "BAIJ", "matrix-free operator", "SBAIJ"};
-  char text[1024];
   TestScene t;
   SbStage stage = {.shift_a = 50., .shift_v = 0., .shift_k = 1.};
   PetscReal worst;
-  PetscMPIInt size;
   int kinds;
   SbSpace s;
   Rows rows[4];
@@ -109,8 +107,7 @@ static PetscErrorCode check_element(const char *element)
   Vec U, X;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), "%s%s", scene, element));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t, "%s%s", scene, element));
   s = t.model->space;
   PetscCall(SbSpaceCreateVec(s, &U));
   PetscCall(SbSpaceCreateVec(s, &X));
@@ -121,8 +118,7 @@ static PetscErrorCode check_element(const char *element)
   PetscCall(SbSpaceCreateMatrixFree(s, &A[2]));
   for (int k = 0; k < 2; k++)
     PetscCall(SbModelTangent(t.model, 0., stage.shift_v, stage.shift_a, 1., U, NULL, A[k]));
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  kinds = size == 1 ? 4 : 3;
+  kinds = test_size == 1 ? 4 : 3;
   if (kinds == 4) {
     PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_SBAIJ, &A[3]));
     PetscCall(SbModelTangent(t.model, 0., stage.shift_v, stage.shift_a, 1., U, NULL, A[3]));
@@ -135,9 +131,9 @@ static PetscErrorCode check_element(const char *element)
     SB_CHECK(rows[k].n == (s->nnode_owned + 1) / 2, "%s: %" PetscInt_FMT " rows", names[k], rows[k].n);
     /* entries are up to about 1e3 */
     worst = difference(s, &rows[k], &rows[1]);
-    SB_CHECK(worst < 1e-10, "%s, %s: rows differ from BAIJ by %g", element, names[k], (double)worst);
+    SB_CHECK(worst < 1e-10, "%s, %s: rows differ from BAIJ by %g", element, names[k], worst);
     PetscCall(against_product(s, A[k], &rows[k], X, &worst));
-    SB_CHECK(worst < 1e-10, "%s, %s: rows differ from the product by %g", element, names[k], (double)worst);
+    SB_CHECK(worst < 1e-10, "%s, %s: rows differ from the product by %g", element, names[k], worst);
   }
   for (int k = 0; k < kinds; k++) {
     PetscCall(put(&rows[k]));

@@ -1,7 +1,7 @@
 // @ranks 1
 /*
-  Box tree against all boxes one by one: boxes that overlap one, pairs of two trees and within one, the nearest; initially and after motion
-  of the boxes. Merging of points against all pairs of points.
+  Box tree against all boxes one by one: boxes that overlap one, pairs of two trees and within one, the
+  nearest; initially and after motion of the boxes. Merging of points against all pairs of points.
 */
 #include <sbgeometry.h>
 #include <math.h>
@@ -18,20 +18,16 @@ static PetscBool overlap(const PetscReal a[6], const PetscReal b[6])
 
 static unsigned state = 7;
 
-static PetscReal number(void)
-{
-  state = state * 1664525u + 1013904223u;
-  return (PetscReal)(state >> 8) / 8388608. - 1;
-}
-
 /* Boxes of a kind: random, on a lattice (many touch exactly), nested, points, all the same, a few that are empty or not finite. */
 static void make_boxes(int kind, PetscInt n, PetscReal (*box)[6])
 {
   for (PetscInt i = 0; i < n; i++) {
-    const PetscReal size = kind == 3 ? 0 : 0.2 * PetscAbsReal(number());
+    const PetscReal size = kind == 3 ? 0 : 0.2 * PetscAbsReal(test_random(&state));
 
     for (int k = 0; k < 3; k++) {
-      const PetscReal x = kind == 1 ? PetscFloorReal(4 * number()) : kind == 4 ? 0.5 : number();
+      const PetscReal x = kind == 1   ? PetscFloorReal(4 * test_random(&state))
+                          : kind == 4 ? 0.5
+                                      : test_random(&state);
 
       box[i][k] = kind == 2 ? -(PetscReal)i / (PetscReal)n : x - (kind == 1 ? 0.5 : size);
       box[i][3 + k] = kind == 2 ? (PetscReal)i / (PetscReal)n
@@ -85,7 +81,7 @@ static void check_nearest(const SbBoxTree *tree, PetscInt n, const PetscReal (*b
     }
   }
   SB_CHECK(nearest.limit2 == best && (found >= 0) == (best < limit2), "the nearest box is %g away, not %g",
-           (double)best, (double)nearest.limit2);
+           best, nearest.limit2);
   /* if the limit is not reduced, all boxes within it are returned */
   for (SbBoxNearestBegin(tree, b, 0.01, &nearest); SbBoxNearestNext(&nearest, &i);) given++;
   for (i = 0; i < n; i++) within += distance2(box[i], b) <= 0.01;
@@ -216,8 +212,8 @@ static PetscErrorCode check_weld(void)
     PetscInt wrong = 0;
 
     for (PetscInt k = 0; k < 3 * n; k++) {
-      x[k] = far + (i % 4 ? number() : PetscFloorReal(5 * number()));
-      if (i % 2 && k / 3 % 5) x[k] = x[k - 3] + 0.008 * number();
+      x[k] = far + (i % 4 ? test_random(&state) : PetscFloorReal(5 * test_random(&state)));
+      if (i % 2 && k / 3 % 5) x[k] = x[k - 3] + 0.008 * test_random(&state);
     }
     PetscCall(SbWeld(n, x, tolerance, chains, map));
     for (PetscInt v = 0; v < n; v++) {

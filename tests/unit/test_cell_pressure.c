@@ -64,7 +64,7 @@ static PetscErrorCode test_small(const char *law, PetscRandom random)
     for (int l = 0; l < SB_BATCH; l++) F[k][l] = 0.9;
   }
   m->ops.pressure(m, (const SbPack *)F, p);
-  for (int l = 0; l < SB_BATCH; l++) SB_CHECK(p[l] > 0., "%s: pressure %g in compression", law, (double)p[l]);
+  for (int l = 0; l < SB_BATCH; l++) SB_CHECK(p[l] > 0., "%s: pressure %g in compression", law, p[l]);
   PetscCall(SbMaterialDestroy(&m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,8 +1,9 @@
 // @ranks 1 2 3 4
 /*
-  Constraints of single nodes, projected in the matrix and outside it: a solve preserves n . u, the constraint force is the residual along
-  the normals, directions act like supports, a body on constraints or stiff springs only equals the body on a support, with every
-  solver and by a factorisation, which also counts negative eigenvalues.
+  Constraints of single nodes, projected in the matrix and outside it: a solve preserves n . u, the constraint
+  force is the residual along the normals, directions act like supports, a body on constraints or stiff
+  springs only equals the body on a support, with every solver and by a factorisation, which also counts
+  negative eigenvalues.
 */
 #include <sbsolver.h>
 #include "../scene.h"
@@ -27,10 +28,7 @@ static PetscErrorCode open_scene(const char *options, const char *element, const
   PetscCall(
     PetscSNPrintf(text, sizeof(text), SCENE "%s -body_a_element %s -solver %s", options, element, solver));
   *t = (TestScene){0};
-  PetscCall(PetscOptionsClear(NULL));
-  PetscCall(SbOptionsReset());
-  PetscCall(SbRegisterAll());
-  PetscCall(PetscOptionsInsertString(NULL, text));
+  PetscCall(test_options(text));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &t->model));
   PetscCall(test_scene_run(t));
   t->run->saddle = (PetscBool)(how == FACTORED);
@@ -70,10 +68,7 @@ static PetscErrorCode fill(Vec x, unsigned state)
   PetscFunctionBeginUser;
   PetscCall(VecGetLocalSize(x, &n));
   PetscCall(VecGetArray(x, &v));
-  for (PetscInt i = 0; i < n; i++) {
-    state = state * 1664525u + 1013904223u;
-    v[i] = (PetscScalar)(state >> 8) / (1 << 24) - 0.5;
-  }
+  for (PetscInt i = 0; i < n; i++) v[i] = 0.5 * test_random(&state);
   PetscCall(VecRestoreArray(x, &v));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -101,7 +96,7 @@ static PetscErrorCode check_operator(TestScene *t, const char *what)
   PetscCall(VecDot(x, z, &xAx));
   SB_CHECK(xAx > 0, "%s: not positive", what);
   SB_CHECK(PetscAbsReal(xAy - yAx) <= 1e-12 * PetscAbsReal(xAx), "%s: x.A y = %.16g, y.A x = %.16g", what,
-           (double)xAy, (double)yAx);
+           xAy, yAx);
   PetscCall(VecGetArray(z, &v));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     if (at_end(s, i, 1)) SB_CHECK_NEAR(SbDot3(v + 3 * i, oblique), 0, 1e-10, what);
@@ -179,8 +174,7 @@ static PetscErrorCode compare(const TestScene *t, const TestScene *other, PetscR
   PetscCall(VecNorm(other->run->U, NORM_INFINITY, &size));
   PetscCall(VecAXPY(t->run->U, -1., other->run->U));
   PetscCall(VecNorm(t->run->U, NORM_INFINITY, &difference));
-  SB_CHECK(size > 1e-4 && difference < tolerance * size, "%s: differs by %g of %g", what, (double)difference,
-           (double)size);
+  SB_CHECK(size > 1e-4 && difference < tolerance * size, "%s: differs by %g of %g", what, difference, size);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -190,14 +184,12 @@ static PetscErrorCode check_axes(const char *element, How how)
   const PetscReal x[3] = {1, 0, 0}, skew[3] = {0.6, 0.8, 0}, z[3] = {0, 0, 1};
   TestScene t, other;
   PetscInt number;
-  char text[1024];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          SCENE CLAMP "-body_a_element %s -effects gravity,clamp,end "
-                                      "-effect_end_type fixed -effect_end_on xmax -effect_end_components xy",
-                          element));
-  PetscCall(test_scene_open(text, &other));
+  PetscCall(test_open(&other,
+                      SCENE CLAMP "-body_a_element %s -effects gravity,clamp,end "
+                                  "-effect_end_type fixed -effect_end_on xmax -effect_end_components xy",
+                      element));
   PetscCall(SbRunSolve(other.run));
   PetscCall(open_scene(CLAMP, element, "cg_two_level", how, PETSC_FALSE, &t));
   for (PetscInt i = 0; i < t.model->space->nnode_owned; i++) {

@@ -98,26 +98,6 @@ static void check_random(void)
   }
 }
 
-/* A vertex above a triangle and two crossing edges, at gaps below the rounding error of differences, far from the origin too. */
-static void check_close(void)
-{
-  for (int i = 0; i < 20; i++) {
-    const PetscReal gap = PetscPowReal(2, -3 * i), far = i % 2 ? 1 : 0;
-    const PetscReal over[12] = {0.3 + far, 0.3, gap, far, 0, 0, 1 + far, 0, 0, far, 1, 0};
-    const PetscReal cross[12] = {far - 1, 0.125, gap, far + 1, -0.25, gap, far, -1, 0, far + 0.125, 1, 0};
-    SbDistance s;
-
-    SbDistanceFind(SB_PAIR_VERTEX_TRIANGLE, over, &s);
-    SB_CHECK(s.feature == SB_PAIR_VERTEX_TRIANGLE, "closest feature %d", (int)s.feature);
-    SB_CHECK_NEAR(s.d, gap, 1e-15 * gap, "distance over a triangle");
-    SB_CHECK_NEAR(s.n[2], 1, 1e-15, "direction over a triangle");
-    SbDistanceFind(SB_PAIR_EDGE_EDGE, cross, &s);
-    SB_CHECK(s.feature == SB_PAIR_EDGE_EDGE, "closest feature %d", (int)s.feature);
-    SB_CHECK_NEAR(s.d, gap, 1e-15 * gap, "distance over an edge");
-    SB_CHECK_NEAR(s.n[2], 1, 1e-15, "direction over an edge");
-  }
-}
-
 /* First and second derivatives of d against central differences along random directions, where the closest feature does not change. */
 static void check_derivatives(void)
 {
@@ -284,7 +264,22 @@ int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   check_random();
-  check_close();
+  /* a vertex above a triangle and two crossing edges, at gaps below the rounding error of differences, far from the origin too */
+  for (int i = 0; i < 20; i++) {
+    const PetscReal gap = PetscPowReal(2, -3 * i), far = i % 2 ? 1 : 0;
+    const PetscReal over[12] = {0.3 + far, 0.3, gap, far, 0, 0, 1 + far, 0, 0, far, 1, 0};
+    const PetscReal cross[12] = {far - 1, 0.125, gap, far + 1, -0.25, gap, far, -1, 0, far + 0.125, 1, 0};
+    SbDistance s;
+
+    SbDistanceFind(SB_PAIR_VERTEX_TRIANGLE, over, &s);
+    SB_CHECK(s.feature == SB_PAIR_VERTEX_TRIANGLE, "closest feature %d", (int)s.feature);
+    SB_CHECK_NEAR(s.d, gap, 1e-15 * gap, "distance over a triangle");
+    SB_CHECK_NEAR(s.n[2], 1, 1e-15, "direction over a triangle");
+    SbDistanceFind(SB_PAIR_EDGE_EDGE, cross, &s);
+    SB_CHECK(s.feature == SB_PAIR_EDGE_EDGE, "closest feature %d", (int)s.feature);
+    SB_CHECK_NEAR(s.d, gap, 1e-15 * gap, "distance over an edge");
+    SB_CHECK_NEAR(s.n[2], 1, 1e-15, "direction over an edge");
+  }
   check_derivatives();
   check_clamp();
   check_cross();

@@ -43,47 +43,46 @@ static PetscErrorCode test_types(void)
 
 static PetscErrorCode test_errors(void)
 {
+  /* Options stay set for the cases behind them. */
+  static const struct {
+    const char *options, *name;
+    PetscErrorCode code;
+    const char *words;
+  } cases[] = {
+    {"", "gravty", PETSC_ERR_USER_INPUT, "gravity"},
+    {"", "qqqqqqqqqqqq", PETSC_ERR_USER_INPUT, "body_force"}, /* no similar name: the message lists all */
+    {"-effect_lid_type tractoin", "lid", PETSC_ERR_USER_INPUT, "-effect_lid_type"},
+    {"", "lid", PETSC_ERR_USER_INPUT, "traction"},
+    /* neither a traction nor a total force; a position where only time is valid; a missing required option */
+    {"-effect_lid_type traction -effect_lid_on top", "lid", PETSC_ERR_USER_INPUT, "-effect_lid_total"},
+    {"-effect_air_type pressure -effect_air_on top -effect_air_value 5*x", "air", PETSC_ERR_USER_INPUT,
+     "-effect_air_value"},
+    {"-effect_hold_type fixed", "hold", PETSC_ERR_USER, "-effect_hold_on"},
+    {"-effect_push_type prescribed_displacement -effect_push_on top", "push", PETSC_ERR_USER_INPUT,
+     "-effect_push_displacement"},
+    {"-effect_push_angle 10 -effect_push_axis 0,0,0", "push", PETSC_ERR_USER_INPUT, "-effect_push_axis"},
+    {"-effect_thick_type damping -effect_thick_alpha -1", "thick", PETSC_ERR_USER, "-effect_thick_alpha"},
+  };
   SbEffect e;
 
   PetscFunctionBeginUser;
-  SB_CHECK_ERROR(SbEffectCreate("gravty", &e), PETSC_ERR_USER_INPUT, "gravity");
-  PetscCall(SbEffectDestroy(&e));
-  // No similar name: the message lists all.
-  SB_CHECK_ERROR(SbEffectCreate("qqqqqqqqqqqq", &e), PETSC_ERR_USER_INPUT, "body_force");
-  PetscCall(SbEffectDestroy(&e));
-  PetscCall(PetscOptionsInsertString(NULL, "-effect_lid_type tractoin"));
-  SB_CHECK_ERROR(SbEffectCreate("lid", &e), PETSC_ERR_USER_INPUT, "-effect_lid_type");
-  SB_CHECK_ERROR(SbEffectCreate("lid", &e), PETSC_ERR_USER_INPUT, "traction");
-  PetscCall(SbEffectDestroy(&e));
-
-  // Neither a traction nor a total force; a position where only time is valid; a missing required option.
-  PetscCall(PetscOptionsInsertString(NULL, "-effect_lid_type traction -effect_lid_on top"));
-  SB_CHECK_ERROR(SbEffectCreate("lid", &e), PETSC_ERR_USER_INPUT, "-effect_lid_total");
-  PetscCall(SbEffectDestroy(&e));
-  PetscCall(
-    PetscOptionsInsertString(NULL, "-effect_air_type pressure -effect_air_on top -effect_air_value 5*x"));
-  SB_CHECK_ERROR(SbEffectCreate("air", &e), PETSC_ERR_USER_INPUT, "-effect_air_value");
-  PetscCall(SbEffectDestroy(&e));
-  PetscCall(PetscOptionsInsertString(NULL, "-effect_hold_type fixed"));
-  SB_CHECK_ERROR(SbEffectCreate("hold", &e), PETSC_ERR_USER, "-effect_hold_on");
-  PetscCall(SbEffectDestroy(&e));
-  PetscCall(PetscOptionsInsertString(NULL, "-effect_push_type prescribed_displacement -effect_push_on top"));
-  SB_CHECK_ERROR(SbEffectCreate("push", &e), PETSC_ERR_USER_INPUT, "-effect_push_displacement");
-  PetscCall(SbEffectDestroy(&e));
-  PetscCall(PetscOptionsInsertString(NULL, "-effect_push_angle 10 -effect_push_axis 0,0,0"));
-  SB_CHECK_ERROR(SbEffectCreate("push", &e), PETSC_ERR_USER_INPUT, "-effect_push_axis");
-  PetscCall(SbEffectDestroy(&e));
-  PetscCall(PetscOptionsInsertString(NULL, "-effect_thick_type damping -effect_thick_alpha -1"));
-  SB_CHECK_ERROR(SbEffectCreate("thick", &e), PETSC_ERR_USER, "-effect_thick_alpha");
-  PetscCall(SbEffectDestroy(&e));
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(cases); k++) {
+    PetscCall(PetscOptionsInsertString(NULL, cases[k].options));
+    SB_CHECK_ERROR(SbEffectCreate(cases[k].name, &e), cases[k].code, cases[k].words);
+    PetscCall(SbEffectDestroy(&e));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode test_registration(void)
+int main(int argc, char **argv)
 {
   SbEffect e;
 
-  PetscFunctionBeginUser;
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(fixture_register());
+  PetscCall(test_types());
+  PetscCall(test_errors());
+  /* a type that a program adds */
   PetscCall(SbEffectRegister(&bare));
   PetscCall(SbEffectCreate("bare", &e));
   SB_CHECK(e->ops.setup == no_space, "operations of a new type");
@@ -96,22 +95,5 @@ static PetscErrorCode test_registration(void)
   PetscCall(SbEffectCreate("gravity", &e));
   SB_CHECK(e != NULL, "after a reset");
   PetscCall(SbEffectDestroy(&e));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-int main(int argc, char **argv)
-{
-  SB_TEST_BEGIN(argc, argv);
-  PetscCall(SbEffectRegister(&SbEffectGravity));
-  PetscCall(SbEffectRegister(&SbEffectBodyForce));
-  PetscCall(SbEffectRegister(&SbEffectTraction));
-  PetscCall(SbEffectRegister(&SbEffectPressure));
-  PetscCall(SbEffectRegister(&SbEffectPointForce));
-  PetscCall(SbEffectRegister(&SbEffectFixed));
-  PetscCall(SbEffectRegister(&SbEffectPrescribedDisplacement));
-  PetscCall(SbEffectRegister(&SbEffectDamping));
-  PetscCall(test_types());
-  PetscCall(test_errors());
-  PetscCall(test_registration());
   SB_TEST_END();
 }

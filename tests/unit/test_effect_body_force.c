@@ -1,6 +1,6 @@
 /*
-  Body force: force and moment of quadratic densities on all cells and on a part; time in the density and as a factor;
-  independence of the number of ranks; every element.
+  Body force: force and moment of quadratic densities on all cells and on a part; time in the density and as a
+  factor; independence of the number of ranks; every element.
 */
 // @ranks 1 3
 #include "effect_fixture.h"
@@ -8,33 +8,23 @@
 static const char *const sets[][2] = {
   {"lower", "box:-1,-1,-1,2,2,0.5"}, {"block", "body:block"}, {"shell", "plane:0,0,1,0"}};
 
+#define PULL "-effect_pull_type body_force -effect_pull_density 1+x;2*y^2;x*z"
+#define GROW "-effect_grow_type body_force -effect_grow_density t*x;0;0 -effect_grow_time 2+t"
+#define HALF "-effect_half_type body_force -effect_half_on lower,lower -effect_half_density 0;0;8"
+
 static const LoadCase cases[] = {
   /* b = (1 + x, 2 y^2, x z) on the unit cube: M = integral X x b = (y x z - z 2 y^2, z (1 + x) - x x z, x 2 y^2 - y (1 + x)) */
   {"pull",
-   "-effect_pull_type body_force -effect_pull_density 1+x;2*y^2;x*z",
+   PULL,
    PETSC_TRUE,
    1,
    1,
    {1.5, 2. / 3, 0.25},
    {1. / 8 - 1. / 3, 3. / 4 - 1. / 6, 1. / 3 - 3. / 4},
    0},
-  {"grow",
-   "-effect_grow_type body_force -effect_grow_density t*x;0;0 -effect_grow_time 2+t",
-   PETSC_FALSE,
-   3,
-   10,
-   {3 * 5 * 0.5, 0, 0},
-   {0, 3 * 5 * 0.25, -3 * 5 * 0.25},
-   0},
+  {"grow", GROW, PETSC_FALSE, 3, 10, {3 * 5 * 0.5, 0, 0}, {0, 3 * 5 * 0.25, -3 * 5 * 0.25}, 0},
   /* 8 N/m^3 on the lower half, also if it is named twice; the force of the last effect is checked */
-  {"half",
-   "-effect_half_type body_force -effect_half_on lower,lower -effect_half_density 0;0;8",
-   PETSC_TRUE,
-   0,
-   4,
-   {0, 0, 4},
-   {2, -2, 0},
-   0}};
+  {"half", HALF, PETSC_TRUE, 0, 4, {0, 0, 4}, {2, -2, 0}, 0}};
 
 int main(int argc, char **argv)
 {

@@ -1,6 +1,6 @@
 /*
-  Contact effect: options and their errors, incompatible settings, a scene without contact, the tangent of contact springs against finite
-  differences of the force, and Coulomb's law in the friction constraints.
+  Contact effect: options and their errors, incompatible settings, a scene without contact, the tangent of
+  contact springs against finite differences of the force, and Coulomb's law in the friction constraints.
 */
 // @ranks 1 3
 #include "../scene.h"
@@ -54,7 +54,6 @@ static PetscErrorCode check_options(void)
            "projected, without friction");
   SB_CHECK(e->ncolumn == 8, "columns");
   PetscCall(SbEffectDestroy(&e));
-  PetscCall(PetscOptionsClear(NULL));
   PetscCall(fixture_destroy(&x));
 
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, hull, &x));
@@ -63,7 +62,6 @@ static PetscErrorCode check_options(void)
              SbConstraintsSeparate(x.space),
            "multiplier, without friction");
   PetscCall(SbEffectDestroy(&e));
-  PetscCall(PetscOptionsClear(NULL));
   PetscCall(fixture_destroy(&x));
 
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, hull, &x));
@@ -78,7 +76,6 @@ static PetscErrorCode check_options(void)
              x.space->constraints->nonsymmetric,
            "friction has constraints");
   PetscCall(SbEffectDestroy(&e));
-  PetscCall(PetscOptionsClear(NULL));
   PetscCall(fixture_destroy(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -144,7 +141,7 @@ static PetscErrorCode force_beside(Fixture *x, SbEffect e, PetscReal h, Vec F)
 static PetscErrorCode check_tangent(const char *element, const char *options)
 {
   const PetscReal h = 1e-6;
-  SbStage stage;
+  SbStage stage = {.t = 0.1, .shift_k = 1};
   Fixture x;
   SbEffect e;
   PetscReal difference, size;
@@ -158,9 +155,6 @@ static PetscErrorCode check_tangent(const char *element, const char *options)
   PetscCall(SbSpacePrescribeDone(x.space));
   PetscCall(SbSpaceCreateMatrix(x.space, SB_MATRIX_AIJ, &A));
   PetscCall(press(&x, e));
-  PetscCall(PetscMemzero(&stage, sizeof(stage)));
-  stage.t = 0.1;
-  stage.shift_k = 1;
   stage.u = x.u;
   x.space->block_scale = 1;
   PetscCall(MatZeroEntries(A));
@@ -186,14 +180,13 @@ static PetscErrorCode check_tangent(const char *element, const char *options)
   PetscCall(VecAXPY(less, 1, more));
   PetscCall(VecNorm(less, NORM_2, &difference));
   SB_CHECK(size > 1 && difference < 1e-6 * size, "%s, %s: tangent and differences are %g of %g apart",
-           element, options, (double)difference, (double)size);
+           element, options, difference, size);
   PetscCall(VecDestroy(&w));
   PetscCall(VecDestroy(&more));
   PetscCall(VecDestroy(&less));
   PetscCall(MatDestroy(&A));
   PetscCall(SbEffectDestroy(&e));
   PetscCall(fixture_destroy(&x));
-  PetscCall(PetscOptionsClear(NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -231,7 +224,7 @@ static PetscErrorCode check_friction(const char *element)
   const char *options = FLOOR "-effect_floor_response penalty -effect_floor_friction 0.4 "
                               "-effect_floor_friction_kinetic 0.4";
   Fixture x, alone;
-  PetscInt slip = 0, stick = 0, mine[2], all[2];
+  PetscInt count[2] = {0, 0}; /* nodes that slip, that stick */
 
   PetscFunctionBeginUser;
   fixture_use(element, element, PETSC_FALSE);
@@ -246,23 +239,17 @@ static PetscErrorCode check_friction(const char *element)
       SB_CHECK(t == 0 && x.space->node_x[3 * i + 2] > 1e-9, "a node off the floor feels nothing");
       continue;
     }
-    SB_CHECK(t <= 0.4 * f[2] * (1 + 1e-12), "friction %g at a normal force of %g", (double)t, (double)f[2]);
+    SB_CHECK(t <= 0.4 * f[2] * (1 + 1e-12), "friction %g at a normal force of %g", t, f[2]);
     SB_CHECK(f[0] * u[0] + f[1] * u[1] <= -0.999999 * s * t, "friction pulls back");
-    if (t > 0.4 * f[2] * (1 - 1e-12))
-      slip++;
-    else
-      stick++;
+    count[t <= 0.4 * f[2] * (1 - 1e-12)]++;
   }
-  mine[0] = slip;
-  mine[1] = stick;
-  PetscCallMPI(MPI_Allreduce(mine, all, 2, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
-  SB_CHECK(all[0] > 0 && all[1] > 0, "%d nodes slip, %d stick", (int)all[0], (int)all[1]);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 2, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
+  SB_CHECK(count[0] > 0 && count[1] > 0, "%d nodes slip, %d stick", (int)count[0], (int)count[1]);
   PetscCall(fixture_create(PETSC_COMM_SELF, 1, "box:1,1,1:3", 1, hull, &alone));
   PetscCall(rub(&alone, options));
   PetscCall(check_serial(&x, &alone, 1e5, "friction"));
   PetscCall(fixture_destroy(&alone));
   PetscCall(fixture_destroy(&x));
-  PetscCall(PetscOptionsClear(NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

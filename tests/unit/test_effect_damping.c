@@ -52,12 +52,11 @@ static PetscErrorCode check_power(const char *block, const char *other, PetscBoo
     SB_CHECK_NEAR(all[0], all[1], 1e-12 * all[1], "damping power");
     // 1200 kg with alpha 0.5/s and as much with 1.5/s, v^2 = 12 m^2/s^2.
     if (rigid) SB_CHECK_NEAR(all[1], 12 * DENSITY * (0.5 + 1.5), 1e-8, "damping power of a translation");
-    SB_CHECK(all[1] > 1, "damping power %g W shows nothing", (double)all[1]);
+    SB_CHECK(all[1] > 1, "damping power %g W shows nothing", all[1]);
   }
   PetscCall(PetscFree(v));
   for (int i = 0; i < 2; i++) PetscCall(SbEffectDestroy(&e[i]));
   PetscCall(fixture_destroy(&x));
-  PetscCall(PetscOptionsClear(NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

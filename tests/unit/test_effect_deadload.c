@@ -1,10 +1,10 @@
 /*
-  Quadrature of dead loads: force and first moments of polynomial densities up to the documented degree, on the
-  cells and on one face of a unit cube; degree 5 and above must show an error (otherwise the test would not detect the degree);
-  time-dependent densities; every element.
+  Quadrature of dead loads: force and first moments of polynomial densities up to the documented degree, on
+  the cells and on one face of a unit cube; degree 5 and above must show an error (otherwise the test would
+  not detect the degree); time-dependent densities; every element.
 
-  With linear basis functions sum_a f_a = integral q and sum_a f_a x_a = integral q x, exactly if q phi_a is integrated
-  exactly: degree 4 of q on rules of degree 5.
+  With linear basis functions sum_a f_a = integral q and sum_a f_a x_a = integral q x, exactly if q phi_a is
+  integrated exactly: degree 4 of q on rules of degree 5.
 */
 // @ranks 1 3
 #include "effect_fixture.h"

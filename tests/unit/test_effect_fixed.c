@@ -1,6 +1,6 @@
 /*
-  Fixed support: constrained unknowns, their value zero, and the reaction: the residual of a body under its weight, so that
-  the support carries the weight at its nodes; every element.
+  Fixed support: constrained unknowns, their value zero, and the reaction: the residual of a body under its
+  weight, so that the support carries the weight at its nodes; every element.
 */
 // @ranks 1 3
 #include "effect_fixture.h"
@@ -9,12 +9,10 @@ static const char *const sets[][2] = {{"bottom", "plane:0,0,1,0"}, {"all", "box:
 
 static PetscErrorCode history(Fixture *x, SbEffect e, PetscReal all[3])
 {
-  SbStage stage;
+  const SbStage stage = {.u = x->u};
   PetscReal mine[3];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&stage, sizeof(stage)));
-  stage.u = x->u;
   PetscCall((*e->ops.history)(e, x->space, &stage, x->f, mine));
   PetscCallMPI(MPI_Allreduce(mine, all, 3, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -68,7 +66,6 @@ static PetscErrorCode check_element(const char *element, PetscReal low)
   PetscCall(SbEffectDestroy(&roll));
   PetscCall(SbEffectDestroy(&rest));
   PetscCall(fixture_destroy(&x));
-  PetscCall(PetscOptionsClear(NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,6 +1,6 @@
 /*
-  Gravity: weight and its moment about the origin for two boxes; the factor of time; contributions to nodes of other ranks;
-  every element, also mixed.
+  Gravity: weight and its moment about the origin for two boxes; the factor of time; contributions to nodes of
+  other ranks; every element, also mixed.
 */
 // @ranks 1 3
 #include "effect_fixture.h"

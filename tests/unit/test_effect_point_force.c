@@ -1,6 +1,7 @@
 /*
-  Point force: the total on one vertex and on a face, shares of the nodes; the work is that of the vertex, whose displacement
-  is averaged over the adjacent cells; time; independence of the number of ranks; every element.
+  Point force: the total on one vertex and on a face, shares of the nodes; the work is that of the vertex,
+  whose displacement is averaged over the adjacent cells; time; independence of the number of ranks; every
+  element.
 */
 // @ranks 1 3
 #include "effect_fixture.h"

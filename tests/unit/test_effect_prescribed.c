@@ -21,18 +21,6 @@ static PetscErrorCode count(const Fixture *x, PetscInt *all)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All local nodes, ghosts included, have the bits of their position. */
-static void check_bits(const Fixture *x)
-{
-  for (PetscInt i = 0; i < x->space->nnode; i++) {
-    const PetscReal *X = &x->space->node_x[3 * i];
-    const int expected = (X[2] < 1e-9 ? 5 : 0) | (X[0] < 1e-9 ? 7 : 0);
-
-    SB_CHECK(x->space->fixed[i] == expected, "bits %d at (%g, %g, %g), expected %d", x->space->fixed[i],
-             (double)X[0], (double)X[1], (double)X[2], expected);
-  }
-}
-
 /* Values and reactions: bottom prescribes x and z of its nodes, west the remaining components of its own. */
 static PetscErrorCode check_values(Fixture *x, SbEffect bottom, SbEffect west)
 {
@@ -85,7 +73,14 @@ static PetscErrorCode check_element(const char *element)
   PetscCall(effect_create(&x, "fixed", "-effect_fixed_on west -effect_fixed_components xyz", &west));
   PetscCall(count(&x, &n));
   SB_CHECK_NEAR(n, p1 ? 18 + 9 * 3 - 3 * 2 : 16 + 8 * 3, 0, "unknowns of the west side without the bottom's");
-  check_bits(&x);
+  /* all local nodes, ghosts included, have the bits of their position */
+  for (PetscInt i = 0; i < x.space->nnode; i++) {
+    const PetscReal *X = &x.space->node_x[3 * i];
+    const int expected = (X[2] < 1e-9 ? 5 : 0) | (X[0] < 1e-9 ? 7 : 0);
+
+    SB_CHECK(x.space->fixed[i] == expected, "bits %d at (%g, %g, %g), expected %d", x.space->fixed[i], X[0],
+             X[1], X[2], expected);
+  }
   SB_CHECK_ERROR(effect_create(&x, "edge",
                                "-effect_edge_type fixed -effect_edge_on edge -effect_edge_components xz",
                                &edge),

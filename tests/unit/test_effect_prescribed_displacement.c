@@ -1,6 +1,6 @@
 /*
-  Prescribed displacement: translation by formulas and by a table, rotation about an axis off the origin, both at once, single components;
-  reaction and torque; every element, and supports of DG faces.
+  Prescribed displacement: translation by formulas and by a table, rotation about an axis off the origin, both
+  at once, single components; reaction and torque; every element, and supports of DG faces.
 */
 // @ranks 1 3
 #include "effect_fixture.h"
@@ -58,11 +58,9 @@ static PetscErrorCode check_torque(Fixture *x, SbEffect e)
 {
   const PetscReal n = x->space->faces ? 8 : 9; // nodes of the top
   PetscReal mine[4], all[4], expected = 0;
-  SbStage stage;
+  const SbStage stage = {.u = x->u};
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&stage, sizeof(stage)));
-  stage.u = x->u;
   for (PetscInt i = 0; i < x->space->nnode; i++) {
     const PetscReal *X = &x->space->node_x[3 * i];
 
@@ -125,8 +123,6 @@ static PetscErrorCode check_element(const char *element, PetscBool held)
   PetscCall(SbEffectDestroy(&twist));
   PetscCall(SbEffectDestroy(&pull));
   PetscCall(fixture_destroy(&x));
-  PetscCall(test_file_remove(table));
-  PetscCall(PetscOptionsClear(NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

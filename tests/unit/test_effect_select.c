@@ -1,38 +1,37 @@
 /*
-  Selection of cells, facets and nodes by named sets on a unit cube: exact counts and areas over all ranks, each item once
-  if sets overlap, and error messages for invalid sets.
+  Selection of cells, facets and nodes by named sets on a unit cube: exact counts and areas over all ranks,
+  each item once if sets overlap, and error messages for invalid sets.
 */
 // @ranks 1 3
 #include "../../src/effect/effect_impl.h"
 #include "effect_fixture.h"
+#include <sbtet.h>
 
 static const char *const sets[][2] = {
   {"bottom", "plane:0,0,1,0"},    {"west", "plane:1,0,0,0"},         {"all", "box:-1,-1,-1,2,2,2"},
   {"corner", "sphere:0,0,0,0.1"}, {"lower", "box:-1,-1,-1,2,2,0.5"},
 };
 
-/* List of sets without an option. */
-static PetscErrorCode make_on(const char *a, const char *b, SbEffectOn *on)
+/* List of sets (NULL: fewer), valid until the next call. */
+static const SbEffectOn *on_sets(const char *a, const char *b)
 {
-  PetscFunctionBeginUser;
-  PetscCall(PetscStrncpy(on->option, "-effect_test_on", sizeof(on->option)));
-  on->n = b ? 2 : a ? 1 : 0;
-  PetscCall(PetscCalloc1(2, &on->name));
-  if (a) PetscCall(PetscStrncpy(on->name[0], a, SB_NAME_MAX));
-  if (b) PetscCall(PetscStrncpy(on->name[1], b, SB_NAME_MAX));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  static char names[2][SB_NAME_MAX];
+  static SbEffectOn on = {.option = "-effect_test_on", .name = names};
+
+  on.n = b ? 2 : a ? 1 : 0;
+  (void)snprintf(names[0], SB_NAME_MAX, "%s", a ? a : "");
+  (void)snprintf(names[1], SB_NAME_MAX, "%s", b ? b : "");
+  return &on;
 }
 
 static PetscErrorCode check_facets(Fixture *x, const char *a, const char *b, PetscReal area, PetscInt count)
 {
-  SbEffectOn on;
   SbFacet *facets;
   PetscInt n;
   PetscReal sum[2] = {0, 0}, all[2];
 
   PetscFunctionBeginUser;
-  PetscCall(make_on(a, b, &on));
-  PetscCall(SbEffectFacets(x->space, &on, &n, &facets));
+  PetscCall(SbEffectFacets(x->space, on_sets(a, b), &n, &facets));
   for (PetscInt i = 0; i < n; i++) {
     if (facets[i].cell >= x->mesh->ncell_owned) continue;
     sum[0] += facets[i].area;
@@ -42,18 +41,15 @@ static PetscErrorCode check_facets(Fixture *x, const char *a, const char *b, Pet
   SB_CHECK_NEAR(all[0], area, 1e-13, "area of the facets");
   SB_CHECK_NEAR(all[1], count, 0, "number of facets");
   PetscCall(PetscFree(facets));
-  PetscCall(PetscFree(on.name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode check_nodes(Fixture *x, const char *a, const char *b, PetscInt count)
 {
-  SbEffectOn on;
   PetscInt n, *nodes, owned = 0, all;
 
   PetscFunctionBeginUser;
-  PetscCall(make_on(a, b, &on));
-  PetscCall(SbEffectNodes(x->space, &on, &n, &nodes));
+  PetscCall(SbEffectNodes(x->space, on_sets(a, b), &n, &nodes));
   for (PetscInt i = 0; i < n; i++) {
     owned += nodes[i] < x->space->nnode_owned;
     SB_CHECK(!i || nodes[i] > nodes[i - 1], "nodes ascend");
@@ -61,56 +57,40 @@ static PetscErrorCode check_nodes(Fixture *x, const char *a, const char *b, Pets
   PetscCallMPI(MPI_Allreduce(&owned, &all, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
   SB_CHECK_NEAR(all, count, 0, "number of nodes");
   PetscCall(PetscFree(nodes));
-  PetscCall(PetscFree(on.name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode check_cells(Fixture *x, const char *a, const char *b, PetscReal volume)
 {
-  SbEffectOn on;
   PetscInt n, *cells;
   PetscReal sum = 0, all;
 
   PetscFunctionBeginUser;
-  PetscCall(make_on(a, b, &on));
-  PetscCall(SbEffectCells(x->space, &on, &n, &cells));
+  PetscCall(SbEffectCells(x->space, on_sets(a, b), &n, &cells));
   for (PetscInt i = 0; i < n; i++) {
-    PetscReal e[3][3];
-    const PetscInt *v = &x->mesh->cell[4 * cells[i]];
-    const PetscReal *X = x->mesh->x;
-
-    if (cells[i] >= x->mesh->ncell_owned) continue;
-    for (int k = 0; k < 9; k++) e[k / 3][k % 3] = X[3 * v[k / 3 + 1] + k % 3] - X[3 * v[0] + k % 3];
-    for (int k = 0; k < 3; k++) {
-      sum += e[0][k] * (e[1][(k + 1) % 3] * e[2][(k + 2) % 3] - e[1][(k + 2) % 3] * e[2][(k + 1) % 3]) / 6;
-    }
+    if (cells[i] < x->mesh->ncell_owned)
+      sum += SbTetDeterminant(x->mesh->x, x->mesh->cell + 4 * cells[i]) / 6;
   }
   PetscCallMPI(MPI_Allreduce(&sum, &all, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   SB_CHECK_NEAR(all, volume, 1e-13, "volume of the cells");
   PetscCall(PetscFree(cells));
-  PetscCall(PetscFree(on.name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode check_errors(Fixture *x)
 {
-  SbEffectOn on;
   SbFacet *facets;
   PetscInt n, *items;
 
   PetscFunctionBeginUser;
   // One vertex, no facet, no cell: the message names set and counts.
-  PetscCall(make_on("bottom", "corner", &on));
-  SB_CHECK_ERROR(SbEffectFacets(x->space, &on, &n, &facets), PETSC_ERR_USER_INPUT, "1 vertices|0");
-  SB_CHECK_ERROR(SbEffectCells(x->space, &on, &n, &items), PETSC_ERR_USER_INPUT,
+  SB_CHECK_ERROR(SbEffectFacets(x->space, on_sets("bottom", "corner"), &n, &facets), PETSC_ERR_USER_INPUT,
+                 "1 vertices|0");
+  SB_CHECK_ERROR(SbEffectCells(x->space, on_sets("bottom", "corner"), &n, &items), PETSC_ERR_USER_INPUT,
                  "-effect_test_on|set bottom");
-  PetscCall(PetscFree(on.name));
-  PetscCall(make_on("botom", NULL, &on));
-  SB_CHECK_ERROR(SbEffectNodes(x->space, &on, &n, &items), PETSC_ERR_USER, "bottom");
-  PetscCall(PetscFree(on.name));
-  PetscCall(make_on(NULL, NULL, &on));
-  SB_CHECK_ERROR(SbEffectNodes(x->space, &on, &n, &items), PETSC_ERR_USER_INPUT, "-effect_test_on");
-  PetscCall(PetscFree(on.name));
+  SB_CHECK_ERROR(SbEffectNodes(x->space, on_sets("botom", NULL), &n, &items), PETSC_ERR_USER, "bottom");
+  SB_CHECK_ERROR(SbEffectNodes(x->space, on_sets(NULL, NULL), &n, &items), PETSC_ERR_USER_INPUT,
+                 "-effect_test_on");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -118,7 +98,6 @@ static PetscErrorCode check_errors(Fixture *x)
 static PetscErrorCode check_faces(const char *element, PetscInt all, PetscInt bottom)
 {
   Fixture x;
-  SbEffectOn on;
   PetscInt n, *items;
 
   PetscFunctionBeginUser;
@@ -131,10 +110,8 @@ static PetscErrorCode check_faces(const char *element, PetscInt all, PetscInt bo
   PetscCall(check_nodes(&x, "west", "bottom", 2 * bottom));
   PetscCall(check_nodes(&x, "all", "corner", all));
   PetscCall(check_errors(&x));
-  PetscCall(make_on("corner", NULL, &on));
-  SB_CHECK_ERROR(SbEffectNodes(x.space, &on, &n, &items), PETSC_ERR_USER_INPUT,
+  SB_CHECK_ERROR(SbEffectNodes(x.space, on_sets("corner", NULL), &n, &items), PETSC_ERR_USER_INPUT,
                  "-effect_test_on|1 vertices|body block");
-  PetscCall(PetscFree(on.name));
   PetscCall(fixture_destroy(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -3,23 +3,19 @@
 #include "../test.h"
 #include <sbelement.h>
 
-/* Nodes of P1 are the vertices, of CR and DG the centroids of the faces opposite to them. */
-static void node_positions(SbElement e, const PetscReal x[4][3], PetscReal node[4][3])
-{
-  for (int a = 0; a < 4; a++) {
-    for (int i = 0; i < 3; i++)
-      node[a][i] = e->nodes_per[0] ? x[a][i] : (x[0][i] + x[1][i] + x[2][i] + x[3][i] - x[a][i]) / 3;
-  }
-}
-
 /* phi_a is 1 at its node and 0 at the others: any linear function is reproduced, its gradient and its values at vertices. */
 static void check_linear(SbElement e, const PetscReal x[4][3], const PetscReal g[4][3], const PetscReal c[4],
                          PetscReal size)
 {
-  PetscReal node[4][3], value[4];
+  PetscReal value[4];
 
-  node_positions(e, x, node);
-  for (int a = 0; a < 4; a++) value[a] = c[0] + SbDot3(c + 1, node[a]);
+  for (int a = 0; a < 4; a++) {
+    PetscReal node[3]; /* of P1: a vertex; of CR and DG: the centroid of the face opposite to it */
+
+    for (int i = 0; i < 3; i++)
+      node[i] = e->nodes_per[0] ? x[a][i] : (x[0][i] + x[1][i] + x[2][i] + x[3][i] - x[a][i]) / 3;
+    value[a] = c[0] + SbDot3(c + 1, node);
+  }
   for (int j = 0; j < 3; j++) {
     PetscReal sum = 0;
 
@@ -117,7 +113,7 @@ static PetscErrorCode test_one(const char *name, const PetscInt per[4], PetscRan
   PetscCall(SbElementCreate(name, NULL, &e));
   for (int d = 0; d < 4; d++) SB_CHECK(e->nodes_per[d] == per[d], "%s: nodes per entity %d", name, d);
   SB_CHECK((e->gamma0 > 0) == (per[3] > 0) && (e->gamma1 > 0) == !per[0], "%s: gamma0 %g, gamma1 %g", name,
-           (double)e->gamma0, (double)e->gamma1);
+           e->gamma0, e->gamma1);
   test_tabulate(e, random);
   test_orientation(e);
   test_mass(e);
@@ -138,20 +134,6 @@ static PetscErrorCode create_light(SbElement e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An element that a program adds is created by its name, with what its constructor filled in. */
-static PetscErrorCode test_register(void)
-{
-  SbElement e;
-
-  PetscFunctionBeginUser;
-  SB_CHECK_ERROR(SbElementCreate("light", NULL, &e), PETSC_ERR_USER, "light");
-  PetscCall(SbElementRegister("light", create_light, 0, NULL));
-  PetscCall(SbElementCreate("light", NULL, &e));
-  SB_CHECK_NEAR(e->ops.mass_lumped, 1. / 8, 1e-16, "lumped mass of the added element");
-  PetscCall(SbElementDestroy(&e));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* gamma0 and gamma1 of a body, and that what makes the form indefinite is refused. */
 static PetscErrorCode test_options(void)
 {
@@ -164,8 +146,7 @@ static PetscErrorCode test_options(void)
   PetscCall(SbScopeSet(&body, "body", "", "a"));
   PetscCall(PetscOptionsInsertString(NULL, "-body_a_gamma0 7 -body_a_gamma1 0.25"));
   PetscCall(SbElementCreate("dg", &body, &e));
-  SB_CHECK(e->gamma0 == 7 && e->gamma1 == 0.25, "gamma0 %g and gamma1 %g were read", (double)e->gamma0,
-           (double)e->gamma1);
+  SB_CHECK(e->gamma0 == 7 && e->gamma1 == 0.25, "gamma0 %g and gamma1 %g were read", e->gamma0, e->gamma1);
   PetscCall(SbElementDestroy(&e));
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(refused); k++) {
     PetscCall(PetscOptionsClear(NULL));
@@ -191,7 +172,12 @@ int main(int argc, char **argv)
   PetscCall(test_one("p1", (const PetscInt[]){1, 0, 0, 0}, random));
   PetscCall(test_one("cr", (const PetscInt[]){0, 0, 1, 0}, random));
   PetscCall(test_one("dg", (const PetscInt[]){0, 0, 0, 4}, random));
-  PetscCall(test_register());
+  /* an element that a program adds is created by its name, with what its constructor filled in */
+  SB_CHECK_ERROR(SbElementCreate("light", NULL, &e), PETSC_ERR_USER, "light");
+  PetscCall(SbElementRegister("light", create_light, 0, NULL));
+  PetscCall(SbElementCreate("light", NULL, &e));
+  SB_CHECK_NEAR(e->ops.mass_lumped, 1. / 8, 1e-16, "lumped mass of the added element");
+  PetscCall(SbElementDestroy(&e));
   PetscCall(test_options());
   PetscCall(PetscRandomDestroy(&random));
   SB_TEST_END();

@@ -1,7 +1,8 @@
 // @ranks 1
 /*
-  Cell kernels on random tets, a different one in each lane: gradients of affine maps, forces as derivatives of the
-  energy, blocks as derivatives of the forces, vanishing terms, and a patch of tets under constant strain.
+  Cell kernels on random tets, a different one in each lane: gradients of affine maps, forces as derivatives
+  of the energy, blocks as derivatives of the forces, vanishing terms, and a patch of tets under constant
+  strain.
 */
 #include "material_checks.h"
 #include <sbelement.h>
@@ -301,8 +302,9 @@ static void test_rotation(SbElement e, SbMaterial m)
 }
 
 /*
-  Patch test: the unit cube cut into twelve tets around an off-centre interior point. Under constant strain the interior
-  point is in equilibrium, and the forces on the corners sum to zero and to the virial sum_a f_a X_a^T = V P.
+  Patch test: the unit cube cut into twelve tets around an off-centre interior point. Under constant strain
+  the interior point is in equilibrium, and the forces on the corners sum to zero and to the virial sum_a f_a
+  X_a^T = V P.
 */
 static void test_patch(SbElement e, SbMaterial m)
 {

@@ -1,8 +1,8 @@
 /*
   test_error.c - errors on some ranks: one line per run, the same exit code on all ranks, no hang.
 
-  The result is known after MPI_Finalize(), so this test counts its checks itself: all ranks write their stderr to one file,
-  which rank 0 reads.
+  The result is known after MPI_Finalize(), so this test counts its checks itself: all ranks write their
+  stderr to one file, which rank 0 reads.
 */
 // @ranks 1 3
 #include "test.h"

@@ -1,10 +1,11 @@
 // @ranks 1 2 3 4
 /*
   Spatial error estimate: zero for solutions that the element represents exactly and for rigid motions, zero
-  across materials with different constant stresses, invariant under rotation of the body, additive, and independent of the
-  number of ranks.
+  across materials with different constant stresses, invariant under rotation of the body, additive, and
+  independent of the number of ranks.
 
-  Tolerances. Rounding of the strains, 1e-16 over the relative cell size, is squared in the energies: 1e-24 of them.
+  Tolerances. Rounding of the strains, 1e-16 over the relative cell size, is squared in the energies: 1e-24 of
+  them.
 */
 #include "../scene.h"
 
@@ -15,10 +16,7 @@ static PetscErrorCode open_scene(MPI_Comm comm, const char *options, SbModel *m)
   SbRun run;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscOptionsClear(NULL));
-  PetscCall(SbOptionsReset());
-  PetscCall(SbRegisterAll());
-  PetscCall(PetscOptionsInsertString(NULL, options));
+  PetscCall(test_options(options));
   PetscCall(SbSceneCreate(comm, m));
   PetscCall(SbRunCreate(*m, &run));
   PetscCall(SbModelSetUp(*m));
@@ -112,9 +110,9 @@ static PetscErrorCode check_patch(const char *element, const char *law)
                           element, law));
   PetscCall(open_scene(PETSC_COMM_WORLD, text, &m));
   PetscCall(estimate(m, linear_field, &est));
-  SB_CHECK(est->strain[0] > 0.1, "%s, %s: strain energy %g", element, law, (double)est->strain[0]);
+  SB_CHECK(est->strain[0] > 0.1, "%s, %s: strain energy %g", element, law, est->strain[0]);
   SB_CHECK(est->body2[0] <= 1e-24 * est->strain[0], "%s, %s: %g of %g J of a constant stress", element, law,
-           (double)est->body2[0], (double)est->strain[0]);
+           est->body2[0], est->strain[0]);
   PetscCall(SbSpaceEstimateDestroy(&est));
   if (!linear) {
     PetscReal error2[2];
@@ -127,8 +125,7 @@ static PetscErrorCode check_patch(const char *element, const char *law)
     }
     SB_CHECK_NEAR(error2[1] / error2[0], 1., 1e-9, "estimate of a turned body over that before");
     PetscCall(estimate(m, rigid_field, &est));
-    SB_CHECK(est->body2[0] <= 1e-24 * 1e3, "%s, %s: %g J of a rigid motion", element, law,
-             (double)est->body2[0]);
+    SB_CHECK(est->body2[0] <= 1e-24 * 1e3, "%s, %s: %g J of a rigid motion", element, law, est->body2[0]);
     PetscCall(SbSpaceEstimateDestroy(&est));
   }
   SB_CHECK(!est, "not set to NULL");
@@ -153,10 +150,10 @@ static PetscErrorCode check_materials(const char *element)
   PetscCall(open_scene(PETSC_COMM_WORLD, text, &m));
   for (int k = 0; k < 2; k++) {
     PetscCall(estimate(m, k ? jump_field : two_field, &est));
-    SB_CHECK(est->strain[0] > 0.02, "%s: strain energy %g", element, (double)est->strain[0]);
+    SB_CHECK(est->strain[0] > 0.02, "%s: strain energy %g", element, est->strain[0]);
     SB_CHECK(est->body2[0] <= 1e-24 * est->strain[0],
-             "%s: %g of %g J where each material has a constant stress", element, (double)est->body2[0],
-             (double)est->strain[0]);
+             "%s: %g of %g J where each material has a constant stress", element, est->body2[0],
+             est->strain[0]);
     PetscCall(SbSpaceEstimateDestroy(&est));
   }
   PetscCall(SbModelDestroy(&m));
@@ -194,22 +191,10 @@ static PetscErrorCode many_bodies(MPI_Comm comm, PetscReal value[4 * NVALUE])
     value[NVALUE * b + 2] = est->factor[b];
     SB_CHECK_NEAR(sum[b] / est->body2[b], 1., 1e-12, "sum over the cells of a body");
   }
-  SB_CHECK(est->factor[0] > 1.001, "factor of P1 %g", (double)est->factor[0]);
+  SB_CHECK(est->factor[0] > 1.001, "factor of P1 %g", est->factor[0]);
   SB_CHECK(est->factor[1] == 1. && est->factor[2] == 1. && est->factor[3] == 1., "factors of CR, DG and P2");
   PetscCall(SbSpaceEstimateDestroy(&est));
   PetscCall(SbModelDestroy(&m));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode check_ranks(void)
-{
-  PetscReal alone[4 * NVALUE], together[4 * NVALUE];
-
-  PetscFunctionBeginUser;
-  PetscCall(many_bodies(PETSC_COMM_SELF, alone));
-  PetscCall(many_bodies(PETSC_COMM_WORLD, together));
-  for (int k = 0; k < 4 * NVALUE; k++)
-    SB_CHECK_NEAR(together[k] / alone[k], 1., 1e-11, "value on all ranks over that on one");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -217,12 +202,16 @@ int main(int argc, char **argv)
 {
   static const char *const elements[] = {"p1", "cr", "dg", "p2"};
   static const char *const laws[] = {"linear", "corotated", "stvk", "neohookean"};
+  PetscReal alone[4 * NVALUE], together[4 * NVALUE];
 
   SB_TEST_BEGIN(argc, argv);
   for (int e = 0; e < 4; e++) {
     for (int l = 0; l < 4; l++) PetscCall(check_patch(elements[e], laws[l]));
     PetscCall(check_materials(elements[e]));
   }
-  PetscCall(check_ranks());
+  PetscCall(many_bodies(PETSC_COMM_SELF, alone));
+  PetscCall(many_bodies(PETSC_COMM_WORLD, together));
+  for (int k = 0; k < 4 * NVALUE; k++)
+    SB_CHECK_NEAR(together[k] / alone[k], 1., 1e-11, "value on all ranks over that on one");
   SB_TEST_END();
 }

@@ -1,7 +1,8 @@
 // @ranks 1 3
 /*
-  Nodes solved exactly: for any preconditioner of the rest, the residual at these nodes vanishes afterwards (to the 1e-4 of
-  the 16-bit factor); the correction is symmetric; constrained nodes and nodes with non-local rows are never chosen.
+  Nodes solved exactly: for any preconditioner of the rest, the residual at these nodes vanishes afterwards
+  (to the 1e-4 of the 16-bit factor); the correction is symmetric; constrained nodes and nodes with non-local
+  rows are never chosen.
 */
 #include "../../src/solver/rotated.h"
 #include "../scene.h"
@@ -79,7 +80,7 @@ int main(int argc, char **argv)
       worst = PetscMax(worst, PetscAbsReal(sum));
     }
   }
-  SB_CHECK(worst < 1e-3, "residual %g on nodes that are solved exactly", (double)worst);
+  SB_CHECK(worst < 1e-3, "residual %g on nodes that are solved exactly", worst);
   for (PetscInt i = 0; i < n; i++) {
     products[0] += z[i] * r2[i];
     products[1] += z2[i] * r[i];

@@ -1,8 +1,8 @@
 // @ranks 1
 /*
-  The factor in 16-bit integers against dense linear algebra: solves, Schur complement of kept nodes, disconnected parts,
-  a matrix that is not positive definite. Rounding the columns to 1.5e-5 of their largest entry gives errors of
-  that size times the condition number of the factor, here about 3: 2e-4 is allowed.
+  The factor in 16-bit integers against dense linear algebra: solves, Schur complement of kept nodes,
+  disconnected parts, a matrix that is not positive definite. Rounding the columns to 1.5e-5 of their largest
+  entry gives errors of that size times the condition number of the factor, here about 3: 2e-4 is allowed.
 */
 #include "../../src/solver/factor.h"
 #include <test.h>
@@ -63,14 +63,6 @@ static PetscErrorCode make_problem(const PetscInt d[3], PetscInt gap, PetscInt n
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode destroy_problem(Problem *p)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree2(p->ia, p->ja));
-  PetscCall(PetscFree2(p->block, p->dense));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Solves A x = b with known x; the dense Schur complement solves for the kept nodes. */
 static PetscErrorCode check_solve(const Problem *p, PetscRandom random, const char *name)
 {
@@ -124,7 +116,7 @@ static PetscErrorCode check_solve(const Problem *p, PetscRandom random, const ch
     error = PetscMax(error, PetscAbsReal(y[i] - x[i]));
     size = PetscMax(size, PetscAbsReal(x[i]));
   }
-  SB_CHECK(error < 2e-4 * size, "%s: error %g of %g", name, (double)error, (double)size);
+  SB_CHECK(error < 2e-4 * size, "%s: error %g of %g", name, error, size);
   PetscCall(SbFactorDestroy(&f));
 
   /* stored in full: exact up to rounding, with its own order and with a given one, in place */
@@ -152,7 +144,7 @@ static PetscErrorCode check_solve(const Problem *p, PetscRandom random, const ch
 }
 
 /* Exact Schur complement (in doubles): A_kk - A_ki A_ii^-1 A_ik by dense elimination. */
-static PetscErrorCode check_schur(const Problem *p)
+static PetscErrorCode check_schur(Problem *p)
 {
   const PetscInt n = 3 * p->n, m = 3 * p->nkeep, free = n - m;
   PetscReal *mine, error = 0.;
@@ -176,7 +168,7 @@ static PetscErrorCode check_schur(const Problem *p)
     for (PetscInt i = j; i < m; i++)
       error = PetscMax(error, PetscAbsReal(mine[j * m + i] - p->dense[(free + i) * n + free + j]));
   }
-  SB_CHECK(error < 1e-11, "Schur complement is off by %g", (double)error);
+  SB_CHECK(error < 1e-11, "Schur complement is off by %g", error);
   PetscCall(PetscFree(mine));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -199,34 +191,29 @@ static PetscErrorCode check_indefinite(Problem *p)
 
 int main(int argc, char **argv)
 {
-  const PetscInt tiny[3] = {1, 1, 1}, small[3] = {4, 3, 2}, cube[3] = {6, 6, 6};
+  static const struct {
+    PetscInt d[3], gap, nkeep;
+    const char *name;
+    PetscErrorCode (*check)(Problem *); /* after the solve; NULL: none */
+  } cases[] = {{{1, 1, 1}, 0, 0, "one node", NULL},
+               {{4, 3, 2}, 0, 5, "small, five kept", check_schur},
+               {{6, 6, 6}, 0, 0, "cube", check_indefinite},
+               {{6, 6, 6}, 0, 36, "cube, a layer kept", check_schur},
+               {{6, 6, 6}, 2, 40, "three slabs, the last one kept", NULL},
+               {{4, 3, 2}, 1, 24, "all kept", NULL}};
   PetscRandom random;
   Problem p;
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(PetscRandomCreate(PETSC_COMM_SELF, &random));
   PetscCall(PetscRandomSetInterval(random, -1., 1.));
-  PetscCall(make_problem(tiny, 0, 0, random, &p));
-  PetscCall(check_solve(&p, random, "one node"));
-  PetscCall(destroy_problem(&p));
-  PetscCall(make_problem(small, 0, 5, random, &p));
-  PetscCall(check_solve(&p, random, "small, five kept"));
-  PetscCall(check_schur(&p));
-  PetscCall(destroy_problem(&p));
-  PetscCall(make_problem(cube, 0, 0, random, &p));
-  PetscCall(check_solve(&p, random, "cube"));
-  PetscCall(check_indefinite(&p));
-  PetscCall(destroy_problem(&p));
-  PetscCall(make_problem(cube, 0, 36, random, &p));
-  PetscCall(check_solve(&p, random, "cube, a layer kept"));
-  PetscCall(check_schur(&p));
-  PetscCall(destroy_problem(&p));
-  PetscCall(make_problem(cube, 2, 40, random, &p));
-  PetscCall(check_solve(&p, random, "three slabs, the last one kept"));
-  PetscCall(destroy_problem(&p));
-  PetscCall(make_problem(small, 1, 24, random, &p));
-  PetscCall(check_solve(&p, random, "all kept"));
-  PetscCall(destroy_problem(&p));
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(cases); k++) {
+    PetscCall(make_problem(cases[k].d, cases[k].gap, cases[k].nkeep, random, &p));
+    PetscCall(check_solve(&p, random, cases[k].name));
+    if (cases[k].check) PetscCall((*cases[k].check)(&p));
+    PetscCall(PetscFree2(p.ia, p.ja));
+    PetscCall(PetscFree2(p.block, p.dense));
+  }
   PetscCall(PetscRandomDestroy(&random));
   SB_TEST_END();
 }

@@ -4,7 +4,6 @@
 // @ranks 1 3
 #include "file.h"
 #include "test.h"
-#include <unistd.h>
 
 static const PetscReal X[3] = {0.5, -2, 3};
 
@@ -15,8 +14,8 @@ static PetscErrorCode value(const char *text, PetscReal expected)
   PetscFunctionBeginUser;
   PetscCall(SbFormulaCreate(PETSC_COMM_WORLD, text, "-test", &f));
   /* the same operations in the same order give bitwise the same result */
-  SB_CHECK(SbFormulaEval(f, 4, X) == expected, "%s is %.17g, expected %.17g", text,
-           (double)SbFormulaEval(f, 4, X), (double)expected);
+  SB_CHECK(SbFormulaEval(f, 4, X) == expected, "%s is %.17g, expected %.17g", text, SbFormulaEval(f, 4, X),
+           expected);
   PetscCall(SbFormulaDestroy(&f));
   SB_CHECK(!f, "destroyed formula is not NULL");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -68,15 +67,12 @@ static PetscErrorCode test_uses(void)
     {"t*z", PETSC_TRUE, PETSC_TRUE},
   };
   SbFormula f;
-  PetscBool time, place;
 
   PetscFunctionBeginUser;
   for (int i = 0; i < 4; i++) {
     PetscCall(SbFormulaCreate(PETSC_COMM_WORLD, cases[i].text, "-test", &f));
-    time = SbFormulaUsesTime(f);
-    place = SbFormulaUsesPosition(f);
-    SB_CHECK(time == cases[i].time && place == cases[i].place, "%s: time %d, place %d", cases[i].text, time,
-             place);
+    SB_CHECK(SbFormulaUsesTime(f) == cases[i].time && SbFormulaUsesPosition(f) == cases[i].place,
+             "%s: time %d, place %d", cases[i].text, SbFormulaUsesTime(f), SbFormulaUsesPosition(f));
     PetscCall(SbFormulaDestroy(&f));
   }
   /* without a dependence on position, x may be NULL */
@@ -131,18 +127,9 @@ static PetscErrorCode test_refused(void)
 static PetscErrorCode table(const char *file, const char *content, const char *line, SbFormula *f)
 {
   char text[PETSC_MAX_PATH_LEN], message[2 * PETSC_MAX_PATH_LEN];
-  PetscMPIInt rank;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) {
-    FILE *out = fopen(file, "w");
-
-    PetscCheck(out, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s", file);
-    (void)fputs(content, out);
-    (void)fclose(out);
-  }
-  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  PetscCall(test_file_put(file, content));
   PetscCall(PetscSNPrintf(text, sizeof(text), "table:%s", file));
   if (line) {
     PetscCall(PetscSNPrintf(message, sizeof(message), "-test|%s|%s", file, line));
@@ -158,16 +145,13 @@ static PetscErrorCode test_tables(void)
   char file[512];
   FILE *empty;
   SbFormula f;
-  PetscBool time, place;
 
   PetscFunctionBeginUser;
   PetscCall(test_file_open(".txt", file, &empty));
   PetscCall(test_file_close(empty));
 
   PetscCall(table(file, "# t value\n0 1\n\n 1, 3 # here\r\n2\t5\n4;-5", NULL, &f));
-  time = SbFormulaUsesTime(f);
-  place = SbFormulaUsesPosition(f);
-  SB_CHECK(time && !place, "a table is a function of time");
+  SB_CHECK(SbFormulaUsesTime(f) && !SbFormulaUsesPosition(f), "a table is a function of time");
   SB_CHECK(SbFormulaEval(f, -1, NULL) == 1 && SbFormulaEval(f, 9, NULL) == -5, "constant outside");
   SB_CHECK(SbFormulaEval(f, 1, NULL) == 3 && SbFormulaEval(f, 2, NULL) == 5, "at the rows");
   SB_CHECK(SbFormulaEval(f, 0.25, NULL) == 1.5 && SbFormulaEval(f, 3, NULL) == 0, "in between");
@@ -182,24 +166,16 @@ static PetscErrorCode test_tables(void)
   PetscCall(table(file, "0 nan\n", "line 1", &f));
   PetscCall(table(file, "0 1\n2 1\n2 3\n", "line 3|2 s", &f));
   PetscCall(table(file, "# nothing\n", "", &f));
-  PetscCall(test_file_remove(file));
   PetscCall(refused("table:/nonexistent.txt", "-test|/nonexistent.txt"));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode run_tests(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(test_values());
-  PetscCall(test_uses());
-  PetscCall(test_refused());
-  PetscCall(test_tables());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(run_tests());
+  PetscCall(test_values());
+  PetscCall(test_uses());
+  PetscCall(test_refused());
+  PetscCall(test_tables());
   SB_TEST_END();
 }

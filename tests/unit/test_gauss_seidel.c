@@ -1,6 +1,7 @@
 /*
-  Gauss-Seidel with the upper triangle: the sweeps solve with D + L^T and, from an initial guess, D + L of the rank's diagonal block, compared with PETSc's
-  MatSOR() on the same matrix, for P1, P2 and CR, with prescribed nodes; the residual returned by the first one equals that of a product.
+  Gauss-Seidel with the upper triangle: the sweeps solve with D + L^T and, from an initial guess, D + L of the
+  rank's diagonal block, compared with PETSc's MatSOR() on the same matrix, for P1, P2 and CR, with prescribed
+  nodes; the residual returned by the first one equals that of a product.
 */
 // @ranks 1 3
 #include "../../src/solver/gauss_seidel.h"
@@ -15,7 +16,6 @@ static void pattern(const PetscReal x[3], PetscReal v[3])
 
 static PetscErrorCode compare(const char *element)
 {
-  char text[1024];
   TestScene scene;
   SbSpace s;
   SbStage stage = {.shift_k = 1.};
@@ -25,12 +25,11 @@ static PetscErrorCode compare(const char *element)
   Mat A;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies b -body_b_mesh box:2,1,1:3 -body_b_element %s -body_b_material linear "
-                          "-body_b_young 1e4 -body_b_poisson 0.3 -effects hold -effect_hold_type fixed "
-                          "-effect_hold_on xmin -time static -solver cg_pbjacobi",
-                          element));
-  PetscCall(test_scene_open(text, &scene));
+  PetscCall(test_open(&scene,
+                      "-bodies b -body_b_mesh box:2,1,1:3 -body_b_element %s -body_b_material linear "
+                      "-body_b_young 1e4 -body_b_poisson 0.3 -effects hold -effect_hold_type fixed "
+                      "-effect_hold_on xmin -time static -solver cg_pbjacobi",
+                      element));
   s = scene.model->space;
   PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_BAIJ, &A));
   PetscCall(SbSpaceAssembleTangent(s, &stage, A));
@@ -52,7 +51,7 @@ static PetscErrorCode compare(const char *element)
       PetscCall(VecNorm(left, NORM_2, &size));
       PetscCall(VecAXPY(t, -1., left));
       PetscCall(VecNorm(t, NORM_2, &error));
-      SB_CHECK(error <= 1e-13 * size, "%s: residual off by %g of %g", element, (double)error, (double)size);
+      SB_CHECK(error <= 1e-13 * size, "%s: residual off by %g of %g", element, error, size);
     }
     PetscCall(
       MatSOR(A, left, 1.,
@@ -66,8 +65,7 @@ static PetscErrorCode compare(const char *element)
     PetscCall(VecNorm(reference, NORM_2, &size));
     PetscCall(VecAXPY(reference, -1., z));
     PetscCall(VecNorm(reference, NORM_2, &error));
-    SB_CHECK(error <= 1e-13 * size, "%s, sweep %d: difference %g of %g", element, k, (double)error,
-             (double)size);
+    SB_CHECK(error <= 1e-13 * size, "%s, sweep %d: difference %g of %g", element, k, error, size);
   }
   SB_CHECK(positive, "%s: a block is not positive", element);
   PetscCall(MatScale(A, -1.));

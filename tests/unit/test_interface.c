@@ -62,7 +62,6 @@ int main(int argc, char **argv)
   SbSpace s;
   SbInterface f;
   PetscInt mine, all, n;
-  PetscMPIInt size, rank;
   PetscReal *schur, *dense, *expected, worst = 0., largest = 0.;
   PetscInt64 bytes, sum, most;
   PetscBool ok;
@@ -70,8 +69,6 @@ int main(int argc, char **argv)
   Mat A;
 
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(test_scene_open(scene, &t));
   s = t.model->space;
   PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_BAIJ, &A)); /* makes the graph */
@@ -79,16 +76,17 @@ int main(int argc, char **argv)
   PetscCall(check_structure(s, f, &mine));
   PetscCallMPI(MPI_Allreduce(&mine, &all, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
   SB_CHECK(all == f->n, "%" PetscInt_FMT " nodes of %" PetscInt_FMT, all, f->n);
-  SB_CHECK(size == 1 ? f->n == 0 : f->n > 0, "%" PetscInt_FMT " nodes on %d ranks", f->n, (int)size);
+  SB_CHECK(test_size == 1 ? f->n == 0 : f->n > 0, "%" PetscInt_FMT " nodes on %d ranks", f->n,
+           (int)test_size);
 
   n = 3 * f->n;
   PetscCall(PetscCalloc2((size_t)n * (size_t)n, &schur, (size_t)n * (size_t)n, &dense));
   PetscCall(PetscMalloc2(n, &x, n, &expected));
-  fill(rank, size, n, schur);
+  fill(test_rank, test_size, n, schur);
   fill(0, 1, n, dense);
   for (PetscInt j = 0; j < n; j++) {
     expected[j] = PetscSinReal((PetscReal)j);
-    x[j] = (float)(expected[j] * (rank == 0 ? 1.5 : -0.5 / (size - 1)));
+    x[j] = (float)(expected[j] * (test_rank == 0 ? 1.5 : -0.5 / (test_size - 1)));
   }
   if (n) {
     PetscBLASInt order, one = 1, info;
@@ -105,26 +103,26 @@ int main(int argc, char **argv)
     largest = PetscMax(largest, PetscAbsReal(expected[j]));
   }
   /* entries are rounded to 1.5e-5 of the largest one of their row */
-  SB_CHECK(worst <= 5e-4 * largest, "off by %g of %g", (double)worst, (double)largest);
+  SB_CHECK(worst <= 5e-4 * largest, "off by %g of %g", worst, largest);
   /* the triangle in 16-bit integers, in blocks of 48 rows with columns padded to 32, evenly distributed */
   bytes = SbInterfaceBytes(f);
   PetscCallMPI(MPI_Allreduce(&bytes, &sum, 1, MPIU_INT64, MPI_SUM, PETSC_COMM_WORLD));
   PetscCallMPI(MPI_Allreduce(&bytes, &most, 1, MPIU_INT64, MPI_MAX, PETSC_COMM_WORLD));
   SB_CHECK(sum >= n * (n + 1) && sum <= n * (n + 112), "%" PetscInt64_FMT " bytes for %" PetscInt_FMT " rows",
            sum, n);
-  SB_CHECK(n < 48 * size || (PetscReal)most <= 1.5 * (PetscReal)sum / size,
+  SB_CHECK(n < 48 * test_size || (PetscReal)most <= 1.5 * (PetscReal)sum / test_size,
            "%" PetscInt64_FMT " of %" PetscInt64_FMT " bytes on one rank", most, sum);
   /* a rank with much other work gets no share */
-  fill(rank, size, n, schur);
-  PetscCall(SbInterfaceFactorise(f, rank == 0 ? 1000000000 : 0, schur, &ok));
-  SB_CHECK(ok && (rank || !SbInterfaceBytes(f)), "%" PetscInt64_FMT " bytes on the busy rank",
+  fill(test_rank, test_size, n, schur);
+  PetscCall(SbInterfaceFactorise(f, test_rank == 0 ? 1000000000 : 0, schur, &ok));
+  SB_CHECK(ok && (test_rank || !SbInterfaceBytes(f)), "%" PetscInt64_FMT " bytes on the busy rank",
            SbInterfaceBytes(f));
   /* zero, and a matrix that is indefinite in its last entry only */
   PetscCall(PetscArrayzero(schur, (size_t)n * (size_t)n));
   PetscCall(SbInterfaceFactorise(f, 0, schur, &ok));
   SB_CHECK(ok == (n == 0), "a singular matrix was factored");
-  fill(rank, size, n, schur);
-  if (n && rank == 0) schur[(size_t)n * (size_t)n - 1] = -100.;
+  fill(test_rank, test_size, n, schur);
+  if (n && test_rank == 0) schur[(size_t)n * (size_t)n - 1] = -100.;
   PetscCall(SbInterfaceFactorise(f, 0, schur, &ok));
   SB_CHECK(ok == (n == 0), "an indefinite matrix was factored");
   PetscCall(PetscFree2(schur, dense));

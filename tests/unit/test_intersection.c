@@ -1,7 +1,8 @@
 // @ranks 1
 /*
-  Segments and triangles with vertices on a small lattice, with many contacts, coplanar and collinear cases: reported as intersecting exactly if a vertex or an
-  edge has zero distance to the other, or if signs of integer volumes show that one crosses the other.
+  Segments and triangles with vertices on a small lattice, with many contacts, coplanar and collinear cases:
+  reported as intersecting exactly if a vertex or an edge has zero distance to the other, or if signs of
+  integer volumes show that one crosses the other.
 */
 #include <sbkernel.h>
 #include "pair_reference.h"

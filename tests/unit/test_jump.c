@@ -1,8 +1,8 @@
 // @ranks 1 3
 /*
-  Face terms of CR and DG against their formula: for each face the jump at three points of a quadrature rule that is exact for squares,
-  from the functions of the two cells at these positions, without the face nodes used in jump.c. Constrained DG faces
-  add the difference of the mean to that of their support.
+  Face terms of CR and DG against their formula: for each face the jump at three points of a quadrature rule
+  that is exact for squares, from the functions of the two cells at these positions, without the face nodes
+  used in jump.c. Constrained DG faces add the difference of the mean to that of their support.
 */
 #include "../../src/fem/fem_impl.h"
 #include "../scene.h"
@@ -212,9 +212,8 @@ static PetscErrorCode check_state(SbModel m, const char *what, const PetscReal u
   SbJumpAdd(s, w, SB_JUMP_STIFFNESS, fw);
   PetscCall(formula(m, u, &exact));
   PetscCall(energy_of(s, u, SB_JUMP_STIFFNESS, &energy));
-  PetscCall(PetscPrintf(m->comm, "  %s: energy %.12g J, by the formula %.12g J\n", what, (double)energy,
-                        (double)exact));
-  SB_CHECK(energy > 0., "%s: energy %g", what, (double)energy);
+  PetscCall(PetscPrintf(m->comm, "  %s: energy %.12g J, by the formula %.12g J\n", what, energy, exact));
+  SB_CHECK(energy > 0., "%s: energy %g", what, energy);
   SB_CHECK_NEAR(energy, exact, 1e-12 * exact, "energy against the formula");
   PetscCall(dot(s, f, u, &product));
   SB_CHECK_NEAR(0.5 * product, energy, 1e-13 * energy, "1/2 x . K x");
@@ -222,11 +221,11 @@ static PetscErrorCode check_state(SbModel m, const char *what, const PetscReal u
   PetscCall(dot(s, fw, u, &other));
   SB_CHECK_NEAR(product, other, 1e-13 * energy, "w . K x and x . K w");
   PetscCall(by_matrix(s, u, f, &worst));
-  SB_CHECK(worst < 1e-14, "%s: matrices and forces differ by %g", what, (double)worst);
+  SB_CHECK(worst < 1e-14, "%s: matrices and forces differ by %g", what, worst);
   PetscCall(PetscArrayzero(fw, 3 * s->nnode));
   SbJumpAdd(s, u, SB_JUMP_DAMPING, fw);
   beta = s->beta[s->region[0].body];
-  SB_CHECK(beta == 0.02, "beta is %g", (double)beta);
+  SB_CHECK(beta == 0.02, "beta is %g", beta);
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) largest = PetscMax(largest, PetscAbsReal(f[i]));
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
     SB_CHECK_NEAR(fw[i], beta * f[i], 1e-14 * beta * largest, "force of damping");
@@ -248,8 +247,7 @@ static PetscErrorCode check_affine(SbModel m, const PetscReal u[])
   SbJumpAdd(s, u, SB_JUMP_STIFFNESS, f);
   PetscCall(energy_of(s, u, SB_JUMP_STIFFNESS, &energy));
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) worst = PetscMax(worst, PetscAbsReal(f[i]));
-  SB_CHECK(worst < 1e-11 * 1e5 && energy < 1e-24 * 1e5, "affine: force %g N, energy %g J", (double)worst,
-           (double)energy);
+  SB_CHECK(worst < 1e-11 * 1e5 && energy < 1e-24 * 1e5, "affine: force %g N, energy %g J", worst, energy);
   PetscCall(PetscFree(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -257,15 +255,13 @@ static PetscErrorCode check_affine(SbModel m, const PetscReal u[])
 static PetscErrorCode check_scene(const char *first, const char *second)
 {
   TestScene t;
-  char text[1024], what[64];
+  char what[64];
   const PetscReal *u, *w;
   Vec U, W;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscSNPrintf(text, sizeof(text), scene, first, strcmp(first, "dg") ? "" : "-body_a_gamma0 3", second));
   PetscCall(PetscSNPrintf(what, sizeof(what), "%s and %s", first, second));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t, scene, first, strcmp(first, "dg") ? "" : "-body_a_gamma0 3", second));
   PetscCall(SbSpaceCreateVec(t.model->space, &U));
   PetscCall(SbSpaceCreateVec(t.model->space, &W));
   PetscCall(test_fill(t.model, affine, U));

@@ -1,7 +1,8 @@
 // @ranks 1 2 3 4
 /*
-  Nodes of a space: P1 at vertices, P2 at vertices and edges, CR one per face, DG four per cell and one for each constrained face, also mixed in
-  one space. Their number, positions and sharing by cells and ranks, equal on one rank and on several.
+  Nodes of a space: P1 at vertices, P2 at vertices and edges, CR one per face, DG four per cell and one for
+  each constrained face, also mixed in one space. Their number, positions and sharing by cells and ranks,
+  equal on one rank and on several.
 */
 #include "../scene.h"
 
@@ -26,10 +27,7 @@ static const char *const scenes[] = {
 static PetscErrorCode open_on(MPI_Comm comm, const char *options, SbModel *m)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscOptionsClear(NULL));
-  PetscCall(SbOptionsReset());
-  PetscCall(SbRegisterAll());
-  PetscCall(PetscOptionsInsertString(NULL, options));
+  PetscCall(test_options(options));
   PetscCall(SbSceneCreate(comm, m));
   PetscCall(SbModelSetUp(*m));
   PetscCall(SbMeshValidate((*m)->mesh));
@@ -123,7 +121,7 @@ static PetscErrorCode compare(SbModel m, SbModel alone)
   PetscCall(describe(m, n, &all));
   for (PetscInt i = 0; i < n; i++) {
     SB_CHECK(all[8 * i + 7] == one[8 * i + 7] && one[8 * i + 7] <= 1., "number %d belongs to %g nodes",
-             (int)i, (double)all[8 * i + 7]);
+             (int)i, all[8 * i + 7]);
     for (int k = 0; k < 7; k++)
       SB_CHECK_NEAR(all[8 * i + k], one[8 * i + k], 1e-15 * PetscAbsReal(one[8 * i + k]),
                     "node on several ranks");
@@ -180,12 +178,11 @@ static void check_cliques(SbSpace s)
     if (s->dirichlet_node && s->dirichlet_node[4 * cell + a] >= 0) {
       SB_CHECK(node[4 * SB_BATCH] == s->dirichlet_node[4 * cell + a] && weight == 0. &&
                  s->fixed[s->dirichlet_node[4 * cell + a]] == 7,
-               "a held face has weight %g", (double)weight);
+               "a held face has weight %g", weight);
     } else if (!SbSpaceCellElement(s, cell)->nodes_per[3] || s->neighbour[4 * cell + a] < 0) {
-      SB_CHECK(node[4 * SB_BATCH] == node[0] && weight == 1., "a side without another has weight %g",
-               (double)weight);
+      SB_CHECK(node[4 * SB_BATCH] == node[0] && weight == 1., "a side without another has weight %g", weight);
     } else {
-      SB_CHECK(node[4 * SB_BATCH] != node[0] && weight > 0. && weight < 1., "weight %g", (double)weight);
+      SB_CHECK(node[4 * SB_BATCH] != node[0] && weight > 0. && weight < 1., "weight %g", weight);
     }
     for (int i = 0; i < 3; i++)
       SB_CHECK_NEAR(s->node_x[3 * node[4 * SB_BATCH] + i], s->node_x[3 * node[0] + i], 1e-15,
@@ -205,8 +202,8 @@ int main(int argc, char **argv)
     PetscCall(check_ghosts(m->space));
     check_cliques(m->space);
     PetscCall(compare(m, alone));
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  scene %d: %d cells, %d vertices, %d nodes\n", (int)k,
-                          (int)m->mesh->Ncell, (int)m->mesh->Nvert, (int)m->space->Nnode));
+    test_print("  scene %d: %d cells, %d vertices, %d nodes\n", (int)k, (int)m->mesh->Ncell,
+               (int)m->mesh->Nvert, (int)m->space->Nnode);
     PetscCall(SbModelDestroy(&m));
     PetscCall(SbModelDestroy(&alone));
   }

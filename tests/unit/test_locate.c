@@ -1,6 +1,7 @@
 // @ranks 1
 /*
-  Point location in tets: against a search over all tets, at corners, outside, next to inverted tets, in curved ones. Shape quality of tets.
+  Point location in tets: against a search over all tets, at corners, outside, next to inverted tets, in
+  curved ones. Shape quality of tets.
 */
 #include "../../src/meshio/meshio_impl.h"
 #include "../test.h"
@@ -65,7 +66,7 @@ static PetscErrorCode check_inside(PetscRandom random)
       sum += w[a];
       for (int k = 0; k < 3; k++) at[k] += w[a] * im.x[3 * im.item[3].vert[4 * cell + a] + k];
     }
-    SB_CHECK(distance < 1e-12, "a point inside is %g away", (double)distance);
+    SB_CHECK(distance < 1e-12, "a point inside is %g away", distance);
     SB_CHECK_NEAR(sum, 1, 1e-14, "sum of weights");
     SB_CHECK_NEAR(depth_in(&im, cell, p), best, 1e-12, "depth in the tet that was found");
     for (int k = 0; k < 3; k++) SB_CHECK_NEAR(at[k], p[k], 1e-12, "place by the weights");
@@ -138,10 +139,9 @@ static PetscErrorCode check_outside(void)
   const PetscReal p[3][3] = {{1.3, 0.7, 0.2}, {0.4, -0.5, 0.1}, {0.5, 0.9, 0.9}},
                   expected[3] = {0.3, 0.5, 0.4};
   SbLocator l;
-  SbImport im;
+  SbImport im = {0};
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&im, sizeof(im)));
   PetscCall(SbImportRead_Box("box:1,2,0.5:6,6,6", &im));
   PetscCall(SbLocatorCreate(im.item[3].n, im.item[3].vert, im.x, NULL, &l));
   for (int i = 0; i < 3; i++) {
@@ -150,8 +150,8 @@ static PetscErrorCode check_outside(void)
     const PetscReal distance = SbLocatorFind(l, p[i], &cell, w);
 
     SB_CHECK(distance >= expected[i] - 1e-12 && distance < 1.1 * expected[i],
-             "%g m from the box, expected %g", (double)distance, (double)expected[i]);
-    for (int a = 0; a < 4; a++) SB_CHECK(w[a] >= 0 && w[a] <= 1, "weight %g", (double)w[a]);
+             "%g m from the box, expected %g", distance, expected[i]);
+    for (int a = 0; a < 4; a++) SB_CHECK(w[a] >= 0 && w[a] <= 1, "weight %g", w[a]);
   }
   PetscCall(SbLocatorDestroy(&l));
   /* of two coincident tets the one that is not inverted contains the point */

@@ -60,27 +60,27 @@ static PetscErrorCode test_options(void)
 
 static PetscErrorCode test_refusals(void)
 {
+  static const struct {
+    const char *law, *young, *poisson, *density, *tangent, *names;
+  } refused[] = {
+    {"corotatd", "5e3", "0.25", "1", NULL,
+     "-body_bcorotatd_material|\"corotatd\"|corotated|linear|stvk|neohookean"},
+    {"corotated", NULL, "0.25", "1", NULL, "-body_bcorotated_young|(0, inf)"},
+    {"corotated", "-1", "0.25", "1", NULL, "-body_bcorotated_young -1 Pa|(0, inf) Pa"},
+    {"corotated", "5e3", NULL, "1", NULL, "-body_bcorotated_poisson|(-1, 0.5)"},
+    {"corotated", "5e3", "0.5", "1", NULL, "-body_bcorotated_poisson 0.5|(-1, 0.5)"},
+    {"corotated", "5e3", "-1", "1", NULL, "-body_bcorotated_poisson -1|(-1, 0.5)"},
+    {"corotated", "5e3", "0.3", "0", NULL, "-body_bcorotated_density 0 kg/m^3|(0, inf) kg/m^3"},
+    {"corotated", "5e3", "0.3", "1", "exakt", "-body_bcorotated_tangent exakt|exact"},
+    {"stvk", "5e3", "0.3", "1", "warped", "-body_bstvk_tangent warped"},
+  };
   SbMaterial m;
 
   PetscFunctionBeginUser;
-  SB_CHECK_ERROR(create("corotatd", "5e3", "0.25", "1", NULL, &m), PETSC_ERR_USER,
-                 "-body_bcorotatd_material|\"corotatd\"|corotated|linear|stvk|neohookean");
-  SB_CHECK_ERROR(create("corotated", NULL, "0.25", "1", NULL, &m), PETSC_ERR_USER,
-                 "-body_bcorotated_young|(0, inf)");
-  SB_CHECK_ERROR(create("corotated", "-1", "0.25", "1", NULL, &m), PETSC_ERR_USER,
-                 "-body_bcorotated_young -1 Pa|(0, inf) Pa");
-  SB_CHECK_ERROR(create("corotated", "5e3", NULL, "1", NULL, &m), PETSC_ERR_USER,
-                 "-body_bcorotated_poisson|(-1, 0.5)");
-  SB_CHECK_ERROR(create("corotated", "5e3", "0.5", "1", NULL, &m), PETSC_ERR_USER,
-                 "-body_bcorotated_poisson 0.5|(-1, 0.5)");
-  SB_CHECK_ERROR(create("corotated", "5e3", "-1", "1", NULL, &m), PETSC_ERR_USER,
-                 "-body_bcorotated_poisson -1|(-1, 0.5)");
-  SB_CHECK_ERROR(create("corotated", "5e3", "0.3", "0", NULL, &m), PETSC_ERR_USER,
-                 "-body_bcorotated_density 0 kg/m^3|(0, inf) kg/m^3");
-  SB_CHECK_ERROR(create("corotated", "5e3", "0.3", "1", "exakt", &m), PETSC_ERR_USER,
-                 "-body_bcorotated_tangent exakt|exact");
-  SB_CHECK_ERROR(create("stvk", "5e3", "0.3", "1", "warped", &m), PETSC_ERR_USER,
-                 "-body_bstvk_tangent warped");
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(refused); k++)
+    SB_CHECK_ERROR(create(refused[k].law, refused[k].young, refused[k].poisson, refused[k].density,
+                          refused[k].tangent, &m),
+                   PETSC_ERR_USER, refused[k].names);
   SB_CHECK_ERROR(SbMaterialCreateElastic("linear", PETSC_INFINITY, 0.3, 1, &m), PETSC_ERR_USER, "(0, inf)");
   SB_CHECK_ERROR(SbMaterialCreateElastic("linear", 1, NAN, 1, &m), PETSC_ERR_USER, "(-1, 0.5)");
   SB_CHECK_ERROR(SbMaterialCreateElastic("linear", 1, 0.5, 1, &m), PETSC_ERR_USER, "(-1, 0.5)");

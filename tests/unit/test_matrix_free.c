@@ -43,7 +43,6 @@ static PetscErrorCode hold(SbSpace s, Vec X)
 static PetscErrorCode compare(const char *law)
 {
   TestScene t;
-  char text[2048];
   SbStage stage = {.shift_a = 50., .shift_v = 7., .shift_k = 1.};
   PetscReal norm, difference, a, b;
   PetscBool has;
@@ -52,8 +51,7 @@ static PetscErrorCode compare(const char *law)
   Mat A, F;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), scene, law, ""));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t, scene, law, ""));
   s = t.model->space;
   PetscCall(SbSpaceAllowsMatrixFree(s, &has));
   SB_CHECK(has, "%s has frames", law);
@@ -80,8 +78,8 @@ static PetscErrorCode compare(const char *law)
   PetscCall(VecAXPY(Z, -1., Y));
   PetscCall(VecNorm(Y, NORM_2, &norm));
   PetscCall(VecNorm(Z, NORM_2, &difference));
-  SB_CHECK(norm > 0. && difference < 1e-13 * norm, "%s: the operators differ by %g of %g", law,
-           (double)difference, (double)norm);
+  SB_CHECK(norm > 0. && difference < 1e-13 * norm, "%s: the operators differ by %g of %g", law, difference,
+           norm);
   /* values at prescribed entries do not affect the free rows */
   PetscCall(test_fill(t.model, other, Y));
   PetscCall(MatMult(F, Y, Z));
@@ -89,8 +87,8 @@ static PetscErrorCode compare(const char *law)
   PetscCall(MatMult(F, X, Y));
   PetscCall(VecAXPY(Z, -1., Y));
   PetscCall(VecNorm(Z, NORM_2, &difference));
-  SB_CHECK(difference < 1e-13 * norm, "%s: prescribed entries change free rows by %g of %g", law,
-           (double)difference, (double)norm);
+  SB_CHECK(difference < 1e-13 * norm, "%s: prescribed entries change free rows by %g of %g", law, difference,
+           norm);
   PetscCall(MatMult(F, W, Z));
   PetscCall(VecDot(X, Z, &b));
   SB_CHECK_NEAR(a, b, 1e-13 * PetscAbsReal(a), "symmetry");
@@ -108,13 +106,11 @@ static PetscErrorCode compare(const char *law)
 static PetscErrorCode refuse(const char *law, const char *extra)
 {
   TestScene t;
-  char text[2048];
   PetscBool has;
   Mat F;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), scene, law, extra));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t, scene, law, extra));
   PetscCall(SbSpaceAllowsMatrixFree(t.model->space, &has));
   SB_CHECK(!has, "%s %s is said to have frames", law, extra);
   SB_CHECK_ERROR(SbSpaceCreateMatrixFree(t.model->space, &F), PETSC_ERR_SUP, "");

@@ -54,18 +54,17 @@ static PetscErrorCode check_empty(void)
 
 int main(int argc, char *argv[])
 {
-  char dir[PETSC_MAX_PATH_LEN];
+  char dir[512];
   SbMemoryMesh *in_memory;
   TestScene scene;
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_empty());
-  PetscCall(fixture_folder(sizeof(dir), dir));
+  PetscCall(test_file_folder(dir));
   PetscCall(fixture_given(&in_memory));
   PetscCall(fixture_open_given(dir, GIVEN_SCENE EULER "-output_fields none", in_memory, &scene));
   PetscCall(check_mesh(scene.model));
   PetscCall(test_scene_close(&scene));
-  PetscCall(fixture_remove(dir));
   PetscCall(SbOptionsReset());
   SB_TEST_END();
 }

@@ -178,18 +178,6 @@ static PetscErrorCode create(const char *file, const char *set_text)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Only rank 0 reads, but all ranks return the same error and message. */
-static PetscErrorCode test_errors(void)
-{
-  PetscFunctionBeginUser;
-  SB_CHECK_ERROR(create(DATA "none.msh", NULL), PETSC_ERR_FILE_OPEN, "body 'liver'|tests/data/none.msh");
-  SB_CHECK_ERROR(create(DATA "bad_nan.msh", NULL), PETSC_ERR_FILE_UNEXPECTED, "line 9|node 4");
-  SB_CHECK_ERROR(create(DATA "bad_twice.msh", NULL), PETSC_ERR_USER_INPUT, "1|3");
-  SB_CHECK_ERROR(create("box:1,1,1:2", "group:ymix"), PETSC_ERR_USER_INPUT, "group 'ymix'");
-  SB_CHECK_ERROR(create("box:1,1,1:2", "sphere:3,0,0,1"), PETSC_ERR_USER_INPUT, "set 'clamp'|0|1");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The validation detects the damage that it is made for; all ranks have the damage, so that all stop at the same check. */
 static PetscErrorCode test_validation(void)
 {
@@ -226,7 +214,12 @@ int main(int argc, char **argv)
   PetscCall(test_few(DATA "two_tets.msh", 2));
   PetscCall(test_few("box:1,1,1:1", 6));
   PetscCall(test_order());
-  PetscCall(test_errors());
+  /* only rank 0 reads, but all ranks return the same error and message */
+  SB_CHECK_ERROR(create(DATA "none.msh", NULL), PETSC_ERR_FILE_OPEN, "body 'liver'|tests/data/none.msh");
+  SB_CHECK_ERROR(create(DATA "bad_nan.msh", NULL), PETSC_ERR_FILE_UNEXPECTED, "line 9|node 4");
+  SB_CHECK_ERROR(create(DATA "bad_twice.msh", NULL), PETSC_ERR_USER_INPUT, "1|3");
+  SB_CHECK_ERROR(create("box:1,1,1:2", "group:ymix"), PETSC_ERR_USER_INPUT, "group 'ymix'");
+  SB_CHECK_ERROR(create("box:1,1,1:2", "sphere:3,0,0,1"), PETSC_ERR_USER_INPUT, "set 'clamp'|0|1");
   PetscCall(test_validation());
   PetscCall(SbOptionsReset());
   SB_TEST_END();

@@ -71,7 +71,7 @@ static PetscErrorCode test_sides(void)
       const PetscReal x = box.im.x[3 * box.im.item[2].vert[3 * t + k] + group / 2];
 
       SB_CHECK(x == (group % 2 ? l[group / 2] : 0), "triangle %d of %s lies at %g", (int)t,
-               box.im.group[group].name, (double)x);
+               box.im.group[group].name, x);
     }
   }
   SB_CHECK(found[0] == 4 && found[1] == 4 && found[2] == 6 && found[3] == 6 && found[4] == 12 &&

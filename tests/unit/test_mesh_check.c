@@ -81,7 +81,7 @@ static PetscErrorCode test_scales(void)
   SB_CHECK(m.im.nreoriented == 48, "%d tets turned in a mirrored cube", (int)m.im.nreoriented);
   SB_CHECK_NEAR(m.facts.body.volume, 1, 1e-14, "volume of the mirrored cube");
   SB_CHECK(m.facts.body.bbox[0] == -1 && m.facts.body.bbox[3] == 0, "extent from %g to %g",
-           (double)m.facts.body.bbox[0], (double)m.facts.body.bbox[3]);
+           m.facts.body.bbox[0], m.facts.body.bbox[3]);
   PetscCall(SbImportDestroy(&m.im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -105,7 +105,7 @@ static PetscErrorCode test_shape(const PetscReal x[12], PetscReal dihedral, Pets
   for (int i = 0; i < 3; i++)
     worst = PetscMax(
       worst, PetscAbsReal(body->bbox[i] - PetscMin(PetscMin(x[i], x[3 + i]), PetscMin(x[6 + i], x[9 + i]))));
-  SB_CHECK(worst == 0, "extent wrong by %g", (double)worst);
+  SB_CHECK(worst == 0, "extent wrong by %g", worst);
   PetscCall(SbImportDestroy(&m.im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -51,30 +51,12 @@ static PetscErrorCode test_all_pairs(const char *what, PetscInt nvert, PetscInt 
 static PetscErrorCode test_box(void)
 {
   const SbBody body = test_body("b", "box:1,1,1:3");
-  SbImport im;
+  SbImport im = {0};
 
   PetscFunctionBeginUser;
-  memset(&im, 0, sizeof(im));
   PetscCall(SbImportRead(&body, &im));
   PetscCall(test_all_pairs("box", im.nvert, im.item[3].n, im.item[3].vert));
   PetscCall(SbImportDestroy(&im));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* A ring of tets around the edge from vertex 0 to 1: hundreds of faces with the same lowest vertex. */
-static PetscErrorCode test_ring(void)
-{
-  enum { N = 90 };
-  PetscInt cell[4 * N];
-
-  PetscFunctionBeginUser;
-  for (PetscInt c = 0; c < N; c++) {
-    cell[4 * c] = 1;
-    cell[4 * c + 1] = 2 + (c + 1) % N;
-    cell[4 * c + 2] = 0;
-    cell[4 * c + 3] = 2 + c;
-  }
-  PetscCall(test_all_pairs("ring", N + 2, N, cell));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -99,9 +81,19 @@ static PetscErrorCode test_shared(void)
 
 int main(int argc, char **argv)
 {
+  enum { N = 90 };
+  PetscInt cell[4 * N];
+
   SB_TEST_BEGIN(argc, argv);
   PetscCall(test_box());
-  PetscCall(test_ring());
+  /* a ring of tets around the edge from vertex 0 to 1: hundreds of faces with the same lowest vertex */
+  for (PetscInt c = 0; c < N; c++) {
+    cell[4 * c] = 1;
+    cell[4 * c + 1] = 2 + (c + 1) % N;
+    cell[4 * c + 2] = 0;
+    cell[4 * c + 3] = 2 + c;
+  }
+  PetscCall(test_all_pairs("ring", N + 2, N, cell));
   PetscCall(test_shared());
   SB_TEST_END();
 }

@@ -13,8 +13,9 @@ static void write_text(const char *name, const char *text)
 
   (void)snprintf(path, sizeof(path), "%s/%s", folder, name);
   file = fopen(path, "wb");
-  if (file) (void)fputs(text, file);
-  if (file) (void)fclose(file);
+  if (!file) return;
+  (void)fputs(text, file);
+  (void)fclose(file);
 }
 
 static PetscErrorCode use_mesh(const char *name)
@@ -122,59 +123,43 @@ static PetscErrorCode test_netgen(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode test_medit(void)
-{
 #define HEAD "MeshVersionFormatted 1\nDimension 3\n"
 #define VERTICES "Vertices\n4\n0 0 0 0\n1 0 0 0\n0 1 0 0\n0 0 1 0\n"
-  static const Case cases[] = {
-    {HEAD VERTICES "Tetrahedra\n1\n1 2 3 4 7\nEnd\n", NULL},
-    {HEAD VERTICES "Corners\n2\n1\n2\nTetrahedra 1 1 2 3 4 7\n# fine\nEnd", NULL},
-    {"MeshVersionFormatted 2 Dimension 2\n", "line 1|dimension 2|3"},
-    {"solid\n", "line 1|'MeshVersionFormatted'|'solid'"},
-    {HEAD "Tetrahedra\n1\n1 2 3 4 7\nEnd\n", "line 3"},
-    {HEAD VERTICES "Tetrahedra\n1\n1 2 3 5 7\nEnd\n", "line 11|element 1|vertex 5|4"},
-    {HEAD VERTICES "Tetrahedra\n1\n1 2 3 4 7\n", "'End'"},
-    {HEAD VERTICES "Hexahedra\n1\n1 2 3 4 1 2 3 4 0\nEnd\n", "1 hexahedra"},
-    {HEAD VERTICES "TetrahedraP2\n1\n1 2 3 4 1 2 3 4 1 5 0\nEnd\n", "element 1|vertex 5 of 4"},
-    {HEAD VERTICES "Triangles\n1\n1 2 3 0\nEnd\n", "1 3-node"},
-    {HEAD "Vertices\n999999999\n", "999999999 vertices"},
-    {NULL, NULL}};
+static const Case medit[] = {
+  {HEAD VERTICES "Tetrahedra\n1\n1 2 3 4 7\nEnd\n", NULL},
+  {HEAD VERTICES "Corners\n2\n1\n2\nTetrahedra 1 1 2 3 4 7\n# fine\nEnd", NULL},
+  {"MeshVersionFormatted 2 Dimension 2\n", "line 1|dimension 2|3"},
+  {"solid\n", "line 1|'MeshVersionFormatted'|'solid'"},
+  {HEAD "Tetrahedra\n1\n1 2 3 4 7\nEnd\n", "line 3"},
+  {HEAD VERTICES "Tetrahedra\n1\n1 2 3 5 7\nEnd\n", "line 11|element 1|vertex 5|4"},
+  {HEAD VERTICES "Tetrahedra\n1\n1 2 3 4 7\n", "'End'"},
+  {HEAD VERTICES "Hexahedra\n1\n1 2 3 4 1 2 3 4 0\nEnd\n", "1 hexahedra"},
+  {HEAD VERTICES "TetrahedraP2\n1\n1 2 3 4 1 2 3 4 1 5 0\nEnd\n", "element 1|vertex 5 of 4"},
+  {HEAD VERTICES "Triangles\n1\n1 2 3 0\nEnd\n", "1 3-node"},
+  {HEAD "Vertices\n999999999\n", "999999999 vertices"},
+  {NULL, NULL}};
 
-  PetscFunctionBeginUser;
-  PetscCall(test_cases("m.mesh", cases));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode test_vtk(void)
-{
 #define VTK                                                                                                 \
   "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 " \
   "1\n"
-  static const Case cases[] = {
-    {VTK "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n", NULL},
-    {VTK
-     "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nCELL_DATA 1\nVECTORS v float\n1 2 3\nFIELD f 1\nr 1 1 int\n7\n",
-     NULL},
-    {"solid\n", "line 1|'# vtk DataFile Version'|VTK"},
-    {"# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\n", "line 4|POLYDATA|UNSTRUCTURED_GRID"},
-    {VTK "CELLS 1 5\n4 0 1 2 4\nCELL_TYPES 1\n10\n", "line 7|cell 0|point 4|3"},
-    {VTK "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n12\n", "line 7|cell 0|VTK|type 12|4 points|8"},
-    {VTK "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n99\n", "line 7|cell 0|VTK|type 99"},
-    {VTK "CELLS 1 5\n9 0 1 2 3\nCELL_TYPES 1\n10\n", "cell 0|1|9 points"},
-    {VTK "CELLS 1 5\n4 0 1 2 3\n", "CELL_TYPES"},
-    {VTK "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nCELL_DATA 2\n", "2 cells|1"},
-    {VTK "CELLS 2 4\nOFFSETS vtktypeint64\n0 9\nCONNECTIVITY vtktypeint64\n0 1 2 3\nCELL_TYPES 1\n10\n",
-     "line 7|cell 0|9|4"},
-    {VTK "CELLS 900000000 5\n", "900000000 cells"},
-    {NULL, NULL}};
+static const Case vtk[] = {
+  {VTK "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n", NULL},
+  {VTK
+   "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nCELL_DATA 1\nVECTORS v float\n1 2 3\nFIELD f 1\nr 1 1 int\n7\n",
+   NULL},
+  {"solid\n", "line 1|'# vtk DataFile Version'|VTK"},
+  {"# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\n", "line 4|POLYDATA|UNSTRUCTURED_GRID"},
+  {VTK "CELLS 1 5\n4 0 1 2 4\nCELL_TYPES 1\n10\n", "line 7|cell 0|point 4|3"},
+  {VTK "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n12\n", "line 7|cell 0|VTK|type 12|4 points|8"},
+  {VTK "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n99\n", "line 7|cell 0|VTK|type 99"},
+  {VTK "CELLS 1 5\n9 0 1 2 3\nCELL_TYPES 1\n10\n", "cell 0|1|9 points"},
+  {VTK "CELLS 1 5\n4 0 1 2 3\n", "CELL_TYPES"},
+  {VTK "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nCELL_DATA 2\n", "2 cells|1"},
+  {VTK "CELLS 2 4\nOFFSETS vtktypeint64\n0 9\nCONNECTIVITY vtktypeint64\n0 1 2 3\nCELL_TYPES 1\n10\n",
+   "line 7|cell 0|9|4"},
+  {VTK "CELLS 900000000 5\n", "900000000 cells"},
+  {NULL, NULL}};
 
-  PetscFunctionBeginUser;
-  PetscCall(test_cases("v.vtk", cases));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode test_vtu(void)
-{
 #define VTU(more, points, cells)                                                                 \
   "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" byte_order=\"LittleEndian\"" more \
   ">\n<UnstructuredGrid>\n<Piece NumberOfPoints=\"4\" NumberOfCells='1'>\n<Points>" points       \
@@ -185,35 +170,28 @@ static PetscErrorCode test_vtu(void)
 #define ARRAY(name, text) \
   "<DataArray type=\"Int64\" Name=\"" name "\" format=\"ascii\">" text "</DataArray>\n"
 #define TET ARRAY("connectivity", "0 1 2 3") ARRAY("offsets", "4") ARRAY("types", "10")
-  static const Case cases[] = {
-    {VTU("", X, TET), NULL},
-    {"<VTKFile type=\"PolyData\">\n", "u.vtu|line 1|type 'PolyData'|UnstructuredGrid"},
-    {VTU(" compressor=\"vtkLZ4DataCompressor\"", X, TET),
-     "line 2|vtkLZ4DataCompressor|vtkZLibDataCompressor"},
-    {VTU("", "", TET), "line 5"},
-    {VTU("", X, ARRAY("connectivity", "0 1 2 3") ARRAY("offsets", "4")), "line 6|'types'"},
-    {VTU("", X, ARRAY("connectivity", "0 1 2 8") ARRAY("offsets", "4") ARRAY("types", "10")),
-     "line 6|cell 0|point 8"},
-    {VTU("", X, ARRAY("connectivity", "0 1 2 3") ARRAY("offsets", "5") ARRAY("types", "10")),
-     "line 6|'connectivity'|5 numbers"},
-    {VTU("", X, ARRAY("connectivity", "0 1 x 3") ARRAY("offsets", "4") ARRAY("types", "10")), "line 6|'x'"},
-    {VTU("",
-         "<DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"binary\">MAAAAAAA****</DataArray>",
-         TET),
-     "line 5|''|12 numbers"},
-    {VTU("", "<DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/>", TET),
-     "line 5|0"},
-    {"<VTKFile type=\"UnstructuredGrid\"><Piece NumberOfPoints=\"4\" NumberOfCells=\"1\"></Piece><Piece "
-     "NumberOfPoints=\"4\" NumberOfCells=\"1\"></Piece></VTKFile>",
-     "u.vtu|line 1"},
-    {"<VTKFile type=\"UnstructuredGrid\"><Piece NumberOfPoints=\"-4\" NumberOfCells=\"1\"></Piece></VTKFile>",
-     "u.vtu|line 1|NumberOfPoints|'-4'"},
-    {NULL, NULL}};
-
-  PetscFunctionBeginUser;
-  PetscCall(test_cases("u.vtu", cases));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+static const Case vtu[] = {
+  {VTU("", X, TET), NULL},
+  {"<VTKFile type=\"PolyData\">\n", "u.vtu|line 1|type 'PolyData'|UnstructuredGrid"},
+  {VTU(" compressor=\"vtkLZ4DataCompressor\"", X, TET), "line 2|vtkLZ4DataCompressor|vtkZLibDataCompressor"},
+  {VTU("", "", TET), "line 5"},
+  {VTU("", X, ARRAY("connectivity", "0 1 2 3") ARRAY("offsets", "4")), "line 6|'types'"},
+  {VTU("", X, ARRAY("connectivity", "0 1 2 8") ARRAY("offsets", "4") ARRAY("types", "10")),
+   "line 6|cell 0|point 8"},
+  {VTU("", X, ARRAY("connectivity", "0 1 2 3") ARRAY("offsets", "5") ARRAY("types", "10")),
+   "line 6|'connectivity'|5 numbers"},
+  {VTU("", X, ARRAY("connectivity", "0 1 x 3") ARRAY("offsets", "4") ARRAY("types", "10")), "line 6|'x'"},
+  {VTU("", "<DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"binary\">MAAAAAAA****</DataArray>",
+       TET),
+   "line 5|''|12 numbers"},
+  {VTU("", "<DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/>", TET),
+   "line 5|0"},
+  {"<VTKFile type=\"UnstructuredGrid\"><Piece NumberOfPoints=\"4\" NumberOfCells=\"1\"></Piece><Piece "
+   "NumberOfPoints=\"4\" NumberOfCells=\"1\"></Piece></VTKFile>",
+   "u.vtu|line 1"},
+  {"<VTKFile type=\"UnstructuredGrid\"><Piece NumberOfPoints=\"-4\" NumberOfCells=\"1\"></Piece></VTKFile>",
+   "u.vtu|line 1|NumberOfPoints|'-4'"},
+  {NULL, NULL}};
 
 static PetscErrorCode test_abaqus(void)
 {
@@ -253,52 +231,38 @@ static PetscErrorCode test_abaqus(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode test_unv(void)
-{
 #define UNODE                                                                                               \
   "    -1\n  2411\n 1 1 1 11\n 0.D+0 0. 0.\n 2 1 1 11\n 1.D+0 0. 0.\n 3 1 1 11\n 0. 1. 0.\n 4 1 1 11\n 0. " \
   "0. 1.E0\n    -1\n"
 #define UTET "    -1\n  2412\n 1 111 2 1 7 4\n 1 2 3 4\n    -1\n"
-  static const Case cases[] = {
-    {UNODE UTET, NULL},
-    {"\xef\xbb\xbf" UNODE UTET, NULL},
-    {UNODE UTET "    -1\n  2467\n 1 0 0 0 0 0 0 2\nname\n 8 1 0 0 7 3 0 0\n    -1\n", NULL},
-    {"solid\n", "u.unv|line 1|-1"},
-    {UTET, "body 'b'|line 2"},
-    {UNODE "    -1\n  2412\n 1 111 2 1 7 4\n 1 2 3 9\n    -1\n", "u.unv|line 15|element 1|node 9"},
-    {UNODE "    -1\n  2412\n 1 118 2 1 7 4\n 1 2 3 4\n    -1\n", "line 14|element 1|kind 118|4 nodes|10"},
-    {UNODE "    -1\n  2412\n 1 118 2 1 7 10\n 1 0 2 0 3 0 0 0\n 0 4\n    -1\n", "line 15|element 1|node 0"},
-    {UNODE "    -1\n  2412\n 1 115 2 1 7 8\n 1 2 3 4 1 2 3 4\n    -1\n", "1 hexahedra"},
-    {UNODE "    -1\n  2412\n 1 111 2 1 7 4\n 1 2 3 4\n", "-1"},
-    {UNODE UTET "    -1\n  2467\n 1 0 0 0 0 0 0 1\nname\n 7 8 0 0\n    -1\n", "group 'name'|node 8"},
-    {UNODE UTET "    -1\n  2467\n 1 0 0 0 0 0 0 900000\nname\n 7 8 0 0\n    -1\n", "900000 members"},
-    {NULL, NULL}};
-
-  PetscFunctionBeginUser;
-  PetscCall(test_cases("u.unv", cases));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+static const Case unv[] = {
+  {UNODE UTET, NULL},
+  {"\xef\xbb\xbf" UNODE UTET, NULL},
+  {UNODE UTET "    -1\n  2467\n 1 0 0 0 0 0 0 2\nname\n 8 1 0 0 7 3 0 0\n    -1\n", NULL},
+  {"solid\n", "u.unv|line 1|-1"},
+  {UTET, "body 'b'|line 2"},
+  {UNODE "    -1\n  2412\n 1 111 2 1 7 4\n 1 2 3 9\n    -1\n", "u.unv|line 15|element 1|node 9"},
+  {UNODE "    -1\n  2412\n 1 118 2 1 7 4\n 1 2 3 4\n    -1\n", "line 14|element 1|kind 118|4 nodes|10"},
+  {UNODE "    -1\n  2412\n 1 118 2 1 7 10\n 1 0 2 0 3 0 0 0\n 0 4\n    -1\n", "line 15|element 1|node 0"},
+  {UNODE "    -1\n  2412\n 1 115 2 1 7 8\n 1 2 3 4 1 2 3 4\n    -1\n", "1 hexahedra"},
+  {UNODE "    -1\n  2412\n 1 111 2 1 7 4\n 1 2 3 4\n", "-1"},
+  {UNODE UTET "    -1\n  2467\n 1 0 0 0 0 0 0 1\nname\n 7 8 0 0\n    -1\n", "group 'name'|node 8"},
+  {UNODE UTET "    -1\n  2467\n 1 0 0 0 0 0 0 900000\nname\n 7 8 0 0\n    -1\n", "900000 members"},
+  {NULL, NULL}};
 
 /* gmsh 4.0: also after a blank line or a UTF-8 byte order mark. */
-static PetscErrorCode test_gmsh_40(void)
-{
 #define FORMAT40 "$MeshFormat\n4.0 0 8\n$EndMeshFormat\n"
 #define ENTITY40 "$Entities\n0 0 0 1\n1 0 0 0 1 1 1 1 7 0\n$EndEntities\n"
 #define NODES40 "$Nodes\n1 4\n1 3 0 4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n"
-  static const Case cases[] = {
-    {FORMAT40 ENTITY40 NODES40 "$Elements\n1 1\n1 3 4 1\n1 1 2 3 4\n$EndElements\n", NULL},
-    {"\n" FORMAT40 NODES40 "$Elements\n1 1\n1 3 4 1\n1 1 2 3 4\n$EndElements\n", NULL},
-    {"\xef\xbb\xbf" FORMAT40 NODES40 "$Elements\n1 1\n1 3 4 1\n1 1 2 3 4\n$EndElements\n", NULL},
-    {FORMAT40 NODES40 "$Elements\n1 1\n1 3 4 1\n1 1 2 3 9\n$EndElements\n", "g.msh|line 15|element 1|node 9"},
-    {FORMAT40 NODES40 "$Elements\n1 2\n1 3 4 1\n1 1 2 3 4\n$EndElements\n", "line 15|2 elements|1"},
-    {FORMAT40 "$Nodes\n1 1\n1 7 0 1\n1 0 0 0\n", "line 6|dimension 7"},
-    {FORMAT40, "g.msh"},
-    {NULL, NULL}};
-
-  PetscFunctionBeginUser;
-  PetscCall(test_cases("g.msh", cases));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+static const Case gmsh_40[] = {
+  {FORMAT40 ENTITY40 NODES40 "$Elements\n1 1\n1 3 4 1\n1 1 2 3 4\n$EndElements\n", NULL},
+  {"\n" FORMAT40 NODES40 "$Elements\n1 1\n1 3 4 1\n1 1 2 3 4\n$EndElements\n", NULL},
+  {"\xef\xbb\xbf" FORMAT40 NODES40 "$Elements\n1 1\n1 3 4 1\n1 1 2 3 4\n$EndElements\n", NULL},
+  {FORMAT40 NODES40 "$Elements\n1 1\n1 3 4 1\n1 1 2 3 9\n$EndElements\n", "g.msh|line 15|element 1|node 9"},
+  {FORMAT40 NODES40 "$Elements\n1 2\n1 3 4 1\n1 1 2 3 4\n$EndElements\n", "line 15|2 elements|1"},
+  {FORMAT40 "$Nodes\n1 1\n1 7 0 1\n1 0 0 0\n", "line 6|dimension 7"},
+  {FORMAT40, "g.msh"},
+  {NULL, NULL}};
 
 static PetscErrorCode test_nastran(void)
 {
@@ -340,12 +304,12 @@ int main(int argc, char **argv)
   SB_CHECK(mkdtemp(folder), "no folder %s", folder);
   PetscCall(test_tetgen());
   PetscCall(test_netgen());
-  PetscCall(test_medit());
-  PetscCall(test_vtk());
-  PetscCall(test_vtu());
+  PetscCall(test_cases("m.mesh", medit));
+  PetscCall(test_cases("v.vtk", vtk));
+  PetscCall(test_cases("u.vtu", vtu));
   PetscCall(test_abaqus());
-  PetscCall(test_unv());
-  PetscCall(test_gmsh_40());
+  PetscCall(test_cases("u.unv", unv));
+  PetscCall(test_cases("g.msh", gmsh_40));
   PetscCall(test_nastran());
   (void)snprintf(command, sizeof(command), "rm -rf %s", folder);
   SB_CHECK(!system(command), "%s stays", folder);

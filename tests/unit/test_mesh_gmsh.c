@@ -1,7 +1,6 @@
 // Reader of gmsh files: the four variants of one mesh give the same result, each kind of damage has its message.
 // @ranks 1
-#include <stdlib.h>
-#include <unistd.h>
+#include "../file.h"
 #include "mesh_test.h"
 
 #define DATA "tests/data/"
@@ -32,7 +31,7 @@ static PetscErrorCode test_variant(const char *path)
   }
   for (PetscInt i = 0; i < 3 * im.nvert && im.nvert == reference.nvert; i++)
     difference = PetscMax(difference, PetscAbsReal(im.x[i] - reference.x[i]));
-  SB_CHECK(difference == 0, "%s: coordinates differ by %g", path, (double)difference);
+  SB_CHECK(difference == 0, "%s: coordinates differ by %g", path, difference);
   SB_CHECK(im.item[3].n == reference.item[3].n &&
              !memcmp(im.item[3].vert, reference.item[3].vert, 4 * 48 * sizeof(PetscInt)),
            "%s: other tets", path);
@@ -45,15 +44,14 @@ static PetscErrorCode test_variant(const char *path)
 static PetscErrorCode test_other_byte_order(void)
 {
   static const unsigned char one[4] = {0, 0, 0, 1};
-  char path[] = "/tmp/sbmesh_XXXXXX.msh";
+  char path[512];
   FILE *file;
   SbImport im;
-  const int fd = mkstemps(path, 4);
   double x[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   uint32_t numbers[3 + 1 + 4] = {4, 1, 0, 1, 1, 2, 3, 4};
 
   PetscFunctionBeginUser;
-  file = fdopen(fd, "wb");
+  PetscCall(test_file_open(".msh", path, &file));
   fprintf(file, "$MeshFormat\n2.2 1 8\n");
   fwrite(one, 1, 4, file);
   fprintf(file, "\n$EndMeshFormat\n$Nodes\n4\n");
@@ -75,26 +73,10 @@ static PetscErrorCode test_other_byte_order(void)
     fwrite(&numbers[i], 4, 1, file);
   }
   fprintf(file, "\n$EndElements\n");
-  fclose(file);
+  PetscCall(test_file_close(file));
   PetscCall(test_import(path, &im));
-  (void)unlink(path);
   SB_CHECK(im.nvert == 4 && im.item[3].n == 1, "%d vertices, %d tets", (int)im.nvert, (int)im.item[3].n);
-  SB_CHECK(im.x[3] == 1 && im.x[11] == 1, "coordinates %g %g", (double)im.x[3], (double)im.x[11]);
-  PetscCall(SbImportDestroy(&im));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Nodes with widely separated numbers, unused nodes, an irrelevant section. */
-static PetscErrorCode test_odd(void)
-{
-  SbImport im;
-
-  PetscFunctionBeginUser;
-  PetscCall(test_import(DATA "odd.msh", &im));
-  SB_CHECK(im.nvert == 10 && im.item[3].n == 2, "%d vertices, %d tets", (int)im.nvert, (int)im.item[3].n);
-  SB_CHECK(im.item[3].vert[1] == 2, "node 1000000000002 became vertex %d", (int)im.item[3].vert[1]);
-  SB_CHECK(test_count(&im, 2, "skin") == 3 && test_count(&im, 3, "flesh") == 2,
-           "groups of a file with names");
+  SB_CHECK(im.x[3] == 1 && im.x[11] == 1, "coordinates %g %g", im.x[3], im.x[11]);
   PetscCall(SbImportDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -140,20 +122,19 @@ static PetscErrorCode test_damage(void)
 /* Any truncation of each variant gives an error, never a crash or a mesh. */
 static PetscErrorCode test_cut(const char *whole_path, size_t step)
 {
-  char path[] = "/tmp/sbmesh_XXXXXX.msh", *data;
-  FILE *file = fopen(whole_path, "rb");
-  size_t size, needed;
+  char path[512], data[20000];
+  FILE *file;
+  size_t size;
   PetscErrorCode ierr;
-  const int fd = mkstemps(path, 4);
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(20000, &data));
-  size = fread(data, 1, 20000, file);
-  needed = size - 1; /* the last line end is dispensable */
+  PetscCall(test_file_open(".msh", path, &file));
+  PetscCall(test_file_close(file));
+  file = fopen(whole_path, "rb");
+  size = fread(data, 1, sizeof(data), file);
   fclose(file);
-  close(fd);
   PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
-  for (size_t n = 0; n < needed; n += step) {
+  for (size_t n = 0; n < size - 1; n += step) { /* the last line end is dispensable */
     file = fopen(path, "wb");
     fwrite(data, 1, n, file);
     fclose(file);
@@ -161,20 +142,26 @@ static PetscErrorCode test_cut(const char *whole_path, size_t step)
     SB_CHECK(ierr, "%s cut to %zu of %zu bytes was accepted", whole_path, n, size);
   }
   PetscCall(PetscPopErrorHandler());
-  (void)unlink(path);
-  PetscCall(PetscFree(data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int main(int argc, char **argv)
 {
+  SbImport im;
+
   SB_TEST_BEGIN(argc, argv);
   PetscCall(test_variant(DATA "two_cubes_22.msh"));
   PetscCall(test_variant(DATA "two_cubes_22_bin.msh"));
   PetscCall(test_variant(DATA "two_cubes_41.msh"));
   PetscCall(test_variant(DATA "two_cubes_41_bin.msh"));
   PetscCall(test_other_byte_order());
-  PetscCall(test_odd());
+  /* nodes with widely separated numbers, unused nodes, an irrelevant section */
+  PetscCall(test_import(DATA "odd.msh", &im));
+  SB_CHECK(im.nvert == 10 && im.item[3].n == 2, "%d vertices, %d tets", (int)im.nvert, (int)im.item[3].n);
+  SB_CHECK(im.item[3].vert[1] == 2, "node 1000000000002 became vertex %d", (int)im.item[3].vert[1]);
+  SB_CHECK(test_count(&im, 2, "skin") == 3 && test_count(&im, 3, "flesh") == 2,
+           "groups of a file with names");
+  PetscCall(SbImportDestroy(&im));
   PetscCall(test_damage());
   PetscCall(test_cut(DATA "two_cubes_22.msh", 7));
   PetscCall(test_cut(DATA "two_cubes_22_bin.msh", 7));

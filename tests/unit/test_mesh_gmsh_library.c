@@ -18,11 +18,10 @@ static PetscErrorCode run(const char *doing, PetscReal seconds, SbGmshWork work,
 /* Runs a task and frees it. */
 static PetscErrorCode try_work(PetscReal seconds, SbGmshWork work, void *ctx)
 {
-  SbImport im;
+  SbImport im = {0};
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  memset(&im, 0, sizeof(im));
   (void)snprintf(im.where, sizeof(im.where), "body 'b': thing");
   ierr = run("made tetrahedra", seconds, work, ctx, &im);
   PetscCall(SbImportDestroy(&im));
@@ -78,12 +77,11 @@ static PetscErrorCode mesh_cube(const SbGmsh *gmsh, void *ctx, SbImport *result)
 
 static PetscErrorCode test_cube(void)
 {
-  SbImport im;
+  SbImport im = {0};
   SbMeshStatistics facts;
   double size = 0.5;
 
   PetscFunctionBeginUser;
-  memset(&im, 0, sizeof(im));
   (void)snprintf(im.where, sizeof(im.where), "body 'b': cube");
   PetscCall(run("made tetrahedra", 60, mesh_cube, &size, &im));
   SB_CHECK(im.item[3].n >= 6 && im.nvert >= 8, "%d tets, %d vertices", (int)im.item[3].n, (int)im.nvert);
@@ -165,11 +163,11 @@ static PetscErrorCode test_not_loaded(void)
 
 int main(int argc, char **argv)
 {
-  PetscMPIInt rank;
+  int rank;
 
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) {
+  rank = test_rank;
+  if (!test_rank) {
     PetscCall(test_cube());
     PetscCall(test_failures());
     PetscCall(test_not_loaded());

@@ -4,11 +4,10 @@
 
 static PetscErrorCode test_groups(void)
 {
-  SbImport im;
+  SbImport im = {0};
   PetscInt a, b, c, tags[5];
 
   PetscFunctionBeginUser;
-  memset(&im, 0, sizeof(im));
   PetscCall(SbImportGroup(&im, 2, 12, NULL, &a));
   PetscCall(SbImportGroup(&im, 3, 12, "flesh", &b));
   PetscCall(SbImportGroup(&im, 2, 12, NULL, &c));
@@ -33,11 +32,10 @@ static PetscErrorCode test_groups(void)
 /* Many items of every dimension are preserved when the arrays grow. */
 static PetscErrorCode test_growth(void)
 {
-  SbImport im;
+  SbImport im = {0};
   PetscInt wrong = 0;
 
   PetscFunctionBeginUser;
-  memset(&im, 0, sizeof(im));
   for (PetscInt i = 0; i < 1000; i++) {
     for (int d = 0; d < 4; d++)
       PetscCall(SbImportAddItem(&im, d, (PetscInt[]){i, i + 1, i + 2, i + 3}, i % 7, i + d));
@@ -59,11 +57,10 @@ static PetscErrorCode test_growth(void)
 static PetscErrorCode test_place(PetscReal scale, const PetscReal rotate[4], const PetscReal translate[3],
                                  const PetscReal expected[3], PetscReal tolerance)
 {
-  SbImport im;
+  SbImport im = {0};
   SbBody body = test_body("b", "box:1,1,1:1");
 
   PetscFunctionBeginUser;
-  memset(&im, 0, sizeof(im));
   body.scale = scale;
   PetscCall(PetscArraycpy(body.rotate, rotate, 4));
   PetscCall(PetscArraycpy(body.translate, translate, 3));
@@ -75,11 +72,10 @@ static PetscErrorCode test_place(PetscReal scale, const PetscReal rotate[4], con
 
 static PetscErrorCode test_bad_place(SbBody body)
 {
-  SbImport im;
+  SbImport im = {0};
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  memset(&im, 0, sizeof(im));
   ierr = SbImportRead(&body, &im);
   PetscCall(SbImportDestroy(&im));
   PetscFunctionReturn(ierr);

@@ -6,11 +6,10 @@
 /* Every number is found at its position, and its neighbours if they are numbers too. */
 static PetscErrorCode test_find(PetscInt n, const int64_t number[], PetscBool table)
 {
-  SbNumbers index;
+  SbNumbers index = {0};
   PetscInt wrong = 0;
 
   PetscFunctionBeginUser;
-  memset(&index, 0, sizeof(index));
   PetscCall(SbNumbersCreate(n, number, &index));
   SB_CHECK((index.table != NULL) == table, "table: %d", index.table != NULL);
   for (PetscInt i = 0; i < n; i++) {
@@ -24,27 +23,6 @@ static PetscErrorCode test_find(PetscInt n, const int64_t number[], PetscBool ta
   }
   SB_CHECK(!wrong, "%d of %d wrong", (int)wrong, (int)(3 * n));
   SB_CHECK(!index.repeated, "number %lld stands twice", (long long)index.twice);
-  PetscCall(SbNumbersDestroy(&index));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode test_numbers(void)
-{
-  const int64_t dense[] = {7, 3, -2, 5, 4}, far[] = {INT64_MAX, 1, INT64_MIN, 1000000000000, -5},
-                twice[] = {3, 9, 3}, far_twice[] = {1, INT64_MAX, 5, INT64_MAX};
-  SbNumbers index;
-
-  PetscFunctionBeginUser;
-  PetscCall(test_find(5, dense, PETSC_TRUE));
-  PetscCall(test_find(5, far, PETSC_FALSE));
-  memset(&index, 0, sizeof(index));
-  SB_CHECK(SbNumbersFind(&index, 0) == -1, "found in nothing");
-  PetscCall(SbNumbersCreate(0, NULL, &index));
-  SB_CHECK(SbNumbersFind(&index, 0) == -1, "found among none");
-  PetscCall(SbNumbersCreate(3, twice, &index));
-  SB_CHECK(index.repeated && index.twice == 3, "%d %lld", index.repeated, (long long)index.twice);
-  PetscCall(SbNumbersCreate(4, far_twice, &index));
-  SB_CHECK(index.repeated && index.twice == INT64_MAX, "%d %lld", index.repeated, (long long)index.twice);
   PetscCall(SbNumbersDestroy(&index));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -64,11 +42,10 @@ static PetscErrorCode test_members(void)
 {
   enum { NITEM = 40, NGROUP = 9 };
   static PetscBool expected[4][NITEM][NGROUP + 1];
-  SbImport im;
+  SbImport im = {0};
   PetscInt group[NGROUP + 1], tags, wrong = 0;
 
   PetscFunctionBeginUser;
-  memset(&im, 0, sizeof(im));
   PetscCall(SbImportTagSet(&im, 0, NULL, &tags));
   for (int g = 0; g <= NGROUP; g++) PetscCall(SbImportGroup(&im, g % 4, 100 + g, NULL, &group[g]));
   PetscCall(SbImportTagSet(&im, 1, &group[NGROUP], &tags));
@@ -103,11 +80,10 @@ static PetscErrorCode test_members(void)
 static PetscErrorCode test_many_groups(void)
 {
   enum { N = 5000 };
-  SbImport im;
+  SbImport im = {0};
   PetscInt group, tags, again, wrong = 0;
 
   PetscFunctionBeginUser;
-  memset(&im, 0, sizeof(im));
   PetscCall(SbImportTagSet(&im, 0, NULL, &tags));
   for (int round = 0; round < 2; round++) {
     for (int64_t k = 0; k < N; k++) {
@@ -126,8 +102,21 @@ static PetscErrorCode test_many_groups(void)
 
 int main(int argc, char **argv)
 {
+  const int64_t dense[] = {7, 3, -2, 5, 4}, far[] = {INT64_MAX, 1, INT64_MIN, 1000000000000, -5},
+                twice[] = {3, 9, 3}, far_twice[] = {1, INT64_MAX, 5, INT64_MAX};
+  SbNumbers index = {0};
+
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(test_numbers());
+  PetscCall(test_find(5, dense, PETSC_TRUE));
+  PetscCall(test_find(5, far, PETSC_FALSE));
+  SB_CHECK(SbNumbersFind(&index, 0) == -1, "found in nothing");
+  PetscCall(SbNumbersCreate(0, NULL, &index));
+  SB_CHECK(SbNumbersFind(&index, 0) == -1, "found among none");
+  PetscCall(SbNumbersCreate(3, twice, &index));
+  SB_CHECK(index.repeated && index.twice == 3, "%d %lld", index.repeated, (long long)index.twice);
+  PetscCall(SbNumbersCreate(4, far_twice, &index));
+  SB_CHECK(index.repeated && index.twice == INT64_MAX, "%d %lld", index.repeated, (long long)index.twice);
+  PetscCall(SbNumbersDestroy(&index));
   PetscCall(test_members());
   PetscCall(test_many_groups());
   SB_TEST_END();

@@ -9,18 +9,16 @@ static PetscErrorCode cut(const char *mesh, SbPartitioner type, PetscInt *most, 
 {
   SbMergedMesh whole;
   SbBody body = test_body("b", mesh);
-  PetscMPIInt rank, size, *part;
+  PetscMPIInt *part;
   PetscInt count[64] = {0}, n[3] = {0, 0, 0};
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(SbMergedMeshCreate(PETSC_COMM_SELF, SB_READING_AUTO, 1, &body, 0, NULL, &whole));
-  if (rank) whole.nvert = whole.ncell = 0;
+  if (test_rank) whole.nvert = whole.ncell = 0;
   PetscCall(PetscMalloc1(whole.ncell, &part));
   PetscCall(SbPartition(PETSC_COMM_WORLD, type, &whole, part));
   for (PetscInt c = 0; c < whole.ncell; c++) {
-    SB_CHECK(part[c] >= 0 && part[c] < size, "cell %d goes to rank %d", (int)c, (int)part[c]);
+    SB_CHECK(part[c] >= 0 && part[c] < test_size, "cell %d goes to rank %d", (int)c, (int)part[c]);
     count[part[c]]++;
     n[1]++;
     for (int f = 0; f < 4; f++) {
@@ -29,7 +27,7 @@ static PetscErrorCode cut(const char *mesh, SbPartitioner type, PetscInt *most, 
       n[2] += other > c && part[other] != part[c];
     }
   }
-  for (int r = 0; r < size; r++) n[0] = PetscMax(n[0], count[r]);
+  for (int r = 0; r < test_size; r++) n[0] = PetscMax(n[0], count[r]);
   PetscCallMPI(MPI_Bcast(n, 3, MPIU_INT, 0, PETSC_COMM_WORLD));
   *most = n[0];
   *cells = n[1];
@@ -40,65 +38,51 @@ static PetscErrorCode cut(const char *mesh, SbPartitioner type, PetscInt *most, 
 }
 
 /*
-  A bar of 24 x 6 x 6 cells of 6 tets: cut across into as many pieces as there are ranks, each border has 72 faces. METIS promises parts of at most 1 %
-  above the mean, bisection is rougher. No border may be longer than twice the shortest possible one.
+  A bar of 24 x 6 x 6 cells of 6 tets: cut across into as many pieces as there are ranks, each border has 72
+  faces. METIS promises parts of at most 1 % above the mean, bisection is rougher. No border may be longer
+  than twice the shortest possible one.
 */
 static PetscErrorCode test_bar(SbPartitioner type, PetscReal slack)
 {
   PetscInt most, cells, faces;
-  PetscMPIInt size;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(cut("box:4,1,1:6", type, &most, &cells, &faces));
   SB_CHECK(cells == 5184, "%d cells", (int)cells);
-  SB_CHECK(most <= (1 + slack) * cells / size + 1, "%d of %d cells on one rank of %d", (int)most, (int)cells,
-           (int)size);
-  SB_CHECK(faces <= 2 * 72 * (size - 1), "%d faces between the parts of %d ranks", (int)faces, (int)size);
-  SB_CHECK(faces >= 72 * (size - 1), "%d faces between the parts of %d ranks", (int)faces, (int)size);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* With two cells each of two ranks gets one. */
-static PetscErrorCode test_few(void)
-{
-  PetscInt most, cells, faces;
-  PetscMPIInt size;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  PetscCall(cut("tests/data/two_tets.msh", SB_PARTITION_METIS, &most, &cells, &faces));
-  SB_CHECK(most == (size == 1 ? 2 : 1), "%d cells on one rank", (int)most);
+  SB_CHECK(most <= (1 + slack) * cells / test_size + 1, "%d of %d cells on one rank of %d", (int)most,
+           (int)cells, (int)test_size);
+  SB_CHECK(faces <= 2 * 72 * (test_size - 1), "%d faces between the parts of %d ranks", (int)faces,
+           (int)test_size);
+  SB_CHECK(faces >= 72 * (test_size - 1), "%d faces between the parts of %d ranks", (int)faces,
+           (int)test_size);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Rank r sends i to rank (r + i) % size for i below r + 3: it arrives in order, and the answer i + 100 r returns. */
 static PetscErrorCode test_route(void)
 {
-  PetscMPIInt rank, size, dest[16];
+  PetscMPIInt dest[16];
   PetscInt number[16], *got, answer[16], last = -1;
   SbRoute route;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  for (PetscMPIInt i = 0; i < rank + 3; i++) {
+  for (PetscMPIInt i = 0; i < test_rank + 3; i++) {
     number[i] = i;
-    dest[i] = (rank + i) % size;
+    dest[i] = (test_rank + i) % test_size;
   }
-  PetscCall(SbRouteCreate(PETSC_COMM_WORLD, rank + 3, dest, &route));
+  PetscCall(SbRouteCreate(PETSC_COMM_WORLD, test_rank + 3, dest, &route));
   PetscCall(SbRouteSend(&route, sizeof(PetscInt), NULL, number, &got));
   for (PetscInt k = 0; k < route.nrecv; k++) {
     const PetscMPIInt from = SbRouteSource(&route, k);
 
-    SB_CHECK((from + got[k]) % size == rank, "%d of rank %d", (int)got[k], (int)from);
+    SB_CHECK((from + got[k]) % test_size == test_rank, "%d of rank %d", (int)got[k], (int)from);
     SB_CHECK(k == route.rfirst[from] || got[k] > last, "%d follows %d", (int)got[k], (int)last);
     last = got[k];
     got[k] += 100 * from;
   }
   PetscCall(SbRouteReply(&route, sizeof(PetscInt), got, answer));
-  for (PetscMPIInt i = 0; i < rank + 3; i++)
-    SB_CHECK(answer[i] == i + 100 * rank, "answer %d to %d", (int)answer[i], (int)i);
+  for (PetscMPIInt i = 0; i < test_rank + 3; i++)
+    SB_CHECK(answer[i] == i + 100 * test_rank, "answer %d to %d", (int)answer[i], (int)i);
   PetscCall(PetscFree(got));
   PetscCall(SbRouteDestroy(&route));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -106,11 +90,15 @@ static PetscErrorCode test_route(void)
 
 int main(int argc, char **argv)
 {
+  PetscInt most, cells, faces;
+
   SB_TEST_BEGIN(argc, argv);
   PetscCall(test_route());
   PetscCall(test_bar(SB_PARTITION_METIS, 0.01));
   PetscCall(test_bar(SB_PARTITION_AUTO, 0.01));
   PetscCall(test_bar(SB_PARTITION_BISECTION, 0.03));
-  PetscCall(test_few());
+  /* with two cells each of two ranks gets one */
+  PetscCall(cut("tests/data/two_tets.msh", SB_PARTITION_METIS, &most, &cells, &faces));
+  SB_CHECK(most == (test_size == 1 ? 2 : 1), "%d cells on one rank", (int)most);
   SB_TEST_END();
 }

@@ -21,11 +21,11 @@ static PetscErrorCode test_parse(void)
   PetscFunctionBeginUser;
   PetscCall(test_set("s", "plane:0,0,2,0.4", &set));
   SB_CHECK(set.shape == SB_SET_PLANE && set.p[2] == 1 && set.p[3] == 0.2 && set.p[4] == 0, "plane %g %g %g",
-           (double)set.p[2], (double)set.p[3], (double)set.p[4]);
+           set.p[2], set.p[3], set.p[4]);
   PetscCall(test_set("s", "plane:3,0,4,5,0.1", &set));
   SB_CHECK_NEAR(set.p[0], 0.6, 1e-15, "norm");
   SB_CHECK_NEAR(set.p[3], 1, 1e-15, "distance");
-  SB_CHECK(set.p[4] == 0.1, "tolerance %g", (double)set.p[4]);
+  SB_CHECK(set.p[4] == 0.1, "tolerance %g", set.p[4]);
   PetscCall(test_set("s", "box:-1,-2,-3,1,2,3", &set));
   SB_CHECK(set.shape == SB_SET_BOX && set.p[0] == -1 && set.p[5] == 3, "box");
   PetscCall(test_set("s", "sphere:1,2,3,0.5", &set));
@@ -143,17 +143,6 @@ static PetscErrorCode fail(const char *text)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode test_nothing(void)
-{
-  PetscFunctionBeginUser;
-  SB_CHECK_ERROR(fail("group:wal"), PETSC_ERR_USER_INPUT, "set 'clamp'|group 'wal'|wall");
-  SB_CHECK_ERROR(fail("group:xmid"), PETSC_ERR_USER_INPUT, "set 'clamp'|group 'xmid'|xmin");
-  SB_CHECK_ERROR(fail("group:b.wall"), PETSC_ERR_USER_INPUT, "group 'b.wall'");
-  SB_CHECK_ERROR(fail("body:c"), PETSC_ERR_USER_INPUT, "set 'clamp'|body 'c'");
-  SB_CHECK_ERROR(fail("plane:0,0,1,7"), PETSC_ERR_USER_INPUT, "set 'clamp'|0|6|1");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
@@ -184,6 +173,11 @@ int main(int argc, char **argv)
   PetscCall(test_counts("sphere:5,0,0,0.71", 7, 6, 0)); /* all corners of the cell but the far one */
   PetscCall(test_counts("halfspace:-1,0,0,-5.5", 18, 8 + 4 * 4, 24));
   PetscCall(test_inner());
-  PetscCall(test_nothing());
+  /* empty sets */
+  SB_CHECK_ERROR(fail("group:wal"), PETSC_ERR_USER_INPUT, "set 'clamp'|group 'wal'|wall");
+  SB_CHECK_ERROR(fail("group:xmid"), PETSC_ERR_USER_INPUT, "set 'clamp'|group 'xmid'|xmin");
+  SB_CHECK_ERROR(fail("group:b.wall"), PETSC_ERR_USER_INPUT, "group 'b.wall'");
+  SB_CHECK_ERROR(fail("body:c"), PETSC_ERR_USER_INPUT, "set 'clamp'|body 'c'");
+  SB_CHECK_ERROR(fail("plane:0,0,1,7"), PETSC_ERR_USER_INPUT, "set 'clamp'|0|6|1");
   SB_TEST_END();
 }

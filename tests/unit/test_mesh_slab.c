@@ -3,7 +3,6 @@
 #include "../../src/mesh/mesh_impl.h"
 #include "mesh_same.h"
 
-#define DATA "tests/data/"
 enum { NSET = 8 };
 
 /* Shuffles the tets. */
@@ -46,8 +45,9 @@ static PetscErrorCode add_group(SbImport *im, int dim, const char *name, PetscIn
 }
 
 /*
-  Two separate boxes with some curved edges, the second one with its first tets inverted; unused vertices between them; an interior triangle and one that is no face; a line, a point;
-  lines and triangles at unused vertices.
+  Two separate boxes with some curved edges, the second one with its first tets inverted; unused vertices
+  between them; an interior triangle and one that is no face; a line, a point; lines and triangles at unused
+  vertices.
 */
 static PetscErrorCode make_mesh(const char *path, PetscBool random)
 {
@@ -126,15 +126,11 @@ static PetscErrorCode test_same_mesh(PetscBool random, const char *partitioner)
   SbBody body[2][3];
   SbSet set[2][NSET];
   SbMesh a, b;
-  PetscMPIInt rank;
-  int id = (int)getpid();
-  char path[256];
+  char path[512];
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCallMPI(MPI_Bcast(&id, 1, MPI_INT, 0, PETSC_COMM_WORLD));
-  (void)snprintf(path, sizeof(path), "/tmp/sbmesh_slab_%d.h5", id);
-  if (!rank) PetscCall(make_mesh(path, random));
+  PetscCall(test_path_of_all("slab.h5", path));
+  if (!test_rank) PetscCall(make_mesh(path, random));
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
   PetscCall(PetscOptionsSetValue(NULL, "-mesh_partitioner", partitioner));
   PetscCall(create(path, "rank0", body[0], set[0], &a));
@@ -179,8 +175,7 @@ static PetscErrorCode test_same_mesh(PetscBool random, const char *partitioner)
   PetscCall(SbMeshDestroy(&a));
   PetscCall(SbMeshDestroy(&b));
   PetscCall(PetscOptionsClearValue(NULL, "-mesh_partitioner"));
-  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  if (!rank) (void)unlink(path);
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD)); /* all ranks have read the file */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -191,15 +186,11 @@ static PetscErrorCode test_refused(PetscInt ncell, const PetscInt vert[4], Petsc
 {
   SbBody body;
   SbMergedMesh whole;
-  PetscMPIInt rank;
-  int id = (int)getpid();
-  char path[256];
+  char path[512];
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCallMPI(MPI_Bcast(&id, 1, MPI_INT, 0, PETSC_COMM_WORLD));
-  (void)snprintf(path, sizeof(path), "/tmp/sbmesh_slab_bad_%d.h5", id);
-  if (!rank) {
+  PetscCall(test_path_of_all("slab_bad.h5", path));
+  if (!test_rank) {
     SbImport *im;
 
     PetscCall(test_read("box:1,1,1:2", 0, &im));
@@ -216,8 +207,7 @@ static PetscErrorCode test_refused(PetscInt ncell, const PetscInt vert[4], Petsc
                                       NULL, &whole),
                    (isfinite(x) ? PETSC_ERR_USER_INPUT : PETSC_ERR_FILE_UNEXPECTED), words);
   }
-  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  if (!rank) (void)unlink(path);
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD)); /* all ranks have read the file */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

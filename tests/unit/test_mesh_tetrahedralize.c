@@ -32,17 +32,15 @@ static void measure(const SbImport *im, PetscInt n, PetscReal volume[])
 /* A sphere within a sphere, each a separate region; the triangles are preserved. */
 static PetscErrorCode check_kept(SbTetBackend backend)
 {
-  TestSurface t;
+  TestSurface t = {0};
   SbSurface s;
   SbTetOptions options;
-  SbImport im;
+  SbImport im = {0};
   SbFaces faces;
   PetscInt slots[2], none, group[2], nin;
   PetscReal want[2], got[3];
 
   PetscFunctionBeginUser;
-  memset(&t, 0, sizeof(t));
-  memset(&im, 0, sizeof(im));
   test_surface_sphere(2, &t);
   nin = t.ntri;
   test_surface_shifted_copy(&t, 0.4, 0.1);
@@ -82,23 +80,21 @@ static PetscErrorCode check_kept(SbTetBackend backend)
 static PetscErrorCode check_sizes(void)
 {
   const PetscReal sizes[3] = {0.5, 0.35, 0.25};
-  TestSurface t;
+  TestSurface t = {0};
   SbSurface s;
   SbTetOptions options;
   PetscReal per[3];
 
   PetscFunctionBeginUser;
-  memset(&t, 0, sizeof(t));
   test_surface_sphere(3, &t);
   PetscCall(make_skin(&t, t.ntri, &s));
   for (int k = 0; k < 3; k++) {
-    SbImport im;
+    SbImport im = {0};
     SbMeshStatistics facts;
     const SbBody *body = &facts.body;
     PetscReal volume;
     PetscInt none;
 
-    memset(&im, 0, sizeof(im));
     PetscCall(SbImportTagSet(&im, 0, NULL, &none));
     SbTetDefaults(&options);
     options.size = sizes[k];
@@ -108,16 +104,14 @@ static PetscErrorCode check_sizes(void)
     SB_CHECK_NEAR(volume, 4 * PETSC_PI / 3, 0.12 * 4 * PETSC_PI / 3, "sphere");
     per[k] = (PetscReal)im.item[3].n * sizes[k] * sizes[k] * sizes[k];
     SB_CHECK(per[k] > 3 * PETSC_SQRT2 * volume && per[k] < 12 * PETSC_SQRT2 * volume, "size %g: %d tets",
-             (double)sizes[k], (int)im.item[3].n);
+             sizes[k], (int)im.item[3].n);
     PetscCall(SbMeshFileMeasure(&im, &facts));
-    SB_CHECK(body->min_dihedral > 8, "size %g: smallest dihedral angle %g", (double)sizes[k],
-             (double)body->min_dihedral);
+    SB_CHECK(body->min_dihedral > 8, "size %g: smallest dihedral angle %g", sizes[k], body->min_dihedral);
     SB_CHECK(strstr(body->note, "surface remeshed"), "'%s'", body->note);
     PetscCall(SbImportDestroy(&im));
   }
   for (int k = 1; k < 3; k++)
-    SB_CHECK(per[k] / per[0] > 0.6 && per[k] / per[0] < 1.7, "sizes 0 and %d: %g and %g", k, (double)per[0],
-             (double)per[k]);
+    SB_CHECK(per[k] / per[0] > 0.6 && per[k] / per[0] < 1.7, "sizes 0 and %d: %g and %g", k, per[0], per[k]);
   PetscCall(SbSurfaceDestroy(&s));
   test_surface_free(&t);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -127,15 +121,13 @@ static PetscErrorCode check_sizes(void)
 static PetscErrorCode check_second_road(void)
 {
   const PetscInt n[2] = {60, 10};
-  TestSurface t;
+  TestSurface t = {0};
   SbSurface s;
   SbTetOptions options;
-  SbImport im;
+  SbImport im = {0};
   PetscReal want, got;
 
   PetscFunctionBeginUser;
-  memset(&t, 0, sizeof(t));
-  memset(&im, 0, sizeof(im));
   test_surface_torus(1, 0.1, n, &t);
   PetscCall(make_skin(&t, t.ntri, &s));
   (void)SbSurfaceMeasure(&s, &want);
@@ -162,14 +154,12 @@ static PetscErrorCode check_second_road(void)
 static PetscErrorCode check_failure(void)
 {
   const PetscReal lo[3] = {0, 0, 0}, hi[3] = {1, 1, 1}, lo2[3] = {0.5, 0.4, 0.3}, hi2[3] = {1.5, 1.6, 1.7};
-  TestSurface t;
+  TestSurface t = {0};
   SbSurface s;
   SbTetOptions options;
-  SbImport im;
+  SbImport im = {0};
 
   PetscFunctionBeginUser;
-  memset(&t, 0, sizeof(t));
-  memset(&im, 0, sizeof(im));
   test_surface_box(lo, hi, PETSC_FALSE, &t);
   test_surface_box(lo2, hi2, PETSC_FALSE, &t);
   PetscCall(make_skin(&t, t.ntri, &s));
@@ -188,11 +178,8 @@ static PetscErrorCode check_failure(void)
 
 int main(int argc, char **argv)
 {
-  PetscMPIInt rank;
-
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) {
+  if (!test_rank) {
     PetscCall(check_kept(SB_TET_GMSH));
     PetscCall(check_kept(SB_TET_TETGEN));
     PetscCall(check_sizes());

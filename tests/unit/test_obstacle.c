@@ -13,13 +13,6 @@ static const char *const texts[] = {"plane:0,3,4,5",
                                     "cylinder:-0.4,0.1,0,0.5,0.3,0.2,0.35",
                                     "bowl:0.1,0,0.2,1.3"};
 
-/* Reproducible numbers in -1..1. */
-static PetscReal number(unsigned *state)
-{
-  *state = *state * 1664525u + 1013904223u;
-  return (PetscReal)(*state >> 8) / (1 << 23) - 1;
-}
-
 /* Whether the normal is continuous around x; at a kink of the distance finite differences are meaningless. */
 static PetscBool smooth(SbObstacle o, const PetscReal x[3], PetscReal h)
 {
@@ -48,7 +41,7 @@ static PetscErrorCode check_shape(const char *text)
   for (int i = 0; i < 1000; i++) {
     PetscReal x[3], n[3], foot[3], m[3], d;
 
-    for (int k = 0; k < 3; k++) x[k] = 0.9 * number(&state);
+    for (int k = 0; k < 3; k++) x[k] = 0.9 * test_random(&state);
     d = SbObstacleDistance(o, x, n);
     SB_CHECK_NEAR(SbDot3(n, n), 1, 1e-14, text);
     if (!smooth(o, x, h)) continue;
@@ -72,37 +65,36 @@ static PetscErrorCode check_shape(const char *text)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_point(const char *text, const PetscReal x[3], PetscReal distance,
-                                  const PetscReal normal[3])
-{
-  SbObstacle o;
-  PetscReal n[3];
-
-  PetscFunctionBeginUser;
-  PetscCall(SbObstacleCreate("-o", text, &o));
-  SB_CHECK_NEAR(SbObstacleDistance(o, x, n), distance, 1e-14, text);
-  for (int k = 0; k < 3; k++) SB_CHECK_NEAR(n[k], normal[k], 1e-14, text);
-  PetscCall(SbObstacleDestroy(&o));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode check_points(void)
 {
-  const PetscReal X[3] = {1, 0, 0}, Z[3] = {0, 0, 1}, Zm[3] = {0, 0, -1}, Xm[3] = {-1, 0, 0};
-  const PetscReal edge[3] = {PETSC_SQRT2 / 2, PETSC_SQRT2 / 2, 0};
+  const PetscReal h = PETSC_SQRT2 / 2;
+  const struct {
+    const char *text;
+    PetscReal x[3], distance, normal[3];
+  } points[] = {
+    {"plane:0,0,2,1", {4, 5, 0.25}, -0.25, {0, 0, 1}},
+    {"sphere:1,2,3,0.5", {3, 2, 3}, 1.5, {1, 0, 0}},
+    {"sphere:1,2,3,0.5", {1, 2, 3}, -0.5, {0, 0, 1}},
+    {"bowl:0,0,0,2", {0, 0, 1.5}, 0.5, {0, 0, -1}},
+    {"bowl:0,0,0,2", {3, 0, 0}, -1, {-1, 0, 0}},
+    {"box:0,0,0,1,2,3", {2, 3, 1}, PETSC_SQRT2, {h, h, 0}},
+    {"box:0,0,0,1,2,3", {0.5, 1, 2.75}, -0.25, {0, 0, 1}},
+    {"capsule:0,0,0,0,0,2,0.5", {1, 0, 1}, 0.5, {1, 0, 0}},
+    {"capsule:0,0,0,0,0,2,0.5", {0, 0, -1}, 0.5, {0, 0, -1}},
+    {"cylinder:0,0,0,0,0,2,0.5", {0.25, 0, -1}, 1, {0, 0, -1}},
+    {"cylinder:0,0,0,0,0,2,0.5", {0.25, 0, 1}, -0.25, {1, 0, 0}},
+  };
 
   PetscFunctionBeginUser;
-  PetscCall(check_point("plane:0,0,2,1", (PetscReal[3]){4, 5, 0.25}, -0.25, Z));
-  PetscCall(check_point("sphere:1,2,3,0.5", (PetscReal[3]){3, 2, 3}, 1.5, X));
-  PetscCall(check_point("sphere:1,2,3,0.5", (PetscReal[3]){1, 2, 3}, -0.5, Z));
-  PetscCall(check_point("bowl:0,0,0,2", (PetscReal[3]){0, 0, 1.5}, 0.5, Zm));
-  PetscCall(check_point("bowl:0,0,0,2", (PetscReal[3]){3, 0, 0}, -1, Xm));
-  PetscCall(check_point("box:0,0,0,1,2,3", (PetscReal[3]){2, 3, 1}, PETSC_SQRT2, edge));
-  PetscCall(check_point("box:0,0,0,1,2,3", (PetscReal[3]){0.5, 1, 2.75}, -0.25, Z));
-  PetscCall(check_point("capsule:0,0,0,0,0,2,0.5", (PetscReal[3]){1, 0, 1}, 0.5, X));
-  PetscCall(check_point("capsule:0,0,0,0,0,2,0.5", (PetscReal[3]){0, 0, -1}, 0.5, Zm));
-  PetscCall(check_point("cylinder:0,0,0,0,0,2,0.5", (PetscReal[3]){0.25, 0, -1}, 1, Zm));
-  PetscCall(check_point("cylinder:0,0,0,0,0,2,0.5", (PetscReal[3]){0.25, 0, 1}, -0.25, X));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(points); i++) {
+    PetscReal n[3];
+    SbObstacle o;
+
+    PetscCall(SbObstacleCreate("-o", points[i].text, &o));
+    SB_CHECK_NEAR(SbObstacleDistance(o, points[i].x, n), points[i].distance, 1e-14, points[i].text);
+    for (int k = 0; k < 3; k++) SB_CHECK_NEAR(n[k], points[i].normal[k], 1e-14, points[i].text);
+    PetscCall(SbObstacleDestroy(&o));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -128,7 +120,7 @@ static void check_poses(void)
   for (int i = 0; i < 20; i++) {
     PetscReal p[3], way[3];
 
-    for (int k = 0; k < 3; k++) p[k] = number(&state);
+    for (int k = 0; k < 3; k++) p[k] = test_random(&state);
     SbPoseApply(&pose, p, x);
     SbPoseInvert(&pose, x, X);
     for (int k = 0; k < 3; k++) SB_CHECK_NEAR(X[k], p[k], 1e-15, "there and back");
@@ -142,32 +134,26 @@ static void check_poses(void)
 
 static PetscErrorCode check_errors(void)
 {
-  SbObstacle o = NULL;
+  static const char *const refused[][2] = {
+    {"cone:1,2,3", "-floor cone:1,2,3"},
+    {"plane", "-floor plane|mesh:FILE"},
+    {"plane:0,0,1", "plane:nx,ny,nz,d"},
+    {"plane:0,0,0,1", "-floor plane:0,0,0,1"},
+    {"sphere:0,0,0,-1", "-floor sphere:0,0,0,-1"},
+    {"sphere:0,0,0,1,5", "sphere:x,y,z,r"},
+    {"sphere:0,0,nan,1", "sphere:x,y,z,r"},
+    {"box:0,0,0,1,-1,1", "-floor box:0,0,0,1,-1,1"},
+    {"capsule:1,1,1,1,1,1,1", "-floor capsule:1,1,1,1,1,1,1"},
+    {"cylinder:1,1,1,1,1,2,0", "-floor cylinder:1,1,1,1,1,2,0"},
+  };
 
   PetscFunctionBeginUser;
-  SB_CHECK_ERROR(SbObstacleCreate("-floor", "cone:1,2,3", &o), PETSC_ERR_USER_INPUT, "-floor cone:1,2,3");
-  SB_CHECK_ERROR(SbObstacleCreate("-floor", "plane", &o), PETSC_ERR_USER_INPUT, "-floor plane|mesh:FILE");
-  SB_CHECK_ERROR(SbObstacleCreate("-floor", "plane:0,0,1", &o), PETSC_ERR_USER_INPUT, "plane:nx,ny,nz,d");
-  PetscCall(SbObstacleDestroy(&o));
-  SB_CHECK_ERROR(SbObstacleCreate("-floor", "plane:0,0,0,1", &o), PETSC_ERR_USER_INPUT,
-                 "-floor plane:0,0,0,1");
-  PetscCall(SbObstacleDestroy(&o));
-  SB_CHECK_ERROR(SbObstacleCreate("-floor", "sphere:0,0,0,-1", &o), PETSC_ERR_USER_INPUT,
-                 "-floor sphere:0,0,0,-1");
-  PetscCall(SbObstacleDestroy(&o));
-  SB_CHECK_ERROR(SbObstacleCreate("-floor", "sphere:0,0,0,1,5", &o), PETSC_ERR_USER_INPUT, "sphere:x,y,z,r");
-  PetscCall(SbObstacleDestroy(&o));
-  SB_CHECK_ERROR(SbObstacleCreate("-floor", "sphere:0,0,nan,1", &o), PETSC_ERR_USER_INPUT, "sphere:x,y,z,r");
-  PetscCall(SbObstacleDestroy(&o));
-  SB_CHECK_ERROR(SbObstacleCreate("-floor", "box:0,0,0,1,-1,1", &o), PETSC_ERR_USER_INPUT,
-                 "-floor box:0,0,0,1,-1,1");
-  PetscCall(SbObstacleDestroy(&o));
-  SB_CHECK_ERROR(SbObstacleCreate("-floor", "capsule:1,1,1,1,1,1,1", &o), PETSC_ERR_USER_INPUT,
-                 "-floor capsule:1,1,1,1,1,1,1");
-  PetscCall(SbObstacleDestroy(&o));
-  SB_CHECK_ERROR(SbObstacleCreate("-floor", "cylinder:1,1,1,1,1,2,0", &o), PETSC_ERR_USER_INPUT,
-                 "-floor cylinder:1,1,1,1,1,2,0");
-  PetscCall(SbObstacleDestroy(&o));
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(refused); k++) {
+    SbObstacle o = NULL;
+
+    SB_CHECK_ERROR(SbObstacleCreate("-floor", refused[k][0], &o), PETSC_ERR_USER_INPUT, refused[k][1]);
+    PetscCall(SbObstacleDestroy(&o));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,9 +1,10 @@
 /*
-  test_option.c - table of options: readers, ranges, messages, unread options, the printed scenario, the manual.
+  test_option.c - table of options: readers, ranges, messages, unread options, the printed scenario, the
+  manual.
 */
 // @ranks 1 3
+#include "file.h"
 #include "test.h"
-#include <unistd.h>
 
 static const SbOption body_rows[] = {
   {"mesh", SB_OPTION_STRING, 1, "", NULL, "", "mesh file"},
@@ -34,12 +35,14 @@ static const SbOption run_rows[] = {
 
 static SbScope run_scope, body_scope;
 
+static PetscOptions database;
+
 /* Creates a database with `options` and registers the option tables. */
-static PetscErrorCode begin(const char *options, PetscOptions *database)
+static PetscErrorCode begin(const char *options)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscOptionsCreate(database));
-  PetscCall(PetscOptionsPush(*database));
+  PetscCall(PetscOptionsCreate(&database));
+  PetscCall(PetscOptionsPush(database));
   PetscCall(PetscOptionsInsertString(NULL, options));
   PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(run_rows), run_rows));
   PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
@@ -50,28 +53,27 @@ static PetscErrorCode begin(const char *options, PetscOptions *database)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode end(PetscOptions *database)
+static PetscErrorCode end(void)
 {
   PetscFunctionBeginUser;
   PetscCall(SbOptionsReset());
   PetscCall(PetscOptionsPop());
-  PetscCall(PetscOptionsDestroy(database));
+  PetscCall(PetscOptionsDestroy(&database));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Reading one option must fail with this message. */
 static PetscErrorCode refused_real(const char *options, const char *key, const char *message)
 {
-  PetscOptions database;
   PetscReal x[3];
 
   PetscFunctionBeginUser;
-  PetscCall(begin(options, &database));
+  PetscCall(begin(options));
   if (!strcmp(key, "translate"))
     SB_CHECK_ERROR(SbOptionReals(&body_scope, key, x), PETSC_ERR_USER, message);
   else
     SB_CHECK_ERROR(SbOptionReal(&body_scope, key, x), PETSC_ERR_USER, message);
-  PetscCall(end(&database));
+  PetscCall(end());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -97,28 +99,8 @@ static PetscErrorCode test_refused_numbers(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Values at the ends of intervals. */
-static PetscErrorCode test_ends(void)
-{
-  PetscOptions database;
-  PetscReal x;
-  PetscInt n;
-
-  PetscFunctionBeginUser;
-  PetscCall(begin("-body_liver_closed 1 -body_liver_poisson 0 -repeat 1", &database));
-  PetscCall(SbOptionReal(&body_scope, "closed", &x));
-  SB_CHECK(x == 1, "closed is %g", (double)x);
-  PetscCall(SbOptionReal(&body_scope, "poisson", &x));
-  SB_CHECK(x == 0, "poisson is %g", (double)x);
-  PetscCall(SbOptionInt(&run_scope, "repeat", &n));
-  SB_CHECK(n == 1, "repeat is %d", (int)n);
-  PetscCall(end(&database));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode test_refused_words(void)
 {
-  PetscOptions database;
   PetscBool b;
   PetscInt n;
   char(*names)[SB_NAME_MAX], text[8];
@@ -126,8 +108,7 @@ static PetscErrorCode test_refused_words(void)
 
   PetscFunctionBeginUser;
   PetscCall(begin("-verbose perhaps -repeat 2.5 -integrator newmrk -body_liver_tags a,,b "
-                  "-body_liver_pull 1;2 -bodies -body_liver_mesh long_name.msh",
-                  &database));
+                  "-body_liver_pull 1;2 -bodies -body_liver_mesh long_name.msh"));
   SB_CHECK_ERROR(SbOptionBool(&run_scope, "verbose", &b), PETSC_ERR_USER, "-verbose perhaps");
   SB_CHECK_ERROR(SbOptionInt(&run_scope, "repeat", &n), PETSC_ERR_USER, "-repeat 2.5");
   SB_CHECK_ERROR(SbOptionChoice(&run_scope, "integrator", &n), PETSC_ERR_USER, "-integrator newmrk|newmark");
@@ -138,11 +119,11 @@ static PetscErrorCode test_refused_words(void)
   SB_CHECK_ERROR(SbOptionNames(&run_scope, "bodies", &n, &names), PETSC_ERR_USER, "-bodies");
   SB_CHECK_ERROR(SbOptionString(&body_scope, "mesh", sizeof(text), text), PETSC_ERR_USER,
                  "-body_liver_mesh|7 characters");
-  PetscCall(end(&database));
-  PetscCall(begin("-repeat 0", &database));
+  PetscCall(end());
+  PetscCall(begin("-repeat 0"));
   SB_CHECK_ERROR(SbOptionInt(&run_scope, "repeat", &n), PETSC_ERR_USER, "-repeat 0|[1, inf)");
   SB_CHECK_ERROR(SbOptionReal(&run_scope, "nonesuch", NULL), PETSC_ERR_PLIB, "'nonesuch'");
-  PetscCall(end(&database));
+  PetscCall(end());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -166,41 +147,24 @@ static PetscErrorCode read_all(PetscBool given)
   PetscCall(SbOptionChoice(&run_scope, "integrator", &choice));
   SB_CHECK(choice == (given ? 2 : 0), "integrator is %d", (int)choice);
   PetscCall(SbOptionReal(&run_scope, "limit", &limit));
-  SB_CHECK(limit == (given ? 0.1 : 77), "limit is %g", (double)limit);
+  SB_CHECK(limit == (given ? 0.1 : 77), "limit is %g", limit);
   PetscCall(SbOptionString(&body_scope, "mesh", sizeof(text), text));
   SB_CHECK(!strcmp(text, "my meshes/liver.msh"), "mesh is '%s'", text);
   PetscCall(SbOptionReal(&body_scope, "scale", &x[0]));
-  SB_CHECK(x[0] == (given ? 0.10000000000000002 : 1), "scale is %.17g", (double)x[0]);
+  SB_CHECK(x[0] == (given ? 0.10000000000000002 : 1), "scale is %.17g", x[0]);
   PetscCall(SbOptionReals(&body_scope, "translate", x));
   SB_CHECK(x[0] == (given ? -1 : 0) && x[1] == (given ? 2.5 : 0) && x[2] == (given ? 1e-300 : 0),
            "translate");
   PetscCall(SbOptionReal(&body_scope, "young", &x[0]));
-  SB_CHECK(x[0] == 5e3, "young is %g", (double)x[0]);
+  SB_CHECK(x[0] == 5e3, "young is %g", x[0]);
   PetscCall(SbOptionNames(&body_scope, "tags", &n, &names));
   SB_CHECK(n == (given ? 1 : 0), "%d tags", (int)n);
   PetscCall(PetscFree(names));
   PetscCall(SbOptionFormulas(&body_scope, "pull", f));
   x[0] = 7, x[1] = 8, x[2] = 9;
-  SB_CHECK(SbFormulaEval(f[0], 3, x) == (given ? -7 : 0), "pull 0 is %g", (double)SbFormulaEval(f[0], 3, x));
-  SB_CHECK(SbFormulaEval(f[2], 3, x) == (given ? 10 : 6), "pull 2 is %g", (double)SbFormulaEval(f[2], 3, x));
+  SB_CHECK(SbFormulaEval(f[0], 3, x) == (given ? -7 : 0), "pull 0 is %g", SbFormulaEval(f[0], 3, x));
+  SB_CHECK(SbFormulaEval(f[2], 3, x) == (given ? 10 : 6), "pull 2 is %g", SbFormulaEval(f[2], 3, x));
   for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&f[i]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode write_file(const char *name, const char *text)
-{
-  PetscMPIInt rank;
-  FILE *f;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) {
-    f = fopen(name, "w");
-    PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s", name);
-    (void)fputs(text, f);
-    (void)fclose(f);
-  }
-  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -238,7 +202,6 @@ static PetscErrorCode test_files(const char *folder)
 {
   const char *const source[2] = {as_opts, as_yaml};
   char file[2][PETSC_MAX_PATH_LEN], view[PETSC_MAX_PATH_LEN];
-  PetscOptions database;
   PetscViewer viewer;
   PetscInt unused;
   const char *value;
@@ -249,8 +212,8 @@ static PetscErrorCode test_files(const char *folder)
   PetscCall(PetscSNPrintf(file[1], sizeof(file[1]), "%s/a.yml", folder));
   PetscCall(PetscSNPrintf(view, sizeof(view), "%s/view.opts", folder));
   for (int i = 0; i < 2; i++) {
-    PetscCall(write_file(file[i], source[i]));
-    PetscCall(begin("", &database));
+    PetscCall(test_file_put(file[i], source[i]));
+    PetscCall(begin(""));
     PetscCall(PetscOptionsInsertFile(PETSC_COMM_WORLD, NULL, file[i], PETSC_TRUE));
     PetscCall(SbOptionsRemember());
     PetscCall(PetscOptionsSetValue(NULL, "-pc_type", "jacobi"));
@@ -261,9 +224,9 @@ static PetscErrorCode test_files(const char *folder)
     PetscCall(SbViewerOpen(PETSC_COMM_WORLD, view, &viewer));
     PetscCall(SbOptionsView(viewer));
     PetscCall(PetscViewerDestroy(&viewer));
-    PetscCall(end(&database));
+    PetscCall(end());
 
-    PetscCall(begin("", &database));
+    PetscCall(begin(""));
     PetscCall(PetscOptionsInsertFile(PETSC_COMM_WORLD, NULL, view, PETSC_TRUE));
     PetscCall(SbOptionsRemember());
     PetscCall(read_all(PETSC_TRUE));
@@ -274,13 +237,12 @@ static PetscErrorCode test_files(const char *folder)
     SB_CHECK(set && value && !strcmp(value, "1e-7"), "-ksp_nothing was lost");
     PetscCall(PetscOptionsFindPair(NULL, NULL, "-pc_type", &value, &set));
     SB_CHECK(!set, "a preset of the program was printed as the user's");
-    PetscCall(end(&database));
+    PetscCall(end());
   }
-  PetscCall(
-    begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3", &database));
+  PetscCall(begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3"));
   PetscCall(read_all(PETSC_FALSE));
   PetscCall(SbOptionsCheck());
-  PetscCall(end(&database));
+  PetscCall(end());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -288,24 +250,21 @@ static PetscErrorCode test_files(const char *folder)
 static PetscErrorCode test_view_text(const char *folder)
 {
   char view[PETSC_MAX_PATH_LEN], line[512];
-  PetscOptions database;
   PetscViewer viewer;
   PetscReal x;
-  PetscMPIInt rank;
   PetscBool preset = PETSC_FALSE;
   int given = 0;
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(view, sizeof(view), "%s/text.opts", folder));
-  PetscCall(begin("-body_liver_scale 0.123456789012345678", &database));
+  PetscCall(begin("-body_liver_scale 0.123456789012345678"));
   PetscCall(SbOptionReal(&body_scope, "poisson", &x));
   PetscCall(SbOptionReal(&body_scope, "scale", &x));
   PetscCall(SbViewerOpen(PETSC_COMM_WORLD, view, &viewer));
   PetscCall(SbOptionsView(viewer));
   PetscCall(PetscViewerDestroy(&viewer));
-  PetscCall(end(&database));
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) {
+  PetscCall(end());
+  if (!test_rank) {
     FILE *f = fopen(view, "r");
 
     while (f && fgets(line, sizeof(line), f)) {
@@ -323,18 +282,15 @@ static PetscErrorCode test_view_text(const char *folder)
 /* Checks `options` beside two valid ones; all but "other" are read; the check fails with `message` (NULL: it succeeds). */
 static PetscErrorCode unread(const char *options, const char *message)
 {
-  PetscOptions database;
-
   PetscFunctionBeginUser;
-  PetscCall(
-    begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3", &database));
+  PetscCall(begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3"));
   PetscCall(PetscOptionsInsertString(NULL, options));
   PetscCall(read_all(PETSC_FALSE));
   if (message)
     SB_CHECK_ERROR(SbOptionsCheck(), PETSC_ERR_USER, message);
   else
     PetscCall(SbOptionsCheck());
-  PetscCall(end(&database));
+  PetscCall(end());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -373,14 +329,12 @@ static PetscErrorCode test_left_out(const char *folder)
     {"-body_kidney_young 3", "-body_kidney_young"},
   };
   char file[PETSC_MAX_PATH_LEN];
-  PetscOptions database;
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(file, sizeof(file), "%s/lists.opts", folder));
-  PetscCall(write_file(file, "-bodies liver,spleen\n-body_spleen_mesh b.msh\n"));
+  PetscCall(test_file_put(file, "-bodies liver,spleen\n-body_spleen_mesh b.msh\n"));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
-    PetscCall(
-      begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3", &database));
+    PetscCall(begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3"));
     PetscCall(SbOptionsFile(PETSC_COMM_WORLD, file));
     PetscCall(PetscOptionsInsertString(NULL, of[i].options));
     PetscCall(read_all(PETSC_FALSE));
@@ -388,7 +342,7 @@ static PetscErrorCode test_left_out(const char *folder)
       SB_CHECK_ERROR(SbOptionsCheck(), PETSC_ERR_USER, of[i].message);
     else
       PetscCall(SbOptionsCheck());
-    PetscCall(end(&database));
+    PetscCall(end());
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -396,21 +350,20 @@ static PetscErrorCode test_left_out(const char *folder)
 /* A required option is missing and a misspelling of it is in the database: the message names the misspelling. */
 static PetscErrorCode test_missing(void)
 {
-  PetscOptions database;
   PetscReal x;
   PetscInt n;
   char(*names)[SB_NAME_MAX];
 
   PetscFunctionBeginUser;
-  PetscCall(begin("-body_liver_yuong 3 -bodis liver", &database));
+  PetscCall(begin("-body_liver_yuong 3 -bodis liver"));
   SB_CHECK_ERROR(SbOptionReal(&body_scope, "young", &x), PETSC_ERR_USER,
                  "-body_liver_yuong|-body_liver_young");
   SB_CHECK_ERROR(SbOptionNames(&run_scope, "bodies", &n, &names), PETSC_ERR_USER, "-bodis|-bodies");
-  PetscCall(end(&database));
+  PetscCall(end());
   /* the same key of another instance is not a misspelling */
-  PetscCall(begin("-body_livre_young 3", &database));
+  PetscCall(begin("-body_livre_young 3"));
   SB_CHECK_ERROR(SbOptionReal(&body_scope, "young", &x), PETSC_ERR_USER, "-body_liver_young|(0, inf)");
-  PetscCall(end(&database));
+  PetscCall(end());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -418,12 +371,11 @@ static PetscErrorCode test_missing(void)
 static PetscErrorCode test_ahead(void)
 {
   static const char *const keys[] = {"scale", "translate", "tags", "pull", "mesh"};
-  PetscOptions database;
   SbScope linear;
 
   PetscFunctionBeginUser;
-  PetscCall(begin("-body_liver_translate 1,2,3 -body_liver_mesh a.msh -verbose -repeat 2 -integrator static",
-                  &database));
+  PetscCall(
+    begin("-body_liver_translate 1,2,3 -body_liver_mesh a.msh -verbose -repeat 2 -integrator static"));
   for (int i = 0; i < 5; i++) PetscCall(SbOptionCheckEarly(&body_scope, keys[i]));
   for (int i = 1; i < 4; i++) PetscCall(SbOptionCheckEarly(&run_scope, run_rows[i].key));
   PetscCall(SbOptionsCheck());
@@ -431,10 +383,10 @@ static PetscErrorCode test_ahead(void)
   SB_CHECK(!SbOptionExists(&run_scope, "young"), "a run has no young");
   PetscCall(SbScopeSet(&linear, "body", "linear", "liver"));
   SB_CHECK(!SbOptionExists(&linear, "young"), "young belongs to another type");
-  PetscCall(end(&database));
-  PetscCall(begin("-body_liver_scale -1", &database));
+  PetscCall(end());
+  PetscCall(begin("-body_liver_scale -1"));
   SB_CHECK_ERROR(SbOptionCheckEarly(&body_scope, "scale"), PETSC_ERR_USER, "-body_liver_scale -1|(0, inf)");
-  PetscCall(end(&database));
+  PetscCall(end());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -443,19 +395,18 @@ static PetscErrorCode test_underscores(void)
 {
   static const SbOption long_rows[] = {
     {"mesh_scale", SB_OPTION_REAL, 1, "", "1", "", "a key with an underscore"}};
-  PetscOptions database;
   SbScope other;
   PetscReal x;
 
   PetscFunctionBeginUser;
-  PetscCall(begin("-body_liver_mesh_scale 3", &database));
+  PetscCall(begin("-body_liver_mesh_scale 3"));
   PetscCall(SbOptionsRegister("body", "", 1, long_rows));
   PetscCall(SbScopeSet(&other, "body", "corotated", "liver_mesh"));
   PetscCall(SbOptionReal(&other, "scale", &x));
-  SB_CHECK(x == 3, "scale of liver_mesh is %g", (double)x);
+  SB_CHECK(x == 3, "scale of liver_mesh is %g", x);
   SB_CHECK_ERROR(SbOptionReal(&body_scope, "mesh_scale", &x), PETSC_ERR_USER,
                  "-body_liver_mesh_scale|body 'liver_mesh'|body 'liver'");
-  PetscCall(end(&database));
+  PetscCall(end());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -482,16 +433,13 @@ static PetscErrorCode test_nearest(void)
 static PetscErrorCode test_manual(const char *folder)
 {
   char file[PETSC_MAX_PATH_LEN], line[1024];
-  PetscOptions database;
-  PetscMPIInt rank;
   int rows = 0, required = 0, tabs = 0;
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(file, sizeof(file), "%s/options.tsv", folder));
-  PetscCall(begin("", &database));
+  PetscCall(begin(""));
   PetscCall(SbOptionsTable(PETSC_COMM_WORLD, file));
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) {
+  if (!test_rank) {
     FILE *f = fopen(file, "r");
 
     while (f && fgets(line, sizeof(line), f)) {
@@ -506,21 +454,28 @@ static PetscErrorCode test_manual(const char *folder)
   }
   SB_CHECK_ERROR(SbOptionsTable(PETSC_COMM_WORLD, "/nonexistent/folder/options.tsv"), PETSC_ERR_FILE_OPEN,
                  "/nonexistent/folder/options.tsv");
-  PetscCall(end(&database));
+  PetscCall(end());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode run_tests(void)
+int main(int argc, char **argv)
 {
-  char folder[PETSC_MAX_PATH_LEN] = "/tmp/sb_test_option_XXXXXX", command[PETSC_MAX_PATH_LEN + 16];
-  PetscMPIInt rank;
+  char folder[512];
+  PetscReal x;
+  PetscInt n;
 
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot make a folder");
-  PetscCallMPI(MPI_Bcast(folder, sizeof(folder), MPI_CHAR, 0, PETSC_COMM_WORLD));
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(test_file_folder(folder));
   PetscCall(test_refused_numbers());
-  PetscCall(test_ends());
+  /* values at the ends of intervals */
+  PetscCall(begin("-body_liver_closed 1 -body_liver_poisson 0 -repeat 1"));
+  PetscCall(SbOptionReal(&body_scope, "closed", &x));
+  SB_CHECK(x == 1, "closed is %g", x);
+  PetscCall(SbOptionReal(&body_scope, "poisson", &x));
+  SB_CHECK(x == 0, "poisson is %g", x);
+  PetscCall(SbOptionInt(&run_scope, "repeat", &n));
+  SB_CHECK(n == 1, "repeat is %d", (int)n);
+  PetscCall(end());
   PetscCall(test_refused_words());
   PetscCall(test_files(folder));
   PetscCall(test_view_text(folder));
@@ -531,15 +486,5 @@ static PetscErrorCode run_tests(void)
   PetscCall(test_underscores());
   PetscCall(test_nearest());
   PetscCall(test_manual(folder));
-  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  PetscCall(PetscSNPrintf(command, sizeof(command), "rm -rf %s", folder));
-  if (!rank) PetscCheck(!system(command), PETSC_COMM_SELF, PETSC_ERR_SYS, "cannot remove %s", folder);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-int main(int argc, char **argv)
-{
-  SB_TEST_BEGIN(argc, argv);
-  PetscCall(run_tests());
   SB_TEST_END();
 }

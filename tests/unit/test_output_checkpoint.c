@@ -4,7 +4,7 @@
 
 #define HASH_OF_BOX 0x1e14294dea8e2209u
 
-static char dir[PETSC_MAX_PATH_LEN];
+static char dir[512];
 
 /* Largest difference between the vectors of the run and the motion at time t. */
 static PetscReal difference(TestScene *scene, PetscReal t)
@@ -29,7 +29,6 @@ static PetscReal difference(TestScene *scene, PetscReal t)
 static PetscErrorCode test_round_trip(void)
 {
   TestScene scene;
-  char options[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
   PetscCall(test_scene_open_in(dir, HELD EULER "-output_fields none -checkpoint_every_time 0.25", &scene));
@@ -42,15 +41,15 @@ static PetscErrorCode test_round_trip(void)
              fixture_exists(dir, "checkpoint_000008.h5"),
            "other checkpoints than 5 and 8 are kept");
   SB_CHECK(!fixture_exists(dir, "checkpoint.tmp"), "a temporary file is left");
-  SbFormat(sizeof(options), options, HELD EULER "-output_fields none -restart %s/checkpoint_000005.h5", dir);
-  PetscCall(test_scene_open_in(dir, options, &scene));
+  PetscCall(
+    test_open_in(dir, &scene, HELD EULER "-output_fields none -restart %s/checkpoint_000005.h5", dir));
   SB_CHECK(scene.run->step0 == 5 && scene.run->t0 == 5 * 0.1, "restart at step %d, t = %.17g",
-           (int)scene.run->step0, (double)scene.run->t0);
-  SB_CHECK(difference(&scene, 0.5) == 0., "the state differs by %g", (double)difference(&scene, 0.5));
+           (int)scene.run->step0, scene.run->t0);
+  SB_CHECK(difference(&scene, 0.5) == 0., "the state differs by %g", difference(&scene, 0.5));
   SB_CHECK(scene.run->energy_start == 1. / 7. && scene.run->energies.load_work == 305. &&
              scene.run->energies.prescribed_work == 400.,
-           "running totals: %.17g %g %g", (double)scene.run->energy_start,
-           (double)scene.run->energies.load_work, (double)scene.run->energies.prescribed_work);
+           "running totals: %.17g %g %g", scene.run->energy_start, scene.run->energies.load_work,
+           scene.run->energies.prescribed_work);
   SB_CHECK(!fixture_exists(dir, "checkpoint_000008.h5"),
            "a checkpoint of what is computed again is still there");
   PetscCall(test_scene_close(&scene));
@@ -69,24 +68,22 @@ static PetscErrorCode test_elements(void)
     "-body_b_young 1 -body_b_poisson 0 -body_c_mesh box:0.4,0.1,0.2:2,2,2 -body_c_translate "
     "0,0.6,0 -body_c_material linear -body_c_young 1 -body_c_poisson 0 -output_fields none ";
   TestScene scene;
-  char options[2048];
 
   PetscFunctionBeginUser;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements); i++) {
-    SbFormat(sizeof(options), options, HELD EULER "%s %s -checkpoint_every_steps 1",
-             i >= 3 ? more : "-output_fields none", elements[i]);
-    PetscCall(test_scene_open_in(dir, options, &scene));
+    PetscCall(test_open_in(dir, &scene, HELD EULER "%s %s -checkpoint_every_steps 1",
+                           i >= 3 ? more : "-output_fields none", elements[i]));
     for (PetscInt k = 0; k <= 1; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
     PetscCall(test_scene_close(&scene));
-    SbFormat(sizeof(options), options, HELD EULER "%s %s -restart latest",
-             i >= 3 ? more : "-output_fields none", elements[i]);
-    PetscCall(test_scene_open_in(dir, options, &scene));
+    PetscCall(test_open_in(dir, &scene, HELD EULER "%s %s -restart latest",
+                           i >= 3 ? more : "-output_fields none", elements[i]));
     SB_CHECK(difference(&scene, 0.1) == 0., "'%s': the state differs by %g", elements[i],
-             (double)difference(&scene, 0.1));
+             difference(&scene, 0.1));
     PetscCall(test_scene_close(&scene));
-    SbFormat(sizeof(options), options, HELD EULER "%s %s -body_a_element %s -restart latest",
-             i >= 3 ? more : "-output_fields none", elements[i], i == 0 || i == 2 ? "cr" : "dg");
-    SB_CHECK_ERROR(test_scene_open_in(dir, options, &scene), PETSC_ERR_USER_INPUT, "'-body_a_element cr'");
+    SB_CHECK_ERROR(test_open_in(dir, &scene, HELD EULER "%s %s -body_a_element %s -restart latest",
+                                i >= 3 ? more : "-output_fields none", elements[i],
+                                i == 0 || i == 2 ? "cr" : "dg"),
+                   PETSC_ERR_USER_INPUT, "'-body_a_element cr'");
     PetscCall(test_scene_close(&scene));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -101,7 +98,6 @@ static PetscErrorCode test_next_step(void)
   } cases[] = {
     {"", 0.025}, {" -ts_dt 0.05", 0.05}, {" -ts_max_time 2", 0.1}, {" -ts_adapt_type basic", 0.025}};
   TestScene scene;
-  char options[PETSC_MAX_PATH_LEN];
   PetscReal dt;
 
   PetscFunctionBeginUser;
@@ -111,11 +107,9 @@ static PetscErrorCode test_next_step(void)
     PetscCall(TSSetTimeStep(scene.run->ts, 0.025));
     PetscCall(fixture_step(&scene, 1, 0.1, PETSC_FALSE));
     PetscCall(test_scene_close(&scene));
-    SbFormat(sizeof(options), options, BOX EULER "-output_fields none -restart latest%s", cases[i].more);
-    PetscCall(test_scene_open_in(dir, options, &scene));
+    PetscCall(test_open_in(dir, &scene, BOX EULER "-output_fields none -restart latest%s", cases[i].more));
     PetscCall(TSGetTimeStep(scene.run->ts, &dt));
-    SB_CHECK(dt == cases[i].dt, "'%s': next step %g, expected %g", cases[i].more, (double)dt,
-             (double)cases[i].dt);
+    SB_CHECK(dt == cases[i].dt, "'%s': next step %g, expected %g", cases[i].more, dt, cases[i].dt);
     PetscCall(test_scene_close(&scene));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -132,12 +126,10 @@ static PetscErrorCode test_hash(void)
                {"-body_a_mesh box:0.4,0.1,0.2:4,2,1", PETSC_FALSE}};
   uint64_t hash[PETSC_STATIC_ARRAY_LENGTH(cases)];
   TestScene scene;
-  char options[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
-    SbFormat(sizeof(options), options, "-bodies a %s" MATERIAL EULER "-output_fields J", cases[i].mesh);
-    PetscCall(test_scene_open_in(dir, options, &scene));
+    PetscCall(test_open_in(dir, &scene, "-bodies a %s" MATERIAL EULER "-output_fields J", cases[i].mesh));
     hash[i] = ((SbOutput)scene.run->output)->mesh_hash;
     SB_CHECK((hash[i] == hash[0]) == (cases[i].same != PETSC_FALSE), "hash of '%s'", cases[i].mesh);
     PetscCall(test_scene_close(&scene));
@@ -153,15 +145,13 @@ static PetscErrorCode test_refused(void)
   static const char *const others[] = {" -body_a_young 1001", " -body_a_material stvk", " -mass consistent",
                                        " -body_a_mesh box:0.4,0.1,0.2:4,2,2", " -restart nowhere.h5"};
   TestScene scene;
-  char options[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
   PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields none -checkpoint_every_steps 1", &scene));
   for (PetscInt k = 0; k <= 1; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
   PetscCall(test_scene_close(&scene));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(others); i++) {
-    SbFormat(sizeof(options), options, BOX EULER "-output_fields none -restart latest%s", others[i]);
-    SB_CHECK_ERROR(test_scene_open_in(dir, options, &scene),
+    SB_CHECK_ERROR(test_open_in(dir, &scene, BOX EULER "-output_fields none -restart latest%s", others[i]),
                    i < 4 ? PETSC_ERR_USER_INPUT : PETSC_ERR_FILE_READ,
                    i < 4 ? "checkpoint_000001.h5" : "nowhere.h5");
     SB_CHECK(fixture_exists(dir, "checkpoint_000001.h5"), "'%s': refused, but the folder was cleared",
@@ -174,13 +164,12 @@ static PetscErrorCode test_refused(void)
 int main(int argc, char *argv[])
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_folder(sizeof(dir), dir));
+  PetscCall(test_file_folder(dir));
   PetscCall(test_round_trip());
   PetscCall(test_elements());
   PetscCall(test_next_step());
   PetscCall(test_hash());
   PetscCall(test_refused());
-  PetscCall(fixture_remove(dir));
   PetscCall(SbOptionsReset());
   SB_TEST_END();
 }

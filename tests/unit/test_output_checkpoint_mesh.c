@@ -2,7 +2,7 @@
 // @ranks 1 2
 #include "memory_mesh_fixture.h"
 
-static char dir[PETSC_MAX_PATH_LEN];
+static char dir[512];
 
 static PetscErrorCode write_two(void)
 {
@@ -23,18 +23,16 @@ static PetscErrorCode write_two(void)
 static PetscErrorCode check_back(PetscInt step)
 {
   SbMemoryMesh *expected, *g;
-  PetscMPIInt rank;
   TestScene scene;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(fixture_given(&expected));
   PetscCall(fixture_open_given(dir, GIVEN_SCENE EULER "-output_fields none -restart latest", NULL, &scene));
   g = scene.model->body[0].in_memory;
   SB_CHECK(scene.run->step0 == step, "goes on from step %d, not %d", (int)scene.run->step0, (int)step);
   SB_CHECK(g && g->step == GIVEN_STEP && g->mass == GIVEN_MASS && g->bound == GIVEN_BOUND,
            "numbers of the mesh");
-  if (g && !rank) {
+  if (g && !test_rank) {
     SB_CHECK(g->nvert == 5 && g->ncell == 2 && g->ntri == 1, "%d vertices, %d tets, %d triangles",
              (int)g->nvert, (int)g->ncell, (int)g->ntri);
     SB_CHECK(!memcmp(g->x, expected->x, 15 * sizeof(*g->x)), "places");
@@ -53,12 +51,10 @@ static PetscErrorCode check_back(PetscInt step)
 static PetscErrorCode damage(const char *array, hid_t type, const void *value, hsize_t n)
 {
   char path[PETSC_MAX_PATH_LEN];
-  PetscMPIInt rank;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   SbFormat(sizeof(path), path, "%s/checkpoint_000005.h5", dir);
-  if (!rank) {
+  if (!test_rank) {
     const hid_t file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT), set = H5Dopen2(file, array, H5P_DEFAULT);
     const hid_t all = H5Dget_space(set), first = H5Screate_simple(1, &n, NULL);
     const hsize_t start[2] = {0, 0}, count[2] = {1, n};
@@ -80,7 +76,7 @@ int main(int argc, char *argv[])
   static const int far = 1000000;
 
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_folder(sizeof(dir), dir));
+  PetscCall(test_file_folder(dir));
   PetscCall(write_two());
   PetscCall(check_back(5));
   /* an invalid vertex number must not be read beyond the end: the older checkpoint is used */
@@ -90,7 +86,6 @@ int main(int argc, char *argv[])
   PetscCall(write_two());
   PetscCall(damage("mesh_a/x", H5T_NATIVE_DOUBLE, &moved, 1));
   PetscCall(check_back(4));
-  PetscCall(fixture_remove(dir));
   PetscCall(SbOptionsReset());
   SB_TEST_END();
 }

@@ -2,23 +2,15 @@
 // names of fields; when a multiple of a time is due.
 #include "output_fixture.h"
 
-static char dir[PETSC_MAX_PATH_LEN];
+static char dir[512];
 
 static PetscErrorCode write_text(const char *name, const char *text)
 {
   char path[PETSC_MAX_PATH_LEN];
-  PetscMPIInt rank;
-  FILE *f;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (rank) PetscFunctionReturn(PETSC_SUCCESS);
   SbFormat(sizeof(path), path, "%s/%s", dir, name);
-  f = fopen(path, "w");
-  PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "%s", path);
-  (void)fputs(text, f);
-  (void)fclose(f);
+  PetscCall(test_file_put(path, text));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -42,10 +34,6 @@ static PetscErrorCode test_folder(void)
   SbFormat(sizeof(deep), deep, "%s/a/b/notes.txt/c", dir);
   SB_CHECK_ERROR(test_scene_open_in(deep, BOX EULER, &scene), PETSC_ERR_FILE_OPEN, "-output_dir");
   PetscCall(test_scene_close(&scene));
-  SbFormat(sizeof(deep), deep, "%s/a/b", dir);
-  PetscCall(fixture_remove(deep));
-  SbFormat(sizeof(deep), deep, "%s/a", dir);
-  PetscCall(fixture_remove(deep));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -117,12 +105,11 @@ static void test_due(void)
 int main(int argc, char *argv[])
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_folder(sizeof(dir), dir));
+  PetscCall(test_file_folder(dir));
   PetscCall(test_folder());
   PetscCall(test_scenario());
   PetscCall(test_fields());
   test_due();
-  PetscCall(fixture_remove(dir));
   PetscCall(SbOptionsReset());
   SB_TEST_END();
 }

@@ -3,20 +3,7 @@
 // @ranks 1 2 3 4
 #include "output_fixture.h"
 
-static char dir[PETSC_MAX_PATH_LEN];
-
-/* Opens the fields.h5 of the run; the caller closes it. */
-static PetscErrorCode open_fields(SbH5 *h)
-{
-  char path[PETSC_MAX_PATH_LEN];
-  PetscBool ok;
-
-  PetscFunctionBeginUser;
-  SbFormat(sizeof(path), path, "%s/fields.h5", dir);
-  PetscCall(SbH5Open(PETSC_COMM_WORLD, path, PETSC_FALSE, h, &ok));
-  SB_CHECK(ok, "fields.h5 cannot be opened");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+static char dir[512];
 
 /* Vertex fields against the formula at the reference positions in the file; cell fields against the constant state. */
 static PetscErrorCode check_values(SbOutput out, SbH5 *h, const char *group, PetscReal t, PetscReal tolerance)
@@ -100,11 +87,11 @@ static PetscErrorCode check_mesh(SbOutput out, SbH5 *h, PetscReal volume)
     least = PetscMin(least, det);
     // bodies in scenario order: the cells of the first one come first
     SB_CHECK(body[c] == (PetscReal)(out->cell.start + c >= 48), "cell %d is in body %g",
-             (int)(out->cell.start + c), (double)body[c]);
+             (int)(out->cell.start + c), body[c]);
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   SB_CHECK_NEAR(sum, volume, 1e-13, "volume of the cells of the file"); // rounding of 48 volumes near 1e-4
-  SB_CHECK(least > 0., "a cell of the file is negatively oriented: %g", (double)least);
+  SB_CHECK(least > 0., "a cell of the file is negatively oriented: %g", least);
   PetscCall(PetscFree3(x, cell, body));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -124,13 +111,12 @@ static PetscErrorCode test_values(const char *precision, PetscReal tolerance)
 {
   TestScene scene;
   SbH5 h;
-  char options[2048], *xmf;
+  char *xmf;
 
   PetscFunctionBeginUser;
-  SbFormat(sizeof(options), options, HELD EULER ALL " -output_precision %s", precision);
-  PetscCall(test_scene_open_in(dir, options, &scene));
+  PetscCall(test_open_in(dir, &scene, HELD EULER ALL " -output_precision %s", precision));
   for (PetscInt k = 0; k <= 3; k++) PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 3)));
-  PetscCall(open_fields(&h));
+  PetscCall(fixture_fields(dir, &h));
   PetscCall(check_values((SbOutput)scene.run->output, &h, "/step/0000/000002", 0.2, tolerance));
   PetscCall(check_values((SbOutput)scene.run->output, &h, "/step/0000/000003", 0.3, tolerance));
   PetscCall(SbH5Close(&h));
@@ -158,7 +144,7 @@ static PetscErrorCode test_reaction(void)
   out = (SbOutput)scene.run->output;
   SB_CHECK(scene.run->want_residual, "the residual is not asked for");
   PetscCall(fixture_step(&scene, 0, 0.1, PETSC_TRUE));
-  PetscCall(open_fields(&h));
+  PetscCall(fixture_fields(dir, &h));
   PetscCall(PetscMalloc2(3 * out->vertex.n, &x, 3 * out->vertex.n, &r));
   PetscCall(SbH5ReadSlice(&h, "/mesh/x", &out->vertex, 3, x, &ok));
   PetscCall(SbH5ReadSlice(&h, "/step/0000/000000/reaction", &out->vertex, 3, r, &ok));
@@ -180,15 +166,15 @@ static PetscErrorCode check_sets(const char *more)
   SbH5 h;
   PetscReal *x, *left, *half, *tets, volume = 0.;
   PetscBool ok[4], fine = PETSC_TRUE;
-  char options[2048], *xmf;
+  char *xmf;
 
   PetscFunctionBeginUser;
-  SbFormat(sizeof(options), options,
-           HELD EULER " -sets left,half -set_half_at halfspace:1,0,0,0.2 -output_fields sets %s", more);
-  PetscCall(test_scene_open_in(dir, options, &scene));
+  PetscCall(test_open_in(
+    dir, &scene, HELD EULER " -sets left,half -set_half_at halfspace:1,0,0,0.2 -output_fields sets %s",
+    more));
   out = (SbOutput)scene.run->output;
   PetscCall(fixture_step(&scene, 0, 0.1, PETSC_TRUE));
-  PetscCall(open_fields(&h));
+  PetscCall(fixture_fields(dir, &h));
   PetscCall(PetscMalloc4(3 * out->point.n, &x, out->point.n, &left, out->point.n, &half, out->cell.n, &tets));
   PetscCall(SbH5ReadSlice(&h, "/mesh/x", &out->point, 3, x, &ok[0]));
   PetscCall(SbH5ReadSlice(&h, "/mesh/set_left", &out->point, 1, left, &ok[1]));
@@ -201,7 +187,7 @@ static PetscErrorCode check_sets(const char *more)
   SB_CHECK(fine, "points of the sets%s", more);
   for (PetscInt c = 0; c < out->cell.n; c++) volume += tets[c];
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &volume, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
-  SB_CHECK(2 * volume == out->cell.N, "%g of %d tets in one half", (double)volume, (int)out->cell.N);
+  SB_CHECK(2 * volume == out->cell.N, "%g of %d tets in one half", volume, (int)out->cell.N);
   PetscCall(PetscFree4(x, left, half, tets));
   PetscCall(SbH5Close(&h));
   PetscCall(test_scene_close(&scene));
@@ -231,10 +217,9 @@ static PetscErrorCode test_two_bodies(void)
   PetscCall(test_scene_open_in(
     dir,
     "-bodies a,b -body_a_mesh box:0.4,0.1,0.2:4,1,2 -body_b_mesh box:0.4,0.1,0.2:4,1,2 -body_b_translate "
-    "0,0,1"
-    " -body_b_material linear -body_b_young 1 -body_b_poisson 0 -body_b_density 1" MATERIAL EULER,
+    "0,0,1 -body_b_material linear -body_b_young 1 -body_b_poisson 0 -body_b_density 1" MATERIAL EULER,
     &scene));
-  PetscCall(open_fields(&h));
+  PetscCall(fixture_fields(dir, &h));
   PetscCall(check_mesh((SbOutput)scene.run->output, &h, 0.016));
   PetscCall(SbH5Close(&h));
   PetscCall(test_scene_close(&scene));
@@ -245,11 +230,10 @@ static PetscErrorCode test_two_bodies(void)
 static PetscErrorCode frames_of(const char *more, PetscInt n, PetscReal dt, char frames[])
 {
   TestScene scene;
-  char options[2048], *xmf, name[64];
+  char *xmf, name[64];
 
   PetscFunctionBeginUser;
-  SbFormat(sizeof(options), options, BOX EULER "-output_fields displacement %s", more);
-  PetscCall(test_scene_open_in(dir, options, &scene));
+  PetscCall(test_open_in(dir, &scene, BOX EULER "-output_fields displacement %s", more));
   for (PetscInt k = 0; k <= n; k++) PetscCall(fixture_step(&scene, k, dt, (PetscBool)(k == n)));
   PetscCall(fixture_read(dir, "fields.xmf", &xmf));
   for (PetscInt k = 0; k <= n; k++) {
@@ -323,7 +307,7 @@ static PetscErrorCode test_hundreds(void)
   PetscFunctionBeginUser;
   PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields J", &scene));
   for (PetscInt k = 0; k <= 230; k++) PetscCall(fixture_step(&scene, k, 0.001, (PetscBool)(k == 230)));
-  PetscCall(open_fields(&h));
+  PetscCall(fixture_fields(dir, &h));
   for (int i = 0; i < 3; i++) {
     char name[32];
 
@@ -349,14 +333,13 @@ static PetscErrorCode test_restart(void)
 {
   TestScene scene;
   SbH5 h;
-  char *xmf, restart[PETSC_MAX_PATH_LEN + 256];
+  char *xmf;
 
   PetscFunctionBeginUser;
   PetscCall(test_scene_open_in(dir, HELD EULER ALL " -checkpoint_every_steps 4", &scene));
   for (PetscInt k = 0; k <= 6; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
   PetscCall(test_scene_close(&scene));
-  SbFormat(sizeof(restart), restart, HELD EULER ALL " -restart %s/checkpoint_000004.h5", dir);
-  PetscCall(test_scene_open_in(dir, restart, &scene));
+  PetscCall(test_open_in(dir, &scene, HELD EULER ALL " -restart %s/checkpoint_000004.h5", dir));
   SB_CHECK(scene.run->step0 == 4, "restart at step %d", (int)scene.run->step0);
   PetscCall(fixture_read(dir, "fields.xmf", &xmf));
   SB_CHECK(count(xmf, "<Time ") == 5 && !strstr(xmf, "/000005/"), "after a restart at 4: %d frames",
@@ -368,7 +351,7 @@ static PetscErrorCode test_restart(void)
   SB_CHECK(count(xmf, "\"set_left\"") == 7 && count(xmf, "\"rank\"") == 7, "arrays of the mesh in the index");
   SB_CHECK(strstr(xmf, "/step/0001/000006/"), "the frames after the restart begin a new hundred");
   PetscCall(PetscFree(xmf));
-  PetscCall(open_fields(&h));
+  PetscCall(fixture_fields(dir, &h));
   SB_CHECK(H5Lexists(h.file, "/step/0000/000005", H5P_DEFAULT) <= 0, "the old step 5 is still there");
   PetscCall(check_values((SbOutput)scene.run->output, &h, "/step/0000/000003", 0.3, 1e-6));
   PetscCall(check_values((SbOutput)scene.run->output, &h, "/step/0001/000005", 0.5, 1e-6));
@@ -395,7 +378,7 @@ static PetscErrorCode test_nothing(void)
 int main(int argc, char *argv[])
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_folder(sizeof(dir), dir));
+  PetscCall(test_file_folder(dir));
   PetscCall(test_values("double", 1e-13)); // rounding of a few operations
   PetscCall(test_values("float", 1.2e-7)); // half a unit in the last place of a float, twice
   PetscCall(test_reaction());
@@ -405,7 +388,6 @@ int main(int argc, char *argv[])
   PetscCall(test_hundreds());
   PetscCall(test_restart());
   PetscCall(test_nothing());
-  PetscCall(fixture_remove(dir));
   PetscCall(SbOptionsReset());
   SB_TEST_END();
 }

@@ -2,7 +2,7 @@
 // restart.
 #include "output_fixture.h"
 
-static char dir[PETSC_MAX_PATH_LEN];
+static char dir[512];
 
 /* Column `name` of row `row` (0 is the first row of numbers) of the file; NAN if it is absent. */
 static PetscReal value_of(const char *text, const char *name, int row)
@@ -46,13 +46,12 @@ static PetscErrorCode test_values(void)
   PetscCall(fixture_read(dir, "history.csv", &text));
   SB_CHECK(count_rows(text) == 4, "%d rows", (int)count_rows(text));
   SB_CHECK(value_of(text, "step", 2) == 2, "step");
-  SB_CHECK(value_of(text, "time", 3) == 3 * 0.1, "time %.17g", (double)value_of(text, "time", 3));
+  SB_CHECK(value_of(text, "time", 3) == 3 * 0.1, "time %.17g", value_of(text, "time", 3));
   SB_CHECK(value_of(text, "dt", 0) == 0 && value_of(text, "dt", 1) == 0.1, "dt");
   SB_CHECK(value_of(text, "kinetic", 2) == 102 && value_of(text, "strain", 2) == 202, "energies");
-  SB_CHECK(value_of(text, "total", 2) == 102. + 202. - 302. - 400., "total %g",
-           (double)value_of(text, "total", 2));
+  SB_CHECK(value_of(text, "total", 2) == 102. + 202. - 302. - 400., "total %g", value_of(text, "total", 2));
   SB_CHECK(value_of(text, "min_J", 1) == 1. / 3., "a third has lost digits: %.17g",
-           (double)value_of(text, "min_J", 1));
+           value_of(text, "min_J", 1));
   SB_CHECK(value_of(text, "inverted", 1) == 7 && value_of(text, "newton", 1) == 2 &&
              value_of(text, "linear", 1) == 30,
            "counts");
@@ -126,15 +125,13 @@ static PetscErrorCode test_every(void)
 static PetscErrorCode test_restart(void)
 {
   TestScene scene;
-  char *text, options[PETSC_MAX_PATH_LEN], path[PETSC_MAX_PATH_LEN];
-  PetscMPIInt rank;
+  char *text, path[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields none -checkpoint_every_steps 4", &scene));
   for (PetscInt k = 0; k <= 6; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
   PetscCall(test_scene_close(&scene));
-  if (!rank) {
+  if (!test_rank) {
     FILE *f;
 
     SbFormat(sizeof(path), path, "%s/history.csv", dir);
@@ -154,9 +151,9 @@ static PetscErrorCode test_restart(void)
   PetscCall(PetscFree(text));
   PetscCall(test_scene_close(&scene));
   // with other columns the old file is kept under another name
-  SbFormat(sizeof(options), options,
-           BOX EULER "-output_fields none -restart %s/checkpoint_000004.h5 -probes p -probe_p_at 0,0,0", dir);
-  PetscCall(test_scene_open_in(dir, options, &scene));
+  PetscCall(test_open_in(
+    dir, &scene, BOX EULER "-output_fields none -restart %s/checkpoint_000004.h5 -probes p -probe_p_at 0,0,0",
+    dir));
   PetscCall(fixture_step(&scene, 4, 0.1, PETSC_TRUE));
   SB_CHECK(fixture_exists(dir, "history_before_000004.csv"), "the history with other columns is gone");
   PetscCall(fixture_read(dir, "history.csv", &text));
@@ -170,12 +167,11 @@ static PetscErrorCode test_restart(void)
 int main(int argc, char *argv[])
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_folder(sizeof(dir), dir));
+  PetscCall(test_file_folder(dir));
   PetscCall(test_values());
   PetscCall(test_tie());
   PetscCall(test_every());
   PetscCall(test_restart());
-  PetscCall(fixture_remove(dir));
   PetscCall(SbOptionsReset());
   SB_TEST_END();
 }

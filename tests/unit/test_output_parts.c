@@ -3,22 +3,19 @@
 // @ranks 1 2 4
 #include "output_fixture.h"
 
-static char dir[PETSC_MAX_PATH_LEN];
+static char dir[512];
 
 /* Numbers dealt cyclically to the ranks, in descending order. */
 static PetscErrorCode test_order(void)
 {
   const PetscInt N = 23;
   SbOrder order;
-  PetscMPIInt rank, size;
   PetscInt n = 0, original[23];
   PetscReal owned[46], slice[46], back[46];
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   for (PetscInt k = N - 1; k >= 0; k--)
-    if (k % size == rank) original[n++] = k;
+    if (k % test_size == test_rank) original[n++] = k;
   for (PetscInt i = 0; i < n; i++) {
     owned[2 * i] = 1. + (PetscReal)original[i];
     owned[2 * i + 1] = -(PetscReal)original[i];
@@ -30,8 +27,7 @@ static PetscErrorCode test_order(void)
                slice[2 * i + 1] == -(PetscReal)(order.start + i),
              "number %d is in the place of %d", (int)slice[2 * i] - 1, (int)(order.start + i));
   PetscCall(SbOrderScatter(&order, 2, slice, back));
-  for (PetscInt i = 0; i < 2 * n; i++)
-    SB_CHECK(back[i] == owned[i], "%g came back as %g", (double)owned[i], (double)back[i]);
+  for (PetscInt i = 0; i < 2 * n; i++) SB_CHECK(back[i] == owned[i], "%g came back as %g", owned[i], back[i]);
   PetscCall(SbOrderDestroy(&order));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -41,15 +37,12 @@ static PetscErrorCode test_order_with_gaps(void)
 {
   const PetscInt N = 17;
   SbOrder order, pairs;
-  PetscMPIInt rank, size;
   PetscInt n = 0, key[17];
   PetscReal owned[34], slice[34];
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   for (PetscInt k = N - 1; k >= 0; k--) {
-    if (k % size != rank) continue;
+    if (k % test_size != test_rank) continue;
     owned[2 * n] = (PetscReal)k;
     owned[2 * n + 1] = k + 0.5;
     key[n++] = 3 * k * k + k;
@@ -60,11 +53,11 @@ static PetscErrorCode test_order_with_gaps(void)
            (int)pairs.N);
   PetscCall(SbOrderGather(&pairs, 1, owned, slice));
   for (PetscInt i = 0; i < pairs.n; i++)
-    SB_CHECK(slice[i] == 0.5 * (PetscReal)(pairs.start + i), "%g is in the place of %g", (double)slice[i],
+    SB_CHECK(slice[i] == 0.5 * (PetscReal)(pairs.start + i), "%g is in the place of %g", slice[i],
              0.5 * (double)(pairs.start + i));
   PetscCall(SbOrderDestroy(&pairs));
   PetscCall(SbOrderGather(&order, 2, owned, slice)); // remains valid without `pairs`
-  SB_CHECK(!order.n || slice[0] == (PetscReal)order.start, "%g is in the place of %d", (double)slice[0],
+  SB_CHECK(!order.n || slice[0] == (PetscReal)order.start, "%g is in the place of %d", slice[0],
            (int)order.start);
   PetscCall(SbOrderDestroy(&order));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -75,16 +68,14 @@ static PetscErrorCode test_h5(void)
 {
   SbOrder order;
   SbH5 h;
-  PetscMPIInt rank;
   PetscReal slice[8], back[8], time = 0.;
   int64_t step = 0;
   char path[PETSC_MAX_PATH_LEN], *text;
   PetscBool ok;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   SbFormat(sizeof(path), path, "%s/test.h5", dir);
-  PetscCall(SbOrderCreate(PETSC_COMM_WORLD, 2, rank ? 0 : 2, (const PetscInt[]){0, 1}, &order));
+  PetscCall(SbOrderCreate(PETSC_COMM_WORLD, 2, test_rank ? 0 : 2, (const PetscInt[]){0, 1}, &order));
   for (PetscInt i = 0; i < 3 * order.n; i++) slice[i] = (PetscReal)(3 * order.start + i) / 3.;
   PetscCall(SbH5Create(PETSC_COMM_WORLD, path, &h));
   PetscCall(SbH5WriteSlice(&h, h.file, "v", "m", &order, 3, H5T_IEEE_F64LE, slice));
@@ -123,16 +114,14 @@ static PetscErrorCode test_h5(void)
 static PetscErrorCode test_open_failure(void)
 {
   SbH5 h;
-  PetscMPIInt rank;
   char path[PETSC_MAX_PATH_LEN];
   PetscBool ok;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   SbFormat(sizeof(path), path, "%s/nothing.h5", dir);
   PetscCall(SbH5Open(PETSC_COMM_WORLD, path, PETSC_FALSE, &h, &ok));
   SB_CHECK(!ok && h.file < 0, "a file that is not there was opened");
-  if (!rank) {
+  if (!test_rank) {
     char message[SB_MESSAGE_MAX] = "";
     const SbChunk chunk = {"no HDF5", 7};
 
@@ -149,12 +138,10 @@ static PetscErrorCode test_files(void)
 {
   char path[PETSC_MAX_PATH_LEN], *text, message[SB_MESSAGE_MAX] = "";
   const SbChunk chunks[3] = {{"one ", 4}, {NULL, 0}, {"two", 3}};
-  PetscMPIInt rank;
   size_t size;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) {
+  if (!test_rank) {
     SbFormat(sizeof(path), path, "%s/chunks.txt", dir);
     SbFileReplace(path, 3, chunks, message);
     PetscCall(SbFileRead(path, &text, &size));
@@ -174,7 +161,7 @@ static PetscErrorCode test_files(void)
   PetscCall(SbFileReserve(PETSC_COMM_WORLD, path, 1000));
   SB_CHECK_ERROR(SbFileReserve(PETSC_COMM_WORLD, path, (PetscInt64)1 << 55), PETSC_ERR_FILE_WRITE,
                  "36028797018963968 bytes");
-  if (!rank) {
+  if (!test_rank) {
     PetscCall(SbFileRead(path, &text, &size));
     SB_CHECK(size == 1000, "the file has %zu bytes", size);
     PetscCall(PetscFree(text));
@@ -185,14 +172,10 @@ static PetscErrorCode test_files(void)
 /* A message of any rank ends the call on all ranks. */
 static PetscErrorCode test_agree(void)
 {
-  PetscMPIInt rank, size;
-
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(SbAgree(PETSC_COMM_WORLD, PETSC_ERR_FILE_WRITE, ""));
   SB_CHECK_ERROR(
-    SbAgree(PETSC_COMM_WORLD, PETSC_ERR_FILE_WRITE, rank == size - 1 ? "the last rank failed" : ""),
+    SbAgree(PETSC_COMM_WORLD, PETSC_ERR_FILE_WRITE, test_rank == test_size - 1 ? "the last rank failed" : ""),
     PETSC_ERR_FILE_WRITE, "the last rank failed");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -200,13 +183,12 @@ static PetscErrorCode test_agree(void)
 int main(int argc, char *argv[])
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_folder(sizeof(dir), dir));
+  PetscCall(test_file_folder(dir));
   PetscCall(test_order());
   PetscCall(test_order_with_gaps());
   PetscCall(test_h5());
   PetscCall(test_open_failure());
   PetscCall(test_files());
   PetscCall(test_agree());
-  PetscCall(fixture_remove(dir));
   SB_TEST_END();
 }

@@ -13,19 +13,7 @@
 #define FIELDS \
   " -output_fields displacement,velocity,acceleration,reaction,J,pressure -output_precision double"
 
-static char dir[PETSC_MAX_PATH_LEN];
-
-static PetscErrorCode open_fields(SbH5 *h)
-{
-  char path[PETSC_MAX_PATH_LEN];
-  PetscBool ok;
-
-  PetscFunctionBeginUser;
-  SbFormat(sizeof(path), path, "%s/fields.h5", dir);
-  PetscCall(SbH5Open(PETSC_COMM_WORLD, path, PETSC_FALSE, h, &ok));
-  SB_CHECK(ok, "fields.h5 cannot be opened");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+static char dir[512];
 
 /* Every point of every body has the motion, which all elements represent exactly. */
 static PetscErrorCode test_affine(const char *more)
@@ -36,15 +24,14 @@ static PetscErrorCode test_affine(const char *more)
   SbH5 h;
   PetscReal *x, *field;
   PetscBool ok;
-  char options[2048], name[64];
+  char name[64];
 
   PetscFunctionBeginUser;
-  SbFormat(sizeof(options), options, BODIES EULER FIELDS "%s", more);
-  PetscCall(test_scene_open_in(dir, options, &scene));
+  PetscCall(test_open_in(dir, &scene, BODIES EULER FIELDS "%s", more));
   for (PetscInt k = 0; k <= 2; k++) PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 2)));
   out = (SbOutput)scene.run->output;
   SB_CHECK(out->point.N == (more[0] ? 4 * (48 + 72 + 48) : 30 + 36 + 27), "%d points", (int)out->point.N);
-  PetscCall(open_fields(&h));
+  PetscCall(fixture_fields(dir, &h));
   PetscCall(PetscMalloc2(3 * out->point.n, &x, PetscMax(3 * out->point.n, out->cell.n), &field));
   PetscCall(SbH5ReadSlice(&h, "/mesh/x", &out->point, 3, x, &ok));
   SB_CHECK(ok, "no /mesh/x");
@@ -144,7 +131,7 @@ static PetscErrorCode test_mean(PetscBool discontinuous)
   }
   SB_CHECK_NEAR(worst, 0., 1e-14, "vertex values"); // roundings of numbers below 1
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &jump, 1, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD));
-  SB_CHECK(!discontinuous || jump > 1e-3, "nothing has jumps: %g", (double)jump);
+  SB_CHECK(!discontinuous || jump > 1e-3, "nothing has jumps: %g", jump);
   PetscCall(PetscFree(value));
   PetscCall(test_scene_close(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -157,11 +144,9 @@ static PetscErrorCode test_reactions(const char *more)
   SbSpace s;
   SbOutput out;
   PetscReal *r, sums[14] = {0.}, away = 0.;
-  char options[2048];
 
   PetscFunctionBeginUser;
-  SbFormat(sizeof(options), options, BODIES EULER FIELDS "%s", more);
-  PetscCall(test_scene_open_in(dir, options, &scene));
+  PetscCall(test_open_in(dir, &scene, BODIES EULER FIELDS "%s", more));
   PetscCall(fixture_step(&scene, 0, 0.1, PETSC_FALSE));
   s = scene.model->space;
   out = (SbOutput)scene.run->output;
@@ -187,10 +172,10 @@ static PetscErrorCode test_reactions(const char *more)
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sums, 14, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   SB_CHECK(sums[7] == 0.5 * (6 + 8 + 8), "%g N at the nodes",
-           (double)sums[7]); // vertices, faces, supports of faces
+           sums[7]); // vertices, faces, supports of faces
   for (int k = 0; k < 6; k++)
     SB_CHECK_NEAR(sums[k], sums[7 + k], 1e-13, "resultant or moment of the reactions");
-  SB_CHECK(away == 0., "a reaction away from the support: %g", (double)away);
+  SB_CHECK(away == 0., "a reaction away from the support: %g", away);
   PetscCall(PetscFree(r));
   PetscCall(test_scene_close(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -202,15 +187,15 @@ static PetscErrorCode test_probes(const char *fields)
   static const PetscReal at[3][3] = {{0.4, 0.1, 0.2}, {0.3, 0.3, 0.1}, {0.1, 0.6, 0.1}};
   TestScene scene;
   SbOutput out;
-  char options[2048], *text, *row;
+  char *text, *row;
   PetscReal u[3], v[3], a[3];
 
   PetscFunctionBeginUser;
-  SbFormat(sizeof(options), options,
-           BODIES EULER
-           "-probes p,q,r -probe_p_at 0.4,0.1,0.2 -probe_q_at 0.31,0.29,0.11 -probe_r_at 0.1,0.6,0.1 %s",
-           fields);
-  PetscCall(test_scene_open_in(dir, options, &scene));
+  PetscCall(test_open_in(
+    dir, &scene,
+    BODIES EULER
+    "-probes p,q,r -probe_p_at 0.4,0.1,0.2 -probe_q_at 0.31,0.29,0.11 -probe_r_at 0.1,0.6,0.1 %s",
+    fields));
   out = (SbOutput)scene.run->output;
   for (PetscInt k = 0; k <= 1; k++) PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 1)));
   PetscCall(fixture_read(dir, "history.csv", &text));
@@ -232,25 +217,23 @@ static PetscErrorCode test_probes(const char *fields)
 static PetscErrorCode test_restart(void)
 {
   TestScene scene;
-  char options[2048], *xmf;
+  char *xmf;
 
   PetscFunctionBeginUser;
   for (int other = 0; other < 2; other++) {
     const char *first = other ? "" : " -output_discontinuous",
                *second = other ? " -output_discontinuous" : "";
 
-    SbFormat(sizeof(options), options, BODIES EULER FIELDS " -checkpoint_every_steps 1%s", first);
-    PetscCall(test_scene_open_in(dir, options, &scene));
+    PetscCall(test_open_in(dir, &scene, BODIES EULER FIELDS " -checkpoint_every_steps 1%s", first));
     for (PetscInt k = 0; k <= 2; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
     PetscCall(test_scene_close(&scene));
-    SbFormat(sizeof(options), options, BODIES EULER FIELDS " -restart %s/checkpoint_000001.h5%s", dir,
-             second);
-    SB_CHECK_ERROR(test_scene_open_in(dir, options, &scene), PETSC_ERR_USER_INPUT,
-                   "-output_discontinuous|-output_dir");
+    SB_CHECK_ERROR(
+      test_open_in(dir, &scene, BODIES EULER FIELDS " -restart %s/checkpoint_000001.h5%s", dir, second),
+      PETSC_ERR_USER_INPUT, "-output_discontinuous|-output_dir");
     PetscCall(test_scene_close(&scene));
     SB_CHECK(fixture_exists(dir, "checkpoint_000002.h5"), "refused, but the folder was cleared");
-    SbFormat(sizeof(options), options, BODIES EULER FIELDS " -restart %s/checkpoint_000001.h5%s", dir, first);
-    PetscCall(test_scene_open_in(dir, options, &scene));
+    PetscCall(
+      test_open_in(dir, &scene, BODIES EULER FIELDS " -restart %s/checkpoint_000001.h5%s", dir, first));
     for (PetscInt k = 1; k <= 3; k++) PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 3)));
     PetscCall(test_scene_close(&scene));
     PetscCall(fixture_read(dir, "fields.xmf", &xmf));
@@ -281,7 +264,7 @@ static PetscErrorCode test_nothing(void)
 int main(int argc, char *argv[])
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_folder(sizeof(dir), dir));
+  PetscCall(test_file_folder(dir));
   PetscCall(test_affine(""));
   PetscCall(test_affine(" -output_discontinuous"));
   PetscCall(test_mean(PETSC_FALSE));
@@ -293,7 +276,6 @@ int main(int argc, char *argv[])
   PetscCall(test_probes("-output_fields none"));
   PetscCall(test_restart());
   PetscCall(test_nothing());
-  PetscCall(fixture_remove(dir));
   PetscCall(SbOptionsReset());
   SB_TEST_END();
 }

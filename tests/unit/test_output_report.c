@@ -1,7 +1,7 @@
 // Printed report: header, progress, final table within 80 columns; run.json at the start, at the end, after a failure.
 #include "output_fixture.h"
 
-static char dir[PETSC_MAX_PATH_LEN];
+static char dir[512];
 
 /* Runs `call` and stores PETSc's output in a text. */
 #define CAPTURE(text, call)                         \
@@ -36,10 +36,8 @@ static PetscErrorCode test_report(void)
   TestScene scene;
   char *header, *progress, *summary, *json;
   const char *cpu;
-  PetscMPIInt rank;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(test_scene_open_in(
     dir, HELD " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -probes p -probe_p_at 0,0,0", &scene));
   PetscCall(fixture_read(dir, "run.json", &json));
@@ -49,7 +47,7 @@ static PetscErrorCode test_report(void)
   CAPTURE(header, PetscCall(SbReportHeader(scene.run)));
   CAPTURE(progress, PetscCall(run_steps(&scene)));
   CAPTURE(summary, PetscCall(SbReportSummary(scene.run)));
-  if (!rank) {
+  if (!test_rank) {
     static const char *const in_header[] = {"supple " SB_VERSION " with PETSc 3.",
                                             "48        30        90",
                                             "linear",
@@ -74,7 +72,7 @@ static PetscErrorCode test_report(void)
     SB_CHECK(strstr(progress, "0/10 ") && strstr(progress, "10/10 "), "progress:\n%s", progress);
     SB_CHECK(strstr(progress, " 2.0 ") && strstr(progress, "30.0"), "iterations per step:\n%s", progress);
   } else
-    SB_CHECK(!header[0] && !progress[0] && !summary[0], "rank %d prints", (int)rank);
+    SB_CHECK(!header[0] && !progress[0] && !summary[0], "rank %d prints", (int)test_rank);
   PetscCall(fixture_read(dir, "run.json", &json));
   SB_CHECK(strstr(json, "\"status\": \"completed\"") && strstr(json, "\"steps\": 10") &&
              strstr(json, "\"linear solve\": "),
@@ -100,19 +98,16 @@ static PetscErrorCode test_elements(void)
     {"dg", "dg            48       192       576", "\"nodes\": 192, \"unknowns\": 576,"},
   };
   TestScene scene;
-  char options[1024], *header, *json;
-  PetscMPIInt rank;
+  char *header, *json;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
-    SbFormat(sizeof(options), options,
-             BOX " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -progress false -body_a_element %s",
-             cases[i].element);
-    PetscCall(test_scene_open_in(dir, options, &scene));
+    PetscCall(test_open_in(
+      dir, &scene, BOX " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -progress false -body_a_element %s",
+      cases[i].element));
     CAPTURE(header, PetscCall(SbReportHeader(scene.run)));
-    SB_CHECK(rank || strstr(header, cases[i].in_header), "no '%s' in the header:\n%s", cases[i].in_header,
-             header);
+    SB_CHECK(test_rank || strstr(header, cases[i].in_header), "no '%s' in the header:\n%s",
+             cases[i].in_header, header);
     check_width(header, "header");
     PetscCall(fixture_read(dir, "run.json", &json));
     SB_CHECK(strstr(json, cases[i].in_json), "no '%s' in run.json: %s", cases[i].in_json, json);
@@ -127,23 +122,21 @@ static PetscErrorCode test_early_end(void)
 {
   TestScene scene;
   char *summary, *json;
-  PetscMPIInt rank;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(
     test_scene_open_in(dir, BOX " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -progress false", &scene));
   SB_CHECK(scene.run->nmonitor == 2, "%d monitors without progress", (int)scene.run->nmonitor);
   PetscCall(PetscStrncpy(scene.run->stop_reason, "the \"solver\" gave\nup", sizeof(scene.run->stop_reason)));
   CAPTURE(summary, PetscCall(SbReportSummary(scene.run)));
-  SB_CHECK(rank || strstr(summary, "stopped    the \"solver\""), "summary:\n%s", summary);
+  SB_CHECK(test_rank || strstr(summary, "stopped    the \"solver\""), "summary:\n%s", summary);
   PetscCall(fixture_read(dir, "run.json", &json));
   SB_CHECK(strstr(json, "\"status\": \"stopped\"") &&
              strstr(json, "\"reason\": \"the \\\"solver\\\" gave\\u000aup\""),
            "run.json: %s", json);
   PetscCall(PetscFree(json));
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  if (!rank) PetscCall(SbReportFailure(scene.run, "disk full"));
+  if (!test_rank) PetscCall(SbReportFailure(scene.run, "disk full"));
   PetscCall(fixture_read(dir, "run.json", &json));
   SB_CHECK(strstr(json, "\"status\": \"failed\"") && strstr(json, "\"reason\": \"disk full\""),
            "run.json: %s", json);
@@ -174,12 +167,11 @@ static PetscErrorCode test_quiet(void)
 int main(int argc, char *argv[])
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_folder(sizeof(dir), dir));
+  PetscCall(test_file_folder(dir));
   PetscCall(test_report());
   PetscCall(test_elements());
   PetscCall(test_early_end());
   PetscCall(test_quiet());
-  PetscCall(fixture_remove(dir));
   PetscCall(SbOptionsReset());
   SB_TEST_END();
 }

@@ -1,7 +1,8 @@
 // @ranks 1 2 3
 /*
-  Two-level preconditioner: symmetric and positive definite; iteration counts nearly independent of the mesh, also on a slender
-  bar where incomplete Cholesky alone fails; agreement with a factorisation, with several and supported bodies; reported failures.
+  Two-level preconditioner: symmetric and positive definite; iteration counts nearly independent of the mesh,
+  also on a slender bar where incomplete Cholesky alone fails; agreement with a factorisation, with several
+  and supported bodies; reported failures.
 */
 #include "../scene.h"
 #include <sbsolver.h>
@@ -60,16 +61,14 @@ static PetscErrorCode assemble(System *y, PetscReal stiffness, PetscReal shift)
 
 static PetscErrorCode system_open(const char *options, PetscReal shift, System *y)
 {
-  PetscMPIInt size;
   PetscScalar *b;
   SbSpace s;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(test_scene_open(options, &y->scene));
   y->ksp = NULL;
   s = y->scene.model->space;
-  PetscCall(SbSpaceCreateMatrix(s, size == 1 ? SB_MATRIX_SBAIJ : SB_MATRIX_BAIJ, &y->A));
+  PetscCall(SbSpaceCreateMatrix(s, test_size == 1 ? SB_MATRIX_SBAIJ : SB_MATRIX_BAIJ, &y->A));
   PetscCall(assemble(y, 1., shift));
   PetscCall(SbSpaceCreateVec(s, &y->b));
   PetscCall(VecDuplicate(y->b, &y->x));
@@ -128,7 +127,7 @@ static PetscErrorCode iterations(const char *options, PetscInt *its)
   PetscCall(true_residual(&y, &residual));
   SB_CHECK(reason > 0, "%s: %s", options, KSPConvergedReasons[reason]);
   /* the residual of the recurrence and the true one differ by rounding: 1e-16 times the condition number of the slender bar, 1e9 */
-  SB_CHECK(residual < 1e-6, "%s: the true residual is %g", options, (double)residual);
+  SB_CHECK(residual < 1e-6, "%s: the true residual is %g", options, residual);
   PetscCall(system_close(&y));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -166,8 +165,7 @@ static PetscErrorCode test_symmetry(const char *options, PetscReal shift, const 
     PetscCall(VecDot(y, Px, &yPx));
     PetscCall(VecNorm(x, NORM_2, &xx));
     PetscCall(VecNorm(y, NORM_2, &yy));
-    SB_CHECK(xPx > 0. && yPy > 0. && xx > 0. && yy > 0., "%s: not positive definite: %g, %g", what,
-             (double)xPx, (double)yPy);
+    SB_CHECK(xPx > 0. && yPy > 0. && xx > 0. && yy > 0., "%s: not positive definite: %g, %g", what, xPx, yPy);
     /* rounding of E^-1, whose condition number is below 1e5 here */
     SB_CHECK_NEAR(xPy, yPx, 1e-9 * PetscSqrtReal(xPx * yPy), what);
   }
@@ -210,7 +208,7 @@ static PetscErrorCode test_renewal(const char *more)
   PetscCall(SbPCCoarseGetStats(y.pc, NULL, NULL, &again, NULL));
   PetscCall(true_residual(&y, &residual));
   SB_CHECK(reason > 0 && again == 3, "after it: %s, %d set-ups", KSPConvergedReasons[reason], (int)again);
-  SB_CHECK(residual < 2e-8, "after it: residual %g", (double)residual);
+  SB_CHECK(residual < 2e-8, "after it: residual %g", residual);
   /* the initial guess is the solution: the hook must keep it, and the choice of the initial guess */
   PetscCall(KSPSetInitialGuessNonzero(y.ksp, PETSC_TRUE));
   PetscCall(KSPSolve(y.ksp, y.b, y.x));
@@ -224,10 +222,8 @@ static PetscErrorCode test_renewal(const char *more)
 static PetscErrorCode test_spread(void)
 {
   static const char *const more[] = {"-pc_coarse_gathered 300 ", SPREAD};
-  PetscMPIInt rank;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   for (int k = 0; k < 2; k++) {
     PetscInt naggregate, nsolved, sum;
     char text[1024];
@@ -240,7 +236,7 @@ static PetscErrorCode test_spread(void)
     PetscCall(KSPSetUp(y.ksp));
     PetscCall(SbPCCoarseGetStats(y.pc, &naggregate, &nsolved, NULL, NULL));
     PetscCallMPI(MPI_Allreduce(&nsolved, &sum, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
-    SB_CHECK(naggregate > 50 && sum == naggregate && (k || nsolved == (rank ? 0 : naggregate)),
+    SB_CHECK(naggregate > 50 && sum == naggregate && (k || nsolved == (test_rank ? 0 : naggregate)),
              "%s: %d of %d aggregates are solved for by this rank, %d by all", more[k], (int)nsolved,
              (int)naggregate, (int)sum);
     PetscCall(system_close(&y));
@@ -254,14 +250,12 @@ static PetscErrorCode test_solution(const char *scene, PetscBool simple, const c
   static const char *const solvers[] = {"-solver direct ", "-solver cg_two_level "};
   PetscReal norm[2], difference = 0.;
   Vec exact = NULL;
-  char text[2048];
 
   PetscFunctionBeginUser;
   for (int k = 0; k < 2; k++) {
     TestScene t;
 
-    PetscCall(PetscSNPrintf(text, sizeof(text), "%s -ksp_rtol 1e-11 -time static %s", scene, solvers[k]));
-    PetscCall(test_scene_open(text, &t));
+    PetscCall(test_open(&t, "%s -ksp_rtol 1e-11 -time static %s", scene, solvers[k]));
     PetscCall(SbRunSolve(t.run));
     SB_CHECK(!t.run->stop_reason[0], "%s: %s", what, t.run->stop_reason);
     PetscCall(VecNorm(t.run->U, NORM_2, &norm[k]));
@@ -287,15 +281,13 @@ static PetscErrorCode test_solution(const char *scene, PetscBool simple, const c
   }
   PetscCall(VecDestroy(&exact));
   /* residual 1e-11, condition number about 1e4 */
-  SB_CHECK(norm[0] > 0. && difference < 1e-6 * norm[0], "%s: off by %g of %g", what, (double)difference,
-           (double)norm[0]);
+  SB_CHECK(norm[0] > 0. && difference < 1e-6 * norm[0], "%s: off by %g of %g", what, difference, norm[0]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int main(int argc, char **argv)
 {
   PetscInt coarse, fine, slender, alone, few, many;
-  PetscMPIInt size;
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(test_symmetry(BAR("box:0.4,0.1,0.1:5") STATIC, 0., "bar"));
@@ -307,11 +299,11 @@ int main(int argc, char **argv)
     test_symmetry(BAR("box:0.4,0.1,0.1:5") STATIC "-body_bar_poisson 0.49", 0., "diagonal as fine level"));
   PetscCall(iterations(BAR("box:0.4,0.1,0.1:6") STATIC, &coarse));
   PetscCall(iterations(BAR("box:0.4,0.1,0.1:12") STATIC, &fine));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "5k and 41k tets: %d and %d iterations\n", (int)coarse, (int)fine));
+  test_print("5k and 41k tets: %d and %d iterations\n", (int)coarse, (int)fine);
   /* incomplete Cholesky alone doubles the iterations; the aggregates grow by 2^(0.3), and the iterations with their size */
   SB_CHECK(fine <= 1.6 * coarse, "iterations grow from %d to %d", (int)coarse, (int)fine);
   PetscCall(iterations(BAR("box:6,0.1,0.1:4") STATIC, &slender));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "slender bar: %d iterations\n", (int)slender));
+  test_print("slender bar: %d iterations\n", (int)slender);
   SB_CHECK(slender < 150, "%d iterations on a slender bar", (int)slender);
   /* spread over the ranks: a symmetric preconditioner too, and about the iterations of a factor for as many aggregates */
   PetscCall(test_symmetry(BAR("box:0.4,0.1,0.1:5") STATIC SPREAD, 0., "spread"));
@@ -322,8 +314,7 @@ int main(int argc, char **argv)
   PetscCall(
     iterations(BAR("box:0.4,0.1,0.1:12") STATIC "-pc_coarse_aggregates 600 -pc_coarse_gathered 600", &few));
   PetscCall(iterations(BAR("box:0.4,0.1,0.1:12") STATIC "-pc_coarse_aggregates 600 " SPREAD, &many));
-  PetscCall(
-    PetscPrintf(PETSC_COMM_WORLD, "600 aggregates: %d iterations, %d with multigrid\n", (int)few, (int)many));
+  test_print("600 aggregates: %d iterations, %d with multigrid\n", (int)few, (int)many);
   SB_CHECK(many <= 1.3 * few, "%d iterations with multigrid, %d with a factor", (int)many, (int)few);
   PetscCall(iterations(BAR("box:6,0.1,0.1:4") STATIC "-pc_coarse_aggregates 1", &alone));
   SB_CHECK(alone > 4 * slender, "the coarse space does nothing: %d iterations without it, %d with",
@@ -333,9 +324,8 @@ int main(int argc, char **argv)
   PetscCall(test_spread());
   PetscCall(test_solution(BAR("box:0.4,0.1,0.1:5"), PETSC_FALSE, "bar"));
   /* tets thirty times as long as thick: the incomplete factorisation breaks down, except where three ranks partition them */
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  PetscCall(
-    test_solution(BAR("box:0.4,0.1,0.1:8,4,60") "-body_bar_poisson 0.4", (PetscBool)(size < 3), "flat tets"));
+  PetscCall(test_solution(BAR("box:0.4,0.1,0.1:8,4,60") "-body_bar_poisson 0.4", (PetscBool)(test_size < 3),
+                          "flat tets"));
   PetscCall(test_solution(BODIES, PETSC_FALSE, "three bodies, one held"));
   PetscCall(test_solution(BODIES SPREAD, PETSC_FALSE, "three bodies, spread"));
   SB_TEST_END();

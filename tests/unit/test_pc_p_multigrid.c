@@ -1,8 +1,9 @@
 // @ranks 1 2 4
 /*
-  P2 preconditioned by P1: the preconditioner is symmetric and positive definite, on any number of ranks and near nu = 1/2; iterations do not grow with
-  the mesh, by a third at most from one rank to four, and are bounded as in docs/reports/solvers.md up to nu 0.49; agreement with a factorisation, with
-  supports in single directions, with springs and with bodies of other elements; an error for runs without p2.
+  P2 preconditioned by P1: the preconditioner is symmetric and positive definite, on any number of ranks and
+  near nu = 1/2; iterations do not grow with the mesh, by a third at most from one rank to four, and are
+  bounded as in docs/reports/solvers.md up to nu 0.49; agreement with a factorisation, with supports in single
+  directions, with springs and with bodies of other elements; an error for runs without p2.
 */
 #include "../scene.h"
 #include <sbsolver.h>
@@ -16,7 +17,6 @@
 static PetscErrorCode check_symmetry(const char *nu)
 {
   PetscScalar xMy, yMx, xMx;
-  char text[1024];
   PetscRandom random;
   Vec x, y, Mx, My;
   TestScene t;
@@ -24,16 +24,14 @@ static PetscErrorCode check_symmetry(const char *nu)
   PC pc;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
+  PetscCall(test_open(
+    &t,
     "-bodies a " BODY(
       "a", "box:0.4,0.1,0.1:2",
       "-body_a_element p2 -body_a_poisson %s ") "-effects low,y -effect_low_type fixed -effect_low_on xmin "
-                                                "-effect_low_components xz "
-                                                "-effect_y_type fixed -effect_y_on ymin -effect_y_components "
-                                                "y " STATIC "-solver cg_pbjacobi",
+                                                "-effect_low_components xz -effect_y_type fixed -effect_y_on "
+                                                "ymin -effect_y_components y " STATIC "-solver cg_pbjacobi",
     nu));
-  PetscCall(test_scene_open(text, &t));
   PetscCall(SbSpaceCreateMatrix(t.model->space, SB_MATRIX_BAIJ, &A));
   PetscCall(SbModelTangent(t.model, 0., 0., 0., 1., t.run->U, NULL, A));
   PetscCall(MatCreateVecs(A, &x, &y));
@@ -51,7 +49,7 @@ static PetscErrorCode check_symmetry(const char *nu)
   PetscCall(VecDot(x, My, &xMy));
   PetscCall(VecDot(y, Mx, &yMx));
   PetscCall(VecDot(x, Mx, &xMx));
-  SB_CHECK(xMx > 0., "nu %s: (x, M x) = %g", nu, (double)xMx);
+  SB_CHECK(xMx > 0., "nu %s: (x, M x) = %g", nu, xMx);
   SB_CHECK_NEAR(xMy, yMx, 1e-10 * xMx, nu);
   PetscCall(PCDestroy(&pc));
   PetscCall(PetscRandomDestroy(&random));
@@ -67,12 +65,10 @@ static PetscErrorCode check_symmetry(const char *nu)
 /* Displacements and iterations of a run. */
 static PetscErrorCode solve(const char *options, const char *solver, PetscInt *iterations, PetscReal *size)
 {
-  char text[2048];
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), "%s -solver %s", options, solver));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t, "%s -solver %s", options, solver));
   PetscCall(SbRunSolve(t.run));
   SB_CHECK(!t.run->stop_reason[0] && !strcmp(t.run->solver, solver), "%s: %s, %s", options, t.run->solver,
            t.run->stop_reason);
@@ -99,8 +95,7 @@ static PetscErrorCode check_iterations(const char *nu, PetscInt bound)
       2 + 2 * k, nu));
     PetscCall(solve(text, "cg_p_multigrid", &its[k], &size));
   }
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  nu %-5s: %" PetscInt_FMT " and %" PetscInt_FMT " iterations\n",
-                        nu, its[0], its[1]));
+  test_print("  nu %-5s: %" PetscInt_FMT " and %" PetscInt_FMT " iterations\n", nu, its[0], its[1]);
   SB_CHECK(its[0] <= bound && its[1] <= bound && its[1] <= its[0] + bound / 8,
            "nu %s: %" PetscInt_FMT " and %" PetscInt_FMT " iterations", nu, its[0], its[1]);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -134,11 +129,9 @@ int main(int argc, char **argv)
   PetscCall(check_answer("-bodies a " BODY(
     "a", "box:0.3,0.1,0.1:2",
     "-body_a_element p2 -body_a_poisson 0.3 ") "-effects gravity,x,y,z -effect_x_type fixed -effect_x_on "
-                                               "xmin -effect_x_components x "
-                                               "-effect_y_type fixed -effect_y_on ymin -effect_y_components "
-                                               "y "
-                                               "-effect_z_type fixed -effect_z_on xmax -effect_z_components "
-                                               "z " STATIC));
+                                               "xmin -effect_x_components x -effect_y_type fixed "
+                                               "-effect_y_on ymin -effect_y_components y -effect_z_type "
+                                               "fixed -effect_z_on xmax -effect_z_components z " STATIC));
   PetscCall(check_answer(
     "-bodies a,b,c " BODY("a", "box:0.3,0.1,0.1:2", "-body_a_element p2 -body_a_poisson 0.3 ")
       BODY("b", "box:0.3,0.1,0.1:2", "-body_b_poisson 0.3 -body_b_translate 0,1,0 ") BODY(

@@ -1,7 +1,7 @@
 // @ranks 1 2 3 4
 /*
-  Rotated factor: exact (up to its 16-bit rounding) for the original operator and for the one
-  of the rigidly rotated body; few iterations in a bent body; independence of the number of ranks; every kind of operator.
+  Rotated factor: exact (up to its 16-bit rounding) for the original operator and for the one of the rigidly
+  rotated body; few iterations in a bent body; independence of the number of ranks; every kind of operator.
 */
 #include "sbsolver.h"
 #include "../scene.h"
@@ -55,12 +55,10 @@ typedef struct {
 
 static PetscErrorCode open_case(const char *law, const char *extra, PetscBool frames, Case *c)
 {
-  char text[2048];
   PC pc;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), bar, law, extra));
-  PetscCall(test_scene_open(text, &c->t));
+  PetscCall(test_open(&c->t, bar, law, extra));
   PetscCall(SbSpaceCreateVec(c->t.model->space, &c->U));
   PetscCall(SbSpaceCreateVec(c->t.model->space, &c->b));
   PetscCall(SbSpaceCreateVec(c->t.model->space, &c->x));
@@ -127,8 +125,7 @@ static PetscErrorCode solve(Case *c, void (*state)(const PetscReal x[3], PetscRe
   PetscCall(VecNorm(r, NORM_2, &error));
   PetscCall(VecNorm(c->b, NORM_2, &norm));
   PetscCall(VecDestroy(&r));
-  SB_CHECK(reason < 0 || error < 1.01 * rtol * norm, "residual %g, allowed %g", (double)error,
-           (double)(rtol * norm));
+  SB_CHECK(reason < 0 || error < 1.01 * rtol * norm, "residual %g, allowed %g", error, rtol * norm);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -147,8 +144,8 @@ static PetscErrorCode check_turn(const char *law, PetscBool frames)
   for (turn_angle = 0.5; turn_angle < 3.2; turn_angle += 0.85) {
     PetscCall(solve(&c, turned, 1e-8, &its));
     SB_CHECK(its > 0 && its <= fresh + 1,
-             "%s: %" PetscInt_FMT " iterations turned by %g, %" PetscInt_FMT " before", law, its,
-             (double)turn_angle, fresh);
+             "%s: %" PetscInt_FMT " iterations turned by %g, %" PetscInt_FMT " before", law, its, turn_angle,
+             fresh);
   }
   PetscCall(KSPGetPC(c.ksp, &pc));
   PetscCall(SbPCRotatedGetStats(pc, &nfactor, NULL, NULL));
@@ -240,22 +237,20 @@ static PetscErrorCode check_work(PetscMPIInt size)
   work = interior + face;
   PetscCallMPI(MPI_Allreduce(&work, &all, 1, MPIU_INT64, MPI_SUM, PETSC_COMM_WORLD));
   PetscCallMPI(MPI_Allreduce(&work, &most, 1, MPIU_INT64, MPI_MAX, PETSC_COMM_WORLD));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "work on %d ranks: %.3f of that on one, busiest rank %.3f\n",
-                        (int)size, (double)all / (double)alone, (double)most / (double)alone));
+  test_print("work on %d ranks: %.3f of that on one, busiest rank %.3f\n", (int)size, all / (double)alone,
+             most / (double)alone);
   SB_CHECK((double)all <= 1.15 * (double)alone, "%d ranks read %g times what one reads", (int)size,
-           (double)all / (double)alone);
+           all / (double)alone);
   SB_CHECK((double)most <= 1.3 * (double)alone / size, "the busiest of %d ranks has %g of the work",
-           (int)size, (double)most / (double)alone);
+           (int)size, most / (double)alone);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int main(int argc, char **argv)
 {
   PetscInt its[2];
-  PetscMPIInt size;
 
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(check_turn(WARPED, PETSC_TRUE));
   PetscCall(check_turn(WARPED, PETSC_FALSE));
   PetscCall(check_turn(WARPED_P2, PETSC_TRUE));
@@ -267,12 +262,11 @@ int main(int argc, char **argv)
   PetscCall(check_bent(WARPED, held, PETSC_FALSE, 2., 13, &its[1]));
   SB_CHECK(PetscAbsInt(its[0] - its[1]) <= 1,
            "%" PetscInt_FMT " iterations without, %" PetscInt_FMT " with a matrix", its[0], its[1]);
-  PetscCall(
-    PetscPrintf(PETSC_COMM_WORLD, "bent bar on %d ranks: %" PetscInt_FMT " iterations\n", (int)size, its[0]));
+  test_print("bent bar on %d ranks: %" PetscInt_FMT " iterations\n", (int)test_size, its[0]);
   PetscCall(check_bent(WARPED, guided, PETSC_TRUE, 2., 13, &its[0]));
   PetscCall(check_bent("corotated", held, PETSC_FALSE, 2., 25, &its[0])); /* exact tangent, projected */
   PetscCall(check_bent("neohookean", held, PETSC_FALSE, 0.5, 15, &its[0]));
   PetscCall(check_indefinite());
-  PetscCall(check_work(size));
+  PetscCall(check_work(test_size));
   SB_TEST_END();
 }

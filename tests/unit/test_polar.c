@@ -3,57 +3,13 @@
   Polar rotations against an independent reference: singular values by one-sided Jacobi in long double,
   itself checked by the definition (R orthogonal, R^T F symmetric, every sum of two signed stretches >= 0).
 */
-#include "../test.h"
-#include <sbkernel.h>
-#include <string.h>
+#include "material_checks.h"
 
 typedef long double Long;
 static const PetscReal eps = 2.2204460492503131e-16;
 
 /* Error of the reference, and tolerance of the comparison; both larger where long double has no more digits than double. */
 static PetscReal fault = 5e-17, rounding = 8 * 2.2204460492503131e-16;
-
-static PetscRandom the_random;
-
-/* Uniform in [-1, 1). */
-static PetscReal uniform(void)
-{
-  PetscReal x = 0;
-
-  (void)PetscRandomGetValueReal(the_random, &x);
-  return 2 * x - 1;
-}
-
-/* Maximum of two numbers; unlike fmax() it keeps a NaN, so that no check passes on one. */
-static PetscReal larger(PetscReal a, PetscReal b)
-{
-  return b > a || isnan(b) ? b : a;
-}
-
-static void random_rotation(PetscReal angle_scale, PetscReal R[9])
-{
-  PetscReal q[4], n = 0;
-
-  for (int k = 0; k < 4; k++) q[k] = uniform() * (k ? angle_scale : 1);
-  for (int k = 0; k < 4; k++) n += q[k] * q[k];
-  const PetscReal s = 2 / n, w = q[0], x = q[1], y = q[2], z = q[3];
-  const PetscReal r[9] = {1 - s * (y * y + z * z), s * (x * y - z * w),     s * (x * z + y * w),
-                          s * (x * y + z * w),     1 - s * (x * x + z * z), s * (y * z - x * w),
-                          s * (x * z - y * w),     s * (y * z + x * w),     1 - s * (x * x + y * y)};
-  memcpy(R, r, sizeof(r));
-}
-
-/* F = A diag(s) B^T with random rotations. */
-static void with_stretches(PetscReal s0, PetscReal s1, PetscReal s2, PetscReal F[9])
-{
-  const PetscReal s[3] = {s0, s1, s2};
-  PetscReal A[9], B[9];
-
-  random_rotation(1, A);
-  random_rotation(1, B);
-  for (int k = 0; k < 9; k++) A[k] *= s[k % 3];
-  SbMatMulTranspose(A, B, F);
-}
 
 static void polar_one(const PetscReal F[9], PetscReal R[9])
 {
@@ -168,8 +124,9 @@ static PetscReal orthogonality(const PetscReal R[9])
 }
 
 /*
-  R is a rotation up to rounding, and within `rounding` |F| / (s2 + s3) of the reference: the rounding of F and of the
-  intermediate sums times the condition number. Where that exceeds 1e-3 only the maximum itself is compared.
+  R is a rotation up to rounding, and within `rounding` |F| / (s2 + s3) of the reference: the rounding of F
+  and of the intermediate sums times the condition number. Where that exceeds 1e-3 only the maximum itself is
+  compared.
 */
 static void check_against_reference(const PetscReal F[9], const char *what)
 {
@@ -193,22 +150,6 @@ static void check_against_reference(const PetscReal F[9], const char *what)
   }
   SB_CHECK(trace >= s[0] + s[1] + s[2] - 2 * rounding * norm, "%s: R : F is %g below its maximum", what,
            (PetscReal)(s[0] + s[1] + s[2] - trace));
-}
-
-static void test_rest(void)
-{
-  const PetscReal F[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-  PetscReal R[9];
-
-  polar_one(F, R);
-  SB_CHECK(!memcmp(F, R, sizeof(R)), "the rotation of F = I is not exactly I");
-  for (int t = 0; t < 2000; t++) {
-    const PetscReal size = pow(10, -1 - 14 * (t / 2000.));
-    PetscReal G[9];
-
-    for (int k = 0; k < 9; k++) G[k] = F[k] + size * uniform();
-    check_against_reference(G, "near rest");
-  }
 }
 
 /* Pure rotations, and rotated stretches 1.1, 1, 0.9, at angles through a full turn; exact half turns too. */
@@ -236,7 +177,7 @@ static void test_angles(void)
   }
 }
 
-static void test_random(void)
+static void test_uniform(void)
 {
   PetscReal F[9];
 
@@ -345,14 +286,26 @@ static void measure_long(void)
 
 int main(int argc, char **argv)
 {
+  const PetscReal F[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  PetscReal R[9];
+
   SB_TEST_BEGIN(argc, argv);
   PetscCall(PetscRandomCreate(PETSC_COMM_SELF, &the_random));
   PetscCall(PetscRandomSetSeed(the_random, 20240517));
   PetscCall(PetscRandomSeed(the_random));
   measure_long();
-  test_rest();
+  /* at rest, and near it */
+  polar_one(F, R);
+  SB_CHECK(!memcmp(F, R, sizeof(R)), "the rotation of F = I is not exactly I");
+  for (int t = 0; t < 2000; t++) {
+    const PetscReal size = pow(10, -1 - 14 * (t / 2000.));
+    PetscReal G[9];
+
+    for (int k = 0; k < 9; k++) G[k] = F[k] + size * uniform();
+    check_against_reference(G, "near rest");
+  }
   test_angles();
-  test_random();
+  test_uniform();
   test_singular();
   test_range();
   test_lanes();

@@ -79,7 +79,7 @@ static PetscErrorCode fill(const PetscReal size[3], PetscReal bits, PetscReal *v
   }
   for (int i = 0; i < 3 * NVERT; i++)
     SB_CHECK(PetscAbsReal(tets->x[i] - hull.x[i]) < 1e-3, "coordinate %d of the hull is %g, was %g", i,
-             (double)tets->x[i], (double)hull.x[i]);
+             tets->x[i], hull.x[i]);
   PetscCall(SbSurfaceDestroy(&hull));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -2,9 +2,9 @@
   test_scene.c - from options to a model; errors before anything is computed.
 */
 // @ranks 1 3
+#include "file.h"
 #include "test.h"
 #include "sbscene.h"
-#include <unistd.h>
 
 #define LAW " -body_liver_material corotated -body_liver_young 5e3 -body_liver_poisson 0.45"
 #define LIVER "-bodies liver -body_liver_mesh box:1,1,1:2" LAW
@@ -19,23 +19,25 @@ static const char two_bodies[] =
   "-effect_hold_on left,big_stone,liver.xmin -effect_press_type pressure -effect_press_on boundary,left,zmax "
   "-effect_press_value 100*t -effect_damp_type damping -effect_damp_on all -effect_damp_alpha 0.1";
 
-static PetscErrorCode begin(const char *options, PetscOptions *database)
+static PetscOptions database;
+
+static PetscErrorCode begin(const char *options)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscOptionsCreate(database));
-  PetscCall(PetscOptionsPush(*database));
+  PetscCall(PetscOptionsCreate(&database));
+  PetscCall(PetscOptionsPush(database));
   PetscCall(PetscOptionsInsertString(NULL, options));
   PetscCall(SbRegisterAll());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode end(PetscOptions *database, SbModel *model)
+static PetscErrorCode end(SbModel *model)
 {
   PetscFunctionBeginUser;
   PetscCall(SbModelDestroy(model));
   PetscCall(SbOptionsReset());
   PetscCall(PetscOptionsPop());
-  PetscCall(PetscOptionsDestroy(database));
+  PetscCall(PetscOptionsDestroy(&database));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -104,17 +106,14 @@ static PetscErrorCode test_model(const char *folder)
                              "  press: {type: pressure, on: [boundary, left, zmax], value: 100*t}\n"
                              "  damp: {type: damping, on: all, alpha: 0.1}\n";
   char view[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN];
-  PetscOptions database;
   PetscViewer viewer;
-  PetscMPIInt rank;
   SbModel model;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(PetscSNPrintf(view, sizeof(view), "%s/view.opts", folder));
   PetscCall(PetscSNPrintf(file, sizeof(file), "%s/scene.yml", folder));
 
-  PetscCall(begin(two_bodies, &database));
+  PetscCall(begin(two_bodies));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &model));
   check_two_bodies(model, "options");
   model->dynamic = PETSC_TRUE;
@@ -123,23 +122,16 @@ static PetscErrorCode test_model(const char *folder)
   PetscCall(SbViewerOpen(PETSC_COMM_WORLD, view, &viewer));
   PetscCall(SbOptionsView(viewer));
   PetscCall(PetscViewerDestroy(&viewer));
-  PetscCall(end(&database, &model));
+  PetscCall(end(&model));
 
-  if (!rank) {
-    FILE *f = fopen(file, "w");
-
-    PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s", file);
-    (void)fputs(yaml, f);
-    (void)fclose(f);
-  }
-  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  PetscCall(test_file_put(file, yaml));
   for (int i = 0; i < 2; i++) {
-    PetscCall(begin("", &database));
+    PetscCall(begin(""));
     PetscCall(PetscOptionsInsertFile(PETSC_COMM_WORLD, NULL, i ? file : view, PETSC_TRUE));
     PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &model));
     check_two_bodies(model, i ? "YAML" : "printed scenario");
     PetscCall(SbOptionsCheck());
-    PetscCall(end(&database, &model));
+    PetscCall(end(&model));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -156,13 +148,12 @@ static PetscErrorCode create_and_check(SbModel *model)
 /* Creation, or the check after it, must fail with a message that contains these names. */
 static PetscErrorCode refused(const char *options, const char *names)
 {
-  PetscOptions database;
   SbModel model = NULL;
 
   PetscFunctionBeginUser;
-  PetscCall(begin(options, &database));
+  PetscCall(begin(options));
   SB_CHECK_ERROR(create_and_check(&model), PETSC_ERR_USER, names);
-  PetscCall(end(&database, &model));
+  PetscCall(end(&model));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -190,34 +181,14 @@ static PetscErrorCode test_names(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode test_values(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(refused("-bodies liver", "-body_liver_mesh"));
-  PetscCall(refused("-bodies liver -body_liver_mesh box:1,1,1:2", "-body_liver_material"));
-  PetscCall(refused(LIVER " -body_liver_material corotate", "-body_liver_material corotate|corotated"));
-  PetscCall(refused(LIVER " -body_liver_element p7", "-body_liver_element p7|p1"));
-  PetscCall(refused(LIVER " -body_liver_scale 0", "-body_liver_scale 0|(0, inf)"));
-  PetscCall(refused(LIVER " -body_liver_rotate 0,0,0,10", "-body_liver_rotate|0,0,0"));
-  PetscCall(refused(LIVER " -body_liver_young -1", "-body_liver_young -1 Pa|(0, inf) Pa"));
-  PetscCall(refused(LIVER " -body_liver_poisson 0.5", "-body_liver_poisson 0.5|(-1, 0.5)"));
-  PetscCall(refused(LIVER " -body_liver_density 0", "-body_liver_density 0 kg/m^3|(0, inf) kg/m^3"));
-  PetscCall(refused(LIVER " -mass lump", "-mass lump|lumped"));
-  PetscCall(refused(LIVER " -body_stone_young 1", "-body_stone_young"));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode test_check(const char *folder)
 {
   char options[2 * PETSC_MAX_PATH_LEN], message[2 * PETSC_MAX_PATH_LEN];
-  PetscOptions database;
   SbModel model;
-  PetscMPIInt rank;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(PetscSNPrintf(options, sizeof(options), "%s/liver.msh", folder));
-  if (!rank) {
+  if (!test_rank) {
     FILE *f = fopen(options, "w");
 
     if (f) (void)fclose(f);
@@ -231,25 +202,11 @@ static PetscErrorCode test_check(const char *folder)
   PetscCall(refused("-bodies liver -body_liver_mesh nowhere.msh" LAW, "-body_liver_mesh nowhere.msh"));
   /* a static run of a body without supports */
   PetscCall(refused(LIVER " -effects gravity", "-time static"));
-  PetscCall(begin(LIVER " -effects hold -effect_hold_type fixed -effect_hold_on xmin", &database));
+  PetscCall(begin(LIVER " -effects hold -effect_hold_type fixed -effect_hold_on xmin"));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &model));
   PetscCall(SbSceneCheck(model));
   SB_CHECK(model->nset == 1 && model->set[0].shape == SB_SET_GROUP, "the set of the support");
-  PetscCall(end(&database, &model));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* 70 sets are more than one bit each; they must not be written beyond the array. */
-static PetscErrorCode test_many_sets(void)
-{
-  char options[4096] = LIVER " -effects hold -effect_hold_type fixed -effect_hold_on s0", name[8];
-
-  PetscFunctionBeginUser;
-  for (int i = 1; i < 70; i++) {
-    (void)snprintf(name, sizeof(name), ",s%d", i);
-    PetscCall(PetscStrlcat(options, name, sizeof(options)));
-  }
-  PetscCall(refused(options, "63 sets|0|-sets"));
+  PetscCall(end(&model));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -280,30 +237,33 @@ static PetscErrorCode test_command(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode run_tests(void)
-{
-  char folder[PETSC_MAX_PATH_LEN] = "/tmp/sb_test_scene_XXXXXX", command[PETSC_MAX_PATH_LEN + 16];
-  PetscMPIInt rank;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot make a folder");
-  PetscCallMPI(MPI_Bcast(folder, sizeof(folder), MPI_CHAR, 0, PETSC_COMM_WORLD));
-  PetscCall(test_model(folder));
-  PetscCall(test_names());
-  PetscCall(test_values());
-  PetscCall(test_check(folder));
-  PetscCall(test_many_sets());
-  PetscCall(test_command());
-  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  PetscCall(PetscSNPrintf(command, sizeof(command), "rm -rf %s", folder));
-  if (!rank) PetscCheck(!system(command), PETSC_COMM_SELF, PETSC_ERR_SYS, "cannot remove %s", folder);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 int main(int argc, char **argv)
 {
+  char folder[512];
+  char options[4096] = LIVER " -effects hold -effect_hold_type fixed -effect_hold_on s0", name[8];
+
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(run_tests());
+  PetscCall(test_file_folder(folder));
+  PetscCall(test_model(folder));
+  PetscCall(test_names());
+  PetscCall(refused("-bodies liver", "-body_liver_mesh"));
+  PetscCall(refused("-bodies liver -body_liver_mesh box:1,1,1:2", "-body_liver_material"));
+  PetscCall(refused(LIVER " -body_liver_material corotate", "-body_liver_material corotate|corotated"));
+  PetscCall(refused(LIVER " -body_liver_element p7", "-body_liver_element p7|p1"));
+  PetscCall(refused(LIVER " -body_liver_scale 0", "-body_liver_scale 0|(0, inf)"));
+  PetscCall(refused(LIVER " -body_liver_rotate 0,0,0,10", "-body_liver_rotate|0,0,0"));
+  PetscCall(refused(LIVER " -body_liver_young -1", "-body_liver_young -1 Pa|(0, inf) Pa"));
+  PetscCall(refused(LIVER " -body_liver_poisson 0.5", "-body_liver_poisson 0.5|(-1, 0.5)"));
+  PetscCall(refused(LIVER " -body_liver_density 0", "-body_liver_density 0 kg/m^3|(0, inf) kg/m^3"));
+  PetscCall(refused(LIVER " -mass lump", "-mass lump|lumped"));
+  PetscCall(refused(LIVER " -body_stone_young 1", "-body_stone_young"));
+  PetscCall(test_check(folder));
+  /* 70 sets are more than one bit each; they must not be written beyond the array. */
+  for (int i = 1; i < 70; i++) {
+    (void)snprintf(name, sizeof(name), ",s%d", i);
+    PetscCall(PetscStrlcat(options, name, sizeof(options)));
+  }
+  PetscCall(refused(options, "63 sets|0|-sets"));
+  PetscCall(test_command());
   SB_TEST_END();
 }

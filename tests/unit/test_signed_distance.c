@@ -1,6 +1,6 @@
 /*
-  Obstacles from meshes: distance, normal and side of a cube against the box: obstacle, of a fine sphere against the exact ones, of non-convex
-  shapes against all triangles and the winding number; the note; errors.
+  Obstacles from meshes: distance, normal and side of a cube against the box: obstacle, of a fine sphere
+  against the exact ones, of non-convex shapes against all triangles and the winding number; the note; errors.
 */
 // @ranks 1 3
 #include "mesh_test.h"
@@ -9,13 +9,6 @@
 #include <sbkernel.h>
 
 static const PetscReal zero[3] = {0, 0, 0};
-
-/* Reproducible numbers in -1..1. */
-static PetscReal number(unsigned *state)
-{
-  *state = *state * 1664525u + 1013904223u;
-  return (PetscReal)(*state >> 8) / (1 << 23) - 1;
-}
 
 /* Creates the obstacle mesh:FILE of a surface. */
 static PetscErrorCode make(const TestSurface *s, SbObstacle *o, size_t size, char note[])
@@ -27,7 +20,6 @@ static PetscErrorCode make(const TestSurface *s, SbObstacle *o, size_t size, cha
   PetscCall(PetscSNPrintf(text, sizeof(text), "mesh:%s", path));
   PetscCall(SbObstacleCreate("-o", text, o));
   PetscCall(SbObstacleSetUp(*o, PETSC_COMM_WORLD, "-o", 1, zero, size, note));
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -37,7 +29,7 @@ static PetscErrorCode make(const TestSurface *s, SbObstacle *o, size_t size, cha
 static PetscErrorCode check_cube(void)
 {
   const PetscReal lo[3] = {-0.5, -0.4, -0.3}, hi[3] = {0.6, 0.5, 0.7};
-  TestSurface s;
+  TestSurface s = {0};
   SbObstacle o, box;
   PetscInt inside = 0;
   PetscReal off = 0, turned = 0;
@@ -45,14 +37,13 @@ static PetscErrorCode check_cube(void)
   char note[256] = "";
 
   PetscFunctionBeginUser;
-  memset(&s, 0, sizeof(s));
   test_surface_box(lo, hi, PETSC_FALSE, &s);
   PetscCall(make(&s, &o, sizeof(note), note));
   PetscCall(SbObstacleCreate("-o", "box:-0.5,-0.4,-0.3,0.6,0.5,0.7", &box));
   for (int i = 0; i < 20000; i++) {
     PetscReal x[3], n[3], m[3], d, exact;
 
-    for (int k = 0; k < 3; k++) x[k] = 1.5 * number(&state);
+    for (int k = 0; k < 3; k++) x[k] = 1.5 * test_random(&state);
     d = SbObstacleDistance(o, x, n);
     exact = SbObstacleDistance(box, x, m);
     inside += exact < 0;
@@ -60,8 +51,8 @@ static PetscErrorCode check_cube(void)
     if (PetscAbsReal(exact) > 1e-3) turned = PetscMax(turned, 1 - SbDot3(n, m));
   }
   SB_CHECK(inside > 200, "%d inside", (int)inside);
-  SB_CHECK(off < 1e-14, "distances from the cube are off by %g", (double)off);
-  SB_CHECK(turned < 1e-12, "normals of the cube are turned: 1 - cos = %g", (double)turned);
+  SB_CHECK(off < 1e-14, "distances from the cube are off by %g", off);
+  SB_CHECK(turned < 1e-12, "normals of the cube are turned: 1 - cos = %g", turned);
   SB_CHECK(strstr(note, "12 triangles around 0.99 m^3"), "note: %s", note);
   PetscCall(SbObstacleDestroy(&o));
   PetscCall(SbObstacleDestroy(&box));
@@ -74,12 +65,11 @@ static PetscErrorCode check_on(void)
 {
   static const PetscReal at[4][3] = {{1, 1, 1}, {1, 1, 0.3}, {1, 0.2, 0.3}, {1 - 1e-13, 0.2, 0.3}};
   const PetscReal unit[3] = {1, 1, 1};
-  TestSurface s;
+  TestSurface s = {0};
   SbObstacle o;
   char note[256];
 
   PetscFunctionBeginUser;
-  memset(&s, 0, sizeof(s));
   test_surface_box(zero, unit, PETSC_FALSE, &s);
   PetscCall(make(&s, &o, sizeof(note), note));
   for (int i = 0; i < 4; i++) {
@@ -160,7 +150,7 @@ static PetscErrorCode check_surface(const TestSurface *s, PetscReal box, const c
   for (int i = 0; i < 1500; i++) {
     PetscReal x[3], n[3], y[3], m[3], d, exact = PETSC_MAX_REAL, around = 0;
 
-    for (int k = 0; k < 3; k++) x[k] = box * number(&state);
+    for (int k = 0; k < 3; k++) x[k] = box * test_random(&state);
     d = SbObstacleDistance(o, x, n);
     for (PetscInt f = 0; f < s->ntri; f++) {
       exact = PetscMin(exact, from_triangle(s, f, x));
@@ -173,22 +163,9 @@ static PetscErrorCode check_surface(const TestSurface *s, PetscReal box, const c
     foot = PetscMax(foot, PetscAbsReal(SbObstacleDistance(o, y, m)));
   }
   SB_CHECK(inside > 50 && !wrong, "%s: %d inside, %d on the wrong side", what, (int)inside, (int)wrong);
-  SB_CHECK(off < 1e-13, "%s: distances are off by %g", what, (double)off);
-  SB_CHECK(foot < 1e-13, "%s: the nearest point is off the surface by %g", what, (double)foot);
+  SB_CHECK(off < 1e-13, "%s: distances are off by %g", what, off);
+  SB_CHECK(foot < 1e-13, "%s: the nearest point is off the surface by %g", what, foot);
   PetscCall(SbObstacleDestroy(&o));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode check_torus(void)
-{
-  const PetscInt n[2] = {24, 12};
-  TestSurface s;
-
-  PetscFunctionBeginUser;
-  memset(&s, 0, sizeof(s));
-  test_surface_torus(1, 0.4, n, &s);
-  PetscCall(check_surface(&s, 1.5, "torus"));
-  test_surface_free(&s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -198,10 +175,9 @@ static PetscErrorCode check_parts(void)
   const PetscReal a[3] = {-0.5, -0.5, -0.5}, b[3] = {0.5, 0.5, 0.5}, c[3] = {-0.3, -0.3, -0.3},
                   d[3] = {0.4, 0.4, 0.4};
   const PetscReal p[3] = {-0.8, -0.8, 0.7}, q[3] = {0.8, 0.8, 0.72};
-  TestSurface s;
+  TestSurface s = {0};
 
   PetscFunctionBeginUser;
-  memset(&s, 0, sizeof(s));
   test_surface_box(a, b, PETSC_FALSE, &s);
   test_surface_box(c, d, PETSC_TRUE, &s);
   test_surface_box(p, q, PETSC_FALSE, &s);
@@ -226,7 +202,7 @@ static PetscReal longest_edge(const TestSurface *s)
 /* A triangle in the unit sphere with edges up to h is at most h^2 / 6 away from it, and its normal deviates by less than h. */
 static PetscErrorCode check_sphere(int split)
 {
-  TestSurface s;
+  TestSurface s = {0};
   SbObstacle o;
   PetscReal off = 0, turned = 0, h;
   PetscInt near = 0, inside = 0;
@@ -234,14 +210,13 @@ static PetscErrorCode check_sphere(int split)
   char note[256];
 
   PetscFunctionBeginUser;
-  memset(&s, 0, sizeof(s));
   test_surface_sphere(split, &s);
   h = longest_edge(&s);
   PetscCall(make(&s, &o, sizeof(note), note));
   for (int i = 0; i < 20000; i++) {
     PetscReal x[3], n[3], d, r;
 
-    for (int k = 0; k < 3; k++) x[k] = 1.2 * number(&state);
+    for (int k = 0; k < 3; k++) x[k] = 1.2 * test_random(&state);
     r = PetscSqrtReal(SbDot3(x, x));
     if (PetscAbsReal(r - 1) > 0.7 * h) continue;
     d = SbObstacleDistance(o, x, n);
@@ -251,8 +226,8 @@ static PetscErrorCode check_sphere(int split)
     turned = PetscMax(turned, PetscSqrtReal(PetscMax(0, 2 - 2 * SbDot3(n, x) / r)));
   }
   SB_CHECK(near > 500 && inside > 200, "%d near the sphere", (int)near);
-  SB_CHECK(off < h * h / 6 * (1 + h), "sphere of edges %g: distances are off by %g", (double)h, (double)off);
-  SB_CHECK(turned < h, "sphere of edges %g: normals are off by %g", (double)h, (double)turned);
+  SB_CHECK(off < h * h / 6 * (1 + h), "sphere of edges %g: distances are off by %g", h, off);
+  SB_CHECK(turned < h, "sphere of edges %g: normals are off by %g", h, turned);
   PetscCall(SbObstacleDestroy(&o));
   test_surface_free(&s);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -260,25 +235,10 @@ static PetscErrorCode check_sphere(int split)
 
 /* ------------------------------------------------------------------ errors, cost */
 
-static PetscErrorCode check_errors(void)
-{
-  SbObstacle o = NULL;
-  char note[256];
-
-  PetscFunctionBeginUser;
-  SB_CHECK_ERROR(SbObstacleCreate("-o", "mesh:", &o), PETSC_ERR_USER_INPUT, "mesh:FILE");
-  PetscCall(SbObstacleDestroy(&o));
-  PetscCall(SbObstacleCreate("-o", "mesh:no,such.stl", &o));
-  SB_CHECK_ERROR(SbObstacleSetUp(o, PETSC_COMM_WORLD, "-o", 1, zero, sizeof(note), note), PETSC_ERR_FILE_OPEN,
-                 "-o|no,such.stl");
-  PetscCall(SbObstacleDestroy(&o));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Time of building the tree and of a query, for information: nothing is checked. */
 static PetscErrorCode measure(void)
 {
-  TestSurface s;
+  TestSurface s = {0};
   SbObstacle o;
   PetscLogDouble t0, t1, t2;
   PetscReal sum = 0;
@@ -286,7 +246,6 @@ static PetscErrorCode measure(void)
   char note[256];
 
   PetscFunctionBeginUser;
-  memset(&s, 0, sizeof(s));
   test_surface_sphere(5, &s);
   PetscCall(PetscTime(&t0));
   PetscCall(make(&s, &o, sizeof(note), note));
@@ -294,14 +253,14 @@ static PetscErrorCode measure(void)
   for (int i = 0; i < 200000; i++) {
     PetscReal x[3], n[3], r;
 
-    for (int k = 0; k < 3; k++) x[k] = number(&state);
-    r = PetscSqrtReal(SbDot3(x, x)) / (1 + 0.05 * number(&state));
+    for (int k = 0; k < 3; k++) x[k] = test_random(&state);
+    r = PetscSqrtReal(SbDot3(x, x)) / (1 + 0.05 * test_random(&state));
     for (int k = 0; k < 3; k++) x[k] /= r;
     sum += SbObstacleDistance(o, x, n);
   }
   PetscCall(PetscTime(&t2));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s: made in %.3f s, %.2f us per distance (mean %.3f)\n", note,
-                        t1 - t0, (t2 - t1) / 200000 * 1e6, (double)sum / 200000));
+  test_print("  %s: made in %.3f s, %.2f us per distance (mean %.3f)\n", note, t1 - t0,
+             (t2 - t1) / 200000 * 1e6, sum / 200000);
   PetscCall(SbObstacleDestroy(&o));
   test_surface_free(&s);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -309,14 +268,26 @@ static PetscErrorCode measure(void)
 
 int main(int argc, char **argv)
 {
+  const PetscInt n[2] = {24, 12};
+  TestSurface s = {0};
+  SbObstacle o = NULL;
+  char note[256];
+
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_cube());
   PetscCall(check_on());
-  PetscCall(check_torus());
+  test_surface_torus(1, 0.4, n, &s);
+  PetscCall(check_surface(&s, 1.5, "torus"));
+  test_surface_free(&s);
   PetscCall(check_parts());
   PetscCall(check_sphere(3));
   PetscCall(check_sphere(4));
-  PetscCall(check_errors());
+  SB_CHECK_ERROR(SbObstacleCreate("-o", "mesh:", &o), PETSC_ERR_USER_INPUT, "mesh:FILE");
+  PetscCall(SbObstacleDestroy(&o));
+  PetscCall(SbObstacleCreate("-o", "mesh:no,such.stl", &o));
+  SB_CHECK_ERROR(SbObstacleSetUp(o, PETSC_COMM_WORLD, "-o", 1, zero, sizeof(note), note), PETSC_ERR_FILE_OPEN,
+                 "-o|no,such.stl");
+  PetscCall(SbObstacleDestroy(&o));
   PetscCall(measure());
   SB_TEST_END();
 }

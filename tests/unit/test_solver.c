@@ -13,12 +13,10 @@ static PetscErrorCode tip(const char *options, PetscReal *z, char stop[512], Pet
 {
   const PetscReal at[3] = {0.3, 0.1, 0.1};
   PetscReal value[3];
-  char text[1024];
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), BAR "%s", options));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t, BAR "%s", options));
   SB_CHECK(t.run->solver_reason[0], "no reason for the solver %s", t.run->solver);
   PetscCall(SbRunSolve(t.run));
   PetscCall(test_value_at(t.model, t.run->U, at, value));
@@ -95,7 +93,7 @@ static PetscErrorCode check_indefinite(const char *package, KSPType type)
       SB_CHECK(reason == KSP_DIVERGED_PC_FAILED, "%s, indefinite: %s", package, KSPConvergedReasons[reason]);
     else
       SB_CHECK(reason > 0 && residual < 1e-10, "%s, matrix %d: %s, residual %g", package, k,
-               KSPConvergedReasons[reason], (double)residual);
+               KSPConvergedReasons[reason], residual);
   }
   PetscCall(KSPDestroy(&ksp));
   PetscCall(MatDestroy(&A));
@@ -106,15 +104,13 @@ static PetscErrorCode check_indefinite(const char *package, KSPType type)
 /* A rotated factorisation serves up to near nu = 1/2; close to it DG took hundreds of times the iterations of other solvers. */
 static PetscErrorCode check_choice(const char *element, const char *nu, PetscBool turns)
 {
-  char text[512];
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh box:0.3,0.1,0.1:1 -body_a_young 1e6 -body_a_poisson %s "
-                          "-body_a_element %s -body_a_material corotated -ts_dt 0.02 -solver auto",
-                          nu, element));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh box:0.3,0.1,0.1:1 -body_a_young 1e6 -body_a_poisson %s "
+                      "-body_a_element %s -body_a_material corotated -ts_dt 0.02 -solver auto",
+                      nu, element));
   SB_CHECK((PetscBool)!strcmp(t.run->solver, "rotated") == turns, "%s, nu %s: auto took %s", element, nu,
            t.run->solver);
   PetscCall(test_scene_close(&t));
@@ -124,16 +120,14 @@ static PetscErrorCode check_choice(const char *element, const char *nu, PetscBoo
 /* If ranks share more nodes than a rotated factorisation supports, another solver is used. */
 static PetscErrorCode check_meeting(const char *solver, const char *most, PetscBool turns)
 {
-  char text[512];
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_young 1e6 -body_a_poisson 0.3 "
-                          "-body_a_material corotated -body_a_tangent warped -effects gravity -ts_dt 0.02 "
-                          "-ts_max_time 0.02 -solver %s -pc_rotated_interface %s",
-                          solver, most));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_young 1e6 -body_a_poisson 0.3 "
+                      "-body_a_material corotated -body_a_tangent warped -effects gravity -ts_dt 0.02 "
+                      "-ts_max_time 0.02 -solver %s -pc_rotated_interface %s",
+                      solver, most));
   SB_CHECK((PetscBool)!strcmp(t.run->solver, strcmp(solver, "auto") ? solver : "rotated") == turns,
            "%s, at most %s nodes: %s was taken, %s", solver, most, t.run->solver, t.run->solver_reason);
   SB_CHECK(turns || !strcmp(t.run->solver, "cg_two_level"), "with many ranks %s was taken", t.run->solver);
@@ -147,25 +141,22 @@ static PetscErrorCode check_meeting(const char *solver, const char *most, PetscB
 static PetscErrorCode swing(const char *element, const char *options, PetscReal x[3])
 {
   const PetscReal at[3] = {0.4, 0.1, 0.1};
-  char text[1024];
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:2 -body_bar_material corotated "
-                          "-body_bar_tangent warped -body_bar_young 2e4 "
-                          "-body_bar_poisson 0.4 -body_bar_density 1000 -body_bar_element %s -effects "
-                          "gravity,clamp -effect_clamp_type fixed "
-                          "-effect_clamp_on xmin -time newmark -ts_dt 0.04 -ts_max_time 0.24 -snes_rtol "
-                          "1e-11 -snes_max_it 200 -time_max_halvings 0 %s",
-                          element, options));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(
+    test_open(&t,
+              "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:2 -body_bar_material corotated -body_bar_tangent "
+              "warped -body_bar_young 2e4 -body_bar_poisson 0.4 -body_bar_density 1000 -body_bar_element %s "
+              "-effects gravity,clamp -effect_clamp_type fixed -effect_clamp_on xmin -time newmark -ts_dt "
+              "0.04 -ts_max_time 0.24 -snes_rtol 1e-11 -snes_max_it 200 -time_max_halvings 0 %s",
+              element, options));
   PetscCall(SbRunSolve(t.run));
   SB_CHECK(!t.run->stop_reason[0], "%s, %s: %s", element, options, t.run->stop_reason);
   PetscCall(test_value_at(t.model, t.run->U, at, x));
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD, "swing, %s, %s: %.9f, %" PetscInt_FMT " Newton, %" PetscInt_FMT " linear iterations\n",
-    element, options, (double)x[2], t.run->newton_total, t.run->linear_total));
+    element, options, x[2], t.run->newton_total, t.run->linear_total));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -178,7 +169,7 @@ static PetscErrorCode check_realtime(const char *element)
   PetscFunctionBeginUser;
   PetscCall(swing(element, "-solver direct", exact));
   PetscCall(swing(element, "-solver realtime", x));
-  SB_CHECK(exact[2] < -0.1, "%s: the bar fell by %g only", element, (double)exact[2]);
+  SB_CHECK(exact[2] < -0.1, "%s: the bar fell by %g only", element, exact[2]);
   for (int c = 0; c < 3; c += 2) SB_CHECK_NEAR(x[c], exact[c], 1e-7 * PetscAbsReal(exact[2]), element);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -186,16 +177,15 @@ static PetscErrorCode check_realtime(const char *element)
 /* The factor does not contain the face terms of these elements. */
 static PetscErrorCode check_faces(const char *element)
 {
-  char text[512];
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies bar -body_bar_mesh box:1,1,1:1 -body_bar_material linear -body_bar_young "
-                          "1e3 -body_bar_poisson 0.3 -body_bar_density 1 -body_bar_element %s "
-                          "-ts_dt 0.1 -solver realtime",
-                          element));
-  SB_CHECK_ERROR(test_scene_open(text, &t), PETSC_ERR_USER, "-solver realtime");
+  SB_CHECK_ERROR(test_open(&t,
+                           "-bodies bar -body_bar_mesh box:1,1,1:1 -body_bar_material linear -body_bar_young "
+                           "1e3 -body_bar_poisson 0.3 -body_bar_density 1 -body_bar_element %s "
+                           "-ts_dt 0.1 -solver realtime",
+                           element),
+                 PETSC_ERR_USER, "-solver realtime");
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -209,12 +199,10 @@ int main(int argc, char **argv)
   PetscReal z, exact;
   PetscInt iterations;
   char stop[512], text[128];
-  PetscMPIInt size;
 
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(tip("-solver cg_pbjacobi", &exact, stop, &iterations));
-  SB_CHECK(exact < -1e-3 && !stop[0], "cg_pbjacobi: tip at %g, %s", (double)exact, stop);
+  SB_CHECK(exact < -1e-3 && !stop[0], "cg_pbjacobi: tip at %g, %s", exact, stop);
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(solvers); k++) {
     static const char *const packages[] = {"cholmod", "umfpack", "mumps", "hypre"};
     PetscBool has = PETSC_TRUE;
@@ -228,7 +216,7 @@ int main(int argc, char **argv)
     SB_CHECK(!stop[0], "%s: %s", solvers[k], stop);
     /* residual 1e-10; the condition number of this bar is about 1e4 */
     SB_CHECK_NEAR(z, exact, 1e-6 * PetscAbsReal(exact), solvers[k]);
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "%-14s %" PetscInt_FMT " iterations\n", solvers[k], iterations));
+    test_print("%-14s %" PetscInt_FMT " iterations\n", solvers[k], iterations);
   }
   PetscCall(tip("-solver cg_jacobi -ksp_type cg -ksp_max_it 3 -time_max_halvings 2", &z, stop, &iterations));
   SB_CHECK(stop[0], "three iterations passed as a solution");
@@ -243,7 +231,7 @@ int main(int argc, char **argv)
     static const char *const turning[] = {"auto", "rotated", "realtime"};
 
     PetscCall(check_meeting(turning[k], "1500", PETSC_TRUE));
-    PetscCall(check_meeting(turning[k], "3", (PetscBool)(size == 1)));
+    PetscCall(check_meeting(turning[k], "3", (PetscBool)(test_size == 1)));
   }
   PetscCall(check_realtime("p1"));
   PetscCall(check_realtime("p2"));

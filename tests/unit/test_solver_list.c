@@ -1,7 +1,8 @@
 // @ranks 1 2
 /*
-  If a solver fails, the next one of the list solves the same system: no step is rejected, the solution agrees with a factorisation, and the run continues
-  with it. A method chosen by the user is not replaced, nor is any if a body is free.
+  If a solver fails, the next one of the list solves the same system: no step is rejected, the solution agrees
+  with a factorisation, and the run continues with it. A method chosen by the user is not replaced, nor is any
+  if a body is free.
 */
 #include <sbsolver.h>
 #include "../slivers.h"
@@ -20,12 +21,10 @@ typedef struct {
 static PetscErrorCode run(const char *options, const char *more, Outcome *o)
 {
   const PetscReal at[3] = {0.3, 0.1, 0.1};
-  char text[2048];
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), "%s %s", options, more));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t, "%s %s", options, more));
   PetscCall(SbRunSolve(t.run));
   PetscCall(test_value_at(t.model, t.run->U, at, o->tip));
   o->newton = t.run->newton_total;
@@ -80,7 +79,6 @@ static PetscErrorCode check_slivers(void)
   SB_CHECK(t.model->body[0].nsliver >= made && made > 0, "%" PetscInt_FMT " slivers found of %" PetscInt_FMT,
            t.model->body[0].nsliver, made);
   PetscCall(test_scene_close(&t));
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -102,22 +100,19 @@ static PetscErrorCode check_rounding(void)
   PetscCall(run(text, "-time_max_halvings 0", &o));
   SB_CHECK(!o.stop[0] && !o.rejected && o.newton < 40,
            "%s, %" PetscInt_FMT " steps cut, %" PetscInt_FMT " iterations", o.stop, o.rejected, o.newton);
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Returns the solver that is chosen for a clamped bar with slivers, without solving. */
 static PetscErrorCode choose(const char *path, const char *solver, const char *body, char name[SB_NAME_MAX])
 {
-  char text[1024];
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          BAR "-body_a_mesh %s -effect_clamp_on held -sets held -set_held_at plane:1,0,0,0 "
-                              "-time static -body_a_material linear %s -solver %s",
-                          path, body, solver));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      BAR "-body_a_mesh %s -effect_clamp_on held -sets held -set_held_at plane:1,0,0,0 "
+                          "-time static -body_a_material linear %s -solver %s",
+                      path, body, solver));
   PetscCall(PetscStrncpy(name, t.run->solver, SB_NAME_MAX));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -137,12 +132,11 @@ static PetscErrorCode check_choice(void)
     PetscCall(slivers_write(&s, path, &made));
     PetscCall(choose(path, "auto", "-body_a_poisson 0.4999 -body_a_element cr", chosen));
     PetscCall(choose(path, "direct", "-body_a_poisson 0.4999 -body_a_element cr", direct));
-    SB_CHECK(!strcmp(chosen, k ? direct : "pressure"), "%g of the tets are slivers: auto took %s",
-             (double)part[k], chosen);
+    SB_CHECK(!strcmp(chosen, k ? direct : "pressure"), "%g of the tets are slivers: auto took %s", part[k],
+             chosen);
     PetscCall(choose(path, "auto", "-body_a_poisson 0.3 -body_a_element dg", chosen));
     SB_CHECK(!strcmp(chosen, k ? "cg_two_level" : "pressure"),
-             "%g of the tets are slivers, DG, nu 0.3: auto took %s", (double)part[k], chosen);
-    PetscCall(test_file_remove(path));
+             "%g of the tets are slivers, DG, nu 0.3: auto took %s", part[k], chosen);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -152,12 +146,11 @@ static PetscErrorCode check_tangent(const char *tangent, PetscBool definite)
 {
   const SbSolverPreset *preset;
   const char *package;
-  char text[1024], reason[512];
+  char reason[512];
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), STATIC "-body_a_tangent %s -solver direct", tangent));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t, STATIC "-body_a_tangent %s -solver direct", tangent));
   PetscCall(SbDirectPackage(t.model->comm, 3 * t.model->space->Nnode, definite, &package));
   SB_CHECK(!strcmp(t.run->solver, package), "%s: %s, not %s", tangent, t.run->solver, package);
   PetscCall(SbRunSolve(t.run));

@@ -1,7 +1,8 @@
 // @ranks 1 2 3 4
 /*
-  Residual, tangent and matrices of a space, for every element and material: the three storage formats agree, the tangent is symmetric and
-  the derivative of the residual, which is that of the energy; forces balance, mass is complete.
+  Residual, tangent and matrices of a space, for every element and material: the three storage formats agree,
+  the tangent is symmetric and the derivative of the residual, which is that of the energy; forces balance,
+  mass is complete.
 */
 #include "../scene.h"
 
@@ -74,8 +75,7 @@ static PetscErrorCode taylor(TestScene *t, int exact, Vec U, Vec V, Vec W)
   }
   if (exact)
     SB_CHECK(error[0] < 1e-11 * scale || error[0] / error[1] > 3.7,
-             "Taylor remainder falls from %g to %g (scale %g)", (double)error[0], (double)error[1],
-             (double)scale);
+             "Taylor remainder falls from %g to %g (scale %g)", error[0], error[1], scale);
   PetscCall(MatDestroy(&J));
   PetscCall(VecDestroy(&F0));
   PetscCall(VecDestroy(&F1));
@@ -103,7 +103,7 @@ static PetscErrorCode energy_slope(TestScene *t, const char *what, Vec U, Vec W)
   }
   PetscCall(SbModelResidual(t->model, 0., U, NULL, NULL, PETSC_FALSE, F));
   PetscCall(VecDot(W, F, &power));
-  SB_CHECK(e[0].strain > 0. && power != 0., "%s: strain energy %g J", what, (double)e[0].strain);
+  SB_CHECK(e[0].strain > 0. && power != 0., "%s: strain energy %g J", what, e[0].strain);
   SB_CHECK_NEAR((e[0].strain - e[1].strain) / (2. * h), power,
                 1e-6 * PetscAbsReal(power) + 1e-13 * e[0].strain / h, what);
   PetscCall(VecDestroy(&X));
@@ -147,8 +147,7 @@ static PetscErrorCode balance(TestScene *t, const char *what, Vec U, Vec F)
     PetscCall(VecStrideNorm(F, c, NORM_1, &norm));
     PetscCall(VecStrideSum(F, c, &total));
     SB_CHECK(PetscAbsReal(total) < 1e-12 * norm,
-             "%s: internal forces along %" PetscInt_FMT " sum to %g of %g", what, c, (double)total,
-             (double)norm);
+             "%s: internal forces along %" PetscInt_FMT " sum to %g of %g", what, c, total, norm);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -184,12 +183,9 @@ static PetscErrorCode one_scene(const char *law, const char *mass, const char *e
   char text[2048];
   Vec U, V, W, Y[3];
   PetscReal norm, diff;
-  PetscMPIInt size;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  PetscCall(PetscSNPrintf(text, sizeof(text), scene_text, law, law, mass, extra));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t, scene_text, law, law, mass, extra));
   PetscCall(SbSpaceCreateVec(t.model->space, &U));
   PetscCall(SbSpaceCreateVec(t.model->space, &V));
   PetscCall(SbSpaceCreateVec(t.model->space, &W));
@@ -201,16 +197,15 @@ static PetscErrorCode one_scene(const char *law, const char *mass, const char *e
   PetscCall(storage(&t, SB_MATRIX_AIJ, U, V, W, Y[1]));
   PetscCall(VecNorm(Y[0], NORM_2, &norm));
   /* partition-independent vectors: the norm is the same on any number of ranks */
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "%s %s %s: |J w| = %.12g\n", law, mass, extra, (double)norm));
+  test_print("%s %s %s: |J w| = %.12g\n", law, mass, extra, norm);
   PetscCall(VecAXPY(Y[1], -1., Y[0]));
   PetscCall(VecNorm(Y[1], NORM_2, &diff));
-  SB_CHECK(norm > 0. && diff < 1e-13 * norm, "%s: AIJ and BAIJ differ by %g of %g", law, (double)diff,
-           (double)norm);
-  if (size == 1) {
+  SB_CHECK(norm > 0. && diff < 1e-13 * norm, "%s: AIJ and BAIJ differ by %g of %g", law, diff, norm);
+  if (test_size == 1) {
     PetscCall(storage(&t, SB_MATRIX_SBAIJ, U, V, W, Y[2]));
     PetscCall(VecAXPY(Y[2], -1., Y[0]));
     PetscCall(VecNorm(Y[2], NORM_2, &diff));
-    SB_CHECK(diff < 1e-13 * norm, "%s: SBAIJ and BAIJ differ by %g of %g", law, (double)diff, (double)norm);
+    SB_CHECK(diff < 1e-13 * norm, "%s: SBAIJ and BAIJ differ by %g of %g", law, diff, norm);
   }
   PetscCall(taylor(&t, exact, U, V, W));
   /* at zero velocity the tangent of damping is complete too: it omits only the dependence of damping on the displacement */

@@ -25,16 +25,14 @@ static PetscErrorCode check_oscillator(const char *law, PetscReal stiffer, Petsc
                   zeta = 0.5 * (alpha / w + beta * w);
   TestScene t;
   PetscReal dt;
-  char text[1024];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
+  PetscCall(test_open(
+    &t,
     "-bodies a -body_a_mesh tests/data/one_tet.msh -body_a_material %s -body_a_young %g -body_a_poisson %g "
     "-body_a_density %g -sets base -set_base_at plane:0,0,1,0 -effects hold,damping -effect_hold_type fixed "
     "-effect_hold_on base -effect_damping_alpha %g -effect_damping_beta %g -time euler_symplectic %s",
-    law, (double)E, (double)nu, (double)rho, (double)alpha, (double)beta, more));
-  PetscCall(test_scene_open(text, &t));
+    law, E, nu, rho, alpha, beta, more));
   PetscCall(SbSpaceStableStep(t.model->space, &dt));
   SB_CHECK_NEAR(dt, 2. * (PetscSqrtReal(1. + zeta * zeta) - zeta) / w, 1e-12 * dt,
                 "stable step of the oscillator");
@@ -58,11 +56,7 @@ static PetscErrorCode energy_ratio(const char *body, PetscReal factor, PetscReal
   PetscCall(test_scene_open(text, &t));
   PetscCall(SbSpaceStableStep(t.model->space, &dt));
   PetscCall(test_scene_close(&t));
-  PetscCall(PetscOptionsClear(NULL));
-  PetscCall(PetscSNPrintf(text + strlen(text), sizeof(text) - strlen(text),
-                          " -ts_dt %.17g -ts_max_time %.17g", (double)(factor * dt),
-                          (double)(400.001 * factor * dt)));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t, "%s -ts_dt %.17g -ts_max_time %.17g", text, factor * dt, 400.001 * factor * dt));
   PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &before));
   PetscCall(SbRunSolve(t.run));
   PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &after));
@@ -79,8 +73,8 @@ static PetscErrorCode check_body(const char *body)
   /* the estimate by the power method may exceed the exact value by a few percent, and is never below it */
   PetscCall(energy_ratio(body, 0.95, &below));
   PetscCall(energy_ratio(body, 1.05, &above));
-  SB_CHECK(below < 30., "%s: 0.95 of the stable step multiplies the energy by %g", body, (double)below);
-  SB_CHECK(!(above < 1e6), "%s: 1.05 of it by %g only", body, (double)above);
+  SB_CHECK(below < 30., "%s: 0.95 of the stable step multiplies the energy by %g", body, below);
+  SB_CHECK(!(above < 1e6), "%s: 1.05 of it by %g only", body, above);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

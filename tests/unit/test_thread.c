@@ -1,6 +1,6 @@
 /*
-  test_thread.c - a factorisation creates no threads: the threads of the process are counted before and after it, and no library reports that it
-  would use more than one.
+  test_thread.c - a factorisation creates no threads: the threads of the process are counted before and after
+  it, and no library reports that it would use more than one.
 */
 #include <sbbase.h>
 #include <stdio.h>
@@ -74,7 +74,7 @@ int main(int argc, char *argv[])
   before = count_threads();
   if (cholmod && before > 0) {
     PetscCall(factor_and_solve(&residual));
-    SB_CHECK(residual < 1e-10, "residual %g", (double)residual);
+    SB_CHECK(residual < 1e-10, "residual %g", residual);
     SB_CHECK(count_threads() == before, "%d threads before the factorisation, %d after it", before,
              count_threads());
   }

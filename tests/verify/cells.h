@@ -1,5 +1,6 @@
 /*
-  cells.h - displacement function of any element in a cell and at a vertex; boxes with perturbed interior vertices.
+  cells.h - displacement function of any element in a cell and at a vertex; boxes with perturbed interior
+  vertices.
 */
 #pragma once
 #include "verify.h"
@@ -97,21 +98,21 @@ typedef struct {
 } VerifyBox;
 
 /* Random displacement of interior vertices by up to 0.2 cells. */
-static inline void verify_move_vertex(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static inline void verify_move_vertex(const VerifyPlace *place, PetscReal x[3])
 {
-  const VerifyBox *box = (const VerifyBox *)ctx;
+  const VerifyBox *box = (const VerifyBox *)place->ctx;
   PetscBool inner = PETSC_TRUE;
 
-  for (int k = 0; k < 3; k++) inner = (PetscBool)(inner && at[k] > 0 && at[k] < n[k]);
+  for (int k = 0; k < 3; k++) inner = (PetscBool)(inner && place->at[k] > 0 && place->at[k] < place->n[k]);
   for (int k = 0; k < 3; k++) {
     PetscReal r = 0.5;
 
     if (inner) (void)PetscRandomGetValueReal(box->random, &r);
-    x[k] = (x[k] + (0.4 * r - 0.2) / (PetscReal)n[k]) * box->size[k];
+    x[k] = (x[k] + (0.4 * r - 0.2) / (PetscReal)place->n[k]) * box->size[k];
   }
 }
 
-/* Writes such a box to a file; the same for equal n on any number of ranks. Remove it with test_file_remove(). Collective. */
+/* Writes such a box to a file; the same for equal n on any number of ranks. Collective. */
 static inline PetscErrorCode verify_distorted_box(const PetscInt n[3], const PetscReal size[3],
                                                   char path[512])
 {

@@ -1,6 +1,6 @@
 /*
-  contact.h - common functions of the verification of contact: history columns by name, sums over each body, the history as a
-  table, balls made of boxes.
+  contact.h - common functions of the verification of contact: history columns by name, sums over each body,
+  the history as a table, balls made of boxes.
 */
 #pragma once
 #include "verify.h"
@@ -15,20 +15,20 @@ static inline SbEffect contact_effect(SbModel m, const char *name)
   return NULL;
 }
 
-/* History columns of an effect for the residual R (N, without constraints), on every rank: value[ncolumn]. */
+/* History columns of an effect for the residual R (N, without constraints; NULL: none), on every rank: value[ncolumn]. */
 static inline PetscErrorCode contact_columns(SbRun run, PetscReal t, Vec R, SbEffect e, PetscReal value[])
 {
   SbModel m = run->model;
   SbStage stage = {.t = t, .shift_k = 1};
-  const PetscReal *r;
+  const PetscReal *r = NULL;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceGetLocalRead(m->space, R, &r));
+  if (R) PetscCall(SbSpaceGetLocalRead(m->space, R, &r));
   PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
-  if (m->space->constraints) SbConstraintsComputeForces(m->space, stage.u, r);
+  if (R && m->space->constraints) SbConstraintsComputeForces(m->space, stage.u, r);
   PetscCall((*e->ops.history)(e, m->space, &stage, r, value));
   PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
-  PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
+  if (R) PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, (PetscMPIInt)e->ncolumn, MPIU_REAL, MPI_SUM, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -85,6 +85,26 @@ static inline PetscErrorCode contact_body_masses(SbModel m, PetscReal mass[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Largest deviation of the stress from a uniaxial pressure along z (Pa), relative to it. */
+static inline PetscErrorCode contact_stress_error(TestScene *t, PetscReal pressure, PetscReal *worst)
+{
+  SbSpace s = t->model->space;
+  PetscReal *sigma;
+  const PetscReal *u;
+
+  PetscFunctionBeginUser;
+  *worst = 0;
+  PetscCall(PetscMalloc1(6 * s->mesh->ncell_owned, &sigma));
+  PetscCall(SbSpaceGetLocalRead(s, t->run->U, &u));
+  SbSpaceCellState(s, u, sigma, NULL, NULL, NULL);
+  PetscCall(SbSpaceRestoreLocalRead(s, t->run->U, &u));
+  for (PetscInt c = 0; c < 6 * s->mesh->ncell_owned; c++)
+    *worst = PetscMax(*worst, PetscAbsReal(sigma[c] + (c % 6 == 2 ? pressure : 0)) / pressure);
+  PetscCall(PetscFree(sigma));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, worst, 1, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Net contact force on each body after the last step, N: force[nbody][3] on every rank. For a run with want_energies. */
 static inline PetscErrorCode contact_body_forces(SbRun run, PetscReal t, PetscReal force[])
 {
@@ -99,10 +119,11 @@ static inline PetscErrorCode contact_body_forces(SbRun run, PetscReal t, PetscRe
 }
 
 /*
-  History of a run: a row per step, initial state included, with named columns: t, dt, kinetic, strain, energy (total with the
-  potential of gravity g along -z and the barrier energy), momentum_x, angular_x, centre_x, volume, min_J, speed, BODY_vx (of its centre), EFFECT_COLUMN of the
-  contact effects, missing (largest component of the change of momentum in the step less that by weight and obstacle forces,
-  kg m/s), and, if requested, net (likewise of the sum of contact forces on all bodies) and push (on the first body), N.
+  History of a run: a row per step, initial state included, with named columns: t, dt, kinetic, strain, energy
+  (total with the potential of gravity g along -z and the barrier energy), momentum_x, angular_x, centre_x,
+  volume, min_J, speed, BODY_vx (of its centre), EFFECT_COLUMN of the contact effects, missing (largest
+  component of the change of momentum in the step less that by weight and obstacle forces, kg m/s), and, if
+  requested, net (likewise of the sum of contact forces on all bodies) and push (on the first body), N.
 */
 typedef struct {
   PetscReal g;                      /* set before the run, m/s^2 */
@@ -111,9 +132,26 @@ typedef struct {
   PetscReal mass, lowest;           /* kg; lowest node at rest, z, m */
   PetscInt newton, steps, rejected; /* totals of the run */
   PetscInt n, ncolumn, room, at;    /* numbers of rows and columns, allocated values, next column to be set */
+  size_t kept;                      /* place in record_kept, from 1 */
   char (*name)[2 * SB_NAME_MAX];    /* [ncolumn] */
   PetscReal *value;                 /* [n][ncolumn] */
 } Record;
+
+/* Arrays of all records, which are freed when the program ends. */
+static struct {
+  void *name, *value;
+} record_kept[256];
+static size_t record_count;
+
+static inline PetscErrorCode record_free_all(void)
+{
+  PetscFunctionBeginUser;
+  for (size_t k = 0; k < record_count; k++) {
+    PetscCall(PetscFree(record_kept[k].name));
+    PetscCall(PetscFree(record_kept[k].value));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* Column values in every row: [n], with a stride of ncolumn. */
 static inline const PetscReal *record_column(const Record *r, const char *name)
@@ -206,6 +244,12 @@ static inline PetscErrorCode record_put(Record *r, const char *first, const char
                                         PetscReal value)
 {
   PetscFunctionBeginUser;
+  if (!r->kept) {
+    PetscCheck(record_count < PETSC_STATIC_ARRAY_LENGTH(record_kept), PETSC_COMM_SELF, PETSC_ERR_PLIB,
+               "more records");
+    if (!record_count) PetscCall(PetscRegisterFinalize(record_free_all));
+    r->kept = ++record_count;
+  }
   if (r->n == 0) {
     PetscCall(PetscRealloc((size_t)(r->ncolumn + 1) * sizeof(*r->name), &r->name));
     PetscCall(PetscSNPrintf(r->name[r->ncolumn++], sizeof(*r->name), "%s%s%s", first, second, third));
@@ -215,6 +259,8 @@ static inline PetscErrorCode record_put(Record *r, const char *first, const char
     PetscCall(PetscRealloc((size_t)r->room * sizeof(PetscReal), &r->value));
   }
   r->value[r->n * r->ncolumn + r->at++] = value;
+  record_kept[r->kept - 1].name = r->name;
+  record_kept[r->kept - 1].value = r->value;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -298,14 +344,6 @@ static inline PetscErrorCode record_add(TestScene *t, Record *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static inline PetscErrorCode record_free(Record *r)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree(r->name));
-  PetscCall(PetscFree(r->value));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Solves an open scene and records it; the scene stays open. */
 static inline PetscErrorCode record_solve(TestScene *t, Record *r)
 {
@@ -318,15 +356,15 @@ static inline PetscErrorCode record_solve(TestScene *t, Record *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves and closes the scene of these options; the caller frees the record with record_free(). */
-static inline PetscErrorCode record_run(Record *r, const char *format, ...)
+/* Solves and closes the scene of these options. */
+static inline PetscErrorCode PETSC_ATTRIBUTE_FORMAT(2, 3) record_run(Record *r, const char *format, ...)
 {
   TestScene t;
   va_list args;
 
   PetscFunctionBeginUser;
   va_start(args, format);
-  PetscCall(verify_vopen(&t, format, args));
+  PetscCall(test_vopen(PETSC_COMM_WORLD, NULL, &t, format, args));
   va_end(args);
   PetscCall(record_solve(&t, r));
   PetscCall(test_scene_close(&t));
@@ -339,13 +377,11 @@ typedef struct {
   PetscBool quarter;
 } ContactBall;
 
-static inline void contact_ball(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static inline void contact_ball(const VerifyPlace *place, PetscReal x[3])
 {
-  const ContactBall *b = (const ContactBall *)ctx;
+  const ContactBall *b = (const ContactBall *)place->ctx;
   PetscReal layer = 0, length;
 
-  (void)n;
-  (void)at;
   for (int k = 0; k < 3; k++) {
     if (!b->quarter || k == 2) x[k] = 2 * x[k] - 1;
     layer = PetscMax(layer, PetscAbsReal(x[k]));
@@ -354,7 +390,7 @@ static inline void contact_ball(const PetscInt n[3], const PetscInt at[3], Petsc
   for (int k = 0; k < 3; k++) x[k] *= length > 0 ? b->radius * layer / length : 0;
 }
 
-/* Writes a ball of n layers of cells across; remove the file with test_file_remove(). */
+/* Writes a ball of n layers of cells across. */
 static inline PetscErrorCode contact_ball_write(PetscInt n, PetscReal radius, char path[512])
 {
   ContactBall ball = {.radius = radius};

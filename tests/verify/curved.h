@@ -1,6 +1,6 @@
 /*
-  curved.h - second-order meshes: a triangular prism, n cells along its sides, m layers, three tets per cell, mapped at all ten nodes of each tet
-  (curved) or at the four vertices only (straight).
+  curved.h - second-order meshes: a triangular prism, n cells along its sides, m layers, three tets per cell,
+  mapped at all ten nodes of each tet (curved) or at the four vertices only (straight).
 */
 #pragma once
 #include "verify.h"
@@ -60,8 +60,7 @@ static inline PetscErrorCode curved_mesh_write(PetscInt n, PetscInt m, CurvedMap
                             0.5 * (PetscReal)at[2] / (PetscReal)m};
 
           map(x);
-          fprintf(f, "%d %.17g %.17g %.17g\n", (int)curved_number(n, at) + 1, (double)x[0], (double)x[1],
-                  (double)x[2]);
+          fprintf(f, "%d %.17g %.17g %.17g\n", (int)curved_number(n, at) + 1, x[0], x[1], x[2]);
         }
       }
     }

@@ -3,13 +3,14 @@
 
     F = 4/3 E* sqrt(R) d^(3/2),   1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2,   1/R = 1/R1 + 1/R2,   a = sqrt(R d),
 
-  for a sphere on a half-space of another material, and for two equal spheres; d is the approach of distant points, a the contact
-  radius. Quarters of both bodies, non-matching meshes, graded towards the contact point. The materials are linear and a is at most
-  R/80, so that the discretisation error dominates.
+  for a sphere on a half-space of another material, and for two equal spheres; d is the approach of distant
+  points, a the contact radius. Quarters of both bodies, non-matching meshes, graded towards the contact
+  point. The materials are linear and a is at most R/80, so that the discretisation error dominates.
 
-  The blocks are finite: their far faces have the displacement of half-spaces under a point force F (Boussinesq), whose relative error is of order
-  (a/r)^2, r > 8 a. F is taken from the formula. This cannot hide an error of the contact force: the displacement there is at most a tenth of d,
-  so an error of 5 % in F changes the approach by 0.5 % of d.
+  The blocks are finite: their far faces have the displacement of half-spaces under a point force F
+  (Boussinesq), whose relative error is of order (a/r)^2, r > 8 a. F is taken from the formula. This cannot
+  hide an error of the contact force: the displacement there is at most a tenth of d, so an error of 5 % in F
+  changes the approach by 0.5 % of d.
 */
 #pragma once
 #include "contact.h"
@@ -22,20 +23,18 @@ enum { CONTACTS, DEEPEST, MEAN, NORMAL, FRICTION, WORK, LOSS, NVALUE = 16 };
 #define CELLS 20    /* cells along an edge of the finest mesh */
 
 /*
-  One body above (side 1) or below (side -1) the plane z = 0: cells at the contact are `fine` times those of a uniform mesh; the surface
-  has the radius `radius` (0: flat).
+  One body above (side 1) or below (side -1) the plane z = 0: cells at the contact are `fine` times those of a
+  uniform mesh; the surface has the radius `radius` (0: flat).
 */
 typedef struct {
   PetscReal fine, side, radius;
 } Block;
 
-static inline void bend(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static inline void bend(const VerifyPlace *place, PetscReal x[3])
 {
-  const Block *b = (const Block *)ctx;
+  const Block *b = (const Block *)place->ctx;
   PetscReal depth, cap = 0;
 
-  (void)n;
-  (void)at;
   if (b->side < 0) x[2] = 1 - x[2];
   for (int k = 0; k < 3; k++) x[k] = SIZE * (b->fine * x[k] + (1 - b->fine) * PetscPowRealInt(x[k], 6));
   depth = x[2];
@@ -78,27 +77,27 @@ static inline PetscErrorCode boussinesq(PetscReal P, PetscReal E, PetscReal side
   char sideways[256];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(sideways, sizeof(sideways), "%.15g*(abs(z)/%s^3-%.15g/(%s*(%s+abs(z))))", (double)c,
-                          r, (double)(1 - 2 * POISSON), r, r));
-  PetscCall(PetscSNPrintf(text, size, "x*%s;y*%s;%.15g+%.15g*(%.15g/%s+z^2/%s^3)", sideways, sideways,
-                          (double)shift, (double)(side * c), (double)(2 * (1 - POISSON)), r, r));
+  PetscCall(PetscSNPrintf(sideways, sizeof(sideways), "%.15g*(abs(z)/%s^3-%.15g/(%s*(%s+abs(z))))", c, r,
+                          1 - 2 * POISSON, r, r));
+  PetscCall(PetscSNPrintf(text, size, "x*%s;y*%s;%.15g+%.15g*(%.15g/%s+z^2/%s^3)", sideways, sideways, shift,
+                          side * c, 2 * (1 - POISSON), r, r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /*
-  Both bodies between the symmetry planes x = 0 and y = 0. The contact surface is the part within a few d of z = 0: up to
-  a few a, without the sides, whose first layer of cells is thicker.
+  Both bodies between the symmetry planes x = 0 and y = 0. The contact surface is the part within a few d of z
+  = 0: up to a few a, without the sides, whose first layer of cells is thicker.
 */
 static inline PetscErrorCode open_pair(const Pair *p, const Case *c, PetscReal d, PetscReal P,
                                        char path[2][512], TestScene *t)
 {
-  char text[VERIFY_TEXT], far[2][VERIFY_TEXT / 4];
+  char far[2][VERIFY_TEXT / 4];
 
   PetscFunctionBeginUser;
   PetscCall(boussinesq(P, p->young[0], -1, 0, sizeof(far[0]), far[0]));
   PetscCall(boussinesq(P, p->young[1], 1, -d, sizeof(far[1]), far[1]));
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
+  PetscCall(test_open(
+    t,
     "-bodies a,b -body_a_mesh %s -body_b_mesh %s -body_a_element %s -body_b_element %s "
     "-body_a_material linear -body_b_material linear -body_a_young %g -body_b_young %g -body_a_poisson %g "
     "-body_b_poisson %g -sets x0,y0,meet,ax,ay,az,bx,by,bz -set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 "
@@ -110,9 +109,8 @@ static inline PetscErrorCode open_pair(const Pair *p, const Case *c, PetscReal d
     "-effect_low_displacement %s -effect_high_type prescribed_displacement -effect_high_on bx,by,bz "
     "-effect_high_displacement %s -effect_meet_type contact -effect_meet_on meet -effect_meet_barrier_width "
     "%.9g ",
-    path[0], path[1], c->element, c->element, (double)p->young[0], (double)p->young[1], POISSON, POISSON,
-    (double)(3 * d), far[0], far[1], (double)(0.01 * d)));
-  PetscCall(test_scene_open(text, t));
+    path[0], path[1], c->element, c->element, p->young[0], p->young[1], POISSON, POISSON, 3 * d, far[0],
+    far[1], 0.01 * d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -144,8 +142,8 @@ static inline PetscErrorCode read_forces(SbRun run, PetscReal values[NVALUE], Pe
 }
 
 /*
-  Force of a case on the far face of the upper body, over that of the formula. The force in the history is a sum over pairs, those of
-  edges being slightly inclined; it must be equal within the tolerance.
+  Force of a case on the far face of the upper body, over that of the formula. The force in the history is a
+  sum over pairs, those of edges being slightly inclined; it must be equal within the tolerance.
 */
 static inline PetscErrorCode hertz(const Pair *p, const Case *c, PetscReal *force)
 {
@@ -162,16 +160,13 @@ static inline PetscErrorCode hertz(const Pair *p, const Case *c, PetscReal *forc
   PetscCall(verify_solve(&t, p->name));
   PetscCall(read_forces(t.run, values, &reaction));
   *force = -4 * reaction / P;
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  %s, %s, %d^3 cells, d = %.3e m: %g points touch, force %.4f "
-                        "(history %.4f) of the formula's, penetration %.1e d, %d solves\n",
-                        p->name, c->element, (int)c->cells, (double)d, (double)values[CONTACTS],
-                        (double)*force, (double)(4 * values[NORMAL] / P), (double)(values[DEEPEST] / d),
-                        (int)t.run->newton_total));
+  test_print("  %s, %s, %d^3 cells, d = %.3e m: %g points touch, force %.4f "
+             "(history %.4f) of the formula's, penetration %.1e d, %d solves\n",
+             p->name, c->element, (int)c->cells, d, values[CONTACTS], *force, 4 * values[NORMAL] / P,
+             values[DEEPEST] / d, (int)t.run->newton_total);
   SB_CHECK_NEAR(4 * values[NORMAL] / P, *force, c->honest * *force,
                 "force in the history against the one that acts");
-  SB_CHECK(values[DEEPEST] < 0.01 * d, "penetration %g m of %g m", (double)values[DEEPEST], (double)d);
+  SB_CHECK(values[DEEPEST] < 0.01 * d, "penetration %g m of %g m", values[DEEPEST], d);
   PetscCall(test_scene_close(&t));
-  for (int k = 0; k < 2; k++) PetscCall(test_file_remove(path[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

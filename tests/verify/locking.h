@@ -1,6 +1,7 @@
 /*
-  locking.h - problems for the comparison of elements near nu = 1/2: each is a function of the mesh, Poisson's ratio and
-  further options (element, penalties, solver). Results are evaluated from the element's own functions.
+  locking.h - problems for the comparison of elements near nu = 1/2: each is a function of the mesh, Poisson's
+  ratio and further options (element, penalties, solver). Results are evaluated from the element's own
+  functions.
 */
 #pragma once
 #include <time.h>
@@ -24,15 +25,21 @@ static inline double locking_clock(void)
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* Opens and solves a scene; the caller closes it. */
-static inline PetscErrorCode locking_run(const char *scene, const char *more, TestScene *t, LockingCost *cost)
+/* Opens and solves a scene of options in printf format and of `more`; the caller closes it. */
+static inline PetscErrorCode PETSC_ATTRIBUTE_FORMAT(4, 5)
+  locking_run(TestScene *t, LockingCost *cost, const char *more, const char *format, ...)
 {
-  char *text;
+  char text[LOCKING_TEXT];
+  size_t length;
   double start;
+  va_list args;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(LOCKING_TEXT, &text));
-  PetscCall(PetscSNPrintf(text, LOCKING_TEXT, "%s %s", scene, more));
+  va_start(args, format);
+  PetscCall(PetscVSNPrintf(text, sizeof(text), format, &length, args));
+  va_end(args);
+  PetscCall(PetscStrlcat(text, " ", sizeof(text)));
+  PetscCall(PetscStrlcat(text, more, sizeof(text)));
   PetscCall(test_scene_open(text, t));
   start = locking_clock();
   PetscCall(verify_solve(t, more));
@@ -41,7 +48,6 @@ static inline PetscErrorCode locking_run(const char *scene, const char *more, Te
   cost->unknowns = 3 * t->model->space->Nnode;
   cost->newton = t->run->newton_total;
   cost->linear = t->run->linear_total;
-  PetscCall(PetscFree(text));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -50,23 +56,21 @@ static inline PetscErrorCode locking_cube(PetscInt n, const char *file, PetscRea
                                           PetscReal error[2], LockingCost *cost)
 {
   TestScene t;
-  char scene[VERIFY_TEXT], text[LOCKING_TEXT], mesh[512];
+  char scene[VERIFY_TEXT], mesh[512];
 
   PetscFunctionBeginUser;
   if (!file[0])
     PetscCall(verify_distorted_box((const PetscInt[3]){n, n, n}, (const PetscReal[3]){1., 1., 1.}, mesh));
   PetscCall(manufactured_scene(nu, scene, sizeof(scene)));
-  PetscCall(PetscSNPrintf(text, sizeof(text), "%s -body_a_mesh %s", more, file[0] ? file : mesh));
-  PetscCall(locking_run(scene, text, &t, cost));
+  PetscCall(locking_run(&t, cost, more, "%s -body_a_mesh %s", scene, file[0] ? file : mesh));
   PetscCall(manufactured_errors(t.model, t.run->U, error));
   PetscCall(test_scene_close(&t));
-  if (!file[0]) PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /*
-  Bar of 0.4 x 0.1 x 0.1 m, x = 0 clamped, under its weight, small strains, n perturbed cells across: u_z at the centre of the
-  end face, strain energy.
+  Bar of 0.4 x 0.1 x 0.1 m, x = 0 clamped, under its weight, small strains, n perturbed cells across: u_z at
+  the centre of the end face, strain energy.
 */
 static inline PetscErrorCode locking_bar(PetscInt n, PetscReal nu, const char *more, PetscReal value[2],
                                          LockingCost *cost)
@@ -75,24 +79,22 @@ static inline PetscErrorCode locking_bar(PetscInt n, PetscReal nu, const char *m
   PetscReal u[3];
   SbEnergies e;
   TestScene t;
-  char scene[VERIFY_TEXT], mesh[512];
+  char mesh[512];
 
   PetscFunctionBeginUser;
   PetscCall(
     verify_distorted_box((const PetscInt[3]){4 * n, n, n}, (const PetscReal[3]){0.4, 0.1, 0.1}, mesh));
-  PetscCall(PetscSNPrintf(
-    scene, sizeof(scene),
+  PetscCall(locking_run(
+    &t, cost, more,
     "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 5e4 -body_a_poisson %.17g "
     "-body_a_density 1000 -sets root -set_root_at plane:1,0,0,0 -effects clamp,gravity "
     "-effect_clamp_type fixed -effect_clamp_on root -effect_gravity_vector 0,0,-9.81 -time static",
-    mesh, (double)nu));
-  PetscCall(locking_run(scene, more, &t, cost));
+    mesh, nu));
   PetscCall(verify_value_at(t.model, t.run->U, end, u));
   PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &e));
   value[0] = u[2];
   value[1] = e.strain;
   PetscCall(test_scene_close(&t));
-  PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -103,17 +105,15 @@ static inline PetscErrorCode locking_cook(const char *mesh, PetscReal nu, const 
 {
   const PetscReal at[2][3] = {{48., 60., 0.}, {48., 52., 0.}};
   TestScene t;
-  char scene[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    scene, sizeof(scene),
+  PetscCall(locking_run(
+    &t, cost, more,
     "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 1 -body_a_poisson %.17g "
     "-body_a_density 1 -effects hold,plane,pull -effect_hold_type fixed -effect_hold_on left "
     "-effect_plane_type fixed -effect_plane_on all -effect_plane_components z -effect_pull_type traction "
     "-effect_pull_on right -effect_pull_vector 0;1/16;0 -time static",
-    mesh, (double)nu));
-  PetscCall(locking_run(scene, more, &t, cost));
+    mesh, nu));
   for (int k = 0; k < 2; k++) {
     PetscReal u[3];
 
@@ -131,8 +131,8 @@ static inline PetscReal locking_shell_displacement(PetscReal nu, PetscReal r)
 }
 
 /*
-  Adds the squares of one cell: radial and hoop stress, error and exact value, sum[0..3]; displacement at the centroid, error and
-  exact value, sum[4..5]; sum[6] is the volume.
+  Adds the squares of one cell: radial and hoop stress, error and exact value, sum[0..3]; displacement at the
+  centroid, error and exact value, sum[4..5]; sum[6] is the volume.
 */
 static inline void locking_shell_cell(const VerifyCell *cell, const PetscReal sigma[6], PetscReal nu,
                                       PetscReal sum[7])
@@ -208,33 +208,39 @@ static inline PetscErrorCode locking_shell(const char *mesh, PetscReal nu, const
                                            LockingCost *cost)
 {
   TestScene t;
-  char scene[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
   PetscCall(
-    PetscSNPrintf(scene, sizeof(scene),
-                  "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 1 -body_a_poisson %.17g "
-                  "-body_a_density 1 -effects x,y,z,push -effect_x_type fixed -effect_x_on x0 "
-                  "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y "
-                  "-effect_z_type fixed -effect_z_on z0 -effect_z_components z -effect_push_type pressure "
-                  "-effect_push_on inside -effect_push_value 1 -effect_push_follower no -time static",
-                  mesh, (double)nu));
-  PetscCall(locking_run(scene, more, &t, cost));
+    locking_run(&t, cost, more,
+                "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 1 -body_a_poisson %.17g "
+                "-body_a_density 1 -effects x,y,z,push -effect_x_type fixed -effect_x_on x0 "
+                "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y "
+                "-effect_z_type fixed -effect_z_on z0 -effect_z_components z -effect_push_type pressure "
+                "-effect_push_on inside -effect_push_value 1 -effect_push_follower no -time static",
+                mesh, nu));
   PetscCall(locking_shell_errors(t.model, t.run->U, nu, e));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Maps a box to Cook's membrane, (0,0) (48,44) (48,60) (0,44); cells as thick as wide. */
+static inline void locking_cook_map(const VerifyPlace *place, PetscReal x[3])
+{
+  const PetscReal bottom = 44. * x[0], top = 44. + 16. * x[0];
+
+  x[0] *= 48.;
+  x[1] = bottom + x[1] * (top - bottom);
+  x[2] *= 48. * (PetscReal)place->n[2] / (PetscReal)place->n[0];
+}
+
 /* Maps a box to the beam of Turek and Hron, its left side to the circle (0.2, 0.2) of radius 0.05 m; one layer in z. */
-static inline void locking_beam_map(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static inline void locking_beam_map(const VerifyPlace *place, PetscReal x[3])
 {
   const PetscReal y = 0.19 + 0.02 * x[1], root = 0.2 + PetscSqrtReal(0.0025 - PetscSqr(y - 0.2));
 
-  (void)at;
-  (void)ctx;
   x[0] = root + x[0] * (0.6 - root);
   x[1] = y;
-  x[2] *= 0.35 / (PetscReal)n[0];
+  x[2] *= 0.35 / (PetscReal)place->n[0];
 }
 
 /* Turek and Hron's CSM1 (mu 0.5e6 Pa) and CSM2 (2e6 Pa), n cells through the thickness: displacement of (0.6, 0.2). */
@@ -245,21 +251,19 @@ static inline PetscErrorCode locking_beam(PetscInt n, PetscReal mu, const char *
   const double half = 0.175 / (double)cells[0]; /* of the thickness */
   const PetscReal tip[3] = {0.6, 0.2, 0.};
   TestScene t;
-  char scene[VERIFY_TEXT], mesh[512];
+  char mesh[512];
 
   PetscFunctionBeginUser;
   PetscCall(verify_mesh_write(cells, locking_beam_map, NULL, mesh));
-  PetscCall(PetscSNPrintf(
-    scene, sizeof(scene),
+  PetscCall(locking_run(
+    &t, cost, more,
     "-bodies a -body_a_mesh %s -body_a_tangent exact -body_a_young %.17g -body_a_poisson 0.4 "
     "-body_a_density 1000 -sets arc -set_arc_at sphere:0.2,0.2,%.17g,%.17g -effects root,plane,gravity "
     "-effect_root_type fixed -effect_root_on arc -effect_plane_type fixed -effect_plane_on all "
     "-effect_plane_components z -effect_gravity_vector 0,-2,0 -time static",
-    mesh, (double)(2.8 * mu), half, (double)PetscSqrtReal(0.0025 + half * half)));
-  PetscCall(locking_run(scene, more, &t, cost));
+    mesh, 2.8 * mu, half, PetscSqrtReal(0.0025 + half * half)));
   PetscCall(verify_value_at(t.model, t.run->U, tip, u));
   PetscCall(test_scene_close(&t));
-  PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -270,17 +274,15 @@ static inline PetscErrorCode locking_swing(PetscInt n, PetscReal nu, const char 
   const PetscReal end[3] = {0.4, 0.05, 0.05};
   SbEnergies e;
   TestScene t;
-  char scene[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    scene, sizeof(scene),
+  PetscCall(locking_run(
+    &t, cost, more,
     "-bodies a -body_a_mesh box:0.4,0.1,0.1:%d -body_a_material corotated -body_a_young 1e5 "
     "-body_a_poisson %.17g -body_a_density 1000 -effects gravity,clamp -effect_gravity_vector 0,0,-9.81 "
     "-effect_clamp_type fixed -effect_clamp_on xmin -time genalpha -time_spectral_radius 0.8 -ts_dt 0.01 "
     "-ts_max_time 0.3",
-    (int)n, (double)nu));
-  PetscCall(locking_run(scene, more, &t, cost));
+    (int)n, nu));
   PetscCall(verify_value_at(t.model, t.run->U, end, value));
   PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &e));
   value[3] = e.strain;
@@ -296,18 +298,16 @@ static inline PetscErrorCode locking_twist(PetscInt n, PetscReal nu, const char 
   const PetscReal edge[3] = {0.2, 0., 0.};
   SbEnergies e;
   TestScene t;
-  char scene[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
   PetscCall(
-    PetscSNPrintf(scene, sizeof(scene),
-                  "-bodies a -body_a_mesh box:0.4,0.1,0.1:%d -body_a_material neohookean -body_a_young 1e5 "
-                  "-body_a_poisson %.17g -body_a_density 1000 -effects held,turned -effect_held_type fixed "
-                  "-effect_held_on xmin -effect_turned_type prescribed_displacement -effect_turned_on xmax "
-                  "-effect_turned_axis 1,0,0 -effect_turned_axis_point 0,0.05,0.05 -effect_turned_angle 90*t "
-                  "-time static -static_steps 16 -ksp_max_it 20",
-                  (int)n, (double)nu));
-  PetscCall(locking_run(scene, more, &t, cost));
+    locking_run(&t, cost, more,
+                "-bodies a -body_a_mesh box:0.4,0.1,0.1:%d -body_a_material neohookean -body_a_young 1e5 "
+                "-body_a_poisson %.17g -body_a_density 1000 -effects held,turned -effect_held_type fixed "
+                "-effect_held_on xmin -effect_turned_type prescribed_displacement -effect_turned_on xmax "
+                "-effect_turned_axis 1,0,0 -effect_turned_axis_point 0,0.05,0.05 -effect_turned_angle 90*t "
+                "-time static -static_steps 16 -ksp_max_it 20",
+                (int)n, nu));
   PetscCall(verify_value_at(t.model, t.run->U, edge, value));
   PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &e));
   value[3] = e.strain;
@@ -316,32 +316,29 @@ static inline PetscErrorCode locking_twist(PetscInt n, PetscReal nu, const char 
 }
 
 /*
-  A soft block, 0.1 x 0.1 x 0.2 m, hangs from its top under gravity, n perturbed cells across; `more` has the material and
-  Young's modulus: largest displacement (m), relative change of volume, smallest J.
+  A soft block, 0.1 x 0.1 x 0.2 m, hangs from its top under gravity, n perturbed cells across; `more` has the
+  material and Young's modulus: largest displacement (m), relative change of volume, smallest J.
 */
 static inline PetscErrorCode locking_hang(PetscInt n, PetscReal nu, const char *more, PetscReal value[3],
                                           LockingCost *cost)
 {
   SbEnergies e;
   TestScene t;
-  char scene[VERIFY_TEXT], mesh[512];
+  char mesh[512];
 
   PetscFunctionBeginUser;
   PetscCall(
     verify_distorted_box((const PetscInt[3]){n, n, 2 * n}, (const PetscReal[3]){0.1, 0.1, 0.2}, mesh));
-  PetscCall(
-    PetscSNPrintf(scene, sizeof(scene),
-                  "-bodies a -body_a_mesh %s -body_a_poisson %.17g -body_a_density 1000 -sets top "
-                  "-set_top_at plane:0,0,1,0.2 -effects clamp,gravity -effect_clamp_type fixed "
-                  "-effect_clamp_on top -effect_gravity_vector 0,0,-9.81 -time static -static_steps 4",
-                  mesh, (double)nu));
-  PetscCall(locking_run(scene, more, &t, cost));
+  PetscCall(locking_run(&t, cost, more,
+                        "-bodies a -body_a_mesh %s -body_a_poisson %.17g -body_a_density 1000 -sets top "
+                        "-set_top_at plane:0,0,1,0.2 -effects clamp,gravity -effect_clamp_type fixed "
+                        "-effect_clamp_on top -effect_gravity_vector 0,0,-9.81 -time static -static_steps 4",
+                        mesh, nu));
   PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &e));
   value[0] = e.max_displacement;
   value[1] = (e.volume - t.model->body[0].volume) / t.model->body[0].volume;
   value[2] = e.min_J;
   PetscCall(test_scene_close(&t));
-  PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -355,23 +352,21 @@ static inline PetscErrorCode locking_modes(PetscInt n, PetscReal nu, const char 
   PetscReal w2[MODES_BLOCK];
   PetscInt zero = 0;
   TestScene t;
-  char text[LOCKING_TEXT], mesh[512];
+  char mesh[512];
 
   PetscFunctionBeginUser;
   PetscCall(
     verify_distorted_box((const PetscInt[3]){n, n, 2 * n}, (const PetscReal[3]){0.1, 0.1, 0.2}, mesh));
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 5e3 "
-                          "-body_a_poisson %.17g -body_a_density 1000 -time newmark %s",
-                          mesh, (double)nu, more));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 5e3 "
+                      "-body_a_poisson %.17g -body_a_density 1000 -time newmark %s",
+                      mesh, nu, more));
   PetscCall(modes_lowest(t.model, unit, w2));
   while (zero < MODES_BLOCK - 2 && w2[zero] < 1e-6 * unit) zero++;
   value[0] = (PetscReal)zero;
   value[1] = w2[zero] / unit;
   value[2] = w2[zero + 1] / unit;
   PetscCall(test_scene_close(&t));
-  PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -402,18 +397,16 @@ static inline PetscErrorCode locking_check_pair(const char *what, LockingProblem
 
     PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_element %s %s", element, options));
     PetscCall(solve(e == 2 ? fine : 2, 0.499, more, value[e], &cost));
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s %s n %d: %.5f %.5f %.5f m, %.5f J\n", what, element,
-                          (int)(e == 2 ? fine : 2), (double)value[e][0], (double)value[e][1],
-                          (double)value[e][2], (double)value[e][3]));
+    test_print("  %s %s n %d: %.5f %.5f %.5f m, %.5f J\n", what, element, (int)(e == 2 ? fine : 2),
+               value[e][0], value[e][1], value[e][2], value[e][3]);
   }
   locking_difference(value[1], value[0], between);
   locking_difference(value[0], value[2], finer);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  %s: DG - CR %.1e m, %.1e of the energy; n 2 - finer %.1e m, %.1e\n", what,
-                        (double)between[0], (double)between[1], (double)finer[0], (double)finer[1]));
+  test_print("  %s: DG - CR %.1e m, %.1e of the energy; n 2 - finer %.1e m, %.1e\n", what, between[0],
+             between[1], finer[0], finer[1]);
   SB_CHECK(between[0] < limit[0] * size && between[1] < limit[0], "%s: CR and DG differ by %g m", what,
-           (double)between[0]);
+           between[0]);
   SB_CHECK(finer[0] < limit[1] * size && finer[1] < limit[1], "%s: CR changes by %g m, %g of the energy",
-           what, (double)finer[0], (double)finer[1]);
+           what, finer[0], finer[1]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

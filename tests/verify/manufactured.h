@@ -3,12 +3,12 @@
 
     u = (phi_y - phi_z, phi_z - phi_x, phi_x - phi_y),   u = 0 on the boundary,   f = -mu Lap u,   E = 3.
 
-  The force does not depend on lambda, so the exact solution is the same for every Poisson's ratio, and any dependence on it is
-  due to the element. Locking shows on meshes with perturbed interior vertices: on the mirrored cells of a box linear tets
-  have enough divergence-free displacements.
+  The force does not depend on lambda, so the exact solution is the same for every Poisson's ratio, and any
+  dependence on it is due to the element. Locking shows on meshes with perturbed interior vertices: on the
+  mirrored cells of a box linear tets have enough divergence-free displacements.
 
-  Errors are those of the element's own function in each cell, by a quadrature rule of degree 5 (Walkington 2000), relative to
-  the norm of u.
+  Errors are those of the element's own function in each cell, by a quadrature rule of degree 5 (Walkington
+  2000), relative to the norm of u.
 */
 #pragma once
 #include "cells.h"
@@ -56,9 +56,9 @@ static inline PetscErrorCode manufactured_force(PetscReal mu, int i, char text[]
     PetscCall(PetscSNPrintf(a[2][v], 64, "2*pi^2*cos(2*pi*%c)", c));
     PetscCall(PetscSNPrintf(a[3][v], 64, "(-4*pi^3*sin(2*pi*%c))", c));
   }
-  PetscCall(PetscSNPrintf(text, size, "-%.17g*(%s*(%s*%s-%s*%s)+%s*(%s*%s+%s*%s-%s*%s-%s*%s))", (double)mu,
-                          a[2][0], a[1][1], a[0][2], a[0][1], a[1][2], a[0][0], a[3][1], a[0][2], a[1][1],
-                          a[2][2], a[2][1], a[1][2], a[0][1], a[3][2]));
+  PetscCall(PetscSNPrintf(text, size, "-%.17g*(%s*(%s*%s-%s*%s)+%s*(%s*%s+%s*%s-%s*%s-%s*%s))", mu, a[2][0],
+                          a[1][1], a[0][2], a[0][1], a[1][2], a[0][0], a[3][1], a[0][2], a[1][1], a[2][2],
+                          a[2][1], a[1][2], a[0][1], a[3][2]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -141,6 +141,6 @@ static inline PetscErrorCode manufactured_scene(PetscReal nu, char text[], size_
     "-bodies a -body_a_material linear -body_a_young 3 -body_a_poisson %.17g -body_a_density 1 "
     "-effects hold,load -effect_hold_type fixed -effect_hold_on boundary -effect_load_type body_force "
     "-effect_load_density %s;%s;%s -time static ",
-    (double)nu, f[0], f[1], f[2]));
+    nu, f[0], f[1], f[2]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,11 +1,11 @@
 /*
-  modes.h - lowest eigenvalues w^2 of K x = w^2 M x by subspace iteration with the program's stiffness and mass matrices, also for
-  free bodies: the factorised matrix is K + shift M.
+  modes.h - lowest eigenvalues w^2 of K x = w^2 M x by subspace iteration with the program's stiffness and
+  mass matrices, also for free bodies: the factorised matrix is K + shift M.
 */
 #pragma once
-#include <petscblaslapack.h>
-#include "sbsolver.h"
 #include "verify.h"
+#include "sbsolver.h"
+#include <petscblaslapack.h>
 
 #define MODES_BLOCK 16
 
@@ -20,6 +20,29 @@ static inline PetscErrorCode modes_times_mass(SbSpace s, Vec X, Vec Y)
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
     y[i] *= s->fixed[i / 3] & (1 << i % 3) ? 0. : s->node_mass[i / 3];
   PetscCall(VecRestoreArray(Y, &y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Factorisation of K + shift M (1/s^2) at the displacement U. Collective. */
+static inline PetscErrorCode modes_factor(SbModel m, PetscReal shift, Vec U, KSP *ksp)
+{
+  const char *package;
+  Mat A;
+  PC pc;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceCreateMatrix(m->space, SB_MATRIX_AIJ, &A));
+  PetscCall(SbModelTangent(m, 0., 0., shift, 1., U, NULL, A));
+  PetscCall(KSPCreate(PETSC_COMM_WORLD, ksp));
+  PetscCall(KSPSetOperators(*ksp, A, A));
+  PetscCall(KSPSetType(*ksp, KSPPREONLY));
+  PetscCall(KSPGetPC(*ksp, &pc));
+  PetscCall(SbDirectPackage(PETSC_COMM_WORLD, 3 * m->space->Nnode, PETSC_TRUE, &package));
+  PetscCheck(package, PETSC_COMM_WORLD, PETSC_ERR_SUP, "This PETSc has neither SuiteSparse nor MUMPS");
+  PetscCall(SbPCDirectSet(pc, package, PETSC_TRUE));
+  PetscCall(PCSetFromOptions(pc));
+  PetscCall(SbPCCheckPivots(pc));
+  PetscCall(MatDestroy(&A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -48,28 +71,15 @@ static inline PetscErrorCode modes_lowest(SbModel m, PetscReal shift, PetscReal 
 {
   PetscReal last = 0.;
   PetscRandom random;
-  const char *package;
   Vec *X, *MX, *Z, U;
-  Mat A;
   KSP ksp;
-  PC pc;
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceCreateVec(m->space, &U));
   PetscCall(VecDuplicateVecs(U, MODES_BLOCK, &X));
   PetscCall(VecDuplicateVecs(U, MODES_BLOCK, &MX));
   PetscCall(VecDuplicateVecs(U, MODES_BLOCK, &Z));
-  PetscCall(SbSpaceCreateMatrix(m->space, SB_MATRIX_AIJ, &A));
-  PetscCall(SbModelTangent(m, 0., 0., shift, 1., U, NULL, A));
-  PetscCall(KSPCreate(PETSC_COMM_WORLD, &ksp));
-  PetscCall(KSPSetOperators(ksp, A, A));
-  PetscCall(KSPSetType(ksp, KSPPREONLY));
-  PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(SbDirectPackage(PETSC_COMM_WORLD, 3 * m->space->Nnode, PETSC_TRUE, &package));
-  PetscCheck(package, PETSC_COMM_WORLD, PETSC_ERR_SUP, "This PETSc has neither SuiteSparse nor MUMPS");
-  PetscCall(SbPCDirectSet(pc, package, PETSC_TRUE));
-  PetscCall(PCSetFromOptions(pc));
-  PetscCall(SbPCCheckPivots(pc));
+  PetscCall(modes_factor(m, shift, U, &ksp));
   PetscCall(PetscRandomCreate(PETSC_COMM_WORLD, &random));
   for (int i = 0; i < MODES_BLOCK; i++) PetscCall(VecSetRandom(X[i], random));
   PetscCall(PetscRandomDestroy(&random));
@@ -88,6 +98,5 @@ static inline PetscErrorCode modes_lowest(SbModel m, PetscReal shift, PetscReal 
   PetscCall(VecDestroyVecs(MODES_BLOCK, &Z));
   PetscCall(VecDestroy(&U));
   PetscCall(KSPDestroy(&ksp));
-  PetscCall(MatDestroy(&A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

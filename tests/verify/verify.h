@@ -1,15 +1,19 @@
 /*
-  verify.h - common functions of the verification programs: scenes, boxes with perturbed vertices, 3x3 algebra, Richardson
-  extrapolation.
+  verify.h - common functions of the verification programs: scenes, boxes with perturbed vertices, 3x3
+  algebra, Richardson extrapolation.
 */
 #pragma once
 #include "../file.h"
 #include "../scene.h"
 
-#define VERIFY_TEXT 4096 /* longest scenario of a test, characters */
+#define VERIFY_TEXT TEST_TEXT
 
-/* Map of the vertex at[3] = 0..n of a box with n[3] cells; x is the point of the unit cube on entry. */
-typedef void (*VerifyMap)(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx);
+/* Vertex at[3] = 0..n of a box with n[3] cells, and its map; x is the point of the unit cube on entry. */
+typedef struct {
+  PetscInt n[3], at[3];
+  void *ctx;
+} VerifyPlace;
+typedef void (*VerifyMap)(const VerifyPlace *place, PetscReal x[3]);
 
 static inline PetscInt verify_vertex(const PetscInt n[3], const PetscInt at[3])
 {
@@ -50,12 +54,13 @@ static inline void verify_write_cells(FILE *f, const PetscInt n[3])
 }
 
 /*
-  A box of n[0] x n[1] x n[2] cells with its vertices where `map` puts them, as a gmsh file in the folder for temporary
-  files. Collective; the path is the same on all ranks, rank 0 writes. Remove it with test_file_remove().
+  A box of n[0] x n[1] x n[2] cells with its vertices where `map` puts them, as a gmsh file in the folder for
+  temporary files. Collective; the path is the same on all ranks, rank 0 writes.
 */
 static inline PetscErrorCode verify_mesh_write(const PetscInt n[3], VerifyMap map, void *ctx, char path[512])
 {
-  PetscInt at[3];
+  VerifyPlace p = {.n = {n[0], n[1], n[2]}, .ctx = ctx};
+  PetscInt *at = p.at;
   FILE *f;
 
   PetscFunctionBeginUser;
@@ -69,9 +74,8 @@ static inline PetscErrorCode verify_mesh_write(const PetscInt n[3], VerifyMap ma
           PetscReal x[3];
 
           for (int k = 0; k < 3; k++) x[k] = (PetscReal)at[k] / (PetscReal)n[k];
-          map(n, at, x, ctx);
-          fprintf(f, "%d %.17g %.17g %.17g\n", (int)verify_vertex(n, at) + 1, (double)x[0], (double)x[1],
-                  (double)x[2]);
+          map(&p, x);
+          fprintf(f, "%d %.17g %.17g %.17g\n", (int)verify_vertex(n, at) + 1, x[0], x[1], x[2]);
         }
       }
     }
@@ -90,8 +94,8 @@ static inline PetscInt verify_numbers(SbModel m)
 }
 
 /*
-  A vector of the run by the number of each node that no partition changes, on every rank: [verify_numbers()][3], zero at
-  numbers without a node; the caller frees it with PetscFree().
+  A vector of the run by the number of each node that no partition changes, on every rank:
+  [verify_numbers()][3], zero at numbers without a node; the caller frees it with PetscFree().
 */
 static inline PetscErrorCode verify_gather(SbModel m, Vec U, PetscReal **value)
 {
@@ -146,6 +150,25 @@ static inline void verify_apply(const PetscReal A[9], const PetscReal x[3], Pets
   for (int i = 0; i < 3; i++) y[i] = A[3 * i] * x[0] + A[3 * i + 1] * x[1] + A[3 * i + 2] * x[2];
 }
 
+/* Sets the displacement of a rigid rotation and translation. */
+static inline PetscErrorCode verify_turn(TestScene *t, const PetscReal axis[3], PetscReal angle,
+                                         const PetscReal moved[3])
+{
+  const SbSpace s = t->model->space;
+  PetscReal R[9];
+  PetscScalar *u;
+
+  PetscFunctionBeginUser;
+  verify_rotation(axis, angle, R);
+  PetscCall(VecGetArray(t->run->U, &u));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    verify_apply(R, s->node_x + 3 * i, u + 3 * i);
+    for (int k = 0; k < 3; k++) u[3 * i + k] += moved[k] - s->node_x[3 * i + k];
+  }
+  PetscCall(VecRestoreArray(t->run->U, &u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Richardson extrapolation of two values, the second with half the mesh size, error of the given order. */
 static inline PetscReal verify_extrapolate(PetscReal coarse, PetscReal fine, PetscReal order)
 {
@@ -158,31 +181,6 @@ static inline PetscReal verify_aitken(const PetscReal v[3])
   return v[2] - PetscSqr(v[2] - v[1]) / ((v[2] - v[1]) - (v[1] - v[0]));
 }
 
-/* test_scene_open() of options in printf format. */
-static inline PetscErrorCode verify_vopen(TestScene *t, const char *format, va_list args)
-{
-  char text[VERIFY_TEXT];
-  size_t length;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscVSNPrintf(text, sizeof(text), format, &length, args));
-  PetscCheck(length <= sizeof(text), PETSC_COMM_SELF, PETSC_ERR_PLIB, "%d characters, room for %d",
-             (int)length, VERIFY_TEXT);
-  PetscCall(test_scene_open(text, t));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static inline PetscErrorCode verify_open(TestScene *t, const char *format, ...)
-{
-  va_list args;
-
-  PetscFunctionBeginUser;
-  va_start(args, format);
-  PetscCall(verify_vopen(t, format, args));
-  va_end(args);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Checks that a run reaches its planned end. */
 static inline PetscErrorCode verify_solve(TestScene *t, const char *what)
 {
@@ -192,44 +190,68 @@ static inline PetscErrorCode verify_solve(TestScene *t, const char *what)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/*
+  Order of Newton's method: errors after one iteration from the solution with a perturbation of `size`, and of
+  a tenth of it; `ripple` is any displacement.
+*/
+static inline PetscErrorCode verify_newton(TestScene *t, void (*ripple)(const PetscReal x[3], PetscReal v[3]),
+                                           PetscReal size, PetscReal error[2], PetscReal *order)
+{
+  Vec X;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(t->run->U, &X));
+  PetscCall(SNESSetTolerances(t->run->snes, 0., 0., 0., 1, SB_UNLIMITED));
+  for (int k = 0; k < 2; k++) {
+    PetscCall(test_fill(t->model, ripple, X));
+    PetscCall(VecAYPX(X, k ? 0.1 * size : size, t->run->U));
+    PetscCall(SbModelPrescribe(t->model, 1., X));
+    PetscCall(SNESSolve(t->run->snes, NULL, X));
+    PetscCall(VecAXPY(X, -1., t->run->U));
+    PetscCall(VecNorm(X, NORM_INFINITY, &error[k]));
+  }
+  *order = PetscLog10Real(error[0] / error[1]);
+  PetscCall(VecDestroy(&X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Title of the checks that follow. */
 static char verify_title[256];
 
-static inline void verify_case(const char *format, ...)
+static inline void PETSC_ATTRIBUTE_FORMAT(1, 2) verify_case(const char *format, ...)
 {
   va_list args;
 
   va_start(args, format);
   (void)vsnprintf(verify_title, sizeof(verify_title), format, args);
   va_end(args);
-  (void)PetscPrintf(PETSC_COMM_WORLD, "  %s\n", verify_title);
+  test_print("  %s\n", verify_title);
 }
 
 /* Prints a number that a report quotes. */
 static inline void verify_show(const char *what, PetscReal value)
 {
-  (void)PetscPrintf(PETSC_COMM_WORLD, "    %s: %.5g\n", what, (double)value);
+  test_print("    %s: %.5g\n", what, value);
 }
 
 /* Checks that print the compared values, also if they pass. */
 #define VERIFY_NEAR(value, expected, tolerance, what)                                                       \
   do {                                                                                                      \
     const double verify_v = (double)(value), verify_e = (double)(expected), verify_t = (double)(tolerance); \
-    (void)PetscPrintf(PETSC_COMM_WORLD, "    %s: %.7g (%.7g within %.2g)\n", what, verify_v, verify_e,      \
-                      verify_t);                                                                            \
+    test_print("    %s: %.7g (%.7g within %.2g)\n", what, verify_v, verify_e, verify_t);                    \
     SB_CHECK(fabs(verify_v - verify_e) <= verify_t, "%s: %s: %.15g, expected %.15g within %.3g",            \
              verify_title, what, verify_v, verify_e, verify_t);                                             \
   } while (0)
 #define VERIFY_LESS(value, bound, what)                                                                      \
   do {                                                                                                       \
     const double verify_v = (double)(value), verify_b = (double)(bound);                                     \
-    (void)PetscPrintf(PETSC_COMM_WORLD, "    %s: %.5g (below %.3g)\n", what, verify_v, verify_b);            \
+    test_print("    %s: %.5g (below %.3g)\n", what, verify_v, verify_b);                                     \
     SB_CHECK(verify_v < verify_b, "%s: %s: %.15g, not below %.15g", verify_title, what, verify_v, verify_b); \
   } while (0)
 #define VERIFY_MORE(value, bound, what)                                                                      \
   do {                                                                                                       \
     const double verify_v = (double)(value), verify_b = (double)(bound);                                     \
-    (void)PetscPrintf(PETSC_COMM_WORLD, "    %s: %.5g (above %.3g)\n", what, verify_v, verify_b);            \
+    test_print("    %s: %.5g (above %.3g)\n", what, verify_v, verify_b);                                     \
     SB_CHECK(verify_v > verify_b, "%s: %s: %.15g, not above %.15g", verify_title, what, verify_v, verify_b); \
   } while (0)
 

@@ -6,8 +6,8 @@
 
       L1 - L0 = h sum x1 x f + h sum m v1 x v0,
 
-  where the internal forces have no torque. The difference to the last sum is the torque of the contact forces: it is zero
-  because the contact energy of a pair is invariant under rotation of both bodies.
+  where the internal forces have no torque. The difference to the last sum is the torque of the contact
+  forces: it is zero because the contact energy of a pair is invariant under rotation of both bodies.
 */
 #include "contact.h"
 
@@ -110,7 +110,7 @@ static PetscErrorCode check(const char *element, PetscReal dt, PetscReal rest)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(verify_open(
+  PetscCall(test_open(
     &t,
     "-bodies a,b -body_a_mesh box:0.1,0.1,0.1:2 -body_b_mesh box:0.1,0.08,0.1:3 "
     "-body_b_translate 0.13,0.03,0.02 -body_b_rotate 1,2,3,20 -body_a_material corotated -body_a_young 2e4 "
@@ -118,22 +118,19 @@ static PetscErrorCode check(const char *element, PetscReal dt, PetscReal rest)
     "-body_b_element %s -body_a_velocity 0.8,0,0 -body_b_velocity -1,0,0 -effects meet "
     "-effect_meet_type contact -time euler_implicit -ts_dt %g -ts_max_time 0.1 -ksp_rtol 1e-11 -snes_rtol "
     "1e-12",
-    element, element, (double)dt));
+    element, element, dt));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch, &w));
   PetscCall(verify_solve(&t, "angular"));
-  PetscCall(
-    PetscPrintf(PETSC_COMM_WORLD,
-                "  %s, steps of %g ms: bodies turned each other by %.3e kg m^2/s, off in a "
-                "step by %.1e, torque of all contacts %.1e, without it %.1e, %g pairs, momentum %.1e\n",
-                element, (double)(1000 * dt), (double)w.most, (double)w.missing, (double)w.torque,
-                (double)w.rest, (double)w.contacts, (double)w.momentum));
+  test_print("  %s, steps of %g ms: bodies turned each other by %.3e kg m^2/s, off in a "
+             "step by %.1e, torque of all contacts %.1e, without it %.1e, %g pairs, momentum %.1e\n",
+             element, 1000 * dt, w.most, w.missing, w.torque, w.rest, w.contacts, w.momentum);
   SB_CHECK(w.contacts > 3 && w.most > 1e-4, "%s: the blocks do not meet", element);
   SB_CHECK(w.rest < rest * w.most, "%s: angular momentum changed by %g kg m^2/s that no contact explains",
-           element, (double)w.rest);
+           element, w.rest);
   SB_CHECK(w.torque < tolerance * w.most, "%s: contact changed the angular momentum by %g of %g kg m^2/s",
-           element, (double)w.torque, (double)w.most);
-  SB_CHECK(w.momentum < 1e-11, "momentum %g kg m/s", (double)w.momentum);
+           element, w.torque, w.most);
+  SB_CHECK(w.momentum < 1e-11, "momentum %g kg m/s", w.momentum);
   PetscCall(VecDestroy(&w.V));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -141,14 +138,11 @@ static PetscErrorCode check(const char *element, PetscReal dt, PetscReal rest)
 
 int main(int argc, char **argv)
 {
-  PetscMPIInt size;
-
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(check("p1", 0.001, 1e-10));
   PetscCall(check("cr", 0.001, 5e-6));
   PetscCall(check("p2", 0.001, 1e-10));
-  if (size > 1) SB_TEST_END(); /* many solves of a small system: on one rank only */
+  if (test_size > 1) SB_TEST_END(); /* many solves of a small system: on one rank only */
   PetscCall(check("p1", 0.0005, 1e-10));
   SB_TEST_END();
 }

@@ -40,8 +40,9 @@ static PetscErrorCode motion(const char *options, Record *r, PetscInt *n, PetscR
 }
 
 /*
-  The preconditioners of `rotated` and `two_level` keep something from solve to solve and are renewed when the operator is a new one, as the
-  one that contact constraints wrap: with a `tolerance` scenes with them may differ by what solves leave.
+  The preconditioners of `rotated` and `two_level` keep something from solve to solve and are renewed when the
+  operator is a new one, as the one that contact constraints wrap: with a `tolerance` scenes with them may
+  differ by what solves leave.
 */
 static PetscErrorCode check_named(const char *element, const char *time, const char *solver,
                                   PetscReal tolerance)
@@ -76,7 +77,7 @@ static PetscErrorCode check_named(const char *element, const char *time, const c
       VERIFY_LESS(off, tolerance, "change of the motion");
     else
       SB_CHECK(!memcmp(value[0], value[k], (size_t)(2 * n) * sizeof(PetscReal)),
-               "%s: the motion differs by %g", verify_title, (double)off);
+               "%s: the motion differs by %g", verify_title, off);
   }
   for (int k = 0; k < 4; k++) PetscCall(PetscFree(value[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -107,7 +108,6 @@ static PetscErrorCode check_beside(const char *solver, PetscReal tolerance)
   VERIFY_MORE(record_max(&r, "meet_contacts"), 3, "pairs of the others");
   VERIFY_LESS(verify_difference(n, alone, beside), tolerance, "change of the displacement");
   VERIFY_LESS(verify_difference(n, alone + n, beside + all), tolerance, "change of the velocity");
-  PetscCall(record_free(&r));
   PetscCall(PetscFree(alone));
   PetscCall(PetscFree(beside));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -8,9 +8,9 @@
               6.38808 J, computed with graded hexahedra of high order
     elastica  slender bar with an end load of fixed direction, alpha = P L^2/(E I) (Bisshopp and Drucker 1945)
 
-  P1 is too stiff in bending: errors decrease as h^2 but are large, so results on several meshes are extrapolated to h = 0
-  (Richardson). With nu = 0 plane bending does not depend on the width: one layer of cells between two symmetry planes
-  is enough.
+  P1 is too stiff in bending: errors decrease as h^2 but are large, so results on several meshes are
+  extrapolated to h = 0 (Richardson). With nu = 0 plane bending does not depend on the width: one layer of
+  cells between two symmetry planes is enough.
 */
 #include "verify.h"
 
@@ -26,11 +26,9 @@ static PetscErrorCode solve(const char *options, Bar *bar)
 {
   SbEnergies e;
   TestScene t;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), "-bodies a -time static %s", options));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t, "-bodies a -time static %s", options));
   PetscCall(verify_solve(&t, bar->what));
   PetscCall(test_value_at(t.model, t.run->U, bar->end, bar->u));
   PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &e));
@@ -57,19 +55,15 @@ static PetscErrorCode hanging_error(PetscInt n, const char *more, PetscReal *err
   TestScene t;
   Vec U;
   PetscReal size;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscSNPrintf(text, sizeof(text),
-                  "-bodies a -time static -body_a_mesh box:0.3,0.3,1:%d -body_a_translate -0.1,-0.2,0 "
-                  "-body_a_material linear -body_a_young %g -body_a_poisson %g -body_a_density 1000 %s "
-                  "-effects gravity,top "
-                  "-effect_top_type prescribed_displacement -effect_top_on zmax "
-                  "-effect_top_displacement %.17g*x;%.17g*y;%.17g*(x^2+y^2)",
-                  (int)n, HANG_E, HANG_NU, more, -HANG_NU * HANG_W / HANG_E, -HANG_NU * HANG_W / HANG_E,
-                  0.5 * HANG_NU * HANG_W / HANG_E));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      "-bodies a -time static -body_a_mesh box:0.3,0.3,1:%d -body_a_translate -0.1,-0.2,0 "
+                      "-body_a_material linear -body_a_young %g -body_a_poisson %g -body_a_density 1000 %s "
+                      "-effects gravity,top -effect_top_type prescribed_displacement -effect_top_on zmax "
+                      "-effect_top_displacement %.17g*x;%.17g*y;%.17g*(x^2+y^2)",
+                      (int)n, HANG_E, HANG_NU, more, -HANG_NU * HANG_W / HANG_E, -HANG_NU * HANG_W / HANG_E,
+                      0.5 * HANG_NU * HANG_W / HANG_E));
   PetscCall(verify_solve(&t, "hanging bar"));
   PetscCall(VecDuplicate(t.run->U, &U));
   PetscCall(test_fill(t.model, hanging_exact, U));
@@ -89,23 +83,20 @@ static PetscErrorCode check_hanging(void)
   PetscFunctionBeginUser;
   for (int k = 0; k < 3; k++) PetscCall(hanging_error(2 << k, "", &error[k]));
   order = PetscLog2Real(error[1] / error[2]);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  hanging bar: largest error at vertices n 2, 4, 8: %.2e %.2e %.2e of the largest "
-                        "displacement, order %.2f\n",
-                        (double)error[0], (double)error[1], (double)error[2], (double)order));
+  test_print("  hanging bar: largest error at vertices n 2, 4, 8: %.2e %.2e %.2e of the largest "
+             "displacement, order %.2f\n",
+             error[0], error[1], error[2], order);
   /* the maximum over the vertices is not smooth in h: the order deviates by 0.3; the error itself is small */
   SB_CHECK_NEAR(order, 2., 0.3, "order at the vertices of the hanging bar");
-  SB_CHECK(error[2] < 1e-3, "hanging bar, n = 8: error of %g", (double)error[2]);
+  SB_CHECK(error[2] < 1e-3, "hanging bar, n = 8: error of %g", error[2]);
   /* the displacement is quadratic: P2 represents it except for the volume, which is constant in each tet */
   PetscCall(hanging_error(2, "-body_a_element p2 -body_a_volume pointwise -solver direct", &error[0]));
   PetscCall(hanging_error(2, "-body_a_element p2 -solver direct", &error[1]));
   PetscCall(hanging_error(4, "-body_a_element p2 -solver direct", &error[2]));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "    P2: n 2 with the volume at points %.1e; with its mean n 2, 4: %.2e %.2e, order %.2f\n",
-    (double)error[0], (double)error[1], (double)error[2], (double)PetscLog2Real(error[1] / error[2])));
-  SB_CHECK(error[0] < 1e-10, "P2, volume at points: error of %g", (double)error[0]);
-  SB_CHECK(error[2] < 1e-3, "P2, n = 4: error of %g", (double)error[2]);
+  test_print("    P2: n 2 with the volume at points %.1e; with its mean n 2, 4: %.2e %.2e, order %.2f\n",
+             error[0], error[1], error[2], PetscLog2Real(error[1] / error[2]));
+  SB_CHECK(error[0] < 1e-10, "P2, volume at points: error of %g", error[0]);
+  SB_CHECK(error[2] < 1e-3, "P2, n = 4: error of %g", error[2]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -123,33 +114,13 @@ static PetscErrorCode shear(PetscInt n, const char *element, PetscReal *w)
   char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
-    "-body_a_mesh box:1,0.05,0.2:%d,1,%d -body_a_element %s -body_a_material linear "
-    "-body_a_young %g -body_a_poisson 0 -body_a_density 1" PLANE " -effect_end_vector 0;0;%.17g*z*(%g-z)",
-    (int)(5 * n), (int)n, element, (double)E, (double)(6. * P / (h * h * h)), (double)h));
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          "-body_a_mesh box:1,0.05,0.2:%d,1,%d -body_a_element %s -body_a_material linear "
+                          "-body_a_young %g -body_a_poisson 0 -body_a_density 1" PLANE
+                          " -effect_end_vector 0;0;%.17g*z*(%g-z)",
+                          (int)(5 * n), (int)n, element, E, 6. * P / (h * h * h), h));
   PetscCall(solve(text, &bar));
   *w = bar.u[2] / (4. * P * L * L * L / (E * h * h * h) + P * L / (5. / 6. * G * h));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* End load with the parabolic shear of beam theory. */
-static PetscErrorCode check_shear(void)
-{
-  PetscReal w[4], limit;
-
-  PetscFunctionBeginUser;
-  for (int k = 0; k < 3; k++) PetscCall(shear(4 << k, "p1", &w[k]));
-  PetscCall(shear(2, "p2", &w[3]));
-  limit = verify_extrapolate(w[1], w[2], 2.);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  cantilever with end load, n 4, 8, 16: %.5f %.5f %.5f of Timoshenko, extrapolated "
-                        "%.5f; P2, n 2: %.5f\n",
-                        (double)w[0], (double)w[1], (double)w[2], (double)limit, (double)w[3]));
-  SB_CHECK_NEAR(PetscLog2Real((1. - w[1]) / (1. - w[2])), 2., 0.15, "order of the end deflection");
-  /* the clamp keeps the end section plane, beam theory does not: about (h/L)^3 / 10 */
-  SB_CHECK_NEAR(limit, 1., 2e-3, "extrapolated deflection / Timoshenko");
-  SB_CHECK_NEAR(w[3], 1., 2e-3, "deflection with P2 / Timoshenko");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -173,16 +144,14 @@ static PetscErrorCode check_weight(void)
     u[k] = bar.u[2];
     w[k] = bar.strain;
     /* under given loads the energy of a conforming element is below the exact one */
-    SB_CHECK(w[k] < strain, "strain energy of %g J is above the exact one", (double)w[k]);
+    SB_CHECK(w[k] < strain, "strain energy of %g J is above the exact one", w[k]);
   }
   limit_u = verify_aitken(u);
   limit_w = verify_aitken(w);
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  clamped bar, n 4, 8, 16: end %.6f %.6f %.6f m, extrapolated %.6f (reference %.6f)\n"
-    "    strain energy %.5f %.5f %.5f J, extrapolated %.5f (reference %.5f), order %.2f\n",
-    (double)u[0], (double)u[1], (double)u[2], (double)limit_u, (double)end, (double)w[0], (double)w[1],
-    (double)w[2], (double)limit_w, (double)strain, (double)PetscLog2Real((w[1] - w[0]) / (w[2] - w[1]))));
+  test_print("  clamped bar, n 4, 8, 16: end %.6f %.6f %.6f m, extrapolated %.6f (reference %.6f)\n"
+             "    strain energy %.5f %.5f %.5f J, extrapolated %.5f (reference %.5f), order %.2f\n",
+             u[0], u[1], u[2], limit_u, end, w[0], w[1], w[2], limit_w, strain,
+             PetscLog2Real((w[1] - w[0]) / (w[2] - w[1])));
   SB_CHECK_NEAR(limit_u, end, 5e-3 * PetscAbsReal(end), "extrapolated end displacement");
   SB_CHECK_NEAR(limit_w, strain, 5e-3 * strain, "extrapolated strain energy");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -201,7 +170,7 @@ static PetscErrorCode elastica(const char *law, const char *element, PetscInt n,
                           "-body_a_mesh box:1,0.02,0.05:%d,1,%d -body_a_element %s -body_a_material %s "
                           "-body_a_tangent exact -body_a_young %g -body_a_poisson 0 -body_a_density 1 " PLANE
                           " -effect_end_vector 0;0;%.17g",
-                          (int)(20 * n), (int)n, element, law, (double)E, (double)(alpha * E * h * h / 12.)));
+                          (int)(20 * n), (int)n, element, law, E, alpha * E * h * h / 12.));
   PetscCall(solve(text, &bar));
   value[0] = -bar.u[0];
   value[1] = bar.u[2];
@@ -221,11 +190,10 @@ static PetscErrorCode check_elastica(const char *law, PetscReal alpha, PetscReal
   PetscCall(elastica(law, "p2", 2, alpha, quadratic));
   for (int k = 0; k < 2; k++) limit[k] = verify_extrapolate(coarse[k], fine[k], 2.);
   for (int k = 0; k < 2; k++) {
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                          "  elastica, %s, alpha %g, %s n 8, 16: %.5f %.5f, extrapolated %.5f, P2 n 2: %.5f "
-                          "(exact %.5f)\n",
-                          law, (double)alpha, k ? "deflection" : "shortening", (double)coarse[k],
-                          (double)fine[k], (double)limit[k], (double)quadratic[k], (double)exact[k]));
+    test_print("  elastica, %s, alpha %g, %s n 8, 16: %.5f %.5f, extrapolated %.5f, P2 n 2: %.5f "
+               "(exact %.5f)\n",
+               law, alpha, k ? "deflection" : "shortening", coarse[k], fine[k], limit[k], quadratic[k],
+               exact[k]);
     /* 1 % of the length: remaining error of the extrapolation, and the finite slenderness */
     SB_CHECK_NEAR(limit[k], exact[k], 0.01 * deflection, k ? "deflection" : "shortening");
     SB_CHECK_NEAR(quadratic[k], exact[k], 0.01 * deflection, "P2");
@@ -235,9 +203,21 @@ static PetscErrorCode check_elastica(const char *law, PetscReal alpha, PetscReal
 
 int main(int argc, char **argv)
 {
+  PetscReal w[4], limit;
+
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_hanging());
-  PetscCall(check_shear());
+  /* end load with the parabolic shear of beam theory */
+  for (int k = 0; k < 3; k++) PetscCall(shear(4 << k, "p1", &w[k]));
+  PetscCall(shear(2, "p2", &w[3]));
+  limit = verify_extrapolate(w[1], w[2], 2.);
+  test_print("  cantilever with end load, n 4, 8, 16: %.5f %.5f %.5f of Timoshenko, extrapolated "
+             "%.5f; P2, n 2: %.5f\n",
+             w[0], w[1], w[2], limit, w[3]);
+  SB_CHECK_NEAR(PetscLog2Real((1. - w[1]) / (1. - w[2])), 2., 0.15, "order of the end deflection");
+  /* the clamp keeps the end section plane, beam theory does not: about (h/L)^3 / 10 */
+  SB_CHECK_NEAR(limit, 1., 2e-3, "extrapolated deflection / Timoshenko");
+  SB_CHECK_NEAR(w[3], 1., 2e-3, "deflection with P2 / Timoshenko");
   PetscCall(check_weight());
   PetscCall(check_elastica("corotated", 1., 0.056433, 0.301721));
   PetscCall(check_elastica("corotated", 2., 0.160642, 0.493457));

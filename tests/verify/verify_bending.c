@@ -1,8 +1,8 @@
 // @ranks 1
 /*
-  Bending near nu = 1/2 with CR, DG and P2, compared with P1: the clamped bar under its weight and Cook's membrane
-  (references: high-order elements, mixed near nu = 1/2). The penalty gamma1 is a compromise between both problems and
-  verify_locking.c; docs/reports/locking.md has finer meshes.
+  Bending near nu = 1/2 with CR, DG and P2, compared with P1: the clamped bar under its weight and Cook's
+  membrane (references: high-order elements, mixed near nu = 1/2). The penalty gamma1 is a compromise between
+  both problems and verify_locking.c; docs/reports/locking.md has finer meshes.
 */
 #include "locking.h"
 
@@ -23,13 +23,10 @@ static PetscErrorCode check_bar(PetscReal nu, PetscReal tip, PetscReal energy)
 
     PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_element %s -solver cholmod", element));
     PetscCall(locking_bar(n, nu, more, value, &cost));
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  bar, nu %-6g %s n %d: %.6f (%.2f %%), %.5f J (%.2f %%)\n",
-                          (double)nu, element, (int)n, (double)value[0],
-                          (double)(100. * (value[0] / tip - 1.)), (double)value[1],
-                          (double)(100. * (value[1] / energy - 1.))));
+    test_print("  bar, nu %-6g %s n %d: %.6f (%.2f %%), %.5f J (%.2f %%)\n", nu, element, (int)n, value[0],
+               100. * (value[0] / tip - 1.), value[1], 100. * (value[1] / energy - 1.));
     if (e == 0) {
-      SB_CHECK(value[0] / tip < (nu > 0.4 ? 0.8 : 0.9), "P1 bends by %g: too much for this test",
-               (double)value[0]);
+      SB_CHECK(value[0] / tip < (nu > 0.4 ? 0.8 : 0.9), "P1 bends by %g: too much for this test", value[0]);
     } else {
       SB_CHECK_NEAR(value[0], tip, (n == 4 ? 0.02 : 0.01) * PetscAbsReal(tip), element);
       SB_CHECK_NEAR(value[1], energy, (n == 4 ? 0.03 : 0.01) * energy, element);
@@ -49,15 +46,13 @@ static PetscErrorCode check_cook(PetscReal nu, PetscReal corner, PetscReal middl
   for (int e = 0; e < ELEMENTS; e++) {
     PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_element %s -solver cholmod", elements[e]));
     PetscCall(locking_cook("meshes/cook.msh", nu, more, value, &cost));
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  Cook, nu %-8g %s: %.4f (%.2f %%), %.4f (%.2f %%)\n",
-                          (double)nu, elements[e], (double)value[0],
-                          (double)(100. * (value[0] / corner - 1.)), (double)value[1],
-                          (double)(100. * (value[1] / middle - 1.))));
+    test_print("  Cook, nu %-8g %s: %.4f (%.2f %%), %.4f (%.2f %%)\n", nu, elements[e], value[0],
+               100. * (value[0] / corner - 1.), value[1], 100. * (value[1] / middle - 1.));
     if (e) {
       SB_CHECK_NEAR(value[0], corner, 0.015 * corner, elements[e]);
       SB_CHECK_NEAR(value[1], middle, 0.015 * middle, elements[e]);
     } else if (nu > 0.49) {
-      SB_CHECK(value[0] < 0.75 * corner, "P1 moves by %g: too much for this test", (double)value[0]);
+      SB_CHECK(value[0] < 0.75 * corner, "P1 moves by %g: too much for this test", value[0]);
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

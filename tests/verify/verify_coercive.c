@@ -1,8 +1,9 @@
 // @ranks 1
 /*
-  Positive semi-definiteness of the stiffness of CR, DG and P2 for all meshes, Poisson ratios and penalties. All eigenvalues of
-  D^-1/2 K D^-1/2, D the diagonal of K, of free bodies on small meshes by LAPACK: exactly six are zero, the rigid modes,
-  none is negative. The scaling removes mesh size: the largest eigenvalue is between 1 and the number of entries of a row.
+  Positive semi-definiteness of the stiffness of CR, DG and P2 for all meshes, Poisson ratios and penalties.
+  All eigenvalues of D^-1/2 K D^-1/2, D the diagonal of K, of free bodies on small meshes by LAPACK: exactly
+  six are zero, the rigid modes, none is negative. The scaling removes mesh size: the largest eigenvalue is
+  between 1 and the number of entries of a row.
 
     meshes    random perturbations of vertices; size ratios of tets of 1000 to 1; tets with angles of 0.06 degrees
     gammas    CR and DG with default penalties, and DG with both gammas at 0.01: positive for every positive gamma
@@ -12,7 +13,8 @@
               the solid is stable, as neo-Hookean P2; the limits are printed
     not so    with gamma1 = 1e-12 CR has many zero-energy modes (Falk 1991): the test detects them
 
-  Rounding: matrix entries are accurate to 1e-15 of the largest one, so eigenvalues to about 1e-14 of the largest one.
+  Rounding: matrix entries are accurate to 1e-15 of the largest one, so eigenvalues to about 1e-14 of the
+  largest one.
 */
 #include "verify.h"
 
@@ -28,14 +30,14 @@ typedef struct {
   PetscRandom random;
 } MeshContext;
 
-static void place_vertex(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void place_vertex(const VerifyPlace *place, PetscReal x[3])
 {
-  const MeshContext *m = (const MeshContext *)ctx;
+  const MeshContext *m = (const MeshContext *)place->ctx;
   PetscReal r[3];
 
   for (int k = 0; k < 3; k++) (void)PetscRandomGetValueReal(m->random, &r[k]);
   if (m->shape == MOVED) {
-    for (int k = 0; k < 3; k++) x[k] += (0.5 * r[k] - 0.25) / (PetscReal)n[k];
+    for (int k = 0; k < 3; k++) x[k] += (0.5 * r[k] - 0.25) / (PetscReal)place->n[k];
   } else if (m->shape == GRADED) {
     /* a cone truncated at a thousandth of its length */
     const PetscReal size = PetscPowReal(10., 3. * (x[0] - 1.));
@@ -43,46 +45,13 @@ static void place_vertex(const PetscInt n[3], const PetscInt at[3], PetscReal x[
     x[0] = size;
     x[1] *= size * (1. + 0.1 * r[1]);
     x[2] *= size * (1. + 0.1 * r[2]);
-  } else if (at[0] == 1 && at[1] == 0) {
+  } else if (place->at[0] == 1 && place->at[1] == 0) {
     /* a line of vertices moved to within a thousandth of the plane of faces */
     const PetscReal part = 0.499 * (1. - 0.002 * r[0]);
 
-    x[0] -= part / (PetscReal)n[0];
-    x[1] += part / (PetscReal)n[1];
+    x[0] -= part / (PetscReal)place->n[0];
+    x[1] += part / (PetscReal)place->n[1];
   }
-}
-
-static PetscErrorCode write_mesh(Shape shape, char path[512])
-{
-  static const PetscInt cells[][3] = {{2, 2, 2}, {6, 1, 1}, {2, 2, 2}};
-  MeshContext m = {.shape = shape};
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscRandomCreate(PETSC_COMM_SELF, &m.random));
-  PetscCall(PetscRandomSetSeed(m.random, 7));
-  PetscCall(PetscRandomSeed(m.random));
-  PetscCall(verify_mesh_write(cells[shape], place_vertex, &m, path));
-  PetscCall(PetscRandomDestroy(&m.random));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Rigid rotation of the body about (1, 2, 3). */
-static PetscErrorCode turn(TestScene *t, PetscReal angle)
-{
-  const PetscReal axis[3] = {1., 2., 3.};
-  const SbSpace s = t->model->space;
-  PetscReal R[9];
-  PetscScalar *u;
-
-  PetscFunctionBeginUser;
-  verify_rotation(axis, angle, R);
-  PetscCall(VecGetArray(t->run->U, &u));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    verify_apply(R, s->node_x + 3 * i, u + 3 * i);
-    for (int k = 0; k < 3; k++) u[3 * i + k] -= s->node_x[3 * i + k];
-  }
-  PetscCall(VecRestoreArray(t->run->U, &u));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Eigenvalues of the scaled tangent, ascending; the caller frees them. */
@@ -126,15 +95,13 @@ static PetscErrorCode check_case(Shape shape, const char *path, const Case *c, P
   TestScene t;
   PetscInt n, zeros = 0, soft = 0;
   PetscReal *w;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material %s "
-                          "-body_a_young 1e5 -body_a_poisson %.17g -body_a_density 1 -solver cg_jacobi %s",
-                          path, c->element, c->law, (double)c->nu, c->gammas));
-  PetscCall(test_scene_open(text, &t));
-  PetscCall(turn(&t, c->angle));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material %s "
+                      "-body_a_young 1e5 -body_a_poisson %.17g -body_a_density 1 -solver cg_jacobi %s",
+                      path, c->element, c->law, c->nu, c->gammas));
+  PetscCall(verify_turn(&t, (const PetscReal[3]){1., 2., 3.}, c->angle, (const PetscReal[3]){0., 0., 0.}));
   PetscCall(spectrum(&t, &n, &w));
   for (PetscInt i = 0; i < n; i++) {
     zeros += w[i] <= ROUNDING * w[n - 1];
@@ -143,16 +110,15 @@ static PetscErrorCode check_case(Shape shape, const char *path, const Case *c, P
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD,
     "  %s %-10s %-7s nu %-8g %s: %4d unknowns, eigenvalues %9.1e .. %8.1e | %.3e .. %.2f, %d zero\n",
-    c->element, c->law, shapes[shape], (double)c->nu, c->gammas, (int)n, (double)w[0], (double)w[5],
-    (double)w[6], (double)w[n - 1], (int)zeros));
+    c->element, c->law, shapes[shape], c->nu, c->gammas, (int)n, w[0], w[5], w[6], w[n - 1], (int)zeros));
   if (shape == SLIVERS)
     SB_CHECK(t.model->body[0].min_dihedral < 1., "the flattest tet has %g degrees",
-             (double)t.model->body[0].min_dihedral);
+             t.model->body[0].min_dihedral);
   if (sound) {
-    SB_CHECK(w[0] > -ROUNDING * w[n - 1], "%s, %s, nu %g %s: eigenvalue %g", c->element, shapes[shape],
-             (double)c->nu, c->gammas, (double)w[0]);
-    SB_CHECK(zeros == 6, "%s, %s, nu %g %s: %d motions without energy", c->element, shapes[shape],
-             (double)c->nu, c->gammas, (int)zeros);
+    SB_CHECK(w[0] > -ROUNDING * w[n - 1], "%s, %s, nu %g %s: eigenvalue %g", c->element, shapes[shape], c->nu,
+             c->gammas, w[0]);
+    SB_CHECK(zeros == 6, "%s, %s, nu %g %s: %d motions without energy", c->element, shapes[shape], c->nu,
+             c->gammas, (int)zeros);
   } else {
     SB_CHECK(soft > 30, "%s, %s %s: %d soft motions, which the test should see", c->element, shapes[shape],
              c->gammas, (int)soft);
@@ -170,15 +136,13 @@ static PetscErrorCode pressed(const char *element, const char *law, PetscReal ra
   SbMaterial m;
   PetscReal *w, eps;
   PetscScalar *u;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh box:1,1,1:2 -body_a_element %s -body_a_material %s "
-                          "-body_a_tangent exact -body_a_young 1e5 -body_a_poisson 0.499 -body_a_density 1 "
-                          "-solver cg_jacobi -effects hold -effect_hold_type fixed -effect_hold_on boundary",
-                          element, law));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh box:1,1,1:2 -body_a_element %s -body_a_material %s "
+                      "-body_a_tangent exact -body_a_young 1e5 -body_a_poisson 0.499 -body_a_density 1 "
+                      "-solver cg_jacobi -effects hold -effect_hold_type fixed -effect_hold_on boundary",
+                      element, law));
   m = t.model->material[0];
   eps = ratio * m->mu / (3. * SbMaterialBulkModulus(m));
   PetscCall(VecGetArray(t.run->U, &u));
@@ -205,9 +169,8 @@ static PetscErrorCode check_pressed(const char *element, const char *law)
       reached[stretched] = ratios[k];
     }
   }
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  %s %-10s squeezed: positive up to %g mu; stretched: up to %g mu\n", element, law,
-                        (double)reached[0], (double)reached[1]));
+  test_print("  %s %-10s squeezed: positive up to %g mu; stretched: up to %g mu\n", element, law, reached[0],
+             reached[1]);
   /* the energy of the mean volume, summed over the body, is that of its boundary */
   if (!strcmp(element, "p2") && !strcmp(law, "neohookean"))
     SB_CHECK(reached[0] == 50. && reached[1] == 50., "P2 is not stable under even pressures");
@@ -224,11 +187,17 @@ static PetscErrorCode check_mesh(Shape shape)
   static const PetscReal nus[] = {0.3, 0.4999, 0.499999};
   static const char *const laws[] = {"corotated -body_a_tangent warped", "corotated -body_a_tangent exact",
                                      "stvk", "neohookean"};
+  static const PetscInt cells[][3] = {{2, 2, 2}, {6, 1, 1}, {2, 2, 2}};
   static const char *const little = "-body_a_gamma0 0.01 -body_a_gamma1 0.01";
+  MeshContext m = {.shape = shape};
   char path[512];
 
   PetscFunctionBeginUser;
-  PetscCall(write_mesh(shape, path));
+  PetscCall(PetscRandomCreate(PETSC_COMM_SELF, &m.random));
+  PetscCall(PetscRandomSetSeed(m.random, 7));
+  PetscCall(PetscRandomSeed(m.random));
+  PetscCall(verify_mesh_write(cells[shape], place_vertex, &m, path));
+  PetscCall(PetscRandomDestroy(&m.random));
   for (int k = 0; k < 3; k++) {
     PetscCall(check_case(shape, path, &(Case){"cr", "linear", "", nus[k], 0.}, PETSC_TRUE));
     PetscCall(check_case(shape, path, &(Case){"dg", "linear", "", nus[k], 0.}, PETSC_TRUE));
@@ -242,7 +211,6 @@ static PetscErrorCode check_mesh(Shape shape)
     PetscCall(check_case(shape, path, &(Case){"dg", laws[law], "", 0.4999, 2.}, PETSC_TRUE));
     PetscCall(check_case(shape, path, &(Case){"p2", laws[law], "", 0.4999, 2.}, PETSC_TRUE));
   }
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

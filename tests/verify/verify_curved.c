@@ -51,20 +51,17 @@ static PetscErrorCode check_patch(const char *mesh, const char *law, const char 
   PetscReal error;
 
   PetscFunctionBeginUser;
-  PetscCall(verify_open(
-    &t,
-    "-bodies a" VERIFY_BODY(
-      "a", "%s", "%s", "1e3",
-      "0.45") "-body_a_element p2 -body_a_volume %s %s -sets skin -set_skin_at boundary -effects d "
+  PetscCall(
+    test_open(&t,
+              "-bodies a -body_a_element p2 -body_a_volume %s %s -sets skin -set_skin_at boundary -effects d "
               "-effect_d_type prescribed_displacement -effect_d_on skin -effect_d_displacement "
               "0.02*x+0.03*y-0.01*z;0.015*x-0.02*y+0.02*z;-0.02*x+0.01*y+0.01*z -time static -solver direct "
-              "-snes_rtol 1e-13 "
-              "-snes_atol 0 -snes_stol 1e-13",
-    mesh, law, volume, strcmp(law, "linear") ? "-body_a_tangent exact" : ""));
+              "-snes_rtol 1e-13 -snes_atol 0 -snes_stol 1e-13" VERIFY_BODY("a", "%s", "%s", "1e3", "0.45"),
+              volume, strcmp(law, "linear") ? "-body_a_tangent exact" : "", mesh, law));
   PetscCall(verify_solve(&t, "patch test"));
   PetscCall(affine_error(&t, A, &error));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  patch test, %s, %s: %.1e\n", law, volume, (double)error));
-  SB_CHECK(error < 1e-10, "patch test, %s, %s: %g", law, volume, (double)error);
+  test_print("  patch test, %s, %s: %.1e\n", law, volume, error);
+  SB_CHECK(error < 1e-10, "patch test, %s, %s: %g", law, volume, error);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -113,37 +110,32 @@ static PetscErrorCode check_equilibrium(const char *mesh)
 
   PetscFunctionBeginUser;
   /* K = E / (3 (1 - 2 nu)); the volumetric strain 3 (-1e-3) gives the pressure 3 K 1e-3 */
-  PetscCall(
-    verify_open(&t,
-                "-bodies a" VERIFY_BODY(
-                  "a", "%s", "linear", "1e3",
-                  "0.45") "-body_a_element p2 -sets skin -set_skin_at boundary -effects p -effect_p_type "
-                          "pressure -effect_p_on skin -effect_p_value 10 -effect_p_follower no -time "
-                          "euler_implicit -ts_dt 0.1",
-                mesh));
+  PetscCall(test_open(
+    &t,
+    "-bodies a -body_a_element p2 -sets skin -set_skin_at boundary -effects p -effect_p_type pressure "
+    "-effect_p_on skin -effect_p_value 10 -effect_p_follower no -time euler_implicit -ts_dt 0.1" VERIFY_BODY(
+      "a", "%s", "linear", "1e3", "0.45"),
+    mesh));
   PetscCall(VecDuplicate(t.run->U, &U));
   PetscCall(residual(&t, U, &size));
   PetscCall(test_fill(t.model, shrink, U));
   PetscCall(residual(&t, U, &most));
-  PetscCall(
-    PetscPrintf(PETSC_COMM_WORLD, "  pressure and stress: %.1e of %.1e N\n", (double)most, (double)size));
-  SB_CHECK(most < 1e-12 * size, "pressure and stress leave %g of %g N", (double)most, (double)size);
+  test_print("  pressure and stress: %.1e of %.1e N\n", most, size);
+  SB_CHECK(most < 1e-12 * size, "pressure and stress leave %g of %g N", most, size);
   PetscCall(VecDestroy(&U));
   PetscCall(test_scene_close(&t));
   for (int law = 1; law < 4; law++) {
-    PetscCall(verify_open(
-      &t, "-bodies a" VERIFY_BODY("a", "%s", "%s", "1e3", "0.45") "-body_a_element p2 -time static", mesh,
-      laws[law]));
+    PetscCall(
+      test_open(&t, "-bodies a -body_a_element p2 -time static" VERIFY_BODY("a", "%s", "%s", "1e3", "0.45"),
+                mesh, laws[law]));
     PetscCall(VecDuplicate(t.run->U, &U));
     PetscCall(residual(&t, U, &still));
     PetscCall(test_fill(t.model, turn, U));
     PetscCall(residual(&t, U, &most));
     PetscCall(SbModelEnergies(t.model, U, NULL, &energies));
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  turned, %s: %.1e N, %.1e J\n", laws[law], (double)most,
-                          (double)energies.strain));
+    test_print("  turned, %s: %.1e N, %.1e J\n", laws[law], most, energies.strain);
     SB_CHECK(still < 1e-10 && most < 1e-10 && PetscAbsReal(energies.strain) < 1e-10,
-             "%s: at rest %g, turned %g N, %g J", laws[law], (double)still, (double)most,
-             (double)energies.strain);
+             "%s: at rest %g, turned %g N, %g J", laws[law], still, most, energies.strain);
     PetscCall(VecDestroy(&U));
     PetscCall(test_scene_close(&t));
   }
@@ -159,13 +151,12 @@ static PetscErrorCode check_sums(const char *mesh, const char *mass)
   Vec U, V, F;
 
   PetscFunctionBeginUser;
-  PetscCall(verify_open(
+  PetscCall(test_open(
     &t,
-    "-bodies a" VERIFY_BODY(
-      "a", "%s", "linear", "1e3",
-      "0.3") "-body_a_element p2 -mass %s -sets skin -set_skin_at boundary -effects q -effect_q_type "
-             "traction -effect_q_on skin -effect_q_total 3,0,0 -time euler_implicit -ts_dt 0.1",
-    mesh, mass));
+    "-bodies a -body_a_element p2 -mass %s -sets skin -set_skin_at boundary -effects q -effect_q_type "
+    "traction -effect_q_on skin -effect_q_total 3,0,0 -time euler_implicit -ts_dt 0.1" VERIFY_BODY(
+      "a", "%s", "linear", "1e3", "0.3"),
+    mass, mesh));
   PetscCall(VecDuplicate(t.run->U, &U));
   PetscCall(VecDuplicate(U, &V));
   PetscCall(VecDuplicate(U, &F));
@@ -217,7 +208,7 @@ static PetscErrorCode sphere_error(PetscInt n, PetscBool second, PetscReal nu, c
 
   PetscFunctionBeginUser;
   PetscCall(curved_mesh_write(n, n, curved_shell, second, mesh));
-  PetscCall(verify_open(&t, SHELL, mesh, (double)nu, element));
+  PetscCall(test_open(&t, SHELL, mesh, (double)nu, element));
   PetscCall(verify_solve(&t, "sphere"));
   /* error at the vertices with equal weights; both meshes have the same vertices */
   PetscCall(VecGetArrayRead(t.run->U, &u));
@@ -233,24 +224,22 @@ static PetscErrorCode sphere_error(PetscInt n, PetscBool second, PetscReal nu, c
   PetscCall(VecRestoreArrayRead(t.run->U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, t.model->comm));
   *error = PetscSqrtReal(sum[0] / sum[1]);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  sphere, nu %g, %s, %5d %s tets: error %.3e\n", (double)nu,
-                        element, (int)t.model->mesh->Ncell, second ? "curved" : "straight", (double)*error));
+  test_print("  sphere, nu %g, %s, %5d %s tets: error %.3e\n", nu, element, (int)t.model->mesh->Ncell,
+             second ? "curved" : "straight", *error);
   /* energy of the error: missing strain energy; the exact one is half the work of the pressure on the wall displacement */
   PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &energies));
   missing = 0.25 * PETSC_PI * (1. - 2. * nu + 4. * (1. + nu)) / 7. - energies.strain;
   PetscCall(SbSpaceEstimateCreate(t.model, &est));
   PetscCall(SbSpaceEstimateCompute(est, 1., t.run->U, t.run->V, t.run->A));
   guess = PetscSqrtReal(est->body2[0]);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "    in energy %.3e J^(1/2), estimated %.2f times that\n",
-                        (double)PetscSqrtReal(PetscAbsReal(missing)),
-                        (double)(guess / PetscSqrtReal(PetscAbsReal(missing)))));
+  test_print("    in energy %.3e J^(1/2), estimated %.2f times that\n", PetscSqrtReal(PetscAbsReal(missing)),
+             guess / PetscSqrtReal(PetscAbsReal(missing)));
   /* 1.20 to 1.24 times the true error on these meshes; the bounds are those of verify_estimate */
   if (second)
     SB_CHECK(guess > 0.6 * PetscSqrtReal(missing) && guess < 1.3 * PetscSqrtReal(missing),
-             "estimated %g, true %g J^(1/2)", (double)guess, (double)PetscSqrtReal(missing));
+             "estimated %g, true %g J^(1/2)", guess, PetscSqrtReal(missing));
   PetscCall(SbSpaceEstimateDestroy(&est));
   PetscCall(test_scene_close(&t));
-  PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -263,13 +252,13 @@ static PetscErrorCode check_sphere(PetscReal nu)
     PetscCall(sphere_error(k ? 6 : 3, PETSC_TRUE, nu, "p2", &curved[k]));
     PetscCall(sphere_error(k ? 6 : 3, PETSC_FALSE, nu, "p2", &straight[k]));
   }
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  orders: curved %.2f, straight %.2f\n",
-                        log(curved[0] / curved[1]) / log(2.), log(straight[0] / straight[1]) / log(2.)));
+  test_print("  orders: curved %.2f, straight %.2f\n", log(curved[0] / curved[1]) / log(2.),
+             log(straight[0] / straight[1]) / log(2.));
   /* theoretical orders in the mean square: 3, and 2 with the geometry of straight tets; here on coarse meshes */
   SB_CHECK(curved[0] > 7. * curved[1] && straight[0] < 5. * straight[1], "orders: curved %g, straight %g",
            log(curved[0] / curved[1]) / log(2.), log(straight[0] / straight[1]) / log(2.));
   SB_CHECK(curved[0] < 0.2 * straight[0] && curved[1] < 0.1 * straight[1], "curved %g, %g, straight %g, %g",
-           (double)curved[0], (double)curved[1], (double)straight[0], (double)straight[1]);
+           curved[0], curved[1], straight[0], straight[1]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -285,15 +274,13 @@ static void half(PetscReal x[3])
 static PetscErrorCode convert(const char *msh, char h5[512])
 {
   SbBody body = {.scale = 1.};
-  PetscMPIInt rank;
   SbImport *im;
   FILE *f;
 
   PetscFunctionBeginUser;
   PetscCall(test_file_open(".h5", h5, &f));
   PetscCall(test_file_close(f));
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) {
+  if (!test_rank) {
     PetscCall(PetscStrncpy(body.mesh, msh, sizeof(body.mesh)));
     PetscCall(SbMeshFileRead(&body, NULL, NULL, &im));
     PetscCall(SbMeshFileWrite(im, h5, SB_MESH_AUTO));
@@ -307,11 +294,8 @@ static PetscErrorCode check_ranks(void)
 {
   static const char *const solver[] = {"direct", "cg_p_multigrid", "pressure"};
   char mesh[512], h5[512], index[512];
-  PetscMPIInt rank, size;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(curved_mesh_write(3, 4, half, PETSC_TRUE, mesh));
   PetscCall(convert(mesh, h5));
   for (int k = 0; k < 3; k++) {
@@ -321,39 +305,32 @@ static PetscErrorCode check_ranks(void)
     /* all ranks, one rank, all ranks in slabs */
     for (int r = 0; r < 3; r++) {
       TestScene t;
-      char text[VERIFY_TEXT];
 
-      PetscCall(
-        PetscSNPrintf(text, sizeof(text),
-                      "-bodies a" VERIFY_BODY(
-                        "a", "%s", "neohookean", "1e6",
-                        "0.45") "-body_a_element p2 -sets foot -set_foot_at plane:0,0,1,0 -effects f,g "
-                                "-effect_f_type fixed "
-                                "-effect_f_on foot -effect_g_type gravity -effect_g_vector 3,-5,-9.81 -time "
-                                "newmark -mass %s "
-                                "-ts_dt 0.02 -ts_max_time 0.06 -solver %s -ksp_rtol 1e-12 -snes_rtol 1e-12%s",
-                      r == 2 ? h5 : mesh, k ? "consistent" : "lumped", solver[k],
-                      r == 2 && size > 1 ? " -mesh_reading slabs" : ""));
-      PetscCall(test_scene_open_on(r == 1 ? PETSC_COMM_SELF : PETSC_COMM_WORLD, NULL, text, &t));
+      PetscCall(test_open_on(
+        r == 1 ? PETSC_COMM_SELF : PETSC_COMM_WORLD, NULL, &t,
+        "-bodies a" VERIFY_BODY(
+          "a", "%s", "neohookean", "1e6",
+          "0.45") "-body_a_element p2 -sets foot -set_foot_at plane:0,0,1,0 -effects f,g -effect_f_type "
+                  "fixed -effect_f_on foot -effect_g_type gravity -effect_g_vector 3,-5,-9.81 -time newmark "
+                  "-mass %s -ts_dt 0.02 -ts_max_time 0.06 -solver %s -ksp_rtol 1e-12 -snes_rtol 1e-12%s",
+        r == 2 ? h5 : mesh, k ? "consistent" : "lumped", solver[k],
+        r == 2 && test_size > 1 ? " -mesh_reading slabs" : ""));
       volume[r] = t.model->body[0].volume;
       PetscCall(verify_solve(&t, "ranks"));
       n = verify_numbers(t.model);
       PetscCall(verify_gather(t.model, t.run->U, &value[r]));
       PetscCall(test_scene_close(&t));
     }
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s: one rank and all differ by %.1e\n", solver[k],
-                          (double)verify_difference(3 * n, value[0], value[1])));
+    test_print("  %s: one rank and all differ by %.1e\n", solver[k],
+               verify_difference(3 * n, value[0], value[1]));
     SB_CHECK(verify_difference(3 * n, value[0], value[1]) < 1e-8, "%s: one rank and all differ by %g",
-             solver[k], (double)verify_difference(3 * n, value[0], value[1]));
+             solver[k], verify_difference(3 * n, value[0], value[1]));
     SB_CHECK(verify_difference(3 * n, value[0], value[2]) < 1e-12, "%s: the .h5 differs by %g", solver[k],
-             (double)verify_difference(3 * n, value[0], value[2]));
+             verify_difference(3 * n, value[0], value[2]));
     SB_CHECK_NEAR(volume[2], volume[0], 1e-14, "volume of the .h5");
     for (int r = 0; r < 3; r++) PetscCall(PetscFree(value[r]));
   }
-  PetscCall(test_file_remove(mesh));
-  PetscCall(test_file_remove(h5));
   (void)snprintf(index, sizeof(index), "%.*s.xmf", (int)strlen(h5) - 3, h5);
-  PetscCall(test_file_remove(index));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -372,17 +349,16 @@ static PetscErrorCode check_refused(void)
   PetscCall(curved_mesh_write(1, 1, fold, PETSC_TRUE, mesh));
   PetscCall(PetscSNPrintf(words, sizeof(words), "body 'a'|%s|tetrahedron 3|Jacobian", mesh));
   SB_CHECK_ERROR(
-    verify_open(
-      &t, "-bodies a" VERIFY_BODY("a", "%s", "linear", "1", "0.3") "-body_a_element p2 -time static", mesh),
+    test_open(&t, "-bodies a -body_a_element p2 -time static" VERIFY_BODY("a", "%s", "linear", "1", "0.3"),
+              mesh),
     PETSC_ERR_USER_INPUT, words);
   PetscCall(test_scene_close(&t));
   /* other elements use the straight tet */
-  PetscCall(verify_open(
-    &t, "-bodies a" VERIFY_BODY("a", "%s", "linear", "1", "0.3") "-body_a_element p1 -time static", mesh));
+  PetscCall(test_open(
+    &t, "-bodies a -body_a_element p1 -time static" VERIFY_BODY("a", "%s", "linear", "1", "0.3"), mesh));
   SB_CHECK_NEAR(t.model->body[0].volume, 0.5, 1e-14, "volume of the straight tets");
   SB_CHECK(strstr(t.model->body[0].note, "straight: 1") != NULL, "note '%s'", t.model->body[0].note);
   PetscCall(test_scene_close(&t));
-  PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -399,7 +375,6 @@ int main(int argc, char **argv)
   PetscCall(check_equilibrium(mesh));
   PetscCall(check_sums(mesh, "lumped"));
   PetscCall(check_sums(mesh, "consistent"));
-  PetscCall(test_file_remove(mesh));
   PetscCall(check_sphere(0.3));
   PetscCall(check_sphere(0.4999));
   PetscCall(check_ranks());

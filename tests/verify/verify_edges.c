@@ -8,42 +8,21 @@
     box      a box falls on a thin plate at 5 m/s, corner first and edge first: no penetration in any step
     rings    two linked coarse rings with interior edges are pulled apart: they stay linked
 
-  Penetration is measured independently of the detector: many sample points on all edges of one surface; for those inside
-  the other one, by its solid angle, the distance from it.
+  Penetration is measured independently of the detector: many sample points on all edges of one surface; for
+  those inside the other one, by its solid angle, the distance from it.
 */
 #include <sbgeometry.h>
-#include "verify.h"
+#include "contact.h"
 
 enum { CONTACTS, DEEPEST, MEAN, NORMAL, FRICTION, WORK, LOSS, GAP, ENERGY, LAG, UNGUARDED, NVALUE };
 enum { ROW = 10, SAMPLES = 6 }; /* a facet's row: part and corners; sample points per edge */
 
-static PetscErrorCode open_on(MPI_Comm comm, TestScene *t, const char *format, ...)
-{
-  char text[VERIFY_TEXT];
-  va_list args;
-
-  PetscFunctionBeginUser;
-  va_start(args, format);
-  PetscCall(PetscVSNPrintf(text, sizeof(text), format, NULL, args));
-  va_end(args);
-  PetscCall(test_scene_open_on(comm, NULL, text, t));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* History columns of the contact effect, on every rank. */
 static PetscErrorCode contact_values(SbRun run, PetscReal values[NVALUE])
 {
-  SbModel m = run->model;
-  SbStage stage = {.shift_k = 1};
-  SbEffect e = NULL;
-
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < m->neffect && !e; i++) e = m->effect[i]->ops.begin_barrier ? m->effect[i] : NULL;
   PetscCall(PetscArrayzero(values, NVALUE));
-  PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
-  PetscCall((*e->ops.history)(e, m->space, &stage, NULL, values));
-  PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, values, NVALUE, MPIU_REAL, MPI_SUM, m->comm));
+  PetscCall(contact_columns(run, 0, NULL, contact_effect(run->model, "meet"), values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -118,14 +97,6 @@ static PetscReal depth_at(const PetscReal p[3], PetscReal part, PetscInt n, cons
   return PetscAbsReal(angle) > 2 * PETSC_PI ? PetscSqrtReal(nearest) : 0;
 }
 
-static inline void box_of(const PetscReal x[9], PetscReal box[6])
-{
-  for (int k = 0; k < 3; k++) {
-    box[k] = PetscMin(x[k], PetscMin(x[3 + k], x[6 + k]));
-    box[3 + k] = PetscMax(x[k], PetscMax(x[3 + k], x[6 + k]));
-  }
-}
-
 /* Largest penetration depth of the sample points on the facet edges of two bodies in the other body, m. */
 static PetscErrorCode depth_of(SbModel m, Vec U, PetscReal *depth)
 {
@@ -136,12 +107,11 @@ static PetscErrorCode depth_of(SbModel m, Vec U, PetscReal *depth)
   PetscCall(gather_skin(m, U, &n, &row));
   for (int k = 0; k < 12; k++) body[k / 6][k % 6] = k % 6 < 3 ? PETSC_MAX_REAL : -PETSC_MAX_REAL;
   for (PetscInt i = 0; i < n; i++) {
-    PetscReal box[6], *all = body[(int)row[ROW * i]];
+    PetscReal *all = body[(int)row[ROW * i]];
 
-    box_of(row + ROW * i + 1, box);
-    for (int k = 0; k < 3; k++) {
-      all[k] = PetscMin(all[k], box[k]);
-      all[3 + k] = PetscMax(all[3 + k], box[3 + k]);
+    for (int k = 0; k < 9; k++) {
+      all[k % 3] = PetscMin(all[k % 3], row[ROW * i + 1 + k]);
+      all[3 + k % 3] = PetscMax(all[3 + k % 3], row[ROW * i + 1 + k]);
     }
   }
   *depth = 0;
@@ -243,7 +213,7 @@ static PetscErrorCode lay_bars(MPI_Comm comm, const char *more, Seen *seen, Pets
 
   PetscFunctionBeginUser;
   *seen = (Seen){.above = PETSC_MAX_REAL, .at = {0.09, 0, 0.0424264}};
-  PetscCall(open_on(comm, &t, BARS "%s", more));
+  PetscCall(test_open_on(comm, NULL, &t, BARS "%s", more));
   PetscCall(SbRunAddMonitor(t.run, watch, seen));
   PetscCall(verify_solve(&t, "bars"));
   PetscCall(contact_values(t.run, values));
@@ -258,25 +228,22 @@ static PetscErrorCode check_bars(const char *more, PetscReal tolerance)
   const PetscReal weight = 0.21 * 0.03 * 0.03 * 1000 * 9.81;
   PetscReal values[NVALUE], alone[NVALUE], u[3], v[3];
   Seen seen, other;
-  PetscMPIInt size;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(lay_bars(PETSC_COMM_WORLD, more, &seen, values, u));
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD,
     "  bars%s: %d contacts, force %.6f of the weight, depth %.1e m (history %.1e), moving with %.1e J\n",
-    more, (int)values[CONTACTS], (double)(values[NORMAL] / weight), (double)seen.depth, (double)seen.deepest,
-    (double)seen.kinetic));
+    more, (int)values[CONTACTS], values[NORMAL] / weight, seen.depth, seen.deepest, seen.kinetic));
   SB_CHECK(values[CONTACTS] >= 1, "the bars do not touch");
   SB_CHECK_NEAR(values[NORMAL], weight, tolerance * weight, "the lower bar carries the upper one");
   SB_CHECK(seen.depth < 1e-6 * 0.21 && seen.deepest < 1e-6 * 0.21,
-           "the bars are %g m in each other, they say %g", (double)seen.depth, (double)seen.deepest);
-  SB_CHECK(seen.kinetic < 1e-8, "the bars still move with %g J", (double)seen.kinetic);
-  if (size > 1) {
+           "the bars are %g m in each other, they say %g", seen.depth, seen.deepest);
+  SB_CHECK(seen.kinetic < 1e-8, "the bars still move with %g J", seen.kinetic);
+  if (test_size > 1) {
     PetscCall(lay_bars(PETSC_COMM_SELF, more, &other, alone, v));
-    SB_CHECK(alone[CONTACTS] == values[CONTACTS], "%g contacts, on one rank %g", (double)values[CONTACTS],
-             (double)alone[CONTACTS]);
+    SB_CHECK(alone[CONTACTS] == values[CONTACTS], "%g contacts, on one rank %g", values[CONTACTS],
+             alone[CONTACTS]);
     SB_CHECK_NEAR(values[NORMAL], alone[NORMAL], 1e-6 * weight, "force on one rank");
     for (int k = 0; k < 3; k++) SB_CHECK_NEAR(u[k], v[k], 1e-8, "displacement on one rank");
   }
@@ -290,21 +257,19 @@ static PetscErrorCode check_fast(void)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(open_on(PETSC_COMM_WORLD, &t,
-                    "-bodies a,b -body_a_mesh box:0.21,0.006,0.006:7,1,1 -body_a_rotate 1,0,0,45 "
-                    "-body_b_mesh box:0.006,0.21,0.006:1,7,1 -body_b_rotate 0,1,0,-45 -body_b_translate "
-                    "0.105,-0.105,0.0105 -body_b_velocity 0,0,-5 -effects a0,a1,b0,b1,meet -time "
-                    "euler_implicit -ts_dt 0.004 -ts_max_time 0.04 " LAWS("1e7") ENDS));
+  PetscCall(test_open(&t,
+                      "-bodies a,b -body_a_mesh box:0.21,0.006,0.006:7,1,1 -body_a_rotate 1,0,0,45 "
+                      "-body_b_mesh box:0.006,0.21,0.006:1,7,1 -body_b_rotate 0,1,0,-45 -body_b_translate "
+                      "0.105,-0.105,0.0105 -body_b_velocity 0,0,-5 -effects a0,a1,b0,b1,meet -time "
+                      "euler_implicit -ts_dt 0.004 -ts_max_time 0.04 " LAWS("1e7") ENDS));
   PetscCall(SbRunAddMonitor(t.run, watch, &seen));
   PetscCall(verify_solve(&t, "fast bars"));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  fast bars: in touch in %d of %d steps, force up to %.3g N, depth %.1e m (history "
-                        "%.1e), middle at least %.4f m over the other\n",
-                        (int)seen.touching, (int)seen.steps, (double)seen.force, (double)seen.depth,
-                        (double)seen.deepest, (double)seen.above));
+  test_print("  fast bars: in touch in %d of %d steps, force up to %.3g N, depth %.1e m (history "
+             "%.1e), middle at least %.4f m over the other\n",
+             (int)seen.touching, (int)seen.steps, seen.force, seen.depth, seen.deepest, seen.above);
   SB_CHECK(seen.touching > 0 && seen.force > 0.1, "the bars do not meet");
-  SB_CHECK(seen.depth < 1e-5, "the bars are %g m in each other", (double)seen.depth);
-  SB_CHECK(seen.above > 0, "the bars went through each other by %g m", (double)-seen.above);
+  SB_CHECK(seen.depth < 1e-5, "the bars are %g m in each other", seen.depth);
+  SB_CHECK(seen.above > 0, "the bars went through each other by %g m", -seen.above);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -317,30 +282,27 @@ static PetscErrorCode check_box(const char *what, const char *turn, PetscReal mo
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(open_on(
-    PETSC_COMM_WORLD, &t,
+  PetscCall(test_open(
+    &t,
     "-bodies plate,cube -body_plate_mesh box:0.2,0.2,0.006:10,10,1 -body_plate_material corotated "
-    "-body_plate_young 1e6 -body_plate_poisson 0.3 -body_plate_density 1000 "
-    "-body_cube_mesh box:0.04,0.04,0.04:2 -body_cube_material corotated -body_cube_young 1e6 "
-    "-body_cube_poisson 0.3 -body_cube_density 1000 %s -body_cube_velocity 0,0,-5 -sets skin,x0,x1,y0,y1 "
-    "-set_skin_at boundary -set_x0_at plane:1,0,0,0 -set_x1_at plane:1,0,0,0.2 -set_y0_at plane:0,1,0,0 "
-    "-set_y1_at plane:0,1,0,0.2 -effects x0,x1,y0,y1,meet -effect_x0_type fixed -effect_x0_on x0 "
-    "-effect_x1_type fixed -effect_x1_on x1 -effect_y0_type fixed -effect_y0_on y0 -effect_y1_type fixed "
-    "-effect_y1_on y1 -effect_meet_type contact -time euler_implicit "
-    "-ts_dt 0.001 -ts_max_time 0.03",
+    "-body_plate_young 1e6 -body_plate_poisson 0.3 -body_plate_density 1000 -body_cube_mesh "
+    "box:0.04,0.04,0.04:2 -body_cube_material corotated -body_cube_young 1e6 -body_cube_poisson 0.3 "
+    "-body_cube_density 1000 %s -body_cube_velocity 0,0,-5 -sets skin,x0,x1,y0,y1 -set_skin_at boundary "
+    "-set_x0_at plane:1,0,0,0 -set_x1_at plane:1,0,0,0.2 -set_y0_at plane:0,1,0,0 -set_y1_at plane:0,1,0,0.2 "
+    "-effects x0,x1,y0,y1,meet -effect_x0_type fixed -effect_x0_on x0 -effect_x1_type fixed -effect_x1_on x1 "
+    "-effect_y0_type fixed -effect_y0_on y0 -effect_y1_type fixed -effect_y1_on y1 -effect_meet_type contact "
+    "-time euler_implicit -ts_dt 0.001 -ts_max_time 0.03",
     turn));
   PetscCall(SbRunAddMonitor(t.run, watch, &seen));
   PetscCall(verify_solve(&t, what));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  box, %s: in touch in %d of %d steps, force up to %.3g N, depth %.1e m (history "
-                        "%.1e), middle at least %.3f m over the plate\n",
-                        what, (int)seen.touching, (int)seen.steps, (double)seen.force, (double)seen.depth,
-                        (double)seen.deepest, (double)seen.above));
+  test_print("  box, %s: in touch in %d of %d steps, force up to %.3g N, depth %.1e m (history "
+             "%.1e), middle at least %.3f m over the plate\n",
+             what, (int)seen.touching, (int)seen.steps, seen.force, seen.depth, seen.deepest, seen.above);
   SB_CHECK(seen.touching > 3 && seen.force > 1, "%s: the box does not hit the plate", what);
-  SB_CHECK(seen.depth < most, "%s: the box is %g m in the plate", what, (double)seen.depth);
+  SB_CHECK(seen.depth < most, "%s: the box is %g m in the plate", what, seen.depth);
   SB_CHECK_NEAR(seen.deepest, seen.depth, 1e-4, "the depth that the history says");
   SB_CHECK(seen.above > 0.01, "%s: the box went through the plate: its middle is %g m over it", what,
-           (double)seen.above);
+           seen.above);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -369,8 +331,8 @@ static PetscErrorCode write_ring(char path[512])
       const int section = i / 4;
       const PetscReal angle = 2 * PETSC_PI * (section - 0.5) / SEGMENTS, r = RADIUS + corner[i % 4][0];
 
-      fprintf(f, "%d %.17g %.17g %.17g\n", i + 1, (double)(r * PetscCosReal(angle)),
-              (double)(r * PetscSinReal(angle)), (double)corner[i % 4][1]);
+      fprintf(f, "%d %.17g %.17g %.17g\n", i + 1, r * PetscCosReal(angle), r * PetscSinReal(angle),
+              corner[i % 4][1]);
     }
     fprintf(f, "$EndNodes\n$Elements\n%d\n", 6 * SEGMENTS);
     for (int i = 0; i < 6 * SEGMENTS; i++) {
@@ -459,40 +421,34 @@ static PetscErrorCode check_rings(PetscReal most)
 
   PetscFunctionBeginUser;
   PetscCall(write_ring(path));
-  PetscCall(
-    open_on(PETSC_COMM_WORLD, &t,
-            "-bodies a,b -body_a_mesh %s -body_b_mesh %s -body_b_rotate 1,0,0,90 -body_b_translate %.15g,0,0 "
-            "-sets skin,far,end -set_skin_at boundary -set_far_at halfspace:1,0,0,-0.09 -set_end_at "
-            "halfspace:-1,0,0,%.15g -effects hold,pull,meet -effect_hold_type fixed -effect_hold_on far "
-            "-effect_pull_type prescribed_displacement -effect_pull_on end -effect_pull_displacement "
-            "0.08*ramp(t/0.4);0;0 -effect_meet_type contact -time "
-            "euler_implicit -ts_dt 0.01 -ts_max_time 0.5" LAWS("1e5"),
-            path, path, (double)away, (double)(-away - 0.09)));
+  PetscCall(test_open(
+    &t,
+    "-bodies a,b -body_a_mesh %s -body_b_mesh %s -body_b_rotate 1,0,0,90 -body_b_translate %.15g,0,0 -sets "
+    "skin,far,end -set_skin_at boundary -set_far_at halfspace:1,0,0,-0.09 -set_end_at halfspace:-1,0,0,%.15g "
+    "-effects hold,pull,meet -effect_hold_type fixed -effect_hold_on far -effect_pull_type "
+    "prescribed_displacement -effect_pull_on end -effect_pull_displacement 0.08*ramp(t/0.4);0;0 "
+    "-effect_meet_type contact -time euler_implicit -ts_dt 0.01 -ts_max_time 0.5" LAWS("1e5"),
+    path, path, away, -away - 0.09));
   PetscCall(SbRunAddMonitor(t.run, watch_rings, &seen));
   PetscCall(verify_solve(&t, "rings"));
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD,
     "  rings: linked in %d of %d steps, in touch in %d, force up to %.3g N, depth %.1e m (history %.1e)\n",
-    seen.linked, (int)seen.steps, (int)seen.touching, (double)seen.force, (double)seen.depth,
-    (double)seen.deepest));
+    seen.linked, (int)seen.steps, (int)seen.touching, seen.force, seen.depth, seen.deepest));
   SB_CHECK(seen.linked == seen.steps, "the rings are linked in %d of %d steps only", seen.linked,
            (int)seen.steps);
   SB_CHECK(seen.touching > seen.steps / 2 && seen.force > 0.5, "the rings do not pull");
   SB_CHECK(seen.depth < most && seen.deepest < most, "the rings are %g m in each other, they say %g",
-           (double)seen.depth, (double)seen.deepest);
+           seen.depth, seen.deepest);
   PetscCall(test_scene_close(&t));
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int main(int argc, char **argv)
 {
-  PetscMPIInt size;
-
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(check_bars("", 1e-3));
-  if (size == 1) {
+  if (test_size == 1) {
     PetscCall(check_bars(" -effect_meet_friction 0.3", 1e-3));
     PetscCall(check_bars(" -body_a_element cr -body_b_element dg -ts_max_time 2", 1e-2));
   }

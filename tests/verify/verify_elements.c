@@ -60,19 +60,17 @@ static PetscErrorCode bar(int kind, PetscInt n, PetscReal *strain)
 {
   // 2 kg at (.1, .05, .05), and 3 N along y, 6 N along z spread over the end x = 0.2.
   const PetscReal w = 2 * 9.81, balance[6] = {0, -3, w - 6, 0.05 * (w - 6 + 3), 0.2 * 6 - 0.1 * w, -0.2 * 3};
-  char text[VERIFY_TEXT];
   PetscReal sum[6];
   SbEnergies e;
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh box:0.2,0.1,0.1:%d" BODY
-                          "%s -body_a_material linear -effects gravity,clamp,pull -effect_clamp_type fixed "
-                          "-effect_clamp_on xmin -effect_pull_type traction -effect_pull_on xmax "
-                          "-effect_pull_total 0,3,6 -time static -solver direct" EXACT,
-                          (int)n, kinds[kind][1]));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh box:0.2,0.1,0.1:%d" BODY
+                      "%s -body_a_material linear -effects gravity,clamp,pull -effect_clamp_type fixed "
+                      "-effect_clamp_on xmin -effect_pull_type traction -effect_pull_on xmax "
+                      "-effect_pull_total 0,3,6 -time static -solver direct" EXACT,
+                      (int)n, kinds[kind][1]));
   PetscCall(verify_solve(&t, kinds[kind][0]));
   PetscCall(reaction(&t, 0, sum));
   for (int k = 0; k < 6; k++) SB_CHECK_NEAR(sum[k], balance[k], 1e-8, kinds[kind][0]);
@@ -94,10 +92,10 @@ static PetscErrorCode check_supports(void)
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD,
     "  supports: strain energy of weak and strong ones differs by %.1e, %.1e on a mesh half as wide\n",
-    (double)difference[0], (double)difference[1]));
+    difference[0], difference[1]));
   /* second order: a quarter; the tolerance covers the singular stress at the edge of the clamp */
   SB_CHECK(difference[0] < 5e-3 && difference[1] < 0.35 * difference[0],
-           "weak and strong supports differ by %g, %g", (double)difference[0], (double)difference[1]);
+           "weak and strong supports differ by %g, %g", difference[0], difference[1]);
   /* the singular edge again: all elements are within a few percent, P1 is stiff */
   for (int kind = 1; kind < 4; kind++) SB_CHECK_NEAR(strain[kind][1] / strain[3][1], 1, 2e-3, kinds[kind][0]);
   SB_CHECK(strain[0][1] < strain[1][1], "P1 is softer than CR");
@@ -110,21 +108,19 @@ static PetscErrorCode check_supports(void)
 
 static PetscErrorCode check_drive(int kind)
 {
-  char text[VERIFY_TEXT];
   PetscReal sum[6];
   SbEnergies e;
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
+  PetscCall(test_open(
+    &t,
     "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
     "%s -body_a_material corotated -effects hand -effect_hand_type prescribed_displacement "
     "-effect_hand_on xmin,xmax -effect_hand_angle 40*t -effect_hand_axis 1,2,3 "
     "-effect_hand_axis_point 0.1,0,0 -effect_hand_displacement t;0;0.5*t -time static -static_steps 4 "
     "-solver direct" EXACT,
     kinds[kind][1]));
-  PetscCall(test_scene_open(text, &t));
   PetscCall(verify_solve(&t, kinds[kind][0]));
   PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &e));
   PetscCall(reaction(&t, 0, sum));
@@ -148,7 +144,7 @@ static PetscErrorCode check_drive(int kind)
       for (int k = 0; k < 3; k++) away = PetscMax(away, PetscAbsReal(x[3 * i + k] - (move[k] + y[k] - r[k])));
     }
     PetscCall(VecRestoreArrayRead(t.run->U, &x));
-    SB_CHECK(away < 1e-9, "%s: a node is %g m from where the drive takes it", kinds[kind][0], (double)away);
+    SB_CHECK(away < 1e-9, "%s: a node is %g m from where the drive takes it", kinds[kind][0], away);
   }
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -159,24 +155,21 @@ static PetscErrorCode check_drive(int kind)
 static PetscErrorCode check_mixed(void)
 {
   const char *element[] = {"p1", "cr", "dg", "p2"};
-  char text[VERIFY_TEXT];
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
-    "-bodies a,b,c,d -body_a_mesh box:0.2,0.1,0.1:2 -body_b_mesh box:0.1,0.2,0.1:2 "
-    "-body_c_mesh box:0.1,0.1,0.2:2 -body_d_mesh box:0.2,0.1,0.1:1 -body_d_material stvk -body_d_element p2 "
+  PetscCall(test_scene_open(
+    "-bodies a,b,c,d -body_a_mesh box:0.2,0.1,0.1:2 -body_b_mesh box:0.1,0.2,0.1:2 -body_c_mesh "
+    "box:0.1,0.1,0.2:2 -body_d_mesh box:0.2,0.1,0.1:1 -body_d_material stvk -body_d_element p2 "
     "-body_d_translate 0,2,0 -body_d_young 1e5 -body_d_poisson 0.4 -body_d_density 200 -body_a_material "
-    "linear -body_b_material corotated "
-    "-body_c_material neohookean -body_b_element cr -body_c_element dg -body_b_translate 1,0,0 "
-    "-body_c_translate 2,0,0" BODY
+    "linear -body_b_material corotated -body_c_material neohookean -body_b_element cr -body_c_element dg "
+    "-body_b_translate 1,0,0 -body_c_translate 2,0,0" BODY
     "-body_b_young 2e5 -body_c_young 1e5 -body_b_poisson 0.3 -body_c_poisson 0.45 -body_b_density 500 "
     "-body_c_density 250 -sets low,tip -set_low_at plane:0,0,1,0 -effects gravity,stand,poke "
     "-effect_stand_type fixed -effect_stand_on low -effect_poke_type point_force -effect_poke_on tip "
-    "-effect_poke_vector 0.01;0.02;0.03 -time static -solver direct" EXACT));
-  PetscCall(PetscStrlcat(text, " -set_tip_at box:-1,-1,0.09,3,1,1", sizeof(text)));
-  PetscCall(test_scene_open(text, &t));
+    "-effect_poke_vector 0.01;0.02;0.03 -time static -solver direct "
+    "-set_tip_at box:-1,-1,0.09,3,1,1" EXACT,
+    &t));
   PetscCall(verify_solve(&t, "four bodies"));
   for (PetscInt b = 0; b < 4; b++) {
     const PetscReal density[] = {1000, 500, 250, 200};
@@ -220,16 +213,14 @@ static PetscErrorCode watch_flight(SbRun run, const SbStep *step, void *ctx)
 static PetscErrorCode check_flight(int kind, const char *mass)
 {
   Flight f = {.worst = 0.};
-  char text[VERIFY_TEXT];
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh box:0.2,0.1,0.1:4" BODY
-                          "%s -body_a_material corotated -body_a_velocity 1,2,3 "
-                          "-body_a_angular_velocity 3,0,0 -mass %s -time euler_symplectic -ts_max_time 0.01",
-                          kinds[kind][1], mass));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh box:0.2,0.1,0.1:4" BODY
+                      "%s -body_a_material corotated -body_a_velocity 1,2,3 "
+                      "-body_a_angular_velocity 3,0,0 -mass %s -time euler_symplectic -ts_max_time 0.01",
+                      kinds[kind][1], mass));
   PetscCall(SbRunAddMonitor(t.run, watch_flight, &f));
   PetscCall(verify_solve(&t, kinds[kind][0]));
   SB_CHECK(t.run->steps_total > 5, "%d steps", (int)t.run->steps_total);
@@ -238,7 +229,7 @@ static PetscErrorCode check_flight(int kind, const char *mass)
   if (mass[0] == 'c')
     SB_CHECK_NEAR(f.start[3], 0.01 + 0.05 * 6 - 0.05 * 4, 1e-12, "angular momentum at the start");
   SB_CHECK_NEAR(f.start[4], 0.05 * 2 - 0.1 * 6, 1e-12, "angular momentum at the start");
-  SB_CHECK(f.worst < 1e-11, "%s: momenta change by %g", kinds[kind][0], (double)f.worst);
+  SB_CHECK(f.worst < 1e-11, "%s: momenta change by %g", kinds[kind][0], f.worst);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -248,17 +239,15 @@ static PetscErrorCode check_flight(int kind, const char *mass)
 /* A clamped bar with an initial upward velocity: the sum of energies and the strain energy at the end. */
 static PetscErrorCode swing(int kind, const char *time, PetscReal energy[2])
 {
-  char text[VERIFY_TEXT];
   SbEnergies e;
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
-                          "%s -body_a_material linear -body_a_velocity 0,0,0.1 -effects clamp "
-                          "-effect_clamp_type fixed -effect_clamp_on xmin -ts_max_time 0.02 %s",
-                          kinds[kind][1], time));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
+                      "%s -body_a_material linear -body_a_velocity 0,0,0.1 -effects clamp "
+                      "-effect_clamp_type fixed -effect_clamp_on xmin -ts_max_time 0.02 %s",
+                      kinds[kind][1], time));
   PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &e));
   energy[0] = e.kinetic + e.strain;
   PetscCall(verify_solve(&t, kinds[kind][0]));
@@ -277,9 +266,8 @@ static PetscErrorCode check_motion(int kind)
   PetscCall(swing(kind, "-time newmark -ts_dt 2e-4 -solver direct" EXACT, implicit));
   SB_CHECK_NEAR(implicit[0], 1, 1e-10, kinds[kind][0]);
   PetscCall(swing(kind, "-time euler_symplectic", explicit));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  %s: strain energy at the end %.6g by Newmark, %.6g by symplectic Euler\n",
-                        kinds[kind][0], (double)implicit[1], (double)explicit[1]));
+  test_print("  %s: strain energy at the end %.6g by Newmark, %.6g by symplectic Euler\n", kinds[kind][0],
+             implicit[1], explicit[1]);
   /* the steps resolve the oscillation, not the fastest waves that the start excites in the bar */
   SB_CHECK_NEAR(explicit[1] / implicit[1], 1, 0.05, kinds[kind][0]);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -289,24 +277,21 @@ static PetscErrorCode check_motion(int kind)
 
 static PetscErrorCode check_pressure(int kind)
 {
-  char text[VERIFY_TEXT];
   SbEnergies e;
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
-                          "%s -body_a_material neohookean -body_a_angular_velocity 0,0,20 -effects sea "
-                          "-effect_sea_type pressure -effect_sea_on boundary -effect_sea_value 2e4 "
-                          "-time euler_implicit -ts_dt 5e-3 -ts_max_time 0.05 -solver direct" EXACT,
-                          kinds[kind][1]));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
+                      "%s -body_a_material neohookean -body_a_angular_velocity 0,0,20 -effects sea "
+                      "-effect_sea_type pressure -effect_sea_on boundary -effect_sea_value 2e4 "
+                      "-time euler_implicit -ts_dt 5e-3 -ts_max_time 0.05 -solver direct" EXACT,
+                      kinds[kind][1]));
   PetscCall(verify_solve(&t, kinds[kind][0]));
   PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &e));
   for (int k = 0; k < 3; k++) SB_CHECK_NEAR(e.momentum[k], 0, 1e-10, kinds[kind][0]);
   /* p / (3 K) = 2e4 * 3 (1 - 0.6) / (3 * 1e5) in each direction, not yet reached, and with extension by the spin */
-  SB_CHECK(e.volume < 0.95 * 2e-3 && e.volume > 0.6 * 2e-3, "%s: volume %g", kinds[kind][0],
-           (double)e.volume);
+  SB_CHECK(e.volume < 0.95 * 2e-3 && e.volume > 0.6 * 2e-3, "%s: volume %g", kinds[kind][0], e.volume);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -41,26 +41,23 @@ static PetscErrorCode check_drift(const char *element, PetscInt steps)
 {
   Drift d = {.every = 100};
   TestScene t;
-  char text[VERIFY_TEXT];
   double begin = MPI_Wtime();
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
+  PetscCall(test_open(
+    &t,
     "-bodies a -body_a_mesh box:0.2,0.1,0.1:1" BODY
     "-body_a_element %s -body_a_material linear -body_a_velocity 0.1,0,0.3 -effects clamp "
     "-effect_clamp_type fixed -effect_clamp_on xmin -time newmark -ts_dt 0.003 -ts_max_time %.17g" TIGHT,
     element, 0.003 * (double)steps));
-  PetscCall(test_scene_open(text, &t));
   PetscCall(SbRunAddMonitor(t.run, watch_drift, &d));
   PetscCall(verify_solve(&t, "drift"));
   SB_CHECK(PetscAbsInt(t.run->steps_total - steps) <= 1, "%d steps", (int)t.run->steps_total);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  drift of Newmark, %s, over %d steps: %.1e of the energy (%.0f s)\n", element,
-                        (int)t.run->steps_total, (double)d.largest, MPI_Wtime() - begin));
+  test_print("  drift of Newmark, %s, over %d steps: %.1e of the energy (%.0f s)\n", element,
+             (int)t.run->steps_total, d.largest, MPI_Wtime() - begin);
   /* rounding of one step if all signs are equal: 1e-15 for P1, more for elements with more unknowns (4.4e-15 on one machine, below 4e-15 on others) */
   SB_CHECK(d.largest < (strcmp(element, "p1") ? 8e-15 : 1e-15) * (double)steps,
-           "%s: energy drifts by %g in %d steps", element, (double)d.largest, (int)steps);
+           "%s: energy drifts by %g in %d steps", element, d.largest, (int)steps);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -102,27 +99,22 @@ static PetscErrorCode check_decay(const char *element, PetscReal h)
   Decay d = {.U = NULL};
   SbEnergies *e;
   TestScene t;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscSNPrintf(text, sizeof(text),
-                  "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
-                  "-body_a_element %s -body_a_material linear -body_a_velocity 0.1,0,0.3 -effects clamp "
-                  "-effect_clamp_type fixed -effect_clamp_on xmin -time euler_implicit -ts_dt %.17g "
-                  "-ts_max_time %.17g" TIGHT,
-                  element, (double)h, (double)(100. * h)));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
+                      "-body_a_element %s -body_a_material linear -body_a_velocity 0.1,0,0.3 -effects clamp "
+                      "-effect_clamp_type fixed -effect_clamp_on xmin -time euler_implicit -ts_dt %.17g "
+                      "-ts_max_time %.17g" TIGHT,
+                      element, h, 100. * h));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch_decay, &d));
   PetscCall(verify_solve(&t, "decay"));
   e = &t.run->energies;
-  PetscCall(
-    PetscPrintf(PETSC_COMM_WORLD,
-                "  implicit Euler, %s, h %g s: energy left %.3e of the start, account off by %.1e of it\n",
-                element, (double)h, (double)((e->kinetic + e->strain) / t.run->energy_start),
-                (double)(PetscAbsReal(e->integrator_loss - d.loss) / t.run->energy_start)));
-  SB_CHECK(d.ups == 0, "%s, h %g: energy rises in %d of 100 steps", element, (double)h, (int)d.ups);
+  test_print("  implicit Euler, %s, h %g s: energy left %.3e of the start, account off by %.1e of it\n",
+             element, h, (e->kinetic + e->strain) / t.run->energy_start,
+             PetscAbsReal(e->integrator_loss - d.loss) / t.run->energy_start);
+  SB_CHECK(d.ups == 0, "%s, h %g: energy rises in %d of 100 steps", element, h, (int)d.ups);
   SB_CHECK_NEAR(e->integrator_loss, d.loss, 1e-12 * t.run->energy_start, "loss of implicit Euler");
   PetscCall(VecDestroy(&d.U));
   PetscCall(VecDestroy(&d.V));
@@ -138,28 +130,25 @@ static PetscErrorCode missing(const char *preset, const char *element, const cha
 {
   SbEnergies *e;
   TestScene t;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
+  PetscCall(test_open(
+    &t,
     "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
     "-body_a_element %s -body_a_material %s -effects gravity,damping,hand,wind -effect_damping_alpha 1 "
     "-effect_damping_beta 0.002 -effect_hand_type prescribed_displacement -effect_hand_on xmin "
     "-effect_hand_displacement 0.05*sin(6*t)^2;0;0.03*t^2 -effect_wind_type traction -effect_wind_on xmax "
     "-effect_wind_vector 0;500*t;0 -time %s -ts_dt %.17g -ts_max_time 0.5" TIGHT,
-    element, law, preset, (double)h));
-  PetscCall(test_scene_open(text, &t));
+    element, law, preset, h));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(verify_solve(&t, "account"));
   e = &t.run->energies;
   *loss =
     e->integrator_loss / (PetscAbsReal(e->load_work) + PetscAbsReal(e->prescribed_work) + e->damping_loss);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  account of %s, %s %s, h %g s: loads %.4f J, drive %.4f J, damping %.4f J, kinetic "
-                        "%.4f J, strain %.4f J; missing %.1e of that\n",
-                        preset, element, law, (double)h, (double)e->load_work, (double)e->prescribed_work,
-                        (double)e->damping_loss, (double)e->kinetic, (double)e->strain, (double)*loss));
+  test_print("  account of %s, %s %s, h %g s: loads %.4f J, drive %.4f J, damping %.4f J, kinetic "
+             "%.4f J, strain %.4f J; missing %.1e of that\n",
+             preset, element, law, h, e->load_work, e->prescribed_work, e->damping_loss, e->kinetic,
+             e->strain, *loss);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -174,7 +163,7 @@ static PetscErrorCode check_account(const char *preset, const char *element, con
   PetscCall(missing(preset, element, law, 0.0025, &loss[0]));
   PetscCall(missing(preset, element, law, 0.00125, &loss[1]));
   SB_CHECK(PetscAbsReal(loss[1]) < bound, "%s, %s, %s: %g of the work is missing", preset, element, law,
-           (double)loss[1]);
+           loss[1]);
   if (order) SB_CHECK_NEAR(PetscLog2Real(PetscAbsReal(loss[0] / loss[1])), order, 0.3, preset);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -201,25 +190,22 @@ static PetscErrorCode check_swing(const char *element)
 {
   Swing w = {0};
   TestScene t;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
+  PetscCall(test_open(
+    &t,
     "-bodies a -body_a_mesh box:0.4,0.1,0.1:2 -body_a_element %s -body_a_material neohookean -body_a_young "
     "3e4 -body_a_poisson 0.45 -body_a_density 1000 -effects gravity,clamp -effect_gravity_vector 0,0,-9.81 "
     "-effect_clamp_type fixed -effect_clamp_on xmin -time newmark -ts_dt 0.005 -ts_max_time 1",
     element));
-  PetscCall(test_scene_open(text, &t));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch_swing, &w));
   PetscCall(verify_solve(&t, "swing"));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  swing, %s: strain energy up to %.2f J, given %.1e J, lost %.1e J\n", element,
-                        (double)w.largest, (double)-w.least, (double)t.run->energies.integrator_loss));
-  SB_CHECK(-w.least < 5e-3 * w.largest, "%s: %g J were given", element, (double)-w.least);
+  test_print("  swing, %s: strain energy up to %.2f J, given %.1e J, lost %.1e J\n", element, w.largest,
+             -w.least, t.run->energies.integrator_loss);
+  SB_CHECK(-w.least < 5e-3 * w.largest, "%s: %g J were given", element, -w.least);
   SB_CHECK(t.run->energies.integrator_loss < 0.02 * w.largest, "%s: %g J were lost", element,
-           (double)t.run->energies.integrator_loss);
+           t.run->energies.integrator_loss);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -232,15 +218,13 @@ static PetscErrorCode fly(const char *preset, const char *element, const char *l
   SbEnergies before, after;
   PetscReal size[2] = {0., 0.};
   TestScene t;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh box:0.3,0.2,0.1:1" BODY
-                          "-body_a_element %s -body_a_material %s -body_a_velocity 0.3,-0.2,0.1 "
-                          "-body_a_angular_velocity 1,2,6 -time %s -ts_dt %.17g -ts_max_time 0.1" TIGHT,
-                          element, law, preset, (double)h));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh box:0.3,0.2,0.1:1" BODY
+                      "-body_a_element %s -body_a_material %s -body_a_velocity 0.3,-0.2,0.1 "
+                      "-body_a_angular_velocity 1,2,6 -time %s -ts_dt %.17g -ts_max_time 0.1" TIGHT,
+                      element, law, preset, h));
   PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &before));
   PetscCall(verify_solve(&t, preset));
   PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &after));
@@ -265,16 +249,13 @@ static PetscErrorCode check_flight(const char *preset, const char *element, cons
   PetscFunctionBeginUser;
   PetscCall(fly(preset, element, law, h, coarse));
   PetscCall(fly(preset, element, law, 0.5 * h, fine));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  free flight, %-16s %s %-10s h %g, %g s: momentum changes by %.1e %.1e, angular "
-                        "momentum by %.1e %.1e\n",
-                        preset, element, law, (double)h, (double)(0.5 * h), (double)coarse[0],
-                        (double)fine[0], (double)coarse[1], (double)fine[1]));
+  test_print("  free flight, %-16s %s %-10s h %g, %g s: momentum changes by %.1e %.1e, angular "
+             "momentum by %.1e %.1e\n",
+             preset, element, law, h, 0.5 * h, coarse[0], fine[0], coarse[1], fine[1]);
   SB_CHECK(coarse[0] < 1e-12 && fine[0] < 1e-12, "%s, %s, %s: momentum changes by %g and %g", preset, element,
-           law, (double)coarse[0], (double)fine[0]);
+           law, coarse[0], fine[0]);
   if (!order)
-    SB_CHECK(fine[1] < 1e-11, "%s, %s, %s: angular momentum changes by %g", preset, element, law,
-             (double)fine[1]);
+    SB_CHECK(fine[1] < 1e-11, "%s, %s, %s: angular momentum changes by %g", preset, element, law, fine[1]);
   if (order > 0) SB_CHECK_NEAR(PetscLog2Real(coarse[1] / fine[1]), order, 0.3, preset);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -303,10 +284,8 @@ static PetscErrorCode check_gain(const char *what, PetscReal chord, const char *
   PetscCall(SbRunAddMonitor(t.run, watch_gain, &gain));
   PetscCall(verify_solve(&t, what));
   given = t.run->energies.prescribed_work + t.run->energies.load_work;
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s: gain %.1e of the work %g J\n", what, (double)(gain / given),
-                        (double)given));
-  SB_CHECK(given > 0. && gain < 0.1 * chord * given, "%s: gain %g J, work %g J", what, (double)gain,
-           (double)given);
+  test_print("  %s: gain %.1e of the work %g J\n", what, gain / given, given);
+  SB_CHECK(given > 0. && gain < 0.1 * chord * given, "%s: gain %g J, work %g J", what, gain, given);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -332,27 +311,13 @@ static PetscErrorCode check_turning(const char *time, const char *element)
   ",-0.1,0.28," x ",0.1,0.28,0.01 -effect_" name "_axis 0,0,1 -effect_" name                              \
   "_axis_point 0,0,0 -effect_" name "_angle 40*t "
 
-static PetscErrorCode check_grip(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(check_gain("grip", 9.5e-4,
-                       "-bodies a -body_a_mesh box:0.1,0.1,0.3:2,2,6 -body_a_translate -0.05,-0.05,0" BODY
-                       "-body_a_material neohookean -effects clamp,left,right -effect_clamp_type fixed "
-                       "-effect_clamp_on zmin -time static -static_steps 20" ROD("left", "-0.0612")
-                         ROD("right", "0.0612")));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 int main(int argc, char **argv)
 {
-  PetscMPIInt size;
-
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  if (size == 1) PetscCall(check_drift("p1", 100000));
-  if (size == 1) PetscCall(check_drift("cr", 10000));
-  if (size == 1) PetscCall(check_drift("dg", 10000));
-  if (size == 1) PetscCall(check_drift("p2", 10000));
+  if (test_size == 1) PetscCall(check_drift("p1", 100000));
+  if (test_size == 1) PetscCall(check_drift("cr", 10000));
+  if (test_size == 1) PetscCall(check_drift("dg", 10000));
+  if (test_size == 1) PetscCall(check_drift("p2", 10000));
   PetscCall(check_decay("p1", 0.002));
   PetscCall(check_decay("p1", 0.05));
   PetscCall(check_decay("cr", 0.002));
@@ -365,7 +330,11 @@ int main(int argc, char **argv)
   PetscCall(check_account("newmark", "p2", "corotated", 2, 1e-3));
   PetscCall(check_turning("euler_implicit -ts_dt 0.1 -ts_max_time 1", "p1"));
   PetscCall(check_turning("static -static_steps 10", "p2"));
-  PetscCall(check_grip());
+  PetscCall(check_gain("grip", 9.5e-4,
+                       "-bodies a -body_a_mesh box:0.1,0.1,0.3:2,2,6 -body_a_translate -0.05,-0.05,0" BODY
+                       "-body_a_material neohookean -effects clamp,left,right -effect_clamp_type fixed "
+                       "-effect_clamp_on zmin -time static -static_steps 20" ROD("left", "-0.0612")
+                         ROD("right", "0.0612")));
   PetscCall(check_swing("cr"));
   PetscCall(check_swing("dg"));
   PetscCall(check_flight("euler_implicit", "p1", "corotated", 2e-3, 1));
@@ -375,7 +344,7 @@ int main(int argc, char **argv)
   PetscCall(check_flight("newmark", "cr", "corotated", 2e-3, 2));
   PetscCall(check_flight("newmark", "dg", "corotated", 2e-3, 2));
   PetscCall(check_flight("newmark", "p2", "corotated", 2e-3, 2));
-  if (size > 1) SB_TEST_END(); /* materials and short steps do not depend on ranks */
+  if (test_size > 1) SB_TEST_END(); /* materials and short steps do not depend on ranks */
   PetscCall(check_flight("newmark", "p1", "neohookean", 2e-3, 2));
   PetscCall(check_flight("genalpha", "p1", "linear", 2e-3, -1));
   PetscCall(check_flight("alpha2", "p1", "corotated", 2e-3, -1));

@@ -2,35 +2,21 @@
 /*
   The bar 0.4 x 0.1 x 0.1 m, clamped, E = 5e4, nu = 0.3, rho = 1000, small strains.
 
-  Lowest natural frequency, 0.68846 Hz in the continuum (computed with high-order elements): the discrete one is found by
-  inverse iteration with the program's stiffness and mass, K y = M x, and converges from above;
-  three meshes are extrapolated (Aitken). CR and DG are close to it already on coarse meshes. Released in this mode the bar must oscillate with this
-  frequency: Newmark lengthens the period by (w h/2)/atan(w h/2), to 1e-8.
+  Lowest natural frequency, 0.68846 Hz in the continuum (computed with high-order elements): the discrete one
+  is found by inverse iteration with the program's stiffness and mass, K y = M x, and converges from above;
+  three meshes are extrapolated (Aitken). CR and DG are close to it already on coarse meshes. Released in this
+  mode the bar must oscillate with this frequency: Newmark lengthens the period by (w h/2)/atan(w h/2), to
+  1e-8.
 
   Sudden gravity, undamped: the first minimum of the end face is -1.5696 m at 0.7203 s.
 */
-#include "sbsolver.h"
-#include "verify.h"
+#include "modes.h"
 
 #define BAR                                                                                                  \
   "-bodies a -body_a_mesh box:0.4,0.1,0.1:%d -body_a_material linear -body_a_young 5e4 -body_a_poisson 0.3 " \
   "-body_a_density 1000 -effect_clamp_type fixed -effect_clamp_on xmin -ksp_rtol 1e-12 "
 
 static const PetscReal end[3] = {0.4, 0.05, 0.05};
-
-/* Y = M X with the lumped mass; zero at prescribed unknowns. */
-static PetscErrorCode times_mass(SbSpace s, Vec X, Vec Y)
-{
-  PetscScalar *y;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecCopy(X, Y));
-  PetscCall(VecGetArray(Y, &y));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
-    y[i] *= s->fixed[i / 3] & (1 << i % 3) ? 0. : s->node_mass[i / 3];
-  PetscCall(VecRestoreArray(Y, &y));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 static void bend(const PetscReal x[3], PetscReal v[3])
 {
@@ -43,24 +29,11 @@ static PetscErrorCode lowest_mode(TestScene *t, Vec X, PetscReal *w)
 {
   SbModel m = t->model;
   PetscReal last = 0., size;
-  const char *package;
   Vec Y, Z;
-  Mat K;
   KSP ksp;
-  PC pc;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceCreateMatrix(m->space, SB_MATRIX_AIJ, &K));
-  PetscCall(SbModelTangent(m, 0., 0., 0., 1., t->run->U, NULL, K));
-  PetscCall(KSPCreate(PETSC_COMM_WORLD, &ksp));
-  PetscCall(KSPSetOperators(ksp, K, K));
-  PetscCall(KSPSetType(ksp, KSPPREONLY));
-  PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(SbDirectPackage(PETSC_COMM_WORLD, 3 * m->space->Nnode, PETSC_TRUE, &package));
-  PetscCheck(package, PETSC_COMM_WORLD, PETSC_ERR_SUP, "This PETSc has neither SuiteSparse nor MUMPS");
-  PetscCall(SbPCDirectSet(pc, package, PETSC_TRUE));
-  PetscCall(PCSetFromOptions(pc));
-  PetscCall(SbPCCheckPivots(pc));
+  PetscCall(modes_factor(m, 0., t->run->U, &ksp));
   PetscCall(VecDuplicate(X, &Y));
   PetscCall(VecDuplicate(X, &Z));
   PetscCall(test_fill(m, bend, X));
@@ -69,11 +42,11 @@ static PetscErrorCode lowest_mode(TestScene *t, Vec X, PetscReal *w)
   for (int k = 0; k < 3000 && (k < 2 || PetscAbsReal(*w - last) > 1e-14 * *w); k++) {
     PetscReal kinetic, strain;
 
-    PetscCall(times_mass(m->space, X, Y));
+    PetscCall(modes_times_mass(m->space, X, Y));
     PetscCall(KSPSolve(ksp, Y, Z));
     /* Rayleigh quotient of z: z K z = z M x */
     PetscCall(VecDot(Z, Y, &strain));
-    PetscCall(times_mass(m->space, Z, Y));
+    PetscCall(modes_times_mass(m->space, Z, Y));
     PetscCall(VecDot(Z, Y, &kinetic));
     last = *w;
     *w = PetscSqrtReal(strain / kinetic);
@@ -81,12 +54,10 @@ static PetscErrorCode lowest_mode(TestScene *t, Vec X, PetscReal *w)
     PetscCall(VecCopy(Z, X));
     PetscCall(VecScale(X, 1. / size));
   }
-  SB_CHECK(PetscAbsReal(*w - last) <= 1e-13 * *w, "inverse iteration ends at %g and %g", (double)last,
-           (double)*w);
+  SB_CHECK(PetscAbsReal(*w - last) <= 1e-13 * *w, "inverse iteration ends at %g and %g", last, *w);
   PetscCall(VecDestroy(&Y));
   PetscCall(VecDestroy(&Z));
   PetscCall(KSPDestroy(&ksp));
-  PetscCall(MatDestroy(&K));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -97,13 +68,10 @@ static PetscErrorCode check_release(const char *element, PetscInt n, PetscReal *
   const PetscInt steps = 73;
   PetscReal w = 0., angle, u0[3], u[3], error;
   TestScene t;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          BAR "-body_a_element %s -effects clamp -time newmark -ts_dt %g -ts_max_time %g",
-                          (int)n, element, (double)h, (double)(h * (PetscReal)steps)));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t, BAR "-body_a_element %s -effects clamp -time newmark -ts_dt %g -ts_max_time %g",
+                      (int)n, element, h, h * (PetscReal)steps));
   PetscCall(lowest_mode(&t, t.run->U, &w));
   *frequency = w / (2. * PETSC_PI);
   PetscCall(test_value_at(t.model, t.run->U, end, u0));
@@ -111,11 +79,10 @@ static PetscErrorCode check_release(const char *element, PetscInt n, PetscReal *
   PetscCall(test_value_at(t.model, t.run->U, end, u));
   angle = 2. * PetscAtanReal(0.5 * w * h) * (PetscReal)steps;
   error = PetscAbsReal(u[2] - u0[2] * PetscCosReal(angle)) / PetscAbsReal(u0[2]);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "    %s n %2d: %.6f Hz; after %d steps of Newmark %.1e from its exact swing\n",
-                        element, (int)n, (double)*frequency, (int)steps, (double)error));
+  test_print("    %s n %2d: %.6f Hz; after %d steps of Newmark %.1e from its exact swing\n", element, (int)n,
+             *frequency, (int)steps, error);
   /* tolerance of the linear solver times the number of steps; on the odd mesh two modes are nearly degenerate */
-  SB_CHECK(n % 2 || error < 1e-8, "the released mode is off by %g after %d steps", (double)error, (int)steps);
+  SB_CHECK(n % 2 || error < 1e-8, "the released mode is off by %g after %d steps", error, (int)steps);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -152,18 +119,14 @@ static PetscErrorCode sudden_gravity(const char *element, PetscInt n, PetscReal 
 {
   Minimum m = {.min_u = 0.};
   TestScene t;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
   PetscCall(
-    PetscSNPrintf(text, sizeof(text),
-                  BAR "-body_a_element %s -effects clamp,gravity -time newmark -ts_dt 0.01 -ts_max_time 0.9",
-                  (int)n, element));
-  PetscCall(test_scene_open(text, &t));
+    test_open(&t, BAR "-body_a_element %s -effects clamp,gravity -time newmark -ts_dt 0.01 -ts_max_time 0.9",
+              (int)n, element));
   PetscCall(SbRunAddMonitor(t.run, watch, &m));
   PetscCall(verify_solve(&t, "sudden gravity"));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "    %s n %2d: first minimum %.5f m at %.5f s\n", element, (int)n,
-                        (double)m.min_u, (double)m.min_t));
+  test_print("    %s n %2d: first minimum %.5f m at %.5f s\n", element, (int)n, m.min_u, m.min_t);
   *u = m.min_u;
   *at = m.min_t;
   PetscCall(test_scene_close(&t));
@@ -180,10 +143,9 @@ int main(int argc, char **argv)
   limit[0] = verify_aitken(f);
   limit[1] = verify_aitken(u);
   limit[2] = verify_aitken(at);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  lowest frequency, extrapolated %.5f Hz (reference 0.68846)\n  sudden gravity, "
-                        "extrapolated %.4f m at %.4f s (reference -1.5696 m at 0.7203 s)\n",
-                        (double)limit[0], (double)limit[1], (double)limit[2]));
+  test_print("  lowest frequency, extrapolated %.5f Hz (reference 0.68846)\n  sudden gravity, "
+             "extrapolated %.4f m at %.4f s (reference -1.5696 m at 0.7203 s)\n",
+             limit[0], limit[1], limit[2]);
   SB_CHECK_NEAR(limit[0], 0.68846, 3e-3 * 0.68846, "extrapolated frequency");
   /* the minimum is flat: small high-frequency waves, which depend on the mesh, determine its position */
   SB_CHECK_NEAR(limit[1], -1.5696, 1e-2 * 1.5696, "extrapolated first minimum");

@@ -18,7 +18,7 @@ static PetscErrorCode check_meshes(const Pair *p)
     PetscCall(hertz(p, &c, &force[i]));
   }
   limit = verify_aitken(force);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s: limit %.4f of the formula\n", p->name, (double)limit));
+  test_print("  %s: limit %.4f of the formula\n", p->name, limit);
   SB_CHECK_NEAR(force[2], 1, 0.04, "force on the finest mesh against that of Hertz");
   SB_CHECK_NEAR(limit, 1, 0.02, "limit of the force against that of Hertz");
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -32,7 +32,7 @@ static PetscErrorCode check_plane(const char *element, PetscInt cells, PetscReal
   PetscFunctionBeginUser;
   PetscCall(verify_mesh_write(n, bend, &block, path));
   PetscCall(boussinesq(P, young, 1, -d, sizeof(far), far));
-  PetscCall(verify_open(
+  PetscCall(test_open(
     &t,
     "-bodies b -body_b_mesh %s -body_b_element %s -body_b_material linear -body_b_young %g "
     "-body_b_poisson %g -sets x0,y0,meet,bx,by,bz -set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 "
@@ -42,21 +42,18 @@ static PetscErrorCode check_plane(const char *element, PetscInt cells, PetscReal
     "-effect_y_components y -effect_high_type prescribed_displacement -effect_high_on bx,by,bz "
     "-effect_high_displacement %s -effect_floor_type contact -effect_floor_response projected "
     "-effect_floor_on meet -effect_floor_obstacle plane:0,0,1,0",
-    path, element, (double)young, POISSON, (double)(3 * d), far));
+    path, element, young, POISSON, 3 * d, far));
   t.run->want_residual = PETSC_TRUE;
   PetscCall(verify_solve(&t, "plane"));
   PetscCall(contact_column(t.run, 1, "floor", "force_z", &force));
   PetscCall(contact_column(t.run, 1, "floor", "contacts", &contacts));
   PetscCall(contact_column(t.run, 1, "high", "reaction_z", &reaction));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  sphere on a rigid plane, %s, %d^3 cells: %g points touch, force %.4f of the "
-                        "formula's, the drive pushes with %.4f, %d solves\n",
-                        element, (int)cells, (double)contacts, (double)(4 * force / P),
-                        (double)(-4 * reaction / P), (int)t.run->newton_total));
+  test_print("  sphere on a rigid plane, %s, %d^3 cells: %g points touch, force %.4f of the "
+             "formula's, the drive pushes with %.4f, %d solves\n",
+             element, (int)cells, contacts, 4 * force / P, -4 * reaction / P, (int)t.run->newton_total);
   SB_CHECK_NEAR(4 * force / P, 1, tolerance, "force of the plane against that of Hertz");
   SB_CHECK_NEAR(-reaction, force, 1e-3 * force, "force of the drive against that of the plane");
   PetscCall(test_scene_close(&t));
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

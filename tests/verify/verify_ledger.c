@@ -1,10 +1,11 @@
 // @ranks 1 2
 /*
-  Effectivity of the error estimates of the ledger, estimate over true error in the energy norm: of time steps on an oscillating bar, for every
-  integrator and with damping; of linear and Newton solves with loose tolerances; of contact springs and barrier gaps. And: the ledger changes no result, its
-  estimates are the same on any number of ranks, and -accuracy is reached, also if contact is the largest error.
-  The true error of the time step is relative to the same run with 32 times shorter steps by Newmark's method, that of a solve relative to a
-  solution up to rounding.
+  Effectivity of the error estimates of the ledger, estimate over true error in the energy norm: of time steps
+  on an oscillating bar, for every integrator and with damping; of linear and Newton solves with loose
+  tolerances; of contact springs and barrier gaps. And: the ledger changes no result, its estimates are the
+  same on any number of ranks, and -accuracy is reached, also if contact is the largest error. The true error
+  of the time step is relative to the same run with 32 times shorter steps by Newmark's method, that of a
+  solve relative to a solution up to rounding.
 */
 #include "verify.h"
 
@@ -44,35 +45,28 @@ static PetscErrorCode distance(SbModel m, Vec U, Vec V, Vec U1, Vec V1, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static void judge(const char *what, const char *source, PetscReal estimate, PetscReal error, PetscReal stored,
-                  PetscReal low, PetscReal high)
-{
-  const PetscReal ratio = estimate / error;
-
-  (void)PetscPrintf(PETSC_COMM_WORLD, "  | %s | %s | %.2e | %.2e | %.2f |\n", what, source,
-                    (double)(error / stored), (double)(estimate / stored), (double)ratio);
-  SB_CHECK(ratio >= low && ratio <= high, "%s, %s: estimate / error %g is not in [%g, %g]", what, source,
-           (double)ratio, (double)low, (double)high);
-}
-
 /* Error of `source` in a run against a reference run. */
 static PetscErrorCode compare(const char *what, const char *name, SbErrorSource source, const char *scene,
                               const char *coarse, const char *fine, PetscReal low, PetscReal high)
 {
-  PetscReal error = 0., estimate, stored, linear = 0.;
+  PetscReal error = 0., estimate, stored, linear = 0., ratio;
   TestScene t, reference;
 
   PetscFunctionBeginUser;
-  PetscCall(verify_open(&reference, "%s %s", scene, fine));
+  PetscCall(test_open(&reference, "%s %s", scene, fine));
   PetscCall(verify_solve(&reference, what));
-  PetscCall(verify_open(&t, "%s %s -ledger yes", scene, coarse));
+  PetscCall(test_open(&t, "%s %s -ledger yes", scene, coarse));
   PetscCall(verify_solve(&t, what));
   PetscCall(distance(reference.model, reference.run->U, reference.run->V, t.run->U, t.run->V, &error));
   PetscCall(SbLedgerGet(t.ledger, source, &estimate, &stored));
   /* the remainder of Newton's method is partly that of its linear solves */
   if (source == SB_ERROR_NONLINEAR) PetscCall(SbLedgerGet(t.ledger, SB_ERROR_LINEAR, &linear, &stored));
   estimate = PetscSqrtReal(PetscSqr(estimate) + PetscSqr(linear));
-  judge(what, name, estimate, error, PetscSqrtReal(stored), low, high);
+  ratio = estimate / error;
+  stored = PetscSqrtReal(stored);
+  test_print("  | %s | %s | %.2e | %.2e | %.2f |\n", what, name, error / stored, estimate / stored, ratio);
+  SB_CHECK(ratio >= low && ratio <= high, "%s, %s: estimate / error %g is not in [%g, %g]", what, name, ratio,
+           low, high);
   PetscCall(test_scene_close(&t));
   PetscCall(test_scene_close(&reference));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -98,15 +92,12 @@ static PetscErrorCode steps(void)
      "-time newmark -ts_dt 0.008", "-time newmark -ts_dt 0.00025", 0.5, 2},
   };
 
-  PetscMPIInt size;
-
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
     char scene[VERIFY_TEXT];
 
     /* thousands of steps of a small system: on several ranks only an implicit and an explicit integrator */
-    if (size > 1 && i != 2 && i != 4) continue;
+    if (test_size > 1 && i != 2 && i != 4) continue;
     PetscCall(PetscSNPrintf(scene, sizeof(scene),
                             BAR "-body_bar_material linear -ts_max_time 0.4 -ksp_rtol 1e-10 %s",
                             of[i].scene));
@@ -148,15 +139,12 @@ static PetscErrorCode solves(void)
      "-body_bar_material linear -body_bar_element p2 -time static", "-ksp_rtol 1e-3", "-ksp_rtol 1e-13"},
   };
 
-  PetscMPIInt size;
-
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
     char scene[VERIFY_TEXT];
 
     /* with a factor per rank the error of CG is smooth and accumulates: docs/reports/error_estimates.md */
-    if (size > 1 && strstr(of[i].scene, "ts_dt") && of[i].source == SB_ERROR_LINEAR) continue;
+    if (test_size > 1 && strstr(of[i].scene, "ts_dt") && of[i].source == SB_ERROR_LINEAR) continue;
     PetscCall(PetscSNPrintf(scene, sizeof(scene), BAR "%s %s", cg, of[i].scene));
     PetscCall(compare(of[i].what, of[i].name, of[i].source, scene, of[i].coarse, of[i].fine, 0.3, 3));
   }
@@ -199,15 +187,15 @@ static PetscErrorCode spectator(const char *options)
   PetscFunctionBeginUser;
   for (int i = 0; i < 2; i++) {
     PetscCall(
-      verify_open(&t[i], BAR "%s %s", options,
-                  i ? "-ledger yes -ledger_every 2 -ledger_quantity displacement -ledger_at 0.4,0,0" : ""));
+      test_open(&t[i], BAR "%s %s", options,
+                i ? "-ledger yes -ledger_every 2 -ledger_quantity displacement -ledger_at 0.4,0,0" : ""));
     PetscCall(verify_solve(&t[i], "spectator"));
   }
   SB_CHECK(!t[0].ledger && !t[0].run->post_solve.fn && !t[0].run->ncolumn, "a run without -ledger has one");
   SB_CHECK(t[1].run->ncolumn == SB_ERROR_COUNT, "%d columns", (int)t[1].run->ncolumn);
   PetscCall(VecAXPY(t[1].run->U, -1., t[0].run->U));
   PetscCall(VecNorm(t[1].run->U, NORM_INFINITY, &difference));
-  SB_CHECK(difference == 0., "with a ledger displacements differ by %g m: %s", (double)difference, options);
+  SB_CHECK(difference == 0., "with a ledger displacements differ by %g m: %s", difference, options);
   SB_CHECK(t[0].run->linear_total == t[1].run->linear_total, "with a ledger iterations differ: %s", options);
   for (int i = 0; i < 2; i++) PetscCall(test_scene_close(&t[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -221,42 +209,31 @@ static PetscErrorCode dial(PetscReal accuracy, PetscInt *steps)
 
   PetscFunctionBeginUser;
   PetscCall(
-    verify_open(&reference, BAR
-                "-body_bar_material linear -ts_max_time 0.4 -time newmark -ts_dt 0.00025 -ksp_rtol 1e-10"));
+    test_open(&reference,
+              BAR "-body_bar_material linear -ts_max_time 0.4 -time newmark -ts_dt 0.00025 -ksp_rtol 1e-10"));
   PetscCall(verify_solve(&reference, "dial"));
-  PetscCall(
-    verify_open(&t, BAR "-body_bar_material linear -ts_max_time 0.4 -time newmark -ts_dt 0.01 -accuracy %g",
-                (double)accuracy));
+  PetscCall(test_open(
+    &t, BAR "-body_bar_material linear -ts_max_time 0.4 -time newmark -ts_dt 0.01 -accuracy %g", accuracy));
   PetscCall(verify_solve(&t, "dial"));
   PetscCall(distance(reference.model, reference.run->U, reference.run->V, t.run->U, t.run->V, &error));
   PetscCall(SbLedgerGet(t.ledger, SB_ERROR_TIME, &form, &stored));
   *steps = t.run->steps_total;
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  -accuracy %g: %d steps, %d iterations, error %.2e\n",
-                        (double)accuracy, (int)*steps, (int)t.run->linear_total,
-                        (double)(error / PetscSqrtReal(stored))));
-  SB_CHECK(error < accuracy * PetscSqrtReal(stored), "-accuracy %g: error %g", (double)accuracy,
-           (double)(error / PetscSqrtReal(stored)));
-  SB_CHECK(error > 0.05 * accuracy * PetscSqrtReal(stored), "-accuracy %g: error %g, far too good",
-           (double)accuracy, (double)(error / PetscSqrtReal(stored)));
+  test_print("  -accuracy %g: %d steps, %d iterations, error %.2e\n", accuracy, (int)*steps,
+             (int)t.run->linear_total, error / PetscSqrtReal(stored));
+  SB_CHECK(error < accuracy * PetscSqrtReal(stored), "-accuracy %g: error %g", accuracy,
+           error / PetscSqrtReal(stored));
+  SB_CHECK(error > 0.05 * accuracy * PetscSqrtReal(stored), "-accuracy %g: error %g, far too good", accuracy,
+           error / PetscSqrtReal(stored));
   PetscCall(test_scene_close(&t));
   PetscCall(test_scene_close(&reference));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode dials(void)
-{
-  PetscInt few, many;
-
-  PetscFunctionBeginUser;
-  PetscCall(dial(0.1, &few));
-  PetscCall(dial(0.01, &many));
-  SB_CHECK(many > few, "-accuracy 0.01 takes %d steps, 0.1 %d", (int)many, (int)few);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /*
-  A block between rollers and a plate that is displaced onto it by a hundredth of the height: uniform strain; the gaps are the only error, and their share of the displacement is that of force and state. And
-  a ball that indents a block against the same with a tiny width: the error is the requested one, or a tenth of that of the mesh.
+  A block between rollers and a plate that is displaced onto it by a hundredth of the height: uniform strain;
+  the gaps are the only error, and their share of the displacement is that of force and state. And a ball that
+  indents a block against the same with a tiny width: the error is the requested one, or a tenth of that of
+  the mesh.
 */
 static PetscErrorCode gaps(void)
 {
@@ -279,33 +256,32 @@ static PetscErrorCode gaps(void)
   PetscReal width = 0.;
 
   PetscFunctionBeginUser;
-  PetscCall(verify_open(&reference, "%s -effect_tool_barrier_width 1e-6", ball));
+  PetscCall(test_open(&reference, "%s -effect_tool_barrier_width 1e-6", ball));
   PetscCall(verify_solve(&reference, "ball"));
   for (int i = 0; i < 2; i++) {
     PetscReal error, mesh, stored;
 
-    PetscCall(verify_open(&t, "%s -accuracy %g", plate, (double)asked[i]));
+    PetscCall(test_open(&t, "%s -accuracy %g", plate, asked[i]));
     PetscCall(verify_solve(&t, "plate"));
     PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &energies));
     error = PetscSqrtReal(energies.strain / exact) - 1.; /* of the strain, and therefore of the force */
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  plate, -accuracy %g: force off by %.1e, width %.1e m\n",
-                          (double)asked[i], (double)error, (double)t.model->potential[0]->width));
-    SB_CHECK(error > 0.02 * asked[i] && error < asked[i], "plate, -accuracy %g: force off by %g",
-             (double)asked[i], (double)error);
-    SB_CHECK(!i || t.model->potential[0]->width < 0.2 * width, "width %g, then %g m", (double)width,
-             (double)t.model->potential[0]->width);
+    test_print("  plate, -accuracy %g: force off by %.1e, width %.1e m\n", asked[i], error,
+               t.model->potential[0]->width);
+    SB_CHECK(error > 0.02 * asked[i] && error < asked[i], "plate, -accuracy %g: force off by %g", asked[i],
+             error);
+    SB_CHECK(!i || t.model->potential[0]->width < 0.2 * width, "width %g, then %g m", width,
+             t.model->potential[0]->width);
     width = t.model->potential[0]->width;
     PetscCall(test_scene_close(&t));
 
-    PetscCall(verify_open(&t, "%s -accuracy %g", ball, (double)asked[i]));
+    PetscCall(test_open(&t, "%s -accuracy %g", ball, asked[i]));
     PetscCall(verify_solve(&t, "ball"));
     PetscCall(distance(reference.model, reference.run->U, reference.run->V, t.run->U, t.run->V, &error));
     PetscCall(SbLedgerGet(t.ledger, SB_ERROR_SPACE, &mesh, &stored));
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  ball, -accuracy %g: contact off by %.1e, mesh by %.1e\n",
-                          (double)asked[i], (double)(error / PetscSqrtReal(stored)),
-                          (double)(mesh / PetscSqrtReal(stored))));
+    test_print("  ball, -accuracy %g: contact off by %.1e, mesh by %.1e\n", asked[i],
+               error / PetscSqrtReal(stored), mesh / PetscSqrtReal(stored));
     SB_CHECK(error < PetscMax(asked[i] * PetscSqrtReal(stored), 0.1 * mesh), "ball, -accuracy %g: %g",
-             (double)asked[i], (double)(error / PetscSqrtReal(stored)));
+             asked[i], error / PetscSqrtReal(stored));
     PetscCall(test_scene_close(&t));
   }
   PetscCall(test_scene_close(&reference));
@@ -314,6 +290,8 @@ static PetscErrorCode gaps(void)
 
 int main(int argc, char **argv)
 {
+  PetscInt few, many;
+
   SB_TEST_BEGIN(argc, argv);
   PetscCall(steps());
   PetscCall(solves());
@@ -322,7 +300,9 @@ int main(int argc, char **argv)
   PetscCall(spectator("-body_bar_material linear -time static -solver cg_icc"));
   PetscCall(spectator("-body_bar_material corotated -ts_dt 0.01 -ts_max_time 0.1"));
   PetscCall(spectator("-body_bar_material corotated -time genalpha -ts_dt 0.01 -ts_max_time 0.1"));
-  PetscCall(dials());
+  PetscCall(dial(0.1, &few));
+  PetscCall(dial(0.01, &many));
+  SB_CHECK(many > few, "-accuracy 0.01 takes %d steps, 0.1 %d", (int)many, (int)few);
   PetscCall(gaps());
   SB_TEST_END();
 }

@@ -1,15 +1,17 @@
 // @ranks 1,2
 /*
-  Limit loads. A cube of St. Venant-Kirchhoff material with Poisson's ratio 0, compressed along one axis to the stretch s, has the nominal
-  stress P = E/2 (s^3 - s), which is largest at s = 1/sqrt 3: 0.19245 E.
+  Limit loads. A cube of St. Venant-Kirchhoff material with Poisson's ratio 0, compressed along one axis to
+  the stretch s, has the nominal stress P = E/2 (s^3 - s), which is largest at s = 1/sqrt 3: 0.19245 E.
 
-  A load path to 0.2 E ends there in few steps, reports the load reached, and that displacements grow without bound with the load. A path to a lower load
-  reaches its end. With arc length control each equilibrium satisfies the formula, past the maximum, through s = 0, where the height is zero, to the
-  inverted branch, which carries 0.2 E; with dead and follower loads, and with all elements. A restart continues the same path, also from the
-  end of a load path.
+  A load path to 0.2 E ends there in few steps, reports the load reached, and that displacements grow without
+  bound with the load. A path to a lower load reaches its end. With arc length control each equilibrium
+  satisfies the formula, past the maximum, through s = 0, where the height is zero, to the inverted branch,
+  which carries 0.2 E; with dead and follower loads, and with all elements. A restart continues the same path,
+  also from the end of a load path.
 
-  Follower pressure on part of a surface has no potential. Its load path ends at the limit too; for a cantilever curled up by it the number of
-  Newton iterations is bounded, although symmetric parts of the tangent are indefinite on the way; likewise for a strip that it pulls by its end.
+  Follower pressure on part of a surface has no potential. Its load path ends at the limit too; for a
+  cantilever curled up by it the number of Newton iterations is bounded, although symmetric parts of the
+  tangent are indefinite on the way; likewise for a strip that it pulls by its end.
 */
 #include "verify.h"
 
@@ -31,18 +33,15 @@ static PetscErrorCode check_end(PetscReal load, int steps, const char *more)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    verify_open(&t, CUBE DEAD "-time_inverted reject -static_steps %d %s", (double)-load, steps, more));
+  PetscCall(test_open(&t, CUBE DEAD "-time_inverted reject -static_steps %d %s", (double)-load, steps, more));
   PetscCall(SbRunSolve(t.run));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %g E in %d steps %s: %.9g in %d steps, softening %g\n    %s\n",
-                        (double)load, steps, more, (double)t.run->t_now, (int)t.run->steps_total,
-                        (double)t.run->softening, t.run->stop_reason));
-  SB_CHECK(reached == 1. || t.run->t_now < reached + 1e-9, "load factor %g beyond the limit",
-           (double)t.run->t_now);
+  test_print("  %g E in %d steps %s: %.9g in %d steps, softening %g\n    %s\n", load, steps, more,
+             t.run->t_now, (int)t.run->steps_total, t.run->softening, t.run->stop_reason);
+  SB_CHECK(reached == 1. || t.run->t_now < reached + 1e-9, "load factor %g beyond the limit", t.run->t_now);
   SB_CHECK_NEAR(t.run->t_now, reached, 1e-3 / steps, "load factor reached");
   SB_CHECK(t.run->steps_total <= steps + 60, "%d steps", (int)t.run->steps_total);
   SB_CHECK((t.run->stop_reason[0] == 0) == (reached == 1.), "%s", t.run->stop_reason);
-  SB_CHECK(reached == 1. || t.run->softening > 30., "softening %g", (double)t.run->softening);
+  SB_CHECK(reached == 1. || t.run->softening > 30., "softening %g", t.run->softening);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -54,17 +53,16 @@ static PetscErrorCode check_follower_end(const char *element)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(verify_open(&t,
-                        CUBE "-static_steps 5 -effect_press_type pressure -effect_press_value %g "
-                             "-body_a_element %s",
-                        (double)load, element));
+  PetscCall(test_open(&t,
+                      CUBE "-static_steps 5 -effect_press_type pressure -effect_press_value %g "
+                           "-body_a_element %s",
+                      load, element));
   PetscCall(SbRunSolve(t.run));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  follower %g E, %s: %.9g in %d steps, %d iterations\n    %s\n",
-                        (double)load, element, (double)t.run->t_now, (int)t.run->steps_total,
-                        (int)t.run->newton_total, t.run->stop_reason));
+  test_print("  follower %g E, %s: %.9g in %d steps, %d iterations\n    %s\n", load, element, t.run->t_now,
+             (int)t.run->steps_total, (int)t.run->newton_total, t.run->stop_reason);
   /* below the limit by the least increment; the iterations are bounded by twice those of the slowest element */
   SB_CHECK_NEAR(t.run->t_now, reached, 1e-3, "load factor");
-  SB_CHECK(t.run->softening > 10., "%s: softening %g", element, (double)t.run->softening);
+  SB_CHECK(t.run->softening > 10., "%s: softening %g", element, t.run->softening);
   SB_CHECK(t.run->newton_total < 280, "%s: %d iterations", element, (int)t.run->newton_total);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -76,28 +74,28 @@ static PetscErrorCode check_curl(const char *element, PetscReal nu, PetscReal pr
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    verify_open(&t,
-                "-bodies a -body_a_mesh box:1,0.1,0.1:10,2,2 -body_a_material neohookean -body_a_young "
-                "1e6 -body_a_poisson %g -body_a_density 1000 -effects hold,press -effect_hold_type "
-                "fixed -effect_hold_on xmin -effect_press_type pressure -effect_press_on zmax "
-                "-effect_press_value %g -time static -static_steps 10 -body_a_element %s",
-                (double)nu, (double)pressure, element));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh box:1,0.1,0.1:10,2,2 -body_a_material neohookean -body_a_young "
+                      "1e6 -body_a_poisson %g -body_a_density 1000 -effects hold,press -effect_hold_type "
+                      "fixed -effect_hold_on xmin -effect_press_type pressure -effect_press_on zmax "
+                      "-effect_press_value %g -time static -static_steps 10 -body_a_element %s",
+                      nu, pressure, element));
   PetscCall(verify_solve(&t, "curl"));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  curl, %s, nu %g, %g Pa: %d Newton and %d linear iterations, %d rejected\n",
-                        element, (double)nu, (double)pressure, (int)t.run->newton_total,
-                        (int)t.run->linear_total, (int)t.run->rejected_total));
+  PetscCall(PetscPrintf(
+    PETSC_COMM_WORLD, "  curl, %s, nu %g, %g Pa: %d Newton and %d linear iterations, %d rejected\n", element,
+    nu, pressure, (int)t.run->newton_total, (int)t.run->linear_total, (int)t.run->rejected_total));
   SB_CHECK(t.run->t_now == 1. && !t.run->rejected_total, "%s: load factor %g, %d rejected", element,
-           (double)t.run->t_now, (int)t.run->rejected_total);
+           t.run->t_now, (int)t.run->rejected_total);
   SB_CHECK(t.run->newton_total <= iterations, "%s: %d Newton iterations", element, (int)t.run->newton_total);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /*
-  Clamped strip under a follower pressure that pulls its end. It stays nearly straight, and the more it is pulled the less stiff it is in bending: the lowest eigenvalue of the
-  tangent decreases as exp(-k length), k^2 = load / (EI); that of its symmetric part is negative from the first load step on. Full Newton steps increase the residual, and the next ones reduce it.
+  Clamped strip under a follower pressure that pulls its end. It stays nearly straight, and the more it is
+  pulled the less stiff it is in bending: the lowest eigenvalue of the tangent decreases as exp(-k length),
+  k^2 = load / (EI); that of its symmetric part is negative from the first load step on. Full Newton steps
+  increase the residual, and the next ones reduce it.
 */
 static PetscErrorCode check_pull(const char *element, PetscReal nu)
 {
@@ -105,20 +103,20 @@ static PetscErrorCode check_pull(const char *element, PetscReal nu)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(verify_open(&t,
-                        "-bodies a -body_a_mesh box:0.2,0.04,0.01:10,2,1 -body_a_material neohookean "
-                        "-body_a_young 1e4 -body_a_poisson %g -body_a_density 1000 -effects hold,pull "
-                        "-effect_hold_type fixed -effect_hold_on xmin -effect_pull_type pressure "
-                        "-effect_pull_on xmax -effect_pull_value -2000*t -time static -static_steps 20 "
-                        "-body_a_element %s",
-                        (double)nu, element));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh box:0.2,0.04,0.01:10,2,1 -body_a_material neohookean "
+                      "-body_a_young 1e4 -body_a_poisson %g -body_a_density 1000 -effects hold,pull "
+                      "-effect_hold_type fixed -effect_hold_on xmin -effect_pull_type pressure "
+                      "-effect_pull_on xmax -effect_pull_value -2000*t -time static -static_steps 20 "
+                      "-body_a_element %s",
+                      nu, element));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(verify_solve(&t, "pull"));
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD, "  pull, %s, nu %g: %d Newton iterations, %d rejected, strain energy %.5e J\n", element,
-    (double)nu, (int)t.run->newton_total, (int)t.run->rejected_total, (double)t.run->energies.strain));
+    nu, (int)t.run->newton_total, (int)t.run->rejected_total, t.run->energies.strain));
   SB_CHECK(t.run->t_now == 1. && !t.run->rejected_total, "%s: load factor %g, %d rejected", element,
-           (double)t.run->t_now, (int)t.run->rejected_total);
+           t.run->t_now, (int)t.run->rejected_total);
   /* 1.5 times the measured number */
   SB_CHECK(t.run->newton_total < 250, "%s: %d Newton iterations", element, (int)t.run->newton_total);
   /* P1 is too stiff by 6 % */
@@ -150,14 +148,13 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
 static PetscErrorCode open_branch(const char *dir, PetscBool follower, const char *more, Branch *b,
                                   TestScene *t)
 {
-  char text[VERIFY_TEXT], load[128];
+  char load[128];
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(load, sizeof(load),
                           follower ? "-effect_press_type pressure -effect_press_value %.17g" : DEAD,
                           follower ? 0.2 : -0.2));
-  PetscCall(PetscSNPrintf(text, sizeof(text), CUBE "-static_steps 10 %s %s", load, more));
-  PetscCall(test_scene_open_in(dir, text, t));
+  PetscCall(test_open_in(dir, t, CUBE "-static_steps 10 %s %s", load, more));
   t->run->want_energies = PETSC_TRUE;
   *b = (Branch){.load = 0.2};
   PetscCall(SbRunAddMonitor(t->run, watch, b));
@@ -173,14 +170,13 @@ static PetscErrorCode check_branch(PetscBool follower, const char *more)
   PetscFunctionBeginUser;
   PetscCall(open_branch(NULL, follower, more, &b, &t));
   PetscCall(verify_solve(&t, "branch"));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD, "  arc length%s: %d steps, %d rejected, top %.6f, s %.9f at the end, error %.1e E\n",
-    more, (int)t.run->steps_total, (int)t.run->rejected_total, (double)b.top, (double)b.s, (double)b.error));
+  test_print("  arc length%s: %d steps, %d rejected, top %.6f, s %.9f at the end, error %.1e E\n", more,
+             (int)t.run->steps_total, (int)t.run->rejected_total, b.top, b.s, b.error);
   /* tolerance of the residual: 1e-8 of the load */
-  SB_CHECK(b.error < 1e-7 * b.load, "%s: %g E off the branch", more, (double)b.error);
-  SB_CHECK((t.run->t_now == 1.) == !follower, "%s: the path ended at %.17g", more, (double)t.run->t_now);
-  SB_CHECK(follower ? b.s < 0.55 && b.s > 0.4 : b.s < -1., "%s: stretch %g at the end", more, (double)b.s);
-  SB_CHECK(b.top <= (follower ? limit / b.load + 1e-7 : 1.), "%s: load factor %g", more, (double)b.top);
+  SB_CHECK(b.error < 1e-7 * b.load, "%s: %g E off the branch", more, b.error);
+  SB_CHECK((t.run->t_now == 1.) == !follower, "%s: the path ended at %.17g", more, t.run->t_now);
+  SB_CHECK(follower ? b.s < 0.55 && b.s > 0.4 : b.s < -1., "%s: stretch %g at the end", more, b.s);
+  SB_CHECK(b.top <= (follower ? limit / b.load + 1e-7 : 1.), "%s: load factor %g", more, b.top);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -192,16 +188,16 @@ static PetscErrorCode check_drive(void)
   Branch b = {.load = 0.};
 
   PetscFunctionBeginUser;
-  PetscCall(verify_open(
+  PetscCall(test_open(
     &t, CUBE ARC
     "-static_steps 10 -effect_press_type prescribed_displacement -effect_press_displacement 0;0;-0.5"));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch, &b));
   PetscCall(verify_solve(&t, "prescribed_displacement"));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  drive: %d steps, %d Newton iterations, s %.12f\n",
-                        (int)t.run->steps_total, (int)t.run->newton_total, (double)b.s));
-  SB_CHECK(t.run->t_now == 1. && PetscAbsReal(b.s - 0.5) < 1e-9, "s %.12f at the load factor %g", (double)b.s,
-           (double)t.run->t_now);
+  test_print("  drive: %d steps, %d Newton iterations, s %.12f\n", (int)t.run->steps_total,
+             (int)t.run->newton_total, b.s);
+  SB_CHECK(t.run->t_now == 1. && PetscAbsReal(b.s - 0.5) < 1e-9, "s %.12f at the load factor %g", b.s,
+           t.run->t_now);
   SB_CHECK(t.run->rejected_total == 0 && t.run->newton_total <= 5 * t.run->steps_total,
            "%d Newton iterations in %d steps", (int)t.run->newton_total, (int)t.run->steps_total);
   PetscCall(test_scene_close(&t));
@@ -228,11 +224,11 @@ static PetscErrorCode check_restart(const char *first, const char *checkpoint, P
                           checkpoint));
   PetscCall(open_branch(dir, PETSC_FALSE, more, &b, &t));
   PetscCall(SbRunSolve(t.run));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  restart of '%s' at %s: s %.12f and %.12f, error %.1e E\n", first,
-                        checkpoint, (double)whole.s, (double)b.s, (double)b.error));
-  SB_CHECK(t.run->steps_total > 1 && b.error < 1e-8 * b.load, "%g E off the branch", (double)b.error);
-  SB_CHECK(b.s < 0.02 && b.s > -0.3, "stretch %g at the end", (double)b.s);
-  SB_CHECK(PetscAbsReal(b.s - whole.s) < tolerance, "restart: %g and %g", (double)b.s, (double)whole.s);
+  test_print("  restart of '%s' at %s: s %.12f and %.12f, error %.1e E\n", first, checkpoint, whole.s, b.s,
+             b.error);
+  SB_CHECK(t.run->steps_total > 1 && b.error < 1e-8 * b.load, "%g E off the branch", b.error);
+  SB_CHECK(b.s < 0.02 && b.s > -0.3, "stretch %g at the end", b.s);
+  SB_CHECK(PetscAbsReal(b.s - whole.s) < tolerance, "restart: %g and %g", b.s, whole.s);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

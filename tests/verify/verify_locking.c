@@ -1,8 +1,8 @@
 // @ranks 1 2
 /*
-  CR and DG do not lock: a divergence-free solution (manufactured.h) at nu = 0.3, 0.49, 0.4999, 0.499999, meshes with perturbed
-  vertices. Orders 2 in L2 and 1 in H1 at every nu, and nearly equal errors. P1 locks on these meshes: its solution is nearly
-  zero. verify_locking_fine.c has finer meshes.
+  CR and DG do not lock: a divergence-free solution (manufactured.h) at nu = 0.3, 0.49, 0.4999, 0.499999,
+  meshes with perturbed vertices. Orders 2 in L2 and 1 in H1 at every nu, and nearly equal errors. P1 locks on
+  these meshes: its solution is nearly zero. verify_locking_fine.c has finer meshes.
 */
 #include "locking.h"
 
@@ -14,8 +14,7 @@ static PetscErrorCode measure(const char *element, PetscInt n, PetscReal nu, Pet
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_element %s -solver direct", element));
   PetscCall(locking_cube(n, "", nu, more, error, &cost));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s nu %-8g n %2d: L2 %.5f  H1 %.5f\n", element, (double)nu,
-                        (int)n, (double)error[0], (double)error[1]));
+  test_print("  %s nu %-8g n %2d: L2 %.5f  H1 %.5f\n", element, nu, (int)n, error[0], error[1]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -33,11 +32,11 @@ static PetscErrorCode check_element(const char *element, PetscInt nnu, const Pet
     for (int k = 0; k < 2; k++) {
       order[k] = PetscLog2Real(coarse[k] / fine[k]);
       if (i == 0) first[k] = fine[k];
-      SB_CHECK(fine[k] <= times * first[k], "%s: nu %g multiplies the error by %g", element, (double)nu[i],
-               (double)(fine[k] / first[k]));
+      SB_CHECK(fine[k] <= times * first[k], "%s: nu %g multiplies the error by %g", element, nu[i],
+               fine[k] / first[k]);
     }
-    SB_CHECK(order[0] >= 1.9, "%s, nu %g: order %g in L2", element, (double)nu[i], (double)order[0]);
-    SB_CHECK(order[1] >= 0.95, "%s, nu %g: order %g in H1", element, (double)nu[i], (double)order[1]);
+    SB_CHECK(order[0] >= 1.9, "%s, nu %g: order %g in L2", element, nu[i], order[0]);
+    SB_CHECK(order[1] >= 0.95, "%s, nu %g: order %g in H1", element, nu[i], order[1]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -52,6 +51,6 @@ int main(int argc, char **argv)
   PetscCall(check_element("dg", 2, ends, 1.2));
   /* the motivation for the other two elements */
   PetscCall(measure("p1", 8, 0.4999, locked));
-  SB_CHECK(locked[0] > 0.9, "P1 has an error of %g only: this mesh shows no locking", (double)locked[0]);
+  SB_CHECK(locked[0] > 0.9, "P1 has an error of %g only: this mesh shows no locking", locked[0]);
   SB_TEST_END();
 }

@@ -1,10 +1,12 @@
 // @ranks 1 2
 /*
-  Newton's method where undamped full steps would fail: a bar of CR that bends under its weight in one load step, near nu = 1/2.
+  Newton's method where undamped full steps would fail: a bar of CR that bends under its weight in one load
+  step, near nu = 1/2.
 
-  It converges in one load step, without a rejected one, and takes at most twice the iterations of the best of 2, 4 and 8 equal load steps, all with the same final
-  state. An indefinite tangent is projected: with the exact one only the same load takes more iterations, and with the projected one
-  only the last iterations are not quadratic. Loose linear solves do not prevent the recovery from a provisional step.
+  It converges in one load step, without a rejected one, and takes at most twice the iterations of the best of
+  2, 4 and 8 equal load steps, all with the same final state. An indefinite tangent is projected: with the
+  exact one only the same load takes more iterations, and with the projected one only the last iterations are
+  not quadratic. Loose linear solves do not prevent the recovery from a provisional step.
 */
 #include "verify.h"
 
@@ -33,12 +35,12 @@ static PetscErrorCode bend(PetscReal poisson, PetscInt steps, const char *extra,
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(verify_open(&t,
-                        "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:2 -body_bar_element cr "
-                        "-body_bar_material neohookean -body_bar_young 5e5 -body_bar_poisson %g "
-                        "-body_bar_density 1000 -effects gravity,clamp -effect_gravity_vector 0,0,-9.81 "
-                        "-effect_clamp_type fixed -effect_clamp_on xmin -time static -static_steps %d %s",
-                        (double)poisson, (int)steps, extra));
+  PetscCall(test_open(&t,
+                      "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:2 -body_bar_element cr "
+                      "-body_bar_material neohookean -body_bar_young 5e5 -body_bar_poisson %g "
+                      "-body_bar_density 1000 -effects gravity,clamp -effect_gravity_vector 0,0,-9.81 "
+                      "-effect_clamp_type fixed -effect_clamp_on xmin -time static -static_steps %d %s",
+                      poisson, (int)steps, extra));
   *o = (Outcome){0};
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SNESMonitorSet(t.run->snes, keep, o, NULL));
@@ -61,12 +63,11 @@ static PetscErrorCode check_one_step(PetscReal poisson)
     SB_CHECK_NEAR(o.strain, one.strain, 1e-6 * one.strain, "strain energy with more load steps");
     if (o.iterations < best.iterations) best = o;
   }
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  nu %g: %d iterations in one load step, %d in the best number of them\n",
-                        (double)poisson, (int)one.iterations, (int)best.iterations));
-  SB_CHECK(one.rejected == 0, "nu %g: %d rejected load steps", (double)poisson, (int)one.rejected);
+  test_print("  nu %g: %d iterations in one load step, %d in the best number of them\n", poisson,
+             (int)one.iterations, (int)best.iterations);
+  SB_CHECK(one.rejected == 0, "nu %g: %d rejected load steps", poisson, (int)one.rejected);
   SB_CHECK(one.iterations <= 2 * best.iterations, "nu %g: %d iterations, %d with load steps chosen by hand",
-           (double)poisson, (int)one.iterations, (int)best.iterations);
+           poisson, (int)one.iterations, (int)best.iterations);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -83,8 +84,8 @@ static PetscErrorCode check_bend_far(const char *element)
                           element));
   PetscCall(bend(0.4999, 1, extra, &one));
   PetscCall(bend(0.4999, 4, extra, &four));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  bend far, %s: %d iterations in one load step, %d in four\n",
-                        element, (int)one.iterations, (int)four.iterations));
+  test_print("  bend far, %s: %d iterations in one load step, %d in four\n", element, (int)one.iterations,
+             (int)four.iterations);
   SB_CHECK(one.rejected == 0 && one.iterations <= four.iterations,
            "%s: %d iterations, %d rejected load steps, %d iterations in four", element, (int)one.iterations,
            (int)one.rejected, (int)four.iterations);
@@ -109,7 +110,7 @@ static PetscErrorCode check_quadratic(void)
 
     /* for order two the ratio of the logarithms is 2; the last residual is at the level of rounding, hence 1.4 */
     SB_CHECK(PetscLogReal(r[2] / r[1]) < 1.4 * PetscLogReal(r[1] / r[0]),
-             "residuals %g, %g, %g are not quadratic", (double)r[0], (double)r[1], (double)r[2]);
+             "residuals %g, %g, %g are not quadratic", r[0], r[1], r[2]);
   }
   SB_CHECK(o.iterations <= filtered.iterations, "%d iterations, %d with the filtered tangent",
            (int)o.iterations, (int)filtered.iterations);
@@ -125,19 +126,18 @@ static PetscErrorCode check_come_back(void)
   PetscFunctionBeginUser;
   for (int k = 0; k < 2; k++) {
     PetscCall(
-      verify_open(&t,
-                  "-bodies a -body_a_mesh box:0.3,0.1,0.1:1 -body_a_element dg -body_a_material corotated "
-                  "-body_a_young 1e6 -body_a_poisson 0.499999 -body_a_density 1000 -effects clamp,gravity "
-                  "-effect_clamp_type fixed -effect_clamp_on xmin -ts_dt 0.02 -ts_max_time 0.04 -solver %s",
-                  k ? "pressure" : "direct"));
+      test_open(&t,
+                "-bodies a -body_a_mesh box:0.3,0.1,0.1:1 -body_a_element dg -body_a_material corotated "
+                "-body_a_young 1e6 -body_a_poisson 0.499999 -body_a_density 1000 -effects clamp,gravity "
+                "-effect_clamp_type fixed -effect_clamp_on xmin -ts_dt 0.02 -ts_max_time 0.04 -solver %s",
+                k ? "pressure" : "direct"));
     PetscCall(verify_solve(&t, "come back"));
     iterations[k] = t.run->newton_total;
     SB_CHECK(t.run->rejected_total == 0, "%d rejected steps", (int)t.run->rejected_total);
     PetscCall(test_scene_close(&t));
   }
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  come back: %d iterations with loose solves, %d with exact ones\n",
-                        (int)iterations[1], (int)iterations[0]));
+  test_print("  come back: %d iterations with loose solves, %d with exact ones\n", (int)iterations[1],
+             (int)iterations[0]);
   SB_CHECK(iterations[1] <= 2 * iterations[0], "%d iterations with loose solves, %d with exact ones",
            (int)iterations[1], (int)iterations[0]);
   PetscFunctionReturn(PETSC_SUCCESS);

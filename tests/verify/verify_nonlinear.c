@@ -30,56 +30,34 @@ static void ripple(const PetscReal x[3], PetscReal v[3])
   v[2] = x[0] * PetscSinReal(9. * x[0] + 1.);
 }
 
-/* Error after one step of Newton's method from a perturbation of the solution U. */
-static PetscErrorCode one_step(TestScene *t, Vec U, PetscReal size, PetscReal *error)
-{
-  Vec X;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecDuplicate(U, &X));
-  PetscCall(test_fill(t->model, ripple, X));
-  PetscCall(VecAYPX(X, size, U));
-  PetscCall(SNESSetTolerances(t->run->snes, 0., 0., 0., 1, SB_UNLIMITED));
-  PetscCall(SNESSolve(t->run->snes, NULL, X));
-  PetscCall(VecAXPY(X, -1., U));
-  PetscCall(VecNorm(X, NORM_INFINITY, error));
-  PetscCall(VecDestroy(&X));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode check_order(const char *element, const char *law, const char *tangent,
                                   PetscReal expected, PetscReal at[3])
 {
-  PetscReal error[2], order;
+  PetscReal error[2], order = 0.;
   TestScene t;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
+  PetscCall(test_open(
+    &t,
     BAR CLAMP
     "-body_a_element %s -body_a_material %s -body_a_tangent %s -effects gravity,clamp,air "
     "-effect_air_type pressure -effect_air_on boundary -effect_air_value 2000 %s -time static " TIGHT,
     element, law, tangent, strcmp(element, "p1") ? "-effect_air_follower false -body_a_young 1e6" : ""));
-  PetscCall(test_scene_open(text, &t));
   PetscCall(verify_solve(&t, law));
   PetscCall(test_value_at(t.model, t.run->U, end, at));
-  for (int k = 0; k < 2; k++) PetscCall(one_step(&t, t.run->U, k ? 1e-4 : 1e-3, &error[k]));
-  order = PetscLog10Real(error[0] / error[1]);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  %s %-10s %-9s: %2d iterations to the answer; a disturbance of 1e-3, 1e-4 becomes "
-                        "%.1e, %.1e: order %.2f\n",
-                        element, law, tangent, (int)t.run->newton_total, (double)error[0], (double)error[1],
-                        (double)order));
+  PetscCall(verify_newton(&t, ripple, 1e-3, error, &order));
+  test_print("  %s %-10s %-9s: %2d iterations to the answer; a disturbance of 1e-3, 1e-4 becomes "
+             "%.1e, %.1e: order %.2f\n",
+             element, law, tangent, (int)t.run->newton_total, error[0], error[1], order);
   SB_CHECK_NEAR(order, expected, 0.1, "order of Newton's method");
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /*
-  All materials and tangents of an element. P1 on this mesh is twice too stiff; CR and DG are not, and get a stiffer bar. Their
-  pressure has a fixed direction: follower pressure on a surface with gaps has a nonsymmetric tangent, of which the matrix has the
-  symmetric part (src/effect/pressure.c).
+  All materials and tangents of an element. P1 on this mesh is twice too stiff; CR and DG are not, and get a
+  stiffer bar. Their pressure has a fixed direction: follower pressure on a surface with gaps has a
+  nonsymmetric tangent, of which the matrix has the symmetric part (src/effect/pressure.c).
 */
 static PetscErrorCode check_orders(const char *element)
 {
@@ -122,20 +100,18 @@ static PetscErrorCode watch_path(SbRun run, const SbStep *step, void *ctx)
 static PetscErrorCode follow(const char *element, const char *law, int steps, PetscReal load, Path *path)
 {
   TestScene t;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
   *path = (Path){.n = 0};
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
-    BAR CLAMP "-body_a_element %s -body_a_material %s -effects gravity,clamp,air,push "
-              "-effect_gravity_vector 0,0,%g -effect_air_type pressure -effect_air_on zmax "
-              "-effect_air_value %g -effect_push_type prescribed_displacement -effect_push_on xmax "
-              "-effect_push_components y -effect_push_displacement 0;%g;0 -time static "
-              "-static_steps %d %s " TIGHT,
-    element, law, -9.81 * (double)load, 100. * (double)load, 0.1 * (double)load, steps,
-    strcmp(element, "p1") ? "-body_a_young 1e6" : ""));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      BAR CLAMP
+                      "-body_a_element %s -body_a_material %s -effects gravity,clamp,air,push "
+                      "-effect_gravity_vector 0,0,%g -effect_air_type pressure -effect_air_on zmax "
+                      "-effect_air_value %g -effect_push_type prescribed_displacement -effect_push_on xmax "
+                      "-effect_push_components y -effect_push_displacement 0;%g;0 -time static "
+                      "-static_steps %d %s " TIGHT,
+                      element, law, -9.81 * (double)load, 100. * (double)load, 0.1 * (double)load, steps,
+                      strcmp(element, "p1") ? "-body_a_young 1e6" : ""));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch_path, path));
   PetscCall(verify_solve(&t, law));
@@ -155,12 +131,10 @@ static PetscErrorCode check_path(const char *element, const char *law)
   PetscCall(follow(element, law, 1, 0.5, &half));
   SB_CHECK(four.n == 5 && four.load[2] == 0.5, "%s: %d states", law, (int)four.n);
   SB_CHECK(four.strain0 == 0. && four.u[0][2] == 0., "%s: the path begins with a strain energy of %g J", law,
-           (double)four.strain0);
-  PetscCall(
-    PetscPrintf(PETSC_COMM_WORLD,
-                "  %s %-10s: end of the bar, 4 load steps and 1 differ by %.1e, the halfway state by %.1e\n",
-                element, law, (double)verify_difference(3, one.u[one.n - 1], four.u[4]),
-                (double)verify_difference(3, half.u[half.n - 1], four.u[2])));
+           four.strain0);
+  test_print("  %s %-10s: end of the bar, 4 load steps and 1 differ by %.1e, the halfway state by %.1e\n",
+             element, law, verify_difference(3, one.u[one.n - 1], four.u[4]),
+             verify_difference(3, half.u[half.n - 1], four.u[2]));
   SB_CHECK(verify_difference(3, one.u[one.n - 1], four.u[4]) < tolerance, "%s: one step and four differ",
            law);
   SB_CHECK(verify_difference(3, half.u[half.n - 1], four.u[2]) < tolerance,
@@ -193,12 +167,10 @@ static PetscErrorCode watch_step(SbRun run, const SbStep *step, void *ctx)
 static PetscErrorCode swing(const char *options, Result *r)
 {
   TestScene t;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
   *r = (Result){.shortest = PETSC_MAX_REAL};
-  PetscCall(PetscSNPrintf(text, sizeof(text), BAR CLAMP "-effects gravity,clamp %s", options));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t, BAR CLAMP "-effects gravity,clamp %s", options));
   PetscCall(SbRunAddMonitor(t.run, watch_step, r));
   PetscCall(SbRunSolve(t.run));
   PetscCall(test_value_at(t.model, t.run->U, end, r->u));
@@ -207,21 +179,6 @@ static PetscErrorCode swing(const char *options, Result *r)
   r->newton = t.run->newton_total;
   PetscCall(PetscStrncpy(r->reason, t.run->stop_reason, sizeof(r->reason)));
   PetscCall(test_scene_close(&t));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode check_long_steps(void)
-{
-  Result settled, rest;
-
-  PetscFunctionBeginUser;
-  PetscCall(swing("-body_a_material corotated -time static " TIGHT, &rest));
-  PetscCall(
-    swing("-body_a_material corotated -time euler_implicit -ts_dt 1 -ts_max_time 30 " TIGHT, &settled));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %d steps of 1 s end %.1e from the static answer\n",
-                        (int)settled.steps, (double)verify_difference(3, rest.u, settled.u)));
-  SB_CHECK(!settled.reason[0] && !rest.reason[0], "%s%s", settled.reason, rest.reason);
-  SB_CHECK(verify_difference(3, rest.u, settled.u) < 1e-6, "long steps end at %g", (double)settled.u[2]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -243,23 +200,20 @@ static PetscErrorCode check_adaptive(const char *preset)
     PetscCall(swing(text, &r));
     SB_CHECK(!r.reason[0], "%s", r.reason);
     SB_CHECK_NEAR(r.t, 0.4, 1e-12, "end of an adaptive run");
-    SB_CHECK(r.longest > 1.2 * r.shortest, "adaptive steps of %g to %g s", (double)r.shortest,
-             (double)r.longest);
+    SB_CHECK(r.longest > 1.2 * r.shortest, "adaptive steps of %g to %g s", r.shortest, r.longest);
     error[k] = PetscAbsReal(r.u[2] - fine.u[2]);
     steps[k] = r.steps;
-    PetscCall(
-      PetscPrintf(PETSC_COMM_WORLD,
-                  "  adaptive %s, tolerance %.0e m: %3d steps of %.5f to %.5f s, %d rejected, error %.1e m\n",
-                  preset, (double)PetscPowRealInt(10., -4 - k), (int)r.steps, (double)r.shortest,
-                  (double)r.longest, (int)r.rejected, (double)error[k]));
+    PetscCall(PetscPrintf(
+      PETSC_COMM_WORLD,
+      "  adaptive %s, tolerance %.0e m: %3d steps of %.5f to %.5f s, %d rejected, error %.1e m\n", preset,
+      PetscPowRealInt(10., -4 - k), (int)r.steps, r.shortest, r.longest, (int)r.rejected, error[k]));
     SB_CHECK(r.rejected < 3 + r.steps / 10, "%d of %d steps were rejected", (int)r.rejected, (int)r.steps);
     /* errors of the steps accumulate and keep oscillating */
-    SB_CHECK(error[k] < 2. * (PetscReal)r.steps * PetscPowRealInt(10., -4 - k), "error of %g m",
-             (double)error[k]);
+    SB_CHECK(error[k] < 2. * (PetscReal)r.steps * PetscPowRealInt(10., -4 - k), "error of %g m", error[k]);
   }
   SB_CHECK(steps[2] > steps[1] && steps[1] > steps[0], "%d, %d, %d steps", (int)steps[0], (int)steps[1],
            (int)steps[2]);
-  SB_CHECK(error[2] < 0.2 * error[0], "errors of %g and %g m", (double)error[0], (double)error[2]);
+  SB_CHECK(error[2] < 0.2 * error[0], "errors of %g and %g m", error[0], error[2]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -275,11 +229,9 @@ static PetscErrorCode check_cuts(void)
   PetscCall(swing("-body_a_material neohookean -body_a_tangent exact -time newmark -ts_dt 0.05 "
                   "-ts_max_time 0.2 -snes_max_it 3 " TIGHT,
                   &cut));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  3 iterations allowed: %d steps of %.5f to %.5f s, %d attempts rejected; end %.5f "
-                        "m, %.5f m with short steps\n",
-                        (int)cut.steps, (double)cut.shortest, (double)cut.longest, (int)cut.rejected,
-                        (double)cut.u[2], (double)whole.u[2]));
+  test_print("  3 iterations allowed: %d steps of %.5f to %.5f s, %d attempts rejected; end %.5f "
+             "m, %.5f m with short steps\n",
+             (int)cut.steps, cut.shortest, cut.longest, (int)cut.rejected, cut.u[2], whole.u[2]);
   SB_CHECK(!cut.reason[0], "%s", cut.reason);
   SB_CHECK(cut.rejected > 0 && cut.shortest < 0.05, "no step was cut");
   SB_CHECK(cut.longest > 1.9 * cut.shortest, "steps do not grow again");
@@ -288,10 +240,9 @@ static PetscErrorCode check_cuts(void)
   PetscCall(swing("-body_a_material neohookean -body_a_tangent exact -time newmark -ts_dt 0.05 "
                   "-ts_max_time 0.2 -snes_max_it 1 -time_max_halvings 2 " TIGHT,
                   &stopped));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  1 iteration, 2 cuts allowed: stops at %g s: %s\n",
-                        (double)stopped.t, stopped.reason));
+  test_print("  1 iteration, 2 cuts allowed: stops at %g s: %s\n", stopped.t, stopped.reason);
   SB_CHECK(stopped.reason[0] && stopped.t < 0.2 && stopped.rejected == 3,
-           "the run went on to %g s after %d rejections: %s", (double)stopped.t, (int)stopped.rejected,
+           "the run went on to %g s after %d rejections: %s", stopped.t, (int)stopped.rejected,
            stopped.reason);
   SB_CHECK(stopped.t > 0. || (stopped.u[0] == 0. && stopped.u[1] == 0. && stopped.u[2] == 0.),
            "the state at the stop is not the last good one");
@@ -304,34 +255,17 @@ static PetscErrorCode check_silent(const char *options)
 
   PetscFunctionBeginUser;
   PetscCall(swing(options, &r));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  one linear iteration: %s\n", r.reason));
+  test_print("  one linear iteration: %s\n", r.reason);
   SB_CHECK(r.reason[0] && !r.steps, "%s: %d steps passed", options, (int)r.steps);
   SB_CHECK(strstr(r.reason, "linear solver") != NULL, "the reason does not name the linear solver: %s",
            r.reason);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_one_solve(void)
-{
-  Result one, full;
-
-  PetscFunctionBeginUser;
-  PetscCall(swing(
-    "-body_a_material corotated -time euler_implicit -ts_dt 0.01 -ts_max_time 0.3 -snes_type ksponly", &one));
-  PetscCall(swing("-body_a_material corotated -time euler_implicit -ts_dt 0.01 -ts_max_time 0.3", &full));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  ksponly: %d solves in %d steps, Newton %d; end %.5f and %.5f m\n", (int)one.newton,
-                        (int)one.steps, (int)full.newton, (double)one.u[2], (double)full.u[2]));
-  SB_CHECK(one.newton == 30 && one.steps == 30 && !one.reason[0], "%d solves in %d steps", (int)one.newton,
-           (int)one.steps);
-  SB_CHECK(full.newton > 30, "Newton took %d iterations", (int)full.newton);
-  SB_CHECK_NEAR(one.u[2], full.u[2], 0.05 * PetscAbsReal(full.u[2]),
-                "end of the bar with one solve per step");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 int main(int argc, char **argv)
 {
+  Result settled, rest, one, full;
+
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_orders("p1"));
   PetscCall(check_orders("cr"));
@@ -344,7 +278,13 @@ int main(int argc, char **argv)
   PetscCall(check_path("cr", "corotated"));
   PetscCall(check_path("dg", "neohookean"));
   PetscCall(check_path("p2", "neohookean"));
-  PetscCall(check_long_steps());
+  PetscCall(swing("-body_a_material corotated -time static " TIGHT, &rest));
+  PetscCall(
+    swing("-body_a_material corotated -time euler_implicit -ts_dt 1 -ts_max_time 30 " TIGHT, &settled));
+  test_print("  %d steps of 1 s end %.1e from the static answer\n", (int)settled.steps,
+             verify_difference(3, rest.u, settled.u));
+  SB_CHECK(!settled.reason[0] && !rest.reason[0], "%s%s", settled.reason, rest.reason);
+  SB_CHECK(verify_difference(3, rest.u, settled.u) < 1e-6, "long steps end at %g", settled.u[2]);
   PetscCall(check_adaptive("newmark"));
   PetscCall(check_adaptive("euler_implicit"));
   PetscCall(check_cuts());
@@ -356,6 +296,15 @@ int main(int argc, char **argv)
                          "-ksp_type cg -ksp_max_it 1"));
   PetscCall(check_silent("-body_a_material corotated -time euler_implicit -ts_dt 0.1 -ts_max_time 1 "
                          "-snes_type ksponly -solver cg_jacobi -ksp_type cg -ksp_max_it 1"));
-  PetscCall(check_one_solve());
+  PetscCall(swing(
+    "-body_a_material corotated -time euler_implicit -ts_dt 0.01 -ts_max_time 0.3 -snes_type ksponly", &one));
+  PetscCall(swing("-body_a_material corotated -time euler_implicit -ts_dt 0.01 -ts_max_time 0.3", &full));
+  test_print("  ksponly: %d solves in %d steps, Newton %d; end %.5f and %.5f m\n", (int)one.newton,
+             (int)one.steps, (int)full.newton, one.u[2], full.u[2]);
+  SB_CHECK(one.newton == 30 && one.steps == 30 && !one.reason[0], "%d solves in %d steps", (int)one.newton,
+           (int)one.steps);
+  SB_CHECK(full.newton > 30, "Newton took %d iterations", (int)full.newton);
+  SB_CHECK_NEAR(one.u[2], full.u[2], 0.05 * PetscAbsReal(full.u[2]),
+                "end of the bar with one solve per step");
   SB_TEST_END();
 }

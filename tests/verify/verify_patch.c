@@ -1,14 +1,15 @@
 // @ranks 1 2
 /*
-  Patch test (MacNeal and Harder, "A proposed standard set of problems to test finite element accuracy", 1985): if the boundary
-  displacements or tractions of a body are those of a homogeneous deformation x = F X, the interior must have it too, on
-  any mesh. Small strains with the displacement of that paper, and a large strain with every material: the stress is compared
-  with the formula of the material, implemented here independently. The linear system is solved directly. The same for P2, CR and DG:
-  boundary nodes are prescribed or loaded, and the interior ones, with all jumps, must follow.
+  Patch test (MacNeal and Harder, "A proposed standard set of problems to test finite element accuracy",
+  1985): if the boundary displacements or tractions of a body are those of a homogeneous deformation x = F X,
+  the interior must have it too, on any mesh. Small strains with the displacement of that paper, and a large
+  strain with every material: the stress is compared with the formula of the material, implemented here
+  independently. The linear system is solved directly. The same for P2, CR and DG: boundary nodes are
+  prescribed or loaded, and the interior ones, with all jumps, must follow.
 
-  Tolerances: displacements 1e-10 of the largest; 1e-9 with CR and DG at nu = 0.4999, because of the condition number. Stresses 1e-9 of the
-  largest times the condition number of the material: rounding of
-  the strain is multiplied by lambda / mu.
+  Tolerances: displacements 1e-10 of the largest; 1e-9 with CR and DG at nu = 0.4999, because of the condition
+  number. Stresses 1e-9 of the largest times the condition number of the material: rounding of the strain is
+  multiplied by lambda / mu.
 */
 #include "verify.h"
 
@@ -22,25 +23,26 @@ typedef struct {
 } MeshContext;
 
 /*
-  Interior vertices of the unit cube: moved at random by up to 0.3 cells; or a line of them moved to within a thousandth of the
-  plane of faces, which leaves flat tets.
+  Interior vertices of the unit cube: moved at random by up to 0.3 cells; or a line of them moved to within a
+  thousandth of the plane of faces, which leaves flat tets.
 */
-static void move_vertex(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void move_vertex(const VerifyPlace *place, PetscReal x[3])
 {
-  const MeshContext *m = (const MeshContext *)ctx;
+  const MeshContext *m = (const MeshContext *)place->ctx;
   PetscReal r[3];
 
   for (int k = 0; k < 3; k++) (void)PetscRandomGetValueReal(m->random, &r[k]);
   for (int k = 0; k < 3; k++) {
-    if (at[k] == 0 || at[k] == n[k]) return;
+    if (place->at[k] == 0 || place->at[k] == place->n[k]) return;
   }
   if (m->shape == DISTORTED) {
-    for (int k = 0; k < 3; k++) x[k] += (0.6 * r[k] - 0.3) / (PetscReal)n[k];
-  } else if (m->shape == SLIVERS && at[0] == 3 && at[1] == 2 && at[2] > 1 && at[2] < n[2] - 1) {
+    for (int k = 0; k < 3; k++) x[k] += (0.6 * r[k] - 0.3) / (PetscReal)place->n[k];
+  } else if (m->shape == SLIVERS && place->at[0] == 3 && place->at[1] == 2 && place->at[2] > 1 &&
+             place->at[2] < place->n[2] - 1) {
     const PetscReal part = 0.499 * (1. - 0.002 * r[0]);
 
-    x[0] -= part / (PetscReal)n[0];
-    x[1] += part / (PetscReal)n[1];
+    x[0] -= part / (PetscReal)place->n[0];
+    x[1] += part / (PetscReal)place->n[1];
   }
 }
 
@@ -179,12 +181,11 @@ static PetscErrorCode load_options(PetscBool pulled, const PetscReal F[9], const
   char more[512];
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscSNPrintf(text, size,
-                  " -effect_move_type prescribed_displacement -effect_move_on %s -effect_move_displacement "
-                  "(%.17g)*x+(%.17g)*y+(%.17g)*z;(%.17g)*x+(%.17g)*y+(%.17g)*z;(%.17g)*x+(%.17g)*y+(%.17g)*z",
-                  pulled ? "side0" : "boundary", (double)F[0] - 1., (double)F[1], (double)F[2], (double)F[3],
-                  (double)F[4] - 1., (double)F[5], (double)F[6], (double)F[7], (double)F[8] - 1.));
+  PetscCall(PetscSNPrintf(
+    text, size,
+    " -effect_move_type prescribed_displacement -effect_move_on %s -effect_move_displacement "
+    "(%.17g)*x+(%.17g)*y+(%.17g)*z;(%.17g)*x+(%.17g)*y+(%.17g)*z;(%.17g)*x+(%.17g)*y+(%.17g)*z",
+    pulled ? "side0" : "boundary", F[0] - 1., F[1], F[2], F[3], F[4] - 1., F[5], F[6], F[7], F[8] - 1.));
   PetscCall(
     PetscStrlcat(text, pulled ? " -effects move,pull1,pull2,pull3,pull4,pull5" : " -effects move", size));
   PetscCall(PetscStrlcat(text, pulled ? " -sets side0,side1,side2,side3,side4,side5" : " -sets side0", size));
@@ -198,8 +199,8 @@ static PetscErrorCode load_options(PetscBool pulled, const PetscReal F[9], const
     PetscCall(PetscSNPrintf(
       more, sizeof(more),
       " -effect_pull%d_type traction -effect_pull%d_on side%d -effect_pull%d_vector %.17g;%.17g;%.17g", side,
-      side, side, side, (double)P[d] * (side % 2 ? 1. : -1.), (double)P[3 + d] * (side % 2 ? 1. : -1.),
-      (double)P[6 + d] * (side % 2 ? 1. : -1.)));
+      side, side, side, P[d] * (side % 2 ? 1. : -1.), P[3 + d] * (side % 2 ? 1. : -1.),
+      P[6 + d] * (side % 2 ? 1. : -1.)));
     PetscCall(PetscStrlcat(text, more, size));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -219,7 +220,7 @@ static PetscErrorCode check_patch(const Patch *p, const char *law, PetscReal nu,
   const PetscReal E = 1e6, stiff = PetscMax(1., nu / (1. - 2. * nu));
   TestScene t;
   PetscReal P[9], sigma[6], error[2];
-  char text[VERIFY_TEXT], loads[VERIFY_TEXT];
+  char loads[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
   exact_stress(law, E, nu, F, P);
@@ -227,29 +228,24 @@ static PetscErrorCode check_patch(const Patch *p, const char *law, PetscReal nu,
   for (int k = 0; k < 6 && known; k++)
     SB_CHECK_NEAR(sigma[k], k < 3 ? known[0] : known[1], 1e-9 * known[0], "stress of the paper");
   PetscCall(load_options(pulled, F, P, loads, sizeof(loads)));
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
+  PetscCall(test_open(
+    &t,
     "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material %s -body_a_young %g -body_a_poisson %g "
     "-body_a_density 1 -time static -ksp_rtol 1e-13 -snes_rtol 1e-13 -snes_atol 0 -snes_stol 1e-13 %s %s %s",
-    p->path, p->element, law, (double)E, (double)nu, !strcmp(law, "corotated") ? "-body_a_tangent exact" : "",
+    p->path, p->element, law, E, nu, !strcmp(law, "corotated") ? "-body_a_tangent exact" : "",
     !strcmp(p->element, "p1") ? "" : "-solver direct", loads));
-  PetscCall(test_scene_open(text, &t));
   PetscCall(verify_solve(&t, law));
   PetscCall(errors(&t, F, sigma, error));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  %s %-10s %-10s nu %-6g %-9s smallest angle %7.3f deg: u %.1e, stress %.1e, Newton %d\n", p->element,
-    shapes[p->shape], law, (double)nu, pulled ? "tractions" : "moved", (double)t.model->body[0].min_dihedral,
-    (double)error[0], (double)error[1], (int)t.run->newton_total));
+  test_print("  %s %-10s %-10s nu %-6g %-9s smallest angle %7.3f deg: u %.1e, stress %.1e, Newton %d\n",
+             p->element, shapes[p->shape], law, nu, pulled ? "tractions" : "moved",
+             t.model->body[0].min_dihedral, error[0], error[1], (int)t.run->newton_total);
   SB_CHECK(error[0] <= (nu > 0.4 && strcmp(p->element, "p1") ? 1e-9 : 1e-10),
-           "%s, %s, %s, nu %g: displacement off by %g", p->element, shapes[p->shape], law, (double)nu,
-           (double)error[0]);
+           "%s, %s, %s, nu %g: displacement off by %g", p->element, shapes[p->shape], law, nu, error[0]);
   SB_CHECK(error[1] <= 1e-9 * stiff, "%s, %s, %s, nu %g: stress off by %g", p->element, shapes[p->shape], law,
-           (double)nu, (double)error[1]);
+           nu, error[1]);
   if (p->shape == SLIVERS) {
     SB_CHECK(t.model->body[0].min_dihedral > 0.05 && t.model->body[0].min_dihedral < 1.,
-             "smallest dihedral angle of the mesh of slivers is %g degrees",
-             (double)t.model->body[0].min_dihedral);
+             "smallest dihedral angle of the mesh of slivers is %g degrees", t.model->body[0].min_dihedral);
   }
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -294,7 +290,6 @@ int main(int argc, char **argv)
       p.element = elements[e];
       PetscCall(check_mesh(&p));
     }
-    PetscCall(test_file_remove(p.path));
   }
   SB_TEST_END();
 }

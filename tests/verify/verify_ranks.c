@@ -3,8 +3,9 @@
   The same scene on one rank and on all: every rank runs it alone, then all run it together. Displacements,
   velocities (by original node number) and scalars of the last state must agree.
 
-  Tolerances, relative to the largest value: 1e-10 if the linear system is solved directly or not at all; 1e-8 if Newton's method stops at
-  1e-9 of its first residual, the difference between solvers on different numbers of ranks.
+  Tolerances, relative to the largest value: 1e-10 if the linear system is solved directly or not at all; 1e-8
+  if Newton's method stops at 1e-9 of its first residual, the difference between solvers on different numbers
+  of ranks.
 */
 #include "verify.h"
 
@@ -19,16 +20,7 @@ static PetscErrorCode solve(MPI_Comm comm, const char *options, State *state)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscOptionsClear(NULL));
-  PetscCall(SbOptionsReset());
-  PetscCall(SbRegisterAll());
-  PetscCall(PetscOptionsInsertString(NULL, options));
-  PetscCall(SbSceneCreate(comm, &t.model));
-  PetscCall(test_scene_run(&t));
-  PetscCall(SbModelSetUp(t.model));
-  PetscCall(SbRunSetUp(t.run));
-  PetscCall(SbMeshValidate(t.model->mesh));
-  PetscCall(SbSpaceValidate(t.model->space));
+  PetscCall(test_scene_open_on(comm, NULL, options, &t));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(verify_solve(&t, options));
   *state = (State){.n = verify_numbers(t.model), .steps = t.run->steps_total, .e = t.run->energies};
@@ -76,14 +68,13 @@ static PetscErrorCode check(const char *what, PetscReal tolerance, const char *o
   du = verify_difference(3 * alone.n, alone.u, together.u);
   if (alone.v) dv = verify_difference(3 * alone.n, alone.v, together.v);
   de = scalars(&alone.e, &together.e);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  %-28s %3d steps: displacement %.1e, velocity %.1e, scalars %.1e\n", what,
-                        (int)alone.steps, (double)du, (double)dv, (double)de));
+  test_print("  %-28s %3d steps: displacement %.1e, velocity %.1e, scalars %.1e\n", what, (int)alone.steps,
+             du, dv, de);
   SB_CHECK(alone.n == together.n && alone.steps == together.steps,
            "%s: %d numbers of nodes and %d steps, %d and %d alone", what, (int)together.n,
            (int)together.steps, (int)alone.n, (int)alone.steps);
   SB_CHECK(du <= tolerance && dv <= tolerance && de <= tolerance,
-           "%s: displacement %g, velocity %g, scalars %g", what, (double)du, (double)dv, (double)de);
+           "%s: displacement %g, velocity %g, scalars %g", what, du, dv, de);
   PetscCall(destroy(&alone));
   PetscCall(destroy(&together));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -120,10 +111,9 @@ static PetscErrorCode check_element(const char *bar, const char *block)
                           bar, block));
   PetscCall(PetscSNPrintf(what, sizeof(what), "newmark, %s and %s", bar, block));
   PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "%s -body_bar_material linear -body_block_material linear "
-                          "-effects gravity,clamp,damping -effect_damping_alpha 0.3 "
-                          "-effect_damping_beta 0.001 -time newmark -ts_dt 0.01 -ts_max_time 0.1 "
-                          "-solver direct -ksp_rtol 1e-13",
+                          "%s -body_bar_material linear -body_block_material linear -effects "
+                          "gravity,clamp,damping -effect_damping_alpha 0.3 -effect_damping_beta 0.001 -time "
+                          "newmark -ts_dt 0.01 -ts_max_time 0.1 -solver direct -ksp_rtol 1e-13",
                           elements));
   PetscCall(check(what, 1e-10, text));
   PetscCall(PetscSNPrintf(what, sizeof(what), "genalpha, %s and %s", bar, block));
@@ -153,10 +143,10 @@ int main(int argc, char **argv)
     "-body_bar_material linear -effects gravity,clamp -time static -solver cg_two_level -ksp_rtol 1e-11"));
   PetscCall(check("static, neohookean, driven", 1e-8,
                   BAR CLAMP
-                  "-body_bar_material neohookean -effects clamp,pull,air "
-                  "-effect_pull_type prescribed_displacement -effect_pull_on xmax -effect_pull_angle 60*t "
-                  "-effect_pull_axis 1,0,0 -effect_pull_axis_point 0,0.05,0.05 -effect_air_type pressure "
-                  "-effect_air_on zmax -effect_air_value 1000 -time static -static_steps 3 -snes_rtol 1e-9"));
+                  "-body_bar_material neohookean -effects clamp,pull,air -effect_pull_type "
+                  "prescribed_displacement -effect_pull_on xmax -effect_pull_angle 60*t -effect_pull_axis "
+                  "1,0,0 -effect_pull_axis_point 0,0.05,0.05 -effect_air_type pressure -effect_air_on zmax "
+                  "-effect_air_value 1000 -time static -static_steps 3 -snes_rtol 1e-9"));
   PetscCall(check("newmark, linear, two bodies", 1e-10,
                   TWO CLAMP
                   "-body_bar_material linear -body_block_material linear -effects gravity,clamp,damping "

@@ -56,13 +56,11 @@ static PetscErrorCode make_second(Pair *p, SbMesher mesher)
   const PetscBool due[2] = {PETSC_TRUE, PETSC_FALSE};
   SbRemeshResult result;
   SbGathered g;
-  PetscMPIInt rank;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(SbGather(p->a.run, &g));
   PetscCall(SbRemeshResultCreate(2, &result));
-  if (!rank) PetscCall(SbRemeshBodies(p->a.model, &g, due, 1, &how, &result));
+  if (!test_rank) PetscCall(SbRemeshBodies(p->a.model, &g, due, 1, &how, &result));
   PetscCall(PetscArraycpy(p->outcome, result.outcome, 2));
   result.next.nfield = g.nfield;
   result.next.width = g.width;
@@ -70,8 +68,8 @@ static PetscErrorCode make_second(Pair *p, SbMesher mesher)
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &p->b.model));
   PetscCall(SbRunCreate(p->b.model, &p->b.run));
   for (int b = 0; b < 2; b++) {
-    if (rank) PetscCall(SbMemoryMeshCreate(0, 0, 0, 0, &result.in_memory[b]));
-    if (rank && b == 0) result.in_memory[b]->mass = g.mass[0];
+    if (test_rank) PetscCall(SbMemoryMeshCreate(0, 0, 0, 0, &result.in_memory[b]));
+    if (test_rank && b == 0) result.in_memory[b]->mass = g.mass[0];
     p->b.model->body[b].in_memory = result.in_memory[b];
     result.in_memory[b] = NULL;
   }
@@ -118,13 +116,11 @@ static PetscErrorCode check_linear(const char *element, const char *mesh)
 {
   SbEnergies e[2];
   PetscReal worst;
-  char text[2048];
   Pair p = {0};
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), TWO EULER "-body_a_element %s -body_b_element p1 %s %s",
-                          element, mesh ? "-body_a_mesh" : "", mesh ? mesh : ""));
-  PetscCall(test_scene_open(text, &p.a));
+  PetscCall(test_open(&p.a, TWO EULER "-body_a_element %s -body_b_element p1 %s %s", element,
+                      mesh ? "-body_a_mesh" : "", mesh ? mesh : ""));
   PetscCall(test_fill(p.a.model, linear, p.a.run->U));
   PetscCall(test_fill(p.a.model, quadratic, p.a.run->V));
   PetscCall(test_fill(p.a.model, linear, p.a.run->A));
@@ -133,15 +129,15 @@ static PetscErrorCode check_linear(const char *element, const char *mesh)
   SB_CHECK(p.b.model->body[0].ncell == p.a.model->body[0].nfacet && p.a.model->body[0].ncell == 96,
            "%s: %d tets, then %d", element, (int)p.a.model->body[0].ncell, (int)p.b.model->body[0].ncell);
   PetscCall(difference(p.b.model, linear, p.b.run->U, &worst));
-  SB_CHECK(worst < 1e-13, "%s: a linear displacement is wrong by %g m", element, (double)worst);
+  SB_CHECK(worst < 1e-13, "%s: a linear displacement is wrong by %g m", element, worst);
   PetscCall(difference(p.b.model, linear, p.b.run->A, &worst));
   if (!strcmp(element, "p2") && !mesh) {
     PetscReal wrong;
 
     PetscCall(difference(p.b.model, quadratic, p.b.run->V, &wrong));
-    SB_CHECK(wrong < 1e-13, "a quadratic velocity is wrong by %g m/s", (double)wrong);
+    SB_CHECK(wrong < 1e-13, "a quadratic velocity is wrong by %g m/s", wrong);
   }
-  SB_CHECK(worst < 1e-13, "%s: a linear acceleration is wrong by %g m/s^2", element, (double)worst);
+  SB_CHECK(worst < 1e-13, "%s: a linear acceleration is wrong by %g m/s^2", element, worst);
   PetscCall(SbModelEnergies(p.a.model, p.a.run->U, p.a.run->V, &e[0]));
   PetscCall(SbModelEnergies(p.b.model, p.b.run->U, p.b.run->V, &e[1]));
   SB_CHECK_NEAR(e[1].strain, e[0].strain, 1e-12 * e[0].strain, "strain energy of a linear displacement");
@@ -191,12 +187,10 @@ static PetscErrorCode check_same(const char *element, const char *mesh)
 {
   Pair p = {0};
   uint64_t a, b;
-  char text[2048];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), TWO EULER "-body_a_element %s -body_b_element %s %s %s",
-                          element, element, mesh ? "-body_a_mesh" : "", mesh ? mesh : ""));
-  PetscCall(test_scene_open(text, &p.a));
+  PetscCall(test_open(&p.a, TWO EULER "-body_a_element %s -body_b_element %s %s %s", element, element,
+                      mesh ? "-body_a_mesh" : "", mesh ? mesh : ""));
   PetscCall(test_fill(p.a.model, curved, p.a.run->U));
   PetscCall(test_fill(p.a.model, linear, p.a.run->V));
   PetscCall(make_second(&p, fixture_cone));
@@ -214,12 +208,10 @@ static PetscErrorCode check_momenta(const char *more)
 {
   PetscReal before[2][6], after[2][6], corrected[2][6], mass[2] = {0, 0}, speed;
   const PetscBool named[2] = {PETSC_TRUE, PETSC_FALSE};
-  char text[2048];
   Pair p = {0};
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), TWO EULER "%s", more));
-  PetscCall(test_scene_open(text, &p.a));
+  PetscCall(test_open(&p.a, TWO EULER "%s", more));
   PetscCall(test_fill(p.a.model, curved, p.a.run->U));
   PetscCall(test_fill(p.a.model, curved, p.a.run->V));
   PetscCall(make_second(&p, fixture_cone));
@@ -237,13 +229,13 @@ static PetscErrorCode check_momenta(const char *more)
 
       SB_CHECK(PetscAbsReal(corrected[b][k] - before[b][k]) <= 1e-12 * scale,
                "'%s', body %d: momentum %d is %.15g, was %.15g, without correction %.15g", more, b, k,
-               (double)corrected[b][k], (double)before[b][k], (double)after[b][k]);
+               corrected[b][k], before[b][k], after[b][k]);
       moved = PetscMax(moved, PetscAbsReal(after[b][k] - before[b][k]) / scale);
     }
     SB_CHECK((moved > 1e-6) == (b == 0), "%s: the momenta of body %d differ by %g before they are put right",
-             more, b, (double)moved);
+             more, b, moved);
   }
-  SB_CHECK(speed > 0 && speed < 0.1, "a rigid speed of %g m/s", (double)speed);
+  SB_CHECK(speed > 0 && speed < 0.1, "a rigid speed of %g m/s", speed);
   for (PetscInt i = 0; i < p.b.model->space->nnode_owned; i++)
     mass[p.b.model->space->node_body[i]] += p.b.model->space->node_mass[i];
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, mass, 2, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
@@ -257,16 +249,13 @@ static PetscErrorCode check_momenta(const char *more)
 static PetscErrorCode energy_change(int n, PetscBool bent, PetscReal *part)
 {
   SbEnergies e[2];
-  char text[2048], mesh[512];
+  char mesh[512];
   Pair p = {0};
 
   PetscFunctionBeginUser;
   (void)snprintf(mesh, sizeof(mesh), "box:0.4,0.1,0.2:%d,%d,%d", 4 * n, n, 2 * n);
   if (bent) PetscCall(curved_mesh_write(n, n, curved_wobble, PETSC_TRUE, mesh));
-  PetscCall(PetscSNPrintf(text, sizeof(text), TWO EULER "-body_a_mesh %s %s", mesh,
-                          bent ? "-body_a_element p2" : ""));
-  PetscCall(test_scene_open(text, &p.a));
-  if (bent) PetscCall(test_file_remove(mesh));
+  PetscCall(test_open(&p.a, TWO EULER "-body_a_mesh %s %s", mesh, bent ? "-body_a_element p2" : ""));
   PetscCall(test_fill(p.a.model, curved, p.a.run->U));
   PetscCall(make_second(&p, SbMesherDefault));
   SB_CHECK(!p.outcome[0].message[0], "%d cells: %s", n, p.outcome[0].message);
@@ -285,11 +274,9 @@ static PetscErrorCode check_energy(PetscBool bent)
   PetscFunctionBeginUser;
   PetscCall(energy_change(bent ? 6 : 3, bent, &coarse));
   PetscCall(energy_change(bent ? 12 : 6, bent, &fine));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  energy, %s: changed by %.2e, %.2e\n",
-                        bent ? "curved tets of p2" : "p1", (double)coarse, (double)fine));
+  test_print("  energy, %s: changed by %.2e, %.2e\n", bent ? "curved tets of p2" : "p1", coarse, fine);
   SB_CHECK(coarse < 0.1 && fine < 0.4 * coarse,
-           "a new mesh changes the energy by %g, with edges half as long by %g", (double)coarse,
-           (double)fine);
+           "a new mesh changes the energy by %g, with edges half as long by %g", coarse, fine);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -301,14 +288,12 @@ static PetscErrorCode check_run(const char *more, const char *element, PetscBool
   PetscReal sum, scale, mass;
   TestScene s;
   int calls = 0;
-  char text[2048];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          TWO "-body_a_element %s -body_a_angular_velocity 0,3,1 -body_a_velocity 1,0,0 "
-                              "-remesh_times 0.02,0.03 -remesh_bodies a %s",
-                          element, more));
-  PetscCall(test_scene_open(text, &s));
+  PetscCall(test_open(&s,
+                      TWO "-body_a_element %s -body_a_angular_velocity 0,3,1 -body_a_velocity 1,0,0 "
+                          "-remesh_times 0.02,0.03 -remesh_bodies a %s",
+                      element, more));
   s.run->want_energies = PETSC_TRUE;
   mass = 900 * s.model->body[0].volume;
   PetscCall(SbRemeshSetMesher(s.remesh, fixture_cone, &calls));
@@ -324,7 +309,7 @@ static PetscErrorCode check_run(const char *more, const char *element, PetscBool
   scale = s.run->energy_start;
   SB_CHECK_NEAR(sum, 0, 1e-12 * scale, "account");
   SB_CHECK(e.remesh_loss != 0 && PetscAbsReal(e.remesh_loss) < 0.2 * scale, "remesh_loss %g of %g J",
-           (double)e.remesh_loss, (double)scale);
+           e.remesh_loss, scale);
   SB_CHECK_NEAR(e.momentum[0], mass, 2e-6 * mass, "momentum along x");
   SB_CHECK_NEAR(e.momentum[1], 0, 2e-6 * mass, "momentum along y");
   SB_CHECK(e.ninverted == 0, "%d tets are inverted", (int)e.ninverted);
@@ -336,28 +321,14 @@ static PetscErrorCode check_run(const char *more, const char *element, PetscBool
 static PetscErrorCode refused_run(SbMesher mesher, const char *more, PetscReal *norm)
 {
   TestScene s;
-  char text[2048];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), TWO EULER "-body_a_angular_velocity 0,3,1 %s", more));
-  PetscCall(test_scene_open(text, &s));
+  PetscCall(test_open(&s, TWO EULER "-body_a_angular_velocity 0,3,1 %s", more));
   if (s.remesh) PetscCall(SbRemeshSetMesher(s.remesh, mesher, NULL));
   PetscCall(test_scene_solve(&s));
   PetscCall(VecNorm(s.run->U, NORM_2, norm));
   SB_CHECK(s.run->steps_total == 5, "%d steps", (int)s.run->steps_total);
   PetscCall(test_scene_close(&s));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode check_refused(void)
-{
-  PetscReal with, without;
-
-  PetscFunctionBeginUser;
-  PetscCall(refused_run(fixture_refuse, "", &without));
-  PetscCall(refused_run(fixture_refuse, "-remesh_times 0.02", &with));
-  SB_CHECK(with == without, "a run that could not be re-meshed moves otherwise: %.17g, without %.17g",
-           (double)with, (double)without);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -402,6 +373,7 @@ static PetscErrorCode check_sets(void)
 int main(int argc, char **argv)
 {
   char mesh[512], more[600];
+  PetscReal with, without;
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_linear("p1", NULL));
@@ -422,7 +394,6 @@ int main(int argc, char **argv)
   }
   (void)snprintf(more, sizeof(more), "%s -body_a_mesh %s", EULER, mesh);
   PetscCall(check_run(more, "p2", PETSC_FALSE));
-  PetscCall(test_file_remove(mesh));
   PetscCall(check_momenta(""));
   PetscCall(check_momenta("-mass consistent"));
   PetscCall(check_momenta("-body_a_element cr"));
@@ -438,7 +409,10 @@ int main(int argc, char **argv)
   PetscCall(check_run("-time newmark -ts_dt 0.01 -ts_max_time 0.05", "p1", PETSC_FALSE));
   PetscCall(check_run("-time genalpha -ts_dt 0.01 -ts_max_time 0.05", "p1", PETSC_FALSE));
   PetscCall(check_run("-time euler_symplectic -ts_max_time 0.05", "p1", PETSC_TRUE));
-  PetscCall(check_refused());
+  PetscCall(refused_run(fixture_refuse, "", &without));
+  PetscCall(refused_run(fixture_refuse, "-remesh_times 0.02", &with));
+  SB_CHECK(with == without, "a run that could not be re-meshed moves otherwise: %.17g, without %.17g", with,
+           without);
   PetscCall(check_sets());
   SB_TEST_END();
 }

@@ -77,16 +77,14 @@ static PetscErrorCode hand_over(TestScene *a, TestScene *b, SbRemeshResult *resu
   const PetscBool due[2] = {PETSC_TRUE, PETSC_FALSE};
   SbRenamed *renamed = &result->renamed;
   SbGathered g;
-  PetscMPIInt rank;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(SbGather(a->run, &g));
   PetscCall(SbRemeshResultCreate(a->model->nbody, result));
-  if (!rank) PetscCall(SbRemeshBodies(a->model, &g, due, 1, &how, result));
-  if (!rank) SB_CHECK(result->done[0], "%s", result->outcome[0].message);
+  if (!test_rank) PetscCall(SbRemeshBodies(a->model, &g, due, 1, &how, result));
+  if (!test_rank) SB_CHECK(result->done[0], "%s", result->outcome[0].message);
   PetscCallMPI(MPI_Bcast(&renamed->n, 1, MPIU_INT, 0, PETSC_COMM_WORLD));
-  if (rank) PetscCall(PetscMalloc2(renamed->n, &renamed->from, renamed->n, &renamed->to));
+  if (test_rank) PetscCall(PetscMalloc2(renamed->n, &renamed->from, renamed->n, &renamed->to));
   PetscCallMPI(MPI_Bcast(renamed->from, (PetscMPIInt)renamed->n, MPIU_INT, 0, PETSC_COMM_WORLD));
   PetscCallMPI(MPI_Bcast(renamed->to, (PetscMPIInt)renamed->n, MPIU_INT, 0, PETSC_COMM_WORLD));
   result->next.nfield = g.nfield;
@@ -94,8 +92,8 @@ static PetscErrorCode hand_over(TestScene *a, TestScene *b, SbRemeshResult *resu
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &b->model));
   PetscCall(SbRunCreate(b->model, &b->run));
   for (PetscInt k = 0; k < a->model->nbody; k++) {
-    if (rank) PetscCall(SbMemoryMeshCreate(0, 0, 0, 0, &result->in_memory[k]));
-    if (rank && !k) result->in_memory[0]->mass = g.mass[0];
+    if (test_rank) PetscCall(SbMemoryMeshCreate(0, 0, 0, 0, &result->in_memory[k]));
+    if (test_rank && !k) result->in_memory[0]->mass = g.mass[0];
     b->model->body[k].in_memory = result->in_memory[k];
     result->in_memory[k] = NULL;
   }
@@ -138,8 +136,8 @@ static PetscErrorCode check_touch(const char *scene)
     worst = PetscMax(worst, PetscAbsReal(after.r[i] - before.r[i]));
     scale = PetscMax(scale, PetscAbsReal(before.r[i]));
   }
-  SB_CHECK(worst <= 1e-12 * scale, "'%s': what touching nodes remember has changed by %g of %g", scene,
-           (double)worst, (double)scale);
+  SB_CHECK(worst <= 1e-12 * scale, "'%s': what touching nodes remember has changed by %g of %g", scene, worst,
+           scale);
   PetscCall(PetscFree(before.r));
   PetscCall(PetscFree(after.r));
   PetscCall(SbRemeshResultDestroy(&result));
@@ -201,23 +199,22 @@ static PetscErrorCode check_run(const char *scene, PetscBool pair, PetscReal end
   e = s.run->energies;
   scale = s.run->energy_start;
   SB_CHECK(!s.run->stop_reason[0] && PetscAbsReal(s.run->t_now - end) < 1e-9, "'%s' ends at %g s: %s", scene,
-           (double)s.run->t_now, s.run->stop_reason);
+           s.run->t_now, s.run->stop_reason);
   SB_CHECK(s.model->body[0].in_memory && e.remesh_loss != 0., "'%s' was not re-meshed", scene);
-  SB_CHECK(PetscAbsReal(e.remesh_loss) < 0.1 * scale, "'%s': %g of %g J by re-meshing", scene,
-           (double)e.remesh_loss, (double)scale);
+  SB_CHECK(PetscAbsReal(e.remesh_loss) < 0.1 * scale, "'%s': %g of %g J by re-meshing", scene, e.remesh_loss,
+           scale);
   lost = scale + e.load_work + e.prescribed_work - e.kinetic - e.strain - e.remesh_loss;
   SB_CHECK(lost > -0.01 * scale && lost < scale + PetscAbsReal(e.load_work), "'%s' has lost %g of %g J",
-           scene, (double)lost, (double)scale);
+           scene, lost, scale);
   SB_CHECK(e.ninverted == 0, "'%s': %d tets inverted", scene, (int)e.ninverted);
   if (pair)
     PetscCall(penetration(s.run, "penetration", &depth));
   else
     PetscCall(below(s.model, s.run->U, &depth));
-  SB_CHECK(depth >= 0. && depth < (strstr(scene, " dg") ? 4e-3 : 1e-3), "'%s': %g m deep", scene,
-           (double)depth);
+  SB_CHECK(depth >= 0. && depth < (strstr(scene, " dg") ? 4e-3 : 1e-3), "'%s': %g m deep", scene, depth);
   drift =
     PetscMax(PetscAbsReal(e.momentum[0]), PetscMax(PetscAbsReal(e.momentum[1]), PetscAbsReal(e.momentum[2])));
-  SB_CHECK(!pair || drift < 1e-5, "'%s': momentum %g kg m/s", scene, (double)drift);
+  SB_CHECK(!pair || drift < 1e-5, "'%s': momentum %g kg m/s", scene, drift);
   PetscCall(test_scene_close(&s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -246,23 +243,21 @@ static PetscErrorCode check_inclusion(const char *more)
 {
   PetscReal before[3], after[3];
   TestScene s;
-  char text[2048];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
-    "-bodies a -body_a_mesh box:0.2,0.2,0.2:5,5,5" STUFF(
-      a) "-body_a_angular_velocity 0,3,1 -sets core -set_core_at sphere:0.1,0.1,0.1,0.075 "
-         "-body_a_inclusions core -inclusion_core_material neohookean -inclusion_core_young 1e5 "
-         "-inclusion_core_poisson 0.3 -inclusion_core_density 3000 -ts_dt 0.01 -ts_max_time 0.03 "
-         "-remesh_times 0.01,0.02 %s",
-    more));
-  PetscCall(test_scene_open(text, &s));
+  PetscCall(
+    test_open(&s,
+              "-bodies a -body_a_mesh box:0.2,0.2,0.2:5,5,5" STUFF(
+                a) "-body_a_angular_velocity 0,3,1 -sets core -set_core_at sphere:0.1,0.1,0.1,0.075 "
+                   "-body_a_inclusions core -inclusion_core_material neohookean -inclusion_core_young 1e5 "
+                   "-inclusion_core_poisson 0.3 -inclusion_core_density 3000 -ts_dt 0.01 -ts_max_time 0.03 "
+                   "-remesh_times 0.01,0.02 %s",
+              more));
   PetscCall(masses(s.model, before));
   PetscCall(test_scene_solve(&s));
   PetscCall(masses(s.model, after));
   SB_CHECK(s.model->body[0].in_memory && s.model->body[0].in_memory->step == 2, "re-meshed twice");
-  SB_CHECK(before[1] > 0.05 * before[0], "an inclusion of %g m^3", (double)before[1]);
+  SB_CHECK(before[1] > 0.05 * before[0], "an inclusion of %g m^3", before[1]);
   for (int k = 0; k < 3; k++)
     SB_CHECK_NEAR(after[k], before[k], 1e-12 * before[k],
                   k == 2 ? "mass of the body"
@@ -279,12 +274,9 @@ static PetscErrorCode check_held(const char *more)
   PetscReal worst = 0.;
   const PetscScalar *u;
   TestScene s;
-  char text[2048];
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscSNPrintf(text, sizeof(text), BEAM "-ts_dt 0.005 -ts_max_time 0.06 -remesh_times 0.03 %s", more));
-  PetscCall(test_scene_open(text, &s));
+  PetscCall(test_open(&s, BEAM "-ts_dt 0.005 -ts_max_time 0.06 -remesh_times 0.03 %s", more));
   s.run->want_energies = PETSC_TRUE;
   PetscCall(test_scene_solve(&s));
   SB_CHECK_NEAR(s.run->t_now, 0.06, 1e-9, "end");
@@ -297,7 +289,7 @@ static PetscErrorCode check_held(const char *more)
   PetscCall(VecRestoreArrayRead(s.run->U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD));
   SB_CHECK(worst == 0. && s.run->energies.max_displacement > 0.01, "%s: the support gives by %g m", more,
-           (double)worst);
+           worst);
   PetscCall(test_scene_close(&s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -307,11 +299,9 @@ static PetscErrorCode ledger_run(const char *more, PetscReal error[2], PetscInt 
 {
   PetscReal stored;
   TestScene s;
-  char text[2048];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), BEAM "-ts_dt 0.005 -ts_max_time 0.08 -ledger %s", more));
-  PetscCall(test_scene_open(text, &s));
+  PetscCall(test_open(&s, BEAM "-ts_dt 0.005 -ts_max_time 0.08 -ledger %s", more));
   PetscCall(test_scene_solve(&s));
   SB_CHECK(!s.run->stop_reason[0], "%s: %s", more, s.run->stop_reason);
   PetscCall(SbLedgerGet(s.ledger, SB_ERROR_TIME, &error[0], &stored));
@@ -334,10 +324,10 @@ static PetscErrorCode check_ledger(const char *more, PetscReal accuracy)
   PetscCall(ledger_run(text, with, &steps[1]));
   /* most of the run precedes re-meshing, so errors that restart at zero would be smaller; a re-meshed body vibrates, so errors are larger */
   SB_CHECK(with[0] > 0.9 * without[0] || (accuracy > 0. && with[0] < accuracy),
-           "%s: time %g, not re-meshed %g", more, (double)with[0], (double)without[0]);
-  SB_CHECK(with[0] < (accuracy > 0. ? accuracy : 0.5), "%s: time %g", more, (double)with[0]);
+           "%s: time %g, not re-meshed %g", more, with[0], without[0]);
+  SB_CHECK(with[0] < (accuracy > 0. ? accuracy : 0.5), "%s: time %g", more, with[0]);
   SB_CHECK(with[1] > 0.5 * without[1] && with[1] < 2. * without[1], "%s: space %g, not re-meshed %g", more,
-           (double)with[1], (double)without[1]);
+           with[1], without[1]);
   SB_CHECK(steps[1] < 20 * steps[0], "%s: %d steps, not re-meshed %d", more, (int)steps[1], (int)steps[0]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -348,18 +338,16 @@ static PetscErrorCode check_ledger(const char *more, PetscReal accuracy)
 static PetscErrorCode check_failed(const char *iterations, PetscBool first)
 {
   TestScene s;
-  char text[2048];
   int calls = 0;
 
   PetscFunctionBeginUser;
   PetscCall(
-    PetscSNPrintf(text, sizeof(text),
-                  "-bodies a -body_a_mesh box:0.1,0.1,0.1:3,3,3" STUFF(
-                    a) "-effects knead -effect_knead_type prescribed_displacement -effect_knead_on boundary "
-                       "-effect_knead_displacement 0.1*sin(60*t^3*y)*z;-0.6*t^3*(y-0.05);-0.6*t^3*z "
-                       "-time static -static_steps 10 -time_max_halvings 0 -remesh_failed -snes_max_it %s",
-                  iterations));
-  PetscCall(test_scene_open(text, &s));
+    test_open(&s,
+              "-bodies a -body_a_mesh box:0.1,0.1,0.1:3,3,3" STUFF(
+                a) "-effects knead -effect_knead_type prescribed_displacement -effect_knead_on boundary "
+                   "-effect_knead_displacement 0.1*sin(60*t^3*y)*z;-0.6*t^3*(y-0.05);-0.6*t^3*z "
+                   "-time static -static_steps 10 -time_max_halvings 0 -remesh_failed -snes_max_it %s",
+              iterations));
   PetscCall(SbRemeshSetMesher(s.remesh, fixture_cone, &calls));
   PetscCall(test_scene_solve(&s));
   PetscCallMPI(MPI_Bcast(&calls, 1, MPI_INT, 0, PETSC_COMM_WORLD));

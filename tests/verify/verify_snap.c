@@ -1,15 +1,18 @@
 // @ranks 1 2
 /*
-  Snap-through of Williams' toggle ("An approach to the non-linear behaviour of the members of a rigid jointed plane framework with finite
-  deflections", Q. J. Mech. Appl. Math. 17, 1964): two straight members of span l = 12.943 in each, clamped at the far ends and rigidly connected in the middle, at
-  a height of H = 0.386 in; section 0.753 in x 0.243 in, E = 1.03e7 lb/in^2. The load in the middle has a maximum, decreases, and increases
-  again. The published maximum by Williams' theory is 34.0392 lb. Here one half is a solid, with Poisson's ratio 0 as for beams.
+  Snap-through of Williams' toggle ("An approach to the non-linear behaviour of the members of a rigid jointed
+  plane framework with finite deflections", Q. J. Mech. Appl. Math. 17, 1964): two straight members of span l
+  = 12.943 in each, clamped at the far ends and rigidly connected in the middle, at a height of H = 0.386 in;
+  section 0.753 in x 0.243 in, E = 1.03e7 lb/in^2. The load in the middle has a maximum, decreases, and
+  increases again. The published maximum by Williams' theory is 34.0392 lb. Here one half is a solid, with
+  Poisson's ratio 0 as for beams.
 
   With the compression N = k^2 E I, slope a = H/l and the deflection delta of the middle, a shallow beam has
 
     P = 2 N (a + B),   B = -delta / (l - 2/k tan(k l/2)),   N l / E A = a delta - 1/2 int w'^2 dx,   w' = B (1 - cos k x - tan(k l/2) sin k x),
 
-  from which N follows for each delta. Neglected are terms of a^2, the shear of the members and finite strains: about 0.1 % each.
+  from which N follows for each delta. Neglected are terms of a^2, the shear of the members and finite
+  strains: about 0.1 % each.
 */
 #include "verify.h"
 
@@ -49,15 +52,13 @@ static PetscReal toggle_load(PetscReal delta)
   return P;
 }
 
-static void member(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void member(const VerifyPlace *place, PetscReal x[3])
 {
   const PetscReal depth = DEPTH * PetscSqrtReal(1. + PetscSqr(RISE / SPAN)); /* of a vertical section */
 
-  (void)at;
-  (void)ctx;
   x[1] = RISE * x[0] + depth * (x[1] - 0.5);
   x[0] *= SPAN;
-  x[2] *= SPAN / (PetscReal)n[0];
+  x[2] *= SPAN / (PetscReal)place->n[0];
 }
 
 typedef struct {
@@ -96,7 +97,7 @@ static PetscErrorCode check_toggle(const char *element, PetscInt nx, PetscInt ny
 
   PetscFunctionBeginUser;
   PetscCall(verify_mesh_write(n, member, NULL, mesh));
-  PetscCall(verify_open(
+  PetscCall(test_open(
     &t,
     "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material stvk -body_a_young %.17g "
     "-body_a_poisson 0 -body_a_density 1 -sets far,middle -set_far_at plane:1,0,0,0 "
@@ -105,18 +106,15 @@ static PetscErrorCode check_toggle(const char *element, PetscInt nx, PetscInt ny
     "-effect_symmetry_components x -effect_plane_type fixed -effect_plane_on all -effect_plane_components z "
     "-effect_load_type traction -effect_load_on middle -effect_load_total 0,%.17g,0 -time static "
     "-static_control arc_length -static_steps 5 -static_longest_step 1",
-    mesh, element, YOUNG, SPAN, (double)(-0.5 * g.full * SPAN / (double)nx / WIDTH)));
-  PetscCall(test_file_remove(mesh));
+    mesh, element, YOUNG, SPAN, -0.5 * g.full * SPAN / (double)nx / WIDTH));
   PetscCall(SbRunAddMonitor(t.run, watch, &g));
   PetscCall(verify_solve(&t, "toggle"));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  %s, %d x %d cells: %d steps, %d rejected, %d Newton iterations; load %.4f lb, then "
-    "%.4f lb, %.1f lb at %.4f in; error %.3f lb\n",
-    element, (int)nx, (int)ny, (int)t.run->steps_total, (int)t.run->rejected_total, (int)t.run->newton_total,
-    (double)g.top, (double)g.bottom, (double)g.last[1], (double)g.last[0], (double)g.error));
-  SB_CHECK(g.last[1] == g.full, "the load ended at %g lb", (double)g.last[1]);
-  SB_CHECK(g.bottom < g.top - 1., "the load fell from %g to %g lb", (double)g.top, (double)g.bottom);
+  test_print("  %s, %d x %d cells: %d steps, %d rejected, %d Newton iterations; load %.4f lb, then "
+             "%.4f lb, %.1f lb at %.4f in; error %.3f lb\n",
+             element, (int)nx, (int)ny, (int)t.run->steps_total, (int)t.run->rejected_total,
+             (int)t.run->newton_total, g.top, g.bottom, g.last[1], g.last[0], g.error);
+  SB_CHECK(g.last[1] == g.full, "the load ended at %g lb", g.last[1]);
+  SB_CHECK(g.bottom < g.top - 1., "the load fell from %g to %g lb", g.top, g.bottom);
   SB_CHECK(t.run->bifurcations == 0, "bifurcation");
   *error = g.error / g.full;
   *top = g.top;
@@ -132,14 +130,12 @@ int main(int argc, char **argv)
   PetscCall(check_toggle("cr", 108, 2, &error[0], &top[0]));
   PetscCall(check_toggle("cr", 216, 4, &error[1], &top[1]));
   limit = verify_extrapolate(top[0], top[1], 2.);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  limit load: extrapolated %.3f lb, published %g lb\n",
-                        (double)limit, LIMIT));
-  SB_CHECK(error[1] < 0.03, "%g of the load off the curve", (double)error[1]);
-  SB_CHECK(error[1] < 0.4 * error[0], "%g and %g of the load off the curve", (double)error[0],
-           (double)error[1]);
+  test_print("  limit load: extrapolated %.3f lb, published %g lb\n", limit, LIMIT);
+  SB_CHECK(error[1] < 0.03, "%g of the load off the curve", error[1]);
+  SB_CHECK(error[1] < 0.4 * error[0], "%g and %g of the load off the curve", error[0], error[1]);
   SB_CHECK_NEAR(limit, LIMIT, 0.01 * LIMIT, "limit load");
   PetscCall(check_toggle("p2", 54, 1, &error[0], &top[0]));
-  SB_CHECK(error[0] < 0.02, "P2: %g of the load off the curve", (double)error[0]);
+  SB_CHECK(error[0] < 0.02, "P2: %g of the load off the curve", error[0]);
   SB_CHECK_NEAR(top[0], LIMIT, 0.01 * LIMIT, "limit load, P2");
   SB_TEST_END();
 }

@@ -22,24 +22,6 @@ static const double complex unit = 1.0i;
 
 /* ------------------------------------------------------------------ turned */
 
-static PetscErrorCode turn(TestScene *t, const PetscReal axis[3], PetscReal angle)
-{
-  const PetscReal moved[3] = {0.7, -1.3, 0.4};
-  SbSpace s = t->model->space;
-  PetscReal R[9];
-  PetscScalar *u;
-
-  PetscFunctionBeginUser;
-  verify_rotation(axis, angle, R);
-  PetscCall(VecGetArray(t->run->U, &u));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    verify_apply(R, s->node_x + 3 * i, u + 3 * i);
-    for (int k = 0; k < 3; k++) u[3 * i + k] += moved[k] - s->node_x[3 * i + k];
-  }
-  PetscCall(VecRestoreArray(t->run->U, &u));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Largest error of sigma_xx over the cells, relative to 2 (mu + lambda). */
 static PetscErrorCode linear_stress(TestScene *t, PetscReal angle, PetscReal *error)
 {
@@ -69,21 +51,19 @@ static PetscErrorCode check_turned(const char *element, const char *law)
   PetscReal worst = 0.;
   Vec F;
   TestScene t;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh box:1,0.8,0.6:3 -body_a_translate -0.3,-0.2,-0.1 "
-                          "-body_a_element %s -body_a_material %s -body_a_young %g -body_a_poisson 0.4 "
-                          "-body_a_density 1000",
-                          element, law, (double)E));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh box:1,0.8,0.6:3 -body_a_translate -0.3,-0.2,-0.1 "
+                      "-body_a_element %s -body_a_material %s -body_a_young %g -body_a_poisson 0.4 "
+                      "-body_a_density 1000",
+                      element, law, E));
   PetscCall(VecDuplicate(t.run->U, &F));
   for (int k = 1; k <= 24; k++) {
     const PetscReal angle = k * PETSC_PI / 12.;
     PetscReal size;
 
-    PetscCall(turn(&t, linear ? z : askew, angle));
+    PetscCall(verify_turn(&t, linear ? z : askew, angle, (const PetscReal[3]){0.7, -1.3, 0.4}));
     if (linear) {
       PetscCall(linear_stress(&t, angle, &size));
     } else {
@@ -93,10 +73,9 @@ static PetscErrorCode check_turned(const char *element, const char *law)
     }
     worst = PetscMax(worst, size);
   }
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  turned through 360 degrees, %s %-10s: %s %.1e\n", element, law,
-                        linear ? "stress from 2 (mu + lambda)(cos t - 1)" : "largest force / (E L^2)",
-                        (double)worst));
-  SB_CHECK(worst <= 1e-12, "%s, %s: %g", element, law, (double)worst);
+  test_print("  turned through 360 degrees, %s %-10s: %s %.1e\n", element, law,
+             linear ? "stress from 2 (mu + lambda)(cos t - 1)" : "largest force / (E L^2)", worst);
+  SB_CHECK(worst <= 1e-12, "%s, %s: %g", element, law, worst);
   PetscCall(VecDestroy(&F));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -152,29 +131,24 @@ static PetscErrorCode check_spin(const char *element, const char *law, PetscReal
   const PetscReal left[3] = {-0.15, 0., 0.}, right[3] = {0.15, 0., 0.};
   Spin s = {.w0h = w0 * h};
   TestScene t;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
+  PetscCall(test_open(
+    &t,
     "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_translate -0.15,-0.05,-0.05 -body_a_element %s "
     "-body_a_material %s -body_a_young %g -body_a_poisson 0.3 -body_a_density 1000 "
     "-body_a_angular_velocity 0,0,%.17g -time euler_implicit -ts_dt %.17g -ts_max_time %.17g "
     "-snes_rtol 1e-10",
-    element, law, (double)E, (double)w0, (double)h, (double)(h * (PetscReal)steps)));
-  PetscCall(test_scene_open(text, &t));
+    element, law, E, w0, h, h * (PetscReal)steps));
   PetscCall(nearest_node(t.model, left, s.left));
   PetscCall(nearest_node(t.model, right, s.right));
   PetscCall(SbRunAddMonitor(t.run, watch_spin, &s));
   PetscCall(verify_solve(&t, "spin"));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  spin, implicit Euler, %s %s, E %g, w0 h %g: turns of %d steps within %.1e of the "
-                        "recurrence; end %.5f rad/s, law %.5f\n",
-                        element, law, (double)E, (double)(w0 * h), (int)steps, (double)s.worst,
-                        (double)(s.d / h), (double)wt));
+  test_print("  spin, implicit Euler, %s %s, E %g, w0 h %g: turns of %d steps within %.1e of the "
+             "recurrence; end %.5f rad/s, law %.5f\n",
+             element, law, E, w0 * h, (int)steps, s.worst, s.d / h, wt);
   SB_CHECK(t.run->steps_total == steps, "%d steps were taken", (int)t.run->steps_total);
-  SB_CHECK(s.worst <= tolerance, "%s, %s, E %g: turns are off by %g", element, law, (double)E,
-           (double)s.worst);
+  SB_CHECK(s.worst <= tolerance, "%s, %s, E %g: turns are off by %g", element, law, E, s.worst);
   SB_CHECK_NEAR(s.d / h, wt, near * wt, "w(t)");
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -188,17 +162,14 @@ static PetscErrorCode check_rod(const char *element, const char *law)
   PetscReal left[3] = {-l, 0., 0.}, right[3] = {l, 0., 0.}, a[3], b[3], longer = 0., rest = 0., spin;
   SbEnergies before, after;
   TestScene t;
-  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscSNPrintf(text, sizeof(text),
-                  "-bodies a -body_a_mesh box:1,0.05,0.05:20,2,2 -body_a_translate -0.5,-0.025,-0.025 "
-                  "-body_a_element %s -body_a_material %s -body_a_young %g -body_a_poisson 0 "
-                  "-body_a_density %g -body_a_angular_velocity 0,0,%g -effects damping "
-                  "-effect_damping_beta 0.01 -time newmark -ts_dt 0.002 -ts_max_time 0.4 -snes_rtol 1e-9",
-                  element, law, (double)E, (double)rho, (double)w));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh box:1,0.05,0.05:20,2,2 -body_a_translate -0.5,-0.025,-0.025 "
+                      "-body_a_element %s -body_a_material %s -body_a_young %g -body_a_poisson 0 "
+                      "-body_a_density %g -body_a_angular_velocity 0,0,%g -effects damping "
+                      "-effect_damping_beta 0.01 -time newmark -ts_dt 0.002 -ts_max_time 0.4 -snes_rtol 1e-9",
+                      element, law, E, rho, w));
   PetscCall(nearest_node(t.model, left, left));
   PetscCall(nearest_node(t.model, right, right));
   PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &before));
@@ -212,11 +183,9 @@ static PetscErrorCode check_rod(const char *element, const char *law)
   }
   longer = PetscSqrtReal(longer) - PetscSqrtReal(rest);
   spin = after.angular[2] / before.angular[2];
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  rod, %s %s, after %.2f rad: longer by %.5e m on each side (%.5e), angular "
-                        "momentum %.7f of the start\n",
-                        element, law, 0.4 * (double)w, (double)(0.5 * longer), (double)stretch,
-                        (double)spin));
+  test_print("  rod, %s %s, after %.2f rad: longer by %.5e m on each side (%.5e), angular "
+             "momentum %.7f of the start\n",
+             element, law, 0.4 * (double)w, 0.5 * longer, stretch, spin);
   /* a strain of 3e-4, and 20 cells, in which the face terms of CR and DG, and the edges of P2, are stiff */
   SB_CHECK_NEAR(0.5 * longer, stretch, (strcmp(element, "p1") ? 1e-2 : 5e-3) * stretch, "stretch of the rod");
   SB_CHECK_NEAR(spin, 1., 1e-4, "angular momentum with damping");

@@ -1,24 +1,24 @@
 // @ranks 1
 /*
-  A cushion compressed to half its height between two moving plates; a quarter of it, symmetry planes x = 0 and y = 0, no friction.
+  A cushion compressed to half its height between two moving plates; a quarter of it, symmetry planes x = 0
+  and y = 0, no friction.
 
-  Both plates have the same force, which increases in every step, no cell is inverted, and the midplane does not move. The work of
-  the plates is the energy of the cushion. With Poisson's ratio 0.49 the volume is nearly constant, and CR and P2 give the same force
-  (with a jump penalty that does not follow the state CR gives less than half of it).
-  With P1, x itself is an
-  admissible test function: the integral of the trace of the stress is the sum of x . f, which is minus the height times the force.
+  Both plates have the same force, which increases in every step, no cell is inverted, and the midplane does
+  not move. The work of the plates is the energy of the cushion. With Poisson's ratio 0.49 the volume is
+  nearly constant, and CR and P2 give the same force (with a jump penalty that does not follow the state CR
+  gives less than half of it). With P1, x itself is an admissible test function: the integral of the trace of
+  the stress is the sum of x . f, which is minus the height times the force.
 */
 #include "contact.h"
+#include <sbtet.h>
 
 #define RADIUS 0.05 /* m */
 #define STEPS 20
 
 /* Map of a quarter of a block with bulging top and bottom, so that contact begins at the centre. */
-static void cushion(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void cushion(const VerifyPlace *place, PetscReal x[3])
 {
-  (void)n;
-  (void)at;
-  (void)ctx;
+  (void)place;
   x[2] = (2 * x[2] - 1) * (1 - 0.15 * (x[0] * x[0] + x[1] * x[1]));
   for (int k = 0; k < 3; k++) x[k] *= RADIUS;
 }
@@ -37,15 +37,9 @@ static PetscErrorCode stress_trace(TestScene *t, PetscReal *integral)
   SbSpaceCellState(s, u, sigma, J, NULL, NULL);
   PetscCall(SbSpaceRestoreLocalRead(s, t->run->U, &u));
   for (PetscInt c = 0; c < s->mesh->ncell_owned; c++) {
-    const PetscReal *x[4];
-    PetscReal e[3][3], cross[3];
+    const PetscReal V = SbTetDeterminant(s->mesh->x, s->mesh->cell + 4 * c) / 6;
 
-    for (int a = 0; a < 4; a++) x[a] = s->mesh->x + 3 * s->mesh->cell[4 * c + a];
-    for (int a = 0; a < 3; a++) {
-      for (int k = 0; k < 3; k++) e[a][k] = x[a + 1][k] - x[0][k];
-    }
-    SbCross(e[0], e[1], cross);
-    *integral += (sigma[6 * c] + sigma[6 * c + 1] + sigma[6 * c + 2]) * J[c] * SbDot3(cross, e[2]) / 6;
+    *integral += (sigma[6 * c] + sigma[6 * c + 1] + sigma[6 * c + 2]) * J[c] * V;
   }
   PetscCall(PetscFree2(sigma, J));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, integral, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
@@ -63,18 +57,18 @@ static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscRe
   TestScene t;
 
   PetscFunctionBeginUser;
-  verify_case("squeeze, %s, nu %g", element, (double)poisson);
+  verify_case("squeeze, %s, nu %g", element, poisson);
   PetscCall(verify_mesh_write(n, cushion, NULL, path));
-  PetscCall(verify_open(
+  PetscCall(test_open(
     &t,
     "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material neohookean -body_a_young %g "
-    "-body_a_poisson %g -sets x0,y0 -set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 "
-    "-effects x,y,top,bottom -effect_x_type fixed -effect_x_on x0 -effect_x_components x "
-    "-effect_y_type fixed -effect_y_on y0 -effect_y_components y -effect_top_type contact "
-    "-effect_top_response projected -effect_top_obstacle plane:0,0,-1,%g -effect_top_displacement 0;0;%g*t "
-    "-effect_bottom_type contact -effect_bottom_response projected -effect_bottom_obstacle plane:0,0,1,%g "
-    "-effect_bottom_displacement 0;0;%g*t -time static -static_steps %d -snes_rtol 1e-8 -ksp_rtol 1e-8",
-    path, element, (double)young, (double)poisson, -RADIUS, -0.5 * RADIUS, -RADIUS, 0.5 * RADIUS, STEPS));
+    "-body_a_poisson %g -sets x0,y0 -set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 -effects "
+    "x,y,top,bottom -effect_x_type fixed -effect_x_on x0 -effect_x_components x -effect_y_type fixed "
+    "-effect_y_on y0 -effect_y_components y -effect_top_type contact -effect_top_response projected "
+    "-effect_top_obstacle plane:0,0,-1,%g -effect_top_displacement 0;0;%g*t -effect_bottom_type contact "
+    "-effect_bottom_response projected -effect_bottom_obstacle plane:0,0,1,%g -effect_bottom_displacement "
+    "0;0;%g*t -time static -static_steps %d -snes_rtol 1e-8 -ksp_rtol 1e-8",
+    path, element, young, poisson, -RADIUS, -0.5 * RADIUS, -RADIUS, 0.5 * RADIUS, STEPS));
   PetscCall(record_solve(&t, &r));
   PetscCall(stress_trace(&t, &trace));
   work = t.run->energies.prescribed_work;
@@ -104,8 +98,6 @@ static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscRe
   /* the height is now RADIUS */
   if (!strcmp(element, "p1"))
     VERIFY_NEAR(-force * RADIUS / trace, 1, 1e-6, "height times force against the trace of the stress");
-  PetscCall(record_free(&r));
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -113,34 +105,27 @@ static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscRe
 static PetscErrorCode check_springs(const char *element)
 {
   Record r = {0};
-  TestScene t;
 
   PetscFunctionBeginUser;
   verify_case("springs, %s", element);
-  PetscCall(verify_open(
-    &t,
-    "-bodies a -body_a_mesh box:0.1,0.1,0.1:3 -body_a_element %s -body_a_material neohookean -body_a_young "
-    "1e4 "
-    "-body_a_poisson 0.4999 -body_a_density 1000 -sets top -set_top_at plane:0,0,1,0.1 -effects "
-    "hold,weight,floor "
-    "-effect_hold_type fixed -effect_hold_on top -effect_weight_type gravity -effect_floor_type contact "
-    "-effect_floor_response penalty -effect_floor_obstacle plane:0,0,1,-0.001 -time static",
-    element));
-  PetscCall(record_solve(&t, &r));
-  PetscCall(test_scene_close(&t));
+  PetscCall(
+    record_run(&r,
+               "-bodies a -body_a_mesh box:0.1,0.1,0.1:3 -body_a_element %s -body_a_material neohookean "
+               "-body_a_young 1e4 -body_a_poisson 0.4999 -body_a_density 1000 -sets top -set_top_at "
+               "plane:0,0,1,0.1 -effects hold,weight,floor -effect_hold_type fixed -effect_hold_on top "
+               "-effect_weight_type gravity -effect_floor_type contact -effect_floor_response penalty "
+               "-effect_floor_obstacle plane:0,0,1,-0.001 -time static",
+               element));
   VERIFY_LESS((PetscReal)r.newton, 80, "iterations");
   /* `projected` gives 3.430 N (P2); the penetration of the springs, 0.5 % of the stress over the shear modulus, is below the error of the mesh */
   if (!strcmp(element, "p2"))
     VERIFY_NEAR(record_last(&r, "floor_force_z") / 3.430, 1, 0.01, "force, of that without springs");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static void block(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+static void block(const VerifyPlace *place, PetscReal x[3])
 {
-  (void)n;
-  (void)at;
-  (void)ctx;
+  (void)place;
   for (int k = 0; k < 3; k++) x[k] *= (k == 2 ? 2 : 1) * RADIUS;
 }
 
@@ -150,25 +135,19 @@ static PetscErrorCode check_thrown(const char *element, PetscReal dt, PetscReal 
   const PetscInt n[3] = {2, 2, 4};
   Record r = {0};
   char path[512];
-  TestScene t;
 
   PetscFunctionBeginUser;
-  verify_case("thrown, %s, steps of %g s", element, (double)dt);
+  verify_case("thrown, %s, steps of %g s", element, dt);
   PetscCall(verify_mesh_write(n, block, NULL, path));
-  PetscCall(
-    verify_open(&t,
-                "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material neohookean -body_a_young 1e4 "
-                "-body_a_poisson 0.49 -body_a_density 1000 -body_a_velocity 0,0,-2.5 -effects floor "
-                "-effect_floor_type contact "
-                "-effect_floor_obstacle plane:0,0,1,-1e-4 -time euler_implicit -ts_dt %g -ts_max_time 0.05",
-                path, element, (double)dt));
-  PetscCall(record_solve(&t, &r));
-  PetscCall(test_scene_close(&t));
+  PetscCall(record_run(
+    &r,
+    "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material neohookean -body_a_young 1e4 "
+    "-body_a_poisson 0.49 -body_a_density 1000 -body_a_velocity 0,0,-2.5 -effects floor -effect_floor_type "
+    "contact -effect_floor_obstacle plane:0,0,1,-1e-4 -time euler_implicit -ts_dt %g -ts_max_time 0.05",
+    path, element, dt));
   VERIFY_LESS(record_gain(&r, "energy"), 1e-6 * record_at(&r, "energy", 0), "energy gained in a step, J");
   /* that of P2 on the same mesh; a constant penalty gives some 0.03 m less */
   VERIFY_NEAR(record_last(&r, "centre_z"), height, 0.003, "height of the centre, m");
-  PetscCall(record_free(&r));
-  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -176,26 +155,21 @@ static PetscErrorCode check_thrown(const char *element, PetscReal dt, PetscReal 
 static PetscErrorCode check_released(const char *element)
 {
   Record r = {0};
-  TestScene t;
 
   PetscFunctionBeginUser;
   verify_case("released, %s", element);
-  PetscCall(verify_open(
-    &t,
+  PetscCall(record_run(
+    &r,
     "-bodies a -body_a_mesh box:0.05,0.05,0.05:2 -body_a_element %s -body_a_material neohookean "
-    "-body_a_young 1e4 "
-    "-body_a_poisson 0.45 -body_a_density 1000 -effects high,low -effect_high_type contact "
+    "-body_a_young 1e4 -body_a_poisson 0.45 -body_a_density 1000 -effects high,low -effect_high_type contact "
     "-effect_high_obstacle plane:0,0,-1,-0.0501 -effect_high_displacement "
     "0;0;-0.04*min(1,t/0.2)+0.04*max(0,min(1,(t-0.3)/0.2)) -effect_low_type contact -effect_low_obstacle "
     "plane:0,0,1,-0.0001 -time newmark -ts_dt 0.004 -ts_max_time 0.6",
     element));
-  PetscCall(record_solve(&t, &r));
-  PetscCall(test_scene_close(&t));
   /* the compressed body has 1 J; the integrator adds 0.035 J, most of it in one step at the fastest compression */
   VERIFY_LESS(record_gain(&r, "energy"), 0.1, "energy gained in a step, J");
   VERIFY_LESS(record_last(&r, "energy"), 0.1, "energy at the end, J");
   VERIFY_NEAR(record_last(&r, "centre_z"), 0.025, 0.002, "height of the centre, m");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -208,19 +182,17 @@ static PetscErrorCode check_waves(const char *element)
 
   PetscFunctionBeginUser;
   verify_case("waves, %s", element);
-  PetscCall(verify_open(
+  PetscCall(test_open(
     &t,
     "-bodies a -body_a_mesh box:0.06,0.05,0.04:2 -body_a_element %s -body_a_material neohookean "
-    "-body_a_young 1e4 "
-    "-body_a_poisson 0.499 -body_a_density 1000 -effects high,low -effect_high_type contact "
-    "-effect_high_obstacle plane:0,0,-1,-0.0401 -effect_high_displacement "
+    "-body_a_young 1e4 -body_a_poisson 0.499 -body_a_density 1000 -effects high,low -effect_high_type "
+    "contact -effect_high_obstacle plane:0,0,-1,-0.0401 -effect_high_displacement "
     "0;0;-0.02*min(1,t/0.05)+0.02*max(0,min(1,(t-0.06)/0.05)) -effect_low_type contact -effect_low_obstacle "
     "plane:0,0,1,-0.0001 -time newmark -ts_dt 0.003 -ts_max_time 0.2",
     element));
   PetscCall(record_solve(&t, &r));
   VERIFY_LESS(-t.run->energies.integrator_loss, 0.06, "energy given, J, of 0.25 J when pressed");
   PetscCall(test_scene_close(&t));
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

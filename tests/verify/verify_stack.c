@@ -2,8 +2,9 @@
 /*
   Five blocks of very different masses and meshes fall onto each other and come to rest.
 
-  At rest each interface carries the weight above it, as given by the field of contact forces (on each body), by the history
-  of the floor and by that of the bodies (the sum over all interfaces). There is no motion and no penetration.
+  At rest each interface carries the weight above it, as given by the field of contact forces (on each body),
+  by the history of the floor and by that of the bodies (the sum over all interfaces). There is no motion and
+  no penetration.
 
     smooth   without friction, a quarter of the stack between its symmetry planes: a free one would slide apart at the
              smallest perturbation, as a real one would
@@ -53,9 +54,8 @@ static PetscErrorCode write_blocks(PetscBool rough, size_t size, char text[])
       one, sizeof(one),
       " -body_b%d_mesh box:%g,%g,%g:%d,%d,%d -body_b%d_rotate 0,0,1,%g -body_b%d_translate %.15g,%.15g,%g "
       "-body_b%d_material corotated -body_b%d_young 1e6 -body_b%d_poisson 0.3 -body_b%d_density %g",
-      k, (double)b->size[0], (double)b->size[1], (double)b->size[2], (int)b->cells[0], (int)b->cells[1],
-      (int)b->cells[2], k, (double)(rough ? b->turn : 0), k, (double)x, (double)y, (double)z, k, k, k, k,
-      (double)b->density));
+      k, b->size[0], b->size[1], b->size[2], (int)b->cells[0], (int)b->cells[1], (int)b->cells[2], k,
+      rough ? b->turn : 0, k, x, y, z, k, k, k, k, b->density));
     PetscCall(PetscStrlcat(text, one, size));
     z += b->size[2];
   }
@@ -80,54 +80,41 @@ static PetscErrorCode keep(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Compares net contact forces with weights, interface by interface from above; returns the largest error relative to the weight there. */
-static PetscErrorCode check_forces(SbRun run, PetscReal t, PetscReal *vertical, PetscReal *sideways,
-                                   PetscReal *sum)
-{
-  PetscReal force[3 * BLOCKS], mass[BLOCKS], carried = 0, weight = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(contact_body_forces(run, t, force));
-  PetscCall(contact_body_masses(run->model, mass));
-  *vertical = *sideways = *sum = 0;
-  for (int k = BLOCKS - 1; k >= 0; k--) {
-    carried += force[3 * k + 2];
-    weight += G * mass[k];
-    if (k > 0) *sum += weight; /* the floor is another effect */
-    *vertical = PetscMax(*vertical, PetscAbsReal(carried / weight - 1));
-    for (int i = 0; i < 2; i++)
-      *sideways = PetscMax(*sideways, PetscAbsReal(force[3 * k + i]) / (G * mass[k]));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* slow: bound of the speed at the end, m/s. */
 static PetscErrorCode check_stack(PetscReal friction, PetscReal slow)
 {
   const PetscReal end = friction > 0 ? 0.8 : 1, size = 0.12;
   Since at = {.since = 0.8 * end};
   Record r = {.g = G};
-  PetscReal drift, vertical = 0, sideways = 0, sum = 0, weight;
+  PetscReal force[3 * BLOCKS], mass[BLOCKS], carried = 0, weight = 0, sum = 0;
+  PetscReal drift, vertical = 0, sideways = 0;
   char bodies[VERIFY_TEXT / 2];
   TestScene t;
 
   PetscFunctionBeginUser;
-  verify_case("stack, friction %g", (double)friction);
+  verify_case("stack, friction %g", friction);
   PetscCall(write_blocks((PetscBool)(friction > 0), sizeof(bodies), bodies));
   PetscCall(
-    verify_open(&t,
-                "%s %s -effect_floor_type contact -effect_floor_on b0 "
-                "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction %g -effect_meet_type contact "
-                "-effect_meet_friction %g "
-                "-time euler_implicit -ts_dt 0.01 -ts_max_time %g -snes_rtol 1e-10 -ksp_rtol 1e-9",
-                bodies, friction > 0 ? "-effects gravity,floor,meet" : GUIDED, (double)friction,
-                (double)friction, (double)end));
+    test_open(&t,
+              "%s %s -effect_floor_type contact -effect_floor_on b0 -effect_floor_obstacle plane:0,0,1,0 "
+              "-effect_floor_friction %g -effect_meet_type contact -effect_meet_friction %g -time "
+              "euler_implicit -ts_dt 0.01 -ts_max_time %g -snes_rtol 1e-10 -ksp_rtol 1e-9",
+              bodies, friction > 0 ? "-effects gravity,floor,meet" : GUIDED, friction, friction, end));
   PetscCall(SbRunAddMonitor(t.run, keep, &at));
   PetscCall(record_solve(&t, &r));
   PetscCall(VecAXPY(at.U, -1, t.run->U));
   PetscCall(VecNorm(at.U, NORM_INFINITY, &drift));
   PetscCall(VecDestroy(&at.U));
-  PetscCall(check_forces(t.run, end, &vertical, &sideways, &sum));
+  /* net contact forces against weights, interface by interface from above, relative to the weight there */
+  PetscCall(contact_body_forces(t.run, end, force));
+  PetscCall(contact_body_masses(t.model, mass));
+  for (int k = BLOCKS - 1; k >= 0; k--) {
+    carried += force[3 * k + 2];
+    weight += G * mass[k];
+    if (k > 0) sum += weight; /* the floor is another effect */
+    vertical = PetscMax(vertical, PetscAbsReal(carried / weight - 1));
+    for (int i = 0; i < 2; i++) sideways = PetscMax(sideways, PetscAbsReal(force[3 * k + i]) / (G * mass[k]));
+  }
   PetscCall(test_scene_close(&t));
   weight = G * r.mass;
   VERIFY_LESS(vertical, 1e-3, "force of an interface against the weight above, off by");
@@ -146,18 +133,14 @@ static PetscErrorCode check_stack(PetscReal friction, PetscReal slow)
   if (friction > 0) /* the guides of the other one push, too */
     VERIFY_LESS(record_max(&r, "missing"), 1e-4, "momentum that no force explains, kg m/s");
   VERIFY_LESS(record_gain(&r, "energy"), 1e-6, "largest gain of a step, J");
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int main(int argc, char **argv)
 {
-  PetscMPIInt size;
-
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(check_stack(0, 5e-4));
-  if (size > 1) SB_TEST_END(); /* many solves of a small system: on one rank only */
+  if (test_size > 1) SB_TEST_END(); /* many solves of a small system: on one rank only */
   PetscCall(check_stack(0.5, 1e-4));
   SB_TEST_END();
 }

@@ -1,86 +1,33 @@
 // @ranks 1
 /*
-  Structural benchmarks CSM1 and CSM2 of Turek and Hron ("Proposal for numerical benchmarking of fluid-structure
-  interaction between an elastic object and laminar incompressible flow", 2006): a St. Venant-Kirchhoff beam, plane strain,
-  0.02 m thick, from the circle (0.2, 0.2) of radius 0.05 m to x = 0.6 m, bends under gravity. Displacement of (0.6, 0.2).
+  Structural benchmarks CSM1 and CSM2 of Turek and Hron ("Proposal for numerical benchmarking of
+  fluid-structure interaction between an elastic object and laminar incompressible flow", 2006): a St.
+  Venant-Kirchhoff beam, plane strain, 0.02 m thick, from the circle (0.2, 0.2) of radius 0.05 m to x = 0.6 m,
+  bends under gravity. Displacement of (0.6, 0.2).
 
-  The mesh is a box whose left side is mapped to the arc, one layer of cells between two planes with u_z = 0. Cook's
-  membrane, (0,0) (48,44) (48,60) (0,44), left side fixed, uniform shear 1/16 on the right one, small strains, plane strain
-  too, is the second mapped box.
+  The mesh is a box whose left side is mapped to the arc, one layer of cells between two planes with u_z = 0.
+  Cook's membrane, (0,0) (48,44) (48,60) (0,44), left side fixed, uniform shear 1/16 on the right one, small
+  strains, plane strain too, is the second mapped box.
 
-  P1 is too stiff in bending on coarse meshes, with errors of order h^2: two meshes are extrapolated (Richardson).
+  P1 is too stiff in bending on coarse meshes, with errors of order h^2: two meshes are extrapolated
+  (Richardson).
 */
-#include "verify.h"
-
-static void beam(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
-{
-  const PetscReal y = 0.19 + 0.02 * x[1], root = 0.2 + PetscSqrtReal(0.0025 - PetscSqr(y - 0.2));
-
-  (void)at;
-  (void)ctx;
-  x[0] = root + x[0] * (0.6 - root);
-  x[1] = y;
-  x[2] *= 0.35 / (PetscReal)n[0];
-}
-
-static void membrane(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
-{
-  const PetscReal bottom = 44. * x[0], top = 44. + 16. * x[0];
-
-  (void)at;
-  (void)ctx;
-  x[0] *= 48.;
-  x[1] = bottom + x[1] * (top - bottom);
-  x[2] *= 48. / (PetscReal)n[0];
-}
-
-/* Displacement at a point of the plane z = 0. */
-static PetscErrorCode solve(const char *what, const PetscInt n[3], VerifyMap map, const char *options,
-                            const PetscReal at[3], PetscReal u[3])
-{
-  TestScene t;
-  char text[VERIFY_TEXT], mesh[512];
-
-  PetscFunctionBeginUser;
-  PetscCall(verify_mesh_write(n, map, NULL, mesh));
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh %s -time static -effect_plane_type fixed "
-                          "-effect_plane_on all -effect_plane_components z %s",
-                          mesh, options));
-  PetscCall(test_scene_open(text, &t));
-  PetscCall(test_file_remove(mesh));
-  PetscCall(verify_solve(&t, what));
-  PetscCall(test_value_at(t.model, t.run->U, at, u));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "    %s, %d x %d cells: %.6g %.6g, %d Newton iterations\n", what,
-                        (int)n[0], (int)n[1], (double)u[0], (double)u[1], (int)t.run->newton_total));
-  PetscCall(test_scene_close(&t));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+#include "locking.h"
 
 static PetscErrorCode check_csm(const char *what, PetscReal mu, PetscReal ux, PetscReal uy)
 {
-  const PetscReal tip[3] = {0.6, 0.2, 0.};
   PetscReal u[2][3], limit[2];
-  char text[VERIFY_TEXT];
+  LockingCost cost;
 
   PetscFunctionBeginUser;
   for (int k = 0; k < 2; k++) {
-    const PetscInt n[3] = {140 << k, 8 << k, 1};
-    const double thickness = 0.35 / (double)n[0];
-
-    PetscCall(
-      PetscSNPrintf(text, sizeof(text),
-                    "-body_a_material stvk -body_a_tangent exact -body_a_young %.17g -body_a_poisson 0.4 "
-                    "-body_a_density 1000 -sets front,back -set_front_at sphere:0.2,0.2,0,0.05 "
-                    "-set_back_at sphere:0.2,0.2,%.17g,0.05 -effects root,plane,gravity "
-                    "-effect_root_type fixed -effect_root_on front,back -effect_gravity_vector 0,-2,0  ",
-                    (double)(2.8 * mu), thickness));
-    PetscCall(solve(what, n, beam, text, tip, u[k]));
+    PetscCall(locking_beam(8 << k, mu, "-body_a_material stvk", u[k], &cost));
+    test_print("    %s, %d cells across: %.6g %.6g, %d Newton iterations\n", what, 8 << k, u[k][0], u[k][1],
+               (int)cost.newton);
   }
   for (int k = 0; k < 2; k++) limit[k] = verify_extrapolate(u[0][k], u[1][k], 2.);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s: extrapolated %.6f %.6f mm (reference %.6f %.6f)\n", what,
-                        (double)(1e3 * limit[0]), (double)(1e3 * limit[1]), (double)(1e3 * ux),
-                        (double)(1e3 * uy)));
+  test_print("  %s: extrapolated %.6f %.6f mm (reference %.6f %.6f)\n", what, 1e3 * limit[0], 1e3 * limit[1],
+             1e3 * ux, 1e3 * uy);
   /* the finer mesh has an error of 1 %, its extrapolation must be at least ten times better */
   SB_CHECK_NEAR(u[1][1], uy, 0.015 * PetscAbsReal(uy), what);
   SB_CHECK_NEAR(limit[0], ux, 3e-3 * PetscAbsReal(ux), what);
@@ -92,25 +39,32 @@ static PetscErrorCode check_csm(const char *what, PetscReal mu, PetscReal ux, Pe
 static PetscErrorCode check_cook(PetscReal nu, PetscReal uy)
 {
   const PetscReal corner[3] = {48., 60., 0.};
-  PetscReal u[3][3], v[3], limit;
-  char text[VERIFY_TEXT];
+  PetscReal u[3], v[3], limit;
+  TestScene t;
+  char mesh[512];
 
   PetscFunctionBeginUser;
   for (int k = 0; k < 3; k++) {
     const PetscInt n[3] = {16 << k, 16 << k, 1};
 
-    PetscCall(PetscSNPrintf(text, sizeof(text),
-                            "-body_a_material linear -body_a_young 1 -body_a_poisson %.17g -body_a_density 1 "
-                            "-sets left,right -set_left_at plane:1,0,0,0 -set_right_at plane:1,0,0,48 "
-                            "-effects hold,plane,pull -effect_hold_type fixed -effect_hold_on left "
-                            "-effect_pull_type traction -effect_pull_on right -effect_pull_vector 0;1/16;0",
-                            (double)nu));
-    PetscCall(solve("Cook", n, membrane, text, corner, u[k]));
-    v[k] = u[k][1];
+    PetscCall(verify_mesh_write(n, locking_cook_map, NULL, mesh));
+    PetscCall(
+      test_open(&t,
+                "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 1 -body_a_poisson %.17g "
+                "-body_a_density 1 "
+                "-sets left,right -set_left_at plane:1,0,0,0 -set_right_at plane:1,0,0,48 "
+                "-effects hold,plane,pull -effect_hold_type fixed -effect_hold_on left "
+                "-effect_plane_type fixed -effect_plane_on all -effect_plane_components z -effect_pull_type "
+                "traction -effect_pull_on right -effect_pull_vector 0;1/16;0 -time static",
+                mesh, nu));
+    PetscCall(verify_solve(&t, "Cook"));
+    PetscCall(test_value_at(t.model, t.run->U, corner, u));
+    test_print("    Cook, %d x %d cells: %.6g %.6g\n", (int)n[0], (int)n[1], u[0], u[1]);
+    PetscCall(test_scene_close(&t));
+    v[k] = u[1];
   }
   limit = verify_aitken(v);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  Cook's membrane, nu %g: extrapolated %.4f m (reference %.4f)\n",
-                        (double)nu, (double)limit, (double)uy));
+  test_print("  Cook's membrane, nu %g: extrapolated %.4f m (reference %.4f)\n", nu, limit, uy);
   SB_CHECK_NEAR(limit, uy, 5e-3 * uy, "corner of Cook's membrane");
   PetscFunctionReturn(PETSC_SUCCESS);
 }

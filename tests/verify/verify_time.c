@@ -1,10 +1,11 @@
 // @ranks 1 3
 /*
-  Integrators against exact solutions of their recurrences. One linear tet fixed at its base is an oscillator: its apex moves
-  along z with w^2 = V (lambda + 2 mu) / (H^2 m), m = rho V / 4. With q = v + i w u an undamped step multiplies q by
+  Integrators against exact solutions of their recurrences. One linear tet fixed at its base is an oscillator:
+  its apex moves along z with w^2 = V (lambda + 2 mu) / (H^2 m), m = rho V / 4. With q = v + i w u an undamped
+  step multiplies q by
     implicit Euler 1 / (1 - i w h), explicit Euler 1 + i w h, Newmark (1/4, 1/2) (1 + i w h / 2) / (1 - i w h / 2),
-  from which the usual formulas of amplitude factor and period elongation follow. With CR and DG, whose tet has more
-  than one mode: the order from steps of h, h/2 and h/4 of a small bar, and free fall.
+  from which the usual formulas of amplitude factor and period elongation follow. With CR and DG, whose tet
+  has more than one mode: the order from steps of h, h/2 and h/4 of a small bar, and free fall.
 */
 #include <complex.h>
 #undef I
@@ -28,17 +29,15 @@ static PetscErrorCode oscillate(const char *options, PetscInt n, PetscReal h, Pe
   const PetscReal apex[3] = {0., 0., HEIGHT};
   PetscReal value[3];
   TestScene t;
-  char text[2048];
 
   PetscFunctionBeginUser;
   PetscCall(
-    PetscSNPrintf(text, sizeof(text),
-                  "-bodies a -body_a_mesh tests/data/one_tet.msh -body_a_material linear -body_a_young %g "
-                  "-body_a_poisson %g -body_a_density %g -body_a_velocity 0,0,%g -sets base "
-                  "-set_base_at plane:0,0,1,0 -effects hold,damping -effect_hold_type fixed "
-                  "-effect_hold_on base -ts_dt %.17g -ts_max_time %.17g -ksp_rtol 1e-14 -solver cg_jacobi %s",
-                  (double)young, (double)nu, (double)rho, (double)v0, (double)h, (double)(h * n), options));
-  PetscCall(test_scene_open(text, &t));
+    test_open(&t,
+              "-bodies a -body_a_mesh tests/data/one_tet.msh -body_a_material linear -body_a_young %g "
+              "-body_a_poisson %g -body_a_density %g -body_a_velocity 0,0,%g -sets base "
+              "-set_base_at plane:0,0,1,0 -effects hold,damping -effect_hold_type fixed "
+              "-effect_hold_on base -ts_dt %.17g -ts_max_time %.17g -ksp_rtol 1e-14 -solver cg_jacobi %s",
+              young, nu, rho, v0, h, h * n, options));
   PetscCall(SbRunSolve(t.run));
   SB_CHECK(!t.run->stop_reason[0] && t.run->steps_total == n, "%s: %s", options, t.run->stop_reason);
   PetscCall(test_value_at(t.model, t.run->U, apex, value));
@@ -84,7 +83,7 @@ static PetscErrorCode check_order(const char *options, PetscReal share, PetscRea
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(text, sizeof(text), "%s -effect_damping_alpha %g -effect_damping_beta %g", options,
-                          (double)alpha, (double)beta));
+                          alpha, beta));
   for (int k = 0; k < 2; k++) {
     PetscCall(oscillate(text, 50 << k, T / (50 << k), &u, &v));
     error[k] = PetscAbsReal(w * (u - exact_u)) + PetscAbsReal(v - exact_v);
@@ -93,35 +92,19 @@ static PetscErrorCode check_order(const char *options, PetscReal share, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Highest frequencies: one step of generalized-alpha at w h = 1e4 leaves the spectral radius (in a norm of u, v, a: examine the decay over steps). */
-static PetscErrorCode check_dissipation(void)
-{
-  PetscReal u[2], v[2];
-
-  PetscFunctionBeginUser;
-  PetscCall(oscillate("-time genalpha -time_spectral_radius 0.5", 20, 1e4 / frequency(0.25), &u[0], &v[0]));
-  PetscCall(oscillate("-time genalpha -time_spectral_radius 0.5", 24, 1e4 / frequency(0.25), &u[1], &v[1]));
-  /* a double root: the factor per step approaches 0.5 from above, (n + 4)/n 0.5^4 for n = 20 */
-  SB_CHECK(PetscAbsReal(v[1]) < PetscAbsReal(v[0]) * 0.0625 * 1.5,
-           "generalized-alpha damps %g to %g in four steps", (double)v[0], (double)v[1]);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Free body under gravity: the fall is g h^2 n (n + 1) / 2 with implicit Euler, g t^2 / 2 with Newmark. */
 static PetscErrorCode check_free_fall(const char *element, const char *preset, PetscReal expected)
 {
   TestScene t;
-  char text[1024];
   PetscReal value[3];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh box:0.2,0.1,0.1:2 -body_a_element %s "
-                          "-body_a_material corotated -body_a_young 1e4 -body_a_poisson 0.3 "
-                          "-body_a_density 1000 -effects gravity -time %s -ts_dt 0.01 -ts_max_time 0.5 "
-                          "-snes_rtol 1e-10",
-                          element, preset));
-  PetscCall(test_scene_open(text, &t));
+  PetscCall(test_open(&t,
+                      "-bodies a -body_a_mesh box:0.2,0.1,0.1:2 -body_a_element %s "
+                      "-body_a_material corotated -body_a_young 1e4 -body_a_poisson 0.3 "
+                      "-body_a_density 1000 -effects gravity -time %s -ts_dt 0.01 -ts_max_time 0.5 "
+                      "-snes_rtol 1e-10",
+                      element, preset));
   PetscCall(SbRunSolve(t.run));
   SB_CHECK(t.run->steps_total == 50, "%s: %" PetscInt_FMT " steps instead of 50", preset, t.run->steps_total);
   for (int k = 0; k < 2; k++) {
@@ -139,17 +122,15 @@ static PetscErrorCode bend(const char *element, const char *options, PetscInt n,
 {
   const PetscReal end[3] = {0.2, 0.05, 0.05}, T = 0.02;
   TestScene t;
-  char text[1024];
 
   PetscFunctionBeginUser;
   PetscCall(
-    PetscSNPrintf(text, sizeof(text),
-                  "-bodies a -body_a_mesh box:0.2,0.1,0.1:1 -body_a_element %s -body_a_material linear "
-                  "-body_a_young 1e4 -body_a_poisson 0.3 -body_a_density 1000 -effects gravity,hold,damping "
-                  "-effect_damping_alpha 2 -effect_damping_beta 0.002 -effect_hold_type fixed "
-                  "-effect_hold_on xmin -ts_dt %.17g -ts_max_time %.17g -ksp_rtol 1e-14 -solver direct %s",
-                  element, (double)(T / (PetscReal)n), (double)T, options));
-  PetscCall(test_scene_open(text, &t));
+    test_open(&t,
+              "-bodies a -body_a_mesh box:0.2,0.1,0.1:1 -body_a_element %s -body_a_material linear "
+              "-body_a_young 1e4 -body_a_poisson 0.3 -body_a_density 1000 -effects gravity,hold,damping "
+              "-effect_damping_alpha 2 -effect_damping_beta 0.002 -effect_hold_type fixed "
+              "-effect_hold_on xmin -ts_dt %.17g -ts_max_time %.17g -ksp_rtol 1e-14 -solver direct %s",
+              element, T / (PetscReal)n, T, options));
   PetscCall(SbRunSolve(t.run));
   SB_CHECK(!t.run->stop_reason[0] && t.run->steps_total == n, "%s: %s", options, t.run->stop_reason);
   PetscCall(test_value_at(t.model, t.run->U, end, value));
@@ -167,8 +148,8 @@ static PetscErrorCode check_bar_order(const char *element, const char *options, 
   for (int k = 0; k < 3; k++) PetscCall(bend(element, options, (order == 1 ? 60 : 20) << k, x[k]));
   order_u = PetscLog2Real((x[0][2] - x[1][2]) / (x[1][2] - x[2][2]));
   order_v = PetscLog2Real((x[0][5] - x[1][5]) / (x[1][5] - x[2][5]));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s %s: order %.3f of displacements, %.3f of velocities\n",
-                        element, options, (double)order_u, (double)order_v));
+  test_print("  %s %s: order %.3f of displacements, %.3f of velocities\n", element, options, order_u,
+             order_v);
   SB_CHECK_NEAR(order_u, order, 0.1, options);
   SB_CHECK_NEAR(order_v, order, 0.1, options);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -177,6 +158,7 @@ static PetscErrorCode check_bar_order(const char *element, const char *options, 
 int main(int argc, char **argv)
 {
   static const char *const elements[] = {"p1", "cr", "dg", "p2"};
+  PetscReal u[2], v[2];
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_oscillator("-time euler_implicit", 0));
@@ -193,7 +175,12 @@ int main(int argc, char **argv)
   PetscCall(check_order("-time newmark -mass consistent", 0.1, 0., 0., 2));
   PetscCall(check_order("-time genalpha -time_spectral_radius 0.5", 0.25, 0., 0., 2));
   PetscCall(check_order("-time genalpha -time_spectral_radius 0", 0.25, 2., 0.002, 2));
-  PetscCall(check_dissipation());
+  /* highest frequencies: one step of generalized-alpha at w h = 1e4 leaves the spectral radius (in a norm of u, v, a: examine the decay over steps) */
+  PetscCall(oscillate("-time genalpha -time_spectral_radius 0.5", 20, 1e4 / frequency(0.25), &u[0], &v[0]));
+  PetscCall(oscillate("-time genalpha -time_spectral_radius 0.5", 24, 1e4 / frequency(0.25), &u[1], &v[1]));
+  /* a double root: the factor per step approaches 0.5 from above, (n + 4)/n 0.5^4 for n = 20 */
+  SB_CHECK(PetscAbsReal(v[1]) < PetscAbsReal(v[0]) * 0.0625 * 1.5,
+           "generalized-alpha damps %g to %g in four steps", v[0], v[1]);
   for (int e = 1; e < 4; e++) {
     PetscCall(check_bar_order(elements[e], "-time euler_implicit", 1));
     PetscCall(check_bar_order(elements[e], "-time newmark", 2));

@@ -1,8 +1,8 @@
 // @ranks 1 2
 /*
-  Time of impact within a step (-effect_<name>_time_of_impact). An elastic bar hits a wall: in the wave solution the contact lasts
-  for the time 2 L / c from the impact, and the rebound speed is the initial one. Runs begin at several distances from
-  the wall, so that the impact is at different times within a step.
+  Time of impact within a step (-effect_<name>_time_of_impact). An elastic bar hits a wall: in the wave
+  solution the contact lasts for the time 2 L / c from the impact, and the rebound speed is the initial one.
+  Runs begin at several distances from the wall, so that the impact is at different times within a step.
 
     wall        a rigid wall: time of first contact, duration and rebound speed, without and with steps divided at the impact, with every response; a divided
                 step and its remainder end at the time of the undivided one
@@ -44,7 +44,6 @@ static PetscErrorCode fly(const char *more, PetscReal phase, PetscReal dt, Petsc
 
     b->off += PetscAbsReal(step - PetscFloorReal(step + 0.5)) > 1e-6;
   }
-  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -71,13 +70,11 @@ static PetscErrorCode measure(const char *more, PetscReal dt, PetscReal end, Err
     e->solves += b.solves;
     e->steps += b.steps;
     e->off += b.off;
-    SB_CHECK(b.gain < 1e-12, "%s: a step gains %g J", more, (double)b.gain);
+    SB_CHECK(b.gain < 1e-12, "%s: a step gains %g J", more, b.gain);
   }
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  %-50s dt %5.2g s: first touch off by %.3f steps, duration by %.2f ms, speed after "
-                        "by %.4f; %d solves, %d steps\n",
-                        more, (double)dt, (double)(e->first / dt), (double)(1e3 * e->duration),
-                        (double)e->velocity, (int)e->solves, (int)e->steps));
+  test_print("  %-50s dt %5.2g s: first touch off by %.3f steps, duration by %.2f ms, speed after "
+             "by %.4f; %d solves, %d steps\n",
+             more, dt, e->first / dt, 1e3 * e->duration, e->velocity, (int)e->solves, (int)e->steps);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -94,12 +91,12 @@ static PetscErrorCode check(const char *response, PetscReal dt)
   PetscCall(PetscSNPrintf(more, sizeof(more), "-effect_wall_time_of_impact yes %s", response));
   PetscCall(measure(more, dt, end, &cut));
   SB_CHECK(whole.first > 0.8 * dt && whole.first < dt, "%s: whole steps find the first touch to %g s", more,
-           (double)whole.first);
-  SB_CHECK(cut.first < 1e-4 * dt, "%s: cut steps find the first touch to %g s", more, (double)cut.first);
+           whole.first);
+  SB_CHECK(cut.first < 1e-4 * dt, "%s: cut steps find the first touch to %g s", more, cut.first);
   SB_CHECK(cut.duration < 0.6 * whole.duration && cut.duration < 0.6 * dt,
-           "%s: duration off by %g, whole by %g", more, (double)cut.duration, (double)whole.duration);
-  SB_CHECK(cut.velocity < whole.velocity + 1e-3, "%s: speed after off by %g, whole by %g", more,
-           (double)cut.velocity, (double)whole.velocity);
+           "%s: duration off by %g, whole by %g", more, cut.duration, whole.duration);
+  SB_CHECK(cut.velocity < whole.velocity + 1e-3, "%s: speed after off by %g, whole by %g", more, cut.velocity,
+           whole.velocity);
   SB_CHECK(cut.steps == whole.steps + phases, "%s: %d steps, whole %d", more, (int)cut.steps,
            (int)whole.steps);
   SB_CHECK(!strstr(response, "augmented") ? cut.solves <= whole.solves + 6 * phases : 1,
@@ -109,33 +106,22 @@ static PetscErrorCode check(const char *response, PetscReal dt)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Points that arrive near the ends of a step, and none that arrive: no division. */
-static PetscErrorCode check_bounds(void)
+int main(int argc, char **argv)
 {
   static const PetscReal phase[] = {3.02, 3.98, 1000};
   Impact b;
 
-  PetscFunctionBeginUser;
+  SB_TEST_BEGIN(argc, argv);
+  if (test_size > 1) phases = 1;
+  PetscCall(check("", 0.005));
+  /* points that arrive near the ends of a step, and none that arrive: no division */
   for (int k = 0; k < 3; k++) {
     PetscCall(fly("-effect_wall_time_of_impact yes", phase[k], 0.002, 0.02, &b));
     SB_CHECK(b.off == 0 && b.steps == 10, "%g steps before the wall: %d steps, %d of them beside the grid",
-             (double)phase[k], (int)b.steps, (int)b.off);
-    SB_CHECK((b.first > 0) == (k < 2), "%g steps before the wall: first touch at %g s", (double)phase[k],
-             (double)b.first);
+             phase[k], (int)b.steps, (int)b.off);
+    SB_CHECK((b.first > 0) == (k < 2), "%g steps before the wall: first touch at %g s", phase[k], b.first);
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-int main(int argc, char **argv)
-{
-  PetscMPIInt size;
-
-  SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  if (size > 1) phases = 1;
-  PetscCall(check("", 0.005));
-  PetscCall(check_bounds());
-  if (size == 1) {
+  if (test_size == 1) {
     PetscCall(check("", 0.002));
     PetscCall(check("-effect_wall_response penalty -effect_wall_stiffness 1000", 0.002));
     PetscCall(check("-effect_wall_response augmented", 0.002));

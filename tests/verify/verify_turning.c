@@ -1,8 +1,8 @@
 // @ranks 1
 /*
-  Large rotations with CR, DG and P2: Turek and Hron's CSM1 and CSM2 (St. Venant-Kirchhoff, and co-rotated, which is equal for
-  small strains), and the swinging bar at nu = 0.499: CR and DG agree, and converge to a finer mesh. verify_twist.c has a
-  twisted bar.
+  Large rotations with CR, DG and P2: Turek and Hron's CSM1 and CSM2 (St. Venant-Kirchhoff, and co-rotated,
+  which is equal for small strains), and the swinging bar at nu = 0.499: CR and DG agree, and converge to a
+  finer mesh. verify_twist.c has a twisted bar.
 */
 #include "locking.h"
 
@@ -23,10 +23,9 @@ static PetscErrorCode check_beam(const char *what, PetscReal mu, PetscReal ux, P
         PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_element %s -body_a_material %s -solver direct",
                                 elements[e], law ? "corotated" : "stvk"));
         PetscCall(locking_beam(n, mu, more, u, &cost));
-        PetscCall(PetscPrintf(
-          PETSC_COMM_WORLD, "  %s %s %s n %d: %.4f %.3f mm (%.2f %%, %.2f %%), %d Newton\n", what,
-          elements[e], law ? "corotated" : "stvk", (int)n, (double)(1e3 * u[0]), (double)(1e3 * u[1]),
-          (double)(100. * (u[0] / ux - 1.)), (double)(100. * (u[1] / uy - 1.)), (int)cost.newton));
+        test_print("  %s %s %s n %d: %.4f %.3f mm (%.2f %%, %.2f %%), %d Newton\n", what, elements[e],
+                   law ? "corotated" : "stvk", (int)n, 1e3 * u[0], 1e3 * u[1], 100. * (u[0] / ux - 1.),
+                   100. * (u[1] / uy - 1.), (int)cost.newton);
         /* shortening is proportional to the square of the deflection */
         SB_CHECK_NEAR(u[1], uy, tolerance * PetscAbsReal(uy), what);
         SB_CHECK_NEAR(u[0], ux, 2. * tolerance * PetscAbsReal(ux), what);

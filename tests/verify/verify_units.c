@@ -1,13 +1,15 @@
 // @ranks 1 2
 /*
-  Independence of units and of the directions of the axes: a scene in m, kg, s is run again in mm, g, ms, with all
-  lengths times 1e-6 and times 1e3 (density and stiffness kept, so times scale with lengths), with stiffness and density times
-  1e-9 and 1e9, and rotated by 37 degrees about (1,2,3). The displacements, in the units of the first, agree to 1e-8 of the
-  largest (rotated: 1e-9). Tolerances, initial guesses, step control and the choice of the explicit step have
-  default values: none of them may depend on units or directions, nor may the face terms of CR and DG. Only Newton's tolerance is smaller: the preconditioner
-  is in single precision, and its effect on the solution depends on the direction.
+  Independence of units and of the directions of the axes: a scene in m, kg, s is run again in mm, g, ms, with
+  all lengths times 1e-6 and times 1e3 (density and stiffness kept, so times scale with lengths), with
+  stiffness and density times 1e-9 and 1e9, and rotated by 37 degrees about (1,2,3). The displacements, in the
+  units of the first, agree to 1e-8 of the largest (rotated: 1e-9). Tolerances, initial guesses, step control
+  and the choice of the explicit step have default values: none of them may depend on units or directions, nor
+  may the face terms of CR and DG. Only Newton's tolerance is smaller: the preconditioner is in single
+  precision, and its effect on the solution depends on the direction.
 
-  Barrier contact, a block that slides to rest with friction and two that collide in flight: as many iterations in m kg s, mm t s, m kg ms and cm g us, and the same displacements to CONTACT.
+  Barrier contact, a block that slides to rest with friction and two that collide in flight: as many
+  iterations in m kg s, mm t s, m kg ms and cm g us, and the same displacements to CONTACT.
 */
 #include "verify.h"
 
@@ -82,32 +84,6 @@ static PetscErrorCode scenario(const char *element, const char *law, const char 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Displacements in m, rotated back. */
-static PetscErrorCode solve(const char *element, const char *law, const char *time, PetscReal seconds,
-                            const Units *q, PetscInt *n, PetscReal **u, PetscInt *steps)
-{
-  TestScene t;
-  PetscReal R[9];
-  char text[VERIFY_TEXT];
-
-  PetscFunctionBeginUser;
-  PetscCall(scenario(element, law, time, seconds, q, text));
-  PetscCall(test_scene_open(text, &t));
-  PetscCall(verify_solve(&t, q->what));
-  *steps = t.run->steps_total;
-  *n = verify_numbers(t.model);
-  PetscCall(verify_gather(t.model, t.run->U, u));
-  verify_rotation(axis, -q->angle, R);
-  for (PetscInt i = 0; i < *n; i++) {
-    PetscReal x[3];
-
-    verify_apply(R, *u + 3 * i, x);
-    for (int k = 0; k < 3; k++) (*u)[3 * i + k] = x[k] / q->m;
-  }
-  PetscCall(test_scene_close(&t));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode check(const char *element, const char *law, const char *time, PetscReal seconds)
 {
   static const Units units[] = {
@@ -119,28 +95,44 @@ static PetscErrorCode check(const char *element, const char *law, const char *ti
     {"mass 1e9", 1., 1e9, 1., 0., 1e-8},
     {"turned", 1., 1., 1., 37. * PETSC_PI / 180., 1e-9},
   };
-  PetscReal *first = NULL, *u;
+  TestScene t;
+  PetscReal *first = NULL, *u, R[9];
   PetscInt n, first_steps = 0, steps;
+  char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s %s, %s:", element, law, time));
+  test_print("  %s %s, %s:", element, law, time);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(units); i++) {
-    PetscCall(solve(element, law, time, seconds, &units[i], &n, &u, &steps));
+    PetscCall(scenario(element, law, time, seconds, &units[i], text));
+    PetscCall(test_scene_open(text, &t));
+    PetscCall(verify_solve(&t, units[i].what));
+    steps = t.run->steps_total;
+    n = verify_numbers(t.model);
+    PetscCall(verify_gather(t.model, t.run->U, &u));
+    PetscCall(test_scene_close(&t));
+    /* displacements in m, rotated back */
+    verify_rotation(axis, -units[i].angle, R);
+    for (PetscInt j = 0; j < n; j++) {
+      PetscReal x[3];
+
+      verify_apply(R, u + 3 * j, x);
+      for (int k = 0; k < 3; k++) u[3 * j + k] = x[k] / units[i].m;
+    }
     if (!first) {
       first = u;
       first_steps = steps;
-      PetscCall(PetscPrintf(PETSC_COMM_WORLD, " %d steps", (int)steps));
+      test_print(" %d steps", (int)steps);
       continue;
     }
     const PetscReal difference = verify_difference(3 * n, first, u);
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "; %s %.1e", units[i].what, (double)difference));
+    test_print("; %s %.1e", units[i].what, difference);
     SB_CHECK(steps == first_steps, "%s, %s, %s, %s: %d steps instead of %d", element, law, time,
              units[i].what, (int)steps, (int)first_steps);
     SB_CHECK(difference <= units[i].tolerance, "%s, %s, %s, %s: %g", element, law, time, units[i].what,
-             (double)difference);
+             difference);
     PetscCall(PetscFree(u));
   }
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "\n"));
+  test_print("\n");
   PetscCall(PetscFree(first));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -158,7 +150,7 @@ static PetscErrorCode contact(const char *what, PetscReal speed, PetscReal frict
   PetscInt newton = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s:", what));
+  test_print("  %s:", what);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(units); i++) {
     const Units *q = &units[i];
     const double m = q->m, s = q->s, pa = q->kg / (m * s * s), rho = q->kg / (m * m * m);
@@ -182,7 +174,7 @@ static PetscErrorCode contact(const char *what, PetscReal speed, PetscReal frict
                   "-effect_gravity_vector 0,0,%.17g -effect_floor_type contact -effect_meet_type contact "
                   "-effect_floor_response barrier -effect_floor_obstacle plane:0,0,1,0 "
                   "-effect_floor_friction %g -effect_meet_friction %g -ts_dt %.17g -ts_max_time %.17g",
-                  -9.81 * m / (s * s), (double)friction, (double)friction, 0.005 * s, seconds * s));
+                  -9.81 * m / (s * s), friction, friction, 0.005 * s, seconds * s));
     PetscCall(test_scene_open(text, &t));
     PetscCall(verify_solve(&t, q->what));
     n = 3 * verify_numbers(t.model);
@@ -190,19 +182,18 @@ static PetscErrorCode contact(const char *what, PetscReal speed, PetscReal frict
     for (PetscInt k = 0; k < n; k++) u[k] /= q->m;
     difference = first ? verify_difference(n, first, u) : 0.;
     if (!first) newton = t.run->newton_total;
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "%s %s %d iterations, %.1e", first ? ";" : "", q->what,
-                          (int)t.run->newton_total, (double)difference));
+    test_print("%s %s %d iterations, %.1e", first ? ";" : "", q->what, (int)t.run->newton_total, difference);
     SB_CHECK(t.run->newton_total == newton && t.run->rejected_total == 0,
              "%s, %s: %d iterations, not %d; %d rejected steps", what, q->what, (int)t.run->newton_total,
              (int)newton, (int)t.run->rejected_total);
-    SB_CHECK(difference <= CONTACT, "%s, %s: displacements differ by %g", what, q->what, (double)difference);
+    SB_CHECK(difference <= CONTACT, "%s, %s: displacements differ by %g", what, q->what, difference);
     if (first)
       PetscCall(PetscFree(u));
     else
       first = u;
     PetscCall(test_scene_close(&t));
   }
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "\n"));
+  test_print("\n");
   PetscCall(PetscFree(first));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

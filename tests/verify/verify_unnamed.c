@@ -1,7 +1,8 @@
 // @ranks 1 2
 /*
-  Every effect, element, material, field and other output (tests/parts.h lists them from the registries): if a scene names one, its log
-  events occur; if not, none occur, nothing is allocated and the motion is bitwise the same.
+  Every effect, element, material, field and other output (tests/parts.h lists them from the registries): if a
+  scene names one, its log events occur; if not, none occur, nothing is allocated and the motion is bitwise
+  the same.
 
     first    a process that has run only the base scene has no log event of anything else, and has allocated nothing in files of effects,
              contact and output
@@ -13,7 +14,6 @@
              motion of the other: bitwise for effects and materials, up to rounding for elements, which change the order of sums
     rows     an effect, element, material or output option without a row in tests/parts.h fails here
 */
-#include <dirent.h>
 #include "../parts.h"
 #include "verify.h"
 
@@ -31,7 +31,7 @@ typedef struct {
 
 static char event_name[EVENTS][2 * SB_NAME_MAX];
 static PetscInt nevent;
-static char folder[PETSC_MAX_PATH_LEN];
+static char folder[512];
 
 static PetscErrorCode name_events(void)
 {
@@ -221,9 +221,8 @@ static PetscErrorCode check_part(const Part *part, const char *base, const Trace
            "after %s %s the base scene has other events", part->family, part->name);
   SB_CHECK(same_motion(reference, &after, after.n), "after %s %s the base scene moves otherwise",
            part->family, part->name);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %-8s %-16s: %8.0f bytes more at the end of the run\n",
-                        part->family, part->name,
-                        with.live - (part->scene[0] ? without.live : reference->live)));
+  test_print("  %-8s %-16s: %8.0f bytes more at the end of the run\n", part->family, part->name,
+             with.live - (part->scene[0] ? without.live : reference->live));
   if (part->scene[0]) PetscCall(destroy(&without));
   PetscCall(destroy(&with));
   PetscCall(destroy(&after));
@@ -250,7 +249,7 @@ static PetscErrorCode check_apart(const Part *part, PetscBool exact)
                  : verify_difference(n, without.u, with.u) < 1e-12 &&
                      verify_difference(n, without.v, with.v) < 1e-12,
            "%s %s of one body changes the motion of the other, by %g and %g", part->family, part->name,
-           (double)verify_difference(n, without.u, with.u), (double)verify_difference(n, without.v, with.v));
+           verify_difference(n, without.u, with.u), verify_difference(n, without.v, with.v));
   PetscCall(destroy(&without));
   PetscCall(destroy(&with));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -297,42 +296,16 @@ static PetscErrorCode check_first(const Trace *trace)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Removes the folder of the output with its files. */
-static PetscErrorCode remove_folder(void)
-{
-  struct dirent *entry;
-  PetscMPIInt rank;
-  DIR *d;
-  char path[2 * PETSC_MAX_PATH_LEN];
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (rank || !(d = opendir(folder))) PetscFunctionReturn(PETSC_SUCCESS);
-  while ((entry = readdir(d))) {
-    PetscCall(PetscSNPrintf(path, sizeof(path), "%s/%s", folder, entry->d_name));
-    (void)unlink(path);
-  }
-  (void)closedir(d);
-  (void)rmdir(folder);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 int main(int argc, char **argv)
 {
-  const char *tmp = getenv("TMPDIR");
   Trace first, reference, last;
   char base[PART_TEXT];
-  PetscMPIInt rank;
 
   /* the count of bytes requires PETSc's own malloc */
   (void)setenv("PETSC_OPTIONS", "-malloc_dump", 1);
   SB_TEST_BEGIN(argc, argv);
   PetscCall(PetscLogDefaultBegin());
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCall(PetscSNPrintf(folder, sizeof(folder), "%s/supple-unnamed-XXXXXX", tmp && tmp[0] ? tmp : "/tmp"));
-  if (!rank) PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "No folder %s", folder);
-  PetscCallMPI(MPI_Bcast(folder, (PetscMPIInt)sizeof(folder), MPI_CHAR, 0, PETSC_COMM_WORLD));
+  PetscCall(test_file_folder(folder));
   part_watch();
   PetscCall(SbRegisterAll());
   PetscCall(name_events());
@@ -349,13 +322,11 @@ int main(int argc, char **argv)
            reference.all_bytes, last.all_n, last.all_bytes);
   SB_CHECK(last.n_output == first.n_output, "%d allocations of output, before any was named %d",
            (int)last.n_output, (int)first.n_output);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  the base scene allocates %d times, %.0f bytes, in " PART_STEPS " steps %d times\n",
-                        (int)reference.setup_n, reference.setup_bytes, (int)reference.step_n));
+  test_print("  the base scene allocates %d times, %.0f bytes, in " PART_STEPS " steps %d times\n",
+             (int)reference.setup_n, reference.setup_bytes, (int)reference.step_n);
   PetscCall(destroy(&first));
   PetscCall(destroy(&reference));
   PetscCall(destroy(&last));
-  PetscCall(remove_folder());
   part_unwatch();
   SB_TEST_END();
 }
