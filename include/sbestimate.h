@@ -9,10 +9,10 @@
 
     |e|^2 = 1/2 int (P - P_h) : C^-1 : (P - P_h),
 
-  P the first Piola-Kirchhoff stress that the continuum would have under the loads, inertia and prescribed displacements of the moment, P_h that
-  of the element, C Hooke's tensor of lambda and mu turned by the rotation of the cell (the strain energy norm of the linear law).
-  The same unit as strain energy: sqrt(body2 / strain) is the relative error. For CR and DG it is the error inside of the cells, the energy
-  of the jumps at faces apart; for P2 that of the deviator and of the mean pressure of each cell.
+  P the first Piola-Kirchhoff stress of the continuum under the loads, inertia and prescribed displacements of
+  the moment, P_h that of the element, C Hooke's tensor turned by the rotation of the cell (the strain energy
+  norm of the linear law). sqrt(body2 / strain) is the relative error. For CR and DG it is the error inside of
+  cells, without the energy of jumps at faces; for P2 that of the deviator and of each cell's mean pressure.
 */
 typedef struct _p_SbSpaceEstimate *SbSpaceEstimate;
 struct _p_SbSpaceEstimate {
@@ -28,14 +28,15 @@ struct _p_SbSpaceEstimate {
   PetscReal *psi;               /* [ncell_owned] energy densities, J/m^3 */
   Vec residual;                 /* NULL without a body of P1 */
 };
-/* Patches and links between ranks, once. Collective. The model is borrowed, the caller destroys the estimate. */
+/* Patches and links between ranks, once. Collective. The model is borrowed; destroy the estimate. */
 PetscErrorCode SbSpaceEstimateCreate(SbModel model, SbSpaceEstimate *est);
 /*
   SbSpaceEstimateCompute - fills cell2, body2, strain and factor.
 
-  Collective. Input: t (s); displacement U (m), velocity V (m/s), acceleration A (m/s^2) at t, the last two NULL in a static run.
-  Results are the same on any number of ranks up to rounding. Measured: 0.2 us for a cell of the linear law, 0.4 us of another (the
-  residual: 0.02 to 0.05 us for P1, 0.1 to 0.2 us for DG), and 155 and 227 bytes for a cell from SbSpaceEstimateCreate() on.
+  Collective. Input: displacement U (m), velocity V (m/s), acceleration A (m/s^2) at t (s), the last two NULL
+  in a static run. Results are the same on any number of ranks up to rounding. Measured: 0.2 us for a cell of
+  the linear law, 0.4 us of another (the residual: 0.02 to 0.05 us for P1, 0.1 to 0.2 us for DG), and 155 and
+  227 bytes for a cell from SbSpaceEstimateCreate() on.
 */
 PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, Vec V, Vec A);
 PetscErrorCode SbSpaceEstimateDestroy(SbSpaceEstimate *est); /* sets *est to NULL; NULL is accepted */

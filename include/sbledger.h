@@ -1,14 +1,15 @@
 /*
   sbledger.h - layer 7: error estimates of a run by source, beside the seconds spent on each.
 
-  Errors are in the norm of the energy: the square of an error is its energy, J, as a displacement that strains the bodies and a velocity that they
-  have; relative is the root of its share of the largest energy, kinetic and strain, that the run has had (of the strain energy in a static run).
+  Errors are in the norm of the energy: the square of an error is its energy, J, as a strain and a velocity of
+  the bodies; relative is the root of its share of the largest energy, kinetic and strain, of the run so far
+  (static: of the strain energy).
 
-  The ledger examines each step that was solved (SbRun.post_solve) and is a monitor besides. Without -ledger, -accuracy or -step_time_budget there is none:
-  no vector, no callback, no column. With -ledger alone it changes no result.
+  The ledger examines each solved step (SbRun.post_solve) and is a monitor. Without -ledger, -accuracy or
+  -step_time_budget there is none: no vector, no callback, no column. With -ledger alone it changes no result.
 
-  Order of calls: SbLedgerRegister(), SbRunCreate(), SbLedgerSetFromOptions(), SbModelSetUp(), SbRunSetUp(), SbLedgerAttach(),
-  SbOutputAttach(), SbRunSolve(), SbLedgerReport(), SbLedgerDestroy().
+  Order of calls: SbLedgerRegister(), SbRunCreate(), SbLedgerSetFromOptions(), SbModelSetUp(), SbRunSetUp(),
+  SbLedgerAttach(), SbOutputAttach(), SbRunSolve(), SbLedgerReport(), SbLedgerDestroy().
 */
 #pragma once
 #include "sbestimate.h"
@@ -29,16 +30,17 @@ typedef struct _p_SbLedger *SbLedger;
 PetscErrorCode SbLedgerRegister(void); /* option rows */
 
 /*
-  SbLedgerSetFromOptions - reads -ledger, -ledger_every, -ledger_quantity, -ledger_at, -ledger_on, -ledger_direction, -accuracy, -step_time_budget. Collective.
+  SbLedgerSetFromOptions - reads the options -ledger, -ledger_..., -accuracy, -step_time_budget. Collective.
 
-  Output: ledger, NULL when none of them asks for one. Errors (PETSC_ERR_USER_INPUT): both -accuracy and -step_time_budget; -time alpha2.
+  Output: ledger, NULL when none of them asks for one. Errors (PETSC_ERR_USER_INPUT): -accuracy and
+  -step_time_budget; -time alpha2.
 */
 PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger);
-/* After SbRunSetUp() and before SbOutputAttach(), whose history gets its columns. NULL: nothing. Collective. */
+/* After SbRunSetUp(), before SbOutputAttach(), whose history has its columns. NULL: nothing. Collective. */
 PetscErrorCode SbLedgerAttach(SbLedger ledger);
 /* `to`, attached, continues the sums of errors and work of `from`, on a re-meshed model. Not collective. */
 PetscErrorCode SbLedgerContinue(SbLedger from, SbLedger to);
-/* The error of a source in the norm of the energy, J^(1/2), and the energy that it is relative to, J. Not collective. */
+/* The error of a source, J^(1/2), and the energy that it is relative to, J. Not collective. */
 PetscErrorCode SbLedgerGet(SbLedger ledger, SbErrorSource source, PetscReal *error, PetscReal *stored);
 /* Writes the table as `file`, and prints it unless quiet. NULL: nothing. Collective. */
 PetscErrorCode SbLedgerReport(SbLedger ledger, const char *file, PetscBool quiet);

@@ -21,67 +21,68 @@ typedef struct _SbSolverPreset {
 PetscErrorCode SbSolverRegister(void);
 /* Reads -solver: "auto" or a name of the table. */
 PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size);
-/* The preset for `choice`; with "auto" by number of unknowns, ranks and law; with -pc_type, a row whose matrix type it supports. The reason in
-   words. Collective. */
+/* The preset for `choice`; with "auto" by number of unknowns, ranks and law; with -pc_type, a row whose
+   matrix type it supports. The reason in words. Collective. */
 PetscErrorCode SbSolverChoose(SbSpace space, PetscBool dynamic, PetscBool linear, PetscBool explicit_run,
                               const char *choice, const SbSolverPreset **preset, char reason[], size_t size);
-/* Names a factorisation for matrices that may be indefinite when `choice` is auto. Not collective. Errors: PETSC_ERR_USER where this PETSc has none
-   for this number of ranks. */
+/* Names a factorisation for matrices that may be indefinite when `choice` is auto. Not collective. Errors:
+   PETSC_ERR_USER where this PETSc has none for this number of ranks. */
 PetscErrorCode SbSolverChooseIndefinite(MPI_Comm comm, size_t size, char choice[]);
 /*
-  SbSolverCountNegativeEigenvalues - eigenvalues below zero of the matrix that `snes` has factored last, in the null space of its contact constraints.
-
-  Collective. Output: negative, -1: the solver does not count them.
+  SbSolverCountNegativeEigenvalues - eigenvalues below zero of the matrix that `snes` has factored last, in
+  the null space of its contact constraints; -1: the solver does not count them. Collective.
 */
 PetscErrorCode SbSolverCountNegativeEigenvalues(SNES snes, SbSpace space, PetscInt *negative);
 /*
-  SbSolverNextFallback - the next solver after one that failed: first a factorisation, for large systems iterations first.
+  SbSolverNextFallback - the next solver after one that failed: a factorisation, for large systems iterations.
 
-  Collective. Input: reason - why it failed; memory - for want of memory. In and out: tried, bits of the rows that failed in this run; preset,
-  the one that failed, then the next one that this PETSc has and that can solve for the space, NULL when there is none.
+  Collective. Input: reason - why it failed; memory - for want of memory. In and out: tried, bits of the rows
+  that failed in this run; preset, the one that failed, then the next one that this PETSc has and that can
+  solve for the space, NULL when there is none.
 */
 PetscErrorCode SbSolverNextFallback(SbSpace space, KSPConvergedReason reason, PetscBool memory,
                                     uint32_t *tried, const SbSolverPreset **preset);
-/* Removes the row's options from the options database, unless their values differ: those are the user's. Not collective. */
+/* Removes the row's options from the database unless their values differ. Not collective. */
 PetscErrorCode SbSolverClear(const SbSolverPreset *preset);
-/* Gives the linear solver of `snes` the preset's options and tolerances; before SNESSetFromOptions(). Collective. */
+/* Gives the solver of `snes` the preset's options and tolerances; before SNESSetFromOptions(). Collective. */
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace space, const SbSolverPreset *preset);
-/* Replaces a method for symmetric systems by FGMRES while nodes in contact slide with friction, and restores it after. Collective; before
-   each solve. */
+/* Replaces a method for symmetric systems by FGMRES while nodes in contact slide with friction, and restores
+   it after. Collective; before each solve. */
 PetscErrorCode SbSolverUpdateSymmetry(KSP ksp, SbSpace space);
 /* M of such a pc, else pc itself. Not collective. */
 PetscErrorCode SbPCConstrainedGetInner(PC pc, PC *inner);
 /* Whether a factorisation of the saddle-point system replaces M now. Not collective. */
 PetscErrorCode SbPCConstrainedIsFactored(PC pc, PetscBool *is);
 /*
-  SbSaddleChoose - how the saddle-point system of constraints is solved: `choice` 0 by size, 1 directly, 2 by iterations, with the reason in words.
-
-  Collective. Errors: PETSC_ERR_USER for 1 where this PETSc has no factorisation for it.
+  SbSaddleChoose - how the saddle-point system of constraints is solved: `choice` 0 by size, 1 directly, 2 by
+  iterations, with the reason in words. Collective. Errors: PETSC_ERR_USER for 1 without a package.
 */
 PetscErrorCode SbSaddleChoose(SbSpace space, PetscBool dynamic, PetscInt choice, SbSaddle *saddle,
                               char reason[], size_t size);
 #define SB_DIRECT_SMALL 30000 /* largest number of unknowns for which auto lets one rank factor for all */
 /*
-  SbDirectPackage - the fastest factorisation package of this PETSc for a symmetric matrix of this many unknowns on the ranks of comm: one of PETSc's
-  MATSOLVER names, NULL without any; with -reproducible one that works on one rank. Indefinite matrices need other packages than positive definite ones. Not collective.
+  SbDirectPackage - the fastest factorisation package of this PETSc for a symmetric matrix of this many
+  unknowns on the ranks of comm: one of PETSc's MATSOLVER names, NULL without any; with -reproducible one that
+  works on one rank. Indefinite matrices need other packages than positive definite ones. Not collective.
 */
 PetscErrorCode SbDirectPackage(MPI_Comm comm, PetscInt unknowns, PetscBool definite, const char **package);
 /*
-  SbPCDirectSet - makes pc a factorisation by `package` (MUMPS, CHOLMOD or UMFPACK) of an AIJ matrix, gathered on one rank where there are several and the
-  package works on one (PCTELESCOPE).
+  SbPCDirectSet - makes pc a factorisation by `package` (MUMPS, CHOLMOD or UMFPACK) of an AIJ matrix, gathered
+  on one rank where there are several and the package works on one (PCTELESCOPE).
 
-  Not collective. PCSetFromOptions() and SbPCCheckPivots() have to follow. Input: symmetric, L L^T or L D L^T where the package has it, else LU. Options read: those of
-  PETSc's PCCHOLESKY or PCLU, with the prefix telescope_ where the matrix is gathered.
+  Not collective. PCSetFromOptions() and SbPCCheckPivots() have to follow. Input: symmetric, L L^T or L D L^T
+  where the package has it, else LU. Options read: those of PETSc's PCCHOLESKY or PCLU, with the prefix
+  telescope_ where the matrix is gathered.
 */
 PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric);
-/* Makes non-positive pivots of a Cholesky factorisation fail the solve (KSP_DIVERGED_PC_FAILED), also with CHOLMOD and where it is gathered on
-   one rank; no effect on other types of pc. After PCSetFromOptions(). Not collective. */
+/* Makes non-positive pivots of a Cholesky factorisation, also a gathered one, fail the solve
+   (KSP_DIVERGED_PC_FAILED). After PCSetFromOptions(). Not collective. */
 PetscErrorCode SbPCCheckPivots(PC pc);
 /*
   SbSolverFinish - the last set-up of the solver of `snes` after SNESSetFromOptions().
 
-  Collective. P: the matrix of the preconditioner; NULL without linear systems. Errors: PETSC_ERR_USER, in one line that says what to choose, for a -ksp_type,
-  -pc_type, norm, side or package that cannot work here.
+  Collective. P: the matrix of the preconditioner; NULL without linear systems. Errors: PETSC_ERR_USER, in one
+  line that says what to choose, for a -ksp_type, -pc_type, norm, side or package that cannot work here.
 */
 PetscErrorCode SbSolverFinish(SNES snes, SbSpace space, const SbSolverPreset *preset, Mat P);
 /* "cg, cholesky of mumps": what the solver of `snes` is now. Not collective. */
@@ -90,79 +91,85 @@ PetscErrorCode SbSolverDescribe(SNES snes, SbSpace space, size_t size, char text
 PetscErrorCode SbSolverCreateOperator(SbSpace space, const SbSolverPreset *preset, Mat *A);
 
 /*
-  SbPCCoarseCreate - makes pc a two-level preconditioner for CG: incomplete Cholesky on each rank, and a coarse space of some
-  hundred aggregates of nodes with six rigid-body modes each, factored on one rank; on many ranks some thousand, with multigrid.
+  SbPCCoarseCreate - makes pc a two-level preconditioner for CG: incomplete Cholesky on each rank, and a
+  coarse space of some hundred aggregates of nodes with six rigid-body modes each, factored on one rank; on
+  many ranks some thousand, with multigrid.
 
-  Collective. The operator is a BAIJ or SBAIJ matrix of the space, symmetric; the space is borrowed. The aggregates are found
-  at the first set-up, the coarse operator is renewed whenever the matrix has changed. Symmetric and positive definite when the
-  operator is; an operator that is not fails the solve (KSP_DIVERGED_PC_FAILED). Where the incomplete factorisation breaks
-  down, the diagonal takes its place with a warning.
-  Options read: -pc_coarse_aggregates (0: by size), -pc_coarse_gathered (largest number of aggregates that one rank factors;
-  -1: by size), -pc_coarse_pc_ and -pc_coarse_mg_ (multigrid), -fine_pc_ (fine level). Errors: PETSC_ERR_USER for a negative number.
+  Collective. The operator is a BAIJ or SBAIJ matrix of the space, symmetric; the space is borrowed. The
+  aggregates are found at the first set-up, the coarse operator is renewed whenever the matrix has changed.
+  Symmetric and positive definite when the operator is; an operator that is not fails the solve
+  (KSP_DIVERGED_PC_FAILED). Where the incomplete factorisation breaks down, the diagonal takes its place with
+  a warning. Options read: -pc_coarse_aggregates (0: by size), -pc_coarse_gathered (largest number of
+  aggregates that one rank factors; -1: by size), -pc_coarse_pc_ and -pc_coarse_mg_ (multigrid), -fine_pc_
+  (fine level). Errors: PETSC_ERR_USER for a negative number.
 */
 PetscErrorCode SbPCCoarseCreate(SbSpace space, PC pc);
-/* After a solve that ended with `reason`: the diagonal for the incomplete factorisation. changed: false for other preconditioners
-   and failures, or when that is done already. Collective. */
+/* After a solve that ended with `reason`: the diagonal for the incomplete factorisation. changed: false for
+   other preconditioners and failures, or when that is done already. Collective. */
 PetscErrorCode SbPCCoarseFallBack(PC pc, KSPConvergedReason reason, PetscBool *changed);
-/* Aggregates of all ranks, those that this rank solves for (all of them when it factors for all), set-ups so far, whether the diagonal is
-   the fine level. Outputs may be NULL. Not collective. */
+/* Aggregates of all ranks, those that this rank solves for (all of them when it factors for all), set-ups so
+   far, whether the diagonal is the fine level. Outputs may be NULL. Not collective. */
 PetscErrorCode SbPCCoarseGetStats(PC pc, PetscInt *naggregate, PetscInt *nsolved, PetscInt *nsetup,
                                   PetscBool *simple);
 
 /*
-  SbPCPMultigridCreate - makes pc multigrid in the degree of the polynomials for CG: Gauss-Seidel on P2, P1 on the vertices below it.
+  SbPCPMultigridCreate - makes pc p-multigrid for CG: Gauss-Seidel on P2, P1 on the vertices below it.
 
-  Collective. The operator is a BAIJ or SBAIJ matrix of the space, symmetric; the space is borrowed. The lower level is renewed whenever the
-  matrix has changed. An operator that is not positive definite fails the solve (KSP_DIVERGED_PC_FAILED). Options read: -pc_coarse_ (of the lower
-  level). Errors: PETSC_ERR_USER for a space without P2 bodies.
+  Collective. The operator is a BAIJ or SBAIJ matrix of the space, symmetric; the space is borrowed. The lower
+  level is renewed whenever the matrix has changed. One that is not positive definite fails the solve. Options
+  read: -pc_coarse_ (of the lower level). Errors: PETSC_ERR_USER for a space without P2 bodies.
 */
 PetscErrorCode SbPCPMultigridCreate(SbSpace space, PC pc);
 
 /*
-  SbPressureOperatorCreate - the tangent of a space with CR or DG bodies, with its volumetric part stored separately, for nu
-  near 1/2.
+  SbPressureOperatorCreate - the tangent of CR or DG with its volumetric part stored separately, for nu near
+  1/2.
 
-  Collective, after SbSpacePrescribeDone(). K is a MATSHELL owned by the caller; the space is borrowed. It is filled by
-  SbSpaceAssembleTangent() and SbSpaceFinishTangent() as a matrix is, and effects may add to it. Errors: PETSC_ERR_USER for a space
-  without face nodes.
+  Collective, after SbSpacePrescribeDone(). K is a MATSHELL owned by the caller; the space is borrowed. It is
+  filled by SbSpaceAssembleTangent() and SbSpaceFinishTangent() as a matrix is, and effects may add to it.
+  Errors: PETSC_ERR_USER for a space without face nodes.
 */
 PetscErrorCode SbPressureOperatorCreate(SbSpace space, Mat *K);
-/* Solves so far, iterations of all of them, most in one. Outputs may be NULL. Not collective. */
-PetscErrorCode SbPCPressureGetStats(PC pc, PetscInt *nsolve, PetscInt *total, PetscInt *most);
+/* Most iterations in one of the solves so far. Not collective. */
+PetscErrorCode SbPCPressureGetMost(PC pc, PetscInt *most);
 
 /*
-  SbPCRotatedCreate - makes pc a preconditioner with a reused factorisation: P = Q A0 Q^T, A0 a past operator, Q the nodes' rotations since.
+  SbPCRotatedCreate - makes pc a preconditioner with a reused factorisation: P = Q A0 Q^T, A0 a past operator,
+  Q the nodes' rotations since.
 
-  Collective. The operator is a matrix-free operator, or an assembled matrix of the space on which the displacement
-  belonging to it is composed as "sb_state" (PetscObjectCompose() with a vector of SbSpaceCreateVec()). One factorisation lasts
-  as long as the iterations stay low; it is renewed at the next change of the operator when they do not, when the solver
-  fails, or when SbPCRotatedRenew() is called.
-  Options read: -pc_rotated_spread (rad), the angle between a cell's and its node's rotation above which the node is solved exactly.
-  Memory: besides the factor 72 n^2 bytes on each rank during a factorisation, with n of SbSpaceInterfaceSize(); 9 n^2 of all ranks
-  together stay. An operator that is not positive definite fails the solve.
+  Collective. The operator is a matrix-free operator, or an assembled matrix of the space on which the
+  displacement belonging to it is composed as "sb_state" (PetscObjectCompose() with a vector of
+  SbSpaceCreateVec()). One factorisation lasts as long as the iterations stay low; it is renewed at the next
+  change of the operator when they do not, when the solver fails, or when SbPCRotatedRenew() is called.
+  Options read: -pc_rotated_spread (rad), the angle between a cell's and its node's rotation above which the
+  node is solved exactly. Memory: besides the factor 72 n^2 bytes on each rank during a factorisation, with n
+  of SbSpaceInterfaceSize(); 9 n^2 of all ranks together stay. An operator that is not positive definite fails
+  the solve.
 */
 PetscErrorCode SbPCRotatedCreate(SbSpace space, PC pc);
 PetscErrorCode SbPCRotatedRenew(PC pc);
 /*
-  SbSpaceInterfaceSize - number n of interface nodes between ranks, and the largest, most, for which -solver rotated works.
+  SbSpaceInterfaceSize - number n of interface nodes between ranks, and the largest for -solver rotated.
 
-  Collective; prescribed unknowns are known. Makes the plan of the space. Options read: -pc_rotated_interface (1500).
+  Collective. Makes the plan of the space. Options read: -pc_rotated_interface (1500).
 */
 PetscErrorCode SbSpaceInterfaceSize(SbSpace space, PetscInt *n, PetscInt *most);
-/* Factorisations so far, nodes solved exactly at present (this rank), entries of the factor (this rank). Outputs may be NULL. */
-PetscErrorCode SbPCRotatedGetStats(PC pc, PetscInt *nfactor, PetscInt *nexact, PetscInt64 *entries);
-/* Bytes that one application reads on this rank: the factor of its interior, twice, and its rows of the interface's; 0 before the
-   factorisation. nface: nodes of the interface. Outputs may be NULL. Not collective. */
-PetscErrorCode SbPCRotatedGetWork(PC pc, PetscInt64 *interior, PetscInt64 *interface, PetscInt *nface);
+/* Factorisations so far; bytes that an application reads on this rank: its interior's factor, twice, and its
+   rows of the interface's; nodes of the interface. Outputs may be NULL. Not collective. */
+PetscErrorCode SbPCRotatedGetStats(PC pc, PetscInt *nfactor, PetscInt64 *interior, PetscInt64 *interface,
+                                   PetscInt *nface);
 
-/* The operator of solves: `whole`, the complete tangent, plus springs, projected onto the constraints. singular: K may be, if only constraints support some body: it is regularised for
-   preconditioners, not for the operator; SB_SADDLE_DIRECT needs none of that. Collective; the caller destroys it; K and `whole` are borrowed until then. */
+/* The operator of solves: `whole`, the complete tangent, plus springs, projected onto the constraints.
+   singular: K may be, if only constraints support some body: it is regularised for preconditioners, not for
+   the operator; SB_SADDLE_DIRECT needs none of that. Collective; the caller destroys it; K and `whole` are
+   borrowed until then. */
 PetscErrorCode SbConstraintsCreateOperator(SbSpace space, Mat K, Mat whole, PetscBool singular,
                                            SbSaddle saddle, Mat *A);
 
-/* ------------------------------------------------------------------ contact_system.c: a tangent with blocks between any nodes */
+/* ------------------------------------------------------------------ tangent and contact blocks */
 
-/* 3x3 blocks, rows of owned nodes, columns of any nodes, best in row order; start with {0}, released with SbBlocksFree(). Duplicates are summed. */
+/* 3x3 blocks, rows of owned nodes, columns of any nodes, best in row order; start with {0}, released with
+   SbBlocksFree(). Duplicates are summed. */
 typedef struct {
   PetscInt n, size;
   PetscInt (*node)[2];   /* [n] owned local node, global node */
@@ -172,7 +179,7 @@ typedef struct {
 PetscErrorCode SbBlocksReserve(SbBlocks *blocks, PetscInt more);
 PetscErrorCode SbBlocksFree(SbBlocks *blocks);
 typedef struct _p_SbContactSystem *SbContactSystem;
-/* choice: 0 by cost, 1 factored, 2 by iterations. Not collective. Options read: -ksp_type, -pc_type, -contact_ksp_, -contact_pc_. */
+/* choice: 0 by cost, 1 factored, 2 by iterations. Not collective. Options read: those of contact_system.c. */
 PetscErrorCode SbContactSystemCreate(SbSpace space, PetscInt choice, SbContactSystem *system);
 /* In words, how such systems are solved. Not collective. */
 PetscErrorCode SbContactSystemDescribe(PetscInt choice, char text[], size_t size);
@@ -180,8 +187,9 @@ PetscErrorCode SbContactSystemDestroy(SbContactSystem *system);
 /*
   SbContactSystemSolve - Y = (K + blocks)^-1 F. The sparsity of the blocks may change with each call.
 
-  Collective. Input: K, the tangent of the space, prescribed unknowns replaced; blocks, symmetric when those of all ranks are taken together, none for prescribed unknowns;
-  fresh, K or blocks have changed since the last call. Output: reason, negative where the matrix is not positive definite; iterations.
+  Collective. Input: K, the tangent of the space, prescribed unknowns replaced; blocks, symmetric when those
+  of all ranks are taken together, none for prescribed unknowns; fresh, K or blocks have changed since the
+  last call. Output: reason, negative where the matrix is not positive definite; iterations.
 */
 PetscErrorCode SbContactSystemSolve(SbContactSystem system, Mat K, const SbBlocks *blocks, PetscBool fresh,
                                     Vec F, Vec Y, KSPConvergedReason *reason, PetscInt *iterations);

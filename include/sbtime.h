@@ -20,9 +20,9 @@ typedef struct {
   PetscInt step;
   PetscReal t, dt; /* s; in a static run t is the load factor, 0..1 */
   PetscReal t_end;
-  PetscInt step_end; /* last step if it is known from dt, else -1 */
-  Vec U, V, A;       /* V, A NULL in a static run */
-  Vec R; /* residual without constraints: reactions on prescribed unknowns; NULL unless SbRun.want_residual */
+  PetscInt step_end;       /* last step if it is known from dt, else -1 */
+  Vec U, V, A;             /* V, A NULL in a static run */
+  Vec R;                   /* residual without constraints: reactions; NULL unless SbRun.want_residual */
   SbEnergies energies;     /* filled when some monitor needs them (SbRun.want_energies) */
   PetscInt newton, linear; /* iterations of this step */
   PetscInt rejected;       /* rejected attempts, this step */
@@ -34,8 +34,8 @@ typedef struct {
 typedef struct _p_SbRun *SbRun;
 
 /*
-  A step as it was solved, before it becomes the state: the solver can still evaluate its equations at U. All vectors are lent;
-  V, A and those of the start are NULL in a static run, where t is the load factor.
+  A step as solved, before it becomes the state: the solver can still evaluate its equations at U. All vectors
+  are lent; V, A and those of the start are NULL in a static run, where t is the load factor.
 */
 typedef struct {
   PetscReal t, dt;  /* start and length, s */
@@ -60,20 +60,15 @@ typedef struct {
 } SbCheckpointValue;
 
 typedef PetscErrorCode (*SbMonitorFn)(SbRun run, const SbStep *step, void *ctx);
-/* After the solve of a step that ended at t, before monitors: whether SbRunSolve() returns after this step. Collective. */
-typedef PetscErrorCode (*SbPauseFn)(SbRun run, PetscInt step, PetscReal t, PetscReal dt, void *ctx,
-                                    PetscBool *pause);
-
 /* One simulation: model, solver, integrator, monitors. */
 struct _p_SbRun {
   SbModel model; /* borrowed */
   SbIntegrator preset;
-  TS ts;     /* NULL in a static run */
-  SNES snes; /* of the TS, or own in a static run; borrowed from ts when there is one */
-  Mat J,
-  operator;  /* tangent; operator of linear solves: J itself, its projection (sbfem.h, SbConstraints), or
-                     J plus SbModelNonsymmetric() */
-  Mat whole; /* the operator that constraints project: J plus SbModelNonsymmetric(); NULL: J is complete */
+  TS ts;        /* NULL in a static run */
+  SNES snes;    /* of the TS, or own in a static run; borrowed from ts when there is one */
+  Mat J;        /* tangent */
+  Mat operator; /* of linear solves: J, its projection (SbConstraints), or J plus SbModelNonsymmetric() */
+  Mat whole;    /* the operator that constraints project: J plus SbModelNonsymmetric(); NULL: J is complete */
   struct {
     Vec U, x, y; /* displacement of J; factor and product; NULL where J is complete */
     PetscReal t; /* J's time or load factor */
@@ -83,8 +78,7 @@ struct _p_SbRun {
   Vec barrier_start;        /* barrier contact: displacement at the start of the step; borrowed */
   PetscReal barrier_dt;     /* its length, s */
   PetscReal barrier_weight; /* weight of its end-of-step forces in the residual of the solve */
-  Vec stage,
-    stage_start; /* where the integrator evaluates forces, stage_start + stage_part (X - stage_start), in a solve for X; NULL: at X */
+  Vec stage, stage_start;   /* forces are those at stage_start + stage_part (X - stage_start); NULL: at X */
   PetscReal stage_part;
   PetscBool dt_given, velocity_predictor, fixed_step, damped;
   PetscBool reject_inverted, rejected_inverted; /* -time_inverted; the last attempt was rejected by it */
@@ -100,9 +94,8 @@ struct _p_SbRun {
   struct {
     PetscBool on;   /* static: steps along the path of equilibria, with the load factor as an unknown */
     PetscInt steps; /* largest number */
-    PetscReal longest,
-      first; /* longest step as a multiple of the first; length of the first, m, 0: not known */
-    PetscReal displacement; /* -static_max_displacement, m; 0: no limit */
+    PetscReal longest, first; /* longest step over the first; length of the first, m, 0: not known */
+    PetscReal displacement;   /* -static_max_displacement, m; 0: no limit */
   } arc;
   Vec path; /* with arc.on: direction of the last step, scaled to the next step's length; zero at the start */
   PetscInt bifurcations; /* number detected by changes of negative pivots */
@@ -127,13 +120,12 @@ struct _p_SbRun {
   struct {
     SbStepSolvedFn fn; /* called after each solve of a step; NULL: none */
     void *ctx;
-    /* error of the step over the allowed one, proportional to its length to the power `order`, for adaptive steps;
-       NULL: displacements are compared with -ts_atol */
-    PetscErrorCode (*error)(SbRun run, const SbSolvedStep *step, void *ctx, PetscInt *order,
-                            PetscReal *ratio);
+    /* for adaptive steps: error over the allowed one, as dt to the power `order`; NULL: by -ts_atol */
+    PetscErrorCode (*error)(SbRun, const SbSolvedStep *step, void *ctx, PetscInt *order, PetscReal *ratio);
   } post_solve;
   struct {
-    SbPauseFn fn; /* called after each step; NULL: none */
+    /* after the solve of a step that ended at t, before monitors: whether SbRunSolve() returns; NULL: none */
+    PetscErrorCode (*fn)(SbRun, PetscInt step, PetscReal t, PetscReal dt, void *ctx, PetscBool *pause);
     PetscReal dt; /* length of the last step that it was called for, or of a restart from a pause; else 0 */
     void *ctx;
   } after;
@@ -151,7 +143,7 @@ struct _p_SbRun {
   const SbColumn *column; /* [ncolumn] of history.csv; borrowed */
   PetscInt ncarried;
   const SbCheckpointValue *carried; /* [ncarried] in checkpoints; borrowed */
-  /* values[ncell_owned] = energy of the error of space discretisation per rest volume, J/m^3; NULL: no estimate. Collective. */
+  /* values[ncell_owned] = energy of the error in space, J/m^3 at rest; NULL: no estimate. Collective. */
   PetscErrorCode (*cell_error)(SbRun run, const SbStep *step, PetscReal values[]);
   PetscBool want_energies, want_residual;
   SbEnergies energies;    /* running totals of work and dissipation */
@@ -169,41 +161,41 @@ struct _p_SbRun {
   PetscReal dt, t_end;               /* length of a step (the first one when adaptive) and end, s */
   PetscInt newton_step, linear_step; /* iterations of the current step */
   PetscInt rejected_seen;            /* rejections up to the last step */
-  Vec loads, reaction,
-    previous; /* f_ext, residual and displacement of the last step, for works; only with want_energies */
-  PetscReal damping_power;                     /* at the last step, W */
-  char stop_reason[1024];                      /* why the run ended early; empty when it reached its end */
-  void *output;                                /* data of src/output; NULL without output */
+  Vec loads, reaction, previous;     /* with want_energies: f_ext, residual, displacement of the last step */
+  PetscReal damping_power;           /* at the last step, W */
+  char stop_reason[1024];            /* why the run ended early; empty when it reached its end */
+  void *output;                      /* data of src/output; NULL without output */
   PetscErrorCode (*output_destroy)(SbRun run); /* frees it; called by SbRunDestroy() when not NULL */
 };
 
 /*
-  SbRunLocalError - local truncation error of the integrator: in the energy norm c h^(p+1) |d^(p+1) (u, v) / dt^(p+1)| for small steps h.
+  SbRunLocalError - local error of the integrator: in the energy norm c h^(p+1) |d^(p+1) (u, v) / dt^(p+1)|
 
-  Not collective. Output: order p and constant c, from the eigenvalue of the method for an undamped oscillator; `ahead`: time, in steps, by which
-  symplectic Euler's velocities lag, an error that does not accumulate; 0 for the others.
+
+  Not collective. Output: order p, constant c, from the method's eigenvalue for an undamped oscillator;
+  `ahead`: steps by which symplectic Euler's velocities lag, an error that does not accumulate.
 */
 void SbRunLocalError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead);
-/* X = (K + H)^-1 B with the tangent K of Newton's last iteration and the Hessian H of barrier contact; solved: false without contact. Collective. */
+/* X = (K + H)^-1 B, K the last tangent, H the Hessian of barrier contact; solved: any contact. Collective. */
 PetscErrorCode SbRunSolveTangent(SbRun run, Vec B, Vec X, PetscInt *iterations, PetscBool *solved);
 PetscErrorCode SbTimeRegister(void); /* option rows and the TSType */
-PetscErrorCode SbRunCreate(SbModel model,
-                           SbRun *run); /* reads the options -time, -solver, ...; nothing is computed yet */
-PetscErrorCode
-SbRunSetUp(SbRun run); /* after SbModelSetUp(): vectors, matrix, solver, integrator. Collective */
+/* Reads the options -time, -solver, ...; nothing is computed yet. */
+PetscErrorCode SbRunCreate(SbModel model, SbRun *run);
+/* After SbModelSetUp(): vectors, matrix, solver, integrator. Collective. */
+PetscErrorCode SbRunSetUp(SbRun run);
 PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx);
-/* From now on SIGTERM, SIGINT and SIGUSR1 end the run after its step: SbRun.stopped. A second SIGINT ends the process. One run at a time. */
+/* From now on SIGTERM, SIGINT, SIGUSR1 end the only run after its step, a second SIGINT the process. */
 PetscErrorCode SbRunCatchSignals(SbRun run);
 /*
   SbRunTransferState - continues the run `from` as the run `to` of a re-meshed model. Collective.
 
-  After SbRunSetUp(to), before monitors are added. Takes over totals, work and dissipation, the step and its time, and lengths of steps; with explicit
-  integrators that is the stable one of the new model, unless it was given. U, V and A are the caller's to fill.
+  After SbRunSetUp(to), before monitors are added. Takes over totals, works, the step and its time, and
+  lengths of steps (explicit: the stable one of the new model, unless given). U, V and A: the caller's.
 */
 PetscErrorCode SbRunTransferState(SbRun from, SbRun to);
-/* Recomputes the acceleration A at t_now from U and V by the residual. Unchanged at prescribed displacements, and with integrators whose
-   acceleration is a history variable. Collective. */
+/* Recomputes A at t_now from U and V by the residual, except at prescribed displacements, and not with
+   integrators whose acceleration is a history variable. Collective. */
 PetscErrorCode SbRunRestartAcceleration(SbRun run);
-PetscErrorCode SbRunSolve(
-  SbRun run); /* the whole time loop or load path; an early end is in run->stop_reason, not an error */
+/* The whole time loop or load path; an early end is in run->stop_reason, not an error. */
+PetscErrorCode SbRunSolve(SbRun run);
 PetscErrorCode SbRunDestroy(SbRun *run);

@@ -1,13 +1,14 @@
 /*
-  box_tree.c - bounding volume hierarchy of axis-aligned boxes with four children per node: overlap queries with a box, with another tree or
-  within a tree, and nearest-neighbour search.
+  box_tree.c - bounding volume hierarchy of axis-aligned boxes, four children per node: overlap with a box,
+  with another tree or within a tree, and nearest-neighbour search.
 
-  The order of the boxes is found by recursive bisection: the range is split at the median of the box centres along the longest
-  axis, always at a multiple of the number of boxes below a child. Four consecutive boxes form a group, four groups one of the next level; each
-  group stores the bounding boxes (hulls) of its four children as arrays, so that they are tested together, and only the order has to be stored.
-  When boxes move, the tree is refitted: the order is kept and the hulls are updated. It is rebuilt when hulls have grown too large.
+  The order of the boxes is found by recursive bisection: a range is split at the median of the box centres
+  along the longest axis, at a multiple of the number of boxes below a child. Four consecutive boxes form a
+  group, four groups one of the next level; a group stores the bounding boxes (hulls) of its children as
+  arrays, so that they are tested together, and only the order has to be stored. When boxes move, the tree is
+  refitted: the order is kept and the hulls are updated. It is rebuilt when hulls have grown too large.
 
-  Traversals use a stack owned by the caller and return one result per call: they need no allocation, and results need not fit into memory.
+  Traversals use a stack of the caller and return one result per call: nothing is allocated.
 */
 #include "sbgeometry.h"
 
@@ -34,7 +35,7 @@ static inline void swap(Item *a, Item *b)
   *b = keep;
 }
 
-/* Quickselect: moves the m smallest items along the axis to the front (Hoare, "Algorithm 65: Find", 1961, with median-of-three pivots). */
+/* Quickselect: moves the m smallest items along the axis to the front (Hoare, "Algorithm 65: Find", 1961). */
 static void select_first(Item item[], PetscInt n, PetscInt m, int axis)
 {
   PetscInt low = 0, high = n - 1;
@@ -64,7 +65,7 @@ static void select_first(Item item[], PetscInt n, PetscInt m, int axis)
   }
 }
 
-/* Orders n boxes by recursive bisection along the longest axis; `below`: number of boxes below each child of the node. */
+/* Orders n boxes by recursive bisection along the longest axis; `below`: number of boxes below each child. */
 static void order_items(Item item[], PetscInt n, PetscInt below)
 {
   PetscReal box[6];
@@ -94,7 +95,7 @@ static inline PetscReal size_of(const PetscReal box[6])
   return size > 0 ? size : 0;
 }
 
-/* Refit: updates the hulls of all groups from the lowest level up; returns the total size of hulls over that of the boxes. */
+/* Refit: updates the hulls from the lowest level up; returns their total size over that of the boxes. */
 static PetscReal fill(SbBoxTree *tree, const PetscReal (*box)[6])
 {
   PetscReal groups = 0, boxes = 0;

@@ -1,17 +1,20 @@
 /*
-  ccd.c - continuous collision detection of two simplices (vertex and triangle, two edges, ...) by conservative advancement.
+  ccd.c - continuous collision detection of vertices, edges and triangles by conservative advancement.
 
-  Vertices move linearly, x_a(t) = x_a + t q_a. Let n be the unit vector along the shortest connection, of length d, at time t. Each side is behind a
-  plane with normal n, and the planes are d apart: for all i of the first side and j of the second, n . (x_i - x_j) >= d. So the distance
-  at a later time s is at least the minimum of n . (x_i - x_j) + (s - t) n . (q_i - q_j), and t can be advanced until this bound equals the
-  gap to be kept. The iteration converges from below to the time at which that gap is reached.
+  Vertices move linearly, x_a(t) = x_a + t q_a. Let n be the unit vector along the shortest connection, of
+  length d, at time t. Each side is behind a plane with normal n, and the planes are d apart: for all i of the
+  first side and j of the second, n . (x_i - x_j) >= d. So the distance at a later time s is at least the
+  minimum of n . (x_i - x_j) + (s - t) n . (q_i - q_j), and t can be advanced until this bound equals the gap
+  to be kept. The iteration converges from below to the time at which that gap is reached.
 
-  This is additive CCD (Li, Kaufman, Jiang, "Codimensional Incremental Potential Contact", 2021, section 4), which bounds the approach by the
-  norms of q, with the bound of Mirtich ("Impulse-based dynamic simulation", 1996, section 2.3): sliding and separating pairs need one distance only.
+  This is additive CCD (Li, Kaufman, Jiang, "Codimensional Incremental Potential Contact", 2021, section 4),
+  which bounds the approach by norms of q, with the bound of Mirtich ("Impulse-based dynamic simulation",
+  1996, section 2.3): sliding and separating pairs need one distance only.
 
-  Rounding: the bound holds for any unit vector n, also an inaccurate one. Differences are formed between coordinates at the same time, so their relative
-  error is small, far from the origin and for fast motion too. The rounding of the caller's coordinates at a fraction of the step, eps |x| initially plus eps |x1 - x0|
-  for the full step, is added to the gap: SB_CCD_ROUNDING times that.
+  Rounding: the bound holds for any unit vector n. Differences are formed between coordinates at the same
+  time, so their relative error is small, far from the origin and for fast motion too. The rounding of the
+  caller's coordinates at a fraction of the step, eps |x| initially plus eps |x1 - x0| for the full step, is
+  added to the gap: SB_CCD_ROUNDING times that.
 */
 #include "sbgeometry.h"
 
@@ -75,7 +78,7 @@ PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal 
     } else if (!(gap - at * fast > stop))
       break;
 
-    // time until a vertex of one side may reach one of the other, along n; at least the time given by the largest relative speed
+    // time until a vertex of one side may reach one of the other along n; at least that by the largest speed
     for (int a = 0; a < n; a++) {
       PetscReal *p = a < nfirst ? first[a] : second[a - nfirst];
 

@@ -57,7 +57,7 @@ SbTriangleFeature SbTriangleClosestPoint(const PetscReal p[3], const PetscReal *
   PetscReal ab[3], ac[3], r[3], d[6], area[3];
   SbTriangleFeature place;
 
-  // products of both edges at corner 0 with the vectors from the corners to p; unnormalised barycentric coordinates
+  // products of the edges at corner 0 with vectors from corners to p; unnormalised barycentric coordinates
   SbSubtract(x[1], x[0], ab);
   SbSubtract(x[2], x[0], ac);
   for (int k = 0; k < 3; k++) {

@@ -1,34 +1,36 @@
 /*
-  distance.c - distance between two simplices (vertex and triangle, two edges, ...), with gradient and Hessian.
+  distance.c - distance of a vertex and a triangle, two edges, ..., with gradient and Hessian.
 
-  The vector between the closest points, from the second side to the first, is r = sum_a w_a x_a, d = |r|. The vertices with nonzero weight are the
-  closest feature: two vertices, a vertex and an edge, or the interior of both sides. Let t_k = sum_a w_a,k x_a be the derivatives of r with respect
-  to the (none, one or two) coordinates on the feature, q_k their dual basis, and c_a = sum_k w_a,k q_k. As r is orthogonal to all t_k,
+  The vector between the closest points, from the second side to the first, is r = sum_a w_a x_a, d = |r|.
+  Vertices with nonzero weight are the closest feature: two vertices, a vertex and an edge, or the interior of
+  both sides. Let t_k = sum_a w_a,k x_a be the derivatives of r by the (none, one or two) coordinates on the
+  feature, q_k their dual basis, and c_a = sum_k w_a,k q_k. As r is orthogonal to all t_k,
 
       d,a    = w_a n,                                              n = r / d
       d,ab   = w_a w_b P / d - w_a c_b n^T - w_b n c_a^T - d (c_a . c_b) n n^T
 
-  with P the projection orthogonal to n and all t_k. P is zero in the interior of both sides: there no term is singular as d vanishes.
+  with P the projection orthogonal to n and all t_k. P is zero in the interior of both sides: no term is
+  singular there.
 
-  a grad d grad d^T + b Hess d has rank five at most, on the space spanned by n times three vectors of weights with zero sum, and by the two directions
-  orthogonal to n times w. Its projection to the positive semi-definite matrices is computed there.
+  a grad d grad d^T + b Hess d has rank five at most, on the space spanned by n times three vectors of weights
+  with zero sum, and by the two directions orthogonal to n times w. Its projection to the positive
+  semi-definite matrices is computed there.
 
-  If both sides are nearly in one plane, r is a small difference of large numbers; where it is less accurate than the normal of the plane,
-  n is that normal and d the distance along it.
+  If both sides are nearly in one plane, r is a small difference of large numbers; where it is less accurate
+  than the normal of the plane, n is that normal and d the distance along it.
 
-  Edges: closest points of the lines if they are on both edges, else the nearest endpoint (after Lumelsky, "On fast computation of distance
-  between line segments", 1985; with cross products instead of differences of squares, which are inaccurate for nearly parallel edges). Mollifier: Li et
-  al., "Incremental Potential Contact", 2020, section 5.
+  Edges: closest points of the lines if on both edges, else the nearest endpoint (after Lumelsky, "On fast
+  computation of distance between line segments", 1985; by cross products, as differences of squares are
+  inaccurate for nearly parallel edges). Mollifier: Li et al., "Incremental Potential Contact", 2020, section
+  5.
 */
 #include "sbgeometry.h"
 
 #define ALONG 1e-4     /* sine between edges below which the lines' closest points are inaccurate */
 #define PARALLEL 1e-12 /* the same, below which lines count as parallel */
 
-/*
-  Distance between `vertex` and the edge from a to b, stored if it is less than s->d (squared here). The vertex is on the first
-  side for sign = 1, on the second for -1.
-*/
+/* Distance of a vertex and an edge a b, if below s->d (squared here); sign: 1 if on the first side, else -1.
+   */
 static inline void try_edge(const PetscReal x[], int vertex, int a, int b, PetscReal sign, SbDistance *s)
 {
   PetscReal e[3], r[3], ee, er, t, d2;
@@ -53,7 +55,8 @@ static inline void try_edge(const PetscReal x[], int vertex, int a, int b, Petsc
   for (int k = 0; k < 3; k++) s->n[k] = sign * r[k];
 }
 
-/* Distance and unit vector from r = s->n, or from the normal of the plane if both sides are nearly in one plane; size2: squared edge length. */
+/* Distance and unit vector from r = s->n, or the normal if both sides are almost in a plane; size2: edge^2.
+   */
 static inline void finish(const PetscReal between[3], const PetscReal normal[3], PetscReal size2,
                           SbDistance *s)
 {
@@ -312,7 +315,7 @@ void SbDistanceHessian(const PetscReal x[], const SbDistance *s, const PetscReal
   }
   if (clamp) clamp_eigenvalues(5, K);
 
-  // expand to 3 x 3 blocks of the vertices in the frame (n, m), rotated to global axes; vertices of zero weight have no blocks
+  // expand to 3 x 3 blocks in the frame (n, m), rotated to global axes; none for vertices of zero weight
   for (int i = 0; i < 4; i++) {
     for (int j = i; j < 4; j++) {
       const PetscReal f = w[i] * w[j] / (size * size);

@@ -1,11 +1,11 @@
 /*
   intersection.c - intersection of a segment and a triangle, and of two triangles beyond their common corners.
 
-  Two triangles intersect if and only if an edge of one intersects the other. With a common corner only the two opposite edges are
-  tested; with a common edge, whether one triangle is folded onto the other. Decisions are made by the signs of determinants,
-  orient(a, b, c, d) = (a - d) . (b - d) x (c - d), in double precision if its magnitude exceeds the rounding error bound (Shewchuk, "Adaptive
-  precision floating-point arithmetic", 1997, the first stage), else in long double, and zero below the error bound of that. Coplanar cases are
-  decided in two dimensions.
+  Two triangles intersect if and only if an edge of one intersects the other. With a common corner only the
+  two opposite edges are tested; with a common edge, whether one triangle is folded onto the other. Decisions
+  are made by the signs of determinants, orient(a, b, c, d) = (a - d) . (b - d) x (c - d), in double precision
+  if above the rounding error bound (Shewchuk, "Adaptive precision floating-point arithmetic", 1997, the first
+  stage), else in long double, and zero below the bound of that. Coplanar cases are decided in two dimensions.
 */
 #include <float.h>
 #include "sbgeometry.h"
@@ -33,7 +33,7 @@ static int orient_long(const PetscReal a[3], const PetscReal b[3], const PetscRe
   return sign_of(det, 16 * LDBL_EPSILON * size);
 }
 
-/* Side of the plane through a, b, c on which d lies: -1 above (corners counter-clockwise seen from d), 0 in the plane, 1 below. */
+/* Side of the plane a b c on which d lies: -1 above (counter-clockwise seen from d), 0 on it, 1 below. */
 static int orient(const PetscReal a[3], const PetscReal b[3], const PetscReal c[3], const PetscReal d[3])
 {
   PetscReal u[3], v[3], w[3], det = 0, size = 0;

@@ -1,9 +1,9 @@
 /*
   signed_distance.c - signed distance from a closed triangulated surface.
 
-  The nearest triangle is found by a box tree. The sign is that of the angle-weighted pseudonormal at the closest point (Baerentzen and Aanaes,
-  "Signed distance computation using the angle weighted pseudonormal", IEEE TVCG 11(3), 2005). Distance and normal are exact
-  up to rounding; nothing is sampled or smoothed.
+  The nearest triangle is found by a box tree. The sign is that of the angle-weighted pseudonormal at the
+  closest point (Baerentzen and Aanaes, "Signed distance computation using the angle weighted pseudonormal",
+  IEEE TVCG 11(3), 2005). Exact up to rounding; nothing is sampled.
 */
 #include "sbgeometry.h"
 
@@ -100,7 +100,7 @@ PetscReal SbSignedDistanceEvaluate(SbSignedDistance s, const PetscReal x[3], Pet
     return SbDot3(face, r);
   }
 
-  // closest point on an edge or corner: normal along the connection, or the pseudonormal at very small distances
+  // closest point on an edge or corner: normal along the connection, or the pseudonormal at tiny distances
   for (int i = 0; i < 3; i++)
     pseudo[i] = feature >= SB_FEATURE_EDGE_0
                   ? face[i] + s->normal[3 * s->across[3 * nearest + (feature - SB_FEATURE_EDGE_0)] + i]

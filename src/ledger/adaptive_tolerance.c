@@ -1,13 +1,15 @@
 /*
   Adaptive tolerances: -accuracy sets a target error, -step_time_budget a limit on the seconds per step.
 
-  -accuracy e: the time step is chosen so that the integrator's error is uniform over the run (TSAdapt, error per unit of time), and the tolerance of solves so that
-  their estimated error is a tenth of e. The mesh is not changed.
-  Barrier contact may have half of e: the width of the barrier is adapted to the error of its gaps, which is proportional to it. It is reduced at once, and the step is
-  solved again; it is increased only between steps and only while the energy stored in the gaps hardly grows, which would accelerate the bodies apart. The error of contact need not be less than a tenth of the mesh's error.
+  -accuracy e: the time step is chosen so that the integrator's error is uniform over the run (TSAdapt, error
+  per unit of time), and the tolerance of solves so that their estimated error is a tenth of e. The mesh is
+  not changed. Barrier contact may have half of e: the width of the barrier is adapted to the error of its
+  gaps, which is proportional to it. It is reduced at once, and the step solved again; it is increased only
+  between steps and while the energy stored in the gaps hardly grows, which would accelerate the bodies apart.
+  The error of contact need not be less than a tenth of the mesh's.
 
-  -step_time_budget s: the time step is the user's. The tolerance of solves is increased when a step took longer than s, and reduced when it took less than s / 2. Results
-  depend on the machine and differ from run to run.
+  -step_time_budget s: the time step is the user's. The tolerance of solves is increased when a step took
+  longer than s, and reduced when it took less than s / 2. Results differ from run to run.
 
   Values of the user (-snes_rtol, -ksp_rtol, -ts_adapt_type) are kept.
 */
@@ -64,7 +66,7 @@ PetscErrorCode SbAdaptiveToleranceSet(SbLedger l, PetscReal rtol)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Error of the solves of the last step, J^(1/2): if not estimated, the last estimate scaled by the residual. */
+/* Error of the last solves, J^(1/2): if not estimated, the last estimate scaled by the residual. */
 static PetscReal left_by_solves(SbLedger l)
 {
   const PetscReal part = l->seen_residual > 0. ? l->residual / l->seen_residual : 1.;
@@ -72,8 +74,9 @@ static PetscReal left_by_solves(SbLedger l)
   return part * PetscSqrtReal(PetscSqr(l->step_linear) + PetscSqr(l->step_nonlinear));
 }
 
-/* Ratio of the error of the last solved step to the allowed one: that of the run times dt / its length. Errors of solves are part of the
-   differences of accelerations, the more the shorter the step, and are subtracted: shorter steps would not reduce them. */
+/* Ratio of the error of the last solved step to the allowed one: that of the run times dt / its length.
+   Errors of solves, a part of the differences of accelerations that shorter steps would not reduce, are
+   subtracted. */
 static PetscErrorCode step_error(SbRun run, const SbSolvedStep *step, void *ctx, PetscInt *order,
                                  PetscReal *ratio)
 {

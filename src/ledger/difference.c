@@ -1,5 +1,5 @@
 /*
-  The tangent of a run for the estimates: finite differences of forces, energies of displacements and velocities, solves with the last tangent.
+  Products with the tangent for the estimates: finite differences of forces, energies, solves.
 */
 #include "ledger_impl.h"
 #include "sbsolver.h"
@@ -58,7 +58,7 @@ PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal 
   PetscCall(VecDuplicate(D, &R));
   if (run->J && run->ts && run->shift_a > 0. && !run->damped && !run->solver_used->matrix_free &&
       !run->model->space->consistent_mass) {
-    /* the last tangent of the step, where it is a matrix K + shift M of the free unknowns with the lumped mass */
+    /* the last tangent, where it is a matrix K + shift M of the free unknowns with the lumped mass */
     PetscCall(VecCopy(D, moved));
     PetscCall(SbSpaceZeroPrescribed(run->model->space, PETSC_TRUE, moved));
     PetscCall(MatMult(run->J, moved, R));

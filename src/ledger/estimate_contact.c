@@ -1,12 +1,15 @@
 /*
-  Error by gaps or penetration in contact. Closing a gap takes the work force times gap: half of it (forces grow from zero)
-  bounds the energy of the error, but includes rigid displacements from the deflection of springs.
+  Error by gaps or penetration in contact. Closing a gap takes the work force times gap: half of it (forces
+  grow from zero) bounds the energy of the error, but includes rigid displacements from the deflection of
+  springs.
 
-  So the estimate for springs is sharper. With F their forces, one step of Uzawa's iteration, (K + springs) delta = F, moves the body to
-  its position with exact contact, up to the ratio of its stiffness to theirs; the elastic energy of delta is that of the error.
+  So the estimate for springs is sharper. With F their forces, one step of Uzawa's iteration, (K + springs)
+  delta = F, moves the body to its position with exact contact, up to the ratio of its stiffness to theirs;
+  the elastic energy of delta is that of the error.
 
-  The gaps of a barrier are proportional to its width: (K + H) delta = sum b'' g n (src/effect/barrier_forces.c) is the error of the state. In a dynamic run K includes inertia: the
-  error is relative to the same step without gaps.
+  The gaps of a barrier are proportional to its width: (K + H) delta = sum b'' g n
+  (src/effect/barrier_forces.c) is the error of the state. In a dynamic run K includes inertia: the error is
+  relative to the same step without gaps.
 */
 #include "ledger_impl.h"
 #include "sbkernel.h"

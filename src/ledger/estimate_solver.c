@@ -1,10 +1,10 @@
 /*
-  Error of the solves of a step: with F the residual at the computed solution and J the tangent, the missing correction is
-  delta = J^-1 F, and the energy of the error 1/2 delta . F (J includes inertia). One more linear solve, to a tenth, computes delta in a
-  fraction of the iterations of the step.
+  Error of the solves of a step: with F the residual at the computed solution and J the tangent, the missing
+  correction is delta = J^-1 F, the energy of the error 1/2 delta . F (J includes inertia). One more linear
+  solve, to a tenth, takes a fraction of the iterations of the step.
 
-  With one linear solve per step this is the error of the linear solver; with Newton's method, whose tolerance also controls
-  the linear solves, all of it is assigned to Newton's. Errors of its steps have the same direction and add up.
+  With one linear solve per step this is the error of the linear solver; with Newton's method, whose tolerance
+  also controls the linear solves, all of it is assigned to Newton's. Errors of its steps add up.
 */
 #include "ledger_impl.h"
 
@@ -31,9 +31,9 @@ PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolvedStep *step)
   l->step_nonlinear = single ? 0. : error;
   if (step->V) l->kept_part = 1.;
   if (step->V && energy > 0.) {
-    /* factor of the next step on an error like delta, from the fraction shift_a delta.M delta of inertia in its energy: on an oscillation of
-       frequency w implicit Euler has the factor 1 / (1 + (w h)^2)^(1/2), the root of this fraction. Other methods do not damp like this, but
-       the acceleration passes the remaining residual to their next solve. */
+    /* factor of the next step on an error like delta: implicit Euler has 1 / (1 + (w h)^2)^(1/2) for
+       frequency w, the root of the fraction of inertia, shift_a delta.M delta, in the energy. Other methods
+       do not damp like this, but the acceleration passes the remaining residual to their next solve. */
     PetscCall(SbMassForm(l, l->delta, &mass));
     l->kept_part = PetscMin(1., PetscSqrtReal(l->run->shift_a * mass / energy));
   }
@@ -41,7 +41,7 @@ PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolvedStep *step)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rounding error of up to half the last digit of each displacement, in a random direction: signs by a hash of the node. */
+/* Rounding error of half the last digit of displacements, in random directions: signs by a hash of nodes. */
 PetscErrorCode SbEstimateRounding(SbLedger l, PetscReal t, Vec U, PetscReal *error)
 {
   const SbSpace s = l->run->model->space;

@@ -1,46 +1,50 @@
 /*
   estimate_space.c - the discretisation error in space, by stress recovery.
 
-  Recovery. P_h is the first Piola-Kirchhoff stress, constant in each cell; for DG that of the gradient of the means. P* is linear in each
-  cell, with the recovered values at the vertices (recovery.c). The error of a cell is estimated by the difference:
+  Recovery. P_h is the first Piola-Kirchhoff stress, constant in each cell; for DG that of the gradient of the
+  means. P* is linear in each cell, with the recovered values at the vertices (recovery.c). The error of a
+  cell is estimated by the difference:
 
-    off_T = 1/2 int_T (P* - P_h) : C^-1 : (P* - P_h),     C^-1: |dev s|^2 / (2 mu) + tr(s)^2 / (9 K),   s = sym(R^T (P* - P_h)),
+    off_T = 1/2 int_T D : C^-1 : D,  D = P* - P_h,  s = sym(R^T D),  C^-1: |dev s|^2 / (2 mu) + tr(s)^2 / (9 K),
 
-  K = lambda + 2/3 mu, R the rotation in F (Zienkiewicz and Zhu 1992; for CR and DG with averages instead of fits: Carstensen and Funken,
-  Math. Comp. 70, 2001). In this norm the estimate stays bounded as nu -> 1/2. For CR and DG the estimate is complete. It needs neither loads
-  nor inertia, which P_h balances.
+  K = lambda + 2/3 mu, R the rotation in F (Zienkiewicz and Zhu 1992; for CR and DG with averages instead of
+  fits: Carstensen and Funken, Math. Comp. 70, 2001). In this norm it stays bounded as nu -> 1/2. For CR and
+  DG it is complete. It needs neither loads nor inertia: P_h balances them.
 
-  Stiffness. P1 is too stiff, near nu = 1/2 by any factor (locking): then P_h is wrong everywhere, and P* - P_h
-  has only a fraction of a small energy. But P* shows how much too stiff P1 is. Let a be the energy of P_h in the norm above, b its smooth part
-  and a - b the part that the mesh has added. Among the multiples s u_h of the solution, under the same loads, the best one
-  with the stiffness of the smooth part only, s^2 b - 2 s a -> min, has s = a / b, and its potential energy is below that of u_h by
+  Stiffness. P1 is too stiff, near nu = 1/2 by any factor (locking): then P_h is wrong everywhere, and P* -
+  P_h has only a fraction of a small energy. But P* shows how much too stiff P1 is. Let a be the energy of P_h
+  in the norm above, b its smooth part and a - b what the mesh has added. Of the multiples s u_h of the
+  solution, under the same loads, the best one with the stiffness of the smooth part only, s^2 b - 2 s a ->
+  min, has s = a / b, and its potential energy is below that of u_h by
 
     |e|^2 = s a - a = (a - b) a / b:
 
-  a Galerkin solution in a space of one dimension. With prescribed displacements instead of loads u_h cannot be
-  scaled and |e|^2 = a - b; in general, with theta the fraction of the work that is done by loads,
+  a Galerkin solution in a space of one dimension. With prescribed displacements instead of loads u_h cannot
+  be scaled and |e|^2 = a - b; in general, with theta the fraction of the work that is done by loads,
 
-    |e|^2 = (a - b) (1 + theta (a / b - 1)),     theta = 1 - sum R . (u - m) / (2 a), at least 0 and at most 1,
+    |e|^2 = (a - b) (1 + theta (a / b - 1)),  theta = 1 - sum R . (u - m) / (2 a), at least 0 and at most 1,
 
-  R the forces of supports and contact, m for each component the mean of u weighted by |R|: supports with the same motion do no
-  work. Without locking a / b -> 1, and the estimate is that of recovery. a - b is the sum of off_T: its
-  shear part unchanged, its pressure part, which locks, enlarged. Where P_h oscillates from cell to cell the fit over some
-  twenty cells keeps a little of it (measured: up to a fifth of the energy), so the smooth energy of the pressure is at most that of P* less a quarter of off,
-  but a - b contains off at most twice.
+  R the forces of supports and contact, m for each component the mean of u weighted by |R|: supports with the
+  same motion do no work. Without locking a / b -> 1, and the estimate is that of recovery. a - b is the sum
+  of off_T: its shear part unchanged, its pressure part, which locks, enlarged. Where P_h oscillates from cell
+  to cell the fit over some twenty cells keeps a little of it (measured: up to a fifth of the energy), so the
+  smooth energy of the pressure is at most that of P* less a quarter of off, but a - b contains off at most
+  twice. The factor on off_T is computed for each P1 body, and is the same in all its cells.
 
-  The factor on off_T is computed for each P1 body, and is the same in all its cells.
-
-  P2. The deviator of P_h is linear in a cell, given at its points, and P* is quadratic; the pressure is constant in a cell and compared with the mean of p*:
+  P2. The deviator of P_h is linear in a cell, given at its points, P* quadratic; the pressure, constant in a
+  cell, is compared with the mean of p*:
 
     off_T = 1/(4 mu) int_T |dev (s* - s_h)|^2 + V/(2 K) (mean p* - p_h)^2.
 
-  Displacements have the accuracy of the deviators and mean pressures, one order above that of pointwise pressures. The element does not lock: no factor.
+  Displacements have the accuracy of deviators and mean pressures, one order above that of pointwise
+  pressures. P2 does not lock: no factor.
 
-  Limits. The norm is that of Hooke's law in the rotated frame of the cell: for strains of order one it is not the tangent's. theta counts
-  supports that rotate by large angles as doing work, and contact between bodies as a support: the estimate of a locked body is
-  too low then. Features that the mesh does not resolve at all are not detected.
-  In a dynamic run the error is that of the current state: against the continuum under the current loads and inertia (elliptic
-  reconstruction, Makridakis and Nochetto, SIAM J. Numer. Anal. 41, 2003), without errors accumulated since the start.
+  Limits. The norm is that of Hooke's law in the rotated frame of the cell: for strains of order one it is not
+  the tangent's. theta counts supports that rotate by large angles as doing work, and contact between bodies
+  as a support: the estimate of a locked body is too low then. Features that the mesh does not resolve at all
+  are not detected. In a dynamic run the error is that of the current state, against the continuum under the
+  current loads and inertia (elliptic reconstruction, Makridakis and Nochetto, SIAM J. Numer. Anal. 41, 2003),
+  not one accumulated since the start.
 */
 #include "recovery.h"
 #include "sbestimate.h"
@@ -146,10 +150,8 @@ static PetscReal cell_volume(SbMesh mesh, PetscInt c)
   return SbTetDeterminant(mesh->x, mesh->cell + 4 * c) / 6.;
 }
 
-/*
-  Adds the energies of an owned cell whose law has the moduli G and K, and returns off_T. The integral over a tet of the square of a linear function with the values d_a at the
-  vertices is V / 20 (sum |d_a|^2 + |sum d_a|^2).
-*/
+/* Adds the energies of an owned cell, G and K its moduli, and returns off_T. The integral of the square of a
+   linear function over a tet is V / 20 (sum |d_a|^2 + |sum d_a|^2), d_a at the vertices. */
 static PetscReal add_cell(SbSpaceEstimate est, PetscInt c, PetscReal G, PetscReal K, PetscReal sum[NSUM])
 {
   const PetscReal *R = est->R ? est->R + 9 * c : NULL, V = cell_volume(est->model->mesh, c);
@@ -179,7 +181,7 @@ static PetscReal add_cell(SbSpaceEstimate est, PetscInt c, PetscReal G, PetscRea
   return squares[0] + squares[1];
 }
 
-/* off_T of an owned P2 cell from the values at its ten nodes; SbQuadraticMass() integrates products of quadratic functions. */
+/* off_T of an owned P2 cell from values at ten nodes; SbQuadraticMass() integrates products of quadratics. */
 static PetscReal quadratic_off(SbSpaceEstimate est, PetscInt c, PetscReal G, PetscReal K)
 {
   const PetscReal *R = est->R ? est->R + 9 * c : NULL, V = cell_volume(est->model->mesh, c);

@@ -1,15 +1,17 @@
 /*
-  Error of the time integrator. With E_j the energy of the j-th derivative of the state (u, v), 1/2 d.K d + 1/2 d'.M d' for d = u^(j), the local error of
-  a method of order p is c h^(p+1) E_(p+1)^(1/2): its eigenvalue z for an oscillator of the frequency w has |z - exp(i w h)| = c (w h)^(p+1), and
-  each derivative multiplies the motion by w.
+  Error of the time integrator. With E_j the energy of the j-th derivative of the state (u, v), 1/2 d.K d +
+  1/2 d'.M d' for d = u^(j), the local error of a method of order p is c h^(p+1) E_(p+1)^(1/2): its eigenvalue
+  z for an oscillator of frequency w has |z - exp(i w h)| = c (w h)^(p+1), each derivative a factor w.
 
-  Local errors add up, but the error of an oscillation is bounded by its own energy. An oscillation that the steps do not resolve reaches this bound soon, which the sum of
-  asymptotic errors ignores. With x = c h^(p+1) w^(p+1) per step, min(sum x, 1) <= (sum x)^(j/(p+1)) for every j, so that
+  Local errors add up, but the error of an oscillation is bounded by its energy. One that the steps do not
+  resolve reaches this bound soon, which the sum of asymptotic errors ignores. With x = c h^(p+1) w^(p+1) per
+  step, min(sum x, 1) <= (sum x)^(j/(p+1)) for every j, so that
 
     (sum c h^(p+1))^(j/(p+1)) E_j^(1/2),   j = 0 .. p,
 
-  are also bounds; the smallest of them and of the sum is used. (With implicit Euler and j = 1 it is the energy that the method has dissipated.)
-  Derivatives are finite differences of the accelerations, which the integrators store (second_order.c).
+  are also bounds; the smallest of them and of the sum is used. (With implicit Euler and j = 1 it is the
+  energy dissipated by the method.) Derivatives are finite differences of the accelerations, which the
+  integrators store (second_order.c).
 */
 #include "ledger_impl.h"
 

@@ -1,11 +1,13 @@
 /*
   Error estimates of a run: which steps are estimated, and how the errors of steps accumulate.
 
-  The energy of a propagated error is constant or, with damping, decreases like that of the motion: so the errors of
-  steps are summed in the energy norm ("Lady Windermere's fan": Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.3).
+  The energy of a propagated error is constant or, with damping, decreases like that of the motion: so the
+  errors of steps are summed in the energy norm ("Lady Windermere's fan": Hairer, Norsett, Wanner, Solving
+  Ordinary Differential Equations I, II.3).
 
-  Steps are estimated while the work for estimates is below a fixed fraction of the run's work, counted in residual evaluations, not in seconds, so that repeated runs estimate
-  the same steps. Other steps are assigned the error of the last estimated one; with -accuracy the integrator's error of each step is estimated.
+  Steps are estimated while the work for estimates is below a fixed fraction of the run's, in residual
+  evaluations, not seconds, so that repeated runs estimate the same steps. Other steps have the error of the
+  last estimated one; with -accuracy the integrator's error is estimated in each.
 */
 #include "ledger_impl.h"
 #include "sblog.h"
@@ -142,11 +144,9 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   // in residual evaluations: a tangent costs three, an iteration with its preconditioner two
   l->work += run->snes ? 4. * (PetscReal)step->newton + 2. * (PetscReal)step->linear + 1. : 1.;
 
-  /*
-    A static run has the errors of its last solve. In a dynamic one the integrator's errors add up. Errors of linear solves are rough, with
-    a different direction in each step, and add in squares; errors of linearisation are smooth, with the same direction, and add linearly. The errors of a step
-    without an estimate are scaled by its last residual.
-  */
+  /* A static run has the errors of its last solve. In a dynamic one the integrator's errors add up; those of
+     linear solves, in changing directions, add in squares, those of linearisation, smooth, linearly. The
+     errors of a step without an estimate are scaled by its last residual. */
   if (!first) {
     const PetscReal part = l->seen_residual > 0. ? l->residual / l->seen_residual : 1.;
     PetscReal *linear = &l->error[SB_ERROR_LINEAR], *nonlinear = &l->error[SB_ERROR_NONLINEAR];

@@ -74,26 +74,27 @@ static inline PetscReal SbLedgerError(SbLedger l, int source)
   return l->error[source] + (source == SB_ERROR_TIME ? l->offset : 0.);
 }
 
-/* difference.c: R = derivative along D, N, of the residual at U, or (strain) of the gradient of the strain energy. Not l->w[1], l->w[2]. Collective. */
+/* difference.c: R = derivative along D of the residual at U, or (strain) of the gradient of the strain
+   energy, N. Collective, not for D or R among l->w[1], l->w[2]. */
 PetscErrorCode SbStiffnessTimes(SbLedger l, PetscReal t, Vec U, Vec D, PetscBool strain, Vec R);
 /* Twice the strain energy of a displacement D, by the tangent at U, J. Collective. */
 PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal *form);
 /* Sum of the lumped mass times the square of a vector, all ranks. Collective. */
 PetscErrorCode SbMassForm(SbLedger l, Vec D, PetscReal *form);
-/* X = J^-1 B with the solver and tangent of the last solve, relative tolerance rtol, initial guess zero; its: iterations. Collective. */
+/* X = J^-1 B with the solver and tangent of the last solve, to rtol, from zero; its: iterations. */
 PetscErrorCode SbProbeSolve(SbLedger l, PetscReal rtol, Vec B, Vec X, PetscInt *its);
 
-/* estimate_time.c: error of the step, into step_time and offset; `all`: also the bounds of the sum over steps. Collective. */
+/* estimate_time.c: error of the step, into step_time, offset; `all`: also bounds of the sum. Collective. */
 PetscErrorCode SbEstimateTime(SbLedger l, const SbSolvedStep *step, PetscBool all);
-/* Adds the error of the step to that of the run, of which damping leaves the fraction `left`. Not collective. */
+/* Adds the error of the step to that of the run, of which damping leaves the part `left`. Not collective. */
 void SbEstimateTimeAdd(SbLedger l, PetscReal dt, PetscReal left);
-/* estimate_solver.c: errors of the solves of the step, into step_linear, step_nonlinear and delta. Collective. */
+/* estimate_solver.c: errors of the step's solves, into step_linear, step_nonlinear and delta. Collective. */
 PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolvedStep *step);
 /* Error from rounding of the displacements, J^(1/2). Collective. */
 PetscErrorCode SbEstimateRounding(SbLedger l, PetscReal t, Vec U, PetscReal *error);
 /* estimate_contact.c: error from contact, J^(1/2). Collective. */
 PetscErrorCode SbEstimateContact(SbLedger l, const SbStep *step, PetscReal *error);
-/* Error from the gaps of barrier contact at U, or an upper bound of it below `enough`, J^(1/2). Collective. */
+/* Error from the gaps of barrier contact at U, or a bound of it below `enough`, J^(1/2). Collective. */
 PetscErrorCode SbEstimateGaps(SbLedger l, Vec U, PetscReal enough, PetscReal *error);
 
 /* adaptive_tolerance.c */

@@ -1,10 +1,10 @@
 /*
   The quantity of interest of the user, and its error.
 
-  In a static run by duality (Becker and Rannacher, Acta Numerica 10, 2001): with z the dual solution,
-  K z = dQ/du, the error by the mesh is a(e_u, e_z), the energy product of the errors of u and z, which the space estimate eta
-  gives as (eta^2(u + s z) - eta^2(u - s z)) / 2 s; the error by the solver is dQ/du . delta. For other sources, and in a dynamic run, the error is the relative
-  error in the energy norm times the range of values of the quantity.
+  In a static run by duality (Becker and Rannacher, Acta Numerica 10, 2001): with z the dual solution, K z =
+  dQ/du, the error by the mesh is a(e_u, e_z), the energy product of the errors of u and z, by the space
+  estimate eta: (eta^2(u + s z) - eta^2(u - s z)) / 2 s; the error by the solver is dQ/du . delta. Else the
+  error is the relative error in the energy norm times the range of values of the quantity.
 */
 #include "ledger_impl.h"
 #include "sbkernel.h"
@@ -52,7 +52,7 @@ PetscErrorCode SbQuantityAttach(SbLedger l)
     PetscReal least = PETSC_MAX_REAL, all;
     PetscInt first = PETSC_MAX_INT, winner;
 
-    /* The node nearest to the position, over all ranks; of equally near ones that with the lowest number, for any partition. */
+    /* the node nearest to the position on all ranks; of equally near ones that with the lowest number */
     for (int pass = 0; pass < 2; pass++) {
       for (PetscInt k = 0; k < s->nnode_owned; k++) {
         PetscReal r[3];

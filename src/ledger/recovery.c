@@ -1,20 +1,23 @@
 /*
-  recovery.c - stresses at the vertices by least squares over the cells around each (superconvergent patch recovery, Zienkiewicz and
-  Zhu, IJNME 33, 1992, parts 1 and 2).
+  recovery.c - stresses at the vertices by least squares over the cells around each (superconvergent patch
+  recovery, Zienkiewicz and Zhu, IJNME 33, 1992, parts 1 and 2).
 
   At a vertex v the recovered value is p(X_v) of the linear polynomial p that minimises
 
     sum_c |p(X_c) - P_c|^2 + r |grad p|^2,   r = 0.05 sum_c |X_c - X_v|^2,
 
-  over the cells c around v, X_c their centroids. r regularises the slope where cells are too few, at corners and edges
-  of a body; constants are recovered for any r. Only cells of one material are fitted together, because the stress jumps at
-  interfaces: a vertex has one value for each material around it, at most `nlayer`. Bodies share no vertices.
+  over the cells c around v, X_c their centroids. r regularises the slope where cells are too few, at corners
+  and edges of a body; constants are recovered for any r. Only cells of one material are fitted together, as
+  the stress jumps at interfaces: a vertex has one value for each material around it, at most `nlayer`. Bodies
+  share no vertices.
 
-  p(X_v) is a linear combination of the P_c with constant weights, which are stored. All cells of an owned vertex are local: only ghosts of the P_c, before, and of the values, after, are communicated.
+  p(X_v) is a linear combination of the P_c with constant weights, which are stored. All cells of an owned
+  vertex are local: only ghosts of the P_c, before, and of the values, after, are communicated.
 
-  For P2 p has degree two and is fitted to the stresses at the four points of each cell; another one is fitted by
-  its means over the cells to their mean pressures, as the element has one pressure per cell. Slopes of the pressure and second derivatives are regularised like the slopes above. The recovered
-  stress is quadratic in a cell, with p(X_v) at its vertices and, at the middle of an edge, the mean of the polynomials of its two ends.
+  For P2 p has degree two and is fitted to the stresses at the four points of each cell; another one is fitted
+  by its means over the cells to their mean pressures. Slopes of the pressure and second derivatives are
+  regularised like slopes above. The recovered stress is quadratic in a cell, p(X_v) at its vertices and, at
+  the middle of an edge, the mean of the polynomials of its ends.
 */
 #include "recovery.h"
 #include "sbkernel.h"
@@ -48,7 +51,7 @@ static PetscErrorCode create_slots(SbRecovery r)
   PetscInt *start, *at, *found, *count, *material, most = 1;
 
   PetscFunctionBeginUser;
-  /* corners 4 c + a of cells at each vertex, at[start[v]..start[v + 1]), and their materials, ascending, the first count[v] of found there */
+  /* corners 4 c + a at each vertex: at[start[v]..start[v + 1]); count[v] materials, ascending, in found */
   PetscCall(SbBucketByKey(4 * mesh->ncell, mesh->cell, mesh->nvert, &start, &at));
   PetscCall(PetscMalloc2(4 * mesh->ncell, &found, mesh->nvert_owned, &count));
   for (PetscInt i = 0; i < start[mesh->nvert_owned]; i++) found[i] = mesh->cell_material[at[i] / 4];
@@ -88,9 +91,7 @@ static inline void monomials(SbMesh mesh, PetscInt cell, int a, PetscReal p[4])
   }
 }
 
-/*
-  First row of the inverse of [n b^T; b B], moments[10] = n, b, B (upper triangle, row-major): with y = B^-1 b it is (1, -y) / (n - b.y).
-*/
+/* First row of the inverse of [n b^T; b B], moments n, b, upper B: (1, -y) / (n - b.y), y = B^-1 b. */
 static void solve_fit(const PetscReal moments[10], PetscReal row[4])
 {
   const PetscReal *b = moments + 1, *M = moments + 4, ridge = RIDGE * (M[0] + M[3] + M[5]);
@@ -149,7 +150,7 @@ static void monomials_of(const PetscReal d[3], PetscReal size, PetscReal p[NFIT]
   memcpy(p, all, sizeof(all));
 }
 
-/* Monomials at the points of a cell relative to its corner a, and their means over the cell, which the point rule integrates exactly. */
+/* Monomials at the points of a cell relative to its corner a, and their means over the cell. */
 static void point_monomials(SbMesh mesh, PetscInt cell, int a, PetscReal size, PetscReal p[5][NFIT])
 {
   const PetscInt *v = mesh->cell + 4 * cell;

@@ -1,9 +1,10 @@
 /*
   Table at the end of a run: errors and seconds of each source, and advice.
 
-  Cost of halving an error, as a factor on the time of the run. Mesh: edges of half the length (errors are proportional to the length; P2: to its square, so edges shorter
-  by 2^(1/2)), hence more tets, and more iterations where their number grows with the mesh. Integrator of order p: steps shorter by 2^(1/p).
-  Solves: the iterations that halve the residual at the measured rate.
+  Cost of halving an error, as a factor on the time of the run. Mesh: edges of half the length (errors are
+  proportional to it; P2: to its square, so edges shorter by 2^(1/2)), hence more tets, and more iterations
+  where these grow with the mesh. Integrator of order p: steps shorter by 2^(1/p). Solves: the iterations that
+  halve the residual at the measured rate.
 */
 #include "ledger_impl.h"
 #include "sblog.h"
@@ -18,11 +19,9 @@ typedef struct {
   PetscReal source[SB_ERROR_COUNT], setup, output, estimates, total;
 } Seconds;
 
-/*
-  space: residuals and tangents; linear: linear solves; nonlinear: both of these in Newton's iterations after the first of a step;
-  contact: search and active-set decisions; time: the remainder of the loop. Estimates are counted separately, including their
-  residuals and solves.
-*/
+/* space: residuals and tangents; linear: linear solves; nonlinear: both of these in Newton's iterations after
+   the first of a step; contact: search and active-set decisions; time: the rest of the loop. Estimates are
+   counted separately, with their residuals and solves. */
 static PetscErrorCode find_seconds(SbLedger l, Seconds *s)
 {
   enum { ASSEMBLY, SOLVE, CONTACT, SEARCH, SETUP, OUTPUT, ESTIMATES, TOTAL, COUNT };
@@ -104,7 +103,7 @@ static PetscReal order_of_space(SbLedger l)
   return l->run->model->element[worst_body(l)]->nodes_per[1] ? 2. : 1.;
 }
 
-/* Factor on the seconds per tet of a solve when edges are halved: 8 for a factorisation (n^2), 2 where iterations grow with the mesh, else 1. */
+/* Factor on the seconds per tet when edges are halved: 8 (n^2) for factors, 2 if iterations grow, else 1. */
 static PetscReal growth(SbRun run)
 {
   static const struct {
@@ -137,11 +136,10 @@ static PetscReal cost(SbLedger l, const Seconds *s, int source)
   }
 }
 
-/*
-  Whether P2 halves the error of the mesh at a lower cost than edges of half the length. On the same tets its relative error is about half the square of the relative error r of a
-  first-order element, for small r (bar of docs/reports/quadratic_tets.md: 0.4 to 0.7 of the square). So edges may be longer by r^(-1/2), and
-  the run takes c r^(3/2) times as long, c the ratio of matrix bytes per tet.
-*/
+/* Whether P2 halves the error of the mesh at a lower cost than edges of half the length. On the same tets its
+   relative error is about half the square of the relative error r of a first-order element, for small r (bar
+   of docs/reports/quadratic_tets.md: 0.4 to 0.7 of it). So edges may be longer by r^(-1/2), and the run takes
+   c r^(3/2) times as long, c the ratio of matrix bytes per tet. */
 static void say_quadratic(SbLedger l, PetscReal cost_of_half, char w[ROOM])
 {
   const SbModel m = l->run->model;
@@ -267,49 +265,21 @@ static void report_accuracy(SbLedger l, char w[ROOM])
 
 /* ------------------------------------------------------------------ table */
 
-static PetscErrorCode write_table(SbLedger l, const Seconds *s, FILE *f)
+/* A line of the printed table: error < 0, quantity NULL, seconds < 0: none. */
+static PetscErrorCode print_line(SbLedger l, const Seconds *s, const char *name, PetscReal error,
+                                 const PetscReal *quantity, PetscReal seconds, const char *note)
 {
-  const SbModel m = l->run->model;
-  const PetscReal scale = l->stored > 0. ? 1. / PetscSqrtReal(l->stored) : 0.;
+  const PetscReal relative = l->stored > 0. ? error / PetscSqrtReal(l->stored) : 0.;
+  char text[96];
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscFPrintf(PETSC_COMM_SELF, f, "source,body,error,relative,quantity,seconds\n#,,J^(1/2),1,SI,s\n"));
-  for (int i = 0; i < SB_ERROR_COUNT; i++)
-    PetscCall(PetscFPrintf(PETSC_COMM_SELF, f, "%s,,%.17g,%.17g,%.17g,%.17g\n", SbErrorNames[i],
-                           (double)SbLedgerError(l, i), (double)(scale * SbLedgerError(l, i)),
-                           (double)l->quantity.error[i], (double)s->source[i]));
-  for (PetscInt b = 0; b < m->nbody; b++)
-    PetscCall(PetscFPrintf(PETSC_COMM_SELF, f, "space,%s,%.17g,%.17g,,\n", m->body[b].name,
-                           (double)PetscSqrtReal(l->space_error[b]),
-                           (double)(scale * PetscSqrtReal(l->space_error[b]))));
-  PetscCall(PetscFPrintf(PETSC_COMM_SELF, f, "together,,%.17g,%.17g,,%.17g\n", (double)together(l),
-                         (double)(scale * together(l)), (double)s->total));
-  PetscCall(PetscFPrintf(PETSC_COMM_SELF, f, "set-up,,,,,%.17g\noutput,,,,,%.17g\nestimates,,,,,%.17g\n",
-                         (double)s->setup, (double)s->output, (double)s->estimates));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode print_line(const char *name, PetscReal error, PetscReal relative,
-                                 const PetscReal *quantity, PetscReal seconds, PetscReal total,
-                                 const char *note)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscPrintf(PETSC_COMM_SELF, "%-11s", name));
-  if (error >= 0.)
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, " %10.2e %9.2e", (double)error, (double)relative));
-  else
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, " %10s %9s", "", ""));
-  if (quantity && error >= 0.)
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, " %9.2e", (double)*quantity));
-  else
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, " %9s", ""));
+  SbFormat(sizeof(text), text, "%-11s", name);
+  if (error >= 0.) SbAppend(sizeof(text), text, " %10.2e %9.2e", (double)error, (double)relative);
+  if (quantity) SbAppend(sizeof(text), text, " %9.2e", (double)*quantity);
   if (seconds >= 0.)
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, " %9.3f %5.1f %%", (double)seconds,
-                          (double)(100. * seconds / PetscMax(total, 1e-9))));
-  else
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, " %9s %7s", "", ""));
-  PetscCall(PetscPrintf(PETSC_COMM_SELF, "  %s\n", note));
+    SbAppend(sizeof(text), text, "%*s %9.3f %5.1f %%", 42 - (int)strlen(text), "", (double)seconds,
+             (double)(100. * seconds / PetscMax(s->total, 1e-9)));
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "%-60s  %s\n", text, note));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -329,35 +299,48 @@ PetscErrorCode SbLedgerReport(SbLedger l, const char *file, PetscBool quiet)
 
   PetscFunctionBeginUser;
   if (!l) PetscFunctionReturn(PETSC_SUCCESS);
+  m = l->run->model;
+  scale = l->stored > 0. ? 1. / PetscSqrtReal(l->stored) : 0.;
   PetscCall(find_seconds(l, &s));
-  PetscCallMPI(MPI_Comm_rank(l->run->model->comm, &rank));
+  PetscCallMPI(MPI_Comm_rank(m->comm, &rank));
   if (rank) PetscFunctionReturn(PETSC_SUCCESS);
   f = fopen(file, "w");
   PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot open %s for writing", file);
-  PetscCall(write_table(l, &s, f));
+  PetscCall(
+    PetscFPrintf(PETSC_COMM_SELF, f, "source,body,error,relative,quantity,seconds\n#,,J^(1/2),1,SI,s\n"));
+  for (int i = 0; i < SB_ERROR_COUNT; i++)
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, f, "%s,,%.17g,%.17g,%.17g,%.17g\n", SbErrorNames[i],
+                           (double)SbLedgerError(l, i), (double)(scale * SbLedgerError(l, i)),
+                           (double)l->quantity.error[i], (double)s.source[i]));
+  for (PetscInt b = 0; b < m->nbody; b++)
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, f, "space,%s,%.17g,%.17g,,\n", m->body[b].name,
+                           (double)PetscSqrtReal(l->space_error[b]),
+                           (double)(scale * PetscSqrtReal(l->space_error[b]))));
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, f,
+                         "together,,%.17g,%.17g,,%.17g\nset-up,,,,,%.17g\noutput,,,,,%.17g\n"
+                         "estimates,,,,,%.17g\n",
+                         (double)together(l), (double)(scale * together(l)), (double)s.total, (double)s.setup,
+                         (double)s.output, (double)s.estimates));
   PetscCheck(!fclose(f), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "cannot write %s", file);
   if (quiet) PetscFunctionReturn(PETSC_SUCCESS);
-  m = l->run->model;
-  scale = l->stored > 0. ? 1. / PetscSqrtReal(l->stored) : 0.;
   q = l->quantity.kind ? l->quantity.error : NULL;
   PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n%-11s %10s %9s %9s %9s %7s  of %.3g J stored\n", "error",
                         "J^(1/2)", "relative", quantities[l->quantity.kind], "seconds", "",
                         (double)l->stored));
   for (int i = 0; i < SB_ERROR_COUNT; i++) {
-    PetscCall(print_line(SbErrorNames[i], SbLedgerError(l, i), scale * SbLedgerError(l, i), q ? &q[i] : NULL,
-                         i == SB_ERROR_ROUNDING ? -1. : s.source[i], s.total, notes[i]));
+    PetscCall(print_line(l, &s, SbErrorNames[i], SbLedgerError(l, i), q ? &q[i] : NULL,
+                         i == SB_ERROR_ROUNDING ? -1. : s.source[i], notes[i]));
     for (PetscInt b = 0; i == SB_ERROR_SPACE && m->nbody > 1 && b < m->nbody; b++) {
       char name[16];
 
       PetscCall(PetscSNPrintf(name, sizeof(name), "  %.8s", m->body[b].name));
-      PetscCall(print_line(name, PetscSqrtReal(l->space_error[b]), scale * PetscSqrtReal(l->space_error[b]),
-                           NULL, -1., 1., ""));
+      PetscCall(print_line(l, &s, name, PetscSqrtReal(l->space_error[b]), NULL, -1., ""));
     }
   }
-  PetscCall(print_line("set-up", -1., 0., NULL, s.setup, s.total, ""));
-  PetscCall(print_line("output", -1., 0., NULL, s.output, s.total, ""));
-  PetscCall(print_line("estimates", -1., 0., NULL, s.estimates, s.total, "of this table"));
-  PetscCall(print_line("together", together(l), scale * together(l), NULL, s.total, s.total, ""));
+  PetscCall(print_line(l, &s, "set-up", -1., NULL, s.setup, ""));
+  PetscCall(print_line(l, &s, "output", -1., NULL, s.output, ""));
+  PetscCall(print_line(l, &s, "estimates", -1., NULL, s.estimates, "of this table"));
+  PetscCall(print_line(l, &s, "together", together(l), NULL, s.total, ""));
   say_largest(l, &s, words);
   say_wasted(l, &s, words);
   report_accuracy(l, words);

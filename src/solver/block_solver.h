@@ -20,8 +20,7 @@ PetscErrorCode SbBlockSolverAnalyze(SbBlockSolver solver, PetscInt n, const Pets
 */
 PetscErrorCode SbBlockSolverSetUp(SbBlockSolver solver, PetscInt n, const PetscInt ia[], const PetscInt ja[],
                                   const PetscReal block[], PetscBool changed, PetscBool *ok);
-/* Floating-point operations of a factorisation, and number of entries of the factor. Collective; after
-   SbBlockSolverAnalyze(). */
+/* Operations of a factorisation, entries of the factor. Collective; after SbBlockSolverAnalyze(). */
 PetscErrorCode SbBlockSolverCost(SbBlockSolver solver, PetscReal *flops, PetscReal *entries);
 /* x = A^-1 b; b and x [n][3], own rows; may be the same array. Collective. */
 PetscErrorCode SbBlockSolverSolve(SbBlockSolver solver, const PetscReal b[], PetscReal x[]);

@@ -21,8 +21,8 @@ PetscErrorCode SbCoarseCreate(SbSpace s, PetscInt wanted, PetscBool vertices, Sb
   PetscCall(PetscMalloc1(s->nnode_owned, &c->agg));
   if (c->aggregated) PetscCall(SbAggregate(s, wanted, &c->nagg, c->agg));
   if (!vertices || !s->edge_node) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(2 * s->nnode, &c->parent));
-  PetscCall(PetscCalloc1(s->nnode, &c->vertex));
+  PetscCall(PetscMalloc1(2 * s->nnode + 1, &c->parent));
+  PetscCall(PetscCalloc1(s->nnode + 1, &c->vertex));
   for (PetscInt k = 0; k < 2 * s->nnode; k++) c->parent[k] = k / 2;
   for (PetscInt k = 0; k < 12 * s->mesh->ncell; k++) {
     const PetscInt edge = k / 2, i = s->edge_node[edge];
@@ -205,42 +205,39 @@ static PetscErrorCode find_vanishing(SbCoarse c)
 }
 
 /* The units of the ghosts in the rows of A, from their owners; then units are renumbered, own ones first. */
-static PetscErrorCode find_ghosts(SbCoarse c, const PetscInt ghost[])
+static PetscErrorCode find_ghosts(SbCoarse c, PetscBool parallel, const PetscInt ghost[])
 {
   const PetscInt n = c->space->nnode_owned, nghost = c->nall - n;
+  PetscReal(*share)[6];
   PetscInt *other, m = 0;
-  PetscReal *share;
-  VecScatter scatter = NULL;
+  VecScatter scatter;
+  Vec own, far;
+  IS is;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(3 * c->nall, &share));
+  PetscCall(PetscMalloc1(c->nall, &share));
   for (PetscInt i = 0; i < n; i++) {
-    share[3 * i] = (PetscReal)c->unit[2 * i];
-    share[3 * i + 1] = (PetscReal)c->unit[2 * i + 1];
-    share[3 * i + 2] = (PetscReal)(64 * c->way[i] + c->moved[i]);
+    for (int q = 0; q < 2; q++) share[i][q] = (PetscReal)c->unit[2 * i + q];
+    share[i][2] = (PetscReal)(64 * c->way[i] + c->moved[i]);
+    for (int q = 0; q < 3; q++) share[i][3 + q] = c->d[3 * i + q];
   }
-  for (int k = 0; k < 2 && ghost; k++) {
-    PetscReal *x = k ? c->d : share;
-    Vec own, far;
-    IS is;
-
-    PetscCall(VecCreateMPIWithArray(c->space->comm, 3, 3 * n, PETSC_DECIDE, x, &own));
-    PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 3, 3 * nghost, x + 3 * n, &far));
-    if (!k) {
-      PetscCall(ISCreateBlock(PETSC_COMM_SELF, 3, nghost, ghost, PETSC_USE_POINTER, &is));
-      PetscCall(VecScatterCreate(own, is, far, NULL, &scatter));
-      PetscCall(ISDestroy(&is));
-    }
+  if (parallel) {
+    PetscCall(VecCreateMPIWithArray(c->space->comm, 6, 6 * n, PETSC_DECIDE, share[0], &own));
+    PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 6, 6 * nghost, share[n], &far));
+    PetscCall(ISCreateBlock(PETSC_COMM_SELF, 6, nghost, ghost, PETSC_USE_POINTER, &is));
+    PetscCall(VecScatterCreate(own, is, far, NULL, &scatter));
     PetscCall(VecScatterBegin(scatter, own, far, INSERT_VALUES, SCATTER_FORWARD));
     PetscCall(VecScatterEnd(scatter, own, far, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(VecScatterDestroy(&scatter));
+    PetscCall(ISDestroy(&is));
     PetscCall(VecDestroy(&own));
     PetscCall(VecDestroy(&far));
   }
-  PetscCall(VecScatterDestroy(&scatter));
   for (PetscInt i = n; i < c->nall; i++) {
-    for (int q = 0; q < 2; q++) c->unit[2 * i + q] = (PetscInt)share[3 * i + q];
-    c->way[i] = (uint8_t)((PetscInt)share[3 * i + 2] / 64);
-    c->moved[i] = (uint8_t)((PetscInt)share[3 * i + 2] % 64);
+    for (int q = 0; q < 2; q++) c->unit[2 * i + q] = (PetscInt)share[i][q];
+    c->way[i] = (uint8_t)((PetscInt)share[i][2] / 64);
+    c->moved[i] = (uint8_t)((PetscInt)share[i][2] % 64);
+    for (int q = 0; q < 3; q++) c->d[3 * i + q] = share[i][3 + q];
   }
   PetscCall(PetscFree(share));
 
@@ -352,7 +349,7 @@ PetscErrorCode SbCoarseSetPattern(SbCoarse c, Mat A, const PetscInt ia[], const 
   c->nall = n + nghost / 3;
   PetscCall(find_units(c, contact));
   PetscCall(find_vanishing(c));
-  PetscCall(find_ghosts(c, parallel ? ghost : NULL));
+  PetscCall(find_ghosts(c, parallel, ghost));
 
   /* the rows of A with columns of own nodes and ghosts */
   if (!ia) {

@@ -70,22 +70,19 @@ PetscErrorCode SbCoarseDestroy(SbCoarse *coarse);
    NULL: those of the space; contact[nnode_owned]: the node moves by itself; NULL: none. Collective. */
 PetscErrorCode SbCoarseSetPattern(SbCoarse coarse, Mat A, const PetscInt ia[], const PetscInt ja[],
                                   const uint8_t contact[]);
-/* A solver with PETSc's options -pc_coarse_: a factorisation, or multigrid. After SbCoarseSetPattern().
-   Collective. */
+/* A solver with the options -pc_coarse_: a factorisation, or multigrid; after the pattern. Collective. */
 PetscErrorCode SbCoarseCreateSolver(SbCoarse coarse, PetscBool factored);
 /* Computes E = Z^T A Z, and sets up its solver. coarse->ok is false if E was found not to be positive
    definite: with a factorisation always, with multigrid perhaps not. Collective. */
 PetscErrorCode SbCoarseSetUp(SbCoarse coarse, Mat A);
 /* The second half of SbCoarseSetUp(), after coarse->value. Collective. */
 PetscErrorCode SbCoarseSetUpSolver(SbCoarse coarse);
-/* c = Z^T r; share: a weighted norm of c over |r|, about 1 for r in the span of Z; NULL: not needed.
-   Collective. */
+/* c = Z^T r; share: a weighted norm of c over |r|, about 1 for r in the span of Z, or NULL. Collective. */
 PetscErrorCode SbCoarseRestrict(SbCoarse coarse, Vec r, PetscReal *share);
 /* z += Z E^-1 c with the c of the last SbCoarseRestrict(). Collective. */
 PetscErrorCode SbCoarseAdd(SbCoarse coarse, Vec z);
 /* x += Z E^-1 Z^T (b - A x). Collective. */
 PetscErrorCode SbCoarseCorrect(SbCoarse coarse, Mat A, Vec b, Vec x);
 
-/* ia[nnode_owned+1], ja: rows of the operators of a space, global nodes; the caller frees both. Not
-   collective. */
+/* ia[nnode_owned+1], ja: graph of the space by global nodes; the caller frees both. Not collective. */
 PetscErrorCode SbSpaceGetGraph(SbSpace space, PetscInt **ia, PetscInt **ja);

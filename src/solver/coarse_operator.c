@@ -10,6 +10,7 @@
   aggregate, and right-hand sides are zero there.
 */
 #include "coarse.h"
+#include "contact_coarse.h"
 
 /* The sums W of one row, by units. */
 typedef struct {
@@ -62,17 +63,7 @@ static inline void add_column(SbCoarse c, const PetscScalar K[9], PetscReal weig
 /* The block of an own row in a column, by its number over all ranks. */
 static inline PetscReal *block_of(SbCoarse c, PetscInt row, PetscInt column)
 {
-  PetscInt low = c->ia[row], high = c->ia[row + 1] - 1;
-
-  while (low < high) {
-    const PetscInt middle = (low + high) / 2;
-
-    if (c->ja[middle] < column)
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  return c->value + 9 * (size_t)low;
+  return c->value + 9 * (size_t)SbRowFind(c->ia, c->ja, row, column);
 }
 
 /* E += Z_i^T W for row i. */
@@ -126,7 +117,7 @@ PetscErrorCode SbCoarseSetUp(SbCoarse c, Mat A)
 
   PetscFunctionBeginUser;
   c->ok = PETSC_TRUE;
-  if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!c->N && !c->direct) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbMatGetBlocks(A, &x));
   for (int q = 0; q < 2 && x.part[q]; q++)
     PetscCall(SbMatGetPattern(x.part[q], &nrow, &start[q], &column[q]));
@@ -144,8 +135,7 @@ PetscErrorCode SbCoarseSetUp(SbCoarse c, Mat A)
         const PetscScalar *K = x.value[q] + 9 * (size_t)k;
         PetscScalar D[9];
 
-        /* rows of prescribed unknowns contain only their diagonal, which counts where the node moves by
-           itself */
+        /* rows of prescribed unknowns have only their diagonal, which counts if the node moves by itself */
         for (int e = 0; j == i && e < 9; e++)
           D[e] = c->way[i] != SB_ITSELF && c->space->fixed[i] & (1 << (e / 3)) ? 0. : K[e];
         add_column(c, j == i ? D : K, x.symmetric && j == i ? 0.5 : 1., j, &row);

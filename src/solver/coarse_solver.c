@@ -91,8 +91,7 @@ PetscErrorCode SbCoarseCreateSolver(SbCoarse c, PetscBool factored)
   else {
     PetscCall(SbAttachModes(c->E, fill_mode, c));
     PetscCall(SbPCMultigridSet(c->solver, c->aggregated ? -1. : 0.));
-    /* coarsening by the square of the graph, PETSc's default on the first level: 50 iterations instead of 38
-       on 16 ranks */
+    /* PETSc's first coarsening, by the square of the graph: 50 iterations instead of 38 on 16 ranks */
     if (c->aggregated) {
       PetscCall(SbSolverSetDefault("pc_coarse_", "pc_gamg_aggressive_coarsening", "0"));
       PetscCall(SbSolverSetDefault("pc_coarse_", "mg_levels_pc_type", "pbjacobi"));

@@ -169,32 +169,35 @@ PetscErrorCode SbPCConstrainedCreate(SbSpace s, PC pc, PC *inner)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbPCShellFind(PC pc, const char *name, void *context)
+{
+  const char *own = NULL;
+  PetscBool is;
+
+  PetscFunctionBeginUser;
+  *(void **)context = NULL;
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCSHELL, &is));
+  if (is) PetscCall(PCShellGetName(pc, &own));
+  if (own && !strcmp(own, name)) PetscCall(PCShellGetContext(pc, context));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbPCConstrainedGetInner(PC pc, PC *inner)
 {
-  PetscBool is;
-  const char *name = NULL;
   Wrapped *w;
 
   PetscFunctionBeginUser;
-  *inner = pc;
-  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCSHELL, &is));
-  if (is) PetscCall(PCShellGetName(pc, &name));
-  if (!name || strcmp(name, NAME)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PCShellGetContext(pc, &w));
-  *inner = w->inner;
+  PetscCall(SbPCShellFind(pc, NAME, &w));
+  *inner = w ? w->inner : pc;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbPCConstrainedIsFactored(PC pc, PetscBool *is)
 {
   Wrapped *w;
-  PC inner;
 
   PetscFunctionBeginUser;
-  *is = PETSC_FALSE;
-  PetscCall(SbPCConstrainedGetInner(pc, &inner));
-  if (inner == pc) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PCShellGetContext(pc, &w));
-  *is = is_factored(w->space);
+  PetscCall(SbPCShellFind(pc, NAME, &w));
+  *is = (PetscBool)(w && is_factored(w->space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

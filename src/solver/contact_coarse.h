@@ -14,6 +14,22 @@ typedef struct {
   uint8_t *contact; /* [n] the node is in contact */
 } SbContactRows;
 
+/* Position of a column in row r, whose columns are ascending; -1: none. */
+static inline PetscInt SbRowFind(const PetscInt ia[], const PetscInt ja[], PetscInt r, PetscInt column)
+{
+  PetscInt low = ia[r], high = ia[r + 1];
+
+  while (low < high) {
+    const PetscInt middle = (low + high) / 2;
+
+    if (ja[middle] < column)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return low < ia[r + 1] && ja[low] == column ? low : -1;
+}
+
 /*
   SbPCContactCreate - makes pc a preconditioner for CG: Chebyshev with the diagonal blocks, or Gauss-Seidel
   for P2 bodies that are not too large, and an exactly solved coarse space: nodes in contact, and rigid-body

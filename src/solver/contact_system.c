@@ -45,7 +45,6 @@ struct _p_SbContactSystem {
   PetscInt *place;   /* [ka[n]] position of the tangent's blocks in rows.value */
   PetscInt *used;    /* [rows.ia[n]] last solve in which contact used the block; -1: a block of the tangent */
   PetscInt *last;    /* [n] last solve in which contact used the row, -1: never */
-  PetscInt *where;   /* [Nnode] position of each column in the row of the last mark_row() */
   PetscInt nsolve;
   PetscInt limit, most;      /* limits of CG's iterations: by options; by the cost of a factorisation */
   PetscInt budget;           /* credit of iterations */
@@ -101,14 +100,14 @@ PetscErrorCode SbContactSystemCreate(SbSpace s, PetscInt choice, SbContactSystem
   c->choice = choice;
   c->rows.n = n;
   PetscCall(PetscMalloc2(n, &c->all, n, &c->last));
-  PetscCall(PetscCalloc1(s->Nnode, &c->where));
   for (PetscInt i = 0; i < n; i++) {
     c->all[i] = i;
     c->last[i] = -1;
   }
   PetscCall(SbSpaceGetGraph(s, &c->ka, &c->kj));
   PetscCall(PetscMalloc2(c->ka[n], &c->place, 9 * (size_t)c->ka[n], &c->tangent));
-  PetscCall(PetscCalloc2(n + 1, &c->rows.ia, n, &c->rows.contact));
+  PetscCall(PetscCalloc1(n + 1, &c->rows.ia));
+  PetscCall(PetscCalloc1(n, &c->rows.contact));
   PetscCall(user_types(c->method, c->type));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -137,39 +136,23 @@ PetscErrorCode SbContactSystemDescribe(PetscInt choice, char text[], size_t size
 
 /* ------------------------------------------------------------------ the matrix */
 
-/* Stores the positions of the columns of row r for place_of(). */
-static inline void mark_row(SbContactSystem c, PetscInt r)
-{
-  for (PetscInt k = c->rows.ia[r]; k < c->rows.ia[r + 1]; k++) c->where[c->rows.ja[k]] = k;
-}
-
-/* Position of column g in row r, the row of the last mark_row(); -1: none. */
-static inline PetscInt place_of(SbContactSystem c, PetscInt r, PetscInt g)
-{
-  const PetscInt k = c->where[g];
-
-  return k >= c->rows.ia[r] && k < c->rows.ia[r + 1] && c->rows.ja[k] == g ? k : -1;
-}
-
 /* Creates a pattern that contains the blocks, and marks nodes in contact. */
 static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
 {
   const PetscInt n = c->rows.n;
-  PetscInt *first, *order, *ia, *ja, *used, most = 0, nz = 0, *column, *stamp;
+  PetscInt *key, *first, *order, *ia, *ja, *used, most = 0, nz = 0, *column, *stamp;
   const SbContactRows old = c->rows;
 
   PetscFunctionBeginUser;
   /* contact blocks by rows */
-  PetscCall(PetscCalloc1(n + 2, &first));
-  PetscCall(PetscMalloc1(b->n, &order));
-  for (PetscInt k = 0; k < b->n; k++) first[b->node[k][0] + 2]++;
-  for (PetscInt r = 0; r < n; r++) first[r + 2] += first[r + 1];
-  for (PetscInt k = 0; k < b->n; k++) order[first[b->node[k][0] + 1]++] = k;
+  PetscCall(PetscMalloc1(b->n, &key));
+  for (PetscInt k = 0; k < b->n; k++) key[k] = b->node[k][0];
+  PetscCall(SbBucketByKey(b->n, key, n, &first, &order));
+  PetscCall(PetscFree(key));
   for (PetscInt r = 0; r < n; r++)
     most = PetscMax(most, c->ka[r + 1] - c->ka[r] + first[r + 1] - first[r] + old.ia[r + 1] - old.ia[r]);
 
-  /* each row: columns of the tangent, those of the old pattern that are still in use, those of the contact
-     blocks */
+  /* each row: columns of the tangent, those of the old pattern still in use, those of contact */
   PetscCall(PetscMalloc2(most, &column, most, &stamp));
   PetscCall(PetscMalloc1(n + 1, &ia));
   PetscCall(PetscMalloc2(c->ka[n] + b->n + old.ia[n], &ja, c->ka[n] + b->n + old.ia[n], &used));
@@ -207,29 +190,15 @@ static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
   PetscCall(PetscFree(first));
   PetscCall(PetscFree2(c->rows.ja, c->used));
   PetscCall(PetscFree(c->rows.value));
-  PetscCall(PetscArraycpy(c->rows.ia, ia, n + 1));
-  PetscCall(PetscFree(ia));
+  PetscCall(PetscFree(c->rows.ia));
+  c->rows.ia = ia;
   c->rows.ja = ja;
   c->used = used;
   PetscCall(PetscMalloc1(9 * (size_t)nz, &c->rows.value));
   for (PetscInt r = 0; r < n; r++) {
-    mark_row(c, r);
-    for (PetscInt k = c->ka[r]; k < c->ka[r + 1]; k++) c->place[k] = place_of(c, r, c->kj[k]);
+    for (PetscInt k = c->ka[r]; k < c->ka[r + 1]; k++) c->place[k] = SbRowFind(ia, ja, r, c->kj[k]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Positions of the blocks, place[n]; false if the pattern lacks some. */
-static PetscBool find_places(SbContactSystem c, const SbBlocks *b, PetscInt place[])
-{
-  PetscBool all = PETSC_TRUE;
-
-  for (PetscInt k = 0; k < b->n; k++) {
-    if (!k || b->node[k][0] != b->node[k - 1][0]) mark_row(c, b->node[k][0]);
-    place[k] = place_of(c, b->node[k][0], b->node[k][1]);
-    all = (PetscBool)(all && place[k] >= 0);
-  }
-  return all;
 }
 
 /* Sums the tangent and the contact blocks into rows.value. */
@@ -246,13 +215,14 @@ static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
     const PetscInt r = b->node[k][0];
 
     c->last[r] = c->nsolve;
-    missing = (PetscBool)(missing || (c->space->fixed[r] != 7 && !rows->contact[r]));
+    place[k] = SbRowFind(rows->ia, rows->ja, r, b->node[k][1]);
+    missing = (PetscBool)(missing || place[k] < 0 || (c->space->fixed[r] != 7 && !rows->contact[r]));
   }
-  if (!missing) missing = (PetscBool)!find_places(c, b, place);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &missing, 1, SB_MPI_BOOL, MPI_LOR, c->space->comm));
   if (missing) {
     PetscCall(make_pattern(c, b));
-    (void)find_places(c, b, place);
+    for (PetscInt k = 0; k < b->n; k++)
+      place[k] = SbRowFind(rows->ia, rows->ja, b->node[k][0], b->node[k][1]);
     c->foreign[0] = c->foreign[1] = PETSC_TRUE;
   }
   PetscCall(SbSpaceGetRows(c->space, K, rows->n, c->all, c->ka, NULL, c->tangent));
@@ -274,8 +244,7 @@ static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Copies the rows into the parts of PETSc's matrix, which stores blocks column-major; SBAIJ only those on and
-   above the diagonal. */
+/* Copies the rows into the parts of PETSc's matrix: column-major blocks, of SBAIJ from the diagonal on. */
 static PetscErrorCode fill_matrix(SbContactSystem c)
 {
   const SbContactRows *rows = &c->rows;
@@ -475,9 +444,9 @@ PetscErrorCode SbContactSystemDestroy(SbContactSystem *system)
   PetscCall(PetscFree2(c->all, c->last));
   PetscCall(PetscFree(c->ka));
   PetscCall(PetscFree(c->kj));
-  PetscCall(PetscFree(c->where));
   PetscCall(PetscFree2(c->place, c->tangent));
-  PetscCall(PetscFree2(c->rows.ia, c->rows.contact));
+  PetscCall(PetscFree(c->rows.ia));
+  PetscCall(PetscFree(c->rows.contact));
   PetscCall(PetscFree2(c->rows.ja, c->used));
   PetscCall(PetscFree(c->rows.value));
   PetscCall(PetscFree(*system));

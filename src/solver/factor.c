@@ -81,6 +81,7 @@ PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], c
   PetscFunctionBeginUser;
   // order of elimination and pattern of L
   PetscCall(PetscNew(&f));
+  *factor = f;
   PetscCall(SbEliminationCreate(n, nkeep, ia, ja, NULL, &f->e));
   PetscCall(cut_panels(f));
   // storage of the panels, with room for reads beyond the end, and work arrays of a solve
@@ -88,7 +89,6 @@ PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], c
   PetscCall(allocate_pages(sizeof(float) * 6 * (size_t)f->e.nfree, &f->scale));
   PetscCall(allocate_pages(sizeof(float) * (3 * (size_t)n + WIDTH), &f->w));
   PetscCall(allocate_pages(sizeof(float) * (size_t)(f->tallest + ROWS), &f->below));
-  *factor = f;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -99,13 +99,12 @@ PetscErrorCode SbFactorCreateExact(PetscInt n, const PetscInt ia[], const PetscI
   SbFactor f;
 
   PetscFunctionBeginUser;
-  // order of elimination, by default the one given
   PetscCall(PetscNew(&f));
-  PetscCall(SbEliminationCreate(n, 0, ia, ja, order, &f->e));
+  *factor = f;
   e = &f->e;
+  PetscCall(SbEliminationCreate(n, 0, ia, ja, order, &f->e));
   // positions of the supernodes' columns in L
-  PetscCall(PetscMalloc1(e->nsuper + 1, &f->column));
-  f->column[0] = 0;
+  PetscCall(PetscCalloc1(e->nsuper + 1, &f->column));
   for (PetscInt g = 0; g < e->nsuper; g++) {
     const PetscInt ncol = 3 * (e->first[g + 1] - e->first[g]), nall = 3 * (e->start[g + 1] - e->start[g]);
 
@@ -113,7 +112,6 @@ PetscErrorCode SbFactorCreateExact(PetscInt n, const PetscInt ia[], const PetscI
     f->tallest = PetscMax(f->tallest, nall);
   }
   PetscCall(PetscMalloc2(f->column[e->nsuper], &f->L, 3 * n + f->tallest, &f->y));
-  *factor = f;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -172,21 +170,26 @@ PetscReal SbFactorFlops(SbFactor f)
 
 /* Work space of a factorisation. */
 typedef struct {
-  PetscInt *position;        /* [n] index of a position in the current front */
+  PetscInt *position, *kept; /* [n] index of a position in the current front, among the kept nodes */
+  PetscInt *at;              /* [tallest / 3] index of the rows of an update */
   PetscScalar *front;        /* [tallest^2] column-major, lower triangle */
   PetscScalar **update;      /* [nsuper] update of each supernode for its parent; NULL: none, or used */
   PetscInt *child, *sibling; /* [nsuper] lists of children in the assembly tree */
 } Work;
 
-/* Extend-add of a supernode's update to a lower triangle; at[k]: node index there of its k-th row. */
-static void add_update(const PetscScalar *update, PetscInt nrow, const PetscInt at[], PetscScalar *to,
-                       PetscInt ld)
+/* Adds the update of supernode g to a lower triangle of order ld, and frees it; index: of positions there. */
+static PetscErrorCode add_update(const SbElimination *e, PetscInt g, Work *work, const PetscInt index[],
+                                 PetscScalar *to, PetscInt ld)
 {
-  const PetscInt size = 3 * nrow;
+  const PetscInt *list = e->list + e->start[g] + e->first[g + 1] - e->first[g];
+  const PetscInt nrow = (PetscInt)(e->list + e->start[g + 1] - list);
+  PetscInt *at = work->at;
 
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < nrow; k++) at[k] = index[list[k]];
   for (PetscInt j = 0; j < nrow; j++) {
     for (PetscInt a = 0; a < 3; a++) {
-      const PetscScalar *from = update + (size_t)(3 * j + a) * (size_t)size;
+      const PetscScalar *from = work->update[g] + (size_t)(3 * j + a) * (size_t)(3 * nrow);
       PetscScalar *column = to + (size_t)(3 * at[j] + a) * (size_t)ld;
 
       for (PetscInt b = a; b < 3; b++) column[3 * at[j] + b] += from[3 * j + b];
@@ -195,6 +198,8 @@ static void add_update(const PetscScalar *update, PetscInt nrow, const PetscInt 
       }
     }
   }
+  PetscCall(PetscFree(work->update[g]));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Factors the leading ncol columns of the front of order size and forms the update. */
@@ -252,16 +257,8 @@ static PetscErrorCode eliminate(SbFactor f, PetscInt g, const PetscInt ia[], con
     }
   }
   // add the updates of the children and free them
-  for (PetscInt c = work->child[g]; c >= 0; c = work->sibling[c]) {
-    const PetscInt below = e->start[c] + e->first[c + 1] - e->first[c], n = e->start[c + 1] - below;
-    PetscInt *at;
-
-    PetscCall(PetscMalloc1(n, &at));
-    for (PetscInt k = 0; k < n; k++) at[k] = work->position[e->list[below + k]];
-    add_update(work->update[c], n, at, work->front, 3 * nall);
-    PetscCall(PetscFree(at));
-    PetscCall(PetscFree(work->update[c]));
-  }
+  for (PetscInt c = work->child[g]; c >= 0; c = work->sibling[c])
+    PetscCall(add_update(e, c, work, work->position, work->front, 3 * nall));
   // factor the columns of the supernode; the update is for its parent
   if (nrow) PetscCall(PetscMalloc1(9 * (size_t)nrow * (size_t)nrow, &work->update[g]));
   PetscCall(factor_front(work->front, 3 * nall, 3 * ncol, work->update[g], ok));
@@ -277,9 +274,11 @@ PetscErrorCode SbFactorNumeric(SbFactor f, const PetscInt ia[], const PetscInt j
 
   PetscFunctionBeginUser;
   // storage for the largest front, and lists of children
-  PetscCall(PetscMalloc2(e->n, &work.position, (size_t)f->tallest * (size_t)f->tallest, &work.front));
-  PetscCall(PetscMalloc2(e->nsuper, &work.child, e->nsuper, &work.sibling));
+  PetscCall(PetscMalloc6(e->n, &work.position, e->n, &work.kept, e->nsuper, &work.child, e->nsuper,
+                         &work.sibling, f->tallest / 3, &work.at, (size_t)f->tallest * (size_t)f->tallest,
+                         &work.front));
   PetscCall(PetscCalloc1(e->nsuper, &work.update));
+  for (PetscInt k = 0; k < e->n; k++) work.kept[k] = k - e->nfree;
   for (PetscInt g = 0; g < e->nsuper; g++) work.child[g] = -1;
   // postorder: supernodes come after all their children
   *ok = PETSC_TRUE;
@@ -312,21 +311,12 @@ PetscErrorCode SbFactorNumeric(SbFactor f, const PetscInt ia[], const PetscInt j
     if (e->parent[g] >= 0) {
       work.sibling[g] = work.child[e->parent[g]];
       work.child[e->parent[g]] = g;
-    } else if (work.update[g]) {
-      const PetscInt first = e->start[g] + e->first[g + 1] - e->first[g], n = e->start[g + 1] - first;
-      PetscInt *at;
-
-      PetscCall(PetscMalloc1(n, &at));
-      for (PetscInt k = 0; k < n; k++) at[k] = e->list[first + k] - e->nfree;
-      add_update(work.update[g], n, at, schur, 3 * (e->n - e->nfree));
-      PetscCall(PetscFree(at));
-      PetscCall(PetscFree(work.update[g]));
-    }
+    } else if (work.update[g])
+      PetscCall(add_update(e, g, &work, work.kept, schur, 3 * (e->n - e->nfree)));
   }
   // after a failure: free the updates that no parent has used
   for (PetscInt g = 0; g < e->nsuper; g++) PetscCall(PetscFree(work.update[g]));
-  PetscCall(PetscFree2(work.position, work.front));
-  PetscCall(PetscFree2(work.child, work.sibling));
+  PetscCall(PetscFree6(work.position, work.kept, work.child, work.sibling, work.at, work.front));
   PetscCall(PetscFree(work.update));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -350,11 +340,7 @@ SB_KERNEL static void forward(SbFactor f)
     for (PetscInt j = 0; j < ncol; j++) x[j] = pivot[j];
     panel_multiply(round_up(3 * p->nrow), ncol, a, pivot, scale + 1, below);
     for (PetscInt k = 0; k < p->nrow; k++) {
-      float *to = w + 3 * p->row[k];
-
-      to[0] -= below[3 * k];
-      to[1] -= below[3 * k + 1];
-      to[2] -= below[3 * k + 2];
+      for (int c = 0; c < 3; c++) w[3 * p->row[k] + c] -= below[3 * k + c];
     }
   }
 }
@@ -374,11 +360,7 @@ SB_KERNEL static void backward(SbFactor f)
 
     // contribution of the solution in the rows below to the right-hand side of the panel
     for (PetscInt k = 0; k < p->nrow; k++) {
-      const float *from = w + 3 * p->row[k];
-
-      below[3 * k] = from[0];
-      below[3 * k + 1] = from[1];
-      below[3 * k + 2] = from[2];
+      for (int c = 0; c < 3; c++) below[3 * k + c] = w[3 * p->row[k] + c];
     }
     for (size_t k = 3 * (size_t)p->nrow; k < height; k++) below[k] = 0.f;
     panel_transposed(height, ncol, a + (size_t)ncol * square / 2, below, scale + 1, pivot);

@@ -36,8 +36,7 @@ PetscErrorCode SbEliminationDestroy(SbElimination *e);
 /* SbFactorCreate - symbolic factorisation (arguments as above). Not collective. */
 PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], const PetscInt ja[],
                               SbFactor *f);
-/* The same with nkeep = 0 for an exact factor, in double precision: SbFactorSolve(). order: as above. Not
-   collective. */
+/* The same for an exact factor, in double precision, without kept nodes; order: as above. Not collective. */
 PetscErrorCode SbFactorCreateExact(PetscInt n, const PetscInt ia[], const PetscInt ja[],
                                    const PetscInt order[], SbFactor *f);
 /* The order of elimination, borrowed: [n] node at each position. */

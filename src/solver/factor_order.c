@@ -140,45 +140,15 @@ static PetscErrorCode merge_groups(PetscInt *ngroup, Group group[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  Structure of column j without j, sorted: own entries and the rows of the groups whose first row is j, which
-  are linked by child[] (first group of column j) and sibling[]. nrows[j]: its length.
-*/
-static PetscErrorCode column_structure(const SbElimination *e, PetscInt j, const PetscInt ia[],
-                                       const PetscInt ja[], const PetscInt child[], const PetscInt sibling[],
-                                       PetscInt *const rows[], PetscInt nrows[], PetscInt mark[],
-                                       PetscInt out[])
+/* Appends to out[n] the positions above j among i that are not marked by j yet. */
+static inline void append(PetscInt j, PetscInt i, PetscInt mark[], PetscInt *n, PetscInt out[])
 {
-  const PetscInt node = e->order[j];
-  PetscInt count = 0;
-
-  PetscFunctionBeginUser;
-  mark[j] = j;
-  for (PetscInt k = ia[node]; k < ia[node + 1]; k++) {
-    const PetscInt i = e->inverse[ja[k]];
-
-    if (i > j && mark[i] != j) {
-      mark[i] = j;
-      out[count++] = i;
-    }
-  }
-  for (PetscInt c = child[j]; c >= 0; c = sibling[c]) {
-    for (PetscInt k = 0; k < nrows[c]; k++) {
-      const PetscInt i = rows[c][k];
-
-      if (i > j && mark[i] != j) {
-        mark[i] = j;
-        out[count++] = i;
-      }
-    }
-  }
-  PetscCall(PetscSortInt(count, out));
-  nrows[j] = count;
-  PetscFunctionReturn(PETSC_SUCCESS);
+  if (i <= j || mark[i] == j) return;
+  mark[i] = j;
+  out[(*n)++] = i;
 }
 
-/* Finds the groups of columns and their rows. rows[j], nrows[j]: structure of column j, kept until its parent
-   has used it. */
+/* Finds the groups of columns and their rows. */
 static PetscErrorCode find_groups(SbElimination *e, const PetscInt ia[], const PetscInt ja[],
                                   const PetscInt parent[], PetscInt *ngroup, Group group[])
 {
@@ -186,35 +156,45 @@ static PetscErrorCode find_groups(SbElimination *e, const PetscInt ia[], const P
   PetscInt *child, *sibling, *nrows, *mark, *out, **rows;
 
   PetscFunctionBeginUser;
+  /* rows[j], nrows[j]: structure of column j, kept until its parent has used it; lists of children */
   PetscCall(PetscMalloc6(n, &child, n, &sibling, n, &nrows, e->n, &mark, e->n, &out, n, &rows));
   for (PetscInt j = 0; j < n; j++) child[j] = -1;
   for (PetscInt i = 0; i < e->n; i++) mark[i] = -1;
   *ngroup = 0;
   for (PetscInt j = 0; j < n; j++) {
-    PetscCall(column_structure(e, j, ia, ja, child, sibling, rows, nrows, mark, out));
+    const PetscInt node = e->order[j];
+    Group *g;
+
+    /* structure of column j without j, sorted: own entries and those of its children */
+    nrows[j] = 0;
+    for (PetscInt k = ia[node]; k < ia[node + 1]; k++) append(j, e->inverse[ja[k]], mark, &nrows[j], out);
+    for (PetscInt c = child[j]; c >= 0; c = sibling[c]) {
+      for (PetscInt k = 0; k < nrows[c]; k++) append(j, rows[c][k], mark, &nrows[j], out);
+      PetscCall(PetscFree(rows[c]));
+    }
+    PetscCall(PetscSortInt(nrows[j], out));
     PetscCall(PetscMalloc1(nrows[j], &rows[j]));
     PetscCall(PetscArraycpy(rows[j], out, nrows[j]));
-    const PetscBool goes_on = (PetscBool)(j > 0 && parent[j - 1] == j && nrows[j - 1] == nrows[j] + 1);
-    for (PetscInt c = child[j]; c >= 0; c = sibling[c]) PetscCall(PetscFree(rows[c]));
-    if (parent[j] >= 0) {
-      sibling[j] = child[parent[j]];
-      child[parent[j]] = j;
-    }
-    if (goes_on) {
+    /* it continues the group of the column before, or begins one */
+    if (j > 0 && parent[j - 1] == j && nrows[j - 1] == nrows[j] + 1)
       group[*ngroup - 1].ncol++;
-    } else {
-      if (*ngroup) PetscCall(merge_groups(ngroup, group));
+    else {
+      PetscCall(merge_groups(ngroup, group));
       group[(*ngroup)++] = (Group){.first = j, .ncol = 1};
     }
     /* the rows of a group are those of its last column */
-    Group *g = &group[*ngroup - 1];
+    g = &group[*ngroup - 1];
     PetscCall(PetscFree(g->row));
     g->nrow = nrows[j];
     PetscCall(PetscMalloc1(g->nrow, &g->row));
-    PetscCall(PetscArraycpy(g->row, rows[j], g->nrow));
-    if (parent[j] < 0) PetscCall(PetscFree(rows[j]));
+    PetscCall(PetscArraycpy(g->row, out, g->nrow));
+    if (parent[j] >= 0) {
+      sibling[j] = child[parent[j]];
+      child[parent[j]] = j;
+    } else
+      PetscCall(PetscFree(rows[j]));
   }
-  if (*ngroup) PetscCall(merge_groups(ngroup, group));
+  PetscCall(merge_groups(ngroup, group));
   PetscCall(PetscFree6(child, sibling, nrows, mark, out, rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -222,7 +202,7 @@ static PetscErrorCode find_groups(SbElimination *e, const PetscInt ia[], const P
 PetscErrorCode SbEliminationCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], const PetscInt ja[],
                                    const PetscInt order[], SbElimination *e)
 {
-  PetscInt *parent, *ancestor, ngroup = 0, *owner, total = 0;
+  PetscInt *parent, *ancestor, *owner, ngroup = 0, total = 0;
   Group *group;
 
   PetscFunctionBeginUser;
@@ -235,15 +215,13 @@ PetscErrorCode SbEliminationCreate(PetscInt n, PetscInt nkeep, const PetscInt ia
     PetscCall(dissect(e->nfree, ia, ja, e->order));
   for (PetscInt k = e->nfree; k < n; k++) e->order[k] = k;
   for (PetscInt k = 0; k < n; k++) e->inverse[e->order[k]] = k;
-  PetscCall(PetscMalloc2(e->nfree, &parent, e->nfree, &ancestor));
+  PetscCall(PetscMalloc4(e->nfree, &parent, e->nfree, &ancestor, e->nfree, &owner, e->nfree, &group));
   elimination_tree(e, ia, ja, parent, ancestor);
   PetscCall(postorder(e, parent));
-  PetscCall(PetscMalloc1(e->nfree, &group));
   PetscCall(find_groups(e, ia, ja, parent, &ngroup, group));
   for (PetscInt g = 0; g < ngroup; g++) total += group[g].ncol + group[g].nrow;
   e->nsuper = ngroup;
   PetscCall(PetscMalloc4(ngroup + 1, &e->first, ngroup + 1, &e->start, total, &e->list, ngroup, &e->parent));
-  PetscCall(PetscMalloc1(e->nfree, &owner));
   e->start[0] = 0;
   for (PetscInt g = 0; g < ngroup; g++) {
     PetscInt *list = e->list + e->start[g];
@@ -261,9 +239,7 @@ PetscErrorCode SbEliminationCreate(PetscInt n, PetscInt nkeep, const PetscInt ia
     e->parent[g] = group[g].nrow && group[g].row[0] < e->nfree ? owner[group[g].row[0]] : -1;
     PetscCall(PetscFree(group[g].row));
   }
-  PetscCall(PetscFree(owner));
-  PetscCall(PetscFree(group));
-  PetscCall(PetscFree2(parent, ancestor));
+  PetscCall(PetscFree4(parent, ancestor, owner, group));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -97,8 +97,7 @@ SB_KERNEL static void up(PetscInt nrow, const PetscInt start[restrict], const Pe
   }
 }
 
-/* l1-Gauss-Seidel (Baker et al. 2011): half the sums of the magnitudes of each row in the off-diagonal part
-   of a parallel matrix. */
+/* l1-Gauss-Seidel: half the sums of the magnitudes of each row in the columns of other ranks. */
 static PetscErrorCode sum_magnitudes(Mat A, PetscInt n, PetscReal extra[])
 {
   const PetscInt *start, *column;
@@ -148,12 +147,12 @@ PetscErrorCode SbGaussSeidelSetUp(Mat A, PetscReal inverse[], PetscReal extra[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbGaussSeidelDown(Mat A, const PetscReal inverse[], const PetscReal extra[], Vec r, Vec z,
-                                 Vec t)
+/* down() with the residual R, or up() if it is NULL. */
+static PetscErrorCode sweep(Mat A, const PetscReal inverse[], const PetscReal extra[], Vec R, Vec Z, Vec T)
 {
   const PetscInt *start, *column;
-  const PetscScalar *in;
-  PetscScalar *a, *out, *left;
+  const PetscScalar *r;
+  PetscScalar *a, *z, *t;
   PetscInt n;
   Mat local;
 
@@ -161,39 +160,36 @@ PetscErrorCode SbGaussSeidelDown(Mat A, const PetscReal inverse[], const PetscRe
   PetscCall(SbProductGetSymmetric(A, &local));
   PetscCall(SbMatGetPattern(local, &n, &start, &column));
   PetscCall(MatSeqSBAIJGetArray(local, &a));
-  PetscCall(VecZeroEntries(t));
-  PetscCall(VecGetArrayRead(r, &in));
-  PetscCall(VecGetArray(z, &out));
-  PetscCall(VecGetArray(t, &left));
-  down(n, start, column, a, inverse, extra, in, out, left);
-  PetscCall(VecRestoreArray(t, &left));
-  PetscCall(VecRestoreArray(z, &out));
-  PetscCall(VecRestoreArrayRead(r, &in));
+  PetscCall(VecGetArray(Z, &z));
+  PetscCall(VecGetArray(T, &t));
+  if (R) {
+    PetscCall(VecGetArrayRead(R, &r));
+    down(n, start, column, a, inverse, extra, r, z, t);
+    PetscCall(VecRestoreArrayRead(R, &r));
+  } else
+    up(n, start, column, a, inverse, extra, t, z);
+  PetscCall(VecRestoreArray(T, &t));
+  PetscCall(VecRestoreArray(Z, &z));
   PetscCall(SbMatRestoreRead(local, MatSeqSBAIJRestoreArray, &a));
-  PetscCall(SbProductSubtractOffDiagonal(A, z, t));
   PetscCall(PetscLogFlops(36. * (double)start[n]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbGaussSeidelDown(Mat A, const PetscReal inverse[], const PetscReal extra[], Vec r, Vec z,
+                                 Vec t)
+{
+  PetscFunctionBeginUser;
+  PetscCall(VecZeroEntries(t));
+  PetscCall(sweep(A, inverse, extra, r, z, t));
+  PetscCall(SbProductSubtractOffDiagonal(A, z, t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbGaussSeidelUp(Mat A, const PetscReal inverse[], const PetscReal extra[], Vec r, Vec z, Vec t)
 {
-  const PetscInt *start, *column;
-  PetscScalar *a, *out, *b;
-  PetscInt n;
-  Mat local;
-
   PetscFunctionBeginUser;
-  PetscCall(SbProductGetSymmetric(A, &local));
-  PetscCall(SbMatGetPattern(local, &n, &start, &column));
   PetscCall(VecCopy(r, t));
   PetscCall(SbProductSubtractOffDiagonal(A, z, t));
-  PetscCall(MatSeqSBAIJGetArray(local, &a));
-  PetscCall(VecGetArray(z, &out));
-  PetscCall(VecGetArray(t, &b));
-  up(n, start, column, a, inverse, extra, b, out);
-  PetscCall(VecRestoreArray(t, &b));
-  PetscCall(VecRestoreArray(z, &out));
-  PetscCall(SbMatRestoreRead(local, MatSeqSBAIJRestoreArray, &a));
-  PetscCall(PetscLogFlops(36. * (double)start[n]));
+  PetscCall(sweep(A, inverse, extra, NULL, z, t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

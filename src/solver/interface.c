@@ -1,7 +1,7 @@
 /*
   The Schur complement on the interface between ranks, for substructuring.
 
-  The interface nodes (interface_nodes.c) separate the ranks, so each rank eliminates its interior. The
+  The interface nodes separate the ranks, so each rank eliminates its interior. The
   remaining matrix on the interface is a dense S, the sum of the ranks' Schur complements. The factorisation S
   = L L^T works on block columns, distributed cyclically, and S^-1 = W^T W with W = L^-1. Each rank has some
   rows W_r of the triangle W and adds W_r^T (W_r b): symmetric and positive definite for any rounding of W,
@@ -20,20 +20,81 @@
 #define MOST_NODES 1500 /* most interface nodes: 162 MB per rank during the factorisation */
 
 /* A block of rows of W on this rank; its transpose is a panel. */
-typedef struct {
+typedef struct _SbRows {
   PetscInt first, nrow;
   size_t offset; /* position in word */
 } Rows;
 
-struct _p_SbInterfaceFactor {
-  PetscInt nblock; /* number of row blocks, all ranks */
-  PetscInt nrows;
-  Rows *rows;     /* [nrows] row blocks of this rank */
-  size_t nword;   /* number of words in use */
-  int32_t *word;  /* words, with room for reads beyond the last panel */
-  float *scale;   /* [3 n][2] scales of the rows; the second ones are unused */
-  float *sum, *y; /* [3 n] sum of the right-hand sides; own part of the solution; room for one block more */
-};
+/*
+  Few nodes that separate the interiors of the ranks, without fully prescribed ones. Output: index[nnode], number
+  of a local node among them, -1 for others; those of a rank are consecutive. nmine: number owned by this rank; n:
+  by all ranks.
+
+  They are a vertex cover of the graph's edges between nodes of different ranks. The greedy cover repeatedly takes
+  the node with the most uncovered edges. A minimum cover, from matchings, has 2 to 5 % fewer nodes
+  (docs/reports/decisions.md). These edges are few: each rank gathers all of them and chooses the same nodes.
+*/
+static PetscErrorCode choose_nodes(SbSpace s, PetscInt index[], PetscInt *nmine, PetscInt *n)
+{
+  const SbPlan p = s->plan;
+  PetscInt count = 0, nend, nnode, most = 0, *mine, *end, *node, *left, *ia, *ja;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < s->nnode; i++) index[i] = -1;
+  *nmine = *n = 0;
+  if (!s->ghosted) PetscFunctionReturn(PETSC_SUCCESS);
+
+  /* global numbers of the ends of edges between free own nodes and those of lower ranks, of all ranks */
+  PetscCall(PetscMalloc1(2 * p->oi[s->nnode_owned], &mine));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    for (PetscInt k = p->oi[i]; k < p->oi[i + 1] && s->fixed[i] != 7; k++) {
+      const PetscInt j = p->oj[k];
+
+      if (s->gnode[j] >= s->gnode_start || s->fixed[j] == 7) continue;
+      mine[count++] = s->gnode[j];
+      mine[count++] = s->gnode[i];
+    }
+  }
+  PetscCall(SbAllgatherv(s->comm, MPIU_INT, count, mine, &nend, &end, NULL));
+  PetscCall(PetscFree(mine));
+
+  /* the nodes, ascending, and their graph by positions among them; left: uncovered edges of each */
+  nnode = nend;
+  PetscCall(PetscMalloc2(nend, &node, nend, &left));
+  PetscCall(PetscArraycpy(node, end, nend));
+  PetscCall(PetscSortRemoveDupsInt(&nnode, node));
+  for (PetscInt e = 0; e < nend; e++) PetscCall(PetscFindInt(end[e], nnode, node, &end[e]));
+  PetscCall(SbBucketByKey(nend, end, nnode, &ia, &ja));
+  for (PetscInt e = 0; e < nend; e++) ja[e] = end[ja[e] ^ 1];
+  for (PetscInt k = 0; k < nnode; k++) {
+    left[k] = ia[k + 1] - ia[k];
+    most = PetscMax(most, left[k]);
+  }
+
+  /* taken nodes: -1 */
+  for (; most > 0; most--) {
+    for (PetscInt k = 0; k < nnode; k++) {
+      if (left[k] < most) continue;
+      left[k] = -1;
+      for (PetscInt e = ia[k]; e < ia[k + 1]; e++) left[ja[e]] -= left[ja[e]] > 0;
+    }
+  }
+
+  /* number them over all ranks: the nodes of a rank are consecutive */
+  for (PetscInt k = 0; k < nnode; k++) left[k] = left[k] < 0 ? (*n)++ : -1;
+  for (PetscInt i = 0; i < s->nnode; i++) {
+    PetscInt k;
+
+    PetscCall(PetscFindInt(s->gnode[i], nnode, node, &k));
+    if (k >= 0) index[i] = left[k];
+    *nmine += i < s->nnode_owned && index[i] >= 0;
+  }
+  PetscCall(PetscFree2(node, left));
+  PetscCall(PetscFree(end));
+  PetscCall(PetscFree(ia));
+  PetscCall(PetscFree(ja));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 PetscErrorCode SbSpaceInterfaceSize(SbSpace s, PetscInt *n, PetscInt *most)
 {
@@ -44,7 +105,7 @@ PetscErrorCode SbSpaceInterfaceSize(SbSpace s, PetscInt *n, PetscInt *most)
   PetscCall(PetscOptionsGetInt(NULL, NULL, "-pc_rotated_interface", most, NULL));
   if (!s->plan) PetscCall(SbPlanCreate(s, &s->plan));
   PetscCall(PetscMalloc1(s->nnode, &index));
-  PetscCall(SbInterfaceChooseNodes(s, index, &nmine, n));
+  PetscCall(choose_nodes(s, index, &nmine, n));
   PetscCall(PetscFree(index));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -56,19 +117,18 @@ PetscErrorCode SbInterfaceCreate(SbSpace s, SbInterface *face)
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&f));
-  PetscCall(PetscNew(&f->factor));
   f->comm = s->comm;
   PetscCall(PetscMalloc1(s->nnode, &f->index));
-  PetscCall(SbInterfaceChooseNodes(s, f->index, &f->nmine, &f->n));
+  PetscCall(choose_nodes(s, f->index, &f->nmine, &f->n));
   PetscCall(PetscMalloc1(f->nmine, &f->mine));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     if (f->index[i] >= 0) f->mine[k++] = i;
   }
-  f->factor->nblock = (3 * f->n + BLOCK - 1) / BLOCK;
-  PetscCall(PetscMalloc1(f->factor->nblock, &f->factor->rows));
-  PetscCall(allocate_pages(sizeof(float) * 6 * (size_t)f->n, &f->factor->scale));
-  PetscCall(allocate_pages(sizeof(float) * (3 * (size_t)f->n + ROWS), &f->factor->sum));
-  PetscCall(allocate_pages(sizeof(float) * (3 * (size_t)f->n + ROWS), &f->factor->y));
+  f->nblock = (3 * f->n + BLOCK - 1) / BLOCK;
+  PetscCall(PetscMalloc1(f->nblock, &f->rows));
+  PetscCall(allocate_pages(sizeof(float) * 6 * (size_t)f->n, &f->scale));
+  PetscCall(allocate_pages(sizeof(float) * (3 * (size_t)f->n + ROWS), &f->sum));
+  PetscCall(allocate_pages(sizeof(float) * (3 * (size_t)f->n + ROWS), &f->y));
   *face = f;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -77,12 +137,11 @@ PetscErrorCode SbInterfaceDestroy(SbInterface *f)
 {
   PetscFunctionBeginUser;
   if (!*f) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree((*f)->factor->rows));
-  free((*f)->factor->word);
-  free((*f)->factor->scale);
-  free((*f)->factor->sum);
-  free((*f)->factor->y);
-  PetscCall(PetscFree((*f)->factor));
+  PetscCall(PetscFree((*f)->rows));
+  free((*f)->word);
+  free((*f)->scale);
+  free((*f)->sum);
+  free((*f)->y);
   PetscCall(PetscFree((*f)->index));
   PetscCall(PetscFree((*f)->mine));
   PetscCall(PetscFree(*f));
@@ -91,7 +150,7 @@ PetscErrorCode SbInterfaceDestroy(SbInterface *f)
 
 PetscInt64 SbInterfaceBytes(SbInterface f)
 {
-  return (PetscInt64)(sizeof(*f->factor->word) * f->factor->nword);
+  return (PetscInt64)(sizeof(*f->word) * f->nword);
 }
 
 /* ------------------------------------------------------------------ factorisation */
@@ -150,7 +209,6 @@ static PetscErrorCode factor_columns(MPI_Comm comm, PetscInt n, PetscInt nblock,
 /* Distributes the row blocks of W, long ones first, each to the rank with the least work so far. */
 static PetscErrorCode share_rows(SbInterface f, PetscInt64 work)
 {
-  SbInterfaceFactor w = f->factor;
   const PetscInt n = 3 * f->n;
   PetscInt64 *load;
   PetscMPIInt size, rank;
@@ -160,41 +218,40 @@ static PetscErrorCode share_rows(SbInterface f, PetscInt64 work)
   PetscCallMPI(MPI_Comm_rank(f->comm, &rank));
   PetscCall(PetscMalloc1(size, &load));
   PetscCallMPI(MPI_Allgather(&work, 1, MPIU_INT64, load, 1, MPIU_INT64, f->comm));
-  w->nrows = 0;
-  w->nword = 0;
-  for (PetscInt b = w->nblock - 1; b >= 0; b--) {
+  f->nrows = 0;
+  f->nword = 0;
+  for (PetscInt b = f->nblock - 1; b >= 0; b--) {
     PetscMPIInt least = 0;
     Rows r;
 
     r.nrow = block_of(n, b, &r.first);
-    r.offset = w->nword;
+    r.offset = f->nword;
     for (PetscMPIInt k = 1; k < size; k++) {
       if (load[k] < load[least]) least = k;
     }
     const size_t words = round_up(r.first + r.nrow) * (size_t)r.nrow / 2;
-    load[least] += (PetscInt64)(sizeof(*w->word) * words);
+    load[least] += (PetscInt64)(sizeof(*f->word) * words);
     if (least != rank) continue;
-    w->nword += words;
-    w->rows[w->nrows++] = r;
+    f->nword += words;
+    f->rows[f->nrows++] = r;
   }
   PetscCall(PetscFree(load));
-  free(w->word);
-  PetscCall(allocate_pages(sizeof(*w->word) * (w->nword + 4096), &w->word));
+  free(f->word);
+  PetscCall(allocate_pages(sizeof(*f->word) * (f->nword + 4096), &f->word));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Computes and stores the rows of W = L^-1 of this rank: L^T w = e for each of them. */
 static PetscErrorCode store_rows(SbInterface f, const PetscReal L[])
 {
-  const SbInterfaceFactor w = f->factor;
   const PetscScalar one = 1.;
   const size_t n = 3 * (size_t)f->n;
   PetscReal *x;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(n * BLOCK, &x));
-  for (PetscInt b = 0; b < w->nrows; b++) {
-    const Rows *r = &w->rows[b];
+  for (PetscInt b = 0; b < f->nrows; b++) {
+    const Rows *r = &f->rows[b];
     const size_t height = (size_t)r->first + (size_t)r->nrow;
     PetscBLASInt order, nrow, ld;
 
@@ -206,8 +263,8 @@ static PetscErrorCode store_rows(SbInterface f, const PetscReal L[])
     PetscCallBLAS("BLAStrsm",
                   BLAStrsm_("L", "L", "T", "N", &order, &nrow, &one, (PetscScalar *)L, &ld, x, &order));
     for (size_t i = 0; i < (size_t)r->nrow; i++)
-      w->scale[2 * ((size_t)r->first + i)] =
-        store_column(height, 0, x + i * height, (size_t)r->nrow, i, w->word + r->offset);
+      f->scale[2 * ((size_t)r->first + i)] =
+        store_column(height, 0, x + i * height, (size_t)r->nrow, i, f->word + r->offset);
   }
   PetscCall(PetscFree(x));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -224,7 +281,7 @@ PetscErrorCode SbInterfaceFactorise(SbInterface f, PetscInt64 work, PetscReal sc
   PetscCallMPI(MPI_Comm_size(f->comm, &size));
   PetscCallMPI(MPI_Comm_rank(f->comm, &rank));
   /* each block column is summed on the rank that factors it */
-  for (PetscInt k = 0; k < f->factor->nblock; k++) {
+  for (PetscInt k = 0; k < f->nblock; k++) {
     const PetscMPIInt owner = (PetscMPIInt)(k % size);
     PetscInt first;
     PetscMPIInt count;
@@ -234,7 +291,7 @@ PetscErrorCode SbInterfaceFactorise(SbInterface f, PetscInt64 work, PetscReal sc
     PetscCallMPI(
       MPI_Reduce(rank == owner ? MPI_IN_PLACE : column, column, count, MPIU_REAL, MPI_SUM, owner, f->comm));
   }
-  PetscCall(factor_columns(f->comm, n, f->factor->nblock, schur, ok));
+  PetscCall(factor_columns(f->comm, n, f->nblock, schur, ok));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(share_rows(f, work));
   PetscCall(store_rows(f, schur));
@@ -244,19 +301,19 @@ PetscErrorCode SbInterfaceFactorise(SbInterface f, PetscInt64 work, PetscReal sc
 /* ------------------------------------------------------------------ solves */
 
 /* x += W_r^T W_r sum */
-SB_KERNEL static void multiply_rows(const struct _p_SbInterfaceFactor *w, float *x)
+SB_KERNEL static void multiply_rows(SbInterface f, float *x)
 {
   float part[BLOCK];
 
-  for (PetscInt b = 0; b < w->nrows; b++) {
-    const Rows *r = &w->rows[b];
+  for (PetscInt b = 0; b < f->nrows; b++) {
+    const Rows *r = &f->rows[b];
     const PetscInt n = r->first + r->nrow;
-    const float *scale = w->scale + 2 * r->first;
-    const int32_t *a = w->word + r->offset;
+    const float *scale = f->scale + 2 * r->first;
+    const int32_t *a = f->word + r->offset;
 
-    panel_transposed(round_up(n), r->nrow, a, w->sum, scale, part);
-    panel_multiply(round_up(n), r->nrow, a, part, scale, w->y);
-    for (PetscInt i = 0; i < n; i++) x[i] += w->y[i];
+    panel_transposed(round_up(n), r->nrow, a, f->sum, scale, part);
+    panel_multiply(round_up(n), r->nrow, a, part, scale, f->y);
+    for (PetscInt i = 0; i < n; i++) x[i] += f->y[i];
   }
 }
 
@@ -267,9 +324,9 @@ PetscErrorCode SbInterfaceSolve(SbInterface f, float x[])
   PetscFunctionBeginUser;
   if (!f->n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMPIIntCast(3 * f->n, &n));
-  PetscCallMPI(MPI_Allreduce(x, f->factor->sum, n, MPI_FLOAT, MPI_SUM, f->comm));
+  PetscCallMPI(MPI_Allreduce(x, f->sum, n, MPI_FLOAT, MPI_SUM, f->comm));
   PetscCall(PetscArrayzero(x, n));
-  multiply_rows(f->factor, x);
+  multiply_rows(f, x);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, x, n, MPI_FLOAT, MPI_SUM, f->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

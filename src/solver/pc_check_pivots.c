@@ -116,8 +116,7 @@ static PetscErrorCode gathered_setup(PC pc)
 
     /* idle ranks have no inner KSP */
     PetscCall(KSPGetPC(ksp, &inner));
-    /* Wraps the factorisation on the rank that has the matrix; called at the first set-up, before which the
-       telescope is empty. */
+    /* before the first set-up the telescope is empty: wrap the factorisation now */
     PetscCall(PCGetApplicationContext(pc, &package));
     if (package && !inner->setupcalled) {
       PetscCall(PetscStrcmp(package, MATSOLVERCHOLMOD, &cholmod));

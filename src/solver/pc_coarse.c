@@ -176,8 +176,7 @@ static PetscErrorCode PCSetUp_Coarse(PC pc)
     PetscMPIInt size;
 
     PetscCallMPI(MPI_Comm_size(s->comm, &size));
-    /* 300 was best for 36,000 nodes (192,000 tets); the cost of the factor grows faster than the number of
-       aggregates */
+    /* 300 was best for 36,000 nodes (192,000 tets); the factor's cost grows faster than their number */
     if (!wanted)
       wanted = PetscMax(1, (PetscInt)(300. * PetscPowReal((PetscReal)s->Nnode / 36000., 0.7) + 0.5));
     if (limit < 0)
@@ -254,7 +253,7 @@ static PetscErrorCode PCSetUp_Blocks(PC pc)
       ok = PETSC_FALSE;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &ok, 1, SB_MPI_BOOL, MPI_LAND, p->space->comm));
-  if (ok) PetscCall(SbCoarseSetUp(c, A));
+  if (ok || p->rows) PetscCall(SbCoarseSetUp(c, A)); /* SbPCContactCost() needs it */
   c->ok = (PetscBool)(ok && c->ok);
   PetscCall(PCSetFailedReason(pc, c->ok ? PC_NOERROR : PC_FACTOR_NUMERIC_ZEROPIVOT));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
@@ -293,8 +292,7 @@ static PetscErrorCode advance(TwoLevel *p, PetscReal factor, PetscReal other, Ve
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* z = M r: Chebyshev (Saad, Iterative Methods for Sparse Linear Systems, 2003, algorithm 12.1), or the fine
-   level. */
+/* z = M r: the fine level, or Chebyshev (Saad, Iterative Methods ..., 2003, algorithm 12.1). */
 static PetscErrorCode smooth(TwoLevel *p, Mat A, Vec r, Vec z)
 {
   const PetscReal middle = 0.5 * LARGEST * (1. + 1. / RANGE), half = 0.5 * LARGEST * (1. - 1. / RANGE);
@@ -385,8 +383,7 @@ static PetscErrorCode PCPreSolve_TwoLevel(PC pc, KSP ksp, Vec b, Vec x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* With contact no net force on a body remains in the residual, so that momentum is as exact as with a
-   factorisation. */
+/* With contact: no net force on a body remains, so that momentum is as exact as with a factorisation. */
 static PetscErrorCode PCPostSolve_TwoLevel(PC pc, KSP ksp, Vec b, Vec x)
 {
   KSPConvergedReason reason;
@@ -408,11 +405,13 @@ static PetscErrorCode PCView_TwoLevel(PC pc, PetscViewer viewer)
 {
   PetscInt count[2] = {0, 0};
   PetscViewer own;
+  PetscMPIInt rank;
   TwoLevel *p;
   SbCoarse c;
 
   PetscFunctionBeginUser;
   PetscCall(PCShellGetContext(pc, &p));
+  PetscCallMPI(MPI_Comm_rank(p->space->comm, &rank));
   c = p->coarse;
   if (c && !c->aggregated) {
     PetscCall(PetscViewerASCIIPrintf(viewer, "  Gauss-Seidel on P2; P1 on the vertices by:\n"));
@@ -435,7 +434,7 @@ static PetscErrorCode PCView_TwoLevel(PC pc, PetscViewer viewer)
   if (p->fine && p->simple) PetscCall(PCView(p->fine, viewer));
   if (p->fine && !p->simple) {
     PetscCall(PetscViewerGetSubViewer(viewer, PETSC_COMM_SELF, &own));
-    if (own) PetscCall(PCView(p->fine, own));
+    if (!rank) PetscCall(PCView(p->fine, own));
     PetscCall(PetscViewerRestoreSubViewer(viewer, PETSC_COMM_SELF, &own));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -539,20 +538,6 @@ PetscErrorCode SbPCContactCost(PC pc, PetscReal *flops, PetscReal *entries)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The context of pc if it is of this type, else NULL. */
-static PetscErrorCode context_of(PC pc, TwoLevel **p)
-{
-  PetscBool is;
-  const char *name = NULL;
-
-  PetscFunctionBeginUser;
-  *p = NULL;
-  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCSHELL, &is));
-  if (is) PetscCall(PCShellGetName(pc, &name));
-  if (name && !strcmp(name, NAME)) PetscCall(PCShellGetContext(pc, p));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbPCCoarseFallBack(PC pc, KSPConvergedReason reason, PetscBool *changed)
 {
   PetscBool ok;
@@ -561,7 +546,7 @@ PetscErrorCode SbPCCoarseFallBack(PC pc, KSPConvergedReason reason, PetscBool *c
 
   PetscFunctionBeginUser;
   *changed = PETSC_FALSE;
-  PetscCall(context_of(pc, &p));
+  PetscCall(SbPCShellFind(pc, NAME, &p));
   if (!p || p->simple || !p->coarse || !p->coarse->ok) PetscFunctionReturn(PETSC_SUCCESS);
   if (reason != KSP_DIVERGED_INDEFINITE_PC && reason != KSP_DIVERGED_PC_FAILED &&
       reason != KSP_DIVERGED_NANORINF)
@@ -580,7 +565,7 @@ PetscErrorCode SbPCCoarseGetStats(PC pc, PetscInt *naggregate, PetscInt *nsolved
   TwoLevel *p;
 
   PetscFunctionBeginUser;
-  PetscCall(context_of(pc, &p));
+  PetscCall(SbPCShellFind(pc, NAME, &p));
   PetscCheck(p, PetscObjectComm((PetscObject)pc), PETSC_ERR_ARG_WRONG, "Not a two-level preconditioner");
   PetscCallMPI(MPI_Comm_rank(p->space->comm, &rank));
   if (naggregate) *naggregate = p->coarse ? p->coarse->N / 2 : 0;

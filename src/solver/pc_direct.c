@@ -11,7 +11,6 @@
 
 PetscErrorCode SbSolverReproducible(PetscBool *reproducible)
 {
-
   PetscFunctionBeginUser;
   PetscCall(SbOptionBool(&SbRunScope, "reproducible", reproducible));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -79,8 +78,7 @@ PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric)
   if (mumps) PetscCall(SbSolverSetDefault(prefix, "mat_mumps_icntl_13", "1"));
   if (mumps) PetscCall(SbSolverSetDefault(prefix, "mat_mumps_icntl_14", "100"));
   if (umfpack) PetscCall(SbSolverSetDefault(prefix, "mat_umfpack_ordering", "METIS"));
-  /* for small matrices CHOLMOD would choose L D L^T, which factors indefinite ones; a failed L L^T appears as
-     the solver's reason */
+  /* else CHOLMOD would factor small indefinite matrices, by L D L^T; a failure is the solver's reason */
   if (!mumps && !umfpack) {
     PetscCall(SbSolverSetDefault(prefix, "mat_cholmod_factor", "supernodal"));
     PetscCall(SbSolverSetDefault(prefix, "mat_cholmod_print", "0"));

@@ -28,24 +28,10 @@
   81, 59 and 79, depending on the partition.
 */
 #define WEAK 0.
+
 /* ------------------------------------------------------------------ spaces */
 
-/* Elements of a level: P1 everywhere, or CR instead of DG. */
-static PetscErrorCode create_elements(SbSpace s, PetscBool p1, SbElement **element)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(s->mesh->nbody, element));
-  for (PetscInt b = 0; b < s->mesh->nbody; b++) {
-    const PetscBool vertices = (PetscBool)(p1 || s->element[b]->nodes_per[0]);
-
-    PetscCall(SbElementCreate(vertices ? "p1" : "cr", NULL, &(*element)[b]));
-    (*element)[b]->gamma1 = s->element[b]->gamma1;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Prescribes in `to` the components prescribed in `from`: at the same node, or at every vertex of the
-   face. */
+/* Prescribes in `to` the components prescribed in `from`: at the same node, or all vertices of the face. */
 static PetscErrorCode fix_like(SbSpace from, SbSpace to)
 {
   uint8_t *mark;
@@ -75,13 +61,21 @@ static PetscErrorCode fix_like(SbSpace from, SbSpace to)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A level with P1 everywhere, or with CR instead of DG. */
 static PetscErrorCode add_level(SbLevels v, PetscBool p1)
 {
+  const SbMesh mesh = v->space->mesh;
   const PetscInt k = v->n++;
 
   PetscFunctionBeginUser;
-  PetscCall(create_elements(v->space, p1, &v->element[k]));
-  PetscCall(SbSpaceCreate(v->space->mesh, v->space->material, v->element[k], &v->at[k]));
+  PetscCall(PetscCalloc1(mesh->nbody, &v->element[k]));
+  for (PetscInt b = 0; b < mesh->nbody; b++) {
+    const SbElement upper = v->space->element[b];
+
+    PetscCall(SbElementCreate(p1 || upper->nodes_per[0] ? "p1" : "cr", NULL, &v->element[k][b]));
+    v->element[k][b]->gamma1 = upper->gamma1;
+  }
+  PetscCall(SbSpaceCreate(mesh, v->space->material, v->element[k], &v->at[k]));
   PetscCall(fix_like(v->space, v->at[k]));
   PetscCall(SbSpaceCreateMatrix(v->at[k], p1 ? SB_MATRIX_AIJ : SB_MATRIX_BAIJ, &v->A[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -133,31 +127,6 @@ static inline PetscReal unless_fixed(SbSpace s, PetscInt i, PetscInt c, PetscRea
 
 /* ------------------------------------------------------------------ the cycle for CR */
 
-static PetscErrorCode restrict_to_vertices(SbLevels v, Vec t)
-{
-  const PetscInt k = v->n - 2;
-  SbSpace s = v->at[k], p = v->at[k + 1];
-  const PetscReal *x;
-  PetscScalar *r;
-
-  PetscFunctionBeginUser;
-  PetscCall(load(s, t, v->g[k], &x));
-  PetscCall(VecZeroEntries(v->t[k + 1]));
-  PetscCall(VecGetArray(v->t[k + 1], &r));
-  for (PetscInt i = 0; i < s->nnode; i++) {
-    for (PetscInt a = 0; a < 3; a++) {
-      const PetscInt vertex = v->corner[3 * i + a];
-
-      if (vertex >= p->nnode_owned) continue;
-      for (PetscInt c = 0; c < 3; c++)
-        r[3 * vertex + c] += unless_fixed(p, vertex, c, unless_fixed(s, i, c, x[3 * i + c] / 3.));
-    }
-  }
-  PetscCall(VecRestoreArray(v->t[k + 1], &r));
-  PetscCall(SbSpaceRestoreLocalRead(s, v->g[k], &x));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode cycle_faces(SbLevels v, Vec r, Vec z)
 {
   const PetscInt k = v->n - 2;
@@ -168,7 +137,21 @@ static PetscErrorCode cycle_faces(SbLevels v, Vec r, Vec z)
 
   PetscFunctionBeginUser;
   PetscCall(SbGaussSeidelDown(A, v->inverse, NULL, r, z, v->t[k]));
-  PetscCall(restrict_to_vertices(v, v->t[k]));
+  /* the residual of the vertices */
+  PetscCall(load(s, v->t[k], v->g[k], &x));
+  PetscCall(VecZeroEntries(v->t[k + 1]));
+  PetscCall(VecGetArray(v->t[k + 1], &out));
+  for (PetscInt i = 0; i < s->nnode; i++) {
+    for (PetscInt a = 0; a < 3; a++) {
+      const PetscInt u = v->corner[3 * i + a];
+
+      for (PetscInt c = 0; c < 3 && u < p->nnode_owned; c++)
+        out[3 * u + c] += unless_fixed(p, u, c, unless_fixed(s, i, c, x[3 * i + c] / 3.));
+    }
+  }
+  PetscCall(VecRestoreArray(v->t[k + 1], &out));
+  PetscCall(SbSpaceRestoreLocalRead(s, v->g[k], &x));
+  /* their correction, interpolated to the faces */
   PetscCall(KSPSolve(v->coarse, v->t[k + 1], v->w[k + 1]));
   PetscCall(load(p, v->w[k + 1], v->g[k + 1], &x));
   PetscCall(VecGetArray(z, &out));
@@ -186,25 +169,6 @@ static PetscErrorCode cycle_faces(SbLevels v, Vec r, Vec z)
 
 /* ------------------------------------------------------------------ DG */
 
-/* Restricts a residual x to the means: the sum over the two sides of a face. */
-static PetscErrorCode restrict_to_means(SbLevels v, const PetscReal x[])
-{
-  SbSpace s = v->space, m = v->at[1];
-  PetscScalar *r;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecZeroEntries(v->r[1]));
-  PetscCall(VecGetArray(v->r[1], &r));
-  for (PetscInt i = 0; i < s->nnode; i++) {
-    const PetscInt k = v->mean[i];
-
-    if (k >= m->nnode_owned) continue;
-    for (PetscInt c = 0; c < 3; c++) r[3 * k + c] += unless_fixed(m, k, c, x[3 * i + c]);
-  }
-  PetscCall(VecRestoreArray(v->r[1], &r));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbLevelsApply(SbLevels v, Vec r, Vec z)
 {
   const PetscReal *x, *mean;
@@ -213,16 +177,20 @@ PetscErrorCode SbLevelsApply(SbLevels v, Vec r, Vec z)
   SbSpace s = v->space;
 
   PetscFunctionBeginUser;
-  if (v->multigrid) {
-    PetscCall(PCApply(v->multigrid, r, z));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  if (v->n == 2) {
-    PetscCall(cycle_faces(v, r, z));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
+  if (v->multigrid) PetscCall(PCApply(v->multigrid, r, z));
+  if (v->n == 2) PetscCall(cycle_faces(v, r, z));
+  if (v->n < 3) PetscFunctionReturn(PETSC_SUCCESS);
+  /* the residual of the means: the sum over the two sides of a face */
   PetscCall(load(v->space, r, v->r[0], &x));
-  PetscCall(restrict_to_means(v, x));
+  PetscCall(VecZeroEntries(v->r[1]));
+  PetscCall(VecGetArray(v->r[1], &out));
+  for (PetscInt i = 0; i < s->nnode; i++) {
+    const PetscInt k = v->mean[i];
+
+    for (PetscInt c = 0; c < 3 && k < v->at[1]->nnode_owned; c++)
+      out[3 * k + c] += unless_fixed(v->at[1], k, c, x[3 * i + c]);
+  }
+  PetscCall(VecRestoreArray(v->r[1], &out));
   PetscCall(cycle_faces(v, v->r[1], v->z[1]));
   PetscCall(load(v->at[1], v->z[1], v->z[1], &mean));
   PetscCall(VecGetArrayRead(v->t[0], &diagonal));
@@ -286,14 +254,21 @@ PetscErrorCode SbLevelsAddSpring(SbLevels v, PetscInt node, PetscReal factor, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the springs of all ranks in shared[nodes of at[n-2]][9], ghosts included, one row of the blocks at a
-   time. */
-static PetscErrorCode gather_springs(SbLevels v)
+PetscErrorCode SbLevelsShareSprings(SbLevels v)
 {
-  const SbSpace s = v->space;
-  const size_t size = 9 * (size_t)v->at[v->n - 2]->nnode;
+  const SbSpace top = v->space;
+  PetscBool any = v->sprung;
+  size_t size;
+  SbSpace s, p;
 
   PetscFunctionBeginUser;
+  if (v->multigrid) PetscFunctionReturn(PETSC_SUCCESS); /* created with the first matrix */
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, SB_MPI_BOOL, MPI_LOR, v->space->comm));
+  if (!any) PetscFunctionReturn(PETSC_SUCCESS);
+  s = v->at[v->n - 2];
+  p = v->at[v->n - 1];
+  /* the springs of all ranks at the nodes of at[n-2], ghosts included, one row of the blocks at a time */
+  size = 9 * (size_t)s->nnode;
   if (!v->shared) PetscCall(PetscMalloc1(size, &v->shared));
   PetscCall(PetscArrayzero(v->shared, size));
   for (PetscInt row = 0; row < 3; row++) {
@@ -301,29 +276,14 @@ static PetscErrorCode gather_springs(SbLevels v)
     PetscScalar *own;
 
     PetscCall(VecGetArray(v->r[0], &own));
-    for (PetscInt k = 0; k < 3 * s->nnode_owned; k++)
+    for (PetscInt k = 0; k < 3 * top->nnode_owned; k++)
       own[k] = v->spring ? v->spring[9 * (k / 3) + 3 * row + k % 3] : 0.;
     PetscCall(VecRestoreArray(v->r[0], &own));
-    PetscCall(SbSpaceGetLocalRead(s, v->r[0], &x));
-    for (PetscInt k = 0; k < 3 * s->nnode; k++)
+    PetscCall(SbSpaceGetLocalRead(top, v->r[0], &x));
+    for (PetscInt k = 0; k < 3 * top->nnode; k++)
       v->shared[9 * (v->mean ? v->mean[k / 3] : k / 3) + 3 * row + k % 3] += x[k];
-    PetscCall(SbSpaceRestoreLocalRead(s, v->r[0], &x));
+    PetscCall(SbSpaceRestoreLocalRead(top, v->r[0], &x));
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbLevelsShareSprings(SbLevels v)
-{
-  PetscBool any = v->sprung;
-  SbSpace s, p;
-
-  PetscFunctionBeginUser;
-  if (v->multigrid) PetscFunctionReturn(PETSC_SUCCESS); /* created with the first matrix */
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, SB_MPI_BOOL, MPI_LOR, v->space->comm));
-  if (!any) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(gather_springs(v));
-  s = v->at[v->n - 2];
-  p = v->at[v->n - 1];
   for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
     const PetscInt c = i / 4, a = i % 4;
     const PetscBool face = (PetscBool)!SbSpaceCellElement(s, c)->nodes_per[0];
@@ -373,8 +333,7 @@ PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
     const SbPlan p = s->plan;
     const PetscReal *own;
 
-    /* Inverse stiffness of the jumps: (1-w)^2 A_ii - 2 w (1-w) A_ij + w^2 A_jj , A the face terms and the
-       mass matrix. */
+    /* stiffness of the jumps: (1-w)^2 A_ii - 2 w (1-w) A_ij + w^2 A_jj, A the face terms and the mass */
     PetscCall(MatGetDiagonal(v->A[0], v->t[0]));
     PetscCall(loose_diagonal(v, v->r[0]));
     PetscCall(load(s, v->r[0], v->r[0], &own));

@@ -51,7 +51,7 @@ typedef struct {
   PetscReal target, last;    /* target of the residual norm; the last residual norm, N */
   PetscReal size, margin;    /* norm of the right-hand side, N; current value of MARGIN */
   PetscInt its, limit, slow; /* iterations of GMRES, their limit; corrections without effect */
-  PetscInt nsolve, total, most;
+  PetscInt most;             /* most iterations of a solve */
 } Pressure;
 
 /* ------------------------------------------------------------------ the mixed system */
@@ -94,7 +94,7 @@ static PetscErrorCode PCApply_Mixed(PC pc, Vec R, Vec Z)
   PetscCall(VecGetArray(s->t, &t));
   for (PetscInt c = 0; c < s->space->mesh->ncell_owned; c++) z[n + c] = -r[n + c] / (s->weight[c] * op->S[c]);
   PetscCall(PetscArraycpy(t, r, n));
-  PetscCall(SbPressureOperatorSubtract(op, z + n, t));
+  PetscCall(SbPressureOperatorAddGradient(op, z + n, PETSC_FALSE, -1., t));
   PetscCall(VecRestoreArray(s->t, &t));
   PetscCall(VecRestoreArrayRead(R, &r));
   PetscCall(VecPlaceArray(op->b, z));
@@ -161,8 +161,7 @@ static PetscErrorCode PCApply_Pressure(PC pc, Vec r, Vec z)
   KSPConvergedReason reason;
   const PetscScalar *from;
   PetscScalar *to;
-  PetscReal norm;
-  PetscReal rtol;
+  PetscReal norm, rtol;
   PetscInt its, n;
   Pressure *s;
   Mat A, K;
@@ -265,8 +264,6 @@ static PetscErrorCode PCPostSolve_Pressure(PC pc, KSP ksp, Vec b, Vec x)
   PetscCall(PCShellGetContext(pc, &s));
   PetscCall(PetscInfo(pc, "%" PetscInt_FMT " corrections, %" PetscInt_FMT " iterations\n", ksp->its, s->its));
   ksp->its = s->its;
-  s->nsolve++;
-  s->total += s->its;
   s->most = PetscMax(s->most, s->its);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -323,20 +320,14 @@ PetscErrorCode SbPCPressureCreate(SbSpace space, PC pc)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPCPressureGetStats(PC pc, PetscInt *nsolve, PetscInt *total, PetscInt *most)
+PetscErrorCode SbPCPressureGetMost(PC pc, PetscInt *most)
 {
-  PetscBool is;
-  const char *name = NULL;
   Pressure *s;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCSHELL, &is));
-  if (is) PetscCall(PCShellGetName(pc, &name));
-  PetscCheck(name && !strcmp(name, NAME), PetscObjectComm((PetscObject)pc), PETSC_ERR_ARG_WRONG,
+  PetscCall(SbPCShellFind(pc, NAME, &s));
+  PetscCheck(s, PetscObjectComm((PetscObject)pc), PETSC_ERR_ARG_WRONG,
              "Not a preconditioner of SbPCPressureCreate()");
-  PetscCall(PCShellGetContext(pc, &s));
-  if (nsolve) *nsolve = s->nsolve;
-  if (total) *total = s->total;
-  if (most) *most = s->most;
+  *most = s->most;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

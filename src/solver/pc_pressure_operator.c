@@ -63,9 +63,8 @@ static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y += factor B^T p; absolute: with |B|. */
-static PetscErrorCode add_gradient(SbPressureOperator op, const PetscScalar p[], PetscBool absolute,
-                                   PetscReal factor, PetscScalar y[])
+PetscErrorCode SbPressureOperatorAddGradient(SbPressureOperator op, const PetscScalar p[], PetscBool absolute,
+                                             PetscReal factor, PetscScalar y[])
 {
   SbSpace s = op->space;
   const PetscScalar *q;
@@ -110,13 +109,6 @@ static PetscErrorCode add_gradient(SbPressureOperator op, const PetscScalar p[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPressureOperatorSubtract(SbPressureOperator op, const PetscScalar p[], PetscScalar y[])
-{
-  PetscFunctionBeginUser;
-  PetscCall(add_gradient(op, p, PETSC_FALSE, -1., y));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbPressureOperatorApply(SbPressureOperator op, const PetscScalar u[], const PetscScalar p[],
                                        PetscScalar y[], PetscScalar d[])
 {
@@ -126,8 +118,8 @@ PetscErrorCode SbPressureOperatorApply(SbPressureOperator op, const PetscScalar 
   PetscCall(MatMult(op->levels->A[0], op->a, op->b));
   PetscCall(VecResetArray(op->a));
   PetscCall(VecResetArray(op->b));
-  if (d) PetscCall(apply_divergence(op, u, PETSC_FALSE, d));
-  if (p) PetscCall(add_gradient(op, p, PETSC_FALSE, 1., y));
+  PetscCall(apply_divergence(op, u, PETSC_FALSE, d));
+  PetscCall(SbPressureOperatorAddGradient(op, p, PETSC_FALSE, 1., y));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -143,7 +135,7 @@ static PetscErrorCode add_volumetric(SbPressureOperator op, PetscBool absolute, 
   PetscCall(VecGetArray(Y, &y));
   PetscCall(apply_divergence(op, x, absolute, d));
   for (PetscInt c = 0; c < op->space->mesh->ncell_owned; c++) d[c] *= op->Cinv[c];
-  PetscCall(add_gradient(op, d, absolute, 1., y));
+  PetscCall(SbPressureOperatorAddGradient(op, d, absolute, 1., y));
   PetscCall(VecRestoreArrayRead(X, &x));
   PetscCall(VecRestoreArray(Y, &y));
   PetscCall(PetscFree(d));
@@ -251,11 +243,18 @@ static PetscErrorCode add_spring(Mat K, PetscInt node, PetscReal factor, const P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* C, its inverse and S of the cells, from the moduli of the last assembly. */
-static void cell_numbers(SbPressureOperator op)
+static PetscErrorCode finish(Mat K)
 {
-  SbSpace s = op->space;
+  SbPressureOperator op;
+  SbSpace s;
 
+  PetscFunctionBeginUser;
+  PetscCall(MatShellGetContext(K, &op));
+  s = op->space;
+  PetscCall(SbLevelsShareSprings(op->levels));
+  for (PetscInt k = 0; k < op->levels->n; k++)
+    PetscCall(SbSpaceFinishTangent(op->levels->at[k], op->levels->A[k]));
+  /* C, its inverse and S of the cells, from the moduli of the last assembly */
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
 
@@ -274,24 +273,10 @@ static void cell_numbers(SbPressureOperator op)
       }
     }
   }
-}
-
-static PetscErrorCode finish(Mat K)
-{
-  SbPressureOperator op;
-
-  PetscFunctionBeginUser;
-  PetscCall(MatShellGetContext(K, &op));
-  PetscCall(SbLevelsShareSprings(op->levels));
-  for (PetscInt k = 0; k < op->levels->n; k++)
-    PetscCall(SbSpaceFinishTangent(op->levels->at[k], op->levels->A[k]));
-  cell_numbers(op);
   PetscCall(MatAssemblyBegin(K, MAT_FINAL_ASSEMBLY)); /* increases the object state */
   PetscCall(MatAssemblyEnd(K, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ create and destroy */
 
 static PetscErrorCode MatDestroy_Pressure(Mat K)
 {
@@ -312,33 +297,11 @@ static PetscErrorCode MatDestroy_Pressure(Mat K)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creates a ghosted vector with one value per cell. */
-static PetscErrorCode create_cell_vector(SbMesh mesh, Vec *p)
-{
-  PetscMPIInt size;
-  PetscInt *number, first;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(mesh->comm, &size));
-  if (size == 1) {
-    PetscCall(VecCreateSeq(mesh->comm, mesh->ncell_owned, p));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCallMPI(MPI_Scan(&mesh->ncell_owned, &first, 1, MPIU_INT, MPI_SUM, mesh->comm));
-  first -= mesh->ncell_owned;
-  PetscCall(PetscMalloc1(mesh->ncell, &number));
-  for (PetscInt c = 0; c < mesh->ncell_owned; c++) number[c] = first + c;
-  PetscCall(SbMeshBroadcastCells(mesh, 1, MPIU_INT, number));
-  PetscCall(VecCreateGhost(mesh->comm, mesh->ncell_owned, PETSC_DECIDE, mesh->ncell - mesh->ncell_owned,
-                           number + mesh->ncell_owned, p));
-  PetscCall(PetscFree(number));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbPressureOperatorCreate(SbSpace s, Mat *K)
 {
+  const PetscInt n = s->mesh->ncell_owned, nall = s->mesh->ncell;
   SbPressureOperator op;
-  PetscInt n;
+  PetscInt first, *number;
 
   PetscFunctionBeginUser;
   PetscCheck(!s->faces != !s->edge_node, s->comm, PETSC_ERR_USER,
@@ -348,7 +311,6 @@ PetscErrorCode SbPressureOperatorCreate(SbSpace s, Mat *K)
   PetscCall(PetscNew(&op));
   op->space = s;
   PetscCall(SbLevelsCreate(s, &op->levels));
-  n = s->mesh->ncell_owned;
   op->volume.stride = s->edge_node ? 30 : 12;
   PetscCall(PetscMalloc((size_t)(s->nbatch * (op->volume.stride + 2)) * sizeof(SbPack) + 64, &op->memory));
   op->volume.b = (SbPack *)(((uintptr_t)op->memory + 63) & ~(uintptr_t)63);
@@ -357,7 +319,13 @@ PetscErrorCode SbPressureOperatorCreate(SbSpace s, Mat *K)
   PetscCall(PetscMalloc4(n, &op->C, n, &op->Cinv, n, &op->S, n, &op->norm));
   PetscCall(SbSpaceCreateVec(s, &op->u));
   PetscCall(SbSpaceCreateVec(s, &op->y));
-  PetscCall(create_cell_vector(s->mesh, &op->p));
+  /* one value per cell, with ghosts */
+  PetscCallMPI(MPI_Scan(&n, &first, 1, MPIU_INT, MPI_SUM, s->comm));
+  PetscCall(PetscMalloc1(nall, &number));
+  for (PetscInt c = 0; c < n; c++) number[c] = first - n + c;
+  PetscCall(SbMeshBroadcastCells(s->mesh, 1, MPIU_INT, number));
+  PetscCall(VecCreateGhost(s->comm, n, PETSC_DECIDE, nall - n, number + n, &op->p));
+  PetscCall(PetscFree(number));
   PetscCall(MatCreateVecs(op->levels->A[0], &op->a, &op->b));
   PetscCall(
     MatCreateShell(s->comm, 3 * s->nnode_owned, 3 * s->nnode_owned, PETSC_DETERMINE, PETSC_DETERMINE, op, K));

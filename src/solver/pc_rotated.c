@@ -77,15 +77,11 @@ static PetscErrorCode number_nodes(Rotated *p)
   p->nkeep = p->n - ninterior;
   // rows of the interior: columns in the factor
   PetscCall(PetscMalloc2(ninterior + 1, &p->ia, nz, &p->ja));
-  p->ia[0] = nz = 0;
-  for (PetscInt k = 0; k < ninterior; k++) {
-    const PetscInt i = p->node[k];
-
-    for (PetscInt e = plan->di[i]; e < plan->di[i + 1]; e++) {
-      if (p->local[plan->dj[e]] >= 0) p->ja[nz++] = p->local[plan->dj[e]];
-    }
-    for (PetscInt e = plan->oi[i]; e < plan->oi[i + 1]; e++) {
-      if (p->local[plan->oj[e]] >= 0) p->ja[nz++] = p->local[plan->oj[e]];
+  PetscCall(SbSpaceGetRows(s, NULL, ninterior, p->node, p->ia, p->ja, NULL));
+  nz = 0;
+  for (PetscInt k = 0, e = 0; k < ninterior; k++) {
+    for (; e < p->ia[k + 1]; e++) {
+      if (p->local[p->ja[e]] >= 0) p->ja[nz++] = p->local[p->ja[e]];
     }
     p->ia[k + 1] = nz;
   }
@@ -119,8 +115,7 @@ static PetscErrorCode find_cells(Rotated *p, Mat A, const SbPack **cells)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the rows of own interface nodes to the Schur complement, and stores the diagonals of prescribed
-   nodes. */
+/* Adds the rows of own interface nodes to the Schur complement; stores the diagonals of prescribed nodes. */
 static PetscErrorCode add_other_rows(Rotated *p, Mat A, PetscReal schur[])
 {
   SbSpace s = p->space;
@@ -435,21 +430,8 @@ PetscErrorCode SbPCRotatedRenew(PC pc)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPCRotatedGetStats(PC pc, PetscInt *nfactor, PetscInt *nexact, PetscInt64 *entries)
-{
-  PetscInt64 found = 0, bytes;
-  Rotated *p;
-
-  PetscFunctionBeginUser;
-  PetscCall(PCShellGetContext(pc, &p));
-  if (p->factor) SbFactorSize(p->factor, &found, &bytes);
-  if (nfactor) *nfactor = p->nfactor;
-  if (nexact) *nexact = p->exact.n;
-  if (entries) *entries = found;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbPCRotatedGetWork(PC pc, PetscInt64 *interior, PetscInt64 *interface, PetscInt *nface)
+PetscErrorCode SbPCRotatedGetStats(PC pc, PetscInt *nfactor, PetscInt64 *interior, PetscInt64 *interface,
+                                   PetscInt *nface)
 {
   PetscInt64 entries, bytes = 0;
   Rotated *p;
@@ -457,6 +439,7 @@ PetscErrorCode SbPCRotatedGetWork(PC pc, PetscInt64 *interior, PetscInt64 *inter
   PetscFunctionBeginUser;
   PetscCall(PCShellGetContext(pc, &p));
   if (p->factor) SbFactorSize(p->factor, &entries, &bytes);
+  if (nfactor) *nfactor = p->nfactor;
   if (interior) *interior = 2 * bytes;
   if (interface) *interface = p->face ? SbInterfaceBytes(p->face) : 0;
   if (nface) *nface = p->face ? p->face->n : 0;

@@ -69,10 +69,11 @@ struct _p_SbPressureOperator {
 };
 /* The operator behind a matrix of SbPressureOperatorCreate(), else NULL. Not collective. */
 PetscErrorCode SbPressureOperatorGet(Mat K, SbPressureOperator *op);
-/* y[3 nnode_owned] = A u + B^T p, d[ncell_owned] = B u; u, p owned parts; p or d may be NULL. Collective. */
+/* y[3 nnode_owned] = A u + B^T p, d[ncell_owned] = B u; u, p owned parts. Collective. */
 PetscErrorCode SbPressureOperatorApply(SbPressureOperator op, const PetscScalar u[], const PetscScalar p[],
                                        PetscScalar y[], PetscScalar d[]);
-/* y[3 nnode_owned] -= B^T p. Collective. */
-PetscErrorCode SbPressureOperatorSubtract(SbPressureOperator op, const PetscScalar p[], PetscScalar y[]);
+/* y[3 nnode_owned] += factor B^T p; absolute: with |B|. Collective. */
+PetscErrorCode SbPressureOperatorAddGradient(SbPressureOperator op, const PetscScalar p[], PetscBool absolute,
+                                             PetscReal factor, PetscScalar y[]);
 /* Norm of the rounding errors of K x from its volumetric part and from the diagonal of A, N. Collective. */
 PetscErrorCode SbPressureOperatorRounding(SbPressureOperator op, Vec x, PetscReal *level);

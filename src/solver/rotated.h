@@ -9,25 +9,20 @@
 
 /* ------------------------------------------------------------------ interface between ranks */
 
-/*
-  SbInterfaceChooseNodes - few nodes that separate the ranks' interiors.
-
-  Collective; the space has a plan. Fully prescribed nodes are left out. Output: index[nnode], number of a
-  local node in the interface, -1 for others; those of a rank are consecutive. nmine: number owned by this
-  rank; n: by all ranks.
-*/
-PetscErrorCode SbInterfaceChooseNodes(SbSpace space, PetscInt index[], PetscInt *nmine, PetscInt *n);
-
-/* The interface nodes, and their factored inverse Schur complement, distributed by rows (interface.c). */
+/* The interface nodes, and W of their inverse Schur complement W^T W, distributed by rows (interface.c). */
 typedef struct _p_SbInterface *SbInterface;
-typedef struct _p_SbInterfaceFactor *SbInterfaceFactor;
 struct _p_SbInterface {
   MPI_Comm comm;
-  PetscInt n;               /* number of interface nodes, all ranks */
-  PetscInt *index;          /* [nnode] number of a local node in the interface, -1 for others */
-  PetscInt nmine;           /* number owned by this rank */
-  PetscInt *mine;           /* [nmine] local nodes */
-  SbInterfaceFactor factor; /* owned */
+  PetscInt n;             /* number of interface nodes, all ranks */
+  PetscInt *index;        /* [nnode] number of a local node in the interface, -1 for others */
+  PetscInt nmine;         /* number owned by this rank */
+  PetscInt *mine;         /* [nmine] local nodes */
+  PetscInt nblock, nrows; /* number of row blocks of W, of all ranks, of this one */
+  struct _SbRows *rows;   /* [nrows] row blocks of this rank */
+  size_t nword;           /* number of words in use */
+  int32_t *word;          /* words, with room for reads beyond the last panel */
+  float *scale;           /* [3 n][2] scales of the rows; the second ones are unused */
+  float *sum, *y; /* [3 n] sum of the right-hand sides; own part of the solution; room for one block more */
 };
 
 /* Finds the interface. Collective. */
@@ -68,8 +63,7 @@ typedef struct {
 
 PetscErrorCode SbExactNodesCreate(SbSpace space, SbExactNodes *e);
 PetscErrorCode SbExactNodesDestroy(SbExactNodes *e);
-/* Chooses the free nodes with a spread above `limit` (raised while there are too many) and all neighbours
-   owned, and factors. */
+/* Chooses free nodes with a spread above `limit`, raised if they are too many, and factors. */
 PetscErrorCode SbExactNodesSetUp(SbExactNodes *e, SbSpace space, Mat A, const PetscReal spread[],
                                  PetscReal limit);
 /* y = B r on the nodes, r -= A y, in place on r[nnode_owned][3]; to be called before P. */

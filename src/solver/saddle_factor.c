@@ -77,8 +77,7 @@ PetscErrorCode SbSaddleFactorSolve(SbSpace s, Vec r, Vec z, PCFailedReason *fail
 
     PetscCall(PCDestroy(&f->pc));
     PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, PETSC_FALSE, &package));
-    /* The projected matrix as AIJ. MatConvert() would need parts of a parallel block matrix that are held
-       elsewhere. */
+    /* the projected matrix as AIJ; MatConvert() would need parts of the block matrix that are in use */
     n = s->nnode_owned;
     /* K, block by block */
     PetscCall(PetscMalloc4(n, &node, n + 1, &ia, 3 * n, &near, 3 * n, &far));

@@ -41,8 +41,7 @@ static PetscErrorCode create_frames(SbSpace s, Mat *A)
   PetscCheck(
     frames, s->comm, PETSC_ERR_USER,
     "-solver realtime is for -mass lumped, the elements p1 and p2 with straight edges, and the materials "
-    "linear, and corotated with "
-    "-body_<name>_tangent warped: choose these, or -solver rotated");
+    "linear, and corotated with -body_<name>_tangent warped: choose these, or -solver rotated");
   PetscCall(SbSpaceCreateMatrixFree(s, A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -84,8 +83,7 @@ static const SbSolverPreset presets[] = {
   {"realtime", SB_MATRIX_BAIJ, "-ksp_type cg -ksp_initial_guess_nonzero", .matrix_free = PETSC_TRUE,
    .create = create_frames, .precondition = SbPCRotatedCreate,
    .help = "the same without a matrix, warm-started: p1 and p2, linear, or corotated with "
-           "-body_<name>_tangent warped; "
-           "fastest with -snes_type ksponly and -ksp_rtol 1e-4"},
+           "-body_<name>_tangent warped; fastest with -snes_type ksponly and -ksp_rtol 1e-4"},
   {"pressure", SB_MATRIX_BAIJ, "-ksp_type richardson -ksp_max_it 300", .create = SbPressureOperatorCreate,
    .precondition = SbPCPressureCreate,
    .help =
@@ -95,36 +93,30 @@ static const SbSolverPreset presets[] = {
 
 /* Matrix types and options for preconditioners of -pc_type. The last row: all others. */
 static const SbSolverPreset by_type[] = {
-  {.name = PCNONE, .matrix = SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type none"},
-  {.name = PCJACOBI, .matrix = SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type jacobi"},
-  {.name = PCPBJACOBI, .matrix = SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type pbjacobi"},
-  {.name = PCICC, .matrix = SB_MATRIX_SBAIJ, .options = "-ksp_type cg -pc_type icc"},
-  {.name = PCBJACOBI,
-   .matrix = SB_MATRIX_AIJ,
+  {PCNONE, SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type none"},
+  {PCJACOBI, SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type jacobi"},
+  {PCPBJACOBI, SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type pbjacobi"},
+  {PCICC, SB_MATRIX_SBAIJ, .options = "-ksp_type cg -pc_type icc"},
+  {PCBJACOBI, SB_MATRIX_AIJ,
    .options = "-ksp_type cg -pc_type bjacobi -sub_pc_factor_shift_type positive_definite"},
-  {.name = PCASM,
-   .matrix = SB_MATRIX_AIJ,
-   .options = "-ksp_type cg -pc_type asm -sub_pc_factor_shift_type positive_definite"},
-  {.name = PCSOR, .matrix = SB_MATRIX_AIJ, .options = "-ksp_type cg -pc_type sor -pc_sor_local_symmetric"},
-  {.name = PCHYPRE, .matrix = SB_MATRIX_AIJ, .options = "-ksp_type cg -pc_type hypre", .package = "hypre"},
-  {.name = "", .matrix = SB_MATRIX_AIJ, .options = "-ksp_type cg"},
+  {PCASM, SB_MATRIX_AIJ, .options = "-ksp_type cg -pc_type asm -sub_pc_factor_shift_type positive_definite"},
+  {PCSOR, SB_MATRIX_AIJ, .options = "-ksp_type cg -pc_type sor -pc_sor_local_symmetric"},
+  {PCHYPRE, SB_MATRIX_AIJ, .options = "-ksp_type cg -pc_type hypre", .package = "hypre"},
+  {"", SB_MATRIX_AIJ, .options = "-ksp_type cg"},
 };
 
 static const SbOption rows[] = {
   {"solver", SB_OPTION_CHOICE, 1, "", "auto",
-   "auto|direct|cg|cg_jacobi|cg_pbjacobi|cg_icc|cg_ssor|cg_two_level|cg_p_multigrid|cg_gamg|cg_hypre|gauss_"
-   "seidel|sor|"
-   "cholmod|umfpack|mumps|rotated|realtime|pressure",
+   "auto|direct|cg|cg_jacobi|cg_pbjacobi|cg_icc|cg_ssor|cg_two_level|cg_p_multigrid|cg_gamg|cg_hypre|"
+   "gauss_seidel|sor|cholmod|umfpack|mumps|rotated|realtime|pressure",
    "linear solver. auto: chosen by size, ranks and material, and reported; direct: the fastest factorisation "
    "that this PETSc has; cg_...: conjugate gradients, preconditioned by Jacobi, point-block Jacobi, "
    "incomplete Cholesky, SSOR, two levels with rigid-body modes as coarse space, p-multigrid (p2), GAMG or "
    "BoomerAMG; gauss_seidel, sor: stationary iterations by blocks, or PETSc's; cholmod, umfpack, mumps: "
    "factorisations; rotated: CG with a Cholesky factor in low precision, computed once and rotated with the "
    "nodes from then on; realtime: the same without a matrix and warm-started, for p1 and p2, linear and "
-   "corotated; "
-   "pressure: GMRES with the pressures of cells as unknowns, for P2, CR and DG near incompressibility. "
-   "PETSc's "
-   "-ksp_ and -pc_ options refine it"},
+   "corotated; pressure: GMRES with the pressures of cells as unknowns, for P2, CR and DG near "
+   "incompressibility. PETSc's -ksp_ and -pc_ options refine it"},
   {"reproducible", SB_OPTION_BOOL, 1, "", "false", "",
    "bitwise identical results of every run on the same number of ranks: matrices are factored on one rank, "
    "and never by MUMPS or SuperLU_DIST, whose order of summation depends on the arrival of messages"},
@@ -172,8 +164,7 @@ static PetscErrorCode may_be_indefinite(SbSpace s, PetscBool *maybe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Value of an option in a preset's option string, "cholesky" for a direct preset's -pc_type; "" if it has
-   none. */
+/* Value of an option in a preset's option string, "" if it has none. */
 static PetscErrorCode preset_value(const SbSolverPreset *preset, const char *name, size_t size, char value[])
 {
   const char *at = strstr(preset->options, name);
@@ -290,45 +281,44 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   }
   if (explicit_run) {
     name = "cg";
-    PetscCall(PetscSNPrintf(reason, size, "explicit integrator: no linear system"));
+    SbFormat(size, reason, "explicit integrator: no linear system");
   } else if (*preset) {
-    PetscCall(PetscSNPrintf(reason, size, "chosen by %s", option));
+    SbFormat(size, reason, "chosen by %s", option);
   } else if (!strcmp(choice, "direct")) {
     PetscCheck(package, s->comm, PETSC_ERR_USER,
                "-solver direct needs SuiteSparse or MUMPS, and this PETSc was built without both: choose "
                "another solver, or auto");
     name = package;
-    PetscCall(PetscSNPrintf(reason, size, "the factorisation for %" PetscInt_FMT " unknowns on %d rank%s%s",
-                            unknowns, (int)nrank, nrank > 1 ? "s" : "",
-                            indefinite ? "; the exact tangent may be indefinite" : ""));
+    SbFormat(size, reason, "the factorisation for %" PetscInt_FMT " unknowns on %d rank%s%s", unknowns,
+             (int)nrank, nrank > 1 ? "s" : "", indefinite ? "; the exact tangent may be indefinite" : "");
   } else if (strcmp(choice, "auto")) {
-    PetscCall(PetscSNPrintf(reason, size, "chosen by -solver"));
+    SbFormat(size, reason, "chosen by -solver");
   } else if (turns) {
     /* 51k unknowns of CR, 36k of DG, nu 0.4: ms per step of rotated and cg_two_level 22 and 89, 22 and 94 on
        two ranks, 12 and 50, 16 and 76 on four (docs/reports/realtime_ranks.md). Ten steps of 1.3k to 2.3k
        unknowns, linear iterations of rotated and pressure, DG: 1150 and 1478 at nu 0.4999, 14521 and 1652 at
        0.49999, 634312 and 4348 at 0.499999 */
     name = "rotated";
-    PetscCall(PetscSNPrintf(reason, size,
-                            "dynamic, %" PetscInt_FMT
-                            " unknowns: one factorisation, rotated with the nodes, serves many steps",
-                            unknowns));
+    SbFormat(size, reason,
+             "dynamic, %" PetscInt_FMT
+             " unknowns: one factorisation, rotated with the nodes, serves many steps",
+             unknowns);
   } else if (s->edge_node && !s->faces && hard.nu <= (hard.slivers ? NU_PRESSURE : NU_SLIVERS) &&
              unknowns > (indefinite || hard.slivers ? SB_DIRECT_SMALL : P_MULTIGRID)) {
     /* measured in docs/reports/solver_choice.md */
     name = "cg_p_multigrid";
-    PetscCall(PetscSNPrintf(
-      reason, size,
-      "%s, %" PetscInt_FMT " unknowns of p2, nu up to %g: with P1 on the vertices below it iterations do not "
-      "grow with the mesh",
-      dynamic ? "dynamic" : "static", unknowns, (double)hard.nu));
+    SbFormat(size, reason,
+             "%s, %" PetscInt_FMT
+             " unknowns of p2, nu up to %g: with P1 on the vertices below it iterations do not "
+             "grow with the mesh",
+             dynamic ? "dynamic" : "static", unknowns, (double)hard.nu);
   } else if (unknowns <= SB_DIRECT_SMALL && package && !(nface > most && hard.nu <= NU_PRESSURE)) {
     /* 28k unknowns of P1 on 16 ranks, dynamic, ms per step of mumps and cg_two_level: 300 to 450 and 50
        (docs/reports/realtime_ranks.md) */
     name = package;
-    PetscCall(PetscSNPrintf(
-      reason, size, "%" PetscInt_FMT " unknowns: a factorisation is fast and works at any Poisson's ratio%s",
-      unknowns, indefinite ? "; the exact tangent may be indefinite" : ""));
+    SbFormat(size, reason,
+             "%" PetscInt_FMT " unknowns: a factorisation is fast and works at any Poisson's ratio%s",
+             unknowns, indefinite ? "; the exact tangent may be indefinite" : "");
   } else if (!dynamic && package &&
              unknowns <= (hard.nu > NU_PRESSURE && hard.slivers               ? DIRECT_NEXT
                           : s->edge_node && !s->faces && hard.nu > NU_SLIVERS ? DIRECT_NEXT
@@ -336,11 +326,11 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
                                                                               : 0)) {
     /* measured in docs/reports/solver_choice.md */
     name = package;
-    PetscCall(PetscSNPrintf(reason, size,
-                            "%" PetscInt_FMT
-                            " unknowns, nu up to %g, %.2g %% of the tets slivers (angles below %g degrees): "
-                            "a factorisation, iterations hardly get there",
-                            unknowns, (double)hard.nu, 100. * (double)hard.sliver_part, SB_SLIVER));
+    SbFormat(size, reason,
+             "%" PetscInt_FMT
+             " unknowns, nu up to %g, %.2g %% of the tets slivers (angles below %g degrees): "
+             "a factorisation, iterations hardly get there",
+             unknowns, (double)hard.nu, 100. * (double)hard.sliver_part, SB_SLIVER);
   } else if (!s->constraints && !s->coupled &&
              (s->edge_node
                 ? !s->faces && hard.nu > NU_SLIVERS
@@ -348,31 +338,25 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
     /* docs/reports/solver_choice.md; 24k tets of CR, dynamic, CPU s of pressure and cg_two_level at nu 0.3 12
        and 7, at 0.45 15 and 11, at 0.49 17 and 17 */
     name = "pressure";
-    PetscCall(PetscSNPrintf(
-      reason, size,
+    SbFormat(
+      size, reason,
       "%s, %" PetscInt_FMT
       " unknowns of %s, nu up to %g: with the pressures as unknowns iterations hardly grow towards 1/2",
       dynamic ? "dynamic" : "static", unknowns, s->edge_node ? "p2" : "cr or dg",
-      (double)(s->edge_node ? hard.nu : hard.face_nu)));
+      (double)(s->edge_node ? hard.nu : hard.face_nu));
   } else {
     /* 192k tets, CPU s of cg_two_level on one rank. Static: 0.36 (cg_gamg 1.7, cg_icc 1.4), at nu 0.45 0.7
        (2.3), at 0.499 4.2 (18); dynamic, h = 0.01 s: 0.22 (1.7, 0.40) */
     name = s->edge_node && !s->faces ? "cg_p_multigrid" : "cg_two_level";
-    PetscCall(
-      PetscSNPrintf(reason, size,
-                    "%s, %" PetscInt_FMT
-                    " unknowns: motions of large parts are solved directly, the rest takes few iterations",
-                    dynamic ? "dynamic" : "static", unknowns));
+    SbFormat(size, reason,
+             "%s, %" PetscInt_FMT
+             " unknowns: motions of large parts are solved directly, the rest takes few iterations",
+             dynamic ? "dynamic" : "static", unknowns);
   }
-  if (nface > most) {
-    size_t length;
-
-    PetscCall(PetscStrlen(reason, &length));
-    PetscCall(PetscSNPrintf(reason + length, size - length,
-                            "; %d ranks meet at %" PetscInt_FMT
-                            " nodes, and rotated and realtime take %" PetscInt_FMT,
-                            (int)nrank, nface, most));
-  }
+  if (nface > most)
+    SbAppend(size, reason,
+             "; %d ranks meet at %" PetscInt_FMT " nodes, and rotated and realtime take %" PetscInt_FMT,
+             (int)nrank, nface, most);
   if (!*preset) *preset = find_preset(name);
   PetscCheck(*preset, s->comm, PETSC_ERR_PLIB, "No solver preset %s", name);
   if ((*preset)->package) PetscCall(SbHasPackage((*preset)->package, &has));
@@ -382,19 +366,17 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fallback solvers in the order of trial, and their largest numbers of unknowns: a factorisation fails rarely
-   but costs most. */
-static const struct {
-  const char *name;
-  PetscInt most;
-} others[] = {{"direct", DIRECT_NEXT},
-              {"pressure", PETSC_MAX_INT},
-              {"cg_gamg", PETSC_MAX_INT},
-              {"direct", PETSC_MAX_INT}};
-
 PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscBool memory, uint32_t *tried,
                                     const SbSolverPreset **preset)
 {
+  /* in the order of trial, up to a number of unknowns: a factorisation fails rarely but costs most */
+  static const struct {
+    const char *name;
+    PetscInt most;
+  } others[] = {{"direct", DIRECT_NEXT},
+                {"pressure", PETSC_MAX_INT},
+                {"cg_gamg", PETSC_MAX_INT},
+                {"direct", PETSC_MAX_INT}};
   const SbSolverPreset *failed = *preset;
   PetscBool indefinite;
   Hardness hard;
@@ -404,8 +386,7 @@ PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscB
   PetscCall(find_hardness(s, &hard));
   if (find_preset(failed->name) == failed) *tried |= 1U << (failed - presets);
   PetscCall(may_be_indefinite(s, &indefinite));
-  /* where the tangent itself may be indefinite, Newton's method changes the tangent; no other solver is
-     tried */
+  /* where the tangent may be indefinite, Newton's method changes it, and no other solver is tried */
   if (indefinite && reason == KSP_DIVERGED_INDEFINITE_MAT) PetscFunctionReturn(PETSC_SUCCESS);
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(others) && !*preset; k++) {
     const PetscBool direct = (PetscBool)!strcmp(others[k].name, "direct");
@@ -417,8 +398,7 @@ PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscB
     if (failed->direct && !memory && !direct) continue;
     /* The first listed fallback of a name that has not failed yet and supports this space; NULL: none. */
     *preset = direct ? NULL : find_preset(others[k].name);
-    /* factorisation: one for definite matrices, then one for indefinite ones, which stress or rounding may
-       cause */
+    /* one for definite matrices, then one for indefinite ones, which stress or rounding may cause */
     for (int j = indefinite; direct && j < 2 && !*preset; j++) {
       const char *package;
 
@@ -483,8 +463,7 @@ PetscErrorCode SbSolverCreateOperator(SbSpace s, const SbSolverPreset *preset, M
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The factorisation package where the user names neither one nor -solver: PETSc's default depends on neither
-   size nor number of ranks. */
+/* The package where the user names neither one nor -solver: PETSc's default ignores size and ranks. */
 static PetscErrorCode choose_package(SbSpace s, PC pc, const char *type)
 {
   const PetscBool lu = (PetscBool)!strcmp(type, PCLU);
@@ -561,8 +540,7 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   if (symmetric && !strcmp(type, PCASM)) PetscCall(set_options("-pc_asm_type basic", PETSC_FALSE));
   if (symmetric && !strcmp(type, PCCOMPOSITE))
     PetscCall(set_options("-sub_0_pc_sor_local_symmetric", PETSC_FALSE));
-  /* PETSc keeps the eigenvalue estimate of the first matrix with the interpolation; it is too small once
-     contact stiffness is added */
+  /* PETSc keeps the eigenvalue estimate of the first matrix, too small once contact stiffness is added */
   PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &given));
   if (!given && !strcmp(type, PCGAMG)) PetscCall(set_options("-pc_gamg_use_sa_esteig no", PETSC_FALSE));
   PetscCall(set_options(preset->options, PETSC_FALSE));

@@ -4,8 +4,7 @@
 #pragma once
 #include "sbsolver.h"
 
-/* PETSC_ERR_USER if the type of ksp does not support its norm and side. After KSPSetFromOptions(). Not
-   collective. */
+/* PETSC_ERR_USER if ksp does not support its norm and side. After KSPSetFromOptions(). Not collective. */
 PetscErrorCode SbKSPCheckNorm(KSP ksp);
 
 /*
@@ -41,8 +40,7 @@ PetscErrorCode SbKSPSetForceTolerance(KSP ksp);
 */
 PetscErrorCode SbPCConstrainedCreate(SbSpace space, PC pc, PC *inner);
 
-/* negative: number of negative pivots of a finished factorisation, -1: unknown; only MUMPS' L D L^T counts
-   them. Collective. */
+/* Number of negative pivots of a factorisation, -1: unknown; only MUMPS' L D L^T counts them. Collective. */
 PetscErrorCode SbPCDirectCountNegative(PC pc, PetscInt *negative);
 
 /* Makes pc algebraic multigrid that needs few messages. threshold of strong couplings: 0, zero couplings, of
@@ -70,8 +68,7 @@ PetscErrorCode SbPCPressureCreate(SbSpace space, PC pc);
   Output: failed, the reason of a failed factorisation; z is NaN then.
 */
 PetscErrorCode SbSaddleFactorSolve(SbSpace space, Vec r, Vec z, PCFailedReason *failed);
-/* Number of negative eigenvalues of K + F^T k G in the null space of the constraints, from that
-   factorisation; -1: unknown. Collective. */
+/* Its negative eigenvalues of K + F^T k G in the constraints' null space, -1: unknown. Collective. */
 PetscErrorCode SbSaddleFactorCountNegative(SbSpace space, PetscInt *negative);
 
 /* Sets -<prefix><key> in PETSc's database unless the user has. Not collective. */
@@ -79,3 +76,6 @@ PetscErrorCode SbSolverSetDefault(const char *prefix, const char *key, const cha
 
 /* -reproducible: runs on the same number of ranks are bitwise equal. Not collective. */
 PetscErrorCode SbSolverReproducible(PetscBool *reproducible);
+
+/* The context of a PCSHELL with this name, NULL for any other pc. Not collective. */
+PetscErrorCode SbPCShellFind(PC pc, const char *name, void *context);

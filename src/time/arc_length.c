@@ -1,25 +1,28 @@
 /*
-  Arc-length method for static runs: the load factor lambda is an unknown, and the length l of a step the additional equation,
+  Arc-length method for static runs: an unknown load factor lambda, the length l of a step as another
+  equation,
 
     R(u, lambda) = f_int(u) - f_ext(u, lambda) = 0,   |d| = l,   d = u - u_n,
 
-  so that the path continues past limit points of load and displacement. |d| is the mass-weighted root mean square,
-  in m, with prescribed displacements: a cylindrical constraint (Crisfield, Comput. Struct. 13, 1981). Both equations are linearised together
-  (Schweizerhof and Wriggers, Comput. Methods Appl. Mech. Eng. 59, 1986). With the exact tangent K and q = -dR/dlambda an
-  iteration takes two solves with one factorisation,
+  so that the path continues past limit points of load and displacement. |d| is the mass-weighted root mean
+  square, in m, with prescribed displacements: a cylindrical constraint (Crisfield, Comput. Struct. 13, 1981).
+  Both equations are linearised together (Schweizerhof and Wriggers, Comput. Methods Appl. Mech. Eng. 59,
+  1986). With the exact tangent K and q = -dR/dlambda an iteration takes two solves with one factorisation,
 
     K r = -R,   K v = q,   dlambda = ((l^2 - |d|^2)/2 - (d, r)) / (d, v),   du = r + dlambda v.
 
-  The predictor is along v, with the sign of (v, d), d the last step (de Souza Neto and Feng, Comput. Methods Appl. Mech.
-  Eng. 179, 1999): unlike the sign of the determinant or of the work of the loads it is right at limit points of load and displacement
-  and after bifurcations. The first step has the load increment 1 / static_steps, later ones are longer while iterations are few. A step that does
-  not converge, or ends at a large angle to its predictor (on another branch), is halved.
+  The predictor is along v, with the sign of (v, d), d the last step (de Souza Neto and Feng, Comput. Methods
+  Appl. Mech. Eng. 179, 1999): unlike the sign of the determinant or of the work of the loads it is right at
+  limit points and after bifurcations. The first step has the load increment 1 / static_steps, later ones are
+  longer while iterations are few. A step that does not converge, or ends at a large angle to its predictor
+  (on another branch), is halved.
 
-  q is a finite difference of residuals. It is exact for loads that are proportional to lambda; with moving supports and formulas of t (here
-  lambda), the step of the difference is small. The last step is solved at lambda = 1.
+  q is a finite difference of residuals, exact for loads proportional to lambda; with moving supports and
+  formulas of t (here lambda) its step is small. The last step is solved at lambda = 1.
 
-  K has negative eigenvalues after limit loads. If the factorisation counts them, a changed number while the load does not change direction is a
-  bifurcation: it is reported, but the other branch is not followed. Not handled: contact, re-meshing.
+  K has negative eigenvalues after limit loads. If the factorisation counts them, a change of their number
+  while the load does not turn is a bifurcation: it is reported, but the other branch is not followed. Not
+  handled: contact, re-meshing.
 */
 #include "sbsolver.h"
 #include "time_impl.h"
@@ -179,7 +182,7 @@ static PetscErrorCode correct(Path *p, PetscReal l, PetscInt *its, PetscBool *ok
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Attempts a step of length l from U with the load factor `from`; sign: whether the load increases initially. */
+/* Attempts a step of length l from U with the load factor `from`; sign: of the initial change of the load. */
 static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal sign, PetscInt *its,
                               PetscBool *ok)
 {
@@ -319,7 +322,7 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
       known = PETSC_TRUE;
     }
 
-    /* length of the first step: load increment 1 / static_steps or, if a load path ended near a limit load, the displacement per load so far */
+    /* first step: by the load increment 1 / static_steps or, after a load path, its displacement per load */
     if (l == 0.) {
       PetscReal rate, uu;
 

@@ -1,5 +1,5 @@
 /*
-  Callbacks of PETSc's TS and SNES. A tangent that cannot have changed (linear laws, loads that do not depend on the
+  Callbacks of PETSc's TS and SNES. A tangent that cannot have changed (linear laws, loads independent of the
   displacement, the same shifts) is not assembled again, and the preconditioner is reused.
 */
 #include "sbsolver.h"

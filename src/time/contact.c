@@ -1,10 +1,10 @@
 /*
-  The active-set iteration of a step with contact: solve with the current active set, update it, repeat until it does not
+  The active-set iteration of a step with contact: solve, update the active set, repeat until it does not
   change.
 
-  Later solves start near their solution, and a tolerance relative to their first residual could be below the rounding of
-  large contact forces. So all solves of a step have the absolute tolerance of the first one. While the active set changes, the tolerance in time
-  steps is a thousand times larger ("rough" solves).
+  Later solves start near their solution, and a tolerance relative to their first residual could be below the
+  rounding of large contact forces. So all solves of a step have the absolute tolerance of the first one;
+  while the active set changes, that in time steps is a thousand times larger ("rough" solves).
 */
 #include "sbsolver.h"
 #include "time_impl.h"
@@ -13,6 +13,8 @@
 #define LOOSER 1e3      /* factor on the tolerance of rough solves */
 #define ROUGH 1e-3      /* largest tolerance of rough solves, over the first residual */
 #define ROUGH_ROUNDS 10 /* number of iterations after which solves are no longer rough */
+#define ROUNDS 250      /* largest number of solves per step; response augmented may take more than 100 */
+#define APART 0.05      /* least distance of a time of impact from the ends of a step, over its length */
 
 /* Tolerances of the solvers as set by the user. */
 typedef struct {
@@ -21,7 +23,7 @@ typedef struct {
   PetscBool single; /* one linear solve per step instead of Newton's method */
 } Aim;
 
-/* Sets absolute tolerances for solves of a step whose first residual is `size`, N; 0: those of the user. least: rounding, N. */
+/* Sets the tolerances of a step with the first residual `size`, N; 0: the user's. least: rounding, N. */
 static PetscErrorCode set_aim(SNES snes, const Aim *aim, PetscReal size, PetscReal least, PetscBool rough)
 {
   const PetscReal rtol = aim->single ? aim->linear_rtol : aim->rtol;
@@ -87,15 +89,14 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
     if (round == 1 && run->may_end_at_impact) {
       /* the first time of impact, if the step may end there */
       PetscCall(SbModelContactTimeOfImpact(m, &run->time_of_impact));
-      if (run->time_of_impact < SB_TIME_OF_IMPACT_LEAST || run->time_of_impact > 1. - SB_TIME_OF_IMPACT_LEAST)
-        run->time_of_impact = 1.;
+      if (run->time_of_impact < APART || run->time_of_impact > 1. - APART) run->time_of_impact = 1.;
       if (run->time_of_impact < 1.) *reason = SNES_CONVERGED_ITERATING;
     }
     if ((!again && !rough) || !*reason) break;
     if (!again || round == ROUGH_ROUNDS) rough = PETSC_FALSE;
     if (projected || !m->dynamic) run->tangent_known = PETSC_FALSE;
     PetscCall(SbRunStopAsked(run, run->step_now, run->t_now, PETSC_TRUE));
-    if (run->stopped || round == SB_CONTACT_ROUNDS) {
+    if (run->stopped || round == ROUNDS) {
       *reason = SNES_DIVERGED_MAX_IT;
       break;
     }

@@ -1,8 +1,11 @@
 /*
-  Energy balance. With R the residual without constraints (the reaction on prescribed unknowns) and f the loads, the work in a step from 0 to 1 is (f0 + f1)/2 . (u1 - u0) by the loads (exact for constant loads: minus the change of their potential),
-  (R0 + R1)/2 . (u1 - u0) by moving supports (of rotating ones: moment times angle); damping dissipates (p0 + p1)/2 h with p = v . C v. Barrier contact integrates its own
-  work (src/effect/barrier.c), as the energy of its gaps may change much within a step. The remaining difference between the energies at the start and now was dissipated
-  (or, negative, added) by the integrator. A stable implicit one adds little; one that adds most of the energy is unstable, and the run means nothing from there on.
+  Energy balance. R: residual without constraints (reaction on prescribed unknowns), f: loads. The work in a
+  step from 0 to 1 is (f0 + f1)/2 . (u1 - u0) by loads (exact for constant ones: minus the change of their
+  potential), (R0 + R1)/2 . (u1 - u0) by moving supports (rotating ones: moment times angle); damping
+  dissipates (p0 + p1)/2 h, p = v . C v. Barrier contact integrates its own work (src/effect/barrier.c), as
+  the energy of its gaps may change much in a step. The rest of the difference between the energies at the
+  start and now was dissipated (negative: added) by the integrator. A stable implicit one adds little; if one
+  adds most of the energy, it is unstable, and the run means nothing from there on.
 */
 #include "time_impl.h"
 
@@ -48,7 +51,7 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
     PetscReal one;
     Vec moved;
 
-    /* twice the work of the loads and of reactions: at prescribed unknowns, and where contact acts now or did a step ago */
+    /* twice the work of loads and reactions: at prescribed unknowns, and where contact acts or just did */
     PetscCall(VecDuplicate(run->U, &moved));
     PetscCall(VecWAXPY(moved, -1., run->previous, run->U));
     PetscCall(VecDot(loads, moved, &work[0]));

@@ -1,6 +1,6 @@
 /*
-  Integrators by name: each preset is a method of second_order.c with its parameters; options of the user have precedence, and all of
-  PETSc's own options (-ts_, -snes_, -ksp_, -pc_) apply.
+  Integrators by name: each preset is a method of second_order.c with its parameters; options of the user, and
+  PETSc's own (-ts_, -snes_, -ksp_, -pc_), have precedence.
 
     euler_implicit    first order, damps; never gains energy in linear runs
     newmark           second order, (1/4, 1/2) conserves energy in linear runs
@@ -90,31 +90,6 @@ PetscErrorCode SbTimeRegister(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Options of the arc-length method, which needs exact tangents: `auto` becomes exact. */
-static PetscErrorCode read_arc_length(SbRun run)
-{
-  const SbModel m = run->model;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionInt(&SbRunScope, "static_max_steps", &run->arc.steps));
-  PetscCall(SbOptionReal(&SbRunScope, "static_max_displacement", &run->arc.displacement));
-  PetscCall(SbOptionReal(&SbRunScope, "static_longest_step", &run->arc.longest));
-  for (PetscInt k = 0; k < m->nmaterial; k++) {
-    char option[3 * SB_NAME_MAX];
-    PetscBool given;
-
-    if (m->material[k]->linear || m->material[k]->tangent == SB_TANGENT_EXACT) continue;
-    PetscCall(PetscSNPrintf(option, sizeof(option), "-%s_%s_tangent", k < m->nbody ? "body" : "inclusion",
-                            k < m->nbody ? m->body[k].name : m->inclusion[k - m->nbody]));
-    PetscCall(PetscOptionsHasName(NULL, NULL, option, &given));
-    PetscCheck(!given, m->comm, PETSC_ERR_USER_INPUT,
-               "-static_control arc_length needs exact tangents: leave %s out, or make it exact", option);
-    PetscCall(SbMaterialSetTangent(m->material[k], SB_TANGENT_EXACT));
-    m->material[k]->adaptive = PETSC_FALSE;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
 {
   SbRun r;
@@ -149,6 +124,25 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
     r->t_end = 1.;
     r->dt = 1. / (PetscReal)r->static_steps;
   }
+  if (r->arc.on) {
+    PetscCall(SbOptionInt(&SbRunScope, "static_max_steps", &r->arc.steps));
+    PetscCall(SbOptionReal(&SbRunScope, "static_max_displacement", &r->arc.displacement));
+    PetscCall(SbOptionReal(&SbRunScope, "static_longest_step", &r->arc.longest));
+    /* the arc-length method needs exact tangents: `auto` becomes exact */
+    for (PetscInt k = 0; k < model->nmaterial; k++) {
+      char option[3 * SB_NAME_MAX];
+      PetscBool given;
+
+      if (model->material[k]->linear || model->material[k]->tangent == SB_TANGENT_EXACT) continue;
+      SbFormat(sizeof(option), option, "-%s_%s_tangent", k < model->nbody ? "body" : "inclusion",
+               k < model->nbody ? model->body[k].name : model->inclusion[k - model->nbody]);
+      PetscCall(PetscOptionsHasName(NULL, NULL, option, &given));
+      PetscCheck(!given, model->comm, PETSC_ERR_USER_INPUT,
+                 "-static_control arc_length needs exact tangents: leave %s out, or make it exact", option);
+      PetscCall(SbMaterialSetTangent(model->material[k], SB_TANGENT_EXACT));
+      model->material[k]->adaptive = PETSC_FALSE;
+    }
+  }
   if (r->preset == SB_TIME_GENALPHA || r->preset == SB_TIME_ALPHA2)
     PetscCall(SbOptionReal(&SbRunScope, "time_spectral_radius", &r->spectral_radius));
   if (r->preset == SB_TIME_NEWMARK) {
@@ -171,7 +165,6 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
   if (r->saddle) PetscCall(SbOptionChoice(&SbRunScope, "saddle_solver", &r->saddle_choice));
   if (barrier) PetscCall(SbOptionChoice(&SbRunScope, "contact_solver", &r->contact_choice));
   PetscCall(SbSolverSetFromOptions(r->solver_choice, sizeof(r->solver_choice)));
-  if (r->arc.on) PetscCall(read_arc_length(r));
   *run = r;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -179,31 +172,23 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
 /* The parameters of a preset's method. */
 static SbMethodSettings method_settings(SbRun run)
 {
-  const PetscReal r = run->spectral_radius, m = (2. - r) / (1. + r), f = 1. / (1. + r);
+  const PetscReal r = run->spectral_radius, m = (2. - r) / (1. + r), f = 1. / (1. + r), *n = run->newmark;
+  const PetscBool impulses = (PetscBool)(run->model->nbegin_step > 0);
+  const PetscBool separate = (PetscBool)(run->model->npotential > 0);
+  SbMethodSettings set = {.method = SB_METHOD_EULER_IMPLICIT, .alpha_m = 1., .alpha_f = 1.};
 
-  switch (run->preset) {
-  case SB_TIME_NEWMARK:
-    return (SbMethodSettings){.method = SB_METHOD_GENERALIZED_ALPHA,
-                              .alpha_m = 1.,
-                              .alpha_f = 1.,
-                              .beta = run->newmark[0],
-                              .gamma = run->newmark[1],
-                              .impulses = (PetscBool)(run->model->nbegin_step > 0),
-                              .separate = (PetscBool)(run->model->npotential > 0)};
-  case SB_TIME_GENALPHA:
-    return (SbMethodSettings){
+  if (run->preset == SB_TIME_NEWMARK)
+    set = (SbMethodSettings){SB_METHOD_GENERALIZED_ALPHA, 1., 1., n[0], n[1], impulses, separate};
+  if (run->preset == SB_TIME_GENALPHA)
+    set = (SbMethodSettings){
       SB_METHOD_GENERALIZED_ALPHA, m, f, 0.25 * PetscSqr(1. + m - f), 0.5 + m - f, PETSC_FALSE, PETSC_FALSE};
-  default:
-    return (SbMethodSettings){.method = run->preset == SB_TIME_EULER_EXPLICIT     ? SB_METHOD_EULER_EXPLICIT
-                                        : run->preset == SB_TIME_EULER_SYMPLECTIC ? SB_METHOD_EULER_SYMPLECTIC
-                                                                                  : SB_METHOD_EULER_IMPLICIT,
-                              .alpha_m = 1.,
-                              .alpha_f = 1.};
-  }
+  if (run->preset == SB_TIME_EULER_EXPLICIT) set.method = SB_METHOD_EULER_EXPLICIT;
+  if (run->preset == SB_TIME_EULER_SYMPLECTIC) set.method = SB_METHOD_EULER_SYMPLECTIC;
+  return set;
 }
 
-/* Eigenvalue z of generalized-alpha for an undamped oscillator of frequency w, h = 1, nearest to exp(i w): with (u, v, a) multiplied by z per
-   step, (1 - alpha_m + alpha_m z) (z - 1)^2 + w^2 (1 - alpha_f + alpha_f z) (1 - gamma + gamma z + (1/2 - beta + beta z) (z - 1)) = 0. */
+/* Eigenvalue z of generalized-alpha for an undamped oscillator of frequency w, h = 1, nearest to exp(i w): the
+   root of p = m d^2 + w^2 f g below, q its derivative. */
 static double complex alpha_eigenvalue(const SbMethodSettings *s, double w)
 {
   double complex z = cexp(I * w);
@@ -249,12 +234,11 @@ void SbRunLocalError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead)
 }
 
 /*
-  SNES: Newton for nonlinear models, one linear solve for linear ones; tolerances independent of units. PETSc's own options override all
-  settings so far, those of the TS as well.
-
-  Tolerance of Newton's linear solves by its progress (Eisenstat and Walker), unless the user sets a tolerance. In a static run where the
-  matrix lacks a part of the tangent (the free rim of a follower pressure), a factorisation is no exact solve, and changes of volume dominate
-  the residual over bending: with loose solves Newton's method converges only linearly near nu = 1/2.
+  SNES: Newton for nonlinear models, one linear solve for linear ones; tolerances independent of units.
+  PETSc's own options override all settings so far, those of the TS as well. Newton's linear solves are as
+  exact as its progress (Eisenstat and Walker), unless the user sets a tolerance. In a static run whose matrix
+  lacks a part of the tangent (the free rim of a follower pressure), a factorisation is no exact solve, and
+  changes of volume dominate the residual: loose solves make it linear near nu = 1/2.
 */
 static PetscErrorCode set_up_snes(SbRun run)
 {
@@ -265,8 +249,8 @@ static PetscErrorCode set_up_snes(SbRun run)
   PetscBool asked, newton, rtol;
 
   PetscFunctionBeginUser;
-  /* rounding of the internal forces: residuals below 1e-13 of (stress modulus) x (area of the body) are meaningless; near
-     nu = 1/2 the modulus is lambda, as the pressure is lambda times the rounding error of the change of volume */
+  /* residuals below 1e-13 of (stress modulus) x (area of the body) are rounding; near nu = 1/2 the modulus is
+     lambda, as the pressure is lambda times the rounding error of the change of volume */
   for (PetscInt b = 0; b < m->nbody; b++) {
     const SbMaterial law = m->material[b];
 
@@ -360,8 +344,8 @@ static PetscErrorCode set_up_ts(SbRun run)
   } else
     PetscCall(TSSetType(run->ts, SB_TS_SECOND_ORDER));
 
-  /* allowed displacement error per step of adaptive runs, over the size of the largest body, independent of units and orientation: twice
-     the largest distance of a node from the centre of its body */
+  /* allowed displacement error per step of adaptive runs, over the size of the largest body, twice the
+     largest distance of a node from the centre of its body: independent of units and orientation */
   PetscCall(PetscMalloc1(m->nbody, &middle));
   PetscCall(SbModelCentres(m, NULL, middle));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
@@ -398,8 +382,8 @@ static PetscErrorCode set_up_ts(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Errors unless barrier contact has its potential, SB_SNES_NEWTON, and no contact with another response beside it; and other contact has
-   several solves per step and, where needed, a matrix that can be projected. */
+/* Errors unless barrier contact has its potential and is alone, and other contact has several solves per step
+   and, where needed, a matrix that can be projected. */
 static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
 {
   const SbModel m = run->model;
@@ -435,7 +419,7 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
     "The effect %s needs several solves in a step: use -time euler_implicit, newmark, genalpha or static",
     name);
   if (run->preset == SB_TIME_NEWMARK) {
-    /* contact with Newmark (newmark_contact.c) needs the trapezoidal rule, the lumped mass, and forces on constrained nodes only */
+    /* newmark_contact.c needs the trapezoidal rule, the lumped mass, and forces on constrained nodes only */
     PetscCheck(run->newmark[0] == 0.25 && run->newmark[1] == 0.5, m->comm, PETSC_ERR_USER_INPUT,
                "-time newmark with the effect %s needs -time_newmark_beta 0.25 and -time_newmark_gamma 0.5, "
                "not %g and %g: else impacts may gain energy",
@@ -549,7 +533,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
       PetscCall(PetscStrncpy(run->solver, run->solver_parts, sizeof(run->solver)));
   }
 
-  /* one solve per step from the velocity predictor, with a tangent that may be too soft: no bound on the energy (docs/reference/theory.md) */
+  /* one solve per step, with a tangent maybe too soft: no bound on the energy (docs/reference/theory.md) */
   if (run->velocity_predictor && !m->linear && run->snes) {
     PetscCall(PetscObjectTypeCompare((PetscObject)run->snes, SNESKSPONLY, &single));
     for (PetscInt r = 0; r < s->nregion; r++)

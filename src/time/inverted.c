@@ -1,9 +1,10 @@
 /*
   Rejects steps that invert tets, with -time_inverted reject.
 
-  det F <= 0 in a tet is not an admissible deformation. With laws of finite energy a run could continue, with meaningless
-  results. A step that increases the number of such tets is rejected, so inverted initial states may recover. It is repeated with half its
-  length; below 2^-time_max_halvings of the nominal length the run stops: shorter steps would only approach the flat tet.
+  det F <= 0 in a tet is no admissible deformation; with laws of finite energy a run could go on, with
+  meaningless results. A step that increases the number of such tets is rejected, so inverted initial states
+  may recover. It is repeated with half its length; below 2^-time_max_halvings of the nominal length the run
+  stops: shorter steps would only approach the flat tet.
 */
 #include "time_impl.h"
 

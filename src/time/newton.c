@@ -1,38 +1,48 @@
 /*
   Newton's method as a minimisation.
 
-  The solution u of a step of an implicit integrator, or of a load step, is a stationary point of the incremental potential
+  The solution u of a step of an implicit integrator, or of a load step, is a stationary point of
 
     E(u) = a_M/2 |u - u^|_M^2 + psi(u) - f . u + D(u)
 
-  (inertia about the predictor u^, strain, loads, Rayleigh damping); the residual F(u) is its gradient. Each iteration solves K p = -F and takes the
-  step s p, with s such that E decreases sufficiently: E(u + s p) - E(u) <= c s F . p (Armijo; Nocedal and Wright, Numerical Optimization, 2006, section 3.1).
+  (inertia about the predictor u^, strain, loads, Rayleigh damping); the residual F(u) is its gradient. An
+  iteration solves K p = -F and steps by s p with sufficient decrease: E(u + s p) - E(u) <= c s F . p (Armijo;
+  Nocedal and Wright, Numerical Optimization, 2006, section 3.1).
 
-  The change of E. Strain energy is evaluated directly; the rest of F is linear in u but for follower loads and contact, so the trapezoidal
-  rule with the slopes at both ends of the step gives its work: psi(u + s p) - psi(u) + s/2 (r(0) + r(s)), r = (F - dpsi/du) . p. Where that
-  is within rounding, near the solution, the norm of the residual decides.
+  The change of E. Strain energy is evaluated directly; the rest of F is linear in u but for follower loads
+  and contact, so the trapezoidal rule gives its work: psi(u + s p) - psi(u) + s/2 (r(0) + r(s)), r = (F -
+  dpsi/du) . p. Where that is within rounding, near the solution, the norm of the residual decides.
 
-  Provisional steps. In bending and rotation a full step stretches what should rotate: E rises far, and the next step brings it back; a monotone search takes very many
-  short steps where five full ones are enough. So a full step that inverts no tet and meets no barrier may raise E, and the next one has to bring E below the old
-  value, by an accurate linear solve if need be; else the search starts again from the old iterate (watchdog technique: Chamberlain et al. 1982; Nocedal
-  and Wright, section 15.6).
+  Provisional steps. In bending and rotation a full step stretches what should rotate: E rises far, and the
+  next step brings it back; a monotone search takes very many short steps instead of five full ones. So a full
+  step that inverts no tet and meets no barrier may raise E; the next one has to bring E below the old value,
+  by an accurate linear solve if need be, else the search starts again from the old iterate (watchdog
+  technique: Chamberlain et al. 1982; Nocedal and Wright, section 15.6).
 
-  Pressure. In static runs the geometric stiffness uses the linearised pressure of a cell after the step, as if the pressure were an unknown of its own (src/fem/quadratic.c): the spurious
-  changes of volume of a full step in bending would give wrong pressures, and steps of a hundredth. The first such step raises E far, and the next two bring it back. Time steps are short enough without.
+  Pressure. In static runs the geometric stiffness uses the linearised pressure of a cell after the step, as
+  if it were an unknown of its own (src/fem/quadratic.c): spurious changes of volume of a full step in bending
+  would give wrong pressures, and steps of a hundredth. The first such step raises E far, and the next two
+  bring it back. Time steps are short enough without.
 
-  Tangent. With -body_NAME_tangent auto it is the exact one. When the linear solver meets negative curvature or negative pivots, or p is no descent direction, negative eigenvalues of
-  the cells are set to zero and the system is solved once more (Longva et al. 2023, "Pitfalls of projection"); after a full step the exact one is tried again.
-  Forces without a potential (the free rim of a follower pressure) have equilibria at which its symmetric part is not definite: the exact tangent is kept if it has as many negative eigenvalues
-  as at the start of the load step, or after a full step to a residual smaller than the first; along an ascent direction the norm of the residual decides. In a slender body it rises
-  as much as E does in rotation, so such a step may be provisional, too: the next ones have to bring the residual, or E, below the old value.
+  Tangent. With -body_NAME_tangent auto it is exact. At negative curvature or pivots in the linear solver, or
+  if p is no descent direction, negative eigenvalues of the cells are set to zero and the system is solved
+  again (Longva et al. 2023, "Pitfalls of projection"); after a full step the exact one is tried again. Forces
+  without a potential (the free rim of a follower pressure) have equilibria where its symmetric part is not
+  definite: the exact tangent is kept if it has as many negative eigenvalues as at the start of the load step,
+  or after a full step to a residual below the first; along an ascent direction the residual decides. In a
+  slender body it rises as much as E does in rotation, so such a step may be provisional, too: the next ones
+  have to bring the residual, or E, below the old value.
 
-  Barrier contact. Its Hessian is the positive part of each pair's, and the exact one after a full step, as only that converges superlinearly near the solution. Friction
-  whose slip reversed is treated as sticking (src/effect/barrier_forces.c), and bounded from above where p is no descent direction. An indefinite tangent is shifted by the least sufficient
-  multiple of the mass matrix (Nocedal and Wright, algorithm 3.3) before cells are filtered: in a collapse nearly all cells have a negative eigenvalue but the assembled tangent has few,
-  and filtering leads to steps of a hundredth.
+  Barrier contact. Its Hessian is the positive part of each pair's, and after a full step the exact one, which
+  alone converges superlinearly near the solution. Friction whose slip reversed is treated as sticking
+  (src/effect/barrier_forces.c), and bounded from above where p is no descent direction. An indefinite tangent
+  is shifted by the least sufficient multiple of the mass matrix (Nocedal and Wright, algorithm 3.3) before
+  cells are filtered: in a collapse nearly all cells have a negative eigenvalue but the assembled tangent has
+  few, and filtering leads to steps of a hundredth.
 
-  Its line search. E follows the quadratic model until new pairs come within the barrier, and rises steeply from there. A step that Armijo's rule ends before that gives
-  the next tangent no new pairs: so the search bisects between the longest sufficient step and the shortest insufficient one until the slope has halved. Where
+  Its line search. E follows the quadratic model until new pairs come within the barrier, and rises steeply
+  from there. A step that Armijo's rule ends before that gives the next tangent no new pairs: so the search
+  bisects between the longest sufficient and the shortest insufficient step until the slope has halved. Where
   E still decreases half as steeply after a full step, the model being too stiff, longer steps are tried.
 */
 #include <petsc/private/snesimpl.h> /* PETSc has no public way to write a SNESType */
@@ -124,7 +134,7 @@ static PetscErrorCode evaluate(Newton *n, Iterate *at)
   at->ninverted = 0;
   PetscCall(VecNorm(at->r, NORM_2, &at->norm));
   if (PetscIsInfOrNanReal(at->norm)) PetscFunctionReturn(PETSC_SUCCESS);
-  /* forces are those of a stage between the start of the step and x, divided by the stage's fraction of the step */
+  /* forces are those of a stage between the start of the step and x, divided by its fraction of the step */
   if (run->stage) PetscCall(VecAXPBYPCZ(run->stage, 1. - part, part, 0., run->stage_start, at->x));
   PetscCall(
     SbModelStrainEnergy(run->model, run->stage ? run->stage : at->x, at->elastic, &at->psi, &at->ninverted));
@@ -185,7 +195,7 @@ static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the mass times the shift, 1/s^2, to the tangent: none for a first shift below the least one, which is found where it is 0. */
+/* Adds the mass times the shift, 1/s^2, to the tangent; none if the first is below the least (0: unknown). */
 static PetscErrorCode add_shift(SNES snes, PetscBool first, PetscReal *least, PetscReal *shift)
 {
   Newton *n = (Newton *)snes->data;
@@ -230,7 +240,7 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
     PetscCall(solve_linear(snes, &reason));
     PetscCall(VecDot(F, Y, slope));
     *slope = -*slope;
-    /* friction treated as sticking changes the right-hand side: Y has to be a descent direction of E as well */
+    /* friction taken as sticking changes the right-hand side: Y has to be a descent direction of E as well */
     if (n->nblock) PetscCall(VecDot(n->rhs, Y, &modelled));
     if (n->nblock && reason == KSP_DIVERGED_ITS)
       break; /* by -pc_type: not evidence of an indefinite tangent */
@@ -305,7 +315,7 @@ static void swap(Iterate *a, Iterate *b)
   *b = c;
 }
 
-/* Line search from X along -Y, where E has the slope `slope`, J, to the next X and F; s: step length as a fraction of Y, in: the largest. */
+/* Line search from X along -Y, E's slope, J, to the next X and F; s: fraction of Y, in: the largest. */
 static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
 {
   Newton *n = (Newton *)snes->data;
@@ -347,7 +357,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
       "iteration %" PetscInt_FMT ": %g of the step changes E by %g J (slope %g J), residual %g -> %g N\n",
       snes->iter, (double)*s, (double)change, (double)slope, (double)from->norm, (double)to->norm));
 
-    /* sufficient decrease; where it is within rounding, or the step an ascent (forces without a potential), the residual decides */
+    /* sufficient decrease; within rounding, or in an ascent without a potential, the residual decides */
     total = n->provisional ? n->rise + change : change;
     goal = DECREASE * (n->provisional ? n->slope : *s * slope);
     back = (PetscBool)(circulatory && n->provisional);
@@ -363,7 +373,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
                   n->provisional < (m->dynamic ? PROVISIONAL : PROVISIONAL_STATIC) &&
                   change < PETSC_INFINITY && to->ninverted <= from->ninverted && to->gaps <= from->gaps);
 
-    /* the minimum of E is before a barrier, or where E hardly curves far beyond a full step: bracket it by slopes */
+    /* the minimum of E is before a barrier, or far beyond a full step: bracket it by slopes */
     barrier = (PetscBool)(m->npotential && plain);
     if (barrier && enough && to->slope < 0.)
       low = *s;
@@ -413,7 +423,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
       }
     }
 
-    /* back to the iterate before the provisional steps, and a shorter step: to the minimum of the parabola through slope and both ends */
+    /* back to before the provisional steps, and a shorter step: to the minimum of a parabola */
     if (n->provisional) {
       PetscCall(VecCopy(n->start, X));
       PetscCall(VecCopy(n->step, Y));
@@ -448,7 +458,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
   }
   n->rise += change;
   n->change = change - undone;
-  /* static: the pressures of the next tangent, linearised at the old X after this step (src/fem/quadratic.c) */
+  /* static: the pressures of the next tangent, linearised at the old X (src/fem/quadratic.c) */
   if (!m->dynamic) PetscCall(SbSpaceLinearisePressure(m->space, X, Y, -1., *s));
   PetscCall(VecCopy(to->x, X));
   PetscCall(VecCopy(to->r, F));
@@ -460,10 +470,11 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
 }
 
 /*
-  Barrier contact: from the start of the step to a first X that has the prescribed displacements, and obstacles at their end positions.
-
-  The integrator's predictor is taken if its motion is free of contact. Else free unknowns begin at the start of the step. Where the prescribed motion would intersect a surface, it is part of
-  Newton's steps: the right-hand side has the derivative of the residual with respect to it, so that the bodies it pushes move with it.
+  Barrier contact: from the start of the step to a first X that has the prescribed displacements, and
+  obstacles at their end positions. The integrator's predictor is taken if its motion is free of contact, else
+  free unknowns begin at the start of the step. A prescribed motion that would intersect a surface is part of
+  Newton's steps: the right-hand side has the derivative of the residual with respect to it, so that the
+  bodies it pushes move with it.
 */
 static PetscErrorCode approach(SNES snes)
 {
@@ -536,7 +547,7 @@ static PetscErrorCode approach(SNES snes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the step s Y was the last one; in barrier contact by its length: residuals are dominated by stiff gaps. */
+/* Whether the step s Y was the last; in barrier contact by its length, as stiff gaps dominate residuals. */
 static PetscErrorCode converged(SNES snes, PetscReal s)
 {
   Newton *n = (Newton *)snes->data;
@@ -625,7 +636,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     PetscCall(SNESLogConvergenceHistory(snes, snes->norm, snes->linear_its - linear));
     PetscCall(converged(snes, s));
     PetscCall(SNESMonitor(snes, snes->iter, snes->norm));
-    /* a collapse takes hundreds of descent steps, and halving the time step saves none: go on while E decreases enough */
+    /* a collapse takes hundreds of descent steps, and halving saves none: go on while E decreases enough */
     fall -= n->change;
     if (!snes->reason && snes->iter >= first + snes->max_its &&
         (!n->patient ||
@@ -635,7 +646,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     if (!barrier && !m->dynamic && !n->provisional) creeps = s < CREEP ? creeps + 1 : 0;
     if (!snes->reason && creeps == CREEPS) snes->reason = SNES_DIVERGED_LINE_SEARCH;
 
-    /* lagged friction takes the normal forces of this iterate: in the first iterations each time, then after convergence */
+    /* lagged friction takes the normal forces of this iterate: in each of the first ones, then at the end */
     if (barrier && (snes->reason > 0 || (!snes->reason && snes->iter <= EARLY))) {
       PetscBool again;
 

@@ -1,16 +1,17 @@
 /*
-  Rigid-body modes without resistance (free motions) of a part of a body, which make a static problem singular, for any length of the load
-  steps.
+  Rigid motions without resistance (free motions) of a part of a body, which make a static problem singular
+  for any length of the load steps.
 
-  A part is a set of nodes that are connected by cells, Z its six rigid motions, P the projection onto admissible displacements
-  (SbSpaceProjectAdmissible()). Two eigenvalue problems of size six decide:
+  A part is a set of nodes connected by cells, Z its six rigid motions, P the projection onto admissible
+  displacements (SbSpaceProjectAdmissible()). Two eigenvalue problems of size six decide:
 
-  1. (Z - P Z)^T (Z - P Z) x = l Z^T Z x. The motion Z x is admissible if l is zero up to rounding: geometry only, no stiffness.
-  2. (P Z x)^T A (P Z x) y = l (P Z x)^T D (P Z x) y of the admissible motions, A the operator of the last solve, D the diagonal of its
-     matrix. If l is zero up to rounding neither springs nor friction nor stress resist: the motion is free.
+  1. (Z - P Z)^T (Z - P Z) x = l Z^T Z x. The motion Z x is admissible if l is zero up to rounding: geometry
+  only. 2. (P Z x)^T A (P Z x) y = l (P Z x)^T D (P Z x) y of admissible motions, A the operator of the last
+  solve, D the diagonal of its matrix. If
+     l is zero up to rounding neither springs nor friction nor stress resist: the motion is free.
 
-  Not found: parts that are free only together, connected by contact. A part on springs so soft that their stiffness is within the rounding of that of its
-  cells counts as free.
+  Not found: parts that are free only together, connected by contact. A part on springs whose stiffness is
+  within the rounding of that of its cells counts as free.
 */
 #include "sbgeometry.h"
 #include "time_impl.h"
@@ -121,7 +122,7 @@ static PetscErrorCode measure(SbRun run, const PetscInt label[], Part *part)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Eigenvalues of E x = value M x, n <= 6, ascending; M-orthonormal eigenvectors in the columns of E. ok: M is definite. */
+/* Eigenvalues of E x = value M x, n <= 6, ascending; M-orthonormal eigenvectors in E. ok: M is definite. */
 static PetscErrorCode eigen(PetscInt n, PetscReal E[36], PetscReal M[36], PetscReal value[6], PetscBool *ok)
 {
   PetscBLASInt one = 1, six = 6, m, lwork = 64, info = 0;
@@ -134,7 +135,7 @@ static PetscErrorCode eigen(PetscInt n, PetscReal E[36], PetscReal M[36], PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of several free motions the message describes the first one along or about an axis, if any. lost: Z - P Z. */
+/* Of several free motions the message describes the first along or about an axis, if any. lost: Z - P Z. */
 static PetscErrorCode choose_axis(SbRun run, Vec d, Vec lost[6], Vec z[6], Part *part)
 {
   PetscReal off, on, stiffness, size;
@@ -177,7 +178,7 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
   for (PetscInt k = 0; k < 6; k++) {
     PetscScalar *to;
 
-    /* motion k = 0..2: translation along an axis, 3..5: rotation about one through the centre; z: its admissible part */
+    /* motion 0..2: translation along an axis, 3..5: rotation about one; z: its admissible part */
     PetscCall(VecZeroEntries(Z[k]));
     PetscCall(VecGetArray(Z[k], &to));
     for (PetscInt i = 0; i < s->nnode_owned; i++) {
@@ -198,7 +199,7 @@ static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *pa
   }
   PetscCall(VecRestoreArrayRead(run->U, &u));
 
-  /* n admissible motions (problem 1), their coefficients of the six motions in the columns of x; Z becomes Z - P Z */
+  /* n admissible motions (problem 1), by coefficients of the six in the columns of x; Z becomes Z - P Z */
   for (int j = 0; j < 6; j++) PetscCall(VecMDot(Z[j], j + 1, Z, M + 6 * j));
   for (int k = 0; k < 6; k++) PetscCall(VecAXPY(Z[k], -1., z[k]));
   for (int j = 0; j < 6; j++) PetscCall(VecMDot(Z[j], j + 1, Z, x + 6 * j));
@@ -262,8 +263,8 @@ static void direction(const PetscReal v[3], PetscReal e[3])
   }
 }
 
-/* "moving along (1, 0, 0)", or "turning about the axis along (0, 0, 1) through (x, y, z)"; the number of further free motions, which of
-   several parts it is, and a hint for elements with nodes at centroids of facets. */
+/* "moving along (1, 0, 0)", or "turning about the axis along (0, 0, 1) through (x, y, z)"; the number of
+   other free motions, which of several parts it is, and a hint for nodes at centroids of facets. */
 static PetscErrorCode describe(SbRun run, const PetscInt label[], const Part *part, PetscInt nbrother,
                                size_t size, char text[])
 {

@@ -5,21 +5,25 @@
     generalized-alpha (Chung and Hulbert 1993; fractions of the new state as in PETSc's TSALPHA2)
       a1 = (s - h v0 - h^2 (1/2 - beta) a0) / (beta h^2),  v1 = v0 + h ((1 - gamma) a0 + gamma a1)
       F(t0 + alpha_f h, u0 + alpha_f s, v0 + alpha_f (v1 - v0), a0 + alpha_m (a1 - a0)) = 0
-    Newmark: alpha_m = alpha_f = 1
+    Newmark: alpha_m = alpha_f = 1; with contact: newmark_contact.c, a0 is the acceleration without contact
     implicit Euler: v1 = s / h, a1 = (v1 - v0) / h (it is not a Newmark method)
-  Newmark with contact: newmark_contact.c; a0 is the acceleration without contact
-  Barrier contact: its force f = -dB/du is evaluated at the end of the step, the only state known to be free of collisions. In Newmark's
-  method, where the mean of both ends would gain energy, it is implicit (Kane, Repetto, Ortiz and Marsden 1999), with a the acceleration without contact, which is stored:
-    u1 = u0 + h v0 + h^2 ((1/2 - beta) a0 + beta a1) + h^2/2 M^-1 f,  v1 = v0 + h ((1 - gamma) a0 + gamma a1) + h M^-1 f
-  Newmark's formula for a1 then gives a1 + M^-1 f / (2 beta), the residual contains -f / (2 beta), and damping the velocity 2 (u1 - u0) / h - v0. The work of the impulse h f
-  over u1 - u0 is at most the decrease of B, as B is convex: contact only dissipates.
-  and, with a0 = M^-1 (f(t0, u0, v0)),
-    explicit Euler: u1 = u0 + h v0, v1 = v0 + h a0;  symplectic Euler: v1 = v0 + h a0, u1 = u0 + h v1.
+    explicit Euler: u1 = u0 + h v0, v1 = v0 + h a0;  symplectic Euler: v1 = v0 + h a0, u1 = u0 + h v1; M a0 = f0
 
-  The acceleration is part of the state (run->A), so a restart continues exactly.
-  A step may be repeated once, up to the first time of impact; the remainder is the next step (src/time/contact.c).
-  A step whose solve fails is halved and repeated; after four good steps its length doubles, up to the nominal one. The local error for TSAdapt
-  is h^2 (beta - 1/6) (a1 - a0) (Zienkiewicz and Xie 1991), for implicit Euler h^2/2 a1.
+  Barrier contact: its force f = -dB/du is evaluated at the end of the step, the only state known to be free
+  of collisions. In Newmark's method, where the mean of both ends would gain energy, it is implicit (Kane,
+  Repetto, Ortiz and Marsden 1999), with the stored a without contact:
+
+    u1 = u0 + h v0 + h^2 ((1/2 - beta) a0 + beta a1) + h^2/2 M^-1 f
+    v1 = v0 + h ((1 - gamma) a0 + gamma a1) + h M^-1 f
+
+  Newmark's formula for a1 then gives a1 + M^-1 f / (2 beta), the residual contains -f / (2 beta), and damping
+  the velocity 2 (u1 - u0) / h - v0. The work of the impulse h f over u1 - u0 is at most the decrease of B, as
+  B is convex: contact only dissipates.
+
+  The acceleration is part of the state (run->A), so a restart continues exactly. A step may be repeated once,
+  up to the first time of impact; the remainder is the next step (contact.c). A step whose solve fails is
+  halved and repeated; after four good steps its length doubles, up to the nominal one. The local error for
+  TSAdapt is h^2 (beta - 1/6) (a1 - a0) (Zienkiewicz and Xie 1991), for implicit Euler h^2/2 a1.
 
   petsc/private/tsimpl.h: PETSc has no public way to write a TSType.
 */
@@ -31,11 +35,16 @@
 typedef struct {
   SbRun run;
   SbMethodSettings set;
-  Vec X0, V0, X1, V1, A1; /* state at the start of the step; state at its end */
-  Vec own0, own1; /* Newmark with contact: accelerations without contact at start and end; else NULL */
-  Vec Xa, Va, Aa; /* stage of generalized-alpha; NULL when the stage is the end */
-  Vec U, V, A;    /* where the equation is evaluated; borrowed */
-  Vec work;
+  union {
+    struct {
+      Vec X0, V0, X1, V1, A1; /* state at the start of the step; state at its end */
+      Vec Xa, Va, Aa;         /* stage of generalized-alpha; NULL when the stage is the end */
+      Vec own0, own1; /* Newmark with contact: accelerations without contact at start and end; else NULL */
+      Vec work;       /* NULL with explicit methods */
+    };
+    Vec all[11]; /* the same vectors */
+  };
+  Vec U, V, A;       /* where the equation is evaluated; borrowed */
   PetscReal rest;    /* length of the remainder of a step after a time of impact, s; 0: none */
   PetscReal whole;   /* length of the step before its division, s: the remainder ends at the original time */
   PetscBool started; /* run->A holds the acceleration of the current state */
@@ -383,31 +392,22 @@ static PetscErrorCode TSInterpolate_SecondOrder(TS ts, PetscReal t, Vec X)
 static PetscErrorCode TSSetUp_SecondOrder(TS ts)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
-  Vec *const ends[] = {&so->X0, &so->V0, &so->X1, &so->V1, &so->A1}, *const stage[] = {&so->Xa, &so->Va,
-                                                                                       &so->Aa};
+  const PetscBool staged = (PetscBool)(so->set.alpha_f != 1. || so->set.alpha_m != 1.);
 
   PetscFunctionBeginUser;
-  for (int k = 0; k < 5; k++) PetscCall(VecDuplicate(ts->vec_sol, ends[k]));
-  for (int k = 0; k < 3 && (so->set.alpha_f != 1. || so->set.alpha_m != 1.); k++)
-    PetscCall(VecDuplicate(ts->vec_sol, stage[k]));
+  for (int k = 0; k < 11; k++) {
+    if (k < 5 || (k < 8 ? staged : k < 10 ? so->set.impulses : ts->usessnes))
+      PetscCall(VecDuplicate(ts->vec_sol, &so->all[k]));
+  }
   PetscCall(TSGetAdapt(ts, &ts->adapt));
   PetscCall(TSAdaptCandidatesClear(ts->adapt));
-  if (ts->usessnes) PetscCall(VecDuplicate(ts->vec_sol, &so->work));
-  if (so->set.impulses) {
-    PetscCall(VecDuplicate(ts->vec_sol, &so->own0));
-    PetscCall(VecDuplicate(ts->vec_sol, &so->own1));
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode TSReset_SecondOrder(TS ts)
 {
-  SecondOrder *so = (SecondOrder *)ts->data;
-  Vec *const all[] = {&so->X0, &so->V0, &so->X1,   &so->V1,   &so->A1,  &so->Xa,
-                      &so->Va, &so->Aa, &so->work, &so->own0, &so->own1};
-
   PetscFunctionBeginUser;
-  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(all); k++) PetscCall(VecDestroy(all[k]));
+  for (int k = 0; k < 11; k++) PetscCall(VecDestroy(&((SecondOrder *)ts->data)->all[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

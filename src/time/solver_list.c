@@ -1,15 +1,16 @@
 /*
-  Fallback solvers: after a failed linear solve the next solver of a list (SbSolverNextFallback()) solves the same system, in the same
-  Newton iteration, and is used for the rest of the run. Only if the last one fails is the step halved.
+  Fallback solvers: after a failed linear solve the next solver of a list (SbSolverNextFallback()) solves the
+  same system, in the same Newton iteration, and is used for the rest of the run. If the last one fails, the
+  step is halved.
 
-  A post-solve callback of the KSP does this. The KSP object is kept, with another type, another preconditioner and, if
-  the next solver needs another matrix type, another operator, assembled at Newton's iterate.
+  A post-solve callback of the KSP does this. The KSP is kept, with another type, another preconditioner and,
+  if the next solver needs another matrix type, another operator, assembled at Newton's iterate.
 
-  Not replaced: solvers that the user chose by -ksp_type or -pc_type; factorisations of the saddle-point system of contact; solves along
-  an arc length; static systems with a free rigid motion (rigid_modes.c), which are singular; exact tangents that Newton's method will project
-  (newton.c).
+  Not replaced: solvers chosen by -ksp_type or -pc_type; factorisations of the saddle-point system of contact;
+  solves along an arc length; static systems with a free rigid motion (rigid_modes.c), which are singular;
+  exact tangents that Newton's method will project (newton.c).
 
-  petsc/private/kspimpl.h: there is no public access to the reason and iterations of a solve, nor to the previous callback.
+  petsc/private/kspimpl.h: reason and iterations of a solve, and the previous callback, are not public.
 */
 #include "sbsolver.h"
 #include "time_impl.h"
@@ -41,7 +42,7 @@ static PetscErrorCode attach(SbSolverList l, KSP ksp)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Describes the failure in text and appends it to l->failures: "DIVERGED_ITS of cg after 5000 iterations, ...". memory: it was out of memory. */
+/* Appends "DIVERGED_ITS of cg after 5000 iterations, ..." to l->failures. memory: there was not enough. */
 static PetscErrorCode describe_failure(SbSolverList l, KSP ksp, Vec b, Vec x, char text[], size_t size,
                                        PetscBool *memory)
 {
@@ -183,7 +184,7 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
   if (run->model->space->tentative) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(describe_failure(l, ksp, b, x, text, sizeof(text), &memory));
 
-  /* first a simpler form of the same preconditioner, if any: its incomplete factorisation may have broken down */
+  /* first a simpler form of the same preconditioner: its incomplete factorisation may have broken down */
   PetscCall(SbPCConstrainedGetInner(ksp->pc, &pc));
   /* MINRES reports an indefinite preconditioner as an indefinite matrix, or reaches its iteration limit */
   reason = ksp->reason;
@@ -196,7 +197,7 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
-  /* then the next solver of the list, with a warning: of a preset, in Newton's method, with a finite right-hand side */
+  /* then the next solver of the list, with a warning: of a preset, in Newton's method, if b is finite */
   PetscCall(PetscObjectTypeCompareAny((PetscObject)run->snes, &newton, SB_SNES_NEWTON, SNESNEWTONLS,
                                       SNESKSPONLY, ""));
   PetscCall(SNESGetSolution(run->snes, &X));

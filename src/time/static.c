@@ -1,11 +1,12 @@
 /*
-  Load steps of a static run: f_int(u) = lambda f_ext, u = lambda u_prescribed on supports, lambda from 0 to 1 in
-  -static_steps equal steps, without mass, damping and TS. A step whose solve fails is halved and repeated from the
-  last equilibrium; after each successful step the length doubles again.
+  Load steps of a static run: f_int(u) = lambda f_ext, u = lambda u_prescribed on supports, lambda from 0 to 1
+  in -static_steps equal steps, without mass, damping and TS. A step whose solve fails is halved and repeated
+  from the last equilibrium; after each successful step the length doubles again.
 
-  Near a limit load lambda* displacements vary like sqrt(lambda* - lambda), and steps would be halved forever. Below
-  -static_min_increment the run stops; the growth of displacements with the load, relative to its minimum over the steps, distinguishes a limit load from
-  other failures. A shortened step without an iteration (a change of load below rounding) does not double the length.
+  Near a limit load lambda* displacements vary like sqrt(lambda* - lambda), and steps would be halved forever.
+  Below -static_min_increment the run stops; the growth of displacements with the load, over its minimum of
+  all steps, tells a limit load from other failures. A shortened step without an iteration (a change of load
+  below rounding) does not double the length.
 */
 #include "time_impl.h"
 
@@ -59,9 +60,9 @@ static PetscErrorCode predict(void *ctx)
 }
 
 /*
-  Whether a solution with contact is a distant equilibrium, off the load path: while the active set is wrong, a body may pass far through an obstacle
-  and end heavily deformed. While forces grow along the path, strain energy grows by at most (f_0 + f_1) . du, f_0 and f_1 the
-  internal forces at the ends of the step; for linear forces by half of that.
+  Whether a solution with contact is a distant equilibrium, off the load path: while the active set is wrong,
+  a body may pass far through an obstacle. While forces grow along the path, strain energy grows by at most
+  (f_0 + f_1) . du, f_0 and f_1 the internal forces at the ends of the step; linear: half of that.
 */
 static PetscErrorCode jumped(const LoadStep *l, PetscBool *is)
 {
@@ -106,8 +107,8 @@ static PetscErrorCode find_free_body(const LoadStep *l, When when, PetscBool *fo
   PetscFunctionBeginUser;
   if (when != BEFORE) PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
   run->free_body = (PetscBool)(body >= 0 && !l->contact);
-  /* stress and loads may resist a free rotation, but not at the start of the step. A stabilising load, as the weight of a hanging body, makes shorter steps
-     succeed; a load that drives the motion has no equilibrium nearby */
+  /* stress and loads may resist a free rotation, but not at the start of the step. A stabilising load, as a
+     hanging weight, makes shorter steps succeed; a load that drives the motion has no equilibrium nearby */
   if (body < 0 && when != SOLVED && !run->model->linear) {
     PetscReal work, force, way;
     Vec along, F;
@@ -197,7 +198,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
                                solve,  contact_residual, complete, &load};
     PetscBool ok = PETSC_FALSE, found;
 
-    /* check at the start: follower loads stiffen a mechanism in later iterations, and a late failure takes long */
+    /* checked early: follower loads stiffen a mechanism in later iterations, and a late failure takes long */
     if (run->nonsymmetric.U && !run->steps_total && !contact)
       PetscCall(find_free_body(&load, BEFORE, &found));
     if (!run->free_body) PetscCall(SbRunAttempt(run, &attempt, &ok));

@@ -1,10 +1,13 @@
 /*
-  One step, dynamic or static, from its start to its acceptance. second_order.c and static.c define a step's unknowns and length.
+  One step, dynamic or static, from its start to its acceptance; see second_order.c, static.c.
 
-    attempt: predictor, Newton's method within the active-set iteration of contact, post-solve callback, rejection
+    attempt: predictor, Newton's method in the active-set iteration of contact, post-solve callback, rejection
     accepted: effects save their history, the energy balance is updated (energy_balance.c), monitors are called
 */
 #include "time_impl.h"
+
+#define SHORT 0.13 /* step over the requested one, below which a warning follows: three halvings */
+#define FORGET 0.9 /* decay per step of the recorded longest step */
 
 PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed)
 {
@@ -54,7 +57,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
     /* the state at the end, or the reason of failure */
     PetscCall((*a->complete)(a->ctx, reason, &step, ok));
 
-    /* the penalty on jumps of CR and DG depends on the initial state: repeat a load step, which may be long, once with the penalty of its end */
+    /* the penalty on jumps is that of the start: repeat a load step, maybe long, once with that of its end */
     if (*ok && !run->model->dynamic && !run->goes_on) {
       PetscCall(SbSpaceFollowJumps(run->model->space, a->U, SB_STEPS_OF_LOAD, &run->goes_on));
       if (run->goes_on) continue;
@@ -73,7 +76,16 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   /* restore prescribed motions to the start of the step, in case the run ends there */
   if (!*ok && run->model->npotential) PetscCall(SbModelPotentialAdvance(run->model, 0.));
 
-  if (!*ok) PetscCall(SbRunWarnShorter(run, a->dt));
+  /* warn of much shorter steps, once until they have the requested length again */
+  if (!*ok && run->stop_reason[0] && !run->stopped && !run->shortened && a->dt <= SHORT * run->dt) {
+    run->shortened = PETSC_TRUE;
+    PetscCall(
+      SbWarning(run->model->comm,
+                "steps had to be halved to %.2g of their length, and more: %s. It goes on; if it gets "
+                "slow, try %s, or loads and motions that begin gently (docs/guides/when_it_fails.md)",
+                (double)(a->dt / run->dt), run->stop_reason,
+                run->model->dynamic ? "a shorter -ts_dt from the start" : "more -static_steps"));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -101,7 +113,7 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
   }
   now.last = (PetscBool)(last || run->stopped);
   if (!first)
-    run->stop.longest_step = PetscMax(SB_FORGET * run->stop.longest_step, begun - run->stop.step_begun);
+    run->stop.longest_step = PetscMax(FORGET * run->stop.longest_step, begun - run->stop.step_begun);
   if (dt > 0.9 * run->dt) run->shortened = PETSC_FALSE;
 
   /* effects save their history */

@@ -1,9 +1,10 @@
 /*
   Early end of a run: reason of the failure, end of halving, requests to stop.
 
-  A signal (SIGTERM, SIGINT, SIGUSR1 on any rank) or the end of -wall_time ends the run after the current step; monitors treat that step as the last one, so
-  that a checkpoint and the last frame are written. A step that takes longer than -stop_grace, or would exceed -wall_time, is abandoned
-  between two iterations of Newton's method, and the run ends with the step before. All ranks decide together, by one reduction after each step and each iteration.
+  A signal (SIGTERM, SIGINT, SIGUSR1 on any rank) or the end of -wall_time ends the run after the current
+  step; monitors take that step as the last one, so that a checkpoint and the last frame are written. A step
+  that takes longer than -stop_grace, or would exceed -wall_time, is abandoned between two iterations, and the
+  run ends with the step before. All ranks decide together, by a reduction after each step and iteration.
 */
 #include <signal.h>
 #include <stdarg.h>
@@ -12,7 +13,6 @@
 #include <unistd.h>
 #include "time_impl.h"
 
-#define SHORT 0.13          /* step over the requested one, below which a warning follows: three halvings */
 #define WALL_TIME 1000      /* request by -wall_time, beside signal numbers */
 #define RESERVE_PART 0.05   /* part of -wall_time reserved for the last files, */
 #define RESERVE_LONGEST 60. /* at most so many s; plus twice the time that files have taken */
@@ -37,21 +37,6 @@ PetscErrorCode SbRunFail(SbRun run, const char *format, ...)
   PetscCall(PetscVSNPrintf(run->stop_reason, sizeof(run->stop_reason), format, NULL, args));
   va_end(args);
   PetscCall(PetscInfo(NULL, "%s\n", run->stop_reason));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbRunWarnShorter(SbRun run, PetscReal dt)
-{
-  PetscFunctionBeginUser;
-  if (!run->stop_reason[0] || run->stopped || run->shortened || dt > SHORT * run->dt)
-    PetscFunctionReturn(PETSC_SUCCESS);
-  run->shortened = PETSC_TRUE;
-  PetscCall(SbWarning(
-    run->model->comm,
-    "steps had to be halved to %.2g of their length, and more: %s. It goes on; if it gets slow, try %s, or "
-    "loads and motions that begin gently (docs/guides/when_it_fails.md)",
-    (double)(dt / run->dt), run->stop_reason,
-    run->model->dynamic ? "a shorter -ts_dt from the start" : "more -static_steps"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,7 +1,6 @@
 /*
-  Continuation of a run with another model of the same scene, after re-meshing.
-
-  Integrators whose acceleration follows from the residual (the explicit ones, Newmark) recompute it. That of implicit Euler and
+  Continuation of a run with another model of the same scene, after re-meshing. Integrators whose acceleration
+  follows from the residual (the explicit ones, Newmark) recompute it; that of implicit Euler and
   generalized-alpha is a history variable.
 */
 #include "time_impl.h"

@@ -26,7 +26,7 @@ static PetscErrorCode tell_work(SNES snes)
   if (!shell) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PCShellGetName(pc, &name));
   if (!name || strcmp(name, "rotated factor")) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbPCRotatedGetWork(pc, &work[0], &work[1], &nface));
+  PetscCall(SbPCRotatedGetStats(pc, NULL, &work[0], &work[1], &nface));
   work[2] = work[0] + work[1];
   PetscCallMPI(MPI_Allreduce(work, all, 3, MPIU_INT64, MPI_MAX, PETSC_COMM_WORLD));
   PetscCall(perf_fact("interface_nodes", (double)nface));

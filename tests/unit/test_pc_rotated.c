@@ -148,7 +148,7 @@ static PetscErrorCode check_turn(const char *law, PetscBool frames)
              fresh);
   }
   PetscCall(KSPGetPC(c.ksp, &pc));
-  PetscCall(SbPCRotatedGetStats(pc, &nfactor, NULL, NULL));
+  PetscCall(SbPCRotatedGetStats(pc, &nfactor, NULL, NULL, NULL));
   SB_CHECK(nfactor == 1, "%s: %" PetscInt_FMT " factorisations", law, nfactor);
   PetscCall(close_case(&c));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -174,7 +174,7 @@ static PetscErrorCode check_bent(const char *law, const char *extra, PetscBool f
   PetscCall(SbPCRotatedRenew(pc));
   PetscCall(solve(&c, bent, 1e-4, &fresh));
   SB_CHECK(fresh > 0 && fresh <= 2, "%s: %" PetscInt_FMT " iterations after renewal", law, fresh);
-  PetscCall(SbPCRotatedGetStats(pc, &nfactor, NULL, NULL));
+  PetscCall(SbPCRotatedGetStats(pc, &nfactor, NULL, NULL, NULL));
   SB_CHECK(nfactor == 2, "%s: %" PetscInt_FMT " factorisations", law, nfactor);
   PetscCall(close_case(&c));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -223,10 +223,10 @@ static PetscErrorCode check_work(PetscMPIInt size)
     PetscCall(PCCreate(comm, &pc));
     PetscCall(PCSetOperators(pc, A, A));
     PetscCall(SbPCRotatedCreate(t.model->space, pc));
-    PetscCall(SbPCRotatedGetWork(pc, &interior, &face, &nface));
+    PetscCall(SbPCRotatedGetStats(pc, NULL, &interior, &face, &nface));
     SB_CHECK(!interior && !face && !nface, "work before there is a factor");
     PetscCall(PCSetUp(pc));
-    PetscCall(SbPCRotatedGetWork(pc, &interior, &face, &nface));
+    PetscCall(SbPCRotatedGetStats(pc, NULL, &interior, &face, &nface));
     SB_CHECK(interior > 0 && face >= 0 && (nface > 0) == (k && size > 1),
              "%" PetscInt_FMT " nodes between ranks", nface);
     if (!k) alone = interior;
