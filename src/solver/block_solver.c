@@ -151,17 +151,21 @@ PetscErrorCode SbBlockSolverCost(SbBlockSolver b, PetscReal *flops, PetscReal *e
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbBlockSolverSolve(SbBlockSolver b, const PetscReal r[], PetscReal x[])
+PetscErrorCode SbBlockSolverSolve(SbBlockSolver b, Vec R, Vec X)
 {
+  const PetscMPIInt n = (PetscMPIInt)b->n;
+  const PetscScalar *r;
+  PetscScalar *x;
+
   PetscFunctionBeginUser;
-  if (b->size == 1) {
-    PetscCall(SbFactorSolve(b->factor, r, x));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCallMPI(
-    MPI_Gatherv(r, (PetscMPIInt)b->n, b->triple, b->x, b->row_count, b->row_first, b->triple, 0, b->comm));
-  if (!b->rank) PetscCall(SbFactorSolve(b->factor, b->x, b->x));
-  PetscCallMPI(
-    MPI_Scatterv(b->x, b->row_count, b->row_first, b->triple, x, (PetscMPIInt)b->n, b->triple, 0, b->comm));
+  PetscCall(VecGetArrayRead(R, &r));
+  PetscCall(VecGetArray(X, &x));
+  if (b->size > 1)
+    PetscCallMPI(MPI_Gatherv(r, n, b->triple, b->x, b->row_count, b->row_first, b->triple, 0, b->comm));
+  if (!b->rank) PetscCall(SbFactorSolve(b->factor, b->size > 1 ? b->x : r, b->size > 1 ? b->x : x));
+  if (b->size > 1)
+    PetscCallMPI(MPI_Scatterv(b->x, b->row_count, b->row_first, b->triple, x, n, b->triple, 0, b->comm));
+  PetscCall(VecRestoreArray(X, &x));
+  PetscCall(VecRestoreArrayRead(R, &r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -22,5 +22,5 @@ PetscErrorCode SbBlockSolverSetUp(SbBlockSolver solver, PetscInt n, const PetscI
                                   const PetscReal block[], PetscBool changed, PetscBool *ok);
 /* Operations of a factorisation, entries of the factor. Collective; after SbBlockSolverAnalyze(). */
 PetscErrorCode SbBlockSolverCost(SbBlockSolver solver, PetscReal *flops, PetscReal *entries);
-/* x = A^-1 b; b and x [n][3], own rows; may be the same array. Collective. */
-PetscErrorCode SbBlockSolverSolve(SbBlockSolver solver, const PetscReal b[], PetscReal x[]);
+/* x = A^-1 b, by own rows. Collective. */
+PetscErrorCode SbBlockSolverSolve(SbBlockSolver solver, Vec b, Vec x);

@@ -209,7 +209,6 @@ static PetscErrorCode find_ghosts(SbCoarse c, PetscBool parallel, const PetscInt
 {
   const PetscInt n = c->space->nnode_owned, nghost = c->nall - n;
   PetscReal(*share)[6];
-  PetscInt *other, m = 0;
   VecScatter scatter;
   Vec own, far;
   IS is;
@@ -242,22 +241,19 @@ static PetscErrorCode find_ghosts(SbCoarse c, PetscBool parallel, const PetscInt
   PetscCall(PetscFree(share));
 
   /* block rows of other ranks, ascending */
-  PetscCall(PetscMalloc1(2 * c->nall, &other));
+  PetscCall(PetscMalloc1(2 * c->nall, &c->other));
+  c->nother = 0;
   for (PetscInt k = 0; k < 2 * c->nall; k++) {
     const PetscInt u = c->unit[k];
 
-    if (u >= 0 && (u < c->first || u >= c->first + c->n)) other[m++] = u;
+    if (u >= 0 && (u < c->first || u >= c->first + c->n)) c->other[c->nother++] = u;
   }
-  PetscCall(PetscSortRemoveDupsInt(&m, other));
-  c->nother = m;
-  PetscCall(PetscMalloc1(m, &c->other));
-  PetscCall(PetscArraycpy(c->other, other, m));
-  PetscCall(PetscFree(other));
+  PetscCall(PetscSortRemoveDupsInt(&c->nother, c->other));
   for (PetscInt k = 0; k < 2 * c->nall; k++) {
     if (c->unit[k] >= c->first && c->unit[k] < c->first + c->n)
       c->unit[k] -= c->first;
     else if (c->unit[k] >= 0) {
-      PetscCall(PetscFindInt(c->unit[k], m, c->other, &c->unit[k]));
+      PetscCall(PetscFindInt(c->unit[k], c->nother, c->other, &c->unit[k]));
       c->unit[k] += c->n;
     }
   }
@@ -268,16 +264,16 @@ static PetscErrorCode find_ghosts(SbCoarse c, PetscBool parallel, const PetscInt
 
 PetscErrorCode SbSpaceGetGraph(SbSpace s, PetscInt **ia, PetscInt **ja)
 {
+  const PetscInt n = s->nnode_owned, nz = s->plan->di[n] + s->plan->oi[n];
   PetscInt *node;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(s->nnode_owned, &node));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) node[i] = i;
-  PetscCall(PetscMalloc1(s->nnode_owned + 1, ia));
-  PetscCall(SbSpaceGetRows(s, NULL, s->nnode_owned, node, *ia, NULL, NULL));
-  PetscCall(PetscMalloc1((*ia)[s->nnode_owned], ja));
-  PetscCall(SbSpaceGetRows(s, NULL, s->nnode_owned, node, *ia, *ja, NULL));
-  for (PetscInt k = 0; k < (*ia)[s->nnode_owned]; k++) (*ja)[k] = s->gnode[(*ja)[k]];
+  PetscCall(PetscMalloc1(n, &node));
+  for (PetscInt i = 0; i < n; i++) node[i] = i;
+  PetscCall(PetscMalloc1(n + 1, ia));
+  PetscCall(PetscMalloc1(nz, ja));
+  PetscCall(SbSpaceGetRows(s, NULL, n, node, *ia, *ja, NULL));
+  for (PetscInt k = 0; k < nz; k++) (*ja)[k] = s->gnode[(*ja)[k]];
   PetscCall(PetscFree(node));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -440,17 +436,13 @@ PetscErrorCode SbCoarseAdd(SbCoarse c, Vec Z)
 {
   const SbSpace s = c->space;
   const PetscScalar *x;
-  PetscScalar *y, *z;
+  PetscScalar *z;
 
   PetscFunctionBeginUser;
   if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
-  if (c->direct) {
-    PetscCall(VecGetArrayRead(c->c, &x));
-    PetscCall(VecGetArray(c->y, &y));
-    PetscCall(SbBlockSolverSolve(c->direct, x, y));
-    PetscCall(VecRestoreArray(c->y, &y));
-    PetscCall(VecRestoreArrayRead(c->c, &x));
-  } else
+  if (c->direct)
+    PetscCall(SbBlockSolverSolve(c->direct, c->c, c->y));
+  else
     PetscCall(PCApply(c->solver, c->c, c->y));
   if (c->wide) {
     PetscCall(VecScatterBegin(c->scatter, c->y, c->wide, INSERT_VALUES, SCATTER_FORWARD));

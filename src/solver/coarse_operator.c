@@ -28,8 +28,8 @@ static inline void add_column(SbCoarse c, const PetscScalar K[9], PetscReal weig
   const PetscReal *d = c->d + 3 * j;
 
   for (int v = 0; v < (c->way[j] == SB_MEAN ? 2 : 1); v++) {
-    const PetscInt u = c->unit[2 * j + v], moved = c->moved[j] >> (3 * v);
-    PetscReal *W;
+    const PetscInt u = c->unit[2 * j + v];
+    PetscReal share[3], *W;
 
     if (u < 0) continue;
     if (row->slot[u] < 0) {
@@ -40,19 +40,15 @@ static inline void add_column(SbCoarse c, const PetscScalar K[9], PetscReal weig
       row->n++;
     }
     W = row->W[row->slot[u]];
+    for (int k = 0; k < 3; k++)
+      share[k] = c->way[j] != SB_MEAN ? weight : c->moved[j] & (1 << (3 * v + k)) ? 0.5 * weight : 0.;
     for (int r = 0; r < 3; r++) {
-      const PetscReal k0 = weight * K[r], k1 = weight * K[3 + r], k2 = weight * K[6 + r];
+      const PetscReal k0 = share[0] * K[r], k1 = share[1] * K[3 + r], k2 = share[2] * K[6 + r];
 
-      if (c->way[j] == SB_MEAN) {
-        W[3 * r] += moved & 1 ? 0.5 * k0 : 0.;
-        W[3 * r + 1] += moved & 2 ? 0.5 * k1 : 0.;
-        W[3 * r + 2] += moved & 4 ? 0.5 * k2 : 0.;
-        continue;
-      }
       W[3 * r] += k0;
       W[3 * r + 1] += k1;
       W[3 * r + 2] += k2;
-      if (c->way[j] == SB_ITSELF) continue;
+      if (c->way[j] != SB_MEMBER) continue;
       W[9 + 3 * r] += d[1] * k2 - d[2] * k1;
       W[9 + 3 * r + 1] += d[2] * k0 - d[0] * k2;
       W[9 + 3 * r + 2] += d[0] * k1 - d[1] * k0;

@@ -7,7 +7,6 @@
   space, so that one iteration is enough, up to rounding. Without active constraints M itself is used.
 */
 #include "solver_impl.h"
-#include "sbsolver.h"
 #include "sblog.h"
 
 /* x <- P x, with its log event. */
@@ -46,19 +45,16 @@ static PetscErrorCode multiply(Mat A, Vec x, Vec y)
 PetscErrorCode SbConstraintsCreateOperator(SbSpace s, Mat K, Mat whole, PetscBool singular, SbSaddle saddle,
                                            Mat *A)
 {
-  PetscInt m, n, M, N;
+  const PetscInt n = 3 * s->nnode_owned;
 
   PetscFunctionBeginUser;
-  PetscCall(MatGetLocalSize(K, &m, &n));
-  PetscCall(MatGetSize(K, &M, &N));
-  PetscCall(MatCreateShell(s->comm, m, n, M, N, s, A));
+  PetscCall(MatCreateShell(s->comm, n, n, PETSC_DETERMINE, PETSC_DETERMINE, s, A));
   PetscCall(MatShellSetOperation(*A, MATOP_MULT, SB_OPERATION(multiply)));
   PetscCall(MatSetOption(*A, MAT_SYMMETRIC, (PetscBool)(!s->constraints->nonsymmetric && whole == K)));
   s->constraints->K = K;
   s->constraints->whole = whole;
   s->constraints->saddle = saddle;
-  if (singular && saddle != SB_SADDLE_DIRECT)
-    PetscCall(PetscCalloc1(3 * s->nnode_owned, &s->constraints->added));
+  if (singular && saddle != SB_SADDLE_DIRECT) PetscCall(PetscCalloc1(n, &s->constraints->added));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -125,12 +125,12 @@ PetscErrorCode SbContactSystemDescribe(PetscInt choice, char text[], size_t size
   PetscFunctionBeginUser;
   PetscCall(user_types(NULL, type));
   if (is_factored(choice, type))
-    PetscCall(PetscSNPrintf(text, size, "contact by a factorisation"));
+    SbFormat(size, text, "contact by a factorisation");
   else if (type[0])
-    PetscCall(PetscSNPrintf(text, size, "contact with %s", type));
+    SbFormat(size, text, "contact with %s", type);
   else
-    PetscCall(PetscSNPrintf(text, size, "contact by CG in two levels%s",
-                            choice ? "" : ", or factored where that is less work"));
+    SbFormat(size, text, "contact by CG in two levels%s",
+             choice ? "" : ", or factored where that is less work");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -381,8 +381,6 @@ static PetscErrorCode iterate(SbContactSystem c, Vec F, Vec Y, KSPConvergedReaso
 static PetscErrorCode factor(SbContactSystem c, Vec F, Vec Y, KSPConvergedReason *reason)
 {
   const SbContactRows *rows = &c->rows;
-  const PetscScalar *f;
-  PetscScalar *y;
   PetscBool ok = PETSC_TRUE;
 
   PetscFunctionBeginUser;
@@ -393,11 +391,7 @@ static PetscErrorCode factor(SbContactSystem c, Vec F, Vec Y, KSPConvergedReason
   c->fresh[1] = (PetscBool)!ok;
   *reason = ok ? KSP_CONVERGED_ITS : KSP_DIVERGED_PC_FAILED;
   if (!ok) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecGetArrayRead(F, &f));
-  PetscCall(VecGetArray(Y, &y));
-  PetscCall(SbBlockSolverSolve(c->factor, f, y));
-  PetscCall(VecRestoreArray(Y, &y));
-  PetscCall(VecRestoreArrayRead(F, &f));
+  PetscCall(SbBlockSolverSolve(c->factor, F, Y));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

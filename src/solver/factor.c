@@ -30,7 +30,7 @@ typedef struct {
 
 struct _p_SbFactor {
   SbElimination e;
-  PetscInt npanel, widest, tallest; /* panels; unknowns in the widest panel, the largest front */
+  PetscInt npanel, tallest; /* panels; unknowns in the largest front */
   Panel *panel;
   size_t nword;
   int32_t *word; /* [nword] stored entries */
@@ -43,13 +43,19 @@ struct _p_SbFactor {
     *y; /* factored fronts, column-major; [3 n + tallest] solution, then rows below a supernode */
 };
 
-/* Divides all supernodes into panels, and finds their positions in storage. */
-static PetscErrorCode cut_panels(SbFactor f)
+PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], const PetscInt ja[],
+                              SbFactor *factor)
 {
-  const SbElimination *e = &f->e;
+  const SbElimination *e;
+  SbFactor f;
 
   PetscFunctionBeginUser;
-  // number of panels: a supernode is divided evenly into panels of at most PANEL nodes
+  // order of elimination and pattern of L
+  PetscCall(PetscNew(&f));
+  *factor = f;
+  e = &f->e;
+  PetscCall(SbEliminationCreate(n, nkeep, ia, ja, NULL, &f->e));
+  // a supernode is divided evenly into panels of at most PANEL nodes
   for (PetscInt g = 0; g < e->nsuper; g++) f->npanel += (e->first[g + 1] - e->first[g] + PANEL - 1) / PANEL;
   PetscCall(PetscMalloc1(f->npanel, &f->panel));
   f->npanel = 0;
@@ -62,28 +68,11 @@ static PetscErrorCode cut_panels(SbFactor f)
       const PetscInt from = ncol * part / npart, to = ncol * (part + 1) / npart;
       Panel *p = &f->panel[f->npanel++];
 
-      *p = (Panel){.first = e->first[g] + from, .ncol = to - from, .group = g, .nrow = nall - to};
-      p->row = e->list + e->start[g] + to;
-      p->offset = f->nword;
+      *p = (Panel){e->first[g] + from, to - from, g, nall - to, e->list + e->start[g] + to, f->nword};
       f->nword += 3 * (size_t)p->ncol * (round_up(3 * p->ncol) + round_up(3 * p->nrow)) / 2;
     }
-    f->widest = PetscMax(f->widest, 3 * ncol);
     f->tallest = PetscMax(f->tallest, 3 * nall);
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], const PetscInt ja[],
-                              SbFactor *factor)
-{
-  SbFactor f;
-
-  PetscFunctionBeginUser;
-  // order of elimination and pattern of L
-  PetscCall(PetscNew(&f));
-  *factor = f;
-  PetscCall(SbEliminationCreate(n, nkeep, ia, ja, NULL, &f->e));
-  PetscCall(cut_panels(f));
   // storage of the panels, with room for reads beyond the end, and work arrays of a solve
   PetscCall(allocate_pages(sizeof(*f->word) * (f->nword + 4096), &f->word));
   PetscCall(allocate_pages(sizeof(float) * 6 * (size_t)f->e.nfree, &f->scale));
@@ -202,31 +191,6 @@ static PetscErrorCode add_update(const SbElimination *e, PetscInt g, Work *work,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Factors the leading ncol columns of the front of order size and forms the update. */
-static PetscErrorCode factor_front(PetscScalar *front, PetscInt size, PetscInt ncol, PetscScalar *update,
-                                   PetscBool *ok)
-{
-  const PetscScalar one = 1., minus = -1.;
-  PetscBLASInt n, m, ld, info;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscBLASIntCast(ncol, &n));
-  PetscCall(PetscBLASIntCast(size - ncol, &m));
-  PetscCall(PetscBLASIntCast(size, &ld));
-  // leading block = L L^T; stop at a non-positive pivot
-  PetscCallBLAS("LAPACKpotrf", LAPACKpotrf_("L", &n, front, &ld, &info));
-  *ok = (PetscBool)(info == 0);
-  if (info || !m) PetscFunctionReturn(PETSC_SUCCESS);
-  // the rows below it: L21 = A21 L^-T
-  PetscCallBLAS("BLAStrsm", BLAStrsm_("R", "L", "T", "N", &m, &n, &one, front, &ld, front + n, &ld));
-  // the update: A22 - L21 L21^T
-  for (PetscInt j = 0; j < m; j++)
-    PetscCall(PetscArraycpy(update + (size_t)j * (size_t)m + j, front + (size_t)(n + j) * (size_t)ld + n + j,
-                            (size_t)(m - j)));
-  PetscCallBLAS("BLASsyrk", BLASsyrk_("L", "N", &m, &n, &minus, front + n, &ld, &one, update, &m));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* One supernode: assembles its front, factors it, keeps its update for the parent. */
 static PetscErrorCode eliminate(SbFactor f, PetscInt g, const PetscInt ia[], const PetscInt ja[],
                                 const PetscReal block[], Work *work, PetscBool *ok)
@@ -234,12 +198,15 @@ static PetscErrorCode eliminate(SbFactor f, PetscInt g, const PetscInt ia[], con
   const SbElimination *e = &f->e;
   const PetscInt ncol = e->first[g + 1] - e->first[g], nall = e->start[g + 1] - e->start[g];
   const PetscInt *list = e->list + e->start[g], nrow = nall - ncol;
+  const PetscScalar one = 1., minus = -1.;
+  PetscScalar *front = work->front, *update;
+  PetscBLASInt n, m, ld, info;
 
   PetscFunctionBeginUser;
   // start the front from the entries of A in the columns of the supernode
   for (PetscInt k = 0; k < nall; k++) work->position[list[k]] = k;
-  for (size_t j = 0, n = 3 * (size_t)nall; j < n; j++)
-    PetscCall(PetscArrayzero(work->front + n * j + j / 3 * 3, n - j / 3 * 3));
+  for (size_t j = 0, size = 3 * (size_t)nall; j < size; j++)
+    PetscCall(PetscArrayzero(front + size * j + j / 3 * 3, size - j / 3 * 3));
   /* Adds the entries of A in the columns of supernode g to its front. Row-major block (node, neighbour) is
      column-major block (neighbour, node). */
   for (PetscInt j = e->first[g]; j < e->first[g + 1]; j++) {
@@ -261,7 +228,21 @@ static PetscErrorCode eliminate(SbFactor f, PetscInt g, const PetscInt ia[], con
     PetscCall(add_update(e, c, work, work->position, work->front, 3 * nall));
   // factor the columns of the supernode; the update is for its parent
   if (nrow) PetscCall(PetscMalloc1(9 * (size_t)nrow * (size_t)nrow, &work->update[g]));
-  PetscCall(factor_front(work->front, 3 * nall, 3 * ncol, work->update[g], ok));
+  update = work->update[g];
+  PetscCall(PetscBLASIntCast(3 * ncol, &n));
+  PetscCall(PetscBLASIntCast(3 * nrow, &m));
+  PetscCall(PetscBLASIntCast(3 * nall, &ld));
+  // leading block = L L^T; stop at a non-positive pivot
+  PetscCallBLAS("LAPACKpotrf", LAPACKpotrf_("L", &n, front, &ld, &info));
+  *ok = (PetscBool)(info == 0);
+  if (info || !m) PetscFunctionReturn(PETSC_SUCCESS);
+  // the rows below it: L21 = A21 L^-T
+  PetscCallBLAS("BLAStrsm", BLAStrsm_("R", "L", "T", "N", &m, &n, &one, front, &ld, front + n, &ld));
+  // the update: A22 - L21 L21^T
+  for (PetscInt j = 0; j < m; j++)
+    PetscCall(PetscArraycpy(update + (size_t)j * (size_t)m + j, front + (size_t)(n + j) * (size_t)ld + n + j,
+                            (size_t)(m - j)));
+  PetscCallBLAS("BLASsyrk", BLASsyrk_("L", "N", &m, &n, &minus, front + n, &ld, &one, update, &m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -307,7 +288,7 @@ PetscErrorCode SbFactorNumeric(SbFactor f, const PetscInt ia[], const PetscInt j
         scale[2 * j + 1] = store_column(3 * (size_t)p->nrow, 0, L + m + j * ld, m, j, below);
       }
     }
-    // keep its update for the parent; without a parent it has kept nodes only and is added to the Schur complement
+    // its update is for the parent; without one it has kept nodes only and is added to the Schur complement
     if (e->parent[g] >= 0) {
       work.sibling[g] = work.child[e->parent[g]];
       work.child[e->parent[g]] = g;

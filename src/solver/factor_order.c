@@ -2,10 +2,10 @@
   Order of elimination and structure of the factor, on nodes (3x3 blocks) throughout.
 
   1. Nested dissection of the graph by METIS.
-  2. Elimination tree (Liu, "The role of elimination trees in sparse factorization", 1990, algorithm 4.2), in postorder:
-     children come before their parent.
-  3. Structure of column j: its own entries and those of its children's structures, below j. A column whose structure is
-     that of the previous column without itself joins its group (a supernode).
+  2. Elimination tree (Liu, "The role of elimination trees in sparse factorization", 1990, algorithm 4.2), in
+     postorder: children come before their parent.
+  3. Structure of column j: its own entries and those of its children's structures, below j. A column whose
+     structure is that of the previous column without itself joins its group (a supernode).
   4. Groups are merged with their parent while this adds few explicit zeros: dense kernels on wider panels
      outweigh them. The limits are those of CHOLMOD (Chen, Davis, Hager, Rajamanickam 2008), in nodes.
 */
@@ -66,42 +66,31 @@ static void elimination_tree(const SbElimination *e, const PetscInt ia[], const 
 static PetscErrorCode postorder(SbElimination *e, PetscInt parent[])
 {
   const PetscInt n = e->nfree;
-  PetscInt *head, *next, *stack, *fresh, *old, top, count = 0;
+  PetscInt *size, *end, *fresh, *old, last = n;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc5(n + 1, &head, n, &next, n + 1, &stack, n, &fresh, n, &old));
-  // lists of children; head[n] lists the roots
-  for (PetscInt j = 0; j <= n; j++) head[j] = -1;
-  for (PetscInt j = n - 1; j >= 0; j--) {
-    const PetscInt p = parent[j] < 0 ? n : parent[j];
-
-    next[j] = head[p];
-    head[p] = j;
+  PetscCall(PetscMalloc4(n, &size, n, &end, n, &fresh, n, &old));
+  // sizes of the subtrees; a parent comes after its children
+  for (PetscInt j = 0; j < n; j++) size[j] = 1;
+  for (PetscInt j = 0; j < n; j++) {
+    if (parent[j] >= 0) size[parent[j]] += size[j];
   }
-  // depth-first search: a node is numbered after its children
-  stack[0] = n;
-  for (top = 0; top >= 0;) {
-    const PetscInt j = stack[top], child = head[j];
+  // from the last root on: each subtree before those of later siblings; end[]: where the next child's ends
+  for (PetscInt j = n - 1; j >= 0; j--) {
+    PetscInt *place = parent[j] < 0 ? &last : &end[parent[j]];
 
-    if (child >= 0) {
-      head[j] = next[child];
-      stack[++top] = child;
-    } else {
-      if (j < n) fresh[j] = count++;
-      top--;
-    }
+    fresh[j] = end[j] = *place - 1;
+    *place -= size[j];
   }
   // order, parents and inverse in the new numbers
-  for (PetscInt j = 0; j < n; j++) {
-    old[j] = e->order[j];
-    next[j] = parent[j];
-  }
+  PetscCall(PetscArraycpy(old, e->order, n));
+  PetscCall(PetscArraycpy(end, parent, n));
   for (PetscInt j = 0; j < n; j++) {
     e->order[fresh[j]] = old[j];
-    parent[fresh[j]] = next[j] < 0 ? -1 : fresh[next[j]];
+    parent[fresh[j]] = end[j] < 0 ? -1 : fresh[end[j]];
   }
   for (PetscInt j = 0; j < n; j++) e->inverse[e->order[j]] = j;
-  PetscCall(PetscFree5(head, next, stack, fresh, old));
+  PetscCall(PetscFree4(size, end, fresh, old));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,12 +1,11 @@
 /*
   Gauss-Seidel sweeps that read the upper triangle only, and return the residual; block Jacobi between ranks.
 
-  With A = L + D + L^T by 3x3 blocks, for the rows and columns of this rank, and A_o the columns of other
-  ranks,
-    down   z = (D + L^T)^-1 r, from the last row on: z_i = D_i^-1 (r_i - sum_{j > i} A_ij z_j). The residual, -L z - A_o z, needs
-           the same blocks: t_j -= A_ij^T z_i for j > i, while they are in the cache;
-    up     z + (D + L)^-1 (r - A z), from the first row on: z_i = D_i^-1 (b_i - sum_{j > i} A_ij z_j) with the old z_j, then
-           b_j -= A_ij^T z_i for j > i; b = r - A_o z at first.
+  With A = L + D + L^T by 3x3 blocks, for the rows and columns of this rank, and A_o those of other ranks,
+    down   z = (D + L^T)^-1 r, from the last row on: z_i = D_i^-1 (r_i - sum_{j > i} A_ij z_j). The residual,
+           -L z - A_o z, needs the same blocks: t_j -= A_ij^T z_i for j > i, while they are in the cache;
+    up     z + (D + L)^-1 (r - A z), from the first row on: z_i = D_i^-1 (b_i - sum_{j > i} A_ij z_j) with the
+           old z_j, then b_j -= A_ij^T z_i for j > i; b = r - A_o z at first.
   So a sweep with its residual reads the stored half of the matrix once, as a product does. The two sweeps are
   adjoint: with a symmetric correction between them the preconditioner is symmetric.
 
@@ -16,7 +15,6 @@
   starts from E z, and D_i^-1 (b_i - ..) becomes D'_i^-1 (b_i + E_i z_i - ..).
 */
 #include "sbfour.h"
-#include "sbassembly.h"
 #include "gauss_seidel.h"
 
 /* z_j -= A_ij^T x for the n blocks right of the diagonal; the fourth lane of x is zero. */

@@ -1,17 +1,16 @@
 /*
   The Schur complement on the interface between ranks, for substructuring.
 
-  The interface nodes separate the ranks, so each rank eliminates its interior. The
-  remaining matrix on the interface is a dense S, the sum of the ranks' Schur complements. The factorisation S
-  = L L^T works on block columns, distributed cyclically, and S^-1 = W^T W with W = L^-1. Each rank has some
-  rows W_r of the triangle W and adds W_r^T (W_r b): symmetric and positive definite for any rounding of W,
-  unlike a rounded inverse. Hence W is stored in 16-bit integers (quantized.h); a block of rows is used twice
-  while it is in the cache, so memory is read once: a quarter of the bytes of the inverse in single precision.
-  An application sums two short vectors over the ranks. Ranks with less work in their interior have more rows.
+  The interface nodes separate the ranks, so each rank eliminates its interior. The remaining matrix on the
+  interface is a dense S, the sum of the ranks' Schur complements. The factorisation S = L L^T works on block
+  columns, distributed cyclically, and S^-1 = W^T W with W = L^-1. Each rank has some rows W_r of the triangle
+  W and adds W_r^T (W_r b): symmetric and positive definite for any rounding of W, unlike a rounded inverse.
+  Hence W is stored in 16-bit integers (quantized.h); a block of rows is used twice while it is in the cache,
+  so memory is read once: a quarter of the bytes of the inverse in single precision. An application sums two
+  short vectors over the ranks. Ranks with less work in their interior have more rows.
 
   Not handled: zeros of W between parts of the interface that are not connected.
 */
-#include "sbsolver.h"
 #include "rotated.h"
 #include "quantized.h"
 #include <petscblaslapack.h>
@@ -26,12 +25,12 @@ typedef struct _SbRows {
 } Rows;
 
 /*
-  Few nodes that separate the interiors of the ranks, without fully prescribed ones. Output: index[nnode], number
-  of a local node among them, -1 for others; those of a rank are consecutive. nmine: number owned by this rank; n:
-  by all ranks.
+  Few nodes that separate the interiors of the ranks, without fully prescribed ones. Output: index[nnode],
+  number of a local node among them, -1 for others; those of a rank are consecutive. nmine: number owned by
+  this rank; n: by all ranks.
 
-  They are a vertex cover of the graph's edges between nodes of different ranks. The greedy cover repeatedly takes
-  the node with the most uncovered edges. A minimum cover, from matchings, has 2 to 5 % fewer nodes
+  They are a vertex cover of the graph's edges between nodes of different ranks. The greedy cover repeatedly
+  takes the node with the most uncovered edges. A minimum cover, from matchings, has 2 to 5 % fewer nodes
   (docs/reports/decisions.md). These edges are few: each rank gathers all of them and chooses the same nodes.
 */
 static PetscErrorCode choose_nodes(SbSpace s, PetscInt index[], PetscInt *nmine, PetscInt *n)
@@ -206,22 +205,41 @@ static PetscErrorCode factor_columns(MPI_Comm comm, PetscInt n, PetscInt nblock,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Distributes the row blocks of W, long ones first, each to the rank with the least work so far. */
-static PetscErrorCode share_rows(SbInterface f, PetscInt64 work)
+PetscErrorCode SbInterfaceFactorise(SbInterface f, PetscInt64 work, PetscReal schur[], PetscBool *ok)
 {
   const PetscInt n = 3 * f->n;
+  const PetscScalar one = 1.;
+  PetscMPIInt size, rank, count;
   PetscInt64 *load;
-  PetscMPIInt size, rank;
+  PetscReal *x;
 
   PetscFunctionBeginUser;
+  *ok = PETSC_TRUE;
+  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCallMPI(MPI_Comm_size(f->comm, &size));
   PetscCallMPI(MPI_Comm_rank(f->comm, &rank));
-  PetscCall(PetscMalloc1(size, &load));
+  /* each block column is summed on the rank that factors it */
+  for (PetscInt k = 0; k < f->nblock; k++) {
+    const PetscMPIInt owner = (PetscMPIInt)(k % size);
+    PetscReal *column;
+    PetscInt first;
+
+    PetscCall(PetscMPIIntCast(block_of(n, k, &first) * n, &count));
+    column = schur + (size_t)first * (size_t)n;
+    PetscCallMPI(
+      MPI_Reduce(rank == owner ? MPI_IN_PLACE : column, column, count, MPIU_REAL, MPI_SUM, owner, f->comm));
+  }
+  PetscCall(factor_columns(f->comm, n, f->nblock, schur, ok));
+  if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
+
+  /* distribute the row blocks of W, long ones first, each to the rank with the least work so far */
+  PetscCall(PetscMalloc2(size, &load, (size_t)n * BLOCK, &x));
   PetscCallMPI(MPI_Allgather(&work, 1, MPIU_INT64, load, 1, MPIU_INT64, f->comm));
   f->nrows = 0;
   f->nword = 0;
   for (PetscInt b = f->nblock - 1; b >= 0; b--) {
     PetscMPIInt least = 0;
+    size_t words;
     Rows r;
 
     r.nrow = block_of(n, b, &r.first);
@@ -229,27 +247,16 @@ static PetscErrorCode share_rows(SbInterface f, PetscInt64 work)
     for (PetscMPIInt k = 1; k < size; k++) {
       if (load[k] < load[least]) least = k;
     }
-    const size_t words = round_up(r.first + r.nrow) * (size_t)r.nrow / 2;
+    words = round_up(r.first + r.nrow) * (size_t)r.nrow / 2;
     load[least] += (PetscInt64)(sizeof(*f->word) * words);
     if (least != rank) continue;
     f->nword += words;
     f->rows[f->nrows++] = r;
   }
-  PetscCall(PetscFree(load));
   free(f->word);
   PetscCall(allocate_pages(sizeof(*f->word) * (f->nword + 4096), &f->word));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
-/* Computes and stores the rows of W = L^-1 of this rank: L^T w = e for each of them. */
-static PetscErrorCode store_rows(SbInterface f, const PetscReal L[])
-{
-  const PetscScalar one = 1.;
-  const size_t n = 3 * (size_t)f->n;
-  PetscReal *x;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(n * BLOCK, &x));
+  /* compute and store those of this rank: L^T w = e for each row w of W = L^-1 */
   for (PetscInt b = 0; b < f->nrows; b++) {
     const Rows *r = &f->rows[b];
     const size_t height = (size_t)r->first + (size_t)r->nrow;
@@ -259,42 +266,13 @@ static PetscErrorCode store_rows(SbInterface f, const PetscReal L[])
     for (PetscInt i = 0; i < r->nrow; i++) x[(size_t)i * height + (size_t)(r->first + i)] = 1.;
     PetscCall(PetscBLASIntCast(r->first + r->nrow, &order));
     PetscCall(PetscBLASIntCast(r->nrow, &nrow));
-    PetscCall(PetscBLASIntCast(3 * f->n, &ld));
-    PetscCallBLAS("BLAStrsm",
-                  BLAStrsm_("L", "L", "T", "N", &order, &nrow, &one, (PetscScalar *)L, &ld, x, &order));
+    PetscCall(PetscBLASIntCast(n, &ld));
+    PetscCallBLAS("BLAStrsm", BLAStrsm_("L", "L", "T", "N", &order, &nrow, &one, schur, &ld, x, &order));
     for (size_t i = 0; i < (size_t)r->nrow; i++)
       f->scale[2 * ((size_t)r->first + i)] =
         store_column(height, 0, x + i * height, (size_t)r->nrow, i, f->word + r->offset);
   }
-  PetscCall(PetscFree(x));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbInterfaceFactorise(SbInterface f, PetscInt64 work, PetscReal schur[], PetscBool *ok)
-{
-  const PetscInt n = 3 * f->n;
-  PetscMPIInt size, rank;
-
-  PetscFunctionBeginUser;
-  *ok = PETSC_TRUE;
-  if (!f->n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCallMPI(MPI_Comm_size(f->comm, &size));
-  PetscCallMPI(MPI_Comm_rank(f->comm, &rank));
-  /* each block column is summed on the rank that factors it */
-  for (PetscInt k = 0; k < f->nblock; k++) {
-    const PetscMPIInt owner = (PetscMPIInt)(k % size);
-    PetscInt first;
-    PetscMPIInt count;
-
-    PetscCall(PetscMPIIntCast(block_of(n, k, &first) * n, &count));
-    PetscReal *column = schur + (size_t)first * (size_t)n;
-    PetscCallMPI(
-      MPI_Reduce(rank == owner ? MPI_IN_PLACE : column, column, count, MPIU_REAL, MPI_SUM, owner, f->comm));
-  }
-  PetscCall(factor_columns(f->comm, n, f->nblock, schur, ok));
-  if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(share_rows(f, work));
-  PetscCall(store_rows(f, schur));
+  PetscCall(PetscFree2(load, x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

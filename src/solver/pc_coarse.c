@@ -20,7 +20,9 @@
   there are more aggregates, of NODES_PER_SPREAD nodes each. Q = Z C Z^T is no exact coarse solve, so that the
   complete form is used, with two coarse corrections:
 
-      P^-1 = 2 Q - Q A Q + (1 - Q A) M (1 - A Q),   symmetric, and positive definite if the eigenvalues of C E are below 2.
+      P^-1 = 2 Q - Q A Q + (1 - Q A) M (1 - A Q),
+
+  symmetric, and positive definite if the eigenvalues of C E are below 2.
 
   docs/reports/many_ranks.md lists the iterations, messages and memory.
 
@@ -29,9 +31,8 @@
   ratio 0.45, not yet at 0.4; very flat tets), the diagonal: twice the iterations, each at half the cost. Bar
   of 192,000 tets, one rank, residual 1e-8, iterations and CPU s: at nu 0.3 ICC 39, 0.37 and diagonal 84,
   0.48; at 0.45 diagonal 143, 0.70. PETSc's PCDEFLATION on the same aggregates takes AIJ only: 0.64 s on one
-  rank, 0.83 on two (this: 0.37,
-  0.54). On a bar sixty times as long as thick CG with PCDEFLATION stopped with an indefinite preconditioner after
-  41 iterations (cause unknown; its fine level was ICC of AIJ); this one converges in 49.
+  rank, 0.83 on two (this: 0.37, 0.54). On a bar sixty times as long as thick CG with PCDEFLATION stopped with
+  an indefinite preconditioner after 41 iterations (cause unknown); this one converges in 49.
 
   Contact: A = K + C, the tangent of the bodies and the contact stiffness, which may be a million times
   larger. Z also contains the unknowns of the nodes in contact: one coarse space holds the stiff contact modes
@@ -103,36 +104,27 @@ typedef struct {
 
 /* ------------------------------------------------------------------ set-up */
 
-/* Creates the incomplete Cholesky factorisation of this rank's diagonal block, or its replacement. */
-static PetscErrorCode create_fine(TwoLevel *p, PC pc, Mat A)
-{
-  const char *prefix;
-  PetscBool symmetric;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &symmetric));
-  PetscCall(PCCreate(p->simple ? p->space->comm : PETSC_COMM_SELF, &p->fine));
-  PetscCall(PCGetOptionsPrefix(pc, &prefix));
-  PetscCall(PCSetOptionsPrefix(p->fine, prefix));
-  PetscCall(PCAppendOptionsPrefix(p->fine, "fine_"));
-  if (p->simple)
-    PetscCall(PCSetType(p->fine, symmetric ? PCJACOBI : PCPBJACOBI));
-  else if (!p->space->nnode_owned) /* PETSc 3.26 fails for an empty matrix */
-    PetscCall(PCSetType(p->fine, PCNONE));
-  else {
-    PetscCall(PCSetType(p->fine, PCICC));
-    PetscCall(PCFactorSetShiftType(p->fine, MAT_SHIFT_POSITIVE_DEFINITE));
-  }
-  PetscCall(PCSetFromOptions(p->fine));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
+/* The incomplete Cholesky factorisation of this rank's diagonal block, or its replacement. */
 static PetscErrorCode set_up_fine(TwoLevel *p, PC pc, Mat A, PetscBool *ok)
 {
   PCFailedReason reason;
+  PetscBool symmetric;
+  const char *prefix;
 
   PetscFunctionBeginUser;
-  if (!p->fine) PetscCall(create_fine(p, pc, A));
+  if (!p->fine) {
+    PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &symmetric));
+    PetscCall(PCCreate(p->simple ? p->space->comm : PETSC_COMM_SELF, &p->fine));
+    PetscCall(PCGetOptionsPrefix(pc, &prefix));
+    PetscCall(PCSetOptionsPrefix(p->fine, prefix));
+    PetscCall(PCAppendOptionsPrefix(p->fine, "fine_"));
+    if (p->simple)
+      PetscCall(PCSetType(p->fine, symmetric ? PCJACOBI : PCPBJACOBI));
+    else /* PETSc 3.26 fails for an empty matrix */
+      PetscCall(PCSetType(p->fine, p->space->nnode_owned ? PCICC : PCNONE));
+    PetscCall(PCFactorSetShiftType(p->fine, MAT_SHIFT_POSITIVE_DEFINITE)); /* ICC's */
+    PetscCall(PCSetFromOptions(p->fine));
+  }
   if (!p->simple) PetscCall(SbProductGetSymmetric(A, &A));
   PetscCall(PCSetOperators(p->fine, A, A));
   PetscCall(PCSetReusePreconditioner(p->fine, PETSC_FALSE));

@@ -7,7 +7,6 @@
   SB_DIRECT_SMALL unknowns cheaper than MUMPS (docs/reports/gathered.md).
 */
 #include "solver_impl.h"
-#include "sbsolver.h"
 
 PetscErrorCode SbSolverReproducible(PetscBool *reproducible)
 {

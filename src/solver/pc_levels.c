@@ -114,7 +114,7 @@ static PetscErrorCode find_means(SbLevels v)
 static PetscErrorCode load(SbSpace s, Vec from, Vec to, const PetscReal **x)
 {
   PetscFunctionBeginUser;
-  if (from != to) PetscCall(VecCopy(from, to));
+  PetscCall(VecCopy(from, to));
   PetscCall(SbSpaceGetLocalRead(s, to, x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -192,7 +192,7 @@ PetscErrorCode SbLevelsApply(SbLevels v, Vec r, Vec z)
   }
   PetscCall(VecRestoreArray(v->r[1], &out));
   PetscCall(cycle_faces(v, v->r[1], v->z[1]));
-  PetscCall(load(v->at[1], v->z[1], v->z[1], &mean));
+  PetscCall(SbSpaceGetLocalRead(v->at[1], v->z[1], &mean));
   PetscCall(VecGetArrayRead(v->t[0], &diagonal));
   PetscCall(VecGetArray(z, &out));
   /* u = m + (1 - w) d; the residual of the jump is (1 - w) r_own - w r_across. */
@@ -215,30 +215,6 @@ PetscErrorCode SbLevelsApply(SbLevels v, Vec r, Vec z)
   PetscCall(VecRestoreArrayRead(v->t[0], &diagonal));
   PetscCall(SbSpaceRestoreLocalRead(v->at[1], v->z[1], &mean));
   PetscCall(SbSpaceRestoreLocalRead(v->space, v->r[0], &x));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Diagonal of the face terms and the mass matrix, without the cells. */
-static PetscErrorCode loose_diagonal(SbLevels v, Vec D)
-{
-  SbSpace s = v->space;
-  PetscScalar *d;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecGetArray(D, &d));
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
-    const PetscReal stiffness = v->shift_k + v->shift_v * s->beta[region->body],
-                    inertia = v->shift_a + v->shift_v * s->alpha[region->body];
-
-    for (PetscInt k = 4 * SB_BATCH * region->bstart; k < 4 * SB_BATCH * region->bend; k++) {
-      const PetscInt i = s->batch_node[k];
-
-      if (i < s->nnode_owned)
-        d[3 * i] = stiffness * s->plan->face_term[0][s->plan->diagonal[i]] + inertia * s->node_mass[i];
-    }
-  }
-  PetscCall(VecRestoreArray(D, &d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -304,18 +280,6 @@ PetscErrorCode SbLevelsShareSprings(SbLevels v)
 
 /* ------------------------------------------------------------------ assembly, create and destroy */
 
-PetscErrorCode SbLevelsAssemble(SbLevels v, const SbStage *stage, const SbVolumetric *out)
-{
-  PetscFunctionBeginUser;
-  v->shift_a = stage->shift_a;
-  v->shift_v = stage->shift_v;
-  v->shift_k = stage->shift_k;
-  if (v->sprung) PetscCall(PetscArrayzero(v->spring, 9 * (size_t)v->space->nnode_owned));
-  v->sprung = PETSC_FALSE;
-  PetscCall(SbSpaceAssembleSplit(v->space, stage, v->n, v->at, v->A, out));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
 {
   PetscFunctionBeginUser;
@@ -332,11 +296,26 @@ PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
     SbSpace s = v->space;
     const SbPlan p = s->plan;
     const PetscReal *own;
+    PetscScalar *d;
 
-    /* stiffness of the jumps: (1-w)^2 A_ii - 2 w (1-w) A_ij + w^2 A_jj, A the face terms and the mass */
     PetscCall(MatGetDiagonal(v->A[0], v->t[0]));
-    PetscCall(loose_diagonal(v, v->r[0]));
-    PetscCall(load(s, v->r[0], v->r[0], &own));
+    /* diagonal of the face terms and the mass matrix, without the cells */
+    PetscCall(VecGetArray(v->r[0], &d));
+    for (PetscInt r = 0; r < s->nregion; r++) {
+      const SbRegion *region = &s->region[r];
+      const PetscReal stiffness = v->shift_k + v->shift_v * s->beta[region->body],
+                      inertia = v->shift_a + v->shift_v * s->alpha[region->body];
+
+      for (PetscInt k = 4 * SB_BATCH * region->bstart; k < 4 * SB_BATCH * region->bend; k++) {
+        const PetscInt i = s->batch_node[k];
+
+        if (i < s->nnode_owned)
+          d[3 * i] = stiffness * p->face_term[0][p->diagonal[i]] + inertia * s->node_mass[i];
+      }
+    }
+    PetscCall(VecRestoreArray(v->r[0], &d));
+    /* stiffness of the jumps: (1-w)^2 A_ii - 2 w (1-w) A_ij + w^2 A_jj */
+    PetscCall(SbSpaceGetLocalRead(s, v->r[0], &own));
     for (PetscInt r = 0; r < s->nregion; r++) {
       const SbRegion *region = &s->region[r];
 

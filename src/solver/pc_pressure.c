@@ -27,7 +27,6 @@
 */
 #include "solver_impl.h"
 #include "pressure.h"
-#include "sbsolver.h"
 #include "sblog.h"
 #include <petsc/private/kspimpl.h>
 

@@ -223,13 +223,21 @@ PetscErrorCode SbPressureOperatorGet(Mat K, SbPressureOperator *op)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The matrices of all levels without the volumetric part, which goes to op->volume. */
 static PetscErrorCode assemble(Mat K, const SbStage *stage)
 {
   SbPressureOperator op;
+  SbLevels v;
 
   PetscFunctionBeginUser;
   PetscCall(MatShellGetContext(K, &op));
-  PetscCall(SbLevelsAssemble(op->levels, stage, &op->volume));
+  v = op->levels;
+  v->shift_a = stage->shift_a;
+  v->shift_v = stage->shift_v;
+  v->shift_k = stage->shift_k;
+  if (v->sprung) PetscCall(PetscArrayzero(v->spring, 9 * (size_t)v->space->nnode_owned));
+  v->sprung = PETSC_FALSE;
+  PetscCall(SbSpaceAssembleSplit(v->space, stage, v->n, v->at, v->A, &op->volume));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

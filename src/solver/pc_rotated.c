@@ -15,7 +15,6 @@
   two are not rotated. Renewal of the factor: see SbPCRotatedCreate(); by iteration counts only, so that runs
   are repeatable.
 */
-#include "sbsolver.h"
 #include "rotated.h"
 #include "sblog.h"
 
@@ -90,97 +89,56 @@ static PetscErrorCode number_nodes(Rotated *p)
 
 /* ------------------------------------------------------------------ set-up for a new operator */
 
-/* The rotations of cells that belong to the operator. */
-static PetscErrorCode find_cells(Rotated *p, Mat A, const SbPack **cells)
-{
-  SbSpace s = p->space;
-  const PetscReal *u;
-  Vec state;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbMatrixFreeGetRotations(A, cells));
-  if (*cells) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscObjectQuery((PetscObject)A, "sb_state", (PetscObject *)&state));
-  PetscCheck(state || s->linear, s->comm, PETSC_ERR_ARG_WRONGSTATE,
-             "The operator does not carry its displacement: compose it as sb_state");
-  if (!p->cells) PetscCall(PetscMalloc1(9 * sb_rotation_points(s) * s->nbatch, &p->cells));
-  if (s->linear)
-    SbSpaceCellRotations(s, NULL, p->cells);
-  else {
-    PetscCall(SbSpaceGetLocalRead(s, state, &u));
-    SbSpaceCellRotations(s, u, p->cells);
-    PetscCall(SbSpaceRestoreLocalRead(s, state, &u));
-  }
-  *cells = (const SbPack *)p->cells;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Adds the rows of own interface nodes to the Schur complement; stores the diagonals of prescribed nodes. */
-static PetscErrorCode add_other_rows(Rotated *p, Mat A, PetscReal schur[])
-{
-  SbSpace s = p->space;
-  const size_t m = 3 * (size_t)p->face->n;
-  PetscInt n = 0, *node, *ia, *ja;
-  PetscReal *block;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(s->nnode_owned, &node, s->nnode_owned + 1, &ia));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    if (p->face->index[i] >= 0 || s->fixed[i] == 7) node[n++] = i;
-  }
-  PetscCall(SbSpaceGetRows(s, A, n, node, ia, NULL, NULL));
-  PetscCall(PetscMalloc2(ia[n], &ja, 9 * ia[n], &block));
-  PetscCall(SbSpaceGetRows(s, A, n, node, ia, ja, block));
-  for (PetscInt k = 0; k < n; k++) {
-    const PetscInt i = node[k];
-
-    for (PetscInt at = ia[k]; at < ia[k + 1]; at++) {
-      const PetscInt j = ja[at], row = p->face->index[i], column = p->face->index[j];
-
-      if (i == j && s->fixed[i] == 7) {
-        for (PetscInt c = 0; c < 3; c++) p->diagonal[3 * i + c] = (float)(1. / block[9 * at + 4 * c]);
-      } else if (row >= 0 && column >= 0 && row >= column) {
-        for (PetscInt e = 0; e < 9; e++)
-          schur[(size_t)(3 * column + e % 3) * m + (size_t)(3 * row + e / 3)] += block[9 * at + e];
-      }
-    }
-  }
-  PetscCall(PetscFree2(ja, block));
-  PetscCall(PetscFree2(node, ia));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
 {
   SbSpace s = p->space;
-  const PetscInt ninterior = p->n - p->nkeep, *kept = p->node + ninterior;
-  const size_t m = 3 * (size_t)p->face->n, k = 3 * (size_t)p->nkeep;
-  PetscInt *ia, *ja, nz = 0;
+  const PetscInt n = s->nnode_owned, ninterior = p->n - p->nkeep, *kept = p->node + ninterior;
+  const PetscInt *index = p->face->index;
+  const size_t m = 3 * (size_t)p->face->n, nkept = 3 * (size_t)p->nkeep;
+  PetscInt *node, *ia, *ja, nz = 0, count = ninterior;
   PetscInt64 entries, bytes;
   PetscReal *block, *own, *schur;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(ninterior + 1, &ia));
-  PetscCall(SbSpaceGetRows(s, A, ninterior, p->node, ia, NULL, NULL));
-  PetscCall(PetscMalloc2(ia[ninterior], &ja, 9 * ia[ninterior], &block));
-  PetscCall(SbSpaceGetRows(s, A, ninterior, p->node, ia, ja, block));
-  /* drop the columns of fully prescribed nodes */
+  /* the operator's rows of the interior, then those of interface and fully prescribed nodes */
+  PetscCall(PetscMalloc2(n, &node, n + 1, &ia));
+  PetscCall(PetscArraycpy(node, p->node, ninterior));
+  for (PetscInt i = 0; i < n; i++) {
+    if (index[i] >= 0 || s->fixed[i] == 7) node[count++] = i;
+  }
+  PetscCall(SbSpaceGetRows(s, A, n, node, ia, NULL, NULL));
+  PetscCall(PetscMalloc2(ia[n], &ja, 9 * ia[n], &block));
+  PetscCall(SbSpaceGetRows(s, A, n, node, ia, ja, block));
+
+  /* factor the interior, without the columns of fully prescribed nodes */
   for (PetscInt at = 0; at < ia[ninterior]; at++) {
     if (p->local[ja[at]] < 0) continue;
     for (PetscInt e = 0; e < 9; e++) block[9 * nz + e] = block[9 * at + e];
     nz++;
   }
-  PetscCall(PetscCalloc2(9 * (size_t)p->nkeep * (size_t)p->nkeep, &own,
-                         9 * (size_t)p->face->n * (size_t)p->face->n, &schur));
+  PetscCall(PetscCalloc2(nkept * nkept, &own, m * m, &schur));
   PetscCall(SbFactorNumeric(p->factor, p->ia, p->ja, block, own, ok));
-  PetscCall(add_other_rows(p, A, schur));
-  /* add the Schur complement of the own interior, numbered locally, to that of the interface */
-  for (size_t j = 0; j < k; j++) {
-    for (size_t i = j; i < k; i++) {
-      const size_t row = 3 * (size_t)p->face->index[kept[i / 3]] + i % 3;
-      const size_t column = 3 * (size_t)p->face->index[kept[j / 3]] + j % 3;
 
-      schur[PetscMin(row, column) * m + PetscMax(row, column)] += own[j * k + i];
+  /* Schur complement of the interface: its own rows, and the complement of the interior, numbered locally;
+     diagonals of prescribed nodes */
+  for (PetscInt k = ninterior; k < n; k++) {
+    const PetscInt i = node[k];
+
+    for (PetscInt at = ia[k]; at < ia[k + 1]; at++) {
+      const PetscInt j = ja[at], row = index[i], column = index[j];
+
+      for (PetscInt c = 0; c < 3 && i == j && s->fixed[i] == 7; c++)
+        p->diagonal[3 * i + c] = (float)(1. / block[9 * at + 4 * c]);
+      for (PetscInt e = 0; e < 9 && column >= 0 && row >= column; e++)
+        schur[(size_t)(3 * column + e % 3) * m + (size_t)(3 * row + e / 3)] += block[9 * at + e];
+    }
+  }
+  for (size_t j = 0; j < nkept; j++) {
+    for (size_t i = j; i < nkept; i++) {
+      const size_t row = 3 * (size_t)index[kept[i / 3]] + i % 3;
+      const size_t column = 3 * (size_t)index[kept[j / 3]] + j % 3;
+
+      schur[PetscMin(row, column) * m + PetscMax(row, column)] += own[j * nkept + i];
     }
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, s->comm));
@@ -188,7 +146,7 @@ static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
   if (*ok) PetscCall(SbInterfaceFactorise(p->face, 2 * bytes, schur, ok));
   PetscCall(PetscFree2(own, schur));
   PetscCall(PetscFree2(ja, block));
-  PetscCall(PetscFree(ia));
+  PetscCall(PetscFree2(node, ia));
   p->nfactor++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -197,17 +155,18 @@ static PetscErrorCode PCSetUp_Rotated(PC pc)
 {
   const SbPack *cells;
   Rotated *p;
+  SbSpace s;
+  PetscInt n;
   PetscBool ok = PETSC_TRUE;
   Mat A;
 
   PetscFunctionBeginUser;
   PetscCall(PCShellGetContext(pc, &p));
+  s = p->space;
+  n = s->nnode_owned;
   PetscCall(PCGetOperators(pc, NULL, &A));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
   if (!p->factor) {
-    SbSpace s = p->space;
-    const PetscInt n = s->nnode_owned;
-
     if (!s->plan) PetscCall(SbPlanCreate(s, &s->plan));
     PetscCall(SbInterfaceCreate(s, &p->face));
     PetscCall(number_nodes(p));
@@ -218,25 +177,39 @@ static PetscErrorCode PCSetUp_Rotated(PC pc)
     PetscCall(
       PetscMalloc4(3 * p->n, &p->b, 3 * p->n, &p->x, 3 * p->nkeep, &p->kept, 3 * p->face->n, &p->edge));
   }
-  PetscCall(find_cells(p, A, &cells));
-  PetscCall(SbSpaceAverageRotations(p->space, cells, p->turn, p->spread));
+  /* the rotations of cells that belong to the operator */
+  PetscCall(SbMatrixFreeGetRotations(A, &cells));
+  if (!cells) {
+    const PetscReal *u = NULL;
+    Vec state;
+
+    PetscCall(PetscObjectQuery((PetscObject)A, "sb_state", (PetscObject *)&state));
+    PetscCheck(state || s->linear, s->comm, PETSC_ERR_ARG_WRONGSTATE,
+               "The operator does not carry its displacement: compose it as sb_state");
+    if (!p->cells) PetscCall(PetscMalloc1(9 * sb_rotation_points(s) * s->nbatch, &p->cells));
+    if (!s->linear) PetscCall(SbSpaceGetLocalRead(s, state, &u));
+    SbSpaceCellRotations(s, u, p->cells);
+    if (!s->linear) PetscCall(SbSpaceRestoreLocalRead(s, state, &u));
+    cells = (const SbPack *)p->cells;
+  }
+  PetscCall(SbSpaceAverageRotations(s, cells, p->turn, p->spread));
   if (p->renew) {
     PetscCall(factor_operator(p, A, &ok));
-    PetscCall(PetscArraycpy(p->turn0, p->turn, 9 * p->space->nnode_owned));
+    PetscCall(PetscArraycpy(p->turn0, p->turn, 9 * n));
     p->fresh = -1;
     p->renew = (PetscBool)!ok;
     PetscCall(PetscInfo(pc, "factorisation %" PetscInt_FMT "%s\n", p->nfactor,
                         ok ? "" : " failed: not positive definite"));
   }
   // the rotation of each node since the factorisation
-  for (PetscInt i = 0; i < p->space->nnode_owned; i++) {
+  for (PetscInt i = 0; i < n; i++) {
     PetscReal Q[9] = {1., 0., 0., 0., 1., 0., 0., 0., 1.};
 
-    if (!p->space->fixed[i]) SbMatMulTranspose(p->turn + 9 * i, p->turn0 + 9 * i, Q);
+    if (!s->fixed[i]) SbMatMulTranspose(p->turn + 9 * i, p->turn0 + 9 * i, Q);
     for (int k = 0; k < 9; k++) p->Q[9 * i + k] = (float)Q[k];
   }
-  PetscCall(SbExactNodesSetUp(&p->exact, p->space, A, p->spread,
-                              p->nfactor && p->fresh >= 0 ? p->limit : PETSC_MAX_REAL));
+  PetscCall(
+    SbExactNodesSetUp(&p->exact, s, A, p->spread, p->nfactor && p->fresh >= 0 ? p->limit : PETSC_MAX_REAL));
   PetscCall(PCSetFailedReason(pc, ok ? PC_NOERROR : PC_FACTOR_NUMERIC_ZEROPIVOT));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -35,8 +35,6 @@ struct _p_SbLevels {
 /* Collective. Prescribed unknowns must have been marked. Options read: -pressure_coarse_. */
 PetscErrorCode SbLevelsCreate(SbSpace space, SbLevels *levels);
 PetscErrorCode SbLevelsDestroy(SbLevels *levels);
-/* Assembles the matrices without, and `out` with, the volumetric part. Not collective. */
-PetscErrorCode SbLevelsAssemble(SbLevels levels, const SbStage *stage, const SbVolumetric *out);
 /* Adds factor times a block at an owned node, which A[0] contains already, to the other levels; a node of
    another rank is ignored. Not collective. */
 PetscErrorCode SbLevelsAddSpring(SbLevels levels, PetscInt node, PetscReal factor, const PetscReal block[9]);

@@ -15,7 +15,6 @@
 */
 #include "solver_impl.h"
 #include "rotated.h"
-#include "sbsolver.h"
 
 #define DIRECT_STATIC 30000 /* static: largest number of unknowns that is factored; docs/reports/contact.md */
 #define DIRECT_DYNAMIC 1000

@@ -15,8 +15,6 @@
   stopped.
 */
 #include "solver_impl.h"
-#include "sbconstraint.h"
-#include "sbsolver.h"
 
 #define RESTART 100 /* restart length of FGMRES */
 /* Thresholds from docs/reports/solver_choice.md. Largest number of unknowns for ... */

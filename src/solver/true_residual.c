@@ -18,12 +18,12 @@
   public getter.
 */
 #include "solver_impl.h"
-#include "sbsolver.h"
 #include <petsc/private/kspimpl.h>
 
 #define AT_MOST 1e-2 /* largest true residual over the right-hand side, unless 2 rtol is larger */
 
-static PetscErrorCode check_residual(KSP ksp, Vec b, Vec x, void *ctx)
+/* After a solve; early, not NULL: only one that has ended by the absolute tolerance. */
+static PetscErrorCode check_residual(KSP ksp, Vec b, Vec x, void *early)
 {
   PetscReal size, residual;
   PetscBool single;
@@ -31,7 +31,7 @@ static PetscErrorCode check_residual(KSP ksp, Vec b, Vec x, void *ctx)
   Vec r;
 
   PetscFunctionBeginUser;
-  (void)ctx;
+  if (early && ksp->reason != KSP_CONVERGED_ATOL) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPPREONLY, &single));
   /* a fixed number of iterations is not convergence */
   if (ksp->reason <= 0 || (ksp->reason == KSP_CONVERGED_ITS && !single)) PetscFunctionReturn(PETSC_SUCCESS);
@@ -51,13 +51,6 @@ static PetscErrorCode check_residual(KSP ksp, Vec b, Vec x, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_early_end(KSP ksp, Vec b, Vec x, void *ctx)
-{
-  PetscFunctionBeginUser;
-  if (ksp->reason == KSP_CONVERGED_ATOL) PetscCall(check_residual(ksp, b, x, ctx));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbKSPCheckTrueResidual(KSP ksp, PetscBool direct, PetscBool alone)
 {
   PetscBool single;
@@ -71,7 +64,7 @@ PetscErrorCode SbKSPCheckTrueResidual(KSP ksp, PetscBool direct, PetscBool alone
       (alone && (norm == KSP_NORM_PRECONDITIONED || norm == KSP_NORM_NATURAL)))
     PetscCall(KSPSetPostSolve(ksp, check_residual, NULL));
   else if (alone)
-    PetscCall(KSPSetPostSolve(ksp, check_early_end, NULL));
+    PetscCall(KSPSetPostSolve(ksp, check_residual, ksp));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
