@@ -45,8 +45,7 @@ static PetscBool is_user_error(PetscErrorCode n, const char *function)
                                    !strcmp(function, "PetscParseLayerYAML"))));
 }
 
-/* Whether an error of PETSc is due to types or tolerances set by the user; `given`: "-ksp_type cg -pc_type
-   bddc". */
+/* Whether types or tolerances that the user gave, as "-ksp_type cg -pc_type bddc", are why PETSc failed. */
 static PetscBool is_wrong_choice(PetscErrorCode n, const char *function, const char *file, size_t size,
                                  char given[])
 {

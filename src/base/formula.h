@@ -35,8 +35,7 @@ struct _p_SbFormula {
 
 /* Reads a two-column file on rank 0 and broadcasts it. Collective. Errors name option, file and line. */
 PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *where, SbFormula formula);
-/* Creates the row->count formulas of an option with the value `live` (live.c); where: name of the option. The
-   caller destroys each. */
+/* Creates the row->count formulas of an option that is `live` (live.c); where: its name. Destroy each. */
 PetscErrorCode SbLiveCreate(const char *where, const SbOption *row, SbFormula formula[]);
 /* Removes a live formula that is being destroyed. */
 void SbLiveForget(SbFormula formula);

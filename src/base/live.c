@@ -118,8 +118,7 @@ void SbLiveSet(PetscInt i, PetscReal t, PetscReal value)
   set_rows(live.value[i].formula, t, value, 1., value);
 }
 
-/* Reads targets from the file; without a valid line a target stays. Warns of the first invalid line. Rank
-   0. */
+/* Reads targets from the file; one without a valid line stays. Warns of the first invalid line. Rank 0. */
 static PetscErrorCode read_targets(PetscReal target[])
 {
   FILE *f = fopen(live.file, "r");

@@ -190,22 +190,12 @@ PetscErrorCode SbOptionGiven(const SbScope *scope, const char *key, PetscBool *g
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a token of PetscOptionsGetAll() is the name of an option that has been read, no part of a value. */
-static PetscErrorCode is_read_name(const char *token, PetscBool *is)
-{
-  PetscFunctionBeginUser;
-  *is = PETSC_FALSE;
-  if (token[0] == '-' && token[1]) PetscCall(PetscOptionsUsed(NULL, token + 1, is));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode add_user(PetscInt *n, SbOptionUser **users, const char *name, const char *value)
 {
   PetscFunctionBeginUser;
   PetscCall(grow(*n, sizeof(**users), users));
   PetscCall(PetscStrallocpy(name, &(*users)[*n].name));
-  (*users)[*n].value = NULL;
-  if (value) PetscCall(PetscStrallocpy(value, &(*users)[*n].value));
+  PetscCall(PetscStrallocpy(value, &(*users)[*n].value)); /* NULL stays NULL */
   (*n)++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -216,8 +206,8 @@ static PetscErrorCode add_user(PetscInt *n, SbOptionUser **users, const char *na
 */
 PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users)
 {
-  PetscInt nleft;
-  char **names, **values, *all, *token, *rest;
+  PetscInt nleft, at = -1;
+  char **names, **values, *all, *rest, value[PETSC_MAX_PATH_LEN] = "";
 
   PetscFunctionBeginUser;
   *n = 0;
@@ -227,26 +217,23 @@ PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users)
   for (PetscInt i = 0; i < nleft; i++) PetscCall(add_user(n, users, names[i], values[i]));
   // read options: a name, then words up to the next name of either kind
   PetscCall(PetscOptionsGetAll(NULL, &all));
-  token = strtok_r(all, " ", &rest);
-  while (token) {
-    char name[PETSC_MAX_OPTION_NAME + 1], value[PETSC_MAX_PATH_LEN] = "";
-    PetscBool is_name, left = PETSC_FALSE;
+  for (char *token = strtok_r(all, " ", &rest); token; token = strtok_r(NULL, " ", &rest)) {
+    const PetscBool dash = (PetscBool)(token[0] == '-' && token[1]);
+    PetscBool read = PETSC_FALSE, left = PETSC_FALSE;
 
-    PetscCall(is_read_name(token, &is_name));
-    PetscCall(PetscStrncpy(name, token, sizeof(name)));
-    token = strtok_r(NULL, " ", &rest);
-    if (!is_name) continue;
-    while (token && !left) {
-      PetscBool next;
-
-      PetscCall(is_read_name(token, &next));
-      for (PetscInt i = 0; i < nleft && !left; i++)
-        left = (PetscBool)(token[0] == '-' && !strcmp(token + 1, names[i]));
-      if (next || left) break;
+    if (dash) PetscCall(PetscOptionsUsed(NULL, token + 1, &read));
+    for (PetscInt i = 0; i < nleft && !left; i++) left = (PetscBool)(dash && !strcmp(token + 1, names[i]));
+    if (read) {
+      at = *n;
+      value[0] = 0;
+      PetscCall(add_user(n, users, token + 1, NULL));
+    } else if (left)
+      at = -1;
+    else if (at >= 0) {
       SbAppend(sizeof(value), value, "%s%s", value[0] ? " " : "", token);
-      token = strtok_r(NULL, " ", &rest);
+      PetscCall(PetscFree((*users)[at].value));
+      PetscCall(PetscStrallocpy(value, &(*users)[at].value));
     }
-    PetscCall(add_user(n, users, name + 1, value[0] ? value : NULL));
   }
   PetscCall(PetscFree(all));
   PetscCall(PetscOptionsLeftRestore(NULL, &nleft, &names, &values));

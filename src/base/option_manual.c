@@ -69,8 +69,7 @@ static PetscErrorCode answers(const SbOptionRow *r, const char *topic, int *how)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Prints the options of a class and type with at least the relevance `least`, under one headline; adds their
-   number to *n. */
+/* Prints the options of a class and type from relevance `least` on, with a headline; adds their number. */
 static PetscErrorCode print_type(PetscViewer viewer, const SbOptionRow *first, const char *topic, int least,
                                  PetscBool table, PetscInt *n)
 {

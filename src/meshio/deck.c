@@ -40,34 +40,22 @@ PetscErrorCode SbDeckFindSet(SbDeck *d, PetscBool of_nodes, const char *name, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode add_range(SbDeck *d, PetscInt set, SbDeckRange range)
+PetscErrorCode SbDeckAddRange(SbDeck *d, PetscInt set, PetscInt other, int64_t first, int64_t last,
+                              int64_t step)
 {
   SbDeckSet *s = &d->set[set];
-
-  PetscFunctionBeginUser;
-  PetscCall(SbImportGrow(d->im, &s->nrange, sizeof(range), &s->range));
-  range.at = d->im->scan.token;
-  s->range[s->nrange.n - 1] = range;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbDeckAddRange(SbDeck *d, PetscInt set, int64_t first, int64_t last, int64_t step)
-{
-  const SbDeckSet *s = &d->set[set];
   SbDeckRange *before = s->nrange.n ? &s->range[s->nrange.n - 1] : NULL;
 
   PetscFunctionBeginUser;
   /* merge consecutive labels into one range, unless messages need the line of each label */
-  if (before && !d->strict && before->set < 0 && before->step == 1 && step == 1 && first == before->last + 1)
+  if (before && !d->strict && other < 0 && before->set < 0 && before->step == 1 && step == 1 &&
+      first == before->last + 1)
     before->last = last;
-  else
-    PetscCall(add_range(d, set, (SbDeckRange){.first = first, .last = last, .step = step, .set = -1}));
+  else {
+    PetscCall(SbImportGrow(d->im, &s->nrange, sizeof(*s->range), &s->range));
+    s->range[s->nrange.n - 1] = (SbDeckRange){first, last, step, other, d->im->scan.token};
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbDeckAddSet(SbDeck *d, PetscInt set, PetscInt other)
-{
-  return add_range(d, set, (SbDeckRange){.set = other});
 }
 
 /* ------------------------------------------------------------------ conversion */

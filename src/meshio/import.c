@@ -122,8 +122,7 @@ static PetscErrorCode read_body(const SbBody *body, SbImport *im)
   if (!read) PetscCall(PetscTestFile(node, 'r', &tetgen));
   PetscCheck(tetgen, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: '%s' is a mesh of no known kind; give a file that ends in %s (or the name of TetGen's "
-             "files without an "
-             "ending), or box:lx,ly,lz:n",
+             "files without an ending), or box:lx,ly,lz:n",
              im->where, body->mesh, known);
   PetscCall((read ? read : SbImportRead_TetGen)(body->mesh, im));
   given = im->nmiddle.n;
@@ -177,8 +176,7 @@ PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImpo
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
-  /* the first copy of a body keeps the unplaced mesh for the next ones; memcmp() may compare padding, which
-     is 0 */
+  /* the first copy of a body keeps the unplaced mesh for the next ones; memcmp(): padding is 0 */
   // NOLINTBEGIN(bugprone-suspicious-memory-comparison)
   if (!shared->x || !before || strcmp(before->copy_of, body->copy_of) || strcmp(before->mesh, body->mesh) ||
       before->mesh_step != body->mesh_step || memcmp(&before->tet, &body->tet, sizeof(body->tet)) ||

@@ -148,7 +148,7 @@ static PetscErrorCode read_set(Abaqus *a, const char *line, PetscBool of_nodes)
   char name[WORD], word[WORD];
   const PetscBool generated = parameter(a, line, "GENERATE", word);
   PetscInt set, other;
-  int64_t label;
+  int64_t label = 0;
 
   PetscFunctionBeginUser;
   if (!parameter(a, line, of_nodes ? "NSET" : "ELSET", name)) SB_SCAN_ERROR(a->scan, "a set without a name");
@@ -161,14 +161,11 @@ static PetscErrorCode read_set(Abaqus *a, const char *line, PetscBool of_nodes)
     if (generated && (value[2] < 1 || value[1] < value[0]))
       SB_SCAN_ERROR(a->scan, "a set from %lld to %lld by %lld; it is empty", (long long)value[0],
                     (long long)value[1], (long long)value[2]);
-    if (generated) PetscCall(SbDeckAddRange(&a->deck, set, value[0], value[1], value[2]));
+    if (generated) PetscCall(SbDeckAddRange(&a->deck, set, -1, value[0], value[1], value[2]));
     while (!generated && next_word(a, word)) {
       if (!word[0]) continue;
       PetscCall(label_of(a, of_nodes, word, &label, &other));
-      if (other >= 0)
-        PetscCall(SbDeckAddSet(&a->deck, set, other));
-      else
-        PetscCall(SbDeckAddRange(&a->deck, set, label, label, 1));
+      PetscCall(SbDeckAddRange(&a->deck, set, other, label, label, 1));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -189,7 +186,7 @@ static PetscErrorCode read_nodes(Abaqus *a, const char *line)
     (void)next_word(a, word);
     PetscCall(number_of(a, word, "label of a node", &label));
     PetscCall(SbDeckAddNode(&a->deck, label, &x));
-    if (set >= 0) PetscCall(SbDeckAddRange(&a->deck, set, label, label, 1));
+    if (set >= 0) PetscCall(SbDeckAddRange(&a->deck, set, -1, label, label, 1));
     for (int i = 0; i < 3; i++) {
       char *end = word;
 
@@ -250,7 +247,7 @@ static PetscErrorCode read_elements(Abaqus *a, const char *line)
       if (k < 10) e.node[k] = node;
     }
     PetscCall(SbDeckAddElement(&a->deck, &e));
-    if (set >= 0) PetscCall(SbDeckAddRange(&a->deck, set, e.label, e.label, 1));
+    if (set >= 0) PetscCall(SbDeckAddRange(&a->deck, set, -1, e.label, e.label, 1));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -223,8 +223,7 @@ static PetscErrorCode read_element(Gmsh *g, int type, int64_t number, PetscInt t
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Versions 1 and 2: in text each line has type and tags of its element, in binary a header for elements of
-   one type. */
+/* Versions 1 and 2: type and tags stand in the line of each element, in binary before many of one type. */
 static PetscErrorCode read_elements_2(Gmsh *g)
 {
   SbScan *s = &g->im->scan;

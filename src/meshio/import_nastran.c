@@ -173,7 +173,7 @@ static PetscBool continues(const Nastran *b)
   return (PetscBool)(!name[0] || name[0] == '+' || name[0] == '*');
 }
 
-/* Next field of the entry, on this line or on a continuation line; b->ended and "" at the end of the entry. */
+/* Next field of the entry, on this line or a continuation; b->ended and "" at the end of the entry. */
 static PetscErrorCode next_field(Nastran *b, char word[WORD])
 {
   SbScan *s = b->scan;
@@ -318,7 +318,7 @@ static PetscErrorCode add_range(Nastran *b, const char *kind, int64_t number, in
   PetscFunctionBeginUser;
   (void)snprintf(name, sizeof(name), "%s_%lld", kind, (long long)number);
   PetscCall(SbDeckFindSet(&b->deck, PETSC_TRUE, name, &set));
-  PetscCall(SbDeckAddRange(&b->deck, set, first, PetscMax(first, last), 1));
+  PetscCall(SbDeckAddRange(&b->deck, set, -1, first, PetscMax(first, last), 1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -75,8 +75,7 @@ static PetscErrorCode read_element(SbDeck *d)
 
 /* ------------------------------------------------------------------ groups */
 
-/* Reads a group. A member has `nvalue` values: kind (7 a node, 8 an element), label, since set 2435 two
-   more. */
+/* Reads a group. A member has nvalue values: kind (7 a node, 8 an element), label, since 2435 two more. */
 static PetscErrorCode read_group(SbDeck *d, int nvalue)
 {
   SbScan *s = &d->im->scan;
@@ -98,7 +97,7 @@ static PetscErrorCode read_group(SbDeck *d, int nvalue)
       PetscInt *mine = &set[value[0] - 7];
 
       if (*mine < 0) PetscCall(SbDeckFindSet(d, (PetscBool)(value[0] == 7), name, mine));
-      PetscCall(SbDeckAddRange(d, *mine, value[1], value[1], 1));
+      PetscCall(SbDeckAddRange(d, *mine, -1, value[1], value[1], 1));
     }
     for (int k = 2; k < nvalue; k++) PetscCall(SbScanText(s, "value of a member of a group", &value[k]));
   }

@@ -158,8 +158,7 @@ static PetscErrorCode take_length(Vtu *v, Bytes *b, const char *name, size_t *le
 
 /* ------------------------------------------------------------------ arrays */
 
-/* Decompresses an array: number and size of blocks, of a smaller last one, compressed sizes; then the
-   blocks. */
+/* Decompresses an array: number and size of blocks, size of a smaller last one, compressed sizes; blocks. */
 static PetscErrorCode take_blocks(Vtu *v, Bytes *b, const char *name, size_t want, unsigned char out[])
 {
   size_t nblock, size, last, full, *packed = NULL, at = 0;

@@ -30,8 +30,7 @@ PetscErrorCode SbImportRead_UNV(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Box(const char *text, SbImport *body);
 PetscErrorCode SbImportRead_H5(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Xdmf(const char *path, SbImport *body);
-/* Reads block k of n of all arrays of an .h5 mesh; SbImportSlabs_H5: its number of tets, 0 for other
-   files. */
+/* Reads block k of n of all arrays of an .h5 mesh; SbImportSlabs_H5: its number of tets; other files: 0. */
 PetscErrorCode SbImportSlab_H5(const char *path, PetscInt k, PetscInt n, SbImport *body, SbSlabRows *rows);
 PetscErrorCode SbImportSlabs_H5(const char *path, PetscInt *ncell);
 
@@ -63,8 +62,7 @@ PetscErrorCode SbImportAddElement(SbImport *import, int type, const PetscInt ver
 */
 PetscErrorCode SbImportCheckTypes(const SbImport *import);
 
-/* Position in gmsh's order of node k of a 10-node tet of Abaqus, Nastran and VTK: the last two are
-   exchanged. */
+/* Position in gmsh's order of node k of a 10-node tet of Abaqus, Nastran, VTK: the last two change places. */
 static inline int SbGmshNode(int k)
 {
   return k < 8 ? k : 17 - k;
@@ -120,11 +118,10 @@ PetscErrorCode SbDeckAddNode(SbDeck *deck, int64_t label, PetscReal **x);
 PetscErrorCode SbDeckAddElement(SbDeck *deck, const SbDeckElement *element);
 /* Finds or creates the set of this name. */
 PetscErrorCode SbDeckFindSet(SbDeck *deck, PetscBool of_nodes, const char *name, PetscInt *set);
-PetscErrorCode SbDeckAddRange(SbDeck *deck, PetscInt set, int64_t first, int64_t last, int64_t step);
-/* Adds the members of the set `other` to a set. */
-PetscErrorCode SbDeckAddSet(SbDeck *deck, PetscInt set, PetscInt other);
-/* Converts the deck to vertices, items, and groups for SbImportJoinGroups(); undefined members: see
-   `strict`. */
+/* Adds to a set the labels first, first + step, ... last, or the members of the set `other`; -1: none. */
+PetscErrorCode SbDeckAddRange(SbDeck *deck, PetscInt set, PetscInt other, int64_t first, int64_t last,
+                              int64_t step);
+/* Converts the deck to vertices, items, and groups for SbImportJoinGroups(). Undefined members: `strict`. */
 PetscErrorCode SbDeckBuild(SbDeck *deck);
 /* Finds the members of a set and of the sets in it, recursively, each once; result in deck->found. */
 PetscErrorCode SbDeckFind(SbDeck *deck, PetscInt set);
