@@ -52,6 +52,20 @@ static inline PetscScalar *sb_block(const SbMatBlocks *x, SbPlan p, PetscInt row
   return x->value[q] + 9 * (size_t)k;
 }
 
+/* Adds a block, or its transpose, times a factor, at its position in an owned row. */
+static inline void sb_insert_block(SbSpace s, const SbMatBlocks *x, PetscInt row, PetscInt column,
+                                   PetscInt position, PetscReal factor, PetscBool turn, const PetscReal k[9])
+{
+  size_t rs, cs;
+  PetscScalar *v;
+
+  if (position == SB_NOT_OWNED || (x->symmetric && row > column)) return;
+  v = sb_block(x, s->plan, row, position, &rs, &cs);
+  for (size_t i = 0; i < 3; i++) {
+    for (size_t j = 0; j < 3; j++) v[i * rs + j * cs] += factor * (turn ? k[3 * j + i] : k[3 * i + j]);
+  }
+}
+
 /*
   For every batch b in order, before its SbInsertBatch(): clears the rows that it adds to first, or sets them
   to the face terms with the factors of a stage and beta[nbody], s, damping. NULL: without face terms.
@@ -101,10 +115,6 @@ void SbBatchMass(SbSpace space, const SbRegion *region, PetscInt b, SbPack mass[
    32-byte aligned. */
 void SbInsertBatch(SbSpace space, const SbMatBlocks *x, PetscInt b, int npair, PetscBool broken,
                    const SbPack K[][9]);
-/* Adds factor k, or its transpose (turn), at its position in the row of node[0] and the column of node[1]. */
-void SbInsertBlock(SbSpace space, const SbMatBlocks *x, const PetscInt node[2], PetscInt position,
-                   PetscReal factor, PetscBool turn, const PetscReal k[9]);
-
 /* constraint.c: projects an assembled matrix, or regularises it. Not collective. */
 void SbConstraintsFinishTangent(SbSpace space, const SbMatBlocks *x);
 PetscErrorCode SbConstraintsDestroy(SbConstraints *constraints);

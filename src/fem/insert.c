@@ -18,66 +18,67 @@ void SbInsertClear(SbSpace s, const SbMatBlocks *x, PetscInt b, const SbStage *f
 {
   const SbPlan p = s->plan;
 
-  for (PetscInt n = 2 * p->fresh_start[b]; n < 2 * p->fresh_start[b + 1]; n++) {
-    const PetscInt i = p->fresh[n / 2], q = n % 2, *ptr = q ? p->oi : p->di;
-    const PetscInt first = x->symmetric ? p->diagonal[i] : ptr[i];
-    const PetscReal factor = faces ? faces->shift_k + faces->shift_v * beta[s->node_body[i]] : 0.;
-    size_t rs, cs;
+  for (PetscInt n = p->fresh_start[b]; n < p->fresh_start[b + 1]; n++) {
+    const PetscInt i = p->fresh[n];
 
-    if (!x->value[q]) continue;
-    memset(x->value[q] + 9 * (size_t)(x->symmetric ? p->ui[i] : first), 0, 72 * (size_t)(ptr[i + 1] - first));
-    /* the face terms are a multiple of the identity in each block */
-    for (PetscInt k = first; faces && k < ptr[i + 1]; k++) {
-      PetscScalar *v = sb_block(x, p, i, q ? ~k : k, &rs, &cs);
+    for (int q = 0; q < (x->value[1] ? 2 : 1); q++) {
+      const PetscInt *ptr = q ? p->oi : x->symmetric ? p->ui : p->di;
+      const PetscReal factor = faces ? faces->shift_k + faces->shift_v * beta[s->node_body[i]] : 0.;
+      size_t rs, cs;
 
-      for (size_t c = 0; c < 3; c++) v[c * (rs + cs)] = factor * p->face_term[q][k];
+      memset(x->value[q] + 9 * (size_t)ptr[i], 0, 72 * (size_t)(ptr[i + 1] - ptr[i]));
+      if (!faces) continue;
+      /* the face terms are a multiple of the identity in each block */
+      ptr = q ? p->oi : p->di;
+      for (PetscInt k = x->symmetric ? p->diagonal[i] : ptr[i]; k < ptr[i + 1]; k++) {
+        PetscScalar *v = sb_block(x, p, i, q ? ~k : k, &rs, &cs);
+
+        for (size_t c = 0; c < 3; c++) v[c * (rs + cs)] = factor * p->face_term[q][k];
+      }
     }
   }
 }
 
-void SbInsertBlock(SbSpace s, const SbMatBlocks *x, const PetscInt node[2], PetscInt position,
-                   PetscReal factor, PetscBool turn, const PetscReal k[9])
-{
-  size_t rs, cs;
-  PetscScalar *v;
-
-  if (position == SB_NOT_OWNED || (x->symmetric && node[0] > node[1])) return;
-  v = sb_block(x, s->plan, node[0], position, &rs, &cs);
-  for (size_t i = 0; i < 3; i++) {
-    for (size_t j = 0; j < 3; j++) v[i * rs + j * cs] += factor * (turn ? k[3 * j + i] : k[3 * i + j]);
-  }
-}
-
-/*
-  Any storage, any rank: adds the cell in lane l of batch b, block by block. DG (broken): each block between
-  means is distributed to the own nodes and those across the faces.
-*/
-static void insert_cell(SbSpace s, const SbMatBlocks *x, PetscInt b, int l, int npair, PetscBool broken,
-                        const SbPack K[][9])
+/* Any storage, any rank: adds the cell in lane l of batch b, block by block. */
+static void insert_cell(SbSpace s, const SbMatBlocks *x, PetscInt b, int l, int npair, const SbPack K[][9])
 {
   const PetscInt w = s->width, *node = s->batch_clique + (size_t)(b * w) * SB_BATCH + l;
   const PetscInt *offset = s->plan->offset + (size_t)(b * w * w) * SB_BATCH + l;
-  const int sides = broken ? 4 : 1;
-  PetscReal weight[8];
 
-  for (int a = 0; a < 4 && broken; a++) {
-    weight[a] = s->batch_weight[4 * b + a][l];
-    weight[4 + a] = 1. - weight[a];
-  }
   for (int p = 0; p < npair; p++) {
-    const int turns = SbPairA[p] == SbPairB[p] ? 1 : 2;
     PetscReal k[9];
 
     SbPackGet(9, K[p], l, k);
-    for (int n = 0; n < sides * turns; n++) {
-      const int turn = n / sides, side = n % sides;
-      const int row = (turn ? SbPairB[p] : SbPairA[p]) + 4 * (side & 1),
-                column = (turn ? SbPairA[p] : SbPairB[p]) + 2 * (side & 2);
-      const PetscInt nodes[2] = {node[SB_BATCH * row], node[SB_BATCH * column]};
-      const PetscReal factor = broken ? weight[row] * weight[column] : 1.;
+    for (int turn = 0; turn < (SbPairA[p] == SbPairB[p] ? 1 : 2); turn++) {
+      const int row = turn ? SbPairB[p] : SbPairA[p], column = turn ? SbPairA[p] : SbPairB[p];
+
+      sb_insert_block(s, x, node[SB_BATCH * row], node[SB_BATCH * column],
+                      offset[SB_BATCH * (w * row + column)], 1., (PetscBool)turn, k);
+    }
+  }
+}
+
+/* DG: each block between means is distributed to the own nodes and those across the faces. */
+static void insert_broken(SbSpace s, const SbMatBlocks *x, PetscInt b, int l, const SbPack K[10][9])
+{
+  const PetscInt w = s->width, *node = s->batch_clique + (size_t)(b * w) * SB_BATCH + l;
+  const PetscInt *offset = s->plan->offset + (size_t)(b * w * w) * SB_BATCH + l;
+  PetscReal weight[8], k[9];
+
+  for (int a = 0; a < 4; a++) {
+    weight[a] = s->batch_weight[4 * b + a][l];
+    weight[4 + a] = 1. - weight[a];
+  }
+  for (int p = 0; p < 10; p++) {
+    SbPackGet(9, K[p], l, k);
+    for (int n = 0; n < (SbPairA[p] == SbPairB[p] ? 4 : 8); n++) {
+      const int turn = n / 4, row = (turn ? SbPairB[p] : SbPairA[p]) + 4 * (n & 1),
+                column = (turn ? SbPairA[p] : SbPairB[p]) + 2 * (n & 2);
+      const PetscReal factor = weight[row] * weight[column];
 
       if (factor != 0.)
-        SbInsertBlock(s, x, nodes, offset[SB_BATCH * (w * row + column)], factor, (PetscBool)turn, k);
+        sb_insert_block(s, x, node[SB_BATCH * row], node[SB_BATCH * column],
+                        offset[SB_BATCH * (w * row + column)], factor, (PetscBool)turn, k);
     }
   }
 }
@@ -141,16 +142,23 @@ SB_INLINE void insert_both(int npair, const SbPack K[][9], const PetscInt offset
   }
 }
 
-/* edge: the batch has nodes of another rank. Both loops have a constant length. */
-SB_KERNEL static void insert_baij(int npair, const SbPack K[restrict][9], const PetscInt offset[restrict],
-                                  PetscInt width, PetscBool edge, PetscScalar *const value[2])
+SB_KERNEL static void insert_baij(const SbPack K[restrict 10][9], const PetscInt offset[restrict],
+                                  PetscInt width, PetscScalar *const value[2])
 {
-  if (npair == SB_PAIRS)
-    insert_both(SB_PAIRS, K, offset, SB_CELL_NODES, PETSC_TRUE, value);
-  else if (edge)
-    insert_both(10, K, offset, width, PETSC_TRUE, value);
-  else
-    insert_both(10, K, offset, width, PETSC_FALSE, value);
+  insert_both(10, K, offset, width, PETSC_FALSE, value);
+}
+
+/* Batches with nodes of another rank. */
+SB_KERNEL static void insert_baij_edge(const SbPack K[restrict 10][9], const PetscInt offset[restrict],
+                                       PetscInt width, PetscScalar *const value[2])
+{
+  insert_both(10, K, offset, width, PETSC_TRUE, value);
+}
+
+SB_KERNEL static void insert_baij_quadratic(const SbPack K[restrict SB_PAIRS][9],
+                                            const PetscInt offset[restrict], PetscScalar *const value[2])
+{
+  insert_both(SB_PAIRS, K, offset, SB_CELL_NODES, PETSC_TRUE, value);
 }
 
 /* The stored block is K_ab, or K_ba = K_ab^T when that lies in the row of the lower node. */
@@ -195,12 +203,19 @@ void SbInsertBatch(SbSpace s, const SbMatBlocks *x, PetscInt b, int npair, Petsc
                  *node = s->batch_node + 4 * SB_BATCH * b;
   PetscInt last = 0;
 
-  if (broken || x->kind == SB_MATRIX_AIJ)
-    for (int l = 0; l < s->batch_n[b]; l++) insert_cell(s, x, b, l, npair, broken, K);
+  if (broken)
+    for (int l = 0; l < s->batch_n[b]; l++) insert_broken(s, x, b, l, K);
+  else if (x->kind == SB_MATRIX_AIJ)
+    for (int l = 0; l < s->batch_n[b]; l++) insert_cell(s, x, b, l, npair, K);
   else if (x->symmetric)
     insert_sbaij(npair, K, s->plan->upper + (size_t)(b * s->plan->npair) * SB_BATCH, x->value);
+  else if (npair == SB_PAIRS)
+    insert_baij_quadratic(K, offset, x->value);
   else {
     for (int k = 0; k < 4 * SB_BATCH; k++) last = PetscMax(last, node[k]);
-    insert_baij(npair, K, offset, s->width, (PetscBool)(last >= s->nnode_owned), x->value);
+    if (last < s->nnode_owned)
+      insert_baij(K, offset, s->width, x->value);
+    else
+      insert_baij_edge(K, offset, s->width, x->value);
   }
 }

@@ -81,41 +81,38 @@ PetscErrorCode SbSpaceAddInternalForce(SbSpace s, const SbStage *stage, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Force of the consistent mass of a region times w = a + alpha v. */
-static void add_consistent_inertia(SbSpace s, const SbRegion *region, const SbStage *stage, PetscReal f[])
-{
-  const PetscReal alpha = stage->v ? s->alpha[region->body] : 0., density = region->material->density;
-  const int n = (int)region->nnode, npair = region->quadratic ? SB_PAIRS : 10;
-
-  for (PetscInt b = region->bstart; b < region->bend; b++) {
-    const PetscInt *node = sb_batch_nodes(s, b);
-    SbPack w[30] = {{0}}, v[30], fe[30] = {{0}}, mass[SB_PAIRS];
-
-    if (stage->a) sb_gather_nodes(n, node, stage->a, w);
-    if (alpha != 0.) sb_gather_nodes(n, node, stage->v, v);
-    for (int k = 0; alpha != 0. && k < 3 * n; k++) {
-      for (int l = 0; l < SB_BATCH; l++) w[k][l] += alpha * v[k][l];
-    }
-    SbBatchMass(s, region, b, mass);
-    for (int k = 0; k < 3 * npair; k++) {
-      const int p = k / 3, i = 3 * SbPairA[p] + k % 3, j = 3 * SbPairB[p] + k % 3;
-
-      for (int l = 0; l < SB_BATCH; l++) {
-        fe[i][l] += density * mass[p][l] * w[j][l];
-        fe[j][l] += i == j ? 0. : density * mass[p][l] * w[i][l];
-      }
-    }
-    sb_scatter_nodes(n, node, s->batch_n[b], (const SbPack *)fe, f);
-  }
-}
-
 void SbSpaceAddInertia(SbSpace s, const SbStage *stage, PetscReal f[])
 {
-  for (PetscInt r = 0; s->consistent_mass && r < s->nregion; r++)
-    add_consistent_inertia(s, &s->region[r], stage, f);
   for (PetscInt i = 0; !s->consistent_mass && i < 3 * s->nnode_owned; i++) {
     if (stage->a) f[i] += s->node_mass[i / 3] * stage->a[i];
     if (stage->v) f[i] += s->alpha[s->node_body[i / 3]] * s->node_mass[i / 3] * stage->v[i];
+  }
+  /* the consistent mass times w = a + alpha v */
+  for (PetscInt r = 0; s->consistent_mass && r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+    const PetscReal alpha = stage->v ? s->alpha[region->body] : 0., density = region->material->density;
+    const int n = (int)region->nnode, npair = region->quadratic ? SB_PAIRS : 10;
+
+    for (PetscInt b = region->bstart; b < region->bend; b++) {
+      const PetscInt *node = sb_batch_nodes(s, b);
+      SbPack w[30] = {{0}}, v[30], fe[30] = {{0}}, mass[SB_PAIRS];
+
+      if (stage->a) sb_gather_nodes(n, node, stage->a, w);
+      if (alpha != 0.) sb_gather_nodes(n, node, stage->v, v);
+      for (int k = 0; alpha != 0. && k < 3 * n; k++) {
+        for (int l = 0; l < SB_BATCH; l++) w[k][l] += alpha * v[k][l];
+      }
+      SbBatchMass(s, region, b, mass);
+      for (int k = 0; k < 3 * npair; k++) {
+        const int p = k / 3, i = 3 * SbPairA[p] + k % 3, j = 3 * SbPairB[p] + k % 3;
+
+        for (int l = 0; l < SB_BATCH; l++) {
+          fe[i][l] += density * mass[p][l] * w[j][l];
+          fe[j][l] += i == j ? 0. : density * mass[p][l] * w[i][l];
+        }
+      }
+      sb_scatter_nodes(n, node, s->batch_n[b], (const SbPack *)fe, f);
+    }
   }
 }
 

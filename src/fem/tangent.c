@@ -111,7 +111,6 @@ PetscErrorCode SbMatRestoreBlocks(SbMatBlocks *b)
 typedef struct {
   PetscReal stiffness;    /* factor on dP/dF */
   PetscReal damping;      /* factor on Hooke's tensor rotated by R (sbmaterial.h, SbMaterialDampingStress) */
-  PetscReal inertia;      /* factor on the consistent mass */
   PetscReal lambda;       /* volumetric modulus of the law, Pa */
   PetscReal mu;           /* shear modulus of the law, Pa */
   const SbPack *pressure; /* pressure in addition to the law's own, Pa, tension; NULL: none */
@@ -138,12 +137,36 @@ SB_KERNEL static void remove_volumetric(PetscReal lambda, const SbPack D[restric
   }
 }
 
+/* Blocks of a law with a full tangent dP/dF, without its volumetric part; damping is added. */
+static void general_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
+                           const SbPack F[9], Split *split, SbPack K[10][9])
+{
+  SbPack C[81], R[9], D[10][9], W;
+
+  m->ops.tangent(m, F, C);
+  if (split) {
+    m->ops.volumetric(m, F, split->D);
+    split->factor = x->stiffness;
+    remove_volumetric(x->lambda, (const SbPack *)split->D, C);
+  }
+  if (x->pressure && m->ops.curvature) m->ops.curvature(m, F, *x->pressure, C);
+  scaled_volumes(V, x->stiffness, W);
+  SbCellBlocksGeneral(g, W, (const SbPack *)C, K);
+  if (x->damping == 0.) return;
+  SbPolar(F, R);
+  scaled_volumes(V, x->damping, W);
+  SbCellBlocksIsotropic(g, W, x->lambda, x->mu, (const SbPack *)R, D);
+  for (int k = 0; k < 90; k++) {
+    for (int l = 0; l < SB_BATCH; l++) K[k / 9][k % 9][l] += D[k / 9][k % 9][l];
+  }
+}
+
 /* Blocks of a law at F, without mass; `split` NULL: with the volumetric part. */
 static void law_blocks(const SbMaterial m, const SbPack *g, const SbPack V, const Factors *x,
                        const SbPack F[9], Split *split, SbPack K[10][9])
 {
   const PetscReal both = x->stiffness + x->damping, lambda = split ? 0. : x->lambda;
-  SbPack R[9], T[9], C[81], D[10][9], W;
+  SbPack R[9], T[9], W;
 
   scaled_volumes(V, both, W);
   if (m->linear || m->ops.frame) {
@@ -167,23 +190,7 @@ static void law_blocks(const SbMaterial m, const SbPack *g, const SbPack V, cons
     }
     SbCellBlocksCorotated(g, W, lambda, x->mu, (const SbPack *)R, (const SbPack *)T, K);
   } else {
-    /* the full tangent dP/dF, without its volumetric part; damping is added */
-    m->ops.tangent(m, F, C);
-    if (split) {
-      m->ops.volumetric(m, F, split->D);
-      split->factor = x->stiffness;
-      remove_volumetric(x->lambda, (const SbPack *)split->D, C);
-    }
-    if (x->pressure && m->ops.curvature) m->ops.curvature(m, F, *x->pressure, C);
-    scaled_volumes(V, x->stiffness, W);
-    SbCellBlocksGeneral(g, W, (const SbPack *)C, K);
-    if (x->damping == 0.) return;
-    SbPolar(F, R);
-    scaled_volumes(V, x->damping, W);
-    SbCellBlocksIsotropic(g, W, x->lambda, x->mu, (const SbPack *)R, D);
-    for (int k = 0; k < 90; k++) {
-      for (int l = 0; l < SB_BATCH; l++) K[k / 9][k % 9][l] += D[k / 9][k % 9][l];
-    }
+    general_blocks(m, g, V, x, F, split, K);
     return;
   }
   if (!split) return;
@@ -317,10 +324,10 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
 {
   const SbRegion *region = &s->region[r];
   const SbMaterial m = region->material;
-  const PetscReal inertia = m->density * (stage->shift_a + stage->shift_v * s->alpha[region->body]);
+  const PetscReal shift = stage->shift_a + stage->shift_v * s->alpha[region->body],
+                  inertia = s->consistent_mass ? m->density * shift : 0.;
   const Factors factors = {.stiffness = stage->shift_k,
                            .damping = stage->shift_v * s->beta[region->body],
-                           .inertia = s->consistent_mass ? inertia : 0.,
                            .lambda = m->lambda,
                            .mu = m->mu};
   const PetscBool faces = (PetscBool)!region->element->nodes_per[0];
@@ -359,9 +366,9 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
       for (int k = 0; k < 90; k++) {
         for (int l = 0; l < SB_BATCH; l++) copy[k / 9][k % 9][l] = scale * K[k / 9][k % 9][l];
       }
-      fill_batch(&fill[n], r, b, factors.inertia, copy);
+      fill_batch(&fill[n], r, b, inertia, copy);
     }
-    fill_batch(&fill[0], r, b, factors.inertia, K);
+    fill_batch(&fill[0], r, b, inertia, K);
   }
 }
 
@@ -424,9 +431,10 @@ PetscErrorCode SbSpaceAddCellBlock(SbSpace s, Mat A, PetscInt cell, PetscInt a, 
   PetscCall(PetscFindInt(cell, s->nbatch, s->batch_cell, &batch));
   if (batch < 0) batch = -batch - 2; /* not the first cell of its batch */
   PetscCall(SbValuesBegin(A, &x));
-  SbInsertBlock(s, &x, node,
-                s->plan->offset[(size_t)(batch * w * w + w * a + b) * SB_BATCH + cell - s->batch_cell[batch]],
-                s->block_scale, PETSC_FALSE, block);
+  sb_insert_block(
+    s, &x, node[0], node[1],
+    s->plan->offset[(size_t)(batch * w * w + w * a + b) * SB_BATCH + cell - s->batch_cell[batch]],
+    s->block_scale, PETSC_FALSE, block);
   PetscCall(SbValuesEnd(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

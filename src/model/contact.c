@@ -31,21 +31,18 @@ static PetscErrorCode constrain(SbModel m, PetscReal t, Vec U)
 
 PetscErrorCode SbModelContactBeginStep(SbModel m, PetscReal t, PetscReal dt, Vec U0, Vec V0, Vec U)
 {
-  const PetscReal *u0, *u, *v0 = NULL;
+  SbEvaluation start = {.U = U0, .V = m->nrestitution ? V0 : NULL};
+  const PetscReal *u;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));
-  PetscCall(SbSpaceGetLocalRead(m->space, U0, &u0));
+  PetscCall(SbEvaluationBegin(m, t, &start));
   PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
-  if (m->nrestitution) {
-    SbModelRestitutionBegin(m, dt, U0, V0);
-    PetscCall(SbSpaceGetLocalRead(m->space, V0, &v0));
-  }
+  if (m->nrestitution) SbModelRestitutionBegin(m, dt, U0, V0);
   for (PetscInt e = 0; e < m->nbegin_step; e++)
-    SbEffectCall(m->begin_step[e], begin_step, m->space, t, dt, u0, v0, u);
-  if (m->nrestitution) PetscCall(SbSpaceRestoreLocalRead(m->space, V0, &v0));
+    SbEffectCall(m->begin_step[e], begin_step, m->space, t, dt, start.stage.u, start.stage.v, u);
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
-  PetscCall(SbSpaceRestoreLocalRead(m->space, U0, &u0));
+  PetscCall(SbEvaluationEnd(m, &start));
   PetscCall(constrain(m, t + dt, U));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);

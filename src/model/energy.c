@@ -125,9 +125,6 @@ PetscErrorCode SbModelCentres(SbModel m, Vec U, PetscReal centre[][4])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  Power dissipated by Rayleigh damping, v . C v, J/s: alpha v.M v + beta v.K(u) v, of all ranks.
-*/
 PetscErrorCode SbModelDampingPower(SbModel m, Vec U, Vec V, PetscReal *power)
 {
   SbEvaluation at = {.U = U, .V = V};
