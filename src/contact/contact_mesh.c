@@ -13,7 +13,6 @@
   normal there, or as one, the centre.
 */
 #include "contact_mesh.h"
-#include "obstacle.h"
 
 /* Points of a facet: its three corners; with P2 the middles of its sides too, 3 + k behind corner k. */
 static inline PetscInt npoint_of(SbSpace s, const SbFacet *f)

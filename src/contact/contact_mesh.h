@@ -1,5 +1,5 @@
 /*
-  contact_mesh.h - shared by the files about surfaces in contact.
+  contact_mesh.h - shared by the files about surfaces in contact, and obstacle.c.
 */
 #pragma once
 #include "sbbarrier.h"
@@ -9,10 +9,8 @@ static inline PetscReal SbContactTriangleArea(const PetscReal x[], const PetscIn
 {
   PetscReal a[3], b[3];
 
-  for (int i = 0; i < 3; i++) {
-    a[i] = x[3 * v[1] + i] - x[3 * v[0] + i];
-    b[i] = x[3 * v[2] + i] - x[3 * v[0] + i];
-  }
+  SbSubtract(x + 3 * v[1], x + 3 * v[0], a);
+  SbSubtract(x + 3 * v[2], x + 3 * v[0], b);
   SbCross(a, b, n);
   return 0.5 * PetscSqrtReal(SbDot3(n, n));
 }
@@ -26,3 +24,15 @@ static inline PetscReal SbContactTriangleArea(const PetscReal x[], const PetscIn
 */
 PetscErrorCode SbContactMeshCrossings(SbContactMesh mesh, PetscBool self, const PetscReal x[], PetscInt *n,
                                       PetscInt **hit);
+
+/* The surface of an obstacle at rest: vertices, and triangles; without triangles one vertex (sphere) or an
+   edge of two (capsule), with a radius. Its arrays are the obstacle's. */
+typedef struct {
+  SbObstacleSide side;
+  PetscReal radius; /* m; of a bowl, too */
+  PetscInt nvertex, ntriangle;
+  const PetscReal *x;       /* [nvertex][3] m */
+  const PetscInt *triangle; /* [ntriangle][3] counter-clockwise seen from outside */
+} SbObstacleSurface;
+/* Not collective, after SbObstacleSetUp(). */
+SbObstacleSurface SbObstacleGetSurface(SbObstacle obstacle);

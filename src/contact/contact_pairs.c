@@ -70,14 +70,6 @@ static inline const PetscInt *vertices_of(SbContactMesh m, int kind, PetscInt i,
   return kind == VERTEX ? own : kind == TRIANGLE ? m->triangle + 3 * i : m->edge + 2 * i;
 }
 
-static PetscErrorCode add_pair(SbContactPairs p, const SbContactPair *pair)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbReserve(p->n + 1, sizeof(*p->pair), &p->size, &p->pair));
-  p->pair[p->n++] = *pair;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Whether the features of a pair stay farther apart than the reach for all positions of its vertices in their
    boxes: the distance at the centres less the largest displacement of a vertex from there. */
 static PetscBool stays_apart(SbContactPairs p, const SbContactPair *pair)
@@ -147,7 +139,9 @@ static PetscErrorCode add_features(SbContactPairs p, SbPairKind kind, PetscInt i
     pair.area = b[0] >= m->nbody_vertex ? m->edge_area[low] : 0.5 * (m->edge_area[low] + m->edge_area[high]);
   else
     pair.area = i < m->nbody_vertex ? m->area[i] : (m->area[b[0]] + m->area[b[1]] + m->area[b[2]]) / 3.;
-  if (!overlaps(p, &pair) && !stays_apart(p, &pair)) PetscCall(add_pair(p, &pair));
+  if (overlaps(p, &pair) || stays_apart(p, &pair)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbReserve(p->n + 1, sizeof(pair), &p->size, &p->pair));
+  p->pair[p->n++] = pair;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -309,7 +303,9 @@ static PetscErrorCode find_pairs(SbContactPairs p, const PetscReal x0[], const P
         PetscSqr(x1[3 * v + i] - x0[3 * v + i] - x1[3 * m->nbody_vertex + i] + x0[3 * m->nbody_vertex + i]);
     away =
       PetscMin(SbContactPairGap(m, &pair, x0, &g), SbContactPairGap(m, &pair, x1, &g)) - PetscSqrtReal(way);
-    if (away < p->reach + 4. * p->margin) PetscCall(add_pair(p, &pair));
+    if (away >= p->reach + 4. * p->margin) continue;
+    PetscCall(SbReserve(p->n + 1, sizeof(pair), &p->size, &p->pair));
+    p->pair[p->n++] = pair;
   }
   if (*full) p->known = PETSC_FALSE;
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SEARCH], 0, 0, 0, 0));

@@ -15,13 +15,12 @@ static int side_of(const PetscReal *a, const PetscReal *b, const PetscReal *c, c
 {
   PetscReal p[3], q[3], r[3], n[3], volume, size = 0., far = 0.;
 
-  for (int i = 0; i < 3; i++) {
-    p[i] = b[i] - a[i];
-    q[i] = c[i] - a[i];
-    r[i] = d[i] - a[i];
+  SbSubtract(b, a, p);
+  SbSubtract(c, a, q);
+  SbSubtract(d, a, r);
+  for (int i = 0; i < 3; i++)
     far = PetscMax(far, PetscMax(PetscMax(PetscAbsReal(a[i]), PetscAbsReal(b[i])),
                                  PetscMax(PetscAbsReal(c[i]), PetscAbsReal(d[i]))));
-  }
   SbCross(p, q, n);
   volume = SbDot3(n, r);
   for (int i = 0; i < 3; i++)
@@ -91,11 +90,9 @@ static PetscReal solid_angle(const PetscReal p[3], const PetscReal *a, const Pet
 {
   PetscReal r[3][3], l[3], n[3];
 
-  for (int i = 0; i < 3; i++) {
-    r[0][i] = a[i] - p[i];
-    r[1][i] = b[i] - p[i];
-    r[2][i] = c[i] - p[i];
-  }
+  SbSubtract(a, p, r[0]);
+  SbSubtract(b, p, r[1]);
+  SbSubtract(c, p, r[2]);
   for (int k = 0; k < 3; k++) l[k] = PetscSqrtReal(SbDot3(r[k], r[k]));
   SbCross(r[1], r[2], n);
   return atan2(SbDot3(r[0], n), l[0] * l[1] * l[2] + SbDot3(r[0], r[1]) * l[2] + SbDot3(r[1], r[2]) * l[0] +

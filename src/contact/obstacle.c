@@ -6,8 +6,7 @@
   nearest side counts). A bowl is a sphere inverted. What a closed mesh encloses is in
   src/geometry/signed_distance.c.
 */
-#include "obstacle.h"
-#include "sbgeometry.h"
+#include "contact_mesh.h"
 #include "sbtriangles.h"
 
 #define SIDES 96  /* of a cylinder as triangles */

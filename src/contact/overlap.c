@@ -32,14 +32,6 @@ typedef struct {
   uint8_t *through;       /* [nedge] goes through a triangle */
 } Ways;
 
-static PetscErrorCode add_point(SbContactOverlap *o, const SbPenetration *point)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbReserve(o->n + 1, sizeof(*o->point), &o->size, &o->point));
-  o->point[o->n++] = *point;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Adds the direction n out of `part`, of depth d, to the weighted sums of vertex v, unless its own outward
    normal points that way. Returns whether it did. */
 static PetscBool suggest(Ways *w, PetscInt v, PetscInt part, PetscReal weight, const PetscReal n[3],
@@ -146,7 +138,9 @@ static PetscErrorCode add_inside(SbContactMesh m, const PetscReal x[], const SbB
     point->v[point->n] = v;
     point->weight[point->n++] = -best[k];
   }
-  if (point->depth > 0.) PetscCall(add_point(o, point));
+  if (point->depth <= 0.) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbReserve(o->n + 1, sizeof(*point), &o->size, &o->point));
+  o->point[o->n++] = *point;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -343,7 +337,8 @@ static PetscErrorCode add_behind(SbContactMesh m, const PetscReal x[], const SbC
   }
   for (int k = 0; k < 3; k++) point.normal[k] = sign * d.n[k];
   point.depth = -gap;
-  PetscCall(add_point(o, &point));
+  PetscCall(SbReserve(o->n + 1, sizeof(point), &o->size, &o->point));
+  o->point[o->n++] = point;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -126,10 +126,8 @@ static PetscBool facing(const Barrier *b, const SbContactPair *pair, const Petsc
   const PetscBool edges = (PetscBool)(pair->kind == SB_PAIR_EDGE_EDGE);
 
   for (int k = 0; k < 4; k++) x[k] = b->x + 3 * pair->v[k];
-  for (int i = 0; i < 3; i++) {
-    p[i] = edges ? x[1][i] - x[0][i] : x[2][i] - x[1][i];
-    q[i] = x[3][i] - x[edges ? 2 : 1][i];
-  }
+  SbSubtract(x[edges ? 1 : 2], x[edges ? 0 : 1], p);
+  SbSubtract(x[3], x[edges ? 2 : 1], q);
   SbCross(p, q, n);
   length = PetscSqrtReal(SbDot3(n, n));
   if (length <= 1e-3 * PetscSqrtReal(SbDot3(p, p) * SbDot3(q, q))) return PETSC_FALSE;

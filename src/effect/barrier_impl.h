@@ -7,10 +7,10 @@
 
 /* Columns of the history for each pair of bodies (barrier_output.c). */
 typedef struct {
-  PetscInt fixed, nsurface; /* columns of the effect before those of pairs; bodies whose surface takes part */
-  PetscInt *slot;           /* [nbody] number among these bodies, or -1 */
-  PetscInt *place;          /* [nsurface][nsurface] first column of a pair, the lower body first */
-  const char **column;      /* [ncolumn] all of the effect */
+  PetscInt nsurface;             /* bodies whose surface takes part */
+  PetscInt *slot;                /* [nbody] number among these bodies, or -1 */
+  PetscInt *place;               /* [nsurface][nsurface] first column of a pair, the lower body first */
+  const char **column;           /* [ncolumn] all of the effect */
   char (*text)[3 * SB_NAME_MAX]; /* names of the columns behind the fixed ones */
 } SbPairs;
 /* Appends the columns of pairs to those of e; takes_part[nbody]: the body's surface takes part. */

@@ -12,28 +12,9 @@ static const char *const self_names[] = {"normal_force", "contacts"};
 #define APART 4 /* columns of two bodies */
 #define SELF 2  /* and of one with itself, whose net force is zero */
 
-/* The columns of two bodies, or of one with itself, behind the n that there are. */
-static PetscErrorCode name_columns(SbEffect e, SbPairs *p, const char a[], const char b[], PetscInt *n)
-{
-  const PetscBool apart = (PetscBool)(a != b);
-
-  PetscFunctionBeginUser;
-  for (int k = 0; k < (apart ? APART : SELF); k++, (*n)++) {
-    char *name = p->text[*n - p->fixed];
-
-    PetscCall(
-      PetscSNPrintf(name, sizeof(p->text[0]), "%s_%s_%s", a, b, (apart ? apart_names : self_names)[k]));
-    for (PetscInt i = 0; i < *n; i++)
-      PetscCheck(strcmp(name, p->column[i]), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-                 "-effect_%s_pairs yes: history.csv would have two columns %s_%s: give a body another name",
-                 e->name, e->name, name);
-    p->column[*n] = name;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh, const PetscBool takes_part[], PetscBool self, SbPairs *p)
 {
+  const PetscInt fixed = e->ncolumn;
   PetscInt64 npair;
   PetscInt n;
 
@@ -46,7 +27,7 @@ PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh, const PetscBool takes_part[
              " pairs, more than the %d that history.csv may have columns for: name fewer sets, or use "
              "-output_contacts yes",
              e->name, p->nsurface, e->name, npair, PAIRS);
-  n = p->fixed = e->ncolumn;
+  n = fixed;
   PetscCall(PetscMalloc3(n + APART * (PetscInt)npair, &p->column, APART * npair, &p->text,
                          p->nsurface * p->nsurface, &p->place));
   PetscCall(PetscArraycpy(p->column, e->column, n));
@@ -54,7 +35,18 @@ PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh, const PetscBool takes_part[
     for (PetscInt b = a; b < mesh->nbody; b++) {
       if (p->slot[a] < 0 || p->slot[b] < 0 || (a == b && !self)) continue;
       p->place[p->nsurface * p->slot[a] + p->slot[b]] = n;
-      PetscCall(name_columns(e, p, mesh->body[a].name, mesh->body[b].name, &n));
+      for (int k = 0; k < (a == b ? SELF : APART); k++, n++) {
+        char *name = p->text[n - fixed];
+
+        SbFormat(sizeof(p->text[0]), name, "%s_%s_%s", mesh->body[a].name, mesh->body[b].name,
+                 (a == b ? self_names : apart_names)[k]);
+        for (PetscInt i = 0; i < n; i++)
+          PetscCheck(
+            strcmp(name, p->column[i]), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+            "-effect_%s_pairs yes: history.csv would have two columns %s_%s: give a body another name",
+            e->name, e->name, name);
+        p->column[n] = name;
+      }
     }
   }
   e->column = p->column;
@@ -220,7 +212,8 @@ PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStag
       told[k] = PETSC_TRUE;
       break;
     }
-    PetscCall(SbContactPointsAdd(list, &p));
+    PetscCall(SbReserve(list->n + 1, sizeof(p), &list->size, &list->point));
+    list->point[list->n++] = p;
   }
   PetscCall(PetscFree(told));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -28,15 +28,6 @@
 #define REST 0.999    /* of the width: a smaller gap is contact */
 #define KEEP 0.01     /* tolerance of the impact's position, over the gap above the width */
 
-/* Appends a spring of this step. */
-static PetscErrorCode add_spring(Barrier *b, const Spring *spring)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbReserve(b->nspring + 1, sizeof(*b->spring), &b->spring_size, &b->spring));
-  b->spring[b->nspring++] = *spring;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Excludes pairs of gap zero, as of a vertex in a triangle, while there is overlap. */
 static PetscErrorCode exempt_nearest(Barrier *b)
 {
@@ -163,7 +154,8 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
     spring.start = SbBarrierSpringPlace(b, &spring);
     spring.goal =
       spring.start + (e->dynamic ? PetscMin(all, PetscMax(w, all * (1. - b->contact->overlap.left))) : all);
-    PetscCall(add_spring(b, &spring));
+    PetscCall(SbReserve(b->nspring + 1, sizeof(spring), &b->spring_size, &b->spring));
+    b->spring[b->nspring++] = spring;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -233,7 +225,8 @@ PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const P
 
   PetscFunctionBeginUser;
   b->nbounce = 0;
-  SbRestitutionBegin(&b->contact->bounce, dt);
+  b->contact->bounce.left = 1.;
+  b->contact->bounce.dt = dt;
 
   /* free flight */
   PetscCall(PetscMalloc2(3 * s->nnode, &u1, 3 * m->nvertex, &x));
@@ -268,7 +261,8 @@ PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const P
     }
     spring.stiffness = RIGID * mass / PetscSqr(dt);
     spring.goal = spring.start + SbRestitutionGap(&b->contact->bounce, 0., spring.approach);
-    PetscCall(add_spring(b, &spring));
+    PetscCall(SbReserve(b->nspring + 1, sizeof(spring), &b->spring_size, &b->spring));
+    b->spring[b->nspring++] = spring;
     b->nbounce++;
   }
   PetscCall(PetscFree2(u1, x));

@@ -56,8 +56,7 @@ static const SbOption rows[] = {
    "kinetic coefficient of friction; negative: equal to the static one; not with barrier"},
   {"stiffness", SB_OPTION_REAL, 1, "", "20", "(0, inf)",
    "penalty, augmented and friction: factor on the stiffness min(lambda + 2 mu, 11 mu) area / height of the "
-   "tet behind "
-   "the surface"},
+   "tet behind the surface"},
   {"damping", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "response penalty: dashpot in parallel with each spring, of stiffness times this time; acts on "
    "penetrating points, without tension"},
@@ -166,28 +165,6 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactSetUpObstacle(SbEffect e, SbSpace space, Contact *c)
-{
-  char option[3 * SB_NAME_MAX], note[192] = "";
-
-  PetscFunctionBeginUser;
-  SbFormat(sizeof(option), option, "-effect_%s_obstacle", e->name);
-  PetscCall(SbObstacleSetUp(c->obstacle, space->comm, option, c->scale, c->at, sizeof(note), note));
-  if (note[0]) SbAppend(sizeof(e->note), e->note, "%s%s", e->note[0] ? "; " : "", note);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbContactDestroy(SbEffect e)
-{
-  Contact *c = (Contact *)e->data;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbObstacleDestroy(&c->obstacle));
-  PetscCall(SbPathDestroy(&c->path));
-  PetscCall(PetscFree(c->touch));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The obstacle and its path; without one: options of contact between bodies. */
 static PetscErrorCode read_obstacle(SbEffect e, const SbScope *scope, Contact *c)
 {
@@ -236,7 +213,7 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionReal(scope, "friction", &c->friction.mu));
   PetscCall(SbOptionReal(scope, "restitution", &c->bounce.e));
   PetscCall(SbOptionReal(scope, "separation_steps", &steps));
-  SbOverlapSet(&c->overlap, steps);
+  c->overlap.recovery = steps > 1 ? PetscExpReal(-1 / steps) : 0;
   e->steady = PETSC_FALSE; /* a load factor does not make an obstacle softer */
   e->euler = (PetscBool)(c->bounce.e > 0);
   if (c->response == BARRIER) {

@@ -3,8 +3,6 @@
 */
 #pragma once
 #include "effect_impl.h"
-#include "overlap.h"
-#include "restitution.h"
 #include "sbcontact.h"
 
 typedef enum { AUTO, PROJECTED, MULTIPLIER, AUGMENTED, PENALTY, BARRIER } SbResponse;
@@ -17,6 +15,33 @@ typedef struct {
   PetscReal error; /* largest error of friction after the last solve, relative to the largest friction */
   PetscBool said;  /* the warning that friction did not converge was given */
 } SbFriction;
+
+/* Gradual resolution of penetration: its depth falls to 1/e in `separation_steps` whole steps; a shorter step
+   resolves less of it, at the same speed. */
+typedef struct {
+  PetscReal recovery; /* factor on the depth in a whole step, exp(-1/separation_steps); 0: resolved at once */
+  PetscReal longest;  /* step so far, s */
+  PetscReal left;     /* factor on the depth in this step */
+} SbOverlap;
+
+static inline void SbOverlapBegin(SbOverlap *o, PetscReal dt)
+{
+  o->longest = PetscMax(o->longest, dt);
+  o->left = o->recovery > 0 ? PetscPowReal(o->recovery, dt / o->longest) : 0;
+}
+
+/* Newton's law of restitution for the impact of a point (src/model/restitution.c). */
+typedef struct {
+  PetscReal e;    /* coefficient of restitution; 0: none */
+  PetscReal left; /* factor on it in this step */
+  PetscReal dt;   /* length of the step, s */
+} SbRestitution;
+
+/* Gap at the end of the step to which a rebounding point is constrained, m; 0: no rebound. */
+static inline PetscReal SbRestitutionGap(const SbRestitution *r, PetscReal gap0, PetscReal speed)
+{
+  return speed > 0 ? gap0 + r->dt * r->left * r->e * speed : 0;
+}
 
 typedef struct _p_Touch Touch; /* contact_node.h */
 

@@ -14,7 +14,6 @@
 #define VALLEY 2    /* flips of an active node between facets in a step that allow two constraints */
 #define AVERAGED 4  /* flips after which normals are averaged */
 #define GIVEN_UP 16 /* flips after which it is not constrained on two any more */
-#define KEPT 24     /* flips after which its plane is kept until the end of the step */
 #define JUMP 1e-6   /* 1 - cosine: a flip */
 
 static void set_plane(const PetscReal n[3], PetscReal value, PetscReal to[3], PetscReal *to_value)
@@ -23,17 +22,11 @@ static void set_plane(const PetscReal n[3], PetscReal value, PetscReal to[3], Pe
   *to_value = value;
 }
 
-/* Right-hand side n . u of the constraint on the plane with normal n at distance `gap` from a node at x, m.
-   */
+/* Right-hand side n . u of the constraint on the plane with normal n at the distance `gap` from x, m. */
 static PetscReal level_of(const PetscReal X[3], const PetscReal x[3], PetscReal gap, const PetscReal n[3],
                           const Touch *touch)
 {
   return SbDot3(n, x) - SbDot3(n, X) - gap + touch->rest;
-}
-
-PetscBool SbContactKept(const Touch *touch)
-{
-  return (PetscBool)(touch->on && touch->flips > KEPT);
 }
 
 PetscBool SbContactFlip(const Contact *c, const PetscReal X[3], const PetscReal x[3], PetscReal gap,

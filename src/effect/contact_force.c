@@ -1,10 +1,32 @@
 /*
-  contact_force.c - pose of the obstacle, contact forces on nodes and their derivatives, the end of a step,
-  history, checkpoints. The method is described in contact_node.c.
+  contact_force.c - the obstacle, contact forces on nodes and their derivatives, the end of a step, history,
+  checkpoints. The method is described in contact_node.c.
 */
 #include "contact_node.h"
 
-/* ------------------------------------------------------------------ geometry */
+/* ------------------------------------------------------------------ the obstacle */
+
+PetscErrorCode SbContactSetUpObstacle(SbEffect e, SbSpace space, Contact *c)
+{
+  char option[3 * SB_NAME_MAX], note[192] = "";
+
+  PetscFunctionBeginUser;
+  SbFormat(sizeof(option), option, "-effect_%s_obstacle", e->name);
+  PetscCall(SbObstacleSetUp(c->obstacle, space->comm, option, c->scale, c->at, sizeof(note), note));
+  if (note[0]) SbAppend(sizeof(e->note), e->note, "%s%s", e->note[0] ? "; " : "", note);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactDestroy(SbEffect e)
+{
+  Contact *c = (Contact *)e->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbObstacleDestroy(&c->obstacle));
+  PetscCall(SbPathDestroy(&c->path));
+  PetscCall(PetscFree(c->touch));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 void SbContactPose(const Contact *c, PetscReal t, SbPose *pose)
 {
@@ -164,7 +186,8 @@ PetscErrorCode SbEffectContactPoints_Contact(SbEffect e, SbSpace space, const Sb
     if (!force_on(c, &pose, space, touch, p.x, p.force)) continue;
     p.gap = SbContactGap(c, &pose, p.x, p.normal);
     if (exact(c)) PetscCall(PetscArraycpy(p.normal, touch->n, 3)); /* the normal of the constraint */
-    PetscCall(SbContactPointsAdd(list, &p));
+    PetscCall(SbReserve(list->n + 1, sizeof(p), &list->size, &list->point));
+    list->point[list->n++] = p;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -174,7 +197,7 @@ PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage 
                                        const PetscReal residual[], PetscReal values[])
 {
   Contact *c = (Contact *)e->data;
-  PetscReal deepest[2] = {0, 0};
+  PetscReal deepest = 0;
   PetscMPIInt rank;
   SbPose pose;
 
@@ -187,7 +210,7 @@ PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage 
     PetscReal x[3], n[3], f[3], arm[3], moment[3];
 
     place(space, touch->node, stage->u, x);
-    deepest[0] = PetscMax(deepest[0], -SbContactGap(c, &pose, x, n));
+    deepest = PetscMax(deepest, -SbContactGap(c, &pose, x, n));
     if (!force_on(c, &pose, space, touch, x, f)) continue;
     for (int k = 0; k < 3; k++) arm[k] = x[k] - c->path.point[k] - pose.d[k];
     SbCross(arm, f, moment);
@@ -197,10 +220,10 @@ PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage 
     }
     values[6]++;
   }
-  PetscCallMPI(MPI_Allreduce(&deepest[0], &deepest[1], 1, MPIU_REAL, MPI_MAX, space->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &deepest, 1, MPIU_REAL, MPI_MAX, space->comm));
   PetscCallMPI(MPI_Comm_rank(space->comm, &rank));
   /* smaller values are within the tolerance */
-  if (!rank && deepest[1] > TOLERANCE * c->size) values[7] = deepest[1];
+  if (!rank && deepest > TOLERANCE * c->size) values[7] = deepest;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -33,6 +33,7 @@
 #define STIFFEST 11. /* of the shear modulus: lambda + 2 mu at nu = 0.45 */
 #define TOGGLES 3    /* activations of a node within a step after which it stays active */
 #define PULLING 1e-6 /* tension at which a node is released, over the largest contact force */
+#define EARLY 1e-6   /* of the path of a rebounding node: near misses count as impacts */
 #define INSTANT 1e-3 /* fraction of a step for the difference quotient of the obstacle's velocity */
 #define SETTLED 1e-4 /* tolerance of spring forces, over the largest contact force */
 
@@ -107,7 +108,7 @@ static PetscReal search(const Contact *c, SbSpace space, const PetscReal x[3], T
   PetscReal n[3], at[3], gap;
 
   touch->undecided = PETSC_FALSE;
-  if (SbContactKept(touch)) return SbDot3(touch->n, x) - SbDot3(touch->n, X) - touch->value;
+  if (touch->on && touch->flips > KEPT) return SbDot3(touch->n, x) - SbDot3(touch->n, X) - touch->value;
   gap = SbContactGap(c, &c->to, x, n);
   if (touch->on && touch->valley) {
     SbContactValley(c, space, x, gap, n, touch);
@@ -173,7 +174,8 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
   c->friction.updates = 0;
   c->first = PETSC_TRUE;
   c->impact = 1;
-  SbRestitutionBegin(&c->bounce, dt);
+  c->bounce.left = 1;
+  c->bounce.dt = dt;
   SbOverlapBegin(&c->overlap, dt);
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
@@ -209,7 +211,7 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
       touch->gap0 = PetscMax(0, gap0);
       for (int k = 0; k < 3; k++) v -= n[k] * (v0[3 * touch->node + k] - (x1[k] - x0[k]) / dt);
       touch->approach = PetscMax(0, v);
-      comes = SbRestitutionApproaches(&c->bounce, touch->gap0, v);
+      comes = (PetscBool)(v > 0 && dt * v * (1 + EARLY) >= touch->gap0);
     }
 
     /* the damper of a step of implicit Euler is a stiffer spring and a constant force: k damping (g - g0) /

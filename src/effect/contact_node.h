@@ -6,6 +6,7 @@
 #include "contact.h"
 
 #define TOLERANCE 1e-7 /* tolerance of penetration, over the size of the bodies */
+#define KEPT 24        /* changes of facet after which a node keeps its plane until the end of the step */
 
 /* Friction state of a node. */
 typedef struct {
@@ -89,8 +90,6 @@ PetscBool SbContactFlip(const Contact *c, const PetscReal X[3], const PetscReal 
                         PetscReal n[3], Touch *touch);
 void SbContactValley(const Contact *c, SbSpace space, const PetscReal x[3], PetscReal gap,
                      const PetscReal n[3], Touch *touch);
-/* Whether a node keeps its plane until the end of the step. */
-PetscBool SbContactKept(const Touch *touch);
 
 /*
   Friction (friction.c). Not collective but for Warn. Begin: a step; touches: active at the end of the last

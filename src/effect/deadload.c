@@ -14,9 +14,9 @@
 #include "effect_impl.h"
 
 typedef struct {
-  SbFormula density[3];           /* N/m^3 or Pa */
-  PetscReal total[3], uniform[3]; /* traction: N, and the same per area, Pa */
-  PetscInt ncorner, nitem;        /* 4 for tets, 3 for facets */
+  SbFormula density[3];    /* N/m^3 or Pa */
+  PetscReal uniform[3];    /* traction: total force, N, from set-up on per area, Pa */
+  PetscInt ncorner, nitem; /* 4 for tets, 3 for facets */
   PetscInt *corner;  /* [nitem][ncorner] 4 cell + vertex of it; NULL once a steady load was integrated */
   PetscInt n, *node; /* [n] owned nodes of these cells */
   PetscReal *value;  /* [nnode][3] load at time t, right on owned nodes, N */
@@ -58,7 +58,7 @@ static PetscErrorCode options_traction(SbEffect e, const SbScope *scope)
              "effect %s: give -effect_%s_vector (Pa, three formulas) or -effect_%s_total (N, three numbers)",
              e->name, e->name, e->name);
   PetscCall(SbEffectFormulas(scope, "vector", 3, PETSC_TRUE, load->density, &e->steady));
-  PetscCall(SbOptionReals(scope, "total", load->total));
+  PetscCall(SbOptionReals(scope, "total", load->uniform));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -155,7 +155,7 @@ static PetscErrorCode setup_traction(SbEffect e, SbSpace space)
   }
   PetscCall(PetscFree(facets));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &area, 1, MPIU_REAL, MPI_SUM, space->comm));
-  for (int i = 0; i < 3; i++) load->uniform[i] = load->total[i] / area;
+  for (int i = 0; i < 3; i++) load->uniform[i] /= area;
   PetscCall(set_up(load, space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

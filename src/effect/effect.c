@@ -132,14 +132,6 @@ PetscErrorCode SbEffectDestroy(SbEffect *effect)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactPointsAdd(SbContactPoints *list, const SbContactPoint *point)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbReserve(list->n + 1, sizeof(SbContactPoint), &list->size, &list->point));
-  list->point[list->n++] = *point;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 void SbEffectMarkPrescribed(SbEffect e, PetscInt nset, SbSet set[])
 {
   for (PetscInt i = 0; e->prescribed && i < e->on.n; i++) {

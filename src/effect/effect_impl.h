@@ -1,5 +1,5 @@
 /*
-  effect_impl.h - shared by effects: formulas, paths, selection by sets, contact points.
+  effect_impl.h - shared by effects: formulas, paths, selection by sets.
 */
 #pragma once
 #include "sbeffect.h"
@@ -60,6 +60,3 @@ static inline PetscInt SbCellBasis(SbElement e, const PetscReal L[4], PetscReal 
   }
   return 4;
 }
-
-/* Appends one. Not collective. */
-PetscErrorCode SbContactPointsAdd(SbContactPoints *list, const SbContactPoint *point);

@@ -73,9 +73,7 @@ static PetscErrorCode setup_point_force(SbEffect e, SbSpace space)
     }
   }
   PetscCall(PetscFree2(volume, chosen));
-  for (PetscInt i = 0; i < space->nnode_owned; i++) p->n += node_share[i] != 0;
-  PetscCall(PetscMalloc2(p->n, &p->node, p->n, &p->share));
-  p->n = 0;
+  PetscCall(PetscMalloc2(space->nnode_owned, &p->node, space->nnode_owned, &p->share));
   for (PetscInt i = 0; i < space->nnode_owned; i++) {
     if (node_share[i] == 0) continue;
     p->node[p->n] = i;

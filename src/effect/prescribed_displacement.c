@@ -24,12 +24,12 @@
 #define COMPONENTS "x|y|z|xy|yz|xz|xyz"
 
 typedef struct {
-  int components; /* bits 0..2 */
-  SbPath path;    /* zero: fixed */
-  PetscInt n, nowned,
-    *node;       /* [n] local nodes with unknowns that it prescribes, ascending, owned ones first */
-  uint8_t *bits; /* [n] bit c: component c is prescribed by this effect */
-  PetscInt *row; /* [n] index into space->fixed_node; NULL before the first prescribe_support() */
+  int components;     /* bits 0..2 */
+  SbPath path;        /* zero: fixed */
+  PetscInt n, nowned; /* nodes with unknowns that it prescribes */
+  PetscInt *node;     /* [n] local, ascending, owned ones first */
+  uint8_t *bits;      /* [n] bit c: component c is prescribed by this effect */
+  PetscInt *row;      /* [n] index into space->fixed_node; NULL before the first prescribe_support() */
 } Support;
 
 static const SbOption fixed_rows[] = {

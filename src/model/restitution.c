@@ -12,7 +12,7 @@
   or released if that needs a tensile force; in the next step it is not constrained. Contact forces and
   deformation are solved together, so the whole body bounces if it is stiff relative to its inertia, sqrt(k/m)
   h >> 1. In a soft one e acts only on the neighbourhood of the point, and the body rebounds by its elasticity
-  (Doyen, Ern, Piperno, SIAM J. Sci. Comput. 33, 2011). (src/effect/restitution.h, barrier_restitution.c)
+  (Doyen, Ern, Piperno, SIAM J. Sci. Comput. 33, 2011). (src/effect/contact.h, barrier_springs.c)
 
   Energy. With W = sum h N v+ over these pairs, D = 1/2 |v1 - v0|^2 in the mass norm and S the strain energy,
   a step of implicit Euler gains W - D + C plus the work of the loads, C = S(u1) - S(u0) - f_int(u1) . (u1 -

@@ -12,7 +12,7 @@ static const char *const elements[ELEMENTS] = {"p1", "cr", "dg", "p2"};
 /* End displacement of the bar: n = 4 cells across, then 8 for CR only if nu is large. */
 static PetscErrorCode check_bar(PetscReal nu, PetscReal tip, PetscReal energy)
 {
-  PetscReal value[2];
+  PetscReal value[2] = {0., 0.};
   LockingCost cost;
   char more[256];
 
@@ -38,7 +38,7 @@ static PetscErrorCode check_bar(PetscReal nu, PetscReal tip, PetscReal energy)
 /* u_y at (48,60) and (48,52); edges of 4 m. */
 static PetscErrorCode check_cook(PetscReal nu, PetscReal corner, PetscReal middle)
 {
-  PetscReal value[2];
+  PetscReal value[2] = {0., 0.};
   LockingCost cost;
   char more[256];
 

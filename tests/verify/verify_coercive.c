@@ -159,7 +159,7 @@ static PetscErrorCode pressed(const char *element, const char *law, PetscReal ra
 static PetscErrorCode check_pressed(const char *element, const char *law)
 {
   static const PetscReal ratios[] = {0.5, 1., 2., 5., 10., 50.};
-  PetscReal smallest, reached[2] = {0., 0.};
+  PetscReal smallest = 0., reached[2] = {0., 0.};
 
   PetscFunctionBeginUser;
   for (int stretched = 0; stretched < 2; stretched++) {
