@@ -171,7 +171,7 @@ static inline PetscErrorCode locking_shell_errors(SbModel m, Vec U, PetscReal nu
 {
   const PetscReal at[3] = {1., 0., 0.};
   SbSpace s = m->space;
-  PetscReal sum[2][7] = {{0.}, {0.}}, *sigma, value[3];
+  PetscReal sum[2][7] = {{0.}, {0.}}, *sigma, value[3] = {0., 0., 0.};
   const PetscReal *u;
   PetscInt inside;
 
