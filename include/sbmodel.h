@@ -108,8 +108,8 @@ PetscErrorCode SbModelContactVelocity(SbModel model, PetscReal t, PetscReal dt, 
 /* G = gap of each node along the normal of the closest candidate surface, m, after the step that ended at t
    with the displacement U; 0 where nothing is near. Collective. */
 PetscErrorCode SbModelContactGap(SbModel model, PetscReal t, Vec U, Vec G);
-/* F = contact forces on the nodes, N, after the step that ended at t with the displacement U, for which
-   SbRunReactions() has been called. Collective. */
+/* F = contact forces on the nodes, N, after the step that ended at t with the displacement U, with the
+   reactions of that step known. Collective. */
 PetscErrorCode SbModelContactForce(SbModel model, PetscReal t, Vec U, Vec F);
 /* Appends the active contact points of this rank, after the same step. Collective. */
 PetscErrorCode SbModelContactPoints(SbModel model, PetscReal t, Vec U, SbContactPoints *list);

@@ -181,6 +181,8 @@ PetscErrorCode SbRunSolveTangent(SbRun run, Vec B, Vec X, PetscInt *iterations, 
 PetscErrorCode SbTimeRegister(void); /* option rows and the TSType */
 /* Reads the options -time, -solver, ...; nothing is computed yet. */
 PetscErrorCode SbRunCreate(SbModel model, SbRun *run);
+/* Name of the integrator, e.g. "newmark". */
+void SbRunIntegrator(SbRun run, size_t size, char name[]);
 /* After SbModelSetUp(): vectors, matrix, solver, integrator. Collective. */
 PetscErrorCode SbRunSetUp(SbRun run);
 PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx);

@@ -23,8 +23,10 @@ PetscInt SbJumpCliques(SbSpace space, const PetscInt **node);
 /* The matrix of the face in lane l of batch b, to be multiplied by the 3x3 identity; zero in padding. */
 void SbJumpMatrix(SbSpace space, PetscInt b, PetscInt l, PetscReal K[8][8]);
 
-/* plan.c: sums the current face terms for the matrix. */
-void SbPlanSumFaceTerms(SbSpace space);
+/* Sums the current face terms for the matrix, in the plan. */
+void SbJumpSumTerms(SbSpace space);
+
+/* plan.c */
 PetscErrorCode SbPlanDestroy(SbPlan *plan);
 
 /* tangent.c: the table of SbMatrixSetAssembly(), NULL for a matrix of blocks. */

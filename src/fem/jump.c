@@ -371,6 +371,38 @@ static PetscBool follow(SbSpace s, const PetscReal x[], SbStepsOf steps)
   return any;
 }
 
+void SbJumpSumTerms(SbSpace s)
+{
+  const SbPlan p = s->plan;
+  const PetscInt *nodes, nbatch = SbJumpCliques(s, &nodes);
+
+  for (int q = 0; q < 2; q++) {
+    const PetscInt n = (q ? p->oi : p->di)[s->nnode_owned];
+
+    for (PetscInt k = 0; k < n; k++) p->face_term[q][k] = 0.;
+  }
+  for (PetscInt b = 0; b < nbatch; b++) {
+    for (PetscInt l = 0; l < SB_BATCH; l++) {
+      const PetscInt *node = nodes + (size_t)b * 8 * SB_BATCH + l;
+      PetscReal K[8][8];
+
+      SbJumpMatrix(s, b, l, K);
+      if (K[0][0] == 0.) continue; // padding lanes are zero
+      for (int k = 0; k < 64; k++) {
+        const PetscInt row = node[k / 8 * SB_BATCH], column = node[k % 8 * SB_BATCH];
+        const int q = column >= s->nnode_owned;
+        const PetscInt *j = q ? p->oj : p->dj;
+        PetscInt at;
+
+        if (row >= s->nnode_owned) continue;
+        at = (q ? p->oi : p->di)[row];
+        while (j[at] != column) at++;
+        p->face_term[q][at] += K[k / 8][k % 8];
+      }
+    }
+  }
+}
+
 PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, SbStepsOf steps, PetscBool *changed)
 {
   const PetscBool in_time = (PetscBool)(steps != SB_STEPS_OF_LOAD);
@@ -390,7 +422,7 @@ PetscErrorCode SbSpaceFollowJumps(SbSpace s, Vec U, SbStepsOf steps, PetscBool *
   PetscCall(SbSpaceRestoreLocalRead(s, U, &x));
   if (in_time) mine = any;
   if (changed) PetscCallMPI(MPI_Allreduce(&mine, changed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
-  if (s->plan && any) SbPlanSumFaceTerms(s);
+  if (s->plan && any) SbJumpSumTerms(s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -25,38 +25,6 @@ static inline const PetscInt *slot_group(const Groups *g, PetscInt slot)
   return g->node + slot / (g->nodes * SB_BATCH) * (g->nodes * SB_BATCH) + slot % SB_BATCH;
 }
 
-void SbPlanSumFaceTerms(SbSpace s)
-{
-  const SbPlan p = s->plan;
-  const PetscInt *nodes, nbatch = SbJumpCliques(s, &nodes);
-
-  for (int q = 0; q < 2; q++) {
-    const PetscInt n = (q ? p->oi : p->di)[s->nnode_owned];
-
-    for (PetscInt k = 0; k < n; k++) p->face_term[q][k] = 0.;
-  }
-  for (PetscInt b = 0; b < nbatch; b++) {
-    for (PetscInt l = 0; l < SB_BATCH; l++) {
-      const PetscInt *node = nodes + (size_t)b * 8 * SB_BATCH + l;
-      PetscReal K[8][8];
-
-      SbJumpMatrix(s, b, l, K);
-      if (K[0][0] == 0.) continue; // padding lanes are zero
-      for (int k = 0; k < 64; k++) {
-        const PetscInt row = node[k / 8 * SB_BATCH], column = node[k % 8 * SB_BATCH];
-        const int q = column >= s->nnode_owned;
-        const PetscInt *j = q ? p->oj : p->dj;
-        PetscInt at;
-
-        if (row >= s->nnode_owned) continue;
-        at = (q ? p->oi : p->di)[row];
-        while (j[at] != column) at++;
-        p->face_term[q][at] += K[k / 8][k % 8];
-      }
-    }
-  }
-}
-
 PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
 {
   const PetscInt nrow = s->nnode_owned, ngroup = s->jump ? 2 : 1, w = s->width;
@@ -132,7 +100,7 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
   }
   if (s->jump) {
     PetscCall(PetscMalloc2(p->di[nrow], &p->face_term[0], p->oi[nrow], &p->face_term[1]));
-    SbPlanSumFaceTerms(s);
+    SbJumpSumTerms(s);
   }
   // the rows in the order in which the batches add to them first: the first batch clears a row in the cache
   PetscCall(PetscMalloc2(s->nbatch + 1, &p->fresh_start, nrow, &p->fresh));

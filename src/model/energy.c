@@ -102,29 +102,6 @@ PetscErrorCode SbModelBodySums(SbModel m, Vec U, Vec V, PetscReal sum[][SB_BODY_
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelCentres(SbModel m, Vec U, PetscReal centre[][4])
-{
-  const SbSpace s = m->space;
-  const PetscScalar *u = NULL;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscArrayzero(&centre[0][0], 4 * m->nbody));
-  if (U) PetscCall(VecGetArrayRead(U, &u));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    PetscReal *c = centre[s->node_body[i]];
-
-    c[3] += s->node_mass[i];
-    for (PetscInt k = 0; k < 3; k++)
-      c[k] += s->node_mass[i] * (s->node_x[3 * i + k] + (u ? u[3 * i + k] : 0.));
-  }
-  if (U) PetscCall(VecRestoreArrayRead(U, &u));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, centre, (PetscMPIInt)(4 * m->nbody), MPIU_REAL, MPI_SUM, m->comm));
-  for (PetscInt b = 0; b < m->nbody; b++) {
-    for (PetscInt k = 0; k < 3; k++) centre[b][k] /= centre[b][3];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbModelDampingPower(SbModel m, Vec U, Vec V, PetscReal *power)
 {
   SbEvaluation at = {.U = U, .V = V};

@@ -340,8 +340,6 @@ typedef struct {
   PetscInt64 bytes;
 } SbOutputFileSize;
 PetscErrorCode SbOutputFiles(SbOutput out, PetscInt *n, SbOutputFileSize **files);
-/* Name of the time preset, e.g. "newmark". */
-void SbPresetName(SbRun run, size_t size, char name[]);
 
 /*
   SbCheckpointLoad - state of a run from a file, on any number of ranks. Collective.

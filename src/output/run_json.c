@@ -2,18 +2,11 @@
   run.json: what ran, where, with which settings, how long and how it ended. Written when a run starts (status
   "running") and replaced as a whole when it ends; a run that was killed leaves the first version.
 */
+#include <sys/resource.h>
 #include <time.h>
 #include <unistd.h>
 #include "output_impl.h"
 #include "sbsolver.h"
-
-void SbPresetName(SbRun run, size_t size, char name[])
-{
-  const char *word = SbIntegrators;
-
-  for (int i = 0; i < (int)run->preset; i++) word = strchr(word, '|') + 1;
-  (void)snprintf(name, size, "%.*s", (int)strcspn(word, "|"), word);
-}
 
 /* A JSON string with its quotes. */
 static void put_string(FILE *f, const char *text)
@@ -54,7 +47,7 @@ static PetscErrorCode put_settings(FILE *f, SbRun run)
   char *options;
 
   PetscFunctionBeginUser;
-  SbPresetName(run, sizeof(name), name);
+  SbRunIntegrator(run, sizeof(name), name);
   put_text(f, "time", name);
   put_text(f, "solver", run->solver);
   put_text(f, "solver_reason", run->solver_reason);
@@ -189,6 +182,35 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
   PetscCall(SbOutputPath(out, "run.json", sizeof(path), path));
   SbFileReplace(path, 1, &(SbChunk){text, size}, message);
   free(text);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *p)
+{
+  static const char *const names[SB_PHASE_COUNT] = {"mesh",         "set-up",  "residual",       "tangent",
+                                                    "linear solve", "contact", "contact search", "energies",
+                                                    "output",       "other"};
+  PetscReal mine[SB_PHASE_COUNT], most[SB_PHASE_COUNT], memory, cpu;
+  struct rusage usage;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbLogSeconds(mine));
+  PetscCall(PetscTime(&p->total));
+  p->total -= out->wall_start;
+  mine[SB_PHASE_OTHER] = p->total;
+  PetscCallMPI(MPI_Allreduce(mine, most, SB_PHASE_COUNT, MPIU_REAL, MPI_MAX, out->comm));
+  p->total = most[SB_PHASE_OTHER];
+  for (int i = 0; i < SB_PHASE_OTHER; i++) most[SB_PHASE_OTHER] -= most[i];
+  for (int i = 0; i < SB_PHASE_COUNT; i++) {
+    p->phase[i].name = names[i];
+    p->phase[i].seconds = PetscMax(most[i], 0.);
+  }
+  cpu = SB_CPU_SECONDS - out->cpu_start;
+  PetscCallMPI(MPI_Allreduce(&cpu, &p->cpu, 1, MPIU_REAL, MPI_MAX, out->comm));
+  (void)getrusage(RUSAGE_SELF, &usage);
+  memory = 1024. * (PetscReal)usage.ru_maxrss;
+  PetscCallMPI(MPI_Allreduce(&memory, &p->memory_max, 1, MPIU_REAL, MPI_MAX, out->comm));
+  PetscCallMPI(MPI_Allreduce(&memory, &p->memory_sum, 1, MPIU_REAL, MPI_SUM, out->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

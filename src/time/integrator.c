@@ -20,6 +20,14 @@
 #define NAMES "euler_implicit|newmark|genalpha|euler_symplectic|euler_explicit|alpha2|static"
 const char *const SbIntegrators = NAMES;
 
+void SbRunIntegrator(SbRun run, size_t size, char name[])
+{
+  const char *word = SbIntegrators;
+
+  for (int i = 0; i < (int)run->preset; i++) word = strchr(word, '|') + 1;
+  SbFormat(size, name, "%.*s", (int)strcspn(word, "|"), word);
+}
+
 static const SbOption rows[] = {
   {"time", SB_OPTION_CHOICE, 1, "", "euler_implicit", NAMES, "time integrator, or static equilibrium"},
   {"ts_dt", SB_OPTION_REAL, 1, "s", "0.01", "(0, inf)",

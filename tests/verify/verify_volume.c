@@ -36,7 +36,7 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   for (int e = 0; e < 3; e++) {
     for (int k = 0; k < 2; k++) {
-      PetscReal value[3];
+      PetscReal value[3] = {0., 0., 0.};
       LockingCost cost;
       char more[256];
 
