@@ -205,7 +205,7 @@ static PetscErrorCode read_curved(const File *f, int layout)
   Array edges = {
     .name = "/mesh/curved_edges", .klass = H5T_INTEGER, .ncomp = 2, .bound = f->nvert, .block = PETSC_TRUE};
   Array off = {.name = "/mesh/edge_offsets", .klass = H5T_FLOAT, .ncomp = 3, .block = PETSC_TRUE};
-  PetscInt n = -1, *end;
+  PetscInt n = -1, noff = -1, *end;
   PetscReal *x;
 
   PetscFunctionBeginUser;
@@ -218,7 +218,10 @@ static PetscErrorCode read_curved(const File *f, int layout)
   }
   if (layout == 1) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(read_array(f, &edges, &n, &end));
-  PetscCall(read_array(f, &off, &n, &x));
+  PetscCall(read_array(f, &off, &noff, &x));
+  if (edges.rows.N != off.rows.N)
+    H5_ERROR(f, "%s has %lld rows; %lld are needed to fit %s", off.name, (long long)off.rows.N,
+             (long long)edges.rows.N, edges.name);
   PetscCall(PetscMalloc1(n, &im->middle));
   im->nmiddle = (SbCount){n, n};
   for (PetscInt i = 0; i < n; i++) {
