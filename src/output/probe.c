@@ -89,12 +89,12 @@ static PetscErrorCode read_probe(SbProbe *probe, PetscBool dynamic)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbProbesSetFromOptions(SbOutput out, const SbScope *scope, PetscBool dynamic)
+PetscErrorCode SbProbesSetFromOptions(SbOutput out, PetscBool dynamic)
 {
   char(*names)[SB_NAME_MAX];
 
   PetscFunctionBeginUser;
-  PetscCall(SbOptionNames(scope, "probes", &out->nprobe, &names));
+  PetscCall(SbOptionNames(&SbRunScope, "probes", &out->nprobe, &names));
   PetscCall(PetscCalloc1(out->nprobe, &out->probe));
   for (PetscInt p = 0; p < out->nprobe; p++) {
     PetscCall(PetscStrncpy(out->probe[p].name, names[p], SB_NAME_MAX));
@@ -117,31 +117,11 @@ PetscErrorCode SbProbesDestroy(SbOutput out)
 
 /* ------------------------------------------------------------------ columns */
 
-PetscInt SbProbesCount(SbOutput out)
-{
-  PetscInt n = 0;
-
-  for (PetscInt p = 0; p < out->nprobe; p++)
-    for (PetscInt i = 0; i < out->probe[p].nfield; i++) n += out->probe[p].field[i]->ncomp;
-  return n;
-}
-
-PetscErrorCode SbProbesColumn(SbOutput out, PetscInt c, size_t size, char name[], const char **unit)
+PetscErrorCode SbProbesColumn(const SbProbe *probe, const SbField *f, PetscInt c, size_t size, char name[])
 {
   static const char *const tensor[] = {"xx", "xy", "xz", "yy", "yz", "zz"}, *const axis[] = {"x", "y", "z"};
-  const SbProbe *probe = out->probe;
-  const SbField *f = probe->field[0];
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 1; c >= f->ncomp; i++) {
-    c -= f->ncomp;
-    if (i == probe->nfield) {
-      probe++;
-      i = 0;
-    }
-    f = probe->field[i];
-  }
-  *unit = f->unit;
   if (f->ncomp == 1)
     PetscCall(PetscSNPrintf(name, size, "%s_%s", probe->name, f->name));
   else if (!strcmp(f->name, "displacement"))
