@@ -8,26 +8,10 @@
 #include <signal.h>
 #include "tool/tool.h"
 
-static PetscErrorCode work(int argc, char *argv[], const SbToolLine *line)
-{
-  SbTool tool;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbToolRegister());
-  if (line->help) {
-    PetscCall(SbToolHelp());
-  } else if (line->version) {
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "supple-mesh %s\n", SB_VERSION));
-  } else {
-    PetscCall(SbToolSetFromOptions(argc, argv, line, &tool));
-    PetscCall(SbToolRun(&tool));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode supple_mesh(int argc, char *argv[])
 {
   SbToolLine line;
+  SbTool tool;
 
   PetscFunctionBeginUser;
   PetscCall(SbErrorHandlerInstall());
@@ -37,7 +21,15 @@ static PetscErrorCode supple_mesh(int argc, char *argv[])
   SbMemoryReturnLarge();
   (void)SbThreadsSetOne();
   (void)signal(SIGPIPE, SIG_IGN);
-  PetscCall(work(argc, argv, &line));
+  PetscCall(SbToolRegister());
+  if (line.help) {
+    PetscCall(SbToolHelp());
+  } else if (line.version) {
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "supple-mesh %s\n", SB_VERSION));
+  } else {
+    PetscCall(SbToolSetFromOptions(argc, argv, &line, &tool));
+    PetscCall(SbToolRun(&tool));
+  }
   PetscCall(SbOptionsReset());
   PetscCall(PetscFinalize());
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -47,17 +47,12 @@ static void path_of(const File *f, const char *name, char path[256])
   (void)snprintf(path, 256, "%s%s", mesh ? f->mesh : "", mesh ? name + strlen("/mesh") : name);
 }
 
-/* Whether an object and all groups on its path exist. */
+/* Whether an object exists; without a group on its path HDF5 fails. */
 static PetscBool is_there(const File *f, const char *name)
 {
-  char path[256], part[256];
+  char path[256];
 
   path_of(f, name, path);
-
-  for (const char *p = strchr(path + 1, '/'); p; p = strchr(p + 1, '/')) {
-    (void)snprintf(part, sizeof(part), "%.*s", (int)(p - path), path);
-    if (H5Lexists(f->file, part, H5P_DEFAULT) <= 0) return PETSC_FALSE;
-  }
   return (PetscBool)(H5Lexists(f->file, path, H5P_DEFAULT) > 0);
 }
 

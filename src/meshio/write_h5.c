@@ -1,14 +1,6 @@
 /*
   write_h5.c - writer of supple's own mesh, HDF5, and its .xmf for ParaView. Layout: docs/reference/meshes.md.
 
-    /                attribute supple_mesh: version of the layout, 1; 2 with curved edges /mesh/x
-    [nvert][3]   double   coordinates /mesh/cells      [ntet][4]    int32    vertices, from 0 /mesh/cell_tags
-    [ntet]       int32    tag set of each tet /mesh/triangles  [n][3], /mesh/triangle_tags [n]; lines [n][2],
-    line_tags; points [n][1], point_tags /mesh/curved_edges [n][2] int32: vertices of curved edges;
-    /mesh/edge_offsets [n][3] double: offset of the edge node from the midpoint /groups/name     [ngroup]
-    text, /groups/dim [ngroup] int32, /groups/number [ngroup] int64 /tag_sets/start  [nset + 1] int32,
-    /tag_sets/group: groups of set k are group[start[k]] .. group[start[k + 1] - 1]
-
   Written by one rank in one piece, without compression: reading is limited by the disk only.
 */
 #include <errno.h>

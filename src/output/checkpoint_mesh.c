@@ -119,9 +119,9 @@ static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_
   SbH5GetInt(group, "sum", &sum, ok);
   for (int k = 0; k < NCOUNT; k++) count[k] = *ok ? (PetscInt)n[k] : 0;
   /* counts must agree with the sizes of the datasets before anything is allocated */
-  *ok = (PetscBool)(*ok && SbH5Rows(group, "x") == n[0] && SbH5Rows(group, "cells") == n[1] &&
-                    (!n[2] || SbH5Rows(group, "triangles") == n[2]) &&
-                    (!n[3] || SbH5Rows(group, "curved_edges") == n[3]));
+  *ok = (PetscBool)(*ok && SbH5Rows(group, "x", NULL) == n[0] && SbH5Rows(group, "cells", NULL) == n[1] &&
+                    (!n[2] || SbH5Rows(group, "triangles", NULL) == n[2]) &&
+                    (!n[3] || SbH5Rows(group, "curved_edges", NULL) == n[3]));
   if (*ok) {
     PetscCall(SbMemoryMeshCreate(count[0], count[1], count[2], count[3], in_memory));
     (*in_memory)->step = (PetscInt)step;

@@ -37,13 +37,6 @@ static const struct {
 };
 #define NTABLE ((int)PETSC_STATIC_ARRAY_LENGTH(table))
 
-struct _p_SbContacts {
-  SbContactPoints list;  /* of this rank */
-  SbContactPoint *point; /* [share.n] of this rank's share, sorted */
-  SbOrder share;         /* which rows are this rank's; it has no star forest */
-  PetscReal *column;     /* [share.n][3] of one quantity */
-};
-
 /* ------------------------------------------------------------------ to the ranks that write them */
 
 static int by_keys(const void *a, const void *b)
@@ -59,7 +52,7 @@ static int by_keys(const void *a, const void *b)
 
 PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt *n, PetscInt64 *bytes)
 {
-  SbContacts c = out->contacts;
+  SbContacts *c = &out->contacts;
   PetscInt bound = 0;
   PetscMPIInt *dest;
   SbRoute route;
@@ -99,7 +92,7 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
 
 PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame)
 {
-  SbContacts c = out->contacts;
+  SbContacts *c = &out->contacts;
   hid_t group;
 
   PetscFunctionBeginUser;
@@ -148,7 +141,7 @@ void SbContactsRead(hid_t frame, PetscInt *n, PetscInt *bytes)
   if (group < 0) return;
   SbH5GetInt(group, "count", &count, &ok);
   if (ok) *n = (PetscInt)count;
-  if (ok && count) *bytes = SbH5NumberBytes(group, "gap");
+  if (ok && count) (void)SbH5Rows(group, "gap", bytes);
   (void)H5Gclose(group);
 }
 
@@ -175,14 +168,11 @@ PetscErrorCode SbContactsCreate(SbRun run, SbOutput out)
 {
   const SbMesh mesh = run->model->mesh;
   PetscReal nowhere[3] = {0., 0., 0.}; /* position of the dummy point of a frame without contact */
-  SbContacts c;
 
   PetscFunctionBeginUser;
   // After a restart frames that are kept may have contact points, which stay in the index.
   if (!out->contact_points && !out->restarted) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscNew(&c));
-  out->contacts = c;
-  c->share.comm = out->comm;
+  out->contacts.share.comm = out->comm;
   if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 3 && mesh->nvert; k++) nowhere[k] = mesh->x[k];
   PetscCall(SbIndexCreate(out, "contacts", nowhere, &out->contact_index));
@@ -191,14 +181,10 @@ PetscErrorCode SbContactsCreate(SbRun run, SbOutput out)
 
 PetscErrorCode SbContactsDestroy(SbOutput out)
 {
-  SbContacts c = out->contacts;
-
   PetscFunctionBeginUser;
-  if (!c) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbIndexDestroy(&out->contact_index));
-  PetscCall(PetscFree(c->list.point));
-  PetscCall(PetscFree(c->point));
-  PetscCall(PetscFree(c->column));
-  PetscCall(PetscFree(out->contacts));
+  PetscCall(PetscFree(out->contacts.list.point));
+  PetscCall(PetscFree(out->contacts.point));
+  PetscCall(PetscFree(out->contacts.column));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -50,29 +50,22 @@ static PetscErrorCode reaction(const SbField *f, SbRun run, const SbStep *step, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode contact_force(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
+/* Force, or gap: of obstacles and other bodies. */
+static PetscErrorCode contact(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
 {
-  Vec F;
+  const SbOutput out = (SbOutput)run->output;
+  Vec x;
 
   PetscFunctionBeginUser;
-  (void)f;
-  PetscCall(VecDuplicate(step->U, &F));
-  PetscCall(SbModelContactForce(run->model, step->t, step->U, F));
-  PetscCall(SbPointsForces(run, (SbOutput)run->output, PETSC_FALSE, F, values));
-  PetscCall(VecDestroy(&F));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode contact_gap(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
-{
-  Vec G;
-
-  PetscFunctionBeginUser;
-  (void)f;
-  PetscCall(VecDuplicate(step->U, &G));
-  PetscCall(SbModelContactGap(run->model, step->t, step->U, G));
-  PetscCall(SbPointsValues(run, (SbOutput)run->output, G, values));
-  PetscCall(VecDestroy(&G));
+  PetscCall(VecDuplicate(step->U, &x));
+  if (!strcmp(f->name, "contact_force")) {
+    PetscCall(SbModelContactForce(run->model, step->t, step->U, x));
+    PetscCall(SbPointsForces(run, out, PETSC_FALSE, x, values));
+  } else {
+    PetscCall(SbModelContactGap(run->model, step->t, step->U, x));
+    PetscCall(SbPointsValues(run, out, x, values));
+  }
+  PetscCall(VecDestroy(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -95,16 +88,6 @@ static PetscErrorCode cell_state(const SbField *f, SbRun run, const SbStep *step
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode scalar(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
-{
-  const PetscReal *state = NULL;
-
-  PetscFunctionBeginUser;
-  PetscCall(cell_state(f, run, step, &state));
-  PetscCall(PetscArraycpy(values, state, run->model->mesh->ncell_owned));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static void stress(const PetscReal s[6], PetscReal value[])
 {
   static const int position[6] = {0, 3, 5, 1, 4, 2}; // from xx yy zz xy yz xz to xx xy xz yy yz zz
@@ -124,15 +107,22 @@ static void mean_pressure(const PetscReal s[6], PetscReal value[])
   value[0] = -(s[0] + s[1] + s[2]) / 3.;
 }
 
-/* A function of the Cauchy stress, f->of_stress. */
-static PetscErrorCode of_stress(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
+/* The value in one cell, from that state: itself, or the function of the Cauchy stress. */
+static void in_cell(const SbField *f, const PetscReal state[], PetscInt cell, PetscReal value[])
 {
-  const PetscReal *sigma = NULL;
+  if (f->of_stress)
+    (*f->of_stress)(state + 6 * cell, value);
+  else
+    value[0] = state[cell];
+}
+
+static PetscErrorCode of_state(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
+{
+  const PetscReal *state = NULL;
 
   PetscFunctionBeginUser;
-  PetscCall(cell_state(f, run, step, &sigma));
-  for (PetscInt c = 0; c < run->model->mesh->ncell_owned; c++)
-    (*f->of_stress)(sigma + 6 * c, values + f->ncomp * c);
+  PetscCall(cell_state(f, run, step, &state));
+  for (PetscInt c = 0; c < run->model->mesh->ncell_owned; c++) in_cell(f, state, c, values + f->ncomp * c);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -175,18 +165,18 @@ static const SbField table[] = {
   {"acceleration", "m/s^2", 3, VERTEX, VARIES, DYNAMIC, "acceleration, state of the integrator", vector,
    STEP(A)},
   {"reaction", "N", 3, VERTEX, VARIES, ALWAYS, "force of a support on the body", .compute = reaction},
-  {"contact_force", "N", 3, VERTEX, VARIES, ALWAYS, "force of contact on the body", .compute = contact_force},
+  {"contact_force", "N", 3, VERTEX, VARIES, ALWAYS, "force of contact on the body", .compute = contact},
   {"contact_gap", "m", 3, VERTEX, VARIES, ALWAYS,
    "from the nearest point of what it may touch, along the normal there; 0: nothing near",
-   .compute = contact_gap},
-  {"stress", "Pa", 6, CELL, VARIES, ALWAYS, "Cauchy stress", of_stress, STATE(sigma), stress},
-  {"von_mises", "Pa", 1, CELL, VARIES, ALWAYS, "von Mises stress", of_stress, STATE(sigma), von_mises},
+   .compute = contact},
+  {"stress", "Pa", 6, CELL, VARIES, ALWAYS, "Cauchy stress", of_state, STATE(sigma), stress},
+  {"von_mises", "Pa", 1, CELL, VARIES, ALWAYS, "von Mises stress", of_state, STATE(sigma), von_mises},
   {"pressure", "Pa", 1, CELL, VARIES, ALWAYS, "pressure of the law, -lambda times its change of volume",
-   scalar, STATE(pressure)},
+   of_state, STATE(pressure)},
   {"mean_pressure", "Pa", 1, CELL, VARIES, ALWAYS, "minus a third of the trace of the Cauchy stress",
-   of_stress, STATE(sigma), mean_pressure},
-  {"J", "1", 1, CELL, VARIES, ALWAYS, "volume ratio det F", scalar, STATE(J)},
-  {"energy_density", "J/m^3", 1, CELL, VARIES, ALWAYS, "strain energy per rest volume", scalar, STATE(psi)},
+   of_state, STATE(sigma), mean_pressure},
+  {"J", "1", 1, CELL, VARIES, ALWAYS, "volume ratio det F", of_state, STATE(J)},
+  {"energy_density", "J/m^3", 1, CELL, VARIES, ALWAYS, "strain energy per rest volume", of_state, STATE(psi)},
   {"space_error", "J/m^3", 1, CELL, VARIES, ALWAYS,
    "energy of the estimated error of the mesh per rest volume; needs -ledger", .compute = space_error},
   {"body", "1", 1, CELL, CONSTANT, ALWAYS, "number of the body, always written", .compute = number},
@@ -222,8 +212,7 @@ PetscErrorCode SbFieldFind(const char *option, const char *name, const SbField *
 
 PetscBool SbFieldIsProbed(const SbField *f)
 {
-  return (PetscBool)(f->compute == vector || f->compute == position || f->compute == scalar ||
-                     f->compute == of_stress);
+  return (PetscBool)(f->compute == vector || f->compute == position || f->compute == of_state);
 }
 
 PetscErrorCode SbFieldAddCells(const SbField *f, SbRun run, const SbStep *step, const SbSum *cells,
@@ -234,13 +223,9 @@ PetscErrorCode SbFieldAddCells(const SbField *f, SbRun run, const SbStep *step, 
   PetscFunctionBeginUser;
   PetscCall(cell_state(f, run, step, &state));
   for (PetscInt i = 0; i < cells->n; i++) {
-    const PetscInt cell = cells->item[i].number;
     PetscReal here[6] = {0.};
 
-    if (f->of_stress)
-      (*f->of_stress)(state + 6 * cell, here);
-    else
-      here[0] = state[cell];
+    in_cell(f, state, cells->item[i].number, here);
     for (PetscInt k = 0; k < f->ncomp; k++) value[k] += cells->item[i].weight * here[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -249,16 +234,16 @@ PetscErrorCode SbFieldAddCells(const SbField *f, SbRun run, const SbStep *step, 
 PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out, const SbField *f)
 {
   const PetscInt n = run->model->mesh->ncell_owned;
-  const PetscBool forces = (PetscBool)(f->compute == reaction || f->compute == contact_force);
+  const PetscBool forces = (PetscBool)(f->compute == reaction || !strcmp(f->name, "contact_force"));
 
   PetscFunctionBeginUser;
   PetscCheck(f->compute != space_error || run->cell_error, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-output_fields space_error needs its estimate: give -ledger yes, too");
   /* the array of the cells' state that this field needs */
-  if (f->compute == scalar || f->compute == of_stress) {
+  if (f->compute == of_state) {
     PetscReal **state = (PetscReal **)((char *)out + f->from);
 
-    if (!*state) PetscCall(PetscMalloc1((f->compute == of_stress ? 6 * n : n), state));
+    if (!*state) PetscCall(PetscMalloc1(f->of_stress ? 6 * n : n, state));
   }
   /* weights of nodes at vertices; forces also need the residual of each step */
   if (forces) run->want_residual = PETSC_TRUE;

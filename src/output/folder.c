@@ -243,24 +243,20 @@ static PetscErrorCode keep_earlier(SbOutput out)
 
 PetscErrorCode SbFolderClear(SbOutput out, PetscInt step0)
 {
-  char name[SB_FILE_MAX], path[PETSC_MAX_PATH_LEN];
+  char path[PETSC_MAX_PATH_LEN + 8];
 
   PetscFunctionBeginUser;
-  /* temporary files of an aborted run */
-  PetscCall(SbOutputPath(out, "checkpoint.tmp", sizeof(path), path));
-  (void)unlink(path);
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++) {
-    (void)snprintf(name, sizeof(name), "%s.tmp", ours[i]);
-    PetscCall(SbOutputPath(out, name, sizeof(path), path));
-    (void)unlink(path);
-  }
   if (!out->restarted && !out->overwrite) PetscCall(keep_earlier(out));
 
   // Later checkpoints would be taken for the latest ones.
   PetscCall(SbCheckpointPrune(out, out->restarted ? step0 : -1, PETSC_MAX_INT));
-  if (out->restarted) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbOutputPath(out, "checkpoint.tmp", sizeof(path), path));
+  (void)unlink(path);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++) {
-    PetscCall(SbOutputPath(out, ours[i], sizeof(path), path));
+    PetscCall(SbOutputPath(out, ours[i], PETSC_MAX_PATH_LEN, path));
+    if (!out->restarted) (void)unlink(path);
+    // temporary files of an aborted run
+    PetscCall(PetscStrlcat(path, ".tmp", sizeof(path)));
     (void)unlink(path);
   }
   PetscFunctionReturn(PETSC_SUCCESS);

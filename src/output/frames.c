@@ -382,8 +382,9 @@ static herr_t list_frame(hid_t top, const char *name, const H5L_info_t *info, vo
   frame->mesh = (PetscInt)mesh;
   frame->n = 0;
   for (PetscInt i = 0; i < n; i++) {
-    const PetscInt bytes = SbH5NumberBytes(group, fields[i].name);
+    PetscInt bytes;
 
+    (void)SbH5Rows(group, fields[i].name, &bytes);
     if (bytes) frame->values[frame->n++] = values_of(&fields[i], bytes);
   }
   SbContactsRead(group, &frame->npoint, &frame->point_bytes);
@@ -496,31 +497,12 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
 
 /* ------------------------------------------------------------------ life */
 
-/* Work arrays, whose sizes are those of the mesh. */
-static PetscErrorCode allocate(SbRun run, SbOutput out)
-{
-  SbFrames fr = out->frames;
-  PetscInt most = 1,
-           wide = out->place ? SB_CELL_NODES + 1 : 4; /* components of a cell field; points of a cell */
-  PetscInt nowned, nslice;
-
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < out->nfield; i++)
-    if (out->field[i]->cell) most = PetscMax(most, out->field[i]->ncomp);
-  wide = PetscMax(wide, most);
-  nowned = PetscMax(3 * out->point.nowned, wide * out->cell.nowned);
-  nslice = PetscMax(PetscMax(3 * out->point.n, wide * out->cell.n), most * out->tet.n);
-  PetscCall(PetscFree2(fr->owned, fr->slice));
-  PetscCall(PetscMalloc2(nowned, &fr->owned, nslice, &fr->slice));
-  for (PetscInt i = 0; i < out->nfield; i++) PetscCall(SbFieldPrepare(run, out, out->field[i]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
 {
   char path[PETSC_MAX_PATH_LEN];
   SbFrames fr = out->frames;
-  PetscBool has; /* the file has the mesh */
+  PetscBool has;           /* the file has the mesh */
+  PetscInt most = 1, wide; /* components of a cell field; points of a cell */
 
   PetscFunctionBeginUser;
   if (!out->nfield) PetscFunctionReturn(PETSC_SUCCESS);
@@ -546,7 +528,15 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
   }
 
   /* work arrays and monitor for the mesh, which is written if it is new */
-  PetscCall(allocate(run, out));
+  for (PetscInt i = 0; i < out->nfield; i++) {
+    if (out->field[i]->cell) most = PetscMax(most, out->field[i]->ncomp);
+    PetscCall(SbFieldPrepare(run, out, out->field[i]));
+  }
+  wide = PetscMax(most, out->place ? SB_CELL_NODES + 1 : 4);
+  PetscCall(PetscFree2(fr->owned, fr->slice));
+  PetscCall(PetscMalloc2(PetscMax(3 * out->point.nowned, wide * out->cell.nowned), &fr->owned,
+                         PetscMax(PetscMax(3 * out->point.n, wide * out->cell.n), most * out->tet.n),
+                         &fr->slice));
   if (out->contact_points) run->want_residual = PETSC_TRUE;
   if (!has) {
     PetscCall(write_mesh(run, out));

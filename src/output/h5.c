@@ -8,12 +8,15 @@
   - Such a group keeps its links in its own object header, in the old format (no checksum), with room for all
     of them from the start: at most 4096 bytes, aligned to 4096 bytes. Naming a frame is one write in a page.
   - The superblock (96 bytes) is one write within one page, too. It says where the file ends, and a file that
-    ends earlier counts as truncated: SbFileReserve() makes it longer than a frame needs before the frame.
+    ends earlier counts as truncated: SbH5Reserve() makes it longer than a frame needs before the frame.
 
   Reference: HDF5 File Format Specification Version 3.0, sections II.A (superblock version 0), IV.A.1.a
   (object header version 1), IV.A.2.g (link message). The old format is asked for explicitly; newer ones would
   write checksums and flags that mark the file as being in use.
 */
+#include <errno.h>
+#include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include "output_impl.h"
 
@@ -137,9 +140,30 @@ PetscErrorCode SbH5Flush(SbH5 *h)
 
 PetscErrorCode SbH5Reserve(SbH5 *h, PetscInt64 bytes)
 {
+  PetscMPIInt rank;
+  char message[SB_MESSAGE_MAX] = "";
+
   PetscFunctionBeginUser;
   h->bytes = bytes;
-  PetscCall(SbFileReserve(h->comm, h->path, bytes));
+  PetscCallMPI(MPI_Comm_rank(h->comm, &rank));
+  if (!rank) {
+    const int fd = open(h->path, O_WRONLY | O_CREAT, 0666);
+    struct stat info;
+    int error = errno;
+
+    if (fd >= 0) {
+      error = fstat(fd, &info) ? errno : posix_fallocate(fd, info.st_size, (off_t)bytes);
+      // What was reserved before the disk was full goes back, so that other files can be ended properly.
+      if (error && ftruncate(fd, info.st_size)) error = errno;
+      (void)close(fd);
+    }
+    // A file system that cannot reserve is not full.
+    if (error && (fd < 0 || (error != EINVAL && error != EOPNOTSUPP && error != ENOSYS))) {
+      SbFormat(sizeof(message), message, "cannot write %" PetscInt64_FMT " bytes to %s: %s; " SB_NO_ROOM,
+               bytes, h->path, strerror(error));
+    }
+  }
+  PetscCall(SbAgree(h->comm, PETSC_ERR_FILE_WRITE, message));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -250,22 +274,13 @@ static hid_t open_dataset(hid_t where, const char *name, hsize_t n[2])
   return dataset;
 }
 
-PetscInt SbH5NumberBytes(hid_t where, const char *name)
+PetscInt64 SbH5Rows(hid_t where, const char *name, PetscInt *bytes)
 {
   hsize_t n[2];
   const hid_t dataset = open_dataset(where, name, n), type = dataset < 0 ? -1 : H5Dget_type(dataset);
-  const size_t bytes = dataset < 0 ? 0 : H5Tget_size(type);
 
+  if (bytes) *bytes = dataset < 0 ? 0 : (PetscInt)H5Tget_size(type);
   if (dataset >= 0) (void)H5Tclose(type);
-  if (dataset >= 0) (void)H5Dclose(dataset);
-  return (PetscInt)bytes;
-}
-
-PetscInt64 SbH5Rows(hid_t where, const char *name)
-{
-  hsize_t n[2];
-  const hid_t dataset = open_dataset(where, name, n);
-
   if (dataset >= 0) (void)H5Dclose(dataset);
   return (PetscInt64)n[0];
 }

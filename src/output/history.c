@@ -119,9 +119,13 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
     for (PetscInt c = 0; c < effect->ncolumn; c++)
       put_column(line, unit_of(effect->column[c]), ",%s_%s", effect->name, effect->column[c]);
   }
-  for (PetscInt i = 0; i < h->nprobe; i++) {
-    PetscCall(SbProbesColumn(out, i, sizeof(name), name, &unit));
-    put_column(line, unit, ",%s", name);
+  for (const SbProbe *probe = out->probe; probe < out->probe + out->nprobe; probe++) {
+    for (PetscInt i = 0; i < probe->nfield; i++) {
+      for (PetscInt c = 0; c < probe->field[i]->ncomp; c++) {
+        PetscCall(SbProbesColumn(probe, probe->field[i], c, sizeof(name), name));
+        put_column(line, probe->field[i]->unit, ",%s", name);
+      }
+    }
   }
   for (PetscInt i = 0; i < nbody * SB_BODY_SUMS; i++)
     put_column(line, body_columns[i % SB_BODY_SUMS].unit, ",%s_%s", run->model->body[i / SB_BODY_SUMS].name,
@@ -270,7 +274,7 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, char message[SB_MESSAGE
         if (step > run->step0) break;
         h->last_step = (PetscInt)step;
       }
-      SbFileReplace(h->path, 1, &(SbChunk){text, (size_t)(line - text)}, message);
+      SbFileReplace(h->path, text, (size_t)(line - text), message);
       kept = PETSC_TRUE;
     }
     PetscCall(PetscFree(text));
@@ -308,7 +312,8 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
     h->fd = -1;
     h->last_step = -1;
     for (PetscInt e = 0; e < model->nhistory; e++) h->nextra += model->history[e]->ncolumn;
-    h->nprobe = SbProbesCount(out);
+    for (PetscInt p = 0; p < out->nprobe; p++)
+      for (PetscInt i = 0; i < out->probe[p].nfield; i++) h->nprobe += out->probe[p].field[i]->ncomp;
     h->nextra += h->nprobe + (out->history_bodies ? SB_BODY_SUMS * model->nbody : 0);
     PetscCall(PetscMalloc3(h->nextra + 1, &h->mine, h->nextra + 1, &h->sum, model->nbody, &h->mass));
     PetscCall(SbOutputPath(out, "history.csv", sizeof(h->path), h->path));

@@ -21,6 +21,9 @@ PetscErrorCode SbIndexCreate(SbOutput out, const char *name, const PetscReal *no
   if (nowhere) PetscCall(PetscArraycpy(x->nowhere, nowhere, 3));
   x->file = open_memstream(&x->text, &x->size);
   PetscCheck(x->file, PETSC_COMM_SELF, PETSC_ERR_MEM, "No memory for %s", x->xmf);
+  (void)fputs("<?xml version=\"1.0\" ?>\n<Xdmf Version=\"3.0\">\n<Domain>\n"
+              "<Grid Name=\"frames\" GridType=\"Collection\" CollectionType=\"Temporal\">\n",
+              x->file);
   *index = x;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -114,7 +117,7 @@ PetscErrorCode SbIndexSetMesh(SbIndex x, hid_t file, PetscInt step)
     mesh >= 0 && H5Lexists(mesh, "cells10", H5P_DEFAULT) > 0 && H5Lexists(mesh, "parent", H5P_DEFAULT) <= 0
       ? 10
       : 4;
-  PetscCall(add_part(x, (PetscInt)SbH5Rows(mesh, "x"), (PetscInt)SbH5Rows(mesh, "cells"), group));
+  PetscCall(add_part(x, (PetscInt)SbH5Rows(mesh, "x", NULL), (PetscInt)SbH5Rows(mesh, "cells", NULL), group));
   if (mesh >= 0) (void)H5Literate(mesh, H5_INDEX_NAME, H5_ITER_INC, NULL, list_array, &list);
   if (mesh >= 0) (void)H5Gclose(mesh);
   PetscCall(list.ierr);

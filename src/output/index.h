@@ -37,7 +37,7 @@ struct _p_SbIndex {
     PetscInt part;
   } * frame;
   SbArray *array;
-  FILE *file; /* xdmf.c: grids so far, in memory: text[size] once it is flushed */
+  FILE *file; /* xdmf.c: head and grids so far, in memory: text[size] once it is flushed */
   char *text;
   size_t size;
   PetscInt nwritten; /* vtkhdf.c: frames that the file on disk has */

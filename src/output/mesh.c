@@ -181,7 +181,6 @@ PetscInt SbOutputMeshStep(SbRun run)
 
 const char *SbOutputMeshName(PetscInt step, char name[SB_MESH_NAME])
 {
-  SbFormat(SB_MESH_NAME, name, "mesh");
-  if (step) SbAppend(SB_MESH_NAME, name, "_%06" PetscInt_FMT, step);
+  SbFormat(SB_MESH_NAME, name, step ? "mesh_%06" PetscInt_FMT : "mesh", step);
   return name;
 }

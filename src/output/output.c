@@ -145,7 +145,7 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
   PetscCall(SbOptionInt(&SbRunScope, "checkpoint_every_steps", &out->checkpoint_every_steps));
   PetscCall(SbOptionInt(&SbRunScope, "checkpoint_keep", &out->checkpoint_keep));
   PetscCall(SbOptionString(&SbRunScope, "restart", sizeof(out->restart), out->restart));
-  PetscCall(SbProbesSetFromOptions(out, &SbRunScope, model->dynamic));
+  PetscCall(SbProbesSetFromOptions(out, model->dynamic));
 
   /* live.txt, which has the values of live formulas */
   if (SbLiveCount()) {
@@ -203,7 +203,6 @@ static PetscErrorCode destroy(SbRun run)
   if (!out) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbFramesDestroy(out));
   PetscCall(SbHistoryDestroy(out));
-  PetscCall(PetscFree(out->line));
   PetscCall(SbOutputForgetMesh(out));
   PetscCall(SbProbesDestroy(out));
   PetscCall(PetscFree(out->identity));
@@ -290,7 +289,7 @@ PetscErrorCode SbOutputAttach(SbRun run)
 
   /* scenario.opts and run.json */
   PetscCall(SbOutputPath(out, "scenario.opts", sizeof(path), path));
-  if (!out->rank) SbFileReplace(path, 1, &(SbChunk){scenario, size}, message);
+  if (!out->rank) SbFileReplace(path, scenario, size, message);
   free(scenario);
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
   PetscCall(SbRunJson(run, out, "running", ""));

@@ -67,9 +67,8 @@ PetscErrorCode SbH5ReadSlice(SbH5 *h, const char *name, const SbOrder *order, Pe
                              PetscReal slice[], PetscBool *ok);
 /* A group that may be missing: negative then. Not collective. */
 hid_t SbH5OpenGroup(hid_t where, const char *name);
-/* Rows of a dataset [n] or [n][m], and bytes of each of its numbers; 0: there is none. Not collective. */
-PetscInt64 SbH5Rows(hid_t where, const char *name);
-PetscInt SbH5NumberBytes(hid_t where, const char *name);
+/* Rows of a dataset [n] or [n][m], and bytes (or NULL) of its numbers; 0: there is none. Not collective. */
+PetscInt64 SbH5Rows(hid_t where, const char *name, PetscInt *bytes);
 /* A whole dataset [n][ncomp], or [n], in memory; false: it is missing, of another shape or unreadable. */
 PetscBool SbH5Read(hid_t where, const char *name, hid_t type, PetscInt n, PetscInt ncomp, void *values);
 PetscErrorCode SbH5PutReal(SbH5 *h, hid_t where, const char *name, PetscReal value);
@@ -87,19 +86,14 @@ PetscErrorCode SbH5GroupCreate(SbH5 *h, unsigned links, unsigned letters, hid_t 
 PetscErrorCode SbH5GroupLink(SbH5 *h, hid_t group, hid_t parent, const char *name);
 #define SB_H5_NODE_LINKS 100 /* with 6 letters: a block of 4080 bytes */
 
-/* SbFileReserve() for an open HDF5 file; messages name these bytes from then on. Collective. */
+/* Reserves `bytes` of disk space beyond the end of the file, without changing it; messages name them from
+   then on. Collective. */
 PetscErrorCode SbH5Reserve(SbH5 *h, PetscInt64 bytes);
-/* Reserves `bytes` of disk space beyond the end of a file, without changing it. Collective. */
-PetscErrorCode SbFileReserve(MPI_Comm comm, const char *path, PetscInt64 bytes);
 /* Ends the run on all ranks when a rank has a message; the lowest rank's is reported. Collective. */
 #define SB_NO_ROOM "make room and go on with -restart auto, or give another -output_dir"
 PetscErrorCode SbAgree(MPI_Comm comm, PetscErrorCode code, const char *message);
-typedef struct {
-  const char *text;
-  size_t size;
-} SbChunk;
 /* Writes path.tmp and renames it to path. Rank 0 only; message: the error, if any. */
-void SbFileReplace(const char *path, int nchunk, const SbChunk chunk[], char message[SB_MESSAGE_MAX]);
+void SbFileReplace(const char *path, const void *text, size_t size, char message[SB_MESSAGE_MAX]);
 /* The whole file; NULL when it cannot be read. One rank. PetscFree. */
 PetscErrorCode SbFileRead(const char *path, char **text, size_t *size);
 
@@ -129,12 +123,37 @@ typedef struct {
   SbSum nodes, cells; /* this rank's nodes, if there is no vertex at x, and tets */
 } SbProbe;
 
-typedef struct _p_SbFrames *SbFrames;     /* frames.c */
-typedef struct _p_SbHistory *SbHistory;   /* history.c */
-typedef struct _p_SbProgress *SbProgress; /* progress.c */
-typedef struct _p_SbPoints *SbPoints;     /* points.c */
-typedef struct _p_SbContacts *SbContacts; /* contacts.c */
-typedef struct _p_SbIndex *SbIndex;       /* index.c */
+typedef struct _p_SbFrames *SbFrames;   /* frames.c */
+typedef struct _p_SbHistory *SbHistory; /* history.c */
+typedef struct _p_SbIndex *SbIndex;     /* index.c */
+
+/* points.c: what values at points need beside the mesh; NULL where nothing does. */
+typedef struct {
+  PetscInt *start;    /* [nvert_owned + 1] into corner; NULL where nodes are vertices */
+  PetscInt *corner;   /* 4 cell + a of the cells around an owned vertex, by original cell number */
+  PetscReal *V;       /* [ncell] m^3 */
+  PetscReal *valence; /* [nnode] cells that have the node; NULL when no field needs it */
+} SbPoints;
+
+/* contacts.c: the points of contact of a frame. */
+typedef struct {
+  SbContactPoints list;  /* of this rank */
+  SbContactPoint *point; /* [share.n] of this rank's share, sorted */
+  SbOrder share;         /* which rows are this rank's; it has no star forest */
+  PetscReal *column;     /* [share.n][3] of one quantity */
+} SbContacts;
+
+/* progress.c: the line of progress. */
+typedef struct {
+  PetscBool on; /* this rank prints it */
+  PetscBool terminal;
+  PetscBool open; /* a line is being rewritten */
+  PetscBool titled;
+  PetscReal last; /* wall time of the last line, s since the time loop began */
+  PetscReal t_start;
+  PetscInt newton, linear, steps; /* since the last line */
+  PetscReal within;               /* MPI_Wtime() of the last line within a step */
+} SbProgress;
 
 typedef struct _p_SbOutput *SbOutput;
 struct _p_SbOutput {
@@ -188,11 +207,11 @@ struct _p_SbOutput {
   PetscReal *sigma, *J, *psi; /* [ncell_owned][6] Pa, [ncell_owned], the same in J/m^3; or NULL */
   PetscReal *pressure;        /* [ncell_owned] Pa; NULL likewise */
 
-  SbPoints points; /* NULL when nothing needs values at vertices */
+  SbPoints points;
 
   SbFrames frames;
-  SbContacts contacts;   /* NULL when there are none to write and none to keep */
-  SbIndex contact_index; /* of them, on rank 0; NULL likewise */
+  SbContacts contacts;
+  SbIndex contact_index; /* of them, on rank 0; NULL when there are none to write and none to keep */
   SbHistory hist;
   SbProgress line;
   char started[32]; /* date and time */
@@ -271,16 +290,15 @@ PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, P
 PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryDestroy(SbOutput out);
 PetscErrorCode SbProbesRegister(void);
-PetscErrorCode SbProbesSetFromOptions(SbOutput out, const SbScope *scope, PetscBool dynamic);
+PetscErrorCode SbProbesSetFromOptions(SbOutput out, PetscBool dynamic);
 PetscErrorCode SbProbesDestroy(SbOutput out);
 PetscErrorCode SbProbesFind(SbRun run, SbOutput out);
-/* Their columns of history.csv: how many, and name and unit of one. */
-PetscInt SbProbesCount(SbOutput out);
-PetscErrorCode SbProbesColumn(SbOutput out, PetscInt column, size_t size, char name[], const char **unit);
+/* Name of the column of history.csv for a component of a field. */
+PetscErrorCode SbProbesColumn(const SbProbe *probe, const SbField *f, PetscInt c, size_t size, char name[]);
 /* Writes the reference positions of probes into a checkpoint of a re-meshed run. Collective. */
 PetscErrorCode SbProbesWrite(SbRun run, SbOutput out, SbH5 *h);
 PetscErrorCode SbProbesRead(SbRun run, SbOutput out, SbH5 *h);
-/* values[SbProbesCount()] += this rank's part of the columns of all probes. Collective. */
+/* values[number of columns] += this rank's part of the columns of all probes. Collective. */
 PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, PetscReal values[]);
 /* checkpoint_effects.c: writes the state of all effects; sum is raised by their checksum. Collective. */
 PetscErrorCode SbCheckpointWriteEffects(SbRun run, SbH5 *h, uint64_t *sum);

@@ -13,26 +13,17 @@
 */
 #include "output_impl.h"
 
-struct _p_SbPoints {
-  PetscInt *start;    /* [nvert_owned + 1] into corner; NULL where nodes are vertices */
-  PetscInt *corner;   /* 4 cell + a of the cells around an owned vertex, by original cell number */
-  PetscReal *V;       /* [ncell] m^3 */
-  PetscReal *valence; /* [nnode] cells that have the node; NULL when no field needs it */
-};
-
 /* ------------------------------------------------------------------ set-up */
 
 PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out, PetscBool forces)
 {
   const SbSpace s = run->model->space;
   const SbMesh mesh = s->mesh;
-  SbPoints p = out->points;
+  SbPoints *p = &out->points;
   PetscInt *key;
   PetscReal *count;
 
   PetscFunctionBeginUser;
-  if (!p) PetscCall(PetscNew(&p));
-  out->points = p;
   if (!s->vertices && !p->start) {
     // the cells around each owned vertex: all of them are local
     PetscCall(SbBucketByKey(4 * mesh->ncell, mesh->cell, mesh->nvert_owned, &p->start, &p->corner));
@@ -66,12 +57,10 @@ PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out, PetscBool forces)
 PetscErrorCode SbPointsDestroy(SbOutput out)
 {
   PetscFunctionBeginUser;
-  if (!out->points) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree(out->points->start));
-  PetscCall(PetscFree(out->points->corner));
-  PetscCall(PetscFree(out->points->V));
-  PetscCall(PetscFree(out->points->valence));
-  PetscCall(PetscFree(out->points));
+  PetscCall(PetscFree(out->points.start));
+  PetscCall(PetscFree(out->points.corner));
+  PetscCall(PetscFree(out->points.V));
+  PetscCall(PetscFree(out->points.valence));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -116,7 +105,7 @@ static void corner_value(SbSpace s, PetscInt corner, const PetscReal x[], PetscR
 }
 
 /* The node at an owned vertex, or -1 where the body has its nodes at faces. */
-static PetscInt vertex_node(SbSpace s, SbPoints p, PetscInt vertex)
+static PetscInt vertex_node(SbSpace s, const SbPoints *p, PetscInt vertex)
 {
   const PetscInt corner = s->vertices ? 0 : p->corner[p->start[vertex]];
 
@@ -127,7 +116,7 @@ static PetscInt vertex_node(SbSpace s, SbPoints p, PetscInt vertex)
 void SbPointsVertex(SbRun run, SbOutput out, PetscInt vertex, const PetscReal x[], PetscReal value[3])
 {
   const SbSpace s = run->model->space;
-  const SbPoints p = out->points;
+  const SbPoints *p = &out->points;
   const PetscInt node = vertex_node(s, p, vertex);
   PetscReal V = 0.;
 
@@ -149,12 +138,6 @@ PetscErrorCode SbPointsValues(SbRun run, SbOutput out, Vec x, PetscReal values[]
   const PetscReal *array;
 
   PetscFunctionBeginUser;
-  if (s->vertices && !out->discontinuous) {
-    PetscCall(VecGetArrayRead(x, &array));
-    PetscCall(PetscArraycpy(values, array, 3 * out->point.nowned));
-    PetscCall(VecRestoreArrayRead(x, &array));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
   PetscCall(SbSpaceGetLocalRead(s, x, &array));
   for (PetscInt i = 0; i < out->point.nowned; i++) {
     const SbPlace p = SbPointsPlace(run, out, i);
@@ -210,7 +193,7 @@ static void add_corner_force(const Forces *f, const PetscReal valence[], PetscIn
 PetscErrorCode SbPointsForces(SbRun run, SbOutput out, PetscBool prescribed, Vec R, PetscReal values[])
 {
   const SbSpace s = run->model->space;
-  const SbPoints p = out->points;
+  const SbPoints *p = &out->points;
   const PetscInt n = out->point.nowned;
   Forces f = {.s = s, .prescribed = prescribed};
 

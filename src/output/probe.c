@@ -44,61 +44,55 @@ PetscErrorCode SbProbesRegister(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Options of a probe: position or set, fields. */
-static PetscErrorCode read_probe(SbProbe *probe, PetscBool dynamic)
+PetscErrorCode SbProbesSetFromOptions(SbOutput out, PetscBool dynamic)
 {
-  SbScope scope;
-  PetscBool given;
-  char(*names)[SB_NAME_MAX], option[2 * SB_NAME_MAX];
-  PetscInt n = 0;
+  char(*names)[SB_NAME_MAX], (*fields)[SB_NAME_MAX], option[2 * SB_NAME_MAX];
 
   PetscFunctionBeginUser;
-  PetscCall(SbScopeSet(&scope, "probe", "", probe->name));
-  for (int k = 0; k < 3; k++) {
-    PetscCall(SbOptionGiven(&scope, keys[k], &given));
-    if (given) probe->kind = (SbProbeKind)k;
-    n += given;
-  }
-  PetscCheck(n == 1, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-probe_%s_at, _on, _in: give one of them, the position of a vertex, or a set over whose facets "
-             "or tets the mean is taken",
-             probe->name);
-  if (probe->kind == SB_PROBE_POINT)
-    PetscCall(SbOptionReals(&scope, "at", probe->at));
-  else
-    PetscCall(SbOptionString(&scope, keys[probe->kind], sizeof(probe->set), probe->set));
-
-  /* the fields */
-  PetscCall(SbOptionName(&scope, "fields", sizeof(option), option));
-  PetscCall(SbOptionNames(&scope, "fields", &n, &names));
-  PetscCheck(n > 0 && n <= SB_FIELD_MAX, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "%s: %" PetscInt_FMT " fields; 1 to %d are possible", option, n, SB_FIELD_MAX);
-  for (PetscInt i = 0; i < n; i++) {
-    const SbField *f;
-
-    PetscCall(SbFieldFind(option, names[i], &f));
-    PetscCheck(
-      SbFieldIsProbed(f), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-      "%s: probes do not follow '%s'; forces of supports and of contact have columns of their effects",
-      option, names[i]);
-    PetscCheck(dynamic || !f->dynamic, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "%s: a static run has no '%s'",
-               option, names[i]);
-    probe->field[probe->nfield++] = f;
-  }
-  PetscCall(PetscFree(names));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbProbesSetFromOptions(SbOutput out, const SbScope *scope, PetscBool dynamic)
-{
-  char(*names)[SB_NAME_MAX];
-
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionNames(scope, "probes", &out->nprobe, &names));
+  PetscCall(SbOptionNames(&SbRunScope, "probes", &out->nprobe, &names));
   PetscCall(PetscCalloc1(out->nprobe, &out->probe));
   for (PetscInt p = 0; p < out->nprobe; p++) {
-    PetscCall(PetscStrncpy(out->probe[p].name, names[p], SB_NAME_MAX));
-    PetscCall(read_probe(&out->probe[p], dynamic));
+    SbProbe *probe = &out->probe[p];
+    PetscInt n = 0;
+    PetscBool given;
+    SbScope scope;
+
+    /* its position or set */
+    PetscCall(PetscStrncpy(probe->name, names[p], SB_NAME_MAX));
+    PetscCall(SbScopeSet(&scope, "probe", "", probe->name));
+    for (int k = 0; k < 3; k++) {
+      PetscCall(SbOptionGiven(&scope, keys[k], &given));
+      if (given) probe->kind = (SbProbeKind)k;
+      n += given;
+    }
+    PetscCheck(
+      n == 1, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+      "-probe_%s_at, _on, _in: give one of them, the position of a vertex, or a set over whose facets "
+      "or tets the mean is taken",
+      probe->name);
+    if (probe->kind == SB_PROBE_POINT)
+      PetscCall(SbOptionReals(&scope, "at", probe->at));
+    else
+      PetscCall(SbOptionString(&scope, keys[probe->kind], sizeof(probe->set), probe->set));
+
+    /* the fields */
+    PetscCall(SbOptionName(&scope, "fields", sizeof(option), option));
+    PetscCall(SbOptionNames(&scope, "fields", &n, &fields));
+    PetscCheck(n > 0 && n <= SB_FIELD_MAX, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+               "%s: %" PetscInt_FMT " fields; 1 to %d are possible", option, n, SB_FIELD_MAX);
+    for (PetscInt i = 0; i < n; i++) {
+      const SbField *f;
+
+      PetscCall(SbFieldFind(option, fields[i], &f));
+      PetscCheck(
+        SbFieldIsProbed(f), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+        "%s: probes do not follow '%s'; forces of supports and of contact have columns of their effects",
+        option, fields[i]);
+      PetscCheck(dynamic || !f->dynamic, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+                 "%s: a static run has no '%s'", option, fields[i]);
+      probe->field[probe->nfield++] = f;
+    }
+    PetscCall(PetscFree(fields));
   }
   PetscCall(PetscFree(names));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -117,31 +111,11 @@ PetscErrorCode SbProbesDestroy(SbOutput out)
 
 /* ------------------------------------------------------------------ columns */
 
-PetscInt SbProbesCount(SbOutput out)
-{
-  PetscInt n = 0;
-
-  for (PetscInt p = 0; p < out->nprobe; p++)
-    for (PetscInt i = 0; i < out->probe[p].nfield; i++) n += out->probe[p].field[i]->ncomp;
-  return n;
-}
-
-PetscErrorCode SbProbesColumn(SbOutput out, PetscInt c, size_t size, char name[], const char **unit)
+PetscErrorCode SbProbesColumn(const SbProbe *probe, const SbField *f, PetscInt c, size_t size, char name[])
 {
   static const char *const tensor[] = {"xx", "xy", "xz", "yy", "yz", "zz"}, *const axis[] = {"x", "y", "z"};
-  const SbProbe *probe = out->probe;
-  const SbField *f = probe->field[0];
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 1; c >= f->ncomp; i++) {
-    c -= f->ncomp;
-    if (i == probe->nfield) {
-      probe++;
-      i = 0;
-    }
-    f = probe->field[i];
-  }
-  *unit = f->unit;
   if (f->ncomp == 1)
     PetscCall(PetscSNPrintf(name, size, "%s_%s", probe->name, f->name));
   else if (!strcmp(f->name, "displacement"))

@@ -10,16 +10,6 @@
 
 #define WIDTH 79
 
-struct _p_SbProgress {
-  PetscBool terminal;
-  PetscBool open; /* a line is being rewritten */
-  PetscBool titled;
-  PetscReal last; /* wall time of the last line, s since the time loop began */
-  PetscReal t_start;
-  PetscInt newton, linear, steps; /* since the last line */
-  PetscReal within;               /* MPI_Wtime() of the last line within a step */
-};
-
 #define LONG 5. /* s between lines within a long step */
 
 static PetscBool is_terminal(void)
@@ -39,7 +29,7 @@ static PetscBool is_terminal(void)
 static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
   const SbOutput out = (SbOutput)ctx;
-  SbProgress p = out->line;
+  SbProgress *p = &out->line;
   const PetscReal wait = p->terminal ? .2 : 2.;
   char line[160], count[32], left[16] = "-", times[16] = "-";
   PetscReal done, speed;
@@ -98,9 +88,9 @@ static PetscErrorCode say_within(SbRun run, PetscInt newton, PetscInt linear, Pe
   char contact[32] = "", solve[40] = "";
 
   PetscFunctionBeginUser;
-  if (!out->line || begun == 0. || now - begun < LONG || now - out->line->within < LONG)
+  if (!out->line.on || begun == 0. || now - begun < LONG || now - out->line.within < LONG)
     PetscFunctionReturn(PETSC_SUCCESS);
-  out->line->within = now;
+  out->line.within = now;
   if (run->ts) PetscCall(TSGetTimeStep(run->ts, &dt));
   if (run->model->nbegin_step)
     (void)snprintf(contact, sizeof(contact), ", contact round %" PetscInt_FMT, run->contact_round);
@@ -141,14 +131,12 @@ PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
   PetscFunctionBeginUser;
   if (!out->progress || out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
   run->want_energies = PETSC_TRUE;
-  if (!out->rank && !out->line) {
-    PetscCall(PetscNew(&out->line));
-    out->line->terminal = is_terminal();
-  }
+  out->line.on = (PetscBool)!out->rank;
+  out->line.terminal = (PetscBool)(out->line.on && is_terminal());
 
   /* of the run on rank 0, and of its solvers on all: a solver with a monitor computes norms that it else does
      not */
-  if (out->line) PetscCall(SbRunAddMonitor(run, monitor, out));
+  if (out->line.on) PetscCall(SbRunAddMonitor(run, monitor, out));
   if (!run->snes) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESGetKSP(run->snes, &ksp));
   PetscCall(SNESMonitorSet(run->snes, within_newton, run, NULL));
@@ -159,7 +147,7 @@ PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
 PetscErrorCode SbProgressEnd(SbOutput out)
 {
   PetscFunctionBeginUser;
-  if (out->line && out->line->open) PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n"));
-  if (out->line) out->line->open = PETSC_FALSE;
+  if (out->line.open) PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n"));
+  out->line.open = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

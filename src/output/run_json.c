@@ -180,7 +180,7 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
   (void)fprintf(f, "  \"status\": \"%s\"\n}\n", status);
   (void)fclose(f);
   PetscCall(SbOutputPath(out, "run.json", sizeof(path), path));
-  SbFileReplace(path, 1, &(SbChunk){text, size}, message);
+  SbFileReplace(path, text, size, message);
   free(text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -190,7 +190,8 @@ PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *p)
   static const char *const names[SB_PHASE_COUNT] = {"mesh",         "set-up",  "residual",       "tangent",
                                                     "linear solve", "contact", "contact search", "energies",
                                                     "output",       "other"};
-  PetscReal mine[SB_PHASE_COUNT], most[SB_PHASE_COUNT], memory, cpu;
+  enum { CPU = SB_PHASE_COUNT, MEMORY, N };
+  PetscReal mine[N], most[N];
   struct rusage usage;
 
   PetscFunctionBeginUser;
@@ -198,19 +199,19 @@ PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *p)
   PetscCall(PetscTime(&p->total));
   p->total -= out->wall_start;
   mine[SB_PHASE_OTHER] = p->total;
-  PetscCallMPI(MPI_Allreduce(mine, most, SB_PHASE_COUNT, MPIU_REAL, MPI_MAX, out->comm));
+  mine[CPU] = SB_CPU_SECONDS - out->cpu_start;
+  (void)getrusage(RUSAGE_SELF, &usage);
+  mine[MEMORY] = 1024. * (PetscReal)usage.ru_maxrss;
+  PetscCallMPI(MPI_Allreduce(mine, most, N, MPIU_REAL, MPI_MAX, out->comm));
+  PetscCallMPI(MPI_Allreduce(&mine[MEMORY], &p->memory_sum, 1, MPIU_REAL, MPI_SUM, out->comm));
   p->total = most[SB_PHASE_OTHER];
   for (int i = 0; i < SB_PHASE_OTHER; i++) most[SB_PHASE_OTHER] -= most[i];
   for (int i = 0; i < SB_PHASE_COUNT; i++) {
     p->phase[i].name = names[i];
     p->phase[i].seconds = PetscMax(most[i], 0.);
   }
-  cpu = SB_CPU_SECONDS - out->cpu_start;
-  PetscCallMPI(MPI_Allreduce(&cpu, &p->cpu, 1, MPIU_REAL, MPI_MAX, out->comm));
-  (void)getrusage(RUSAGE_SELF, &usage);
-  memory = 1024. * (PetscReal)usage.ru_maxrss;
-  PetscCallMPI(MPI_Allreduce(&memory, &p->memory_max, 1, MPIU_REAL, MPI_MAX, out->comm));
-  PetscCallMPI(MPI_Allreduce(&memory, &p->memory_sum, 1, MPIU_REAL, MPI_SUM, out->comm));
+  p->cpu = most[CPU];
+  p->memory_max = most[MEMORY];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

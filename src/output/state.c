@@ -31,7 +31,7 @@ static PetscErrorCode read_all(hid_t where, const char *name, hid_t type, PetscI
 {
   PetscFunctionBeginUser;
   *(void **)array = NULL;
-  *n = (PetscInt)SbH5Rows(where, name);
+  *n = (PetscInt)SbH5Rows(where, name, NULL);
   if (!*n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc((size_t)*n * (size_t)ncomp * H5Tget_size(SbH5TypeInMemory(type)), (void **)array));
   if (!SbH5Read(where, name, type, *n, ncomp, *(void **)array)) PetscCall(PetscFree(*(void **)array));
@@ -309,12 +309,12 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
 
   /* displacement and velocity of its nodes; supports, which follow the faces' nodes there, may be other ones
      */
-  PetscCall(find_rows(run, (PetscInt)SbH5Rows(h.file, "u"), row, &ok));
+  PetscCall(find_rows(run, (PetscInt)SbH5Rows(h.file, "u", NULL), row, &ok));
   if (ok) {
     SbOrder order;
     PetscReal *slice, *owned;
 
-    PetscCall(SbOrderCreate(out->comm, (PetscInt)SbH5Rows(h.file, "u"), s->nnode_owned, row, &order));
+    PetscCall(SbOrderCreate(out->comm, (PetscInt)SbH5Rows(h.file, "u", NULL), s->nnode_owned, row, &order));
     PetscCall(PetscMalloc2(3 * order.n, &slice, 3 * s->nnode_owned, &owned));
     for (int k = 0; k < 2 && ok; k++) {
       const PetscBool has = (PetscBool)(H5Lexists(h.file, k ? "v" : "u", H5P_DEFAULT) > 0);

@@ -249,7 +249,7 @@ void SbVtkhdfWrite(SbIndex v, PetscBool last, char message[SB_MESSAGE_MAX])
   size_t nwork = 4 * (size_t)v->nframe + (size_t)v->npart + 1;
   PetscBool ok = PETSC_TRUE;
   int64_t *work;
-  SbChunk image = {NULL, 0};
+  size_t size = 0;
   const double begun = MPI_Wtime();
   void *text = NULL;
   hid_t file, list;
@@ -265,16 +265,15 @@ void SbVtkhdfWrite(SbIndex v, PetscBool last, char message[SB_MESSAGE_MAX])
   if (file >= 0) {
     write_file(v, file, work, &ok);
     (void)H5Fflush(file, H5F_SCOPE_GLOBAL);
-    image.size = (size_t)PetscMax(H5Fget_file_image(file, NULL, 0), 0);
-    text = malloc(image.size + 1);
-    image.text = (const char *)text;
-    ok = (PetscBool)(ok && text && H5Fget_file_image(file, text, image.size) == (ssize_t)image.size);
+    size = (size_t)PetscMax(H5Fget_file_image(file, NULL, 0), 0);
+    text = malloc(size + 1);
+    ok = (PetscBool)(ok && text && H5Fget_file_image(file, text, size) == (ssize_t)size);
     (void)H5Fclose(file);
   }
   if (file < 0 || !ok)
     SbFormat(SB_MESSAGE_MAX, message, "cannot write %s: HDF5 fails to make it in memory", v->vtkhdf);
   else
-    SbFileReplace(v->vtkhdf, 1, &image, message);
+    SbFileReplace(v->vtkhdf, text, size, message);
   v->nwritten = v->nframe;
   v->next = MPI_Wtime() + BETWEEN * (MPI_Wtime() - begun);
   free(text);

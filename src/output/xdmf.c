@@ -76,12 +76,10 @@ void SbXdmfAdd(SbIndex x)
 
 void SbXdmfWrite(SbIndex x, char message[SB_MESSAGE_MAX])
 {
-  static const char head[] = "<?xml version=\"1.0\" ?>\n<Xdmf Version=\"3.0\">\n<Domain>\n"
-                             "<Grid Name=\"frames\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
   static const char tail[] = "</Grid>\n</Domain>\n</Xdmf>\n";
-  SbChunk chunks[3] = {{head, sizeof(head) - 1}, {NULL, 0}, {tail, sizeof(tail) - 1}};
 
+  (void)fputs(tail, x->file);
   (void)fflush(x->file);
-  chunks[1] = (SbChunk){x->text, x->size};
-  SbFileReplace(x->xmf, 3, chunks, message);
+  SbFileReplace(x->xmf, x->text, x->size, message);
+  (void)fseek(x->file, -(long)strlen(tail), SEEK_CUR); // the next grid goes before it
 }

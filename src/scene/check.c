@@ -17,7 +17,7 @@
 static PetscErrorCode near_files(const char *path, size_t size, char text[])
 {
   const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
-  char folder[PETSC_MAX_PATH_LEN];
+  char folder[PETSC_MAX_PATH_LEN], found[PETSC_MAX_PATH_LEN];
   DIR *dir;
   struct dirent *entry;
   const char **list;
@@ -32,13 +32,8 @@ static PetscErrorCode near_files(const char *path, size_t size, char text[])
   while (n < NAMES_MAX && (entry = readdir(dir)))
     PetscCall(PetscStrallocpy(entry->d_name, (char **)&list[n++]));
   (void)closedir(dir);
-  PetscCall(SbSuggestNames(name, n, list, size, text));
-  if (text[0]) {
-    char found[PETSC_MAX_PATH_LEN];
-
-    SbFormat(sizeof(found), found, "%s%s", folder, text);
-    SbFormat(size, text, "%s", found);
-  }
+  PetscCall(SbSuggestNames(name, n, list, sizeof(found), found));
+  if (found[0]) SbFormat(size, text, "%s%s", folder, found);
   for (PetscInt i = 0; i < n; i++) PetscCall(PetscFree(list[i]));
   PetscCall(PetscFree(list));
   PetscFunctionReturn(PETSC_SUCCESS);

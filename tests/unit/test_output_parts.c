@@ -123,9 +123,8 @@ static PetscErrorCode test_open_failure(void)
   SB_CHECK(!ok && h.file < 0, "a file that is not there was opened");
   if (!test_rank) {
     char message[SB_MESSAGE_MAX] = "";
-    const SbChunk chunk = {"no HDF5", 7};
 
-    SbFileReplace(path, 1, &chunk, message);
+    SbFileReplace(path, "no HDF5", 7, message);
     SB_CHECK(!message[0], "%s", message);
   }
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
@@ -137,20 +136,20 @@ static PetscErrorCode test_open_failure(void)
 static PetscErrorCode test_files(void)
 {
   char path[PETSC_MAX_PATH_LEN], *text, message[SB_MESSAGE_MAX] = "";
-  const SbChunk chunks[3] = {{"one ", 4}, {NULL, 0}, {"two", 3}};
+  SbH5 h = {.comm = PETSC_COMM_WORLD};
   size_t size;
 
   PetscFunctionBeginUser;
   if (!test_rank) {
-    SbFormat(sizeof(path), path, "%s/chunks.txt", dir);
-    SbFileReplace(path, 3, chunks, message);
+    SbFormat(sizeof(path), path, "%s/whole.txt", dir);
+    SbFileReplace(path, "one two", 7, message);
     PetscCall(SbFileRead(path, &text, &size));
     SB_CHECK(!message[0] && size == 7 && text && !strcmp(text, "one two"), "read '%s', %s", text ? text : "",
              message);
     PetscCall(PetscFree(text));
-    SB_CHECK(!fixture_exists(dir, "chunks.txt.tmp"), "the temporary file is left");
+    SB_CHECK(!fixture_exists(dir, "whole.txt.tmp"), "the temporary file is left");
     SbFormat(sizeof(path), path, "%s/no/folder", dir);
-    SbFileReplace(path, 3, chunks, message);
+    SbFileReplace(path, "one two", 7, message);
     SB_CHECK(strstr(message, "cannot write 7 bytes to ") && strstr(message, "No such file or directory"),
              "message '%s'", message);
     PetscCall(SbFileRead(path, &text, &size));
@@ -158,9 +157,9 @@ static PetscErrorCode test_files(void)
   }
   // more than any disk has: an error, and the length of the file does not change
   SbFormat(sizeof(path), path, "%s/reserve", dir);
-  PetscCall(SbFileReserve(PETSC_COMM_WORLD, path, 1000));
-  SB_CHECK_ERROR(SbFileReserve(PETSC_COMM_WORLD, path, (PetscInt64)1 << 55), PETSC_ERR_FILE_WRITE,
-                 "36028797018963968 bytes");
+  PetscCall(PetscStrncpy(h.path, path, sizeof(h.path)));
+  PetscCall(SbH5Reserve(&h, 1000));
+  SB_CHECK_ERROR(SbH5Reserve(&h, (PetscInt64)1 << 55), PETSC_ERR_FILE_WRITE, "36028797018963968 bytes");
   if (!test_rank) {
     PetscCall(SbFileRead(path, &text, &size));
     SB_CHECK(size == 1000, "the file has %zu bytes", size);
