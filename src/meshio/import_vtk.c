@@ -181,10 +181,8 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
     for (int64_t i = 0; i < n; i++) {
       (void)SbScanWord(s, sizeof(name), name);
       if (!strcmp(name, "METADATA")) {
-        while (SbScanMore(s, '\n')) {
-          SbScanEndOfLine(s);
-          if (s->at < s->end && (*s->at == '\n' || *s->at == '\r')) break;
-        }
+        do SbScanEndOfLine(s);
+        while (SbScanMore(s, '\n'));
         (void)SbScanWord(s, sizeof(name), name);
       }
       PetscCall(SbScanText(s, "number of components", &ncomponent));
