@@ -79,6 +79,9 @@ PetscBool SbScanMore(SbScan *scan, char comment);
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s", (scan)->where, \
             SbScanPosition(scan, sb_position), sb_text);                            \
   } while (0)
+#define SB_SCAN_ENDS(scan, what, ...)                                                                      \
+  SB_SCAN_ERROR(scan, "the file ends where " what " is expected; it is truncated, write or copy it again", \
+                __VA_ARGS__)
 
 /* ------------------------------------------------------------------ import.c: one body in memory */
 

@@ -327,9 +327,7 @@ PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
       SB_SCAN_ERROR(s, "the mesh is cut into partitions; save it in one piece (gmsh: Mesh, Unpartition)");
     else if (!SbScanFind(s, closing))
       SB_SCAN_ERROR(s, "section %s has no end; the file is truncated, write or copy it again", name);
-    if (!SbScanWord(s, sizeof(end), end))
-      SB_SCAN_ERROR(s, "the file ends where %s is expected; it is truncated, write or copy it again",
-                    closing);
+    if (!SbScanWord(s, sizeof(end), end)) SB_SCAN_ENDS(s, "%s", closing);
     if (strcmp(end, closing))
       SB_SCAN_ERROR(s, "expected %s, found '%.20s'; the section is longer than announced or damaged", closing,
                     end);

@@ -70,9 +70,7 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
     // skip other sections: go to the next word that is not a number
     for (SbScanNext(s); s->at < s->end && !isalpha((unsigned char)*s->at); SbScanNext(s))
       while (s->at < s->end && !isspace((unsigned char)*s->at)) s->at++;
-    if (!SbScanWord(s, sizeof(word), word))
-      SB_SCAN_ERROR(
-        s, "the file ends where a section, or 'End', is expected; it is truncated, write or copy it again");
+    if (!SbScanWord(s, sizeof(word), word)) SB_SCAN_ENDS(s, "a section, or '%s',", "End");
     if (!strcmp(word, "End")) break;
     // coordinates and a reference, which is ignored
     if (!strcmp(word, "Vertices")) {

@@ -124,9 +124,7 @@ PetscErrorCode SbImportRead_UNV(const char *path, SbImport *im)
       // the data set ends at a delimiter; the end of the file is an error
       while (s->at < s->end && (*s->at == '\n' || *s->at == '\r')) s->at++;
       s->token = s->at;
-      if (s->at >= s->end)
-        SB_SCAN_ERROR(
-          s, "the file ends where a line of -1 is expected; it is truncated, write or copy it again");
+      if (s->at >= s->end) SB_SCAN_ENDS(s, "a line of %d", -1);
       if (is_mark(s)) break;
       // data set 2411 has the coordinates on a line of their own, data set 15 on the same line
       if (id == 2411 || id == 781 || id == 15) {

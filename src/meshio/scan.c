@@ -94,9 +94,7 @@ static PetscErrorCode unexpected(SbScan *s, const char *what, int64_t number)
 
   PetscFunctionBeginUser;
   if (number) (void)snprintf(of, sizeof(of), " of node %lld", (long long)number);
-  if (s->at >= s->end)
-    SB_SCAN_ERROR(s, "the file ends where the %s%s is expected; it is truncated, write or copy it again",
-                  what, of);
+  if (s->at >= s->end) SB_SCAN_ENDS(s, "the %s%s", what, of);
   (void)SbScanWord(s, sizeof(found), found);
   SB_SCAN_ERROR(s, "expected the %s%s, found '%s'", what, of, found);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -126,8 +124,7 @@ static inline PetscErrorCode take(SbScan *s, const char *what, size_t n, void *v
 {
   PetscFunctionBeginUser;
   s->token = s->at;
-  if ((size_t)(s->end - s->at) < n)
-    SB_SCAN_ERROR(s, "the file ends where the %s is expected; it is truncated, write or copy it again", what);
+  if ((size_t)(s->end - s->at) < n) SB_SCAN_ENDS(s, "the %s", what);
   memcpy(value, s->at, n);
   for (size_t i = 0; s->swap && i < n; i++) ((char *)value)[i] = s->at[n - 1 - i];
   s->at += n;

@@ -73,9 +73,7 @@ static PetscErrorCode read_header(Ply *p)
   if (strcmp(word, "ply")) SB_SCAN_ERROR(p->s, "expected 'ply', found '%s'; it is no PLY file", word);
   for (;;) {
     SbScanEndOfLine(p->s);
-    if (!SbScanWord(p->s, sizeof(word), word))
-      SB_SCAN_ERROR(p->s,
-                    "the file ends where 'end_header' is expected; it is truncated, write or copy it again");
+    if (!SbScanWord(p->s, sizeof(word), word)) SB_SCAN_ENDS(p->s, "'%s'", "end_header");
     if (!strcmp(word, "end_header")) break;
     if (!strcmp(word, "format")) {
       // text, or binary in either byte order
@@ -121,8 +119,7 @@ static PetscErrorCode read_value(Ply *p, SbNumberType type, const char *what, do
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   s->token = s->at;
-  if (s->end - s->at < type.size)
-    SB_SCAN_ERROR(s, "the file ends where the %s is expected; it is truncated, write or copy it again", what);
+  if (s->end - s->at < type.size) SB_SCAN_ENDS(s, "the %s", what);
   SbNumbersConvert(type, p->big_endian, 1, s->at, value);
   s->at += type.size;
   PetscFunctionReturn(PETSC_SUCCESS);

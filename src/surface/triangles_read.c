@@ -75,9 +75,7 @@ static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
       // the normal is ignored
       SbScanEndOfLine(s);
       for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(facet); k++) {
-        if (!stl_next(s, word))
-          SB_SCAN_ERROR(s, "the file ends where '%s' is expected; it is truncated, write or copy it again",
-                        facet[k]);
+        if (!stl_next(s, word)) SB_SCAN_ENDS(s, "'%s'", facet[k]);
         if (strcasecmp(word, facet[k])) SB_SCAN_ERROR(s, "expected '%s', found '%s'", facet[k], word);
         if (facet[k][0] == 'v') PetscCall(add_vertex(s, f));
       }
@@ -85,8 +83,7 @@ static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
     } else
       SB_SCAN_ERROR(s, "expected 'facet' or 'endsolid', found '%s'", word);
   }
-  if (open)
-    SB_SCAN_ERROR(s, "the file ends where 'endsolid' is expected; it is truncated, write or copy it again");
+  if (open) SB_SCAN_ENDS(s, "'%s'", "endsolid");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
