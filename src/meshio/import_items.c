@@ -352,9 +352,7 @@ PetscErrorCode SbImportGroup(SbImport *im, PetscInt dim, int64_t tag, const char
   if (g < 0) {
     g = im->slot[s] = im->ngroup;
     PetscCall(SbReserve(g + 1, sizeof(SbGroup), &im->capacity[0], &im->group));
-    im->group[g].dim = dim;
-    im->group[g].tag = tag;
-    im->group[g].alone = -1;
+    im->group[g] = (SbGroup){.dim = dim, .tag = tag, .alone = -1};
     (void)snprintf(im->group[g].name, SB_GROUP_MAX, "%s_%lld", SbGroupKinds[dim], (long long)tag);
     im->ngroup++;
   }

@@ -56,28 +56,6 @@ static PetscErrorCode read_points(Poly *p, int64_t n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_node_file(Poly *p)
-{
-  char name[PETSC_MAX_PATH_LEN + 8];
-  SbScan *own = p->s, scan;
-  char *dot;
-  int64_t count[4];
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  (void)snprintf(name, PETSC_MAX_PATH_LEN, "%s", p->f->path);
-  dot = strrchr(name, '.');
-  (void)snprintf(dot, 8, ".node");
-  ierr = SbScanOpen(p->f->where, name, &scan);
-  scan.comment = '#';
-  p->s = &scan;
-  if (!ierr) ierr = read_counts(&scan, "number of points in the .node file", 4, count);
-  if (!ierr) ierr = read_points(p, count[0]);
-  p->s = own;
-  PetscCall(SbScanClose(&scan));
-  PetscFunctionReturn(ierr);
-}
-
 /* ------------------------------------------------------------------ facets */
 
 /* Reads a polygon of a facet: the number of corners, and these, on one or more lines. */
@@ -143,6 +121,9 @@ PetscErrorCode SbTrianglesRead_Poly(SbScan *s, SbTriangleFile *f)
   Poly poly = {.s = s, .f = f}, *p = &poly;
   int64_t count[4];
   PetscReal *hole = NULL; /* [][3] hole points of a facet */
+  SbScan scan;
+  char name[PETSC_MAX_PATH_LEN + 8];
+  PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
   s->comment = '#';
@@ -151,8 +132,18 @@ PetscErrorCode SbTrianglesRead_Poly(SbScan *s, SbTriangleFile *f)
     SB_SCAN_ERROR(s, "points of %lld dimensions; expected 3", (long long)count[1]);
   if (count[0])
     PetscCall(read_points(p, count[0]));
-  else
-    PetscCall(read_node_file(p));
+  else {
+    // the points are in NAME.node
+    (void)snprintf(name, sizeof(name), "%.*s.node", (int)(strrchr(f->path, '.') - f->path), f->path);
+    ierr = SbScanOpen(f->where, name, &scan);
+    scan.comment = '#';
+    p->s = &scan;
+    if (!ierr) ierr = read_counts(&scan, "number of points in the .node file", 4, count);
+    if (!ierr) ierr = read_points(p, count[0]);
+    p->s = s;
+    PetscCall(SbScanClose(&scan));
+    PetscCall(ierr);
+  }
   PetscCall(read_counts(s, "number of facets", 2, count));
   for (int64_t i = 1; i <= count[0]; i++) {
     int64_t facet[3] = {1, 0, 0}, number;
