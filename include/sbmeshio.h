@@ -217,7 +217,7 @@ void SbChildIsolate(pid_t parent, PetscReal seconds);
 PetscErrorCode SbImportScratch(SbImport *import, size_t bytes, void *array);
 /* The same for one more of `unit` bytes each. */
 PetscErrorCode SbImportGrow(SbImport *import, SbCount *count, size_t unit, void *array);
-/* Allocates n vertices. */
+/* Allocates n vertices, numbered from 1 on. */
 PetscErrorCode SbImportSetVertices(SbImport *import, PetscInt n);
 /* Appends a simplex; vert[dim + 1]. */
 PetscErrorCode SbImportAddItem(SbImport *import, int dim, const PetscInt vert[], PetscInt tags,

@@ -78,7 +78,6 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
       PetscCall(SbScanCount(s, "vertices", 8, 8, &n));
       PetscCall(SbImportSetVertices(im, (PetscInt)n));
       for (PetscInt v = 0; v < n; v++) {
-        im->vert_number[v] = v + 1;
         PetscCall(SbScanPoint(s, "coordinate", v + 1, im->x + 3 * v));
         PetscCall(SbScanReal(s, "reference", v + 1, &reference));
       }

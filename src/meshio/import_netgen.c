@@ -25,7 +25,6 @@ static PetscErrorCode read_points(SbImport *im)
   PetscCall(SbScanCount(s, "points", 6, 6, &n));
   PetscCall(SbImportSetVertices(im, (PetscInt)n));
   for (PetscInt v = 0; v < n; v++) {
-    im->vert_number[v] = v + 1;
     PetscCall(SbScanPoint(s, "coordinate", v + 1, im->x + 3 * v));
     SbScanEndOfLine(s);
   }
