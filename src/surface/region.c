@@ -356,17 +356,13 @@ static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
   // each shell must enclose a volume, and each surface must have exactly one shell of negative volume
   for (PetscInt k = 0; k < s->nshell; k++) {
     const Shell *p = &s->shells[k];
-    const long long number = (long long)s->f->number[p->first];
+    PetscInt *outer = &s->surfaces[p->surface].outer;
 
     PetscCheck(PetscAbsReal(p->volume) > SB_TRIANGLE_EMPTY * PetscPowReal(p->area / 6, 1.5), PETSC_COMM_SELF,
                PETSC_ERR_USER_INPUT,
                "%s: the part with triangle %lld encloses no volume; give it a thickness, or remove it",
-               s->f->where, number);
-    if (p->volume > 0) continue;
-    PetscCheck(s->surfaces[p->surface].outer < 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "%s: the triangles around triangle %lld cut each other; join the parts into one", s->f->where,
-               number);
-    s->surfaces[p->surface].outer = k;
+               s->f->where, (long long)s->f->number[p->first]);
+    if (p->volume < 0) *outer = *outer == -1 ? k : -2; /* -2: several */
   }
   for (PetscInt k = 0; k < s->nsurface; k++)
     PetscCheck(s->surfaces[k].outer >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,

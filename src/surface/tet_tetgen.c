@@ -171,14 +171,13 @@ PetscErrorCode SbTetRun_TetGen(const SbTetJob *job, SbImport *tets)
 {
   char folder[PETSC_MAX_PATH_LEN];
   PetscErrorCode ierr;
-  const char *base;
+  const char *base = getenv("TMPDIR");
   DIR *d;
   const struct dirent *entry;
   char path[PATH_LENGTH];
 
   PetscFunctionBeginUser;
   // temporary folder
-  base = getenv("TMPDIR");
   (void)snprintf(folder, sizeof(folder) - 16, "%s/supple-tetgen-XXXXXX", base && base[0] ? base : "/tmp");
   PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
              "no temporary folder %s (%s); set TMPDIR to a folder that can be written", folder,
