@@ -126,8 +126,8 @@ static PetscErrorCode read_entities(Gmsh *g)
 
 /* ------------------------------------------------------------------ nodes and elements */
 
-/* Reads the numbers of blocks and of nodes or elements; before version 4 there is one block, and the number is
-   text also in a binary file. */
+/* Reads the numbers of blocks and of nodes or elements; before version 4 there is one block, and the number
+   is text also in a binary file. */
 static PetscErrorCode read_totals(Gmsh *g, const char *what, int64_t *nblock, int64_t *n)
 {
   SbScan *s = &g->im->scan;
