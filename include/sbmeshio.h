@@ -37,6 +37,7 @@ typedef struct {
   const char *end;
   const char *at;    /* next byte */
   const char *token; /* the last token, for messages */
+  char comment;      /* begins a comment up to the end of the line, which is passed over; 0: none does */
   PetscBool binary;  /* the numbers that follow are binary */
   PetscBool bytes;   /* messages count bytes instead of lines */
   PetscBool swap;    /* from a machine with the other byte order */
@@ -55,6 +56,8 @@ PetscErrorCode SbScanPoint(SbScan *scan, const char *what, int64_t number,
 /* A count of items with at least these bytes each, as text and in binary: an error if the file is shorter. */
 PetscErrorCode SbScanRoom(SbScan *scan, const char *what, int64_t n, int64_t text_bytes,
                           int64_t binary_bytes);
+/* The same of a "number of <what>" that it reads, in binary of 8 bytes. */
+PetscErrorCode SbScanCount(SbScan *scan, const char *what, int text_bytes, int binary_bytes, int64_t *n);
 /* Binary format of a number. */
 typedef struct {
   char kind; /* 'i' signed, 'u' unsigned, 'f' floating point */
@@ -64,11 +67,10 @@ typedef struct {
 PetscErrorCode SbScanType(SbScan *scan, SbNumberType *type);
 /* n numbers of this type from bytes. */
 void SbNumbersConvert(SbNumberType type, PetscBool big_endian, size_t n, const void *bytes, double value[]);
-/* The next word; empty at the end of the file. */
-PetscErrorCode SbScanWord(SbScan *scan, size_t size, char word[]);
+/* Whether there is a next word; empty at the end of the file. */
+PetscBool SbScanWord(SbScan *scan, size_t size, char word[]);
 void SbScanEndOfLine(SbScan *scan); /* to the first byte after it */
-void SbScanNext(SbScan *scan,
-                char comment); /* to the next word, over blank lines and comments to the end of a line */
+void SbScanNext(SbScan *scan);      /* to the next word, over blank lines and comments */
 PetscBool SbScanMore(SbScan *scan, char comment);
 #define SB_SCAN_ERROR(scan, ...)                                                    \
   do {                                                                              \
@@ -77,6 +79,9 @@ PetscBool SbScanMore(SbScan *scan, char comment);
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s", (scan)->where, \
             SbScanPosition(scan, sb_position), sb_text);                            \
   } while (0)
+#define SB_SCAN_ENDS(scan, what, ...)                                                                      \
+  SB_SCAN_ERROR(scan, "the file ends where " what " is expected; it is truncated, write or copy it again", \
+                __VA_ARGS__)
 
 /* ------------------------------------------------------------------ import.c: one body in memory */
 
@@ -212,7 +217,7 @@ void SbChildIsolate(pid_t parent, PetscReal seconds);
 PetscErrorCode SbImportScratch(SbImport *import, size_t bytes, void *array);
 /* The same for one more of `unit` bytes each. */
 PetscErrorCode SbImportGrow(SbImport *import, SbCount *count, size_t unit, void *array);
-/* Allocates n vertices. */
+/* Allocates n vertices, numbered from 1 on. */
 PetscErrorCode SbImportSetVertices(SbImport *import, PetscInt n);
 /* Appends a simplex; vert[dim + 1]. */
 PetscErrorCode SbImportAddItem(SbImport *import, int dim, const PetscInt vert[], PetscInt tags,

@@ -82,12 +82,9 @@ PetscErrorCode SbImportRead_Box(const char *text, SbImport *im)
   // vertices, then tets
   PetscCall(SbImportSetVertices(im, (n[0] + 1) * (n[1] + 1) * (n[2] + 1)));
   for (at[2] = 0; at[2] <= n[2]; at[2]++) {
-    for (at[1] = 0; at[1] <= n[1]; at[1]++) {
-      for (at[0] = 0; at[0] <= n[0]; at[0]++, v++) {
+    for (at[1] = 0; at[1] <= n[1]; at[1]++)
+      for (at[0] = 0; at[0] <= n[0]; at[0]++, v++)
         for (int d = 0; d < 3; d++) im->x[3 * v + d] = l[d] * (PetscReal)at[d] / (PetscReal)n[d];
-        im->vert_number[v] = v + 1;
-      }
-    }
   }
   for (at[2] = 0; at[2] < n[2]; at[2]++) {
     for (at[1] = 0; at[1] < n[1]; at[1]++)

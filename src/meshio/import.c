@@ -65,7 +65,7 @@ static const struct {
   SbReader read;
 } readers[] = {
   {".msh", SbImportRead_Gmsh},     {".vtk", SbImportRead_VTK},
-  {".vtu", SbImportRead_VTU},      {".mesh", SbImportRead_Mesh},
+  {".vtu", SbImportRead_VTU},      {".mesh", SbImportRead_Medit},
   {".node", SbImportRead_TetGen},  {".ele", SbImportRead_TetGen},
   {".face", SbImportRead_TetGen},  {".edge", SbImportRead_TetGen},
   {".vol", SbImportRead_Netgen},   {".neu", SbImportRead_NetgenNeutral},
@@ -76,18 +76,6 @@ static const struct {
   {".h5", SbImportRead_H5},        {".xmf", SbImportRead_Xdmf},
   {".poly", SbImportRead_Surface}, {".smesh", SbImportRead_Surface},
 };
-
-/* Reader for the extension of a file; NULL if unknown: then `known` lists all extensions. */
-static SbReader reader_of(const char *mesh, size_t size, char known[])
-{
-  const char *dot = strrchr(mesh, '.');
-
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(readers); i++) {
-    if (dot && !strcasecmp(dot, readers[i].extension)) return readers[i].read;
-    SbAppend(size, known, "%s%s", i ? " " : "", readers[i].extension);
-  }
-  return NULL;
-}
 
 /* Sets the inputs of a reader from the body. */
 static PetscErrorCode begin(const SbBody *body, SbImport *im)
@@ -109,14 +97,18 @@ static PetscErrorCode begin(const SbBody *body, SbImport *im)
 static PetscErrorCode read_body(const SbBody *body, SbImport *im)
 {
   char known[256] = "", node[PETSC_MAX_PATH_LEN + 8];
-  const SbReader read =
-    strncmp(body->mesh, "box:", 4) ? reader_of(body->mesh, sizeof(known), known) : SbImportRead_Box;
+  const char *dot = strrchr(body->mesh, '.');
+  SbReader read = strncmp(body->mesh, "box:", 4) ? NULL : SbImportRead_Box;
   PetscBool tetgen = PETSC_TRUE;
   PetscReal largest;
   PetscInt given;
 
   PetscFunctionBeginUser;
   PetscCall(begin(body, im));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(readers) && !read; i++) {
+    if (dot && !strcasecmp(dot, readers[i].extension)) read = readers[i].read;
+    SbAppend(sizeof(known), known, "%s%s", i ? " " : "", readers[i].extension);
+  }
   // a name without a known ending may be what TetGen's files have in common
   (void)snprintf(node, sizeof(node), "%s.node", body->mesh);
   if (!read) PetscCall(PetscTestFile(node, 'r', &tetgen));
@@ -202,11 +194,11 @@ PetscErrorCode SbImportRead(const SbBody *body, SbImport *im)
 
 PetscErrorCode SbImportSlabs(const SbBody *body, PetscInt *ncell)
 {
-  char known[256] = "";
+  const char *dot = strrchr(body->mesh, '.');
 
   PetscFunctionBeginUser;
   *ncell = 0;
-  if (!body->in_memory && !body->mesh_step && reader_of(body->mesh, sizeof(known), known) == SbImportRead_H5)
+  if (!body->in_memory && !body->mesh_step && dot && !strcasecmp(dot, ".h5"))
     PetscCall(SbImportSlabs_H5(body->mesh, ncell));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

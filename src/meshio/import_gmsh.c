@@ -39,7 +39,7 @@ static PetscErrorCode read_format(Gmsh *g)
   int64_t kind, size, one;
 
   PetscFunctionBeginUser;
-  PetscCall(SbScanWord(s, sizeof(version), version));
+  (void)SbScanWord(s, sizeof(version), version);
   g->version = 0;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(versions); i++)
     if (!strcmp(version, versions[i].name)) g->version = versions[i].version;
@@ -124,7 +124,27 @@ static PetscErrorCode read_entities(Gmsh *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ blocks of version 4 */
+/* ------------------------------------------------------------------ nodes and elements */
+
+/* Reads the numbers of blocks and of nodes or elements; before version 4 there is one block, and the number
+   is text also in a binary file. */
+static PetscErrorCode read_totals(Gmsh *g, const char *what, int64_t *nblock, int64_t *n)
+{
+  SbScan *s = &g->im->scan;
+  int64_t bound;
+
+  PetscFunctionBeginUser;
+  *nblock = 1;
+  if (g->version > 2) {
+    PetscCall(SbScanInt(s, 8, "number of blocks", nblock));
+    PetscCall(SbScanInt(s, 8, what, n));
+    for (int k = 0; k < 2 && g->version == 41; k++) PetscCall(SbScanInt(s, 8, "bound of numbers", &bound));
+  } else {
+    PetscCall(SbScanText(s, what, n));
+    if (g->binary) SbScanEndOfLine(s);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* Reads the header of a block: entity, kind (nodes: parametric or not; elements: type), number. */
 static PetscErrorCode read_block(Gmsh *g, int64_t *dim, int64_t *tag, int64_t *kind, int64_t *n)
@@ -140,29 +160,19 @@ static PetscErrorCode read_block(Gmsh *g, int64_t *dim, int64_t *tag, int64_t *k
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ nodes */
-
 /* Reads tag and coordinates of each node; in version 4 in blocks, perhaps with parametric coordinates; in 4.1
    all tags of a block come first. */
 static PetscErrorCode read_nodes(Gmsh *g)
 {
   SbImport *im = g->im;
   SbScan *s = &im->scan;
-  int64_t nblock = 1, n, dim = 0, tag, parametric = 0;
+  int64_t nblock, n, dim = 0, tag, parametric = 0;
   PetscInt v = 0;
   PetscReal parameter;
 
   PetscFunctionBeginUser;
   if (im->x) SB_SCAN_ERROR(s, "second section $Nodes");
-  // before version 4 the number of nodes is text also in a binary file, and the nodes are one block
-  if (g->version > 2) {
-    PetscCall(SbScanInt(s, 8, "number of blocks", &nblock));
-    PetscCall(SbScanInt(s, 8, "number of nodes", &n));
-    for (int k = 0; k < 2 && g->version == 41; k++) PetscCall(SbScanInt(s, 8, "bound of numbers", &tag));
-  } else {
-    PetscCall(SbScanText(s, "number of nodes", &n));
-    if (g->binary) SbScanEndOfLine(s);
-  }
+  PetscCall(read_totals(g, "number of nodes", &nblock, &n));
   PetscCall(SbScanRoom(s, "nodes", n, 8, 28));
   PetscCall(SbImportSetVertices(im, (PetscInt)n));
   for (int64_t b = 0; b < nblock; b++) {
@@ -191,73 +201,64 @@ static PetscErrorCode read_nodes(Gmsh *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ elements */
-
-static PetscErrorCode check_type(Gmsh *g, int64_t type)
-{
-  PetscFunctionBeginUser;
-  if (type < 1 || type >= SB_GMSH_NTYPES)
-    SB_SCAN_ERROR(&g->im->scan,
-                  "element type %lld; supple needs 4-node tetrahedra (type 4), with points, lines and "
-                  "triangles for groups",
-                  (long long)type);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Reads the nodes of one element, and adds it to the import. */
-static PetscErrorCode read_element(Gmsh *g, int type, int64_t number, PetscInt tags)
+/*
+  Reads the elements. In version 4 blocks have the entity and the type of their elements. In versions 1 and 2
+  type and tags stand in the line of each element, in a binary file before many of one type.
+*/
+static PetscErrorCode read_elements(Gmsh *g)
 {
   SbScan *s = &g->im->scan;
-  int64_t node;
-  PetscInt vert[64];
-
-  PetscFunctionBeginUser;
-  for (int i = 0; i < SbGmshTypes[type].nnode; i++) {
-    PetscCall(SbScanInt(s, g->width, "node of an element", &node));
-    vert[i] = SbNumbersFind(&g->im->nodes, node);
-    if (vert[i] < 0)
-      SB_SCAN_ERROR(s, "element %lld uses node %lld, which $Nodes does not list", (long long)number,
-                    (long long)node);
-  }
-  PetscCall(SbImportAddElement(g->im, type, vert, tags, number));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Versions 1 and 2: type and tags stand in the line of each element, in binary before many of one type. */
-static PetscErrorCode read_elements_2(Gmsh *g)
-{
-  SbScan *s = &g->im->scan;
-  int64_t total, number = 0, type, ntag = 2, n = 1, nnode, last_tag = 0;
+  const PetscBool blocks = (PetscBool)(g->version > 2);
+  int64_t nblock, total, left, dim = 0, entity = 0, type, n = 1, ntag = 2, number = 0, nnode;
+  int64_t last_tag = 0, last_dim = -1;
   PetscInt tags, last_tags = 0; /* of the last group: usually that of the next element too */
-  int dim, last_dim = -1;
 
   PetscFunctionBeginUser;
-  PetscCall(SbScanText(s, "number of elements", &total)); /* text also in a binary file */
-  if (g->binary) SbScanEndOfLine(s);
-  PetscCall(SbScanRoom(s, "elements", total, 8, 8));
-  for (int64_t left = total; left > 0; left -= n) {
-    if (!s->binary) PetscCall(SbScanInt(s, 4, "number of an element", &number));
-    PetscCall(SbScanInt(s, 4, "type of an element", &type));
-    PetscCall(check_type(g, type));
-    dim = SbGmshTypes[type].dim;
-    if (s->binary) PetscCall(SbScanInt(s, 4, "number of elements in a block", &n));
-    if (g->version == 2) PetscCall(SbScanInt(s, 4, "number of tags of an element", &ntag));
-    if (n < 1 || n > left)
+  PetscCall(read_totals(g, "number of elements", &nblock, &total));
+  left = total;
+  PetscCall(SbScanRoom(s, "elements", total, blocks ? 4 : 8, 8));
+  for (int64_t b = 0; blocks ? b < nblock : left > 0; b++, left -= n) {
+    if (blocks)
+      PetscCall(read_block(g, &dim, &entity, &type, &n));
+    else {
+      if (!s->binary) PetscCall(SbScanInt(s, 4, "number of an element", &number));
+      PetscCall(SbScanInt(s, 4, "type of an element", &type));
+      if (s->binary) PetscCall(SbScanInt(s, 4, "number of elements in a block", &n));
+      if (g->version == 2) PetscCall(SbScanInt(s, 4, "number of tags of an element", &ntag));
+    }
+    if (type < 1 || type >= SB_GMSH_NTYPES)
+      SB_SCAN_ERROR(s,
+                    "element type %lld; supple needs 4-node tetrahedra (type 4), with points, lines and "
+                    "triangles for groups",
+                    (long long)type);
+    if (n < (blocks ? 0 : 1) || n > left)
       SB_SCAN_ERROR(s, "block of %lld elements; only %lld of those announced for the section are left",
                     (long long)n, (long long)left);
+    // tag set of the entity; an unlisted entity has no groups
+    tags = 0;
+    for (PetscInt i = 0; blocks && i < g->nentity && !tags; i++)
+      if (g->entity[i].dim == dim && g->entity[i].tag == entity) tags = g->entity[i].tags;
+    if (tags && dim != SbGmshTypes[type].dim)
+      SB_SCAN_ERROR(s, "%s in a block of dimension %lld; the file is damaged", SbGmshTypes[type].name,
+                    (long long)dim);
     for (int64_t i = 0; i < n; i++) {
-      int64_t tag = 0, other;
+      PetscInt vert[64];
 
-      if (s->binary) PetscCall(SbScanInt(s, 4, "number of an element", &number));
-      // the first tag is the physical group, 0 for none; the others are ignored
-      PetscCall(SbScanRoom(s, "tags of an element", ntag, 2, 4));
-      for (int64_t k = 0; k < ntag; k++) PetscCall(SbScanInt(s, 4, "tag of an element", k ? &other : &tag));
-      if (tag && (tag != last_tag || dim != last_dim)) {
-        PetscCall(SbImportTagsAlone(g->im, dim, tag < 0 ? -tag : tag, NULL, &last_tags));
-        last_dim = dim;
-        last_tag = tag;
+      if (blocks || s->binary) PetscCall(SbScanInt(s, g->width, "number of an element", &number));
+      if (!blocks) {
+        int64_t tag = 0, other;
+
+        // the first tag is the physical group, 0 for none; the others are ignored
+        PetscCall(SbScanRoom(s, "tags of an element", ntag, 2, 4));
+        for (int64_t k = 0; k < ntag; k++) PetscCall(SbScanInt(s, 4, "tag of an element", k ? &other : &tag));
+        dim = SbGmshTypes[type].dim;
+        if (tag && (tag != last_tag || dim != last_dim)) {
+          PetscCall(SbImportTagsAlone(g->im, (PetscInt)dim, tag < 0 ? -tag : tag, NULL, &last_tags));
+          last_dim = dim;
+          last_tag = tag;
+        }
+        tags = tag ? last_tags : 0;
       }
-      tags = tag ? last_tags : 0;
       // in version 1 each element line has its number of nodes
       if (g->version == 1) {
         PetscCall(SbScanText(s, "number of nodes of an element", &nnode));
@@ -265,43 +266,21 @@ static PetscErrorCode read_elements_2(Gmsh *g)
           SB_SCAN_ERROR(s, "an element of type %d with %lld nodes; expected %d", (int)type, (long long)nnode,
                         SbGmshTypes[type].nnode);
       }
-      PetscCall(read_element(g, (int)type, number, tags));
+      for (int k = 0; k < SbGmshTypes[type].nnode; k++) {
+        int64_t node;
+
+        PetscCall(SbScanInt(s, g->width, "node of an element", &node));
+        vert[k] = SbNumbersFind(&g->im->nodes, node);
+        if (vert[k] < 0)
+          SB_SCAN_ERROR(s, "element %lld uses node %lld, which $Nodes does not list", (long long)number,
+                        (long long)node);
+      }
+      PetscCall(SbImportAddElement(g->im, (int)type, vert, tags, number));
     }
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode read_elements_4(Gmsh *g)
-{
-  SbScan *s = &g->im->scan;
-  int64_t nblock, total, dim, tag, type, n, number, nread = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanInt(s, 8, "number of blocks", &nblock));
-  PetscCall(SbScanInt(s, 8, "number of elements", &total));
-  for (int k = 0; k < 2 && g->version == 41; k++) PetscCall(SbScanInt(s, 8, "bound of numbers", &tag));
-  PetscCall(SbScanRoom(s, "elements", total, 4, 8));
-  for (int64_t b = 0; b < nblock; b++, nread += n) {
-    PetscInt tags = 0;
-
-    PetscCall(read_block(g, &dim, &tag, &type, &n));
-    PetscCall(check_type(g, type));
-    if (n < 0 || n > total - nread)
-      SB_SCAN_ERROR(s, "block of %lld elements; only %lld of those announced for the section are left",
-                    (long long)n, (long long)(total - nread));
-    // tag set of the entity; an unlisted entity has no groups
-    for (PetscInt i = 0; i < g->nentity && !tags; i++)
-      if (g->entity[i].dim == dim && g->entity[i].tag == tag) tags = g->entity[i].tags;
-    if (tags && dim != SbGmshTypes[type].dim)
-      SB_SCAN_ERROR(s, "%s in a block of dimension %lld; the file is damaged", SbGmshTypes[type].name,
-                    (long long)dim);
-    for (int64_t i = 0; i < n; i++) {
-      PetscCall(SbScanInt(s, g->width, "number of an element", &number));
-      PetscCall(read_element(g, (int)type, number, tags));
-    }
-  }
-  if (nread < total)
-    SB_SCAN_ERROR(s, "%lld elements are announced, the blocks hold %lld", (long long)total, (long long)nread);
+  if (left > 0)
+    SB_SCAN_ERROR(s, "%lld elements are announced, the blocks hold %lld", (long long)total,
+                  (long long)(total - left));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -316,7 +295,7 @@ PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
   // version 1 begins with its nodes
-  PetscCall(SbScanWord(s, sizeof(name), name));
+  (void)SbScanWord(s, sizeof(name), name);
   if (!strcmp(name, "$NOD"))
     g.version = 1;
   else if (strcmp(name, "$MeshFormat"))
@@ -337,25 +316,17 @@ PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
       SbScanEndOfLine(s);
       s->binary = g.binary;
       if (elements && !im->x) SB_SCAN_ERROR(s, "section %s before the nodes", name);
-      if (nodes)
-        PetscCall(read_nodes(&g));
-      else if (elements)
-        PetscCall(g.version <= 2 ? read_elements_2(&g) : read_elements_4(&g));
-      else
-        PetscCall(read_entities(&g));
+      PetscCall((nodes ? read_nodes : elements ? read_elements : read_entities)(&g));
       s->binary = PETSC_FALSE;
     } else if (!strcmp(name, "$PartitionedEntities"))
       SB_SCAN_ERROR(s, "the mesh is cut into partitions; save it in one piece (gmsh: Mesh, Unpartition)");
     else if (!SbScanFind(s, closing))
       SB_SCAN_ERROR(s, "section %s has no end; the file is truncated, write or copy it again", name);
-    PetscCall(SbScanWord(s, sizeof(end), end));
-    if (!end[0])
-      SB_SCAN_ERROR(s, "the file ends where %s is expected; it is truncated, write or copy it again",
-                    closing);
+    if (!SbScanWord(s, sizeof(end), end)) SB_SCAN_ENDS(s, "%s", closing);
     if (strcmp(end, closing))
       SB_SCAN_ERROR(s, "expected %s, found '%.20s'; the section is longer than announced or damaged", closing,
                     end);
-    PetscCall(SbScanWord(s, sizeof(name), name));
+    (void)SbScanWord(s, sizeof(name), name);
   }
   PetscCheck(im->x, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
              "%s: has no section $Nodes; it is truncated or not a mesh", im->where);

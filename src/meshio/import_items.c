@@ -69,6 +69,7 @@ PetscErrorCode SbImportSetVertices(SbImport *im, PetscInt n)
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(3 * (size_t)n, &im->x));
   PetscCall(PetscMalloc1(n, &im->vert_number));
+  for (PetscInt v = 0; v < n; v++) im->vert_number[v] = v + 1;
   im->nvert = n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -350,13 +351,10 @@ PetscErrorCode SbImportGroup(SbImport *im, PetscInt dim, int64_t tag, const char
   s = find_slot(im, dim, tag);
   g = im->slot[s];
   if (g < 0) {
-    g = im->slot[s] = im->ngroup;
+    g = im->slot[s] = im->ngroup++;
     PetscCall(SbReserve(g + 1, sizeof(SbGroup), &im->capacity[0], &im->group));
-    im->group[g].dim = dim;
-    im->group[g].tag = tag;
-    im->group[g].alone = -1;
+    im->group[g] = (SbGroup){.dim = dim, .tag = tag, .alone = -1};
     (void)snprintf(im->group[g].name, SB_GROUP_MAX, "%s_%lld", SbGroupKinds[dim], (long long)tag);
-    im->ngroup++;
   }
   if (name) PetscCall(PetscStrncpy(im->group[g].name, name, SB_GROUP_MAX));
   *group = g;

@@ -27,12 +27,10 @@ static PetscErrorCode read_elements(SbImport *im, int type)
 
   PetscFunctionBeginUser;
   if (!im->x) SB_SCAN_ERROR(s, "elements before the section Vertices");
-  SbScanNext(s, '#');
   PetscCall(SbScanCount(s, SbGmshTypes[type].name, 2 * nnode, 2 * nnode, &n));
   for (int64_t i = 0; i < n; i++) {
     PetscInt tags = 0;
 
-    SbScanNext(s, '#');
     for (int k = 0; k < nnode; k++) {
       PetscCall(SbScanText(s, "vertex of an element", &point));
       if (point < 1 || point > im->nvert)
@@ -57,34 +55,34 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
-  SbScanNext(s, '#');
-  PetscCall(SbScanWord(s, sizeof(word), word));
+  s->comment = '#';
+  SbScanNext(s);
+  // a neutral file of Netgen, which has the same extension, begins with a number
+  if (s->at < s->end && isdigit((unsigned char)*s->at)) {
+    PetscCall(SbScanClose(s));
+    PetscCall(SbImportRead_NetgenNeutral(path, im));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  (void)SbScanWord(s, sizeof(word), word);
   if (strcmp(word, "MeshVersionFormatted"))
     SB_SCAN_ERROR(s, "expected 'MeshVersionFormatted', found '%s'; this is no text file of Medit", word);
   for (;;) {
     // skip other sections: go to the next word that is not a number
-    for (SbScanNext(s, '#'); s->at < s->end && !isalpha((unsigned char)*s->at); SbScanNext(s, '#'))
+    for (SbScanNext(s); s->at < s->end && !isalpha((unsigned char)*s->at); SbScanNext(s))
       while (s->at < s->end && !isspace((unsigned char)*s->at)) s->at++;
-    PetscCall(SbScanWord(s, sizeof(word), word));
-    if (!word[0])
-      SB_SCAN_ERROR(
-        s, "the file ends where a section, or 'End', is expected; it is truncated, write or copy it again");
+    if (!SbScanWord(s, sizeof(word), word)) SB_SCAN_ENDS(s, "a section, or '%s',", "End");
     if (!strcmp(word, "End")) break;
     // coordinates and a reference, which is ignored
     if (!strcmp(word, "Vertices")) {
       if (im->x) SB_SCAN_ERROR(s, "second section Vertices");
-      SbScanNext(s, '#');
       PetscCall(SbScanCount(s, "vertices", 8, 8, &n));
       PetscCall(SbImportSetVertices(im, (PetscInt)n));
       for (PetscInt v = 0; v < n; v++) {
-        im->vert_number[v] = v + 1;
-        SbScanNext(s, '#');
         PetscCall(SbScanPoint(s, "coordinate", v + 1, im->x + 3 * v));
         PetscCall(SbScanReal(s, "reference", v + 1, &reference));
       }
     }
     if (!strcmp(word, "Dimension")) {
-      SbScanNext(s, '#');
       PetscCall(SbScanText(s, "dimension", &dimension));
       if (dimension != 3) SB_SCAN_ERROR(s, "dimension %lld; expected 3", (long long)dimension);
     }
@@ -92,20 +90,5 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
       if (!strcmp(word, elements[i].word)) PetscCall(read_elements(im, elements[i].type));
   }
   PetscCall(SbImportCheckTypes(im));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Medit and Netgen share the extension .mesh: a file of Netgen begins with a number. */
-PetscErrorCode SbImportRead_Mesh(const char *path, SbImport *im)
-{
-  SbScan *s = &im->scan;
-  PetscBool number;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanOpen(im->where, path, s));
-  SbScanNext(s, '#');
-  number = (PetscBool)(s->at < s->end && isdigit((unsigned char)*s->at));
-  PetscCall(SbScanClose(s));
-  PetscCall(number ? SbImportRead_NetgenNeutral(path, im) : SbImportRead_Medit(path, im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -98,30 +98,25 @@ static PetscErrorCode read_comment(Nastran *b, const char *text, const char *end
 
 /* ------------------------------------------------------------------ lines and fields */
 
-static void trim(const char *from, const char *to, char word[WORD])
+/* Field k of this line, trimmed; field 0 is the name. */
+static void get_field(const Nastran *b, int k, char word[WORD])
 {
+  const char *from = b->line.text, *to;
   size_t n = 0;
 
+  if (b->line.commas) {
+    for (int i = 0; i < k; i++) from += strcspn(from, ",") + (strchr(from, ',') != NULL);
+    to = from + strcspn(from, ",");
+  } else {
+    const size_t width = !k || b->line.per_line == 8 ? 8 : 16, first = k ? 8 + (size_t)(k - 1) * width : 0;
+
+    to = from + PetscMin(first + width, b->line.length);
+    from += PetscMin(first, b->line.length);
+  }
   while (from < to && isspace((unsigned char)*from)) from++;
   while (to > from && isspace((unsigned char)to[-1])) to--;
   for (; from < to && n + 1 < WORD; from++) word[n++] = *from;
   word[n] = 0;
-}
-
-/* Field k of this line; field 0 is the name. */
-static void get_field(const Nastran *b, int k, char word[WORD])
-{
-  const size_t length = b->line.length, width = b->line.per_line == 4 ? 16 : 8;
-  const size_t from = k ? 8 + (size_t)(k - 1) * width : 0, to = k ? from + width : 8;
-  const char *p = b->line.text;
-
-  if (b->line.commas) {
-    for (int i = 0; i < k && p; i++) p = (p = strchr(p, ',')) != NULL ? p + 1 : NULL;
-    word[0] = 0;
-    if (p) trim(p, p + strcspn(p, ","), word);
-    return;
-  }
-  trim(p + PetscMin(from, length), p + PetscMin(to, length), word);
 }
 
 /* Goes to the next line that is neither a comment nor empty; false at the end of the file. */
@@ -214,22 +209,15 @@ static PetscErrorCode to_number(Nastran *b, const char *word, const char *what, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode next_number(Nastran *b, const char *what, int64_t *value)
+/* Reads an integer; `needed`: it must not be missing. */
+static PetscErrorCode next_number(Nastran *b, PetscBool needed, const char *what, int64_t *value)
 {
   char word[WORD];
 
   PetscFunctionBeginUser;
   PetscCall(next_field(b, word));
   PetscCall(to_number(b, word, what, value));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Reads a required integer. */
-static PetscErrorCode next_label(Nastran *b, const char *what, int64_t *value)
-{
-  PetscFunctionBeginUser;
-  PetscCall(next_number(b, what, value));
-  if (!*value) SB_SCAN_ERROR(b->scan, "the %s is missing", what);
+  if (needed && !*value) SB_SCAN_ERROR(b->scan, "the %s is missing", what);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -241,8 +229,8 @@ static PetscErrorCode read_grid(Nastran *b)
   PetscReal *x;
 
   PetscFunctionBeginUser;
-  PetscCall(next_label(b, "number of a node", &label));
-  PetscCall(next_number(b, "coordinate system of a node", &system));
+  PetscCall(next_number(b, PETSC_TRUE, "number of a node", &label));
+  PetscCall(next_number(b, PETSC_FALSE, "coordinate system of a node", &system));
   if (system)
     SB_SCAN_ERROR(b->scan,
                   "node %lld is given in coordinate system %lld; write all nodes in the basic one (field 3 "
@@ -286,11 +274,11 @@ static PetscErrorCode read_element(Nastran *b, int kind)
   int64_t node;
 
   PetscFunctionBeginUser;
-  PetscCall(next_label(b, "number of an element", &e.label));
-  if (kinds[kind].property) PetscCall(next_number(b, "property of an element", &e.property));
+  PetscCall(next_number(b, PETSC_TRUE, "number of an element", &e.label));
+  if (kinds[kind].property) PetscCall(next_number(b, PETSC_FALSE, "property of an element", &e.property));
   if (!e.property) e.property = -1;
   for (int k = 0; k < kinds[kind].ncorner; k++) {
-    PetscCall(next_label(b, "node of an element", &node));
+    PetscCall(next_number(b, PETSC_TRUE, "node of an element", &node));
     if (k < 4) e.node[k] = node;
   }
   /* edge nodes; the last fields of shells and lines have other meanings */
@@ -330,7 +318,7 @@ static PetscErrorCode read_list(Nastran *b, const char *kind, int nskip)
   int64_t number = 0, node, last = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(next_label(b, "number of a set", &number));
+  PetscCall(next_number(b, PETSC_TRUE, "number of a set", &number));
   for (int i = 0; i < nskip; i++) PetscCall(next_field(b, word));
   for (;;) {
     PetscCall(next_field(b, word));
@@ -363,7 +351,7 @@ static PetscErrorCode read_entry(Nastran *b)
     int64_t system;
 
     PetscCall(next_field(b, word));
-    PetscCall(next_number(b, "coordinate system of the nodes", &system));
+    PetscCall(next_number(b, PETSC_FALSE, "coordinate system of the nodes", &system));
     if (system)
       SB_SCAN_ERROR(b->scan, "GRDSET gives the nodes in coordinate system %lld; write them in the basic one",
                     (long long)system);
@@ -373,9 +361,9 @@ static PetscErrorCode read_entry(Nastran *b)
     char word[WORD];
     int64_t spc = 0, node;
 
-    PetscCall(next_label(b, "spc of a set", &spc));
+    PetscCall(next_number(b, PETSC_TRUE, "spc of a set", &spc));
     for (int i = 0; i < 2; i++) {
-      PetscCall(next_number(b, "node of a set", &node));
+      PetscCall(next_number(b, PETSC_FALSE, "node of a set", &node));
       if (node) PetscCall(add_range(b, "spc", spc, node, node));
       for (int k = 0; k < 2; k++) PetscCall(next_field(b, word));
     }
@@ -387,7 +375,7 @@ static PetscErrorCode read_entry(Nastran *b)
   for (int k = 0; k < (int)PETSC_STATIC_ARRAY_LENGTH(kinds); k++)
     if (!strcasecmp(name, kinds[k].name)) PetscCall(read_element(b, k));
   if (b->pending[0] && (name[0] == 'P' || name[0] == 'p')) {
-    PetscCall(next_number(b, "number of a property", &number));
+    PetscCall(next_number(b, PETSC_FALSE, "number of a property", &number));
     PetscCall(add_name(b, number, b->pending));
     b->pending[0] = 0;
   }

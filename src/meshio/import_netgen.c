@@ -22,12 +22,9 @@ static PetscErrorCode read_points(SbImport *im)
   int64_t n;
 
   PetscFunctionBeginUser;
-  SbScanNext(s, '#');
   PetscCall(SbScanCount(s, "points", 6, 6, &n));
   PetscCall(SbImportSetVertices(im, (PetscInt)n));
   for (PetscInt v = 0; v < n; v++) {
-    im->vert_number[v] = v + 1;
-    SbScanNext(s, '#');
     PetscCall(SbScanPoint(s, "coordinate", v + 1, im->x + 3 * v));
     SbScanEndOfLine(s);
   }
@@ -61,14 +58,12 @@ static PetscErrorCode read_elements(SbImport *im, const Layout *l)
   PetscInt vert[10];
 
   PetscFunctionBeginUser;
-  SbScanNext(s, '#');
   PetscCall(SbScanCount(s, l->dim == 3 ? "volume elements" : "surface elements", l->room, l->room, &n));
   for (int64_t i = 0; i < n; i++) {
     const char *at, *token;
     int type = SB_GMSH_LINE;
     PetscInt tags = 0;
 
-    SbScanNext(s, '#');
     for (int k = 0; k < 5 && l->before[k]; k++) PetscCall(SbScanText(s, l->before[k], &value[k]));
     // number of points: given, or the number of words on the rest of the line
     nnode = l->nnode < 0 ? 0 : value[l->nnode];
@@ -101,9 +96,10 @@ PetscErrorCode SbImportRead_NetgenNeutral(const char *path, SbImport *im)
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
+  s->comment = '#';
   PetscCall(read_points(im));
   PetscCall(read_elements(im, &neutral_volume));
-  SbScanNext(s, '#');
+  SbScanNext(s);
   if (s->at < s->end) PetscCall(read_elements(im, &neutral_surface));
   PetscCall(SbImportCheckTypes(im));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -135,12 +131,10 @@ static PetscErrorCode read_names(SbImport *im, const char *section, PetscInt dim
 
   PetscFunctionBeginUser;
   if (!find_section(s, section)) PetscFunctionReturn(PETSC_SUCCESS);
-  SbScanNext(s, '#');
   PetscCall(SbScanCount(s, "names", 2, 2, &n));
   for (int64_t i = 0; i < n; i++) {
     char name[SB_GROUP_MAX];
 
-    SbScanNext(s, '#');
     PetscCall(SbScanText(s, "number of a name", &number));
     PetscCall(SbScanRestOfLine(s, sizeof(name), name));
     if (name[0]) PetscCall(SbImportNameGroup(im, dim, number, name));
@@ -155,8 +149,8 @@ PetscErrorCode SbImportRead_Netgen(const char *path, SbImport *im)
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
-  SbScanNext(s, '#');
-  PetscCall(SbScanWord(s, sizeof(word), word));
+  s->comment = '#';
+  (void)SbScanWord(s, sizeof(word), word);
   if (strcmp(word, "mesh3d"))
     SB_SCAN_ERROR(s, "expected 'mesh3d', found '%s'; this is no mesh of Netgen", word);
   if (!find_section(s, "points"))

@@ -47,7 +47,6 @@ static PetscErrorCode read_file(SbImport *im, int f)
 
   PetscFunctionBeginUser;
   /* the first count is required, the others default to 0 */
-  SbScanNext(s, '#');
   PetscCall(SbScanText(s, files[f].count, &count[0]));
   for (int i = 1; i < files[f].ncount && SbScanMore(s, '#'); i++)
     PetscCall(SbScanText(s, "count or mark of the first line", &count[i]));
@@ -71,7 +70,6 @@ static PetscErrorCode read_file(SbImport *im, int f)
     const int64_t marks = count[files[f].ncount - 1];
     PetscInt vert[10] = {i}, tags = 0;
 
-    SbScanNext(s, '#');
     PetscCall(SbScanText(s, dim ? "number of an item" : "number of a point", &number));
     // point numbers are consecutive; a point has coordinates, a tet, face or edge has points
     if (dim == 0) im->vert_number[i] = number;
@@ -150,6 +148,7 @@ PetscErrorCode SbImportRead_TetGen(const char *path, SbImport *im)
     (void)snprintf(where, sizeof(im->where) + 8, "%.*s%s", lead, im->where, name);
     PetscCall(SbScanClose(&im->scan));
     PetscCall(SbScanOpen(where, name, &im->scan));
+    im->scan.comment = '#';
     PetscCall(read_file(im, f));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

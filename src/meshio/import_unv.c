@@ -7,7 +7,6 @@
   volume_N, surface_N or curve_N of its physical property N, and to the named groups that list it. Groups of
   nodes are kept too. Errors: volume elements other than tets of 4 or 10 nodes.
 */
-#include <ctype.h>
 #include "meshio_impl.h"
 
 /* FE descriptor ids, and gmsh's types. Others (springs, masses) are skipped. */
@@ -26,13 +25,11 @@ static const struct {
 /* Whether this line is a delimiter: -1 and nothing else. */
 static PetscBool is_mark(const SbScan *s)
 {
-  const char *p = s->at;
+  const char *p = s->at + strspn(s->at, " \t");
 
-  while (p < s->end && (*p == ' ' || *p == '\t')) p++;
-  if (s->end - p < 2 || p[0] != '-' || p[1] != '1') return PETSC_FALSE;
-  for (p += 2; p < s->end && *p != '\n'; p++)
-    if (!isspace((unsigned char)*p)) return PETSC_FALSE;
-  return PETSC_TRUE;
+  if (strncmp(p, "-1", 2)) return PETSC_FALSE;
+  p += 2 + strspn(p + 2, " \t\r\v\f");
+  return (PetscBool)(*p == '\n' || p == s->end);
 }
 
 /* ------------------------------------------------------------------ nodes and elements */
@@ -113,7 +110,7 @@ PetscErrorCode SbImportRead_UNV(const char *path, SbImport *im)
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
-  for (SbScanNext(s, 0); s->at < s->end; SbScanNext(s, 0)) {
+  for (SbScanNext(s); s->at < s->end; SbScanNext(s)) {
     int64_t id;
 
     while (s->at > s->data && s->at[-1] != '\n') s->at--; /* back to the beginning of the line */
@@ -127,9 +124,7 @@ PetscErrorCode SbImportRead_UNV(const char *path, SbImport *im)
       // the data set ends at a delimiter; the end of the file is an error
       while (s->at < s->end && (*s->at == '\n' || *s->at == '\r')) s->at++;
       s->token = s->at;
-      if (s->at >= s->end)
-        SB_SCAN_ERROR(
-          s, "the file ends where a line of -1 is expected; it is truncated, write or copy it again");
+      if (s->at >= s->end) SB_SCAN_ENDS(s, "a line of %d", -1);
       if (is_mark(s)) break;
       // data set 2411 has the coordinates on a line of their own, data set 15 on the same line
       if (id == 2411 || id == 781 || id == 15) {

@@ -12,9 +12,9 @@ typedef struct {
   SbScan *scan;
   SbImport *im;
   SbVtkGrid grid;
-  PetscBool binary, points, cells, on_cells; /* on_cells: the arrays that follow are cell data */
-  int64_t ntuple;                            /* number of tuples of the arrays that follow */
-  const char *cells_at;                      /* position of the cells, for messages */
+  PetscBool points, cells, on_cells; /* on_cells: the arrays that follow are cell data */
+  int64_t ntuple;                    /* number of tuples of the arrays that follow */
+  const char *cells_at;              /* position of the cells, for messages */
 } Vtk;
 
 /* ------------------------------------------------------------------ numbers */
@@ -24,19 +24,19 @@ static PetscErrorCode read_array(Vtk *v, const char *what, int64_t n, SbNumberTy
 {
   SbScan *s = v->scan;
   const size_t bytes = (size_t)n * (size_t)type.size;
-  const int least = v->binary ? type.size : 2;
+  const int least = s->bytes ? type.size : 2;
   PetscReal x;
 
   PetscFunctionBeginUser;
   // binary data begins after the end of the line
-  if (v->binary) SbScanEndOfLine(s);
+  if (s->bytes) SbScanEndOfLine(s);
   PetscCall(SbScanRoom(s, what, n, least, least));
   if (value) PetscCall(SbImportScratch(v->im, (size_t)n * sizeof(**value), value));
-  for (int64_t i = 0; i < n && !v->binary; i++) {
+  for (int64_t i = 0; i < n && !s->bytes; i++) {
     PetscCall(SbScanReal(s, what, 0, &x));
     if (value) (*value)[i] = x;
   }
-  if (!v->binary) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!s->bytes) PetscFunctionReturn(PETSC_SUCCESS);
   s->token = s->at;
   if ((size_t)(s->end - s->at) < bytes)
     SB_SCAN_ERROR(s, "the file ends within the %s; it is truncated, write or copy it again", what);
@@ -64,13 +64,13 @@ static PetscErrorCode read_cells(Vtk *v)
   PetscCall(SbScanCount(s, "cells", 1, 1, &n));
   PetscCall(SbScanCount(s, "numbers in the list of cells", 1, 1, &size));
   at = s->at;
-  PetscCall(SbScanWord(s, sizeof(word), word));
+  (void)SbScanWord(s, sizeof(word), word);
   if (!strcasecmp(word, "OFFSETS")) {
     // since version 5: `n` offsets from 0 to the number of points, then the points
     PetscCall(SbScanType(s, &type));
     PetscCall(read_array(v, "offsets", n, type, &grid->end));
     for (int64_t c = 0; c + 1 < n; c++) grid->end[c] = grid->end[c + 1]; /* drop the first offset, 0 */
-    PetscCall(SbScanWord(s, sizeof(word), word));
+    (void)SbScanWord(s, sizeof(word), word);
     if (strcasecmp(word, "CONNECTIVITY")) SB_SCAN_ERROR(s, "expected CONNECTIVITY, found '%s'", word);
     PetscCall(SbScanType(s, &type));
     PetscCall(read_array(v, "points of cells", size, type, &grid->connect));
@@ -164,28 +164,26 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
     // SCALARS name type [components] / LOOKUP_TABLE name / numbers
     const char *at;
 
-    PetscCall(SbScanWord(s, sizeof(name), name));
+    (void)SbScanWord(s, sizeof(name), name);
     PetscCall(SbScanType(s, &type));
     if (SbScanMore(s, '\n')) PetscCall(SbScanText(s, "number of components", &ncomponent));
     at = s->at;
-    PetscCall(SbScanWord(s, sizeof(word), word));
+    (void)SbScanWord(s, sizeof(word), word);
     if (strcasecmp(word, "LOOKUP_TABLE"))
       s->at = at;
     else
-      PetscCall(SbScanWord(s, sizeof(word), word));
+      (void)SbScanWord(s, sizeof(word), word);
     PetscCall(read_data(v, name, ncomponent, v->ntuple, type));
   } else if (!strcasecmp(section, "FIELD")) {
     // FIELD name n, then n times: name components tuples type / numbers
-    PetscCall(SbScanWord(s, sizeof(word), word));
+    (void)SbScanWord(s, sizeof(word), word);
     PetscCall(SbScanCount(s, "arrays in a field", 8, 8, &n));
     for (int64_t i = 0; i < n; i++) {
-      PetscCall(SbScanWord(s, sizeof(name), name));
+      (void)SbScanWord(s, sizeof(name), name);
       if (!strcmp(name, "METADATA")) {
-        while (SbScanMore(s, '\n')) {
-          SbScanEndOfLine(s);
-          if (s->at < s->end && (*s->at == '\n' || *s->at == '\r')) break;
-        }
-        PetscCall(SbScanWord(s, sizeof(name), name));
+        do SbScanEndOfLine(s);
+        while (SbScanMore(s, '\n'));
+        (void)SbScanWord(s, sizeof(name), name);
       }
       PetscCall(SbScanText(s, "number of components", &ncomponent));
       PetscCall(SbScanText(s, "number of tuples", &ntuple));
@@ -194,7 +192,7 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
     }
   } else if (!strcasecmp(section, "LOOKUP_TABLE")) {
     // 4 bytes or 4 numbers per entry
-    PetscCall(SbScanWord(s, sizeof(name), name));
+    (void)SbScanWord(s, sizeof(name), name);
     PetscCall(SbScanCount(s, "colours", 1, 1, &n));
     PetscCall(read_array(v, "colours", 4 * n, (SbNumberType){'u', 1}, NULL));
   } else if (!strcasecmp(section, "METADATA")) {
@@ -202,7 +200,7 @@ static PetscErrorCode read_section(Vtk *v, const char *section)
     do SbScanEndOfLine(s);
     while (SbScanMore(s, '\n'));
   } else if (k < PETSC_STATIC_ARRAY_LENGTH(tuples)) {
-    PetscCall(SbScanWord(s, sizeof(name), name));
+    (void)SbScanWord(s, sizeof(name), name);
     PetscCall(SbScanType(s, &type));
     PetscCall(read_data(v, name, tuples[k].ncomponent, v->ntuple, type));
   } else
@@ -223,21 +221,16 @@ PetscErrorCode SbImportRead_VTK(const char *path, SbImport *im)
     SB_SCAN_ERROR(s, "expected '# vtk DataFile Version'; this is no legacy file of VTK");
   SbScanEndOfLine(s);
   SbScanEndOfLine(s); /* title */
-  PetscCall(SbScanWord(s, sizeof(kind), kind));
+  (void)SbScanWord(s, sizeof(kind), kind);
   if (strcasecmp(kind, "ASCII") && strcasecmp(kind, "BINARY"))
     SB_SCAN_ERROR(s, "expected ASCII or BINARY, found '%s'", kind);
-  v.binary = (PetscBool)!strcasecmp(kind, "BINARY");
-  s->bytes = v.binary;
-  PetscCall(SbScanWord(s, sizeof(word), word));
+  s->bytes = (PetscBool)!strcasecmp(kind, "BINARY");
+  (void)SbScanWord(s, sizeof(word), word);
   if (strcasecmp(word, "DATASET")) SB_SCAN_ERROR(s, "expected DATASET, found '%s'", word);
-  PetscCall(SbScanWord(s, sizeof(word), word));
+  (void)SbScanWord(s, sizeof(word), word);
   if (strcasecmp(word, "UNSTRUCTURED_GRID"))
     SB_SCAN_ERROR(s, "data set %s; expected UNSTRUCTURED_GRID with tetrahedra", word);
-  for (;;) {
-    PetscCall(SbScanWord(s, sizeof(name), name));
-    if (!name[0]) break;
-    PetscCall(read_section(&v, name));
-  }
+  while (SbScanWord(s, sizeof(name), name)) PetscCall(read_section(&v, name));
   if (!v.points || !v.cells || !v.grid.type)
     SB_SCAN_ERROR(s, "the file ends before the section %s; it is truncated, write or copy it again",
                   !v.points  ? "POINTS"

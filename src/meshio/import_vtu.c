@@ -142,16 +142,14 @@ static PetscBool take_bytes(Bytes *b, size_t n, unsigned char out[])
 static PetscErrorCode take_length(Vtu *v, Bytes *b, const char *name, size_t *length)
 {
   unsigned char raw[8];
-  uint64_t value = 0;
+  double value;
 
   PetscFunctionBeginUser;
   if (!take_bytes(b, (size_t)v->header, raw))
     SB_SCAN_ERROR(v->scan, "the data of array '%s' is truncated, or no base64", name);
-  for (int i = 0; i < v->header; i++)
-    value |= (uint64_t)raw[i] << 8 * (v->big_endian ? v->header - 1 - i : i);
-  if (value > (uint64_t)1 << 40)
-    SB_SCAN_ERROR(v->scan, "array '%s' announces %llu bytes or blocks; it is damaged", name,
-                  (unsigned long long)value);
+  SbNumbersConvert((SbNumberType){'u', v->header}, v->big_endian, 1, raw, &value);
+  if (value > 0x1p40)
+    SB_SCAN_ERROR(v->scan, "array '%s' announces %.0f bytes or blocks; it is damaged", name, value);
   *length = (size_t)value;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

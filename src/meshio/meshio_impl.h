@@ -12,17 +12,13 @@ PetscErrorCode SbImportNameGroup(SbImport *import, PetscInt dim, int64_t tag, co
 
 /* scan.c: reads an integer, as text or binary of 4 or 8 bytes; `what` describes it in error messages. */
 PetscErrorCode SbScanInt(SbScan *scan, int bytes, const char *what, int64_t *value);
-/* Reads the "number of <what>", in binary of 8 bytes; for the bytes of an item see SbScanRoom(). */
-PetscErrorCode SbScanCount(SbScan *scan, const char *what, int text_bytes, int binary_bytes, int64_t *n);
 
 /* Reads a file, or a mesh description `text`: sets x, vert_number, items and groups. */
 typedef PetscErrorCode (*SbReader)(const char *text, SbImport *body);
 PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Netgen(const char *path, SbImport *body); /* .vol */
 PetscErrorCode SbImportRead_NetgenNeutral(const char *path, SbImport *body);
-PetscErrorCode SbImportRead_Medit(const char *path, SbImport *body);
-PetscErrorCode SbImportRead_Mesh(const char *path,
-                                 SbImport *body); /* .mesh: Medit, or the neutral format of Netgen */
+PetscErrorCode SbImportRead_Medit(const char *path, SbImport *body); /* or the neutral format of Netgen */
 PetscErrorCode SbImportRead_VTK(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_VTU(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *body);

@@ -73,10 +73,13 @@ const char *SbScanPosition(const SbScan *s, char position[64])
   return position;
 }
 
-static inline void skip_blanks(SbScan *s)
+void SbScanNext(SbScan *s)
 {
-  while (s->at < s->end && isspace((unsigned char)*s->at)) s->at++;
-  s->token = s->at;
+  for (;; SbScanEndOfLine(s)) {
+    while (s->at < s->end && isspace((unsigned char)*s->at)) s->at++;
+    s->token = s->at;
+    if (!s->comment || s->at >= s->end || *s->at != s->comment) return;
+  }
 }
 
 static inline PetscBool ends_token(const SbScan *s, const char *p)
@@ -88,16 +91,11 @@ static inline PetscBool ends_token(const SbScan *s, const char *p)
 static PetscErrorCode unexpected(SbScan *s, const char *what, int64_t number)
 {
   char found[24], of[32] = "";
-  size_t n = 0;
 
   PetscFunctionBeginUser;
   if (number) (void)snprintf(of, sizeof(of), " of node %lld", (long long)number);
-  if (s->at >= s->end)
-    SB_SCAN_ERROR(s, "the file ends where the %s%s is expected; it is truncated, write or copy it again",
-                  what, of);
-  for (; n + 1 < sizeof(found) && !ends_token(s, s->at + n); n++)
-    found[n] = isprint((unsigned char)s->at[n]) ? s->at[n] : '?';
-  found[n] = 0;
+  if (s->at >= s->end) SB_SCAN_ENDS(s, "the %s%s", what, of);
+  (void)SbScanWord(s, sizeof(found), found);
   SB_SCAN_ERROR(s, "expected the %s%s, found '%s'", what, of, found);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -110,7 +108,7 @@ PetscErrorCode SbScanText(SbScan *s, const char *what, int64_t *value)
   int ndigit = 0;
 
   PetscFunctionBeginUser;
-  skip_blanks(s);
+  SbScanNext(s);
   p = s->at;
   minus = (PetscBool)(p < s->end && *p == '-');
   if (p < s->end && (*p == '-' || *p == '+')) p++;
@@ -126,8 +124,7 @@ static inline PetscErrorCode take(SbScan *s, const char *what, size_t n, void *v
 {
   PetscFunctionBeginUser;
   s->token = s->at;
-  if ((size_t)(s->end - s->at) < n)
-    SB_SCAN_ERROR(s, "the file ends where the %s is expected; it is truncated, write or copy it again", what);
+  if ((size_t)(s->end - s->at) < n) SB_SCAN_ENDS(s, "the %s", what);
   memcpy(value, s->at, n);
   for (size_t i = 0; s->swap && i < n; i++) ((char *)value)[i] = s->at[n - 1 - i];
   s->at += n;
@@ -170,7 +167,7 @@ PetscErrorCode SbScanReal(SbScan *s, const char *what, int64_t number, PetscReal
     PetscCall(take(s, what, sizeof(*value), value));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  skip_blanks(s);
+  SbScanNext(s);
   *value = strtod(s->at, &p);
   if (s->at < s->end && p > s->at && (*p == 'D' || *p == 'd')) {
     // exponent letter of Fortran, 1.5D+00
@@ -221,19 +218,16 @@ PetscErrorCode SbScanRoom(SbScan *s, const char *what, int64_t n, int64_t text_b
 
 PetscErrorCode SbScanQuoted(SbScan *s, const char *what, size_t size, char value[])
 {
-  const char *close;
   size_t n;
 
   PetscFunctionBeginUser;
-  skip_blanks(s);
-  close = s->at < s->end && *s->at == '"' ? (const char *)memchr(s->at + 1, '"', (size_t)(s->end - s->at) - 1)
-                                          : NULL;
-  if (!close) PetscCall(unexpected(s, what, 0));
-  n = (size_t)(close - s->at) - 1;
+  SbScanNext(s);
+  n = *s->at == '"' ? strcspn(s->at + 1, "\"") : 0; /* the data ends with a zero */
+  if (*s->at != '"' || s->at[n + 1] != '"') PetscCall(unexpected(s, what, 0));
   if (n >= size) SB_SCAN_ERROR(s, "the %s is longer than %zu characters", what, size - 1);
   memcpy(value, s->at + 1, n);
   value[n] = 0;
-  s->at = close + 1;
+  s->at += n + 2;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -252,17 +246,16 @@ PetscErrorCode SbScanRestOfLine(SbScan *s, size_t size, char name[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbScanWord(SbScan *s, size_t size, char word[])
+PetscBool SbScanWord(SbScan *s, size_t size, char word[])
 {
   size_t n = 0;
 
-  PetscFunctionBeginUser;
-  skip_blanks(s);
+  SbScanNext(s);
   for (; n + 1 < size && !ends_token(s, s->at + n); n++)
     word[n] = isprint((unsigned char)s->at[n]) ? s->at[n] : '?';
   word[n] = 0;
   s->at += n;
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return (PetscBool)(n > 0);
 }
 
 PetscErrorCode SbScanType(SbScan *s, SbNumberType *type)
@@ -287,7 +280,7 @@ PetscErrorCode SbScanType(SbScan *s, SbNumberType *type)
   char word[32];
 
   PetscFunctionBeginUser;
-  PetscCall(SbScanWord(s, sizeof(word), word));
+  (void)SbScanWord(s, sizeof(word), word);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(types) && word[0]; i++) {
     if (strcasecmp(word, types[i].name) && strcasecmp(word, types[i].other)) continue;
     *type = types[i].type;
@@ -321,15 +314,6 @@ void SbNumbersConvert(SbNumberType type, PetscBool big_endian, size_t n, const v
 
       value[i] = (double)((int64_t)(bits << unused) >> unused);
     }
-  }
-}
-
-void SbScanNext(SbScan *s, char comment)
-{
-  skip_blanks(s);
-  while (s->at < s->end && *s->at == comment) {
-    SbScanEndOfLine(s);
-    skip_blanks(s);
   }
 }
 

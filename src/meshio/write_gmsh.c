@@ -14,6 +14,7 @@
 #include <errno.h>
 #include <stdlib.h>
 #include "meshio_impl.h"
+#include "sbgeometry.h"
 
 typedef struct {
   const SbImport *im;
@@ -124,23 +125,14 @@ static void write_entity(Out *out, int dim, PetscInt tags)
   const SbImport *im = out->im;
   PetscReal box[6];
   PetscInt k = im->tags_start[tags], g;
-  const SbItems *item = &out->im->item[dim];
+  const SbItems *item = &im->item[dim];
 
   // bounding box of the items of this tag set
-  for (int i = 0; i < 3; i++) box[i] = PETSC_MAX_REAL, box[3 + i] = PETSC_MIN_REAL;
+  SbBoxClear(box);
   for (PetscInt j = 0; j < item->n; j++) {
     if (item->tags[j] != tags) continue;
-    for (int a = 0; a <= dim; a++) {
-      const PetscReal *x = out->im->x + 3 * item->vert[(dim + 1) * j + a];
-
-      for (int i = 0; i < 3; i++) {
-        box[i] = PetscMin(box[i], x[i]);
-        box[3 + i] = PetscMax(box[3 + i], x[i]);
-      }
-    }
+    for (int a = 0; a <= dim; a++) SbBoxAdd(box, im->x + 3 * item->vert[(dim + 1) * j + a]);
   }
-  for (int i = 0; i < 6; i++)
-    if (box[i] == PETSC_MAX_REAL || box[i] == PETSC_MIN_REAL) box[i] = 0;
   put(out, 4, tags + 1, ' ');
   for (int i = 0; i < (dim ? 6 : 3); i++) put_real(out, box[i], ' ');
   put(out, 8, count_groups(im, tags, dim), ' ');

@@ -105,7 +105,6 @@ static PetscErrorCode make_surface(const char *path, const PetscReal at[3], SbTr
   char option[SB_IMPORT_OPTION_MAX];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(repairs, sizeof(*repairs)));
   PetscCall(SbTrianglesReadFile(path, f));
   // scale and translate; check for invalid numbers
   for (PetscInt i = 0; i < 3 * t->nvert; i++) {
@@ -192,7 +191,7 @@ static PetscErrorCode take_boundary(const SbTriangleFile *f, const SbSurface *s,
 static PetscErrorCode read_obstacle(const char *path, const PetscReal at[3], SbTriangleFile *f)
 {
   const SbTriangleFormat *format = SbTrianglesFormat(path);
-  SbSurfaceRepairs repairs;
+  SbSurfaceRepairs repairs = {0};
   SbSurface s = {0};
   PetscErrorCode ierr;
 
@@ -255,7 +254,7 @@ PetscErrorCode SbSurfaceRead(const char *path, SbImport *im, SbSurface *s)
 {
   SbTriangles t = {0};
   SbTriangleFile file = {.im = im, .where = im->where, .body = PETSC_TRUE, .t = &t};
-  SbSurfaceRepairs repairs;
+  SbSurfaceRepairs repairs = {0};
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;

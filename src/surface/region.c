@@ -356,17 +356,13 @@ static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
   // each shell must enclose a volume, and each surface must have exactly one shell of negative volume
   for (PetscInt k = 0; k < s->nshell; k++) {
     const Shell *p = &s->shells[k];
-    const long long number = (long long)s->f->number[p->first];
+    PetscInt *outer = &s->surfaces[p->surface].outer;
 
     PetscCheck(PetscAbsReal(p->volume) > SB_TRIANGLE_EMPTY * PetscPowReal(p->area / 6, 1.5), PETSC_COMM_SELF,
                PETSC_ERR_USER_INPUT,
                "%s: the part with triangle %lld encloses no volume; give it a thickness, or remove it",
-               s->f->where, number);
-    if (p->volume > 0) continue;
-    PetscCheck(s->surfaces[p->surface].outer < 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "%s: the triangles around triangle %lld cut each other; join the parts into one", s->f->where,
-               number);
-    s->surfaces[p->surface].outer = k;
+               s->f->where, (long long)s->f->number[p->first]);
+    if (p->volume < 0) *outer = *outer == -1 ? k : -2; /* -2: several */
   }
   for (PetscInt k = 0; k < s->nsurface; k++)
     PetscCheck(s->surfaces[k].outer >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -383,26 +379,18 @@ static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
     s->shells[s->surfaces[k].outer].parent = s->surfaces[k].parent;
   }
   if (!s->f->sheets) empty_cavities(s);
-  // regions of the hole points in the file are empty
-  for (PetscInt i = 0; i < s->f->nhole; i++) {
-    const SbSeed *h = &s->f->hole[i];
-    const PetscInt k = shell_around(s, h->x, -1);
+  // points in the file: each must lie in a region; those of holes are empty
+  for (PetscInt i = 0; i < s->f->nhole + s->f->nregion; i++) {
+    const PetscBool hole = (PetscBool)(i < s->f->nhole);
+    const SbSeed *seed = hole ? &s->f->hole[i] : &s->f->region[i - s->f->nhole];
+    const PetscInt k = shell_around(s, seed->x, -1);
 
-    PetscCheck(
-      k != OUTSIDE, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-      "%s: hole %lld at (%.6g, %.6g, %.6g) m lies in no region; move it into the cavity, or remove it",
-      s->f->where, (long long)h->number, (double)h->x[0], (double)h->x[1], (double)h->x[2]);
-    s->m->ncavity += !s->shells[k].empty;
-    s->shells[k].empty = PETSC_TRUE;
-  }
-  // each region point in the file must be in a region
-  for (PetscInt i = 0; i < s->f->nregion; i++) {
-    const SbSeed *r = &s->f->region[i];
-
-    PetscCheck(
-      shell_around(s, r->x, -1) != OUTSIDE, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-      "%s: the point of region %lld at (%.6g, %.6g, %.6g) m lies in no region; move it, or remove it",
-      s->f->where, (long long)r->number, (double)r->x[0], (double)r->x[1], (double)r->x[2]);
+    PetscCheck(k != OUTSIDE, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s: %s %lld at (%.6g, %.6g, %.6g) m lies in no region; move it%s, or remove it", s->f->where,
+               hole ? "hole" : "the point of region", (long long)seed->number, (double)seed->x[0],
+               (double)seed->x[1], (double)seed->x[2], hole ? " into the cavity" : "");
+    s->m->ncavity += hole && !s->shells[k].empty;
+    if (hole) s->shells[k].empty = PETSC_TRUE;
   }
   // number the positive shells with material; a negative shell has the number of the region around it
   for (Shell *p = s->shells; p < s->shells + s->nshell; p++)

@@ -144,9 +144,7 @@ static PetscErrorCode work_in(const char *folder, const SbTetJob *job, SbImport 
   im->item[0].n = im->item[1].n = 0; /* marked points and edges */
   // restore the exact coordinates of a kept surface, which were rounded to text
   if (!job->remesh) {
-    PetscCheck(im->nvert >= s->nvert, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "vertices of the surface are gone");
-    for (PetscInt i = 0; i < 3 * s->nvert; i++) {
+    for (PetscInt i = 0; i < 3 * PetscMin(s->nvert, im->nvert); i++) {
       PetscCheck(PetscAbsReal(im->x[i] - s->x[i]) < 1e-6 * job->edge, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
                  "vertex %" PetscInt_FMT " of the surface was moved", i / 3 + 1);
       im->x[i] = s->x[i];
@@ -173,14 +171,13 @@ PetscErrorCode SbTetRun_TetGen(const SbTetJob *job, SbImport *tets)
 {
   char folder[PETSC_MAX_PATH_LEN];
   PetscErrorCode ierr;
-  const char *base;
+  const char *base = getenv("TMPDIR");
   DIR *d;
   const struct dirent *entry;
   char path[PATH_LENGTH];
 
   PetscFunctionBeginUser;
   // temporary folder
-  base = getenv("TMPDIR");
   (void)snprintf(folder, sizeof(folder) - 16, "%s/supple-tetgen-XXXXXX", base && base[0] ? base : "/tmp");
   PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
              "no temporary folder %s (%s); set TMPDIR to a folder that can be written", folder,

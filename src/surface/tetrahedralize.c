@@ -129,18 +129,13 @@ static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscB
       continue;
     }
     // the body keeps its groups and tag sets
-    PetscCall(PetscFree(body->x));
-    PetscCall(PetscFree(body->vert_number));
     body->nvert = tets.nvert;
     body->x = tets.x;
     body->vert_number = tets.vert_number;
+    PetscCall(PetscArraycpy(body->item, tets.item, 4));
     tets.x = NULL;
     tets.vert_number = NULL;
-    for (int d = 0; d < 4; d++) {
-      PetscCall(SbItemsFree(&body->item[d]));
-      body->item[d] = tets.item[d];
-      tets.item[d] = (SbItems){0};
-    }
+    PetscCall(PetscArrayzero(tets.item, 4));
     PetscCall(SbImportDestroy(&tets));
     for (PetscInt i = 0; i < 3 * body->nvert; i++) body->x[i] *= (1 / factor);
     for (PetscInt v = 0; v < body->nvert; v++) body->vert_number[v] = v + 1;

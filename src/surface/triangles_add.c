@@ -104,36 +104,28 @@ static PetscReal seen_area(const Polygon *p, PetscInt a, PetscInt b, PetscInt c,
   return SbDot3(n, p->normal);
 }
 
-/* Quality of the ear at corner i: area over longest edge squared; -1 if it is not an ear. */
-static PetscReal ear_quality(const Polygon *p, PetscInt n, const PetscInt vert[], PetscInt i)
-{
-  const PetscInt a = vert[(i + n - 1) % n], b = vert[i], c = vert[(i + 1) % n];
-  PetscReal longest2;
-  const PetscReal area = seen_area(p, a, b, c, &longest2);
-
-  if (!(area > 0)) return -1;
-  for (PetscInt k = 0; k < n; k++) {
-    const PetscInt d = vert[k];
-
-    if (d != a && d != b && d != c && seen_area(p, a, b, d, NULL) >= 0 && seen_area(p, b, c, d, NULL) >= 0 &&
-        seen_area(p, c, a, d, NULL) >= 0)
-      return -1;
-  }
-  return area / longest2;
-}
-
 /* Ear clipping, removes corners from left[]; later checks refuse the result of a self-intersecting one. */
 static PetscErrorCode cut_ears(const Polygon *p, PetscInt n, PetscInt left[], int64_t number,
                                SbTriangleFile *f)
 {
   PetscFunctionBeginUser;
   while (n > 3) {
-    PetscReal best = -1;
+    PetscReal best = 0;
     PetscInt ear = 0;
 
+    // the ear with the best quality, area over longest edge squared; a corner within makes it none
     for (PetscInt i = 0; i < n; i++) {
-      const PetscReal quality = ear_quality(p, n, left, i);
+      const PetscInt a = left[(i + n - 1) % n], b = left[i], c = left[(i + 1) % n];
+      PetscReal longest2, quality = seen_area(p, a, b, c, &longest2);
 
+      quality /= longest2;
+      for (PetscInt k = 0; k < n && quality > best; k++) {
+        const PetscInt d = left[k];
+
+        if (d != a && d != b && d != c && seen_area(p, a, b, d, NULL) >= 0 &&
+            seen_area(p, b, c, d, NULL) >= 0 && seen_area(p, c, a, d, NULL) >= 0)
+          quality = 0;
+      }
       if (quality > best) {
         best = quality;
         ear = i;

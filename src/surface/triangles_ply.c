@@ -47,13 +47,13 @@ static PetscErrorCode read_property(Ply *p)
   q = &e->property[e->nproperty++];
   *q = (Property){.axis = -1};
   before = p->s->at;
-  PetscCall(SbScanWord(p->s, sizeof(word), word));
+  (void)SbScanWord(p->s, sizeof(word), word);
   if (!strcmp(word, "list"))
     PetscCall(SbScanType(p->s, &q->count));
   else
     p->s->at = before;
   PetscCall(SbScanType(p->s, &q->type));
-  PetscCall(SbScanWord(p->s, sizeof(word), word));
+  (void)SbScanWord(p->s, sizeof(word), word);
   if (!strcmp(e->name, "vertex") && word[0] >= 'x' && word[0] <= 'z' && !word[1] && !q->count.size)
     q->axis = word[0] - 'x';
   if (!strcmp(e->name, "face") && (!strcmp(word, "vertex_indices") || !strcmp(word, "vertex_index")) &&
@@ -69,18 +69,15 @@ static PetscErrorCode read_header(Ply *p)
 
   PetscFunctionBeginUser;
   // first line, then one keyword per line
-  PetscCall(SbScanWord(p->s, sizeof(word), word));
+  (void)SbScanWord(p->s, sizeof(word), word);
   if (strcmp(word, "ply")) SB_SCAN_ERROR(p->s, "expected 'ply', found '%s'; it is no PLY file", word);
   for (;;) {
     SbScanEndOfLine(p->s);
-    PetscCall(SbScanWord(p->s, sizeof(word), word));
-    if (!word[0])
-      SB_SCAN_ERROR(p->s,
-                    "the file ends where 'end_header' is expected; it is truncated, write or copy it again");
+    if (!SbScanWord(p->s, sizeof(word), word)) SB_SCAN_ENDS(p->s, "'%s'", "end_header");
     if (!strcmp(word, "end_header")) break;
     if (!strcmp(word, "format")) {
       // text, or binary in either byte order
-      PetscCall(SbScanWord(p->s, sizeof(word), word));
+      (void)SbScanWord(p->s, sizeof(word), word);
       if (strcmp(word, "ascii") && strcmp(word, "binary_little_endian") && strcmp(word, "binary_big_endian"))
         SB_SCAN_ERROR(p->s, "format '%s'; expected ascii, binary_little_endian or binary_big_endian", word);
       binary = (PetscBool)(word[0] == 'b');
@@ -94,7 +91,7 @@ static PetscErrorCode read_header(Ply *p)
         SB_SCAN_ERROR(p->s, "the file has more than %d kinds of elements", ELEMENTS_MAX);
       e = &p->element[p->nelement++];
       PetscCall(PetscMemzero(e, sizeof(*e)));
-      PetscCall(SbScanWord(p->s, sizeof(e->name), e->name));
+      (void)SbScanWord(p->s, sizeof(e->name), e->name);
       PetscCall(SbScanText(p->s, "number of elements", &e->n));
       if (!strcmp(e->name, "tristrips"))
         SB_SCAN_ERROR(p->s, "the file holds triangle strips; write it with single faces");
@@ -122,8 +119,7 @@ static PetscErrorCode read_value(Ply *p, SbNumberType type, const char *what, do
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   s->token = s->at;
-  if (s->end - s->at < type.size)
-    SB_SCAN_ERROR(s, "the file ends where the %s is expected; it is truncated, write or copy it again", what);
+  if (s->end - s->at < type.size) SB_SCAN_ENDS(s, "the %s", what);
   SbNumbersConvert(type, p->big_endian, 1, s->at, value);
   s->at += type.size;
   PetscFunctionReturn(PETSC_SUCCESS);

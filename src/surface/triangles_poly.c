@@ -25,7 +25,6 @@ static PetscErrorCode read_counts(SbScan *s, const char *what, int n, int64_t co
 {
   PetscFunctionBeginUser;
   for (int i = 1; i < n; i++) count[i] = 0;
-  SbScanNext(s, '#');
   PetscCall(SbScanText(s, what, &count[0]));
   for (int i = 1; i < n && SbScanMore(s, '#'); i++) PetscCall(SbScanText(s, what, &count[i]));
   SbScanEndOfLine(s);
@@ -46,7 +45,6 @@ static PetscErrorCode read_points(Poly *p, int64_t n)
   for (int64_t i = 0; i < n; i++) {
     PetscReal x[3];
 
-    SbScanNext(p->s, '#');
     PetscCall(SbScanText(p->s, "number of a point", &number[i]));
     PetscCall(SbScanPoint(p->s, "coordinate of a point", 0, x));
     SbScanEndOfLine(p->s);
@@ -58,27 +56,6 @@ static PetscErrorCode read_points(Poly *p, int64_t n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_node_file(Poly *p)
-{
-  char name[PETSC_MAX_PATH_LEN + 8];
-  SbScan *own = p->s, scan;
-  char *dot;
-  int64_t count[4];
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  (void)snprintf(name, PETSC_MAX_PATH_LEN, "%s", p->f->path);
-  dot = strrchr(name, '.');
-  (void)snprintf(dot, 8, ".node");
-  ierr = SbScanOpen(p->f->where, name, &scan);
-  p->s = &scan;
-  if (!ierr) ierr = read_counts(&scan, "number of points in the .node file", 4, count);
-  if (!ierr) ierr = read_points(p, count[0]);
-  p->s = own;
-  PetscCall(SbScanClose(&scan));
-  PetscFunctionReturn(ierr);
-}
-
 /* ------------------------------------------------------------------ facets */
 
 /* Reads a polygon of a facet: the number of corners, and these, on one or more lines. */
@@ -87,7 +64,6 @@ static PetscErrorCode read_polygon(Poly *p, const char *what, int64_t facet)
   int64_t n, number;
 
   PetscFunctionBeginUser;
-  SbScanNext(p->s, '#');
   PetscCall(SbScanText(p->s, what, &n));
   if (n < 3)
     SB_SCAN_ERROR(p->s,
@@ -99,7 +75,6 @@ static PetscErrorCode read_polygon(Poly *p, const char *what, int64_t facet)
   PetscCall(SbImportScratch(p->f->im, (size_t)(p->nvert + n) * sizeof(*p->vert), &p->vert));
   p->start[p->nloop] = p->nvert;
   for (int64_t i = 0; i < n; i++) {
-    SbScanNext(p->s, '#');
     PetscCall(SbScanText(p->s, "corner of a polygon", &number));
     p->vert[p->nvert] = SbNumbersFind(&p->f->im->nodes, number);
     if (p->vert[p->nvert++] < 0)
@@ -118,14 +93,13 @@ static PetscErrorCode read_seeds(Poly *p, const char *what, PetscBool attribute,
   int64_t count[1] = {0};
 
   PetscFunctionBeginUser;
-  SbScanNext(p->s, '#');
+  SbScanNext(p->s);
   if (p->s->at < p->s->end) PetscCall(read_counts(p->s, what, 1, count));
   PetscCall(SbImportScratch(p->f->im, (size_t)count[0] * sizeof(**seed), seed));
   for (*n = 0; *n < count[0]; (*n)++) {
     SbSeed *one = &(*seed)[*n];
     PetscReal value = 0;
 
-    SbScanNext(p->s, '#');
     PetscCall(SbScanText(p->s, what, &one->number));
     PetscCall(SbScanPoint(p->s, what, 0, one->x));
     if (attribute && SbScanMore(p->s, '#')) PetscCall(SbScanReal(p->s, "attribute of a region", 0, &value));
@@ -147,15 +121,29 @@ PetscErrorCode SbTrianglesRead_Poly(SbScan *s, SbTriangleFile *f)
   Poly poly = {.s = s, .f = f}, *p = &poly;
   int64_t count[4];
   PetscReal *hole = NULL; /* [][3] hole points of a facet */
+  SbScan scan;
+  char name[PETSC_MAX_PATH_LEN + 8];
+  PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
+  s->comment = '#';
   PetscCall(read_counts(s, "number of points", 4, count));
   if (count[0] && count[1] != 3)
     SB_SCAN_ERROR(s, "points of %lld dimensions; expected 3", (long long)count[1]);
   if (count[0])
     PetscCall(read_points(p, count[0]));
-  else
-    PetscCall(read_node_file(p));
+  else {
+    // the points are in NAME.node
+    (void)snprintf(name, sizeof(name), "%.*s.node", (int)(strrchr(f->path, '.') - f->path), f->path);
+    ierr = SbScanOpen(f->where, name, &scan);
+    scan.comment = '#';
+    p->s = &scan;
+    if (!ierr) ierr = read_counts(&scan, "number of points in the .node file", 4, count);
+    if (!ierr) ierr = read_points(p, count[0]);
+    p->s = s;
+    PetscCall(SbScanClose(&scan));
+    PetscCall(ierr);
+  }
   PetscCall(read_counts(s, "number of facets", 2, count));
   for (int64_t i = 1; i <= count[0]; i++) {
     int64_t facet[3] = {1, 0, 0}, number;
@@ -172,7 +160,6 @@ PetscErrorCode SbTrianglesRead_Poly(SbScan *s, SbTriangleFile *f)
     PetscCall(SbScanRoom(s, "holes of a facet", facet[1], 4, 4));
     PetscCall(SbImportScratch(f->im, 3 * (size_t)facet[1] * sizeof(*hole), &hole));
     for (int64_t k = 0; k < facet[1]; k++) {
-      SbScanNext(s, '#');
       PetscCall(SbScanText(s, "number of a hole", &number));
       PetscCall(SbScanPoint(s, "coordinate of a hole", 0, hole + 3 * k));
       SbScanEndOfLine(s);

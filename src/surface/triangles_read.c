@@ -28,13 +28,13 @@ static PetscErrorCode add_vertex(SbScan *s, SbTriangleFile *f)
 
 /* ------------------------------------------------------------------ STL */
 
-/* Reads the next word; `end solid` becomes `endsolid`. */
-static PetscErrorCode stl_next(SbScan *s, char word[32])
+/* Whether there is a next word; `end solid` becomes `endsolid`. */
+static PetscBool stl_next(SbScan *s, char word[32])
 {
-  PetscFunctionBeginUser;
-  PetscCall(SbScanWord(s, 32, word));
-  if (!strcasecmp(word, "end")) PetscCall(SbScanWord(s, 32 - 3, word + 3));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  const PetscBool there = SbScanWord(s, 32, word);
+
+  if (!strcasecmp(word, "end")) (void)SbScanWord(s, 32 - 3, word + 3);
+  return there;
 }
 
 /* Reads one or more solids, which together are the surface. */
@@ -48,12 +48,10 @@ static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
   PetscFunctionBeginUser;
   /* padding bytes that some programs write at the end */
   while (s->end > s->at && (s->end[-1] == 0 || s->end[-1] == 0x1a)) s->end--;
-  for (;;) {
-    PetscCall(stl_next(s, word));
+  while (stl_next(s, word) || !nsolid) {
     if (!nsolid && strcasecmp(word, "solid"))
       SB_SCAN_ERROR(s, "expected 'solid', and the size of the file is not that of a binary one: it is no STL "
                        "file, or truncated");
-    if (!word[0]) break;
     if (!strcasecmp(word, "solid")) {
       // the rest of the line is the name of the solid
       char name[SB_NAME_MAX], *last;
@@ -77,10 +75,7 @@ static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
       // the normal is ignored
       SbScanEndOfLine(s);
       for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(facet); k++) {
-        PetscCall(stl_next(s, word));
-        if (!word[0])
-          SB_SCAN_ERROR(s, "the file ends where '%s' is expected; it is truncated, write or copy it again",
-                        facet[k]);
+        if (!stl_next(s, word)) SB_SCAN_ENDS(s, "'%s'", facet[k]);
         if (strcasecmp(word, facet[k])) SB_SCAN_ERROR(s, "expected '%s', found '%s'", facet[k], word);
         if (facet[k][0] == 'v') PetscCall(add_vertex(s, f));
       }
@@ -88,8 +83,7 @@ static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
     } else
       SB_SCAN_ERROR(s, "expected 'facet' or 'endsolid', found '%s'", word);
   }
-  if (open)
-    SB_SCAN_ERROR(s, "the file ends where 'endsolid' is expected; it is truncated, write or copy it again");
+  if (open) SB_SCAN_ENDS(s, "'%s'", "endsolid");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -138,9 +132,7 @@ PetscErrorCode SbTrianglesRead_OBJ(SbScan *s, SbTriangleFile *f)
   char word[16];
 
   PetscFunctionBeginUser;
-  for (;;) {
-    PetscCall(SbScanWord(s, sizeof(word), word));
-    if (!word[0]) break;
+  while (SbScanWord(s, sizeof(word), word)) {
     if (!strcmp(word, "v")) PetscCall(add_vertex(s, f));
     /* the rest of a line f: vertex numbers from 1, or negative ones counted back from the last vertex;
        indices after a slash are ignored */
@@ -165,7 +157,7 @@ PetscErrorCode SbTrianglesRead_OBJ(SbScan *s, SbTriangleFile *f)
       for (nname[kind] = 0; SbScanMore(s, '\n');) {
         const PetscBool room = (PetscBool)(nname[kind] < (kind ? 8 : 1));
 
-        PetscCall(SbScanWord(s, SB_NAME_MAX, room ? name[kind + nname[kind]] : more));
+        (void)SbScanWord(s, SB_NAME_MAX, room ? name[kind + nname[kind]] : more);
         nname[kind] += room;
       }
       if (nname[0]) all[n++] = name[0];
@@ -179,29 +171,24 @@ PetscErrorCode SbTrianglesRead_OBJ(SbScan *s, SbTriangleFile *f)
 
 PetscErrorCode SbTrianglesRead_OFF(SbScan *s, SbTriangleFile *f)
 {
-  int64_t count[3];
+  int64_t nvert, nface, nedge;
   char word[16];
 
   PetscFunctionBeginUser;
-  SbScanNext(s, '#');
-  PetscCall(SbScanWord(s, sizeof(word), word));
+  s->comment = '#';
+  (void)SbScanWord(s, sizeof(word), word);
   if (strcmp(word, "OFF"))
     SB_SCAN_ERROR(s, "expected 'OFF', found '%s'; only the plain text kind of OFF file is read", word);
-  for (int i = 0; i < 3; i++) {
-    SbScanNext(s, '#');
-    PetscCall(SbScanText(s, "number of vertices, faces and edges", &count[i]));
-  }
-  PetscCall(SbScanRoom(s, "vertices", count[0], 6, 6));
-  PetscCall(SbScanRoom(s, "faces", count[1], 8, 8));
-  for (int64_t i = 0; i < count[0]; i++) {
-    SbScanNext(s, '#');
+  PetscCall(SbScanCount(s, "vertices", 6, 6, &nvert));
+  PetscCall(SbScanCount(s, "faces", 8, 8, &nface));
+  PetscCall(SbScanText(s, "number of edges", &nedge));
+  for (int64_t i = 0; i < nvert; i++) {
     PetscCall(add_vertex(s, f));
     SbScanEndOfLine(s);
   }
-  for (int64_t i = 0; i < count[1]; i++) {
+  for (int64_t i = 0; i < nface; i++) {
     int64_t n, v;
 
-    SbScanNext(s, '#');
     PetscCall(SbScanText(s, "number of corners of a face", &n));
     for (int64_t k = 0; k < n; k++) {
       PetscCall(SbScanText(s, "vertex of a face", &v));
