@@ -35,12 +35,8 @@ static inline PetscReal longest_edge2(const PetscReal x[], const PetscInt v[4])
 {
   PetscReal L2 = 0;
 
-  for (int e = 0; e < 6; e++) {
-    PetscReal d[3];
-
-    SbSubtract(x + 3 * v[SbTetEdge[e][0]], x + 3 * v[SbTetEdge[e][1]], d);
-    L2 = PetscMax(L2, SbDot3(d, d));
-  }
+  for (int e = 0; e < 6; e++)
+    L2 = PetscMax(L2, SbDistance2(x + 3 * v[SbTetEdge[e][0]], x + 3 * v[SbTetEdge[e][1]]));
   return L2;
 }
 

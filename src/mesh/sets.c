@@ -83,9 +83,7 @@ PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set)
 static PetscBool inside(const SbSet *set, const PetscReal x[3], PetscReal slack)
 {
   const PetscReal *p = set->p;
-  PetscReal d[3];
 
-  SbSubtract(x, p, d);
   switch (set->shape) {
   case SB_SET_BOX:
     for (int i = 0; i < 3; i++)
@@ -94,7 +92,7 @@ static PetscBool inside(const SbSet *set, const PetscReal x[3], PetscReal slack)
   case SB_SET_PLANE:
     return (PetscBool)(PetscAbsReal(SbDot3(p, x) - p[3]) <= PetscMax(p[4], slack));
   case SB_SET_SPHERE:
-    return (PetscBool)(PetscSqrtReal(SbDot3(d, d)) <= p[3] + slack);
+    return (PetscBool)(PetscSqrtReal(SbDistance2(x, p)) <= p[3] + slack);
   case SB_SET_HALFSPACE:
     return (PetscBool)(SbDot3(p, x) <= p[3] + slack);
   default:

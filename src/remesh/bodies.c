@@ -172,9 +172,8 @@ static PetscInt old_edge(const Work *w, uint64_t key)
   PetscInt at;
 
   if (high >= w->mesh.nkept) return -1;
-  key = SbKeyOfPair(w->mesh.kept[low], w->mesh.kept[high]);
-  at = SbKeysFind(w->nedge, w->edge, key);
-  return at < w->nedge && w->edge[at].key == key ? w->edge[at].slot : -1;
+  at = SbKeysFind(w->nedge, w->edge, SbKeyOfPair(w->mesh.kept[low], w->mesh.kept[high]));
+  return at < 0 ? -1 : w->edge[at].slot;
 }
 
 /* The old fields at a rest position X, from the tet that contains `near`. */

@@ -275,11 +275,6 @@ typedef struct {
   SbLedger ledger;
 } Scene;
 
-static PetscReal distance(const PetscReal a[3], const PetscReal b[3])
-{
-  return PetscSqrtReal(PetscSqr(a[0] - b[0]) + PetscSqr(a[1] - b[1]) + PetscSqr(a[2] - b[2]));
-}
-
 /* Sets up the new scene and transfers the state. */
 static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
 {
@@ -333,7 +328,7 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   PetscCall(SbModelEnergies(s.model, run->U, run->V, &e[1]));
   run->energies.remesh_loss += e[0].kinetic + e[0].strain - e[1].kinetic - e[1].strain;
   run->energies.remesh_mass += PetscAbsReal(s.model->mass - old->model->mass);
-  run->energies.remesh_momentum += distance(e[0].momentum, e[1].momentum);
+  run->energies.remesh_momentum += PetscSqrtReal(SbDistance2(e[0].momentum, e[1].momentum));
   PetscCall(SbLedgerAttach(s.ledger));
   if (s.ledger) PetscCall(SbLedgerContinue(old->ledger, s.ledger));
   PetscCall(SbRemeshAttach(r, run));
@@ -349,7 +344,7 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
                         .quality = {r->worst[b], o->quality},
                         .moved = o->nmoved,
                         .speed = speed[0],
-                        .shift = distance(e[0].centre, e[1].centre)};
+                        .shift = PetscSqrtReal(SbDistance2(e[0].centre, e[1].centre))};
 
     if (!result->done[b]) continue;
     PetscCall(PetscStrncpy(entry.body, s.model->body[b].name, sizeof(entry.body)));
