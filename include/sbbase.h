@@ -27,7 +27,7 @@ typedef enum {
 } SbOptionKind;
 
 /*
-  One row describes one option of ours. Rows are `static const` arrays beside the code that reads them; together,
+  One row describes one option of ours. Rows are `static const` arrays beside the code that reads them;
   registered, they are the table from which -help, the checks, -scenario_view and docs/options.md are made.
 */
 typedef struct {
@@ -35,9 +35,8 @@ typedef struct {
   SbOptionKind kind;
   PetscInt count;   /* values of SB_OPTION_REALS, formulas of SB_OPTION_FORMULA; 1 otherwise */
   const char *unit; /* "Pa", "kg/m^3"; "" when there is none */
-  const char
-    *preset; /* default as it would be typed; NULL: must be given; "": nothing by default, the reader of a
-                          number, truth value or choice leaves *value as it was */
+  /* default as it would be typed; NULL: must be given; "": none, number, truth value or choice stay */
+  const char *preset;
   const char *range; /* "(0, inf)", "[0, 0.5)" for numbers; "a|b|c" for a choice; "" when free */
   const char *help;  /* one sentence */
 } SbOption;
@@ -59,20 +58,20 @@ PetscErrorCode SbOptionsRegister(const char *klass, const char *type, PetscInt n
 PetscErrorCode SbScopeSet(SbScope *scope, const char *klass, const char *type, const char *instance);
 
 /*
-  Readers: value given by the user for the instance, for what it is a copy of (SbOptionsInherit()), or, of bodies, for all of them by -body_default_<key>; or else the preset of the row. Each value read is remembered with its text (for
-  SbOptionsView() and SbOptionsCheck()). Errors (PETSC_ERR_USER, one line that names the full option, value, range, unit):
-  unreadable text, value out of range, missing required option. Reading a key without a row is a programming error.
+  Readers: value given by the user for the instance, for what it is a copy of (SbOptionsInherit()), or, of
+  bodies, for all by -body_default_<key>; else the preset of the row. Each value read is remembered with its
+  text (for SbOptionsView(), SbOptionsCheck()). Errors (PETSC_ERR_USER, one line that names the full option,
+  value, range, unit): unreadable, out of range, missing; a key without a row is a programming error.
 */
 PetscErrorCode SbOptionBool(const SbScope *scope, const char *key, PetscBool *value);
 PetscErrorCode SbOptionInt(const SbScope *scope, const char *key, PetscInt *value);
 PetscErrorCode SbOptionReal(const SbScope *scope, const char *key, PetscReal *value);
 PetscErrorCode SbOptionReals(const SbScope *scope, const char *key, PetscReal value[]);
 PetscErrorCode SbOptionString(const SbScope *scope, const char *key, size_t size, char value[]);
-PetscErrorCode SbOptionNames(const SbScope *scope, const char *key, PetscInt *n,
-                             char (**names)[SB_NAME_MAX]); /* PetscFree */
-PetscErrorCode SbOptionChoice(const SbScope *scope, const char *key,
-                              PetscInt *index); /* position in `range` */
-/* From now on -<klass>_<instance>_<key>, if not given, has the value of -<klass>_<from>_<key>: `instance` is a copy of `from`. Not collective. */
+/* names: PetscFree(); index: position in `range`. */
+PetscErrorCode SbOptionNames(const SbScope *scope, const char *key, PetscInt *n, char (**names)[SB_NAME_MAX]);
+PetscErrorCode SbOptionChoice(const SbScope *scope, const char *key, PetscInt *index);
+/* From now on -<klass>_<instance>_<key>, if not given, has the value of -<klass>_<from>_<key>. */
 PetscErrorCode SbOptionsInherit(const char *klass, const char *instance, const char *from);
 PetscErrorCode SbOptionGiven(const SbScope *scope, const char *key, PetscBool *given); /* by the user */
 
@@ -86,40 +85,40 @@ PetscBool SbOptionExists(const SbScope *scope, const char *key);
 PetscErrorCode SbOptionName(const SbScope *scope, const char *key, size_t size, char name[]);
 
 /*
-  SbOptionsCheck - examines the options of ours that nobody read. One that exists and is of no use in this run is warned of, with the reason; one that does
-  not exist ends the run, with the nearest names.
-  Ours: every name that begins with the prefix of a class (body_, set_, effect_) or equals, or is within two edits of,
-  a program-wide option of ours and does not belong to PETSc. Of an instance that was not read an option exists when the class has its key and SbOptionsFile() found the
-  instance in a list. Collective.
+  SbOptionsCheck - examines the options of ours that nobody read. One that exists and is of no use in this run
+  is warned of, with the reason; one that does not exist ends the run, with the nearest names.
+  Ours: every name that begins with the prefix of a class (body_, set_, effect_) or equals, or is within two
+  edits of, a program-wide option of ours and does not belong to PETSc. Of an instance that was not read an
+  option exists when the class has its key and SbOptionsFile() found the instance in a list. Collective.
 */
 PetscErrorCode SbOptionsCheck(void);
-/* Notes the names in the lists of a scenario file (-bodies, -effects, ...), which the command line may override. After all rows are
-   registered. Collective. */
+/* Notes the names in the lists of a scenario file (-bodies, -effects, ...), which the command line may
+   override. After all rows are registered. Collective. */
 PetscErrorCode SbOptionsFile(MPI_Comm comm, const char *file);
-/* Call once, when the user's options are all in the database and before the program adds its own (presets of solvers):
-   what is added later does not count as the user's. Without this call everything counts. Not collective. */
+/* Call once, when the user's options are all in the database and before the program adds its own (presets of
+   solvers): what is added later is not the user's. Without this call everything counts. Not collective. */
 PetscErrorCode SbOptionsRemember(void);
 /* At the end of a run: warns about each option of the user's that nobody read; n: how many. Collective. */
 PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n);
-/* The complete scenario as an option file that runs again: every option of ours read so far with its value, help as
-   comment, then the PETSc options that the user gave. Collective; rank 0 writes. */
+/* The complete scenario as an option file that runs again: every option of ours read so far with its value,
+   help as comment, then the PETSc options that the user gave. Collective; rank 0 writes. */
 PetscErrorCode SbOptionsView(PetscViewer viewer);
 /*
   SbOptionsHelp - the manual for -help, from the table.
 
-  Collective; rank 0 prints. topic: "": how to run it, a first scene, the topics; "all": everything; else a class, a type, the first word of
-  options, or a word in their names and texts. Errors: PETSC_ERR_USER for a word that no option holds.
+  Collective; rank 0 prints. topic: "": how to run it, a first scene, the topics; "all": everything; else a
+  class, a type, the first word of options, or a word in their names and texts. Errors: PETSC_ERR_USER.
 */
 PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic);
-/* The table for programs (scripts/manual): tabs between the columns class, type, option, kind, count, unit, required (yes, no), default, range and
-   meaning, whose names are the first line. Collective; rank 0 writes to a file, or to standard output when file is "-". */
+/* The table for programs (scripts/manual): columns class, type, option, kind, count, unit, required, default,
+   range, meaning, with tabs between them and a headline. Collective; rank 0 writes; file "-": to stdout. */
 PetscErrorCode SbOptionsTable(MPI_Comm comm, const char *file);
-/* ASCII viewer on a file, or on standard output when file is "" or "-"; if it cannot be written, an error on every rank. Collective. */
+/* ASCII viewer on a file, "" or "-": standard output; an error on every rank if not writable. Collective. */
 PetscErrorCode SbViewerOpen(MPI_Comm comm, const char *file, PetscViewer *viewer);
 PetscErrorCode SbOptionsReset(void); /* forgets what was read and registered; at exit and in tests */
 
-/* SbSuggestNames - the names of `n` candidates closest to `word` by edit distance, joined by " or "; "" when none is near. NULL
-   among the names is passed over: PetscFunctionListGet() counts its closing one. */
+/* SbSuggestNames - the names of `n` candidates closest to `word` by edit distance, joined by " or "; "" when
+   none is near. NULL among the names is passed over: PetscFunctionListGet() counts its closing one. */
 PetscErrorCode SbSuggestNames(const char *word, PetscInt n, const char *const names[], size_t size,
                               char text[]);
 /* What to say of a word that is none of these names: "p1, cr, dg; did you mean cr?". */
@@ -133,33 +132,30 @@ PetscBool SbHasPrefix(const char *word, const char *beginnings);
 /* ------------------------------------------------------------------ errors and warnings */
 
 /*
-  SbErrorHandlerInstall - from here on a user error (PETSC_ERR_USER, PETSC_ERR_USER_INPUT, PETSC_ERR_FILE_*, a bad option
-  file) is not printed where it happens, but by SbErrorFinish(). Other errors get PETSc's trace. Collective; after
-  MPI_Init() and before PetscInitialize().
+  SbErrorHandlerInstall - from here on a user error (PETSC_ERR_USER, PETSC_ERR_USER_INPUT, PETSC_ERR_FILE_*, a
+  bad option file) is not printed where it happens, but by SbErrorFinish(). Other errors get PETSc's trace.
+  Collective; after MPI_Init() and before PetscInitialize().
 */
 PetscErrorCode SbErrorHandlerInstall(void);
-void SbErrorSetTrace(
-  PetscBool trace); /* the stack of calls with every error, also with errors of the input */
+void SbErrorSetTrace(PetscBool trace); /* the stack of calls with every error, also of the input */
 /* The name that begins error lines and warnings, "supple" without this call; a literal. */
 void SbErrorSetProgram(const char *name);
 /* The option file that PETSc is about to read: PETSc's messages about YAML do not name it. */
 void SbErrorSetFile(const char *file);
-/* Adds the line of a syntax error in a YAML file, "line 6: ...", to the message of PETSc's error. Not collective. */
+/* Adds the line of a syntax error in a YAML file, "line 6: ...", to the message of PETSc's error. */
 void SbErrorFindYamlLine(void);
-/* An error line at the end of a run whose calls all succeeded: a solver gave up, the output is complete. A printf format. */
-void SbErrorPost(const char *format, ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
-#define SB_EXIT_STOPPED \
-  75 /* exit code of a run that was asked to stop and can go on: EX_TEMPFAIL of sysexits.h */
-/* The posted line is not an error, but a requested stop: the line says so, and the exit code is SB_EXIT_STOPPED. */
-void SbErrorSetStopped(void);
-/* Callback on one rank when the run fails, before the error line; PETSc may be in any state, no communication. NULL: none. */
+#define SB_EXIT_STOPPED 75 /* of a run that was asked to stop and can go on: EX_TEMPFAIL of sysexits.h */
+/* An error line at the end of a run whose calls all succeeded: a solver gave up, the output is complete.
+   stopped: no error but a requested stop: the line says so, and the exit code is SB_EXIT_STOPPED. */
+void SbErrorPost(PetscBool stopped, const char *message);
+/* Callback on one rank when the run fails, before the error line, in any state of PETSc; no communication. */
 void SbErrorSetFailureHandler(void (*failure_handler)(const char *message, void *ctx), void *ctx);
-/* Callback on this rank at the start of SbErrorFinish(), with or without an error, to remove files. NULL: none. */
+/* Callback on this rank at the start of SbErrorFinish(), with or without an error, to remove files. */
 void SbErrorSetCleanup(void (*fn)(void));
 /*
-  SbErrorFinish - last call of main() on every rank: `supple: error: ...` on stderr, once for the run; then MPI_Finalize(),
-  or MPI_Abort() when other ranks do not arrive within a few seconds. Returns the exit code, non-zero on all ranks when
-  one failed. `ierr` is the code that came up, 0 after PetscFinalize().
+  SbErrorFinish - last call of main() on every rank: `supple: error: ...` on stderr, once for the run; then
+  MPI_Finalize(), or MPI_Abort() when other ranks do not arrive within a few seconds. Returns the exit code,
+  non-zero on all ranks when one failed. `ierr` is the code that came up, 0 after PetscFinalize().
 */
 int SbErrorFinish(PetscErrorCode ierr);
 /* An error of one rank (rank 0, a child process), to be raised by all. */
@@ -167,7 +163,7 @@ typedef struct {
   int code;
   char text[1024];
 } SbCaughtError;
-/* For PetscPushErrorHandler(), ctx an SbCaughtError: keeps the message. An error that is not the user's is also printed with its trace. */
+/* For PetscPushErrorHandler(), ctx an SbCaughtError: keeps the message; internal errors also have a trace. */
 PetscErrorCode SbCatchError(MPI_Comm comm, int line, const char *function, const char *file,
                             PetscErrorCode code, PetscErrorType kind, const char *text, void *ctx);
 /* Keeps the error of a call that this rank makes alone: SB_CATCH(&caught, call). */
@@ -181,7 +177,7 @@ PetscErrorCode SbCatchError(MPI_Comm comm, int line, const char *function, const
   } while (0)
 /* Raises the error caught by the lowest failed rank on all ranks. Collective. */
 PetscErrorCode SbCaughtRaise(MPI_Comm comm, const SbCaughtError *caught);
-/* One line `supple: warning: ...` on stderr by rank 0 of comm; a printf format without newline. Collective. */
+/* One line `supple: warning: ...` on stderr by rank 0 of comm; printf format without newline. Collective. */
 PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
 
 /* ------------------------------------------------------------------ texts */
@@ -194,37 +190,39 @@ int SbParseNumbers(const char *text, int most, PetscReal p[]);
 
 /* ------------------------------------------------------------------ arrays */
 
-/* Enlarges *array, of *size elements of `unit` bytes, to at least `need`; at least doubles it, so that appending is cheap. Not collective. */
+/* Enlarges *array, of *size elements of `unit` bytes, to at least `need`, and twice: appending is cheap. */
 PetscErrorCode SbReserve(PetscInt need, size_t unit, PetscInt *size, void *array);
 /*
-  SbBucketByKey - positions 0..n-1 by their keys: those with key k are item[start[k]..start[k + 1]), ascending.
+  SbBucketByKey - positions 0..n-1 by key: those with key k are item[start[k]..start[k + 1]), ascending.
 
-  Not collective. Positions with a key below 0 or from nkey on take no part. Output: start[nkey + 1], item[start[nkey]]; the caller frees both.
+  Not collective. Positions with a key below 0 or from nkey on take no part. Output: start[nkey + 1],
+  item[start[nkey]]; the caller frees both.
 */
 PetscErrorCode SbBucketByKey(PetscInt n, const PetscInt key[], PetscInt nkey, PetscInt **start,
                              PetscInt **item);
-/* Sorts n items of `size` bytes by the PetscInts that they begin with, the first, then the second, up to nkey. Not collective. */
+/* Sorts n items of `size` bytes by the nkey PetscInts that they begin with, one after the other. */
 PetscErrorCode SbSortByKeys(PetscInt n, size_t size, int nkey, void *item);
 /*
   SbAllgatherv - one array on all ranks, of those of all ranks in their order.
 
-  Collective. Input: mine[n]. Output: total; all, address of a pointer to the array, which the caller frees; before (or NULL), entries of lower ranks.
+  Collective. Input: mine[n]. Output: total; all, address of a pointer to the array, which the caller frees;
+  before (or NULL), entries of lower ranks.
 */
 PetscErrorCode SbAllgatherv(MPI_Comm comm, MPI_Datatype type, PetscInt n, const void *mine, PetscInt *total,
                             void *all, PetscInt *before);
 
 /* ------------------------------------------------------------------ memory */
 
-/* From here on arrays of 32 MiB and more are given back to the system when they are freed. After PetscInitialize(). */
+/* Freed arrays of 32 MiB and more go back to the system from here on. After PetscInitialize(). */
 void SbMemoryReturnLarge(void);
 
 /* ------------------------------------------------------------------ threads */
 
 /*
-  SbThreadsSetOne - from here on the libraries of this process (OpenMP's, BLAS) compute on the calling thread alone.
+  SbThreadsSetOne - from here on loaded libraries (OpenMP's, BLAS) compute on the calling thread alone.
 
-  Not collective. Returns the number of threads that some library would still use, 1 when all obey. Libraries that are loaded
-  later are not included: call it again.
+  Not collective. Returns the number of threads that some library would still use, 1 when all obey. For
+  libraries that are loaded later call it again.
 */
 int SbThreadsSetOne(void);
 
@@ -233,24 +231,25 @@ int SbThreadsSetOne(void);
 /*
   SbFormula - a number as a function of time t (s) and rest position x, y, z (m).
 
-  Text: numbers, t x y z, pi, + - * / ^, parentheses, unary minus, comparison-free functions sin cos tan asin acos atan
-  atan2 exp log sqrt abs min max floor tanh step(a) (0 for a < 0, else 1), ramp(a) (a clamped to [0, 1]), clamp(a, lo, hi);
-  or `table:FILE`, a text file with two columns (t in s, value; comma or blanks; # comments), linear in between, constant outside.
-  Compiled once to a small stack program; evaluation allocates nothing.
+  Text: numbers, t x y z, pi, + - * / ^, parentheses, unary minus, functions sin cos tan asin acos atan atan2
+  exp log sqrt abs min max floor tanh step(a) (0 for a < 0, else 1), ramp(a) (a clamped to [0, 1]),
+  clamp(a, lo, hi); or `table:FILE`, a file with two columns (t in s, value; comma or blanks; # comments),
+  linear in between, constant outside. Compiled once to a stack program; evaluation allocates nothing.
 */
 typedef struct _p_SbFormula *SbFormula;
-PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *where,
-                               SbFormula *formula); /* where: option name, for messages */
-PetscReal SbFormulaEval(SbFormula formula, PetscReal t,
-                        const PetscReal x[3]); /* x may be NULL when the formula does not use it */
+/* where: option name, for messages; x may be NULL when the formula does not use it. */
+PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *where, SbFormula *formula);
+PetscReal SbFormulaEval(SbFormula formula, PetscReal t, const PetscReal x[3]);
 PetscBool SbFormulaUsesTime(SbFormula formula);
 PetscBool SbFormulaUsesPosition(SbFormula formula);
 PetscErrorCode SbFormulaDestroy(SbFormula *formula);
 /*
   Live formulas (src/base/live.c): numbers set during a run, where a formula of an effect is the word `live`.
 
-  SetUp: file, largest speed (m/s) and angular speed (degree/s), largest ratio of simulated to real time, 0: no limit; before the first step. Of number i = 0 .. SbLiveCount() - 1: Column, its
-  name in the history and its unit (may be NULL); Get, its value at time t of the present step; Set changes it. Advance: after an accepted step that ended at t, reads new targets from the file. Collective.
+  SetUp: file, largest speed (m/s) and angular speed (degree/s), largest ratio of simulated to real time, 0:
+  no limit; before the first step. Of number i = 0 .. SbLiveCount() - 1: Column, its name in the history and
+  its unit (may be NULL); Get, its value at time t of the present step; Set changes it. Advance: after an
+  accepted step that ended at t, reads new targets from the file. Collective.
 */
 PetscErrorCode SbLiveSetUp(const char *file, PetscReal speed, PetscReal angular_speed, PetscReal pace);
 PetscInt SbLiveCount(void);

@@ -1,16 +1,15 @@
 /*
   sbcompat.h - every difference between the PETSc releases that supple builds with, in one place.
 
-  Supported: 3.18 (Debian 12) and 3.25 or newer. The callback conventions changed one by one in 3.23 and 3.24, so
-  these two (and the untested releases between 3.18 and them) are refused here instead of failing at run time.
+  Supported: 3.18 (Debian 12) and 3.25 or newer. The callback conventions changed one by one in 3.23 and 3.24,
+  so these (and the untested releases between 3.18 and them) are refused here instead of failing later.
 */
 #pragma once
 #include <petscsys.h>
 #include <string.h>
 
 #if PETSC_VERSION_LT(3, 18, 0) || (PETSC_VERSION_GE(3, 19, 0) && PETSC_VERSION_LT(3, 25, 0))
-  #error \
-    "supple needs PETSc 3.18.x, or 3.25 and newer: point PETSC_DIR/PETSC_ARCH or PKG_CONFIG_PATH at one of them"
+  #error "supple needs PETSc 3.18.x, or 3.25 and newer: point PETSC_DIR/PETSC_ARCH or PKG_CONFIG_PATH at one"
 #endif
 #if defined(PETSC_USE_COMPLEX) || !defined(PETSC_USE_REAL_DOUBLE)
   #error "supple needs a PETSc with real double-precision scalars"
@@ -33,8 +32,8 @@
 #endif
 
 /*
-  Context of a destroy callback of a MATSHELL, PCSHELL, KSP, SNES: 3.18 hands over ctx, newer releases &ctx, under the
-  same C type. SB_DESTROY_CTX(type, arg) is the pointer to the struct in both; SB_CTX_TO_DESTROY(ctx) is what a callback of PETSc's is called with.
+  Context of a destroy callback of a MATSHELL, PCSHELL, KSP, SNES: 3.18 hands over ctx, newer releases &ctx,
+  of the same C type. SB_DESTROY_CTX(type, arg): the struct in both; SB_CTX_TO_DESTROY(ctx): what it passes.
 */
 #if PETSC_VERSION_LT(3, 24, 0)
   #define SB_DESTROY_CTX(type, arg) ((type *)(arg))
@@ -102,7 +101,7 @@ typedef const char *SbErrorText;
     SNESConverged(snes, iteration, xnorm, ynorm, fnorm)
 #endif
 
-/* Whether PETSc calls -ts_dt deprecated, in favour of -ts_time_step; here both names work with every release. */
+/* Whether PETSc calls -ts_dt deprecated, in favour of -ts_time_step; here both names always work. */
 #if PETSC_VERSION_LT(3, 26, 0)
   #define SB_TS_DT_RENAMED 0
 #else
@@ -117,7 +116,7 @@ typedef const char *SbErrorText;
   #define SbKSPRefineOrthogonalization(ksp) KSPGMRESSetCGSRefinementType(ksp, KSP_GMRES_CGS_REFINE_IFNEEDED)
 #endif
 
-/* PetscHasExternalPackage() for CHOLMOD and UMFPACK too: some releases know SuiteSparse as a whole, some each part of it. */
+/* PetscHasExternalPackage(), also where CHOLMOD and UMFPACK are only known as SuiteSparse as a whole. */
 static inline PetscErrorCode SbHasPackage(const char name[], PetscBool *has)
 {
   PetscFunctionBeginUser;

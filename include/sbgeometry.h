@@ -309,7 +309,7 @@ static inline uint64_t SbKeyOfPair(PetscInt a, PetscInt b)
 }
 /* Sorts by key, then by slot. */
 void SbKeysSort(PetscInt n, SbKey item[]);
-/* Of sorted items: number of those from i on with its key; first one whose key is not below `key`, or n. */
+/* Of sorted items: number of those from i on with its key; the first one with a key, -1: there is none. */
 PetscInt SbKeysAlike(PetscInt n, const SbKey item[], PetscInt i);
 PetscInt SbKeysFind(PetscInt n, const SbKey item[], uint64_t key);
 

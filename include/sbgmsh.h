@@ -1,12 +1,12 @@
 /*
   sbgmsh.h - layer 2: the gmsh library at work in a process of its own: it makes tetrahedra. Rank 0 only.
 
-  How to use it: write a function of type SbGmshWork and hand it to SbGmshRun(). That forks; the child loads libgmsh, calls
-  the function with a fresh, empty model, and what the function puts into its SbImport
-  comes back to the caller. The function sees all memory of the caller as it was (its ctx may point anywhere), but what
-  it changes there stays in the child. A PETSc error in the function is raised in the caller with the same code and
-  text. A crash of gmsh, or one that does not end in time, is an error of the caller too; the memory of gmsh goes with the child. A
-  scene that does not call SbGmshRun() never loads the library.
+  How to use it: write a function of type SbGmshWork and hand it to SbGmshRun(). That forks; the child loads
+  libgmsh, calls the function with a fresh, empty model, and what the function puts into its SbImport comes
+  back to the caller. The function sees all memory of the caller as it was (its ctx may point anywhere), but
+  what it changes there stays in the child. A PETSc error in the function is raised in the caller with the
+  same code and text. A crash of gmsh, or one that does not end in time, is an error of the caller too; the
+  memory of gmsh goes with the child. A scene that does not call SbGmshRun() never loads the library.
 
     static PetscErrorCode work(const SbGmsh *gmsh, void *ctx, SbImport *result)
     {
@@ -24,14 +24,15 @@
     const SbGmshJob job = {im->where, "made tetrahedra", 600, work, &mine};
     PetscCall(SbGmshRun(&job, im));
 
-  The functions are those of gmshc.h without the prefix `gmsh` (reference manual of gmsh, "Gmsh API"; one that is missing below is a line more),
-  with the same arguments but the last, the error code, which SB_GMSH() adds and checks. Arrays that gmsh hands out go back by
-  gmsh->Free(). Nothing of gmsh is printed; it uses one thread, so that the same input gives the same mesh.
+  The functions are those of gmshc.h without the prefix `gmsh` (reference manual of gmsh, "Gmsh API"; one that
+  is missing below is a line more), with the same arguments but the last, the error code, which SB_GMSH() adds
+  and checks. Arrays of gmsh go back by gmsh->Free(). It prints nothing; with its one thread the same input
+  gives the same mesh.
 */
 #pragma once
 #include "sbmeshio.h"
 
-/* type, name, arguments: as in gmshc.h, with the same ones from gmsh 4.8 on to 4.15 (gmshModelAddPhysicalGroup() has not). */
+/* type, name, arguments: as in gmshc.h from 4.8 to 4.15, alike (gmshModelAddPhysicalGroup() is not). */
 #define SB_GMSH_FUNCTIONS(X)                                                                          \
   X(void, OptionSetNumber, (const char *, double, int *))                                             \
   X(void, ModelAdd, (const char *, int *))                                                            \
@@ -61,7 +62,7 @@ typedef struct {
 #undef SB_GMSH_MEMBER
 } SbGmsh;
 
-/* Calls a function of gmsh; its error becomes one of PETSc with the last message of gmsh. SB_GMSH0(): without arguments. */
+/* Calls a function of gmsh; its error becomes one of PETSc with its message. SB_GMSH0(): no arguments. */
 #define SB_GMSH(gmsh, function, ...)                              \
   do {                                                            \
     int sb_error = 0;                                             \
@@ -90,8 +91,8 @@ typedef struct {
 
   Not collective; for rank 0. Replaces vertices and items of `result`; groups do not come back.
 
-  Errors: what the work function raises; PETSC_ERR_USER_INPUT when the library cannot be loaded; PETSC_ERR_FILE_UNEXPECTED when
-  gmsh crashes or takes longer than job->seconds; PETSC_ERR_SYS when there can be no child process.
+  Errors: those of the work function; PETSC_ERR_USER_INPUT: no library; PETSC_ERR_FILE_UNEXPECTED: gmsh
+  crashes or takes longer than job->seconds; PETSC_ERR_SYS: no child process.
 */
 PetscErrorCode SbGmshRun(const SbGmshJob *job, SbImport *result);
 

@@ -64,6 +64,12 @@ SB_INLINE void SbSubtract(const PetscReal a[3], const PetscReal b[3], PetscReal 
   for (int k = 0; k < 3; k++) c[k] = a[k] - b[k];
 }
 
+/* |a - b|^2 */
+SB_INLINE PetscReal SbDistance2(const PetscReal a[3], const PetscReal b[3])
+{
+  return PetscSqr(a[0] - b[0]) + PetscSqr(a[1] - b[1]) + PetscSqr(a[2] - b[2]);
+}
+
 /* c = a x b */
 SB_INLINE void SbCross(const PetscReal a[3], const PetscReal b[3], PetscReal c[3])
 {

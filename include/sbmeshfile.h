@@ -1,7 +1,7 @@
 /*
-  sbmeshfile.h - layer 2: a mesh as a file, on one rank: read, measured, repaired, refined, written: the operations of supple-mesh.
+  sbmeshfile.h - layer 2: a mesh file, on one rank: read, measured, repaired, refined, written (supple-mesh).
 
-  Not collective throughout. Errors: PETSC_ERR_USER_INPUT / PETSC_ERR_FILE_*, one line that names the file and what to do.
+  Not collective. Errors: PETSC_ERR_USER_INPUT / PETSC_ERR_FILE_*, a line that names the file and what to do.
 */
 #pragma once
 #include "sbmesh.h"
@@ -59,7 +59,7 @@ typedef struct {
   PetscInt64 ratio[SB_RATIO_BINS]; /* radius ratios of the tets, 1 for the regular tet */
 } SbMeshStatistics;
 /*
-  SbMeshFileMeasure - checks the mesh as a run would, with the same repairs (unused vertices, orientation), and computes its statistics.
+  SbMeshFileMeasure - statistics, after checks and repairs (unused vertices, orientation) as those of a run.
 
   Errors: what SbMeshCreate() refuses.
 */
@@ -82,7 +82,7 @@ typedef struct {
   SbMeshFileRepair - makes a mesh that a run accepts, where dropping, turning and welding can do it.
 
   Input:
-    weld - vertices at most so far apart become one, m; 0: none do; below 0: 1e-9 of the diagonal of the extent
+    merge_tolerance - vertices at most so far apart become one, m; 0: none; below 0: 1e-9 of the diagonal
   Output:
     done - counts of repairs
   Errors: remaining defects that SbMeshCreate() would refuse: overlapping tets, no tets.
@@ -105,7 +105,7 @@ typedef enum {
   SB_MESH_H5
 } SbMeshFormat;
 /*
-  SbMeshFileWrite - writes a mesh with all its groups: gmsh's .msh, or supple's .h5 with an .xmf beside it for ParaView.
+  SbMeshFileWrite - writes a mesh with all its groups: gmsh's .msh, or supple's .h5 with an .xmf beside it.
 
   The file is written beside its target and renamed when it is whole.
 */

@@ -1,5 +1,5 @@
 /*
-  sbmeshio.h - layer 2: a body on rank 0 as its reader delivers it, and services for readers. Not collective throughout.
+  sbmeshio.h - layer 2: a body as its reader delivers it, services for readers. Not collective throughout.
 */
 #pragma once
 #include <hdf5.h>
@@ -8,7 +8,7 @@
 
 #define SB_GROUP_MAX (2 * SB_NAME_MAX) /* longest name of a physical group, with the terminating zero */
 
-/* ------------------------------------------------------------------ numbers.c: from numbers of a file to indices in memory */
+/* ------------------------------------------------- numbers.c: from numbers of a file to indices in memory */
 
 typedef struct {
   int64_t number;
@@ -47,12 +47,11 @@ PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *scan);
 PetscErrorCode SbScanClose(SbScan *scan);
 /* "line 12" or "byte 4711" of the last token. */
 const char *SbScanPosition(const SbScan *scan, char position[64]);
-/* Numbers, as text or, but for SbScanText(), in binary; `what` names the expected item, for messages. */
+/* Numbers, as text or, but for SbScanText(), in binary; `what` names the expected item, for messages, that of
+   `number`. A point: three finite ones. */
 PetscErrorCode SbScanText(SbScan *scan, const char *what, int64_t *value);
-PetscErrorCode SbScanReal(SbScan *scan, const char *what, int64_t number,
-                          PetscReal *value); /* `what` of `number` */
-PetscErrorCode SbScanPoint(SbScan *scan, const char *what, int64_t number,
-                           PetscReal x[3]); /* three finite ones */
+PetscErrorCode SbScanReal(SbScan *scan, const char *what, int64_t number, PetscReal *value);
+PetscErrorCode SbScanPoint(SbScan *scan, const char *what, int64_t number, PetscReal x[3]);
 /* A count of items with at least these bytes each, as text and in binary: an error if the file is shorter. */
 PetscErrorCode SbScanRoom(SbScan *scan, const char *what, int64_t n, int64_t text_bytes,
                           int64_t binary_bytes);
@@ -130,7 +129,7 @@ typedef struct {
   PetscReal off[3]; /* from the middle of the edge, m once placed */
 } SbMiddle;
 
-/* A body as its reader delivers it. Zeroed before the reader is called; freed by SbImportDestroy(), also after an error. */
+/* A body as its reader delivers it. Zeroed before; freed by SbImportDestroy(), also after an error. */
 struct _p_SbImport {
   char where[PETSC_MAX_PATH_LEN + 2 * SB_NAME_MAX]; /* "body 'liver': liver.msh", begins every message */
   char body[SB_NAME_MAX];                           /* "liver"; "" in supple-mesh */
@@ -147,8 +146,7 @@ struct _p_SbImport {
   PetscInt nslot;       /* a power of two */
   PetscInt *slot;       /* [nslot] groups by a hash of (dim, tag), or -1; made when needed */
   SbCount nmiddle;
-  SbMiddle *
-    middle; /* [nmiddle] edges of 10-node tets, for each tet; once read those that are off the middle, each once, ascending */
+  SbMiddle *middle;  /* [nmiddle] edges of 10-node tets; once read those off the middle, once, ascending */
   PetscBool surface; /* input: all triangles are read, and tets are optional */
   SbTetOptions tet;  /* input: parameters for filling a surface with tets */
   PetscReal scale;   /* input: scale factor, applied after reading; a reader that has scaled sets it to 1 */
@@ -173,18 +171,19 @@ struct _p_SbImport {
 /* Chooses the reader by the name of the mesh, reads, transforms. Not collective. */
 PetscErrorCode SbImportRead(const SbBody *body, SbImport *import);
 PetscErrorCode SbImportDestroy(SbImport *import);
-/* Leaves out the vertices with keep[] 0, and items with such a one; keep[nvert] becomes the new number of each, or -1. Not collective. */
+/* Leaves out vertices with keep[] 0, and items with one; keep[nvert] becomes the new numbers, or -1. */
 PetscErrorCode SbImportDropVertices(SbImport *import, PetscInt keep[]);
-/* Once tets and nodes of edges are read: edges of tets off their middle, each once, ascending; nodes that are no corner of a tet are no vertices any more.
-   Output: found[nmiddle], which of those in a list are edges of tets, or NULL: it is an error if one is not; largest, off the middle over the length. Errors: an edge
-   with two nodes at different places, or twice in a list. Not collective. */
+/* Once tets and nodes of edges are read: edges of tets off their middle, each once, ascending; nodes that are
+   no corner of a tet are no vertices any more. Output: found[nmiddle], which of those in a list are edges of
+   tets, or NULL: it is an error if one is not; largest, off the middle over the length. Errors: an edge with
+   two nodes at different places, or twice in a list. Not collective. */
 PetscErrorCode SbImportMiddles(SbImport *import, PetscBool found[], PetscReal *largest);
 /* The error of one that is listed and of no tet. */
 PetscErrorCode SbImportLostMiddle(const SbImport *import, const SbMiddle *lost);
 /* The note of the reader about n edges off their middle. */
 void SbImportNoteMiddles(SbImport *import, PetscInt n, PetscReal largest);
-/* The same of a body that may be one of many copies: `before`, the body before it or NULL, and `shared`, zeroed at first, in which the mesh of its file is kept for
-   the next one; destroy it. */
+/* The same of a body that may be one of many copies: `before`, the body before it or NULL, and `shared`,
+   zeroed at first, in which the mesh of its file is kept for the next one; destroy it. */
 PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImport *shared, SbImport *import);
 /* Which rows of the arrays of an .h5 mesh a slab has: from first, in blocks of `block`, N in the file. */
 typedef struct {
@@ -196,13 +195,13 @@ PetscErrorCode SbImportSlabs(const SbBody *body, PetscInt *ncell);
   SbImportSlab - slab k of n of such a mesh, placed. Not collective.
 
   Output:
-    import - the k-th block of the vertices and that of the simplices of each dimension, with numbers of vertices in the file, from 0 on; all
-             groups
+    import - the k-th block of the vertices and that of the simplices of each dimension, with numbers of
+             vertices in the file, from 0 on; all groups
     rows   - of the vertices
   Errors: those of SbImportRead() that these blocks show.
 */
 PetscErrorCode SbImportSlab(const SbBody *body, PetscInt k, PetscInt n, SbImport *import, SbSlabRows *rows);
-/* How the user writes an option of this body, for messages: "-body_liver_tet_size"; in supple-mesh "-size". */
+/* How the user writes an option of this body, for messages: "-body_liver_tet_size"; supple-mesh: "-size". */
 #define SB_IMPORT_OPTION_MAX (SB_NAME_MAX + 32)
 const char *SbImportOption(const SbImport *import, const char *key, char name[SB_IMPORT_OPTION_MAX]);
 /* A .msh of any version. */
@@ -210,10 +209,10 @@ PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *body);
 /* TetGen's files; path: one of them, or what they have in common. */
 PetscErrorCode SbImportRead_TetGen(const char *path, SbImport *body);
 
-/* In a forked child of `parent`: resets signal handlers, masks and terminal of the parent; the child ends with the parent, and after `seconds` by SIGALRM,
-   also after exec. */
+/* In a forked child of `parent`: resets signal handlers, masks and terminal of the parent; the child ends
+   with the parent, and after `seconds` by SIGALRM, also after exec. */
 void SbChildIsolate(pid_t parent, PetscReal seconds);
-/* Allocates or enlarges an array of a reader to this many bytes; *array: NULL or an earlier one, whose contents are kept. Freed by SbImportDestroy() at the latest. */
+/* Allocates (*array NULL) or enlarges an array of a reader; freed by SbImportDestroy() at the latest. */
 PetscErrorCode SbImportScratch(SbImport *import, size_t bytes, void *array);
 /* The same for one more of `unit` bytes each. */
 PetscErrorCode SbImportGrow(SbImport *import, SbCount *count, size_t unit, void *array);
@@ -222,7 +221,7 @@ PetscErrorCode SbImportSetVertices(SbImport *import, PetscInt n);
 /* Appends a simplex; vert[dim + 1]. */
 PetscErrorCode SbImportAddItem(SbImport *import, int dim, const PetscInt vert[], PetscInt tags,
                                int64_t number);
-/* Allocates exactly n simplices of a dimension that has none yet, numbered from 1 on; the caller fills them. */
+/* Allocates n simplices of a dimension that has none yet, numbered from 1 on; the caller fills them. */
 PetscErrorCode SbImportSetItems(SbImport *import, int dim, PetscInt n);
 PetscErrorCode SbItemsFree(SbItems *items);
 /* Copies item `from` to item `to`. */
@@ -234,13 +233,14 @@ PetscErrorCode SbImportTagsAlone(SbImport *import, PetscInt dim, int64_t tag, co
                                  PetscInt *tags);
 /* The tag set that holds exactly these groups (any order, repeats allowed, reordered here), made when new. */
 PetscErrorCode SbImportTagSet(SbImport *import, PetscInt n, PetscInt groups[], PetscInt *tags);
-/* Notes that an item belongs to a group; SbImportJoinGroups() gives every item the groups noted for it, beside those that it has. */
+/* Notes that an item belongs to a group; SbImportJoinGroups() adds to each item the groups noted for it. */
 PetscErrorCode SbImportAddMember(SbImport *import, PetscInt dim, PetscInt item, PetscInt group);
 PetscErrorCode SbImportJoinGroups(SbImport *import);
-/* Of simplices with the same vertices the first stays, with the groups of all; but for `all` only of those that have groups and share none. Adds how many went. */
+/* Of simplices with the same vertices the first stays, with the groups of all; but for `all` only of those
+   that have groups and share none. Adds how many went. */
 PetscErrorCode SbImportJoinRepeats(SbImport *import, int dim, PetscBool all, PetscInt *ndropped);
 
-/* ------------------------------------------------------------------ edges.c: pairs of vertices that an item joins */
+/* ---------------------------------------------------------- edges.c: pairs of vertices that an item joins */
 
 typedef struct {
   PetscInt nvert, nedge;
@@ -256,13 +256,13 @@ PetscInt SbImportEdgesFind(const SbImportEdges *edges, PetscInt a, PetscInt b);
 /* x[nedge][3]: the middle of each edge, or where its node is off it. */
 void SbImportEdgeNodes(const SbImport *import, const SbImportEdges *edges, PetscReal x[]);
 
-/* ------------------------------------------------------------------ write_h5.c: indices of HDF5 files for ParaView */
+/* --------------------------------------------------------- write_h5.c: indices of HDF5 files for ParaView */
 
-/* An array [n] or [n][ncomp] of type "Int" or "Float" as a DataItem of XDMF; file and path in it by a printf format. */
+/* An array [n] or [n][ncomp] of type "Int" or "Float" as a DataItem of XDMF; file, path: a printf format. */
 void SbXdmfArray(FILE *file, PetscInt64 n, int ncomp, const char *type, int bytes, const char *format, ...)
   PETSC_ATTRIBUTE_FORMAT(6, 7);
 
-/* ------------------------------------------------------------------ import_h5.c: what is in the fields.h5 of a run */
+/* --------------------------------------------------------- import_h5.c: what is in the fields.h5 of a run */
 
 /* Its frames. Start with {.wanted = step}, negative: the last one. */
 typedef struct {

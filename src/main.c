@@ -3,8 +3,8 @@
 
     supple SCENARIO.opts [-option value ...]          or     mpirun -n 4 supple SCENARIO.yml
 
-  Options are read and checked before the computation; a run that fails keeps its output and ends with an error
-  line and a non-zero code. Open MPI refuses to start as root unless OMPI_ALLOW_RUN_AS_ROOT=1 and
+  Options are read and checked before the computation; a run that fails keeps its output and ends with an
+  error line and a non-zero code. Open MPI refuses to start as root unless OMPI_ALLOW_RUN_AS_ROOT=1 and
   OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 are set.
 */
 #include <signal.h>
@@ -54,8 +54,7 @@ static PetscErrorCode simulate(Scene *s)
   PetscCall(SbOutputFile(s->run, "ledger.csv", sizeof(file), file, &quiet));
   PetscCall(SbLedgerReport(s->ledger, file, quiet));
   SbErrorSetFailureHandler(NULL, NULL);
-  if (s->run->stopped) SbErrorSetStopped();
-  if (s->run->stop_reason[0]) SbErrorPost("%s", s->run->stop_reason);
+  if (s->run->stop_reason[0]) SbErrorPost(s->run->stopped, s->run->stop_reason);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -134,7 +133,7 @@ static PetscErrorCode supple(int argc, char *argv[])
 
 int main(int argc, char *argv[])
 {
-  // for each file of HDF5, Open MPI would create a lock file for shared file pointers, which are unused, and abort if its path has more than 255 characters
+  // Open MPI would create an unused lock file for each HDF5 file, and abort above 255 characters of path
   (void)setenv("OMPI_MCA_sharedfp", "^lockedfile", 0);
   if (MPI_Init(&argc, &argv)) return 1;
   return SbErrorFinish(supple(argc, argv));

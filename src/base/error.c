@@ -164,19 +164,11 @@ void SbErrorFindYamlLine(void)
                                                        : "; compare its indentation, colons and quotes");
 }
 
-void SbErrorPost(const char *format, ...)
+void SbErrorPost(PetscBool stopped, const char *message)
 {
-  va_list args;
-
-  va_start(args, format);
-  (void)vsnprintf(state.message, sizeof(state.message), format, args);
-  va_end(args);
+  SbFormat(sizeof(state.message), state.message, "%s", message);
+  if (stopped) state.code = SB_EXIT_STOPPED;
   state.pending = state.posted = PETSC_TRUE;
-}
-
-void SbErrorSetStopped(void)
-{
-  state.code = SB_EXIT_STOPPED;
 }
 
 void SbErrorSetFailureHandler(void (*failure_handler)(const char *message, void *ctx), void *ctx)

@@ -155,11 +155,9 @@ static PetscErrorCode unary(Parser *p)
     PetscCall(unary(p));
     if (minus) PetscCall(emit(p, SB_OP_NEG, 0, 0, 0));
   } else {
-    unsigned char c;
+    const unsigned char c = (unsigned char)*p->next;
 
     // a number, a name or an expression in parentheses
-    skip_blanks(p);
-    c = (unsigned char)*p->next;
     if (isdigit(c) || (c == '.' && isdigit((unsigned char)p->next[1]))) {
       char *end;
       const PetscReal number = strtod(p->next, &end);

@@ -17,8 +17,9 @@ typedef struct {
   char name[SB_OPTION_NAME_MAX]; /* "-body_liver_young" */
   SbScope scope;
   const SbOption *row;
-  PetscBool given; /* given by the user, else `text` is the default */
-  char *text;      /* owned */
+  PetscBool given;        /* given by the user, else `text` is the default */
+  char *text;             /* owned */
+  char want[SB_NAME_MAX]; /* for messages: " in (0, inf) Pa", " in m"; "" without interval and unit */
 } SbOptionRecord;
 
 /* An option given by the user, of supple or PETSc. */

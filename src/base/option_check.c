@@ -117,19 +117,6 @@ static size_t instance_of(const char *klass, const char *name, PetscBool *read)
   return best;
 }
 
-/* Whether a record of the instance (n letters) is of this type. */
-static PetscBool has_type(const char *klass, const char *instance, size_t n, const char *type)
-{
-  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
-    const SbScope *scope = &SbTheOptions.record[i].scope;
-
-    if (!strcmp(scope->klass, klass) && !strcmp(scope->type, type) && strlen(scope->instance) == n &&
-        !strncasecmp(scope->instance, instance, n))
-      return PETSC_TRUE;
-  }
-  return PETSC_FALSE;
-}
-
 /* Classification of an unread option. */
 typedef enum {
   NOT_OURS,
@@ -166,7 +153,14 @@ static PetscErrorCode verdict_of_class(const char *klass, const char *name, size
     PetscBool own;
 
     if (strcmp(r->klass, klass) || strcasecmp(r->row->key, key)) continue;
-    own = (PetscBool)(!r->type[0] || has_type(klass, instance, n, r->type));
+    // whether the row is for all types, or for one of which the instance has been read
+    own = (PetscBool)!r->type[0];
+    for (PetscInt i = 0; i < SbTheOptions.nrecord && !own; i++) {
+      const SbScope *s = &SbTheOptions.record[i].scope;
+
+      own = (PetscBool)(!strcmp(s->klass, klass) && !strcmp(s->type, r->type) && strlen(s->instance) == n &&
+                        !strncasecmp(s->instance, instance, n));
+    }
     *verdict = read ? UNUSED : LEFT_OUT;
     if (!read)
       SbFormat(size, text, "%s %.*s", klass, (int)n, instance);

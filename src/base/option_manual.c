@@ -20,13 +20,15 @@ static const char *const first_options[][3] = {
   {"", "", "ts_max_time"}, {"", "", "solver"},      {"", "", "output_dir"},
 };
 
+/* What the terminal and the table say of each kind of option. */
+static const char *const kinds[][2] = {
+  [SB_OPTION_BOOL] = {"true or false", "bool"}, [SB_OPTION_INT] = {"integer", "int"},
+  [SB_OPTION_REAL] = {"number", "real"},        [SB_OPTION_REALS] = {"number", "real"},
+  [SB_OPTION_STRING] = {"text", "text"},        [SB_OPTION_NAMES] = {"comma-separated names", "names"},
+  [SB_OPTION_CHOICE] = {"one of", "choice"},    [SB_OPTION_FORMULA] = {"formula", "formula"}};
+
 static PetscErrorCode help_row(PetscViewer viewer, const SbOptionRow *r)
 {
-  static const char *const kinds[] = {
-    [SB_OPTION_BOOL] = "true or false", [SB_OPTION_INT] = "integer",
-    [SB_OPTION_REAL] = "number",        [SB_OPTION_REALS] = "number",
-    [SB_OPTION_STRING] = "text",        [SB_OPTION_NAMES] = "comma-separated names",
-    [SB_OPTION_CHOICE] = "one of",      [SB_OPTION_FORMULA] = "formula"};
   const SbOption *row = r->row;
   char name[SB_OPTION_NAME_MAX], number[16] = "";
 
@@ -38,7 +40,7 @@ static PetscErrorCode help_row(PetscViewer viewer, const SbOptionRow *r)
                                    row->kind == SB_OPTION_REALS ? "comma-separated "
                                    : row->count > 1             ? "semicolon-separated "
                                                                 : "",
-                                   kinds[row->kind], row->count > 1 ? "s" : ""));
+                                   kinds[row->kind][0], row->count > 1 ? "s" : ""));
   if (row->range[0])
     PetscCall(PetscViewerASCIIPrintf(viewer, "%s %s", strchr("[(", row->range[0]) ? " in" : "", row->range));
   if (row->unit[0]) PetscCall(PetscViewerASCIIPrintf(viewer, " %s", row->unit));
@@ -50,42 +52,30 @@ static PetscErrorCode help_row(PetscViewer viewer, const SbOptionRow *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Relevance of an option to a topic: 3: class or type, 2: first word, 1: a word in name or text, 0: none. */
-static PetscErrorCode answers(const SbOptionRow *r, const char *topic, int *how)
-{
-  const SbOption *row = r->row;
-  const size_t n = strlen(topic);
-  char name[SB_OPTION_NAME_MAX];
-
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionManualName(r, sizeof(name), name));
-  *how = 0;
-  if (!strcasecmp(r->klass[0] ? r->klass : "run", topic) || !strcasecmp(r->type, topic))
-    *how = 3;
-  else if (!r->klass[0] && !strncasecmp(row->key, topic, n) && (!row->key[n] || row->key[n] == '_'))
-    *how = 2;
-  else if (strcasestr(name, topic) || strcasestr(row->help, topic) || strcasestr(row->range, topic))
-    *how = 1;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Prints the options of a class and type from relevance `least` on, with a headline; adds their number. */
 static PetscErrorCode print_type(PetscViewer viewer, const SbOptionRow *first, const char *topic, int least,
                                  PetscBool table, PetscInt *n)
 {
-  static const char *const kinds[] = {
-    [SB_OPTION_BOOL] = "bool",     [SB_OPTION_INT] = "int",        [SB_OPTION_REAL] = "real",
-    [SB_OPTION_REALS] = "real",    [SB_OPTION_STRING] = "text",    [SB_OPTION_NAMES] = "names",
-    [SB_OPTION_CHOICE] = "choice", [SB_OPTION_FORMULA] = "formula"};
+  const size_t length = strlen(topic);
   char name[SB_OPTION_NAME_MAX];
   PetscInt printed = 0;
-  int how = 0;
 
   PetscFunctionBeginUser;
   for (const SbOptionRow *r = first; r < SbTheOptions.row + SbTheOptions.nrow; r++) {
+    const SbOption *row = r->row;
+    int relevance = 0;
+
     if (strcmp(r->klass, first->klass) || strcmp(r->type, first->type)) continue;
-    PetscCall(answers(r, topic, &how));
-    if (how < least) continue;
+    // relevance of the option to the topic: 3: class or type, 2: first word, 1: a word in name or text
+    PetscCall(SbOptionManualName(r, sizeof(name), name));
+    if (!strcasecmp(r->klass[0] ? r->klass : "run", topic) || !strcasecmp(r->type, topic))
+      relevance = 3;
+    else if (!r->klass[0] && !strncasecmp(row->key, topic, length) &&
+             (!row->key[length] || row->key[length] == '_'))
+      relevance = 2;
+    else if (strcasestr(name, topic) || strcasestr(row->help, topic) || strcasestr(row->range, topic))
+      relevance = 1;
+    if (relevance < least) continue;
     // headline of a section: "The run", "Every body", "body: corotated"
     if (!printed++ && !table) {
       if (!r->klass[0])
@@ -96,12 +86,11 @@ static PetscErrorCode print_type(PetscViewer viewer, const SbOptionRow *first, c
         PetscCall(PetscViewerASCIIPrintf(viewer, "\n%s: %s\n", r->klass, r->type));
     }
     // a line for the terminal, or one of the table for scripts, whose columns are those of SbOptionsTable()
-    PetscCall(SbOptionManualName(r, sizeof(name), name));
     if (table)
       PetscCall(PetscViewerASCIIPrintf(viewer, "%s\t%s\t%s\t%s\t%" PetscInt_FMT "\t%s\t%s\t%s\t%s\t%s\n",
-                                       r->klass, r->type, name, kinds[r->row->kind], r->row->count,
-                                       r->row->unit, r->row->preset ? "no" : "yes",
-                                       r->row->preset ? r->row->preset : "", r->row->range, r->row->help));
+                                       r->klass, r->type, name, kinds[row->kind][1], row->count, row->unit,
+                                       row->preset ? "no" : "yes", row->preset ? row->preset : "", row->range,
+                                       row->help));
     else
       PetscCall(help_row(viewer, r));
   }

@@ -58,16 +58,6 @@ static PetscBool parse_real(const char *text, PetscReal *value)
 
 /* ------------------------------------------------------------------ ranges */
 
-/* Text " in (0, inf) Pa", " in m"; "" without interval and unit. */
-static const char *wanted(const SbOption *row, size_t size, char text[])
-{
-  const PetscBool range = (PetscBool)(row->range[0] == '(' || row->range[0] == '[');
-
-  (void)snprintf(text, size, "%s%s%s%s", range || row->unit[0] ? " in " : "", range ? row->range : "",
-                 range && row->unit[0] ? " " : "", row->unit);
-  return text;
-}
-
 static PetscErrorCode check_range(const SbOptionRecord *r, PetscReal x)
 {
   PetscBool in;
@@ -103,8 +93,7 @@ static PetscErrorCode text_of(const SbScope *scope, const char *key, SbOptionKin
   SbOptionRecord *r = NULL;
   const char *value = NULL;
   SbScope where;
-  PetscBool given;
-  char want[SB_NAME_MAX];
+  PetscBool given, range;
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionNeed(scope, key, &row));
@@ -113,9 +102,12 @@ static PetscErrorCode text_of(const SbScope *scope, const char *key, SbOptionKin
   PetscCheck(row->kind == kind, PETSC_COMM_SELF, PETSC_ERR_PLIB, "Option %s has kind %d, asked for as %d",
              r->name, (int)row->kind, (int)kind);
   r->given = given;
+  range = (PetscBool)(row->range[0] == '(' || row->range[0] == '[');
+  SbFormat(sizeof(r->want), r->want, "%s%s%s%s", range || row->unit[0] ? " in " : "", range ? row->range : "",
+           range && row->unit[0] ? " " : "", row->unit);
   if (r->given && !value && row->kind == SB_OPTION_BOOL) value = "true";
-  PetscCheck(!r->given || value, PETSC_COMM_SELF, PETSC_ERR_USER, "%s has no value%s: %s%s", r->name,
-             wanted(row, sizeof(want), want), row->help,
+  PetscCheck(!r->given || value, PETSC_COMM_SELF, PETSC_ERR_USER, "%s has no value%s: %s%s", r->name, r->want,
+             row->help,
              row->kind == SB_OPTION_FORMULA ? "; write -x as 0-x, or PETSc takes it for an option" : "");
   if (!r->given && !row->preset) PetscCall(SbOptionMissing(r));
   PetscCall(PetscFree(r->text));
@@ -150,7 +142,7 @@ PetscErrorCode SbOptionBool(const SbScope *scope, const char *key, PetscBool *va
 PetscErrorCode SbOptionInt(const SbScope *scope, const char *key, PetscInt *value)
 {
   const SbOptionRecord *r;
-  char *end, want[SB_NAME_MAX];
+  char *end;
   long long n;
 
   PetscFunctionBeginUser;
@@ -158,7 +150,7 @@ PetscErrorCode SbOptionInt(const SbScope *scope, const char *key, PetscInt *valu
   if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
   n = strtoll(r->text, &end, 10);
   PetscCheck(end != r->text && !*end, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not an integer%s: %s",
-             r->name, r->text, wanted(r->row, sizeof(want), want), r->row->help);
+             r->name, r->text, r->want, r->row->help);
   PetscCall(check_range(r, (PetscReal)n));
   PetscCheck(n >= PETSC_MIN_INT && n <= PETSC_MAX_INT, PETSC_COMM_SELF, PETSC_ERR_USER,
              "%s %s is too large for this build of PETSc, whose integers end at %" PetscInt_FMT, r->name,
@@ -171,13 +163,12 @@ PetscErrorCode SbOptionReal(const SbScope *scope, const char *key, PetscReal *va
 {
   const SbOptionRecord *r;
   PetscReal x;
-  char want[SB_NAME_MAX];
 
   PetscFunctionBeginUser;
   PetscCall(text_of(scope, key, SB_OPTION_REAL, &r));
   if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCheck(parse_real(r->text, &x), PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not a number%s: %s", r->name,
-             r->text, wanted(r->row, sizeof(want), want), r->row->help);
+             r->text, r->want, r->row->help);
   PetscCall(check_range(r, x));
   *value = x;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -187,7 +178,6 @@ PetscErrorCode SbOptionReals(const SbScope *scope, const char *key, PetscReal va
 {
   const SbOptionRecord *r;
   const char *text;
-  char want[SB_NAME_MAX];
   PetscInt n;
 
   PetscFunctionBeginUser;
@@ -196,8 +186,7 @@ PetscErrorCode SbOptionReals(const SbScope *scope, const char *key, PetscReal va
   n = count_pieces(r->text, ',');
   PetscCheck(n == r->row->count, PETSC_COMM_SELF, PETSC_ERR_USER,
              "%s %s has %" PetscInt_FMT " number%s, needs %" PetscInt_FMT "%s with commas between them: %s",
-             r->name, r->text, n, n == 1 ? "" : "s", r->row->count, wanted(r->row, sizeof(want), want),
-             r->row->help);
+             r->name, r->text, n, n == 1 ? "" : "s", r->row->count, r->want, r->row->help);
   text = r->text;
   for (PetscInt i = 0; i < n; i++) {
     char piece[64];
@@ -205,7 +194,7 @@ PetscErrorCode SbOptionReals(const SbScope *scope, const char *key, PetscReal va
 
     PetscCheck(next_piece(&text, ',', sizeof(piece), piece) && parse_real(piece, &x), PETSC_COMM_SELF,
                PETSC_ERR_USER, "%s %s: entry %" PetscInt_FMT " is not a number%s: %s", r->name, r->text,
-               i + 1, wanted(r->row, sizeof(want), want), r->row->help);
+               i + 1, r->want, r->row->help);
     PetscCall(check_range(r, x));
     value[i] = x;
   }

@@ -27,14 +27,14 @@ PetscInt SbKeysAlike(PetscInt n, const SbKey item[], PetscInt i)
 
 PetscInt SbKeysFind(PetscInt n, const SbKey item[], uint64_t key)
 {
-  PetscInt begin = 0;
+  PetscInt begin = 0, left = n;
 
-  while (n > 0) {
-    const PetscInt half = n / 2;
+  while (left > 0) {
+    const PetscInt half = left / 2;
     const PetscBool below = (PetscBool)(item[begin + half].key < key);
 
     begin += below ? half + 1 : 0;
-    n = below ? n - half - 1 : half;
+    left = below ? left - half - 1 : half;
   }
-  return begin;
+  return begin < n && item[begin].key == key ? begin : -1;
 }

@@ -5,10 +5,10 @@
   are set to zero and the others scaled to the sum 1; the distance to that point bounds the distance to the
   tet from above, and limits the search in the box tree.
 
-  In a curved tet, x(l) = sum_a phi_a(l) x_a, l is found by Newton's method from the coordinates in the straight
-  tet: with the corners c_i of the P1 tet that has the derivatives of the map at l (src/base/quadratic_map.c), the
-  next l are the barycentric coordinates in it of p - x(l) + sum l_i c_i. Its box is that of the corners and the edge
-  midpoints shifted by twice the offsets of the edge nodes (Bernstein form).
+  In a curved tet, x(l) = sum_a phi_a(l) x_a, l is found by Newton's method from the coordinates in the
+  straight tet: with the corners c_i of the P1 tet that has the derivatives of the map at l
+  (quadratic_map.c), the next l are the barycentric coordinates in it of p - x(l) + sum l_i c_i. Its box is
+  that of the corners and the edge midpoints shifted by twice the offsets of the edge nodes (Bernstein form).
 */
 #include "sbgeometry.h"
 

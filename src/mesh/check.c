@@ -35,12 +35,8 @@ static inline PetscReal longest_edge2(const PetscReal x[], const PetscInt v[4])
 {
   PetscReal L2 = 0;
 
-  for (int e = 0; e < 6; e++) {
-    PetscReal d[3];
-
-    SbSubtract(x + 3 * v[SbTetEdge[e][0]], x + 3 * v[SbTetEdge[e][1]], d);
-    L2 = PetscMax(L2, SbDot3(d, d));
-  }
+  for (int e = 0; e < 6; e++)
+    L2 = PetscMax(L2, SbDistance2(x + 3 * v[SbTetEdge[e][0]], x + 3 * v[SbTetEdge[e][1]]));
   return L2;
 }
 
@@ -58,40 +54,6 @@ PetscReal SbImportLargest(const SbImport *im)
 
   for (PetscInt i = 0; i < 3 * im->nvert; i++) largest = PetscMax(largest, PetscAbsReal(im->x[i]));
   return largest;
-}
-
-/* Swaps two vertices of inverted tets; a flat tet is an error. */
-static PetscErrorCode orient(SbImport *im, PetscReal largest)
-{
-  PetscReal det;
-
-  PetscFunctionBeginUser;
-  for (PetscInt c = 0; c < im->item[3].n; c++) {
-    PetscInt *v = im->item[3].vert + 4 * c;
-
-    // a flat tet, perhaps because it has the same node twice
-    if (SbTetFlat(im->x, v, largest, &det)) {
-      for (int i = 0; i < 4; i++) {
-        for (int j = 0; j < i; j++)
-          PetscCheck(v[i] != v[j], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-                     "%s: tetrahedron %lld uses node %lld twice; remove it", im->where,
-                     (long long)im->item[3].number[c], (long long)im->vert_number[v[i]]);
-      }
-      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-              "%s: tetrahedron %lld is flat (volume %.3g m^3 with an edge of %.3g m); repair the mesh (gmsh: "
-              "Mesh.Optimize = 1)",
-              im->where, (long long)im->item[3].number[c], (double)PetscAbsReal(det) / 6,
-              (double)PetscSqrtReal(longest_edge2(im->x, v)));
-    }
-    if (det < 0) {
-      const PetscInt keep = v[3];
-
-      v[3] = v[2];
-      v[2] = keep;
-      im->nreoriented++;
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ tets together */
@@ -118,9 +80,35 @@ PetscErrorCode SbImportOverlap(const SbImport *im, const int64_t number[3], Pets
 PetscErrorCode SbImportCheckCells(SbImport *im, PetscReal largest, SbFaces *faces)
 {
   const int64_t *number = im->item[3].number;
+  PetscReal det;
 
   PetscFunctionBeginUser;
-  PetscCall(orient(im, largest));
+  // swap two vertices of inverted tets; a flat tet is an error
+  for (PetscInt c = 0; c < im->item[3].n; c++) {
+    PetscInt *v = im->item[3].vert + 4 * c;
+
+    // a flat tet, perhaps because it has the same node twice
+    if (SbTetFlat(im->x, v, largest, &det)) {
+      for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < i; j++)
+          PetscCheck(v[i] != v[j], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+                     "%s: tetrahedron %lld uses node %lld twice; remove it", im->where, (long long)number[c],
+                     (long long)im->vert_number[v[i]]);
+      }
+      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+              "%s: tetrahedron %lld is flat (volume %.3g m^3 with an edge of %.3g m); repair the mesh (gmsh: "
+              "Mesh.Optimize = 1)",
+              im->where, (long long)number[c], (double)PetscAbsReal(det) / 6,
+              (double)PetscSqrtReal(longest_edge2(im->x, v)));
+    }
+    if (det < 0) {
+      const PetscInt keep = v[3];
+
+      v[3] = v[2];
+      v[2] = keep;
+      im->nreoriented++;
+    }
+  }
   PetscCall(SbFacesCreate(im->nvert, im->item[3].n, im->item[3].vert, faces));
   /* cells with equal vertices share all four faces; with a third cell at one of them it is a face of three */
   if (faces->nshared) {

@@ -29,7 +29,7 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
                             SbMesh *mesh)
 {
   SbMesh m;
-  SbMergedMesh merged, curved;
+  SbMergedMesh merged;
   SbLocalMesh local;
   PetscInt partitioner, reading;
   PetscBool full, all = PETSC_FALSE;
@@ -69,14 +69,10 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   m->set = set;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));
   for (PetscInt b = 0; b < nbody; b++) all = (PetscBool)(all || body[b].other_nodes);
-  curved = merged;
-  merged.curved = NULL;
-  merged.edge_off = NULL;
   PetscCall(SbDistribute(comm, (SbPartitioner)partitioner, all, &merged, &local));
   PetscCall(SbMeshNumber(m, &local));
-  PetscCall(SbMeshCurve(m, curved.ncurved, curved.curved, curved.edge_off));
-  PetscCall(PetscFree(curved.curved));
-  PetscCall(PetscFree(curved.edge_off));
+  PetscCall(SbMeshCurve(m, merged.ncurved, merged.curved, merged.edge_off));
+  PetscCall(SbMergedMeshDestroy(&merged));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));
   *mesh = m;
   PetscFunctionReturn(PETSC_SUCCESS);

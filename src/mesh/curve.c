@@ -73,45 +73,8 @@ PetscBool SbImportOffsets(const SbImport *im, int dim, const PetscInt v[], Petsc
   return curved;
 }
 
-/* Statistics of curved cells. */
-typedef struct {
-  PetscInt n[2];    /* numbers of curved cells, and of those whose Jacobian is not positive */
-  int64_t number;   /* file number of the first cell whose Jacobian is not positive */
-  PetscReal least;  /* its smallest Jacobian over that of the straight tet */
-  PetscReal volume; /* sum of the volume changes relative to straight tets, m^3 */
-} Curved;
-
-/* The curved cells of this rank, with their edge offsets if `keep`; without cell[] they are only counted. */
-static PetscErrorCode find_curved(const SbImport *im, PetscBool keep, uint64_t cell[], PetscReal **edge_off,
-                                  Curved *found)
-{
-  PetscInt room = 0;
-
-  PetscFunctionBeginUser;
-  for (PetscInt c = 0; im->nmiddle.n && c < im->item[3].n; c++) {
-    const PetscInt *v = im->item[3].vert + 4 * c;
-    PetscReal off[18], least;
-
-    if (!SbImportOffsets(im, 3, v, off)) continue;
-    found->n[0]++;
-    if (!keep) continue;
-
-    // smallest Jacobian at quadrature points and nodes, and the change of volume relative to the straight tet
-    least = SbTetCurvedLeast(im->x, v, off);
-    if (!(least > 0) && !found->n[1]++) {
-      found->number = im->item[3].number[c];
-      found->least = least;
-    }
-    found->volume += SbTetCurvedVolume(im->x, v, off) - SbTetDeterminant(im->x, v) / 6;
-    if (!cell) continue;
-    cell[c] |= SB_CURVED;
-    PetscCall(SbReserve(found->n[0], 18 * sizeof(PetscReal), &room, edge_off));
-    PetscCall(PetscArraycpy(*edge_off + 18 * (size_t)(found->n[0] - 1), off, 18));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode refuse(const SbImport *im, const Curved *found, PetscInt nfolded)
+/* Error of the first tet whose Jacobian is not positive, by its number in the file. */
+static PetscErrorCode refuse(const SbImport *im, int64_t number, PetscReal least, PetscInt nfolded)
 {
   PetscFunctionBeginUser;
   SETERRQ(
@@ -119,30 +82,49 @@ static PetscErrorCode refuse(const SbImport *im, const Curved *found, PetscInt n
     "%s: tetrahedron %lld of second order folds over itself (tets that do: %lld): its least Jacobian is %.3g "
     "times that of the straight tet, and must be above 0; mesh finer there or let gmsh untangle it "
     "(Mesh.HighOrderOptimize = 2), or save straight tets (Mesh.ElementOrder = 1)",
-    im->where, (long long)found->number, (long long)nfolded, (double)found->least);
+    im->where, (long long)number, (long long)nfolded, (double)least);
 }
 
 PetscErrorCode SbImportCurve(MPI_Comm comm, const SbImport *im, SbBody *body, uint64_t cell[],
                              PetscReal **edge_off)
 {
   SbCaughtError caught = {0, ""};
-  Curved found = {{0, 0}, 0, 0, 0};
-  PetscInt n[2];
+  PetscInt mine[2] = {0, 0}, n[2], room = 0; /* curved cells; those whose Jacobian is not positive */
+  PetscReal least = 0, volume = 0;
+  int64_t number = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(find_curved(im, body->edge_nodes, cell, edge_off, &found));
-  PetscCallMPI(MPI_Allreduce(found.n, n, 2, MPIU_INT, MPI_SUM, comm));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &found.volume, 1, MPIU_REAL, MPI_SUM, comm));
+  for (PetscInt c = 0; im->nmiddle.n && c < im->item[3].n; c++) {
+    const PetscInt *v = im->item[3].vert + 4 * c;
+    PetscReal off[18], smallest;
+
+    if (!SbImportOffsets(im, 3, v, off)) continue;
+    mine[0]++;
+    if (!body->edge_nodes) continue;
+    // smallest Jacobian at quadrature points and nodes, and the change of volume relative to the straight tet
+    smallest = SbTetCurvedLeast(im->x, v, off);
+    if (!(smallest > 0) && !mine[1]++) {
+      number = im->item[3].number[c];
+      least = smallest;
+    }
+    volume += SbTetCurvedVolume(im->x, v, off) - SbTetDeterminant(im->x, v) / 6;
+    if (!cell) continue;
+    cell[c] |= SB_CURVED;
+    PetscCall(SbReserve(mine[0], 18 * sizeof(PetscReal), &room, edge_off));
+    PetscCall(PetscArraycpy(*edge_off + 18 * (size_t)(mine[0] - 1), off, 18));
+  }
+  PetscCallMPI(MPI_Allreduce(mine, n, 2, MPIU_INT, MPI_SUM, comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &volume, 1, MPIU_REAL, MPI_SUM, comm));
   if (!n[0]) PetscFunctionReturn(PETSC_SUCCESS);
-  if (cell && found.n[1]) SB_CATCH(&caught, refuse(im, &found, n[1]));
+  if (cell && mine[1]) SB_CATCH(&caught, refuse(im, number, least, n[1]));
   PetscCall(SbCaughtRaise(comm, &caught));
-  body->volume += found.volume;
+  body->volume += volume;
   SbAppend(sizeof(body->note), body->note, "%s%s: %" PetscInt_FMT, body->note[0] ? ", " : "",
            body->edge_nodes ? "curved tets" : "curved tets, which only p2 keeps, taken as straight", n[0]);
   if (n[1])
     SbAppend(sizeof(body->note), body->note,
              ", folded over themselves, which p2 refuses: %" PetscInt_FMT " (the first: tetrahedron %lld)",
-             n[1], (long long)found.number);
+             n[1], (long long)number);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

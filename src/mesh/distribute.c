@@ -30,8 +30,9 @@ PetscErrorCode SbLocalMeshDestroy(SbLocalMesh *c)
 static PetscErrorCode send_cells(const SbLocalMesh *from, PetscBool owned, const SbRoute *route,
                                  const PetscInt which[], const PetscMPIInt dest[], SbLocalMesh *to)
 {
-  PetscInt *at, *list, nlist = 0, *order, *position, *count;
-  PetscMPIInt *list_dest, *mark;
+  PetscInt *at, *order, *position, *count;
+  PetscMPIInt *mark;
+  SbRouteList list = {0};
   SbRoute vertices;
 
   PetscFunctionBeginUser;
@@ -39,30 +40,23 @@ static PetscErrorCode send_cells(const SbLocalMesh *from, PetscBool owned, const
   // vertices to send to each rank, in the order of the cells; at[][4]: where the vertices of a cell are there
   PetscCall(PetscMalloc1(4 * (size_t)route->nsend, &at));
   PetscCall(
-    PetscMalloc4(route->nsend, &order, from->nvert, &position, route->size, &count, from->nvert, &mark));
+    PetscCalloc4(route->nsend, &order, from->nvert, &position, route->size, &count, from->nvert, &mark));
   for (PetscInt i = 0; i < route->nsend; i++) order[route->position[i]] = i;
-  for (int pass = 0; pass < 2; pass++) {
-    for (PetscInt v = 0; v < from->nvert; v++) mark[v] = -1;
-    for (PetscMPIInt r = 0; r < route->size; r++) count[r] = 0;
-    nlist = 0;
-    for (PetscInt k = 0; k < route->nsend; k++) {
-      const PetscInt i = order[k], *v = from->cell + 4 * (size_t)(which ? which[i] : i);
+  for (PetscInt v = 0; v < from->nvert; v++) mark[v] = -1;
+  for (PetscInt k = 0; k < route->nsend; k++) {
+    const PetscInt i = order[k], *v = from->cell + 4 * (size_t)(which ? which[i] : i);
 
-      for (int a = 0; a < 4; a++) {
-        if (mark[v[a]] != dest[i]) {
-          if (pass) list[nlist] = v[a];
-          if (pass) list_dest[nlist] = dest[i];
-          nlist++;
-          mark[v[a]] = dest[i];
-          position[v[a]] = count[dest[i]]++;
-        }
-        at[4 * (size_t)i + a] = position[v[a]];
+    for (int a = 0; a < 4; a++) {
+      if (mark[v[a]] != dest[i]) {
+        PetscCall(SbRouteAdd(&list, v[a], dest[i]));
+        mark[v[a]] = dest[i];
+        position[v[a]] = count[dest[i]]++;
       }
+      at[4 * (size_t)i + a] = position[v[a]];
     }
-    if (!pass) PetscCall(PetscMalloc2(nlist, &list, nlist, &list_dest));
   }
   PetscCall(PetscFree4(order, position, count, mark));
-  PetscCall(SbRouteCreate(route->comm, nlist, list_dest, &vertices));
+  PetscCall(SbRouteCreate(route->comm, list.n, list.rank, &vertices));
   PetscCall(SbRouteSend(route, 4 * sizeof(PetscInt), NULL, at, &to->cell));
   PetscCall(PetscFree(at));
   to->ncell = route->nrecv;
@@ -71,10 +65,11 @@ static PetscErrorCode send_cells(const SbLocalMesh *from, PetscBool owned, const
     for (PetscInt i = 4 * route->rfirst[r]; i < 4 * (route->rfirst[r] + route->rcount[r]); i++)
       to->cell[i] += vertices.rfirst[r];
   PetscCall(SbRouteSend(route, sizeof(SbCellData), which, from->data, &to->data));
-  PetscCall(SbRouteSend(&vertices, sizeof(SbVertexData), list, from->vertex, &to->vertex));
-  if (owned) PetscCall(SbRouteSend(&vertices, sizeof(PetscMPIInt), list, from->owner, &to->owner));
+  PetscCall(SbRouteSend(&vertices, sizeof(SbVertexData), list.item, from->vertex, &to->vertex));
+  if (owned) PetscCall(SbRouteSend(&vertices, sizeof(PetscMPIInt), list.item, from->owner, &to->owner));
   PetscCall(SbRouteDestroy(&vertices));
-  PetscCall(PetscFree2(list, list_dest));
+  PetscCall(PetscFree(list.item));
+  PetscCall(PetscFree(list.rank));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -108,8 +103,9 @@ typedef struct {
 static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbLocalMesh *local, Border *border)
 {
   const PetscInt n = local->nvert_cells;
-  PetscInt *orig, *got, *start, *holder, *pair, block, first, npair = 0;
-  PetscMPIInt *dest, *pair_dest, rank, size;
+  PetscInt *orig, *got, *start, *holder, (*pair)[2], block, first;
+  PetscMPIInt *dest, rank, size;
+  SbRouteList list = {0};
   SbRoute there, back;
 
   PetscFunctionBeginUser;
@@ -128,32 +124,27 @@ static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbLocal
   /* ranks that have each vertex of this rank's block, ascending */
   for (PetscInt i = 0; i < there.nrecv; i++) got[i] -= first;
   PetscCall(SbBucketByKey(there.nrecv, got, block, &start, &holder));
-  for (PetscInt i = 0; i < there.nrecv; i++) holder[i] = SbRouteSource(&there, holder[i]);
+  PetscCall(PetscMalloc1(there.nrecv, &pair));
+  for (PetscInt i = 0; i < there.nrecv; i++) {
+    pair[i][0] = first + got[holder[i]];
+    pair[i][1] = SbRouteSource(&there, holder[i]);
+  }
   PetscCall(SbRouteDestroy(&there));
   PetscCall(PetscFree(got));
+  PetscCall(PetscFree(holder));
   /* each of these ranks gets the whole list */
   for (PetscInt v = 0; v < block; v++) {
-    const PetscInt m = start[v + 1] - start[v];
-
-    npair += m > 1 ? m * m : 0;
-  }
-  PetscCall(PetscMalloc2(2 * (size_t)npair, &pair, npair, &pair_dest));
-  npair = 0;
-  for (PetscInt v = 0; v < block; v++) {
     if (start[v + 1] - start[v] < 2) continue;
-    for (PetscInt i = start[v]; i < start[v + 1]; i++) {
-      for (PetscInt j = start[v]; j < start[v + 1]; j++) {
-        pair[2 * npair] = first + v;
-        pair[2 * npair + 1] = holder[j];
-        pair_dest[npair++] = (PetscMPIInt)holder[i];
-      }
-    }
+    for (PetscInt i = start[v]; i < start[v + 1]; i++)
+      for (PetscInt j = start[v]; j < start[v + 1]; j++)
+        PetscCall(SbRouteAdd(&list, j, (PetscMPIInt)pair[i][1]));
   }
   PetscCall(PetscFree(start));
-  PetscCall(PetscFree(holder));
-  PetscCall(SbRouteCreate(comm, npair, pair_dest, &back));
-  PetscCall(SbRouteSend(&back, 2 * sizeof(PetscInt), NULL, pair, &border->pair));
-  PetscCall(PetscFree2(pair, pair_dest));
+  PetscCall(SbRouteCreate(comm, list.n, list.rank, &back));
+  PetscCall(SbRouteSend(&back, sizeof(*pair), list.item, pair, &border->pair));
+  PetscCall(PetscFree(pair));
+  PetscCall(PetscFree(list.item));
+  PetscCall(PetscFree(list.rank));
   /* received from blocks of ascending ranks, so original numbers ascend */
   border->n = 0;
   PetscCall(PetscMalloc1(back.nrecv / 2, &border->vert)); /* at least two ranks have each */
@@ -193,45 +184,31 @@ static int compare_shared(const void *a, const void *b)
 
 /* Lists the owned cells to copy, and the destination ranks. */
 static PetscErrorCode list_copies(const SbLocalMesh *local, const Border *border, PetscBool all,
-                                  PetscMPIInt me, PetscMPIInt size, PetscInt *ncopy, PetscInt **copied,
-                                  PetscMPIInt **dest)
+                                  PetscMPIInt me, PetscMPIInt size, SbRouteList *list)
 {
-  PetscInt *shared, *mark, n = 0;
+  PetscInt *shared, *mark;
 
   PetscFunctionBeginUser;
   // position of each vertex in border->vert, -1: not shared
   PetscCall(PetscMalloc2(local->nvert_cells, &shared, size, &mark));
   for (PetscInt v = 0; v < local->nvert_cells; v++) shared[v] = -1;
   for (PetscInt i = 0; i < border->n; i++) shared[border->vert[i].vert] = i;
-  // count, then list: a cell goes once to each rank that owns one of its vertices (`all`: that has one)
-  for (int pass = 0; pass < 2; pass++) {
-    for (PetscMPIInt r = 0; r < size; r++) mark[r] = -1;
-    n = 0;
-    for (PetscInt c = 0; c < local->ncell_owned; c++) {
-      mark[me] = c;
-      for (int a = 0; a < 4; a++) {
-        const PetscInt v = local->cell[4 * (size_t)c + a];
-        const Shared *s = shared[v] < 0 ? NULL : border->vert + shared[v];
+  // a cell goes once to each rank that owns one of its vertices (`all`: that has one)
+  for (PetscMPIInt r = 0; r < size; r++) mark[r] = -1;
+  for (PetscInt c = 0; c < local->ncell_owned; c++) {
+    mark[me] = c;
+    for (int a = 0; a < 4; a++) {
+      const PetscInt v = local->cell[4 * (size_t)c + a];
+      const Shared *s = shared[v] < 0 ? NULL : border->vert + shared[v];
 
-        for (PetscInt k = 0; s && k < (all ? s->n : 1); k++) {
-          const PetscMPIInt r = all ? (PetscMPIInt)s->rank[2 * k] : local->owner[v];
+      for (PetscInt k = 0; s && k < (all ? s->n : 1); k++) {
+        const PetscMPIInt r = all ? (PetscMPIInt)s->rank[2 * k] : local->owner[v];
 
-          if (mark[r] == c) continue;
-          mark[r] = c;
-          if (pass) {
-            (*copied)[n] = c;
-            (*dest)[n] = r;
-          }
-          n++;
-        }
+        if (mark[r] != c) PetscCall(SbRouteAdd(list, c, r));
+        mark[r] = c;
       }
     }
-    if (!pass) {
-      PetscCall(PetscMalloc1(n, copied));
-      PetscCall(PetscMalloc1(n, dest));
-    }
   }
-  *ncopy = n;
   PetscCall(PetscFree2(shared, mark));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -245,6 +222,7 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
   SbLocalMesh whole = {.cell = w->cell, .data = w->data, .vertex = w->vertex};
   PetscMPIInt size, rank, *dest;
   PetscInt *orig, *number, *order, *position, n = 0;
+  SbRouteList copies = {0};
   SbRoute route;
   SbLocalMesh owned, ghost;
   Border border;
@@ -254,26 +232,26 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   whole.ncell = whole.ncell_owned = w->ncell;
   whole.nvert = whole.nvert_cells = w->nvert;
-  // on one rank the arrays are taken over without a copy
-  if (size == 1) {
-    *local = whole;
-    w->cell = NULL;
-    w->data = NULL;
-    w->vertex = NULL;
-    PetscCall(SbMergedMeshDestroy(w));
-    PetscCall(PetscCalloc1(local->nvert, &local->owner));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  // partition the mesh, send each cell to its owner
+  // partition the mesh, and take over its arrays, on one rank without a copy
   PetscCall(PetscMalloc1(w->ncell, &dest));
   PetscCall(SbPartition(comm, type, w, dest));
   PetscCall(PetscFree(w->neighbour));
   PetscCall(PetscFree(w->remote));
+  w->cell = NULL;
+  w->data = NULL;
+  w->vertex = NULL;
+  if (size == 1) {
+    *local = whole;
+    PetscCall(PetscFree(dest));
+    PetscCall(PetscCalloc1(local->nvert, &local->owner));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  // each cell goes to its owner
   PetscCall(SbRouteCreate(comm, w->ncell, dest, &route));
   PetscCall(send_cells(&whole, PETSC_FALSE, &route, NULL, dest, &owned));
   PetscCall(SbRouteDestroy(&route));
   PetscCall(PetscFree(dest));
-  PetscCall(SbMergedMeshDestroy(w));
+  PetscCall(SbLocalMeshDestroy(&whole));
   // sort owned cells and their vertices by original number; a vertex may have come from several ranks
   *local = (SbLocalMesh){.ncell = owned.ncell, .ncell_owned = owned.ncell};
   PetscCall(PetscMalloc3(PetscMax(owned.nvert, owned.ncell), &number, PetscMax(owned.nvert, owned.ncell),
@@ -316,12 +294,13 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
     for (PetscInt k = 0; k < n; k++)
       local->owner[s[k].vert] = (PetscMPIInt)s[k].rank[2 * ((PetscInt64)k * s[k].n / n)];
   }
-  PetscCall(list_copies(local, &border, all, rank, size, &n, &local->copied, &dest));
+  PetscCall(list_copies(local, &border, all, rank, size, &copies));
+  local->copied = copies.item;
   PetscCall(PetscFree(border.vert));
   PetscCall(PetscFree(border.pair));
-  PetscCall(SbRouteCreate(comm, n, dest, &local->ghost));
-  PetscCall(send_cells(local, PETSC_TRUE, &local->ghost, local->copied, dest, &ghost));
-  PetscCall(PetscFree(dest));
+  PetscCall(SbRouteCreate(comm, copies.n, copies.rank, &local->ghost));
+  PetscCall(send_cells(local, PETSC_TRUE, &local->ghost, local->copied, copies.rank, &ghost));
+  PetscCall(PetscFree(copies.rank));
   // append the ghost cells, and those of their vertices that this rank does not have
   n = local->nvert;
   PetscCall(PetscMalloc4(local->nvert_cells, &orig, ghost.nvert, &number, ghost.nvert, &order, ghost.nvert,

@@ -100,7 +100,7 @@ PetscInt SbFacesFind(const SbFaces *faces, const PetscInt vert[3], PetscInt slot
   const SbKey *face = faces->face + faces->start[lo];
   PetscInt n = 0;
 
-  for (PetscInt i = SbKeysFind(end, face, key); n < 2 && i < end && face[i].key == key; i++)
+  for (PetscInt i = SbKeysFind(end, face, key); i >= 0 && n < 2 && i < end && face[i].key == key; i++)
     slots[n++] = face[i].slot;
   return n;
 }

@@ -133,10 +133,6 @@ PetscReal SbBodySmallest(PetscInt nbody, const SbBody body[])
 {
   PetscReal size = PETSC_MAX_REAL;
 
-  for (PetscInt b = 0; b < nbody; b++) {
-    const PetscReal diagonal = SbBoxDiagonal(body[b].bbox);
-
-    size = PetscMin(size, diagonal);
-  }
+  for (PetscInt b = 0; b < nbody; b++) size = PetscMin(size, SbBoxDiagonal(body[b].bbox));
   return size;
 }

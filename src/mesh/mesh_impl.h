@@ -86,6 +86,13 @@ PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport i
 
 /* ------------------------------------------------------------------ route.c: see sbmesh.h */
 
+/* A growing list of items that go to other ranks, zeroed at first; free both arrays. */
+typedef struct {
+  PetscInt n, room[2];
+  PetscInt *item;    /* [n] */
+  PetscMPIInt *rank; /* [n] */
+} SbRouteList;
+PetscErrorCode SbRouteAdd(SbRouteList *list, PetscInt item, PetscMPIInt rank);
 /* Returns answer[nrecv] to the senders of the records: result[nsend], allocated by the caller. Collective. */
 PetscErrorCode SbRouteReply(const SbRoute *route, size_t unit, const void *answer, void *result);
 /* Rank that sent the received record i. */
@@ -167,8 +174,8 @@ typedef struct {
 } SbLocalMesh;
 
 PetscErrorCode SbLocalMeshDestroy(SbLocalMesh *local);
-/* Distributes the merged mesh and destroys it. `all`: ghosts are all cells that share a vertex with an
-   owned cell, else those with an owned vertex. Collective. */
+/* Distributes the merged mesh, of which only the curved cells remain. `all`: ghosts are all cells that share
+   a vertex with an owned cell, else those with an owned vertex. Collective. */
 PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, SbMergedMesh *merged,
                             SbLocalMesh *local);
 /* Local numbering: fills the arrays and counts of the mesh and frees the local mesh. Collective. */

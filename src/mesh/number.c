@@ -8,90 +8,6 @@
 */
 #include "mesh_impl.h"
 
-/* The local mesh before renumbering, and the maps to the new numbers. */
-typedef struct {
-  const SbLocalMesh *p;
-  PetscMPIInt rank, size;
-  PetscInt *local;  /* [nvert] new local number of a vertex */
-  PetscInt *global; /* [nvert] global number of a vertex */
-} Work;
-
-/* ------------------------------------------------------------------ vertices */
-
-/* Local and global numbers of owned vertices. */
-static PetscErrorCode number_owned(Work *w, SbMesh mesh)
-{
-  const SbLocalMesh *p = w->p;
-  PetscInt *compact, *back, *cell, *order, n = 0, mine[2], sum[2] = {0, 0};
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc4(p->nvert, &compact, p->nvert, &back, 4 * (size_t)p->ncell, &cell, p->nvert, &order));
-  for (PetscInt v = 0; v < p->nvert; v++) {
-    compact[v] = -1;
-    if (p->owner[v] != w->rank) continue;
-    back[n] = v;
-    compact[v] = n++;
-  }
-  for (PetscInt i = 0; i < 4 * p->ncell; i++) cell[i] = compact[p->cell[i]];
-  PetscCall(SbOrderRCM(n, p->ncell, cell, order));
-  for (PetscInt i = 0; i < n; i++) w->local[back[order[i]]] = i;
-  PetscCall(PetscFree4(compact, back, cell, order));
-  mesh->nvert_owned = n;
-  mesh->nvert = p->nvert;
-  mesh->ncell_owned = p->ncell_owned;
-  mesh->ncell = p->ncell;
-  mine[0] = n;
-  mine[1] = p->ncell_owned;
-  PetscCallMPI(MPI_Scan(mine, sum, 1, MPIU_INT, MPI_SUM, mesh->comm));
-  mesh->gvert_start = sum[0] - n;
-  PetscCallMPI(MPI_Allreduce(mine, sum, 2, MPIU_INT, MPI_SUM, mesh->comm));
-  mesh->Nvert = sum[0];
-  mesh->Ncell = sum[1];
-  for (PetscInt v = 0; v < p->nvert; v++)
-    if (p->owner[v] == w->rank) w->global[v] = mesh->gvert_start + w->local[v];
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Ghost vertices: their owners are asked for global numbers, by original number. */
-static PetscErrorCode number_ghosts(Work *w, SbMesh mesh)
-{
-  const SbLocalMesh *p = w->p;
-  PetscInt *ghost, *key, *orig, *got, n = 0;
-  PetscMPIInt *dest;
-  SbRoute route;
-
-  PetscFunctionBeginUser;
-  if (w->size == 1) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc4(p->nvert, &ghost, p->nvert, &key, p->nvert_cells, &orig, p->nvert, &dest));
-  for (PetscInt v = 0; v < p->nvert; v++) {
-    if (p->owner[v] == w->rank) continue;
-    ghost[n] = v;
-    key[n] = p->vertex[v].orig;
-    dest[n++] = p->owner[v];
-  }
-  for (PetscInt v = 0; v < p->nvert_cells; v++) orig[v] = p->vertex[v].orig;
-  PetscCall(SbRouteCreate(mesh->comm, n, dest, &route));
-  PetscCall(SbRouteSend(&route, sizeof(PetscInt), NULL, key, &got));
-  for (PetscInt i = 0; i < route.nrecv; i++) {
-    PetscInt v;
-
-    PetscCall(PetscFindInt(got[i], p->nvert_cells, orig, &v));
-    PetscCheck(v >= 0 && p->owner[v] == w->rank, PETSC_COMM_SELF, PETSC_ERR_PLIB,
-               "Vertex %" PetscInt_FMT " is not owned here", got[i]);
-    got[i] = w->global[v];
-  }
-  PetscCall(SbRouteReply(&route, sizeof(PetscInt), got, key));
-  PetscCall(PetscFree(got));
-  PetscCall(SbRouteDestroy(&route));
-  for (PetscInt i = 0; i < n; i++) w->global[ghost[i]] = key[i];
-  PetscCall(PetscSortIntWithArray(n, key, ghost));
-  for (PetscInt i = 0; i < n; i++) w->local[ghost[i]] = mesh->nvert_owned + i;
-  PetscCall(PetscFree4(ghost, key, orig, dest));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* ------------------------------------------------------------------ cells */
-
 /* Inclusion of its body that a cell belongs to: 0 for the bulk, else its position in the list plus one. */
 static PetscInt inclusion_of(SbMesh mesh, const SbCellData *cell)
 {
@@ -102,21 +18,20 @@ static PetscInt inclusion_of(SbMesh mesh, const SbCellData *cell)
   return 0;
 }
 
-static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
+/* Cells in their new order; local[]: new numbers of the vertices. */
+static PetscErrorCode fill_cells(const SbLocalMesh *p, const PetscInt local[], SbMesh mesh)
 {
-  const SbLocalMesh *p = w->p;
   const PetscInt nghost = p->ncell - p->ncell_owned;
-  PetscInt *order, *key, *some, *at, *start, *number, *got, *leaf;
+  PetscInt *order, *key, *some, *at, *start, *got;
   PetscSFNode *remote;
 
   PetscFunctionBeginUser;
   // order of the cells: two bucket sorts, by lowest vertex, then by body, inclusion and curved or straight
-  PetscCall(PetscMalloc1(p->ncell, &order));
-  PetscCall(PetscMalloc1(p->ncell, &key));
+  PetscCall(PetscMalloc2(p->ncell, &order, p->ncell, &key));
   for (PetscInt c = 0; c < p->ncell; c++) {
     const PetscInt *v = p->cell + 4 * (size_t)c;
 
-    key[c] = PetscMin(PetscMin(w->local[v[0]], w->local[v[1]]), PetscMin(w->local[v[2]], w->local[v[3]]));
+    key[c] = PetscMin(PetscMin(local[v[0]], local[v[1]]), PetscMin(local[v[2]], local[v[3]]));
   }
   PetscCall(SbBucketByKey(p->ncell, key, mesh->nvert, &start, &some));
   PetscCall(PetscFree(start));
@@ -129,28 +44,24 @@ static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
   }
   PetscCall(SbBucketByKey(p->ncell, key, 4 * (SB_INCLUSION_MAX + 1) * mesh->nbody, &start, &at));
   for (PetscInt i = 0; i < p->ncell; i++) order[i] = some[at[i]];
-  PetscCall(PetscFree(key));
   PetscCall(PetscFree(some));
   PetscCall(PetscFree(at));
   PetscCall(PetscFree(start));
   // star forest from owned cells to their ghost copies
-  if (w->size > 1) {
-    PetscCall(PetscMalloc1(p->ncell, &number));
-    for (PetscInt c = 0; c < p->ncell; c++) number[order[c]] = c;
-    PetscCall(SbRouteSend(&p->ghost, sizeof(PetscInt), p->copied, number, &got));
-    PetscCall(PetscMalloc1(nghost, &leaf));
+  if (p->ghost.size) {
+    for (PetscInt c = 0; c < p->ncell; c++) key[order[c]] = c; /* now the new number of each cell */
+    PetscCall(SbRouteSend(&p->ghost, sizeof(PetscInt), p->copied, key, &got));
     PetscCall(PetscMalloc1(nghost, &remote));
     for (PetscInt g = 0; g < nghost; g++) {
       const PetscInt came = order[p->ncell_owned + g] - p->ncell_owned; /* position as received */
 
-      leaf[g] = p->ncell_owned + g;
+      key[g] = p->ncell_owned + g;
       remote[g] = (PetscSFNode){SbRouteSource(&p->ghost, came), got[came]};
     }
     PetscCall(PetscSFCreate(mesh->comm, &mesh->cell_sf));
-    PetscCall(PetscSFSetGraph(mesh->cell_sf, p->ncell_owned, nghost, leaf, PETSC_OWN_POINTER, remote,
+    PetscCall(PetscSFSetGraph(mesh->cell_sf, p->ncell_owned, nghost, key, PETSC_COPY_VALUES, remote,
                               PETSC_OWN_POINTER));
     PetscCall(PetscFree(got));
-    PetscCall(PetscFree(number));
   }
   PetscCall(PetscMalloc6(4 * (size_t)mesh->ncell, &mesh->cell, mesh->ncell, &mesh->cell_orig, mesh->ncell,
                          &mesh->cell_body, mesh->ncell, &mesh->cell_material, mesh->ncell, &mesh->cell_set,
@@ -165,40 +76,92 @@ static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
     mesh->cell_material[c] =
       inclusion ? mesh->body[data->body].inclusion[inclusion - 1].material : data->body;
     for (int a = 0; a < 4; a++) {
-      mesh->cell[4 * (size_t)c + a] = w->local[p->cell[4 * (size_t)order[c] + a]];
+      mesh->cell[4 * (size_t)c + a] = local[p->cell[4 * (size_t)order[c] + a]];
       mesh->face_set[4 * (size_t)c + a] = data->face[a];
     }
   }
-  PetscCall(PetscFree(order));
+  PetscCall(PetscFree2(order, key));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *local)
+PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *p)
 {
-  Work w = {.p = local};
+  PetscInt *local, *global, *compact, *back, *cell, *order, *ghost, *key, *orig, *got;
+  PetscInt n = 0, mine[2], sum[2] = {0, 0};
+  PetscMPIInt rank, *dest;
+  SbRoute route;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(mesh->comm, &w.rank));
-  PetscCallMPI(MPI_Comm_size(mesh->comm, &w.size));
-  PetscCall(PetscMalloc2(local->nvert, &w.local, local->nvert, &w.global));
-  PetscCall(number_owned(&w, mesh));
-  PetscCall(number_ghosts(&w, mesh));
+  PetscCallMPI(MPI_Comm_rank(mesh->comm, &rank));
+  PetscCall(PetscMalloc2(p->nvert, &local, p->nvert, &global));
+  // local numbers of owned vertices
+  PetscCall(PetscMalloc4(p->nvert, &compact, p->nvert, &back, 4 * (size_t)p->ncell, &cell, p->nvert, &order));
+  for (PetscInt v = 0; v < p->nvert; v++) {
+    compact[v] = -1;
+    if (p->owner[v] != rank) continue;
+    back[n] = v;
+    compact[v] = n++;
+  }
+  for (PetscInt i = 0; i < 4 * p->ncell; i++) cell[i] = compact[p->cell[i]];
+  PetscCall(SbOrderRCM(n, p->ncell, cell, order));
+  for (PetscInt i = 0; i < n; i++) local[back[order[i]]] = i;
+  PetscCall(PetscFree4(compact, back, cell, order));
+  // counts, and global numbers of owned vertices
+  mesh->nvert_owned = n;
+  mesh->nvert = p->nvert;
+  mesh->ncell_owned = p->ncell_owned;
+  mesh->ncell = p->ncell;
+  mine[0] = n;
+  mine[1] = p->ncell_owned;
+  PetscCallMPI(MPI_Scan(mine, sum, 1, MPIU_INT, MPI_SUM, mesh->comm));
+  mesh->gvert_start = sum[0] - n;
+  PetscCallMPI(MPI_Allreduce(mine, sum, 2, MPIU_INT, MPI_SUM, mesh->comm));
+  mesh->Nvert = sum[0];
+  mesh->Ncell = sum[1];
+  for (PetscInt v = 0; v < p->nvert; v++)
+    if (p->owner[v] == rank) global[v] = mesh->gvert_start + local[v];
+  // ghost vertices: their owners are asked for global numbers, by original number
+  PetscCall(PetscMalloc4(p->nvert, &ghost, p->nvert, &key, p->nvert_cells, &orig, p->nvert, &dest));
+  n = 0;
+  for (PetscInt v = 0; v < p->nvert; v++) {
+    if (p->owner[v] == rank) continue;
+    ghost[n] = v;
+    key[n] = p->vertex[v].orig;
+    dest[n++] = p->owner[v];
+  }
+  for (PetscInt v = 0; v < p->nvert_cells; v++) orig[v] = p->vertex[v].orig;
+  PetscCall(SbRouteCreate(mesh->comm, n, dest, &route));
+  PetscCall(SbRouteSend(&route, sizeof(PetscInt), NULL, key, &got));
+  for (PetscInt i = 0; i < route.nrecv; i++) {
+    PetscInt v;
+
+    PetscCall(PetscFindInt(got[i], p->nvert_cells, orig, &v));
+    PetscCheck(v >= 0 && p->owner[v] == rank, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+               "Vertex %" PetscInt_FMT " is not owned here", got[i]);
+    got[i] = global[v];
+  }
+  PetscCall(SbRouteReply(&route, sizeof(PetscInt), got, key));
+  PetscCall(PetscFree(got));
+  PetscCall(SbRouteDestroy(&route));
+  for (PetscInt i = 0; i < n; i++) global[ghost[i]] = key[i];
+  PetscCall(PetscSortIntWithArray(n, key, ghost));
+  for (PetscInt i = 0; i < n; i++) local[ghost[i]] = mesh->nvert_owned + i;
+  PetscCall(PetscFree4(ghost, key, orig, dest));
   // vertex arrays in the new order
   PetscCall(PetscMalloc5(mesh->nvert, &mesh->gvert, mesh->nvert, &mesh->vert_orig, mesh->nvert,
                          &mesh->vert_body, mesh->nvert, &mesh->vert_set, 3 * (size_t)mesh->nvert, &mesh->x));
   for (PetscInt v = 0; v < mesh->nvert; v++) {
-    const SbVertexData *p = &w.p->vertex[v];
-    const PetscInt l = w.local[v];
+    const PetscInt l = local[v];
 
-    mesh->gvert[l] = w.global[v];
-    mesh->vert_orig[l] = p->orig;
-    mesh->vert_body[l] = p->body;
-    mesh->vert_set[l] = p->set;
-    for (int i = 0; i < 3; i++) mesh->x[3 * l + i] = p->x[i];
+    mesh->gvert[l] = global[v];
+    mesh->vert_orig[l] = p->vertex[v].orig;
+    mesh->vert_body[l] = p->vertex[v].body;
+    mesh->vert_set[l] = p->vertex[v].set;
+    PetscCall(PetscArraycpy(mesh->x + 3 * l, p->vertex[v].x, 3));
   }
-  PetscCall(PetscFree(local->vertex));
-  PetscCall(fill_cells(&w, mesh));
-  PetscCall(PetscFree2(w.local, w.global));
-  PetscCall(SbLocalMeshDestroy(local));
+  PetscCall(PetscFree(p->vertex));
+  PetscCall(fill_cells(p, local, mesh));
+  PetscCall(PetscFree2(local, global));
+  PetscCall(SbLocalMeshDestroy(p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

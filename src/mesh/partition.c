@@ -100,8 +100,7 @@ static PetscErrorCode cut_graph(MPI_Comm comm, const SbMergedMesh *w, PetscSF sf
     orig[c] = w->data[c].orig;
     dest[c] = 0;
   }
-  PetscCall(PetscSFBcastBegin(sf, MPIU_INT, orig, remote, MPI_REPLACE));
-  PetscCall(PetscSFBcastEnd(sf, MPIU_INT, orig, remote, MPI_REPLACE));
+  PetscCall(SbForestBroadcast(sf, 1, MPIU_INT, orig, remote));
   for (PetscInt s = 0; s < 4 * w->ncell; s++) {
     const PetscInt n = w->neighbour[s];
 
@@ -198,8 +197,7 @@ PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh
     // move a cell to the part of most of its neighbours, if that cuts fewer faces
     PetscCall(PetscMalloc2(w->ncell, &now, w->nremote, &across));
     for (int sweep = 0; sweep < SWEEPS; sweep++) {
-      PetscCall(PetscSFBcastBegin(sf, MPI_INT, part, across, MPI_REPLACE));
-      PetscCall(PetscSFBcastEnd(sf, MPI_INT, part, across, MPI_REPLACE));
+      PetscCall(SbForestBroadcast(sf, 1, MPI_INT, part, across));
       PetscCall(PetscArraycpy(now, part, w->ncell));
       for (PetscInt c = 0; c < w->ncell; c++) {
         PetscMPIInt other[4];

@@ -58,7 +58,6 @@ void SbImportJoin(const SbImport *im, PetscInt parent[], PetscInt *npart)
   for (PetscInt v = 0; v < im->nvert; v++) parent[v] = parent[parent[v]];
 }
 
-/* Repairs and warnings in one line; empty if there are none. */
 PetscErrorCode SbImportNote(const SbImport *im, SbBody *body)
 {
   const struct {

@@ -50,12 +50,12 @@ static void split(const SbImport *im, int dim, const PetscInt v[], const SbImpor
   for (int i = 0; i < ncorner[dim]; i++) child[i] = node[corners[dim][i]];
   if (dim < 3) return;
   for (int d = 0; d < 3; d++) {
-    PetscReal r[3];
+    const PetscReal length2 =
+      SbDistance2(im->x + 3 * node[diagonals[d][0]], im->x + 3 * node[diagonals[d][1]]);
 
-    SbSubtract(im->x + 3 * node[diagonals[d][0]], im->x + 3 * node[diagonals[d][1]], r);
     /* tolerance: among equal diagonals the first one is taken, independent of rounding */
-    if (!(SbDot3(r, r) < shortest * (1 - 1e-12))) continue;
-    shortest = SbDot3(r, r);
+    if (!(length2 < shortest * (1 - 1e-12))) continue;
+    shortest = length2;
     best = diagonals[d];
   }
   for (int i = 0; i < 16; i++) child[16 + i] = node[best[i % 4 < 2 ? i % 4 : i / 4 + i % 4]];

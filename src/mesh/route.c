@@ -5,6 +5,16 @@
 */
 #include "mesh_impl.h"
 
+PetscErrorCode SbRouteAdd(SbRouteList *list, PetscInt item, PetscMPIInt rank)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbReserve(list->n + 1, sizeof(*list->item), &list->room[0], &list->item));
+  PetscCall(SbReserve(list->n + 1, sizeof(*list->rank), &list->room[1], &list->rank));
+  list->item[list->n] = item;
+  list->rank[list->n++] = rank;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, const PetscMPIInt dest[], SbRoute *route)
 {
   PetscFunctionBeginUser;

@@ -16,16 +16,15 @@
 
 static const struct {
   const char *name, *form;
-  SbSetShape shape;
   int least, most; /* range of the number of parameters; 0: a name; -1: none */
 } shapes[] = {
-  {"group", "group:NAME or group:BODY.NAME", SB_SET_GROUP, 0, 0},
-  {"box", "box:xmin,ymin,zmin,xmax,ymax,zmax (m)", SB_SET_BOX, 6, 6},
-  {"plane", "plane:nx,ny,nz,d or plane:nx,ny,nz,d,tolerance (m)", SB_SET_PLANE, 4, 5},
-  {"sphere", "sphere:cx,cy,cz,radius (m)", SB_SET_SPHERE, 4, 4},
-  {"halfspace", "halfspace:nx,ny,nz,d (m)", SB_SET_HALFSPACE, 4, 4},
-  {"body", "body:NAME", SB_SET_BODY, 0, 0},
-  {"boundary", "boundary", SB_SET_BOUNDARY, -1, -1},
+  [SB_SET_GROUP] = {"group", "group:NAME or group:BODY.NAME", 0, 0},
+  [SB_SET_BOX] = {"box", "box:xmin,ymin,zmin,xmax,ymax,zmax (m)", 6, 6},
+  [SB_SET_PLANE] = {"plane", "plane:nx,ny,nz,d or plane:nx,ny,nz,d,tolerance (m)", 4, 5},
+  [SB_SET_SPHERE] = {"sphere", "sphere:cx,cy,cz,radius (m)", 4, 4},
+  [SB_SET_HALFSPACE] = {"halfspace", "halfspace:nx,ny,nz,d (m)", 4, 4},
+  [SB_SET_BODY] = {"body", "body:NAME", 0, 0},
+  [SB_SET_BOUNDARY] = {"boundary", "boundary", -1, -1},
 };
 enum { NSHAPE = (int)PETSC_STATIC_ARRAY_LENGTH(shapes) };
 
@@ -49,7 +48,7 @@ PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set)
     PetscCall(SbSuggestName(word, NSHAPE, names, sizeof(all), all));
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': a set begins with one of %s", option, text, all);
   }
-  set->shape = shapes[i].shape;
+  set->shape = (SbSetShape)i;
   set->group[0] = 0;
   PetscCall(PetscArrayzero(p, 8));
   if (shapes[i].least < 0)
@@ -83,9 +82,7 @@ PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set)
 static PetscBool inside(const SbSet *set, const PetscReal x[3], PetscReal slack)
 {
   const PetscReal *p = set->p;
-  PetscReal d[3];
 
-  SbSubtract(x, p, d);
   switch (set->shape) {
   case SB_SET_BOX:
     for (int i = 0; i < 3; i++)
@@ -94,7 +91,7 @@ static PetscBool inside(const SbSet *set, const PetscReal x[3], PetscReal slack)
   case SB_SET_PLANE:
     return (PetscBool)(PetscAbsReal(SbDot3(p, x) - p[3]) <= PetscMax(p[4], slack));
   case SB_SET_SPHERE:
-    return (PetscBool)(PetscSqrtReal(SbDot3(d, d)) <= p[3] + slack);
+    return (PetscBool)(PetscSqrtReal(SbDistance2(x, p)) <= p[3] + slack);
   case SB_SET_HALFSPACE:
     return (PetscBool)(SbDot3(p, x) <= p[3] + slack);
   default:
@@ -282,7 +279,6 @@ PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport i
 {
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < nset; k++) {
-    const char *name = NULL;
     PetscReal box[6];
 
     if (set[k].nvert || set[k].nfacet || set[k].ncell) continue;
@@ -299,15 +295,13 @@ PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport i
               set[k].group, near[0] ? "; did you mean " : "", near, near[0] ? "?" : "");
     }
     // a shape outside the bodies
-    for (int i = 0; i < NSHAPE; i++)
-      if (shapes[i].shape == set[k].shape) name = shapes[i].name;
     SbBoxClear(box);
     for (PetscInt b = 0; b < nbody; b++) SbBoxMerge(box, body[b].bbox);
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
             "set '%s': no vertex lies in the %s; the placed bodies reach from (%.6g, %.6g, %.6g) to (%.6g, "
             "%.6g, %.6g) m",
-            set[k].name, name, (double)box[0], (double)box[1], (double)box[2], (double)box[3], (double)box[4],
-            (double)box[5]);
+            set[k].name, shapes[set[k].shape].name, (double)box[0], (double)box[1], (double)box[2],
+            (double)box[3], (double)box[4], (double)box[5]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -120,7 +120,7 @@ static PetscErrorCode ask_home_ranks(Slab *s)
 /* ------------------------------------------------------------------ faces between tets of two ranks */
 
 typedef struct {
-  PetscInt vert[3], at; /* ascending; position in the received array */
+  PetscInt vert[3], at; /* ascending; slot at the sender, position in the received array */
   PetscInt cell;        /* local index plus the number of cells of earlier bodies, as in SbPart.remote */
   int64_t number;       /* file number of the tet */
 } Face;
@@ -158,7 +158,7 @@ static PetscErrorCode match_faces(const Slab *s, const SbRoute *route, Face face
 }
 
 /* Makes cells of other ranks neighbours; one that is across all four faces is a duplicate tet. */
-static PetscErrorCode link_faces(Slab *s, PetscInt nsend, const PetscInt slot[], const Across across[])
+static PetscErrorCode link_faces(Slab *s, PetscInt nsend, const Face face[], const Across across[])
 {
   SbFaces *faces = &s->part->faces;
   const PetscInt ncell = s->im->item[3].n;
@@ -168,17 +168,17 @@ static PetscErrorCode link_faces(Slab *s, PetscInt nsend, const PetscInt slot[],
   PetscCall(PetscMalloc1(nsend, &s->part->remote));
   for (PetscInt i = 0; i < nsend; i++) {
     if (across[i].rank < 0 || across[i].rank == s->rank) continue;
-    faces->neighbour[slot[i]] = ncell + n;
+    faces->neighbour[face[i].at] = ncell + n;
     s->part->remote[n++] = (PetscSFNode){across[i].rank, across[i].cell};
     faces->nboundary--;
   }
   s->part->nremote = n;
   for (PetscInt i = 3; i < nsend; i++) {
-    if (slot[i] != slot[i - 3] + 3 || slot[i] % 4 != 3 || across[i].rank < 0 || across[i].rank == s->rank)
-      continue;
+    if (face[i].at != face[i - 3].at + 3 || face[i].at % 4 != 3) continue;
+    if (across[i].rank < 0 || across[i].rank == s->rank) continue;
     if (across[i].number == across[i - 1].number && across[i].number == across[i - 2].number &&
         across[i].number == across[i - 3].number)
-      PetscCall(SbImportTwice(s->im, s->im->item[3].number[slot[i] / 4], across[i].number));
+      PetscCall(SbImportTwice(s->im, s->im->item[3].number[face[i].at / 4], across[i].number));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -188,44 +188,36 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
 {
   const SbItems *tets = &s->im->item[3];
   SbCaughtError caught = {0, ""};
-  PetscInt n = 0, *slot;
+  PetscInt n = 0, room = 0;
   SbRoute route;
-  Face *face, *got;
+  Face *face = NULL, *got;
   Across *across, *result;
 
   PetscFunctionBeginUser;
-  // count, then list: faces with three shared vertices, sent to the home rank of the lowest one
-  for (int pass = 0; pass < 2; pass++) {
-    if (pass) PetscCall(PetscMalloc2(n, &face, n, &slot));
-    n = 0;
-    for (PetscInt i = 0; i < 4 * tets->n; i++) {
-      PetscInt v[3];
-      PetscBool all = PETSC_TRUE;
+  // faces with three shared vertices, sent to the home rank of the lowest one
+  for (PetscInt i = 0; i < 4 * tets->n; i++) {
+    PetscInt v[3];
+    PetscBool all = PETSC_TRUE;
 
-      for (int k = 0; k < 3; k++) {
-        v[k] = tets->vert[4 * (i / 4) + SbFaceVertex[i % 4][k]];
-        all = (PetscBool)(all && s->shared[v[k]]);
-      }
-      if (!all) continue;
-      if (pass) {
-        PetscCall(PetscSortInt(3, v));
-        face[n] =
-          (Face){{s->used[v[0]], s->used[v[1]], s->used[v[2]]}, 0, before + i / 4, tets->number[i / 4]};
-        slot[n] = i;
-      }
-      n++;
+    for (int k = 0; k < 3; k++) {
+      v[k] = tets->vert[4 * (i / 4) + SbFaceVertex[i % 4][k]];
+      all = (PetscBool)(all && s->shared[v[k]]);
     }
+    if (!all) continue;
+    PetscCall(PetscSortInt(3, v));
+    PetscCall(SbReserve(n + 1, sizeof(*face), &room, &face));
+    face[n++] = (Face){{s->used[v[0]], s->used[v[1]], s->used[v[2]]}, i, before + i / 4, tets->number[i / 4]};
   }
   // home ranks match the faces and reply with the cell across
   PetscCall(send_home(s, n, sizeof(Face), face, &route, &got));
   PetscCall(PetscMalloc2(route.nrecv, &across, n, &result));
   SB_CATCH(&caught, match_faces(s, &route, got, across));
   PetscCall(SbRouteReply(&route, sizeof(Across), across, result));
-  if (!caught.code) SB_CATCH(&caught, link_faces(s, n, slot, result));
+  if (!caught.code) SB_CATCH(&caught, link_faces(s, n, face, result));
   // an error of one rank is raised on all ranks
   PetscCall(PetscFree(got));
   PetscCall(PetscFree2(across, result));
-  PetscCall(PetscFree2(face, slot));
+  PetscCall(PetscFree(face));
   PetscCall(SbRouteDestroy(&route));
   PetscCall(SbCaughtRaise(s->comm, &caught));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -340,26 +332,20 @@ static PetscErrorCode send_to_users(Slab *s, PetscInt n, size_t unit, const void
                                     SbRoute *on, PetscInt **from, void *in)
 {
   char *got;
-  PetscMPIInt *dest;
+  SbRouteList list = {0};
 
   PetscFunctionBeginUser;
   PetscCall(send_home(s, n, unit, record, there, &got));
-  for (int pass = 0; pass < 2; pass++) {
-    if (pass) PetscCall(PetscMalloc1(n, &dest));
-    if (pass) PetscCall(PetscMalloc1(n, from));
-    n = 0;
-    for (PetscInt i = 0; i < there->nrecv; i++) {
-      const PetscInt v = first_vertex(got, unit, i) - s->rows.first;
+  for (PetscInt i = 0; i < there->nrecv; i++) {
+    const PetscInt v = first_vertex(got, unit, i) - s->rows.first;
 
-      for (PetscInt k = s->start[v]; k < s->start[v + 1]; k++, n++) {
-        if (pass) (*from)[n] = i;
-        if (pass) dest[n] = (PetscMPIInt)s->user[k];
-      }
-    }
+    for (PetscInt k = s->start[v]; k < s->start[v + 1]; k++)
+      PetscCall(SbRouteAdd(&list, i, (PetscMPIInt)s->user[k]));
   }
-  PetscCall(SbRouteCreate(s->comm, n, dest, on));
+  *from = list.item;
+  PetscCall(SbRouteCreate(s->comm, list.n, list.rank, on));
   PetscCall(SbRouteSend(on, unit, *from, got, in));
-  PetscCall(PetscFree(dest));
+  PetscCall(PetscFree(list.rank));
   PetscCall(PetscFree(got));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

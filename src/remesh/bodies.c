@@ -172,29 +172,25 @@ static PetscInt old_edge(const Work *w, uint64_t key)
   PetscInt at;
 
   if (high >= w->mesh.nkept) return -1;
-  key = SbKeyOfPair(w->mesh.kept[low], w->mesh.kept[high]);
-  at = SbKeysFind(w->nedge, w->edge, key);
-  return at < w->nedge && w->edge[at].key == key ? w->edge[at].slot : -1;
+  at = SbKeysFind(w->nedge, w->edge, SbKeyOfPair(w->mesh.kept[low], w->mesh.kept[high]));
+  return at < 0 ? -1 : w->edge[at].slot;
 }
 
 /* The old fields at a rest position X, from the tet that contains `near`. */
 static void interpolate_old(const Work *w, const PetscReal X[3], const PetscReal near[3], PetscReal value[])
 {
-  PetscReal weight[4];
+  PetscReal weight[4], psi[SB_CELL_NODES] = {0.};
   PetscInt cell;
 
   (void)SbLocatorFind(w->rest, near, &cell, weight);
   if (near != X) SbTetBarycentric(w->g->X + 3 * w->vert0, w->cell + 4 * cell, X, weight);
+  if (w->edge) SbQuadraticBasis(weight, psi);
+  for (int i = 0; i < 16 && !w->edge; i++) psi[i % 4] += weight[i / 4] * w->element->ops.vertex[i / 4][i % 4];
   for (PetscInt k = 0; k < w->each; k++) value[k] = 0.;
   for (int a = 0; a < (w->edge ? SB_CELL_NODES : 4); a++) {
     const PetscReal *from = old_value(w, cell, a < 4 ? a : SB_EDGES + a - 4);
-    PetscReal psi = 0.;
 
-    if (w->edge)
-      psi = a < 4 ? weight[a] * (2. * weight[a] - 1.)
-                  : 4. * weight[SbTetEdge[a - 4][0]] * weight[SbTetEdge[a - 4][1]];
-    for (int v = 0; v < 4 && !w->edge; v++) psi += weight[v] * w->element->ops.vertex[v][a];
-    for (PetscInt k = 0; k < w->each; k++) value[k] += psi * from[k];
+    for (PetscInt k = 0; k < w->each; k++) value[k] += psi[a] * from[k];
   }
 }
 

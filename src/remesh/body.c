@@ -82,24 +82,21 @@ static void bend(const Material *at, SbNewMesh *m, PetscInt c, PetscInt vertex)
   for (int e = 0; m->edge_off && e < 6; e++) {
     const PetscInt a = m->cell[4 * c + SbTetEdge[e][0]], b = m->cell[4 * c + SbTetEdge[e][1]];
     const PetscInt i = SbKeysFind(at->ncurved, at->curved, SbKeyOfPair(a, b));
-    PetscReal *off = m->edge_off + 18 * (size_t)c + 3 * e, middle[3], X[3], w[4], length2 = 0, off2 = 0;
+    PetscReal *off = m->edge_off + 18 * (size_t)c + 3 * e, middle[3], X[3], w[4];
     PetscInt cell;
 
     if (vertex >= 0 && a != vertex && b != vertex) continue;
     // a kept edge has its old node, others that of the map at the middle
-    if (i < at->ncurved && at->curved[i].key == SbKeyOfPair(a, b)) {
+    if (i >= 0) {
       for (int k = 0; k < 3; k++) off[k] = at->old->edge_off[3 * (size_t)at->curved[i].slot + k];
       continue;
     }
     for (int k = 0; k < 3; k++) middle[k] = 0.5 * (m->flat[3 * a + k] + m->flat[3 * b + k]);
     (void)SbLocatorFind(at->flat, middle, &cell, w);
     mix_rest(at->old, cell, w, X);
-    for (int k = 0; k < 3; k++) {
-      off[k] = X[k] - 0.5 * (m->X[3 * a + k] + m->X[3 * b + k]);
-      off2 += PetscSqr(off[k]);
-      length2 += PetscSqr(m->X[3 * a + k] - m->X[3 * b + k]);
-    }
-    for (int k = 0; k < 3 && off2 <= PetscSqr(STRAIGHT) * length2; k++) off[k] = 0;
+    for (int k = 0; k < 3; k++) off[k] = X[k] - 0.5 * (m->X[3 * a + k] + m->X[3 * b + k]);
+    if (SbDot3(off, off) <= PetscSqr(STRAIGHT) * SbDistance2(m->X + 3 * a, m->X + 3 * b))
+      memset(off, 0, 3 * sizeof(*off));
   }
 }
 
@@ -219,14 +216,10 @@ static PetscBool inner_edge(const SbSurface *hull, const SbKey edge[], const SbN
   for (int i = 0; i < 4; i++) {
     for (int j = 0; j < i; j++) {
       const PetscInt p = m->cell[4 * c + i], q = m->cell[4 * c + j];
-      const uint64_t key = SbKeyOfPair(p, q);
-      const PetscInt at = SbKeysFind(3 * hull->ntri, edge, key);
-      PetscReal length = 0;
+      const PetscReal length2 = SbDistance2(m->x + 3 * p, m->x + 3 * q);
 
-      if (at < 3 * hull->ntri && edge[at].key == key) continue;
-      for (int k = 0; k < 3; k++) length += PetscSqr(m->x[3 * p + k] - m->x[3 * q + k]);
-      if (length <= longest) continue;
-      longest = length;
+      if (length2 <= longest || SbKeysFind(3 * hull->ntri, edge, SbKeyOfPair(p, q)) >= 0) continue;
+      longest = length2;
       ends[0] = p;
       ends[1] = q;
     }

@@ -143,73 +143,60 @@ static PetscReal add_rigid(SbModel m, const PetscReal u[], const PetscReal middl
   return largest;
 }
 
-/* One correction of the momenta. wanted: about the origin. */
-static PetscErrorCode correct(SbModel m, Vec U, const PetscBool named[], const PetscReal middle[][4],
-                              const PetscReal size[], const PetscReal wanted[][6], PetscReal v[],
-                              PetscReal *largest)
-{
-  /* components removed by supports stay zero: the minimum norm solution */
-  PetscBLASInt six = 6, one = 1, rank, nwork = 64, info = 0;
-  PetscReal(*now)[6], (*c)[6], (*G)[6][6], *w, speed, singular[6], work[64], least = 1e-11;
-  const PetscReal *u;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc3(m->nbody, &now, m->nbody, &c, m->nbody, &G));
-  PetscCall(PetscMalloc1(3 * m->space->nnode, &w));
-  PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
-  for (int l = 0; l < 6; l++) {
-    PetscCall(PetscArrayzero(&c[0][0], 6 * m->nbody));
-    PetscCall(PetscArrayzero(w, 3 * m->space->nnode));
-    for (PetscInt b = 0; b < m->nbody; b++) c[b][l] = 1.;
-    (void)add_rigid(m, u, middle, size, (const PetscReal(*)[6])c, w);
-    PetscCall(momenta_about(m, U, w, middle, now));
-    for (PetscInt b = 0; b < m->nbody; b++)
-      for (int k = 0; k < 6; k++) G[b][l][k] = now[b][k] / (k < 3 ? 1. : size[b]);
-  }
-  PetscCall(momenta_about(m, U, v, middle, now));
-  for (PetscInt b = 0; b < m->nbody; b++) {
-    PetscReal moved[3];
-
-    SbCross(middle[b], wanted[b], moved);
-    for (int k = 0; k < 3; k++) {
-      c[b][k] = wanted[b][k] - now[b][k];
-      c[b][3 + k] = (wanted[b][3 + k] - moved[k] - now[b][3 + k]) / size[b];
-    }
-    PetscCallBLAS("LAPACKgelss", LAPACKgelss_(&six, &six, &one, &G[b][0][0], &six, c[b], &six, singular,
-                                              &least, &rank, work, &nwork, &info));
-    PetscCheck(!info, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK gelss failed with %d", (int)info);
-    for (int k = 0; k < 6 && !named[b]; k++) c[b][k] = 0.;
-  }
-  speed = add_rigid(m, u, middle, size, (const PetscReal(*)[6])c, v);
-  *largest = PetscMax(*largest, speed);
-  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
-  PetscCall(PetscFree(w));
-  PetscCall(PetscFree3(now, c, G));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbBodySetMomenta(SbModel m, Vec U, Vec V, const PetscBool named[],
                                 const PetscReal momenta[][6], PetscReal *largest)
 {
-  const PetscReal *in_memory;
-  PetscReal(*middle)[4], *size, *v, *array;
+  /* components removed by supports stay zero: the minimum norm solution */
+  PetscBLASInt six = 6, one = 1, rank, nwork = 64, info = 0;
+  PetscReal(*middle)[4], (*now)[6], (*c)[6], (*G)[6][6], *size, *v, *w, *array, speed, singular[6], work[64];
+  PetscReal least = 1e-11;
+  const PetscReal *in_memory, *u, (*centre)[4];
 
   PetscFunctionBeginUser;
   *largest = 0.;
-  PetscCall(PetscCalloc2(m->nbody, &middle, m->nbody, &size));
-  PetscCall(PetscMalloc1(3 * m->space->nnode, &v));
+  PetscCall(PetscCalloc5(m->nbody, &middle, m->nbody, &size, m->nbody, &now, m->nbody, &c, m->nbody, &G));
+  PetscCall(PetscMalloc2(3 * m->space->nnode, &v, 3 * m->space->nnode, &w));
   PetscCall(SbModelCentres(m, U, middle));
+  centre = (const PetscReal(*)[4])middle;
   for (PetscInt b = 0; b < m->nbody; b++) size[b] = PetscPowReal(m->body[b].volume, 1. / 3);
   PetscCall(SbSpaceGetLocalRead(m->space, V, &in_memory));
   PetscCall(PetscArraycpy(v, in_memory, 3 * m->space->nnode));
   PetscCall(SbSpaceRestoreLocalRead(m->space, V, &in_memory));
-  for (int i = 0; i < 2; i++)
-    PetscCall(correct(m, U, named, (const PetscReal(*)[4])middle, size, momenta, v, largest));
+  PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
+  // the correction, and one refinement
+  for (int i = 0; i < 2; i++) {
+    for (int l = 0; l < 6; l++) {
+      PetscCall(PetscArrayzero(&c[0][0], 6 * m->nbody));
+      PetscCall(PetscArrayzero(w, 3 * m->space->nnode));
+      for (PetscInt b = 0; b < m->nbody; b++) c[b][l] = 1.;
+      (void)add_rigid(m, u, centre, size, (const PetscReal(*)[6])c, w);
+      PetscCall(momenta_about(m, U, w, centre, now));
+      for (PetscInt b = 0; b < m->nbody; b++)
+        for (int k = 0; k < 6; k++) G[b][l][k] = now[b][k] / (k < 3 ? 1. : size[b]);
+    }
+    PetscCall(momenta_about(m, U, v, centre, now));
+    for (PetscInt b = 0; b < m->nbody; b++) {
+      PetscReal moved[3];
+
+      SbCross(middle[b], momenta[b], moved);
+      for (int k = 0; k < 3; k++) {
+        c[b][k] = momenta[b][k] - now[b][k];
+        c[b][3 + k] = (momenta[b][3 + k] - moved[k] - now[b][3 + k]) / size[b];
+      }
+      PetscCallBLAS("LAPACKgelss", LAPACKgelss_(&six, &six, &one, &G[b][0][0], &six, c[b], &six, singular,
+                                                &least, &rank, work, &nwork, &info));
+      PetscCheck(!info, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK gelss failed with %d", (int)info);
+      for (int k = 0; k < 6 && !named[b]; k++) c[b][k] = 0.;
+    }
+    speed = add_rigid(m, u, centre, size, (const PetscReal(*)[6])c, v);
+    *largest = PetscMax(*largest, speed);
+  }
+  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
   PetscCall(SbSpaceGetLocalWrite(m->space, V, &array));
   PetscCall(PetscArraycpy(array, v, 3 * m->space->nnode_owned));
   PetscCall(SbSpaceRestoreLocalWrite(m->space, V, &array));
-  PetscCall(PetscFree(v));
-  PetscCall(PetscFree2(middle, size));
+  PetscCall(PetscFree2(v, w));
+  PetscCall(PetscFree5(middle, size, now, c, G));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, largest, 1, MPIU_REAL, MPI_MAX, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -73,7 +73,7 @@ PetscErrorCode SbRemeshRegister(void)
 
 PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
 {
-  PetscBool named = PETSC_FALSE, any = PETSC_FALSE, comes = PETSC_FALSE, given;
+  PetscBool named = PETSC_FALSE, any = PETSC_FALSE, given;
   PetscInt from, n;
   SbScope own;
   SbRemesh r;
@@ -82,7 +82,6 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
   static const char *const keys[] = {"remesh_quality", "remesh_times", "remesh_failed"};
 
   PetscFunctionBeginUser;
-  *remesh = NULL;
   // whether the scenario asks for re-meshing, by any option but the settings
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(keys); k++) {
     PetscCall(SbOptionGiven(&SbRunScope, keys[k], &given));
@@ -93,13 +92,8 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
     PetscCall(SbOptionGiven(&own, "remesh_quality", &given));
     named = (PetscBool)(named || given);
   }
-  for (PetscInt e = 0; e < m->neffect; e++)
-    comes = (PetscBool)(comes || (m->effect[e]->ops.prescribe &&
-                                  (m->effect[e]->from > 0. || m->effect[e]->until < PETSC_MAX_REAL)));
-  if (!named && !comes) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&r));
   *remesh = r;
-  PetscCall(SbLogNamed("Mesh", "remesh", &r->event));
   r->nbody = m->nbody;
   r->tried = -1;
   PetscCall(PetscCalloc7(m->nbody, &r->named, m->nbody, &r->due, m->nbody, &r->asked, m->nbody, &r->bound,
@@ -113,6 +107,8 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
     if (effect->from > 0.) r->change[r->nchange++] = effect->from;
     if (effect->until > 0. && effect->until < PETSC_MAX_REAL) r->change[r->nchange++] = effect->until;
   }
+  if (!named && !r->nchange) PetscCall(SbRemeshDestroy(remesh));
+  if (*remesh) PetscCall(SbLogNamed("Mesh", "remesh", &r->event));
   if (!named) PetscFunctionReturn(PETSC_SUCCESS);
   // the named bodies; all if none is named
   PetscCall(SbOptionNames(&SbRunScope, "remesh_bodies", &n, &words));
@@ -275,11 +271,6 @@ typedef struct {
   SbLedger ledger;
 } Scene;
 
-static PetscReal distance(const PetscReal a[3], const PetscReal b[3])
-{
-  return PetscSqrtReal(PetscSqr(a[0] - b[0]) + PetscSqr(a[1] - b[1]) + PetscSqr(a[2] - b[2]));
-}
-
 /* Sets up the new scene and transfers the state. */
 static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
 {
@@ -333,7 +324,7 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   PetscCall(SbModelEnergies(s.model, run->U, run->V, &e[1]));
   run->energies.remesh_loss += e[0].kinetic + e[0].strain - e[1].kinetic - e[1].strain;
   run->energies.remesh_mass += PetscAbsReal(s.model->mass - old->model->mass);
-  run->energies.remesh_momentum += distance(e[0].momentum, e[1].momentum);
+  run->energies.remesh_momentum += PetscSqrtReal(SbDistance2(e[0].momentum, e[1].momentum));
   PetscCall(SbLedgerAttach(s.ledger));
   if (s.ledger) PetscCall(SbLedgerContinue(old->ledger, s.ledger));
   PetscCall(SbRemeshAttach(r, run));
@@ -349,7 +340,7 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
                         .quality = {r->worst[b], o->quality},
                         .moved = o->nmoved,
                         .speed = speed[0],
-                        .shift = distance(e[0].centre, e[1].centre)};
+                        .shift = PetscSqrtReal(SbDistance2(e[0].centre, e[1].centre))};
 
     if (!result->done[b]) continue;
     PetscCall(PetscStrncpy(entry.body, s.model->body[b].name, sizeof(entry.body)));

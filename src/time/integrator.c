@@ -195,8 +195,8 @@ static SbMethodSettings method_settings(SbRun run)
   return set;
 }
 
-/* Eigenvalue z of generalized-alpha for an undamped oscillator of frequency w, h = 1, nearest to exp(i w): the
-   root of p = m d^2 + w^2 f g below, q its derivative. */
+/* Eigenvalue z of generalized-alpha for an undamped oscillator of frequency w, h = 1, nearest to exp(i w):
+   the root of p = m d^2 + w^2 f g below, q its derivative. */
 static double complex alpha_eigenvalue(const SbMethodSettings *s, double w)
 {
   double complex z = cexp(I * w);

@@ -7,7 +7,7 @@
       F(t0 + alpha_f h, u0 + alpha_f s, v0 + alpha_f (v1 - v0), a0 + alpha_m (a1 - a0)) = 0
     Newmark: alpha_m = alpha_f = 1; with contact: newmark_contact.c, a0 is the acceleration without contact
     implicit Euler: v1 = s / h, a1 = (v1 - v0) / h (it is not a Newmark method)
-    explicit Euler: u1 = u0 + h v0, v1 = v0 + h a0;  symplectic Euler: v1 = v0 + h a0, u1 = u0 + h v1; M a0 = f0
+    explicit Euler: u1 = u0 + h v0, v1 = v0 + h a0; symplectic: v1 = v0 + h a0, u1 = u0 + h v1; M a0 = f0
 
   Barrier contact: its force f = -dB/du is evaluated at the end of the step, the only state known to be free
   of collisions. In Newmark's method, where the mean of both ends would gain energy, it is implicit (Kane,

@@ -2,7 +2,7 @@
   One step, dynamic or static, from its start to its acceptance; see second_order.c, static.c.
 
     attempt: predictor, Newton's method in the active-set iteration of contact, post-solve callback, rejection
-    accepted: effects save their history, the energy balance is updated (energy_balance.c), monitors are called
+    accepted: effects save their history, the energy balance is updated (energy_balance.c), monitors called
 */
 #include "time_impl.h"
 
