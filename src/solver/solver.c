@@ -471,10 +471,9 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
     s->constraints->general = PETSC_FALSE;
   }
   PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(KSPSetTolerances(ksp, 1e-8, PETSC_DEFAULT, PETSC_DEFAULT, 5000));
   /* the residual norm of CG in a null space may grow far before it decreases */
-  if (SbConstraintsSeparate(s))
-    PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, PETSC_DEFAULT, 1e10, PETSC_DEFAULT));
+  PetscCall(
+    KSPSetTolerances(ksp, 1e-8, PETSC_DEFAULT, SbConstraintsSeparate(s) ? 1e10 : PETSC_DEFAULT, 5000));
   PetscCall(SbPCConstrainedCreate(s, pc, &pc));
   /* the preset's types, or those of the user */
   PetscCall(preset_value(preset, "-ksp_type", sizeof(method), method));
