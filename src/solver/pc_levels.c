@@ -221,7 +221,6 @@ PetscErrorCode SbLevelsShareSprings(SbLevels v)
 {
   const SbSpace top = v->space;
   PetscBool any = v->sprung;
-  size_t size;
   SbSpace s, p;
 
   PetscFunctionBeginUser;
@@ -231,9 +230,8 @@ PetscErrorCode SbLevelsShareSprings(SbLevels v)
   s = v->at[v->n - 2];
   p = v->at[v->n - 1];
   /* the springs of all ranks at the nodes of at[n-2], ghosts included, one row of the blocks at a time */
-  size = 9 * (size_t)s->nnode;
-  if (!v->shared) PetscCall(PetscMalloc1(size, &v->shared));
-  PetscCall(PetscArrayzero(v->shared, size));
+  if (!v->shared) PetscCall(PetscMalloc1(9 * (size_t)s->nnode, &v->shared));
+  PetscCall(PetscArrayzero(v->shared, 9 * (size_t)s->nnode));
   for (PetscInt row = 0; row < 3; row++) {
     const PetscReal *x;
     PetscScalar *own;
