@@ -25,8 +25,6 @@ typedef struct {
   PetscInt next;                 /* next constraint of the node, -1: none; filled by SbSpaceAddConstraint() */
 } SbConstraint;
 
-typedef struct _p_SbSaddleFactor *SbSaddleFactor; /* src/solver/saddle_factor.c */
-
 struct _p_SbConstraints {
   PetscBool beside; /* solves treat them outside K (SbConstraintsCreateOperator()), else K is projected */
   PetscBool nonsymmetric; /* some may have push other than n */
@@ -44,9 +42,10 @@ struct _p_SbConstraints {
   Mat whole;                /* borrowed: the complete tangent, K plus SbModelNonsymmetric(), or K */
   PetscReal *added;         /* [nnode_owned][3] diagonal regularisation added to K, N/m; NULL: none */
   PetscInt version, matrix; /* raised when the constraints change, and when K does */
-  SbSaddleFactor factored;  /* NULL before the first solve with SB_SADDLE_DIRECT */
-  PetscErrorCode (*destroy_factored)(SbSaddleFactor *); /* set by its creator */
-  PetscBool general;                                    /* FGMRES replaces a method for symmetric systems */
+  PC factored; /* factorisation of the system, owned; NULL before the first solve with SB_SADDLE_DIRECT */
+  PetscInt factored_version, factored_matrix; /* version and matrix then */
+  PCFailedReason failed;                      /* of this factorisation */
+  PetscBool general;                          /* FGMRES replaces a method for symmetric systems */
   char method[SB_NAME_MAX];
   KSPNormType norm;
   PCSide side; /* of the replaced method */
@@ -56,6 +55,14 @@ struct _p_SbConstraints {
 static inline SbConstraints SbConstraintsSeparate(SbSpace space)
 {
   return space->constraints && space->constraints->beside ? space->constraints : NULL;
+}
+
+/* Whether a factorisation of the saddle-point system replaces the preconditioner now. Not collective. */
+static inline PetscBool SbConstraintsFactored(SbSpace space)
+{
+  const SbConstraints c = space->constraints;
+
+  return (PetscBool)(c && c->saddle == SB_SADDLE_DIRECT && c->nexact);
 }
 
 /* beside: solves treat the constraints outside K; nonsymmetric: push may differ from n, which needs `beside`.

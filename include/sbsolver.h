@@ -7,15 +7,14 @@
 /* A row of the solver table: a matrix type and default PETSc options. */
 typedef struct _SbSolverPreset {
   const char *name;
-  SbMatrixKind matrix;                             /* on several ranks SBAIJ becomes BAIJ */
-  const char *options;                             /* "-ksp_type cg -pc_type gamg ..." */
-  const char *package;                             /* of PETSc's that the row needs; NULL: none */
-  PetscBool direct;                                /* a factorisation by that package */
-  PetscBool matrix_free;                           /* a matrix-free operator instead of the matrix */
-  PetscErrorCode (*create)(SbSpace space, Mat *K); /* an operator of our own; NULL: the matrix */
-  PetscErrorCode (*precondition)(SbSpace space,
-                                 PC pc); /* a preconditioner of our own; NULL: by the options */
-  const char *help;
+  SbMatrixKind matrix;                                  /* on several ranks SBAIJ becomes BAIJ */
+  const char *options;                                  /* "-ksp_type cg -pc_type gamg ..." */
+  const char *package;                                  /* of PETSc's that the row needs; NULL: none */
+  PetscBool direct;                                     /* a factorisation by that package */
+  PetscBool matrix_free;                                /* a matrix-free operator instead of the matrix */
+  PetscErrorCode (*create)(SbSpace space, Mat *K);      /* an operator of our own; NULL: the matrix */
+  PetscErrorCode (*precondition)(SbSpace space, PC pc); /* one of our own; NULL: by the options */
+  PetscBool by_type;                                    /* the name is a -pc_type of the user */
 } SbSolverPreset;
 
 PetscErrorCode SbSolverRegister(void);
@@ -51,8 +50,6 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace space, const SbSolverPreset *pre
 PetscErrorCode SbSolverUpdateSymmetry(KSP ksp, SbSpace space);
 /* M of such a pc, else pc itself. Not collective. */
 PetscErrorCode SbPCConstrainedGetInner(PC pc, PC *inner);
-/* Whether a factorisation of the saddle-point system replaces M now. Not collective. */
-PetscErrorCode SbPCConstrainedIsFactored(PC pc, PetscBool *is);
 /*
   SbSaddleChoose - how the saddle-point system of constraints is solved: `choice` 0 by size, 1 directly, 2 by
   iterations, with the reason in words. Collective. Errors: PETSC_ERR_USER for 1 without a package.

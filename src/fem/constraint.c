@@ -53,7 +53,7 @@ PetscErrorCode SbConstraintsDestroy(SbConstraints *constraints)
 
   PetscFunctionBeginUser;
   if (!c) PetscFunctionReturn(PETSC_SUCCESS);
-  if (c->factored) PetscCall((c->destroy_factored)(&c->factored));
+  PetscCall(PCDestroy(&c->factored));
   PetscCall(PetscFree(c->constraint));
   PetscCall(PetscFree(c->first));
   PetscCall(PetscFree(c->Q));

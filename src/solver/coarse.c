@@ -37,15 +37,12 @@ PetscErrorCode SbCoarseCreate(SbSpace s, PetscInt wanted, PetscBool vertices, Sb
 static PetscErrorCode free_pattern(SbCoarse c)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscFree4(c->way, c->moved, c->unit, c->d));
+  PetscCall(PetscFree5(c->way, c->moved, c->unit, c->d, c->other));
   PetscCall(PetscFree3(c->centre, c->null, c->row_of));
   PetscCall(PetscFree2(c->weight, c->ia));
-  PetscCall(PetscFree(c->other));
   PetscCall(PetscFree2(c->ja, c->value));
   PetscCall(VecDestroy(&c->c));
   PetscCall(VecDestroy(&c->y));
-  PetscCall(VecDestroy(&c->wide));
-  PetscCall(VecScatterDestroy(&c->scatter));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -106,7 +103,8 @@ static PetscErrorCode find_units(SbCoarse c, const uint8_t contact[])
   PetscInt *count;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc4(c->nall, &c->way, c->nall, &c->moved, 2 * c->nall, &c->unit, 3 * c->nall, &c->d));
+  PetscCall(PetscMalloc5(c->nall, &c->way, c->nall, &c->moved, 2 * c->nall, &c->unit, 3 * c->nall, &c->d,
+                         2 * c->nall, &c->other));
   PetscCall(PetscCalloc3(4 * c->nagg, &c->centre, 36 * c->nagg, &c->null, c->nagg, &c->row_of));
   PetscCall(PetscCalloc2(c->nagg, &count, 3 * s->nnode, &number));
 
@@ -209,9 +207,7 @@ static PetscErrorCode find_ghosts(SbCoarse c, PetscBool parallel, const PetscInt
 {
   const PetscInt n = c->space->nnode_owned, nghost = c->nall - n;
   PetscReal(*share)[6];
-  VecScatter scatter;
-  Vec own, far;
-  IS is;
+  Vec all;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(c->nall, &share));
@@ -221,16 +217,11 @@ static PetscErrorCode find_ghosts(SbCoarse c, PetscBool parallel, const PetscInt
     for (int q = 0; q < 3; q++) share[i][3 + q] = c->d[3 * i + q];
   }
   if (parallel) {
-    PetscCall(VecCreateMPIWithArray(c->space->comm, 6, 6 * n, PETSC_DECIDE, share[0], &own));
-    PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 6, 6 * nghost, share[n], &far));
-    PetscCall(ISCreateBlock(PETSC_COMM_SELF, 6, nghost, ghost, PETSC_USE_POINTER, &is));
-    PetscCall(VecScatterCreate(own, is, far, NULL, &scatter));
-    PetscCall(VecScatterBegin(scatter, own, far, INSERT_VALUES, SCATTER_FORWARD));
-    PetscCall(VecScatterEnd(scatter, own, far, INSERT_VALUES, SCATTER_FORWARD));
-    PetscCall(VecScatterDestroy(&scatter));
-    PetscCall(ISDestroy(&is));
-    PetscCall(VecDestroy(&own));
-    PetscCall(VecDestroy(&far));
+    PetscCall(
+      VecCreateGhostBlockWithArray(c->space->comm, 6, 6 * n, PETSC_DECIDE, nghost, ghost, share[0], &all));
+    PetscCall(VecGhostUpdateBegin(all, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(VecGhostUpdateEnd(all, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(VecDestroy(&all));
   }
   for (PetscInt i = n; i < c->nall; i++) {
     for (int q = 0; q < 2; q++) c->unit[2 * i + q] = (PetscInt)share[i][q];
@@ -241,7 +232,6 @@ static PetscErrorCode find_ghosts(SbCoarse c, PetscBool parallel, const PetscInt
   PetscCall(PetscFree(share));
 
   /* block rows of other ranks, ascending */
-  PetscCall(PetscMalloc1(2 * c->nall, &c->other));
   c->nother = 0;
   for (PetscInt k = 0; k < 2 * c->nall; k++) {
     const PetscInt u = c->unit[k];
@@ -333,7 +323,6 @@ PetscErrorCode SbCoarseSetPattern(SbCoarse c, Mat A, const PetscInt ia[], const 
   PetscInt *own_ia = NULL, *own_ja = NULL, *column, nghost = 0;
   PetscBool parallel;
   Mat far;
-  IS is;
 
   PetscFunctionBeginUser;
   PetscCall(free_pattern(c));
@@ -369,20 +358,15 @@ PetscErrorCode SbCoarseSetPattern(SbCoarse c, Mat A, const PetscInt ia[], const 
   c->changed = PETSC_TRUE;
 
   /* vectors */
-  PetscCall(VecCreate(s->comm, &c->c));
-  PetscCall(VecSetSizes(c->c, 3 * c->n, PETSC_DECIDE));
-  PetscCall(VecSetType(c->c, VECSTANDARD));
-  PetscCall(VecDuplicate(c->c, &c->y));
-  if (!c->aggregated && parallel) {
-    PetscCall(PetscMalloc1(c->n + c->nother, &column));
-    for (PetscInt u = 0; u < c->n; u++) column[u] = c->first + u;
-    PetscCall(PetscArraycpy(column + c->n, c->other, c->nother));
-    PetscCall(VecCreateSeq(PETSC_COMM_SELF, 3 * (c->n + c->nother), &c->wide));
-    PetscCall(ISCreateBlock(PETSC_COMM_SELF, 3, c->n + c->nother, column, PETSC_USE_POINTER, &is));
-    PetscCall(VecScatterCreate(c->c, is, c->wide, NULL, &c->scatter));
-    PetscCall(ISDestroy(&is));
-    PetscCall(PetscFree(column));
+  c->wide = (PetscBool)(!c->aggregated && parallel);
+  if (c->wide)
+    PetscCall(VecCreateGhostBlock(s->comm, 3, 3 * c->n, PETSC_DECIDE, c->nother, c->other, &c->c));
+  else {
+    PetscCall(VecCreate(s->comm, &c->c));
+    PetscCall(VecSetSizes(c->c, 3 * c->n, PETSC_DECIDE));
+    PetscCall(VecSetType(c->c, VECSTANDARD));
   }
+  PetscCall(VecDuplicate(c->c, &c->y));
   if (c->s) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatCreateVecs(A, &c->s, &c->t));
   PetscCall(VecDuplicate(c->s, &c->w));
@@ -395,11 +379,12 @@ PetscErrorCode SbCoarseRestrict(SbCoarse c, Vec R, PetscReal *share)
 {
   const SbSpace s = c->space;
   PetscReal norm2[2] = {0., 0.}; /* squared norm of c, weighted; of r on the units */
-  Vec to = c->wide ? c->wide : c->c;
   const PetscScalar *r;
   PetscScalar *m;
+  Vec to = c->c;
 
   PetscFunctionBeginUser;
+  if (c->wide) PetscCall(VecGhostGetLocalForm(c->c, &to));
   PetscCall(VecZeroEntries(to));
   PetscCall(VecGetArray(to, &m));
   PetscCall(VecGetArrayRead(R, &r));
@@ -422,9 +407,9 @@ PetscErrorCode SbCoarseRestrict(SbCoarse c, Vec R, PetscReal *share)
   PetscCall(VecRestoreArrayRead(R, &r));
   PetscCall(VecRestoreArray(to, &m));
   if (c->wide) {
-    PetscCall(VecZeroEntries(c->c));
-    PetscCall(VecScatterBegin(c->scatter, c->wide, c->c, ADD_VALUES, SCATTER_REVERSE));
-    PetscCall(VecScatterEnd(c->scatter, c->wide, c->c, ADD_VALUES, SCATTER_REVERSE));
+    PetscCall(VecGhostRestoreLocalForm(c->c, &to));
+    PetscCall(VecGhostUpdateBegin(c->c, ADD_VALUES, SCATTER_REVERSE));
+    PetscCall(VecGhostUpdateEnd(c->c, ADD_VALUES, SCATTER_REVERSE));
   }
   if (!share) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, norm2, 2, MPIU_REAL, MPI_SUM, s->comm));
@@ -437,6 +422,7 @@ PetscErrorCode SbCoarseAdd(SbCoarse c, Vec Z)
   const SbSpace s = c->space;
   const PetscScalar *x;
   PetscScalar *z;
+  Vec from = c->y;
 
   PetscFunctionBeginUser;
   if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
@@ -445,10 +431,11 @@ PetscErrorCode SbCoarseAdd(SbCoarse c, Vec Z)
   else
     PetscCall(PCApply(c->solver, c->c, c->y));
   if (c->wide) {
-    PetscCall(VecScatterBegin(c->scatter, c->y, c->wide, INSERT_VALUES, SCATTER_FORWARD));
-    PetscCall(VecScatterEnd(c->scatter, c->y, c->wide, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(VecGhostUpdateBegin(c->y, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(VecGhostUpdateEnd(c->y, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(VecGhostGetLocalForm(c->y, &from));
   }
-  PetscCall(VecGetArrayRead(c->wide ? c->wide : c->y, &x));
+  PetscCall(VecGetArrayRead(from, &x));
   PetscCall(VecGetArray(Z, &z));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     const PetscInt *unit = c->unit + 2 * i;
@@ -463,7 +450,8 @@ PetscErrorCode SbCoarseAdd(SbCoarse c, Vec Z)
     for (int q = 0; q < 3; q++) z[3 * i + q] += s->fixed[i] & (1 << q) ? 0. : u[q];
   }
   PetscCall(VecRestoreArray(Z, &z));
-  PetscCall(VecRestoreArrayRead(c->wide ? c->wide : c->y, &x));
+  PetscCall(VecRestoreArrayRead(from, &x));
+  if (c->wide) PetscCall(VecGhostRestoreLocalForm(c->y, &from));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -10,7 +10,6 @@
   aggregate, and right-hand sides are zero there.
 */
 #include "coarse.h"
-#include "contact_coarse.h"
 
 /* The sums W of one row, by units. */
 typedef struct {

@@ -92,10 +92,9 @@ PetscErrorCode SbCoarseCreateSolver(SbCoarse c, PetscBool factored)
     PetscCall(SbAttachModes(c->E, fill_mode, c));
     PetscCall(SbPCMultigridSet(c->solver, c->aggregated ? -1. : 0.));
     /* PETSc's first coarsening, by the square of the graph: 50 iterations instead of 38 on 16 ranks */
-    if (c->aggregated) {
-      PetscCall(SbSolverSetDefault("pc_coarse_", "pc_gamg_aggressive_coarsening", "0"));
-      PetscCall(SbSolverSetDefault("pc_coarse_", "mg_levels_pc_type", "pbjacobi"));
-    }
+    if (c->aggregated)
+      PetscCall(SbSolverSetDefaults(
+        "pc_coarse_", "-pc_gamg_aggressive_coarsening 0 -mg_levels_pc_type pbjacobi", PETSC_FALSE));
   }
   PetscCall(PCSetFromOptions(c->solver));
   PetscCall(SbPCCheckPivots(c->solver));

@@ -66,12 +66,6 @@ typedef struct {
   Vec r; /* projected residual */
 } Wrapped;
 
-/* Whether the saddle-point system is factored at present. */
-static PetscBool is_factored(SbSpace s)
-{
-  return (PetscBool)(s->constraints->saddle == SB_SADDLE_DIRECT && s->constraints->nexact);
-}
-
 static PetscErrorCode setup_wrapped(PC pc)
 {
   PCFailedReason reason;
@@ -84,7 +78,8 @@ static PetscErrorCode setup_wrapped(PC pc)
   PetscCall(PCSetOperators(w->inner, K, K));
   PetscCall(PCSetFailedReason(pc, PC_NOERROR));
   w->space->constraints->matrix++;
-  if (is_factored(w->space)) PetscFunctionReturn(PETSC_SUCCESS); /* no set-up of M: K alone may be singular */
+  /* no set-up of M: K alone may be singular */
+  if (SbConstraintsFactored(w->space)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PCSetUp(w->inner));
   PetscCall(PCGetFailedReason(w->inner, &reason));
   PetscCall(PCSetFailedReason(pc, reason));
@@ -99,7 +94,7 @@ static PetscErrorCode apply_wrapped(PC pc, Vec r, Vec z)
 
   PetscFunctionBeginUser;
   PetscCall(PCShellGetContext(pc, &w));
-  factored = is_factored(w->space);
+  factored = SbConstraintsFactored(w->space);
   if (w->space->constraints->nexact) {
     if (!w->r) PetscCall(VecDuplicate(r, &w->r));
     PetscCall(VecCopy(r, w->r));
@@ -185,15 +180,5 @@ PetscErrorCode SbPCConstrainedGetInner(PC pc, PC *inner)
   PetscFunctionBeginUser;
   PetscCall(SbPCShellFind(pc, NAME, &w));
   *inner = w ? w->inner : pc;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbPCConstrainedIsFactored(PC pc, PetscBool *is)
-{
-  Wrapped *w;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbPCShellFind(pc, NAME, &w));
-  *is = (PetscBool)(w && is_factored(w->space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

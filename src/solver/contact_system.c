@@ -18,7 +18,6 @@
   -sub_pc_type) apply here, too.
 */
 #include "coarse.h"
-#include "contact_coarse.h"
 #include "sblog.h"
 #include "sbsolver.h"
 
@@ -60,11 +59,11 @@ struct _p_SbContactSystem {
 
 PetscErrorCode SbBlocksReserve(SbBlocks *b, PetscInt more)
 {
+  PetscInt size = b->size;
+
   PetscFunctionBeginUser;
-  if (b->n + more <= b->size) PetscFunctionReturn(PETSC_SUCCESS);
-  b->size = PetscMax(2 * b->size, b->n + more);
-  PetscCall(PetscRealloc((size_t)b->size * sizeof(*b->node), &b->node));
-  PetscCall(PetscRealloc((size_t)b->size * sizeof(*b->block), &b->block));
+  PetscCall(SbReserve(b->n + more, sizeof(*b->node), &size, &b->node));
+  PetscCall(SbReserve(b->n + more, sizeof(*b->block), &b->size, &b->block));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -206,23 +205,19 @@ static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
 {
   SbContactRows *rows = &c->rows;
   PetscBool missing = (PetscBool)!rows->value;
-  PetscInt *place;
 
   PetscFunctionBeginUser;
   c->nsolve++;
-  PetscCall(PetscMalloc1(b->n, &place));
   for (PetscInt k = 0; k < b->n; k++) {
     const PetscInt r = b->node[k][0];
 
     c->last[r] = c->nsolve;
-    place[k] = SbRowFind(rows->ia, rows->ja, r, b->node[k][1]);
-    missing = (PetscBool)(missing || place[k] < 0 || (c->space->fixed[r] != 7 && !rows->contact[r]));
+    missing = (PetscBool)(missing || SbRowFind(rows->ia, rows->ja, r, b->node[k][1]) < 0 ||
+                          (c->space->fixed[r] != 7 && !rows->contact[r]));
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &missing, 1, SB_MPI_BOOL, MPI_LOR, c->space->comm));
   if (missing) {
     PetscCall(make_pattern(c, b));
-    for (PetscInt k = 0; k < b->n; k++)
-      place[k] = SbRowFind(rows->ia, rows->ja, b->node[k][0], b->node[k][1]);
     c->foreign[0] = c->foreign[1] = PETSC_TRUE;
   }
   PetscCall(SbSpaceGetRows(c->space, K, rows->n, c->all, c->ka, NULL, c->tangent));
@@ -234,12 +229,12 @@ static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
     for (int e = 0; e < 9; e++) rows->value[9 * (size_t)c->place[k] + e] = c->tangent[9 * (size_t)k + e];
   }
   for (PetscInt k = 0; k < b->n; k++) {
-    PetscReal *to = rows->value + 9 * (size_t)place[k];
+    const PetscInt place = SbRowFind(rows->ia, rows->ja, b->node[k][0], b->node[k][1]);
+    PetscReal *to = rows->value + 9 * (size_t)place;
 
-    if (c->used[place[k]] >= 0) c->used[place[k]] = c->nsolve;
+    if (c->used[place] >= 0) c->used[place] = c->nsolve;
     for (int e = 0; e < 9; e++) to[e] += b->block[k][e];
   }
-  PetscCall(PetscFree(place));
   c->fresh[0] = c->fresh[1] = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -356,22 +351,22 @@ static PetscErrorCode iterate(SbContactSystem c, Vec F, Vec Y, KSPConvergedReaso
   PC pc;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   if (c->fresh[0]) PetscCall(set_up_iteration(c));
+  /* PETSc's log events count the set-up and the iteration */
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
-  /* PETSc's log events count these */
   PetscCall(KSPSetUp(c->ksp));
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   if (!c->type[0]) {
     PetscCall(KSPGetPC(c->ksp, &pc));
-    PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
     if (changed) PetscCall(find_most(c, pc));
     c->budget = PetscMin(c->budget + c->most, SAVED * c->most);
     PetscCall(
       KSPSetTolerances(c->ksp, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT, PetscMin(c->limit, c->budget)));
-    PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
+    if (!c->budget) PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (!c->type[0] && !c->budget) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   PetscCall(KSPSolve(c->ksp, F, Y));
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   PetscCall(KSPGetConvergedReason(c->ksp, reason));
   PetscCall(KSPGetIterationNumber(c->ksp, iterations));
   c->budget -= *iterations;
@@ -403,7 +398,6 @@ PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *bl
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   if (fresh || !c->rows.value) PetscCall(merge(c, K, blocks));
-  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   /* factor by choice, if small, while CG pauses, or if a factor of these values exists */
   factored = (PetscBool)(is_factored(c->choice, c->type) ||
                          (!c->type[0] && !c->choice &&
@@ -418,11 +412,10 @@ PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *bl
     c->budget = 0;
   }
   if (factored || slow) {
-    PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
     PetscCall(factor(c, F, Y, reason));
-    PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
     ++*iterations;
   }
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT_SOLVE], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -10,15 +10,6 @@
 
 #define MOST_NODES 600 /* largest number of nodes: with more their factorisation costs more than it saves */
 
-PetscErrorCode SbExactNodesCreate(SbSpace s, SbExactNodes *e)
-{
-  PetscFunctionBeginUser;
-  memset(e, 0, sizeof(*e));
-  PetscCall(PetscMalloc1(s->nnode, &e->index));
-  for (PetscInt i = 0; i < s->nnode; i++) e->index[i] = -1;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode free_arrays(SbExactNodes *e)
 {
   PetscFunctionBeginUser;
@@ -37,35 +28,30 @@ PetscErrorCode SbExactNodesDestroy(SbExactNodes *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Counts and numbers the nodes above the limit. */
-static void choose(SbExactNodes *e, SbSpace s, const PetscReal spread[], PetscReal limit)
-{
-  const SbPlan p = s->plan;
-
-  e->n = 0;
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    const PetscBool chosen = (PetscBool)(spread[i] > limit && !s->fixed[i] && p->oi[i] == p->oi[i + 1]);
-
-    e->index[i] = chosen ? e->n++ : -1;
-  }
-}
-
 PetscErrorCode SbExactNodesSetUp(SbExactNodes *e, SbSpace s, Mat A, const PetscReal spread[], PetscReal limit)
 {
+  const SbPlan p = s->plan;
   PetscInt nz = 0;
   PetscBool ok = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   PetscCall(free_arrays(e));
-  choose(e, s, spread, limit);
-  while (e->n > MOST_NODES) choose(e, s, spread, limit *= 1.3);
+  if (!e->index) PetscCall(PetscMalloc1(s->nnode_owned, &e->index));
+  /* the nodes above the limit, which is raised while they are too many */
+  while (PETSC_TRUE) {
+    e->n = 0;
+    for (PetscInt i = 0; i < s->nnode_owned; i++)
+      e->index[i] = spread[i] > limit && !s->fixed[i] && p->oi[i] == p->oi[i + 1] ? e->n++ : -1;
+    if (e->n <= MOST_NODES) break;
+    limit *= 1.3;
+  }
   if (!e->n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(
     PetscMalloc5(e->n, &e->node, e->n + 1, &e->ia, e->n + 1, &e->ka, 3 * e->n, &e->x, 3 * e->n, &e->y));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     if (e->index[i] < 0) continue;
     e->node[e->index[i]] = i;
-    nz += s->plan->di[i + 1] - s->plan->di[i];
+    nz += p->di[i + 1] - p->di[i];
   }
   PetscCall(PetscMalloc5(nz, &e->ja, nz, &e->kja, 9 * nz, &e->block, 9 * nz, &e->kblock, 9 * nz, &e->value));
   PetscCall(SbSpaceGetRows(s, A, e->n, e->node, e->ia, e->ja, e->block));
@@ -85,10 +71,7 @@ PetscErrorCode SbExactNodesSetUp(SbExactNodes *e, SbSpace s, Mat A, const PetscR
   PetscCall(SbFactorCreate(e->n, 0, e->ka, e->kja, &e->factor));
   PetscCall(SbFactorNumeric(e->factor, e->ka, e->kja, e->kblock, NULL, &ok));
   /* an indefinite block: no node is solved exactly */
-  if (!ok) {
-    PetscCall(free_arrays(e));
-    for (PetscInt i = 0; i < s->nnode_owned; i++) e->index[i] = -1;
-  }
+  if (!ok) PetscCall(free_arrays(e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

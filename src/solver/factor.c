@@ -207,8 +207,7 @@ static PetscErrorCode eliminate(SbFactor f, PetscInt g, const PetscInt ia[], con
   for (PetscInt k = 0; k < nall; k++) work->position[list[k]] = k;
   for (size_t j = 0, size = 3 * (size_t)nall; j < size; j++)
     PetscCall(PetscArrayzero(front + size * j + j / 3 * 3, size - j / 3 * 3));
-  /* Adds the entries of A in the columns of supernode g to its front. Row-major block (node, neighbour) is
-     column-major block (neighbour, node). */
+  // row-major block (node, neighbour) is column-major block (neighbour, node)
   for (PetscInt j = e->first[g]; j < e->first[g + 1]; j++) {
     const PetscInt node = e->order[j], column = 3 * (j - e->first[g]);
 
@@ -304,11 +303,15 @@ PetscErrorCode SbFactorNumeric(SbFactor f, const PetscInt ia[], const PetscInt j
 
 /* ------------------------------------------------------------------ solves */
 
-/* w <- L^-1 w, from the first panel to the last. */
-SB_KERNEL static void forward(SbFactor f)
+SB_KERNEL void SbFactorForward(SbFactor f, const float b[], float kept[])
 {
+  const SbElimination *e = &f->e;
   float *w = f->w, *below = f->below, pivot[3 * PANEL + PAIR] __attribute__((aligned(64)));
 
+  // copy into the order of elimination; w <- L^-1 w, from the first panel to the last
+  for (PetscInt i = 0; i < e->n; i++) {
+    for (PetscInt c = 0; c < 3; c++) w[3 * i + c] = b[3 * e->order[i] + c];
+  }
   for (PetscInt q = 0; q < f->npanel; q++) {
     const Panel *p = &f->panel[q];
     const PetscInt ncol = 3 * p->ncol;
@@ -324,20 +327,24 @@ SB_KERNEL static void forward(SbFactor f)
       for (int c = 0; c < 3; c++) w[3 * p->row[k] + c] -= below[3 * k + c];
     }
   }
+  // the right-hand side of the kept nodes
+  for (PetscInt i = 3 * e->nfree; i < 3 * e->n; i++) kept[i - 3 * e->nfree] = w[i];
 }
 
-/* w <- L^-T w, from the last panel to the first. */
-SB_KERNEL static void backward(SbFactor f)
+SB_KERNEL void SbFactorBackward(SbFactor f, const float kept[], float x[])
 {
+  const SbElimination *e = &f->e;
   float *w = f->w, *below = f->below, pivot[3 * PANEL + PAIR] __attribute__((aligned(64)));
 
+  // w <- L^-T w from the values at the kept nodes, from the last panel to the first
+  for (PetscInt i = 3 * e->nfree; i < 3 * e->n; i++) w[i] = kept[i - 3 * e->nfree];
   for (PetscInt q = f->npanel - 1; q >= 0; q--) {
     const Panel *p = &f->panel[q];
     const PetscInt ncol = 3 * p->ncol;
     const size_t height = round_up(3 * p->nrow), square = round_up(ncol);
     const float *scale = f->scale + 6 * p->first;
     const int32_t *a = f->word + p->offset;
-    float *x = w + 3 * p->first;
+    float *own = w + 3 * p->first;
 
     // contribution of the solution in the rows below to the right-hand side of the panel
     for (PetscInt k = 0; k < p->nrow; k++) {
@@ -346,33 +353,13 @@ SB_KERNEL static void backward(SbFactor f)
     for (size_t k = 3 * (size_t)p->nrow; k < height; k++) below[k] = 0.f;
     panel_transposed(height, ncol, a + (size_t)ncol * square / 2, below, scale + 1, pivot);
     // the unknowns of the panel: transposed inverse times the difference
-    for (PetscInt j = 0; j < ncol; j++) pivot[j] = x[j] - pivot[j];
+    for (PetscInt j = 0; j < ncol; j++) pivot[j] = own[j] - pivot[j];
     for (size_t j = (size_t)ncol; j < square; j++) pivot[j] = 0.f;
-    panel_transposed(square, ncol, a, pivot, scale, x);
+    panel_transposed(square, ncol, a, pivot, scale, own);
   }
-}
-
-void SbFactorForward(SbFactor f, const float b[], float kept[])
-{
-  const SbElimination *e = &f->e;
-
-  // copy into the order of elimination; at the end return the right-hand side of the kept nodes
+  // into the order of the caller
   for (PetscInt i = 0; i < e->n; i++) {
-    for (PetscInt c = 0; c < 3; c++) f->w[3 * i + c] = b[3 * e->order[i] + c];
-  }
-  forward(f);
-  for (PetscInt i = 3 * e->nfree; i < 3 * e->n; i++) kept[i - 3 * e->nfree] = f->w[i];
-}
-
-void SbFactorBackward(SbFactor f, const float kept[], float x[])
-{
-  const SbElimination *e = &f->e;
-
-  // from the values at the kept nodes to all others, then into the order of the caller
-  for (PetscInt i = 3 * e->nfree; i < 3 * e->n; i++) f->w[i] = kept[i - 3 * e->nfree];
-  backward(f);
-  for (PetscInt i = 0; i < e->n; i++) {
-    for (PetscInt c = 0; c < 3; c++) x[3 * e->order[i] + c] = f->w[3 * i + c];
+    for (PetscInt c = 0; c < 3; c++) x[3 * e->order[i] + c] = w[3 * i + c];
   }
 }
 

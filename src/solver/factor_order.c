@@ -145,7 +145,7 @@ static PetscErrorCode find_groups(SbElimination *e, const PetscInt ia[], const P
   PetscInt *child, *sibling, *nrows, *mark, *out, **rows;
 
   PetscFunctionBeginUser;
-  /* rows[j], nrows[j]: structure of column j, kept until its parent has used it; lists of children */
+  /* rows[j], nrows[j]: structure of column j, kept for the last column of a group only; lists of children */
   PetscCall(PetscMalloc6(n, &child, n, &sibling, n, &nrows, e->n, &mark, e->n, &out, n, &rows));
   for (PetscInt j = 0; j < n; j++) child[j] = -1;
   for (PetscInt i = 0; i < e->n; i++) mark[i] = -1;
@@ -159,29 +159,25 @@ static PetscErrorCode find_groups(SbElimination *e, const PetscInt ia[], const P
     for (PetscInt k = ia[node]; k < ia[node + 1]; k++) append(j, e->inverse[ja[k]], mark, &nrows[j], out);
     for (PetscInt c = child[j]; c >= 0; c = sibling[c]) {
       for (PetscInt k = 0; k < nrows[c]; k++) append(j, rows[c][k], mark, &nrows[j], out);
-      PetscCall(PetscFree(rows[c]));
     }
     PetscCall(PetscSortInt(nrows[j], out));
     PetscCall(PetscMalloc1(nrows[j], &rows[j]));
     PetscCall(PetscArraycpy(rows[j], out, nrows[j]));
     /* it continues the group of the column before, or begins one */
-    if (j > 0 && parent[j - 1] == j && nrows[j - 1] == nrows[j] + 1)
+    if (j > 0 && parent[j - 1] == j && nrows[j - 1] == nrows[j] + 1) {
       group[*ngroup - 1].ncol++;
-    else {
+      PetscCall(PetscFree(rows[j - 1]));
+    } else {
       PetscCall(merge_groups(ngroup, group));
       group[(*ngroup)++] = (Group){.first = j, .ncol = 1};
     }
     /* the rows of a group are those of its last column */
     g = &group[*ngroup - 1];
-    PetscCall(PetscFree(g->row));
     g->nrow = nrows[j];
-    PetscCall(PetscMalloc1(g->nrow, &g->row));
-    PetscCall(PetscArraycpy(g->row, out, g->nrow));
-    if (parent[j] >= 0) {
-      sibling[j] = child[parent[j]];
-      child[parent[j]] = j;
-    } else
-      PetscCall(PetscFree(rows[j]));
+    g->row = rows[j];
+    if (parent[j] < 0) continue;
+    sibling[j] = child[parent[j]];
+    child[parent[j]] = j;
   }
   PetscCall(merge_groups(ngroup, group));
   PetscCall(PetscFree6(child, sibling, nrows, mark, out, rows));

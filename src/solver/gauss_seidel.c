@@ -15,7 +15,9 @@
   starts from E z, and D_i^-1 (b_i - ..) becomes D'_i^-1 (b_i + E_i z_i - ..).
 */
 #include "sbfour.h"
-#include "gauss_seidel.h"
+#include "sbassembly.h"
+#include "sbkernel.h"
+#include "solver_impl.h"
 
 /* z_j -= A_ij^T x for the n blocks right of the diagonal; the fourth lane of x is zero. */
 SB_INLINE void push(const PetscScalar *a, PetscInt n, const PetscInt column[], const PetscReal x[3],

@@ -147,11 +147,6 @@ PetscErrorCode SbInterfaceDestroy(SbInterface *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscInt64 SbInterfaceBytes(SbInterface f)
-{
-  return (PetscInt64)(sizeof(*f->word) * f->nword);
-}
-
 /* ------------------------------------------------------------------ factorisation */
 
 /* First column of block k of n columns; returns its width. */

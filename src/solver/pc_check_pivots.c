@@ -49,15 +49,13 @@ static PetscErrorCode guarded_setup(PC pc)
   PetscErrorCode error;
   MatFactorError before = MAT_FACTOR_NOERROR;
   MatSolverType package;
-  PetscBool mumps;
   Mat factor;
 
   PetscFunctionBeginUser;
   PetscCall(PetscObjectQueryFunction((PetscObject)pc, ORIGINAL, &original));
   // after a failure PETSc treats MUMPS' analysis as failed, and does not factor again: create a new factor
   PetscCall(PCFactorGetMatSolverType(pc, &package));
-  PetscCall(PetscStrcmp(package, MATSOLVERMUMPS, &mumps));
-  if (mumps && pc->setupcalled) {
+  if (package && !strcmp(package, MATSOLVERMUMPS) && pc->setupcalled) {
     PetscCall(PCFactorGetMatrix(pc, &factor));
     PetscCall(MatFactorGetError(factor, &before));
     if (before) pc->flag = DIFFERENT_NONZERO_PATTERN;
@@ -112,15 +110,13 @@ static PetscErrorCode gathered_setup(PC pc)
   PetscCall(PCTelescopeGetKSP(pc, &ksp));
   if (ksp) {
     const char *package;
-    PetscBool cholmod;
 
     /* idle ranks have no inner KSP */
     PetscCall(KSPGetPC(ksp, &inner));
     /* before the first set-up the telescope is empty: wrap the factorisation now */
     PetscCall(PCGetApplicationContext(pc, &package));
     if (package && !inner->setupcalled) {
-      PetscCall(PetscStrcmp(package, MATSOLVERCHOLMOD, &cholmod));
-      PetscCall(PCSetType(inner, cholmod ? PCCHOLESKY : PCLU));
+      PetscCall(PCSetType(inner, strcmp(package, MATSOLVERCHOLMOD) ? PCLU : PCCHOLESKY));
       PetscCall(PCFactorSetMatSolverType(inner, package));
       PetscCall(PCSetFromOptions(inner));
     }

@@ -57,8 +57,6 @@
   (2003), Analysis of p-multigrid.
 */
 #include "coarse.h"
-#include "contact_coarse.h"
-#include "gauss_seidel.h"
 #include "solver_impl.h"
 #include "sblog.h"
 

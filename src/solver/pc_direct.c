@@ -8,13 +8,6 @@
 */
 #include "solver_impl.h"
 
-PetscErrorCode SbSolverReproducible(PetscBool *reproducible)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionBool(&SbRunScope, "reproducible", reproducible));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbDirectPackage(MPI_Comm comm, PetscInt unknowns, PetscBool definite, const char **package)
 {
   const char *order[4];
@@ -24,7 +17,7 @@ PetscErrorCode SbDirectPackage(MPI_Comm comm, PetscInt unknowns, PetscBool defin
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(comm, &size));
-  PetscCall(SbSolverReproducible(&reproducible));
+  PetscCall(SbOptionBool(&SbRunScope, "reproducible", &reproducible));
   if (definite && (size == 1 || unknowns <= SB_DIRECT_SMALL)) order[n++] = MATSOLVERCHOLMOD;
   if (size == 1 || !reproducible) order[n++] = MATSOLVERMUMPS;
   if (definite) order[n++] = MATSOLVERCHOLMOD;
@@ -39,15 +32,26 @@ PetscErrorCode SbDirectPackage(MPI_Comm comm, PetscInt unknowns, PetscBool defin
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSolverSetDefault(const char *prefix, const char *key, const char *value)
+PetscErrorCode SbSolverSetDefaults(const char *prefix, const char *options, PetscBool clear)
 {
-  char name[128];
-  PetscBool given;
+  char **word;
+  int n;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(name, sizeof(name), "-%s%s", prefix, key));
-  PetscCall(PetscOptionsHasName(NULL, NULL, name, &given));
-  if (!given) PetscCall(PetscOptionsSetValue(NULL, name, value));
+  PetscCall(PetscStrToArray(options, ' ', &n, &word));
+  for (int k = 0; k < n; k++) {
+    const char *key = word[k] + 1, *value = "";
+    char name[128], there[128] = "";
+    PetscBool given;
+
+    if (k + 1 < n && word[k + 1][0] != '-') value = word[++k];
+    if (!strcmp(key, "ksp_type") || !strcmp(key, "pc_type")) continue;
+    PetscCall(PetscSNPrintf(name, sizeof(name), "-%s%s", prefix, key));
+    PetscCall(PetscOptionsGetString(NULL, NULL, name, there, sizeof(there), &given));
+    if (!clear && !given) PetscCall(PetscOptionsSetValue(NULL, name, value[0] ? value : NULL));
+    if (clear && given && !strcmp(there, value)) PetscCall(PetscOptionsClearValue(NULL, name));
+  }
+  PetscCall(PetscStrToArrayDestroy(n, word));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -73,15 +77,13 @@ PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric)
     PetscCall(
       PCSetApplicationContext(pc, (void *)(uintptr_t)package)); /* its options are set at the first set-up */
   }
-  /* MUMPS counts all negative pivots only if the last front is not distributed */
-  if (mumps) PetscCall(SbSolverSetDefault(prefix, "mat_mumps_icntl_13", "1"));
-  if (mumps) PetscCall(SbSolverSetDefault(prefix, "mat_mumps_icntl_14", "100"));
-  if (umfpack) PetscCall(SbSolverSetDefault(prefix, "mat_umfpack_ordering", "METIS"));
-  /* else CHOLMOD would factor small indefinite matrices, by L D L^T; a failure is the solver's reason */
-  if (!mumps && !umfpack) {
-    PetscCall(SbSolverSetDefault(prefix, "mat_cholmod_factor", "supernodal"));
-    PetscCall(SbSolverSetDefault(prefix, "mat_cholmod_print", "0"));
-  }
+  /* MUMPS counts all negative pivots only if the last front is not distributed; CHOLMOD otherwise factors
+     small indefinite matrices, by L D L^T, and a failure is the solver's reason */
+  PetscCall(SbSolverSetDefaults(prefix,
+                                mumps     ? "-mat_mumps_icntl_13 1 -mat_mumps_icntl_14 100"
+                                : umfpack ? "-mat_umfpack_ordering METIS"
+                                          : "-mat_cholmod_factor supernodal -mat_cholmod_print 0",
+                                PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

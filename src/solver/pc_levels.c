@@ -19,7 +19,6 @@
   piecewise H1 functions.
 */
 #include "pressure.h"
-#include "gauss_seidel.h"
 #include "solver_impl.h"
 
 /*
@@ -34,30 +33,28 @@
 /* Prescribes in `to` the components prescribed in `from`: at the same node, or all vertices of the face. */
 static PetscErrorCode fix_like(SbSpace from, SbSpace to)
 {
-  uint8_t *mark;
-  PetscReal *shared;
+  PetscReal *mark;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc2(to->nnode, &mark, 3 * to->nnode, &shared));
+  PetscCall(PetscCalloc1(3 * to->nnode, &mark));
   for (PetscInt i = 0; i < 4 * from->mesh->ncell; i++) {
     const PetscInt *node = to->cell_node + 4 * (i / 4), a = i % 4,
                    support = from->dirichlet_node ? from->dirichlet_node[i] : -1;
     const uint8_t fixed = from->fixed[support < 0 ? from->cell_node[i] : support];
+    const PetscBool face = (PetscBool)(SbSpaceCellElement(to, i / 4)->nodes_per[0] &&
+                                       !SbSpaceCellElement(from, i / 4)->nodes_per[0]);
 
-    if (!fixed) continue;
-    if (SbSpaceCellElement(to, i / 4)->nodes_per[0] && !SbSpaceCellElement(from, i / 4)->nodes_per[0]) {
-      for (PetscInt k = 1; k < 4; k++) mark[node[(a + k) % 4]] |= fixed;
-    } else
-      mark[node[a]] |= fixed;
+    for (PetscInt c = 0; c < 9 && fixed; c++) {
+      if (fixed & (1 << (c % 3))) mark[3 * node[face ? (a + 1 + c / 3) % 4 : a] + c % 3] = 1.;
+    }
   }
   /* owners know all cells of their nodes, and send the marks to the other ranks */
-  for (PetscInt i = 0; i < to->nnode_owned; i++) shared[3 * i] = mark[i];
-  PetscCall(SbSpaceUpdateGhosts(to, shared));
-  for (PetscInt i = 0; i < to->nnode; i++) {
-    if (shared[3 * i] > 0.) PetscCall(SbSpacePrescribe(to, i, (int)shared[3 * i]));
+  PetscCall(SbSpaceUpdateGhosts(to, mark));
+  for (PetscInt k = 0; k < 3 * to->nnode; k++) {
+    if (mark[k] > 0.) PetscCall(SbSpacePrescribe(to, k / 3, 1 << (k % 3)));
   }
   PetscCall(SbSpacePrescribeDone(to));
-  PetscCall(PetscFree2(mark, shared));
+  PetscCall(PetscFree(mark));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -220,21 +217,10 @@ PetscErrorCode SbLevelsApply(SbLevels v, Vec r, Vec z)
 
 /* ------------------------------------------------------------------ springs */
 
-PetscErrorCode SbLevelsAddSpring(SbLevels v, PetscInt node, PetscReal factor, const PetscReal block[9])
-{
-  PetscFunctionBeginUser;
-  if (v->multigrid || node >= v->space->nnode_owned) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!v->spring) PetscCall(PetscCalloc1(9 * (size_t)v->space->nnode_owned, &v->spring));
-  v->sprung = PETSC_TRUE;
-  for (int k = 0; k < 9; k++) v->spring[9 * node + k] += factor * block[k];
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbLevelsShareSprings(SbLevels v)
 {
   const SbSpace top = v->space;
   PetscBool any = v->sprung;
-  size_t size;
   SbSpace s, p;
 
   PetscFunctionBeginUser;
@@ -244,9 +230,8 @@ PetscErrorCode SbLevelsShareSprings(SbLevels v)
   s = v->at[v->n - 2];
   p = v->at[v->n - 1];
   /* the springs of all ranks at the nodes of at[n-2], ghosts included, one row of the blocks at a time */
-  size = 9 * (size_t)s->nnode;
-  if (!v->shared) PetscCall(PetscMalloc1(size, &v->shared));
-  PetscCall(PetscArrayzero(v->shared, size));
+  if (!v->shared) PetscCall(PetscMalloc1(9 * (size_t)s->nnode, &v->shared));
+  PetscCall(PetscArrayzero(v->shared, 9 * (size_t)s->nnode));
   for (PetscInt row = 0; row < 3; row++) {
     const PetscReal *x;
     PetscScalar *own;

@@ -18,14 +18,12 @@
 
 /* ------------------------------------------------------------------ B and its transpose */
 
-static void clear_fixed(SbSpace s, PetscInt nnode, PetscReal x[])
+static void clear_fixed(SbSpace s, PetscReal x[])
 {
-  for (PetscInt k = 0; k < s->nfixed && s->fixed_node[k] < nnode; k++) {
-    const PetscInt i = s->fixed_node[k];
+  for (PetscInt k = 0; k < 3 * s->nfixed && s->fixed_node[k / 3] < s->nnode_owned; k++) {
+    const PetscInt i = s->fixed_node[k / 3], c = k % 3;
 
-    for (PetscInt c = 0; c < 3; c++) {
-      if (s->fixed[i] & (1 << c)) x[3 * i + c] = 0.;
-    }
+    if (s->fixed[i] & (1 << c)) x[3 * i + c] = 0.;
   }
 }
 
@@ -40,7 +38,7 @@ static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar 
   PetscFunctionBeginUser;
   PetscCall(VecGetArray(op->u, &x));
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) x[i] = absolute ? PetscAbsScalar(u[i]) : u[i];
-  clear_fixed(s, s->nnode_owned, x);
+  clear_fixed(s, x);
   PetscCall(VecRestoreArray(op->u, &x));
   PetscCall(SbSpaceGetLocalRead(s, op->u, &local));
   /* d[ncell_owned] = B x of owned cells; x[nnode][3] with ghosts. */
@@ -101,7 +99,7 @@ PetscErrorCode SbPressureOperatorAddGradient(SbPressureOperator op, const PetscS
       sb_scatter_strain(s, region, b, force, f);
     }
   }
-  clear_fixed(s, s->nnode_owned, f);
+  clear_fixed(s, f);
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) y[i] += factor * f[i];
   PetscCall(SbSpaceRestoreLocalWrite(s, op->y, &f));
   PetscCall(VecRestoreArrayRead(local, &q));
@@ -181,9 +179,9 @@ static PetscErrorCode MatGetDiagonal_Pressure(Mat K, Vec D)
   PetscFunctionBeginUser;
   PetscCall(MatShellGetContext(K, &op));
   PetscCall(MatGetDiagonal(op->levels->A[0], D));
-  PetscCall(PetscCalloc1(3 * op->space->nnode, &y));
-  /* Adds the squares of the entries of B C^-1/2 at each node to y[nnode][3]; complete on owned nodes. */
   s = op->space;
+  PetscCall(PetscCalloc1(3 * s->nnode, &y));
+  /* Adds the squares of the entries of B C^-1/2 at each node to y[nnode][3]; complete on owned nodes. */
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
 
@@ -204,9 +202,9 @@ static PetscErrorCode MatGetDiagonal_Pressure(Mat K, Vec D)
       }
     }
   }
-  clear_fixed(op->space, op->space->nnode_owned, y);
+  clear_fixed(s, y);
   PetscCall(VecGetArray(D, &d));
-  for (PetscInt i = 0; i < 3 * op->space->nnode_owned; i++) d[i] += y[i];
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) d[i] += y[i];
   PetscCall(VecRestoreArray(D, &d));
   PetscCall(PetscFree(y));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -241,13 +239,19 @@ static PetscErrorCode assemble(Mat K, const SbStage *stage)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For the other levels: A[0] contains the spring already. */
 static PetscErrorCode add_spring(Mat K, PetscInt node, PetscReal factor, const PetscReal block[9])
 {
   SbPressureOperator op;
+  SbLevels v;
 
   PetscFunctionBeginUser;
   PetscCall(MatShellGetContext(K, &op));
-  PetscCall(SbLevelsAddSpring(op->levels, node, factor, block));
+  v = op->levels;
+  if (v->multigrid || node >= v->space->nnode_owned) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!v->spring) PetscCall(PetscCalloc1(9 * (size_t)v->space->nnode_owned, &v->spring));
+  v->sprung = PETSC_TRUE;
+  for (int k = 0; k < 9; k++) v->spring[9 * node + k] += factor * block[k];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -171,7 +171,6 @@ static PetscErrorCode PCSetUp_Rotated(PC pc)
     PetscCall(SbInterfaceCreate(s, &p->face));
     PetscCall(number_nodes(p));
     PetscCall(SbFactorCreate(p->n, p->nkeep, p->ia, p->ja, &p->factor));
-    PetscCall(SbExactNodesCreate(s, &p->exact));
     PetscCall(PetscMalloc3(9 * n, &p->turn, 9 * n, &p->turn0, n, &p->spread));
     PetscCall(PetscMalloc5(9 * n, &p->Q, 3 * n, &p->diagonal, 3 * n, &p->r, 3 * n, &p->r1, 3 * n, &p->z));
     PetscCall(
@@ -355,7 +354,7 @@ static PetscErrorCode PCDestroy_Rotated(PC pc)
   PetscCall(PCShellGetContext(pc, &p));
   PetscCall(SbInterfaceDestroy(&p->face));
   PetscCall(SbFactorDestroy(&p->factor));
-  if (p->node) PetscCall(SbExactNodesDestroy(&p->exact));
+  PetscCall(SbExactNodesDestroy(&p->exact));
   PetscCall(PetscFree2(p->node, p->local));
   PetscCall(PetscFree2(p->ia, p->ja));
   PetscCall(PetscFree(p->cells));
@@ -414,7 +413,7 @@ PetscErrorCode SbPCRotatedGetStats(PC pc, PetscInt *nfactor, PetscInt64 *interio
   if (p->factor) SbFactorSize(p->factor, &entries, &bytes);
   if (nfactor) *nfactor = p->nfactor;
   if (interior) *interior = 2 * bytes;
-  if (interface) *interface = p->face ? SbInterfaceBytes(p->face) : 0;
+  if (interface) *interface = p->face ? (PetscInt64)(sizeof(*p->face->word) * p->face->nword) : 0;
   if (nface) *nface = p->face ? p->face->n : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

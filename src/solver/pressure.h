@@ -35,9 +35,6 @@ struct _p_SbLevels {
 /* Collective. Prescribed unknowns must have been marked. Options read: -pressure_coarse_. */
 PetscErrorCode SbLevelsCreate(SbSpace space, SbLevels *levels);
 PetscErrorCode SbLevelsDestroy(SbLevels *levels);
-/* Adds factor times a block at an owned node, which A[0] contains already, to the other levels; a node of
-   another rank is ignored. Not collective. */
-PetscErrorCode SbLevelsAddSpring(SbLevels levels, PetscInt node, PetscReal factor, const PetscReal block[9]);
 /* Adds the springs of all ranks to the other matrices, before their final assembly. Collective. */
 PetscErrorCode SbLevelsShareSprings(SbLevels levels);
 /* After the final assembly. *positive = false: a diagonal block is not positive definite, and SbLevelsApply()

@@ -19,7 +19,7 @@ struct _p_SbInterface {
   PetscInt *mine;         /* [nmine] local nodes */
   PetscInt nblock, nrows; /* number of row blocks of W, of all ranks, of this one */
   struct _SbRows *rows;   /* [nrows] row blocks of this rank */
-  size_t nword;           /* number of words in use */
+  size_t nword;           /* number of words in use: this rank reads them in a solve */
   int32_t *word;          /* words, with room for reads beyond the last panel */
   float *scale;           /* [3 n][2] scales of the rows; the second ones are unused */
   float *sum, *y; /* [3 n] sum of the right-hand sides; own part of the solution; room for one block more */
@@ -38,8 +38,6 @@ PetscErrorCode SbInterfaceDestroy(SbInterface *face);
 PetscErrorCode SbInterfaceFactorise(SbInterface face, PetscInt64 work, PetscReal schur[], PetscBool *ok);
 /* x[3 n] <- inverse times the sum of x over ranks. Collective. */
 PetscErrorCode SbInterfaceSolve(SbInterface face, float x[]);
-/* Bytes of the factored inverse that this rank reads in a solve. Not collective. */
-PetscInt64 SbInterfaceBytes(SbInterface face);
 
 /* ------------------------------------------------------------------ nodes solved exactly */
 
@@ -61,9 +59,8 @@ typedef struct {
   SbFactor factor;
 } SbExactNodes;
 
-PetscErrorCode SbExactNodesCreate(SbSpace space, SbExactNodes *e);
 PetscErrorCode SbExactNodesDestroy(SbExactNodes *e);
-/* Chooses free nodes with a spread above `limit`, raised if they are too many, and factors. */
+/* Chooses, in e, which starts with {0}, free nodes with a spread above `limit`, raised if they are too many, and factors. */
 PetscErrorCode SbExactNodesSetUp(SbExactNodes *e, SbSpace space, Mat A, const PetscReal spread[],
                                  PetscReal limit);
 /* y = B r on the nodes, r -= A y, in place on r[nnode_owned][3]; to be called before P. */

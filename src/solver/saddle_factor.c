@@ -19,12 +19,6 @@
 #define DIRECT_STATIC 30000 /* static: largest number of unknowns that is factored; docs/reports/contact.md */
 #define DIRECT_DYNAMIC 1000
 
-struct _p_SbSaddleFactor {
-  PC pc;
-  PetscInt version, matrix; /* versions of the constraints and of K that were factored */
-  PCFailedReason failed;
-};
-
 PetscErrorCode SbSaddleChoose(SbSpace s, PetscBool dynamic, PetscInt choice, SbSaddle *saddle, char reason[],
                               size_t size)
 {
@@ -45,36 +39,19 @@ PetscErrorCode SbSaddleChoose(SbSpace s, PetscBool dynamic, PetscInt choice, SbS
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode destroy_factor(SbSaddleFactor *factored)
-{
-  SbSaddleFactor f = *factored;
-
-  PetscFunctionBeginUser;
-  PetscCall(PCDestroy(&f->pc));
-  PetscCall(PetscFree(*factored));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbSaddleFactorSolve(SbSpace s, Vec r, Vec z, PCFailedReason *failed)
 {
   const char *package;
   SbConstraints c = s->constraints;
-  SbSaddleFactor f;
   Mat A;
 
   PetscFunctionBeginUser;
-  if (!c->factored) {
-    PetscCall(PetscNew(&c->factored));
-    c->destroy_factored = destroy_factor;
-  }
-  f = c->factored;
-
   /* the factorisation of this K with these constraints is missing */
-  if (!f->pc || f->matrix != c->matrix || f->version != c->version) {
+  if (!c->factored || c->factored_matrix != c->matrix || c->factored_version != c->version) {
     PetscInt n, *node, *ia, *ja, *near, *far;
     PetscReal *block;
 
-    PetscCall(PCDestroy(&f->pc));
+    PetscCall(PCDestroy(&c->factored));
     PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, PETSC_FALSE, &package));
     /* the projected matrix as AIJ; MatConvert() would need parts of the block matrix that are in use */
     n = s->nnode_owned;
@@ -107,33 +84,23 @@ PetscErrorCode SbSaddleFactorSolve(SbSpace s, Vec r, Vec z, PCFailedReason *fail
     PetscCall(MatSetOption(A, MAT_SYMMETRIC, (PetscBool)!c->nonsymmetric));
     PetscCall(PetscFree2(ja, block));
     PetscCall(PetscFree4(node, ia, near, far));
-    PetscCall(PCCreate(s->comm, &f->pc));
-    PetscCall(PCSetOptionsPrefix(f->pc, "saddle_"));
-    PetscCall(PCSetOperators(f->pc, A, A));
+    PetscCall(PCCreate(s->comm, &c->factored));
+    PetscCall(PCSetOptionsPrefix(c->factored, "saddle_"));
+    PetscCall(PCSetOperators(c->factored, A, A));
     PetscCall(MatDestroy(&A)); /* the preconditioner keeps a reference */
-    PetscCall(SbPCDirectSet(f->pc, package, (PetscBool)!c->nonsymmetric));
-    PetscCall(PCSetFromOptions(f->pc));
-    PetscCall(SbPCCheckPivots(f->pc));
-    PetscCall(PCSetUp(f->pc));
-    PetscCall(PCGetFailedReason(f->pc, &f->failed));
-    f->matrix = c->matrix;
-    f->version = c->version;
+    PetscCall(SbPCDirectSet(c->factored, package, (PetscBool)!c->nonsymmetric));
+    PetscCall(PCSetFromOptions(c->factored));
+    PetscCall(SbPCCheckPivots(c->factored));
+    PetscCall(PCSetUp(c->factored));
+    PetscCall(PCGetFailedReason(c->factored, &c->failed));
+    c->factored_matrix = c->matrix;
+    c->factored_version = c->version;
   }
 
-  *failed = f->failed;
-  if (f->failed)
+  *failed = c->failed;
+  if (c->failed)
     PetscCall(VecSet(z, PETSC_INFINITY));
   else
-    PetscCall(PCApply(f->pc, r, z));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbSaddleFactorCountNegative(SbSpace s, PetscInt *negative)
-{
-  const SbSaddleFactor f = s->constraints->factored;
-
-  PetscFunctionBeginUser;
-  *negative = -1;
-  if (f && !f->failed) PetscCall(SbPCDirectCountNegative(f->pc, negative));
+    PetscCall(PCApply(c->factored, r, z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -44,63 +44,51 @@ static PetscErrorCode create_frames(SbSpace s, Mat *A)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The names are explained at the option below. */
 static const SbSolverPreset presets[] = {
-  {"cg", SB_MATRIX_BAIJ, "-ksp_type cg -pc_type none", .help = "conjugate gradients without preconditioner"},
-  {"cg_jacobi", SB_MATRIX_BAIJ, "-ksp_type cg -pc_type jacobi", .help = "CG, diagonal preconditioner"},
-  {"cg_pbjacobi", SB_MATRIX_BAIJ, "-ksp_type cg -pc_type pbjacobi", .help = "CG, 3x3 diagonal blocks"},
+  {"cg", SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type none"},
+  {"cg_jacobi", SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type jacobi"},
+  {"cg_pbjacobi", SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type pbjacobi"},
   {"cg_icc", SB_MATRIX_SBAIJ,
-   "-ksp_type cg -pc_type bjacobi -sub_pc_type icc -sub_pc_factor_shift_type positive_definite",
-   .help = "CG, incomplete Cholesky on each rank"},
-  {"cg_ssor", SB_MATRIX_AIJ, "-ksp_type cg -pc_type sor -pc_sor_local_symmetric",
-   .help = "CG, symmetric Gauss-Seidel on each rank"},
-  {"cg_two_level", SB_MATRIX_SBAIJ, "-ksp_type cg", .precondition = SbPCCoarseCreate,
-   .help =
-     "CG, incomplete Cholesky on each rank and the rigid-body modes of some hundred aggregates of nodes"},
-  {"cg_p_multigrid", SB_MATRIX_SBAIJ, "-ksp_type cg", .precondition = SbPCPMultigridCreate,
-   .help = "CG, Gauss-Seidel on P2 with P1 on the vertices below it: P2 bodies"},
-  {"cg_gamg", SB_MATRIX_AIJ, "-ksp_type cg -pc_type gamg",
-   .help = "CG, algebraic multigrid with the rigid-body modes of each body"},
+   .options = "-ksp_type cg -pc_type bjacobi -sub_pc_type icc -sub_pc_factor_shift_type positive_definite"},
+  {"cg_ssor", SB_MATRIX_AIJ, .options = "-ksp_type cg -pc_type sor -pc_sor_local_symmetric"},
+  {"cg_two_level", SB_MATRIX_SBAIJ, "-ksp_type cg", .precondition = SbPCCoarseCreate},
+  {"cg_p_multigrid", SB_MATRIX_SBAIJ, "-ksp_type cg", .precondition = SbPCPMultigridCreate},
+  {"cg_gamg", SB_MATRIX_AIJ, .options = "-ksp_type cg -pc_type gamg"},
   {"cg_hypre", SB_MATRIX_AIJ,
    "-ksp_type cg -pc_type hypre -pc_hypre_type boomeramg -pc_hypre_boomeramg_strong_threshold 0.5",
-   .package = "hypre", .help = "CG, BoomerAMG of hypre"},
+   .package = "hypre"},
+  /* these two are block Jacobi between ranks */
   {"gauss_seidel", SB_MATRIX_AIJ,
-   "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1 -ksp_max_it 100000",
-   .help = "Gauss-Seidel iteration (between ranks: block Jacobi)"},
+   .options = "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1 "
+              "-ksp_max_it 100000"},
   {"sor", SB_MATRIX_AIJ,
-   "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1.6 -ksp_max_it 100000",
-   .help = "successive over-relaxation, omega 1.6 (between ranks: block Jacobi)"},
-  {"cholmod", SB_MATRIX_AIJ, "-ksp_type cg", .package = MATSOLVERCHOLMOD, .direct = PETSC_TRUE,
-   .help = "sparse Cholesky of SuiteSparse, on one of the ranks"},
-  {"umfpack", SB_MATRIX_AIJ, "-ksp_type fgmres", .package = MATSOLVERUMFPACK, .direct = PETSC_TRUE,
-   .help = "sparse LU of SuiteSparse, on one of the ranks: takes indefinite tangents"},
-  {"mumps", SB_MATRIX_AIJ, "-ksp_type fgmres", .package = MATSOLVERMUMPS, .direct = PETSC_TRUE,
-   .help = "sparse factorisation of MUMPS on all ranks: takes indefinite tangents"},
-  {"rotated", SB_MATRIX_BAIJ, "-ksp_type cg", .precondition = SbPCRotatedCreate,
-   .help = "CG, one factorisation that is rotated with the nodes and seldom renewed: dynamic runs of up to "
-           "about 100k tets"},
+   .options = "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1.6 "
+              "-ksp_max_it 100000"},
+  {"cholmod", SB_MATRIX_AIJ, "-ksp_type cg", .package = MATSOLVERCHOLMOD, .direct = PETSC_TRUE},
+  {"umfpack", SB_MATRIX_AIJ, "-ksp_type fgmres", .package = MATSOLVERUMFPACK, .direct = PETSC_TRUE},
+  {"mumps", SB_MATRIX_AIJ, "-ksp_type fgmres", .package = MATSOLVERMUMPS, .direct = PETSC_TRUE},
+  {"rotated", SB_MATRIX_BAIJ, "-ksp_type cg", .precondition = SbPCRotatedCreate},
+  /* fastest with -snes_type ksponly and -ksp_rtol 1e-4 */
   {"realtime", SB_MATRIX_BAIJ, "-ksp_type cg -ksp_initial_guess_nonzero", .matrix_free = PETSC_TRUE,
-   .create = create_frames, .precondition = SbPCRotatedCreate,
-   .help = "the same without a matrix, warm-started: p1 and p2, linear, or corotated with "
-           "-body_<name>_tangent warped; fastest with -snes_type ksponly and -ksp_rtol 1e-4"},
+   .create = create_frames, .precondition = SbPCRotatedCreate},
   {"pressure", SB_MATRIX_BAIJ, "-ksp_type richardson -ksp_max_it 300", .create = SbPressureOperatorCreate,
-   .precondition = SbPCPressureCreate,
-   .help =
-     "GMRES with the pressures of the cells as unknowns and multigrid on P1: P2, CR and DG bodies at any "
-     "Poisson's ratio"},
+   .precondition = SbPCPressureCreate},
 };
 
 /* Matrix types and options for preconditioners of -pc_type. The last row: all others. */
 static const SbSolverPreset by_type[] = {
-  {PCNONE, SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type none"},
-  {PCJACOBI, SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type jacobi"},
-  {PCPBJACOBI, SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type pbjacobi"},
-  {PCICC, SB_MATRIX_SBAIJ, .options = "-ksp_type cg -pc_type icc"},
-  {PCBJACOBI, SB_MATRIX_AIJ,
-   .options = "-ksp_type cg -pc_type bjacobi -sub_pc_factor_shift_type positive_definite"},
-  {PCASM, SB_MATRIX_AIJ, .options = "-ksp_type cg -pc_type asm -sub_pc_factor_shift_type positive_definite"},
-  {PCSOR, SB_MATRIX_AIJ, .options = "-ksp_type cg -pc_type sor -pc_sor_local_symmetric"},
-  {PCHYPRE, SB_MATRIX_AIJ, .options = "-ksp_type cg -pc_type hypre", .package = "hypre"},
-  {"", SB_MATRIX_AIJ, .options = "-ksp_type cg"},
+  {PCNONE, SB_MATRIX_BAIJ, "-ksp_type cg -pc_type none", .by_type = PETSC_TRUE},
+  {PCJACOBI, SB_MATRIX_BAIJ, "-ksp_type cg -pc_type jacobi", .by_type = PETSC_TRUE},
+  {PCPBJACOBI, SB_MATRIX_BAIJ, "-ksp_type cg -pc_type pbjacobi", .by_type = PETSC_TRUE},
+  {PCICC, SB_MATRIX_SBAIJ, "-ksp_type cg -pc_type icc", .by_type = PETSC_TRUE},
+  {PCBJACOBI, SB_MATRIX_AIJ, "-ksp_type cg -pc_type bjacobi -sub_pc_factor_shift_type positive_definite",
+   .by_type = PETSC_TRUE},
+  {PCASM, SB_MATRIX_AIJ, "-ksp_type cg -pc_type asm -sub_pc_factor_shift_type positive_definite",
+   .by_type = PETSC_TRUE},
+  {PCSOR, SB_MATRIX_AIJ, "-ksp_type cg -pc_type sor -pc_sor_local_symmetric", .by_type = PETSC_TRUE},
+  {PCHYPRE, SB_MATRIX_AIJ, "-ksp_type cg -pc_type hypre", .package = "hypre", .by_type = PETSC_TRUE},
+  {"", SB_MATRIX_AIJ, "-ksp_type cg", .by_type = PETSC_TRUE},
 };
 
 static const SbOption rows[] = {
@@ -147,21 +135,6 @@ static const SbSolverPreset *find_preset(const char *name)
   return NULL;
 }
 
-/* Whether some law always uses its exact tangent, which is indefinite in compression, so that CHOLMOD fails.
-   Where Newton's method chooses the tangent (auto), such a failure makes it project the cells' tangents. */
-static PetscErrorCode may_be_indefinite(SbSpace s, PetscBool *maybe)
-{
-  PetscFunctionBeginUser;
-  *maybe = PETSC_FALSE;
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbMaterial m = s->region[r].material;
-
-    if (!m->linear && !m->adaptive && m->tangent == SB_TANGENT_EXACT) *maybe = PETSC_TRUE;
-  }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, maybe, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Value of an option in a preset's option string, "" if it has none. */
 static PetscErrorCode preset_value(const SbSolverPreset *preset, const char *name, size_t size, char value[])
 {
@@ -182,22 +155,27 @@ typedef struct {
   PetscReal sliver_part; /* fraction of tets with an angle below SB_SLIVER */
   PetscBool slivers;     /* sliver_part is above SLIVERS */
   PetscBool dg;          /* some element has its nodes in one cell only (DG) */
+  /* Some law always uses its exact tangent, which is indefinite in compression, so that CHOLMOD fails. Where
+     Newton's method chooses the tangent (auto), such a failure makes it project the cells' tangents. */
+  PetscBool indefinite;
 } Hardness;
 
 static PetscErrorCode find_hardness(SbSpace s, Hardness *h)
 {
-  PetscReal most[3] = {-1., -1., 0.};
+  PetscReal most[4] = {-1., -1., 0., 0.};
   PetscInt nsliver = 0, ncell = 0;
 
   PetscFunctionBeginUser;
   for (PetscInt r = 0; r < s->nregion; r++) {
     const PetscInt *per = s->region[r].element->nodes_per;
+    const SbMaterial m = s->region[r].material;
 
-    most[0] = PetscMax(most[0], s->region[r].material->nu);
-    if (!per[0]) most[1] = PetscMax(most[1], s->region[r].material->nu);
+    most[0] = PetscMax(most[0], m->nu);
+    if (!per[0]) most[1] = PetscMax(most[1], m->nu);
     if (per[3]) most[2] = 1.;
+    if (!m->linear && !m->adaptive && m->tangent == SB_TANGENT_EXACT) most[3] = 1.;
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most, 3, MPIU_REAL, MPI_MAX, s->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most, 4, MPIU_REAL, MPI_MAX, s->comm));
   for (PetscInt b = 0; b < s->mesh->nbody; b++) {
     nsliver += s->mesh->body[b].nsliver;
     ncell += s->mesh->body[b].ncell;
@@ -207,6 +185,7 @@ static PetscErrorCode find_hardness(SbSpace s, Hardness *h)
   h->sliver_part = (PetscReal)nsliver / (PetscReal)PetscMax(1, ncell);
   h->slivers = (PetscBool)(h->sliver_part >= SLIVERS);
   h->dg = (PetscBool)(most[2] > 0.);
+  h->indefinite = (PetscBool)(most[3] > 0.);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -248,15 +227,14 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   const char *name = choice, *package, *option = NULL;
   char method[SB_NAME_MAX] = "";
   PetscInt nface = 0, most = 0;
-  PetscBool indefinite, has = PETSC_TRUE, turns;
+  PetscBool has = PETSC_TRUE, turns;
   PetscMPIInt nrank;
   Hardness hard;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(s->comm, &nrank));
-  PetscCall(may_be_indefinite(s, &indefinite));
   PetscCall(find_hardness(s, &hard));
-  PetscCall(SbDirectPackage(s->comm, unknowns, (PetscBool)!indefinite, &package));
+  PetscCall(SbDirectPackage(s->comm, unknowns, (PetscBool)!hard.indefinite, &package));
   PetscCall(PetscOptionsGetString(NULL, NULL, "-ksp_type", method, sizeof(method), NULL));
   *preset = NULL;
   if (!explicit_run) PetscCall(find_type(choice, preset, &option));
@@ -288,7 +266,8 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
                "another solver, or auto");
     name = package;
     SbFormat(size, reason, "the factorisation for %" PetscInt_FMT " unknowns on %d rank%s%s", unknowns,
-             (int)nrank, nrank > 1 ? "s" : "", indefinite ? "; the exact tangent may be indefinite" : "");
+             (int)nrank, nrank > 1 ? "s" : "",
+             hard.indefinite ? "; the exact tangent may be indefinite" : "");
   } else if (strcmp(choice, "auto")) {
     SbFormat(size, reason, "chosen by -solver");
   } else if (turns) {
@@ -302,7 +281,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
              " unknowns: one factorisation, rotated with the nodes, serves many steps",
              unknowns);
   } else if (s->edge_node && !s->faces && hard.nu <= (hard.slivers ? NU_PRESSURE : NU_SLIVERS) &&
-             unknowns > (indefinite || hard.slivers ? SB_DIRECT_SMALL : P_MULTIGRID)) {
+             unknowns > (hard.indefinite || hard.slivers ? SB_DIRECT_SMALL : P_MULTIGRID)) {
     /* measured in docs/reports/solver_choice.md */
     name = "cg_p_multigrid";
     SbFormat(size, reason,
@@ -316,7 +295,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
     name = package;
     SbFormat(size, reason,
              "%" PetscInt_FMT " unknowns: a factorisation is fast and works at any Poisson's ratio%s",
-             unknowns, indefinite ? "; the exact tangent may be indefinite" : "");
+             unknowns, hard.indefinite ? "; the exact tangent may be indefinite" : "");
   } else if (!dynamic && package &&
              unknowns <= (hard.nu > NU_PRESSURE && hard.slivers               ? DIRECT_NEXT
                           : s->edge_node && !s->faces && hard.nu > NU_SLIVERS ? DIRECT_NEXT
@@ -376,16 +355,14 @@ PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscB
                 {"cg_gamg", PETSC_MAX_INT},
                 {"direct", PETSC_MAX_INT}};
   const SbSolverPreset *failed = *preset;
-  PetscBool indefinite;
   Hardness hard;
 
   PetscFunctionBeginUser;
   *preset = NULL;
   PetscCall(find_hardness(s, &hard));
   if (find_preset(failed->name) == failed) *tried |= 1U << (failed - presets);
-  PetscCall(may_be_indefinite(s, &indefinite));
   /* where the tangent may be indefinite, Newton's method changes it, and no other solver is tried */
-  if (indefinite && reason == KSP_DIVERGED_INDEFINITE_MAT) PetscFunctionReturn(PETSC_SUCCESS);
+  if (hard.indefinite && reason == KSP_DIVERGED_INDEFINITE_MAT) PetscFunctionReturn(PETSC_SUCCESS);
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(others) && !*preset; k++) {
     const PetscBool direct = (PetscBool)!strcmp(others[k].name, "direct");
 
@@ -394,52 +371,24 @@ PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscB
     if (!strcmp(others[k].name, "cg_gamg") && hard.face_nu > NU_PRESSURE) continue;
     /* a matrix that is singular for a factorisation is singular for iterations */
     if (failed->direct && !memory && !direct) continue;
-    /* The first listed fallback of a name that has not failed yet and supports this space; NULL: none. */
-    *preset = direct ? NULL : find_preset(others[k].name);
-    /* one for definite matrices, then one for indefinite ones, which stress or rounding may cause */
-    for (int j = indefinite; direct && j < 2 && !*preset; j++) {
-      const char *package;
+    /* one that has not failed yet; a factorisation for definite matrices, then one for indefinite ones, which
+       stress or rounding may cause */
+    for (int j = direct ? (int)hard.indefinite : 1; j < 2 && !*preset; j++) {
+      const char *name = others[k].name;
 
-      PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, (PetscBool)!j, &package));
-      if (package) *preset = find_preset(package);
+      if (direct) PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, (PetscBool)!j, &name));
+      if (name) *preset = find_preset(name);
       if (*preset && (*tried) & 1U << (*preset - presets)) *preset = NULL;
     }
-    if (*preset && (*tried) & 1U << (*preset - presets)) *preset = NULL;
     if (*preset && (*preset)->create && (!s->faces == !s->edge_node || s->constraints)) *preset = NULL;
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/*
-  Adds a preset's options to PETSc's database unless the user set them, or (clear) removes those whose values
-  are still the preset's. Types are set by calls, so that types in the database are always the user's.
-*/
-static PetscErrorCode set_options(const char *text, PetscBool clear)
-{
-  char **word;
-  int n;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscStrToArray(text, ' ', &n, &word));
-  for (int k = 0; k < n; k++) {
-    const char *name = word[k], *value = "";
-    char there[128] = "";
-    PetscBool given;
-
-    if (k + 1 < n && word[k + 1][0] != '-') value = word[++k];
-    if (!strcmp(name, "-ksp_type") || !strcmp(name, "-pc_type")) continue;
-    PetscCall(PetscOptionsGetString(NULL, NULL, name, there, sizeof(there), &given));
-    if (!clear && !given) PetscCall(PetscOptionsSetValue(NULL, name, value[0] ? value : NULL));
-    if (clear && given && !strcmp(there, value)) PetscCall(PetscOptionsClearValue(NULL, name));
-  }
-  PetscCall(PetscStrToArrayDestroy(n, word));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbSolverClear(const SbSolverPreset *preset)
 {
   PetscFunctionBeginUser;
-  PetscCall(set_options(preset->options, PETSC_TRUE));
+  PetscCall(SbSolverSetDefaults("", preset->options, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -466,13 +415,14 @@ static PetscErrorCode choose_package(SbSpace s, PC pc, const char *type)
 {
   const PetscBool lu = (PetscBool)!strcmp(type, PCLU);
   const char *package;
-  PetscBool indefinite, has;
   PetscMPIInt size;
+  PetscBool has;
+  Hardness hard;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(s->comm, &size));
-  PetscCall(may_be_indefinite(s, &indefinite));
-  PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, (PetscBool)(!lu && !indefinite), &package));
+  PetscCall(find_hardness(s, &hard));
+  PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, (PetscBool)(!lu && !hard.indefinite), &package));
   if (size > 1) {
     /* on several ranks, MUMPS for any other matrix type */
     package = MATSOLVERMUMPS;
@@ -484,10 +434,10 @@ static PetscErrorCode choose_package(SbSpace s, PC pc, const char *type)
     package = NULL;
   if (package) PetscCall(PCFactorSetMatSolverType(pc, package));
   if (package && !strcmp(package, MATSOLVERMUMPS))
-    PetscCall(set_options("-mat_mumps_icntl_13 1 -mat_mumps_icntl_14 100", PETSC_FALSE));
+    PetscCall(SbSolverSetDefaults("", "-mat_mumps_icntl_13 1 -mat_mumps_icntl_14 100", PETSC_FALSE));
   /* a non-positive pivot appears as a reason of the solve, not as an error */
   if (package && !strcmp(package, MATSOLVERCHOLMOD))
-    PetscCall(set_options("-mat_cholmod_print 0", PETSC_FALSE));
+    PetscCall(SbSolverSetDefaults("", "-mat_cholmod_print 0", PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -510,10 +460,10 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
 
   PetscFunctionBeginUser;
   /* algebraic multigrid sums its coarse matrices in the order in which messages arrive */
-  PetscCall(SbSolverReproducible(&reproducible));
+  PetscCall(SbOptionBool(&SbRunScope, "reproducible", &reproducible));
   PetscCallMPI(MPI_Comm_size(s->comm, &size));
   if (reproducible && size > 1)
-    PetscCall(set_options("-matptap_via allatonce -matstash_reproduce yes", PETSC_FALSE));
+    PetscCall(SbSolverSetDefaults("", "-matptap_via allatonce -matstash_reproduce yes", PETSC_FALSE));
   PetscCall(SNESGetKSP(snes, &ksp));
   if (s->constraints && s->constraints->general) { /* each solver starts from the original method */
     PetscCall(KSPSetNormType(ksp, s->constraints->norm));
@@ -521,10 +471,9 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
     s->constraints->general = PETSC_FALSE;
   }
   PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(KSPSetTolerances(ksp, 1e-8, PETSC_DEFAULT, PETSC_DEFAULT, 5000));
   /* the residual norm of CG in a null space may grow far before it decreases */
-  if (SbConstraintsSeparate(s))
-    PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, PETSC_DEFAULT, 1e10, PETSC_DEFAULT));
+  PetscCall(
+    KSPSetTolerances(ksp, 1e-8, PETSC_DEFAULT, SbConstraintsSeparate(s) ? 1e10 : PETSC_DEFAULT, 5000));
   PetscCall(SbPCConstrainedCreate(s, pc, &pc));
   /* the preset's types, or those of the user */
   PetscCall(preset_value(preset, "-ksp_type", sizeof(method), method));
@@ -535,13 +484,15 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   PetscCall(is_symmetric(ksp, &symmetric));
   if (type[0]) PetscCall(PCSetType(pc, type));
   /* variants that keep the preconditioner symmetric */
-  if (symmetric && !strcmp(type, PCASM)) PetscCall(set_options("-pc_asm_type basic", PETSC_FALSE));
+  if (symmetric && !strcmp(type, PCASM))
+    PetscCall(SbSolverSetDefaults("", "-pc_asm_type basic", PETSC_FALSE));
   if (symmetric && !strcmp(type, PCCOMPOSITE))
-    PetscCall(set_options("-sub_0_pc_sor_local_symmetric", PETSC_FALSE));
+    PetscCall(SbSolverSetDefaults("", "-sub_0_pc_sor_local_symmetric", PETSC_FALSE));
   /* PETSc keeps the eigenvalue estimate of the first matrix, too small once contact stiffness is added */
   PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &given));
-  if (!given && !strcmp(type, PCGAMG)) PetscCall(set_options("-pc_gamg_use_sa_esteig no", PETSC_FALSE));
-  PetscCall(set_options(preset->options, PETSC_FALSE));
+  if (!given && !strcmp(type, PCGAMG))
+    PetscCall(SbSolverSetDefaults("", "-pc_gamg_use_sa_esteig no", PETSC_FALSE));
+  PetscCall(SbSolverSetDefaults("", preset->options, PETSC_FALSE));
   if (!strcmp(type, PCLU) || !strcmp(type, PCCHOLESKY)) PetscCall(choose_package(s, pc, type));
   if (preset->direct) PetscCall(SbPCDirectSet(pc, preset->package, PETSC_TRUE));
   if (preset->precondition) PetscCall(preset->precondition(s, pc));
@@ -594,7 +545,7 @@ static PetscErrorCode check_factor(PC pc, Mat A)
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)pc), &size));
-  PetscCall(SbSolverReproducible(&reproducible));
+  PetscCall(SbOptionBool(&SbRunScope, "reproducible", &reproducible));
   PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &distributed, PCLU, PCCHOLESKY, ""));
   PetscCheck(!reproducible || size == 1 || !distributed, PetscObjectComm((PetscObject)pc), PETSC_ERR_USER,
              "-reproducible: a factorisation on %d ranks has other last digits in each run; choose -solver "
@@ -690,7 +641,6 @@ PetscErrorCode SbSolverFinish(SNES snes, SbSpace s, const SbSolverPreset *preset
 PetscErrorCode SbSolverDescribe(SNES snes, SbSpace s, size_t size, char text[])
 {
   MatSolverType package = NULL;
-  PetscBool shell, factor;
   KSPType method;
   const char *name, *gathered;
   KSP ksp;
@@ -703,10 +653,9 @@ PetscErrorCode SbSolverDescribe(SNES snes, SbSpace s, size_t size, char text[])
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(SbPCConstrainedGetInner(pc, &pc));
   PetscCall(PCGetType(pc, &name));
-  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCSHELL, &shell));
-  if (shell) PetscCall(PCShellGetName(pc, &name));
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &factor, PCLU, PCCHOLESKY, ""));
-  if (factor) PetscCall(PCFactorGetMatSolverType(pc, &package));
+  if (name && (!strcmp(name, PCLU) || !strcmp(name, PCCHOLESKY)))
+    PetscCall(PCFactorGetMatSolverType(pc, &package));
+  if (name && !strcmp(name, PCSHELL)) PetscCall(PCShellGetName(pc, &name));
   PetscCall(SbPCDirectGathered(pc, &gathered));
   if (gathered) {
     name = strcmp(gathered, MATSOLVERCHOLMOD) ? PCLU : PCCHOLESKY;
@@ -733,19 +682,15 @@ PetscErrorCode SbSolverChooseIndefinite(MPI_Comm comm, size_t size, char choice[
 
 PetscErrorCode SbSolverCountNegativeEigenvalues(SNES snes, SbSpace s, PetscInt *negative)
 {
-  PetscBool saddle;
   KSP ksp;
   PC pc;
 
   PetscFunctionBeginUser;
+  *negative = -1;
   PetscCall(SNESGetKSP(snes, &ksp));
   PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(SbPCConstrainedIsFactored(pc, &saddle));
-  if (saddle)
-    PetscCall(SbSaddleFactorCountNegative(s, negative));
-  else {
-    PetscCall(SbPCConstrainedGetInner(pc, &pc));
-    PetscCall(SbPCDirectCountNegative(pc, negative));
-  }
+  PetscCall(SbPCConstrainedGetInner(pc, &pc));
+  if (SbConstraintsFactored(s)) pc = s->constraints->failed ? NULL : s->constraints->factored;
+  if (pc) PetscCall(SbPCDirectCountNegative(pc, negative));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

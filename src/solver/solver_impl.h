@@ -68,14 +68,24 @@ PetscErrorCode SbPCPressureCreate(SbSpace space, PC pc);
   Output: failed, the reason of a failed factorisation; z is NaN then.
 */
 PetscErrorCode SbSaddleFactorSolve(SbSpace space, Vec r, Vec z, PCFailedReason *failed);
-/* Its negative eigenvalues of K + F^T k G in the constraints' null space, -1: unknown. Collective. */
-PetscErrorCode SbSaddleFactorCountNegative(SbSpace space, PetscInt *negative);
 
-/* Sets -<prefix><key> in PETSc's database unless the user has. Not collective. */
-PetscErrorCode SbSolverSetDefault(const char *prefix, const char *key, const char *value);
-
-/* -reproducible: runs on the same number of ranks are bitwise equal. Not collective. */
-PetscErrorCode SbSolverReproducible(PetscBool *reproducible);
+/* Adds options, such as "-key value", with a prefix to PETSc's database unless the user set them, or (clear)
+   removes those whose values are still the same. -ksp_type and -pc_type are skipped: they are set by calls,
+   so that types in the database are always the user's. Not collective. */
+PetscErrorCode SbSolverSetDefaults(const char *prefix, const char *options, PetscBool clear);
 
 /* The context of a PCSHELL with this name, NULL for any other pc. Not collective. */
 PetscErrorCode SbPCShellFind(PC pc, const char *name, void *context);
+
+/* ------------------------------------------------------------------ sweeps of Gauss-Seidel */
+
+/* inverse[n][9]: inverse diagonal blocks of a matrix with the fast product, n own nodes. extra[n][3] (output;
+   NULL: none): l1 terms, added to the diagonal, with which sweeps converge on several ranks. Zero and
+   *positive = false where a determinant is not positive on this rank. Not collective. */
+PetscErrorCode SbGaussSeidelSetUp(Mat A, PetscReal inverse[], PetscReal extra[], PetscBool *positive);
+/* z = (D + L^T)^-1 r, D and L of this rank's part, and t = r - A z. r differs from z and t. Collective. */
+PetscErrorCode SbGaussSeidelDown(Mat A, const PetscReal inverse[], const PetscReal extra[], Vec r, Vec z,
+                                 Vec t);
+/* z += (D + L)^-1 (r - A z); t is work space. Collective. */
+PetscErrorCode SbGaussSeidelUp(Mat A, const PetscReal inverse[], const PetscReal extra[], Vec r, Vec z,
+                               Vec t);

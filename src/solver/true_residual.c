@@ -53,18 +53,17 @@ static PetscErrorCode check_residual(KSP ksp, Vec b, Vec x, void *early)
 
 PetscErrorCode SbKSPCheckTrueResidual(KSP ksp, PetscBool direct, PetscBool alone)
 {
-  PetscBool single;
+  PetscBool always;
   KSPNormType norm;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPPREONLY, &single));
+  PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPPREONLY, &always));
   PetscCall(KSPGetNormType(ksp, &norm));
   /* inside Newton's method no check: its next residual is a better test than norms of different scale */
-  if (single || (direct && norm == KSP_NORM_UNPRECONDITIONED) ||
+  if ((direct && norm == KSP_NORM_UNPRECONDITIONED) ||
       (alone && (norm == KSP_NORM_PRECONDITIONED || norm == KSP_NORM_NATURAL)))
-    PetscCall(KSPSetPostSolve(ksp, check_residual, NULL));
-  else if (alone)
-    PetscCall(KSPSetPostSolve(ksp, check_residual, ksp));
+    always = PETSC_TRUE;
+  if (always || alone) PetscCall(KSPSetPostSolve(ksp, check_residual, always ? NULL : ksp));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -536,7 +536,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
   /* PETSc's options may have changed the preset */
   if (!explicit) {
     PetscCall(SbSolverDescribe(run->snes, s, sizeof(run->solver_parts), run->solver_parts));
-    if (!run->solver_used->help ||
+    if (run->solver_used->by_type ||
         (run->solver_used->direct && !strstr(run->solver_parts, run->solver_used->package)))
       PetscCall(PetscStrncpy(run->solver, run->solver_parts, sizeof(run->solver)));
   }

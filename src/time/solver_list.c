@@ -165,7 +165,7 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
   SbSolverList l = (SbSolverList)ctx;
   SbRun run = l->run;
   const SbSolverPreset *next = run->solver_used;
-  PetscBool memory, simpler = PETSC_FALSE, minres, newton, factored;
+  PetscBool memory, simpler = PETSC_FALSE, minres, newton;
   KSPConvergedReason reason;
   char text[192], motion[256];
   PetscInt body = -1;
@@ -201,9 +201,9 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
   PetscCall(PetscObjectTypeCompareAny((PetscObject)run->snes, &newton, SB_SNES_NEWTON, SNESNEWTONLS,
                                       SNESKSPONLY, ""));
   PetscCall(SNESGetSolution(run->snes, &X));
-  PetscCall(SbPCConstrainedIsFactored(ksp->pc, &factored));
   PetscCall(VecNorm(b, NORM_2, &size));
-  if (!l->own || !newton || !X || factored || PetscIsInfOrNanReal(size)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!l->own || !newton || !X || SbConstraintsFactored(run->model->space) || PetscIsInfOrNanReal(size))
+    PetscFunctionReturn(PETSC_SUCCESS);
   /* a static system with a free motion is singular for every solver */
   if (!run->model->dynamic) PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion, NULL));
   if (body >= 0) PetscFunctionReturn(PETSC_SUCCESS);

@@ -31,7 +31,7 @@ static void apply(SbExactNodes *e, PetscInt n, const float r[], float work[], fl
 int main(int argc, char **argv)
 {
   TestScene t;
-  SbExactNodes e;
+  SbExactNodes e = {0};
   SbSpace s;
   PetscReal *spread, worst = 0., products[2] = {0., 0.};
   PetscInt n, wrong = 0, total;
@@ -53,7 +53,6 @@ int main(int argc, char **argv)
     r[i] = sinf((float)(i + 1));
     r2[i] = cosf((float)(3 * i));
   }
-  PetscCall(SbExactNodesCreate(s, &e));
   PetscCall(SbExactNodesSetUp(&e, s, A, spread, 2.));
   SB_CHECK(e.n == 0, "%" PetscInt_FMT " nodes above a limit that none reaches", e.n);
   apply(&e, n, r, w, z);
