@@ -52,14 +52,12 @@ PetscErrorCode SbAdaptiveToleranceSetFromOptions(SbLedger l)
 PetscErrorCode SbAdaptiveToleranceSet(SbLedger l, PetscReal rtol)
 {
   const SNES snes = l->run->snes;
-  PetscBool single;
   KSP ksp;
 
   PetscFunctionBeginUser;
   l->rtol = PetscMax(TIGHTEST, PetscMin(LOOSEST, rtol));
-  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &single));
   PetscCall(SNESGetKSP(snes, &ksp));
-  if (single)
+  if (l->run->single)
     PetscCall(KSPSetTolerances(ksp, l->rtol, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
   else
     PetscCall(SNESSetTolerances(snes, PETSC_DEFAULT, l->rtol, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));

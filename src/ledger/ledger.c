@@ -107,12 +107,10 @@ static PetscErrorCode examine_step(SbRun run, const SbSolvedStep *step, void *ct
 
   /* norm of the last residual, N, known from the solver without an evaluation */
   if (step->solved) {
-    PetscBool single;
     KSP ksp;
 
-    PetscCall(PetscObjectTypeCompare((PetscObject)run->snes, SNESKSPONLY, &single));
     PetscCall(SNESGetKSP(run->snes, &ksp));
-    if (single)
+    if (run->single)
       PetscCall(KSPGetResidualNorm(ksp, &l->residual));
     else
       PetscCall(SNESGetFunctionNorm(run->snes, &l->residual));

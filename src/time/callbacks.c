@@ -101,18 +101,15 @@ PetscErrorCode SbFormStaticJacobian(SNES snes, Vec U, Mat J, Mat P, void *ctx)
 
 PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A)
 {
-  SbSpace s = run->model->space;
-  PetscScalar *a;
-
   PetscFunctionBeginUser;
   PetscCall(SbModelResidual(run->model, t, U, V, NULL, PETSC_TRUE, A));
-  if (s->consistent_mass) {
+  if (run->model->space->consistent_mass) {
     Mat M;
     KSP ksp;
     PC pc;
 
     /* with the consistent mass the system is solved by CG to rounding; the lumped mass is a division */
-    PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_BAIJ, &M));
+    PetscCall(SbSpaceCreateMatrix(run->model->space, SB_MATRIX_BAIJ, &M));
     PetscCall(SbModelTangent(run->model, 0., 0., 1., 0., run->U, run->V, M));
     PetscCall(KSPCreate(run->model->comm, &ksp));
     PetscCall(KSPSetOptionsPrefix(ksp, "mass_"));
@@ -124,13 +121,8 @@ PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A)
     PetscCall(KSPSolve(ksp, A, A));
     PetscCall(KSPDestroy(&ksp));
     PetscCall(MatDestroy(&M));
-  } else {
-    PetscCall(VecGetArray(A, &a));
-    /* supports have no mass, and are prescribed */
-    for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
-      a[i] = s->node_mass[i / 3] > 0. ? a[i] / s->node_mass[i / 3] : 0.;
-    PetscCall(VecRestoreArray(A, &a));
-  }
+  } else
+    PetscCall(VecPointwiseDivide(A, A, run->mass));
   PetscCall(VecScale(A, -1.));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -93,8 +93,8 @@ PetscErrorCode SbTimeRegister(void)
   PetscFunctionBeginUser;
   PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
   PetscCall(SbSolverRegister());
-  PetscCall(SbSecondOrderRegister());
-  PetscCall(SbNewtonRegister());
+  PetscCall(TSRegister(SB_TS_SECOND_ORDER, SbSecondOrderCreate));
+  PetscCall(SNESRegister(SB_SNES_NEWTON, SbNewtonCreate));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -278,6 +278,7 @@ static PetscErrorCode set_up_snes(SbRun run)
     PetscCall(TSSetFromOptions(run->ts));
   else
     PetscCall(SNESSetFromOptions(snes));
+  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &run->single));
   PetscCall(SbSolverFinish(snes, m->space, run->solver_used, run->J));
   PetscCall(SbNewtonSetRun(snes, run));
 
@@ -464,13 +465,18 @@ PetscErrorCode SbRunSetUp(SbRun run)
   const SbModel m = run->model;
   const PetscBool explicit = SbRunIsExplicit(run);
   const SbSpace s = m->space;
-  PetscBool single, warped = PETSC_FALSE;
+  PetscBool warped = PETSC_FALSE;
+  PetscScalar *mass;
   char reason[128];
 
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < m->nbody; b++) {
     if (s->alpha[b] != 0. || s->beta[b] != 0.) run->damped = m->dynamic;
   }
+  PetscCall(SbSpaceCreateVec(s, &run->mass));
+  PetscCall(VecGetArrayWrite(run->mass, &mass));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) mass[i] = s->node_mass[i / 3];
+  PetscCall(VecRestoreArrayWrite(run->mass, &mass));
   PetscCall(SbSpaceCreateVec(s, &run->U));
   if (m->dynamic) {
     PetscCall(SbSpaceCreateVec(s, &run->V));
@@ -543,11 +549,10 @@ PetscErrorCode SbRunSetUp(SbRun run)
 
   /* one solve per step, with a tangent maybe too soft: no bound on the energy (docs/reference/theory.md) */
   if (run->velocity_predictor && !m->linear && run->snes) {
-    PetscCall(PetscObjectTypeCompare((PetscObject)run->snes, SNESKSPONLY, &single));
     for (PetscInt r = 0; r < s->nregion; r++)
       warped = (PetscBool)(warped || s->region[r].material->tangent == SB_TANGENT_WARPED);
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &warped, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
-    if (single && warped)
+    if (run->single && warped)
       PetscCall(SbWarning(
         s->comm, "-snes_type ksponly with -time_predictor velocity and a warped tangent may gain energy "
                  "without bound: give -body_<name>_tangent exact_spd, or leave the predictor out"));
@@ -618,8 +623,9 @@ PetscErrorCode SbRunSolve(SbRun run)
 PetscErrorCode SbRunDestroy(SbRun *run)
 {
   SbRun r = *run;
-  Vec *const vectors[] = {&r->R, &r->nonsymmetric.U, &r->nonsymmetric.x, &r->nonsymmetric.y, &r->U,   &r->V,
-                          &r->A, &r->loads,          &r->reaction,       &r->previous,       &r->path};
+  Vec *const vectors[] = {
+    &r->R, &r->nonsymmetric.U, &r->nonsymmetric.x, &r->nonsymmetric.y, &r->U,    &r->V,
+    &r->A, &r->loads,          &r->reaction,       &r->previous,       &r->path, &r->mass};
 
   PetscFunctionBeginUser;
   if (!r) PetscFunctionReturn(PETSC_SUCCESS);

@@ -130,55 +130,36 @@ static PetscErrorCode SNESTSFormJacobian_SecondOrder(SNES snes, Vec X, Mat J, Ma
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets X1 to the initial guess, with the prescribed values of the end time. */
+/* Sets X1 to the initial guess, with the prescribed values of the end time; explicit: to the solution. */
 static PetscErrorCode predict(void *ctx)
 {
   const TS ts = (TS)ctx;
   SecondOrder *so = (SecondOrder *)ts->data;
-  PetscBool single, warm;
+  const SbRun run = so->run;
+  const PetscReal h = ts->time_step;
+  PetscBool warm;
   KSP ksp;
 
   PetscFunctionBeginUser;
-  if (!ts->usessnes) PetscFunctionReturn(PETSC_SUCCESS); /* explicit */
+  if (!ts->usessnes) {
+    PetscCall(VecWAXPY(so->V1, h, run->A, so->V0));
+    PetscCall(VecWAXPY(so->X1, h, so->set.method == SB_METHOD_EULER_EXPLICIT ? so->V0 : so->V1, so->X0));
+    PetscCall(SbModelPrescribe(run->model, ts->ptime + h, so->X1));
+    PetscCall(SbFormAcceleration(run, ts->ptime + h, so->X1, so->V1, so->A1));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(VecCopy(so->X0, so->X1));
-  if (so->run->velocity_predictor) PetscCall(VecAXPY(so->X1, ts->time_step, so->V0));
-  PetscCall(SbModelPrescribe(so->run->model, ts->ptime + ts->time_step, so->X1));
+  if (run->velocity_predictor) PetscCall(VecAXPY(so->X1, h, so->V0));
+  PetscCall(SbModelPrescribe(run->model, ts->ptime + h, so->X1));
   /* one linear solve per step: the update (X <- X - Y) has free flight as initial guess */
-  PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, SNESKSPONLY, &single));
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(KSPGetInitialGuessNonzero(ksp, &warm));
-  if (single && warm) {
+  if (run->single && warm) {
     Vec Y;
 
     PetscCall(SNESGetSolutionUpdate(ts->snes, &Y));
-    if (Y) PetscCall(VecAXPBY(Y, so->run->velocity_predictor ? 0. : -ts->time_step, 0., so->V0));
+    if (Y) PetscCall(VecAXPBY(Y, run->velocity_predictor ? 0. : -h, 0., so->V0));
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Solves for the end displacement X, which holds the initial guess; the explicit methods need no solver. */
-static PetscErrorCode solve(void *ctx, Vec X, SNESConvergedReason *reason)
-{
-  const TS ts = (TS)ctx;
-  SecondOrder *so = (SecondOrder *)ts->data;
-  const PetscReal h = ts->time_step;
-  PetscInt newton, linear;
-
-  PetscFunctionBeginUser;
-  if (!ts->usessnes) {
-    PetscCall(VecWAXPY(so->V1, h, so->run->A, so->V0));
-    PetscCall(VecWAXPY(X, h, so->set.method == SB_METHOD_EULER_EXPLICIT ? so->V0 : so->V1, so->X0));
-    PetscCall(SbModelPrescribe(so->run->model, ts->ptime + h, X));
-    PetscCall(SbFormAcceleration(so->run, ts->ptime + h, X, so->V1, so->A1));
-    *reason = SNES_CONVERGED_ITS;
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(SNESSolve(ts->snes, NULL, X));
-  PetscCall(SNESGetConvergedReason(ts->snes, reason));
-  PetscCall(SNESGetIterationNumber(ts->snes, &newton));
-  PetscCall(SNESGetLinearSolveIterations(ts->snes, &linear));
-  ts->snes_its += newton;
-  ts->ksp_its += linear;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -209,7 +190,6 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
   const TS ts = (TS)ctx;
   SecondOrder *so = (SecondOrder *)ts->data;
   const SbRun run = so->run;
-  const SbSpace s = run->model->space;
   const PetscReal h = ts->time_step;
   PetscReal size;
 
@@ -218,15 +198,10 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
   PetscCall(VecNorm(ts->usessnes ? so->V1 : so->A1, NORM_INFINITY, &size));
   *ok = (PetscBool)(reason > 0 && !PetscIsInfOrNanReal(size));
   if (*ok && so->set.separate) {
-    PetscScalar *push;
-
     /* barrier contact: adds its impulse to the velocity, and removes it from the acceleration */
     PetscCall(VecZeroEntries(so->work));
     PetscCall(SbModelPotentialGradient(run->model, so->X1, -1., PETSC_TRUE, NULL, so->work));
-    PetscCall(VecGetArray(so->work, &push));
-    for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
-      push[i] = s->node_mass[i / 3] > 0. ? push[i] / s->node_mass[i / 3] : 0.;
-    PetscCall(VecRestoreArray(so->work, &push));
+    PetscCall(VecPointwiseDivide(so->work, so->work, run->mass));
     PetscCall(VecAXPY(so->A1, -0.5 / so->set.beta, so->work));
     PetscCall(VecWAXPY(so->V1, h, so->work, so->V0));
     PetscCall(VecAXPY(so->V1, h * (1. - so->set.gamma), run->A));
@@ -281,8 +256,8 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
   run->stage_start = so->X0;
   run->stage_part = so->set.alpha_f;
   for (;;) {
-    const SbAttempt attempt = {ts->ptime, ts->time_step,    so->X0,   so->X1, predict,
-                               solve,     contact_residual, complete, ts};
+    const SbAttempt attempt = {ts->ptime, ts->time_step,    so->X0,   so->X1,
+                               predict,   contact_residual, complete, ts};
     PetscBool ok = PETSC_FALSE, accept = PETSC_FALSE, fixed;
     PetscReal next, h;
 
@@ -290,6 +265,8 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     run->may_end_at_impact = (PetscBool)(run->model->ntime_of_impact && !cuts && so->whole == 0.);
     run->time_of_impact = 1.;
     PetscCall(SbRunAttempt(run, &attempt, &ok));
+    ts->snes_its = run->newton_total - run->newton_before + run->newton_step;
+    ts->ksp_its = run->linear_total - run->linear_before + run->linear_step;
     if (ok) {
       PetscCall(VecCopy(so->X1, ts->vec_sol));
       PetscCall(VecCopy(so->V1, ts->vec_dot));
@@ -428,7 +405,7 @@ void SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings)
   ts->usessnes = (PetscBool)!SbRunIsExplicit(run);
 }
 
-static PetscErrorCode TSCreate_SecondOrder(TS ts)
+PetscErrorCode SbSecondOrderCreate(TS ts)
 {
   SecondOrder *so;
 
@@ -445,12 +422,5 @@ static PetscErrorCode TSCreate_SecondOrder(TS ts)
   ts->ops->snesjacobian = SNESTSFormJacobian_SecondOrder;
   ts->default_adapt_type = TSADAPTNONE;
   ts->usessnes = PETSC_TRUE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbSecondOrderRegister(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(TSRegister(SB_TS_SECOND_ORDER, TSCreate_SecondOrder));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -26,7 +26,7 @@ static inline PetscBool SbRunIsExplicit(SbRun run)
   return (PetscBool)(run->preset == SB_TIME_EULER_EXPLICIT || run->preset == SB_TIME_EULER_SYMPLECTIC);
 }
 
-PetscErrorCode SbSecondOrderRegister(void);
+PetscErrorCode SbSecondOrderCreate(TS ts);
 /* run: source of prescribed displacements, initial acceleration and lumped mass; borrowed. */
 void SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings);
 
@@ -34,8 +34,7 @@ void SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings);
 typedef struct {
   PetscReal t, dt;                      /* start and length, s */
   Vec U0, U;                            /* displacements at the start; at the end, once solved, m */
-  PetscErrorCode (*predict)(void *ctx); /* sets U to an initial guess with the prescribed values */
-  PetscErrorCode (*solve)(void *ctx, Vec U, SNESConvergedReason *reason); /* solves from the guess in U */
+  PetscErrorCode (*predict)(void *ctx); /* U: a guess with the prescribed values; explicit: the solution */
   PetscErrorCode (*residual)(void *ctx, Vec U, Vec R); /* residual without constraints, N; for contact */
   /* computes the end state from U, in `step`; if not ok run->stop_reason is the reason */
   PetscErrorCode (*complete)(void *ctx, SNESConvergedReason reason, SbSolvedStep *step, PetscBool *ok);
@@ -53,7 +52,7 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
 PetscErrorCode SbRunAfterStep(TS ts);
 /* newton.c: Newton's method as a minimisation, a SNESType. SetRun after SNESSetType(); run is borrowed. */
 #define SB_SNES_NEWTON "newton"
-PetscErrorCode SbNewtonRegister(void);
+PetscErrorCode SbNewtonCreate(SNES snes);
 PetscErrorCode SbNewtonSetRun(SNES snes, SbRun run);
 /* Whether a tangent of the last solve was indefinite; false for another SNESType or tangent. */
 PetscErrorCode SbNewtonUnstable(SNES snes, PetscBool *is);
@@ -129,10 +128,10 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
 PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R);
 
 /*
-  SbRunSolveContact - active-set iteration of a step with contact: solves until the active set does not
-  change; U: initial guess, then solution. Collective. reason: of the last solve; SNES_DIVERGED_MAX_IT if the
-  active set does not converge. With run->may_end_at_impact, if nodes come into contact within the step, it
-  ends after the first solve with SNES_CONVERGED_ITERATING: the step is to be repeated with the fraction
-  run->time_of_impact of its length.
+  SbRunSolveStep - solves a step by run->snes, with contact until the active set does not change; U: initial
+  guess, then solution. Collective. reason: of the last solve; SNES_DIVERGED_MAX_IT if the active set does not
+  converge. With run->may_end_at_impact, if nodes come into contact within the step, it ends after the first
+  solve with SNES_CONVERGED_ITERATING: the step is to be repeated with the fraction run->time_of_impact of its
+  length.
 */
-PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *attempt, SNESConvergedReason *reason);
+PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConvergedReason *reason);
