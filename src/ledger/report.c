@@ -170,27 +170,23 @@ static void say_largest(SbLedger l, const Seconds *s, char w[ROOM])
 {
   static const char *const what[SB_ERROR_COUNT] = {
     "the mesh is the largest source of error: halving it takes edges of %.3g times the length",
-    "the time step is the largest source of error: halving it takes steps of %.3g s",
+    "the time step is the largest source: halving it takes steps of %.3g s",
     "Newton's method stops too early: halving its error takes a smaller -snes_rtol",
     "the linear solver is the largest source of error: halving it takes a smaller -ksp_rtol",
     "contact is the largest source of error: a smaller -effect_..._barrier_width, or response projected",
     "rounding is the largest source of error: only other units or a smaller range of stiffnesses helps"};
   const int most = largest(l);
   const SbRun run = l->run;
+  PetscReal half; /* length of edges over the present one, or of steps, s, for half the error */
 
   if (!(SbLedgerError(l, most) > 0.)) {
     SbAppend(ROOM, w, "No error was found that could be distinguished from zero. ");
     return;
   }
   SbAppend(ROOM, w, "Of an error of %.2g %%, ", (double)(100. * together(l) / PetscSqrtReal(l->stored)));
-  if (most == SB_ERROR_TIME)
-    SbAppend(
-      ROOM, w, "the time step is the largest source: halving it takes steps of %.3g s",
-      (double)(run->t_end / PetscMax(1, run->steps_total) / PetscPowReal(2., 1. / (PetscReal)l->order)));
-  else if (most == SB_ERROR_SPACE)
-    SbAppend(ROOM, w, what[most], (double)PetscPowReal(0.5, 1. / order_of_space(l)));
-  else
-    SbAppend(ROOM, w, "%s", what[most]);
+  half = PetscPowReal(0.5, 1. / (most == SB_ERROR_TIME ? (PetscReal)l->order : order_of_space(l)));
+  if (most == SB_ERROR_TIME) half *= run->t_end / PetscMax(1, run->steps_total);
+  SbAppend(ROOM, w, what[most], (double)half);
   if (most != SB_ERROR_CONTACT && most != SB_ERROR_ROUNDING)
     SbAppend(ROOM, w, ", and %.2g times the time", (double)cost(l, s, most));
   SbAppend(ROOM, w, ". ");
