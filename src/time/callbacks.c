@@ -99,17 +99,25 @@ PetscErrorCode SbFormStaticJacobian(SNES snes, Vec U, Mat J, Mat P, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A)
+PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, PetscBool constrain, Vec A)
 {
+  const SbSpace s = run->model->space;
+  Vec kept = NULL;
+
   PetscFunctionBeginUser;
-  PetscCall(SbModelResidual(run->model, t, U, V, NULL, PETSC_TRUE, A));
-  if (run->model->space->consistent_mass) {
+  if (!constrain) {
+    PetscCall(VecDuplicate(A, &kept));
+    PetscCall(VecCopy(A, kept));
+    PetscCall(SbSpaceZeroPrescribed(s, PETSC_FALSE, kept));
+  }
+  PetscCall(SbModelResidual(run->model, t, U, V, NULL, constrain, A));
+  if (s->consistent_mass) {
     Mat M;
     KSP ksp;
     PC pc;
 
     /* with the consistent mass the system is solved by CG to rounding; the lumped mass is a division */
-    PetscCall(SbSpaceCreateMatrix(run->model->space, SB_MATRIX_BAIJ, &M));
+    PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_BAIJ, &M));
     PetscCall(SbModelTangent(run->model, 0., 0., 1., 0., run->U, run->V, M));
     PetscCall(KSPCreate(run->model->comm, &ksp));
     PetscCall(KSPSetOptionsPrefix(ksp, "mass_"));
@@ -124,5 +132,10 @@ PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A)
   } else
     PetscCall(VecPointwiseDivide(A, A, run->mass));
   PetscCall(VecScale(A, -1.));
+  if (!constrain) {
+    PetscCall(SbSpaceZeroPrescribed(s, PETSC_TRUE, A));
+    PetscCall(VecAXPY(A, 1., kept));
+    PetscCall(VecDestroy(&kept));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

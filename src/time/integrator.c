@@ -548,15 +548,12 @@ PetscErrorCode SbRunSetUp(SbRun run)
   }
 
   /* one solve per step, with a tangent maybe too soft: no bound on the energy (docs/reference/theory.md) */
-  if (run->velocity_predictor && !m->linear && run->snes) {
-    for (PetscInt r = 0; r < s->nregion; r++)
-      warped = (PetscBool)(warped || s->region[r].material->tangent == SB_TANGENT_WARPED);
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &warped, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
-    if (run->single && warped)
-      PetscCall(SbWarning(
-        s->comm, "-snes_type ksponly with -time_predictor velocity and a warped tangent may gain energy "
-                 "without bound: give -body_<name>_tangent exact_spd, or leave the predictor out"));
-  }
+  for (PetscInt k = 0; k < m->nmaterial; k++)
+    warped = (PetscBool)(warped || m->material[k]->tangent == SB_TANGENT_WARPED);
+  if (run->velocity_predictor && !m->linear && run->single && warped)
+    PetscCall(SbWarning(
+      s->comm, "-snes_type ksponly with -time_predictor velocity and a warped tangent may gain energy "
+               "without bound: give -body_<name>_tangent exact_spd, or leave the predictor out"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

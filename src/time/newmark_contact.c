@@ -26,28 +26,6 @@
 */
 #include "time_impl.h"
 
-PetscErrorCode SbNewmarkOwn(SbRun run, PetscReal t, Vec U, Vec V, Vec A, Vec own)
-{
-  const SbSpace s = run->model->space;
-  const PetscScalar *a;
-  PetscScalar *x;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbModelResidual(run->model, t, U, V, NULL, PETSC_FALSE, own));
-  /* -M^-1 r at free unknowns, A at prescribed ones; r: the residual without inertia and contact */
-  PetscCall(VecGetArrayRead(A, &a));
-  PetscCall(VecGetArray(own, &x));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
-    if (s->fixed[i / 3] & (1 << (i % 3)))
-      x[i] = a[i];
-    else
-      x[i] = s->node_mass[i / 3] > 0. ? -x[i] / s->node_mass[i / 3] : 0.;
-  }
-  PetscCall(VecRestoreArray(own, &x));
-  PetscCall(VecRestoreArrayRead(A, &a));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbNewmarkContact(SbRun run, PetscReal t, PetscReal dt, Vec U, Vec V, Vec A, Vec own)
 {
   const SbModel m = run->model;
@@ -58,7 +36,8 @@ PetscErrorCode SbNewmarkContact(SbRun run, PetscReal t, PetscReal dt, Vec U, Vec
   PetscCall(VecCopy(V, change));
   if (SbSpaceIsConstrained(m->space)) PetscCall(SbModelContactVelocity(m, t, dt, U, V));
   PetscCall(VecAYPX(change, -1., V));
-  PetscCall(SbNewmarkOwn(run, t, U, V, A, own));
+  PetscCall(VecCopy(A, own));
+  PetscCall(SbFormAcceleration(run, t, U, V, PETSC_FALSE, own));
   PetscCall(VecAXPBY(A, 0.5, 0.5, own));
   PetscCall(VecAXPY(A, 1. / dt, change));
   PetscCall(VecDestroy(&change));

@@ -145,7 +145,7 @@ static PetscErrorCode predict(void *ctx)
     PetscCall(VecWAXPY(so->V1, h, run->A, so->V0));
     PetscCall(VecWAXPY(so->X1, h, so->set.method == SB_METHOD_EULER_EXPLICIT ? so->V0 : so->V1, so->X0));
     PetscCall(SbModelPrescribe(run->model, ts->ptime + h, so->X1));
-    PetscCall(SbFormAcceleration(run, ts->ptime + h, so->X1, so->V1, so->A1));
+    PetscCall(SbFormAcceleration(run, ts->ptime + h, so->X1, so->V1, PETSC_TRUE, so->A1));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(VecCopy(so->X0, so->X1));
@@ -241,12 +241,14 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
   PetscFunctionBeginUser;
   /* a restarted run has its acceleration: that of generalized-alpha does not follow from the other state */
   if (!so->started && run->step0 == 0 && so->set.method != SB_METHOD_EULER_IMPLICIT)
-    PetscCall(SbFormAcceleration(run, ts->ptime, ts->vec_sol, ts->vec_dot, run->A));
+    PetscCall(SbFormAcceleration(run, ts->ptime, ts->vec_sol, ts->vec_dot, PETSC_TRUE, run->A));
 
   /* the penalty on jumps of CR and DG for this step */
   PetscCall(SbRunFollowJumps(run, &jumps));
-  if (so->own0 && (!so->started || jumps))
-    PetscCall(SbNewmarkOwn(run, ts->ptime, ts->vec_sol, ts->vec_dot, run->A, so->own0));
+  if (so->own0 && (!so->started || jumps)) {
+    PetscCall(VecCopy(run->A, so->own0));
+    PetscCall(SbFormAcceleration(run, ts->ptime, ts->vec_sol, ts->vec_dot, PETSC_FALSE, so->own0));
+  }
   so->started = PETSC_TRUE;
 
   /* copy the initial state, to which a rejected step returns */

@@ -81,8 +81,8 @@ PetscErrorCode SbFormI2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscRe
 PetscErrorCode SbFormCreateOperator(SbRun run);
 PetscErrorCode SbFormStaticFunction(SNES snes, Vec U, Vec F, void *run);
 PetscErrorCode SbFormStaticJacobian(SNES snes, Vec U, Mat J, Mat P, void *run);
-/* A = M^-1 (f_ext - C V - f_int), zero on prescribed unknowns. */
-PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A);
+/* A = M^-1 (f_ext - C V - f_int), zero on prescribed unknowns; not constrained: without contact, and kept there. */
+PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, PetscBool constrain, Vec A);
 
 /*
   newmark_contact.c, after the solves of a step of Newmark with contact from t - dt to t. Collective.
@@ -96,8 +96,6 @@ PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A);
     own     - acceleration at t without contact, for the next step
 */
 PetscErrorCode SbNewmarkContact(SbRun run, PetscReal t, PetscReal dt, Vec U, Vec V, Vec A, Vec own);
-/* own = the acceleration at t without contact, from U and V; at prescribed unknowns that of A. Collective. */
-PetscErrorCode SbNewmarkOwn(SbRun run, PetscReal t, Vec U, Vec V, Vec A, Vec own);
 
 /*
   solver_list.c: after a failed linear solve of run->snes the next solver of SbSolverNextFallback() solves the

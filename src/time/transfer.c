@@ -64,7 +64,7 @@ PetscErrorCode SbRunRestartAcceleration(SbRun run)
   if (!run->A || !(SbRunIsExplicit(run) || (run->preset == SB_TIME_NEWMARK && !run->model->nbegin_step)))
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(run->A, &own));
-  PetscCall(SbFormAcceleration(run, run->t_now, run->U, run->V, own));
+  PetscCall(SbFormAcceleration(run, run->t_now, run->U, run->V, PETSC_TRUE, own));
   PetscCall(SbSpaceZeroPrescribed(run->model->space, PETSC_FALSE, run->A));
   PetscCall(VecAXPY(run->A, 1., own));
   PetscCall(VecDestroy(&own));
