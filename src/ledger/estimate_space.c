@@ -530,7 +530,7 @@ PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, V
   const SbMesh mesh = model->mesh;
   const SbRecovery r = est->recovery;
   const PetscReal *u;
-  PetscReal(*sum)[NSUM], *G, *K, *point = NULL;
+  PetscReal(*sum)[NSUM], *point = NULL;
 
   PetscFunctionBeginUser;
   if (est->stress) PetscCall(PetscCalloc1(36 * (size_t)mesh->ncell, &point));
@@ -555,24 +555,20 @@ PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, V
   }
   PetscCall(SbMeshBroadcastVertices(mesh, 9 * r->nlayer, MPIU_REAL, r->value));
 
-  /* sums over the cells of each body; the moduli of each law are computed once */
+  /* sums over the cells of each body */
   PetscCall(PetscCalloc1(model->nbody, &sum));
-  PetscCall(PetscMalloc2(model->nmaterial, &G, model->nmaterial, &K));
-  for (PetscInt k = 0; k < model->nmaterial; k++) {
-    G[k] = model->material[k]->mu;
-    K[k] = SbMaterialBulkModulus(model->material[k]);
-  }
   for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
-    const PetscInt k = mesh->cell_material[c], body = mesh->cell_body[c];
+    const SbMaterial law = model->material[mesh->cell_material[c]];
+    const PetscReal K = SbMaterialBulkModulus(law);
+    const PetscInt body = mesh->cell_body[c];
 
     if (model->element[body]->nodes_per[1]) {
-      est->cell2[c] = quadratic_off(est, c, G[k], K[k]);
+      est->cell2[c] = quadratic_off(est, c, law->mu, K);
       sum[body][SHEAR_OFF] += est->cell2[c];
       sum[body][STRAIN] += cell_volume(mesh, c) * est->psi[c];
     } else
-      est->cell2[c] = add_cell(est, c, G[k], K[k], sum[body]);
+      est->cell2[c] = add_cell(est, c, law->mu, K, sum[body]);
   }
-  PetscCall(PetscFree2(G, K));
   if (est->residual) {
     const PetscReal *force;
 

@@ -207,12 +207,11 @@ static void say_wasted(SbLedger l, const Seconds *s, char w[ROOM])
   if (l->may_tune) return; /* the adaptive tolerance sets them */
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
     const PetscReal e = SbLedgerError(l, of[i].source);
-    const PetscReal spent = s->source[of[i].source] / PetscMax(s->total, 1e-9);
+    const PetscBool cheap = (PetscBool)(s->source[of[i].source] < 0.1 * PetscMax(s->total, 1e-9));
+    const PetscBool factorised = (PetscBool)(l->run->linear_total <= l->run->newton_total); /* no tolerance */
 
-    if (!(e > 0.) || e * WASTE > most || (of[i].source != SB_ERROR_TIME && spent < 0.1)) continue;
-    if (of[i].source == SB_ERROR_TIME && !l->run->model->dynamic) continue;
-    if (of[i].source != SB_ERROR_TIME && l->run->linear_total <= l->run->newton_total)
-      continue; /* factorisations have no tolerance */
+    if (!(e > 0.) || e * WASTE > most) continue;
+    if (of[i].source == SB_ERROR_TIME ? !l->run->model->dynamic : cheap || factorised) continue;
     SbAppend(
       ROOM, w,
       "%s is wasted: its error is %.1g times the largest one, and could be %.1g times as large unnoticed. ",
