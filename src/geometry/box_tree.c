@@ -251,9 +251,7 @@ void SbBoxNearestBegin(const SbBoxTree *tree, const PetscReal box[6], PetscReal 
   for (int k = 0; k < 6; k++) nearest->box[k] = box[k];
   nearest->limit2 = limit2;
   nearest->depth = tree->n > 0;
-  nearest->stack[0].level = tree->nlevel - 1;
-  nearest->stack[0].index = 0;
-  nearest->stack[0].d2 = 0;
+  nearest->stack[0] = (SbBoxNearestEntry){.level = tree->nlevel - 1};
 }
 
 PetscBool SbBoxNearestNext(SbBoxNearest *nearest, PetscInt *i)

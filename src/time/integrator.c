@@ -315,6 +315,28 @@ static PetscErrorCode step_accepted(TS ts, PetscInt step, PetscReal t, Vec U, vo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Re-meshing and requests to stop, before monitors. */
+static PetscErrorCode after_step(TS ts)
+{
+  TSConvergedReason reason;
+  PetscReal t, before;
+  PetscInt step;
+  SbRun run;
+
+  PetscFunctionBeginUser;
+  PetscCall(TSGetApplicationContext(ts, &run));
+  PetscCall(TSGetConvergedReason(ts, &reason));
+  PetscCall(TSGetTime(ts, &t));
+  if (reason || t >= run->t_end * (1. - 1e-12)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(TSGetStepNumber(ts, &step));
+  PetscCall(TSGetPrevTime(ts, &before));
+  run->after.dt = t - before;
+  if (run->after.fn) PetscCall((*run->after.fn)(run, step, t, t - before, run->after.ctx, &run->paused));
+  PetscCall(SbRunStopAsked(run, step, t, PETSC_FALSE));
+  if (run->paused || run->stopped) PetscCall(TSSetConvergedReason(ts, TS_CONVERGED_USER));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode set_up_ts(SbRun run)
 {
   const SbModel m = run->model;
@@ -382,7 +404,7 @@ static PetscErrorCode set_up_ts(SbRun run)
   PetscCall(TSSetTimeStep(run->ts, run->dt));
   PetscCall(TSMonitorSet(run->ts, step_accepted, run, NULL));
   PetscCall(TSSetApplicationContext(run->ts, run));
-  PetscCall(TSSetPostStep(run->ts, SbRunAfterStep));
+  PetscCall(TSSetPostStep(run->ts, after_step));
   PetscCall(TSGetAdapt(run->ts, &adapt));
   PetscCall(PetscObjectTypeCompare((PetscObject)adapt, TSADAPTNONE, &run->fixed_step));
   m->barrier_apart = (PetscBool)(m->npotential && run->preset != SB_TIME_EULER_IMPLICIT);
@@ -428,7 +450,7 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
     "The effect %s needs several solves in a step: use -time euler_implicit, newmark, genalpha or static",
     name);
   if (run->preset == SB_TIME_NEWMARK) {
-    /* newmark_contact.c needs the trapezoidal rule, the lumped mass, and forces on constrained nodes only */
+    /* its contact needs the trapezoidal rule, the lumped mass, and forces on constrained nodes only */
     PetscCheck(run->newmark[0] == 0.25 && run->newmark[1] == 0.5, m->comm, PETSC_ERR_USER_INPUT,
                "-time newmark with the effect %s needs -time_newmark_beta 0.25 and -time_newmark_gamma 0.5, "
                "not %g and %g: else impacts may gain energy",

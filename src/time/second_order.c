@@ -5,7 +5,7 @@
     generalized-alpha (Chung and Hulbert 1993; fractions of the new state as in PETSc's TSALPHA2)
       a1 = (s - h v0 - h^2 (1/2 - beta) a0) / (beta h^2),  v1 = v0 + h ((1 - gamma) a0 + gamma a1)
       F(t0 + alpha_f h, u0 + alpha_f s, v0 + alpha_f (v1 - v0), a0 + alpha_m (a1 - a0)) = 0
-    Newmark: alpha_m = alpha_f = 1; with contact: newmark_contact.c, a0 is the acceleration without contact
+    Newmark: alpha_m = alpha_f = 1; with contact: below, a0 is the acceleration without contact
     implicit Euler: v1 = s / h, a1 = (v1 - v0) / h (it is not a Newmark method)
     explicit Euler: u1 = u0 + h v0, v1 = v0 + h a0;  symplectic Euler: v1 = v0 + h a0, u1 = u0 + h v1; M a0 = f0
 
@@ -24,6 +24,30 @@
   up to the first time of impact; the remainder is the next step (contact.c). A step whose solve fails is
   halved and repeated; after four good steps its length doubles, up to the nominal one. The local error for
   TSAdapt is h^2 (beta - 1/6) (a1 - a0) (Zienkiewicz and Xie 1991), for implicit Euler h^2/2 a1.
+
+  Newmark with contact: the trapezoidal rule with implicit contact forces. With a the acceleration without
+  contact, M a = f_ext - f_int(u) - C v, and G^T lambda the contact forces at the end of the step (Kane,
+  Repetto, Ortiz and Marsden, "Finite element analysis of nonsmooth contact", CMAME 180, 1999: beta = 1/4,
+  gamma = 1/2 there, 1/2 and 1 for contact)
+
+    u1 = u0 + h v0 + h^2/4 (a0 + a1) + h^2/2 M^-1 G^T lambda,    v* = v0 + h/2 (a0 + a1) + h M^-1 G^T lambda.
+
+  So u1 - u0 = h (v0 + v*) / 2, and a linear body gains lambda . (g1 - g0), g the gaps: active nodes have g1 =
+  0, so an impact dissipates energy and persistent contact conserves it. But G v* is not zero: a node with g0
+  = 0 has v* = -v0, and separates in the next step or its force oscillates. Hence the velocity at the end is
+
+    v1 = v* + M^-1 G^T mu  with  G v1 = w,
+
+  w the velocities of obstacles: the persistency condition of Laursen and Love (IJNME 53, 2002). As the
+  closest velocity in the mass norm it dissipates energy, too, m v^2 / 2 of each impacting node with the nodal
+  mass m: an impact of the nodes without restitution, which vanishes with the size of the cells. In the next
+  step their a0 and contact force are in balance, and forces are steady. (Deuflhard, Krause and Ertel, IJNME
+  73, 2008, project the predictor instead; their nodes keep the velocities from before the impact until they
+  separate.)
+
+  As s = u1 - u0 Newmark's own formula with a0 gives A = a1 + 2 M^-1 G^T lambda, and M A + C v* + f_int(u1) -
+  f_ext = 2 G^T lambda: the solvers need no change. The stored acceleration is a1 + M^-1 G^T (lambda + mu /
+  h), with the mean contact force over the step, whose product with h is the change of momentum.
 
   petsc/private/tsimpl.h: PETSc has no public way to write a TSType.
 */
@@ -207,8 +231,17 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
     PetscCall(VecAXPY(so->V1, h * (1. - so->set.gamma), run->A));
     PetscCall(VecAXPY(so->V1, h * so->set.gamma, so->A1));
   }
-  if (*ok && so->set.impulses)
-    PetscCall(SbNewmarkContact(run, ts->ptime + h, h, so->X1, so->V1, so->A1, so->own1));
+  if (*ok && so->set.impulses) {
+    /* contact: adds its impulse to the velocity, and the mean force over the step to the acceleration */
+    PetscCall(VecCopy(so->V1, so->work));
+    if (SbSpaceIsConstrained(run->model->space))
+      PetscCall(SbModelContactVelocity(run->model, ts->ptime + h, h, so->X1, so->V1));
+    PetscCall(VecAYPX(so->work, -1., so->V1));
+    PetscCall(VecCopy(so->A1, so->own1));
+    PetscCall(SbFormAcceleration(run, ts->ptime + h, so->X1, so->V1, PETSC_FALSE, so->own1));
+    PetscCall(VecAXPBY(so->A1, 0.5, 0.5, so->own1));
+    PetscCall(VecAXPY(so->A1, 1. / h, so->work));
+  }
   *step = solved_step(ts);
   if (!*ok && !ts->usessnes)
     PetscCall(SbRunFail(run,

@@ -17,7 +17,7 @@ typedef enum {
 typedef struct {
   SbMethod method;
   PetscReal alpha_m, alpha_f, beta, gamma; /* generalized-alpha; fractions of the new state, as in TSALPHA2 */
-  PetscBool impulses;                      /* Newmark with contact: newmark_contact.c */
+  PetscBool impulses;                      /* Newmark with contact */
   PetscBool separate;                      /* Newmark with barrier contact: the acceleration excludes it */
 } SbMethodSettings;
 
@@ -48,8 +48,6 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *attempt, PetscBool *ok);
 PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt,
                                  PetscBool last); /* saves history, calls monitors; also at the start */
 #define SB_NEWTON_ITERATIONS 100
-/* transfer.c: the post-step function of the TS. */
-PetscErrorCode SbRunAfterStep(TS ts);
 /* newton.c: Newton's method as a minimisation, a SNESType. SetRun after SNESSetType(); run is borrowed. */
 #define SB_SNES_NEWTON "newton"
 PetscErrorCode SbNewtonCreate(SNES snes);
@@ -81,21 +79,9 @@ PetscErrorCode SbFormI2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscRe
 PetscErrorCode SbFormCreateOperator(SbRun run);
 PetscErrorCode SbFormStaticFunction(SNES snes, Vec U, Vec F, void *run);
 PetscErrorCode SbFormStaticJacobian(SNES snes, Vec U, Mat J, Mat P, void *run);
-/* A = M^-1 (f_ext - C V - f_int), zero on prescribed unknowns; not constrained: without contact, and kept there. */
+/* A = M^-1 (f_ext - C V - f_int), zero on prescribed unknowns; without `constrain`: without contact, and A
+   keeps its values there. */
 PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, PetscBool constrain, Vec A);
-
-/*
-  newmark_contact.c, after the solves of a step of Newmark with contact from t - dt to t. Collective.
-
-  Input:
-    U       - displacement at t
-  In and out:
-    V       - velocity at t by Newmark's formulas, m/s; out: after contact impulses
-    A       - acceleration likewise, m/s^2; out: M A + f_int - f_ext is the mean force of contact
-  Output:
-    own     - acceleration at t without contact, for the next step
-*/
-PetscErrorCode SbNewmarkContact(SbRun run, PetscReal t, PetscReal dt, Vec U, Vec V, Vec A, Vec own);
 
 /*
   solver_list.c: after a failed linear solve of run->snes the next solver of SbSolverNextFallback() solves the

@@ -5,27 +5,6 @@
 */
 #include "time_impl.h"
 
-PetscErrorCode SbRunAfterStep(TS ts)
-{
-  TSConvergedReason reason;
-  PetscReal t, before;
-  PetscInt step;
-  SbRun run;
-
-  PetscFunctionBeginUser;
-  PetscCall(TSGetApplicationContext(ts, &run));
-  PetscCall(TSGetConvergedReason(ts, &reason));
-  PetscCall(TSGetTime(ts, &t));
-  if (reason || t >= run->t_end * (1. - 1e-12)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(TSGetStepNumber(ts, &step));
-  PetscCall(TSGetPrevTime(ts, &before));
-  run->after.dt = t - before;
-  if (run->after.fn) PetscCall((*run->after.fn)(run, step, t, t - before, run->after.ctx, &run->paused));
-  PetscCall(SbRunStopAsked(run, step, t, PETSC_FALSE));
-  if (run->paused || run->stopped) PetscCall(TSSetConvergedReason(ts, TS_CONVERGED_USER));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbRunTransferState(SbRun from, SbRun to)
 {
   PetscReal dt;
