@@ -75,18 +75,6 @@ static int largest(SbLedger l)
   return most;
 }
 
-/* Edge of a regular tet of the mean volume, m. */
-static PetscReal mesh_size(SbModel m)
-{
-  PetscReal volume = 0., n = 0.;
-
-  for (PetscInt b = 0; b < m->nbody; b++) {
-    volume += m->body[b].volume;
-    n += (PetscReal)m->body[b].ncell;
-  }
-  return PetscPowReal(6. * PetscSqrtReal(2.) * volume / n, 1. / 3.);
-}
-
 /* The body with the largest error of the mesh. */
 static PetscInt worst_body(SbLedger l)
 {
@@ -224,8 +212,15 @@ static void report_accuracy(SbLedger l, char w[ROOM])
 {
   const PetscReal all = together(l) / PetscSqrtReal(PetscMax(l->stored, PETSC_MIN_REAL));
   const PetscReal mesh = l->error[SB_ERROR_SPACE] / PetscSqrtReal(PetscMax(l->stored, PETSC_MIN_REAL));
-  const PetscReal h = mesh_size(l->run->model);
+  const SbModel m = l->run->model;
+  PetscReal volume = 0., n = 0., h;
 
+  /* size of the mesh: edge of a regular tet of the mean volume, m */
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    volume += m->body[b].volume;
+    n += (PetscReal)m->body[b].ncell;
+  }
+  h = PetscPowReal(6. * PetscSqrtReal(2.) * volume / n, 1. / 3.);
   if (l->accuracy > 0.) {
     SbAppend(ROOM, w, "-accuracy %.3g was %s. ", (double)l->accuracy, all <= l->accuracy ? "met" : "NOT met");
     if (mesh > 0.7 * l->accuracy)
