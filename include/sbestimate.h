@@ -19,6 +19,7 @@ struct _p_SbSpaceEstimate {
   SbModel model;     /* borrowed */
   PetscReal *cell2;  /* [ncell_owned] square of the error of each owned cell, J */
   PetscReal *body2;  /* [nbody] sums over the cells of each body and all ranks, J */
+  PetscReal total2;  /* their sum, J */
   PetscReal *strain; /* [nbody] the laws' strain energy of the cells of each body and all ranks, J */
   PetscReal *factor; /* [nbody] cell2, body2 over the square of recovery alone, 1 but for P1 */
   struct _p_SbRecovery *recovery;
@@ -31,7 +32,7 @@ struct _p_SbSpaceEstimate {
 /* Patches and links between ranks, once. Collective. The model is borrowed; destroy the estimate. */
 PetscErrorCode SbSpaceEstimateCreate(SbModel model, SbSpaceEstimate *est);
 /*
-  SbSpaceEstimateCompute - fills cell2, body2, strain and factor.
+  SbSpaceEstimateCompute - fills cell2, body2, total2, strain and factor.
 
   Collective. Input: displacement U (m), velocity V (m/s), acceleration A (m/s^2) at t (s), the last two NULL
   in a static run. Results are the same on any number of ranks up to rounding. Measured: 0.2 us for a cell of

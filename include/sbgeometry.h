@@ -177,7 +177,7 @@ typedef struct {
   int nlevel;
   PetscInt start[SB_BOX_TREE_LEVELS + 1]; /* first group of each level; level 0: boxes, the last: one group */
   PetscInt *order;                        /* [4 start[1]] box at each place of level 0, -1: none */
-  PetscReal (*group)[6][4]; /* [start[nlevel]] lower and upper corners of the four boxes or groups in it, m */
+  PetscReal (*group)[6][4]; /* [start[nlevel] + 1] corners of the four boxes or groups in it, m; last: hull */
   PetscReal hull[6];        /* of all, m */
   PetscReal size;           /* of all hulls over that of the boxes, when the order was made */
   PetscInt built;           /* number of rebuilds */
@@ -195,10 +195,8 @@ PetscErrorCode SbBoxTreeRefit(SbBoxTree *tree, const PetscReal (*box)[6]);
 typedef struct {
   const SbBoxTree *tree; /* borrowed */
   PetscReal box[6];
-  unsigned hits; /* children of the last group not yet returned */
-  PetscInt leaf; /* place of its first child */
   int depth;
-  PetscInt stack[3 * SB_BOX_TREE_LEVELS + 4][2]; /* level and group */
+  PetscInt stack[3 * SB_BOX_TREE_LEVELS + 4][2]; /* level and group; -1: box */
 } SbBoxQuery;
 void SbBoxQueryBegin(const SbBoxTree *tree, const PetscReal box[6], SbBoxQuery *query);
 PetscBool SbBoxQueryNext(SbBoxQuery *query, PetscInt *i);

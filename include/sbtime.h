@@ -74,6 +74,7 @@ struct _p_SbRun {
     PetscReal t; /* J's time or load factor */
   } nonsymmetric;
   Vec U, V, A;              /* A: acceleration of the last step, state of the integrator */
+  Vec mass;                 /* lumped mass of each displacement, kg; 0 on supports, which are prescribed */
   Vec R;                    /* residual for contact; NULL without */
   Vec barrier_start;        /* barrier contact: displacement at the start of the step; borrowed */
   PetscReal barrier_dt;     /* its length, s */
@@ -81,6 +82,7 @@ struct _p_SbRun {
   Vec stage, stage_start;   /* forces are those at stage_start + stage_part (X - stage_start); NULL: at X */
   PetscReal stage_part;
   PetscBool dt_given, velocity_predictor, fixed_step, damped;
+  PetscBool single;                             /* one linear solve per step instead of Newton's method */
   PetscBool reject_inverted, rejected_inverted; /* -time_inverted; the last attempt was rejected by it */
   PetscBool may_end_at_impact;                  /* this attempt may end where points come into contact */
   PetscInt contact_round;                       /* active-set iterations of this step, 0: without contact */

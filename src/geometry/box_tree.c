@@ -100,7 +100,6 @@ static PetscReal fill(SbBoxTree *tree, const PetscReal (*box)[6])
 {
   PetscReal groups = 0, boxes = 0;
 
-  SbBoxClear(tree->hull);
   for (int level = 0; level < tree->nlevel; level++) {
     const PetscInt first = tree->start[level], n = tree->start[level + 1] - first;
 
@@ -119,15 +118,11 @@ static PetscReal fill(SbBoxTree *tree, const PetscReal (*box)[6])
         if (level == 0) boxes += size_of(child);
       }
       groups += size_of(hull);
-      // store it as a child of the next level, or as the hull of the tree
-      for (int k = 0; k < 6; k++) {
-        if (level + 1 == tree->nlevel)
-          tree->hull[k] = hull[k];
-        else
-          tree->group[tree->start[level + 1] + g / 4][k][g % 4] = hull[k];
-      }
+      // store it as a child of the next level; above the last one there is another group for the hull of all
+      for (int k = 0; k < 6; k++) tree->group[tree->start[level + 1] + g / 4][k][g % 4] = hull[k];
     }
   }
+  for (int k = 0; k < 6; k++) tree->hull[k] = tree->group[tree->start[tree->nlevel]][k][0];
   return groups / PetscMax(boxes + size_of(tree->hull), PETSC_SMALL * PETSC_SMALL);
 }
 
@@ -174,10 +169,11 @@ PetscErrorCode SbBoxTreeCreate(PetscInt n, const PetscReal (*box)[6], SbBoxTree 
     tree->start[tree->nlevel + 1] = tree->start[tree->nlevel] + ngroup;
     tree->nlevel++;
   }
-  PetscCall(PetscMalloc2(4 * (size_t)tree->start[1], &tree->order, tree->start[tree->nlevel], &tree->group));
+  PetscCall(
+    PetscMalloc2(4 * (size_t)tree->start[1], &tree->order, tree->start[tree->nlevel] + 1, &tree->group));
   for (PetscInt i = n; i < 4 * tree->start[1]; i++) tree->order[i] = -1;
   // initialise unused children as empty boxes
-  for (PetscInt g = 0; g < tree->start[tree->nlevel]; g++) {
+  for (PetscInt g = 0; g <= tree->start[tree->nlevel]; g++) {
     for (int k = 0; k < 6; k++) {
       for (int l = 0; l < 4; l++) tree->group[g][k][l] = k < 3 ? PETSC_MAX_REAL : -PETSC_MAX_REAL;
     }
@@ -221,7 +217,6 @@ void SbBoxQueryBegin(const SbBoxTree *tree, const PetscReal box[6], SbBoxQuery *
 {
   query->tree = tree;
   for (int k = 0; k < 6; k++) query->box[k] = box[k];
-  query->hits = 0;
   query->depth = tree->n > 0;
   query->stack[0][0] = tree->nlevel - 1;
   query->stack[0][1] = 0;
@@ -231,35 +226,23 @@ PetscBool SbBoxQueryNext(SbBoxQuery *query, PetscInt *i)
 {
   const SbBoxTree *tree = query->tree;
 
-  // pop groups until one of the lowest level overlaps the box
-  while (!query->hits) {
-    PetscInt level, g;
+  // return a box; push the overlapping children of a group
+  while (query->depth) {
+    const PetscInt level = query->stack[--query->depth][0], g = query->stack[query->depth][1];
     unsigned mask;
 
-    if (!query->depth) return PETSC_FALSE;
-    query->depth--;
-    level = query->stack[query->depth][0];
-    g = query->stack[query->depth][1];
-    mask = meeting((const PetscReal(*)[4])tree->group[tree->start[level] + g], query->box);
-    if (level == 0) {
-      query->hits = mask;
-      query->leaf = 4 * g;
-      continue;
+    if (level < 0) {
+      *i = tree->order[g];
+      return PETSC_TRUE;
     }
+    mask = meeting((const PetscReal(*)[4])tree->group[tree->start[level] + g], query->box);
     for (int l = 3; l >= 0; l--) {
       if (!(mask >> l & 1)) continue;
       query->stack[query->depth][0] = level - 1;
       query->stack[query->depth++][1] = 4 * g + l;
     }
   }
-  // return the overlapping boxes, one per call
-  for (int l = 0; l < 4; l++) {
-    if (!(query->hits >> l & 1)) continue;
-    query->hits &= ~(1U << l);
-    *i = tree->order[query->leaf + l];
-    break;
-  }
-  return PETSC_TRUE;
+  return PETSC_FALSE;
 }
 
 void SbBoxNearestBegin(const SbBoxTree *tree, const PetscReal box[6], PetscReal limit2, SbBoxNearest *nearest)
@@ -268,9 +251,7 @@ void SbBoxNearestBegin(const SbBoxTree *tree, const PetscReal box[6], PetscReal 
   for (int k = 0; k < 6; k++) nearest->box[k] = box[k];
   nearest->limit2 = limit2;
   nearest->depth = tree->n > 0;
-  nearest->stack[0].level = tree->nlevel - 1;
-  nearest->stack[0].index = 0;
-  nearest->stack[0].d2 = 0;
+  nearest->stack[0] = (SbBoxNearestEntry){.level = tree->nlevel - 1};
 }
 
 PetscBool SbBoxNearestNext(SbBoxNearest *nearest, PetscInt *i)
@@ -341,13 +322,7 @@ PetscInt SbBoxPairsNext(SbBoxPairs *pairs, PetscInt room, PetscInt pair[])
       const SbBoxTree *t = pairs->tree[down];
       unsigned mask;
 
-      if (level == t->nlevel)
-        for (int k = 0; k < 3; k++) {
-          box[k] = t->hull[k] - pairs->grown;
-          box[3 + k] = t->hull[3 + k] + pairs->grown;
-        }
-      else
-        grow(t->group[t->start[level] + top.group[down] / 4], top.group[down] % 4, pairs->grown, box);
+      grow(t->group[t->start[level] + top.group[down] / 4], top.group[down] % 4, pairs->grown, box);
       mask = meeting((const PetscReal(*)[4])(up ? other : group)[0], box);
       for (int l = 3; l >= 0; l--) {
         if (!(mask >> l & 1)) continue;

@@ -204,7 +204,7 @@ static void point_derivatives(const PetscReal x[], const SbDistance *s, PetscRea
   }
 }
 
-static inline void clamp_eigenvalues(const int n, PetscReal A[])
+void SbSymmetricProjectPSD(int n, PetscReal A[])
 {
   PetscReal V[SB_CLAMP_MAX * SB_CLAMP_MAX], D[SB_CLAMP_MAX * SB_CLAMP_MAX], size = 0;
   PetscBool negative = PETSC_FALSE;
@@ -261,11 +261,6 @@ static inline void clamp_eigenvalues(const int n, PetscReal A[])
   }
 }
 
-void SbSymmetricProjectPSD(int n, PetscReal A[])
-{
-  clamp_eigenvalues(n, A);
-}
-
 void SbDistanceHessian(const PetscReal x[], const SbDistance *s, const PetscReal factor[2], PetscBool clamp,
                        PetscReal H[])
 {
@@ -313,7 +308,7 @@ void SbDistanceHessian(const PetscReal x[], const SbDistance *s, const PetscReal
     K[24] *= bend[1] * bend[1] / ee;
     K[18] *= bend[0] * bend[0] / ee;
   }
-  if (clamp) clamp_eigenvalues(5, K);
+  if (clamp) SbSymmetricProjectPSD(5, K);
 
   // expand to 3 x 3 blocks in the frame (n, m), rotated to global axes; none for vertices of zero weight
   for (int i = 0; i < 4; i++) {

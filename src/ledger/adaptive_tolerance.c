@@ -52,14 +52,12 @@ PetscErrorCode SbAdaptiveToleranceSetFromOptions(SbLedger l)
 PetscErrorCode SbAdaptiveToleranceSet(SbLedger l, PetscReal rtol)
 {
   const SNES snes = l->run->snes;
-  PetscBool single;
   KSP ksp;
 
   PetscFunctionBeginUser;
   l->rtol = PetscMax(TIGHTEST, PetscMin(LOOSEST, rtol));
-  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &single));
   PetscCall(SNESGetKSP(snes, &ksp));
-  if (single)
+  if (l->run->single)
     PetscCall(KSPSetTolerances(ksp, l->rtol, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
   else
     PetscCall(SNESSetTolerances(snes, PETSC_DEFAULT, l->rtol, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
@@ -111,7 +109,7 @@ PetscErrorCode SbAdaptiveToleranceAttach(SbLedger l)
 /* Adapts the barrier's width to its allowed error; `again`: the step has to be solved with the new width. */
 static PetscErrorCode update_widths(SbLedger l, const SbSolvedStep *step, PetscBool *again)
 {
-  PetscReal allowed = GAPS * l->accuracy * PetscSqrtReal(l->stored), error, mesh = 0.;
+  PetscReal allowed = GAPS * l->accuracy * PetscSqrtReal(l->stored), error;
   PetscBool changed;
 
   PetscFunctionBeginUser;
@@ -127,9 +125,7 @@ static PetscErrorCode update_widths(SbLedger l, const SbSolvedStep *step, PetscB
 
   /* too large, unless the error of the mesh is much larger */
   PetscCall(SbSpaceEstimateCompute(l->space, step->t + step->dt, step->U, step->V, step->A));
-  for (PetscInt b = 0; b < l->run->model->nbody; b++) mesh += l->space->body2[b];
-  mesh = PetscSqrtReal(mesh);
-  allowed = PetscMax(allowed, MESH * mesh);
+  allowed = PetscMax(allowed, MESH * PetscSqrtReal(l->space->total2));
   if (error <= allowed) {
     l->mesh_bounds = PETSC_TRUE;
     PetscFunctionReturn(PETSC_SUCCESS);

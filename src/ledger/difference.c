@@ -35,15 +35,9 @@ PetscErrorCode SbStiffnessTimes(SbLedger l, PetscReal t, Vec U, Vec D, PetscBool
 
 PetscErrorCode SbMassForm(SbLedger l, Vec D, PetscReal *form)
 {
-  const SbSpace s = l->run->model->space;
-  const PetscScalar *d;
-  PetscReal sum = 0.;
-
   PetscFunctionBeginUser;
-  PetscCall(VecGetArrayRead(D, &d));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) sum += s->node_mass[i / 3] * d[i] * d[i];
-  PetscCall(VecRestoreArrayRead(D, &d));
-  PetscCallMPI(MPI_Allreduce(&sum, form, 1, MPIU_REAL, MPI_SUM, s->comm));
+  PetscCall(VecPointwiseMult(l->w[2], l->run->mass, D));
+  PetscCall(VecDot(l->w[2], D, form));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -12,16 +12,14 @@
 
 PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolvedStep *step)
 {
-  const SNES snes = l->run->snes;
+  const PetscBool single = l->run->single;
   const Vec F = l->w[0];
   PetscReal energy, error, mass;
   PetscInt its;
-  PetscBool single;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &single));
   l->residuals -= MPI_Wtime();
-  PetscCall(SNESComputeFunction(snes, step->U, F));
+  PetscCall(SNESComputeFunction(l->run->snes, step->U, F));
   l->residuals += MPI_Wtime();
   PetscCall(SbProbeSolve(l, ROUGHLY, F, l->delta, &its));
   PetscCall(VecDot(l->delta, F, &energy));

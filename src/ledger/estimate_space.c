@@ -2,8 +2,8 @@
   estimate_space.c - the discretisation error in space, by stress recovery.
 
   Recovery. P_h is the first Piola-Kirchhoff stress, constant in each cell; for DG that of the gradient of the
-  means. P* is linear in each cell, with the recovered values at the vertices (recovery.c). The error of a
-  cell is estimated by the difference:
+  means. P* is linear in each cell, with the recovered values at the vertices (below). The error of a cell is
+  estimated by the difference:
 
     off_T = 1/2 int_T D : C^-1 : D,  D = P* - P_h,  s = sym(R^T D),  C^-1: |dev s|^2 / (2 mu) + tr(s)^2 / (9 K),
 
@@ -45,13 +45,294 @@
   are not detected. In a dynamic run the error is that of the current state, against the continuum under the
   current loads and inertia (elliptic reconstruction, Makridakis and Nochetto, SIAM J. Numer. Anal. 41, 2003),
   not one accumulated since the start.
+
+  Values at the vertices, by least squares over the cells around each (superconvergent patch recovery,
+  Zienkiewicz and Zhu, IJNME 33, 1992, parts 1 and 2). At a vertex v the recovered value is p(X_v) of the
+  linear polynomial p that minimises
+
+    sum_c |p(X_c) - P_c|^2 + r |grad p|^2,   r = 0.05 sum_c |X_c - X_v|^2,
+
+  over the cells c around v, X_c their centroids. r regularises the slope where cells are too few, at corners
+  and edges of a body; constants are recovered for any r. Only cells of one material are fitted together, as
+  the stress jumps at interfaces: a vertex has one value for each material around it, at most `nlayer`. Bodies
+  share no vertices.
+
+  p(X_v) is a linear combination of the P_c with constant weights, which are stored. All cells of an owned
+  vertex are local: only ghosts of the P_c, before, and of the values, after, are communicated.
+
+  For P2 p has degree two and is fitted to the stresses at the four points of each cell; another one is fitted
+  by its means over the cells to their mean pressures. Slopes of the pressure and second derivatives are
+  regularised like slopes above. The recovered stress is quadratic in a cell, p(X_v) at its vertices and, at
+  the middle of an edge, the mean of the polynomials of its ends.
 */
-#include "recovery.h"
 #include "sbestimate.h"
 #include "sbgeometry.h"
+#include "sbkernel.h"
+#include <petscblaslapack.h>
 
-#define KEPT 0.25  /* largest fraction of the energy of an oscillating pressure that recovery keeps */
-#define FLOOR 1e-8 /* least smooth fraction of the energy */
+#define KEPT 0.25         /* largest fraction of the energy of an oscillating pressure that recovery keeps */
+#define FLOOR 1e-8        /* least smooth fraction of the energy */
+#define RIDGE 0.05        /* factor in r above */
+#define RIDGE_SLOPE 0.01  /* factor on slopes of the pressure, over the number of cells */
+#define RIDGE_SECOND 1e-3 /* the same for second derivatives */
+#define NFIT 10           /* monomials up to degree two */
+#define NVALUE 10         /* fitted values: nine of P, the pressure */
+
+/* Stress of a P2 cell, Pa: Piola's at the points of SbRuleQuadratic, mean pressure in the rotated frame. */
+typedef struct SbPointStress {
+  PetscReal P[4][9], pressure;
+} SbPointStress;
+
+/* ------------------------------------------------------------------ recovery */
+
+typedef struct _p_SbRecovery *SbRecovery;
+struct _p_SbRecovery {
+  SbMesh mesh;              /* borrowed */
+  const SbElement *element; /* [nbody] borrowed */
+  PetscInt nlayer;          /* largest number of materials around a vertex, all ranks */
+  PetscInt *slot;    /* [ncell][4] index of the value of each corner of a cell: nlayer vertex + layer */
+  PetscReal *weight; /* [ncell][4] weight of a cell's P in the value of a corner; 0: vertex not owned */
+  PetscReal *value;  /* [nvert nlayer][9] recovered values */
+  /* for P2; NULL without a P2 body */
+  PetscReal (*factor)[2][NFIT * NFIT]; /* [nvert_owned nlayer] Cholesky factors for P, pressure */
+  struct Fit {
+    PetscReal c[NVALUE][NFIT]; /* coefficients of the monomials of (X - X_v) / size */
+    PetscReal size;            /* length scale, m */
+  } * fit;                     /* [nvert nlayer] */
+};
+
+/* Lists the materials around each vertex on its owner, and finds the slot of each corner of each cell. */
+static PetscErrorCode create_slots(SbRecovery r)
+{
+  SbMesh mesh = r->mesh;
+  PetscInt *start, *at, *found, *count, *material, most = 1;
+
+  PetscFunctionBeginUser;
+  /* corners 4 c + a at each vertex: at[start[v]..start[v + 1]); count[v] materials, ascending, in found */
+  PetscCall(SbBucketByKey(4 * mesh->ncell, mesh->cell, mesh->nvert, &start, &at));
+  PetscCall(PetscMalloc2(4 * mesh->ncell, &found, mesh->nvert_owned, &count));
+  for (PetscInt i = 0; i < start[mesh->nvert_owned]; i++) found[i] = mesh->cell_material[at[i] / 4];
+  for (PetscInt v = 0; v < mesh->nvert_owned; v++) {
+    count[v] = start[v + 1] - start[v];
+    PetscCall(PetscSortRemoveDupsInt(&count[v], found + start[v]));
+    most = PetscMax(most, count[v]);
+  }
+  PetscCallMPI(MPI_Allreduce(&most, &r->nlayer, 1, MPIU_INT, MPI_MAX, mesh->comm));
+  PetscCall(PetscMalloc1(r->nlayer * (size_t)mesh->nvert, &material));
+  for (PetscInt i = 0; i < r->nlayer * mesh->nvert; i++) material[i] = -1;
+  for (PetscInt v = 0; v < mesh->nvert_owned; v++)
+    PetscCall(PetscArraycpy(material + r->nlayer * v, found + start[v], count[v]));
+  PetscCall(SbMeshBroadcastVertices(mesh, r->nlayer, MPIU_INT, material));
+  PetscCall(PetscCalloc3(4 * (size_t)mesh->ncell, &r->slot, 4 * (size_t)mesh->ncell, &r->weight,
+                         9 * (size_t)r->nlayer * mesh->nvert, &r->value));
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    r->slot[i] = r->nlayer * mesh->cell[i];
+    for (PetscInt k = 1; k < r->nlayer && material[r->slot[i]] != mesh->cell_material[i / 4]; k++)
+      r->slot[i]++;
+  }
+  PetscCall(PetscFree(material));
+  PetscCall(PetscFree2(found, count));
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree(at));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* 1 and the centroid of a cell relative to its corner a. */
+static inline void monomials(SbMesh mesh, PetscInt cell, int a, PetscReal p[4])
+{
+  const PetscInt *v = mesh->cell + 4 * cell;
+
+  p[0] = 1.;
+  for (int k = 0; k < 3; k++) {
+    p[k + 1] = -mesh->x[3 * v[a] + k];
+    for (int b = 0; b < 4; b++) p[k + 1] += 0.25 * mesh->x[3 * v[b] + k];
+  }
+}
+
+/* First row of the inverse of [n b^T; b B], moments n, b, upper B: (1, -y) / (n - b.y), y = B^-1 b. */
+static void solve_fit(const PetscReal moments[10], PetscReal row[4])
+{
+  const PetscReal *b = moments + 1, *M = moments + 4, ridge = RIDGE * (M[0] + M[3] + M[5]);
+  const PetscReal B[9] = {M[0] + ridge, M[1], M[2], M[1], M[3] + ridge, M[4], M[2], M[4], M[5] + ridge};
+  PetscReal cofactor[9], y[3];
+  const PetscReal det = SbMatDet(B);
+
+  SbMatCofactor(B, cofactor);
+  for (int k = 0; k < 3; k++) y[k] = SbDot3(cofactor + 3 * k, b) / det;
+  row[0] = 1. / (moments[0] - SbDot3(b, y));
+  for (int k = 0; k < 3; k++) row[k + 1] = -y[k] * row[0];
+}
+
+static PetscErrorCode create_weights(SbRecovery r)
+{
+  SbMesh mesh = r->mesh;
+  const PetscInt n = r->nlayer * mesh->nvert_owned;
+  PetscReal *moments, *row, p[4];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc2(10 * (size_t)n, &moments, 4 * (size_t)n, &row));
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    PetscReal *sum = moments + 10 * r->slot[i];
+
+    if (mesh->cell[i] >= mesh->nvert_owned) continue;
+    monomials(mesh, i / 4, (int)(i % 4), p);
+    for (int a = 0; a < 4; a++) {
+      for (int b = a; b < 4; b++) *sum++ += p[a] * p[b];
+    }
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    if (moments[10 * k] > 0.) solve_fit(moments + 10 * k, row + 4 * k);
+  }
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    if (mesh->cell[i] >= mesh->nvert_owned) continue;
+    monomials(mesh, i / 4, (int)(i % 4), p);
+    for (int a = 0; a < 4; a++) r->weight[i] += row[4 * r->slot[i] + a] * p[a];
+  }
+  PetscCall(PetscFree2(moments, row));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static inline PetscBool is_quadratic(SbRecovery r, PetscInt cell)
+{
+  return (PetscBool)(r->element[r->mesh->cell_body[cell]]->nodes_per[1] > 0);
+}
+
+static void monomials_of(const PetscReal d[3], PetscReal size, PetscReal p[NFIT])
+{
+  const PetscReal x = d[0] / size, y = d[1] / size, z = d[2] / size;
+  const PetscReal all[NFIT] = {1., x, y, z, x * x, y * y, z * z, x * y, y * z, z * x};
+
+  memcpy(p, all, sizeof(all));
+}
+
+/* Monomials at the points of a cell relative to its corner a, and their means over the cell. */
+static void point_monomials(SbMesh mesh, PetscInt cell, int a, PetscReal size, PetscReal p[5][NFIT])
+{
+  const PetscInt *v = mesh->cell + 4 * cell;
+
+  for (int k = 0; k < NFIT; k++) p[4][k] = 0.;
+  for (int q = 0; q < 4; q++) {
+    PetscReal d[3];
+
+    for (int k = 0; k < 3; k++) {
+      d[k] = -mesh->x[3 * v[a] + k];
+      for (int b = 0; b < 4; b++) d[k] += SbRuleQuadratic.L[q][b] * mesh->x[3 * v[b] + k];
+    }
+    monomials_of(d, size, p[q]);
+    for (int k = 0; k < NFIT; k++) p[4][k] += 0.25 * p[q][k];
+  }
+}
+
+static PetscErrorCode create_quadratic(SbRecovery r)
+{
+  SbMesh mesh = r->mesh;
+  const PetscInt n = r->nlayer * mesh->nvert_owned;
+  PetscBLASInt order = NFIT, info;
+  PetscInt *ncell;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc2(r->nlayer * mesh->nvert, &r->fit, n, &r->factor));
+
+  // length scales: root mean square of the distances of centroids
+  PetscCall(PetscCalloc1(n, &ncell));
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    PetscReal p[4];
+
+    if (mesh->cell[i] >= mesh->nvert_owned || !is_quadratic(r, i / 4)) continue;
+    monomials(mesh, i / 4, (int)(i % 4), p);
+    r->fit[r->slot[i]].size += SbDot3(p + 1, p + 1);
+    ncell[r->slot[i]]++;
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    if (ncell[k]) r->fit[k].size = PetscSqrtReal(r->fit[k].size / (PetscReal)ncell[k]);
+  }
+
+  // normal equations: sums of products of monomials
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    const PetscInt slot = r->slot[i];
+    PetscReal p[5][NFIT];
+
+    if (mesh->cell[i] >= mesh->nvert_owned || !is_quadratic(r, i / 4)) continue;
+    point_monomials(mesh, i / 4, (int)(i % 4), r->fit[slot].size, p);
+    for (int q = 0; q < 5; q++) {
+      for (int k = 0; k < NFIT * NFIT; k++) r->factor[slot][q == 4][k] += p[q][k / NFIT] * p[q][k % NFIT];
+    }
+  }
+  for (PetscInt s = 0; s < n; s++) {
+    if (!ncell[s]) continue;
+    for (int which = 0; which < 2; which++) {
+      PetscReal *A = r->factor[s][which];
+
+      for (int k = 1; k < NFIT; k++)
+        A[(NFIT + 1) * k] += (k >= 4 ? RIDGE_SECOND : which ? RIDGE_SLOPE : 1e-12) * A[0];
+      LAPACKpotrf_("L", &order, A, &order, &info);
+      PetscCheck(!info, PETSC_COMM_SELF, PETSC_ERR_LIB, "The sums at a vertex are not definite: %d",
+                 (int)info);
+    }
+  }
+  PetscCall(PetscFree(ncell));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fits polynomials of degree two to the stresses of P2 cells, set on owned ones. */
+static PetscErrorCode fit_quadratic(SbRecovery r, SbPointStress stress[])
+{
+  SbMesh mesh = r->mesh;
+  const PetscInt n = r->nlayer * mesh->nvert_owned;
+  PetscBLASInt order = NFIT, nine = 9, one = 1, info;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbMeshBroadcastCells(mesh, sizeof(*stress) / sizeof(PetscReal), MPIU_REAL, stress));
+  for (PetscInt s = 0; s < n; s++) memset(r->fit[s].c, 0, sizeof(r->fit[s].c));
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    struct Fit *fit = r->fit + r->slot[i];
+    PetscReal p[5][NFIT];
+
+    if (mesh->cell[i] >= mesh->nvert_owned || !is_quadratic(r, i / 4)) continue;
+    point_monomials(mesh, i / 4, (int)(i % 4), fit->size, p);
+    for (int m = 0; m < NFIT; m++) {
+      for (int q = 0; q < 4; q++) {
+        for (int k = 0; k < 9; k++) fit->c[k][m] += p[q][m] * stress[i / 4].P[q][k];
+      }
+      fit->c[9][m] += p[4][m] * stress[i / 4].pressure;
+    }
+  }
+  for (PetscInt s = 0; s < n; s++) {
+    if (!(r->fit[s].size > 0.)) continue;
+    LAPACKpotrs_("L", &order, &nine, r->factor[s][0], &order, r->fit[s].c[0], &order, &info);
+    LAPACKpotrs_("L", &order, &one, r->factor[s][1], &order, r->fit[s].c[9], &order, &info);
+  }
+  PetscCall(
+    SbMeshBroadcastVertices(mesh, r->nlayer * (sizeof(*r->fit) / sizeof(PetscReal)), MPIU_REAL, r->fit));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The recovered stress and, returned, pressure at node a = 0..9 of an owned P2 cell. */
+static PetscReal recovered(SbRecovery r, PetscInt cell, int a, PetscReal P[9])
+{
+  const PetscInt *v = r->mesh->cell + 4 * cell, *slot = r->slot + 4 * cell;
+  PetscReal value[NVALUE] = {0.};
+
+  if (a < 4) {
+    for (int k = 0; k < 9; k++) P[k] = r->fit[slot[a]].c[k][0];
+    return r->fit[slot[a]].c[9][0];
+  }
+  for (int end = 0; end < 2; end++) {
+    const int from = SbTetEdge[a - 4][end], to = SbTetEdge[a - 4][1 - end];
+    const struct Fit *fit = r->fit + slot[from];
+    PetscReal d[3], p[NFIT];
+
+    for (int k = 0; k < 3; k++) d[k] = 0.5 * (r->mesh->x[3 * v[to] + k] - r->mesh->x[3 * v[from] + k]);
+    monomials_of(d, fit->size, p);
+    for (int m = 0; m < NFIT; m++) {
+      for (int k = 0; k < NVALUE; k++) value[k] += 0.5 * p[m] * fit->c[k][m];
+    }
+  }
+  memcpy(P, value, 9 * sizeof(*P));
+  return value[9];
+}
+
+/* ------------------------------------------------------------------ energies */
 
 /* Sums over a body. Energies in J. */
 typedef enum {
@@ -87,8 +368,15 @@ PetscErrorCode SbSpaceEstimateCreate(SbModel model, SbSpaceEstimate *estimate)
     stiff = (PetscBool)(stiff || is_stiff(model, b));
     quadratic = (PetscBool)(quadratic || model->element[b]->nodes_per[1]);
   }
-  PetscCall(SbRecoveryCreate(model->mesh, model->element, &est->recovery));
-  if (quadratic) PetscCall(PetscMalloc1(model->mesh->ncell, &est->stress));
+  PetscCall(PetscNew(&est->recovery));
+  est->recovery->mesh = model->mesh;
+  est->recovery->element = model->element;
+  PetscCall(create_slots(est->recovery));
+  PetscCall(create_weights(est->recovery));
+  if (quadratic) {
+    PetscCall(create_quadratic(est->recovery));
+    PetscCall(PetscMalloc1(model->mesh->ncell, &est->stress));
+  }
   PetscCall(PetscCalloc3(model->nbody, &est->body2, model->nbody, &est->strain, model->nbody, &est->factor));
   PetscCall(PetscCalloc3(n, &est->cell2, n, &est->psi, 9 * (size_t)model->mesh->ncell, &est->P));
   if (!model->space->linear) PetscCall(PetscMalloc1(9 * (size_t)n, &est->R));
@@ -103,7 +391,9 @@ PetscErrorCode SbSpaceEstimateDestroy(SbSpaceEstimate *estimate)
 
   PetscFunctionBeginUser;
   if (!est) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbRecoveryDestroy(&est->recovery));
+  PetscCall(PetscFree3(est->recovery->slot, est->recovery->weight, est->recovery->value));
+  PetscCall(PetscFree2(est->recovery->fit, est->recovery->factor));
+  PetscCall(PetscFree(est->recovery));
   PetscCall(PetscFree3(est->body2, est->strain, est->factor));
   PetscCall(PetscFree3(est->cell2, est->psi, est->P));
   PetscCall(PetscFree(est->stress));
@@ -160,7 +450,7 @@ static PetscReal add_cell(SbSpaceEstimate est, PetscInt c, PetscReal G, PetscRea
 
   turn(R, est->P + 9 * c, s);
   for (int a = 0; a < 4; a++) {
-    turn(R, SbRecoveryCorner(est->recovery, c, a), star[a]);
+    turn(R, est->recovery->value + 9 * est->recovery->slot[4 * c + a], star[a]);
     for (int k = 0; k < 6; k++) {
       off[a][k] = star[a][k] - s[k];
       off[4][k] += off[a][k];
@@ -193,7 +483,7 @@ static PetscReal quadratic_off(SbSpaceEstimate est, PetscInt c, PetscReal G, Pet
     const int i = a < 4 ? a : SbTetEdge[a - 4][0], j = a < 4 ? a : SbTetEdge[a - 4][1];
     PetscReal P[9], mean;
 
-    pressure += (a < 4 ? -0.05 : 0.2) * SbRecoveryNode(est->recovery, c, a, P);
+    pressure += (a < 4 ? -0.05 : 0.2) * recovered(est->recovery, c, a, P);
     for (int k = 0; k < 9; k++) {
       const PetscReal sum = at->P[0][k] + at->P[1][k] + at->P[2][k] + at->P[3][k];
 
@@ -236,16 +526,18 @@ static PetscReal stiff_error(const PetscReal sum[NSUM])
 
 PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, Vec V, Vec A)
 {
-  SbModel model = est->model;
+  const SbModel model = est->model;
+  const SbMesh mesh = model->mesh;
+  const SbRecovery r = est->recovery;
   const PetscReal *u;
-  PetscReal(*sum)[NSUM], *G, *K, *point = NULL;
+  PetscReal(*sum)[NSUM], *point = NULL;
 
   PetscFunctionBeginUser;
-  if (est->stress) PetscCall(PetscCalloc1(36 * (size_t)model->mesh->ncell, &point));
+  if (est->stress) PetscCall(PetscCalloc1(36 * (size_t)mesh->ncell, &point));
   PetscCall(SbSpaceGetLocalRead(model->space, U, &u));
   SbSpaceCellPiola(model->space, u, est->P, est->R, est->psi, point);
   PetscCall(SbSpaceRestoreLocalRead(model->space, U, &u));
-  for (PetscInt c = 0; point && c < model->mesh->ncell_owned; c++) {
+  for (PetscInt c = 0; point && c < mesh->ncell_owned; c++) {
     PetscReal s[6];
 
     turn(est->R ? est->R + 9 * c : NULL, est->P + 9 * c, s);
@@ -253,58 +545,62 @@ PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, V
     est->stress[c].pressure = (s[0] + s[1] + s[2]) / 3.;
   }
   PetscCall(PetscFree(point));
-  if (est->stress) PetscCall(SbRecoveryApplyQuadratic(est->recovery, est->stress));
-  PetscCall(SbRecoveryApply(est->recovery, est->P));
 
-  /* sums over the cells of each body; the moduli of each law are computed once */
-  PetscCall(PetscCalloc1(model->nbody, &sum));
-  PetscCall(PetscMalloc2(model->nmaterial, &G, model->nmaterial, &K));
-  for (PetscInt k = 0; k < model->nmaterial; k++) {
-    G[k] = model->material[k]->mu;
-    K[k] = SbMaterialBulkModulus(model->material[k]);
+  /* recovered stresses */
+  if (est->stress) PetscCall(fit_quadratic(r, est->stress));
+  PetscCall(SbMeshBroadcastCells(mesh, 9, MPIU_REAL, est->P));
+  PetscCall(PetscArrayzero(r->value, 9 * (size_t)r->nlayer * mesh->nvert));
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    for (int k = 0; k < 9; k++) r->value[9 * r->slot[i] + k] += r->weight[i] * est->P[9 * (i / 4) + k];
   }
-  for (PetscInt c = 0; c < model->mesh->ncell_owned; c++) {
-    const PetscInt k = model->mesh->cell_material[c], body = model->mesh->cell_body[c];
+  PetscCall(SbMeshBroadcastVertices(mesh, 9 * r->nlayer, MPIU_REAL, r->value));
+
+  /* sums over the cells of each body */
+  PetscCall(PetscCalloc1(model->nbody, &sum));
+  for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
+    const SbMaterial law = model->material[mesh->cell_material[c]];
+    const PetscReal K = SbMaterialBulkModulus(law);
+    const PetscInt body = mesh->cell_body[c];
 
     if (model->element[body]->nodes_per[1]) {
-      est->cell2[c] = quadratic_off(est, c, G[k], K[k]);
+      est->cell2[c] = quadratic_off(est, c, law->mu, K);
       sum[body][SHEAR_OFF] += est->cell2[c];
-      sum[body][STRAIN] += cell_volume(model->mesh, c) * est->psi[c];
+      sum[body][STRAIN] += cell_volume(mesh, c) * est->psi[c];
     } else
-      est->cell2[c] = add_cell(est, c, G[k], K[k], sum[body]);
+      est->cell2[c] = add_cell(est, c, law->mu, K, sum[body]);
   }
-  PetscCall(PetscFree2(G, K));
   if (est->residual) {
-    const PetscReal *r;
+    const PetscReal *force;
 
     /* the terms of theta: forces of supports and contact, and the displacements of nodes there */
     PetscCall(SbModelResidual(model, t, U, V, A, PETSC_FALSE, est->residual));
-    PetscCall(VecGetArrayRead(est->residual, &r));
+    PetscCall(VecGetArrayRead(est->residual, &force));
     PetscCall(VecGetArrayRead(U, &u));
     for (PetscInt i = 0; i < 3 * model->space->nnode_owned; i++) {
       PetscReal *mine = sum[model->space->node_body[i / 3]];
 
-      mine[FORCE_SIZE + i % 3] += PetscAbsReal(r[i]);
-      mine[SHIFT + i % 3] += PetscAbsReal(r[i]) * u[i];
-      mine[FORCE + i % 3] += r[i];
-      mine[WORK + i % 3] += r[i] * u[i];
+      mine[FORCE_SIZE + i % 3] += PetscAbsReal(force[i]);
+      mine[SHIFT + i % 3] += PetscAbsReal(force[i]) * u[i];
+      mine[FORCE + i % 3] += force[i];
+      mine[WORK + i % 3] += force[i] * u[i];
     }
     PetscCall(VecRestoreArrayRead(U, &u));
-    PetscCall(VecRestoreArrayRead(est->residual, &r));
+    PetscCall(VecRestoreArrayRead(est->residual, &force));
   }
   PetscCallMPI(
     MPI_Allreduce(MPI_IN_PLACE, sum, (PetscMPIInt)(NSUM * model->nbody), MPIU_REAL, MPI_SUM, model->comm));
 
   /* results of each body from its sums */
+  est->total2 = 0.;
   for (PetscInt b = 0; b < model->nbody; b++) {
     const PetscReal off = sum[b][SHEAR_OFF] + sum[b][PRESSURE_OFF];
 
     est->strain[b] = sum[b][STRAIN];
     est->body2[b] = is_stiff(model, b) ? stiff_error(sum[b]) : off;
+    est->total2 += est->body2[b];
     est->factor[b] = off > 0. ? est->body2[b] / off : 1.;
   }
-  for (PetscInt c = 0; c < model->mesh->ncell_owned; c++)
-    est->cell2[c] *= est->factor[model->mesh->cell_body[c]];
+  for (PetscInt c = 0; c < mesh->ncell_owned; c++) est->cell2[c] *= est->factor[mesh->cell_body[c]];
   PetscCall(PetscFree(sum));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

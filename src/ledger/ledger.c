@@ -107,12 +107,10 @@ static PetscErrorCode examine_step(SbRun run, const SbSolvedStep *step, void *ct
 
   /* norm of the last residual, N, known from the solver without an evaluation */
   if (step->solved) {
-    PetscBool single;
     KSP ksp;
 
-    PetscCall(PetscObjectTypeCompare((PetscObject)run->snes, SNESKSPONLY, &single));
     PetscCall(SNESGetKSP(run->snes, &ksp));
-    if (single)
+    if (run->single)
       PetscCall(KSPGetResidualNorm(ksp, &l->residual));
     else
       PetscCall(SNESGetFunctionNorm(run->snes, &l->residual));
@@ -164,17 +162,14 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   begin(l);
   if (!first && (step->last || (l->every && step->step % l->every == 0))) {
     const SbModel m = l->run->model;
-    PetscReal sum = 0., contact = 0.;
+    PetscReal contact = 0.;
 
     PetscCall(SbSpaceEstimateCompute(l->space, step->t, step->U, step->V, step->A));
-    for (PetscInt b = 0; b < m->nbody; b++) {
-      l->space_error[b] = l->space->body2[b];
-      sum += l->space->body2[b];
-    }
+    PetscCall(PetscArraycpy(l->space_error, l->space->body2, m->nbody));
     l->error[SB_ERROR_SPACE] =
-      m->dynamic ? PetscMax(l->error[SB_ERROR_SPACE], PetscSqrtReal(sum)) : PetscSqrtReal(sum);
+      PetscMax(m->dynamic ? l->error[SB_ERROR_SPACE] : 0., PetscSqrtReal(l->space->total2));
     if ((m->nbegin_step || m->npotential) && step->R) PetscCall(SbEstimateContact(l, step, &contact));
-    l->error[SB_ERROR_CONTACT] = m->dynamic ? PetscMax(l->error[SB_ERROR_CONTACT], contact) : contact;
+    l->error[SB_ERROR_CONTACT] = PetscMax(m->dynamic ? l->error[SB_ERROR_CONTACT] : 0., contact);
     l->own_work += SPACE_WORK;
   }
   if (l->quantity.kind) PetscCall(SbQuantityValue(l, step));

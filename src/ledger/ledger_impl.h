@@ -79,7 +79,7 @@ static inline PetscReal SbLedgerError(SbLedger l, int source)
 PetscErrorCode SbStiffnessTimes(SbLedger l, PetscReal t, Vec U, Vec D, PetscBool strain, Vec R);
 /* Twice the strain energy of a displacement D, by the tangent at U, J. Collective. */
 PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal *form);
-/* Sum of the lumped mass times the square of a vector, all ranks. Collective. */
+/* Sum of the lumped mass times the square of a vector other than l->w[2], all ranks. Collective. */
 PetscErrorCode SbMassForm(SbLedger l, Vec D, PetscReal *form);
 /* X = J^-1 B with the solver and tangent of the last solve, to rtol, from zero; its: iterations. */
 PetscErrorCode SbProbeSolve(SbLedger l, PetscReal rtol, Vec B, Vec X, PetscInt *its);

@@ -75,18 +75,6 @@ static int largest(SbLedger l)
   return most;
 }
 
-/* Edge of a regular tet of the mean volume, m. */
-static PetscReal mesh_size(SbModel m)
-{
-  PetscReal volume = 0., n = 0.;
-
-  for (PetscInt b = 0; b < m->nbody; b++) {
-    volume += m->body[b].volume;
-    n += (PetscReal)m->body[b].ncell;
-  }
-  return PetscPowReal(6. * PetscSqrtReal(2.) * volume / n, 1. / 3.);
-}
-
 /* The body with the largest error of the mesh. */
 static PetscInt worst_body(SbLedger l)
 {
@@ -170,27 +158,23 @@ static void say_largest(SbLedger l, const Seconds *s, char w[ROOM])
 {
   static const char *const what[SB_ERROR_COUNT] = {
     "the mesh is the largest source of error: halving it takes edges of %.3g times the length",
-    "the time step is the largest source of error: halving it takes steps of %.3g s",
+    "the time step is the largest source: halving it takes steps of %.3g s",
     "Newton's method stops too early: halving its error takes a smaller -snes_rtol",
     "the linear solver is the largest source of error: halving it takes a smaller -ksp_rtol",
     "contact is the largest source of error: a smaller -effect_..._barrier_width, or response projected",
     "rounding is the largest source of error: only other units or a smaller range of stiffnesses helps"};
   const int most = largest(l);
   const SbRun run = l->run;
+  PetscReal half; /* length of edges over the present one, or of steps, s, for half the error */
 
   if (!(SbLedgerError(l, most) > 0.)) {
     SbAppend(ROOM, w, "No error was found that could be distinguished from zero. ");
     return;
   }
   SbAppend(ROOM, w, "Of an error of %.2g %%, ", (double)(100. * together(l) / PetscSqrtReal(l->stored)));
-  if (most == SB_ERROR_TIME)
-    SbAppend(
-      ROOM, w, "the time step is the largest source: halving it takes steps of %.3g s",
-      (double)(run->t_end / PetscMax(1, run->steps_total) / PetscPowReal(2., 1. / (PetscReal)l->order)));
-  else if (most == SB_ERROR_SPACE)
-    SbAppend(ROOM, w, what[most], (double)PetscPowReal(0.5, 1. / order_of_space(l)));
-  else
-    SbAppend(ROOM, w, "%s", what[most]);
+  half = PetscPowReal(0.5, 1. / (most == SB_ERROR_TIME ? (PetscReal)l->order : order_of_space(l)));
+  if (most == SB_ERROR_TIME) half *= run->t_end / PetscMax(1, run->steps_total);
+  SbAppend(ROOM, w, what[most], (double)half);
   if (most != SB_ERROR_CONTACT && most != SB_ERROR_ROUNDING)
     SbAppend(ROOM, w, ", and %.2g times the time", (double)cost(l, s, most));
   SbAppend(ROOM, w, ". ");
@@ -211,12 +195,11 @@ static void say_wasted(SbLedger l, const Seconds *s, char w[ROOM])
   if (l->may_tune) return; /* the adaptive tolerance sets them */
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
     const PetscReal e = SbLedgerError(l, of[i].source);
-    const PetscReal spent = s->source[of[i].source] / PetscMax(s->total, 1e-9);
+    const PetscBool cheap = (PetscBool)(s->source[of[i].source] < 0.1 * PetscMax(s->total, 1e-9));
+    const PetscBool factorised = (PetscBool)(l->run->linear_total <= l->run->newton_total); /* no tolerance */
 
-    if (!(e > 0.) || e * WASTE > most || (of[i].source != SB_ERROR_TIME && spent < 0.1)) continue;
-    if (of[i].source == SB_ERROR_TIME && !l->run->model->dynamic) continue;
-    if (of[i].source != SB_ERROR_TIME && l->run->linear_total <= l->run->newton_total)
-      continue; /* factorisations have no tolerance */
+    if (!(e > 0.) || e * WASTE > most) continue;
+    if (of[i].source == SB_ERROR_TIME ? !l->run->model->dynamic : cheap || factorised) continue;
     SbAppend(
       ROOM, w,
       "%s is wasted: its error is %.1g times the largest one, and could be %.1g times as large unnoticed. ",
@@ -229,8 +212,15 @@ static void report_accuracy(SbLedger l, char w[ROOM])
 {
   const PetscReal all = together(l) / PetscSqrtReal(PetscMax(l->stored, PETSC_MIN_REAL));
   const PetscReal mesh = l->error[SB_ERROR_SPACE] / PetscSqrtReal(PetscMax(l->stored, PETSC_MIN_REAL));
-  const PetscReal h = mesh_size(l->run->model);
+  const SbModel m = l->run->model;
+  PetscReal volume = 0., n = 0., h;
 
+  /* size of the mesh: edge of a regular tet of the mean volume, m */
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    volume += m->body[b].volume;
+    n += (PetscReal)m->body[b].ncell;
+  }
+  h = PetscPowReal(6. * PetscSqrtReal(2.) * volume / n, 1. / 3.);
   if (l->accuracy > 0.) {
     SbAppend(ROOM, w, "-accuracy %.3g was %s. ", (double)l->accuracy, all <= l->accuracy ? "met" : "NOT met");
     if (mesh > 0.7 * l->accuracy)

@@ -69,15 +69,12 @@ static PetscErrorCode put_at(Path *p, PetscReal factor)
 static PetscErrorCode create(SbRun run, Path *p)
 {
   const SbModel m = run->model;
-  PetscScalar *w;
   PetscReal moved;
 
   PetscFunctionBeginUser;
   *p = (Path){.run = run, .negative = -1};
   for (int k = 0; k < 9; k++) PetscCall(VecDuplicate(run->U, &p->all[k]));
-  PetscCall(VecGetArray(p->weight, &w));
-  for (PetscInt i = 0; i < 3 * m->space->nnode_owned; i++) w[i] = m->space->node_mass[i / 3] / m->mass;
-  PetscCall(VecRestoreArray(p->weight, &w));
+  PetscCall(VecAXPBY(p->weight, 1. / m->mass, 0., run->mass));
   /* whether R is linear in lambda */
   PetscCall(VecZeroEntries(p->X));
   PetscCall(put_at(p, 1.));

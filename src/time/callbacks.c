@@ -99,13 +99,18 @@ PetscErrorCode SbFormStaticJacobian(SNES snes, Vec U, Mat J, Mat P, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A)
+PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, PetscBool constrain, Vec A)
 {
-  SbSpace s = run->model->space;
-  PetscScalar *a;
+  const SbSpace s = run->model->space;
+  Vec kept = NULL;
 
   PetscFunctionBeginUser;
-  PetscCall(SbModelResidual(run->model, t, U, V, NULL, PETSC_TRUE, A));
+  if (!constrain) {
+    PetscCall(VecDuplicate(A, &kept));
+    PetscCall(VecCopy(A, kept));
+    PetscCall(SbSpaceZeroPrescribed(s, PETSC_FALSE, kept));
+  }
+  PetscCall(SbModelResidual(run->model, t, U, V, NULL, constrain, A));
   if (s->consistent_mass) {
     Mat M;
     KSP ksp;
@@ -124,13 +129,13 @@ PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A)
     PetscCall(KSPSolve(ksp, A, A));
     PetscCall(KSPDestroy(&ksp));
     PetscCall(MatDestroy(&M));
-  } else {
-    PetscCall(VecGetArray(A, &a));
-    /* supports have no mass, and are prescribed */
-    for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
-      a[i] = s->node_mass[i / 3] > 0. ? a[i] / s->node_mass[i / 3] : 0.;
-    PetscCall(VecRestoreArray(A, &a));
-  }
+  } else
+    PetscCall(VecPointwiseDivide(A, A, run->mass));
   PetscCall(VecScale(A, -1.));
+  if (!constrain) {
+    PetscCall(SbSpaceZeroPrescribed(s, PETSC_TRUE, A));
+    PetscCall(VecAXPY(A, 1., kept));
+    PetscCall(VecDestroy(&kept));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

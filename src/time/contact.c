@@ -1,6 +1,6 @@
 /*
-  The active-set iteration of a step with contact: solve, update the active set, repeat until it does not
-  change.
+  The solves of a step. With contact an active-set iteration: solve, update the active set, repeat until it
+  does not change.
 
   Later solves start near their solution, and a tolerance relative to their first residual could be below the
   rounding of large contact forces. So all solves of a step have the absolute tolerance of the first one;
@@ -20,25 +20,39 @@
 typedef struct {
   PetscReal atol, rtol, linear_rtol, linear_atol;
   KSP ksp;
-  PetscBool single; /* one linear solve per step instead of Newton's method */
 } Aim;
 
 /* Sets the tolerances of a step with the first residual `size`, N; 0: the user's. least: rounding, N. */
-static PetscErrorCode set_aim(SNES snes, const Aim *aim, PetscReal size, PetscReal least, PetscBool rough)
+static PetscErrorCode set_aim(SbRun run, const Aim *aim, PetscReal size, PetscReal least, PetscBool rough)
 {
-  const PetscReal rtol = aim->single ? aim->linear_rtol : aim->rtol;
+  const PetscReal rtol = run->single ? aim->linear_rtol : aim->rtol;
   const PetscReal part = rough ? PetscMax(rtol, PetscMin(ROUGH, LOOSER * rtol)) : rtol;
   const PetscReal atol = PetscMax(PetscMax(aim->atol, least), (rough ? part : aim->rtol) * size);
-  const PetscReal linear = (aim->single ? 1 : 0.1) * PetscMax(least, part * size);
+  const PetscReal linear = (run->single ? 1 : 0.1) * PetscMax(least, part * size);
 
   PetscFunctionBeginUser;
-  PetscCall(SNESSetTolerances(snes, atol, aim->rtol, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
+  PetscCall(SNESSetTolerances(run->snes, atol, aim->rtol, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
   PetscCall(KSPSetTolerances(aim->ksp, PETSC_DEFAULT, PetscMax(aim->linear_atol, linear), PETSC_DEFAULT,
                              PETSC_DEFAULT));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConvergedReason *reason)
+/* From the displacement in U. */
+static PetscErrorCode solve(SbRun run, Vec U, SNESConvergedReason *reason)
+{
+  PetscInt newton, linear;
+
+  PetscFunctionBeginUser;
+  PetscCall(SNESSolve(run->snes, NULL, U));
+  PetscCall(SNESGetConvergedReason(run->snes, reason));
+  PetscCall(SNESGetIterationNumber(run->snes, &newton));
+  PetscCall(SNESGetLinearSolveIterations(run->snes, &linear));
+  run->newton_step += newton;
+  run->linear_step += linear;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *step, SNESConvergedReason *reason)
 {
   const SbModel m = run->model;
   const SNES snes = run->snes;
@@ -49,6 +63,10 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
   Aim aim;
 
   PetscFunctionBeginUser;
+  if (!m->nbegin_step) {
+    PetscCall(solve(run, U, reason));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (!run->R) PetscCall(VecDuplicate(U, &run->R));
   run->time_of_impact = 1.;
 
@@ -56,7 +74,6 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
   PetscCall(SNESGetKSP(snes, &aim.ksp));
   PetscCall(SNESGetTolerances(snes, &aim.atol, &aim.rtol, NULL, NULL, NULL));
   PetscCall(KSPGetTolerances(aim.ksp, &aim.linear_rtol, &aim.linear_atol, NULL, NULL));
-  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &aim.single));
 
   /* the initial active set */
   PetscCall(SbModelContactBeginStep(m, step->t, step->dt, step->U0, run->V, U));
@@ -78,9 +95,9 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
 
   /* solves until the active set does not change; the first one without contact has the user's tolerances */
   for (PetscInt round = 1;; round++) {
-    if (constrained || round > 1) PetscCall(set_aim(snes, &aim, size, least, rough));
+    if (constrained || round > 1) PetscCall(set_aim(run, &aim, size, least, rough));
     PetscCall(SbSolverUpdateSymmetry(aim.ksp, m->space));
-    PetscCall((*step->solve)(step->ctx, U, reason));
+    PetscCall(solve(run, U, reason));
     if (*reason <= 0) break;
     run->contact_round = round;
     PetscCall((*step->residual)(step->ctx, U, run->R));
@@ -101,6 +118,6 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
       break;
     }
   }
-  PetscCall(set_aim(snes, &aim, 0, 0, PETSC_FALSE));
+  PetscCall(set_aim(run, &aim, 0, 0, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -93,8 +93,8 @@ PetscErrorCode SbTimeRegister(void)
   PetscFunctionBeginUser;
   PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
   PetscCall(SbSolverRegister());
-  PetscCall(SbSecondOrderRegister());
-  PetscCall(SbNewtonRegister());
+  PetscCall(TSRegister(SB_TS_SECOND_ORDER, SbSecondOrderCreate));
+  PetscCall(SNESRegister(SB_SNES_NEWTON, SbNewtonCreate));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -278,6 +278,7 @@ static PetscErrorCode set_up_snes(SbRun run)
     PetscCall(TSSetFromOptions(run->ts));
   else
     PetscCall(SNESSetFromOptions(snes));
+  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &run->single));
   PetscCall(SbSolverFinish(snes, m->space, run->solver_used, run->J));
   PetscCall(SbNewtonSetRun(snes, run));
 
@@ -311,6 +312,28 @@ static PetscErrorCode step_accepted(TS ts, PetscInt step, PetscReal t, Vec U, vo
   run->linear_step = linear + run->linear_before - run->linear_total;
   PetscCall(SbRunStepAccepted(run, step, t, step == run->step0 ? 0. : t - previous,
                               (PetscBool)((reason > 0 && !run->paused) || t >= run->t_end * (1. - 1e-12))));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Re-meshing and requests to stop, before monitors. */
+static PetscErrorCode after_step(TS ts)
+{
+  TSConvergedReason reason;
+  PetscReal t, before;
+  PetscInt step;
+  SbRun run;
+
+  PetscFunctionBeginUser;
+  PetscCall(TSGetApplicationContext(ts, &run));
+  PetscCall(TSGetConvergedReason(ts, &reason));
+  PetscCall(TSGetTime(ts, &t));
+  if (reason || t >= run->t_end * (1. - 1e-12)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(TSGetStepNumber(ts, &step));
+  PetscCall(TSGetPrevTime(ts, &before));
+  run->after.dt = t - before;
+  if (run->after.fn) PetscCall((*run->after.fn)(run, step, t, t - before, run->after.ctx, &run->paused));
+  PetscCall(SbRunStopAsked(run, step, t, PETSC_FALSE));
+  if (run->paused || run->stopped) PetscCall(TSSetConvergedReason(ts, TS_CONVERGED_USER));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -381,7 +404,7 @@ static PetscErrorCode set_up_ts(SbRun run)
   PetscCall(TSSetTimeStep(run->ts, run->dt));
   PetscCall(TSMonitorSet(run->ts, step_accepted, run, NULL));
   PetscCall(TSSetApplicationContext(run->ts, run));
-  PetscCall(TSSetPostStep(run->ts, SbRunAfterStep));
+  PetscCall(TSSetPostStep(run->ts, after_step));
   PetscCall(TSGetAdapt(run->ts, &adapt));
   PetscCall(PetscObjectTypeCompare((PetscObject)adapt, TSADAPTNONE, &run->fixed_step));
   m->barrier_apart = (PetscBool)(m->npotential && run->preset != SB_TIME_EULER_IMPLICIT);
@@ -427,7 +450,7 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
     "The effect %s needs several solves in a step: use -time euler_implicit, newmark, genalpha or static",
     name);
   if (run->preset == SB_TIME_NEWMARK) {
-    /* newmark_contact.c needs the trapezoidal rule, the lumped mass, and forces on constrained nodes only */
+    /* its contact needs the trapezoidal rule, the lumped mass, and forces on constrained nodes only */
     PetscCheck(run->newmark[0] == 0.25 && run->newmark[1] == 0.5, m->comm, PETSC_ERR_USER_INPUT,
                "-time newmark with the effect %s needs -time_newmark_beta 0.25 and -time_newmark_gamma 0.5, "
                "not %g and %g: else impacts may gain energy",
@@ -464,13 +487,18 @@ PetscErrorCode SbRunSetUp(SbRun run)
   const SbModel m = run->model;
   const PetscBool explicit = SbRunIsExplicit(run);
   const SbSpace s = m->space;
-  PetscBool single, warped = PETSC_FALSE;
+  PetscBool warped = PETSC_FALSE;
+  PetscScalar *mass;
   char reason[128];
 
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < m->nbody; b++) {
     if (s->alpha[b] != 0. || s->beta[b] != 0.) run->damped = m->dynamic;
   }
+  PetscCall(SbSpaceCreateVec(s, &run->mass));
+  PetscCall(VecGetArrayWrite(run->mass, &mass));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) mass[i] = s->node_mass[i / 3];
+  PetscCall(VecRestoreArrayWrite(run->mass, &mass));
   PetscCall(SbSpaceCreateVec(s, &run->U));
   if (m->dynamic) {
     PetscCall(SbSpaceCreateVec(s, &run->V));
@@ -542,16 +570,12 @@ PetscErrorCode SbRunSetUp(SbRun run)
   }
 
   /* one solve per step, with a tangent maybe too soft: no bound on the energy (docs/reference/theory.md) */
-  if (run->velocity_predictor && !m->linear && run->snes) {
-    PetscCall(PetscObjectTypeCompare((PetscObject)run->snes, SNESKSPONLY, &single));
-    for (PetscInt r = 0; r < s->nregion; r++)
-      warped = (PetscBool)(warped || s->region[r].material->tangent == SB_TANGENT_WARPED);
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &warped, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
-    if (single && warped)
-      PetscCall(SbWarning(
-        s->comm, "-snes_type ksponly with -time_predictor velocity and a warped tangent may gain energy "
-                 "without bound: give -body_<name>_tangent exact_spd, or leave the predictor out"));
-  }
+  for (PetscInt k = 0; k < m->nmaterial; k++)
+    warped = (PetscBool)(warped || m->material[k]->tangent == SB_TANGENT_WARPED);
+  if (run->velocity_predictor && !m->linear && run->single && warped)
+    PetscCall(SbWarning(
+      s->comm, "-snes_type ksponly with -time_predictor velocity and a warped tangent may gain energy "
+               "without bound: give -body_<name>_tangent exact_spd, or leave the predictor out"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -618,8 +642,9 @@ PetscErrorCode SbRunSolve(SbRun run)
 PetscErrorCode SbRunDestroy(SbRun *run)
 {
   SbRun r = *run;
-  Vec *const vectors[] = {&r->R, &r->nonsymmetric.U, &r->nonsymmetric.x, &r->nonsymmetric.y, &r->U,   &r->V,
-                          &r->A, &r->loads,          &r->reaction,       &r->previous,       &r->path};
+  Vec *const vectors[] = {
+    &r->R, &r->nonsymmetric.U, &r->nonsymmetric.x, &r->nonsymmetric.y, &r->U,    &r->V,
+    &r->A, &r->loads,          &r->reaction,       &r->previous,       &r->path, &r->mass};
 
   PetscFunctionBeginUser;
   if (!r) PetscFunctionReturn(PETSC_SUCCESS);

@@ -200,7 +200,7 @@ static PetscErrorCode add_shift(SNES snes, PetscBool first, PetscReal *least, Pe
 {
   Newton *n = (Newton *)snes->data;
   const SbModel m = n->run->model;
-  PetscScalar stiff, *d;
+  PetscScalar stiff;
 
   PetscFunctionBeginUser;
   if (*least == 0.) {
@@ -211,9 +211,7 @@ static PetscErrorCode add_shift(SNES snes, PetscBool first, PetscReal *least, Pe
   }
   if (*shift < *least) *shift = first ? 0. : *least;
   if (*shift == 0.) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecGetArray(n->to.r, &d));
-  for (PetscInt i = 0; i < 3 * m->space->nnode_owned; i++) d[i] = *shift * m->space->node_mass[i / 3];
-  PetscCall(VecRestoreArray(n->to.r, &d));
+  PetscCall(VecAXPBY(n->to.r, *shift, 0., n->run->mass));
   PetscCall(MatDiagonalSet(snes->jacobian_pre, n->to.r, ADD_VALUES));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -720,7 +718,7 @@ static PetscErrorCode SNESDestroy_Newton(SNES snes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SNESCreate_Newton(SNES snes)
+PetscErrorCode SbNewtonCreate(SNES snes)
 {
   Newton *n;
 
@@ -732,13 +730,6 @@ static PetscErrorCode SNESCreate_Newton(SNES snes)
   snes->ops->reset = SNESReset_Newton;
   snes->ops->destroy = SNESDestroy_Newton;
   snes->usesksp = PETSC_TRUE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbNewtonRegister(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SNESRegister(SB_SNES_NEWTON, SNESCreate_Newton));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

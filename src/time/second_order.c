@@ -5,7 +5,7 @@
     generalized-alpha (Chung and Hulbert 1993; fractions of the new state as in PETSc's TSALPHA2)
       a1 = (s - h v0 - h^2 (1/2 - beta) a0) / (beta h^2),  v1 = v0 + h ((1 - gamma) a0 + gamma a1)
       F(t0 + alpha_f h, u0 + alpha_f s, v0 + alpha_f (v1 - v0), a0 + alpha_m (a1 - a0)) = 0
-    Newmark: alpha_m = alpha_f = 1; with contact: newmark_contact.c, a0 is the acceleration without contact
+    Newmark: alpha_m = alpha_f = 1; with contact: below, a0 is the acceleration without contact
     implicit Euler: v1 = s / h, a1 = (v1 - v0) / h (it is not a Newmark method)
     explicit Euler: u1 = u0 + h v0, v1 = v0 + h a0; symplectic: v1 = v0 + h a0, u1 = u0 + h v1; M a0 = f0
 
@@ -24,6 +24,30 @@
   up to the first time of impact; the remainder is the next step (contact.c). A step whose solve fails is
   halved and repeated; after four good steps its length doubles, up to the nominal one. The local error for
   TSAdapt is h^2 (beta - 1/6) (a1 - a0) (Zienkiewicz and Xie 1991), for implicit Euler h^2/2 a1.
+
+  Newmark with contact: the trapezoidal rule with implicit contact forces. With a the acceleration without
+  contact, M a = f_ext - f_int(u) - C v, and G^T lambda the contact forces at the end of the step (Kane,
+  Repetto, Ortiz and Marsden, "Finite element analysis of nonsmooth contact", CMAME 180, 1999: beta = 1/4,
+  gamma = 1/2 there, 1/2 and 1 for contact)
+
+    u1 = u0 + h v0 + h^2/4 (a0 + a1) + h^2/2 M^-1 G^T lambda,    v* = v0 + h/2 (a0 + a1) + h M^-1 G^T lambda.
+
+  So u1 - u0 = h (v0 + v*) / 2, and a linear body gains lambda . (g1 - g0), g the gaps: active nodes have g1 =
+  0, so an impact dissipates energy and persistent contact conserves it. But G v* is not zero: a node with g0
+  = 0 has v* = -v0, and separates in the next step or its force oscillates. Hence the velocity at the end is
+
+    v1 = v* + M^-1 G^T mu  with  G v1 = w,
+
+  w the velocities of obstacles: the persistency condition of Laursen and Love (IJNME 53, 2002). As the
+  closest velocity in the mass norm it dissipates energy, too, m v^2 / 2 of each impacting node with the nodal
+  mass m: an impact of the nodes without restitution, which vanishes with the size of the cells. In the next
+  step their a0 and contact force are in balance, and forces are steady. (Deuflhard, Krause and Ertel, IJNME
+  73, 2008, project the predictor instead; their nodes keep the velocities from before the impact until they
+  separate.)
+
+  As s = u1 - u0 Newmark's own formula with a0 gives A = a1 + 2 M^-1 G^T lambda, and M A + C v* + f_int(u1) -
+  f_ext = 2 G^T lambda: the solvers need no change. The stored acceleration is a1 + M^-1 G^T (lambda + mu /
+  h), with the mean contact force over the step, whose product with h is the change of momentum.
 
   petsc/private/tsimpl.h: PETSc has no public way to write a TSType.
 */
@@ -130,55 +154,36 @@ static PetscErrorCode SNESTSFormJacobian_SecondOrder(SNES snes, Vec X, Mat J, Ma
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets X1 to the initial guess, with the prescribed values of the end time. */
+/* Sets X1 to the initial guess, with the prescribed values of the end time; explicit: to the solution. */
 static PetscErrorCode predict(void *ctx)
 {
   const TS ts = (TS)ctx;
   SecondOrder *so = (SecondOrder *)ts->data;
-  PetscBool single, warm;
+  const SbRun run = so->run;
+  const PetscReal h = ts->time_step;
+  PetscBool warm;
   KSP ksp;
 
   PetscFunctionBeginUser;
-  if (!ts->usessnes) PetscFunctionReturn(PETSC_SUCCESS); /* explicit */
+  if (!ts->usessnes) {
+    PetscCall(VecWAXPY(so->V1, h, run->A, so->V0));
+    PetscCall(VecWAXPY(so->X1, h, so->set.method == SB_METHOD_EULER_EXPLICIT ? so->V0 : so->V1, so->X0));
+    PetscCall(SbModelPrescribe(run->model, ts->ptime + h, so->X1));
+    PetscCall(SbFormAcceleration(run, ts->ptime + h, so->X1, so->V1, PETSC_TRUE, so->A1));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(VecCopy(so->X0, so->X1));
-  if (so->run->velocity_predictor) PetscCall(VecAXPY(so->X1, ts->time_step, so->V0));
-  PetscCall(SbModelPrescribe(so->run->model, ts->ptime + ts->time_step, so->X1));
+  if (run->velocity_predictor) PetscCall(VecAXPY(so->X1, h, so->V0));
+  PetscCall(SbModelPrescribe(run->model, ts->ptime + h, so->X1));
   /* one linear solve per step: the update (X <- X - Y) has free flight as initial guess */
-  PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, SNESKSPONLY, &single));
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(KSPGetInitialGuessNonzero(ksp, &warm));
-  if (single && warm) {
+  if (run->single && warm) {
     Vec Y;
 
     PetscCall(SNESGetSolutionUpdate(ts->snes, &Y));
-    if (Y) PetscCall(VecAXPBY(Y, so->run->velocity_predictor ? 0. : -ts->time_step, 0., so->V0));
+    if (Y) PetscCall(VecAXPBY(Y, run->velocity_predictor ? 0. : -h, 0., so->V0));
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Solves for the end displacement X, which holds the initial guess; the explicit methods need no solver. */
-static PetscErrorCode solve(void *ctx, Vec X, SNESConvergedReason *reason)
-{
-  const TS ts = (TS)ctx;
-  SecondOrder *so = (SecondOrder *)ts->data;
-  const PetscReal h = ts->time_step;
-  PetscInt newton, linear;
-
-  PetscFunctionBeginUser;
-  if (!ts->usessnes) {
-    PetscCall(VecWAXPY(so->V1, h, so->run->A, so->V0));
-    PetscCall(VecWAXPY(X, h, so->set.method == SB_METHOD_EULER_EXPLICIT ? so->V0 : so->V1, so->X0));
-    PetscCall(SbModelPrescribe(so->run->model, ts->ptime + h, X));
-    PetscCall(SbFormAcceleration(so->run, ts->ptime + h, X, so->V1, so->A1));
-    *reason = SNES_CONVERGED_ITS;
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(SNESSolve(ts->snes, NULL, X));
-  PetscCall(SNESGetConvergedReason(ts->snes, reason));
-  PetscCall(SNESGetIterationNumber(ts->snes, &newton));
-  PetscCall(SNESGetLinearSolveIterations(ts->snes, &linear));
-  ts->snes_its += newton;
-  ts->ksp_its += linear;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -209,7 +214,6 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
   const TS ts = (TS)ctx;
   SecondOrder *so = (SecondOrder *)ts->data;
   const SbRun run = so->run;
-  const SbSpace s = run->model->space;
   const PetscReal h = ts->time_step;
   PetscReal size;
 
@@ -218,22 +222,26 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
   PetscCall(VecNorm(ts->usessnes ? so->V1 : so->A1, NORM_INFINITY, &size));
   *ok = (PetscBool)(reason > 0 && !PetscIsInfOrNanReal(size));
   if (*ok && so->set.separate) {
-    PetscScalar *push;
-
     /* barrier contact: adds its impulse to the velocity, and removes it from the acceleration */
     PetscCall(VecZeroEntries(so->work));
     PetscCall(SbModelPotentialGradient(run->model, so->X1, -1., PETSC_TRUE, NULL, so->work));
-    PetscCall(VecGetArray(so->work, &push));
-    for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
-      push[i] = s->node_mass[i / 3] > 0. ? push[i] / s->node_mass[i / 3] : 0.;
-    PetscCall(VecRestoreArray(so->work, &push));
+    PetscCall(VecPointwiseDivide(so->work, so->work, run->mass));
     PetscCall(VecAXPY(so->A1, -0.5 / so->set.beta, so->work));
     PetscCall(VecWAXPY(so->V1, h, so->work, so->V0));
     PetscCall(VecAXPY(so->V1, h * (1. - so->set.gamma), run->A));
     PetscCall(VecAXPY(so->V1, h * so->set.gamma, so->A1));
   }
-  if (*ok && so->set.impulses)
-    PetscCall(SbNewmarkContact(run, ts->ptime + h, h, so->X1, so->V1, so->A1, so->own1));
+  if (*ok && so->set.impulses) {
+    /* contact: adds its impulse to the velocity, and the mean force over the step to the acceleration */
+    PetscCall(VecCopy(so->V1, so->work));
+    if (SbSpaceIsConstrained(run->model->space))
+      PetscCall(SbModelContactVelocity(run->model, ts->ptime + h, h, so->X1, so->V1));
+    PetscCall(VecAYPX(so->work, -1., so->V1));
+    PetscCall(VecCopy(so->A1, so->own1));
+    PetscCall(SbFormAcceleration(run, ts->ptime + h, so->X1, so->V1, PETSC_FALSE, so->own1));
+    PetscCall(VecAXPBY(so->A1, 0.5, 0.5, so->own1));
+    PetscCall(VecAXPY(so->A1, 1. / h, so->work));
+  }
   *step = solved_step(ts);
   if (!*ok && !ts->usessnes)
     PetscCall(SbRunFail(run,
@@ -266,12 +274,14 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
   PetscFunctionBeginUser;
   /* a restarted run has its acceleration: that of generalized-alpha does not follow from the other state */
   if (!so->started && run->step0 == 0 && so->set.method != SB_METHOD_EULER_IMPLICIT)
-    PetscCall(SbFormAcceleration(run, ts->ptime, ts->vec_sol, ts->vec_dot, run->A));
+    PetscCall(SbFormAcceleration(run, ts->ptime, ts->vec_sol, ts->vec_dot, PETSC_TRUE, run->A));
 
   /* the penalty on jumps of CR and DG for this step */
   PetscCall(SbRunFollowJumps(run, &jumps));
-  if (so->own0 && (!so->started || jumps))
-    PetscCall(SbNewmarkOwn(run, ts->ptime, ts->vec_sol, ts->vec_dot, run->A, so->own0));
+  if (so->own0 && (!so->started || jumps)) {
+    PetscCall(VecCopy(run->A, so->own0));
+    PetscCall(SbFormAcceleration(run, ts->ptime, ts->vec_sol, ts->vec_dot, PETSC_FALSE, so->own0));
+  }
   so->started = PETSC_TRUE;
 
   /* copy the initial state, to which a rejected step returns */
@@ -281,8 +291,8 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
   run->stage_start = so->X0;
   run->stage_part = so->set.alpha_f;
   for (;;) {
-    const SbAttempt attempt = {ts->ptime, ts->time_step,    so->X0,   so->X1, predict,
-                               solve,     contact_residual, complete, ts};
+    const SbAttempt attempt = {ts->ptime, ts->time_step,    so->X0,   so->X1,
+                               predict,   contact_residual, complete, ts};
     PetscBool ok = PETSC_FALSE, accept = PETSC_FALSE, fixed;
     PetscReal next, h;
 
@@ -290,6 +300,8 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     run->may_end_at_impact = (PetscBool)(run->model->ntime_of_impact && !cuts && so->whole == 0.);
     run->time_of_impact = 1.;
     PetscCall(SbRunAttempt(run, &attempt, &ok));
+    ts->snes_its = run->newton_total - run->newton_before + run->newton_step;
+    ts->ksp_its = run->linear_total - run->linear_before + run->linear_step;
     if (ok) {
       PetscCall(VecCopy(so->X1, ts->vec_sol));
       PetscCall(VecCopy(so->V1, ts->vec_dot));
@@ -428,7 +440,7 @@ void SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings)
   ts->usessnes = (PetscBool)!SbRunIsExplicit(run);
 }
 
-static PetscErrorCode TSCreate_SecondOrder(TS ts)
+PetscErrorCode SbSecondOrderCreate(TS ts)
 {
   SecondOrder *so;
 
@@ -445,12 +457,5 @@ static PetscErrorCode TSCreate_SecondOrder(TS ts)
   ts->ops->snesjacobian = SNESTSFormJacobian_SecondOrder;
   ts->default_adapt_type = TSADAPTNONE;
   ts->usessnes = PETSC_TRUE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbSecondOrderRegister(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(TSRegister(SB_TS_SECOND_ORDER, TSCreate_SecondOrder));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -22,22 +22,6 @@ typedef struct {
   PetscBool contact;        /* with contact of any response */
 } LoadStep;
 
-/* Newton's method from the displacement in X. */
-static PetscErrorCode solve(void *ctx, Vec X, SNESConvergedReason *reason)
-{
-  const SbRun run = ((LoadStep *)ctx)->run;
-  PetscInt newton, linear;
-
-  PetscFunctionBeginUser;
-  PetscCall(SNESSolve(run->snes, NULL, X));
-  PetscCall(SNESGetConvergedReason(run->snes, reason));
-  PetscCall(SNESGetIterationNumber(run->snes, &newton));
-  PetscCall(SNESGetLinearSolveIterations(run->snes, &linear));
-  run->newton_step += newton;
-  run->linear_step += linear;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode contact_residual(void *ctx, Vec X, Vec R)
 {
   const SbRun run = ((LoadStep *)ctx)->run;
@@ -194,8 +178,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
   while (factor < 1.) {
     const PetscReal next = factor + length > 1. - 1e-9 ? 1. : factor + length;
     LoadStep load = {run, next, next - factor, X, contact};
-    const SbAttempt attempt = {factor, next - factor,    run->U,   X,    predict,
-                               solve,  contact_residual, complete, &load};
+    const SbAttempt attempt = {factor, next - factor, run->U, X, predict, contact_residual, complete, &load};
     PetscBool ok = PETSC_FALSE, found;
 
     /* checked early: follower loads stiffen a mechanism in later iterations, and a late failure takes long */

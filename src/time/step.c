@@ -31,7 +31,7 @@ PetscErrorCode SbRunFollowJumps(SbRun run, PetscBool *changed)
 
 PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 {
-  SNESConvergedReason reason;
+  SNESConvergedReason reason = SNES_CONVERGED_ITS;
   PetscBool again = PETSC_TRUE;
 
   PetscFunctionBeginUser;
@@ -49,10 +49,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 
     /* the predictor, and the solution from there; with contact by active-set iterations */
     if (!run->goes_on) PetscCall((*a->predict)(a->ctx));
-    if (run->model->nbegin_step)
-      PetscCall(SbRunSolveContact(run, a, &reason));
-    else
-      PetscCall((*a->solve)(a->ctx, a->U, &reason));
+    if (!SbRunIsExplicit(run)) PetscCall(SbRunSolveStep(run, a, &reason));
 
     /* the state at the end, or the reason of failure */
     PetscCall((*a->complete)(a->ctx, reason, &step, ok));

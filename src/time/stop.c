@@ -86,20 +86,9 @@ PetscErrorCode SbRunCatchSignals(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Seconds of "h:mm:ss" or "d-hh:mm:ss", as in batch systems; negative: neither. */
-static PetscReal duration(const char *text)
-{
-  int day = 0, hour, minute, second, end = 0;
-
-  if ((sscanf(text, "%d-%d:%2d:%2d%n", &day, &hour, &minute, &second, &end) != 4 || text[end]) &&
-      (day = 0, sscanf(text, "%d:%2d:%2d%n", &hour, &minute, &second, &end) != 3 || text[end]))
-    return -1.;
-  if (day < 0 || hour < 0 || minute < 0 || minute > 59 || second < 0 || second > 59) return -1.;
-  return 86400. * day + 3600. * hour + 60. * minute + second;
-}
-
 PetscErrorCode SbRunReadStop(SbRun run)
 {
+  int n, day = 0, hour, minute, second, end = 0;
   char text[SB_NAME_MAX];
 
   PetscFunctionBeginUser;
@@ -107,7 +96,14 @@ PetscErrorCode SbRunReadStop(SbRun run)
   PetscCall(SbOptionReal(&SbRunScope, "stop_grace", &run->stop.grace));
   PetscCall(SbOptionString(&SbRunScope, "wall_time", sizeof(text), text));
   if (!text[0]) PetscFunctionReturn(PETSC_SUCCESS);
-  run->stop.wall_time = duration(text);
+  /* "h:mm:ss" or "d-hh:mm:ss", as in batch systems */
+  if (strchr(text, '-'))
+    n = sscanf(text, "%d-%d:%2d:%2d%n", &day, &hour, &minute, &second, &end) - 1;
+  else
+    n = sscanf(text, "%d:%2d:%2d%n", &hour, &minute, &second, &end);
+  if (n == 3 && !text[end] && day >= 0 && hour >= 0 && minute >= 0 && minute < 60 && second >= 0 &&
+      second < 60)
+    run->stop.wall_time = 86400. * day + 3600. * hour + 60. * minute + second;
   run->stop.listens = PETSC_TRUE;
   PetscCheck(run->stop.wall_time > 0., PETSC_COMM_SELF, PETSC_ERR_USER,
              "-wall_time %s is no duration: give hours:minutes:seconds, 1:30:00, or "

@@ -17,7 +17,7 @@ typedef enum {
 typedef struct {
   SbMethod method;
   PetscReal alpha_m, alpha_f, beta, gamma; /* generalized-alpha; fractions of the new state, as in TSALPHA2 */
-  PetscBool impulses;                      /* Newmark with contact: newmark_contact.c */
+  PetscBool impulses;                      /* Newmark with contact */
   PetscBool separate;                      /* Newmark with barrier contact: the acceleration excludes it */
 } SbMethodSettings;
 
@@ -26,7 +26,7 @@ static inline PetscBool SbRunIsExplicit(SbRun run)
   return (PetscBool)(run->preset == SB_TIME_EULER_EXPLICIT || run->preset == SB_TIME_EULER_SYMPLECTIC);
 }
 
-PetscErrorCode SbSecondOrderRegister(void);
+PetscErrorCode SbSecondOrderCreate(TS ts);
 /* run: source of prescribed displacements, initial acceleration and lumped mass; borrowed. */
 void SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings);
 
@@ -34,8 +34,7 @@ void SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings);
 typedef struct {
   PetscReal t, dt;                      /* start and length, s */
   Vec U0, U;                            /* displacements at the start; at the end, once solved, m */
-  PetscErrorCode (*predict)(void *ctx); /* sets U to an initial guess with the prescribed values */
-  PetscErrorCode (*solve)(void *ctx, Vec U, SNESConvergedReason *reason); /* solves from the guess in U */
+  PetscErrorCode (*predict)(void *ctx); /* U: a guess with the prescribed values; explicit: the solution */
   PetscErrorCode (*residual)(void *ctx, Vec U, Vec R); /* residual without constraints, N; for contact */
   /* computes the end state from U, in `step`; if not ok run->stop_reason is the reason */
   PetscErrorCode (*complete)(void *ctx, SNESConvergedReason reason, SbSolvedStep *step, PetscBool *ok);
@@ -49,11 +48,9 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *attempt, PetscBool *ok);
 PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt,
                                  PetscBool last); /* saves history, calls monitors; also at the start */
 #define SB_NEWTON_ITERATIONS 100
-/* transfer.c: the post-step function of the TS. */
-PetscErrorCode SbRunAfterStep(TS ts);
 /* newton.c: Newton's method as a minimisation, a SNESType. SetRun after SNESSetType(); run is borrowed. */
 #define SB_SNES_NEWTON "newton"
-PetscErrorCode SbNewtonRegister(void);
+PetscErrorCode SbNewtonCreate(SNES snes);
 PetscErrorCode SbNewtonSetRun(SNES snes, SbRun run);
 /* Whether a tangent of the last solve was indefinite; false for another SNESType or tangent. */
 PetscErrorCode SbNewtonUnstable(SNES snes, PetscBool *is);
@@ -82,23 +79,9 @@ PetscErrorCode SbFormI2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscRe
 PetscErrorCode SbFormCreateOperator(SbRun run);
 PetscErrorCode SbFormStaticFunction(SNES snes, Vec U, Vec F, void *run);
 PetscErrorCode SbFormStaticJacobian(SNES snes, Vec U, Mat J, Mat P, void *run);
-/* A = M^-1 (f_ext - C V - f_int), zero on prescribed unknowns. */
-PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A);
-
-/*
-  newmark_contact.c, after the solves of a step of Newmark with contact from t - dt to t. Collective.
-
-  Input:
-    U       - displacement at t
-  In and out:
-    V       - velocity at t by Newmark's formulas, m/s; out: after contact impulses
-    A       - acceleration likewise, m/s^2; out: M A + f_int - f_ext is the mean force of contact
-  Output:
-    own     - acceleration at t without contact, for the next step
-*/
-PetscErrorCode SbNewmarkContact(SbRun run, PetscReal t, PetscReal dt, Vec U, Vec V, Vec A, Vec own);
-/* own = the acceleration at t without contact, from U and V; at prescribed unknowns that of A. Collective. */
-PetscErrorCode SbNewmarkOwn(SbRun run, PetscReal t, Vec U, Vec V, Vec A, Vec own);
+/* A = M^-1 (f_ext - C V - f_int), zero on prescribed unknowns; without `constrain`: without contact, and A
+   keeps its values there. */
+PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, PetscBool constrain, Vec A);
 
 /*
   solver_list.c: after a failed linear solve of run->snes the next solver of SbSolverNextFallback() solves the
@@ -129,10 +112,10 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
 PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R);
 
 /*
-  SbRunSolveContact - active-set iteration of a step with contact: solves until the active set does not
-  change; U: initial guess, then solution. Collective. reason: of the last solve; SNES_DIVERGED_MAX_IT if the
-  active set does not converge. With run->may_end_at_impact, if nodes come into contact within the step, it
-  ends after the first solve with SNES_CONVERGED_ITERATING: the step is to be repeated with the fraction
-  run->time_of_impact of its length.
+  SbRunSolveStep - solves a step by run->snes, with contact until the active set does not change; U: initial
+  guess, then solution. Collective. reason: of the last solve; SNES_DIVERGED_MAX_IT if the active set does not
+  converge. With run->may_end_at_impact, if nodes come into contact within the step, it ends after the first
+  solve with SNES_CONVERGED_ITERATING: the step is to be repeated with the fraction run->time_of_impact of its
+  length.
 */
-PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *attempt, SNESConvergedReason *reason);
+PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConvergedReason *reason);

@@ -5,27 +5,6 @@
 */
 #include "time_impl.h"
 
-PetscErrorCode SbRunAfterStep(TS ts)
-{
-  TSConvergedReason reason;
-  PetscReal t, before;
-  PetscInt step;
-  SbRun run;
-
-  PetscFunctionBeginUser;
-  PetscCall(TSGetApplicationContext(ts, &run));
-  PetscCall(TSGetConvergedReason(ts, &reason));
-  PetscCall(TSGetTime(ts, &t));
-  if (reason || t >= run->t_end * (1. - 1e-12)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(TSGetStepNumber(ts, &step));
-  PetscCall(TSGetPrevTime(ts, &before));
-  run->after.dt = t - before;
-  if (run->after.fn) PetscCall((*run->after.fn)(run, step, t, t - before, run->after.ctx, &run->paused));
-  PetscCall(SbRunStopAsked(run, step, t, PETSC_FALSE));
-  if (run->paused || run->stopped) PetscCall(TSSetConvergedReason(ts, TS_CONVERGED_USER));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbRunTransferState(SbRun from, SbRun to)
 {
   PetscReal dt;
@@ -64,7 +43,7 @@ PetscErrorCode SbRunRestartAcceleration(SbRun run)
   if (!run->A || !(SbRunIsExplicit(run) || (run->preset == SB_TIME_NEWMARK && !run->model->nbegin_step)))
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(run->A, &own));
-  PetscCall(SbFormAcceleration(run, run->t_now, run->U, run->V, own));
+  PetscCall(SbFormAcceleration(run, run->t_now, run->U, run->V, PETSC_TRUE, own));
   PetscCall(SbSpaceZeroPrescribed(run->model->space, PETSC_FALSE, run->A));
   PetscCall(VecAXPY(run->A, 1., own));
   PetscCall(VecDestroy(&own));

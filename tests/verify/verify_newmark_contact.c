@@ -1,6 +1,6 @@
 // @ranks 1 2
 /*
-  Newmark with contact (src/time/newmark_contact.c).
+  Newmark with contact (src/time/second_order.c).
 
     wall      an elastic bar hits a wall: contact duration and rebound speed against the wave solution and implicit Euler; no step gains energy
     bars      two bars collide: they exchange their velocities, apart from the effect of the mass of the contact nodes; momentum
