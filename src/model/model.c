@@ -69,14 +69,12 @@ static PetscErrorCode match_mass(SbModel m, PetscInt b)
 
   PetscFunctionBeginUser;
   for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
-    PetscReal x[4][3], g[3][3], V;
+    const PetscInt *vert = mesh->cell + 4 * c;
 
     if (mesh->cell_body[c] != b) continue;
-    for (PetscInt i = 0; i < 12; i++) x[i / 3][i % 3] = mesh->x[3 * mesh->cell[4 * c + i / 3] + i % 3];
-    m->element[b]->ops.tabulate((const PetscReal(*)[3])x, g, &V);
-    if (mesh->cell_set[c] & SB_CURVED)
-      V = SbTetCurvedVolume(mesh->x, mesh->cell + 4 * c, mesh->edge_off + 18 * c);
-    mass += m->material[mesh->cell_material[c]]->density * V;
+    mass += m->material[mesh->cell_material[c]]->density *
+            (mesh->cell_set[c] & SB_CURVED ? SbTetCurvedVolume(mesh->x, vert, mesh->edge_off + 18 * c)
+                                           : SbTetDeterminant(mesh->x, vert) / 6.);
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &mass, 1, MPIU_REAL, MPI_SUM, m->comm));
   factor = m->body[b].in_memory->mass / mass;
