@@ -101,8 +101,8 @@ typedef struct {
     advance       - * moves obstacles to the fraction `progress` of their path from t to t + dt, 0..1.
     safe          - part: largest collision-free fraction of the motion from u0 to u1, and from the present
                     progress to `progress`; nactive: active pairs at u0.
-    nearest       - the smallest gap at the last positions, m, and its pair, in words, of all ranks;
-                    PETSC_MAX_REAL and "" without one.
+    nearest       - where the smallest gap of all ranks at the last positions is below `gap`, m: lowers it
+                    and sets `text` to the pair, in words.
     lag           - lagged friction, at u of an iterate or (solved) of a solution: may take normal forces and
                     slip directions from u; again: it did, and the step needs one more solve.
     potential     - energy += that at u, J; f += its gradient.

@@ -258,18 +258,11 @@ PetscErrorCode SbModelPotentialMaxStep(SbModel m, Vec X, Vec Y, PetscReal progre
 PetscErrorCode SbModelPotentialNearest(SbModel m, size_t size, char text[])
 {
   PetscReal least = PETSC_MAX_REAL;
-  char mine[256];
 
   PetscFunctionBeginUser;
   text[0] = 0;
-  for (PetscInt e = 0; e < m->npotential; e++) {
-    PetscReal gap;
-
-    CONTACT_CALL(m->potential[e], nearest, m->space, &gap, sizeof(mine), mine);
-    if (gap >= least) continue;
-    least = gap;
-    PetscCall(PetscStrncpy(text, mine, size));
-  }
+  for (PetscInt e = 0; e < m->npotential; e++)
+    CONTACT_CALL(m->potential[e], nearest, m->space, &least, size, text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
