@@ -42,12 +42,9 @@ typedef struct {
   SbPack *modulus; /* [nbatch] lambda times the factor of stiffness and damping, Pa */
   SbPack *shear;   /* [nbatch] mu likewise, Pa */
 } SbVolumetric;
-/*
-  SbSpaceAssembleSplit - the tangent without its volumetric part, in up to three spaces, space[0] = s.
-
-  Not collective. The strains are those of s. Where space[k] has its nodes at vertices and s at faces, A[k] is
-  the same form there. out NULL: nothing is left out.
-*/
+/* The tangent without its volumetric part, in up to three spaces, space[0] = s, whose strains they are. Where
+   space[k] has its nodes at vertices and s at faces, A[k] is the same form there. out NULL: nothing is left
+   out. Not collective. */
 PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n, const SbSpace space[],
                                     const Mat A[], const SbVolumetric *out);
 
@@ -89,13 +86,9 @@ SB_INLINE PetscReal SbRigidSize(const PetscReal box[6])
 }
 /* Value of rigid-body mode 0 to 5 (translations, rotations about its middle) at x, over its size. */
 void SbRigidMode(PetscInt mode, const PetscReal x[3], const PetscReal box[6], PetscReal value[3]);
-/*
-  SbAttachModes - the near null space of A: the six rigid-body modes, which algebraic multigrid must
-  reproduce, made orthonormal. Six serve any number of bodies: no aggregate spans two, and
-  each body turns about its own centre.
-
-  Collective. fill(mode, v, ctx) writes this rank's part of a mode; one that vanishes is left out.
-*/
+/* The near null space of A: the six rigid-body modes, which algebraic multigrid must reproduce, made
+   orthonormal. Six serve any number of bodies: no aggregate spans two, and each body turns about its own
+   centre. fill(mode, v, ctx) writes this rank's part of a mode; one that vanishes is left out. Collective. */
 PetscErrorCode SbAttachModes(Mat A, PetscErrorCode (*fill)(PetscInt mode, PetscScalar v[], const void *ctx),
                              const void *ctx);
 
@@ -165,32 +158,21 @@ static inline PetscInt sb_rotation_points(SbSpace s)
 {
   return s->edge_node ? 4 : 1;
 }
-/*
-  SbSpaceCellRotations - R[nbatch][sb_rotation_points()][9]: the frames of laws, or polar rotations of F.
-
-  Not collective. Input: u[nnode][3] with ghosts, m; NULL: at rest.
-*/
+/* R[nbatch][sb_rotation_points()][9]: the frames of laws, or polar rotations of F, at u[nnode][3] with
+   ghosts, m; NULL: at rest. Not collective. */
 void SbSpaceCellRotations(SbSpace space, const PetscReal u[], SbPack R[]);
-/*
-  SbSpaceAverageRotations - the material's rotation around each owned node: the proper one closest to the
-  volume-weighted mean of those of the cells around it.
-
-  Not collective. Output: node_R[nnode_owned][9], row-major; spread[nnode_owned] (may be NULL), the largest
-  |R_cell - R|_F^2 among the cells around, 8 sin^2(angle / 2).
-*/
+/* The material's rotation around each owned node, node_R[nnode_owned][9], row-major: the proper one closest
+   to the volume-weighted mean of those of the cells around it. spread[nnode_owned] (may be NULL): the largest
+   |R_cell - R|_F^2 among these cells, 8 sin^2(angle / 2). Not collective. */
 PetscErrorCode SbSpaceAverageRotations(SbSpace space, const SbPack R[], PetscReal node_R[],
                                        PetscReal spread[]);
 
 /* Lends the rotations of cells that a matrix-free operator holds; NULL for another matrix. */
 PetscErrorCode SbMatrixFreeGetRotations(Mat A, const SbPack **R);
 
-/*
-  SbSpaceGetRows - rows of an operator of the space for some owned nodes.
-
-  Not collective. Input: A, matrix-free operator, AIJ, BAIJ or SBAIJ of the space; n, node[n] owned local
-  nodes. Output: ia[n+1], ja: local nodes, owned ones first, both ascending; block[ia[n]][9], row-major, N/m.
-  ja and block may be NULL to learn ia. Caller owns the arrays.
-*/
+/* Rows of A, a matrix-free operator, AIJ, BAIJ or SBAIJ of the space, for the owned local nodes node[n].
+   Output: ia[n+1], ja: local nodes, owned ones first, both ascending; block[ia[n]][9], row-major, N/m. ja and
+   block may be NULL to learn ia. Caller owns the arrays. Not collective. */
 PetscErrorCode SbSpaceGetRows(SbSpace space, Mat A, PetscInt n, const PetscInt node[], PetscInt ia[],
                               PetscInt ja[], PetscReal block[]);
 
@@ -198,21 +180,15 @@ PetscErrorCode SbSpaceGetRows(SbSpace space, Mat A, PetscInt n, const PetscInt n
 PetscErrorCode SbProductAttach(Mat A);
 /* Lends the rows of a sequential BAIJ or SBAIJ matrix: start[n+1], column[start[n]]. Not collective. */
 PetscErrorCode SbMatGetPattern(Mat A, PetscInt *n, const PetscInt *start[], const PetscInt *column[]);
-/*
-  SbProductGetSymmetric - the rows and columns of this rank of a matrix with the fast product, as SBAIJ.
-
-  Not collective. Input: A, BAIJ or SBAIJ with the fast product. Output: local, borrowed from A, up to date
-  until values of A change; A itself when that is SBAIJ on one rank. Ask again after each assembly.
-*/
+/* The rows and columns of this rank of A, BAIJ or SBAIJ with the fast product, as SBAIJ: borrowed from A, up
+   to date until values of A change; A itself when that is SBAIJ on one rank. Ask again after each assembly.
+   Not collective. */
 PetscErrorCode SbProductGetSymmetric(Mat A, Mat *local);
 /* y -= the columns of other ranks of A times x. Collective. */
 PetscErrorCode SbProductSubtractOffDiagonal(Mat A, Vec x, Vec y);
-/*
-  SbMatRestoreRead - gives back values only read, by the matrix's own function, say MatSeqSBAIJRestoreArray.
-
-  Not collective. Since 3.25 PETSc takes these functions for a change of the matrix, after which fast products
-  and preconditioners are set up again, in each iteration if one reads the values in its set-up.
-*/
+/* Gives back values only read, by the matrix's own function, say MatSeqSBAIJRestoreArray. Since 3.25 PETSc
+   takes these functions for a change of the matrix, after which fast products and preconditioners are set up
+   again, in each iteration if one reads the values in its set-up. Not collective. */
 PetscErrorCode SbMatRestoreRead(Mat A, PetscErrorCode (*restore)(Mat, PetscScalar *[]), PetscScalar *value[]);
 /* The values of a matrix: diagonal part, and the one with ghost columns; of SBAIJ the upper triangle. */
 typedef struct {

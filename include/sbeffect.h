@@ -45,7 +45,8 @@ typedef struct {
 /*
   Operations; a star: not collective. u, u0, u1: local displacements [nnode][3], ghosts up to date, m; v0:
   velocities, m/s; f, r0, r1, residual: forces [nnode][3], N, right on owned nodes without communication.
-  Numbers and lists are this rank's part.
+  Numbers and lists are this rank's part. Work, energies and bounds are added, flags set, `part` of
+  time_of_impact() lowered: their caller gives the first values.
 */
 typedef struct {
   /* reads -effect_<name>_...; scope = {"effect", <type>, <name>}; called once, by SbEffectCreate() */
@@ -92,22 +93,22 @@ typedef struct {
     method minimises (src/time/newton.c).
 
     touching      - at the start t of a run, first step dt: adds pairs whose gap at u is too small, or little
-                    larger. first: it was the first step, alike on all ranks; else nothing was done.
+                    larger. first: set at the first step, alike on all ranks; else nothing is done.
     begin_barrier - a step from t to t + dt begins with u0 and the speed of potential.c, m/s; where surfaces
-                    touch when the run begins, u0 is changed (moved), ghosts too. Prescribed motions are at t:
+                    touch when the run begins, u0 is changed, ghosts too. Prescribed motions are at t:
                     `progress` 0.
     meet          - after begin_barrier, for restitution: finds the impacts of the step, from u0 and v0.
     advance       - * moves obstacles to the fraction `progress` of their path from t to t + dt, 0..1.
     safe          - part: largest collision-free fraction of the motion from u0 to u1, and from the present
                     progress to `progress`; nactive: active pairs at u0.
-    nearest       - the smallest gap at the last positions, m, and its pair, in words, of all ranks;
-                    PETSC_MAX_REAL and "" without one.
+    nearest       - where the smallest gap of all ranks at the last positions is below `gap`, m: lowers it
+                    and sets `text` to the pair, in words.
     lag           - lagged friction, at u of an iterate or (solved) of a solution: may take normal forces and
                     slip directions from u; again: it did, and the step needs one more solve.
-    potential     - energy at u, J; f += its gradient.
+    potential     - energy += that at u, J; f += its gradient.
     hessian       - adds the blocks of its Hessian at u, or of the substitute (SbContactHessian), and to
                     r[nnode][3], N, the gradient of the substitute's quadratic model less the true one.
-    gap_forces    - f += the load that closes the gaps at u to first order; `bound`: half of force times gap,
+    gap_forces    - f += the load that closes the gaps at u to first order; bound += half of force times gap,
                     which bounds the energy of the error by gaps, J.
     scale_width   - * multiplies a default width of the barrier by `factor`. Smaller: at once, not below what
                     rounding allows; changed: it did, alike on all ranks. Larger: when the next step begins,
@@ -116,7 +117,7 @@ typedef struct {
   PetscErrorCode (*touching)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, const PetscReal u[],
                              PetscBool *first, SbInitialContacts *list);
   PetscErrorCode (*begin_barrier)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, PetscReal speed,
-                                  PetscReal u0[], PetscBool *moved);
+                                  PetscReal u0[]);
   PetscErrorCode (*meet)(SbEffect e, SbSpace space, PetscReal dt, const PetscReal u0[], const PetscReal v0[]);
   PetscErrorCode (*advance)(SbEffect e, PetscReal progress);
   PetscErrorCode (*safe)(SbEffect e, SbSpace space, const PetscReal u0[], const PetscReal u1[],

@@ -46,17 +46,14 @@ struct _p_SbElement {
   SbElementOps ops;
 };
 extern PetscFunctionList SbElementList;
-/*
-  Adds an element; create() fills nodes_per and ops, and gammas with their defaults. `rows`: its options,
-  class "body", type `name`. Not collective, same on all ranks.
-*/
+/* Adds an element; create() fills nodes_per and ops, and gammas with their defaults. `rows`: its options,
+   class "body", type `name`. Not collective, same on all ranks. */
 PetscErrorCode SbElementRegister(const char *name, PetscErrorCode (*create)(SbElement), PetscInt nrows,
                                  const SbOption rows[]);
 PetscErrorCode SbElementRegisterAll(void);
-/*
-  Creates an element by name and reads the options of body (NULL: their defaults; its `type` is not examined);
-  owned by the caller. Error: PETSC_ERR_USER for an unknown name, and what the option readers refuse.
-*/
+/* Creates an element by name and reads the options of body (NULL: their defaults; its `type` is not
+   examined); owned by the caller. Error: PETSC_ERR_USER for an unknown name, and what the option readers
+   refuse. */
 PetscErrorCode SbElementCreate(const char *name, const SbScope *body, SbElement *e);
 PetscErrorCode SbElementDestroy(SbElement *e);
 

@@ -35,11 +35,7 @@ typedef struct {
   PetscInt nnode;       /* of a cell: 4, of P2 SB_CELL_NODES */
 } SbRegion;
 
-/*
-  The face terms of CR and DG (src/fem/jump.c), in batches of SB_BATCH faces between two cells of one body,
-  all with a node that this rank owns.
-*/
-typedef struct _p_SbJump *SbJump;
+typedef struct _p_SbJump *SbJump;               /* face terms of CR and DG, src/fem/jump.c */
 typedef struct _p_SbConstraints *SbConstraints; /* sbconstraint.h */
 
 typedef struct _p_SbSpace *SbSpace;
@@ -133,22 +129,16 @@ PetscErrorCode SbSpaceAddInternalForce(SbSpace space, const SbStage *stage, Pets
 /* f += M (a + alpha v); a or v may be NULL. */
 void SbSpaceAddInertia(SbSpace space, const SbStage *stage, PetscReal f[]);
 
-/*
-  SbSpaceLinearisePressure - sets the cell pressures of tangents to linearised ones (src/fem/quadratic.c).
-
-  Collective. Input: U, m; step, m; along: factor on it; part: p = p(U) + part dp/dU . along step. step NULL:
-  p(U). U NULL: tangents have the pressures of their states again.
-*/
+/* Sets the cell pressures of tangents to linearised ones (src/fem/quadratic.c), p = p(U) + part dp/dU . along
+   step; U, step: m. step NULL: p(U). U NULL: tangents have the pressures of their states again.
+   Collective. */
 PetscErrorCode SbSpaceLinearisePressure(SbSpace space, Vec U, Vec step, PetscReal along, PetscReal part);
 
-/*
-  SbSpaceFollowJumps - adapts the penalty on jumps of CR and DG to the state (src/fem/jump.c).
-
-  Collective. Input: U, m; steps: load steps, with the energies of full jumps; time steps, where the energy of
-  each face at U is kept within bounds; time steps without damping, where no penalty falls. Output: changed
-  (or NULL): some penalty did, for load steps by a percent or more. Until the next call the face terms are
-  constant; at first they are those of the rest state.
-*/
+/* Adapts the penalty on jumps of CR and DG to the state U, m (src/fem/jump.c). steps: load steps, with the
+   energies of full jumps; time steps, where the energy of each face at U is kept within bounds; time steps
+   without damping, where no penalty falls. changed (or NULL): some penalty did, for load steps by a percent
+   or more. Until the next call the face terms are constant; at first they are those of the rest state.
+   Collective. */
 typedef enum { SB_STEPS_OF_LOAD, SB_STEPS_IN_TIME, SB_STEPS_UNDAMPED } SbStepsOf;
 PetscErrorCode SbSpaceFollowJumps(SbSpace space, Vec U, SbStepsOf steps, PetscBool *changed);
 /* For checkpoints and re-meshing, k[5 ncell_owned]: for each of a cell's four faces the stiffness of the full
@@ -242,15 +232,12 @@ PetscErrorCode SbSpaceFindSet(SbSpace space, const char *name, const char *where
 
 /* --------------------------------- real time: many similar systems, solved fast */
 
-/*
-  SbSpaceCreateMatrixFree - the tangent without a matrix: A = shift_a M + shift_v C + shift_k sum_T R_T K_T
-  R_T^T, applied cell by cell from the cells' rotated gradients.
-
-  Collective. For laws whose tangent is Hooke's tensor turned by a rotation (linear; co-rotated with the
-  warped tangent), lumped mass, and elements without face terms (P1, P2). A is a MATSHELL owned by the caller;
-  the space is borrowed. Its state is set by SbSpaceAssembleTangent(), as for any matrix. Prescribed unknowns
-  have a scaled identity. Errors: PETSC_ERR_SUP for what it is not for.
-*/
+/* The tangent without a matrix: A = shift_a M + shift_v C + shift_k sum_T R_T K_T R_T^T, applied cell by cell
+   from the cells' rotated gradients, for laws whose tangent is Hooke's tensor turned by a rotation (linear;
+   co-rotated with the warped tangent), lumped mass, and elements without face terms (P1, P2). A is a MATSHELL
+   owned by the caller; the space is borrowed. Its state is set by SbSpaceAssembleTangent(), as for any
+   matrix. Prescribed unknowns have a scaled identity. Collective. Errors: PETSC_ERR_SUP for what it is not
+   for. */
 PetscErrorCode SbSpaceCreateMatrixFree(SbSpace space, Mat *A);
 /* Whether the space's laws, elements and mass allow a matrix-free operator. Collective, same on all ranks. */
 PetscErrorCode SbSpaceAllowsMatrixFree(SbSpace space, PetscBool *has);

@@ -119,27 +119,18 @@ SB_INLINE PetscReal SbMatDet(const PetscReal A[9])
   return SbDot3(A, c);
 }
 
-/*
-  SbPolar - the proper rotation R next to F: det R = +1, the maximiser of R : F, for every F.
-
-  Not collective. Input: F, deformation gradients. Output: R, rotations; R^T F is symmetric. Where the
-  maximiser is not unique (rank one, F = 0, reflections with equal stretches) some maximiser is returned, I
-  for F = 0. A lane that is not finite gives NaN. Error of R about 5 eps |F| / (s2 + s3), s2 + s3 being the
-  sum of the two smaller signed stretches: that is rounding of F seen through the condition number of the
-  problem. A lane's result does not depend on the others.
-*/
+/* The proper rotation R next to F: det R = +1, the maximiser of R : F, for every F; R^T F is symmetric. Where
+   the maximiser is not unique (rank one, F = 0, reflections with equal stretches) some maximiser is returned,
+   I for F = 0. A lane that is not finite gives NaN. Error of R about 5 eps |F| / (s2 + s3), s2 + s3 being the
+   sum of the two smaller signed stretches: that is rounding of F seen through the condition number of the
+   problem. A lane's result does not depend on the others. Not collective. */
 void SbPolar(const SbPack F[9], SbPack R[9]);
 
-/*
-  SbSymEig - eigenvalues s[3] and eigenvectors V (columns, det V = +1) of symmetric S[6] = 00 01 02 11 12 22.
-
-  Not collective. Right to rounding of the largest entry; no order among the eigenvalues. With R from
-  SbPolar() and S = R^T F this is the singular value decomposition F = (R V) diag(s) V^T with two rotations,
-  the sign of det F being in s.
-*/
+/* Eigenvalues s[3] and eigenvectors V (columns, det V = +1) of symmetric S[6] = 00 01 02 11 12 22, right to
+   rounding of the largest entry; no order among the eigenvalues. With R from SbPolar() and S = R^T F this is
+   the singular value decomposition F = (R V) diag(s) V^T with two rotations, the sign of det F being in s.
+   Not collective. */
 void SbSymEig(const SbPack S[6], SbPack s[3], SbPack V[9]);
 
-/*
-  SbStretches - F = U diag(s) V^T with rotations U and V; s[k] in no order, det F = s0 s1 s2 with its sign.
-*/
+/* F = U diag(s) V^T with rotations U and V; s[k] in no order, det F = s0 s1 s2 with its sign. */
 void SbStretches(const SbPack F[9], SbPack U[9], SbPack s[3], SbPack V[9]);

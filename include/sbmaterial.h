@@ -23,8 +23,7 @@ typedef enum {
 typedef struct {
   /* reads -body_<name>_...; scope = {"body", <law>, <name>} */
   PetscErrorCode (*setfromoptions)(SbMaterial m, const SbScope *scope);
-  /* checks that the law has this tangent and sets `tangent` and `frame`; NULL when there is one tangent only
-     */
+  /* checks that the law has this tangent, sets `tangent` and `frame`; NULL when there is one tangent only */
   PetscErrorCode (*settangent)(SbMaterial m, SbTangentKind kind);
   /* psi = energy per rest volume, J/m^3; zero at rest */
   void (*energy)(const struct _p_SbMaterial *m, const SbPack F[9], SbPack psi);
@@ -70,23 +69,16 @@ struct _p_SbMaterial {
 };
 
 extern PetscFunctionList SbMaterialList;
-/*
-  SbMaterialRegister - adds a law and the rows of its options (classes "body" and "inclusion", type = law).
-
-  Not collective, same on all ranks. create() fills the table, `tangent` and the flags of a material whose
-  numbers are set.
-*/
+/* Adds a law and the rows of its options (classes "body" and "inclusion", type = law). create() fills the
+   table, `tangent` and the flags of a material whose numbers are set. Not collective, same on all ranks. */
 PetscErrorCode SbMaterialRegister(const char *law, PetscErrorCode (*create)(SbMaterial), PetscInt nrows,
                                   const SbOption rows[]);
 /* linear, corotated, stvk, neohookean, and the rows young, poisson, density that every body has. */
 PetscErrorCode SbMaterialRegisterAll(void);
-/*
-  SbMaterialCreate - creates the law by name and reads young, poisson, density and the law's own options.
-
-  Not collective, same on all ranks. Input: law; body, the scope of the body or inclusion (its `type` is not
-  examined). Output: material, owned by the caller. Errors: PETSC_ERR_USER for an unknown law and for what the
-  option readers and the next two refuse.
-*/
+/* Creates the law by name and reads young, poisson, density and the law's own options. body: the scope of the
+   body or inclusion (its `type` is not examined). The material is owned by the caller. Errors: PETSC_ERR_USER
+   for an unknown law and for what the option readers and the next two refuse. Not collective, same on all
+   ranks. */
 PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial *m);
 /* The same from numbers: E in Pa, nu without unit, density in kg/m^3, first tangent. Reads no options. */
 PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal nu, PetscReal density,
@@ -116,14 +108,10 @@ SB_INLINE void SbMaterialRotation(const struct _p_SbMaterial *m, const SbPack F[
   else
     SbPolar(F, R);
 }
-/*
-  SbMaterialDampingStress - dP = R hooke(sym(R^T H)) = mu (H + R H^T R) + lambda (R : H) R, R the rotation in
-  F: the stress of stiffness-proportional damping, per second of beta; R = I for the linear law. One rule for
-  every other law and every tangent: it never feeds energy in (H : dP >= 0), and where the cell is unstrained
-  (F = R) it is the law's tangent and vanishes for a spin. In a strained cell a spin is damped in proportion
-  to the strain.
-
-  Not collective. Input: F; H, gradient of the velocity, 1/s. Output: dP, Pa/s.
-*/
+/* dP = R hooke(sym(R^T H)) = mu (H + R H^T R) + lambda (R : H) R, Pa/s, with R the rotation in F and H the
+   gradient of the velocity, 1/s: the stress of stiffness-proportional damping, per second of beta; R = I for
+   the linear law. One rule for every other law and every tangent: it never feeds energy in (H : dP >= 0), and
+   where the cell is unstrained (F = R) it is the law's tangent and vanishes for a spin. In a strained cell a
+   spin is damped in proportion to the strain. Not collective. */
 void SbMaterialDampingStress(const struct _p_SbMaterial *m, const SbPack F[9], const SbPack H[9],
                              SbPack dP[9]);

@@ -81,11 +81,8 @@ PetscErrorCode SbModelLoads(SbModel model, PetscReal t, Vec U, Vec V, Vec F);
 /* A = shift_a M + shift_v C + shift_k K(u) and the effects' part, prescribed ones replaced. Collective. */
 PetscErrorCode SbModelTangent(SbModel model, PetscReal t, PetscReal shift_v, PetscReal shift_a,
                               PetscReal shift_k, Vec U, Vec V, Mat A);
-/*
-  SbModelNonsymmetric - Y = the part of the tangent at U that the matrix lacks, not symmetric, times X.
-
-  Collective. U, X: [nnode][3] m; Y: N, zero on prescribed unknowns; all from SbSpaceCreateVec().
-*/
+/* Y = the part of the tangent at U that the matrix lacks, not symmetric, times X. U, X: [nnode][3] m; Y: N,
+   zero on prescribed unknowns; all from SbSpaceCreateVec(). Collective. */
 PetscErrorCode SbModelNonsymmetric(SbModel model, PetscReal t, Vec U, Vec X, Vec Y);
 /* Writes prescribed displacements at t into U. */
 PetscErrorCode SbModelPrescribe(SbModel model, PetscReal t, Vec U);
@@ -154,12 +151,8 @@ PetscErrorCode SbModelCentres(SbModel model, Vec U, PetscReal centre[][4]);
 PetscErrorCode SbModelBodySums(SbModel model, Vec U, Vec V, PetscReal sum[][SB_BODY_SUMS]);
 /* Instantaneous part of the energies (kinetic, strain, momenta, ...). V may be NULL. Collective. */
 PetscErrorCode SbModelEnergies(SbModel model, Vec U, Vec V, SbEnergies *e);
-/*
-  SbModelStrainEnergy - strain energy at U, J, its gradient, the internal forces without damping, F[nnode][3]
-  N, and how many tets are inverted there.
-
-  Collective. F may be NULL.
-*/
+/* Strain energy at U, J, its gradient, the internal forces without damping, F[nnode][3] N (may be NULL), and
+   how many tets are inverted there. Collective. */
 PetscErrorCode SbModelStrainEnergy(SbModel model, Vec U, Vec F, PetscReal *psi, PetscInt *ninverted);
 /* For laws with -body_NAME_tangent auto: from now on tangents with each cell projected to positive
    semi-definite, or the exact ones. Not collective. */

@@ -146,8 +146,8 @@ static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, Petsc
   PetscReal *normal;
 
   PetscFunctionBeginUser;
-  *first = (PetscBool)(!b->begun && t == 0.); /* not when it goes on from a checkpoint */
-  if (!*first) PetscFunctionReturn(PETSC_SUCCESS);
+  if (b->begun || t != 0.) PetscFunctionReturn(PETSC_SUCCESS); /* it goes on, perhaps from a checkpoint */
+  *first = PETSC_TRUE;
   find_path(b, t, dt);
   PetscCall(SbContactMeshMarkDriven(m));
   PetscCall(SbBarrierPlace(b, u, 0., b->x));
@@ -321,27 +321,27 @@ static PetscErrorCode scale_width_barrier(SbEffect e, PetscReal factor, PetscRea
   PetscReal far = b->mesh->size, least;
 
   PetscFunctionBeginUser;
-  *changed = PETSC_FALSE;
   if (b->width > 0. || b->overlapping) PetscFunctionReturn(PETSC_SUCCESS);
   b->wider = factor > 1. ? factor : 0.;
   b->growth = growth;
   if (factor > 1.) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt k = 0; k < 3 * b->mesh->nbody_vertex; k++) far = PetscMax(far, PetscAbsReal(b->mesh->X[k]));
   least = WIDTH_LEAST * far / e->width;
-  *changed = (PetscBool)(least < 1.);
-  if (*changed) set_scale(e, PetscMax(factor, least) * b->scale);
+  if (least >= 1.) PetscFunctionReturn(PETSC_SUCCESS);
+  set_scale(e, PetscMax(factor, least) * b->scale);
+  *changed = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscReal dt, PetscReal speed,
-                                    PetscReal u0[], PetscBool *moved)
+                                    PetscReal u0[])
 {
   Barrier *b = (Barrier *)e->data;
   const SbContactMesh m = b->mesh;
   PetscReal least = PETSC_MAX_REAL, energy[2], unused;
+  PetscBool moved;
 
   PetscFunctionBeginUser;
-  *moved = PETSC_FALSE;
   find_path(b, t, dt);
   b->progress = 0.;
   b->friction.n = b->nspring = b->nbounce = 0;
@@ -351,8 +351,8 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
     PetscCall(SbBarrierSeparate(e, s, dt, (PetscBool)(!b->begun && !b->searched && t == 0.)));
   }
   if (!b->begun && t == 0.) { /* not when it goes on from a checkpoint */
-    PetscCall(part_touching(e, s, u0, moved));
-    if (*moved) PetscCall(SbBarrierSeparate(e, s, dt, PETSC_FALSE));
+    PetscCall(part_touching(e, s, u0, &moved));
+    if (moved) PetscCall(SbBarrierSeparate(e, s, dt, PETSC_FALSE));
   }
   b->begun = PETSC_TRUE;
   PetscCall(SbBarrierUpdate(b, u0));
@@ -390,10 +390,9 @@ static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], Pe
                                   PetscBool *again)
 {
   Barrier *b = (Barrier *)e->data;
-  PetscBool last;
+  PetscBool last, more;
 
   PetscFunctionBeginUser;
-  *again = PETSC_FALSE;
   if (b->contact->friction.mu <= 0. && (e->dynamic || !b->overlapping)) PetscFunctionReturn(PETSC_SUCCESS);
   if (e->dynamic && !b->lags && !solved) PetscFunctionReturn(PETSC_SUCCESS);
   last = (PetscBool)(++b->nlag >= (b->lags ? b->lags : e->dynamic ? 2 : LAGS));
@@ -412,9 +411,9 @@ static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], Pe
     b->nstuck = 0;
   } else
     b->nstuck += solved;
-  *again =
+  more =
     (PetscBool)(!last && b->nstuck < STUCK && b->lag > (e->dynamic && !b->lags ? MUCH : b->lag_tolerance));
-  if (!e->dynamic && !*again && b->lag > b->lag_tolerance && !b->stuck_said) {
+  if (!e->dynamic && !more && b->lag > b->lag_tolerance && !b->stuck_said) {
     b->stuck_said = PETSC_TRUE;
     PetscCall(
       SbWarning(s->comm,
@@ -422,7 +421,9 @@ static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], Pe
                 "Coulomb's limit; try more -static_steps, or motion (-time euler_implicit)",
                 e->name, (double)b->lag));
   }
-  if (*again) SbBarrierSwapFriction(b);
+  if (!more) PetscFunctionReturn(PETSC_SUCCESS);
+  SbBarrierSwapFriction(b);
+  *again = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -136,7 +136,6 @@ PetscErrorCode SbEffectGapForces_Barrier(SbEffect e, SbSpace s, const PetscReal 
 
   PetscFunctionBeginUser;
   (void)s;
-  *bound = 0.;
   PetscCall(SbBarrierUpdate(b, u));
   for (PetscInt i = 0; i < b->nactive; i++) {
     const Active *a = &b->active[i];
@@ -219,10 +218,9 @@ PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal 
 
   PetscFunctionBeginUser;
   (void)s;
-  *energy = 0.;
   if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBarrierUpdate(b, u));
-  *energy = SbBarrierGradient(b, 1., f);
+  *energy += SbBarrierGradient(b, 1., f);
 
   /* pairs whose slip has reversed since the Hessian was evaluated */
   for (PetscInt i = 0; i < b->friction.n; i++) {

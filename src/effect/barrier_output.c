@@ -291,9 +291,8 @@ PetscErrorCode SbEffectNearest_Barrier(SbEffect e, SbSpace s, PetscReal *gap, si
   mine.gap = least ? (double)least->gap : PETSC_MAX_REAL;
   mine.rank = rank;
   PetscCallMPI(MPI_Allreduce(&mine, &first, 1, MPI_DOUBLE_INT, MPI_MINLOC, s->comm));
+  if (first.gap >= *gap) PetscFunctionReturn(PETSC_SUCCESS);
   *gap = first.gap;
-  text[0] = 0;
-  if (first.gap == PETSC_MAX_REAL) PetscFunctionReturn(PETSC_SUCCESS);
   if (rank == first.rank) {
     const SbContactPair *pair = &b->pairs->pair[least->pair];
     const PetscInt part[2] = {b->mesh->part[pair->v[0]], b->mesh->part[pair->v[SbContactPairSplit(pair)]]};

@@ -275,7 +275,6 @@ PetscErrorCode SbEffectRestitution_Barrier(SbEffect e, PetscReal *work)
   PetscReal push[15];
 
   PetscFunctionBeginUser;
-  *work = 0.;
   for (PetscInt i = b->nspring - b->nbounce; i < b->nspring; i++) {
     const Spring *spring = &b->spring[i];
 

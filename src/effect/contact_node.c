@@ -154,7 +154,7 @@ static PetscErrorCode impact_contact(SbEffect e, PetscReal *part)
   Contact *c = (Contact *)e->data;
 
   PetscFunctionBeginUser;
-  *part = c->impact;
+  *part = PetscMin(*part, c->impact);
   /* springs of new contacts have acted for a whole step */
   for (PetscInt i = 0; c->impact < 1 && i < c->n; i++) {
     if (!c->touch[i].was) c->touch[i].lambda = 0;
@@ -389,7 +389,6 @@ static PetscErrorCode restitution_contact(SbEffect e, PetscReal *work)
   const Contact *c = (const Contact *)e->data;
 
   PetscFunctionBeginUser;
-  *work = 0;
   for (PetscInt i = 0; i < c->n; i++) {
     const Touch *touch = &c->touch[i];
 

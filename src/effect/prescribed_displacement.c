@@ -154,7 +154,6 @@ static PetscErrorCode turning_work_support(SbEffect e, SbSpace space, PetscReal 
   SbPose pose[2];
 
   PetscFunctionBeginUser;
-  *work = 0;
   if (theta[0] == theta[1]) PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 2; k++) SbPoseSet(d->path.axis, theta[k], d->path.point, still, &pose[k]);
   for (PetscInt i = 0; i < d->nowned; i++) {

@@ -39,46 +39,35 @@ void SbInsertClear(SbSpace s, const SbMatBlocks *x, PetscInt b, const SbStage *f
   }
 }
 
-/* Any storage, any rank: adds the cell in lane l of batch b, block by block. */
-static void insert_cell(SbSpace s, const SbMatBlocks *x, PetscInt b, int l, int npair, const SbPack K[][9])
+/*
+  Any storage, any rank: adds the cells of batch b, block by block. DG: each block between means is distributed
+  to the own nodes and those across the faces.
+*/
+static void insert_cells(SbSpace s, const SbMatBlocks *x, PetscInt b, int npair, PetscBool broken,
+                         const SbPack K[][9])
 {
-  const PetscInt w = s->width, *node = s->batch_clique + (size_t)(b * w) * SB_BATCH + l;
-  const PetscInt *offset = s->plan->offset + (size_t)(b * w * w) * SB_BATCH + l;
-
-  for (int p = 0; p < npair; p++) {
-    PetscReal k[9];
-
-    SbPackGet(9, K[p], l, k);
-    for (int turn = 0; turn < (SbPairA[p] == SbPairB[p] ? 1 : 2); turn++) {
-      const int row = turn ? SbPairB[p] : SbPairA[p], column = turn ? SbPairA[p] : SbPairB[p];
-
-      sb_insert_block(s, x, node[SB_BATCH * row], node[SB_BATCH * column],
-                      offset[SB_BATCH * (w * row + column)], 1., (PetscBool)turn, k);
-    }
-  }
-}
-
-/* DG: each block between means is distributed to the own nodes and those across the faces. */
-static void insert_broken(SbSpace s, const SbMatBlocks *x, PetscInt b, int l, const SbPack K[10][9])
-{
-  const PetscInt w = s->width, *node = s->batch_clique + (size_t)(b * w) * SB_BATCH + l;
-  const PetscInt *offset = s->plan->offset + (size_t)(b * w * w) * SB_BATCH + l;
+  const PetscInt w = s->width;
   PetscReal weight[8], k[9];
 
-  for (int a = 0; a < 4; a++) {
-    weight[a] = s->batch_weight[4 * b + a][l];
-    weight[4 + a] = 1. - weight[a];
-  }
-  for (int p = 0; p < 10; p++) {
-    SbPackGet(9, K[p], l, k);
-    for (int n = 0; n < (SbPairA[p] == SbPairB[p] ? 4 : 8); n++) {
-      const int turn = n / 4, row = (turn ? SbPairB[p] : SbPairA[p]) + 4 * (n & 1),
-                column = (turn ? SbPairA[p] : SbPairB[p]) + 2 * (n & 2);
-      const PetscReal factor = weight[row] * weight[column];
+  for (int l = 0; l < s->batch_n[b]; l++) {
+    const PetscInt *node = s->batch_clique + (size_t)(b * w) * SB_BATCH + l;
+    const PetscInt *offset = s->plan->offset + (size_t)(b * w * w) * SB_BATCH + l;
 
-      if (factor != 0.)
-        sb_insert_block(s, x, node[SB_BATCH * row], node[SB_BATCH * column],
-                        offset[SB_BATCH * (w * row + column)], factor, (PetscBool)turn, k);
+    for (int a = 0; a < 4 && broken; a++) {
+      weight[a] = s->batch_weight[4 * b + a][l];
+      weight[4 + a] = 1. - weight[a];
+    }
+    for (int p = 0; p < npair; p++) {
+      SbPackGet(9, K[p], l, k);
+      for (int n = 0; n < (SbPairA[p] == SbPairB[p] ? 4 : 8); n += broken ? 1 : 4) {
+        const int turn = n / 4, row = (turn ? SbPairB[p] : SbPairA[p]) + 4 * (n & 1),
+                  column = (turn ? SbPairA[p] : SbPairB[p]) + 2 * (n & 2);
+        const PetscReal factor = broken ? weight[row] * weight[column] : 1.;
+
+        if (factor != 0.)
+          sb_insert_block(s, x, node[SB_BATCH * row], node[SB_BATCH * column],
+                          offset[SB_BATCH * (w * row + column)], factor, (PetscBool)turn, k);
+      }
     }
   }
 }
@@ -142,23 +131,16 @@ SB_INLINE void insert_both(int npair, const SbPack K[][9], const PetscInt offset
   }
 }
 
-SB_KERNEL static void insert_baij(const SbPack K[restrict 10][9], const PetscInt offset[restrict],
-                                  PetscInt width, PetscScalar *const value[2])
+/* `edge`: batches with nodes of another rank. */
+SB_KERNEL static void insert_baij(int npair, const SbPack K[restrict][9], const PetscInt offset[restrict],
+                                  PetscInt width, PetscBool edge, PetscScalar *const value[2])
 {
-  insert_both(10, K, offset, width, PETSC_FALSE, value);
-}
-
-/* Batches with nodes of another rank. */
-SB_KERNEL static void insert_baij_edge(const SbPack K[restrict 10][9], const PetscInt offset[restrict],
-                                       PetscInt width, PetscScalar *const value[2])
-{
-  insert_both(10, K, offset, width, PETSC_TRUE, value);
-}
-
-SB_KERNEL static void insert_baij_quadratic(const SbPack K[restrict SB_PAIRS][9],
-                                            const PetscInt offset[restrict], PetscScalar *const value[2])
-{
-  insert_both(SB_PAIRS, K, offset, SB_CELL_NODES, PETSC_TRUE, value);
+  if (npair == SB_PAIRS)
+    insert_both(SB_PAIRS, K, offset, SB_CELL_NODES, PETSC_TRUE, value);
+  else if (edge)
+    insert_both(10, K, offset, width, PETSC_TRUE, value);
+  else
+    insert_both(10, K, offset, width, PETSC_FALSE, value);
 }
 
 /* The stored block is K_ab, or K_ba = K_ab^T when that lies in the row of the lower node. */
@@ -203,19 +185,12 @@ void SbInsertBatch(SbSpace s, const SbMatBlocks *x, PetscInt b, int npair, Petsc
                  *node = s->batch_node + 4 * SB_BATCH * b;
   PetscInt last = 0;
 
-  if (broken)
-    for (int l = 0; l < s->batch_n[b]; l++) insert_broken(s, x, b, l, K);
-  else if (x->kind == SB_MATRIX_AIJ)
-    for (int l = 0; l < s->batch_n[b]; l++) insert_cell(s, x, b, l, npair, K);
+  if (broken || x->kind == SB_MATRIX_AIJ)
+    insert_cells(s, x, b, npair, broken, K);
   else if (x->symmetric)
     insert_sbaij(npair, K, s->plan->upper + (size_t)(b * s->plan->npair) * SB_BATCH, x->value);
-  else if (npair == SB_PAIRS)
-    insert_baij_quadratic(K, offset, x->value);
   else {
     for (int k = 0; k < 4 * SB_BATCH; k++) last = PetscMax(last, node[k]);
-    if (last < s->nnode_owned)
-      insert_baij(K, offset, s->width, x->value);
-    else
-      insert_baij_edge(K, offset, s->width, x->value);
+    insert_baij(npair, K, offset, s->width, (PetscBool)(last >= s->nnode_owned), x->value);
   }
 }

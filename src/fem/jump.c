@@ -55,7 +55,7 @@ typedef struct {
 #define SUPPORT (-1)
 
 struct _p_SbJump {
-  Face *face;         /* faces in the order of batches and lanes */
+  Face *face;         /* those with an owned node, in the order of batches and lanes */
   PetscReal *V;       /* [ncell] rest volume, m^3 */
   PetscReal *modulus; /* [ncell] modulus m above, Pa */
   PetscInt nbatch;

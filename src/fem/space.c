@@ -342,9 +342,8 @@ PetscErrorCode SbSpaceGetSetFacets(SbSpace s, PetscInt k, PetscInt *n, SbFacet *
     for (PetscInt a = 0; a < 3; a++) {
       facet->corner[a] = SbFaceVertex[face][a];
       facet->vertex[a] = mesh->cell[4 * cell + facet->corner[a]];
-    }
-    for (PetscInt a = 0; a < 3; a++)
       SbSubtract(mesh->x + 3 * facet->vertex[a], mesh->x + 3 * facet->vertex[0], x[a]);
+    }
     SbSubtract(mesh->x + 3 * facet->vertex[0], mesh->x + 3 * mesh->cell[f], up);
     SbCross(x[1], x[2], normal);
     length = PetscSqrtReal(SbDot3(normal, normal));

@@ -84,8 +84,10 @@ PetscErrorCode SbSpaceZeroPrescribed(SbSpace s, PetscBool prescribed, Vec X)
 
   PetscFunctionBeginUser;
   PetscCall(VecGetArray(X, &x));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
-    if (prescribed == ((s->fixed[i / 3] >> i % 3) & 1)) x[i] = 0.;
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    for (int k = 0; k < 3; k++)
+      if (prescribed == ((s->fixed[i] >> k) & 1)) x[3 * i + k] = 0.;
+  }
   PetscCall(VecRestoreArray(X, &x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

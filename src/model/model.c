@@ -69,14 +69,12 @@ static PetscErrorCode match_mass(SbModel m, PetscInt b)
 
   PetscFunctionBeginUser;
   for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
-    PetscReal x[4][3], g[3][3], V;
+    const PetscInt *vert = mesh->cell + 4 * c;
 
     if (mesh->cell_body[c] != b) continue;
-    for (PetscInt i = 0; i < 12; i++) x[i / 3][i % 3] = mesh->x[3 * mesh->cell[4 * c + i / 3] + i % 3];
-    m->element[b]->ops.tabulate((const PetscReal(*)[3])x, g, &V);
-    if (mesh->cell_set[c] & SB_CURVED)
-      V = SbTetCurvedVolume(mesh->x, mesh->cell + 4 * c, mesh->edge_off + 18 * c);
-    mass += m->material[mesh->cell_material[c]]->density * V;
+    mass += m->material[mesh->cell_material[c]]->density *
+            (mesh->cell_set[c] & SB_CURVED ? SbTetCurvedVolume(mesh->x, vert, mesh->edge_off + 18 * c)
+                                           : SbTetDeterminant(mesh->x, vert) / 6.);
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &mass, 1, MPIU_REAL, MPI_SUM, m->comm));
   factor = m->body[b].in_memory->mass / mass;
@@ -242,16 +240,6 @@ PetscErrorCode SbModelExternalForces(SbModel m, const SbStage *stage, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets the residual at prescribed unknowns to zero: guesses have the prescribed values. */
-static void constrain_residual(SbSpace s, PetscReal f[])
-{
-  for (PetscInt k = 0; k < 3 * s->nfixed; k++) {
-    const PetscInt node = s->fixed_node[k / 3];
-
-    if (s->fixed[node] & (1 << k % 3)) f[3 * node + k % 3] = 0.;
-  }
-}
-
 PetscErrorCode SbModelResidual(SbModel m, PetscReal t, Vec U, Vec V, Vec A, PetscBool constrain, Vec F)
 {
   SbEvaluation e = {.U = U, .V = V, .A = A, .F = F};
@@ -261,9 +249,10 @@ PetscErrorCode SbModelResidual(SbModel m, PetscReal t, Vec U, Vec V, Vec A, Pets
   PetscCall(SbModelExternalForces(m, &e.stage, (PetscBool)(constrain && m->barrier_apart), -1., e.f));
   PetscCall(SbSpaceAddInternalForce(m->space, &e.stage, e.f));
   if (A || V) SbSpaceAddInertia(m->space, &e.stage, e.f);
-  if (constrain) constrain_residual(m->space, e.f);
   if (m->space->constraints) SbConstraintsResidual(m->space, e.stage.u, constrain, e.f);
   PetscCall(SbEvaluationEnd(m, &e));
+  /* guesses have the prescribed values */
+  if (constrain) PetscCall(SbSpaceZeroPrescribed(m->space, PETSC_TRUE, F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -312,10 +301,9 @@ PetscErrorCode SbModelNonsymmetric(SbModel m, PetscReal t, Vec U, Vec X, Vec Y)
     e.stage.shift_k = load_factor(m, m->nonsymmetric[k]);
     SbEffectCall(m->nonsymmetric[k], nonsymmetric, m->space, &e.stage, x, e.f);
   }
-  constrain_residual(m->space, e.f);
-  if (m->space->constraints) SbConstraintsProject(m->space, e.f);
   PetscCall(SbSpaceRestoreLocalRead(m->space, X, &x));
   PetscCall(SbEvaluationEnd(m, &e));
+  PetscCall(SbSpaceProjectAdmissible(m->space, Y));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -18,49 +18,28 @@
 #define CLOSE 0.9   /* gap over the target gap below which there is contact */
 #define MISSED 1e-3 /* tolerance of the sweeps over the target gap */
 
+/* Order of initial contacts: bodies, direction, gap, target gap. */
 static int by_value(const void *a, const void *b)
 {
-  const PetscReal *p = (const PetscReal *)a, *q = (const PetscReal *)b;
+  const SbInitialContact *p = a, *q = b;
+  const PetscInt body = p->body[0] != q->body[0] ? p->body[0] - q->body[0] : p->body[1] - q->body[1];
+  const PetscReal difference[6] = {
+    body, p->n[0] - q->n[0], p->n[1] - q->n[1], p->n[2] - q->n[2], p->gap - q->gap, p->to - q->to};
 
-  for (int i = 0; i < 7; i++) {
-    if (p[i] != q[i]) return p[i] < q[i] ? -1 : 1;
+  for (int i = 0; i < 6; i++) {
+    if (difference[i] != 0.) return difference[i] < 0. ? -1 : 1;
   }
   return 0;
 }
 
-/* Gathers the initial contacts of all ranks, ordered: bodies, direction, gap, target gap. */
-static PetscErrorCode gather_touches(MPI_Comm comm, const SbInitialContacts *mine, PetscInt *n,
-                                     PetscReal (**all)[7])
-{
-  PetscReal(*own)[7];
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(mine->n + 1, &own));
-  for (PetscInt i = 0; i < mine->n; i++) {
-    const SbInitialContact *t = &mine->touch[i];
-
-    for (int k = 0; k < 2; k++) own[i][k] = (PetscReal)t->body[k];
-    for (int k = 0; k < 3; k++) own[i][2 + k] = t->n[k];
-    own[i][5] = t->gap;
-    own[i][6] = t->to;
-  }
-  PetscCall(SbAllgatherv(comm, MPIU_REAL, 7 * mine->n, own, n, all, NULL));
-  *n /= 7;
-  if (*n) qsort(*all, (size_t)*n, sizeof(**all), by_value);
-  PetscCall(PetscFree(own));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Gap of a contact after the displacements `way` of its two bodies, m. */
-static PetscReal gap_after(const PetscReal touch[7], const PetscReal way[])
+static PetscReal gap_after(const SbInitialContact *t, const PetscReal way[])
 {
-  const PetscReal *one = way + 3 * (PetscInt)touch[0], *two = way + 3 * (PetscInt)touch[1];
-
-  return touch[5] + SbDot3(touch + 2, one) - SbDot3(touch + 2, two);
+  return t->gap + SbDot3(t->n, way + 3 * t->body[0]) - SbDot3(t->n, way + 3 * t->body[1]);
 }
 
 /* Gauss-Seidel: each contact moves its bodies along it, except fixed components; way[nbody + 1][3], m. */
-static void sweep_touches(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, const uint8_t fixed[],
+static void sweep_touches(PetscInt n, const SbInitialContact touch[], PetscInt nbody, const uint8_t fixed[],
                           PetscReal way[])
 {
   PetscReal worst = 1.;
@@ -69,19 +48,20 @@ static void sweep_touches(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, con
   for (int sweep = 0; sweep < SWEEPS && worst > MISSED; sweep++) {
     worst = 0.;
     for (PetscInt i = 0; i < n; i++) {
-      const PetscReal *direction = touch[i] + 2, missing = touch[i][6] - gap_after(touch[i], way);
+      const SbInitialContact *t = &touch[i];
+      const PetscReal missing = t->to - gap_after(t, way);
       PetscReal sum = 0.;
 
       for (int k = 0; k < 6; k++) {
-        if (!(fixed[(PetscInt)touch[i][k / 3]] >> (k % 3) & 1)) sum += PetscSqr(direction[k % 3]);
+        if (!(fixed[t->body[k / 3]] >> (k % 3) & 1)) sum += PetscSqr(t->n[k % 3]);
       }
       if (missing <= 0. || sum < MISSED) continue;
-      worst = PetscMax(worst, missing / touch[i][6]);
+      worst = PetscMax(worst, missing / t->to);
       for (int k = 0; k < 6; k++) {
-        const PetscInt b = (PetscInt)touch[i][k / 3];
+        const PetscInt b = t->body[k / 3];
 
         if (!(fixed[b] >> (k % 3) & 1))
-          way[3 * b + k % 3] += (k < 3 ? 1. : -1.) * missing / sum * direction[k % 3];
+          way[3 * b + k % 3] += (k < 3 ? 1. : -1.) * missing / sum * t->n[k % 3];
       }
     }
   }
@@ -93,21 +73,22 @@ static void sweep_touches(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, con
   the distance within which contacts were searched. fixed[nbody + 1]: bit c, component c is prescribed or was
   fixed here; way[nbody + 1][3], m; moved: some body moves.
 */
-static void find_ways(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, uint8_t fixed[], PetscReal way[],
-                      PetscBool *moved)
+static void find_ways(PetscInt n, const SbInitialContact touch[], PetscInt nbody, uint8_t fixed[],
+                      PetscReal way[], PetscBool *moved)
 {
   PetscReal longest = 0., most = PETSC_MAX_REAL, scale;
   PetscBool again;
 
   *moved = PETSC_FALSE;
   for (PetscInt i = 0; i < n; i++) {
+    const SbInitialContact *t = &touch[i];
     PetscBool mobile = PETSC_FALSE;
 
     for (int k = 0; k < 6; k++)
-      mobile = (PetscBool)(mobile || (!(fixed[(PetscInt)touch[i][k / 3]] >> (k % 3) & 1) &&
-                                      PetscAbsReal(touch[i][2 + k % 3]) > MISSED));
-    *moved = (PetscBool)(*moved || (mobile && touch[i][5] < CLOSE * touch[i][6]));
-    most = PetscMin(most, FAR * touch[i][6]);
+      mobile = (PetscBool)(mobile ||
+                           (!(fixed[t->body[k / 3]] >> (k % 3) & 1) && PetscAbsReal(t->n[k % 3]) > MISSED));
+    *moved = (PetscBool)(*moved || (mobile && t->gap < CLOSE * t->to));
+    most = PetscMin(most, FAR * t->to);
   }
   if (!*moved) return;
 
@@ -116,9 +97,11 @@ static void find_ways(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, uint8_t
     again = PETSC_FALSE;
     sweep_touches(n, touch, nbody, fixed, way);
     for (PetscInt i = 0; i < n; i++) {
-      if (gap_after(touch[i], way) >= PetscMin(touch[i][5], touch[i][6]) - MISSED * touch[i][6]) continue;
+      const SbInitialContact *t = &touch[i];
+
+      if (gap_after(t, way) >= PetscMin(t->gap, t->to) - MISSED * t->to) continue;
       for (int k = 0; k < 2; k++) {
-        const PetscInt b = (PetscInt)touch[i][k];
+        const PetscInt b = t->body[k];
 
         again = (PetscBool)(again || fixed[b] != 7);
         fixed[b] = 7;
@@ -134,18 +117,6 @@ static void find_ways(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, uint8_t
   for (PetscInt k = 0; k < 3 * (nbody + 1); k++) way[k] *= scale;
 }
 
-/* Lends the local displacements U, with ghosts, for changes. */
-static PetscErrorCode open_state(SbModel m, Vec U, PetscReal **u)
-{
-  const PetscReal *now;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbSpaceGetLocalRead(m->space, U, &now));
-  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &now));
-  PetscCall(SbSpaceGetLocalWrite(m->space, U, u));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /*
   Separates bodies in initial contact by rigid displacements, in a dynamic run until the barrier is inactive.
   Effects move the vertices of remaining contacts.
@@ -159,28 +130,25 @@ PetscErrorCode SbModelPotentialStart(SbModel m, PetscReal t, PetscReal dt, Vec U
   PetscBool go_on = PETSC_TRUE;
 
   PetscFunctionBeginUser;
-  PetscCall(open_state(m, U, &u));
+  PetscCall(SbSpaceGetLocalWrite(s, U, &u));
+  PetscCall(SbSpaceUpdateGhosts(s, u));
   PetscCall(PetscCalloc2(nbody + 1, &fixed, 3 * (nbody + 1), &way));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) fixed[s->node_body[i]] |= s->fixed[i];
+  fixed[nbody] = 7;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, fixed, (PetscMPIInt)(nbody + 1), MPI_UINT8_T, MPI_BOR, m->comm));
   for (int round = 0; go_on && round < ROUNDS; round++) {
     SbInitialContacts list = {0};
-    PetscReal(*touch)[7];
-    PetscInt n = 0;
+    SbInitialContact *touch;
+    PetscInt n;
 
     go_on = PETSC_FALSE;
-    for (PetscInt e = 0; e < m->npotential; e++) {
-      PetscBool first;
-
-      CONTACT_CALL(m->potential[e], touching, s, t, dt, u, &first, &list);
-      go_on = (PetscBool)(go_on || first);
-    }
+    for (PetscInt e = 0; e < m->npotential; e++)
+      CONTACT_CALL(m->potential[e], touching, s, t, dt, u, &go_on, &list);
     if (!go_on) break;
-    if (!round) {
-      for (PetscInt i = 0; i < s->nnode_owned; i++) fixed[s->node_body[i]] |= s->fixed[i];
-      fixed[nbody] = 7;
-      PetscCallMPI(
-        MPI_Allreduce(MPI_IN_PLACE, fixed, (PetscMPIInt)(nbody + 1), MPI_UINT8_T, MPI_BOR, m->comm));
-    }
-    PetscCall(gather_touches(m->comm, &list, &n, &touch));
+    PetscCall(
+      SbAllgatherv(m->comm, MPI_BYTE, list.n * (PetscInt)sizeof(*touch), list.touch, &n, &touch, NULL));
+    n /= (PetscInt)sizeof(*touch);
+    if (n) qsort(touch, (size_t)n, sizeof(*touch), by_value);
     PetscCall(PetscFree(list.touch));
     find_ways(n, touch, nbody, fixed, way, &go_on);
     PetscCall(PetscFree(touch));
@@ -229,15 +197,15 @@ static PetscErrorCode step_speed(SbModel m, PetscReal t, PetscReal dt, Vec U, Ve
 PetscErrorCode SbModelPotentialBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0, Vec V0)
 {
   SbEvaluation at = {.U = U0, .V = V0};
-  PetscBool moved;
   PetscReal *u;
 
   PetscFunctionBeginUser;
   m->barrier_speed = 0.;
   if (V0) PetscCall(step_speed(m, t, dt, U0, V0, &m->barrier_speed));
-  PetscCall(open_state(m, U0, &u));
+  PetscCall(SbSpaceGetLocalWrite(m->space, U0, &u));
+  PetscCall(SbSpaceUpdateGhosts(m->space, u));
   for (PetscInt e = 0; e < m->npotential; e++)
-    CONTACT_CALL(m->potential[e], begin_barrier, m->space, t, dt, m->barrier_speed, u, &moved);
+    CONTACT_CALL(m->potential[e], begin_barrier, m->space, t, dt, m->barrier_speed, u);
   PetscCall(SbSpaceRestoreLocalWrite(m->space, U0, &u));
 
   /* impact velocities of this step */
@@ -290,18 +258,11 @@ PetscErrorCode SbModelPotentialMaxStep(SbModel m, Vec X, Vec Y, PetscReal progre
 PetscErrorCode SbModelPotentialNearest(SbModel m, size_t size, char text[])
 {
   PetscReal least = PETSC_MAX_REAL;
-  char mine[256];
 
   PetscFunctionBeginUser;
   text[0] = 0;
-  for (PetscInt e = 0; e < m->npotential; e++) {
-    PetscReal gap;
-
-    CONTACT_CALL(m->potential[e], nearest, m->space, &gap, sizeof(mine), mine);
-    if (gap >= least) continue;
-    least = gap;
-    PetscCall(PetscStrncpy(text, mine, size));
-  }
+  for (PetscInt e = 0; e < m->npotential; e++)
+    CONTACT_CALL(m->potential[e], nearest, m->space, &least, size, text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -312,12 +273,7 @@ PetscErrorCode SbModelPotentialUpdateFriction(SbModel m, Vec X, PetscBool solved
   PetscFunctionBeginUser;
   *again = PETSC_FALSE;
   PetscCall(SbSpaceGetLocalRead(m->space, X, &u));
-  for (PetscInt e = 0; e < m->npotential; e++) {
-    PetscBool mine;
-
-    CONTACT_CALL(m->potential[e], lag, m->space, u, solved, &mine);
-    *again = (PetscBool)(*again || mine);
-  }
+  for (PetscInt e = 0; e < m->npotential; e++) CONTACT_CALL(m->potential[e], lag, m->space, u, solved, again);
   PetscCall(SbSpaceRestoreLocalRead(m->space, X, &u));
   if (m->nrestitution && solved && !*again) PetscCall(SbModelRestitutionUpdate(m, X, again));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -347,12 +303,7 @@ PetscErrorCode SbModelPotentialGradient(SbModel m, Vec U, PetscReal scale, Petsc
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(3 * s->nnode, &f));
   PetscCall(SbSpaceGetLocalRead(s, U, &u));
-  for (PetscInt e = 0; e < m->npotential; e++) {
-    PetscReal mine;
-
-    CONTACT_CALL(m->potential[e], potential, s, u, &mine, f);
-    sum += mine;
-  }
+  for (PetscInt e = 0; e < m->npotential; e++) CONTACT_CALL(m->potential[e], potential, s, u, &sum, f);
   PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
   PetscCall(VecGetArray(F, &out));
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
@@ -371,12 +322,8 @@ PetscErrorCode SbModelGapForces(SbModel m, Vec U, Vec F, PetscReal *bound)
   PetscFunctionBeginUser;
   *bound = 0.;
   PetscCall(SbEvaluationBegin(m, 0., &at));
-  for (PetscInt e = 0; e < m->npotential; e++) {
-    PetscReal mine;
-
-    CONTACT_CALL(m->potential[e], gap_forces, m->space, at.stage.u, at.f, &mine);
-    *bound += mine;
-  }
+  for (PetscInt e = 0; e < m->npotential; e++)
+    CONTACT_CALL(m->potential[e], gap_forces, m->space, at.stage.u, at.f, bound);
   PetscCall(SbEvaluationEnd(m, &at));
   PetscCall(SbSpaceZeroPrescribed(m->space, PETSC_TRUE, F));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, bound, 1, MPIU_REAL, MPI_SUM, m->comm));
@@ -387,12 +334,8 @@ PetscErrorCode SbModelScaleBarrierWidths(SbModel m, PetscReal factor, PetscReal 
 {
   PetscFunctionBeginUser;
   *changed = PETSC_FALSE;
-  for (PetscInt e = 0; e < m->npotential; e++) {
-    PetscBool mine;
-
-    CONTACT_CALL(m->potential[e], scale_width, factor, growth, &mine);
-    *changed = (PetscBool)(*changed || mine);
-  }
+  for (PetscInt e = 0; e < m->npotential; e++)
+    CONTACT_CALL(m->potential[e], scale_width, factor, growth, changed);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -45,11 +45,7 @@ PetscErrorCode SbModelRestitutionUpdate(SbModel m, Vec U, PetscBool *again)
   Vec change, F;
 
   PetscFunctionBeginUser;
-  for (PetscInt k = 0; k < m->nrestitution; k++) {
-    work = 0.;
-    SbEffectCall(m->restitution[k], restitution, &work);
-    W += work;
-  }
+  for (PetscInt k = 0; k < m->nrestitution; k++) SbEffectCall(m->restitution[k], restitution, &W);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &W, 1, MPIU_REAL, MPI_SUM, m->comm));
   if (W <= 0.) PetscFunctionReturn(PETSC_SUCCESS);
 

@@ -48,7 +48,6 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   if (run->damped) PetscCall(SbModelDampingPower(m, run->U, run->V, &power));
   if (!first) {
     const PetscScalar *before, *now;
-    PetscReal one;
     Vec moved;
 
     /* twice the work of loads and reactions: at prescribed unknowns, and where contact acts or just did */
@@ -66,8 +65,7 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
     PetscCall(VecGetArrayRead(reaction, &now));
     for (PetscInt k = 0; k < m->nprescribe; k++) {
       if (!m->prescribe[k]->ops.turning_work) continue;
-      SbEffectCall(m->prescribe[k], turning_work, m->space, t - dt, t, before, now, &one);
-      own[1] += one;
+      SbEffectCall(m->prescribe[k], turning_work, m->space, t - dt, t, before, now, &own[1]);
     }
     PetscCall(VecRestoreArrayRead(reaction, &now));
     PetscCall(VecRestoreArrayRead(run->reaction, &before));
