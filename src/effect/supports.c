@@ -1,7 +1,6 @@
 /*
-  prescribed_displacement.c - the supports `fixed`, nodes with zero displacement, and
-  `prescribed_displacement`, nodes moved along a given path: a translation, a rotation about an axis, or both;
-  in all directions or in some.
+  supports.c - the supports `fixed`, nodes with zero displacement, and `prescribed_displacement`, nodes moved
+  along a given path: a translation, a rotation about an axis, or both; in all directions or in some.
 
   With r = X - c the rest position relative to a point c of the axis, k the unit direction and theta(t) the
   angle, the prescribed displacement is (Rodrigues 1840)
