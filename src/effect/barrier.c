@@ -343,7 +343,7 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
   PetscFunctionBeginUser;
   *moved = PETSC_FALSE;
   find_path(b, t, dt);
-  b->progress = 0.;
+  e->progress = 0.;
   b->friction.n = b->nspring = b->nbounce = 0;
   if (!b->begun) PetscCall(SbContactMeshMarkDriven(m));
   if (!b->begun || b->overlapping || b->parted) {
@@ -442,15 +442,6 @@ static PetscErrorCode safe_barrier(SbEffect e, SbSpace s, const PetscReal u0[], 
   /* the pairs were searched for anew */
   if (b->pairs->nsearch != nsearch) b->known = PETSC_FALSE;
   b->shortest = PetscMin(b->shortest, *part);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode advance_barrier(SbEffect e, PetscReal progress)
-{
-  Barrier *b = (Barrier *)e->data;
-
-  PetscFunctionBeginUser;
-  b->progress = progress;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -578,6 +569,7 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&b));
+  b->effect = e;
   b->contact = contact;
   PetscCall(SbOptionReal(scope, "barrier_width", &b->width));
   PetscCall(SbOptionReal(scope, "barrier_pressure", &b->pressure));
@@ -590,7 +582,6 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
                          .touching = touching_barrier,
                          .begin_barrier = begin_barrier,
                          .safe = safe_barrier,
-                         .advance = advance_barrier,
                          .lag = lag_barrier,
                          .nearest = SbEffectNearest_Barrier,
                          .meet = e->euler ? SbEffectMeet_Barrier : NULL,

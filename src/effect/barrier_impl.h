@@ -49,6 +49,7 @@ typedef struct {
 } Spring;
 
 typedef struct {
+  SbEffect effect;  /* whose data this is */
   Contact *contact; /* owned */
   SbContactMesh mesh;
   SbContactPairs pairs;
@@ -57,12 +58,12 @@ typedef struct {
   PetscReal scale;           /* w over its default, 0..1 (-accuracy) */
   PetscReal wider, growth;   /* largest factor on it at the next step, 0: none; growth of energy by it, J */
   PetscBool verify, begun, searched; /* option; the run has begun; overlaps were searched for */
-  PetscReal *x, *u;        /* [nvertex][3] current positions, m; [nnode_owned][3] displacements of them, m */
-  PetscReal *start;        /* [nvertex][3] at the start of the step, m */
-  PetscReal *from, *to;    /* [obstacle's vertices][3] positions at the start and the end of the step, m */
-  PetscReal progress, now; /* completed fraction of that path; the one of x */
-  PetscReal *other;        /* [nvertex][3] end of a motion, m */
-  PetscBool known;         /* x and active are up to date for u and progress */
+  PetscReal *x, *u;     /* [nvertex][3] current positions, m; [nnode_owned][3] displacements of them, m */
+  PetscReal *start;     /* [nvertex][3] at the start of the step, m */
+  PetscReal *from, *to; /* [obstacle's vertices][3] positions at the start and the end of the step, m */
+  PetscReal now;        /* SbEffect.progress of x, the completed fraction of that path */
+  PetscReal *other;     /* [nvertex][3] end of a motion, m */
+  PetscBool known;      /* x and active are up to date for u and progress */
   PetscInt nactive, size;
   Active *active;
   FrictionPairs friction, next; /* next: with closest points and normal forces at the end of the step */

@@ -244,6 +244,7 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
              e->name, (double)c->bounce.e, e->name);
 
   e->nstate = SB_CONTACT_STATE;
+  e->by_node = PETSC_TRUE;
   e->column = columns;
   e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);
   e->saddle = (PetscBool)(c->response == MULTIPLIER);
