@@ -130,7 +130,7 @@ static PetscErrorCode setup_body_force(SbEffect e, SbSpace space)
   PetscInt *cells;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectCells(space, &e->on, &load->nitem, &cells));
+  PetscCall(SbEffectItems(space, &e->on, SB_ON_CELLS, &load->nitem, &cells));
   load->ncorner = 4;
   PetscCall(PetscMalloc1(4 * load->nitem, &load->corner));
   for (PetscInt i = 0; i < 4 * load->nitem; i++) load->corner[i] = 4 * cells[i / 4] + i % 4;

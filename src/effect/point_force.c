@@ -45,7 +45,7 @@ static PetscErrorCode setup_point_force(SbEffect e, SbSpace space)
   PetscBool *chosen;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectVertices(space, &e->on, &n, &vertices));
+  PetscCall(SbEffectItems(space, &e->on, SB_ON_VERTICES, &n, &vertices));
   while (total < n && vertices[total] < mesh->nvert_owned) total++;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_INT, MPI_SUM, space->comm));
   share = 1. / (PetscReal)total;

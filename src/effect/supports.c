@@ -86,7 +86,7 @@ static PetscErrorCode setup_support(SbEffect e, SbSpace space)
   PetscInt n, owned;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectNodes(space, &e->on, &n, &d->node));
+  PetscCall(SbEffectItems(space, &e->on, SB_ON_NODES, &n, &d->node));
   PetscCall(PetscMalloc1(n, &d->bits));
   /* an earlier effect keeps what it has; all ranks see a node with the same bits, so they decide alike */
   for (PetscInt i = 0; i < n; i++) {
