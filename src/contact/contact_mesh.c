@@ -20,14 +20,12 @@ static inline PetscInt npoint_of(SbSpace s, const SbFacet *f)
   return s->edge_node && s->edge_node[6 * f->cell] >= 0 ? 6 : 3;
 }
 
-/* The local node of P2 in the middle of side k of a facet. */
+/* The local node of P2 in the middle of side k of a facet; edges of a tet: 01 02 03 12 13 23. */
 static PetscInt middle_of(SbSpace s, const SbFacet *f, PetscInt k)
 {
   const int a = f->corner[k], b = f->corner[(k + 1) % 3];
-  int e = 0;
 
-  while (SbTetEdge[e][0] != PetscMin(a, b) || SbTetEdge[e][1] != PetscMax(a, b)) e++;
-  return s->edge_node[6 * f->cell + e];
+  return s->edge_node[6 * f->cell + (a && b ? a + b : a + b - 1)];
 }
 
 /* Own points are numbered vertices first, then nodes in the middle of sides; -1: another rank's, or none. */

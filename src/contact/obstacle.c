@@ -164,11 +164,6 @@ PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscBool SbObstacleIsMesh(SbObstacle o)
-{
-  return (PetscBool)(o->shape == MESH);
-}
-
 PetscErrorCode SbObstacleSetUp(SbObstacle o, MPI_Comm comm, const char *option, PetscReal scale,
                                const PetscReal at[3], size_t size, char note[])
 {

@@ -58,19 +58,19 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   PetscCall(PetscFree(facet));
   s->coupled = PETSC_TRUE;
   if (!b->contact->obstacle) {
-    PetscBool *takes_part;
-    PetscInt nsurface = 0;
+    SbPairs *p = &b->columns;
 
-    PetscCall(PetscCalloc1(nbody, &takes_part));
-    for (PetscInt v = 0; v < b->mesh->nbody_vertex; v++) takes_part[b->mesh->part[v]] = PETSC_TRUE;
-    for (PetscInt i = 0; i < nbody; i++) nsurface += takes_part[i];
+    PetscCall(PetscMalloc1(nbody, &p->slot));
+    for (PetscInt i = 0; i < nbody; i++) p->slot[i] = -1;
+    for (PetscInt v = 0; v < b->mesh->nbody_vertex; v++) p->slot[b->mesh->part[v]] = 0;
+    for (PetscInt i = 0; i < nbody; i++)
+      if (p->slot[i] == 0) p->slot[i] = p->nsurface++;
     PetscCheck(
-      nsurface > 1 || b->contact->self, s->comm, PETSC_ERR_USER_INPUT,
+      p->nsurface > 1 || b->contact->self, s->comm, PETSC_ERR_USER_INPUT,
       "The effect %s has only one body to examine: give -effect_%s_self yes for a body that may meet "
       "itself, more sets with -effect_%s_on, or -effect_%s_obstacle",
       e->name, e->name, e->name, e->name);
-    if (b->contact->pairs) PetscCall(SbPairsSetUp(e, s->mesh, takes_part, b->contact->self, &b->columns));
-    PetscCall(PetscFree(takes_part));
+    if (b->contact->pairs) PetscCall(SbPairsSetUp(e, s->mesh, b->contact->self, p));
   }
 
   /* width and pressure of each body */

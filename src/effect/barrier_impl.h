@@ -13,9 +13,8 @@ typedef struct {
   const char **column;           /* [ncolumn] all of the effect */
   char (*text)[3 * SB_NAME_MAX]; /* names of the columns behind the fixed ones */
 } SbPairs;
-/* Appends the columns of pairs to those of e; takes_part[nbody]: the body's surface takes part. */
-PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh, const PetscBool takes_part[], PetscBool self,
-                            SbPairs *pairs);
+/* Appends the columns of pairs to those of e, by nsurface and slot[]. */
+PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh, PetscBool self, SbPairs *pairs);
 
 /* A pair with a gap below the width, at the current positions. */
 typedef struct {

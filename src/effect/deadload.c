@@ -17,10 +17,9 @@ typedef struct {
   SbFormula density[3];    /* N/m^3 or Pa */
   PetscReal uniform[3];    /* traction: total force, N, from set-up on per area, Pa */
   PetscInt ncorner, nitem; /* 4 for tets, 3 for facets */
-  PetscInt *corner;  /* [nitem][ncorner] 4 cell + vertex of it; NULL once a steady load was integrated */
-  PetscInt n, *node; /* [n] owned nodes of these cells */
-  PetscReal *value;  /* [nnode][3] load at time t, right on owned nodes, N */
-  PetscReal t;       /* s */
+  PetscInt *corner; /* [nitem][ncorner] 4 cell + vertex of it; NULL once a steady load was integrated */
+  PetscReal *value; /* [nnode][3] load at time t, right on owned nodes, N */
+  PetscReal t;      /* s */
 } DeadLoad;
 
 static const SbOption body_force_rows[] = {
@@ -100,24 +99,13 @@ static void integrate(DeadLoad *load, SbSpace space, PetscReal t)
   }
 }
 
-/* Finds the nodes of the cells of load->corner[nitem][ncorner], and integrates once. */
+/* Integrates over load->corner[nitem][ncorner] once. */
 static PetscErrorCode set_up(DeadLoad *load, SbSpace space)
 {
-  PetscBool steady = PETSC_TRUE, *touched;
+  PetscBool steady = PETSC_TRUE;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(space->nnode, &touched));
-  for (PetscInt item = 0; item < load->nitem; item++) {
-    const PetscInt cell = load->corner[load->ncorner * item] / 4;
-    const PetscInt n = SbSpaceCellElement(space, cell)->nodes_per[1] ? SB_CELL_NODES : 4;
-
-    for (PetscInt a = 0; a < n; a++) touched[SbSpaceCellNode(space, cell, a)] = PETSC_TRUE;
-  }
-  PetscCall(PetscMalloc2(space->nnode_owned, &load->node, 3 * space->nnode, &load->value));
-  for (PetscInt i = 0; i < space->nnode_owned; i++) {
-    if (touched[i]) load->node[load->n++] = i;
-  }
-  PetscCall(PetscFree(touched));
+  PetscCall(PetscMalloc1(3 * space->nnode, &load->value));
   integrate(load, space, 0);
   for (int i = 0; i < 3; i++) steady = (PetscBool)(steady && !SbFormulaUsesTime(load->density[i]));
   if (steady) PetscCall(PetscFree(load->corner));
@@ -167,12 +155,8 @@ static PetscErrorCode force_deadload(SbEffect e, SbSpace space, const SbStage *s
 
   PetscFunctionBeginUser;
   if (load->corner && stage->t != load->t) integrate(load, space, stage->t);
-  for (PetscInt i = 0; i < load->n; i++) {
-    const PetscInt node = 3 * load->node[i];
-
-    for (int c = 0; c < 3; c++) f[node + c] += s * load->value[node + c];
-  }
-  PetscCall(PetscLogFlops(6.0 * (PetscLogDouble)load->n));
+  for (PetscInt i = 0; i < 3 * space->nnode_owned; i++) f[i] += s * load->value[i];
+  PetscCall(PetscLogFlops(6.0 * (PetscLogDouble)space->nnode_owned));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -183,7 +167,7 @@ static PetscErrorCode destroy_deadload(SbEffect e)
   PetscFunctionBeginUser;
   for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&load->density[i]));
   PetscCall(PetscFree(load->corner));
-  PetscCall(PetscFree2(load->node, load->value));
+  PetscCall(PetscFree(load->value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
