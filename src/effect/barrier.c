@@ -469,7 +469,7 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
     const PetscReal way = SbBarrierSpringPlace(b, spring) - spring->start;
     PetscReal push[15];
 
-    if (m->own[spring->v[0]]) pushed += SbBarrierSpring(b, spring, push) * way;
+    if (m->own[spring->at.v[0]]) pushed += SbBarrierSpring(b, spring, push) * way;
     if (i >= b->nspring - b->nbounce) continue;
     gained += PetscMin(way, spring->goal - spring->start);
     asked += spring->goal - spring->start;

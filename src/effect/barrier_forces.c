@@ -175,12 +175,12 @@ void SbBarrierTerm(const Barrier *b, PetscInt i, Term *t)
   } else {
     const Spring *spring = &b->spring[k - b->friction.n];
 
-    t->n = spring->n;
-    for (t->nfirst = 0; t->nfirst < t->n && spring->weight[t->nfirst] > 0.; t->nfirst++) continue;
-    t->v = spring->v;
-    t->weight = spring->weight;
-    t->normal = spring->normal;
-    t->counts = (PetscBool)b->mesh->own[spring->v[0]];
+    t->n = spring->at.n;
+    for (t->nfirst = 0; t->nfirst < t->n && spring->at.weight[t->nfirst] > 0.; t->nfirst++) continue;
+    t->v = spring->at.v;
+    t->weight = spring->at.weight;
+    t->normal = spring->at.normal;
+    t->counts = (PetscBool)b->mesh->own[spring->at.v[0]];
     t->force = SbBarrierSpring(b, spring, t->gradient);
     t->energy = 0.5 * t->force * (spring->goal - SbBarrierSpringPlace(b, spring));
   }
@@ -311,8 +311,9 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
     PetscReal T[9];
 
     if (!spring->held && SbBarrierSpringPlace(b, spring) >= spring->goal) continue;
-    for (int k = 0; k < 9; k++) T[k] = spring->stiffness * spring->normal[k / 3] * spring->normal[k % 3];
-    PetscCall(add_blocks(b, spring->n, spring->v, spring->weight, T));
+    for (int k = 0; k < 9; k++)
+      T[k] = spring->stiffness * spring->at.normal[k / 3] * spring->at.normal[k % 3];
+    PetscCall(add_blocks(b, spring->at.n, spring->at.v, spring->at.weight, T));
   }
   PetscCall(SbContactBlocksToNodes(b->mesh, &b->blocks, blocks));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -39,10 +39,9 @@ typedef struct {
 
 /* A one-sided spring along a direction in this step: separates an overlap, or enforces restitution. */
 typedef struct {
-  PetscInt n, v[5];
-  PetscReal weight[5], normal[3];
+  SbPenetration at;          /* of restitution: the point of the impact, without depth and area */
   PetscReal goal, stiffness; /* of normal . sum weight x, m; N/m */
-  PetscReal start, depth;    /* that sum and the penetration at the start of the step, m */
+  PetscReal start;           /* that sum at the start of the step, m */
   PetscBool held;            /* two-sided: it was active when its goal was changed */
   PetscReal approach;        /* restitution: speed of approach, m/s */
 } Spring;
@@ -127,8 +126,8 @@ static inline PetscReal SbBarrierSpringPlace(const Barrier *b, const Spring *spr
 {
   PetscReal g = 0.;
 
-  for (PetscInt k = 0; k < spring->n; k++)
-    g += spring->weight[k] * SbDot3(spring->normal, b->x + 3 * spring->v[k]);
+  for (PetscInt k = 0; k < spring->at.n; k++)
+    g += spring->at.weight[k] * SbDot3(spring->at.normal, b->x + 3 * spring->at.v[k]);
   return g;
 }
 /* Its force, N, and the gradient of its energy by its vertices, N. */
@@ -137,7 +136,7 @@ static inline PetscReal SbBarrierSpring(const Barrier *b, const Spring *spring, 
   const PetscReal all = spring->stiffness * (spring->goal - SbBarrierSpringPlace(b, spring)),
                   force = spring->held ? all : PetscMax(0., all);
 
-  for (int k = 0; k < 15; k++) gradient[k] = -force * spring->weight[k / 3] * spring->normal[k % 3];
+  for (int k = 0; k < 15; k++) gradient[k] = -force * spring->at.weight[k / 3] * spring->at.normal[k % 3];
   return force;
 }
 /* A term of the potential at the current positions: active pairs, then those with friction, then springs. */

@@ -118,7 +118,7 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
   values[at[LAG]] = b->lag;
   values[at[UNGUARDED]] = b->overlapping ? (PetscReal)b->overlap.ncrossing : 0.;
   for (PetscInt i = 0; i < b->nspring; i++) /* of the overlaps found at the start of the step */
-    values[at[PENETRATION]] = PetscMax(values[at[PENETRATION]], b->spring[i].depth + b->spring[i].start -
+    values[at[PENETRATION]] = PetscMax(values[at[PENETRATION]], b->spring[i].at.depth + b->spring[i].start -
                                                                   SbBarrierSpringPlace(b, &b->spring[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -174,7 +174,7 @@ PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStag
       p.id[1] = t.v[0];
       p.id[2] = t.v[t.n - 1];
       p.gap = SbBarrierSpringPlace(b, &b->spring[spring]);
-      if (spring < b->nspring - b->nbounce) p.gap -= b->spring[spring].start + b->spring[spring].depth;
+      if (spring < b->nspring - b->nbounce) p.gap -= b->spring[spring].start + b->spring[spring].at.depth;
     } else if (i >= b->nactive) /* friction of a pair in contact only at the start of the step */
       p.gap = SbContactPairGap(b->mesh, &b->friction.pair[i - b->nactive].pair, b->x, &d);
     else

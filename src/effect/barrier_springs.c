@@ -129,13 +129,9 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
     const PetscInt one = m->part[p->v[0]], two = m->part[p->v[p->n - 1]];
     const PetscReal w = PetscMin(b->w[one], b->w[two]), k = PetscMin(b->k[one], b->k[two]),
                     all = p->depth + 0.5 * w;
-    Spring spring = {.n = p->n, .stiffness = b->stiffer * k * p->area / w};
+    Spring spring = {.at = *p, .stiffness = b->stiffer * k * p->area / w};
 
     if (!e->dynamic) spring.stiffness *= STIFF;
-    PetscCall(PetscArraycpy(spring.v, p->v, 5));
-    PetscCall(PetscArraycpy(spring.weight, p->weight, 5));
-    PetscCall(PetscArraycpy(spring.normal, p->normal, 3));
-    spring.depth = p->depth;
     spring.start = SbBarrierSpringPlace(b, &spring);
     spring.goal =
       spring.start + (e->dynamic ? PetscMin(all, PetscMax(w, all * (1. - b->contact->overlap.left))) : all);
@@ -186,17 +182,14 @@ static PetscBool find_spring(const Barrier *b, const SbContactPair *pair, const 
       const PetscReal weight = turned ? -d.weight[k] : d.weight[k];
 
       if (pass ? weight >= 0. : weight <= 0.) continue;
-      spring->v[spring->n] = pair->v[k];
-      spring->weight[spring->n++] = weight;
+      spring->at.v[spring->at.n] = pair->v[k];
+      spring->at.weight[spring->at.n++] = weight;
     }
   }
-  for (int i = 0; i < 3; i++) spring->normal[i] = turned ? -d.n[i] : d.n[i];
-  for (PetscInt k = 0; k < spring->n; k++) {
-    const PetscInt v = 3 * spring->v[k];
-
-    spring->start += spring->weight[k] * SbDot3(spring->normal, b->x + v);
-    spring->approach -= spring->weight[k] * SbDot3(spring->normal, b->other + v);
-  }
+  for (int i = 0; i < 3; i++) spring->at.normal[i] = turned ? -d.n[i] : d.n[i];
+  spring->start = SbBarrierSpringPlace(b, spring);
+  for (PetscInt k = 0; k < spring->at.n; k++)
+    spring->approach -= spring->at.weight[k] * SbDot3(spring->at.normal, b->other + 3 * spring->at.v[k]);
   spring->approach = (spring->approach + spring->start) / b->contact->bounce.dt;
   return (PetscBool)(spring->approach > 0.);
 }
@@ -264,7 +257,7 @@ PetscErrorCode SbEffectRestitution_Barrier(SbEffect e, PetscReal *work)
   for (PetscInt i = b->nspring - b->nbounce; i < b->nspring; i++) {
     const Spring *spring = &b->spring[i];
 
-    if (b->mesh->own[spring->v[0]])
+    if (b->mesh->own[spring->at.v[0]])
       *work += SbBarrierSpring(b, spring, push) * (SbBarrierSpringPlace(b, spring) - spring->start);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
