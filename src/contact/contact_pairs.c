@@ -172,12 +172,6 @@ PetscErrorCode SbContactPairsCreate(SbContactMesh m, PetscBool self, PetscBool o
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbContactPairsIgnore(SbContactPairs p, const uint8_t near[])
-{
-  if (p->near || near) p->known = PETSC_FALSE;
-  p->near = near;
-}
-
 PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs)
 {
   PetscFunctionBeginUser;

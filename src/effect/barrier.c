@@ -547,7 +547,8 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   PetscCall(PetscFree(b->next.pair));
   PetscCall(SbContactBlocksFree(&b->blocks));
   PetscCall(PetscFree(b->spring));
-  PetscCall(SbContactOverlapFree(&b->overlap));
+  PetscCall(PetscFree(b->overlap.point));
+  PetscCall(PetscFree(b->overlap.near));
   e->data = b->contact;
   PetscCall(SbContactDestroy(e));
   PetscCall(PetscFree(b));

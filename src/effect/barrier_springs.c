@@ -105,7 +105,8 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
         e->name, name, (double)x[0], (double)x[1], (double)x[2], name);
     }
   }
-  SbContactPairsIgnore(b->pairs, b->overlapping ? o->near : NULL);
+  if (b->pairs->near || b->overlapping) b->pairs->known = PETSC_FALSE;
+  b->pairs->near = b->overlapping ? o->near : NULL;
   b->known = PETSC_FALSE;
   if (!b->overlapping) PetscFunctionReturn(PETSC_SUCCESS);
 
@@ -119,7 +120,7 @@ PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool 
     for (int k = 0; k < 4; k++) o->near[pair->v[k]] = SB_OVERLAP_INSIDE;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, o->near, (PetscMPIInt)m->nvertex, MPI_UINT8_T, MPI_MAX, s->comm));
-  SbContactPairsIgnore(b->pairs, o->near);
+  b->pairs->known = PETSC_FALSE;
   if (!b->announced) PetscCall(announce(e, s, o));
   b->announced = PETSC_TRUE;
 
