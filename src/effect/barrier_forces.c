@@ -275,9 +275,9 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
   }
 
   /*
-    friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2); the parabola that bounds f0 from above has f0'/u
-    instead of f0''. A sliding pair whose slip reversed in the last trial step is treated as sticking: a spring
-    with the force mu N at the slip e replaces mu N f0'. If a full step leaves it beyond e, it slides.
+    friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2); the parabola that bounds f0 from above has
+    f0'/u instead of f0''. A sliding pair whose slip reversed in the last trial step is treated as sticking: a
+    spring with the force mu N at the slip e replaces mu N f0'. If a full step leaves it beyond e, it slides.
   */
   for (PetscInt i = 0; i < b->friction.n; i++) {
     FrictionPair *friction = &b->friction.pair[i];
