@@ -82,7 +82,7 @@ struct _p_SbContactPairs {
   PetscReal *box;     /* [nvertex][6] within which vertices may move before pairs are searched for again */
   PetscReal *shorter; /* [nvertex][3] end of a motion that was halved */
   struct SbContactFeatures *features; /* [6] vertices, triangles and edges, each of this rank and of others */
-  PetscBool known;
+  PetscBool known;                    /* cleared by who changes `near` */
   const uint8_t *near; /* [nvertex] SbContactOverlap.near, borrowed: excludes such pairs; NULL: none */
   PetscInt n, size;
   SbContactPair *pair; /* [n] all that have nodes of this rank, in no order */
@@ -91,8 +91,6 @@ struct _p_SbContactPairs {
 PetscErrorCode SbContactPairsCreate(SbContactMesh mesh, PetscBool self, PetscBool others, PetscReal reach,
                                     SbContactPairs *pairs);
 PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs);
-/* Excludes pairs of an overlap, by SbContactOverlap.near (borrowed, NULL: none). Not collective. */
-void SbContactPairsIgnore(SbContactPairs pairs, const uint8_t near[]);
 /* All pairs that come within the reach on the linear motion from x0 to x1, and some more. Not collective. */
 PetscErrorCode SbContactPairsFind(SbContactPairs pairs, const PetscReal x0[], const PetscReal x1[]);
 /* The gap, m: the distance less the radius; closest points and direction in `distance`. Not collective. */
@@ -132,7 +130,7 @@ typedef struct {
 } SbPenetration;
 /* Of a vertex: adjacent to intersected ones; its edges or triangles intersect a surface; it is inside one. */
 enum { SB_OVERLAP_ADJACENT = 1, SB_OVERLAP_INTERSECTED, SB_OVERLAP_INSIDE };
-/* Start with {0}. The same on every rank. */
+/* Start with {0}; release with PetscFree(point) and PetscFree(near). The same on every rank. */
 typedef struct {
   PetscInt ncrossing; /* edges that intersect triangles, or features behind a round or one-sided obstacle */
   PetscInt part[2];   /* of the first of them: body, or nbody for the obstacle */
@@ -144,7 +142,6 @@ typedef struct {
 /* Penetration at x; `inside`: there is some, even if no edge intersects a triangle. Collective. */
 PetscErrorCode SbContactOverlapFind(SbContactMesh mesh, PetscBool self, const PetscReal x[], PetscBool inside,
                                     SbContactOverlap *overlap);
-PetscErrorCode SbContactOverlapFree(SbContactOverlap *overlap);
 /* Whether one body is wholly inside another, so that no edge intersects a triangle: the centroid of a tet of
    body[0] is within the surface of body[1] at x. Slow: for the start of a run. Collective. */
 PetscErrorCode SbContactMeshIsInside(SbContactMesh mesh, const PetscReal x[], PetscInt body[2],

@@ -20,7 +20,6 @@ typedef struct _p_SbObstacle *SbObstacle;
 */
 PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle *obstacle);
 PetscErrorCode SbObstacleDestroy(SbObstacle *obstacle);
-PetscBool SbObstacleIsMesh(SbObstacle obstacle);
 /*
   SbObstacleSetUp - reads the file of a mesh: obstacle, before SbObstacleDistance(); no other shape needs it.
 

@@ -95,10 +95,8 @@ typedef struct {
     touching      - at the start t of a run, first step dt: adds pairs whose gap at u is too small, or little
                     larger. first: set at the first step, alike on all ranks; else nothing is done.
     begin_barrier - a step from t to t + dt begins with u0 and the speed of potential.c, m/s; where surfaces
-                    touch when the run begins, u0 is changed, ghosts too. Prescribed motions are at t:
-                    `progress` 0.
+                    touch when the run begins, u0 is changed, ghosts too. Sets `progress` to 0.
     meet          - after begin_barrier, for restitution: finds the impacts of the step, from u0 and v0.
-    advance       - * moves obstacles to the fraction `progress` of their path from t to t + dt, 0..1.
     safe          - part: largest collision-free fraction of the motion from u0 to u1, and from the present
                     progress to `progress`; nactive: active pairs at u0.
     nearest       - where the smallest gap of all ranks at the last positions is below `gap`, m: lowers it
@@ -119,7 +117,6 @@ typedef struct {
   PetscErrorCode (*begin_barrier)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, PetscReal speed,
                                   PetscReal u0[]);
   PetscErrorCode (*meet)(SbEffect e, SbSpace space, PetscReal dt, const PetscReal u0[], const PetscReal v0[]);
-  PetscErrorCode (*advance)(SbEffect e, PetscReal progress);
   PetscErrorCode (*safe)(SbEffect e, SbSpace space, const PetscReal u0[], const PetscReal u1[],
                          PetscReal progress, PetscReal *part, PetscInt *nactive);
   PetscErrorCode (*nearest)(SbEffect e, SbSpace space, PetscReal *gap, size_t size, char text[]);
@@ -141,10 +138,6 @@ typedef struct {
      checkpoint. assemble_constraints() then gives the constraints of that time. */
   PetscErrorCode (*load)(SbEffect e, SbSpace space, PetscReal t, const PetscReal u[], PetscInt n,
                          const PetscReal records[]);
-  /* * for re-meshing, records that name nodes: renumbers the n records of all ranks from save() for a mesh in
-     which node from[i] (original number; ascending) is to[i]; drops those of removed nodes */
-  PetscErrorCode (*rename)(SbEffect e, PetscInt nnode, const PetscInt from[], const PetscInt to[],
-                           PetscInt *n, PetscReal records[]);
   /* numbers for the history, with the names in `columns`, summed over the ranks; residual is the unbalanced
      force, on prescribed unknowns the reaction */
   PetscErrorCode (*history)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal residual[],
@@ -191,6 +184,8 @@ struct _p_SbEffect {
   PetscBool springs;     /* of contact: springs or friction, not constraints alone. Default PETSC_FALSE */
   PetscBool prescribed;  /* it prescribes the nodes of its sets in all directions */
   PetscInt nstate;       /* numbers in a record of save() */
+  PetscBool by_node;     /* the first of them is a node's original number. Default PETSC_FALSE */
+  PetscReal progress;    /* of barrier contact: obstacles are at this fraction of their path in the step */
   PetscReal width;       /* of barrier contact: the smallest width, the gap below which surfaces repel, m */
   PetscReal work;        /* of barrier contact: on the bodies in the last accepted step, this rank's, J */
   PetscInt ncolumn;      /* history columns, known after set-up */

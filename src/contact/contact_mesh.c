@@ -20,14 +20,12 @@ static inline PetscInt npoint_of(SbSpace s, const SbFacet *f)
   return s->edge_node && s->edge_node[6 * f->cell] >= 0 ? 6 : 3;
 }
 
-/* The local node of P2 in the middle of side k of a facet. */
+/* The local node of P2 in the middle of side k of a facet; edges of a tet: 01 02 03 12 13 23. */
 static PetscInt middle_of(SbSpace s, const SbFacet *f, PetscInt k)
 {
   const int a = f->corner[k], b = f->corner[(k + 1) % 3];
-  int e = 0;
 
-  while (SbTetEdge[e][0] != PetscMin(a, b) || SbTetEdge[e][1] != PetscMax(a, b)) e++;
-  return s->edge_node[6 * f->cell + e];
+  return s->edge_node[6 * f->cell + (a && b ? a + b : a + b - 1)];
 }
 
 /* Own points are numbered vertices first, then nodes in the middle of sides; -1: another rank's, or none. */
@@ -283,7 +281,7 @@ static PetscErrorCode make_edges(SbContactMesh m, PetscBool lone)
 PetscErrorCode SbContactMeshCreate(SbSpace s, PetscInt n, const SbFacet facet[], SbObstacle obstacle,
                                    SbContactMesh *mesh)
 {
-  SbObstacleSurface o = {0};
+  SbTriangles o = {0};
   SbContactMesh m;
   PetscInt nbody_edge = 0;
   PetscMPIInt rank;
@@ -295,21 +293,26 @@ PetscErrorCode SbContactMeshCreate(SbSpace s, PetscInt n, const SbFacet facet[],
   PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
 
   /* vertices and triangles of the bodies, then of the obstacle, which belong to rank 0 */
-  if (obstacle) o = SbObstacleGetSurface(obstacle);
-  m->side = o.side;
-  m->radius = o.radius;
-  PetscCall(make_vertices(m, n, facet, o.nvertex));
-  PetscCall(make_triangles(m, n, facet, o.ntriangle));
-  PetscCall(PetscArraycpy(m->X + 3 * m->nbody_vertex, o.x, 3 * o.nvertex));
-  for (PetscInt i = 0; i < 3 * o.ntriangle; i++)
-    m->triangle[3 * m->nbody_triangle + i] = m->nbody_vertex + o.triangle[i];
+  if (obstacle) {
+    const Shape shape = obstacle->shape;
+
+    o = obstacle->surface;
+    m->side = shape == PLANE ? SB_SIDE_PLANE : shape == BOWL ? SB_SIDE_BOWL : SB_SIDE_NONE;
+    if (shape == SPHERE || shape == BOWL) m->radius = obstacle->p[3];
+    if (shape == CAPSULE) m->radius = obstacle->p[6];
+  }
+  PetscCall(make_vertices(m, n, facet, o.nvert));
+  PetscCall(make_triangles(m, n, facet, o.ntri));
+  PetscCall(PetscArraycpy(m->X + 3 * m->nbody_vertex, o.x, 3 * o.nvert));
+  for (PetscInt i = 0; i < 3 * o.ntri; i++)
+    m->triangle[3 * m->nbody_triangle + i] = m->nbody_vertex + o.tri[i];
   for (PetscInt v = m->nbody_vertex; v < m->nvertex; v++) {
     m->part[v] = s->mesh->nbody;
     m->area[v] = 0.;
     m->own[v] = (uint8_t)!rank;
     m->driven[v] = 1;
   }
-  PetscCall(make_edges(m, (PetscBool)(o.radius > 0. && o.nvertex == 2)));
+  PetscCall(make_edges(m, (PetscBool)(m->radius > 0. && o.nvert == 2)));
 
   /* shortest and mean edge of the bodies, size of the smallest one */
   m->shortest = PETSC_MAX_REAL;

@@ -3,6 +3,7 @@
 */
 #pragma once
 #include "sbbarrier.h"
+#include "sbtriangles.h"
 
 /* Area of a triangle of the vertices v; n[3], its normal, twice as long. */
 static inline PetscReal SbContactTriangleArea(const PetscReal x[], const PetscInt v[3], PetscReal n[3])
@@ -25,14 +26,13 @@ static inline PetscReal SbContactTriangleArea(const PetscReal x[], const PetscIn
 PetscErrorCode SbContactMeshCrossings(SbContactMesh mesh, PetscBool self, const PetscReal x[], PetscInt *n,
                                       PetscInt **hit);
 
-/* The surface of an obstacle at rest: vertices, and triangles; without triangles one vertex (sphere) or an
-   edge of two (capsule), with a radius. Its arrays are the obstacle's. */
-typedef struct {
-  SbObstacleSide side;
-  PetscReal radius; /* m; of a bowl, too */
-  PetscInt nvertex, ntriangle;
-  const PetscReal *x;       /* [nvertex][3] m */
-  const PetscInt *triangle; /* [ntriangle][3] counter-clockwise seen from outside */
-} SbObstacleSurface;
-/* Not collective, after SbObstacleSetUp(). */
-SbObstacleSurface SbObstacleGetSurface(SbObstacle obstacle);
+typedef enum { PLANE, SPHERE, BOX, CAPSULE, CYLINDER, BOWL, MESH } Shape;
+struct _p_SbObstacle {
+  Shape shape;
+  PetscReal p[7]; /* its numbers */
+  char *file;     /* mesh: its path */
+  /* at rest, of a mesh after SbObstacleSetUp(); without triangles one vertex (sphere) or an edge of two
+     (capsule), with a radius */
+  SbTriangles surface;
+  SbSignedDistance distance; /* mesh: of the surface */
+};

@@ -93,17 +93,6 @@ static PetscBool stays_apart(SbContactPairs p, const SbContactPair *pair)
                      p->reach + PetscSqrtReal(far[0]) + PetscSqrtReal(far[1]));
 }
 
-/* Whether features of the vertices a and b can be in contact at all: different bodies or self-contact, not
-   both prescribed or of the obstacle. */
-static inline PetscBool wanted(SbContactPairs p, PetscInt a, PetscInt b)
-{
-  const SbContactMesh m = p->mesh;
-
-  return (PetscBool)(m->part[a] != m->part[b] ? p->others || m->part[a] == m->space->mesh->nbody ||
-                                                  m->part[b] == m->space->mesh->nbody
-                                              : p->self && a < m->nbody_vertex);
-}
-
 /* Whether the features belong to an overlap (SbContactOverlap.near): such pairs are excluded. */
 static inline PetscBool overlaps(SbContactPairs p, const SbContactPair *pair)
 {
@@ -125,10 +114,13 @@ static PetscErrorCode add_features(SbContactPairs p, SbPairKind kind, PetscInt i
                  *b = edges ? m->edge + 2 * high : m->triangle + 3 * j;
   SbContactPair pair = {.kind = kind,
                         .v = {a[0], edges ? a[1] : b[0], edges ? b[0] : b[1], edges ? b[1] : b[2]}};
+  const PetscInt one = m->part[a[0]], two = m->part[b[0]], obstacle = m->space->mesh->nbody;
   PetscBool driven = PETSC_TRUE;
 
   PetscFunctionBeginUser;
-  if (!wanted(p, a[0], b[0])) PetscFunctionReturn(PETSC_SUCCESS);
+  /* only of different bodies or self-contact, not both of the obstacle, or prescribed */
+  if (one != two ? !p->others && one != obstacle && two != obstacle : !p->self || one == obstacle)
+    PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 4; k++) {
     driven = (PetscBool)(driven && m->driven[pair.v[k]]);
     for (int l = SbContactPairSplit(&pair); k < SbContactPairSplit(&pair) && l < 4; l++)
@@ -178,12 +170,6 @@ PetscErrorCode SbContactPairsCreate(SbContactMesh m, PetscBool self, PetscBool o
     PetscCall(PetscMalloc1(f->n, &f->box));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-void SbContactPairsIgnore(SbContactPairs p, const uint8_t near[])
-{
-  if (p->near || near) p->known = PETSC_FALSE;
-  p->near = near;
 }
 
 PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs)

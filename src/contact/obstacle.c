@@ -7,20 +7,9 @@
   src/geometry/signed_distance.c.
 */
 #include "contact_mesh.h"
-#include "sbtriangles.h"
 
 #define SIDES 96  /* of a cylinder as triangles */
 #define LARGE 20. /* m; files of larger obstacles are in mm */
-
-typedef enum { PLANE, SPHERE, BOX, CAPSULE, CYLINDER, BOWL, MESH } Shape;
-
-struct _p_SbObstacle {
-  Shape shape;
-  PetscReal p[7];
-  char *file;                /* mesh: its path */
-  SbTriangles surface;       /* mesh: after SbObstacleSetUp() */
-  SbSignedDistance distance; /* mesh: likewise; of the surface */
-};
 
 static const struct {
   const char *name, *form;
@@ -164,11 +153,6 @@ PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscBool SbObstacleIsMesh(SbObstacle o)
-{
-  return (PetscBool)(o->shape == MESH);
-}
-
 PetscErrorCode SbObstacleSetUp(SbObstacle o, MPI_Comm comm, const char *option, PetscReal scale,
                                const PetscReal at[3], size_t size, char note[])
 {
@@ -286,22 +270,6 @@ PetscReal SbObstacleDistance(SbObstacle o, const PetscReal x[3], PetscReal n[3])
   default:
     return from_cylinder(p, x, n);
   }
-}
-
-SbObstacleSurface SbObstacleGetSurface(SbObstacle o)
-{
-  return (SbObstacleSurface){
-    .side = o->shape == PLANE  ? SB_SIDE_PLANE
-            : o->shape == BOWL ? SB_SIDE_BOWL
-                               : SB_SIDE_NONE,
-    .radius = o->shape == SPHERE || o->shape == BOWL ? o->p[3]
-              : o->shape == CAPSULE                  ? o->p[6]
-                                                     : 0,
-    .nvertex = o->surface.nvert,
-    .ntriangle = o->surface.ntri,
-    .x = o->surface.x,
-    .triangle = o->surface.tri,
-  };
 }
 
 void SbPoseSet(const PetscReal axis[3], PetscReal angle, const PetscReal c[3], const PetscReal d[3],

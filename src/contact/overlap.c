@@ -434,11 +434,3 @@ PetscErrorCode SbContactOverlapFind(SbContactMesh m, PetscBool self, const Petsc
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-PetscErrorCode SbContactOverlapFree(SbContactOverlap *o)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree(o->point));
-  PetscCall(PetscFree(o->near));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}

@@ -58,19 +58,19 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   PetscCall(PetscFree(facet));
   s->coupled = PETSC_TRUE;
   if (!b->contact->obstacle) {
-    PetscBool *takes_part;
-    PetscInt nsurface = 0;
+    SbPairs *p = &b->columns;
 
-    PetscCall(PetscCalloc1(nbody, &takes_part));
-    for (PetscInt v = 0; v < b->mesh->nbody_vertex; v++) takes_part[b->mesh->part[v]] = PETSC_TRUE;
-    for (PetscInt i = 0; i < nbody; i++) nsurface += takes_part[i];
+    PetscCall(PetscMalloc1(nbody, &p->slot));
+    for (PetscInt i = 0; i < nbody; i++) p->slot[i] = -1;
+    for (PetscInt v = 0; v < b->mesh->nbody_vertex; v++) p->slot[b->mesh->part[v]] = 0;
+    for (PetscInt i = 0; i < nbody; i++)
+      if (p->slot[i] == 0) p->slot[i] = p->nsurface++;
     PetscCheck(
-      nsurface > 1 || b->contact->self, s->comm, PETSC_ERR_USER_INPUT,
+      p->nsurface > 1 || b->contact->self, s->comm, PETSC_ERR_USER_INPUT,
       "The effect %s has only one body to examine: give -effect_%s_self yes for a body that may meet "
       "itself, more sets with -effect_%s_on, or -effect_%s_obstacle",
       e->name, e->name, e->name, e->name);
-    if (b->contact->pairs) PetscCall(SbPairsSetUp(e, s->mesh, takes_part, b->contact->self, &b->columns));
-    PetscCall(PetscFree(takes_part));
+    if (b->contact->pairs) PetscCall(SbPairsSetUp(e, s->mesh, b->contact->self, p));
   }
 
   /* width and pressure of each body */
@@ -343,7 +343,7 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
 
   PetscFunctionBeginUser;
   find_path(b, t, dt);
-  b->progress = 0.;
+  e->progress = 0.;
   b->friction.n = b->nspring = b->nbounce = 0;
   if (!b->begun) PetscCall(SbContactMeshMarkDriven(m));
   if (!b->begun || b->overlapping || b->parted) {
@@ -446,15 +446,6 @@ static PetscErrorCode safe_barrier(SbEffect e, SbSpace s, const PetscReal u0[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode advance_barrier(SbEffect e, PetscReal progress)
-{
-  Barrier *b = (Barrier *)e->data;
-
-  PetscFunctionBeginUser;
-  b->progress = progress;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage)
 {
   Barrier *b = (Barrier *)e->data;
@@ -479,7 +470,7 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
     const PetscReal way = SbBarrierSpringPlace(b, spring) - spring->start;
     PetscReal push[15];
 
-    if (m->own[spring->v[0]]) pushed += SbBarrierSpring(b, spring, push) * way;
+    if (m->own[spring->at.v[0]]) pushed += SbBarrierSpring(b, spring, push) * way;
     if (i >= b->nspring - b->nbounce) continue;
     gained += PetscMin(way, spring->goal - spring->start);
     asked += spring->goal - spring->start;
@@ -557,7 +548,8 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   PetscCall(PetscFree(b->next.pair));
   PetscCall(SbContactBlocksFree(&b->blocks));
   PetscCall(PetscFree(b->spring));
-  PetscCall(SbContactOverlapFree(&b->overlap));
+  PetscCall(PetscFree(b->overlap.point));
+  PetscCall(PetscFree(b->overlap.near));
   e->data = b->contact;
   PetscCall(SbContactDestroy(e));
   PetscCall(PetscFree(b));
@@ -579,6 +571,7 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&b));
+  b->effect = e;
   b->contact = contact;
   PetscCall(SbOptionReal(scope, "barrier_width", &b->width));
   PetscCall(SbOptionReal(scope, "barrier_pressure", &b->pressure));
@@ -591,7 +584,6 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope)
                          .touching = touching_barrier,
                          .begin_barrier = begin_barrier,
                          .safe = safe_barrier,
-                         .advance = advance_barrier,
                          .lag = lag_barrier,
                          .nearest = SbEffectNearest_Barrier,
                          .meet = e->euler ? SbEffectMeet_Barrier : NULL,

@@ -44,13 +44,13 @@ PetscErrorCode SbBarrierUpdate(Barrier *b, const PetscReal u[])
 
   PetscFunctionBeginUser;
   PetscCall(PetscArraycmp(u, b->u, b->known ? n : 0, &same));
-  same = (PetscBool)(b->known && same && b->now == b->progress);
+  same = (PetscBool)(b->known && same && b->now == b->effect->progress);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &same, 1, SB_MPI_BOOL, MPI_LAND, b->mesh->space->comm));
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscArraycpy(b->u, u, n));
-  b->now = b->progress;
+  b->now = b->effect->progress;
   b->known = PETSC_TRUE;
-  PetscCall(SbBarrierPlace(b, u, b->progress, b->x));
+  PetscCall(SbBarrierPlace(b, u, b->effect->progress, b->x));
   PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
   b->nactive = 0;
   for (PetscInt i = 0; i < b->pairs->n; i++) {
@@ -73,7 +73,7 @@ PetscReal SbBarrierSlip(const Barrier *b, const FrictionPair *friction, PetscRea
   PetscReal normal = 0.;
 
   for (int i = 0; i < 3; i++) {
-    u[i] = -b->progress * friction->rotation[i];
+    u[i] = -b->effect->progress * friction->rotation[i];
     for (int k = 0; k < 4; k++)
       u[i] +=
         friction->weight[k] * (b->x[3 * friction->pair.v[k] + i] - b->start[3 * friction->pair.v[k] + i]);
@@ -174,12 +174,12 @@ void SbBarrierTerm(const Barrier *b, PetscInt i, Term *t)
   } else {
     const Spring *spring = &b->spring[k - b->friction.n];
 
-    t->n = spring->n;
-    for (t->nfirst = 0; t->nfirst < t->n && spring->weight[t->nfirst] > 0.; t->nfirst++) continue;
-    t->v = spring->v;
-    t->weight = spring->weight;
-    t->normal = spring->normal;
-    t->counts = (PetscBool)b->mesh->own[spring->v[0]];
+    t->n = spring->at.n;
+    for (t->nfirst = 0; t->nfirst < t->n && spring->at.weight[t->nfirst] > 0.; t->nfirst++) continue;
+    t->v = spring->at.v;
+    t->weight = spring->at.weight;
+    t->normal = spring->at.normal;
+    t->counts = (PetscBool)b->mesh->own[spring->at.v[0]];
     t->force = SbBarrierSpring(b, spring, t->gradient);
     t->energy = 0.5 * t->force * (spring->goal - SbBarrierSpringPlace(b, spring));
   }
@@ -232,18 +232,17 @@ PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the blocks of a pair's Hessian where one of both vertices has nodes here; H[144], or with `weight`
-   H[9] with respect to the weighted sum of positions. */
-static PetscErrorCode add_blocks(Barrier *b, const SbContactPair *pair, const PetscReal weight[4],
+/* Adds the blocks of a Hessian by n vertices where one of both has nodes here; H[144], or with `weight` H[9]
+   with respect to the weighted sum of positions. */
+static PetscErrorCode add_blocks(Barrier *b, PetscInt n, const PetscInt vertex[], const PetscReal weight[],
                                  const PetscReal H[])
 {
   const SbContactMesh m = b->mesh;
-  const int n = pair->side ? 1 : 4;
 
   PetscFunctionBeginUser;
-  for (int p = 0; p < n; p++) {
-    for (int q = p; q < n; q++) {
-      const PetscInt v = pair->v[p], w = pair->v[q];
+  for (PetscInt p = 0; p < n; p++) {
+    for (PetscInt q = p; q < n; q++) {
+      const PetscInt v = vertex[p], w = vertex[q];
       PetscReal block[9];
 
       if (v >= m->nbody_vertex || w >= m->nbody_vertex || !(m->mine[v] | m->mine[w])) continue;
@@ -270,14 +269,13 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
 
     SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, of_pair(b, b->w, pair), of_pair(b, b->k, pair),
                   &energy, gradient, (PetscBool)(kind != SB_HESSIAN_EXACT), H);
-    PetscCall(add_blocks(b, pair, NULL, H));
+    PetscCall(add_blocks(b, pair->side ? 1 : 4, pair->v, NULL, H));
   }
 
   /*
-  friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2); the parabola that bounds f0 from above has f0'/u
-  instead of f0''. A sliding pair whose slip reversed in the last trial step
-    is treated as sticking: a spring with the force mu N at the slip e replaces mu N f0'. If a full step
-    leaves it beyond e, it slides.
+    friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2); the parabola that bounds f0 from above has
+    f0'/u instead of f0''. A sliding pair whose slip reversed in the last trial step is treated as sticking: a
+    spring with the force mu N at the slip e replaces mu N f0'. If a full step leaves it beyond e, it slides.
   */
   for (PetscInt i = 0; i < b->friction.n; i++) {
     FrictionPair *friction = &b->friction.pair[i];
@@ -302,26 +300,18 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
       if (y > 0.) T[k] += (curve - slope) * friction->slip[k / 3] * friction->slip[k % 3] / (y * y);
       T[k] *= friction->force;
     }
-    PetscCall(add_blocks(b, &friction->pair, friction->weight, T));
+    PetscCall(add_blocks(b, friction->pair.side ? 1 : 4, friction->pair.v, friction->weight, T));
   }
 
   /* active springs */
   for (PetscInt i = 0; i < b->nspring; i++) {
     const Spring *spring = &b->spring[i];
+    PetscReal T[9];
 
     if (!spring->held && SbBarrierSpringPlace(b, spring) >= spring->goal) continue;
-    for (PetscInt k = 0; k < spring->n * spring->n; k++) {
-      const PetscInt p = k / spring->n, q = k % spring->n, v = spring->v[p], w = spring->v[q];
-      PetscReal B[9];
-
-      if (q < p || v >= b->mesh->nbody_vertex || w >= b->mesh->nbody_vertex ||
-          !(b->mesh->mine[v] | b->mesh->mine[w]))
-        continue;
-      for (int j = 0; j < 9; j++)
-        B[j] = spring->stiffness * spring->weight[p] * spring->weight[q] * spring->normal[j / 3] *
-               spring->normal[j % 3];
-      PetscCall(SbContactBlocksAdd(&b->blocks, v, w, B, 3));
-    }
+    for (int k = 0; k < 9; k++)
+      T[k] = spring->stiffness * spring->at.normal[k / 3] * spring->at.normal[k % 3];
+    PetscCall(add_blocks(b, spring->at.n, spring->at.v, spring->at.weight, T));
   }
   PetscCall(SbContactBlocksToNodes(b->mesh, &b->blocks, blocks));
   PetscFunctionReturn(PETSC_SUCCESS);

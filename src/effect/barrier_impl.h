@@ -13,9 +13,8 @@ typedef struct {
   const char **column;           /* [ncolumn] all of the effect */
   char (*text)[3 * SB_NAME_MAX]; /* names of the columns behind the fixed ones */
 } SbPairs;
-/* Appends the columns of pairs to those of e; takes_part[nbody]: the body's surface takes part. */
-PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh, const PetscBool takes_part[], PetscBool self,
-                            SbPairs *pairs);
+/* Appends the columns of pairs to those of e, by nsurface and slot[]. */
+PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh, PetscBool self, SbPairs *pairs);
 
 /* A pair with a gap below the width, at the current positions. */
 typedef struct {
@@ -40,15 +39,15 @@ typedef struct {
 
 /* A one-sided spring along a direction in this step: separates an overlap, or enforces restitution. */
 typedef struct {
-  PetscInt n, v[5];
-  PetscReal weight[5], normal[3];
+  SbPenetration at;          /* of restitution: the point of the impact, without depth and area */
   PetscReal goal, stiffness; /* of normal . sum weight x, m; N/m */
-  PetscReal start, depth;    /* that sum and the penetration at the start of the step, m */
+  PetscReal start;           /* that sum at the start of the step, m */
   PetscBool held;            /* two-sided: it was active when its goal was changed */
   PetscReal approach;        /* restitution: speed of approach, m/s */
 } Spring;
 
 typedef struct {
+  SbEffect effect;  /* whose data this is */
   Contact *contact; /* owned */
   SbContactMesh mesh;
   SbContactPairs pairs;
@@ -57,12 +56,12 @@ typedef struct {
   PetscReal scale;           /* w over its default, 0..1 (-accuracy) */
   PetscReal wider, growth;   /* largest factor on it at the next step, 0: none; growth of energy by it, J */
   PetscBool verify, begun, searched; /* option; the run has begun; overlaps were searched for */
-  PetscReal *x, *u;        /* [nvertex][3] current positions, m; [nnode_owned][3] displacements of them, m */
-  PetscReal *start;        /* [nvertex][3] at the start of the step, m */
-  PetscReal *from, *to;    /* [obstacle's vertices][3] positions at the start and the end of the step, m */
-  PetscReal progress, now; /* completed fraction of that path; the one of x */
-  PetscReal *other;        /* [nvertex][3] end of a motion, m */
-  PetscBool known;         /* x and active are up to date for u and progress */
+  PetscReal *x, *u;     /* [nvertex][3] current positions, m; [nnode_owned][3] displacements of them, m */
+  PetscReal *start;     /* [nvertex][3] at the start of the step, m */
+  PetscReal *from, *to; /* [obstacle's vertices][3] positions at the start and the end of the step, m */
+  PetscReal now;        /* SbEffect.progress of x, the completed fraction of that path */
+  PetscReal *other;     /* [nvertex][3] end of a motion, m */
+  PetscBool known;      /* x and active are up to date for u and progress */
   PetscInt nactive, size;
   Active *active;
   FrictionPairs friction, next; /* next: with closest points and normal forces at the end of the step */
@@ -127,8 +126,8 @@ static inline PetscReal SbBarrierSpringPlace(const Barrier *b, const Spring *spr
 {
   PetscReal g = 0.;
 
-  for (PetscInt k = 0; k < spring->n; k++)
-    g += spring->weight[k] * SbDot3(spring->normal, b->x + 3 * spring->v[k]);
+  for (PetscInt k = 0; k < spring->at.n; k++)
+    g += spring->at.weight[k] * SbDot3(spring->at.normal, b->x + 3 * spring->at.v[k]);
   return g;
 }
 /* Its force, N, and the gradient of its energy by its vertices, N. */
@@ -137,7 +136,7 @@ static inline PetscReal SbBarrierSpring(const Barrier *b, const Spring *spring, 
   const PetscReal all = spring->stiffness * (spring->goal - SbBarrierSpringPlace(b, spring)),
                   force = spring->held ? all : PetscMax(0., all);
 
-  for (int k = 0; k < 15; k++) gradient[k] = -force * spring->weight[k / 3] * spring->normal[k % 3];
+  for (int k = 0; k < 15; k++) gradient[k] = -force * spring->at.weight[k / 3] * spring->at.normal[k % 3];
   return force;
 }
 /* A term of the potential at the current positions: active pairs, then those with friction, then springs. */

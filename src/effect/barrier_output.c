@@ -12,22 +12,18 @@ static const char *const self_names[] = {"normal_force", "contacts"};
 #define APART 4 /* columns of two bodies */
 #define SELF 2  /* and of one with itself, whose net force is zero */
 
-PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh, const PetscBool takes_part[], PetscBool self, SbPairs *p)
+PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh, PetscBool self, SbPairs *p)
 {
   const PetscInt fixed = e->ncolumn;
-  PetscInt64 npair;
-  PetscInt n;
+  const PetscInt64 npair = (PetscInt64)p->nsurface * (p->nsurface - 1) / 2 + (self ? p->nsurface : 0);
+  PetscInt n = fixed;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(mesh->nbody, &p->slot));
-  for (PetscInt b = 0; b < mesh->nbody; b++) p->slot[b] = takes_part[b] ? p->nsurface++ : -1;
-  npair = (PetscInt64)p->nsurface * (p->nsurface - 1) / 2 + (self ? p->nsurface : 0);
   PetscCheck(npair <= PAIRS, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-effect_%s_pairs yes: the %" PetscInt_FMT " bodies of -effect_%s_on make %" PetscInt64_FMT
              " pairs, more than the %d that history.csv may have columns for: name fewer sets, or use "
              "-output_contacts yes",
              e->name, p->nsurface, e->name, npair, PAIRS);
-  n = fixed;
   PetscCall(PetscMalloc3(n + APART * (PetscInt)npair, &p->column, APART * npair, &p->text,
                          p->nsurface * p->nsurface, &p->place));
   PetscCall(PetscArraycpy(p->column, e->column, n));
@@ -54,41 +50,7 @@ PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh, const PetscBool takes_part[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds a contact pair of the bodies `first` and `second` to values[]: force on the first, N. */
-static void add_pair(const SbPairs *p, PetscInt first, PetscInt second, PetscReal normal_force,
-                     const PetscReal force[3], PetscReal values[])
-{
-  const PetscInt low = PetscMin(first, second), high = PetscMax(first, second);
-  PetscReal *at;
-
-  if (!p->column) return;
-  at = values + p->place[p->nsurface * p->slot[low] + p->slot[high]];
-  if (low == high) {
-    at[0] += normal_force;
-    at[1] += normal_force > 0.;
-    return;
-  }
-  for (int k = 0; k < 3; k++) at[k] += first == high ? force[k] : -force[k];
-  at[3] += normal_force > 0.;
-}
-
 /* ------------------------------------------------------------------ output */
-
-/* values += force, N, and torque, N m, of the obstacle on the bodies. */
-static void add_force(const Barrier *b, const SbPose *pose, const Term *t, PetscReal values[6])
-{
-  for (PetscInt k = 0; k < t->n; k++) {
-    PetscReal arm[3], moment[3];
-
-    if (t->v[k] >= b->mesh->nbody_vertex) continue;
-    for (int j = 0; j < 3; j++) arm[j] = b->x[3 * t->v[k] + j] - b->contact->path.point[j] - pose->d[j];
-    SbCross(arm, t->gradient + 3 * k, moment);
-    for (int j = 0; j < 3; j++) {
-      values[j] -= t->gradient[3 * k + j];
-      values[3 + j] -= moment[j];
-    }
-  }
-}
 
 /* Force and torque of an obstacle, or forces between bodies; energy of the barrier; work and loss so far. */
 PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
@@ -98,6 +60,7 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
   enum { CONTACTS, PENETRATION, GAP, ENERGY, LOSS, LAG, UNGUARDED };
   static const int places[2][7] = {{0, 1, 7, 8, 6, 9, 10}, {6, 7, 8, 9, 10, 11, 12}};
   Barrier *b = (Barrier *)e->data;
+  const SbPairs *p = &b->columns;
   const int *at = places[b->contact->obstacle != NULL];
   PetscReal least = PETSC_MAX_REAL;
   PetscMPIInt rank;
@@ -113,21 +76,40 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
   PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
   if (b->contact->obstacle) SbContactPose(b->contact, stage->t, &pose);
   for (PetscInt i = 0; i < nterm(b); i++) {
-    PetscReal force[3] = {0.};
+    PetscReal force[3] = {0.}, *columns;
+    PetscInt one, two;
     Term t;
 
     SbBarrierTerm(b, i, &t);
     if (!t.counts) continue;
     values[at[CONTACTS]] += i < b->nactive || t.force > 0.;
     if (i < b->nactive) values[at[ENERGY]] += t.energy;
-    if (b->contact->obstacle) {
-      add_force(b, &pose, &t, values);
-      continue;
+
+    /* force and torque of the obstacle on the bodies */
+    for (PetscInt k = 0; b->contact->obstacle && k < t.n; k++) {
+      PetscReal arm[3], moment[3];
+
+      if (t.v[k] >= b->mesh->nbody_vertex) continue;
+      for (int j = 0; j < 3; j++) arm[j] = b->x[3 * t.v[k] + j] - b->contact->path.point[j] - pose.d[j];
+      SbCross(arm, t.gradient + 3 * k, moment);
+      for (int j = 0; j < 3; j++) {
+        values[j] -= t.gradient[3 * k + j];
+        values[3 + j] -= moment[j];
+      }
     }
+    if (b->contact->obstacle) continue;
+
+    /* forces between two bodies, or of one on itself, and their columns */
     for (int k = 0; k < 3 * t.nfirst; k++) force[k % 3] -= t.gradient[k];
     values[3] += t.force;
     if (i >= b->nactive && i < b->nactive + b->friction.n) values[4] += PetscSqrtReal(SbDot3(force, force));
-    add_pair(&b->columns, b->mesh->part[t.v[0]], b->mesh->part[t.v[t.n - 1]], t.force, force, values);
+    if (!p->column) continue;
+    one = b->mesh->part[t.v[0]];
+    two = b->mesh->part[t.v[t.n - 1]];
+    columns = values + p->place[p->nsurface * p->slot[PetscMin(one, two)] + p->slot[PetscMax(one, two)]];
+    columns[one == two ? 1 : 3] += t.force > 0.;
+    if (one == two) columns[0] += t.force;
+    for (int k = 0; k < 3 && one != two; k++) columns[k] += one > two ? force[k] : -force[k];
   }
   if (!b->contact->obstacle) values[5] = b->work;
   values[at[LOSS]] = b->friction_loss;
@@ -136,7 +118,7 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
   values[at[LAG]] = b->lag;
   values[at[UNGUARDED]] = b->overlapping ? (PetscReal)b->overlap.ncrossing : 0.;
   for (PetscInt i = 0; i < b->nspring; i++) /* of the overlaps found at the start of the step */
-    values[at[PENETRATION]] = PetscMax(values[at[PENETRATION]], b->spring[i].depth + b->spring[i].start -
+    values[at[PENETRATION]] = PetscMax(values[at[PENETRATION]], b->spring[i].at.depth + b->spring[i].start -
                                                                   SbBarrierSpringPlace(b, &b->spring[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -192,7 +174,7 @@ PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStag
       p.id[1] = t.v[0];
       p.id[2] = t.v[t.n - 1];
       p.gap = SbBarrierSpringPlace(b, &b->spring[spring]);
-      if (spring < b->nspring - b->nbounce) p.gap -= b->spring[spring].start + b->spring[spring].depth;
+      if (spring < b->nspring - b->nbounce) p.gap -= b->spring[spring].start + b->spring[spring].at.depth;
     } else if (i >= b->nactive) /* friction of a pair in contact only at the start of the step */
       p.gap = SbContactPairGap(b->mesh, &b->friction.pair[i - b->nactive].pair, b->x, &d);
     else

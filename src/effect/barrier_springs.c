@@ -28,27 +28,6 @@
 #define REST 0.999    /* of the width: a smaller gap is contact */
 #define KEEP 0.01     /* tolerance of the impact's position, over the gap above the width */
 
-/* Excludes pairs of gap zero, as of a vertex in a triangle, while there is overlap. */
-static PetscErrorCode exempt_nearest(Barrier *b)
-{
-  const SbContactMesh m = b->mesh;
-  uint8_t *near = b->overlap.near;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
-  for (PetscInt i = 0; i < b->pairs->n; i++) {
-    const SbContactPair *pair = &b->pairs->pair[i];
-    SbDistance d;
-
-    if (SbContactPairGap(m, pair, b->x, &d) > SAME * m->size) continue;
-    for (int k = 0; k < 4; k++) near[pair->v[k]] = SB_OVERLAP_INSIDE;
-  }
-  PetscCallMPI(
-    MPI_Allreduce(MPI_IN_PLACE, near, (PetscMPIInt)m->nvertex, MPI_UINT8_T, MPI_MAX, m->space->comm));
-  SbContactPairsIgnore(b->pairs, near);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Warns once, naming what overlaps. */
 static PetscErrorCode announce(SbEffect e, const SbSpace s, const SbContactOverlap *o)
 {
@@ -88,69 +67,72 @@ static PetscBool same_place(const Barrier *b, const PetscInt body[2])
   return (PetscBool)(most < SAME * m->size);
 }
 
-/* Error if a body is wholly inside the obstacle: no separation direction exists. x: initial positions. */
-static PetscErrorCode check_obstacle(SbEffect e, SbSpace s)
-{
-  const Barrier *b = (const Barrier *)e->data;
-  const SbContactMesh m = b->mesh;
-  SbPose pose;
-
-  PetscFunctionBeginUser;
-  SbContactPose(b->contact, 0., &pose);
-  for (PetscInt v = 0; v < m->nbody_vertex; v++) {
-    PetscReal X[3], n[3];
-
-    SbPoseInvert(&pose, b->x + 3 * v, X);
-    PetscCheck(m->driven[v] || SbObstacleDistance(b->contact->obstacle, X, n) > -SAME * m->size, s->comm,
-               PETSC_ERR_USER_INPUT,
-               "The effect %s: %s is inside the obstacle when the run begins, at (%g, %g, %g) m; move it by "
-               "-body_%s_translate",
-               e->name, s->mesh->body[m->part[v]].name, (double)b->x[3 * v], (double)b->x[3 * v + 1],
-               (double)b->x[3 * v + 2], s->mesh->body[m->part[v]].name);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbBarrierSeparate(SbEffect e, SbSpace s, PetscReal dt, PetscBool first)
 {
   Barrier *b = (Barrier *)e->data;
+  const SbContactMesh m = b->mesh;
   SbContactOverlap *o = &b->overlap;
-  const PetscBool before = b->overlapping;
   PetscBool inside = PETSC_FALSE;
   PetscInt body[2] = {0, 0};
 
   PetscFunctionBeginUser;
   b->nspring = 0;
-  if (first && !b->contact->obstacle) PetscCall(SbContactMeshIsInside(b->mesh, b->x, body, &inside));
-  PetscCall(SbContactOverlapFind(b->mesh, b->contact->self, b->x, inside, o));
+  if (first && !b->contact->obstacle) PetscCall(SbContactMeshIsInside(m, b->x, body, &inside));
+  PetscCall(SbContactOverlapFind(m, b->contact->self, b->x, inside, o));
   PetscCheck(
     !inside || (o->n && !same_place(b, body)), s->comm, PETSC_ERR_USER_INPUT,
     "The effect %s: body %s is inside body %s when the run begins, or in the same place; move one of them by "
     "-body_%s_translate",
     e->name, s->mesh->body[body[0]].name, s->mesh->body[body[1]].name, s->mesh->body[body[0]].name);
-  b->overlapping =
-    (PetscBool)(o->ncrossing > 0 && (!first || !o->n || o->deepest > ROUNDING * b->mesh->size));
-  if (first && b->contact->obstacle && !b->overlapping) PetscCall(check_obstacle(e, s));
-  SbContactPairsIgnore(b->pairs, b->overlapping ? o->near : NULL);
+  b->overlapping = (PetscBool)(o->ncrossing > 0 && (!first || !o->n || o->deepest > ROUNDING * m->size));
+
+  /* a body wholly inside the obstacle has no separation direction */
+  if (first && b->contact->obstacle && !b->overlapping) {
+    SbPose pose;
+
+    SbContactPose(b->contact, 0., &pose);
+    for (PetscInt v = 0; v < m->nbody_vertex; v++) {
+      const char *name = s->mesh->body[m->part[v]].name;
+      const PetscReal *x = b->x + 3 * v;
+      PetscReal X[3], n[3];
+
+      SbPoseInvert(&pose, x, X);
+      PetscCheck(
+        m->driven[v] || SbObstacleDistance(b->contact->obstacle, X, n) > -SAME * m->size, s->comm,
+        PETSC_ERR_USER_INPUT,
+        "The effect %s: %s is inside the obstacle when the run begins, at (%g, %g, %g) m; move it by "
+        "-body_%s_translate",
+        e->name, name, (double)x[0], (double)x[1], (double)x[2], name);
+    }
+  }
+  if (b->pairs->near || b->overlapping) b->pairs->known = PETSC_FALSE;
+  b->pairs->near = b->overlapping ? o->near : NULL;
   b->known = PETSC_FALSE;
   if (!b->overlapping) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(exempt_nearest(b));
-  if (!before && !b->announced) PetscCall(announce(e, s, o));
+
+  /* excludes pairs of gap zero, too, as of a vertex in a triangle */
+  PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
+  for (PetscInt i = 0; i < b->pairs->n; i++) {
+    const SbContactPair *pair = &b->pairs->pair[i];
+    SbDistance d;
+
+    if (SbContactPairGap(m, pair, b->x, &d) > SAME * m->size) continue;
+    for (int k = 0; k < 4; k++) o->near[pair->v[k]] = SB_OVERLAP_INSIDE;
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, o->near, (PetscMPIInt)m->nvertex, MPI_UINT8_T, MPI_MAX, s->comm));
+  b->pairs->known = PETSC_FALSE;
+  if (!b->announced) PetscCall(announce(e, s, o));
   b->announced = PETSC_TRUE;
 
   if (e->dynamic) SbOverlapBegin(&b->contact->overlap, dt);
   for (PetscInt i = 0; i < o->n; i++) {
     const SbPenetration *p = &o->point[i];
-    const PetscInt one = b->mesh->part[p->v[0]], two = b->mesh->part[p->v[p->n - 1]];
+    const PetscInt one = m->part[p->v[0]], two = m->part[p->v[p->n - 1]];
     const PetscReal w = PetscMin(b->w[one], b->w[two]), k = PetscMin(b->k[one], b->k[two]),
                     all = p->depth + 0.5 * w;
-    Spring spring = {.n = p->n, .stiffness = b->stiffer * k * p->area / w};
+    Spring spring = {.at = *p, .stiffness = b->stiffer * k * p->area / w};
 
     if (!e->dynamic) spring.stiffness *= STIFF;
-    PetscCall(PetscArraycpy(spring.v, p->v, 5));
-    PetscCall(PetscArraycpy(spring.weight, p->weight, 5));
-    PetscCall(PetscArraycpy(spring.normal, p->normal, 3));
-    spring.depth = p->depth;
     spring.start = SbBarrierSpringPlace(b, &spring);
     spring.goal =
       spring.start + (e->dynamic ? PetscMin(all, PetscMax(w, all * (1. - b->contact->overlap.left))) : all);
@@ -201,17 +183,14 @@ static PetscBool find_spring(const Barrier *b, const SbContactPair *pair, const 
       const PetscReal weight = turned ? -d.weight[k] : d.weight[k];
 
       if (pass ? weight >= 0. : weight <= 0.) continue;
-      spring->v[spring->n] = pair->v[k];
-      spring->weight[spring->n++] = weight;
+      spring->at.v[spring->at.n] = pair->v[k];
+      spring->at.weight[spring->at.n++] = weight;
     }
   }
-  for (int i = 0; i < 3; i++) spring->normal[i] = turned ? -d.n[i] : d.n[i];
-  for (PetscInt k = 0; k < spring->n; k++) {
-    const PetscInt v = 3 * spring->v[k];
-
-    spring->start += spring->weight[k] * SbDot3(spring->normal, b->x + v);
-    spring->approach -= spring->weight[k] * SbDot3(spring->normal, b->other + v);
-  }
+  for (int i = 0; i < 3; i++) spring->at.normal[i] = turned ? -d.n[i] : d.n[i];
+  spring->start = SbBarrierSpringPlace(b, spring);
+  for (PetscInt k = 0; k < spring->at.n; k++)
+    spring->approach -= spring->at.weight[k] * SbDot3(spring->at.normal, b->other + 3 * spring->at.v[k]);
   spring->approach = (spring->approach + spring->start) / b->contact->bounce.dt;
   return (PetscBool)(spring->approach > 0.);
 }
@@ -278,7 +257,7 @@ PetscErrorCode SbEffectRestitution_Barrier(SbEffect e, PetscReal *work)
   for (PetscInt i = b->nspring - b->nbounce; i < b->nspring; i++) {
     const Spring *spring = &b->spring[i];
 
-    if (b->mesh->own[spring->v[0]])
+    if (b->mesh->own[spring->at.v[0]])
       *work += SbBarrierSpring(b, spring, push) * (SbBarrierSpringPlace(b, spring) - spring->start);
   }
   PetscFunctionReturn(PETSC_SUCCESS);

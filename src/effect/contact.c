@@ -165,15 +165,34 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The obstacle and its path; without one: options of contact between bodies. */
-static PetscErrorCode read_obstacle(SbEffect e, const SbScope *scope, Contact *c)
+static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
 {
-  PetscBool given, steady;
+  static const char *const columns[] = {"force_x",  "force_y",  "force_z",  "torque_x",
+                                        "torque_y", "torque_z", "contacts", "penetration"};
+  Contact *c = (Contact *)e->data;
+  const char *why = NULL;
   char option[3 * SB_NAME_MAX], text[PETSC_MAX_PATH_LEN];
+  PetscBool given, steady;
+  PetscReal steps;
+  PetscInt choice;
 
   PetscFunctionBeginUser;
+  e->ops = SbContactNodeOps;
+  PetscCall(choose(e, &c->response, &why));
+  if (why) SbFormat(sizeof(e->note), e->note, "response %s: %s", names_of_responses[c->response], why);
+
+  /* the obstacle and its path; without one: options of contact between bodies */
   PetscCall(SbOptionString(scope, "obstacle", sizeof(text), text));
-  if (!text[0]) {
+  if (text[0]) {
+    PetscCall(SbOptionName(scope, "obstacle", sizeof(option), option));
+    PetscCall(SbObstacleCreate(option, text, &c->obstacle));
+    c->facets = (PetscBool)!strncmp(text, "mesh:", 5);
+    if (c->facets) {
+      PetscCall(SbOptionReal(scope, "obstacle_scale", &c->scale));
+      PetscCall(SbOptionReals(scope, "obstacle_at", c->at));
+    }
+    PetscCall(SbPathRead(scope, PETSC_FALSE, &c->path, &steady));
+  } else {
     for (size_t k = 1; k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
       PetscCall(SbOptionGiven(scope, exact_only[k], &given));
       PetscCheck(
@@ -183,33 +202,7 @@ static PetscErrorCode read_obstacle(SbEffect e, const SbScope *scope, Contact *c
     }
     PetscCall(SbOptionBool(scope, "self", &c->self));
     PetscCall(SbOptionBool(scope, "pairs", &c->pairs));
-    PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(SbOptionName(scope, "obstacle", sizeof(option), option));
-  PetscCall(SbObstacleCreate(option, text, &c->obstacle));
-  c->facets = SbObstacleIsMesh(c->obstacle);
-  if (c->facets) {
-    PetscCall(SbOptionReal(scope, "obstacle_scale", &c->scale));
-    PetscCall(SbOptionReals(scope, "obstacle_at", c->at));
-  }
-  PetscCall(SbPathRead(scope, PETSC_FALSE, &c->path, &steady));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
-{
-  static const char *const columns[] = {"force_x",  "force_y",  "force_z",  "torque_x",
-                                        "torque_y", "torque_z", "contacts", "penetration"};
-  Contact *c = (Contact *)e->data;
-  const char *why = NULL;
-  PetscReal steps;
-  PetscInt choice;
-
-  PetscFunctionBeginUser;
-  e->ops = SbContactNodeOps;
-  PetscCall(choose(e, &c->response, &why));
-  if (why) SbFormat(sizeof(e->note), e->note, "response %s: %s", names_of_responses[c->response], why);
-  PetscCall(read_obstacle(e, scope, c));
   PetscCall(SbOptionReal(scope, "friction", &c->friction.mu));
   PetscCall(SbOptionReal(scope, "restitution", &c->bounce.e));
   PetscCall(SbOptionReal(scope, "separation_steps", &steps));
@@ -244,6 +237,7 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
              e->name, (double)c->bounce.e, e->name);
 
   e->nstate = SB_CONTACT_STATE;
+  e->by_node = PETSC_TRUE;
   e->column = columns;
   e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);
   e->saddle = (PetscBool)(c->response == MULTIPLIER);

@@ -1,6 +1,5 @@
 /*
-  contact_node.h - nodes against a rigid obstacle: shared by contact_node.c, contact_facets.c,
-  contact_force.c and friction.c.
+  contact_node.h - nodes against a rigid obstacle: shared by contact_node.c, contact_facets.c and friction.c.
 */
 #pragma once
 #include "contact.h"
@@ -55,32 +54,6 @@ struct _p_Touch {
   PetscReal stretch[3]; /* of springs that stick, in the obstacle's rest frame, after the last step, m */
 };
 
-/* Gap of a point, m, and the normal there. */
-PetscReal SbContactGap(const Contact *c, const SbPose *pose, const PetscReal x[3], PetscReal n[3]);
-
-static inline void place(SbSpace space, PetscInt node, const PetscReal u[], PetscReal x[3])
-{
-  for (int i = 0; i < 3; i++) x[i] = space->node_x[3 * node + i] + u[3 * node + i];
-}
-
-/* Force of spring and damper, N, also in tension. */
-static inline PetscReal pull(const Touch *touch, PetscReal gap)
-{
-  return touch->lambda + touch->before - touch->stiff * gap;
-}
-
-/* Normal force of the springs, N; gap: relative to `rest`. */
-static inline PetscReal spring(const Touch *touch, PetscReal gap)
-{
-  return touch->idle ? 0 : PetscMax(0, pull(touch, gap));
-}
-
-/* The same of any response after a solve, N. */
-static inline PetscReal SbContactForce(const Contact *c, const Touch *touch)
-{
-  return exact(c) ? touch->lambda : spring(touch, touch->gap);
-}
-
 /*
   contact_facets.c: updates the planes of an active node after a solve, at x, X at rest, at the distance `gap`
   (m) from the facet with normal n. Flip: it was constrained to one facet; returns whether to another one now.
@@ -110,19 +83,4 @@ void SbFrictionJudge(SbFriction *f, PetscReal worst, PetscReal largest, PetscBoo
 void SbFrictionAccept(const SbFriction *f, Touch *touch, PetscBool presses);
 /* At the end of a step: warns once of friction that did not converge. Collective. */
 PetscErrorCode SbFrictionWarn(SbFriction *f, const char effect[], SbSpace space, PetscReal t);
-/* Operations of the effect (sbeffect.h). */
-PetscErrorCode SbEffectForce_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[]);
-PetscErrorCode SbEffectTangent_Contact(SbEffect e, SbSpace space, const SbStage *stage, Mat A);
-PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *stage);
-PetscErrorCode SbEffectGap_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],
-                                   PetscReal normal[]);
-PetscErrorCode SbEffectContactPoints_Contact(SbEffect e, SbSpace space, const SbStage *stage,
-                                             SbContactPoints *list);
-PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage *stage,
-                                       const PetscReal residual[], PetscReal values[]);
-#define SB_CONTACT_STATE 23 /* numbers in a record */
-PetscErrorCode SbEffectSave_Contact(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records);
-PetscErrorCode SbEffectLoad_Contact(SbEffect e, SbSpace space, PetscReal t, const PetscReal u[], PetscInt n,
-                                    const PetscReal records[]);
-PetscErrorCode SbEffectRename_Contact(SbEffect e, PetscInt nnode, const PetscInt from[], const PetscInt to[],
-                                      PetscInt *n, PetscReal records[]);
+#define SB_CONTACT_STATE 23 /* numbers in a record of a node */

@@ -17,10 +17,9 @@ typedef struct {
   SbFormula density[3];    /* N/m^3 or Pa */
   PetscReal uniform[3];    /* traction: total force, N, from set-up on per area, Pa */
   PetscInt ncorner, nitem; /* 4 for tets, 3 for facets */
-  PetscInt *corner;  /* [nitem][ncorner] 4 cell + vertex of it; NULL once a steady load was integrated */
-  PetscInt n, *node; /* [n] owned nodes of these cells */
-  PetscReal *value;  /* [nnode][3] load at time t, right on owned nodes, N */
-  PetscReal t;       /* s */
+  PetscInt *corner; /* [nitem][ncorner] 4 cell + vertex of it; NULL once a steady load was integrated */
+  PetscReal *value; /* [nnode][3] load at time t, right on owned nodes, N */
+  PetscReal t;      /* s */
 } DeadLoad;
 
 static const SbOption body_force_rows[] = {
@@ -41,8 +40,11 @@ static const SbOption traction_rows[] = {
 
 static PetscErrorCode options_body_force(SbEffect e, const SbScope *scope)
 {
+  DeadLoad *load = (DeadLoad *)e->data;
+
   PetscFunctionBeginUser;
-  PetscCall(SbEffectFormulas(scope, "density", 3, PETSC_TRUE, ((DeadLoad *)e->data)->density, &e->steady));
+  load->ncorner = 4;
+  PetscCall(SbEffectFormulas(scope, "density", 3, PETSC_TRUE, load->density, &e->steady));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -52,6 +54,7 @@ static PetscErrorCode options_traction(SbEffect e, const SbScope *scope)
   PetscBool vector, total;
 
   PetscFunctionBeginUser;
+  load->ncorner = 3;
   PetscCall(SbOptionGiven(scope, "vector", &vector));
   PetscCall(SbOptionGiven(scope, "total", &total));
   PetscCheck(vector || total, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
@@ -100,63 +103,36 @@ static void integrate(DeadLoad *load, SbSpace space, PetscReal t)
   }
 }
 
-/* Finds the nodes of the cells of load->corner[nitem][ncorner], and integrates once. */
-static PetscErrorCode set_up(DeadLoad *load, SbSpace space)
+static PetscErrorCode setup_deadload(SbEffect e, SbSpace space)
 {
-  PetscBool steady = PETSC_TRUE, *touched;
+  DeadLoad *load = (DeadLoad *)e->data;
+  const PetscInt nc = load->ncorner;
+  PetscBool steady = PETSC_TRUE;
+  PetscReal area = 0;
+  PetscInt *cells = NULL;
+  SbFacet *facets = NULL;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(space->nnode, &touched));
-  for (PetscInt item = 0; item < load->nitem; item++) {
-    const PetscInt cell = load->corner[load->ncorner * item] / 4;
-    const PetscInt n = SbSpaceCellElement(space, cell)->nodes_per[1] ? SB_CELL_NODES : 4;
+  if (nc == 4)
+    PetscCall(SbEffectItems(space, &e->on, SB_ON_CELLS, &load->nitem, &cells));
+  else
+    PetscCall(SbEffectFacets(space, &e->on, &load->nitem, &facets));
+  PetscCall(PetscMalloc1(nc * load->nitem, &load->corner));
+  for (PetscInt i = 0; i < load->nitem; i++) {
+    for (PetscInt a = 0; a < nc; a++)
+      load->corner[nc * i + a] = nc == 4 ? 4 * cells[i] + a : 4 * facets[i].cell + facets[i].corner[a];
+    if (nc == 3 && facets[i].cell < space->mesh->ncell_owned) area += facets[i].area;
+  }
+  PetscCall(PetscFree(cells));
+  PetscCall(PetscFree(facets));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &area, 1, MPIU_REAL, MPI_SUM, space->comm));
+  for (int i = 0; i < 3 && nc == 3; i++) load->uniform[i] /= area;
 
-    for (PetscInt a = 0; a < n; a++) touched[SbSpaceCellNode(space, cell, a)] = PETSC_TRUE;
-  }
-  PetscCall(PetscMalloc2(space->nnode_owned, &load->node, 3 * space->nnode, &load->value));
-  for (PetscInt i = 0; i < space->nnode_owned; i++) {
-    if (touched[i]) load->node[load->n++] = i;
-  }
-  PetscCall(PetscFree(touched));
+  /* a steady load is integrated once */
+  PetscCall(PetscMalloc1(3 * space->nnode, &load->value));
   integrate(load, space, 0);
   for (int i = 0; i < 3; i++) steady = (PetscBool)(steady && !SbFormulaUsesTime(load->density[i]));
   if (steady) PetscCall(PetscFree(load->corner));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode setup_body_force(SbEffect e, SbSpace space)
-{
-  DeadLoad *load = (DeadLoad *)e->data;
-  PetscInt *cells;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbEffectCells(space, &e->on, &load->nitem, &cells));
-  load->ncorner = 4;
-  PetscCall(PetscMalloc1(4 * load->nitem, &load->corner));
-  for (PetscInt i = 0; i < 4 * load->nitem; i++) load->corner[i] = 4 * cells[i / 4] + i % 4;
-  PetscCall(PetscFree(cells));
-  PetscCall(set_up(load, space));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode setup_traction(SbEffect e, SbSpace space)
-{
-  DeadLoad *load = (DeadLoad *)e->data;
-  PetscReal area = 0;
-  SbFacet *facets;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbEffectFacets(space, &e->on, &load->nitem, &facets));
-  load->ncorner = 3;
-  PetscCall(PetscMalloc1(3 * load->nitem, &load->corner));
-  for (PetscInt i = 0; i < load->nitem; i++) {
-    for (int a = 0; a < 3; a++) load->corner[3 * i + a] = 4 * facets[i].cell + facets[i].corner[a];
-    if (facets[i].cell < space->mesh->ncell_owned) area += facets[i].area;
-  }
-  PetscCall(PetscFree(facets));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &area, 1, MPIU_REAL, MPI_SUM, space->comm));
-  for (int i = 0; i < 3; i++) load->uniform[i] /= area;
-  PetscCall(set_up(load, space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -167,12 +143,8 @@ static PetscErrorCode force_deadload(SbEffect e, SbSpace space, const SbStage *s
 
   PetscFunctionBeginUser;
   if (load->corner && stage->t != load->t) integrate(load, space, stage->t);
-  for (PetscInt i = 0; i < load->n; i++) {
-    const PetscInt node = 3 * load->node[i];
-
-    for (int c = 0; c < 3; c++) f[node + c] += s * load->value[node + c];
-  }
-  PetscCall(PetscLogFlops(6.0 * (PetscLogDouble)load->n));
+  for (PetscInt i = 0; i < 3 * space->nnode_owned; i++) f[i] += s * load->value[i];
+  PetscCall(PetscLogFlops(6.0 * (PetscLogDouble)space->nnode_owned));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -183,7 +155,7 @@ static PetscErrorCode destroy_deadload(SbEffect e)
   PetscFunctionBeginUser;
   for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&load->density[i]));
   PetscCall(PetscFree(load->corner));
-  PetscCall(PetscFree2(load->node, load->value));
+  PetscCall(PetscFree(load->value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -193,7 +165,7 @@ const SbEffectType SbEffectBodyForce = {
   .nrow = PETSC_STATIC_ARRAY_LENGTH(body_force_rows),
   .row = body_force_rows,
   .ops = {.setfromoptions = options_body_force,
-          .setup = setup_body_force,
+          .setup = setup_deadload,
           .force = force_deadload,
           .destroy = destroy_deadload},
 };
@@ -204,7 +176,7 @@ const SbEffectType SbEffectTraction = {
   .nrow = PETSC_STATIC_ARRAY_LENGTH(traction_rows),
   .row = traction_rows,
   .ops = {.setfromoptions = options_traction,
-          .setup = setup_traction,
+          .setup = setup_deadload,
           .force = force_deadload,
           .destroy = destroy_deadload},
 };

@@ -37,15 +37,14 @@ PetscErrorCode SbPathDestroy(SbPath *path);
   a set that selects nothing of the kind, with what it does select.
 
   SbEffectFacets - boundary facets of owned and ghost cells.
-  SbEffectNodes  - nodes that can be constrained, ascending, owned ones first. An error for a body with nodes
-                   at faces of which the sets hold vertices but no face.
-  SbEffectVertices - vertices of the mesh, ascending, owned ones first.
-  SbEffectCells  - cells, ascending, owned ones first; every local cell when no set is named.
+  SbEffectItems  - cells (all local ones when no set is named), vertices of the mesh, or nodes that can be
+                   constrained; ascending, owned ones first. An error for a body with nodes at faces of which
+                   the sets hold vertices but no face.
 */
 PetscErrorCode SbEffectFacets(SbSpace space, const SbEffectOn *on, PetscInt *n, SbFacet **facets);
-PetscErrorCode SbEffectNodes(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **nodes);
-PetscErrorCode SbEffectVertices(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **vertices);
-PetscErrorCode SbEffectCells(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **cells);
+typedef enum { SB_ON_CELLS, SB_ON_VERTICES, SB_ON_NODES, SB_ON_FACETS } SbOnKind;
+PetscErrorCode SbEffectItems(SbSpace space, const SbEffectOn *on, SbOnKind kind, PetscInt *n,
+                             PetscInt **items);
 
 /* Basis functions of a cell at the barycentric coordinates L; returns their number. */
 static inline PetscInt SbCellBasis(SbElement e, const PetscReal L[4], PetscReal phi[SB_CELL_NODES])

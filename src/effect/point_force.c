@@ -14,9 +14,7 @@
 
 typedef struct {
   SbFormula vector[3];
-  PetscInt n;       /* owned nodes that have a part */
-  PetscInt *node;   /* [n] local */
-  PetscReal *share; /* [n] of the total force */
+  PetscReal *share; /* [nnode] part of the total force, right on owned nodes */
 } PointForce;
 
 static const SbOption rows[] = {
@@ -39,18 +37,17 @@ static PetscErrorCode setup_point_force(SbEffect e, SbSpace space)
   PointForce *p = (PointForce *)e->data;
   PetscInt n, total = 0, *vertices;
   const SbMesh mesh = space->mesh;
-  PetscReal *node_share; /* [nnode] part of the total force, right on owned nodes */
-  PetscReal *volume;     /* of the cells around each selected vertex, m^3 */
-  PetscReal share;       /* of the total force that a vertex has */
+  PetscReal *volume; /* of the cells around each selected vertex, m^3 */
+  PetscReal share;   /* of the total force that a vertex has */
   PetscBool *chosen;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectVertices(space, &e->on, &n, &vertices));
+  PetscCall(SbEffectItems(space, &e->on, SB_ON_VERTICES, &n, &vertices));
   while (total < n && vertices[total] < mesh->nvert_owned) total++;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_INT, MPI_SUM, space->comm));
   share = 1. / (PetscReal)total;
   /* the volume around each vertex first, then what its cells pass on to their nodes */
-  PetscCall(PetscCalloc1(space->nnode, &node_share));
+  PetscCall(PetscCalloc1(space->nnode, &p->share));
   PetscCall(PetscCalloc2(mesh->nvert, &volume, mesh->nvert, &chosen));
   for (PetscInt i = 0; i < n; i++) chosen[vertices[i]] = PETSC_TRUE;
   for (int pass = 0; pass < 2; pass++) {
@@ -64,22 +61,15 @@ static PetscErrorCode setup_point_force(SbEffect e, SbSpace space)
         const SbElement element = SbSpaceCellElement(space, cell);
 
         /* a P1 or P2 node at the vertex is the vertex: the parts of its cells add up to one */
-        if (element->nodes_per[0]) node_share[space->cell_node[4 * cell + k]] = share;
+        if (element->nodes_per[0]) p->share[space->cell_node[4 * cell + k]] = share;
         for (int a = 0; a < 4 && !element->nodes_per[0]; a++)
-          node_share[space->cell_node[4 * cell + a]] +=
+          p->share[space->cell_node[4 * cell + a]] +=
             share * space->batch_V[b][l] / volume[v] * element->ops.vertex[k][a];
       } else
         volume[v] += space->batch_V[b][l];
     }
   }
   PetscCall(PetscFree2(volume, chosen));
-  PetscCall(PetscMalloc2(space->nnode_owned, &p->node, space->nnode_owned, &p->share));
-  for (PetscInt i = 0; i < space->nnode_owned; i++) {
-    if (node_share[i] == 0) continue;
-    p->node[p->n] = i;
-    p->share[p->n++] = node_share[i];
-  }
-  PetscCall(PetscFree(node_share));
   PetscCall(PetscFree(vertices));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -91,11 +81,8 @@ static PetscErrorCode force_point_force(SbEffect e, SbSpace space, const SbStage
   PetscReal F[3];
 
   PetscFunctionBeginUser;
-  (void)space;
   for (int c = 0; c < 3; c++) F[c] = s * SbFormulaEval(p->vector[c], stage->t, NULL);
-  for (PetscInt i = 0; i < p->n; i++) {
-    for (int c = 0; c < 3; c++) f[3 * p->node[i] + c] += p->share[i] * F[c];
-  }
+  for (PetscInt i = 0; i < 3 * space->nnode_owned; i++) f[i] += p->share[i / 3] * F[i % 3];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -105,7 +92,7 @@ static PetscErrorCode destroy_point_force(SbEffect e)
 
   PetscFunctionBeginUser;
   for (int c = 0; c < 3; c++) PetscCall(SbFormulaDestroy(&p->vector[c]));
-  PetscCall(PetscFree2(p->node, p->share));
+  PetscCall(PetscFree(p->share));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

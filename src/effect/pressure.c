@@ -91,10 +91,9 @@ static RimEdge side_of(SbSpace space, const SbFacet *facet, PetscInt c)
   const PetscInt a = facet->corner[c], b = facet->corner[(c + 1) % 3];
   RimEdge e = {{SbSpaceCellNode(space, facet->cell, a), SbSpaceCellNode(space, facet->cell, b), -1}};
 
-  for (int k = 0; SbSpaceCellElement(space, facet->cell)->nodes_per[1] && k < 6; k++) {
-    if (SbTetEdge[k][0] == PetscMin(a, b) && SbTetEdge[k][1] == PetscMax(a, b))
-      e.node[2] = SbSpaceCellNode(space, facet->cell, 4 + k);
-  }
+  /* edges of a tet: 01 02 03 12 13 23 */
+  if (SbSpaceCellElement(space, facet->cell)->nodes_per[1])
+    e.node[2] = SbSpaceCellNode(space, facet->cell, a && b ? 4 + a + b : 3 + a + b);
   return e;
 }
 

@@ -9,20 +9,18 @@
 */
 #include "effect_impl.h"
 
-typedef enum { CELLS, FACETS, VERTICES } Kind;
-
 /* Numbers k[on->n] of the named sets, and the union of their bits; an error when one selects nothing. */
-static PetscErrorCode find_sets(SbSpace space, const SbEffectOn *on, Kind kind, PetscInt k[SB_SET_MAX],
+static PetscErrorCode find_sets(SbSpace space, const SbEffectOn *on, SbOnKind kind, PetscInt k[SB_SET_MAX],
                                 uint64_t *mask)
 {
-  const char *const need[] = {"tetrahedra", "boundary facets", "vertices"};
+  const char *const need[] = {"tetrahedra", "vertices", "vertices", "boundary facets"};
   const char *const hint[] = {
-    "take a set that encloses whole tetrahedra, such as a body or a larger box",
-    "take a set that contains whole triangles of the surface, such as a thicker plane or box",
-    "take a larger set"};
+    "take a set that encloses whole tetrahedra, such as a body or a larger box", "take a larger set",
+    "take a larger set",
+    "take a set that contains whole triangles of the surface, such as a thicker plane or box"};
 
   PetscFunctionBeginUser;
-  PetscCheck(on->n || kind == CELLS, space->comm, PETSC_ERR_USER_INPUT,
+  PetscCheck(on->n || kind == SB_ON_CELLS, space->comm, PETSC_ERR_USER_INPUT,
              "%s: name at least one set, see -sets", on->option);
   PetscCheck(on->n <= SB_SET_MAX, space->comm, PETSC_ERR_USER_INPUT,
              "%s names %" PetscInt_FMT " sets, at most %d can be used", on->option, on->n, SB_SET_MAX);
@@ -32,9 +30,9 @@ static PetscErrorCode find_sets(SbSpace space, const SbEffectOn *on, Kind kind, 
 
     PetscCall(SbSpaceFindSet(space, on->name[i], on->option, &k[i]));
     set = &space->mesh->set[k[i]];
-    PetscCheck(kind == CELLS    ? set->ncell
-               : kind == FACETS ? set->nfacet
-                                : set->nvert,
+    PetscCheck(kind == SB_ON_CELLS    ? set->ncell
+               : kind == SB_ON_FACETS ? set->nfacet
+                                      : set->nvert,
                space->comm, PETSC_ERR_USER_INPUT,
                "%s: set %s selects no %s (%" PetscInt_FMT " vertices, %" PetscInt_FMT
                " boundary facets, %" PetscInt_FMT " tetrahedra): %s",
@@ -52,7 +50,7 @@ PetscErrorCode SbEffectFacets(SbSpace space, const SbEffectOn *on, PetscInt *n, 
   PetscFunctionBeginUser;
   *n = 0;
   *facets = NULL;
-  PetscCall(find_sets(space, on, FACETS, k, &mask));
+  PetscCall(find_sets(space, on, SB_ON_FACETS, k, &mask));
   for (PetscInt i = 0; i < on->n; i++) {
     SbFacet *more;
     PetscInt nmore;
@@ -64,19 +62,6 @@ PetscErrorCode SbEffectFacets(SbSpace space, const SbEffectOn *on, PetscInt *n, 
     }
     PetscCall(PetscFree(more));
     seen |= SB_SET_BIT(k[i]);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Items with a bit of the mask, ascending; all of them when no set is named. */
-static PetscErrorCode collect(const SbEffectOn *on, PetscInt nitem, const uint64_t sets[], uint64_t mask,
-                              PetscInt *n, PetscInt **items)
-{
-  PetscFunctionBeginUser;
-  *n = 0;
-  PetscCall(PetscMalloc1(nitem, items));
-  for (PetscInt i = 0; i < nitem; i++) {
-    if (!on->n || sets[i] & mask) (*items)[(*n)++] = i;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -110,36 +95,21 @@ static PetscErrorCode check_nodes(SbSpace space, const SbEffectOn *on, uint64_t 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEffectNodes(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **nodes)
+PetscErrorCode SbEffectItems(SbSpace space, const SbEffectOn *on, SbOnKind kind, PetscInt *n,
+                             PetscInt **items)
 {
+  const PetscInt count[] = {space->mesh->ncell, space->mesh->nvert, space->nnode};
+  const uint64_t *const sets[] = {space->mesh->cell_set, space->mesh->vert_set, space->node_set};
   PetscInt k[SB_SET_MAX];
   uint64_t mask;
 
   PetscFunctionBeginUser;
-  PetscCall(find_sets(space, on, VERTICES, k, &mask));
-  if (space->faces) PetscCall(check_nodes(space, on, mask));
-  PetscCall(collect(on, space->nnode, space->node_set, mask, n, nodes));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbEffectVertices(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **vertices)
-{
-  PetscInt k[SB_SET_MAX];
-  uint64_t mask;
-
-  PetscFunctionBeginUser;
-  PetscCall(find_sets(space, on, VERTICES, k, &mask));
-  PetscCall(collect(on, space->mesh->nvert, space->mesh->vert_set, mask, n, vertices));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbEffectCells(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **cells)
-{
-  PetscInt k[SB_SET_MAX];
-  uint64_t mask;
-
-  PetscFunctionBeginUser;
-  PetscCall(find_sets(space, on, CELLS, k, &mask));
-  PetscCall(collect(on, space->mesh->ncell, space->mesh->cell_set, mask, n, cells));
+  PetscCall(find_sets(space, on, kind, k, &mask));
+  if (kind == SB_ON_NODES && space->faces) PetscCall(check_nodes(space, on, mask));
+  *n = 0;
+  PetscCall(PetscMalloc1(count[kind], items));
+  for (PetscInt i = 0; i < count[kind]; i++) {
+    if (!on->n || sets[kind][i] & mask) (*items)[(*n)++] = i;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

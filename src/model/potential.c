@@ -222,7 +222,7 @@ PetscErrorCode SbModelPotentialBegin(SbModel m, PetscReal t, PetscReal dt, Vec U
 PetscErrorCode SbModelPotentialAdvance(SbModel m, PetscReal progress)
 {
   PetscFunctionBeginUser;
-  for (PetscInt e = 0; e < m->npotential; e++) CONTACT_CALL(m->potential[e], advance, progress);
+  for (PetscInt e = 0; e < m->npotential; e++) m->potential[e]->progress = progress;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

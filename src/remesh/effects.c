@@ -2,7 +2,7 @@
   Transfers history variables of effects (active contact, friction) to the new model, like a checkpoint with
   renumbered nodes.
 
-  Records of effects without the operation `rename` name no nodes.
+  Records of effects that do not say so (SbEffect.by_node) name no nodes.
 */
 #include "remesh_impl.h"
 
@@ -24,7 +24,22 @@ PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed)
     PetscCall(SbAllgatherv(a->space->comm, MPIU_REAL, nown * e->nstate, own, &total, &records, NULL));
     n = e->nstate ? total / e->nstate : 0;
     PetscCall(PetscFree(own));
-    if (e->ops.rename) PetscCall((*e->ops.rename)(e, renamed->n, renamed->from, renamed->to, &n, records));
+
+    // renumber the nodes that they begin with; drop those of removed nodes
+    if (e->by_node) {
+      total = n;
+      n = 0;
+      for (PetscInt i = 0; i < total; i++) {
+        PetscReal *record = records + e->nstate * i;
+        PetscInt place;
+
+        PetscCall(PetscFindInt((PetscInt)record[0], renamed->n, renamed->from, &place));
+        if (place < 0) continue;
+        record[0] = (PetscReal)renamed->to[place];
+        PetscCall(PetscArraymove(records + e->nstate * n, record, e->nstate));
+        n++;
+      }
+    }
     SbEffectCall(b->effect[k], load, b->space, from->t_now, u, n, records);
     PetscCall(PetscFree(records));
   }

@@ -49,7 +49,7 @@ static PetscErrorCode check_nodes(Fixture *x, const char *a, const char *b, Pets
   PetscInt n, *nodes, owned = 0, all;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectNodes(x->space, on_sets(a, b), &n, &nodes));
+  PetscCall(SbEffectItems(x->space, on_sets(a, b), SB_ON_NODES, &n, &nodes));
   for (PetscInt i = 0; i < n; i++) {
     owned += nodes[i] < x->space->nnode_owned;
     SB_CHECK(!i || nodes[i] > nodes[i - 1], "nodes ascend");
@@ -66,7 +66,7 @@ static PetscErrorCode check_cells(Fixture *x, const char *a, const char *b, Pets
   PetscReal sum = 0, all;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectCells(x->space, on_sets(a, b), &n, &cells));
+  PetscCall(SbEffectItems(x->space, on_sets(a, b), SB_ON_CELLS, &n, &cells));
   for (PetscInt i = 0; i < n; i++) {
     if (cells[i] < x->mesh->ncell_owned)
       sum += SbTetDeterminant(x->mesh->x, x->mesh->cell + 4 * cells[i]) / 6;
@@ -86,10 +86,11 @@ static PetscErrorCode check_errors(Fixture *x)
   // One vertex, no facet, no cell: the message names set and counts.
   SB_CHECK_ERROR(SbEffectFacets(x->space, on_sets("bottom", "corner"), &n, &facets), PETSC_ERR_USER_INPUT,
                  "1 vertices|0");
-  SB_CHECK_ERROR(SbEffectCells(x->space, on_sets("bottom", "corner"), &n, &items), PETSC_ERR_USER_INPUT,
-                 "-effect_test_on|set bottom");
-  SB_CHECK_ERROR(SbEffectNodes(x->space, on_sets("botom", NULL), &n, &items), PETSC_ERR_USER, "bottom");
-  SB_CHECK_ERROR(SbEffectNodes(x->space, on_sets(NULL, NULL), &n, &items), PETSC_ERR_USER_INPUT,
+  SB_CHECK_ERROR(SbEffectItems(x->space, on_sets("bottom", "corner"), SB_ON_CELLS, &n, &items),
+                 PETSC_ERR_USER_INPUT, "-effect_test_on|set bottom");
+  SB_CHECK_ERROR(SbEffectItems(x->space, on_sets("botom", NULL), SB_ON_NODES, &n, &items), PETSC_ERR_USER,
+                 "bottom");
+  SB_CHECK_ERROR(SbEffectItems(x->space, on_sets(NULL, NULL), SB_ON_NODES, &n, &items), PETSC_ERR_USER_INPUT,
                  "-effect_test_on");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -110,8 +111,8 @@ static PetscErrorCode check_faces(const char *element, PetscInt all, PetscInt bo
   PetscCall(check_nodes(&x, "west", "bottom", 2 * bottom));
   PetscCall(check_nodes(&x, "all", "corner", all));
   PetscCall(check_errors(&x));
-  SB_CHECK_ERROR(SbEffectNodes(x.space, on_sets("corner", NULL), &n, &items), PETSC_ERR_USER_INPUT,
-                 "-effect_test_on|1 vertices|body block");
+  SB_CHECK_ERROR(SbEffectItems(x.space, on_sets("corner", NULL), SB_ON_NODES, &n, &items),
+                 PETSC_ERR_USER_INPUT, "-effect_test_on|1 vertices|body block");
   PetscCall(fixture_destroy(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

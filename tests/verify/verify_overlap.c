@@ -129,7 +129,8 @@ static PetscErrorCode check_ring(const char *element)
   VERIFY_MORE(o.n, 8, "points that know the way out");
   VERIFY_MORE(radial, 0.5, "mean part of the ways along the radius");
   VERIFY_LESS(o.deepest, 0.11, "depth, m");
-  PetscCall(SbContactOverlapFree(&o));
+  PetscCall(PetscFree(o.point));
+  PetscCall(PetscFree(o.near));
   PetscCall(PetscFree(x));
   PetscCall(PetscFree(facet));
   PetscCall(SbContactMeshDestroy(&m));

@@ -1,7 +1,6 @@
 /*
-  prescribed_displacement.c - the supports `fixed`, nodes with zero displacement, and
-  `prescribed_displacement`, nodes moved along a given path: a translation, a rotation about an axis, or both;
-  in all directions or in some.
+  supports.c - the supports `fixed`, nodes with zero displacement, and `prescribed_displacement`, nodes moved
+  along a given path: a translation, a rotation about an axis, or both; in all directions or in some.
 
   With r = X - c the rest position relative to a point c of the axis, k the unit direction and theta(t) the
   angle, the prescribed displacement is (Rodrigues 1840)
@@ -87,7 +86,7 @@ static PetscErrorCode setup_support(SbEffect e, SbSpace space)
   PetscInt n, owned;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectNodes(space, &e->on, &n, &d->node));
+  PetscCall(SbEffectItems(space, &e->on, SB_ON_NODES, &n, &d->node));
   PetscCall(PetscMalloc1(n, &d->bits));
   /* an earlier effect keeps what it has; all ranks see a node with the same bits, so they decide alike */
   for (PetscInt i = 0; i < n; i++) {
