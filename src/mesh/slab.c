@@ -380,7 +380,7 @@ static PetscErrorCode find_triangles(Slab *s)
   const SbItems *item = &s->im->item[2];
   const PetscInt n = item->n;
   Triangle *mine, *in;
-  PetscInt *from, slots[2];
+  PetscInt *from = NULL, slots[2];
   PetscBool *found, *anywhere;
   SbRoute there, on;
   SbImport *im = s->im;
@@ -426,7 +426,7 @@ static PetscErrorCode find_edges(Slab *s)
   SbMiddle *mine = im->middle, *in;
   PetscReal largest = 0;
   const PetscInt nmine = im->nmiddle.n;
-  PetscInt *from, total = nmine;
+  PetscInt *from = NULL, total = nmine;
   PetscBool *found, *anywhere;
   SbRoute there, on;
 
