@@ -165,7 +165,7 @@ typedef struct {
 PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal x1[],
                          const SbCCDLimits *limits, PetscReal *time);
 
-/* ------------------------------------------------------------------ box_tree.c: boxes that meet or are near */
+/* --------------------------------------------------------- box_tree.c: boxes that meet or are near */
 
 /*
   A tree over boxes with four children to a node: four boxes form a group, four groups one of the next level.
@@ -294,7 +294,7 @@ PetscInt SbUnionLabel(PetscInt n, PetscInt up[]);
 /* Removes points that are not in used[nused], and renumbers these. Keeps the order. */
 PetscErrorCode SbDropUnusedPoints(PetscInt *n, PetscReal x[], PetscInt nused, PetscInt used[]);
 
-/* ------------------------------------------------------------------ keys.c: which edges or faces are the same */
+/* --------------------------------------------------------- keys.c: which edges or faces are the same */
 
 typedef struct {
   uint64_t key;

@@ -40,8 +40,8 @@ typedef struct {
 void SbImportShape(const SbImport *import, PetscReal degrees, SbShape *shape);
 
 /*
-  SbTetQuality - shape of a tet, positions in m: 3 r / R with the radii of the spheres in it and around it, 1 for
-  the regular one, 0 for a flat one, negative when it is inverted. Not collective.
+  SbTetQuality - shape of a tet, positions in m: 3 r / R with the radii of the spheres in it and around it, 1
+  for the regular one, 0 for a flat one, negative when it is inverted. Not collective.
 */
 PetscReal SbTetQuality(const PetscReal x[], const PetscInt vert[4]);
 /* curve.c: of a tet with its edges off their middles by off[6][3], its volume, and the least Jacobian, where

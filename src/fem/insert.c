@@ -40,8 +40,8 @@ void SbInsertClear(SbSpace s, const SbMatBlocks *x, PetscInt b, const SbStage *f
 }
 
 /*
-  Any storage, any rank: adds the cells of batch b, block by block. DG: each block between means is distributed
-  to the own nodes and those across the faces.
+  Any storage, any rank: adds the cells of batch b, block by block. DG: each block between means is
+  distributed to the own nodes and those across the faces.
 */
 static void insert_cells(SbSpace s, const SbMatBlocks *x, PetscInt b, int npair, PetscBool broken,
                          const SbPack K[][9])

@@ -5,7 +5,7 @@
   means. P* is linear in each cell, with the recovered values at the vertices (below). The error of a cell is
   estimated by the difference:
 
-    off_T = 1/2 int_T D : C^-1 : D,  D = P* - P_h,  s = sym(R^T D),  C^-1: |dev s|^2 / (2 mu) + tr(s)^2 / (9 K),
+    off_T = 1/2 int_T D : C^-1 : D,  D = P* - P_h, s = sym(R^T D), C^-1: |dev s|^2 / (2 mu) + tr(s)^2 / (9 K),
 
   K = lambda + 2/3 mu, R the rotation in F (Zienkiewicz and Zhu 1992; for CR and DG with averages instead of
   fits: Carstensen and Funken, Math. Comp. 70, 2001). In this norm it stays bounded as nu -> 1/2. For CR and

@@ -302,7 +302,7 @@ PetscErrorCode SbProbesRead(SbRun run, SbOutput out, SbH5 *h);
 PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, PetscReal values[]);
 /* checkpoint_effects.c: writes the state of all effects; sum is raised by their checksum. Collective. */
 PetscErrorCode SbCheckpointWriteEffects(SbRun run, SbH5 *h, uint64_t *sum);
-/* Reads it: raises sum, or without it hands the state to the effects, at t; not ok: unreadable. Collective. */
+/* Reads it: raises sum; without sum gives the state to the effects, at t. ok: it is readable. Collective. */
 PetscErrorCode SbCheckpointReadEffects(SbRun run, SbH5 *h, PetscReal t, uint64_t *sum, PetscBool *ok);
 /* Hash of a number at a position of an array. */
 uint64_t SbMixReal(uint64_t position, PetscReal value);

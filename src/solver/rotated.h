@@ -60,7 +60,7 @@ typedef struct {
 } SbExactNodes;
 
 PetscErrorCode SbExactNodesDestroy(SbExactNodes *e);
-/* Chooses, in e, which starts with {0}, free nodes with a spread above `limit`, raised if they are too many, and factors. */
+/* Chooses in e, {0} before, free nodes with a spread above `limit`, raised if they are too many; factors. */
 PetscErrorCode SbExactNodesSetUp(SbExactNodes *e, SbSpace space, Mat A, const PetscReal spread[],
                                  PetscReal limit);
 /* y = B r on the nodes, r -= A y, in place on r[nnode_owned][3]; to be called before P. */
