@@ -43,7 +43,8 @@ static PetscErrorCode read_rows(FILE *f, const char *file, const char *where, Pe
               number, times);
     }
     PetscCall(SbReserve(*n + 1, sizeof(**rows), &room, rows));
-    PetscCall(PetscArraycpy((*rows)[(*n)++], row, 2));
+    PetscCall(PetscArraycpy((*rows)[*n], row, 2));
+    (*n)++;
   }
   PetscCheck(!ferror(f), PETSC_COMM_SELF, PETSC_ERR_USER, "%s: cannot read %s", where, file);
   PetscCheck(*n, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: %s holds no numbers", where, file);

@@ -402,7 +402,7 @@ PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], con
       else
         memcpy(K, B[0], sizeof(B[0]));
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        const size_t start = (size_t)(b * s->width * s->width * SB_BATCH + l);
+        const size_t start = (size_t)b * s->width * s->width * SB_BATCH + l;
 
         for (PetscInt turn = 0; turn < 2 * npair; turn++) {
           const PetscInt pair = turn / 2, a = turn % 2 ? SbPairB[pair] : SbPairA[pair],

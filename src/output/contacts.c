@@ -120,7 +120,7 @@ PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame)
       else
         c->column[i] = ((const PetscReal *)((const char *)p + table[k].from))[i % ncomp];
     }
-    (void)H5Tconvert(H5T_NATIVE_DOUBLE, SbH5TypeInMemory(type), (size_t)(c->share.n * ncomp), c->column, NULL,
+    (void)H5Tconvert(H5T_NATIVE_DOUBLE, SbH5TypeInMemory(type), (size_t)c->share.n * ncomp, c->column, NULL,
                      H5P_DEFAULT);
     PetscCall(SbH5WriteSlice(h, group, table[k].name, table[k].unit, &c->share, ncomp, type, c->column));
   }

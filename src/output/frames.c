@@ -54,7 +54,7 @@ static PetscErrorCode put(SbOutput out, hid_t where, const char *name, const cha
       PetscCall(PetscArraymove(fr->slice + ncomp * n, fr->slice + ncomp * i, ncomp));
     }
   }
-  (void)H5Tconvert(H5T_NATIVE_DOUBLE, SbH5TypeInMemory(type), (size_t)(ncomp * order->n), fr->slice, NULL,
+  (void)H5Tconvert(H5T_NATIVE_DOUBLE, SbH5TypeInMemory(type), (size_t)order->n * ncomp, fr->slice, NULL,
                    H5P_DEFAULT);
   PetscCall(SbH5WriteSlice(&fr->h5, where, name, unit, order, ncomp, type, fr->slice));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -118,10 +118,13 @@ static PetscErrorCode find_units(SbCoarse c, const uint8_t contact[])
   for (PetscInt k = 0; k < 3 * c->nagg; k++)
     c->centre[4 * (k / 3) + k % 3] /= (PetscReal)PetscMax(1, count[k / 3]);
   for (PetscInt k = 0; k < 3 * n; k++) {
+    PetscInt a;
+
     c->d[k] = 0.;
     if (c->way[k / 3] != SB_MEMBER) continue;
-    c->d[k] = s->node_x[k] - c->centre[4 * c->agg[k / 3] + k % 3];
-    c->centre[4 * c->agg[k / 3] + 3] += PetscSqr(c->d[k]) / (PetscReal)count[c->agg[k / 3]];
+    a = c->agg[k / 3];
+    c->d[k] = s->node_x[k] - c->centre[4 * a + k % 3];
+    c->centre[4 * a + 3] += PetscSqr(c->d[k]) / (PetscReal)count[a];
   }
   for (PetscInt a = 0; a < c->nagg; a++)
     c->centre[4 * a + 3] = count[a] > 1 ? PetscSqrtReal(c->centre[4 * a + 3]) : 0.;
