@@ -43,8 +43,8 @@ void SbInsertClear(SbSpace s, const SbMatBlocks *x, PetscInt b, const SbStage *f
   Any storage, any rank: adds the cells of batch b, block by block. DG: each block between means is
   distributed to the own nodes and those across the faces.
 */
-static void insert_cells(SbSpace s, const SbMatBlocks *x, PetscInt b, int npair, PetscBool broken,
-                         const SbPack K[][9])
+SB_INLINE void insert_cells(SbSpace s, const SbMatBlocks *x, PetscInt b, int npair, PetscBool broken,
+                            const SbPack K[][9])
 {
   const PetscInt w = s->width;
   PetscReal weight[8], k[9];
@@ -185,8 +185,10 @@ void SbInsertBatch(SbSpace s, const SbMatBlocks *x, PetscInt b, int npair, Petsc
                  *node = s->batch_node + 4 * SB_BATCH * b;
   PetscInt last = 0;
 
-  if (broken || x->kind == SB_MATRIX_AIJ)
-    insert_cells(s, x, b, npair, broken, K);
+  if (broken)
+    insert_cells(s, x, b, npair, PETSC_TRUE, K);
+  else if (x->kind == SB_MATRIX_AIJ)
+    insert_cells(s, x, b, npair, PETSC_FALSE, K);
   else if (x->symmetric)
     insert_sbaij(npair, K, s->plan->upper + (size_t)(b * s->plan->npair) * SB_BATCH, x->value);
   else {
