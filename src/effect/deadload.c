@@ -17,9 +17,10 @@ typedef struct {
   SbFormula density[3];    /* N/m^3 or Pa */
   PetscReal uniform[3];    /* traction: total force, N, from set-up on per area, Pa */
   PetscInt ncorner, nitem; /* 4 for tets, 3 for facets */
-  PetscInt *corner; /* [nitem][ncorner] 4 cell + vertex of it; NULL once a steady load was integrated */
-  PetscReal *value; /* [nnode][3] load at time t, right on owned nodes, N */
-  PetscReal t;      /* s */
+  PetscInt *corner;  /* [nitem][ncorner] 4 cell + vertex of it; NULL once a steady load was integrated */
+  PetscInt n, *node; /* [n] owned nodes of these cells */
+  PetscReal *value;  /* [nnode][3] load at time t, right on owned nodes, N */
+  PetscReal t;       /* s */
 } DeadLoad;
 
 static const SbOption body_force_rows[] = {
@@ -107,7 +108,7 @@ static PetscErrorCode setup_deadload(SbEffect e, SbSpace space)
 {
   DeadLoad *load = (DeadLoad *)e->data;
   const PetscInt nc = load->ncorner;
-  PetscBool steady = PETSC_TRUE;
+  PetscBool steady = PETSC_TRUE, *touched;
   PetscReal area = 0;
   PetscInt *cells = NULL;
   SbFacet *facets = NULL;
@@ -128,6 +129,21 @@ static PetscErrorCode setup_deadload(SbEffect e, SbSpace space)
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &area, 1, MPIU_REAL, MPI_SUM, space->comm));
   for (int i = 0; i < 3 && nc == 3; i++) load->uniform[i] /= area;
 
+  /* the owned nodes of these cells: a load on few costs little in a large mesh */
+  PetscCall(PetscCalloc1(space->nnode, &touched));
+  for (PetscInt i = 0; i < load->nitem; i++) {
+    const PetscInt cell = load->corner[nc * i] / 4;
+
+    for (PetscInt a = 0; a < (SbSpaceCellElement(space, cell)->nodes_per[1] ? SB_CELL_NODES : 4); a++)
+      touched[SbSpaceCellNode(space, cell, a)] = PETSC_TRUE;
+  }
+  for (PetscInt i = 0; i < space->nnode_owned; i++) load->n += touched[i];
+  PetscCall(PetscMalloc1(load->n, &load->node));
+  for (PetscInt i = space->nnode_owned - 1, k = load->n; i >= 0; i--) {
+    if (touched[i]) load->node[--k] = i;
+  }
+  PetscCall(PetscFree(touched));
+
   /* a steady load is integrated once */
   PetscCall(PetscMalloc1(3 * space->nnode, &load->value));
   integrate(load, space, 0);
@@ -143,8 +159,12 @@ static PetscErrorCode force_deadload(SbEffect e, SbSpace space, const SbStage *s
 
   PetscFunctionBeginUser;
   if (load->corner && stage->t != load->t) integrate(load, space, stage->t);
-  for (PetscInt i = 0; i < 3 * space->nnode_owned; i++) f[i] += s * load->value[i];
-  PetscCall(PetscLogFlops(6.0 * (PetscLogDouble)space->nnode_owned));
+  for (PetscInt i = 0; i < load->n; i++) {
+    const PetscInt node = 3 * load->node[i];
+
+    for (int c = 0; c < 3; c++) f[node + c] += s * load->value[node + c];
+  }
+  PetscCall(PetscLogFlops(6.0 * (PetscLogDouble)load->n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -155,6 +175,7 @@ static PetscErrorCode destroy_deadload(SbEffect e)
   PetscFunctionBeginUser;
   for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&load->density[i]));
   PetscCall(PetscFree(load->corner));
+  PetscCall(PetscFree(load->node));
   PetscCall(PetscFree(load->value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
