@@ -96,13 +96,11 @@ static PetscErrorCode find_means(SbLevels v)
     v->mean[s->cell_node[i]] = m->cell_node[i];
     if (s->dirichlet_node && s->dirichlet_node[i] >= 0) v->mean[s->dirichlet_node[i]] = m->cell_node[i];
   }
-  for (PetscInt b = 0; b < s->nbatch; b++) {
-    for (PetscInt k = 0; k < 4 * SB_BATCH; k++) {
-      const PetscInt *node = s->batch_clique + (size_t)(b * s->width) * SB_BATCH + k;
+  for (PetscInt k = 0; k < 4 * SB_BATCH * s->nbatch; k++) {
+    const PetscInt *node = sb_batch_nodes(s, k / (4 * SB_BATCH)) + k % (4 * SB_BATCH);
 
-      v->weight[node[0]] = s->batch_weight[4 * b + k / SB_BATCH][k % SB_BATCH];
-      if (node[4 * SB_BATCH] != node[0]) v->across[node[0]] = node[4 * SB_BATCH];
-    }
+    v->weight[node[0]] = s->batch_weight[k / SB_BATCH][k % SB_BATCH];
+    if (node[4 * SB_BATCH] != node[0]) v->across[node[0]] = node[4 * SB_BATCH];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -286,35 +284,25 @@ PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
     PetscCall(MatGetDiagonal(v->A[0], v->t[0]));
     /* diagonal of the face terms and the mass matrix, without the cells */
     PetscCall(VecGetArray(v->r[0], &d));
-    for (PetscInt r = 0; r < s->nregion; r++) {
-      const SbRegion *region = &s->region[r];
-      const PetscReal stiffness = v->shift_k + v->shift_v * s->beta[region->body],
-                      inertia = v->shift_a + v->shift_v * s->alpha[region->body];
+    for (PetscInt i = 0; i < s->nnode_owned; i++) {
+      const PetscReal stiffness = v->shift_k + v->shift_v * s->beta[s->node_body[i]],
+                      inertia = v->shift_a + v->shift_v * s->alpha[s->node_body[i]];
 
-      for (PetscInt k = 4 * SB_BATCH * region->bstart; k < 4 * SB_BATCH * region->bend; k++) {
-        const PetscInt i = s->batch_node[k];
-
-        if (i < s->nnode_owned)
-          d[3 * i] = stiffness * p->face_term[0][p->diagonal[i]] + inertia * s->node_mass[i];
-      }
+      d[3 * i] = stiffness * p->face_term[0][p->diagonal[i]] + inertia * s->node_mass[i];
     }
     PetscCall(VecRestoreArray(v->r[0], &d));
     /* stiffness of the jumps: (1-w)^2 A_ii - 2 w (1-w) A_ij + w^2 A_jj */
     PetscCall(SbSpaceGetLocalRead(s, v->r[0], &own));
-    for (PetscInt r = 0; r < s->nregion; r++) {
-      const SbRegion *region = &s->region[r];
+    for (PetscInt k = 0; k < 4 * SB_BATCH * s->nbatch; k++) {
+      const PetscInt b = k / (4 * SB_BATCH), a = k / SB_BATCH % 4, i = s->batch_node[k], j = v->across[i];
+      const PetscInt at =
+        p->offset[((size_t)b * 64 + (size_t)(8 * a + 4 + a)) * SB_BATCH + (size_t)(k % SB_BATCH)];
+      const PetscReal w = v->weight[i];
 
-      for (PetscInt k = 4 * SB_BATCH * region->bstart; k < 4 * SB_BATCH * region->bend; k++) {
-        const PetscInt b = k / (4 * SB_BATCH), a = k / SB_BATCH % 4, i = s->batch_node[k], j = v->across[i],
-                       at = p->offset[((size_t)b * 64 + (size_t)(8 * a + 4 + a)) * SB_BATCH +
-                                      (size_t)(k % SB_BATCH)];
-        const PetscReal w = v->weight[i];
-
-        if (i >= s->nnode_owned || j < 0) continue;
-        v->jump[i] = 1. / ((1. - w) * (1. - w) * own[3 * i] + w * w * own[3 * j] -
-                           2. * w * (1. - w) * (v->shift_k + v->shift_v * s->beta[region->body]) *
-                             p->face_term[at < 0][at < 0 ? ~at : at]);
-      }
+      if (i >= s->nnode_owned || j < 0) continue;
+      v->jump[i] = 1. / ((1. - w) * (1. - w) * own[3 * i] + w * w * own[3 * j] -
+                         2. * w * (1. - w) * (v->shift_k + v->shift_v * s->beta[s->node_body[i]]) *
+                           p->face_term[at < 0][at < 0 ? ~at : at]);
     }
     PetscCall(SbSpaceRestoreLocalRead(s, v->r[0], &own));
   }
