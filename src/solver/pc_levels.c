@@ -105,15 +105,6 @@ static PetscErrorCode find_means(SbLevels v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Copies the owned values of a plain vector into one with ghosts, and updates the ghosts. */
-static PetscErrorCode load(SbSpace s, Vec from, Vec to, const PetscReal **x)
-{
-  PetscFunctionBeginUser;
-  PetscCall(VecCopy(from, to));
-  PetscCall(SbSpaceGetLocalRead(s, to, x));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* x, or 0 at a prescribed component of node i. */
 static inline PetscReal unless_fixed(SbSpace s, PetscInt i, PetscInt c, PetscReal x)
 {
@@ -133,9 +124,9 @@ static PetscErrorCode cycle_faces(SbLevels v, Vec r, Vec z)
   PetscFunctionBeginUser;
   PetscCall(SbGaussSeidelDown(A, v->inverse, NULL, r, z, v->t[k]));
   /* the residual of the vertices */
-  PetscCall(load(s, v->t[k], v->g[k], &x));
-  PetscCall(VecZeroEntries(v->t[k + 1]));
-  PetscCall(VecGetArray(v->t[k + 1], &out));
+  PetscCall(SbSpaceGetLocalRead(s, v->t[k], &x));
+  PetscCall(VecZeroEntries(v->r[k + 1]));
+  PetscCall(VecGetArray(v->r[k + 1], &out));
   for (PetscInt i = 0; i < s->nnode; i++) {
     for (PetscInt a = 0; a < 3; a++) {
       const PetscInt u = v->corner[3 * i + a];
@@ -144,11 +135,11 @@ static PetscErrorCode cycle_faces(SbLevels v, Vec r, Vec z)
         out[3 * u + c] += unless_fixed(p, u, c, unless_fixed(s, i, c, x[3 * i + c] / 3.));
     }
   }
-  PetscCall(VecRestoreArray(v->t[k + 1], &out));
-  PetscCall(SbSpaceRestoreLocalRead(s, v->g[k], &x));
+  PetscCall(VecRestoreArray(v->r[k + 1], &out));
+  PetscCall(SbSpaceRestoreLocalRead(s, v->t[k], &x));
   /* their correction, interpolated to the faces */
-  PetscCall(KSPSolve(v->coarse, v->t[k + 1], v->w[k + 1]));
-  PetscCall(load(p, v->w[k + 1], v->g[k + 1], &x));
+  PetscCall(KSPSolve(v->coarse, v->r[k + 1], v->z[k + 1]));
+  PetscCall(SbSpaceGetLocalRead(p, v->z[k + 1], &x));
   PetscCall(VecGetArray(z, &out));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     const PetscInt *a = v->corner + 3 * i;
@@ -157,7 +148,7 @@ static PetscErrorCode cycle_faces(SbLevels v, Vec r, Vec z)
       out[3 * i + c] += unless_fixed(s, i, c, (x[3 * a[0] + c] + x[3 * a[1] + c] + x[3 * a[2] + c]) / 3.);
   }
   PetscCall(VecRestoreArray(z, &out));
-  PetscCall(SbSpaceRestoreLocalRead(p, v->g[k + 1], &x));
+  PetscCall(SbSpaceRestoreLocalRead(p, v->z[k + 1], &x));
   PetscCall(SbGaussSeidelUp(A, v->inverse, NULL, r, z, v->t[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -176,7 +167,8 @@ PetscErrorCode SbLevelsApply(SbLevels v, Vec r, Vec z)
   if (v->n == 2) PetscCall(cycle_faces(v, r, z));
   if (v->n < 3) PetscFunctionReturn(PETSC_SUCCESS);
   /* the residual of the means: the sum over the two sides of a face */
-  PetscCall(load(v->space, r, v->r[0], &x));
+  PetscCall(VecCopy(r, v->r[0]));
+  PetscCall(SbSpaceGetLocalRead(s, v->r[0], &x));
   PetscCall(VecZeroEntries(v->r[1]));
   PetscCall(VecGetArray(v->r[1], &out));
   for (PetscInt i = 0; i < s->nnode; i++) {
@@ -209,7 +201,7 @@ PetscErrorCode SbLevelsApply(SbLevels v, Vec r, Vec z)
   PetscCall(VecRestoreArray(z, &out));
   PetscCall(VecRestoreArrayRead(v->t[0], &diagonal));
   PetscCall(SbSpaceRestoreLocalRead(v->at[1], v->z[1], &mean));
-  PetscCall(SbSpaceRestoreLocalRead(v->space, v->r[0], &x));
+  PetscCall(SbSpaceRestoreLocalRead(s, v->r[0], &x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -349,8 +341,7 @@ PetscErrorCode SbLevelsCreate(SbSpace s, SbLevels *levels)
   for (PetscInt k = 0; k < v->n; k++) {
     PetscCall(SbSpaceCreateVec(v->at[k], &v->r[k]));
     PetscCall(SbSpaceCreateVec(v->at[k], &v->z[k]));
-    PetscCall(SbSpaceCreateVec(v->at[k], &v->g[k]));
-    PetscCall(MatCreateVecs(v->A[k], &v->t[k], &v->w[k]));
+    PetscCall(SbSpaceCreateVec(v->at[k], &v->t[k]));
   }
   PetscCall(PetscMalloc1(9 * (size_t)v->at[v->n - 2]->nnode_owned, &v->inverse));
   PetscCall(KSPCreate(v->space->comm, &v->coarse));
@@ -378,9 +369,7 @@ PetscErrorCode SbLevelsDestroy(SbLevels *levels)
     PetscCall(PetscFree(v->element[k]));
     PetscCall(VecDestroy(&v->r[k]));
     PetscCall(VecDestroy(&v->z[k]));
-    PetscCall(VecDestroy(&v->g[k]));
     PetscCall(VecDestroy(&v->t[k]));
-    PetscCall(VecDestroy(&v->w[k]));
   }
   PetscCall(PetscFree4(v->mean, v->across, v->weight, v->jump));
   PetscCall(PetscFree(v->corner));

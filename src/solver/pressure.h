@@ -23,8 +23,7 @@ struct _p_SbLevels {
   PetscReal *weight;    /* [nnode] own weight in the mean of the two sides */
   PetscReal *jump;      /* [nnode_owned] inverse stiffness of the jump, m/N */
   PetscInt *corner;     /* [nodes of at[n-2]][3] local vertices of the face; P1: its vertex three times */
-  Vec r[3], z[3], g[3]; /* work vectors of each level, with ghosts */
-  Vec t[3], w[3];       /* work vectors without ghosts; t[0] is the diagonal of A[0] with a DG body */
+  Vec r[3], z[3], t[3]; /* work vectors with ghosts; t[0] is the diagonal of A[0] with a DG body */
   PetscBool sprung;     /* this rank has had springs since the last assembly */
   PetscReal *spring;    /* [nnode_owned][9] sum of the springs of effects, N/m; NULL: none */
   PetscReal *shared;    /* [nodes of at[n-2]][9] the same there; NULL before any rank has springs */
