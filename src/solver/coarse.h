@@ -100,17 +100,10 @@ typedef struct {
 /* Position of a column in row r, whose columns are ascending; -1: none. */
 static inline PetscInt SbRowFind(const PetscInt ia[], const PetscInt ja[], PetscInt r, PetscInt column)
 {
-  PetscInt low = ia[r], high = ia[r + 1];
+  PetscInt place;
 
-  while (low < high) {
-    const PetscInt middle = (low + high) / 2;
-
-    if (ja[middle] < column)
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  return low < ia[r + 1] && ja[low] == column ? low : -1;
+  (void)PetscFindInt(column, ia[r + 1] - ia[r], ja + ia[r], &place);
+  return place < 0 ? -1 : ia[r] + place;
 }
 
 /*
