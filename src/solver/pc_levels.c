@@ -210,7 +210,7 @@ PetscErrorCode SbLevelsApply(SbLevels v, Vec r, Vec z)
 PetscErrorCode SbLevelsShareSprings(SbLevels v)
 {
   const SbSpace top = v->space;
-  PetscBool any = v->sprung;
+  PetscBool any = (PetscBool)(v->spring != NULL);
   SbSpace s, p;
 
   PetscFunctionBeginUser;

@@ -233,8 +233,7 @@ static PetscErrorCode assemble(Mat K, const SbStage *stage)
   v->shift_a = stage->shift_a;
   v->shift_v = stage->shift_v;
   v->shift_k = stage->shift_k;
-  if (v->sprung) PetscCall(PetscArrayzero(v->spring, 9 * (size_t)v->space->nnode_owned));
-  v->sprung = PETSC_FALSE;
+  if (v->spring) PetscCall(PetscArrayzero(v->spring, 9 * (size_t)v->space->nnode_owned));
   PetscCall(SbSpaceAssembleSplit(v->space, stage, v->n, v->at, v->A, &op->volume));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -250,7 +249,6 @@ static PetscErrorCode add_spring(Mat K, PetscInt node, PetscReal factor, const P
   v = op->levels;
   if (v->multigrid || node >= v->space->nnode_owned) PetscFunctionReturn(PETSC_SUCCESS);
   if (!v->spring) PetscCall(PetscCalloc1(9 * (size_t)v->space->nnode_owned, &v->spring));
-  v->sprung = PETSC_TRUE;
   for (int k = 0; k < 9; k++) v->spring[9 * node + k] += factor * block[k];
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -24,8 +24,7 @@ struct _p_SbLevels {
   PetscReal *jump;      /* [nnode_owned] inverse stiffness of the jump, m/N */
   PetscInt *corner;     /* [nodes of at[n-2]][3] local vertices of the face; P1: its vertex three times */
   Vec r[3], z[3], t[3]; /* work vectors with ghosts; t[0] is the diagonal of A[0] with a DG body */
-  PetscBool sprung;     /* this rank has had springs since the last assembly */
-  PetscReal *spring;    /* [nnode_owned][9] sum of the springs of effects, N/m; NULL: none */
+  PetscReal *spring;    /* [nnode_owned][9] sum of the springs of effects, N/m; NULL: none so far */
   PetscReal *shared;    /* [nodes of at[n-2]][9] the same there; NULL before any rank has springs */
   KSP coarse;           /* solver of the P1 level; NULL with a P2 body */
   PC multigrid;         /* preconditioner of a space with a P2 body, else NULL */
