@@ -170,9 +170,9 @@ PetscErrorCode SbSpaceAverageRotations(SbSpace space, const SbPack R[], PetscRea
 /* Lends the rotations of cells that a matrix-free operator holds; NULL for another matrix. */
 PetscErrorCode SbMatrixFreeGetRotations(Mat A, const SbPack **R);
 
-/* Rows of A, a matrix-free operator, AIJ, BAIJ or SBAIJ of the space, for the owned local nodes node[n].
-   Output: ia[n+1], ja: local nodes, owned ones first, both ascending; block[ia[n]][9], row-major, N/m. ja and
-   block may be NULL to learn ia. Caller owns the arrays. Not collective. */
+/* Rows of A, a matrix-free operator, AIJ, BAIJ or SBAIJ of the space, for the owned local nodes node[n],
+   NULL: 0 to n - 1. Output: ia[n+1], ja: local nodes, owned ones first, both ascending; block[ia[n]][9],
+   row-major, N/m. ja and block may be NULL to learn ia. Caller owns the arrays. Not collective. */
 PetscErrorCode SbSpaceGetRows(SbSpace space, Mat A, PetscInt n, const PetscInt node[], PetscInt ia[],
                               PetscInt ja[], PetscReal block[]);
 

@@ -14,7 +14,7 @@ PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[
   PetscFunctionBeginUser;
   ia[0] = 0;
   for (PetscInt k = 0; k < n; k++) {
-    const PetscInt i = node[k], nd = p->di[i + 1] - p->di[i], no = p->oi[i + 1] - p->oi[i];
+    const PetscInt i = node ? node[k] : k, nd = p->di[i + 1] - p->di[i], no = p->oi[i + 1] - p->oi[i];
 
     ia[k + 1] = ia[k] + nd + no;
     if (!ja) continue;
@@ -30,7 +30,7 @@ PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[
   }
   PetscCall(SbValuesBegin(A, &b));
   for (PetscInt k = 0; k < n; k++) {
-    const PetscInt i = node[k], nd = p->di[i + 1] - p->di[i];
+    const PetscInt i = node ? node[k] : k, nd = p->di[i + 1] - p->di[i];
 
     for (PetscInt e = 0; e < ia[k + 1] - ia[k]; e++) {
       PetscInt row = i, at = e < nd ? p->di[i] + e : ~(p->oi[i] + e - nd);

@@ -364,9 +364,10 @@ PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], con
   PetscCall(PetscMalloc1(s->nnode, &wanted));
   for (PetscInt i = 0; i < s->nnode; i++) wanted[i] = -1;
   for (PetscInt k = 0; k < n; k++) {
-    wanted[node[k]] = k;
-    for (PetscInt c = 0; c < 3; c++)
-      block[9 * (ia[k] + p->diagonal[node[k]] - p->di[node[k]]) + 4 * c] += o->inertia[node[k]];
+    const PetscInt i = node ? node[k] : k;
+
+    wanted[i] = k;
+    for (PetscInt c = 0; c < 3; c++) block[9 * (ia[k] + p->diagonal[i] - p->di[i]) + 4 * c] += o->inertia[i];
   }
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];

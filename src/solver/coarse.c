@@ -258,16 +258,12 @@ static PetscErrorCode find_ghosts(SbCoarse c, PetscBool parallel, const PetscInt
 PetscErrorCode SbSpaceGetGraph(SbSpace s, PetscInt **ia, PetscInt **ja)
 {
   const PetscInt n = s->nnode_owned, nz = s->plan->di[n] + s->plan->oi[n];
-  PetscInt *node;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(n, &node));
-  for (PetscInt i = 0; i < n; i++) node[i] = i;
   PetscCall(PetscMalloc1(n + 1, ia));
   PetscCall(PetscMalloc1(nz, ja));
-  PetscCall(SbSpaceGetRows(s, NULL, n, node, *ia, *ja, NULL));
+  PetscCall(SbSpaceGetRows(s, NULL, n, NULL, *ia, *ja, NULL));
   for (PetscInt k = 0; k < nz; k++) (*ja)[k] = s->gnode[(*ja)[k]];
-  PetscCall(PetscFree(node));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -39,7 +39,6 @@ struct _p_SbContactSystem {
   SbSpace space;
   PetscInt choice; /* 0 by cost, 1 factorisation, 2 CG */
   SbContactRows rows;
-  PetscInt *all;     /* [nnode_owned] 0, 1, 2, ... */
   PetscInt *ka, *kj; /* pattern of the tangent: [n+1]; [ka[n]] global nodes */
   PetscInt *place;   /* [ka[n]] position of the tangent's blocks in rows.value */
   PetscInt *used;    /* [rows.ia[n]] last solve in which contact used the block; -1: a block of the tangent */
@@ -98,11 +97,8 @@ PetscErrorCode SbContactSystemCreate(SbSpace s, PetscInt choice, SbContactSystem
   c->space = s;
   c->choice = choice;
   c->rows.n = n;
-  PetscCall(PetscMalloc2(n, &c->all, n, &c->last));
-  for (PetscInt i = 0; i < n; i++) {
-    c->all[i] = i;
-    c->last[i] = -1;
-  }
+  PetscCall(PetscMalloc1(n, &c->last));
+  for (PetscInt i = 0; i < n; i++) c->last[i] = -1;
   PetscCall(SbSpaceGetGraph(s, &c->ka, &c->kj));
   PetscCall(PetscMalloc2(c->ka[n], &c->place, 9 * (size_t)c->ka[n], &c->tangent));
   PetscCall(PetscCalloc1(n + 1, &c->rows.ia));
@@ -220,7 +216,7 @@ static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
     PetscCall(make_pattern(c, b));
     c->foreign[0] = c->foreign[1] = PETSC_TRUE;
   }
-  PetscCall(SbSpaceGetRows(c->space, K, rows->n, c->all, c->ka, NULL, c->tangent));
+  PetscCall(SbSpaceGetRows(c->space, K, rows->n, NULL, c->ka, NULL, c->tangent));
   /* blocks of the tangent are overwritten, those of contact alone start from zero */
   for (PetscInt k = 0; k < rows->ia[rows->n]; k++) {
     if (c->used[k] >= 0) PetscCall(PetscArrayzero(rows->value + 9 * (size_t)k, 9));
@@ -428,7 +424,7 @@ PetscErrorCode SbContactSystemDestroy(SbContactSystem *system)
   PetscCall(KSPDestroy(&c->ksp));
   PetscCall(MatDestroy(&c->A));
   PetscCall(SbBlockSolverDestroy(&c->factor));
-  PetscCall(PetscFree2(c->all, c->last));
+  PetscCall(PetscFree(c->last));
   PetscCall(PetscFree(c->ka));
   PetscCall(PetscFree(c->kj));
   PetscCall(PetscFree2(c->place, c->tangent));

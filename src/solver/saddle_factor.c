@@ -48,7 +48,7 @@ PetscErrorCode SbSaddleFactorSolve(SbSpace s, Vec r, Vec z, PCFailedReason *fail
   PetscFunctionBeginUser;
   /* the factorisation of this K with these constraints is missing */
   if (!c->factored || c->factored_matrix != c->matrix || c->factored_version != c->version) {
-    PetscInt n, *node, *ia, *ja, *near, *far;
+    PetscInt n, *ia, *ja, *near, *far;
     PetscReal *block;
 
     PetscCall(PCDestroy(&c->factored));
@@ -56,11 +56,10 @@ PetscErrorCode SbSaddleFactorSolve(SbSpace s, Vec r, Vec z, PCFailedReason *fail
     /* the projected matrix as AIJ; MatConvert() would need parts of the block matrix that are in use */
     n = s->nnode_owned;
     /* K, block by block */
-    PetscCall(PetscMalloc4(n, &node, n + 1, &ia, 3 * n, &near, 3 * n, &far));
-    for (PetscInt k = 0; k < n; k++) node[k] = k;
-    PetscCall(SbSpaceGetRows(s, c->K, n, node, ia, NULL, NULL));
+    PetscCall(PetscMalloc3(n + 1, &ia, 3 * n, &near, 3 * n, &far));
+    PetscCall(SbSpaceGetRows(s, c->K, n, NULL, ia, NULL, NULL));
     PetscCall(PetscMalloc2(ia[n], &ja, 9 * ia[n], &block));
-    PetscCall(SbSpaceGetRows(s, c->K, n, node, ia, ja, block));
+    PetscCall(SbSpaceGetRows(s, c->K, n, NULL, ia, ja, block));
     for (PetscInt k = 0; k < 3 * n; k++) {
       near[k] = far[k] = 0;
       for (PetscInt j = ia[k / 3]; j < ia[k / 3 + 1]; j++) (ja[j] < n ? near : far)[k] += 3;
@@ -83,7 +82,7 @@ PetscErrorCode SbSaddleFactorSolve(SbSpace s, Vec r, Vec z, PCFailedReason *fail
     PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
     PetscCall(MatSetOption(A, MAT_SYMMETRIC, (PetscBool)!c->nonsymmetric));
     PetscCall(PetscFree2(ja, block));
-    PetscCall(PetscFree4(node, ia, near, far));
+    PetscCall(PetscFree3(ia, near, far));
     PetscCall(PCCreate(s->comm, &c->factored));
     PetscCall(PCSetOptionsPrefix(c->factored, "saddle_"));
     PetscCall(PCSetOperators(c->factored, A, A));
