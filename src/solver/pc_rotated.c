@@ -93,7 +93,7 @@ static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
 {
   SbSpace s = p->space;
   const PetscInt n = s->nnode_owned, ninterior = p->n - p->nkeep, *kept = p->node + ninterior;
-  const PetscInt *index = p->face->index;
+  const PetscInt *index = p->face->index, nall = s->plan->di[n] + s->plan->oi[n];
   const size_t m = 3 * (size_t)p->face->n, nkept = 3 * (size_t)p->nkeep;
   PetscInt *node, *ia, *ja, nz = 0, count = ninterior;
   PetscInt64 entries, bytes;
@@ -101,13 +101,11 @@ static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
 
   PetscFunctionBeginUser;
   /* the operator's rows of the interior, then those of interface and fully prescribed nodes */
-  PetscCall(PetscMalloc2(n, &node, n + 1, &ia));
+  PetscCall(PetscMalloc4(n, &node, n + 1, &ia, nall, &ja, 9 * (size_t)nall, &block));
   PetscCall(PetscArraycpy(node, p->node, ninterior));
   for (PetscInt i = 0; i < n; i++) {
     if (index[i] >= 0 || s->fixed[i] == 7) node[count++] = i;
   }
-  PetscCall(SbSpaceGetRows(s, A, n, node, ia, NULL, NULL));
-  PetscCall(PetscMalloc2(ia[n], &ja, 9 * ia[n], &block));
   PetscCall(SbSpaceGetRows(s, A, n, node, ia, ja, block));
 
   /* factor the interior, without the columns of fully prescribed nodes */
@@ -145,8 +143,7 @@ static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
   SbFactorSize(p->factor, &entries, &bytes);
   if (*ok) PetscCall(SbInterfaceFactorise(p->face, 2 * bytes, schur, ok));
   PetscCall(PetscFree2(own, schur));
-  PetscCall(PetscFree2(ja, block));
-  PetscCall(PetscFree2(node, ia));
+  PetscCall(PetscFree4(node, ia, ja, block));
   p->nfactor++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

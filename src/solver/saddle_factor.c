@@ -48,21 +48,19 @@ PetscErrorCode SbSaddleFactorSolve(SbSpace s, Vec r, Vec z, PCFailedReason *fail
   PetscFunctionBeginUser;
   /* the factorisation of this K with these constraints is missing */
   if (!c->factored || c->factored_matrix != c->matrix || c->factored_version != c->version) {
-    PetscInt n, *ia, *ja, *near, *far;
+    const PetscInt n = s->nnode_owned, *di = s->plan->di, *oi = s->plan->oi, nz = di[n] + oi[n];
+    PetscInt *ia, *ja, *near, *far;
     PetscReal *block;
 
     PetscCall(PCDestroy(&c->factored));
     PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, PETSC_FALSE, &package));
     /* the projected matrix as AIJ; MatConvert() would need parts of the block matrix that are in use */
-    n = s->nnode_owned;
     /* K, block by block */
-    PetscCall(PetscMalloc3(n + 1, &ia, 3 * n, &near, 3 * n, &far));
-    PetscCall(SbSpaceGetRows(s, c->K, n, NULL, ia, NULL, NULL));
-    PetscCall(PetscMalloc2(ia[n], &ja, 9 * ia[n], &block));
+    PetscCall(PetscMalloc5(n + 1, &ia, nz, &ja, 9 * (size_t)nz, &block, 3 * n, &near, 3 * n, &far));
     PetscCall(SbSpaceGetRows(s, c->K, n, NULL, ia, ja, block));
     for (PetscInt k = 0; k < 3 * n; k++) {
-      near[k] = far[k] = 0;
-      for (PetscInt j = ia[k / 3]; j < ia[k / 3 + 1]; j++) (ja[j] < n ? near : far)[k] += 3;
+      near[k] = 3 * (di[k / 3 + 1] - di[k / 3]);
+      far[k] = 3 * (oi[k / 3 + 1] - oi[k / 3]);
     }
     PetscCall(MatCreateAIJ(s->comm, 3 * n, 3 * n, 3 * s->Nnode, 3 * s->Nnode, 0, near, 0, far, &A));
 
@@ -81,8 +79,7 @@ PetscErrorCode SbSaddleFactorSolve(SbSpace s, Vec r, Vec z, PCFailedReason *fail
     PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
     PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
     PetscCall(MatSetOption(A, MAT_SYMMETRIC, (PetscBool)!c->nonsymmetric));
-    PetscCall(PetscFree2(ja, block));
-    PetscCall(PetscFree3(ia, near, far));
+    PetscCall(PetscFree5(ia, ja, block, near, far));
     PetscCall(PCCreate(s->comm, &c->factored));
     PetscCall(PCSetOptionsPrefix(c->factored, "saddle_"));
     PetscCall(PCSetOperators(c->factored, A, A));
