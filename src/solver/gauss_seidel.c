@@ -97,40 +97,28 @@ SB_KERNEL static void up(PetscInt nrow, const PetscInt start[restrict], const Pe
   }
 }
 
-/* l1-Gauss-Seidel: half the sums of the magnitudes of each row in the columns of other ranks. */
-static PetscErrorCode sum_magnitudes(Mat A, PetscInt n, PetscReal extra[])
-{
-  const PetscInt *start, *column;
-  PetscBool parallel;
-  PetscScalar *a;
-  Mat other;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscArrayzero(extra, 3 * n));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
-  if (!parallel) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(MatMPIBAIJGetSeqBAIJ(A, NULL, &other, NULL));
-  PetscCall(SbMatGetPattern(other, &n, &start, &column));
-  PetscCall(MatSeqBAIJGetArray(other, &a));
-  for (PetscInt i = 0; i < n; i++) {
-    for (PetscInt k = 9 * start[i]; k < 9 * start[i + 1]; k++)
-      extra[3 * i + k % 3] += 0.5 * PetscAbsReal(a[k]);
-  }
-  PetscCall(SbMatRestoreRead(other, MatSeqBAIJRestoreArray, &a));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbGaussSeidelSetUp(Mat A, PetscReal inverse[], PetscReal extra[], PetscBool *positive)
 {
-  const PetscInt *start, *column;
+  const PetscInt *start, *far = NULL, *column;
   PetscScalar *a;
   PetscInt n;
+  SbMatBlocks b;
   Mat local;
 
   PetscFunctionBeginUser;
   PetscCall(SbProductGetSymmetric(A, &local));
   PetscCall(SbMatGetPattern(local, &n, &start, &column));
-  if (extra) PetscCall(sum_magnitudes(A, n, extra));
+  /* l1-Gauss-Seidel: half the sums of the magnitudes of each row in the columns of other ranks */
+  if (extra) {
+    PetscCall(PetscArrayzero(extra, 3 * n));
+    PetscCall(SbMatGetBlocks(A, &b));
+    if (b.part[1]) PetscCall(SbMatGetPattern(b.part[1], &n, &far, &column));
+    for (PetscInt i = 0; i < n && far; i++) {
+      for (PetscInt k = 9 * far[i]; k < 9 * far[i + 1]; k++)
+        extra[3 * i + k % 3] += 0.5 * PetscAbsReal(b.value[1][k]);
+    }
+    PetscCall(SbMatRestoreBlocks(&b));
+  }
   PetscCall(MatSeqSBAIJGetArray(local, &a));
   *positive = PETSC_TRUE;
   for (PetscInt i = 0; i < n; i++) {
