@@ -26,21 +26,20 @@ typedef struct _SbRows {
 
 /*
   Few nodes that separate the interiors of the ranks, without fully prescribed ones. Output: index[nnode],
-  number of a local node among them, -1 for others; those of a rank are consecutive. nmine: number owned by
-  this rank; n: by all ranks.
+  number of a local node among them, -1 for others; those of a rank are consecutive. n: their number.
 
   They are a vertex cover of the graph's edges between nodes of different ranks. The greedy cover repeatedly
   takes the node with the most uncovered edges. A minimum cover, from matchings, has 2 to 5 % fewer nodes
   (docs/reports/decisions.md). These edges are few: each rank gathers all of them and chooses the same nodes.
 */
-static PetscErrorCode choose_nodes(SbSpace s, PetscInt index[], PetscInt *nmine, PetscInt *n)
+static PetscErrorCode choose_nodes(SbSpace s, PetscInt index[], PetscInt *n)
 {
   const SbPlan p = s->plan;
   PetscInt count = 0, nend, nnode, most = 0, *mine, *end, *node, *left, *ia, *ja;
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < s->nnode; i++) index[i] = -1;
-  *nmine = *n = 0;
+  *n = 0;
   if (!s->ghosted) PetscFunctionReturn(PETSC_SUCCESS);
 
   /* global numbers of the ends of edges between free own nodes and those of lower ranks, of all ranks */
@@ -86,7 +85,6 @@ static PetscErrorCode choose_nodes(SbSpace s, PetscInt index[], PetscInt *nmine,
 
     PetscCall(PetscFindInt(s->gnode[i], nnode, node, &k));
     if (k >= 0) index[i] = left[k];
-    *nmine += i < s->nnode_owned && index[i] >= 0;
   }
   PetscCall(PetscFree2(node, left));
   PetscCall(PetscFree(end));
@@ -97,14 +95,14 @@ static PetscErrorCode choose_nodes(SbSpace s, PetscInt index[], PetscInt *nmine,
 
 PetscErrorCode SbSpaceInterfaceSize(SbSpace s, PetscInt *n, PetscInt *most)
 {
-  PetscInt *index, nmine;
+  PetscInt *index;
 
   PetscFunctionBeginUser;
   *most = MOST_NODES;
   PetscCall(PetscOptionsGetInt(NULL, NULL, "-pc_rotated_interface", most, NULL));
   if (!s->plan) PetscCall(SbPlanCreate(s, &s->plan));
   PetscCall(PetscMalloc1(s->nnode, &index));
-  PetscCall(choose_nodes(s, index, &nmine, n));
+  PetscCall(choose_nodes(s, index, n));
   PetscCall(PetscFree(index));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -112,16 +110,15 @@ PetscErrorCode SbSpaceInterfaceSize(SbSpace s, PetscInt *n, PetscInt *most)
 PetscErrorCode SbInterfaceCreate(SbSpace s, SbInterface *face)
 {
   SbInterface f;
-  PetscInt k = 0;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&f));
   f->comm = s->comm;
   PetscCall(PetscMalloc1(s->nnode, &f->index));
-  PetscCall(choose_nodes(s, f->index, &f->nmine, &f->n));
-  PetscCall(PetscMalloc1(f->nmine, &f->mine));
+  PetscCall(choose_nodes(s, f->index, &f->n));
+  PetscCall(PetscMalloc1(f->n, &f->mine));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    if (f->index[i] >= 0) f->mine[k++] = i;
+    if (f->index[i] >= 0) f->mine[f->nmine++] = i;
   }
   f->nblock = (3 * f->n + BLOCK - 1) / BLOCK;
   PetscCall(PetscMalloc1(f->nblock, &f->rows));
