@@ -74,7 +74,8 @@ PetscErrorCode SbBlockSolverAnalyze(SbBlockSolver b, PetscInt n, const PetscInt 
 {
   const PetscBool root = (PetscBool)!b->rank;
   PetscMPIInt rows, entries;
-  PetscInt nentry, before = b->N, *length = NULL, *order = NULL;
+  PetscInt nentry, before = b->N, *length = NULL;
+  SbFactor old = b->factor;
   PetscInt64 size = 0, bytes;
 
   PetscFunctionBeginUser;
@@ -102,17 +103,13 @@ PetscErrorCode SbBlockSolverAnalyze(SbBlockSolver b, PetscInt n, const PetscInt 
   for (PetscInt i = 0; i < b->N; i++) b->ia[i + 1] += b->ia[i];
 
   /* keep the old order while its factor is not too large */
-  if (b->factor && before == b->N) {
-    PetscCall(PetscMalloc1(b->N, &order));
-    PetscCall(PetscArraycpy(order, SbFactorOrder(b->factor), b->N));
-  }
-  PetscCall(SbFactorDestroy(&b->factor));
-  if (order) {
-    PetscCall(SbFactorCreateExact(b->N, b->ia, b->ja, order, &b->factor));
-    PetscCall(PetscFree(order));
+  b->factor = NULL;
+  if (old && before == b->N) {
+    PetscCall(SbFactorCreateExact(b->N, b->ia, b->ja, SbFactorOrder(old), &b->factor));
     SbFactorSize(b->factor, &size, &bytes);
     if ((PetscReal)size > WORSE * (PetscReal)b->dissected) PetscCall(SbFactorDestroy(&b->factor));
   }
+  PetscCall(SbFactorDestroy(&old));
   if (!b->factor) {
     PetscCall(SbFactorCreateExact(b->N, b->ia, b->ja, NULL, &b->factor));
     SbFactorSize(b->factor, &b->dissected, &bytes);
