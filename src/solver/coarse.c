@@ -260,8 +260,7 @@ PetscErrorCode SbSpaceGetGraph(SbSpace s, PetscInt **ia, PetscInt **ja)
   const PetscInt n = s->nnode_owned, nz = s->plan->di[n] + s->plan->oi[n];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(n + 1, ia));
-  PetscCall(PetscMalloc1(nz, ja));
+  PetscCall(PetscMalloc2(n + 1, ia, nz, ja));
   PetscCall(SbSpaceGetRows(s, NULL, n, NULL, *ia, *ja, NULL));
   for (PetscInt k = 0; k < nz; k++) (*ja)[k] = s->gnode[(*ja)[k]];
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -352,8 +351,7 @@ PetscErrorCode SbCoarseSetPattern(SbCoarse c, Mat A, const PetscInt ia[], const 
   for (PetscInt i = 0; i < n; i++) c->widest = PetscMax(c->widest, 2 * (ia[i + 1] - ia[i]));
   PetscCall(find_pattern(c, ia, column));
   PetscCall(PetscFree(column));
-  PetscCall(PetscFree(own_ia));
-  PetscCall(PetscFree(own_ja));
+  PetscCall(PetscFree2(own_ia, own_ja));
   c->changed = PETSC_TRUE;
 
   /* vectors */

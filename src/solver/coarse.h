@@ -83,7 +83,7 @@ PetscErrorCode SbCoarseAdd(SbCoarse coarse, Vec z);
 /* x += Z E^-1 Z^T (b - A x). Collective. */
 PetscErrorCode SbCoarseCorrect(SbCoarse coarse, Mat A, Vec b, Vec x);
 
-/* ia[nnode_owned+1], ja: graph of the space by global nodes; the caller frees both. Not collective. */
+/* ia[nnode_owned+1], ja: graph of the space by global nodes, of one PetscMalloc2(). Not collective. */
 PetscErrorCode SbSpaceGetGraph(SbSpace space, PetscInt **ia, PetscInt **ja);
 
 /* ------------------------------------------------------------------ bodies in contact (pc_coarse.c) */

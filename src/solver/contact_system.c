@@ -97,12 +97,11 @@ PetscErrorCode SbContactSystemCreate(SbSpace s, PetscInt choice, SbContactSystem
   c->space = s;
   c->choice = choice;
   c->rows.n = n;
-  PetscCall(PetscMalloc1(n, &c->last));
+  PetscCall(PetscCalloc2(n, &c->last, n, &c->rows.contact));
   for (PetscInt i = 0; i < n; i++) c->last[i] = -1;
   PetscCall(SbSpaceGetGraph(s, &c->ka, &c->kj));
   PetscCall(PetscMalloc2(c->ka[n], &c->place, 9 * (size_t)c->ka[n], &c->tangent));
-  PetscCall(PetscCalloc1(n + 1, &c->rows.ia));
-  PetscCall(PetscCalloc1(n, &c->rows.contact));
+  PetscCall(PetscCalloc3(n + 1, &c->rows.ia, 0, &c->rows.ja, 0, &c->used));
   PetscCall(user_types(c->method, c->type));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -149,8 +148,7 @@ static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
 
   /* each row: columns of the tangent, those of the old pattern still in use, those of contact */
   PetscCall(PetscMalloc2(most, &column, most, &stamp));
-  PetscCall(PetscMalloc1(n + 1, &ia));
-  PetscCall(PetscMalloc2(c->ka[n] + b->n + old.ia[n], &ja, c->ka[n] + b->n + old.ia[n], &used));
+  PetscCall(PetscMalloc3(n + 1, &ia, c->ka[n] + b->n + old.ia[n], &ja, c->ka[n] + b->n + old.ia[n], &used));
   ia[0] = 0;
   for (PetscInt r = 0; r < n; r++) {
     PetscInt m = 0;
@@ -183,9 +181,8 @@ static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
   PetscCall(PetscFree2(column, stamp));
   PetscCall(PetscFree(order));
   PetscCall(PetscFree(first));
-  PetscCall(PetscFree2(c->rows.ja, c->used));
+  PetscCall(PetscFree3(c->rows.ia, c->rows.ja, c->used));
   PetscCall(PetscFree(c->rows.value));
-  PetscCall(PetscFree(c->rows.ia));
   c->rows.ia = ia;
   c->rows.ja = ja;
   c->used = used;
@@ -424,13 +421,10 @@ PetscErrorCode SbContactSystemDestroy(SbContactSystem *system)
   PetscCall(KSPDestroy(&c->ksp));
   PetscCall(MatDestroy(&c->A));
   PetscCall(SbBlockSolverDestroy(&c->factor));
-  PetscCall(PetscFree(c->last));
-  PetscCall(PetscFree(c->ka));
-  PetscCall(PetscFree(c->kj));
+  PetscCall(PetscFree2(c->last, c->rows.contact));
+  PetscCall(PetscFree2(c->ka, c->kj));
   PetscCall(PetscFree2(c->place, c->tangent));
-  PetscCall(PetscFree(c->rows.ia));
-  PetscCall(PetscFree(c->rows.contact));
-  PetscCall(PetscFree2(c->rows.ja, c->used));
+  PetscCall(PetscFree3(c->rows.ia, c->rows.ja, c->used));
   PetscCall(PetscFree(c->rows.value));
   PetscCall(PetscFree(*system));
   PetscFunctionReturn(PETSC_SUCCESS);
