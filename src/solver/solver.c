@@ -225,7 +225,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
 {
   const PetscInt unknowns = 3 * s->Nnode;
   const char *name = choice, *package, *option = NULL;
-  char method[SB_NAME_MAX] = "";
+  char method[SB_NAME_MAX] = "", count[48], system[64];
   PetscInt nface = 0, most = 0;
   PetscBool has = PETSC_TRUE, turns;
   PetscMPIInt nrank;
@@ -255,6 +255,8 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
     turns = PETSC_FALSE;
     choice = "auto";
   }
+  SbFormat(sizeof(count), count, "%" PetscInt_FMT " unknowns", unknowns);
+  SbFormat(sizeof(system), system, "%s, %s", dynamic ? "dynamic" : "static", count);
   if (explicit_run) {
     name = "cg";
     SbFormat(size, reason, "explicit integrator: no linear system");
@@ -265,8 +267,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
                "-solver direct needs SuiteSparse or MUMPS, and this PETSc was built without both: choose "
                "another solver, or auto");
     name = package;
-    SbFormat(size, reason, "the factorisation for %" PetscInt_FMT " unknowns on %d rank%s%s", unknowns,
-             (int)nrank, nrank > 1 ? "s" : "",
+    SbFormat(size, reason, "the factorisation for %s on %d rank%s%s", count, (int)nrank, nrank > 1 ? "s" : "",
              hard.indefinite ? "; the exact tangent may be indefinite" : "");
   } else if (strcmp(choice, "auto")) {
     SbFormat(size, reason, "chosen by -solver");
@@ -276,26 +277,20 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
        unknowns, linear iterations of rotated and pressure, DG: 1150 and 1478 at nu 0.4999, 14521 and 1652 at
        0.49999, 634312 and 4348 at 0.499999 */
     name = "rotated";
-    SbFormat(size, reason,
-             "dynamic, %" PetscInt_FMT
-             " unknowns: one factorisation, rotated with the nodes, serves many steps",
-             unknowns);
+    SbFormat(size, reason, "%s: one factorisation, rotated with the nodes, serves many steps", system);
   } else if (s->edge_node && !s->faces && hard.nu <= (hard.slivers ? NU_PRESSURE : NU_SLIVERS) &&
              unknowns > (hard.indefinite || hard.slivers ? SB_DIRECT_SMALL : P_MULTIGRID)) {
     /* measured in docs/reports/solver_choice.md */
     name = "cg_p_multigrid";
     SbFormat(size, reason,
-             "%s, %" PetscInt_FMT
-             " unknowns of p2, nu up to %g: with P1 on the vertices below it iterations do not "
-             "grow with the mesh",
-             dynamic ? "dynamic" : "static", unknowns, (double)hard.nu);
+             "%s of p2, nu up to %g: with P1 on the vertices below it iterations do not grow with the mesh",
+             system, (double)hard.nu);
   } else if (unknowns <= SB_DIRECT_SMALL && package && !(nface > most && hard.nu <= NU_PRESSURE)) {
     /* 28k unknowns of P1 on 16 ranks, dynamic, ms per step of mumps and cg_two_level: 300 to 450 and 50
        (docs/reports/realtime_ranks.md) */
     name = package;
-    SbFormat(size, reason,
-             "%" PetscInt_FMT " unknowns: a factorisation is fast and works at any Poisson's ratio%s",
-             unknowns, hard.indefinite ? "; the exact tangent may be indefinite" : "");
+    SbFormat(size, reason, "%s: a factorisation is fast and works at any Poisson's ratio%s", count,
+             hard.indefinite ? "; the exact tangent may be indefinite" : "");
   } else if (!dynamic && package &&
              unknowns <= (hard.nu > NU_PRESSURE && hard.slivers               ? DIRECT_NEXT
                           : s->edge_node && !s->faces && hard.nu > NU_SLIVERS ? DIRECT_NEXT
@@ -304,10 +299,9 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
     /* measured in docs/reports/solver_choice.md */
     name = package;
     SbFormat(size, reason,
-             "%" PetscInt_FMT
-             " unknowns, nu up to %g, %.2g %% of the tets slivers (angles below %g degrees): "
-             "a factorisation, iterations hardly get there",
-             unknowns, (double)hard.nu, 100. * (double)hard.sliver_part, SB_SLIVER);
+             "%s, nu up to %g, %.2g %% of the tets slivers (angles below %g degrees): a factorisation, "
+             "iterations hardly get there",
+             count, (double)hard.nu, 100. * (double)hard.sliver_part, SB_SLIVER);
   } else if (!s->constraints && !s->coupled &&
              (s->edge_node
                 ? !s->faces && hard.nu > NU_SLIVERS
@@ -315,20 +309,15 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
     /* docs/reports/solver_choice.md; 24k tets of CR, dynamic, CPU s of pressure and cg_two_level at nu 0.3 12
        and 7, at 0.45 15 and 11, at 0.49 17 and 17 */
     name = "pressure";
-    SbFormat(
-      size, reason,
-      "%s, %" PetscInt_FMT
-      " unknowns of %s, nu up to %g: with the pressures as unknowns iterations hardly grow towards 1/2",
-      dynamic ? "dynamic" : "static", unknowns, s->edge_node ? "p2" : "cr or dg",
-      (double)(s->edge_node ? hard.nu : hard.face_nu));
+    SbFormat(size, reason,
+             "%s of %s, nu up to %g: with the pressures as unknowns iterations hardly grow towards 1/2",
+             system, s->edge_node ? "p2" : "cr or dg", (double)(s->edge_node ? hard.nu : hard.face_nu));
   } else {
     /* 192k tets, CPU s of cg_two_level on one rank. Static: 0.36 (cg_gamg 1.7, cg_icc 1.4), at nu 0.45 0.7
        (2.3), at 0.499 4.2 (18); dynamic, h = 0.01 s: 0.22 (1.7, 0.40) */
     name = s->edge_node && !s->faces ? "cg_p_multigrid" : "cg_two_level";
-    SbFormat(size, reason,
-             "%s, %" PetscInt_FMT
-             " unknowns: motions of large parts are solved directly, the rest takes few iterations",
-             dynamic ? "dynamic" : "static", unknowns);
+    SbFormat(size, reason, "%s: motions of large parts are solved directly, the rest takes few iterations",
+             system);
   }
   if (nface > most)
     SbAppend(size, reason,
