@@ -127,8 +127,6 @@ PetscErrorCode SbPCPMultigridCreate(SbSpace space, PC pc);
   Errors: PETSC_ERR_USER for a space without face nodes.
 */
 PetscErrorCode SbPressureOperatorCreate(SbSpace space, Mat *K);
-/* Most iterations in one of the solves so far. Not collective. */
-PetscErrorCode SbPCPressureGetMost(PC pc, PetscInt *most);
 
 /*
   SbPCRotatedCreate - makes pc a preconditioner with a reused factorisation: P = Q A0 Q^T, A0 a past operator,

@@ -30,7 +30,6 @@
 #include "sblog.h"
 #include <petsc/private/kspimpl.h>
 
-#define NAME "pressure"
 #define RESTART 120        /* restart length of GMRES: 80 took 97 iterations instead of 81 on 64 ranks */
 #define LARGEST_WEIGHT 1e4 /* largest lambda / mu in the weighted norm of GMRES */
 #define MARGIN 0.3         /* target of GMRES over the target of the whole solve */
@@ -50,7 +49,6 @@ typedef struct {
   PetscReal target, last;    /* target of the residual norm; the last residual norm, N */
   PetscReal size, margin;    /* norm of the right-hand side, N; current value of MARGIN */
   PetscInt its, limit, slow; /* iterations of GMRES, their limit; corrections without effect */
-  PetscInt most;             /* most iterations of a solve */
 } Pressure;
 
 /* ------------------------------------------------------------------ the mixed system */
@@ -263,7 +261,6 @@ static PetscErrorCode PCPostSolve_Pressure(PC pc, KSP ksp, Vec b, Vec x)
   PetscCall(PCShellGetContext(pc, &s));
   PetscCall(PetscInfo(pc, "%" PetscInt_FMT " corrections, %" PetscInt_FMT " iterations\n", ksp->its, s->its));
   ksp->its = s->its;
-  s->most = PetscMax(s->most, s->its);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -309,24 +306,12 @@ PetscErrorCode SbPCPressureCreate(SbSpace space, PC pc)
   s->space = space;
   PetscCall(PCSetType(pc, PCSHELL));
   PetscCall(PCShellSetContext(pc, s));
-  PetscCall(PCShellSetName(pc, NAME));
+  PetscCall(PCShellSetName(pc, "pressure"));
   PetscCall(PCShellSetSetUp(pc, PCSetUp_Pressure));
   PetscCall(PCShellSetApply(pc, PCApply_Pressure));
   PetscCall(PCShellSetPreSolve(pc, PCPreSolve_Pressure));
   PetscCall(PCShellSetPostSolve(pc, PCPostSolve_Pressure));
   PetscCall(PCShellSetView(pc, PCView_Pressure));
   PetscCall(PCShellSetDestroy(pc, PCDestroy_Pressure));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbPCPressureGetMost(PC pc, PetscInt *most)
-{
-  Pressure *s;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbPCShellFind(pc, NAME, &s));
-  PetscCheck(s, PetscObjectComm((PetscObject)pc), PETSC_ERR_ARG_WRONG,
-             "Not a preconditioner of SbPCPressureCreate()");
-  *most = s->most;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
