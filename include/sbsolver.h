@@ -135,14 +135,13 @@ PetscErrorCode SbPressureOperatorCreate(SbSpace space, Mat *K);
   Collective. The operator is a matrix-free operator, or an assembled matrix of the space on which the
   displacement belonging to it is composed as "sb_state" (PetscObjectCompose() with a vector of
   SbSpaceCreateVec()). One factorisation lasts as long as the iterations stay low; it is renewed at the next
-  change of the operator when they do not, when the solver fails, or when SbPCRotatedRenew() is called.
+  change of the operator when they do not, or when the solver fails.
   Options read: -pc_rotated_spread (rad), the angle between a cell's and its node's rotation above which the
   node is solved exactly. Memory: besides the factor 72 n^2 bytes on each rank during a factorisation, with n
   of SbSpaceInterfaceSize(); 9 n^2 of all ranks together stay. An operator that is not positive definite fails
   the solve.
 */
 PetscErrorCode SbPCRotatedCreate(SbSpace space, PC pc);
-PetscErrorCode SbPCRotatedRenew(PC pc);
 /*
   SbSpaceInterfaceSize - number n of interface nodes between ranks, and the largest for -solver rotated.
 

@@ -389,16 +389,6 @@ PetscErrorCode SbPCRotatedCreate(SbSpace s, PC pc)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPCRotatedRenew(PC pc)
-{
-  Rotated *p;
-
-  PetscFunctionBeginUser;
-  PetscCall(PCShellGetContext(pc, &p));
-  p->renew = PETSC_TRUE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbPCRotatedGetStats(PC pc, PetscInt *nfactor, PetscInt64 *interior, PetscInt64 *interface,
                                    PetscInt *nface)
 {
