@@ -130,8 +130,7 @@ PetscErrorCode SbModelPotentialNearest(SbModel model, size_t size, char text[]);
 PetscErrorCode SbModelPotentialUpdateFriction(SbModel model, Vec X, PetscBool solved, PetscBool *again);
 /* Work of contact on the bodies in the last accepted step, J; F, N, of SbModelLoads(), less contact. */
 PetscErrorCode SbModelPotentialWork(SbModel model, Vec U, PetscReal *work, Vec F);
-/* F += scale times the gradient of the energy at U, N; free_only: not where prescribed. energy of all ranks,
-   J (NULL: not wanted). */
+/* F += scale times the gradient of the energy at U, N; free_only: not where prescribed. energy: J or NULL */
 PetscErrorCode SbModelPotentialGradient(SbModel model, Vec U, PetscReal scale, PetscBool free_only,
                                         PetscReal *energy, Vec F);
 PetscErrorCode SbModelPotentialHessian(SbModel model, Vec U, SbContactHessian kind, SbBlocks *blocks, Vec R);

@@ -2,9 +2,8 @@
   sboutput.h - layer 7: one folder per run. fields.h5 and its indices, history.csv, run.json, checkpoints.
 
   Everything here attaches to a run as a monitor; output that the scenario does not select is not attached.
-  Order of calls: SbOutputRegister(), SbRunCreate(), SbOutputSetFromOptions(), SbOptionsCheck(),
-  SbModelSetUp(), SbRunSetUp(), SbOutputAttach(), SbReportHeader(), SbRunSolve(), SbReportSummary(),
-  SbRunDestroy().
+  Order: SbOutputRegister(), SbRunCreate(), SbOutputSetFromOptions(), SbOptionsCheck(), SbModelSetUp(),
+  SbRunSetUp(), SbOutputAttach(), SbReportHeader(), SbRunSolve(), SbReportSummary(), SbRunDestroy().
 
   Everything in the files is in original order: bodies as the scenario names them, vertices and cells as in
   their files. It does not depend on the number of ranks.
@@ -95,9 +94,8 @@ PetscErrorCode SbOutputLoadState(SbRun run);
 PetscErrorCode SbOutputRestoreMeshes(SbRun run);
 
 /*
-  SbOutputReattach - continues the output with another run of the same scene, whose bodies were re-meshed: the
-  same files, in which the mesh changes. Collective; instead of SbOutputSetFromOptions() and SbOutputAttach()
-  for `to`.
+  SbOutputReattach - continues the output with another run of the same scene, whose bodies were re-meshed, in
+  the same files. Collective; instead of SbOutputSetFromOptions() and SbOutputAttach() for `to`.
 */
 PetscErrorCode SbOutputReattach(SbRun from, SbRun to);
 

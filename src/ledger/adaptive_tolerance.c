@@ -72,9 +72,8 @@ static PetscReal left_by_solves(SbLedger l)
   return part * PetscSqrtReal(PetscSqr(l->step_linear) + PetscSqr(l->step_nonlinear));
 }
 
-/* Ratio of the error of the last solved step to the allowed one: that of the run times dt / its length.
-   Errors of solves, a part of the differences of accelerations that shorter steps would not reduce, are
-   subtracted. */
+/* Ratio of the error of the last solved step to the allowed one, that of the run times dt / its length; less
+   errors of solves, a part of the differences of accelerations that shorter steps would not reduce. */
 static PetscErrorCode step_error(SbRun run, const SbSolvedStep *step, void *ctx, PetscInt *order,
                                  PetscReal *ratio)
 {

@@ -1,7 +1,6 @@
 /*
   Error by gaps or penetration in contact. Closing a gap takes the work force times gap: half of it (forces
-  grow from zero) bounds the energy of the error, but includes rigid displacements from the deflection of
-  springs.
+  grow from zero) bounds the energy of the error, but includes rigid displacements as springs deflect.
 
   So the estimate for springs is sharper. With F their forces, one step of Uzawa's iteration, (K + springs)
   delta = F, moves the body to its position with exact contact, up to the ratio of its stiffness to theirs;

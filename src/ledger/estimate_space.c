@@ -54,8 +54,7 @@
 
   over the cells c around v, X_c their centroids. r regularises the slope where cells are too few, at corners
   and edges of a body; constants are recovered for any r. Only cells of one material are fitted together, as
-  the stress jumps at interfaces: a vertex has one value for each material around it, at most `nlayer`. Bodies
-  share no vertices.
+  stress jumps at interfaces: a vertex has one value for each material around it. Bodies share no vertices.
 
   p(X_v) is a linear combination of the P_c with constant weights, which are stored. All cells of an owned
   vertex are local: only ghosts of the P_c, before, and of the values, after, are communicated.

@@ -1,8 +1,7 @@
 /*
   History variables of effects in checkpoints: active contact constraints, friction states. Each effect gives
   records of numbers, whose entities have numbers that no partition changes (SbEffectOps.save); they are one
-  dataset per effect, `state_<name>`, in any order. Every rank reads all of them,
-  and the effect takes those of its entities.
+  dataset per effect, `state_<name>`, in any order. Every rank reads all; the effect takes its entities'.
 
   Without such a dataset (no contact, or an older file) the effects begin as at the start of a run.
 */

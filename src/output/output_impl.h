@@ -86,8 +86,7 @@ PetscErrorCode SbH5GroupCreate(SbH5 *h, unsigned links, unsigned letters, hid_t 
 PetscErrorCode SbH5GroupLink(SbH5 *h, hid_t group, hid_t parent, const char *name);
 #define SB_H5_NODE_LINKS 100 /* with 6 letters: a block of 4080 bytes */
 
-/* Reserves `bytes` of disk space beyond the end of the file, without changing it; messages name them from
-   then on. Collective. */
+/* Reserves `bytes` of disk space beyond the end of the file; later messages name them. Collective. */
 PetscErrorCode SbH5Reserve(SbH5 *h, PetscInt64 bytes);
 /* Ends the run on all ranks when a rank has a message; the lowest rank's is reported. Collective. */
 #define SB_NO_ROOM "make room and go on with -restart auto, or give another -output_dir"
@@ -278,8 +277,7 @@ PetscErrorCode SbFramesDestroy(SbOutput out);
 /* contacts.c. Without -output_contacts: after a restart keeps the entries of the index. */
 PetscErrorCode SbContactsCreate(SbRun run, SbOutput out);
 PetscErrorCode SbContactsDestroy(SbOutput out);
-/* The points of contact after a step, on the ranks that write them; n of all, -1 without the option; their
-   bytes. Collective. */
+/* Points of contact after a step, on ranks that write them; n of all, -1: no option; bytes. Collective. */
 PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt *n, PetscInt64 *bytes);
 /* Writes these points as a group of the frame. Collective. */
 PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame);

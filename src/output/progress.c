@@ -1,8 +1,7 @@
 /*
   The line of progress of a run: rewritten in place on a terminal, else a plain line now and then.
 
-  Open MPI gives its ranks a pseudo-terminal whatever its own output is, so under it the launcher's output
-  decides.
+  Open MPI gives its ranks a pseudo-terminal whatever its own output is: there the launcher's output decides.
 */
 #include <stdlib.h>
 #include <unistd.h>
@@ -134,8 +133,7 @@ PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
   out->line.on = (PetscBool)!out->rank;
   out->line.terminal = (PetscBool)(out->line.on && is_terminal());
 
-  /* of the run on rank 0, and of its solvers on all: a solver with a monitor computes norms that it else does
-     not */
+  /* of the run on rank 0, of its solvers on all, as a solver computes some norms only for a monitor */
   if (out->line.on) PetscCall(SbRunAddMonitor(run, monitor, out));
   if (!run->snes) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESGetKSP(run->snes, &ksp));

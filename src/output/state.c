@@ -222,8 +222,7 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
 
 /*
   row[nnode_owned]: the row of each owned node in a checkpoint with n nodes of the same meshes and elements.
-  Supports of dg may differ: each of this run's takes the row of its face's node. ok: the number of nodes
-  agrees. Collective.
+  Supports of dg may differ: each of this run's takes the row of its face's node. ok: n agrees. Collective.
 */
 static PetscErrorCode find_rows(SbRun run, PetscInt n, PetscInt row[], PetscBool *ok)
 {
@@ -307,8 +306,7 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
   }
   PetscCall(PetscMalloc1(s->nnode_owned, &row));
 
-  /* displacement and velocity of its nodes; supports, which follow the faces' nodes there, may be other ones
-     */
+  /* displacement and velocity of its nodes; supports, behind the faces' nodes there, may be other ones */
   PetscCall(find_rows(run, (PetscInt)SbH5Rows(h.file, "u", NULL), row, &ok));
   if (ok) {
     SbOrder order;

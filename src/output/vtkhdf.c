@@ -8,8 +8,7 @@
   move; frames without it show the rest shape. Contact points are PolyData, one part per frame.
 
   The file is built in memory and replaced as a whole, in a time that grows with the number of frames. So it
-  is rebuilt after BETWEEN times the seconds of the last time, and at the end of the run: at most a twentieth
-  of the run.
+  is rebuilt after BETWEEN times the seconds of the last time, at most a twentieth of the run, and at its end.
 
   Reference: VTKHDF file format, version 2.0 (docs.vtk.org, "VTK File Formats"): Steps of UnstructuredGrid and
   PolyData. Symmetric tensors have the order xx yy zz xy yz xz there.

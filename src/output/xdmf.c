@@ -3,12 +3,10 @@
 
   Only the part of XDMF that both vtkXdmfReader and vtkXdmf3Reader support: one temporal collection of uniform
   grids, every array named by its full path in the HDF5 file, no references, no hyperslabs. The text of all
-  frames so far is kept, so that the file is whole after every frame: it is written beside its target and
-  renamed.
+  frames so far is kept, so that the file is whole after every frame: written beside its target and renamed.
 
-  Points are a mesh of one vertex per cell, said explicitly: without that vtkXdmf3Reader finds no cells.
-  Neither reader takes a grid without points (vtkXdmf3Reader ends with a signal); a frame without any gets a
-  dummy one.
+  Points are a mesh of one vertex per cell, said explicitly: without that vtkXdmf3Reader finds no cells. As
+  neither reader takes a grid without points (vtkXdmf3Reader crashes), a frame without any gets a dummy one.
 */
 #include "index.h"
 #include "sbmeshio.h"

@@ -3,8 +3,7 @@
 
   Names of bodies, sets and effects are parts of option names: -body_<name>_young. These are case-insensitive
   in PETSc, hence names must differ in more than case. PETSc also takes `-body_young` for a missing
-  `-body_1_young`; a part of a name that has only digits could thus read the option of another name and is an
-  error.
+  `-body_1_young`: a part of a name that has only digits could read another name's option, and is an error.
 */
 #include <ctype.h>
 #include "scene_impl.h"

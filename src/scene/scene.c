@@ -1,6 +1,5 @@
 /*
-  scene.c - builds the model from options: bodies with material and element, effects, sets. Nothing is
-  computed here.
+  scene.c - builds the model from options, without computing: bodies with material and element, effects, sets.
 */
 #include "scene_impl.h"
 

@@ -1,6 +1,5 @@
 /*
-  Arc-length method for static runs: an unknown load factor lambda, the length l of a step as another
-  equation,
+  Arc-length method for static runs: an unknown load factor lambda, and the length l of a step prescribed,
 
     R(u, lambda) = f_int(u) - f_ext(u, lambda) = 0,   |d| = l,   d = u - u_n,
 

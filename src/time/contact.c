@@ -1,6 +1,5 @@
 /*
-  The solves of a step. With contact an active-set iteration: solve, update the active set, repeat until it
-  does not change.
+  The solves of a step; with contact an active-set iteration: solve and update the active set until it stays.
 
   Later solves start near their solution, and a tolerance relative to their first residual could be below the
   rounding of large contact forces. So all solves of a step have the absolute tolerance of the first one;

@@ -42,8 +42,7 @@
   closest velocity in the mass norm it dissipates energy, too, m v^2 / 2 of each impacting node with the nodal
   mass m: an impact of the nodes without restitution, which vanishes with the size of the cells. In the next
   step their a0 and contact force are in balance, and forces are steady. (Deuflhard, Krause and Ertel, IJNME
-  73, 2008, project the predictor instead; their nodes keep the velocities from before the impact until they
-  separate.)
+  73, 2008, project the predictor instead; their nodes keep the velocity before the impact until they part.)
 
   As s = u1 - u0 Newmark's own formula with a0 gives A = a1 + 2 M^-1 G^T lambda, and M A + C v* + f_int(u1) -
   f_ext = 2 G^T lambda: the solvers need no change. The stored acceleration is a1 + M^-1 G^T (lambda + mu /

@@ -1,7 +1,6 @@
 /*
   Fallback solvers: after a failed linear solve the next solver of a list (SbSolverNextFallback()) solves the
-  same system, in the same Newton iteration, and is used for the rest of the run. If the last one fails, the
-  step is halved.
+  same system, in the same Newton iteration, and stays for the run. If the last one fails, the step is halved.
 
   A post-solve callback of the KSP does this. The KSP is kept, with another type, another preconditioner and,
   if the next solver needs another matrix type, another operator, assembled at Newton's iterate.

@@ -79,15 +79,10 @@ PetscErrorCode SbFormI2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscRe
 PetscErrorCode SbFormCreateOperator(SbRun run);
 PetscErrorCode SbFormStaticFunction(SNES snes, Vec U, Vec F, void *run);
 PetscErrorCode SbFormStaticJacobian(SNES snes, Vec U, Mat J, Mat P, void *run);
-/* A = M^-1 (f_ext - C V - f_int), zero on prescribed unknowns; without `constrain`: without contact, and A
-   keeps its values there. */
+/* A = M^-1 (f_ext - C V - f_int), 0 where prescribed; without `constrain` no contact, and A is kept there. */
 PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, PetscBool constrain, Vec A);
 
-/*
-  solver_list.c: after a failed linear solve of run->snes the next solver of SbSolverNextFallback() solves the
-  same system and replaces the old one, with a warning; not with -ksp_type or -pc_type. After
-  SbSolverFinish().
-*/
+/* solver_list.c, after SbSolverFinish(): solvers of run->snes that fail are replaced from here on. */
 PetscErrorCode SbSolverListCreate(SbRun run);
 /* Message after a failed linear solve: solvers tried, with reasons, likely causes, advice. Collective. */
 PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[]);
@@ -115,7 +110,6 @@ PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R);
   SbRunSolveStep - solves a step by run->snes, with contact until the active set does not change; U: initial
   guess, then solution. Collective. reason: of the last solve; SNES_DIVERGED_MAX_IT if the active set does not
   converge. With run->may_end_at_impact, if nodes come into contact within the step, it ends after the first
-  solve with SNES_CONVERGED_ITERATING: the step is to be repeated with the fraction run->time_of_impact of its
-  length.
+  solve with SNES_CONVERGED_ITERATING: to be repeated with the fraction run->time_of_impact of its length.
 */
 PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *attempt, SNESConvergedReason *reason);

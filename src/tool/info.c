@@ -1,6 +1,5 @@
 /*
-  info.c - supple-mesh info: contents and quality of a mesh, whether a run accepts it, and an estimate of the
-  memory of a run.
+  info.c - supple-mesh info: contents and quality of a mesh, whether a run accepts it, its memory in a run.
 
   The estimate uses counts of the mesh. N nodes of the element: vertices (p1), faces (cr), four in every tet
   (dg), vertices and edges (p2). A row of the matrix has a block of 3 x 3 numbers for its node and for each

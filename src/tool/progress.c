@@ -1,6 +1,6 @@
 /*
-  progress.c - progress line on standard error: overwritten in place on a terminal, else a new
-  line at intervals. Phases of less than a second print nothing.
+  progress.c - progress line on standard error: overwritten in place on a terminal, else a new line at
+  intervals. Phases of less than a second print nothing.
 */
 #include <unistd.h>
 #include "tool.h"
