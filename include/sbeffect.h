@@ -98,7 +98,7 @@ typedef struct {
                     touch when the run begins, u0 is changed, ghosts too. Sets `progress` to 0.
     meet          - after begin_barrier, for restitution: finds the impacts of the step, from u0 and v0.
     safe          - part: largest collision-free fraction of the motion from u0 to u1, and from the present
-                    progress to `progress`; nactive: active pairs at u0.
+                    progress to 1; nactive: active pairs at u0.
     nearest       - where the smallest gap of all ranks at the last positions is below `gap`, m: lowers it
                     and sets `text` to the pair, in words.
     lag           - lagged friction, at u of an iterate or (solved) of a solution: may take normal forces and
@@ -118,7 +118,7 @@ typedef struct {
                                   PetscReal u0[]);
   PetscErrorCode (*meet)(SbEffect e, SbSpace space, PetscReal dt, const PetscReal u0[], const PetscReal v0[]);
   PetscErrorCode (*safe)(SbEffect e, SbSpace space, const PetscReal u0[], const PetscReal u1[],
-                         PetscReal progress, PetscReal *part, PetscInt *nactive);
+                         PetscReal *part, PetscInt *nactive);
   PetscErrorCode (*nearest)(SbEffect e, SbSpace space, PetscReal *gap, size_t size, char text[]);
   PetscErrorCode (*lag)(SbEffect e, SbSpace space, const PetscReal u[], PetscBool solved, PetscBool *again);
   PetscErrorCode (*potential)(SbEffect e, SbSpace space, const PetscReal u[], PetscReal *energy,

@@ -123,8 +123,7 @@ PetscErrorCode SbModelContactPoints(SbModel model, PetscReal t, Vec U, SbContact
 PetscErrorCode SbModelPotentialStart(SbModel model, PetscReal t, PetscReal dt, Vec U);
 PetscErrorCode SbModelPotentialBegin(SbModel model, PetscReal t, PetscReal dt, Vec U0, Vec V0);
 PetscErrorCode SbModelPotentialAdvance(SbModel model, PetscReal progress);
-PetscErrorCode SbModelPotentialMaxStep(SbModel model, Vec X, Vec Y, PetscReal progress, PetscReal *part,
-                                       PetscInt *nactive);
+PetscErrorCode SbModelPotentialMaxStep(SbModel model, Vec X, Vec Y, PetscReal *part, PetscInt *nactive);
 /* The closest pair in the last attempt at a step, in words, for the message of its failure. */
 PetscErrorCode SbModelPotentialNearest(SbModel model, size_t size, char text[]);
 PetscErrorCode SbModelPotentialUpdateFriction(SbModel model, Vec X, PetscBool solved, PetscBool *again);

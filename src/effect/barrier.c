@@ -428,7 +428,7 @@ static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], Pe
 }
 
 static PetscErrorCode safe_barrier(SbEffect e, SbSpace s, const PetscReal u0[], const PetscReal u1[],
-                                   PetscReal progress, PetscReal *part, PetscInt *nactive)
+                                   PetscReal *part, PetscInt *nactive)
 {
   Barrier *b = (Barrier *)e->data;
   PetscInt nsearch;
@@ -438,7 +438,7 @@ static PetscErrorCode safe_barrier(SbEffect e, SbSpace s, const PetscReal u0[], 
   PetscCall(SbBarrierUpdate(b, u0));
   nsearch = b->pairs->nsearch;
   *nactive = b->nactive;
-  PetscCall(SbBarrierPlace(b, u1, progress, b->other));
+  PetscCall(SbBarrierPlace(b, u1, 1., b->other));
   PetscCall(SbContactPairsMaxStep(b->pairs, b->x, b->other, part));
   /* the pairs were searched for anew */
   if (b->pairs->nsearch != nsearch) b->known = PETSC_FALSE;

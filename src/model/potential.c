@@ -226,8 +226,7 @@ PetscErrorCode SbModelPotentialAdvance(SbModel m, PetscReal progress)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelPotentialMaxStep(SbModel m, Vec X, Vec Y, PetscReal progress, PetscReal *part,
-                                       PetscInt *nactive)
+PetscErrorCode SbModelPotentialMaxStep(SbModel m, Vec X, Vec Y, PetscReal *part, PetscInt *nactive)
 {
   const PetscReal *u0, *u1;
   PetscReal found[2] = {1., 0.};
@@ -242,7 +241,7 @@ PetscErrorCode SbModelPotentialMaxStep(SbModel m, Vec X, Vec Y, PetscReal progre
     PetscReal mine;
     PetscInt pairs;
 
-    CONTACT_CALL(m->potential[e], safe, m->space, u0, u1, progress, &mine, &pairs);
+    CONTACT_CALL(m->potential[e], safe, m->space, u0, u1, &mine, &pairs);
     found[0] = PetscMin(found[0], mine);
     found[1] -= (PetscReal)pairs;
   }

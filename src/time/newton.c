@@ -393,7 +393,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
           far = 0.5 * (low + high);
         else if (*s >= 1.) {
           PetscCall(VecScale(Y, FARTHER * *s));
-          PetscCall(SbModelPotentialMaxStep(m, X, Y, 1., &far, &nactive));
+          PetscCall(SbModelPotentialMaxStep(m, X, Y, &far, &nactive));
           PetscCall(VecScale(Y, 1. / (FARTHER * *s)));
           if (far < 1.) tries = TRIES;
           far = far > 1.5 / FARTHER ? FARTHER * far * *s : 0.;
@@ -415,7 +415,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
       PetscCall(solve_accurately(snes, &slope, &better));
       if (better) {
         if (m->npotential)
-          PetscCall(SbModelPotentialMaxStep(m, X, Y, 1., s, &nactive)); /* for the new direction */
+          PetscCall(SbModelPotentialMaxStep(m, X, Y, s, &nactive)); /* for the new direction */
         PetscCall(find_slopes(n, Y, from));
         continue;
       }
@@ -486,11 +486,11 @@ static PetscErrorCode approach(SNES snes)
   PetscFunctionBeginUser;
   PetscCall(SbModelPotentialAdvance(m, 0.));
   PetscCall(VecWAXPY(Y, -1., X, start));
-  PetscCall(SbModelPotentialMaxStep(m, start, Y, 1., &part, &nactive));
+  PetscCall(SbModelPotentialMaxStep(m, start, Y, &part, &nactive));
   if (part == 1. && !nactive) {
     PetscCall(SbModelPotentialAdvance(m, 1.));
     PetscCall(VecZeroEntries(Y));
-    PetscCall(SbModelPotentialMaxStep(m, X, Y, 1., &part, &nactive));
+    PetscCall(SbModelPotentialMaxStep(m, X, Y, &part, &nactive));
     if (!nactive) PetscFunctionReturn(PETSC_SUCCESS);
     PetscCall(SbModelPotentialAdvance(m, 0.));
   }
@@ -505,7 +505,7 @@ static PetscErrorCode approach(SNES snes)
     /* the rest of the motion at once */
     PetscCall(VecCopy(D, Y));
     PetscCall(VecScale(Y, progress - 1.));
-    PetscCall(SbModelPotentialMaxStep(m, X, Y, 1., &part, &nactive));
+    PetscCall(SbModelPotentialMaxStep(m, X, Y, &part, &nactive));
     if (part == 1.) {
       PetscCall(VecAXPY(X, -1., Y));
       PetscCall(SbModelPotentialAdvance(m, 1.));
@@ -523,7 +523,7 @@ static PetscErrorCode approach(SNES snes)
     PetscCall(find_direction(snes, &filtered, &slope));
     if (snes->reason) PetscFunctionReturn(PETSC_SUCCESS);
     PetscCall(VecAXPY(Y, progress - 1., D));
-    PetscCall(SbModelPotentialMaxStep(m, X, Y, 1., &s, &nactive));
+    PetscCall(SbModelPotentialMaxStep(m, X, Y, &s, &nactive));
     PetscCall(SbModelStrainEnergy(m, X, NULL, &energy, &before));
     for (whole = s;; s *= 0.5) {
       PetscCall(VecWAXPY(n->to.x, -s, Y, X));
@@ -619,7 +619,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     /* direction, and largest step */
     PetscCall(find_direction(snes, &filtered, &slope));
     s = 1.;
-    if (barrier && !snes->reason) PetscCall(SbModelPotentialMaxStep(m, X, Y, 1., &s, &nactive));
+    if (barrier && !snes->reason) PetscCall(SbModelPotentialMaxStep(m, X, Y, &s, &nactive));
     if (!snes->reason) PetscCall(search(snes, slope, &s));
     if (snes->reason) break;
     n->whole = (PetscBool)(s >= 1.);
