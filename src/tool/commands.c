@@ -54,7 +54,7 @@ static PetscErrorCode repair(SbTool *tool, SbImport *mesh)
               {&r.nitem, "triangles, lines and points of groups that are not of the tets, dropped"}};
 
   PetscFunctionBeginUser;
-  SB_TOOL_PHASE(tool, "repairing", SbMeshFileRepair(mesh, tool->merge_tolerance, &r));
+  SB_TOOL_PHASE(tool, "repairing", SbMeshFileRepair(mesh, tool->body.tet.merge_tolerance, &r));
   (void)snprintf(welded, sizeof(welded), "vertices welded to others at most %.3g m away",
                  (double)r.merge_tolerance);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(done) && !tool->quiet; i++) {

@@ -182,8 +182,6 @@ PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *li
   tool->in = line->word[1];
   tool->out = command->nfile > 1 ? line->word[2] : NULL;
   PetscCall(PetscStrncpy(tool->body.mesh, tool->in, sizeof(tool->body.mesh)));
-  tool->merge_tolerance = -1;
-  PetscCall(SbOptionReal(&SbRunScope, "merge_tolerance", &tool->merge_tolerance));
 
   /* options of tetrahedralization */
   SbTetDefaults(&tool->body.tet);

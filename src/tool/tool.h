@@ -14,7 +14,6 @@ typedef struct {
 typedef struct _SbTool {
   const char *command, *in, *out; /* out: NULL if the command writes no mesh */
   SbBody body;                    /* body of the file `in`: name, step, scale, rotate, translate, tet */
-  PetscReal merge_tolerance;      /* option -merge_tolerance, m; below 0: the default */
   PetscInt levels;                /* option -levels */
   SbMeshFormat format;            /* option -format */
   char view[PETSC_MAX_PATH_LEN];  /* option -view; "": no picture */
