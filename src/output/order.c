@@ -43,14 +43,12 @@ PetscErrorCode SbOrderCreateSparse(MPI_Comm comm, PetscInt bound, PetscInt nowne
   PetscCall(PetscCalloc1(all.n, &mark));
   PetscCall(PetscMalloc1(nowned, &number));
   for (PetscInt i = 0; i < nowned; i++) number[i] = 1;
-  PetscCall(PetscSFReduceBegin(all.sf, MPIU_INT, number, mark, MPI_REPLACE));
-  PetscCall(PetscSFReduceEnd(all.sf, MPIU_INT, number, mark, MPI_REPLACE));
+  PetscCall(SbForestReduce(all.sf, 1, MPIU_INT, number, mark));
   for (PetscInt i = 0; i < all.n; i++) before += mark[i];
   PetscCallMPI(MPI_Allreduce(&before, &N, 1, MPIU_INT, MPI_SUM, comm));
   PetscCallMPI(MPI_Scan(MPI_IN_PLACE, &before, 1, MPIU_INT, MPI_SUM, comm));
   for (PetscInt i = all.n - 1; i >= 0; i--) before = mark[i] ? mark[i] = before - 1 : before;
-  PetscCall(PetscSFBcastBegin(all.sf, MPIU_INT, mark, number, MPI_REPLACE));
-  PetscCall(PetscSFBcastEnd(all.sf, MPIU_INT, mark, number, MPI_REPLACE));
+  PetscCall(SbForestBroadcast(all.sf, 1, MPIU_INT, mark, number));
   PetscCall(SbOrderCreate(comm, N, nowned, number, order));
   PetscCall(PetscFree(mark));
   PetscCall(PetscFree(number));
