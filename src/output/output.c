@@ -67,31 +67,10 @@ PetscErrorCode SbOutputFile(SbRun run, const char *name, size_t size, char path[
 
 /* ------------------------------------------------------------------ options */
 
-/* The fields of -output_fields, without those that a static run lacks; and body. */
-static PetscErrorCode read_fields(SbOutput out, PetscBool dynamic)
-{
-  char(*names)[SB_NAME_MAX];
-  PetscInt n;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionNames(&SbRunScope, "output_fields", &n, &names));
-  if (n == 1 && !strcmp(names[0], "none")) n = 0;
-  for (PetscInt i = 0; i < n || (i == n && out->nfield); i++) {
-    const SbField *f;
-    PetscInt k = 0;
-
-    PetscCall(SbFieldFind("-output_fields", i < n ? names[i] : "body", &f));
-    while (k < out->nfield && out->field[k] != f) k++;
-    if (k == out->nfield && (dynamic || !f->dynamic)) out->field[out->nfield++] = f;
-  }
-  PetscCall(PetscFree(names));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode read_options(SbOutput out, SbModel model)
 {
-  PetscInt precision;
-  char **args;
+  PetscInt precision, nname;
+  char **args, (*names)[SB_NAME_MAX];
   int n;
 
   PetscFunctionBeginUser;
@@ -120,8 +99,20 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
   }
   PetscCall(SbOptionBool(&SbRunScope, "output_overwrite", &out->overwrite));
 
+  /* the fields of -output_fields, without those that a static run lacks; and body */
+  PetscCall(SbOptionNames(&SbRunScope, "output_fields", &nname, &names));
+  if (nname == 1 && !strcmp(names[0], "none")) nname = 0;
+  for (PetscInt i = 0; i < nname || (i == nname && out->nfield); i++) {
+    const SbField *f;
+    PetscInt k = 0;
+
+    PetscCall(SbFieldFind("-output_fields", i < nname ? names[i] : "body", &f));
+    while (k < out->nfield && out->field[k] != f) k++;
+    if (k == out->nfield && (model->dynamic || !f->dynamic)) out->field[out->nfield++] = f;
+  }
+  PetscCall(PetscFree(names));
+
   /* contents and intervals */
-  PetscCall(read_fields(out, model->dynamic));
   PetscCall(SbOptionReal(&SbRunScope, "output_every", &out->every));
   PetscCall(SbOptionInt(&SbRunScope, "output_every_steps", &out->every_steps));
   PetscCall(SbOptionChoice(&SbRunScope, "output_precision", &precision));
