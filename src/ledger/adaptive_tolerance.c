@@ -79,11 +79,10 @@ static PetscErrorCode step_error(SbRun run, const SbSolvedStep *step, void *ctx,
 {
   SbLedger l = (SbLedger)ctx;
   const PetscReal allowed = STEPS * l->accuracy * PetscSqrtReal(l->stored) * step->dt / run->t_end;
-  const PetscReal noise = NOISE * left_by_solves(l);
 
   PetscFunctionBeginUser;
   *order = l->order;
-  *ratio = allowed > 0. ? PetscMax(0., l->step_time - noise) / allowed : 0.;
+  *ratio = allowed > 0. ? PetscMax(0., l->step_time - NOISE * left_by_solves(l)) / allowed : 0.;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -139,7 +138,6 @@ static PetscErrorCode update_widths(SbLedger l, const SbSolvedStep *step, PetscB
 PetscErrorCode SbAdaptiveToleranceUpdate(SbLedger l, const SbSolvedStep *step, PetscBool *again)
 {
   const SbRun run = l->run;
-  const PetscReal part = step->V ? step->dt / run->t_end : 1.;
   PetscReal allowed, left;
 
   PetscFunctionBeginUser;
@@ -152,7 +150,7 @@ PetscErrorCode SbAdaptiveToleranceUpdate(SbLedger l, const SbSolvedStep *step, P
   }
   if (step->solved && run->model->npotential) PetscCall(update_widths(l, step, again));
   if (!l->may_tune || !step->solved) PetscFunctionReturn(PETSC_SUCCESS);
-  allowed = SOLVERS * l->accuracy * PetscSqrtReal(l->stored) * part;
+  allowed = SOLVERS * l->accuracy * PetscSqrtReal(l->stored) * (step->V ? step->dt / run->t_end : 1.);
   left = left_by_solves(l);
   if (!(left > 0.) || !(allowed > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
   if (left > allowed) {

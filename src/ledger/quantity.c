@@ -134,7 +134,6 @@ PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step)
   for (int i = 0; i < SB_ERROR_COUNT; i++) q->error[i] = scale * SbLedgerError(l, i);
   if (!l->run->model->dynamic && q->kind != SB_QUANTITY_VOLUME) {
     const PetscReal both = PetscSqr(l->step_linear) + PetscSqr(l->step_nonlinear);
-    const SbModel m = l->run->model;
     PetscReal left, energy, s, sums[2];
     PetscInt its;
     Vec B, Z;
@@ -146,7 +145,7 @@ PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step)
       PetscCall(SbStiffnessTimes(l, step->t, step->U, q->weight, PETSC_FALSE, B));
     else
       PetscCall(VecCopy(q->weight, B));
-    PetscCall(SbSpaceZeroPrescribed(m->space, PETSC_TRUE, B));
+    PetscCall(SbSpaceZeroPrescribed(l->run->model->space, PETSC_TRUE, B));
     PetscCall(VecDot(B, l->delta, &left));
     left = PetscAbsReal(left) / PetscSqrtReal(PetscMax(both, PETSC_MIN_REAL));
     q->error[SB_ERROR_LINEAR] = left * l->step_linear;

@@ -131,10 +131,9 @@ PetscErrorCode SbModelSetUp(SbModel m)
   m->linear = m->space->linear;
   /* supports first: other effects need the prescribed unknowns */
   for (PetscInt k = 0; k < 2 * m->neffect; k++) {
-    const PetscBool supports = (PetscBool)(k < m->neffect);
     SbEffect effect = m->effect[k % m->neffect];
 
-    if (supports != (effect->ops.prescribe != NULL)) continue;
+    if ((k < m->neffect) != (effect->ops.prescribe != NULL)) continue;
     effect->dynamic = m->dynamic;
     if (effect->ops.setup) SbEffectCall(effect, setup, m->space);
     m->linear = (PetscBool)(m->linear && effect->linear);

@@ -170,13 +170,12 @@ PetscErrorCode SbOutputRestoreMeshes(SbRun run)
 {
   SbOutput out = (SbOutput)run->output;
   const SbModel m = run->model;
-  const PetscBool latest = (PetscBool)!strcmp(out->restart, "latest");
   char path[PETSC_MAX_PATH_LEN];
   PetscBool ok = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   if (!out->restart[0]) PetscFunctionReturn(PETSC_SUCCESS);
-  for (int k = 0; !ok && (latest || !k); k++) {
+  for (int k = 0; !ok && (!k || !strcmp(out->restart, "latest")); k++) {
     PetscCall(SbCheckpointFind(out, out->restart, k, sizeof(path), path));
     if (!path[0]) break;
 

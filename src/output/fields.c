@@ -19,10 +19,8 @@
 /* A vector of the step. */
 static PetscErrorCode vector(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
 {
-  const Vec *x = (const Vec *)((const char *)step + f->from);
-
   PetscFunctionBeginUser;
-  PetscCall(SbPointsValues(run, (SbOutput)run->output, *x, values));
+  PetscCall(SbPointsValues(run, (SbOutput)run->output, *(const Vec *)((const char *)step + f->from), values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

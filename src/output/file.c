@@ -26,9 +26,8 @@ void SbFileReplace(const char *path, const void *text, size_t size, char message
   errno = 0;
   file = fopen(tmp, "w");
   if (file) {
-    const size_t written = fwrite(text, 1, size, file);
-
-    bad = fclose(file) || written != size || rename(tmp, path);
+    bad = fwrite(text, 1, size, file) != size;
+    bad = fclose(file) || bad || rename(tmp, path);
   }
   if (!bad) return;
   SbFormat(SB_MESSAGE_MAX, message, "cannot write %zu bytes to %s: %s; " SB_NO_ROOM, size, path,

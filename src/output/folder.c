@@ -209,10 +209,8 @@ static PetscErrorCode keep_earlier(SbOutput out)
 
   PetscFunctionBeginUser;
   PetscCall(SbOutputFiles(out, &n, &file));
-  if (!n) {
-    PetscCall(PetscFree(file));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
+  if (!n) PetscCall(PetscFree(file));
+  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbOutputPath(out, "run.json", sizeof(path), path));
   if (stat(path, &info)) info.st_mtime = time(NULL);
   (void)strftime(date, sizeof(date), "%Y-%m-%d_%H-%M-%S", localtime_r(&info.st_mtime, &local));

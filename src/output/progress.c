@@ -29,7 +29,6 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
   const SbOutput out = (SbOutput)ctx;
   SbProgress *p = &out->line;
-  const PetscReal wait = p->terminal ? .2 : 2.;
   char line[160], count[32], left[16] = "-", times[16] = "-";
   PetscReal done, speed;
 
@@ -46,7 +45,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     p->newton += step->newton;
     p->linear += step->linear;
     p->steps++;
-    if (!step->last && step->wall - p->last < wait) PetscFunctionReturn(PETSC_SUCCESS);
+    if (!step->last && step->wall - p->last < (p->terminal ? .2 : 2.)) PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscLogEventBegin(out->event.progress, 0, 0, 0, 0));
   // the line: step, time, iterations, energies, speed, time left

@@ -116,7 +116,6 @@ PetscErrorCode SbRunReadStop(SbRun run)
 
 PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool within)
 {
-  const double now = MPI_Wtime();
   PetscMPIInt rank;
   int reason;
 
@@ -130,7 +129,7 @@ PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool w
       PetscMin(RESERVE_LONGEST, RESERVE_PART * run->stop.wall_time) + 2. * run->stop.longest_output;
     const PetscReal next = within ? 0. : STEP_FACTOR * run->stop.longest_step;
 
-    if (now - run->stop.begun + reserve + next >= run->stop.wall_time) reason = WALL_TIME;
+    if (MPI_Wtime() - run->stop.begun + reserve + next >= run->stop.wall_time) reason = WALL_TIME;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &reason, 1, MPI_INT, MPI_MAX, run->model->comm));
   if (!reason) PetscFunctionReturn(PETSC_SUCCESS);
