@@ -163,7 +163,10 @@ PetscErrorCode SbOutputForgetMesh(SbOutput out)
   PetscCall(PetscFree(out->psi));
   PetscCall(PetscFree(out->pressure));
   PetscCall(PetscFree(out->body_nodes));
-  PetscCall(SbPointsDestroy(out));
+  PetscCall(PetscFree(out->points.start));
+  PetscCall(PetscFree(out->points.corner));
+  PetscCall(PetscFree(out->points.V));
+  PetscCall(PetscFree(out->points.valence));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -195,7 +195,11 @@ static PetscErrorCode destroy(SbRun run)
   PetscCall(SbFramesDestroy(out));
   PetscCall(SbHistoryDestroy(out));
   PetscCall(SbOutputForgetMesh(out));
-  PetscCall(SbProbesDestroy(out));
+  for (PetscInt p = 0; p < out->nprobe; p++) {
+    PetscCall(PetscFree(out->probe[p].nodes.item));
+    PetscCall(PetscFree(out->probe[p].cells.item));
+  }
+  PetscCall(PetscFree(out->probe));
   PetscCall(PetscFree(out->identity));
   PetscCall(PetscFree(out->remeshed));
   SbFolderUnlock(out);

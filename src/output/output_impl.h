@@ -251,7 +251,6 @@ PetscBool SbFieldIsProbed(const SbField *field);
 
 /* points.c: vectors at points of vertex fields. This one first; forces: for SbPointsForces(). Collective. */
 PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out, PetscBool forces);
-PetscErrorCode SbPointsDestroy(SbOutput out);
 /* Where an owned point is: at a vertex, or at an edge of P2 (vertex -1), where there is a node; of a cell (4
    cell + a of the vertex), if it is that cell's alone. */
 typedef struct {
@@ -289,7 +288,6 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryDestroy(SbOutput out);
 PetscErrorCode SbProbesRegister(void);
 PetscErrorCode SbProbesSetFromOptions(SbOutput out, PetscBool dynamic);
-PetscErrorCode SbProbesDestroy(SbOutput out);
 PetscErrorCode SbProbesFind(SbRun run, SbOutput out);
 /* Name of the column of history.csv for a component of a field. */
 PetscErrorCode SbProbesColumn(const SbProbe *probe, const SbField *f, PetscInt c, size_t size, char name[]);

@@ -54,16 +54,6 @@ PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out, PetscBool forces)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPointsDestroy(SbOutput out)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree(out->points.start));
-  PetscCall(PetscFree(out->points.corner));
-  PetscCall(PetscFree(out->points.V));
-  PetscCall(PetscFree(out->points.valence));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ places */
 
 SbPlace SbPointsPlace(SbRun run, SbOutput out, PetscInt i)

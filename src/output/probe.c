@@ -98,17 +98,6 @@ PetscErrorCode SbProbesSetFromOptions(SbOutput out, PetscBool dynamic)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbProbesDestroy(SbOutput out)
-{
-  PetscFunctionBeginUser;
-  for (PetscInt p = 0; p < out->nprobe; p++) {
-    PetscCall(PetscFree(out->probe[p].nodes.item));
-    PetscCall(PetscFree(out->probe[p].cells.item));
-  }
-  PetscCall(PetscFree(out->probe));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ columns */
 
 PetscErrorCode SbProbesColumn(const SbProbe *probe, const SbField *f, PetscInt c, size_t size, char name[])
