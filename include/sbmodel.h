@@ -96,9 +96,6 @@ PetscErrorCode SbModelContactBeginStep(SbModel model, PetscReal t, PetscReal dt,
 PetscErrorCode SbModelContactUpdateActiveSet(SbModel model, PetscReal t, Vec U, Vec R, PetscBool *again);
 /* After effects have loaded their state from a checkpoint: assembles their constraints. Collective. */
 PetscErrorCode SbModelContactResume(SbModel model);
-/* After the first solve of a step: the fraction of the step at which the first point comes into contact, 1:
-   none does; effects that do not ask for it are not examined. Collective. */
-PetscErrorCode SbModelContactTimeOfImpact(SbModel model, PetscReal *part);
 /* V <- the nearest velocity that keeps active contacts closed, after a step of the length dt that ended at t
    with the displacement U. Collective. */
 PetscErrorCode SbModelContactVelocity(SbModel model, PetscReal t, PetscReal dt, Vec U, Vec V);
@@ -127,8 +124,6 @@ PetscErrorCode SbModelPotentialMaxStep(SbModel model, Vec X, Vec Y, PetscReal *p
 /* The closest pair in the last attempt at a step, in words, for the message of its failure. */
 PetscErrorCode SbModelPotentialNearest(SbModel model, size_t size, char text[]);
 PetscErrorCode SbModelPotentialUpdateFriction(SbModel model, Vec X, PetscBool solved, PetscBool *again);
-/* Work of contact on the bodies in the last accepted step, J; F, N, of SbModelLoads(), less contact. */
-PetscErrorCode SbModelPotentialWork(SbModel model, Vec U, PetscReal *work, Vec F);
 /* F += scale times the gradient of the energy at U, N; free_only: not where prescribed. energy: J or NULL */
 PetscErrorCode SbModelPotentialGradient(SbModel model, Vec U, PetscReal scale, PetscBool free_only,
                                         PetscReal *energy, Vec F);

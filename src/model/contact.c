@@ -71,15 +71,6 @@ PetscErrorCode SbModelContactUpdateActiveSet(SbModel m, PetscReal t, Vec U, Vec 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelContactTimeOfImpact(SbModel m, PetscReal *part)
-{
-  PetscFunctionBeginUser;
-  *part = 1.;
-  for (PetscInt e = 0; e < m->ntime_of_impact; e++) SbEffectCall(m->time_of_impact[e], time_of_impact, part);
-  if (m->ntime_of_impact) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, part, 1, MPIU_REAL, MPI_MIN, m->comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbModelContactVelocity(SbModel m, PetscReal t, PetscReal dt, Vec U, Vec V)
 {
   SbEvaluation e = {.U = U};

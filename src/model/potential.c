@@ -337,12 +337,3 @@ PetscErrorCode SbModelScaleBarrierWidths(SbModel m, PetscReal factor, PetscReal 
     CONTACT_CALL(m->potential[e], scale_width, factor, growth, changed);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-PetscErrorCode SbModelPotentialWork(SbModel m, Vec U, PetscReal *work, Vec F)
-{
-  PetscFunctionBeginUser;
-  *work = 0.;
-  PetscCall(SbModelPotentialGradient(m, U, 1., PETSC_FALSE, NULL, F));
-  for (PetscInt e = 0; e < m->npotential; e++) *work += m->potential[e]->work;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}

@@ -104,7 +104,9 @@ PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *step, SNESConvergedRea
     PetscCall(SbModelContactUpdateActiveSet(m, step->t + step->dt, U, run->R, &again));
     if (round == 1 && run->may_end_at_impact) {
       /* the first time of impact, if the step may end there */
-      PetscCall(SbModelContactTimeOfImpact(m, &run->time_of_impact));
+      for (PetscInt e = 0; e < m->ntime_of_impact; e++)
+        SbEffectCall(m->time_of_impact[e], time_of_impact, &run->time_of_impact);
+      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &run->time_of_impact, 1, MPIU_REAL, MPI_MIN, m->comm));
       if (run->time_of_impact < APART || run->time_of_impact > 1. - APART) run->time_of_impact = 1.;
       if (run->time_of_impact < 1.) *reason = SNES_CONVERGED_ITERATING;
     }

@@ -43,7 +43,9 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   PetscCall(VecDuplicate(run->U, &loads));
   PetscCall(VecDuplicate(run->U, &reaction));
   PetscCall(SbModelLoads(m, t, run->U, run->V, loads));
-  if (m->npotential) PetscCall(SbModelPotentialWork(m, run->U, &own[0], loads));
+  /* loads without barrier contact, which has its own work */
+  if (m->npotential) PetscCall(SbModelPotentialGradient(m, run->U, 1., PETSC_FALSE, NULL, loads));
+  for (PetscInt k = 0; k < m->npotential; k++) own[0] += m->potential[k]->work;
   PetscCall(SbRunReactions(run, t, reaction));
   if (run->damped) PetscCall(SbModelDampingPower(m, run->U, run->V, &power));
   if (!first) {
