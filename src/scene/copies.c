@@ -45,20 +45,19 @@ static PetscErrorCode read_file(const char *option, const char *file, PetscInt *
   char line[1024];
   FILE *f = fopen(file, "r");
   PetscInt room = 0;
+  PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBeginUser;
   PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "%s %s: %s", option, file, strerror(errno));
-  for (int number = 1; fgets(line, sizeof(line), f); number++) {
-    PetscErrorCode ierr;
-    PetscBool found;
+  for (int number = 1; !ierr && fgets(line, sizeof(line), f); number++) {
+    PetscBool found = PETSC_FALSE;
 
     PetscCall(SbReserve(*n + 1, sizeof(**place), &room, place));
     ierr = read_line(option, file, number, line, &(*place)[*n], &found);
-    if (ierr) (void)fclose(f);
-    PetscCall(ierr);
     *n += found;
   }
   (void)fclose(f);
+  PetscCall(ierr);
   PetscCheck(*n, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s has no line with numbers", option, file);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -218,6 +218,7 @@ PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model)
 {
   char(*names)[SB_NAME_MAX];
   PetscInt n;
+  PetscErrorCode ierr = PETSC_SUCCESS;
   static const char *const keys[] = {"mass", "mesh_partitioner", "mesh_reading", "mesh_report", "validate"};
 
   PetscFunctionBeginUser;
@@ -227,13 +228,10 @@ PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model)
 
   PetscCall(SbSceneReadNames("effects", "effect", &n, &names));
   PetscCall(PetscCalloc1(n, &(*model)->effect));
-  for (PetscInt i = 0; i < n; i++) {
-    const PetscErrorCode ierr = SbEffectCreate(names[i], &(*model)->effect[(*model)->neffect++]);
-
-    if (ierr) PetscCall(PetscFree(names));
-    PetscCall(ierr);
-  }
+  for (PetscInt i = 0; i < n && !ierr; i++)
+    ierr = SbEffectCreate(names[i], &(*model)->effect[(*model)->neffect++]);
   PetscCall(PetscFree(names));
+  PetscCall(ierr);
   PetscCall(SbSceneReadSets(*model));
 
   /* check options that are read after the mesh already now, to report errors early */

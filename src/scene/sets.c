@@ -86,18 +86,15 @@ PetscErrorCode SbSceneReadSets(SbModel model)
   char(*names)[SB_NAME_MAX];
   SbScope scope;
   PetscInt n, room;
+  PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBeginUser;
   PetscCall(SbSceneReadNames("sets", "set", &n, &names));
   room = n;
   PetscCall(PetscCalloc1(n + SB_SET_MAX + 1, &model->set));
-  for (PetscInt i = 0; i < n; i++) {
-    const PetscErrorCode ierr = read_set(model, names[i]);
-
-    if (ierr) PetscCall(PetscFree(names));
-    PetscCall(ierr);
-  }
+  for (PetscInt i = 0; i < n && !ierr; i++) ierr = read_set(model, names[i]);
   PetscCall(PetscFree(names));
+  PetscCall(ierr);
   for (PetscInt e = 0; e < model->neffect; e++) {
     // sets of an effect; none if its type has no such option
     PetscCall(SbScopeSet(&scope, "effect", model->effect[e]->type, model->effect[e]->name));
