@@ -40,9 +40,9 @@ struct _p_SbLedger {
   PetscReal derivative[4], mean[4]; /* current energies of derivatives, J/s^2j; their integrals */
   PetscReal lost, tau, span; /* integrator: sum of errors, J^(1/2); sum of c h^(p+1); length of the run, s */
   PetscReal stored;          /* largest energy so far, J */
-  PetscReal error[SB_ERROR_COUNT];        /* [source] errors of the run, J^(1/2) */
-  PetscReal relative[SB_ERROR_COUNT + 1]; /* history columns: relative errors, then that of the quantity */
-  SbColumn column[SB_ERROR_COUNT + 1];
+  PetscReal error[SB_ERROR_COUNT];    /* [source] errors of the run, J^(1/2) */
+  PetscReal relative[SB_ERROR_COUNT]; /* the same, relative: columns of the history */
+  SbColumn column[SB_ERROR_COUNT];
   SbCheckpointValue carried[SB_LEDGER_CARRIED];
   /* errors of the last estimated step, J^(1/2) */
   PetscReal step_time, step_linear, step_nonlinear, offset;

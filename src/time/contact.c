@@ -67,7 +67,6 @@ PetscErrorCode SbRunSolveStep(SbRun run, const SbAttempt *step, SNESConvergedRea
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (!run->R) PetscCall(VecDuplicate(U, &run->R));
-  run->time_of_impact = 1.;
 
   /* tolerances as set by the user */
   PetscCall(SNESGetKSP(snes, &aim.ksp));

@@ -405,7 +405,6 @@ static PetscErrorCode set_up_ts(SbRun run)
   PetscCall(TSMonitorSet(run->ts, step_accepted, run, NULL));
   PetscCall(TSSetApplicationContext(run->ts, run));
   PetscCall(TSSetPostStep(run->ts, after_step));
-  PetscCall(TSGetAdapt(run->ts, &adapt));
   PetscCall(PetscObjectTypeCompare((PetscObject)adapt, TSADAPTNONE, &run->fixed_step));
   m->barrier_apart = (PetscBool)(m->npotential && run->preset != SB_TIME_EULER_IMPLICIT);
   if (m->barrier_apart) run->barrier_weight = settings.separate ? 0.5 / settings.beta : 1. / settings.alpha_f;

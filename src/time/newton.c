@@ -126,6 +126,7 @@ typedef struct {
 static PetscErrorCode evaluate(Newton *n, Iterate *at)
 {
   const SbRun run = n->run;
+  const SbModel m = run->model;
   const PetscReal part = run->stage ? run->stage_part : 1.;
   PetscReal energy;
 
@@ -136,14 +137,12 @@ static PetscErrorCode evaluate(Newton *n, Iterate *at)
   if (PetscIsInfOrNanReal(at->norm)) PetscFunctionReturn(PETSC_SUCCESS);
   /* forces are those of a stage between the start of the step and x, divided by its fraction of the step */
   if (run->stage) PetscCall(VecAXPBYPCZ(run->stage, 1. - part, part, 0., run->stage_start, at->x));
-  PetscCall(
-    SbModelStrainEnergy(run->model, run->stage ? run->stage : at->x, at->elastic, &at->psi, &at->ninverted));
+  PetscCall(SbModelStrainEnergy(m, run->stage ? run->stage : at->x, at->elastic, &at->psi, &at->ninverted));
   at->psi /= PetscSqr(part);
   /* contact is evaluated at x */
-  if (run->model->npotential) {
+  if (m->npotential) {
     PetscCall(VecZeroEntries(at->contact));
-    PetscCall(
-      SbModelPotentialGradient(run->model, at->x, run->barrier_weight, PETSC_TRUE, &energy, at->contact));
+    PetscCall(SbModelPotentialGradient(m, at->x, run->barrier_weight, PETSC_TRUE, &energy, at->contact));
     at->gaps = run->barrier_weight * energy;
     at->psi += at->gaps;
   }

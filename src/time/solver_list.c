@@ -54,8 +54,7 @@ static PetscErrorCode describe_failure(SbSolverList l, KSP ksp, Vec b, Vec x, ch
   PetscFunctionBeginUser;
   PetscCall(PCGetFailedReason(ksp->pc, &failed));
   *memory = (PetscBool)(failed == PC_FACTOR_OUTMEMORY);
-  PetscCallMPI(
-    MPI_Allreduce(MPI_IN_PLACE, memory, 1, SB_MPI_BOOL, MPI_LOR, PetscObjectComm((PetscObject)ksp)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, memory, 1, SB_MPI_BOOL, MPI_LOR, l->run->model->comm));
   if (ksp->reason == KSP_DIVERGED_PC_FAILED)
     PetscCall(PetscSNPrintf(text, size, "%s of %s: %s", reason, l->run->solver,
                             *memory ? "not enough memory" : "its set-up met a pivot that is not positive"));
