@@ -168,8 +168,7 @@ static PetscErrorCode find_nearest(const SbSpace s, SbOutput out, SbProbe *probe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The owned cell of the probe's body that contains its point, or the nearest one: distance outside (negative
-   inside), and the weights. */
+/* The owned cell of a probe's body with its point, or the nearest: distance (negative inside), weights. */
 static PetscReal deepest_owned(const SbMesh mesh, const SbProbe *probe, PetscInt *cell, PetscReal weight[4])
 {
   PetscReal best = PETSC_MAX_REAL;

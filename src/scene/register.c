@@ -1,6 +1,5 @@
 /*
-  register.c - registers all types that a scenario can name, one line per type. A new type is one file in its
-  folder and one line here.
+  register.c - registers all types that a scenario can name: a new one is a file in its folder, a line here.
 */
 #include "sbremesh.h"
 #include "scene_impl.h"

@@ -1,6 +1,5 @@
 /*
-  sets.c - named sets of a scene: those defined by a shape in -sets, and those that effects, probes and bodies
-  name directly.
+  sets.c - named sets of a scene: defined by a shape in -sets, or named by effects, probes and bodies alone.
 
   Sets are named by the options `on` of effects, `on` and `in` of probes, `inclusions` of bodies. A name that
   -sets does not define means, in this order: the body of that name, `all` bodies, the whole `boundary`, the

@@ -20,8 +20,7 @@
   formulas of t (here lambda) its step is small. The last step is solved at lambda = 1.
 
   K has negative eigenvalues after limit loads. If the factorisation counts them, a change of their number
-  while the load does not turn is a bifurcation: it is reported, but the other branch is not followed. Not
-  handled: contact, re-meshing.
+  while the load does not turn is a bifurcation: reported, not followed. Not handled: contact, re-meshing.
 */
 #include "sbsolver.h"
 #include "time_impl.h"

@@ -5,10 +5,9 @@
   A part is a set of nodes connected by cells, Z its six rigid motions, P the projection onto admissible
   displacements (SbSpaceProjectAdmissible()). Two eigenvalue problems of size six decide:
 
-  1. (Z - P Z)^T (Z - P Z) x = l Z^T Z x. The motion Z x is admissible if l is zero up to rounding: geometry
-  only. 2. (P Z x)^T A (P Z x) y = l (P Z x)^T D (P Z x) y of admissible motions, A the operator of the last
-  solve, D the diagonal of its matrix. If
-     l is zero up to rounding neither springs nor friction nor stress resist: the motion is free.
+  1. (Z - P Z)^T (Z - P Z) x = l Z^T Z x: by geometry, Z x is admissible if l is zero up to rounding.
+  2. (P Z x)^T A (P Z x) y = l (P Z x)^T D (P Z x) y of admissible motions, A the last solve's operator, D the
+     diagonal of its matrix: free if l is zero, as neither springs nor friction nor stress resist.
 
   Not found: parts that are free only together, connected by contact. A part on springs whose stiffness is
   within the rounding of that of its cells counts as free.

@@ -66,8 +66,7 @@ PetscBool SbRunTooShort(SbRun run, PetscReal dt);
 
 /*
   inverted.c, after a step from t to t + dt was solved. Collective; nothing without -time_inverted reject. U:
-  displacements at its start and end. ok: false if it inverted tets; run->rejected_inverted and
-  run->stop_reason are set then.
+  displacements at its start and end. Not ok: it inverted tets; sets run->rejected_inverted, stop_reason.
 */
 PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const Vec U[2], PetscBool *ok);
 
