@@ -10,7 +10,6 @@
   coordinates: |det| <= (1e-12 L + 8 eps max|x|) L^2. The thinnest slivers worth simulating are nine orders
   above the first term.
 */
-#include "sbkernel.h"
 #include "mesh_impl.h"
 
 /* ------------------------------------------------------------------ unused vertices */

@@ -6,7 +6,6 @@
   Jacobian, a cubic polynomial.
 */
 #include "mesh_impl.h"
-#include "sbkernel.h"
 
 static int compare(const void *a, const void *b)
 {

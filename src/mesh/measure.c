@@ -1,7 +1,6 @@
 /*
   measure.c - statistics of a mesh file: measures of groups, size of the mesh, shape of its tets.
 */
-#include "sbkernel.h"
 #include "mesh_impl.h"
 
 const PetscReal SbRatioBinEdges[SB_RATIO_BINS] = {1, 1.25, 1.5, 2, 3, 5, 10, 100};

@@ -5,7 +5,6 @@
 */
 #pragma once
 #include <petscsf.h>
-#include "sbquadratic.h"
 #include "sbtet.h"
 
 /* Pseudorandom hash of an integer (splitmix64, Steele et al. 2014). */

@@ -6,7 +6,6 @@
   V / sum |n_i| and R = | |a|^2 b x c + |b|^2 c x a + |c|^2 a x b | / (12 V) with the edges a, b, c from
   vertex 0 (Shewchuk, "What is a good linear finite element?", 2002).
 */
-#include "sbkernel.h"
 #include "mesh_impl.h"
 
 void SbTetShape(const PetscReal x[], const PetscInt v[4], PetscReal *V, PetscReal cosine[6], PetscReal *ratio)

@@ -12,7 +12,6 @@
   between two midpoints; on the diagonal a quarter of the sum of the offsets of the four edges that it does
   not connect, less a quarter of those of the two edges that it connects.
 */
-#include "sbkernel.h"
 #include "mesh_impl.h"
 
 /* Nodes of an item: corners 0 to 3, then the midpoints of its edges in the order of SbTetEdge. */

@@ -9,7 +9,6 @@
   duplicates or are no face of a tet are dropped, and so are unused vertices. Overlapping tets cannot be
   repaired: the check of a run reports them.
 */
-#include "sbgeometry.h"
 #include "mesh_impl.h"
 
 /* ------------------------------------------------------------------ welding */

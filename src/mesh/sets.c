@@ -8,8 +8,6 @@
   its tets, their vertices and their boundary facets. Groups with equal names and different dimensions are one
   set.
 */
-#include <stdlib.h>
-#include "sbkernel.h"
 #include "mesh_impl.h"
 
 /* ------------------------------------------------------------------ parsing */

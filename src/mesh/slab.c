@@ -14,7 +14,6 @@
   and the highest one of its tets. The result is the same as that of a serial import (merge.c) on any number
   of ranks; volumes may differ by rounding.
 */
-#include <stdlib.h>
 #include "mesh_impl.h"
 
 typedef struct {

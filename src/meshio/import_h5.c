@@ -16,7 +16,6 @@
   is allocated that is larger than the file can hold (uncompressed, as written here, at most the file size;
   compressed by others, at most a thousand times that).
 */
-#include <hdf5.h>
 #include <stdlib.h>
 #include "meshio_impl.h"
 

@@ -4,7 +4,6 @@
   An entity of a file may belong to several physical groups. Each distinct set of groups is stored once (a
   "tag set"), and items refer to it by number; set 0 is the empty set.
 */
-#include <stdlib.h>
 #include "meshio_impl.h"
 #include "sbquadratic.h"
 

@@ -12,7 +12,6 @@
   Numbers count from 1. A double is written as text with 17 digits, so that it is read back exactly.
 */
 #include <errno.h>
-#include <stdlib.h>
 #include "meshio_impl.h"
 #include "sbgeometry.h"
 

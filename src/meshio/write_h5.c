@@ -5,7 +5,6 @@
 */
 #include <errno.h>
 #include <stdarg.h>
-#include <hdf5.h>
 #include "meshio_impl.h"
 
 const char *const SbH5Items[4] = {"point", "line", "triangle", "cell"};

@@ -15,7 +15,6 @@
   is well conditioned; one refinement step follows.
 */
 #include "remesh_impl.h"
-#include "sbkernel.h"
 #include <petscblaslapack.h>
 
 /* ------------------------------------------------------------------ quality */

@@ -7,7 +7,6 @@
   exact coordinates are used. The vertices of the hull keep their positions in either case.
 */
 #include "sbremesh.h"
-#include "sbsurface.h"
 #include "sbtet.h"
 
 #define BITS 10   /* an edge is 2^10 to 2^11 rounding steps */

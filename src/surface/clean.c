@@ -8,7 +8,6 @@
   neighbour at its longest edge is divided at the opposite corner, so that the shape is unchanged. Open edges
   are an error.
 */
-#include "sbkernel.h"
 #include "surface_impl.h"
 
 #define PASSES 20         /* passes over flat triangles: one may be adjacent to another */

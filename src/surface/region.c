@@ -20,7 +20,6 @@
   every region is material except the holes given in the file.
 */
 #include <stdlib.h>
-#include "sbkernel.h"
 #include "surface_impl.h"
 
 #define OUTSIDE (-1)

@@ -4,7 +4,6 @@
 
   Candidate pairs by a bounding volume hierarchy, exact test in src/geometry/intersection.c.
 */
-#include "sbkernel.h"
 #include "surface_impl.h"
 
 #define NAMED 3   /* largest number of pairs in a message */

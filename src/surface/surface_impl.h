@@ -2,7 +2,6 @@
   surface_impl.h - shared declarations of src/surface/: from a file to a surface with regions. Rank 0 only.
 */
 #pragma once
-#include "sbgeometry.h"
 #include "sbsurface.h"
 #include "triangles.h"
 

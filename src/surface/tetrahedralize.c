@@ -7,7 +7,6 @@
   surface was kept, else within ten percent), groups are assigned to tets and triangles, and slivers are
   counted.
 */
-#include "sbkernel.h"
 #include "sbtet.h"
 #include "tet_backends.h"
 

@@ -9,7 +9,6 @@
   edges of opposite directions.
 */
 #include <ctype.h>
-#include "sbkernel.h"
 #include "triangles.h"
 
 #define CORNERS_MAX 1000 /* corners of a non-convex polygon, at most: ear clipping is cubic in their number */

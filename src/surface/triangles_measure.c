@@ -1,7 +1,6 @@
 /*
   triangles_measure.c - areas, edges, volumes and solid angles (van Oosterom and Strackee 1983) of triangles.
 */
-#include "sbkernel.h"
 #include "triangles.h"
 
 static const PetscReal *corner(const SbTriangles *t, PetscInt f, int k)
