@@ -8,7 +8,7 @@
 /* ------------------------------------------------------------------ faces.c: which cells share a face */
 
 typedef struct {
-  PetscInt nvert, ncell;
+  PetscInt ncell;
   PetscInt *start; /* [nvert + 1] into `face`: faces by lowest vertex */
   SbKey *face;     /* [4 ncell] of the two other vertices, ascending for each lowest; slots 4 cell + face */
   PetscInt *neighbour; /* [ncell][4] cell across face f (opposite vertex f), -1 on the boundary */

@@ -62,11 +62,7 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
       PetscCall(PetscPrintf(comm, "body '%s': %s: %s\n", p->name, p->mesh, p->note));
   }
   PetscCall(PetscNew(&m));
-  m->comm = comm;
-  m->nbody = nbody;
-  m->body = body;
-  m->nset = nset;
-  m->set = set;
+  *m = (struct _p_SbMesh){.comm = comm, .nbody = nbody, .body = body, .nset = nset, .set = set};
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));
   for (PetscInt b = 0; b < nbody; b++) all = (PetscBool)(all || body[b].other_nodes);
   PetscCall(SbDistribute(comm, (SbPartitioner)partitioner, all, &merged, &local));

@@ -218,7 +218,6 @@ static PetscErrorCode list_copies(const SbLocalMesh *local, const Border *border
 PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, SbMergedMesh *w,
                             SbLocalMesh *local)
 {
-  const PetscInt Nvert = w->Nvert;
   SbLocalMesh whole = {.cell = w->cell, .data = w->data, .vertex = w->vertex};
   PetscMPIInt size, rank, *dest;
   PetscInt *orig, *number, *order, *position, n = 0;
@@ -276,7 +275,7 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
   PetscCall(SbLocalMeshDestroy(&owned));
   // owners of the shared vertices
   PetscCall(PetscCalloc1(local->nvert, &local->owner));
-  PetscCall(border_create(comm, Nvert, local, &border));
+  PetscCall(border_create(comm, w->Nvert, local, &border));
   // the vertices of each set of ranks, in equal parts along the longest axis of their bounding box
   for (PetscInt v = 0; v < local->nvert_cells; v++) local->owner[v] = rank;
   if (border.n) qsort(border.vert, (size_t)border.n, sizeof(Shared), compare_shared);

@@ -35,9 +35,7 @@ PetscErrorCode SbFacesCreate(PetscInt nvert, PetscInt ncell, const PetscInt cell
   uint64_t key;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(faces, sizeof(*faces)));
-  faces->nvert = nvert;
-  faces->ncell = ncell;
+  *faces = (SbFaces){.ncell = ncell};
   // buckets of the faces by lowest vertex
   PetscCall(PetscCalloc1(nvert + 1, &faces->start));
   PetscCall(PetscMalloc1(4 * (size_t)ncell, &faces->face));

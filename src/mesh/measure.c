@@ -70,7 +70,7 @@ PetscErrorCode SbMeshFileGroup(const SbImport *im, PetscInt i, SbMeshGroup *grou
 
 PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshStatistics *facts)
 {
-  SbFaces faces;
+  SbFaces faces = {0};
   PetscErrorCode ierr;
   PetscReal V, cosine[6], ratio, min_cosine = 1, sum = 0;
   SbImportEdges edges;
@@ -78,7 +78,6 @@ PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshStatistics *facts)
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(facts, sizeof(*facts)));
-  PetscCall(PetscMemzero(&faces, sizeof(faces)));
   ierr = SbImportCheck(im, &faces);
   if (!ierr) ierr = SbImportQuality(im, &faces, &facts->body);
   facts->body.edge_nodes = PETSC_TRUE;

@@ -63,7 +63,6 @@ PetscErrorCode SbImportMemoryMesh(const SbBody *body, SbImport *im)
   PetscCall(SbImportTagSet(im, 0, NULL, &none));
   PetscCall(SbImportSetVertices(im, g->nvert));
   PetscCall(PetscArraycpy(im->x, g->x, 3 * (size_t)g->nvert));
-  for (PetscInt v = 0; v < g->nvert; v++) im->vert_number[v] = v + 1;
   for (PetscInt c = 0; c < g->ncell; c++)
     PetscCall(SbImportAddItem(im, 3, g->cell + 4 * (size_t)c, none, c + 1));
   PetscCall(PetscMalloc1(g->nedge, &im->middle));

@@ -64,7 +64,7 @@ static void drop_collapsed(SbImport *im, int dim, PetscInt *ndropped)
 
 PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *done)
 {
-  SbFaces faces;
+  SbFaces faces = {0};
   PetscErrorCode ierr;
   PetscInt turned, nitem = im->item[0].n + im->item[1].n + im->item[2].n, ndropped = 0, slots[2], kept = 0;
   PetscBool *flat;
@@ -74,7 +74,6 @@ PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *don
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(done, sizeof(*done)));
-  PetscCall(PetscMemzero(&faces, sizeof(faces)));
   PetscCall(weld(im, tolerance, done));
   drop_collapsed(im, 3, &done->ncollapsed);
   PetscCall(SbImportJoinRepeats(im, 3, PETSC_TRUE, &done->nduplicate));

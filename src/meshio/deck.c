@@ -34,9 +34,8 @@ PetscErrorCode SbDeckFindSet(SbDeck *d, PetscBool of_nodes, const char *name, Pe
     if (d->set[*set].of_nodes == of_nodes && !(*d->compare)(d->set[*set].name, name))
       PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbImportGrow(d->im, &d->nset, sizeof(*d->set), &d->set));
-  PetscCall(PetscMemzero(&d->set[*set], sizeof(*d->set)));
+  d->set[*set] = (SbDeckSet){.of_nodes = of_nodes};
   (void)snprintf(d->set[*set].name, SB_GROUP_MAX, "%s", name);
-  d->set[*set].of_nodes = of_nodes;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -17,8 +17,7 @@ PetscErrorCode SbImportEdgesCreate(const SbImport *im, SbImportEdges *edges)
   PetscInt64 total = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(edges, sizeof(*edges)));
-  edges->nvert = im->nvert;
+  *edges = (SbImportEdges){.nvert = im->nvert};
   for (int d = 1; d < 4; d++) total += (PetscInt64)edge_count[d] * im->item[d].n;
   PetscCheck(total <= PETSC_MAX_INT, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: has more edges than this build can number", im->where);

@@ -20,10 +20,7 @@
 PetscErrorCode SbSurfaceCreate(PetscInt nvert, PetscInt ntri, PetscInt nregion, SbSurface *s)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(s, sizeof(*s)));
-  s->nvert = nvert;
-  s->ntri = ntri;
-  s->nregion = nregion;
+  *s = (SbSurface){.nvert = nvert, .ntri = ntri, .nregion = nregion};
   PetscCall(PetscCalloc6(3 * (size_t)nvert, &s->x, 3 * (size_t)ntri, &s->tri, ntri, &s->tags, ntri,
                          &s->number, 2 * (size_t)ntri, &s->side, nregion, &s->region_tags));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -200,8 +197,6 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *s, const SbT
              region + 1, (double)wrong);
   job = (SbTetJob){.where = where, .body = body, .surface = s, .options = *o, .edge = edge};
   job.size = o->size > 0 ? o->size : edge;
-  if (!(job.options.seconds > 0)) job.options.seconds = 600;
-  if (!(job.options.angle > 0)) job.options.angle = 40;
   job.remesh =
     (PetscBool)(o->surface == SB_TET_REMESH ||
                 (o->surface == SB_TET_SURFACE_AUTO && (job.size > NEAR * edge || edge > NEAR * job.size)));
