@@ -333,12 +333,11 @@ static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRemeshResultCreate(PetscInt nbody, SbRemeshResult *r)
+PetscErrorCode SbRemeshResultCreate(const SbGathered *g, SbRemeshResult *r)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(r, sizeof(*r)));
-  r->nbody = nbody;
-  PetscCall(PetscCalloc3(nbody, &r->in_memory, nbody, &r->outcome, nbody, &r->done));
+  *r = (SbRemeshResult){.nbody = g->nbody, .next = {.nfield = g->nfield, .width = g->width}};
+  PetscCall(PetscCalloc3(g->nbody, &r->in_memory, g->nbody, &r->outcome, g->nbody, &r->done));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -408,9 +407,6 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
     room += w->nvert + 2 * w->faces.nboundary + w->nedge;
   }
   // counts of the next meshes, and arrays for their values
-  r->next.nbody = g->nbody;
-  r->next.nfield = g->nfield;
-  r->next.width = g->width;
   PetscCall(PetscCalloc2(g->nbody + 1, &r->next.vert0, g->nbody + 1, &r->next.cell0));
   for (PetscInt b = 0; b < g->nbody; b++) {
     r->next.vert0[b + 1] = r->next.vert0[b] + r->outcome[b].nvert[1];

@@ -366,14 +366,11 @@ static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
   PetscFunctionBeginUser;
   PetscCall(PetscLogStagePush(SbLogStageSetup));
   PetscCall(PetscLogEventBegin(r->event, 0, 0, 0, 0));
-  PetscCall(SbRemeshResultCreate(m->nbody, &result));
   // new meshes on rank 0; messages, counts and names are sent to all ranks
   PetscCallMPI(MPI_Comm_rank(m->comm, &rank));
   PetscCall(SbGather(run, &g));
+  PetscCall(SbRemeshResultCreate(&g, &result));
   if (!rank) PetscCall(SbRemeshBodies(m, &g, r->due, run->step_now, &r->how, &result));
-  result.next.nbody = g.nbody;
-  result.next.nfield = g.nfield;
-  result.next.width = g.width;
   PetscCall(SbGatheredDestroy(&g));
   PetscCallMPI(
     MPI_Bcast(result.outcome, (int)((size_t)m->nbody * sizeof(*result.outcome)), MPI_BYTE, 0, m->comm));

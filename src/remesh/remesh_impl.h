@@ -85,7 +85,7 @@ typedef struct {
   SbGathered next;          /* next scene with its state; X, vert_set and so on are not set */
   SbRenamed renamed;        /* renumbered nodes of the surfaces of all bodies */
 } SbRemeshResult;           /* SbRemeshResultDestroy() */
-PetscErrorCode SbRemeshResultCreate(PetscInt nbody, SbRemeshResult *result);
+PetscErrorCode SbRemeshResultCreate(const SbGathered *g, SbRemeshResult *result);
 PetscErrorCode SbRemeshResultDestroy(SbRemeshResult *result);
 PetscErrorCode SbRemeshBodies(SbModel model, const SbGathered *g, const PetscBool due[], PetscInt step,
                               const SbRemeshing *how, SbRemeshResult *result);

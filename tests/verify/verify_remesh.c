@@ -59,11 +59,9 @@ static PetscErrorCode make_second(Pair *p, SbMesher mesher)
 
   PetscFunctionBeginUser;
   PetscCall(SbGather(p->a.run, &g));
-  PetscCall(SbRemeshResultCreate(2, &result));
+  PetscCall(SbRemeshResultCreate(&g, &result));
   if (!test_rank) PetscCall(SbRemeshBodies(p->a.model, &g, due, 1, &how, &result));
   PetscCall(PetscArraycpy(p->outcome, result.outcome, 2));
-  result.next.nfield = g.nfield;
-  result.next.width = g.width;
   PetscCallMPI(MPI_Bcast(p->outcome, (int)sizeof(p->outcome), MPI_BYTE, 0, PETSC_COMM_WORLD));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &p->b.model));
   PetscCall(SbRunCreate(p->b.model, &p->b.run));

@@ -80,15 +80,13 @@ static PetscErrorCode hand_over(TestScene *a, TestScene *b, SbRemeshResult *resu
 
   PetscFunctionBeginUser;
   PetscCall(SbGather(a->run, &g));
-  PetscCall(SbRemeshResultCreate(a->model->nbody, result));
+  PetscCall(SbRemeshResultCreate(&g, result));
   if (!test_rank) PetscCall(SbRemeshBodies(a->model, &g, due, 1, &how, result));
   if (!test_rank) SB_CHECK(result->done[0], "%s", result->outcome[0].message);
   PetscCallMPI(MPI_Bcast(&renamed->n, 1, MPIU_INT, 0, PETSC_COMM_WORLD));
   if (test_rank) PetscCall(PetscMalloc2(renamed->n, &renamed->from, renamed->n, &renamed->to));
   PetscCallMPI(MPI_Bcast(renamed->from, (PetscMPIInt)renamed->n, MPIU_INT, 0, PETSC_COMM_WORLD));
   PetscCallMPI(MPI_Bcast(renamed->to, (PetscMPIInt)renamed->n, MPIU_INT, 0, PETSC_COMM_WORLD));
-  result->next.nfield = g.nfield;
-  result->next.width = g.width;
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &b->model));
   PetscCall(SbRunCreate(b->model, &b->run));
   for (PetscInt k = 0; k < a->model->nbody; k++) {
