@@ -190,9 +190,7 @@ PetscErrorCode SbMergedMeshCreate(MPI_Comm comm, SbReading reading, PetscInt nbo
   for (PetscInt b = 0; b < nbody; b++) {
     PetscCall(SbImportDestroy(&im[b]));
     PetscCall(SbFacesDestroy(&part[b].faces));
-    PetscCall(PetscFree(part[b].masks.vert));
-    PetscCall(PetscFree(part[b].masks.cell));
-    PetscCall(PetscFree(part[b].masks.face));
+    PetscCall(PetscFree3(part[b].masks.vert, part[b].masks.cell, part[b].masks.face));
     PetscCall(PetscFree(part[b].orig));
     PetscCall(PetscFree(part[b].edge_off));
     PetscCall(PetscFree(part[b].remote));

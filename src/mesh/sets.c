@@ -146,9 +146,7 @@ PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbo
   const PetscReal slack = 1e-6 * SbBoxDiagonal(body[b].bbox);
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(im->nvert, &m->vert));
-  PetscCall(PetscCalloc1(im->item[3].n, &m->cell));
-  PetscCall(PetscCalloc1(4 * (size_t)im->item[3].n, &m->face));
+  PetscCall(PetscCalloc3(im->nvert, &m->vert, im->item[3].n, &m->cell, 4 * (size_t)im->item[3].n, &m->face));
   // shapes, bodies, the boundary; `all`: bits of sets that contain the whole body, `hull`: its boundary
   for (PetscInt k = 0; k < nset; k++) {
     if (set[k].shape == SB_SET_BODY && (!strcmp(set[k].group, body[b].name) ||

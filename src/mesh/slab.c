@@ -452,34 +452,6 @@ static PetscErrorCode find_edges(Slab *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ sets */
-
-static PetscErrorCode mark(Slab *s, PetscInt nbody, const SbBody body[], PetscInt b, PetscInt nset,
-                           SbSet set[])
-{
-  SbImport *im = s->im;
-  SbMasks *m = &s->part->masks;
-  uint64_t *bits, *got;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(im->ntags, &bits));
-  PetscCall(PetscCalloc1(s->nkept, &s->mask));
-  PetscCall(SbSetsBits(im, nbody, body, b, nset, set, bits));
-  PetscCall(mark_items(s, bits));
-  PetscCall(PetscFree(bits));
-  PetscCall(find_triangles(s));
-  PetscCall(SbSetsMark(im, &s->part->faces, nbody, body, b, nset, set, m));
-  // combine the set bits of shared vertices over all ranks
-  PetscCall(SbRouteSend(&s->vert, sizeof(uint64_t), NULL, m->vert, &got));
-  for (PetscInt i = 0; i < s->vert.nrecv; i++) s->mask[s->asked[i]] |= got[i];
-  for (PetscInt i = 0; i < s->vert.nrecv; i++) got[i] = s->mask[s->asked[i]];
-  PetscCall(SbRouteReply(&s->vert, sizeof(uint64_t), got, m->vert));
-  PetscCall(PetscFree(got));
-  /* count vertices at their home ranks */
-  PetscCall(SbSetsCount(s->comm, s->nkept, im->item[3].n, &(SbMasks){s->mask, m->cell, m->face}, nset, set));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ import */
 
 static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody body[], PetscInt b,
@@ -492,6 +464,8 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   SbItems *tets = &im->item[3];
   PetscInt low = PETSC_MAX_INT, high = -1, n = 0, *map;
   PetscInt64 *edge, *got;
+  SbMasks *m = &s->part->masks;
+  uint64_t *bits;
   PetscMPIInt *dest;
   SbRoute route;
 
@@ -556,11 +530,25 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   PetscCall(SbCountPinched(route.nrecv, got, &im->npinched));
   PetscCall(PetscFree(got));
   PetscCall(SbRouteDestroy(&route));
-  PetscCall(mark(s, nbody, body, b, nset, set));
+  // members of sets: groups of points, lines and triangles, then shapes and groups of tets
+  PetscCall(PetscMalloc1(im->ntags, &bits));
+  PetscCall(PetscCalloc1(s->nkept, &s->mask));
+  PetscCall(SbSetsBits(im, nbody, body, b, nset, set, bits));
+  PetscCall(mark_items(s, bits));
+  PetscCall(PetscFree(bits));
+  PetscCall(find_triangles(s));
+  PetscCall(SbSetsMark(im, &s->part->faces, nbody, body, b, nset, set, m));
+  // combine the set bits of shared vertices over all ranks; count vertices at their home ranks
+  PetscCall(SbRouteSend(&s->vert, sizeof(uint64_t), NULL, m->vert, &bits));
+  for (PetscInt i = 0; i < s->vert.nrecv; i++) s->mask[s->asked[i]] |= bits[i];
+  for (PetscInt i = 0; i < s->vert.nrecv; i++) bits[i] = s->mask[s->asked[i]];
+  PetscCall(SbRouteReply(&s->vert, sizeof(uint64_t), bits, m->vert));
+  PetscCall(PetscFree(bits));
+  PetscCall(SbSetsCount(s->comm, s->nkept, tets->n, &(SbMasks){s->mask, m->cell, m->face}, nset, set));
   PetscCall(sum(s, 1, &im->npinched));
   PetscCall(sum(s, 1, &im->nlost));
   PetscCall(SbImportNote(im, &body[b]));
-  PetscCall(SbImportCurve(s->comm, im, &body[b], s->part->masks.cell, &s->part->edge_off));
+  PetscCall(SbImportCurve(s->comm, im, &body[b], m->cell, &s->part->edge_off));
   PetscCall(PetscFree(s->part->faces.face)); /* no longer needed: neighbours are known */
   PetscCall(PetscFree(s->part->faces.start));
   PetscFunctionReturn(PETSC_SUCCESS);
