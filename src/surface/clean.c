@@ -15,10 +15,7 @@
 
 static PetscReal distance2(const SbTriangles *t, PetscInt v, PetscInt w)
 {
-  PetscReal d[3];
-
-  SbSubtract(t->x + 3 * v, t->x + 3 * w, d);
-  return SbDot3(d, d);
+  return SbDistance2(t->x + 3 * v, t->x + 3 * w);
 }
 
 /* ------------------------------------------------------------------ duplicates */

@@ -28,7 +28,6 @@
 typedef struct {
   PetscInt first;   /* a triangle of the shell */
   PetscInt surface; /* surface of its triangles */
-  PetscInt parent;  /* negative shell: the positive shell around it, or OUTSIDE */
   PetscReal volume, area;
   PetscReal box[6];
   PetscBool empty; /* positive shell without material */
@@ -375,7 +374,6 @@ static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
     for (int i = 0; i < 3; i++)
       middle[i] = (t->x[3 * v[0] + i] + t->x[3 * v[1] + i] + t->x[3 * v[2] + i]) / 3;
     s->surfaces[k].parent = s->nsurface > 1 ? shell_around(s, middle, k) : OUTSIDE;
-    s->shells[s->surfaces[k].outer].parent = s->surfaces[k].parent;
   }
   if (!s->f->sheets) empty_cavities(s);
   // points in the file: each must lie in a region; those of holes are empty
@@ -394,8 +392,8 @@ static PetscErrorCode find_regions(Arrangement *s, SbSurface *out)
   // number the positive shells with material; a negative shell has the number of the region around it
   for (Shell *p = s->shells; p < s->shells + s->nshell; p++)
     p->region = p->volume > 0 && !p->empty ? n++ : OUTSIDE;
-  for (Shell *p = s->shells; p < s->shells + s->nshell; p++)
-    if (p->volume < 0 && p->parent != OUTSIDE) p->region = s->shells[p->parent].region;
+  for (const Surface *u = s->surfaces; u < s->surfaces + s->nsurface; u++)
+    if (u->parent != OUTSIDE) s->shells[u->outer].region = s->shells[u->parent].region;
   PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: no region is left beside its holes; remove one of them", s->f->where);
   // output triangles with material on at least one side, and their vertices

@@ -90,11 +90,10 @@ static PetscErrorCode untangle(SbTriangles *t, PetscReal reach, Search *s, SbSur
     smooth(t, active, sum);
     m->nuntangled = 0;
     for (PetscInt v = 0; v < t->nvert; v++) {
-      PetscReal d[3];
+      const PetscReal d2 = SbDistance2(t->x + 3 * v, x0 + 3 * v);
 
-      SbSubtract(t->x + 3 * v, x0 + 3 * v, d);
-      m->nuntangled += SbDot3(d, d) > 0;
-      most = PetscMax(most, SbDot3(d, d));
+      m->nuntangled += d2 > 0;
+      most = PetscMax(most, d2);
     }
     m->untangled = PetscSqrtReal(most);
     PetscCall(find_pairs(t, s));

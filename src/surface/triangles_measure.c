@@ -27,12 +27,10 @@ PetscReal SbTrianglesMeanEdge(const SbTriangles *t)
   PetscReal sum = 0;
 
   for (PetscInt f = 0; f < t->ntri; f++) {
-    PetscReal e[3], around = 0;
+    PetscReal around = 0;
 
-    for (int k = 0; k < 3; k++) {
-      SbSubtract(corner(t, f, (k + 1) % 3), corner(t, f, k), e);
-      around += PetscSqrtReal(SbDot3(e, e));
-    }
+    for (int k = 0; k < 3; k++)
+      around += PetscSqrtReal(SbDistance2(corner(t, f, (k + 1) % 3), corner(t, f, k)));
     sum += around;
   }
   return t->ntri ? sum / (3 * (PetscReal)t->ntri) : 0;
