@@ -337,8 +337,8 @@ static PetscErrorCode read_list(Nastran *b, const char *kind, int nskip)
 
 static PetscErrorCode read_entry(Nastran *b)
 {
-  char name[WORD];
-  int64_t number = 0;
+  char name[WORD], word[WORD];
+  int64_t number = 0, node;
 
   PetscFunctionBeginUser;
   if (continues(b)) PetscFunctionReturn(PETSC_SUCCESS); /* continuation of a skipped entry */
@@ -347,24 +347,18 @@ static PetscErrorCode read_entry(Nastran *b)
   if (!strcasecmp(name, "GRID")) PetscCall(read_grid(b));
   // default coordinate system of points
   if (!strcasecmp(name, "GRDSET")) {
-    char word[WORD];
-    int64_t system;
-
     PetscCall(next_field(b, word));
-    PetscCall(next_number(b, PETSC_FALSE, "coordinate system of the nodes", &system));
-    if (system)
+    PetscCall(next_number(b, PETSC_FALSE, "coordinate system of the nodes", &number));
+    if (number)
       SB_SCAN_ERROR(b->scan, "GRDSET gives the nodes in coordinate system %lld; write them in the basic one",
-                    (long long)system);
+                    (long long)number);
   }
   // SPC: twice a node, its components and their displacement
   if (!strcasecmp(name, "SPC")) {
-    char word[WORD];
-    int64_t spc = 0, node;
-
-    PetscCall(next_number(b, PETSC_TRUE, "spc of a set", &spc));
+    PetscCall(next_number(b, PETSC_TRUE, "spc of a set", &number));
     for (int i = 0; i < 2; i++) {
       PetscCall(next_number(b, PETSC_FALSE, "node of a set", &node));
-      if (node) PetscCall(add_range(b, "spc", spc, node, node));
+      if (node) PetscCall(add_range(b, "spc", number, node, node));
       for (int k = 0; k < 2; k++) PetscCall(next_field(b, word));
     }
   }

@@ -19,7 +19,7 @@ typedef struct {
   const SbImport *im;
   FILE *file;
   PetscBool binary;
-  PetscBool *used[4];     /* [ntags] whether items of the dimension have the tag set */
+  PetscBool (*used)[4];   /* [ntags] whether items of each dimension have the tag set */
   int home_dim;           /* dimension of the entity that has the nodes */
   PetscInt home;          /* tag set of that entity */
   int64_t *number;        /* [ngroup] numbers of the groups in the file */
@@ -262,12 +262,12 @@ static PetscErrorCode write_all(Out *out, PetscBool version22)
 
     // entities: one for each tag set of each dimension
     for (int d = 0; d < 4; d++)
-      for (PetscInt t = 0; t < im->ntags; t++) n[d] += out->used[d][t];
+      for (PetscInt t = 0; t < im->ntags; t++) n[d] += out->used[t][d];
     (void)fprintf(out->file, "$Entities\n");
     for (int d = 0; d < 4; d++) put(out, 8, n[d], d < 3 ? ' ' : '\n');
     for (int d = 0; d < 4; d++)
       for (PetscInt t = 0; t < im->ntags; t++)
-        if (out->used[d][t]) write_entity(out, d, t);
+        if (out->used[t][d]) write_entity(out, d, t);
     (void)fprintf(out->file, "%s$EndEntities\n", out->binary ? "\n" : "");
     // one block of nodes: all numbers, then all coordinates
     (void)fprintf(out->file, "$Nodes\n");
@@ -313,10 +313,12 @@ PetscErrorCode SbWrite_Gmsh(const SbImport *im, const char *path, SbMeshFormat f
   PetscCheck(out.file, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path,
              strerror(errno));
   (void)setvbuf(out.file, NULL, _IOFBF, 1 << 20);
+  if (im->nmiddle.n) PetscCall(SbImportEdgesCreate(im, &out.edges));
+  out.nnode = im->nvert + out.edges.nedge;
+  PetscCall(PetscCalloc3(im->ntags, &out.used, im->ngroup, &out.number, 3 * (size_t)out.nnode, &out.x));
   // tag sets of each dimension; nodes belong to the first entity of the highest dimension
   for (int d = 0; d < 4; d++) {
-    PetscCall(PetscCalloc1(im->ntags, &out.used[d]));
-    for (PetscInt i = 0; i < im->item[d].n; i++) out.used[d][im->item[d].tags[i]] = PETSC_TRUE;
+    for (PetscInt i = 0; i < im->item[d].n; i++) out.used[im->item[d].tags[i]][d] = PETSC_TRUE;
     if (im->item[d].n) {
       out.home_dim = d;
       out.home = im->item[d].tags[0];
@@ -324,7 +326,6 @@ PetscErrorCode SbWrite_Gmsh(const SbImport *im, const char *path, SbMeshFormat f
     out.total += im->item[d].n;
   }
   // group numbers from 1 to INT32_MAX are kept; others are invalid in gmsh and get the next free numbers
-  PetscCall(PetscMalloc1(im->ngroup, &out.number));
   for (int later = 0; later < 2; later++) {
     for (PetscInt g = 0; g < im->ngroup; g++) {
       const SbGroup *p = &im->group[g];
@@ -338,9 +339,6 @@ PetscErrorCode SbWrite_Gmsh(const SbImport *im, const char *path, SbMeshFormat f
     }
   }
   // nodes: the vertices and, if there are curved edges, a node for each edge
-  if (im->nmiddle.n) PetscCall(SbImportEdgesCreate(im, &out.edges));
-  out.nnode = im->nvert + out.edges.nedge;
-  PetscCall(PetscMalloc1(3 * (size_t)out.nnode, &out.x));
   PetscCall(PetscArraycpy(out.x, im->x, 3 * (size_t)im->nvert));
   if (im->nmiddle.n) SbImportEdgeNodes(im, &out.edges, out.x + 3 * im->nvert);
   errno = 0;
@@ -349,9 +347,7 @@ PetscErrorCode SbWrite_Gmsh(const SbImport *im, const char *path, SbMeshFormat f
     (void)fclose(out.file);
   else
     ierr = SbWriteEnd(out.file, path);
-  for (int d = 0; d < 4; d++) PetscCall(PetscFree(out.used[d]));
-  PetscCall(PetscFree(out.number));
+  PetscCall(PetscFree3(out.used, out.number, out.x));
   PetscCall(SbImportEdgesDestroy(&out.edges));
-  PetscCall(PetscFree(out.x));
   PetscFunctionReturn(ierr);
 }
