@@ -28,8 +28,6 @@ static PetscErrorCode prepare(PetscInt nbody, SbBody body[], PetscInt b, PetscIn
   PetscCall(SbSetsMark(im, &part->faces, nbody, body, b, nset, set, &part->masks));
   PetscCall(SbImportCurve(PETSC_COMM_SELF, im, &body[b], part->masks.cell, &part->edge_off));
   PetscCall(SbSetsCount(PETSC_COMM_SELF, im->nvert, im->item[3].n, &part->masks, nset, set));
-  PetscCall(PetscFree(part->faces.face)); /* no longer needed: neighbours are known */
-  PetscCall(PetscFree(part->faces.start));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -142,6 +140,8 @@ static PetscErrorCode build(MPI_Comm comm, const PetscBool slabs[], PetscInt nbo
       if (!rank) SB_CATCH(&caught, prepare(nbody, body, b, nset, set, shared, &im[b], &part[b]));
       PetscCall(SbCaughtRaise(comm, &caught));
     }
+    PetscCall(PetscFree(part[b].faces.face)); /* no longer needed: neighbours are known */
+    PetscCall(PetscFree(part[b].faces.start));
     w->ncell += im[b].item[3].n;
     w->nvert += im[b].nvert;
     w->nremote += part[b].nremote;

@@ -549,8 +549,6 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   PetscCall(sum(s, 1, &im->nlost));
   PetscCall(SbImportNote(im, &body[b]));
   PetscCall(SbImportCurve(s->comm, im, &body[b], m->cell, &s->part->edge_off));
-  PetscCall(PetscFree(s->part->faces.face)); /* no longer needed: neighbours are known */
-  PetscCall(PetscFree(s->part->faces.start));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
