@@ -33,30 +33,20 @@ const SbPointRule SbRuleQuintic = {SB_POINTS,
                                     {C, 0.5 - C, C, 0.5 - C},
                                     {C, C, 0.5 - C, 0.5 - C}},
                                    {WA, WA, WA, WA, WB, WB, WB, WB, WC, WC, WC, WC, WC, WC}};
-#undef A
-#undef B
-#undef C
-#undef WA
-#undef WB
-#undef WC
 
-#define A 0.10128650732345633  /* (6 - sqrt 15) / 21 */
-#define B 0.47014206410511505  /* (6 + sqrt 15) / 21 */
-#define WA 0.12593918054482717 /* (155 - sqrt 15) / 1200 */
-#define WB 0.13239415278850616 /* (155 + sqrt 15) / 1200 */
+#define P 0.10128650732345633  /* (6 - sqrt 15) / 21 */
+#define Q 0.47014206410511505  /* (6 + sqrt 15) / 21 */
+#define WP 0.12593918054482717 /* (155 - sqrt 15) / 1200 */
+#define WQ 0.13239415278850616 /* (155 + sqrt 15) / 1200 */
 const SbPointRule SbRuleFacet = {7,
-                                 {{1 - 2 * A, A, A},
-                                  {A, 1 - 2 * A, A},
-                                  {A, A, 1 - 2 * A},
-                                  {1 - 2 * B, B, B},
-                                  {B, 1 - 2 * B, B},
-                                  {B, B, 1 - 2 * B},
+                                 {{1 - 2 * P, P, P},
+                                  {P, 1 - 2 * P, P},
+                                  {P, P, 1 - 2 * P},
+                                  {1 - 2 * Q, Q, Q},
+                                  {Q, 1 - 2 * Q, Q},
+                                  {Q, Q, 1 - 2 * Q},
                                   {1. / 3, 1. / 3, 1. / 3}},
-                                 {WA, WA, WA, WB, WB, WB, 9. / 40}};
-#undef A
-#undef B
-#undef WA
-#undef WB
+                                 {WP, WP, WP, WQ, WQ, WQ, 9. / 40}};
 
 void SbQuadraticBasis(const PetscReal L[4], PetscReal phi[SB_CELL_NODES])
 {

@@ -261,29 +261,20 @@ PetscBool SbScanWord(SbScan *s, size_t size, char word[])
 PetscErrorCode SbScanType(SbScan *s, SbNumberType *type)
 {
   static const struct {
-    const char *name, *other;
+    const char *name[3];
     SbNumberType type;
-  } types[] = {{"char", "int8", {'i', 1}},
-               {"uchar", "uint8", {'u', 1}},
-               {"short", "int16", {'i', 2}},
-               {"ushort", "uint16", {'u', 2}},
-               {"int", "int32", {'i', 4}},
-               {"uint", "uint32", {'u', 4}},
-               {"float", "float32", {'f', 4}},
-               {"double", "float64", {'f', 8}},
-               {"long", "vtktypeint64", {'i', 8}},
-               {"unsigned_char", "", {'u', 1}},
-               {"unsigned_short", "", {'u', 2}},
-               {"unsigned_int", "", {'u', 4}},
-               {"unsigned_long", "vtktypeuint64", {'u', 8}},
-               {"vtkidtype", "", {'i', 4}}};
+  } types[] = {{{"char", "int8", ""}, {'i', 1}},          {{"uchar", "uint8", "unsigned_char"}, {'u', 1}},
+               {{"short", "int16", ""}, {'i', 2}},        {{"ushort", "uint16", "unsigned_short"}, {'u', 2}},
+               {{"int", "int32", "vtkidtype"}, {'i', 4}}, {{"uint", "uint32", "unsigned_int"}, {'u', 4}},
+               {{"float", "float32", ""}, {'f', 4}},      {{"double", "float64", ""}, {'f', 8}},
+               {{"long", "vtktypeint64", ""}, {'i', 8}},  {{"unsigned_long", "vtktypeuint64", ""}, {'u', 8}}};
   char word[32];
 
   PetscFunctionBeginUser;
   (void)SbScanWord(s, sizeof(word), word);
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(types) && word[0]; i++) {
-    if (strcasecmp(word, types[i].name) && strcasecmp(word, types[i].other)) continue;
-    *type = types[i].type;
+  for (size_t i = 0; i < 3 * PETSC_STATIC_ARRAY_LENGTH(types) && word[0]; i++) {
+    if (strcasecmp(word, types[i / 3].name[i % 3])) continue;
+    *type = types[i / 3].type;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   SB_SCAN_ERROR(s, "expected a type of numbers, as float or int, found '%s'", word);
