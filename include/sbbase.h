@@ -134,12 +134,10 @@ PetscBool SbHasPrefix(const char *word, const char *beginnings);
 /*
   SbErrorHandlerInstall - from here on a user error (PETSC_ERR_USER, PETSC_ERR_USER_INPUT, PETSC_ERR_FILE_*, a
   bad option file) is not printed where it happens, but by SbErrorFinish(). Other errors get PETSc's trace.
-  Collective; after MPI_Init() and before PetscInitialize().
+  Collective; after MPI_Init(), before PetscInitialize(). program: a literal, begins error lines and warnings.
 */
-PetscErrorCode SbErrorHandlerInstall(void);
+PetscErrorCode SbErrorHandlerInstall(const char *program);
 void SbErrorSetTrace(PetscBool trace); /* the stack of calls with every error, also of the input */
-/* The name that begins error lines and warnings, "supple" without this call; a literal. */
-void SbErrorSetProgram(const char *name);
 /* The option file that PETSc is about to read: PETSc's messages about YAML do not name it. */
 void SbErrorSetFile(const char *file);
 /* Adds the line of a syntax error in a YAML file, "line 6: ...", to the message of PETSc's error. */

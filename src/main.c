@@ -70,7 +70,7 @@ static PetscErrorCode supple(int argc, char *argv[])
 
   PetscFunctionBeginUser;
   /* initialise libraries and error handling */
-  PetscCall(SbErrorHandlerInstall());
+  PetscCall(SbErrorHandlerInstall("supple"));
   PetscCall(SbCommandLine(&argc, argv, &command));
   ierr = PetscInitialize(&argc, &argv, command.scenario[0] ? command.scenario : NULL, NULL);
   if (ierr) SbErrorFindYamlLine();

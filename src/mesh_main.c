@@ -14,8 +14,7 @@ static PetscErrorCode supple_mesh(int argc, char *argv[])
   SbTool tool;
 
   PetscFunctionBeginUser;
-  PetscCall(SbErrorHandlerInstall());
-  SbErrorSetProgram("supple-mesh");
+  PetscCall(SbErrorHandlerInstall("supple-mesh"));
   PetscCall(SbToolCommandLine(&argc, argv, &line));
   PetscCall(PetscInitialize(&argc, &argv, NULL, NULL));
   SbMemoryReturnLarge();

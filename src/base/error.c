@@ -98,9 +98,10 @@ static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, con
   return PetscTraceBackErrorHandler(PETSC_COMM_SELF, line, function, file, n, p, mess, NULL);
 }
 
-PetscErrorCode SbErrorHandlerInstall(void)
+PetscErrorCode SbErrorHandlerInstall(const char *program)
 {
   PetscFunctionBeginUser;
+  state.program = program;
   PetscCallMPI(MPI_Comm_dup(MPI_COMM_WORLD, &state.comm));
   PetscCall(PetscPushErrorHandler(handler, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -109,11 +110,6 @@ PetscErrorCode SbErrorHandlerInstall(void)
 void SbErrorSetTrace(PetscBool trace)
 {
   state.trace = trace;
-}
-
-void SbErrorSetProgram(const char *name)
-{
-  state.program = name;
 }
 
 void SbErrorSetFile(const char *file)

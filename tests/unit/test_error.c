@@ -19,7 +19,7 @@ static PetscErrorCode fails(const char *what)
 static PetscErrorCode program(int argc, char **argv, PetscMPIInt rank, PetscMPIInt size)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbErrorHandlerInstall());
+  PetscCall(SbErrorHandlerInstall("supple"));
   PetscCall(PetscInitialize(&argc, &argv, NULL, NULL));
   PetscCall(SbWarning(PETSC_COMM_WORLD, "a warning of %d rank%s", (int)size, size == 1 ? "" : "s"));
   if (rank == size - 1) PetscCall(fails("the last rank failed"));
