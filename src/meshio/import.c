@@ -192,17 +192,6 @@ PetscErrorCode SbImportRead(const SbBody *body, SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbImportSlabs(const SbBody *body, PetscInt *ncell)
-{
-  const char *dot = strrchr(body->mesh, '.');
-
-  PetscFunctionBeginUser;
-  *ncell = 0;
-  if (!body->in_memory && !body->mesh_step && dot && !strcasecmp(dot, ".h5"))
-    PetscCall(SbImportSlabs_H5(body->mesh, ncell));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbImportSlab(const SbBody *body, PetscInt k, PetscInt n, SbImport *im, SbSlabRows *rows)
 {
   PetscFunctionBeginUser;

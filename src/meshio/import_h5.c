@@ -17,6 +17,7 @@
   compressed by others, at most a thousand times that).
 */
 #include <stdlib.h>
+#include <strings.h>
 #include "meshio_impl.h"
 
 typedef struct {
@@ -561,15 +562,18 @@ PetscErrorCode SbImportRead_H5(const char *path, SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbImportSlabs_H5(const char *path, PetscInt *ncell)
+PetscErrorCode SbImportSlabs(const SbBody *body, PetscInt *ncell)
 {
+  const char *dot = strrchr(body->mesh, '.');
   hid_t file, set, space;
   hsize_t size[2] = {0, 0};
 
   PetscFunctionBeginUser;
   *ncell = 0;
+  if (body->in_memory || body->mesh_step || !dot || strcasecmp(dot, ".h5"))
+    PetscFunctionReturn(PETSC_SUCCESS);
   (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
-  file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+  file = H5Fopen(body->mesh, H5F_ACC_RDONLY, H5P_DEFAULT);
   if (file < 0) PetscFunctionReturn(PETSC_SUCCESS);
   set = H5Aexists(file, "supple_mesh") > 0 ? H5Dopen2(file, "/mesh/cells", H5P_DEFAULT) : -1;
   space = set >= 0 ? H5Dget_space(set) : -1;

@@ -26,9 +26,8 @@ PetscErrorCode SbImportRead_UNV(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Box(const char *text, SbImport *body);
 PetscErrorCode SbImportRead_H5(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Xdmf(const char *path, SbImport *body);
-/* Reads block k of n of all arrays of an .h5 mesh; SbImportSlabs_H5: its number of tets; other files: 0. */
+/* Reads block k of n of all arrays of an .h5 mesh. */
 PetscErrorCode SbImportSlab_H5(const char *path, PetscInt k, PetscInt n, SbImport *body, SbSlabRows *rows);
-PetscErrorCode SbImportSlabs_H5(const char *path, PetscInt *ncell);
 
 /* ------------------------------------------------------------------ gmsh's element types */
 
