@@ -12,8 +12,6 @@
 */
 #include "mesh_impl.h"
 
-/* ------------------------------------------------------------------ unused vertices */
-
 PetscErrorCode SbImportDropUnused(SbImport *im)
 {
   const PetscInt before = im->nvert;
@@ -27,8 +25,6 @@ PetscErrorCode SbImportDropUnused(SbImport *im)
   PetscCall(PetscFree(keep));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ single tets */
 
 static inline PetscReal longest_edge2(const PetscReal x[], const PetscInt v[4])
 {
@@ -54,8 +50,6 @@ PetscReal SbImportLargest(const SbImport *im)
   for (PetscInt i = 0; i < 3 * im->nvert; i++) largest = PetscMax(largest, PetscAbsReal(im->x[i]));
   return largest;
 }
-
-/* ------------------------------------------------------------------ tets together */
 
 PetscErrorCode SbImportTwice(const SbImport *im, int64_t a, int64_t b)
 {

@@ -23,8 +23,6 @@ PetscErrorCode SbMeshRegister(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ the mesh */
-
 PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[],
                             SbMesh *mesh)
 {

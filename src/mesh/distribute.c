@@ -12,8 +12,6 @@
 #include <stdlib.h>
 #include "mesh_impl.h"
 
-/* ------------------------------------------------------------------ sending cells */
-
 PetscErrorCode SbLocalMeshDestroy(SbLocalMesh *c)
 {
   PetscFunctionBeginUser;
@@ -86,8 +84,7 @@ static PetscErrorCode ascending(PetscInt n, size_t unit, const void *record, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ shared vertices */
-
+/* Vertices that several ranks have. */
 typedef struct {
   PetscInt vert, orig, n;
   const PetscInt *rank; /* [n] ranks that have the vertex, ascending; stride 2 in Border.pair */
@@ -180,8 +177,6 @@ static int compare_shared(const void *a, const void *b)
   return (p->orig > q->orig) - (p->orig < q->orig);
 }
 
-/* ------------------------------------------------------------------ ghosts */
-
 /* Lists the owned cells to copy, and the destination ranks. */
 static PetscErrorCode list_copies(const SbLocalMesh *local, const Border *border, PetscBool all,
                                   PetscMPIInt me, PetscMPIInt size, SbRouteList *list)
@@ -212,8 +207,6 @@ static PetscErrorCode list_copies(const SbLocalMesh *local, const Border *border
   PetscCall(PetscFree2(shared, mark));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ distribution */
 
 PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, SbMergedMesh *w,
                             SbLocalMesh *local)

@@ -5,8 +5,6 @@
 
 const PetscReal SbRatioBinEdges[SB_RATIO_BINS] = {1, 1.25, 1.5, 2, 3, 5, 10, 100};
 
-/* ------------------------------------------------------------------ groups */
-
 /* Length, area or signed volume of a simplex with straight edges. */
 static PetscReal straight(const PetscReal x[], int dim, const PetscInt v[])
 {
@@ -65,8 +63,6 @@ PetscErrorCode SbMeshFileGroup(const SbImport *im, PetscInt i, SbMeshGroup *grou
   PetscCall(PetscFree(in));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ shape */
 
 PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshStatistics *facts)
 {

@@ -20,8 +20,7 @@
 #define SAMPLES 65536 /* sampled tets of all parts together, at least */
 #define SWEEPS 4      /* number of sweeps that improve the interfaces */
 
-/* ------------------------------------------------------------------ bisection */
-
+/* The tree of a bisection. */
 typedef struct {
   int axis; /* axis of the cut, -1: leaf */
   PetscReal cut;
@@ -81,8 +80,6 @@ static PetscErrorCode split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3],
   PetscCall(split(t, t->node[at].next + 1, n - below, x + below, k - half));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ METIS */
 
 /* Gathers the graph on rank 0, by original numbers: the result is alike for any distribution of cells. */
 static PetscErrorCode cut_graph(MPI_Comm comm, const SbMergedMesh *w, PetscSF sf, PetscMPIInt part[])
@@ -145,8 +142,6 @@ static PetscErrorCode cut_graph(MPI_Comm comm, const SbMergedMesh *w, PetscSF sf
   PetscCall(PetscFree4(orig, remote, across, dest));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ partition */
 
 PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh *w, PetscMPIInt part[])
 {

@@ -11,8 +11,6 @@
 */
 #include "mesh_impl.h"
 
-/* ------------------------------------------------------------------ welding */
-
 /* Replaces each vertex in items by the first vertex within the tolerance; the others become unused. */
 static PetscErrorCode weld(SbImport *im, PetscReal tolerance, SbRepair *done)
 {
@@ -41,8 +39,7 @@ static PetscErrorCode weld(SbImport *im, PetscReal tolerance, SbRepair *done)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ single items */
-
+/* Drops the items of a dimension that use a vertex twice. */
 static void drop_collapsed(SbImport *im, int dim, PetscInt *ndropped)
 {
   SbItems *item = &im->item[dim];
@@ -59,8 +56,6 @@ static void drop_collapsed(SbImport *im, int dim, PetscInt *ndropped)
   *ndropped += item->n - kept;
   item->n = kept;
 }
-
-/* ------------------------------------------------------------------ the whole mesh */
 
 PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *done)
 {

@@ -67,8 +67,6 @@ static PetscErrorCode send_home(const Slab *s, PetscInt n, size_t unit, const vo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ vertices */
-
 /* Positions and original numbers of the vertices of this rank's tets. */
 static PetscErrorCode ask_home_ranks(Slab *s)
 {
@@ -116,8 +114,7 @@ static PetscErrorCode ask_home_ranks(Slab *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ faces between tets of two ranks */
-
+/* A face that may be between tets of two ranks, and the tet across it. */
 typedef struct {
   PetscInt vert[3], at; /* ascending; slot at the sender, position in the received array */
   PetscInt cell;        /* local index plus the number of cells of earlier bodies, as in SbPart.remote */
@@ -222,8 +219,7 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ connected parts */
-
+/* Number of connected parts of the body. */
 static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
 {
   const SbImport *im = s->im;
@@ -274,8 +270,6 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
   PetscCall(PetscFree2(user, pair));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ points, lines and triangles of groups */
 
 /* Adds set bits of items to the masks of their vertices at the home ranks, unless one of these is unused. */
 static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
@@ -415,8 +409,6 @@ static PetscErrorCode find_triangles(Slab *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ curved edges */
-
 /* Sends each curved edge to the ranks that use its lower vertex; the ranks whose tets have it keep it. */
 static PetscErrorCode find_edges(Slab *s)
 {
@@ -451,8 +443,6 @@ static PetscErrorCode find_edges(Slab *s)
   SbImportNoteMiddles(im, total, largest);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ import */
 
 static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody body[], PetscInt b,
                               PetscInt nset, SbSet set[])

@@ -45,8 +45,6 @@ static void list_parts(SbImport *im, const Header *h, Part part[NPART])
   }
 }
 
-/* ------------------------------------------------------------------ the child */
-
 void SbChildIsolate(pid_t parent, PetscReal seconds)
 {
   const PetscReal most = PetscMin(seconds, 1e9), whole = PetscFloorReal(most);
@@ -86,8 +84,6 @@ static void child(FILE *file, const SbGmshJob *job)
     if (part[i].bytes) (void)fwrite(*part[i].array, part[i].bytes, 1, file);
   _exit(fflush(file) || ferror(file) ? 1 : 0);
 }
-
-/* ------------------------------------------------------------------ the parent */
 
 PetscErrorCode SbGmshRun(const SbGmshJob *job, SbImport *im)
 {

@@ -32,8 +32,6 @@ static const struct {
 #undef ROW
 };
 
-/* ------------------------------------------------------------------ messages */
-
 /* Last line of the log with the prefix `level`, without the prefix; "" if there is none. */
 static void last_line(const SbGmsh *g, const char *level, size_t size, char text[])
 {
@@ -63,8 +61,6 @@ PetscErrorCode SbGmshError(const SbGmsh *g, const char *function)
           text[0] ? text : "no reason given", function);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ the job */
 
 PetscErrorCode SbGmshCall(const SbGmshJob *job, SbImport *im)
 {

@@ -26,8 +26,6 @@ typedef struct {
   Entity *entity; /* [nentity] */
 } Gmsh;
 
-/* ------------------------------------------------------------------ format, names, entities */
-
 static PetscErrorCode read_format(Gmsh *g)
 {
   static const struct {
@@ -123,8 +121,6 @@ static PetscErrorCode read_entities(Gmsh *g)
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ nodes and elements */
 
 /* Reads the numbers of blocks and of nodes or elements; before version 4 there is one block, and the number
    is text also in a binary file. */
@@ -283,8 +279,6 @@ static PetscErrorCode read_elements(Gmsh *g)
                   (long long)(total - left));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ the file */
 
 PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
 {

@@ -105,8 +105,6 @@ PetscErrorCode SbImportRead_NetgenNeutral(const char *path, SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ .vol */
-
 /* Goes behind the line that consists of this word; false if there is none. */
 static PetscBool find_section(SbScan *s, const char *name)
 {

@@ -20,8 +20,6 @@ static const struct {
   {113, 18}, {104, 5}, {115, 5}, {105, 17}, {116, 17},
 };
 
-/* ------------------------------------------------------------------ lines */
-
 /* Whether this line is a delimiter: -1 and nothing else. */
 static PetscBool is_mark(const SbScan *s)
 {
@@ -31,8 +29,6 @@ static PetscBool is_mark(const SbScan *s)
   p += 2 + strspn(p + 2, " \t\r\v\f");
   return (PetscBool)(*p == '\n' || p == s->end);
 }
-
-/* ------------------------------------------------------------------ nodes and elements */
 
 static PetscErrorCode read_element(SbDeck *d)
 {
@@ -70,8 +66,6 @@ static PetscErrorCode read_element(SbDeck *d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ groups */
-
 /* Reads a group. A member has nvalue values: kind (7 a node, 8 an element), label, since 2435 two more. */
 static PetscErrorCode read_group(SbDeck *d, int nvalue)
 {
@@ -100,8 +94,6 @@ static PetscErrorCode read_group(SbDeck *d, int nvalue)
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ the file */
 
 PetscErrorCode SbImportRead_UNV(const char *path, SbImport *im)
 {

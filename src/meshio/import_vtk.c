@@ -17,8 +17,6 @@ typedef struct {
   const char *cells_at;              /* position of the cells, for messages */
 } Vtk;
 
-/* ------------------------------------------------------------------ numbers */
-
 /* Reads n numbers of this type into an array that it allocates; value NULL: skips them. */
 static PetscErrorCode read_array(Vtk *v, const char *what, int64_t n, SbNumberType type, double **value)
 {
@@ -44,8 +42,6 @@ static PetscErrorCode read_array(Vtk *v, const char *what, int64_t n, SbNumberTy
   s->at += bytes;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ points and cells */
 
 static PetscErrorCode read_cells(Vtk *v)
 {
@@ -97,8 +93,6 @@ static PetscErrorCode read_cells(Vtk *v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ data */
-
 /* Reads an array of `ncomponent` numbers per tuple; kept if it has one number per cell. */
 static PetscErrorCode read_data(Vtk *v, const char *name, int64_t ncomponent, int64_t ntuple,
                                 SbNumberType type)
@@ -118,8 +112,6 @@ static PetscErrorCode read_data(Vtk *v, const char *name, int64_t ncomponent, in
     PetscCall(read_array(v, "data", ncomponent * ntuple, type, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ the file */
 
 static PetscErrorCode read_section(Vtk *v, const char *section)
 {

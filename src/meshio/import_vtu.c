@@ -28,8 +28,6 @@ typedef struct {
   unsigned char *raw;      /* decoded bytes of the last array */
 } Vtu;
 
-/* ------------------------------------------------------------------ XML */
-
 /* A tag, from its < to behind its >. */
 typedef struct {
   const char *open, *close;
@@ -87,8 +85,6 @@ static PetscErrorCode attribute_number(Vtu *v, Tag tag, const char *name, int64_
     SB_SCAN_ERROR(v->scan, "expected a number %s=\"...\", found '%s'", name, value);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ bytes */
 
 /* Decoder of raw or base64 bytes. */
 typedef struct {
@@ -153,8 +149,6 @@ static PetscErrorCode take_length(Vtu *v, Bytes *b, const char *name, size_t *le
   *length = (size_t)value;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ arrays */
 
 /* Decompresses an array: number and size of blocks, size of a smaller last one, compressed sizes; blocks. */
 static PetscErrorCode take_blocks(Vtu *v, Bytes *b, const char *name, size_t want, unsigned char out[])
@@ -258,8 +252,6 @@ static PetscErrorCode read_array(Vtu *v, Tag tag, int64_t n, double **value)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ the parts of a grid */
-
 /* Content of an element, from after its > to the < of its end tag. */
 static PetscErrorCode content(Vtu *v, const char *name, const char **from, const char **end)
 {
@@ -297,8 +289,6 @@ static PetscErrorCode read_cell_array(Vtu *v, const char *name, int64_t n, doubl
   SB_SCAN_ERROR(v->scan, "the element Cells has no array '%s'", name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ the file */
 
 PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
 {

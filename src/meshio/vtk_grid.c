@@ -34,8 +34,6 @@ PetscErrorCode SbVtkSetPoints(PetscInt n, const double x[], SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ cells */
-
 PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
 {
   SbScan *s = &im->scan;

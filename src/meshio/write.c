@@ -41,8 +41,6 @@ void SbMeshFileCount(const SbImport *im, PetscInt *nvert, PetscInt n[4])
   for (int d = 0; d < 4; d++) n[d] = im->item[d].n;
 }
 
-/* ------------------------------------------------------------------ writing */
-
 /* Renames a file that has been written, or removes it after an error. */
 static PetscErrorCode finish(PetscErrorCode ierr, const char *part, const char *path)
 {

@@ -35,8 +35,6 @@ static const int gmsh_type[2][4] = {{SB_GMSH_POINT, SB_GMSH_LINE, SB_GMSH_TRIANG
 /* Edges of an item by dimension, in gmsh's order. */
 static const int nedge_of[4] = {0, 1, 3, 6}, edge_of[6][2] = {{0, 1}, {1, 2}, {2, 0}, {3, 0}, {2, 3}, {1, 3}};
 
-/* ------------------------------------------------------------------ numbers */
-
 /* Writes an integer: text and a separator, or 4 or 8 bytes; fprintf() takes four times as long. */
 static void put(Out *out, int bytes, int64_t value, char after)
 {
@@ -71,8 +69,6 @@ static PetscErrorCode report_progress(Out *out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ nodes */
-
 /* Writes the nodes of an item of dimension d. */
 static void put_nodes(Out *out, int d, const PetscInt v[], int bytes)
 {
@@ -85,8 +81,6 @@ static void put_nodes(Out *out, int d, const PetscInt v[], int bytes)
     put(out, bytes, out->im->nvert + at + 1, e + 1 < nedge ? ' ' : '\n');
   }
 }
-
-/* ------------------------------------------------------------------ groups */
 
 /* Whether the name of a group differs from the default for its number. */
 static PetscBool has_name(const Out *out, PetscInt g)
@@ -117,8 +111,7 @@ static PetscInt count_groups(const SbImport *im, PetscInt tags, int dim)
   return n;
 }
 
-/* ------------------------------------------------------------------ version 4.1 */
-
+/* Version 4.1: an entity, which has the groups of a tag set. */
 static void write_entity(Out *out, int dim, PetscInt tags)
 {
   const SbImport *im = out->im;
@@ -187,8 +180,6 @@ static PetscErrorCode write_elements_41(Out *out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ version 2.2 */
-
 static PetscErrorCode write_elements_22(Out *out)
 {
   const SbImport *im = out->im;
@@ -225,8 +216,6 @@ static PetscErrorCode write_elements_22(Out *out)
   (void)fprintf(out->file, "%s$EndElements\n", out->binary ? "\n" : "");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ the file */
 
 static PetscErrorCode write_all(Out *out, PetscBool version22)
 {

@@ -17,8 +17,6 @@
 #include "remesh_impl.h"
 #include <petscblaslapack.h>
 
-/* ------------------------------------------------------------------ quality */
-
 PetscErrorCode SbCornerPositions(SbSpace s, Vec U, PetscReal x[])
 {
   const SbMesh mesh = s->mesh;
@@ -72,8 +70,7 @@ PetscErrorCode SbBodyQualities(SbModel m, Vec U, const PetscBool named[], PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ momenta */
-
+/* Momenta of the bodies with the velocities v, about these points or the origin. */
 static PetscErrorCode momenta_about(SbModel m, Vec U, const PetscReal v[], const PetscReal about[][4],
                                     PetscReal momenta[][6])
 {

@@ -18,8 +18,7 @@ static PetscReal distance2(const SbTriangles *t, PetscInt v, PetscInt w)
   return SbDistance2(t->x + 3 * v, t->x + 3 * w);
 }
 
-/* ------------------------------------------------------------------ duplicates */
-
+/* A triangle in the search for duplicates. */
 typedef struct {
   PetscInt vert[3]; /* ascending */
   PetscInt triangle;
@@ -91,8 +90,6 @@ PetscErrorCode SbSurfaceMergeVertices(SbTriangleFile *f, PetscReal tolerance, Sb
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ flat triangles */
-
 /* Longest edge of a triangle, the first of equal ones. */
 static int longest_edge(const SbTriangles *t, PetscInt f)
 {
@@ -142,8 +139,6 @@ static PetscErrorCode cut_flat(SbTriangleFile *f, SbKey edge[], PetscInt *ncut, 
   PetscCall(PetscFree2(flat, touched));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ open edges */
 
 /* Smallest tolerance with which each open edge has a partner; 0 if it is too large for rounding. */
 static PetscReal partner_distance(const SbTriangles *t, PetscInt n, const PetscInt slot[])

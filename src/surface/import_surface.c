@@ -60,8 +60,6 @@ PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOpt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ note of repairs */
-
 static void write_repairs(const SbTriangles *t, const SbSurfaceRepairs *m, size_t size, char text[])
 {
   const struct {
@@ -91,8 +89,6 @@ static void write_repairs(const SbTriangles *t, const SbSurfaceRepairs *m, size_
     if (rows_of[i].n)
       SbAppend(size, text, "%s%s: %" PetscInt_FMT, text[0] ? ", " : "", rows_of[i].what, rows_of[i].n);
 }
-
-/* ------------------------------------------------------------------ from file to tets */
 
 /* Surface of a body, or of an obstacle translated to `at`, with its regions; the repairs become a note. */
 static PetscErrorCode make_surface(const char *path, const PetscReal at[3], SbTriangleFile *f, SbSurface *s,
@@ -247,8 +243,6 @@ PetscErrorCode SbTrianglesRead(MPI_Comm comm, const char *option, const char *pa
   if (note[0]) PetscCall(SbWarning(comm, "%s: %s: %s", option, path, note));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ a body */
 
 PetscErrorCode SbSurfaceRead(const char *path, SbImport *im, SbSurface *s)
 {

@@ -10,8 +10,7 @@
 #define PASSES 60 /* largest number of smoothing passes */
 #define FEW 0.02  /* largest fraction of intersecting triangles that is smoothed */
 
-/* ------------------------------------------------------------------ intersecting pairs */
-
+/* Pairs of triangles that intersect. */
 typedef struct {
   PetscInt n; /* number of pairs found */
   PetscInt pair[NAMED][2];
@@ -42,8 +41,6 @@ static PetscErrorCode find_pairs(const SbTriangles *t, Search *s)
   PetscCall(SbBoxTreeDestroy(&tree));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ removal by smoothing */
 
 /* Laplacian smoothing: active vertices move halfway to the mean of their neighbours. Work space: sum. */
 static void smooth(SbTriangles *t, const PetscBool active[], PetscReal (*sum)[4])

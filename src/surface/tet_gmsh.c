@@ -23,8 +23,7 @@ typedef struct {
   Piece *piece;
 } Model;
 
-/* ------------------------------------------------------------------ surface to gmsh model */
-
+/* The surface becomes a model of gmsh. */
 static PetscErrorCode add_surface(const SbGmsh *g, Model *m)
 {
   const SbSurface *s = m->job->surface;
@@ -96,8 +95,6 @@ static PetscErrorCode cut_surface(const SbGmsh *g, Model *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ gmsh model to import */
-
 /* Adds the items of one entity; their vertices are node tags - 1. */
 static PetscErrorCode take_items(const SbGmsh *g, int dim, int entity, PetscInt tags, SbImport *im)
 {
@@ -117,8 +114,7 @@ static PetscErrorCode take_items(const SbGmsh *g, int dim, int entity, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ meshing */
-
+/* Makes the tets, in the child process. */
 static PetscErrorCode work(const SbGmsh *g, void *ctx, SbImport *im)
 {
   Model m = {.job = (const SbTetJob *)ctx};

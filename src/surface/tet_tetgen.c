@@ -23,8 +23,7 @@
 #define UNKNOWN (-2) /* region of a part that is not found yet */
 #define PATH_LENGTH (PETSC_MAX_PATH_LEN + 300)
 
-/* ------------------------------------------------------------------ child process */
-
+/* Raises the error of a child process that failed. */
 static PetscErrorCode check_end(const char *folder, int status)
 {
   char said[256] = "", path[PATH_LENGTH], line[256];
@@ -48,8 +47,6 @@ static PetscErrorCode check_end(const char *folder, int status)
           WIFSIGNALED(status) ? WTERMSIG(status) : WEXITSTATUS(status), said[0] ? ", saying: " : "", said);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ regions */
 
 /* The region of each tag set of tets, from the tets at facets; tags of facets become numbers of triangles. */
 static PetscErrorCode match_regions(const SbSurface *s, const SbFaces *faces, SbImport *im, PetscInt region[])
@@ -81,8 +78,6 @@ static PetscErrorCode match_regions(const SbSurface *s, const SbFaces *faces, Sb
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ backend */
 
 static PetscErrorCode work_in(const char *folder, const SbTetJob *job, SbImport *im)
 {

@@ -30,8 +30,6 @@ typedef struct {
   Element element[ELEMENTS_MAX];
 } Ply;
 
-/* ------------------------------------------------------------------ header */
-
 static PetscErrorCode read_property(Ply *p)
 {
   Element *e;
@@ -105,8 +103,6 @@ static PetscErrorCode read_header(Ply *p)
   p->s->binary = p->s->bytes = binary;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ values */
 
 /* Reads a number of any type. */
 static PetscErrorCode read_value(Ply *p, SbNumberType type, const char *what, double *value)

@@ -32,8 +32,6 @@ static PetscErrorCode read_counts(SbScan *s, const char *what, int n, int64_t co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ points */
-
 /* Reads points from this file, or from NAME.node. */
 static PetscErrorCode read_points(Poly *p, int64_t n)
 {
@@ -55,8 +53,6 @@ static PetscErrorCode read_points(Poly *p, int64_t n)
              p->f->where, (long long)index->twice);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ facets */
 
 /* Reads a polygon of a facet: the number of corners, and these, on one or more lines. */
 static PetscErrorCode read_polygon(Poly *p, const char *what, int64_t facet)
@@ -85,8 +81,6 @@ static PetscErrorCode read_polygon(Poly *p, const char *what, int64_t facet)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ holes and regions */
-
 /* Reads hole or region points; the part may be missing at the end of the file. */
 static PetscErrorCode read_seeds(Poly *p, const char *what, PetscBool attribute, PetscInt *n, SbSeed **seed)
 {
@@ -111,8 +105,6 @@ static PetscErrorCode read_seeds(Poly *p, const char *what, PetscBool attribute,
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ the file */
 
 PetscErrorCode SbTrianglesRead_Poly(SbScan *s, SbTriangleFile *f)
 {

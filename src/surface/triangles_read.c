@@ -26,8 +26,6 @@ static PetscErrorCode add_vertex(SbScan *s, SbTriangleFile *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ STL */
-
 /* Whether there is a next word; `end solid` becomes `endsolid`. */
 static PetscBool stl_next(SbScan *s, char word[32])
 {
@@ -120,8 +118,6 @@ PetscErrorCode SbTrianglesRead_STL(SbScan *s, SbTriangleFile *f)
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* ------------------------------------------------------------------ OBJ and OFF */
 
 PetscErrorCode SbTrianglesRead_OBJ(SbScan *s, SbTriangleFile *f)
 {
